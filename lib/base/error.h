@@ -1,0 +1,17 @@
+/* Filling in the caller's ebpo_error. */
+#ifndef EBPO_BASE_ERROR_H
+#define EBPO_BASE_ERROR_H
+
+#include <ebpo/base.h>
+
+/* Writes the message (printf style) and returns `status`, so that `return ebpo_fail(...)` reads well. `error` may be NULL.
+ * An error that is already set is overwritten. */
+ebpo_status ebpo_fail(ebpo_error *error, ebpo_status status, const char *format, ...) EBPO_PRINTF(3, 4);
+
+/* EBPO_E_MEMORY with the number of bytes that could not be had. */
+ebpo_status ebpo_fail_memory(ebpo_error *error, uint64_t bytes);
+
+/* EBPO_E_IO: "`path`: `what`: strerror(errno)". */
+ebpo_status ebpo_fail_errno(ebpo_error *error, const char *path, const char *what);
+
+#endif

@@ -1,0 +1,113 @@
+#include "base/parallel.h"
+
+#include <pthread.h>
+#include <sched.h>
+#include <stdatomic.h>
+#include <time.h>
+
+#include "base/error.h"
+
+enum { MAX_THREADS = 256 };
+
+typedef struct run {
+    uint64_t count, grain;
+    ebpo_task_fn task;
+    void *context;
+    const ebpo_progress *progress;
+    const char *stage;
+    _Atomic uint64_t next, done;
+    atomic_bool stop;
+    pthread_mutex_t lock; /* guards the three below */
+    uint64_t failed_at;
+    ebpo_status status;
+    ebpo_error error;
+} run;
+
+typedef struct worker {
+    run *r;
+    unsigned number;
+    pthread_t thread;
+} worker;
+
+unsigned ebpo_thread_count(unsigned requested)
+{
+    if (requested)
+        return requested < MAX_THREADS ? requested : MAX_THREADS;
+    cpu_set_t set;
+    int cores = sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 1;
+    return cores < 1 ? 1 : cores > MAX_THREADS ? MAX_THREADS : (unsigned)cores;
+}
+
+static void record_failure(run *r, uint64_t at, ebpo_status status, const ebpo_error *error)
+{
+    pthread_mutex_lock(&r->lock);
+    if (r->status == EBPO_OK || at < r->failed_at) {
+        r->failed_at = at;
+        r->status = status;
+        r->error = *error;
+    }
+    pthread_mutex_unlock(&r->lock);
+    atomic_store(&r->stop, true);
+}
+
+static double now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static void work(run *r, unsigned number)
+{
+    double last = now();
+    while (!atomic_load(&r->stop)) {
+        uint64_t begin = atomic_fetch_add(&r->next, r->grain);
+        if (begin >= r->count)
+            return;
+        uint64_t end = r->count - begin < r->grain ? r->count : begin + r->grain;
+        ebpo_error error = EBPO_ERROR_INIT;
+        ebpo_status status = r->task(r->context, begin, end, number, &error);
+        if (status != EBPO_OK)
+            record_failure(r, begin, status, &error);
+        uint64_t done = atomic_fetch_add(&r->done, end - begin) + (end - begin);
+        if (number == 0 && r->progress && r->progress->report && now() - last > 0.1) {
+            last = now();
+            if (!r->progress->report(r->progress->user, r->stage, done, r->count)) {
+                ebpo_fail(&error, EBPO_E_CANCELLED, "stopped on request during %s", r->stage);
+                record_failure(r, begin, EBPO_E_CANCELLED, &error);
+            }
+        }
+    }
+}
+
+static void *run_worker(void *argument)
+{
+    worker *w = argument;
+    work(w->r, w->number);
+    return NULL;
+}
+
+ebpo_status ebpo_parallel_for(unsigned threads, uint64_t count, uint64_t grain, ebpo_task_fn task, void *context,
+                              const ebpo_progress *progress, const char *stage, ebpo_error *error)
+{
+    run r = { .count = count, .grain = grain ? grain : 1, .task = task, .context = context, .progress = progress,
+              .stage = stage, .lock = PTHREAD_MUTEX_INITIALIZER, .status = EBPO_OK };
+    threads = ebpo_thread_count(threads);
+    uint64_t pieces = count / r.grain + 1;
+    if (threads > pieces)
+        threads = (unsigned)pieces;
+    worker workers[MAX_THREADS];
+    unsigned started = 1;
+    for (; started < threads; started++) {
+        workers[started] = (worker){ .r = &r, .number = started };
+        if (pthread_create(&workers[started].thread, NULL, run_worker, &workers[started]) != 0)
+            break; /* fewer threads give the same result */
+    }
+    work(&r, 0);
+    for (unsigned i = 1; i < started; i++)
+        pthread_join(workers[i].thread, NULL);
+    pthread_mutex_destroy(&r.lock);
+    if (r.status != EBPO_OK && error)
+        *error = r.error;
+    return r.status;
+}

@@ -1,0 +1,70 @@
+/* EBP-Octree in HDF5: status codes, errors, progress, version.
+ *
+ * Every function that can fail returns an ebpo_status. The detail goes into an
+ * ebpo_error that the caller owns; passing NULL for it is always allowed.
+ * There is no global or thread-local error state.
+ */
+#ifndef EBPO_BASE_H
+#define EBPO_BASE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#if defined(__GNUC__)
+#define EBPO_API __attribute__((visibility("default")))
+#define EBPO_MUST_USE __attribute__((warn_unused_result))
+#define EBPO_PRINTF(fmt, args) __attribute__((format(printf, fmt, args)))
+#else
+#define EBPO_API
+#define EBPO_MUST_USE
+#define EBPO_PRINTF(fmt, args)
+#endif
+
+/* Stable: numbers are never reused. */
+typedef enum ebpo_status {
+    EBPO_OK = 0,
+    EBPO_E_MEMORY = -1,      /* an allocation failed */
+    EBPO_E_ARGUMENT = -2,    /* the caller broke a documented precondition */
+    EBPO_E_IO = -3,          /* the operating system said no */
+    EBPO_E_FORMAT = -4,      /* a file is not what it says it is, or is damaged */
+    EBPO_E_VERSION = -5,     /* a file needs a newer reader (version or required part) */
+    EBPO_E_UNSUPPORTED = -6, /* valid, but this build or version cannot do it */
+    EBPO_E_NOT_SOLID = -7,   /* a solid is required and the mesh does not balance */
+    EBPO_E_LIMIT = -8,       /* a count or size is beyond a stated limit */
+    EBPO_E_CANCELLED = -9,   /* the progress callback asked to stop */
+    EBPO_E_ABSENT = -10      /* the file was written without the part that is needed */
+} ebpo_status;
+
+/* What went wrong, where, and what to do next, as one sentence without a newline. */
+typedef struct ebpo_error {
+    ebpo_status status;
+    char message[480];
+} ebpo_error;
+
+#define EBPO_ERROR_INIT { EBPO_OK, "" }
+
+/* Name of a status ("EBPO_E_FORMAT"); a static string, never NULL. */
+EBPO_API const char *ebpo_status_name(ebpo_status status);
+
+/* Library version, "major.minor.patch"; a static string. */
+EBPO_API const char *ebpo_version(void);
+
+/* Called from the thread that called the library, some times a second at most.
+ * `stage` is a static string; `total` is 0 when it is not known.
+ * Return false to stop: the running call then ends with EBPO_E_CANCELLED and leaves no file behind. */
+typedef bool (*ebpo_progress_fn)(void *user, const char *stage, uint64_t done, uint64_t total);
+
+typedef struct ebpo_progress {
+    ebpo_progress_fn report; /* NULL: silent */
+    void *user;
+} ebpo_progress;
+
+#ifdef __cplusplus
+}
+#endif
+#endif

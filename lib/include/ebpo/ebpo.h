@@ -1,0 +1,12 @@
+/* EBP-Octree in HDF5: the whole public interface. */
+#ifndef EBPO_EBPO_H
+#define EBPO_EBPO_H
+
+#include <ebpo/base.h>
+#include <ebpo/mesh.h>
+#include <ebpo/file.h>
+#include <ebpo/build.h>
+#include <ebpo/lod.h>
+#include <ebpo/verify.h>
+
+#endif

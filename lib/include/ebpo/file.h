@@ -1,0 +1,178 @@
+/* EBP-Octree in HDF5: what a `.ebpo.h5` file holds, reading and writing it. format-spec/ describes the same, byte by byte. */
+#ifndef EBPO_FILE_H
+#define EBPO_FILE_H
+
+#include <ebpo/mesh.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define EBPO_FORMAT_MAJOR 1
+#define EBPO_FORMAT_MINOR 0
+#define EBPO_LEVELS_MAX 21 /* levels 0 to 20 */
+
+/* A node's type, two bits in `types`. */
+typedef enum ebpo_node_type {
+    EBPO_WHITE = 0, /* no face touches the closed cell, which lies outside (in a surface model: no face touches it) */
+    EBPO_BLACK = 1, /* no face touches the closed cell, which lies inside */
+    EBPO_LEAF = 2,  /* lists its faces, has no children */
+    EBPO_GRAY = 3   /* has eight children */
+} ebpo_node_type;
+
+/* Which points a solid is made of, by their winding number w. */
+typedef enum ebpo_rule {
+    EBPO_RULE_NONZERO = 0,  /* w != 0 */
+    EBPO_RULE_EVENODD = 1,  /* w odd */
+    EBPO_RULE_POSITIVE = 2  /* w > 0 */
+} ebpo_rule;
+
+/* Parts of a file, as bits. */
+typedef enum ebpo_part {
+    EBPO_PART_PLANES = 1,      /* envelope planes of gray nodes */
+    EBPO_PART_MESH = 2,        /* vertices, faces and the leaves' face lists */
+    EBPO_PART_MAPS = 4,        /* source numbers of vertices and faces */
+    EBPO_PART_LEAF_PLANES = 8  /* stored envelope planes of leaves */
+} ebpo_part;
+
+typedef enum ebpo_codec {
+    EBPO_CODEC_ZSTD = 0,    /* HDF5 filter 32015, frames with checksum */
+    EBPO_CODEC_DEFLATE = 1, /* HDF5's own; needs no plugin; fletcher32 checksum */
+    EBPO_CODEC_NONE = 2
+} ebpo_codec;
+
+/* One level, all nodes in octcode order. Rank: the i-th gray node of a level has the i-th group of eight children in the next level.
+ * Arrays are NULL when their count is 0 or their part is absent. */
+typedef struct ebpo_level {
+    uint64_t group_count;     /* groups of eight siblings; level 0: one group, of which only octant 0 exists */
+    uint64_t gray_count, leaf_count, white_count, black_count;
+    uint16_t *types;          /* [group_count]; type of octant i in bits 2i, 2i + 1; octant: bit 0 x, bit 1 y, bit 2 z */
+    uint8_t *plane_counts;    /* [gray_count] planes that the node adds to its parent's envelope */
+    uint32_t *planes;         /* [plane_count] codes, see ebpo_plane_decode; node after node */
+    uint64_t plane_count;
+    int32_t *leaf_winding;    /* [leaf_count] winding number at the leaf's lowest corner, shifted (see format-spec); solids only */
+    int32_t *black_winding;   /* [black_count], NULL: all 1 */
+    int32_t *white_winding;   /* [white_count], NULL: all 0 */
+    uint64_t *leaf_first;     /* [leaf_count] number of the leaf's first new face */
+    uint32_t *leaf_new;       /* [leaf_count] faces leaf_first .. leaf_first + leaf_new - 1 touch this leaf and no leaf before it */
+    uint32_t *leaf_ref_count; /* [leaf_count] further faces, all of a number below leaf_first */
+    uint32_t *leaf_refs;      /* [ref_count] their numbers, ascending within each leaf; leaf after leaf */
+    uint64_t ref_count;
+    uint64_t new_count;       /* sum of leaf_new */
+    uint8_t *leaf_plane_counts; /* [leaf_count], part EBPO_PART_LEAF_PLANES */
+    uint32_t *leaf_planes;    /* [leaf_plane_count] */
+    uint64_t leaf_plane_count;
+    double gray_volume;       /* volume of the envelopes of this level's gray nodes, in the model's unit cubed */
+    double leaf_volume;       /* the same for its leaves (derived envelopes) */
+} ebpo_level;
+
+EBPO_API void ebpo_level_free(ebpo_level *level);
+
+/* Half-space of a plane code in the coordinates of its node's cell: xi = (p - corner) / cell size, per axis, so 0 <= xi <= 1.
+ * The envelope keeps the points with 4096 * (n . xi) <= d. All integers: |n0| + |n1| + |n2| = 511, and nothing is ever rounded by a reader.
+ * False for the codes that stand for no plane. */
+EBPO_API bool ebpo_plane_decode(uint32_t code, int32_t n[3], int32_t *d);
+
+/* Facts about a level that the head of the file tells without reading the level. */
+typedef struct ebpo_level_summary {
+    uint64_t gray_count, leaf_count, white_count, black_count;
+    uint64_t plane_count, leaf_plane_count;
+    uint64_t new_count, ref_count; /* faces first seen, faces referenced again */
+    double gray_volume, leaf_volume;
+    uint64_t stored_bytes;         /* in the file, compressed; set when reading */
+} ebpo_level_summary;
+
+/* Everything about a file but its arrays. */
+typedef struct ebpo_info {
+    int version_major, version_minor;
+    char generator[64];
+    char source_name[256], source_format[16];
+    uint8_t source_sha256[32];
+    uint64_t source_size;
+    char unit[32], crs[256], date[32]; /* "" when not given */
+    bool solid;                        /* else a surface */
+    ebpo_rule rule;
+    bool double_coordinates;
+    uint64_t vertex_count, face_count; /* of the mesh in the file */
+    uint64_t source_vertex_count, source_face_count; /* triangles before mending */
+    double box_origin[3], box_size[3]; /* root cell */
+    int grid_level;                    /* deepest level for which the box is exact */
+    int max_level;                     /* the limit used in building */
+    int level_count;                   /* levels 0 .. level_count - 1 are present */
+    uint32_t leaf_faces;
+    double epsilon;
+    ebpo_mend_record mend;
+    ebpo_mesh_report report;           /* counts and measures; places are not stored */
+    uint32_t parts;                    /* ebpo_part bits */
+    ebpo_codec codec;
+    uint8_t content_sha256[32];
+    ebpo_level_summary level[EBPO_LEVELS_MAX];
+    uint64_t file_bytes, head_bytes, mesh_vertex_bytes, mesh_face_bytes, map_bytes; /* set when reading */
+} ebpo_info;
+
+/* A whole model in memory: what the builder makes and the writer writes. The mesh is in file order: faces by the first leaf (depth-first
+ * octcode order) that they touch, vertices by first use, unreferenced vertices last. */
+typedef struct ebpo_tree {
+    ebpo_info info;
+    ebpo_level level[EBPO_LEVELS_MAX];
+    ebpo_mesh mesh;
+    uint32_t *vertex_source; /* [vertex_count] number in the source, or NULL */
+    uint32_t *face_source;   /* [face_count]; numbers >= source_face_count: faces added by filling holes */
+} ebpo_tree;
+
+EBPO_API void ebpo_tree_free(ebpo_tree *tree);
+
+typedef struct ebpo_write_options {
+    ebpo_codec codec;
+    int codec_level;      /* 0: the default (zstd 3, deflate 6) */
+    unsigned threads;     /* 0: all cores */
+    uint32_t parts;       /* which parts to write, of those the tree has */
+    ebpo_progress progress;
+} ebpo_write_options;
+#define EBPO_WRITE_OPTIONS_INIT { EBPO_CODEC_ZSTD, 0, 0, ~0u, { NULL, NULL } }
+
+/* Writes the file: whole or not at all (temporary name, fsync, rename, fsync of the folder). Equal trees give identical bytes. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_tree_write(const ebpo_tree *tree, const char *path,
+                                                   const ebpo_write_options *options, ebpo_error *error);
+
+/* An open file. Immutable; HDF5 calls inside are serialised by the library, so any thread may use it. */
+typedef struct ebpo_file ebpo_file;
+
+/* Opens a file, reads and checks its head only. Unknown major version or unknown required part: EBPO_E_VERSION, by name.
+ * Safe on untrusted files. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_open(ebpo_file **out, const char *path, ebpo_error *error);
+EBPO_API void ebpo_file_close(ebpo_file *file);
+
+/* Lent; valid until the file is closed. */
+EBPO_API const ebpo_info *ebpo_file_info(const ebpo_file *file);
+
+/* Reads one level (0 .. level_count - 1) and checks it: counts, ranges, order, index arrays.
+ * The caller frees it with ebpo_level_free. `threads` 0: all cores. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_level(ebpo_file *file, int level, ebpo_level *out, unsigned threads,
+                                                        ebpo_error *error);
+
+/* Reads the mesh in file order; EBPO_E_ABSENT without the part. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_mesh(ebpo_file *file, ebpo_mesh *out, unsigned threads, ebpo_error *error);
+
+/* Reads the maps: vertex_source[vertex_count] and face_source[face_count], both allocated with malloc; checked to be permutations of
+ * 0 .. count - 1 (after welding: strictly different numbers below source_vertex_count). EBPO_E_ABSENT without the part. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_maps(ebpo_file *file, uint32_t **vertex_source, uint32_t **face_source,
+                                                       unsigned threads, ebpo_error *error);
+
+/* Everything at once. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_tree(ebpo_file *file, ebpo_tree *out, unsigned threads, ebpo_error *error);
+
+/* The mesh in the source's order where the maps are there (vertices by vertex_source, faces by face_source), else in file order. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_source_mesh(ebpo_file *file, ebpo_mesh *out, bool *source_order,
+                                                              unsigned threads, ebpo_error *error);
+
+/* Recomputes the content checksum from all arrays and compares: EBPO_E_FORMAT when it differs. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_check_content(ebpo_file *file, unsigned threads, ebpo_error *error);
+
+/* Registers the zstd filter with libhdf5 in this process, so that the caller's own HDF5 calls can read the files too. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_register_filters(ebpo_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

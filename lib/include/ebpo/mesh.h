@@ -1,0 +1,109 @@
+/* EBP-Octree in HDF5: triangle meshes, reading, checking and mending them. */
+#ifndef EBPO_MESH_H
+#define EBPO_MESH_H
+
+#include <ebpo/base.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* An indexed triangle mesh. Plain data: fields may be read, and set by callers who build one themselves
+ * (allocate the arrays with malloc, free with ebpo_mesh_free). At most 2^32 - 2 vertices and 2^32 - 2 faces. */
+typedef struct ebpo_mesh {
+    uint64_t vertex_count;
+    uint64_t face_count;
+    float *xyz32;    /* [vertex_count][3], or NULL when the source holds doubles */
+    double *xyz64;   /* [vertex_count][3], or NULL when the source holds floats; exactly one of the two is set */
+    uint32_t *faces; /* [face_count][3], vertex indices, counter-clockwise seen from outside */
+    uint64_t polygons_triangulated; /* source faces with more than three corners */
+    uint64_t polygons_concave;      /* of these, how many were concave (cut by ears) */
+    uint64_t strips;                /* triangle strips unrolled */
+    uint64_t polygons_dropped;      /* source faces with fewer than three corners, left out */
+    char source_name[256];          /* file name without folders, "" if not from a file */
+    uint8_t source_sha256[32];      /* of the source file's bytes; zero if not from a file */
+    uint64_t source_size;           /* bytes */
+    char source_format[16];         /* "ply-ascii", "ply-le", "ply-be", "obj", "stl", "off", "" */
+} ebpo_mesh;
+
+/* Frees the arrays and clears the struct. NULL is fine. */
+EBPO_API void ebpo_mesh_free(ebpo_mesh *mesh);
+
+typedef struct ebpo_mesh_read_options {
+    ebpo_progress progress;
+} ebpo_mesh_read_options;
+#define EBPO_MESH_READ_OPTIONS_INIT { { NULL, NULL } }
+
+/* Reads a mesh; the format is told from the file's first bytes, then from its name.
+ * PLY always; OBJ, STL and OFF when the library was built with assimp (else EBPO_E_UNSUPPORTED).
+ * Polygons are triangulated, concave ones correctly; strips are unrolled. Positions keep every bit.
+ * Safe on untrusted files. On failure `out` is cleared. `options` may be NULL. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_read(ebpo_mesh *out, const char *path,
+                                                  const ebpo_mesh_read_options *options, ebpo_error *error);
+
+/* Writes a binary little-endian PLY: float or double vertices as the mesh holds them, int32 or uint32 triangles.
+ * Appears whole or not at all (temporary name, fsync, rename). */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_write_ply(const ebpo_mesh *mesh, const char *path, ebpo_error *error);
+
+/* How many of one kind of finding, and where the first ones are (source numbers, from 0). */
+#define EBPO_FINDING_PLACES 4
+typedef struct ebpo_finding {
+    uint64_t count;
+    uint64_t place[EBPO_FINDING_PLACES]; /* the first min(count, 4), ascending */
+} ebpo_finding;
+
+/* What a mesh is. Edges are undirected pairs of distinct vertex indices. Places of edge findings are faces that use such an edge.
+ * Balanced: each edge is used as often in one direction as in the other; that is what makes a winding number well
+ * defined (the solid), a wider class than the theses' closed 2-manifolds. */
+typedef struct ebpo_mesh_report {
+    bool balanced;
+    bool manifold;                    /* closed 2-manifold, consistently oriented: EBP 2017, section 3.1 */
+    ebpo_finding boundary_edges;      /* used once */
+    ebpo_finding nonmanifold_edges;   /* used more than twice */
+    ebpo_finding misoriented_edges;   /* used twice, both times in one direction */
+    ebpo_finding unbalanced_edges;    /* directions do not cancel (the union of the causes above, less what cancels) */
+    ebpo_finding bowtie_vertices;     /* faces around the vertex form more than one fan; place: vertex */
+    ebpo_finding zero_area_faces;     /* exact test; includes index_repeated_faces */
+    ebpo_finding index_repeated_faces; /* a face that names a vertex twice */
+    ebpo_finding repeated_faces;      /* same three vertices as an earlier face, any rotation or orientation */
+    ebpo_finding unreferenced_vertices;
+    ebpo_finding repeated_positions;  /* same position as an earlier vertex */
+    uint64_t edges;
+    uint64_t components;              /* connected by shared vertices, faces only */
+    uint64_t boundary_loops;          /* holes: closed chains of boundary edges */
+    bool genus_known;                 /* closed 2-manifold only */
+    int64_t genus;                    /* summed over the components */
+    double area;
+    double volume;                    /* signed, integral of the winding number; 0 for a surface */
+    double mean_edge;                 /* EBP 2017, equation 3 */
+    double min[3], max[3];            /* of referenced vertices */
+} ebpo_mesh_report;
+
+/* Checks a mesh. A NaN or infinite coordinate, an index out of range or a mesh without faces is EBPO_E_FORMAT and named with its place;
+ * everything else is counted in the report. `threads` 0: all cores. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_check(ebpo_mesh_report *report, const ebpo_mesh *mesh, unsigned threads,
+                                                   ebpo_progress progress, ebpo_error *error);
+
+/* What mending did; recorded in the file. */
+typedef struct ebpo_mend_record {
+    bool weld, orient, fill_holes;    /* what was asked for */
+    uint64_t welded_vertices;         /* removed because their position repeats an earlier one */
+    uint64_t flipped_faces;
+    uint64_t unorientable_components; /* left as they were */
+    uint64_t filled_holes;
+    uint64_t added_faces;             /* at the end of the face list */
+    uint64_t unfilled_holes;          /* boundary chains that are not simple loops */
+} ebpo_mend_record;
+
+/* Merges vertices with identical positions (-0 equals 0); the first of each group stays, order is kept. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error);
+/* Makes neighbouring faces agree, component by component (across edges used twice), then turns each closed component so that its signed volume
+ * is positive unless it already was consistent. Non-orientable components stay untouched and are counted. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error);
+/* Closes each simple boundary loop with triangles over its own vertices, appended at the end. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_fill_holes(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,44 @@
+/* EBP-Octree in HDF5: proving that a file keeps its promises. */
+#ifndef EBPO_VERIFY_H
+#define EBPO_VERIFY_H
+
+#include <ebpo/file.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* One kind of check: how often it was made and how often it failed. */
+typedef struct ebpo_verify_count {
+    uint64_t checks, violations;
+    char first[240]; /* the first violation in file order, "" if none */
+} ebpo_verify_count;
+
+typedef struct ebpo_verify_report {
+    ebpo_verify_count structure;   /* head, shapes, counts, index arrays, order */
+    ebpo_verify_count content;     /* content checksum */
+    ebpo_verify_count containment; /* vertices, clipped faces and inside corners against every half-space on their path */
+    ebpo_verify_count nesting;     /* a child's envelope lies in its parent's; leaf planes included */
+    ebpo_verify_count labels;      /* white, black and corner winding numbers against an independent winding number */
+    ebpo_verify_count lists;       /* no face touches a cell that does not list it; no list names a face twice */
+    ebpo_verify_count source;      /* mesh equal to the source (--against), bit for bit */
+    uint64_t checks, violations;   /* sums */
+} ebpo_verify_report;
+
+typedef struct ebpo_verify_options {
+    const ebpo_mesh *source;  /* mesh as read (before mending), or NULL; mending recorded in the file is done again */
+    unsigned threads;         /* 0: all cores */
+    uint64_t label_samples;   /* cells whose labels are checked by an independent winding number; 0: all when face_count * cells is small, else 4096 */
+    ebpo_progress progress;
+} ebpo_verify_options;
+#define EBPO_VERIFY_OPTIONS_INIT { NULL, 0, 0, { NULL, NULL } }
+
+/* Verifies an open file. EBPO_OK when the work could be done, whatever it found: look at report->violations.
+ * A file too damaged to be read counts as a structure violation. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_verify(ebpo_file *file, const ebpo_verify_options *options,
+                                               ebpo_verify_report *report, ebpo_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
