@@ -7,7 +7,7 @@
 
 enum { EBPO_MAX_LEVEL = 20 };
 
-/* The root cell: [origin, origin + size] on each axis. origin is an integer multiple of a power of two u, and size an integer multiple of u * 2^grid_level,
+/* The root cell: [origin, origin + size] on each axis. origin is an integer multiple of a power of two u (its own for each axis), and size an integer multiple of u * 2^grid_level,
  * with every corner at levels 0 .. grid_level exactly representable. size > 0 on every axis. */
 typedef struct ebpo_box {
     double origin[3];

@@ -64,6 +64,13 @@ typedef struct ebpo_progress {
     void *user;
 } ebpo_progress;
 
+/* Writes `size` bytes as one file, which appears whole or not at all (temporary name, fsync, rename); an existing regular file is replaced. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_write_file(const char *path, const void *data, size_t size, ebpo_error *error);
+
+/* Removes the temporary files of all outputs that this process is writing; they cannot be finished afterwards. Only calls unlink: made for
+ * signal handlers, just before the process ends. */
+EBPO_API void ebpo_abandon_outputs(void);
+
 #ifdef __cplusplus
 }
 #endif

@@ -1,0 +1,107 @@
+/* Support of runs of vertices by boxes of boxes. Rounding is monotone, so a box's bound computed in the same order of operations is
+ * never below that of a point in it: skipping a box never loses the greatest point. */
+#include <stdlib.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "build/builder.h"
+
+static void join(double (*box)[3], const double low[3], const double high[3])
+{
+    for (int k = 0; k < 3; k++) {
+        box[0][k] = low[k] < box[0][k] ? low[k] : box[0][k];
+        box[1][k] = high[k] > box[1][k] ? high[k] : box[1][k];
+    }
+}
+
+ebpo_status ebpo_bounds_make(ebpo_bounds *bounds, double (*position)[3], uint64_t count, ebpo_error *error)
+{
+    uint64_t below = count;
+    for (int level = 0; level < EBPO_BOUNDS_LEVELS && below > 1; level++) {
+        uint64_t n = (below + EBPO_BOUNDS_FAN - 1) / EBPO_BOUNDS_FAN;
+        double (*box)[2][3] = ebpo_alloc(n, sizeof *box);
+        if (!box)
+            return ebpo_fail_memory(error, n * sizeof *box);
+        bounds->box[level] = box;
+        bounds->count[level] = n;
+        bounds->levels = level + 1;
+        for (uint64_t i = 0; i < below; i++) {
+            double *low = level ? bounds->box[level - 1][i][0] : position[i];
+            double *high = level ? bounds->box[level - 1][i][1] : position[i];
+            double (*b)[3] = box[i / EBPO_BOUNDS_FAN];
+            if (i % EBPO_BOUNDS_FAN == 0)
+                for (int k = 0; k < 3; k++) {
+                    b[0][k] = low[k];
+                    b[1][k] = high[k];
+                }
+            else
+                join(b, low, high);
+        }
+        below = n;
+    }
+    return EBPO_OK;
+}
+
+void ebpo_bounds_free(ebpo_bounds *bounds)
+{
+    for (int i = 0; i < bounds->levels; i++)
+        free(bounds->box[i]);
+    bounds->levels = 0;
+}
+
+typedef struct query {
+    const ebpo_builder *b;
+    double corner[3], size[3], n[3];
+    uint64_t begin, end;
+    double best;
+} query;
+
+static double value(const query *q, const double low[3], const double high[3])
+{
+    double x = (q->n[0] < 0 ? low[0] : high[0]), y = (q->n[1] < 0 ? low[1] : high[1]), z = (q->n[2] < 0 ? low[2] : high[2]);
+    return q->n[0] * ((x - q->corner[0]) / q->size[0]) + q->n[1] * ((y - q->corner[1]) / q->size[1]) +
+           q->n[2] * ((z - q->corner[2]) / q->size[2]);
+}
+
+static void visit(query *q, int level, uint64_t block)
+{
+    /* `level` 0 is the vertices themselves. */
+    uint64_t width = 1;
+    for (int i = 0; i < level; i++)
+        width *= EBPO_BOUNDS_FAN;
+    if (block * width >= q->end || (block + 1) * width <= q->begin)
+        return;
+    if (level == 0) {
+        const double *p = q->b->position[block];
+        double v = value(q, p, p);
+        q->best = v > q->best ? v : q->best;
+        return;
+    }
+    const double (*box)[3] = (const double (*)[3])q->b->bounds.box[level - 1][block];
+    if (value(q, box[0], box[1]) <= q->best)
+        return;
+    uint64_t below = level > 1 ? q->b->bounds.count[level - 2] : q->b->vertex_count;
+    for (uint64_t i = block * EBPO_BOUNDS_FAN; i < (block + 1) * EBPO_BOUNDS_FAN && i < below; i++)
+        visit(q, level - 1, i);
+}
+
+double ebpo_bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n[3], uint64_t begin, uint64_t end)
+{
+    query q = { .b = b, .begin = begin, .end = end, .best = -1e300 };
+    for (int k = 0; k < 3; k++) {
+        q.corner[k] = ebpo_wall(&b->box, k, cell.level, cell.at[k]);
+        q.size[k] = b->box.size[k] / (double)(1u << cell.level);
+        q.n[k] = n[k];
+    }
+    /* Start at the level where the run covers some blocks, not at the top. */
+    int level = 0;
+    uint64_t width = 1;
+    while (level < b->bounds.levels && width * EBPO_BOUNDS_FAN <= end - begin) {
+        width *= EBPO_BOUNDS_FAN;
+        level++;
+    }
+    if (begin < end)
+        for (uint64_t block = begin / width; block * width < end; block++)
+            visit(&q, level, block);
+    return q.best;
+}

@@ -1,0 +1,167 @@
+/* From a mesh to a tree: the stages in their order. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "build/builder.h"
+#include "ebpo_config.h"
+
+/* EBP 2017, equation 3: the least i >= 1 with L / 2^i below the mean edge. */
+static int level_limit(const ebpo_mesh_report *report)
+{
+    double side = 0;
+    for (int k = 0; k < 3; k++)
+        side = fmax(side, report->max[k] - report->min[k]);
+    int level = 1;
+    for (side /= 2; level < EBPO_MAX_LEVEL && !(side < report->mean_edge); side /= 2)
+        level++;
+    return level;
+}
+
+static ebpo_status check_text(const char *name, const char *text, size_t room, ebpo_error *error)
+{
+    if (!text)
+        return EBPO_OK;
+    if (strlen(text) >= room)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s is longer than %zu bytes", name, room - 1);
+    for (const unsigned char *c = (const unsigned char *)text; *c; c++)
+        if (*c < 32 || *c == 127)
+            return ebpo_fail(error, EBPO_E_ARGUMENT, "%s holds a control character", name);
+    return EBPO_OK;
+}
+
+static ebpo_status check_options(const ebpo_build_options *o, const ebpo_info *info, ebpo_error *error)
+{
+    if (o->max_level < -1 || o->max_level > EBPO_MAX_LEVEL)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "max_level %d is not in 0 .. %d", o->max_level, EBPO_MAX_LEVEL);
+    if (!(o->epsilon >= 0) || o->epsilon > 1)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "epsilon %g is not in 0 .. 1", o->epsilon);
+    if (o->rule > EBPO_RULE_POSITIVE)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown winding rule %d", (int)o->rule);
+    ebpo_status status = check_text("unit", o->unit, sizeof info->unit, error);
+    if (status == EBPO_OK)
+        status = check_text("crs", o->crs, sizeof info->crs, error);
+    if (status == EBPO_OK)
+        status = check_text("date", o->date, sizeof info->date, error);
+    return status;
+}
+
+static void copy_text(char *to, const char *from)
+{
+    if (from)
+        strcpy(to, from); /* check_options saw to the length */
+}
+
+static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *mesh, const ebpo_mesh_report *report,
+                      const ebpo_mend_record *mend)
+{
+    const ebpo_build_options *o = b->options;
+    info->version_major = EBPO_FORMAT_MAJOR;
+    info->version_minor = EBPO_FORMAT_MINOR;
+    copy_text(info->generator, "ebpo " EBPO_VERSION);
+    copy_text(info->unit, o->unit);
+    copy_text(info->crs, o->crs);
+    copy_text(info->date, o->date);
+    memcpy(info->source_name, mesh->source_name, sizeof info->source_name);
+    memcpy(info->source_format, mesh->source_format, sizeof info->source_format);
+    memcpy(info->source_sha256, mesh->source_sha256, sizeof info->source_sha256);
+    info->source_size = mesh->source_size;
+    info->solid = b->solid;
+    info->rule = o->rule;
+    info->double_coordinates = mesh->xyz64 != NULL;
+    info->vertex_count = mesh->vertex_count;
+    info->face_count = mesh->face_count;
+    info->source_vertex_count = mesh->vertex_count + (mend ? mend->welded_vertices : 0);
+    info->source_face_count = mesh->face_count - (mend ? mend->added_faces : 0);
+    memcpy(info->box_origin, b->box.origin, sizeof info->box_origin);
+    memcpy(info->box_size, b->box.size, sizeof info->box_size);
+    info->grid_level = b->box.grid_level;
+    info->max_level = b->max_level;
+    info->leaf_faces = o->leaf_faces;
+    info->epsilon = o->epsilon;
+    if (mend)
+        info->mend = *mend;
+    info->report = *report;
+    info->parts = o->parts;
+}
+
+static ebpo_status prepare(ebpo_builder *b, const ebpo_mesh *mesh, const ebpo_mesh_report *report,
+                           const ebpo_build_options *options, ebpo_error *error)
+{
+    b->options = options;
+    b->threads = ebpo_thread_count(options->threads);
+    b->solid = report->balanced;
+    if (!b->solid && options->require_solid)
+        return ebpo_fail(error, EBPO_E_NOT_SOLID,
+                         "%s does not balance (%llu edges are not used as often one way as the other), so it bounds no solid; "
+                         "try --fill-holes, --orient or --weld, or leave out --require-solid for a surface model",
+                         mesh->source_name[0] ? mesh->source_name : "the mesh",
+                         (unsigned long long)report->unbalanced_edges.count);
+    b->max_level = options->max_level >= 0 ? options->max_level : level_limit(report);
+    if (!ebpo_box_make(&b->box, report->min, report->max, b->max_level))
+        return ebpo_fail(error, EBPO_E_LIMIT, "coordinates up to %g are too large for an exact grid of %d levels; scale the model",
+                         fmax(fabs(report->min[0]), fabs(report->max[0])), b->max_level);
+    return EBPO_OK;
+}
+
+static void builder_free(ebpo_builder *b)
+{
+    free(b->position);
+    free(b->key);
+    free(b->vertex_source);
+    free(b->face);
+    free(b->face_source);
+    free(b->normal);
+    ebpo_bounds_free(&b->bounds);
+    free(b->number);
+    ebpo_subtree_free(&b->top);
+    for (uint64_t i = 0; i < b->sub_count; i++)
+        ebpo_subtree_free(&b->sub[i]);
+    free(b->sub);
+    free(b->top_envelope);
+}
+
+static ebpo_status run_stages(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, ebpo_error *error)
+{
+    ebpo_status status = ebpo_build_order(b, mesh, error);
+    if (status == EBPO_OK)
+        status = ebpo_build_partition(b, error);
+    if (status == EBPO_OK)
+        status = ebpo_build_labels(b, error);
+    if (status == EBPO_OK)
+        status = ebpo_build_number(b, error);
+    if (status == EBPO_OK)
+        status = ebpo_build_top(b, error);
+    if (status == EBPO_OK)
+        status = ebpo_emit_subtrees(b, error);
+    if (status == EBPO_OK)
+        status = ebpo_build_levels(b, out, error);
+    if (status == EBPO_OK && b->options->parts & EBPO_PART_MESH)
+        status = ebpo_build_mesh(b, mesh, out, error);
+    return status;
+}
+
+ebpo_status ebpo_build(ebpo_tree *out, ebpo_mesh *mesh, const ebpo_mesh_report *report, const ebpo_mend_record *mend,
+                       const ebpo_build_options *options, ebpo_error *error)
+{
+    ebpo_build_options defaults = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_builder b = { 0 };
+    memset(out, 0, sizeof *out);
+    if (!options)
+        options = &defaults;
+    ebpo_status status = check_options(options, &out->info, error);
+    if (status == EBPO_OK)
+        status = prepare(&b, mesh, report, options, error);
+    if (status == EBPO_OK)
+        fill_info(&out->info, &b, mesh, report, mend);
+    if (status == EBPO_OK)
+        status = run_stages(&b, mesh, out, error);
+    builder_free(&b);
+    ebpo_mesh_free(mesh);
+    if (status != EBPO_OK)
+        ebpo_tree_free(out);
+    return status;
+}

@@ -1,0 +1,162 @@
+/* The builder's working state, shared by its stages:
+ *   order      vertices and faces along the Morton curve, bounds for support queries
+ *   partition  faces to cells, subtree by subtree: nodes, leaf lists, corner winding differences
+ *   number     final face and vertex numbers
+ *   envelopes  labels and planes from the root down, arrays of each level
+ * Subtrees are independent in partition and envelopes, so that they can run on all cores or one after the other. */
+#ifndef EBPO_BUILD_BUILDER_H
+#define EBPO_BUILD_BUILDER_H
+
+#include <ebpo/build.h>
+
+#include "geom/cell.h"
+#include "planes/planes.h"
+
+#define EBPO_NO_NUMBER UINT32_MAX
+#define EBPO_NO_NORMAL UINT32_MAX
+
+/* A node of a subtree under construction. Empty nodes get their colour with the labels. */
+typedef struct ebpo_build_node {
+    uint8_t type;       /* ebpo_node_type; empty nodes are EBPO_WHITE */
+    uint32_t child;     /* gray: index of the first of eight children */
+    uint32_t detail;    /* gray and leaf: index into details; a subtree hanging from the top: its number */
+} ebpo_build_node;
+
+typedef struct ebpo_build_detail {
+    int32_t delta[8];         /* winding numbers of the corners minus that of corner 0 */
+    uint64_t entry_begin, entry_end; /* the leaf's list, or those of all leaves below a gray node, in `entries` */
+    uint64_t cross_begin, cross_end; /* gray: faces that are not wholly inside, in `crossing` */
+    uint32_t first, new_count;       /* leaf: final number of its first new face */
+} ebpo_build_detail;
+
+/* A stretch of one level's arrays under construction. */
+typedef struct ebpo_out {
+    ebpo_level level;
+    uint64_t group_capacity, gray_capacity, plane_capacity, leaf_capacity[6], ref_capacity, black_capacity, white_capacity,
+        leaf_plane_capacity;
+} ebpo_out;
+
+/* A subtree: its nodes, depth first. nodes[0] is its root. */
+typedef struct ebpo_subtree {
+    ebpo_cell cell;
+    uint32_t *list;          /* faces that touch the cell; freed once partitioned */
+    uint64_t list_count;
+    ebpo_build_node *nodes;
+    uint64_t node_count, node_capacity;
+    ebpo_build_detail *details;
+    uint64_t detail_count, detail_capacity;
+    uint32_t *entries;
+    uint64_t entry_count, entry_capacity;
+    uint32_t *crossing;
+    uint64_t cross_count, cross_capacity;
+    int32_t winding;         /* at the lowest corner */
+    uint8_t root_type;       /* of nodes[0], and its corner differences: they outlive the nodes */
+    int32_t root_delta[8];
+    ebpo_out *out;           /* [EBPO_LEVELS_MAX] what envelopes makes */
+    ebpo_polytope *above;    /* the parent's envelope cut to this cell */
+} ebpo_subtree;
+
+/* Bounds of runs of vertices, 16 to a block, 16 blocks to a block above, and so on. */
+enum { EBPO_BOUNDS_FAN = 16, EBPO_BOUNDS_LEVELS = 8 };
+typedef struct ebpo_bounds {
+    double (*box[EBPO_BOUNDS_LEVELS])[2][3]; /* box[k][i]: of vertices [i * 16^(k+1), ...) */
+    uint64_t count[EBPO_BOUNDS_LEVELS];
+    int levels;
+} ebpo_bounds;
+
+typedef struct ebpo_builder {
+    const ebpo_build_options *options;
+    unsigned threads;
+    bool solid;
+    int max_level;
+    ebpo_box box;
+    uint64_t vertex_count;    /* referenced ones, along the curve */
+    uint64_t face_count;
+    double (*position)[3];
+    uint64_t *key;            /* Morton code of the vertex's cell at max_level, ascending */
+    uint32_t *vertex_source;  /* number in the mesh */
+    uint32_t (*face)[3];      /* in vertices along the curve */
+    uint32_t *face_source;
+    uint32_t *normal;         /* normal part of a plane code, or EBPO_NO_NORMAL */
+    ebpo_bounds bounds;
+    uint32_t *number;         /* final number of each face */
+    ebpo_subtree top;         /* gray nodes above the subtrees; its leaves name subtrees in `detail` */
+    ebpo_subtree *sub;
+    uint64_t sub_count, sub_capacity;
+    struct ebpo_top_envelope *top_envelope; /* of the top's gray nodes, by detail */
+} ebpo_builder;
+
+/* order.c */
+ebpo_status ebpo_build_order(ebpo_builder *b, const ebpo_mesh *mesh, ebpo_error *error);
+void ebpo_build_vertex_range(const ebpo_builder *b, ebpo_cell cell, uint64_t *begin, uint64_t *end);
+
+/* bounds.c: greatest n . xi over vertices [begin, end), in coordinates of the cell that holds them, or -1e300. */
+ebpo_status ebpo_bounds_make(ebpo_bounds *bounds, double (*position)[3], uint64_t count, ebpo_error *error);
+double ebpo_bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n[3], uint64_t begin, uint64_t end);
+void ebpo_bounds_free(ebpo_bounds *bounds);
+
+/* partition.c */
+ebpo_status ebpo_build_partition(ebpo_builder *b, ebpo_error *error);
+void ebpo_subtree_free(ebpo_subtree *s);
+/* Frees what only partition and envelopes need; `out` and the root's facts stay. */
+void ebpo_subtree_release(ebpo_subtree *s);
+
+/* number.c */
+ebpo_status ebpo_build_number(ebpo_builder *b, ebpo_error *error);
+ebpo_status ebpo_build_mesh(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, ebpo_error *error);
+
+/* labels.c */
+ebpo_status ebpo_build_labels(ebpo_builder *b, ebpo_error *error);
+bool ebpo_rule_inside(ebpo_rule rule, int32_t winding);
+/* Winding number at corner 0 of each child minus that of the parent's, from the children's corner differences. Crossings along any way
+ * between two corners agree when the mesh balances: false when they do not. */
+bool ebpo_child_offsets(const int32_t *child_delta[8], int32_t offset[8]);
+/* A gray node's own corner differences from its children's. */
+bool ebpo_gather_delta(const int32_t *child_delta[8], int32_t delta[8]);
+/* The corner differences of the eight children; those of empty ones are zero. */
+void ebpo_child_deltas(const ebpo_builder *b, const ebpo_subtree *s, uint32_t child, const int32_t *child_delta[8]);
+
+/* candidates.c */
+int ebpo_build_candidates(const ebpo_builder *b, const ebpo_subtree *s, const ebpo_build_detail *detail, int most,
+                          ebpo_candidate *out);
+
+/* envelopes.c */
+typedef struct ebpo_envelope_scratch ebpo_envelope_scratch;
+ebpo_status ebpo_scratch_make(ebpo_envelope_scratch **out, ebpo_error *error);
+void ebpo_scratch_free(ebpo_envelope_scratch *scratch);
+/* The own planes of a gray node; `envelope` is its parent's cut to its cell, then its own. Returns their number, -1: out of memory. */
+int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, const ebpo_subtree *s,
+                     const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope,
+                     uint32_t codes[EBPO_PLANES_MAX]);
+unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32_t delta[8]);
+double ebpo_cell_volume(const ebpo_builder *b, int level);
+
+/* emit.c: subtrees to stretches of level arrays */
+ebpo_status ebpo_emit_subtrees(ebpo_builder *b, ebpo_error *error);
+bool ebpo_emit_group(ebpo_out *out, uint16_t types);
+bool ebpo_emit_gray(ebpo_out *out, const uint32_t *codes, int count, double volume);
+bool ebpo_emit_empty(ebpo_out *out, bool black, int32_t winding);
+void ebpo_out_free(ebpo_out *out);
+
+/* top.c: the nodes above the subtrees */
+ebpo_status ebpo_build_top(ebpo_builder *b, ebpo_error *error);
+
+/* join.c */
+ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error);
+
+static inline void ebpo_build_triangle(const ebpo_builder *b, uint32_t face, ebpo_triangle *out)
+{
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            out->corner[i][k] = b->position[b->face[face][i]][k];
+}
+
+static inline ebpo_cell ebpo_child_cell(ebpo_cell cell, unsigned octant)
+{
+    ebpo_cell c = { cell.level + 1, { 0, 0, 0 } };
+    for (unsigned k = 0; k < 3; k++)
+        c.at[k] = cell.at[k] * 2 + (octant >> k & 1);
+    return c;
+}
+
+#endif

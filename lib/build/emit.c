@@ -1,0 +1,210 @@
+/* Subtrees to stretches of level arrays: a depth-first walk meets the nodes of each level in octcode order. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "build/builder.h"
+
+typedef struct emitter {
+    const ebpo_builder *b;
+    ebpo_subtree *s;
+    ebpo_envelope_scratch *scratch;
+    ebpo_triangle *faces;
+    uint64_t faces_capacity;
+} emitter;
+
+void ebpo_out_free(ebpo_out *out)
+{
+    for (int i = 0; out && i < EBPO_LEVELS_MAX; i++)
+        ebpo_level_free(&out[i].level);
+    free(out);
+}
+
+bool ebpo_emit_group(ebpo_out *out, uint16_t types)
+{
+    ebpo_level *l = &out->level;
+    if (!ebpo_grow(&l->types, &out->group_capacity, l->group_count + 1, sizeof *l->types))
+        return false;
+    l->types[l->group_count++] = types;
+    return true;
+}
+
+bool ebpo_emit_gray(ebpo_out *out, const uint32_t *codes, int count, double volume)
+{
+    ebpo_level *l = &out->level;
+    if (!ebpo_grow(&l->plane_counts, &out->gray_capacity, l->gray_count + 1, 1) ||
+        !ebpo_grow(&l->planes, &out->plane_capacity, l->plane_count + (uint64_t)count, sizeof *l->planes))
+        return false;
+    l->plane_counts[l->gray_count++] = (uint8_t)count;
+    memcpy(l->planes + l->plane_count, codes, (size_t)count * sizeof *codes);
+    l->plane_count += (uint64_t)count;
+    l->gray_volume += volume;
+    return true;
+}
+
+bool ebpo_emit_empty(ebpo_out *out, bool black, int32_t winding)
+{
+    ebpo_level *l = &out->level;
+    int32_t **array = black ? &l->black_winding : &l->white_winding;
+    uint64_t *count = black ? &l->black_count : &l->white_count;
+    if (!ebpo_grow(array, black ? &out->black_capacity : &out->white_capacity, *count + 1, sizeof **array))
+        return false;
+    (*array)[(*count)++] = winding;
+    return true;
+}
+
+static int compare_numbers(const void *a, const void *b)
+{
+    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
+}
+
+static void sort_numbers(uint32_t *a, uint64_t n)
+{
+    if (n > 32) {
+        qsort(a, n, sizeof *a, compare_numbers);
+        return;
+    }
+    for (uint64_t i = 1; i < n; i++) {
+        uint32_t v = a[i];
+        uint64_t j = i;
+        for (; j > 0 && a[j - 1] > v; j--)
+            a[j] = a[j - 1];
+        a[j] = v;
+    }
+}
+
+static bool grow_leaf_arrays(ebpo_out *out, uint64_t refs)
+{
+    ebpo_level *l = &out->level;
+    uint64_t n = l->leaf_count + 1, *c = out->leaf_capacity;
+    return ebpo_grow(&l->leaf_winding, &c[0], n, sizeof *l->leaf_winding) &&
+           ebpo_grow(&l->leaf_first, &c[1], n, sizeof *l->leaf_first) &&
+           ebpo_grow(&l->leaf_new, &c[2], n, sizeof *l->leaf_new) &&
+           ebpo_grow(&l->leaf_ref_count, &c[3], n, sizeof *l->leaf_ref_count) &&
+           ebpo_grow(&l->leaf_plane_counts, &c[4], n, sizeof *l->leaf_plane_counts) &&
+           ebpo_grow(&l->leaf_refs, &out->ref_capacity, l->ref_count + refs, sizeof *l->leaf_refs);
+}
+
+static bool emit_list(const emitter *e, const ebpo_build_detail *d, ebpo_out *out, int32_t winding)
+{
+    ebpo_level *l = &out->level;
+    uint64_t refs = d->entry_end - d->entry_begin - d->new_count;
+    if (!grow_leaf_arrays(out, refs))
+        return false;
+    l->leaf_winding[l->leaf_count] = winding;
+    l->leaf_first[l->leaf_count] = d->first;
+    l->leaf_new[l->leaf_count] = d->new_count;
+    l->leaf_ref_count[l->leaf_count] = (uint32_t)refs;
+    uint32_t *ref = l->leaf_refs + l->ref_count;
+    for (uint64_t i = d->entry_begin; i < d->entry_end; i++) {
+        uint32_t number = e->b->number[e->s->entries[i]];
+        if (number < d->first)
+            *ref++ = number;
+    }
+    sort_numbers(l->leaf_refs + l->ref_count, refs);
+    l->ref_count += refs;
+    l->new_count += d->new_count;
+    return true;
+}
+
+static bool emit_leaf(emitter *e, const ebpo_build_detail *d, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope)
+{
+    const ebpo_builder *b = e->b;
+    ebpo_out *out = &e->s->out[cell.level];
+    ebpo_level *l = &out->level;
+    uint64_t count = d->entry_end - d->entry_begin;
+    if (!emit_list(e, d, out, winding) || !ebpo_grow(&e->faces, &e->faces_capacity, count, sizeof *e->faces))
+        return false;
+    for (uint64_t i = 0; i < count; i++)
+        ebpo_build_triangle(b, e->s->entries[d->entry_begin + i], &e->faces[i]);
+    uint32_t codes[EBPO_PLANES_MAX];
+    int planes = ebpo_leaf_planes(&b->box, cell, e->faces, count, ebpo_inside_corners(b, winding, d->delta), b->options->epsilon,
+                                  envelope, codes);
+    l->leaf_volume += ebpo_polytope_volume(envelope) * ebpo_cell_volume(b, cell.level);
+    l->leaf_plane_counts[l->leaf_count++] = (uint8_t)planes;
+    if (!(b->options->parts & EBPO_PART_LEAF_PLANES))
+        return true;
+    if (!ebpo_grow(&l->leaf_planes, &out->leaf_plane_capacity, l->leaf_plane_count + (uint64_t)planes, sizeof *l->leaf_planes))
+        return false;
+    memcpy(l->leaf_planes + l->leaf_plane_count, codes, (size_t)planes * sizeof *codes);
+    l->leaf_plane_count += (uint64_t)planes;
+    return true;
+}
+
+static bool emit_empty(emitter *e, ebpo_cell cell, int32_t winding)
+{
+    bool black = e->b->solid && ebpo_rule_inside(e->b->options->rule, winding);
+    return ebpo_emit_empty(&e->s->out[cell.level], black, winding);
+}
+
+static bool emit(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope);
+
+static bool emit_gray(emitter *e, const ebpo_build_node *node, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope)
+{
+    const ebpo_builder *b = e->b;
+    const ebpo_build_detail *d = &e->s->details[node->detail];
+    uint32_t codes[EBPO_PLANES_MAX];
+    int planes = 0;
+    if (b->options->parts & EBPO_PART_PLANES)
+        planes = ebpo_gray_planes(b, e->scratch, e->s, d, cell, winding, envelope, codes);
+    if (planes < 0 || !ebpo_emit_gray(&e->s->out[cell.level], codes, planes,
+                                      ebpo_polytope_volume(envelope) * ebpo_cell_volume(b, cell.level)))
+        return false;
+    const int32_t *child_delta[8];
+    int32_t offset[8];
+    ebpo_child_deltas(b, e->s, node->child, child_delta);
+    ebpo_child_offsets(child_delta, offset);
+    uint16_t types = 0;
+    for (uint32_t o = 0; o < 8; o++) {
+        unsigned type = e->s->nodes[node->child + o].type;
+        if (type == EBPO_WHITE && b->solid && ebpo_rule_inside(b->options->rule, winding + offset[o]))
+            type = EBPO_BLACK;
+        types |= (uint16_t)(type << 2 * o);
+    }
+    if (!ebpo_emit_group(&e->s->out[cell.level + 1], types))
+        return false;
+    ebpo_polytope child;
+    for (uint32_t o = 0; o < 8; o++) {
+        if (e->s->nodes[node->child + o].type != EBPO_WHITE)
+            ebpo_polytope_child(envelope, o, &child);
+        if (!emit(e, node->child + o, ebpo_child_cell(cell, o), winding + offset[o], &child))
+            return false;
+    }
+    return true;
+}
+
+static bool emit(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope)
+{
+    ebpo_build_node node = e->s->nodes[index];
+    switch (node.type) {
+    case EBPO_LEAF: return emit_leaf(e, &e->s->details[node.detail], cell, winding, envelope);
+    case EBPO_GRAY: return emit_gray(e, &node, cell, winding, envelope);
+    default: return emit_empty(e, cell, winding);
+    }
+}
+
+static ebpo_status emit_subtrees(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+{
+    ebpo_builder *b = context;
+    (void)worker;
+    emitter e = { .b = b };
+    ebpo_status status = ebpo_scratch_make(&e.scratch, error);
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
+        ebpo_subtree *s = e.s = &b->sub[i];
+        s->out = ebpo_alloc_zero(EBPO_LEVELS_MAX, sizeof *s->out);
+        if (!s->out || !emit(&e, 0, s->cell, s->winding, s->above))
+            status = ebpo_fail(error, EBPO_E_MEMORY, "out of memory while computing envelopes");
+        ebpo_subtree_release(s);
+    }
+    ebpo_scratch_free(e.scratch);
+    free(e.faces);
+    return status;
+}
+
+ebpo_status ebpo_emit_subtrees(ebpo_builder *b, ebpo_error *error)
+{
+    return ebpo_parallel_for(b->threads, b->sub_count, 1, emit_subtrees, b, &b->options->progress, "envelopes", error);
+}

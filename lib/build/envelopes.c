@@ -1,0 +1,130 @@
+/* Planes of a gray node: its solid's support in each candidate direction, then a selection. The support is that of the extreme points of solid ∩ cell:
+ * mesh vertices in the cell, points where faces cross its boundary, corners that lie inside. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "build/builder.h"
+#include "geom/plane_code.h"
+
+enum { FEW_VERTICES = 192, TOP_LEVELS = 4, CANDIDATES_BELOW = 64 };
+
+struct ebpo_envelope_scratch {
+    double (*point)[4]; /* cell coordinates, and what rounding may add to a support */
+    uint64_t count, capacity;
+    ebpo_candidate candidates[EBPO_PLANES_CANDIDATES];
+    double normal[EBPO_PLANES_CANDIDATES][3];
+};
+
+ebpo_status ebpo_scratch_make(ebpo_envelope_scratch **out, ebpo_error *error)
+{
+    *out = ebpo_alloc_zero(1, sizeof **out);
+    return *out ? EBPO_OK : ebpo_fail_memory(error, sizeof **out);
+}
+
+void ebpo_scratch_free(ebpo_envelope_scratch *scratch)
+{
+    if (scratch)
+        free(scratch->point);
+    free(scratch);
+}
+
+double ebpo_cell_volume(const ebpo_builder *b, int level)
+{
+    double v = 1;
+    for (int k = 0; k < 3; k++)
+        v *= b->box.size[k] / (double)(1u << level);
+    return v;
+}
+
+unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32_t delta[8])
+{
+    unsigned mask = 0;
+    if (b->solid)
+        for (int i = 0; i < 8; i++)
+            if (ebpo_rule_inside(b->options->rule, winding + delta[i]))
+                mask |= 1u << i;
+    return mask;
+}
+
+static bool add_point(ebpo_envelope_scratch *scratch, double x, double y, double z, double slack)
+{
+    if (!ebpo_grow(&scratch->point, &scratch->capacity, scratch->count + 1, sizeof *scratch->point))
+        return false;
+    double *p = scratch->point[scratch->count++];
+    p[0] = x, p[1] = y, p[2] = z, p[3] = EBPO_NORMAL_NORM * slack;
+    return true;
+}
+
+static bool add_vertices(const ebpo_builder *b, ebpo_envelope_scratch *scratch, ebpo_cell cell, uint64_t begin, uint64_t end)
+{
+    double corner[3], size[3];
+    for (int k = 0; k < 3; k++) {
+        corner[k] = ebpo_wall(&b->box, k, cell.level, cell.at[k]);
+        size[k] = b->box.size[k] / (double)(1u << cell.level);
+    }
+    for (uint64_t i = begin; i < end; i++) {
+        const double *p = b->position[i];
+        /* Two roundings of values up to 1, far below the slack that ebpo_plane_code_offset adds. */
+        if (!add_point(scratch, (p[0] - corner[0]) / size[0], (p[1] - corner[1]) / size[1], (p[2] - corner[2]) / size[2], 0))
+            return false;
+    }
+    return true;
+}
+
+static bool add_crossings(const ebpo_builder *b, ebpo_envelope_scratch *scratch, const ebpo_subtree *s,
+                          const ebpo_build_detail *d, ebpo_cell cell)
+{
+    for (uint64_t i = d->cross_begin; i < d->cross_end; i++) {
+        ebpo_triangle face;
+        double points[9][3], slack;
+        ebpo_build_triangle(b, s->crossing[i], &face);
+        int count = ebpo_clip_triangle(&b->box, cell, &face, points, &slack);
+        for (int p = 0; p < count; p++)
+            if (!add_point(scratch, points[p][0], points[p][1], points[p][2], slack))
+                return false;
+    }
+    return true;
+}
+
+static void raise_support(const ebpo_envelope_scratch *scratch, const double n[3], double *support)
+{
+    double best = *support;
+    for (uint64_t i = 0; i < scratch->count; i++) {
+        const double *p = scratch->point[i];
+        double v = n[0] * p[0] + n[1] * p[1] + n[2] * p[2] + p[3];
+        best = v > best ? v : best;
+    }
+    *support = best;
+}
+
+int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, const ebpo_subtree *s,
+                     const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope,
+                     uint32_t codes[EBPO_PLANES_MAX])
+{
+    bool top = cell.level <= TOP_LEVELS;
+    int count = ebpo_build_candidates(b, s, detail, top ? EBPO_PLANES_CANDIDATES : CANDIDATES_BELOW, scratch->candidates);
+    uint64_t begin, end;
+    ebpo_build_vertex_range(b, cell, &begin, &end);
+    scratch->count = 0;
+    bool few = end - begin <= FEW_VERTICES;
+    if (few && !add_vertices(b, scratch, cell, begin, end))
+        return -1;
+    if (!add_crossings(b, scratch, s, detail, cell))
+        return -1;
+    unsigned corners = ebpo_inside_corners(b, winding, detail->delta);
+    for (int i = 0; i < 8; i++)
+        if (corners >> i & 1 && !add_point(scratch, i & 1, i >> 1 & 1, i >> 2 & 1, 0))
+            return -1;
+    for (int j = 0; j < count; j++) {
+        int32_t v[3], d;
+        ebpo_plane_code_decode(scratch->candidates[j].normal, v, &d);
+        double n[3] = { v[0], v[1], v[2] }, *support = &scratch->candidates[j].support;
+        if (!few)
+            *support = ebpo_bounds_support(b, cell, n, begin, end);
+        raise_support(scratch, n, support);
+    }
+    double epsilon = b->options->epsilon * (top ? 0.1 : 1);
+    return ebpo_select_greedy(envelope, scratch->candidates, count, epsilon, EBPO_PLANES_MAX, codes);
+}

@@ -1,0 +1,80 @@
+/* Winding numbers at cell corners. A subtree's corner differences come from its own leaves alone; a walk from corner to corner along the
+ * children's edges adds them up, and the root's lowest corner lies outside the model, where the winding number is 0.
+ * Replaces the special cases of BP 2008, 3.4.1.1. */
+#include "base/error.h"
+#include "build/builder.h"
+
+bool ebpo_rule_inside(ebpo_rule rule, int32_t winding)
+{
+    switch (rule) {
+    case EBPO_RULE_NONZERO: return winding != 0;
+    case EBPO_RULE_EVENODD: return winding & 1;
+    case EBPO_RULE_POSITIVE: return winding > 0;
+    }
+    return false;
+}
+
+bool ebpo_child_offsets(const int32_t *child_delta[8], int32_t offset[8])
+{
+    offset[0] = 0;
+    bool agree = true;
+    for (int i = 1; i < 8; i++) {
+        bool known = false;
+        for (int axis = 0; axis < 3; axis++) {
+            if (!(i >> axis & 1))
+                continue;
+            int before = i & ~(1 << axis);
+            int32_t way = offset[before] + child_delta[before][1 << axis];
+            agree = agree && (!known || way == offset[i]);
+            offset[i] = way;
+            known = true;
+        }
+    }
+    return agree;
+}
+
+bool ebpo_gather_delta(const int32_t *child_delta[8], int32_t delta[8])
+{
+    int32_t offset[8];
+    bool agree = ebpo_child_offsets(child_delta, offset);
+    for (int i = 0; i < 8; i++)
+        delta[i] = offset[i] + child_delta[i][i];
+    return agree;
+}
+
+void ebpo_child_deltas(const ebpo_builder *b, const ebpo_subtree *s, uint32_t child, const int32_t *child_delta[8])
+{
+    static const int32_t none[8];
+    for (uint32_t o = 0; o < 8; o++) {
+        const ebpo_build_node *n = &s->nodes[child + o];
+        if (n->type == EBPO_WHITE)
+            child_delta[o] = none;
+        else if (s == &b->top && n->type == EBPO_LEAF)
+            child_delta[o] = b->sub[n->detail].root_delta;
+        else
+            child_delta[o] = s->details[n->detail].delta;
+    }
+}
+
+static bool top_deltas(ebpo_builder *b, uint32_t index)
+{
+    ebpo_subtree *s = &b->top;
+    ebpo_build_node *node = &s->nodes[index];
+    if (node->type != EBPO_GRAY)
+        return true;
+    bool agree = true;
+    for (uint32_t o = 0; o < 8; o++)
+        agree = top_deltas(b, node->child + o) && agree;
+    const int32_t *child_delta[8];
+    ebpo_child_deltas(b, s, node->child, child_delta);
+    return ebpo_gather_delta(child_delta, s->details[node->detail].delta) && agree;
+}
+
+ebpo_status ebpo_build_labels(ebpo_builder *b, ebpo_error *error)
+{
+    if (!b->solid)
+        return EBPO_OK;
+    if (!top_deltas(b, 0))
+        return ebpo_fail(error, EBPO_E_NOT_SOLID, "winding numbers disagree: the mesh does not balance; check it again before building");
+    return EBPO_OK;
+}

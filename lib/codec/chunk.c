@@ -1,0 +1,168 @@
+#include "codec/chunk.h"
+
+#include <string.h>
+#include <zlib.h>
+#include <zstd.h>
+
+#include "base/endian.h"
+
+void ebpo_chunk_coder_clear(ebpo_chunk_coder *coder)
+{
+    ZSTD_freeCCtx(coder->zstd_out);
+    ZSTD_freeDCtx(coder->zstd_in);
+    coder->zstd_out = coder->zstd_in = NULL;
+}
+
+size_t ebpo_chunk_bound(size_t raw_bytes)
+{
+    size_t zstd = ZSTD_compressBound(raw_bytes), deflate = compressBound((uLong)raw_bytes);
+    return (zstd > deflate ? zstd : deflate) + 4;
+}
+
+void ebpo_shuffle(const uint8_t *in, size_t bytes, size_t element_size, uint8_t *out)
+{
+    size_t count = bytes / element_size;
+    for (size_t k = 0; k < element_size; k++)
+        for (size_t i = 0; i < count; i++)
+            out[k * count + i] = in[i * element_size + k];
+}
+
+void ebpo_unshuffle(const uint8_t *in, size_t bytes, size_t element_size, uint8_t *out)
+{
+    size_t count = bytes / element_size;
+    for (size_t k = 0; k < element_size; k++)
+        for (size_t i = 0; i < count; i++)
+            out[i * element_size + k] = in[k * count + i];
+}
+
+uint32_t ebpo_fletcher32(const uint8_t *data, size_t bytes)
+{
+    uint32_t low = 0, high = 0;
+    size_t words = bytes / 2;
+    while (words) {
+        size_t run = words > 360 ? 360 : words; /* no overflow of 32 bits before the sums are folded */
+        words -= run;
+        for (; run; run--, data += 2) {
+            low += (uint32_t)data[0] << 8 | data[1];
+            high += low;
+        }
+        low = (low & 0xffff) + (low >> 16);
+        high = (high & 0xffff) + (high >> 16);
+    }
+    if (bytes % 2) {
+        low += (uint32_t)data[0] << 8;
+        high += low;
+        low = (low & 0xffff) + (low >> 16);
+        high = (high & 0xffff) + (high >> 16);
+    }
+    low = (low & 0xffff) + (low >> 16);
+    high = (high & 0xffff) + (high >> 16);
+    return high << 16 | low;
+}
+
+static ebpo_status zstd_encode(ebpo_chunk_coder *coder, int level, const uint8_t *raw, size_t raw_bytes, uint8_t *out, size_t *out_bytes)
+{
+    if (!coder->zstd_out)
+        coder->zstd_out = ZSTD_createCCtx();
+    if (!coder->zstd_out)
+        return EBPO_E_MEMORY;
+    size_t failed = ZSTD_isError(ZSTD_CCtx_setParameter(coder->zstd_out, ZSTD_c_compressionLevel, level ? level : EBPO_ZSTD_LEVEL));
+    failed |= ZSTD_isError(ZSTD_CCtx_setParameter(coder->zstd_out, ZSTD_c_checksumFlag, 1));
+    if (failed)
+        return EBPO_E_ARGUMENT;
+    size_t size = ZSTD_compress2(coder->zstd_out, out, ebpo_chunk_bound(raw_bytes), raw, raw_bytes);
+    *out_bytes = size;
+    return ZSTD_isError(size) ? EBPO_E_MEMORY : EBPO_OK; /* the bound leaves no other cause */
+}
+
+static ebpo_status deflate_encode(int level, const uint8_t *raw, size_t raw_bytes, uint8_t *out, size_t *out_bytes)
+{
+    uLongf size = (uLongf)ebpo_chunk_bound(raw_bytes);
+    int code = compress2(out, &size, raw, (uLong)raw_bytes, level ? level : EBPO_DEFLATE_LEVEL);
+    *out_bytes = size;
+    return code == Z_OK ? EBPO_OK : code == Z_MEM_ERROR ? EBPO_E_MEMORY : EBPO_E_ARGUMENT;
+}
+
+ebpo_status ebpo_chunk_encode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline, int level, size_t element_size,
+                              const uint8_t *raw, size_t raw_bytes, uint8_t *out, size_t *out_bytes)
+{
+    ebpo_status status = EBPO_OK;
+    bool compressed = pipeline == EBPO_PIPELINE_ZSTD || pipeline == EBPO_PIPELINE_DEFLATE;
+    if (compressed && element_size > 1) {
+        ebpo_shuffle(raw, raw_bytes, element_size, coder->scratch);
+        raw = coder->scratch;
+    }
+    if (pipeline == EBPO_PIPELINE_ZSTD)
+        return zstd_encode(coder, level, raw, raw_bytes, out, out_bytes);
+    if (pipeline == EBPO_PIPELINE_DEFLATE) {
+        status = deflate_encode(level, raw, raw_bytes, out, out_bytes);
+    } else {
+        memcpy(out, raw, raw_bytes);
+        *out_bytes = raw_bytes;
+    }
+    if (status == EBPO_OK && pipeline != EBPO_PIPELINE_BARE) {
+        ebpo_store32(out + *out_bytes, ebpo_fletcher32(out, *out_bytes));
+        *out_bytes += 4;
+    }
+    return status;
+}
+
+static ebpo_status broken(const char **why, const char *what)
+{
+    *why = what;
+    return EBPO_E_FORMAT;
+}
+
+static ebpo_status zstd_decode(ebpo_chunk_coder *coder, const uint8_t *stored, size_t stored_bytes, uint8_t *raw, size_t raw_bytes,
+                               const char **why)
+{
+    if (!coder->zstd_in)
+        coder->zstd_in = ZSTD_createDCtx();
+    if (!coder->zstd_in)
+        return EBPO_E_MEMORY;
+    if (ZSTD_getFrameContentSize(stored, stored_bytes) != raw_bytes)
+        return broken(why, "the zstd frame does not state the chunk's size");
+    if (ZSTD_findFrameCompressedSize(stored, stored_bytes) != stored_bytes)
+        return broken(why, "the zstd frame does not fill the chunk");
+    size_t size = ZSTD_decompressDCtx(coder->zstd_in, raw, raw_bytes, stored, stored_bytes);
+    if (ZSTD_isError(size))
+        return broken(why, ZSTD_getErrorName(size));
+    return size == raw_bytes ? EBPO_OK : broken(why, "the zstd frame decodes to another size than the chunk's");
+}
+
+static ebpo_status deflate_decode(const uint8_t *stored, size_t stored_bytes, uint8_t *raw, size_t raw_bytes, const char **why)
+{
+    uLongf size = (uLongf)raw_bytes;
+    uLong used = (uLong)stored_bytes;
+    int code = uncompress2(raw, &size, stored, &used);
+    if (code == Z_MEM_ERROR)
+        return EBPO_E_MEMORY;
+    if (code != Z_OK || size != raw_bytes || used != stored_bytes)
+        return broken(why, "the deflate stream does not decode to the chunk's size");
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_chunk_decode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline, size_t element_size, const uint8_t *stored,
+                              size_t stored_bytes, uint8_t *raw, size_t raw_bytes, const char **why)
+{
+    *why = "";
+    if (pipeline == EBPO_PIPELINE_DEFLATE || pipeline == EBPO_PIPELINE_CHECKSUM) {
+        if (stored_bytes < 4 || ebpo_load32(stored + stored_bytes - 4) != ebpo_fletcher32(stored, stored_bytes - 4))
+            return broken(why, "the fletcher32 checksum does not match");
+        stored_bytes -= 4;
+    }
+    bool shuffled = (pipeline == EBPO_PIPELINE_ZSTD || pipeline == EBPO_PIPELINE_DEFLATE) && element_size > 1;
+    uint8_t *into = shuffled ? coder->scratch : raw;
+    ebpo_status status = EBPO_OK;
+    if (pipeline == EBPO_PIPELINE_ZSTD)
+        status = zstd_decode(coder, stored, stored_bytes, into, raw_bytes, why);
+    else if (pipeline == EBPO_PIPELINE_DEFLATE)
+        status = deflate_decode(stored, stored_bytes, into, raw_bytes, why);
+    else if (stored_bytes != raw_bytes)
+        status = broken(why, "the stored size is not the chunk's size");
+    else
+        memcpy(raw, stored, raw_bytes);
+    if (status == EBPO_OK && shuffled)
+        ebpo_unshuffle(into, raw_bytes, element_size, raw);
+    return status;
+}

@@ -1,0 +1,262 @@
+#include "container/plan.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "codec/coding.h"
+#include "container/check.h"
+#include "container/facts.h"
+#include "ebpo_config.h"
+
+void ebpo_plan_free(ebpo_plan *plan)
+{
+    for (unsigned i = 0; i < plan->count; i++)
+        ebpo_h5_close_id(plan->array[i].handle);
+    free(plan->array);
+    for (int level = 0; level < EBPO_LEVELS_MAX; level++) {
+        free(plan->types_index[level]);
+        free(plan->gray_index[level]);
+        free(plan->leaf_index[level]);
+    }
+    free(plan->faces_index);
+    memset(plan, 0, sizeof *plan);
+}
+
+static void summarise(ebpo_info *info, const ebpo_tree *tree)
+{
+    for (int i = 0; i < info->level_count; i++) {
+        const ebpo_level *l = &tree->level[i];
+        ebpo_level_summary *s = &info->level[i];
+        bool mesh = info->parts & EBPO_PART_MESH;
+        *s = (ebpo_level_summary){ .gray_count = l->gray_count, .leaf_count = l->leaf_count, .white_count = l->white_count,
+                                   .black_count = l->black_count, .gray_volume = l->gray_volume, .leaf_volume = l->leaf_volume };
+        s->plane_count = info->parts & EBPO_PART_PLANES ? l->plane_count : 0;
+        s->leaf_plane_count = info->parts & EBPO_PART_LEAF_PLANES ? l->leaf_plane_count : 0;
+        s->new_count = mesh ? l->new_count : 0;
+        s->ref_count = mesh ? l->ref_count : 0;
+    }
+}
+
+static bool texts_ok(const ebpo_info *info)
+{
+    const struct { const char *text; size_t size; } texts[] = {
+        { info->generator, sizeof info->generator }, { info->source_name, sizeof info->source_name },
+        { info->source_format, sizeof info->source_format }, { info->unit, sizeof info->unit },
+        { info->crs, sizeof info->crs }, { info->date, sizeof info->date },
+    };
+    for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++)
+        if (!memchr(texts[i].text, 0, texts[i].size) || !ebpo_h5_text_ok(texts[i].text))
+            return false;
+    return true;
+}
+
+/* The facts as the file will state them: parts that are wanted and there, counts of what is written. */
+static ebpo_status settle_facts(ebpo_plan *plan, const ebpo_write_options *options, const ebpo_check *check, ebpo_error *error)
+{
+    const ebpo_tree *tree = plan->tree;
+    ebpo_info *info = &plan->info;
+    *info = tree->info;
+    info->version_major = EBPO_FORMAT_MAJOR;
+    info->version_minor = EBPO_FORMAT_MINOR;
+    info->codec = options->codec;
+    info->parts &= options->parts;
+    if (!(info->parts & EBPO_PART_MESH))
+        info->parts &= ~(uint32_t)EBPO_PART_MAPS;
+    if (!info->generator[0])
+        snprintf(info->generator, sizeof info->generator, "ebpo %s", EBPO_VERSION);
+    if (info->parts & EBPO_PART_MESH) {
+        bool one = !tree->mesh.xyz32 != !tree->mesh.xyz64;
+        if (!one || !tree->mesh.faces || tree->mesh.vertex_count != info->vertex_count || tree->mesh.face_count != info->face_count)
+            return ebpo_check_fail(check, -1, "/mesh", "the mesh is missing or its counts are not those of the facts", error);
+        info->double_coordinates = tree->mesh.xyz64 != NULL;
+    }
+    if (info->parts & EBPO_PART_MAPS && (!tree->vertex_source || !tree->face_source))
+        return ebpo_check_fail(check, -1, "/maps", "the maps are missing", error);
+    if (info->level_count < 1 || info->level_count > EBPO_LEVELS_MAX || info->grid_level < 0 || info->max_level < 0 ||
+        (unsigned)info->rule > EBPO_RULE_POSITIVE)
+        return ebpo_check_fail(check, -1, "/levels", "there are no levels, too many, or impossible facts", error);
+    if (!texts_ok(info))
+        return ebpo_check_fail(check, -1, "/", "a name, unit, CRS or date is not UTF-8 without control characters", error);
+    summarise(info, tree);
+    return ebpo_facts_check(info, check->shown, check->as, error);
+}
+
+static ebpo_status check_tree(ebpo_plan *plan, const ebpo_check *check, ebpo_error *error)
+{
+    const ebpo_tree *tree = plan->tree;
+    const ebpo_info *info = &plan->info;
+    ebpo_status status = EBPO_OK;
+    for (int i = 0; i < info->level_count && status == EBPO_OK; i++)
+        status = ebpo_check_level(check, info, i, &tree->level[i], error);
+    if (status == EBPO_OK && info->parts & EBPO_PART_MESH)
+        status = ebpo_check_order(check, tree, error);
+    if (status == EBPO_OK && info->parts & EBPO_PART_MESH)
+        status = ebpo_check_vertices(check, &tree->mesh, error);
+    if (status == EBPO_OK && info->parts & EBPO_PART_MAPS)
+        status = ebpo_check_map(check, "/maps/vertex_source", tree->vertex_source, info->vertex_count, info->source_vertex_count, error);
+    if (status == EBPO_OK && info->parts & EBPO_PART_MAPS)
+        status = ebpo_check_map(check, "/maps/face_source", tree->face_source, info->face_count,
+                                info->source_face_count + info->mend.added_faces, error);
+    return status;
+}
+
+static ebpo_status index_levels(ebpo_plan *plan, ebpo_error *error)
+{
+    for (int i = 0; i < plan->info.level_count; i++) {
+        const ebpo_level *level = &plan->tree->level[i];
+        ebpo_level stored = *level; /* without the parts that are left out */
+        if (!(plan->info.parts & EBPO_PART_MESH))
+            stored.leaf_first = NULL;
+        if (!(plan->info.parts & EBPO_PART_LEAF_PLANES))
+            stored.leaf_plane_counts = NULL;
+        plan->types_index[i] = ebpo_index_types(level, i == 0);
+        plan->gray_index[i] = ebpo_index_gray(level);
+        plan->leaf_index[i] = ebpo_index_leaves(&stored);
+        if (!plan->types_index[i] || !plan->gray_index[i] || !plan->leaf_index[i])
+            return ebpo_fail_memory(error, level->leaf_count / EBPO_INDEX_ROWS * 24);
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status index_faces(ebpo_plan *plan, const ebpo_check *check, ebpo_error *error)
+{
+    const ebpo_mesh *mesh = &plan->tree->mesh;
+    uint32_t rows = ebpo_h5_chunk_rows(mesh->face_count, 3, 4);
+    plan->faces_index = ebpo_alloc(mesh->face_count / rows + 1, sizeof *plan->faces_index);
+    if (!plan->faces_index)
+        return ebpo_fail_memory(error, mesh->face_count / rows * 8);
+    uint64_t seen = 0;
+    for (uint64_t i = 0; i < mesh->face_count * 3; i++) {
+        if (i % (3 * (uint64_t)rows) == 0)
+            plan->faces_index[i / (3 * (uint64_t)rows)] = seen;
+        if (mesh->faces[i] > seen || mesh->faces[i] >= mesh->vertex_count)
+            return ebpo_check_fail(check, -1, "/mesh/faces", "the vertices are not in the order of their first use by the faces", error);
+        seen += mesh->faces[i] == seen;
+    }
+    return EBPO_OK;
+}
+
+/* Least of 1, 2, 4 bytes that holds all values. */
+static uint8_t narrow_unsigned(const uint32_t *values, uint64_t count)
+{
+    uint32_t all = 0;
+    for (uint64_t i = 0; i < count; i++)
+        all |= values[i];
+    return all <= UINT8_MAX ? 1 : all <= UINT16_MAX ? 2 : 4;
+}
+
+static uint8_t narrow_signed(const int32_t *values, uint64_t count)
+{
+    int32_t low = 0, high = 0;
+    for (uint64_t i = 0; i < count; i++) {
+        low = values[i] < low ? values[i] : low;
+        high = values[i] > high ? values[i] : high;
+    }
+    return low >= INT8_MIN && high <= INT8_MAX ? 1 : low >= INT16_MIN && high <= INT16_MAX ? 2 : 4;
+}
+
+static uint8_t narrow_skips(const ebpo_level *level)
+{
+    uint64_t end = 0, all = 0;
+    for (uint64_t i = 0; i < level->leaf_count; i++) {
+        all |= level->leaf_first[i] - end;
+        end = level->leaf_first[i] + level->leaf_new[i];
+    }
+    return all <= UINT32_MAX ? 4 : 8;
+}
+
+static bool all_are(const int32_t *values, uint64_t count, int32_t usual)
+{
+    for (uint64_t i = 0; values && i < count; i++)
+        if (values[i] != usual)
+            return false;
+    return true;
+}
+
+/* Where the values are and how wide they get. */
+static void find_values(const ebpo_plan *plan, ebpo_array_out *a)
+{
+    const ebpo_level *l = &plan->tree->level[a->level];
+    const void *values = NULL;
+    uint8_t native = 4, stored = 4;
+    switch (a->id) {
+    case EBPO_A_TYPES: values = l->types, native = stored = 2; break;
+    case EBPO_A_PLANE_COUNTS: values = l->plane_counts, native = stored = 1; break;
+    case EBPO_A_PLANES: values = l->planes; break;
+    case EBPO_A_LEAF_WINDING: values = l->leaf_winding, stored = narrow_signed(values, l->leaf_count); break;
+    case EBPO_A_BLACK_WINDING: values = l->black_winding, stored = narrow_signed(values, l->black_count); break;
+    case EBPO_A_WHITE_WINDING: values = l->white_winding, stored = narrow_signed(values, l->white_count); break;
+    case EBPO_A_LEAF_SKIP: stored = narrow_skips(l); break;
+    case EBPO_A_LEAF_NEW: values = l->leaf_new, stored = narrow_unsigned(values, l->leaf_count); break;
+    case EBPO_A_LEAF_REF_COUNT: values = l->leaf_ref_count, stored = narrow_unsigned(values, l->leaf_count); break;
+    case EBPO_A_TYPES_INDEX: values = plan->types_index[a->level], native = stored = 8; break;
+    case EBPO_A_GRAY_INDEX: values = plan->gray_index[a->level], native = stored = 8; break;
+    case EBPO_A_LEAF_INDEX: values = plan->leaf_index[a->level], native = stored = 8; break;
+    case EBPO_A_LEAF_PLANE_COUNTS: values = l->leaf_plane_counts, native = stored = 1; break;
+    case EBPO_A_LEAF_PLANES: values = l->leaf_planes; break;
+    case EBPO_A_VERTICES: stored = plan->info.double_coordinates ? 8 : 4; break;
+    case EBPO_A_FACES_INDEX: values = plan->faces_index, native = stored = 8; break;
+    default: break; /* 4 bytes, a coding of its own */
+    }
+    a->values = values;
+    a->value_size = native;
+    a->shape.element_size = stored;
+}
+
+static ebpo_pipeline pipeline_of(ebpo_codec codec)
+{
+    return codec == EBPO_CODEC_ZSTD ? EBPO_PIPELINE_ZSTD : codec == EBPO_CODEC_DEFLATE ? EBPO_PIPELINE_DEFLATE : EBPO_PIPELINE_CHECKSUM;
+}
+
+static void add_array(ebpo_plan *plan, ebpo_array_id id, int level)
+{
+    const ebpo_level *l = &plan->tree->level[level];
+    uint64_t rows = ebpo_schema_rows(&plan->info, id, level);
+    if (rows == 0 || (id == EBPO_A_BLACK_WINDING && all_are(l->black_winding, l->black_count, 1)) ||
+        (id == EBPO_A_WHITE_WINDING && all_are(l->white_winding, l->white_count, 0)))
+        return;
+    ebpo_array_out *a = &plan->array[plan->count++];
+    *a = (ebpo_array_out){ .id = id, .level = level, .handle = -1 };
+    ebpo_schema_path(id, level, a->path);
+    find_values(plan, a);
+    a->shape.rows = rows;
+    a->shape.cols = ebpo_schema[id].cols;
+    a->shape.is_signed = ebpo_schema[id].is_signed;
+    a->shape.chunk_rows = ebpo_h5_chunk_rows(rows, a->shape.cols, a->shape.element_size);
+    a->shape.pipeline = pipeline_of(plan->info.codec);
+}
+
+ebpo_status ebpo_plan_make(ebpo_plan *plan, const ebpo_tree *tree, const ebpo_write_options *options, const char *shown,
+                           ebpo_error *error)
+{
+    ebpo_check check = { shown, EBPO_E_ARGUMENT };
+    memset(plan, 0, sizeof *plan);
+    plan->tree = tree;
+    ebpo_status status = settle_facts(plan, options, &check, error);
+    if (status == EBPO_OK)
+        status = check_tree(plan, &check, error);
+    if (status == EBPO_OK)
+        status = index_levels(plan, error);
+    if (status == EBPO_OK && plan->info.parts & EBPO_PART_MESH)
+        status = index_faces(plan, &check, error);
+    if (status != EBPO_OK)
+        goto done;
+    plan->array = ebpo_alloc((uint64_t)plan->info.level_count * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS, sizeof *plan->array);
+    if (!plan->array) {
+        status = ebpo_fail_memory(error, sizeof *plan->array);
+        goto done;
+    }
+    for (int level = 0; level < plan->info.level_count; level++)
+        for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
+            add_array(plan, (ebpo_array_id)id, level);
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS; id++)
+        add_array(plan, (ebpo_array_id)id, 0);
+done:
+    if (status != EBPO_OK)
+        ebpo_plan_free(plan);
+    return status;
+}

@@ -1,0 +1,304 @@
+#include "geom/polytope.h"
+
+#include <string.h>
+
+static const double tolerance = 1e-10;
+
+static void cross(const double a[3], const double b[3], double out[3])
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+void ebpo_polytope_cube(ebpo_polytope *p)
+{
+    /* Vertex i has bit 0 x, bit 1 y, bit 2 z. */
+    static const uint8_t loops[6][4] = { { 0, 4, 6, 2 }, { 1, 3, 7, 5 }, { 0, 1, 5, 4 },
+                                         { 2, 6, 7, 3 }, { 0, 2, 3, 1 }, { 4, 5, 7, 6 } };
+    p->vertex_count = 8;
+    p->face_count = 6;
+    p->corner_count = 24;
+    for (int i = 0; i < 8; i++)
+        for (int k = 0; k < 3; k++)
+            p->vertex[i][k] = i >> k & 1;
+    for (int f = 0; f < 6; f++) {
+        p->tag[f] = -1 - f;
+        p->first[f] = (uint16_t)(4 * f);
+        memcpy(p->corner + 4 * f, loops[f], 4);
+    }
+    p->first[6] = 24;
+}
+
+double ebpo_polytope_volume(const ebpo_polytope *p)
+{
+    const double *o = p->vertex[0];
+    double sum = 0;
+    for (int f = 0; f < p->face_count; f++) {
+        const double *a = p->vertex[p->corner[p->first[f]]];
+        double oa[3] = { a[0] - o[0], a[1] - o[1], a[2] - o[2] };
+        for (int i = p->first[f] + 1; i + 1 < p->first[f + 1]; i++) {
+            const double *b = p->vertex[p->corner[i]], *c = p->vertex[p->corner[i + 1]];
+            double ob[3] = { b[0] - o[0], b[1] - o[1], b[2] - o[2] };
+            double oc[3] = { c[0] - o[0], c[1] - o[1], c[2] - o[2] };
+            double n[3];
+            cross(ob, oc, n);
+            sum += dot(oa, n);
+        }
+    }
+    return sum / 6;
+}
+
+static void between(const double a[3], double da, const double b[3], double db, double out[3])
+{
+    double t = da / (da - db);
+    for (int k = 0; k < 3; k++)
+        out[k] = a[k] + t * (b[k] - a[k]);
+}
+
+double ebpo_polytope_removed(const ebpo_polytope *p, const double n[3], double d)
+{
+    double dist[EBPO_POLYTOPE_VERTICES], reference[3] = { 0, 0, 0 };
+    bool have_reference = false;
+    for (int i = 0; i < p->vertex_count; i++)
+        dist[i] = dot(n, p->vertex[i]) - d;
+    double sum = 0;
+    for (int f = 0; f < p->face_count; f++) {
+        /* The part of this face beyond the plane, as a fan seen from a point on the plane: the cap itself adds nothing. */
+        double start[3], previous[3];
+        int kept = 0, count = p->first[f + 1] - p->first[f];
+        const uint8_t *loop = p->corner + p->first[f];
+        for (int i = 0; i < count; i++) {
+            int a = loop[i], b = loop[i + 1 < count ? i + 1 : 0];
+            double points[2][3];
+            int added = 0;
+            if (dist[a] > 0)
+                memcpy(points[added++], p->vertex[a], sizeof points[0]);
+            if ((dist[a] > 0) != (dist[b] > 0)) {
+                /* The same end first from both sides, so that neighbours get the same point. */
+                if (dist[a] > 0)
+                    between(p->vertex[a], dist[a], p->vertex[b], dist[b], points[added]);
+                else
+                    between(p->vertex[b], dist[b], p->vertex[a], dist[a], points[added]);
+                if (!have_reference) {
+                    memcpy(reference, points[added], sizeof reference);
+                    have_reference = true;
+                }
+                added++;
+            }
+            for (int j = 0; j < added; j++) {
+                double r[3] = { points[j][0], points[j][1], points[j][2] };
+                if (kept == 0)
+                    memcpy(start, r, sizeof start);
+                else if (kept > 1) {
+                    double u[3], v[3], w[3], c[3];
+                    for (int k = 0; k < 3; k++) {
+                        u[k] = start[k] - reference[k];
+                        v[k] = previous[k] - reference[k];
+                        w[k] = r[k] - reference[k];
+                    }
+                    cross(v, w, c);
+                    sum += dot(u, c);
+                }
+                memcpy(previous, r, sizeof previous);
+                kept++;
+            }
+        }
+    }
+    return have_reference ? sum / 6 : 0;
+}
+
+/* --- clipping --- */
+
+typedef struct cut {
+    const ebpo_polytope *in;
+    ebpo_polytope *out;
+    double dist[EBPO_POLYTOPE_VERTICES];
+    uint8_t number[EBPO_POLYTOPE_VERTICES]; /* of kept vertices in `out` */
+    bool on[EBPO_POLYTOPE_VERTICES];        /* `out` vertex lies on the cutting plane */
+    struct { uint8_t in, out, number; } edge[EBPO_POLYTOPE_FACES]; /* cut edges and their new vertices */
+    int edges;
+    struct { uint8_t from, to; } rim[EBPO_POLYTOPE_CORNERS]; /* edges of kept loops that lie on the plane */
+    int rims;
+    bool full;
+} cut;
+
+static uint8_t add_vertex(cut *c, const double x[3], bool on)
+{
+    if (c->out->vertex_count == EBPO_POLYTOPE_VERTICES) {
+        c->full = true;
+        return 0;
+    }
+    int i = c->out->vertex_count++;
+    memcpy(c->out->vertex[i], x, sizeof c->out->vertex[i]);
+    c->on[i] = on;
+    return (uint8_t)i;
+}
+
+static uint8_t crossing(cut *c, uint8_t in, uint8_t out)
+{
+    if (c->dist[in] >= -tolerance)
+        return c->number[in]; /* the inner end itself lies on the plane */
+    for (int i = 0; i < c->edges; i++)
+        if (c->edge[i].in == in && c->edge[i].out == out)
+            return c->edge[i].number;
+    if (c->edges == EBPO_POLYTOPE_FACES) {
+        c->full = true;
+        return 0;
+    }
+    double x[3];
+    between(c->in->vertex[in], c->dist[in], c->in->vertex[out], c->dist[out], x);
+    uint8_t number = add_vertex(c, x, true);
+    c->edge[c->edges].in = in;
+    c->edge[c->edges].out = out;
+    c->edge[c->edges++].number = number;
+    return number;
+}
+
+static void add_corner(cut *c, int loop_start, uint8_t v)
+{
+    ebpo_polytope *o = c->out;
+    if (o->corner_count > loop_start && o->corner[o->corner_count - 1] == v)
+        return;
+    if (o->corner_count == EBPO_POLYTOPE_CORNERS) {
+        c->full = true;
+        return;
+    }
+    o->corner[o->corner_count++] = v;
+}
+
+static void close_face(cut *c, int start, int32_t tag)
+{
+    ebpo_polytope *o = c->out;
+    while (o->corner_count > start + 1 && o->corner[o->corner_count - 1] == o->corner[start])
+        o->corner_count--;
+    if (o->corner_count - start < 3 || o->face_count == EBPO_POLYTOPE_FACES) {
+        c->full |= o->face_count == EBPO_POLYTOPE_FACES;
+        o->corner_count = start;
+        return;
+    }
+    o->tag[o->face_count] = tag;
+    o->first[o->face_count++] = (uint16_t)start;
+    o->first[o->face_count] = (uint16_t)o->corner_count;
+}
+
+static void clip_face(cut *c, int f)
+{
+    const ebpo_polytope *p = c->in;
+    const uint8_t *loop = p->corner + p->first[f];
+    int count = p->first[f + 1] - p->first[f], start = c->out->corner_count;
+    bool inside = false;
+    for (int i = 0; i < count; i++)
+        inside |= c->dist[loop[i]] < -tolerance;
+    if (!inside)
+        return;
+    for (int i = 0; i < count; i++) {
+        uint8_t a = loop[i], b = loop[i + 1 < count ? i + 1 : 0];
+        bool a_out = c->dist[a] > tolerance, b_out = c->dist[b] > tolerance;
+        if (!a_out)
+            add_corner(c, start, c->number[a]);
+        if (a_out != b_out)
+            add_corner(c, start, a_out ? crossing(c, b, a) : crossing(c, a, b));
+    }
+    close_face(c, start, p->tag[f]);
+    for (int i = start; i < c->out->corner_count && !c->full; i++) {
+        uint8_t a = c->out->corner[i], b = c->out->corner[i + 1 < c->out->corner_count ? i + 1 : start];
+        if (c->on[a] && c->on[b]) {
+            c->rim[c->rims].from = a;
+            c->rim[c->rims++].to = b;
+        }
+    }
+}
+
+/* Rim edges used in both directions lie between two kept faces; the others, reversed, bound the cap. */
+static bool close_cap(cut *c, int32_t tag)
+{
+    int16_t next[EBPO_POLYTOPE_VERTICES];
+    memset(next, -1, sizeof next);
+    int open = 0, begin = -1;
+    for (int i = 0; i < c->rims; i++) {
+        bool paired = false;
+        for (int j = 0; j < c->rims && !paired; j++)
+            paired = c->rim[i].from == c->rim[j].to && c->rim[i].to == c->rim[j].from;
+        if (paired)
+            continue;
+        if (next[c->rim[i].to] != -1)
+            return false;
+        next[c->rim[i].to] = c->rim[i].from;
+        begin = c->rim[i].to;
+        open++;
+    }
+    if (open < 3)
+        return false;
+    int start = c->out->corner_count, at = begin, steps = 0;
+    do {
+        add_corner(c, start, (uint8_t)at);
+        at = next[at];
+        steps++;
+    } while (at != -1 && at != begin && steps <= open);
+    if (at != begin || steps != open)
+        return false;
+    close_face(c, start, tag);
+    return true;
+}
+
+ebpo_clip ebpo_polytope_clip(ebpo_polytope *p, const double n[3], double d, int32_t tag)
+{
+    cut c;
+    ebpo_polytope out;
+    c.in = p;
+    c.out = &out;
+    c.edges = c.rims = 0;
+    c.full = false;
+    double most = -1e300, least = 1e300;
+    for (int i = 0; i < p->vertex_count; i++) {
+        double e = dot(n, p->vertex[i]) - d;
+        c.dist[i] = e;
+        most = e > most ? e : most;
+        least = e < least ? e : least;
+    }
+    if (most <= tolerance)
+        return EBPO_CLIP_NONE;
+    if (least >= -1e-7)
+        return EBPO_CLIP_REFUSED;
+    out.vertex_count = out.face_count = out.corner_count = 0;
+    out.first[0] = 0;
+    for (int i = 0; i < p->vertex_count; i++)
+        if (c.dist[i] <= tolerance)
+            c.number[i] = add_vertex(&c, p->vertex[i], c.dist[i] >= -tolerance);
+    for (int f = 0; f < p->face_count && !c.full; f++)
+        clip_face(&c, f);
+    if (c.full || !close_cap(&c, tag) || c.full || out.face_count < 4)
+        return EBPO_CLIP_REFUSED;
+    memcpy(p->vertex, out.vertex, (size_t)out.vertex_count * sizeof out.vertex[0]);
+    memcpy(p->tag, out.tag, (size_t)out.face_count * sizeof out.tag[0]);
+    memcpy(p->first, out.first, (size_t)(out.face_count + 1) * sizeof out.first[0]);
+    memcpy(p->corner, out.corner, (size_t)out.corner_count);
+    p->vertex_count = out.vertex_count;
+    p->face_count = out.face_count;
+    p->corner_count = out.corner_count;
+    return EBPO_CLIP_CUT;
+}
+
+bool ebpo_polytope_child(const ebpo_polytope *p, unsigned octant, ebpo_polytope *out)
+{
+    *out = *p;
+    for (int k = 0; k < 3; k++) {
+        bool high = octant >> k & 1;
+        double n[3] = { 0, 0, 0 };
+        n[k] = high ? -1 : 1;
+        if (ebpo_polytope_clip(out, n, high ? -0.5 : 0.5, -1 - (2 * k + !high)) == EBPO_CLIP_REFUSED) {
+            ebpo_polytope_cube(out);
+            return false;
+        }
+    }
+    for (int i = 0; i < out->vertex_count; i++)
+        for (int k = 0; k < 3; k++)
+            out->vertex[i][k] = 2 * out->vertex[i][k] - (octant >> k & 1);
+    return true;
+}

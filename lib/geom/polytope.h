@@ -1,0 +1,43 @@
+/* Convex polytopes in cell coordinates, cut from the unit cube by half-spaces: for volumes, drawing and choosing planes.
+ * Their vertices are rounded. Containment never depends on them; the decoded half-spaces carry the guarantee.
+ * Source: BP 2008, section 3.4.3 (clipping of the box), done here on vertex loops. */
+#ifndef EBPO_GEOM_POLYTOPE_H
+#define EBPO_GEOM_POLYTOPE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+enum { EBPO_POLYTOPE_VERTICES = 192, EBPO_POLYTOPE_FACES = 96, EBPO_POLYTOPE_CORNERS = 576 };
+
+/* Face loops run counter-clockwise seen from outside. A face's tag tells the half-space it comes from: -1 - (2 * axis + side) for the walls of
+ * the first cube, then what ebpo_polytope_clip was given. */
+typedef struct ebpo_polytope {
+    int vertex_count, face_count, corner_count;
+    double vertex[EBPO_POLYTOPE_VERTICES][3];
+    int32_t tag[EBPO_POLYTOPE_FACES];
+    uint16_t first[EBPO_POLYTOPE_FACES + 1]; /* corners of face f: first[f] .. first[f + 1] - 1 */
+    uint8_t corner[EBPO_POLYTOPE_CORNERS];   /* vertex numbers */
+} ebpo_polytope;
+
+typedef enum ebpo_clip {
+    EBPO_CLIP_NONE,   /* nothing was removed */
+    EBPO_CLIP_CUT,
+    EBPO_CLIP_REFUSED /* next to nothing would remain, or there is no room, or rounding spoiled the loops: left as it was (too large, never too small) */
+} ebpo_clip;
+
+/* The unit cube. */
+void ebpo_polytope_cube(ebpo_polytope *p);
+
+/* Keeps n . x <= d. |n| should be about 1 (tolerance 1e-10 in cell units). */
+ebpo_clip ebpo_polytope_clip(ebpo_polytope *p, const double n[3], double d, int32_t tag);
+
+/* Cuts out the octant and scales it to the unit cube; false when (numerically) nothing lies in it: *out is then the whole cube. `out` may not be `p`.
+ * Walls between siblings get the wall tags again. */
+bool ebpo_polytope_child(const ebpo_polytope *p, unsigned octant, ebpo_polytope *out);
+
+double ebpo_polytope_volume(const ebpo_polytope *p);
+
+/* Volume that clipping by n . x <= d would remove. */
+double ebpo_polytope_removed(const ebpo_polytope *p, const double n[3], double d);
+
+#endif

@@ -1,0 +1,23 @@
+/* Included first by the files whose results rest on IEEE double arithmetic, one rounding for each operation, to nearest.
+ * Refuses compilers and flags that do not promise that; turns contraction into FMA off even where the flags forgot to. */
+#ifndef EBPO_GEOM_STRICT_FP_H
+#define EBPO_GEOM_STRICT_FP_H
+
+#include <float.h>
+
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
+#error "exact predicates need strict floating point: build without -ffast-math"
+#endif
+/* 16 is 0 for double; it only widens what compilers do with _Float16. */
+#if FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16
+#error "exact predicates need FLT_EVAL_METHOD 0: on 32-bit x86 build with -msse2 -mfpmath=sse"
+#endif
+_Static_assert(FLT_RADIX == 2 && DBL_MANT_DIG == 53 && DBL_MAX_EXP == 1024, "exact predicates need IEEE 754 binary64");
+
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__)
+#pragma GCC optimize("fp-contract=off")
+#endif
+
+#endif

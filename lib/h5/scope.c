@@ -1,0 +1,65 @@
+#include "h5/scope.h"
+
+#include <pthread.h>
+#include <stdio.h>
+
+#include "base/error.h"
+#include "h5/h5.h"
+#include "h5/zstd_filter.h"
+
+static pthread_mutex_t library = PTHREAD_MUTEX_INITIALIZER;
+
+void ebpo_h5_enter(ebpo_h5_scope *scope)
+{
+    pthread_mutex_lock(&library);
+    if (H5Eget_auto2(H5E_DEFAULT, &scope->printer, &scope->printer_data) < 0)
+        *scope = (ebpo_h5_scope){ NULL, NULL };
+    H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
+}
+
+void ebpo_h5_leave(ebpo_h5_scope *scope)
+{
+    H5Eset_auto2(H5E_DEFAULT, scope->printer, scope->printer_data);
+    pthread_mutex_unlock(&library);
+}
+
+static herr_t take_first(unsigned depth, const H5E_error2_t *entry, void *data)
+{
+    (void)depth;
+    if (entry->desc)
+        snprintf(data, 160, "%s", entry->desc);
+    return 1; /* the innermost is enough */
+}
+
+ebpo_status ebpo_h5_fail(ebpo_error *error, ebpo_status status, const char *shown, const char *object, const char *what)
+{
+    char cause[160] = "";
+    H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take_first, cause);
+    H5Eclear2(H5E_DEFAULT);
+    const char *colon = *object ? ": " : "";
+    if (*cause)
+        return ebpo_fail(error, status, "%s%s%s: %s (libhdf5: %s)", shown, colon, object, what, cause);
+    return ebpo_fail(error, status, "%s%s%s: %s", shown, colon, object, what);
+}
+
+hid_t ebpo_h5_integer_type(unsigned size, bool is_signed)
+{
+    switch (size) {
+    case 1: return is_signed ? H5T_STD_I8LE : H5T_STD_U8LE;
+    case 2: return is_signed ? H5T_STD_I16LE : H5T_STD_U16LE;
+    case 4: return is_signed ? H5T_STD_I32LE : H5T_STD_U32LE;
+    case 8: return is_signed ? H5T_STD_I64LE : H5T_STD_U64LE;
+    }
+    return -1;
+}
+
+ebpo_status ebpo_h5_register(ebpo_error *error)
+{
+    ebpo_h5_scope scope;
+    ebpo_h5_enter(&scope);
+    ebpo_status status = EBPO_OK;
+    if (H5Zregister(&ebpo_zstd_filter) < 0)
+        status = ebpo_h5_fail(error, EBPO_E_UNSUPPORTED, "HDF5", "", "the zstd filter could not be registered");
+    ebpo_h5_leave(&scope);
+    return status;
+}

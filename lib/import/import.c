@@ -1,0 +1,332 @@
+#include "import/import.h"
+
+#include "base/error.h"
+#include "ebpo_config.h"
+#include "io/file.h"
+
+#if !EBPO_HAVE_ASSIMP
+
+ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data, uint64_t size,
+                               const char *name, ebpo_error *error)
+{
+    (void)format;
+    (void)data;
+    (void)size;
+    *out = (ebpo_mesh){ 0 };
+    return ebpo_fail(error, EBPO_E_UNSUPPORTED, "%s: this build reads PLY only; build it with libassimp-dev installed, or convert the file to PLY",
+                     ebpo_file_name(name));
+}
+
+#else
+
+#include <assimp/cfileio.h>
+#include <assimp/cimport.h>
+#include <assimp/scene.h>
+#include <inttypes.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "geom/polygon.h"
+#include "import/weld.h"
+
+#define MOST (UINT64_C(0xfffffffe))
+
+/* aiGetErrorString is one text for the whole process. */
+static pthread_mutex_t assimp_lock = PTHREAD_MUTEX_INITIALIZER;
+
+static const char *const pseudo_names[] = { "model.obj", "model.stl", "model.off" };
+static const char *const format_names[] = { "obj", "stl", "off" };
+
+/* The one file that assimp gets to see. */
+typedef struct memory_file {
+    const uint8_t *data;
+    size_t size;
+    const char *name;
+} memory_file;
+
+typedef struct cursor {
+    const memory_file *file;
+    size_t at;
+} cursor;
+
+static size_t read_bytes(struct aiFile *file, char *to, size_t size, size_t count)
+{
+    cursor *c = (cursor *)(void *)file->UserData;
+    size_t left = c->file->size - c->at;
+    if (size == 0)
+        return 0;
+    if (count > left / size)
+        count = left / size;
+    memcpy(to, c->file->data + c->at, size * count);
+    c->at += size * count;
+    return count;
+}
+
+static size_t write_bytes(struct aiFile *file, const char *from, size_t size, size_t count)
+{
+    (void)file, (void)from, (void)size, (void)count;
+    return 0;
+}
+
+static size_t tell(struct aiFile *file)
+{
+    return ((cursor *)(void *)file->UserData)->at;
+}
+
+static size_t file_size(struct aiFile *file)
+{
+    return ((cursor *)(void *)file->UserData)->file->size;
+}
+
+static enum aiReturn seek(struct aiFile *file, size_t offset, enum aiOrigin origin)
+{
+    cursor *c = (cursor *)(void *)file->UserData;
+    size_t base = origin == aiOrigin_SET ? 0 : origin == aiOrigin_CUR ? c->at : c->file->size;
+    size_t to = base + offset; /* negative offsets come as large ones and wrap around */
+    if (to > c->file->size)
+        return aiReturn_FAILURE;
+    c->at = to;
+    return aiReturn_SUCCESS;
+}
+
+static void flush(struct aiFile *file)
+{
+    (void)file;
+}
+
+/* Any other name (material libraries) does not exist: a model must not make us open what it likes. */
+static struct aiFile *open_memory(struct aiFileIO *io, const char *name, const char *mode)
+{
+    const memory_file *source = (const memory_file *)(void *)io->UserData;
+    struct aiFile *file;
+    cursor *c;
+    if (strcmp(name, source->name) != 0 || mode[0] != 'r')
+        return NULL;
+    file = calloc(1, sizeof *file);
+    c = calloc(1, sizeof *c);
+    if (!file || !c) {
+        free(file);
+        free(c);
+        return NULL;
+    }
+    c->file = source;
+    *file = (struct aiFile){ read_bytes, write_bytes, tell, file_size, seek, flush, (aiUserData)(void *)c };
+    return file;
+}
+
+static void close_memory(struct aiFileIO *io, struct aiFile *file)
+{
+    (void)io;
+    free(file->UserData);
+    free(file);
+}
+
+/* assimp allocates what an OFF header claims before it looks at the rest. */
+static ebpo_status check_off_counts(const memory_file *file, const char *name, ebpo_error *error)
+{
+    char head[4096];
+    size_t n = file->size < sizeof head - 1 ? file->size : sizeof head - 1;
+    unsigned long long count[2] = { 0, 0 };
+    memcpy(head, file->data, n);
+    head[n] = 0;
+    char *s = strpbrk(head, " \t\r\n"); /* behind the first word */
+    if (s)
+        s += strspn(s, " \t\r\n");
+    while (s && *s == '#') {
+        s = strpbrk(s, "\r\n");
+        if (s)
+            s += strspn(s, " \t\r\n");
+    }
+    if (!s || sscanf(s, "%llu %llu", &count[0], &count[1]) != 2)
+        return ebpo_fail(error, EBPO_E_FORMAT, "%s: no counts of vertices and faces follow the word OFF; repair the file", name);
+    if (count[0] > file->size / 2 || count[1] > file->size / 2)
+        return ebpo_fail(error, EBPO_E_FORMAT, "%s: %llu vertices and %llu faces do not fit into a file of %zu bytes; it is damaged",
+                         name, count[0], count[1], file->size);
+    return EBPO_OK;
+}
+
+/* Sums over the scene's meshes, with every index checked. */
+typedef struct totals {
+    uint64_t vertices, triangles, most_corners;
+} totals;
+
+static ebpo_status add_mesh_totals(totals *t, const struct aiMesh *m, const char *name, ebpo_error *error)
+{
+    t->vertices += m->mNumVertices;
+    for (unsigned i = 0; i < m->mNumFaces; i++) {
+        const struct aiFace *face = &m->mFaces[i];
+        for (unsigned k = 0; k < face->mNumIndices; k++)
+            if (face->mIndices[k] >= m->mNumVertices)
+                return ebpo_fail(error, EBPO_E_FORMAT, "%s: face %u names vertex %u, but there are %u vertices; repair the file",
+                                 name, i, face->mIndices[k], m->mNumVertices);
+        t->triangles += face->mNumIndices >= 3 ? face->mNumIndices - 2 : 0;
+        if (t->most_corners < face->mNumIndices)
+            t->most_corners = face->mNumIndices;
+    }
+    if (t->vertices > MOST || t->triangles > MOST)
+        return ebpo_fail(error, EBPO_E_LIMIT, "%s: more than 2^32 - 2 vertices or triangles; split the model", name);
+    return EBPO_OK;
+}
+
+static ebpo_status scene_totals(totals *t, const struct aiScene *scene, const char *name, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (unsigned i = 0; i < scene->mNumMeshes && status == EBPO_OK; i++)
+        status = add_mesh_totals(t, scene->mMeshes[i], name, error);
+    if (status == EBPO_OK && t->triangles == 0)
+        status = ebpo_fail(error, EBPO_E_FORMAT, "%s: has no faces; there is no mesh in this file", name);
+    return status;
+}
+
+static void copy_positions(float *xyz, const struct aiScene *scene)
+{
+    for (unsigned i = 0; i < scene->mNumMeshes; i++) {
+        const struct aiMesh *m = scene->mMeshes[i];
+        for (unsigned k = 0; k < m->mNumVertices; k++, xyz += 3) {
+            xyz[0] = m->mVertices[k].x;
+            xyz[1] = m->mVertices[k].y;
+            xyz[2] = m->mVertices[k].z;
+        }
+    }
+}
+
+typedef struct polygon_room {
+    double (*position)[3];
+    uint32_t (*triangle)[3];
+    void *scratch;
+} polygon_room;
+
+static bool polygon_room_get(polygon_room *room, uint64_t corners)
+{
+    room->position = ebpo_alloc(corners, sizeof *room->position);
+    room->triangle = ebpo_alloc(corners, sizeof *room->triangle);
+    room->scratch = ebpo_alloc(ebpo_polygon_scratch_bytes(corners), 1);
+    return room->position && room->triangle && room->scratch;
+}
+
+static void polygon_room_free(polygon_room *room)
+{
+    free(room->position);
+    free(room->triangle);
+    free(room->scratch);
+}
+
+/* `map`: from this assimp mesh's vertices to ours. */
+static ebpo_status add_face(ebpo_mesh *mesh, const struct aiFace *face, const uint32_t *map, const polygon_room *room,
+                            const char *name, ebpo_error *error)
+{
+    uint32_t n = face->mNumIndices;
+    if (n < 3) {
+        mesh->polygons_dropped++;
+        return EBPO_OK;
+    }
+    for (uint32_t i = 0; i < n; i++)
+        for (int k = 0; k < 3; k++)
+            room->position[i][k] = (double)mesh->xyz32[3 * (uint64_t)map[face->mIndices[i]] + (uint64_t)k];
+    ebpo_polygon_kind kind = ebpo_polygon_triangulate(room->triangle, (const double (*)[3])room->position, n, room->scratch);
+    if (kind == EBPO_POLYGON_TOO_LARGE)
+        return ebpo_fail(error, EBPO_E_LIMIT, "%s: a concave polygon of %" PRIu32 " corners is too intricate to be cut into triangles here; triangulate it in the source",
+                         name, n);
+    mesh->polygons_triangulated += n > 3;
+    mesh->polygons_concave += kind == EBPO_POLYGON_CONCAVE;
+    for (uint32_t i = 0; i < n - 2; i++)
+        for (int k = 0; k < 3; k++)
+            mesh->faces[3 * (mesh->face_count + i) + (uint64_t)k] = map[face->mIndices[room->triangle[i][k]]];
+    mesh->face_count += n - 2;
+    return EBPO_OK;
+}
+
+static ebpo_status add_faces(ebpo_mesh *mesh, const struct aiScene *scene, const uint32_t *map, const polygon_room *room,
+                             const char *name, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (unsigned i = 0; i < scene->mNumMeshes; i++) {
+        const struct aiMesh *m = scene->mMeshes[i];
+        for (unsigned k = 0; k < m->mNumFaces && status == EBPO_OK; k++)
+            status = add_face(mesh, &m->mFaces[k], map, room, name, error);
+        map += m->mNumVertices;
+    }
+    return status;
+}
+
+/* assimp gives OBJ vertices once for each corner that uses them and STL has no shared vertices at all, so shared edges exist only after welding.
+ * OFF keeps its vertices apart in the file; welding it too makes the three formats agree on what a shared vertex is. */
+static ebpo_status convert(ebpo_mesh *mesh, const struct aiScene *scene, const char *name, ebpo_error *error)
+{
+    totals t = { 0, 0, 3 };
+    polygon_room room = { NULL, NULL, NULL };
+    uint32_t *map = NULL;
+    float *smaller;
+    ebpo_status status = scene_totals(&t, scene, name, error);
+    if (status != EBPO_OK)
+        return status;
+    mesh->xyz32 = ebpo_alloc(t.vertices, 3 * sizeof *mesh->xyz32);
+    mesh->faces = ebpo_alloc(t.triangles, 3 * sizeof *mesh->faces);
+    map = ebpo_alloc(t.vertices, sizeof *map);
+    if (!mesh->xyz32 || !mesh->faces || !map || !polygon_room_get(&room, t.most_corners)) {
+        status = ebpo_fail_memory(error, t.vertices * 16 + t.triangles * 12);
+        goto done;
+    }
+    copy_positions(mesh->xyz32, scene);
+    status = ebpo_import_weld(mesh->xyz32, t.vertices, map, &mesh->vertex_count, error);
+    if (status != EBPO_OK)
+        goto done;
+    status = add_faces(mesh, scene, map, &room, name, error);
+    smaller = ebpo_realloc(mesh->xyz32, mesh->vertex_count, 3 * sizeof *mesh->xyz32);
+    if (smaller)
+        mesh->xyz32 = smaller;
+done:
+    polygon_room_free(&room);
+    free(map);
+    return status;
+}
+
+static ebpo_status import_locked(ebpo_mesh *mesh, const memory_file *file, const char *name, ebpo_error *error)
+{
+    struct aiFileIO io = { open_memory, close_memory, (aiUserData)(uintptr_t)file };
+    /* No post-processing: nothing may move, join or reorder. */
+    const struct aiScene *scene = aiImportFileEx(file->name, 0, &io);
+    if (!scene) {
+        char reason[200];
+        snprintf(reason, sizeof reason, "%s", aiGetErrorString());
+        for (char *s = reason; *s; s++)
+            if (*s < ' ' || *s > '~')
+                *s = ' ';
+        return ebpo_fail(error, EBPO_E_FORMAT, "%s: assimp cannot read it (%s); repair the file or convert it to PLY", name, reason);
+    }
+    ebpo_status status = convert(mesh, scene, name, error);
+    aiReleaseImport(scene);
+    return status;
+}
+
+ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data, uint64_t size,
+                               const char *name, ebpo_error *error)
+{
+    memory_file file = { data, (size_t)size, pseudo_names[format] };
+    ebpo_mesh mesh = { 0 };
+    ebpo_status status = EBPO_OK;
+    name = ebpo_file_name(name);
+    if (format == EBPO_IMPORT_OFF)
+        status = check_off_counts(&file, name, error);
+    if (status == EBPO_OK) {
+        pthread_mutex_lock(&assimp_lock);
+        status = import_locked(&mesh, &file, name, error);
+        pthread_mutex_unlock(&assimp_lock);
+    }
+    if (status == EBPO_OK) {
+        snprintf(mesh.source_name, sizeof mesh.source_name, "%s", name);
+        snprintf(mesh.source_format, sizeof mesh.source_format, "%s", format_names[format]);
+        mesh.source_size = size;
+    } else {
+        free(mesh.xyz32);
+        free(mesh.faces);
+        mesh = (ebpo_mesh){ 0 };
+    }
+    *out = mesh;
+    return status;
+}
+
+#endif

@@ -1,0 +1,19 @@
+/* Reading OBJ, STL and OFF through assimp. */
+#ifndef EBPO_IMPORT_IMPORT_H
+#define EBPO_IMPORT_IMPORT_H
+
+#include <ebpo/mesh.h>
+
+typedef enum ebpo_import_format { EBPO_IMPORT_OBJ, EBPO_IMPORT_STL, EBPO_IMPORT_OFF } ebpo_import_format;
+
+/* Tells the format from the first bytes, else from the ending of `name`; false when it is none of the three. */
+bool ebpo_import_recognise(ebpo_import_format *format, const uint8_t *data, uint64_t size, const char *name);
+
+/* Parses a file that is in memory. Positions are float32. source_size, source_name and source_format are set.
+ * EBPO_E_UNSUPPORTED in a build without assimp, EBPO_E_FORMAT when assimp refuses the file. No other file is opened (material
+ * libraries are not read). Runs one at a time in a process, since assimp's error text is global. On failure `out` is cleared.
+ * Faces keep the file's order within each object or group of an OBJ file; vertices are numbered by first use. */
+EBPO_MUST_USE ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data, uint64_t size,
+                                             const char *name, ebpo_error *error);
+
+#endif

@@ -1,0 +1,87 @@
+/* ebpo_mesh_read: one file of any known format. */
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/error.h"
+#include "base/sha256.h"
+#include "import/import.h"
+#include "io/file.h"
+#include "ply/ply.h"
+
+void ebpo_mesh_free(ebpo_mesh *mesh)
+{
+    if (!mesh)
+        return;
+    free(mesh->xyz32);
+    free(mesh->xyz64);
+    free(mesh->faces);
+    memset(mesh, 0, sizeof *mesh);
+}
+
+typedef struct hashing {
+    const ebpo_file *file;
+    uint8_t digest[32];
+    pthread_t thread;
+    bool threaded;
+} hashing;
+
+static void *hash_file(void *argument)
+{
+    hashing *h = argument;
+    ebpo_sha256 state;
+    ebpo_sha256_begin(&state);
+    ebpo_sha256_add(&state, h->file->data, (size_t)h->file->size);
+    ebpo_sha256_end(&state, h->digest);
+    return NULL;
+}
+
+/* Hashing runs beside parsing: it takes about as long, and both read the same pages. */
+static void hash_begin(hashing *h)
+{
+    h->threaded = pthread_create(&h->thread, NULL, hash_file, h) == 0;
+    if (!h->threaded)
+        hash_file(h);
+}
+
+static void hash_end(hashing *h)
+{
+    if (h->threaded)
+        pthread_join(h->thread, NULL);
+}
+
+static ebpo_status parse(ebpo_mesh *out, const ebpo_file *file, const char *path, const ebpo_progress *progress, ebpo_error *error)
+{
+    const char *dot = strrchr(ebpo_file_name(path), '.');
+    ebpo_import_format format;
+    if (ebpo_ply_recognise(file->data, file->size))
+        return ebpo_ply_parse_memory(out, file->data, file->size, path, progress, error);
+    if (ebpo_import_recognise(&format, file->data, file->size, path))
+        return ebpo_import_memory(out, format, file->data, file->size, path, error);
+    if (dot && strcasecmp(dot, ".ply") == 0) /* its reader says best what is wrong */
+        return ebpo_ply_parse_memory(out, file->data, file->size, path, progress, error);
+    return ebpo_fail(error, EBPO_E_FORMAT, "%s: neither its first bytes nor its name tell a PLY, OBJ, STL or OFF file",
+                     ebpo_file_name(path));
+}
+
+ebpo_status ebpo_mesh_read(ebpo_mesh *out, const char *path, const ebpo_mesh_read_options *options, ebpo_error *error)
+{
+    static const ebpo_progress silent = { NULL, NULL };
+    ebpo_file file = EBPO_FILE_INIT;
+    hashing hash = { .file = &file };
+    memset(out, 0, sizeof *out);
+    ebpo_status status = ebpo_file_open(&file, path, error);
+    if (status != EBPO_OK)
+        return status;
+    hash_begin(&hash);
+    status = parse(out, &file, path, options ? &options->progress : &silent, error);
+    hash_end(&hash);
+    if (status == EBPO_OK)
+        status = ebpo_file_unchanged(&file, path, error);
+    if (status == EBPO_OK)
+        memcpy(out->source_sha256, hash.digest, sizeof hash.digest);
+    else
+        ebpo_mesh_free(out);
+    ebpo_file_close(&file);
+    return status;
+}

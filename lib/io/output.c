@@ -1,0 +1,25 @@
+/* The public face of publish.h: whole files, and giving up. */
+#include "base/error.h"
+#include "io/publish.h"
+
+ebpo_status ebpo_write_file(const char *path, const void *data, size_t size, ebpo_error *error)
+{
+    ebpo_publish out = EBPO_PUBLISH_INIT;
+    ebpo_status status = ebpo_publish_begin(&out, path, error);
+    if (status != EBPO_OK)
+        return status;
+    FILE *stream = ebpo_publish_stream(&out);
+    if (!stream)
+        status = ebpo_fail_memory(error, BUFSIZ);
+    else if (fwrite(data, 1, size, stream) != size)
+        status = ebpo_fail_errno(error, path, "could not be written");
+    if (status == EBPO_OK)
+        status = ebpo_publish_commit(&out, error);
+    ebpo_publish_abort(&out);
+    return status;
+}
+
+void ebpo_abandon_outputs(void)
+{
+    ebpo_publish_abandon_all();
+}

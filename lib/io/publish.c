@@ -1,0 +1,202 @@
+#include "io/publish.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "io/file.h"
+
+/* Names of the temporary files in the making. Fixed storage and lock-free states, because a signal handler reads them. */
+enum { SLOT_FREE, SLOT_TAKEN, SLOT_LIVE };
+static struct slot {
+    atomic_int state;
+    char path[PATH_MAX];
+} slots[EBPO_PUBLISH_SLOTS];
+
+static atomic_uint name_counter;
+
+static int take_slot(void)
+{
+    for (int i = 0; i < EBPO_PUBLISH_SLOTS; i++) {
+        int expected = SLOT_FREE;
+        if (atomic_compare_exchange_strong(&slots[i].state, &expected, SLOT_TAKEN))
+            return i;
+    }
+    return -1;
+}
+
+static void release_slot(ebpo_publish *publish)
+{
+    if (publish->slot >= 0)
+        atomic_store(&slots[publish->slot].state, SLOT_FREE);
+    publish->slot = -1;
+}
+
+void ebpo_publish_abandon_all(void)
+{
+    int saved = errno;
+    for (int i = 0; i < EBPO_PUBLISH_SLOTS; i++)
+        if (atomic_load(&slots[i].state) == SLOT_LIVE)
+            unlink(slots[i].path);
+    errno = saved;
+}
+
+static ebpo_status check_target(const char *path, ebpo_error *error)
+{
+    if (!*ebpo_file_name(path))
+        return ebpo_fail(error, EBPO_E_IO, "%s: names no file; give the output a file name", path);
+    struct stat st;
+    if (lstat(path, &st) != 0)
+        return errno == ENOENT ? EBPO_OK : ebpo_fail_errno(error, path, "cannot be written");
+    if (S_ISREG(st.st_mode))
+        return EBPO_OK;
+    const char *what = S_ISDIR(st.st_mode) ? "is a folder" : S_ISLNK(st.st_mode) ? "is a symbolic link" : "is a pipe or device";
+    return ebpo_fail(error, EBPO_E_IO, "%s: %s, which cannot be replaced by an output file; name another file", path, what);
+}
+
+static ebpo_status resolve(ebpo_publish *publish, const char *path, ebpo_error *error)
+{
+    const char *name = ebpo_file_name(path);
+    char *folder = strndup(path, (size_t)(name - path));
+    publish->shown = strdup(path);
+    if (!folder || !publish->shown) {
+        free(folder);
+        return ebpo_fail_memory(error, strlen(path));
+    }
+    publish->folder = realpath(*folder ? folder : ".", NULL);
+    free(folder);
+    if (!publish->folder)
+        return ebpo_fail_errno(error, path, "the folder of the output cannot be used");
+    if (asprintf(&publish->target, "%s/%s", publish->folder, name) < 0) {
+        publish->target = NULL;
+        return ebpo_fail_memory(error, strlen(path));
+    }
+    return EBPO_OK;
+}
+
+/* 200 bytes of the target's name are enough to recognise it, and keep the sum below the usual limit of 255. */
+static ebpo_status create_temporary(ebpo_publish *publish, ebpo_error *error)
+{
+    for (int attempt = 0; attempt < 100; attempt++) {
+        free(publish->temporary);
+        if (asprintf(&publish->temporary, "%s/.%.200s.%ld-%u.tmp", publish->folder, ebpo_file_name(publish->target),
+                     (long)getpid(), atomic_fetch_add(&name_counter, 1)) < 0) {
+            publish->temporary = NULL;
+            return ebpo_fail_memory(error, PATH_MAX);
+        }
+        if (strlen(publish->temporary) >= PATH_MAX)
+            return ebpo_fail(error, EBPO_E_IO, "%s: the path is too long; write to a folder with a shorter one", publish->shown);
+        publish->fd = open(publish->temporary, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0666);
+        if (publish->fd >= 0)
+            return EBPO_OK;
+        if (errno != EEXIST)
+            break;
+    }
+    ebpo_status status = ebpo_fail_errno(error, publish->shown, "no temporary file can be created beside it");
+    free(publish->temporary);
+    publish->temporary = NULL;
+    return status;
+}
+
+ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path, ebpo_error *error)
+{
+    *out = (ebpo_publish)EBPO_PUBLISH_INIT;
+    ebpo_publish publish = EBPO_PUBLISH_INIT;
+    ebpo_status status = check_target(path, error);
+    if (status == EBPO_OK)
+        status = resolve(&publish, path, error);
+    if (status == EBPO_OK && (publish.slot = take_slot()) < 0)
+        status = ebpo_fail(error, EBPO_E_LIMIT, "%s: more than %d files are being written at a time", path, EBPO_PUBLISH_SLOTS);
+    if (status == EBPO_OK)
+        status = create_temporary(&publish, error);
+    if (status != EBPO_OK) {
+        ebpo_publish_abort(&publish);
+        return status;
+    }
+    strcpy(slots[publish.slot].path, publish.temporary);
+    atomic_store(&slots[publish.slot].state, SLOT_LIVE);
+    *out = publish;
+    return EBPO_OK;
+}
+
+const char *ebpo_publish_path(const ebpo_publish *publish)
+{
+    return publish->temporary;
+}
+
+FILE *ebpo_publish_stream(ebpo_publish *publish)
+{
+    if (!publish->stream) {
+        publish->stream = fdopen(publish->fd, "w+b");
+        if (publish->stream)
+            publish->fd = -1; /* the stream owns it now */
+    }
+    return publish->stream;
+}
+
+static bool close_writer(ebpo_publish *publish)
+{
+    bool good = true;
+    if (publish->stream) {
+        good = !ferror(publish->stream);
+        good = fclose(publish->stream) == 0 && good;
+    } else if (publish->fd >= 0) {
+        good = close(publish->fd) == 0;
+    }
+    publish->stream = NULL;
+    publish->fd = -1;
+    return good;
+}
+
+/* By name, since a library may have written through a descriptor of its own. */
+static bool sync_path(const char *path, int flags)
+{
+    int fd = open(path, O_RDONLY | O_CLOEXEC | flags);
+    if (fd < 0)
+        return false;
+    bool good = fsync(fd) == 0 || errno == EINVAL; /* EINVAL: a file system without sync of folders */
+    int saved = errno;
+    close(fd);
+    errno = saved;
+    return good;
+}
+
+ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    errno = 0;
+    if (!close_writer(publish))
+        status = ebpo_fail_errno(error, publish->shown, errno ? "could not be written" : "could not be written whole");
+    else if (!sync_path(publish->temporary, O_NOFOLLOW))
+        status = ebpo_fail_errno(error, publish->shown, "could not be synced to the disk");
+    else if (rename(publish->temporary, publish->target) != 0)
+        status = ebpo_fail_errno(error, publish->shown, "the finished temporary file could not be renamed to it");
+    if (status == EBPO_OK) {
+        free(publish->temporary);
+        publish->temporary = NULL;
+        if (!sync_path(publish->folder, O_DIRECTORY))
+            status = ebpo_fail_errno(error, publish->shown, "is in place, but its folder could not be synced to the disk");
+    }
+    ebpo_publish_abort(publish);
+    return status;
+}
+
+void ebpo_publish_abort(ebpo_publish *publish)
+{
+    close_writer(publish);
+    if (publish->temporary)
+        unlink(publish->temporary);
+    release_slot(publish);
+    free(publish->shown);
+    free(publish->folder);
+    free(publish->target);
+    free(publish->temporary);
+    *publish = (ebpo_publish)EBPO_PUBLISH_INIT;
+}

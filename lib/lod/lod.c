@@ -1,0 +1,215 @@
+/* A level's envelopes: from the root down, each cut from its parent's. The top of the tree is walked first; the subtrees that hang from it are
+ * independent of each other. Where it is cut depends on the tree alone, so the result does not depend on the number of threads. */
+#include <ebpo/lod.h>
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "lod/model.h"
+#include "lod/pieces.h"
+
+enum { SEEDS_WANTED = 128 };
+
+/* A gray node at the split level: where a subtree's walk begins. */
+typedef struct seed {
+    ebpo_cell cell;
+    ebpo_polytope envelope;
+} seed;
+
+typedef struct job {
+    const ebpo_lod_model *model;
+    bool walls, polygons; /* keep wall polygons; want polygons at all, or the volume only */
+    int split;            /* level at which the first walk leaves seeds */
+    seed *seeds;
+    uint64_t seed_count;
+    ebpo_lod_piece (*pieces)[EBPO_LEVELS_MAX]; /* [1 + seed_count]: of the top, then of each seed */
+    ebpo_leaf_scratch *scratch;                /* [threads] */
+} job;
+
+typedef struct walker {
+    job *j;
+    ebpo_lod_piece *out;        /* [EBPO_LEVELS_MAX] */
+    ebpo_leaf_scratch *scratch;
+    int stop;                   /* gray nodes of this level are not descended into */
+    ebpo_error *error;
+} walker;
+
+static double cell_volume(const ebpo_box *box, int level)
+{
+    double side = (double)(1u << level);
+    return box->size[0] / side * (box->size[1] / side) * (box->size[2] / side);
+}
+
+static ebpo_status emit(walker *w, const ebpo_polytope *p, ebpo_cell cell)
+{
+    ebpo_lod_piece *piece = &w->out[cell.level];
+    piece->volume += ebpo_polytope_volume(p) * cell_volume(&w->j->model->box, cell.level);
+    if (!w->j->polygons)
+        return EBPO_OK;
+    return ebpo_lod_piece_add(piece, p, &w->j->model->box, cell, w->j->walls, w->error);
+}
+
+static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell, const ebpo_polytope *parent);
+
+static ebpo_status visit_gray(walker *w, uint64_t gray, ebpo_cell cell, ebpo_polytope *envelope)
+{
+    const ebpo_level *level = &w->j->model->level[cell.level];
+    if (level->plane_counts && level->plane_counts[gray])
+        ebpo_lod_cut(envelope, level->planes + w->j->model->index[cell.level].plane_first[gray], level->plane_counts[gray]);
+    if (cell.level == w->j->model->target)
+        return emit(w, envelope, cell);
+    if (cell.level == w->stop) {
+        seed *s = &w->j->seeds[w->j->seed_count++];
+        s->cell = cell;
+        s->envelope = *envelope;
+        return EBPO_OK;
+    }
+    return visit_group(w, gray, cell, envelope);
+}
+
+static ebpo_status visit_node(walker *w, ebpo_node_type type, uint64_t rank, ebpo_cell cell, ebpo_polytope *envelope)
+{
+    if (type == EBPO_GRAY)
+        return visit_gray(w, rank, cell, envelope);
+    ebpo_status status = ebpo_lod_leaf(w->j->model, cell, rank, w->scratch, envelope, w->error);
+    return status == EBPO_OK ? emit(w, envelope, cell) : status;
+}
+
+/* One node of the group; `parent` is NULL for the root. Black nodes are their whole cell. */
+static ebpo_status visit_child(walker *w, uint64_t group, unsigned octant, ebpo_cell cell, const ebpo_polytope *parent)
+{
+    const ebpo_lod_model *model = w->j->model;
+    uint16_t types = model->level[cell.level].types[group];
+    ebpo_node_type type = ebpo_type_of(types, octant);
+    if (type == EBPO_WHITE)
+        return EBPO_OK;
+    ebpo_polytope envelope;
+    if (type == EBPO_BLACK || !parent)
+        ebpo_polytope_cube(&envelope);
+    else
+        (void)ebpo_polytope_child(parent, octant, &envelope);
+    if (type == EBPO_BLACK)
+        return emit(w, &envelope, cell);
+    const ebpo_lod_index *index = &model->index[cell.level];
+    uint64_t before = type == EBPO_GRAY ? index->gray_before[group] : index->leaf_before[group];
+    return visit_node(w, type, before + ebpo_count_type(types, type, octant), cell, &envelope);
+}
+
+static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell, const ebpo_polytope *parent)
+{
+    ebpo_status status = EBPO_OK;
+    for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
+        ebpo_cell cell = { parent_cell.level + 1, { 0, 0, 0 } };
+        for (unsigned k = 0; k < 3; k++)
+            cell.at[k] = 2 * parent_cell.at[k] + (octant >> k & 1);
+        status = visit_child(w, group, octant, cell, parent);
+    }
+    return status;
+}
+
+static ebpo_status walk_seeds(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+{
+    job *j = context;
+    for (uint64_t i = begin; i < end; i++) {
+        walker w = { j, j->pieces[1 + i], &j->scratch[worker], -1, error };
+        seed *s = &j->seeds[i];
+        /* Seeds are in octcode order, and all gray nodes of their level: the i-th has the i-th group below it. */
+        ebpo_status status = visit_group(&w, i, s->cell, &s->envelope);
+        if (status != EBPO_OK)
+            return status;
+    }
+    return EBPO_OK;
+}
+
+/* The first level with enough gray nodes to share out; the target when there is none. */
+static int choose_split(const ebpo_lod_model *model)
+{
+    int level = 0;
+    while (level < model->target && model->level[level].gray_count < SEEDS_WANTED)
+        level++;
+    return level;
+}
+
+static ebpo_status prepare(job *j, unsigned threads, ebpo_error *error)
+{
+    j->split = choose_split(j->model);
+    uint64_t seeds = j->split < j->model->target ? j->model->level[j->split].gray_count : 0;
+    j->seeds = ebpo_alloc(seeds, sizeof *j->seeds);
+    j->pieces = ebpo_alloc_zero(seeds + 1, sizeof *j->pieces);
+    j->scratch = ebpo_alloc_zero(threads, sizeof *j->scratch);
+    if (!j->seeds || !j->pieces || !j->scratch)
+        return ebpo_fail_memory(error, seeds * (sizeof *j->seeds + sizeof *j->pieces));
+    return EBPO_OK;
+}
+
+static ebpo_status walk(job *j, unsigned threads, const ebpo_progress *progress, ebpo_error *error)
+{
+    walker top = { j, j->pieces[0], &j->scratch[0], j->split, error };
+    ebpo_status status = visit_child(&top, 0, 0, (ebpo_cell){ 0, { 0, 0, 0 } }, NULL);
+    if (status != EBPO_OK)
+        return status;
+    return ebpo_parallel_for(threads, j->seed_count, 1, walk_seeds, j, progress, "clipping envelopes", error);
+}
+
+/* Level after level, and within one level first the top's nodes or the seeds' in their order. */
+static ebpo_status join(job *j, ebpo_mesh *out, double *volume, ebpo_error *error)
+{
+    uint64_t count = j->seed_count + 1, listed = 0;
+    ebpo_lod_piece **list = ebpo_alloc(count * EBPO_LEVELS_MAX, sizeof *list);
+    if (!list)
+        return ebpo_fail_memory(error, count * EBPO_LEVELS_MAX * sizeof *list);
+    double sum = 0;
+    for (int level = 0; level <= j->model->target; level++)
+        for (uint64_t i = 0; i < count; i++) {
+            sum += j->pieces[i][level].volume;
+            list[listed++] = &j->pieces[i][level];
+        }
+    if (volume)
+        *volume = sum;
+    ebpo_status status = out ? ebpo_lod_join(out, list, listed, error) : EBPO_OK;
+    free(list);
+    return status;
+}
+
+static void job_free(job *j, unsigned threads)
+{
+    for (uint64_t i = 0; j->pieces && i <= j->seed_count; i++)
+        for (int level = 0; level < EBPO_LEVELS_MAX; level++)
+            ebpo_lod_piece_free(&j->pieces[i][level]);
+    for (unsigned i = 0; j->scratch && i < threads; i++)
+        free(j->scratch[i].faces);
+    free(j->pieces);
+    free(j->scratch);
+    free(j->seeds);
+}
+
+ebpo_status ebpo_lod_level(ebpo_file *file, int level, const ebpo_lod_options *options, ebpo_mesh *out, double *volume,
+                           ebpo_error *error)
+{
+    static const ebpo_lod_options defaults = EBPO_LOD_OPTIONS_INIT;
+    if (!options)
+        options = &defaults;
+    if (out)
+        memset(out, 0, sizeof *out);
+    const ebpo_info *info = ebpo_file_info(file);
+    if (level < 0 || level >= info->level_count)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "there is no level %d; this file has levels 0 to %d", level,
+                         info->level_count - 1);
+    unsigned threads = ebpo_thread_count(options->threads);
+    ebpo_lod_model model;
+    ebpo_status status = ebpo_lod_model_read(&model, file, level, threads, error);
+    if (status != EBPO_OK)
+        return status;
+    job j = { .model = &model, .walls = options->walls, .polygons = out != NULL };
+    status = prepare(&j, threads, error);
+    if (status == EBPO_OK)
+        status = walk(&j, threads, &options->progress, error);
+    if (status == EBPO_OK)
+        status = join(&j, out, volume, error);
+    job_free(&j, threads);
+    ebpo_lod_model_free(&model);
+    return status;
+}

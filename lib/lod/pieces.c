@@ -1,0 +1,99 @@
+#include "lod/pieces.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+
+static const uint64_t count_limit = UINT32_MAX - 1;
+
+void ebpo_lod_piece_free(ebpo_lod_piece *piece)
+{
+    free(piece->xyz);
+    free(piece->faces);
+    piece->xyz = NULL;
+    piece->faces = NULL;
+    piece->vertex_count = piece->vertex_room = piece->face_count = piece->face_room = 0;
+}
+
+/* Points on a wall get the wall's own coordinate, so that neighbouring cells agree to the last bit. */
+static double to_model(const ebpo_box *box, ebpo_cell cell, int axis, double xi)
+{
+    double low = ebpo_wall(box, axis, cell.level, cell.at[axis]);
+    if (xi <= 0)
+        return low;
+    if (xi >= 1)
+        return ebpo_wall(box, axis, cell.level, cell.at[axis] + 1);
+    return low + xi * (box->size[axis] / (double)(1u << cell.level));
+}
+
+static void add_fan(ebpo_lod_piece *piece, const uint32_t *number, const uint8_t *loop, int corners)
+{
+    for (int i = 1; i + 1 < corners; i++) {
+        uint32_t *face = piece->faces + 3 * piece->face_count++;
+        face[0] = number[loop[0]];
+        face[1] = number[loop[i]];
+        face[2] = number[loop[i + 1]];
+    }
+}
+
+ebpo_status ebpo_lod_piece_add(ebpo_lod_piece *piece, const ebpo_polytope *p, const ebpo_box *box, ebpo_cell cell, bool walls,
+                               ebpo_error *error)
+{
+    if (piece->vertex_count + EBPO_POLYTOPE_VERTICES > count_limit)
+        return ebpo_fail(error, EBPO_E_LIMIT, "the level has more than 4294967294 vertices; take a coarser level");
+    if (!ebpo_grow(&piece->xyz, &piece->vertex_room, piece->vertex_count + (uint64_t)p->vertex_count, 3 * sizeof(double)) ||
+        !ebpo_grow(&piece->faces, &piece->face_room, piece->face_count + (uint64_t)p->corner_count, 3 * sizeof(uint32_t)))
+        return ebpo_fail_memory(error, (piece->vertex_count + piece->face_count) * 3 * sizeof(double));
+    uint32_t number[EBPO_POLYTOPE_VERTICES];
+    memset(number, 0xff, sizeof number);
+    for (int f = 0; f < p->face_count; f++) {
+        if (p->tag[f] < 0 && !walls)
+            continue;
+        for (int i = p->first[f]; i < p->first[f + 1]; i++) {
+            uint8_t v = p->corner[i];
+            if (number[v] != UINT32_MAX)
+                continue;
+            for (int k = 0; k < 3; k++)
+                piece->xyz[3 * piece->vertex_count + (uint64_t)k] = to_model(box, cell, k, p->vertex[v][k]);
+            number[v] = (uint32_t)piece->vertex_count++;
+        }
+        add_fan(piece, number, p->corner + p->first[f], p->first[f + 1] - p->first[f]);
+    }
+    return EBPO_OK;
+}
+
+static void append(ebpo_mesh *out, const ebpo_lod_piece *piece)
+{
+    if (piece->vertex_count)
+        memcpy(out->xyz64 + 3 * out->vertex_count, piece->xyz, piece->vertex_count * 3 * sizeof(double));
+    uint32_t *faces = out->faces + 3 * out->face_count, base = (uint32_t)out->vertex_count;
+    for (uint64_t i = 0; i < 3 * piece->face_count; i++)
+        faces[i] = piece->faces[i] + base;
+    out->vertex_count += piece->vertex_count;
+    out->face_count += piece->face_count;
+}
+
+ebpo_status ebpo_lod_join(ebpo_mesh *out, ebpo_lod_piece *const *pieces, uint64_t count, ebpo_error *error)
+{
+    uint64_t vertices = 0, faces = 0;
+    for (uint64_t i = 0; i < count; i++) {
+        vertices += pieces[i]->vertex_count;
+        faces += pieces[i]->face_count;
+    }
+    if (vertices > count_limit || faces > count_limit)
+        return ebpo_fail(error, EBPO_E_LIMIT, "the level has more than 4294967294 vertices or faces; take a coarser level");
+    memset(out, 0, sizeof *out);
+    out->xyz64 = ebpo_alloc(vertices, 3 * sizeof(double));
+    out->faces = ebpo_alloc(faces, 3 * sizeof(uint32_t));
+    if (!out->xyz64 || !out->faces) {
+        ebpo_mesh_free(out);
+        return ebpo_fail_memory(error, vertices * 3 * sizeof(double) + faces * 3 * sizeof(uint32_t));
+    }
+    for (uint64_t i = 0; i < count; i++) {
+        append(out, pieces[i]);
+        ebpo_lod_piece_free(pieces[i]);
+    }
+    return EBPO_OK;
+}

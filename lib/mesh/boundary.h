@@ -1,0 +1,36 @@
+/* Boundary edges (used once) and the closed chains that they form: holes. */
+#ifndef EBPO_MESH_BOUNDARY_H
+#define EBPO_MESH_BOUNDARY_H
+
+#include "mesh/stars.h"
+
+/* A boundary edge in the direction in which its only face uses it. */
+typedef struct ebpo_boundary_edge {
+    uint32_t from, to, face;
+} ebpo_boundary_edge;
+
+typedef struct ebpo_boundary {
+    ebpo_boundary_edge *edges;
+    uint64_t count, capacity;
+} ebpo_boundary;
+
+/* Appends; false when memory is short. */
+bool ebpo_boundary_add(ebpo_boundary *boundary, ebpo_boundary_edge edge);
+void ebpo_boundary_free(ebpo_boundary *boundary);
+
+/* Simple closed chains (no vertex twice, at least three edges). Loop i runs over vertex[first[i] .. first[i + 1]). */
+typedef struct ebpo_loops {
+    uint64_t count;
+    uint64_t *first;      /* [count + 1] */
+    uint32_t *vertex;
+    uint64_t open_chains; /* what cannot be closed: edges whose directions do not continue one another */
+} ebpo_loops;
+
+/* Chains the edges (which are sorted by the way). Where several boundaries pass a vertex, each continues around the fan of
+ * faces it belongs to, so that fans do not get tied together; a chain that still comes back to a vertex is split there. The result depends
+ * on the mesh only. `out` is cleared on failure. */
+EBPO_MUST_USE ebpo_status ebpo_boundary_loops(ebpo_loops *out, ebpo_boundary *boundary, const ebpo_stars *stars,
+                                              const ebpo_mesh *mesh, ebpo_error *error);
+void ebpo_loops_free(ebpo_loops *loops);
+
+#endif

@@ -1,0 +1,52 @@
+/* The passes of ebpo_mesh_check. Each works on fixed blocks, whose results are joined in order: the report does not depend on the number of threads. */
+#ifndef EBPO_MESH_CHECK_PARTS_H
+#define EBPO_MESH_CHECK_PARTS_H
+
+#include "mesh/boundary.h"
+#include "mesh/stars.h"
+#include "mesh/sum.h"
+
+typedef struct ebpo_check {
+    const ebpo_mesh *mesh;
+    unsigned threads; /* resolved */
+    ebpo_progress progress;
+    ebpo_mesh_report *report;
+    uint32_t *parents;      /* [vertex_count] union-find forest over vertices */
+    ebpo_stars stars;
+    ebpo_boundary boundary; /* all boundary edges, in no order */
+    uint64_t referenced;    /* vertices that faces use */
+} ebpo_check;
+
+/* Counts `place`, and keeps it when it is among the lowest. */
+static inline void ebpo_finding_add(ebpo_finding *finding, uint64_t place)
+{
+    int kept = finding->count < EBPO_FINDING_PLACES ? (int)finding->count : EBPO_FINDING_PLACES;
+    finding->count++;
+    if (kept == EBPO_FINDING_PLACES && finding->place[kept - 1] <= place)
+        return;
+    int i = kept < EBPO_FINDING_PLACES ? kept : kept - 1;
+    for (; i > 0 && finding->place[i - 1] > place; i--)
+        finding->place[i] = finding->place[i - 1];
+    finding->place[i] = place;
+}
+
+static inline void ebpo_finding_merge(ebpo_finding *finding, const ebpo_finding *other)
+{
+    uint64_t kept = other->count < EBPO_FINDING_PLACES ? other->count : EBPO_FINDING_PLACES;
+    for (uint64_t i = 0; i < kept; i++)
+        ebpo_finding_add(finding, other->place[i]);
+    finding->count += other->count - kept;
+}
+
+/* Every coordinate finite. */
+EBPO_MUST_USE ebpo_status ebpo_check_coordinates(ebpo_check *check, ebpo_error *error);
+/* Bounding box and unreferenced vertices; needs stars. */
+EBPO_MUST_USE ebpo_status ebpo_check_vertices(ebpo_check *check, ebpo_error *error);
+/* Area, volume (about the box's centre), zero areas, repeated indices; joins components. Needs the bounding box. */
+EBPO_MUST_USE ebpo_status ebpo_check_faces(ebpo_check *check, ebpo_error *error);
+/* Edges, bow-ties, repeated faces, mean edge, number of components; needs the faces' pass. */
+EBPO_MUST_USE ebpo_status ebpo_check_stars(ebpo_check *check, ebpo_error *error);
+/* Repeated positions. */
+EBPO_MUST_USE ebpo_status ebpo_check_positions(ebpo_check *check, ebpo_error *error);
+
+#endif

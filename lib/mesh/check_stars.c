@@ -1,0 +1,238 @@
+#include <math.h>
+#include <stdlib.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "mesh/check_parts.h"
+
+enum { STAR_GRAIN = 1 << 13, INSERTION_LIMIT = 32 };
+
+typedef struct star_block {
+    ebpo_finding boundary, nonmanifold, misoriented, unbalanced, bowtie, repeated_face;
+    ebpo_sum length;
+    uint64_t edges, components;
+} star_block;
+
+/* The two other corners of a face that has this vertex as its lowest. */
+typedef struct opposite {
+    uint64_t corners; /* lower << 32 | higher */
+    uint32_t face;
+} opposite;
+
+typedef struct scratch {
+    ebpo_star star;
+    uint32_t *fans; /* union-find over the star's faces */
+    uint64_t fan_capacity;
+    opposite *opposites;
+    uint64_t opposite_capacity;
+    ebpo_boundary boundary;
+} scratch;
+
+typedef struct star_pass {
+    ebpo_check *check;
+    star_block *blocks;
+    scratch *scratch; /* one for each worker */
+} star_pass;
+
+static uint32_t fan_root(uint32_t *fans, uint32_t i)
+{
+    while (fans[i] != i)
+        i = fans[i] = fans[fans[i]];
+    return i;
+}
+
+/* Faces of one edge belong to one fan; returns how many fans that joined. */
+static uint64_t join_fans(uint32_t *fans, const ebpo_link *links, uint64_t begin, uint64_t end)
+{
+    uint64_t joined = 0;
+    uint32_t first = EBPO_NO_INDEX;
+    for (uint64_t i = begin; i < end; i++) {
+        uint32_t entry = links[i].entry;
+        if (entry == EBPO_NO_INDEX)
+            continue;
+        uint32_t root = fan_root(fans, entry);
+        if (first != EBPO_NO_INDEX && root != first) {
+            fans[root] = first;
+            joined++;
+        }
+        if (first == EBPO_NO_INDEX)
+            first = root;
+    }
+    return joined;
+}
+
+static bool classify_edge(star_block *block, scratch *s, uint32_t v, const ebpo_link *links, uint64_t uses)
+{
+    uint64_t out = 0;
+    uint32_t face = ebpo_link_face(&links[0]), neighbour = ebpo_link_neighbour(&links[0]);
+    for (uint64_t i = 0; i < uses; i++)
+        out += links[i].out;
+    block->edges++;
+    if (uses > 2)
+        ebpo_finding_add(&block->nonmanifold, face);
+    if (uses == 2 && out != 1)
+        ebpo_finding_add(&block->misoriented, face);
+    if (2 * out != uses)
+        ebpo_finding_add(&block->unbalanced, face);
+    if (uses != 1)
+        return true;
+    ebpo_finding_add(&block->boundary, face);
+    return ebpo_boundary_add(&s->boundary, (ebpo_boundary_edge){ out ? v : neighbour, out ? neighbour : v, face });
+}
+
+static double edge_length(const ebpo_mesh *mesh, uint32_t a, uint32_t b)
+{
+    double p[3], q[3];
+    ebpo_mesh_position(mesh, a, p);
+    ebpo_mesh_position(mesh, b, q);
+    double d[3] = { q[0] - p[0], q[1] - p[1], q[2] - p[2] };
+    return sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+}
+
+static bool check_edges(const ebpo_mesh *mesh, star_block *block, scratch *s, uint32_t v)
+{
+    const ebpo_star *star = &s->star;
+    uint64_t fans = star->faces;
+    if (!ebpo_grow(&s->fans, &s->fan_capacity, star->faces, sizeof *s->fans))
+        return false;
+    for (uint64_t i = 0; i < star->faces; i++)
+        s->fans[i] = (uint32_t)i;
+    for (uint64_t begin = 0, end; begin < star->count; begin = end) {
+        end = ebpo_star_run_end(star, begin);
+        fans -= join_fans(s->fans, star->links, begin, end);
+        uint32_t neighbour = ebpo_link_neighbour(&star->links[begin]);
+        if (neighbour < v) /* the edge is counted at its lower end */
+            continue;
+        ebpo_sum_add(&block->length, edge_length(mesh, v, neighbour));
+        if (!classify_edge(block, s, v, star->links + begin, end - begin))
+            return false;
+    }
+    if (fans > 1)
+        ebpo_finding_add(&block->bowtie, v);
+    return true;
+}
+
+static int compare_opposites(const void *a, const void *b)
+{
+    const opposite *x = a, *y = b;
+    if (x->corners != y->corners)
+        return x->corners < y->corners ? -1 : 1;
+    return x->face < y->face ? -1 : x->face > y->face;
+}
+
+static void sort_opposites(opposite *o, uint64_t count)
+{
+    if (count > INSERTION_LIMIT) {
+        qsort(o, count, sizeof *o, compare_opposites);
+        return;
+    }
+    for (uint64_t i = 1; i < count; i++) {
+        opposite x = o[i];
+        uint64_t j = i;
+        for (; j > 0 && compare_opposites(&o[j - 1], &x) > 0; j--)
+            o[j] = o[j - 1];
+        o[j] = x;
+    }
+}
+
+/* Equal faces meet at their lowest vertex. */
+static bool check_repeated(const ebpo_check *check, star_block *block, scratch *s, uint32_t v)
+{
+    uint64_t begin = check->stars.first[v], end = check->stars.first[v + (uint64_t)1], count = 0;
+    if (!ebpo_grow(&s->opposites, &s->opposite_capacity, end - begin, sizeof *s->opposites))
+        return false;
+    for (uint64_t i = begin; i < end; i++) {
+        uint32_t f = check->stars.face[i];
+        const uint32_t *c = check->mesh->faces + 3 * (uint64_t)f;
+        if (c[0] < v || c[1] < v || c[2] < v || ebpo_face_repeats_index(c))
+            continue;
+        uint32_t p = c[0] == v ? c[1] : c[0], q = c[2] == v ? c[1] : c[2];
+        s->opposites[count++] = (opposite){ p < q ? (uint64_t)p << 32 | q : (uint64_t)q << 32 | p, f };
+    }
+    sort_opposites(s->opposites, count);
+    for (uint64_t i = 1; i < count; i++)
+        if (s->opposites[i].corners == s->opposites[i - 1].corners)
+            ebpo_finding_add(&block->repeated_face, s->opposites[i].face);
+    return true;
+}
+
+static ebpo_status stars(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+{
+    star_pass *pass = context;
+    const ebpo_check *check = pass->check;
+    scratch *s = &pass->scratch[worker];
+    star_block block = { .edges = 0 };
+    for (uint64_t v = begin; v < end; v++) {
+        uint32_t vertex = (uint32_t)v;
+        uint64_t degree = ebpo_stars_degree(&check->stars, vertex);
+        if (degree == 0)
+            continue;
+        block.components += check->parents[v] == v;
+        if (!ebpo_star_gather(&s->star, &check->stars, check->mesh, vertex) ||
+            !check_edges(check->mesh, &block, s, vertex) || !check_repeated(check, &block, s, vertex))
+            return ebpo_fail_memory(error, degree * 2 * sizeof *s->star.links);
+    }
+    pass->blocks[begin / STAR_GRAIN] = block;
+    return EBPO_OK;
+}
+
+static void join_blocks(ebpo_mesh_report *r, const star_block *blocks, uint64_t count)
+{
+    ebpo_sum length = { 0, 0 };
+    for (uint64_t i = 0; i < count; i++) {
+        const star_block *b = &blocks[i];
+        ebpo_finding_merge(&r->boundary_edges, &b->boundary);
+        ebpo_finding_merge(&r->nonmanifold_edges, &b->nonmanifold);
+        ebpo_finding_merge(&r->misoriented_edges, &b->misoriented);
+        ebpo_finding_merge(&r->unbalanced_edges, &b->unbalanced);
+        ebpo_finding_merge(&r->bowtie_vertices, &b->bowtie);
+        ebpo_finding_merge(&r->repeated_faces, &b->repeated_face);
+        ebpo_sum_merge(&length, &b->length);
+        r->edges += b->edges;
+        r->components += b->components;
+    }
+    r->mean_edge = r->edges ? ebpo_sum_value(&length) / (double)r->edges : 0;
+}
+
+static bool gather_boundary(ebpo_check *check, const scratch *scratches)
+{
+    bool ok = true;
+    for (unsigned t = 0; t < check->threads; t++)
+        for (uint64_t i = 0; ok && i < scratches[t].boundary.count; i++)
+            ok = ebpo_boundary_add(&check->boundary, scratches[t].boundary.edges[i]);
+    return ok;
+}
+
+static void free_scratch(scratch *s)
+{
+    ebpo_star_free(&s->star);
+    free(s->fans);
+    free(s->opposites);
+    ebpo_boundary_free(&s->boundary);
+}
+
+ebpo_status ebpo_check_stars(ebpo_check *check, ebpo_error *error)
+{
+    uint64_t count = check->mesh->vertex_count, blocks = (count + STAR_GRAIN - 1) / STAR_GRAIN;
+    star_pass pass = { .check = check, .blocks = ebpo_alloc(blocks, sizeof *pass.blocks),
+                       .scratch = ebpo_alloc_zero(check->threads, sizeof *pass.scratch) };
+    ebpo_status status = EBPO_OK;
+    if (!pass.blocks || !pass.scratch) {
+        status = ebpo_fail_memory(error, blocks * sizeof *pass.blocks);
+        goto done;
+    }
+    status = ebpo_parallel_for(check->threads, count, STAR_GRAIN, stars, &pass, &check->progress, "checking edges",
+                               error);
+    if (status != EBPO_OK)
+        goto done;
+    join_blocks(check->report, pass.blocks, blocks);
+    if (!gather_boundary(check, pass.scratch))
+        status = ebpo_fail_memory(error, check->report->boundary_edges.count * sizeof *check->boundary.edges);
+done:
+    for (unsigned t = 0; pass.scratch && t < check->threads; t++)
+        free_scratch(&pass.scratch[t]);
+    free(pass.scratch);
+    free(pass.blocks);
+    return status;
+}

@@ -1,0 +1,43 @@
+/* Internals shared by the parts of the mesh module. Other modules take ebpo_mesh_position from here. */
+#ifndef EBPO_MESH_MESH_H
+#define EBPO_MESH_MESH_H
+
+#include <ebpo/mesh.h>
+
+#define EBPO_NO_INDEX UINT32_MAX
+
+/* Position of vertex i (< vertex_count) as doubles; exact for both kinds of coordinates. */
+static inline void ebpo_mesh_position(const ebpo_mesh *mesh, uint64_t i, double out[3])
+{
+    if (mesh->xyz32) {
+        const float *p = mesh->xyz32 + 3 * i;
+        out[0] = p[0], out[1] = p[1], out[2] = p[2];
+    } else {
+        const double *p = mesh->xyz64 + 3 * i;
+        out[0] = p[0], out[1] = p[1], out[2] = p[2];
+    }
+}
+
+/* True when the face names a vertex twice. */
+static inline bool ebpo_face_repeats_index(const uint32_t face[3])
+{
+    return face[0] == face[1] || face[1] == face[2] || face[2] == face[0];
+}
+
+/* (b - a) x (c - a), rounded. */
+static inline void ebpo_face_cross(const double a[3], const double b[3], const double c[3], double out[3])
+{
+    double p[3] = { b[0] - a[0], b[1] - a[1], b[2] - a[2] };
+    double q[3] = { c[0] - a[0], c[1] - a[1], c[2] - a[2] };
+    out[0] = p[1] * q[2] - p[2] * q[1];
+    out[1] = p[2] * q[0] - p[0] * q[2];
+    out[2] = p[0] * q[1] - p[1] * q[0];
+}
+
+/* What messages call the mesh: its source's name, or "mesh". */
+const char *ebpo_mesh_label(const ebpo_mesh *mesh);
+
+/* EBPO_E_ARGUMENT unless the arrays that the counts promise are there, EBPO_E_LIMIT when a count is beyond 2^32 - 2. */
+EBPO_MUST_USE ebpo_status ebpo_mesh_check_shape(const ebpo_mesh *mesh, ebpo_error *error);
+
+#endif

@@ -1,0 +1,64 @@
+/* Choosing the planes of an envelope, and the support of the solid that bounds them. */
+#ifndef EBPO_PLANES_PLANES_H
+#define EBPO_PLANES_PLANES_H
+
+#include <ebpo/base.h>
+
+#include "geom/cell.h"
+#include "geom/polytope.h"
+
+enum {
+    EBPO_PLANES_MAX = 32,         /* a node adds at most so many */
+    EBPO_PLANES_CANDIDATES = 512  /* and chooses among at most so many */
+};
+
+/* A candidate: a normal (bits 0-19 of a plane code) and the support of the solid in the cell in that direction: an upper bound of
+ * n . xi over it, in cell coordinates. */
+typedef struct ebpo_candidate {
+    uint32_t normal;
+    double support;
+} ebpo_candidate;
+
+/* A selection: takes planes from `candidates` (count <= EBPO_PLANES_CANDIDATES), clips `envelope` by them and writes their codes;
+ * returns how many (<= most <= EBPO_PLANES_MAX). Adding a method means one function of this shape. */
+typedef int (*ebpo_select_fn)(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, double epsilon, int most,
+                              uint32_t *codes);
+
+/* Greedy by removed volume, lazily re-evaluated, until the gain falls below epsilon * cell volume. */
+int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, double epsilon, int most,
+                       uint32_t *codes);
+
+/* A face as its three corners, in the model's coordinates. */
+typedef struct ebpo_triangle {
+    double corner[3][3];
+} ebpo_triangle;
+
+/* Points of face ∩ cell's extreme points in cell coordinates (polygon corners, at most 9), and an error bound: the exact intersection lies
+ * within `*slack` (cell units, each axis) of the polygon's hull. Returns the number of points; 0 when they do not meet.
+ * The cell is widened by the slack before clipping, so that a face touching the closed cell always gives points. */
+int ebpo_clip_triangle(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face, double points[9][3], double *slack);
+
+/* True when the face certainly does not touch the closed cell; errs on the side of "may touch". */
+bool ebpo_triangle_misses_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face);
+
+/* Normal part of the plane code for a face, in cell coordinates of this root box; false for a face without area. */
+bool ebpo_face_normal_code(const ebpo_box *box, const ebpo_triangle *face, uint32_t *normal);
+
+/* Winding numbers of the cell's eight corners (bit 0 x, bit 1 y, bit 2 z; shifted, see ebpo_axis_crossing) minus that of corner 0.
+ * `faces` must hold every face that touches the closed cell. Exact. */
+void ebpo_corner_windings(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces, uint64_t count, int32_t delta[8]);
+
+/* A leaf's own planes from its faces: on entry `envelope` is the parent's envelope cut to this cell, on return the leaf's. `inside_corners`: bit i set
+ * when corner i lies in the solid. Writes at most EBPO_PLANES_MAX codes and returns how many. EBP 2017, section 3.4. */
+int ebpo_leaf_planes(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces, uint64_t count, unsigned inside_corners,
+                     double epsilon, ebpo_polytope *envelope, uint32_t codes[EBPO_PLANES_MAX]);
+
+/* n as a direction of length about 1 and the matching offset, for ebpo_polytope_clip. */
+static inline double ebpo_plane_as_double(const int32_t n[3], int64_t d, double out[3])
+{
+    for (int k = 0; k < 3; k++)
+        out[k] = (double)n[k] * (1.0 / 511);
+    return (double)d * (1.0 / (511.0 * 4096));
+}
+
+#endif

@@ -1,0 +1,76 @@
+/* Greedy selection: the plane that removes most volume first. Gains only shrink while the envelope does, so a gain computed
+ * earlier bounds today's and most candidates are never looked at again (lazy evaluation). */
+#include "geom/plane_code.h"
+#include "planes/planes.h"
+
+typedef struct ranked {
+    double gain; /* an upper bound; exact for the envelope of `round` */
+    double n[3], d;
+    uint32_t code;
+    int round; /* -1: never evaluated */
+} ranked;
+
+/* Upper bound of the volume beyond a plane: among convex bodies of volume V and width H the cap of height h is largest for the cone with
+ * its base on the far side, V (1 - (1 - h/H)^3). */
+static double cap_bound(const ebpo_polytope *p, double volume, const double n[3], double d)
+{
+    double most = -1e300, least = 1e300;
+    for (int i = 0; i < p->vertex_count; i++) {
+        double e = n[0] * p->vertex[i][0] + n[1] * p->vertex[i][1] + n[2] * p->vertex[i][2];
+        most = e > most ? e : most;
+        least = e < least ? e : least;
+    }
+    double h = most - d, width = most - least;
+    if (!(h > 1e-9) || !(width > 0))
+        return 0;
+    double left = h < width ? 1 - h / width : 0;
+    return volume * (1 - left * left * left);
+}
+
+static int rank_candidates(const ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, double epsilon,
+                           ranked *out)
+{
+    double volume = ebpo_polytope_volume(envelope);
+    int kept = 0;
+    for (int i = 0; i < count; i++) {
+        int32_t n[3], d;
+        if (!ebpo_plane_code_decode(ebpo_plane_code_make(candidates[i].normal, 0), n, &d))
+            continue;
+        int q = ebpo_plane_code_offset(n, candidates[i].support);
+        if (q < 0)
+            continue;
+        ranked r = { .round = -1, .code = ebpo_plane_code_make(candidates[i].normal, q) };
+        ebpo_plane_code_decode(r.code, n, &d);
+        r.d = ebpo_plane_as_double(n, d, r.n);
+        r.gain = cap_bound(envelope, volume, r.n, r.d);
+        if (r.gain >= epsilon && r.gain > 0)
+            out[kept++] = r;
+    }
+    return kept;
+}
+
+int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, double epsilon, int most,
+                       uint32_t *codes)
+{
+    ranked list[EBPO_PLANES_CANDIDATES];
+    int left = rank_candidates(envelope, candidates, count, epsilon, list), taken = 0;
+    while (left > 0 && taken < most) {
+        int best = 0;
+        for (int i = 1; i < left; i++)
+            if (list[i].gain > list[best].gain || (list[i].gain == list[best].gain && list[i].code < list[best].code))
+                best = i;
+        ranked *r = &list[best];
+        if (r->round != taken) {
+            double gain = ebpo_polytope_removed(envelope, r->n, r->d);
+            r->gain = gain;
+            r->round = taken;
+            if (!(gain >= epsilon && gain > 0))
+                list[best] = list[--left];
+            continue;
+        }
+        if (ebpo_polytope_clip(envelope, r->n, r->d, taken) == EBPO_CLIP_CUT)
+            codes[taken++] = r->code;
+        list[best] = list[--left];
+    }
+    return taken;
+}

@@ -1,0 +1,216 @@
+#include <inttypes.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "io/file.h"
+#include "ply/parser.h"
+#include "ply/ply.h"
+
+#define MOST_VERTICES (UINT64_C(0xfffffffe))
+enum { REPORT_BYTES = 1 << 24 };
+
+bool ebpo_ply_recognise(const uint8_t *data, uint64_t size)
+{
+    return size >= 4 && memcmp(data, "ply", 3) == 0 && (data[3] == '\n' || data[3] == '\r');
+}
+
+ebpo_status ebpo_ply_fail(const ply_parser *p, const char *format, ...)
+{
+    char text[320];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    if (p->header.encoding == PLY_ASCII)
+        return ebpo_fail(p->error, EBPO_E_FORMAT, "%s: line %" PRIu64 ": %s", p->name, p->line, text);
+    return ebpo_fail(p->error, EBPO_E_FORMAT, "%s: byte %" PRIu64 ": %s", p->name, p->at, text);
+}
+
+const char *ebpo_ply_row_name(const ply_element *element)
+{
+    static const char *const names[] = { "element", "vertex", "face", "strip" };
+    return names[element->kind];
+}
+
+ebpo_status ebpo_ply_fail_end(const ply_parser *p, const ply_element *element, uint64_t row)
+{
+    char name[PLY_WORD_TEXT];
+    ebpo_ply_word_text(name, element->name);
+    return ebpo_ply_fail(p, "the file ends after %" PRIu64 " bytes within row %" PRIu64 " of the %" PRIu64
+                         " of element '%s'; it is cut short, get it again", p->size, row, element->count, name);
+}
+
+ebpo_status ebpo_ply_report(ply_parser *p)
+{
+    p->next_report = p->at + REPORT_BYTES;
+    if (!p->progress || !p->progress->report || p->progress->report(p->progress->user, "reading", p->at, p->size))
+        return EBPO_OK;
+    return ebpo_fail(p->error, EBPO_E_CANCELLED, "stopped on request while reading %s", p->name);
+}
+
+/* Least bytes of all rows; false when they exceed any file. */
+static bool least_bytes(const ply_parser *p, const ply_element *element, uint64_t *bytes)
+{
+    uint64_t row = element->row_bytes;
+    if (p->header.encoding == PLY_ASCII && !ebpo_mul_ok(element->properties, 2, &row)) /* a digit and a blank */
+        return false;
+    return ebpo_mul_ok(element->count, row, bytes);
+}
+
+/* Before anything is allocated: can the file hold what its header claims? */
+static ebpo_status check_counts(ply_parser *p)
+{
+    uint64_t left = p->size - p->header.body;
+    left += p->header.encoding == PLY_ASCII; /* the last blank may be missing */
+    for (uint64_t i = 0; i < p->header.elements; i++) {
+        const ply_element *e = &p->header.element[i];
+        uint64_t need;
+        if (least_bytes(p, e, &need) && need <= left) {
+            left -= need;
+            continue;
+        }
+        char name[PLY_WORD_TEXT];
+        ebpo_ply_word_text(name, e->name);
+        if (p->header.encoding == PLY_ASCII || e->has_list)
+            return ebpo_fail(p->error, EBPO_E_FORMAT, "%s: line %" PRIu64 ": %" PRIu64 " rows of element '%s' do not fit into the rest of the file, %"
+                             PRIu64 " bytes; it is cut short or damaged, get it again", p->name, e->line, e->count, name, left);
+        p->at = p->size;
+        return ebpo_ply_fail_end(p, e, left / e->row_bytes);
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status check_parts(const ply_parser *p)
+{
+    const ply_header *h = &p->header;
+    uint64_t vertices = h->element[h->vertex].count, faces = h->face >= 0 ? h->element[h->face].count : 0;
+    if (vertices > MOST_VERTICES || faces > MOST_VERTICES)
+        return ebpo_fail(p->error, EBPO_E_LIMIT, "%s: %" PRIu64 " vertices and %" PRIu64 " faces, but no more than 2^32 - 2 of each can be read; split the model",
+                         p->name, vertices, faces);
+    if (!faces && (h->strips < 0 || !h->element[h->strips].count))
+        return ebpo_fail(p->error, EBPO_E_FORMAT, "%s: has %" PRIu64 " vertices but no faces: a point cloud; make a surface of it first",
+                         p->name, vertices);
+    return EBPO_OK;
+}
+
+/* Floats stay floats when all three coordinates are; doubles hold every other type exactly. */
+static bool all_float(const ply_header *h)
+{
+    const ply_element *vertex = &h->element[h->vertex];
+    for (uint64_t i = 0; i < vertex->properties; i++) {
+        const ply_property *property = &h->property[vertex->first + i];
+        if (property->role != PLY_ROLE_NONE && property->type != PLY_FLOAT32)
+            return false;
+    }
+    return true;
+}
+
+static ebpo_status allocate(ply_parser *p)
+{
+    const ply_header *h = &p->header;
+    ebpo_mesh *mesh = p->mesh;
+    mesh->vertex_count = h->element[h->vertex].count;
+    size_t width = all_float(h) ? sizeof(float) : sizeof(double);
+    void *coordinates = ebpo_alloc(mesh->vertex_count, 3 * width);
+    if (width == sizeof(float))
+        mesh->xyz32 = coordinates;
+    else
+        mesh->xyz64 = coordinates;
+    p->face_capacity = h->face >= 0 ? h->element[h->face].count : 0;
+    mesh->faces = ebpo_alloc(p->face_capacity, 3 * sizeof *mesh->faces);
+    if (!coordinates || !mesh->faces)
+        return ebpo_fail_memory(p->error, mesh->vertex_count * 3 * width + p->face_capacity * 3 * sizeof *mesh->faces);
+    if (h->encoding == PLY_ASCII && !(p->c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0)))
+        return ebpo_fail_memory(p->error, 0);
+    return EBPO_OK;
+}
+
+static ebpo_status read_element(ply_parser *p, const ply_element *element, bool store)
+{
+    return p->header.encoding == PLY_ASCII ? ebpo_ply_ascii_element(p, element, store)
+                                           : ebpo_ply_binary_element(p, element, store);
+}
+
+/* Faces that stand before the vertices are stepped over and read afterwards: to cut a polygon takes its positions. */
+static ebpo_status read_early_faces(ply_parser *p)
+{
+    uint64_t at = p->at, line = p->line;
+    p->at = p->header.body;
+    p->line = p->header.body_line;
+    ebpo_status status = EBPO_OK;
+    for (int64_t i = 0; i < p->header.vertex && status == EBPO_OK; i++)
+        status = read_element(p, &p->header.element[i], true);
+    p->at = at;
+    p->line = line;
+    p->next_report = 0;
+    return status;
+}
+
+static ebpo_status read_body(ply_parser *p)
+{
+    ebpo_status status = EBPO_OK;
+    p->at = p->header.body;
+    p->line = p->header.body_line;
+    for (int64_t i = 0; i < (int64_t)p->header.elements && status == EBPO_OK; i++) {
+        status = read_element(p, &p->header.element[i], i >= p->header.vertex);
+        if (status == EBPO_OK && i == p->header.vertex)
+            status = read_early_faces(p);
+    }
+    if (status == EBPO_OK && p->mesh->face_count == 0)
+        status = ebpo_fail(p->error, EBPO_E_FORMAT, "%s: none of its faces has three corners; there is no mesh in this file", p->name);
+    return status;
+}
+
+/* The face array grew by halves; give back what is left over. */
+static void trim(ply_parser *p)
+{
+    if (p->face_capacity == p->mesh->face_count)
+        return;
+    uint32_t *faces = ebpo_realloc(p->mesh->faces, p->mesh->face_count, 3 * sizeof *faces);
+    if (faces)
+        p->mesh->faces = faces;
+}
+
+static void describe(ply_parser *p)
+{
+    static const char *const formats[] = { "ply-ascii", "ply-le", "ply-be" };
+    snprintf(p->mesh->source_name, sizeof p->mesh->source_name, "%s", p->name);
+    snprintf(p->mesh->source_format, sizeof p->mesh->source_format, "%s", formats[p->header.encoding]);
+    p->mesh->source_size = p->size;
+}
+
+ebpo_status ebpo_ply_parse_memory(ebpo_mesh *out, const uint8_t *data, uint64_t size, const char *name,
+                                  const ebpo_progress *progress, ebpo_error *error)
+{
+    ebpo_mesh mesh = { 0 };
+    ply_parser p = { .data = data, .size = size, .name = ebpo_file_name(name), .mesh = &mesh, .progress = progress, .error = error };
+    ebpo_status status = ebpo_ply_header_parse(&p.header, data, size, p.name, error);
+    if (status == EBPO_OK)
+        status = check_counts(&p);
+    if (status == EBPO_OK)
+        status = check_parts(&p);
+    if (status == EBPO_OK)
+        status = allocate(&p);
+    if (status == EBPO_OK)
+        status = read_body(&p);
+    if (status == EBPO_OK) {
+        trim(&p);
+        describe(&p);
+    } else {
+        free(mesh.xyz32);
+        free(mesh.xyz64);
+        free(mesh.faces);
+        mesh = (ebpo_mesh){ 0 };
+    }
+    if (p.c_locale)
+        freelocale(p.c_locale);
+    free(p.corners);
+    free(p.scratch);
+    ebpo_ply_header_free(&p.header);
+    *out = mesh;
+    return status;
+}

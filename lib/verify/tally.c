@@ -1,0 +1,112 @@
+#include "verify/tally.h"
+
+#include <inttypes.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "morton/octcode.h"
+
+static int compare_u64(uint64_t a, uint64_t b)
+{
+    return (a > b) - (a < b);
+}
+
+static int compare_places(const ebpo_verify_place *a, const ebpo_verify_place *b)
+{
+    int order = compare_u64(a->octcode, b->octcode);
+    if (order == 0)
+        order = compare_u64(a->face, b->face);
+    return order != 0 ? order : compare_u64(a->plane, b->plane);
+}
+
+/* "level 5, octcode 0o1234567, face 17, plane 2: ", as far as the place has these. */
+static int print_place(char *out, size_t size, const ebpo_verify_place *place)
+{
+    int length = 0;
+    const char *comma = "";
+    if (place->octcode) {
+        length += snprintf(out, size, "level %d, octcode 0o%" PRIo64, ebpo_octcode_level(place->octcode), place->octcode);
+        comma = ", ";
+    }
+    if (place->face != EBPO_NO_FACE) {
+        length += snprintf(out + length, size - (size_t)length, "%sface %" PRIu64, comma, place->face);
+        comma = ", ";
+    }
+    if (place->plane != EBPO_NO_PLANE)
+        length += snprintf(out + length, size - (size_t)length, "%splane %" PRIu32, comma, place->plane);
+    if (length)
+        length += snprintf(out + length, size - (size_t)length, ": ");
+    return length;
+}
+
+/* Equal places (two findings about one node) are told apart by their text, so that merging does not depend on order. */
+static void record(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verify_place *place, const char *text)
+{
+    int order = tally->violations[kind] ? compare_places(place, &tally->place[kind]) : -1;
+    tally->violations[kind]++;
+    if (order < 0 || (order == 0 && strcmp(text, tally->first[kind]) < 0)) {
+        tally->place[kind] = *place;
+        snprintf(tally->first[kind], sizeof tally->first[kind], "%s", text);
+    }
+}
+
+static void record_va(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verify_place *place, const char *format, va_list args)
+{
+    char text[sizeof tally->first[kind]];
+    int length = print_place(text, sizeof text, place);
+    vsnprintf(text + length, sizeof text - (size_t)length, format, args);
+    record(tally, kind, place, text);
+}
+
+void ebpo_tally_violation(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verify_place *place, const char *format, ...)
+{
+    if (tally->violations[kind] && compare_places(place, &tally->place[kind]) > 0) {
+        tally->violations[kind]++; /* damaged files have millions of these: no text for what is not kept */
+        return;
+    }
+    va_list args;
+    va_start(args, format);
+    record_va(tally, kind, place, format, args);
+    va_end(args);
+}
+
+bool ebpo_tally_check(ebpo_tally *tally, ebpo_verify_kind kind, bool holds, const char *format, ...)
+{
+    tally->checks[kind]++;
+    if (holds)
+        return true;
+    va_list args;
+    va_start(args, format);
+    record_va(tally, kind, &(ebpo_verify_place){0, EBPO_NO_FACE, EBPO_NO_PLANE}, format, args);
+    va_end(args);
+    return false;
+}
+
+void ebpo_tally_merge(ebpo_tally *into, const ebpo_tally *from)
+{
+    for (int kind = 0; kind < EBPO_VERIFY_KINDS; kind++) {
+        into->checks[kind] += from->checks[kind];
+        if (from->violations[kind]) {
+            record(into, (ebpo_verify_kind)kind, &from->place[kind], from->first[kind]);
+            into->violations[kind] += from->violations[kind] - 1;
+        }
+    }
+    into->spare_entries += from->spare_entries;
+    into->exact_touches += from->exact_touches;
+    into->exact_half_spaces += from->exact_half_spaces;
+}
+
+void ebpo_tally_report(const ebpo_tally *tally, ebpo_verify_report *report)
+{
+    *report = (ebpo_verify_report){0};
+    ebpo_verify_count *count[EBPO_VERIFY_KINDS] = {&report->structure, &report->content, &report->containment,
+                                                   &report->nesting, &report->labels, &report->lists, &report->source};
+    for (int kind = 0; kind < EBPO_VERIFY_KINDS; kind++) {
+        count[kind]->checks = tally->checks[kind];
+        count[kind]->violations = tally->violations[kind];
+        memcpy(count[kind]->first, tally->first[kind], sizeof count[kind]->first);
+        report->checks += tally->checks[kind];
+        report->violations += tally->violations[kind];
+    }
+}

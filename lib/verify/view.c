@@ -1,0 +1,158 @@
+#include "verify/view.h"
+
+#include <stdlib.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+
+/* Adds what a group holds to the running counts. */
+static void add_group(ebpo_view_group *sum, const ebpo_view *view, const ebpo_level *level, uint64_t group, unsigned octants)
+{
+    for (unsigned octant = 0; octant < octants; octant++) {
+        ebpo_node_type type = ebpo_view_type(level, group, octant);
+        uint64_t rank = sum->of_type[type]++;
+        if (type == EBPO_GRAY && view->has_planes)
+            sum->planes += level->plane_counts[rank];
+        if (type == EBPO_LEAF && view->has_mesh)
+            sum->refs += level->leaf_ref_count[rank];
+        if (type == EBPO_LEAF && view->has_leaf_planes)
+            sum->leaf_planes += level->leaf_plane_counts[rank];
+    }
+}
+
+static unsigned octants_at(int level)
+{
+    return level == 0 ? 1 : 8;
+}
+
+ebpo_status ebpo_view_make(ebpo_view *out, const ebpo_tree *tree, ebpo_error *error)
+{
+    *out = (ebpo_view){.tree = tree, .box.grid_level = tree->info.grid_level};
+    for (int k = 0; k < 3; k++) {
+        out->box.origin[k] = tree->info.box_origin[k];
+        out->box.size[k] = tree->info.box_size[k];
+    }
+    out->has_mesh = tree->info.parts & EBPO_PART_MESH;
+    out->has_planes = tree->info.parts & EBPO_PART_PLANES;
+    out->has_leaf_planes = tree->info.parts & EBPO_PART_LEAF_PLANES;
+    for (int l = 0; l < tree->info.level_count; l++) {
+        const ebpo_level *level = &tree->level[l];
+        out->groups[l] = ebpo_alloc(level->group_count, sizeof *out->groups[l]);
+        if (!out->groups[l]) {
+            ebpo_view_free(out);
+            return ebpo_fail_memory(error, level->group_count * sizeof *out->groups[l]);
+        }
+        ebpo_view_group sum = {0};
+        for (uint64_t group = 0; group < level->group_count; group++) {
+            out->groups[l][group] = sum;
+            add_group(&sum, out, level, group, octants_at(l));
+        }
+    }
+    return EBPO_OK;
+}
+
+void ebpo_view_free(ebpo_view *view)
+{
+    for (int l = 0; l < EBPO_LEVELS_MAX; l++)
+        free(view->groups[l]);
+    *view = (ebpo_view){0};
+}
+
+/* Fills in type and rank. */
+static ebpo_view_node place(const ebpo_view *view, ebpo_octcode code, ebpo_cell cell, uint64_t group, unsigned octant)
+{
+    const ebpo_level *level = &view->tree->level[cell.level];
+    ebpo_view_node node = {code, cell, group, octant, ebpo_view_type(level, group, octant), 0};
+    node.rank = view->groups[cell.level][group].of_type[node.type];
+    for (unsigned i = 0; i < octant; i++)
+        node.rank += ebpo_view_type(level, group, i) == node.type;
+    return node;
+}
+
+ebpo_view_node ebpo_view_root(const ebpo_view *view)
+{
+    return place(view, 1, (ebpo_cell){0, {0, 0, 0}}, 0, 0);
+}
+
+ebpo_view_node ebpo_view_child(const ebpo_view *view, const ebpo_view_node *node, unsigned octant)
+{
+    ebpo_cell cell = {node->cell.level + 1, {0}};
+    for (int k = 0; k < 3; k++)
+        cell.at[k] = 2 * node->cell.at[k] + (octant >> k & 1);
+    return place(view, ebpo_octcode_child(node->code, octant), cell, node->rank, octant);
+}
+
+/* Group of `level` that holds the gray node of this rank. */
+static uint64_t group_of_gray(const ebpo_view *view, int level, uint64_t rank)
+{
+    uint64_t low = 0, high = view->tree->level[level].group_count;
+    while (high - low > 1) {
+        uint64_t middle = low + (high - low) / 2;
+        if (view->groups[level][middle].of_type[EBPO_GRAY] <= rank)
+            low = middle;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+ebpo_view_node ebpo_view_at(const ebpo_view *view, int level, uint64_t group, unsigned octant)
+{
+    unsigned path[EBPO_LEVELS_MAX];
+    path[level] = octant;
+    for (int l = level - 1; l >= 0; l--) {
+        uint64_t rank = group;
+        group = group_of_gray(view, l, rank);
+        uint64_t before = view->groups[l][group].of_type[EBPO_GRAY];
+        unsigned i = 0;
+        while (i < 7 && !(ebpo_view_type(&view->tree->level[l], group, i) == EBPO_GRAY && before++ == rank))
+            i++;
+        path[l] = i;
+    }
+    ebpo_view_node node = ebpo_view_root(view);
+    for (int l = 1; l <= level; l++)
+        node = ebpo_view_child(view, &node, path[l]);
+    return node;
+}
+
+const uint32_t *ebpo_view_planes(const ebpo_view *view, const ebpo_view_node *node, uint32_t *count)
+{
+    const ebpo_level *level = &view->tree->level[node->cell.level];
+    const ebpo_view_group *group = &view->groups[node->cell.level][node->group];
+    bool gray = node->type == EBPO_GRAY;
+    *count = 0;
+    if (gray ? !view->has_planes : node->type != EBPO_LEAF || !view->has_leaf_planes)
+        return NULL;
+    const uint8_t *counts = gray ? level->plane_counts : level->leaf_plane_counts;
+    uint64_t first = gray ? group->planes : group->leaf_planes;
+    for (uint64_t rank = group->of_type[node->type]; rank < node->rank; rank++)
+        first += counts[rank];
+    *count = counts[node->rank];
+    return *count ? (gray ? level->planes : level->leaf_planes) + first : NULL;
+}
+
+const uint32_t *ebpo_view_refs(const ebpo_view *view, const ebpo_view_node *leaf, uint32_t *count)
+{
+    const ebpo_level *level = &view->tree->level[leaf->cell.level];
+    const ebpo_view_group *group = &view->groups[leaf->cell.level][leaf->group];
+    uint64_t first = group->refs;
+    for (uint64_t rank = group->of_type[EBPO_LEAF]; rank < leaf->rank; rank++)
+        first += level->leaf_ref_count[rank];
+    *count = level->leaf_ref_count[leaf->rank];
+    return *count ? level->leaf_refs + first : NULL;
+}
+
+int64_t ebpo_view_winding(const ebpo_view *view, const ebpo_view_node *node)
+{
+    const ebpo_level *level = &view->tree->level[node->cell.level];
+    switch (node->type) {
+    case EBPO_WHITE:
+        return level->white_winding ? level->white_winding[node->rank] : 0;
+    case EBPO_BLACK:
+        return level->black_winding ? level->black_winding[node->rank] : 1;
+    case EBPO_LEAF:
+        return level->leaf_winding ? level->leaf_winding[node->rank] : 0;
+    default:
+        return 0;
+    }
+}

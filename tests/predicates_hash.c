@@ -1,0 +1,64 @@
+/* Built once for each set of compiler flags, with the predicates' sources built the same way: prints one hash of many results, of all stages. */
+#include <inttypes.h>
+#include <stdio.h>
+
+#include "exact_twin.h"
+#include "geom/cell.h"
+#include "geom/predicates.h"
+#include "geom/predicates_expansion.h"
+
+enum { ROUNDS = 3000 };
+
+static uint64_t mix(uint64_t hash, int value)
+{
+    return (hash ^ (uint64_t)(value + 8)) * 0x100000001b3;
+}
+
+static uint64_t mix_double(uint64_t hash, double x)
+{
+    union {
+        double number;
+        uint64_t bits;
+    } u = {x};
+    return (hash ^ u.bits) * 0x100000001b3;
+}
+
+static uint64_t hash_points(uint64_t hash, const double *p)
+{
+    hash = mix(hash, ebpo_orient3d(p, p + 3, p + 6, p + 9));
+    hash = mix(hash, ebpo_orient3d_expansion(p, p + 3, p + 6, p + 9));
+    hash = mix(hash, ebpo_orient2d(p, p + 2, p + 4));
+    hash = mix(hash, ebpo_orient2d_expansion(p, p + 2, p + 4));
+    hash = mix(hash, ebpo_sign_of_products(p, 6));
+    hash = mix(hash, ebpo_sign_of_products_expansion(p, 6));
+    for (int axis = 0; axis < 3; axis++)
+        hash = mix(hash, ebpo_axis_crossing(p + 9, p[9 + axis] + 1, axis, p, p + 3, p + 6));
+    return mix(hash, ebpo_point_on_triangle(p + 9, p, p + 3, p + 6));
+}
+
+static uint64_t hash_box(uint64_t hash, const double min[3], double extent)
+{
+    const double max[3] = {min[0] + extent, min[1] + extent, min[2] + extent};
+    ebpo_box box;
+    if (!ebpo_box_make(&box, min, max, 17))
+        return mix(hash, 0);
+    for (int k = 0; k < 3; k++)
+        hash = mix_double(mix_double(hash, box.origin[k]), box.size[k]);
+    return hash;
+}
+
+int main(void)
+{
+    uint64_t hash = 0xcbf29ce484222325, state = 1;
+    for (int i = 0; i < ROUNDS; i++)
+        for (int kind = 0; kind < TWIN_KINDS; kind++) {
+            double p[12];
+            twin_points(p, 3, kind, &state);
+            for (int k = 0; k < 12; k++)
+                hash = mix_double(hash, p[k]);
+            hash = hash_points(hash, p);
+            hash = hash_box(hash, p, p[3] < 0 ? -p[3] : p[3]);
+        }
+    printf("%016" PRIx64 "\n", hash);
+    return 0;
+}

@@ -1,0 +1,256 @@
+/* Root boxes whose walls are exact doubles, and octcodes. */
+#include <check.h>
+#include <math.h>
+#include <stdlib.h>
+
+#include <gmp.h>
+
+#include "exact_twin.h"
+#include "geom/cell.h"
+#include "morton/octcode.h"
+
+/* --- boxes --- */
+
+/* True when ebpo_wall gives origin + k size / 2^level without rounding. */
+static bool wall_is_exact(const ebpo_box *box, int axis, int level, uint32_t k)
+{
+    mpq_t expected, origin, found;
+    mpq_inits(expected, origin, found, NULL);
+    mpq_set_d(expected, box->size[axis]);
+    mpq_set_ui(found, k, 1);
+    mpq_mul(expected, expected, found);
+    mpq_div_2exp(expected, expected, (mp_bitcnt_t)level);
+    mpq_set_d(origin, box->origin[axis]);
+    mpq_add(expected, expected, origin);
+    mpq_set_d(found, ebpo_wall(box, axis, level, k));
+    bool exact = mpq_equal(expected, found);
+    mpq_clears(expected, origin, found, NULL);
+    return exact;
+}
+
+static void check_walls(const ebpo_box *box, uint64_t *state)
+{
+    for (int axis = 0; axis < 3; axis++)
+        for (int level = 0; level <= box->grid_level; level++) {
+            uint32_t last = (uint32_t)1 << level;
+            const uint32_t k[5] = {0, 1, last - 1, last, (uint32_t)twin_integer(state, 0, last)};
+            for (int i = 0; i < 5; i++)
+                ck_assert_msg(wall_is_exact(box, axis, level, k[i]), "axis %d level %d wall %u", axis, level, k[i]);
+        }
+}
+
+static void check_box(const double min[3], const double max[3], int grid_level, uint64_t *state)
+{
+    ebpo_box box;
+    ck_assert(ebpo_box_make(&box, min, max, grid_level));
+    ck_assert(ebpo_box_valid(&box));
+    ck_assert_int_eq(box.grid_level, grid_level);
+    for (int k = 0; k < 3; k++) {
+        ck_assert(box.size[k] > 0);
+        ck_assert(box.origin[k] < min[k]);
+        ck_assert(max[k] < ebpo_wall(&box, k, 0, 1));
+    }
+    check_walls(&box, state);
+}
+
+/* One coordinate of the kinds that files hold, by scale. */
+static double hard_coordinate(int kind, uint64_t *state)
+{
+    double x = twin_uniform(state);
+    switch (kind) {
+    case 0: return x;
+    case 1: return 1e7 + 1e-3 * x;
+    case 2: return (double)(float)(1e7 + x);
+    case 3: return (double)(float)(1e-38 * x);
+    case 4: return 0x1p-1074 * (double)twin_integer(state, -3, 3);
+    case 5: return 1e-300 * x;
+    case 6: return 1e300 * x;
+    case 7: return 0x1p1000 * (x < 0 ? -1 : 1);
+    case 8: return (double)twin_integer(state, -1, 1);
+    case 9: return -0x1p53 + (double)twin_integer(state, 0, 3);
+    default: return ldexp(x, (int)twin_integer(state, -1074, 1000));
+    }
+}
+
+START_TEST(box_walls_are_exact_and_outside_the_model)
+{
+    uint64_t state = (uint64_t)_i + 1;
+    for (int i = 0; i < 400; i++) {
+        double min[3], max[3];
+        for (int k = 0; k < 3; k++) {
+            int kind = i % 4 == 3 ? (int)twin_integer(&state, 0, 10) : _i;
+            double a = hard_coordinate(kind, &state), b = hard_coordinate(kind, &state);
+            if (twin_random(&state) % 4 == 0)
+                b = a;
+            min[k] = fmin(a, b);
+            max[k] = fmax(a, b);
+        }
+        check_box(min, max, i % 3 ? EBPO_MAX_LEVEL : (int)twin_integer(&state, 0, EBPO_MAX_LEVEL), &state);
+    }
+}
+END_TEST
+
+START_TEST(box_of_ordinary_model_grows_by_a_millionth_at_most)
+{
+    uint64_t state = 4;
+    for (int i = 0; i < 10000; i++) {
+        double min[3], max[3], scale = ldexp(1, (int)twin_integer(&state, -900, 900));
+        ebpo_box box;
+        for (int k = 0; k < 3; k++) {
+            min[k] = scale * 2 * twin_uniform(&state);
+            max[k] = min[k] + scale * (1.25 + twin_uniform(&state));
+        }
+        ck_assert(ebpo_box_make(&box, min, max, EBPO_MAX_LEVEL));
+        for (int k = 0; k < 3; k++)
+            ck_assert(box.size[k] <= (max[k] - min[k]) * (1 + 1e-6));
+    }
+}
+END_TEST
+
+/* The finest step that 53 bits allow 1e7 from 0 is 2^-29: 2^20 cells of it make 2^-9. */
+START_TEST(box_of_translated_model_is_as_tight_as_doubles_allow)
+{
+    const double min[3] = {1e7, 1e7, 1e7}, max[3] = {1e7 + 1e-3, 1e7 + 1e-3, 1e7 + 1e-3};
+    ebpo_box box;
+    ck_assert(ebpo_box_make(&box, min, max, EBPO_MAX_LEVEL));
+    ck_assert(box.size[0] == 0x1p-9);
+    ck_assert(ebpo_box_make(&box, min, max, 8));
+    ck_assert(box.size[0] <= 1.01e-3);
+}
+END_TEST
+
+START_TEST(box_of_single_point_has_volume)
+{
+    const double zero[3] = {0, 0, 0}, point[3] = {3, -4, 0};
+    uint64_t state = 1;
+    check_box(zero, zero, EBPO_MAX_LEVEL, &state);
+    check_box(point, point, EBPO_MAX_LEVEL, &state);
+}
+END_TEST
+
+START_TEST(box_make_refuses_bounds_out_of_range)
+{
+    const double good[3] = {0, 0, 0}, bad[][3] = {{0, NAN, 0}, {INFINITY, 0, 0}, {0, 0, 0x1.1p1000}, {0, -INFINITY, 0}, {-1, 1, 1}};
+    ebpo_box box;
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+        ck_assert(!ebpo_box_make(&box, good, bad[i], 5));
+    ck_assert(!ebpo_box_make(&box, bad[3], good, 5));
+    ck_assert(!ebpo_box_make(&box, good, good, -1));
+    ck_assert(!ebpo_box_make(&box, good, good, EBPO_MAX_LEVEL + 1));
+}
+END_TEST
+
+START_TEST(box_valid_refuses_hostile_boxes)
+{
+    const ebpo_box good = {{-1, 0, 0x1p30}, {2, 3, 1}, 20};
+    const double bad_size[] = {NAN, INFINITY, -INFINITY, -1, 0, -0.0, 0x1p-1074, 0x1.8p1003, 1.1, 0x1.0000000000001p0};
+    const double bad_origin[] = {NAN, INFINITY, -INFINITY, 0x1p1003, 0.1, 0x1p-60, 0x1p40, -0x1p60};
+    ck_assert(ebpo_box_valid(&good));
+    for (size_t i = 0; i < sizeof bad_size / sizeof *bad_size; i++) {
+        ebpo_box box = good;
+        box.size[1] = bad_size[i];
+        box.origin[1] = 0x1p-40;
+        ck_assert_msg(!ebpo_box_valid(&box), "size %g", bad_size[i]);
+    }
+    for (size_t i = 0; i < sizeof bad_origin / sizeof *bad_origin; i++) {
+        ebpo_box box = good;
+        box.origin[2] = bad_origin[i];
+        ck_assert_msg(!ebpo_box_valid(&box), "origin %g", bad_origin[i]);
+    }
+    ebpo_box box = good;
+    box.grid_level = 21;
+    ck_assert(!ebpo_box_valid(&box));
+    box.grid_level = -1;
+    ck_assert(!ebpo_box_valid(&box));
+}
+END_TEST
+
+/* Whatever bits a file holds: what is called valid has exact walls. */
+START_TEST(box_valid_accepts_only_boxes_with_exact_walls)
+{
+    uint64_t state = 6;
+    int valid = 0;
+    for (int i = 0; i < 3000; i++) {
+        ebpo_box box = {.grid_level = (int)twin_integer(&state, -1, 21)};
+        int e = (int)twin_integer(&state, -1074, 1000), bits = (int)twin_integer(&state, 30, 53);
+        for (int k = 0; k < 3; k++) {
+            int64_t limit = (int64_t)1 << bits;
+            box.origin[k] = ldexp((double)twin_integer(&state, -limit, limit), e - bits);
+            box.size[k] = ldexp((double)twin_integer(&state, 1, limit), e - bits + (int)twin_integer(&state, 0, 20));
+        }
+        if (!ebpo_box_valid(&box))
+            continue;
+        valid++;
+        check_walls(&box, &state);
+    }
+    ck_assert_int_gt(valid, 100);
+}
+END_TEST
+
+/* --- octcodes --- */
+
+/* Bit by bit, from the root down. */
+static ebpo_octcode plain_octcode(ebpo_cell cell)
+{
+    ebpo_octcode code = 1;
+    for (int bit = cell.level - 1; bit >= 0; bit--)
+        code = ebpo_octcode_child(code, (cell.at[0] >> bit & 1) | (cell.at[1] >> bit & 1) << 1 | (cell.at[2] >> bit & 1) << 2);
+    return code;
+}
+
+START_TEST(octcode_equals_plain_twin_and_comes_back)
+{
+    uint64_t state = (uint64_t)_i + 50;
+    int64_t last = ((int64_t)1 << _i) - 1;
+    for (int i = 0; i < 20000; i++) {
+        ebpo_cell cell = {_i, {0, 0, 0}};
+        for (int k = 0; k < 3; k++)
+            cell.at[k] = (uint32_t)(i == 0 ? last : twin_integer(&state, 0, last));
+        ebpo_octcode code = ebpo_octcode_of_cell(cell);
+        ck_assert(code == plain_octcode(cell));
+        ck_assert(ebpo_octcode_valid(code));
+        ck_assert_int_eq(ebpo_octcode_level(code), _i);
+        ebpo_cell back = ebpo_cell_of_octcode(code);
+        ck_assert(back.level == _i && back.at[0] == cell.at[0] && back.at[1] == cell.at[1] && back.at[2] == cell.at[2]);
+        if (_i == 0)
+            continue;
+        ebpo_cell up = ebpo_cell_of_octcode(ebpo_octcode_parent(code));
+        ck_assert(up.level == _i - 1 && up.at[0] == cell.at[0] / 2 && up.at[1] == cell.at[1] / 2 && up.at[2] == cell.at[2] / 2);
+    }
+}
+END_TEST
+
+START_TEST(octcode_valid_refuses_codes_without_leading_one)
+{
+    ck_assert(!ebpo_octcode_valid(0));
+    ck_assert(ebpo_octcode_valid(1));
+    ck_assert(!ebpo_octcode_valid(2));
+    ck_assert(!ebpo_octcode_valid(7));
+    ck_assert(ebpo_octcode_valid(15));
+    ck_assert(ebpo_octcode_valid((uint64_t)1 << 60));
+    ck_assert(!ebpo_octcode_valid((uint64_t)1 << 63));
+    ck_assert(ebpo_octcode_first_descendant(9, 3) == (uint64_t)9 << 6);
+}
+END_TEST
+
+int main(void)
+{
+    TCase *tests = tcase_create("cell");
+    tcase_set_timeout(tests, 120);
+    tcase_add_loop_test(tests, box_walls_are_exact_and_outside_the_model, 0, 11);
+    tcase_add_test(tests, box_of_ordinary_model_grows_by_a_millionth_at_most);
+    tcase_add_test(tests, box_of_translated_model_is_as_tight_as_doubles_allow);
+    tcase_add_test(tests, box_of_single_point_has_volume);
+    tcase_add_test(tests, box_make_refuses_bounds_out_of_range);
+    tcase_add_test(tests, box_valid_refuses_hostile_boxes);
+    tcase_add_test(tests, box_valid_accepts_only_boxes_with_exact_walls);
+    tcase_add_loop_test(tests, octcode_equals_plain_twin_and_comes_back, 0, EBPO_MAX_LEVEL + 1);
+    tcase_add_test(tests, octcode_valid_refuses_codes_without_leading_one);
+    Suite *suite = suite_create("cell");
+    suite_add_tcase(suite, tests);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_ENV);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+}

@@ -1,0 +1,27 @@
+/* What the commands share. */
+#ifndef EBPO_TOOLS_COMMAND_H
+#define EBPO_TOOLS_COMMAND_H
+
+#include <ebpo/ebpo.h>
+
+#include "args.h"
+
+enum { EXIT_FINE = 0, EXIT_FAILED = 1, EXIT_USAGE = 2, EXIT_NOT_SOLID = 3 };
+
+typedef struct command {
+    const arg_spec *spec;
+    int (*run)(int argc, char **argv); /* argv[0] is the command's name; returns the exit code */
+} command;
+
+extern const command command_convert, command_check, command_info, command_extract, command_render, command_verify;
+
+/* Prints "ebpo convert: message" and returns the exit code that the status stands for. */
+int command_failed(const char *name, const ebpo_error *error);
+
+/* True when both paths lead to one existing file. */
+bool command_same_file(const char *a, const char *b);
+
+/* 1: the file begins as an HDF5 file does, 0: it does not, -1: it cannot be read (said on stderr). */
+int command_is_hdf5(const char *name, const char *path);
+
+#endif

@@ -1,0 +1,34 @@
+/* Writing JSON (RFC 8259): indented objects and arrays, exact numbers. */
+#ifndef EBPO_TOOLS_JSON_H
+#define EBPO_TOOLS_JSON_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+
+enum { JSON_DEPTH = 16 };
+
+typedef struct json {
+    FILE *out;
+    int depth;
+    bool filled[JSON_DEPTH]; /* something stands before at this depth */
+    char close[JSON_DEPTH];
+} json;
+
+/* `key` is NULL inside arrays and for the outermost value. */
+void json_begin(json *j, FILE *out);
+void json_object(json *j, const char *key);
+void json_array(json *j, const char *key);
+void json_end(json *j); /* of the innermost object or array */
+void json_finish(json *j); /* closes what is open, and the last line */
+/* Bytes that are not UTF-8 become U+FFFD. */
+void json_text(json *j, const char *key, const char *text);
+void json_uint(json *j, const char *key, uint64_t v);
+void json_int(json *j, const char *key, int64_t v);
+/* 17 significant digits: the double itself. Not finite: null. */
+void json_real(json *j, const char *key, double v);
+void json_bool(json *j, const char *key, bool v);
+void json_null(json *j, const char *key);
+void json_reals(json *j, const char *key, const double *v, int count);
+
+#endif

@@ -1,0 +1,115 @@
+/* The command line: `ebpo COMMAND ...`. One table of commands, one cmd_*.c for each. */
+#include <errno.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "command.h"
+#include "signals.h"
+
+static const command *const commands[] = { &command_convert, &command_check,  &command_info,
+                                           &command_extract, &command_render, &command_verify };
+enum { COMMANDS = sizeof commands / sizeof *commands };
+
+int command_failed(const char *name, const ebpo_error *error)
+{
+    fprintf(stderr, "ebpo %s: %s\n", name, error->message[0] ? error->message : ebpo_status_name(error->status));
+    if (error->status == EBPO_E_ARGUMENT)
+        return EXIT_USAGE;
+    return error->status == EBPO_E_NOT_SOLID ? EXIT_NOT_SOLID : EXIT_FAILED;
+}
+
+bool command_same_file(const char *a, const char *b)
+{
+    struct stat sa, sb;
+    return stat(a, &sa) == 0 && stat(b, &sb) == 0 && sa.st_dev == sb.st_dev && sa.st_ino == sb.st_ino;
+}
+
+int command_is_hdf5(const char *name, const char *path)
+{
+    static const char signature[8] = "\211HDF\r\n\032\n";
+    char head[8] = "";
+    struct stat st;
+    FILE *f = stat(path, &st) == 0 && S_ISDIR(st.st_mode) ? (errno = EISDIR, NULL) : fopen(path, "rb");
+    if (!f) {
+        fprintf(stderr, "ebpo %s: %s: cannot be opened: %s\n", name, path, strerror(errno));
+        return -1;
+    }
+    size_t got = fread(head, 1, sizeof head, f);
+    fclose(f);
+    return got == sizeof head && memcmp(head, signature, sizeof head) == 0;
+}
+
+static const command *find(const char *name)
+{
+    for (int i = 0; i < COMMANDS; i++)
+        if (strcmp(commands[i]->spec->command, name) == 0)
+            return commands[i];
+    return NULL;
+}
+
+static void usage(FILE *out)
+{
+    fprintf(out, "usage: ebpo COMMAND [options] ...\n\nEBP-Octree in HDF5: closed triangle meshes as trees of convex envelopes.\n\n"
+                 "commands:\n");
+    for (int i = 0; i < COMMANDS; i++)
+        fprintf(out, "  %-10s %s\n", commands[i]->spec->command, commands[i]->spec->summary);
+    fprintf(out, "  %-10s %s\n", "help", "what a command does and its options: ebpo help COMMAND");
+    fprintf(out, "\n  --version  the version, and end\n"
+                 "\nexit codes: 0 fine, 1 data or input/output, 2 usage, 3 not a solid where one is required\n");
+}
+
+static int unknown_command(const char *name)
+{
+    fprintf(stderr, "ebpo: unknown command '%s'; try 'ebpo help'\n", name);
+    return EXIT_USAGE;
+}
+
+static int help(int argc, char **argv)
+{
+    if (argc > 3) {
+        fprintf(stderr, "ebpo help: '%s' is one operand too many; expected: [COMMAND]; try 'ebpo help'\n", argv[3]);
+        return EXIT_USAGE;
+    }
+    if (argc < 3) {
+        usage(stdout);
+        return EXIT_FINE;
+    }
+    const command *c = find(argv[2]);
+    if (!c)
+        return unknown_command(argv[2]);
+    args_help(c->spec);
+    return EXIT_FINE;
+}
+
+static int dispatch(int argc, char **argv)
+{
+    if (argc < 2) {
+        usage(stderr);
+        return EXIT_USAGE;
+    }
+    const char *name = argv[1];
+    if (strcmp(name, "--version") == 0 || strcmp(name, "-V") == 0) {
+        printf("ebpo %s, format %d.%d\n", ebpo_version(), EBPO_FORMAT_MAJOR, EBPO_FORMAT_MINOR);
+        return EXIT_FINE;
+    }
+    if (strcmp(name, "help") == 0 || strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0)
+        return help(argc, argv);
+    const command *c = find(name);
+    return c ? c->run(argc - 1, argv + 1) : unknown_command(name);
+}
+
+int main(int argc, char **argv)
+{
+    signals_install();
+    int code = dispatch(argc, argv);
+    /* What was printed counts only once it has arrived: a full disk shows here. */
+    errno = 0;
+    if (fflush(stdout) != 0 || ferror(stdout)) {
+        fprintf(stderr, "ebpo: standard output: %s\n", errno ? strerror(errno) : "could not be written");
+        return code ? code : EXIT_FAILED;
+    }
+    return code;
+}

@@ -1,0 +1,27 @@
+#include "signals.h"
+
+#include <ebpo/base.h>
+#include <signal.h>
+#include <string.h>
+
+static void give_up(int number)
+{
+    ebpo_abandon_outputs();
+    /* SA_RESETHAND brought the default back: the parent sees which signal it was. */
+    raise(number);
+}
+
+void signals_install(void)
+{
+    static const int numbers[] = { SIGINT, SIGTERM, SIGHUP };
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
+        struct sigaction action, before;
+        memset(&action, 0, sizeof action);
+        action.sa_handler = give_up;
+        action.sa_flags = (int)SA_RESETHAND;
+        sigfillset(&action.sa_mask);
+        /* Who started us with a signal ignored (nohup) wants it ignored. */
+        if (sigaction(numbers[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN)
+            sigaction(numbers[i], &action, NULL);
+    }
+}

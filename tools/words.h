@@ -1,0 +1,27 @@
+/* Numbers and flags as people read them. */
+#ifndef EBPO_TOOLS_WORDS_H
+#define EBPO_TOOLS_WORDS_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include <ebpo/file.h>
+
+/* 999, 12.3 K, 4.56 M. */
+char *words_count(char *out, size_t room, double v);
+/* 999 B, 12.3 KB, 4.56 MB: powers of 1000. */
+char *words_bytes(char *out, size_t room, uint64_t bytes);
+/* "1 hole", "3 holes". */
+char *words_plural(char *out, size_t room, uint64_t count, const char *one, const char *many);
+/* Names of the ebpo_part bits with commas: "planes, mesh, maps". */
+char *words_parts(char *out, size_t room, uint32_t parts);
+const char *words_rule(ebpo_rule rule);
+const char *words_codec(ebpo_codec codec);
+void words_hex(const uint8_t digest[32], char out[65]);
+
+/* NULL-terminated, in the order of the enums; for option tables. */
+extern const char *const rule_words[];
+extern const char *const codec_words[];
+extern const char *const part_words[]; /* word i is bit i */
+
+#endif
