@@ -115,7 +115,7 @@ START_TEST(edges_of_four_faces_are_found)
     ebpo_mesh_report r = check_named("touching_at_edge");
     ck_assert_uint_eq(r.nonmanifold_edges.count, 1);
     ck_assert_uint_eq(r.unbalanced_edges.count, 0);
-    ck_assert_uint_eq(r.bowtie_vertices.count, 0); /* the shared edge ties the fans together */
+    ck_assert_uint_eq(r.bowtie_vertices.count, 2); /* a fan ends at an edge of four faces */
     ck_assert_uint_eq(r.components, 1);
     ck_assert(!r.genus_known);
 }

@@ -10,7 +10,7 @@ typedef struct mending {
 
 typedef struct prepared {
     ebpo_mesh mesh;          /* as mended */
-    ebpo_mesh as_read;       /* facts only: no arrays */
+    ebpo_mesh as_read;       /* facts only; its array pointers tell which there were, no more */
     ebpo_mesh_report before; /* of the mesh as read */
     ebpo_mesh_report report; /* of the mesh as mended */
     ebpo_mend_record record;

@@ -121,11 +121,12 @@ static bool emit_leaf(emitter *e, const ebpo_build_detail *d, ebpo_cell cell, in
     for (uint64_t i = 0; i < count; i++)
         ebpo_build_triangle(b, e->s->entries[d->entry_begin + i], &e->faces[i]);
     uint32_t codes[EBPO_PLANES_MAX];
-    int planes = ebpo_leaf_planes(&b->box, cell, e->faces, count, ebpo_inside_corners(b, winding, d->delta), b->options->epsilon,
-                                  envelope, codes);
+    bool stored = b->options->parts & EBPO_PART_LEAF_PLANES;
+    int planes = ebpo_leaf_planes(&b->box, cell, e->faces, count, ebpo_inside_corners(b, winding, d->delta),
+                                  stored ? b->options->epsilon : 0, envelope, codes);
     l->leaf_volume += ebpo_polytope_volume(envelope) * ebpo_cell_volume(b, cell.level);
     l->leaf_plane_counts[l->leaf_count++] = (uint8_t)planes;
-    if (!(b->options->parts & EBPO_PART_LEAF_PLANES))
+    if (!stored)
         return true;
     if (!ebpo_grow(&l->leaf_planes, &out->leaf_plane_capacity, l->leaf_plane_count + (uint64_t)planes, sizeof *l->leaf_planes))
         return false;

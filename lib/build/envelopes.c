@@ -8,7 +8,7 @@
 #include "build/builder.h"
 #include "geom/plane_code.h"
 
-enum { FEW_VERTICES = 192, TOP_LEVELS = 4, CANDIDATES_BELOW = 64 };
+enum { FEW_VERTICES = 192, TOP_LEVELS = 4, CANDIDATES_BELOW = 48 };
 
 struct ebpo_envelope_scratch {
     double (*point)[4]; /* cell coordinates, and what rounding may add to a support */

@@ -15,16 +15,23 @@ void ebpo_content_add(ebpo_content *content, const void *data, size_t bytes)
     ebpo_sha256_add(&content->state, data, bytes);
 }
 
-void ebpo_content_end_array(ebpo_content *content, const char *path)
+void ebpo_content_put(ebpo_content *content, const char *path, const uint8_t digest[32])
 {
-    content->open = false;
     if (!ebpo_grow(&content->entries, &content->capacity, content->count + 1, sizeof *content->entries)) {
         content->short_of_memory = true;
         return;
     }
     ebpo_content_entry *entry = &content->entries[content->count++];
     snprintf(entry->path, sizeof entry->path, "%s", path);
-    ebpo_sha256_end(&content->state, entry->digest);
+    memcpy(entry->digest, digest, 32);
+}
+
+void ebpo_content_end_array(ebpo_content *content, const char *path)
+{
+    uint8_t digest[32];
+    ebpo_sha256_end(&content->state, digest);
+    content->open = false;
+    ebpo_content_put(content, path, digest);
 }
 
 static int by_path(const void *a, const void *b)

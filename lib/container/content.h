@@ -22,6 +22,8 @@ typedef struct ebpo_content {
 } ebpo_content;
 
 void ebpo_content_add(ebpo_content *content, const void *data, size_t bytes);
+/* An array whose digest is known. */
+void ebpo_content_put(ebpo_content *content, const char *path, const uint8_t digest[32]);
 void ebpo_content_end_array(ebpo_content *content, const char *path);
 EBPO_MUST_USE ebpo_status ebpo_content_end(ebpo_content *content, uint8_t digest[32], ebpo_error *error);
 void ebpo_content_free(ebpo_content *content);

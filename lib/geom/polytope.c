@@ -1,5 +1,6 @@
 #include "geom/polytope.h"
 
+#include <math.h>
 #include <string.h>
 
 static const double tolerance = 1e-10;
@@ -61,56 +62,69 @@ static void between(const double a[3], double da, const double b[3], double db, 
         out[k] = a[k] + t * (b[k] - a[k]);
 }
 
+/* The corners of face f beyond the plane, in order; the points where its edges cross it included. */
+static int beyond(const ebpo_polytope *p, int f, const double *dist, double (*points)[3])
+{
+    int count = p->first[f + 1] - p->first[f], kept = 0;
+    const uint8_t *loop = p->corner + p->first[f];
+    for (int i = 0, a = loop[count - 1]; i < count; i++) {
+        int b = loop[i];
+        bool a_out = dist[a] > 0, b_out = dist[b] > 0;
+        if (a_out != b_out) {
+            /* The same end first from both sides, so that neighbours get the same point. */
+            int out = a_out ? a : b, in = a_out ? b : a;
+            between(p->vertex[out], dist[out], p->vertex[in], dist[in], points[kept]);
+            kept++;
+        }
+        if (b_out) {
+            for (int k = 0; k < 3; k++)
+                points[kept][k] = p->vertex[b][k];
+            kept++;
+        }
+        a = b;
+    }
+    return kept;
+}
+
+static double fan_volume(double (*points)[3], int count, const double o[3])
+{
+    double u[3] = { points[0][0] - o[0], points[0][1] - o[1], points[0][2] - o[2] };
+    double v[3] = { points[1][0] - o[0], points[1][1] - o[1], points[1][2] - o[2] }, sum = 0;
+    for (int i = 2; i < count; i++) {
+        double w[3] = { points[i][0] - o[0], points[i][1] - o[1], points[i][2] - o[2] }, c[3];
+        cross(v, w, c);
+        sum += dot(u, c);
+        v[0] = w[0], v[1] = w[1], v[2] = w[2];
+    }
+    return sum;
+}
+
 double ebpo_polytope_removed(const ebpo_polytope *p, const double n[3], double d)
 {
-    double dist[EBPO_POLYTOPE_VERTICES], reference[3] = { 0, 0, 0 };
-    bool have_reference = false;
-    for (int i = 0; i < p->vertex_count; i++)
+    double dist[EBPO_POLYTOPE_VERTICES] , points[2 * EBPO_POLYTOPE_VERTICES][3], reference[3];
+    bool out[EBPO_POLYTOPE_VERTICES];
+    int nearest = 0;
+    for (int i = 0; i < p->vertex_count; i++) {
         dist[i] = dot(n, p->vertex[i]) - d;
+        out[i] = dist[i] > 0;
+        nearest = fabs(dist[i]) < fabs(dist[nearest]) ? i : nearest;
+    }
+    double lift = dist[nearest] / dot(n, n);
+    for (int k = 0; k < 3; k++)
+        reference[k] = p->vertex[nearest][k] - lift * n[k]; /* any point on the plane */
+    /* The parts of the faces beyond the plane, as fans seen from a point on the plane: the cap itself adds nothing. */
     double sum = 0;
     for (int f = 0; f < p->face_count; f++) {
-        /* The part of this face beyond the plane, as a fan seen from a point on the plane: the cap itself adds nothing. */
-        double start[3], previous[3];
-        int kept = 0, count = p->first[f + 1] - p->first[f];
-        const uint8_t *loop = p->corner + p->first[f];
-        for (int i = 0; i < count; i++) {
-            int a = loop[i], b = loop[i + 1 < count ? i + 1 : 0];
-            double points[2][3];
-            int added = 0;
-            if (dist[a] > 0)
-                memcpy(points[added++], p->vertex[a], sizeof points[0]);
-            if ((dist[a] > 0) != (dist[b] > 0)) {
-                /* The same end first from both sides, so that neighbours get the same point. */
-                if (dist[a] > 0)
-                    between(p->vertex[a], dist[a], p->vertex[b], dist[b], points[added]);
-                else
-                    between(p->vertex[b], dist[b], p->vertex[a], dist[a], points[added]);
-                if (!have_reference) {
-                    memcpy(reference, points[added], sizeof reference);
-                    have_reference = true;
-                }
-                added++;
-            }
-            for (int j = 0; j < added; j++) {
-                double r[3] = { points[j][0], points[j][1], points[j][2] };
-                if (kept == 0)
-                    memcpy(start, r, sizeof start);
-                else if (kept > 1) {
-                    double u[3], v[3], w[3], c[3];
-                    for (int k = 0; k < 3; k++) {
-                        u[k] = start[k] - reference[k];
-                        v[k] = previous[k] - reference[k];
-                        w[k] = r[k] - reference[k];
-                    }
-                    cross(v, w, c);
-                    sum += dot(u, c);
-                }
-                memcpy(previous, r, sizeof previous);
-                kept++;
-            }
-        }
+        bool any = false;
+        for (int i = p->first[f]; i < p->first[f + 1]; i++)
+            any |= out[p->corner[i]];
+        if (!any)
+            continue;
+        int kept = beyond(p, f, dist, points);
+        if (kept >= 3)
+            sum += fan_volume(points, kept, reference);
     }
-    return have_reference ? sum / 6 : 0;
+    return sum / 6;
 }
 
 /* --- clipping --- */

@@ -42,24 +42,14 @@ static uint32_t fan_root(uint32_t *fans, uint32_t i)
     return i;
 }
 
-/* Faces of one edge belong to one fan; returns how many fans that joined. */
-static uint64_t join_fans(uint32_t *fans, const ebpo_link *links, uint64_t begin, uint64_t end)
+/* The faces of an edge that is used twice belong to one fan; returns how many fans that joined. Where more faces meet, a fan ends. */
+static uint64_t join_fans(uint32_t *fans, const ebpo_link *links, uint64_t uses)
 {
-    uint64_t joined = 0;
-    uint32_t first = EBPO_NO_INDEX;
-    for (uint64_t i = begin; i < end; i++) {
-        uint32_t entry = links[i].entry;
-        if (entry == EBPO_NO_INDEX)
-            continue;
-        uint32_t root = fan_root(fans, entry);
-        if (first != EBPO_NO_INDEX && root != first) {
-            fans[root] = first;
-            joined++;
-        }
-        if (first == EBPO_NO_INDEX)
-            first = root;
-    }
-    return joined;
+    if (uses != 2 || links[0].entry == EBPO_NO_INDEX || links[1].entry == EBPO_NO_INDEX)
+        return 0;
+    uint32_t a = fan_root(fans, links[0].entry), b = fan_root(fans, links[1].entry);
+    fans[a] = b;
+    return a != b;
 }
 
 static bool classify_edge(star_block *block, scratch *s, uint32_t v, const ebpo_link *links, uint64_t uses)
@@ -100,7 +90,7 @@ static bool check_edges(const ebpo_mesh *mesh, star_block *block, scratch *s, ui
         s->fans[i] = (uint32_t)i;
     for (uint64_t begin = 0, end; begin < star->count; begin = end) {
         end = ebpo_star_run_end(star, begin);
-        fans -= join_fans(s->fans, star->links, begin, end);
+        fans -= join_fans(s->fans, star->links + begin, end - begin);
         uint32_t neighbour = ebpo_link_neighbour(&star->links[begin]);
         if (neighbour < v) /* the edge is counted at its lower end */
             continue;

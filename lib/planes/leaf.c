@@ -51,5 +51,7 @@ int ebpo_leaf_planes(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *f
     for (int i = 0; i < 8; i++)
         if (inside_corners >> i & 1)
             raise_supports(candidates, n, kept, (const double[3]){ i & 1, i >> 1 & 1, i >> 2 & 1 }, 0);
-    return ebpo_select_greedy(envelope, candidates, kept, epsilon, EBPO_PLANES_MAX, codes);
+    if (epsilon > 0)
+        return ebpo_select_greedy(envelope, candidates, kept, epsilon, EBPO_PLANES_MAX, codes);
+    return ebpo_select_all(envelope, candidates, kept, EBPO_PLANES_MAX, codes);
 }

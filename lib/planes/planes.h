@@ -28,6 +28,9 @@ typedef int (*ebpo_select_fn)(ebpo_polytope *envelope, const ebpo_candidate *can
 int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, double epsilon, int most,
                        uint32_t *codes);
 
+/* Every candidate that removes anything, deepest cut first: the tightest envelope, and with few candidates the cheapest to find. */
+int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, int most, uint32_t *codes);
+
 /* A face as its three corners, in the model's coordinates. */
 typedef struct ebpo_triangle {
     double corner[3][3];
@@ -49,7 +52,8 @@ bool ebpo_face_normal_code(const ebpo_box *box, const ebpo_triangle *face, uint3
 void ebpo_corner_windings(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces, uint64_t count, int32_t delta[8]);
 
 /* A leaf's own planes from its faces: on entry `envelope` is the parent's envelope cut to this cell, on return the leaf's. `inside_corners`: bit i set
- * when corner i lies in the solid. Writes at most EBPO_PLANES_MAX codes and returns how many. EBP 2017, section 3.4. */
+ * when corner i lies in the solid; `epsilon` > 0: greedy selection, for planes
+ * that will be stored; 0: all that cut, for planes that are derived and cost no byte. Writes at most EBPO_PLANES_MAX codes and returns how many. EBP 2017, section 3.4. */
 int ebpo_leaf_planes(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces, uint64_t count, unsigned inside_corners,
                      double epsilon, ebpo_polytope *envelope, uint32_t codes[EBPO_PLANES_MAX]);
 

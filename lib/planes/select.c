@@ -74,3 +74,19 @@ int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_candidate *candidates
     }
     return taken;
 }
+
+int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, int most, uint32_t *codes)
+{
+    ranked list[EBPO_PLANES_CANDIDATES];
+    int left = rank_candidates(envelope, candidates, count, 0, list), taken = 0;
+    while (left > 0 && taken < most) {
+        int best = 0;
+        for (int i = 1; i < left; i++)
+            if (list[i].gain > list[best].gain || (list[i].gain == list[best].gain && list[i].code < list[best].code))
+                best = i;
+        if (ebpo_polytope_clip(envelope, list[best].n, list[best].d, taken) == EBPO_CLIP_CUT)
+            codes[taken++] = list[best].code;
+        list[best] = list[--left];
+    }
+    return taken;
+}

@@ -130,9 +130,9 @@ static ebpo_status read_property(rows *r, const ply_property *property)
 static ebpo_status end_row(rows *r)
 {
     ply_parser *p = r->p;
-    while (p->at < p->size && is_blank(p->data[p->at]) && p->data[p->at] != (uint8_t)p->header.line_end)
+    while (p->at < p->size && is_blank(p->data[p->at]) && p->data[p->at] != '\n' && p->data[p->at] != '\r')
         p->at++;
-    if (p->at == p->size || p->data[p->at] == (uint8_t)p->header.line_end)
+    if (p->at == p->size || is_blank(p->data[p->at]))
         return EBPO_OK;
     ply_word token;
     next_token(p, &token);

@@ -49,6 +49,13 @@ static verdict compare_intervals(double a, double b, double low, double high, do
     return UNSURE;
 }
 
+/* (b - a) * inverse, 0 only when a and b are equal; not a number (and so never sure) where it is too small to compute with. */
+static double scaled_difference(double a, double b, double inverse)
+{
+    double x = (b - a) * inverse;
+    return a != b && fabs(x) < 0x1p-400 ? NAN : x;
+}
+
 /* The axis edge x (unit vector k), edge from corner i to j, l being the third corner. */
 static verdict edge_axis(const ebpo_local *p, const double edge[3], int i, int l, int k)
 {
@@ -86,7 +93,7 @@ static verdict separating_axes(const ebpo_frame *frame, const ebpo_corners *face
     double edge[3][3];
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++)
-            edge[i][k] = (face->at[(i + 1) % 3][k] - face->at[i][k]) * frame->inverse[k];
+            edge[i][k] = scaled_difference(face->at[i][k], face->at[(i + 1) % 3][k], frame->inverse[k]);
     verdict all = normal_axis(&p, edge);
     for (int i = 0; i < 3 && all != APART; i++)
         for (int k = 0; k < 3 && all != APART; k++) {

@@ -52,7 +52,8 @@ typedef struct ebpo_finding {
     uint64_t place[EBPO_FINDING_PLACES]; /* the first min(count, 4), ascending */
 } ebpo_finding;
 
-/* What a mesh is. Edges are undirected pairs of distinct vertex indices. Places of edge findings are faces that use such an edge.
+/* What a mesh is. Edges are undirected pairs of distinct vertex indices. The place of an edge finding is the lowest face that uses the edge
+ * (a face with two such edges is there twice).
  * Balanced: each edge is used as often in one direction as in the other; that is what makes a winding number well
  * defined (the solid), a wider class than the theses' closed 2-manifolds. */
 typedef struct ebpo_mesh_report {
@@ -62,15 +63,16 @@ typedef struct ebpo_mesh_report {
     ebpo_finding nonmanifold_edges;   /* used more than twice */
     ebpo_finding misoriented_edges;   /* used twice, both times in one direction */
     ebpo_finding unbalanced_edges;    /* directions do not cancel (the union of the causes above, less what cancels) */
-    ebpo_finding bowtie_vertices;     /* faces around the vertex form more than one fan; place: vertex */
+    ebpo_finding bowtie_vertices;     /* faces around the vertex form more than one fan (chain across edges used twice);
+                                       * so the ends of non-manifold edges count as well; place: vertex */
     ebpo_finding zero_area_faces;     /* exact test; includes index_repeated_faces */
     ebpo_finding index_repeated_faces; /* a face that names a vertex twice */
-    ebpo_finding repeated_faces;      /* same three vertices as an earlier face, any rotation or orientation */
+    ebpo_finding repeated_faces;      /* same three distinct vertices as an earlier face, any rotation or orientation */
     ebpo_finding unreferenced_vertices;
     ebpo_finding repeated_positions;  /* same position as an earlier vertex */
     uint64_t edges;
     uint64_t components;              /* connected by shared vertices, faces only */
-    uint64_t boundary_loops;          /* holes: closed chains of boundary edges */
+    uint64_t boundary_loops;          /* holes: closed chains of boundary edges, split where they pass a vertex twice */
     bool genus_known;                 /* closed 2-manifold only */
     int64_t genus;                    /* summed over the components */
     double area;
@@ -95,12 +97,19 @@ typedef struct ebpo_mend_record {
     uint64_t unfilled_holes;          /* boundary chains that are not simple loops */
 } ebpo_mend_record;
 
-/* Merges vertices with identical positions (-0 equals 0); the first of each group stays, order is kept. */
+/* The three functions add their counts to `record` (start from a zeroed one; it may be NULL). An index out of range is EBPO_E_FORMAT.
+ * On failure the mesh is as it was. They use all cores; results do not depend on how many. */
+
+/* Merges vertices with identical positions (-0 equals 0), also unreferenced ones; the first of each group stays, order is kept. Faces that then name
+ * a vertex twice stay. */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error);
-/* Makes neighbouring faces agree, component by component (across edges used twice), then turns each closed component so that its signed volume
- * is positive unless it already was consistent. Non-orientable components stay untouched and are counted. */
+/* Makes neighbouring faces agree, component by component (across edges used twice). A component that already is consistent is left alone, also one with
+ * negative volume: that may be a cavity. Another one is turned so that its signed volume is positive if it is closed (each of its edges used twice),
+ * and so that the majority of its faces stays as it was if it is open. Non-orientable components stay untouched and are counted. */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error);
-/* Closes each simple boundary loop with triangles over its own vertices, appended at the end. */
+/* Closes each boundary loop (as counted in boundary_loops) with triangles over its own vertices, appended at the end; no vertices are added. Up to
+ * 256 edges: the triangulation of least area that, where possible, makes no edge the mesh has already; beyond that, ear by ear. Chains that do not
+ * close (orientations that do not agree: see ebpo_mesh_orient) stay and are counted. */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_fill_holes(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error);
 
 #ifdef __cplusplus

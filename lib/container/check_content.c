@@ -1,0 +1,67 @@
+/* Recomputing a file's content checksum. */
+#include <string.h>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "container/content.h"
+#include "container/reader.h"
+
+/* Arrays are independent, so threads take whole ones; chunks within one must come in order. */
+typedef struct content_job {
+    ebpo_file *file;
+    const ebpo_array_in *array[EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS];
+    uint8_t digest[EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS][32];
+    unsigned count;
+} content_job;
+
+static ebpo_status take(void *context, const ebpo_array_in *array, uint64_t chunk, uint64_t row, uint64_t rows, const uint8_t *bytes,
+                        ebpo_error *error)
+{
+    (void)chunk;
+    (void)row;
+    (void)error;
+    ebpo_sha256_add(context, bytes, rows * ebpo_h5_row_bytes(&array->shape));
+    return EBPO_OK;
+}
+
+static ebpo_status digest_arrays(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+{
+    content_job *j = context;
+    (void)worker;
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
+        ebpo_sha256 state;
+        ebpo_sha256_begin(&state);
+        status = ebpo_reader_rows(j->file, j->array[i], 1, take, &state, error);
+        ebpo_sha256_end(&state, j->digest[i]);
+    }
+    return status;
+}
+
+static ebpo_status compare(content_job *j, ebpo_error *error)
+{
+    ebpo_content content = { .entries = NULL };
+    uint8_t digest[32];
+    for (unsigned i = 0; i < j->count; i++)
+        ebpo_content_put(&content, j->array[i]->path, j->digest[i]);
+    ebpo_status status = ebpo_content_end(&content, digest, error);
+    ebpo_content_free(&content);
+    if (status == EBPO_OK && memcmp(digest, j->file->info.content_sha256, 32) != 0)
+        status = ebpo_fail(error, EBPO_E_FORMAT, "%s: the content is not what content_sha256 says: the file was changed; get a fresh copy",
+                           j->file->in.shown);
+    return status;
+}
+
+ebpo_status ebpo_file_check_content(ebpo_file *file, unsigned threads, ebpo_error *error)
+{
+    content_job j = { .file = file };
+    for (int id = EBPO_ARRAYS - 1; id >= EBPO_LEVEL_ARRAYS; id--) /* the largest first */
+        if (file->root_array[id].present)
+            j.array[j.count++] = &file->root_array[id];
+    for (int level = file->info.level_count - 1; level >= 0; level--)
+        for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
+            if (file->level_array[level][id].present)
+                j.array[j.count++] = &file->level_array[level][id];
+    ebpo_status status = ebpo_parallel_for(threads, j.count, 1, digest_arrays, &j, NULL, "check", error);
+    return status == EBPO_OK ? compare(&j, error) : status;
+}

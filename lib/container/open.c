@@ -1,0 +1,144 @@
+/* Opening a file: the head, and whether every array is there in the shape that the head's counts call for. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "container/facts.h"
+#include "container/reader.h"
+
+static ebpo_status open_array(ebpo_file *file, ebpo_array_id id, int level, uint64_t *address, ebpo_error *error)
+{
+    const ebpo_array_spec *spec = &ebpo_schema[id];
+    ebpo_array_in *a = id < EBPO_LEVEL_ARRAYS ? &file->level_array[level][id] : &file->root_array[id];
+    uint64_t rows = ebpo_schema_rows(&file->info, id, level);
+    *a = (ebpo_array_in){ .id = id, .level = level, .handle = -1 };
+    ebpo_schema_path(id, level, a->path);
+    if (rows == 0 || (spec->if_needed && ebpo_h5_look(&file->in, a->path) == EBPO_H5_ABSENT))
+        return EBPO_OK;
+    ebpo_status status = ebpo_h5_open_array(&file->in, a->path, &a->shape, &a->stored_bytes, address, &a->handle, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_check check = ebpo_reader_check(file);
+    if (a->shape.rows != rows)
+        return ebpo_check_fail(&check, -1, a->path, "the array's length contradicts the counts in the head", error);
+    if (a->shape.cols != spec->cols || !(spec->sizes & a->shape.element_size) || a->shape.is_signed != spec->is_signed)
+        return ebpo_check_fail(&check, -1, a->path, "the array has the wrong type or the wrong number of columns", error);
+    bool wide = file->info.double_coordinates;
+    if (id == EBPO_A_VERTICES && a->shape.element_size != (wide ? 8 : 4))
+        return ebpo_check_fail(&check, -1, a->path, "the array's type contradicts coordinate_type", error);
+    a->present = true;
+    return EBPO_OK;
+}
+
+static ebpo_status open_levels(ebpo_file *file, ebpo_error *error)
+{
+    ebpo_h5_id id;
+    char path[EBPO_PATH_BYTES];
+    ebpo_status status = ebpo_h5_open_group(&file->in, "/levels", &id, error);
+    ebpo_h5_close_id(id);
+    for (int level = 0; level < file->info.level_count && status == EBPO_OK; level++) {
+        snprintf(path, sizeof path, "/levels/%02d", level);
+        status = ebpo_h5_open_group(&file->in, path, &id, error);
+        if (status == EBPO_OK)
+            status = ebpo_facts_get_level(&file->in, id, path, &file->info.level[level], error);
+        ebpo_h5_close_id(id);
+    }
+    return status;
+}
+
+static ebpo_status open_group(ebpo_file *file, const char *path, bool wanted, ebpo_error *error)
+{
+    ebpo_h5_id id = -1;
+    ebpo_status status = wanted ? ebpo_h5_open_group(&file->in, path, &id, error) : EBPO_OK;
+    ebpo_h5_close_id(id);
+    return status;
+}
+
+static ebpo_status open_arrays(ebpo_file *file, ebpo_error *error)
+{
+    ebpo_info *info = &file->info;
+    uint64_t address = 0, stored = 0;
+    ebpo_status status = open_group(file, "/mesh", info->parts & EBPO_PART_MESH, error);
+    if (status == EBPO_OK)
+        status = open_group(file, "/maps", info->parts & EBPO_PART_MAPS, error);
+    for (int level = 0; level < info->level_count; level++)
+        for (int id = 0; id < EBPO_LEVEL_ARRAYS && status == EBPO_OK; id++) {
+            status = open_array(file, (ebpo_array_id)id, level, &address, error);
+            info->level[level].stored_bytes += file->level_array[level][id].stored_bytes;
+            if (level == 0 && id == EBPO_A_TYPES)
+                info->head_bytes = address; /* the first array in the file */
+        }
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS && status == EBPO_OK; id++)
+        status = open_array(file, (ebpo_array_id)id, 0, &address, error);
+    info->file_bytes = file->in.file_bytes;
+    info->mesh_vertex_bytes = file->root_array[EBPO_A_VERTICES].stored_bytes;
+    info->mesh_face_bytes = file->root_array[EBPO_A_FACES].stored_bytes + file->root_array[EBPO_A_FACES_INDEX].stored_bytes;
+    info->map_bytes = file->root_array[EBPO_A_VERTEX_SOURCE].stored_bytes + file->root_array[EBPO_A_FACE_SOURCE].stored_bytes;
+    for (int level = 0; level < info->level_count; level++)
+        stored += info->level[level].stored_bytes;
+    stored += info->mesh_vertex_bytes + info->mesh_face_bytes + info->map_bytes;
+    if (status == EBPO_OK && stored > info->file_bytes)
+        status = ebpo_fail(error, EBPO_E_FORMAT, "%s: the arrays' chunks take more room than the file has; get a fresh copy of the file",
+                           file->in.shown);
+    ebpo_pipeline pipeline = file->level_array[0][EBPO_A_TYPES].shape.pipeline;
+    info->codec = pipeline == EBPO_PIPELINE_ZSTD ? EBPO_CODEC_ZSTD : pipeline == EBPO_PIPELINE_DEFLATE ? EBPO_CODEC_DEFLATE : EBPO_CODEC_NONE;
+    return status;
+}
+
+ebpo_status ebpo_file_open(ebpo_file **out, const char *path, ebpo_error *error)
+{
+    *out = NULL;
+    ebpo_file *file = ebpo_alloc_zero(1, sizeof *file);
+    if (!file)
+        return ebpo_fail_memory(error, sizeof *file);
+    file->in = (ebpo_h5_in)EBPO_H5_IN_INIT;
+    for (int i = 0; i < EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS; i++)
+        file->level_array[i / EBPO_LEVEL_ARRAYS][i % EBPO_LEVEL_ARRAYS].handle = -1;
+    for (int i = 0; i < EBPO_ARRAYS; i++)
+        file->root_array[i].handle = -1;
+    ebpo_h5_id root = -1;
+    ebpo_status status = ebpo_h5_open(&file->in, path, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_open_group(&file->in, "/", &root, error);
+    if (status == EBPO_OK)
+        status = ebpo_facts_get(&file->in, root, &file->info, error);
+    ebpo_h5_close_id(root);
+    if (status == EBPO_OK && (file->info.level_count < 1 || file->info.level_count > EBPO_LEVELS_MAX))
+        status = ebpo_fail(error, EBPO_E_FORMAT, "%s: /: level_count is not 1 to %d; get a fresh copy of the file", path, EBPO_LEVELS_MAX);
+    if (status == EBPO_OK)
+        status = open_levels(file, error);
+    if (status == EBPO_OK)
+        status = ebpo_facts_check(&file->info, file->in.shown, EBPO_E_FORMAT, error);
+    if (status == EBPO_OK)
+        status = open_arrays(file, error);
+    if (status == EBPO_OK) {
+        *out = file;
+    } else {
+        ebpo_file_close(file);
+    }
+    return status;
+}
+
+void ebpo_file_close(ebpo_file *file)
+{
+    if (!file)
+        return;
+    for (int i = 0; i < EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS; i++)
+        ebpo_h5_close_id(file->level_array[i / EBPO_LEVEL_ARRAYS][i % EBPO_LEVEL_ARRAYS].handle);
+    for (int i = 0; i < EBPO_ARRAYS; i++)
+        ebpo_h5_close_id(file->root_array[i].handle);
+    ebpo_h5_close(&file->in);
+    free(file);
+}
+
+const ebpo_info *ebpo_file_info(const ebpo_file *file)
+{
+    return &file->info;
+}
+
+ebpo_status ebpo_register_filters(ebpo_error *error)
+{
+    return ebpo_h5_register(error);
+}

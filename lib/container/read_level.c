@@ -1,0 +1,192 @@
+/* One level from its arrays. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "container/plan.h"
+#include "container/reader.h"
+
+void ebpo_level_free(ebpo_level *level)
+{
+    if (!level)
+        return;
+    free(level->types);
+    free(level->plane_counts);
+    free(level->planes);
+    free(level->leaf_winding);
+    free(level->black_winding);
+    free(level->white_winding);
+    free(level->leaf_first);
+    free(level->leaf_new);
+    free(level->leaf_ref_count);
+    free(level->leaf_refs);
+    free(level->leaf_plane_counts);
+    free(level->leaf_planes);
+    memset(level, 0, sizeof *level);
+}
+
+/* leaf_first holds skips; each leaf's new faces end before the next one's begin. */
+static ebpo_status add_up_skips(ebpo_file *file, int number, ebpo_level *level, ebpo_error *error)
+{
+    ebpo_check check = ebpo_reader_check(file);
+    uint64_t end = 0, faces = file->info.face_count;
+    for (uint64_t i = 0; i < level->leaf_count; i++) {
+        uint64_t skip = level->leaf_first[i];
+        if (skip > faces - end || level->leaf_new[i] > faces - end - skip)
+            return ebpo_check_fail(&check, number, "leaf_skip", "a leaf's new faces lie beyond the last face", error);
+        level->leaf_first[i] = end + skip;
+        end += skip + level->leaf_new[i];
+    }
+    return EBPO_OK;
+}
+
+typedef struct refs_job {
+    ebpo_file *file;
+    int number;
+    ebpo_level *level;
+    const uint64_t *index;
+} refs_job;
+
+/* Gaps, counted down from the leaf's first face, to ascending numbers. */
+static bool decode_leaf_refs(uint32_t *refs, uint64_t count, uint64_t first)
+{
+    uint64_t above = first;
+    for (uint64_t k = 0; k < count; k++) {
+        if (refs[k] >= above)
+            return false;
+        above -= (uint64_t)refs[k] + 1;
+        refs[k] = (uint32_t)above;
+    }
+    for (uint64_t k = 0; k < count / 2; k++) {
+        uint32_t other = refs[count - 1 - k];
+        refs[count - 1 - k] = refs[k];
+        refs[k] = other;
+    }
+    return true;
+}
+
+static ebpo_status decode_refs(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+{
+    refs_job *j = context;
+    (void)worker;
+    uint64_t leaf = begin * EBPO_INDEX_ROWS, at = j->index[begin * 3 + 1];
+    uint64_t stop = end * EBPO_INDEX_ROWS < j->level->leaf_count ? end * EBPO_INDEX_ROWS : j->level->leaf_count;
+    for (; leaf < stop; at += j->level->leaf_ref_count[leaf++])
+        if (!decode_leaf_refs(j->level->leaf_refs + at, j->level->leaf_ref_count[leaf], j->level->leaf_first[leaf])) {
+            ebpo_check check = ebpo_reader_check(j->file);
+            return ebpo_check_fail(&check, j->number, "leaf_refs", "a reference does not lead to a face before the leaf's own", error);
+        }
+    return EBPO_OK;
+}
+
+static ebpo_status check_index(ebpo_file *file, ebpo_array_id id, int number, const uint64_t *right, ebpo_error *error)
+{
+    const ebpo_array_in *array = ebpo_reader_array(file, id, number);
+    uint64_t *stored = NULL;
+    if (!array->present)
+        return EBPO_OK;
+    ebpo_status status = ebpo_reader_make(file, id, number, 1, sizeof *stored, &stored, error);
+    if (status == EBPO_OK && memcmp(stored, right, array->shape.rows * array->shape.cols * sizeof *stored) != 0) {
+        ebpo_check check = ebpo_reader_check(file);
+        status = ebpo_check_fail(&check, number, ebpo_schema[id].name, "the index contradicts the arrays that it is about", error);
+    }
+    free(stored);
+    return status;
+}
+
+static ebpo_status read_faces(ebpo_file *file, int number, ebpo_level *level, unsigned threads, ebpo_error *error)
+{
+    ebpo_status status = ebpo_reader_make(file, EBPO_A_LEAF_SKIP, number, threads, 8, &level->leaf_first, error);
+    if (status == EBPO_OK)
+        status = ebpo_reader_make(file, EBPO_A_LEAF_NEW, number, threads, 4, &level->leaf_new, error);
+    if (status == EBPO_OK)
+        status = ebpo_reader_make(file, EBPO_A_LEAF_REF_COUNT, number, threads, 4, &level->leaf_ref_count, error);
+    if (status == EBPO_OK)
+        status = ebpo_reader_make(file, EBPO_A_LEAF_REFS, number, threads, 4, &level->leaf_refs, error);
+    if (status != EBPO_OK || !level->leaf_first)
+        return status;
+    uint64_t refs = 0;
+    for (uint64_t i = 0; i < level->leaf_count; i++)
+        refs += level->leaf_ref_count[i];
+    ebpo_check check = ebpo_reader_check(file);
+    if (refs != level->ref_count)
+        return ebpo_check_fail(&check, number, "leaf_ref_count", "the counts do not add up to the number of references", error);
+    return add_up_skips(file, number, level, error);
+}
+
+/* References are decoded here: leaf_index tells each block of leaves where to begin. */
+static ebpo_status finish_leaves(ebpo_file *file, int number, ebpo_level *level, unsigned threads, ebpo_error *error)
+{
+    uint64_t *index = ebpo_index_leaves(level);
+    ebpo_status status = index ? EBPO_OK : ebpo_fail_memory(error, level->leaf_count / EBPO_INDEX_ROWS * 24);
+    if (status == EBPO_OK)
+        status = check_index(file, EBPO_A_LEAF_INDEX, number, index, error);
+    if (status == EBPO_OK && level->leaf_refs) {
+        refs_job j = { file, number, level, index };
+        uint64_t blocks = (level->leaf_count - 1) / EBPO_INDEX_ROWS + 1;
+        status = ebpo_parallel_for(blocks > 1 ? threads : 1, blocks, 1, decode_refs, &j, NULL, "read", error);
+    }
+    free(index);
+    return status;
+}
+
+static ebpo_status check_indexes(ebpo_file *file, int number, const ebpo_level *level, ebpo_error *error)
+{
+    uint64_t *types = ebpo_index_types(level, number == 0), *gray = ebpo_index_gray(level);
+    ebpo_status status = types && gray ? EBPO_OK : ebpo_fail_memory(error, level->group_count / EBPO_INDEX_ROWS * 32);
+    if (status == EBPO_OK)
+        status = check_index(file, EBPO_A_TYPES_INDEX, number, types, error);
+    if (status == EBPO_OK)
+        status = check_index(file, EBPO_A_GRAY_INDEX, number, gray, error);
+    free(types);
+    free(gray);
+    return status;
+}
+
+static ebpo_status read_arrays(ebpo_file *file, int number, ebpo_level *level, unsigned threads, ebpo_error *error)
+{
+    const struct { ebpo_array_id id; size_t size; void *values; } plain[] = {
+        { EBPO_A_TYPES, 2, &level->types },
+        { EBPO_A_PLANE_COUNTS, 1, &level->plane_counts },
+        { EBPO_A_PLANES, 4, &level->planes },
+        { EBPO_A_LEAF_WINDING, 4, &level->leaf_winding },
+        { EBPO_A_BLACK_WINDING, 4, &level->black_winding },
+        { EBPO_A_WHITE_WINDING, 4, &level->white_winding },
+        { EBPO_A_LEAF_PLANE_COUNTS, 1, &level->leaf_plane_counts },
+        { EBPO_A_LEAF_PLANES, 4, &level->leaf_planes },
+    };
+    ebpo_status status = EBPO_OK;
+    for (size_t i = 0; i < sizeof plain / sizeof plain[0] && status == EBPO_OK; i++)
+        status = ebpo_reader_make(file, plain[i].id, number, threads, plain[i].size, plain[i].values, error);
+    if (status == EBPO_OK)
+        status = read_faces(file, number, level, threads, error);
+    return status;
+}
+
+ebpo_status ebpo_file_read_level(ebpo_file *file, int level, ebpo_level *out, unsigned threads, ebpo_error *error)
+{
+    memset(out, 0, sizeof *out);
+    const ebpo_info *info = &file->info;
+    if (level < 0 || level >= info->level_count)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: there is no level %d; the file has levels 0 to %d", file->in.shown, level,
+                         info->level_count - 1);
+    const ebpo_level_summary *s = &info->level[level];
+    *out = (ebpo_level){ .group_count = ebpo_schema_groups(info, level), .gray_count = s->gray_count, .leaf_count = s->leaf_count,
+                         .white_count = s->white_count, .black_count = s->black_count, .plane_count = s->plane_count,
+                         .ref_count = s->ref_count, .new_count = s->new_count, .leaf_plane_count = s->leaf_plane_count,
+                         .gray_volume = s->gray_volume, .leaf_volume = s->leaf_volume };
+    ebpo_status status = read_arrays(file, level, out, threads, error);
+    if (status == EBPO_OK && out->leaf_count)
+        status = finish_leaves(file, level, out, threads, error);
+    if (status == EBPO_OK)
+        status = check_indexes(file, level, out, error);
+    if (status == EBPO_OK) {
+        ebpo_check check = ebpo_reader_check(file);
+        status = ebpo_check_level(&check, info, level, out, error);
+    }
+    if (status != EBPO_OK)
+        ebpo_level_free(out);
+    return status;
+}

@@ -1,0 +1,254 @@
+/* The mesh, its maps, the source's order, and whole trees. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "codec/coding.h"
+#include "container/reader.h"
+
+void ebpo_tree_free(ebpo_tree *tree)
+{
+    if (!tree)
+        return;
+    for (int i = 0; i < EBPO_LEVELS_MAX; i++)
+        ebpo_level_free(&tree->level[i]);
+    ebpo_mesh_free(&tree->mesh);
+    free(tree->vertex_source);
+    free(tree->face_source);
+    memset(tree, 0, sizeof *tree);
+}
+
+static ebpo_status absent(const ebpo_file *file, const char *part, ebpo_error *error)
+{
+    return ebpo_fail(error, EBPO_E_ABSENT, "%s: the file was written without its %s; build it again with them", file->in.shown, part);
+}
+
+typedef struct mesh_job {
+    ebpo_file *file;
+    ebpo_mesh *mesh;
+    uint64_t *faces_index; /* NULL: a single chunk */
+    uint64_t seen;         /* by the last chunk */
+} mesh_job;
+
+static ebpo_status take_vertices(void *context, const ebpo_array_in *array, uint64_t chunk, uint64_t row, uint64_t rows, const uint8_t *bytes,
+                                 ebpo_error *error)
+{
+    (void)array;
+    (void)chunk;
+    (void)error;
+    mesh_job *j = context;
+    if (j->mesh->xyz32)
+        ebpo_points32_decode(bytes, rows, j->mesh->xyz32 + 3 * row);
+    else
+        ebpo_points64_decode(bytes, rows, j->mesh->xyz64 + 3 * row);
+    return EBPO_OK;
+}
+
+static ebpo_status take_faces(void *context, const ebpo_array_in *array, uint64_t chunk, uint64_t row, uint64_t rows, const uint8_t *bytes,
+                              ebpo_error *error)
+{
+    mesh_job *j = context;
+    ebpo_check check = ebpo_reader_check(j->file);
+    uint64_t last = ebpo_h5_chunk_count(&array->shape) - 1;
+    uint64_t seen = j->faces_index ? j->faces_index[chunk] : 0;
+    if (seen > j->mesh->vertex_count || (chunk == 0 && seen))
+        return ebpo_check_fail(&check, -1, "/mesh/faces_index", "the index names more vertices than there are", error);
+    if (!ebpo_corners_decode(bytes, rows, &seen, j->mesh->faces + 3 * row) || seen > j->mesh->vertex_count)
+        return ebpo_check_fail(&check, -1, "/mesh/faces", "a face names a vertex that does not exist", error);
+    if (chunk < last && seen != j->faces_index[chunk + 1])
+        return ebpo_check_fail(&check, -1, "/mesh/faces_index", "the index contradicts the faces", error);
+    return EBPO_OK;
+}
+
+static ebpo_status make_mesh(const ebpo_info *info, ebpo_mesh *out, ebpo_error *error)
+{
+    out->vertex_count = info->vertex_count;
+    out->face_count = info->face_count;
+    if (info->double_coordinates)
+        out->xyz64 = ebpo_alloc(info->vertex_count, 3 * sizeof *out->xyz64);
+    else
+        out->xyz32 = ebpo_alloc(info->vertex_count, 3 * sizeof *out->xyz32);
+    out->faces = ebpo_alloc(info->face_count, 3 * sizeof *out->faces);
+    snprintf(out->source_name, sizeof out->source_name, "%s", info->source_name);
+    snprintf(out->source_format, sizeof out->source_format, "%s", info->source_format);
+    memcpy(out->source_sha256, info->source_sha256, sizeof out->source_sha256);
+    out->source_size = info->source_size;
+    if (!out->faces || (!out->xyz32 && !out->xyz64))
+        return ebpo_fail_memory(error, info->vertex_count * 24 + info->face_count * 12);
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_file_read_mesh(ebpo_file *file, ebpo_mesh *out, unsigned threads, ebpo_error *error)
+{
+    memset(out, 0, sizeof *out);
+    if (!(file->info.parts & EBPO_PART_MESH))
+        return absent(file, "mesh", error);
+    mesh_job j = { .file = file, .mesh = out };
+    ebpo_check check = ebpo_reader_check(file);
+    ebpo_status status = make_mesh(&file->info, out, error);
+    if (status == EBPO_OK)
+        status = ebpo_reader_rows(file, ebpo_reader_array(file, EBPO_A_VERTICES, 0), threads, take_vertices, &j, error);
+    if (status == EBPO_OK)
+        status = ebpo_check_vertices(&check, out, error);
+    if (status == EBPO_OK)
+        status = ebpo_reader_make(file, EBPO_A_FACES_INDEX, 0, 1, 8, &j.faces_index, error);
+    if (status == EBPO_OK)
+        status = ebpo_reader_rows(file, ebpo_reader_array(file, EBPO_A_FACES, 0), threads, take_faces, &j, error);
+    free(j.faces_index);
+    if (status != EBPO_OK)
+        ebpo_mesh_free(out);
+    return status;
+}
+
+static ebpo_status take_numbers(void *context, const ebpo_array_in *array, uint64_t chunk, uint64_t row, uint64_t rows, const uint8_t *bytes,
+                                ebpo_error *error)
+{
+    (void)array;
+    (void)chunk;
+    (void)error;
+    ebpo_numbers_decode(bytes, rows, (uint32_t *)context + row);
+    return EBPO_OK;
+}
+
+static ebpo_status read_map(ebpo_file *file, ebpo_array_id id, uint64_t limit, unsigned threads, uint32_t **out, ebpo_error *error)
+{
+    const ebpo_array_in *array = ebpo_reader_array(file, id, 0);
+    ebpo_check check = ebpo_reader_check(file);
+    uint32_t *map = ebpo_alloc(array->shape.rows, sizeof *map);
+    if (!map)
+        return ebpo_fail_memory(error, array->shape.rows * sizeof *map);
+    ebpo_status status = ebpo_reader_rows(file, array, threads, take_numbers, map, error);
+    if (status == EBPO_OK)
+        status = ebpo_check_map(&check, array->path, map, array->shape.rows, limit, error);
+    if (status == EBPO_OK)
+        *out = map;
+    else
+        free(map);
+    return status;
+}
+
+static uint64_t face_limit(const ebpo_info *info)
+{
+    return info->source_face_count + info->mend.added_faces;
+}
+
+ebpo_status ebpo_file_read_maps(ebpo_file *file, uint32_t **vertex_source, uint32_t **face_source, unsigned threads, ebpo_error *error)
+{
+    *vertex_source = *face_source = NULL;
+    if (!(file->info.parts & EBPO_PART_MAPS))
+        return absent(file, "maps to the source's numbers", error);
+    ebpo_status status = read_map(file, EBPO_A_VERTEX_SOURCE, file->info.source_vertex_count, threads, vertex_source, error);
+    if (status == EBPO_OK)
+        status = read_map(file, EBPO_A_FACE_SOURCE, face_limit(&file->info), threads, face_source, error);
+    if (status != EBPO_OK) {
+        free(*vertex_source);
+        *vertex_source = NULL;
+    }
+    return status;
+}
+
+ebpo_status ebpo_file_read_tree(ebpo_file *file, ebpo_tree *out, unsigned threads, ebpo_error *error)
+{
+    memset(out, 0, sizeof *out);
+    out->info = file->info;
+    ebpo_check check = ebpo_reader_check(file);
+    ebpo_status status = EBPO_OK;
+    for (int i = 0; i < file->info.level_count && status == EBPO_OK; i++)
+        status = ebpo_file_read_level(file, i, &out->level[i], threads, error);
+    if (status == EBPO_OK && file->info.parts & EBPO_PART_MESH)
+        status = ebpo_check_order(&check, out, error);
+    if (status == EBPO_OK && file->info.parts & EBPO_PART_MESH)
+        status = ebpo_file_read_mesh(file, &out->mesh, threads, error);
+    if (status == EBPO_OK && file->info.parts & EBPO_PART_MAPS)
+        status = ebpo_file_read_maps(file, &out->vertex_source, &out->face_source, threads, error);
+    if (status != EBPO_OK)
+        ebpo_tree_free(out);
+    return status;
+}
+
+/* Place of each item when they are sorted by their source number (distinct, below limit): in *place, to be freed. */
+static ebpo_status sort_by_source(const uint32_t *source, uint64_t count, uint64_t limit, uint32_t **place, ebpo_error *error)
+{
+    static const uint32_t none = UINT32_MAX;
+    uint32_t *item = ebpo_alloc(limit, sizeof *item), *out = ebpo_alloc(count, sizeof *out);
+    if (!item || !out) {
+        free(item);
+        free(out);
+        return ebpo_fail_memory(error, (limit + count) * sizeof *item);
+    }
+    memset(item, 0xff, limit * sizeof *item);
+    for (uint64_t i = 0; i < count; i++)
+        item[source[i]] = (uint32_t)i;
+    uint32_t next = 0;
+    for (uint64_t i = 0; i < limit; i++)
+        if (item[i] != none)
+            out[item[i]] = next++;
+    free(item);
+    *place = out;
+    return EBPO_OK;
+}
+
+static ebpo_status reorder_vertices(ebpo_mesh *mesh, const uint32_t *place, ebpo_error *error)
+{
+    size_t size = mesh->xyz32 ? 3 * sizeof *mesh->xyz32 : 3 * sizeof *mesh->xyz64;
+    const uint8_t *old = mesh->xyz32 ? (const uint8_t *)mesh->xyz32 : (const uint8_t *)mesh->xyz64;
+    uint8_t *sorted = ebpo_alloc(mesh->vertex_count, size);
+    if (!sorted)
+        return ebpo_fail_memory(error, mesh->vertex_count * size);
+    for (uint64_t i = 0; i < mesh->vertex_count; i++)
+        memcpy(sorted + place[i] * size, old + i * size, size);
+    if (mesh->xyz32) {
+        free(mesh->xyz32);
+        mesh->xyz32 = (float *)(void *)sorted;
+    } else {
+        free(mesh->xyz64);
+        mesh->xyz64 = (double *)(void *)sorted;
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status reorder_faces(ebpo_mesh *mesh, const uint32_t *vertex_place, const uint32_t *face_place, ebpo_error *error)
+{
+    uint32_t *sorted = ebpo_alloc(mesh->face_count, 3 * sizeof *sorted);
+    if (!sorted)
+        return ebpo_fail_memory(error, mesh->face_count * 12);
+    for (uint64_t i = 0; i < mesh->face_count * 3; i++)
+        sorted[3 * (uint64_t)face_place[i / 3] + i % 3] = vertex_place[mesh->faces[i]];
+    free(mesh->faces);
+    mesh->faces = sorted;
+    return EBPO_OK;
+}
+
+static ebpo_status to_source_order(ebpo_file *file, ebpo_mesh *mesh, unsigned threads, ebpo_error *error)
+{
+    uint32_t *vertex_source, *face_source, *vertex_place = NULL, *face_place = NULL;
+    ebpo_status status = ebpo_file_read_maps(file, &vertex_source, &face_source, threads, error);
+    if (status == EBPO_OK)
+        status = sort_by_source(vertex_source, mesh->vertex_count, file->info.source_vertex_count, &vertex_place, error);
+    if (status == EBPO_OK)
+        status = sort_by_source(face_source, mesh->face_count, face_limit(&file->info), &face_place, error);
+    free(vertex_source);
+    free(face_source);
+    if (status == EBPO_OK)
+        status = reorder_vertices(mesh, vertex_place, error);
+    if (status == EBPO_OK)
+        status = reorder_faces(mesh, vertex_place, face_place, error);
+    free(vertex_place);
+    free(face_place);
+    return status;
+}
+
+ebpo_status ebpo_file_read_source_mesh(ebpo_file *file, ebpo_mesh *out, bool *source_order, unsigned threads, ebpo_error *error)
+{
+    bool maps = file->info.parts & EBPO_PART_MAPS;
+    ebpo_status status = ebpo_file_read_mesh(file, out, threads, error);
+    if (status == EBPO_OK && maps)
+        status = to_source_order(file, out, threads, error);
+    if (source_order)
+        *source_order = status == EBPO_OK && maps;
+    if (status != EBPO_OK)
+        ebpo_mesh_free(out);
+    return status;
+}

@@ -1,0 +1,54 @@
+/* An open file, and reading its arrays chunk by chunk. */
+#ifndef EBPO_CONTAINER_READER_H
+#define EBPO_CONTAINER_READER_H
+
+#include <ebpo/file.h>
+
+#include "container/check.h"
+#include "container/schema.h"
+#include "h5/h5.h"
+
+typedef struct ebpo_array_in {
+    bool present;
+    ebpo_array_id id;
+    int level;
+    char path[EBPO_PATH_BYTES];
+    ebpo_h5_shape shape;
+    uint64_t stored_bytes;
+    ebpo_h5_id handle;
+} ebpo_array_in;
+
+struct ebpo_file {
+    ebpo_h5_in in;
+    ebpo_info info;
+    ebpo_array_in level_array[EBPO_LEVELS_MAX][EBPO_LEVEL_ARRAYS];
+    ebpo_array_in root_array[EBPO_ARRAYS]; /* those from EBPO_A_VERTICES on */
+};
+
+static inline const ebpo_array_in *ebpo_reader_array(const ebpo_file *file, ebpo_array_id id, int level)
+{
+    return id < EBPO_LEVEL_ARRAYS ? &file->level_array[level][id] : &file->root_array[id];
+}
+
+static inline ebpo_check ebpo_reader_check(const ebpo_file *file)
+{
+    return (ebpo_check){ file->in.shown, EBPO_E_FORMAT };
+}
+
+/* Takes rows [row, row + rows) of chunk number `chunk`, decoded to the bytes that the specification describes. Called from several threads. */
+typedef ebpo_status (*ebpo_rows_fn)(void *context, const ebpo_array_in *array, uint64_t chunk, uint64_t row, uint64_t rows,
+                                    const uint8_t *bytes, ebpo_error *error);
+
+/* Reads all chunks of an array that is present. Chunks come in any order, unless threads is 1. */
+EBPO_MUST_USE ebpo_status ebpo_reader_rows(ebpo_file *file, const ebpo_array_in *array, unsigned threads, ebpo_rows_fn take, void *context,
+                                           ebpo_error *error);
+
+/* Reads integers into `values`, of `size` bytes each. */
+EBPO_MUST_USE ebpo_status ebpo_reader_integers(ebpo_file *file, const ebpo_array_in *array, unsigned threads, void *values, size_t size,
+                                               ebpo_error *error);
+
+/* The same into new memory: NULL when the array is absent. */
+EBPO_MUST_USE ebpo_status ebpo_reader_make(ebpo_file *file, ebpo_array_id id, int level, unsigned threads, size_t size, void *values_out,
+                                           ebpo_error *error);
+
+#endif

@@ -1,0 +1,20 @@
+#!/bin/sh
+# The main job on a real model: installs what is needed, builds, installs, converts the closed bunny of Debian's glmark2-data, inspects, verifies
+# and draws it. Results in samples/out.
+set -eu
+cd "$(dirname "$0")/.."
+sh tools/install-deps.sh --demo
+[ -d build-quick ] || meson setup build-quick -Dtests=disabled
+ninja -C build-quick
+sudo=
+[ "$(id -u)" = 0 ] || sudo=sudo
+$sudo ninja -C build-quick install >/dev/null
+$sudo ldconfig
+mkdir -p samples/out
+out=samples/out/bunny.ebpo.h5
+set -x
+ebpo convert /usr/share/glmark2/models/bunny.obj $out
+ebpo info $out
+ebpo verify $out --against /usr/share/glmark2/models/bunny.obj
+ebpo render $out samples/out/bunny.png --levels 0,2,4,6 --size 1600x420
+h5dump -d /levels/01/plane_counts $out

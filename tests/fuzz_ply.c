@@ -1,0 +1,24 @@
+/* Fuzz target: any bytes as a PLY file. A mesh that comes out must be whole: counts, arrays and indices that agree. */
+#include <stdlib.h>
+
+#include <ebpo/mesh.h>
+
+#include "ply/ply.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    ebpo_mesh mesh;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_status status = ebpo_ply_parse_memory(&mesh, data, size, "fuzz.ply", NULL, &error);
+    if (status != EBPO_OK && (error.status != status || !error.message[0] || mesh.faces || mesh.xyz32 || mesh.xyz64))
+        abort();
+    if (status == EBPO_OK && (!mesh.face_count || !mesh.xyz32 == !mesh.xyz64))
+        abort();
+    for (uint64_t i = 0; i < 3 * mesh.face_count; i++)
+        if (mesh.faces[i] >= mesh.vertex_count)
+            abort();
+    ebpo_mesh_free(&mesh);
+    return 0;
+}

@@ -1,0 +1,24 @@
+#!/bin/sh
+# All tests: installs what they need, builds with gcc, clang and sanitizers (warnings are errors) and runs every suite.
+# Usage: tests/run.sh [gcc] [clang] [sanitize]; all three by default. Needs no model files; with ../shared/models or $EBPO_MODELS the real ones are tested too.
+set -eu
+cd "$(dirname "$0")/.."
+sh tools/install-deps.sh --tests
+jobs=$(nproc)
+run() { # name, compiler, meson options...
+    name=$1 compiler=$2
+    shift 2
+    echo "=== $name ==="
+    [ -d "build-$name" ] || CC=$compiler meson setup "build-$name" -Dwerror=true -Dtests=enabled "$@"
+    ninja -C "build-$name" -j "$jobs"
+    meson test -C "build-$name" -v --no-rebuild
+}
+[ $# -gt 0 ] || set -- gcc clang sanitize
+for suite in "$@"; do
+    case $suite in
+    gcc) run gcc gcc ;;
+    clang) run clang clang ;;
+    sanitize) run sanitize gcc -Db_sanitize=address,undefined -Db_lundef=false --buildtype=debugoptimized ;;
+    *) echo "usage: tests/run.sh [gcc] [clang] [sanitize]" >&2; exit 2 ;;
+    esac
+done

@@ -1,0 +1,227 @@
+/* Files: whole reading, and outputs that appear whole or not at all. */
+#include <check.h>
+#include <dirent.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "io/file.h"
+#include "io/publish.h"
+
+static char folder[] = "/tmp/ebpo-io-XXXXXX";
+static char target[64];
+
+static void enter(void)
+{
+    strcpy(folder, "/tmp/ebpo-io-XXXXXX");
+    ck_assert(mkdtemp(folder) != NULL);
+    snprintf(target, sizeof target, "%s/out.bin", folder);
+}
+
+static int files_in_folder(void)
+{
+    int n = 0;
+    DIR *d = opendir(folder);
+    while (readdir(d))
+        n++;
+    closedir(d);
+    return n - 2;
+}
+
+static void leave(void)
+{
+    unlink(target);
+    ck_assert(rmdir(folder) == 0);
+}
+
+static void write_file(const char *path, const char *content)
+{
+    FILE *f = fopen(path, "wb");
+    ck_assert(f && fputs(content, f) >= 0 && fclose(f) == 0);
+}
+
+static void check_content(const char *path, const char *content)
+{
+    ebpo_file file;
+    ck_assert(ebpo_file_open(&file, path, NULL) == EBPO_OK);
+    ck_assert(file.size == strlen(content) && memcmp(file.data, content, file.size) == 0);
+    ebpo_file_close(&file);
+}
+
+START_TEST(stream_output_appears_on_commit_only)
+{
+    ebpo_publish out;
+    mode_t mask = umask(027);
+    struct stat st;
+    write_file(target, "old");
+    ck_assert(ebpo_publish_begin(&out, target, NULL) == EBPO_OK);
+    fputs("new", ebpo_publish_stream(&out));
+    check_content(target, "old");
+    ck_assert(files_in_folder() == 2);
+    ck_assert(ebpo_publish_commit(&out, NULL) == EBPO_OK);
+    check_content(target, "new");
+    ck_assert(files_in_folder() == 1 && stat(target, &st) == 0 && (st.st_mode & 0777) == 0640);
+    ebpo_publish_abort(&out);
+    check_content(target, "new");
+    umask(mask);
+}
+END_TEST
+
+START_TEST(output_written_by_name_is_published)
+{
+    ebpo_publish out;
+    ck_assert(ebpo_publish_begin(&out, target, NULL) == EBPO_OK);
+    write_file(ebpo_publish_path(&out), "by name");
+    ck_assert(ebpo_publish_commit(&out, NULL) == EBPO_OK);
+    check_content(target, "by name");
+}
+END_TEST
+
+START_TEST(aborted_output_leaves_nothing_behind)
+{
+    ebpo_publish out;
+    write_file(target, "old");
+    ck_assert(ebpo_publish_begin(&out, target, NULL) == EBPO_OK);
+    fputs("new", ebpo_publish_stream(&out));
+    ebpo_publish_abort(&out);
+    ebpo_publish_abort(&out);
+    ck_assert(files_in_folder() == 1);
+    check_content(target, "old");
+}
+END_TEST
+
+START_TEST(commit_fails_when_the_temporary_file_is_gone)
+{
+    ebpo_publish out;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert(ebpo_publish_begin(&out, target, NULL) == EBPO_OK);
+    unlink(ebpo_publish_path(&out));
+    ck_assert(ebpo_publish_commit(&out, &error) == EBPO_E_IO);
+    ck_assert(files_in_folder() == 0 && strstr(error.message, target) != NULL);
+}
+END_TEST
+
+static void refused(const char *path, const char *message)
+{
+    ebpo_publish out;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert(ebpo_publish_begin(&out, path, &error) == EBPO_E_IO);
+    ck_assert_msg(strstr(error.message, message) && strstr(error.message, path), "%s", error.message);
+}
+
+START_TEST(targets_that_cannot_be_replaced_are_refused)
+{
+    char path[128], file[64];
+    refused(folder, "is a folder");
+    refused("/dev/null", "is a pipe or device");
+    snprintf(path, sizeof path, "%s/", folder);
+    refused(path, "names no file");
+    snprintf(path, sizeof path, "%s/absent/out.bin", folder);
+    refused(path, "No such file");
+    snprintf(file, sizeof file, "%s/link", folder);
+    ck_assert(symlink(target, file) == 0);
+    refused(file, "is a symbolic link");
+    unlink(file);
+    if (geteuid() != 0) { /* root may write anywhere */
+        chmod(folder, 0500);
+        refused(target, "Permission denied");
+        chmod(folder, 0700);
+    }
+    ck_assert(files_in_folder() == 0);
+}
+END_TEST
+
+START_TEST(more_outputs_than_slots_are_refused_and_slots_come_back)
+{
+    ebpo_publish out[EBPO_PUBLISH_SLOTS], last;
+    for (int round = 0; round < 2; round++) {
+        for (int i = 0; i < EBPO_PUBLISH_SLOTS; i++)
+            ck_assert(ebpo_publish_begin(&out[i], target, NULL) == EBPO_OK);
+        ck_assert(ebpo_publish_begin(&last, target, NULL) == EBPO_E_LIMIT);
+        for (int i = 0; i < EBPO_PUBLISH_SLOTS; i++)
+            ebpo_publish_abort(&out[i]);
+    }
+    ck_assert(files_in_folder() == 0);
+}
+END_TEST
+
+static void on_signal(int number)
+{
+    (void)number;
+    ebpo_publish_abandon_all();
+    _exit(3);
+}
+
+START_TEST(signal_handler_removes_what_is_unfinished)
+{
+    pid_t child = fork();
+    if (child == 0) {
+        ebpo_publish done, open1, open2;
+        signal(SIGTERM, on_signal);
+        if (ebpo_publish_begin(&done, target, NULL) || ebpo_publish_commit(&done, NULL) ||
+            ebpo_publish_begin(&open1, target, NULL) || ebpo_publish_begin(&open2, target, NULL) || files_in_folder() != 3)
+            _exit(1);
+        raise(SIGTERM);
+    }
+    int status;
+    ck_assert(waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 3);
+    ck_assert(files_in_folder() == 1);
+}
+END_TEST
+
+START_TEST(empty_file_is_read_as_no_bytes)
+{
+    write_file(target, "");
+    check_content(target, "");
+}
+END_TEST
+
+START_TEST(change_while_reading_is_noticed)
+{
+    ebpo_file file;
+    write_file(target, "one");
+    ck_assert(ebpo_file_open(&file, target, NULL) == EBPO_OK);
+    ck_assert(ebpo_file_unchanged(&file, target, NULL) == EBPO_OK);
+    write_file(target, "longer");
+    ck_assert(ebpo_file_unchanged(&file, target, NULL) == EBPO_E_IO);
+    ebpo_file_close(&file);
+}
+END_TEST
+
+START_TEST(pipes_and_folders_are_refused_without_hanging)
+{
+    ebpo_file file;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert(mkfifo(target, 0600) == 0);
+    ck_assert(ebpo_file_open(&file, target, &error) == EBPO_E_IO && strstr(error.message, "pipe") != NULL);
+    ck_assert(ebpo_file_open(&file, folder, &error) == EBPO_E_IO && strstr(error.message, "folder") != NULL);
+    ck_assert(file.fd == -1 && !file.data);
+}
+END_TEST
+
+int main(void)
+{
+    TCase *tests = tcase_create("io");
+    tcase_add_checked_fixture(tests, enter, leave);
+    tcase_add_test(tests, stream_output_appears_on_commit_only);
+    tcase_add_test(tests, output_written_by_name_is_published);
+    tcase_add_test(tests, aborted_output_leaves_nothing_behind);
+    tcase_add_test(tests, commit_fails_when_the_temporary_file_is_gone);
+    tcase_add_test(tests, targets_that_cannot_be_replaced_are_refused);
+    tcase_add_test(tests, more_outputs_than_slots_are_refused_and_slots_come_back);
+    tcase_add_test(tests, signal_handler_removes_what_is_unfinished);
+    tcase_add_test(tests, empty_file_is_read_as_no_bytes);
+    tcase_add_test(tests, change_while_reading_is_noticed);
+    tcase_add_test(tests, pipes_and_folders_are_refused_without_hanging);
+    Suite *suite = suite_create("io");
+    suite_add_tcase(suite, tests);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_ENV);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+}

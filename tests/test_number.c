@@ -1,0 +1,139 @@
+/* Decimal text to float and double against the C library, which rounds correctly. */
+#include <check.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "ply/number.h"
+
+static uint64_t next(uint64_t *state)
+{
+    *state ^= *state << 13;
+    *state ^= *state >> 7;
+    *state ^= *state << 17;
+    return *state;
+}
+
+static void compare(const char *s, locale_t c)
+{
+    float f = 1, expected_f = strtof(s, NULL);
+    double d = 1, expected_d = strtod(s, NULL);
+    ck_assert_msg(ebpo_number_float(&f, s, strlen(s), c) && ebpo_number_double(&d, s, strlen(s), c), "%s refused", s);
+    ck_assert_msg(memcmp(&f, &expected_f, sizeof f) == 0, "%s as float: %a instead of %a", s, (double)f, (double)expected_f);
+    ck_assert_msg(memcmp(&d, &expected_d, sizeof d) == 0, "%s as double: %a instead of %a", s, d, expected_d);
+}
+
+/* Of every length of digits, exponent and place of the point. */
+static void random_decimal(char *out, uint64_t *state)
+{
+    int digits = 1 + (int)(next(state) % 24), point = (int)(next(state) % (uint64_t)(digits + 1));
+    if (next(state) % 2)
+        *out++ = '-';
+    for (int i = 0; i < digits; i++) {
+        if (i == point)
+            *out++ = '.';
+        *out++ = (char)('0' + next(state) % 10);
+    }
+    *out = 0;
+    if (next(state) % 3 == 0)
+        sprintf(out, "e%d", (int)(next(state) % 90) - 50);
+}
+
+START_TEST(random_decimals_are_rounded_as_by_the_c_library)
+{
+    locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+    uint64_t state = 88172645463325252u + (uint64_t)_i;
+    char s[80];
+    for (int i = 0; i < 60000; i++) {
+        random_decimal(s, &state);
+        compare(s, c);
+    }
+    freelocale(c);
+}
+END_TEST
+
+/* Midpoints of neighbouring floats, a hair above and below: where rounding twice goes wrong. */
+START_TEST(midpoints_between_floats_are_rounded_once)
+{
+    locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+    uint64_t state = 12345;
+    char s[200];
+    for (int i = 0; i < 10000; i++) {
+        uint32_t bits = (uint32_t)(0x30000000 + next(&state) % 0x20000000);
+        float a;
+        memcpy(&a, &bits, sizeof a);
+        double middle = ((double)a + (double)nextafterf(a, INFINITY)) / 2;
+        for (int digits = 9; digits <= 40; digits += i % 7 + 1) {
+            snprintf(s, sizeof s, "%.*e", digits, middle);
+            compare(s, c);
+            snprintf(s, sizeof s, "%.*f", digits % 25, middle);
+            compare(s, c);
+        }
+        snprintf(s, sizeof s, "%.60f", middle);
+        compare(s, c);
+        strcat(s, "000000000000000000001");
+        compare(s, c);
+    }
+    freelocale(c);
+}
+END_TEST
+
+START_TEST(edges_of_the_range_are_read)
+{
+    static const char *const cases[] = { "0", "-0", "0.0", "-0.000", "1e400", "-1e400", "1e-400", "1.17549435e-38", "1e-45", "7.0e-46", "3.4028235e38",
+        "3.4028236e38", "2.2250738585072011e-308", "4.9e-324", "2.4e-324", "1.7976931348623159e308", "9007199254740993", "18446744073709551615",
+        "0.000000000000000000000000000000000000000000000001", "1.", ".5", "+1", "1E+2", "00000000000000000000000000000001.5", "0e99999999999",
+        "1e-99999999999", "9999999999999999999", "99999999999999999999" };
+    locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+        compare(cases[i], c);
+    freelocale(c);
+}
+END_TEST
+
+START_TEST(what_is_no_number_is_refused)
+{
+    static const char *const cases[] = { "", "-", "+", ".", "e5", "1e", "1e+", "1.2.3", "1,5", "0x10", "1f", "--1", "nanx", "in", "1 ", " 1", "1e5.0" };
+    locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+    float f;
+    double d;
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+        ck_assert_msg(!ebpo_number_float(&f, cases[i], strlen(cases[i]), c) && !ebpo_number_double(&d, cases[i], strlen(cases[i]), c), "%s", cases[i]);
+    char *many = malloc(EBPO_NUMBER_LONGEST + 1);
+    memset(many, '7', EBPO_NUMBER_LONGEST + 1);
+    ck_assert(ebpo_number_double(&d, many, EBPO_NUMBER_LONGEST, c) && isinf(d));
+    ck_assert(!ebpo_number_double(&d, many, EBPO_NUMBER_LONGEST + 1, c));
+    free(many);
+    freelocale(c);
+}
+END_TEST
+
+START_TEST(integers_are_read_whole_or_not_at_all)
+{
+    int64_t value;
+    ck_assert(ebpo_number_integer(&value, "-12", 3) && value == -12);
+    ck_assert(ebpo_number_integer(&value, "+7", 2) && value == 7);
+    ck_assert(ebpo_number_integer(&value, "999999999999999999", 18) && value == 999999999999999999);
+    ck_assert(!ebpo_number_integer(&value, "9999999999999999999", 19));
+    ck_assert(!ebpo_number_integer(&value, "1.", 2) && !ebpo_number_integer(&value, "", 0) && !ebpo_number_integer(&value, "-", 1));
+}
+END_TEST
+
+int main(void)
+{
+    TCase *tests = tcase_create("number");
+    tcase_set_timeout(tests, 120);
+    tcase_add_loop_test(tests, random_decimals_are_rounded_as_by_the_c_library, 0, 3);
+    tcase_add_test(tests, midpoints_between_floats_are_rounded_once);
+    tcase_add_test(tests, edges_of_the_range_are_read);
+    tcase_add_test(tests, what_is_no_number_is_refused);
+    tcase_add_test(tests, integers_are_read_whole_or_not_at_all);
+    Suite *suite = suite_create("number");
+    suite_add_tcase(suite, tests);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_ENV);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+}

@@ -1,0 +1,81 @@
+/* ebpo check: what a mesh is, before anything is built from it. */
+#include <stddef.h>
+#include <stdio.h>
+
+#include "command.h"
+#include "prepare.h"
+#include "progress.h"
+#include "report.h"
+
+typedef struct values {
+    mending mend;
+    bool require_solid, json, quiet;
+    int64_t threads;
+} values;
+
+static const arg_option options[] = {
+    { "weld", 0, ARG_FLAG, offsetof(values, mend.weld), NULL, "first merge vertices at one position (STL: always)", 0, 0, NULL },
+    { "orient", 0, ARG_FLAG, offsetof(values, mend.orient), NULL, "then make neighbouring faces agree in orientation", 0, 0, NULL },
+    { "fill-holes", 0, ARG_FLAG, offsetof(values, mend.fill_holes), NULL, "then close simple boundary loops", 0, 0, NULL },
+    { "require-solid", 0, ARG_FLAG, offsetof(values, require_solid), NULL, "end with code 3 if the mesh is not a solid", 0, 0, NULL },
+    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
+    { "json", 0, ARG_FLAG, offsetof(values, json), NULL, "print the report as JSON", 0, 0, NULL },
+    { "quiet", 'q', ARG_FLAG, offsetof(values, quiet), NULL, "no report, no progress: errors and warnings only", 0, 0, NULL },
+    { 0 },
+};
+
+static const arg_spec spec = {
+    "check", "IN.ply", 1, 1, "what a mesh is: solid or surface, and each finding with its places",
+    "With mending options: what it would be after mending. Nothing is written.", options
+};
+
+static void print_json(const prepared *p, const char *path)
+{
+    json j;
+    json_begin(&j, stdout);
+    json_object(&j, NULL);
+    json_text(&j, "file", path);
+    report_json_source(&j, "source", &p->as_read);
+    report_json(&j, "report", &p->before);
+    if (p->mended) {
+        report_json_mending(&j, "mend", &p->record);
+        report_json(&j, "report_after_mending", &p->report);
+    }
+    json_finish(&j);
+}
+
+static void print_words(const prepared *p, const char *path)
+{
+    report_print(stdout, path, &p->as_read, &p->before);
+    if (!p->mended)
+        return;
+    report_print_mending(stdout, &p->record);
+    report_print(stdout, "after mending", &p->mesh, &p->report);
+}
+
+static int run(int argc, char **argv)
+{
+    values v = { 0 };
+    const char *operand[ARGS_OPERANDS_MAX];
+    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
+    if (parsed != ARGS_RUN)
+        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    progress_line line;
+    ebpo_progress progress = progress_start(&line, "check", v.quiet);
+    ebpo_error error = EBPO_ERROR_INIT;
+    prepared p;
+    ebpo_status status = prepare_mesh(&p, operand[0], v.mend, (unsigned)v.threads, progress, &error);
+    progress_wipe(&line);
+    if (status != EBPO_OK)
+        return command_failed("check", &error);
+    if (v.json)
+        print_json(&p, operand[0]);
+    else if (!v.quiet)
+        print_words(&p, operand[0]);
+    fflush(stdout);
+    report_warn(stderr, "check", operand[0], &p.report, &p.record);
+    ebpo_mesh_free(&p.mesh);
+    return v.require_solid && !p.report.balanced ? EXIT_NOT_SOLID : EXIT_FINE;
+}
+
+const command command_check = { &spec, run };

@@ -1,0 +1,206 @@
+/* ebpo convert: from a mesh to an .ebpo.h5 file. */
+#include <stddef.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "command.h"
+#include "facts.h"
+#include "prepare.h"
+#include "progress.h"
+#include "report.h"
+#include "words.h"
+
+typedef struct values {
+    int64_t max_level, leaf_faces, zstd_level, threads;
+    double epsilon;
+    uint32_t with, without;
+    int codec, rule;
+    mending mend;
+    bool require_solid, json, quiet;
+    const char *unit, *crs, *date;
+} values;
+
+static const char *const with_words[] = { "leaf-planes", NULL };
+static const char *const without_words[] = { "planes", "mesh", "maps", NULL }; /* word i is ebpo_part bit i */
+
+static const arg_option options[] = {
+    { "max-level", 0, ARG_INT, offsetof(values, max_level), "N",
+      "deepest level, 0 to 20; default: until cells are as short as\nthe mean edge", 0, 20, NULL },
+    { "leaf-faces", 0, ARG_INT, offsetof(values, leaf_faces), "N",
+      "a node with at most N faces becomes a leaf; 0: only the\ndeepest level stops; default 16", 0, 4294967295.0, NULL },
+    { "epsilon", 0, ARG_REAL, offsetof(values, epsilon), "E",
+      "a plane is kept while it removes at least this share of\nits cell; default 0.003", 0, 1, NULL },
+    { "with", 0, ARG_SET, offsetof(values, with), "LIST", "also store: leaf-planes", 0, 0, with_words },
+    { "without", 0, ARG_SET, offsetof(values, without), "LIST",
+      "leave out: maps, mesh (and with it maps), planes;\ncommas between, may be repeated", 0, 0, without_words },
+    { "codec", 0, ARG_WORD, offsetof(values, codec), "NAME", "zstd (the default), deflate or none", 0, 0, codec_words },
+    { "zstd-level", 0, ARG_INT, offsetof(values, zstd_level), "N", "effort of zstd, 1 to 22; default 3", 1, 22, NULL },
+    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
+    { "weld", 0, ARG_FLAG, offsetof(values, mend.weld), NULL, "first merge vertices at one position (STL: always)", 0, 0, NULL },
+    { "orient", 0, ARG_FLAG, offsetof(values, mend.orient), NULL, "then make neighbouring faces agree in orientation", 0, 0, NULL },
+    { "fill-holes", 0, ARG_FLAG, offsetof(values, mend.fill_holes), NULL, "then close simple boundary loops", 0, 0, NULL },
+    { "rule", 0, ARG_WORD, offsetof(values, rule), "NAME",
+      "inside is where the winding number is nonzero (the default),\nodd (evenodd) or positive", 0, 0, rule_words },
+    { "require-solid", 0, ARG_FLAG, offsetof(values, require_solid), NULL, "end with code 3 if the mesh is not a solid", 0, 0, NULL },
+    { "unit", 0, ARG_TEXT, offsetof(values, unit), "U", "unit of length to record, such as mm", 0, 0, NULL },
+    { "crs", 0, ARG_TEXT, offsetof(values, crs), "C", "coordinate reference system to record, such as EPSG:25832", 0, 0, NULL },
+    { "date", 0, ARG_TEXT, offsetof(values, date), "D", "date to record, such as 2026-03-01; none by default, so that\nequal input gives an equal file", 0, 0, NULL },
+    { "json", 0, ARG_FLAG, offsetof(values, json), NULL, "print reports and facts as JSON", 0, 0, NULL },
+    { "quiet", 'q', ARG_FLAG, offsetof(values, quiet), NULL, "no report, no progress: errors and warnings only", 0, 0, NULL },
+    { 0 },
+};
+
+static const arg_spec spec = {
+    "convert", "IN.ply OUT.ebpo.h5", 2, 2, "a closed triangle mesh to an .ebpo.h5 file",
+    "IN is PLY, or OBJ, STL or OFF where the library was built with assimp. OUT appears whole or not at all;\n"
+    "an older OUT is replaced. Mending is done in the order weld, orient, fill holes.", options
+};
+
+static int usage_error(const char *message)
+{
+    fprintf(stderr, "ebpo convert: %s; try 'ebpo convert --help'\n", message);
+    return EXIT_USAGE;
+}
+
+static int check_values(const values *v, const char *in, const char *out)
+{
+    if (v->zstd_level && v->codec != EBPO_CODEC_ZSTD)
+        return usage_error("--zstd-level says nothing about --codec deflate or none");
+    if (strcmp(in, out) == 0 || command_same_file(in, out)) {
+        fprintf(stderr, "ebpo convert: %s: is input and output at once; give the output another name\n", out);
+        return EXIT_USAGE;
+    }
+    return EXIT_FINE;
+}
+
+static uint32_t parts_of(const values *v)
+{
+    uint32_t without = v->without;
+    if (without & EBPO_PART_MESH)
+        without |= EBPO_PART_MAPS;
+    uint32_t parts = (EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS) & ~without;
+    return v->with ? parts | EBPO_PART_LEAF_PLANES : parts;
+}
+
+/* --- output --- */
+
+static void print_reports(const values *v, const prepared *p, const char *in)
+{
+    if (!v->json && !v->quiet) {
+        report_print(stdout, in, &p->as_read, &p->before);
+        report_print_mending(stdout, &p->record);
+        if (p->mended)
+            report_print(stdout, "after mending", &p->mesh, &p->report);
+    }
+    fflush(stdout);
+    report_warn(stderr, "convert", in, &p->report, &p->record);
+}
+
+static void print_summary(const ebpo_info *info, const char *out, double seconds)
+{
+    char bytes[32];
+    int last = info->level_count - 1;
+    printf("%s: %s, levels 0 to %d, %s, %.2f B/face", out, info->solid ? "a solid" : "a surface", last,
+           words_bytes(bytes, sizeof bytes, info->file_bytes),
+           info->face_count ? (double)info->file_bytes / (double)info->face_count : 0);
+    if (info->source_size)
+        printf(", %.0f %% of the source", 100 * (double)info->file_bytes / (double)info->source_size);
+    printf(", in %.1f s\n", seconds);
+}
+
+static void print_json(const prepared *p, const ebpo_info *info, const char *out, double seconds)
+{
+    json j;
+    json_begin(&j, stdout);
+    json_object(&j, NULL);
+    facts_json(&j, out, info);
+    json_object(&j, "input");
+    report_json_source(&j, "mesh", &p->as_read);
+    report_json(&j, "report", &p->before);
+    json_end(&j);
+    json_real(&j, "seconds", seconds);
+    json_finish(&j);
+}
+
+/* What is on the disk, as a reader sees it. */
+static ebpo_status print_result(const values *v, const prepared *p, const char *out, double seconds, ebpo_error *error)
+{
+    if (v->quiet && !v->json)
+        return EBPO_OK;
+    ebpo_file *file = NULL;
+    ebpo_status status = ebpo_file_open(&file, out, error);
+    if (status != EBPO_OK)
+        return status;
+    if (v->json)
+        print_json(p, ebpo_file_info(file), out, seconds);
+    else
+        print_summary(ebpo_file_info(file), out, seconds);
+    ebpo_file_close(file);
+    return EBPO_OK;
+}
+
+/* --- work --- */
+
+static ebpo_status build_and_write(const values *v, prepared *p, const char *out, ebpo_progress progress, ebpo_error *error)
+{
+    ebpo_build_options build = EBPO_BUILD_OPTIONS_INIT;
+    build.max_level = (int)v->max_level;
+    build.leaf_faces = (uint32_t)v->leaf_faces;
+    build.epsilon = v->epsilon;
+    build.parts = parts_of(v);
+    build.rule = (ebpo_rule)v->rule;
+    build.require_solid = v->require_solid;
+    build.threads = (unsigned)v->threads;
+    build.unit = v->unit;
+    build.crs = v->crs;
+    build.date = v->date;
+    build.progress = progress;
+    ebpo_tree tree;
+    ebpo_status status = ebpo_build(&tree, &p->mesh, &p->report, &p->record, &build, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
+    write.codec = (ebpo_codec)v->codec;
+    write.codec_level = (int)v->zstd_level;
+    write.threads = (unsigned)v->threads;
+    write.progress = progress;
+    status = ebpo_tree_write(&tree, out, &write, error);
+    ebpo_tree_free(&tree);
+    return status;
+}
+
+static int run(int argc, char **argv)
+{
+    const ebpo_build_options defaults = EBPO_BUILD_OPTIONS_INIT;
+    values v = { .max_level = -1, .leaf_faces = defaults.leaf_faces, .epsilon = defaults.epsilon };
+    const char *operand[ARGS_OPERANDS_MAX];
+    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
+    if (parsed != ARGS_RUN)
+        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    const char *in = operand[0], *out = operand[1];
+    int code = check_values(&v, in, out);
+    if (code != EXIT_FINE)
+        return code;
+    progress_line line;
+    ebpo_progress progress = progress_start(&line, "convert", v.quiet);
+    double begun = progress_now();
+    ebpo_error error = EBPO_ERROR_INIT;
+    prepared p;
+    ebpo_status status = prepare_mesh(&p, in, v.mend, (unsigned)v.threads, progress, &error);
+    progress_wipe(&line);
+    if (status == EBPO_OK) {
+        print_reports(&v, &p, in);
+        if (v.require_solid && !p.report.balanced) {
+            ebpo_mesh_free(&p.mesh);
+            fprintf(stderr, "ebpo convert: %s: is not a solid, and --require-solid was given; nothing was written\n", in);
+            return EXIT_NOT_SOLID;
+        }
+        status = build_and_write(&v, &p, out, progress, &error);
+        progress_wipe(&line);
+    }
+    if (status == EBPO_OK)
+        status = print_result(&v, &p, out, progress_now() - begun, &error);
+    return status == EBPO_OK ? EXIT_FINE : command_failed("convert", &error);
+}
+
+const command command_convert = { &spec, run };

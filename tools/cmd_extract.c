@@ -1,0 +1,103 @@
+/* ebpo extract: a level's envelopes, or the model itself, as PLY. */
+#include <stddef.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "command.h"
+#include "progress.h"
+#include "words.h"
+
+typedef struct values {
+    int64_t level, threads;
+    bool mesh, no_walls, quiet;
+} values;
+
+static const arg_option options[] = {
+    { "level", 0, ARG_INT, offsetof(values, level), "N", "the envelopes of level N, and leaves and black nodes above it", 0, 20, NULL },
+    { "mesh", 0, ARG_FLAG, offsetof(values, mesh), NULL, "the model itself, bit for bit; in the source's order where\nthe maps are stored", 0, 0, NULL },
+    { "no-walls", 0, ARG_FLAG, offsetof(values, no_walls), NULL, "with --level: leave out polygons that lie on cell walls", 0, 0, NULL },
+    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
+    { "quiet", 'q', ARG_FLAG, offsetof(values, quiet), NULL, "no summary, no progress: errors and warnings only", 0, 0, NULL },
+    { 0 },
+};
+
+static const arg_spec spec = {
+    "extract", "FILE OUT.ply", 2, 2, "a level's envelopes, or the model itself, as PLY", "Either --level or --mesh is needed.", options
+};
+
+static int check_values(const values *v, const char *in, const char *out)
+{
+    const char *message = NULL;
+    if ((v->level >= 0) == v->mesh)
+        message = v->mesh ? "--level and --mesh exclude each other" : "what shall be extracted? give --level N or --mesh";
+    else if (v->mesh && v->no_walls)
+        message = "--no-walls belongs to --level; the model has no cell walls";
+    if (message) {
+        fprintf(stderr, "ebpo extract: %s; try 'ebpo extract --help'\n", message);
+        return EXIT_USAGE;
+    }
+    if (strcmp(in, out) == 0 || command_same_file(in, out)) {
+        fprintf(stderr, "ebpo extract: %s: is input and output at once; give the output another name\n", out);
+        return EXIT_USAGE;
+    }
+    return EXIT_FINE;
+}
+
+static ebpo_status take(ebpo_file *file, const values *v, const char *path, ebpo_progress progress, ebpo_mesh *out,
+                        double *volume, ebpo_error *error)
+{
+    if (!v->mesh) {
+        ebpo_lod_options lod = EBPO_LOD_OPTIONS_INIT;
+        lod.walls = !v->no_walls;
+        lod.threads = (unsigned)v->threads;
+        lod.progress = progress;
+        return ebpo_lod_level(file, (int)v->level, &lod, out, volume, error);
+    }
+    bool source_order = false;
+    ebpo_status status = ebpo_file_read_source_mesh(file, out, &source_order, (unsigned)v->threads, error);
+    if (status == EBPO_OK && !source_order)
+        fprintf(stderr, "ebpo extract: %s: note: holds no maps, so vertices and faces come in the file's order\n", path);
+    return status;
+}
+
+static void summarise(const values *v, const char *out, const ebpo_mesh *mesh, double volume)
+{
+    char vertices[40], faces[40];
+    words_plural(vertices, sizeof vertices, mesh->vertex_count, "vertex", "vertices");
+    words_plural(faces, sizeof faces, mesh->face_count, "face", "faces");
+    printf("%s: %s, %s", out, vertices, faces);
+    if (!v->mesh)
+        printf(", envelope volume %.9g", volume);
+    putchar('\n');
+}
+
+static int run(int argc, char **argv)
+{
+    values v = { .level = -1 };
+    const char *operand[ARGS_OPERANDS_MAX];
+    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
+    if (parsed != ARGS_RUN)
+        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    int code = check_values(&v, operand[0], operand[1]);
+    if (code != EXIT_FINE)
+        return code;
+    progress_line line;
+    ebpo_progress progress = progress_start(&line, "extract", v.quiet);
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file = NULL;
+    ebpo_mesh mesh = { 0 };
+    double volume = 0;
+    ebpo_status status = ebpo_file_open(&file, operand[0], &error);
+    if (status == EBPO_OK)
+        status = take(file, &v, operand[0], progress, &mesh, &volume, &error);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_write_ply(&mesh, operand[1], &error);
+    progress_wipe(&line);
+    if (status == EBPO_OK && !v.quiet)
+        summarise(&v, operand[1], &mesh, volume);
+    ebpo_mesh_free(&mesh);
+    ebpo_file_close(file);
+    return status == EBPO_OK ? EXIT_FINE : command_failed("extract", &error);
+}
+
+const command command_extract = { &spec, run };

@@ -1,0 +1,56 @@
+/* ebpo info: what a file is and holds. Reads the head only. */
+#include <stddef.h>
+#include <stdio.h>
+
+#include "command.h"
+#include "facts.h"
+
+typedef struct values {
+    bool json;
+} values;
+
+static const arg_option options[] = {
+    { "json", 0, ARG_FLAG, offsetof(values, json), NULL, "print the facts as JSON", 0, 0, NULL },
+    { 0 },
+};
+
+static const arg_spec spec = {
+    "info", "FILE", 1, 1, "what a file is, what it holds, bytes by part, and a table by level",
+    "Only the head of the file is read. FILE is an .ebpo.h5 file; for meshes there is 'ebpo check'.", options
+};
+
+static int run(int argc, char **argv)
+{
+    values v = { 0 };
+    const char *operand[ARGS_OPERANDS_MAX];
+    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
+    if (parsed != ARGS_RUN)
+        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    int is_hdf5 = command_is_hdf5("info", operand[0]);
+    if (is_hdf5 < 0)
+        return EXIT_FAILED;
+    if (!is_hdf5) {
+        fprintf(stderr, "ebpo info: %s: is not an .ebpo.h5 file; for a mesh try 'ebpo check'\n", operand[0]);
+        return EXIT_FAILED;
+    }
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file = NULL;
+    if (ebpo_file_open(&file, operand[0], &error) != EBPO_OK)
+        return command_failed("info", &error);
+    const ebpo_info *info = ebpo_file_info(file);
+    if (v.json) {
+        json j;
+        json_begin(&j, stdout);
+        json_object(&j, NULL);
+        facts_json(&j, operand[0], info);
+        json_finish(&j);
+    } else {
+        facts_print(stdout, operand[0], info);
+        putchar('\n');
+        facts_table(stdout, info);
+    }
+    ebpo_file_close(file);
+    return EXIT_FINE;
+}
+
+const command command_info = { &spec, run };

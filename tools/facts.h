@@ -1,0 +1,21 @@
+/* The facts of a file's head: tables and JSON. */
+#ifndef EBPO_TOOLS_FACTS_H
+#define EBPO_TOOLS_FACTS_H
+
+#include <ebpo/file.h>
+#include <stdio.h>
+
+#include "json.h"
+
+/* Volume of the envelopes that stand for the model at `level`: its gray nodes, and the leaves and black nodes of levels 0 .. level. */
+double facts_volume(const ebpo_info *info, int level);
+/* The same in percent of the solid; of the root box for a surface. */
+double facts_percent(const ebpo_info *info, int level);
+/* Bytes of the head and of levels 0 .. level. */
+uint64_t facts_cumulative(const ebpo_info *info, int level);
+
+void facts_print(FILE *out, const char *path, const ebpo_info *info);
+void facts_table(FILE *out, const ebpo_info *info);
+void facts_json(json *j, const char *path, const ebpo_info *info);
+
+#endif

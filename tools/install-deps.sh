@@ -1,0 +1,20 @@
+#!/bin/sh
+# Installs the Debian packages that building needs; with --tests also what the tests need, with --demo what the quick start needs.
+set -eu
+packages="gcc pkg-config meson ninja-build libhdf5-dev libzstd-dev zlib1g-dev libgmp-dev nettle-dev libassimp-dev libpng-dev"
+for option in "$@"; do
+    case $option in
+    --tests) packages="$packages check hdf5-tools python3 python3-h5py python3-numpy clang libclang-rt-14-dev g++ mandoc" ;;
+    --demo) packages="$packages hdf5-tools glmark2-data" ;;
+    *) echo "usage: install-deps.sh [--tests] [--demo]" >&2; exit 2 ;;
+    esac
+done
+missing=
+for package in $packages; do
+    dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q 'ok installed' || missing="$missing $package"
+done
+[ -z "$missing" ] && exit 0
+sudo=
+[ "$(id -u)" = 0 ] || sudo=sudo
+# shellcheck disable=SC2086
+$sudo env DEBIAN_FRONTEND=noninteractive sh -c 'apt-get update -qq && apt-get install -y -qq --no-install-recommends "$@"' sh $missing
