@@ -131,9 +131,24 @@ static const struct { const char *name, *content, *message; } bad[] = {
     { "t.off", "OFF\n", "no counts" },
     { "t.off", "OFF\n#x", "no counts" },
     { "t.off", "OFF\n4000000000 1 0\n0 0 0\n", "4000000000 vertices and 1 faces do not fit into a file of 25 bytes" },
+    { "t.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n", "line 6: face 0 names vertex 3, but there are 3 vertices" },
+    { "t.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1\n", "line 6: face 0 names fewer than its 3" },
+    { "t.off", "OFF\n3 1 0\n0 0 0\n1 0\n0 1 0\n3 0 1 2\n", "line 4: vertex 1 has no three coordinates" },
+    { "t.off", "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "the file ends before face 1" },
+    { "t.off", "OFF\n3 1 0 2.5\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "line 2: no counts" },
     { "t.stl", "not an stl file at all", "t.stl: " },
     { "t.stl", "solid x\nendsolid x\n", "t.stl: " },
 };
+
+START_TEST(off_faces_that_assimp_would_leave_out_are_refused)
+{
+    static const char off[] = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n10 0 1 2 0 1 2 0 1 2 0\n";
+    ebpo_mesh mesh;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert(import(&mesh, "t.off", off, sizeof off - 1, &error) == EBPO_E_UNSUPPORTED);
+    ck_assert(strstr(error.message, "line 6: face 0 has 10 corners") != NULL);
+}
+END_TEST
 
 START_TEST(damaged_files_are_refused_by_name)
 {
@@ -186,6 +201,7 @@ int main(void)
     tcase_add_test(tests, off_keeps_faces_in_order);
     tcase_add_test(tests, stl_of_both_kinds_is_welded);
     tcase_add_test(tests, polygons_of_obj_are_cut_by_ears);
+    tcase_add_test(tests, off_faces_that_assimp_would_leave_out_are_refused);
     tcase_add_loop_test(tests, damaged_files_are_refused_by_name, 0, (int)(sizeof bad / sizeof *bad));
     tcase_add_test(tests, bunny_of_glmark2_is_closed_when_it_is_there);
 #else

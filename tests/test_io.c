@@ -46,10 +46,10 @@ static void write_file(const char *path, const char *content)
 
 static void check_content(const char *path, const char *content)
 {
-    ebpo_file file;
-    ck_assert(ebpo_file_open(&file, path, NULL) == EBPO_OK);
+    ebpo_whole_file file;
+    ck_assert(ebpo_whole_file_open(&file, path, NULL) == EBPO_OK);
     ck_assert(file.size == strlen(content) && memcmp(file.data, content, file.size) == 0);
-    ebpo_file_close(&file);
+    ebpo_whole_file_close(&file);
 }
 
 START_TEST(stream_output_appears_on_commit_only)
@@ -182,23 +182,23 @@ END_TEST
 
 START_TEST(change_while_reading_is_noticed)
 {
-    ebpo_file file;
+    ebpo_whole_file file;
     write_file(target, "one");
-    ck_assert(ebpo_file_open(&file, target, NULL) == EBPO_OK);
-    ck_assert(ebpo_file_unchanged(&file, target, NULL) == EBPO_OK);
+    ck_assert(ebpo_whole_file_open(&file, target, NULL) == EBPO_OK);
+    ck_assert(ebpo_whole_file_unchanged(&file, target, NULL) == EBPO_OK);
     write_file(target, "longer");
-    ck_assert(ebpo_file_unchanged(&file, target, NULL) == EBPO_E_IO);
-    ebpo_file_close(&file);
+    ck_assert(ebpo_whole_file_unchanged(&file, target, NULL) == EBPO_E_IO);
+    ebpo_whole_file_close(&file);
 }
 END_TEST
 
 START_TEST(pipes_and_folders_are_refused_without_hanging)
 {
-    ebpo_file file;
+    ebpo_whole_file file;
     ebpo_error error = EBPO_ERROR_INIT;
     ck_assert(mkfifo(target, 0600) == 0);
-    ck_assert(ebpo_file_open(&file, target, &error) == EBPO_E_IO && strstr(error.message, "pipe") != NULL);
-    ck_assert(ebpo_file_open(&file, folder, &error) == EBPO_E_IO && strstr(error.message, "folder") != NULL);
+    ck_assert(ebpo_whole_file_open(&file, target, &error) == EBPO_E_IO && strstr(error.message, "pipe") != NULL);
+    ck_assert(ebpo_whole_file_open(&file, folder, &error) == EBPO_E_IO && strstr(error.message, "folder") != NULL);
     ck_assert(file.fd == -1 && !file.data);
 }
 END_TEST

@@ -318,6 +318,17 @@ START_TEST(orient_turns_flipped_faces_back)
 }
 END_TEST
 
+START_TEST(orient_gives_a_closed_component_positive_volume_against_the_majority)
+{
+    ebpo_mesh mesh = ebpo_test_make("inside_out_cube");
+    ebpo_test_turn_face(&mesh, 4);
+    ebpo_mend_record record = mend(&mesh, ebpo_mesh_orient);
+    ck_assert_uint_eq(record.flipped_faces, 11);
+    ck_assert_double_eq_tol(check(&mesh).volume, 1, 1e-15);
+    ebpo_mesh_free(&mesh);
+}
+END_TEST
+
 START_TEST(orient_leaves_consistent_components_alone)
 {
     ebpo_mesh mesh = ebpo_test_make("cavity");
@@ -577,6 +588,7 @@ static Suite *mesh_suite(void)
     tcase_add_test(mending, weld_undoes_split_vertices);
     tcase_add_test(mending, weld_keeps_the_first_and_takes_minus_zero_for_zero);
     tcase_add_test(mending, orient_turns_flipped_faces_back);
+    tcase_add_test(mending, orient_gives_a_closed_component_positive_volume_against_the_majority);
     tcase_add_test(mending, orient_leaves_consistent_components_alone);
     tcase_add_test(mending, orient_lets_the_majority_of_an_open_surface_win);
     tcase_add_test(mending, orient_leaves_a_mobius_strip_untouched);

@@ -143,6 +143,34 @@ static bool emit_empty(emitter *e, ebpo_cell cell, int32_t winding)
 
 static bool emit(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope);
 
+static unsigned filled_children(const ebpo_subtree *s, uint32_t child)
+{
+    unsigned mask = 0;
+    for (uint32_t o = 0; o < 8; o++)
+        mask |= (unsigned)(s->nodes[child + o].type != EBPO_WHITE) << o;
+    return mask;
+}
+
+/* In octant order; neighbours share the halves that their envelopes are cut from. A half that rounding leaves nothing of stays the whole
+ * cube, and so do its parts: too large, never too small. */
+static bool emit_children(emitter *e, uint32_t child, ebpo_cell cell, int32_t winding, const int32_t offset[8],
+                          const ebpo_polytope *envelope)
+{
+    unsigned filled = filled_children(e->s, child);
+    ebpo_polytope z, y, x;
+    for (unsigned o = 0; o < 8; o++) {
+        if (o % 4 == 0 && filled >> o & 15)
+            ebpo_polytope_half(envelope, 2, o >> 2 & 1, &z);
+        if (o % 2 == 0 && filled >> o & 3)
+            ebpo_polytope_half(&z, 1, o >> 1 & 1, &y);
+        if (filled >> o & 1)
+            ebpo_polytope_half(&y, 0, o & 1, &x);
+        if (!emit(e, child + o, ebpo_child_cell(cell, o), winding + offset[o], &x))
+            return false;
+    }
+    return true;
+}
+
 static bool emit_gray(emitter *e, const ebpo_build_node *node, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope)
 {
     const ebpo_builder *b = e->b;
@@ -167,14 +195,7 @@ static bool emit_gray(emitter *e, const ebpo_build_node *node, ebpo_cell cell, i
     }
     if (!ebpo_emit_group(&e->s->out[cell.level + 1], types))
         return false;
-    ebpo_polytope child;
-    for (uint32_t o = 0; o < 8; o++) {
-        if (e->s->nodes[node->child + o].type != EBPO_WHITE)
-            ebpo_polytope_child(envelope, o, &child);
-        if (!emit(e, node->child + o, ebpo_child_cell(cell, o), winding + offset[o], &child))
-            return false;
-    }
-    return true;
+    return emit_children(e, node->child, cell, winding, offset, envelope);
 }
 
 static bool emit(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope)

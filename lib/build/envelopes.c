@@ -10,9 +10,12 @@
 
 enum { FEW_VERTICES = 192, TOP_LEVELS = 4, CANDIDATES_BELOW = 48 };
 
+typedef double pair __attribute__((vector_size(16)));
+typedef int64_t pair_mask __attribute__((vector_size(16)));
+
 struct ebpo_envelope_scratch {
-    double (*point)[4]; /* cell coordinates, and what rounding may add to a support */
-    uint64_t count, capacity;
+    pair (*point)[4]; /* two points: cell coordinates, and what rounding may add to a support */
+    uint64_t count, capacity; /* points; twos */
     ebpo_candidate candidates[EBPO_PLANES_CANDIDATES];
     double normal[EBPO_PLANES_CANDIDATES][3];
 };
@@ -50,10 +53,13 @@ unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32
 
 static bool add_point(ebpo_envelope_scratch *scratch, double x, double y, double z, double slack)
 {
-    if (!ebpo_grow(&scratch->point, &scratch->capacity, scratch->count + 1, sizeof *scratch->point))
+    if (!ebpo_grow(&scratch->point, &scratch->capacity, scratch->count / 2 + 1, sizeof *scratch->point))
         return false;
-    double *p = scratch->point[scratch->count++];
-    p[0] = x, p[1] = y, p[2] = z, p[3] = EBPO_NORMAL_NORM * slack;
+    pair *p = scratch->point[scratch->count / 2];
+    double values[4] = { x, y, z, EBPO_NORMAL_NORM * slack };
+    for (int k = 0; k < 4; k++) /* the second of two is a copy until it comes */
+        p[k] = scratch->count % 2 ? (pair){ p[k][0], values[k] } : (pair){ values[k], values[k] };
+    scratch->count++;
     return true;
 }
 
@@ -88,15 +94,21 @@ static bool add_crossings(const ebpo_builder *b, ebpo_envelope_scratch *scratch,
     return true;
 }
 
+static pair greater(pair a, pair b)
+{
+    pair_mask m = a > b;
+    return (pair)(((pair_mask)a & m) | ((pair_mask)b & ~m));
+}
+
+/* Points come in twos of a coordinate, so that one instruction serves both; the greatest of them does not depend on the order. */
 static void raise_support(const ebpo_envelope_scratch *scratch, const double n[3], double *support)
 {
-    double best = *support;
-    for (uint64_t i = 0; i < scratch->count; i++) {
-        const double *p = scratch->point[i];
-        double v = n[0] * p[0] + n[1] * p[1] + n[2] * p[2] + p[3];
-        best = v > best ? v : best;
+    pair nx = { n[0], n[0] }, ny = { n[1], n[1] }, nz = { n[2], n[2] }, best = { *support, *support };
+    for (uint64_t i = 0; i < scratch->count; i += 2) {
+        const pair *p = scratch->point[i / 2];
+        best = greater(nx * p[0] + ny * p[1] + nz * p[2] + p[3], best);
     }
-    *support = best;
+    *support = best[0] > best[1] ? best[0] : best[1];
 }
 
 int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, const ebpo_subtree *s,

@@ -17,7 +17,7 @@ static const char *next_step(const ebpo_check *check)
 
 ebpo_status ebpo_check_fail(const ebpo_check *check, int level, const char *array, const char *what, ebpo_error *error)
 {
-    char folder[16] = "";
+    char folder[24] = "";
     if (level >= 0)
         snprintf(folder, sizeof folder, "/levels/%02d/", level);
     return ebpo_fail(error, check->as, "%s: %s%s: %s; %s", check->shown, folder, array, what, next_step(check));
@@ -187,7 +187,7 @@ ebpo_status ebpo_check_map(const ebpo_check *check, const char *array, const uin
     return status;
 }
 
-ebpo_status ebpo_check_vertices(const ebpo_check *check, const ebpo_mesh *mesh, ebpo_error *error)
+ebpo_status ebpo_check_finite(const ebpo_check *check, const ebpo_mesh *mesh, ebpo_error *error)
 {
     bool finite = true;
     for (uint64_t i = 0; i < mesh->vertex_count * 3; i++)

@@ -25,6 +25,6 @@ EBPO_MUST_USE ebpo_status ebpo_check_map(const ebpo_check *check, const char *ar
                                          ebpo_error *error);
 
 /* Vertices are finite and faces name vertices that exist, in first-use order. */
-EBPO_MUST_USE ebpo_status ebpo_check_vertices(const ebpo_check *check, const ebpo_mesh *mesh, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_check_finite(const ebpo_check *check, const ebpo_mesh *mesh, ebpo_error *error);
 
 #endif

@@ -95,7 +95,7 @@ static ebpo_status check_tree(ebpo_plan *plan, const ebpo_check *check, ebpo_err
     if (status == EBPO_OK && info->parts & EBPO_PART_MESH)
         status = ebpo_check_order(check, tree, error);
     if (status == EBPO_OK && info->parts & EBPO_PART_MESH)
-        status = ebpo_check_vertices(check, &tree->mesh, error);
+        status = ebpo_check_finite(check, &tree->mesh, error);
     if (status == EBPO_OK && info->parts & EBPO_PART_MAPS)
         status = ebpo_check_map(check, "/maps/vertex_source", tree->vertex_source, info->vertex_count, info->source_vertex_count, error);
     if (status == EBPO_OK && info->parts & EBPO_PART_MAPS)

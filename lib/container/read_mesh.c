@@ -91,7 +91,7 @@ ebpo_status ebpo_file_read_mesh(ebpo_file *file, ebpo_mesh *out, unsigned thread
     if (status == EBPO_OK)
         status = ebpo_reader_rows(file, ebpo_reader_array(file, EBPO_A_VERTICES, 0), threads, take_vertices, &j, error);
     if (status == EBPO_OK)
-        status = ebpo_check_vertices(&check, out, error);
+        status = ebpo_check_finite(&check, out, error);
     if (status == EBPO_OK)
         status = ebpo_reader_make(file, EBPO_A_FACES_INDEX, 0, 1, 8, &j.faces_index, error);
     if (status == EBPO_OK)

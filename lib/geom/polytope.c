@@ -109,6 +109,8 @@ double ebpo_polytope_removed(const ebpo_polytope *p, const double n[3], double d
         out[i] = dist[i] > 0;
         nearest = fabs(dist[i]) < fabs(dist[nearest]) ? i : nearest;
     }
+    if (!p->vertex_count)
+        return 0;
     double lift = dist[nearest] / dot(n, n);
     for (int k = 0; k < 3; k++)
         reference[k] = p->vertex[nearest][k] - lift * n[k]; /* any point on the plane */
@@ -299,20 +301,34 @@ ebpo_clip ebpo_polytope_clip(ebpo_polytope *p, const double n[3], double d, int3
     return EBPO_CLIP_CUT;
 }
 
+void ebpo_polytope_copy(ebpo_polytope *to, const ebpo_polytope *from)
+{
+    to->vertex_count = from->vertex_count;
+    to->face_count = from->face_count;
+    to->corner_count = from->corner_count;
+    memcpy(to->vertex, from->vertex, (size_t)from->vertex_count * sizeof from->vertex[0]);
+    memcpy(to->tag, from->tag, (size_t)from->face_count * sizeof from->tag[0]);
+    memcpy(to->first, from->first, (size_t)(from->face_count + 1) * sizeof from->first[0]);
+    memcpy(to->corner, from->corner, (size_t)from->corner_count);
+}
+
+bool ebpo_polytope_half(const ebpo_polytope *p, int axis, int side, ebpo_polytope *out)
+{
+    double n[3] = { 0, 0, 0 };
+    n[axis] = side ? -1 : 1;
+    ebpo_polytope_copy(out, p);
+    for (int i = 0; i < out->vertex_count; i++)
+        out->vertex[i][axis] = 2 * out->vertex[i][axis] - side;
+    if (ebpo_polytope_clip(out, n, side ? 0 : 1, -1 - (2 * axis + !side)) != EBPO_CLIP_REFUSED)
+        return true;
+    ebpo_polytope_cube(out);
+    return false;
+}
+
 bool ebpo_polytope_child(const ebpo_polytope *p, unsigned octant, ebpo_polytope *out)
 {
-    *out = *p;
-    for (int k = 0; k < 3; k++) {
-        bool high = octant >> k & 1;
-        double n[3] = { 0, 0, 0 };
-        n[k] = high ? -1 : 1;
-        if (ebpo_polytope_clip(out, n, high ? -0.5 : 0.5, -1 - (2 * k + !high)) == EBPO_CLIP_REFUSED) {
-            ebpo_polytope_cube(out);
-            return false;
-        }
-    }
-    for (int i = 0; i < out->vertex_count; i++)
-        for (int k = 0; k < 3; k++)
-            out->vertex[i][k] = 2 * out->vertex[i][k] - (octant >> k & 1);
-    return true;
+    ebpo_polytope z, y;
+    bool some = ebpo_polytope_half(p, 2, octant >> 2 & 1, &z);
+    some = ebpo_polytope_half(&z, 1, octant >> 1 & 1, &y) && some;
+    return ebpo_polytope_half(&y, 0, octant & 1, out) && some;
 }

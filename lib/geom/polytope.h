@@ -31,9 +31,16 @@ void ebpo_polytope_cube(ebpo_polytope *p);
 /* Keeps n . x <= d. |n| should be about 1 (tolerance 1e-10 in cell units). */
 ebpo_clip ebpo_polytope_clip(ebpo_polytope *p, const double n[3], double d, int32_t tag);
 
-/* Cuts out the octant and scales it to the unit cube; false when (numerically) nothing lies in it: *out is then the whole cube. `out` may not be `p`.
+/* Cuts out the octant and scales it to the unit cube; false when (numerically) nothing lies in it: *out is then a box around it. `out` may not be `p`.
  * Walls between siblings get the wall tags again. */
 bool ebpo_polytope_child(const ebpo_polytope *p, unsigned octant, ebpo_polytope *out);
+
+/* One half along `axis` (side 0: lower, 1: upper), scaled to the unit cube; ebpo_polytope_child is z, then y, then x. False, and the whole cube,
+ * when (numerically) nothing lies in it. */
+bool ebpo_polytope_half(const ebpo_polytope *p, int axis, int side, ebpo_polytope *out);
+
+/* Copies what is in use: much less than the struct. */
+void ebpo_polytope_copy(ebpo_polytope *to, const ebpo_polytope *from);
 
 double ebpo_polytope_volume(const ebpo_polytope *p);
 

@@ -1,6 +1,7 @@
 /* Opening and reading files that nobody vouches for, see h5.h. */
 #include <errno.h>
 #include <fcntl.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -97,6 +98,13 @@ ebpo_status ebpo_h5_open_group(ebpo_h5_in *in, const char *path, ebpo_h5_id *id,
     return status;
 }
 
+static ebpo_status attribute_fails(ebpo_h5_in *in, const char *object, const char *name, const char *what, ebpo_error *error)
+{
+    char place[160];
+    snprintf(place, sizeof place, "%s: attribute %s", object, name);
+    return ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, place, what);
+}
+
 /* Opens the attribute and its type; EBPO_E_ABSENT when there is none. `points`: how many values it must have. */
 static ebpo_status open_attribute(ebpo_h5_in *in, hid_t id, const char *object, const char *name, hssize_t points, hid_t *attribute,
                                   hid_t *type, ebpo_error *error)
@@ -117,8 +125,7 @@ static ebpo_status open_attribute(ebpo_h5_in *in, hid_t id, const char *object, 
         H5Sclose(space);
     if (ok)
         return EBPO_OK;
-    (void)object;
-    return ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, name, "the attribute is damaged or has the wrong number of values");
+    return attribute_fails(in, object, name, "it is damaged or has the wrong number of values", error);
 }
 
 static void close_attribute(hid_t attribute, hid_t type)
@@ -158,7 +165,7 @@ ebpo_status ebpo_h5_get_text(ebpo_h5_in *in, ebpo_h5_id id, const char *object, 
         size_t length = H5Tget_size(type);
         if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) != 0 || length == 0 || length >= size ||
             H5Aread(attribute, type, text) < 0 || !ebpo_h5_text_ok(text))
-            status = ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, name, "the attribute is not a fixed-length UTF-8 text of a sensible length");
+            status = attribute_fails(in, object, name, "it is not a fixed-length UTF-8 text of a sensible length", error);
     }
     if (status != EBPO_OK)
         text[0] = 0;
@@ -175,7 +182,7 @@ static ebpo_status get_numbers(ebpo_h5_in *in, hid_t id, const char *object, con
     hid_t attribute, type;
     ebpo_status status = open_attribute(in, id, object, name, count ? count : 1, &attribute, &type, error);
     if (status == EBPO_OK && (H5Tequal(type, stored) <= 0 || H5Aread(attribute, memory, values) < 0))
-        status = ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, name, what);
+        status = attribute_fails(in, object, name, what, error);
     close_attribute(attribute, type);
     ebpo_h5_leave(&scope);
     return status;
@@ -183,18 +190,18 @@ static ebpo_status get_numbers(ebpo_h5_in *in, hid_t id, const char *object, con
 
 ebpo_status ebpo_h5_get_int(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const char *name, int64_t *value, ebpo_error *error)
 {
-    return get_numbers(in, id, object, name, H5T_STD_I64LE, H5T_NATIVE_INT64, value, 0, "the attribute is not an i64", error);
+    return get_numbers(in, id, object, name, H5T_STD_I64LE, H5T_NATIVE_INT64, value, 0, "it is not an i64", error);
 }
 
 ebpo_status ebpo_h5_get_count(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const char *name, uint64_t *value, ebpo_error *error)
 {
-    return get_numbers(in, id, object, name, H5T_STD_U64LE, H5T_NATIVE_UINT64, value, 0, "the attribute is not a u64", error);
+    return get_numbers(in, id, object, name, H5T_STD_U64LE, H5T_NATIVE_UINT64, value, 0, "it is not a u64", error);
 }
 
 ebpo_status ebpo_h5_get_real(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const char *name, double *values, unsigned count,
                              ebpo_error *error)
 {
-    return get_numbers(in, id, object, name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, values, count, "the attribute is not of f64 numbers",
+    return get_numbers(in, id, object, name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, values, count, "it is not of f64 numbers",
                        error);
 }
 

@@ -14,7 +14,7 @@ ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const 
     (void)size;
     *out = (ebpo_mesh){ 0 };
     return ebpo_fail(error, EBPO_E_UNSUPPORTED, "%s: this build reads PLY only; build it with libassimp-dev installed, or convert the file to PLY",
-                     ebpo_file_name(name));
+                     ebpo_path_name(name));
 }
 
 #else
@@ -30,6 +30,7 @@ ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const 
 
 #include "base/alloc.h"
 #include "geom/polygon.h"
+#include "import/off_check.h"
 #include "import/weld.h"
 
 #define MOST (UINT64_C(0xfffffffe))
@@ -122,30 +123,6 @@ static void close_memory(struct aiFileIO *io, struct aiFile *file)
     (void)io;
     free(file->UserData);
     free(file);
-}
-
-/* assimp allocates what an OFF header claims before it looks at the rest. */
-static ebpo_status check_off_counts(const memory_file *file, const char *name, ebpo_error *error)
-{
-    char head[4096];
-    size_t n = file->size < sizeof head - 1 ? file->size : sizeof head - 1;
-    unsigned long long count[2] = { 0, 0 };
-    memcpy(head, file->data, n);
-    head[n] = 0;
-    char *s = strpbrk(head, " \t\r\n"); /* behind the first word */
-    if (s)
-        s += strspn(s, " \t\r\n");
-    while (s && *s == '#') {
-        s = strpbrk(s, "\r\n");
-        if (s)
-            s += strspn(s, " \t\r\n");
-    }
-    if (!s || sscanf(s, "%llu %llu", &count[0], &count[1]) != 2)
-        return ebpo_fail(error, EBPO_E_FORMAT, "%s: no counts of vertices and faces follow the word OFF; repair the file", name);
-    if (count[0] > file->size / 2 || count[1] > file->size / 2)
-        return ebpo_fail(error, EBPO_E_FORMAT, "%s: %llu vertices and %llu faces do not fit into a file of %zu bytes; it is damaged",
-                         name, count[0], count[1], file->size);
-    return EBPO_OK;
 }
 
 /* Sums over the scene's meshes, with every index checked. */
@@ -308,9 +285,9 @@ ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const 
     memory_file file = { data, (size_t)size, pseudo_names[format] };
     ebpo_mesh mesh = { 0 };
     ebpo_status status = EBPO_OK;
-    name = ebpo_file_name(name);
+    name = ebpo_path_name(name);
     if (format == EBPO_IMPORT_OFF)
-        status = check_off_counts(&file, name, error);
+        status = ebpo_import_check_off(data, size, name, error);
     if (status == EBPO_OK) {
         pthread_mutex_lock(&assimp_lock);
         status = import_locked(&mesh, &file, name, error);

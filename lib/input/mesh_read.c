@@ -20,7 +20,7 @@ void ebpo_mesh_free(ebpo_mesh *mesh)
 }
 
 typedef struct hashing {
-    const ebpo_file *file;
+    const ebpo_whole_file *file;
     uint8_t digest[32];
     pthread_t thread;
     bool threaded;
@@ -50,9 +50,9 @@ static void hash_end(hashing *h)
         pthread_join(h->thread, NULL);
 }
 
-static ebpo_status parse(ebpo_mesh *out, const ebpo_file *file, const char *path, const ebpo_progress *progress, ebpo_error *error)
+static ebpo_status parse(ebpo_mesh *out, const ebpo_whole_file *file, const char *path, const ebpo_progress *progress, ebpo_error *error)
 {
-    const char *dot = strrchr(ebpo_file_name(path), '.');
+    const char *dot = strrchr(ebpo_path_name(path), '.');
     ebpo_import_format format;
     if (ebpo_ply_recognise(file->data, file->size))
         return ebpo_ply_parse_memory(out, file->data, file->size, path, progress, error);
@@ -61,27 +61,27 @@ static ebpo_status parse(ebpo_mesh *out, const ebpo_file *file, const char *path
     if (dot && strcasecmp(dot, ".ply") == 0) /* its reader says best what is wrong */
         return ebpo_ply_parse_memory(out, file->data, file->size, path, progress, error);
     return ebpo_fail(error, EBPO_E_FORMAT, "%s: neither its first bytes nor its name tell a PLY, OBJ, STL or OFF file",
-                     ebpo_file_name(path));
+                     ebpo_path_name(path));
 }
 
 ebpo_status ebpo_mesh_read(ebpo_mesh *out, const char *path, const ebpo_mesh_read_options *options, ebpo_error *error)
 {
     static const ebpo_progress silent = { NULL, NULL };
-    ebpo_file file = EBPO_FILE_INIT;
+    ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
     hashing hash = { .file = &file };
     memset(out, 0, sizeof *out);
-    ebpo_status status = ebpo_file_open(&file, path, error);
+    ebpo_status status = ebpo_whole_file_open(&file, path, error);
     if (status != EBPO_OK)
         return status;
     hash_begin(&hash);
     status = parse(out, &file, path, options ? &options->progress : &silent, error);
     hash_end(&hash);
     if (status == EBPO_OK)
-        status = ebpo_file_unchanged(&file, path, error);
+        status = ebpo_whole_file_unchanged(&file, path, error);
     if (status == EBPO_OK)
         memcpy(out->source_sha256, hash.digest, sizeof hash.digest);
     else
         ebpo_mesh_free(out);
-    ebpo_file_close(&file);
+    ebpo_whole_file_close(&file);
     return status;
 }

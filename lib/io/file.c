@@ -11,7 +11,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 
-static ebpo_status read_whole(ebpo_file *file, const char *path, ebpo_error *error)
+static ebpo_status read_whole(ebpo_whole_file *file, const char *path, ebpo_error *error)
 {
     uint8_t *buffer = ebpo_alloc(file->size, 1);
     if (!buffer)
@@ -33,7 +33,7 @@ static ebpo_status read_whole(ebpo_file *file, const char *path, ebpo_error *err
     return EBPO_OK;
 }
 
-static ebpo_status map_or_read(ebpo_file *file, const char *path, ebpo_error *error)
+static ebpo_status map_or_read(ebpo_whole_file *file, const char *path, ebpo_error *error)
 {
     if (file->size == 0) {
         file->data = (const uint8_t *)"";
@@ -49,9 +49,9 @@ static ebpo_status map_or_read(ebpo_file *file, const char *path, ebpo_error *er
     return EBPO_OK;
 }
 
-ebpo_status ebpo_file_open(ebpo_file *out, const char *path, ebpo_error *error)
+ebpo_status ebpo_whole_file_open(ebpo_whole_file *out, const char *path, ebpo_error *error)
 {
-    ebpo_file file = EBPO_FILE_INIT;
+    ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
     *out = file;
     ebpo_status status;
     struct stat st;
@@ -73,12 +73,12 @@ ebpo_status ebpo_file_open(ebpo_file *out, const char *path, ebpo_error *error)
     status = map_or_read(&file, path, error);
 done:
     if (status != EBPO_OK)
-        ebpo_file_close(&file);
+        ebpo_whole_file_close(&file);
     *out = file;
     return status;
 }
 
-ebpo_status ebpo_file_unchanged(const ebpo_file *file, const char *path, ebpo_error *error)
+ebpo_status ebpo_whole_file_unchanged(const ebpo_whole_file *file, const char *path, ebpo_error *error)
 {
     struct stat st;
     if (fstat(file->fd, &st) != 0)
@@ -89,17 +89,17 @@ ebpo_status ebpo_file_unchanged(const ebpo_file *file, const char *path, ebpo_er
     return EBPO_OK;
 }
 
-void ebpo_file_close(ebpo_file *file)
+void ebpo_whole_file_close(ebpo_whole_file *file)
 {
     if (file->mapped)
         munmap(file->mapped, (size_t)file->size);
     free(file->buffer);
     if (file->fd >= 0)
         close(file->fd);
-    *file = (ebpo_file)EBPO_FILE_INIT;
+    *file = (ebpo_whole_file)EBPO_WHOLE_FILE_INIT;
 }
 
-const char *ebpo_file_name(const char *path)
+const char *ebpo_path_name(const char *path)
 {
     const char *slash = strrchr(path, '/');
     return slash ? slash + 1 : path;

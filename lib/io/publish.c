@@ -50,7 +50,7 @@ void ebpo_publish_abandon_all(void)
 
 static ebpo_status check_target(const char *path, ebpo_error *error)
 {
-    if (!*ebpo_file_name(path))
+    if (!*ebpo_path_name(path))
         return ebpo_fail(error, EBPO_E_IO, "%s: names no file; give the output a file name", path);
     struct stat st;
     if (lstat(path, &st) != 0)
@@ -63,7 +63,7 @@ static ebpo_status check_target(const char *path, ebpo_error *error)
 
 static ebpo_status resolve(ebpo_publish *publish, const char *path, ebpo_error *error)
 {
-    const char *name = ebpo_file_name(path);
+    const char *name = ebpo_path_name(path);
     char *folder = strndup(path, (size_t)(name - path));
     publish->shown = strdup(path);
     if (!folder || !publish->shown) {
@@ -86,7 +86,7 @@ static ebpo_status create_temporary(ebpo_publish *publish, ebpo_error *error)
 {
     for (int attempt = 0; attempt < 100; attempt++) {
         free(publish->temporary);
-        if (asprintf(&publish->temporary, "%s/.%.200s.%ld-%u.tmp", publish->folder, ebpo_file_name(publish->target),
+        if (asprintf(&publish->temporary, "%s/.%.200s.%ld-%u.tmp", publish->folder, ebpo_path_name(publish->target),
                      (long)getpid(), atomic_fetch_add(&name_counter, 1)) < 0) {
             publish->temporary = NULL;
             return ebpo_fail_memory(error, PATH_MAX);

@@ -82,6 +82,7 @@ ebpo_status ebpo_lod_leaf(const ebpo_lod_model *model, ebpo_cell cell, uint64_t 
         return status;
     uint32_t codes[EBPO_PLANES_MAX];
     unsigned inside = inside_corners(model, cell, leaf, scratch->faces, count);
-    (void)ebpo_leaf_planes(&model->box, cell, scratch->faces, count, inside, model->info->epsilon, envelope, codes);
+    /* Derived planes cost no bytes: each that removes anything is taken, as in the volumes that the file states. */
+    (void)ebpo_leaf_planes(&model->box, cell, scratch->faces, count, inside, 0, envelope, codes);
     return EBPO_OK;
 }

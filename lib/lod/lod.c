@@ -64,48 +64,67 @@ static ebpo_status visit_gray(walker *w, uint64_t gray, ebpo_cell cell, ebpo_pol
     if (cell.level == w->stop) {
         seed *s = &w->j->seeds[w->j->seed_count++];
         s->cell = cell;
-        s->envelope = *envelope;
+        ebpo_polytope_copy(&s->envelope, envelope);
         return EBPO_OK;
     }
     return visit_group(w, gray, cell, envelope);
 }
 
-static ebpo_status visit_node(walker *w, ebpo_node_type type, uint64_t rank, ebpo_cell cell, ebpo_polytope *envelope)
+/* One gray node or leaf; `envelope` is the parent's, cut to this cell. */
+static ebpo_status visit_node(walker *w, uint64_t group, unsigned octant, ebpo_cell cell, ebpo_polytope *envelope)
 {
+    const ebpo_lod_model *model = w->j->model;
+    const ebpo_lod_index *index = &model->index[cell.level];
+    uint16_t types = model->level[cell.level].types[group];
+    ebpo_node_type type = ebpo_type_of(types, octant);
+    uint64_t rank = ebpo_count_type(types, type, octant);
     if (type == EBPO_GRAY)
-        return visit_gray(w, rank, cell, envelope);
-    ebpo_status status = ebpo_lod_leaf(w->j->model, cell, rank, w->scratch, envelope, w->error);
+        return visit_gray(w, rank + index->gray_before[group], cell, envelope);
+    ebpo_status status = ebpo_lod_leaf(model, cell, rank + index->leaf_before[group], w->scratch, envelope, w->error);
     return status == EBPO_OK ? emit(w, envelope, cell) : status;
 }
 
-/* One node of the group; `parent` is NULL for the root. Black nodes are their whole cell. */
-static ebpo_status visit_child(walker *w, uint64_t group, unsigned octant, ebpo_cell cell, const ebpo_polytope *parent)
+/* Black nodes are their whole cell. */
+static ebpo_status visit_black(walker *w, ebpo_cell cell)
 {
-    const ebpo_lod_model *model = w->j->model;
-    uint16_t types = model->level[cell.level].types[group];
-    ebpo_node_type type = ebpo_type_of(types, octant);
-    if (type == EBPO_WHITE)
-        return EBPO_OK;
-    ebpo_polytope envelope;
-    if (type == EBPO_BLACK || !parent)
-        ebpo_polytope_cube(&envelope);
-    else
-        (void)ebpo_polytope_child(parent, octant, &envelope);
-    if (type == EBPO_BLACK)
-        return emit(w, &envelope, cell);
-    const ebpo_lod_index *index = &model->index[cell.level];
-    uint64_t before = type == EBPO_GRAY ? index->gray_before[group] : index->leaf_before[group];
-    return visit_node(w, type, before + ebpo_count_type(types, type, octant), cell, &envelope);
+    ebpo_polytope cube;
+    ebpo_polytope_cube(&cube);
+    return emit(w, &cube, cell);
 }
 
+static ebpo_status visit_root(walker *w)
+{
+    ebpo_cell root = { 0, { 0, 0, 0 } };
+    ebpo_polytope cube;
+    ebpo_polytope_cube(&cube);
+    switch (ebpo_type_of(w->j->model->level[0].types[0], 0)) {
+    case EBPO_WHITE: return EBPO_OK;
+    case EBPO_BLACK: return visit_black(w, root);
+    default: return visit_node(w, 0, 0, root, &cube);
+    }
+}
+
+/* In octant order; neighbours share the halves that their envelopes are cut from, as in the builder. */
 static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell, const ebpo_polytope *parent)
 {
+    uint16_t types = w->j->model->level[parent_cell.level + 1].types[group];
+    unsigned filled = types >> 1 & 0x5555; /* bit 2i: octant i is gray or a leaf */
+    ebpo_polytope z, y, x;
     ebpo_status status = EBPO_OK;
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
         ebpo_cell cell = { parent_cell.level + 1, { 0, 0, 0 } };
         for (unsigned k = 0; k < 3; k++)
             cell.at[k] = 2 * parent_cell.at[k] + (octant >> k & 1);
-        status = visit_child(w, group, octant, cell, parent);
+        if (octant % 4 == 0 && filled >> 2 * octant & 0xff)
+            (void)ebpo_polytope_half(parent, 2, octant >> 2 & 1, &z);
+        if (octant % 2 == 0 && filled >> 2 * octant & 0xf)
+            (void)ebpo_polytope_half(&z, 1, octant >> 1 & 1, &y);
+        if (filled >> 2 * octant & 1) {
+            (void)ebpo_polytope_half(&y, 0, octant & 1, &x);
+            status = visit_node(w, group, octant, cell, &x);
+        } else if (ebpo_type_of(types, octant) == EBPO_BLACK) {
+            status = visit_black(w, cell);
+        }
     }
     return status;
 }
@@ -148,7 +167,7 @@ static ebpo_status prepare(job *j, unsigned threads, ebpo_error *error)
 static ebpo_status walk(job *j, unsigned threads, const ebpo_progress *progress, ebpo_error *error)
 {
     walker top = { j, j->pieces[0], &j->scratch[0], j->split, error };
-    ebpo_status status = visit_child(&top, 0, 0, (ebpo_cell){ 0, { 0, 0, 0 } }, NULL);
+    ebpo_status status = visit_root(&top);
     if (status != EBPO_OK)
         return status;
     return ebpo_parallel_for(threads, j->seed_count, 1, walk_seeds, j, progress, "clipping envelopes", error);

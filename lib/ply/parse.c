@@ -187,7 +187,7 @@ ebpo_status ebpo_ply_parse_memory(ebpo_mesh *out, const uint8_t *data, uint64_t 
                                   const ebpo_progress *progress, ebpo_error *error)
 {
     ebpo_mesh mesh = { 0 };
-    ply_parser p = { .data = data, .size = size, .name = ebpo_file_name(name), .mesh = &mesh, .progress = progress, .error = error };
+    ply_parser p = { .data = data, .size = size, .name = ebpo_path_name(name), .mesh = &mesh, .progress = progress, .error = error };
     ebpo_status status = ebpo_ply_header_parse(&p.header, data, size, p.name, error);
     if (status == EBPO_OK)
         status = check_counts(&p);

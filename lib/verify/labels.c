@@ -6,6 +6,8 @@ enum { SAMPLES_DEFAULT = 4096 };
 /* Faces looked at by rays, in all: some seconds. */
 static const double ray_work_affordable = 4e8;
 
+__extension__ typedef unsigned __int128 wide;
+
 void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_view *view, const ebpo_columns *columns, uint64_t samples)
 {
     uint64_t all = 0, classes = 0;
@@ -39,7 +41,7 @@ static bool planned(const ebpo_label_plan *plan, const ebpo_view_node *node)
     uint64_t cells = plan->cells[node->cell.level][node->type], take = plan->take[node->cell.level][node->type];
     if (take >= cells)
         return true;
-    return (unsigned __int128)(node->rank + 1) * take / cells != (unsigned __int128)node->rank * take / cells;
+    return (wide)(node->rank + 1) * take / cells != (wide)node->rank * take / cells;
 }
 
 static void corner_position(const ebpo_frame *frame, unsigned corner, double out[3])
@@ -151,7 +153,7 @@ void ebpo_check_root_corners(ebpo_tally *tally, const ebpo_corner_windings *root
     }
 }
 
-unsigned ebpo_inside_corners(const ebpo_view *view, const ebpo_corner_windings *corners)
+unsigned ebpo_windings_inside(const ebpo_view *view, const ebpo_corner_windings *corners)
 {
     unsigned inside = 0;
     for (unsigned i = 0; i < 8; i++)

@@ -41,6 +41,6 @@ void ebpo_check_links(ebpo_tally *tally, const ebpo_view_node *node, const ebpo_
 void ebpo_check_root_corners(ebpo_tally *tally, const ebpo_corner_windings *root);
 
 /* Bit i: corner i lies in the solid. */
-unsigned ebpo_inside_corners(const ebpo_view *view, const ebpo_corner_windings *corners);
+unsigned ebpo_windings_inside(const ebpo_view *view, const ebpo_corner_windings *corners);
 
 #endif

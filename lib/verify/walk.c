@@ -132,7 +132,7 @@ static void finish_gray(const walk *w, worker *self, const ebpo_view_node *node,
     if (!w->view->tree->info.solid)
         return;
     ebpo_check_links(&self->tally, node, children, corners);
-    unsigned inside = ebpo_inside_corners(w->view, corners);
+    unsigned inside = ebpo_windings_inside(w->view, corners);
     if (inside == 0)
         return;
     ebpo_half_spaces_of(&self->planes, w->view, node);
@@ -157,7 +157,7 @@ static void walk_terminal(const walk *w, worker *self, const ebpo_view_node *nod
     ebpo_check_terminal_label(&self->tally, view, node, &frame, &w->plan, w->rays ? &w->columns : NULL);
     ebpo_terminal_windings(corners, view, node, &frame, faces, count);
     if (self->planes.count)
-        ebpo_check_corners_contained(&self->tally, &self->planes, node, ebpo_inside_corners(view, corners));
+        ebpo_check_corners_contained(&self->tally, &self->planes, node, ebpo_windings_inside(view, corners));
 }
 
 static bool stack_reserve(face_stack *s, uint64_t need)

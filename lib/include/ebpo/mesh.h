@@ -36,8 +36,9 @@ typedef struct ebpo_mesh_read_options {
 
 /* Reads a mesh; the format is told from the file's first bytes, then from its name.
  * PLY always; OBJ, STL and OFF when the library was built with assimp (else EBPO_E_UNSUPPORTED).
- * Polygons are triangulated, concave ones correctly; strips are unrolled. Positions keep every bit.
- * Safe on untrusted files. On failure `out` is cleared. `options` may be NULL. */
+ * Polygons are triangulated, concave ones correctly; strips are unrolled. PLY positions keep every bit and text is
+ * rounded correctly; assimp gives single precision, and for text now and then a neighbour of the nearest float (lib/import/import.h has the figures).
+ * PLY is safe on untrusted files. On failure `out` is cleared. `options` may be NULL. */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_read(ebpo_mesh *out, const char *path,
                                                   const ebpo_mesh_read_options *options, ebpo_error *error);
 

@@ -1,0 +1,12 @@
+/* The mesh in the file against the mesh that it was made from. */
+#ifndef EBPO_VERIFY_SOURCE_H
+#define EBPO_VERIFY_SOURCE_H
+
+#include "verify/tally.h"
+
+/* Does the recorded mending again on a copy of `source` and compares bit for bit. `stored`: the file's mesh; `ordered`: it is in the source's order
+ * (else vertices and faces are compared as multisets). */
+EBPO_MUST_USE ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_info *info, const ebpo_mesh *stored, bool ordered,
+                                            const ebpo_mesh *source, ebpo_error *error);
+
+#endif

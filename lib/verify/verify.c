@@ -1,0 +1,96 @@
+/* Proves a file's promises. Of the builder's geometry only the exact predicates are used: cells, half-spaces and clipping are done here in another way. */
+#include "verify/verify.h"
+
+#include "base/error.h"
+#include "mesh/mesh.h"
+#include "verify/nesting.h"
+#include "verify/source.h"
+#include "verify/structure.h"
+#include "verify/walk.h"
+
+ebpo_status ebpo_verify_tree(ebpo_tally *tally, const ebpo_tree *tree, const ebpo_verify_options *options, ebpo_error *error)
+{
+    if (!ebpo_check_shape(tally, tree))
+        return EBPO_OK;
+    ebpo_view view;
+    ebpo_status status = ebpo_view_make(&view, tree, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_check_structure(tally, &view);
+    ebpo_check_nesting(tally, &view);
+    status = ebpo_walk(tally, &view, options, error);
+    ebpo_view_free(&view);
+    return status;
+}
+
+/* A failure that says something about the file and not about this machine or call. */
+static bool is_finding(ebpo_status status)
+{
+    return status == EBPO_E_FORMAT || status == EBPO_E_VERSION || status == EBPO_E_LIMIT;
+}
+
+static ebpo_status check_content(ebpo_file *file, const ebpo_verify_options *options, ebpo_tally *tally, ebpo_error *error)
+{
+    ebpo_error own = EBPO_ERROR_INIT;
+    ebpo_status status = ebpo_file_check_content(file, options->threads, &own);
+    if (status == EBPO_OK || is_finding(status)) {
+        ebpo_tally_check(tally, EBPO_VERIFY_CONTENT, status == EBPO_OK, "%s", own.message);
+        return EBPO_OK;
+    }
+    return ebpo_fail(error, status, "%s", own.message);
+}
+
+static ebpo_status check_tree(ebpo_file *file, const ebpo_verify_options *options, ebpo_tally *tally, ebpo_error *error)
+{
+    ebpo_error own = EBPO_ERROR_INIT;
+    ebpo_tree tree = {0};
+    ebpo_status status = ebpo_file_read_tree(file, &tree, options->threads, &own);
+    if (status == EBPO_OK || is_finding(status))
+        ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, status == EBPO_OK, "%s", own.message);
+    if (status == EBPO_OK) {
+        status = ebpo_verify_tree(tally, &tree, options, error);
+        ebpo_tree_free(&tree);
+        return status;
+    }
+    return is_finding(status) ? EBPO_OK : ebpo_fail(error, status, "%s", own.message);
+}
+
+static ebpo_status check_source(ebpo_file *file, const ebpo_verify_options *options, ebpo_tally *tally, ebpo_error *error)
+{
+    ebpo_error own = EBPO_ERROR_INIT;
+    ebpo_mesh stored;
+    bool ordered = false;
+    ebpo_status status = ebpo_file_read_source_mesh(file, &stored, &ordered, options->threads, &own);
+    if (is_finding(status)) {
+        ebpo_tally_check(tally, EBPO_VERIFY_SOURCE, false, "%s", own.message);
+        return EBPO_OK;
+    }
+    if (status != EBPO_OK)
+        return ebpo_fail(error, status, "%s", own.message);
+    status = ebpo_check_source(tally, ebpo_file_info(file), &stored, ordered, options->source, error);
+    ebpo_mesh_free(&stored);
+    return status;
+}
+
+ebpo_status ebpo_verify(ebpo_file *file, const ebpo_verify_options *options, ebpo_verify_report *report, ebpo_error *error)
+{
+    static const ebpo_verify_options defaults = EBPO_VERIFY_OPTIONS_INIT;
+    options = options ? options : &defaults;
+    *report = (ebpo_verify_report){0};
+    if (!file)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "verify: no file; open one with ebpo_file_open");
+    if (options->source) {
+        ebpo_status shape = ebpo_mesh_check_shape(options->source, error);
+        if (shape != EBPO_OK)
+            return shape;
+    }
+    ebpo_tally tally = {0};
+    ebpo_status status = check_content(file, options, &tally, error);
+    if (status == EBPO_OK)
+        status = check_tree(file, options, &tally, error);
+    if (status == EBPO_OK && options->source)
+        status = check_source(file, options, &tally, error);
+    if (status == EBPO_OK)
+        ebpo_tally_report(&tally, report);
+    return status;
+}

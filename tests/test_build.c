@@ -1,0 +1,290 @@
+/* The builder: trees keep their promises to the reader, on solids of every kind. Envelopes and labels are proved by test_verify. */
+#include <check.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/build.h>
+
+#include "solids.h"
+
+static ebpo_status build_with(ebpo_tree *tree, ebpo_mesh mesh, const ebpo_build_options *options)
+{
+    ebpo_mesh_report report;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_status status = ebpo_mesh_check(&report, &mesh, 1, (ebpo_progress){ NULL, NULL }, &error);
+    ck_assert_msg(status == EBPO_OK, "%s", error.message);
+    return ebpo_build(tree, &mesh, &report, NULL, options, &error);
+}
+
+static ebpo_tree build(ebpo_mesh mesh, const ebpo_build_options *options)
+{
+    ebpo_tree tree;
+    ck_assert_int_eq(build_with(&tree, mesh, options), EBPO_OK);
+    return tree;
+}
+
+static unsigned type_at(const ebpo_level *level, uint64_t node)
+{
+    return level->types[node / 8] >> 2 * (node % 8) & 3;
+}
+
+static void assert_counts(const ebpo_tree *tree)
+{
+    for (int i = 0; i < tree->info.level_count; i++) {
+        const ebpo_level *l = &tree->level[i];
+        uint64_t count[4] = { 0 }, nodes = i ? 8 * l->group_count : 1;
+        for (uint64_t n = 0; n < nodes; n++)
+            count[type_at(l, n)]++;
+        ck_assert_uint_eq(count[EBPO_WHITE], l->white_count);
+        ck_assert_uint_eq(count[EBPO_BLACK], l->black_count);
+        ck_assert_uint_eq(count[EBPO_LEAF], l->leaf_count);
+        ck_assert_uint_eq(count[EBPO_GRAY], l->gray_count);
+        ck_assert_uint_eq(l->group_count, i ? tree->level[i - 1].gray_count : 1);
+    }
+    ck_assert_uint_eq(tree->level[tree->info.level_count - 1].gray_count, 0);
+}
+
+/* Every face is new once, in the first leaf that lists it, and lists name no face twice. */
+static void assert_lists(const ebpo_tree *tree)
+{
+    uint8_t *seen = calloc(tree->mesh.face_count + 1, 1);
+    ck_assert_ptr_nonnull(seen);
+    for (int i = 0; i < tree->info.level_count; i++) {
+        const ebpo_level *l = &tree->level[i];
+        uint64_t ref = 0, last = 0;
+        for (uint64_t n = 0; n < l->leaf_count; n++) {
+            ck_assert_uint_ge(l->leaf_first[n], last);
+            last = l->leaf_first[n] + l->leaf_new[n];
+            for (uint64_t f = l->leaf_first[n]; f < last; f++)
+                ck_assert_uint_eq(seen[f]++, 0);
+            for (uint32_t r = 0; r < l->leaf_ref_count[n]; r++, ref++) {
+                ck_assert_uint_lt(l->leaf_refs[ref], l->leaf_first[n]);
+                ck_assert(r == 0 || l->leaf_refs[ref] > l->leaf_refs[ref - 1]);
+            }
+            ck_assert_uint_gt(l->leaf_new[n] + l->leaf_ref_count[n], 0);
+            if (i < tree->info.max_level)
+                ck_assert_uint_le(l->leaf_new[n] + l->leaf_ref_count[n], tree->info.leaf_faces);
+        }
+    }
+    for (uint64_t f = 0; f < tree->mesh.face_count; f++)
+        ck_assert_uint_eq(seen[f], 1);
+    free(seen);
+}
+
+/* The mesh of the tree is the source, renumbered. */
+static void assert_same_mesh(const ebpo_tree *tree, const ebpo_mesh *source)
+{
+    ck_assert_uint_eq(tree->mesh.vertex_count, source->vertex_count);
+    ck_assert_uint_eq(tree->mesh.face_count, source->face_count);
+    for (uint64_t v = 0; v < source->vertex_count; v++)
+        ck_assert_mem_eq(tree->mesh.xyz64 + 3 * v, source->xyz64 + 3 * (uint64_t)tree->vertex_source[v], 24);
+    for (uint64_t f = 0; f < source->face_count; f++)
+        for (uint64_t k = 0; k < 3; k++)
+            ck_assert_uint_eq(tree->vertex_source[tree->mesh.faces[3 * f + k]],
+                              source->faces[3 * (uint64_t)tree->face_source[f] + k]);
+}
+
+static double level_volume(const ebpo_tree *tree, int level)
+{
+    double cell = tree->info.box_size[0] * tree->info.box_size[1] * tree->info.box_size[2], sum = 0;
+    for (int i = 0; i <= level; i++, cell /= 8)
+        sum += tree->level[i].leaf_volume + (double)tree->level[i].black_count * cell;
+    return sum + tree->level[level].gray_volume;
+}
+
+/* Where windings stay below 2 the integral of the winding number is the solid's volume. */
+static bool single_shell_everywhere(const ebpo_tree *tree)
+{
+    for (int i = 0; i < tree->info.level_count; i++) {
+        const ebpo_level *l = &tree->level[i];
+        if (l->black_winding)
+            return false;
+        for (uint64_t n = 0; n < l->leaf_count; n++)
+            if (l->leaf_winding[n] > 1)
+                return false;
+    }
+    return true;
+}
+
+START_TEST(tree_of_every_solid_is_consistent)
+{
+    const ebpo_test_solid *solid = &ebpo_test_solids[_i];
+    for (uint32_t leaf_faces = 0; leaf_faces <= 16; leaf_faces += 8) {
+        ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+        options.leaf_faces = leaf_faces;
+        options.max_level = leaf_faces ? -1 : 4;
+        ebpo_mesh source = solid->make();
+        ebpo_tree tree = build(solid->make(), &options);
+        ck_assert_int_eq(tree.info.solid, solid->balanced);
+        assert_counts(&tree);
+        assert_lists(&tree);
+        if (source.xyz64)
+            assert_same_mesh(&tree, &source);
+        for (int i = 1; i < tree.info.level_count; i++)
+            ck_assert_double_le(level_volume(&tree, i), level_volume(&tree, i - 1) * (1 + 1e-9));
+        if (solid->balanced && isfinite(solid->volume) && solid->volume > 0 && single_shell_everywhere(&tree))
+            ck_assert_double_ge(level_volume(&tree, tree.info.level_count - 1), solid->volume * (1 - 1e-9));
+        ebpo_tree_free(&tree);
+        ebpo_mesh_free(&source);
+    }
+}
+END_TEST
+
+static void assert_equal_trees(const ebpo_tree *a, const ebpo_tree *b)
+{
+    ck_assert_int_eq(a->info.level_count, b->info.level_count);
+    for (int i = 0; i < a->info.level_count; i++) {
+        const ebpo_level *x = &a->level[i], *y = &b->level[i];
+        ck_assert_uint_eq(x->group_count, y->group_count);
+        ck_assert_mem_eq(x->types, y->types, x->group_count * 2);
+        ck_assert_uint_eq(x->plane_count, y->plane_count);
+        if (x->plane_count)
+            ck_assert_mem_eq(x->planes, y->planes, x->plane_count * 4);
+        ck_assert_uint_eq(x->ref_count, y->ref_count);
+        if (x->ref_count)
+            ck_assert_mem_eq(x->leaf_refs, y->leaf_refs, x->ref_count * 4);
+        ck_assert(x->gray_volume == y->gray_volume && x->leaf_volume == y->leaf_volume);
+    }
+    ck_assert_mem_eq(a->mesh.faces, b->mesh.faces, a->mesh.face_count * 12);
+    ck_assert_mem_eq(a->face_source, b->face_source, a->mesh.face_count * 4);
+}
+
+START_TEST(result_does_not_depend_on_threads)
+{
+    double centre[3] = { 0, 0, 0 };
+    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+    options.threads = 1;
+    ebpo_tree one = build(ebpo_test_sphere(centre, 1, 5), &options);
+    options.threads = 7;
+    ebpo_tree seven = build(ebpo_test_sphere(centre, 1, 5), &options);
+    assert_equal_trees(&one, &seven);
+    ebpo_tree_free(&one);
+    ebpo_tree_free(&seven);
+}
+END_TEST
+
+START_TEST(maximum_level_follows_equation_3)
+{
+    /* A cube of side 1 cut into n x n squares: edges 1/n and the diagonals; L / 2^i falls below their mean. */
+    double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
+    for (uint32_t n = 1; n <= 32; n *= 2) {
+        ebpo_mesh mesh = ebpo_test_box(low, high, n);
+        ebpo_mesh_report report;
+        ck_assert_int_eq(ebpo_mesh_check(&report, &mesh, 1, (ebpo_progress){ NULL, NULL }, NULL), EBPO_OK);
+        int expected = 1;
+        while (ldexp(1, -expected) >= report.mean_edge)
+            expected++;
+        ebpo_tree tree = build(mesh, NULL);
+        ck_assert_int_eq(tree.info.max_level, expected);
+        ebpo_tree_free(&tree);
+    }
+}
+END_TEST
+
+START_TEST(levels_zero_and_twenty_work)
+{
+    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+    options.max_level = 0;
+    ebpo_tree tree = build(ebpo_test_make("tetrahedron"), &options);
+    ck_assert_int_eq(tree.info.level_count, 1);
+    ck_assert_uint_eq(tree.level[0].leaf_count, 1);
+    ebpo_tree_free(&tree);
+    options.max_level = 20;
+    options.leaf_faces = 2; /* three faces meet at a corner: the tree goes down there to the end */
+    tree = build(ebpo_test_make("tetrahedron"), &options);
+    ck_assert_int_eq(tree.info.level_count, 21);
+    assert_counts(&tree);
+    assert_lists(&tree);
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
+START_TEST(too_many_cells_are_refused)
+{
+    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+    options.max_level = 20;
+    options.leaf_faces = 0;
+    ebpo_tree tree;
+    ck_assert_int_eq(build_with(&tree, ebpo_test_make("tetrahedron"), &options), EBPO_E_LIMIT);
+}
+END_TEST
+
+START_TEST(require_solid_refuses_a_surface)
+{
+    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+    options.require_solid = true;
+    ebpo_tree tree;
+    ck_assert_int_eq(build_with(&tree, ebpo_test_sheet(1, 4), &options), EBPO_E_NOT_SOLID);
+    options.require_solid = false;
+    ck_assert_int_eq(build_with(&tree, ebpo_test_sheet(1, 4), &options), EBPO_OK);
+    ck_assert(!tree.info.solid);
+    for (int i = 0; i < tree.info.level_count; i++)
+        ck_assert_uint_eq(tree.level[i].black_count, 0);
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
+static ebpo_mesh two_spheres(double shift)
+{
+    double a[3] = { 0, 0, 0 }, b[3] = { shift, 0, 0 };
+    ebpo_mesh mesh = ebpo_test_sphere(a, 1, 3), other = ebpo_test_sphere(b, 1, 3);
+    ebpo_test_append(&mesh, &other);
+    ebpo_mesh_free(&other);
+    return mesh;
+}
+
+static double black_volume(const ebpo_tree *tree)
+{
+    double cell = tree->info.box_size[0] * tree->info.box_size[1] * tree->info.box_size[2], sum = 0;
+    for (int i = 0; i < tree->info.level_count; i++, cell /= 8)
+        sum += (double)tree->level[i].black_count * cell;
+    return sum;
+}
+
+START_TEST(rules_differ_where_shells_overlap)
+{
+    double volume[3];
+    for (int rule = 0; rule < 3; rule++) {
+        ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+        options.rule = (ebpo_rule)rule;
+        options.max_level = 6;
+        ebpo_tree tree = build(two_spheres(0.7), &options);
+        volume[rule] = black_volume(&tree);
+        ebpo_tree_free(&tree);
+    }
+    ck_assert_double_eq(volume[EBPO_RULE_NONZERO], volume[EBPO_RULE_POSITIVE]);
+    ck_assert_double_lt(volume[EBPO_RULE_EVENODD], 0.8 * volume[EBPO_RULE_NONZERO]);
+}
+END_TEST
+
+START_TEST(bad_options_leave_nothing_behind)
+{
+    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+    options.max_level = 21;
+    ebpo_tree tree;
+    ck_assert_int_eq(build_with(&tree, ebpo_test_make("tetrahedron"), &options), EBPO_E_ARGUMENT);
+    ck_assert_ptr_null(tree.mesh.faces);
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("build");
+    TCase *tests = tcase_create("build");
+    tcase_set_timeout(tests, 600);
+    tcase_add_loop_test(tests, tree_of_every_solid_is_consistent, 0, ebpo_test_solid_count);
+    tcase_add_test(tests, result_does_not_depend_on_threads);
+    tcase_add_test(tests, maximum_level_follows_equation_3);
+    tcase_add_test(tests, levels_zero_and_twenty_work);
+    tcase_add_test(tests, too_many_cells_are_refused);
+    tcase_add_test(tests, require_solid_refuses_a_surface);
+    tcase_add_test(tests, rules_differ_where_shells_overlap);
+    tcase_add_test(tests, bad_options_leave_nothing_behind);
+    suite_add_tcase(suite, tests);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_NORMAL);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed ? 1 : 0;
+}

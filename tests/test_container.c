@@ -1,0 +1,589 @@
+/* The container: trees come back bit for bit, equal trees give equal files, and damage is noticed. */
+#include <check.h>
+#include <fcntl.h>
+#include <hdf5.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "codec/chunk.h"
+#include "codec/coding.h"
+#include "h5/h5.h"
+#include "random_tree.h"
+
+static char folder[64];
+
+static void make_folder(void)
+{
+    snprintf(folder, sizeof folder, "/tmp/ebpo-container-XXXXXX");
+    ck_assert_ptr_nonnull(mkdtemp(folder));
+}
+
+static void remove_folder(void)
+{
+    char command[256];
+    snprintf(command, sizeof command, "chmod -R u+w '%s' && rm -rf '%s'", folder, folder);
+    ck_assert_int_eq(system(command), 0);
+}
+
+static const char *in_folder(const char *name)
+{
+    static char path[4][128];
+    static int turn;
+    turn = (turn + 1) % 4;
+    snprintf(path[turn], sizeof path[turn], "%s/%s", folder, name);
+    return path[turn];
+}
+
+static uint8_t *slurp(const char *path, size_t *size)
+{
+    FILE *f = fopen(path, "rb");
+    ck_assert_ptr_nonnull(f);
+    fseek(f, 0, SEEK_END);
+    *size = (size_t)ftell(f);
+    rewind(f);
+    uint8_t *data = malloc(*size + 1);
+    ck_assert_uint_eq(fread(data, 1, *size, f), *size);
+    fclose(f);
+    return data;
+}
+
+static void spill(const char *path, const uint8_t *data, size_t size)
+{
+    FILE *f = fopen(path, "wb");
+    ck_assert_ptr_nonnull(f);
+    ck_assert_uint_eq(fwrite(data, 1, size, f), size);
+    fclose(f);
+}
+
+static void write_ok(const ebpo_tree *tree, const char *path, ebpo_codec codec, unsigned threads, uint32_t parts)
+{
+    ebpo_write_options options = EBPO_WRITE_OPTIONS_INIT;
+    ebpo_error error = EBPO_ERROR_INIT;
+    options.codec = codec;
+    options.threads = threads;
+    options.parts = parts;
+    ck_assert_msg(ebpo_tree_write(tree, path, &options, &error) == EBPO_OK, "%s", error.message);
+}
+
+static ebpo_file *open_ok(const char *path)
+{
+    ebpo_file *file;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert_msg(ebpo_file_open(&file, path, &error) == EBPO_OK, "%s", error.message);
+    return file;
+}
+
+static void same(const void *a, const void *b, uint64_t count, size_t size, const char *what)
+{
+    ck_assert_msg(!a == !b || count == 0, "%s: present in one only", what);
+    if (a && b)
+        ck_assert_msg(memcmp(a, b, count * size) == 0, "%s differs", what);
+}
+
+static void same_level(const ebpo_level *a, const ebpo_level *b)
+{
+    ck_assert_uint_eq(a->group_count, b->group_count);
+    ck_assert_uint_eq(a->gray_count, b->gray_count);
+    ck_assert_uint_eq(a->leaf_count, b->leaf_count);
+    ck_assert_uint_eq(a->white_count, b->white_count);
+    ck_assert_uint_eq(a->black_count, b->black_count);
+    ck_assert_uint_eq(a->ref_count, b->ref_count);
+    ck_assert_uint_eq(a->new_count, b->new_count);
+    same(a->types, b->types, a->group_count, 2, "types");
+    same(a->plane_counts, b->plane_counts, a->gray_count, 1, "plane_counts");
+    same(a->planes, b->planes, a->plane_count, 4, "planes");
+    same(a->leaf_winding, b->leaf_winding, a->leaf_count, 4, "leaf_winding");
+    same(a->black_winding, b->black_winding, a->black_count, 4, "black_winding");
+    same(a->white_winding, b->white_winding, a->white_count, 4, "white_winding");
+    same(a->leaf_first, b->leaf_first, a->leaf_count, 8, "leaf_first");
+    same(a->leaf_new, b->leaf_new, a->leaf_count, 4, "leaf_new");
+    same(a->leaf_ref_count, b->leaf_ref_count, a->leaf_count, 4, "leaf_ref_count");
+    same(a->leaf_refs, b->leaf_refs, a->ref_count, 4, "leaf_refs");
+    same(a->leaf_plane_counts, b->leaf_plane_counts, a->leaf_count, 1, "leaf_plane_counts");
+    same(a->leaf_planes, b->leaf_planes, a->leaf_plane_count, 4, "leaf_planes");
+    ck_assert(a->gray_volume == b->gray_volume && a->leaf_volume == b->leaf_volume);
+}
+
+static void same_tree(const ebpo_tree *a, const ebpo_tree *b)
+{
+    ck_assert_int_eq(a->info.level_count, b->info.level_count);
+    for (int i = 0; i < a->info.level_count; i++)
+        same_level(&a->level[i], &b->level[i]);
+    same(a->mesh.faces, b->mesh.faces, a->mesh.face_count, 12, "faces");
+    same(a->mesh.xyz32, b->mesh.xyz32, a->mesh.vertex_count, 12, "float vertices");
+    same(a->mesh.xyz64, b->mesh.xyz64, a->mesh.vertex_count, 24, "double vertices");
+    same(a->vertex_source, b->vertex_source, a->mesh.vertex_count, 4, "vertex_source");
+    same(a->face_source, b->face_source, a->mesh.face_count, 4, "face_source");
+    ck_assert_str_eq(a->info.source_name, b->info.source_name);
+    ck_assert_str_eq(a->info.unit, b->info.unit);
+    ck_assert_str_eq(a->info.crs, b->info.crs);
+    ck_assert(memcmp(a->info.box_origin, b->info.box_origin, 24) == 0 && memcmp(a->info.box_size, b->info.box_size, 24) == 0);
+    ck_assert(a->info.report.genus == b->info.report.genus && a->info.report.volume == b->info.report.volume);
+    ck_assert(a->info.rule == b->info.rule && a->info.solid == b->info.solid && a->info.epsilon == b->info.epsilon);
+}
+
+/* Shapes of trees: single leaf, several levels, many items (index arrays, several chunks), odd windings, surface, doubles, leaf planes. */
+static const random_tree_options shapes[] = {
+    { 1, 1, 0, 9, true, false, false, false },   { 2, 2, 0, 5, true, false, false, false },
+    { 3, 5, 8, 6, true, true, true, false },     { 4, 6, 7, 9, false, false, false, true },
+    { 5, 12, 1, 300, true, false, false, true }, { 6, 8, 8, 9, true, false, true, true },
+    { 7, 7, 9, 90000, true, false, false, false },
+};
+enum { SHAPES = sizeof shapes / sizeof shapes[0] };
+
+START_TEST(trees_come_back_bit_for_bit)
+{
+    ebpo_tree tree, back;
+    random_tree_options options = shapes[_i];
+    if (options.new_faces > 1000)
+        options.levels = 3;
+    random_tree_make(&tree, &options);
+    for (int codec = EBPO_CODEC_ZSTD; codec <= EBPO_CODEC_NONE; codec++)
+        for (unsigned threads = 1; threads <= 3; threads += 2) {
+            write_ok(&tree, in_folder("t.ebpo.h5"), (ebpo_codec)codec, threads, ~0u);
+            ebpo_file *file = open_ok(in_folder("t.ebpo.h5"));
+            ebpo_error error = EBPO_ERROR_INIT;
+            ck_assert_msg(ebpo_file_read_tree(file, &back, threads, &error) == EBPO_OK, "%s", error.message);
+            ck_assert_int_eq(ebpo_file_info(file)->codec, codec);
+            ck_assert_msg(ebpo_file_check_content(file, threads, &error) == EBPO_OK, "%s", error.message);
+            same_tree(&tree, &back);
+            ebpo_tree_free(&back);
+            ebpo_file_close(file);
+        }
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
+START_TEST(equal_trees_give_equal_bytes_for_any_thread_count)
+{
+    ebpo_tree tree;
+    random_tree_make(&tree, &shapes[5]);
+    for (int codec = EBPO_CODEC_ZSTD; codec <= EBPO_CODEC_NONE; codec++) {
+        size_t size, other_size;
+        write_ok(&tree, in_folder("a.ebpo.h5"), (ebpo_codec)codec, 1, ~0u);
+        write_ok(&tree, in_folder("b.ebpo.h5"), (ebpo_codec)codec, 7, ~0u);
+        uint8_t *a = slurp(in_folder("a.ebpo.h5"), &size), *b = slurp(in_folder("b.ebpo.h5"), &other_size);
+        ck_assert_uint_eq(size, other_size);
+        ck_assert_int_eq(memcmp(a, b, size), 0);
+        free(a);
+        free(b);
+    }
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
+START_TEST(content_checksum_does_not_depend_on_the_codec)
+{
+    ebpo_tree tree;
+    uint8_t digest[32];
+    random_tree_make(&tree, &shapes[2]);
+    for (int codec = EBPO_CODEC_ZSTD; codec <= EBPO_CODEC_NONE; codec++) {
+        write_ok(&tree, in_folder("a.ebpo.h5"), (ebpo_codec)codec, 1, ~0u);
+        ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
+        if (codec == EBPO_CODEC_ZSTD)
+            memcpy(digest, ebpo_file_info(file)->content_sha256, 32);
+        ck_assert_int_eq(memcmp(digest, ebpo_file_info(file)->content_sha256, 32), 0);
+        ebpo_file_close(file);
+    }
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
+static herr_t check_chunks(hid_t group, const char *name, const H5L_info_t *info, void *data)
+{
+    (void)info;
+    uint64_t *head = data;
+    hid_t object = H5Oopen(group, name, H5P_DEFAULT);
+    if (H5Iget_type(object) == H5I_DATASET) {
+        hsize_t count = 0;
+        hid_t space = H5Dget_space(object);
+        ck_assert_int_ge(H5Dget_num_chunks(object, space, &count), 0);
+        for (hsize_t i = 0; i < count; i++) {
+            hsize_t at[2], size;
+            unsigned mask;
+            haddr_t address;
+            ck_assert_int_ge(H5Dget_chunk_info(object, space, i, at, &mask, &address, &size), 0);
+            ck_assert_uint_ge(address, head[0]);
+            head[1] += size;
+        }
+        H5Sclose(space);
+    }
+    H5Oclose(object);
+    return 0;
+}
+
+START_TEST(all_metadata_is_in_a_small_head)
+{
+    ebpo_tree tree;
+    random_tree_make(&tree, &shapes[4]);
+    ck_assert_int_eq(tree.info.level_count, 12);
+    write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, ~0u);
+    ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
+    uint64_t head[2] = { ebpo_file_info(file)->head_bytes, 0 }, size = ebpo_file_info(file)->file_bytes;
+    ebpo_file_close(file);
+    ck_assert_uint_lt(head[0], 64 << 10);
+    hid_t fid = H5Fopen(in_folder("a.ebpo.h5"), H5F_ACC_RDONLY, H5P_DEFAULT);
+    ck_assert_int_ge(H5Lvisit(fid, H5_INDEX_NAME, H5_ITER_NATIVE, check_chunks, head), 0);
+    H5Fclose(fid);
+    ck_assert_uint_eq(head[0] + head[1], size); /* nothing behind the head but chunks, and no gaps */
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
+START_TEST(libhdf5_reads_what_we_compress)
+{
+    ebpo_tree tree;
+    random_tree_make(&tree, &shapes[5]);
+    ck_assert_int_eq(ebpo_register_filters(NULL), EBPO_OK);
+    for (int codec = EBPO_CODEC_ZSTD; codec <= EBPO_CODEC_NONE; codec++) {
+        write_ok(&tree, in_folder("a.ebpo.h5"), (ebpo_codec)codec, 2, ~0u);
+        hid_t fid = H5Fopen(in_folder("a.ebpo.h5"), H5F_ACC_RDONLY, H5P_DEFAULT);
+        hid_t planes = H5Dopen2(fid, "/levels/06/planes", H5P_DEFAULT), codes = H5Dopen2(fid, "/mesh/faces", H5P_DEFAULT);
+        uint32_t *values = malloc(tree.level[6].plane_count * 4), *faces = malloc(tree.mesh.face_count * 12);
+        ck_assert_int_ge(H5Dread(planes, H5T_NATIVE_UINT32, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), 0);
+        ck_assert_int_ge(H5Dread(codes, H5T_NATIVE_UINT32, H5S_ALL, H5S_ALL, H5P_DEFAULT, faces), 0);
+        ck_assert_int_eq(memcmp(values, tree.level[6].planes, tree.level[6].plane_count * 4), 0);
+        uint64_t seen = 0;
+        ck_assert(ebpo_corners_decode((uint8_t *)faces, tree.mesh.face_count, &seen, faces));
+        ck_assert_int_eq(memcmp(faces, tree.mesh.faces, tree.mesh.face_count * 12), 0);
+        free(values);
+        free(faces);
+        H5Dclose(planes);
+        H5Dclose(codes);
+        H5Fclose(fid);
+    }
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
+START_TEST(parts_that_are_left_out_are_absent)
+{
+    ebpo_tree tree, back;
+    ebpo_mesh mesh;
+    ebpo_error error = EBPO_ERROR_INIT;
+    uint32_t *vertex_source, *face_source;
+    random_tree_make(&tree, &shapes[3]);
+    for (uint32_t parts = 0; parts < 16; parts++) {
+        write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, parts);
+        ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
+        uint32_t there = parts & EBPO_PART_MESH ? parts : parts & ~(uint32_t)EBPO_PART_MAPS;
+        ck_assert_uint_eq(ebpo_file_info(file)->parts, there);
+        ck_assert_msg(ebpo_file_read_tree(file, &back, 1, &error) == EBPO_OK, "%s", error.message);
+        ck_assert_int_eq(back.level[5].leaf_planes != NULL, (there & EBPO_PART_LEAF_PLANES) != 0);
+        ck_assert_int_eq(back.level[4].planes != NULL, (there & EBPO_PART_PLANES) != 0);
+        ck_assert_int_eq(back.level[5].leaf_first != NULL, (there & EBPO_PART_MESH) != 0);
+        ck_assert_int_eq(ebpo_file_read_mesh(file, &mesh, 1, NULL), there & EBPO_PART_MESH ? EBPO_OK : EBPO_E_ABSENT);
+        ebpo_mesh_free(&mesh);
+        ck_assert_int_eq(ebpo_file_read_maps(file, &vertex_source, &face_source, 1, NULL), there & EBPO_PART_MAPS ? EBPO_OK : EBPO_E_ABSENT);
+        free(vertex_source);
+        free(face_source);
+        ck_assert_int_eq(ebpo_file_check_content(file, 2, NULL), EBPO_OK);
+        ebpo_tree_free(&back);
+        ebpo_file_close(file);
+    }
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
+START_TEST(source_order_undoes_the_maps)
+{
+    ebpo_tree tree;
+    ebpo_mesh mesh;
+    bool ordered;
+    random_tree_make(&tree, &shapes[_i]);
+    tree.info.source_vertex_count = tree.mesh.vertex_count * 2; /* as after welding: every second number is gone */
+    for (uint64_t i = 0; i < tree.mesh.vertex_count; i++)
+        tree.vertex_source[i] *= 2;
+    write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, ~0u);
+    ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
+    ck_assert_int_eq(ebpo_file_read_source_mesh(file, &mesh, &ordered, 2, NULL), EBPO_OK);
+    ck_assert(ordered);
+    for (uint64_t i = 0; i < tree.mesh.face_count; i++)
+        for (int k = 0; k < 3; k++)
+            ck_assert_uint_eq(mesh.faces[3 * (uint64_t)tree.face_source[i] + k], tree.vertex_source[tree.mesh.faces[3 * i + k]] / 2);
+    size_t size = mesh.xyz32 ? 12 : 24;
+    const char *sorted = mesh.xyz32 ? (char *)mesh.xyz32 : (char *)mesh.xyz64;
+    const char *stored = mesh.xyz32 ? (char *)tree.mesh.xyz32 : (char *)tree.mesh.xyz64;
+    for (uint64_t i = 0; i < tree.mesh.vertex_count; i++)
+        ck_assert_int_eq(memcmp(sorted + tree.vertex_source[i] / 2 * size, stored + i * size, size), 0);
+    ebpo_mesh_free(&mesh);
+    ebpo_file_close(file);
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
+START_TEST(read_only_folders_will_do)
+{
+    ebpo_tree tree;
+    random_tree_make(&tree, &shapes[1]);
+    write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, ~0u);
+    ck_assert_int_eq(chmod(in_folder("a.ebpo.h5"), 0444) | chmod(folder, 0555), 0);
+    ebpo_file *file = open_ok(in_folder("a.ebpo.h5")), *again = open_ok(in_folder("a.ebpo.h5"));
+    ebpo_file_close(file);
+    ck_assert_int_eq(ebpo_file_check_content(again, 1, NULL), EBPO_OK);
+    ebpo_file_close(again);
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
+/* Opens and reads everything; true when that, and the checksum, found nothing wrong. */
+static bool reads_well(const char *path, ebpo_error *error)
+{
+    ebpo_file *file;
+    ebpo_tree tree;
+    if (ebpo_file_open(&file, path, error) != EBPO_OK)
+        return false;
+    bool ok = ebpo_file_read_tree(file, &tree, 1, error) == EBPO_OK;
+    if (ok)
+        ebpo_tree_free(&tree);
+    ok = ok && ebpo_file_check_content(file, 1, error) == EBPO_OK;
+    ebpo_file_close(file);
+    return ok;
+}
+
+START_TEST(every_cut_off_file_is_refused)
+{
+    ebpo_tree tree;
+    size_t size;
+    random_tree_make(&tree, &shapes[2]);
+    write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, ~0u);
+    uint8_t *data = slurp(in_folder("a.ebpo.h5"), &size);
+    for (size_t cut = 0; cut < size; cut += cut < size - 20 ? 197 : 1) {
+        ebpo_error error = EBPO_ERROR_INIT;
+        spill(in_folder("b.ebpo.h5"), data, cut);
+        ck_assert_msg(!reads_well(in_folder("b.ebpo.h5"), &error), "cut at %zu", cut);
+        ck_assert_ptr_nonnull(strstr(error.message, "b.ebpo.h5"));
+    }
+    free(data);
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
+/* zstd frames have a few bits without meaning; reads_well has compared the content, so a flip that it passes changed nothing. */
+START_TEST(every_flipped_bit_behind_the_head_is_noticed)
+{
+    ebpo_tree tree;
+    size_t size;
+    random_tree_make(&tree, &shapes[2]);
+    write_ok(&tree, in_folder("a.ebpo.h5"), (ebpo_codec)_i, 1, ~0u);
+    ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
+    uint64_t head = ebpo_file_info(file)->head_bytes;
+    ebpo_file_close(file);
+    uint8_t *data = slurp(in_folder("a.ebpo.h5"), &size);
+    unsigned missed = 0;
+    for (size_t at = (size_t)head; at < size; at += 37) {
+        ebpo_error error = EBPO_ERROR_INIT;
+        uint8_t old = data[at];
+        data[at] ^= (uint8_t)(1u << at % 8);
+        spill(in_folder("b.ebpo.h5"), data, size);
+        missed += reads_well(in_folder("b.ebpo.h5"), &error);
+        data[at] = old;
+    }
+    ck_assert_uint_le(missed, _i == EBPO_CODEC_ZSTD ? 2 : 0);
+    free(data);
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
+/* Flips in the head: refused, or without effect (bytes that HDF5 leaves unused); never a crash, never other content. */
+START_TEST(flipped_bits_in_the_head_do_no_harm)
+{
+    ebpo_tree tree, back;
+    size_t size;
+    random_tree_make(&tree, &shapes[1]);
+    write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, ~0u);
+    uint8_t *data = slurp(in_folder("a.ebpo.h5"), &size);
+    for (size_t at = 0; at < size && at < 9000; at += 13) {
+        uint8_t old = data[at];
+        data[at] ^= (uint8_t)(1u << at % 8);
+        spill(in_folder("b.ebpo.h5"), data, size);
+        ebpo_file *file;
+        if (ebpo_file_open(&file, in_folder("b.ebpo.h5"), NULL) == EBPO_OK) {
+            if (ebpo_file_read_tree(file, &back, 1, NULL) == EBPO_OK) {
+                same_tree(&tree, &back);
+                ebpo_tree_free(&back);
+            }
+            ebpo_file_close(file);
+        }
+        data[at] = old;
+    }
+    free(data);
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
+typedef void (*spoil_fn)(ebpo_tree *tree);
+static void spoil_types(ebpo_tree *t) { t->level[1].types[0] ^= 1; }
+static void spoil_root(ebpo_tree *t) { t->level[0].types[0] |= 4; }
+static void spoil_first_use(ebpo_tree *t) { t->mesh.faces[0] = 1; }
+static void spoil_vertex(ebpo_tree *t) { t->mesh.xyz64[3] = NAN; }
+static void spoil_map(ebpo_tree *t) { t->vertex_source[1] = t->vertex_source[0]; }
+static void spoil_plane(ebpo_tree *t) { t->level[3].planes[0] = UINT32_MAX; }
+static void spoil_text(ebpo_tree *t) { t->info.unit[0] = '\n'; }
+static void spoil_box(ebpo_tree *t) { t->info.box_origin[1] = NAN; }
+static void spoil_order(ebpo_tree *t) { t->level[4].leaf_first[2]++; }
+static void spoil_black(ebpo_tree *t) { t->level[4].black_winding[0] = 0; }
+static void spoil_mesh(ebpo_tree *t) { t->mesh.face_count--; }
+static void spoil_levels(ebpo_tree *t) { t->info.level_count = 22; }
+static const spoil_fn spoils[] = { spoil_types, spoil_root, spoil_first_use, spoil_vertex, spoil_map, spoil_plane, spoil_text, spoil_box,
+                                   spoil_order, spoil_black, spoil_mesh, spoil_levels };
+
+START_TEST(writer_refuses_a_tree_that_readers_would_refuse)
+{
+    ebpo_tree tree;
+    ebpo_error error = EBPO_ERROR_INIT;
+    random_tree_make(&tree, &shapes[2]);
+    spoils[_i](&tree);
+    ck_assert_int_eq(ebpo_tree_write(&tree, in_folder("a.ebpo.h5"), NULL, &error), EBPO_E_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(error.message, "not written"));
+    ck_assert_int_ne(access(in_folder("a.ebpo.h5"), F_OK), 0);
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
+static bool stop_at_once(void *user, const char *stage, uint64_t done, uint64_t total)
+{
+    (void)user;
+    (void)stage;
+    (void)done;
+    (void)total;
+    return false;
+}
+
+START_TEST(a_stopped_writer_leaves_the_old_file)
+{
+    ebpo_tree tree;
+    size_t size, again;
+    random_tree_make(&tree, &shapes[3]);
+    write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_DEFLATE, 1, ~0u);
+    uint8_t *before = slurp(in_folder("a.ebpo.h5"), &size);
+    ebpo_write_options options = EBPO_WRITE_OPTIONS_INIT;
+    options.progress.report = stop_at_once;
+    ck_assert_int_eq(ebpo_tree_write(&tree, in_folder("a.ebpo.h5"), &options, NULL), EBPO_E_CANCELLED);
+    uint8_t *after = slurp(in_folder("a.ebpo.h5"), &again);
+    ck_assert(size == again && memcmp(before, after, size) == 0);
+    free(before);
+    free(after);
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
+START_TEST(codec_and_level_are_checked)
+{
+    ebpo_tree tree;
+    random_tree_make(&tree, &shapes[0]);
+    const struct { ebpo_codec codec; int level; ebpo_status status; } cases[] = {
+        { EBPO_CODEC_ZSTD, 22, EBPO_OK }, { EBPO_CODEC_ZSTD, 23, EBPO_E_ARGUMENT }, { EBPO_CODEC_DEFLATE, 9, EBPO_OK },
+        { EBPO_CODEC_DEFLATE, 10, EBPO_E_ARGUMENT }, { EBPO_CODEC_NONE, 1, EBPO_E_ARGUMENT }, { (ebpo_codec)7, 0, EBPO_E_ARGUMENT },
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        ebpo_write_options options = EBPO_WRITE_OPTIONS_INIT;
+        options.codec = cases[i].codec;
+        options.codec_level = cases[i].level;
+        ck_assert_int_eq(ebpo_tree_write(&tree, in_folder("a.ebpo.h5"), &options, NULL), cases[i].status);
+    }
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
+START_TEST(what_is_no_file_of_ours_is_named)
+{
+    ebpo_file *file;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert_int_eq(ebpo_file_open(&file, in_folder("none"), &error), EBPO_E_IO);
+    ck_assert_int_eq(ebpo_file_open(&file, folder, &error), EBPO_E_IO);
+    spill(in_folder("text"), (const uint8_t *)"hello", 5);
+    ck_assert_int_eq(ebpo_file_open(&file, in_folder("text"), &error), EBPO_E_FORMAT);
+    hid_t fid = H5Fcreate(in_folder("other.h5"), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+    H5Fclose(fid);
+    ck_assert_int_eq(ebpo_file_open(&file, in_folder("other.h5"), &error), EBPO_E_FORMAT);
+    ck_assert_ptr_nonnull(strstr(error.message, "not an EBP-Octree"));
+    ck_assert_ptr_null(file);
+}
+END_TEST
+
+START_TEST(callers_error_printing_is_given_back)
+{
+    H5E_auto2_t before, after;
+    void *data;
+    ebpo_file *file;
+    H5Eget_auto2(H5E_DEFAULT, &before, &data);
+    spill(in_folder("text"), (const uint8_t *)"hello", 5);
+    ck_assert_int_eq(ebpo_file_open(&file, in_folder("text"), NULL), EBPO_E_FORMAT);
+    H5Eget_auto2(H5E_DEFAULT, &after, &data);
+    ck_assert(before == after);
+}
+END_TEST
+
+START_TEST(chunks_come_back_from_every_pipeline)
+{
+    static ebpo_chunk_coder coder;
+    static uint8_t raw[EBPO_CHUNK_BYTES_MAX], back[EBPO_CHUNK_BYTES_MAX];
+    uint64_t state = 1;
+    for (size_t i = 0; i < sizeof raw; i++, state = state * 6364136223846793005u + 1)
+        raw[i] = (uint8_t)(state >> 60);
+    for (int pipeline = EBPO_PIPELINE_ZSTD; pipeline <= EBPO_PIPELINE_BARE; pipeline++)
+        for (size_t size = 1; size <= 8; size *= 2)
+            for (size_t bytes = 8; bytes <= sizeof raw; bytes *= 8) {
+                uint8_t *stored = malloc(ebpo_chunk_bound(bytes));
+                size_t used = 0;
+                const char *why;
+                ck_assert_int_eq(ebpo_chunk_encode(&coder, (ebpo_pipeline)pipeline, 0, size, raw, bytes, stored, &used), EBPO_OK);
+                ck_assert_int_eq(ebpo_chunk_decode(&coder, (ebpo_pipeline)pipeline, size, stored, used, back, bytes, &why), EBPO_OK);
+                ck_assert_int_eq(memcmp(raw, back, bytes), 0);
+                ck_assert_int_eq(ebpo_chunk_decode(&coder, (ebpo_pipeline)pipeline, size, stored, used - 1, back, bytes, &why),
+                                 EBPO_E_FORMAT);
+                free(stored);
+            }
+    ebpo_chunk_coder_clear(&coder);
+}
+END_TEST
+
+START_TEST(codings_return_every_bit_pattern)
+{
+    uint32_t bits[12] = { 0, 1, 0x80000000u, 0x7fffffffu, 0xffffffffu, 0x7f800000u, 0xff800000u, 0x3f800000u, 0xbf800000u, 2, 3, 4 };
+    float xyz[12], back[12];
+    uint8_t file[48];
+    memcpy(xyz, bits, sizeof bits);
+    ebpo_points32_encode(xyz, 4, file);
+    ebpo_points32_decode(file, 4, back);
+    ck_assert_int_eq(memcmp(xyz, back, sizeof xyz), 0);
+    ck_assert_uint_eq(ebpo_float_order32(0x80000000u), 0xffffffffu); /* -0 comes right before +0 */
+    uint32_t numbers[3] = { UINT32_MAX, 0, 5 }, numbers_back[3];
+    ebpo_numbers_encode(numbers, 3, file);
+    ebpo_numbers_decode(file, 3, numbers_back);
+    ck_assert_int_eq(memcmp(numbers, numbers_back, sizeof numbers), 0);
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("container");
+    TCase *tests = tcase_create("container");
+    tcase_set_timeout(tests, 300);
+    tcase_add_checked_fixture(tests, make_folder, remove_folder);
+    tcase_add_loop_test(tests, trees_come_back_bit_for_bit, 0, SHAPES);
+    tcase_add_test(tests, equal_trees_give_equal_bytes_for_any_thread_count);
+    tcase_add_test(tests, content_checksum_does_not_depend_on_the_codec);
+    tcase_add_test(tests, all_metadata_is_in_a_small_head);
+    tcase_add_test(tests, libhdf5_reads_what_we_compress);
+    tcase_add_test(tests, parts_that_are_left_out_are_absent);
+    tcase_add_loop_test(tests, source_order_undoes_the_maps, 1, 4);
+    tcase_add_test(tests, read_only_folders_will_do);
+    tcase_add_test(tests, every_cut_off_file_is_refused);
+    tcase_add_loop_test(tests, every_flipped_bit_behind_the_head_is_noticed, 0, 3);
+    tcase_add_test(tests, flipped_bits_in_the_head_do_no_harm);
+    tcase_add_loop_test(tests, writer_refuses_a_tree_that_readers_would_refuse, 0, sizeof spoils / sizeof spoils[0]);
+    tcase_add_test(tests, a_stopped_writer_leaves_the_old_file);
+    tcase_add_test(tests, codec_and_level_are_checked);
+    tcase_add_test(tests, what_is_no_file_of_ours_is_named);
+    tcase_add_test(tests, callers_error_printing_is_given_back);
+    tcase_add_test(tests, chunks_come_back_from_every_pipeline);
+    tcase_add_test(tests, codings_return_every_bit_pattern);
+    suite_add_tcase(suite, tests);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_NORMAL);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed != 0;
+}

@@ -1,0 +1,243 @@
+/* Faces against cells, corner windings and selections, against plain twins that sample or enumerate. */
+#include <check.h>
+#include <math.h>
+#include <stdlib.h>
+
+#include "geom/plane_code.h"
+#include "planes/octants.h"
+#include "planes/planes.h"
+#include "solids.h"
+
+static const double shapes[][6] = {
+    { 0, 0, 0, 1, 1, 1 }, { -0.5, -0.5, -0.5, 1, 2, 0.001 }, { 1e7, -1e7, 3, 4, 8, 16 }, { 1e-30, 0, 0, 1e-30, 1e-30, 1e-30 }
+};
+
+/* Corners on a coarse grid around the box, so that touching walls, edges and corners exactly is common. */
+static ebpo_triangle random_face(const ebpo_box *box, uint64_t *seed, bool on_grid)
+{
+    ebpo_triangle t;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) {
+            double at = on_grid ? (double)(ebpo_test_random(seed) % 17) / 16 : ebpo_test_random_unit(seed);
+            t.corner[i][k] = box->origin[k] + at * box->size[k];
+        }
+    return t;
+}
+
+static void point_of(const ebpo_triangle *t, uint64_t *seed, double out[3])
+{
+    /* Weights in 64ths: corners and edge points are common. */
+    int a = (int)(ebpo_test_random(seed) % 65), b = (int)(ebpo_test_random(seed) % (uint64_t)(65 - a));
+    for (int k = 0; k < 3; k++)
+        out[k] = (a * t->corner[0][k] + b * t->corner[1][k] + (64 - a - b) * t->corner[2][k]) / 64;
+}
+
+static ebpo_box box_of(int i, int grid_level)
+{
+    ebpo_box box;
+    double low[3], high[3];
+    for (int k = 0; k < 3; k++) {
+        low[k] = shapes[i][k];
+        high[k] = shapes[i][k] + shapes[i][3 + k];
+    }
+    ck_assert(ebpo_box_make(&box, low, high, grid_level));
+    return box;
+}
+
+/* Relative position in the cell, and whether rounding of the sampled point could matter. */
+static bool clearly_in(const ebpo_box *box, ebpo_cell cell, const double p[3])
+{
+    for (int k = 0; k < 3; k++) {
+        double low = ebpo_wall(box, k, cell.level, cell.at[k]), high = ebpo_wall(box, k, cell.level, cell.at[k] + 1);
+        double margin = 1e-12 * (fabs(low) + fabs(high) + (high - low));
+        if (p[k] < low + margin || p[k] > high - margin)
+            return false;
+    }
+    return true;
+}
+
+START_TEST(no_octant_that_a_face_reaches_is_missed)
+{
+    uint64_t seed = 1;
+    for (int s = 0; s < 4; s++) {
+        ebpo_box box = box_of(s, 12);
+        for (int i = 0; i < 20000; i++) {
+            ebpo_triangle t = random_face(&box, &seed, i % 2);
+            ebpo_cell cell = { 0, { 0, 0, 0 } };
+            for (int depth = 0; depth < 6; depth++) {
+                unsigned mask = ebpo_octants_touched(&box, cell, &t);
+                for (int j = 0; j < 8; j++) {
+                    double p[3];
+                    point_of(&t, &seed, p);
+                    for (unsigned o = 0; o < 8; o++) {
+                        ebpo_cell child = { cell.level + 1, { 0, 0, 0 } };
+                        for (unsigned k = 0; k < 3; k++)
+                            child.at[k] = cell.at[k] * 2 + (o >> k & 1);
+                        if (clearly_in(&box, child, p)) {
+                            ck_assert_msg(mask >> o & 1, "octant %u missed at level %d", o, cell.level);
+                            ck_assert(!ebpo_triangle_misses_cell(&box, child, &t));
+                        }
+                    }
+                }
+                if (!mask)
+                    break;
+                unsigned o = (unsigned)__builtin_ctz(mask);
+                cell.level++;
+                for (unsigned k = 0; k < 3; k++)
+                    cell.at[k] = cell.at[k] * 2 + (o >> k & 1);
+            }
+        }
+    }
+}
+END_TEST
+
+START_TEST(octants_far_from_a_face_are_left_out)
+{
+    ebpo_box box = box_of(0, 10);
+    ebpo_triangle t = { { { 0.1, 0.1, 0.1 }, { 0.2, 0.1, 0.1 }, { 0.1, 0.2, 0.1 } } };
+    ck_assert_uint_eq(ebpo_octants_touched(&box, (ebpo_cell){ 0, { 0, 0, 0 } }, &t), 1);
+    /* A slanted face whose box reaches all octants, and which cuts off one corner of the cube. */
+    ebpo_triangle slanted = { { { 0.9, 0, 0 }, { 0, 0.9, 0 }, { 0, 0, 0.9 } } };
+    unsigned mask = ebpo_octants_touched(&box, (ebpo_cell){ 0, { 0, 0, 0 } }, &slanted);
+    ck_assert_uint_eq(mask, 0x17);
+}
+END_TEST
+
+START_TEST(clipped_face_bounds_every_point_of_it_in_the_cell)
+{
+    uint64_t seed = 2;
+    for (int s = 0; s < 4; s++) {
+        ebpo_box box = box_of(s, 12);
+        for (int i = 0; i < 40000; i++) {
+            ebpo_triangle t = random_face(&box, &seed, i % 2);
+            int level = (int)(ebpo_test_random(&seed) % 4);
+            ebpo_cell cell = { level, { 0, 0, 0 } };
+            for (int k = 0; k < 3; k++)
+                cell.at[k] = (uint32_t)(ebpo_test_random(&seed) % (1u << level));
+            double points[9][3], slack, n[3];
+            int count = ebpo_clip_triangle(&box, cell, &t, points, &slack);
+            ck_assert_int_le(count, 9);
+            ck_assert_double_lt(slack, 1e-9);
+            for (int j = 0; j < 8; j++) {
+                double p[3], best = -1e300, value = 0;
+                point_of(&t, &seed, p);
+                if (!clearly_in(&box, cell, p))
+                    continue;
+                ck_assert_int_gt(count, 0);
+                for (int k = 0; k < 3; k++)
+                    n[k] = 2 * ebpo_test_random_unit(&seed) - 1;
+                for (int q = 0; q < count; q++)
+                    best = fmax(best, n[0] * points[q][0] + n[1] * points[q][1] + n[2] * points[q][2]);
+                for (int k = 0; k < 3; k++) {
+                    double low = ebpo_wall(&box, k, level, cell.at[k]);
+                    value += n[k] * ((p[k] - low) / (box.size[k] / (1 << level)));
+                }
+                ck_assert_double_le(value, best + 3 * slack + 1e-8);
+            }
+        }
+    }
+}
+END_TEST
+
+START_TEST(corner_windings_of_a_cube_in_a_cell_are_zero_and_inside_ones_are_one)
+{
+    ebpo_box box = box_of(0, 4);
+    double low[3] = { 0.1, 0.1, 0.1 }, high[3] = { 0.9, 0.9, 0.9 };
+    ebpo_mesh cube = ebpo_test_box(low, high, 1);
+    ebpo_triangle faces[12];
+    for (int f = 0; f < 12; f++)
+        for (int i = 0; i < 3; i++)
+            for (int k = 0; k < 3; k++)
+                faces[f].corner[i][k] = cube.xyz64[3 * cube.faces[3 * f + i] + (uint32_t)k];
+    int32_t delta[8];
+    ebpo_corner_windings(&box, (ebpo_cell){ 0, { 0, 0, 0 } }, faces, 12, delta);
+    for (int i = 0; i < 8; i++)
+        ck_assert_int_eq(delta[i], 0);
+    ebpo_corner_windings(&box, (ebpo_cell){ 1, { 0, 0, 0 } }, faces, 12, delta);
+    for (int i = 0; i < 8; i++)
+        ck_assert_int_eq(delta[i], i == 7);
+    ebpo_corner_windings(&box, (ebpo_cell){ 1, { 1, 1, 1 } }, faces, 12, delta);
+    for (int i = 0; i < 8; i++)
+        ck_assert_int_eq(delta[i], i == 0 ? 0 : -1);
+    ebpo_mesh_free(&cube);
+}
+END_TEST
+
+/* The slow twin: always the greatest removal, everything evaluated in every round. */
+static int plain_greedy(ebpo_polytope *envelope, const ebpo_candidate *c, int count, double epsilon, int most, uint32_t *codes)
+{
+    int taken = 0;
+    while (taken < most) {
+        double best = 0;
+        uint32_t best_code = UINT32_MAX;
+        for (int i = 0; i < count; i++) {
+            int32_t v[3], d;
+            double n[3];
+            ebpo_plane_code_decode(c[i].normal, v, &d);
+            int q = ebpo_plane_code_offset(v, c[i].support);
+            if (q < 0)
+                continue;
+            uint32_t code = ebpo_plane_code_make(c[i].normal, q);
+            ebpo_plane_code_decode(code, v, &d);
+            double offset = ebpo_plane_as_double(v, d, n), gain = ebpo_polytope_removed(envelope, n, offset);
+            if (gain > best || (gain == best && code < best_code)) {
+                best = gain;
+                best_code = code;
+            }
+        }
+        if (!(best >= epsilon))
+            break;
+        int32_t v[3], d;
+        double n[3];
+        ebpo_plane_code_decode(best_code, v, &d);
+        double offset = ebpo_plane_as_double(v, d, n);
+        if (ebpo_polytope_clip(envelope, n, offset, taken) != EBPO_CLIP_CUT)
+            break;
+        codes[taken++] = best_code;
+    }
+    return taken;
+}
+
+START_TEST(lazy_greedy_takes_what_plain_greedy_takes)
+{
+    uint64_t seed = 3;
+    for (int round = 0; round < 400; round++) {
+        ebpo_candidate c[40];
+        for (int i = 0; i < 40; i++) {
+            double n[3] = { ebpo_test_random_unit(&seed) - 0.5, ebpo_test_random_unit(&seed) - 0.5, ebpo_test_random_unit(&seed) - 0.5 };
+            int32_t v[3], d;
+            ck_assert(ebpo_plane_code_normal(n, &c[i].normal));
+            ebpo_plane_code_decode(c[i].normal, v, &d);
+            c[i].support = 0.5 * (v[0] + v[1] + v[2]) + 511 * (0.15 + 0.3 * ebpo_test_random_unit(&seed));
+        }
+        ebpo_polytope fast, slow;
+        ebpo_polytope_cube(&fast);
+        ebpo_polytope_cube(&slow);
+        uint32_t a[EBPO_PLANES_MAX], b[EBPO_PLANES_MAX];
+        int na = ebpo_select_greedy(&fast, c, 40, 0.002, EBPO_PLANES_MAX, a);
+        int nb = plain_greedy(&slow, c, 40, 0.002, EBPO_PLANES_MAX, b);
+        ck_assert_int_eq(na, nb);
+        for (int i = 0; i < na; i++)
+            ck_assert_uint_eq(a[i], b[i]);
+        ck_assert_double_eq(ebpo_polytope_volume(&fast), ebpo_polytope_volume(&slow));
+    }
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("planes");
+    TCase *tests = tcase_create("planes");
+    tcase_set_timeout(tests, 300);
+    tcase_add_test(tests, no_octant_that_a_face_reaches_is_missed);
+    tcase_add_test(tests, octants_far_from_a_face_are_left_out);
+    tcase_add_test(tests, clipped_face_bounds_every_point_of_it_in_the_cell);
+    tcase_add_test(tests, corner_windings_of_a_cube_in_a_cell_are_zero_and_inside_ones_are_one);
+    tcase_add_test(tests, lazy_greedy_takes_what_plain_greedy_takes);
+    suite_add_tcase(suite, tests);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_NORMAL);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed ? 1 : 0;
+}

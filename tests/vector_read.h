@@ -1,0 +1,35 @@
+/* Reading a vector file whole, and its outcome as two lines: status, message. Words of libhdf5's own and the folder are left out. */
+#ifndef VECTOR_READ_H
+#define VECTOR_READ_H
+
+#include <stdio.h>
+#include <string.h>
+
+#include <ebpo/file.h>
+
+static ebpo_status vector_read(const char *path, ebpo_tree *tree, ebpo_error *error)
+{
+    ebpo_file *file;
+    ebpo_status status = ebpo_file_open(&file, path, error);
+    if (status != EBPO_OK)
+        return status;
+    status = ebpo_file_read_tree(file, tree, 1, error);
+    if (status == EBPO_OK)
+        status = ebpo_file_check_content(file, 1, error);
+    if (status != EBPO_OK)
+        ebpo_tree_free(tree);
+    ebpo_file_close(file);
+    return status;
+}
+
+static void vector_outcome(const char *path, const ebpo_error *error, char *text, size_t size)
+{
+    const char *name = strrchr(path, '/') ? strrchr(path, '/') + 1 : path;
+    const char *rest = strncmp(error->message, path, strlen(path)) == 0 ? error->message + strlen(path) : error->message;
+    snprintf(text, size, "%s\n%s%s\n", ebpo_status_name(error->status), name, rest);
+    char *cause = strstr(text, " (libhdf5: ");
+    if (cause)
+        snprintf(cause, 2, "\n");
+}
+
+#endif

@@ -1,0 +1,24 @@
+/* A picture in memory: 8-bit sRGB, rows from the top. */
+#ifndef EBPO_TOOLS_PICTURE_H
+#define EBPO_TOOLS_PICTURE_H
+
+#include <ebpo/base.h>
+
+typedef struct picture {
+    int width, height;
+    uint8_t *rgb; /* [height][width][3] */
+} picture;
+
+/* All of one colour; false when memory is short. */
+bool picture_make(picture *out, int width, int height, const uint8_t colour[3]);
+void picture_free(picture *p);
+
+/* Text in a bitmap font of 6 x 9 pixels times `scale`; (x, y) is the upper left corner. Small letters, digits and .,:%+-()/ are there, capitals
+ * show as small letters, all else as a space. What reaches over the border is cut off. */
+void picture_text(picture *p, int x, int y, int scale, const uint8_t colour[3], const char *text);
+int picture_text_width(int scale, const char *text);
+
+/* As a PNG file, whole or not at all. */
+EBPO_MUST_USE ebpo_status picture_write_png(const picture *p, const char *path, ebpo_error *error);
+
+#endif
