@@ -13,6 +13,13 @@
 #include "tree_json.h"
 #include "vector_read.h"
 
+/* libhdf5 1.10 itself leaks when it gives up on a damaged object header; that is not what we look for here. */
+const char *__lsan_default_suppressions(void);
+const char *__lsan_default_suppressions(void)
+{
+    return "leak:libhdf5";
+}
+
 static const char *folder;
 
 static void die(const char *what, const char *why)
@@ -107,9 +114,9 @@ static void make_passed(void)
     random_tree_options odd = { 11, 4, 6, 4, true, false, true, false };
     random_tree_make(&tree, &odd);
     write_vector("10_windings_of_all_sizes", &tree, EBPO_CODEC_ZSTD, ~0u);
-    random_tree_options many = { 12, 3, 9, 700, true, false, false, false };
+    random_tree_options many = { 12, 3, 9, 600, true, false, false, false };
     random_tree_make(&tree, &many);
-    write_vector("11_two_chunks_of_faces", &tree, EBPO_CODEC_ZSTD, ~0u);
+    write_vector("11_two_chunks_of_faces", &tree, EBPO_CODEC_ZSTD, EBPO_PART_MESH);
 }
 
 /* --- failed --- */
@@ -128,7 +135,8 @@ static void set_text(const char *object, const char *name, const char *text)
     H5Tset_size(type, strlen(text));
     H5Tset_strpad(type, H5T_STR_NULLPAD);
     H5Tset_cset(type, H5T_CSET_UTF8);
-    H5Adelete(id, name);
+    if (H5Aexists(id, name) > 0)
+        H5Adelete(id, name);
     hid_t attribute = H5Acreate2(id, name, type, space, H5P_DEFAULT, H5P_DEFAULT);
     need(H5Awrite(attribute, type, text) >= 0, name);
     H5Aclose(attribute);
@@ -232,7 +240,7 @@ static void v_source_less(void) { set_count("/", "source_vertex_count", 3); }
 static void v_gray_deep(void) { set_count("/levels/01", "gray", 1); }
 static void v_nodes(void) { set_count("/levels/01", "white", 77); }
 static void v_planes_many(void) { set_count("/levels/00", "planes", 256); }
-static void v_planes_count(void) { set_count("/levels/00", "planes", 1); }
+static void v_planes_count(void) { set_count("/levels/00", "planes", 200); }
 static void v_new_sum(void) { set_count("/levels/01", "faces_new", 3); }
 static void v_level_missing(void) { drop("/levels/01"); }
 static void v_array_missing(void) { drop("/mesh/faces"); }
@@ -272,7 +280,11 @@ static void v_skip_far(void) { poke("/levels/01/leaf_skip", 0, 0xffffffff); }
 static void v_leaf_new(void) { poke("/levels/01/leaf_new", 0, 200); }
 static void v_ref_counts(void) { poke("/levels/01/leaf_ref_count", 0, 200); }
 static void v_refs(void) { poke("/levels/01/leaf_refs", 0, 4); }
-static void v_order(void) { poke("/levels/03/leaf_skip", 0, 1); }
+static void v_order(void)
+{
+    poke("/levels/03/leaf_new", 0, 0); /* two leaves trade a face: sums and ranges stay right */
+    poke("/levels/03/leaf_new", 1, 3);
+}
 static void v_black(void) { poke("/levels/03/black_winding", 0, 2); }
 static void v_white(void) { poke("/levels/03/white_winding", 0, 1); }
 static void v_nan(void) { poke("/mesh/vertices", 0, (int64_t)0x7fc00000u << 1); }
@@ -441,6 +453,7 @@ int main(int argc, char **argv)
     if (argc != 2)
         die("usage", "make_vectors FOLDER");
     folder = argv[1];
+    H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
     snprintf(path, sizeof path, "%s/passed", folder);
     mkdir(path, 0777);
     snprintf(path, sizeof path, "%s/failed", folder);

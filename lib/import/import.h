@@ -1,6 +1,6 @@
 /* Reading OBJ, STL and OFF through assimp.
  *
- * assimp's own decimal reader does not round correctly. Measured with assimp 5.2.4, 27,000 coordinates each, against strtof: of text such as
+ * assimp's own decimal reader does not round correctly. Measured with assimp 5.2.4, 27,000 coordinates each, against correct rounding: of text such as
  * "0.296502" 0.3 % of the coordinates are one unit in the last place off; with 9 or 17 digits 0.5 %; with an exponent ("2.96502000e-01") 32 %,
  * by up to two units. Binary STL is exact. Who needs every bit of a text file converts it to PLY with another program.
  * assimp is large and has had memory errors on damaged files: for untrusted files prefer PLY, whose reader is ours.

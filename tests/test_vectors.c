@@ -1,0 +1,131 @@
+/* The files of format-spec/vectors: argument 1 is that folder, argument 2 the program make_vectors. */
+#include <check.h>
+#include <dirent.h>
+#include <stdlib.h>
+#include <unistd.h>
+#include <hdf5.h>
+#include <zlib.h>
+#include <zstd.h>
+
+#include "tree_json.h"
+#include "vector_read.h"
+
+/* libhdf5 1.10 itself leaks when it gives up on a damaged object header; that is not what we look for here. */
+const char *__lsan_default_suppressions(void);
+const char *__lsan_default_suppressions(void)
+{
+    return "leak:libhdf5";
+}
+
+static const char *vectors, *maker;
+
+static char *slurp(const char *path, size_t *size)
+{
+    FILE *in = fopen(path, "rb");
+    ck_assert_msg(in != NULL, "%s is missing", path);
+    fseek(in, 0, SEEK_END);
+    *size = (size_t)ftell(in);
+    rewind(in);
+    char *text = calloc(1, *size + 1);
+    ck_assert_uint_eq(fread(text, 1, *size, in), *size);
+    fclose(in);
+    return text;
+}
+
+/* Calls `check` for every .ebpo.h5 in a folder with its path and the path of its companion. */
+static unsigned each(const char *part, const char *companion, void (*check)(const char *path, const char *expected))
+{
+    char path[1024], other[1024];
+    snprintf(path, sizeof path, "%s/%s", vectors, part);
+    DIR *directory = opendir(path);
+    ck_assert_msg(directory != NULL, "%s is missing", path);
+    unsigned count = 0;
+    for (struct dirent *entry; (entry = readdir(directory)) != NULL;) {
+        const char *end = strstr(entry->d_name, ".ebpo.h5");
+        if (!end)
+            continue;
+        snprintf(path, sizeof path, "%s/%s/%s", vectors, part, entry->d_name);
+        snprintf(other, sizeof other, "%s/%s/%.*s%s", vectors, part, (int)(end - entry->d_name), entry->d_name, companion);
+        check(path, other);
+        count++;
+    }
+    closedir(directory);
+    return count;
+}
+
+static void check_passed(const char *path, const char *expected_path)
+{
+    ebpo_tree tree;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert_msg(vector_read(path, &tree, &error) == EBPO_OK, "%s", error.message);
+    char *json = NULL;
+    size_t json_size = 0, size;
+    FILE *out = open_memstream(&json, &json_size);
+    tree_json(out, &tree);
+    fclose(out);
+    char *expected = slurp(expected_path, &size);
+    ck_assert_str_eq(json, expected);
+    free(json);
+    free(expected);
+    ebpo_tree_free(&tree);
+}
+
+static void check_failed(const char *path, const char *expected_path)
+{
+    ebpo_tree tree;
+    ebpo_error error = EBPO_ERROR_INIT;
+    char text[1024];
+    size_t size;
+    ck_assert_msg(vector_read(path, &tree, &error) != EBPO_OK, "%s is read without an error", path);
+    vector_outcome(path, &error, text, sizeof text);
+    char *expected = slurp(expected_path, &size);
+    ck_assert_str_eq(text, expected);
+    free(expected);
+}
+
+START_TEST(passed_vectors_are_read_as_their_json_says)
+{
+    ck_assert_uint_ge(each("passed", ".json", check_passed), 11);
+}
+END_TEST
+
+START_TEST(failed_vectors_are_refused_with_their_text)
+{
+    ck_assert_uint_ge(each("failed", ".txt", check_failed), 60);
+}
+END_TEST
+
+/* Compressors may change their output from version to version: bytes are compared only where the vectors were made. */
+START_TEST(vectors_are_what_make_vectors_makes)
+{
+    unsigned major, minor, release;
+    H5get_libversion(&major, &minor, &release);
+    if (ZSTD_versionNumber() != 10504 || strcmp(zlibVersion(), "1.2.13") != 0 || major != 1 || minor != 10 || release != 8)
+        return;
+    char folder[] = "/tmp/ebpo-vectors-XXXXXX", command[4096];
+    ck_assert_ptr_nonnull(mkdtemp(folder));
+    snprintf(command, sizeof command, "'%s' %s 2>/dev/null && diff -r %s/passed '%s/passed' && diff -r %s/failed '%s/failed'; r=$?; rm -rf %s; exit $r",
+             maker, folder, folder, vectors, folder, vectors, folder);
+    ck_assert_int_eq(system(command), 0);
+}
+END_TEST
+
+int main(int argc, char **argv)
+{
+    if (argc != 3)
+        return 2;
+    vectors = argv[1];
+    maker = argv[2];
+    Suite *suite = suite_create("vectors");
+    TCase *tests = tcase_create("vectors");
+    tcase_set_timeout(tests, 300);
+    tcase_add_test(tests, passed_vectors_are_read_as_their_json_says);
+    tcase_add_test(tests, failed_vectors_are_refused_with_their_text);
+    tcase_add_test(tests, vectors_are_what_make_vectors_makes);
+    suite_add_tcase(suite, tests);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_NORMAL);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed != 0;
+}
