@@ -14,7 +14,7 @@
 #include "vector_read.h"
 
 /* libhdf5 1.10 itself leaks when it gives up on a damaged object header; that is not what we look for here. */
-const char *__lsan_default_suppressions(void);
+__attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
 const char *__lsan_default_suppressions(void)
 {
     return "leak:libhdf5";
@@ -246,8 +246,11 @@ static void v_level_missing(void) { drop("/levels/01"); }
 static void v_array_missing(void) { drop("/mesh/faces"); }
 static void v_group_for_array(void)
 {
+    hid_t plist = H5Pcreate(H5P_GROUP_CREATE);
+    H5Pset_obj_track_times(plist, false);
     drop("/mesh/faces");
-    H5Gclose(H5Gcreate2(file, "/mesh/faces", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+    H5Gclose(H5Gcreate2(file, "/mesh/faces", H5P_DEFAULT, plist, H5P_DEFAULT));
+    H5Pclose(plist);
 }
 static void v_soft_link(void)
 {
@@ -280,11 +283,7 @@ static void v_skip_far(void) { poke("/levels/01/leaf_skip", 0, 0xffffffff); }
 static void v_leaf_new(void) { poke("/levels/01/leaf_new", 0, 200); }
 static void v_ref_counts(void) { poke("/levels/01/leaf_ref_count", 0, 200); }
 static void v_refs(void) { poke("/levels/01/leaf_refs", 0, 4); }
-static void v_order(void)
-{
-    poke("/levels/03/leaf_new", 0, 0); /* two leaves trade a face: sums and ranges stay right */
-    poke("/levels/03/leaf_new", 1, 3);
-}
+static void v_order(void) { poke("/levels/02/leaf_skip", 1, 46); }
 static void v_black(void) { poke("/levels/03/black_winding", 0, 2); }
 static void v_white(void) { poke("/levels/03/white_winding", 0, 1); }
 static void v_nan(void) { poke("/mesh/vertices", 0, (int64_t)0x7fc00000u << 1); }

@@ -11,7 +11,7 @@
 #include "vector_read.h"
 
 /* libhdf5 1.10 itself leaks when it gives up on a damaged object header; that is not what we look for here. */
-const char *__lsan_default_suppressions(void);
+__attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
 const char *__lsan_default_suppressions(void)
 {
     return "leak:libhdf5";

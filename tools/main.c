@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "command.h"
 #include "signals.h"
@@ -101,15 +102,22 @@ static int dispatch(int argc, char **argv)
     return c ? c->run(argc - 1, argv + 1) : unknown_command(name);
 }
 
+/* What was printed counts only once it has arrived: a full disk shows here. */
+static int flush_output(int code)
+{
+    errno = 0;
+    if (fflush(stdout) == 0 && !ferror(stdout))
+        return code;
+    fprintf(stderr, "ebpo: standard output: %s\n", errno ? strerror(errno) : "could not be written");
+    return code ? code : EXIT_FAILED;
+}
+
 int main(int argc, char **argv)
 {
     signals_install();
-    int code = dispatch(argc, argv);
-    /* What was printed counts only once it has arrived: a full disk shows here. */
-    errno = 0;
-    if (fflush(stdout) != 0 || ferror(stdout)) {
-        fprintf(stderr, "ebpo: standard output: %s\n", errno ? strerror(errno) : "could not be written");
-        return code ? code : EXIT_FAILED;
-    }
+    int code = flush_output(dispatch(argc, argv));
+    /* libhdf5 1.10 crashes in its exit handler after a file that could not be written; nothing is left for it to do. */
+    if (code == EXIT_FAILED)
+        _exit(code);
     return code;
 }

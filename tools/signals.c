@@ -13,6 +13,8 @@ static void give_up(int number)
 
 void signals_install(void)
 {
+    /* A limit on file size is an error like a full disk, not the end. */
+    signal(SIGXFSZ, SIG_IGN);
     static const int numbers[] = { SIGINT, SIGTERM, SIGHUP };
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
         struct sigaction action, before;

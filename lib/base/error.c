@@ -39,6 +39,10 @@ ebpo_status ebpo_fail(ebpo_error *error, ebpo_status status, const char *format,
         va_start(args, format);
         vsnprintf(error->message, sizeof error->message, format, args);
         va_end(args);
+        /* One line, whatever a file name or another library's message brings along. */
+        for (char *c = error->message; *c; c++)
+            if ((unsigned char)*c < 0x20 || *c == 0x7f)
+                *c = ' ';
     }
     return status;
 }

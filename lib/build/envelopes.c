@@ -101,14 +101,39 @@ static pair greater(pair a, pair b)
 }
 
 /* Points come in twos of a coordinate, so that one instruction serves both; the greatest of them does not depend on the order. */
-static void raise_support(const ebpo_envelope_scratch *scratch, const double n[3], double *support)
+static void raise_support(const ebpo_envelope_scratch *scratch, uint64_t step, const double n[3], double *support)
 {
     pair nx = { n[0], n[0] }, ny = { n[1], n[1] }, nz = { n[2], n[2] }, best = { *support, *support };
-    for (uint64_t i = 0; i < scratch->count; i += 2) {
-        const pair *p = scratch->point[i / 2];
+    for (uint64_t i = 0; 2 * i < scratch->count; i += step) {
+        const pair *p = scratch->point[i];
         best = greater(nx * p[0] + ny * p[1] + nz * p[2] + p[3], best);
     }
     *support = best[0] > best[1] ? best[0] : best[1];
+}
+
+/* Supports of all candidates, over the points and the vertices [begin, end). Those that cannot gain epsilon even if the solid
+ * reached no farther than a few of its points are dropped at once. */
+static int find_supports(const ebpo_builder *b, ebpo_envelope_scratch *scratch, ebpo_cell cell, int count, uint64_t begin,
+                         uint64_t end, const ebpo_polytope *envelope, double epsilon)
+{
+    double volume = ebpo_polytope_volume(envelope);
+    int kept = 0;
+    for (int j = 0; j < count; j++) {
+        ebpo_candidate c = scratch->candidates[j];
+        int32_t v[3], d;
+        ebpo_plane_code_decode(c.normal, v, &d);
+        double n[3] = { v[0], v[1], v[2] }, direction[3], few = -1e300;
+        for (int k = 0; k < 3; k++)
+            direction[k] = n[k] * (1.0 / EBPO_NORMAL_NORM);
+        raise_support(scratch, scratch->count / 16 + 1, n, &few);
+        if (few > -1e300 && ebpo_cap_bound(envelope, volume, direction, few * (1.0 / EBPO_NORMAL_NORM)) < epsilon)
+            continue;
+        if (begin < end)
+            c.support = ebpo_bounds_support(b, cell, n, begin, end);
+        raise_support(scratch, 1, n, &c.support);
+        scratch->candidates[kept++] = c;
+    }
+    return kept;
 }
 
 int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, const ebpo_subtree *s,
@@ -129,14 +154,7 @@ int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, cons
     for (int i = 0; i < 8; i++)
         if (corners >> i & 1 && !add_point(scratch, i & 1, i >> 1 & 1, i >> 2 & 1, 0))
             return -1;
-    for (int j = 0; j < count; j++) {
-        int32_t v[3], d;
-        ebpo_plane_code_decode(scratch->candidates[j].normal, v, &d);
-        double n[3] = { v[0], v[1], v[2] }, *support = &scratch->candidates[j].support;
-        if (!few)
-            *support = ebpo_bounds_support(b, cell, n, begin, end);
-        raise_support(scratch, n, support);
-    }
     double epsilon = b->options->epsilon * (top ? 0.1 : 1);
+    count = find_supports(b, scratch, cell, count, few ? 0 : begin, few ? 0 : end, envelope, epsilon);
     return ebpo_select_greedy(envelope, scratch->candidates, count, epsilon, EBPO_PLANES_MAX, codes);
 }

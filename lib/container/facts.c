@@ -301,7 +301,7 @@ static ebpo_status get_version(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info,
     ebpo_status status = ebpo_h5_get_text(in, root, "/", "format", format, sizeof format, NULL);
     if (status != EBPO_OK || strcmp(format, FORMAT) != 0)
         return ebpo_fail(error, EBPO_E_FORMAT, "%s: an HDF5 file, but not an EBP-Octree (its root attribute format does not say \"%s\"); "
-                         "make one with `ebpo build`", in->shown, FORMAT);
+                         "make one with `ebpo convert`", in->shown, FORMAT);
     status = get_fact(in, root, "/", &major, info, error);
     if (status == EBPO_OK)
         status = get_fact(in, root, "/", &minor, info, error);

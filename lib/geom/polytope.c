@@ -142,6 +142,7 @@ typedef struct cut {
     struct { uint8_t from, to; } rim[EBPO_POLYTOPE_CORNERS]; /* edges of kept loops that lie on the plane */
     int rims;
     bool full;
+    bool touched; /* old vertices lie on the plane: rim edges may have kept faces on both sides */
 } cut;
 
 static uint8_t add_vertex(cut *c, const double x[3], bool on)
@@ -239,7 +240,7 @@ static bool close_cap(cut *c, int32_t tag)
     int open = 0, begin = -1;
     for (int i = 0; i < c->rims; i++) {
         bool paired = false;
-        for (int j = 0; j < c->rims && !paired; j++)
+        for (int j = 0; c->touched && j < c->rims && !paired; j++)
             paired = c->rim[i].from == c->rim[j].to && c->rim[i].to == c->rim[j].from;
         if (paired)
             continue;
@@ -270,7 +271,7 @@ ebpo_clip ebpo_polytope_clip(ebpo_polytope *p, const double n[3], double d, int3
     c.in = p;
     c.out = &out;
     c.edges = c.rims = 0;
-    c.full = false;
+    c.full = c.touched = false;
     double most = -1e300, least = 1e300;
     for (int i = 0; i < p->vertex_count; i++) {
         double e = dot(n, p->vertex[i]) - d;
@@ -285,8 +286,11 @@ ebpo_clip ebpo_polytope_clip(ebpo_polytope *p, const double n[3], double d, int3
     out.vertex_count = out.face_count = out.corner_count = 0;
     out.first[0] = 0;
     for (int i = 0; i < p->vertex_count; i++)
-        if (c.dist[i] <= tolerance)
-            c.number[i] = add_vertex(&c, p->vertex[i], c.dist[i] >= -tolerance);
+        if (c.dist[i] <= tolerance) {
+            bool on = c.dist[i] >= -tolerance;
+            c.number[i] = add_vertex(&c, p->vertex[i], on);
+            c.touched |= on;
+        }
     for (int f = 0; f < p->face_count && !c.full; f++)
         clip_face(&c, f);
     if (c.full || !close_cap(&c, tag) || c.full || out.face_count < 4)

@@ -17,15 +17,24 @@ void ebpo_lod_piece_free(ebpo_lod_piece *piece)
     piece->vertex_count = piece->vertex_room = piece->face_count = piece->face_room = 0;
 }
 
-/* Points on a wall get the wall's own coordinate, so that neighbouring cells agree to the last bit. */
-static double to_model(const ebpo_box *box, ebpo_cell cell, int axis, double xi)
+/* `sides`: bit 2 * axis + side for each cell wall that the point lies on, whatever rounding made of it. Such points get the wall's own coordinate,
+ * so that neighbouring cells agree to the last bit. */
+static double to_model(const ebpo_box *box, ebpo_cell cell, int axis, double xi, unsigned sides)
 {
     double low = ebpo_wall(box, axis, cell.level, cell.at[axis]);
-    if (xi <= 0)
+    if (xi <= 0 || sides >> 2 * axis & 1)
         return low;
-    if (xi >= 1)
+    if (xi >= 1 || sides >> (2 * axis + 1) & 1)
         return ebpo_wall(box, axis, cell.level, cell.at[axis] + 1);
     return low + xi * (box->size[axis] / (double)(1u << cell.level));
+}
+
+static void find_sides(const ebpo_polytope *p, uint8_t sides[EBPO_POLYTOPE_VERTICES])
+{
+    memset(sides, 0, EBPO_POLYTOPE_VERTICES);
+    for (int f = 0; f < p->face_count; f++)
+        for (int i = p->first[f]; p->tag[f] < 0 && i < p->first[f + 1]; i++)
+            sides[p->corner[i]] |= (uint8_t)(1u << (-1 - p->tag[f]));
 }
 
 static void add_fan(ebpo_lod_piece *piece, const uint32_t *number, const uint8_t *loop, int corners)
@@ -47,6 +56,8 @@ ebpo_status ebpo_lod_piece_add(ebpo_lod_piece *piece, const ebpo_polytope *p, co
         !ebpo_grow(&piece->faces, &piece->face_room, piece->face_count + (uint64_t)p->corner_count, 3 * sizeof(uint32_t)))
         return ebpo_fail_memory(error, (piece->vertex_count + piece->face_count) * 3 * sizeof(double));
     uint32_t number[EBPO_POLYTOPE_VERTICES];
+    uint8_t sides[EBPO_POLYTOPE_VERTICES];
+    find_sides(p, sides);
     memset(number, 0xff, sizeof number);
     for (int f = 0; f < p->face_count; f++) {
         if (p->tag[f] < 0 && !walls)
@@ -56,7 +67,7 @@ ebpo_status ebpo_lod_piece_add(ebpo_lod_piece *piece, const ebpo_polytope *p, co
             if (number[v] != UINT32_MAX)
                 continue;
             for (int k = 0; k < 3; k++)
-                piece->xyz[3 * piece->vertex_count + (uint64_t)k] = to_model(box, cell, k, p->vertex[v][k]);
+                piece->xyz[3 * piece->vertex_count + (uint64_t)k] = to_model(box, cell, k, p->vertex[v][k], sides[v]);
             number[v] = (uint32_t)piece->vertex_count++;
         }
         add_fan(piece, number, p->corner + p->first[f], p->first[f + 1] - p->first[f]);

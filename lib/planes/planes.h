@@ -19,6 +19,9 @@ typedef struct ebpo_candidate {
     double support;
 } ebpo_candidate;
 
+/* Upper bound of the volume that n . x <= d removes from a polytope of the given volume; much cheaper than the volume itself. */
+double ebpo_cap_bound(const ebpo_polytope *p, double volume, const double n[3], double d);
+
 /* A selection: takes planes from `candidates` (count <= EBPO_PLANES_CANDIDATES), clips `envelope` by them and writes their codes;
  * returns how many (<= most <= EBPO_PLANES_MAX). Adding a method means one function of this shape. */
 typedef int (*ebpo_select_fn)(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, double epsilon, int most,

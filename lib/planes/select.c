@@ -10,9 +10,9 @@ typedef struct ranked {
     int round; /* -1: never evaluated */
 } ranked;
 
-/* Upper bound of the volume beyond a plane: among convex bodies of volume V and width H the cap of height h is largest for the cone with
- * its base on the far side, V (1 - (1 - h/H)^3). */
-static double cap_bound(const ebpo_polytope *p, double volume, const double n[3], double d)
+/* Among convex bodies of volume V and width H the cap of height h is largest for the cone with its base on the far side,
+ * V (1 - (1 - h/H)^3). */
+double ebpo_cap_bound(const ebpo_polytope *p, double volume, const double n[3], double d)
 {
     double most = -1e300, least = 1e300;
     for (int i = 0; i < p->vertex_count; i++) {
@@ -42,51 +42,77 @@ static int rank_candidates(const ebpo_polytope *envelope, const ebpo_candidate *
         ranked r = { .round = -1, .code = ebpo_plane_code_make(candidates[i].normal, q) };
         ebpo_plane_code_decode(r.code, n, &d);
         r.d = ebpo_plane_as_double(n, d, r.n);
-        r.gain = cap_bound(envelope, volume, r.n, r.d);
+        r.gain = ebpo_cap_bound(envelope, volume, r.n, r.d);
         if (r.gain >= epsilon && r.gain > 0)
             out[kept++] = r;
     }
     return kept;
 }
 
+static bool before(const ranked *a, const ranked *b)
+{
+    return a->gain > b->gain || (a->gain == b->gain && a->code < b->code);
+}
+
+/* Restores the heap (greatest gain first) below item i. */
+static void sift_down(ranked *heap, int count, int i)
+{
+    ranked item = heap[i];
+    for (int child = 2 * i + 1; child < count; child = 2 * i + 1) {
+        if (child + 1 < count && before(&heap[child + 1], &heap[child]))
+            child++;
+        if (!before(&heap[child], &item))
+            break;
+        heap[i] = heap[child];
+        i = child;
+    }
+    heap[i] = item;
+}
+
+static void make_heap(ranked *heap, int count)
+{
+    for (int i = count / 2 - 1; i >= 0; i--)
+        sift_down(heap, count, i);
+}
+
+static void drop_first(ranked *heap, int *count)
+{
+    heap[0] = heap[--*count];
+    if (*count)
+        sift_down(heap, *count, 0);
+}
+
 int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, double epsilon, int most,
                        uint32_t *codes)
 {
-    ranked list[EBPO_PLANES_CANDIDATES];
-    int left = rank_candidates(envelope, candidates, count, epsilon, list), taken = 0;
+    ranked heap[EBPO_PLANES_CANDIDATES];
+    int left = rank_candidates(envelope, candidates, count, epsilon, heap), taken = 0;
+    make_heap(heap, left);
     while (left > 0 && taken < most) {
-        int best = 0;
-        for (int i = 1; i < left; i++)
-            if (list[i].gain > list[best].gain || (list[i].gain == list[best].gain && list[i].code < list[best].code))
-                best = i;
-        ranked *r = &list[best];
+        ranked *r = &heap[0];
         if (r->round != taken) {
-            double gain = ebpo_polytope_removed(envelope, r->n, r->d);
-            r->gain = gain;
+            r->gain = ebpo_polytope_removed(envelope, r->n, r->d);
             r->round = taken;
-            if (!(gain >= epsilon && gain > 0))
-                list[best] = list[--left];
+            if (r->gain >= epsilon && r->gain > 0)
+                sift_down(heap, left, 0);
+            else
+                drop_first(heap, &left);
             continue;
         }
         if (ebpo_polytope_clip(envelope, r->n, r->d, taken) == EBPO_CLIP_CUT)
             codes[taken++] = r->code;
-        list[best] = list[--left];
+        drop_first(heap, &left);
     }
     return taken;
 }
 
 int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, int most, uint32_t *codes)
 {
-    ranked list[EBPO_PLANES_CANDIDATES];
-    int left = rank_candidates(envelope, candidates, count, 0, list), taken = 0;
-    while (left > 0 && taken < most) {
-        int best = 0;
-        for (int i = 1; i < left; i++)
-            if (list[i].gain > list[best].gain || (list[i].gain == list[best].gain && list[i].code < list[best].code))
-                best = i;
-        if (ebpo_polytope_clip(envelope, list[best].n, list[best].d, taken) == EBPO_CLIP_CUT)
-            codes[taken++] = list[best].code;
-        list[best] = list[--left];
-    }
+    ranked heap[EBPO_PLANES_CANDIDATES];
+    int left = rank_candidates(envelope, candidates, count, 0, heap), taken = 0;
+    make_heap(heap, left);
+    for (; left > 0 && taken < most; drop_first(heap, &left))
+        if (ebpo_polytope_clip(envelope, heap[0].n, heap[0].d, taken) == EBPO_CLIP_CUT)
+            codes[taken++] = heap[0].code;
     return taken;
 }

@@ -8,7 +8,6 @@
 
 #include <math.h>
 
-#include "verify/exact.h"
 
 static const double eps = 0x1p-53;
 
@@ -110,7 +109,7 @@ static bool face_keeps(ebpo_tally *tally, const ebpo_half_spaces *planes, int i,
     if (certified_by_wall(local, n, bound) || certified_by_two_walls(local, n, bound))
         return true;
     tally->exact_half_spaces++;
-    return ebpo_exact_half_space(frame->low, frame->high, face->at, planes->normal[i], planes->d[i]);
+    return ebpo_exact_half_space(frame->low, frame->high, face, planes->normal[i], planes->d[i]);
 }
 
 void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_half_spaces *planes, const ebpo_view_node *node,

@@ -26,7 +26,7 @@ static void polygon_clear(polygon *g)
             mpq_clear(g->at[i][k]);
 }
 
-static void set_triangle(polygon *g, const double low[3], const double high[3], const double p[3][3])
+static void set_triangle(polygon *g, const double low[3], const double high[3], const ebpo_corners *face)
 {
     mpq_t first, size;
     mpq_inits(first, size, NULL);
@@ -36,7 +36,7 @@ static void set_triangle(polygon *g, const double low[3], const double high[3], 
         mpq_set_d(size, high[k]);
         mpq_sub(size, size, first);
         for (int i = 0; i < 3; i++) {
-            mpq_set_d(g->at[i][k], p[i][k]);
+            mpq_set_d(g->at[i][k], face->at[i][k]);
             mpq_sub(g->at[i][k], g->at[i][k], first);
             mpq_div(g->at[i][k], g->at[i][k], size);
         }
@@ -86,11 +86,11 @@ static void clip(polygon *out, polygon *in, int axis, int wall)
 }
 
 /* Leaves the intersection in *g. */
-static void clip_to_box(polygon *g, const double low[3], const double high[3], const double p[3][3])
+static void clip_to_box(polygon *g, const double low[3], const double high[3], const ebpo_corners *face)
 {
     polygon other;
     polygon_init(&other);
-    set_triangle(g, low, high, p);
+    set_triangle(g, low, high, face);
     for (int axis = 0; axis < 3; axis++) {
         clip(&other, g, axis, 0);
         clip(g, &other, axis, 1);
@@ -98,11 +98,11 @@ static void clip_to_box(polygon *g, const double low[3], const double high[3], c
     polygon_clear(&other);
 }
 
-bool ebpo_exact_touches(const double low[3], const double high[3], const double p[3][3])
+bool ebpo_exact_touches(const double low[3], const double high[3], const ebpo_corners *face)
 {
     polygon g;
     polygon_init(&g);
-    clip_to_box(&g, low, high, p);
+    clip_to_box(&g, low, high, face);
     bool touches = g.count > 0;
     polygon_clear(&g);
     return touches;
@@ -122,11 +122,11 @@ static bool corner_satisfies(mpq_t at[3], const int32_t n[3], int32_t d)
     return holds;
 }
 
-bool ebpo_exact_half_space(const double low[3], const double high[3], const double p[3][3], const int32_t n[3], int32_t d)
+bool ebpo_exact_half_space(const double low[3], const double high[3], const ebpo_corners *face, const int32_t n[3], int32_t d)
 {
     polygon g;
     polygon_init(&g);
-    clip_to_box(&g, low, high, p);
+    clip_to_box(&g, low, high, face);
     bool holds = true;
     for (int i = 0; i < g.count && holds; i++)
         holds = corner_satisfies(g.at[i], n, d);

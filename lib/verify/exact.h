@@ -5,10 +5,15 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* True when the closed triangle p meets the closed box [low, high]. */
-bool ebpo_exact_touches(const double low[3], const double high[3], const double p[3][3]);
+/* A face: corners in the model's coordinates, exact. */
+typedef struct ebpo_corners {
+    double at[3][3];
+} ebpo_corners;
 
-/* True when every point of the triangle in the closed box satisfies 4096 * (n . xi) <= d, xi = (point - low) / (high - low). */
-bool ebpo_exact_half_space(const double low[3], const double high[3], const double p[3][3], const int32_t n[3], int32_t d);
+/* True when the closed face meets the closed box [low, high]. */
+bool ebpo_exact_touches(const double low[3], const double high[3], const ebpo_corners *face);
+
+/* True when every point of the face in the closed box satisfies 4096 * (n . xi) <= d, xi = (point - low) / (high - low). */
+bool ebpo_exact_half_space(const double low[3], const double high[3], const ebpo_corners *face, const int32_t n[3], int32_t d);
 
 #endif

@@ -52,7 +52,7 @@ void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_view *view, const e
         check_leaf(tally, view, node, faces, count);
         return;
     }
-    tally->checks[EBPO_VERIFY_LISTS]++;
+    tally->checks[EBPO_VERIFY_LISTS] += count ? count : 1;
     for (uint64_t i = 0; i < count; i++)
         unlisted(tally, node, faces[i], node->type == EBPO_WHITE ? "the face touches a white cell" : "the face touches a black cell");
 }

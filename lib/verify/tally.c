@@ -105,7 +105,7 @@ void ebpo_tally_report(const ebpo_tally *tally, ebpo_verify_report *report)
     for (int kind = 0; kind < EBPO_VERIFY_KINDS; kind++) {
         count[kind]->checks = tally->checks[kind];
         count[kind]->violations = tally->violations[kind];
-        memcpy(count[kind]->first, tally->first[kind], sizeof count[kind]->first);
+        snprintf(count[kind]->first, sizeof count[kind]->first, "%s", tally->first[kind]);
         report->checks += tally->checks[kind];
         report->violations += tally->violations[kind];
     }

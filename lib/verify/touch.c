@@ -6,8 +6,6 @@
 
 #include <math.h>
 
-#include "verify/exact.h"
-
 static const double eps = 0x1p-53;
 static const double slack = 0x1p-900; /* covers underflow */
 
@@ -118,5 +116,5 @@ bool ebpo_face_touches(const ebpo_frame *frame, const ebpo_corners *face, ebpo_t
     if (answer != UNSURE)
         return answer == MEET;
     tally->exact_touches++;
-    return ebpo_exact_touches(frame->low, frame->high, face->at);
+    return ebpo_exact_touches(frame->low, frame->high, face);
 }

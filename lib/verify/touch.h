@@ -3,6 +3,7 @@
 #define EBPO_VERIFY_TOUCH_H
 
 #include "geom/cell.h"
+#include "verify/exact.h"
 #include "verify/tally.h"
 
 /* A cell: its walls (exact) and the reciprocals of its sizes (rounded). */
@@ -11,11 +12,6 @@ typedef struct ebpo_frame {
 } ebpo_frame;
 
 ebpo_frame ebpo_frame_make(const ebpo_box *box, ebpo_cell cell);
-
-/* A face: corners in the model's coordinates, exact. */
-typedef struct ebpo_corners {
-    double at[3][3];
-} ebpo_corners;
 
 /* Corners of a face in cell coordinates. Each coordinate is off by at most 4 * 2^-53 of its absolute value (and 2^-1000). */
 typedef struct ebpo_local {

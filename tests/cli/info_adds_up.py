@@ -1,0 +1,23 @@
+"""info_adds_up.py FILE <JSON of ebpo info: bytes, volumes and counts are consistent with each other and with the file."""
+import json
+import math
+import os
+import sys
+
+info = json.load(sys.stdin)
+size = os.path.getsize(sys.argv[1])
+b, levels = info["bytes"], info["levels"]
+assert b["file"] == size, (b["file"], size)
+assert b["head"] + b["levels"] + b["vertices"] + b["faces"] + b["maps"] + b["other"] == size, b
+assert levels[-1]["cumulative_bytes"] == b["head"] + b["levels"]
+cell = math.prod(info["box_size"])
+below = 0
+for i, level in enumerate(levels):
+    below += level["leaf_volume"] + level["black"] * cell / 8**i
+    assert math.isclose(level["envelope_volume"], below + level["gray_volume"], rel_tol=1e-12)
+    assert level["percent_of_solid"] >= 99.999999
+    nodes = level["gray"] + level["leaf"] + level["white"] + level["black"]
+    assert nodes == (8 * levels[i - 1]["gray"] if i else 1), (i, nodes)
+    assert i == 0 or level["envelope_volume"] <= levels[i - 1]["envelope_volume"] * (1 + 1e-9)
+assert sum(level["faces_new"] for level in levels) == (info["faces"] if "mesh" in info["parts"] else 0)
+print("fine")

@@ -1,0 +1,27 @@
+#!/usr/bin/env python3
+"""interrupt.py SIGNAL OUT COMMAND...: sends SIGNAL once a temporary file for OUT is there; prints how the command ended and what it left."""
+import os
+import signal
+import subprocess
+import sys
+import time
+
+
+def leftovers(out):
+    folder, name = os.path.split(os.path.abspath(out))
+    return sorted(f for f in os.listdir(folder) if f.startswith("." + name) or f == name)
+
+
+def main():
+    number, out, command = getattr(signal, "SIG" + sys.argv[1]), sys.argv[2], sys.argv[3:]
+    signal.signal(number, signal.SIG_DFL)
+    process = subprocess.Popen(command)
+    while process.poll() is None and not leftovers(out):
+        time.sleep(0.002)
+    seen = process.poll() is None
+    process.send_signal(number)
+    code = process.wait(timeout=60)
+    print(f"{'interrupted' if seen else 'came too late'}, ended by {-code}, left {leftovers(out)}")
+
+
+main()

@@ -1,0 +1,47 @@
+"""picture_shows.py FILE.png WIDTH HEIGHT: a PNG of that size with a light border and something darker inside. Filters 0 to 4 of 8-bit RGB."""
+import struct
+import sys
+import zlib
+
+
+def rows_of(data):
+    at, packed, size = 8, b"", None
+    while at < len(data):
+        length, kind = struct.unpack(">I4s", data[at:at + 8])
+        body = data[at + 8:at + 8 + length]
+        assert struct.unpack(">I", data[at + 8 + length:at + 12 + length])[0] == zlib.crc32(kind + body)
+        if kind == b"IHDR":
+            size = struct.unpack(">IIBBBBB", body)
+        if kind == b"IDAT":
+            packed += body
+        at += 12 + length
+    assert size[2:] == (8, 2, 0, 0, 0), size
+    return size[0], size[1], zlib.decompress(packed)
+
+
+def paeth(a, b, c):
+    pa, pb, pc = abs(b - c), abs(a - c), abs(a + b - 2 * c)
+    return a if pa <= pb and pa <= pc else b if pb <= pc else c
+
+
+def unfilter(width, height, raw):
+    stride, before, out = 3 * width, bytes(3 * width), []
+    for y in range(height):
+        kind, line = raw[y * (stride + 1)], bytearray(raw[y * (stride + 1) + 1:(y + 1) * (stride + 1)])
+        for i in range(stride):
+            a, b, c = (line[i - 3] if i >= 3 else 0), before[i], (before[i - 3] if i >= 3 else 0)
+            line[i] = (line[i] + (0, a, b, (a + b) // 2, paeth(a, b, c))[kind]) & 255
+        out.append(bytes(line))
+        before = line
+    return out
+
+
+data = open(sys.argv[1], "rb").read()
+assert data[:8] == b"\x89PNG\r\n\x1a\n"
+width, height, raw = rows_of(data)
+assert (width, height) == (int(sys.argv[2]), int(sys.argv[3])), (width, height)
+rows = unfilter(width, height, raw)
+assert min(rows[0]) > 200 and all(row[0] > 200 for row in rows), "the border is not light"
+dark = sum(row[i] < 200 for row in rows for i in range(0, 3 * width, 3))
+assert width * height // 10 < dark < width * height * 9 // 10, dark
+print("fine")

@@ -1,0 +1,86 @@
+#!/usr/bin/env python3
+"""Runs command-line tests that are data.
+
+run.py TOOL INPUTS FEATURES FILE.tests
+
+Each line of FILE.tests is
+
+    exit code | standard output | standard error | command
+
+and is run by sh in a folder of its own for each file, in which the input meshes lie and in which later lines see what earlier
+ones wrote. Outputs are regular expressions (searched, "." matches newlines); an empty one means that there must be no output,
+* means anything, @NAME that the output equals the file NAME beside this script. "png:0" runs the line only when FEATURES
+(words with commas between) has png, "no-png:2" only when it has not. Lines that begin with # are comments.
+"""
+import os
+import re
+import subprocess
+import sys
+import tempfile
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+
+
+def output_fits(expected, actual):
+    if expected == "*":
+        return True
+    if expected == "":
+        return actual == ""
+    if expected.startswith("@"):
+        with open(os.path.join(HERE, expected[1:]), encoding="utf-8") as f:
+            return f.read() == actual
+    return re.search(expected, actual, re.DOTALL | re.MULTILINE) is not None
+
+
+def wanted(field, features):
+    """The exit code of a line, or None if the line is for another build."""
+    condition, _, code = field.rpartition(":")
+    if condition.startswith("no-"):
+        return None if condition[3:] in features else int(code)
+    return int(code) if not condition or condition in features else None
+
+
+def run_line(line, folder, environment, features):
+    """None if fine or skipped, else what is wrong."""
+    fields = [f.strip() for f in line.split(" | ", 3)]
+    if len(fields) != 4:
+        return "is not: code | output | error | command"
+    code, out, err, command = fields
+    code = wanted(code, features)
+    if code is None:
+        return None
+    done = subprocess.run(["sh", "-c", command], cwd=folder, env=environment, stdin=subprocess.DEVNULL, timeout=300,
+                          capture_output=True)
+    stdout, stderr = (b.decode("utf-8", "replace") for b in (done.stdout, done.stderr))
+    wrong = []
+    if done.returncode != code:
+        wrong.append(f"exit code {done.returncode}, not {code}")
+    if not output_fits(out, stdout):
+        wrong.append("standard output does not fit")
+    if not output_fits(err, stderr):
+        wrong.append("standard error does not fit")
+    return "; ".join(wrong) + f"\n--- output\n{stdout}--- error\n{stderr}---" if wrong else None
+
+
+def main():
+    tool, inputs, features, tests = sys.argv[1:]
+    environment = dict(os.environ, LC_ALL="C.UTF-8", PATH=os.path.dirname(os.path.abspath(tool)) + ":" + os.environ["PATH"],
+                       TESTS=HERE, INPUTS=os.path.abspath(inputs))
+    bad = lines = 0
+    with tempfile.TemporaryDirectory() as folder, open(tests, encoding="utf-8") as data:
+        subprocess.run([inputs, folder], check=True)
+        for number, line in enumerate(data, 1):
+            line = line.rstrip("\n")
+            if not line or line.startswith("#"):
+                continue
+            lines += 1
+            wrong = run_line(line, folder, environment, features.split(","))
+            if wrong:
+                bad += 1
+                print(f"{tests}:{number}: {line}\n{wrong}")
+    print(f"{tests}: {lines} lines, {bad} failed")
+    return 1 if bad or not lines else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

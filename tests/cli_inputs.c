@@ -1,0 +1,87 @@
+/* Meshes for the command-line tests, good and bad, written into a folder: cli_inputs FOLDER, or cli_inputs --large FILE for one that takes a
+ * while to convert. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "solids.h"
+
+static char folder_path[4096];
+
+static const char *in_folder(const char *folder, const char *name)
+{
+    snprintf(folder_path, sizeof folder_path, "%s/%s", folder, name);
+    return folder_path;
+}
+
+static void write_mesh(ebpo_mesh *mesh, const char *path)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    if (ebpo_mesh_write_ply(mesh, path, &error) != EBPO_OK) {
+        fprintf(stderr, "%s\n", error.message);
+        exit(1);
+    }
+    ebpo_mesh_free(mesh);
+}
+
+static void write_bytes(const char *path, const char *bytes, size_t size)
+{
+    FILE *f = fopen(path, "wb");
+    if (!f || fwrite(bytes, 1, size, f) != size || fclose(f) != 0) {
+        perror(path);
+        exit(1);
+    }
+}
+
+static const struct {
+    const char *file, *text;
+} texts[] = {
+    { "empty.ply", "" },
+    { "nonsense.ply", "this is not a mesh\n" },
+    { "no_faces.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n" },
+    { "cut_short.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+                       "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n" },
+    { "bad_index.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+                       "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 99\n" },
+    { "nan.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+                 "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 nan 0\n0 1 0\n3 0 1 2\n" },
+    { "quads.ply", "ply\nformat ascii 1.0\nelement vertex 8\nproperty double x\nproperty double y\nproperty double z\n"
+                   "element face 6\nproperty list uchar int vertex_indices\nend_header\n"
+                   "0 0 0\n1 0 0\n0 1 0\n1 1 0\n0 0 1\n1 0 1\n0 1 1\n1 1 1\n"
+                   "4 0 4 6 2\n4 1 3 7 5\n4 0 1 5 4\n4 2 6 7 3\n4 0 2 3 1\n4 4 5 7 6\n" },
+    { "tetrahedron.stl", "solid t\n"
+                         "facet normal 0 0 -1\nouter loop\nvertex 0 0 0\nvertex 0 1 0\nvertex 1 0 0\nendloop\nendfacet\n"
+                         "facet normal 0 -1 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 0 1\nendloop\nendfacet\n"
+                         "facet normal -1 0 0\nouter loop\nvertex 0 0 0\nvertex 0 0 1\nvertex 0 1 0\nendloop\nendfacet\n"
+                         "facet normal 1 1 1\nouter loop\nvertex 1 0 0\nvertex 0 1 0\nvertex 0 0 1\nendloop\nendfacet\n"
+                         "endsolid t\n" },
+};
+
+static const char *const solids[] = { "tetrahedron", "cube", "cube_float", "sphere", "sphere_float", "torus", "cavity", "open_box",
+                                      "flipped_face_cube", "mobius", "blob", "overlapping_cubes", "zero_area_face",
+                                      "repeated_faces", "inside_out_cube" };
+
+int main(int argc, char **argv)
+{
+    if (argc == 3 && strcmp(argv[1], "--large") == 0) {
+        ebpo_mesh large = ebpo_test_torus(2, 1, 600, 300);
+        write_mesh(&large, argv[2]);
+        return 0;
+    }
+    if (argc != 2) {
+        fprintf(stderr, "usage: cli_inputs FOLDER | --large FILE\n");
+        return 2;
+    }
+    for (size_t i = 0; i < sizeof solids / sizeof *solids; i++) {
+        char name[64];
+        snprintf(name, sizeof name, "%s.ply", solids[i]);
+        ebpo_mesh mesh = ebpo_test_make(solids[i]);
+        write_mesh(&mesh, in_folder(argv[1], name));
+    }
+    ebpo_mesh split = ebpo_test_make("cube");
+    ebpo_test_split_vertices(&split);
+    write_mesh(&split, in_folder(argv[1], "split_cube.ply"));
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
+        write_bytes(in_folder(argv[1], texts[i].file), texts[i].text, strlen(texts[i].text));
+    return 0;
+}

@@ -1,0 +1,312 @@
+/* Levels as polygons. */
+#include <check.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <ebpo/ebpo.h>
+
+#include "solids.h"
+
+static char folder[] = "/tmp/ebpo-lod-XXXXXX", path[64];
+
+static void make_folder(void)
+{
+    ck_assert_ptr_nonnull(mkdtemp(folder));
+    snprintf(path, sizeof path, "%s/x.ebpo.h5", folder);
+}
+
+static void remove_folder(void)
+{
+    unlink(path);
+    rmdir(folder);
+    strcpy(folder + strlen(folder) - 6, "XXXXXX");
+}
+
+static ebpo_file *build(ebpo_mesh mesh, uint32_t parts, uint32_t leaf_faces)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_mesh_report report;
+    ebpo_mend_record mend = { 0 };
+    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
+    ebpo_tree tree;
+    ebpo_file *file = NULL;
+    options.parts = parts;
+    options.leaf_faces = leaf_faces;
+    ck_assert_msg(ebpo_mesh_check(&report, &mesh, 0, options.progress, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_build(&tree, &mesh, &report, &mend, &options, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_tree_write(&tree, path, &write, &error) == EBPO_OK, "%s", error.message);
+    ebpo_tree_free(&tree);
+    ck_assert_msg(ebpo_file_open(&file, path, &error) == EBPO_OK, "%s", error.message);
+    return file;
+}
+
+enum { USUAL = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS };
+
+static double stored_volume(const ebpo_info *info, int level)
+{
+    double cell = info->box_size[0] * info->box_size[1] * info->box_size[2], sum = info->level[level].gray_volume;
+    for (int i = 0; i <= level; i++)
+        sum += info->level[i].leaf_volume + (double)info->level[i].black_count * ldexp(cell, -3 * i);
+    return sum;
+}
+
+static double take(ebpo_file *file, int level, bool walls, unsigned threads, ebpo_mesh *out)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_lod_options options = EBPO_LOD_OPTIONS_INIT;
+    double volume = -1;
+    options.walls = walls;
+    options.threads = threads;
+    ck_assert_msg(ebpo_lod_level(file, level, &options, out, &volume, &error) == EBPO_OK, "%s", error.message);
+    return volume;
+}
+
+/* Signed volume of a closed mesh. */
+static double mesh_volume(const ebpo_mesh *mesh)
+{
+    double sum = 0;
+    for (uint64_t f = 0; f < mesh->face_count; f++) {
+        const double *a = mesh->xyz64 + 3 * (uint64_t)mesh->faces[3 * f], *b = mesh->xyz64 + 3 * (uint64_t)mesh->faces[3 * f + 1],
+                     *c = mesh->xyz64 + 3 * (uint64_t)mesh->faces[3 * f + 2];
+        sum += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
+    }
+    return sum / 6;
+}
+
+static double largest_volume(const ebpo_info *info)
+{
+    return info->box_size[0] * info->box_size[1] * info->box_size[2];
+}
+
+START_TEST(level_volumes_equal_those_stored_in_the_file)
+{
+    for (int variant = 0; variant < 2; variant++) {
+        ebpo_file *file = build(ebpo_test_solids[_i].make(), variant ? USUAL | EBPO_PART_LEAF_PLANES : USUAL, 4);
+        const ebpo_info *info = ebpo_file_info(file);
+        for (int level = 0; level < info->level_count; level++) {
+            double volume = take(file, level, true, 0, NULL), stored = stored_volume(info, level);
+            ck_assert_msg(fabs(volume - stored) <= 1e-6 * stored + 1e-12 * largest_volume(info), "%s level %d: %.17g, stored %.17g",
+                          ebpo_test_solids[_i].name, level, volume, stored);
+        }
+        ebpo_file_close(file);
+    }
+}
+END_TEST
+
+START_TEST(volumes_of_a_real_model_agree_too)
+{
+    const char *models = getenv("EBPO_MODELS");
+    ebpo_mesh mesh;
+    char name[4096];
+    snprintf(name, sizeof name, "%s/armadillo.ply", models ? models : "");
+    if (!models || ebpo_mesh_read(&mesh, name, NULL, NULL) != EBPO_OK)
+        return;
+    ebpo_file *file = build(mesh, USUAL, 16);
+    const ebpo_info *info = ebpo_file_info(file);
+    for (int level = 0; level < info->level_count; level++) {
+        double volume = take(file, level, true, 0, NULL), stored = stored_volume(info, level);
+        ck_assert_msg(fabs(volume - stored) <= 1e-7 * stored, "level %d: %.17g, stored %.17g", level, volume, stored);
+    }
+    ebpo_file_close(file);
+}
+END_TEST
+
+START_TEST(envelopes_are_closed_and_fill_the_stated_volume)
+{
+    ebpo_file *file = build(ebpo_test_solids[_i].make(), USUAL, 4);
+    const ebpo_info *info = ebpo_file_info(file);
+    for (int level = 0; level < info->level_count; level++) {
+        ebpo_mesh mesh;
+        ebpo_mesh_report report;
+        double volume = take(file, level, true, 0, &mesh);
+        ck_assert_uint_gt(mesh.face_count, 0);
+        ck_assert(ebpo_mesh_check(&report, &mesh, 0, (ebpo_progress){ NULL, NULL }, NULL) == EBPO_OK);
+        ck_assert_msg(report.balanced && report.unreferenced_vertices.count == 0, "%s level %d", ebpo_test_solids[_i].name, level);
+        double own = mesh_volume(&mesh), offset = 1e-9 * largest_volume(info);
+        for (int k = 0; k < 3; k++) /* far from the origin, rounding eats into the sum */
+            offset *= 1 + fabs(info->box_origin[k]) / info->box_size[k];
+        ck_assert_msg(fabs(own - volume) <= 1e-7 * volume + offset, "%s level %d: %.17g, %.17g", ebpo_test_solids[_i].name, level, own,
+                      volume);
+        ebpo_mesh_free(&mesh);
+    }
+    ebpo_file_close(file);
+}
+END_TEST
+
+START_TEST(deeper_levels_are_never_larger)
+{
+    ebpo_file *file = build(ebpo_test_solids[_i].make(), USUAL, 0);
+    double before = INFINITY;
+    for (int level = 0; level < ebpo_file_info(file)->level_count; level++) {
+        double volume = take(file, level, true, 0, NULL);
+        ck_assert_msg(volume <= before * (1 + 1e-9), "%s level %d", ebpo_test_solids[_i].name, level);
+        before = volume;
+    }
+    ebpo_file_close(file);
+}
+END_TEST
+
+static bool same_mesh(const ebpo_mesh *a, const ebpo_mesh *b)
+{
+    return a->vertex_count == b->vertex_count && a->face_count == b->face_count &&
+           memcmp(a->xyz64, b->xyz64, a->vertex_count * 24) == 0 && memcmp(a->faces, b->faces, a->face_count * 12) == 0;
+}
+
+START_TEST(result_does_not_depend_on_the_number_of_threads)
+{
+    ebpo_file *file = build(ebpo_test_torus(2, 0.7, 60, 40), USUAL, 2);
+    int last = ebpo_file_info(file)->level_count - 1;
+    ck_assert_int_ge(last, 4);
+    for (int level = 0; level <= last; level++) {
+        ebpo_mesh one, seven;
+        double a = take(file, level, true, 1, &one), b = take(file, level, true, 7, &seven);
+        ck_assert(memcmp(&a, &b, sizeof a) == 0 && same_mesh(&one, &seven));
+        ebpo_mesh_free(&one);
+        ebpo_mesh_free(&seven);
+    }
+    ebpo_file_close(file);
+}
+END_TEST
+
+/* On a wall of some level-`level` cell, all three corners in one plane x, y or z = constant. */
+static bool on_wall(const ebpo_info *info, const ebpo_mesh *mesh, uint64_t face, int level)
+{
+    for (int k = 0; k < 3; k++) {
+        const double *x = mesh->xyz64 + k;
+        const uint32_t *f = mesh->faces + 3 * face;
+        double a = x[3 * (uint64_t)f[0]], at = (a - info->box_origin[k]) / info->box_size[k] * ldexp(1, level);
+        if (a == x[3 * (uint64_t)f[1]] && a == x[3 * (uint64_t)f[2]] && at == round(at))
+            return true;
+    }
+    return false;
+}
+
+START_TEST(walls_are_left_out_on_request)
+{
+    ebpo_file *file = build(ebpo_test_make("sphere"), USUAL, 4);
+    const ebpo_info *info = ebpo_file_info(file);
+    for (int level = 0; level < info->level_count; level++) {
+        ebpo_mesh with, without;
+        double a = take(file, level, true, 0, &with), b = take(file, level, false, 0, &without);
+        uint64_t walls = 0;
+        for (uint64_t f = 0; f < with.face_count; f++)
+            walls += on_wall(info, &with, f, level);
+        ck_assert(a == b);
+        ck_assert_uint_eq(with.face_count, without.face_count + walls);
+        for (uint64_t f = 0; f < without.face_count; f++)
+            ck_assert(!on_wall(info, &without, f, level));
+        ebpo_mesh_free(&with);
+        ebpo_mesh_free(&without);
+    }
+    ebpo_file_close(file);
+}
+END_TEST
+
+START_TEST(envelopes_come_level_by_level_in_octcode_order)
+{
+    /* Without planes and mesh each envelope is its cell: twelve triangles, whose middle tells the cell. */
+    ebpo_file *file = build(ebpo_test_make("blob"), 0, 4);
+    const ebpo_info *info = ebpo_file_info(file);
+    ebpo_mesh mesh;
+    take(file, info->level_count - 1, true, 0, &mesh);
+    ck_assert_uint_eq(mesh.vertex_count % 8, 0);
+    uint64_t before = 0;
+    for (uint64_t i = 0; i < mesh.vertex_count; i += 8) {
+        double low[3] = { INFINITY, INFINITY, INFINITY }, high = -INFINITY;
+        for (uint64_t v = i; v < i + 8; v++) {
+            for (uint64_t k = 0; k < 3; k++)
+                low[k] = fmin(low[k], mesh.xyz64[3 * v + k]);
+            high = fmax(high, mesh.xyz64[3 * v]);
+        }
+        int level = (int)lround(log2(info->box_size[0] / (high - low[0])));
+        uint64_t code = 1;
+        for (int bit = level - 1; bit >= 0; bit--)
+            for (int k = 2; k >= 0; k--) {
+                uint64_t at = (uint64_t)llround((low[k] - info->box_origin[k]) / info->box_size[k] * ldexp(1, level));
+                code = code << 1 | (at >> bit & 1);
+            }
+        ck_assert_uint_gt(code, before);
+        before = code;
+    }
+    ebpo_mesh_free(&mesh);
+    ebpo_file_close(file);
+}
+END_TEST
+
+START_TEST(without_faces_leaves_have_what_they_inherit)
+{
+    ebpo_file *file = build(ebpo_test_make("torus"), EBPO_PART_PLANES, 4);
+    int last = ebpo_file_info(file)->level_count - 1;
+    double bare = take(file, last, true, 0, NULL), derived = stored_volume(ebpo_file_info(file), last);
+    ck_assert(bare > derived);
+    ck_assert(bare <= take(file, last - 1, true, 0, NULL) * (1 + 1e-9));
+    ebpo_file_close(file);
+}
+END_TEST
+
+START_TEST(a_level_that_is_not_there_is_refused)
+{
+    ebpo_file *file = build(ebpo_test_make("cube"), USUAL, 4);
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_mesh mesh;
+    int count = ebpo_file_info(file)->level_count;
+    ck_assert_int_eq(ebpo_lod_level(file, count, NULL, &mesh, NULL, &error), EBPO_E_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(error.message, "this file has levels 0 to"));
+    ck_assert_int_eq(ebpo_lod_level(file, -1, NULL, &mesh, NULL, NULL), EBPO_E_ARGUMENT);
+    ck_assert_ptr_null(mesh.xyz64);
+    ebpo_file_close(file);
+}
+END_TEST
+
+static bool stop_at_once(void *user, const char *stage, uint64_t done, uint64_t total)
+{
+    (void)stage;
+    (void)done;
+    (void)total;
+    return *(bool *)user;
+}
+
+START_TEST(a_cancelled_run_leaves_nothing)
+{
+    ebpo_file *file = build(ebpo_test_torus(2, 0.7, 300, 150), USUAL, 0);
+    bool go_on = false;
+    ebpo_lod_options options = EBPO_LOD_OPTIONS_INIT;
+    options.threads = 1;
+    options.progress = (ebpo_progress){ stop_at_once, &go_on };
+    ebpo_mesh mesh;
+    ebpo_status status = ebpo_lod_level(file, ebpo_file_info(file)->level_count - 1, &options, &mesh, NULL, NULL);
+    /* A machine that is done before the first report is fine too. */
+    ck_assert(status == EBPO_E_CANCELLED || status == EBPO_OK);
+    ck_assert(status == EBPO_OK || mesh.xyz64 == NULL);
+    ebpo_mesh_free(&mesh);
+    ebpo_file_close(file);
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("lod");
+    TCase *cases = tcase_create("lod");
+    tcase_set_timeout(cases, 120);
+    tcase_add_checked_fixture(cases, make_folder, remove_folder);
+    tcase_add_loop_test(cases, level_volumes_equal_those_stored_in_the_file, 0, ebpo_test_solid_count);
+    tcase_add_loop_test(cases, envelopes_are_closed_and_fill_the_stated_volume, 0, ebpo_test_solid_count);
+    tcase_add_loop_test(cases, deeper_levels_are_never_larger, 0, ebpo_test_solid_count);
+    tcase_add_test(cases, volumes_of_a_real_model_agree_too);
+    tcase_add_test(cases, result_does_not_depend_on_the_number_of_threads);
+    tcase_add_test(cases, walls_are_left_out_on_request);
+    tcase_add_test(cases, envelopes_come_level_by_level_in_octcode_order);
+    tcase_add_test(cases, without_faces_leaves_have_what_they_inherit);
+    tcase_add_test(cases, a_level_that_is_not_there_is_refused);
+    tcase_add_test(cases, a_cancelled_run_leaves_nothing);
+    suite_add_tcase(suite, cases);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_NORMAL);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed != 0;
+}

@@ -1,0 +1,223 @@
+/* The verifier on files: with and without their parts, against their source and against another one, whole and damaged. */
+#include <check.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <ebpo/build.h>
+#include <ebpo/verify.h>
+
+#include "solids.h"
+
+static char folder[32], path[64];
+static ebpo_verify_report report;
+
+static void enter(void)
+{
+    strcpy(folder, "/tmp/ebpo-verify-XXXXXX");
+    ck_assert(mkdtemp(folder) != NULL);
+    snprintf(path, sizeof path, "%s/model.ebpo.h5", folder);
+}
+
+static void leave(void)
+{
+    unlink(path);
+    ck_assert(rmdir(folder) == 0);
+}
+
+/* A mesh whose vertices repeat, with a hole and turned faces: all mending has something to do. */
+static ebpo_mesh worn_mesh(void)
+{
+    ebpo_mesh mesh = ebpo_test_make("sphere");
+    ebpo_test_turn_face(&mesh, 5);
+    ebpo_test_split_vertices(&mesh);
+    mesh.face_count--;
+    ebpo_test_shuffle(&mesh, 7);
+    return mesh;
+}
+
+/* Builds and writes a file of a copy-like second mesh (makers are deterministic), mended as asked. */
+static void write_file(ebpo_mesh mesh, bool mended, uint32_t parts)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_mend_record mend = {0};
+    if (mended) {
+        mend.weld = mend.orient = mend.fill_holes = true;
+        ck_assert(ebpo_mesh_weld(&mesh, &mend, &error) == EBPO_OK);
+        ck_assert(ebpo_mesh_orient(&mesh, &mend, &error) == EBPO_OK);
+        ck_assert(ebpo_mesh_fill_holes(&mesh, &mend, &error) == EBPO_OK);
+    }
+    ebpo_mesh_report facts;
+    ck_assert(ebpo_mesh_check(&facts, &mesh, 1, (ebpo_progress){0}, &error) == EBPO_OK);
+    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+    options.leaf_faces = 8;
+    options.threads = 1;
+    options.parts |= EBPO_PART_LEAF_PLANES;
+    ebpo_tree tree;
+    ck_assert_msg(ebpo_build(&tree, &mesh, &facts, &mend, &options, &error) == EBPO_OK, "%s", error.message);
+    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
+    write.parts = parts;
+    ck_assert_msg(ebpo_tree_write(&tree, path, &write, &error) == EBPO_OK, "%s", error.message);
+    ebpo_tree_free(&tree);
+}
+
+/* False when the file cannot even be opened. */
+static bool verify_against(const ebpo_mesh *source)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file;
+    if (ebpo_file_open(&file, path, &error) != EBPO_OK)
+        return false;
+    ebpo_verify_options options = EBPO_VERIFY_OPTIONS_INIT;
+    options.source = source;
+    options.threads = 2;
+    ck_assert_msg(ebpo_verify(file, &options, &report, &error) == EBPO_OK, "%s", error.message);
+    ebpo_file_close(file);
+    return true;
+}
+
+static void expect_fine(const ebpo_mesh *source)
+{
+    ck_assert(verify_against(source));
+    ck_assert_msg(report.violations == 0, "%s%s%s%s%s%s%s", report.structure.first, report.content.first, report.containment.first,
+                  report.nesting.first, report.labels.first, report.lists.first, report.source.first);
+    ck_assert_uint_gt(report.content.checks, 0);
+}
+
+START_TEST(file_equals_its_source_after_mending)
+{
+    ebpo_mesh source = worn_mesh();
+    write_file(worn_mesh(), true, ~0u);
+    expect_fine(&source);
+    ck_assert_uint_gt(report.source.checks, 1000);
+    ebpo_mesh_free(&source);
+}
+END_TEST
+
+START_TEST(file_without_maps_equals_its_source_as_a_set)
+{
+    ebpo_mesh source = worn_mesh();
+    write_file(worn_mesh(), true, EBPO_PART_MESH | EBPO_PART_PLANES);
+    expect_fine(&source);
+    ck_assert_uint_gt(report.source.checks, 1000);
+    ebpo_mesh_free(&source);
+}
+END_TEST
+
+START_TEST(files_without_parts_keep_what_they_promise)
+{
+    static const uint32_t parts[] = {EBPO_PART_PLANES, EBPO_PART_MESH, EBPO_PART_MESH | EBPO_PART_LEAF_PLANES, 0};
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
+        write_file(ebpo_test_make("torus"), false, parts[i]);
+        expect_fine(NULL);
+    }
+}
+END_TEST
+
+START_TEST(another_source_is_noticed_down_to_the_sign_of_zero)
+{
+    static const uint32_t parts[] = {~0u, EBPO_PART_MESH | EBPO_PART_PLANES};
+    for (int i = 0; i < 2; i++) {
+        write_file(ebpo_test_make("cube_in_cell_walls"), false, parts[i]);
+        ebpo_mesh source = ebpo_test_make("cube_in_cell_walls");
+        expect_fine(&source);
+        ebpo_mesh other = ebpo_test_make("cube_in_cell_walls");
+        uint64_t *bits = (uint64_t *)(void *)other.xyz64;
+        bits[0] ^= 1;
+        ck_assert(verify_against(&other));
+        ck_assert_uint_gt(report.source.violations, 0);
+        bits[0] ^= 1;
+        uint32_t first = other.faces[0];
+        other.faces[0] = other.faces[1], other.faces[1] = other.faces[2], other.faces[2] = first;
+        ck_assert(verify_against(&other));
+        ck_assert_uint_gt(report.source.violations, 0);
+        other.face_count--;
+        ck_assert(verify_against(&other));
+        ck_assert_uint_gt(report.source.violations, 0);
+        ebpo_mesh_free(&other);
+        ebpo_mesh_free(&source);
+    }
+    ebpo_mesh zero = ebpo_test_make("cube"), minus = ebpo_test_make("cube");
+    uint64_t at = 0;
+    while (zero.xyz64[at] != 0)
+        at++;
+    minus.xyz64[at] = -0.0;
+    write_file(ebpo_test_make("cube"), false, ~0u);
+    expect_fine(&zero);
+    ck_assert(verify_against(&minus));
+    ck_assert_uint_gt(report.source.violations, 0);
+    ebpo_mesh_free(&zero);
+    ebpo_mesh_free(&minus);
+}
+END_TEST
+
+/* Flips a bit here and there: the file is refused, or violations are counted, or the byte meant nothing. Never a crash, never a status of our own making. */
+START_TEST(damaged_files_are_findings_and_not_failures)
+{
+    write_file(ebpo_test_make("sphere"), false, ~0u);
+    FILE *f = fopen(path, "r+b");
+    fseek(f, 0, SEEK_END);
+    long size = ftell(f);
+    uint64_t state = 11;
+    int found = 0, rounds = 150;
+    for (int i = 0; i < rounds; i++) {
+        long at = (long)(ebpo_test_random(&state) % (uint64_t)size);
+        fseek(f, at, SEEK_SET);
+        int byte = fgetc(f), flipped = byte ^ 1 << i % 8;
+        fseek(f, at, SEEK_SET);
+        fputc(flipped, f);
+        fflush(f);
+        found += !verify_against(NULL) || report.violations > 0;
+        fseek(f, at, SEEK_SET);
+        fputc(byte, f);
+        fflush(f);
+    }
+    fclose(f);
+    ck_assert_int_gt(found, rounds / 2);
+    expect_fine(NULL);
+}
+END_TEST
+
+static bool stop_at_once(void *user, const char *stage, uint64_t done, uint64_t total)
+{
+    (void)user, (void)stage, (void)done, (void)total;
+    return false;
+}
+
+START_TEST(verifying_needs_a_file_and_may_be_stopped)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert(ebpo_verify(NULL, NULL, &report, &error) == EBPO_E_ARGUMENT);
+    write_file(ebpo_test_make("torus"), false, ~0u);
+    ebpo_file *file;
+    ck_assert(ebpo_file_open(&file, path, &error) == EBPO_OK);
+    ebpo_verify_options options = EBPO_VERIFY_OPTIONS_INIT;
+    options.progress.report = stop_at_once;
+    ebpo_status status = ebpo_verify(file, &options, &report, &error);
+    ck_assert(status == EBPO_OK || status == EBPO_E_CANCELLED); /* a small file is done before the first report */
+    ck_assert(ebpo_verify(file, NULL, &report, &error) == EBPO_OK);
+    ck_assert_uint_eq(report.violations, 0);
+    ebpo_file_close(file);
+}
+END_TEST
+
+int main(void)
+{
+    TCase *tests = tcase_create("verify file");
+    tcase_set_timeout(tests, 300);
+    tcase_add_checked_fixture(tests, enter, leave);
+    tcase_add_test(tests, file_equals_its_source_after_mending);
+    tcase_add_test(tests, file_without_maps_equals_its_source_as_a_set);
+    tcase_add_test(tests, files_without_parts_keep_what_they_promise);
+    tcase_add_test(tests, another_source_is_noticed_down_to_the_sign_of_zero);
+    tcase_add_test(tests, damaged_files_are_findings_and_not_failures);
+    tcase_add_test(tests, verifying_needs_a_file_and_may_be_stopped);
+    Suite *suite = suite_create("verify file");
+    suite_add_tcase(suite, tests);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_ENV);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+}
