@@ -16,5 +16,5 @@ set -x
 ebpo convert /usr/share/glmark2/models/bunny.obj $out
 ebpo info $out
 ebpo verify $out --against /usr/share/glmark2/models/bunny.obj
-ebpo render $out samples/out/bunny.png --levels 0,2,4,6 --size 1600x420
+ebpo render $out samples/out/bunny.png --levels 0,1,2,3,4,6 --size 1200x840
 h5dump -d /levels/01/plane_counts $out

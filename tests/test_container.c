@@ -432,7 +432,17 @@ static void spoil_order(ebpo_tree *t) { t->level[4].leaf_first[2]++; }
 static void spoil_black(ebpo_tree *t) { t->level[4].black_winding[0] = 0; }
 static void spoil_mesh(ebpo_tree *t) { t->mesh.face_count--; }
 static void spoil_levels(ebpo_tree *t) { t->info.level_count = 22; }
-static const spoil_fn spoils[] = { spoil_types, spoil_root, spoil_first_use, spoil_vertex, spoil_map, spoil_plane, spoil_text, spoil_box,
+static void spoil_refs(ebpo_tree *t)
+{
+    ebpo_level *l = &t->level[4];
+    uint64_t at = 0, leaf = 0;
+    while (l->leaf_ref_count[leaf] < 2)
+        at += l->leaf_ref_count[leaf++];
+    uint32_t first = l->leaf_refs[at];
+    l->leaf_refs[at] = l->leaf_refs[at + 1];
+    l->leaf_refs[at + 1] = first;
+}
+static const spoil_fn spoils[] = { spoil_refs, spoil_types, spoil_root, spoil_first_use, spoil_vertex, spoil_map, spoil_plane, spoil_text, spoil_box,
                                    spoil_order, spoil_black, spoil_mesh, spoil_levels };
 
 START_TEST(writer_refuses_a_tree_that_readers_would_refuse)
@@ -444,6 +454,39 @@ START_TEST(writer_refuses_a_tree_that_readers_would_refuse)
     ck_assert_int_eq(ebpo_tree_write(&tree, in_folder("a.ebpo.h5"), NULL, &error), EBPO_E_ARGUMENT);
     ck_assert_ptr_nonnull(strstr(error.message, "not written"));
     ck_assert_int_ne(access(in_folder("a.ebpo.h5"), F_OK), 0);
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
+START_TEST(an_index_that_contradicts_its_arrays_is_refused)
+{
+    static const char *const names[] = { "types_index", "gray_index", "leaf_index" };
+    ebpo_tree tree;
+    ebpo_level level;
+    random_tree_make(&tree, &shapes[5]);
+    write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_ZSTD, 2, ~0u);
+    ck_assert_int_eq(ebpo_register_filters(NULL), EBPO_OK);
+    hid_t fid = H5Fopen(in_folder("a.ebpo.h5"), H5F_ACC_RDWR, H5P_DEFAULT);
+    int number = 0;
+    for (char path[64]; number < 8; number++) {
+        snprintf(path, sizeof path, "/levels/%02d/%s", number, names[_i]);
+        if (H5Lexists(fid, path, H5P_DEFAULT) <= 0)
+            continue;
+        uint64_t values[4096];
+        hid_t id = H5Dopen2(fid, path, H5P_DEFAULT);
+        ck_assert_int_ge(H5Dread(id, H5T_NATIVE_UINT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), 0);
+        values[_i == 1 ? 1 : 4]++;
+        ck_assert_int_ge(H5Dwrite(id, H5T_NATIVE_UINT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), 0);
+        H5Dclose(id);
+        break;
+    }
+    H5Fclose(fid);
+    ck_assert_int_lt(number, 8);
+    ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert_int_eq(ebpo_file_read_level(file, number, &level, 1, &error), EBPO_E_FORMAT);
+    ck_assert_ptr_nonnull(strstr(error.message, names[_i]));
+    ebpo_file_close(file);
     ebpo_tree_free(&tree);
 }
 END_TEST
@@ -581,6 +624,7 @@ int main(void)
     tcase_add_loop_test(tests, every_flipped_bit_behind_the_head_is_noticed, 0, 3);
     tcase_add_test(tests, flipped_bits_in_the_head_do_no_harm);
     tcase_add_loop_test(tests, writer_refuses_a_tree_that_readers_would_refuse, 0, sizeof spoils / sizeof spoils[0]);
+    tcase_add_loop_test(tests, an_index_that_contradicts_its_arrays_is_refused, 0, 3);
     tcase_add_test(tests, a_stopped_writer_leaves_the_old_file);
     tcase_add_test(tests, codec_and_level_are_checked);
     tcase_add_test(tests, what_is_no_file_of_ours_is_named);

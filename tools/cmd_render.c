@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "command.h"
 #include "facts.h"
@@ -129,7 +130,7 @@ static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress pro
     t->closed = true;
     ebpo_status status = ebpo_lod_level(file, t->level, &lod, &t->mesh, NULL, error);
     if (status == EBPO_OK)
-        snprintf(t->caption, sizeof t->caption, info->solid ? "level %d: %.1f %%" : "level %d", t->level,
+        snprintf(t->caption, sizeof t->caption, info->solid ? "level %d: %.1f %%" : "level %d: %.1f %% of box", t->level,
                  facts_percent(info, t->level));
     return status;
 }
@@ -183,6 +184,12 @@ static const tile *coarsest(const job *j)
     return best;
 }
 
+static unsigned thread_count(const job *j)
+{
+    long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    return j->v.threads ? (unsigned)j->v.threads : cores > 0 ? (unsigned)cores : 1;
+}
+
 static ebpo_status draw_tile(const job *j, const tile *t, picture *p, const camera *view, const int at[4], ebpo_error *error)
 {
     static const uint8_t ink[3] = { 60, 66, 76 };
@@ -190,7 +197,7 @@ static ebpo_status draw_tile(const job *j, const tile *t, picture *p, const came
     if (t->level == MESH)
         memcpy(style.colour, (const double[3]){ 0.66, 0.54, 0.40 }, sizeof style.colour);
     int caption = j->v.levels ? 1 + at[2] / 240 : 0;
-    ebpo_status status = raster_draw(p, at[0], at[1], at[2], at[3] - 14 * caption, view, &t->mesh, &style, error);
+    ebpo_status status = raster_draw(p, at[0], at[1], at[2], at[3] - 14 * caption, view, &t->mesh, &style, thread_count(j), error);
     if (status == EBPO_OK && caption)
         picture_text(p, at[0] + (at[2] - picture_text_width(caption, t->caption)) / 2, at[1] + at[3] - 12 * caption, caption,
                      ink, t->caption);

@@ -2,11 +2,12 @@
 #include "raster.h"
 
 #include <math.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { OCCLUSION_STEPS = 10 };
+enum { OCCLUSION_STEPS = 10, THREADS_MAX = 64 };
 #define EDGE UINT32_C(0x80000000)
 
 typedef struct sample {
@@ -274,8 +275,43 @@ static void resolve_pixel(const raster *r, int x, int y, double reach, uint8_t *
         rgb[k] = to_srgb(sum[k] / (r->side * r->side));
 }
 
+/* One thread's share of the second step: every threads-th row. */
+typedef struct share {
+    const raster *r;
+    picture *out;
+    int x, y, width, height;
+    unsigned number, threads;
+    pthread_t thread;
+} share;
+
+static void *resolve_rows(void *argument)
+{
+    const share *s = argument;
+    double reach = 0.10 * s->r->view->distance * s->r->view->tangent;
+    for (int j = (int)s->number; j < s->height; j += (int)s->threads)
+        for (int i = 0; i < s->width; i++)
+            resolve_pixel(s->r, i, j, reach,
+                          s->out->rgb + 3 * ((size_t)(s->y + j) * (size_t)s->out->width + (size_t)(s->x + i)));
+    return NULL;
+}
+
+static void resolve(const raster *r, picture *out, int x, int y, int width, int height, unsigned threads)
+{
+    share shares[THREADS_MAX];
+    unsigned count = threads < 1 ? 1 : threads < THREADS_MAX ? threads : THREADS_MAX, started = 1;
+    for (unsigned i = 0; i < count; i++)
+        shares[i] = (share){ .r = r, .out = out, .x = x, .y = y, .width = width, .height = height, .number = i, .threads = count };
+    while (started < count && pthread_create(&shares[started].thread, NULL, resolve_rows, &shares[started]) == 0)
+        started++;
+    resolve_rows(&shares[0]);
+    for (unsigned i = started; i < count; i++) /* threads that could not be had */
+        resolve_rows(&shares[i]);
+    for (unsigned i = 1; i < started; i++)
+        pthread_join(shares[i].thread, NULL);
+}
+
 ebpo_status raster_draw(picture *out, int x, int y, int width, int height, const camera *view, const ebpo_mesh *mesh,
-                        const raster_style *style, ebpo_error *error)
+                        const raster_style *style, unsigned threads, ebpo_error *error)
 {
     if (mesh->face_count >= EDGE) {
         snprintf(error->message, sizeof error->message, "more than 2147483647 faces cannot be drawn; take a coarser level");
@@ -296,10 +332,7 @@ ebpo_status raster_draw(picture *out, int x, int y, int width, int height, const
     for (uint64_t face = 0; face < mesh->face_count; face++)
         draw_face(&r, face);
     make_tables(&r);
-    double reach = 0.10 * view->distance * view->tangent;
-    for (int j = 0; j < height; j++)
-        for (int i = 0; i < width; i++)
-            resolve_pixel(&r, i, j, reach, out->rgb + 3 * ((size_t)(y + j) * (size_t)out->width + (size_t)(x + i)));
+    resolve(&r, out, x, y, width, height, threads);
 done:
     free(r.samples);
     free(r.normal);

@@ -22,8 +22,9 @@ typedef struct raster_style {
     bool edges;        /* draw the outlines of polygons */
 } raster_style;
 
-/* Draws the mesh into the rectangle (x, y, width, height) of the picture, over what is there. */
+/* Draws the mesh into the rectangle (x, y, width, height) of the picture, over what is there. `threads` 1 to 64; the picture does not depend
+ * on it. */
 EBPO_MUST_USE ebpo_status raster_draw(picture *out, int x, int y, int width, int height, const camera *view,
-                                      const ebpo_mesh *mesh, const raster_style *style, ebpo_error *error);
+                                      const ebpo_mesh *mesh, const raster_style *style, unsigned threads, ebpo_error *error);
 
 #endif

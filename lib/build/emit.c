@@ -11,8 +11,9 @@ typedef struct emitter {
     const ebpo_builder *b;
     ebpo_subtree *s;
     ebpo_envelope_scratch *scratch;
-    ebpo_triangle *faces;
-    uint64_t faces_capacity;
+    ebpo_triangle *faces; /* of one leaf */
+    uint64_t *list;       /* final number << 32 | face, of one leaf */
+    uint64_t faces_capacity, list_capacity;
 } emitter;
 
 void ebpo_out_free(ebpo_out *out)
@@ -38,7 +39,8 @@ bool ebpo_emit_gray(ebpo_out *out, const uint32_t *codes, int count, double volu
         !ebpo_grow(&l->planes, &out->plane_capacity, l->plane_count + (uint64_t)count, sizeof *l->planes))
         return false;
     l->plane_counts[l->gray_count++] = (uint8_t)count;
-    memcpy(l->planes + l->plane_count, codes, (size_t)count * sizeof *codes);
+    if (count) /* the array may not be there yet */
+        memcpy(l->planes + l->plane_count, codes, (size_t)count * sizeof *codes);
     l->plane_count += (uint64_t)count;
     l->gray_volume += volume;
     return true;
@@ -110,16 +112,40 @@ static bool emit_list(const emitter *e, const ebpo_build_detail *d, ebpo_out *ou
     return true;
 }
 
+static int compare_keys(const void *a, const void *b)
+{
+    uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* The leaf's faces by final number. A reader has them in this order too, and what follows from them depends on it where faces are many. */
+static bool gather_faces(emitter *e, const ebpo_build_detail *d)
+{
+    uint64_t count = d->entry_end - d->entry_begin;
+    if (!ebpo_grow(&e->faces, &e->faces_capacity, count, sizeof *e->faces) ||
+        !ebpo_grow(&e->list, &e->list_capacity, count, sizeof *e->list))
+        return false;
+    bool sorted = true;
+    for (uint64_t i = 0; i < count; i++) {
+        uint32_t face = e->s->entries[d->entry_begin + i];
+        e->list[i] = (uint64_t)e->b->number[face] << 32 | face;
+        sorted = sorted && (i == 0 || e->list[i - 1] < e->list[i]);
+    }
+    if (!sorted)
+        qsort(e->list, count, sizeof *e->list, compare_keys);
+    for (uint64_t i = 0; i < count; i++)
+        ebpo_build_triangle(e->b, (uint32_t)e->list[i], &e->faces[i]);
+    return true;
+}
+
 static bool emit_leaf(emitter *e, const ebpo_build_detail *d, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope)
 {
     const ebpo_builder *b = e->b;
     ebpo_out *out = &e->s->out[cell.level];
     ebpo_level *l = &out->level;
     uint64_t count = d->entry_end - d->entry_begin;
-    if (!emit_list(e, d, out, winding) || !ebpo_grow(&e->faces, &e->faces_capacity, count, sizeof *e->faces))
+    if (!emit_list(e, d, out, winding) || !gather_faces(e, d))
         return false;
-    for (uint64_t i = 0; i < count; i++)
-        ebpo_build_triangle(b, e->s->entries[d->entry_begin + i], &e->faces[i]);
     uint32_t codes[EBPO_PLANES_MAX];
     bool stored = b->options->parts & EBPO_PART_LEAF_PLANES;
     int planes = ebpo_leaf_planes(&b->box, cell, e->faces, count, ebpo_inside_corners(b, winding, d->delta),
@@ -130,7 +156,8 @@ static bool emit_leaf(emitter *e, const ebpo_build_detail *d, ebpo_cell cell, in
         return true;
     if (!ebpo_grow(&l->leaf_planes, &out->leaf_plane_capacity, l->leaf_plane_count + (uint64_t)planes, sizeof *l->leaf_planes))
         return false;
-    memcpy(l->leaf_planes + l->leaf_plane_count, codes, (size_t)planes * sizeof *codes);
+    if (planes)
+        memcpy(l->leaf_planes + l->leaf_plane_count, codes, (size_t)planes * sizeof *codes);
     l->leaf_plane_count += (uint64_t)planes;
     return true;
 }
@@ -223,6 +250,7 @@ static ebpo_status emit_subtrees(void *context, uint64_t begin, uint64_t end, un
     }
     ebpo_scratch_free(e.scratch);
     free(e.faces);
+    free(e.list);
     return status;
 }
 

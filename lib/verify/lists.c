@@ -2,6 +2,8 @@
 
 #include <stdlib.h>
 
+#include "base/alloc.h"
+
 static void unlisted(ebpo_tally *tally, const ebpo_view_node *node, uint32_t face, const char *text)
 {
     ebpo_tally_violation(tally, EBPO_VERIFY_LISTS, &(ebpo_verify_place){node->code, face, EBPO_NO_PLANE}, "%s", text);
@@ -57,44 +59,48 @@ void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_view *view, const e
         unlisted(tally, node, faces[i], node->type == EBPO_WHITE ? "the face touches a white cell" : "the face touches a black cell");
 }
 
-/* Different faces met so far, up to a limit that is small where this is used. */
-typedef struct face_set {
-    uint64_t limit, count;
-    uint32_t *faces; /* [limit + 1] */
-} face_set;
+/* Faces listed below a node, repeated as they come. */
+typedef struct gathering {
+    uint32_t *faces;
+    uint64_t count, capacity;
+    bool short_of_memory;
+} gathering;
 
-static void add_face(face_set *set, uint32_t face)
-{
-    for (uint64_t i = 0; i < set->count; i++)
-        if (set->faces[i] == face)
-            return;
-    set->faces[set->count++] = face;
-}
-
-static void gather(face_set *set, const ebpo_view *view, const ebpo_view_node *node)
+static void gather(gathering *g, const ebpo_view *view, const ebpo_view_node *node)
 {
     if (node->type == EBPO_LEAF) {
         face_list list = list_of(view, node);
-        for (uint32_t i = 0; i < list.ref_count && set->count <= set->limit; i++)
-            add_face(set, list.refs[i]);
-        for (uint32_t i = 0; i < list.new_count && set->count <= set->limit; i++)
-            add_face(set, (uint32_t)(list.first + i));
+        uint64_t more = (uint64_t)list.ref_count + list.new_count;
+        if (g->short_of_memory || !ebpo_grow(&g->faces, &g->capacity, g->count + more, sizeof *g->faces)) {
+            g->short_of_memory = true;
+            return;
+        }
+        for (uint32_t i = 0; i < list.ref_count; i++)
+            g->faces[g->count++] = list.refs[i];
+        for (uint32_t i = 0; i < list.new_count; i++)
+            g->faces[g->count++] = (uint32_t)(list.first + i);
     }
-    for (unsigned octant = 0; node->type == EBPO_GRAY && octant < 8 && set->count <= set->limit; octant++) {
+    for (unsigned octant = 0; node->type == EBPO_GRAY && octant < 8; octant++) {
         ebpo_view_node child = ebpo_view_child(view, node, octant);
-        gather(set, view, &child);
+        gather(g, view, &child);
     }
+}
+
+static int compare_numbers(const void *a, const void *b)
+{
+    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
 }
 
 bool ebpo_lists_more_faces(const ebpo_view *view, const ebpo_view_node *node, uint64_t limit)
 {
-    /* A set as large as the mesh cannot be exceeded; and memory that is short proves nothing against the file. */
-    if (limit >= view->tree->mesh.face_count)
-        return false;
-    face_set set = {limit, 0, malloc((limit + 1) * sizeof *set.faces)};
-    if (!set.faces)
-        return true;
-    gather(&set, view, node);
-    free(set.faces);
-    return set.count > limit;
+    gathering g = {0};
+    gather(&g, view, node);
+    if (g.count)
+        qsort(g.faces, g.count, sizeof *g.faces, compare_numbers);
+    uint64_t different = g.count > 0;
+    for (uint64_t i = 1; i < g.count; i++)
+        different += g.faces[i] != g.faces[i - 1];
+    free(g.faces);
+    return different > limit || g.short_of_memory; /* memory that is short proves nothing against the file */
 }

@@ -28,7 +28,8 @@ typedef struct ebpo_verify_report {
 typedef struct ebpo_verify_options {
     const ebpo_mesh *source;  /* mesh as read (before mending), or NULL; mending recorded in the file is done again */
     unsigned threads;         /* 0: all cores */
-    uint64_t label_samples;   /* cells whose labels are checked by an independent winding number; 0: all when face_count * cells is small, else 4096 */
+    uint64_t label_samples;   /* cells whose labels are checked by an independent winding number; 0: all when
+                             * that takes some seconds (4e8 looks at a face), else 4096; at least one of each level and type */
     ebpo_progress progress;
 } ebpo_verify_options;
 #define EBPO_VERIFY_OPTIONS_INIT { NULL, 0, 0, { NULL, NULL } }

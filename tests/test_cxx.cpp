@@ -1,0 +1,32 @@
+// The public headers from C++, and the shared library's public symbols only.
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+
+#include <ebpo/ebpo.h>
+
+int main()
+{
+    ebpo_mesh mesh = {};
+    mesh.vertex_count = 4;
+    mesh.face_count = 4;
+    mesh.xyz32 = static_cast<float *>(std::calloc(12, sizeof(float)));
+    mesh.faces = static_cast<std::uint32_t *>(std::malloc(12 * sizeof(std::uint32_t)));
+    const std::uint32_t faces[12] = { 0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2 };
+    for (int i = 0; i < 12; i++)
+        mesh.faces[i] = faces[i];
+    mesh.xyz32[3] = mesh.xyz32[7] = mesh.xyz32[11] = 1;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_mesh_report report;
+    if (ebpo_mesh_check(&report, &mesh, 1, ebpo_progress(), &error) != EBPO_OK || !report.balanced)
+        return 1;
+    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_tree tree;
+    if (ebpo_build(&tree, &mesh, &report, nullptr, &options, &error) != EBPO_OK) {
+        std::puts(error.message);
+        return 1;
+    }
+    std::printf("%s: %d levels, volume %g\n", ebpo_version(), tree.info.level_count, tree.info.report.volume);
+    ebpo_tree_free(&tree);
+    return 0;
+}

@@ -1,0 +1,19 @@
+#!/bin/sh
+# The samples do what they say: test_samples.sh EBPO SAMPLES PLUGIN_FOLDER INPUTS
+set -u
+ebpo=$1 samples=$2 inputs=$4
+export HDF5_PLUGIN_PATH="$3"
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+fail() { echo "FAILED: $1"; cat "$work/out"; exit 1; }
+command -v h5dump >/dev/null && command -v h5ls >/dev/null || exit 77
+
+"$inputs" "$work" || exit 1
+"$ebpo" convert -q --leaf-faces 8 "$work/sphere.ply" "$work/a.ebpo.h5" || fail convert
+sh "$samples/inspect.sh" "$work/a.ebpo.h5" 1 >"$work/out" 2>&1 || fail inspect.sh
+grep -q 'vertex_count *[0-9]' "$work/out" || fail "inspect.sh shows the number of vertices"
+grep -q 'plane_counts: [0-9]' "$work/out" || fail "inspect.sh shows a level's planes"
+/usr/bin/python3 -c 'import h5py' 2>/dev/null || exit 0
+/usr/bin/python3 "$samples/read_level.py" "$work/a.ebpo.h5" 1 >"$work/out" 2>&1 || fail read_level.py
+planes=$("$ebpo" info --json "$work/a.ebpo.h5" | /usr/bin/python3 -c 'import json, sys; print(json.load(sys.stdin)["levels"][1]["planes"])')
+[ "$(grep -c '^1[0-7] ' "$work/out")" = "$planes" ] || fail "read_level.py prints each plane of level 1 ($planes)"
