@@ -19,7 +19,7 @@ GENERATED = {
     "torus": ["--base", "torus", "--faces", "30000", "--seed", "7"],
     "sphere": ["--base", "sphere", "--subdivide", "5", "--seed", "3"],
 }
-REAL = ["bunny_closed", "dragon100k", "motorbike", "office_chair", "cheese_g133", "twin7081_left", "blade"]
+REAL = ["bunny_closed", "office_chair", "twin7081_left", "blade"]
 VARIANTS = {"default": [], "leaf-planes": ["--with", "leaf-planes", "--leaf-faces", "8"], "fine": ["--leaf-faces", "0", "--rule", "positive"]}
 
 
@@ -42,8 +42,8 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         for name, path in inputs(folder):
             for variant, options in VARIANTS.items():
-                outputs = [f"{folder}/{threads}.ebpo.h5" for threads in (1, 2, 5)]
-                for threads, output in zip((1, 2, 5), outputs):
+                outputs = [f"{folder}/{threads}.ebpo.h5" for threads in (1, 5)]
+                for threads, output in zip((1, 5), outputs):
                     run(EBPO, "convert", "-q", "--threads", str(threads), *options, path, output)
                 if not all(filecmp.cmp(outputs[0], output, shallow=False) for output in outputs[1:]):
                     problems.append(f"{name} {variant}: bytes depend on the number of threads")
@@ -55,7 +55,7 @@ def main():
     for key, digest in found.items():
         if expected.get(key) != digest:
             problems.append(f"{key}: content {digest}, expected {expected.get(key)}")
-    print("\n".join(problems) or f"{len(found)} files have the expected content, for 1, 2 and 5 threads")
+    print("\n".join(problems) or f"{len(found)} files have the expected content, for 1 and 5 threads")
     return 1 if problems else 0
 
 

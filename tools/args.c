@@ -82,19 +82,12 @@ static arg_result set_value(const arg_spec *spec, const arg_option *o, const cha
 {
     void *field = (char *)values + o->offset;
     switch (o->kind) {
-    case ARG_FLAG:
-        *(bool *)field = true;
-        return ARGS_RUN;
-    case ARG_INT:
-        return set_int(spec, o, text, field);
-    case ARG_REAL:
-        return set_real(spec, o, text, field);
-    case ARG_WORD:
-        return find_word(spec, o, text, strlen(text), field);
-    case ARG_SET:
-        return set_bits(spec, o, text, field);
-    case ARG_TEXT:
-        break;
+    case ARG_FLAG: *(bool *)field = true; return ARGS_RUN;
+    case ARG_INT: return set_int(spec, o, text, field);
+    case ARG_REAL: return set_real(spec, o, text, field);
+    case ARG_WORD: return find_word(spec, o, text, strlen(text), field);
+    case ARG_SET: return set_bits(spec, o, text, field);
+    case ARG_TEXT: break;
     }
     if (!*text)
         return wrong(spec, "--%s: the value is empty", o->name);
@@ -195,7 +188,8 @@ static arg_result take_letters(parser *p)
     return ARGS_RUN;
 }
 
-arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values, const char *operands[ARGS_OPERANDS_MAX])
+arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values,
+                      const char *operands[ARGS_OPERANDS_MAX])
 {
     parser p = { spec, argc, 1, argv, values };
     int count = 0;
@@ -218,7 +212,8 @@ arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values,
             return result;
     }
     if (count < spec->least)
-        return wrong(spec, "%s; expected: %s", count ? "an operand is missing" : "operands are missing", spec->operands);
+        return wrong(spec, "%s; expected: %s", count ? "an operand is missing" : "operands are missing",
+                     spec->operands);
     return ARGS_RUN;
 }
 

@@ -16,22 +16,22 @@ typedef enum arg_kind {
 } arg_kind;
 
 typedef struct arg_option {
-    const char *name;         /* "max-level", without dashes; NULL ends the table */
-    char letter;              /* short form, or 0 */
+    const char *name; /* "max-level", without dashes; NULL ends the table */
+    char letter;      /* short form, or 0 */
     arg_kind kind;
-    size_t offset;            /* of the field in the values struct */
-    const char *value;        /* "N", for --help; NULL for flags */
-    const char *help;         /* may have several lines */
+    size_t offset;     /* of the field in the values struct */
+    const char *value; /* "N", for --help; NULL for flags */
+    const char *help;  /* may have several lines */
     double low, high;
     const char *const *words; /* NULL-terminated */
 } arg_option;
 
 typedef struct arg_spec {
-    const char *command;      /* "convert" */
-    const char *operands;     /* "IN.ply OUT.ebpo.h5" */
-    int least, most;          /* number of operands */
-    const char *summary;      /* one line */
-    const char *text;         /* more lines for --help, or NULL */
+    const char *command;  /* "convert" */
+    const char *operands; /* "IN.ply OUT.ebpo.h5" */
+    int least, most;      /* number of operands */
+    const char *summary;  /* one line */
+    const char *text;     /* more lines for --help, or NULL */
     const arg_option *options;
 } arg_spec;
 
@@ -39,9 +39,11 @@ typedef enum arg_result { ARGS_RUN, ARGS_HELPED, ARGS_WRONG } arg_result;
 
 enum { ARGS_OPERANDS_MAX = 4 };
 
-/* Parses argv[1 ..] into `values` (set to defaults before) and `operands` (unused ones NULL). Options may stand anywhere; "--" ends them.
+/* Parses argv[1 ..] into `values` (set to defaults before) and `operands` (unused ones NULL). Options may stand
+ * anywhere; "--" ends them.
  * --help is printed on stdout; what is wrong is said on stderr. */
-arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values, const char *operands[ARGS_OPERANDS_MAX]);
+arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values,
+                      const char *operands[ARGS_OPERANDS_MAX]);
 
 void args_help(const arg_spec *spec);
 

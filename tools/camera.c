@@ -77,7 +77,8 @@ static void measure(camera *c, const ebpo_mesh *mesh, double aspect, double *shi
     *shift_y = (low[1] + high[1]) / 2 * distance;
 }
 
-void camera_fit(camera *out, const ebpo_mesh *mesh, double azimuth, double elevation, int up_axis, int width, int height)
+void camera_fit(camera *out, const ebpo_mesh *mesh, double azimuth, double elevation, int up_axis, int width,
+                int height)
 {
     double aspect = (double)width / height, sx, sy;
     memset(out, 0, sizeof *out);

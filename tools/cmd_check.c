@@ -14,20 +14,28 @@ typedef struct values {
 } values;
 
 static const arg_option options[] = {
-    { "weld", 0, ARG_FLAG, offsetof(values, mend.weld), NULL, "first merge vertices at one position (STL: always)", 0, 0, NULL },
-    { "orient", 0, ARG_FLAG, offsetof(values, mend.orient), NULL, "then make neighbouring faces agree in orientation", 0, 0, NULL },
-    { "fill-holes", 0, ARG_FLAG, offsetof(values, mend.fill_holes), NULL, "then close simple boundary loops", 0, 0, NULL },
-    { "require-solid", 0, ARG_FLAG, offsetof(values, require_solid), NULL, "end with code 3 if the mesh is not a solid", 0, 0, NULL },
+    { "weld", 0, ARG_FLAG, offsetof(values, mend.weld), NULL, "first merge vertices at one position (STL: always)", 0,
+      0, NULL },
+    { "orient", 0, ARG_FLAG, offsetof(values, mend.orient), NULL, "then make neighbouring faces agree in orientation",
+      0, 0, NULL },
+    { "fill-holes", 0, ARG_FLAG, offsetof(values, mend.fill_holes), NULL, "then close simple boundary loops", 0, 0,
+      NULL },
+    { "require-solid", 0, ARG_FLAG, offsetof(values, require_solid), NULL, "end with code 3 if the mesh is not a solid",
+      0, 0, NULL },
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
     { "json", 0, ARG_FLAG, offsetof(values, json), NULL, "print the report as JSON", 0, 0, NULL },
-    { "quiet", 'q', ARG_FLAG, offsetof(values, quiet), NULL, "no report, no progress: errors and warnings only", 0, 0, NULL },
+    { "quiet", 'q', ARG_FLAG, offsetof(values, quiet), NULL, "no report, no progress: errors and warnings only", 0, 0,
+      NULL },
     { 0 },
 };
 
-static const arg_spec spec = {
-    "check", "IN.ply", 1, 1, "what a mesh is: solid or surface, and each finding with its places",
-    "With mending options: what it would be after mending. Nothing is written.", options
-};
+static const arg_spec spec = { "check",
+                               "IN.ply",
+                               1,
+                               1,
+                               "what a mesh is: solid or surface, and each finding with its places",
+                               "With mending options: what it would be after mending. Nothing is written.",
+                               options };
 
 static void print_json(const prepared *p, const char *path)
 {

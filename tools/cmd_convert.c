@@ -27,7 +27,8 @@ static const arg_option options[] = {
     { "max-level", 0, ARG_INT, offsetof(values, max_level), "N",
       "deepest level, 0 to 20; default: until cells are as short as\nthe mean edge", 0, 20, NULL },
     { "leaf-faces", 0, ARG_INT, offsetof(values, leaf_faces), "N",
-      "a node with at most N faces becomes a leaf; 0: only the\ndeepest level stops; default 16", 0, 4294967295.0, NULL },
+      "a node with at most N faces becomes a leaf; 0: only the\ndeepest level stops; default 16", 0, 4294967295.0,
+      NULL },
     { "epsilon", 0, ARG_REAL, offsetof(values, epsilon), "E",
       "a plane is kept while it removes at least this share of\nits cell; default 0.003", 0, 1, NULL },
     { "with", 0, ARG_SET, offsetof(values, with), "LIST", "also store: leaf-planes", 0, 0, with_words },
@@ -36,24 +37,36 @@ static const arg_option options[] = {
     { "codec", 0, ARG_WORD, offsetof(values, codec), "NAME", "zstd (the default), deflate or none", 0, 0, codec_words },
     { "zstd-level", 0, ARG_INT, offsetof(values, zstd_level), "N", "effort of zstd, 1 to 22; default 3", 1, 22, NULL },
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
-    { "weld", 0, ARG_FLAG, offsetof(values, mend.weld), NULL, "first merge vertices at one position (STL: always)", 0, 0, NULL },
-    { "orient", 0, ARG_FLAG, offsetof(values, mend.orient), NULL, "then make neighbouring faces agree in orientation", 0, 0, NULL },
-    { "fill-holes", 0, ARG_FLAG, offsetof(values, mend.fill_holes), NULL, "then close simple boundary loops", 0, 0, NULL },
+    { "weld", 0, ARG_FLAG, offsetof(values, mend.weld), NULL, "first merge vertices at one position (STL: always)", 0,
+      0, NULL },
+    { "orient", 0, ARG_FLAG, offsetof(values, mend.orient), NULL, "then make neighbouring faces agree in orientation",
+      0, 0, NULL },
+    { "fill-holes", 0, ARG_FLAG, offsetof(values, mend.fill_holes), NULL, "then close simple boundary loops", 0, 0,
+      NULL },
     { "rule", 0, ARG_WORD, offsetof(values, rule), "NAME",
       "inside is where the winding number is nonzero (the default),\nodd (evenodd) or positive", 0, 0, rule_words },
-    { "require-solid", 0, ARG_FLAG, offsetof(values, require_solid), NULL, "end with code 3 if the mesh is not a solid", 0, 0, NULL },
+    { "require-solid", 0, ARG_FLAG, offsetof(values, require_solid), NULL, "end with code 3 if the mesh is not a solid",
+      0, 0, NULL },
     { "unit", 0, ARG_TEXT, offsetof(values, unit), "U", "unit of length to record, such as mm", 0, 0, NULL },
-    { "crs", 0, ARG_TEXT, offsetof(values, crs), "C", "coordinate reference system to record, such as EPSG:25832", 0, 0, NULL },
-    { "date", 0, ARG_TEXT, offsetof(values, date), "D", "date to record, such as 2026-03-01; none by default, so that\nequal input gives an equal file", 0, 0, NULL },
+    { "crs", 0, ARG_TEXT, offsetof(values, crs), "C", "coordinate reference system to record, such as EPSG:25832", 0, 0,
+      NULL },
+    { "date", 0, ARG_TEXT, offsetof(values, date), "D",
+      "date to record, such as 2026-03-01; none by default, so that\nequal input gives an equal file", 0, 0, NULL },
     { "json", 0, ARG_FLAG, offsetof(values, json), NULL, "print reports and facts as JSON", 0, 0, NULL },
-    { "quiet", 'q', ARG_FLAG, offsetof(values, quiet), NULL, "no report, no progress: errors and warnings only", 0, 0, NULL },
+    { "quiet", 'q', ARG_FLAG, offsetof(values, quiet), NULL, "no report, no progress: errors and warnings only", 0, 0,
+      NULL },
     { 0 },
 };
 
 static const arg_spec spec = {
-    "convert", "IN.ply OUT.ebpo.h5", 2, 2, "a closed triangle mesh to an .ebpo.h5 file",
+    "convert",
+    "IN.ply OUT.ebpo.h5",
+    2,
+    2,
+    "a closed triangle mesh to an .ebpo.h5 file",
     "IN is PLY, or OBJ, STL or OFF where the library was built with assimp. OUT appears whole or not at all;\n"
-    "an older OUT is replaced. Mending is done in the order weld, orient, fill holes.", options
+    "an older OUT is replaced. Mending is done in the order weld, orient, fill holes.",
+    options
 };
 
 static int usage_error(const char *message)
@@ -141,7 +154,8 @@ static ebpo_status print_result(const values *v, const prepared *p, const char *
 
 /* --- work --- */
 
-static ebpo_status build_and_write(const values *v, prepared *p, const char *out, ebpo_progress progress, ebpo_error *error)
+static ebpo_status build_and_write(const values *v, prepared *p, const char *out, ebpo_progress progress,
+                                   ebpo_error *error)
 {
     ebpo_build_options build = EBPO_BUILD_OPTIONS_INIT;
     build.max_level = (int)v->max_level;
@@ -192,7 +206,8 @@ static int run(int argc, char **argv)
         print_reports(&v, &p, in);
         if (v.require_solid && !p.report.balanced) {
             ebpo_mesh_free(&p.mesh);
-            fprintf(stderr, "ebpo convert: %s: is not a solid, and --require-solid was given; nothing was written\n", in);
+            fprintf(stderr, "ebpo convert: %s: is not a solid, and --require-solid was given; nothing was written\n",
+                    in);
             return EXIT_NOT_SOLID;
         }
         status = build_and_write(&v, &p, out, progress, &error);

@@ -13,23 +13,32 @@ typedef struct values {
 } values;
 
 static const arg_option options[] = {
-    { "level", 0, ARG_INT, offsetof(values, level), "N", "the envelopes of level N, and leaves and black nodes above it", 0, 20, NULL },
-    { "mesh", 0, ARG_FLAG, offsetof(values, mesh), NULL, "the model itself, bit for bit; in the source's order where\nthe maps are stored", 0, 0, NULL },
-    { "no-walls", 0, ARG_FLAG, offsetof(values, no_walls), NULL, "with --level: leave out polygons that lie on cell walls", 0, 0, NULL },
+    { "level", 0, ARG_INT, offsetof(values, level), "N",
+      "the envelopes of level N, and leaves and black nodes above it", 0, 20, NULL },
+    { "mesh", 0, ARG_FLAG, offsetof(values, mesh), NULL,
+      "the model itself, bit for bit; in the source's order where\nthe maps are stored", 0, 0, NULL },
+    { "no-walls", 0, ARG_FLAG, offsetof(values, no_walls), NULL,
+      "with --level: leave out polygons that lie on cell walls", 0, 0, NULL },
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
-    { "quiet", 'q', ARG_FLAG, offsetof(values, quiet), NULL, "no summary, no progress: errors and warnings only", 0, 0, NULL },
+    { "quiet", 'q', ARG_FLAG, offsetof(values, quiet), NULL, "no summary, no progress: errors and warnings only", 0, 0,
+      NULL },
     { 0 },
 };
 
-static const arg_spec spec = {
-    "extract", "FILE OUT.ply", 2, 2, "a level's envelopes, or the model itself, as PLY", "Either --level or --mesh is needed.", options
-};
+static const arg_spec spec = { "extract",
+                               "FILE OUT.ply",
+                               2,
+                               2,
+                               "a level's envelopes, or the model itself, as PLY",
+                               "Either --level or --mesh is needed.",
+                               options };
 
 static int check_values(const values *v, const char *in, const char *out)
 {
     const char *message = NULL;
     if ((v->level >= 0) == v->mesh)
-        message = v->mesh ? "--level and --mesh exclude each other" : "what shall be extracted? give --level N or --mesh";
+        message =
+            v->mesh ? "--level and --mesh exclude each other" : "what shall be extracted? give --level N or --mesh";
     else if (v->mesh && v->no_walls)
         message = "--no-walls belongs to --level; the model has no cell walls";
     if (message) {
@@ -56,7 +65,8 @@ static ebpo_status take(ebpo_file *file, const values *v, const char *path, ebpo
     bool source_order = false;
     ebpo_status status = ebpo_file_read_source_mesh(file, out, &source_order, (unsigned)v->threads, error);
     if (status == EBPO_OK && !source_order)
-        fprintf(stderr, "ebpo extract: %s: note: holds no maps, so vertices and faces come in the file's order\n", path);
+        fprintf(stderr, "ebpo extract: %s: note: holds no maps, so vertices and faces come in the file's order\n",
+                path);
     return status;
 }
 

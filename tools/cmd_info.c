@@ -15,8 +15,13 @@ static const arg_option options[] = {
 };
 
 static const arg_spec spec = {
-    "info", "FILE", 1, 1, "what a file is, what it holds, bytes by part, and a table by level",
-    "Only the head of the file is read. FILE is an .ebpo.h5 file; for meshes there is 'ebpo check'.", options
+    "info",
+    "FILE",
+    1,
+    1,
+    "what a file is, what it holds, bytes by part, and a table by level",
+    "Only the head of the file is read. FILE is an .ebpo.h5 file; for meshes there is 'ebpo check'.",
+    options
 };
 
 static int run(int argc, char **argv)

@@ -27,9 +27,12 @@ static const char *const up_words[] = { "x", "y", "z", NULL };
 static const arg_option options[] = {
     { "level", 0, ARG_INT, offsetof(values, level), "N", "the envelopes of level N", 0, 20, NULL },
     { "mesh", 0, ARG_FLAG, offsetof(values, mesh), NULL, "the model itself; the default", 0, 0, NULL },
-    { "levels", 0, ARG_TEXT, offsetof(values, levels), "LIST", "several side by side, with captions: levels and 'mesh',\nfor example 0,2,4,mesh", 0, 0, NULL },
-    { "view", 0, ARG_TEXT, offsetof(values, view), "AZ,EL", "from where: azimuth and elevation in degrees; default 30,20", 0, 0, NULL },
-    { "up", 0, ARG_WORD, offsetof(values, up), "AXIS", "the axis that points upwards: x, y (the default) or z", 0, 0, up_words },
+    { "levels", 0, ARG_TEXT, offsetof(values, levels), "LIST",
+      "several side by side, with captions: levels and 'mesh',\nfor example 0,2,4,mesh", 0, 0, NULL },
+    { "view", 0, ARG_TEXT, offsetof(values, view), "AZ,EL",
+      "from where: azimuth and elevation in degrees; default 30,20", 0, 0, NULL },
+    { "up", 0, ARG_WORD, offsetof(values, up), "AXIS", "the axis that points upwards: x, y (the default) or z", 0, 0,
+      up_words },
     { "size", 0, ARG_TEXT, offsetof(values, size), "WxH", "pixels, 16 to 8192 each; default 1200x900", 0, 0, NULL },
     { "edges", 0, ARG_FLAG, offsetof(values, edges), NULL, "draw the outlines of the polygons", 0, 0, NULL },
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
@@ -37,10 +40,13 @@ static const arg_option options[] = {
     { 0 },
 };
 
-static const arg_spec spec = {
-    "render", "FILE OUT.png", 2, 2, "a shaded picture of a level or of the model, without a display",
-    "FILE is an .ebpo.h5 file, or a mesh.", options
-};
+static const arg_spec spec = { "render",
+                               "FILE OUT.png",
+                               2,
+                               2,
+                               "a shaded picture of a level or of the model, without a display",
+                               "FILE is an .ebpo.h5 file, or a mesh.",
+                               options };
 
 #if EBPO_HAVE_PNG
 
@@ -100,14 +106,15 @@ static int parse(job *j)
         fprintf(stderr, "ebpo render: --level, --levels and --mesh exclude each other; try 'ebpo render --help'\n");
         return EXIT_USAGE;
     }
-    if (sscanf(v->view, "%lf,%lf%c", &j->azimuth, &j->elevation, &rest) != 2 || !(j->azimuth >= -360 && j->azimuth <= 360) ||
-        !(j->elevation >= -90 && j->elevation <= 90))
+    if (sscanf(v->view, "%lf,%lf%c", &j->azimuth, &j->elevation, &rest) != 2 ||
+        !(j->azimuth >= -360 && j->azimuth <= 360) || !(j->elevation >= -90 && j->elevation <= 90))
         return usage_error("--view", v->view, "an azimuth from -360 to 360, a comma, and an elevation from -90 to 90");
     if (sscanf(v->size, "%5dx%5d%c", &j->width, &j->height, &rest) != 2 || j->width < 16 || j->width > SIDE_MAX ||
         j->height < 16 || j->height > SIDE_MAX)
         return usage_error("--size", v->size, "a width, an x, and a height, each from 16 to 8192");
     if (v->levels && !parse_levels(j))
-        return usage_error("--levels", v->levels, "a list of at most 24 levels (0 to 20) and 'mesh' with commas between");
+        return usage_error("--levels", v->levels,
+                           "a list of at most 24 levels (0 to 20) and 'mesh' with commas between");
     if (!v->levels)
         j->tiles[j->tile_count++].level = v->level >= 0 ? (int)v->level : MESH;
     return EXIT_FINE;
@@ -124,14 +131,15 @@ static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress pro
         t->closed = info->solid && info->report.manifold;
         return ebpo_file_read_mesh(file, &t->mesh, threads, error);
     }
-    ebpo_lod_options lod = EBPO_LOD_OPTIONS_INIT; /* walls too: they close the envelopes, and inner ones cannot be seen */
+    ebpo_lod_options lod =
+        EBPO_LOD_OPTIONS_INIT; /* walls too: they close the envelopes, and inner ones cannot be seen */
     lod.threads = threads;
     lod.progress = progress;
     t->closed = true;
     ebpo_status status = ebpo_lod_level(file, t->level, &lod, &t->mesh, NULL, error);
     if (status == EBPO_OK)
-        snprintf(t->caption, sizeof t->caption, info->solid ? "level %d: %.1f %%" : "level %d: %.1f %% of box", t->level,
-                 facts_percent(info, t->level));
+        snprintf(t->caption, sizeof t->caption, info->solid ? "level %d: %.1f %%" : "level %d: %.1f %% of box",
+                 t->level, facts_percent(info, t->level));
     return status;
 }
 
@@ -190,17 +198,19 @@ static unsigned thread_count(const job *j)
     return j->v.threads ? (unsigned)j->v.threads : cores > 0 ? (unsigned)cores : 1;
 }
 
-static ebpo_status draw_tile(const job *j, const tile *t, picture *p, const camera *view, const int at[4], ebpo_error *error)
+static ebpo_status draw_tile(const job *j, const tile *t, picture *p, const camera *view, const int at[4],
+                             ebpo_error *error)
 {
     static const uint8_t ink[3] = { 60, 66, 76 };
     raster_style style = { { 0.30, 0.48, 0.66 }, t->closed, j->v.edges };
     if (t->level == MESH)
         memcpy(style.colour, (const double[3]){ 0.66, 0.54, 0.40 }, sizeof style.colour);
     int caption = j->v.levels ? 1 + at[2] / 240 : 0;
-    ebpo_status status = raster_draw(p, at[0], at[1], at[2], at[3] - 14 * caption, view, &t->mesh, &style, thread_count(j), error);
+    ebpo_status status =
+        raster_draw(p, at[0], at[1], at[2], at[3] - 14 * caption, view, &t->mesh, &style, thread_count(j), error);
     if (status == EBPO_OK && caption)
-        picture_text(p, at[0] + (at[2] - picture_text_width(caption, t->caption)) / 2, at[1] + at[3] - 12 * caption, caption,
-                     ink, t->caption);
+        picture_text(p, at[0] + (at[2] - picture_text_width(caption, t->caption)) / 2, at[1] + at[3] - 12 * caption,
+                     caption, ink, t->caption);
     return status;
 }
 
@@ -214,8 +224,8 @@ static ebpo_status draw(const job *j, picture *p, ebpo_error *error)
     camera view;
     const tile *first = coarsest(j);
     if (height <= caption) {
-        snprintf(error->message, sizeof error->message, "--size %s has no room for %d tiles; take a larger one", j->v.size,
-                 j->tile_count);
+        snprintf(error->message, sizeof error->message, "--size %s has no room for %d tiles; take a larger one",
+                 j->v.size, j->tile_count);
         return error->status = EBPO_E_ARGUMENT;
     }
     paint_background(p);
@@ -235,7 +245,8 @@ static ebpo_status render(job *j, bool is_file, ebpo_progress progress, ebpo_err
     picture p = { 0 };
     ebpo_status status = is_file ? load_file(j, progress, error) : load_mesh(j, progress, error);
     if (status == EBPO_OK && !picture_make(&p, j->width, j->height, white)) {
-        snprintf(error->message, sizeof error->message, "no memory for a picture of %s; take a smaller --size", j->v.size);
+        snprintf(error->message, sizeof error->message, "no memory for a picture of %s; take a smaller --size",
+                 j->v.size);
         status = error->status = EBPO_E_MEMORY;
     }
     if (status == EBPO_OK)

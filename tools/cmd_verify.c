@@ -14,9 +14,12 @@ typedef struct values {
 } values;
 
 static const arg_option options[] = {
-    { "against", 0, ARG_TEXT, offsetof(values, against), "IN.ply", "also compare the model with its source, bit for bit", 0, 0, NULL },
+    { "against", 0, ARG_TEXT, offsetof(values, against), "IN.ply",
+      "also compare the model with its source, bit for bit", 0, 0, NULL },
     { "samples", 0, ARG_INT, offsetof(values, samples), "N",
-      "cells whose labels are checked by an independent winding\nnumber; 0, the default: all of a small file, 4096 of a large", 0, 9007199254740992.0, NULL },
+      "cells whose labels are checked by an independent winding\nnumber; 0, the default: all of a small file, 4096 of "
+      "a large",
+      0, 9007199254740992.0, NULL },
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
     { "json", 0, ARG_FLAG, offsetof(values, json), NULL, "print the counts as JSON", 0, 0, NULL },
     { "quiet", 'q', ARG_FLAG, offsetof(values, quiet), NULL, "print violations and errors only", 0, 0, NULL },
@@ -24,8 +27,13 @@ static const arg_option options[] = {
 };
 
 static const arg_spec spec = {
-    "verify", "FILE", 1, 1, "checks every promise of a file; ends with code 1 if one is broken",
-    "Containment is checked with the decoded half-spaces, exactly, not with rounded polyhedra.", options
+    "verify",
+    "FILE",
+    1,
+    1,
+    "checks every promise of a file; ends with code 1 if one is broken",
+    "Containment is checked with the decoded half-spaces, exactly, not with rounded polyhedra.",
+    options
 };
 
 static const struct kind {

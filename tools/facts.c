@@ -54,7 +54,8 @@ static void print_model(FILE *out, const ebpo_info *info)
     if (!(info->parts & EBPO_PART_MESH))
         fputs(" (not in this file)", out);
     if (info->solid)
-        fprintf(out, "\n  solid     volume %.6g, by winding number, rule %s", info->report.volume, words_rule(info->rule));
+        fprintf(out, "\n  solid     volume %.6g, by winding number, rule %s", info->report.volume,
+                words_rule(info->rule));
     fprintf(out, "\n  box       %.6g %.6g %.6g, size %.6g %.6g %.6g%s%s\n", info->box_origin[0], info->box_origin[1],
             info->box_origin[2], info->box_size[0], info->box_size[1], info->box_size[2], info->unit[0] ? " " : "",
             info->unit);
@@ -90,7 +91,8 @@ void facts_print(FILE *out, const char *path, const ebpo_info *info)
 {
     char bytes[32], parts[64];
     fprintf(out, "%s: EBP-Octree %d.%d, %s, levels 0 to %d, %s\n", path, info->version_major, info->version_minor,
-            info->solid ? "a solid" : "a surface", info->level_count - 1, words_bytes(bytes, sizeof bytes, info->file_bytes));
+            info->solid ? "a solid" : "a surface", info->level_count - 1,
+            words_bytes(bytes, sizeof bytes, info->file_bytes));
     print_source(out, info);
     report_print_mending(out, &info->mend);
     print_model(out, info);
@@ -107,13 +109,14 @@ void facts_print(FILE *out, const char *path, const ebpo_info *info)
 
 void facts_table(FILE *out, const ebpo_info *info)
 {
-    fprintf(out, "%5s %9s %9s %9s %9s %9s %10s %10s %9s %10s %9s\n", "level", "gray", "leaf", "white", "black", "planes",
-            "faces new", "faces again", "stored", "cumulative", info->solid ? "% solid" : "% box");
+    fprintf(out, "%5s %9s %9s %9s %9s %9s %10s %10s %9s %10s %9s\n", "level", "gray", "leaf", "white", "black",
+            "planes", "faces new", "faces again", "stored", "cumulative", info->solid ? "% solid" : "% box");
     for (int i = 0; i < info->level_count; i++) {
         const ebpo_level_summary *l = &info->level[i];
         char stored[32], sum[32];
-        fprintf(out, "%5d %9llu %9llu %9llu %9llu %9llu %10llu %11llu %9s %10s %9.2f\n", i, (unsigned long long)l->gray_count,
-                (unsigned long long)l->leaf_count, (unsigned long long)l->white_count, (unsigned long long)l->black_count,
+        fprintf(out, "%5d %9llu %9llu %9llu %9llu %9llu %10llu %11llu %9s %10s %9.2f\n", i,
+                (unsigned long long)l->gray_count, (unsigned long long)l->leaf_count,
+                (unsigned long long)l->white_count, (unsigned long long)l->black_count,
                 (unsigned long long)(l->plane_count + l->leaf_plane_count), (unsigned long long)l->new_count,
                 (unsigned long long)l->ref_count, words_bytes(stored, sizeof stored, l->stored_bytes),
                 words_bytes(sum, sizeof sum, facts_cumulative(info, i)), facts_percent(info, i));

@@ -7,7 +7,8 @@
 
 #include "json.h"
 
-/* Volume of the envelopes that stand for the model at `level`: its gray nodes, and the leaves and black nodes of levels 0 .. level. */
+/* Volume of the envelopes that stand for the model at `level`: its gray nodes, and the leaves and black nodes of levels
+ * 0 .. level. */
 double facts_volume(const ebpo_info *info, int level);
 /* The same in percent of the solid; of the root box for a surface. */
 double facts_percent(const ebpo_info *info, int level);

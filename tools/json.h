@@ -19,7 +19,7 @@ typedef struct json {
 void json_begin(json *j, FILE *out);
 void json_object(json *j, const char *key);
 void json_array(json *j, const char *key);
-void json_end(json *j); /* of the innermost object or array */
+void json_end(json *j);    /* of the innermost object or array */
 void json_finish(json *j); /* closes what is open, and the last line */
 /* Bytes that are not UTF-8 become U+FFFD. */
 void json_text(json *j, const char *key, const char *text);

@@ -53,7 +53,8 @@ static const command *find(const char *name)
 
 static void usage(FILE *out)
 {
-    fprintf(out, "usage: ebpo COMMAND [options] ...\n\nEBP-Octree in HDF5: closed triangle meshes as trees of convex envelopes.\n\n"
+    fprintf(out, "usage: ebpo COMMAND [options] ...\n\nEBP-Octree in HDF5: closed triangle meshes as trees of convex "
+                 "envelopes.\n\n"
                  "commands:\n");
     for (int i = 0; i < COMMANDS; i++)
         fprintf(out, "  %-10s %s\n", commands[i]->spec->command, commands[i]->spec->summary);

@@ -32,9 +32,11 @@ ebpo_status picture_write_png(const picture *p, const char *path, ebpo_error *er
     void *bytes = malloc(size);
     ebpo_status status = EBPO_E_MEMORY;
     if (!bytes)
-        snprintf(error->message, sizeof error->message, "%s: no memory for %zu bytes; take a smaller --size", path, (size_t)size);
+        snprintf(error->message, sizeof error->message, "%s: no memory for %zu bytes; take a smaller --size", path,
+                 (size_t)size);
     else if (!png_image_write_to_memory(&image, bytes, &size, 0, p->rgb, 0, NULL))
-        snprintf(error->message, sizeof error->message, "%s: libpng cannot encode the picture: %s", path, image.message);
+        snprintf(error->message, sizeof error->message, "%s: libpng cannot encode the picture: %s", path,
+                 image.message);
     else
         status = ebpo_write_file(path, bytes, size, error);
     error->status = status;

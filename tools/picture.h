@@ -13,8 +13,8 @@ typedef struct picture {
 bool picture_make(picture *out, int width, int height, const uint8_t colour[3]);
 void picture_free(picture *p);
 
-/* Text in a bitmap font of 6 x 9 pixels times `scale`; (x, y) is the upper left corner. Small letters, digits and .,:%+-()/ are there, capitals
- * show as small letters, all else as a space. What reaches over the border is cut off. */
+/* Text in a bitmap font of 6 x 9 pixels times `scale`; (x, y) is the upper left corner. Small letters, digits and
+ * .,:%+-()/ are there, capitals show as small letters, all else as a space. What reaches over the border is cut off. */
 void picture_text(picture *p, int x, int y, int scale, const uint8_t colour[3], const char *text);
 int picture_text_width(int scale, const char *text);
 

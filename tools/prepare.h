@@ -14,12 +14,12 @@ typedef struct prepared {
     ebpo_mesh_report before; /* of the mesh as read */
     ebpo_mesh_report report; /* of the mesh as mended */
     ebpo_mend_record record;
-    bool mended;             /* a mending step ran, so the two reports may differ */
+    bool mended; /* a mending step ran, so the two reports may differ */
 } prepared;
 
-/* Weld (always for STL, which has no shared vertices), orient, fill holes, each if asked; checks before and after. On failure
- * nothing is left to free; else ebpo_mesh_free(&out->mesh). */
-EBPO_MUST_USE ebpo_status prepare_mesh(prepared *out, const char *path, mending asked, unsigned threads, ebpo_progress progress,
-                                       ebpo_error *error);
+/* Weld (always for STL, which has no shared vertices), orient, fill holes, each if asked; checks before and after. On
+ * failure nothing is left to free; else ebpo_mesh_free(&out->mesh). */
+EBPO_MUST_USE ebpo_status prepare_mesh(prepared *out, const char *path, mending asked, unsigned threads,
+                                       ebpo_progress progress, ebpo_error *error);
 
 #endif

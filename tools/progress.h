@@ -6,9 +6,9 @@
 
 typedef struct progress_line {
     const char *command;
-    bool active;       /* stderr is a terminal and the user does not want quiet */
-    bool shown;        /* there is a line to wipe */
-    const char *stage; /* of the last report */
+    bool active;        /* stderr is a terminal and the user does not want quiet */
+    bool shown;         /* there is a line to wipe */
+    const char *stage;  /* of the last report */
     double begun, last; /* seconds: when the stage began, when the line was drawn */
 } progress_line;
 

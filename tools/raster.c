@@ -1,4 +1,5 @@
-/* Two steps: each sample gets the nearest triangle (z-buffer on 1/depth, which is linear on the screen); then pixels are shaded from their samples. */
+/* Two steps: each sample gets the nearest triangle (z-buffer on 1/depth, which is linear on the screen); then pixels
+ * are shaded from their samples. */
 #include "raster.h"
 
 #include <math.h>
@@ -11,8 +12,8 @@ enum { OCCLUSION_STEPS = 10, THREADS_MAX = 64 };
 #define EDGE UINT32_C(0x80000000)
 
 typedef struct sample {
-    float inverse;  /* 1 / depth; 0: far away */
-    uint32_t what;  /* triangle, top bit: on an outline */
+    float inverse; /* 1 / depth; 0: far away */
+    uint32_t what; /* triangle, top bit: on an outline */
 } sample;
 
 /* A vertex in the camera's axes (x right, y up, z depth) and on the screen. */
@@ -27,9 +28,10 @@ typedef struct raster {
     int width, height, side; /* in samples; side: samples across a pixel */
     double focal, per_focal; /* samples per unit of x / depth, and one by that */
     sample *samples;
-    float (*normal)[3];      /* of each triangle, in the camera's axes, towards the eye */
-    double spiral[OCCLUSION_STEPS][2], turn[256][2]; /* where occlusion looks: a spiral in the unit disk, and turns of it */
-    double linear[256];      /* sRGB values as light */
+    float (*normal)[3]; /* of each triangle, in the camera's axes, towards the eye */
+    double spiral[OCCLUSION_STEPS][2],
+        turn[256][2];   /* where occlusion looks: a spiral in the unit disk, and turns of it */
+    double linear[256]; /* sRGB values as light */
 } raster;
 
 static double dot(const double a[3], const double b[3])
@@ -77,8 +79,8 @@ static bool unit_normal(double (*c)[3], double out[3])
 
 /* --- first step --- */
 
-/* Which sides (bit i: from corner i to the next) are outlines of the polygon: in the fans of ebpo_lod_level the sides between neighbouring
- * triangles of one plane are none. */
+/* Which sides (bit i: from corner i to the next) are outlines of the polygon: in the fans of ebpo_lod_level the sides
+ * between neighbouring triangles of one plane are none. */
 static unsigned outline(const raster *r, uint64_t face, const double normal[3])
 {
     const uint32_t *f = r->mesh->faces + 3 * face;
@@ -132,10 +134,14 @@ static void fill_triangle(raster *r, const seen p[3], uint32_t what, unsigned ou
         return;
     double line = 0.42 * r->side; /* half the outline's breadth */
     double det = (p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x);
-    double gx = ((p[1].inverse - p[0].inverse) * (p[2].y - p[0].y) - (p[2].inverse - p[0].inverse) * (p[1].y - p[0].y)) / det;
-    double gy = ((p[2].inverse - p[0].inverse) * (p[1].x - p[0].x) - (p[1].inverse - p[0].inverse) * (p[2].x - p[0].x)) / det;
-    int x0 = clamp(fmin(p[0].x, fmin(p[1].x, p[2].x)), r->width), x1 = clamp(fmax(p[0].x, fmax(p[1].x, p[2].x)) + 1, r->width);
-    int y0 = clamp(fmin(p[0].y, fmin(p[1].y, p[2].y)), r->height), y1 = clamp(fmax(p[0].y, fmax(p[1].y, p[2].y)) + 1, r->height);
+    double gx =
+        ((p[1].inverse - p[0].inverse) * (p[2].y - p[0].y) - (p[2].inverse - p[0].inverse) * (p[1].y - p[0].y)) / det;
+    double gy =
+        ((p[2].inverse - p[0].inverse) * (p[1].x - p[0].x) - (p[1].inverse - p[0].inverse) * (p[2].x - p[0].x)) / det;
+    int x0 = clamp(fmin(p[0].x, fmin(p[1].x, p[2].x)), r->width),
+        x1 = clamp(fmax(p[0].x, fmax(p[1].x, p[2].x)) + 1, r->width);
+    int y0 = clamp(fmin(p[0].y, fmin(p[1].y, p[2].y)), r->height),
+        y1 = clamp(fmax(p[0].y, fmax(p[1].y, p[2].y)) + 1, r->height);
     for (int y = y0; y < y1; y++)
         for (int x = x0; x < x1; x++) {
             double sx = x + 0.5, sy = y + 0.5, d[3];
@@ -147,7 +153,8 @@ static void fill_triangle(raster *r, const seen p[3], uint32_t what, unsigned ou
             sample *at = &r->samples[(size_t)y * (size_t)r->width + (size_t)x];
             if (inverse <= at->inverse)
                 continue;
-            bool on_line = (outlines & 1 && d[0] < line) || (outlines & 2 && d[1] < line) || (outlines & 4 && d[2] < line);
+            bool on_line =
+                (outlines & 1 && d[0] < line) || (outlines & 2 && d[1] < line) || (outlines & 4 && d[2] < line);
             *at = (sample){ inverse, what | (on_line ? EDGE : 0) };
         }
 }
@@ -213,7 +220,8 @@ static double occlusion(const raster *r, int x, int y, const sample *at, const f
 /* Key light from the upper left, a weak fill from the right, the sky above, a gloss. Linear light. */
 static void light(const raster *r, const float n[3], double hidden, double out[3])
 {
-    static const double key[3] = { -0.46, 0.62, 0.635 }, fill[3] = { 0.86, 0.10, 0.50 }, half[3] = { -0.254, 0.343, 0.904 };
+    static const double key[3] = { -0.46, 0.62, 0.635 }, fill[3] = { 0.86, 0.10, 0.50 },
+                        half[3] = { -0.254, 0.343, 0.904 };
     double m[3] = { (double)n[0], (double)n[1], (double)n[2] };
     double k = fmax(0, dot(m, key)), f = fmax(0, dot(m, fill)), sky = 0.5 + 0.5 * m[1];
     double gloss = fmax(0, dot(m, half));
@@ -300,7 +308,9 @@ static void resolve(const raster *r, picture *out, int x, int y, int width, int 
     share shares[THREADS_MAX];
     unsigned count = threads < 1 ? 1 : threads < THREADS_MAX ? threads : THREADS_MAX, started = 1;
     for (unsigned i = 0; i < count; i++)
-        shares[i] = (share){ .r = r, .out = out, .x = x, .y = y, .width = width, .height = height, .number = i, .threads = count };
+        shares[i] = (share){
+            .r = r, .out = out, .x = x, .y = y, .width = width, .height = height, .number = i, .threads = count
+        };
     while (started < count && pthread_create(&shares[started].thread, NULL, resolve_rows, &shares[started]) == 0)
         started++;
     resolve_rows(&shares[0]);
@@ -314,11 +324,14 @@ ebpo_status raster_draw(picture *out, int x, int y, int width, int height, const
                         const raster_style *style, unsigned threads, ebpo_error *error)
 {
     if (mesh->face_count >= EDGE) {
-        snprintf(error->message, sizeof error->message, "more than 2147483647 faces cannot be drawn; take a coarser level");
+        snprintf(error->message, sizeof error->message,
+                 "more than 2147483647 faces cannot be drawn; take a coarser level");
         return error->status = EBPO_E_LIMIT;
     }
     int side = (int64_t)width * height > 4000000 ? 2 : 3;
-    raster r = { .view = view, .mesh = mesh, .style = style, .width = side * width, .height = side * height, .side = side };
+    raster r = {
+        .view = view, .mesh = mesh, .style = style, .width = side * width, .height = side * height, .side = side
+    };
     r.focal = r.height / 2.0 / view->tangent;
     r.per_focal = 1 / r.focal;
     r.samples = calloc((size_t)r.width * (size_t)r.height, sizeof *r.samples);
@@ -326,7 +339,8 @@ ebpo_status raster_draw(picture *out, int x, int y, int width, int height, const
     ebpo_status status = EBPO_OK;
     if (!r.samples || !r.normal) {
         status = error->status = EBPO_E_MEMORY;
-        snprintf(error->message, sizeof error->message, "no memory for a picture of %d x %d; take a smaller --size", width, height);
+        snprintf(error->message, sizeof error->message, "no memory for a picture of %d x %d; take a smaller --size",
+                 width, height);
         goto done;
     }
     for (uint64_t face = 0; face < mesh->face_count; face++)

@@ -13,13 +13,14 @@ static const struct finding_text {
       "boundary edges (used by one face only)", "face" },
     { offsetof(ebpo_mesh_report, nonmanifold_edges), "nonmanifold_edges", "edge shared by more than two faces",
       "edges shared by more than two faces", "face" },
-    { offsetof(ebpo_mesh_report, misoriented_edges), "misoriented_edges", "edge whose two faces disagree in orientation",
-      "edges whose two faces disagree in orientation", "face" },
+    { offsetof(ebpo_mesh_report, misoriented_edges), "misoriented_edges",
+      "edge whose two faces disagree in orientation", "edges whose two faces disagree in orientation", "face" },
     { offsetof(ebpo_mesh_report, unbalanced_edges), "unbalanced_edges", "edge does not balance", "edges do not balance",
       "face" },
     { offsetof(ebpo_mesh_report, bowtie_vertices), "bowtie_vertices", "vertex where several fans of faces meet",
       "vertices where several fans of faces meet", "vertex" },
-    { offsetof(ebpo_mesh_report, zero_area_faces), "zero_area_faces", "face without area", "faces without area", "face" },
+    { offsetof(ebpo_mesh_report, zero_area_faces), "zero_area_faces", "face without area", "faces without area",
+      "face" },
     { offsetof(ebpo_mesh_report, index_repeated_faces), "index_repeated_faces", "face that names a vertex twice",
       "faces that name a vertex twice", "face" },
     { offsetof(ebpo_mesh_report, repeated_faces), "repeated_faces", "repeated face", "repeated faces", "face" },
@@ -69,13 +70,15 @@ static void print_reading(FILE *out, const ebpo_mesh *mesh)
 {
     char text[80];
     if (mesh->polygons_triangulated) {
-        fprintf(out, "  %s cut into triangles", words_plural(text, sizeof text, mesh->polygons_triangulated, "polygon", "polygons"));
+        fprintf(out, "  %s cut into triangles",
+                words_plural(text, sizeof text, mesh->polygons_triangulated, "polygon", "polygons"));
         if (mesh->polygons_concave)
             fprintf(out, " (%llu concave)", (unsigned long long)mesh->polygons_concave);
         fputc('\n', out);
     }
     if (mesh->strips)
-        fprintf(out, "  %s unrolled\n", words_plural(text, sizeof text, mesh->strips, "triangle strip", "triangle strips"));
+        fprintf(out, "  %s unrolled\n",
+                words_plural(text, sizeof text, mesh->strips, "triangle strip", "triangle strips"));
     if (mesh->polygons_dropped)
         fprintf(out, "  %s of fewer than three corners left out\n",
                 words_plural(text, sizeof text, mesh->polygons_dropped, "polygon", "polygons"));
@@ -115,7 +118,8 @@ void report_print_mending(FILE *out, const ebpo_mend_record *r)
 {
     char text[80];
     if (r->weld)
-        fprintf(out, "  welded: %s merged\n", words_plural(text, sizeof text, r->welded_vertices, "vertex", "vertices"));
+        fprintf(out, "  welded: %s merged\n",
+                words_plural(text, sizeof text, r->welded_vertices, "vertex", "vertices"));
     if (r->orient) {
         fprintf(out, "  oriented: %s turned", words_plural(text, sizeof text, r->flipped_faces, "face", "faces"));
         if (r->unorientable_components)
@@ -158,14 +162,16 @@ void report_warn(FILE *out, const char *command, const char *path, const ebpo_me
     if (report->balanced)
         return;
     bool any = false;
-    fprintf(out, "ebpo %s: %s: warning: this is a surface, not a solid, so what is inside stays unknown;", command, path);
+    fprintf(out, "ebpo %s: %s: warning: this is a surface, not a solid, so what is inside stays unknown;", command,
+            path);
     advise_boundary(out, &any, report, record);
     if (report->misoriented_edges.count)
         advise(out, &any, report->misoriented_edges.count, "misoriented edges",
                record->orient ? "cannot be oriented; use a mesh editor" : "try --orient");
     if (report->nonmanifold_edges.count)
         advise(out, &any, report->nonmanifold_edges.count, "edges shared by more than two faces",
-               record->orient ? "remove the faces that are too many" : "try --orient, or remove the faces that are too many");
+               record->orient ? "remove the faces that are too many"
+                              : "try --orient, or remove the faces that are too many");
     if (!any)
         advise(out, &any, report->unbalanced_edges.count, "unbalanced edges", "see 'ebpo check'");
     fputc('\n', out);

@@ -6,13 +6,10 @@
 static bool is_inside(ebpo_rule rule, int32_t winding)
 {
     switch (rule) {
-    case EBPO_RULE_EVENODD:
-        return winding & 1;
-    case EBPO_RULE_POSITIVE:
-        return winding > 0;
+    case EBPO_RULE_EVENODD: return winding & 1;
+    case EBPO_RULE_POSITIVE: return winding > 0;
     case EBPO_RULE_NONZERO:
-    default:
-        return winding != 0;
+    default: return winding != 0;
     }
 }
 
@@ -47,7 +44,8 @@ static ebpo_status gather_faces(const ebpo_lod_model *model, ebpo_cell cell, uin
     for (uint64_t i = 0; i < fresh && fine; i++)
         fine = take_face(&model->mesh, level->leaf_first[leaf] + i, &scratch->faces[refs + i]);
     if (!fine)
-        return ebpo_fail(error, EBPO_E_FORMAT, "level %d: leaf %llu names a face or vertex that the mesh does not have; run ebpo verify",
+        return ebpo_fail(error, EBPO_E_FORMAT,
+                         "level %d: leaf %llu names a face or vertex that the mesh does not have; run ebpo verify",
                          cell.level, (unsigned long long)leaf);
     *count = refs + fresh;
     return EBPO_OK;

@@ -1,5 +1,6 @@
-/* A level's envelopes: from the root down, each cut from its parent's. The top of the tree is walked first; the subtrees that hang from it are
- * independent of each other. Where it is cut depends on the tree alone, so the result does not depend on the number of threads. */
+/* A level's envelopes: from the root down, each cut from its parent's. The top of the tree is walked first; the
+ * subtrees that hang from it are independent of each other. Where it is cut depends on the tree alone, so the result
+ * does not depend on the number of threads. */
 #include <ebpo/lod.h>
 
 #include <stdlib.h>
@@ -31,9 +32,9 @@ typedef struct job {
 
 typedef struct walker {
     job *j;
-    ebpo_lod_piece *out;        /* [EBPO_LEVELS_MAX] */
+    ebpo_lod_piece *out; /* [EBPO_LEVELS_MAX] */
     ebpo_leaf_scratch *scratch;
-    int stop;                   /* gray nodes of this level are not descended into */
+    int stop; /* gray nodes of this level are not descended into */
     ebpo_error *error;
 } walker;
 
@@ -58,7 +59,8 @@ static ebpo_status visit_gray(walker *w, uint64_t gray, ebpo_cell cell, ebpo_pol
 {
     const ebpo_level *level = &w->j->model->level[cell.level];
     if (level->plane_counts && level->plane_counts[gray])
-        ebpo_lod_cut(envelope, level->planes + w->j->model->index[cell.level].plane_first[gray], level->plane_counts[gray]);
+        ebpo_lod_cut(envelope, level->planes + w->j->model->index[cell.level].plane_first[gray],
+                     level->plane_counts[gray]);
     if (cell.level == w->j->model->target)
         return emit(w, envelope, cell);
     if (cell.level == w->stop) {

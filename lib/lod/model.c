@@ -24,7 +24,8 @@ static ebpo_status read_levels(ebpo_lod_model *out, ebpo_file *file, unsigned th
             return status;
         uint64_t expected = i == 0 ? 1 : out->level[i - 1].gray_count;
         if (out->level[i].group_count != expected)
-            return ebpo_fail(error, EBPO_E_FORMAT, "level %d: %llu groups of siblings, but %llu parents; run ebpo verify", i,
+            return ebpo_fail(error, EBPO_E_FORMAT,
+                             "level %d: %llu groups of siblings, but %llu parents; run ebpo verify", i,
                              (unsigned long long)out->level[i].group_count, (unsigned long long)expected);
     }
     return EBPO_OK;

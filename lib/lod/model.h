@@ -1,4 +1,5 @@
-/* What a walk down the tree needs: the levels, their ranks, and the faces from which leaves derive their planes. Read only while walking. */
+/* What a walk down the tree needs: the levels, their ranks, and the faces from which leaves derive their planes. Read
+ * only while walking. */
 #ifndef EBPO_LOD_MODEL_H
 #define EBPO_LOD_MODEL_H
 
@@ -37,8 +38,8 @@ typedef struct ebpo_leaf_scratch {
 } ebpo_leaf_scratch;
 
 /* Cuts `envelope` (on entry the parent's in this cell) to that of leaf number `leaf` of the cell's level. */
-EBPO_MUST_USE ebpo_status ebpo_lod_leaf(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf, ebpo_leaf_scratch *scratch,
-                                        ebpo_polytope *envelope, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_lod_leaf(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf,
+                                        ebpo_leaf_scratch *scratch, ebpo_polytope *envelope, ebpo_error *error);
 
 /* Cuts the envelope by plane codes of its own cell. */
 void ebpo_lod_cut(ebpo_polytope *envelope, const uint32_t *codes, uint64_t count);

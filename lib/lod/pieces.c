@@ -17,8 +17,8 @@ void ebpo_lod_piece_free(ebpo_lod_piece *piece)
     piece->vertex_count = piece->vertex_room = piece->face_count = piece->face_room = 0;
 }
 
-/* `sides`: bit 2 * axis + side for each cell wall that the point lies on, whatever rounding made of it. Such points get the wall's own coordinate,
- * so that neighbouring cells agree to the last bit. */
+/* `sides`: bit 2 * axis + side for each cell wall that the point lies on, whatever rounding made of it. Such points get
+ * the wall's own coordinate, so that neighbouring cells agree to the last bit. */
 static double to_model(const ebpo_box *box, ebpo_cell cell, int axis, double xi, unsigned sides)
 {
     double low = ebpo_wall(box, axis, cell.level, cell.at[axis]);
@@ -47,13 +47,15 @@ static void add_fan(ebpo_lod_piece *piece, const uint32_t *number, const uint8_t
     }
 }
 
-ebpo_status ebpo_lod_piece_add(ebpo_lod_piece *piece, const ebpo_polytope *p, const ebpo_box *box, ebpo_cell cell, bool walls,
-                               ebpo_error *error)
+ebpo_status ebpo_lod_piece_add(ebpo_lod_piece *piece, const ebpo_polytope *p, const ebpo_box *box, ebpo_cell cell,
+                               bool walls, ebpo_error *error)
 {
     if (piece->vertex_count + EBPO_POLYTOPE_VERTICES > count_limit)
         return ebpo_fail(error, EBPO_E_LIMIT, "the level has more than 4294967294 vertices; take a coarser level");
-    if (!ebpo_grow(&piece->xyz, &piece->vertex_room, piece->vertex_count + (uint64_t)p->vertex_count, 3 * sizeof(double)) ||
-        !ebpo_grow(&piece->faces, &piece->face_room, piece->face_count + (uint64_t)p->corner_count, 3 * sizeof(uint32_t)))
+    if (!ebpo_grow(&piece->xyz, &piece->vertex_room, piece->vertex_count + (uint64_t)p->vertex_count,
+                   3 * sizeof(double)) ||
+        !ebpo_grow(&piece->faces, &piece->face_room, piece->face_count + (uint64_t)p->corner_count,
+                   3 * sizeof(uint32_t)))
         return ebpo_fail_memory(error, (piece->vertex_count + piece->face_count) * 3 * sizeof(double));
     uint32_t number[EBPO_POLYTOPE_VERTICES];
     uint8_t sides[EBPO_POLYTOPE_VERTICES];
@@ -94,7 +96,8 @@ ebpo_status ebpo_lod_join(ebpo_mesh *out, ebpo_lod_piece *const *pieces, uint64_
         faces += pieces[i]->face_count;
     }
     if (vertices > count_limit || faces > count_limit)
-        return ebpo_fail(error, EBPO_E_LIMIT, "the level has more than 4294967294 vertices or faces; take a coarser level");
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "the level has more than 4294967294 vertices or faces; take a coarser level");
     memset(out, 0, sizeof *out);
     out->xyz64 = ebpo_alloc(vertices, 3 * sizeof(double));
     out->faces = ebpo_alloc(faces, 3 * sizeof(uint32_t));

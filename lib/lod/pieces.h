@@ -9,7 +9,7 @@
 
 /* What one walk found at one level. */
 typedef struct ebpo_lod_piece {
-    double *xyz; /* [vertex_count][3] */
+    double *xyz;     /* [vertex_count][3] */
     uint32_t *faces; /* [face_count][3], numbers within the piece */
     uint64_t vertex_count, vertex_room, face_count, face_room;
     double volume;
@@ -17,11 +17,14 @@ typedef struct ebpo_lod_piece {
 
 void ebpo_lod_piece_free(ebpo_lod_piece *piece);
 
-/* Appends the polytope (cell coordinates) of a cell as triangle fans; with `walls` false without the polygons on the cell's walls. */
-EBPO_MUST_USE ebpo_status ebpo_lod_piece_add(ebpo_lod_piece *piece, const ebpo_polytope *p, const ebpo_box *box, ebpo_cell cell,
-                                             bool walls, ebpo_error *error);
+/* Appends the polytope (cell coordinates) of a cell as triangle fans; with `walls` false without the polygons on the
+ * cell's walls. */
+EBPO_MUST_USE ebpo_status ebpo_lod_piece_add(ebpo_lod_piece *piece, const ebpo_polytope *p, const ebpo_box *box,
+                                             ebpo_cell cell, bool walls, ebpo_error *error);
 
-/* Joins `count` pieces, in order, to a mesh of double vertices; pieces are freed on the way. EBPO_E_LIMIT beyond 2^32 - 2 vertices or faces. */
-EBPO_MUST_USE ebpo_status ebpo_lod_join(ebpo_mesh *out, ebpo_lod_piece *const *pieces, uint64_t count, ebpo_error *error);
+/* Joins `count` pieces, in order, to a mesh of double vertices; pieces are freed on the way. EBPO_E_LIMIT beyond 2^32 -
+ * 2 vertices or faces. */
+EBPO_MUST_USE ebpo_status ebpo_lod_join(ebpo_mesh *out, ebpo_lod_piece *const *pieces, uint64_t count,
+                                        ebpo_error *error);
 
 #endif

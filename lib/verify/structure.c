@@ -87,7 +87,7 @@ static bool lists_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
         fresh += level->leaf_new[leaf];
     }
     if (!CHECK(refs == level->ref_count && fresh == level->new_count, "level %d: lists hold %" PRIu64 " new faces and %" PRIu64
-               " references, counts say %" PRIu64 " and %" PRIu64, l, fresh, refs, level->new_count, level->ref_count) || refs != level->ref_count)
+               " references, counts say %" PRIu64 " and %" PRIu64, l, fresh, refs, level->new_count, level->ref_count))
         return false;
     refs = 0;
     bool ok = true;
@@ -118,8 +118,8 @@ static bool mesh_shape(ebpo_tally *tally, const ebpo_tree *tree)
         ebpo_mesh_position(mesh, i, p);
         infinite += !isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2]);
     }
-    return CHECK(outside == 0, "%" PRIu64 " corners of faces name vertices that do not exist", outside) &
-           CHECK(infinite == 0, "%" PRIu64 " vertices are not finite", infinite);
+    bool corners_fine = CHECK(outside == 0, "%" PRIu64 " corners of faces name vertices that do not exist", outside);
+    return CHECK(infinite == 0, "%" PRIu64 " vertices are not finite", infinite) && corners_fine;
 }
 
 bool ebpo_check_shape(ebpo_tally *tally, const ebpo_tree *tree)
