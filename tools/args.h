@@ -26,6 +26,10 @@ typedef struct arg_option {
     const char *const *words; /* NULL-terminated */
 } arg_option;
 
+/* An option without a value: its field is a bool of the struct `type`. */
+#define ARG_SWITCH(name, letter, type, field, help) \
+    { name, letter, ARG_FLAG, offsetof(type, field), NULL, help, 0, 0, NULL }
+
 typedef struct arg_spec {
     const char *command;  /* "convert" */
     const char *operands; /* "IN.ply OUT.ebpo.h5" */

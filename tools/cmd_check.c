@@ -14,28 +14,25 @@ typedef struct values {
 } values;
 
 static const arg_option options[] = {
-    { "weld", 0, ARG_FLAG, offsetof(values, mend.weld), NULL, "first merge vertices at one position (STL: always)", 0,
-      0, NULL },
-    { "orient", 0, ARG_FLAG, offsetof(values, mend.orient), NULL, "then make neighbouring faces agree in orientation",
-      0, 0, NULL },
-    { "fill-holes", 0, ARG_FLAG, offsetof(values, mend.fill_holes), NULL, "then close simple boundary loops", 0, 0,
-      NULL },
-    { "require-solid", 0, ARG_FLAG, offsetof(values, require_solid), NULL, "end with code 3 if the mesh is not a solid",
-      0, 0, NULL },
+    ARG_SWITCH("weld", 0, values, mend.weld, "first merge vertices at one position (STL: always)"),
+    ARG_SWITCH("orient", 0, values, mend.orient, "then make neighbouring faces agree in orientation"),
+    ARG_SWITCH("fill-holes", 0, values, mend.fill_holes, "then close simple boundary loops"),
+    ARG_SWITCH("require-solid", 0, values, require_solid, "end with code 3 if the mesh is not a solid"),
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
-    { "json", 0, ARG_FLAG, offsetof(values, json), NULL, "print the report as JSON", 0, 0, NULL },
-    { "quiet", 'q', ARG_FLAG, offsetof(values, quiet), NULL, "no report, no progress: errors and warnings only", 0, 0,
-      NULL },
+    ARG_SWITCH("json", 0, values, json, "print the report as JSON"),
+    ARG_SWITCH("quiet", 'q', values, quiet, "no report, no progress: errors and warnings only"),
     { 0 },
 };
 
-static const arg_spec spec = { "check",
-                               "IN.ply",
-                               1,
-                               1,
-                               "what a mesh is: solid or surface, and each finding with its places",
-                               "With mending options: what it would be after mending. Nothing is written.",
-                               options };
+static const arg_spec spec = {
+    .command = "check",
+    .operands = "IN.ply",
+    .least = 1,
+    .most = 1,
+    .summary = "what a mesh is: solid or surface, and each finding with its places",
+    .text = "With mending options: what it would be after mending. Nothing is written.",
+    .options = options,
+};
 
 static void print_json(const prepared *p, const char *path)
 {

@@ -37,36 +37,31 @@ static const arg_option options[] = {
     { "codec", 0, ARG_WORD, offsetof(values, codec), "NAME", "zstd (the default), deflate or none", 0, 0, codec_words },
     { "zstd-level", 0, ARG_INT, offsetof(values, zstd_level), "N", "effort of zstd, 1 to 22; default 3", 1, 22, NULL },
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
-    { "weld", 0, ARG_FLAG, offsetof(values, mend.weld), NULL, "first merge vertices at one position (STL: always)", 0,
-      0, NULL },
-    { "orient", 0, ARG_FLAG, offsetof(values, mend.orient), NULL, "then make neighbouring faces agree in orientation",
-      0, 0, NULL },
-    { "fill-holes", 0, ARG_FLAG, offsetof(values, mend.fill_holes), NULL, "then close simple boundary loops", 0, 0,
-      NULL },
+    ARG_SWITCH("weld", 0, values, mend.weld, "first merge vertices at one position (STL: always)"),
+    ARG_SWITCH("orient", 0, values, mend.orient, "then make neighbouring faces agree in orientation"),
+    ARG_SWITCH("fill-holes", 0, values, mend.fill_holes, "then close simple boundary loops"),
     { "rule", 0, ARG_WORD, offsetof(values, rule), "NAME",
       "inside is where the winding number is nonzero (the default),\nodd (evenodd) or positive", 0, 0, rule_words },
-    { "require-solid", 0, ARG_FLAG, offsetof(values, require_solid), NULL, "end with code 3 if the mesh is not a solid",
-      0, 0, NULL },
+    ARG_SWITCH("require-solid", 0, values, require_solid, "end with code 3 if the mesh is not a solid"),
     { "unit", 0, ARG_TEXT, offsetof(values, unit), "U", "unit of length to record, such as mm", 0, 0, NULL },
     { "crs", 0, ARG_TEXT, offsetof(values, crs), "C", "coordinate reference system to record, such as EPSG:25832", 0, 0,
       NULL },
     { "date", 0, ARG_TEXT, offsetof(values, date), "D",
       "date to record, such as 2026-03-01; none by default, so that\nequal input gives an equal file", 0, 0, NULL },
-    { "json", 0, ARG_FLAG, offsetof(values, json), NULL, "print reports and facts as JSON", 0, 0, NULL },
-    { "quiet", 'q', ARG_FLAG, offsetof(values, quiet), NULL, "no report, no progress: errors and warnings only", 0, 0,
-      NULL },
+    ARG_SWITCH("json", 0, values, json, "print reports and facts as JSON"),
+    ARG_SWITCH("quiet", 'q', values, quiet, "no report, no progress: errors and warnings only"),
     { 0 },
 };
 
 static const arg_spec spec = {
-    "convert",
-    "IN.ply OUT.ebpo.h5",
-    2,
-    2,
-    "a closed triangle mesh to an .ebpo.h5 file",
-    "IN is PLY, or OBJ, STL or OFF where the library was built with assimp. OUT appears whole or not at all;\n"
-    "an older OUT is replaced. Mending is done in the order weld, orient, fill holes.",
-    options
+    .command = "convert",
+    .operands = "IN.ply OUT.ebpo.h5",
+    .least = 2,
+    .most = 2,
+    .summary = "a closed triangle mesh to an .ebpo.h5 file",
+    .text = "IN is PLY, or OBJ, STL or OFF where the library was built with assimp. OUT appears whole or not at all;\n"
+            "an older OUT is replaced. Mending is done in the order weld, orient, fill holes.",
+    .options = options,
 };
 
 static int usage_error(const char *message)

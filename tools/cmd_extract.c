@@ -15,23 +15,23 @@ typedef struct values {
 static const arg_option options[] = {
     { "level", 0, ARG_INT, offsetof(values, level), "N",
       "the envelopes of level N, and leaves and black nodes above it", 0, 20, NULL },
-    { "mesh", 0, ARG_FLAG, offsetof(values, mesh), NULL,
-      "the model itself, bit for bit; in the source's order where\nthe maps are stored", 0, 0, NULL },
-    { "no-walls", 0, ARG_FLAG, offsetof(values, no_walls), NULL,
-      "with --level: leave out polygons that lie on cell walls", 0, 0, NULL },
+    ARG_SWITCH("mesh", 0, values, mesh,
+               "the model itself, bit for bit; in the source's order where\nthe maps are stored"),
+    ARG_SWITCH("no-walls", 0, values, no_walls, "with --level: leave out polygons that lie on cell walls"),
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
-    { "quiet", 'q', ARG_FLAG, offsetof(values, quiet), NULL, "no summary, no progress: errors and warnings only", 0, 0,
-      NULL },
+    ARG_SWITCH("quiet", 'q', values, quiet, "no summary, no progress: errors and warnings only"),
     { 0 },
 };
 
-static const arg_spec spec = { "extract",
-                               "FILE OUT.ply",
-                               2,
-                               2,
-                               "a level's envelopes, or the model itself, as PLY",
-                               "Either --level or --mesh is needed.",
-                               options };
+static const arg_spec spec = {
+    .command = "extract",
+    .operands = "FILE OUT.ply",
+    .least = 2,
+    .most = 2,
+    .summary = "a level's envelopes, or the model itself, as PLY",
+    .text = "Either --level or --mesh is needed.",
+    .options = options,
+};
 
 static int check_values(const values *v, const char *in, const char *out)
 {

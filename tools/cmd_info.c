@@ -10,18 +10,18 @@ typedef struct values {
 } values;
 
 static const arg_option options[] = {
-    { "json", 0, ARG_FLAG, offsetof(values, json), NULL, "print the facts as JSON", 0, 0, NULL },
+    ARG_SWITCH("json", 0, values, json, "print the facts as JSON"),
     { 0 },
 };
 
 static const arg_spec spec = {
-    "info",
-    "FILE",
-    1,
-    1,
-    "what a file is, what it holds, bytes by part, and a table by level",
-    "Only the head of the file is read. FILE is an .ebpo.h5 file; for meshes there is 'ebpo check'.",
-    options
+    .command = "info",
+    .operands = "FILE",
+    .least = 1,
+    .most = 1,
+    .summary = "what a file is, what it holds, bytes by part, and a table by level",
+    .text = "Only the head of the file is read. FILE is an .ebpo.h5 file; for meshes there is 'ebpo check'.",
+    .options = options,
 };
 
 static int run(int argc, char **argv)

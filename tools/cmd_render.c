@@ -26,7 +26,7 @@ static const char *const up_words[] = { "x", "y", "z", NULL };
 
 static const arg_option options[] = {
     { "level", 0, ARG_INT, offsetof(values, level), "N", "the envelopes of level N", 0, 20, NULL },
-    { "mesh", 0, ARG_FLAG, offsetof(values, mesh), NULL, "the model itself; the default", 0, 0, NULL },
+    ARG_SWITCH("mesh", 0, values, mesh, "the model itself; the default"),
     { "levels", 0, ARG_TEXT, offsetof(values, levels), "LIST",
       "several side by side, with captions: levels and 'mesh',\nfor example 0,2,4,mesh", 0, 0, NULL },
     { "view", 0, ARG_TEXT, offsetof(values, view), "AZ,EL",
@@ -34,19 +34,21 @@ static const arg_option options[] = {
     { "up", 0, ARG_WORD, offsetof(values, up), "AXIS", "the axis that points upwards: x, y (the default) or z", 0, 0,
       up_words },
     { "size", 0, ARG_TEXT, offsetof(values, size), "WxH", "pixels, 16 to 8192 each; default 1200x900", 0, 0, NULL },
-    { "edges", 0, ARG_FLAG, offsetof(values, edges), NULL, "draw the outlines of the polygons", 0, 0, NULL },
+    ARG_SWITCH("edges", 0, values, edges, "draw the outlines of the polygons"),
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
-    { "quiet", 'q', ARG_FLAG, offsetof(values, quiet), NULL, "no progress: errors and warnings only", 0, 0, NULL },
+    ARG_SWITCH("quiet", 'q', values, quiet, "no progress: errors and warnings only"),
     { 0 },
 };
 
-static const arg_spec spec = { "render",
-                               "FILE OUT.png",
-                               2,
-                               2,
-                               "a shaded picture of a level or of the model, without a display",
-                               "FILE is an .ebpo.h5 file, or a mesh.",
-                               options };
+static const arg_spec spec = {
+    .command = "render",
+    .operands = "FILE OUT.png",
+    .least = 2,
+    .most = 2,
+    .summary = "a shaded picture of a level or of the model, without a display",
+    .text = "FILE is an .ebpo.h5 file, or a mesh.",
+    .options = options,
+};
 
 #if EBPO_HAVE_PNG
 

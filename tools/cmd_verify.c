@@ -21,19 +21,19 @@ static const arg_option options[] = {
       "a large",
       0, 9007199254740992.0, NULL },
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
-    { "json", 0, ARG_FLAG, offsetof(values, json), NULL, "print the counts as JSON", 0, 0, NULL },
-    { "quiet", 'q', ARG_FLAG, offsetof(values, quiet), NULL, "print violations and errors only", 0, 0, NULL },
+    ARG_SWITCH("json", 0, values, json, "print the counts as JSON"),
+    ARG_SWITCH("quiet", 'q', values, quiet, "print violations and errors only"),
     { 0 },
 };
 
 static const arg_spec spec = {
-    "verify",
-    "FILE",
-    1,
-    1,
-    "checks every promise of a file; ends with code 1 if one is broken",
-    "Containment is checked with the decoded half-spaces, exactly, not with rounded polyhedra.",
-    options
+    .command = "verify",
+    .operands = "FILE",
+    .least = 1,
+    .most = 1,
+    .summary = "checks every promise of a file; ends with code 1 if one is broken",
+    .text = "Containment is checked with the decoded half-spaces, exactly, not with rounded polyhedra.",
+    .options = options,
 };
 
 static const struct kind {
