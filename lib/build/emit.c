@@ -148,7 +148,9 @@ static bool emit_leaf(emitter *e, const ebpo_build_detail *d, ebpo_cell cell, in
         return false;
     uint32_t codes[EBPO_PLANES_MAX];
     bool stored = b->options->parts & EBPO_PART_LEAF_PLANES;
-    int planes = ebpo_leaf_planes(&b->box, cell, e->faces, count, ebpo_inside_corners(b, winding, d->delta),
+    int planes = 0;
+    if (stored || b->options->parts & EBPO_PART_MESH) /* else a reader has nothing to derive them from */
+        planes = ebpo_leaf_planes(&b->box, cell, e->faces, count, ebpo_inside_corners(b, winding, d->delta),
                                   stored ? b->options->epsilon : 0, envelope, codes);
     l->leaf_volume += ebpo_polytope_volume(envelope) * ebpo_cell_volume(b, cell.level);
     l->leaf_plane_counts[l->leaf_count++] = (uint8_t)planes;

@@ -136,6 +136,12 @@ static int find_supports(const ebpo_builder *b, ebpo_envelope_scratch *scratch, 
     return kept;
 }
 
+/* Top levels are nearly free of bytes, and a needle that fills a thousandth of its cell deserves planes all the same. */
+static double top_share(const ebpo_polytope *envelope)
+{
+    return 0.1 * sqrt(fmax(0, ebpo_polytope_volume(envelope)));
+}
+
 int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, const ebpo_subtree *s,
                      const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope,
                      uint32_t codes[EBPO_PLANES_MAX])
@@ -154,7 +160,7 @@ int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, cons
     for (int i = 0; i < 8; i++)
         if (corners >> i & 1 && !add_point(scratch, i & 1, i >> 1 & 1, i >> 2 & 1, 0))
             return -1;
-    double epsilon = b->options->epsilon * (top ? 0.1 : 1);
+    double epsilon = b->options->epsilon * (top ? top_share(envelope) : 1);
     count = find_supports(b, scratch, cell, count, few ? 0 : begin, few ? 0 : end, envelope, epsilon);
     return ebpo_select_greedy(envelope, scratch->candidates, count, epsilon, EBPO_PLANES_MAX, codes);
 }
