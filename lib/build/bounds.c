@@ -85,9 +85,9 @@ static void visit(query *q, int level, uint64_t block)
         visit(q, level - 1, i);
 }
 
-double ebpo_bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n[3], uint64_t begin, uint64_t end)
+double ebpo_bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n[3], uint64_t begin, uint64_t end, double least)
 {
-    query q = { .b = b, .begin = begin, .end = end, .best = -1e300 };
+    query q = { .b = b, .begin = begin, .end = end, .best = least };
     for (int k = 0; k < 3; k++) {
         q.corner[k] = ebpo_wall(&b->box, k, cell.level, cell.at[k]);
         q.size[k] = b->box.size[k] / (double)(1u << cell.level);

@@ -90,9 +90,10 @@ typedef struct ebpo_builder {
 ebpo_status ebpo_build_order(ebpo_builder *b, const ebpo_mesh *mesh, ebpo_error *error);
 void ebpo_build_vertex_range(const ebpo_builder *b, ebpo_cell cell, uint64_t *begin, uint64_t *end);
 
-/* bounds.c: greatest n . xi over vertices [begin, end), in coordinates of the cell that holds them, or -1e300. */
+/* bounds.c: greatest n . xi over vertices [begin, end), in coordinates of the cell that holds them, and `least`. */
 ebpo_status ebpo_bounds_make(ebpo_bounds *bounds, double (*position)[3], uint64_t count, ebpo_error *error);
-double ebpo_bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n[3], uint64_t begin, uint64_t end);
+double ebpo_bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n[3], uint64_t begin, uint64_t end,
+                           double least);
 void ebpo_bounds_free(ebpo_bounds *bounds);
 
 /* partition.c */

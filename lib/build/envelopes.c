@@ -2,6 +2,9 @@
  * mesh vertices in the cell, points where faces cross its boundary, corners that lie inside. */
 #include <math.h>
 #include <stdlib.h>
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
 
 #include "base/alloc.h"
 #include "base/error.h"
@@ -11,7 +14,9 @@
 enum { FEW_VERTICES = 192, TOP_LEVELS = 4, CANDIDATES_BELOW = 48 };
 
 typedef double pair __attribute__((vector_size(16)));
+#ifndef __SSE2__
 typedef int64_t pair_mask __attribute__((vector_size(16)));
+#endif
 
 struct ebpo_envelope_scratch {
     pair (*point)[4]; /* two points: cell coordinates, and what rounding may add to a support */
@@ -96,42 +101,67 @@ static bool add_crossings(const ebpo_builder *b, ebpo_envelope_scratch *scratch,
 
 static pair greater(pair a, pair b)
 {
+#ifdef __SSE2__
+    return _mm_max_pd(a, b);
+#else
     pair_mask m = a > b;
     return (pair)(((pair_mask)a & m) | ((pair_mask)b & ~m));
+#endif
 }
 
-/* Points come in twos of a coordinate, so that one instruction serves both; the greatest of them does not depend on the order. */
-static void raise_support(const ebpo_envelope_scratch *scratch, uint64_t step, const double n[3], double *support)
+/* Raises *support by the points, until it reaches `enough`. Points come in twos of a coordinate, so that one instruction serves both; the greatest
+ * of them does not depend on the order. */
+static void raise_support(const ebpo_envelope_scratch *scratch, const double n[3], double enough, double *support)
 {
+    enum { STRETCH = 16 };
     pair nx = { n[0], n[0] }, ny = { n[1], n[1] }, nz = { n[2], n[2] }, best = { *support, *support };
-    for (uint64_t i = 0; 2 * i < scratch->count; i += step) {
-        const pair *p = scratch->point[i];
-        best = greater(nx * p[0] + ny * p[1] + nz * p[2] + p[3], best);
+    uint64_t twos = (scratch->count + 1) / 2, i = 0;
+    while (i < twos && *support < enough) {
+        uint64_t end = twos - i < STRETCH ? twos : i + STRETCH;
+        pair other = best;
+        for (; i + 1 < end; i += 2) { /* two chains of comparisons side by side */
+            const pair *p = scratch->point[i], *q = scratch->point[i + 1];
+            best = greater(nx * p[0] + ny * p[1] + nz * p[2] + p[3], best);
+            other = greater(nx * q[0] + ny * q[1] + nz * q[2] + q[3], other);
+        }
+        if (i < end) {
+            const pair *p = scratch->point[i++];
+            best = greater(nx * p[0] + ny * p[1] + nz * p[2] + p[3], best);
+        }
+        best = greater(best, other);
+        *support = best[0] > best[1] ? best[0] : best[1];
     }
-    *support = best[0] > best[1] ? best[0] : best[1];
 }
 
-/* Supports of all candidates, over the points and the vertices [begin, end). Those that cannot gain epsilon even if the solid
- * reached no farther than a few of its points are dropped at once. */
+/* A support from which on a plane cannot remove epsilon: a cap of height h of a body of width H and volume V has at most V (1 - (1 - h/H)^3) <= 3 V h / H. */
+static double hopeless(const ebpo_polytope *envelope, double volume, const double n[3], double epsilon)
+{
+    double most = -1e300, least = 1e300;
+    for (int i = 0; i < envelope->vertex_count; i++) {
+        const double *v = envelope->vertex[i];
+        double e = n[0] * v[0] + n[1] * v[1] + n[2] * v[2];
+        most = e > most ? e : most;
+        least = e < least ? e : least;
+    }
+    return most - (most - least) * epsilon / (3 * volume);
+}
+
+/* Supports of all candidates, over the points and the vertices [begin, end). Those that cannot gain epsilon are dropped as soon as that shows. */
 static int find_supports(const ebpo_builder *b, ebpo_envelope_scratch *scratch, ebpo_cell cell, int count, uint64_t begin,
                          uint64_t end, const ebpo_polytope *envelope, double epsilon)
 {
     double volume = ebpo_polytope_volume(envelope);
     int kept = 0;
-    for (int j = 0; j < count; j++) {
+    for (int j = 0; j < count && volume > 0; j++) {
         ebpo_candidate c = scratch->candidates[j];
         int32_t v[3], d;
         ebpo_plane_code_decode(c.normal, v, &d);
-        double n[3] = { v[0], v[1], v[2] }, direction[3], few = -1e300;
-        for (int k = 0; k < 3; k++)
-            direction[k] = n[k] * (1.0 / EBPO_NORMAL_NORM);
-        raise_support(scratch, scratch->count / 16 + 1, n, &few);
-        if (few > -1e300 && ebpo_cap_bound(envelope, volume, direction, few * (1.0 / EBPO_NORMAL_NORM)) < epsilon)
-            continue;
-        if (begin < end)
-            c.support = ebpo_bounds_support(b, cell, n, begin, end);
-        raise_support(scratch, 1, n, &c.support);
-        scratch->candidates[kept++] = c;
+        double n[3] = { v[0], v[1], v[2] }, enough = hopeless(envelope, volume, n, epsilon);
+        raise_support(scratch, n, enough, &c.support);
+        if (begin < end && c.support < enough)
+            c.support = ebpo_bounds_support(b, cell, n, begin, end, c.support);
+        if (c.support < enough)
+            scratch->candidates[kept++] = c;
     }
     return kept;
 }
@@ -152,14 +182,15 @@ int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, cons
     ebpo_build_vertex_range(b, cell, &begin, &end);
     scratch->count = 0;
     bool few = end - begin <= FEW_VERTICES;
-    if (few && !add_vertices(b, scratch, cell, begin, end))
-        return -1;
-    if (!add_crossings(b, scratch, s, detail, cell))
-        return -1;
+    /* Corners first: they reach far and show soonest which directions are hopeless. */
     unsigned corners = ebpo_inside_corners(b, winding, detail->delta);
     for (int i = 0; i < 8; i++)
         if (corners >> i & 1 && !add_point(scratch, i & 1, i >> 1 & 1, i >> 2 & 1, 0))
             return -1;
+    if (few && !add_vertices(b, scratch, cell, begin, end))
+        return -1;
+    if (!add_crossings(b, scratch, s, detail, cell))
+        return -1;
     double epsilon = b->options->epsilon * (top ? top_share(envelope) : 1);
     count = find_supports(b, scratch, cell, count, few ? 0 : begin, few ? 0 : end, envelope, epsilon);
     return ebpo_select_greedy(envelope, scratch->candidates, count, epsilon, EBPO_PLANES_MAX, codes);

@@ -19,9 +19,6 @@ typedef struct ebpo_candidate {
     double support;
 } ebpo_candidate;
 
-/* Upper bound of the volume that n . x <= d removes from a polytope of the given volume; much cheaper than the volume itself. */
-double ebpo_cap_bound(const ebpo_polytope *p, double volume, const double n[3], double d);
-
 /* A selection: takes planes from `candidates` (count <= EBPO_PLANES_CANDIDATES), clips `envelope` by them and writes their codes;
  * returns how many (<= most <= EBPO_PLANES_MAX). Adding a method means one function of this shape. */
 typedef int (*ebpo_select_fn)(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, double epsilon, int most,
@@ -31,7 +28,8 @@ typedef int (*ebpo_select_fn)(ebpo_polytope *envelope, const ebpo_candidate *can
 int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, double epsilon, int most,
                        uint32_t *codes);
 
-/* Every candidate that removes anything, deepest cut first: the tightest envelope, and with few candidates the cheapest to find. */
+/* Every candidate that may remove 0.03 % of the cell or more, deepest cut first: nearly the tightest envelope, and with few candidates the
+ * cheapest to find. */
 int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, int most, uint32_t *codes);
 
 /* A face as its three corners, in the model's coordinates. */
@@ -56,7 +54,8 @@ void ebpo_corner_windings(const ebpo_box *box, ebpo_cell cell, const ebpo_triang
 
 /* A leaf's own planes from its faces: on entry `envelope` is the parent's envelope cut to this cell, on return the leaf's. `inside_corners`: bit i set
  * when corner i lies in the solid; `epsilon` > 0: greedy selection, for planes
- * that will be stored; 0: all that cut, for planes that are derived and cost no byte. Writes at most EBPO_PLANES_MAX codes and returns how many. EBP 2017, section 3.4. */
+ * that will be stored; 0: ebpo_select_all, for planes that are derived
+ * and cost no byte. Writes at most EBPO_PLANES_MAX codes and returns how many. EBP 2017, section 3.4. */
 int ebpo_leaf_planes(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces, uint64_t count, unsigned inside_corners,
                      double epsilon, ebpo_polytope *envelope, uint32_t codes[EBPO_PLANES_MAX]);
 

@@ -10,9 +10,9 @@ typedef struct ranked {
     int round; /* -1: never evaluated */
 } ranked;
 
-/* Among convex bodies of volume V and width H the cap of height h is largest for the cone with its base on the far side,
+/* Upper bound of the volume beyond a plane, much cheaper than the volume itself: among convex bodies of volume V and width H the cap of height h is largest for the cone with its base on the far side,
  * V (1 - (1 - h/H)^3). */
-double ebpo_cap_bound(const ebpo_polytope *p, double volume, const double n[3], double d)
+static double cap_bound(const ebpo_polytope *p, double volume, const double n[3], double d)
 {
     double most = -1e300, least = 1e300;
     for (int i = 0; i < p->vertex_count; i++) {
@@ -42,7 +42,7 @@ static int rank_candidates(const ebpo_polytope *envelope, const ebpo_candidate *
         ranked r = { .round = -1, .code = ebpo_plane_code_make(candidates[i].normal, q) };
         ebpo_plane_code_decode(r.code, n, &d);
         r.d = ebpo_plane_as_double(n, d, r.n);
-        r.gain = ebpo_cap_bound(envelope, volume, r.n, r.d);
+        r.gain = cap_bound(envelope, volume, r.n, r.d);
         if (r.gain >= epsilon && r.gain > 0)
             out[kept++] = r;
     }
@@ -106,10 +106,13 @@ int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_candidate *candidates
     return taken;
 }
 
+/* Share of the cell below which a derived plane is not worth the time of a clip. */
+static const double hardly_anything = 3e-4;
+
 int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, int most, uint32_t *codes)
 {
     ranked heap[EBPO_PLANES_CANDIDATES];
-    int left = rank_candidates(envelope, candidates, count, 0, heap), taken = 0;
+    int left = rank_candidates(envelope, candidates, count, hardly_anything, heap), taken = 0;
     make_heap(heap, left);
     for (; left > 0 && taken < most; drop_first(heap, &left))
         if (ebpo_polytope_clip(envelope, heap[0].n, heap[0].d, taken) == EBPO_CLIP_CUT)
