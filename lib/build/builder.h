@@ -7,6 +7,8 @@
 #ifndef EBPO_BUILD_BUILDER_H
 #define EBPO_BUILD_BUILDER_H
 
+#include <stdatomic.h>
+
 #include <ebpo/build.h>
 
 #include "geom/cell.h"
@@ -83,6 +85,7 @@ typedef struct ebpo_builder {
     ebpo_subtree top;         /* gray nodes above the subtrees; its leaves name subtrees in `detail` */
     ebpo_subtree *sub;
     uint64_t sub_count, sub_capacity;
+    _Atomic uint64_t entry_count; /* in all lists so far */
     struct ebpo_top_envelope *top_envelope; /* of the top's gray nodes, by detail */
 } ebpo_builder;
 

@@ -15,7 +15,7 @@
 enum { PIECE_FACES = 4096, PIECES_MOST = 2048, SPLIT_GRAIN = 1 << 13 };
 
 /* A mesh with huge faces and a deep maximum level would list every face in millions of cells. */
-static const uint64_t entries_per_face = 512, entries_always = 1 << 24;
+static const uint64_t entries_per_face = 256, entries_always = 1 << 22;
 
 typedef struct grower {
     ebpo_builder *b;
@@ -111,10 +111,10 @@ static ebpo_status grow_leaf(grower *g, ebpo_build_node *node, ebpo_cell cell, u
     memcpy(s->entries + s->entry_count, g->stack + at, (size_t)count * sizeof *g->stack);
     s->entry_count += count;
     d->entry_end = s->entry_count;
-    if (s->entry_count > entries_always && s->entry_count / entries_per_face > b->face_count)
+    if (atomic_fetch_add(&b->entry_count, count) + count > entries_always + entries_per_face * b->face_count)
         return ebpo_fail(g->error, EBPO_E_LIMIT,
-                         "the faces would be listed in more than %u cells each on average: lower --max-level or raise --leaf-faces",
-                         (unsigned)entries_per_face);
+                         "the faces would be listed more than %llu times: lower --max-level or raise --leaf-faces",
+                         (unsigned long long)(entries_always + entries_per_face * b->face_count));
     if (!b->solid)
         return EBPO_OK;
     if (!ebpo_grow(&g->faces, &g->faces_capacity, count, sizeof *g->faces))
