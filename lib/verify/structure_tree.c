@@ -8,10 +8,13 @@
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
 
-/* A volume cannot be more than that of the cells it lies in; the slack is for the rounding of sums. */
+/* A volume cannot be more than that of the cells it lies in; the slack is for the rounding of sums. Coordinates beyond about 1e102 or below 1e-102 have
+ * volumes that no double holds: the format leaves those unspecified. */
 static bool volume_possible(double volume, uint64_t cells, int l, const ebpo_info *info)
 {
     double cell = ldexp(info->box_size[0], -l) * ldexp(info->box_size[1], -l) * ldexp(info->box_size[2], -l);
+    if (!isnormal(cell))
+        return true;
     return volume >= 0 && volume <= (double)cells * cell * (1 + 1e-6);
 }
 
