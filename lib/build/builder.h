@@ -85,7 +85,7 @@ typedef struct ebpo_builder {
     ebpo_subtree top;         /* gray nodes above the subtrees; its leaves name subtrees in `detail` */
     ebpo_subtree *sub;
     uint64_t sub_count, sub_capacity;
-    _Atomic uint64_t entry_count; /* in all lists so far */
+    _Atomic uint64_t leaf_count, entry_count; /* in all subtrees so far */
     struct ebpo_top_envelope *top_envelope; /* of the top's gray nodes, by detail */
 } ebpo_builder;
 

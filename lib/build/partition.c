@@ -15,7 +15,7 @@
 enum { PIECE_FACES = 4096, PIECES_MOST = 2048, SPLIT_GRAIN = 1 << 13 };
 
 /* A mesh with huge faces and a deep maximum level would list every face in millions of cells. */
-static const uint64_t entries_per_face = 256, entries_always = 1 << 22;
+static const uint64_t leaves_per_face = 64, leaves_always = 1 << 22, entries_per_face = 512, entries_always = 1 << 26;
 
 typedef struct grower {
     ebpo_builder *b;
@@ -111,9 +111,11 @@ static ebpo_status grow_leaf(grower *g, ebpo_build_node *node, ebpo_cell cell, u
     memcpy(s->entries + s->entry_count, g->stack + at, (size_t)count * sizeof *g->stack);
     s->entry_count += count;
     d->entry_end = s->entry_count;
-    if (atomic_fetch_add(&b->entry_count, count) + count > entries_always + entries_per_face * b->face_count)
+    uint64_t leaves = atomic_fetch_add(&b->leaf_count, 1) + 1, entries = atomic_fetch_add(&b->entry_count, count) + count;
+    if (leaves > leaves_always + leaves_per_face * b->face_count || entries > entries_always + entries_per_face * b->face_count)
         return ebpo_fail(g->error, EBPO_E_LIMIT,
-                         "the faces would be listed more than %llu times: lower --max-level or raise --leaf-faces",
+                         "the faces touch too many cells (more than %llu leaves or %llu listed faces): lower --max-level or raise --leaf-faces",
+                         (unsigned long long)(leaves_always + leaves_per_face * b->face_count),
                          (unsigned long long)(entries_always + entries_per_face * b->face_count));
     if (!b->solid)
         return EBPO_OK;
