@@ -3,7 +3,14 @@
 # Usage: samples/inspect.sh FILE.ebpo.h5 [LEVEL]
 set -eu
 file=${1:?usage: inspect.sh FILE.ebpo.h5 [LEVEL]}
-level=$(printf '%02d' "${2:-1}")
+case ${2:-1} in
+[0-9]) level=0${2:-1} ;;
+[0-9][0-9]) level=$2 ;;
+*) echo "inspect.sh: $2 is no level; levels are 0 to 20" >&2; exit 2 ;;
+esac
+
+h5ls "$file" >/dev/null 2>&1 || { echo "inspect.sh: $file: not there, or not an HDF5 file" >&2; exit 1; }
+h5ls "$file/levels/$level" >/dev/null 2>&1 || { echo "inspect.sh: $file has no level $level; see ebpo info $file" >&2; exit 1; }
 
 echo "== what it is"
 for name in about format_version kind vertex_count face_count box_origin box_size; do
@@ -14,10 +21,10 @@ done
 echo "== what it holds"
 h5ls -r "$file"
 
-echo "== level $level: types of eight siblings in two bits each, planes of each gray node, the first plane codes"
+echo "== level $level, first values: types of eight siblings in two bits each, planes of each gray node, plane codes"
 for name in types plane_counts planes; do
-    h5ls "$file/levels/$level" | grep -q "^$name " && h5dump -d "/levels/$level/$name" -s 0 -c 1 "$file" | sed -n 's/^ *(0): /'"$name"': /p'
+    h5ls "$file/levels/$level" | grep -q "^$name " && h5dump -d "/levels/$level/$name" -A 0 -s 0 -c 1 "$file" | sed -n 's/^ *(0): /'"$name"': /p'
 done
 
-echo "== all of it, as HDF5 sees it: h5dump -d /levels/$level/plane_counts $file"
-h5dump -A 0 -d "/levels/$level/plane_counts" "$file" || true
+echo "== all of it, as HDF5 sees it: h5dump -A 0 -d /levels/$level/types $file"
+h5dump -A 0 -d "/levels/$level/types" "$file"

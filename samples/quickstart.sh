@@ -4,7 +4,8 @@
 set -eu
 cd "$(dirname "$0")/.."
 sh tools/install-deps.sh --demo
-[ -d build-quick ] || meson setup build-quick -Dtests=disabled
+# /usr/local/lib is where the loader looks on every Debian.
+meson setup build-quick --libdir=lib -Dtests=disabled $([ -d build-quick ] && echo --reconfigure)
 ninja -C build-quick
 sudo=
 [ "$(id -u)" = 0 ] || sudo=sudo
@@ -17,4 +18,6 @@ ebpo convert /usr/share/glmark2/models/bunny.obj $out
 ebpo info $out
 ebpo verify $out --against /usr/share/glmark2/models/bunny.obj
 ebpo render $out samples/out/bunny.png --levels 0,1,2,3,4,6 --size 1200x840
-h5dump -d /levels/01/plane_counts $out
+h5dump -A 0 -d /levels/01/plane_counts $out
+set +x
+echo "Results: $out, samples/out/bunny.png"

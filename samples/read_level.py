@@ -45,8 +45,16 @@ def half_spaces(codes):
 
 
 def main():
+    if len(sys.argv) not in (2, 3):
+        sys.exit("usage: read_level.py FILE.ebpo.h5 [LEVEL]")
     name, level = sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 1
-    with h5py.File(name, "r") as file:
+    try:
+        file = h5py.File(name, "r")
+    except OSError as error:
+        sys.exit(f"read_level.py: {name}: {error}")
+    with file:
+        if f"/levels/{level:02d}" not in file:
+            sys.exit(f"read_level.py: {name} has no level {level}")
         codes, types = octcodes(file, level)
         gray = codes[types == 3]
         corner, size = cells(gray, level, file.attrs["box_origin"], file.attrs["box_size"])
@@ -60,4 +68,7 @@ def main():
             print(f"{int(gray[node]):o}", *n[i], f"{d[i]:.6f}", *corner[node])
 
 
-main()
+try:
+    main()
+except BrokenPipeError:
+    sys.exit(0)

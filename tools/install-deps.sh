@@ -1,11 +1,12 @@
 #!/bin/sh
 # Installs the Debian packages that building needs; with --tests also what the tests need, with --demo what the quick start needs.
 set -eu
-packages="gcc pkg-config meson ninja-build libhdf5-dev libzstd-dev zlib1g-dev libgmp-dev nettle-dev libassimp-dev libpng-dev"
+# dpkg-dev tells meson where libraries go on Debian.
+packages="gcc dpkg-dev pkg-config meson ninja-build libhdf5-dev libzstd-dev zlib1g-dev libgmp-dev nettle-dev libassimp-dev libpng-dev"
 for option in "$@"; do
     case $option in
     --tests) packages="$packages check hdf5-tools python3 python3-h5py python3-numpy clang libclang-rt-14-dev g++ mandoc" ;;
-    --demo) packages="$packages hdf5-tools glmark2-data" ;;
+    --demo) packages="$packages hdf5-tools glmark2-data python3-h5py" ;;
     *) echo "usage: install-deps.sh [--tests] [--demo]" >&2; exit 2 ;;
     esac
 done

@@ -118,7 +118,7 @@ def peak_memory(*command):
 
 
 def main():
-    print("# Tables\n\nMade by `tests/bench/tables.py EBPO MODELS_DIR LARGE.ply > docs/tables.md`; nothing here was typed in by hand but the "
+    print("# Tables\n\nMade by `tests/bench/tables.py EBPO MODELS_DIR LARGE.ply > docs/tables.md` (a5: `ebpo-generate --base armadillo.ply --subdivide 3 a5.ply`); nothing here was typed in by hand but the "
           "two theses' and the prototype's figures, which the script names.\n")
     with tempfile.TemporaryDirectory() as folder:
         size_table(folder)
