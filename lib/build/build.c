@@ -55,6 +55,26 @@ static void copy_text(char *to, const char *from)
         strcpy(to, from); /* check_options saw to the length */
 }
 
+/* Names of files may be any bytes; the format wants text. What is neither printable ASCII nor part of a valid UTF-8 sequence becomes "_". */
+static void copy_name(char *to, const char *from)
+{
+    while (*from) {
+        const unsigned char *c = (const unsigned char *)from;
+        int length = c[0] < 0x80 ? 1 : c[0] >= 0xc2 && c[0] < 0xe0 ? 2 : c[0] >= 0xe0 && c[0] < 0xf0 ? 3 : c[0] >= 0xf0 && c[0] < 0xf5 ? 4 : 0;
+        bool fine = length > 0 && c[0] >= 32 && c[0] != 127;
+        for (int i = 1; i < length && fine; i++)
+            fine = (c[i] & 0xc0) == 0x80;
+        /* Control characters of Latin 1, sequences longer than need be, surrogates, what lies beyond Unicode. */
+        if ((c[0] == 0xc2 && c[1] < 0xa0) || (c[0] == 0xe0 && c[1] < 0xa0) || (c[0] == 0xed && c[1] >= 0xa0) ||
+            (c[0] == 0xf0 && c[1] < 0x90) || (c[0] == 0xf4 && c[1] >= 0x90))
+            fine = false;
+        for (int i = 0; i < (fine ? length : 1); i++)
+            *to++ = fine ? from[i] : '_';
+        from += fine ? length : 1;
+    }
+    *to = 0;
+}
+
 static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *mesh, const ebpo_mesh_report *report,
                       const ebpo_mend_record *mend)
 {
@@ -65,7 +85,7 @@ static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *m
     copy_text(info->unit, o->unit);
     copy_text(info->crs, o->crs);
     copy_text(info->date, o->date);
-    memcpy(info->source_name, mesh->source_name, sizeof info->source_name);
+    copy_name(info->source_name, mesh->source_name);
     memcpy(info->source_format, mesh->source_format, sizeof info->source_format);
     memcpy(info->source_sha256, mesh->source_sha256, sizeof info->source_sha256);
     info->source_size = mesh->source_size;
@@ -88,6 +108,14 @@ static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *m
     info->parts = o->parts;
 }
 
+static double greatest_coordinate(const ebpo_mesh_report *report)
+{
+    double most = 0;
+    for (int k = 0; k < 3; k++)
+        most = fmax(most, fmax(fabs(report->min[k]), fabs(report->max[k])));
+    return most;
+}
+
 static ebpo_status prepare(ebpo_builder *b, const ebpo_mesh *mesh, const ebpo_mesh_report *report,
                            const ebpo_build_options *options, ebpo_error *error)
 {
@@ -103,7 +131,7 @@ static ebpo_status prepare(ebpo_builder *b, const ebpo_mesh *mesh, const ebpo_me
     b->max_level = options->max_level >= 0 ? options->max_level : level_limit(report);
     if (!ebpo_box_make(&b->box, report->min, report->max, b->max_level))
         return ebpo_fail(error, EBPO_E_LIMIT, "coordinates up to %g are too large for an exact grid of %d levels; scale the model",
-                         fmax(fabs(report->min[0]), fabs(report->max[0])), b->max_level);
+                         greatest_coordinate(report), b->max_level);
     return EBPO_OK;
 }
 

@@ -36,11 +36,10 @@ static ebpo_out *current(joiner *j)
 
 static unsigned type_of(const ebpo_builder *b, const ebpo_build_node *n, int32_t winding)
 {
-    if (n->type == EBPO_LEAF)
-        return b->sub[n->detail].root_type;
-    if (n->type == EBPO_WHITE && b->solid && ebpo_rule_inside(b->options->rule, winding))
+    unsigned type = n->type == EBPO_LEAF ? b->sub[n->detail].root_type : n->type;
+    if (type == EBPO_WHITE && b->solid && ebpo_rule_inside(b->options->rule, winding))
         return EBPO_BLACK;
-    return n->type;
+    return type;
 }
 
 static bool walk(joiner *j, uint32_t index, ebpo_cell cell, int32_t winding)

@@ -17,6 +17,13 @@ enum { PIECE_FACES = 4096, PIECES_MOST = 2048, SPLIT_GRAIN = 1 << 13 };
 /* A mesh with huge faces and a deep maximum level would list every face in millions of cells. */
 static const uint64_t leaves_per_face = 64, leaves_always = 1 << 22, entries_per_face = 512, entries_always = 1 << 26;
 
+/* Faces seen below a node; a round number saves clearing. */
+typedef struct face_set {
+    struct { uint32_t face, round; } *slots;
+    uint64_t mask, count;
+    uint32_t round;
+} face_set;
+
 typedef struct grower {
     ebpo_builder *b;
     ebpo_subtree *s;
@@ -26,6 +33,7 @@ typedef struct grower {
     uint64_t mask_capacity;
     ebpo_triangle *faces; /* of one leaf */
     uint64_t faces_capacity;
+    face_set set;
     ebpo_error *error;
 } grower;
 
@@ -155,6 +163,69 @@ static ebpo_status split(grower *g, ebpo_cell cell, uint64_t at, uint64_t count,
     return EBPO_OK;
 }
 
+/* --- coalescing what turned out to be few --- */
+
+static uint64_t set_slot(const face_set *set, uint32_t face)
+{
+    uint64_t slot = (face * UINT64_C(0x9e3779b97f4a7c15)) >> 32 & set->mask;
+    while (set->slots[slot].round == set->round && set->slots[slot].face != face)
+        slot = (slot + 1) & set->mask;
+    return slot;
+}
+
+static bool set_has(const face_set *set, uint32_t face)
+{
+    return set->slots[set_slot(set, face)].round == set->round;
+}
+
+/* Room for one face more than a leaf may list. */
+static bool set_start(face_set *set, uint64_t most)
+{
+    if (!set->slots) {
+        uint64_t size = 8;
+        while (size < 2 * (most + 2))
+            size *= 2;
+        set->slots = ebpo_alloc_zero(size, sizeof *set->slots);
+        set->mask = size - 1;
+    }
+    set->round++;
+    set->count = 0;
+    return set->slots != NULL;
+}
+
+/* A face that passes by at the distance of a rounding error may be listed here and, where cells are smaller, no more. When the leaves
+ * below a gray node list no more faces than one leaf may, the node is a leaf of just those; when they list none, it is empty. */
+static ebpo_status collapse_if_few(grower *g, uint32_t index, ebpo_cell cell, uint64_t at, uint64_t count)
+{
+    ebpo_subtree *s = g->s;
+    ebpo_build_node gray = s->nodes[index];
+    ebpo_build_detail d = s->details[gray.detail];
+    uint64_t most = g->b->options->leaf_faces < g->b->face_count ? g->b->options->leaf_faces : g->b->face_count;
+    if (!set_start(&g->set, most))
+        return no_memory(g->error);
+    for (uint64_t i = d.entry_begin; i < d.entry_end; i++) {
+        uint64_t slot = set_slot(&g->set, s->entries[i]);
+        if (g->set.slots[slot].round == g->set.round)
+            continue;
+        if (g->set.count++ == most)
+            return EBPO_OK; /* gray it stays */
+        g->set.slots[slot].face = s->entries[i];
+        g->set.slots[slot].round = g->set.round;
+    }
+    s->node_count = gray.child;
+    s->detail_count = gray.detail;
+    s->entry_count = d.entry_begin;
+    s->cross_count = d.cross_begin;
+    uint64_t kept = 0;
+    for (uint64_t i = 0; i < count; i++)
+        if (set_has(&g->set, g->stack[at + i]))
+            g->stack[at + kept++] = g->stack[at + i];
+    ebpo_build_node node = { 0 };
+    ebpo_status status = kept ? grow_leaf(g, &node, cell, at, kept) : EBPO_OK;
+    s->nodes[index] = node;
+    return status;
+}
+
 /* The node's list is stack[at] to stack[at + count - 1]; the stack is free from `top` on. */
 static ebpo_status grow(grower *g, uint32_t index, ebpo_cell cell, uint64_t at, uint64_t count, uint64_t top)
 {
@@ -192,7 +263,7 @@ static ebpo_status grow(grower *g, uint32_t index, ebpo_cell cell, uint64_t at, 
         ebpo_gather_delta(child_delta, d.delta);
     }
     s->details[detail] = d;
-    return EBPO_OK;
+    return collapse_if_few(g, index, cell, at, count);
 }
 
 static ebpo_status grow_subtrees(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
@@ -213,11 +284,13 @@ static ebpo_status grow_subtrees(void *context, uint64_t begin, uint64_t end, un
         }
         if (status == EBPO_OK) {
             s->root_type = s->nodes[0].type;
-            memcpy(s->root_delta, s->details[s->nodes[0].detail].delta, sizeof s->root_delta);
+            if (s->root_type != EBPO_WHITE)
+                memcpy(s->root_delta, s->details[s->nodes[0].detail].delta, sizeof s->root_delta);
         }
         free(g.stack);
         free(g.mask);
         free(g.faces);
+        free(g.set.slots);
     }
     return status;
 }
@@ -327,6 +400,8 @@ ebpo_status ebpo_build_partition(ebpo_builder *b, ebpo_error *error)
     for (uint64_t i = 0; i < b->face_count; i++)
         all[i] = (uint32_t)i;
     uint64_t piece = b->face_count / PIECES_MOST > PIECE_FACES ? b->face_count / PIECES_MOST : PIECE_FACES;
+    if (piece < 2 * (uint64_t)b->options->leaf_faces) /* so that no node of the top can turn out to be a leaf */
+        piece = 2 * (uint64_t)b->options->leaf_faces;
     ebpo_status status = grow_top(b, 0, b->top.cell, all, b->face_count, piece, error);
     if (status == EBPO_OK)
         status = ebpo_parallel_for(b->threads, b->sub_count, 1, grow_subtrees, b, &b->options->progress, "cells", error);
