@@ -109,12 +109,12 @@ void facts_print(FILE *out, const char *path, const ebpo_info *info)
 
 void facts_table(FILE *out, const ebpo_info *info)
 {
-    fprintf(out, "%5s %9s %9s %9s %9s %9s %10s %10s %9s %10s %9s\n", "level", "gray", "leaf", "white", "black",
+    fprintf(out, "%5s %9s %9s %9s %9s %9s %10s %12s %9s %10s %9s\n", "level", "gray", "leaf", "white", "black",
             "planes", "faces new", "faces again", "stored", "cumulative", info->solid ? "% solid" : "% box");
     for (int i = 0; i < info->level_count; i++) {
         const ebpo_level_summary *l = &info->level[i];
         char stored[32], sum[32];
-        fprintf(out, "%5d %9llu %9llu %9llu %9llu %9llu %10llu %11llu %9s %10s %9.2f\n", i,
+        fprintf(out, "%5d %9llu %9llu %9llu %9llu %9llu %10llu %12llu %9s %10s %9.2f\n", i,
                 (unsigned long long)l->gray_count, (unsigned long long)l->leaf_count,
                 (unsigned long long)l->white_count, (unsigned long long)l->black_count,
                 (unsigned long long)(l->plane_count + l->leaf_plane_count), (unsigned long long)l->new_count,
