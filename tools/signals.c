@@ -7,7 +7,13 @@
 static void give_up(int number)
 {
     ebpo_abandon_outputs();
-    /* SA_RESETHAND brought the default back: the parent sees which signal it was. */
+    /* SA_RESETHAND brought the default back: the parent sees which signal it was. At once, and not when this handler returns: another thread may be
+     * about to open the output by its name again. */
+    sigset_t only;
+    sigemptyset(&only);
+    sigaddset(&only, number);
+    pthread_sigmask(SIG_UNBLOCK, &only, NULL);
+    ebpo_abandon_outputs();
     raise(number);
 }
 

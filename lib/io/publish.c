@@ -93,9 +93,13 @@ static ebpo_status create_temporary(ebpo_publish *publish, ebpo_error *error)
         }
         if (strlen(publish->temporary) >= PATH_MAX)
             return ebpo_fail(error, EBPO_E_IO, "%s: the path is too long; write to a folder with a shorter one", publish->shown);
+        /* Known to the signal handler before it exists, so that there is no moment in which it would be left behind. */
+        strcpy(slots[publish->slot].path, publish->temporary);
+        atomic_store(&slots[publish->slot].state, SLOT_LIVE);
         publish->fd = open(publish->temporary, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0666);
         if (publish->fd >= 0)
             return EBPO_OK;
+        atomic_store(&slots[publish->slot].state, SLOT_TAKEN);
         if (errno != EEXIST)
             break;
     }
@@ -120,8 +124,6 @@ ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path, ebpo_error *
         ebpo_publish_abort(&publish);
         return status;
     }
-    strcpy(slots[publish.slot].path, publish.temporary);
-    atomic_store(&slots[publish.slot].state, SLOT_LIVE);
     *out = publish;
     return EBPO_OK;
 }
