@@ -40,13 +40,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (fd < 0 || write(fd, data, size) != (ssize_t)size)
         abort();
     close(fd);
-    if (ebpo_file_open(&file, path, NULL) != EBPO_OK)
+    if (ebpo_open(&file, path, NULL) != EBPO_OK)
         return 0;
     if (ebpo_file_read_tree(file, &tree, 1, NULL) == EBPO_OK)
         ebpo_tree_free(&tree);
     if (ebpo_file_read_source_mesh(file, &mesh, NULL, 1, NULL) == EBPO_OK)
         ebpo_mesh_free(&mesh);
     (void)!ebpo_file_check_content(file, 1, NULL);
-    ebpo_file_close(file);
+    ebpo_close(file);
     return 0;
 }

@@ -76,7 +76,7 @@ static ebpo_file *open_ok(const char *path)
 {
     ebpo_file *file;
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert_msg(ebpo_file_open(&file, path, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_open(&file, path, &error) == EBPO_OK, "%s", error.message);
     return file;
 }
 
@@ -155,7 +155,7 @@ START_TEST(trees_come_back_bit_for_bit)
             ck_assert_msg(ebpo_file_check_content(file, threads, &error) == EBPO_OK, "%s", error.message);
             same_tree(&tree, &back);
             ebpo_tree_free(&back);
-            ebpo_file_close(file);
+            ebpo_close(file);
         }
     ebpo_tree_free(&tree);
 }
@@ -190,7 +190,7 @@ START_TEST(content_checksum_does_not_depend_on_the_codec)
         if (codec == EBPO_CODEC_ZSTD)
             memcpy(digest, ebpo_file_info(file)->content_sha256, 32);
         ck_assert_int_eq(memcmp(digest, ebpo_file_info(file)->content_sha256, 32), 0);
-        ebpo_file_close(file);
+        ebpo_close(file);
     }
     ebpo_tree_free(&tree);
 }
@@ -227,7 +227,7 @@ START_TEST(all_metadata_is_in_a_small_head)
     write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, ~0u);
     ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
     uint64_t head[2] = { ebpo_file_info(file)->head_bytes, 0 }, size = ebpo_file_info(file)->file_bytes;
-    ebpo_file_close(file);
+    ebpo_close(file);
     ck_assert_uint_lt(head[0], 64 << 10);
     hid_t fid = H5Fopen(in_folder("a.ebpo.h5"), H5F_ACC_RDONLY, H5P_DEFAULT);
     ck_assert_int_ge(H5Lvisit(fid, H5_INDEX_NAME, H5_ITER_NATIVE, check_chunks, head), 0);
@@ -286,7 +286,7 @@ START_TEST(parts_that_are_left_out_are_absent)
         free(face_source);
         ck_assert_int_eq(ebpo_file_check_content(file, 2, NULL), EBPO_OK);
         ebpo_tree_free(&back);
-        ebpo_file_close(file);
+        ebpo_close(file);
     }
     ebpo_tree_free(&tree);
 }
@@ -314,7 +314,7 @@ START_TEST(source_order_undoes_the_maps)
     for (uint64_t i = 0; i < tree.mesh.vertex_count; i++)
         ck_assert_int_eq(memcmp(sorted + tree.vertex_source[i] / 2 * size, stored + i * size, size), 0);
     ebpo_mesh_free(&mesh);
-    ebpo_file_close(file);
+    ebpo_close(file);
     ebpo_tree_free(&tree);
 }
 END_TEST
@@ -326,9 +326,9 @@ START_TEST(read_only_folders_will_do)
     write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, ~0u);
     ck_assert_int_eq(chmod(in_folder("a.ebpo.h5"), 0444) | chmod(folder, 0555), 0);
     ebpo_file *file = open_ok(in_folder("a.ebpo.h5")), *again = open_ok(in_folder("a.ebpo.h5"));
-    ebpo_file_close(file);
+    ebpo_close(file);
     ck_assert_int_eq(ebpo_file_check_content(again, 1, NULL), EBPO_OK);
-    ebpo_file_close(again);
+    ebpo_close(again);
     ebpo_tree_free(&tree);
 }
 END_TEST
@@ -338,13 +338,13 @@ static bool reads_well(const char *path, ebpo_error *error)
 {
     ebpo_file *file;
     ebpo_tree tree;
-    if (ebpo_file_open(&file, path, error) != EBPO_OK)
+    if (ebpo_open(&file, path, error) != EBPO_OK)
         return false;
     bool ok = ebpo_file_read_tree(file, &tree, 1, error) == EBPO_OK;
     if (ok)
         ebpo_tree_free(&tree);
     ok = ok && ebpo_file_check_content(file, 1, error) == EBPO_OK;
-    ebpo_file_close(file);
+    ebpo_close(file);
     return ok;
 }
 
@@ -375,7 +375,7 @@ START_TEST(every_flipped_bit_behind_the_head_is_noticed)
     write_ok(&tree, in_folder("a.ebpo.h5"), (ebpo_codec)_i, 1, ~0u);
     ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
     uint64_t head = ebpo_file_info(file)->head_bytes;
-    ebpo_file_close(file);
+    ebpo_close(file);
     uint8_t *data = slurp(in_folder("a.ebpo.h5"), &size);
     unsigned missed = 0;
     for (size_t at = (size_t)head; at < size; at += 37) {
@@ -405,12 +405,12 @@ START_TEST(flipped_bits_in_the_head_do_no_harm)
         data[at] ^= (uint8_t)(1u << at % 8);
         spill(in_folder("b.ebpo.h5"), data, size);
         ebpo_file *file;
-        if (ebpo_file_open(&file, in_folder("b.ebpo.h5"), NULL) == EBPO_OK) {
+        if (ebpo_open(&file, in_folder("b.ebpo.h5"), NULL) == EBPO_OK) {
             if (ebpo_file_read_tree(file, &back, 1, NULL) == EBPO_OK) {
                 same_tree(&tree, &back);
                 ebpo_tree_free(&back);
             }
-            ebpo_file_close(file);
+            ebpo_close(file);
         }
         data[at] = old;
     }
@@ -486,7 +486,7 @@ START_TEST(an_index_that_contradicts_its_arrays_is_refused)
     ebpo_error error = EBPO_ERROR_INIT;
     ck_assert_int_eq(ebpo_file_read_level(file, number, &level, 1, &error), EBPO_E_FORMAT);
     ck_assert_ptr_nonnull(strstr(error.message, names[_i]));
-    ebpo_file_close(file);
+    ebpo_close(file);
     ebpo_tree_free(&tree);
 }
 END_TEST
@@ -540,13 +540,13 @@ START_TEST(what_is_no_file_of_ours_is_named)
 {
     ebpo_file *file;
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert_int_eq(ebpo_file_open(&file, in_folder("none"), &error), EBPO_E_IO);
-    ck_assert_int_eq(ebpo_file_open(&file, folder, &error), EBPO_E_IO);
+    ck_assert_int_eq(ebpo_open(&file, in_folder("none"), &error), EBPO_E_IO);
+    ck_assert_int_eq(ebpo_open(&file, folder, &error), EBPO_E_IO);
     spill(in_folder("text"), (const uint8_t *)"hello", 5);
-    ck_assert_int_eq(ebpo_file_open(&file, in_folder("text"), &error), EBPO_E_FORMAT);
+    ck_assert_int_eq(ebpo_open(&file, in_folder("text"), &error), EBPO_E_FORMAT);
     hid_t fid = H5Fcreate(in_folder("other.h5"), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
     H5Fclose(fid);
-    ck_assert_int_eq(ebpo_file_open(&file, in_folder("other.h5"), &error), EBPO_E_FORMAT);
+    ck_assert_int_eq(ebpo_open(&file, in_folder("other.h5"), &error), EBPO_E_FORMAT);
     ck_assert_ptr_nonnull(strstr(error.message, "not an EBP-Octree"));
     ck_assert_ptr_null(file);
 }
@@ -559,7 +559,7 @@ START_TEST(callers_error_printing_is_given_back)
     ebpo_file *file;
     H5Eget_auto2(H5E_DEFAULT, &before, &data);
     spill(in_folder("text"), (const uint8_t *)"hello", 5);
-    ck_assert_int_eq(ebpo_file_open(&file, in_folder("text"), NULL), EBPO_E_FORMAT);
+    ck_assert_int_eq(ebpo_open(&file, in_folder("text"), NULL), EBPO_E_FORMAT);
     H5Eget_auto2(H5E_DEFAULT, &after, &data);
     ck_assert(before == after);
 }

@@ -40,7 +40,7 @@ static ebpo_file *build(ebpo_mesh mesh, uint32_t parts, uint32_t leaf_faces)
     ck_assert_msg(ebpo_build(&tree, &mesh, &report, &mend, &options, &error) == EBPO_OK, "%s", error.message);
     ck_assert_msg(ebpo_tree_write(&tree, path, &write, &error) == EBPO_OK, "%s", error.message);
     ebpo_tree_free(&tree);
-    ck_assert_msg(ebpo_file_open(&file, path, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_open(&file, path, &error) == EBPO_OK, "%s", error.message);
     return file;
 }
 
@@ -92,7 +92,7 @@ START_TEST(level_volumes_equal_those_stored_in_the_file)
             ck_assert_msg(fabs(volume - stored) <= 1e-6 * stored + 1e-12 * largest_volume(info), "%s level %d: %.17g, stored %.17g",
                           ebpo_test_solids[_i].name, level, volume, stored);
         }
-        ebpo_file_close(file);
+        ebpo_close(file);
     }
 }
 END_TEST
@@ -111,7 +111,7 @@ START_TEST(volumes_of_a_real_model_agree_too)
         double volume = take(file, level, true, 0, NULL), stored = stored_volume(info, level);
         ck_assert_msg(fabs(volume - stored) <= 1e-7 * stored, "level %d: %.17g, stored %.17g", level, volume, stored);
     }
-    ebpo_file_close(file);
+    ebpo_close(file);
 }
 END_TEST
 
@@ -133,7 +133,7 @@ START_TEST(envelopes_are_closed_and_fill_the_stated_volume)
                       volume);
         ebpo_mesh_free(&mesh);
     }
-    ebpo_file_close(file);
+    ebpo_close(file);
 }
 END_TEST
 
@@ -146,7 +146,7 @@ START_TEST(deeper_levels_are_never_larger)
         ck_assert_msg(volume <= before * (1 + 1e-9), "%s level %d", ebpo_test_solids[_i].name, level);
         before = volume;
     }
-    ebpo_file_close(file);
+    ebpo_close(file);
 }
 END_TEST
 
@@ -168,7 +168,7 @@ START_TEST(result_does_not_depend_on_the_number_of_threads)
         ebpo_mesh_free(&one);
         ebpo_mesh_free(&seven);
     }
-    ebpo_file_close(file);
+    ebpo_close(file);
 }
 END_TEST
 
@@ -202,7 +202,7 @@ START_TEST(walls_are_left_out_on_request)
         ebpo_mesh_free(&with);
         ebpo_mesh_free(&without);
     }
-    ebpo_file_close(file);
+    ebpo_close(file);
 }
 END_TEST
 
@@ -233,7 +233,7 @@ START_TEST(envelopes_come_level_by_level_in_octcode_order)
         before = code;
     }
     ebpo_mesh_free(&mesh);
-    ebpo_file_close(file);
+    ebpo_close(file);
 }
 END_TEST
 
@@ -244,10 +244,10 @@ START_TEST(without_faces_leaves_have_what_they_inherit)
     double bare = take(file, last, true, 0, NULL);
     ck_assert_double_eq_tol(bare, stored_volume(ebpo_file_info(file), last), 1e-6 * bare);
     ck_assert(bare <= take(file, last - 1, true, 0, NULL) * (1 + 1e-9));
-    ebpo_file_close(file);
+    ebpo_close(file);
     ebpo_file *full = build(ebpo_test_make("torus"), USUAL, 4);
     ck_assert(bare > take(full, last, true, 0, NULL));
-    ebpo_file_close(full);
+    ebpo_close(full);
 }
 END_TEST
 
@@ -261,7 +261,7 @@ START_TEST(a_level_that_is_not_there_is_refused)
     ck_assert_ptr_nonnull(strstr(error.message, "this file has levels 0 to"));
     ck_assert_int_eq(ebpo_lod_level(file, -1, NULL, &mesh, NULL, NULL), EBPO_E_ARGUMENT);
     ck_assert_ptr_null(mesh.xyz64);
-    ebpo_file_close(file);
+    ebpo_close(file);
 }
 END_TEST
 
@@ -286,7 +286,7 @@ START_TEST(a_cancelled_run_leaves_nothing)
     ck_assert(status == EBPO_E_CANCELLED || status == EBPO_OK);
     ck_assert(status == EBPO_OK || mesh.xyz64 == NULL);
     ebpo_mesh_free(&mesh);
-    ebpo_file_close(file);
+    ebpo_close(file);
 }
 END_TEST
 

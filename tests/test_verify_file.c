@@ -67,13 +67,13 @@ static bool verify_against(const ebpo_mesh *source)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file;
-    if (ebpo_file_open(&file, path, &error) != EBPO_OK)
+    if (ebpo_open(&file, path, &error) != EBPO_OK)
         return false;
     ebpo_verify_options options = EBPO_VERIFY_OPTIONS_INIT;
     options.source = source;
     options.threads = 2;
     ck_assert_msg(ebpo_verify(file, &options, &report, &error) == EBPO_OK, "%s", error.message);
-    ebpo_file_close(file);
+    ebpo_close(file);
     return true;
 }
 
@@ -158,9 +158,9 @@ START_TEST(damaged_files_are_findings_and_not_failures)
 {
     write_file(ebpo_test_make("sphere"), false, ~0u);
     ebpo_file *file;
-    ck_assert(ebpo_file_open(&file, path, NULL) == EBPO_OK);
+    ck_assert(ebpo_open(&file, path, NULL) == EBPO_OK);
     uint64_t head = ebpo_file_info(file)->head_bytes;
-    ebpo_file_close(file);
+    ebpo_close(file);
     FILE *f = fopen(path, "r+b");
     fseek(f, 0, SEEK_END);
     long size = ftell(f);
@@ -196,14 +196,14 @@ START_TEST(verifying_needs_a_file_and_may_be_stopped)
     ck_assert(ebpo_verify(NULL, NULL, &report, &error) == EBPO_E_ARGUMENT);
     write_file(ebpo_test_make("torus"), false, ~0u);
     ebpo_file *file;
-    ck_assert(ebpo_file_open(&file, path, &error) == EBPO_OK);
+    ck_assert(ebpo_open(&file, path, &error) == EBPO_OK);
     ebpo_verify_options options = EBPO_VERIFY_OPTIONS_INIT;
     options.progress.report = stop_at_once;
     ebpo_status status = ebpo_verify(file, &options, &report, &error);
     ck_assert(status == EBPO_OK || status == EBPO_E_CANCELLED); /* a small file is done before the first report */
     ck_assert(ebpo_verify(file, NULL, &report, &error) == EBPO_OK);
     ck_assert_uint_eq(report.violations, 0);
-    ebpo_file_close(file);
+    ebpo_close(file);
 }
 END_TEST
 

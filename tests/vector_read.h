@@ -10,7 +10,7 @@
 static ebpo_status vector_read(const char *path, ebpo_tree *tree, ebpo_error *error)
 {
     ebpo_file *file;
-    ebpo_status status = ebpo_file_open(&file, path, error);
+    ebpo_status status = ebpo_open(&file, path, error);
     if (status != EBPO_OK)
         return status;
     status = ebpo_file_read_tree(file, tree, 1, error);
@@ -18,7 +18,7 @@ static ebpo_status vector_read(const char *path, ebpo_tree *tree, ebpo_error *er
         status = ebpo_file_check_content(file, 1, error);
     if (status != EBPO_OK)
         ebpo_tree_free(tree);
-    ebpo_file_close(file);
+    ebpo_close(file);
     return status;
 }
 

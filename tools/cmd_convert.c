@@ -136,14 +136,14 @@ static ebpo_status print_result(const values *v, const prepared *p, const char *
     if (v->quiet && !v->json)
         return EBPO_OK;
     ebpo_file *file = NULL;
-    ebpo_status status = ebpo_file_open(&file, out, error);
+    ebpo_status status = ebpo_open(&file, out, error);
     if (status != EBPO_OK)
         return status;
     if (v->json)
         print_json(p, ebpo_file_info(file), out, seconds);
     else
         print_summary(ebpo_file_info(file), out, seconds);
-    ebpo_file_close(file);
+    ebpo_close(file);
     return EBPO_OK;
 }
 

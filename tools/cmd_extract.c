@@ -97,7 +97,7 @@ static int run(int argc, char **argv)
     ebpo_file *file = NULL;
     ebpo_mesh mesh = { 0 };
     double volume = 0;
-    ebpo_status status = ebpo_file_open(&file, operand[0], &error);
+    ebpo_status status = ebpo_open(&file, operand[0], &error);
     if (status == EBPO_OK)
         status = take(file, &v, operand[0], progress, &mesh, &volume, &error);
     if (status == EBPO_OK)
@@ -106,7 +106,7 @@ static int run(int argc, char **argv)
     if (status == EBPO_OK && !v.quiet)
         summarise(&v, operand[1], &mesh, volume);
     ebpo_mesh_free(&mesh);
-    ebpo_file_close(file);
+    ebpo_close(file);
     return status == EBPO_OK ? EXIT_FINE : command_failed("extract", &error);
 }
 

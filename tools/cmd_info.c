@@ -40,7 +40,7 @@ static int run(int argc, char **argv)
     }
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
-    if (ebpo_file_open(&file, operand[0], &error) != EBPO_OK)
+    if (ebpo_open(&file, operand[0], &error) != EBPO_OK)
         return command_failed("info", &error);
     const ebpo_info *info = ebpo_file_info(file);
     if (v.json) {
@@ -54,7 +54,7 @@ static int run(int argc, char **argv)
         putchar('\n');
         facts_table(stdout, info);
     }
-    ebpo_file_close(file);
+    ebpo_close(file);
     return EXIT_FINE;
 }
 

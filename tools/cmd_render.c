@@ -148,10 +148,10 @@ static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress pro
 static ebpo_status load_file(job *j, ebpo_progress progress, ebpo_error *error)
 {
     ebpo_file *file = NULL;
-    ebpo_status status = ebpo_file_open(&file, j->in, error);
+    ebpo_status status = ebpo_open(&file, j->in, error);
     for (int i = 0; i < j->tile_count && status == EBPO_OK; i++)
         status = load_tile(j, &j->tiles[i], file, progress, error);
-    ebpo_file_close(file);
+    ebpo_close(file);
     return status;
 }
 

@@ -108,7 +108,7 @@ static ebpo_status verify(const values *v, const char *path, ebpo_progress progr
     ebpo_mesh source = { 0 };
     ebpo_file *file = NULL;
     ebpo_mesh_read_options read = { progress };
-    ebpo_status status = ebpo_file_open(&file, path, error);
+    ebpo_status status = ebpo_open(&file, path, error);
     if (status == EBPO_OK && v->against)
         status = ebpo_mesh_read(&source, v->against, &read, error);
     if (status == EBPO_OK) {
@@ -120,7 +120,7 @@ static ebpo_status verify(const values *v, const char *path, ebpo_progress progr
         status = ebpo_verify(file, &verify_options, report, error);
     }
     ebpo_mesh_free(&source);
-    ebpo_file_close(file);
+    ebpo_close(file);
     return status;
 }
 

@@ -87,7 +87,7 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_error *error)
     return status;
 }
 
-ebpo_status ebpo_file_open(ebpo_file **out, const char *path, ebpo_error *error)
+ebpo_status ebpo_open(ebpo_file **out, const char *path, ebpo_error *error)
 {
     *out = NULL;
     ebpo_file *file = ebpo_alloc_zero(1, sizeof *file);
@@ -116,12 +116,12 @@ ebpo_status ebpo_file_open(ebpo_file **out, const char *path, ebpo_error *error)
     if (status == EBPO_OK) {
         *out = file;
     } else {
-        ebpo_file_close(file);
+        ebpo_close(file);
     }
     return status;
 }
 
-void ebpo_file_close(ebpo_file *file)
+void ebpo_close(ebpo_file *file)
 {
     if (!file)
         return;

@@ -10,9 +10,8 @@
 #include "codec/coding.h"
 
 typedef struct scratch {
-    ebpo_chunk_coder coder;
+    ebpo_chunk_reader reader;
     uint8_t raw[EBPO_CHUNK_BYTES_MAX];
-    uint8_t stored[]; /* the bound of an encoded chunk */
 } scratch;
 
 typedef struct job {
@@ -20,34 +19,57 @@ typedef struct job {
     const ebpo_array_in *array;
     ebpo_rows_fn take;
     void *context;
-    size_t bound;
     scratch **scratch; /* for each worker, made when first needed */
 } job;
+
+void ebpo_chunk_reader_clear(ebpo_chunk_reader *reader)
+{
+    ebpo_chunk_coder_clear(&reader->coder);
+    free(reader->stored);
+    reader->stored = NULL;
+    reader->capacity = 0;
+}
+
+ebpo_status ebpo_reader_chunk(ebpo_file *file, const ebpo_array_in *array, uint64_t chunk, ebpo_chunk_reader *reader, uint8_t *raw_out,
+                              ebpo_error *error)
+{
+    const ebpo_h5_shape *shape = &array->shape;
+    size_t stored = 0, raw = shape->chunk_rows * ebpo_h5_row_bytes(shape), bound = ebpo_chunk_bound(raw);
+    if (reader->capacity < bound) {
+        free(reader->stored);
+        reader->stored = ebpo_alloc(bound, 1);
+        reader->capacity = reader->stored ? bound : 0;
+    }
+    if (!reader->stored)
+        return ebpo_fail_memory(error, bound);
+    ebpo_status status = ebpo_h5_get_chunk(&file->in, array->path, array->handle, shape, chunk, reader->stored, bound, &stored, error);
+    if (status != EBPO_OK)
+        return status;
+    const char *why;
+    status = ebpo_chunk_decode(&reader->coder, shape->pipeline, shape->element_size, reader->stored, stored, raw_out, raw, &why);
+    if (status == EBPO_E_MEMORY)
+        return ebpo_fail_memory(error, raw);
+    if (status != EBPO_OK)
+        return ebpo_fail(error, status, "%s: %s: chunk %" PRIu64 " is damaged: %s; get a fresh copy of the file", file->in.shown,
+                         array->path, chunk, why);
+    return EBPO_OK;
+}
 
 static ebpo_status read_chunk(job *j, scratch *s, uint64_t chunk, ebpo_error *error)
 {
     const ebpo_array_in *a = j->array;
-    const ebpo_h5_shape *shape = &a->shape;
-    size_t stored = 0, raw = shape->chunk_rows * ebpo_h5_row_bytes(shape);
-    ebpo_status status = ebpo_h5_get_chunk(&j->file->in, a->path, a->handle, shape, chunk, s->stored, j->bound, &stored, error);
+    ebpo_status status = ebpo_reader_chunk(j->file, a, chunk, &s->reader, s->raw, error);
     if (status != EBPO_OK)
         return status;
-    const char *why;
-    status = ebpo_chunk_decode(&s->coder, shape->pipeline, shape->element_size, s->stored, stored, s->raw, raw, &why);
-    if (status == EBPO_E_MEMORY)
-        return ebpo_fail_memory(error, raw);
-    if (status != EBPO_OK)
-        return ebpo_fail(error, status, "%s: %s: chunk %" PRIu64 " is damaged: %s; get a fresh copy of the file", j->file->in.shown,
-                         a->path, chunk, why);
-    uint64_t row = chunk * shape->chunk_rows, left = shape->rows - row;
-    return j->take(j->context, a, chunk, row, left < shape->chunk_rows ? left : shape->chunk_rows, s->raw, error);
+    uint64_t row = chunk * a->shape.chunk_rows, left = a->shape.rows - row;
+    return j->take(j->context, a, chunk, row, left < a->shape.chunk_rows ? left : a->shape.chunk_rows, s->raw, error);
 }
 
 static ebpo_status read_chunks(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
 {
     job *j = context;
     if (!j->scratch[worker])
-        j->scratch[worker] = ebpo_alloc_zero(1, sizeof(scratch) + j->bound);
+        j->scratch[worker] = ebpo_alloc_zero(1, sizeof(scratch));
     if (!j->scratch[worker])
         return ebpo_fail_memory(error, sizeof(scratch));
     ebpo_status status = EBPO_OK;
@@ -61,15 +83,14 @@ ebpo_status ebpo_reader_rows(ebpo_file *file, const ebpo_array_in *array, unsign
 {
     uint64_t chunks = ebpo_h5_chunk_count(&array->shape);
     threads = chunks > 2 ? ebpo_thread_count(threads) : 1;
-    size_t raw = array->shape.chunk_rows * ebpo_h5_row_bytes(&array->shape);
-    job j = { .file = file, .array = array, .take = take, .context = context, .bound = ebpo_chunk_bound(raw) };
+    job j = { .file = file, .array = array, .take = take, .context = context };
     j.scratch = ebpo_alloc_zero(threads, sizeof *j.scratch);
     if (!j.scratch)
         return ebpo_fail_memory(error, threads * sizeof *j.scratch);
     ebpo_status status = ebpo_parallel_for(threads, chunks, 1, read_chunks, &j, NULL, "read", error);
     for (unsigned i = 0; i < threads; i++)
         if (j.scratch[i]) {
-            ebpo_chunk_coder_clear(&j.scratch[i]->coder);
+            ebpo_chunk_reader_clear(&j.scratch[i]->reader);
             free(j.scratch[i]);
         }
     free(j.scratch);

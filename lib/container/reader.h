@@ -35,6 +35,19 @@ static inline ebpo_check ebpo_reader_check(const ebpo_file *file)
     return (ebpo_check){ file->in.shown, EBPO_E_FORMAT };
 }
 
+/* Decoding state and room for one stored chunk, of one thread; zero-initialise, clear when done. */
+typedef struct ebpo_chunk_reader {
+    ebpo_chunk_coder coder;
+    uint8_t *stored;
+    size_t capacity;
+} ebpo_chunk_reader;
+void ebpo_chunk_reader_clear(ebpo_chunk_reader *reader);
+
+/* Fetches chunk number `chunk` of an array that is present and decodes it: chunk_rows rows as the specification describes them (the last chunk with its filling), into `raw` of
+ * EBPO_CHUNK_BYTES_MAX bytes. Several threads at once, each with its own reader. */
+EBPO_MUST_USE ebpo_status ebpo_reader_chunk(ebpo_file *file, const ebpo_array_in *array, uint64_t chunk, ebpo_chunk_reader *reader, uint8_t *raw,
+                                            ebpo_error *error);
+
 /* Takes rows [row, row + rows) of chunk number `chunk`, decoded to the bytes that the specification describes. Called from several threads. */
 typedef ebpo_status (*ebpo_rows_fn)(void *context, const ebpo_array_in *array, uint64_t chunk, uint64_t row, uint64_t rows,
                                     const uint8_t *bytes, ebpo_error *error);

@@ -78,7 +78,7 @@ ebpo_status ebpo_verify(ebpo_file *file, const ebpo_verify_options *options, ebp
     options = options ? options : &defaults;
     *report = (ebpo_verify_report){0};
     if (!file)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "verify: no file; open one with ebpo_file_open");
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "verify: no file; open one with ebpo_open");
     if (options->source) {
         ebpo_status shape = ebpo_mesh_check_shape(options->source, error);
         if (shape != EBPO_OK)

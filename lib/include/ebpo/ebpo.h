@@ -7,6 +7,8 @@
 #include <ebpo/file.h>
 #include <ebpo/build.h>
 #include <ebpo/lod.h>
+#include <ebpo/query.h>
+#include <ebpo/stream.h>
 #include <ebpo/verify.h>
 
 #endif

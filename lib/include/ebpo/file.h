@@ -135,13 +135,31 @@ typedef struct ebpo_write_options {
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_tree_write(const ebpo_tree *tree, const char *path,
                                                    const ebpo_write_options *options, ebpo_error *error);
 
-/* An open file. Immutable; HDF5 calls inside are serialised by the library, so any thread may use it. */
+/* Where bytes come from. `read` fills `data` with the bytes [offset, offset + size), all of which lie within `size` of the source, or fails;
+ * it is called from several threads at once. `close` is called once, when the file is closed or when opening fails. */
+typedef struct ebpo_source {
+    void *user;
+    uint64_t size; /* bytes */
+    ebpo_status (*read)(void *user, uint64_t offset, uint64_t size, void *data, ebpo_error *error);
+    void (*close)(void *user); /* may be NULL */
+} ebpo_source;
+
+/* An open file. Immutable: any number of threads may use it at once. */
 typedef struct ebpo_file ebpo_file;
 
-/* Opens a file, reads and checks its head only. Unknown major version or unknown required part: EBPO_E_VERSION, by name.
- * Safe on untrusted files. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_open(ebpo_file **out, const char *path, ebpo_error *error);
-EBPO_API void ebpo_file_close(ebpo_file *file);
+/* Opens a file and reads its head only: the facts, and where each chunk of each array is. HDF5 is used for that and for nothing later; everything else is
+ * read straight from the source. Unknown major version or unknown required part: EBPO_E_VERSION, by name. Safe on untrusted files.
+ * A file that another program shortens or changes while it is open gives EBPO_E_IO or EBPO_E_FORMAT, never wrong data (the pipelines with checksums). */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_open(ebpo_file **out, const char *path, ebpo_error *error);
+/* The same from bytes in memory, which stay the caller's and must outlive the file. `name` is for messages. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_memory(ebpo_file **out, const void *data, uint64_t size, const char *name, ebpo_error *error);
+/* The same from any source; it is closed with the file (also when opening fails). */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_source(ebpo_file **out, const ebpo_source *source, const char *name, ebpo_error *error);
+/* NULL is fine. Models, contexts and streams made from the file are freed before. */
+EBPO_API void ebpo_close(ebpo_file *file);
+
+/* Bytes asked of the source so far, and how many times; the head's reading included. */
+EBPO_API void ebpo_file_traffic(const ebpo_file *file, uint64_t *bytes, uint64_t *reads);
 
 /* Lent; valid until the file is closed. */
 EBPO_API const ebpo_info *ebpo_file_info(const ebpo_file *file);

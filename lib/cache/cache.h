@@ -1,0 +1,47 @@
+/* Things in memory under a budget: found by key, loaded when missing, the least recently used go first. Any thread may call. */
+#ifndef EBPO_CACHE_CACHE_H
+#define EBPO_CACHE_CACHE_H
+
+#include <ebpo/base.h>
+
+typedef struct ebpo_cache ebpo_cache;
+
+/* Where items come from. Called without locks held, by any thread, never twice at a time for one key. */
+typedef struct ebpo_cache_source {
+    void *user;
+    /* Bytes that loading `key` will take at most, the item itself included; room for that is made first. *keep: what the item takes once loaded, at most. */
+    ebpo_status (*estimate)(void *user, uint64_t key, uint64_t *peak, uint64_t *keep, ebpo_error *error);
+    ebpo_status (*load)(void *user, uint64_t key, void **item, uint64_t *bytes, ebpo_error *error);
+    void (*release)(void *user, void *item);
+} ebpo_cache_source;
+
+typedef struct ebpo_cache_stats {
+    uint64_t hits, loads, prefetched, evicted;
+    uint64_t bytes, peak_bytes;   /* items, and what loads under way may take */
+    double load_seconds;          /* that callers of get waited */
+} ebpo_cache_stats;
+
+/* `budget` in bytes, 0: no limit. `name` ("subtree") is for messages. */
+EBPO_MUST_USE ebpo_status ebpo_cache_make(ebpo_cache **out, const ebpo_cache_source *source, const char *name, uint64_t budget, ebpo_error *error);
+/* Stops the background thread, releases all items; none may be pinned. NULL is fine. */
+void ebpo_cache_free(ebpo_cache *cache);
+
+/* Finds or loads an item and pins it: it stays until unpinned as often as it was got. Waits while another thread loads the same key, or while a background load holds
+ * the room. EBPO_E_LIMIT when the budget has no room even with everything unpinned gone; it says how much would do. *hit may be NULL. */
+EBPO_MUST_USE ebpo_status ebpo_cache_get(ebpo_cache *cache, uint64_t key, void **item, bool *hit, ebpo_error *error);
+void ebpo_cache_unpin(ebpo_cache *cache, uint64_t key);
+
+/* Pins an item if it is there; false, without waiting, when it is not. */
+bool ebpo_cache_try(ebpo_cache *cache, uint64_t key, void **item);
+
+/* Asks a background thread (started by the first call) to load these, in this order; what was asked before and is not done yet is forgotten. Loading in the background
+ * evicts only what is unpinned and not among the keys asked for; its failures are silent (the key will be loaded when it is needed). At most EBPO_CACHE_AHEAD keys. */
+enum { EBPO_CACHE_AHEAD = 64 };
+void ebpo_cache_prefetch(ebpo_cache *cache, const uint64_t *keys, unsigned count);
+
+/* Drops everything that is not pinned. */
+void ebpo_cache_clear(ebpo_cache *cache);
+
+void ebpo_cache_get_stats(ebpo_cache *cache, ebpo_cache_stats *out);
+
+#endif
