@@ -145,9 +145,9 @@ static void builder_free(ebpo_builder *b)
     free(b->normal);
     ebpo_bounds_free(&b->bounds);
     free(b->number);
-    ebpo_subtree_free(&b->top);
+    ebpo_branch_free(&b->top);
     for (uint64_t i = 0; i < b->sub_count; i++)
-        ebpo_subtree_free(&b->sub[i]);
+        ebpo_branch_free(&b->sub[i]);
     free(b->sub);
     free(b->top_envelope);
 }

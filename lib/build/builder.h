@@ -39,7 +39,7 @@ typedef struct ebpo_out {
 } ebpo_out;
 
 /* A subtree: its nodes, depth first. nodes[0] is its root. */
-typedef struct ebpo_subtree {
+typedef struct ebpo_branch {
     ebpo_cell cell;
     uint32_t *list;          /* faces that touch the cell; freed once partitioned */
     uint64_t list_count;
@@ -56,7 +56,7 @@ typedef struct ebpo_subtree {
     int32_t root_delta[8];
     ebpo_out *out;           /* [EBPO_LEVELS_MAX] what envelopes makes */
     ebpo_polytope *above;    /* the parent's envelope cut to this cell */
-} ebpo_subtree;
+} ebpo_branch;
 
 /* Bounds of runs of vertices, 16 to a block, 16 blocks to a block above, and so on. */
 enum { EBPO_BOUNDS_FAN = 16, EBPO_BOUNDS_LEVELS = 8 };
@@ -82,8 +82,8 @@ typedef struct ebpo_builder {
     uint32_t *normal;         /* normal part of a plane code, or EBPO_NO_NORMAL */
     ebpo_bounds bounds;
     uint32_t *number;         /* final number of each face */
-    ebpo_subtree top;         /* gray nodes above the subtrees; its leaves name subtrees in `detail` */
-    ebpo_subtree *sub;
+    ebpo_branch top;         /* gray nodes above the subtrees; its leaves name subtrees in `detail` */
+    ebpo_branch *sub;
     uint64_t sub_count, sub_capacity;
     _Atomic uint64_t leaf_count, entry_count; /* in all subtrees so far */
     struct ebpo_top_envelope *top_envelope; /* of the top's gray nodes, by detail */
@@ -101,9 +101,9 @@ void ebpo_bounds_free(ebpo_bounds *bounds);
 
 /* partition.c */
 ebpo_status ebpo_build_partition(ebpo_builder *b, ebpo_error *error);
-void ebpo_subtree_free(ebpo_subtree *s);
+void ebpo_branch_free(ebpo_branch *s);
 /* Frees what only partition and envelopes need; `out` and the root's facts stay. */
-void ebpo_subtree_release(ebpo_subtree *s);
+void ebpo_subtree_release(ebpo_branch *s);
 
 /* number.c */
 ebpo_status ebpo_build_number(ebpo_builder *b, ebpo_error *error);
@@ -118,10 +118,10 @@ bool ebpo_child_offsets(const int32_t *child_delta[8], int32_t offset[8]);
 /* A gray node's own corner differences from its children's. */
 bool ebpo_gather_delta(const int32_t *child_delta[8], int32_t delta[8]);
 /* The corner differences of the eight children; those of empty ones are zero. */
-void ebpo_child_deltas(const ebpo_builder *b, const ebpo_subtree *s, uint32_t child, const int32_t *child_delta[8]);
+void ebpo_child_deltas(const ebpo_builder *b, const ebpo_branch *s, uint32_t child, const int32_t *child_delta[8]);
 
 /* candidates.c */
-int ebpo_build_candidates(const ebpo_builder *b, const ebpo_subtree *s, const ebpo_build_detail *detail, int most,
+int ebpo_build_candidates(const ebpo_builder *b, const ebpo_branch *s, const ebpo_build_detail *detail, int most,
                           ebpo_candidate *out);
 
 /* envelopes.c */
@@ -129,7 +129,7 @@ typedef struct ebpo_envelope_scratch ebpo_envelope_scratch;
 ebpo_status ebpo_scratch_make(ebpo_envelope_scratch **out, ebpo_error *error);
 void ebpo_scratch_free(ebpo_envelope_scratch *scratch);
 /* The own planes of a gray node; `envelope` is its parent's cut to its cell, then its own. Returns their number, -1: out of memory. */
-int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, const ebpo_subtree *s,
+int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, const ebpo_branch *s,
                      const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope,
                      uint32_t codes[EBPO_PLANES_MAX]);
 unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32_t delta[8]);

@@ -25,7 +25,7 @@ static void sample_entries(const ebpo_builder *b, const uint32_t *entries, uint6
     *skip = i - end;
 }
 
-static int take_sample(const ebpo_builder *b, const ebpo_subtree *s, const ebpo_build_detail *d, uint32_t *sample)
+static int take_sample(const ebpo_builder *b, const ebpo_branch *s, const ebpo_build_detail *d, uint32_t *sample)
 {
     int count = 0;
     uint64_t skip = 0, total = 0;
@@ -65,7 +65,7 @@ static bool fill_bins(bin *table, int *used, int *slots, const uint32_t *sample,
     return true;
 }
 
-int ebpo_build_candidates(const ebpo_builder *b, const ebpo_subtree *s, const ebpo_build_detail *detail, int most,
+int ebpo_build_candidates(const ebpo_builder *b, const ebpo_branch *s, const ebpo_build_detail *detail, int most,
                           ebpo_candidate *out)
 {
     uint32_t sample[SAMPLE_MOST];

@@ -9,7 +9,7 @@
 
 typedef struct emitter {
     const ebpo_builder *b;
-    ebpo_subtree *s;
+    ebpo_branch *s;
     ebpo_envelope_scratch *scratch;
     ebpo_triangle *faces; /* of one leaf */
     uint64_t *list;       /* final number << 32 | face, of one leaf */
@@ -172,7 +172,7 @@ static bool emit_empty(emitter *e, ebpo_cell cell, int32_t winding)
 
 static bool emit(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope);
 
-static unsigned filled_children(const ebpo_subtree *s, uint32_t child)
+static unsigned filled_children(const ebpo_branch *s, uint32_t child)
 {
     unsigned mask = 0;
     for (uint32_t o = 0; o < 8; o++)
@@ -244,7 +244,7 @@ static ebpo_status emit_subtrees(void *context, uint64_t begin, uint64_t end, un
     emitter e = { .b = b };
     ebpo_status status = ebpo_scratch_make(&e.scratch, error);
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
-        ebpo_subtree *s = e.s = &b->sub[i];
+        ebpo_branch *s = e.s = &b->sub[i];
         s->out = ebpo_alloc_zero(EBPO_LEVELS_MAX, sizeof *s->out);
         if (!s->out || !emit(&e, 0, s->cell, s->winding, s->above))
             status = ebpo_fail(error, EBPO_E_MEMORY, "out of memory while computing envelopes");

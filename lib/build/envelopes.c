@@ -84,7 +84,7 @@ static bool add_vertices(const ebpo_builder *b, ebpo_envelope_scratch *scratch, 
     return true;
 }
 
-static bool add_crossings(const ebpo_builder *b, ebpo_envelope_scratch *scratch, const ebpo_subtree *s,
+static bool add_crossings(const ebpo_builder *b, ebpo_envelope_scratch *scratch, const ebpo_branch *s,
                           const ebpo_build_detail *d, ebpo_cell cell)
 {
     for (uint64_t i = d->cross_begin; i < d->cross_end; i++) {
@@ -172,7 +172,7 @@ static double top_share(const ebpo_polytope *envelope)
     return 0.1 * sqrt(fmax(0, ebpo_polytope_volume(envelope)));
 }
 
-int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, const ebpo_subtree *s,
+int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, const ebpo_branch *s,
                      const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope,
                      uint32_t codes[EBPO_PLANES_MAX])
 {

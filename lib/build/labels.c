@@ -42,7 +42,7 @@ bool ebpo_gather_delta(const int32_t *child_delta[8], int32_t delta[8])
     return agree;
 }
 
-void ebpo_child_deltas(const ebpo_builder *b, const ebpo_subtree *s, uint32_t child, const int32_t *child_delta[8])
+void ebpo_child_deltas(const ebpo_builder *b, const ebpo_branch *s, uint32_t child, const int32_t *child_delta[8])
 {
     static const int32_t none[8];
     for (uint32_t o = 0; o < 8; o++) {
@@ -58,7 +58,7 @@ void ebpo_child_deltas(const ebpo_builder *b, const ebpo_subtree *s, uint32_t ch
 
 static bool top_deltas(ebpo_builder *b, uint32_t index)
 {
-    ebpo_subtree *s = &b->top;
+    ebpo_branch *s = &b->top;
     ebpo_build_node *node = &s->nodes[index];
     if (node->type != EBPO_GRAY)
         return true;

@@ -6,7 +6,7 @@
 #include "base/error.h"
 #include "build/builder.h"
 
-static void number_leaf(ebpo_builder *b, ebpo_subtree *s, ebpo_build_detail *d, uint32_t *next)
+static void number_leaf(ebpo_builder *b, ebpo_branch *s, ebpo_build_detail *d, uint32_t *next)
 {
     d->first = *next;
     for (uint64_t i = d->entry_begin; i < d->entry_end; i++) {
@@ -17,7 +17,7 @@ static void number_leaf(ebpo_builder *b, ebpo_subtree *s, ebpo_build_detail *d, 
     d->new_count = *next - d->first;
 }
 
-static void number_subtree(ebpo_builder *b, ebpo_subtree *s, uint32_t index, uint32_t *next)
+static void number_subtree(ebpo_builder *b, ebpo_branch *s, uint32_t index, uint32_t *next)
 {
     const ebpo_build_node *node = &s->nodes[index];
     if (node->type == EBPO_LEAF)

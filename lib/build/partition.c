@@ -26,7 +26,7 @@ typedef struct face_set {
 
 typedef struct grower {
     ebpo_builder *b;
-    ebpo_subtree *s;
+    ebpo_branch *s;
     uint32_t *stack;  /* lists of the nodes on the way down, one behind the other */
     uint64_t stack_used, stack_capacity;
     uint8_t *mask;
@@ -37,7 +37,7 @@ typedef struct grower {
     ebpo_error *error;
 } grower;
 
-void ebpo_subtree_release(ebpo_subtree *s)
+void ebpo_subtree_release(ebpo_branch *s)
 {
     free(s->list);
     free(s->nodes);
@@ -52,7 +52,7 @@ void ebpo_subtree_release(ebpo_subtree *s)
     s->above = NULL;
 }
 
-void ebpo_subtree_free(ebpo_subtree *s)
+void ebpo_branch_free(ebpo_branch *s)
 {
     ebpo_subtree_release(s);
     ebpo_out_free(s->out);
@@ -69,7 +69,7 @@ static ebpo_status no_memory(ebpo_error *error)
     return ebpo_fail(error, EBPO_E_MEMORY, "out of memory while assigning faces to cells");
 }
 
-static bool new_detail(ebpo_subtree *s, uint32_t *index)
+static bool new_detail(ebpo_branch *s, uint32_t *index)
 {
     if (!ebpo_grow(&s->details, &s->detail_capacity, s->detail_count + 1, sizeof *s->details))
         return false;
@@ -78,7 +78,7 @@ static bool new_detail(ebpo_subtree *s, uint32_t *index)
     return true;
 }
 
-static bool new_children(ebpo_subtree *s, uint32_t *first)
+static bool new_children(ebpo_branch *s, uint32_t *first)
 {
     if (!ebpo_grow(&s->nodes, &s->node_capacity, s->node_count + 8, sizeof *s->nodes))
         return false;
@@ -89,7 +89,7 @@ static bool new_children(ebpo_subtree *s, uint32_t *first)
 }
 
 /* Faces with a vertex outside the cell's run of vertices reach over its walls (or touch an upper one). */
-static ebpo_status list_crossing(const ebpo_builder *b, ebpo_subtree *s, ebpo_cell cell, const uint32_t *list, uint64_t count,
+static ebpo_status list_crossing(const ebpo_builder *b, ebpo_branch *s, ebpo_cell cell, const uint32_t *list, uint64_t count,
                                  ebpo_build_detail *detail, ebpo_error *error)
 {
     uint64_t begin, end;
@@ -110,7 +110,7 @@ static ebpo_status list_crossing(const ebpo_builder *b, ebpo_subtree *s, ebpo_ce
 static ebpo_status grow_leaf(grower *g, ebpo_build_node *node, ebpo_cell cell, uint64_t at, uint64_t count)
 {
     ebpo_builder *b = g->b;
-    ebpo_subtree *s = g->s;
+    ebpo_branch *s = g->s;
     node->type = EBPO_LEAF;
     if (!new_detail(s, &node->detail) || !ebpo_grow(&s->entries, &s->entry_capacity, s->entry_count + count, sizeof *s->entries))
         return no_memory(g->error);
@@ -197,7 +197,7 @@ static bool set_start(face_set *set, uint64_t most)
  * below a gray node list no more faces than one leaf may, the node is a leaf of just those; when they list none, it is empty. */
 static ebpo_status collapse_if_few(grower *g, uint32_t index, ebpo_cell cell, uint64_t at, uint64_t count)
 {
-    ebpo_subtree *s = g->s;
+    ebpo_branch *s = g->s;
     ebpo_build_node gray = s->nodes[index];
     ebpo_build_detail d = s->details[gray.detail];
     uint64_t most = g->b->options->leaf_faces < g->b->face_count ? g->b->options->leaf_faces : g->b->face_count;
@@ -229,7 +229,7 @@ static ebpo_status collapse_if_few(grower *g, uint32_t index, ebpo_cell cell, ui
 /* The node's list is stack[at] to stack[at + count - 1]; the stack is free from `top` on. */
 static ebpo_status grow(grower *g, uint32_t index, ebpo_cell cell, uint64_t at, uint64_t count, uint64_t top)
 {
-    ebpo_subtree *s = g->s;
+    ebpo_branch *s = g->s;
     if (count == 0)
         return EBPO_OK; /* stays white until the labels are known */
     if (is_leaf(g->b, cell.level, count)) {
@@ -272,7 +272,7 @@ static ebpo_status grow_subtrees(void *context, uint64_t begin, uint64_t end, un
     (void)worker;
     ebpo_status status = EBPO_OK;
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
-        ebpo_subtree *s = &b->sub[i];
+        ebpo_branch *s = &b->sub[i];
         grower g = { .b = b, .s = s, .error = error, .stack = s->list, .stack_capacity = s->list_count };
         s->list = NULL;
         if (!ebpo_grow(&s->nodes, &s->node_capacity, 1, sizeof *s->nodes))
@@ -349,7 +349,7 @@ static ebpo_status add_subtree(ebpo_builder *b, ebpo_build_node *node, ebpo_cell
     }
     node->type = EBPO_LEAF;
     node->detail = (uint32_t)b->sub_count;
-    b->sub[b->sub_count++] = (ebpo_subtree){ .cell = cell, .list = list, .list_count = count };
+    b->sub[b->sub_count++] = (ebpo_branch){ .cell = cell, .list = list, .list_count = count };
     return EBPO_OK;
 }
 
@@ -357,7 +357,7 @@ static ebpo_status add_subtree(ebpo_builder *b, ebpo_build_node *node, ebpo_cell
 static ebpo_status grow_top(ebpo_builder *b, uint32_t index, ebpo_cell cell, uint32_t *list, uint64_t count, uint64_t piece,
                             ebpo_error *error)
 {
-    ebpo_subtree *s = &b->top;
+    ebpo_branch *s = &b->top;
     if (count <= piece || is_leaf(b, cell.level, count)) {
         ebpo_build_node node = { 0 };
         ebpo_status status = add_subtree(b, &node, cell, list, count, error);

@@ -6,17 +6,19 @@
 
 typedef struct ebpo_cache ebpo_cache;
 
-/* Where items come from. Called without locks held, by any thread, never twice at a time for one key. */
+/* Where items come from. Called without locks held, by any thread; estimate and load never twice at a time for one key. They may use other caches, not this one. */
 typedef struct ebpo_cache_source {
     void *user;
     /* Bytes that loading `key` will take at most, the item itself included; room for that is made first. *keep: what the item takes once loaded, at most. */
     ebpo_status (*estimate)(void *user, uint64_t key, uint64_t *peak, uint64_t *keep, ebpo_error *error);
+    /* *bytes: at most the peak that was said, or the get fails with EBPO_E_LIMIT. */
     ebpo_status (*load)(void *user, uint64_t key, void **item, uint64_t *bytes, ebpo_error *error);
     void (*release)(void *user, void *item);
 } ebpo_cache_source;
 
 typedef struct ebpo_cache_stats {
-    uint64_t hits, loads, prefetched, evicted;
+    uint64_t hits;                       /* finds that needed no waiting */
+    uint64_t loads, prefetched, evicted; /* by get, in the background, to make room */
     uint64_t bytes, peak_bytes;   /* items, and what loads under way may take */
     double load_seconds;          /* that callers of get waited */
 } ebpo_cache_stats;
@@ -35,7 +37,8 @@ void ebpo_cache_unpin(ebpo_cache *cache, uint64_t key);
 bool ebpo_cache_try(ebpo_cache *cache, uint64_t key, void **item);
 
 /* Asks a background thread (started by the first call) to load these, in this order; what was asked before and is not done yet is forgotten. Loading in the background
- * evicts only what is unpinned and not among the keys asked for; its failures are silent (the key will be loaded when it is needed). At most EBPO_CACHE_AHEAD keys. */
+ * evicts only what is unpinned and not among the keys asked for; its failures are silent (the key will be loaded when it is needed). At most EBPO_CACHE_AHEAD keys; what is
+ * beyond is ignored. Those that are there already count as just used. */
 enum { EBPO_CACHE_AHEAD = 64 };
 void ebpo_cache_prefetch(ebpo_cache *cache, const uint64_t *keys, unsigned count);
 

@@ -59,7 +59,7 @@ static ebpo_status check_planes(const ebpo_check *check, int level, const char *
     return EBPO_OK;
 }
 
-static bool is_inside(ebpo_rule rule, int32_t winding)
+bool ebpo_check_inside(ebpo_rule rule, int32_t winding)
 {
     return rule == EBPO_RULE_NONZERO ? winding != 0 : rule == EBPO_RULE_EVENODD ? winding % 2 != 0 : winding > 0;
 }
@@ -75,11 +75,11 @@ static ebpo_status check_windings(const ebpo_check *check, const ebpo_info *info
         return ebpo_check_fail(check, level, "leaf_winding", "the array is missing", error);
     if (arrays->black_winding)
         for (uint64_t i = 0; i < arrays->black_count; i++)
-            if (!is_inside(info->rule, arrays->black_winding[i]))
+            if (!ebpo_check_inside(info->rule, arrays->black_winding[i]))
                 return ebpo_check_fail(check, level, "black_winding", "a black node lies outside by the winding rule", error);
     if (arrays->white_winding)
         for (uint64_t i = 0; i < arrays->white_count; i++)
-            if (is_inside(info->rule, arrays->white_winding[i]))
+            if (ebpo_check_inside(info->rule, arrays->white_winding[i]))
                 return ebpo_check_fail(check, level, "white_winding", "a white node lies inside by the winding rule", error);
     return EBPO_OK;
 }

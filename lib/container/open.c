@@ -8,16 +8,16 @@
 #include "container/facts.h"
 #include "container/reader.h"
 
-static ebpo_status open_array(ebpo_file *file, ebpo_array_id id, int level, uint64_t *address, ebpo_error *error)
+static ebpo_status open_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_id id, int level, ebpo_error *error)
 {
     const ebpo_array_spec *spec = &ebpo_schema[id];
     ebpo_array_in *a = id < EBPO_LEVEL_ARRAYS ? &file->level_array[level][id] : &file->root_array[id];
     uint64_t rows = ebpo_schema_rows(&file->info, id, level);
-    *a = (ebpo_array_in){ .id = id, .level = level, .handle = -1 };
+    *a = (ebpo_array_in){ .id = id, .level = level };
     ebpo_schema_path(id, level, a->path);
-    if (rows == 0 || (spec->if_needed && ebpo_h5_look(&file->in, a->path) == EBPO_H5_ABSENT))
+    if (rows == 0 || (spec->if_needed && ebpo_h5_look(h5, a->path) == EBPO_H5_ABSENT))
         return EBPO_OK;
-    ebpo_status status = ebpo_h5_open_array(&file->in, a->path, &a->shape, &a->stored_bytes, address, &a->handle, error);
+    ebpo_status status = ebpo_h5_read_array(h5, a->path, &a->shape, &a->chunks, &a->stored_bytes, error);
     if (status != EBPO_OK)
         return status;
     ebpo_check check = ebpo_reader_check(file);
@@ -32,47 +32,48 @@ static ebpo_status open_array(ebpo_file *file, ebpo_array_id id, int level, uint
     return EBPO_OK;
 }
 
-static ebpo_status open_levels(ebpo_file *file, ebpo_error *error)
+static ebpo_status open_levels(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
 {
     ebpo_h5_id id;
     char path[EBPO_PATH_BYTES];
-    ebpo_status status = ebpo_h5_open_group(&file->in, "/levels", &id, error);
+    ebpo_status status = ebpo_h5_open_group(h5, "/levels", &id, error);
     ebpo_h5_close_id(id);
     for (int level = 0; level < file->info.level_count && status == EBPO_OK; level++) {
         snprintf(path, sizeof path, "/levels/%02d", level);
-        status = ebpo_h5_open_group(&file->in, path, &id, error);
+        status = ebpo_h5_open_group(h5, path, &id, error);
         if (status == EBPO_OK)
-            status = ebpo_facts_get_level(&file->in, id, path, &file->info.level[level], error);
+            status = ebpo_facts_get_level(h5, id, path, &file->info.level[level], error);
         ebpo_h5_close_id(id);
     }
     return status;
 }
 
-static ebpo_status open_group(ebpo_file *file, const char *path, bool wanted, ebpo_error *error)
+static ebpo_status open_group(ebpo_h5_in *h5, const char *path, bool wanted, ebpo_error *error)
 {
     ebpo_h5_id id = -1;
-    ebpo_status status = wanted ? ebpo_h5_open_group(&file->in, path, &id, error) : EBPO_OK;
+    ebpo_status status = wanted ? ebpo_h5_open_group(h5, path, &id, error) : EBPO_OK;
     ebpo_h5_close_id(id);
     return status;
 }
 
-static ebpo_status open_arrays(ebpo_file *file, ebpo_error *error)
+static ebpo_status open_arrays(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
 {
     ebpo_info *info = &file->info;
-    uint64_t address = 0, stored = 0;
-    ebpo_status status = open_group(file, "/mesh", info->parts & EBPO_PART_MESH, error);
+    uint64_t stored = 0;
+    ebpo_status status = open_group(h5, "/mesh", info->parts & EBPO_PART_MESH, error);
     if (status == EBPO_OK)
-        status = open_group(file, "/maps", info->parts & EBPO_PART_MAPS, error);
+        status = open_group(h5, "/maps", info->parts & EBPO_PART_MAPS, error);
     for (int level = 0; level < info->level_count; level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS && status == EBPO_OK; id++) {
-            status = open_array(file, (ebpo_array_id)id, level, &address, error);
-            info->level[level].stored_bytes += file->level_array[level][id].stored_bytes;
-            if (level == 0 && id == EBPO_A_TYPES)
-                info->head_bytes = address; /* the first array in the file */
+            const ebpo_array_in *a = &file->level_array[level][id];
+            status = open_array(file, h5, (ebpo_array_id)id, level, error);
+            info->level[level].stored_bytes += a->stored_bytes;
+            if (level == 0 && id == EBPO_A_TYPES && a->chunks)
+                info->head_bytes = a->chunks[0].address; /* the first array in the file */
         }
     for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS && status == EBPO_OK; id++)
-        status = open_array(file, (ebpo_array_id)id, 0, &address, error);
-    info->file_bytes = file->in.file_bytes;
+        status = open_array(file, h5, (ebpo_array_id)id, 0, error);
+    info->file_bytes = file->in.source.size;
     info->mesh_vertex_bytes = file->root_array[EBPO_A_VERTICES].stored_bytes;
     info->mesh_face_bytes = file->root_array[EBPO_A_FACES].stored_bytes + file->root_array[EBPO_A_FACES_INDEX].stored_bytes;
     info->map_bytes = file->root_array[EBPO_A_VERTEX_SOURCE].stored_bytes + file->root_array[EBPO_A_FACE_SOURCE].stored_bytes;
@@ -87,38 +88,70 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_error *error)
     return status;
 }
 
-ebpo_status ebpo_open(ebpo_file **out, const char *path, ebpo_error *error)
+static ebpo_status read_head(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
 {
-    *out = NULL;
-    ebpo_file *file = ebpo_alloc_zero(1, sizeof *file);
-    if (!file)
-        return ebpo_fail_memory(error, sizeof *file);
-    file->in = (ebpo_h5_in)EBPO_H5_IN_INIT;
-    for (int i = 0; i < EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS; i++)
-        file->level_array[i / EBPO_LEVEL_ARRAYS][i % EBPO_LEVEL_ARRAYS].handle = -1;
-    for (int i = 0; i < EBPO_ARRAYS; i++)
-        file->root_array[i].handle = -1;
     ebpo_h5_id root = -1;
-    ebpo_status status = ebpo_h5_open(&file->in, path, error);
+    ebpo_status status = ebpo_h5_open_group(h5, "/", &root, error);
     if (status == EBPO_OK)
-        status = ebpo_h5_open_group(&file->in, "/", &root, error);
-    if (status == EBPO_OK)
-        status = ebpo_facts_get(&file->in, root, &file->info, error);
+        status = ebpo_facts_get(h5, root, &file->info, error);
     ebpo_h5_close_id(root);
     if (status == EBPO_OK && (file->info.level_count < 1 || file->info.level_count > EBPO_LEVELS_MAX))
-        status = ebpo_fail(error, EBPO_E_FORMAT, "%s: /: level_count is not 1 to %d; get a fresh copy of the file", path, EBPO_LEVELS_MAX);
+        status = ebpo_fail(error, EBPO_E_FORMAT, "%s: /: level_count is not 1 to %d; get a fresh copy of the file", file->in.shown, EBPO_LEVELS_MAX);
     if (status == EBPO_OK)
-        status = open_levels(file, error);
+        status = open_levels(file, h5, error);
     if (status == EBPO_OK)
         status = ebpo_facts_check(&file->info, file->in.shown, EBPO_E_FORMAT, error);
-    if (status == EBPO_OK)
-        status = open_arrays(file, error);
-    if (status == EBPO_OK) {
-        *out = file;
-    } else {
-        ebpo_close(file);
+    return status == EBPO_OK ? open_arrays(file, h5, error) : status;
+}
+
+/* Takes the source over, whatever happens. */
+static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const char *name, ebpo_error *error)
+{
+    ebpo_file *file = ebpo_alloc_zero(1, sizeof *file);
+    if (!file) {
+        if (source->close)
+            source->close(source->user);
+        return ebpo_fail_memory(error, sizeof *file);
     }
+    ebpo_h5_in h5 = EBPO_H5_IN_INIT;
+    ebpo_status status = ebpo_input_open(&file->in, source, name, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_open(&h5, &file->in, error);
+    if (status == EBPO_OK)
+        status = read_head(file, &h5, error);
+    status = ebpo_h5_close(&h5, status, error);
+    if (status == EBPO_OK)
+        *out = file;
+    else
+        ebpo_close(file);
     return status;
+}
+
+ebpo_status ebpo_open(ebpo_file **out, const char *path, ebpo_error *error)
+{
+    ebpo_source source;
+    *out = NULL;
+    ebpo_status status = ebpo_source_of_path(&source, path, error);
+    return status == EBPO_OK ? open_source(out, &source, path, error) : status;
+}
+
+ebpo_status ebpo_open_memory(ebpo_file **out, const void *data, uint64_t size, const char *name, ebpo_error *error)
+{
+    *out = NULL;
+    if (!data && size)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: no bytes; give the file's bytes with their count", name ? name : "memory");
+    ebpo_source source = ebpo_source_of_memory(data, size);
+    return open_source(out, &source, name ? name : "memory", error);
+}
+
+ebpo_status ebpo_open_source(ebpo_file **out, const ebpo_source *source, const char *name, ebpo_error *error)
+{
+    *out = NULL;
+    if (source->read)
+        return open_source(out, source, name ? name : "source", error);
+    if (source->close)
+        source->close(source->user);
+    return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: a source without a read function; set one", name ? name : "source");
 }
 
 void ebpo_close(ebpo_file *file)
@@ -126,11 +159,17 @@ void ebpo_close(ebpo_file *file)
     if (!file)
         return;
     for (int i = 0; i < EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS; i++)
-        ebpo_h5_close_id(file->level_array[i / EBPO_LEVEL_ARRAYS][i % EBPO_LEVEL_ARRAYS].handle);
+        free(file->level_array[i / EBPO_LEVEL_ARRAYS][i % EBPO_LEVEL_ARRAYS].chunks);
     for (int i = 0; i < EBPO_ARRAYS; i++)
-        ebpo_h5_close_id(file->root_array[i].handle);
-    ebpo_h5_close(&file->in);
+        free(file->root_array[i].chunks);
+    ebpo_input_close(&file->in);
     free(file);
+}
+
+void ebpo_file_traffic(const ebpo_file *file, uint64_t *bytes, uint64_t *reads)
+{
+    *bytes = atomic_load(&file->in.bytes);
+    *reads = atomic_load(&file->in.reads);
 }
 
 const ebpo_info *ebpo_file_info(const ebpo_file *file)

@@ -49,8 +49,7 @@ typedef struct refs_job {
     const uint64_t *index;
 } refs_job;
 
-/* Gaps, counted down from the leaf's first face, to ascending numbers. */
-static bool decode_leaf_refs(uint32_t *refs, uint64_t count, uint64_t first)
+bool ebpo_refs_decode(uint32_t *refs, uint64_t count, uint64_t first)
 {
     uint64_t above = first;
     for (uint64_t k = 0; k < count; k++) {
@@ -74,7 +73,7 @@ static ebpo_status decode_refs(void *context, uint64_t begin, uint64_t end, unsi
     uint64_t leaf = begin * EBPO_INDEX_ROWS, at = j->index[begin * 3 + 1];
     uint64_t stop = end * EBPO_INDEX_ROWS < j->level->leaf_count ? end * EBPO_INDEX_ROWS : j->level->leaf_count;
     for (; leaf < stop; at += j->level->leaf_ref_count[leaf++])
-        if (!decode_leaf_refs(j->level->leaf_refs + at, j->level->leaf_ref_count[leaf], j->level->leaf_first[leaf])) {
+        if (!ebpo_refs_decode(j->level->leaf_refs + at, j->level->leaf_ref_count[leaf], j->level->leaf_first[leaf])) {
             ebpo_check check = ebpo_reader_check(j->file);
             return ebpo_check_fail(&check, j->number, "leaf_refs", "a reference does not lead to a face before the leaf's own", error);
         }

@@ -9,6 +9,11 @@
 #include "base/parallel.h"
 #include "codec/coding.h"
 
+enum {
+    RUN_BYTES = 1 << 20, /* of one read, at most */
+    RUN_CHUNKS = 64      /* that a thread takes on at a time */
+};
+
 typedef struct scratch {
     ebpo_chunk_reader reader;
     uint8_t raw[EBPO_CHUNK_BYTES_MAX];
@@ -30,23 +35,28 @@ void ebpo_chunk_reader_clear(ebpo_chunk_reader *reader)
     reader->capacity = 0;
 }
 
-ebpo_status ebpo_reader_chunk(ebpo_file *file, const ebpo_array_in *array, uint64_t chunk, ebpo_chunk_reader *reader, uint8_t *raw_out,
-                              ebpo_error *error)
+/* Bytes [address, address + bytes) of the file to reader->stored, with room for at least `room`. */
+static ebpo_status fetch(ebpo_file *file, ebpo_chunk_reader *reader, uint64_t address, size_t bytes, size_t room, ebpo_error *error)
 {
-    const ebpo_h5_shape *shape = &array->shape;
-    size_t stored = 0, raw = shape->chunk_rows * ebpo_h5_row_bytes(shape), bound = ebpo_chunk_bound(raw);
-    if (reader->capacity < bound) {
+    if (room < bytes)
+        room = bytes;
+    if (reader->capacity < room) {
         free(reader->stored);
-        reader->stored = ebpo_alloc(bound, 1);
-        reader->capacity = reader->stored ? bound : 0;
+        reader->stored = ebpo_alloc(room, 1);
+        reader->capacity = reader->stored ? room : 0;
     }
     if (!reader->stored)
-        return ebpo_fail_memory(error, bound);
-    ebpo_status status = ebpo_h5_get_chunk(&file->in, array->path, array->handle, shape, chunk, reader->stored, bound, &stored, error);
-    if (status != EBPO_OK)
-        return status;
+        return ebpo_fail_memory(error, room);
+    return ebpo_input_read(&file->in, address, bytes, reader->stored, error);
+}
+
+static ebpo_status decode(ebpo_file *file, const ebpo_array_in *array, uint64_t chunk, ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *raw_out,
+                          ebpo_error *error)
+{
+    const ebpo_h5_shape *shape = &array->shape;
+    size_t raw = shape->chunk_rows * ebpo_h5_row_bytes(shape);
     const char *why;
-    status = ebpo_chunk_decode(&reader->coder, shape->pipeline, shape->element_size, reader->stored, stored, raw_out, raw, &why);
+    ebpo_status status = ebpo_chunk_decode(coder, shape->pipeline, shape->element_size, stored, array->chunks[chunk].bytes, raw_out, raw, &why);
     if (status == EBPO_E_MEMORY)
         return ebpo_fail_memory(error, raw);
     if (status != EBPO_OK)
@@ -55,14 +65,39 @@ ebpo_status ebpo_reader_chunk(ebpo_file *file, const ebpo_array_in *array, uint6
     return EBPO_OK;
 }
 
-static ebpo_status read_chunk(job *j, scratch *s, uint64_t chunk, ebpo_error *error)
+ebpo_status ebpo_reader_chunk(ebpo_file *file, const ebpo_array_in *array, uint64_t chunk, ebpo_chunk_reader *reader, uint8_t *raw,
+                              ebpo_error *error)
+{
+    const ebpo_h5_chunk *at = &array->chunks[chunk];
+    size_t bound = ebpo_chunk_bound(array->shape.chunk_rows * ebpo_h5_row_bytes(&array->shape));
+    ebpo_status status = fetch(file, reader, at->address, at->bytes, bound, error);
+    return status == EBPO_OK ? decode(file, array, chunk, &reader->coder, reader->stored, raw, error) : status;
+}
+
+/* End of the run of chunks from `begin` on (at most to `end`) that lie one behind the other in the file, up to RUN_BYTES: one read brings them all. */
+static uint64_t find_run(const ebpo_array_in *array, uint64_t begin, uint64_t end, size_t *bytes)
+{
+    const ebpo_h5_chunk *c = array->chunks;
+    uint64_t next = begin + 1;
+    *bytes = c[begin].bytes;
+    while (next < end && c[next].address == c[begin].address + *bytes && *bytes + c[next].bytes <= RUN_BYTES)
+        *bytes += c[next++].bytes;
+    return next;
+}
+
+static ebpo_status read_run(job *j, scratch *s, uint64_t begin, uint64_t end, size_t bytes, ebpo_error *error)
 {
     const ebpo_array_in *a = j->array;
-    ebpo_status status = ebpo_reader_chunk(j->file, a, chunk, &s->reader, s->raw, error);
-    if (status != EBPO_OK)
-        return status;
-    uint64_t row = chunk * a->shape.chunk_rows, left = a->shape.rows - row;
-    return j->take(j->context, a, chunk, row, left < a->shape.chunk_rows ? left : a->shape.chunk_rows, s->raw, error);
+    ebpo_status status = fetch(j->file, &s->reader, a->chunks[begin].address, bytes, 0, error);
+    size_t at = 0;
+    for (uint64_t chunk = begin; chunk < end && status == EBPO_OK; chunk++) {
+        uint64_t row = chunk * a->shape.chunk_rows, left = a->shape.rows - row;
+        status = decode(j->file, a, chunk, &s->reader.coder, s->reader.stored + at, s->raw, error);
+        if (status == EBPO_OK)
+            status = j->take(j->context, a, chunk, row, left < a->shape.chunk_rows ? left : a->shape.chunk_rows, s->raw, error);
+        at += a->chunks[chunk].bytes;
+    }
+    return status;
 }
 
 static ebpo_status read_chunks(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
@@ -73,8 +108,12 @@ static ebpo_status read_chunks(void *context, uint64_t begin, uint64_t end, unsi
     if (!j->scratch[worker])
         return ebpo_fail_memory(error, sizeof(scratch));
     ebpo_status status = EBPO_OK;
-    for (uint64_t chunk = begin; chunk < end && status == EBPO_OK; chunk++)
-        status = read_chunk(j, j->scratch[worker], chunk, error);
+    while (begin < end && status == EBPO_OK) {
+        size_t bytes;
+        uint64_t run = find_run(j->array, begin, end, &bytes);
+        status = read_run(j, j->scratch[worker], begin, run, bytes, error);
+        begin = run;
+    }
     return status;
 }
 
@@ -87,7 +126,10 @@ ebpo_status ebpo_reader_rows(ebpo_file *file, const ebpo_array_in *array, unsign
     j.scratch = ebpo_alloc_zero(threads, sizeof *j.scratch);
     if (!j.scratch)
         return ebpo_fail_memory(error, threads * sizeof *j.scratch);
-    ebpo_status status = ebpo_parallel_for(threads, chunks, 1, read_chunks, &j, NULL, "read", error);
+    uint64_t grain = chunks / (threads * 4) + 1; /* each thread gets a few turns, of runs as long as that allows */
+    if (grain > RUN_CHUNKS)
+        grain = RUN_CHUNKS;
+    ebpo_status status = ebpo_parallel_for(threads, chunks, grain, read_chunks, &j, NULL, "read", error);
     for (unsigned i = 0; i < threads; i++)
         if (j.scratch[i]) {
             ebpo_chunk_reader_clear(&j.scratch[i]->reader);

@@ -7,6 +7,7 @@
 #include "container/check.h"
 #include "container/schema.h"
 #include "h5/h5.h"
+#include "io/source.h"
 
 typedef struct ebpo_array_in {
     bool present;
@@ -15,11 +16,11 @@ typedef struct ebpo_array_in {
     char path[EBPO_PATH_BYTES];
     ebpo_h5_shape shape;
     uint64_t stored_bytes;
-    ebpo_h5_id handle;
+    ebpo_h5_chunk *chunks; /* [ebpo_h5_chunk_count(&shape)] where each is; NULL when the array is absent */
 } ebpo_array_in;
 
 struct ebpo_file {
-    ebpo_h5_in in;
+    ebpo_input in;
     ebpo_info info;
     ebpo_array_in level_array[EBPO_LEVELS_MAX][EBPO_LEVEL_ARRAYS];
     ebpo_array_in root_array[EBPO_ARRAYS]; /* those from EBPO_A_VERTICES on */
@@ -63,5 +64,8 @@ EBPO_MUST_USE ebpo_status ebpo_reader_integers(ebpo_file *file, const ebpo_array
 /* The same into new memory: NULL when the array is absent. */
 EBPO_MUST_USE ebpo_status ebpo_reader_make(ebpo_file *file, ebpo_array_id id, int level, unsigned threads, size_t size, void *values_out,
                                            ebpo_error *error);
+
+/* A leaf's references in place: gaps, counted down from its first new face, to ascending numbers. False when one falls below 0. */
+bool ebpo_refs_decode(uint32_t *refs, uint64_t count, uint64_t first);
 
 #endif

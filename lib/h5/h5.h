@@ -6,6 +6,7 @@
 #include <ebpo/base.h>
 
 #include "codec/chunk.h"
+#include "io/source.h"
 
 typedef int64_t ebpo_h5_id; /* an open object; negative: none */
 
@@ -70,17 +71,20 @@ EBPO_MUST_USE ebpo_status ebpo_h5_head_used(ebpo_h5_out *out, uint64_t first_raw
 EBPO_MUST_USE ebpo_status ebpo_h5_finish(ebpo_h5_out *out, uint64_t *file_bytes, ebpo_error *error);
 void ebpo_h5_discard(ebpo_h5_out *out);
 
-/* --- reading --- */
+/* --- reading: the head and where the chunks are; libhdf5 never sees the chunks themselves --- */
 typedef struct ebpo_h5_in {
-    char *shown;         /* the file's name */
+    const char *shown;   /* the input's name */
     ebpo_h5_id file;
     uint64_t file_bytes;
+    struct ebpo_h5_driver *driver;
 } ebpo_h5_in;
-#define EBPO_H5_IN_INIT { NULL, -1, 0 }
+#define EBPO_H5_IN_INIT { NULL, -1, 0, NULL }
 
-/* Opens for reading, without file locks: read-only folders and network file systems do. EBPO_E_FORMAT when it is no HDF5 file. */
-EBPO_MUST_USE ebpo_status ebpo_h5_open(ebpo_h5_in *in, const char *path, ebpo_error *error);
-void ebpo_h5_close(ebpo_h5_in *in);
+/* Opens for reading, through the input, which stays the caller's and outlives `in`. EBPO_E_FORMAT when it is no HDF5 file. */
+EBPO_MUST_USE ebpo_status ebpo_h5_open(ebpo_h5_in *in, ebpo_input *input, ebpo_error *error);
+/* Closes everything, also what a failing open left. Returns `status`, unless the input failed at any time since opening: then that, with its
+ * message, since libhdf5 reports failed reads as damage or as absence. */
+EBPO_MUST_USE ebpo_status ebpo_h5_close(ebpo_h5_in *in, ebpo_status status, ebpo_error *error);
 
 /* What a path names. Soft and external links are not followed: OTHER. The path's folders have been checked by the caller. */
 typedef enum ebpo_h5_kind { EBPO_H5_ABSENT, EBPO_H5_GROUP, EBPO_H5_ARRAY, EBPO_H5_OTHER } ebpo_h5_kind;
@@ -99,14 +103,17 @@ EBPO_MUST_USE ebpo_status ebpo_h5_get_count(ebpo_h5_in *in, ebpo_h5_id id, const
 EBPO_MUST_USE ebpo_status ebpo_h5_get_real(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const char *name, double *values,
                                            unsigned count, ebpo_error *error);
 
-/* Opens an array and tells its shape, having checked that it is one of ours: little-endian integers, one or two fixed dimensions, one of the
- * pipelines, chunks as ebpo_h5_chunk_rows says. `stored_bytes`: the sum of its chunks'; `address`: of its first chunk. */
-EBPO_MUST_USE ebpo_status ebpo_h5_open_array(ebpo_h5_in *in, const char *path, ebpo_h5_shape *shape, uint64_t *stored_bytes,
-                                             uint64_t *address, ebpo_h5_id *id, ebpo_error *error);
+/* Where a chunk lies in the file, as stored. */
+typedef struct ebpo_h5_chunk {
+    uint64_t address;
+    uint32_t bytes;
+} ebpo_h5_chunk;
 
-/* Copies a stored chunk to `data` of `capacity` bytes; a larger chunk, or none, is EBPO_E_FORMAT. */
-EBPO_MUST_USE ebpo_status ebpo_h5_get_chunk(ebpo_h5_in *in, const char *path, ebpo_h5_id id, const ebpo_h5_shape *shape, uint64_t chunk,
-                                            void *data, size_t capacity, size_t *bytes, ebpo_error *error);
+/* Tells an array's shape and its chunks' places, ebpo_h5_chunk_count(shape) of them, which the caller frees; NULL on failure. Checked: little-endian
+ * integers, one or two fixed dimensions, one of the pipelines, chunks as ebpo_h5_chunk_rows says; every chunk is there, lies within the file,
+ * has passed its filters, and takes at most ebpo_chunk_bound bytes. `stored_bytes`: their sum. */
+EBPO_MUST_USE ebpo_status ebpo_h5_read_array(ebpo_h5_in *in, const char *path, ebpo_h5_shape *shape, ebpo_h5_chunk **chunks,
+                                             uint64_t *stored_bytes, ebpo_error *error);
 
 /* True for UTF-8 without control characters. */
 bool ebpo_h5_text_ok(const char *text);

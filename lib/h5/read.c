@@ -1,70 +1,58 @@
 /* Opening and reading files that nobody vouches for, see h5.h. */
-#include <errno.h>
-#include <fcntl.h>
+#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
+#include "base/alloc.h"
 #include "base/error.h"
+#include "h5/driver.h"
 #include "h5/h5.h"
 #include "h5/scope.h"
 #include "h5/zstd_filter.h"
 
-static ebpo_status look_at_file(const char *path, ebpo_error *error)
-{
-    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-    if (fd < 0)
-        return ebpo_fail_errno(error, path, "cannot be opened");
-    struct stat facts;
-    ebpo_status status = EBPO_OK;
-    if (fstat(fd, &facts) < 0)
-        status = ebpo_fail_errno(error, path, "cannot be examined");
-    else if (!S_ISREG(facts.st_mode))
-        status = ebpo_fail(error, EBPO_E_IO, "%s: not a regular file; give the name of an .ebpo.h5 file", path);
-    close(fd);
-    return status;
-}
-
-static hid_t file_access(void)
+static hid_t file_access(ebpo_h5_driver *driver)
 {
     hid_t fapl = H5Pcreate(H5P_FILE_ACCESS);
     if (fapl >= 0 && (H5Pset_fclose_degree(fapl, H5F_CLOSE_STRONG) < 0 || H5Pset_file_locking(fapl, false, true) < 0 ||
-                      H5Pset_cache(fapl, 0, 1, 0, 1.0) < 0)) {
+                      H5Pset_cache(fapl, 0, 1, 0, 1.0) < 0 || !ebpo_h5_driver_use(driver, fapl))) {
         H5Pclose(fapl);
         return -1;
     }
     return fapl;
 }
 
-ebpo_status ebpo_h5_open(ebpo_h5_in *in, const char *path, ebpo_error *error)
+ebpo_status ebpo_h5_open(ebpo_h5_in *in, ebpo_input *input, ebpo_error *error)
 {
-    ebpo_status status = look_at_file(path, error);
+    *in = (ebpo_h5_in){ .shown = input->shown, .file = -1, .file_bytes = input->source.size };
+    in->driver = ebpo_alloc_zero(1, sizeof *in->driver);
+    if (!in->driver)
+        return ebpo_fail_memory(error, sizeof *in->driver);
+    ebpo_status status = ebpo_h5_driver_open(in->driver, input, error);
     if (status != EBPO_OK)
         return status;
-    in->shown = strdup(path);
-    if (!in->shown)
-        return ebpo_fail_memory(error, strlen(path) + 1);
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
-    hid_t fapl = file_access();
-    hsize_t size = 0;
-    in->file = fapl < 0 ? -1 : H5Fopen(path, H5F_ACC_RDONLY, fapl);
-    if (in->file < 0 || H5Fget_filesize(in->file, &size) < 0)
-        status = ebpo_h5_fail(error, EBPO_E_FORMAT, path, "", "not a whole HDF5 file; was it cut off in copying, or is it something else?");
-    in->file_bytes = size;
+    hid_t fapl = file_access(in->driver);
+    in->file = fapl < 0 ? -1 : H5Fopen(in->shown, H5F_ACC_RDONLY, fapl);
+    if (in->file < 0)
+        status = ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, "", "not a whole HDF5 file; was it cut off in copying, or is it something else?");
     if (fapl >= 0)
         H5Pclose(fapl);
     ebpo_h5_leave(&scope);
     return status;
 }
 
-void ebpo_h5_close(ebpo_h5_in *in)
+ebpo_status ebpo_h5_close(ebpo_h5_in *in, ebpo_status status, ebpo_error *error)
 {
     ebpo_h5_close_id(in->file);
-    free(in->shown);
+    if (in->driver && in->driver->status != EBPO_OK)
+        status = ebpo_fail(error, in->driver->status, "%s", in->driver->error.message);
+    if (in->driver)
+        ebpo_h5_driver_close(in->driver);
+    free(in->driver);
     *in = (ebpo_h5_in)EBPO_H5_IN_INIT;
+    return status;
 }
 
 ebpo_h5_kind ebpo_h5_look(ebpo_h5_in *in, const char *path)
@@ -287,70 +275,78 @@ static const char *find_shape(hid_t dataset, hid_t dcpl, ebpo_h5_shape *shape)
     return NULL;
 }
 
-/* A chunk takes some bytes, so a file cannot hold more of them than its size allows. */
-static const char *find_storage(ebpo_h5_in *in, hid_t dataset, const ebpo_h5_shape *shape, uint64_t *stored, uint64_t *address)
+/* Address and size of one chunk, by reading it while the driver records. What is wrong with it, or NULL. */
+static const char *find_chunk(ebpo_h5_in *in, hid_t dataset, const ebpo_h5_shape *shape, uint64_t number, uint64_t bound, ebpo_h5_chunk *chunk)
 {
-    enum { CHUNK_MIN = 4 };
-    if (ebpo_h5_chunk_count(shape) > in->file_bytes / CHUNK_MIN)
-        return "the array has more chunks than the file can hold";
-    *stored = H5Dget_storage_size(dataset);
-    if (*stored > in->file_bytes || ebpo_h5_chunk_count(shape) > *stored / (shape->rows == 1 ? 1 : CHUNK_MIN))
-        return "the array's chunks do not fit the file";
-    hsize_t at[2] = { 0, 0 }, size;
-    haddr_t where = HADDR_UNDEF;
-    unsigned mask;
-    if (H5Dget_chunk_info_by_coord(dataset, at, &mask, &where, &size) < 0 || where == HADDR_UNDEF)
-        return "the array's first chunk is missing";
-    *address = where;
+    uint8_t unused[1]; /* the driver writes nothing */
+    uint32_t mask = 0;
+    hsize_t at[2] = { number * shape->chunk_rows, 0 };
+    ebpo_h5_driver *d = in->driver;
+    d->recorded = 0;
+    d->recording = true;
+    herr_t result = H5Dread_chunk(dataset, H5P_DEFAULT, at, &mask, unused);
+    d->recording = false;
+    if (result < 0 || d->recorded != 1 || d->bytes == 0)
+        return "the chunk is missing";
+    if (mask != 0)
+        return "the chunk was stored without its filters";
+    if (d->bytes > bound)
+        return "the chunk is larger than it can be";
+    if (d->address > in->file_bytes || d->bytes > in->file_bytes - d->address)
+        return "the chunk lies beyond the end of the file";
+    *chunk = (ebpo_h5_chunk){ d->address, (uint32_t)d->bytes };
     return NULL;
 }
 
-ebpo_status ebpo_h5_open_array(ebpo_h5_in *in, const char *path, ebpo_h5_shape *shape, uint64_t *stored_bytes, uint64_t *address,
-                               ebpo_h5_id *id, ebpo_error *error)
+/* A chunk takes some bytes, so a file cannot hold more of them than its size allows. */
+static ebpo_status find_chunks(ebpo_h5_in *in, hid_t dataset, const char *path, const ebpo_h5_shape *shape, ebpo_h5_chunk **chunks,
+                               uint64_t *stored, ebpo_error *error)
 {
-    *id = -1;
+    enum { CHUNK_MIN = 4 };
+    char place[160];
+    uint64_t count = ebpo_h5_chunk_count(shape), bound = ebpo_chunk_bound(shape->chunk_rows * ebpo_h5_row_bytes(shape));
+    const char *wrong = NULL;
+    if (count > 1 && count > in->file_bytes / CHUNK_MIN)
+        return ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, path, "the array has more chunks than the file can hold");
+    *chunks = ebpo_alloc(count, sizeof **chunks);
+    if (!*chunks)
+        return ebpo_fail_memory(error, count * sizeof **chunks);
+    for (uint64_t i = 0; i < count; i++) {
+        wrong = find_chunk(in, dataset, shape, i, bound, *chunks + i);
+        if (wrong) {
+            snprintf(place, sizeof place, "%s: chunk %" PRIu64, path, i);
+            return ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, place, wrong);
+        }
+        *stored += (*chunks)[i].bytes;
+        if (*stored > in->file_bytes)
+            return ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, path, "the array's chunks do not fit the file");
+    }
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_h5_read_array(ebpo_h5_in *in, const char *path, ebpo_h5_shape *shape, ebpo_h5_chunk **chunks, uint64_t *stored_bytes,
+                               ebpo_error *error)
+{
+    *chunks = NULL;
+    *stored_bytes = 0;
     ebpo_h5_kind kind = ebpo_h5_look(in, path);
     if (kind != EBPO_H5_ARRAY)
         return ebpo_fail(error, EBPO_E_FORMAT, "%s: %s: %s; get a fresh copy of the file", in->shown, path,
                          kind == EBPO_H5_ABSENT ? "the array is missing" : "this is not an array");
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
-    hid_t dcpl = -1;
-    *id = H5Dopen2(in->file, path, H5P_DEFAULT);
-    if (*id >= 0)
-        dcpl = H5Dget_create_plist(*id);
-    const char *wrong = dcpl < 0 ? "the array's description is damaged" : find_shape(*id, dcpl, shape);
-    if (!wrong)
-        wrong = find_storage(in, *id, shape, stored_bytes, address);
-    ebpo_status status = wrong ? ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, path, wrong) : EBPO_OK;
+    hid_t dataset = H5Dopen2(in->file, path, H5P_DEFAULT), dcpl = dataset >= 0 ? H5Dget_create_plist(dataset) : -1;
+    const char *wrong = dcpl < 0 ? "the array's description is damaged" : find_shape(dataset, dcpl, shape);
+    ebpo_status status = wrong ? ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, path, wrong)
+                               : find_chunks(in, dataset, path, shape, chunks, stored_bytes, error);
     if (dcpl >= 0)
         H5Pclose(dcpl);
-    if (wrong && *id >= 0) {
-        H5Dclose(*id);
-        *id = -1;
+    if (dataset >= 0)
+        H5Dclose(dataset);
+    ebpo_h5_leave(&scope);
+    if (status != EBPO_OK) {
+        free(*chunks);
+        *chunks = NULL;
     }
-    ebpo_h5_leave(&scope);
-    return status;
-}
-
-ebpo_status ebpo_h5_get_chunk(ebpo_h5_in *in, const char *path, ebpo_h5_id id, const ebpo_h5_shape *shape, uint64_t chunk, void *data,
-                              size_t capacity, size_t *bytes, ebpo_error *error)
-{
-    ebpo_h5_scope scope;
-    ebpo_h5_enter(&scope);
-    hsize_t at[2] = { chunk * shape->chunk_rows, 0 }, size = 0;
-    uint32_t mask = 0;
-    const char *wrong = NULL;
-    if (H5Dget_chunk_storage_size(id, at, &size) < 0 || size == 0)
-        wrong = "a chunk is missing";
-    else if (size > capacity)
-        wrong = "a chunk is larger than it can be";
-    else if (H5Dread_chunk(id, H5P_DEFAULT, at, &mask, data) < 0)
-        wrong = "a chunk cannot be read";
-    else if (mask != 0)
-        wrong = "a chunk was stored without its filters";
-    *bytes = (size_t)size;
-    ebpo_status status = wrong ? ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, path, wrong) : EBPO_OK;
-    ebpo_h5_leave(&scope);
     return status;
 }

@@ -136,7 +136,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_tree_write(const ebpo_tree *tree, const 
                                                    const ebpo_write_options *options, ebpo_error *error);
 
 /* Where bytes come from. `read` fills `data` with the bytes [offset, offset + size), all of which lie within `size` of the source, or fails;
- * it is called from several threads at once. `close` is called once, when the file is closed or when opening fails. */
+ * it is called from several threads at once. `close` is called once, when the file is closed or when opening fails.
+ * While a file is being opened, `read` is called from inside libhdf5: it must then neither use libhdf5 nor open another file. */
 typedef struct ebpo_source {
     void *user;
     uint64_t size; /* bytes */

@@ -1,0 +1,295 @@
+/* Decoded chunks through a cache. */
+#include <endian.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "codec/coding.h"
+#include "container/slice_parts.h"
+
+/* Readers are kept for the next load: setting up a decoder takes longer than a chunk. They are not part of the budget. */
+enum { IDLE_MAX = 4, CHUNK_BITS = 48 };
+
+struct ebpo_chunk_desk {
+    ebpo_chunk_desk *next;
+    ebpo_chunk_reader reader;
+    uint8_t raw[EBPO_CHUNK_BYTES_MAX];
+};
+
+static ebpo_chunk_desk *take_desk(ebpo_chunks *c)
+{
+    pthread_mutex_lock(&c->lock);
+    ebpo_chunk_desk *desk = c->idle;
+    if (desk) {
+        c->idle = desk->next;
+        c->idle_count--;
+    }
+    pthread_mutex_unlock(&c->lock);
+    return desk ? desk : ebpo_alloc_zero(1, sizeof *desk);
+}
+
+static void free_desk(ebpo_chunk_desk *desk)
+{
+    ebpo_chunk_reader_clear(&desk->reader);
+    free(desk);
+}
+
+static void give_desk(ebpo_chunks *c, ebpo_chunk_desk *desk)
+{
+    pthread_mutex_lock(&c->lock);
+    bool keep = c->idle_count < IDLE_MAX;
+    if (keep) {
+        desk->next = c->idle;
+        c->idle = desk;
+        c->idle_count++;
+    }
+    pthread_mutex_unlock(&c->lock);
+    if (!keep)
+        free_desk(desk);
+}
+
+static uint64_t key_of(const ebpo_array_in *array, uint64_t chunk)
+{
+    uint64_t number = array->id < EBPO_LEVEL_ARRAYS ? (uint64_t)array->level * EBPO_LEVEL_ARRAYS + array->id
+                                                    : (uint64_t)EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + array->id;
+    return number << CHUNK_BITS | chunk;
+}
+
+static const ebpo_array_in *array_of(const ebpo_chunks *c, uint64_t key)
+{
+    uint64_t number = key >> CHUNK_BITS, levels = (uint64_t)EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS;
+    return number < levels ? &c->file->level_array[number / EBPO_LEVEL_ARRAYS][number % EBPO_LEVEL_ARRAYS]
+                           : &c->file->root_array[number - levels];
+}
+
+static uint64_t chunk_of(uint64_t key)
+{
+    return key & ((UINT64_C(1) << CHUNK_BITS) - 1);
+}
+
+/* Without the filling of the last chunk. */
+static uint64_t chunk_rows(const ebpo_array_in *array, uint64_t chunk)
+{
+    uint64_t left = array->shape.rows - chunk * array->shape.chunk_rows;
+    return left < array->shape.chunk_rows ? left : array->shape.chunk_rows;
+}
+
+static ebpo_status estimate(void *user, uint64_t key, uint64_t *peak, uint64_t *keep, ebpo_error *error)
+{
+    const ebpo_array_in *array = array_of(user, key);
+    (void)error;
+    *peak = *keep = chunk_rows(array, chunk_of(key)) * ebpo_h5_row_bytes(&array->shape);
+    return EBPO_OK;
+}
+
+static ebpo_status decode_faces(const ebpo_chunks *c, uint64_t chunk, uint64_t rows, const uint8_t *raw, uint32_t *corners, ebpo_error *error)
+{
+    const ebpo_array_in *array = &c->file->root_array[EBPO_A_FACES];
+    uint64_t vertices = c->file->info.vertex_count, seen = c->seen ? c->seen[chunk] : 0;
+    if (seen > vertices || (chunk == 0 && seen))
+        return ebpo_chunks_fail(c, -1, EBPO_A_FACES_INDEX, "the index names more vertices than there are", error);
+    if (!ebpo_corners_decode(raw, rows, &seen, corners) || seen > vertices)
+        return ebpo_chunks_fail(c, -1, EBPO_A_FACES, "a face names a vertex that does not exist", error);
+    if (chunk + 1 < ebpo_h5_chunk_count(&array->shape) && seen != c->seen[chunk + 1])
+        return ebpo_chunks_fail(c, -1, EBPO_A_FACES_INDEX, "the index contradicts the faces", error);
+    return EBPO_OK;
+}
+
+static ebpo_status decode_vertices(const ebpo_chunks *c, uint64_t rows, const uint8_t *raw, void *xyz, ebpo_error *error)
+{
+    bool finite = true;
+    if (c->file->info.double_coordinates) {
+        const double *numbers = xyz;
+        ebpo_points64_decode(raw, rows, xyz);
+        for (uint64_t i = 0; i < 3 * rows; i++)
+            finite &= isfinite(numbers[i]) != 0;
+    } else {
+        const float *numbers = xyz;
+        ebpo_points32_decode(raw, rows, xyz);
+        for (uint64_t i = 0; i < 3 * rows; i++)
+            finite &= isfinite(numbers[i]) != 0;
+    }
+    return finite ? EBPO_OK : ebpo_chunks_fail(c, -1, EBPO_A_VERTICES, "a coordinate is not a finite number", error);
+}
+
+static ebpo_status decode_map(const ebpo_chunks *c, ebpo_array_id id, uint64_t rows, const uint8_t *raw, uint32_t *numbers, ebpo_error *error)
+{
+    const ebpo_info *info = &c->file->info;
+    uint64_t limit = id == EBPO_A_FACE_SOURCE ? info->source_face_count + info->mend.added_faces : info->source_vertex_count;
+    uint32_t largest = 0;
+    ebpo_numbers_decode(raw, rows, numbers);
+    for (uint64_t i = 0; i < rows; i++)
+        largest = numbers[i] > largest ? numbers[i] : largest;
+    return largest < limit ? EBPO_OK : ebpo_chunks_fail(c, -1, id, "a source number is out of range or used twice", error);
+}
+
+/* Once for each load, so that using a chunk again costs nothing but finding it. */
+static ebpo_status decode(const ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk, const uint8_t *raw, void *item, ebpo_error *error)
+{
+    uint64_t rows = chunk_rows(array, chunk);
+    switch (array->id) {
+    case EBPO_A_VERTICES: return decode_vertices(c, rows, raw, item, error);
+    case EBPO_A_FACES: return decode_faces(c, chunk, rows, raw, item, error);
+    case EBPO_A_VERTEX_SOURCE:
+    case EBPO_A_FACE_SOURCE: return decode_map(c, array->id, rows, raw, item, error);
+    default: memcpy(item, raw, rows * ebpo_h5_row_bytes(&array->shape)); return EBPO_OK;
+    }
+}
+
+static ebpo_status load(void *user, uint64_t key, void **item, uint64_t *bytes, ebpo_error *error)
+{
+    ebpo_chunks *c = user;
+    const ebpo_array_in *array = array_of(c, key);
+    uint64_t rows = chunk_rows(array, chunk_of(key));
+    size_t row_bytes = ebpo_h5_row_bytes(&array->shape);
+    ebpo_chunk_desk *desk = take_desk(c);
+    void *made = desk ? ebpo_alloc(rows, row_bytes) : NULL;
+    ebpo_status status = made ? EBPO_OK : ebpo_fail_memory(error, rows * row_bytes + sizeof *desk);
+    if (status == EBPO_OK)
+        status = ebpo_reader_chunk(c->file, array, chunk_of(key), &desk->reader, desk->raw, error);
+    if (status == EBPO_OK)
+        status = decode(c, array, chunk_of(key), desk->raw, made, error);
+    if (desk)
+        give_desk(c, desk);
+    if (status == EBPO_OK) {
+        *item = made;
+        *bytes = rows * row_bytes;
+    } else {
+        free(made);
+    }
+    return status;
+}
+
+static void release(void *user, void *item)
+{
+    (void)user;
+    free(item);
+}
+
+ebpo_status ebpo_chunks_make(ebpo_chunks **out, ebpo_file *file, uint64_t budget, ebpo_error *error)
+{
+    *out = NULL;
+    ebpo_chunks *c = ebpo_alloc_zero(1, sizeof *c);
+    if (!c)
+        return ebpo_fail_memory(error, sizeof *c);
+    c->file = file;
+    pthread_mutex_init(&c->lock, NULL);
+    ebpo_cache_source source = { c, estimate, load, release };
+    ebpo_status status = ebpo_reader_make(file, EBPO_A_FACES_INDEX, 0, 1, sizeof *c->seen, &c->seen, error);
+    if (status == EBPO_OK)
+        status = ebpo_cache_make(&c->cache, &source, "chunk", budget, error);
+    if (status == EBPO_OK)
+        *out = c;
+    else
+        ebpo_chunks_free(c);
+    return status;
+}
+
+void ebpo_chunks_free(ebpo_chunks *chunks)
+{
+    if (!chunks)
+        return;
+    ebpo_cache_free(chunks->cache);
+    while (chunks->idle) {
+        ebpo_chunk_desk *desk = chunks->idle;
+        chunks->idle = desk->next;
+        free_desk(desk);
+    }
+    free(chunks->seen);
+    pthread_mutex_destroy(&chunks->lock);
+    free(chunks);
+}
+
+void ebpo_chunks_get_stats(ebpo_chunks *chunks, ebpo_cache_stats *out)
+{
+    ebpo_cache_get_stats(chunks->cache, out);
+}
+
+void ebpo_view_release(ebpo_chunks *chunks, ebpo_view *view)
+{
+    if (view->rows)
+        ebpo_cache_unpin(chunks->cache, view->key);
+    *view = (ebpo_view){ .array = view->array };
+}
+
+ebpo_status ebpo_view_load(ebpo_chunks *chunks, ebpo_view *view, uint64_t row, ebpo_error *error)
+{
+    uint64_t chunk = row / view->array->shape.chunk_rows;
+    void *item;
+    ebpo_view_release(chunks, view); /* first: a tight budget may need the room */
+    uint64_t key = key_of(view->array, chunk);
+    ebpo_status status = ebpo_cache_get(chunks->cache, key, &item, NULL, error);
+    if (status != EBPO_OK)
+        return status;
+    view->key = key;
+    view->begin = chunk * view->array->shape.chunk_rows;
+    view->end = view->begin + chunk_rows(view->array, chunk);
+    view->rows = item;
+    return EBPO_OK;
+}
+
+static void widen(const ebpo_h5_shape *shape, const uint8_t *rows, uint64_t numbers, uint8_t *values, size_t size)
+{
+    if (shape->element_size == size && __BYTE_ORDER == __LITTLE_ENDIAN)
+        memcpy(values, rows, numbers * size);
+    else
+        ebpo_integers_decode(rows, shape->element_size, shape->is_signed, numbers, values, size);
+}
+
+static ebpo_status check_rows(const ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row, uint64_t rows, size_t size, ebpo_error *error)
+{
+    const char *shown = chunks->file->in.shown;
+    if (id >= EBPO_LEVEL_ARRAYS || level < 0 || level >= chunks->file->info.level_count)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: level %d has no array number %d of integers", shown, level, (int)id);
+    const ebpo_array_in *array = ebpo_reader_array(chunks->file, id, level);
+    if (!array->present || row > array->shape.rows || rows > array->shape.rows - row || size < array->shape.element_size)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: %s: rows %" PRIu64 " to %" PRIu64 " of %zu bytes are asked for, and the array has %" PRIu64
+                         " of %d", shown, array->path, row, row + rows, size, array->shape.rows, array->shape.element_size);
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_chunks_integers(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row, uint64_t rows, void *values, size_t size,
+                                 ebpo_error *error)
+{
+    ebpo_status status = check_rows(chunks, id, level, row, rows, size, error);
+    if (status != EBPO_OK)
+        return status;
+    const ebpo_array_in *array = ebpo_reader_array(chunks->file, id, level);
+    ebpo_view view = { .array = array };
+    uint64_t cols = array->shape.cols ? array->shape.cols : 1;
+    uint8_t *out = values;
+    while (rows && status == EBPO_OK) {
+        status = ebpo_view_move(chunks, &view, row, error);
+        if (status != EBPO_OK)
+            break;
+        uint64_t here = view.end - row < rows ? view.end - row : rows;
+        widen(&array->shape, view.rows + (row - view.begin) * ebpo_h5_row_bytes(&array->shape), here * cols, out, size);
+        out += here * cols * size;
+        row += here;
+        rows -= here;
+    }
+    ebpo_view_release(chunks, &view);
+    return status;
+}
+
+ebpo_status ebpo_chunks_take(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row, uint64_t rows, size_t size, void *values_out,
+                             ebpo_error *error)
+{
+    void *values = NULL;
+    ebpo_status status = rows ? check_rows(chunks, id, level, row, rows, size, error) : EBPO_OK; /* before room is made */
+    if (status == EBPO_OK && rows) {
+        const ebpo_array_in *array = ebpo_reader_array(chunks->file, id, level);
+        uint64_t cols = array->shape.cols ? array->shape.cols : 1;
+        values = ebpo_alloc(rows, size * cols);
+        status = values ? ebpo_chunks_integers(chunks, id, level, row, rows, values, size, error) : ebpo_fail_memory(error, rows * size * cols);
+    }
+    if (status != EBPO_OK) {
+        free(values);
+        values = NULL;
+    }
+    memcpy(values_out, &values, sizeof values);
+    return status;
+}

@@ -1,0 +1,43 @@
+/* The whole tree as a slice. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/error.h"
+#include "container/reader.h"
+#include "container/slice.h"
+
+/* What a slice does not have. */
+static void drop(ebpo_level *level)
+{
+    free(level->leaf_plane_counts);
+    free(level->leaf_planes);
+    level->leaf_plane_counts = NULL;
+    level->leaf_planes = NULL;
+    level->leaf_plane_count = 0;
+    level->gray_volume = level->leaf_volume = 0;
+}
+
+ebpo_status ebpo_slice_read_all(ebpo_slice *out, ebpo_file *file, unsigned threads, ebpo_error *error)
+{
+    memset(out, 0, sizeof *out);
+    if (!(file->info.parts & EBPO_PART_MESH))
+        return ebpo_fail(error, EBPO_E_ABSENT, "%s: the file was written without its mesh; build it again with it", file->in.shown);
+    ebpo_tree tree;
+    ebpo_status status = ebpo_file_read_tree(file, &tree, threads, error);
+    if (status != EBPO_OK)
+        return status;
+    out->level_count = file->info.level_count;
+    for (int i = 0; i < out->level_count; i++) {
+        drop(&tree.level[i]);
+        out->level[i] = tree.level[i];
+        memset(&tree.level[i], 0, sizeof tree.level[i]);
+    }
+    out->root.type = (ebpo_node_type)out->level[0].types[0];
+    out->face_count = tree.mesh.face_count;
+    out->mesh = tree.mesh;
+    memset(&tree.mesh, 0, sizeof tree.mesh);
+    out->face_source = tree.face_source;
+    tree.face_source = NULL;
+    ebpo_tree_free(&tree);
+    return EBPO_OK;
+}

@@ -1,0 +1,97 @@
+/* What the files of slice.h share: pinned chunks, ranks, and the numbering of what a slice picks out of the file. */
+#ifndef EBPO_CONTAINER_SLICE_PARTS_H
+#define EBPO_CONTAINER_SLICE_PARTS_H
+
+#include <pthread.h>
+
+#include "container/reader.h"
+#include "container/slice.h"
+
+/* --- chunks.c --- */
+
+typedef struct ebpo_chunk_desk ebpo_chunk_desk; /* what one loading thread needs */
+
+struct ebpo_chunks {
+    ebpo_file *file;
+    ebpo_cache *cache;
+    uint64_t *seen; /* [chunks of /mesh/faces] vertices seen before each; NULL: a single chunk, or no mesh */
+    pthread_mutex_t lock; /* of the desks that nobody uses */
+    ebpo_chunk_desk *idle;
+    unsigned idle_count;
+};
+
+/* A place in an array: at most one chunk, pinned while rows in it are wanted. Begin with { .array = ... }, end with ebpo_view_release. One thread. */
+typedef struct ebpo_view {
+    const ebpo_array_in *array;
+    uint64_t key;
+    uint64_t begin, end; /* rows of the pinned chunk */
+    const uint8_t *rows; /* NULL: none is pinned. Integers as in the file; faces as u32 corners, vertices as floats or doubles, maps as u32 */
+} ebpo_view;
+
+EBPO_MUST_USE ebpo_status ebpo_view_load(ebpo_chunks *chunks, ebpo_view *view, uint64_t row, ebpo_error *error);
+void ebpo_view_release(ebpo_chunks *chunks, ebpo_view *view);
+
+/* Pins the chunk that holds `row`, which the array has. Cheap while rows stay in one chunk. */
+EBPO_MUST_USE static inline ebpo_status ebpo_view_move(ebpo_chunks *chunks, ebpo_view *view, uint64_t row, ebpo_error *error)
+{
+    return row >= view->begin && row < view->end ? EBPO_OK : ebpo_view_load(chunks, view, row, error);
+}
+
+/* The same as ebpo_chunks_integers, in new memory; NULL for no rows. */
+EBPO_MUST_USE ebpo_status ebpo_chunks_take(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row, uint64_t rows, size_t size,
+                                           void *values_out, ebpo_error *error);
+
+/* Sum of rows of an unsigned array; EBPO_E_FORMAT when it is beyond 2^62. */
+EBPO_MUST_USE ebpo_status ebpo_chunks_sum(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row, uint64_t rows, uint64_t *sum,
+                                          ebpo_error *error);
+
+static inline ebpo_status ebpo_chunks_fail(const ebpo_chunks *chunks, int level, ebpo_array_id id, const char *what, ebpo_error *error)
+{
+    ebpo_check check = ebpo_reader_check(chunks->file);
+    return ebpo_check_fail(&check, level, ebpo_schema[id].name, what, error);
+}
+
+/* --- ranks.c: from the nearest row of an index, and counting from there --- */
+
+/* Nodes of each type in groups of eight. */
+void ebpo_ranks_count(const void *types, uint64_t groups, uint64_t counts[4]);
+/* The same for groups [group, group + groups) of the file. */
+EBPO_MUST_USE ebpo_status ebpo_ranks_count_file(ebpo_chunks *chunks, int level, uint64_t group, uint64_t groups, uint64_t counts[4],
+                                                ebpo_error *error);
+/* Nodes of each type of a level before a group. */
+EBPO_MUST_USE ebpo_status ebpo_ranks_before(ebpo_chunks *chunks, int level, uint64_t group, uint64_t ranks[4], ebpo_error *error);
+/* [rank, rank + count) lies within the level, for each type. */
+EBPO_MUST_USE ebpo_status ebpo_ranks_check(const ebpo_chunks *chunks, int level, const uint64_t ranks[4], const uint64_t counts[4],
+                                           ebpo_error *error);
+/* Planes of the gray nodes before one. */
+EBPO_MUST_USE ebpo_status ebpo_ranks_planes(ebpo_chunks *chunks, int level, uint64_t gray, uint64_t *planes, ebpo_error *error);
+/* End of the new faces of the leaf before one, and references of the leaves before it. */
+EBPO_MUST_USE ebpo_status ebpo_ranks_leaf(ebpo_chunks *chunks, int level, uint64_t leaf, uint64_t *end, uint64_t *refs, ebpo_error *error);
+
+/* A place that the file has, as far as the head tells; else EBPO_E_ARGUMENT. */
+EBPO_MUST_USE ebpo_status ebpo_place_check(const ebpo_chunks *chunks, const ebpo_place *place, ebpo_error *error);
+
+/* --- compact.c: different numbers, sorted, and the place of each --- */
+
+typedef struct ebpo_compact {
+    struct { uint32_t number, place; } *slot; /* open addressing, at most half full; number UINT32_MAX: free */
+    unsigned shift;
+    uint32_t *sorted; /* [count] */
+    uint64_t count;
+} ebpo_compact;
+
+/* For at most `room` calls of add. Numbers are below 2^32 - 1. */
+EBPO_MUST_USE ebpo_status ebpo_compact_make(ebpo_compact *out, uint64_t room, ebpo_error *error);
+void ebpo_compact_free(ebpo_compact *compact);
+void ebpo_compact_add(ebpo_compact *compact, uint32_t number);
+/* After the last add: sorts. */
+EBPO_MUST_USE ebpo_status ebpo_compact_sort(ebpo_compact *compact, ebpo_error *error);
+/* Place of a number that was added. */
+uint32_t ebpo_compact_find(const ebpo_compact *compact, uint32_t number);
+
+/* --- slice_faces.c --- */
+
+/* From levels with numbers of the file, and first_face and face_count: everything else, and local numbers in the levels. */
+EBPO_MUST_USE ebpo_status ebpo_slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_error *error);
+
+#endif

@@ -1,0 +1,31 @@
+/* Where the bytes of a file come from: regular files and memory as ebpo_source, and an input, which is a source with a name and a count of its use. */
+#ifndef EBPO_IO_SOURCE_H
+#define EBPO_IO_SOURCE_H
+
+#include <ebpo/file.h>
+#include <stdatomic.h>
+
+/* Opens a regular file, by pread: one that is shortened while it is open gives EBPO_E_IO, where a mapping would raise SIGBUS.
+ * EBPO_E_IO when it is missing, may not be read, or is a folder, pipe or device. The caller (or whoever takes the source over) calls out->close. */
+EBPO_MUST_USE ebpo_status ebpo_source_of_path(ebpo_source *out, const char *path, ebpo_error *error);
+
+/* `size` bytes that stay the caller's and outlive the source. There is nothing to close. */
+ebpo_source ebpo_source_of_memory(const void *data, uint64_t size);
+
+/* A source being read. Any number of threads may read at once. */
+typedef struct ebpo_input {
+    ebpo_source source;
+    char *shown; /* the name for messages */
+    _Atomic uint64_t bytes, reads;
+} ebpo_input;
+
+/* Takes the source over; on failure (EBPO_E_MEMORY) it is closed. `name` is copied. */
+EBPO_MUST_USE ebpo_status ebpo_input_open(ebpo_input *input, const ebpo_source *source, const char *name, ebpo_error *error);
+/* Closes the source, once. Harmless on a zeroed input. */
+void ebpo_input_close(ebpo_input *input);
+
+/* Bytes [offset, offset + size) into `data`. Beyond the source's end: EBPO_E_FORMAT, because only the file itself can have named such a place.
+ * What the source's own `read` returns is handed on, with a message if it gave none. */
+EBPO_MUST_USE ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size, void *data, ebpo_error *error);
+
+#endif

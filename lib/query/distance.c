@@ -1,0 +1,198 @@
+/* Distance, nearest point and normal: EBP 2017, 4.4. */
+#include "geom/strict_fp.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/error.h"
+#include "query/clock.h"
+#include "query/inside.h"
+#include "query/limited.h"
+#include "query/locate.h"
+#include "query/modes.h"
+#include "query/nearest.h"
+#include "query/options.h"
+#include "query/walk.h"
+
+/* Children that are neither white nor black, nearest first. */
+typedef struct ranked {
+    ebpo_spot spot;
+    double lower;
+} ranked;
+
+static double spot_distance(const ebpo_model *m, const ebpo_box *box, const ebpo_spot *spot, double parent, const double p[3])
+{
+    uint32_t count;
+    const uint32_t *codes = ebpo_spot_planes(m, spot, &count);
+    return fmax(parent, ebpo_envelope_distance(box, spot->level, spot->at, codes, count, p));
+}
+
+static int rank_children(const ebpo_model *m, const ebpo_box *box, const ebpo_spot *gray, double parent, const double p[3], ranked out[8])
+{
+    int count = 0;
+    for (unsigned octant = 0; octant < 8; octant++) {
+        ranked r = { ebpo_spot_child(m, gray, octant), 0 };
+        if (ebpo_spot_is_settled(&r.spot))
+            continue;
+        r.lower = spot_distance(m, box, &r.spot, parent, p);
+        int at = count++;
+        for (; at > 0 && out[at - 1].lower > r.lower; at--)
+            out[at] = out[at - 1];
+        out[at] = r;
+    }
+    return count;
+}
+
+/* --- exact: every subtree that may hold something nearer --- */
+
+static ebpo_status search_top(ebpo_context *c, ebpo_nearest *n, const ebpo_box *box, ebpo_spot spot, double lower, ebpo_error *error)
+{
+    if (lower > n->limit || ebpo_spot_is_settled(&spot))
+        return EBPO_OK;
+    if (n->late || (n->deadline && ebpo_clock() > n->deadline)) {
+        n->late = true;
+        n->passed_over = fmin(n->passed_over, lower);
+        return EBPO_OK;
+    }
+    if (ebpo_spot_is_below(&spot)) {
+        ebpo_status status = ebpo_spot_enter(c, &spot, error);
+        return status == EBPO_OK ? ebpo_nearest_search(n, c, spot.subtree, error) : status;
+    }
+    ranked child[8];
+    int count = rank_children(c->model, box, &spot, lower, n->p, child);
+    ebpo_status status = EBPO_OK;
+    for (int i = 0; i < count && status == EBPO_OK; i++)
+        status = search_top(c, n, box, child[i].spot, child[i].lower, error);
+    return status;
+}
+
+static ebpo_status search_everything(ebpo_context *c, ebpo_nearest *n, ebpo_error *error)
+{
+    if (c->model->whole)
+        return ebpo_nearest_search(n, c, c->model->whole, error);
+    ebpo_box box = ebpo_model_box(c->model);
+    return search_top(c, n, &box, ebpo_spot_root(c->model), 0, error);
+}
+
+/* Negative inside. */
+static ebpo_status give_sign(ebpo_context *c, const double p[3], ebpo_distance_result *out, ebpo_error *error)
+{
+    ebpo_inside_result where;
+    ebpo_query_options plain = EBPO_QUERY_OPTIONS_INIT;
+    if (!c->model->info->solid || !(out->distance > 0))
+        return EBPO_OK;
+    ebpo_status status = c->model->whole ? ebpo_inside_whole(c, p, 1, &where, error) : ebpo_inside_walk(c, p, &plain, &where, error);
+    if (status == EBPO_OK && where.where == EBPO_IN)
+        out->distance = -out->distance;
+    return status;
+}
+
+static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_query_options *o, ebpo_distance_result *out, ebpo_error *error)
+{
+    ebpo_nearest n;
+    ebpo_nearest_begin(&n, p, o->max_distance);
+    if (o->deadline_ns)
+        n.deadline = ebpo_clock() + o->deadline_ns;
+    if (o->warm && c->warm)
+        ebpo_nearest_hint(&n, (const double (*)[3])c->warm_triangle);
+    ebpo_status status = search_everything(c, &n, error);
+    if (status != EBPO_OK)
+        return status;
+    if (n.late && n.passed_over <= n.limit) {
+        double lo = fmin(n.passed_over, n.found ? n.lo : n.upper);
+        *out = (ebpo_distance_result){ NAN, lo, n.upper, { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
+        return EBPO_OK;
+    }
+    ebpo_nearest_end(&n, o->max_distance, out);
+    if (out->face == EBPO_NO_FACE)
+        return EBPO_OK;
+    c->warm = true;
+    memcpy(c->warm_triangle, n.triangle, sizeof n.triangle);
+    return o->unsigned_distance ? EBPO_OK : give_sign(c, p, out, error);
+}
+
+/* --- the interval that the nodes of a level give --- */
+
+typedef struct interval {
+    ebpo_context *c;
+    const ebpo_query_options *o;
+    ebpo_box box;
+    const double *p;
+    uint64_t deadline;
+    double lo, hi;
+} interval;
+
+static ebpo_status narrow(interval *v, ebpo_spot spot, double lower, ebpo_error *error)
+{
+    const ebpo_model *m = v->c->model;
+    if (lower > v->hi || ebpo_spot_is_settled(&spot))
+        return EBPO_OK;
+    v->hi = fmin(v->hi, ebpo_cell_far(&v->box, spot.level, spot.at, v->p));
+    if (spot.level >= v->o->level || !ebpo_spot_is_gray(m, &spot) || (v->deadline && ebpo_clock() > v->deadline)) {
+        v->lo = fmin(v->lo, lower);
+        return EBPO_OK;
+    }
+    if (ebpo_spot_is_below(&spot)) {
+        ebpo_status status = ebpo_spot_enter(v->c, &spot, error);
+        if (status != EBPO_OK)
+            return status;
+    }
+    ranked child[8];
+    int count = rank_children(m, &v->box, &spot, lower, v->p, child);
+    ebpo_status status = EBPO_OK;
+    for (int i = 0; i < count && status == EBPO_OK; i++)
+        status = narrow(v, child[i].spot, child[i].lower, error);
+    return status;
+}
+
+ebpo_status ebpo_distance_interval(ebpo_context *context, const double p[3], const ebpo_query_options *options, double *lo, double *hi,
+                                   ebpo_error *error)
+{
+    interval v = { .c = context, .o = options, .box = ebpo_model_box(context->model), .p = p, .lo = INFINITY, .hi = INFINITY };
+    if (options->deadline_ns)
+        v.deadline = ebpo_clock() + options->deadline_ns;
+    ebpo_spot root = ebpo_spot_root(context->model);
+    ebpo_status status = narrow(&v, root, spot_distance(context->model, &v.box, &root, 0, p), error);
+    *lo = fmin(v.lo, v.hi);
+    *hi = v.hi;
+    return status;
+}
+
+static ebpo_status limited(ebpo_context *c, const double p[3], const ebpo_query_options *o, ebpo_distance_result *out, ebpo_error *error)
+{
+    *out = (ebpo_distance_result){ NAN, 0, INFINITY, { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
+    ebpo_status status = ebpo_distance_interval(c, p, o, &out->lo, &out->hi, error);
+    if (out->lo > o->max_distance)
+        out->distance = INFINITY;
+    return status;
+}
+
+static ebpo_status one(ebpo_context *c, const double p[3], const ebpo_query_options *o, ebpo_distance_result *out, ebpo_error *error)
+{
+    if (o->mode == EBPO_DISTANCE_ENVELOPE)
+        return ebpo_distance_to_envelope(c, p, o, out, error);
+    if (o->mode == EBPO_DISTANCE_RECURSIVE || o->mode == EBPO_DISTANCE_LEAVES)
+        return ebpo_distance_around(c, p, o, out, error);
+    return o->level >= 0 ? limited(c, p, o, out, error) : exact(c, p, o, out, error);
+}
+
+ebpo_status ebpo_distance_many(ebpo_context *context, const double *points, uint64_t count, const ebpo_query_options *options,
+                               ebpo_distance_result *out, ebpo_error *error)
+{
+    static const ebpo_query_options usual = EBPO_QUERY_OPTIONS_INIT;
+    const ebpo_query_options *o = options ? options : &usual;
+    ebpo_status status = ebpo_check_options(o, error);
+    if (status == EBPO_OK)
+        status = ebpo_check_points(points, count, error);
+    if (status == EBPO_OK && o->level < 0 && o->mode != EBPO_DISTANCE_ENVELOPE)
+        status = ebpo_check_mesh(context->model, error);
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
+        status = one(context, points + 3 * i, o, &out[i], error);
+    return status;
+}
+
+ebpo_status ebpo_distance(ebpo_context *context, const double point[3], const ebpo_query_options *options, ebpo_distance_result *out,
+                          ebpo_error *error)
+{
+    return ebpo_distance_many(context, point, 1, options, out, error);
+}

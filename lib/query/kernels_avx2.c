@@ -1,0 +1,6 @@
+/* Kernels for processors with AVX2; the same operations in the same order. */
+#include "geom/strict_fp.h"
+
+#include "query/kernels.inc"
+
+const ebpo_kernels ebpo_kernels_avx2 = { crossings, bounds, faces };

@@ -1,0 +1,15 @@
+/* Kernels for any processor. */
+#include "geom/strict_fp.h"
+
+#include "query/kernels.inc"
+
+const ebpo_kernels ebpo_kernels_base = { crossings, bounds, faces };
+
+const ebpo_kernels *ebpo_kernels_best(void)
+{
+#if defined(EBPO_HAVE_AVX2)
+    if (__builtin_cpu_supports("avx2"))
+        return &ebpo_kernels_avx2;
+#endif
+    return &ebpo_kernels_base;
+}

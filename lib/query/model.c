@@ -1,0 +1,285 @@
+/* Opening a model: everything at once when that fits, else the top of the tree and a cache. */
+#include "query/model.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "query/clock.h"
+#include "query/locate.h"
+
+/* Decoded chunks: an eighth of the budget, within these. */
+enum { CHUNKS_LEAST = 4 << 20, CHUNKS_MOST = 128 << 20 };
+/* Of a cache: a path needs the subtree where it is, those around, and room to load the next. */
+enum { SUBTREES_WANTED = 64 };
+
+static ebpo_slice_size whole_size(const ebpo_info *info)
+{
+    ebpo_slice_size size = { 0, 0, 0, info->face_count };
+    for (int i = 0; i < info->level_count; i++) {
+        size.groups += info->level[i].gray_count;
+        size.leaves += info->level[i].leaf_count;
+        size.refs += info->level[i].ref_count;
+    }
+    return size;
+}
+
+/* --- subtrees for the cache --- */
+
+static ebpo_status estimate_subtree(void *user, uint64_t key, uint64_t *peak, uint64_t *keep, ebpo_error *error)
+{
+    ebpo_model *m = user;
+    ebpo_slice_size size;
+    ebpo_status status = ebpo_slice_measure(m->chunks, &m->top->below[key], &size, error);
+    if (status == EBPO_OK)
+        ebpo_subtree_estimate(&size, m->info, keep, peak);
+    return status;
+}
+
+static ebpo_status load_subtree(void *user, uint64_t key, void **item, uint64_t *bytes, ebpo_error *error)
+{
+    ebpo_model *m = user;
+    ebpo_slice slice;
+    ebpo_subtree *subtree = NULL;
+    ebpo_status status = ebpo_slice_read(&slice, m->chunks, &m->top->below[key], error);
+    if (status == EBPO_OK)
+        status = ebpo_subtree_make(&subtree, &slice, m->info, true, 1, error);
+    *item = subtree;
+    *bytes = status == EBPO_OK ? subtree->bytes : 0;
+    return status;
+}
+
+static void release_subtree(void *user, void *item)
+{
+    (void)user;
+    ebpo_subtree_free(item);
+}
+
+/* --- how much, and where to cut --- */
+
+/* Half the budget for subtrees must hold so many of the average size; the top may take a quarter. */
+static int choose_cut(const ebpo_info *info, uint64_t budget)
+{
+    ebpo_slice_size size = whole_size(info);
+    uint64_t keep, peak;
+    ebpo_subtree_estimate(&size, info, &keep, &peak);
+    for (int level = 1; level < info->level_count; level++) {
+        uint64_t grays = info->level[level].gray_count;
+        if (ebpo_top_estimate(info, level) > budget / 4)
+            return -1;
+        if (grays == 0 || keep / grays * SUBTREES_WANTED <= budget / 2)
+            return level;
+    }
+    return info->level_count - 1;
+}
+
+/* The least budget that choose_cut accepts, about. */
+static uint64_t least_budget(const ebpo_info *info)
+{
+    uint64_t budget = 8 << 20;
+    while (choose_cut(info, budget) < 0 && budget < UINT64_C(1) << 60)
+        budget += budget / 8;
+    return budget;
+}
+
+static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
+{
+    ebpo_slice slice;
+    ebpo_status status = ebpo_slice_read_all(&slice, m->file, m->options.threads, error);
+    if (status == EBPO_OK)
+        status = ebpo_subtree_make(&m->whole, &slice, m->info, true, m->options.threads, error);
+    return status;
+}
+
+static ebpo_status open_top(ebpo_model *m, int cut_level, ebpo_error *error)
+{
+    uint64_t budget = m->options.memory, chunks = 0, cache = 0;
+    ebpo_status status = ebpo_top_read(&m->top, m->file, cut_level, m->options.threads, error);
+    if (status != EBPO_OK)
+        return status;
+    if (budget) {
+        chunks = budget / 8 < CHUNKS_LEAST ? CHUNKS_LEAST : budget / 8 > CHUNKS_MOST ? CHUNKS_MOST : budget / 8;
+        if (m->top->bytes + chunks + CHUNKS_LEAST > budget)
+            return ebpo_fail(error, EBPO_E_LIMIT, "levels 0 to %d and a cache take more than the budget of %" PRIu64 " bytes; give %" PRIu64
+                             " or a lower cut level", cut_level, budget, m->top->bytes + 2 * chunks);
+        cache = budget - m->top->bytes - chunks;
+    }
+    status = ebpo_chunks_make(&m->chunks, m->file, chunks, error);
+    ebpo_cache_source source = { m, estimate_subtree, load_subtree, release_subtree };
+    if (status == EBPO_OK)
+        status = ebpo_cache_make(&m->cache, &source, "subtree", cache, error);
+    return status;
+}
+
+static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
+{
+    const ebpo_model_options *o = &m->options;
+    ebpo_slice_size size = whole_size(m->info);
+    uint64_t keep, peak;
+    ebpo_subtree_estimate(&size, m->info, &keep, &peak);
+    int deepest = m->info->level_count - 1;
+    if (o->cut_level >= 0)
+        return open_top(m, o->cut_level < deepest ? o->cut_level : deepest, error);
+    if (!(m->info->parts & EBPO_PART_MESH))
+        return open_top(m, deepest, error);
+    if (o->memory == 0 || peak <= o->memory)
+        return open_whole(m, error);
+    int cut = choose_cut(m->info, o->memory);
+    if (cut < 0)
+        return ebpo_fail(error, EBPO_E_LIMIT, "a budget of %" PRIu64 " bytes is too small for this model; give at least %" PRIu64, o->memory,
+                         least_budget(m->info));
+    return open_top(m, cut, error);
+}
+
+ebpo_status ebpo_model_open(ebpo_model **out, ebpo_file *file, const ebpo_model_options *options, ebpo_error *error)
+{
+    static const ebpo_model_options usual = EBPO_MODEL_OPTIONS_INIT;
+    *out = NULL;
+    ebpo_model *m = ebpo_alloc_zero(1, sizeof *m);
+    if (!m)
+        return ebpo_fail_memory(error, sizeof *m);
+    uint64_t begin = ebpo_clock();
+    m->file = file;
+    m->info = ebpo_file_info(file);
+    m->options = options ? *options : usual;
+    m->kernels = ebpo_kernels_best();
+    ebpo_status status = m->options.loading > EBPO_LOAD_NODES
+                             ? ebpo_fail(error, EBPO_E_ARGUMENT, "model options: there is no way of loading number %d", (int)m->options.loading)
+                             : open_parts(m, error);
+    if (status != EBPO_OK) {
+        ebpo_model_close(m);
+        return status;
+    }
+    m->open_seconds = (double)(ebpo_clock() - begin) * 1e-9;
+    *out = m;
+    return EBPO_OK;
+}
+
+void ebpo_model_close(ebpo_model *m)
+{
+    if (!m)
+        return;
+    ebpo_cache_free(m->cache);
+    ebpo_chunks_free(m->chunks);
+    ebpo_top_free(m->top);
+    ebpo_subtree_free(m->whole);
+    free(m);
+}
+
+void ebpo_model_get_stats(const ebpo_model *m, ebpo_model_stats *out)
+{
+    *out = (ebpo_model_stats){ .resident = m->whole != NULL, .cut_level = m->top ? m->top->cut_level : 0, .budget = m->options.memory,
+                               .open_seconds = m->open_seconds };
+    ebpo_file_traffic(m->file, &out->bytes_read, &out->reads);
+    if (m->whole) {
+        out->memory = out->memory_peak = m->whole->bytes;
+        out->leaves = m->whole->leaf_count;
+        out->leaves_one_wall = m->whole->one_wall;
+        memcpy(out->leaves_of_kind, m->whole->kinds, sizeof out->leaves_of_kind);
+        return;
+    }
+    ebpo_cache_stats subtrees, chunks;
+    ebpo_cache_get_stats(m->cache, &subtrees);
+    ebpo_chunks_get_stats(m->chunks, &chunks);
+    out->memory = m->top->bytes + subtrees.bytes + chunks.bytes;
+    out->memory_peak = m->top->bytes + subtrees.peak_bytes + chunks.peak_bytes;
+    out->hits = subtrees.hits;
+    out->loads = subtrees.loads;
+    out->prefetched = subtrees.prefetched;
+    out->evicted = subtrees.evicted;
+    out->load_seconds = subtrees.load_seconds;
+}
+
+/* --- contexts --- */
+
+ebpo_status ebpo_context_new(ebpo_context **out, ebpo_model *model, ebpo_error *error)
+{
+    *out = ebpo_alloc_zero(1, sizeof **out);
+    if (!*out)
+        return ebpo_fail_memory(error, sizeof **out);
+    (*out)->model = model;
+    return EBPO_OK;
+}
+
+static void let_go(ebpo_context *c)
+{
+    if (c->pinned)
+        ebpo_cache_unpin(c->model->cache, c->pinned_key);
+    ebpo_subtree_free(c->own);
+    c->pinned = c->own = NULL;
+}
+
+void ebpo_context_free(ebpo_context *c)
+{
+    if (!c)
+        return;
+    let_go(c);
+    free(c->open);
+    free(c->hits);
+    free(c->faces);
+    free(c);
+}
+
+/* The subtrees whose cells touch this one's: EBP 2017, 4.2.3 (27 with itself). */
+static void prefetch_around(const ebpo_model *m, uint32_t below)
+{
+    const ebpo_place *here = &m->top->below[below];
+    uint64_t keys[26];
+    unsigned count = 0;
+    uint32_t last = (1u << here->level) - 1;
+    for (int i = 0; i < 27; i++) {
+        uint32_t at[3];
+        bool within = i != 13;
+        for (int k = 0, rest = i; k < 3; k++, rest /= 3) {
+            at[k] = here->at[k] + (uint32_t)(rest % 3) - 1;
+            within = within && at[k] <= last;
+        }
+        uint32_t entry = m->top->nodes.root;
+        for (int level = 1; within && level <= here->level && ebpo_entry_kind_of(entry) == EBPO_ENTRY_GRAY; level++)
+            entry = m->top->nodes.group[ebpo_entry_value(entry)][ebpo_octant_at(at, here->level - level)];
+        if (within && ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW)
+            keys[count++] = ebpo_entry_value(entry);
+    }
+    ebpo_cache_prefetch(m->cache, keys, count);
+}
+
+static ebpo_status load_own(ebpo_context *c, uint32_t below, ebpo_subtree **out, ebpo_error *error)
+{
+    void *item = NULL;
+    uint64_t bytes;
+    if (c->own && c->own_key == below) {
+        *out = c->own;
+        return EBPO_OK;
+    }
+    let_go(c);
+    ebpo_status status = load_subtree(c->model, below, &item, &bytes, error);
+    if (status == EBPO_OK) {
+        *out = c->own = item;
+        c->own_key = below;
+    }
+    return status;
+}
+
+ebpo_status ebpo_context_subtree(ebpo_context *c, uint32_t below, ebpo_subtree **out, ebpo_error *error)
+{
+    const ebpo_model *m = c->model;
+    void *item;
+    if (m->options.loading != EBPO_LOAD_CACHE)
+        return load_own(c, below, out, error);
+    if (c->pinned && c->pinned_key == below) {
+        *out = c->pinned;
+        return EBPO_OK;
+    }
+    let_go(c);
+    ebpo_status status = ebpo_cache_get(m->cache, below, &item, NULL, error);
+    if (status != EBPO_OK)
+        return status;
+    *out = c->pinned = item;
+    c->pinned_key = below;
+    if (m->options.prefetch)
+        prefetch_around(m, below);
+    return EBPO_OK;
+}

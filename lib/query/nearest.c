@@ -1,0 +1,334 @@
+/* Depth first, nearest child first, with everything pruned that is certainly farther than something already seen. Bounds and triangles in single precision, with errors
+ * bounded; what passes is judged with certain bounds in double precision, and what these cannot tell apart exactly. */
+#include "geom/strict_fp.h"
+
+#include "query/nearest.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "query/clock.h"
+
+/* Beyond so many halves of the subtree's size, single precision tells nothing apart. */
+#define FAR 32.0
+
+typedef struct visit {
+    float lower2;
+    uint32_t child;
+} visit;
+
+void ebpo_nearest_begin(ebpo_nearest *n, const double p[3], double max_distance)
+{
+    memset(n, 0, sizeof *n);
+    memcpy(n->p, p, sizeof n->p);
+    n->limit = max_distance;
+    n->upper = INFINITY;
+    n->passed_over = INFINITY;
+}
+
+void ebpo_nearest_hint(ebpo_nearest *n, const double triangle[3][3])
+{
+    ebpo_distance_bounds b;
+    ebpo_triangle_distance_bounds(n->p, triangle, &b);
+    n->upper = fmin(n->upper, b.hi);
+    n->limit = fmin(n->limit, b.hi);
+}
+
+static bool same_corner(const double a[3], const double b[3])
+{
+    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+}
+
+/* Sign of the new face's distance less the winner's, exact. Faces around one vertex or edge are the usual tie. */
+static int compare(const ebpo_nearest *n, const double triangle[3][3], const ebpo_distance_bounds *b)
+{
+    if (b->hi < n->lo)
+        return -1;
+    if (b->lo > n->hi)
+        return 1;
+    if (b->feature <= EBPO_NEAR_CORNER2 && n->feature <= EBPO_NEAR_CORNER2 && same_corner(triangle[b->feature], n->triangle[n->feature]))
+        return 0;
+    if (b->feature >= EBPO_NEAR_EDGE0 && b->feature <= EBPO_NEAR_EDGE2 && n->feature >= EBPO_NEAR_EDGE0 && n->feature <= EBPO_NEAR_EDGE2) {
+        const double *a0 = triangle[b->feature - EBPO_NEAR_EDGE0], *a1 = triangle[(b->feature - EBPO_NEAR_EDGE0 + 1) % 3];
+        const double *b0 = n->triangle[n->feature - EBPO_NEAR_EDGE0], *b1 = n->triangle[(n->feature - EBPO_NEAR_EDGE0 + 1) % 3];
+        if ((same_corner(a0, b1) && same_corner(a1, b0)) || (same_corner(a0, b0) && same_corner(a1, b1)))
+            return 0;
+    }
+    return ebpo_triangle_distance_compare(n->p, triangle, n->triangle);
+}
+
+static void look_at(ebpo_nearest *n, const ebpo_subtree *s, uint32_t slot)
+{
+    uint32_t local = s->slot_face[slot];
+    if (local == EBPO_NO_SLOT)
+        return;
+    double triangle[3][3];
+    ebpo_distance_bounds b;
+    ebpo_subtree_triangle(s, slot, triangle);
+    ebpo_triangle_distance_bounds(n->p, triangle, &b);
+    if (b.lo > n->limit)
+        return;
+    uint64_t file_face = ebpo_subtree_file_face(s, local);
+    if (n->found) {
+        if (file_face == n->file_face)
+            return;
+        int sign = compare(n, triangle, &b);
+        if (sign > 0 || (sign == 0 && file_face > n->file_face))
+            return;
+    }
+    n->found = true;
+    n->lo = b.lo;
+    n->hi = b.hi;
+    n->feature = b.feature;
+    n->file_face = file_face;
+    n->told_face = ebpo_subtree_told_face(s, local);
+    memcpy(n->triangle, triangle, sizeof triangle);
+    n->upper = fmin(n->upper, b.hi);
+    n->limit = fmin(n->limit, b.hi);
+}
+
+void ebpo_nearest_leaf(ebpo_nearest *n, const ebpo_subtree *s, const ebpo_subtree_leaf *leaf)
+{
+    for (uint32_t b = 0; b < leaf->blocks; b++)
+        for (uint32_t lane = 0; lane < EBPO_BLOCK; lane++)
+            look_at(n, s, s->list[leaf->list + b] * EBPO_BLOCK + lane);
+}
+
+/* --- near: single precision --- */
+
+static bool make_probe(const ebpo_subtree *s, const double p[3], ebpo_probe *out)
+{
+    double most = 1;
+    for (int k = 0; k < 3; k++) {
+        double local = (p[k] - s->centre[k]) * s->scale;
+        if (!(fabs(local) < FAR))
+            return false;
+        most = fmax(most, fabs(local));
+        out->p[k] = p[k];
+        out->high[k] = (float)p[k];
+        out->low[k] = (float)(p[k] - (double)out->high[k]);
+        out->local[k] = (float)local;
+    }
+    out->scale = (float)s->scale;
+    out->scale64 = s->scale;
+    out->error = (float)most * 0x1p-20f;
+    return true;
+}
+
+/* A search under way. Faces that may be nearest wait as candidates until the end: by then nearly all are known to be farther. */
+enum { CANDIDATES = 64 };
+
+typedef struct candidate {
+    float low;
+    uint32_t slot;
+} candidate;
+
+typedef struct searching {
+    ebpo_nearest *n;
+    const ebpo_kernels *kernels;
+    const ebpo_subtree *s;
+    ebpo_probe probe;
+    float best;   /* some face is certainly not farther, or what is does not matter: in the frame */
+    float limit2; /* what squared lower bounds are compared with */
+    int count;
+    candidate waiting[CANDIDATES];
+} searching;
+
+static void set_best(searching *g, float best)
+{
+    float limit = best * (1 + 0x1p-18f) + g->probe.error;
+    g->best = best;
+    g->limit2 = limit * limit;
+}
+
+/* The limit in the frame, rounded up. */
+static float frame_limit(const searching *g)
+{
+    double limit = g->n->limit * g->probe.scale64 * (1 + 0x1p-20) + DBL_MIN;
+    return limit < 0x1p60 ? (float)limit * (1 + 0x1p-20f) + FLT_MIN : 0x1p60f;
+}
+
+static void drop_far(searching *g)
+{
+    int kept = 0;
+    for (int i = 0; i < g->count; i++)
+        if (g->waiting[i].low <= g->best)
+            g->waiting[kept++] = g->waiting[i];
+    g->count = kept;
+}
+
+/* Judges the candidates, the most promising first. */
+static void judge(searching *g)
+{
+    drop_far(g);
+    while (g->count) {
+        int first = 0;
+        for (int i = 1; i < g->count; i++)
+            first = g->waiting[i].low < g->waiting[first].low ? i : first;
+        candidate c = g->waiting[first];
+        g->waiting[first] = g->waiting[--g->count];
+        if (c.low > g->best)
+            continue;
+        double before = g->n->limit;
+        look_at(g->n, g->s, c.slot);
+        if (g->n->limit < before) {
+            float limit = frame_limit(g);
+            if (limit < g->best)
+                set_best(g, limit);
+        }
+    }
+}
+
+static void add_block(searching *g, uint32_t block)
+{
+    float low[8], high[8], best = g->best;
+    for (unsigned lanes = g->kernels->faces(g->s, block, &g->probe, g->best, low, high); lanes; lanes &= lanes - 1) {
+        unsigned lane = (unsigned)__builtin_ctz(lanes);
+        if (g->count == CANDIDATES)
+            drop_far(g);
+        if (g->count == CANDIDATES)
+            judge(g);
+        g->waiting[g->count++] = (candidate){ low[lane], block * EBPO_BLOCK + lane };
+        best = high[lane] < best ? high[lane] : best;
+        if (best < g->best)
+            set_best(g, best);
+    }
+}
+
+/* Children that matter, farthest first, so that the nearest is on top. */
+static uint32_t push_children(visit *stack, uint32_t top, const ebpo_bound *bound, unsigned lanes, const float lower2[8])
+{
+    uint32_t base = top;
+    for (; lanes; lanes &= lanes - 1) {
+        unsigned lane = (unsigned)__builtin_ctz(lanes);
+        visit v = { lower2[lane], bound->child[lane] };
+        uint32_t at = top++;
+        for (; at > base && stack[at - 1].lower2 < v.lower2; at--)
+            stack[at] = stack[at - 1];
+        stack[at] = v;
+    }
+    return top;
+}
+
+/* Out of time: what is left on the stack bounds what was passed over. */
+static void give_up(searching *g, const visit *stack, uint32_t top)
+{
+    ebpo_nearest *n = g->n;
+    n->late = true;
+    for (uint32_t i = 0; i < top; i++) {
+        double lower = (sqrt((double)stack[i].lower2) * (1 - 0x1p-20) - (double)g->probe.error) / g->probe.scale64;
+        n->passed_over = fmin(n->passed_over, fmax(lower, 0));
+    }
+}
+
+/* An octree level adds at most one level to the hierarchy, a long list of one leaf eleven. */
+enum { STACK = 64 * 8 };
+
+static void search_near(searching *g)
+{
+    visit stack[STACK];
+    uint32_t top = 1, steps = 0;
+    set_best(g, frame_limit(g));
+    stack[0] = (visit){ 0, g->s->top };
+    while (top) {
+        visit v = stack[--top];
+        if (v.lower2 > g->limit2)
+            continue;
+        if (g->n->deadline && (++steps & 7) == 0 && ebpo_clock() > g->n->deadline) {
+            give_up(g, stack, top + 1);
+            break;
+        }
+        if (v.child & EBPO_IS_BLOCK) {
+            add_block(g, v.child & ~EBPO_IS_BLOCK);
+            continue;
+        }
+        float lower2[8];
+        const ebpo_bound *bound = &g->s->bound[v.child];
+        unsigned lanes = g->kernels->bounds(bound, &g->probe, g->limit2, lower2);
+        top = push_children(stack, top, bound, lanes, lower2);
+    }
+    judge(g);
+}
+
+/* --- far: double precision, boxes only --- */
+
+/* Lower bound of the distance to a child's box, in the model's unit. */
+static double box_distance(const ebpo_subtree *s, const ebpo_bound *b, int lane, const double p[3])
+{
+    double most = 0, sum = 0, d[3];
+    for (int k = 0; k < 3; k++) {
+        double low = s->centre[k] + (double)b->low[k][lane] / s->scale, high = s->centre[k] + (double)b->high[k][lane] / s->scale;
+        d[k] = fmax(fmax(low - p[k], p[k] - high), 0);
+        most = fmax(most, d[k]);
+    }
+    if (!(most > 0) || isinf(most))
+        return most;
+    for (int k = 0; k < 3; k++)
+        sum += d[k] / most * (d[k] / most);
+    /* p[k] is FAR away on the axis that matters, so the rounding of the walls is far below 2^-40 of it. */
+    return most * sqrt(sum) * (1 - 0x1p-40);
+}
+
+static void search_far(ebpo_nearest *n, const ebpo_subtree *s, uint32_t child)
+{
+    if (child & EBPO_IS_BLOCK) {
+        for (uint32_t lane = 0; lane < EBPO_BLOCK; lane++)
+            look_at(n, s, (child & ~EBPO_IS_BLOCK) * EBPO_BLOCK + lane);
+        return;
+    }
+    const ebpo_bound *b = &s->bound[child];
+    double lower[8];
+    unsigned left = 0;
+    for (int lane = 0; lane < 8; lane++)
+        if (b->child[lane] != EBPO_NO_CHILD) {
+            lower[lane] = box_distance(s, b, lane, n->p);
+            left |= 1u << lane;
+        }
+    while (left) {
+        int best = __builtin_ctz(left);
+        for (int lane = best + 1; lane < 8; lane++)
+            if (left >> lane & 1 && lower[lane] < lower[best])
+                best = lane;
+        left &= ~(1u << best);
+        if (n->late || (n->deadline && ebpo_clock() > n->deadline)) {
+            n->late = true;
+            n->passed_over = fmin(n->passed_over, lower[best]);
+        } else if (lower[best] <= n->limit) {
+            search_far(n, s, b->child[best]);
+        }
+    }
+}
+
+ebpo_status ebpo_nearest_search(ebpo_nearest *n, ebpo_context *context, const ebpo_subtree *s, ebpo_error *error)
+{
+    (void)error;
+    searching g;
+    g.n = n;
+    g.kernels = context->model->kernels;
+    g.s = s;
+    g.count = 0;
+    if (s->bound_count == 0)
+        return EBPO_OK;
+    if (make_probe(s, n->p, &g.probe))
+        search_near(&g);
+    else
+        search_far(n, s, s->top);
+    return EBPO_OK;
+}
+
+void ebpo_nearest_end(const ebpo_nearest *n, double max_distance, ebpo_distance_result *out)
+{
+    *out = (ebpo_distance_result){ INFINITY, max_distance, INFINITY, { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
+    if (!n->found || (n->hi > max_distance && ebpo_triangle_distance_compare_to(n->p, n->triangle, max_distance) > 0))
+        return;
+    ebpo_triangle_nearest exact;
+    ebpo_triangle_nearest_exact(n->p, n->triangle, &exact);
+    out->distance = out->lo = out->hi = exact.distance;
+    memcpy(out->point, exact.point, sizeof out->point);
+    ebpo_triangle_unit_normal(n->triangle, out->normal);
+    out->face = n->told_face;
+}

@@ -1,0 +1,37 @@
+/* The nearest face: a search that may go through several subtrees. */
+#ifndef EBPO_QUERY_NEAREST_H
+#define EBPO_QUERY_NEAREST_H
+
+#include "geom/distance.h"
+#include "query/model.h"
+
+typedef struct ebpo_nearest {
+    double p[3];
+    double limit;        /* what is farther does not matter; certain */
+    double upper;        /* some face of the model is at most so far away, or INFINITY */
+    double lo, hi;       /* of the winner's distance, certain */
+    bool found;
+    ebpo_feature feature;
+    double triangle[3][3];
+    uint64_t file_face, told_face;
+    uint64_t deadline;   /* of ebpo_clock, or 0 */
+    bool late;           /* it passed */
+    double passed_over;  /* lower bound of what was not looked at for want of time */
+} ebpo_nearest;
+
+/* Nothing found yet. */
+void ebpo_nearest_begin(ebpo_nearest *n, const double p[3], double max_distance);
+
+/* Looks at a triangle that is known to be the model's, to have an upper bound early. It does not count as found. */
+void ebpo_nearest_hint(ebpo_nearest *n, const double triangle[3][3]);
+
+/* Searches all faces of a subtree. */
+EBPO_MUST_USE ebpo_status ebpo_nearest_search(ebpo_nearest *n, ebpo_context *context, const ebpo_subtree *s, ebpo_error *error);
+
+/* Looks at the faces that a leaf lists. */
+void ebpo_nearest_leaf(ebpo_nearest *n, const ebpo_subtree *s, const ebpo_subtree_leaf *leaf);
+
+/* The answer but for its sign; nothing within the limit: INFINITY. */
+void ebpo_nearest_end(const ebpo_nearest *n, double max_distance, ebpo_distance_result *out);
+
+#endif

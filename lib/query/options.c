@@ -1,0 +1,67 @@
+#include "query/options.h"
+
+#include <inttypes.h>
+#include <math.h>
+
+#include "base/error.h"
+#include "query/inside.h"
+#include "query/limited.h"
+
+ebpo_status ebpo_check_options(const ebpo_query_options *o, ebpo_error *error)
+{
+    if (o->level < -1 || o->level >= EBPO_LEVELS_MAX)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "level %d: give 0 to %d, or -1 for all", o->level, EBPO_LEVELS_MAX - 1);
+    if (!(o->max_distance >= 0))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "maximum distance %g: give 0 or more", o->max_distance);
+    if (o->envelopes > EBPO_ENVELOPES_SKIP || o->mode > EBPO_DISTANCE_ENVELOPE)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "query options hold a value that is none of its kind");
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_check_points(const double *points, uint64_t count, ebpo_error *error)
+{
+    for (uint64_t i = 0; i < 3 * count; i++)
+        if (!isfinite(points[i]))
+            return ebpo_fail(error, EBPO_E_ARGUMENT, "point %" PRIu64 " has a coordinate that is no finite number", i / 3);
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_check_mesh(const ebpo_model *model, ebpo_error *error)
+{
+    if (model->info->parts & EBPO_PART_MESH)
+        return EBPO_OK;
+    return ebpo_fail(error, EBPO_E_ABSENT, "the file was written without its mesh: exact answers need it; ask with a level, or build the file again with the mesh");
+}
+
+ebpo_status ebpo_check_solid(const ebpo_model *model, ebpo_error *error)
+{
+    if (model->info->solid)
+        return EBPO_OK;
+    return ebpo_fail(error, EBPO_E_NOT_SOLID, "the model is a surface: it has no inside; close it (convert --fill-holes) and build it again");
+}
+
+ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64_t count, const ebpo_query_options *options,
+                             ebpo_inside_result *out, ebpo_error *error)
+{
+    static const ebpo_query_options usual = EBPO_QUERY_OPTIONS_INIT;
+    const ebpo_query_options *o = options ? options : &usual;
+    const ebpo_model *m = context->model;
+    ebpo_status status = ebpo_check_options(o, error);
+    if (status == EBPO_OK)
+        status = ebpo_check_solid(m, error);
+    if (status == EBPO_OK)
+        status = ebpo_check_points(points, count, error);
+    if (status == EBPO_OK && o->level < 0)
+        status = ebpo_check_mesh(m, error);
+    if (status == EBPO_OK && m->whole && o->level < 0 && !o->deadline_ns && o->envelopes != EBPO_ENVELOPES_USE)
+        return ebpo_inside_whole(context, points, count, out, error);
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
+        status = ebpo_inside_walk(context, points + 3 * i, o, &out[i], error);
+    return status;
+}
+
+ebpo_status ebpo_inside(ebpo_context *context, const double point[3], const ebpo_query_options *options, ebpo_inside_result *out,
+                        ebpo_error *error)
+{
+    return ebpo_inside_many(context, point, 1, options, out, error);
+}

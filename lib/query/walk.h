@@ -1,0 +1,43 @@
+/* Going down from node to node, in the top of a tree and in subtrees alike, with what envelopes tell on the way. */
+#ifndef EBPO_QUERY_WALK_H
+#define EBPO_QUERY_WALK_H
+
+#include "query/model.h"
+
+/* A node. `subtree` is NULL in the top. */
+typedef struct ebpo_spot {
+    const ebpo_subtree *subtree;
+    uint32_t entry;
+    int level;
+    uint32_t at[3];
+} ebpo_spot;
+
+ebpo_spot ebpo_spot_root(const ebpo_model *model);
+
+/* True for gray nodes, also those whose subtree is not in memory. */
+bool ebpo_spot_is_gray(const ebpo_model *model, const ebpo_spot *spot);
+static inline bool ebpo_spot_is_settled(const ebpo_spot *spot) { return ebpo_entry_kind_of(spot->entry) == EBPO_ENTRY_SETTLED; }
+static inline bool ebpo_spot_is_below(const ebpo_spot *spot) { return ebpo_entry_kind_of(spot->entry) == EBPO_ENTRY_BELOW; }
+
+/* For a spot BELOW: the same node as the root of its subtree, loaded if need be; it stays until the context enters another one. */
+EBPO_MUST_USE ebpo_status ebpo_spot_enter(ebpo_context *context, ebpo_spot *spot, ebpo_error *error);
+
+/* Child of a gray node that is not BELOW. */
+ebpo_spot ebpo_spot_child(const ebpo_model *model, const ebpo_spot *gray, unsigned octant);
+
+/* Plane codes that the node itself has. */
+const uint32_t *ebpo_spot_planes(const ebpo_model *model, const ebpo_spot *spot, uint32_t *count);
+
+/* Length of the diagonal of the spot's cell, rounded up so that it bounds the distance of any point of the cell to a face that the node lists. */
+double ebpo_spot_diagonal(const ebpo_model *model, const ebpo_spot *spot);
+
+/* --- envelopes, in codes and cells: any node --- */
+
+/* True when p is certainly outside one of the half-spaces of a cell. */
+bool ebpo_outside_planes(const ebpo_box *box, int level, const uint32_t at[3], const uint32_t *codes, uint32_t count, const double p[3]);
+
+/* Certain lower bound of the distance of p to the cell cut by the half-spaces, and upper bound of the distance to the farthest point of the cell. */
+double ebpo_envelope_distance(const ebpo_box *box, int level, const uint32_t at[3], const uint32_t *codes, uint32_t count, const double p[3]);
+double ebpo_cell_far(const ebpo_box *box, int level, const uint32_t at[3], const double p[3]);
+
+#endif

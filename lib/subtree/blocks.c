@@ -1,0 +1,70 @@
+/* Corners of faces, eight faces together. */
+#include <float.h>
+#include <stdlib.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "subtree/parts.h"
+
+typedef struct job {
+    ebpo_subtree *s;
+    const ebpo_mesh *mesh;
+    const ebpo_layout *layout;
+} job;
+
+static void fill_lane32(float *block, unsigned lane, const ebpo_mesh *mesh, uint32_t face)
+{
+    for (unsigned i = 0; i < 9; i++)
+        block[i * EBPO_BLOCK + lane] = mesh->xyz32[3 * (uint64_t)mesh->faces[3 * (uint64_t)face + i / 3] + i % 3];
+}
+
+static void fill_lane64(double *block, unsigned lane, const ebpo_mesh *mesh, uint32_t face)
+{
+    for (unsigned i = 0; i < 9; i++) {
+        uint64_t at = 3 * (uint64_t)mesh->faces[3 * (uint64_t)face + i / 3] + i % 3;
+        block[i * EBPO_BLOCK + lane] = mesh->xyz64 ? mesh->xyz64[at] : (double)mesh->xyz32[at];
+    }
+}
+
+static ebpo_status fill(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+{
+    (void)worker;
+    (void)error;
+    job *j = context;
+    ebpo_subtree *s = j->s;
+    for (uint64_t b = begin; b < end; b++)
+        for (unsigned lane = 0; lane < EBPO_BLOCK; lane++) {
+            uint32_t face = j->layout->block_begin[b] + lane;
+            bool there = face < j->layout->block_end[b];
+            s->slot_face[b * EBPO_BLOCK + lane] = there ? face : EBPO_NO_SLOT;
+            if (there && s->wide)
+                fill_lane64(s->block64 + b * EBPO_BLOCK_NUMBERS, lane, j->mesh, face);
+            else if (there)
+                fill_lane32(s->block32 + b * EBPO_BLOCK_NUMBERS, lane, j->mesh, face);
+            else
+                for (unsigned i = 0; i < 9; i++) {
+                    if (s->wide)
+                        s->block64[b * EBPO_BLOCK_NUMBERS + i * EBPO_BLOCK + lane] = DBL_MAX;
+                    else
+                        s->block32[b * EBPO_BLOCK_NUMBERS + i * EBPO_BLOCK + lane] = FLT_MAX;
+                }
+        }
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_subtree_fill_blocks(ebpo_subtree *s, const ebpo_slice *slice, const ebpo_layout *layout, unsigned threads, ebpo_error *error)
+{
+    uint64_t numbers = layout->block_count * EBPO_BLOCK_NUMBERS, size = s->wide ? sizeof(double) : sizeof(float);
+    s->block_count = (uint32_t)layout->block_count;
+    void *blocks = aligned_alloc(64, (numbers * size + 127) / 64 * 64);
+    if (s->wide)
+        s->block64 = blocks;
+    else
+        s->block32 = blocks;
+    s->slot_face = ebpo_alloc(layout->block_count, EBPO_BLOCK * sizeof *s->slot_face);
+    if (!blocks || !s->slot_face)
+        return ebpo_fail_memory(error, numbers * size);
+    job j = { s, &slice->mesh, layout };
+    return ebpo_parallel_for(threads, layout->block_count, 1024, fill, &j, NULL, "open", error);
+}

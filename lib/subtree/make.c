@@ -1,0 +1,155 @@
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "subtree/parts.h"
+#include "subtree/subtree.h"
+
+/* Single precision does for blocks while its squares and cubes stay far from its ends; coordinates beyond that, and doubles, take doubles. */
+static bool needs_doubles(const ebpo_info *info)
+{
+    double most = 0;
+    for (int k = 0; k < 3; k++)
+        most = fmax(most, fmax(fabs(info->box_origin[k]), fabs(info->box_origin[k] + info->box_size[k])));
+    double least = fmin(info->box_size[0], fmin(info->box_size[1], info->box_size[2]));
+    return info->double_coordinates || !(most < 0x1p40) || !(least > 0x1p-40);
+}
+
+static void make_frame(ebpo_subtree *s)
+{
+    double most = 0;
+    for (int k = 0; k < 3; k++) {
+        double low = ebpo_wall(&s->box, k, s->root.level, s->root.at[k]), high = ebpo_wall(&s->box, k, s->root.level, s->root.at[k] + 1);
+        s->centre[k] = low / 2 + high / 2;
+        most = fmax(most, high - low);
+    }
+    int exponent;
+    frexp(most, &exponent);
+    s->scale = ldexp(1, exponent < -1000 ? 1000 : exponent > 1000 ? -1000 : 1 - exponent);
+}
+
+static ebpo_status copy_planes(ebpo_subtree *s, const ebpo_slice *slice, ebpo_error *error)
+{
+    uint64_t grays = 0, planes = 0, at = 0;
+    for (int i = 0; i < slice->level_count; i++) {
+        grays += slice->level[i].gray_count;
+        planes += slice->level[i].plane_count;
+    }
+    s->gray_planes = ebpo_alloc(planes, sizeof *s->gray_planes);
+    s->gray_first = ebpo_alloc(grays + 1, sizeof *s->gray_first);
+    if (!s->gray_planes || !s->gray_first)
+        return ebpo_fail_memory(error, (grays + planes) * 4);
+    uint64_t gray = 0;
+    for (int i = 0; i < slice->level_count; i++) {
+        const ebpo_level *level = &slice->level[i];
+        uint64_t first = at;
+        for (uint64_t k = 0; k < level->gray_count; k++) {
+            s->gray_first[gray++] = (uint32_t)at;
+            at += level->plane_counts ? level->plane_counts[k] : 0;
+        }
+        if (level->plane_count)
+            memcpy(s->gray_planes + first, level->planes, level->plane_count * sizeof *s->gray_planes);
+    }
+    s->gray_first[gray] = (uint32_t)at;
+    return EBPO_OK;
+}
+
+static uint64_t count_bytes(const ebpo_subtree *s)
+{
+    uint64_t cells = s->nodes.grid_bits ? UINT64_C(1) << 3 * s->nodes.grid_bits : 0;
+    uint64_t faces = s->face_source || s->outer ? (uint64_t)s->block_count * 8 : 0;
+    return sizeof *s + s->nodes.group_count * sizeof *s->nodes.group + cells * 5 + s->leaf_count * sizeof *s->leaf + s->list_count * 4 +
+           s->plane_groups * sizeof *s->planes + (uint64_t)s->block_count * (EBPO_BLOCK_NUMBERS * (s->wide ? 8 : 4) + EBPO_BLOCK * 4) +
+           s->bound_count * sizeof *s->bound + s->outer_count * 4 + (s->face_source ? faces * 4 : 0) +
+           (s->gray_first ? (uint64_t)s->nodes.group_count * 4 + s->gray_first[s->nodes.group_count] * 4 : 0);
+}
+
+static ebpo_status make(ebpo_subtree *s, ebpo_slice *slice, bool with_planes, unsigned threads, ebpo_error *error)
+{
+    ebpo_layout layout;
+    ebpo_leaf_place *places = NULL;
+    ebpo_status status = ebpo_layout_make(&layout, slice, error);
+    if (status != EBPO_OK)
+        return status;
+    status = ebpo_subtree_fill_blocks(s, slice, &layout, threads, error);
+    ebpo_mesh_free(&slice->mesh);
+    if (status == EBPO_OK)
+        status = ebpo_subtree_fill_bounds(s, &layout, threads, error);
+    if (status == EBPO_OK)
+        status = ebpo_subtree_fill_nodes(s, slice, &layout, &places, error);
+    ebpo_layout_free(&layout);
+    if (status == EBPO_OK)
+        status = ebpo_subtree_fill_kinds(s, places, threads, error);
+    if (status == EBPO_OK && with_planes)
+        status = copy_planes(s, slice, error);
+    free(places);
+    return status;
+}
+
+ebpo_status ebpo_subtree_make(ebpo_subtree **out, ebpo_slice *slice, const ebpo_info *info, bool with_planes, unsigned threads, ebpo_error *error)
+{
+    *out = NULL;
+    ebpo_subtree *s = ebpo_alloc_zero(1, sizeof *s);
+    if (!s) {
+        ebpo_slice_free(slice);
+        return ebpo_fail_memory(error, sizeof *s);
+    }
+    memcpy(s->box.origin, info->box_origin, sizeof s->box.origin);
+    memcpy(s->box.size, info->box_size, sizeof s->box.size);
+    s->box.grid_level = info->grid_level;
+    s->root = slice->root;
+    s->deepest = slice->root.level + slice->level_count - 1;
+    s->solid = info->solid;
+    s->has_planes = with_planes;
+    s->wide = needs_doubles(info);
+    s->outer_count = slice->outer_count;
+    s->first_face = slice->first_face;
+    make_frame(s);
+    ebpo_status status = slice->mesh.face_count >= EBPO_IS_BLOCK
+                             ? ebpo_fail(error, EBPO_E_LIMIT, "the model has too many faces to be held at once; give a memory budget")
+                             : make(s, slice, with_planes, threads, error);
+    s->outer = slice->outer;
+    s->face_source = slice->face_source;
+    slice->outer = slice->face_source = NULL;
+    ebpo_slice_free(slice);
+    if (status != EBPO_OK) {
+        ebpo_subtree_free(s);
+        return status;
+    }
+    if (s->root.level == 0)
+        ebpo_nodes_make_grid(&s->nodes);
+    s->bytes = count_bytes(s);
+    *out = s;
+    return EBPO_OK;
+}
+
+void ebpo_subtree_free(ebpo_subtree *s)
+{
+    if (!s)
+        return;
+    ebpo_nodes_free(&s->nodes);
+    free(s->leaf);
+    free(s->list);
+    free(s->planes);
+    free(s->block32);
+    free(s->block64);
+    free(s->slot_face);
+    free(s->bound);
+    free(s->outer);
+    free(s->face_source);
+    free(s->gray_planes);
+    free(s->gray_first);
+    free(s);
+}
+
+/* Blocks are more than half full but for the last of each leaf or list; lists name at most one block for each listed face. */
+void ebpo_subtree_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep, uint64_t *peak)
+{
+    uint64_t wide = needs_doubles(info) ? 2 : 1, faces = size->new_faces + size->refs;
+    uint64_t blocks = faces / 4 + 2, bounds = blocks / 3 + 2;
+    *keep = sizeof(ebpo_subtree) + size->groups * 64 + size->leaves * (sizeof(ebpo_subtree_leaf) + 64) + (size->refs + size->new_faces) * 4 +
+            blocks * (EBPO_BLOCK_NUMBERS * 4 * wide + 32) + bounds * sizeof(ebpo_bound) + faces * 8;
+    *peak = *keep + size->groups * 128 + size->leaves * 64 + faces * (12 + 36 * wide + 24) + 65536;
+}

@@ -1,0 +1,208 @@
+/* Child tables, leaf records, and the grid that spares the way down. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "subtree/parts.h"
+
+typedef struct walk {
+    ebpo_subtree *s;
+    const ebpo_slice *slice;
+    const uint32_t *block_of; /* [local face] */
+    ebpo_leaf_place *places;
+    uint64_t rank[EBPO_LEVELS_MAX][4]; /* nodes of each type of each level, seen so far */
+    uint64_t refs[EBPO_LEVELS_MAX];
+    uint64_t group_begin[EBPO_LEVELS_MAX]; /* number of the first group of each level */
+    uint64_t leaf_begin[EBPO_LEVELS_MAX];
+    uint64_t list_room;
+    uint32_t *scratch;  /* blocks of one leaf */
+    uint64_t scratch_room;
+    ebpo_status status;
+    ebpo_error *error;
+} walk;
+
+static int compare_numbers(const void *a, const void *b)
+{
+    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
+}
+
+static void put_list(walk *w, ebpo_subtree_leaf *leaf, uint64_t count)
+{
+    ebpo_subtree *s = w->s;
+    uint64_t kept = 0;
+    qsort(w->scratch, count, sizeof *w->scratch, compare_numbers);
+    for (uint64_t i = 0; i < count; i++)
+        if (i == 0 || w->scratch[i] != w->scratch[i - 1])
+            w->scratch[kept++] = w->scratch[i];
+    if (!ebpo_grow(&s->list, &w->list_room, s->list_count + kept, sizeof *s->list)) {
+        w->status = ebpo_fail_memory(w->error, (s->list_count + kept) * sizeof *s->list);
+        return;
+    }
+    if (s->list_count + kept > UINT32_MAX) {
+        w->status = ebpo_fail(w->error, EBPO_E_LIMIT, "the leaves list too many faces to be held at once; give a memory budget");
+        return;
+    }
+    memcpy(s->list + s->list_count, w->scratch, kept * sizeof *s->list);
+    leaf->list = (uint32_t)s->list_count;
+    leaf->blocks = (uint32_t)kept;
+    s->list_count += kept;
+}
+
+/* The new faces are a run of blocks; references are looked up one by one, runs of the same block left out at once. */
+static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank, uint32_t number)
+{
+    ebpo_subtree_leaf *leaf = &w->s->leaf[number];
+    uint64_t refs = level->leaf_ref_count[rank], count = 0;
+    if (!ebpo_grow(&w->scratch, &w->scratch_room, refs + level->leaf_new[rank], sizeof *w->scratch)) {
+        w->status = ebpo_fail_memory(w->error, refs * sizeof *w->scratch);
+        return;
+    }
+    for (uint64_t i = 0; i < refs + level->leaf_new[rank]; i++) {
+        uint64_t face = i < refs ? level->leaf_refs[w->refs[depth] + i] : level->leaf_first[rank] + (i - refs);
+        uint32_t block = w->block_of[face];
+        if (count == 0 || w->scratch[count - 1] != block)
+            w->scratch[count++] = block;
+    }
+    w->refs[depth] += refs;
+    leaf->wall = EBPO_NO_WALL;
+    leaf->winding = level->leaf_winding ? level->leaf_winding[rank] : 0;
+    put_list(w, leaf, count);
+}
+
+static uint32_t settled(walk *w, const int32_t *windings, uint64_t rank, int32_t usual)
+{
+    int32_t winding = windings ? windings[rank] : usual;
+    if (winding <= -EBPO_ENTRY_ZERO || winding >= EBPO_ENTRY_ZERO) {
+        w->status = ebpo_fail(w->error, EBPO_E_LIMIT, "a node's winding number is beyond 2^29: the solid has too many shells");
+        return 0;
+    }
+    return ebpo_entry(EBPO_ENTRY_SETTLED, (uint32_t)(winding + EBPO_ENTRY_ZERO));
+}
+
+static uint32_t walk_node(walk *w, int depth, ebpo_node_type type, const uint32_t at[3])
+{
+    const ebpo_level *level = &w->slice->level[depth];
+    uint64_t rank = w->rank[depth][type]++;
+    if (w->status != EBPO_OK)
+        return 0;
+    if (type == EBPO_WHITE)
+        return settled(w, level->white_winding, rank, 0);
+    if (type == EBPO_BLACK)
+        return settled(w, level->black_winding, rank, 1);
+    if (type == EBPO_LEAF) {
+        uint32_t number = (uint32_t)(w->leaf_begin[depth] + rank);
+        w->places[number] = (ebpo_leaf_place){ { at[0], at[1], at[2] }, (uint8_t)(w->slice->root.level + depth) };
+        fill_leaf(w, level, depth, rank, number);
+        return ebpo_entry(EBPO_ENTRY_LEAF, number);
+    }
+    uint64_t group = w->group_begin[depth + 1] + rank;
+    uint16_t types = w->slice->level[depth + 1].types[rank];
+    for (unsigned octant = 0; octant < 8; octant++) {
+        uint32_t below[3] = { at[0] * 2 + (octant & 1), at[1] * 2 + (octant >> 1 & 1), at[2] * 2 + (octant >> 2) };
+        uint32_t entry = walk_node(w, depth + 1, (ebpo_node_type)(types >> 2 * octant & 3), below);
+        w->s->nodes.group[group][octant] = entry;
+    }
+    return ebpo_entry(EBPO_ENTRY_GRAY, (uint32_t)group);
+}
+
+static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **block_of)
+{
+    const ebpo_slice *slice = w->slice;
+    ebpo_subtree *s = w->s;
+    uint64_t groups = 0, leaves = 0;
+    for (int depth = 0; depth < slice->level_count; depth++) {
+        w->group_begin[depth] = depth ? groups : 0;
+        w->leaf_begin[depth] = leaves;
+        groups += depth ? slice->level[depth].group_count : 0;
+        leaves += slice->level[depth].leaf_count;
+    }
+    if (groups >= EBPO_ENTRY_ZERO || leaves >= EBPO_ENTRY_ZERO)
+        return ebpo_fail(w->error, EBPO_E_LIMIT, "the tree has too many nodes to be held at once; give a memory budget");
+    s->nodes.group = ebpo_alloc(groups, sizeof *s->nodes.group);
+    s->nodes.group_count = (uint32_t)groups;
+    s->leaf = ebpo_alloc_zero(leaves, sizeof *s->leaf);
+    s->leaf_count = (uint32_t)leaves;
+    w->places = ebpo_alloc(leaves, sizeof *w->places);
+    uint64_t faces = layout->block_count ? layout->block_end[layout->block_count - 1] : 0;
+    uint32_t *map = *block_of = ebpo_alloc(faces, sizeof *map);
+    if (!s->nodes.group || !s->leaf || !w->places || !map)
+        return ebpo_fail_memory(w->error, groups * 32 + leaves * sizeof *s->leaf + faces * 4);
+    for (uint64_t b = 0; b < layout->block_count; b++)
+        for (uint32_t face = layout->block_begin[b]; face < layout->block_end[b]; face++)
+            map[face] = (uint32_t)b;
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_subtree_fill_nodes(ebpo_subtree *s, const ebpo_slice *slice, const ebpo_layout *layout, ebpo_leaf_place **places,
+                                    ebpo_error *error)
+{
+    walk w = { .s = s, .slice = slice, .status = EBPO_OK, .error = error };
+    uint32_t *block_of = NULL;
+    ebpo_status status = make_room(&w, layout, &block_of);
+    if (status == EBPO_OK) {
+        w.block_of = block_of;
+        s->nodes.root_level = slice->root.level;
+        s->nodes.root = walk_node(&w, 0, (ebpo_node_type)(slice->level[0].types[0] & 3), slice->root.at);
+        status = w.status;
+    }
+    free(block_of);
+    free(w.scratch);
+    *places = w.places;
+    return status;
+}
+
+/* --- the grid --- */
+
+typedef struct painter {
+    ebpo_nodes *nodes;
+    int bits;
+} painter;
+
+static void paint(painter *p, uint32_t entry, int depth, uint32_t x, uint32_t y, uint32_t z)
+{
+    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_GRAY && depth < p->bits) {
+        for (unsigned octant = 0; octant < 8; octant++)
+            paint(p, p->nodes->group[ebpo_entry_value(entry)][octant], depth + 1, 2 * x + (octant & 1), 2 * y + (octant >> 1 & 1), 2 * z + (octant >> 2));
+        return;
+    }
+    int shift = p->bits - depth;
+    uint32_t span = 1u << shift;
+    for (uint32_t k = z << shift; k < (z << shift) + span; k++)
+        for (uint32_t j = y << shift; j < (y << shift) + span; j++)
+            for (uint32_t i = x << shift; i < (x << shift) + span; i++) {
+                uint64_t cell = ((uint64_t)k << p->bits | j) << p->bits | i;
+                p->nodes->grid[cell] = entry;
+                p->nodes->grid_depth[cell] = (uint8_t)depth;
+            }
+}
+
+void ebpo_nodes_make_grid(ebpo_nodes *nodes)
+{
+    int bits = 0;
+    while (bits < 8 && UINT64_C(1) << 3 * (bits + 1) <= 8 * (uint64_t)nodes->group_count)
+        bits++;
+    if (bits < 2)
+        return;
+    uint64_t cells = UINT64_C(1) << 3 * bits;
+    nodes->grid = ebpo_alloc(cells, sizeof *nodes->grid);
+    nodes->grid_depth = ebpo_alloc(cells, 1);
+    if (!nodes->grid || !nodes->grid_depth) {
+        free(nodes->grid);
+        free(nodes->grid_depth);
+        nodes->grid = NULL;
+        nodes->grid_depth = NULL;
+        return;
+    }
+    nodes->grid_bits = bits;
+    paint(&(painter){ nodes, bits }, nodes->root, 0, 0, 0, 0);
+}
+
+void ebpo_nodes_free(ebpo_nodes *nodes)
+{
+    free(nodes->group);
+    free(nodes->grid);
+    free(nodes->grid_depth);
+    memset(nodes, 0, sizeof *nodes);
+}

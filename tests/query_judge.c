@@ -1,0 +1,284 @@
+/* Models made for the tests of questions, and what the oracle says to the answers. */
+#include "query_kit.h"
+
+#include <check.h>
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#if defined __SANITIZE_ADDRESS__ || defined __SANITIZE_THREAD__
+#define SANITIZED 1
+#elif defined __has_feature
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define SANITIZED 1
+#endif
+#endif
+#ifndef SANITIZED
+#define SANITIZED 0
+#endif
+
+enum { SHOWN = 3 };
+
+void *query_room(uint64_t count, size_t size)
+{
+    void *block = calloc(count + 1, size);
+    ck_assert_ptr_nonnull(block);
+    return block;
+}
+
+uint64_t query_scaled(uint64_t count)
+{
+    const char *text = getenv("EBPO_TEST_SCALE");
+    double n = (double)count * (text ? atof(text) : 1) * (SANITIZED ? 0.1 : 1);
+    return n >= 1 ? (uint64_t)n : 1;
+}
+
+/* --- models --- */
+
+static void write_tree(query_model *m, ebpo_mesh mesh, const query_variant *variant)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_mesh_report report;
+    ebpo_tree tree;
+    ck_assert_msg(ebpo_mesh_check(&report, &mesh, 1, (ebpo_progress){ NULL, NULL }, &error) == EBPO_OK, "%s: %s", m->name, error.message);
+    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+    options.leaf_faces = variant->leaf_faces;
+    options.max_level = variant->max_level;
+    options.rule = variant->rule;
+    options.threads = 1;
+    if (variant->parts)
+        options.parts = variant->parts;
+    ck_assert_msg(ebpo_build(&tree, &mesh, &report, NULL, &options, &error) == EBPO_OK, "%s, %s: %s", m->name, variant->name, error.message);
+    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
+    write.threads = 1;
+    ck_assert_msg(ebpo_tree_write(&tree, m->path, &write, &error) == EBPO_OK, "%s", error.message);
+    m->info = tree.info;
+    m->mesh = tree.mesh;
+    m->face_source = tree.info.parts & EBPO_PART_MAPS ? tree.face_source : NULL;
+    if (!m->face_source)
+        free(tree.face_source);
+    tree.face_source = NULL;
+    memset(&tree.mesh, 0, sizeof tree.mesh);
+    ebpo_tree_free(&tree);
+}
+
+static void measure(query_model *m)
+{
+    double low[3] = { INFINITY, INFINITY, INFINITY }, high[3] = { -INFINITY, -INFINITY, -INFINITY };
+    m->size = m->largest = 0;
+    for (uint64_t i = 0; i < 3 * m->mesh.face_count; i++) {
+        double p[3];
+        ebpo_test_point(&m->mesh, m->mesh.faces[i], p);
+        for (int k = 0; k < 3; k++) {
+            low[k] = fmin(low[k], p[k]);
+            high[k] = fmax(high[k], p[k]);
+            m->size = fmax(m->size, high[k] - low[k]);
+            m->largest = fmax(m->largest, fabs(p[k]));
+        }
+    }
+    m->normal = query_room(m->mesh.face_count, sizeof *m->normal);
+    for (uint32_t f = 0; f < m->mesh.face_count; f++)
+        oracle_normal(m->judge, f, m->normal[f]);
+}
+
+void query_model_make(query_model *m, const char *name, ebpo_mesh mesh, const query_variant *variant)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    memset(m, 0, sizeof *m);
+    m->name = name;
+    m->variant = variant->name;
+    strcpy(m->folder, "/tmp/ebpo-query-XXXXXX");
+    ck_assert(mkdtemp(m->folder) != NULL);
+    snprintf(m->path, sizeof m->path, "%s/model.ebpo.h5", m->folder);
+    write_tree(m, mesh, variant);
+    ck_assert_msg(ebpo_open(&m->file, m->path, &error) == EBPO_OK, "%s: %s", name, error.message);
+    ck_assert_msg(ebpo_model_open(&m->model, m->file, NULL, &error) == EBPO_OK, "%s, %s: %s", name, variant->name, error.message);
+    ck_assert_msg(ebpo_context_new(&m->context, m->model, &error) == EBPO_OK, "%s: %s", name, error.message);
+    m->judge = oracle_make(&m->mesh);
+    measure(m);
+}
+
+void query_model_free(query_model *m)
+{
+    ebpo_context_free(m->context);
+    ebpo_model_close(m->model);
+    ebpo_close(m->file);
+    oracle_free(m->judge);
+    ebpo_mesh_free(&m->mesh);
+    free(m->face_source);
+    free(m->normal);
+    unlink(m->path);
+    rmdir(m->folder);
+}
+
+/* --- the truth --- */
+
+static bool inside_by(ebpo_rule rule, int32_t winding)
+{
+    return rule == EBPO_RULE_NONZERO ? winding != 0 : rule == EBPO_RULE_EVENODD ? winding % 2 != 0 : winding > 0;
+}
+
+void query_find_truths(query_model *m, const double *points, uint64_t count, query_truth *out)
+{
+    for (uint64_t i = 0; i < count; i++) {
+        oracle_nearest near;
+        query_truth *t = out + i;
+        oracle_find_nearest(m->judge, points + 3 * i, &near);
+        t->distance = near.distance;
+        t->file_face = near.faces[0];
+        t->ties = near.count;
+        t->face = m->face_source ? m->face_source[t->file_face] : t->file_face;
+        t->winding = 0;
+        t->where = near.on ? EBPO_ON : EBPO_OUT;
+        if (!near.on && m->info.solid) {
+            t->winding = oracle_winding(m->judge, points + 3 * i);
+            t->where = inside_by(m->info.rule, t->winding) ? EBPO_IN : EBPO_OUT;
+        }
+    }
+}
+
+/* --- verdicts --- */
+
+static bool show(const query_model *m, const double *p, uint64_t *wrong)
+{
+    if ((*wrong)++ >= SHOWN)
+        return false;
+    fprintf(stderr, "%s, %s: point (%a, %a, %a): ", m->name, m->variant, p[0], p[1], p[2]);
+    return true;
+}
+
+uint64_t query_wrong_inside(const query_model *m, const double *points, const query_truth *truth, uint64_t count, const ebpo_inside_result *got)
+{
+    uint64_t wrong = 0;
+    for (uint64_t i = 0; i < count; i++) {
+        const query_truth *t = truth + i;
+        if (got[i].where == t->where && got[i].winding == t->winding && got[i].doubt == 0)
+            continue;
+        if (show(m, points + 3 * i, &wrong))
+            fprintf(stderr, "inside says %d, winding %d, doubt %a; it is %d, winding %d\n", got[i].where, got[i].winding, got[i].doubt, t->where,
+                    t->winding);
+    }
+    return wrong;
+}
+
+/* The nearest point is about at the distance from the point: within some ulps of the largest coordinate. */
+static bool point_fits(const query_model *m, const double *p, const query_truth *t, const ebpo_distance_result *got)
+{
+    long double sum = 0;
+    double largest = m->largest;
+    for (int k = 0; k < 3; k++) {
+        long double d = (long double)got->point[k] - p[k];
+        largest = fmax(largest, fabs(p[k]));
+        sum += d * d;
+    }
+    double margin = 16 * DBL_EPSILON * largest + 16 * DBL_TRUE_MIN;
+    return fabsl(sqrtl(sum) - t->distance) <= margin;
+}
+
+static bool normal_fits(const query_model *m, const query_truth *t, const ebpo_distance_result *got)
+{
+    const double *n = m->normal[t->file_face];
+    for (int k = 0; k < 3; k++)
+        if (!(fabs(n[k] - got->normal[k]) <= 4 * DBL_EPSILON * fabs(n[k])))
+            return false;
+    return true;
+}
+
+static const char *distance_fault(const query_model *m, const double *p, const query_truth *t, bool is_unsigned, const ebpo_distance_result *got)
+{
+    double expected = t->where == EBPO_IN && !is_unsigned ? -t->distance : t->distance;
+    if (got->distance != expected)
+        return fabs(got->distance) == t->distance ? "sign" : "distance";
+    if (got->lo != t->distance || got->hi != t->distance)
+        return "lo, hi";
+    if (got->face != t->face)
+        return "face";
+    if (!point_fits(m, p, t, got))
+        return "nearest point";
+    if (!normal_fits(m, t, got))
+        return "normal";
+    return NULL;
+}
+
+uint64_t query_wrong_distance(const query_model *m, const double *points, const query_truth *truth, uint64_t count, bool is_unsigned,
+                              const ebpo_distance_result *got)
+{
+    uint64_t wrong = 0;
+    for (uint64_t i = 0; i < count; i++) {
+        const char *fault = distance_fault(m, points + 3 * i, truth + i, is_unsigned, got + i);
+        if (!fault || !show(m, points + 3 * i, &wrong))
+            continue;
+        const query_truth *t = truth + i;
+        const double *n = m->normal[t->file_face];
+        fprintf(stderr, "wrong %s: distance %a in [%a, %a], face %llu, point (%a, %a, %a), normal (%a, %a, %a); it is %a, where %d, face %llu (%u at this distance), normal (%a, %a, %a)\n",
+                fault, got[i].distance, got[i].lo, got[i].hi, (unsigned long long)got[i].face, got[i].point[0], got[i].point[1], got[i].point[2],
+                got[i].normal[0], got[i].normal[1], got[i].normal[2], t->distance, t->where, (unsigned long long)t->face, t->ties, n[0], n[1], n[2]);
+    }
+    return wrong;
+}
+
+uint64_t query_wrong_limited_inside(const query_model *m, const double *points, const query_truth *truth, uint64_t count,
+                                    const ebpo_inside_result *got)
+{
+    uint64_t wrong = 0;
+    for (uint64_t i = 0; i < count; i++) {
+        const query_truth *t = truth + i;
+        bool maybe = got[i].where == EBPO_MAYBE && got[i].winding == 0 && got[i].doubt >= t->distance;
+        bool certain = got[i].where == t->where && got[i].winding == t->winding && got[i].doubt == 0;
+        if (!maybe && !certain && show(m, points + 3 * i, &wrong))
+            fprintf(stderr, "limited inside says %d, winding %d, doubt %a; it is %d, winding %d, at distance %a\n", got[i].where, got[i].winding,
+                    got[i].doubt, t->where, t->winding, t->distance);
+    }
+    return wrong;
+}
+
+static bool limited_distance_fits(const query_truth *t, const ebpo_distance_result *got)
+{
+    if (!(got->lo <= t->distance && t->distance <= got->hi && got->lo >= 0))
+        return false;
+    if (isnan(got->distance))
+        return true;
+    if (got->face != EBPO_NO_FACE && got->lo == got->hi && got->face != t->face)
+        return false;
+    return got->distance == (t->where == EBPO_IN ? -t->distance : t->distance);
+}
+
+uint64_t query_wrong_limited_distance(const query_model *m, const double *points, const query_truth *truth, uint64_t count,
+                                      const ebpo_distance_result *got)
+{
+    uint64_t wrong = 0;
+    for (uint64_t i = 0; i < count; i++)
+        if (!limited_distance_fits(truth + i, got + i) && show(m, points + 3 * i, &wrong))
+            fprintf(stderr, "limited distance says %a in [%a, %a], face %llu; it is %a, where %d, face %llu\n", got[i].distance, got[i].lo, got[i].hi,
+                    (unsigned long long)got[i].face, truth[i].distance, truth[i].where, (unsigned long long)truth[i].face);
+    return wrong;
+}
+
+void query_ask(query_model *m, uint64_t count, uint64_t seed)
+{
+    enum { BATCH = 512 };
+    double *points = query_room(count, 3 * sizeof *points);
+    query_truth *truth = query_room(BATCH, sizeof *truth);
+    ebpo_inside_result *inside = query_room(BATCH, sizeof *inside);
+    ebpo_distance_result *distance = query_room(BATCH, sizeof *distance);
+    ebpo_error error = EBPO_ERROR_INIT;
+    uint64_t wrong = 0;
+    query_make_points(m, count, seed, points);
+    for (uint64_t at = 0; at < count && wrong == 0; at += BATCH) {
+        const double *p = points + 3 * at;
+        uint64_t n = count - at < BATCH ? count - at : BATCH;
+        query_find_truths(m, p, n, truth);
+        ck_assert_msg(ebpo_inside_many(m->context, p, n, NULL, inside, &error) == EBPO_OK, "%s, %s: %s", m->name, m->variant, error.message);
+        ck_assert_msg(ebpo_distance_many(m->context, p, n, NULL, distance, &error) == EBPO_OK, "%s, %s: %s", m->name, m->variant, error.message);
+        wrong += query_wrong_inside(m, p, truth, n, inside);
+        wrong += query_wrong_distance(m, p, truth, n, false, distance);
+    }
+    ck_assert_msg(wrong == 0, "%s, %s, seed %llu: %llu wrong answers", m->name, m->variant, (unsigned long long)seed, (unsigned long long)wrong);
+    free(points);
+    free(truth);
+    free(inside);
+    free(distance);
+}

@@ -1,0 +1,89 @@
+/* What the tests of questions share: solids, files made of them, awkward points, and the judge's verdict. */
+#ifndef EBPO_TESTS_QUERY_KIT_H
+#define EBPO_TESTS_QUERY_KIT_H
+
+#include <ebpo/build.h>
+#include <ebpo/query.h>
+
+#include "oracle.h"
+#include "solids.h"
+
+/* --- solids: query_solids.c --- */
+
+/* All balanced solids of solids.h, and some more. */
+int query_solid_count(void);
+const char *query_solid_name(int i);
+ebpo_mesh query_solid_make(int i);
+ebpo_mesh query_solid_by_name(const char *name); /* surfaces too; aborts when there is none */
+
+/* Ways to build a tree. */
+typedef struct query_variant {
+    const char *name;
+    uint32_t leaf_faces;
+    int max_level;
+    ebpo_rule rule;
+    uint32_t parts; /* 0: the default */
+} query_variant;
+extern const query_variant query_variants[];
+extern const int query_variant_count;
+
+/* A small solid of boxes and tetrahedra that touch, nest, overlap, face inward or repeat; on a grid of small integers or anywhere. */
+ebpo_mesh query_random_solid(uint64_t seed, bool on_grid);
+
+/* --- models: query_judge.c --- */
+
+typedef struct query_model {
+    const char *name, *variant;
+    ebpo_info info;
+    ebpo_mesh mesh;         /* in file order */
+    uint32_t *face_source;  /* [face_count] or NULL */
+    double (*normal)[3];    /* [face_count] */
+    double size, largest;   /* longest side of the mesh's box; largest coordinate */
+    oracle *judge;          /* not for several threads */
+    char folder[64], path[96];
+    ebpo_file *file;
+    ebpo_model *model;
+    ebpo_context *context;
+} query_model;
+
+/* Builds, writes a file, opens it. The mesh is consumed. Failures are test failures. */
+void query_model_make(query_model *m, const char *name, ebpo_mesh mesh, const query_variant *variant);
+void query_model_free(query_model *m);
+
+/* The truth about a point. */
+typedef struct query_truth {
+    double distance;  /* correctly rounded, not signed */
+    int32_t winding;  /* 0 when on */
+    int32_t where;    /* IN, OUT or ON; a surface: OUT or ON */
+    uint64_t face;    /* the nearest one that comes first in the file, as callers are told */
+    uint32_t file_face, ties;
+} query_truth;
+void query_find_truths(query_model *m, const double *points, uint64_t count, query_truth *out);
+
+/* Wrong answers among `count` exact ones; the first ones are printed. `is_unsigned`: no signs were asked for. */
+uint64_t query_wrong_inside(const query_model *m, const double *points, const query_truth *truth, uint64_t count, const ebpo_inside_result *got);
+uint64_t query_wrong_distance(const query_model *m, const double *points, const query_truth *truth, uint64_t count, bool is_unsigned,
+                              const ebpo_distance_result *got);
+/* The same for answers that a level or a deadline limits. */
+uint64_t query_wrong_limited_inside(const query_model *m, const double *points, const query_truth *truth, uint64_t count,
+                                    const ebpo_inside_result *got);
+uint64_t query_wrong_limited_distance(const query_model *m, const double *points, const query_truth *truth, uint64_t count,
+                                      const ebpo_distance_result *got);
+
+/* Asks everything about `count` awkward points of `seed`: inside and distance, in batches; fails the test when an answer is wrong. */
+void query_ask(query_model *m, uint64_t count, uint64_t seed);
+
+/* EBPO_TEST_SCALE times `count`, at least 1; sanitizers do a tenth. */
+uint64_t query_scaled(uint64_t count);
+
+/* --- points: query_points.c --- */
+
+/* `count` points [3]: vertices, points of edges and faces, cell walls and corners of all levels, coordinates of vertices mixed, middles between vertices, close to the surface, random, outside,
+ * far away; half of them moved by an ulp on some axes. */
+void query_make_points(const query_model *m, uint64_t count, uint64_t seed, double *out);
+/* Rays likewise: through vertices, along edges, within faces, between awkward points. */
+void query_make_ray(const query_model *m, uint64_t *state, double origin[3], double direction[3], double *t_max);
+
+void *query_room(uint64_t count, size_t size);
+
+#endif

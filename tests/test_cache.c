@@ -1,0 +1,743 @@
+/* The cache against a plain model of itself, and under threads: the source counts what is loading and what lives, and the budget holds at every moment. */
+#include <check.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "base/error.h"
+#include "cache/cache.h"
+#include "solids.h"
+
+enum { KEYS = 256 };
+
+/* An instrumented source: item `key` takes size[key], its loading peak[key]. */
+typedef struct source {
+    pthread_mutex_t lock;
+    pthread_cond_t moved;
+    uint64_t budget, bytes, size[KEYS], peak[KEYS];
+    int live[KEYS], loading[KEYS], loads[KEYS];
+    bool failing[KEYS], gated[KEYS]; /* a gated load waits until the gate opens */
+    int order[4 * KEYS], ordered;    /* loads as they began */
+    int faults;                      /* what must never happen */
+    bool jitter;
+} source;
+
+typedef struct item {
+    uint64_t key;
+    source *from;
+} item;
+
+static source *src;
+static ebpo_cache *cache;
+
+static void account(source *s, int64_t change)
+{
+    s->bytes += (uint64_t)change;
+    s->faults += s->budget && s->bytes > s->budget;
+}
+
+static ebpo_status estimate(void *user, uint64_t key, uint64_t *peak, uint64_t *keep, ebpo_error *error)
+{
+    source *s = user;
+    (void)error;
+    pthread_mutex_lock(&s->lock);
+    s->faults += s->loading[key] > 0;
+    *peak = s->peak[key];
+    *keep = s->size[key];
+    pthread_mutex_unlock(&s->lock);
+    return EBPO_OK;
+}
+
+static ebpo_status load(void *user, uint64_t key, void **out, uint64_t *bytes, ebpo_error *error)
+{
+    source *s = user;
+    pthread_mutex_lock(&s->lock);
+    s->faults += s->loading[key]++ > 0;
+    s->loads[key]++;
+    if (s->ordered < 4 * KEYS)
+        s->order[s->ordered++] = (int)key;
+    account(s, (int64_t)s->peak[key]);
+    pthread_cond_broadcast(&s->moved);
+    while (s->gated[key])
+        pthread_cond_wait(&s->moved, &s->lock);
+    pthread_mutex_unlock(&s->lock);
+    if (s->jitter)
+        usleep((unsigned)(key * 7 % 50));
+    pthread_mutex_lock(&s->lock);
+    bool fails = s->failing[key];
+    s->loading[key]--;
+    account(s, (int64_t)(fails ? 0 : s->size[key]) - (int64_t)s->peak[key]);
+    if (!fails)
+        s->faults += s->live[key]++ > 1; /* the one before may be on its way out */
+    *bytes = s->size[key];
+    pthread_mutex_unlock(&s->lock);
+    if (fails)
+        return ebpo_fail(error, EBPO_E_IO, "key %d cannot be read", (int)key);
+    item *made = malloc(sizeof *made);
+    *made = (item){ key, s };
+    *out = made;
+    return EBPO_OK;
+}
+
+static void release(void *user, void *it)
+{
+    source *s = user;
+    item *i = it;
+    pthread_mutex_lock(&s->lock);
+    s->faults += s->live[i->key]-- < 1;
+    account(s, -(int64_t)s->size[i->key]);
+    pthread_mutex_unlock(&s->lock);
+    free(i);
+}
+
+static void begin_with(uint64_t budget, uint64_t size, uint64_t peak)
+{
+    src = calloc(1, sizeof *src);
+    pthread_mutex_init(&src->lock, NULL);
+    pthread_cond_init(&src->moved, NULL);
+    src->budget = budget;
+    for (int i = 0; i < KEYS; i++) {
+        src->size[i] = size;
+        src->peak[i] = peak;
+    }
+    ebpo_cache_source from = { src, estimate, load, release };
+    ck_assert_int_eq(ebpo_cache_make(&cache, &from, "thing", budget, NULL), EBPO_OK);
+}
+
+static void finish(void)
+{
+    ebpo_cache_free(cache);
+    ck_assert_int_eq(src->faults, 0);
+    ck_assert_uint_eq(src->bytes, 0);
+    for (int i = 0; i < KEYS; i++)
+        ck_assert_int_eq(src->live[i], 0);
+    pthread_cond_destroy(&src->moved);
+    pthread_mutex_destroy(&src->lock);
+    free(src);
+}
+
+static bool get(uint64_t key)
+{
+    void *it = NULL;
+    bool hit = false;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert_msg(ebpo_cache_get(cache, key, &it, &hit, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_uint_eq(((item *)it)->key, key);
+    return hit;
+}
+
+static bool use(uint64_t key)
+{
+    bool hit = get(key);
+    ebpo_cache_unpin(cache, key);
+    return hit;
+}
+
+static ebpo_cache_stats stats(void)
+{
+    ebpo_cache_stats s;
+    ebpo_cache_get_stats(cache, &s);
+    return s;
+}
+
+static void set_gate(uint64_t key, bool closed)
+{
+    pthread_mutex_lock(&src->lock);
+    src->gated[key] = closed;
+    pthread_cond_broadcast(&src->moved);
+    pthread_mutex_unlock(&src->lock);
+}
+
+static void await_loading(uint64_t key)
+{
+    pthread_mutex_lock(&src->lock);
+    while (!src->loading[key])
+        pthread_cond_wait(&src->moved, &src->lock);
+    pthread_mutex_unlock(&src->lock);
+}
+
+static int loads_of(uint64_t key)
+{
+    pthread_mutex_lock(&src->lock);
+    int loads = src->loads[key];
+    pthread_mutex_unlock(&src->lock);
+    return loads;
+}
+
+static void await_prefetched(uint64_t count)
+{
+    for (int i = 0; i < 5000 && stats().prefetched < count; i++)
+        usleep(1000);
+    ck_assert_uint_eq(stats().prefetched, count);
+}
+
+/* --- one thread --- */
+
+/* The plain model: keys from the least to the most recently used. */
+typedef struct twin {
+    int key[KEYS], count, pins[KEYS];
+    uint64_t bytes, pinned;
+} twin;
+
+static int twin_at(const twin *t, int key)
+{
+    for (int i = 0; i < t->count; i++)
+        if (t->key[i] == key)
+            return i;
+    return -1;
+}
+
+static void twin_remove(twin *t, int at)
+{
+    t->bytes -= src->size[t->key[at]];
+    memmove(t->key + at, t->key + at + 1, (size_t)(t->count - at - 1) * sizeof *t->key);
+    t->count--;
+}
+
+static void twin_append(twin *t, int key)
+{
+    t->key[t->count++] = key;
+    t->bytes += src->size[key];
+}
+
+static void twin_pin(twin *t, int key)
+{
+    if (t->pins[key]++ == 0)
+        t->pinned += src->size[key];
+}
+
+static bool twin_get(twin *t, int key)
+{
+    if (twin_at(t, key) < 0) {
+        uint64_t peak = src->peak[key];
+        if (t->pinned + peak > src->budget)
+            return false;
+        for (int i = 0; t->bytes + peak > src->budget;)
+            if (t->pins[t->key[i]])
+                i++;
+            else
+                twin_remove(t, i);
+        twin_append(t, key);
+    }
+    twin_pin(t, key);
+    return true;
+}
+
+static void twin_unpin(twin *t, int key)
+{
+    if (--t->pins[key])
+        return;
+    t->pinned -= src->size[key];
+    twin_remove(t, twin_at(t, key)); /* the end of use is the last use */
+    twin_append(t, key);
+}
+
+static void step(twin *t, uint64_t *random)
+{
+    int key = (int)(ebpo_test_random(random) % 40);
+    void *it;
+    switch (ebpo_test_random(random) % 8) {
+    case 0: case 1: case 2: {
+        ebpo_error error = EBPO_ERROR_INIT;
+        bool there = twin_at(t, key) >= 0, hit, fits = twin_get(t, key);
+        ck_assert_int_eq(ebpo_cache_get(cache, (uint64_t)key, &it, &hit, &error), fits ? EBPO_OK : EBPO_E_LIMIT);
+        ck_assert(hit == there);
+        break;
+    }
+    case 3: {
+        bool there = twin_at(t, key) >= 0;
+        ck_assert(ebpo_cache_try(cache, (uint64_t)key, &it) == there);
+        if (there)
+            twin_pin(t, key);
+        break;
+    }
+    case 4:
+        if (ebpo_test_random(random) % 50)
+            break;
+        ebpo_cache_clear(cache);
+        for (int i = t->count; i-- > 0;)
+            if (!t->pins[t->key[i]])
+                twin_remove(t, i);
+        break;
+    default:
+        for (int i = 0; i < 40 && !t->pins[key]; i++)
+            key = (key + 1) % 40;
+        if (t->pins[key]) {
+            ebpo_cache_unpin(cache, (uint64_t)key);
+            twin_unpin(t, key);
+        }
+    }
+}
+
+START_TEST(random_operations_agree_with_a_plain_model)
+{
+    uint64_t random = (uint64_t)_i;
+    begin_with(1000, 0, 0);
+    for (int i = 0; i < KEYS; i++) {
+        src->size[i] = 10 + ebpo_test_random(&random) % 150;
+        src->peak[i] = src->size[i] + ebpo_test_random(&random) % 100;
+    }
+    twin t = { .count = 0 };
+    for (int i = 0; i < 20000; i++) {
+        step(&t, &random);
+        int differ = -1;
+        for (int key = 0; key < 40; key++)
+            differ = src->live[key] == (twin_at(&t, key) >= 0) ? differ : key;
+        ck_assert_msg(differ < 0, "step %d, key %d", i, differ);
+        ck_assert_uint_eq(stats().bytes, t.bytes);
+    }
+    ck_assert_uint_le(stats().peak_bytes, 1000);
+    ck_assert_uint_gt(stats().evicted, 1000);
+    for (int key = 0; key < 40; key++)
+        while (t.pins[key]--)
+            ebpo_cache_unpin(cache, (uint64_t)key);
+    finish();
+}
+END_TEST
+
+START_TEST(pinned_items_stay_and_the_message_says_what_would_do)
+{
+    begin_with(300, 100, 120);
+    get(1);
+    get(1);
+    get(2);
+    ebpo_cache_unpin(cache, 1);
+    void *it;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert_int_eq(ebpo_cache_get(cache, 3, &it, NULL, &error), EBPO_E_LIMIT);
+    ck_assert_ptr_null(it);
+    ck_assert_msg(strstr(error.message, "budget of 320 would do"), "%s", error.message);
+    ck_assert(ebpo_cache_try(cache, 1, &it));
+    ebpo_cache_unpin(cache, 1);
+    ebpo_cache_unpin(cache, 1);
+    get(3);
+    ck_assert_int_eq(src->live[1], 0);
+    ck_assert_int_eq(src->live[2], 1);
+    ebpo_cache_unpin(cache, 2);
+    ebpo_cache_unpin(cache, 3);
+    finish();
+}
+END_TEST
+
+START_TEST(a_failed_load_tells_why_and_leaves_nothing)
+{
+    begin_with(300, 100, 120);
+    src->failing[5] = true;
+    ebpo_error error = EBPO_ERROR_INIT;
+    void *it;
+    ck_assert_int_eq(ebpo_cache_get(cache, 5, &it, NULL, &error), EBPO_E_IO);
+    ck_assert_str_eq(error.message, "key 5 cannot be read");
+    ck_assert_uint_eq(stats().bytes, 0);
+    src->failing[5] = false;
+    ck_assert(!use(5));
+    ck_assert(use(5));
+    ck_assert_uint_eq(stats().loads, 1);
+    ck_assert_uint_eq(stats().hits, 1);
+    finish();
+}
+END_TEST
+
+static ebpo_status say_little(void *user, uint64_t key, uint64_t *peak, uint64_t *keep, ebpo_error *error)
+{
+    ebpo_status status = estimate(user, key, peak, keep, error);
+    *peak = *keep = 10;
+    return status;
+}
+
+START_TEST(an_item_beyond_its_estimate_does_not_break_the_budget)
+{
+    begin_with(300, 100, 100);
+    ebpo_cache_free(cache);
+    ebpo_cache_source from = { src, say_little, load, release };
+    ck_assert_int_eq(ebpo_cache_make(&cache, &from, "thing", 300, NULL), EBPO_OK);
+    void *it;
+    ck_assert_int_eq(ebpo_cache_get(cache, 1, &it, NULL, NULL), EBPO_E_LIMIT);
+    ck_assert_uint_eq(stats().bytes, 0);
+    finish();
+}
+END_TEST
+
+START_TEST(without_a_budget_everything_stays)
+{
+    begin_with(0, 1 << 20, 1 << 20);
+    for (int round = 0; round < 2; round++)
+        for (uint64_t key = 0; key < KEYS; key++)
+            ck_assert(use(key) == (round == 1));
+    ck_assert_uint_eq(stats().evicted, 0);
+    ck_assert_uint_eq(stats().bytes, (uint64_t)KEYS << 20);
+    ebpo_cache_clear(cache);
+    ck_assert_uint_eq(stats().bytes, 0);
+    finish();
+}
+END_TEST
+
+/* --- several threads --- */
+
+typedef struct getter {
+    pthread_t thread;
+    uint64_t key;
+    bool hit;
+    ebpo_status status;
+    ebpo_error error;
+} getter;
+
+static void *run_getter(void *context)
+{
+    getter *g = context;
+    void *it;
+    g->status = ebpo_cache_get(cache, g->key, &it, &g->hit, &g->error);
+    if (g->status == EBPO_OK)
+        ebpo_cache_unpin(cache, g->key);
+    return NULL;
+}
+
+static void start(getter *g, uint64_t key)
+{
+    *g = (getter){ .key = key };
+    pthread_create(&g->thread, NULL, run_getter, g);
+}
+
+START_TEST(many_who_want_the_same_key_load_it_once)
+{
+    getter g[8];
+    begin_with(1000, 100, 100);
+    set_gate(7, true);
+    for (int i = 0; i < 8; i++)
+        start(&g[i], 7);
+    await_loading(7);
+    usleep(20000);
+    set_gate(7, false);
+    int hits = 0;
+    for (int i = 0; i < 8; i++) {
+        pthread_join(g[i].thread, NULL);
+        ck_assert_int_eq(g[i].status, EBPO_OK);
+        hits += g[i].hit;
+    }
+    ck_assert_int_eq(loads_of(7), 1);
+    ck_assert_uint_eq(stats().hits, (uint64_t)hits);
+    ck_assert_int_lt(hits, 8);
+    ck_assert(stats().load_seconds > 0.01);
+    finish();
+}
+END_TEST
+
+START_TEST(those_who_wait_for_a_load_that_fails_get_their_own_answer)
+{
+    getter g[4];
+    begin_with(1000, 100, 100);
+    set_gate(7, true);
+    src->failing[7] = true;
+    for (int i = 0; i < 4; i++)
+        start(&g[i], 7);
+    await_loading(7);
+    usleep(20000);
+    set_gate(7, false);
+    for (int i = 0; i < 4; i++) {
+        pthread_join(g[i].thread, NULL);
+        ck_assert_int_eq(g[i].status, EBPO_E_IO);
+        ck_assert_str_eq(g[i].error.message, "key 7 cannot be read");
+    }
+    ck_assert_uint_eq(stats().bytes, 0);
+    finish();
+}
+END_TEST
+
+START_TEST(a_get_waits_for_the_room_that_another_load_holds)
+{
+    getter a, b;
+    begin_with(150, 100, 100);
+    set_gate(1, true);
+    start(&a, 1);
+    await_loading(1);
+    start(&b, 2);
+    usleep(20000);
+    ck_assert_int_eq(loads_of(2), 0);
+    set_gate(1, false);
+    pthread_join(a.thread, NULL);
+    pthread_join(b.thread, NULL);
+    ck_assert_int_eq(a.status, EBPO_OK);
+    ck_assert(b.status == EBPO_OK || b.status == EBPO_E_LIMIT); /* refused if it came while 1 was in use */
+    finish();
+}
+END_TEST
+
+/* Small loads, one after the other on several threads, never leave room for a large one by chance. */
+static void *run_small(void *context)
+{
+    atomic_bool *stop = context;
+    for (uint64_t i = 0; !atomic_load(stop); i++) {
+        void *it;
+        uint64_t key = i % 100;
+        if (ebpo_cache_get(cache, key, &it, NULL, NULL) == EBPO_OK)
+            ebpo_cache_unpin(cache, key);
+    }
+    return NULL;
+}
+
+START_TEST(a_large_load_is_not_starved_by_small_ones)
+{
+    pthread_t small[3];
+    atomic_bool stop = false;
+    begin_with(400, 100, 100);
+    src->jitter = true;
+    src->size[200] = src->peak[200] = 290; /* a small one in use leaves no room: that is a refusal; beside loads it waits */
+    for (int i = 0; i < 3; i++)
+        pthread_create(&small[i], NULL, run_small, &stop);
+    int done = 0;
+    for (int i = 0; i < 20000 && done < 20; i++) {
+        void *it;
+        if (ebpo_cache_get(cache, 200, &it, NULL, NULL) == EBPO_OK) {
+            ebpo_cache_unpin(cache, 200);
+            ebpo_cache_clear(cache);
+            done++;
+        }
+    }
+    atomic_store(&stop, true);
+    for (int i = 0; i < 3; i++)
+        pthread_join(small[i], NULL);
+    ck_assert_int_eq(done, 20);
+    finish();
+}
+END_TEST
+
+/* --- ahead --- */
+
+START_TEST(what_is_asked_for_ahead_is_loaded_in_order)
+{
+    begin_with(1000, 100, 100);
+    uint64_t keys[] = { 9, 3, 9, 5, 200 };
+    ebpo_cache_prefetch(cache, keys, 5);
+    await_prefetched(4);
+    int expected[] = { 9, 3, 5, 200 };
+    for (int i = 0; i < 4; i++)
+        ck_assert_int_eq(src->order[i], expected[i]);
+    ck_assert(use(5) && use(9) && use(3));
+    ck_assert_uint_eq(stats().loads, 0);
+    finish();
+}
+END_TEST
+
+START_TEST(loading_ahead_drops_neither_what_is_in_use_nor_what_was_asked_for)
+{
+    begin_with(500, 100, 100);
+    for (uint64_t key = 1; key <= 5; key++)
+        use(key);
+    get(1);
+    uint64_t keys[] = { 2, 10, 11, 12, 13, 14 };
+    ebpo_cache_prefetch(cache, keys, 6);
+    await_prefetched(3);
+    usleep(20000);
+    ck_assert_uint_eq(stats().prefetched, 3);
+    ck_assert(use(1) && use(2) && use(10) && use(11) && use(12));
+    ebpo_cache_unpin(cache, 1);
+    finish();
+}
+END_TEST
+
+START_TEST(asking_again_forgets_what_was_asked_before)
+{
+    begin_with(5000, 100, 100);
+    set_gate(1, true);
+    uint64_t before[] = { 1, 2, 3 }, after[] = { 4, 5 };
+    ebpo_cache_prefetch(cache, before, 3);
+    await_loading(1);
+    ebpo_cache_prefetch(cache, after, 2);
+    set_gate(1, false);
+    await_prefetched(3);
+    usleep(10000);
+    ck_assert_int_eq(loads_of(2), 0);
+    ck_assert_int_eq(loads_of(3), 0);
+    ck_assert(use(1) && use(4) && use(5));
+    ebpo_cache_prefetch(cache, NULL, 0);
+    finish();
+}
+END_TEST
+
+START_TEST(a_get_waits_for_the_background_and_does_not_load_again)
+{
+    getter g;
+    begin_with(100, 100, 100);
+    set_gate(1, true);
+    uint64_t key = 1;
+    ebpo_cache_prefetch(cache, &key, 1);
+    await_loading(1);
+    start(&g, 1);
+    usleep(20000);
+    set_gate(1, false);
+    pthread_join(g.thread, NULL);
+    ck_assert_int_eq(g.status, EBPO_OK);
+    ck_assert(!g.hit);
+    ck_assert_int_eq(loads_of(1), 1);
+    ebpo_cache_stats s = stats();
+    ck_assert(s.hits == 0 && s.loads == 0 && s.prefetched == 1 && s.load_seconds > 0.01);
+    finish();
+}
+END_TEST
+
+START_TEST(a_get_waits_for_the_room_of_a_background_load)
+{
+    getter g;
+    begin_with(150, 100, 100);
+    set_gate(1, true);
+    uint64_t keys[] = { 1, 3, 4 };
+    ebpo_cache_prefetch(cache, keys, 3);
+    await_loading(1);
+    start(&g, 2);
+    usleep(20000);
+    ck_assert_int_eq(loads_of(2), 0);
+    set_gate(1, false);
+    pthread_join(g.thread, NULL);
+    ck_assert_int_eq(g.status, EBPO_OK);
+    finish();
+}
+END_TEST
+
+START_TEST(failures_ahead_are_silent)
+{
+    begin_with(1000, 100, 100);
+    src->failing[1] = true;
+    src->peak[2] = 5000;
+    uint64_t keys[] = { 1, 2, 3 };
+    ebpo_cache_prefetch(cache, keys, 3);
+    await_prefetched(1);
+    ck_assert(use(3));
+    ebpo_error error = EBPO_ERROR_INIT;
+    void *it;
+    ck_assert_int_eq(ebpo_cache_get(cache, 1, &it, NULL, &error), EBPO_E_IO);
+    ck_assert_int_eq(ebpo_cache_get(cache, 2, &it, NULL, &error), EBPO_E_LIMIT);
+    finish();
+}
+END_TEST
+
+static void *open_gate_soon(void *context)
+{
+    usleep(20000);
+    set_gate(*(uint64_t *)context, false);
+    return NULL;
+}
+
+START_TEST(freeing_ends_the_background_after_its_current_load)
+{
+    begin_with(0, 100, 100);
+    uint64_t keys[64];
+    for (uint64_t i = 0; i < 64; i++)
+        keys[i] = i;
+    set_gate(2, true);
+    ebpo_cache_prefetch(cache, keys, 64);
+    await_loading(2);
+    pthread_t opener;
+    pthread_create(&opener, NULL, open_gate_soon, &keys[2]);
+    ebpo_cache_free(cache);
+    cache = NULL;
+    pthread_join(opener, NULL);
+    ck_assert_int_eq(src->ordered, 3);
+    finish();
+}
+END_TEST
+
+/* --- all at once --- */
+
+typedef struct hammer {
+    pthread_t thread;
+    uint64_t seed;
+    int wrong;
+} hammer;
+
+static void hammer_once(hammer *h, uint64_t key)
+{
+    void *it;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_status status = ebpo_cache_get(cache, key, &it, NULL, &error);
+    bool fails = key % 50 == 49;
+    if (status == EBPO_OK) {
+        h->wrong += ((item *)it)->key != key || fails;
+        if (key % 3 == 0)
+            usleep(1);
+        h->wrong += ((item *)it)->from != src;
+        ebpo_cache_unpin(cache, key);
+    } else {
+        h->wrong += fails ? status != EBPO_E_IO && status != EBPO_E_LIMIT : status != EBPO_E_LIMIT;
+    }
+}
+
+static void *run_hammer(void *context)
+{
+    hammer *h = context;
+    uint64_t at = h->seed % KEYS;
+    for (int i = 0; i < 4000; i++) {
+        uint64_t r = ebpo_test_random(&h->seed);
+        at = r % 20 == 0 ? r / 32 % KEYS : (at + r / 32 % 5) % KEYS;
+        hammer_once(h, at);
+        void *it;
+        if (r % 7 == 0 && ebpo_cache_try(cache, (at + 1) % KEYS, &it))
+            ebpo_cache_unpin(cache, (at + 1) % KEYS);
+        if (r % 11 == 0) {
+            uint64_t keys[8];
+            for (uint64_t k = 0; k < 8; k++)
+                keys[k] = (at + k) % KEYS;
+            ebpo_cache_prefetch(cache, keys, 8);
+        }
+        if (r % 997 == 0)
+            ebpo_cache_clear(cache);
+    }
+    return NULL;
+}
+
+START_TEST(the_budget_holds_under_four_threads_and_the_background)
+{
+    hammer h[4];
+    uint64_t random = 1 + (uint64_t)_i;
+    begin_with(_i == 0 ? 700 : _i == 1 ? 3000 : 400, 0, 0);
+    src->jitter = true;
+    for (int i = 0; i < KEYS; i++) {
+        src->size[i] = 20 + ebpo_test_random(&random) % 100;
+        src->peak[i] = src->size[i] + ebpo_test_random(&random) % 80;
+        src->failing[i] = i % 50 == 49;
+    }
+    for (int i = 0; i < 4; i++) {
+        h[i] = (hammer){ .seed = 77 * (uint64_t)(i + 1) };
+        pthread_create(&h[i].thread, NULL, run_hammer, &h[i]);
+    }
+    for (int i = 0; i < 4; i++) {
+        pthread_join(h[i].thread, NULL);
+        ck_assert_int_eq(h[i].wrong, 0);
+    }
+    ebpo_cache_stats s = stats();
+    ck_assert_uint_le(s.peak_bytes, src->budget);
+    ck_assert_uint_gt(s.prefetched, 0);
+    ck_assert_uint_gt(s.hits, 0);
+    finish();
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("cache");
+    TCase *tests = tcase_create("cache");
+    tcase_set_timeout(tests, 300);
+    tcase_add_loop_test(tests, random_operations_agree_with_a_plain_model, 1, 6);
+    tcase_add_test(tests, pinned_items_stay_and_the_message_says_what_would_do);
+    tcase_add_test(tests, a_failed_load_tells_why_and_leaves_nothing);
+    tcase_add_test(tests, an_item_beyond_its_estimate_does_not_break_the_budget);
+    tcase_add_test(tests, without_a_budget_everything_stays);
+    tcase_add_test(tests, many_who_want_the_same_key_load_it_once);
+    tcase_add_test(tests, those_who_wait_for_a_load_that_fails_get_their_own_answer);
+    tcase_add_test(tests, a_get_waits_for_the_room_that_another_load_holds);
+    tcase_add_test(tests, a_large_load_is_not_starved_by_small_ones);
+    tcase_add_test(tests, what_is_asked_for_ahead_is_loaded_in_order);
+    tcase_add_test(tests, loading_ahead_drops_neither_what_is_in_use_nor_what_was_asked_for);
+    tcase_add_test(tests, asking_again_forgets_what_was_asked_before);
+    tcase_add_test(tests, a_get_waits_for_the_background_and_does_not_load_again);
+    tcase_add_test(tests, a_get_waits_for_the_room_of_a_background_load);
+    tcase_add_test(tests, failures_ahead_are_silent);
+    tcase_add_test(tests, freeing_ends_the_background_after_its_current_load);
+    tcase_add_loop_test(tests, the_budget_holds_under_four_threads_and_the_background, 0, 3);
+    suite_add_tcase(suite, tests);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_NORMAL);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed != 0;
+}

@@ -1,0 +1,123 @@
+/* Questions to small models of every kind, a million awkward points against the oracle. EBPO_TEST_SCALE scales their number. */
+#include <check.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "query_kit.h"
+
+/* Brute force takes a while over many faces, and with coordinates of two thousand bits. */
+static uint64_t points_for(const char *name, uint64_t faces)
+{
+    uint64_t n = UINT64_C(1200000) / (faces + 40);
+    if (strcmp(name, "all_scales") == 0 || strcmp(name, "cone_slivers") == 0)
+        return 200;
+    return n > 7000 ? 7000 : n;
+}
+
+START_TEST(answers_to_awkward_points_are_those_of_brute_force)
+{
+    int solid = _i / query_variant_count, variant = _i % query_variant_count;
+    query_model m;
+    query_model_make(&m, query_solid_name(solid), query_solid_make(solid), &query_variants[variant]);
+    query_ask(&m, query_scaled(points_for(m.name, m.mesh.face_count)), (uint64_t)_i);
+    query_model_free(&m);
+}
+END_TEST
+
+START_TEST(a_million_points_are_asked_about)
+{
+    uint64_t sum = 0;
+    for (int i = 0; i < query_solid_count(); i++) {
+        ebpo_mesh mesh = query_solid_make(i);
+        sum += points_for(query_solid_name(i), mesh.face_count) * (uint64_t)query_variant_count;
+        ebpo_mesh_free(&mesh);
+    }
+    ck_assert_uint_ge(sum, 1000000);
+}
+END_TEST
+
+/* --- refusals --- */
+
+START_TEST(points_that_are_not_finite_are_refused_by_their_number)
+{
+    static const double odd[] = { NAN, INFINITY, -INFINITY };
+    query_model m;
+    query_model_make(&m, "cube", query_solid_by_name("cube"), &query_variants[0]);
+    for (int i = 0; i < 9; i++) {
+        double points[6][3] = { { 0 } };
+        ebpo_inside_result inside[6];
+        ebpo_distance_result distance[6];
+        ebpo_error error = EBPO_ERROR_INIT;
+        points[4][i % 3] = odd[i / 3];
+        ck_assert_int_eq(ebpo_inside(m.context, points[4], NULL, inside, &error), EBPO_E_ARGUMENT);
+        ck_assert_int_eq(ebpo_distance(m.context, points[4], NULL, distance, &error), EBPO_E_ARGUMENT);
+        ck_assert_int_eq(ebpo_inside_many(m.context, points[0], 6, NULL, inside, &error), EBPO_E_ARGUMENT);
+        ck_assert_msg(strchr(error.message, '4') != NULL, "%s", error.message);
+        ck_assert_int_eq(ebpo_distance_many(m.context, points[0], 6, NULL, distance, &error), EBPO_E_ARGUMENT);
+        ck_assert_msg(strchr(error.message, '4') != NULL, "%s", error.message);
+        ck_assert_int_eq(ebpo_inside_many(m.context, points[0], 4, NULL, inside, &error), EBPO_OK);
+    }
+    query_model_free(&m);
+}
+END_TEST
+
+START_TEST(no_points_are_no_failure)
+{
+    query_model m;
+    query_model_make(&m, "cube", query_solid_by_name("cube"), &query_variants[0]);
+    ck_assert_int_eq(ebpo_inside_many(m.context, NULL, 0, NULL, NULL, NULL), EBPO_OK);
+    ck_assert_int_eq(ebpo_distance_many(m.context, NULL, 0, NULL, NULL, NULL), EBPO_OK);
+    query_model_free(&m);
+}
+END_TEST
+
+START_TEST(surfaces_have_distances_but_no_inside)
+{
+    static const char *const names[] = { "open_box", "flipped_face_cube", "mobius", "band", "sheet" };
+    const char *name = names[_i];
+    query_model m;
+    query_model_make(&m, name, query_solid_by_name(name), &query_variants[0]);
+    ck_assert(!m.info.solid);
+    uint64_t count = query_scaled(3000);
+    double *points = query_room(count, 3 * sizeof *points);
+    query_truth *truth = query_room(count, sizeof *truth);
+    ebpo_distance_result *distance = query_room(count, sizeof *distance);
+    ebpo_inside_result inside;
+    ebpo_error error = EBPO_ERROR_INIT;
+    query_make_points(&m, count, 3, points);
+    query_find_truths(&m, points, count, truth);
+    ck_assert_int_eq(ebpo_inside(m.context, points, NULL, &inside, &error), EBPO_E_NOT_SOLID);
+    ck_assert_int_ne(error.message[0], 0);
+    for (int is_unsigned = 0; is_unsigned < 2; is_unsigned++) {
+        ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
+        options.unsigned_distance = is_unsigned;
+        ck_assert_int_eq(ebpo_distance_many(m.context, points, count, &options, distance, &error), EBPO_OK);
+        ck_assert_uint_eq(query_wrong_distance(&m, points, truth, count, is_unsigned, distance), 0);
+    }
+    free(points);
+    free(truth);
+    free(distance);
+    query_model_free(&m);
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("query");
+    TCase *points = tcase_create("points"), *refusals = tcase_create("refusals");
+    tcase_set_timeout(points, 600);
+    tcase_set_timeout(refusals, 600);
+    tcase_add_loop_test(points, answers_to_awkward_points_are_those_of_brute_force, 0, query_solid_count() * query_variant_count);
+    tcase_add_test(points, a_million_points_are_asked_about);
+    tcase_add_test(refusals, points_that_are_not_finite_are_refused_by_their_number);
+    tcase_add_test(refusals, no_points_are_no_failure);
+    tcase_add_loop_test(refusals, surfaces_have_distances_but_no_inside, 0, 5);
+    suite_add_tcase(suite, points);
+    suite_add_tcase(suite, refusals);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_NORMAL);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed ? 1 : 0;
+}

@@ -1,0 +1,39 @@
+/* Real models, in the folder that EBPO_MODELS names: awkward points against brute force. */
+#include <check.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "query_kit.h"
+
+static const char *const names[] = { "cheese_g133", "fertility", "selfint_A", "cad_adis16480" };
+
+START_TEST(real_models_answer_like_brute_force)
+{
+    const char *folder = getenv("EBPO_MODELS");
+    char path[1024];
+    ebpo_mesh mesh;
+    ebpo_error error = EBPO_ERROR_INIT;
+    if (!folder)
+        return;
+    snprintf(path, sizeof path, "%s/%s.ply", folder, names[_i]);
+    ck_assert_msg(ebpo_mesh_read(&mesh, path, NULL, &error) == EBPO_OK, "%s", error.message);
+    query_model m;
+    query_model_make(&m, names[_i], mesh, &query_variants[0]);
+    query_ask(&m, query_scaled(2000), (uint64_t)_i + 31);
+    query_model_free(&m);
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("query_models");
+    TCase *tests = tcase_create("models");
+    tcase_set_timeout(tests, 1000);
+    tcase_add_loop_test(tests, real_models_answer_like_brute_force, 0, sizeof names / sizeof *names);
+    suite_add_tcase(suite, tests);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_NORMAL);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed ? 1 : 0;
+}

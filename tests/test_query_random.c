@@ -1,0 +1,94 @@
+/* Questions to small random solids against brute force: boxes and tetrahedra that touch, nest, overlap and repeat. A failure prints the solid's seed; EBPO_TEST_SEED=<seed> asks that one only,
+ * EBPO_TEST_SCALE scales their number. */
+#include <check.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "query_kit.h"
+
+enum { POINTS = 400, RAYS = 60, BOXES = 20 };
+
+static void ask_rays(query_model *m, uint64_t *state)
+{
+    for (int i = 0; i < RAYS; i++) {
+        double origin[3], direction[3], t_max;
+        const oracle_hit *expected;
+        const ebpo_ray_hit *hits;
+        uint32_t n;
+        uint64_t count;
+        query_make_ray(m, state, origin, direction, &t_max);
+        oracle_ray(m->judge, origin, direction, t_max, &expected, &n);
+        ck_assert_int_eq(ebpo_ray_all(m->context, origin, direction, t_max, &hits, &count, NULL), EBPO_OK);
+        bool same = count == n;
+        for (uint32_t h = 0; h < n && same; h++)
+            same = hits[h].side == expected[h].side && hits[h].face == (m->face_source ? m->face_source[expected[h].face] : expected[h].face);
+        ck_assert_msg(same, "%s: ray (%a, %a, %a) + t (%a, %a, %a), t <= %a: %llu hits, %u expected, or others", m->name, origin[0], origin[1], origin[2],
+                      direction[0], direction[1], direction[2], t_max, (unsigned long long)count, n);
+    }
+}
+
+static void ask_boxes(query_model *m, uint64_t *state)
+{
+    double corner[2 * BOXES][3];
+    query_make_points(m, 2 * BOXES, ebpo_test_random(state), corner[0]);
+    for (int i = 0; i < BOXES; i++) {
+        double low[3], high[3];
+        const uint32_t *expected;
+        const uint64_t *faces;
+        uint32_t n;
+        uint64_t count;
+        for (int k = 0; k < 3; k++) {
+            low[k] = fmin(corner[2 * i][k], corner[2 * i + 1][k]);
+            high[k] = fmax(corner[2 * i][k], corner[2 * i + 1][k]);
+        }
+        oracle_box(m->judge, low, high, &expected, &n);
+        ck_assert_int_eq(ebpo_faces_in_box(m->context, low, high, &faces, &count, NULL), EBPO_OK);
+        bool same = count == n;
+        for (uint32_t f = 0; f < n && same; f++)
+            same = faces[f] == (m->face_source ? m->face_source[expected[f]] : expected[f]);
+        ck_assert_msg(same, "%s: box (%a, %a, %a) .. (%a, %a, %a): %llu faces, %u expected, or others", m->name, low[0], low[1], low[2], high[0], high[1],
+                      high[2], (unsigned long long)count, n);
+    }
+}
+
+static void ask_solid(uint64_t seed)
+{
+    query_model m;
+    char name[64];
+    uint64_t state = seed;
+    snprintf(name, sizeof name, "EBPO_TEST_SEED=%llu", (unsigned long long)seed);
+    query_model_make(&m, name, query_random_solid(seed, seed % 4 != 3), &query_variants[seed % (uint64_t)query_variant_count]);
+    query_ask(&m, POINTS, seed);
+    ask_rays(&m, &state);
+    ask_boxes(&m, &state);
+    query_model_free(&m);
+}
+
+START_TEST(random_solids_answer_like_brute_force)
+{
+    const char *seed = getenv("EBPO_TEST_SEED");
+    uint64_t count = query_scaled(80);
+    if (seed) {
+        if (_i == 0)
+            ask_solid(strtoull(seed, NULL, 0));
+        return;
+    }
+    for (uint64_t i = 0; i < count; i++)
+        ask_solid((uint64_t)_i * 1000000 + i);
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("query_random");
+    TCase *tests = tcase_create("random");
+    tcase_set_timeout(tests, 1000);
+    tcase_add_loop_test(tests, random_solids_answer_like_brute_force, 0, 8);
+    suite_add_tcase(suite, tests);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_NORMAL);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed ? 1 : 0;
+}

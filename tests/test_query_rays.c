@@ -1,0 +1,261 @@
+/* Rays and boxes against the oracle: through vertices, along edges, within faces, from everywhere to everywhere. */
+#include <check.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "query_kit.h"
+
+static uint64_t told(const query_model *m, uint32_t face)
+{
+    return m->face_source ? m->face_source[face] : face;
+}
+
+/* Steps between two doubles of the same sign. */
+static uint64_t steps(double a, double b)
+{
+    int64_t x, y;
+    memcpy(&x, &a, sizeof x);
+    memcpy(&y, &b, sizeof y);
+    return (uint64_t)(x < y ? y - x : x - y);
+}
+
+static bool hit_fits(const query_model *m, const oracle_hit *expected, const ebpo_ray_hit *got)
+{
+    return got->face == told(m, expected->face) && got->side == expected->side && steps(got->t + 0.0, expected->t) <= 2;
+}
+
+typedef struct ray {
+    double origin[3], direction[3], t_max;
+} ray;
+
+static void show(const query_model *m, const ray *r)
+{
+    fprintf(stderr, "%s, %s: ray (%a, %a, %a) + t (%a, %a, %a), t <= %a: ", m->name, m->variant, r->origin[0], r->origin[1], r->origin[2],
+            r->direction[0], r->direction[1], r->direction[2], r->t_max);
+}
+
+static bool all_fit(const query_model *m, const ray *r, const oracle_hit *expected, uint32_t n, const ebpo_ray_hit *got, uint64_t count)
+{
+    for (uint32_t i = 0; i < n && i < count; i++)
+        if (!hit_fits(m, &expected[i], &got[i])) {
+            show(m, r);
+            fprintf(stderr, "hit %u says t %a, face %llu, side %d; it is t %a, face %llu, side %d\n", i, got[i].t, (unsigned long long)got[i].face,
+                    got[i].side, expected[i].t, (unsigned long long)told(m, expected[i].face), expected[i].side);
+            return false;
+        }
+    if (count != n) {
+        show(m, r);
+        fprintf(stderr, "%llu hits; there are %u\n", (unsigned long long)count, n);
+    }
+    return count == n;
+}
+
+static bool ask_ray(query_model *m, ebpo_context *context, const ray *r)
+{
+    const oracle_hit *expected;
+    const ebpo_ray_hit *hits;
+    ebpo_ray_hit first;
+    uint32_t n;
+    uint64_t count;
+    bool hit;
+    ebpo_error error = EBPO_ERROR_INIT;
+    oracle_ray(m->judge, r->origin, r->direction, r->t_max, &expected, &n);
+    ck_assert_msg(ebpo_ray_first(context, r->origin, r->direction, r->t_max, &first, &hit, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_ray_all(context, r->origin, r->direction, r->t_max, &hits, &count, &error) == EBPO_OK, "%s", error.message);
+    if (hit != (n > 0) || (n > 0 && !hit_fits(m, &expected[0], &first))) {
+        show(m, r);
+        fprintf(stderr, "the first hit is not right: %d, t %a, face %llu, side %d\n", hit, first.t, (unsigned long long)first.face, first.side);
+        return false;
+    }
+    return all_fit(m, r, expected, n, hits, count);
+}
+
+static void some_ray(query_model *m, uint64_t *state, ray *r)
+{
+    query_make_ray(m, state, r->origin, r->direction, &r->t_max);
+    if (ebpo_test_random(state) % 8 == 0) { /* any length */
+        int shift = (int)(ebpo_test_random(state) % 600) - 300;
+        bool any = false;
+        for (int k = 0; k < 3; k++) {
+            double d = ldexp(r->direction[k], shift);
+            any |= d != 0;
+            r->direction[k] = isfinite(d) ? d : 1;
+        }
+        if (!any)
+            r->direction[0] = 1;
+    }
+    for (int k = 0; k < 3; k++)
+        if (!isfinite(r->direction[k]))
+            r->direction[k] = copysign(1e308, r->direction[k]);
+}
+
+/* The ray once more, ending where it meets a face, or a step before or after that. */
+static bool ask_ends(query_model *m, ebpo_context *context, const ray *r)
+{
+    const oracle_hit *expected;
+    uint32_t n;
+    bool good = true;
+    oracle_ray(m->judge, r->origin, r->direction, INFINITY, &expected, &n);
+    double t = n ? expected[n / 2].t : 1;
+    for (int i = -1; i <= 1 && isfinite(t); i++) {
+        ray cut = *r;
+        cut.t_max = i < 0 ? fmax(0, nextafter(t, -INFINITY)) : i > 0 ? nextafter(t, INFINITY) : t;
+        good &= ask_ray(m, context, &cut);
+    }
+    return good;
+}
+
+START_TEST(rays_meet_what_brute_force_says)
+{
+    int variant = _i % query_variant_count;
+    query_model m;
+    query_model_make(&m, query_solid_name(_i), query_solid_make(_i), &query_variants[variant]);
+    uint64_t state = (uint64_t)_i, wrong = 0, count = query_scaled(m.mesh.face_count > 500 ? 500 : 3000);
+    if (strcmp(m.name, "all_scales") == 0)
+        count = query_scaled(100);
+    for (uint64_t i = 0; i < count && wrong < 3; i++) {
+        ray r;
+        some_ray(&m, &state, &r);
+        wrong += !ask_ray(&m, m.context, &r);
+        if (i % 8 == 0)
+            wrong += !ask_ends(&m, m.context, &r);
+    }
+    ck_assert_uint_eq(wrong, 0);
+    query_model_free(&m);
+}
+END_TEST
+
+START_TEST(rays_do_not_depend_on_what_is_in_memory)
+{
+    static const char *const names[] = { "sphere", "boxes_in_walls", "blob" };
+    query_model m;
+    query_model_make(&m, names[_i], query_solid_by_name(names[_i]), &query_variants[5]);
+    for (int loading = 0; loading < 3; loading++)
+        for (int cut = 0; cut < 3; cut++) {
+            ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+            ebpo_model *model;
+            ebpo_context *context;
+            ebpo_error error = EBPO_ERROR_INIT;
+            uint64_t state = (uint64_t)(3 * loading + cut), wrong = 0;
+            how.loading = (ebpo_loading)loading;
+            how.cut_level = cut;
+            ck_assert_msg(ebpo_model_open(&model, m.file, &how, &error) == EBPO_OK, "%s", error.message);
+            ck_assert_msg(ebpo_context_new(&context, model, &error) == EBPO_OK, "%s", error.message);
+            for (uint64_t i = 0; i < query_scaled(60) && wrong == 0; i++) {
+                ray r;
+                some_ray(&m, &state, &r);
+                wrong += !ask_ray(&m, context, &r);
+            }
+            ck_assert_uint_eq(wrong, 0);
+            ebpo_context_free(context);
+            ebpo_model_close(model);
+        }
+    query_model_free(&m);
+}
+END_TEST
+
+START_TEST(rays_that_make_no_sense_are_refused)
+{
+    static const ray rays[] = {
+        { { 0, 0, 0 }, { 0, 0, 0 }, 1 },        { { NAN, 0, 0 }, { 1, 0, 0 }, 1 },  { { 0, INFINITY, 0 }, { 1, 0, 0 }, 1 },
+        { { 0, 0, 0 }, { 1, NAN, 0 }, 1 },      { { 0, 0, 0 }, { 1, 0, INFINITY }, 1 }, { { 0, 0, 0 }, { 1, 0, 0 }, -1 },
+        { { 0, 0, 0 }, { 1, 0, 0 }, NAN },
+    };
+    query_model m;
+    query_model_make(&m, "cube", query_solid_by_name("cube"), &query_variants[0]);
+    for (size_t i = 0; i < sizeof rays / sizeof *rays; i++) {
+        const ebpo_ray_hit *hits;
+        ebpo_ray_hit one;
+        uint64_t count;
+        bool hit;
+        ebpo_error error = EBPO_ERROR_INIT;
+        ck_assert_int_eq(ebpo_ray_first(m.context, rays[i].origin, rays[i].direction, rays[i].t_max, &one, &hit, &error), EBPO_E_ARGUMENT);
+        ck_assert_int_eq(ebpo_ray_all(m.context, rays[i].origin, rays[i].direction, rays[i].t_max, &hits, &count, &error), EBPO_E_ARGUMENT);
+        ck_assert_int_ne(error.message[0], 0);
+    }
+    query_model_free(&m);
+}
+END_TEST
+
+/* --- boxes --- */
+
+static bool ask_box(query_model *m, const double low[3], const double high[3])
+{
+    const uint32_t *expected;
+    const uint64_t *faces;
+    uint32_t n;
+    uint64_t count;
+    ebpo_error error = EBPO_ERROR_INIT;
+    oracle_box(m->judge, low, high, &expected, &n);
+    ck_assert_msg(ebpo_faces_in_box(m->context, low, high, &faces, &count, &error) == EBPO_OK, "%s", error.message);
+    bool same = count == n;
+    for (uint32_t i = 0; i < n && same; i++)
+        same = faces[i] == told(m, expected[i]);
+    if (!same)
+        fprintf(stderr, "%s, %s: box (%a, %a, %a) .. (%a, %a, %a): %llu faces, %u expected, or others\n", m->name, m->variant, low[0], low[1], low[2],
+                high[0], high[1], high[2], (unsigned long long)count, n);
+    return same;
+}
+
+START_TEST(boxes_hold_what_brute_force_says)
+{
+    query_model m;
+    query_model_make(&m, query_solid_name(_i), query_solid_make(_i), &query_variants[(_i + 1) % query_variant_count]);
+    uint64_t count = query_scaled(m.mesh.face_count > 500 ? 200 : 1500), wrong = 0, state = (uint64_t)_i;
+    double (*p)[3] = query_room(2 * count, sizeof *p);
+    if (strcmp(m.name, "all_scales") == 0)
+        count = query_scaled(100);
+    query_make_points(&m, 2 * count, (uint64_t)_i + 77, p[0]);
+    for (uint64_t i = 0; i < count && wrong < 3; i++) {
+        double low[3], high[3];
+        for (int k = 0; k < 3; k++) {
+            bool flat = ebpo_test_random(&state) % 4 == 0;
+            low[k] = fmin(p[2 * i][k], p[2 * i + 1][k]);
+            high[k] = flat ? low[k] : fmax(p[2 * i][k], p[2 * i + 1][k]);
+        }
+        wrong += !ask_box(&m, low, high);
+        wrong += !ask_box(&m, p[2 * i], p[2 * i]);
+    }
+    ck_assert_uint_eq(wrong, 0);
+    free(p);
+    query_model_free(&m);
+}
+END_TEST
+
+START_TEST(boxes_that_make_no_sense_are_refused)
+{
+    static const double boxes[][6] = { { 1, 0, 0, 0, 1, 1 }, { NAN, 0, 0, 1, 1, 1 }, { 0, 0, 0, 1, NAN, 1 }, { 0, 0, 1, 1, 1, 0.5 } };
+    query_model m;
+    query_model_make(&m, "cube", query_solid_by_name("cube"), &query_variants[0]);
+    for (size_t i = 0; i < sizeof boxes / sizeof *boxes; i++) {
+        const uint64_t *faces;
+        uint64_t count;
+        ebpo_error error = EBPO_ERROR_INIT;
+        ck_assert_int_eq(ebpo_faces_in_box(m.context, boxes[i], boxes[i] + 3, &faces, &count, &error), EBPO_E_ARGUMENT);
+        ck_assert_int_ne(error.message[0], 0);
+    }
+    query_model_free(&m);
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("query_rays");
+    TCase *rays = tcase_create("rays"), *boxes = tcase_create("boxes");
+    tcase_set_timeout(rays, 600);
+    tcase_set_timeout(boxes, 600);
+    tcase_add_loop_test(rays, rays_meet_what_brute_force_says, 0, query_solid_count());
+    tcase_add_loop_test(rays, rays_do_not_depend_on_what_is_in_memory, 0, 3);
+    tcase_add_test(rays, rays_that_make_no_sense_are_refused);
+    tcase_add_loop_test(boxes, boxes_hold_what_brute_force_says, 0, query_solid_count());
+    tcase_add_test(boxes, boxes_that_make_no_sense_are_refused);
+    suite_add_tcase(suite, rays);
+    suite_add_tcase(suite, boxes);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_NORMAL);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed ? 1 : 0;
+}

@@ -1,0 +1,689 @@
+/* Rays and boxes against triangles, held against twins in rational numbers that share no method with the library: a ray is clipped by linear conditions
+ * on t, a triangle is clipped as a polygon by the box's half-spaces. */
+#include <check.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <gmp.h>
+
+#include "exact_twin.h"
+#include "geom/ray.h"
+
+enum { ROUNDS = 11000, RAY_KINDS = 12, BOX_KINDS = 7 };
+
+/* --- rational vectors --- */
+
+typedef struct rational3 {
+    mpq_t x[3];
+} rational3;
+
+static void init3(rational3 *a)
+{
+    mpq_inits(a->x[0], a->x[1], a->x[2], NULL);
+}
+
+static void clear3(rational3 *a)
+{
+    mpq_clears(a->x[0], a->x[1], a->x[2], NULL);
+}
+
+static void set3(rational3 *a, const double x[3])
+{
+    init3(a);
+    for (int k = 0; k < 3; k++)
+        mpq_set_d(a->x[k], x[k]);
+}
+
+/* out = a - b, initialised here */
+static void difference3(rational3 *out, const rational3 *a, const rational3 *b)
+{
+    init3(out);
+    for (int k = 0; k < 3; k++)
+        mpq_sub(out->x[k], a->x[k], b->x[k]);
+}
+
+static void dot3(mpq_t out, const rational3 *a, const rational3 *b)
+{
+    mpq_t product, sum;
+    mpq_inits(product, sum, NULL);
+    for (int k = 0; k < 3; k++) {
+        mpq_mul(product, a->x[k], b->x[k]);
+        mpq_add(sum, sum, product);
+    }
+    mpq_set(out, sum);
+    mpq_clears(product, sum, NULL);
+}
+
+static void cross3(rational3 *out, const rational3 *a, const rational3 *b)
+{
+    mpq_t product;
+    mpq_init(product);
+    init3(out);
+    for (int k = 0; k < 3; k++) {
+        int u = (k + 1) % 3, v = (k + 2) % 3;
+        mpq_mul(out->x[k], a->x[u], b->x[v]);
+        mpq_mul(product, a->x[v], b->x[u]);
+        mpq_sub(out->x[k], out->x[k], product);
+    }
+    mpq_clear(product);
+}
+
+static bool zero3(const rational3 *a)
+{
+    return mpq_sgn(a->x[0]) == 0 && mpq_sgn(a->x[1]) == 0 && mpq_sgn(a->x[2]) == 0;
+}
+
+/* --- the ray's twin: what remains of [0, t_max] --- */
+
+typedef struct interval {
+    bool any, endless;
+    bool strict; /* all inequalities hold strictly at `low` */
+    mpq_t low, high;
+} interval;
+
+/* Keeps the t with c0 + c1 t >= 0. */
+static void keep(interval *r, const mpq_t c0, const mpq_t c1)
+{
+    mpq_t root;
+    if (!r->any)
+        return;
+    if (mpq_sgn(c1) == 0) {
+        r->any = mpq_sgn(c0) >= 0;
+        return;
+    }
+    mpq_init(root);
+    mpq_div(root, c0, c1);
+    mpq_neg(root, root);
+    if (mpq_sgn(c1) > 0 && mpq_cmp(root, r->low) > 0)
+        mpq_set(r->low, root);
+    if (mpq_sgn(c1) < 0 && (r->endless || mpq_cmp(root, r->high) < 0)) {
+        mpq_set(r->high, root);
+        r->endless = false;
+    }
+    r->any = r->endless || mpq_cmp(r->low, r->high) <= 0;
+    mpq_clear(root);
+}
+
+/* Keeps the t with c0 + c1 t = 0. */
+static void keep_zero(interval *r, mpq_t c0, mpq_t c1)
+{
+    keep(r, c0, c1);
+    mpq_neg(c0, c0);
+    mpq_neg(c1, c1);
+    keep(r, c0, c1);
+}
+
+/* Condition normal . (origin + t direction - at) >= 0, or = 0. */
+static void keep_plane(interval *r, const rational3 *normal, const rational3 *origin, const rational3 *direction, const rational3 *at, bool equal)
+{
+    rational3 from;
+    mpq_t c0, c1;
+    mpq_inits(c0, c1, NULL);
+    difference3(&from, origin, at);
+    dot3(c0, normal, &from);
+    dot3(c1, normal, direction);
+    if (equal)
+        keep_zero(r, c0, c1);
+    else
+        keep(r, c0, c1);
+    mpq_clears(c0, c1, NULL);
+    clear3(&from);
+}
+
+/* At r->low, is normal . (point - at) > 0? */
+static bool strictly_within(const interval *r, const rational3 *normal, const rational3 *origin, const rational3 *direction, const rational3 *at)
+{
+    rational3 point;
+    mpq_t c;
+    init3(&point);
+    mpq_init(c);
+    for (int k = 0; k < 3; k++) {
+        mpq_mul(c, r->low, direction->x[k]);
+        mpq_add(point.x[k], origin->x[k], c);
+        mpq_sub(point.x[k], point.x[k], at->x[k]);
+    }
+    dot3(c, normal, &point);
+    bool within = mpq_sgn(c) > 0;
+    mpq_clear(c);
+    clear3(&point);
+    return within;
+}
+
+static void keep_area(interval *r, const rational3 p[3], const rational3 *normal, const rational3 *origin, const rational3 *direction)
+{
+    r->strict = true;
+    keep_plane(r, normal, origin, direction, &p[0], true);
+    for (int pass = 0; pass < 2; pass++)
+        for (int i = 0; i < 3; i++) {
+            rational3 edge, inward;
+            difference3(&edge, &p[(i + 1) % 3], &p[i]);
+            cross3(&inward, normal, &edge);
+            if (pass == 0)
+                keep_plane(r, &inward, origin, direction, &p[i], false);
+            else if (!r->any || !strictly_within(r, &inward, origin, direction, &p[i]))
+                r->strict = false;
+            clear3(&inward);
+            clear3(&edge);
+        }
+}
+
+/* The corners lie on one line: between the two that are farthest apart. */
+static void keep_segment(interval *r, const rational3 p[3], const rational3 *origin, const rational3 *direction)
+{
+    mpq_t length, longest;
+    int from = 0, to = 1;
+    mpq_inits(length, longest, NULL);
+    for (int i = 0; i < 3; i++) {
+        rational3 edge;
+        difference3(&edge, &p[(i + 1) % 3], &p[i]);
+        dot3(length, &edge, &edge);
+        if (mpq_cmp(length, longest) > 0) {
+            mpq_set(longest, length);
+            from = i;
+            to = (i + 1) % 3;
+        }
+        clear3(&edge);
+    }
+    rational3 along, back;
+    difference3(&along, &p[to], &p[from]);
+    difference3(&back, &p[from], &p[to]);
+    keep_plane(r, &along, origin, direction, &p[from], false);
+    keep_plane(r, &back, origin, direction, &p[to], false);
+    for (int k = 0; k < 3; k++) {
+        rational3 unit, across;
+        init3(&unit);
+        mpq_set_ui(unit.x[k], 1, 1);
+        cross3(&across, &along, &unit);
+        if (mpq_sgn(longest) == 0)
+            keep_plane(r, &unit, origin, direction, &p[0], true);
+        else
+            keep_plane(r, &across, origin, direction, &p[from], true);
+        clear3(&across);
+        clear3(&unit);
+    }
+    clear3(&along);
+    clear3(&back);
+    mpq_clears(length, longest, NULL);
+}
+
+/* r->low: the first common point; returns the side. r is initialised here. */
+static int twin_ray(const ebpo_segment *ray, const double triangle[3][3], interval *r)
+{
+    rational3 p[3], f, g, normal, origin, direction;
+    mpq_t slope;
+    int side = 0;
+    mpq_inits(r->low, r->high, slope, NULL);
+    r->any = true;
+    r->endless = ray->t_max == INFINITY;
+    if (!r->endless)
+        mpq_set_d(r->high, ray->t_max);
+    set3(&origin, ray->origin);
+    set3(&direction, ray->direction);
+    for (int i = 0; i < 3; i++)
+        set3(&p[i], triangle[i]);
+    difference3(&f, &p[1], &p[0]);
+    difference3(&g, &p[2], &p[0]);
+    cross3(&normal, &f, &g);
+    if (zero3(&normal))
+        keep_segment(r, p, &origin, &direction);
+    else {
+        keep_area(r, p, &normal, &origin, &direction);
+        dot3(slope, &normal, &direction);
+        side = r->any && r->strict ? -mpq_sgn(slope) : 0;
+    }
+    for (int i = 0; i < 3; i++)
+        clear3(&p[i]);
+    clear3(&f);
+    clear3(&g);
+    clear3(&normal);
+    clear3(&origin);
+    clear3(&direction);
+    mpq_clear(slope);
+    return side;
+}
+
+static void interval_clear(interval *r)
+{
+    mpq_clears(r->low, r->high, NULL);
+}
+
+/* |t - exact| <= 2 ulp: exact lies between the doubles two steps away. */
+static bool close_enough(double t, const mpq_t exact)
+{
+    mpq_t end;
+    double low = nextafter(nextafter(t, -INFINITY), -INFINITY), high = nextafter(nextafter(t, INFINITY), INFINITY);
+    if (t == INFINITY) {
+        low = 0x1.fffffffffffffp1023;
+        high = INFINITY;
+    }
+    mpq_init(end);
+    mpq_set_d(end, low);
+    bool ok = mpq_cmp(end, exact) <= 0;
+    if (high < INFINITY) {
+        mpq_set_d(end, high);
+        ok = ok && mpq_cmp(exact, end) <= 0;
+    }
+    mpq_clear(end);
+    return ok;
+}
+
+/* --- cases --- */
+
+static double small(uint64_t *state, int64_t size)
+{
+    return (double)twin_integer(state, -size, size);
+}
+
+static double nudged(double x, uint64_t *state)
+{
+    for (int64_t ulps = twin_integer(state, 0, 1); ulps > 0; ulps--)
+        x = nextafter(x, twin_random(state) & 1 ? INFINITY : -INFINITY);
+    return x;
+}
+
+/* A point of the triangle: inside, on an edge or a corner. */
+static void point_of(const double triangle[3][3], double out[3], uint64_t *state)
+{
+    static const double weights[][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {.5, .5, 0}, {0, .25, .75}, {.25, .25, .5}, {.5, .25, .25}, {.375, 0, .625}};
+    const double *w = weights[twin_integer(state, 0, 7)];
+    for (int k = 0; k < 3; k++)
+        out[k] = w[0] * triangle[0][k] + w[1] * triangle[1][k] + w[2] * triangle[2][k];
+}
+
+static void direction_to(ebpo_segment *ray, const double target[3])
+{
+    bool zero = true;
+    for (int k = 0; k < 3; k++) {
+        ray->direction[k] = target[k] - ray->origin[k];
+        zero = zero && ray->direction[k] == 0;
+    }
+    if (zero)
+        ray->direction[0] = 1;
+}
+
+/* Powers of two, apart for lengths and directions. */
+static void scale_all(ebpo_segment *ray, double triangle[3][3], int lengths, int directions)
+{
+    for (int k = 0; k < 3; k++) {
+        for (int i = 0; i < 3; i++)
+            triangle[i][k] = ldexp(triangle[i][k], lengths);
+        ray->origin[k] = ldexp(ray->origin[k], lengths);
+        ray->direction[k] = ldexp(ray->direction[k], directions);
+    }
+}
+
+static void flatten(double triangle[3][3], uint64_t *state)
+{
+    int64_t s = twin_integer(state, -2, 2);
+    for (int k = 0; k < 3; k++)
+        triangle[2][k] = triangle[0][k] + (double)s * (triangle[1][k] - triangle[0][k]);
+    if (twin_random(state) % 4 == 0)
+        memcpy(triangle[1], triangle[0], sizeof triangle[0]);
+}
+
+static void ray_case(int kind, ebpo_segment *ray, double triangle[3][3], uint64_t *state)
+{
+    double target[3];
+    bool whole = kind <= 3 || kind == 8 || kind == 10;
+    for (int k = 0; k < 3; k++) {
+        for (int i = 0; i < 3; i++)
+            triangle[i][k] = whole ? small(state, kind == 0 ? 2 : 8) * 8 : kind == 7 ? 1e7 + twin_uniform(state) : twin_uniform(state);
+        ray->origin[k] = whole ? small(state, kind == 0 ? 2 : 8) * 8 : kind == 7 ? 1e7 + twin_uniform(state) : twin_uniform(state);
+        ray->direction[k] = whole ? small(state, 2) : twin_uniform(state);
+    }
+    if (kind == 2 || kind == 3) /* in one plane, or without area */
+        for (int i = 0; i < 3 && kind == 2; i++)
+            triangle[i][2] = ray->origin[2] + (double)i * (double)(twin_random(state) % 8 == 0);
+    if (kind == 2)
+        ray->direction[2] = 0;
+    if (kind == 3 || (kind == 5 && twin_random(state) % 4 == 0))
+        flatten(triangle, state);
+    if (kind == 6) /* a sliver */
+        for (int k = 0; k < 3; k++)
+            triangle[2][k] = nudged(.5 * (triangle[0][k] + triangle[1][k]), state);
+    if (ray->direction[0] == 0 && ray->direction[1] == 0 && ray->direction[2] == 0)
+        ray->direction[twin_integer(state, 0, 2)] = 1;
+    if (kind == 8 || kind == 9) /* along an axis, through the triangle when it can */
+        for (int k = 0, axis = (int)twin_integer(state, 0, 2); k < 3; k++)
+            ray->direction[k] = k == axis ? (twin_random(state) & 1 ? 1 : -1) : 0;
+    point_of((const double (*)[3])triangle, target, state);
+    if (kind == 9)
+        for (int k = 0; k < 3; k++)
+            ray->origin[k] = ray->direction[k] == 0 ? nudged(target[k], state) : ray->origin[k];
+    else if (kind != 8 && twin_random(state) % 2)
+        direction_to(ray, target);
+    if (kind == 10 && twin_random(state) % 2) /* begins on the triangle */
+        memcpy(ray->origin, target, sizeof target);
+    ray->t_max = INFINITY;
+    uint64_t choice = twin_random(state) % 4;
+    if (choice == 0)
+        ray->t_max = (double)twin_integer(state, 0, 4) / 2;
+    if (choice == 1)
+        ray->t_max = nudged(1, state);
+    if (kind == 5 || kind == 11) {
+        int range = kind == 11 ? 1000 : 300, lengths = (int)twin_integer(state, -range, range - 1), directions = (int)twin_integer(state, -range, range - 1);
+        scale_all(ray, triangle, lengths, directions);
+        ray->t_max = ldexp(ray->t_max, lengths - directions);
+    }
+}
+
+/* --- rays --- */
+
+typedef struct tally {
+    long cases, hits, touches, misses;
+} tally;
+
+static void check_ray(const ebpo_segment *ray, const double triangle[3][3], int kind, tally *count)
+{
+    interval r;
+    ebpo_ray_meeting m;
+    int side = twin_ray(ray, triangle, &r);
+    ebpo_ray_triangle(ray, triangle, &m);
+    ck_assert_msg(m.meets == r.any, "kind %d, case %ld: meets %d, twin %d", kind, count->cases, m.meets, r.any);
+    if (m.meets) {
+        ck_assert_msg(m.side == side, "kind %d, case %ld: side %d, twin %d", kind, count->cases, m.side, side);
+        ck_assert_msg(close_enough(m.t, r.low), "kind %d, case %ld: t %a, twin %a", kind, count->cases, m.t, mpq_get_d(r.low));
+        ck_assert(m.t <= ray->t_max);
+    }
+    count->cases++;
+    count->misses += !r.any;
+    count->hits += r.any && side;
+    count->touches += r.any && !side;
+    interval_clear(&r);
+}
+
+/* The limit exactly at the hit, and next to it, where the hit's t is a double. */
+static void check_limits(ebpo_segment *ray, const double triangle[3][3], int kind, tally *count)
+{
+    ebpo_ray_meeting m;
+    ebpo_ray_triangle(ray, triangle, &m);
+    if (!m.meets || m.t == INFINITY)
+        return;
+    double t = m.t;
+    for (int step = -1; step <= 1; step++) {
+        ray->t_max = step < 0 ? fmax(0, nextafter(t, 0)) : step > 0 ? nextafter(t, INFINITY) : t;
+        check_ray(ray, triangle, kind, count);
+    }
+}
+
+START_TEST(rays_meet_triangles_as_rational_clipping_says)
+{
+    tally count = {0};
+    uint64_t state = 11 + (uint64_t)_i;
+    for (int i = 0; i < (_i == 11 ? ROUNDS / 4 : ROUNDS); i++) {
+        ebpo_segment ray;
+        double triangle[3][3];
+        ray_case(_i, &ray, triangle, &state);
+        check_ray(&ray, (const double (*)[3])triangle, _i, &count);
+        check_limits(&ray, (const double (*)[3])triangle, _i, &count);
+    }
+    ck_assert_msg(count.hits + count.touches > 400 && count.misses > 400, "kind %d: %ld hits, %ld touches, %ld misses", _i, count.hits, count.touches, count.misses);
+}
+END_TEST
+
+START_TEST(rays_meet_triangles_of_hard_coordinates)
+{
+    tally count = {0};
+    uint64_t state = 99;
+    for (int i = 0; i < 1500; i++)
+        for (int kind = 0; kind < TWIN_KINDS; kind++) {
+            double p[12], triangle[3][3];
+            ebpo_segment ray = {.t_max = INFINITY};
+            twin_points(p, 3, kind, &state);
+            memcpy(triangle, p, sizeof triangle);
+            memcpy(ray.origin, p + 9, sizeof ray.origin);
+            for (int k = 0; k < 3; k++) {
+                double by_half = .25 * p[k] + .25 * p[3 + k] + .5 * p[6 + k] - p[9 + k];
+                ray.direction[k] = i % 2 ? p[9 + k] - p[3 * (i / 2 % 3) + k] : by_half;
+                if (!(fabs(ray.direction[k]) < INFINITY))
+                    ray.direction[k] = 1;
+            }
+            if (ray.direction[0] == 0 && ray.direction[1] == 0 && ray.direction[2] == 0)
+                ray.direction[i % 3] = -1;
+            check_ray(&ray, (const double (*)[3])triangle, kind, &count);
+            check_limits(&ray, (const double (*)[3])triangle, kind, &count);
+        }
+    ck_assert(count.hits > 100 && count.touches > 100 && count.misses > 100);
+}
+END_TEST
+
+/* Fans around a common corner or edge give ties; others differ by little. */
+START_TEST(hits_are_ordered_as_rationals_are)
+{
+    uint64_t state = 5;
+    long ties = 0, other = 0;
+    for (int i = 0; i < 60000; i++) {
+        ebpo_segment ray;
+        double a[3][3], b[3][3], other_case[3][3];
+        interval ra, rb;
+        ebpo_segment unused;
+        ray_case(i % RAY_KINDS, &ray, a, &state);
+        ray.t_max = INFINITY;
+        ray_case(i % RAY_KINDS, &unused, other_case, &state);
+        memcpy(b, a, sizeof a);
+        memcpy(b[2], other_case[2], sizeof b[2]);
+        if (twin_random(&state) % 4 == 0)
+            b[1][0] = nudged(b[1][0], &state);
+        if (twin_random(&state) % 8 == 0)
+            memcpy(b, other_case, sizeof b);
+        twin_ray(&ray, (const double (*)[3])a, &ra);
+        twin_ray(&ray, (const double (*)[3])b, &rb);
+        if (ra.any && rb.any) {
+            int order = mpq_cmp(ra.low, rb.low);
+            order = (order > 0) - (order < 0);
+            ck_assert_int_eq(ebpo_ray_compare(&ray, (const double (*)[3])a, (const double (*)[3])b), order);
+            ck_assert_int_eq(ebpo_ray_compare(&ray, (const double (*)[3])b, (const double (*)[3])a), -order);
+            ties += order == 0;
+            other += order != 0;
+        }
+        interval_clear(&ra);
+        interval_clear(&rb);
+    }
+    ck_assert_msg(ties > 3000 && other > 3000, "%ld ties, %ld others", ties, other);
+}
+END_TEST
+
+START_TEST(simple_rays_are_answered_by_hand)
+{
+    const double t[3][3] = {{0, 0, 1}, {2, 0, 1}, {0, 2, 1}}; /* normal +z */
+    const double flat[3][3] = {{1, 0, 0}, {3, 0, 0}, {2, 0, 0}}, point[3][3] = {{1, 1, 1}, {1, 1, 1}, {1, 1, 1}};
+    const struct {
+        ebpo_segment ray;
+        const double (*triangle)[3];
+        ebpo_ray_meeting expected;
+    } cases[] = {
+        {{{.5, .5, 0}, {0, 0, 2}, INFINITY}, t, {true, -1, .5}},
+        {{{.5, .5, 2}, {0, 0, -1}, INFINITY}, t, {true, 1, 1}},
+        {{{.5, .5, 2}, {0, 0, -1}, 1}, t, {true, 1, 1}},
+        {{{.5, .5, 2}, {0, 0, -1}, 0x1.fffffffffffffp-1}, t, {false, 0, 0}},
+        {{{.5, .5, 1}, {0, 0, -1}, 0}, t, {true, 1, 0}},
+        {{{.5, .5, 0}, {0, 0, -1}, INFINITY}, t, {false, 0, 0}},
+        {{{1, 1, 0}, {0, 0, 1}, INFINITY}, t, {true, 0, 1}},
+        {{{0, 0, 0}, {0, 0, 1}, INFINITY}, t, {true, 0, 1}},
+        {{{-1, 1, 1}, {1, 0, 0}, INFINITY}, t, {true, 0, 1}},
+        {{{.5, .5, 1}, {1, 0, 0}, INFINITY}, t, {true, 0, 0}},
+        {{{-1, 1, 1.5}, {1, 0, 0}, INFINITY}, t, {false, 0, 0}},
+        {{{2, -1, 0}, {0, 4, 0}, INFINITY}, flat, {true, 0, .25}},
+        {{{0, 0, 0}, {1, 0, 0}, INFINITY}, flat, {true, 0, 1}},
+        {{{4, 0, 0}, {1, 0, 0}, INFINITY}, flat, {false, 0, 0}},
+        {{{0, 0, 0}, {1, 1, 1}, 1}, point, {true, 0, 1}},
+        {{{0, 0, 0}, {1, 1, 2}, INFINITY}, point, {false, 0, 0}},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        ebpo_ray_meeting m;
+        ebpo_ray_triangle(&cases[i].ray, cases[i].triangle, &m);
+        ck_assert_msg(m.meets == cases[i].expected.meets && m.side == cases[i].expected.side, "case %zu", i);
+        ck_assert_msg(!m.meets || m.t == cases[i].expected.t, "case %zu: t %g", i, m.t);
+    }
+}
+END_TEST
+
+/* --- boxes --- */
+
+enum { CLIPPED_MOST = 16 };
+
+typedef struct rational_polygon {
+    rational3 p[CLIPPED_MOST];
+    int n;
+} rational_polygon;
+
+static void polygon_push(rational_polygon *poly, const rational3 *p)
+{
+    ck_assert_int_lt(poly->n, CLIPPED_MOST);
+    init3(&poly->p[poly->n]);
+    for (int k = 0; k < 3; k++)
+        mpq_set(poly->p[poly->n].x[k], p->x[k]);
+    poly->n++;
+}
+
+static void polygon_clear(rational_polygon *poly)
+{
+    while (poly->n > 0)
+        clear3(&poly->p[--poly->n]);
+}
+
+/* Where the segment from p to q meets x[axis] = at. */
+static void push_cut(rational_polygon *out, const rational3 *p, const rational3 *q, int axis, const mpq_t at)
+{
+    rational3 cut;
+    mpq_t s, length;
+    mpq_inits(s, length, NULL);
+    init3(&cut);
+    mpq_sub(s, at, p->x[axis]);
+    mpq_sub(length, q->x[axis], p->x[axis]);
+    mpq_div(s, s, length);
+    for (int k = 0; k < 3; k++) {
+        mpq_sub(length, q->x[k], p->x[k]);
+        mpq_mul(length, length, s);
+        mpq_add(cut.x[k], p->x[k], length);
+    }
+    polygon_push(out, &cut);
+    clear3(&cut);
+    mpq_clears(s, length, NULL);
+}
+
+/* Sutherland and Hodgman 1974: keeps side * (x[axis] - at) >= 0. */
+static void cut_polygon(rational_polygon *poly, int axis, int side, double at)
+{
+    rational_polygon out = {.n = 0};
+    mpq_t limit;
+    mpq_init(limit);
+    mpq_set_d(limit, at);
+    for (int i = 0; i < poly->n; i++) {
+        const rational3 *p = &poly->p[i], *q = &poly->p[(i + 1) % poly->n];
+        int here = side * mpq_cmp(p->x[axis], limit), next = side * mpq_cmp(q->x[axis], limit);
+        if (here >= 0)
+            polygon_push(&out, p);
+        if ((here < 0 && next > 0) || (here > 0 && next < 0))
+            push_cut(&out, p, q, axis, limit);
+    }
+    mpq_clear(limit);
+    polygon_clear(poly);
+    *poly = out;
+}
+
+static bool twin_box(const double triangle[3][3], const double min[3], const double max[3])
+{
+    rational_polygon poly = {.n = 0};
+    for (int i = 0; i < 3; i++) {
+        rational3 p;
+        set3(&p, triangle[i]);
+        polygon_push(&poly, &p);
+        clear3(&p);
+    }
+    for (int k = 0; k < 3; k++) {
+        cut_polygon(&poly, k, 1, min[k]);
+        cut_polygon(&poly, k, -1, max[k]);
+    }
+    bool meets = poly.n > 0;
+    polygon_clear(&poly);
+    return meets;
+}
+
+static void box_case(int kind, double triangle[3][3], double min[3], double max[3], uint64_t *state)
+{
+    double centre[3], half = kind == 0 ? 1 : .25 * fabs(twin_uniform(state));
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; i < 3; i++)
+            triangle[i][k] = kind == 0 ? small(state, 3) : kind == 1 ? small(state, 20) : twin_uniform(state);
+    point_of((const double (*)[3])triangle, centre, state);
+    if (kind == 3)
+        for (int k = 0; k < 3; k++)
+            triangle[2][k] = nudged(.5 * (triangle[0][k] + triangle[1][k]), state);
+    if (kind == 4 || (kind <= 1 && twin_random(state) % 4 == 0))
+        flatten(triangle, state);
+    for (int k = 0; k < 3; k++) {
+        double a = kind == 0 ? small(state, 3) : kind == 1 ? small(state, 20) : centre[k] - 2 * half * twin_uniform(state);
+        double b = kind == 0 ? small(state, 3) : kind == 1 ? a + 16 : a + half;
+        /* A corner of the box on the triangle, or one step off; flat boxes and points. */
+        if (kind == 2 || kind == 5) {
+            a = nudged(centre[k], state);
+            b = a + half;
+        }
+        if (kind == 5 && twin_random(state) % 2) {
+            b = a;
+            a = b - half;
+        }
+        if (twin_random(state) % (kind == 2 ? 2 : 8) == 0)
+            b = a;
+        min[k] = fmin(a, b);
+        max[k] = fmax(a, b);
+    }
+    int shift = kind == 6 ? (int)twin_integer(state, -1000, 1000) : 0;
+    for (int k = 0; k < 3; k++) {
+        for (int i = 0; i < 3; i++)
+            triangle[i][k] = ldexp(triangle[i][k], shift);
+        min[k] = ldexp(min[k], shift);
+        max[k] = ldexp(max[k], shift);
+    }
+}
+
+START_TEST(boxes_meet_triangles_as_rational_clipping_says)
+{
+    long meets = 0, apart = 0;
+    uint64_t state = 21 + (uint64_t)_i;
+    for (int i = 0; i < (_i == 6 ? ROUNDS / 2 : ROUNDS); i++) {
+        double triangle[3][3], min[3], max[3];
+        box_case(_i, triangle, min, max, &state);
+        bool expected = twin_box((const double (*)[3])triangle, min, max);
+        ck_assert_msg(ebpo_triangle_meets_box((const double (*)[3])triangle, min, max) == expected, "kind %d, case %d: twin says %d", _i, i, expected);
+        meets += expected;
+        apart += !expected;
+    }
+    ck_assert_msg(meets > 300 && apart > 300, "kind %d: %ld meet, %ld apart", _i, meets, apart);
+}
+END_TEST
+
+START_TEST(boxes_of_points_meet_what_they_lie_on)
+{
+    const double t[3][3] = {{0, 0, 0}, {4, 0, 0}, {0, 4, 4}}, on[3] = {1, 1, 1}, off[3] = {1, 1, 0x1.0000000000001p0};
+    const double far[3] = {3, 3, 3}, low[3] = {2, 2, 2}, edge[3] = {2, 2, 2}, high[3] = {9, 9, 9};
+    ck_assert(ebpo_triangle_meets_box(t, on, on));
+    ck_assert(!ebpo_triangle_meets_box(t, off, off));
+    ck_assert(!ebpo_triangle_meets_box(t, far, far));
+    ck_assert(ebpo_triangle_meets_box(t, low, high));
+    ck_assert(ebpo_triangle_meets_box(t, edge, edge));
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("ray");
+    TCase *rays = tcase_create("rays"), *boxes = tcase_create("boxes");
+    tcase_set_timeout(rays, 600);
+    tcase_set_timeout(boxes, 600);
+    tcase_add_test(rays, simple_rays_are_answered_by_hand);
+    tcase_add_loop_test(rays, rays_meet_triangles_as_rational_clipping_says, 0, RAY_KINDS);
+    tcase_add_test(rays, rays_meet_triangles_of_hard_coordinates);
+    tcase_add_test(rays, hits_are_ordered_as_rationals_are);
+    tcase_add_test(boxes, boxes_of_points_meet_what_they_lie_on);
+    tcase_add_loop_test(boxes, boxes_meet_triangles_as_rational_clipping_says, 0, BOX_KINDS);
+    suite_add_tcase(suite, rays);
+    suite_add_tcase(suite, boxes);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_NORMAL);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+}

@@ -1,0 +1,530 @@
+/* Files from memory, from paths and from a caller's own source: the same trees, few reads, and every failure of a read told as what it is. */
+#include <check.h>
+#include <hdf5.h>
+#include <pthread.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "container/reader.h"
+#include "random_tree.h"
+#include "tree_json.h"
+
+/* libhdf5 1.10 itself leaks when opening a damaged file fails; that is not what we look for here. */
+__attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
+const char *__lsan_default_suppressions(void)
+{
+    return "leak:libhdf5";
+}
+
+static char folder[64], path[128], rewritten[128];
+static uint8_t *data; /* the bytes of `path`, in a block of exactly their size */
+static size_t size;
+static char *expected; /* the tree in it */
+
+static uint8_t *slurp(const char *name, size_t *bytes)
+{
+    FILE *f = fopen(name, "rb");
+    ck_assert_ptr_nonnull(f);
+    fseek(f, 0, SEEK_END);
+    *bytes = (size_t)ftell(f);
+    rewind(f);
+    uint8_t *all = malloc(*bytes);
+    ck_assert_uint_eq(fread(all, 1, *bytes, f), *bytes);
+    fclose(f);
+    return all;
+}
+
+static char *text_of(const ebpo_tree *tree)
+{
+    char *text = NULL;
+    size_t length = 0;
+    FILE *out = open_memstream(&text, &length);
+    tree_json(out, tree);
+    fclose(out);
+    return text;
+}
+
+static char *read_text(ebpo_file *file, unsigned threads)
+{
+    ebpo_tree tree;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert_msg(ebpo_file_read_tree(file, &tree, threads, &error) == EBPO_OK, "%s", error.message);
+    char *text = text_of(&tree);
+    ebpo_tree_free(&tree);
+    return text;
+}
+
+static void expect_tree(ebpo_file *file, unsigned threads)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    char *text = read_text(file, threads);
+    ck_assert_msg(strcmp(text, expected) == 0, "another tree came back");
+    ck_assert_msg(ebpo_file_check_content(file, threads, &error) == EBPO_OK, "%s", error.message);
+    free(text);
+}
+
+static void make_file(const random_tree_options *options, ebpo_codec codec)
+{
+    ebpo_tree tree;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
+    write.codec = codec;
+    random_tree_make(&tree, options);
+    ck_assert_msg(ebpo_tree_write(&tree, path, &write, &error) == EBPO_OK, "%s", error.message);
+    ebpo_tree_free(&tree);
+    free(data);
+    data = slurp(path, &size);
+    ebpo_file *file;
+    ck_assert_msg(ebpo_open(&file, path, &error) == EBPO_OK, "%s", error.message);
+    free(expected);
+    expected = read_text(file, 1);
+    ebpo_close(file);
+}
+
+static const random_tree_options small = { 2, 3, 3, 5, true, false, false, false };
+static const random_tree_options large = { 7, 3, 9, 90000, true, false, false, false }; /* several chunks in many arrays */
+
+static void set_up(void)
+{
+    snprintf(folder, sizeof folder, "/tmp/ebpo-source-XXXXXX");
+    ck_assert_ptr_nonnull(mkdtemp(folder));
+    snprintf(path, sizeof path, "%s/a.ebpo.h5", folder);
+    snprintf(rewritten, sizeof rewritten, "%s/b.ebpo.h5", folder);
+}
+
+static void tear_down(void)
+{
+    char command[128];
+    snprintf(command, sizeof command, "rm -rf '%s'", folder);
+    ck_assert_int_eq(system(command), 0);
+    free(data);
+    free(expected);
+    data = NULL;
+    expected = NULL;
+}
+
+/* A source over `data` that fails at its `fail_at`-th read, counted from 0. */
+typedef struct probe {
+    _Atomic unsigned reads, closes;
+    unsigned fail_at;
+    ebpo_status status;
+    bool silent;
+} probe;
+
+static ebpo_status probe_read(void *user, uint64_t offset, uint64_t bytes, void *to, ebpo_error *error)
+{
+    probe *p = user;
+    ck_assert(offset <= size && bytes <= size - offset && bytes > 0);
+    if (p->reads++ == p->fail_at) {
+        if (!p->silent) {
+            error->status = p->status;
+            snprintf(error->message, sizeof error->message, "the line is dead");
+        }
+        return p->status;
+    }
+    memcpy(to, data + offset, bytes);
+    return EBPO_OK;
+}
+
+static void probe_close(void *user)
+{
+    probe *p = user;
+    p->closes++;
+}
+
+static ebpo_status open_probe(ebpo_file **file, probe *p, ebpo_error *error)
+{
+    ebpo_source source = { p, size, probe_read, probe_close };
+    return ebpo_open_source(file, &source, "afar", error);
+}
+
+/* The same content as libhdf5 arranges it by default: metadata here and there, chunks in B-trees. */
+static void rewrite_with_trees(void)
+{
+    static const char *const groups[] = { "levels", "mesh", "maps" };
+    hid_t in = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT), out = H5Fcreate(rewritten, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+    for (int i = 0; i < 3; i++)
+        ck_assert_int_ge(H5Ocopy(in, groups[i], out, groups[i], H5P_DEFAULT, H5P_DEFAULT), 0);
+    H5O_info_t facts;
+    ck_assert_int_ge(H5Oget_info2(in, &facts, H5O_INFO_NUM_ATTRS), 0);
+    for (hsize_t i = 0; i < facts.num_attrs; i++) {
+        char name[64], value[512];
+        hid_t from = H5Aopen_by_idx(in, ".", H5_INDEX_NAME, H5_ITER_INC, i, H5P_DEFAULT, H5P_DEFAULT);
+        hid_t type = H5Aget_type(from), space = H5Aget_space(from);
+        ck_assert_int_gt(H5Aget_name(from, sizeof name, name), 0);
+        ck_assert_int_ge(H5Aread(from, type, value), 0);
+        hid_t to = H5Acreate2(out, name, type, space, H5P_DEFAULT, H5P_DEFAULT);
+        ck_assert_int_ge(H5Awrite(to, type, value), 0);
+        H5Aclose(to);
+        H5Aclose(from);
+        H5Tclose(type);
+        H5Sclose(space);
+    }
+    H5Fclose(in);
+    H5Fclose(out);
+}
+
+/* One array again without filters, all chunks set aside at once: libhdf5 then computes their places and stores no table. */
+static void strip(hid_t file, const char *name)
+{
+    hid_t old = H5Dopen2(file, name, H5P_DEFAULT), type = H5Dget_type(old), space = H5Dget_space(old);
+    hid_t from = H5Dget_create_plist(old), plain = H5Pcreate(H5P_DATASET_CREATE);
+    hsize_t chunk[2], dims[2] = { 1, 1 };
+    int rank = H5Pget_chunk(from, 2, chunk);
+    H5Sget_simple_extent_dims(space, dims, NULL);
+    void *values = malloc(dims[0] * dims[1] * H5Tget_size(type));
+    ck_assert_int_ge(H5Dread(old, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), 0);
+    H5Pset_chunk(plain, rank, chunk);
+    H5Pset_alloc_time(plain, H5D_ALLOC_TIME_EARLY);
+    ck_assert_int_ge(H5Ldelete(file, name, H5P_DEFAULT), 0);
+    hid_t fresh = H5Dcreate2(file, name, type, space, H5P_DEFAULT, plain, H5P_DEFAULT);
+    ck_assert_int_ge(H5Dwrite(fresh, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), 0);
+    free(values);
+    H5Pclose(from);
+    H5Pclose(plain);
+    H5Sclose(space);
+    H5Tclose(type);
+    H5Dclose(old);
+    H5Dclose(fresh);
+}
+
+static herr_t list_array(hid_t group, const char *name, const H5O_info_t *info, void *user)
+{
+    (void)group;
+    char(**next)[64] = user;
+    if (info->type == H5O_TYPE_DATASET)
+        snprintf(*(*next)++, 64, "%s", name);
+    return 0;
+}
+
+static void rewrite_without_filters(void)
+{
+    static char names[256][64];
+    char(*next)[64] = names;
+    FILE *f = fopen(rewritten, "wb");
+    ck_assert_uint_eq(fwrite(data, 1, size, f), size);
+    fclose(f);
+    ck_assert_int_eq(ebpo_register_filters(NULL), EBPO_OK);
+    hid_t fapl = H5Pcreate(H5P_FILE_ACCESS);
+    H5Pset_libver_bounds(fapl, H5F_LIBVER_V110, H5F_LIBVER_V110);
+    hid_t file = H5Fopen(rewritten, H5F_ACC_RDWR, fapl);
+    ck_assert_int_ge(H5Ovisit2(file, H5_INDEX_NAME, H5_ITER_INC, list_array, &next, H5O_INFO_BASIC), 0);
+    while (next-- != names)
+        strip(file, *next);
+    H5Pclose(fapl);
+    H5Fclose(file);
+}
+
+START_TEST(memory_paths_and_sources_give_equal_trees)
+{
+    for (int codec = EBPO_CODEC_ZSTD; codec <= EBPO_CODEC_NONE; codec++) {
+        probe p = { .fail_at = UINT32_MAX };
+        ebpo_file *file[3];
+        make_file(_i ? &large : &small, (ebpo_codec)codec);
+        ck_assert_int_eq(ebpo_open(&file[0], path, NULL), EBPO_OK);
+        ck_assert_int_eq(ebpo_open_memory(&file[1], data, size, "bytes", NULL), EBPO_OK);
+        ck_assert_int_eq(open_probe(&file[2], &p, NULL), EBPO_OK);
+        for (int i = 0; i < 3; i++) {
+            expect_tree(file[i], 2);
+            ck_assert_uint_eq(p.closes, 0);
+            ck_assert_uint_eq(ebpo_file_info(file[i])->file_bytes, size);
+            ebpo_close(file[i]);
+        }
+        ck_assert_uint_eq(p.closes, 1);
+    }
+}
+END_TEST
+
+START_TEST(one_read_opens_a_file_and_each_byte_of_an_array_is_read_once)
+{
+    uint64_t bytes, reads, later, later_reads;
+    ebpo_file *file;
+    ebpo_tree tree;
+    make_file(&large, EBPO_CODEC_ZSTD);
+    ck_assert_int_eq(ebpo_open(&file, path, NULL), EBPO_OK);
+    const ebpo_info *info = ebpo_file_info(file);
+    ebpo_file_traffic(file, &bytes, &reads);
+    ck_assert_uint_eq(reads, 1);
+    ck_assert_uint_eq(bytes, size < 131072 ? size : 131072);
+    ck_assert_int_eq(ebpo_file_read_tree(file, &tree, 1, NULL), EBPO_OK);
+    ebpo_file_traffic(file, &later, &later_reads);
+    ck_assert_uint_eq(later - bytes, size - info->head_bytes);
+    uint64_t arrays = 0, chunks = 0;
+    for (int i = 0; i < EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS; i++) {
+        const ebpo_array_in *a = i < EBPO_ARRAYS ? &file->root_array[i] : &file->level_array[0][0] + (i - EBPO_ARRAYS);
+        arrays += a->present;
+        chunks += a->present ? ebpo_h5_chunk_count(&a->shape) : 0;
+    }
+    ck_assert_uint_gt(chunks, arrays + 20);
+    ck_assert_uint_ge(later_reads - reads, arrays);
+    ck_assert_uint_lt(later_reads - reads, arrays + (chunks - arrays) / 2); /* neighbours come together */
+    ebpo_tree_free(&tree);
+    ebpo_close(file);
+}
+END_TEST
+
+/* Fails at read 0, 1, 2, ... of opening and of reading everything, until there are no more reads. */
+static unsigned fail_everywhere(ebpo_status status, bool silent)
+{
+    for (unsigned k = 0;; k++) {
+        probe p = { .fail_at = k, .status = status, .silent = silent };
+        ebpo_error error = EBPO_ERROR_INIT;
+        ebpo_file *file;
+        ebpo_tree tree;
+        ebpo_status got = open_probe(&file, &p, &error);
+        ck_assert((got == EBPO_OK) == (file != NULL));
+        ck_assert_int_eq(H5Fget_obj_count(H5F_OBJ_ALL, H5F_OBJ_ALL), 0);
+        ck_assert_uint_eq(p.closes, got != EBPO_OK);
+        if (got == EBPO_OK) {
+            got = ebpo_file_read_tree(file, &tree, 1, &error);
+            if (got == EBPO_OK)
+                ebpo_tree_free(&tree);
+            ebpo_close(file);
+        }
+        ck_assert_uint_eq(p.closes, 1);
+        if (p.reads <= k) {
+            ck_assert_int_eq(got, EBPO_OK);
+            return k;
+        }
+        ck_assert_msg(got == status, "read %u: %s, %s", k, ebpo_status_name(got), error.message);
+        ck_assert_ptr_nonnull(strstr(error.message, silent ? "afar: bytes " : "the line is dead"));
+    }
+}
+
+START_TEST(every_failing_read_is_told_as_such)
+{
+    make_file(&small, EBPO_CODEC_ZSTD);
+    ck_assert_uint_gt(fail_everywhere(EBPO_E_IO, false), 10);
+    ck_assert_uint_gt(fail_everywhere(EBPO_E_MEMORY, true), 10);
+}
+END_TEST
+
+START_TEST(every_failing_read_is_told_as_such_where_metadata_is_scattered)
+{
+    probe p = { .fail_at = UINT32_MAX };
+    ebpo_file *file;
+    make_file(&large, EBPO_CODEC_NONE);
+    rewrite_with_trees();
+    free(data);
+    data = slurp(rewritten, &size);
+    ck_assert_uint_gt(size, 1 << 20);
+    ck_assert_int_eq(open_probe(&file, &p, NULL), EBPO_OK);
+    ck_assert_uint_gt(p.reads, 3); /* so that there is something to fail behind the head */
+    ebpo_close(file);
+    fail_everywhere(EBPO_E_IO, false);
+}
+END_TEST
+
+START_TEST(files_that_libhdf5_rearranged_give_equal_trees)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file;
+    make_file(_i < 2 ? &small : &large, EBPO_CODEC_ZSTD);
+    if (_i % 2)
+        rewrite_without_filters();
+    else
+        rewrite_with_trees();
+    ck_assert_msg(ebpo_open(&file, rewritten, &error) == EBPO_OK, "%s", error.message);
+    expect_tree(file, 2);
+    ebpo_close(file);
+}
+END_TEST
+
+static void compare_table(hid_t fid, const ebpo_array_in *array, uint64_t *chunks)
+{
+    hid_t id = H5Dopen2(fid, array->path, H5P_DEFAULT);
+    uint64_t count = ebpo_h5_chunk_count(&array->shape), stored = 0;
+    ck_assert_int_ge(id, 0);
+    for (uint64_t i = 0; i < count; i++) {
+        hsize_t at[2] = { i * array->shape.chunk_rows, 0 }, bytes;
+        unsigned mask;
+        haddr_t address;
+        ck_assert_int_ge(H5Dget_chunk_info_by_coord(id, at, &mask, &address, &bytes), 0);
+        ck_assert_uint_eq(array->chunks[i].address, address);
+        ck_assert_uint_eq(array->chunks[i].bytes, bytes);
+        stored += bytes;
+    }
+    ck_assert_uint_eq(array->stored_bytes, stored);
+    ck_assert_uint_eq(H5Dget_storage_size(id), stored);
+    *chunks += count;
+    H5Dclose(id);
+}
+
+START_TEST(chunk_tables_are_what_libhdf5_says)
+{
+    ebpo_file *file;
+    uint64_t chunks = 0, arrays = 0;
+    make_file(&large, EBPO_CODEC_ZSTD);
+    const char *name = _i == 0 ? path : rewritten;
+    if (_i == 1)
+        rewrite_with_trees();
+    if (_i == 2)
+        rewrite_without_filters();
+    ck_assert_int_eq(ebpo_open(&file, name, NULL), EBPO_OK);
+    hid_t fid = H5Fopen(name, H5F_ACC_RDONLY, H5P_DEFAULT);
+    for (int i = 0; i < EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS; i++) {
+        const ebpo_array_in *a = i < EBPO_ARRAYS ? &file->root_array[i] : &file->level_array[0][0] + (i - EBPO_ARRAYS);
+        ck_assert_int_eq(a->present, a->chunks != NULL);
+        arrays += a->present;
+        if (a->present)
+            compare_table(fid, a, &chunks);
+    }
+    ck_assert_uint_gt(chunks, arrays + 20);
+    H5Fclose(fid);
+    ebpo_close(file);
+}
+END_TEST
+
+START_TEST(nothing_of_libhdf5_is_open_once_a_file_is)
+{
+    ebpo_file *file;
+    ebpo_error error = EBPO_ERROR_INIT;
+    make_file(&small, EBPO_CODEC_ZSTD);
+    ck_assert_int_eq(ebpo_open(&file, path, NULL), EBPO_OK);
+    ck_assert_int_eq(H5Fget_obj_count(H5F_OBJ_ALL, H5F_OBJ_ALL), 0);
+    ck_assert_int_eq(H5close(), 0); /* not even the library is needed any more */
+    expect_tree(file, 2);
+    ebpo_close(file);
+    ck_assert_msg(ebpo_open(&file, path, &error) == EBPO_OK, "%s", error.message); /* and it comes back */
+    ebpo_close(file);
+}
+END_TEST
+
+START_TEST(no_read_goes_beyond_bytes_in_memory)
+{
+    ebpo_tree tree;
+    make_file(&small, EBPO_CODEC_DEFLATE);
+    for (size_t cut = 0; cut < size; cut += cut < 64 ? 1 : 211) {
+        ebpo_file *file;
+        ebpo_error error = EBPO_ERROR_INIT;
+        uint8_t *bytes = malloc(cut);
+        memcpy(bytes, data, cut);
+        ebpo_status status = ebpo_open_memory(&file, bytes, cut, "cut.ebpo.h5", &error);
+        if (status == EBPO_OK) {
+            status = ebpo_file_read_tree(file, &tree, 1, &error);
+            ebpo_close(file);
+        }
+        ck_assert_int_eq(status, EBPO_E_FORMAT);
+        ck_assert_ptr_nonnull(strstr(error.message, "cut.ebpo.h5"));
+        ck_assert_int_eq(H5Fget_obj_count(H5F_OBJ_ALL, H5F_OBJ_ALL), 0);
+        free(bytes);
+    }
+}
+END_TEST
+
+START_TEST(a_file_cut_short_while_it_is_open_fails_as_input)
+{
+    ebpo_file *file;
+    ebpo_tree tree;
+    ebpo_error error = EBPO_ERROR_INIT;
+    make_file(&large, EBPO_CODEC_ZSTD);
+    ck_assert_int_eq(ebpo_open(&file, path, NULL), EBPO_OK);
+    ck_assert_int_eq(truncate(path, (off_t)size / 2), 0);
+    ck_assert_int_eq(ebpo_file_read_tree(file, &tree, 2, &error), EBPO_E_IO);
+    ck_assert_ptr_nonnull(strstr(error.message, path));
+    ck_assert_ptr_nonnull(strstr(error.message, "became shorter"));
+    ebpo_close(file);
+}
+END_TEST
+
+START_TEST(what_is_no_regular_file_fails_at_once)
+{
+    ebpo_file *file;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert_int_eq(mkfifo(path, 0600), 0);
+    ck_assert_int_eq(ebpo_open(&file, path, &error), EBPO_E_IO);
+    ck_assert_ptr_nonnull(strstr(error.message, "not a regular file"));
+    ck_assert_int_eq(ebpo_open(&file, folder, &error), EBPO_E_IO);
+    ck_assert_int_eq(ebpo_open(&file, rewritten, &error), EBPO_E_IO);
+    ck_assert_ptr_null(file);
+}
+END_TEST
+
+START_TEST(missing_arguments_are_refused_and_the_source_closed)
+{
+    probe p = { .fail_at = 0 };
+    ebpo_source source = { &p, 5, NULL, probe_close };
+    ebpo_file *file;
+    ck_assert_int_eq(ebpo_open_source(&file, &source, "x", NULL), EBPO_E_ARGUMENT);
+    ck_assert_uint_eq(p.closes, 1);
+    ck_assert_int_eq(ebpo_open_memory(&file, NULL, 5, NULL, NULL), EBPO_E_ARGUMENT);
+    ck_assert_int_eq(ebpo_open_memory(&file, NULL, 0, NULL, NULL), EBPO_E_FORMAT);
+    ck_assert_int_eq(ebpo_open_memory(&file, "text", 4, NULL, NULL), EBPO_E_FORMAT);
+    ck_assert_ptr_null(file);
+}
+END_TEST
+
+static void *read_in_thread(void *user)
+{
+    return read_text(user, 2);
+}
+
+START_TEST(threads_read_one_file_at_once)
+{
+    ebpo_file *file;
+    pthread_t thread[4];
+    void *text;
+    make_file(&large, EBPO_CODEC_ZSTD);
+    ck_assert_int_eq(ebpo_open(&file, path, NULL), EBPO_OK);
+    for (int i = 0; i < 4; i++)
+        ck_assert_int_eq(pthread_create(&thread[i], NULL, read_in_thread, file), 0);
+    for (int i = 0; i < 4; i++) {
+        ck_assert_int_eq(pthread_join(thread[i], &text), 0);
+        ck_assert_msg(strcmp(text, expected) == 0, "another tree came back");
+        free(text);
+    }
+    ebpo_close(file);
+}
+END_TEST
+
+static void *open_in_thread(void *user)
+{
+    for (int i = 0; i < 20; i++) {
+        ebpo_file *file;
+        if (ebpo_open(&file, user, NULL) != EBPO_OK)
+            return user;
+        ebpo_close(file);
+    }
+    return NULL;
+}
+
+START_TEST(threads_open_one_file_at_once)
+{
+    pthread_t thread[4];
+    void *failed;
+    make_file(&small, EBPO_CODEC_ZSTD);
+    for (int i = 0; i < 4; i++)
+        ck_assert_int_eq(pthread_create(&thread[i], NULL, open_in_thread, path), 0);
+    for (int i = 0; i < 4; i++) {
+        ck_assert_int_eq(pthread_join(thread[i], &failed), 0);
+        ck_assert_ptr_null(failed);
+    }
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("source");
+    TCase *tests = tcase_create("source");
+    tcase_set_timeout(tests, 300);
+    tcase_add_checked_fixture(tests, set_up, tear_down);
+    tcase_add_loop_test(tests, memory_paths_and_sources_give_equal_trees, 0, 2);
+    tcase_add_test(tests, one_read_opens_a_file_and_each_byte_of_an_array_is_read_once);
+    tcase_add_test(tests, every_failing_read_is_told_as_such);
+    tcase_add_test(tests, every_failing_read_is_told_as_such_where_metadata_is_scattered);
+    tcase_add_loop_test(tests, files_that_libhdf5_rearranged_give_equal_trees, 0, 4);
+    tcase_add_loop_test(tests, chunk_tables_are_what_libhdf5_says, 0, 3);
+    tcase_add_test(tests, nothing_of_libhdf5_is_open_once_a_file_is);
+    tcase_add_test(tests, no_read_goes_beyond_bytes_in_memory);
+    tcase_add_test(tests, a_file_cut_short_while_it_is_open_fails_as_input);
+    tcase_add_test(tests, what_is_no_regular_file_fails_at_once);
+    tcase_add_test(tests, missing_arguments_are_refused_and_the_source_closed);
+    tcase_add_test(tests, threads_read_one_file_at_once);
+    tcase_add_test(tests, threads_open_one_file_at_once);
+    suite_add_tcase(suite, tests);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_NORMAL);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed != 0;
+}

@@ -1,0 +1,116 @@
+/* ebpo measure: area, volume, centroid, inertia, and the volume of each level. */
+#include <stddef.h>
+#include <stdio.h>
+
+#include "command.h"
+#include "facts.h"
+
+typedef struct values {
+    bool json;
+    int64_t threads;
+} values;
+
+static const arg_option options[] = {
+    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
+    ARG_SWITCH("json", 0, values, json, "print the numbers as JSON"),
+    { 0 },
+};
+
+static const arg_spec spec = {
+    .command = "measure",
+    .operands = "FILE",
+    .least = 1,
+    .most = 1,
+    .summary = "area, volume, centroid and inertia, and the volume of each level",
+    .text = "FILE is an .ebpo.h5 file with its mesh. Volume, centroid and inertia are those of the winding number's integral\n"
+            "(density 1); a surface has an area only.",
+    .options = options,
+};
+
+/* --- words --- */
+
+static void print_levels(const ebpo_info *info)
+{
+    printf("%5s %24s %9s\n", "level", "envelopes' volume", info->solid ? "% solid" : "% box");
+    for (int i = 0; i < info->level_count; i++)
+        printf("%5d %24.16g %9.2f\n", i, facts_volume(info, i), facts_percent(info, i));
+}
+
+static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass *mass)
+{
+    printf("%s: %s%s%s\n", path, info->solid ? "a solid" : "a surface", info->unit[0] ? ", unit " : "", info->unit);
+    printf("  area      %.16g\n", mass->area);
+    if (info->solid) {
+        const double *c = mass->centroid;
+        printf("  volume    %.16g\n  centroid  %.16g %.16g %.16g\n", mass->volume, c[0], c[1], c[2]);
+        for (int k = 0; k < 3; k++)
+            printf("  %-9s %.16g %.16g %.16g\n", k ? "" : "inertia", mass->inertia[k][0], mass->inertia[k][1], mass->inertia[k][2]);
+    }
+    putchar('\n');
+    print_levels(info);
+}
+
+/* --- JSON --- */
+
+static void json_mass(json *j, const char *path, const ebpo_info *info, const ebpo_mass *mass)
+{
+    json_text(j, "file", path);
+    json_text(j, "kind", info->solid ? "solid" : "surface");
+    json_text(j, "unit", info->unit);
+    json_real(j, "area", mass->area);
+    if (info->solid) {
+        json_real(j, "volume", mass->volume);
+        json_reals(j, "centroid", mass->centroid, 3);
+        json_array(j, "inertia");
+        for (int k = 0; k < 3; k++)
+            json_reals(j, NULL, mass->inertia[k], 3);
+        json_end(j);
+    }
+    json_array(j, "levels");
+    for (int i = 0; i < info->level_count; i++) {
+        json_object(j, NULL);
+        json_int(j, "level", i);
+        json_real(j, "envelope_volume", facts_volume(info, i));
+        json_real(j, info->solid ? "percent_of_solid" : "percent_of_box", facts_percent(info, i));
+        json_end(j);
+    }
+    json_end(j);
+}
+
+static int measure(const char *path, const values *v)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file = NULL;
+    ebpo_mass mass;
+    if (ebpo_open(&file, path, &error) != EBPO_OK)
+        return command_failed("measure", &error);
+    ebpo_status status = ebpo_measure(file, (unsigned)v->threads, &mass, &error);
+    if (status == EBPO_OK && v->json) {
+        json j;
+        json_begin(&j, stdout);
+        json_object(&j, NULL);
+        json_mass(&j, path, ebpo_file_info(file), &mass);
+        json_finish(&j);
+    } else if (status == EBPO_OK)
+        print_mass(path, ebpo_file_info(file), &mass);
+    ebpo_close(file);
+    return status == EBPO_OK ? EXIT_FINE : command_failed("measure", &error);
+}
+
+static int run(int argc, char **argv)
+{
+    values v = { 0 };
+    const char *operand[ARGS_OPERANDS_MAX];
+    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
+    if (parsed != ARGS_RUN)
+        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    int is_hdf5 = command_is_hdf5("measure", operand[0]);
+    if (is_hdf5 < 0)
+        return EXIT_FAILED;
+    if (is_hdf5)
+        return measure(operand[0], &v);
+    fprintf(stderr, "ebpo measure: %s: is not an .ebpo.h5 file; for a mesh try 'ebpo check'\n", operand[0]);
+    return EXIT_FAILED;
+}
+
+const command command_measure = { &spec, run };
