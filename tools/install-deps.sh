@@ -1,5 +1,6 @@
 #!/bin/sh
-# Installs the Debian packages that building needs; with --tests also what the tests need, with --demo what the quick start needs.
+# Installs the Debian packages that building needs; with --tests also what the tests need, with --demo what the quick start needs,
+# with --bench the peers of the benchmarks.
 set -eu
 # dpkg-dev tells meson where libraries go on Debian.
 packages="gcc dpkg-dev pkg-config meson ninja-build libhdf5-dev libzstd-dev zlib1g-dev libgmp-dev nettle-dev libassimp-dev libpng-dev"
@@ -7,7 +8,8 @@ for option in "$@"; do
     case $option in
     --tests) packages="$packages check hdf5-tools python3 python3-h5py python3-numpy clang libclang-rt-14-dev g++ mandoc" ;;
     --demo) packages="$packages hdf5-tools glmark2-data python3-h5py" ;;
-    *) echo "usage: install-deps.sh [--tests] [--demo]" >&2; exit 2 ;;
+    --bench) packages="$packages g++ libembree-dev libcgal-dev python3 python3-numpy" ;;
+    *) echo "usage: install-deps.sh [--tests] [--demo] [--bench]" >&2; exit 2 ;;
     esac
 done
 missing=

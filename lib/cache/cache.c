@@ -223,7 +223,7 @@ static room make_room(ebpo_cache *c, const demand *d)
         }
         release_all(c, leaving);
     }
-    count_bytes(c, d->peak); c->stats.bytes -= d->peak/2;
+    count_bytes(c, d->peak);
     c->passing += d->peak;
     return ROOM_MADE;
 }

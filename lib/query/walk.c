@@ -54,6 +54,9 @@ const uint32_t *ebpo_spot_planes(const ebpo_model *model, const ebpo_spot *spot,
     return spot->subtree->gray_planes + spot->subtree->gray_first[value];
 }
 
+/* A node may list a face that only comes near, within 1/256 of the cell's size on each axis (format-spec, section 5); and some room for rounding. */
+static const double near_share = 0x1.1p-8;
+
 static void cell_of(const ebpo_box *box, int level, const uint32_t at[3], double low[3], double size[3])
 {
     for (int k = 0; k < 3; k++) {
@@ -77,11 +80,7 @@ double ebpo_spot_diagonal(const ebpo_model *model, const ebpo_spot *spot)
     ebpo_box box = ebpo_model_box(model);
     double low[3], size[3];
     cell_of(&box, spot->level, spot->at, low, size);
-    /* A node lists faces that come within 2^-40 of the cell's size and of the coordinates: format-spec, section 5. */
-    double near = 0;
-    for (int k = 0; k < 3; k++)
-        near = fmax(near, (fabs(low[k]) + size[k]) * 0x1p-38);
-    return length3(size) * (1 + 0x1p-30) + near;
+    return length3(size) * (1 + near_share);
 }
 
 /* Value of a half-space at p, 4096 n . xi - d, and a bound on its error. */
@@ -138,11 +137,9 @@ double ebpo_envelope_distance(const ebpo_box *box, int level, const uint32_t at[
 
 double ebpo_cell_far(const ebpo_box *box, int level, const uint32_t at[3], const double p[3])
 {
-    double low[3], size[3], d[3], near = 0;
+    double low[3], size[3], d[3];
     cell_of(box, level, at, low, size);
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < 3; k++)
         d[k] = fmax(fabs(p[k] - low[k]), fabs(p[k] - (low[k] + size[k])));
-        near = fmax(near, (fabs(low[k]) + size[k]) * 0x1p-38);
-    }
-    return length3(d) * (1 + 0x1p-40) + near;
+    return length3(d) * (1 + 0x1p-40) + length3(size) * near_share;
 }

@@ -3,6 +3,8 @@
 #include <stdlib.h>
 
 #include "base/alloc.h"
+#include "verify/touch.h"
+#include "verify/winding.h"
 
 static void unlisted(ebpo_tally *tally, const ebpo_view_node *node, uint32_t face, const char *text)
 {
@@ -22,6 +24,41 @@ static face_list list_of(const ebpo_view *view, const ebpo_view_node *leaf)
     face_list list = {.first = level->leaf_first[leaf->rank], .new_count = level->leaf_new[leaf->rank]};
     list.refs = ebpo_view_refs(view, leaf, &list.ref_count);
     return list;
+}
+
+static bool among(const uint32_t *faces, uint64_t count, uint32_t face)
+{
+    for (uint64_t i = 0; i < count; i++)
+        if (faces[i] == face)
+            return true;
+    return false;
+}
+
+/* A listed face that does not touch the leaf must touch it widened by 1/256: level-limited distances rest on that. */
+static void check_near(ebpo_tally *tally, const ebpo_view *view, const ebpo_view_node *leaf, uint32_t face)
+{
+    ebpo_frame frame = ebpo_frame_make(&view->box, leaf->cell);
+    ebpo_corners corners;
+    for (int k = 0; k < 3; k++) {
+        double more = (frame.high[k] - frame.low[k]) * 0x1p-8;
+        frame.low[k] -= more;
+        frame.high[k] += more;
+        frame.inverse[k] = 1 / (frame.high[k] - frame.low[k]);
+    }
+    ebpo_face_corners(&view->tree->mesh, face, &corners);
+    if (!ebpo_face_touches(&frame, &corners, tally))
+        unlisted(tally, leaf, face, "the leaf lists a face that does not come near it");
+}
+
+static void check_spare(ebpo_tally *tally, const ebpo_view *view, const ebpo_view_node *leaf, const face_list *list, const uint32_t *faces,
+                        uint64_t count)
+{
+    for (uint32_t i = 0; i < list->ref_count; i++)
+        if (!among(faces, count, list->refs[i]))
+            check_near(tally, view, leaf, list->refs[i]);
+    for (uint32_t i = 0; i < list->new_count; i++)
+        if (!among(faces, count, (uint32_t)(list->first + i)))
+            check_near(tally, view, leaf, (uint32_t)(list->first + i));
 }
 
 static void check_leaf(ebpo_tally *tally, const ebpo_view *view, const ebpo_view_node *leaf, const uint32_t *faces, uint64_t count)
@@ -44,7 +81,10 @@ static void check_leaf(ebpo_tally *tally, const ebpo_view *view, const ebpo_view
     if (list.ref_count && list.refs[list.ref_count - 1] >= list.first)
         unlisted(tally, leaf, list.refs[list.ref_count - 1], "the list refers to a face that is not below its first new face");
     tally->checks[EBPO_VERIFY_LISTS] += count + list.ref_count + list.new_count;
-    tally->spare_entries += (uint64_t)list.ref_count + list.new_count - found;
+    uint64_t spare = (uint64_t)list.ref_count + list.new_count - found;
+    tally->spare_entries += spare;
+    if (spare)
+        check_spare(tally, view, leaf, &list, faces, count);
 }
 
 void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_view *view, const ebpo_view_node *node,
