@@ -1,11 +1,13 @@
 /* Built once for each set of compiler flags, with the predicates' sources built the same way: prints one hash of many results, of all stages. */
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 
 #include "exact_twin.h"
 #include "geom/cell.h"
 #include "geom/predicates.h"
 #include "geom/predicates_expansion.h"
+#include "geom/ray.h"
 
 enum { ROUNDS = 3000 };
 
@@ -47,6 +49,31 @@ static uint64_t hash_box(uint64_t hash, const double min[3], double extent)
     return hash;
 }
 
+/* The ray from the first point to one near the last, and to the middle of the others. */
+static uint64_t hash_rays(uint64_t hash, const double *p)
+{
+    const double triangle[3][3] = {{p[0], p[1], p[2]}, {p[3], p[4], p[5]}, {p[6], p[7], p[8]}};
+    const double other[3][3] = {{p[0], p[1], p[2]}, {p[6], p[7], p[8]}, {p[3], p[5], p[4]}};
+    ebpo_segment ray = {.t_max = 1.5};
+    for (int aim = 0; aim < 2; aim++) {
+        ebpo_ray_meeting m, n;
+        for (int k = 0; k < 3; k++) {
+            double to = aim == 0 ? p[k] : .25 * p[k] + .25 * p[3 + k] + .5 * p[6 + k];
+            ray.origin[k] = p[9 + k];
+            ray.direction[k] = to - p[9 + k] < INFINITY && to - p[9 + k] > -INFINITY ? to - p[9 + k] : 1;
+        }
+        if (ray.direction[0] == 0 && ray.direction[1] == 0)
+            ray.direction[0] = 1;
+        ebpo_ray_triangle(&ray, triangle, &m);
+        ebpo_ray_triangle(&ray, other, &n);
+        hash = mix_double(mix(hash, m.meets ? m.side : 7), m.t);
+        if (m.meets && n.meets)
+            hash = mix(hash, ebpo_ray_compare(&ray, triangle, other));
+    }
+    const double low[3] = {p[9], fmin(p[10], p[1]), p[11]}, high[3] = {p[9], fmax(p[10], p[1]), p[11]};
+    return mix(hash, ebpo_triangle_meets_box(triangle, low, high));
+}
+
 int main(void)
 {
     uint64_t hash = 0xcbf29ce484222325, state = 1;
@@ -57,6 +84,7 @@ int main(void)
             for (int k = 0; k < 12; k++)
                 hash = mix_double(hash, p[k]);
             hash = hash_points(hash, p);
+            hash = hash_rays(hash, p);
             hash = hash_box(hash, p, p[3] < 0 ? -p[3] : p[3]);
         }
     printf("%016" PRIx64 "\n", hash);

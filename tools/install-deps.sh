@@ -8,7 +8,7 @@ for option in "$@"; do
     case $option in
     --tests) packages="$packages check hdf5-tools python3 python3-h5py python3-numpy clang libclang-rt-14-dev g++ mandoc" ;;
     --demo) packages="$packages hdf5-tools glmark2-data python3-h5py" ;;
-    --bench) packages="$packages g++ libembree-dev libcgal-dev python3 python3-numpy" ;;
+    --bench) packages="$packages g++ libembree-dev libcgal-dev python3" ;;
     *) echo "usage: install-deps.sh [--tests] [--demo] [--bench]" >&2; exit 2 ;;
     esac
 done

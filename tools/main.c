@@ -10,8 +10,8 @@
 #include "command.h"
 #include "signals.h"
 
-static const command *const commands[] = { &command_convert, &command_check,  &command_info,
-                                           &command_extract, &command_render, &command_verify };
+static const command *const commands[] = { &command_convert, &command_check,  &command_info, &command_levels,
+                                           &command_extract, &command_measure, &command_render, &command_verify };
 enum { COMMANDS = sizeof commands / sizeof *commands };
 
 int command_failed(const char *name, const ebpo_error *error)

@@ -27,9 +27,32 @@ void ebpo_shuffle(const uint8_t *in, size_t bytes, size_t element_size, uint8_t 
             out[k * count + i] = in[i * element_size + k];
 }
 
+/* The usual element sizes byte by byte but element after element, which compilers turn into vector code. */
+static void unshuffle2(const uint8_t *in, size_t count, uint8_t *out)
+{
+    for (size_t i = 0; i < count; i++) {
+        out[2 * i] = in[i];
+        out[2 * i + 1] = in[count + i];
+    }
+}
+
+static void unshuffle4(const uint8_t *in, size_t count, uint8_t *out)
+{
+    for (size_t i = 0; i < count; i++)
+        ebpo_store32(out + 4 * i, in[i] | (uint32_t)in[count + i] << 8 | (uint32_t)in[2 * count + i] << 16 | (uint32_t)in[3 * count + i] << 24);
+}
+
 void ebpo_unshuffle(const uint8_t *in, size_t bytes, size_t element_size, uint8_t *out)
 {
     size_t count = bytes / element_size;
+    if (element_size == 2) {
+        unshuffle2(in, count, out);
+        return;
+    }
+    if (element_size == 4) {
+        unshuffle4(in, count, out);
+        return;
+    }
     for (size_t k = 0; k < element_size; k++)
         for (size_t i = 0; i < count; i++)
             out[i * element_size + k] = in[k * count + i];

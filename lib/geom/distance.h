@@ -23,7 +23,7 @@ void ebpo_triangle_distance_bounds(const double p[3], const double triangle[3][3
 
 typedef struct ebpo_triangle_nearest {
     double distance;      /* the double nearest to the exact distance (ties to even); INFINITY when that overflows */
-    double point[3];      /* nearest point, each coordinate within 2 ulp of the largest coordinate involved */
+    double point[3];      /* nearest point, each coordinate within 8 ulp of the largest coordinate involved */
     ebpo_feature feature; /* certain, never UNKNOWN; the lowest-dimensional one that contains the nearest point */
 } ebpo_triangle_nearest;
 /* Double-double arithmetic with an error bound, integers of any size (GMP) when that does not decide the rounding. */

@@ -109,7 +109,7 @@ static bool all_float(const ply_header *h)
     return true;
 }
 
-static ebpo_status allocate(ply_parser *p)
+static ebpo_status allocate_vertices(ply_parser *p)
 {
     const ply_header *h = &p->header;
     ebpo_mesh *mesh = p->mesh;
@@ -120,13 +120,21 @@ static ebpo_status allocate(ply_parser *p)
         mesh->xyz32 = coordinates;
     else
         mesh->xyz64 = coordinates;
-    p->face_capacity = h->face >= 0 ? h->element[h->face].count : 0;
-    mesh->faces = ebpo_alloc(p->face_capacity, 3 * sizeof *mesh->faces);
-    if (!coordinates || !mesh->faces)
-        return ebpo_fail_memory(p->error, mesh->vertex_count * 3 * width + p->face_capacity * 3 * sizeof *mesh->faces);
+    if (!coordinates)
+        return ebpo_fail_memory(p->error, mesh->vertex_count * 3 * width);
     if (h->encoding == PLY_ASCII && !(p->c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0)))
         return ebpo_fail_memory(p->error, 0);
     return EBPO_OK;
+}
+
+static ebpo_status allocate(ply_parser *p)
+{
+    const ply_header *h = &p->header;
+    p->face_capacity = h->face >= 0 ? h->element[h->face].count : 0;
+    p->mesh->faces = ebpo_alloc(p->face_capacity, 3 * sizeof *p->mesh->faces);
+    if (!p->mesh->faces)
+        return ebpo_fail_memory(p->error, p->face_capacity * 3 * sizeof *p->mesh->faces);
+    return allocate_vertices(p);
 }
 
 static ebpo_status read_element(ply_parser *p, const ply_element *element, bool store)
@@ -212,5 +220,49 @@ ebpo_status ebpo_ply_parse_memory(ebpo_mesh *out, const uint8_t *data, uint64_t 
     free(p.scratch);
     ebpo_ply_header_free(&p.header);
     *out = mesh;
+    return status;
+}
+
+/* Gives the vertices away, widened. */
+static ebpo_status give_points(ply_parser *p, double **xyz, uint64_t *count)
+{
+    ebpo_mesh *mesh = p->mesh;
+    if (mesh->xyz32) {
+        mesh->xyz64 = ebpo_alloc(mesh->vertex_count, 3 * sizeof(double));
+        if (!mesh->xyz64)
+            return ebpo_fail_memory(p->error, mesh->vertex_count * 3 * sizeof(double));
+        for (uint64_t i = 0; i < 3 * mesh->vertex_count; i++)
+            mesh->xyz64[i] = (double)mesh->xyz32[i];
+    }
+    *xyz = mesh->xyz64;
+    *count = mesh->vertex_count;
+    mesh->xyz64 = NULL;
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_points_parse_ply(double **xyz, uint64_t *count, const void *data, uint64_t size, const char *name, ebpo_error *error)
+{
+    ebpo_mesh mesh = { 0 };
+    ply_parser p = { .data = data, .size = size, .name = ebpo_path_name(name), .mesh = &mesh, .error = error };
+    *xyz = NULL;
+    *count = 0;
+    ebpo_status status = ebpo_ply_header_parse(&p.header, p.data, size, p.name, error);
+    if (status == EBPO_OK)
+        status = check_counts(&p);
+    if (status == EBPO_OK)
+        status = allocate_vertices(&p);
+    p.at = p.header.body;
+    p.line = p.header.body_line;
+    for (int64_t i = 0; status == EBPO_OK && i <= p.header.vertex; i++) /* what stands behind the vertices is not read */
+        status = read_element(&p, &p.header.element[i], i == p.header.vertex);
+    if (status == EBPO_OK)
+        status = give_points(&p, xyz, count);
+    free(mesh.xyz32);
+    free(mesh.xyz64);
+    if (p.c_locale)
+        freelocale(p.c_locale);
+    free(p.corners);
+    free(p.scratch);
+    ebpo_ply_header_free(&p.header);
     return status;
 }

@@ -43,17 +43,22 @@ typedef struct pass {
 
 static void frame_of(frame *f, const ebpo_mesh *mesh)
 {
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, half = 0, p[3];
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, half = 0, largest = 0, p[3];
     for (uint64_t i = 0; i < 3 * mesh->face_count; i++) {
         ebpo_mesh_position(mesh, mesh->faces[i], p);
         for (int k = 0; k < 3; k++) {
             low[k] = p[k] < low[k] ? p[k] : low[k];
             high[k] = p[k] > high[k] ? p[k] : high[k];
+            largest = fmax(largest, fabs(p[k]));
         }
     }
     for (int k = 0; k < 3; k++)
         half = fmax(half, mesh->face_count ? .5 * high[k] - .5 * low[k] : 0);
     frexp(half, &f->exponent);
+    /* A model that is flat far away and tiny otherwise must not overflow. */
+    int top;
+    frexp(largest, &top);
+    f->exponent = f->exponent > top - 900 ? f->exponent : top - 900;
     f->factor[0] = ldexp(1, -f->exponent / 2);
     f->factor[1] = ldexp(1, -f->exponent - -f->exponent / 2);
     for (int k = 0; k < 3; k++)

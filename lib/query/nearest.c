@@ -16,10 +16,23 @@
 /* Beyond so many halves of the subtree's size, single precision tells nothing apart. */
 #define FAR 32.0
 
-typedef struct visit {
+/* A child to visit: the bits of its squared lower bound (not negative, so of the same order as integers), then its number. */
+typedef uint64_t visit;
+
+static inline visit make_visit(float lower2, uint32_t child)
+{
+    uint32_t bits;
+    memcpy(&bits, &lower2, sizeof bits);
+    return (uint64_t)bits << 32 | child;
+}
+
+static inline float visit_lower2(visit v)
+{
+    uint32_t bits = (uint32_t)(v >> 32);
     float lower2;
-    uint32_t child;
-} visit;
+    memcpy(&lower2, &bits, sizeof lower2);
+    return lower2;
+}
 
 void ebpo_nearest_begin(ebpo_nearest *n, const double p[3], double max_distance)
 {
@@ -205,9 +218,9 @@ static uint32_t push_children(visit *stack, uint32_t top, const ebpo_bound *boun
     uint32_t base = top;
     for (; lanes; lanes &= lanes - 1) {
         unsigned lane = (unsigned)__builtin_ctz(lanes);
-        visit v = { lower2[lane], bound->child[lane] };
+        visit v = make_visit(lower2[lane], bound->child[lane]);
         uint32_t at = top++;
-        for (; at > base && stack[at - 1].lower2 < v.lower2; at--)
+        for (; at > base && stack[at - 1] < v; at--)
             stack[at] = stack[at - 1];
         stack[at] = v;
     }
@@ -220,7 +233,7 @@ static void give_up(searching *g, const visit *stack, uint32_t top)
     ebpo_nearest *n = g->n;
     n->late = true;
     for (uint32_t i = 0; i < top; i++) {
-        double lower = (sqrt((double)stack[i].lower2) * (1 - 0x1p-20) - (double)g->probe.error) / g->probe.scale64;
+        double lower = (sqrt((double)visit_lower2(stack[i])) * (1 - 0x1p-20) - (double)g->probe.error) / g->probe.scale64;
         n->passed_over = fmin(n->passed_over, fmax(lower, 0));
     }
 }
@@ -233,21 +246,22 @@ static void search_near(searching *g)
     visit stack[STACK];
     uint32_t top = 1, steps = 0;
     set_best(g, frame_limit(g));
-    stack[0] = (visit){ 0, g->s->top };
+    stack[0] = make_visit(0, g->s->top);
     while (top) {
         visit v = stack[--top];
-        if (v.lower2 > g->limit2)
+        uint32_t child = (uint32_t)v;
+        if (visit_lower2(v) > g->limit2)
             continue;
         if (g->n->deadline && (++steps & 7) == 0 && ebpo_clock() > g->n->deadline) {
             give_up(g, stack, top + 1);
             break;
         }
-        if (v.child & EBPO_IS_BLOCK) {
-            add_block(g, v.child & ~EBPO_IS_BLOCK);
+        if (child & EBPO_IS_BLOCK) {
+            add_block(g, child & ~EBPO_IS_BLOCK);
             continue;
         }
         float lower2[8];
-        const ebpo_bound *bound = &g->s->bound[v.child];
+        const ebpo_bound *bound = &g->s->bound[child];
         unsigned lanes = g->kernels->bounds(bound, &g->probe, g->limit2, lower2);
         top = push_children(stack, top, bound, lanes, lower2);
     }

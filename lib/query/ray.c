@@ -87,10 +87,17 @@ static void try_block(casting *c, const ebpo_subtree *s, uint32_t block)
     }
 }
 
-/* The ray in the subtree's frame: origin, direction with the same t. Widening covers the rounding of both. */
+/* The ray in the subtree's frame, its direction scaled by a power of two to about 1. Widening covers the rounding of all. */
 typedef struct framed {
     double origin[3], direction[3], slack;
+    double limit_scale; /* t in the frame for t = 1; 0 or infinite where that leaves the doubles, and then limits prune nothing */
 } framed;
+
+static double frame_limit(const casting *c, const framed *f)
+{
+    double limit = c->limit * f->limit_scale * (1 + 0x1p-40);
+    return f->limit_scale > 0 && limit > 0x1p-500 ? limit : c->limit > 0 || c->count ? INFINITY : 0x1p-40;
+}
 
 typedef struct entered {
     double enter;
@@ -111,7 +118,7 @@ static void cast_bound(casting *c, const ebpo_subtree *s, const framed *f, uint3
             continue;
         double low[3] = { b->low[0][lane], b->low[1][lane], b->low[2][lane] }, high[3] = { b->high[0][lane], b->high[1][lane], b->high[2][lane] };
         entered e = { 0, b->child[lane] };
-        if (!meets_slabs(f->origin, f->direction, c->limit, low, high, f->slack, &e.enter))
+        if (!meets_slabs(f->origin, f->direction, frame_limit(c, f), low, high, f->slack, &e.enter))
             continue;
         int at = count++;
         for (; at > 0 && order[at - 1].enter > e.enter; at--)
@@ -119,21 +126,26 @@ static void cast_bound(casting *c, const ebpo_subtree *s, const framed *f, uint3
         order[at] = e;
     }
     for (int i = 0; i < count && !c->no_memory; i++)
-        if (order[i].enter <= c->limit)
+        if (order[i].enter <= frame_limit(c, f))
             cast_bound(c, s, f, order[i].child);
 }
 
 static void cast_subtree(casting *c, const ebpo_subtree *s)
 {
     framed f;
-    double most = 2;
+    double most = 2, longest = 0;
+    int exponent;
     if (s->bound_count == 0)
         return;
+    for (int k = 0; k < 3; k++)
+        longest = fmax(longest, fabs(c->ray.direction[k]));
+    frexp(longest, &exponent);
     for (int k = 0; k < 3; k++) {
         f.origin[k] = (c->ray.origin[k] - s->centre[k]) * s->scale;
-        f.direction[k] = c->ray.direction[k] * s->scale;
+        f.direction[k] = ldexp(c->ray.direction[k], -exponent);
         most = fmax(most, fabs(f.origin[k]));
     }
+    f.limit_scale = ldexp(s->scale, exponent);
     f.slack = most * 0x1p-48;
     cast_bound(c, s, &f, s->top);
 }

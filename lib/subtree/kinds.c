@@ -46,46 +46,70 @@ static void leaf_cell(const ebpo_subtree *s, const ebpo_leaf_place *place, doubl
     }
 }
 
-/* A wall is free when no face's box, cut by the cell, comes to it: `reach` is what the boxes leave free of faces. */
-static uint8_t find_wall(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const double low[3], const double high[3])
+static inline double least3(double a, double b, double c)
 {
-    unsigned met = 0;
-    for (uint32_t b = 0; b < leaf->blocks && met != 63; b++)
-        for (unsigned lane = 0; lane < EBPO_BLOCK && met != 63; lane++) {
-            uint32_t slot = s->list[leaf->list + b] * EBPO_BLOCK + lane;
-            if (s->slot_face[slot] == EBPO_NO_SLOT)
-                break;
-            double t[3][3];
-            unsigned touches = 0;
-            bool away = false;
-            ebpo_subtree_triangle(s, slot, t);
-            for (int k = 0; k < 3; k++) {
-                double least = fmin(t[0][k], fmin(t[1][k], t[2][k])), most = fmax(t[0][k], fmax(t[1][k], t[2][k]));
-                away = away || least > high[k] || most < low[k];
-                touches |= (unsigned)(least <= low[k]) << 2 * k | (unsigned)(most >= high[k]) << (2 * k + 1);
-            }
-            if (!away)
-                met |= touches;
+    double low = a < b ? a : b;
+    return low < c ? low : c;
+}
+
+static inline double most3(double a, double b, double c)
+{
+    double high = a > b ? a : b;
+    return high > c ? high : c;
+}
+
+/* Gathers the faces whose boxes meet the cell, and tells which walls these boxes come to (bit 2 axis + side). Rounding can only add to both. False when the faces are too many
+ * to be held (the walls are right all the same). */
+static bool gather(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const double low[3], const double high[3], leaf_faces *f, unsigned *walls)
+{
+    double inverse[3];
+    bool room = true;
+    f->count = 0;
+    *walls = 0;
+    for (int k = 0; k < 3; k++) {
+        f->low[k] = low[k];
+        f->size[k] = high[k] - low[k];
+        inverse[k] = 1 / f->size[k];
+    }
+    for (uint32_t slot = 0, end = leaf->blocks * EBPO_BLOCK; slot < end; slot++) {
+        uint32_t at = s->list[leaf->list + slot / EBPO_BLOCK] * EBPO_BLOCK + slot % EBPO_BLOCK;
+        double t[3][3], x[3][3];
+        unsigned touches = 0;
+        bool away = s->slot_face[at] == EBPO_NO_SLOT;
+        if (away)
+            continue;
+        ebpo_subtree_triangle(s, at, t);
+        for (int k = 0; k < 3; k++) {
+            for (int i = 0; i < 3; i++)
+                x[i][k] = (t[i][k] - low[k]) * inverse[k];
+            double least = least3(x[0][k], x[1][k], x[2][k]), most = most3(x[0][k], x[1][k], x[2][k]);
+            away = away || least > 1 + 0x1p-40 || most < -0x1p-40;
+            touches |= (unsigned)!(least > 0x1p-40) << 2 * k | (unsigned)!(most < 1 - 0x1p-40) << (2 * k + 1);
         }
-    for (uint8_t wall = 0; wall < EBPO_NO_WALL; wall++)
-        if (!(met >> wall & 1))
-            return wall;
-    return EBPO_NO_WALL;
+        if (away)
+            continue;
+        *walls |= touches;
+        room = room && f->count < FACES_MAX;
+        if (room) {
+            memcpy(f->p[f->count], x, sizeof x);
+            f->slot[f->count++] = at;
+        }
+    }
+    return room;
 }
 
 /* Crossings of the leaf's faces with a segment along an axis. */
 static int32_t crossings(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const double from[3], double to, int axis)
 {
     int32_t sum = 0;
-    for (uint32_t b = 0; b < leaf->blocks; b++)
-        for (unsigned lane = 0; lane < EBPO_BLOCK; lane++) {
-            uint32_t slot = s->list[leaf->list + b] * EBPO_BLOCK + lane;
-            double t[3][3];
-            if (s->slot_face[slot] == EBPO_NO_SLOT)
-                break;
-            ebpo_subtree_triangle(s, slot, t);
-            sum += ebpo_axis_crossing(from, to, axis, t[0], t[1], t[2]);
-        }
+    for (uint32_t i = 0; i < leaf->blocks * EBPO_BLOCK; i++) {
+        uint32_t slot = s->list[leaf->list + i / EBPO_BLOCK] * EBPO_BLOCK + i % EBPO_BLOCK;
+        double t[3][3];
+        if (s->slot_face[slot] == EBPO_NO_SLOT)
+            continue;
+        ebpo_subtree_triangle(s, slot, t);
+        sum += ebpo_axis_crossing(from, to, axis, t[0], t[1], t[2]);
+    }
     return sum;
 }
 
@@ -94,39 +118,11 @@ static int32_t winding_at(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, 
 {
     double from[3] = { low[0], low[1], low[2] };
     for (int axis = 0; axis < 3; axis++) {
-        at_corner += crossings(s, leaf, from, p[axis], axis);
+        if (p[axis] > from[axis])
+            at_corner += crossings(s, leaf, from, p[axis], axis);
         from[axis] = p[axis];
     }
     return at_corner;
-}
-
-static bool gather(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const double low[3], const double high[3], leaf_faces *f)
-{
-    f->count = 0;
-    for (int k = 0; k < 3; k++) {
-        f->low[k] = low[k];
-        f->size[k] = high[k] - low[k];
-    }
-    for (uint32_t b = 0; b < leaf->blocks; b++)
-        for (unsigned lane = 0; lane < EBPO_BLOCK; lane++) {
-            uint32_t slot = s->list[leaf->list + b] * EBPO_BLOCK + lane;
-            if (s->slot_face[slot] == EBPO_NO_SLOT)
-                break;
-            double t[3][3];
-            bool away = false;
-            ebpo_subtree_triangle(s, slot, t);
-            for (int k = 0; k < 3; k++)
-                away = away || fmin(t[0][k], fmin(t[1][k], t[2][k])) > high[k] || fmax(t[0][k], fmax(t[1][k], t[2][k])) < low[k];
-            if (away)
-                continue;
-            if (f->count == FACES_MAX)
-                return false;
-            f->slot[f->count] = slot;
-            for (int i = 0; i < 9; i++)
-                f->p[f->count][i / 3][i % 3] = (t[i / 3][i % 3] - low[i % 3]) / f->size[i % 3];
-            f->count++;
-        }
-    return f->count > 0;
 }
 
 typedef struct plane {
@@ -143,7 +139,7 @@ static bool face_plane(const double p[3][3], plane *out)
         out->n[k] = a - b;
         norm += fabs(a - b);
         products += fabs(a) + fabs(b);
-        reach = fmax(reach, fmax(fabs(p[0][k]), fmax(fabs(p[1][k]), fabs(p[2][k]))));
+        reach = most3(reach, most3(fabs(p[0][k]), fabs(p[1][k]), fabs(p[2][k])), 0);
     }
     /* n is right to 2^-50 of the products, so to 2^-40 of its norm, and n . xi to 2^-33 for every corner: less than what sides_of calls certain. */
     if (!(norm > products * 0x1p-10) || !(reach < 64))
@@ -162,6 +158,9 @@ static int exact_side(const ebpo_subtree *s, uint32_t plane_slot, uint32_t point
     double a[3][3], b[3][3];
     ebpo_subtree_triangle(s, plane_slot, a);
     ebpo_subtree_triangle(s, point_slot, b);
+    for (int i = 0; i < 3; i++) /* neighbours share corners */
+        if (a[i][0] == b[corner][0] && a[i][1] == b[corner][1] && a[i][2] == b[corner][2])
+            return 0;
     return ebpo_orient3d(a[0], a[1], a[2], b[corner]);
 }
 
@@ -231,6 +230,11 @@ static bool below_all(const plane *planes, int count, int flip, const double xi[
     return below;
 }
 
+static double within_cell(double x)
+{
+    return x < 0 ? 0 : x > 1 ? 1 : x;
+}
+
 /* Winding numbers in P and in the rest of the cell, from the cell's corners and, if none of them is in P, from a point near the middle of the faces. False when that does not settle
  * it. */
 static bool find_windings(const ebpo_subtree *s, ebpo_subtree_leaf *leaf, int32_t at_corner, const leaf_faces *f, const plane *planes, int count,
@@ -256,8 +260,9 @@ static bool find_windings(const ebpo_subtree *s, ebpo_subtree_leaf *leaf, int32_
         double xi[3] = { 0, 0, 0 }, p[3];
         for (int k = 0; k < 3; k++) {
             for (int i = 0; i < f->count; i++)
-                xi[k] += (fmin(fmax(f->p[i][0][k], 0), 1) + fmin(fmax(f->p[i][1][k], 0), 1) + fmin(fmax(f->p[i][2][k], 0), 1)) / (3 * f->count);
+                xi[k] += (within_cell(f->p[i][0][k]) + within_cell(f->p[i][1][k]) + within_cell(f->p[i][2][k])) / (3 * f->count);
             p[k] = f->low[k] + xi[k] * f->size[k];
+            xi[k] = (p[k] - f->low[k]) / f->size[k]; /* in a cell of a few ulps the point has moved */
         }
         if (!below_all(planes, count, flip, xi, &certain) || !certain)
             return false;
@@ -293,13 +298,15 @@ static bool classify(const ebpo_subtree *s, ebpo_subtree_leaf *leaf, const ebpo_
     int flip = 1, count = 0;
     int32_t at_corner = leaf->winding;
     leaf_cell(s, place, low, high);
-    leaf->wall = find_wall(s, leaf, low, high);
+    unsigned walls;
+    bool few = gather(s, leaf, low, high, &f, &walls);
+    leaf->wall = walls == 63 ? EBPO_NO_WALL : (uint8_t)__builtin_ctz(~walls);
     if (leaf->wall != EBPO_NO_WALL && leaf->wall % 2) {
         double p[3] = { low[0], low[1], low[2] };
         p[leaf->wall / 2] = high[leaf->wall / 2];
         leaf->winding = winding_at(s, leaf, at_corner, low, p);
     }
-    if (gather(s, leaf, low, high, &f))
+    if (few && f.count)
         count = collect_planes(s, &f, planes, &flip);
     bool ok = true;
     if (count && find_windings(s, leaf, at_corner, &f, planes, count, flip))

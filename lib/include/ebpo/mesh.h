@@ -42,6 +42,12 @@ typedef struct ebpo_mesh_read_options {
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_read(ebpo_mesh *out, const char *path,
                                                   const ebpo_mesh_read_options *options, ebpo_error *error);
 
+/* The vertices alone of a PLY file that is in memory, as doubles [*count][3] (exact: floats and integers are widened), to be freed with free(). Every dialect
+ * that ebpo_mesh_read takes; faces may be absent and are not looked at. Coordinates may be NaN or infinite. `name` is for messages. Safe on untrusted
+ * bytes. On failure *xyz is NULL. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_points_parse_ply(double **xyz, uint64_t *count, const void *data, uint64_t size, const char *name,
+                                                         ebpo_error *error);
+
 /* Writes a binary little-endian PLY: float or double vertices as the mesh holds them, int32 or uint32 triangles.
  * Appears whole or not at all (temporary name, fsync, rename). */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_write_ply(const ebpo_mesh *mesh, const char *path, ebpo_error *error);

@@ -109,7 +109,8 @@ typedef enum ebpo_where {
 
 typedef struct ebpo_inside_result {
     int32_t where;   /* ebpo_where */
-    int32_t winding; /* winding number; 0 when ON or MAYBE */
+    int32_t winding; /* winding number; 0 when ON or MAYBE, and when level or deadline are given and an envelope decided (with rules other than
+                      * nonzero it may be another one that is not inside) */
     double doubt;    /* MAYBE: the surface is at most so far away (the diagonal of the cell that was reached); else 0 */
 } ebpo_inside_result;
 

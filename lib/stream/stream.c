@@ -1,0 +1,296 @@
+/* Levels one after the other. Of a level that has been passed only its types stay, and with polygons its planes: enough to walk down to the nodes of the next one. */
+#include <ebpo/stream.h>
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "morton/octcode.h"
+#include "stream/walk.h"
+#include "stream/world.h"
+
+enum { PIECE = 4096, CODES_MOST = 255 };
+
+struct ebpo_stream {
+    ebpo_file *file;
+    const ebpo_info *info;
+    ebpo_stream_options options;
+    ebpo_box box;
+    int level; /* last one read; -1: none */
+    ebpo_level kept[EBPO_LEVELS_MAX];
+    uint64_t bytes;
+    double settled; /* volume of the leaves and black nodes of all levels before the next one */
+    ebpo_walk walk;
+    ebpo_walk_envelopes *envelopes; /* with polygons */
+    double planes[CODES_MOST][4];
+    double vertices[EBPO_POLYTOPE_VERTICES][3];
+    uint32_t polygon_first[EBPO_POLYTOPE_FACES + 1], corners[EBPO_POLYTOPE_CORNERS];
+};
+
+ebpo_status ebpo_stream_new(ebpo_stream **out, ebpo_file *file, const ebpo_stream_options *options, ebpo_error *error)
+{
+    static const ebpo_stream_options usual = EBPO_STREAM_OPTIONS_INIT;
+    *out = NULL;
+    ebpo_stream *s = ebpo_alloc_zero(1, sizeof *s);
+    if (!s)
+        return ebpo_fail_memory(error, sizeof *s);
+    s->file = file;
+    s->info = ebpo_file_info(file);
+    s->options = options ? *options : usual;
+    s->level = -1;
+    memcpy(s->box.origin, s->info->box_origin, sizeof s->box.origin);
+    memcpy(s->box.size, s->info->box_size, sizeof s->box.size);
+    s->box.grid_level = s->info->grid_level;
+    s->bytes = s->info->head_bytes;
+    if (s->options.polygons && !(s->envelopes = ebpo_alloc_zero(1, sizeof *s->envelopes))) {
+        ebpo_stream_free(s);
+        return ebpo_fail_memory(error, sizeof *s->envelopes);
+    }
+    *out = s;
+    return EBPO_OK;
+}
+
+void ebpo_stream_free(ebpo_stream *s)
+{
+    if (!s)
+        return;
+    for (int i = 0; i <= s->level; i++)
+        ebpo_level_free(&s->kept[i]);
+    free(s->envelopes);
+    free(s);
+}
+
+/* --- reading a level --- */
+
+#define DROP(array) (free(array), (array) = NULL)
+
+static void drop_faces(ebpo_level *level)
+{
+    DROP(level->leaf_first);
+    DROP(level->leaf_new);
+    DROP(level->leaf_ref_count);
+    DROP(level->leaf_refs);
+}
+
+static void drop_passed(ebpo_level *level, bool planes)
+{
+    DROP(level->leaf_winding);
+    DROP(level->black_winding);
+    DROP(level->white_winding);
+    DROP(level->leaf_plane_counts);
+    DROP(level->leaf_planes);
+    if (!planes) {
+        DROP(level->plane_counts);
+        DROP(level->planes);
+    }
+}
+
+static uint64_t sum_counts(const uint8_t *counts, uint64_t count)
+{
+    uint64_t sum = 0;
+    for (uint64_t i = 0; counts && i < count; i++)
+        sum += counts[i];
+    return sum;
+}
+
+/* What the walk relies on. */
+static ebpo_status check_level(const ebpo_level *level, int number, uint64_t parents, ebpo_error *error)
+{
+    uint64_t count[4] = { 0 };
+    if (level->group_count != parents)
+        return ebpo_fail(error, EBPO_E_FORMAT, "level %d: %" PRIu64 " groups of siblings, but %" PRIu64 " parents; run ebpo verify", number, level->group_count,
+                         parents);
+    for (uint64_t i = 0; i < level->group_count; i++)
+        for (unsigned k = 0; k < (number ? 8 : 1); k++)
+            count[level->types[i] >> 2 * k & 3]++;
+    if (count[EBPO_GRAY] != level->gray_count || count[EBPO_LEAF] != level->leaf_count || count[EBPO_BLACK] != level->black_count ||
+        count[EBPO_WHITE] != level->white_count)
+        return ebpo_fail(error, EBPO_E_FORMAT, "level %d: its types and its node counts disagree; run ebpo verify", number);
+    if (sum_counts(level->plane_counts, level->gray_count) != (level->plane_counts ? level->plane_count : 0) ||
+        sum_counts(level->leaf_plane_counts, level->leaf_count) != (level->leaf_plane_counts ? level->leaf_plane_count : 0))
+        return ebpo_fail(error, EBPO_E_FORMAT, "level %d: the counts of its planes do not add up; run ebpo verify", number);
+    return EBPO_OK;
+}
+
+/* --- volumes --- */
+
+typedef struct volumes {
+    double gray, settled;
+} volumes;
+
+typedef struct job {
+    const ebpo_stream *stream;
+    int target;
+    ebpo_walk *starts; /* [pieces] */
+    volumes *found;    /* [pieces] */
+    ebpo_walk_envelopes *envelopes; /* [threads] */
+} job;
+
+static double cell_volume(const ebpo_box *box, int level)
+{
+    double sides = (double)(1u << level);
+    return box->size[0] / sides * (box->size[1] / sides) * (box->size[2] / sides);
+}
+
+static ebpo_status sum_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+{
+    const job *j = context;
+    double cell = cell_volume(&j->stream->box, j->target);
+    (void)error;
+    for (uint64_t i = begin; i < end; i++) {
+        ebpo_walk walk = j->starts[i];
+        ebpo_walk_node node;
+        for (int k = 0; k < PIECE && ebpo_walk_next(&walk, &node); k++)
+            if (node.type != EBPO_WHITE)
+                *(node.type == EBPO_GRAY ? &j->found[i].gray : &j->found[i].settled) +=
+                    ebpo_polytope_volume(ebpo_walk_envelope(&walk, &node, &j->envelopes[worker])) * cell;
+    }
+    return EBPO_OK;
+}
+
+/* A first walk, without envelopes, finds where each piece begins; pieces do not depend on the number of threads, so neither does the sum. */
+static void find_starts(job *j)
+{
+    ebpo_walk walk;
+    ebpo_walk_node node;
+    ebpo_walk_begin(&walk, j->stream->kept, j->target);
+    uint64_t seen = 0;
+    do {
+        if (seen % PIECE == 0)
+            j->starts[seen / PIECE] = walk;
+        seen++;
+    } while (ebpo_walk_next(&walk, &node));
+}
+
+static ebpo_status cut_volumes(const ebpo_stream *s, int target, uint64_t nodes, volumes *out, ebpo_error *error)
+{
+    unsigned threads = ebpo_thread_count(s->options.threads);
+    uint64_t pieces = nodes / PIECE + 1;
+    job j = { s, target, ebpo_alloc(pieces, sizeof *j.starts), ebpo_alloc_zero(pieces, sizeof *j.found), ebpo_alloc_zero(threads, sizeof *j.envelopes) };
+    ebpo_status status = EBPO_OK;
+    if (!j.starts || !j.found || !j.envelopes) {
+        status = ebpo_fail_memory(error, pieces * (sizeof *j.starts + sizeof *j.found) + threads * sizeof *j.envelopes);
+        goto done;
+    }
+    find_starts(&j);
+    status = ebpo_parallel_for(threads, pieces, 1, sum_pieces, &j, NULL, "cutting envelopes", error);
+    for (uint64_t i = 0; i < pieces; i++) {
+        out->gray += j.found[i].gray;
+        out->settled += j.found[i].settled;
+    }
+done:
+    free(j.starts);
+    free(j.found);
+    free(j.envelopes);
+    return status;
+}
+
+static volumes stated_volumes(const ebpo_stream *s, int level)
+{
+    const ebpo_level_summary *summary = &s->info->level[level];
+    return (volumes){ summary->gray_volume, summary->leaf_volume + (double)summary->black_count * cell_volume(&s->box, level) };
+}
+
+/* --- levels --- */
+
+ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool *more, ebpo_error *error)
+{
+    int next = s->level + 1;
+    *more = false;
+    if (next >= s->info->level_count)
+        return EBPO_OK;
+    ebpo_level *level = &s->kept[next];
+    uint64_t parents = next ? s->kept[next - 1].gray_count : 1;
+    ebpo_status status = ebpo_file_read_level(s->file, next, level, s->options.threads, error);
+    if (status != EBPO_OK)
+        return status;
+    drop_faces(level);
+    volumes v = stated_volumes(s, next);
+    uint64_t nodes = next ? 8 * parents : 1;
+    status = check_level(level, next, parents, error);
+    if (status == EBPO_OK && s->options.polygons) {
+        v = (volumes){ 0, 0 };
+        status = cut_volumes(s, next, nodes, &v, error);
+    }
+    if (status != EBPO_OK) {
+        ebpo_level_free(level);
+        memset(level, 0, sizeof *level);
+        return status;
+    }
+    if (next)
+        drop_passed(&s->kept[next - 1], s->options.polygons);
+    s->level = next;
+    s->settled += v.settled;
+    s->bytes += s->info->level[next].stored_bytes;
+    ebpo_walk_begin(&s->walk, s->kept, next);
+    *out = (ebpo_stream_level){ next, nodes, s->bytes, v.gray + s->settled };
+    *more = true;
+    return EBPO_OK;
+}
+
+/* --- nodes --- */
+
+static int32_t winding_of(const ebpo_level *level, const ebpo_walk_node *node)
+{
+    switch (node->type) {
+    case EBPO_WHITE: return level->white_winding ? level->white_winding[node->rank] : 0;
+    case EBPO_BLACK: return level->black_winding ? level->black_winding[node->rank] : 1;
+    case EBPO_LEAF: return level->leaf_winding ? level->leaf_winding[node->rank] : 0;
+    case EBPO_GRAY:
+    default: return 0;
+    }
+}
+
+static void add_planes(ebpo_stream *s, ebpo_cell cell, const ebpo_walk_node *node, ebpo_stream_node *out)
+{
+    for (unsigned i = 0; i < node->code_count; i++) {
+        int32_t n[3], d;
+        if (ebpo_plane_decode(node->codes[i], n, &d))
+            ebpo_plane_to_world(&s->box, cell, n, d, s->planes[out->plane_count++]);
+    }
+    out->planes = (const double(*)[4])s->planes;
+}
+
+static void add_polygons(ebpo_stream *s, ebpo_cell cell, const ebpo_walk_node *node, ebpo_stream_node *out)
+{
+    const ebpo_polytope *p = ebpo_walk_envelope(&s->walk, node, s->envelopes);
+    ebpo_polytope_to_world(p, &s->box, cell, s->vertices);
+    for (int f = 0; f <= p->face_count; f++)
+        s->polygon_first[f] = p->first[f];
+    for (int i = 0; i < p->corner_count; i++)
+        s->corners[i] = p->corner[i];
+    out->volume = ebpo_polytope_volume(p) * cell_volume(&s->box, cell.level);
+    out->vertex_count = (uint32_t)p->vertex_count;
+    out->polygon_count = (uint32_t)p->face_count;
+    out->vertices = (const double(*)[3])s->vertices;
+    out->polygon_first = s->polygon_first;
+    out->corners = s->corners;
+}
+
+ebpo_status ebpo_stream_next_node(ebpo_stream *s, ebpo_stream_node *out, bool *more, ebpo_error *error)
+{
+    ebpo_walk_node node;
+    *more = false;
+    if (s->level < 0)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "no level has been read yet; call ebpo_stream_next_level first");
+    if (!ebpo_walk_next(&s->walk, &node))
+        return EBPO_OK;
+    ebpo_cell cell = ebpo_cell_of_octcode(node.octcode);
+    *out = (ebpo_stream_node){ .octcode = node.octcode, .type = node.type, .winding = winding_of(&s->kept[s->level], &node) };
+    for (int k = 0; k < 3; k++) {
+        out->min[k] = ebpo_wall(&s->box, k, cell.level, cell.at[k]);
+        out->max[k] = ebpo_wall(&s->box, k, cell.level, cell.at[k] + 1);
+    }
+    if (s->options.planes || s->options.polygons)
+        add_planes(s, cell, &node, out);
+    if (s->options.polygons && node.type != EBPO_WHITE)
+        add_polygons(s, cell, &node, out);
+    else if (node.type == EBPO_BLACK)
+        out->volume = cell_volume(&s->box, cell.level);
+    *more = true;
+    return EBPO_OK;
+}

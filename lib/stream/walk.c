@@ -1,0 +1,102 @@
+#include "stream/walk.h"
+
+#include <string.h>
+
+#include "planes/planes.h"
+
+void ebpo_walk_begin(ebpo_walk *walk, const ebpo_level *level, int target)
+{
+    memset(walk, 0, sizeof *walk);
+    walk->level = level;
+    walk->target = target;
+}
+
+/* The next node of the level at `depth`, of which there is one. */
+static ebpo_walk_node *pass(ebpo_walk *w, int depth)
+{
+    const ebpo_level *level = &w->level[depth];
+    unsigned octant = w->at[depth].octant++;
+    ebpo_walk_node *node = &w->at[depth].node;
+    node->octcode = depth ? w->at[depth - 1].node.octcode << 3 | octant : 1;
+    node->type = (ebpo_node_type)(level->types[w->at[depth].group] >> 2 * octant & 3);
+    node->rank = w->at[depth].rank[node->type]++;
+    node->codes = NULL;
+    node->code_count = 0;
+    if (node->type == EBPO_GRAY && level->plane_counts) {
+        node->code_count = level->plane_counts[node->rank];
+        node->codes = node->code_count ? level->planes + w->at[depth].plane : NULL;
+        w->at[depth].plane += node->code_count;
+    } else if (node->type == EBPO_LEAF && level->leaf_plane_counts) {
+        node->code_count = level->leaf_plane_counts[node->rank];
+        node->codes = node->code_count ? level->leaf_planes + w->at[depth].leaf_plane : NULL;
+        w->at[depth].leaf_plane += node->code_count;
+    }
+    return node;
+}
+
+bool ebpo_walk_next(ebpo_walk *w, ebpo_walk_node *out)
+{
+    for (;;) {
+        int depth = w->depth;
+        if (w->at[depth].octant == (depth ? 8 : 1)) { /* level 0 has one node */
+            if (depth == 0)
+                return false;
+            w->at[depth].group++;
+            w->at[depth].octant = 0;
+            w->depth--;
+            continue;
+        }
+        const ebpo_walk_node *node = pass(w, depth);
+        if (depth == w->target) {
+            *out = *node;
+            return true;
+        }
+        if (node->type == EBPO_GRAY)
+            w->depth++;
+    }
+}
+
+static void cut(ebpo_polytope *envelope, const ebpo_walk_node *node)
+{
+    for (unsigned i = 0; i < node->code_count; i++) {
+        int32_t n[3], d;
+        double direction[3];
+        if (!ebpo_plane_decode(node->codes[i], n, &d))
+            continue;
+        double offset = ebpo_plane_as_double(n, d, direction);
+        (void)ebpo_polytope_clip(envelope, direction, offset, (int32_t)i);
+    }
+}
+
+static void start(const ebpo_polytope *parent, uint64_t octcode, ebpo_polytope *envelope)
+{
+    if (parent)
+        (void)ebpo_polytope_child(parent, octcode & 7, envelope);
+    else
+        ebpo_polytope_cube(envelope);
+}
+
+/* Of the ancestor at `depth`. */
+static const ebpo_polytope *ancestor(const ebpo_walk *w, int depth, ebpo_walk_envelopes *e)
+{
+    if (depth < 0)
+        return NULL;
+    const ebpo_walk_node *node = &w->at[depth].node;
+    if (e->octcode[depth] != node->octcode) {
+        start(ancestor(w, depth - 1, e), node->octcode, &e->at[depth]);
+        cut(&e->at[depth], node);
+        e->octcode[depth] = node->octcode;
+    }
+    return &e->at[depth];
+}
+
+const ebpo_polytope *ebpo_walk_envelope(const ebpo_walk *w, const ebpo_walk_node *node, ebpo_walk_envelopes *e)
+{
+    if (node->type == EBPO_BLACK) {
+        ebpo_polytope_cube(&e->own);
+    } else {
+        start(ancestor(w, w->target - 1, e), node->octcode, &e->own);
+        cut(&e->own, node);
+    }
+    return &e->own;
+}

@@ -1,0 +1,44 @@
+/* A coarse-to-fine viewer's main loop: each level's envelopes as closed polyhedra, drawn (here: summed up) as soon as the level is there.
+ *
+ *     stream_levels FILE.ebpo.h5 [LEVEL]
+ *     cc stream_levels.c $(pkg-config --cflags --libs ebpo) */
+#include <ebpo/ebpo.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+int main(int argc, char **argv)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file = NULL;
+    ebpo_stream *stream = NULL;
+    ebpo_stream_options options = EBPO_STREAM_OPTIONS_INIT;
+    ebpo_stream_level level;
+    ebpo_stream_node node;
+    bool more = true;
+    int last = argc > 2 ? atoi(argv[2]) : EBPO_LEVELS_MAX;
+    if (argc < 2) {
+        fprintf(stderr, "usage: stream_levels FILE.ebpo.h5 [LEVEL]\n");
+        return 2;
+    }
+    options.polygons = true;
+    if (ebpo_open(&file, argv[1], &error) != EBPO_OK || ebpo_stream_new(&stream, file, &options, &error) != EBPO_OK)
+        goto done;
+    while (ebpo_stream_next_level(stream, &level, &more, &error) == EBPO_OK && more) {
+        uint64_t polyhedra = 0, polygons = 0;
+        while (ebpo_stream_next_node(stream, &node, &more, &error) == EBPO_OK && more) {
+            polyhedra += node.polygon_count > 0; /* white nodes have none */
+            polygons += node.polygon_count;      /* a renderer would take node.vertices, polygon_first and corners here */
+        }
+        printf("level %d after %" PRIu64 " bytes: %" PRIu64 " new polyhedra with %" PRIu64 " polygons; with the leaves before, volume %.9g\n", level.level,
+               level.cumulative_bytes, polyhedra, polygons, level.volume);
+        if (error.status != EBPO_OK || level.level >= last)
+            break;
+    }
+done:
+    if (error.status != EBPO_OK)
+        fprintf(stderr, "stream_levels: %s\n", error.message);
+    ebpo_stream_free(stream);
+    ebpo_close(file);
+    return error.status != EBPO_OK;
+}

@@ -1,0 +1,60 @@
+#include "query_run.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "command.h"
+
+/* An answer that cannot be delivered ends the work; main says why. */
+static bool deliver(void)
+{
+    return fflush(stdout) == 0 && !ferror(stdout);
+}
+
+static int answer_all(const query_job *job, ebpo_context *context, points *in, double *rows)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_status status = job->answer(job, context, rows, 0, &error);
+    uint64_t count = 0;
+    while (status == EBPO_OK && (count = points_next(in, rows)) > 0) {
+        status = job->answer(job, context, rows, count, &error);
+        if (!deliver())
+            return EXIT_FAILED;
+    }
+    if (status != EBPO_OK)
+        return command_failed(job->command, &error);
+    return in->failed ? EXIT_FAILED : EXIT_FINE;
+}
+
+static void tell_stats(const query_job *job, const ebpo_model *model)
+{
+    ebpo_model_stats stats;
+    ebpo_model_get_stats(model, &stats);
+    stats_print(stderr, job->values->json, &stats);
+}
+
+int query_run(query_job *job, const char *model, const char *path)
+{
+    const query_values *v = job->values;
+    ebpo_model_options holding;
+    query_session session = QUERY_SESSION_INIT;
+    points in;
+    if (!query_options_from(job->command, v, &holding, &job->options))
+        return EXIT_USAGE;
+    job->form = v->json ? ANSWERS_JSON : v->raw ? ANSWERS_RAW : ANSWERS_TEXT;
+    int code = EXIT_FAILED;
+    double *rows = malloc(sizeof *rows * POINTS_BATCH * POINTS_WIDEST);
+    bool opened = points_open(&in, job->command, path, job->kind, v->raw, v->tmax);
+    if (!rows)
+        fprintf(stderr, "ebpo %s: not enough memory\n", job->command);
+    else if (opened)
+        code = query_open(&session, job->command, model, &holding);
+    if (session.context)
+        code = answer_all(job, session.context, &in, rows);
+    if (session.context && v->stats)
+        tell_stats(job, session.model);
+    query_close(&session);
+    points_close(&in);
+    free(rows);
+    return code;
+}
