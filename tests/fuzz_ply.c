@@ -7,6 +7,25 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
+/* The vertices alone: there whenever the mesh is, and the same numbers. */
+static void read_points(const ebpo_mesh *mesh, const uint8_t *data, size_t size)
+{
+    double *xyz;
+    uint64_t count;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_status status = ebpo_points_parse_ply(&xyz, &count, data, size, "fuzz.ply", &error);
+    if (status != EBPO_OK && (mesh->face_count || xyz || count || error.status != status || !error.message[0]))
+        abort();
+    if (status == EBPO_OK && mesh->face_count && count != mesh->vertex_count)
+        abort();
+    for (uint64_t i = 0; mesh->face_count && i < 3 * count; i++) {
+        double expected = mesh->xyz32 ? (double)mesh->xyz32[i] : mesh->xyz64[i];
+        if (xyz[i] != expected && xyz[i] == xyz[i]) /* not a NaN */
+            abort();
+    }
+    free(xyz);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     ebpo_mesh mesh;
@@ -19,6 +38,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     for (uint64_t i = 0; i < 3 * mesh.face_count; i++)
         if (mesh.faces[i] >= mesh.vertex_count)
             abort();
+    read_points(&mesh, data, size);
     ebpo_mesh_free(&mesh);
     return 0;
 }

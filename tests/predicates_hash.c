@@ -1,4 +1,6 @@
 /* Built once for each set of compiler flags, with the predicates' sources built the same way: prints one hash of many results, of all stages. */
+#include "geom/strict_fp.h"
+
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>

@@ -398,6 +398,67 @@ START_TEST(a_file_cut_at_any_byte_is_refused)
 }
 END_TEST
 
+/* --- vertices alone --- */
+
+static ebpo_status parse_points(double **xyz, uint64_t *count, const bytes *b, ebpo_error *error)
+{
+    uint8_t *copy = malloc(b->size ? b->size : 1);
+    memcpy(copy, b->data, b->size);
+    ebpo_status status = ebpo_points_parse_ply(xyz, count, copy, b->size, "folder/points.ply", error);
+    free(copy);
+    return status;
+}
+
+START_TEST(points_are_the_vertices_of_any_dialect_widened)
+{
+    static bytes b;
+    int width = _i / 3 % 2 ? 8 : 4;
+    double *xyz;
+    uint64_t count;
+    ebpo_error error = EBPO_ERROR_INIT;
+    make_cube(&b, (enum encoding)(_i % 3), _i / 6, width, "\n");
+    ck_assert_msg(parse_points(&xyz, &count, &b, &error) == EBPO_OK, "%s", error.message);
+    ck_assert(count == 8);
+    for (int i = 0; i < 24; i++)
+        ck_assert(xyz[i] == (width == 4 ? (double)(float)corner[i / 3][i % 3] : corner[i / 3][i % 3]));
+    free(xyz);
+}
+END_TEST
+
+START_TEST(points_need_no_faces_and_faces_behind_them_are_not_looked_at)
+{
+    static const char *const sources[] = { POINTS(2) "end_header\n0 0 0\n1 2.5 nan\n", POINTS(2) FACES(1) "0 0 0\n1 2.5 inf\n3 0 1 99\n" };
+    static bytes b;
+    for (int i = 0; i < 2; i++) {
+        double *xyz;
+        uint64_t count;
+        b.size = 0;
+        text(&b, "%s", sources[i]);
+        ck_assert(parse_points(&xyz, &count, &b, NULL) == EBPO_OK);
+        ck_assert(count == 2 && xyz[3] == 1 && xyz[4] == 2.5 && !(xyz[5] - xyz[5] == 0));
+        free(xyz);
+    }
+}
+END_TEST
+
+START_TEST(points_that_are_damaged_are_refused_with_their_place)
+{
+    static bytes b;
+    double *xyz;
+    uint64_t count;
+    ebpo_error error = EBPO_ERROR_INIT;
+    b.size = 0;
+    text(&b, POINTS(2) "end_header\n0 0 0\n1 x 0\n");
+    ck_assert(parse_points(&xyz, &count, &b, &error) == EBPO_E_FORMAT && !xyz && !count);
+    ck_assert_msg(strstr(error.message, "points.ply: line 9: no number: 'x' in vertex 1") != NULL, "%s", error.message);
+    make_cube(&b, LITTLE, true, 4, "\n");
+    for (size_t whole = b.size, n = 0; n < whole; n++) {
+        b.size = n;
+        ck_assert(parse_points(&xyz, &count, &b, &error) == EBPO_E_FORMAT && !xyz);
+    }
+}
+END_TEST
+
 static bool refuse(void *user, const char *stage, uint64_t done, uint64_t total)
 {
     (void)user;
@@ -570,6 +631,9 @@ int main(void)
     TCase *tests = tcase_create("ply");
     tcase_set_timeout(tests, 120);
     tcase_add_loop_test(tests, every_encoding_order_width_and_line_end_gives_the_same_cube, 0, 36);
+    tcase_add_loop_test(tests, points_are_the_vertices_of_any_dialect_widened, 0, 12);
+    tcase_add_test(tests, points_need_no_faces_and_faces_behind_them_are_not_looked_at);
+    tcase_add_test(tests, points_that_are_damaged_are_refused_with_their_place);
     tcase_add_test(tests, reader_allows_bytes_behind_the_last_element);
     tcase_add_loop_test(tests, integer_coordinates_are_read_as_doubles, 0, 6);
     tcase_add_test(tests, reader_passes_nan_and_infinity_through);

@@ -1,14 +1,25 @@
 #!/bin/sh
-# The samples do what they say: test_samples.sh EBPO SAMPLES PLUGIN_FOLDER INPUTS
+# The samples do what they say: test_samples.sh EBPO SAMPLES PLUGIN_FOLDER INPUTS QUERY LIBEBPO
 set -u
-ebpo=$1 samples=$2 inputs=$4
+ebpo=$1 samples=$2 inputs=$4 query=$5 library=$6
 export HDF5_PLUGIN_PATH="$3"
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 fail() { echo "FAILED: $1"; cat "$work/out"; exit 1; }
-command -v h5dump >/dev/null && command -v h5ls >/dev/null || exit 77
 
 "$inputs" "$work" || exit 1
+
+# Questions, from C and from Python: the same answers. The cube is 0 .. 1.
+"$ebpo" convert -q "$work/quads.ply" "$work/cube.ebpo.h5" >"$work/out" 2>&1 || fail convert
+printf '0.5 0.25 0.5\n3 0.25 0.5\n1 1 1\n' >"$work/points"
+"$query" "$work/cube.ebpo.h5" <"$work/points" >"$work/out" 2>&1 || fail query
+[ "$(sed 's/face [0-9]*/face N/' "$work/out")" = "IN, -0.25 from face N at 0.5 0 0.5
+OUT, 2 from face N at 1 0.25 0.5
+ON, 0 from face N at 1 1 1" ] || fail "query answers"
+EBPO_LIBRARY="$library" python3 "$samples/query.py" "$work/cube.ebpo.h5" <"$work/points" >"$work/out.py" 2>&1 || { cp "$work/out.py" "$work/out"; fail query.py; }
+sed 's/\.0\b//g' "$work/out.py" | cmp - "$work/out" >/dev/null || fail "query.py answers as query does"
+
+command -v h5dump >/dev/null && command -v h5ls >/dev/null || exit 77
 "$ebpo" convert -q --leaf-faces 8 "$work/sphere.ply" "$work/a.ebpo.h5" || fail convert
 sh "$samples/inspect.sh" "$work/a.ebpo.h5" 1 >"$work/out" 2>&1 || fail inspect.sh
 grep -q 'vertex_count *[0-9]' "$work/out" || fail "inspect.sh shows the number of vertices"

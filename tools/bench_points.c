@@ -131,20 +131,20 @@ int bench_points_make(bench_points *out, points_kind kind, const char *model, co
     return code;
 }
 
-void bench_points_free(bench_points *points)
+void bench_points_free(bench_points *p)
 {
-    free(points->rows);
-    *points = (bench_points){ .rows = NULL };
+    free(p->rows);
+    *p = (bench_points){ .rows = NULL };
 }
 
-int bench_points_save(const bench_points *points, const char *path)
+int bench_points_save(const bench_points *p, const char *path)
 {
     FILE *f = fopen(path, "wb");
     bool good = f != NULL;
-    int width = points_width(points->kind), kept = points_raw_width(points->kind);
-    for (uint64_t i = 0; i < points->count && good; i++)
+    int width = points_width(p->kind), kept = points_raw_width(p->kind);
+    for (uint64_t i = 0; i < p->count && good; i++)
         for (int k = 0; k < kept; k++)
-            raw_double(f, points->rows[i * (uint64_t)width + (unsigned)k]);
+            raw_double(f, p->rows[i * (uint64_t)width + (unsigned)k]);
     good = good && !ferror(f);
     if (f && fclose(f) != 0)
         good = false;

@@ -33,27 +33,27 @@ static bool whole_with_unit(const char *text, const char *const *units, const ui
     return false;
 }
 
-static bool read_size(const char *command, const char *text, uint64_t *out)
+static bool read_size(const char *name, const char *text, uint64_t *out)
 {
     static const char *const units[] = { "", "K", "M", "G", "T", "k", "m", "g", "t", NULL };
     static const uint64_t factors[] = { 1, 1u << 10, 1u << 20, 1u << 30, UINT64_C(1) << 40, 1u << 10, 1u << 20, 1u << 30, UINT64_C(1) << 40 };
     if (whole_with_unit(text, units, factors, out))
         return true;
-    fprintf(stderr, "ebpo %s: --memory: '%s' is not a size such as 64M, 1G, 512K or 1000000; try 'ebpo %s --help'\n", command, text, command);
+    fprintf(stderr, "ebpo %s: --memory: '%s' is not a size such as 64M, 1G, 512K or 1000000; try 'ebpo %s --help'\n", name, text, name);
     return false;
 }
 
-static bool read_time(const char *command, const char *text, uint64_t *out)
+static bool read_time(const char *name, const char *text, uint64_t *out)
 {
     static const char *const units[] = { "", "us", "ns", "ms", "s", NULL };
     static const uint64_t factors[] = { 1000, 1000, 1, 1000000, 1000000000 };
     if (whole_with_unit(text, units, factors, out) && *out > 0 && *out < UINT64_C(1000000000000000))
         return true;
-    fprintf(stderr, "ebpo %s: --deadline: '%s' is not a time such as 50us, 500ns, 1ms or 20 (microseconds); try 'ebpo %s --help'\n", command, text, command);
+    fprintf(stderr, "ebpo %s: --deadline: '%s' is not a time such as 50us, 500ns, 1ms or 20 (microseconds); try 'ebpo %s --help'\n", name, text, name);
     return false;
 }
 
-bool query_options_from(const char *command, const query_values *v, ebpo_model_options *model, ebpo_query_options *query)
+bool query_options_from(const char *name, const query_values *v, ebpo_model_options *model, ebpo_query_options *query)
 {
     *model = (ebpo_model_options)EBPO_MODEL_OPTIONS_INIT;
     *query = (ebpo_query_options)EBPO_QUERY_OPTIONS_INIT;
@@ -67,16 +67,16 @@ bool query_options_from(const char *command, const query_values *v, ebpo_model_o
     query->unsigned_distance = v->unsigned_distance;
     query->warm = !v->no_warm;
     query->max_distance = v->max_distance;
-    return (!v->memory || read_size(command, v->memory, &model->memory)) && (!v->deadline || read_time(command, v->deadline, &query->deadline_ns));
+    return (!v->memory || read_size(name, v->memory, &model->memory)) && (!v->deadline || read_time(name, v->deadline, &query->deadline_ns));
 }
 
-int query_open(query_session *s, const char *command, const char *path, const ebpo_model_options *options)
+int query_open(query_session *s, const char *name, const char *path, const ebpo_model_options *options)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    int is_hdf5 = command_is_hdf5(command, path);
+    int is_hdf5 = command_is_hdf5(name, path);
     if (is_hdf5 <= 0) {
         if (is_hdf5 == 0)
-            fprintf(stderr, "ebpo %s: %s: is not an .ebpo.h5 file; make one of a mesh with 'ebpo convert'\n", command, path);
+            fprintf(stderr, "ebpo %s: %s: is not an .ebpo.h5 file; make one of a mesh with 'ebpo convert'\n", name, path);
         return EXIT_FAILED;
     }
     ebpo_status status = ebpo_open(&s->file, path, &error);
@@ -84,7 +84,7 @@ int query_open(query_session *s, const char *command, const char *path, const eb
         status = ebpo_model_open(&s->model, s->file, options, &error);
     if (status == EBPO_OK)
         status = ebpo_context_new(&s->context, s->model, &error);
-    return status == EBPO_OK ? EXIT_FINE : command_failed(command, &error);
+    return status == EBPO_OK ? EXIT_FINE : command_failed(name, &error);
 }
 
 void query_close(query_session *s)

@@ -39,8 +39,8 @@ typedef struct query_values {
 extern const char *const inside_modes[];   /* fast, cache, nodes, ... */
 extern const char *const distance_modes[]; /* in the order of ebpo_distance_mode */
 
-/* Both forms. False: the values do not fit, which has been said on stderr (exit with EXIT_USAGE). */
-bool query_options_from(const char *command, const query_values *v, ebpo_model_options *model, ebpo_query_options *query);
+/* Both forms; `name` is the command's, for messages. False: the values do not fit, which has been said on stderr (exit with EXIT_USAGE). */
+bool query_options_from(const char *name, const query_values *v, ebpo_model_options *model, ebpo_query_options *query);
 
 /* A file, its model in memory, and a context. */
 typedef struct query_session {
@@ -51,7 +51,7 @@ typedef struct query_session {
 #define QUERY_SESSION_INIT { NULL, NULL, NULL }
 
 /* Returns an exit code; what is wrong has been said on stderr. query_close in any case. */
-int query_open(query_session *s, const char *command, const char *path, const ebpo_model_options *options);
+int query_open(query_session *s, const char *name, const char *path, const ebpo_model_options *options);
 void query_close(query_session *s);
 
 #endif

@@ -1,14 +1,21 @@
 #include "query_run.h"
 
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "command.h"
 
-/* An answer that cannot be delivered ends the work; main says why. */
-static bool deliver(void)
+/* An answer that cannot be delivered ends the work. */
+static bool deliver(const query_job *job)
 {
-    return fflush(stdout) == 0 && !ferror(stdout);
+    errno = 0;
+    if (fflush(stdout) == 0 && !ferror(stdout))
+        return true;
+    fprintf(stderr, "ebpo %s: standard output: %s\n", job->command, errno ? strerror(errno) : "could not be written");
+    clearerr(stdout); /* or main would say it again */
+    return false;
 }
 
 static int answer_all(const query_job *job, ebpo_context *context, points *in, double *rows)
@@ -18,7 +25,7 @@ static int answer_all(const query_job *job, ebpo_context *context, points *in, d
     uint64_t count = 0;
     while (status == EBPO_OK && (count = points_next(in, rows)) > 0) {
         status = job->answer(job, context, rows, count, &error);
-        if (!deliver())
+        if (!deliver(job))
             return EXIT_FAILED;
     }
     if (status != EBPO_OK)

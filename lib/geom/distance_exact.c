@@ -172,14 +172,16 @@ void ebpo_triangle_unit_normal(const double triangle[3][3], double normal[3])
     for (int k = 0; k < 3; k++) {
         int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
         double products = fabs(e[u].head * f[v].head) + fabs(e[v].head * f[u].head);
-        /* 2^-96 of the products is the error; a component of exactly nothing times something is exactly 0. */
-        sure = sure && (fabs(n[k].head) > 0x1p-40 * products || products == 0);
+        bool nothing = (e[u].head == 0 || f[v].head == 0) && (e[v].head == 0 || f[u].head == 0);
+        /* 2^-96 of the products is the error; where a factor of each is 0, so is the component. */
+        sure = sure && (nothing || (fabs(n[k].head) > 0x1p-40 * products && products > 0x1p-800));
     }
     if (!sure) {
         ebpo_triangle_unit_normal_gmp(triangle, normal);
         return;
     }
-    double length = pair_root(pair_dot(n, n)).head;
+    ebpo_pair length2 = pair_dot(n, n);
+    double length = length2.head > 0 ? pair_root(length2).head : 1;
     for (int k = 0; k < 3; k++)
         normal[k] = n[k].head / length;
 }

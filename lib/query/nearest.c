@@ -46,7 +46,7 @@ void ebpo_nearest_begin(ebpo_nearest *n, const double p[3], double max_distance)
 void ebpo_nearest_hint(ebpo_nearest *n, const double triangle[3][3])
 {
     ebpo_distance_bounds b;
-    ebpo_triangle_distance_bounds(n->p, triangle, &b);
+    ebpo_triangle_distance_bounds(n->p, (const double (*)[3])triangle, &b);
     n->upper = fmin(n->upper, b.hi);
     n->limit = fmin(n->limit, b.hi);
 }
@@ -71,7 +71,7 @@ static int compare(const ebpo_nearest *n, const double triangle[3][3], const ebp
         if ((same_corner(a0, b1) && same_corner(a1, b0)) || (same_corner(a0, b0) && same_corner(a1, b1)))
             return 0;
     }
-    return ebpo_triangle_distance_compare(n->p, triangle, n->triangle);
+    return ebpo_triangle_distance_compare(n->p, triangle, (const double (*)[3])n->triangle);
 }
 
 static void look_at(ebpo_nearest *n, const ebpo_subtree *s, uint32_t slot)
@@ -82,14 +82,14 @@ static void look_at(ebpo_nearest *n, const ebpo_subtree *s, uint32_t slot)
     double triangle[3][3];
     ebpo_distance_bounds b;
     ebpo_subtree_triangle(s, slot, triangle);
-    ebpo_triangle_distance_bounds(n->p, triangle, &b);
+    ebpo_triangle_distance_bounds(n->p, (const double (*)[3])triangle, &b);
     if (b.lo > n->limit)
         return;
     uint64_t file_face = ebpo_subtree_file_face(s, local);
     if (n->found) {
         if (file_face == n->file_face)
             return;
-        int sign = compare(n, triangle, &b);
+        int sign = compare(n, (const double (*)[3])triangle, &b);
         if (sign > 0 || (sign == 0 && file_face > n->file_face))
             return;
     }
@@ -337,12 +337,12 @@ ebpo_status ebpo_nearest_search(ebpo_nearest *n, ebpo_context *context, const eb
 void ebpo_nearest_end(const ebpo_nearest *n, double max_distance, ebpo_distance_result *out)
 {
     *out = (ebpo_distance_result){ INFINITY, max_distance, INFINITY, { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
-    if (!n->found || (n->hi > max_distance && ebpo_triangle_distance_compare_to(n->p, n->triangle, max_distance) > 0))
+    if (!n->found || (n->hi > max_distance && ebpo_triangle_distance_compare_to(n->p, (const double (*)[3])n->triangle, max_distance) > 0))
         return;
     ebpo_triangle_nearest exact;
-    ebpo_triangle_nearest_exact(n->p, n->triangle, &exact);
+    ebpo_triangle_nearest_exact(n->p, (const double (*)[3])n->triangle, &exact);
     out->distance = out->lo = out->hi = exact.distance;
     memcpy(out->point, exact.point, sizeof out->point);
-    ebpo_triangle_unit_normal(n->triangle, out->normal);
+    ebpo_triangle_unit_normal((const double (*)[3])n->triangle, out->normal);
     out->face = n->told_face;
 }

@@ -22,7 +22,7 @@ typedef struct extent {
     double low[3], high[3], normal[3];
 } extent;
 
-static inline void corner(const ebpo_subtree *s, const double t[3][3], int i, double out[3])
+static inline void corner(const ebpo_subtree *s, double t[3][3], int i, double out[3])
 {
     for (int k = 0; k < 3; k++)
         out[k] = (t[i][k] - s->centre[k]) * s->scale;

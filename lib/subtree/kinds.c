@@ -70,6 +70,10 @@ static bool gather(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const d
         f->low[k] = low[k];
         f->size[k] = high[k] - low[k];
         inverse[k] = 1 / f->size[k];
+        if (!(f->size[k] > 0x1p-900)) { /* the rest is not for numbers so small */
+            *walls = 63;
+            return false;
+        }
     }
     for (uint32_t slot = 0, end = leaf->blocks * EBPO_BLOCK; slot < end; slot++) {
         uint32_t at = s->list[leaf->list + slot / EBPO_BLOCK] * EBPO_BLOCK + slot % EBPO_BLOCK;

@@ -166,7 +166,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_faces_in_box(ebpo_context *context, cons
 
 typedef struct ebpo_mass {
     double area;
-    double volume;         /* the integral of the winding number: the solid's volume where that is 0 and 1 only; 0 for a surface, as all below */
+    double volume;         /* the integral of the winding number: the solid's volume where that is 0 and 1 only; 0 for a surface. Where it is 0 so is all below */
     double centroid[3];
     double inertia[3][3];  /* about the centroid, of density 1 */
 } ebpo_mass;

@@ -1,0 +1,73 @@
+#!/usr/bin/env python3
+"""Which points are inside, and how far away is the surface? The C library through ctypes: nothing to build.
+
+    samples/query.py MODEL.ebpo.h5 <points.txt
+
+Reads lines "x y z" and answers each. The library is found where the system looks, or at EBPO_LIBRARY=/path/to/libebpo.so.
+As a module:  model = Model("bunny.ebpo.h5"); model.inside([(0, 0, 0)]); model.distance([(0, 0, 0)])
+"""
+import ctypes
+import ctypes.util
+import os
+import sys
+
+
+class Error(ctypes.Structure):  # ebpo/base.h
+    _fields_ = [("status", ctypes.c_int), ("message", ctypes.c_char * 480)]
+
+
+class Inside(ctypes.Structure):  # ebpo/query.h, as all below
+    _fields_ = [("where", ctypes.c_int32), ("winding", ctypes.c_int32), ("doubt", ctypes.c_double)]
+    word = property(lambda self: ("OUT", "IN", "ON", "MAYBE")[self.where])
+
+
+class Distance(ctypes.Structure):
+    _fields_ = [("distance", ctypes.c_double), ("lo", ctypes.c_double), ("hi", ctypes.c_double), ("point", ctypes.c_double * 3),
+                ("normal", ctypes.c_double * 3), ("face", ctypes.c_uint64)]
+
+
+class Model:
+    """Answers raise RuntimeError with the library's message."""
+
+    def __init__(self, path):
+        name = os.environ.get("EBPO_LIBRARY") or ctypes.util.find_library("ebpo")
+        if not name:
+            raise RuntimeError("libebpo is not found; install it, or name it in EBPO_LIBRARY")
+        self.library = ctypes.CDLL(name)
+        self.file, self.model, self.context = ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_void_p()
+        self.call("ebpo_open", ctypes.byref(self.file), os.fsencode(path))
+        self.call("ebpo_model_open", ctypes.byref(self.model), self.file, None)
+        self.call("ebpo_context_new", ctypes.byref(self.context), self.model)
+
+    def call(self, function, *arguments):
+        error = Error()
+        if getattr(self.library, function)(*arguments, ctypes.byref(error)) != 0:
+            raise RuntimeError(error.message.decode("utf-8", "replace"))
+
+    def ask(self, function, answer, points):
+        flat = (ctypes.c_double * (3 * len(points)))(*[c for x, y, z in points for c in (x, y, z)])
+        answers = (answer * len(points))()
+        self.call(function, self.context, flat, ctypes.c_uint64(len(points)), None, answers)
+        return answers
+
+    def inside(self, points):
+        return self.ask("ebpo_inside_many", Inside, points)
+
+    def distance(self, points):
+        return self.ask("ebpo_distance_many", Distance, points)
+
+
+def main():
+    if len(sys.argv) != 2:
+        sys.exit("usage: query.py MODEL.ebpo.h5 <points.txt")
+    try:
+        points = [tuple(map(float, line.split())) for line in sys.stdin if line.strip()]
+        model = Model(sys.argv[1])
+        for where, nearest in zip(model.inside(points), model.distance(points)):
+            print(f"{where.word}, {nearest.distance!r} from face {nearest.face} at", *map(repr, nearest.point))
+    except (RuntimeError, ValueError, OSError) as error:
+        sys.exit(f"query.py: {error}")
+
+
+if __name__ == "__main__":
+    main()
