@@ -175,6 +175,31 @@ static ebpo_status walk_nodes(asking *a, ebpo_inside_result *out, ebpo_error *er
     return walk_file(a, &spot, out, error);
 }
 
+/* True when everything that p needs is in the context's hands: then envelopes save nothing. */
+static bool answer_at_hand(asking *a, ebpo_inside_result *out, ebpo_status *status, ebpo_error *error)
+{
+    ebpo_context *c = a->context;
+    const ebpo_nodes *nodes = &c->model->top->nodes;
+    int fine = c->model->info->level_count - 1, level = 0;
+    uint32_t entry = nodes->root;
+    while (ebpo_entry_kind_of(entry) == EBPO_ENTRY_GRAY) {
+        level++;
+        entry = nodes->group[ebpo_entry_value(entry)][ebpo_octant_at(a->at, fine - level)];
+    }
+    *status = EBPO_OK;
+    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_SETTLED) {
+        ebpo_inside_settled(c, entry, out);
+        return true;
+    }
+    const ebpo_subtree *held = c->pinned && c->pinned_key == ebpo_entry_value(entry) ? c->pinned
+                               : c->own && c->own_key == ebpo_entry_value(entry)     ? c->own
+                                                                                      : NULL;
+    if (!held)
+        return false;
+    *status = ebpo_inside_subtree(c, held, a->at, a->p, out, error);
+    return true;
+}
+
 ebpo_status ebpo_inside_walk(ebpo_context *context, const double p[3], const ebpo_query_options *options, ebpo_inside_result *out, ebpo_error *error)
 {
     const ebpo_model *m = context->model;
@@ -185,5 +210,9 @@ ebpo_status ebpo_inside_walk(ebpo_context *context, const double p[3], const ebp
         *out = (ebpo_inside_result){ EBPO_OUT, 0, 0 };
         return EBPO_OK;
     }
+    ebpo_status status;
+    bool plain = options->envelopes != EBPO_ENVELOPES_USE && options->level < 0 && !options->deadline_ns;
+    if (plain && !m->whole && m->options.loading != EBPO_LOAD_NODES && answer_at_hand(&a, out, &status, error))
+        return status;
     return !m->whole && m->options.loading == EBPO_LOAD_NODES ? walk_nodes(&a, out, error) : walk_down(&a, out, error);
 }

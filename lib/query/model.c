@@ -12,9 +12,14 @@
 #include "query/locate.h"
 
 /* Decoded chunks: an eighth of the budget, within these. */
-enum { CHUNKS_LEAST = 4 << 20, CHUNKS_MOST = 128 << 20 };
+enum { CHUNKS_LEAST = 2 << 20, CHUNKS_MOST = 128 << 20, SUBTREES_LEAST = 2 << 20 };
 /* Of a cache: a path needs the subtree where it is, those around, and room to load the next. */
 enum { SUBTREES_WANTED = 64 };
+
+static uint64_t chunk_budget(uint64_t budget)
+{
+    return budget / 8 < CHUNKS_LEAST ? CHUNKS_LEAST : budget / 8 > CHUNKS_MOST ? CHUNKS_MOST : budget / 8;
+}
 
 static ebpo_slice_size whole_size(const ebpo_info *info)
 {
@@ -68,18 +73,19 @@ static int choose_cut(const ebpo_info *info, uint64_t budget)
     ebpo_subtree_estimate(&size, info, &keep, &peak);
     for (int level = 1; level < info->level_count; level++) {
         uint64_t grays = info->level[level].gray_count;
-        if (ebpo_top_estimate(info, level) > budget / 4)
+        uint64_t top = ebpo_top_estimate(info, level);
+        if (top > budget / 4 || top + chunk_budget(budget) + SUBTREES_LEAST > budget)
             return -1;
         if (grays == 0 || keep / grays * SUBTREES_WANTED <= budget / 2)
             return level;
     }
-    return info->level_count - 1;
+    return budget < chunk_budget(budget) + 2 * SUBTREES_LEAST ? -1 : info->level_count - 1;
 }
 
-/* The least budget that choose_cut accepts, about. */
+/* A budget that choose_cut accepts, not much more than the least. */
 static uint64_t least_budget(const ebpo_info *info)
 {
-    uint64_t budget = 8 << 20;
+    uint64_t budget = 4 << 20;
     while (choose_cut(info, budget) < 0 && budget < UINT64_C(1) << 60)
         budget += budget / 8;
     return budget;
@@ -101,10 +107,10 @@ static ebpo_status open_top(ebpo_model *m, int cut_level, ebpo_error *error)
     if (status != EBPO_OK)
         return status;
     if (budget) {
-        chunks = budget / 8 < CHUNKS_LEAST ? CHUNKS_LEAST : budget / 8 > CHUNKS_MOST ? CHUNKS_MOST : budget / 8;
-        if (m->top->bytes + chunks + CHUNKS_LEAST > budget)
+        chunks = chunk_budget(budget);
+        if (m->top->bytes + chunks + SUBTREES_LEAST > budget)
             return ebpo_fail(error, EBPO_E_LIMIT, "levels 0 to %d and a cache take more than the budget of %" PRIu64 " bytes; give %" PRIu64
-                             " or a lower cut level", cut_level, budget, m->top->bytes + 2 * chunks);
+                             " or a lower cut level", cut_level, budget, m->top->bytes + chunks + SUBTREES_LEAST);
         cache = budget - m->top->bytes - chunks;
     }
     status = ebpo_chunks_make(&m->chunks, m->file, chunks, error);

@@ -22,26 +22,40 @@ typedef struct extent {
     double low[3], high[3], normal[3];
 } extent;
 
-static inline void corner(const ebpo_subtree *s, double t[3][3], int i, double out[3])
+/* A block's corners in the frame, [corner][axis][lane]; lanes without a face repeat the first one. */
+typedef struct lanes {
+    double x[3][3][EBPO_BLOCK];
+} lanes;
+
+static void load_lanes(const ebpo_subtree *s, uint32_t block, lanes *out)
 {
-    for (int k = 0; k < 3; k++)
-        out[k] = (t[i][k] - s->centre[k]) * s->scale;
+    for (int i = 0; i < 9; i++) {
+        uint64_t at = (uint64_t)block * EBPO_BLOCK_NUMBERS + (uint64_t)i * EBPO_BLOCK;
+        double *x = out->x[i / 3][i % 3], centre = s->centre[i % 3];
+        for (int lane = 0; lane < EBPO_BLOCK; lane++)
+            x[lane] = s->wide ? s->block64[at + (uint64_t)lane] : (double)s->block32[at + (uint64_t)lane];
+        for (int lane = 0; lane < EBPO_BLOCK; lane++)
+            x[lane] = s->slot_face[block * EBPO_BLOCK + (uint32_t)lane] == EBPO_NO_SLOT ? x[0] : (x[lane] - centre) * s->scale;
+    }
 }
 
-static void add_face(const ebpo_subtree *s, uint32_t slot, extent *e)
+static void add_block(const lanes *l, extent *e)
 {
-    double t[3][3], p[3][3];
-    ebpo_subtree_triangle(s, slot, t);
-    for (int i = 0; i < 3; i++) {
-        corner(s, t, i, p[i]);
-        for (int k = 0; k < 3; k++) {
-            e->low[k] = p[i][k] < e->low[k] ? p[i][k] : e->low[k];
-            e->high[k] = p[i][k] > e->high[k] ? p[i][k] : e->high[k];
-        }
-    }
     for (int k = 0; k < 3; k++) {
         int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
-        e->normal[k] += (p[1][u] - p[0][u]) * (p[2][v] - p[0][v]) - (p[1][v] - p[0][v]) * (p[2][u] - p[0][u]);
+        double low = e->low[k], high = e->high[k], normal = 0;
+        for (int i = 0; i < 3; i++)
+            for (int lane = 0; lane < EBPO_BLOCK; lane++) {
+                double x = l->x[i][k][lane];
+                low = x < low ? x : low;
+                high = x > high ? x : high;
+            }
+        for (int lane = 0; lane < EBPO_BLOCK; lane++)
+            normal += (l->x[1][u][lane] - l->x[0][u][lane]) * (l->x[2][v][lane] - l->x[0][v][lane]) -
+                      (l->x[1][v][lane] - l->x[0][v][lane]) * (l->x[2][u][lane] - l->x[0][u][lane]);
+        e->low[k] = low;
+        e->high[k] = high;
+        e->normal[k] += normal;
     }
 }
 
@@ -57,22 +71,22 @@ typedef struct slab {
     double from, to, radius2;
 } slab;
 
-static void add_to_slab(const ebpo_subtree *s, uint32_t slot, const double middle[3], const float axis[3], slab *out)
+static void add_to_slab(const lanes *l, const double middle[3], const float axis[3], slab *out)
 {
-    double t[3][3], p[3];
-    ebpo_subtree_triangle(s, slot, t);
     for (int i = 0; i < 3; i++) {
-        corner(s, t, i, p);
-        double along = 0, square = 0;
-        for (int k = 0; k < 3; k++) {
-            double d = p[k] - middle[k];
-            along += d * (double)axis[k];
-            square += d * d;
+        double along[EBPO_BLOCK] = { 0 }, square[EBPO_BLOCK] = { 0 };
+        for (int k = 0; k < 3; k++)
+            for (int lane = 0; lane < EBPO_BLOCK; lane++) {
+                double d = l->x[i][k][lane] - middle[k];
+                along[lane] += d * (double)axis[k];
+                square[lane] += d * d;
+            }
+        for (int lane = 0; lane < EBPO_BLOCK; lane++) {
+            double radius2 = square[lane] - along[lane] * along[lane] + square[lane] * 0x1p-22; /* the axis is a unit vector up to its rounding */
+            out->from = along[lane] < out->from ? along[lane] : out->from;
+            out->to = along[lane] > out->to ? along[lane] : out->to;
+            out->radius2 = radius2 > out->radius2 ? radius2 : out->radius2;
         }
-        out->from = along < out->from ? along : out->from;
-        out->to = along > out->to ? along : out->to;
-        double radius2 = square - along * along + square * 0x1p-22; /* the axis is a unit vector up to its rounding */
-        out->radius2 = radius2 > out->radius2 ? radius2 : out->radius2;
     }
 }
 
@@ -103,9 +117,11 @@ static void set_child(ebpo_bound *b, int lane, const extent *e, const float axis
 static void bound_blocks(const ebpo_subtree *s, ebpo_bound *b, int lane, uint32_t first, uint32_t last)
 {
     extent e = { { INFINITY, INFINITY, INFINITY }, { -INFINITY, -INFINITY, -INFINITY }, { 0, 0, 0 } };
-    for (uint64_t slot = (uint64_t)first * EBPO_BLOCK; slot < (uint64_t)last * EBPO_BLOCK; slot++)
-        if (s->slot_face[slot] != EBPO_NO_SLOT)
-            add_face(s, (uint32_t)slot, &e);
+    lanes l;
+    for (uint32_t block = first; block < last; block++) {
+        load_lanes(s, block, &l);
+        add_block(&l, &e);
+    }
     float axis[3] = { 0, 0, 0 };
     double middle[3];
     for (int k = 0; k < 3; k++)
@@ -117,9 +133,11 @@ static void bound_blocks(const ebpo_subtree *s, ebpo_bound *b, int lane, uint32_
     } else {
         choose_axis(&e, axis);
         w = (slab){ INFINITY, -INFINITY, 0 };
-        for (uint64_t slot = (uint64_t)first * EBPO_BLOCK; slot < (uint64_t)last * EBPO_BLOCK; slot++)
-            if (s->slot_face[slot] != EBPO_NO_SLOT)
-                add_to_slab(s, (uint32_t)slot, middle, axis, &w);
+        for (uint32_t block = first; block < last; block++) {
+            if (last - first > 1)
+                load_lanes(s, block, &l);
+            add_to_slab(&l, middle, axis, &w);
+        }
     }
     set_child(b, lane, &e, axis, middle, &w);
 }

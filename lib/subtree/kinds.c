@@ -58,48 +58,63 @@ static inline double most3(double a, double b, double c)
     return high > c ? high : c;
 }
 
-/* Gathers the faces whose boxes meet the cell, and tells which walls these boxes come to (bit 2 axis + side). Rounding can only add to both. False when the faces are too many
- * to be held (the walls are right all the same). */
+/* Which of a block's faces have boxes that meet the cell, and which walls these boxes come to (bit 2 axis + side). Exact comparisons. */
+static unsigned look_at_block(const ebpo_subtree *s, uint32_t block, const double low[3], const double high[3], unsigned *walls)
+{
+    int away[EBPO_BLOCK] = { 0 }, touches[EBPO_BLOCK] = { 0 };
+    for (int k = 0; k < 3; k++) {
+        double x[3][EBPO_BLOCK];
+        for (int i = 0; i < 3; i++)
+            for (int lane = 0; lane < EBPO_BLOCK; lane++) {
+                uint64_t at = (uint64_t)block * EBPO_BLOCK_NUMBERS + (uint64_t)(3 * i + k) * EBPO_BLOCK + (uint64_t)lane;
+                x[i][lane] = s->wide ? s->block64[at] : (double)s->block32[at];
+            }
+        for (int lane = 0; lane < EBPO_BLOCK; lane++) {
+            double least = least3(x[0][lane], x[1][lane], x[2][lane]), most = most3(x[0][lane], x[1][lane], x[2][lane]);
+            away[lane] |= (least > high[k]) | (most < low[k]);
+            touches[lane] |= (least <= low[k]) << 2 * k | (most >= high[k]) << (2 * k + 1);
+        }
+    }
+    unsigned near = 0;
+    for (int lane = 0; lane < EBPO_BLOCK; lane++) {
+        near |= (unsigned)!away[lane] << lane;
+        *walls |= away[lane] ? 0 : (unsigned)touches[lane];
+    }
+    return near;
+}
+
+static void add_face(const ebpo_subtree *s, uint32_t slot, const double inverse[3], leaf_faces *f)
+{
+    double t[3][3];
+    ebpo_subtree_triangle(s, slot, t);
+    for (int i = 0; i < 9; i++)
+        f->p[f->count][i / 3][i % 3] = (t[i / 3][i % 3] - f->low[i % 3]) * inverse[i % 3];
+    f->slot[f->count++] = slot;
+}
+
+/* Gathers the faces whose boxes meet the cell, and the walls that they come to. False when they are not to be had: too many, or a cell too small for what follows. */
 static bool gather(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const double low[3], const double high[3], leaf_faces *f, unsigned *walls)
 {
     double inverse[3];
-    bool room = true;
+    bool fine = true;
     f->count = 0;
     *walls = 0;
     for (int k = 0; k < 3; k++) {
         f->low[k] = low[k];
         f->size[k] = high[k] - low[k];
         inverse[k] = 1 / f->size[k];
-        if (!(f->size[k] > 0x1p-900)) { /* the rest is not for numbers so small */
-            *walls = 63;
-            return false;
+        fine = fine && f->size[k] > 0x1p-900;
+    }
+    for (uint32_t b = 0; b < leaf->blocks; b++) {
+        uint32_t block = s->list[leaf->list + b];
+        unsigned near = look_at_block(s, block, low, high, walls); /* lanes without a face are far away */
+        for (; near && fine; near &= near - 1) {
+            fine = f->count < FACES_MAX;
+            if (fine)
+                add_face(s, block * EBPO_BLOCK + (unsigned)__builtin_ctz(near), inverse, f);
         }
     }
-    for (uint32_t slot = 0, end = leaf->blocks * EBPO_BLOCK; slot < end; slot++) {
-        uint32_t at = s->list[leaf->list + slot / EBPO_BLOCK] * EBPO_BLOCK + slot % EBPO_BLOCK;
-        double t[3][3], x[3][3];
-        unsigned touches = 0;
-        bool away = s->slot_face[at] == EBPO_NO_SLOT;
-        if (away)
-            continue;
-        ebpo_subtree_triangle(s, at, t);
-        for (int k = 0; k < 3; k++) {
-            for (int i = 0; i < 3; i++)
-                x[i][k] = (t[i][k] - low[k]) * inverse[k];
-            double least = least3(x[0][k], x[1][k], x[2][k]), most = most3(x[0][k], x[1][k], x[2][k]);
-            away = away || least > 1 + 0x1p-40 || most < -0x1p-40;
-            touches |= (unsigned)!(least > 0x1p-40) << 2 * k | (unsigned)!(most < 1 - 0x1p-40) << (2 * k + 1);
-        }
-        if (away)
-            continue;
-        *walls |= touches;
-        room = room && f->count < FACES_MAX;
-        if (room) {
-            memcpy(f->p[f->count], x, sizeof x);
-            f->slot[f->count++] = at;
-        }
-    }
-    return room;
+    return fine;
 }
 
 /* Crossings of the leaf's faces with a segment along an axis. */
@@ -294,6 +309,15 @@ static bool keep_planes(piece *out, ebpo_subtree_leaf *leaf, const plane *planes
     return true;
 }
 
+/* A lower wall if there is one: its winding number is the corner's. */
+static uint8_t choose_wall(unsigned walls)
+{
+    unsigned open = ~walls & 63;
+    if (open & 21)
+        return (uint8_t)__builtin_ctz(open & 21);
+    return open ? (uint8_t)__builtin_ctz(open) : EBPO_NO_WALL;
+}
+
 static bool classify(const ebpo_subtree *s, ebpo_subtree_leaf *leaf, const ebpo_leaf_place *place, piece *out)
 {
     double low[3], high[3];
@@ -304,7 +328,7 @@ static bool classify(const ebpo_subtree *s, ebpo_subtree_leaf *leaf, const ebpo_
     leaf_cell(s, place, low, high);
     unsigned walls;
     bool few = gather(s, leaf, low, high, &f, &walls);
-    leaf->wall = walls == 63 ? EBPO_NO_WALL : (uint8_t)__builtin_ctz(~walls);
+    leaf->wall = choose_wall(walls);
     if (leaf->wall != EBPO_NO_WALL && leaf->wall % 2) {
         double p[3] = { low[0], low[1], low[2] };
         p[leaf->wall / 2] = high[leaf->wall / 2];
