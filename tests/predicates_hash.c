@@ -9,6 +9,7 @@
 #include "geom/cell.h"
 #include "geom/predicates.h"
 #include "geom/predicates_expansion.h"
+#include "geom/distance.h"
 #include "geom/ray.h"
 
 enum { ROUNDS = 3000 };
@@ -76,6 +77,22 @@ static uint64_t hash_rays(uint64_t hash, const double *p)
     return mix(hash, ebpo_triangle_meets_box(triangle, low, high));
 }
 
+static uint64_t hash_distances(uint64_t hash, const double *p)
+{
+    const double triangle[3][3] = {{p[0], p[1], p[2]}, {p[3], p[4], p[5]}, {p[6], p[7], p[8]}};
+    const double other[3][3] = {{p[0], p[1], p[2]}, {p[6], p[7], p[8]}, {p[3], p[5], p[4]}};
+    ebpo_distance_bounds b;
+    ebpo_triangle_nearest n;
+    double normal[3];
+    ebpo_triangle_distance_bounds(p + 9, triangle, &b);
+    ebpo_triangle_nearest_exact(p + 9, triangle, &n);
+    ebpo_triangle_unit_normal(triangle, normal);
+    hash = mix_double(mix_double(mix_double(mix(hash, (int)n.feature), b.lo), b.hi), n.distance);
+    for (int k = 0; k < 3; k++)
+        hash = mix_double(mix_double(hash, n.point[k]), normal[k]);
+    return mix(hash, ebpo_triangle_distance_compare(p + 9, triangle, other));
+}
+
 int main(void)
 {
     uint64_t hash = 0xcbf29ce484222325, state = 1;
@@ -87,6 +104,7 @@ int main(void)
                 hash = mix_double(hash, p[k]);
             hash = hash_points(hash, p);
             hash = hash_rays(hash, p);
+            hash = hash_distances(hash, p);
             hash = hash_box(hash, p, p[3] < 0 ? -p[3] : p[3]);
         }
     printf("%016" PRIx64 "\n", hash);
