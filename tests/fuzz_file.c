@@ -1,10 +1,5 @@
-/* Any bytes as a file: opening and reading everything ends in a status, nothing else. */
-#include <fcntl.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <unistd.h>
-
-#include <ebpo/file.h>
+/* Any bytes as a file: opening, reading everything and asking ends in a status, nothing else. */
+#include <ebpo/query.h>
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -15,20 +10,37 @@ const char *__lsan_default_suppressions(void)
     return "leak:libhdf5";
 }
 
-static char path[64];
-
-static void remove_file(void)
+/* Questions through whole models and through subtrees loaded on demand. */
+static void ask(ebpo_file *file, int cut_level)
 {
-    unlink(path);
-}
-
-static int open_scratch(void)
-{
-    if (path[0])
-        return open(path, O_WRONLY | O_TRUNC);
-    snprintf(path, sizeof path, "%s/ebpo-fuzz-XXXXXX", access("/dev/shm", W_OK) == 0 ? "/dev/shm" : "/tmp");
-    atexit(remove_file);
-    return mkstemp(path);
+    static const double points[4][3] = { { 0, 0, 0 }, { 0.25, 0.3, 0.2 }, { 1, 1, 1 }, { 1e9, -3, 0.5 } };
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model *model;
+    ebpo_context *context;
+    options.cut_level = cut_level;
+    options.threads = 1;
+    options.memory = 64 << 20;
+    if (ebpo_model_open(&model, file, &options, NULL) != EBPO_OK)
+        return;
+    if (ebpo_context_new(&context, model, NULL) == EBPO_OK) {
+        ebpo_inside_result where;
+        ebpo_distance_result distance;
+        const ebpo_ray_hit *hits;
+        const uint64_t *faces;
+        uint64_t count;
+        for (int i = 0; i < 4; i++) {
+            ebpo_query_options limited = EBPO_QUERY_OPTIONS_INIT;
+            limited.level = i;
+            (void)!ebpo_inside(context, points[i], NULL, &where, NULL);
+            (void)!ebpo_inside(context, points[i], &limited, &where, NULL);
+            (void)!ebpo_distance(context, points[i], NULL, &distance, NULL);
+            (void)!ebpo_distance(context, points[i], &limited, &distance, NULL);
+        }
+        (void)!ebpo_ray_all(context, points[1], points[2], 10, &hits, &count, NULL);
+        (void)!ebpo_faces_in_box(context, points[0], points[2], &faces, &count, NULL);
+        ebpo_context_free(context);
+    }
+    ebpo_model_close(model);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
@@ -36,17 +48,15 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     ebpo_file *file;
     ebpo_tree tree;
     ebpo_mesh mesh;
-    int fd = open_scratch();
-    if (fd < 0 || write(fd, data, size) != (ssize_t)size)
-        abort();
-    close(fd);
-    if (ebpo_open(&file, path, NULL) != EBPO_OK)
+    if (ebpo_open_memory(&file, data, size, "fuzzed", NULL) != EBPO_OK)
         return 0;
     if (ebpo_file_read_tree(file, &tree, 1, NULL) == EBPO_OK)
         ebpo_tree_free(&tree);
     if (ebpo_file_read_source_mesh(file, &mesh, NULL, 1, NULL) == EBPO_OK)
         ebpo_mesh_free(&mesh);
     (void)!ebpo_file_check_content(file, 1, NULL);
+    for (int cut = -1; cut < 3; cut++)
+        ask(file, cut);
     ebpo_close(file);
     return 0;
 }
