@@ -31,7 +31,7 @@ typedef struct asked {
 static void begin(asked *a, int i, uint64_t count)
 {
     query_model_make(&a->m, cases[i].name, query_solid_by_name(cases[i].name), &query_variants[cases[i].variant]);
-    a->count = query_scaled(count);
+    a->count = query_scaled(count / 3);
     a->points = query_room(a->count, 3 * sizeof *a->points);
     a->truth = query_room(a->count, sizeof *a->truth);
     a->inside = query_room(a->count, sizeof *a->inside);
