@@ -51,7 +51,7 @@ void oracle_choose_unit(oracle *o, const double *p, int count)
     }
 }
 
-void oracle_cross(mpz_t out[3], mpz_t a[3], mpz_t b[3])
+void oracle_cross(mpz_t *out, mpz_t *a, mpz_t *b)
 {
     for (int k = 0; k < 3; k++) {
         int i = (k + 1) % 3, j = (k + 2) % 3;
@@ -60,7 +60,7 @@ void oracle_cross(mpz_t out[3], mpz_t a[3], mpz_t b[3])
     }
 }
 
-void oracle_dot(mpz_t out, mpz_t a[3], mpz_t b[3])
+void oracle_dot(mpz_t out, mpz_t *a, mpz_t *b)
 {
     mpz_mul(out, a[0], b[0]);
     mpz_addmul(out, a[1], b[1]);

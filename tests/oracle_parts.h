@@ -53,8 +53,9 @@ void oracle_set(mpz_t z, double x, int e);
 void oracle_choose_unit(oracle *o, const double *p, int count);
 /* a[i] = corner i of the face - p, edge[i] = a[i + 1] - a[i], normal = edge[0] x edge[1]; in the unit. */
 void oracle_load(oracle *o, uint32_t face);
-void oracle_cross(mpz_t out[3], mpz_t a[3], mpz_t b[3]);
-void oracle_dot(mpz_t out, mpz_t a[3], mpz_t b[3]);
+/* Vectors are three numbers. */
+void oracle_cross(mpz_t *out, mpz_t *a, mpz_t *b);
+void oracle_dot(mpz_t out, mpz_t *a, mpz_t *b);
 /* Sign of a - b; uses s[10], s[11]. */
 int oracle_fraction_compare(oracle *o, const oracle_fraction *a, const oracle_fraction *b);
 void oracle_fraction_swap(oracle_fraction *a, oracle_fraction *b);

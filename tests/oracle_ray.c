@@ -14,7 +14,7 @@ static void keep_least(oracle *o, bool *any, oracle_fraction *best, oracle_fract
     *any = true;
 }
 
-static bool is_zero(mpz_t a[3])
+static bool is_zero(mpz_t *a)
 {
     return mpz_sgn(a[0]) == 0 && mpz_sgn(a[1]) == 0 && mpz_sgn(a[2]) == 0;
 }
@@ -188,7 +188,7 @@ void oracle_ray(oracle *o, const double origin[3], const double direction[3], do
 /* --- boxes; corners are relative to o->p = min, o->direction = max - min --- */
 
 /* The projections on the axis have a gap. */
-static bool separates(oracle *o, mpz_t axis[3])
+static bool separates(oracle *o, mpz_t *axis)
 {
     mpz_t *low = &o->s[2], *high = &o->s[3];
     mpz_set_ui(*low, 0);
