@@ -1,0 +1,155 @@
+// A chunk's bytes as HDF5 stores them: shuffle, zstd or deflate, fletcher32. Every checksum and every length is compared.
+
+export const CHUNK_BYTES_MAX = 65536; // before compression
+export const FILTER = { deflate: 1, shuffle: 2, fletcher32: 3, zstd: 32015 };
+
+/** 'zstd', 'deflate', 'checksum' or 'bare' for an array's filters, or undefined when they are none of the format's. */
+export function pipelineOf(filters, elementSize) {
+  const ids = filters.map((f) => f.id), shuffle = elementSize > 1 ? [FILTER.shuffle] : [];
+  const is = (...wanted) => wanted.length === ids.length && wanted.every((id, i) => id === ids[i]);
+  if (ids.length && ids[0] === FILTER.shuffle && filters[0].values[0] !== elementSize)
+    return undefined;
+  if (is(...shuffle, FILTER.zstd))
+    return 'zstd';
+  if (is(...shuffle, FILTER.deflate, FILTER.fletcher32))
+    return 'deflate';
+  return is(FILTER.fletcher32) ? 'checksum' : is() ? 'bare' : undefined;
+}
+
+/** The most bytes that an encoded chunk can have: generous for both compressors. */
+export function chunkBound(bytes) {
+  return bytes + (bytes >> 8) + 1024;
+}
+
+/** HDF5's fletcher32: big-endian 16-bit words, sums modulo 65535. */
+export function fletcher32(data) {
+  let low = 0, high = 0;
+  const words = data.length >> 1;
+  for (let i = 0; i < words;) {
+    for (const stop = Math.min(words, i + 360); i < stop; i++) {
+      low += data[2 * i] << 8 | data[2 * i + 1];
+      high += low;
+    }
+    low = (low & 0xffff) + (low >>> 16);
+    high = (high & 0xffff) + Math.floor(high / 65536);
+  }
+  if (data.length & 1) {
+    low += data[data.length - 1] << 8;
+    high += low;
+    low = (low & 0xffff) + (low >>> 16);
+    high = (high & 0xffff) + (high >>> 16);
+  }
+  low = (low & 0xffff) + (low >>> 16);
+  high = (high & 0xffff) + (high >>> 16);
+  return ((high << 16) | low) >>> 0;
+}
+
+function unshuffle(data, size) {
+  const count = data.length / size, out = new Uint8Array(data.length);
+  for (let k = 0; k < size; k++)
+    for (let i = 0, from = k * count, to = k; i < count; i++, to += size)
+      out[to] = data[from + i];
+  return out;
+}
+
+/**
+ * What is wrong with a chunk as a single zstd frame that states its size, has a checksum and fills the chunk, or undefined. (The wasm decoder
+ * alone would take several frames, and frames without a checksum.) Source: RFC 8878, section 3.1.
+ */
+export function zstdFrameFault(data, size) {
+  const view = new DataView(data.buffer, data.byteOffset, data.byteLength);
+  if (data.length < 6 || view.getUint32(0, true) !== 0xfd2fb528)
+    return 'it is not a zstd frame';
+  const descriptor = data[4], single = descriptor >> 5 & 1, contentCode = descriptor >> 6;
+  const contentBytes = contentCode === 0 ? single : 1 << contentCode;
+  let at = 5 + (single ? 0 : 1) + [0, 1, 2, 4][descriptor & 3];
+  if (contentBytes === 0 || at + contentBytes > data.length)
+    return "the zstd frame does not state the chunk's size";
+  let stated = 0;
+  for (let i = contentBytes - 1; i >= 0; i--)
+    stated = stated * 256 + data[at + i];
+  if (stated + (contentBytes === 2 ? 256 : 0) !== size)
+    return "the zstd frame does not state the chunk's size";
+  if (!(descriptor & 4))
+    return 'the zstd frame has no checksum';
+  at += contentBytes;
+  for (let last = 0; !last;) {
+    if (at + 3 > data.length)
+      return 'the zstd frame is cut short';
+    const header = data[at] | data[at + 1] << 8 | data[at + 2] << 16;
+    last = header & 1;
+    at += 3 + ((header >> 1 & 3) === 1 ? 1 : header >> 3);
+  }
+  return at + 4 === data.length ? undefined : 'the zstd frame does not fill the chunk';
+}
+
+async function inflate(data) {
+  const stream = new DecompressionStream('deflate'), writer = stream.writable.getWriter();
+  writer.write(data).catch(() => {});
+  writer.close().catch(() => {});
+  const parts = [];
+  let total = 0;
+  for (const reader = stream.readable.getReader(); ;) {
+    const { done, value } = await reader.read();
+    if (done)
+      break;
+    total += value.length;
+    if (total > CHUNK_BYTES_MAX) {
+      reader.cancel().catch(() => {});
+      break;
+    }
+    parts.push(value);
+  }
+  const out = new Uint8Array(total);
+  let at = 0;
+  for (const part of parts) {
+    out.set(part, at);
+    at += part.length;
+  }
+  return out;
+}
+
+let wasm;
+
+/** The zstd decoder that is used unless another is given: the wasm of npm's zstddec. Its import needs Node.js, a bundler or an import map. */
+async function usualZstd() {
+  wasm ??= import('zstddec').then(({ ZSTDDecoder }) => loadZstd(ZSTDDecoder));
+  return wasm;
+}
+
+/** A zstd decoder from zstddec's class, for places that cannot resolve bare imports (module workers). */
+export async function loadZstd(ZSTDDecoder) {
+  const decoder = new ZSTDDecoder();
+  await decoder.init();
+  return decoder;
+}
+
+/**
+ * Decodes one stored chunk to exactly `size` bytes. Returns { bytes } or { fault }, a sentence part.
+ * `zstd` has decode(bytes, size) as npm's zstddec; undefined: that.
+ */
+export async function decodeChunk(stored, pipeline, elementSize, size, zstd) {
+  let data = stored;
+  if (pipeline === 'deflate' || pipeline === 'checksum') {
+    const end = data.length - 4;
+    if (end < 0 || new DataView(data.buffer, data.byteOffset + end, 4).getUint32(0, true) !== fletcher32(data.subarray(0, end)))
+      return { fault: 'the fletcher32 checksum does not match' };
+    data = data.subarray(0, end);
+  }
+  if (pipeline === 'zstd') {
+    const fault = zstdFrameFault(data, size);
+    if (fault)
+      return { fault };
+    data = (zstd ?? await usualZstd()).decode(data, size);
+    if (data.length !== size) // the decoder gives no bytes on errors
+      return { fault: 'the zstd frame does not decode, or its checksum does not match' };
+  } else if (pipeline === 'deflate') {
+    data = await inflate(data).catch(() => new Uint8Array(0));
+    if (data.length !== size)
+      return { fault: "the deflate stream does not decode to the chunk's size" };
+  } else if (data.length !== size) {
+    return { fault: "the stored size is not the chunk's size" };
+  }
+  const shuffled = (pipeline === 'zstd' || pipeline === 'deflate') && elementSize > 1;
+  return { bytes: shuffled ? unshuffle(data, elementSize) : data.slice() };
+}

@@ -1,0 +1,284 @@
+// What a file's head says: root attributes, levels, and the table of arrays. format-spec/README.md, sections 3 and 4.
+import { EbpoError, formatError } from './error.js';
+import { text } from './hdf5.js';
+
+export const LEVELS_MAX = 21, INDEX_ROWS = 4096;
+const MESH_MAX = 2 ** 32 - 2, NODES_MAX = 2 ** 40;
+const KNOWN_PARTS = ['levels', 'mesh', 'planes', 'maps', 'leaf-planes'];
+
+const WORDS = { kind: ['surface', 'solid'], winding_rule: ['nonzero', 'evenodd', 'positive'], coordinate_type: ['float32', 'float64'] };
+const TEXTS = ['source_name', 'source_format', 'unit', 'crs', 'date'];
+const FLAGS = ['mend_weld', 'mend_orient', 'mend_fill_holes', 'mesh_balanced', 'mesh_manifold', 'mesh_genus_known'];
+const COUNTS = ['source_size', 'vertex_count', 'face_count', 'source_vertex_count', 'source_face_count', 'leaf_faces', 'mend_welded_vertices',
+  'mend_flipped_faces', 'mend_unorientable', 'mend_filled_holes', 'mend_added_faces', 'mend_unfilled_holes', 'mesh_boundary_edges',
+  'mesh_nonmanifold_edges', 'mesh_misoriented_edges', 'mesh_unbalanced_edges', 'mesh_bowtie_vertices', 'mesh_zero_area_faces',
+  'mesh_index_repeated_faces', 'mesh_repeated_faces', 'mesh_unreferenced_vertices', 'mesh_repeated_positions', 'mesh_edges', 'mesh_components',
+  'mesh_boundary_loops'];
+const NUMBERS = ['grid_level', 'max_level', 'level_count'];
+const REALS = ['epsilon', 'mesh_area', 'mesh_volume', 'mesh_mean_edge'];
+const TRIPLES = ['box_origin', 'box_size', 'mesh_min', 'mesh_max'];
+const DIGESTS = ['source_sha256', 'content_sha256'];
+const LEVEL_COUNTS = ['gray', 'leaf', 'white', 'black', 'planes', 'leaf_planes', 'faces_new', 'faces_referenced'];
+
+/** Reads attributes of one object by type. */
+class Facts {
+  constructor(attributes, where) {
+    this.attributes = attributes;
+    this.where = where;
+  }
+
+  fail(name, what) {
+    return formatError(this.where, `attribute ${name}: ${what}`);
+  }
+
+  #get(name, count, fits, what) {
+    const a = this.attributes.get(name);
+    if (!a)
+      throw formatError(this.where, `attribute ${name} is missing`);
+    const points = a.space ? a.space.dims.reduce((product, d) => product * d, 1) : 0;
+    if (!fits(a.type))
+      throw this.fail(name, `it is not ${what}`);
+    if (points !== count || !a.space.fixed || a.data.length < count * a.type.size)
+      throw this.fail(name, 'it is damaged or has the wrong number of values');
+    return new DataView(a.data.buffer, a.data.byteOffset, count * a.type.size);
+  }
+
+  has(name) {
+    return this.attributes.has(name);
+  }
+
+  text(name, most = 4096) {
+    const view = this.#get(name, 1, (t) => t.class === 'text' && t.padded && t.utf8 && t.size >= 1 && t.size <= most, 'a fixed-length UTF-8 text of a sensible length');
+    const bytes = new Uint8Array(view.buffer, view.byteOffset, view.byteLength), end = bytes.indexOf(0);
+    const value = text(end < 0 ? bytes : bytes.subarray(0, end));
+    if (value === undefined)
+      throw this.fail(name, 'it is not a fixed-length UTF-8 text of a sensible length');
+    return value;
+  }
+
+  count(name, most = Number.MAX_SAFE_INTEGER) {
+    const view = this.#get(name, 1, (t) => t.class === 'integer' && t.size === 8 && !t.signed && t.little, 'a u64');
+    const value = view.getBigUint64(0, true);
+    if (value > BigInt(most))
+      throw this.fail(name, 'it has a value that the format does not allow');
+    return Number(value);
+  }
+
+  int(name, least = 0, most = 2 ** 20) {
+    const view = this.#get(name, 1, (t) => t.class === 'integer' && t.size === 8 && t.signed && t.little, 'an i64');
+    const value = view.getBigInt64(0, true);
+    if (value < BigInt(least) || value > BigInt(most))
+      throw this.fail(name, 'it has a value that the format does not allow');
+    return Number(value);
+  }
+
+  reals(name, count) {
+    const view = this.#get(name, count, (t) => t.class === 'double', 'of doubles');
+    return Array.from({ length: count }, (_, i) => view.getFloat64(8 * i, true));
+  }
+
+  word(name) {
+    const value = this.text(name);
+    if (!WORDS[name].includes(value))
+      throw this.fail(name, 'it has a value that the format does not allow');
+    return value;
+  }
+}
+
+function readParts(facts) {
+  const seen = new Set();
+  for (const [name, required] of [['required_parts', true], ['optional_parts', false]])
+    for (const word of facts.text(name).split(' ').filter(Boolean)) {
+      if (!KNOWN_PARTS.includes(word)) {
+        if (required)
+          throw new EbpoError('VERSION', `the file needs part "${word}", which this reader does not know; use a newer one`);
+      } else if (seen.has(word)) {
+        throw formatError('', `part "${word}" is listed twice`);
+      }
+      if (KNOWN_PARTS.includes(word))
+        seen.add(word);
+    }
+  if (!seen.has('levels'))
+    throw facts.fail('required_parts', 'it has a value that the format does not allow');
+  return seen;
+}
+
+/** The root's attributes as an object with the attributes' names, and `parts`, a Set of words. */
+export function readFacts(attributes) {
+  const facts = new Facts(attributes, '/'), out = {};
+  let format;
+  try {
+    format = facts.text('format');
+  } catch { /* said below */ }
+  if (format !== 'EBP-Octree in HDF5')
+    throw formatError('', 'an HDF5 file, but not an EBP-Octree (its root attribute format does not say "EBP-Octree in HDF5")', 'make one with `ebpo convert`');
+  out.format_version_major = facts.int('format_version_major');
+  out.format_version_minor = facts.int('format_version_minor');
+  if (out.format_version_major !== 1)
+    throw new EbpoError('VERSION', `format version ${out.format_version_major}.${out.format_version_minor}, and this reader reads version 1; use a newer one`);
+  out.parts = readParts(facts);
+  out.generator = facts.text('generator');
+  for (const name of TEXTS)
+    out[name] = facts.has(name) ? facts.text(name) : undefined;
+  for (const name of Object.keys(WORDS))
+    out[name] = facts.word(name);
+  for (const name of FLAGS)
+    out[name] = facts.count(name, 1) === 1;
+  for (const name of COUNTS)
+    out[name] = facts.count(name);
+  for (const name of NUMBERS)
+    out[name] = facts.int(name);
+  out.mesh_genus = facts.int('mesh_genus', Number.MIN_SAFE_INTEGER, Number.MAX_SAFE_INTEGER);
+  for (const name of REALS)
+    out[name] = facts.reals(name, 1)[0];
+  for (const name of TRIPLES)
+    out[name] = facts.reals(name, 3);
+  for (const name of DIGESTS) {
+    out[name] = facts.text(name);
+    if (!/^[0-9a-f]{64}$/.test(out[name]))
+      throw facts.fail(name, 'it has a value that the format does not allow');
+  }
+  if (out.level_count < 1 || out.level_count > LEVELS_MAX)
+    throw formatError('/', `level_count is not 1 to ${LEVELS_MAX}`);
+  out.solid = out.kind === 'solid';
+  return out;
+}
+
+/** A level's attributes. */
+export function readLevelFacts(attributes, where) {
+  const facts = new Facts(attributes, where), out = {};
+  for (const name of LEVEL_COUNTS)
+    out[name] = facts.count(name);
+  out.gray_volume = facts.reals('gray_volume', 1)[0];
+  out.leaf_volume = facts.reals('leaf_volume', 1)[0];
+  return out;
+}
+
+/** Whether an axis of the root box lies on a grid of exact doubles (format-spec, section 5). Exact: in integers. */
+function axisValid(origin, size, gridLevel) {
+  const largest = 2 ** 1002;
+  if (!(Math.abs(origin) <= largest && size > 0 && size <= largest))
+    return false;
+  const parts = (x) => {
+    const view = new DataView(new ArrayBuffer(8));
+    view.setFloat64(0, Math.abs(x));
+    const bits = view.getBigUint64(0), exponent = Number(bits >> 52n), fraction = bits & 0xfffffffffffffn;
+    let m = exponent ? fraction | 1n << 52n : fraction, e = Math.max(exponent, 1) - 1075;
+    while (m && !(m & 1n)) {
+      m >>= 1n;
+      e++;
+    }
+    return { m: x < 0 ? -m : m, e };
+  };
+  const o = parts(origin), s = parts(size);
+  const e = Math.min(s.e - gridLevel, o.m ? o.e : Infinity);
+  if (e < -1074)
+    return false;
+  const limit = 1n << 53n;
+  if ((o.m && o.e - e > 60) || s.e - e > 60)
+    return false;
+  const first = o.m ? o.m << BigInt(o.e - e) : 0n, length = s.m << BigInt(s.e - e);
+  return first <= limit && first >= -limit && length <= limit && first + length <= limit;
+}
+
+function checkLevelCounts(info, level) {
+  const s = info.levels[level], has = (part) => info.parts.has(part);
+  const nodes = level ? 8 * info.levels[level - 1].gray : 1;
+  if ([s.gray, s.leaf, s.white, s.black].some((n) => n > NODES_MAX))
+    return 'a level has too many nodes';
+  if (s.gray + s.leaf + s.white + s.black !== nodes)
+    return 'a level does not have eight nodes for each gray one above';
+  if ((s.gray === 0) !== (level === info.level_count - 1))
+    return 'the gray nodes do not end at the deepest level';
+  if (s.planes > (has('planes') ? 255 * s.gray : 0) || s.leaf_planes > (has('leaf-planes') ? 255 * s.leaf : 0))
+    return 'a level has more planes than its nodes can';
+  if (!has('mesh') && (s.faces_new || s.faces_referenced))
+    return 'a level counts faces, and there is no mesh';
+  if (s.leaf === 0 && (s.faces_new || s.faces_referenced))
+    return 'a level has faces but no leaf';
+  if (s.black && !info.solid)
+    return 'a surface has black nodes';
+  if (s.leaf && s.faces_referenced / s.leaf > info.face_count)
+    return 'a level refers to more faces than there are';
+  return undefined;
+}
+
+/** Whether the facts can be true together, before anything is sized by them. */
+export function checkFacts(info) {
+  const mesh = (what) => formatError('/', what);
+  if ([info.face_count, info.vertex_count].some((n) => n < 1 || n > MESH_MAX))
+    throw mesh('face_count or vertex_count is 0 or beyond 2^32 - 2');
+  if ([info.source_vertex_count, info.source_face_count, info.mend_added_faces].some((n) => n > MESH_MAX))
+    throw mesh('a count of the source is beyond 2^32 - 2');
+  if (info.vertex_count > info.source_vertex_count || info.face_count > info.source_face_count + info.mend_added_faces)
+    throw mesh('the mesh has more vertices or faces than its source and the mending account for');
+  if (info.parts.has('maps') && !info.parts.has('mesh'))
+    throw mesh('there are maps but no mesh');
+  if (info.grid_level > 20 || info.max_level > info.grid_level || info.level_count > info.max_level + 1)
+    throw mesh('grid_level, max_level and level_count contradict each other');
+  if (![0, 1, 2].every((k) => axisValid(info.box_origin[k], info.box_size[k], info.grid_level)))
+    throw mesh('box_origin and box_size are not on a grid of exact doubles');
+  if (!(info.epsilon >= 0 && Number.isFinite(info.epsilon)))
+    throw mesh('epsilon is negative or not a number');
+  let faces = 0;
+  for (let level = 0; level < info.level_count; level++) {
+    const wrong = checkLevelCounts(info, level);
+    faces += info.levels[level].faces_new;
+    if (wrong || faces > info.face_count)
+      throw formatError('/levels', wrong ?? 'the levels have more new faces than there are');
+  }
+  if (info.parts.has('mesh') && faces !== info.face_count)
+    throw formatError('/levels', "the levels' new faces do not add up to face_count");
+}
+
+/** Rows of a chunk: the largest power of two that fits, or all rows when there are fewer. */
+export function chunkRows(rows, cols, elementSize) {
+  const fit = 2 ** Math.floor(Math.log2(65536 / (elementSize * Math.max(cols, 1))));
+  return Math.min(rows, fit);
+}
+
+const indexRows = (count) => (count > INDEX_ROWS ? Math.ceil(count / INDEX_ROWS) : 0);
+
+// name: [columns (0: one dimension), element sizes, signed, rows, may be absent though it has rows]
+const has = (info, part, rows) => (info.parts.has(part) ? rows : 0);
+const LEVEL_ARRAYS = {
+  types: [0, [2], false, (info, s, groups) => groups],
+  plane_counts: [0, [1], false, (info, s) => has(info, 'planes', s.gray)],
+  planes: [0, [4], false, (info, s) => has(info, 'planes', s.planes)],
+  leaf_winding: [0, [1, 2, 4], true, (info, s) => (info.solid ? s.leaf : 0)],
+  black_winding: [0, [1, 2, 4], true, (info, s) => (info.solid ? s.black : 0), true],
+  white_winding: [0, [1, 2, 4], true, (info, s) => (info.solid ? s.white : 0), true],
+  leaf_skip: [0, [4, 8], false, (info, s) => has(info, 'mesh', s.leaf)],
+  leaf_new: [0, [1, 2, 4], false, (info, s) => has(info, 'mesh', s.leaf)],
+  leaf_ref_count: [0, [1, 2, 4], false, (info, s) => has(info, 'mesh', s.leaf)],
+  leaf_refs: [0, [4], false, (info, s) => has(info, 'mesh', s.faces_referenced)],
+  types_index: [4, [8], false, (info, s, groups) => indexRows(groups)],
+  gray_index: [1, [8], false, (info, s) => has(info, 'planes', indexRows(s.gray))],
+  leaf_index: [3, [8], false, (info, s) => (info.parts.has('mesh') || info.parts.has('leaf-planes') ? indexRows(s.leaf) : 0)],
+  leaf_plane_counts: [0, [1], false, (info, s) => has(info, 'leaf-planes', s.leaf)],
+  leaf_planes: [0, [4], false, (info, s) => has(info, 'leaf-planes', s.leaf_planes)],
+};
+const faceChunks = (info) => {
+  const rows = chunkRows(info.face_count, 3, 4);
+  return info.face_count > rows ? Math.ceil(info.face_count / rows) : 0;
+};
+const ROOT_ARRAYS = {
+  '/mesh/vertices': [3, [4, 8], false, (info) => has(info, 'mesh', info.vertex_count)],
+  '/mesh/faces': [3, [4], false, (info) => has(info, 'mesh', info.face_count)],
+  '/mesh/faces_index': [1, [8], false, (info) => has(info, 'mesh', faceChunks(info))],
+  '/maps/vertex_source': [0, [4], false, (info) => has(info, 'maps', info.vertex_count)],
+  '/maps/face_source': [0, [4], false, (info) => has(info, 'maps', info.face_count)],
+};
+
+/** The arrays that a file with these facts has: [{ path, level, name, cols, sizes, signed, rows, mayBeAbsent }]. */
+export function arraysOf(info) {
+  const out = [];
+  info.levels.forEach((summary, level) => {
+    const folder = `/levels/${String(level).padStart(2, '0')}`, groups = level ? info.levels[level - 1].gray : 1;
+    for (const [name, [cols, sizes, signed, rows, mayBeAbsent]] of Object.entries(LEVEL_ARRAYS))
+      out.push({ path: `${folder}/${name}`, level, name, cols, sizes, signed, rows: rows(info, summary, groups), mayBeAbsent });
+  });
+  for (const [path, [cols, sizes, signed, rows]] of Object.entries(ROOT_ARRAYS))
+    out.push({ path, level: undefined, name: path, cols, sizes, signed, rows: rows(info) });
+  return out.filter((a) => a.rows > 0);
+}
