@@ -134,7 +134,7 @@ static void probe_close(void *user)
 
 static ebpo_status open_probe(ebpo_file **file, probe *p, ebpo_error *error)
 {
-    ebpo_source source = { p, size, probe_read, probe_close };
+    ebpo_source source = { p, size, probe_read, probe_close, NULL, 0 };
     return ebpo_open_source(file, &source, "afar", error);
 }
 
@@ -443,7 +443,7 @@ END_TEST
 START_TEST(missing_arguments_are_refused_and_the_source_closed)
 {
     probe p = { .fail_at = 0 };
-    ebpo_source source = { &p, 5, NULL, probe_close };
+    ebpo_source source = { &p, 5, NULL, probe_close, NULL, 0 };
     ebpo_file *file;
     ck_assert_int_eq(ebpo_open_source(&file, &source, "x", NULL), EBPO_E_ARGUMENT);
     ck_assert_uint_eq(p.closes, 1);

@@ -78,6 +78,14 @@ static arg_result set_bits(const arg_spec *spec, const arg_option *o, const char
     }
 }
 
+static arg_result add_to_list(const arg_spec *spec, const arg_option *o, const char *text, arg_list *out)
+{
+    if (out->count == ARG_LIST_MAX)
+        return wrong(spec, "--%s: is given more than %d times", o->name, ARG_LIST_MAX);
+    out->item[out->count++] = text;
+    return ARGS_RUN;
+}
+
 static arg_result set_value(const arg_spec *spec, const arg_option *o, const char *text, void *values)
 {
     void *field = (char *)values + o->offset;
@@ -87,10 +95,13 @@ static arg_result set_value(const arg_spec *spec, const arg_option *o, const cha
     case ARG_REAL: return set_real(spec, o, text, field);
     case ARG_WORD: return find_word(spec, o, text, strlen(text), field);
     case ARG_SET: return set_bits(spec, o, text, field);
+    case ARG_LIST:
     case ARG_TEXT: break;
     }
     if (!*text)
         return wrong(spec, "--%s: the value is empty", o->name);
+    if (o->kind == ARG_LIST)
+        return add_to_list(spec, o, text, field);
     *(const char **)field = text;
     return ARGS_RUN;
 }

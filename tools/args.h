@@ -11,6 +11,7 @@ typedef enum arg_kind {
     ARG_INT,  /* int64_t in [low, high] */
     ARG_REAL, /* double in [low, high] */
     ARG_TEXT, /* const char *, not empty */
+    ARG_LIST, /* arg_list; may be repeated */
     ARG_WORD, /* int: index into `words` */
     ARG_SET   /* uint32_t: bits by index into `words`; comma list, may be repeated */
 } arg_kind;
@@ -25,6 +26,13 @@ typedef struct arg_option {
     double low, high;
     const char *const *words; /* NULL-terminated */
 } arg_option;
+
+/* Texts in the order in which they were given, NULL at the end. */
+enum { ARG_LIST_MAX = 32 };
+typedef struct arg_list {
+    const char *item[ARG_LIST_MAX + 1];
+    int count;
+} arg_list;
 
 /* An option without a value: its field is a bool of the struct `type`. */
 #define ARG_SWITCH(name, letter, type, field, help) \

@@ -76,12 +76,12 @@ static int fill_path(bench_points *out, ebpo_file *file, uint64_t seed)
     return good ? EXIT_FINE : no_memory();
 }
 
-static int generate(bench_points *out, const char *model, bool path, uint64_t seed)
+static int generate(bench_points *out, const char *model, const remote_values *remote, bool path, uint64_t seed)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
     int code = make_room(out, out->count);
-    if (code == EXIT_FINE && ebpo_open(&file, model, &error) != EBPO_OK)
+    if (code == EXIT_FINE && remote_open(&file, model, remote, &error) != EBPO_OK)
         code = command_failed("bench", &error);
     if (code == EXIT_FINE && path)
         code = fill_path(out, file, seed);
@@ -112,7 +112,7 @@ static int read_all(bench_points *out, points *in, uint64_t most)
     return out->count ? EXIT_FINE : EXIT_FAILED;
 }
 
-int bench_points_make(bench_points *out, points_kind kind, const char *model, const char *what, bool raw, uint64_t count, uint64_t seed)
+int bench_points_make(bench_points *out, points_kind kind, const char *model, const remote_values *remote, const char *what, bool raw, uint64_t count, uint64_t seed)
 {
     bool path = strcmp(what, "path") == 0;
     *out = (bench_points){ .kind = kind, .count = count ? count : USUAL_COUNT };
@@ -121,7 +121,7 @@ int bench_points_make(bench_points *out, points_kind kind, const char *model, co
         return EXIT_USAGE;
     }
     if (path || strcmp(what, "uniform") == 0)
-        return generate(out, model, path, seed);
+        return generate(out, model, remote, path, seed);
     points in;
     out->count = 0;
     int code = EXIT_FAILED;

@@ -42,6 +42,7 @@ static const arg_option options[] = {
     { "save-answers", 0, ARG_TEXT, offsetof(values, save_answers), "FILE",
       "write the answers: inside a byte each, as in 'where';\nelse a double (distance or t) and an int64 (face or -1)", 0, 0, NULL },
     ARG_SWITCH("json", 0, query_values, json, "print all of it as JSON"),
+    REMOTE_OPTIONS(query_values, remote),
     { 0 },
 };
 
@@ -51,7 +52,7 @@ static const arg_spec spec = {
     .least = 1,
     .most = 1,
     .summary = "how long questions to a file take",
-    .text = "MODEL is an .ebpo.h5 file. One thread asks. First a cold start (the system is asked to forget the file), then each question by\n"
+    .text = "MODEL is an .ebpo.h5 file or its URL. One thread asks. First a cold start (the system is asked to forget the file), then each question by\n"
             "itself, then all of them at once.",
     .options = options,
 };
@@ -63,6 +64,7 @@ typedef struct results {
     uint64_t cold_bytes, cold_reads, peak;
     bench_figures figures;
     ebpo_model_stats model, model_end; /* after the first pass, and after all */
+    traffic traffic;                   /* of the warm session */
     uint64_t answered[4];              /* inside: by ebpo_where; else 0: nothing found, 1: found */
 } results;
 
@@ -85,14 +87,14 @@ static bool set_mode(values *v)
 /* --- measuring --- */
 
 /* From a file that the system has forgotten to the first answer. */
-static int cold_start(const bench_job *job, const char *path, const ebpo_model_options *holding, results *r)
+static int cold_start(const bench_job *job, const char *path, const ebpo_model_options *holding, const remote_values *remote, results *r)
 {
     query_session s = QUERY_SESSION_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_model_stats stats;
     r->cold_pages = bench_drop_file(path);
     uint64_t begin = bench_clock();
-    int code = query_open(&s, "bench", path, holding);
+    int code = query_open(&s, "bench", path, holding, remote);
     r->cold_open_seconds = (double)(bench_clock() - begin) * 1e-9;
     if (code == EXIT_FINE && bench_ask(job, s.context, 0, &error) != EBPO_OK)
         code = command_failed("bench", &error);
@@ -225,6 +227,7 @@ static void print_results(const values *v, const char *path, uint64_t count, con
     print_answers(v, r);
     printf("model          ");
     stats_print(stdout, false, &r->model);
+    remote_tell(&r->traffic, &v->q.remote, false);
 }
 
 static void json_answers(json *j, const values *v, const results *r)
@@ -283,6 +286,7 @@ static void print_json(const values *v, const char *path, uint64_t count, const 
     json_answers(&j, v, r);
     stats_json(&j, "model", &r->model);
     stats_json(&j, "model_at_end", &r->model_end);
+    remote_json(&j, &r->traffic, &v->q.remote);
     json_finish(&j);
 }
 
@@ -293,20 +297,22 @@ static int bench(bench_job *job, const values *v, const char *path, const ebpo_m
     results r = { .clock_ns = bench_clock_cost() };
     query_session s = QUERY_SESSION_INIT;
     bench_reset_peak();
-    int code = cold_start(job, path, holding, &r);
+    int code = cold_start(job, path, holding, &v->q.remote, &r);
     uint64_t begin = bench_clock();
     if (code == EXIT_FINE)
-        code = query_open(&s, "bench", path, holding);
+        code = query_open(&s, "bench", path, holding, &v->q.remote);
     r.open_seconds = (double)(bench_clock() - begin) * 1e-9;
     if (code == EXIT_FINE)
         code = measure(job, &s, (int)v->repeat, batch, &r);
+    if (s.file)
+        r.traffic = traffic_of(s.file);
     query_close(&s);
     if (code == EXIT_FINE && v->save_answers)
         code = save_answers(job, v->save_answers);
     if (code != EXIT_FINE)
         return code;
     count_answers(job, &r);
-    (v->q.json ? print_json : print_results)(v, path, job->count, &r);
+    (v->q.json ? print_json : print_results)(v, remote_shown(path), job->count, &r);
     return EXIT_FINE;
 }
 
@@ -319,7 +325,7 @@ static int prepare(const values *v, const char *path, bench_points *p)
         fprintf(stderr, "ebpo bench: %s: is not an .ebpo.h5 file; make one of a mesh with 'ebpo convert'\n", path);
     if (is_hdf5 <= 0)
         return EXIT_FAILED;
-    int code = bench_points_make(p, kind, path, v->points, v->q.raw, (uint64_t)v->count, (uint64_t)v->seed);
+    int code = bench_points_make(p, kind, path, &v->q.remote, v->points, v->q.raw, (uint64_t)v->count, (uint64_t)v->seed);
     if (code == EXIT_FINE && v->save_points)
         code = bench_points_save(p, v->save_points);
     return code;

@@ -5,11 +5,13 @@
 
 #include "command.h"
 #include "progress.h"
+#include "remote.h"
 #include "words.h"
 
 typedef struct values {
     int64_t level, threads;
     bool mesh, no_walls, quiet;
+    remote_values remote;
 } values;
 
 static const arg_option options[] = {
@@ -20,6 +22,7 @@ static const arg_option options[] = {
     ARG_SWITCH("no-walls", 0, values, no_walls, "with --level: leave out polygons that lie on cell walls"),
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
     ARG_SWITCH("quiet", 'q', values, quiet, "no summary, no progress: errors and warnings only"),
+    REMOTE_OPTIONS(values, remote),
     { 0 },
 };
 
@@ -29,7 +32,7 @@ static const arg_spec spec = {
     .least = 2,
     .most = 2,
     .summary = "a level's envelopes, or the model itself, as PLY",
-    .text = "Either --level or --mesh is needed.",
+    .text = "FILE is an .ebpo.h5 file or its URL. Either --level or --mesh is needed.",
     .options = options,
 };
 
@@ -66,7 +69,7 @@ static ebpo_status take(ebpo_file *file, const values *v, const char *path, ebpo
     ebpo_status status = ebpo_file_read_source_mesh(file, out, &source_order, (unsigned)v->threads, error);
     if (status == EBPO_OK && !source_order)
         fprintf(stderr, "ebpo extract: %s: note: holds no maps, so vertices and faces come in the file's order\n",
-                path);
+                remote_shown(path));
     return status;
 }
 
@@ -83,7 +86,7 @@ static void summarise(const values *v, const char *out, const ebpo_mesh *mesh, d
 
 static int run(int argc, char **argv)
 {
-    values v = { .level = -1 };
+    values v = { .level = -1, .remote = REMOTE_VALUES_INIT };
     const char *operand[ARGS_OPERANDS_MAX];
     arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
     if (parsed != ARGS_RUN)
@@ -97,7 +100,7 @@ static int run(int argc, char **argv)
     ebpo_file *file = NULL;
     ebpo_mesh mesh = { 0 };
     double volume = 0;
-    ebpo_status status = ebpo_open(&file, operand[0], &error);
+    ebpo_status status = remote_open(&file, operand[0], &v.remote, &error);
     if (status == EBPO_OK)
         status = take(file, &v, operand[0], progress, &mesh, &volume, &error);
     if (status == EBPO_OK)
@@ -105,6 +108,10 @@ static int run(int argc, char **argv)
     progress_wipe(&line);
     if (status == EBPO_OK && !v.quiet)
         summarise(&v, operand[1], &mesh, volume);
+    if (status == EBPO_OK) {
+        traffic t = traffic_of(file);
+        remote_tell(&t, &v.remote, false);
+    }
     ebpo_mesh_free(&mesh);
     ebpo_close(file);
     return status == EBPO_OK ? EXIT_FINE : command_failed("extract", &error);

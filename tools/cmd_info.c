@@ -4,13 +4,16 @@
 
 #include "command.h"
 #include "facts.h"
+#include "remote.h"
 
 typedef struct values {
     bool json;
+    remote_values remote;
 } values;
 
 static const arg_option options[] = {
     ARG_SWITCH("json", 0, values, json, "print the facts as JSON"),
+    REMOTE_OPTIONS(values, remote),
     { 0 },
 };
 
@@ -20,13 +23,13 @@ static const arg_spec spec = {
     .least = 1,
     .most = 1,
     .summary = "what a file is, what it holds, bytes by part, and a table by level",
-    .text = "Only the head of the file is read. FILE is an .ebpo.h5 file; for meshes there is 'ebpo check'.",
+    .text = "Only the head of the file is read. FILE is an .ebpo.h5 file or its URL; for meshes there is 'ebpo check'.",
     .options = options,
 };
 
 static int run(int argc, char **argv)
 {
-    values v = { 0 };
+    values v = { .remote = REMOTE_VALUES_INIT };
     const char *operand[ARGS_OPERANDS_MAX];
     arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
     if (parsed != ARGS_RUN)
@@ -40,19 +43,27 @@ static int run(int argc, char **argv)
     }
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
-    if (ebpo_open(&file, operand[0], &error) != EBPO_OK)
+    ebpo_status status = remote_open(&file, operand[0], &v.remote, &error);
+    if (status == EBPO_OK)
+        status = ebpo_file_locate(file, &error);
+    if (status != EBPO_OK) {
+        ebpo_close(file);
         return command_failed("info", &error);
+    }
     const ebpo_info *info = ebpo_file_info(file);
+    traffic t = traffic_of(file);
     if (v.json) {
         json j;
         json_begin(&j, stdout);
         json_object(&j, NULL);
-        facts_json(&j, operand[0], info);
+        facts_json(&j, remote_shown(operand[0]), info);
+        remote_json(&j, &t, &v.remote);
         json_finish(&j);
     } else {
-        facts_print(stdout, operand[0], info);
+        facts_print(stdout, remote_shown(operand[0]), info);
         putchar('\n');
         facts_table(stdout, info);
+        remote_tell(&t, &v.remote, false);
     }
     ebpo_close(file);
     return EXIT_FINE;

@@ -11,10 +11,12 @@
 #include "command.h"
 #include "facts.h"
 #include "json.h"
+#include "remote.h"
 
 typedef struct values {
     int64_t to, threads;
     bool nodes, json;
+    remote_values remote;
 } values;
 
 static const arg_option options[] = {
@@ -22,6 +24,7 @@ static const arg_option options[] = {
     ARG_SWITCH("nodes", 0, values, nodes, "a line for each node as well: octcode, type, cell, planes"),
     ARG_SWITCH("json", 0, values, json, "print all of it as JSON"),
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
+    REMOTE_OPTIONS(values, remote),
     { 0 },
 };
 
@@ -31,7 +34,7 @@ static const arg_spec spec = {
     .least = 1,
     .most = 1,
     .summary = "reads a file level by level and tells of each as it arrives",
-    .text = "FILE is an .ebpo.h5 file. Bytes are those of the file up to and with the level, times are since opening.",
+    .text = "FILE is an .ebpo.h5 file or its URL. Bytes are those of the file up to and with the level, times are since opening.",
     .options = options,
 };
 
@@ -188,21 +191,29 @@ static ebpo_status tell(printer *p, ebpo_file *file, const char *path, ebpo_erro
     if (p->v->json) {
         json_begin(&p->j, stdout);
         json_object(&p->j, NULL);
-        json_text(&p->j, "file", path);
+        json_text(&p->j, "file", remote_shown(path));
         json_array(&p->j, "levels");
     } else {
-        print_head(path, p->info);
+        print_head(remote_shown(path), p->info);
     }
-    status = tell_levels(p, stream, p->v->to >= 0 ? (int)p->v->to : last, error);
-    if (p->v->json)
+    int to = p->v->to >= 0 ? (int)p->v->to : last;
+    ebpo_file_expect_levels(file, 0, to);
+    status = tell_levels(p, stream, to, error);
+    traffic t = traffic_of(file);
+    if (p->v->json) {
+        json_end(&p->j);
+        remote_json(&p->j, &t, &p->v->remote);
         json_finish(&p->j);
+    } else {
+        remote_tell(&t, &p->v->remote, false);
+    }
     ebpo_stream_free(stream);
     return status;
 }
 
 static int run(int argc, char **argv)
 {
-    values v = { .to = -1 };
+    values v = { .to = -1, .remote = REMOTE_VALUES_INIT };
     const char *operand[ARGS_OPERANDS_MAX];
     arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
     if (parsed != ARGS_RUN)
@@ -210,7 +221,7 @@ static int run(int argc, char **argv)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
     printer p = { .v = &v, .begin = now() };
-    if (ebpo_open(&file, operand[0], &error) != EBPO_OK)
+    if (remote_open(&file, operand[0], &v.remote, &error) != EBPO_OK)
         return command_failed("levels", &error);
     p.info = ebpo_file_info(file);
     ebpo_status status = tell(&p, file, operand[0], &error);

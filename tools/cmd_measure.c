@@ -4,15 +4,18 @@
 
 #include "command.h"
 #include "facts.h"
+#include "remote.h"
 
 typedef struct values {
     bool json;
     int64_t threads;
+    remote_values remote;
 } values;
 
 static const arg_option options[] = {
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
     ARG_SWITCH("json", 0, values, json, "print the numbers as JSON"),
+    REMOTE_OPTIONS(values, remote),
     { 0 },
 };
 
@@ -22,7 +25,7 @@ static const arg_spec spec = {
     .least = 1,
     .most = 1,
     .summary = "area, volume, centroid and inertia, and the volume of each level",
-    .text = "FILE is an .ebpo.h5 file with its mesh. Volume, centroid and inertia are those of the winding number's integral\n"
+    .text = "FILE is an .ebpo.h5 file with its mesh, or its URL. Volume, centroid and inertia are those of the winding number's integral\n"
             "(density 1); a surface has an area only.",
     .options = options,
 };
@@ -82,24 +85,28 @@ static int measure(const char *path, const values *v)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
     ebpo_mass mass;
-    if (ebpo_open(&file, path, &error) != EBPO_OK)
+    if (remote_open(&file, path, &v->remote, &error) != EBPO_OK)
         return command_failed("measure", &error);
     ebpo_status status = ebpo_measure(file, (unsigned)v->threads, &mass, &error);
+    traffic t = traffic_of(file);
     if (status == EBPO_OK && v->json) {
         json j;
         json_begin(&j, stdout);
         json_object(&j, NULL);
-        json_mass(&j, path, ebpo_file_info(file), &mass);
+        json_mass(&j, remote_shown(path), ebpo_file_info(file), &mass);
+        remote_json(&j, &t, &v->remote);
         json_finish(&j);
-    } else if (status == EBPO_OK)
-        print_mass(path, ebpo_file_info(file), &mass);
+    } else if (status == EBPO_OK) {
+        print_mass(remote_shown(path), ebpo_file_info(file), &mass);
+        remote_tell(&t, &v->remote, false);
+    }
     ebpo_close(file);
     return status == EBPO_OK ? EXIT_FINE : command_failed("measure", &error);
 }
 
 static int run(int argc, char **argv)
 {
-    values v = { 0 };
+    values v = { .remote = REMOTE_VALUES_INIT };
     const char *operand[ARGS_OPERANDS_MAX];
     arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
     if (parsed != ARGS_RUN)

@@ -12,6 +12,7 @@
 #include "picture.h"
 #include "progress.h"
 #include "raster.h"
+#include "remote.h"
 
 enum { TILES_MAX = 24, MESH = -1, SIDE_MAX = 8192 };
 
@@ -20,6 +21,7 @@ typedef struct values {
     const char *levels, *view, *size;
     int up;
     bool mesh, edges, quiet;
+    remote_values remote;
 } values;
 
 static const char *const up_words[] = { "x", "y", "z", NULL };
@@ -37,6 +39,7 @@ static const arg_option options[] = {
     ARG_SWITCH("edges", 0, values, edges, "draw the outlines of the polygons"),
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
     ARG_SWITCH("quiet", 'q', values, quiet, "no progress: errors and warnings only"),
+    REMOTE_OPTIONS(values, remote),
     { 0 },
 };
 
@@ -46,7 +49,7 @@ static const arg_spec spec = {
     .least = 2,
     .most = 2,
     .summary = "a shaded picture of a level or of the model, without a display",
-    .text = "FILE is an .ebpo.h5 file, or a mesh.",
+    .text = "FILE is an .ebpo.h5 file or its URL, or a mesh.",
     .options = options,
 };
 
@@ -148,9 +151,13 @@ static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress pro
 static ebpo_status load_file(job *j, ebpo_progress progress, ebpo_error *error)
 {
     ebpo_file *file = NULL;
-    ebpo_status status = ebpo_open(&file, j->in, error);
+    ebpo_status status = remote_open(&file, j->in, &j->v.remote, error);
     for (int i = 0; i < j->tile_count && status == EBPO_OK; i++)
         status = load_tile(j, &j->tiles[i], file, progress, error);
+    if (status == EBPO_OK) {
+        traffic t = traffic_of(file);
+        remote_tell(&t, &j->v.remote, false);
+    }
     ebpo_close(file);
     return status;
 }
@@ -285,7 +292,7 @@ static int run_job(job *j)
 
 static int run(int argc, char **argv)
 {
-    values v = { .level = -1, .view = "30,20", .size = "1200x900", .up = 1 };
+    values v = { .level = -1, .view = "30,20", .size = "1200x900", .up = 1, .remote = REMOTE_VALUES_INIT };
     const char *operand[ARGS_OPERANDS_MAX];
     arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
     if (parsed != ARGS_RUN)

@@ -5,12 +5,14 @@
 #include "command.h"
 #include "json.h"
 #include "progress.h"
+#include "remote.h"
 #include "words.h"
 
 typedef struct values {
     const char *against;
     int64_t samples, threads;
     bool json, quiet;
+    remote_values remote;
 } values;
 
 static const arg_option options[] = {
@@ -23,6 +25,7 @@ static const arg_option options[] = {
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
     ARG_SWITCH("json", 0, values, json, "print the counts as JSON"),
     ARG_SWITCH("quiet", 'q', values, quiet, "print violations and errors only"),
+    REMOTE_OPTIONS(values, remote),
     { 0 },
 };
 
@@ -32,7 +35,7 @@ static const arg_spec spec = {
     .least = 1,
     .most = 1,
     .summary = "checks every promise of a file; ends with code 1 if one is broken",
-    .text = "Containment is checked with the decoded half-spaces, exactly, not with rounded polyhedra.",
+    .text = "FILE is an .ebpo.h5 file or its URL. Containment is checked with the decoded half-spaces, exactly, not with rounded polyhedra.",
     .options = options,
 };
 
@@ -80,12 +83,12 @@ static void print_violations(const ebpo_verify_report *report, const char *path)
     }
 }
 
-static void print_json(const ebpo_verify_report *report, const char *path)
+static void print_json(const ebpo_verify_report *report, const char *path, const traffic *t, const remote_values *remote)
 {
     json j;
     json_begin(&j, stdout);
     json_object(&j, NULL);
-    json_text(&j, "file", path);
+    json_text(&j, "file", remote_shown(path));
     json_bool(&j, "fine", report->violations == 0);
     json_uint(&j, "checks", report->checks);
     json_uint(&j, "violations", report->violations);
@@ -99,16 +102,18 @@ static void print_json(const ebpo_verify_report *report, const char *path)
             json_text(&j, "first", c->first);
         json_end(&j);
     }
+    json_end(&j);
+    remote_json(&j, t, remote);
     json_finish(&j);
 }
 
 static ebpo_status verify(const values *v, const char *path, ebpo_progress progress, ebpo_verify_report *report,
-                          ebpo_error *error)
+                          traffic *t, ebpo_error *error)
 {
     ebpo_mesh source = { 0 };
     ebpo_file *file = NULL;
     ebpo_mesh_read_options read = { progress };
-    ebpo_status status = ebpo_open(&file, path, error);
+    ebpo_status status = remote_open(&file, path, &v->remote, error);
     if (status == EBPO_OK && v->against)
         status = ebpo_mesh_read(&source, v->against, &read, error);
     if (status == EBPO_OK) {
@@ -119,6 +124,8 @@ static ebpo_status verify(const values *v, const char *path, ebpo_progress progr
         verify_options.progress = progress;
         status = ebpo_verify(file, &verify_options, report, error);
     }
+    if (status == EBPO_OK)
+        *t = traffic_of(file);
     ebpo_mesh_free(&source);
     ebpo_close(file);
     return status;
@@ -126,7 +133,7 @@ static ebpo_status verify(const values *v, const char *path, ebpo_progress progr
 
 static int run(int argc, char **argv)
 {
-    values v = { 0 };
+    values v = { .remote = REMOTE_VALUES_INIT };
     const char *operand[ARGS_OPERANDS_MAX];
     arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
     if (parsed != ARGS_RUN)
@@ -135,16 +142,19 @@ static int run(int argc, char **argv)
     ebpo_progress progress = progress_start(&line, "verify", v.quiet);
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_verify_report report;
-    ebpo_status status = verify(&v, operand[0], progress, &report, &error);
+    traffic t;
+    ebpo_status status = verify(&v, operand[0], progress, &report, &t, &error);
     progress_wipe(&line);
     if (status != EBPO_OK)
         return command_failed("verify", &error);
     if (v.json)
-        print_json(&report, operand[0]);
+        print_json(&report, operand[0], &t, &v.remote);
     else if (!v.quiet)
-        print_words(&report, operand[0]);
+        print_words(&report, remote_shown(operand[0]));
     fflush(stdout);
-    print_violations(&report, operand[0]);
+    print_violations(&report, remote_shown(operand[0]));
+    if (!v.json)
+        remote_tell(&t, &v.remote, false);
     return report.violations ? EXIT_FAILED : EXIT_FINE;
 }
 

@@ -22,7 +22,7 @@ int command_failed(const char *name, const ebpo_error *error);
 /* True when both paths lead to one existing file. */
 bool command_same_file(const char *a, const char *b);
 
-/* 1: the file begins as an HDF5 file does, 0: it does not, -1: it cannot be read (said on stderr). */
+/* 1: the file begins as an HDF5 file does, or is a URL, 0: it does not, -1: it cannot be read (said on stderr). */
 int command_is_hdf5(const char *name, const char *path);
 
 #endif

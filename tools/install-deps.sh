@@ -3,7 +3,7 @@
 # with --bench the peers of the benchmarks.
 set -eu
 # dpkg-dev tells meson where libraries go on Debian.
-packages="gcc dpkg-dev pkg-config meson ninja-build libhdf5-dev libzstd-dev zlib1g-dev libgmp-dev nettle-dev libassimp-dev libpng-dev"
+packages="gcc dpkg-dev pkg-config meson ninja-build libhdf5-dev libzstd-dev zlib1g-dev libgmp-dev nettle-dev libassimp-dev libpng-dev libcurl4-openssl-dev"
 for option in "$@"; do
     case $option in
     --tests) packages="$packages check hdf5-tools python3 python3-h5py python3-numpy clang libclang-rt-14-dev g++ mandoc" ;;

@@ -26,11 +26,13 @@ int command_failed(const char *name, const ebpo_error *error)
 bool command_same_file(const char *a, const char *b)
 {
     struct stat sa, sb;
-    return stat(a, &sa) == 0 && stat(b, &sb) == 0 && sa.st_dev == sb.st_dev && sa.st_ino == sb.st_ino;
+    return !ebpo_is_url(a) && stat(a, &sa) == 0 && stat(b, &sb) == 0 && sa.st_dev == sb.st_dev && sa.st_ino == sb.st_ino;
 }
 
 int command_is_hdf5(const char *name, const char *path)
 {
+    if (ebpo_is_url(path))
+        return 1; /* opening it will tell */
     static const char signature[8] = "\211HDF\r\n\032\n";
     char head[8] = "";
     struct stat st;

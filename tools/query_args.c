@@ -1,11 +1,9 @@
 #include "query_args.h"
 
-#include <errno.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "command.h"
+#include "words.h"
 
 const char *const inside_modes[] = { "fast", "cache", "nodes", "subtree", "cache-plain", "nodes-plain", "subtree-plain", NULL };
 const char *const distance_modes[] = { "exact", "recursive", "leaves", "envelope", NULL };
@@ -19,25 +17,9 @@ static const struct {
     { EBPO_LOAD_SUBTREE, EBPO_ENVELOPES_SKIP },
 };
 
-/* Digits, then nothing or one of the units. */
-static bool whole_with_unit(const char *text, const char *const *units, const uint64_t *factors, uint64_t *out)
-{
-    char *end;
-    errno = 0;
-    unsigned long long v = strtoull(text, &end, 10);
-    if (end == text || errno || text[0] < '0' || text[0] > '9')
-        return false;
-    for (int i = 0; units[i]; i++)
-        if (strcmp(end, units[i]) == 0)
-            return !__builtin_mul_overflow((uint64_t)v, factors[i], out);
-    return false;
-}
-
 static bool read_size(const char *name, const char *text, uint64_t *out)
 {
-    static const char *const units[] = { "", "K", "M", "G", "T", "k", "m", "g", "t", NULL };
-    static const uint64_t factors[] = { 1, 1u << 10, 1u << 20, 1u << 30, UINT64_C(1) << 40, 1u << 10, 1u << 20, 1u << 30, UINT64_C(1) << 40 };
-    if (whole_with_unit(text, units, factors, out))
+    if (words_read_size(text, out))
         return true;
     fprintf(stderr, "ebpo %s: --memory: '%s' is not a size such as 64M, 1G, 512K or 1000000; try 'ebpo %s --help'\n", name, text, name);
     return false;
@@ -47,7 +29,7 @@ static bool read_time(const char *name, const char *text, uint64_t *out)
 {
     static const char *const units[] = { "", "us", "ns", "ms", "s", NULL };
     static const uint64_t factors[] = { 1000, 1000, 1, 1000000, 1000000000 };
-    if (whole_with_unit(text, units, factors, out) && *out > 0 && *out < UINT64_C(1000000000000000))
+    if (words_read_unit(text, units, factors, out) && *out > 0 && *out < UINT64_C(1000000000000000))
         return true;
     fprintf(stderr, "ebpo %s: --deadline: '%s' is not a time such as 50us, 500ns, 1ms or 20 (microseconds); try 'ebpo %s --help'\n", name, text, name);
     return false;
@@ -70,7 +52,7 @@ bool query_options_from(const char *name, const query_values *v, ebpo_model_opti
     return (!v->memory || read_size(name, v->memory, &model->memory)) && (!v->deadline || read_time(name, v->deadline, &query->deadline_ns));
 }
 
-int query_open(query_session *s, const char *name, const char *path, const ebpo_model_options *options)
+int query_open(query_session *s, const char *name, const char *path, const ebpo_model_options *options, const remote_values *remote)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     int is_hdf5 = command_is_hdf5(name, path);
@@ -79,7 +61,7 @@ int query_open(query_session *s, const char *name, const char *path, const ebpo_
             fprintf(stderr, "ebpo %s: %s: is not an .ebpo.h5 file; make one of a mesh with 'ebpo convert'\n", name, path);
         return EXIT_FAILED;
     }
-    ebpo_status status = ebpo_open(&s->file, path, &error);
+    ebpo_status status = remote_open(&s->file, path, remote, &error);
     if (status == EBPO_OK)
         status = ebpo_model_open(&s->model, s->file, options, &error);
     if (status == EBPO_OK)

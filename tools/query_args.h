@@ -6,15 +6,17 @@
 #include <math.h>
 
 #include "args.h"
+#include "remote.h"
 
 typedef struct query_values {
     const char *memory, *deadline;
     int64_t cut_level, threads, level;
     double max_distance, tmax;
     int inside_mode, distance_mode; /* indices into the words below */
-    bool prefetch, raw, json, stats, unsigned_distance, no_warm, all;
+    bool prefetch, raw, json, unsigned_distance, no_warm, all;
+    remote_values remote;
 } query_values;
-#define QUERY_VALUES_INIT { .cut_level = -1, .level = -1, .max_distance = INFINITY, .tmax = INFINITY }
+#define QUERY_VALUES_INIT { .cut_level = -1, .level = -1, .max_distance = INFINITY, .tmax = INFINITY, .remote = REMOTE_VALUES_INIT }
 
 /* Rows for the tables of options. In other structs query_values comes first. */
 #define QUERY_MODEL_OPTIONS \
@@ -28,7 +30,8 @@ typedef struct query_values {
 #define QUERY_FORM_OPTIONS(raw_text) \
     ARG_SWITCH("raw", 0, query_values, raw, raw_text), \
     ARG_SWITCH("json", 0, query_values, json, "a JSON object for each, on a line"), \
-    ARG_SWITCH("stats", 0, query_values, stats, "what it took, on standard error at the end")
+    ARG_SWITCH("stats", 0, query_values, remote.stats, "what it took, on standard error at the end"), \
+    REMOTE_HTTP_OPTIONS(query_values, remote)
 
 #define QUERY_LIMIT_OPTIONS(level_text) \
     { "level", 0, ARG_INT, offsetof(query_values, level), "L", level_text, 0, 20, NULL }, \
@@ -51,7 +54,7 @@ typedef struct query_session {
 #define QUERY_SESSION_INIT { NULL, NULL, NULL }
 
 /* Returns an exit code; what is wrong has been said on stderr. query_close in any case. */
-int query_open(query_session *s, const char *name, const char *path, const ebpo_model_options *options);
+int query_open(query_session *s, const char *name, const char *path, const ebpo_model_options *options, const remote_values *remote);
 void query_close(query_session *s);
 
 #endif

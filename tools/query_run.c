@@ -33,11 +33,13 @@ static int answer_all(const query_job *job, ebpo_context *context, points *in, d
     return in->failed ? EXIT_FAILED : EXIT_FINE;
 }
 
-static void tell_stats(const query_job *job, const ebpo_model *model)
+static void tell_stats(const query_job *job, const query_session *session)
 {
     ebpo_model_stats stats;
-    ebpo_model_get_stats(model, &stats);
+    traffic t = traffic_of(session->file);
+    ebpo_model_get_stats(session->model, &stats);
     stats_print(stderr, job->values->json, &stats);
+    remote_tell(&t, &job->values->remote, job->values->json);
 }
 
 int query_run(query_job *job, const char *model, const char *path)
@@ -55,11 +57,11 @@ int query_run(query_job *job, const char *model, const char *path)
     if (!rows)
         fprintf(stderr, "ebpo %s: not enough memory\n", job->command);
     else if (opened)
-        code = query_open(&session, job->command, model, &holding);
+        code = query_open(&session, job->command, model, &holding, &v->remote);
     if (session.context)
         code = answer_all(job, session.context, &in, rows);
-    if (session.context && v->stats)
-        tell_stats(job, session.model);
+    if (session.context && v->remote.stats)
+        tell_stats(job, &session);
     query_close(&session);
     points_close(&in);
     free(rows);

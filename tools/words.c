@@ -1,6 +1,9 @@
 #include "words.h"
 
+#include <errno.h>
 #include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
 const char *const rule_words[] = { "nonzero", "evenodd", "positive", NULL };
 const char *const codec_words[] = { "zstd", "deflate", "none", NULL };
@@ -61,4 +64,24 @@ void words_hex(const uint8_t digest[32], char out[65])
 {
     for (int i = 0; i < 32; i++)
         snprintf(out + 2 * i, 3, "%02x", digest[i]);
+}
+
+bool words_read_unit(const char *text, const char *const *units, const uint64_t *factors, uint64_t *out)
+{
+    char *end;
+    errno = 0;
+    unsigned long long v = strtoull(text, &end, 10);
+    if (end == text || errno || text[0] < '0' || text[0] > '9')
+        return false;
+    for (int i = 0; units[i]; i++)
+        if (strcmp(end, units[i]) == 0)
+            return !__builtin_mul_overflow((uint64_t)v, factors[i], out);
+    return false;
+}
+
+bool words_read_size(const char *text, uint64_t *out)
+{
+    static const char *const units[] = { "", "K", "M", "G", "T", "k", "m", "g", "t", NULL };
+    static const uint64_t factors[] = { 1, 1u << 10, 1u << 20, 1u << 30, UINT64_C(1) << 40, 1u << 10, 1u << 20, 1u << 30, UINT64_C(1) << 40 };
+    return words_read_unit(text, units, factors, out);
 }

@@ -17,6 +17,10 @@ char *words_plural(char *out, size_t room, uint64_t count, const char *one, cons
 char *words_parts(char *out, size_t room, uint32_t parts);
 const char *words_rule(ebpo_rule rule);
 const char *words_codec(ebpo_codec codec);
+/* Digits, then nothing or one of the units (NULL-terminated); the number times its factor. */
+bool words_read_unit(const char *text, const char *const *units, const uint64_t *factors, uint64_t *out);
+/* 64M, 1G, 512K, 1000000: powers of 1024. */
+bool words_read_size(const char *text, uint64_t *out);
 void words_hex(const uint8_t digest[32], char out[65]);
 
 /* NULL-terminated, in the order of the enums; for option tables. */

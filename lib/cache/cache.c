@@ -384,6 +384,15 @@ bool ebpo_cache_try(ebpo_cache *c, uint64_t key, void **item)
     return there;
 }
 
+bool ebpo_cache_has(ebpo_cache *c, uint64_t key)
+{
+    pthread_mutex_lock(&c->lock);
+    slot *s = find(c, key);
+    bool there = s && s->state == READY;
+    pthread_mutex_unlock(&c->lock);
+    return there;
+}
+
 void ebpo_cache_unpin(ebpo_cache *c, uint64_t key)
 {
     pthread_mutex_lock(&c->lock);

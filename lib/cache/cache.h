@@ -31,6 +31,8 @@ void ebpo_cache_free(ebpo_cache *cache);
 /* Finds or loads an item and pins it: it stays until unpinned as often as it was got. Waits while another thread loads the same key, or while a background load holds
  * the room. EBPO_E_LIMIT when the budget has no room even with everything unpinned gone; it says how much would do. *hit may be NULL. */
 EBPO_MUST_USE ebpo_status ebpo_cache_get(ebpo_cache *cache, uint64_t key, void **item, bool *hit, ebpo_error *error);
+/* True if an item is there now; no use of it, no hit. */
+bool ebpo_cache_has(ebpo_cache *cache, uint64_t key);
 void ebpo_cache_unpin(ebpo_cache *cache, uint64_t key);
 
 /* Pins an item if it is there; false, without waiting, when it is not. */

@@ -55,13 +55,20 @@ static ebpo_status compare(content_job *j, ebpo_error *error)
 ebpo_status ebpo_file_check_content(ebpo_file *file, unsigned threads, ebpo_error *error)
 {
     content_job j = { .file = file };
-    for (int id = EBPO_ARRAYS - 1; id >= EBPO_LEVEL_ARRAYS; id--) /* the largest first */
+    bool far = ebpo_input_expects(&file->in); /* then in the order of the file, in which it comes; else the largest first */
+    for (int id = EBPO_ARRAYS - 1; id >= EBPO_LEVEL_ARRAYS; id--)
         if (file->root_array[id].present)
             j.array[j.count++] = &file->root_array[id];
     for (int level = file->info.level_count - 1; level >= 0; level--)
-        for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
+        for (int id = EBPO_LEVEL_ARRAYS - 1; id >= 0; id--)
             if (file->level_array[level][id].present)
                 j.array[j.count++] = &file->level_array[level][id];
+    for (unsigned i = 0; far && i < j.count / 2; i++) {
+        const ebpo_array_in *other = j.array[i];
+        j.array[i] = j.array[j.count - 1 - i];
+        j.array[j.count - 1 - i] = other;
+    }
+    ebpo_expect_tree(file);
     ebpo_status status = ebpo_parallel_for(threads, j.count, 1, digest_arrays, &j, NULL, "check", error);
     return status == EBPO_OK ? compare(&j, error) : status;
 }

@@ -11,7 +11,7 @@
 #include "container/slice_parts.h"
 
 /* Readers are kept for the next load: setting up a decoder takes longer than a chunk. They are not part of the budget. */
-enum { IDLE_MAX = 4, CHUNK_BITS = 48 };
+enum { IDLE_MAX = 4, CHUNK_BITS = 48, AROUND = 4 };
 
 struct ebpo_chunk_desk {
     ebpo_chunk_desk *next;
@@ -139,6 +139,33 @@ static ebpo_status decode(const ebpo_chunks *c, const ebpo_array_in *array, uint
     }
 }
 
+static void expect_missing(ebpo_chunks *c, ebpo_expected *e, const ebpo_array_in *array, uint64_t begin, uint64_t end)
+{
+    for (uint64_t i = begin; i < end; i++)
+        if (!ebpo_cache_has(c->cache, key_of(array, i)))
+            ebpo_expect_chunks(e, array, i, i + 1);
+}
+
+void ebpo_chunks_expect(ebpo_chunks *c, ebpo_expected *e, ebpo_array_id id, int level, uint64_t row, uint64_t rows)
+{
+    const ebpo_array_in *array = ebpo_reader_array(c->file, id, level);
+    if (!ebpo_input_expects(&c->file->in) || !array->present || rows == 0 || row >= array->shape.rows)
+        return;
+    uint64_t left = array->shape.rows - row, last = row + (rows < left ? rows : left) - 1;
+    expect_missing(c, e, array, row / array->shape.chunk_rows, last / array->shape.chunk_rows + 1);
+}
+
+/* A request takes about as long for a few chunks as for one, and its neighbours are likely to be the next. */
+static void expect_around(ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk)
+{
+    uint64_t begin = chunk / AROUND * AROUND, count = ebpo_h5_chunk_count(&array->shape);
+    ebpo_expected e = EBPO_EXPECTED_INIT(c->file);
+    if (!ebpo_input_expects(&c->file->in))
+        return;
+    expect_missing(c, &e, array, begin, count - begin < AROUND ? count : begin + AROUND);
+    ebpo_expect_all(&e);
+}
+
 static ebpo_status load(void *user, uint64_t key, void **item, uint64_t *bytes, ebpo_error *error)
 {
     ebpo_chunks *c = user;
@@ -148,6 +175,7 @@ static ebpo_status load(void *user, uint64_t key, void **item, uint64_t *bytes, 
     ebpo_chunk_desk *desk = take_desk(c);
     void *made = desk ? ebpo_alloc(rows, row_bytes) : NULL;
     ebpo_status status = made ? EBPO_OK : ebpo_fail_memory(error, rows * row_bytes + sizeof *desk);
+    expect_around(c, array, chunk_of(key));
     if (status == EBPO_OK)
         status = ebpo_reader_chunk(c->file, array, chunk_of(key), &desk->reader, desk->raw, error);
     if (status == EBPO_OK)
@@ -258,6 +286,9 @@ ebpo_status ebpo_chunks_integers(ebpo_chunks *chunks, ebpo_array_id id, int leve
     if (status != EBPO_OK)
         return status;
     const ebpo_array_in *array = ebpo_reader_array(chunks->file, id, level);
+    ebpo_expected expected = EBPO_EXPECTED_INIT(chunks->file);
+    ebpo_chunks_expect(chunks, &expected, id, level, row, rows);
+    ebpo_expect_all(&expected);
     ebpo_view view = { .array = array };
     uint64_t cols = array->shape.cols ? array->shape.cols : 1;
     uint8_t *out = values;

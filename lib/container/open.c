@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "container/facts.h"
 #include "container/reader.h"
+#include "http/http.h"
 
 static ebpo_status open_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_id id, int level, ebpo_error *error)
 {
@@ -17,7 +18,8 @@ static ebpo_status open_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_id id,
     ebpo_schema_path(id, level, a->path);
     if (rows == 0 || (spec->if_needed && ebpo_h5_look(h5, a->path) == EBPO_H5_ABSENT))
         return EBPO_OK;
-    ebpo_status status = ebpo_h5_read_array(h5, a->path, &a->shape, &a->chunks, &a->stored_bytes, error);
+    uint64_t most = ebpo_input_is_far(&file->in) ? 1 : UINT64_MAX; /* places of more are behind the headers */
+    ebpo_status status = ebpo_h5_read_array(h5, a->path, most, &a->shape, &a->chunks, &a->stored_bytes, error);
     if (status != EBPO_OK)
         return status;
     ebpo_check check = ebpo_reader_check(file);
@@ -29,6 +31,8 @@ static ebpo_status open_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_id id,
     if (id == EBPO_A_VERTICES && a->shape.element_size != (wide ? 8 : 4))
         return ebpo_check_fail(&check, -1, a->path, "the array's type contradicts coordinate_type", error);
     a->present = true;
+    if (!a->chunks)
+        atomic_store(&file->located, false);
     return EBPO_OK;
 }
 
@@ -56,10 +60,31 @@ static ebpo_status open_group(ebpo_h5_in *h5, const char *path, bool wanted, ebp
     return status;
 }
 
-static ebpo_status open_arrays(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
+/* Bytes by part, of the arrays whose chunks are known. */
+static ebpo_status sum_stored(ebpo_file *file, ebpo_error *error)
 {
     ebpo_info *info = &file->info;
     uint64_t stored = 0;
+    for (int level = 0; level < info->level_count; level++) {
+        info->level[level].stored_bytes = 0;
+        for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
+            info->level[level].stored_bytes += file->level_array[level][id].stored_bytes;
+    }
+    info->mesh_vertex_bytes = file->root_array[EBPO_A_VERTICES].stored_bytes;
+    info->mesh_face_bytes = file->root_array[EBPO_A_FACES].stored_bytes + file->root_array[EBPO_A_FACES_INDEX].stored_bytes;
+    info->map_bytes = file->root_array[EBPO_A_VERTEX_SOURCE].stored_bytes + file->root_array[EBPO_A_FACE_SOURCE].stored_bytes;
+    for (int level = 0; level < info->level_count; level++)
+        stored += info->level[level].stored_bytes;
+    stored += info->mesh_vertex_bytes + info->mesh_face_bytes + info->map_bytes;
+    if (stored > info->file_bytes)
+        return ebpo_fail(error, EBPO_E_FORMAT, "%s: the arrays' chunks take more room than the file has; get a fresh copy of the file",
+                         file->in.shown);
+    return EBPO_OK;
+}
+
+static ebpo_status open_arrays(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
+{
+    ebpo_info *info = &file->info;
     ebpo_status status = open_group(h5, "/mesh", info->parts & EBPO_PART_MESH, error);
     if (status == EBPO_OK)
         status = open_group(h5, "/maps", info->parts & EBPO_PART_MAPS, error);
@@ -67,25 +92,15 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *erro
         for (int id = 0; id < EBPO_LEVEL_ARRAYS && status == EBPO_OK; id++) {
             const ebpo_array_in *a = &file->level_array[level][id];
             status = open_array(file, h5, (ebpo_array_id)id, level, error);
-            info->level[level].stored_bytes += a->stored_bytes;
             if (level == 0 && id == EBPO_A_TYPES && a->chunks)
                 info->head_bytes = a->chunks[0].address; /* the first array in the file */
         }
     for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS && status == EBPO_OK; id++)
         status = open_array(file, h5, (ebpo_array_id)id, 0, error);
     info->file_bytes = file->in.source.size;
-    info->mesh_vertex_bytes = file->root_array[EBPO_A_VERTICES].stored_bytes;
-    info->mesh_face_bytes = file->root_array[EBPO_A_FACES].stored_bytes + file->root_array[EBPO_A_FACES_INDEX].stored_bytes;
-    info->map_bytes = file->root_array[EBPO_A_VERTEX_SOURCE].stored_bytes + file->root_array[EBPO_A_FACE_SOURCE].stored_bytes;
-    for (int level = 0; level < info->level_count; level++)
-        stored += info->level[level].stored_bytes;
-    stored += info->mesh_vertex_bytes + info->mesh_face_bytes + info->map_bytes;
-    if (status == EBPO_OK && stored > info->file_bytes)
-        status = ebpo_fail(error, EBPO_E_FORMAT, "%s: the arrays' chunks take more room than the file has; get a fresh copy of the file",
-                           file->in.shown);
     ebpo_pipeline pipeline = file->level_array[0][EBPO_A_TYPES].shape.pipeline;
     info->codec = pipeline == EBPO_PIPELINE_ZSTD ? EBPO_CODEC_ZSTD : pipeline == EBPO_PIPELINE_DEFLATE ? EBPO_CODEC_DEFLATE : EBPO_CODEC_NONE;
-    return status;
+    return status == EBPO_OK ? sum_stored(file, error) : status;
 }
 
 static ebpo_status read_head(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
@@ -114,9 +129,11 @@ static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const
         return ebpo_fail_memory(error, sizeof *file);
     }
     ebpo_h5_in h5 = EBPO_H5_IN_INIT;
+    pthread_mutex_init(&file->lock, NULL);
+    atomic_init(&file->located, true);
     ebpo_status status = ebpo_input_open(&file->in, source, name, error);
     if (status == EBPO_OK)
-        status = ebpo_h5_open(&h5, &file->in, error);
+        status = ebpo_h5_open(&h5, &file->in, 0, error);
     if (status == EBPO_OK)
         status = read_head(file, &h5, error);
     status = ebpo_h5_close(&h5, status, error);
@@ -127,12 +144,82 @@ static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const
     return status;
 }
 
+/* --- files far away: what the opening left for later --- */
+
+static ebpo_status locate_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_in *a, ebpo_error *error)
+{
+    ebpo_h5_shape shape;
+    ebpo_h5_chunk *chunks;
+    uint64_t stored;
+    if (!a->present || a->chunks)
+        return EBPO_OK;
+    ebpo_status status = ebpo_h5_read_array(h5, a->path, UINT64_MAX, &shape, &chunks, &stored, error);
+    if (status != EBPO_OK)
+        return status;
+    if (shape.rows != a->shape.rows || shape.cols != a->shape.cols || shape.element_size != a->shape.element_size || shape.pipeline != a->shape.pipeline) {
+        free(chunks);
+        return ebpo_fail(error, EBPO_E_IO, "%s: %s: the file has changed while it was open; open it again", file->in.shown, a->path);
+    }
+    a->chunks = chunks;
+    a->stored_bytes = stored;
+    return EBPO_OK;
+}
+
+static ebpo_status locate_all(ebpo_file *file, ebpo_error *error)
+{
+    ebpo_h5_in h5 = EBPO_H5_IN_INIT;
+    uint64_t begin = file->in.source.at_hand, end = file->info.head_bytes;
+    if (begin < end)
+        ebpo_input_expect(&file->in, &(ebpo_range){ begin, end - begin }, 1);
+    ebpo_status status = ebpo_h5_open(&h5, &file->in, end, error);
+    for (int i = 0; i < EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS && status == EBPO_OK; i++)
+        status = locate_array(file, &h5, &file->level_array[i / EBPO_LEVEL_ARRAYS][i % EBPO_LEVEL_ARRAYS], error);
+    for (int i = 0; i < EBPO_ARRAYS && status == EBPO_OK; i++)
+        status = locate_array(file, &h5, &file->root_array[i], error);
+    status = ebpo_h5_close(&h5, status, error);
+    return status == EBPO_OK ? sum_stored(file, error) : status;
+}
+
+ebpo_status ebpo_file_locate(ebpo_file *file, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    if (atomic_load(&file->located))
+        return EBPO_OK;
+    pthread_mutex_lock(&file->lock);
+    if (!atomic_load(&file->located)) {
+        status = locate_all(file, error);
+        if (status == EBPO_OK)
+            atomic_store(&file->located, true);
+    }
+    pthread_mutex_unlock(&file->lock);
+    return status;
+}
+
+ebpo_status ebpo_reader_locate(ebpo_file *file, const ebpo_array_in *array, ebpo_error *error)
+{
+    /* A single chunk's place stands in the array's header: known since the opening. */
+    return ebpo_h5_chunk_count(&array->shape) == 1 ? EBPO_OK : ebpo_file_locate(file, error);
+}
+
 ebpo_status ebpo_open(ebpo_file **out, const char *path, ebpo_error *error)
 {
     ebpo_source source;
     *out = NULL;
+    if (ebpo_is_url(path))
+        return ebpo_open_url(out, path, NULL, error);
     ebpo_status status = ebpo_source_of_path(&source, path, error);
     return status == EBPO_OK ? open_source(out, &source, path, error) : status;
+}
+
+ebpo_status ebpo_open_url(ebpo_file **out, const char *url, const ebpo_http_options *options, ebpo_error *error)
+{
+    ebpo_source source;
+    *out = NULL;
+    ebpo_status status = ebpo_source_of_url(&source, url, options, error);
+    if (status != EBPO_OK)
+        return status;
+    char shown[EBPO_SHOWN_BYTES];
+    return open_source(out, &source, ebpo_url_shown(url, shown, sizeof shown), error);
 }
 
 ebpo_status ebpo_open_memory(ebpo_file **out, const void *data, uint64_t size, const char *name, ebpo_error *error)
@@ -163,6 +250,7 @@ void ebpo_close(ebpo_file *file)
     for (int i = 0; i < EBPO_ARRAYS; i++)
         free(file->root_array[i].chunks);
     ebpo_input_close(&file->in);
+    pthread_mutex_destroy(&file->lock);
     free(file);
 }
 
@@ -170,6 +258,11 @@ void ebpo_file_traffic(const ebpo_file *file, uint64_t *bytes, uint64_t *reads)
 {
     *bytes = atomic_load(&file->in.bytes);
     *reads = atomic_load(&file->in.reads);
+}
+
+bool ebpo_file_http_stats(const ebpo_file *file, ebpo_http_stats *out)
+{
+    return ebpo_source_http_stats(&file->in.source, out);
 }
 
 const ebpo_info *ebpo_file_info(const ebpo_file *file)

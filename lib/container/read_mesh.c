@@ -85,6 +85,9 @@ ebpo_status ebpo_file_read_mesh(ebpo_file *file, ebpo_mesh *out, unsigned thread
     memset(out, 0, sizeof *out);
     if (!(file->info.parts & EBPO_PART_MESH))
         return absent(file, "mesh", error);
+    ebpo_expected expected = EBPO_EXPECTED_INIT(file);
+    ebpo_expect_mesh(&expected);
+    ebpo_expect_all(&expected);
     mesh_job j = { .file = file, .mesh = out };
     ebpo_check check = ebpo_reader_check(file);
     ebpo_status status = make_mesh(&file->info, out, error);
@@ -139,6 +142,9 @@ ebpo_status ebpo_file_read_maps(ebpo_file *file, uint32_t **vertex_source, uint3
     *vertex_source = *face_source = NULL;
     if (!(file->info.parts & EBPO_PART_MAPS))
         return absent(file, "maps to the source's numbers", error);
+    ebpo_expected expected = EBPO_EXPECTED_INIT(file);
+    ebpo_expect_maps(&expected);
+    ebpo_expect_all(&expected);
     ebpo_status status = read_map(file, EBPO_A_VERTEX_SOURCE, file->info.source_vertex_count, threads, vertex_source, error);
     if (status == EBPO_OK)
         status = read_map(file, EBPO_A_FACE_SOURCE, face_limit(&file->info), threads, face_source, error);
@@ -152,6 +158,7 @@ ebpo_status ebpo_file_read_maps(ebpo_file *file, uint32_t **vertex_source, uint3
 ebpo_status ebpo_file_read_tree(ebpo_file *file, ebpo_tree *out, unsigned threads, ebpo_error *error)
 {
     memset(out, 0, sizeof *out);
+    ebpo_expect_tree(file);
     out->info = file->info;
     ebpo_check check = ebpo_reader_check(file);
     ebpo_status status = EBPO_OK;
@@ -243,6 +250,10 @@ static ebpo_status to_source_order(ebpo_file *file, ebpo_mesh *mesh, unsigned th
 ebpo_status ebpo_file_read_source_mesh(ebpo_file *file, ebpo_mesh *out, bool *source_order, unsigned threads, ebpo_error *error)
 {
     bool maps = file->info.parts & EBPO_PART_MAPS;
+    ebpo_expected expected = EBPO_EXPECTED_INIT(file);
+    ebpo_expect_mesh(&expected);
+    ebpo_expect_maps(&expected);
+    ebpo_expect_all(&expected);
     ebpo_status status = ebpo_file_read_mesh(file, out, threads, error);
     if (status == EBPO_OK && maps)
         status = to_source_order(file, out, threads, error);

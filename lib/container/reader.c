@@ -68,9 +68,12 @@ static ebpo_status decode(ebpo_file *file, const ebpo_array_in *array, uint64_t 
 ebpo_status ebpo_reader_chunk(ebpo_file *file, const ebpo_array_in *array, uint64_t chunk, ebpo_chunk_reader *reader, uint8_t *raw,
                               ebpo_error *error)
 {
+    ebpo_status status = ebpo_reader_locate(file, array, error);
+    if (status != EBPO_OK)
+        return status;
     const ebpo_h5_chunk *at = &array->chunks[chunk];
     size_t bound = ebpo_chunk_bound(array->shape.chunk_rows * ebpo_h5_row_bytes(&array->shape));
-    ebpo_status status = fetch(file, reader, at->address, at->bytes, bound, error);
+    status = fetch(file, reader, at->address, at->bytes, bound, error);
     return status == EBPO_OK ? decode(file, array, chunk, &reader->coder, reader->stored, raw, error) : status;
 }
 
@@ -121,6 +124,9 @@ ebpo_status ebpo_reader_rows(ebpo_file *file, const ebpo_array_in *array, unsign
                              ebpo_error *error)
 {
     uint64_t chunks = ebpo_h5_chunk_count(&array->shape);
+    ebpo_status status = ebpo_reader_locate(file, array, error);
+    if (status != EBPO_OK)
+        return status;
     threads = chunks > 2 ? ebpo_thread_count(threads) : 1;
     job j = { .file = file, .array = array, .take = take, .context = context };
     j.scratch = ebpo_alloc_zero(threads, sizeof *j.scratch);
@@ -129,7 +135,7 @@ ebpo_status ebpo_reader_rows(ebpo_file *file, const ebpo_array_in *array, unsign
     uint64_t grain = chunks / (threads * 4) + 1; /* each thread gets a few turns, of runs as long as that allows */
     if (grain > RUN_CHUNKS)
         grain = RUN_CHUNKS;
-    ebpo_status status = ebpo_parallel_for(threads, chunks, grain, read_chunks, &j, NULL, "read", error);
+    status = ebpo_parallel_for(threads, chunks, grain, read_chunks, &j, NULL, "read", error);
     for (unsigned i = 0; i < threads; i++)
         if (j.scratch[i]) {
             ebpo_chunk_reader_clear(&j.scratch[i]->reader);

@@ -3,6 +3,8 @@
 #define EBPO_CONTAINER_READER_H
 
 #include <ebpo/file.h>
+#include <pthread.h>
+#include <stdatomic.h>
 
 #include "container/check.h"
 #include "container/schema.h"
@@ -16,7 +18,7 @@ typedef struct ebpo_array_in {
     char path[EBPO_PATH_BYTES];
     ebpo_h5_shape shape;
     uint64_t stored_bytes;
-    ebpo_h5_chunk *chunks; /* [ebpo_h5_chunk_count(&shape)] where each is; NULL when the array is absent */
+    ebpo_h5_chunk *chunks; /* [ebpo_h5_chunk_count(&shape)] where each is; NULL when the array is absent. After ebpo_reader_locate, unless it has one chunk only */
 } ebpo_array_in;
 
 struct ebpo_file {
@@ -24,7 +26,35 @@ struct ebpo_file {
     ebpo_info info;
     ebpo_array_in level_array[EBPO_LEVELS_MAX][EBPO_LEVEL_ARRAYS];
     ebpo_array_in root_array[EBPO_ARRAYS]; /* those from EBPO_A_VERTICES on */
+    pthread_mutex_t lock;
+    atomic_bool located;   /* the chunks of all arrays are known */
 };
+
+/* After this the chunks of an array that is present are known. Reads from a file that is far away, once. Any thread. */
+EBPO_MUST_USE ebpo_status ebpo_reader_locate(ebpo_file *file, const ebpo_array_in *array, ebpo_error *error);
+
+/* What will be read, collected and then announced; nothing is done for sources that do not want to know. For one thread.
+ *
+ *     ebpo_expected expected = EBPO_EXPECTED_INIT(file);
+ *     ebpo_expect_array(&expected, array);    ...
+ *     ebpo_expect_all(&expected);
+ */
+typedef struct ebpo_expected {
+    ebpo_file *file;
+    ebpo_range *range;
+    uint64_t count, room;
+} ebpo_expected;
+#define EBPO_EXPECTED_INIT(file) { file, NULL, 0, 0 }
+/* Chunks [begin, end) of an array that is present or not. */
+void ebpo_expect_chunks(ebpo_expected *expected, const ebpo_array_in *array, uint64_t begin, uint64_t end);
+void ebpo_expect_array(ebpo_expected *expected, const ebpo_array_in *array);
+void ebpo_expect_level(ebpo_expected *expected, int level);
+void ebpo_expect_mesh(ebpo_expected *expected);
+void ebpo_expect_maps(ebpo_expected *expected);
+/* Announces the whole file. */
+void ebpo_expect_tree(ebpo_file *file);
+/* Announces what was collected, and frees it. */
+void ebpo_expect_all(ebpo_expected *expected);
 
 static inline const ebpo_array_in *ebpo_reader_array(const ebpo_file *file, ebpo_array_id id, int level)
 {

@@ -133,9 +133,35 @@ static ebpo_status read_leaves(ebpo_chunks *chunks, const range *r, ebpo_level *
     return status == EBPO_OK ? read_refs(chunks, r->level, refs, out, error) : status;
 }
 
+/* What reading a level's nodes begins with, and the next level's types; only files far away care. */
+static void expect_nodes(ebpo_chunks *chunks, const range *r)
+{
+    static const ebpo_array_id of_leaves[] = { EBPO_A_LEAF_SKIP, EBPO_A_LEAF_NEW, EBPO_A_LEAF_REF_COUNT };
+    ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
+    uint64_t gray = r->rank[EBPO_GRAY], leaf = r->rank[EBPO_LEAF], gray_index = gray / EBPO_INDEX_ROWS, leaf_index = leaf / EBPO_INDEX_ROWS;
+    uint64_t grays = r->count[EBPO_GRAY], leaves = r->count[EBPO_LEAF], counted = gray_index * EBPO_INDEX_ROWS;
+    if (grays) {
+        ebpo_chunks_expect(chunks, &e, EBPO_A_GRAY_INDEX, r->level, gray_index, 1);
+        ebpo_chunks_expect(chunks, &e, EBPO_A_PLANE_COUNTS, r->level, counted, gray + grays - counted);
+        ebpo_chunks_expect(chunks, &e, EBPO_A_TYPES_INDEX, r->level + 1, gray_index, 1);
+        ebpo_chunks_expect(chunks, &e, EBPO_A_TYPES, r->level + 1, counted, gray + grays - counted);
+    }
+    if (leaves) {
+        counted = leaf_index * EBPO_INDEX_ROWS;
+        ebpo_chunks_expect(chunks, &e, EBPO_A_LEAF_INDEX, r->level, leaf_index, 1);
+        ebpo_chunks_expect(chunks, &e, EBPO_A_LEAF_WINDING, r->level, leaf, leaves);
+        for (size_t i = 0; i < sizeof of_leaves / sizeof *of_leaves; i++)
+            ebpo_chunks_expect(chunks, &e, of_leaves[i], r->level, counted, leaf + leaves - counted);
+    }
+    ebpo_chunks_expect(chunks, &e, EBPO_A_BLACK_WINDING, r->level, r->rank[EBPO_BLACK], r->count[EBPO_BLACK]);
+    ebpo_chunks_expect(chunks, &e, EBPO_A_WHITE_WINDING, r->level, r->rank[EBPO_WHITE], r->count[EBPO_WHITE]);
+    ebpo_expect_all(&e);
+}
+
 /* Everything of one level but its types. */
 static ebpo_status read_nodes(ebpo_chunks *chunks, const range *r, ebpo_level *out, ebpo_error *error)
 {
+    expect_nodes(chunks, r);
     out->gray_count = r->count[EBPO_GRAY];
     out->leaf_count = r->count[EBPO_LEAF];
     out->white_count = r->count[EBPO_WHITE];

@@ -6,6 +6,22 @@
 #include "base/error.h"
 #include "container/slice_parts.h"
 
+static void expect_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t *single, uint64_t singles, uint64_t first, uint64_t rows)
+{
+    ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
+    uint64_t chunk_rows = ebpo_reader_array(chunks->file, id, 0)->shape.chunk_rows, next = 0; /* rows before `next` are in */
+    if (!ebpo_input_expects(&chunks->file->in))
+        return;
+    for (uint64_t i = 0; i < singles; i++)
+        if (single[i] >= next) {
+            ebpo_chunks_expect(chunks, &e, id, 0, single[i], 1);
+            next = (single[i] / chunk_rows + 1) * chunk_rows;
+        }
+    if (rows && first + rows > next)
+        ebpo_chunks_expect(chunks, &e, id, 0, first > next ? first : next, first + rows - (first > next ? first : next));
+    ebpo_expect_all(&e);
+}
+
 /* Rows of a decoded array: those of `single` (ascending), then [first, first + rows). Chunks stay pinned while rows are in them. */
 static ebpo_status gather(ebpo_chunks *chunks, ebpo_array_id id, size_t row_bytes, const uint32_t *single, uint64_t singles, uint64_t first,
                           uint64_t rows, void *out, ebpo_error *error)
@@ -13,6 +29,7 @@ static ebpo_status gather(ebpo_chunks *chunks, ebpo_array_id id, size_t row_byte
     ebpo_view view = { .array = ebpo_reader_array(chunks->file, id, 0) };
     ebpo_status status = EBPO_OK;
     uint8_t *to = out;
+    expect_rows(chunks, id, single, singles, first, rows);
     for (uint64_t i = 0; i < singles && (status = ebpo_view_move(chunks, &view, single[i], error)) == EBPO_OK; i++, to += row_bytes)
         memcpy(to, view.rows + (single[i] - view.begin) * row_bytes, row_bytes);
     while (rows && status == EBPO_OK && (status = ebpo_view_move(chunks, &view, first, error)) == EBPO_OK) {

@@ -41,6 +41,9 @@ EBPO_MUST_USE static inline ebpo_status ebpo_view_move(ebpo_chunks *chunks, ebpo
 EBPO_MUST_USE ebpo_status ebpo_chunks_take(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row, uint64_t rows, size_t size,
                                            void *values_out, ebpo_error *error);
 
+/* Collects the chunks of rows [row, row + rows), as far as the array has them, that are not in memory. */
+void ebpo_chunks_expect(ebpo_chunks *chunks, ebpo_expected *expected, ebpo_array_id id, int level, uint64_t row, uint64_t rows);
+
 /* Sum of rows of an unsigned array; EBPO_E_FORMAT when it is beyond 2^62. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_sum(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row, uint64_t rows, uint64_t *sum,
                                           ebpo_error *error);

@@ -80,8 +80,9 @@ typedef struct ebpo_h5_in {
 } ebpo_h5_in;
 #define EBPO_H5_IN_INIT { NULL, -1, 0, NULL }
 
-/* Opens for reading, through the input, which stays the caller's and outlives `in`. EBPO_E_FORMAT when it is no HDF5 file. */
-EBPO_MUST_USE ebpo_status ebpo_h5_open(ebpo_h5_in *in, ebpo_input *input, ebpo_error *error);
+/* Opens for reading, through the input, which stays the caller's and outlives `in`. EBPO_E_FORMAT when it is no HDF5 file. `metadata_bytes`: where raw data begins, if that is
+ * known, else 0. */
+EBPO_MUST_USE ebpo_status ebpo_h5_open(ebpo_h5_in *in, ebpo_input *input, uint64_t metadata_bytes, ebpo_error *error);
 /* Closes everything, also what a failing open left. Returns `status`, unless the input failed at any time since opening: then that, with its
  * message, since libhdf5 reports failed reads as damage or as absence. */
 EBPO_MUST_USE ebpo_status ebpo_h5_close(ebpo_h5_in *in, ebpo_status status, ebpo_error *error);
@@ -111,8 +112,8 @@ typedef struct ebpo_h5_chunk {
 
 /* Tells an array's shape and its chunks' places, ebpo_h5_chunk_count(shape) of them, which the caller frees; NULL on failure. Checked: little-endian
  * integers, one or two fixed dimensions, one of the pipelines, chunks as ebpo_h5_chunk_rows says; every chunk is there, lies within the file,
- * has passed its filters, and takes at most ebpo_chunk_bound bytes. `stored_bytes`: their sum. */
-EBPO_MUST_USE ebpo_status ebpo_h5_read_array(ebpo_h5_in *in, const char *path, ebpo_h5_shape *shape, ebpo_h5_chunk **chunks,
+ * has passed its filters, and takes at most ebpo_chunk_bound bytes. `stored_bytes`: their sum. Arrays of more than `most` chunks: only the shape is told, *chunks is NULL. */
+EBPO_MUST_USE ebpo_status ebpo_h5_read_array(ebpo_h5_in *in, const char *path, uint64_t most, ebpo_h5_shape *shape, ebpo_h5_chunk **chunks,
                                              uint64_t *stored_bytes, ebpo_error *error);
 
 /* True for UTF-8 without control characters. */

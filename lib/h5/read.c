@@ -22,13 +22,13 @@ static hid_t file_access(ebpo_h5_driver *driver)
     return fapl;
 }
 
-ebpo_status ebpo_h5_open(ebpo_h5_in *in, ebpo_input *input, ebpo_error *error)
+ebpo_status ebpo_h5_open(ebpo_h5_in *in, ebpo_input *input, uint64_t metadata_bytes, ebpo_error *error)
 {
     *in = (ebpo_h5_in){ .shown = input->shown, .file = -1, .file_bytes = input->source.size };
     in->driver = ebpo_alloc_zero(1, sizeof *in->driver);
     if (!in->driver)
         return ebpo_fail_memory(error, sizeof *in->driver);
-    ebpo_status status = ebpo_h5_driver_open(in->driver, input, error);
+    ebpo_status status = ebpo_h5_driver_open(in->driver, input, metadata_bytes, error);
     if (status != EBPO_OK)
         return status;
     ebpo_h5_scope scope;
@@ -324,8 +324,8 @@ static ebpo_status find_chunks(ebpo_h5_in *in, hid_t dataset, const char *path, 
     return EBPO_OK;
 }
 
-ebpo_status ebpo_h5_read_array(ebpo_h5_in *in, const char *path, ebpo_h5_shape *shape, ebpo_h5_chunk **chunks, uint64_t *stored_bytes,
-                               ebpo_error *error)
+ebpo_status ebpo_h5_read_array(ebpo_h5_in *in, const char *path, uint64_t most, ebpo_h5_shape *shape, ebpo_h5_chunk **chunks,
+                               uint64_t *stored_bytes, ebpo_error *error)
 {
     *chunks = NULL;
     *stored_bytes = 0;
@@ -337,8 +337,9 @@ ebpo_status ebpo_h5_read_array(ebpo_h5_in *in, const char *path, ebpo_h5_shape *
     ebpo_h5_enter(&scope);
     hid_t dataset = H5Dopen2(in->file, path, H5P_DEFAULT), dcpl = dataset >= 0 ? H5Dget_create_plist(dataset) : -1;
     const char *wrong = dcpl < 0 ? "the array's description is damaged" : find_shape(dataset, dcpl, shape);
-    ebpo_status status = wrong ? ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, path, wrong)
-                               : find_chunks(in, dataset, path, shape, chunks, stored_bytes, error);
+    ebpo_status status = wrong ? ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, path, wrong) : EBPO_OK;
+    if (status == EBPO_OK && ebpo_h5_chunk_count(shape) <= most)
+        status = find_chunks(in, dataset, path, shape, chunks, stored_bytes, error);
     if (dcpl >= 0)
         H5Pclose(dcpl);
     if (dataset >= 0)

@@ -80,7 +80,7 @@ ebpo_status ebpo_source_of_path(ebpo_source *out, const char *path, ebpo_error *
     }
     s->fd = fd;
     strcpy(s->path, path);
-    *out = (ebpo_source){ s, size, path_read, path_close };
+    *out = (ebpo_source){ s, size, path_read, path_close, NULL, 0 };
     return EBPO_OK;
 }
 
@@ -93,7 +93,7 @@ static ebpo_status memory_read(void *user, uint64_t offset, uint64_t size, void 
 
 ebpo_source ebpo_source_of_memory(const void *data, uint64_t size)
 {
-    return (ebpo_source){ (void *)(uintptr_t)data, size, memory_read, NULL }; /* read only, whatever the type of `user` says */
+    return (ebpo_source){ (void *)(uintptr_t)data, size, memory_read, NULL, NULL, 0 }; /* read only, whatever the type of `user` says */
 }
 
 ebpo_status ebpo_input_open(ebpo_input *input, const ebpo_source *source, const char *name, ebpo_error *error)
@@ -133,4 +133,15 @@ ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size, v
     if (*cause.message)
         return ebpo_fail(error, status, "%s", cause.message);
     return ebpo_fail(error, status, "%s: bytes %" PRIu64 " to %" PRIu64 " could not be read", input->shown, offset, offset + size - 1);
+}
+
+void ebpo_input_expect(ebpo_input *input, const ebpo_range *ranges, size_t count)
+{
+    uint64_t size = input->source.size;
+    if (!input->source.expect || count == 0)
+        return;
+    for (size_t i = 0; i < count; i++)
+        if (ranges[i].offset > size || ranges[i].size > size - ranges[i].offset)
+            return; /* the reading will say so */
+    input->source.expect(input->source.user, ranges, count);
 }

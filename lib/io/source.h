@@ -28,4 +28,17 @@ void ebpo_input_close(ebpo_input *input);
  * What the source's own `read` returns is handed on, with a message if it gave none. */
 EBPO_MUST_USE ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size, void *data, ebpo_error *error);
 
+/* True when announcing is of use. */
+static inline bool ebpo_input_expects(const ebpo_input *input)
+{
+    return input->source.expect != NULL;
+}
+/* True when not everything is to be looked at in opening. */
+static inline bool ebpo_input_is_far(const ebpo_input *input)
+{
+    return input->source.expect && input->source.at_hand && input->source.at_hand < input->source.size;
+}
+/* Announces what will be read. Ranges beyond the source's end are let pass: reading them will fail. */
+void ebpo_input_expect(ebpo_input *input, const ebpo_range *ranges, size_t count);
+
 #endif

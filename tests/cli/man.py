@@ -24,7 +24,7 @@ def main():
     tool, folder = sys.argv[1:]
     bad = 0
     commands = [c for c in re.findall(r"^  ([a-z]+) ", help_of(tool, "help"), re.MULTILINE) if c != "help"]
-    pages = ["ebpo.1"]
+    pages = ["ebpo.1", "ebpo-remote.7"]
     for command in commands:
         page = f"ebpo-{command}.1"
         pages.append(page)

@@ -135,6 +135,11 @@ typedef struct ebpo_write_options {
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_tree_write(const ebpo_tree *tree, const char *path,
                                                    const ebpo_write_options *options, ebpo_error *error);
 
+/* Bytes [offset, offset + size) of a source. */
+typedef struct ebpo_range {
+    uint64_t offset, size;
+} ebpo_range;
+
 /* Where bytes come from. `read` fills `data` with the bytes [offset, offset + size), all of which lie within `size` of the source, or fails;
  * it is called from several threads at once. `close` is called once, when the file is closed or when opening fails.
  * While a file is being opened, `read` is called from inside libhdf5: it must then neither use libhdf5 nor open another file. */
@@ -143,6 +148,12 @@ typedef struct ebpo_source {
     uint64_t size; /* bytes */
     ebpo_status (*read)(void *user, uint64_t offset, uint64_t size, void *data, ebpo_error *error);
     void (*close)(void *user); /* may be NULL */
+    /* May be NULL. Announces ranges, all within the source, that will be read soon, each about once: a source far away fetches them together and ahead of the reader. Nothing
+     * depends on it; it does not wait, and is called from several threads. */
+    void (*expect)(void *user, const ebpo_range *ranges, size_t count);
+    /* With `expect`: so many bytes at the beginning need no fetching. When that is not the whole file, only what they tell is looked at in opening: where the chunks of arrays of
+     * more than one chunk lie is read when the first of these arrays is (or ebpo_file_locate called). */
+    uint64_t at_hand;
 } ebpo_source;
 
 /* An open file. Immutable: any number of threads may use it at once. */
@@ -151,7 +162,7 @@ typedef struct ebpo_file ebpo_file;
 /* Opens a file and reads its head only: the facts, and where each chunk of each array is. HDF5 is used for that and for nothing later; everything else is
  * read straight from the source. Unknown major version or unknown required part: EBPO_E_VERSION, by name. Safe on untrusted files.
  * A file that another program shortens or changes while it is open gives EBPO_E_IO or EBPO_E_FORMAT, never wrong data (the pipelines with checksums). */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_open(ebpo_file **out, const char *path, ebpo_error *error);
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_open(ebpo_file **out, const char *path, ebpo_error *error); /* a path, or a URL: ebpo/http.h */
 /* The same from bytes in memory, which stay the caller's and must outlive the file. `name` is for messages. */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_memory(ebpo_file **out, const void *data, uint64_t size, const char *name, ebpo_error *error);
 /* The same from any source; it is closed with the file (also when opening fails). */
@@ -159,11 +170,19 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_source(ebpo_file **out, const ebpo_
 /* NULL is fine. Models, contexts and streams made from the file are freed before. */
 EBPO_API void ebpo_close(ebpo_file *file);
 
-/* Bytes asked of the source so far, and how many times; the head's reading included. */
+/* Bytes asked of the source so far, and how many times; the head's reading included. Of a file opened by URL, what went over the net is told by ebpo_file_http_stats. */
 EBPO_API void ebpo_file_traffic(const ebpo_file *file, uint64_t *bytes, uint64_t *reads);
 
 /* Lent; valid until the file is closed. */
 EBPO_API const ebpo_info *ebpo_file_info(const ebpo_file *file);
+
+/* Where all chunks lie, if that has not been read yet (files far away, ebpo_source.at_hand). Sets stored_bytes of all levels, mesh_vertex_bytes, mesh_face_bytes and map_bytes in the
+ * info, which before leave out arrays of more than one chunk; reading such an array does it too, so no other thread should look at these then. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_locate(ebpo_file *file, ebpo_error *error);
+
+/* Announces that levels first .. last will be read; last beyond the last level: up to that one. A source far away then fetches them with as few requests as it can, where reading one
+ * after the other would ask for each by itself. Does not wait, cannot fail. */
+EBPO_API void ebpo_file_expect_levels(ebpo_file *file, int first, int last);
 
 /* Reads one level (0 .. level_count - 1) and checks it: counts, ranges, order, index arrays.
  * The caller frees it with ebpo_level_free. `threads` 0: all cores. */

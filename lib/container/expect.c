@@ -1,0 +1,73 @@
+/* Telling the source what will be read. */
+#include <stdlib.h>
+
+#include "base/alloc.h"
+#include "container/reader.h"
+
+static void add(ebpo_expected *e, uint64_t offset, uint64_t size)
+{
+    ebpo_range *last = e->count ? &e->range[e->count - 1] : NULL;
+    if (last && last->offset + last->size == offset)
+        last->size += size;
+    else if (ebpo_grow(&e->range, &e->room, e->count + 1, sizeof *e->range)) /* else it is read without having been announced */
+        e->range[e->count++] = (ebpo_range){ offset, size };
+}
+
+void ebpo_expect_chunks(ebpo_expected *e, const ebpo_array_in *array, uint64_t begin, uint64_t end)
+{
+    /* A failure is the reading's to tell. */
+    if (!ebpo_input_expects(&e->file->in) || !array->present || ebpo_reader_locate(e->file, array, NULL) != EBPO_OK)
+        return;
+    for (uint64_t i = begin; i < end; i++)
+        add(e, array->chunks[i].address, array->chunks[i].bytes);
+}
+
+void ebpo_expect_array(ebpo_expected *e, const ebpo_array_in *array)
+{
+    ebpo_expect_chunks(e, array, 0, array->present ? ebpo_h5_chunk_count(&array->shape) : 0);
+}
+
+void ebpo_expect_level(ebpo_expected *e, int level)
+{
+    for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
+        ebpo_expect_array(e, &e->file->level_array[level][id]);
+}
+
+void ebpo_expect_mesh(ebpo_expected *e)
+{
+    ebpo_expect_array(e, &e->file->root_array[EBPO_A_VERTICES]);
+    ebpo_expect_array(e, &e->file->root_array[EBPO_A_FACES]);
+    ebpo_expect_array(e, &e->file->root_array[EBPO_A_FACES_INDEX]);
+}
+
+void ebpo_expect_maps(ebpo_expected *e)
+{
+    ebpo_expect_array(e, &e->file->root_array[EBPO_A_VERTEX_SOURCE]);
+    ebpo_expect_array(e, &e->file->root_array[EBPO_A_FACE_SOURCE]);
+}
+
+void ebpo_expect_all(ebpo_expected *e)
+{
+    ebpo_input_expect(&e->file->in, e->range, e->count);
+    free(e->range);
+    *e = (ebpo_expected)EBPO_EXPECTED_INIT(e->file);
+}
+
+void ebpo_file_expect_levels(ebpo_file *file, int first, int last)
+{
+    ebpo_expected e = EBPO_EXPECTED_INIT(file);
+    int end = last < file->info.level_count - 1 ? last : file->info.level_count - 1;
+    for (int level = first < 0 ? 0 : first; level <= end; level++)
+        ebpo_expect_level(&e, level);
+    ebpo_expect_all(&e);
+}
+
+void ebpo_expect_tree(ebpo_file *file)
+{
+    ebpo_expected e = EBPO_EXPECTED_INIT(file);
+    for (int level = 0; level < file->info.level_count; level++)
+        ebpo_expect_level(&e, level);
+    ebpo_expect_mesh(&e);
+    ebpo_expect_maps(&e);
+    ebpo_expect_all(&e);
+}

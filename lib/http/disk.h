@@ -1,0 +1,23 @@
+/* Blocks of files on servers, kept in a folder from one session to the next. Each block is a file of its own, named by the digest of address and version and the block's number,
+ * and carries a checksum. Written to a temporary name and renamed, so any number of processes may share the folder. Nothing depends on it: what cannot be read, is damaged or
+ * cannot be written is as if it were not there. Any thread. */
+#ifndef EBPO_HTTP_DISK_H
+#define EBPO_HTTP_DISK_H
+
+#include <ebpo/base.h>
+
+#include "http/answer.h"
+
+enum { EBPO_DISK_BLOCK = 32768 /* divides the bytes of the first request */ };
+
+typedef struct ebpo_disk ebpo_disk;
+
+/* Makes the folder, if its parent is there. EBPO_E_ARGUMENT when it cannot be written. `bytes`: that the folder may hold. */
+EBPO_MUST_USE ebpo_status ebpo_disk_open(ebpo_disk **out, const char *folder, uint64_t bytes, const char *url, const ebpo_http_version *version, ebpo_error *error);
+void ebpo_disk_close(ebpo_disk *disk);
+
+/* `size`: EBPO_DISK_BLOCK, less at the end of the file. False: not there. */
+bool ebpo_disk_get(ebpo_disk *disk, uint64_t block, void *data, size_t size);
+void ebpo_disk_put(ebpo_disk *disk, uint64_t block, const void *data, size_t size);
+
+#endif

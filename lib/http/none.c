@@ -1,0 +1,21 @@
+/* Instead of the rest, in a library built without libcurl. */
+#include <string.h>
+
+#include "base/error.h"
+#include "http/http.h"
+
+ebpo_status ebpo_source_of_url(ebpo_source *out, const char *url, const ebpo_http_options *options, ebpo_error *error)
+{
+    (void)options;
+    *out = (ebpo_source){ .user = NULL };
+    char shown[EBPO_SHOWN_BYTES];
+    return ebpo_fail(error, EBPO_E_UNSUPPORTED, "%s: this library was built without HTTP; install libcurl and build it again, or download the file",
+                     ebpo_url_shown(url, shown, sizeof shown));
+}
+
+bool ebpo_source_http_stats(const ebpo_source *source, ebpo_http_stats *out)
+{
+    (void)source;
+    memset(out, 0, sizeof *out);
+    return false;
+}

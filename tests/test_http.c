@@ -1,0 +1,725 @@
+/* Files on web servers, good ones and bad ones: the right bytes or a clear error, and never a hang (each test has a time limit).
+ * test_http FAULTY_SERVER. EBPO_TEST_SCALE scales the number of random schedules of faults. */
+#include <check.h>
+#include <dirent.h>
+#include <fcntl.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <ebpo/ebpo.h>
+
+#include "http/answer.h"
+#include "http/http.h"
+#include "web.h"
+
+enum { DATA_BYTES = 3000017, HEAD_BYTES = 98304 };
+static uint8_t *data;
+
+static uint64_t next_random(uint64_t *state)
+{
+    *state ^= *state << 13;
+    *state ^= *state >> 7;
+    *state ^= *state << 17;
+    return *state;
+}
+
+static ebpo_http_options quick(void)
+{
+    ebpo_http_options o = EBPO_HTTP_OPTIONS_INIT;
+    o.connect_timeout = 2;
+    o.stall_timeout = 1;
+    o.time_limit = 4;
+    o.retries = 3;
+    o.netrc = false;
+    o.proxy = "";
+    return o;
+}
+
+static ebpo_http_stats stats_of(const ebpo_source *source)
+{
+    ebpo_http_stats stats;
+    ck_assert(ebpo_source_http_stats(source, &stats));
+    return stats;
+}
+
+static ebpo_status read_one(const ebpo_source *s, uint64_t offset, uint64_t size, ebpo_error *error)
+{
+    uint8_t *got = malloc(size);
+    ebpo_status status = s->read(s->user, offset, size, got, error);
+    if (status == EBPO_OK)
+        ck_assert_mem_eq(got, data + offset, size);
+    free(got);
+    return status;
+}
+
+/* Some places, then everything, announced in pieces. */
+static ebpo_status read_all(const ebpo_source *s, ebpo_error *error)
+{
+    static const ebpo_range places[] = { { 0, 100 }, { HEAD_BYTES - 50, 100 }, { 1000000, 1 }, { DATA_BYTES - 10, 10 }, { 500000, 1200000 } };
+    ebpo_range announced[10];
+    ebpo_status status = EBPO_OK;
+    for (size_t i = 0; i < sizeof places / sizeof *places && status == EBPO_OK; i++)
+        status = read_one(s, places[i].offset, places[i].size, error);
+    for (uint64_t i = 0; i < 10; i++)
+        announced[i] = (ebpo_range){ (9 - i) * 300000, i == 0 ? DATA_BYTES - 2700000 : 300000 };
+    if (status == EBPO_OK)
+        s->expect(s->user, announced, 10);
+    for (int i = 9; i >= 0 && status == EBPO_OK; i--)
+        status = read_one(s, announced[i].offset, announced[i].size, error);
+    return status;
+}
+
+static ebpo_status visit(const char *fault, const ebpo_http_options *options, ebpo_http_stats *stats, ebpo_error *error)
+{
+    ebpo_source s;
+    ebpo_status status = ebpo_source_of_url(&s, web_url(fault), options, error);
+    if (status != EBPO_OK)
+        return status;
+    ck_assert_uint_eq(s.size, DATA_BYTES);
+    status = read_all(&s, error);
+    if (stats)
+        *stats = stats_of(&s);
+    s.close(s.user);
+    return status;
+}
+
+/* --- servers that one can read from --- */
+
+static const struct {
+    const char *fault;
+    unsigned retries; /* at least */
+} readable[] = {
+    { "good", 0 }, { "modified", 0 }, { "bare", 0 }, { "whole", 0 }, { "whole_bare", 0 }, { "whole_chunked", 0 }, { "whole_dropped-2", 2 }, { "short-2", 2 }, { "empty-2", 2 },
+    { "lying_length-2", 2 }, { "chunked", 0 }, { "stall_head-1", 1 }, { "stall_body-1", 1 }, { "code-503-2", 2 }, { "code-500-1", 1 }, { "code-502-1", 1 }, { "code-504-1", 1 },
+    { "code-408-1", 1 }, { "code-429-1", 1 }, { "code_later-503-1-2", 1 }, { "wait-429-1-1", 1 }, { "redirect", 0 },
+};
+
+START_TEST(what_passes_or_does_no_harm_gives_the_same_bytes)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_http_options o = quick();
+    ebpo_http_stats stats;
+    ebpo_status status = visit(readable[_i].fault, &o, &stats, &error);
+    ck_assert_msg(status == EBPO_OK, "%s: %s", readable[_i].fault, error.message);
+    ck_assert_msg(stats.retries >= readable[_i].retries, "%s: %d retries", readable[_i].fault, (int)stats.retries);
+    ck_assert_uint_ge(stats.bytes, DATA_BYTES);
+}
+END_TEST
+
+START_TEST(a_server_that_sends_less_each_time_is_asked_for_the_rest)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_http_options o = quick();
+    o.retries = 60;
+    o.time_limit = 60;
+    ebpo_source s;
+    ck_assert_int_eq(ebpo_source_of_url(&s, web_url("less"), &o, &error), EBPO_OK);
+    ck_assert_msg(read_one(&s, 100000, 300000, &error) == EBPO_OK, "%s", error.message);
+    s.close(s.user);
+}
+END_TEST
+
+/* --- servers that one cannot read from --- */
+
+static const struct {
+    const char *fault;
+    ebpo_status status;
+    const char *words;
+} unreadable[] = {
+    { "whole_open", EBPO_E_UNSUPPORTED, "does not tell where the file ends" },
+    { "whole_later", EBPO_E_IO, "the whole file when asked for a part" },
+    { "short-99", EBPO_E_IO, "given up after" },
+    { "empty-99", EBPO_E_IO, "given up after 4 attempts" },
+    { "lying_length", EBPO_E_IO, "given up after" },
+    { "wrong_range", EBPO_E_IO, "the server sent bytes 1 to 98304 when asked for 0 to 98303" },
+    { "wrong_range_later", EBPO_E_IO, "when asked for" },
+    { "bad_range", EBPO_E_IO, "Content-Range" },
+    { "no_range", EBPO_E_IO, "Content-Range" },
+    { "star", EBPO_E_IO, "does not tell the file's size" },
+    { "two_ranges", EBPO_E_IO, "Content-Range" },
+    { "wide", EBPO_E_IO, "when asked for 0 to 98303" },
+    { "longer", EBPO_E_IO, "more bytes than it was asked for" },
+    { "multipart", EBPO_E_IO, "Content-Range" },
+    { "gzip", EBPO_E_IO, "Content-Encoding" },
+    { "gzip_whole", EBPO_E_IO, "Content-Encoding" },
+    { "stall_head-99", EBPO_E_IO, "; " },
+    { "stall_body-99", EBPO_E_IO, "; " },
+    { "drip", EBPO_E_IO, "not read within 4 s" },
+    { "code-503", EBPO_E_IO, "answered 503; given up after 4 attempts" },
+    { "code-500", EBPO_E_IO, "answered 500; given up" },
+    { "code-404", EBPO_E_IO, "answered 404: there is no such file" },
+    { "code-403", EBPO_E_IO, "answered 403: not allowed" },
+    { "code-401", EBPO_E_IO, "answered 401: not allowed" },
+    { "code-501", EBPO_E_IO, "answered 501" },
+    { "code-304", EBPO_E_IO, "answered 304" },
+    { "code_later-404-1", EBPO_E_IO, "answered 404" },
+    { "wait-503-3600-99", EBPO_E_IO, "asked again in 3600 s" },
+    { "wait-429-30-99", EBPO_E_IO, "asked again in 30 s" },
+    { "redirect_wrong", EBPO_E_IO, "when asked for" },
+    { "redirect_loop", EBPO_E_IO, "redirects" },
+    { "redirect_file", EBPO_E_IO, "rotocol" },
+    { "change_etag", EBPO_E_IO, "another ETag" },
+    { "change_etag-2", EBPO_E_IO, "another ETag" },
+    { "change_modified", EBPO_E_IO, "another Last-Modified" },
+    { "change_size", EBPO_E_IO, "another size" },
+    { "change_shorter", EBPO_E_IO, "has changed" },
+    { "change_between", EBPO_E_IO, "another ETag" },
+    { "headers", EBPO_E_IO, "head of the server's answer is too long" },
+    { "garbage", EBPO_E_IO, "" },
+    { "not_satisfiable", EBPO_E_IO, "416" },
+    { "private", EBPO_E_IO, "answered 401" },
+};
+
+START_TEST(what_is_wrong_is_a_clear_error_that_names_the_file)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_http_options o = quick();
+    ebpo_status status = visit(unreadable[_i].fault, &o, NULL, &error);
+    ck_assert_msg(status == unreadable[_i].status, "%s: %d %s", unreadable[_i].fault, status, error.message);
+    ck_assert_msg(strstr(error.message, unreadable[_i].words), "%s: %s", unreadable[_i].fault, error.message);
+    ck_assert_msg(strncmp(error.message, "http://127.0.0.1:", 17) == 0, "%s: %s", unreadable[_i].fault, error.message);
+    ck_assert_ptr_null(strchr(error.message, '\n'));
+}
+END_TEST
+
+START_TEST(final_codes_are_asked_for_once)
+{
+    static const char *const faults[] = { "code-404", "code-403", "code-401" };
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_http_options o = quick();
+    ebpo_source s;
+    ck_assert_int_eq(ebpo_source_of_url(&s, web_url("code_later-404-1-1"), &o, &error), EBPO_OK);
+    ck_assert_int_eq(read_one(&s, 200000, 10, &error), EBPO_E_IO);
+    ck_assert_uint_eq(stats_of(&s).requests, 2);
+    ck_assert_uint_eq(stats_of(&s).retries, 0);
+    ck_assert_int_eq(read_one(&s, 200000, 10, &error), EBPO_OK); /* a failure is not for ever */
+    s.close(s.user);
+    for (int i = 0; i < 3; i++)
+        ck_assert_int_eq(ebpo_source_of_url(&s, web_url(faults[i]), &o, &error), EBPO_E_IO);
+}
+END_TEST
+
+START_TEST(a_page_with_200_is_not_taken_for_a_model)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_http_options o = quick();
+    ebpo_file *file;
+    ck_assert_int_eq(ebpo_open_url(&file, web_url("html"), &o, &error), EBPO_E_FORMAT);
+    ck_assert_ptr_nonnull(strstr(error.message, "HDF5"));
+    ck_assert_ptr_null(file);
+}
+END_TEST
+
+START_TEST(without_ranges_or_version_only_small_files_are_read)
+{
+    static const char *const faults[] = { "whole", "whole_chunked", "whole_bare", "bare" };
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_http_options o = quick();
+    ebpo_source s;
+    o.whole_limit = DATA_BYTES - 1;
+    for (size_t i = 0; i < sizeof faults / sizeof *faults; i++) {
+        ck_assert_int_eq(ebpo_source_of_url(&s, web_url(faults[i]), &o, &error), EBPO_E_UNSUPPORTED);
+        ck_assert_ptr_nonnull(strstr(error.message, "download the file"));
+    }
+    o.unversioned = true;
+    ck_assert_int_eq(visit("bare", &o, NULL, &error), EBPO_OK);
+}
+END_TEST
+
+START_TEST(a_file_without_a_version_is_one_answer_or_none)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_http_options o = quick();
+    ebpo_source s;
+    ck_assert_int_eq(ebpo_source_of_url(&s, web_url("change_bare-1"), &o, &error), EBPO_OK);
+    uint8_t *got = malloc(DATA_BYTES);
+    ck_assert_int_eq(s.read(s.user, 0, DATA_BYTES, got, &error), EBPO_OK);
+    for (size_t i = 0; i < DATA_BYTES; i++)
+        ck_assert_uint_eq(got[i], data[DATA_BYTES - 1 - i]); /* the second version, all of it */
+    free(got);
+    s.close(s.user);
+}
+END_TEST
+
+/* --- what it costs --- */
+
+START_TEST(opening_is_one_request_and_what_was_announced_comes_in_few)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_http_options o = quick();
+    ebpo_source s;
+    ck_assert_int_eq(ebpo_source_of_url(&s, web_url("good"), &o, &error), EBPO_OK);
+    ck_assert_int_eq(read_one(&s, 0, HEAD_BYTES, &error), EBPO_OK);
+    ck_assert_uint_eq(stats_of(&s).requests, 1);
+    ck_assert_uint_eq(stats_of(&s).bytes, HEAD_BYTES);
+    ebpo_range ranges[29];
+    for (uint64_t i = 0; i < 29; i++)
+        ranges[i] = (ebpo_range){ 100000 + i * 100000, 100000 };
+    s.expect(s.user, ranges, 29);
+    for (int i = 0; i < 29; i++)
+        ck_assert_int_eq(read_one(&s, ranges[i].offset, ranges[i].size, &error), EBPO_OK);
+    ck_assert_uint_eq(stats_of(&s).requests, 2);
+    ck_assert_uint_eq(stats_of(&s).bytes, HEAD_BYTES + 2900000);
+    ck_assert_uint_le(stats_of(&s).connections, 2);
+    s.close(s.user);
+}
+END_TEST
+
+START_TEST(what_was_announced_and_not_read_does_no_harm)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_http_options o = quick();
+    ebpo_source s;
+    uint64_t random = 7;
+    ck_assert_int_eq(ebpo_source_of_url(&s, web_url("good"), &o, &error), EBPO_OK);
+    for (int i = 0; i < 300; i++) {
+        uint64_t at = next_random(&random) % (DATA_BYTES - 5000);
+        ebpo_range twice[2] = { { at, 5000 }, { at + 1000, 2000 } };
+        s.expect(s.user, twice, 2);
+        if (i % 3 == 0)
+            ck_assert_int_eq(read_one(&s, next_random(&random) % (DATA_BYTES - 9000), 9000, &error), EBPO_OK);
+    }
+    s.close(s.user);
+}
+END_TEST
+
+/* --- threads, luck and interruption --- */
+
+typedef struct reader {
+    const ebpo_source *source;
+    uint64_t random;
+    atomic_int *failures;
+} reader;
+
+static void *read_anywhere(void *argument)
+{
+    reader *r = argument;
+    for (int i = 0; i < 25; i++) {
+        uint64_t at = next_random(&r->random) % DATA_BYTES, most = DATA_BYTES - at < 200000 ? DATA_BYTES - at : 200000, size = 1 + next_random(&r->random) % most;
+        ebpo_error error = EBPO_ERROR_INIT;
+        if (i % 2)
+            r->source->expect(r->source->user, &(ebpo_range){ at, size }, 1);
+        ebpo_status status = read_one(r->source, at, size, &error);
+        if (status != EBPO_OK)
+            atomic_fetch_add(r->failures, 1);
+        ck_assert_msg(status == EBPO_OK || (status == EBPO_E_IO && *error.message), "%d %s", status, error.message);
+    }
+    return NULL;
+}
+
+static int read_by_threads(const ebpo_source *source, uint64_t seed)
+{
+    enum { THREADS = 4 };
+    pthread_t threads[THREADS];
+    reader readers[THREADS];
+    atomic_int failures = 0;
+    for (unsigned i = 0; i < THREADS; i++) {
+        readers[i] = (reader){ source, seed * 1000 + i + 1, &failures };
+        ck_assert_int_eq(pthread_create(&threads[i], NULL, read_anywhere, &readers[i]), 0);
+    }
+    for (int i = 0; i < THREADS; i++)
+        pthread_join(threads[i], NULL);
+    return failures;
+}
+
+START_TEST(threads_read_at_once)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_http_options o = quick();
+    ebpo_source s;
+    ck_assert_int_eq(ebpo_source_of_url(&s, web_url("good"), &o, &error), EBPO_OK);
+    ck_assert_int_eq(read_by_threads(&s, 1), 0);
+    s.close(s.user);
+}
+END_TEST
+
+static int schedules(void)
+{
+    const char *text = getenv("EBPO_TEST_SCALE");
+    double scale = text ? atof(text) : 1;
+    int count = (int)(12 * scale);
+    return count < 2 ? 2 : count;
+}
+
+START_TEST(whatever_happens_the_bytes_are_right_or_there_is_an_error)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_http_options o = quick();
+    char fault[64];
+    o.retries = 12;
+    o.time_limit = 60;
+    int opened = 0, failures = 0;
+    for (int seed = 0; seed < schedules(); seed++) {
+        ebpo_source s;
+        snprintf(fault, sizeof fault, "random-%d-%d", seed, 10 + seed % 4 * 10);
+        if (ebpo_source_of_url(&s, web_url(fault), &o, &error) != EBPO_OK)
+            continue;
+        opened++;
+        failures += read_by_threads(&s, (uint64_t)seed + 2);
+        s.close(s.user);
+    }
+    ck_assert_int_gt(opened, 0);
+    ck_assert_int_lt(failures, opened * 100);
+}
+END_TEST
+
+static atomic_bool stopping;
+
+static bool stop(void *user)
+{
+    (void)user;
+    return stopping;
+}
+
+static void *stop_soon(void *argument)
+{
+    (void)argument;
+    usleep(300000);
+    stopping = true;
+    return NULL;
+}
+
+START_TEST(a_read_is_stopped_on_request)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_http_options o = EBPO_HTTP_OPTIONS_INIT;
+    pthread_t thread;
+    ebpo_source s;
+    o.stop = stop;
+    o.proxy = "";
+    pthread_create(&thread, NULL, stop_soon, NULL);
+    ck_assert_int_eq(ebpo_source_of_url(&s, web_url("stall_head-99"), &o, &error), EBPO_E_CANCELLED);
+    pthread_join(thread, NULL);
+}
+END_TEST
+
+START_TEST(a_source_is_closed_while_it_reads_ahead)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_http_options o = quick();
+    ebpo_source s;
+    ck_assert_int_eq(ebpo_source_of_url(&s, web_url("good"), &o, &error), EBPO_OK);
+    s.expect(s.user, &(ebpo_range){ 0, DATA_BYTES }, 1);
+    s.close(s.user);
+}
+END_TEST
+
+/* --- options --- */
+
+START_TEST(name_password_and_headers_are_sent_and_not_shown)
+{
+    static const char *const headers[] = { "X-Key: 7", NULL };
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_http_options o = quick();
+    ebpo_source s;
+    o.user = "name:secret";
+    o.headers = headers;
+    ck_assert_msg(visit("private", &o, NULL, &error) == EBPO_OK, "%s", error.message);
+    char shown[100];
+    ck_assert_str_eq(ebpo_url_shown("https://name:p@ss@example.org/a/b.h5?signature=1#x", shown, sizeof shown), "https://example.org/a/b.h5");
+    ck_assert_str_eq(ebpo_url_shown("http://example.org?a@b", shown, sizeof shown), "http://example.org");
+    ck_assert_str_eq(ebpo_url_shown("a@b/c?d", shown, sizeof shown), "a@b/c?d");
+    ck_assert_str_eq(ebpo_url_shown("http://example.org/abc", shown, 12), "http://exam");
+    o.user = "name:wrong";
+    ck_assert_int_eq(ebpo_source_of_url(&s, web_url("private"), &o, &error), EBPO_E_IO);
+    ck_assert_ptr_null(strstr(error.message, "wrong"));
+}
+END_TEST
+
+START_TEST(options_out_of_range_are_refused)
+{
+    static const char *const smuggled[] = { "X: 1\r\nY: 2", NULL };
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_source s;
+    for (int i = 0; i < 6; i++) {
+        ebpo_http_options o = quick();
+        if (i == 0)
+            o.connections = 0;
+        else if (i == 1)
+            o.connections = 33;
+        else if (i == 2)
+            o.time_limit = 0;
+        else if (i == 3)
+            o.stall_timeout = __builtin_nan("");
+        else if (i == 4)
+            o.headers = smuggled;
+        else
+            o.cache_folder = "/nowhere/at/all";
+        ck_assert_msg(ebpo_source_of_url(&s, web_url("good"), &o, &error) == EBPO_E_ARGUMENT, "%d", i);
+    }
+    ck_assert_int_eq(ebpo_source_of_url(&s, "ftp://example.org/a", NULL, &error), EBPO_E_ARGUMENT);
+}
+END_TEST
+
+START_TEST(a_server_that_is_not_there_is_an_error)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_http_options o = quick();
+    ebpo_source s;
+    o.retries = 1;
+    ck_assert_int_eq(ebpo_source_of_url(&s, "http://127.0.0.1:1/a", &o, &error), EBPO_E_IO);
+    ck_assert_int_eq(ebpo_source_of_url(&s, "http://", &o, &error), EBPO_E_IO);
+}
+END_TEST
+
+/* --- the folder --- */
+
+static char cache[] = "/tmp/ebpo-cache-XXXXXX";
+
+/* Calls for each file; returns how many there are. */
+static int each_file(void (*what)(const char *name))
+{
+    int count = 0;
+    DIR *folder = opendir(cache);
+    for (struct dirent *f; folder && (f = readdir(folder)) != NULL;)
+        if (f->d_name[0] != '.' || strlen(f->d_name) > 2) {
+            char name[400];
+            snprintf(name, sizeof name, "%s/%s", cache, f->d_name);
+            what(name);
+            count++;
+        }
+    closedir(folder);
+    return count;
+}
+
+static void damage(const char *name)
+{
+    int fd = open(name, O_WRONLY);
+    ck_assert_int_eq(pwrite(fd, "x!", 2, 1000), 2);
+    close(fd);
+}
+
+static void erase(const char *name)
+{
+    unlink(name);
+}
+
+static uint64_t total;
+static void add_up(const char *name)
+{
+    struct stat st;
+    total += stat(name, &st) == 0 ? (uint64_t)st.st_size : 0;
+}
+
+static void set_up_cache(void)
+{
+    strcpy(cache, "/tmp/ebpo-cache-XXXXXX");
+    ck_assert_ptr_nonnull(mkdtemp(cache));
+}
+
+static void tear_down_cache(void)
+{
+    each_file(erase);
+    rmdir(cache);
+}
+
+static ebpo_http_stats visit_cached(const char *url, uint64_t bytes)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_http_options o = quick();
+    ebpo_source s;
+    o.cache_folder = cache;
+    o.cache_bytes = bytes;
+    ck_assert_msg(ebpo_source_of_url(&s, url, &o, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(read_all(&s, &error) == EBPO_OK, "%s", error.message);
+    ebpo_http_stats stats = stats_of(&s);
+    s.close(s.user);
+    return stats;
+}
+
+START_TEST(the_next_session_reads_from_the_folder_and_checks_it)
+{
+    char url[300];
+    snprintf(url, sizeof url, "%s", web_url("good"));
+    ck_assert_uint_gt(visit_cached(url, 1 << 30).requests, 1);
+    ebpo_http_stats again = visit_cached(url, 1 << 30);
+    ck_assert_uint_eq(again.requests, 1);
+    ck_assert_uint_ge(again.cache_bytes, DATA_BYTES - HEAD_BYTES);
+    ck_assert_uint_gt(again.cache_hits, 0);
+    ck_assert_int_gt(each_file(damage), 80);
+    again = visit_cached(url, 1 << 30);
+    ck_assert_uint_gt(again.requests, 1);
+    ck_assert_uint_eq(visit_cached(url, 1 << 30).requests, 1);
+    ck_assert_uint_gt(visit_cached(web_url("good"), 1 << 30).requests, 1); /* another address */
+}
+END_TEST
+
+START_TEST(the_folder_stays_below_its_limit)
+{
+    enum { LIMIT = 1000000 };
+    for (int i = 0; i < 3; i++)
+        visit_cached(web_url("good"), LIMIT);
+    total = 0;
+    each_file(add_up);
+    ck_assert_uint_gt(total, LIMIT / 4);
+    ck_assert_uint_le(total, LIMIT);
+}
+END_TEST
+
+START_TEST(another_version_is_not_taken_from_the_folder)
+{
+    char url[300];
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_http_options o = quick();
+    ebpo_source s;
+    o.cache_folder = cache;
+    snprintf(url, sizeof url, "%s", web_url("change_etag-2"));
+    ck_assert_int_eq(ebpo_source_of_url(&s, url, &o, &error), EBPO_OK);
+    ck_assert_int_eq(read_one(&s, 200000, 1000, &error), EBPO_OK);
+    ck_assert_int_eq(read_one(&s, 1200000, 1000, &error), EBPO_E_IO);
+    s.close(s.user);
+    ck_assert_int_eq(ebpo_source_of_url(&s, url, &o, &error), EBPO_OK);
+    uint8_t got[1000];
+    ck_assert_int_eq(s.read(s.user, 200000, 1000, got, &error), EBPO_OK);
+    for (int i = 0; i < 1000; i++)
+        ck_assert_uint_eq(got[i], data[DATA_BYTES - 1 - 200000 - i]);
+    s.close(s.user);
+}
+END_TEST
+
+START_TEST(processes_share_the_folder)
+{
+    char url[300];
+    snprintf(url, sizeof url, "%s", web_url("good"));
+    pid_t child[3];
+    for (int i = 0; i < 3; i++) {
+        child[i] = fork();
+        if (child[i] == 0) {
+            ebpo_error error = EBPO_ERROR_INIT;
+            ebpo_http_options o = quick();
+            ebpo_source s;
+            o.cache_folder = cache;
+            o.cache_bytes = 1500000;
+            bool good = ebpo_source_of_url(&s, url, &o, &error) == EBPO_OK && read_all(&s, &error) == EBPO_OK;
+            if (good)
+                s.close(s.user);
+            _exit(good ? 0 : 1);
+        }
+    }
+    for (int i = 0; i < 3; i++) {
+        int state;
+        ck_assert_int_eq(waitpid(child[i], &state, 0), child[i]);
+        ck_assert_int_eq(state, 0);
+    }
+}
+END_TEST
+
+/* --- heads of answers --- */
+
+static ebpo_verdict judged(const char *const *lines, const ebpo_http_version *pinned, char why[EBPO_WHY_BYTES])
+{
+    ebpo_answer answer = { .code = 0 };
+    ebpo_asked asked = { 100, 200, pinned, 1000 };
+    ebpo_status status;
+    for (; *lines; lines++)
+        ebpo_answer_line(&answer, *lines, strlen(*lines));
+    *why = 0;
+    return ebpo_answer_judge(&answer, &asked, &status, why);
+}
+
+#define JUDGED(...) judged((const char *const[]){ __VA_ARGS__, NULL }, &pinned, why)
+
+START_TEST(heads_are_judged_by_the_letter)
+{
+    ebpo_http_version pinned = { 5000, "\"a\"", "" };
+    char why[EBPO_WHY_BYTES];
+    ck_assert_int_eq(JUDGED("HTTP/1.1 206 Partial\r\n", "content-range:bytes 100-199/5000\r\n", "ETag: \"a\"\r\n"), EBPO_ANSWER_PART);
+    ck_assert_int_eq(JUDGED("HTTP/2 206\r\n", "Content-Range: BYTES 100-150/5000 \r\n", "etag:\"a\"\r\n"), EBPO_ANSWER_PART);
+    ck_assert_int_eq(JUDGED("HTTP/1.1 302 Found\r\n", "Content-Encoding: gzip\r\n", "HTTP/1.1 206 x\r\n", "Content-Range: bytes 100-199/5000", "ETag: \"a\""), EBPO_ANSWER_PART);
+    static const char *const wrong[] = { "bytes 100-200/5000", "bytes 99-199/5000", "bytes 150-120/5000", "bytes 100-199/150", "bytes 100-199/5001", "bytes 100-199/",
+        "bytes 100-199", "bytes -199/5000", "bytes 100-/5000", "bytes 100-199/5000x", "bytes  100-199/5000", "bytes 100-99999999999999999999999/5000", "items 100-199/5000", "",
+        "bytes */5000", "bytes 100-199/*", "bytes +100-199/5000", "bytes 0100-0x99/5000" };
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        char line[100];
+        snprintf(line, sizeof line, "Content-Range: %s\r\n", wrong[i]);
+        ck_assert_msg(JUDGED("HTTP/1.1 206 x\r\n", line, "ETag: \"a\"\r\n") == EBPO_ANSWER_REFUSED, "%s", wrong[i]);
+        ck_assert_uint_gt(strlen(why), 20);
+    }
+    ck_assert_int_eq(JUDGED("HTTP/1.1 206 x", "Content-Range: bytes 100-199/5000"), EBPO_ANSWER_REFUSED); /* the tag has gone */
+    ck_assert_int_eq(JUDGED("HTTP/1.1 206 x", "Content-Range: bytes 100-199/5000", "ETag: W/\"a\""), EBPO_ANSWER_REFUSED);
+    ck_assert_int_eq(JUDGED("HTTP/1.1 206 x", "Content-Range: bytes 100-199/5000", "ETag: \"a\"", "Content-Encoding: br"), EBPO_ANSWER_REFUSED);
+    ck_assert_int_eq(JUDGED("HTTP/1.1 206 x", "Content-Range: bytes 100-199/5000", "ETag: \"a\"", "Content-Encoding: identity"), EBPO_ANSWER_PART);
+    ck_assert_int_eq(JUDGED("nonsense"), EBPO_ANSWER_REFUSED);
+    ck_assert_int_eq(JUDGED("HTTP/1.1 503 x"), EBPO_ANSWER_LATER);
+}
+END_TEST
+
+START_TEST(long_tags_are_told_apart_to_their_end)
+{
+    char line[2000], other[2000], why[EBPO_WHY_BYTES];
+    ebpo_answer answer = { .code = 0 };
+    memset(line, 'x', sizeof line);
+    memcpy(line, "ETag: ", 6);
+    memcpy(other, line, sizeof line);
+    other[1999] = 'y';
+    ebpo_answer_line(&answer, line, sizeof line);
+    ebpo_http_version pinned = { 5000, "", "" };
+    strcpy(pinned.etag, answer.etag);
+    ebpo_answer second = { .code = 206, .has_range = true, .has_total = true, .begin = 100, .last = 199, .total = 5000 };
+    ebpo_asked asked = { 100, 200, &pinned, 1000 };
+    ebpo_status status;
+    ebpo_answer_line(&second, line, sizeof line);
+    ck_assert_int_eq(ebpo_answer_judge(&second, &asked, &status, why), EBPO_ANSWER_PART);
+    ebpo_answer_line(&second, other, sizeof other);
+    ck_assert_int_eq(ebpo_answer_judge(&second, &asked, &status, why), EBPO_ANSWER_REFUSED);
+}
+END_TEST
+
+static void make_data(void)
+{
+    uint64_t random = 88172645463325252u;
+    data = malloc(DATA_BYTES);
+    for (size_t i = 0; i < DATA_BYTES; i++)
+        data[i] = (uint8_t)(next_random(&random) >> 24);
+}
+
+int main(int argc, char **argv)
+{
+    make_data();
+    if (argc < 2 || !web_start(argv[1], data, DATA_BYTES)) {
+        fprintf(stderr, "no Python, no web server\n");
+        return 77;
+    }
+    Suite *suite = suite_create("http");
+    TCase *tests = tcase_create("servers"), *folder = tcase_create("folder");
+    tcase_set_timeout(tests, 120);
+    tcase_set_timeout(folder, 120);
+    tcase_add_checked_fixture(folder, set_up_cache, tear_down_cache);
+    tcase_add_loop_test(tests, what_passes_or_does_no_harm_gives_the_same_bytes, 0, sizeof readable / sizeof *readable);
+    tcase_add_test(tests, a_server_that_sends_less_each_time_is_asked_for_the_rest);
+    tcase_add_loop_test(tests, what_is_wrong_is_a_clear_error_that_names_the_file, 0, sizeof unreadable / sizeof *unreadable);
+    tcase_add_test(tests, final_codes_are_asked_for_once);
+    tcase_add_test(tests, a_page_with_200_is_not_taken_for_a_model);
+    tcase_add_test(tests, without_ranges_or_version_only_small_files_are_read);
+    tcase_add_test(tests, a_file_without_a_version_is_one_answer_or_none);
+    tcase_add_test(tests, opening_is_one_request_and_what_was_announced_comes_in_few);
+    tcase_add_test(tests, what_was_announced_and_not_read_does_no_harm);
+    tcase_add_test(tests, threads_read_at_once);
+    tcase_add_test(tests, whatever_happens_the_bytes_are_right_or_there_is_an_error);
+    tcase_add_test(tests, a_read_is_stopped_on_request);
+    tcase_add_test(tests, a_source_is_closed_while_it_reads_ahead);
+    tcase_add_test(tests, name_password_and_headers_are_sent_and_not_shown);
+    tcase_add_test(tests, options_out_of_range_are_refused);
+    tcase_add_test(tests, a_server_that_is_not_there_is_an_error);
+    tcase_add_test(tests, heads_are_judged_by_the_letter);
+    tcase_add_test(tests, long_tags_are_told_apart_to_their_end);
+    tcase_add_test(folder, the_next_session_reads_from_the_folder_and_checks_it);
+    tcase_add_test(folder, the_folder_stays_below_its_limit);
+    tcase_add_test(folder, another_version_is_not_taken_from_the_folder);
+    tcase_add_test(folder, processes_share_the_folder);
+    suite_add_tcase(suite, tests);
+    suite_add_tcase(suite, folder);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_NORMAL);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    web_stop();
+    free(data);
+    return failed != 0;
+}

@@ -1,0 +1,61 @@
+#include "web.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+static pid_t server, owner;
+static int server_input = -1, port, number;
+static char folder[] = "/tmp/ebpo-web-XXXXXX", path[sizeof folder + 16];
+
+static bool write_file(const void *data, size_t size)
+{
+    FILE *f = mkdtemp(folder) ? (snprintf(path, sizeof path, "%s/served", folder), fopen(path, "wb")) : NULL;
+    bool good = f && fwrite(data, 1, size, f) == size;
+    return f && fclose(f) == 0 && good;
+}
+
+bool web_start(const char *script, const void *data, size_t size)
+{
+    int in[2], out[2];
+    if (!write_file(data, size) || pipe2(in, O_CLOEXEC) != 0 || pipe2(out, O_CLOEXEC) != 0)
+        return false;
+    owner = getpid();
+    server = fork();
+    if (server == 0) {
+        dup2(in[0], 0);
+        dup2(out[1], 1);
+        execlp("python3", "python3", script, path, (char *)NULL);
+        _exit(127);
+    }
+    close(in[0]);
+    close(out[1]);
+    server_input = in[1]; /* closes on exec, and with this process */
+    FILE *told = fdopen(out[0], "r");
+    bool good = server > 0 && told && fscanf(told, "%d", &port) == 1;
+    if (told)
+        fclose(told);
+    atexit(web_stop);
+    return good;
+}
+
+void web_stop(void)
+{
+    if (server <= 0 || getpid() != owner) /* Check's children come here too */
+        return;
+    close(server_input);
+    waitpid(server, NULL, 0);
+    server = 0;
+    unlink(path);
+    rmdir(folder);
+}
+
+const char *web_url(const char *fault)
+{
+    static char url[300];
+    snprintf(url, sizeof url, "http://127.0.0.1:%d/%s/%ld-%d", port, fault, (long)getpid(), number++);
+    return url;
+}
