@@ -1,23 +1,34 @@
 #!/bin/sh
 # Installs the Debian packages that building needs; with --tests also what the tests need, with --demo what the quick start needs,
-# with --bench the peers of the benchmarks.
+# with --bench the peers of the benchmarks, with --viewer what serves the web viewer.
 set -eu
+here=$(cd "$(dirname "$0")" && pwd)
+# Debian's nodejs comes without npm; others' brings it and conflicts with Debian's.
+viewer="nginx-light nodejs"
+command -v npm >/dev/null || viewer="$viewer npm"
+modules=no
 # dpkg-dev tells meson where libraries go on Debian.
 packages="gcc dpkg-dev pkg-config meson ninja-build libhdf5-dev libzstd-dev zlib1g-dev libgmp-dev nettle-dev libassimp-dev libpng-dev libcurl4-openssl-dev"
 for option in "$@"; do
     case $option in
-    --tests) packages="$packages check hdf5-tools python3 python3-h5py python3-numpy clang libclang-rt-14-dev g++ mandoc" ;;
+    --tests) packages="$packages check hdf5-tools python3 python3-h5py python3-numpy clang libclang-rt-14-dev g++ mandoc chromium $viewer" modules=yes ;;
     --demo) packages="$packages hdf5-tools glmark2-data python3-h5py" ;;
     --bench) packages="$packages g++ libembree-dev libcgal-dev python3" ;;
-    *) echo "usage: install-deps.sh [--tests] [--demo] [--bench]" >&2; exit 2 ;;
+    --viewer) packages="$packages $viewer" modules=yes ;;
+    *) echo "usage: install-deps.sh [--tests] [--demo] [--bench] [--viewer]" >&2; exit 2 ;;
     esac
 done
 missing=
 for package in $packages; do
     dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q 'ok installed' || missing="$missing $package"
 done
-[ -z "$missing" ] && exit 0
-sudo=
-[ "$(id -u)" = 0 ] || sudo=sudo
-# shellcheck disable=SC2086
-$sudo env DEBIAN_FRONTEND=noninteractive sh -c 'apt-get update -qq && apt-get install -y -qq --no-install-recommends "$@"' sh $missing
+if [ -n "$missing" ]; then
+    sudo=
+    [ "$(id -u)" = 0 ] || sudo=sudo
+    # shellcheck disable=SC2086
+    $sudo env DEBIAN_FRONTEND=noninteractive sh -c 'apt-get update -qq && apt-get install -y -qq --no-install-recommends "$@"' sh $missing
+fi
+# The viewer's packages, as package-lock.json pins them.
+if [ $modules = yes ] && ! cmp -s "$here/viewer/package-lock.json" "$here/viewer/node_modules/.installed"; then
+    (cd "$here/viewer" && npm ci --silent --no-audit --no-fund && cp package-lock.json node_modules/.installed)
+fi

@@ -3,21 +3,33 @@
 // Source: BP 2008, section 3.4.3 (clipping of the box), done here on vertex loops.
 
 const TOLERANCE = 1e-10; // in cell units
+const VERTICES = 192, FACES = 96, CORNERS = 576;
 
 /**
- * In cell coordinates, 0 .. 1 on each axis. `x`: three numbers a vertex; `loops`: vertex numbers of each polygon, counter-clockwise seen from
- * outside; `wall`: for each polygon whether it lies on a wall of the cell.
- * @typedef {{ x: number[], loops: number[][], wall: boolean[] }} Polytope
+ * In cell coordinates, 0 .. 1 on each axis. `x`: three numbers a vertex; polygon f has the vertices corner[first[f]] .. corner[first[f + 1] - 1],
+ * counter-clockwise seen from outside, and wall[f] is 1 when it lies on a wall of the cell.
+ * @typedef {{ vertices: number, faces: number, x: Float64Array, first: Uint16Array, corner: Uint8Array, wall: Uint8Array }} Polytope
  */
+const room = () => ({ vertices: 0, faces: 0, x: new Float64Array(3 * VERTICES), first: new Uint16Array(FACES + 1), corner: new Uint8Array(CORNERS), wall: new Uint8Array(FACES) });
+
+function copy(to, from) {
+  to.vertices = from.vertices;
+  to.faces = from.faces;
+  to.x.set(from.x.subarray(0, 3 * from.vertices));
+  to.first.set(from.first.subarray(0, from.faces + 1));
+  to.corner.set(from.corner.subarray(0, from.first[from.faces]));
+  to.wall.set(from.wall.subarray(0, from.faces));
+}
 
 /** The whole cell. Vertex i has bit 0 x, bit 1 y, bit 2 z. */
-export function cube() {
-  return {
-    x: [0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 0, 1, 1, 0, 1, 0, 1, 1, 1, 1, 1],
-    loops: [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]],
-    wall: [true, true, true, true, true, true],
-  };
-}
+const CUBE = {
+  vertices: 8, faces: 6,
+  x: Float64Array.of(0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 0, 1, 1, 0, 1, 0, 1, 1, 1, 1, 1),
+  first: Uint16Array.of(0, 4, 8, 12, 16, 20, 24),
+  corner: Uint8Array.of(0, 4, 6, 2, 1, 3, 7, 5, 0, 1, 5, 4, 2, 6, 7, 3, 0, 2, 3, 1, 4, 5, 7, 6),
+  wall: new Uint8Array(6).fill(1),
+};
+export const cube = () => CUBE;
 
 /** The half-space of a plane code (format-spec, section 6): { n, d }, integers; 4096 * (n . xi) <= d is kept. */
 export function decodePlane(code) {
@@ -26,129 +38,179 @@ export function decodePlane(code) {
   return { n, d: 4096 * (Math.min(n[0], 0) + Math.min(n[1], 0) + Math.min(n[2], 0)) + 511 * ((code >>> 20) + 1) };
 }
 
-/** Cuts by the half-space of a plane code. */
-export function clipByCode(p, code) {
-  const { n, d } = decodePlane(code);
-  return clip(p, n[0] * (1 / 511), n[1] * (1 / 511), n[2] * (1 / 511), d * (1 / (511 * 4096)), false) ?? p;
-}
+// Room for the work on one polytope: `at` is it, `spare` becomes the next one.
+let at = room(), spare = room();
+const dist = new Float64Array(VERTICES), number = new Uint8Array(VERTICES), on = new Uint8Array(VERTICES), next = new Int16Array(VERTICES);
+const edgeIn = new Uint8Array(FACES), edgeOut = new Uint8Array(FACES), edgeNumber = new Uint8Array(FACES);
+const rimFrom = new Uint8Array(CORNERS), rimTo = new Uint8Array(CORNERS);
+let edges, rims, corners, full;
 
-/**
- * Keeps n . x <= d. Returns p itself when nothing is cut away, and undefined when next to nothing would remain or rounding spoils the loops:
- * the caller then keeps p, which is too large, never too small.
- */
-function clip(p, nx, ny, nz, d, wall) {
-  const count = p.x.length / 3, dist = new Float64Array(count);
-  let most = -Infinity, least = Infinity;
-  for (let i = 0; i < count; i++) {
-    const e = nx * p.x[3 * i] + ny * p.x[3 * i + 1] + nz * p.x[3 * i + 2] - d;
-    dist[i] = e;
-    most = Math.max(most, e);
-    least = Math.min(least, e);
+function addVertex(x, y, z, isOn) {
+  if (spare.vertices === VERTICES) {
+    full = true;
+    return 0;
   }
-  if (most <= TOLERANCE)
-    return p;
-  if (least >= -1e-7)
-    return undefined;
-  const out = { x: [], loops: [], wall: [] }, number = new Int16Array(count).fill(-1), on = [], cuts = new Map(), rim = [];
-  const add = (x, y, z, isOn) => {
-    out.x.push(x, y, z);
-    return on.push(isOn) - 1;
-  };
-  for (let i = 0; i < count; i++)
-    if (dist[i] <= TOLERANCE)
-      number[i] = add(p.x[3 * i], p.x[3 * i + 1], p.x[3 * i + 2], dist[i] >= -TOLERANCE);
-  const crossing = (i, o) => { // from inside to outside
-    if (dist[i] >= -TOLERANCE)
-      return number[i];
-    const key = i * count + o;
-    let made = cuts.get(key);
-    if (made === undefined) {
-      const t = dist[i] / (dist[i] - dist[o]), at = (k) => p.x[3 * i + k] + t * (p.x[3 * o + k] - p.x[3 * i + k]);
-      cuts.set(key, made = add(at(0), at(1), at(2), true));
-    }
-    return made;
-  };
-  p.loops.forEach((loop, f) => {
-    if (!loop.some((v) => dist[v] < -TOLERANCE))
-      return;
-    const kept = [];
-    const corner = (v) => {
-      if (kept.at(-1) !== v)
-        kept.push(v);
-    };
-    for (let i = 0; i < loop.length; i++) {
-      const a = loop[i], b = loop[i + 1 < loop.length ? i + 1 : 0], aOut = dist[a] > TOLERANCE, bOut = dist[b] > TOLERANCE;
-      if (!aOut)
-        corner(number[a]);
-      if (aOut !== bOut)
-        corner(aOut ? crossing(b, a) : crossing(a, b));
-    }
-    close(out, kept, p.wall[f]);
-    if (kept.length >= 3)
-      for (let i = 0; i < kept.length; i++) {
-        const a = kept[i], b = kept[i + 1 < kept.length ? i + 1 : 0];
-        if (on[a] && on[b])
-          rim.push([a, b]);
-      }
-  });
-  return closeCap(out, rim, wall) && out.loops.length >= 4 ? out : undefined;
+  const i = spare.vertices++;
+  spare.x[3 * i] = x;
+  spare.x[3 * i + 1] = y;
+  spare.x[3 * i + 2] = z;
+  on[i] = isOn;
+  return i;
 }
 
-function close(out, loop, wall) {
-  while (loop.length > 1 && loop.at(-1) === loop[0])
-    loop.pop();
-  if (loop.length < 3)
+// The new vertex on an edge that leaves the half-space.
+function crossing(i, o) {
+  if (dist[i] >= -TOLERANCE)
+    return number[i]; // the inner end itself lies on the plane
+  for (let e = 0; e < edges; e++)
+    if (edgeIn[e] === i && edgeOut[e] === o)
+      return edgeNumber[e];
+  if (edges === FACES) {
+    full = true;
+    return 0;
+  }
+  const t = dist[i] / (dist[i] - dist[o]), x = at.x, a = 3 * i, b = 3 * o;
+  edgeIn[edges] = i;
+  edgeOut[edges] = o;
+  return edgeNumber[edges++] = addVertex(x[a] + t * (x[b] - x[a]), x[a + 1] + t * (x[b + 1] - x[a + 1]), x[a + 2] + t * (x[b + 2] - x[a + 2]), 1);
+}
+
+function addCorner(start, v) {
+  if (corners > start && spare.corner[corners - 1] === v)
     return;
-  out.loops.push(loop);
-  out.wall.push(wall);
+  if (corners === CORNERS)
+    full = true;
+  else
+    spare.corner[corners++] = v;
+}
+
+function closeFace(start, wall) {
+  while (corners > start + 1 && spare.corner[corners - 1] === spare.corner[start])
+    corners--;
+  if (corners - start < 3 || spare.faces === FACES) {
+    full ||= spare.faces === FACES;
+    corners = start;
+    return;
+  }
+  spare.wall[spare.faces] = wall;
+  spare.first[spare.faces++] = start;
+  spare.first[spare.faces] = corners;
+}
+
+function clipFace(f) {
+  const from = at.first[f], to = at.first[f + 1], start = corners;
+  let inside = false;
+  for (let i = from; i < to; i++)
+    inside ||= dist[at.corner[i]] < -TOLERANCE;
+  if (!inside)
+    return;
+  for (let i = from; i < to; i++) {
+    const a = at.corner[i], b = at.corner[i + 1 < to ? i + 1 : from], aOut = dist[a] > TOLERANCE, bOut = dist[b] > TOLERANCE;
+    if (!aOut)
+      addCorner(start, number[a]);
+    if (aOut !== bOut)
+      addCorner(start, aOut ? crossing(b, a) : crossing(a, b));
+  }
+  closeFace(start, at.wall[f]);
+  for (let i = start; i < corners; i++) {
+    const a = spare.corner[i], b = spare.corner[i + 1 < corners ? i + 1 : start];
+    if (on[a] && on[b]) {
+      rimFrom[rims] = a;
+      rimTo[rims++] = b;
+    }
+  }
 }
 
 // Rim edges used in both directions lie between two kept polygons; the others, reversed, bound the cap.
-function closeCap(out, rim, wall) {
-  const next = new Map();
-  let begin;
-  for (const [a, b] of rim) {
-    if (rim.some(([c, d]) => c === b && d === a))
+function closeCap(wall) {
+  let open = 0, begin = -1;
+  next.fill(-1, 0, spare.vertices);
+  for (let i = 0; i < rims; i++) {
+    let paired = false;
+    for (let j = 0; j < rims && !paired; j++)
+      paired = rimFrom[i] === rimTo[j] && rimTo[i] === rimFrom[j];
+    if (paired)
       continue;
-    if (next.has(b))
+    if (next[rimTo[i]] !== -1)
       return false;
-    next.set(b, a);
-    begin = b;
+    next[begin = rimTo[i]] = rimFrom[i];
+    open++;
   }
-  if (next.size < 3)
+  if (open < 3)
     return false;
-  const loop = [];
-  let at = begin;
+  const start = corners;
+  let v = begin, steps = 0;
   do {
-    loop.push(at);
-    at = next.get(at);
-  } while (at !== undefined && at !== begin && loop.length <= next.size);
-  if (at !== begin || loop.length !== next.size)
+    addCorner(start, v);
+    v = next[v];
+    steps++;
+  } while (v !== -1 && v !== begin && steps <= open);
+  if (v !== begin || steps !== open)
     return false;
-  close(out, loop, wall);
+  closeFace(start, wall);
   return true;
 }
 
-function half(p, axis, side) {
-  const scaled = { x: p.x.slice(), loops: p.loops, wall: p.wall };
-  for (let i = axis; i < scaled.x.length; i += 3)
-    scaled.x[i] = 2 * scaled.x[i] - side;
-  const sign = side ? -1 : 1;
-  return clip(scaled, axis === 0 ? sign : 0, axis === 1 ? sign : 0, axis === 2 ? sign : 0, side ? 0 : 1, true) ?? cube();
+/**
+ * Keeps n . x <= d of `at`. False when next to nothing would remain, or there is no room, or rounding spoiled the loops: it is then left as it
+ * was, too large, never too small.
+ */
+function clip(nx, ny, nz, d, wall) {
+  let most = -Infinity, least = Infinity;
+  for (let i = 0; i < at.vertices; i++) {
+    const e = dist[i] = nx * at.x[3 * i] + ny * at.x[3 * i + 1] + nz * at.x[3 * i + 2] - d;
+    most = e > most ? e : most;
+    least = e < least ? e : least;
+  }
+  if (most <= TOLERANCE)
+    return true;
+  if (least >= -1e-7)
+    return false;
+  spare.vertices = spare.faces = edges = rims = corners = 0;
+  full = false;
+  for (let i = 0; i < at.vertices; i++)
+    if (dist[i] <= TOLERANCE)
+      number[i] = addVertex(at.x[3 * i], at.x[3 * i + 1], at.x[3 * i + 2], dist[i] >= -TOLERANCE ? 1 : 0);
+  for (let f = 0; f < at.faces && !full; f++)
+    clipFace(f);
+  if (full || !closeCap(wall) || full || spare.faces < 4)
+    return false;
+  [at, spare] = [spare, at];
+  return true;
 }
 
-/** The part in a child's cell, in the child's coordinates; the whole cell when (numerically) nothing lies in it. */
-export function childPart(p, octant) {
-  return half(half(half(p, 2, octant >> 2 & 1), 1, octant >> 1 & 1), 0, octant & 1);
+function half(axis, side) {
+  for (let i = axis; i < 3 * at.vertices; i += 3)
+    at.x[i] = 2 * at.x[i] - side;
+  const sign = side ? -1 : 1;
+  if (!clip(axis === 0 ? sign : 0, axis === 1 ? sign : 0, axis === 2 ? sign : 0, side ? 0 : 1, 1))
+    copy(at, CUBE);
+}
+
+/**
+ * An envelope: what `parent` (undefined: the whole cell) leaves of its child number `octant`, scaled to the child's cell and cut by plane codes.
+ * Where numerically nothing is left, the whole cell.
+ * @returns {Polytope}
+ */
+export function envelope(parent, octant, codes) {
+  copy(at, parent ?? CUBE);
+  if (parent)
+    for (let axis = 2; axis >= 0; axis--)
+      half(axis, octant >> axis & 1);
+  for (const code of codes) {
+    const { n, d } = decodePlane(code);
+    clip(n[0] * (1 / 511), n[1] * (1 / 511), n[2] * (1 / 511), d * (1 / (511 * 4096)), 0);
+  }
+  return { vertices: at.vertices, faces: at.faces, x: at.x.slice(0, 3 * at.vertices), first: at.first.slice(0, at.faces + 1),
+    corner: at.corner.slice(0, at.first[at.faces]), wall: at.wall.slice(0, at.faces) };
 }
 
 /** Volume in cells. */
-export function volume(p) {
-  const { x } = p;
+export function volume({ x, faces, first, corner }) {
   let sum = 0;
-  for (const loop of p.loops)
-    for (let i = 1; i + 1 < loop.length; i++) {
-      const [a, b, c] = [3 * loop[0], 3 * loop[i], 3 * loop[i + 1]];
+  for (let f = 0; f < faces; f++)
+    for (let i = first[f] + 1; i + 1 < first[f + 1]; i++) {
+      const a = 3 * corner[first[f]], b = 3 * corner[i], c = 3 * corner[i + 1];
       const bx = x[b] - x[0], by = x[b + 1] - x[1], bz = x[b + 2] - x[2], cx = x[c] - x[0], cy = x[c + 1] - x[1], cz = x[c + 2] - x[2];
       sum += (x[a] - x[0]) * (by * cz - bz * cy) + (x[a + 1] - x[1]) * (bz * cx - bx * cz) + (x[a + 2] - x[2]) * (bx * cy - by * cx);
     }

@@ -10,7 +10,7 @@ const HEAD_BYTES = 128 * 1024, HEAD_BYTES_MOST = 256 * 1024 * 1024;
 const GAP_BYTES = 32 * 1024;            // rather read this much for nothing than ask twice
 const REQUEST_BYTES = 4 * 1024 * 1024;  // a request's most
 const REQUESTS = 6;                     // at once, as browsers do for a host
-const CACHE_BYTES = 48 * 1024 * 1024;   // decoded chunks that parts of arrays were taken from
+const CACHE_BYTES = 96 * 1024 * 1024;   // decoded chunks that parts of arrays were taken from
 
 const FACE_TABLES = ['leaf_skip', 'leaf_new', 'leaf_ref_count', 'leaf_refs', 'leaf_index'];
 const folder = (level) => `/levels/${String(level).padStart(2, '0')}/`;
@@ -289,7 +289,7 @@ export class EbpoFile {
   /**
    * Some faces: `numbers` are face numbers, the answer their corners: Float64Array, nine numbers each. Fetches the chunks that hold them, twice:
    * faces, then vertices. Decoded chunks
-   * stay in a cache of 48 MiB.
+   * stay in a cache of 96 MiB.
    */
   async facesByNumber(numbers) {
     this.#needMesh();

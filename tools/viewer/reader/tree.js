@@ -1,6 +1,6 @@
 // The octree as nodes with children, from levels as they arrive: format-spec/README.md, section 5.
 import { BLACK, GRAY, LEAF, WHITE } from './decode.js';
-import { childPart, clipByCode, cube } from './envelope.js';
+import { cube, envelope } from './envelope.js';
 
 /** One node. `at`: its cell's place in its level; `rank`: among the nodes of its type in its level; `octant`: among its siblings. */
 export class Node {
@@ -86,13 +86,7 @@ export class Tree {
    * its parent's envelope in its own cell. Kept with the node.
    */
   polytope(node) {
-    if (!node.polytope) {
-      let p = node.type === BLACK || !node.parent ? cube() : childPart(this.polytope(node.parent), node.octant);
-      if (node.type !== BLACK)
-        for (const code of this.planes(node))
-          p = clipByCode(p, code);
-      node.polytope = p;
-    }
+    node.polytope ??= node.type === BLACK ? cube() : envelope(node.parent && this.polytope(node.parent), node.octant, this.planes(node));
     return node.polytope;
   }
 

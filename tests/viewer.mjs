@@ -1,0 +1,294 @@
+// The viewer in a headless Chromium, files served by nginx: viewer.mjs EBPO GENERATE SOURCE_ROOT
+// Ends with 77 (skipped) where Chromium, nginx or the viewer's packages are not installed; tools/install-deps.sh --tests installs them.
+import assert from 'node:assert/strict';
+import { execFileSync, spawn } from 'node:child_process';
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { createServer } from 'node:net';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { pathToFileURL } from 'node:url';
+
+const [ebpo, generate, root] = process.argv.slice(2), viewer = join(root, 'tools/viewer');
+const chromium = ['/usr/bin/chromium', '/usr/bin/chromium-browser'].find(existsSync);
+const nginx = ['/usr/sbin/nginx', '/usr/bin/nginx'].some(existsSync);
+if (!chromium || !nginx || !existsSync(join(viewer, 'node_modules/playwright-core'))) {
+  console.log('skipped: chromium, nginx or tools/viewer/node_modules is missing; run tools/install-deps.sh --tests');
+  process.exit(77);
+}
+const load = (path) => import(pathToFileURL(join(viewer, path)));
+const { chromium: playwright } = await load('node_modules/playwright-core/index.mjs');
+const { openEbpo } = await load('reader/index.js');
+
+const work = mkdtempSync(join(tmpdir(), 'ebpo-viewer-')), models = join(work, 'models'), log = join(work, 'access.log'), model = join(models, 'ring.ebpo.h5');
+const run = (program, args, input) => execFileSync(program, args, { encoding: 'utf8', input, maxBuffer: 1 << 26 });
+const SIZE = { width: 800, height: 600 };
+const cleanup = [() => rmSync(work, { recursive: true, force: true })];
+
+// --- the model, the server, the browser ---
+
+function makeModels() {
+  mkdirSync(models);
+  run(generate, ['--base', 'torus', '--faces', '40000', join(work, 'ring.ply')]);
+  run(ebpo, ['convert', '-q', '--with', 'leaf-planes', join(work, 'ring.ply'), model]);
+  const damaged = Buffer.from(readFileSync(model));
+  damaged[damaged.length >> 1] ^= 1;
+  writeFileSync(join(models, 'damaged.ebpo.h5'), damaged);
+}
+
+async function serve() {
+  const port = await new Promise((done) => {
+    const probe = createServer().listen(0, '127.0.0.1', () => {
+      const { port: free } = probe.address();
+      probe.close(() => done(free));
+    });
+  });
+  const server = spawn('sh', [join(root, 'samples/serve.sh'), '--no-install', '--port', String(port), '--folder', models, '--log', log], { stdio: 'inherit' });
+  cleanup.push(() => new Promise((done) => server.once('exit', done).kill('SIGTERM')));
+  const address = `http://localhost:${port}/`;
+  for (let i = 0; i < 100; i++) {
+    if (await fetch(address).then((r) => r.ok, () => false))
+      return address;
+    await new Promise((done) => setTimeout(done, 100));
+  }
+  throw new Error('nginx did not come up');
+}
+
+async function browse() {
+  const flags = ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'];
+  const browser = await playwright.launch({ executablePath: chromium, args: process.getuid() === 0 ? ['--no-sandbox', ...flags] : flags });
+  cleanup.push(() => browser.close());
+  return browser;
+}
+
+const complaints = [];
+async function show(browser, address) {
+  const page = await browser.newPage({ viewport: SIZE, colorScheme: 'dark', reducedMotion: 'reduce' });
+  page.on('pageerror', (e) => complaints.push(e.message));
+  page.on('console', (m) => ['error', 'warning'].includes(m.type()) && !/GPU stall|WebGL-0x/.test(m.text()) && complaints.push(m.text()));
+  await page.goto(address);
+  return page;
+}
+
+const stateOf = (page) => page.evaluate(() => window.ebpoViewer?.state);
+async function settled(page) {
+  await page.waitForFunction(() => window.ebpoViewer?.state.idle || window.ebpoViewer?.state.error, undefined, { timeout: 120000, polling: 100 });
+  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+  return stateOf(page);
+}
+
+// --- what the library says ---
+
+const levels = () => JSON.parse(run(ebpo, ['levels', '--json', model])).levels;
+function triangles(level, ...options) {
+  run(ebpo, ['extract', '-q', '--level', String(level), ...options, model, join(work, 'out.ply')]);
+  return Number(/element face (\d+)/.exec(readFileSync(join(work, 'out.ply'), 'latin1').slice(0, 2000))[1]);
+}
+const sum = (list, what) => list.reduce((total, item) => total + what(item), 0);
+
+// Requests for the model since the last call, from nginx's own log: [bytes].
+let logged = 0;
+function requests(name = 'ring') {
+  const lines = readFileSync(log, 'utf8').split('\n').filter((line) => line.includes(`/models/${name}.ebpo.h5`)), fresh = lines.slice(logged);
+  logged = lines.length;
+  return fresh.map((line) => {
+    const [, status, bytes] = /" (\d+) (\d+) "/.exec(line);
+    assert.equal(status, '206');
+    return Number(bytes);
+  });
+}
+
+// Where the model's vertices fall on the page: [left, top, right, bottom].
+async function silhouette(page) {
+  const { vertices } = await (await openEbpo(readFileSync(model))).mesh();
+  const { matrix, center, scale } = await page.evaluate(() => {
+    const { camera } = window.ebpoViewer.scene;
+    camera.updateMatrixWorld();
+    return { matrix: camera.projectionMatrix.clone().multiply(camera.matrixWorldInverse).elements, ...window.ebpoViewer.place };
+  });
+  const box = [Infinity, Infinity, -Infinity, -Infinity];
+  for (let i = 0; i < vertices.length; i += 3) {
+    const p = [0, 1, 2].map((k) => (vertices[i + k] - center[k]) * scale), row = (r) => matrix[r] * p[0] + matrix[r + 4] * p[1] + matrix[r + 8] * p[2] + matrix[r + 12];
+    const x = (row(0) / row(3) + 1) / 2 * SIZE.width, y = (1 - row(1) / row(3)) / 2 * SIZE.height;
+    box[0] = Math.min(box[0], x);
+    box[1] = Math.min(box[1], y);
+    box[2] = Math.max(box[2], x);
+    box[3] = Math.max(box[3], y);
+  }
+  return box;
+}
+
+// The screenshot, without the panels: where it differs from one without the model, and the mean colour there. The page decodes the PNG.
+async function look(page) {
+  const hide = await page.addStyleTag({ content: '#panel, #bar, #tools, #progress { visibility: hidden; }' });
+  const shot = async () => (await page.screenshot()).toString('base64');
+  const withModel = await shot(), stage = await page.addStyleTag({ content: '#canvas { visibility: hidden; }' }), without = await shot();
+  await stage.evaluate((node) => node.remove());
+  await hide.evaluate((node) => node.remove());
+  return page.evaluate(async (pictures) => {
+    const [a, b] = await Promise.all(pictures.map(async (png) => {
+      const image = await createImageBitmap(await (await fetch('data:image/png;base64,' + png)).blob());
+      const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
+      context.drawImage(image, 0, 0);
+      return context.getImageData(0, 0, image.width, image.height);
+    }));
+    const box = [Infinity, Infinity, -Infinity, -Infinity], colour = [0, 0, 0], shades = new Set();
+    let count = 0;
+    for (let i = 0; i < a.data.length; i += 4) {
+      const difference = Math.abs(a.data[i] - b.data[i]) + Math.abs(a.data[i + 1] - b.data[i + 1]) + Math.abs(a.data[i + 2] - b.data[i + 2]);
+      if (difference < 24)
+        continue;
+      const x = i / 4 % a.width, y = Math.floor(i / 4 / a.width);
+      box[0] = Math.min(box[0], x);
+      box[1] = Math.min(box[1], y);
+      box[2] = Math.max(box[2], x + 1);
+      box[3] = Math.max(box[3], y + 1);
+      count++;
+      for (let k = 0; k < 3; k++)
+        colour[k] += a.data[i + k];
+      shades.add(a.data[i] << 16 | a.data[i + 1] << 8 | a.data[i + 2]);
+    }
+    return { box, share: count / (a.width * a.height), colour: colour.map((c) => c / count), shades: shades.size };
+  }, [withModel, without]);
+}
+
+function checkBox(found, wanted, outside, inside) {
+  const out = [wanted[0] - found[0], wanted[1] - found[1], found[2] - wanted[2], found[3] - wanted[3]];
+  assert.ok(out.every((d) => d <= outside && d >= -inside), `seen at ${found.map(Math.round)}, expected at ${wanted.map(Math.round)}`);
+}
+
+// --- the tests ---
+
+async function levelFour(page) {
+  const state = await settled(page), bytes = requests();
+  assert.equal(state.depth, 4);
+  assert.ok(bytes.length <= 2 && sum(bytes, (b) => b) <= 150 * 1024, `levels 0 to 4 took ${bytes}`);
+  assert.deepEqual([state.traffic.requests, state.traffic.bytes], [bytes.length, sum(bytes, (b) => b)]);
+}
+
+async function levelFive(page) {
+  await page.keyboard.press('ArrowRight');
+  const state = await settled(page), table = levels().slice(0, 6), black = sum(table, (l) => l.black);
+  assert.ok(state.depth >= 5);
+  assert.ok(requests().length <= 2);
+  assert.equal(state.stats.nodes, table[5].gray + sum(table, (l) => l.leaf));
+  assert.equal(state.stats.triangles, triangles(5) - 12 * black);
+  assert.equal(state.stats.triangles - state.stats.wallTriangles, triangles(5, '--no-walls'));
+  const { box, share, colour, shades } = await look(page);
+  assert.ok(share > 0.08 && shades > 300, `a picture: ${share} of the page in ${shades} colours`);
+  checkBox(box, await silhouette(page), 3, 1); // envelopes contain the model, and little more
+  assert.ok(Math.max(...colour) - Math.min(...colour) < 30, `plain: ${colour}`);
+}
+
+async function colours(page) {
+  await page.keyboard.press('k'); // by level
+  const level = await look(page);
+  assert.ok(level.colour[1] > level.colour[0] + 30, `level 5 is blue-green: ${level.colour}`);
+  await page.keyboard.press('k'); // by type
+}
+
+async function mesh(page) {
+  for (let i = 0; i < 6; i++)
+    await page.keyboard.press('ArrowRight');
+  const state = await settled(page), table = levels(), file = await openEbpo(readFileSync(model));
+  assert.equal(state.stats.meshTriangles, sum(file.info.levels, (l) => l.faces_new + l.faces_referenced));
+  assert.equal(state.stats.triangles, state.stats.meshTriangles);
+  assert.equal(state.stats.nodes, sum(table, (l) => l.leaf));
+  const { box, colour } = await look(page);
+  checkBox(box, await silhouette(page), 1, 1);
+  assert.ok(colour[0] > colour[2] + 25, `real faces are tan: ${colour}`);
+}
+
+async function clipping(page) {
+  const before = await look(page);
+  await page.keyboard.press('x');
+  await settled(page);
+  const { share } = await look(page);
+  assert.ok(share < before.share * 0.85, `half of the ring is cut away: ${share} of ${before.share}`);
+  await page.keyboard.press('x');
+  await page.keyboard.press('x');
+  await page.keyboard.press('x');
+  await settled(page);
+}
+
+async function point(page) {
+  const { info } = await openEbpo(readFileSync(model)), at = info.box_origin.map((o, k) => o + info.box_size[k] * [0.08, 0.45, 0.5][k]);
+  for (const p of [at, info.box_origin.map((o, k) => o + info.box_size[k] / 2)]) {
+    await page.evaluate((x) => window.ebpoViewer.probeAt(x), p);
+    await page.waitForFunction(() => window.ebpoViewer.state.probe?.exact, undefined, { timeout: 30000 });
+    const { probe } = await stateOf(page), line = p.join(' ') + '\n';
+    assert.equal(probe.where.toUpperCase(), JSON.parse(run(ebpo, ['inside', '--json', model], line)).where);
+    const { distance } = JSON.parse(run(ebpo, ['distance', '--json', '--unsigned', model], line));
+    assert.ok(Math.abs(probe.distance - distance) <= 1e-12 && probe.lo <= distance && distance <= probe.hi, `${probe.distance} ${distance}`);
+  }
+  assert.match(await page.textContent('#where'), /Inside|Outside/);
+}
+
+async function click(page) {
+  const [x0, y0, x1, y1] = (await look(page)).box;
+  await page.keyboard.press('Escape');
+  await page.mouse.click(x0 + (x1 - x0) * 0.5, y1 - (y1 - y0) * 0.12);
+  await page.waitForFunction(() => window.ebpoViewer.state.probe?.exact, undefined, { timeout: 30000 });
+  assert.ok((await stateOf(page)).probe.distance < 1e-5, 'a point picked on the real faces lies on them');
+}
+
+async function fromDisk(page) {
+  await page.keyboard.press('o');
+  assert.ok(await page.isVisible('#start'));
+  await page.setInputFiles('#file', model);
+  await page.waitForFunction(() => window.ebpoViewer.state.depth >= 0, undefined, { timeout: 30000 });
+  await settled(page);
+  assert.equal(await page.textContent('#name'), 'ring.ebpo.h5');
+  assert.equal(requests().length, 0);
+}
+
+async function errors(browser, address) {
+  const quiet = complaints.length;
+  for (const [query, said] of [['file=models/damaged.ebpo.h5&detail=0', /damaged\.ebpo\.h5.*(damaged|checksum)/], ['file=models/none.ebpo.h5', /404/], ['file=style.css', /not a whole HDF5 file|does not serve ranges/]]) {
+    const page = await show(browser, `${address}?${query}`);
+    await page.waitForSelector('#error:not([hidden])', { timeout: 60000 });
+    assert.match(await page.textContent('#errorWhat'), said);
+    assert.ok((await page.textContent('#errorNext')).length > 5);
+    await page.close();
+  }
+  complaints.length = quiet; // the browser logs the 404
+}
+
+async function samples(browser, address) {
+  const page = await show(browser, `${address}?samples=models/index.json`);
+  await page.click('#samples a:has-text("ring")');
+  await page.waitForFunction(() => window.ebpoViewer.state.depth >= 0, undefined, { timeout: 30000 });
+  await page.close();
+}
+
+async function main() {
+  makeModels();
+  const address = await serve(), browser = await browse(), page = await show(browser, `${address}?file=models/ring.ebpo.h5&level=4&detail=0`);
+  const step = async (name, work) => {
+    await work().catch((error) => {
+      throw new Error(`${name}: ${error.message}`, { cause: error });
+    });
+    console.log(`ok ${name}`);
+  };
+  await step('levels 0 to 4 come in at most two requests and 150 KB', () => levelFour(page));
+  await step('level 5 has the nodes and triangles of the library\'s, and is seen where the model is', () => levelFive(page));
+  await step('colours tell levels and types', () => colours(page));
+  await step('leaves show the real faces, in their place', () => mesh(page));
+  await step('the clipping plane cuts', () => clipping(page));
+  await step('a point gets the library\'s answers', () => point(page));
+  await step('a click asks about the point that is seen', () => click(page));
+  requests();
+  await step('a file from disk is shown without a server', () => fromDisk(page));
+  await page.close();
+  await step('errors say what, and what next', () => errors(browser, address));
+  await step('a sample is opened from the list', () => samples(browser, address));
+  assert.deepEqual(complaints, [], 'the page complained');
+}
+
+let code = 0;
+await main().catch((error) => {
+  console.error(error);
+  code = 1;
+});
+for (const undo of cleanup.reverse())
+  await undo();
+process.exit(code);

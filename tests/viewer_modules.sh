@@ -1,0 +1,18 @@
+#!/bin/sh
+# The viewer's modules under node: viewer_modules.sh NODE VIEWER EBPO GENERATE INPUTS
+set -eu
+EBPO_TOOL=$(realpath "$3") generate=$(realpath "$4") inputs=$(realpath "$5")
+cd "$2"
+[ -d node_modules/zstddec ] || { echo "skipped: $2/node_modules is missing; run tools/install-deps.sh --tests"; exit 77; }
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+"$inputs" "$work"
+"$generate" --base torus --faces 8000 "$work/ring.ply"
+convert() { out=$1; shift; "$EBPO_TOOL" convert -q "$@" "$work/$out.ebpo.h5"; EBPO_FILES="${EBPO_FILES:-} $work/$out.ebpo.h5"; }
+convert ring --with leaf-planes "$work/ring.ply"
+convert ring_without_mesh --without mesh "$work/ring.ply"
+convert ring_deflate --codec deflate --leaf-faces 4 "$work/ring.ply"
+convert cube --with leaf-planes --max-level 4 --leaf-faces 0 "$work/quads.ply"
+for solid in cavity overlapping_cubes inside_out_cube zero_area_face repeated_faces mobius; do convert $solid "$work/$solid.ply" 2>/dev/null; done
+export EBPO_TOOL EBPO_FILES
+"$1" --test reader/test/*.test.js test/*.test.js

@@ -1,0 +1,22 @@
+// node list.js FILE ...: a list of files for the viewer's first page (?samples=), as JSON.
+import { promises as fs } from 'node:fs';
+import { basename } from 'node:path';
+import { openEbpo } from './reader/index.js';
+
+// Ranges of a file on disk, so that large ones are not read whole.
+async function headOf(path) {
+  const handle = await fs.open(path), { size } = await handle.stat();
+  const read = async (offset, length) => (await handle.read(new Uint8Array(length), 0, length, offset)).buffer;
+  const source = { name: path, size, requests: 0, bytes: 0, read, open: (bytes) => read(0, Math.min(bytes, size)) };
+  try {
+    const { info } = await openEbpo(source);
+    return { name: basename(path, '.ebpo.h5'), file: basename(path), faces: info.face_count, bytes: size };
+  } finally {
+    await handle.close();
+  }
+}
+
+const list = [];
+for (const path of process.argv.slice(2))
+  list.push(await headOf(path));
+console.log(JSON.stringify(list, null, 1));

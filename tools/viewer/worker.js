@@ -1,0 +1,165 @@
+// Reads, chooses and cuts, so that the page stays responsive. The page sends 'open', 'close', 'view' and 'probe'; it gets 'opened', 'tiles', 'loaded', 'probed',
+// 'idle' and 'failed'.
+import { ZSTDDecoder } from './node_modules/zstddec/dist/zstddec.mjs'; // workers have no import maps
+import { Cut } from './cut.js';
+import { Tree, distanceInterval, inside, insideLeaf, loadZstd, nearestFace, openEbpo } from './reader/index.js';
+
+const FIRST_LEVELS = 5;                   // come with the first one or two requests
+const TREE_BYTES_MOST = 512 * 1024 * 1024; // decoded arrays of levels, roughly
+
+const SMALL_MESH = 8 * 1024 * 1024;       // stored bytes
+const MESH_BYTES_A_VIEW = 16 * 1024 * 1024; // of larger ones, before the camera moves again
+
+let session; // one open file
+let view, want;
+
+function post(message, transfer = []) {
+  self.postMessage(message, transfer);
+}
+
+const describe = (error) => ({ code: error.code ?? 'FAULT', message: error.message ?? String(error) });
+
+class Session {
+  constructor(number) {
+    this.number = number;
+    this.began = performance.now();
+    this.timeline = []; // { level, ms, bytes, requests }
+    this.busy = { level: undefined, mesh: false };
+    this.running = this.again = false;
+    this.probes = 0;
+  }
+
+  get ended() {
+    return session !== this;
+  }
+
+  async open(what) {
+    this.file = await openEbpo(what, { zstd: await loadZstd(ZSTDDecoder) });
+    const { info, source } = this.file;
+    this.tree = new Tree(info);
+    const meshBytes = ['/mesh/vertices', '/mesh/faces'].reduce((sum, path) => sum + (this.file.arrays.get(path)?.bytes ?? 0), 0);
+    this.cut = new Cut(this.tree, { small: meshBytes < SMALL_MESH });
+    post({ type: 'opened', session: this.number, name: source.name, size: source.size, info, scene: this.cut.scene,
+      bytesTo: info.levels.map((_, i) => this.file.bytesToLevel(i)), traffic: this.file.traffic, ms: performance.now() - this.began });
+    await this.load(Math.min(FIRST_LEVELS, info.level_count) - 1);
+  }
+
+  /** Brings levels up to `last` into the tree. Callers that want the same level share the work. */
+  async load(last) {
+    while (this.tree.depth < last) {
+      this.busy.level ??= this.#loadNext(last).finally(() => (this.busy.level = undefined));
+      await this.busy.level;
+    }
+  }
+
+  async #loadNext(last) {
+    for (const level of await this.file.levels(this.tree.depth + 1, last)) {
+      this.tree.add(level);
+      this.timeline.push({ level: level.level, ms: performance.now() - this.began, ...this.file.traffic });
+    }
+    if (!this.ended)
+      post({ type: 'loaded', session: this.number, depth: this.tree.depth, timeline: this.timeline, traffic: this.file.traffic });
+  }
+
+  #levelFits(level) {
+    const bytes = (l) => this.tree.info.levels[l].gray * 40 + this.tree.info.levels[l].planes * 4 + this.tree.info.levels[l].leaf * 6;
+    let sum = 0;
+    for (let l = 0; l <= level; l++)
+      sum += bytes(l);
+    return sum < TREE_BYTES_MOST;
+  }
+
+  async pump() {
+    if (this.running) {
+      this.again = true;
+      return;
+    }
+    this.running = true;
+    let result;
+    do {
+      this.again = false;
+      result = this.cut.update(view, want);
+      this.#send(result);
+      const deeper = result.deeper && this.#levelFits(this.tree.depth + 1);
+      if (deeper && !this.busy.level)
+        this.#later(this.load(this.tree.depth + 1));
+      if (result.leaves.length && !this.busy.mesh && !result.more && !deeper && this.#meshAllowed())
+        this.#later(this.#loadMesh(result.leaves));
+      await new Promise((done) => setTimeout(done)); // lets a newer view in
+    } while (!this.ended && (this.again || result.more));
+    this.running = false;
+    if (!this.ended && !this.busy.level && !this.busy.mesh)
+      post({ type: 'idle', session: this.number, want: want.number, traffic: this.file.traffic, deeper: result.deeper });
+  }
+
+  #meshAllowed() {
+    if (this.viewNumber !== want.number) {
+      this.viewNumber = want.number;
+      this.viewBytes = this.file.traffic.bytes;
+    }
+    return this.cut.small || want.pixels === 0 || this.file.traffic.bytes - this.viewBytes < MESH_BYTES_A_VIEW;
+  }
+
+  #later(work) {
+    work.then(() => this.ended || this.pump(), (error) => this.ended || post({ type: 'failed', session: this.number, error: describe(error), late: true }));
+  }
+
+  async #loadMesh(leaves) {
+    this.busy.mesh = true;
+    try {
+      const lists = await this.file.leafFaces(leaves);
+      leaves.forEach((leaf, i) => this.cut.addMesh(leaf, lists[i]));
+    } finally {
+      this.busy.mesh = false;
+    }
+  }
+
+  #send({ set, removed, stats }) {
+    const transfer = set.flatMap((t) => [t.position.buffer, t.tag.buffer, t.index.buffer, t.lines?.buffer, t.cells?.buffer]).filter(Boolean);
+    post({ type: 'tiles', session: this.number, set, removed, stats, traffic: this.file.traffic, ms: performance.now() - this.began, want: want.number }, transfer);
+  }
+
+  /** Where a point is: at once what the levels at hand say for certain, then exactly, by the faces of the leaves that matter. */
+  async probe(point) {
+    const number = ++this.probes, { tree, file } = this, solid = tree.info.solid;
+    const answer = (more) => this.ended || number !== this.probes || post({ type: 'probed', session: this.number, point, solid, traffic: file.traffic, ...more });
+    const coarse = { depth: tree.depth, where: solid ? inside(tree, point).where : undefined, ...distanceInterval(tree, point) };
+    answer({ ...coarse, exact: false, done: !file.info.parts.has('mesh') });
+    if (!file.info.parts.has('mesh'))
+      return;
+    const deeper = () => this.load(tree.depth + 1);
+    let where;
+    if (solid) {
+      let found = inside(tree, point);
+      while (found.where === 'maybe' && tree.children(found.node) === undefined && tree.depth + 1 < tree.info.level_count) {
+        await deeper();
+        found = inside(tree, point);
+      }
+      where = found.where === 'maybe' ? insideLeaf(tree, found.node, point, (await file.leafFaces([found.node]))[0]).where : found.where;
+    }
+    const near = await nearestFace(tree, point, (leaves) => file.leafFaces(leaves), deeper);
+    answer({ ...coarse, where, distance: near.distance, nearest: near.point, exact: true, done: true });
+  }
+}
+
+self.onmessage = async ({ data }) => {
+  try {
+    if (data.type === 'open') {
+      session = undefined;
+      const mine = session = new Session(data.session);
+      await mine.open(data.what);
+      if (!mine.ended && view)
+        await mine.pump();
+    } else if (data.type === 'close') {
+      session = undefined;
+    } else if (data.type === 'view') {
+      ({ view, want } = data);
+      if (session?.tree?.root)
+        await session.pump();
+    } else if (data.type === 'probe' && session?.tree?.root) {
+      await session.probe(data.point);
+    }
+  } catch (error) {
+    post({ type: 'failed', session: data.session ?? session?.number, error: describe(error) });
+  }
+};
