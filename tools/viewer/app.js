@@ -5,7 +5,7 @@ const $ = (id) => document.getElementById(id);
 const TRIANGLES_MOST = 2_000_000; // about; a tile more does no harm
 
 const state = {
-  session: 0, want: 0, settled: 0, idle: false, info: undefined, scene: undefined, depth: -1, bytesTo: [], timeline: [], stats: undefined, traffic: undefined,
+  opening: 0, want: 0, settled: 0, idle: false, info: undefined, scene: undefined, depth: -1, bytesTo: [], timeline: [], stats: undefined, traffic: undefined,
   clip: { axis: undefined, flip: false }, probe: undefined, frames: [],
 };
 
@@ -24,7 +24,7 @@ const length = (x, digits = 5) => `${Number(x.toPrecision(digits))}${state.info?
 // --- opening ---
 
 function open(what, name) {
-  state.session++;
+  state.opening++;
   Object.assign(state, { info: undefined, depth: -1, idle: false, timeline: [], stats: undefined, probe: undefined, error: undefined, shownAfter: undefined, auto: AUTO.first, frames: [] });
   scene.clear();
   scene.home();
@@ -32,7 +32,7 @@ function open(what, name) {
   busy(true);
   $('start').hidden = true;
   state.shownName = name;
-  worker.postMessage({ type: 'open', session: state.session, what });
+  worker.postMessage({ type: 'open', opening: state.opening, what });
   ask();
 }
 
@@ -59,9 +59,9 @@ function openFile(file) {
 }
 
 function close() {
-  state.session++;
+  state.opening++;
   Object.assign(state, { info: undefined, depth: -1 });
-  worker.postMessage({ type: 'close', session: state.session });
+  worker.postMessage({ type: 'close', opening: state.opening });
   scene.clear();
   busy(false);
   for (const id of ['panel', 'bar', 'tools'])
@@ -82,7 +82,7 @@ const handlers = {
     $('name').title = m.name;
     $('facts').textContent = `${count(i.face_count)} faces · ${i.solid ? 'solid' : 'surface'} · levels 0–${i.level_count - 1} · ${bytes(m.size)}`;
     for (const id of ['panel', 'bar', 'tools'])
-      $(id).hidden = false;
+      $(id).hidden = id === 'panel' && innerWidth <= 760;
     const stops = i.level_count - 1 + (i.parts.has('mesh') ? 1 : 0);
     $('level').max = stops;
     $('level').value = askedLevel() ?? stops;
@@ -129,7 +129,7 @@ const handlers = {
   },
 };
 worker.onmessage = ({ data }) => {
-  if (data.session === state.session)
+  if (data.opening === state.opening)
     handlers[data.type](data);
 };
 worker.onerror = (e) => showError({ message: `The page's worker failed (${e.message ?? 'it could not be loaded'}); run npm ci in tools/viewer, and reload` });
@@ -205,7 +205,7 @@ function levelChanged() {
   $('levelText').textContent = mesh ? 'all, and the mesh' : `0 to ${at}`;
   $('levelHint').textContent = mesh ? 'Refined where it is seen; leaves show the real faces.' : `Envelopes of level ${at} and of leaves above it: ${bytes(state.bytesTo[at])} of the file.`;
   const excess = volumeExcess(Math.min(at, i.level_count - 1));
-  $('sExcess').textContent = excess === undefined ? '–' : mesh ? '0 %' : `+${excess < 10 ? excess.toFixed(2) : excess.toFixed(0)} %`;
+  $('sExcess').textContent = excess === undefined || mesh ? '–' : `+${excess < 10 ? excess.toFixed(2) : excess.toFixed(0)} %`;
   showLevels();
   ask();
 }
@@ -288,7 +288,7 @@ function setTheme(theme) {
 
 function layout() {
   const narrow = innerWidth <= 760, shown = !$('panel').hidden;
-  scene.setInsets(0, shown && !narrow ? 310 : 0);
+  scene.setInsets(shown && !narrow ? 310 : 0, shown && narrow ? $('panel').offsetHeight + 60 : 0);
 }
 
 // --- the probe ---
@@ -298,7 +298,7 @@ const toScene = (p) => p.map((x, k) => (x - state.scene.center[k]) * state.scene
 
 function probeAt(point) {
   state.probe = { point, pending: true };
-  worker.postMessage({ type: 'probe', session: state.session, point });
+  worker.postMessage({ type: 'probe', opening: state.opening, point });
   probeShown();
 }
 

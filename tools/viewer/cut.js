@@ -13,6 +13,7 @@ const LEAF_SHARE = 4;          // in small files leaves' faces are taken even wh
 const GROUP_LEVELS = 3;        // leaves below one node so many levels above have neighbouring faces in the file
 const GROUP_LEAVES = 12;       // fewer wanted ones are not worth their chunks, unless they are large
 const LARGE_LEAF = 6;
+const REAL_FACE = 4;           // in a vertex's tag, beside the node's type: [level, type, normal, normal]
 
 /** How the scene's coordinates come from the model's: scene = (model - center) * scale. */
 export function sceneOf(info) {
@@ -230,7 +231,7 @@ export class Cut {
       }
       this.made += node.polytope ? 0 : 1.4; // and of nodes above
       const p = this.tree.polytope(node), own = p.corner.length - 2 * p.faces;
-      vertices += p.vertices;
+      vertices += p.vertices + this.#wallVertices(p);
       for (let f = 0; f < p.faces; f++)
         wallTriangles += p.wall[f] ? p.first[f + 1] - p.first[f] - 2 : 0;
       edges += p.corner.length / 2;
@@ -246,6 +247,39 @@ export class Cut {
     return { key, position, tag, index, inner: triangles - wallTriangles, lines: lines?.subarray(0, out.line), cells, triangles, meshTriangles, wallTriangles };
   }
 
+  // Vertices of polygons on walls come twice: there they have another normal. Their numbers among the second ones go to `this.second`.
+  #wallVertices(p) {
+    const second = this.second ??= new Int16Array(256);
+    second.fill(-1, 0, p.vertices);
+    let count = 0;
+    for (let f = 0; f < p.faces; f++)
+      for (let i = p.first[f]; p.wall[f] && i < p.first[f + 1]; i++)
+        if (second[p.corner[i]] < 0)
+          second[p.corner[i]] = count++;
+    return count;
+  }
+
+  // The mean normal of a node's planes, octahedral in two bytes 1 .. 255; [0, 0] where there is none. Walls are lit by it, so that the small steps
+  // between neighbouring envelopes do not look like edges of the model.
+  #meanNormal(p, h) {
+    const n = [0, 0, 0], at = (v, k) => p.x[3 * v + k] * h[k];
+    for (let f = 0; f < p.faces; f++)
+      for (let i = p.first[f] + 1; !p.wall[f] && i + 1 < p.first[f + 1]; i++) {
+        const a = p.corner[p.first[f]], b = p.corner[i], c = p.corner[i + 1];
+        for (let k = 0; k < 3; k++) {
+          const u = (k + 1) % 3, v = (k + 2) % 3;
+          n[k] += (at(b, u) - at(a, u)) * (at(c, v) - at(a, v)) - (at(b, v) - at(a, v)) * (at(c, u) - at(a, u));
+        }
+      }
+    const sum = Math.abs(n[0]) + Math.abs(n[1]) + Math.abs(n[2]);
+    if (!(sum > 0))
+      return [0, 0];
+    let [x, y] = [n[0] / sum, n[1] / sum];
+    if (n[2] < 0)
+      [x, y] = [(1 - Math.abs(y)) * (x < 0 ? -1 : 1), (1 - Math.abs(x)) * (y < 0 ? -1 : 1)];
+    return [128 + Math.round(127 * x), 128 + Math.round(127 * y)];
+  }
+
   #addPolytope(out, node, p) {
     const h = this.half[node.level], low = this.low.map((l, k) => l + 2 * node.at[k] * h[k]), first = out.vertex;
     for (let i = 0; i < p.x.length; i++)
@@ -254,14 +288,22 @@ export class Cut {
       out.tag[4 * v] = node.level;
       out.tag[4 * v + 1] = node.type;
     }
-    out.vertex += p.vertices;
+    const again = first + p.vertices, count = this.#wallVertices(p), [u, w] = this.#meanNormal(p, h), { second } = this;
+    for (let v = 0; v < p.vertices; v++)
+      if (second[v] >= 0) {
+        const to = again + second[v];
+        out.position.copyWithin(3 * to, 3 * (first + v), 3 * (first + v + 1));
+        out.tag.set([node.level, node.type, u, w], 4 * to);
+      }
+    out.vertex += p.vertices + count;
     for (let f = 0; f < p.faces; f++) {
       const from = p.first[f], to = p.first[f + 1];
       let at = p.wall[f] ? out.wall : out.inner;
+      const number = p.wall[f] ? (v) => again + second[v] : (v) => first + v;
       for (let i = from + 1; i + 1 < to; i++) {
-        out.index[at++] = first + p.corner[from];
-        out.index[at++] = first + p.corner[i];
-        out.index[at++] = first + p.corner[i + 1];
+        out.index[at++] = number(p.corner[from]);
+        out.index[at++] = number(p.corner[i]);
+        out.index[at++] = number(p.corner[i + 1]);
       }
       if (p.wall[f])
         out.wall = at;
@@ -282,8 +324,7 @@ export class Cut {
     out.position.set(node.mesh, 3 * first);
     for (let i = 0; i < n; i++) {
       out.tag[4 * (first + i)] = node.level;
-      out.tag[4 * (first + i) + 1] = node.type;
-      out.tag[4 * (first + i) + 2] = 1;
+      out.tag[4 * (first + i) + 1] = node.type | REAL_FACE;
       out.index[out.inner++] = first + i;
       if (out.lines) {
         out.lines[out.line++] = first + i;

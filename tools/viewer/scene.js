@@ -13,6 +13,7 @@ const VERTEX = `
   varying vec3 eyeSpace;
   varying vec3 scenePlace;
   varying vec3 colour;
+  varying vec3 lent;
   flat varying int kind;
   uniform int colouring;
   uniform vec3 plain, mesh, types[4], levels[21];
@@ -20,8 +21,15 @@ const VERTEX = `
     vec4 at = modelViewMatrix * vec4(position, 1.0);
     eyeSpace = at.xyz;
     scenePlace = position;
-    kind = int(tag.y + 0.5);
-    bool face = tag.z > 0.5;
+    kind = int(tag.y + 0.5) & 3;
+    bool face = int(tag.y + 0.5) > 3;
+    lent = vec3(0.0);
+    if (tag.z > 0.5) { // octahedral, on polygons that lie on cell walls
+      vec2 o = (tag.zw - 128.0) / 127.0;
+      vec3 n = vec3(o, 1.0 - abs(o.x) - abs(o.y));
+      if (n.z < 0.0) n.xy = (1.0 - abs(n.yx)) * vec2(n.x < 0.0 ? -1.0 : 1.0, n.y < 0.0 ? -1.0 : 1.0);
+      lent = normalMatrix * normalize(n);
+    }
     colour = colouring == 0 ? plain : colouring == 1 ? levels[int(tag.x + 0.5)] : face ? mesh : types[kind];
     gl_Position = projectionMatrix * at;
   }`;
@@ -30,6 +38,7 @@ const FRAGMENT = `
   varying vec3 eyeSpace;
   varying vec3 scenePlace;
   varying vec3 colour;
+  varying vec3 lent;
   flat varying int kind;
   uniform vec4 clip;
   uniform bool clipping;
@@ -39,6 +48,7 @@ const FRAGMENT = `
     if (clipping && kind == 1 && gl_FrontFacing) discard; // what is full inside shows where it is cut only
     vec3 n = normalize(cross(dFdx(eyeSpace), dFdy(eyeSpace)));
     vec3 toEye = normalize(-eyeSpace);
+    if (dot(lent, lent) > 0.1 && !clipping) n = normalize(lent + toEye * max(0.0, 0.25 - dot(lent, toEye)));
     if (!gl_FrontFacing && clipping) { // the back of a closed body seen through the cut: fills the section
       float hatch = abs(fract((gl_FragCoord.x + gl_FragCoord.y) / 9.0) - 0.5) < 0.07 ? 0.82 : 1.0;
       gl_FragColor = vec4(mix(section, colour, 0.22) * hatch, 1.0);
@@ -159,23 +169,23 @@ export class Scene {
     this.redraw();
   }
 
-  /** Room that panels take at the right and left, in pixels: the model is centred in the rest. */
-  setInsets(left, right) {
-    this.insets = [left, right];
+  /** Room that panels take at the right and the bottom, in pixels: the model is centred in the rest. */
+  setInsets(right, bottom) {
+    this.insets = [right, bottom];
     this.#offset();
     this.redraw();
   }
 
   #offset() {
-    const { clientWidth: w, clientHeight: h } = this.canvas.parentElement, [left, right] = this.insets ?? [0, 0];
-    this.camera.setViewOffset(w, h, (right - left) / 2, 0, w, h);
+    const { clientWidth: w, clientHeight: h } = this.canvas.parentElement, [right, bottom] = this.insets ?? [0, 0];
+    this.camera.setViewOffset(w, h, right / 2, bottom / 2, w, h);
     this.camera.updateProjectionMatrix();
   }
 
   /** A view of everything. */
   home() {
-    const { clientWidth: w, clientHeight: h } = this.canvas.parentElement, [left, right] = this.insets ?? [0, 0];
-    const narrow = Math.min(1, (w - left - right) / Math.max(h, 1)), distance = 0.98 / Math.sin(this.camera.fov * Math.PI / 360) / Math.max(narrow, 0.3);
+    const { clientWidth: w, clientHeight: h } = this.canvas.parentElement, [right, bottom] = this.insets ?? [0, 0];
+    const narrow = Math.min(h - bottom, w - right) / Math.max(h, 1), distance = 0.98 / Math.sin(this.camera.fov * Math.PI / 360) / Math.max(narrow, 0.25);
     this.controls.target.set(0, 0, 0);
     this.camera.position.set(0.42, 0.32, 0.85).setLength(Math.min(distance, 11));
     this.controls.update();

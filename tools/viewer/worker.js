@@ -10,7 +10,7 @@ const TREE_BYTES_MOST = 512 * 1024 * 1024; // decoded arrays of levels, roughly
 const SMALL_MESH = 8 * 1024 * 1024;       // stored bytes
 const MESH_BYTES_A_VIEW = 16 * 1024 * 1024; // of larger ones, before the camera moves again
 
-let session; // one open file
+let current; // one open file
 let view, want;
 
 function post(message, transfer = []) {
@@ -19,7 +19,7 @@ function post(message, transfer = []) {
 
 const describe = (error) => ({ code: error.code ?? 'FAULT', message: error.message ?? String(error) });
 
-class Session {
+class OpenFile {
   constructor(number) {
     this.number = number;
     this.began = performance.now();
@@ -30,7 +30,7 @@ class Session {
   }
 
   get ended() {
-    return session !== this;
+    return current !== this;
   }
 
   async open(what) {
@@ -39,7 +39,7 @@ class Session {
     this.tree = new Tree(info);
     const meshBytes = ['/mesh/vertices', '/mesh/faces'].reduce((sum, path) => sum + (this.file.arrays.get(path)?.bytes ?? 0), 0);
     this.cut = new Cut(this.tree, { small: meshBytes < SMALL_MESH });
-    post({ type: 'opened', session: this.number, name: source.name, size: source.size, info, scene: this.cut.scene,
+    post({ type: 'opened', opening: this.number, name: source.name, size: source.size, info, scene: this.cut.scene,
       bytesTo: info.levels.map((_, i) => this.file.bytesToLevel(i)), traffic: this.file.traffic, ms: performance.now() - this.began });
     await this.load(Math.min(FIRST_LEVELS, info.level_count) - 1);
   }
@@ -58,7 +58,7 @@ class Session {
       this.timeline.push({ level: level.level, ms: performance.now() - this.began, ...this.file.traffic });
     }
     if (!this.ended)
-      post({ type: 'loaded', session: this.number, depth: this.tree.depth, timeline: this.timeline, traffic: this.file.traffic });
+      post({ type: 'loaded', opening: this.number, depth: this.tree.depth, timeline: this.timeline, traffic: this.file.traffic });
   }
 
   #levelFits(level) {
@@ -89,7 +89,7 @@ class Session {
     } while (!this.ended && (this.again || result.more));
     this.running = false;
     if (!this.ended && !this.busy.level && !this.busy.mesh)
-      post({ type: 'idle', session: this.number, want: want.number, traffic: this.file.traffic, deeper: result.deeper });
+      post({ type: 'idle', opening: this.number, want: want.number, traffic: this.file.traffic, deeper: result.deeper });
   }
 
   #meshAllowed() {
@@ -101,7 +101,7 @@ class Session {
   }
 
   #later(work) {
-    work.then(() => this.ended || this.pump(), (error) => this.ended || post({ type: 'failed', session: this.number, error: describe(error), late: true }));
+    work.then(() => this.ended || this.pump(), (error) => this.ended || post({ type: 'failed', opening: this.number, error: describe(error), late: true }));
   }
 
   async #loadMesh(leaves) {
@@ -116,13 +116,13 @@ class Session {
 
   #send({ set, removed, stats }) {
     const transfer = set.flatMap((t) => [t.position.buffer, t.tag.buffer, t.index.buffer, t.lines?.buffer, t.cells?.buffer]).filter(Boolean);
-    post({ type: 'tiles', session: this.number, set, removed, stats, traffic: this.file.traffic, ms: performance.now() - this.began, want: want.number }, transfer);
+    post({ type: 'tiles', opening: this.number, set, removed, stats, traffic: this.file.traffic, ms: performance.now() - this.began, want: want.number }, transfer);
   }
 
   /** Where a point is: at once what the levels at hand say for certain, then exactly, by the faces of the leaves that matter. */
   async probe(point) {
     const number = ++this.probes, { tree, file } = this, solid = tree.info.solid;
-    const answer = (more) => this.ended || number !== this.probes || post({ type: 'probed', session: this.number, point, solid, traffic: file.traffic, ...more });
+    const answer = (more) => this.ended || number !== this.probes || post({ type: 'probed', opening: this.number, point, solid, traffic: file.traffic, ...more });
     const coarse = { depth: tree.depth, where: solid ? inside(tree, point).where : undefined, ...distanceInterval(tree, point) };
     answer({ ...coarse, exact: false, done: !file.info.parts.has('mesh') });
     if (!file.info.parts.has('mesh'))
@@ -145,21 +145,21 @@ class Session {
 self.onmessage = async ({ data }) => {
   try {
     if (data.type === 'open') {
-      session = undefined;
-      const mine = session = new Session(data.session);
+      current = undefined;
+      const mine = current = new OpenFile(data.opening);
       await mine.open(data.what);
       if (!mine.ended && view)
         await mine.pump();
     } else if (data.type === 'close') {
-      session = undefined;
+      current = undefined;
     } else if (data.type === 'view') {
       ({ view, want } = data);
-      if (session?.tree?.root)
-        await session.pump();
-    } else if (data.type === 'probe' && session?.tree?.root) {
-      await session.probe(data.point);
+      if (current?.tree?.root)
+        await current.pump();
+    } else if (data.type === 'probe' && current?.tree?.root) {
+      await current.probe(data.point);
     }
   } catch (error) {
-    post({ type: 'failed', session: data.session ?? session?.number, error: describe(error) });
+    post({ type: 'failed', opening: data.opening ?? current?.number, error: describe(error) });
   }
 };

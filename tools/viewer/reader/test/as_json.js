@@ -29,7 +29,7 @@ function asJson(info, levels, mesh, maps) {
   };
 }
 
-/** Reads and checks everything. */
+/** Reads and checks everything. The answer is that of read_ebpo.py. */
 export async function readAll(bytes, name) {
   const file = await openEbpo(bytes, { name });
   const levels = await file.levels(0, file.info.level_count - 1, { faces: true });
