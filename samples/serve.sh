@@ -4,7 +4,7 @@
 # DIR holds .ebpo.h5 files (samples/out, which samples/quickstart.sh fills). Nothing is written outside a temporary folder and tools/viewer/node_modules.
 set -eu
 here=$(cd "$(dirname "$0")/.." && pwd)
-viewer=$here/tools/viewer port=8080 folder=$here/samples/out log= install=yes
+viewer=$here/tools/viewer port=8080 folder=$here/samples/out log='' install=yes
 while [ $# -gt 0 ]; do
     case $1 in
     --port) port=$2; shift 2 ;;
