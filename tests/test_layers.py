@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Modules include downward only: lib/layers.txt says which module stands on which layer, siblings do not include each other,
-only h5 includes <hdf5.h>, and only base and the public headers are included from everywhere."""
+only h5 includes <hdf5.h> and only http <curl/curl.h>, and only base and the public headers are included from everywhere."""
 import pathlib
 import re
 import sys
@@ -27,6 +27,8 @@ for module in modules:
             place = f"{source.relative_to(root.parent)}:{number}"
             if name.startswith("hdf5") and module.name != "h5":
                 problems.append(f"{place}: only lib/h5 includes {name}")
+            if name.startswith("curl/") and module.name != "http":
+                problems.append(f"{place}: only lib/http includes {name}")
             if found.group(1) == '"' and "/" in name:
                 other = name.split("/")[0]
                 if other == module.name or other not in layer:

@@ -1,6 +1,5 @@
-#include "http/transfer.h"
+#include "http/slot.h"
 
-#include <curl/curl.h>
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,57 +7,12 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "ebpo_config.h"
 
 enum {
-    SLOTS_MAX = 32,
-    REDIRECTS_MAX = 5,
-    STALL_BYTES = 100,        /* a second */
-    DRAIN_BYTES = 65536,      /* of a body that is not wanted: reading it to its end keeps the connection */
-    LOOK_MS = 100,            /* between looks at `stop` */
+    LOOK_MS = 100, /* between looks at `stop` and for stalls */
     IDLE_MS = 60000
 };
 static const double PAUSE_FIRST = 0.2, PAUSE_MOST = 8, PAUSE_ASKED_MOST = 60; /* seconds */
-
-/* One of the places for requests under way, with a handle that is used again and again. */
-typedef struct slot {
-    ebpo_transfers *owner;
-    CURL *easy;
-    ebpo_request *request;      /* NULL: free */
-    ebpo_http_version pinned;   /* a copy for this attempt */
-    bool is_pinned;
-    ebpo_answer answer;
-    bool judged, stopped, stalled; /* stopped, stalled: we ended the transfer ourselves */
-    bool sent;                  /* connected, and the request is out */
-    double moved;               /* time of the last bytes */
-    ebpo_verdict verdict;
-    ebpo_status status;
-    char why[EBPO_WHY_BYTES];
-    uint64_t begin, end;        /* asked in this attempt */
-    uint64_t received, taken, unwanted; /* bytes of its body */
-    char trouble[CURL_ERROR_SIZE];
-} slot;
-
-struct ebpo_transfers {
-    const char *url, *shown;
-    const ebpo_http_options *options;
-    pthread_mutex_t *lock;
-    pthread_cond_t *done;
-    CURLM *multi;
-    struct curl_slist *headers;
-    pthread_t thread;
-    bool running;
-    slot slots[SLOTS_MAX];
-    unsigned slot_count, active;
-    /* Guarded by the lock. */
-    bool quit, cancelled;
-    ebpo_request *queue; /* urgent ones first */
-    ebpo_http_version pinned;
-    bool is_pinned;
-    ebpo_http_stats stats;
-    /* The thread's own. */
-    uint64_t random;
-};
 
 static pthread_once_t curl_once = PTHREAD_ONCE_INIT;
 static CURLcode curl_state;
@@ -75,142 +29,7 @@ double ebpo_http_now(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* --- what libcurl calls --- */
-
-/* Some ten times a second while a request is under way. libcurl's own measure of speed is an average over several seconds. */
-static int look_for_stall(void *user, curl_off_t total, curl_off_t done, curl_off_t upload_total, curl_off_t uploaded)
-{
-    slot *s = user;
-    curl_off_t connected = 0;
-    double now = ebpo_http_now();
-    (void)total;
-    (void)done;
-    (void)upload_total;
-    (void)uploaded;
-    if (!s->sent && curl_easy_getinfo(s->easy, CURLINFO_PRETRANSFER_TIME_T, &connected) == CURLE_OK && connected > 0) {
-        s->sent = true;
-        s->moved = now;
-    }
-    s->stalled = s->sent && now - s->moved > s->owner->options->stall_timeout;
-    return s->stalled;
-}
-
-static size_t take_header(char *line, size_t size, size_t count, void *user)
-{
-    slot *s = user;
-    s->moved = ebpo_http_now();
-    ebpo_answer_line(&s->answer, line, size * count);
-    if (s->answer.header_bytes <= EBPO_HTTP_HEADERS_MAX)
-        return size * count;
-    s->judged = true;
-    s->stopped = true;
-    s->verdict = EBPO_ANSWER_REFUSED;
-    s->status = EBPO_E_IO;
-    strcpy(s->why, "the head of the server's answer is too long; this server is broken");
-    return 0;
-}
-
-static void judge(slot *s)
-{
-    ebpo_asked asked = { s->begin, s->end, s->is_pinned ? &s->pinned : NULL, s->owner->options->whole_limit };
-    if (!s->judged)
-        s->verdict = ebpo_answer_judge(&s->answer, &asked, &s->status, s->why);
-    s->judged = true;
-}
-
-static size_t refuse(slot *s, ebpo_status status, const char *why)
-{
-    s->verdict = EBPO_ANSWER_REFUSED;
-    s->status = status;
-    s->stopped = true;
-    snprintf(s->why, sizeof s->why, "%s", why);
-    return 0;
-}
-
-static size_t take_part(slot *s, const char *bytes, size_t size)
-{
-    uint64_t room = s->answer.last + 1 - s->begin - s->taken;
-    if (size > room)
-        return refuse(s, EBPO_E_IO, "the server sent more bytes than it was asked for and than it said; this server or a proxy on the way is broken");
-    memcpy(s->request->data + (s->begin - s->request->offset) + s->taken, bytes, size);
-    s->taken += size;
-    return size;
-}
-
-static size_t take_whole(slot *s, const char *bytes, size_t size)
-{
-    ebpo_request *r = s->request;
-    if (s->taken + size > s->owner->options->whole_limit)
-        return refuse(s, EBPO_E_UNSUPPORTED, "the server has no byte ranges, and the file is larger than what would be read as a whole; download the file, or use a server with ranges");
-    if (!ebpo_grow(&r->whole, &r->whole_room, s->taken + size, 1))
-        return refuse(s, EBPO_E_MEMORY, "out of memory");
-    memcpy(r->whole + s->taken, bytes, size);
-    s->taken += size;
-    return size;
-}
-
-static size_t take_body(char *bytes, size_t size, size_t count, void *user)
-{
-    slot *s = user;
-    size *= count;
-    s->moved = ebpo_http_now();
-    judge(s);
-    s->received += size;
-    if (s->verdict == EBPO_ANSWER_PART)
-        return take_part(s, bytes, size);
-    if (s->verdict == EBPO_ANSWER_WHOLE)
-        return take_whole(s, bytes, size);
-    s->unwanted += size;
-    s->stopped = s->unwanted > DRAIN_BYTES || s->verdict == EBPO_ANSWER_REFUSED;
-    return s->stopped ? 0 : size;
-}
-
 /* --- setting up --- */
-
-static bool https(const char *url)
-{
-    return url[4] == 's' || url[4] == 'S';
-}
-
-static bool set_options(slot *s)
-{
-    const ebpo_transfers *t = s->owner;
-    const ebpo_http_options *o = t->options;
-    CURL *e = s->easy;
-    bool good = curl_easy_setopt(e, CURLOPT_URL, t->url) == CURLE_OK && curl_easy_setopt(e, CURLOPT_HTTPHEADER, t->headers) == CURLE_OK;
-#if LIBCURL_VERSION_NUM >= 0x075500
-    good = good && curl_easy_setopt(e, CURLOPT_PROTOCOLS_STR, "http,https") == CURLE_OK;
-    good = good && curl_easy_setopt(e, CURLOPT_REDIR_PROTOCOLS_STR, https(t->url) ? "https" : "http,https") == CURLE_OK;
-#else
-    good = good && curl_easy_setopt(e, CURLOPT_PROTOCOLS, CURLPROTO_HTTP | CURLPROTO_HTTPS) == CURLE_OK;
-    good = good && curl_easy_setopt(e, CURLOPT_REDIR_PROTOCOLS, https(t->url) ? CURLPROTO_HTTPS : CURLPROTO_HTTP | CURLPROTO_HTTPS) == CURLE_OK;
-#endif
-    curl_easy_setopt(e, CURLOPT_FOLLOWLOCATION, 1L);
-    curl_easy_setopt(e, CURLOPT_MAXREDIRS, (long)REDIRECTS_MAX);
-    curl_easy_setopt(e, CURLOPT_HTTP_VERSION, (long)CURL_HTTP_VERSION_2TLS);
-    curl_easy_setopt(e, CURLOPT_NOSIGNAL, 1L);
-    curl_easy_setopt(e, CURLOPT_SUPPRESS_CONNECT_HEADERS, 1L);
-    curl_easy_setopt(e, CURLOPT_TCP_KEEPALIVE, 1L);
-    curl_easy_setopt(e, CURLOPT_BUFFERSIZE, 262144L);
-    curl_easy_setopt(e, CURLOPT_CONNECTTIMEOUT_MS, (long)(o->connect_timeout * 1000) + 1);
-    curl_easy_setopt(e, CURLOPT_LOW_SPEED_LIMIT, (long)STALL_BYTES);
-    curl_easy_setopt(e, CURLOPT_LOW_SPEED_TIME, (long)(o->stall_timeout + 0.999));
-    curl_easy_setopt(e, CURLOPT_NETRC, (long)(o->netrc ? CURL_NETRC_OPTIONAL : CURL_NETRC_IGNORED));
-    good = good && curl_easy_setopt(e, CURLOPT_USERAGENT, o->user_agent ? o->user_agent : "libebpo/" EBPO_VERSION) == CURLE_OK;
-    good = good && (!o->user || curl_easy_setopt(e, CURLOPT_USERPWD, o->user) == CURLE_OK);
-    good = good && (!o->ca_file || curl_easy_setopt(e, CURLOPT_CAINFO, o->ca_file) == CURLE_OK);
-    good = good && (!o->proxy || curl_easy_setopt(e, CURLOPT_PROXY, o->proxy) == CURLE_OK);
-    curl_easy_setopt(e, CURLOPT_NOPROGRESS, 0L);
-    curl_easy_setopt(e, CURLOPT_XFERINFOFUNCTION, look_for_stall);
-    curl_easy_setopt(e, CURLOPT_XFERINFODATA, s);
-    curl_easy_setopt(e, CURLOPT_ERRORBUFFER, s->trouble);
-    curl_easy_setopt(e, CURLOPT_HEADERFUNCTION, take_header);
-    curl_easy_setopt(e, CURLOPT_HEADERDATA, s);
-    curl_easy_setopt(e, CURLOPT_WRITEFUNCTION, take_body);
-    curl_easy_setopt(e, CURLOPT_WRITEDATA, s);
-    curl_easy_setopt(e, CURLOPT_PRIVATE, s);
-    return good;
-}
 
 static bool add_header(struct curl_slist **list, const char *text)
 {
@@ -235,7 +54,7 @@ static bool set_up(ebpo_transfers *t)
     for (unsigned i = 0; i < t->slot_count; i++) {
         t->slots[i].owner = t;
         t->slots[i].easy = curl_easy_init();
-        if (!t->slots[i].easy || !set_options(&t->slots[i]))
+        if (!t->slots[i].easy || !ebpo_slot_set_up(&t->slots[i]))
             return false;
     }
     t->running = pthread_create(&t->thread, NULL, drive, t) == 0;
@@ -257,7 +76,7 @@ ebpo_status ebpo_transfers_make(ebpo_transfers **out, const char *url, const cha
     t->options = options;
     t->lock = lock;
     t->done = done;
-    t->slot_count = options->connections < SLOTS_MAX ? options->connections : SLOTS_MAX;
+    t->slot_count = options->connections < EBPO_SLOTS_MAX ? options->connections : EBPO_SLOTS_MAX;
     t->random = (uint64_t)(ebpo_http_now() * 1e9) ^ (uint64_t)(uintptr_t)t;
     if (set_up(t)) {
         *out = t;
@@ -366,7 +185,7 @@ static uint64_t next_random(ebpo_transfers *t)
 }
 
 /* Seconds until the next attempt: doubling, and jitter so that many readers do not come back at once. What the server asks for counts when it is more. */
-static double pause_after(ebpo_transfers *t, const slot *s, bool *asked_for)
+static double pause_after(ebpo_transfers *t, const ebpo_slot *s, bool *asked_for)
 {
     curl_off_t asked = 0;
     double pause = PAUSE_FIRST;
@@ -379,7 +198,7 @@ static double pause_after(ebpo_transfers *t, const slot *s, bool *asked_for)
     return *asked_for ? (double)asked : pause;
 }
 
-static void begin_attempt(ebpo_transfers *t, slot *s, ebpo_request *r, double now)
+static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, double now)
 {
     char range[64];
     bool begun = r->first && r->got > 0;
@@ -425,7 +244,7 @@ static bool passing(CURLcode code)
 }
 
 /* What came is kept, so that the next attempt asks for the rest only. */
-static bool keep(slot *s, CURLcode code)
+static bool keep(ebpo_slot *s, CURLcode code)
 {
     ebpo_request *r = s->request;
     if (s->verdict == EBPO_ANSWER_WHOLE) {
@@ -446,7 +265,7 @@ static bool keep(slot *s, CURLcode code)
     return r->got == r->size;
 }
 
-static void describe(const slot *s, CURLcode code, char *out, size_t room)
+static void describe(const ebpo_slot *s, CURLcode code, char *out, size_t room)
 {
     const char *trouble = *s->trouble ? s->trouble : curl_easy_strerror(code);
     if (s->judged && s->verdict == EBPO_ANSWER_LATER)
@@ -460,7 +279,7 @@ static void describe(const slot *s, CURLcode code, char *out, size_t room)
 }
 
 /* Again later, or the end of it. */
-static void try_again(ebpo_transfers *t, slot *s, CURLcode code, double now)
+static void try_again(ebpo_transfers *t, ebpo_slot *s, CURLcode code, double now)
 {
     ebpo_request *r = s->request;
     char what[CURL_ERROR_SIZE], why[CURL_ERROR_SIZE + 160];
@@ -484,7 +303,7 @@ static void try_again(ebpo_transfers *t, slot *s, CURLcode code, double now)
     finish(t, r, EBPO_E_IO, why);
 }
 
-static void end_attempt(ebpo_transfers *t, slot *s, CURLcode code)
+static void end_attempt(ebpo_transfers *t, ebpo_slot *s, CURLcode code)
 {
     long connections = 0, redirects = 0;
     ebpo_request *r = s->request;
@@ -493,7 +312,7 @@ static void end_attempt(ebpo_transfers *t, slot *s, CURLcode code)
     curl_easy_getinfo(s->easy, CURLINFO_REDIRECT_COUNT, &redirects);
     curl_multi_remove_handle(t->multi, s->easy);
     if (code == CURLE_OK)
-        judge(s);
+        ebpo_slot_judge(s);
     pthread_mutex_lock(t->lock);
     t->active--;
     t->stats.bytes += s->received;
@@ -547,7 +366,7 @@ static ebpo_request *next_due(ebpo_transfers *t, double now, double *wait)
     return NULL;
 }
 
-static slot *free_slot(ebpo_transfers *t)
+static ebpo_slot *free_slot(ebpo_transfers *t)
 {
     for (unsigned i = 0; i < t->slot_count; i++)
         if (!t->slots[i].request)
@@ -564,7 +383,7 @@ static bool start_due(ebpo_transfers *t, double *wait)
     if (t->cancelled)
         cancel_queue(t);
     while (!quit && (r = next_due(t, ebpo_http_now(), wait)) != NULL) {
-        slot *s = free_slot(t);
+        ebpo_slot *s = free_slot(t);
         begin_attempt(t, s, r, ebpo_http_now());
         if (curl_multi_add_handle(t->multi, s->easy) != CURLM_OK) {
             t->active--;
@@ -612,7 +431,7 @@ static void *drive(void *transfers)
                 continue;
             CURLcode code = m->data.result; /* the message goes with the handle */
             curl_easy_getinfo(m->easy_handle, CURLINFO_PRIVATE, &private);
-            end_attempt(t, (slot *)(void *)private, code);
+            end_attempt(t, (ebpo_slot *)(void *)private, code);
             ended = true;
         }
         if (ended)
