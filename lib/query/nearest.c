@@ -108,7 +108,7 @@ void ebpo_nearest_leaf(ebpo_nearest *n, const ebpo_subtree *s, const ebpo_subtre
 {
     for (uint32_t b = 0; b < leaf->blocks; b++)
         for (uint32_t lane = 0; lane < EBPO_BLOCK; lane++)
-            look_at(n, s, s->list[leaf->list + b] * EBPO_BLOCK + lane);
+            look_at(n, s, s->list[leaf->list + b].block * EBPO_BLOCK + lane);
 }
 
 /* --- near: single precision --- */

@@ -58,8 +58,14 @@ static inline double most3(double a, double b, double c)
     return high > c ? high : c;
 }
 
-/* Which of a block's faces have boxes that meet the cell, and which walls these boxes come to (bit 2 axis + side). Exact comparisons. */
-static unsigned look_at_block(const ebpo_subtree *s, uint32_t block, const double low[3], const double high[3], unsigned *walls)
+/* The boxes of a block's faces, and those that meet the cell. */
+typedef struct block_boxes {
+    double least[3][EBPO_BLOCK], most[3][EBPO_BLOCK];
+    unsigned near; /* a bit for each face */
+} block_boxes;
+
+/* Finds which of a block's faces have boxes that meet the cell, and which walls these boxes come to (bit 2 axis + side). Exact comparisons. */
+static void look_at_block(const ebpo_subtree *s, uint32_t block, const double low[3], const double high[3], block_boxes *out, unsigned *walls)
 {
     int away[EBPO_BLOCK] = { 0 }, touches[EBPO_BLOCK] = { 0 };
     for (int k = 0; k < 3; k++) {
@@ -71,16 +77,38 @@ static unsigned look_at_block(const ebpo_subtree *s, uint32_t block, const doubl
             }
         for (int lane = 0; lane < EBPO_BLOCK; lane++) {
             double least = least3(x[0][lane], x[1][lane], x[2][lane]), most = most3(x[0][lane], x[1][lane], x[2][lane]);
+            out->least[k][lane] = least;
+            out->most[k][lane] = most;
             away[lane] |= (least > high[k]) | (most < low[k]);
             touches[lane] |= (least <= low[k]) << 2 * k | (most >= high[k]) << (2 * k + 1);
         }
     }
-    unsigned near = 0;
+    out->near = 0;
     for (int lane = 0; lane < EBPO_BLOCK; lane++) {
-        near |= (unsigned)!away[lane] << lane;
+        out->near |= (unsigned)!away[lane] << lane;
         *walls |= away[lane] ? 0 : (unsigned)touches[lane];
     }
-    return near;
+}
+
+/* A coordinate in the cell, 0 .. EBPO_LISTED_CELLS, widened by far more than the rounding here and in those that ask (2^-40). */
+static uint8_t listed(double x, double low, double inverse, double widening)
+{
+    double cells = (x - low) * inverse * EBPO_LISTED_CELLS + widening;
+    return cells < 0 ? 0 : cells < 255 ? (uint8_t)cells : 255;
+}
+
+static void set_listed_box(ebpo_listed_block *out, const block_boxes *b, const double low[3], const double inverse[3])
+{
+    for (int k = 0; k < 3; k++) {
+        double least = INFINITY, most = -INFINITY;
+        for (int lane = 0; lane < EBPO_BLOCK; lane++)
+            if (b->near >> lane & 1) {
+                least = b->least[k][lane] < least ? b->least[k][lane] : least;
+                most = b->most[k][lane] > most ? b->most[k][lane] : most;
+            }
+        out->low[k] = b->near ? listed(least, low[k], inverse[k], -0x1p-8) : 255;
+        out->high[k] = b->near ? listed(most, low[k], inverse[k], 0x1p-8) : 0;
+    }
 }
 
 static void add_face(const ebpo_subtree *s, uint32_t slot, const double inverse[3], leaf_faces *f)
@@ -92,8 +120,8 @@ static void add_face(const ebpo_subtree *s, uint32_t slot, const double inverse[
     f->slot[f->count++] = slot;
 }
 
-/* Gathers the faces whose boxes meet the cell, and the walls that they come to. False when they are not to be had: too many, or a cell too small for what follows. */
-static bool gather(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const double low[3], const double high[3], leaf_faces *f, unsigned *walls)
+/* Gathers the faces whose boxes meet the cell, the walls that they come to, and the boxes of the list. False when they are not to be had: too many, or a cell too small for what follows. */
+static bool gather(ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const double low[3], const double high[3], leaf_faces *f, unsigned *walls)
 {
     double inverse[3];
     bool fine = true;
@@ -105,16 +133,20 @@ static bool gather(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const d
         inverse[k] = 1 / f->size[k];
         fine = fine && f->size[k] > 0x1p-900;
     }
+    bool few = fine;
     for (uint32_t b = 0; b < leaf->blocks; b++) {
-        uint32_t block = s->list[leaf->list + b];
-        unsigned near = look_at_block(s, block, low, high, walls); /* lanes without a face are far away */
-        for (; near && fine; near &= near - 1) {
-            fine = f->count < FACES_MAX;
-            if (fine)
-                add_face(s, block * EBPO_BLOCK + (unsigned)__builtin_ctz(near), inverse, f);
+        ebpo_listed_block *block = &s->list[leaf->list + b];
+        block_boxes boxes;
+        look_at_block(s, block->block, low, high, &boxes, walls); /* lanes without a face are far away */
+        if (fine)
+            set_listed_box(block, &boxes, low, inverse);
+        for (unsigned near = boxes.near; near && few; near &= near - 1) {
+            few = f->count < FACES_MAX;
+            if (few)
+                add_face(s, block->block * EBPO_BLOCK + (unsigned)__builtin_ctz(near), inverse, f);
         }
     }
-    return fine;
+    return few;
 }
 
 /* Crossings of the leaf's faces with a segment along an axis. */
@@ -122,7 +154,7 @@ static int32_t crossings(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, c
 {
     int32_t sum = 0;
     for (uint32_t i = 0; i < leaf->blocks * EBPO_BLOCK; i++) {
-        uint32_t slot = s->list[leaf->list + i / EBPO_BLOCK] * EBPO_BLOCK + i % EBPO_BLOCK;
+        uint32_t slot = s->list[leaf->list + i / EBPO_BLOCK].block * EBPO_BLOCK + i % EBPO_BLOCK;
         double t[3][3];
         if (s->slot_face[slot] == EBPO_NO_SLOT)
             continue;
@@ -318,7 +350,7 @@ static uint8_t choose_wall(unsigned walls)
     return open ? (uint8_t)__builtin_ctz(open) : EBPO_NO_WALL;
 }
 
-static bool classify(const ebpo_subtree *s, ebpo_subtree_leaf *leaf, const ebpo_leaf_place *place, piece *out)
+static bool classify(ebpo_subtree *s, ebpo_subtree_leaf *leaf, const ebpo_leaf_place *place, piece *out)
 {
     double low[3], high[3];
     leaf_faces f;

@@ -44,7 +44,8 @@ static void put_list(walk *w, ebpo_subtree_leaf *leaf, uint64_t count)
         w->status = ebpo_fail(w->error, EBPO_E_LIMIT, "the leaves list too many faces to be held at once; give a memory budget");
         return;
     }
-    memcpy(s->list + s->list_count, w->scratch, kept * sizeof *s->list);
+    for (uint64_t i = 0; i < kept; i++)
+        s->list[s->list_count + i] = (ebpo_listed_block){ w->scratch[i], { 0, 0, 0 }, { 255, 255, 255 } };
     leaf->list = (uint32_t)s->list_count;
     leaf->blocks = (uint32_t)kept;
     s->list_count += kept;
