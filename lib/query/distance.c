@@ -94,12 +94,12 @@ static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_query_op
     if (o->deadline_ns)
         n.deadline = ebpo_clock() + o->deadline_ns;
     if (o->warm && c->warm)
-        ebpo_nearest_hint(&n, (const double (*)[3])c->warm_triangle);
+        ebpo_nearest_hint(&n, (const double (*)[3])c->warm_triangle, c->warm_face);
     ebpo_status status = search_everything(c, &n, error);
     if (status != EBPO_OK)
         return status;
     if (n.late && n.passed_over <= n.limit) {
-        double lo = fmin(n.passed_over, n.found ? n.lo : n.upper);
+        double lo = fmin(n.passed_over, n.found ? n.bounds.lo : n.upper);
         *out = (ebpo_distance_result){ NAN, lo, n.upper, { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
         return EBPO_OK;
     }
@@ -107,6 +107,7 @@ static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_query_op
     if (out->face == EBPO_NO_FACE)
         return EBPO_OK;
     c->warm = true;
+    c->warm_face = n.file_face;
     memcpy(c->warm_triangle, n.triangle, sizeof n.triangle);
     return o->unsigned_distance ? EBPO_OK : give_sign(c, p, out, error);
 }

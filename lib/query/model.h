@@ -38,6 +38,7 @@ struct ebpo_context {
     /* The last nearest face: where ebpo_distance begins, if asked to. */
     bool warm;
     double warm_triangle[3][3];
+    uint64_t warm_face;         /* its number in the file */
 };
 
 static inline bool ebpo_rule_inside(ebpo_rule rule, int32_t winding)

@@ -101,7 +101,7 @@ static void nearest_polygon(const ebpo_polytope *e, const ebpo_box *box, const e
     if (isinf(out->distance))
         return;
     ebpo_triangle_nearest exact;
-    ebpo_triangle_nearest_exact(p, (const double (*)[3])best, &exact);
+    ebpo_triangle_nearest_exact(p, (const double (*)[3])best, NULL, &exact);
     ebpo_triangle_unit_normal((const double (*)[3])best, out->normal);
     out->distance = exact.distance;
     for (int k = 0; k < 3; k++)

@@ -9,11 +9,13 @@ typedef struct ebpo_nearest {
     double p[3];
     double limit;        /* what is farther does not matter; certain */
     double upper;        /* some face of the model is at most so far away, or INFINITY */
-    double lo, hi;       /* of the winner's distance, certain */
     bool found;
-    ebpo_feature feature;
+    ebpo_distance_bounds bounds; /* of the winner */
     double triangle[3][3];
     uint64_t file_face, told_face;
+    bool hinted;
+    uint64_t hint_face;  /* in the file */
+    ebpo_distance_bounds hint;
     uint64_t deadline;   /* of ebpo_clock, or 0 */
     bool late;           /* it passed */
     double passed_over;  /* lower bound of what was not looked at for want of time */
@@ -22,8 +24,8 @@ typedef struct ebpo_nearest {
 /* Nothing found yet. */
 void ebpo_nearest_begin(ebpo_nearest *n, const double p[3], double max_distance);
 
-/* Looks at a triangle that is known to be the model's, to have an upper bound early. It does not count as found. */
-void ebpo_nearest_hint(ebpo_nearest *n, const double triangle[3][3]);
+/* Looks at a face of the model, to have an upper bound early. It does not count as found. */
+void ebpo_nearest_hint(ebpo_nearest *n, const double triangle[3][3], uint64_t file_face);
 
 /* Searches all faces of a subtree. */
 EBPO_MUST_USE ebpo_status ebpo_nearest_search(ebpo_nearest *n, ebpo_context *context, const ebpo_subtree *s, ebpo_error *error);
