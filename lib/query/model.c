@@ -44,6 +44,15 @@ static ebpo_status estimate_subtree(void *user, uint64_t key, uint64_t *peak, ui
     return status;
 }
 
+/* Adds a subtree's leaves to what is in memory, or (sign -1) takes them away. */
+static void count_leaves(ebpo_model *m, const ebpo_subtree *s, uint64_t sign)
+{
+    m->leaves += sign * s->leaf_count;
+    m->leaves_one_wall += sign * s->one_wall;
+    for (int k = 0; k < 5; k++)
+        m->leaves_of_kind[k] += sign * s->kinds[k];
+}
+
 static ebpo_status load_subtree(void *user, uint64_t key, void **item, uint64_t *bytes, ebpo_error *error)
 {
     ebpo_model *m = user;
@@ -52,6 +61,8 @@ static ebpo_status load_subtree(void *user, uint64_t key, void **item, uint64_t 
     ebpo_status status = ebpo_slice_read(&slice, m->chunks, &m->top->below[key], error);
     if (status == EBPO_OK)
         status = ebpo_subtree_make(&subtree, &slice, m->info, true, 1, error);
+    if (status == EBPO_OK)
+        count_leaves(m, subtree, 1);
     *item = subtree;
     *bytes = status == EBPO_OK ? subtree->bytes : 0;
     return status;
@@ -59,7 +70,8 @@ static ebpo_status load_subtree(void *user, uint64_t key, void **item, uint64_t 
 
 static void release_subtree(void *user, void *item)
 {
-    (void)user;
+    if (item)
+        count_leaves(user, item, (uint64_t)-1);
     ebpo_subtree_free(item);
 }
 
@@ -97,6 +109,8 @@ static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
     ebpo_status status = ebpo_slice_read_all(&slice, m->file, m->options.threads, error);
     if (status == EBPO_OK)
         status = ebpo_subtree_make(&m->whole, &slice, m->info, true, m->options.threads, error);
+    if (m->whole)
+        count_leaves(m, m->whole, 1);
     return status;
 }
 
@@ -180,11 +194,12 @@ void ebpo_model_get_stats(const ebpo_model *m, ebpo_model_stats *out)
     *out = (ebpo_model_stats){ .resident = m->whole != NULL, .cut_level = m->top ? m->top->cut_level : 0, .budget = m->options.memory,
                                .open_seconds = m->open_seconds };
     ebpo_file_traffic(m->file, &out->bytes_read, &out->reads);
+    out->leaves = m->leaves;
+    out->leaves_one_wall = m->leaves_one_wall;
+    for (int k = 0; k < 5; k++)
+        out->leaves_of_kind[k] = m->leaves_of_kind[k];
     if (m->whole) {
         out->memory = out->memory_peak = m->whole->bytes;
-        out->leaves = m->whole->leaf_count;
-        out->leaves_one_wall = m->whole->one_wall;
-        memcpy(out->leaves_of_kind, m->whole->kinds, sizeof out->leaves_of_kind);
         return;
     }
     ebpo_cache_stats subtrees, chunks;
@@ -214,7 +229,7 @@ static void let_go(ebpo_context *c)
 {
     if (c->pinned)
         ebpo_cache_unpin(c->model->cache, c->pinned_key);
-    ebpo_subtree_free(c->own);
+    release_subtree(c->model, c->own);
     c->pinned = c->own = NULL;
 }
 

@@ -21,6 +21,7 @@ struct ebpo_model {
     ebpo_chunks *chunks;
     ebpo_cache *cache;     /* subtrees by their number in the top */
     double open_seconds;
+    _Atomic uint64_t leaves, leaves_of_kind[5], leaves_one_wall; /* in the subtrees that are in memory */
 };
 
 struct ebpo_context {
