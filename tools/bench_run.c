@@ -1,5 +1,6 @@
 #include "bench_run.h"
 
+#include <errno.h>
 #include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
@@ -73,6 +74,14 @@ ebpo_status bench_ask(const bench_job *job, ebpo_context *context, uint64_t numb
     return ask_into(job, context, number, job->answers, error);
 }
 
+/* Sleeps, as one who asks at a fixed rate does: others use the core meanwhile. */
+static void wait_until(uint64_t when)
+{
+    struct timespec t = { (time_t)(when / 1000000000), (long)(when % 1000000000) };
+    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, NULL) == EINTR)
+        ;
+}
+
 /* Of ascending times: the least one that no more than 1 - share of them exceed. */
 static uint64_t quantile(const uint64_t *sorted, uint64_t count, double share)
 {
@@ -84,7 +93,10 @@ ebpo_status bench_singly(const bench_job *job, ebpo_context *context, uint64_t c
 {
     ebpo_status status = EBPO_OK;
     double sum = 0;
+    uint64_t begin = bench_clock();
     for (uint64_t i = 0; i < job->count && status == EBPO_OK; i++) {
+        if (job->rate > 0)
+            wait_until(begin + (uint64_t)((double)i / job->rate * 1e9));
         uint64_t start = bench_clock();
         status = bench_ask(job, context, i, error);
         uint64_t took = bench_clock() - start;

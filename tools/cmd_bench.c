@@ -19,6 +19,7 @@ typedef struct values {
     int query;
     const char *points, *mode, *save_points, *save_answers;
     int64_t count, seed, repeat;
+    double rate;
 } values;
 
 static const char *const query_words[] = { "inside", "distance", "ray", NULL };
@@ -32,6 +33,7 @@ static const arg_option options[] = {
     { "count", 0, ARG_INT, offsetof(values, count), "N", "how many; the default: 100000, or all of the file", 1, 1e9, NULL },
     { "seed", 0, ARG_INT, offsetof(values, seed), "S", "of uniform points and paths; the default: 1", 0, 1e15, NULL },
     { "repeat", 0, ARG_INT, offsetof(values, repeat), "R", "ask everything R times; the figures are those of the median mean", 1, REPEAT_MAX, NULL },
+    { "rate", 0, ARG_REAL, offsetof(values, rate), "HZ", "ask so many single questions a second, and sleep in between", 0, 1e9, NULL },
     { "mode", 'm', ARG_TEXT, offsetof(values, mode), "MODE", "as for 'ebpo inside' or 'ebpo distance'", 0, 0, NULL },
     { "max-distance", 0, ARG_REAL, offsetof(query_values, max_distance), "D", "as for 'ebpo distance'", 0, DBL_MAX, NULL },
     ARG_SWITCH("unsigned", 0, query_values, unsigned_distance, "as for 'ebpo distance'"),
@@ -279,6 +281,8 @@ static void print_json(const values *v, const char *path, uint64_t count, const 
     json_uint(&j, "count", count);
     json_int(&j, "seed", v->seed);
     json_int(&j, "repeat", v->repeat);
+    if (v->rate > 0)
+        json_real(&j, "rate", v->rate);
     json_figures(&j, r);
     json_answers(&j, v, r);
     stats_json(&j, "model", &r->model);
@@ -342,6 +346,7 @@ static int run(int argc, char **argv)
     job.rows = p.rows;
     job.width = points_width(p.kind);
     job.count = p.count;
+    job.rate = v.rate;
     size_t bytes = bench_answer_bytes(job.query);
     void *batch = calloc(p.count + 1, bytes);
     job.answers = calloc(p.count + 1, bytes);
