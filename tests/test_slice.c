@@ -195,7 +195,7 @@ static void compare_faces(const ebpo_slice *s, const ebpo_tree *tree)
 
 static void compare_counts(const compare *c, const ebpo_slice_size *size)
 {
-    ebpo_slice_size sum = { 0, 0, 0, 0 };
+    ebpo_slice_size sum = { 0 };
     for (int i = 0; i < c->slice->level_count; i++) {
         const ebpo_level *l = &c->slice->level[i];
         ck_assert_uint_eq(l->white_count, c->next[i][EBPO_WHITE]);

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/error.h"
+#include "query/ahead.h"
 #include "query/clock.h"
 #include "query/inside.h"
 #include "query/limited.h"
@@ -56,7 +57,9 @@ static ebpo_status search_top(ebpo_context *c, ebpo_nearest *n, const ebpo_box *
     }
     if (ebpo_spot_is_below(&spot)) {
         ebpo_status status = ebpo_spot_enter(c, &spot, error);
-        return status == EBPO_OK ? ebpo_nearest_search(n, c, spot.subtree, error) : status;
+        if (status == EBPO_OK)
+            ebpo_nearest_search(n, c, spot.subtree);
+        return status;
     }
     ranked child[8];
     int count = rank_children(c->model, box, &spot, lower, n->p, child);
@@ -68,18 +71,19 @@ static ebpo_status search_top(ebpo_context *c, ebpo_nearest *n, const ebpo_box *
 
 static ebpo_status search_everything(ebpo_context *c, ebpo_nearest *n, ebpo_error *error)
 {
-    if (c->model->whole)
-        return ebpo_nearest_search(n, c, c->model->whole, error);
+    if (c->model->whole) {
+        ebpo_nearest_search(n, c, c->model->whole);
+        return EBPO_OK;
+    }
     ebpo_box box = ebpo_model_box(c->model);
     return search_top(c, n, &box, ebpo_spot_root(c->model), 0, error);
 }
 
-/* Negative inside. */
-static ebpo_status give_sign(ebpo_context *c, const double p[3], ebpo_distance_result *out, ebpo_error *error)
+ebpo_status ebpo_give_sign(ebpo_context *c, const double p[3], const ebpo_query_options *o, ebpo_distance_result *out, ebpo_error *error)
 {
     ebpo_inside_result where;
     ebpo_query_options plain = EBPO_QUERY_OPTIONS_INIT;
-    if (!c->model->info->solid || !(out->distance > 0))
+    if (!c->model->info->solid || o->unsigned_distance || out->face == EBPO_NO_FACE || !(out->distance > 0))
         return EBPO_OK;
     ebpo_status status = c->model->whole ? ebpo_inside_whole(c, p, 1, &where, error) : ebpo_inside_walk(c, p, &plain, &where, error);
     if (status == EBPO_OK && where.where == EBPO_IN)
@@ -94,7 +98,7 @@ static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_query_op
     if (o->deadline_ns)
         n.deadline = ebpo_clock() + o->deadline_ns;
     if (o->warm && c->warm)
-        ebpo_nearest_hint(&n, (const double (*)[3])c->warm_triangle, c->warm_face);
+        ebpo_nearest_begin_with(&n, (const double (*)[3])c->warm_triangle, c->warm_face, c->warm_told);
     ebpo_status status = search_everything(c, &n, error);
     if (status != EBPO_OK)
         return status;
@@ -106,10 +110,13 @@ static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_query_op
     ebpo_nearest_end(&n, o->max_distance, out);
     if (out->face == EBPO_NO_FACE)
         return EBPO_OK;
+    if (c->pinned && ebpo_looks_ahead(c->model))
+        ebpo_context_look_ahead(c, out->point);
     c->warm = true;
     c->warm_face = n.file_face;
+    c->warm_told = n.told_face;
     memcpy(c->warm_triangle, n.triangle, sizeof n.triangle);
-    return o->unsigned_distance ? EBPO_OK : give_sign(c, p, out, error);
+    return ebpo_give_sign(c, p, o, out, error);
 }
 
 /* --- the interval that the nodes of a level give --- */

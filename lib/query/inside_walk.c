@@ -82,7 +82,9 @@ static ebpo_status leaf_from_file(asking *a, const ebpo_place *place, ebpo_insid
     ebpo_model *m = a->context->model;
     ebpo_slice slice;
     ebpo_subtree *subtree;
-    ebpo_status status = ebpo_slice_read(&slice, m->chunks, place, error);
+    ebpo_status status = ebpo_model_has_room(m, place, error);
+    if (status == EBPO_OK)
+        status = ebpo_slice_read(&slice, m->chunks, place, error);
     if (status == EBPO_OK)
         status = ebpo_subtree_make(&subtree, &slice, m->info, false, 1, error);
     if (status == EBPO_OK) {
@@ -191,12 +193,9 @@ static bool answer_at_hand(asking *a, ebpo_inside_result *out, ebpo_status *stat
         ebpo_inside_settled(c, entry, out);
         return true;
     }
-    const ebpo_subtree *held = c->pinned && c->pinned_key == ebpo_entry_value(entry) ? c->pinned
-                               : c->own && c->own_key == ebpo_entry_value(entry)     ? c->own
-                                                                                      : NULL;
-    if (!held)
+    if (!c->pinned || c->pinned_key != ebpo_entry_value(entry))
         return false;
-    *status = ebpo_inside_subtree(c, held, a->at, a->p, out, error);
+    *status = ebpo_inside_subtree(c, c->pinned, a->at, a->p, out, error);
     return true;
 }
 

@@ -23,12 +23,13 @@ static uint64_t chunk_budget(uint64_t budget)
 
 static ebpo_slice_size whole_size(const ebpo_info *info)
 {
-    ebpo_slice_size size = { 0, 0, 0, info->face_count };
+    ebpo_slice_size size = { .new_faces = info->face_count };
     for (int i = 0; i < info->level_count; i++) {
         size.groups += info->level[i].gray_count;
         size.leaves += info->level[i].leaf_count;
         size.refs += info->level[i].ref_count;
     }
+    size.outer = size.refs; /* of the subtrees of any level together */
     return size;
 }
 
@@ -76,6 +77,21 @@ static void release_subtree(void *user, void *item)
 }
 
 /* --- how much, and where to cut --- */
+
+ebpo_status ebpo_model_has_room(const ebpo_model *m, const ebpo_place *place, ebpo_error *error)
+{
+    ebpo_slice_size size;
+    uint64_t keep, peak;
+    ebpo_status status = m->options.memory ? ebpo_slice_measure(m->chunks, place, &size, error) : EBPO_OK;
+    if (status != EBPO_OK || !m->options.memory)
+        return status;
+    ebpo_subtree_estimate(&size, m->info, &keep, &peak);
+    uint64_t taken = m->top->bytes + chunk_budget(m->options.memory);
+    if (taken + peak <= m->options.memory)
+        return EBPO_OK;
+    return ebpo_fail(error, EBPO_E_LIMIT, "the memory budget of %" PRIu64 " bytes does not hold a leaf of level %d, which takes up to %" PRIu64 " more than the %" PRIu64
+                     " in use; give a larger budget", m->options.memory, place->level, peak, taken);
+}
 
 /* Half the budget for subtrees must hold so many of the average size; the top may take a quarter. */
 static int choose_cut(const ebpo_info *info, uint64_t budget)
@@ -139,6 +155,7 @@ static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
     const ebpo_model_options *o = &m->options;
     ebpo_slice_size size = whole_size(m->info);
     uint64_t keep, peak;
+    size.outer = 0;
     ebpo_subtree_estimate(&size, m->info, &keep, &peak);
     int deepest = m->info->level_count - 1;
     if (o->cut_level >= 0)
@@ -229,8 +246,7 @@ static void let_go(ebpo_context *c)
 {
     if (c->pinned)
         ebpo_cache_unpin(c->model->cache, c->pinned_key);
-    release_subtree(c->model, c->own);
-    c->pinned = c->own = NULL;
+    c->pinned = NULL;
 }
 
 void ebpo_context_free(ebpo_context *c)
@@ -244,63 +260,34 @@ void ebpo_context_free(ebpo_context *c)
     free(c);
 }
 
-/* The subtrees whose cells touch this one's: EBP 2017, 4.2.3 (27 with itself). */
-static void prefetch_around(const ebpo_model *m, uint32_t below)
+/* Says what --memory would do instead of what the cache lacks. */
+static ebpo_status too_little(const ebpo_model *m, uint32_t below, ebpo_error *error)
 {
-    const ebpo_place *here = &m->top->below[below];
-    uint64_t keys[26];
-    unsigned count = 0;
-    uint32_t last = (1u << here->level) - 1;
-    for (int i = 0; i < 27; i++) {
-        uint32_t at[3];
-        bool within = i != 13;
-        for (int k = 0, rest = i; k < 3; k++, rest /= 3) {
-            at[k] = here->at[k] + (uint32_t)(rest % 3) - 1;
-            within = within && at[k] <= last;
-        }
-        uint32_t entry = m->top->nodes.root;
-        for (int level = 1; within && level <= here->level && ebpo_entry_kind_of(entry) == EBPO_ENTRY_GRAY; level++)
-            entry = m->top->nodes.group[ebpo_entry_value(entry)][ebpo_octant_at(at, here->level - level)];
-        if (within && ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW)
-            keys[count++] = ebpo_entry_value(entry);
-    }
-    ebpo_cache_prefetch(m->cache, keys, count);
-}
-
-static ebpo_status load_own(ebpo_context *c, uint32_t below, ebpo_subtree **out, ebpo_error *error)
-{
-    void *item = NULL;
-    uint64_t bytes;
-    if (c->own && c->own_key == below) {
-        *out = c->own;
-        return EBPO_OK;
-    }
-    let_go(c);
-    ebpo_status status = load_subtree(c->model, below, &item, &bytes, error);
-    if (status == EBPO_OK) {
-        *out = c->own = item;
-        c->own_key = below;
-    }
-    return status;
+    uint64_t peak, keep, least;
+    if (estimate_subtree((ebpo_model *)m, below, &peak, &keep, NULL) != EBPO_OK)
+        return EBPO_E_LIMIT;
+    least = m->top->bytes + peak;
+    while (m->top->bytes + chunk_budget(least) + peak > least)
+        least += least / 8 + 1;
+    return ebpo_fail(error, EBPO_E_LIMIT, "the memory budget of %" PRIu64 " bytes does not hold one subtree below level %d and what else is in use; a budget of %" PRIu64
+                     " would, or a higher cut level", m->options.memory, m->top->cut_level, least);
 }
 
 ebpo_status ebpo_context_subtree(ebpo_context *c, uint32_t below, ebpo_subtree **out, ebpo_error *error)
 {
     const ebpo_model *m = c->model;
     void *item;
-    if (m->options.loading != EBPO_LOAD_CACHE)
-        return load_own(c, below, out, error);
     if (c->pinned && c->pinned_key == below) {
         *out = c->pinned;
         return EBPO_OK;
     }
     let_go(c);
+    if (m->options.loading != EBPO_LOAD_CACHE)
+        ebpo_cache_clear(m->cache);
     ebpo_status status = ebpo_cache_get(m->cache, below, &item, NULL, error);
     if (status != EBPO_OK)
-        return status;
+        return status == EBPO_E_LIMIT && m->options.memory ? too_little(m, below, error) : status;
     *out = c->pinned = item;
     c->pinned_key = below;
-    if (m->options.prefetch)
-        prefetch_around(m, below);
     return EBPO_OK;
 }

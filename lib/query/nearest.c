@@ -43,13 +43,23 @@ void ebpo_nearest_begin(ebpo_nearest *n, const double p[3], double max_distance)
     n->passed_over = INFINITY;
 }
 
-void ebpo_nearest_hint(ebpo_nearest *n, const double triangle[3][3], uint64_t file_face)
+static void take(ebpo_nearest *n, const double triangle[3][3], const ebpo_distance_bounds *bounds, uint64_t file_face, uint64_t told_face)
 {
-    ebpo_triangle_distance_bounds(n->p, (const double (*)[3])triangle, &n->hint);
-    n->hinted = true;
-    n->hint_face = file_face;
-    n->upper = fmin(n->upper, n->hint.hi);
-    n->limit = fmin(n->limit, n->hint.hi);
+    n->found = true;
+    n->bounds = *bounds;
+    n->file_face = file_face;
+    n->told_face = told_face;
+    memcpy(n->triangle, triangle, sizeof n->triangle);
+    n->upper = fmin(n->upper, bounds->hi);
+    n->limit = fmin(n->limit, bounds->hi);
+}
+
+void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint64_t file_face, uint64_t told_face)
+{
+    ebpo_distance_bounds b;
+    ebpo_triangle_distance_bounds(n->p, (const double (*)[3])triangle, &b);
+    if (b.lo <= n->limit)
+        take(n, triangle, &b, file_face, told_face);
 }
 
 static bool same_corner(const double a[3], const double b[3])
@@ -81,29 +91,20 @@ static void look_at(ebpo_nearest *n, const ebpo_subtree *s, uint32_t slot)
     if (local == EBPO_NO_SLOT)
         return;
     uint64_t file_face = ebpo_subtree_file_face(s, local);
+    if (n->found && file_face == n->file_face)
+        return;
     double triangle[3][3];
     ebpo_distance_bounds b;
     ebpo_subtree_triangle(s, slot, triangle);
-    if (n->hinted && file_face == n->hint_face)
-        b = n->hint;
-    else
-        ebpo_triangle_distance_bounds(n->p, (const double (*)[3])triangle, &b);
+    ebpo_triangle_distance_bounds(n->p, (const double (*)[3])triangle, &b);
     if (b.lo > n->limit)
         return;
     if (n->found) {
-        if (file_face == n->file_face)
-            return;
         int sign = compare(n, (const double (*)[3])triangle, &b);
         if (sign > 0 || (sign == 0 && file_face > n->file_face))
             return;
     }
-    n->found = true;
-    n->bounds = b;
-    n->file_face = file_face;
-    n->told_face = ebpo_subtree_told_face(s, local);
-    memcpy(n->triangle, triangle, sizeof triangle);
-    n->upper = fmin(n->upper, b.hi);
-    n->limit = fmin(n->limit, b.hi);
+    take(n, (const double (*)[3])triangle, &b, file_face, ebpo_subtree_told_face(s, local));
 }
 
 void ebpo_nearest_leaf(ebpo_nearest *n, const ebpo_subtree *s, const ebpo_subtree_leaf *leaf)
@@ -130,7 +131,7 @@ static bool make_probe(const ebpo_subtree *s, const double p[3], ebpo_probe *out
     }
     out->scale = (float)s->scale;
     out->scale64 = s->scale;
-    out->error = (float)most * 0x1p-20f;
+    out->error = (float)most * 0x1p-19f; /* three axes, three roundings each, of numbers up to `most` + 2 */
     return true;
 }
 
@@ -319,21 +320,19 @@ static void search_far(ebpo_nearest *n, const ebpo_subtree *s, uint32_t child)
     }
 }
 
-ebpo_status ebpo_nearest_search(ebpo_nearest *n, ebpo_context *context, const ebpo_subtree *s, ebpo_error *error)
+void ebpo_nearest_search(ebpo_nearest *n, const ebpo_context *context, const ebpo_subtree *s)
 {
-    (void)error;
     searching g;
     g.n = n;
     g.kernels = context->model->kernels;
     g.s = s;
     g.count = 0;
     if (s->bound_count == 0)
-        return EBPO_OK;
+        return;
     if (make_probe(s, n->p, &g.probe))
         search_near(&g);
     else
         search_far(n, s, s->top);
-    return EBPO_OK;
 }
 
 void ebpo_nearest_end(const ebpo_nearest *n, double max_distance, ebpo_distance_result *out)

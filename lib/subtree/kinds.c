@@ -21,7 +21,7 @@ typedef struct leaf_faces {
     int count;
     double p[FACES_MAX][3][3];
     uint32_t slot[FACES_MAX];
-    double low[3], size[3];
+    double low[3], size[3], inverse[3];
 } leaf_faces;
 
 typedef struct piece {
@@ -111,26 +111,25 @@ static void set_listed_box(ebpo_listed_block *out, const block_boxes *b, const d
     }
 }
 
-static void add_face(const ebpo_subtree *s, uint32_t slot, const double inverse[3], leaf_faces *f)
+static void add_face(const ebpo_subtree *s, uint32_t slot, leaf_faces *f)
 {
     double t[3][3];
     ebpo_subtree_triangle(s, slot, t);
     for (int i = 0; i < 9; i++)
-        f->p[f->count][i / 3][i % 3] = (t[i / 3][i % 3] - f->low[i % 3]) * inverse[i % 3];
+        f->p[f->count][i / 3][i % 3] = (t[i / 3][i % 3] - f->low[i % 3]) * f->inverse[i % 3];
     f->slot[f->count++] = slot;
 }
 
 /* Gathers the faces whose boxes meet the cell, the walls that they come to, and the boxes of the list. False when they are not to be had: too many, or a cell too small for what follows. */
 static bool gather(ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const double low[3], const double high[3], leaf_faces *f, unsigned *walls)
 {
-    double inverse[3];
     bool fine = true;
     f->count = 0;
     *walls = 0;
     for (int k = 0; k < 3; k++) {
         f->low[k] = low[k];
         f->size[k] = high[k] - low[k];
-        inverse[k] = 1 / f->size[k];
+        f->inverse[k] = 1 / f->size[k];
         fine = fine && f->size[k] > 0x1p-900;
     }
     bool few = fine;
@@ -139,11 +138,11 @@ static bool gather(ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const double 
         block_boxes boxes;
         look_at_block(s, block->block, low, high, &boxes, walls); /* lanes without a face are far away */
         if (fine)
-            set_listed_box(block, &boxes, low, inverse);
+            set_listed_box(block, &boxes, low, f->inverse);
         for (unsigned near = boxes.near; near && few; near &= near - 1) {
             few = f->count < FACES_MAX;
             if (few)
-                add_face(s, block->block * EBPO_BLOCK + (unsigned)__builtin_ctz(near), inverse, f);
+                add_face(s, block->block * EBPO_BLOCK + (unsigned)__builtin_ctz(near), f);
         }
     }
     return few;
@@ -181,19 +180,25 @@ typedef struct plane {
 } plane;
 
 /* The plane of a face in the cell's coordinates, 1-norm 1. False when rounding could have touched it: a sliver, or corners far outside the cell. */
-static bool face_plane(const double p[3][3], plane *out)
+static bool face_plane(const ebpo_subtree *s, const leaf_faces *f, int face, plane *out)
 {
-    double norm = 0, products = 0, reach = 0;
+    const double (*p)[3] = (const double (*)[3])f->p[face];
+    double t[3][3], e[3], g[3], norm = 0, products = 0, reach = 0;
+    ebpo_subtree_triangle(s, f->slot[face], t);
+    for (int k = 0; k < 3; k++) { /* of the corners as they are: those in the cell's coordinates are rounded, which short edges do not stand */
+        e[k] = (t[1][k] - t[0][k]) * f->inverse[k];
+        g[k] = (t[2][k] - t[0][k]) * f->inverse[k];
+    }
     for (int k = 0; k < 3; k++) {
         int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
-        double a = (p[1][u] - p[0][u]) * (p[2][v] - p[0][v]), b = (p[1][v] - p[0][v]) * (p[2][u] - p[0][u]);
+        double a = e[u] * g[v], b = e[v] * g[u];
         out->n[k] = a - b;
         norm += fabs(a - b);
         products += fabs(a) + fabs(b);
         reach = most3(reach, most3(fabs(p[0][k]), fabs(p[1][k]), fabs(p[2][k])), 0);
     }
     /* n is right to 2^-50 of the products, so to 2^-40 of its norm, and n . xi to 2^-33 for every corner: less than what sides_of calls certain. */
-    if (!(norm > products * 0x1p-10) || !(reach < 64))
+    if (!(norm > products * 0x1p-10) || !(products > 0x1p-900) || !(reach < 64))
         return false;
     out->d = 0;
     for (int k = 0; k < 3; k++) {
@@ -247,7 +252,7 @@ static int collect_planes(const ebpo_subtree *s, const leaf_faces *f, plane *out
     unsigned allowed = 3; /* bit 0: convex is still possible, bit 1: concave */
     for (int i = 0; i < f->count; i++) {
         plane q;
-        if (!face_plane(f->p[i], &q))
+        if (!face_plane(s, f, i, &q))
             return 0;
         unsigned sides = sides_of(s, f, i, &q, 3);
         allowed &= (sides & 1 ? 2u : 3u) & (sides & 2 ? 1u : 3u);

@@ -1,3 +1,4 @@
+/* A subtree from its slice, stage by stage, and how much memory that takes. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -147,7 +148,7 @@ void ebpo_subtree_free(ebpo_subtree *s)
 /* Blocks are more than half full but for the last of each leaf or list; lists name at most one block for each listed face. */
 void ebpo_subtree_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep, uint64_t *peak)
 {
-    uint64_t wide = needs_doubles(info) ? 2 : 1, faces = size->new_faces + size->refs;
+    uint64_t wide = needs_doubles(info) ? 2 : 1, faces = size->new_faces + size->outer;
     uint64_t blocks = faces / 4 + 2, bounds = blocks / 3 + 2;
     *keep = sizeof(ebpo_subtree) + size->groups * 64 + size->leaves * (sizeof(ebpo_subtree_leaf) + 64) + (size->refs + size->new_faces) * sizeof(ebpo_listed_block) +
             blocks * (EBPO_BLOCK_NUMBERS * 4 * wide + 32) + bounds * sizeof(ebpo_bound) + faces * 8;
