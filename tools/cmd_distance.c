@@ -50,6 +50,8 @@ static int run(int argc, char **argv)
     arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
     if (parsed != ARGS_RUN)
         return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    if (!query_distance_fits("distance", &v) || (v.level >= 0 && !query_accepts("distance", &v, QUERY_MAX_DISTANCE, "--level")))
+        return EXIT_USAGE;
     static ebpo_distance_result results[POINTS_BATCH];
     query_job job = { .command = "distance", .values = &v, .kind = POINTS, .answer = answer, .results = results };
     return query_run(&job, operand[0], operand[1]);

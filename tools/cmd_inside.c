@@ -40,6 +40,8 @@ static int run(int argc, char **argv)
     arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
     if (parsed != ARGS_RUN)
         return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    if (!query_inside_fits("inside", &v))
+        return EXIT_USAGE;
     static ebpo_inside_result results[POINTS_BATCH];
     query_job job = { .command = "inside", .values = &v, .kind = POINTS, .answer = answer, .results = results };
     return query_run(&job, operand[0], operand[1]);

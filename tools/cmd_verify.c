@@ -131,6 +131,8 @@ static int run(int argc, char **argv)
     arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
     if (parsed != ARGS_RUN)
         return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    if (!command_wants_hdf5("verify", operand[0]))
+        return EXIT_FAILED;
     progress_line line;
     ebpo_progress progress = progress_start(&line, "verify", v.quiet);
     ebpo_error error = EBPO_ERROR_INIT;

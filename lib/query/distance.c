@@ -184,12 +184,25 @@ static ebpo_status one(ebpo_context *c, const double p[3], const ebpo_query_opti
     return o->level >= 0 ? limited(c, p, o, out, error) : exact(c, p, o, out, error);
 }
 
+/* Modes that cannot keep to a level or a deadline say so. */
+static ebpo_status check_mode(const ebpo_query_options *o, ebpo_error *error)
+{
+    bool around = o->mode == EBPO_DISTANCE_RECURSIVE || o->mode == EBPO_DISTANCE_LEAVES;
+    if (around && (o->level >= 0 || o->deadline_ns))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "the recursive and leaves modes of distance know neither level nor deadline; leave these away, or take the exact mode");
+    if (o->mode == EBPO_DISTANCE_ENVELOPE && o->deadline_ns)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "the envelope mode of distance knows no deadline; give a level instead");
+    return EBPO_OK;
+}
+
 ebpo_status ebpo_distance_many(ebpo_context *context, const double *points, uint64_t count, const ebpo_query_options *options,
                                ebpo_distance_result *out, ebpo_error *error)
 {
     static const ebpo_query_options usual = EBPO_QUERY_OPTIONS_INIT;
     const ebpo_query_options *o = options ? options : &usual;
     ebpo_status status = ebpo_check_options(o, error);
+    if (status == EBPO_OK)
+        status = check_mode(o, error);
     if (status == EBPO_OK)
         status = ebpo_check_points(points, count, error);
     if (status == EBPO_OK && o->level < 0 && o->mode != EBPO_DISTANCE_ENVELOPE)

@@ -1,10 +1,10 @@
-#include "query/ahead.h"
 #include "query/options.h"
 
 #include <inttypes.h>
 #include <math.h>
 
 #include "base/error.h"
+#include "query/ahead.h"
 #include "query/inside.h"
 #include "query/limited.h"
 
