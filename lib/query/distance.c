@@ -83,7 +83,7 @@ ebpo_status ebpo_give_sign(ebpo_context *c, const double p[3], const ebpo_query_
 {
     ebpo_inside_result where;
     ebpo_query_options plain = EBPO_QUERY_OPTIONS_INIT;
-    if (!c->model->info->solid || o->unsigned_distance || out->face == EBPO_NO_FACE || !(out->distance > 0))
+    if (!c->model->info->solid || o->unsigned_distance || out->face == EBPO_NO_FACE)
         return EBPO_OK;
     ebpo_status status = c->model->whole ? ebpo_inside_whole(c, p, 1, &where, error) : ebpo_inside_walk(c, p, &plain, &where, error);
     if (status == EBPO_OK && where.where == EBPO_IN)

@@ -165,9 +165,11 @@ static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
     if (o->memory == 0 || peak <= o->memory)
         return open_whole(m, error);
     int cut = choose_cut(m->info, o->memory);
-    if (cut < 0)
+    if (cut < 0) {
+        uint64_t least = least_budget(m->info);
         return ebpo_fail(error, EBPO_E_LIMIT, "a budget of %" PRIu64 " bytes is too small for this model; give at least %" PRIu64, o->memory,
-                         least_budget(m->info));
+                         least < peak ? least : peak);
+    }
     return open_top(m, cut, error);
 }
 

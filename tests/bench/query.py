@@ -275,7 +275,7 @@ def deepest(model, most):
 
 def section_modes(bench, page, models):
     model = max(models, key=lambda m: m.faces)
-    (budget, words), count = small_budget(bench, model), max(1, bench.options.count // 20)
+    (budget, words), count = small_budget(bench, model), max(1, bench.options.count // 100)
     page.text("## Modes of the EBP thesis", "", f"Point in solid, {model.name} ({model.faces:,} faces), {count:,} points, us; with a budget "
               f"of {words}. Beside EBP 2017, table 25: means of three models of 26 to 28 million faces, on another machine. "
               "*plain*: without envelopes.")
@@ -298,7 +298,7 @@ def section_modes(bench, page, models):
 
 def section_distance_modes(bench, page, models):
     model = max(models, key=lambda m: m.faces)
-    (budget, words), count = small_budget(bench, model), max(1, bench.options.count // 20)
+    (budget, words), count = small_budget(bench, model), max(1, bench.options.count // 200)
     page.text("## Distance modes of the EBP thesis", "", f"{model.name}, {count:,} points, us; *exact* gives the minimum, the others do not "
               f"promise it. Everything in memory, and with a budget of {words}. Beside EBP 2017, table 28.")
     kinds = [(f"`{mode}`", ["--mode", mode], EBP_DISTANCE.get(mode, ("-", "-"))) for mode in ["exact", "recursive", "leaves"]]

@@ -128,7 +128,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_inside_many(ebpo_context *context, const
 #define EBPO_NO_FACE UINT64_MAX
 
 typedef struct ebpo_distance_result {
-    double distance;  /* correctly rounded. Solids, unless unsigned: negative inside. INFINITY: nothing within max_distance; NAN: not determined (lo, hi) */
+    double distance;  /* correctly rounded. Solids, unless unsigned: negative inside (-0.0 where it underflows). INFINITY: nothing within max_distance; NAN: not determined (lo, hi) */
     double lo, hi;    /* the true distance (unsigned) is certainly within; equal to |distance| for exact answers */
     double point[3];  /* nearest point, rounded; NAN: none */
     double normal[3]; /* unit normal of the face (outward by its orientation); of a face without area: (0, 0, 0) */
