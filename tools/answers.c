@@ -6,6 +6,8 @@
 #include <stdio_ext.h>
 #include <string.h>
 
+#include "command.h"
+
 const char *const where_words[] = { "OUT", "IN", "ON", "MAYBE" };
 
 /* --- answers leave whole --- */
@@ -13,15 +15,18 @@ const char *const where_words[] = { "OUT", "IN", "ON", "MAYBE" };
 /* A pipe takes so much at once; the last answer under it leaves before the next one begins. ANSWER: the longest one, but for lists of hits and faces. */
 enum { CHUNK = 4096, ANSWER = 512 };
 
-void answers_begin(void)
+static const char *printing; /* the command */
+
+void answers_begin(const char *name)
 {
+    printing = name;
     setvbuf(stdout, NULL, _IOFBF, 1 << 18);
 }
 
 static void leave_whole(void)
 {
     if (__fpending(stdout) > CHUNK - ANSWER)
-        fflush(stdout); /* a failure is kept by the stream and told by command_flush */
+        command_flush(printing); /* a failure stays with the stream: the loop of questions sees it */
 }
 
 /* --- raw --- */

@@ -82,11 +82,11 @@ static void wait_until(uint64_t when)
         ;
 }
 
-/* Of ascending times: the least one that no more than 1 - share of them exceed. */
-static uint64_t quantile(const uint64_t *sorted, uint64_t count, double share)
+/* Of ascending times: the least one that no more than 1 - thousandths / 1000 of them exceed. */
+static uint64_t quantile(const uint64_t *sorted, uint64_t count, unsigned thousandths)
 {
-    uint64_t rank = (uint64_t)(share * (double)count);
-    return sorted[rank < count ? rank : count - 1];
+    uint64_t below = count / 1000 * thousandths + (count % 1000 * thousandths + 999) / 1000;
+    return sorted[below ? below - 1 : 0];
 }
 
 ebpo_status bench_singly(const bench_job *job, ebpo_context *context, uint64_t clock_cost, bench_figures *out, ebpo_error *error)
@@ -108,9 +108,9 @@ ebpo_status bench_singly(const bench_job *job, ebpo_context *context, uint64_t c
         sum += (double)job->ns[i];
     qsort(job->ns, job->count, sizeof *job->ns, compare_u64);
     out->mean = sum / (double)job->count;
-    out->p50 = quantile(job->ns, job->count, 0.5);
-    out->p99 = quantile(job->ns, job->count, 0.99);
-    out->p999 = quantile(job->ns, job->count, 0.999);
+    out->p50 = quantile(job->ns, job->count, 500);
+    out->p99 = quantile(job->ns, job->count, 990);
+    out->p999 = quantile(job->ns, job->count, 999);
     out->max = job->ns[job->count - 1];
     return EBPO_OK;
 }

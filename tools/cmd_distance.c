@@ -13,6 +13,7 @@ static const arg_option options[] = {
     ARG_SWITCH("no-warm", 0, query_values, no_warm, "do not begin with the answer before; the answers are the same"),
     QUERY_LIMIT_OPTIONS("look at levels 0 to L only and print lo and hi, between which\nthe distance is"),
     QUERY_MODEL_OPTIONS,
+    QUERY_PREFETCH_OPTION,
     QUERY_FORM_OPTIONS("points are three doubles each, answers seven doubles and a uint64,\nor lo and hi (little-endian)"),
     { 0 },
 };

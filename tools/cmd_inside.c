@@ -10,6 +10,7 @@ static const arg_option options[] = {
       0, 0, inside_modes },
     QUERY_LIMIT_OPTIONS("look at levels 0 to L only: IN and OUT are certain, else MAYBE"),
     QUERY_MODEL_OPTIONS,
+    QUERY_PREFETCH_OPTION,
     QUERY_FORM_OPTIONS("points are three doubles each, answers two int32 (little-endian)"),
     { 0 },
 };

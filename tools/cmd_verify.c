@@ -145,7 +145,7 @@ static int run(int argc, char **argv)
         print_json(&report, operand[0]);
     else if (!v.quiet)
         print_words(&report, operand[0]);
-    fflush(stdout);
+    command_flush("verify");
     print_violations(&report, operand[0]);
     return report.violations ? EXIT_FAILED : EXIT_FINE;
 }

@@ -47,8 +47,9 @@ bool query_inside_fits(const char *name, const query_values *v)
 
 bool query_distance_fits(const char *name, const query_values *v)
 {
-    static const unsigned idle[] = { 0, QUERY_LEVEL | QUERY_DEADLINE | QUERY_NO_WARM | QUERY_PREFETCH, QUERY_LEVEL | QUERY_DEADLINE | QUERY_NO_WARM | QUERY_PREFETCH,
-                                     QUERY_DEADLINE | QUERY_MAX_DISTANCE | QUERY_UNSIGNED | QUERY_NO_WARM | QUERY_PREFETCH };
+    enum { AROUND = QUERY_LEVEL | QUERY_DEADLINE | QUERY_NO_WARM | QUERY_PREFETCH,
+           ENVELOPE = QUERY_DEADLINE | QUERY_MAX_DISTANCE | QUERY_UNSIGNED | QUERY_NO_WARM | QUERY_PREFETCH };
+    static const unsigned idle[] = { 0, AROUND, AROUND, ENVELOPE };
     char with[40];
     snprintf(with, sizeof with, "--mode %s", distance_modes[v->distance_mode]);
     if (!query_accepts(name, v, idle[v->distance_mode], with))
@@ -96,7 +97,8 @@ bool query_options_from(const char *name, const query_values *v, ebpo_model_opti
 {
     *model = (ebpo_model_options)EBPO_MODEL_OPTIONS_INIT;
     *query = (ebpo_query_options)EBPO_QUERY_OPTIONS_INIT;
-    model->cut_level = (int)v->cut_level;
+    /* What is below the level is not looked at, so it need not be in memory. */
+    model->cut_level = v->cut_level < 0 && !v->memory && v->level >= 0 ? (int)v->level : (int)v->cut_level;
     model->loading = inside_meanings[v->inside_mode].loading;
     model->prefetch = v->prefetch;
     model->threads = (unsigned)v->threads;

@@ -22,8 +22,10 @@ typedef struct query_values {
       "bytes that the model may take: 64M, 1G, 512K (powers of 1024);\n0, the default: as much as it needs", 0, 0, NULL }, \
     { "cut-level", 0, ARG_INT, offsetof(query_values, cut_level), "C", \
       "keep levels 0 to C in memory, load subtrees below on demand;\nthe default: all at once where --memory allows", 0, 20, NULL }, \
-    ARG_SWITCH("prefetch", 0, query_values, prefetch, "load subtrees around the last one in the background"), \
     { "threads", 0, ARG_INT, offsetof(query_values, threads), "N", "threads for opening; 0, the default: all cores", 0, 256, NULL }
+
+/* Rays and boxes look at many subtrees anyway: nothing is loaded ahead of them. */
+#define QUERY_PREFETCH_OPTION ARG_SWITCH("prefetch", 0, query_values, prefetch, "load subtrees around the last one in the background")
 
 #define QUERY_FORM_OPTIONS(raw_text) \
     ARG_SWITCH("raw", 0, query_values, raw, raw_text), \

@@ -36,7 +36,7 @@ int query_run(query_job *job, const char *model, const char *path)
     if (!query_options_from(job->command, v, &holding, &job->options))
         return EXIT_USAGE;
     job->form = v->json ? ANSWERS_JSON : v->raw ? ANSWERS_RAW : ANSWERS_TEXT;
-    answers_begin();
+    answers_begin(job->command);
     int code = EXIT_FAILED;
     double *rows = malloc(sizeof *rows * POINTS_BATCH * POINTS_WIDEST);
     bool opened = points_open(&in, job->command, path, job->kind, v->raw, v->tmax);
