@@ -4,7 +4,7 @@
     tests/bench/query.py BUILD_DIR MODEL.ply... [--count N] [--faces-from-generator M [--base BASE.ply]] -o docs/queries.md
 
 BUILD_DIR: a release build configured with -Dpeers=enabled (tools/install-deps.sh --bench installs what that needs).
-Each model is converted once (kept in --work); every figure is the median of --rounds runs in which the programs take turns, one thread each,
+Each model is converted once (kept in --work); every figure is the median of --rounds runs (a third of that above a million faces) in which the programs take turns, one thread each,
 on one core. The modes are measured on the largest model.
 
 What is asked of `ebpo bench FILE --query inside|distance|ray --points uniform|path --seed S --count N --json`: --save-points and --save-answers (both
@@ -61,6 +61,9 @@ class Bench:
         self.work = pathlib.Path(options.work or self.build / "bench-query")
         self.work.mkdir(parents=True, exist_ok=True)
         self.load = []
+
+    def rounds(self, model):
+        return self.options.rounds if model.faces < 1000000 else max(1, self.options.rounds // 3)
 
     def run(self, *command, pinned=True):
         command = [str(c) for c in command]
@@ -184,7 +187,7 @@ def compare(bench, model, query, points):
     raw = bench.work / f"{model.name}.{query}.{points}.raw"
     answers = {who: bench.work / f"answers.{who}" for who in ["ebpo"] + PEERS}
     reports = {who: [] for who in ["ebpo", "embree", "embree warm", "cgal"]}
-    for _ in range(bench.options.rounds):
+    for _ in range(bench.rounds(model)):
         reports["ebpo"].append(bench.ours(model, query, "--count", count, "--save-points", raw, "--save-answers", answers["ebpo"],
                                           points=points))
         for peer in PEERS:
@@ -234,7 +237,7 @@ def section_opening(bench, page, models):
         for model in sorted(models, key=lambda m: m.faces):
             raw = bench.work / f"{model.name}.{query}.opening.raw"
             runs = {who: [] for who in ["ebpo"] + PEERS}
-            for _ in range(bench.options.rounds):
+            for _ in range(bench.rounds(model)):
                 runs["ebpo"].append(bench.ours(model, query, "--count", 100, "--save-points", raw))
                 for peer in PEERS:
                     runs[peer].append(bench.peer(peer, model, query, raw, "--cold", "--count", 1))
@@ -264,7 +267,7 @@ def small_budget(bench, model):
 
 def both_points(bench, model, query, count, *arguments):
     """Medians for uniform points and a path."""
-    reports = {points: [bench.ours(model, query, "--count", count, *arguments, points=points) for _ in range(bench.options.rounds)]
+    reports = {points: [bench.ours(model, query, "--count", count, *arguments, points=points) for _ in range(bench.rounds(model))]
                for points in ["uniform", "path"]}
     return reports
 
@@ -323,7 +326,7 @@ def section_out_of_core(bench, page, models):
             count = max(1, bench.options.count // SHARE.get((query, "path"), 1))
             for prefetch in [[], ["--prefetch"]]:
                 runs = [bench.ours(model, query, "--count", count, "--memory", budget, *prefetch, points="path", pinned=not prefetch)
-                        for _ in range(bench.options.rounds)]
+                        for _ in range(bench.rounds(model))]
                 rows.append([model.name, f"{model.faces:,}", query, "yes" if prefetch else "no", words.split(" of the")[0]]
                             + [us(median(runs, n)) for n in ["mean", "p50", "p99", "p999", "max"]]
                             + [figure(median(runs, "loads")), figure(median(runs, "memory_peak") / 2**20),
@@ -360,7 +363,8 @@ def processor():
 
 
 def command_line(options):
-    words = ["tests/bench/query.py", "BUILD_DIR"] + [pathlib.Path(m).name for m in options.models] + ["--count", str(options.count)]
+    words = ["tests/bench/query.py", "BUILD_DIR"] + [pathlib.Path(m).name for m in options.models]
+    words += ["--count", str(options.count), "--rounds", str(options.rounds)]
     if options.faces_from_generator:
         words += ["--faces-from-generator", str(options.faces_from_generator)]
         words += ["--base", pathlib.Path(options.base).name] if options.base else []
@@ -411,10 +415,16 @@ def main():
     bench, page = Bench(options), Page()
     plies = list(options.models) + ([generated(bench)] if options.faces_from_generator else [])
     models = [Model(bench, ply) for ply in plies]
-    sections(bench, page, models, wanted)
+    for section in SECTIONS: # the page is whole after each
+        if section in wanted:
+            sections(bench, page, models, [section])
+            write(options, bench, page)
+
+
+def write(options, bench, page):
     head = Page()
     head.text("# Queries", "", f"Made by `{command_line(options)}`; nothing here was typed in but the theses' figures, which the script names. {processor()}, "
-              f"one thread on one core, medians of {options.rounds} runs in which the programs take turns; load average of the machine meanwhile "
+              f"one thread on one core, medians of {options.rounds} runs (a third of that above a million faces) in which the programs take turns; load average of the machine meanwhile "
               f"{statistics.median(bench.load):.1f} (median), {max(bench.load):.1f} (most). Compare within a row.")
     pathlib.Path(options.output).write_text("\n".join(head.lines + page.lines).rstrip("\n") + "\n")
 
