@@ -110,8 +110,8 @@ static void look_at(ebpo_nearest *n, const ebpo_subtree *s, uint32_t slot)
 void ebpo_nearest_leaf(ebpo_nearest *n, const ebpo_subtree *s, const ebpo_subtree_leaf *leaf)
 {
     for (uint32_t b = 0; b < leaf->blocks; b++)
-        for (uint32_t lane = 0; lane < EBPO_BLOCK; lane++)
-            look_at(n, s, s->list[leaf->list + b].block * EBPO_BLOCK + lane);
+        for (unsigned lanes = s->list[leaf->list + b].lanes; lanes; lanes &= lanes - 1)
+            look_at(n, s, s->list[leaf->list + b].block * EBPO_BLOCK + (unsigned)__builtin_ctz(lanes));
 }
 
 /* --- near: single precision --- */

@@ -64,15 +64,15 @@ typedef struct block_boxes {
     unsigned near; /* a bit for each face */
 } block_boxes;
 
-/* Finds which of a block's faces have boxes that meet the cell, and which walls these boxes come to (bit 2 axis + side). Exact comparisons. */
-static void look_at_block(const ebpo_subtree *s, uint32_t block, const double low[3], const double high[3], block_boxes *out, unsigned *walls)
+/* Finds which of the faces listed in a block have boxes that meet the cell, and which walls these boxes come to (bit 2 axis + side). Exact comparisons. */
+static void look_at_block(const ebpo_subtree *s, const ebpo_listed_block *listed, const double low[3], const double high[3], block_boxes *out, unsigned *walls)
 {
     int away[EBPO_BLOCK] = { 0 }, touches[EBPO_BLOCK] = { 0 };
     for (int k = 0; k < 3; k++) {
         double x[3][EBPO_BLOCK];
         for (int i = 0; i < 3; i++)
             for (int lane = 0; lane < EBPO_BLOCK; lane++) {
-                uint64_t at = (uint64_t)block * EBPO_BLOCK_NUMBERS + (uint64_t)(3 * i + k) * EBPO_BLOCK + (uint64_t)lane;
+                uint64_t at = (uint64_t)listed->block * EBPO_BLOCK_NUMBERS + (uint64_t)(3 * i + k) * EBPO_BLOCK + (uint64_t)lane;
                 x[i][lane] = s->wide ? s->block64[at] : (double)s->block32[at];
             }
         for (int lane = 0; lane < EBPO_BLOCK; lane++) {
@@ -85,8 +85,9 @@ static void look_at_block(const ebpo_subtree *s, uint32_t block, const double lo
     }
     out->near = 0;
     for (int lane = 0; lane < EBPO_BLOCK; lane++) {
-        out->near |= (unsigned)!away[lane] << lane;
-        *walls |= away[lane] ? 0 : (unsigned)touches[lane];
+        bool near = listed->lanes >> lane & 1 && !away[lane];
+        out->near |= (unsigned)near << lane;
+        *walls |= near ? (unsigned)touches[lane] : 0;
     }
 }
 
@@ -136,7 +137,7 @@ static bool gather(ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const double 
     for (uint32_t b = 0; b < leaf->blocks; b++) {
         ebpo_listed_block *block = &s->list[leaf->list + b];
         block_boxes boxes;
-        look_at_block(s, block->block, low, high, &boxes, walls); /* lanes without a face are far away */
+        look_at_block(s, block, low, high, &boxes, walls);
         if (fine)
             set_listed_box(block, &boxes, low, f->inverse);
         for (unsigned near = boxes.near; near && few; near &= near - 1) {
@@ -152,13 +153,13 @@ static bool gather(ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const double 
 static int32_t crossings(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const double from[3], double to, int axis)
 {
     int32_t sum = 0;
-    for (uint32_t i = 0; i < leaf->blocks * EBPO_BLOCK; i++) {
-        uint32_t slot = s->list[leaf->list + i / EBPO_BLOCK].block * EBPO_BLOCK + i % EBPO_BLOCK;
-        double t[3][3];
-        if (s->slot_face[slot] == EBPO_NO_SLOT)
-            continue;
-        ebpo_subtree_triangle(s, slot, t);
-        sum += ebpo_axis_crossing(from, to, axis, t[0], t[1], t[2]);
+    for (uint32_t b = 0; b < leaf->blocks; b++) {
+        const ebpo_listed_block *listed = &s->list[leaf->list + b];
+        for (unsigned lanes = listed->lanes; lanes; lanes &= lanes - 1) {
+            double t[3][3];
+            ebpo_subtree_triangle(s, listed->block * EBPO_BLOCK + (unsigned)__builtin_ctz(lanes), t);
+            sum += ebpo_axis_crossing(from, to, axis, t[0], t[1], t[2]);
+        }
     }
     return sum;
 }
