@@ -41,8 +41,9 @@ typedef struct ebpo_model_options {
 typedef struct ebpo_model ebpo_model;
 
 /* Reads what the budget allows: everything, or the levels up to the cut level. Levels whose mesh part is absent serve level-limited questions only.
- * EBPO_E_LIMIT when the budget is too small, with one that would do (about the least). A budget that opens holds the average subtree many times, but perhaps
- * not the largest one: the question that needs that one is EBPO_E_LIMIT too, with the budget that would do. The file must stay open as long as the model. `options` may be NULL. */
+ * EBPO_E_LIMIT when the budget is too small, with one that would do (about the least). A budget that opens holds the average subtree many times, but
+ * perhaps not the largest one: the question that needs it then is EBPO_E_LIMIT too, with the budget that would do.
+ * The file must stay open as long as the model. `options` may be NULL. */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_model_open(ebpo_model **out, ebpo_file *file, const ebpo_model_options *options, ebpo_error *error);
 /* After its contexts. NULL is fine. */
 EBPO_API void ebpo_model_close(ebpo_model *model);
