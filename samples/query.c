@@ -8,42 +8,46 @@
 
 static const char *const words[] = { "OUT", "IN", "ON", "MAYBE" };
 
-static ebpo_status answer(ebpo_context *context, bool solid, const double point[3], ebpo_error *error)
+static bool answer(ebpo_context *context, bool solid, const double point[3], ebpo_error *error)
 {
     ebpo_inside_result where = { EBPO_MAYBE, 0, 0 }; /* a surface has no inside, but distances */
     ebpo_distance_result nearest;
-    ebpo_status status = solid ? ebpo_inside(context, point, NULL, &where, error) : EBPO_OK;
-    if (status == EBPO_OK)
-        status = ebpo_distance(context, point, NULL, &nearest, error);
-    if (status == EBPO_OK)
-        printf("%s, %.17g from face %" PRIu64 " at %.17g %.17g %.17g\n", solid ? words[where.where] : "surface", nearest.distance, nearest.face,
-               nearest.point[0], nearest.point[1], nearest.point[2]);
-    return status;
+    if ((solid && ebpo_inside(context, point, NULL, &where, error) != EBPO_OK) || ebpo_distance(context, point, NULL, &nearest, error) != EBPO_OK)
+        return false;
+    printf("%s, %.17g from face %" PRIu64 " at %.17g %.17g %.17g\n", solid ? words[where.where] : "surface", nearest.distance, nearest.face,
+           nearest.point[0], nearest.point[1], nearest.point[2]);
+    return true;
 }
 
 int main(int argc, char **argv)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT; /* options.memory = 64 << 20 holds it to 64 MB */
     ebpo_file *file = NULL;
-    ebpo_model *model = NULL;
+    ebpo_model *model = NULL;     /* as a whole; ebpo_model_options hold it to less memory */
     ebpo_context *context = NULL; /* one for each thread */
+    char line[1000];
     double p[3];
-    if (argc != 2) {
-        fprintf(stderr, "usage: query MODEL.ebpo.h5 <points.txt\n");
-        return 2;
+    if (argc != 2)
+        return fputs("usage: query MODEL.ebpo.h5 <points.txt\n", stderr), 2;
+    bool good = ebpo_open(&file, argv[1], &error) == EBPO_OK && ebpo_model_open(&model, file, NULL, &error) == EBPO_OK &&
+                ebpo_context_new(&context, model, &error) == EBPO_OK;
+    for (long number = 1; good && fgets(line, sizeof line, stdin); number++) {
+        int end = 0, count = sscanf(line, "%lf %lf %lf %n", &p[0], &p[1], &p[2], &end);
+        if (count == EOF) /* an empty line */
+            continue;
+        good = count == 3 && line[end] == 0;
+        if (good)
+            good = answer(context, ebpo_file_info(file)->solid, p, &error);
+        else
+            snprintf(error.message, sizeof error.message, "line %ld: three numbers are expected", number);
     }
-    ebpo_status status = ebpo_open(&file, argv[1], &error);
-    if (status == EBPO_OK)
-        status = ebpo_model_open(&model, file, &options, &error);
-    if (status == EBPO_OK)
-        status = ebpo_context_new(&context, model, &error);
-    while (status == EBPO_OK && scanf("%lf %lf %lf", &p[0], &p[1], &p[2]) == 3)
-        status = answer(context, ebpo_file_info(file)->solid, p, &error);
-    if (status != EBPO_OK)
+    if (!good)
         fprintf(stderr, "query: %s\n", error.message);
+    good = fflush(stdout) == 0 && !ferror(stdout) && good; /* a full disk shows here */
+    if (ferror(stdout))
+        perror("query: standard output");
     ebpo_context_free(context);
     ebpo_model_close(model);
     ebpo_close(file);
-    return status != EBPO_OK;
+    return !good;
 }

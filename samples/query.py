@@ -3,13 +3,16 @@
 
     samples/query.py MODEL.ebpo.h5 <points.txt
 
-Reads lines "x y z" and answers each. The library is found where the system looks, or at EBPO_LIBRARY=/path/to/libebpo.so.
+Reads lines "x y z", with blanks or commas between, and answers each. The library is found where the system looks, or at EBPO_LIBRARY=/path/to/libebpo.so.
 As a module:  model = Model("bunny.ebpo.h5"); model.inside([(0, 0, 0)]); model.distance([(0, 0, 0)])
 """
 import ctypes
 import ctypes.util
 import os
+import re
 import sys
+
+NOT_SOLID = -7  # ebpo/base.h
 
 
 class Error(ctypes.Structure):  # ebpo/base.h
@@ -39,6 +42,9 @@ class Model:
         self.call("ebpo_model_open", ctypes.byref(self.model), self.file, None)
         self.call("ebpo_context_new", ctypes.byref(self.context), self.model)
 
+        error = Error()  # a question about no points tells whether there is an inside
+        self.solid = self.library.ebpo_inside_many(self.context, None, ctypes.c_uint64(0), None, None, ctypes.byref(error)) != NOT_SOLID
+
     def call(self, function, *arguments):
         error = Error()
         if getattr(self.library, function)(*arguments, ctypes.byref(error)) != 0:
@@ -57,15 +63,31 @@ class Model:
         return self.ask("ebpo_distance_many", Distance, points)
 
 
+def parse(line, number):
+    """A point, or None for an empty line."""
+    line = line.split("#")[0].strip()
+    if not line:
+        return None
+    try:
+        x, y, z = map(float, re.split(r"\s*,\s*|\s+", line))
+    except ValueError:
+        raise RuntimeError(f"line {number}: three numbers are expected") from None
+    return x, y, z
+
+
 def main():
     if len(sys.argv) != 2:
         sys.exit("usage: query.py MODEL.ebpo.h5 <points.txt")
     try:
-        points = [tuple(map(float, line.split())) for line in sys.stdin if line.strip()]
         model = Model(sys.argv[1])
-        for where, nearest in zip(model.inside(points), model.distance(points)):
-            print(f"{where.word}, {nearest.distance!r} from face {nearest.face} at", *map(repr, nearest.point))
-    except (RuntimeError, ValueError, OSError) as error:
+        for number, line in enumerate(sys.stdin, 1):
+            point = parse(line, number)
+            if point is None:
+                continue
+            where = model.inside([point])[0].word if model.solid else "surface"
+            nearest = model.distance([point])[0]
+            print(f"{where}, {nearest.distance!r} from face {nearest.face} at", *map(repr, nearest.point))
+    except (RuntimeError, OSError) as error:
         sys.exit(f"query.py: {error}")
 
 

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "geom/distance.h"
+#include "geom/distance_pairs.h"
 
 typedef struct point {
     mpq_t x[3];
@@ -195,7 +195,7 @@ START_TEST(distances_are_rounded_correctly_and_lie_within_their_bounds)
         exact_square(square, p, (const double (*)[3])t);
         ebpo_triangle_nearest n;
         ebpo_distance_bounds b;
-        ebpo_triangle_nearest_exact(p, (const double (*)[3])t, &n);
+        ebpo_triangle_nearest_exact(p, (const double (*)[3])t, NULL, &n);
         ebpo_triangle_distance_bounds(p, (const double (*)[3])t, &b);
         ck_assert_msg(rounded_correctly(n.distance, square), "case %d: %a is not the distance", i, n.distance);
         ck_assert_msg(compare_square(b.lo, b.lo, square) <= 0, "case %d: lower bound %a is above %a", i, b.lo, n.distance);
@@ -270,6 +270,45 @@ START_TEST(unit_normals_are_right_also_of_slivers)
 }
 END_TEST
 
+#if defined(__x86_64__)
+/* What the callers see to: no product of four differences of coordinates leaves the doubles. */
+static bool in_range(const double *x, int n)
+{
+    for (int i = 0; i < n; i++)
+        if (x[i] != 0 && (fabs(x[i]) > 0x1p100 || fabs(x[i]) < 0x1p-60))
+            return false;
+    return true;
+}
+
+START_TEST(processors_with_fma_give_the_same_bits)
+{
+    if (!__builtin_cpu_supports("fma"))
+        return;
+    int measured = 0, normals = 0;
+    state = 80;
+    for (int i = 0; i < 4 * CASES; i++) {
+        double p[3], t[3][3], n[3] = { 0, 0, 0 }, m[3] = { 0, 0, 0 };
+        make_case(i % 12, p, t);
+        ebpo_distance_bounds b;
+        ebpo_triangle_distance_bounds(p, (const double (*)[3])t, &b);
+        bool base = ebpo_distance_pairs_base.unit_normal((const double (*)[3])t, n);
+        ck_assert_int_eq(base, ebpo_distance_pairs_fma.unit_normal((const double (*)[3])t, m));
+        ck_assert_msg(!base || memcmp(n, m, sizeof n) == 0, "case %d: normals differ", i);
+        normals += base;
+        if (b.feature == EBPO_NEAR_UNKNOWN || !in_range(p, 3) || !in_range(t[0], 9))
+            continue;
+        ebpo_measured x, y;
+        ebpo_distance_pairs_base.measure(p, (const double (*)[3])t, b.feature, &x);
+        ebpo_distance_pairs_fma.measure(p, (const double (*)[3])t, b.feature, &y);
+        ck_assert_msg(memcmp(&x, &y, sizeof x) == 0, "case %d: %a and %a", i, x.distance.head, y.distance.head);
+        measured++;
+    }
+    ck_assert_int_gt(measured, CASES);
+    ck_assert_int_gt(normals, CASES);
+}
+END_TEST
+#endif
+
 int main(void)
 {
     Suite *suite = suite_create("distance");
@@ -278,6 +317,9 @@ int main(void)
     tcase_add_test(exact, distances_are_rounded_correctly_and_lie_within_their_bounds);
     tcase_add_test(exact, comparisons_are_exact_also_of_equal_distances);
     tcase_add_test(exact, unit_normals_are_right_also_of_slivers);
+#if defined(__x86_64__)
+    tcase_add_test(exact, processors_with_fma_give_the_same_bits);
+#endif
     suite_add_tcase(suite, exact);
     SRunner *runner = srunner_create(suite);
     srunner_run_all(runner, CK_NORMAL);

@@ -1,5 +1,6 @@
 /* Questions in all modes: however a file is loaded, whatever the budget, the order, the threads: the answers are the same; with limits they are certain. */
 #include <check.h>
+#include <inttypes.h>
 #include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
@@ -317,6 +318,38 @@ START_TEST(the_theses_modes_never_claim_too_much)
 }
 END_TEST
 
+/* What a leaf or a node has is told by the file, not by what lies beside it in memory. */
+START_TEST(the_theses_modes_do_not_depend_on_what_is_in_memory)
+{
+    asked a;
+    begin(&a, _i, 300);
+    ebpo_distance_result *resident = calloc(a.count, sizeof *resident);
+    for (int mode = EBPO_DISTANCE_RECURSIVE; mode <= EBPO_DISTANCE_ENVELOPE; mode++) {
+        ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
+        options.mode = (ebpo_distance_mode)mode;
+        ASSERT_OK(ebpo_distance_many(a.m.context, a.points, a.count, &options, resident, error));
+        for (int cut = 1; cut < a.m.info.level_count; cut++) {
+            ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+            ebpo_model *model;
+            ebpo_context *context;
+            how.cut_level = cut;
+            ASSERT_OK(ebpo_model_open(&model, a.m.file, &how, error));
+            ASSERT_OK(ebpo_context_new(&context, model, error));
+            ASSERT_OK(ebpo_distance_many(context, a.points, a.count, &options, a.distance, error));
+            for (uint64_t i = 0; i < a.count; i++) {
+                const ebpo_distance_result *got = a.distance + i, *want = resident + i;
+                ck_assert_msg(got->face == want->face && memcmp(&got->distance, &want->distance, sizeof got->distance) == 0, "mode %d, cut level %d, point (%a, %a, %a): %a of face %" PRIu64
+                              ", resident %a of face %" PRIu64, mode, cut, a.points[3 * i], a.points[3 * i + 1], a.points[3 * i + 2], got->distance, got->face, want->distance, want->face);
+            }
+            ebpo_context_free(context);
+            ebpo_model_close(model);
+        }
+    }
+    free(resident);
+    end(&a);
+}
+END_TEST
+
 /* --- a file without mesh --- */
 
 START_TEST(a_file_without_mesh_answers_by_levels_only)
@@ -465,6 +498,7 @@ int main(void)
     tcase_add_loop_test(tests, answers_limited_to_a_level_do_not_depend_on_what_is_in_memory, 0, CASES);
     tcase_add_loop_test(tests, answers_limited_by_a_deadline_are_certain, 0, CASES);
     tcase_add_loop_test(tests, the_theses_modes_never_claim_too_much, 0, CASES);
+    tcase_add_loop_test(tests, the_theses_modes_do_not_depend_on_what_is_in_memory, 0, CASES);
     tcase_add_loop_test(tests, a_file_without_mesh_answers_by_levels_only, 0, CASES);
     tcase_add_loop_test(threads, four_threads_get_the_answers_of_one, 0, CASES);
     tcase_add_loop_test(threads, four_threads_share_a_small_budget, 0, CASES);

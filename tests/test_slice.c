@@ -195,7 +195,7 @@ static void compare_faces(const ebpo_slice *s, const ebpo_tree *tree)
 
 static void compare_counts(const compare *c, const ebpo_slice_size *size)
 {
-    ebpo_slice_size sum = { 0, 0, 0, 0 };
+    ebpo_slice_size sum = { 0 };
     for (int i = 0; i < c->slice->level_count; i++) {
         const ebpo_level *l = &c->slice->level[i];
         ck_assert_uint_eq(l->white_count, c->next[i][EBPO_WHITE]);
@@ -212,6 +212,8 @@ static void compare_counts(const compare *c, const ebpo_slice_size *size)
         sum.refs += l->ref_count;
         sum.new_faces += l->new_count;
     }
+    sum.outer = c->slice->root.level == 0 ? 0 : sum.refs;
+    ck_assert_uint_le(c->slice->outer_count, sum.outer);
     ck_assert_uint_eq(sum.new_faces, c->slice->face_count);
     ck_assert_mem_eq(&sum, size, sizeof sum);
 }

@@ -3,9 +3,31 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stddef.h>
+#include <stdio_ext.h>
 #include <string.h>
 
+#include "command.h"
+
 const char *const where_words[] = { "OUT", "IN", "ON", "MAYBE" };
+
+/* --- answers leave whole --- */
+
+/* A pipe takes so much at once; the last answer under it leaves before the next one begins. ANSWER: the longest one, but for lists of hits and faces. */
+enum { CHUNK = 4096, ANSWER = 512 };
+
+static const char *printing; /* the command */
+
+void answers_begin(const char *name)
+{
+    printing = name;
+    setvbuf(stdout, NULL, _IOFBF, 1 << 18);
+}
+
+static void leave_whole(void)
+{
+    if (__fpending(stdout) > CHUNK - ANSWER)
+        command_flush(printing); /* a failure stays with the stream: the loop of questions sees it */
+}
 
 /* --- raw --- */
 
@@ -76,6 +98,7 @@ void answers_inside(answer_form form, const ebpo_inside_result *results, uint64_
             inside_json(r);
         else
             inside_text(r);
+        leave_whole();
     }
 }
 
@@ -135,8 +158,10 @@ static void distance_raw(bool limited, const ebpo_distance_result *r)
 
 void answers_distance(answer_form form, bool limited, const ebpo_distance_result *results, uint64_t count)
 {
-    for (uint64_t i = 0; i < count; i++)
+    for (uint64_t i = 0; i < count; i++) {
         (form == ANSWERS_RAW ? distance_raw : form == ANSWERS_JSON ? distance_json : distance_text)(limited, &results[i]);
+        leave_whole();
+    }
 }
 
 /* --- rays and boxes --- */
@@ -169,6 +194,7 @@ void answers_ray_first(answer_form form, const ebpo_ray_hit *hit)
     } else {
         puts("-");
     }
+    leave_whole();
 }
 
 void answers_ray_all(answer_form form, const ebpo_ray_hit *hits, uint64_t count)
@@ -188,6 +214,7 @@ void answers_ray_all(answer_form form, const ebpo_ray_hit *hits, uint64_t count)
             printf(" %.17g %" PRIu64 " %" PRId32, hits[i].t, hits[i].face, hits[i].side);
     if (form != ANSWERS_RAW)
         puts(form == ANSWERS_JSON ? "]" : "");
+    leave_whole();
 }
 
 void answers_box(answer_form form, const uint64_t *faces, uint64_t count)
@@ -205,6 +232,7 @@ void answers_box(answer_form form, const uint64_t *faces, uint64_t count)
             printf("%s%" PRIu64, form == ANSWERS_JSON ? (i ? ", " : "") : " ", faces[i]);
     if (form != ANSWERS_RAW)
         puts(form == ANSWERS_JSON ? "]" : "");
+    leave_whole();
 }
 
 /* --- sums --- */

@@ -1,5 +1,6 @@
 #include "bench_run.h"
 
+#include <errno.h>
 #include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
@@ -73,18 +74,29 @@ ebpo_status bench_ask(const bench_job *job, ebpo_context *context, uint64_t numb
     return ask_into(job, context, number, job->answers, error);
 }
 
-/* Of ascending times: the least one that no more than 1 - share of them exceed. */
-static uint64_t quantile(const uint64_t *sorted, uint64_t count, double share)
+/* Sleeps, as one who asks at a fixed rate does: others use the core meanwhile. */
+static void wait_until(uint64_t when)
 {
-    uint64_t rank = (uint64_t)(share * (double)count);
-    return sorted[rank < count ? rank : count - 1];
+    struct timespec t = { (time_t)(when / 1000000000), (long)(when % 1000000000) };
+    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, NULL) == EINTR)
+        ;
+}
+
+/* Of ascending times: the least one that no more than 1 - thousandths / 1000 of them exceed. */
+static uint64_t quantile(const uint64_t *sorted, uint64_t count, unsigned thousandths)
+{
+    uint64_t below = count / 1000 * thousandths + (count % 1000 * thousandths + 999) / 1000;
+    return sorted[below ? below - 1 : 0];
 }
 
 ebpo_status bench_singly(const bench_job *job, ebpo_context *context, uint64_t clock_cost, bench_figures *out, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     double sum = 0;
+    uint64_t begin = bench_clock();
     for (uint64_t i = 0; i < job->count && status == EBPO_OK; i++) {
+        if (job->rate > 0)
+            wait_until(begin + (uint64_t)((double)i / job->rate * 1e9));
         uint64_t start = bench_clock();
         status = bench_ask(job, context, i, error);
         uint64_t took = bench_clock() - start;
@@ -96,9 +108,9 @@ ebpo_status bench_singly(const bench_job *job, ebpo_context *context, uint64_t c
         sum += (double)job->ns[i];
     qsort(job->ns, job->count, sizeof *job->ns, compare_u64);
     out->mean = sum / (double)job->count;
-    out->p50 = quantile(job->ns, job->count, 0.5);
-    out->p99 = quantile(job->ns, job->count, 0.99);
-    out->p999 = quantile(job->ns, job->count, 0.999);
+    out->p50 = quantile(job->ns, job->count, 500);
+    out->p99 = quantile(job->ns, job->count, 990);
+    out->p999 = quantile(job->ns, job->count, 999);
     out->max = job->ns[job->count - 1];
     return EBPO_OK;
 }

@@ -20,6 +20,7 @@ typedef struct bench_job {
     const double *rows;
     int width;      /* doubles a row */
     uint64_t count;
+    double rate;    /* single questions a second; 0: as fast as they are answered */
     uint64_t *ns;   /* [count] */
     void *answers;  /* [count] of one member of bench_answer */
 } bench_job;

@@ -2,6 +2,7 @@
 #include <errno.h>
 #include <float.h>
 #include <inttypes.h>
+#include <math.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -19,10 +20,13 @@ typedef struct values {
     int query;
     const char *points, *mode, *save_points, *save_answers;
     int64_t count, seed, repeat;
+    double rate;
 } values;
 
 static const char *const query_words[] = { "inside", "distance", "ray", NULL };
 enum { REPEAT_MAX = 99 };
+/* What became of a question for a distance or a ray. Interval: level or deadline did not suffice. */
+enum { NOTHING, FOUND, INTERVAL };
 
 static const arg_option options[] = {
     { "query", 0, ARG_WORD, offsetof(values, query), "QUERY", "inside (the default), distance or ray", 0, 0, query_words },
@@ -32,12 +36,14 @@ static const arg_option options[] = {
     { "count", 0, ARG_INT, offsetof(values, count), "N", "how many; the default: 100000, or all of the file", 1, 1e9, NULL },
     { "seed", 0, ARG_INT, offsetof(values, seed), "S", "of uniform points and paths; the default: 1", 0, 1e15, NULL },
     { "repeat", 0, ARG_INT, offsetof(values, repeat), "R", "ask everything R times; the figures are those of the median mean", 1, REPEAT_MAX, NULL },
+    { "rate", 0, ARG_REAL, offsetof(values, rate), "HZ", "ask so many single questions a second, and sleep in between", 0, 1e9, NULL },
     { "mode", 'm', ARG_TEXT, offsetof(values, mode), "MODE", "as for 'ebpo inside' or 'ebpo distance'", 0, 0, NULL },
     { "max-distance", 0, ARG_REAL, offsetof(query_values, max_distance), "D", "as for 'ebpo distance'", 0, DBL_MAX, NULL },
     ARG_SWITCH("unsigned", 0, query_values, unsigned_distance, "as for 'ebpo distance'"),
     ARG_SWITCH("no-warm", 0, query_values, no_warm, "as for 'ebpo distance'"),
     QUERY_LIMIT_OPTIONS("look at levels 0 to L only"),
     QUERY_MODEL_OPTIONS,
+    QUERY_PREFETCH_OPTION,
     { "save-points", 0, ARG_TEXT, offsetof(values, save_points), "FILE", "write what was asked about, as little-endian doubles", 0, 0, NULL },
     { "save-answers", 0, ARG_TEXT, offsetof(values, save_answers), "FILE",
       "write the answers: inside a byte each, as in 'where';\nelse a double (distance or t) and an int64 (face or -1)", 0, 0, NULL },
@@ -65,7 +71,7 @@ typedef struct results {
     bench_figures figures;
     ebpo_model_stats model, model_end; /* after the first pass, and after all */
     traffic traffic;                   /* of the warm session */
-    uint64_t answered[4];              /* inside: by ebpo_where; else 0: nothing found, 1: found */
+    uint64_t answered[4];              /* inside: by ebpo_where; else NOTHING, FOUND or INTERVAL */
 } results;
 
 /* The words of --mode belong to the question. */
@@ -94,7 +100,7 @@ static int cold_start(const bench_job *job, const char *path, const ebpo_model_o
     ebpo_model_stats stats;
     r->cold_pages = bench_drop_file(path);
     uint64_t begin = bench_clock();
-    int code = query_open(&s, "bench", path, holding, remote);
+    int code = query_open(&s, "bench", path, holding, job->options.level, remote);
     r->cold_open_seconds = (double)(bench_clock() - begin) * 1e-9;
     if (code == EXIT_FINE && bench_ask(job, s.context, 0, &error) != EBPO_OK)
         code = command_failed("bench", &error);
@@ -128,14 +134,61 @@ static double median_batch(const bench_figures *f, int count)
     return median_by_mean(by_batch, count).mean;
 }
 
+/* Every file but the two words. */
+static bool is_generated(const char *what)
+{
+    return strcmp(what, "uniform") == 0 || strcmp(what, "path") == 0;
+}
+
+/* Options without effect are refused, or figures would be taken for something that they are not. */
+static bool options_fit(const values *v)
+{
+    char with[40];
+    unsigned idle = QUERY_UNSIGNED | QUERY_MAX_DISTANCE | QUERY_NO_WARM;
+    if (v->query == BENCH_RAY)
+        idle |= QUERY_LEVEL | QUERY_DEADLINE | QUERY_PREFETCH;
+    snprintf(with, sizeof with, "--query %s", query_words[v->query]);
+    if (v->q.raw && is_generated(v->points)) {
+        fprintf(stderr, "ebpo bench: --raw has no effect with --points %s; leave one of them away, or try 'ebpo bench --help'\n", v->points);
+        return false;
+    }
+    if (v->seed >= 0 && !is_generated(v->points)) {
+        fprintf(stderr, "ebpo bench: --seed has no effect with --points %s; leave one of them away, or try 'ebpo bench --help'\n", v->points);
+        return false;
+    }
+    if (v->query == BENCH_DISTANCE)
+        return query_distance_fits("bench", &v->q);
+    return query_accepts("bench", &v->q, idle, with) && query_inside_fits("bench", &v->q);
+}
+
+/* Bit by bit: NAN stands for what was not found. */
+static bool same_reals(const double *a, const double *b, int count)
+{
+    return memcmp(a, b, (size_t)count * sizeof *a) == 0;
+}
+
+static bool same_answer(bench_query query, const void *one, const void *other, uint64_t i)
+{
+    if (query == BENCH_INSIDE) {
+        const ebpo_inside_result *a = (const ebpo_inside_result *)one + i, *b = (const ebpo_inside_result *)other + i;
+        return a->where == b->where && a->winding == b->winding && same_reals(&a->doubt, &b->doubt, 1);
+    }
+    if (query == BENCH_DISTANCE) {
+        const ebpo_distance_result *a = (const ebpo_distance_result *)one + i, *b = (const ebpo_distance_result *)other + i;
+        return same_reals(&a->distance, &b->distance, 1) && same_reals(&a->lo, &b->lo, 1) && same_reals(&a->hi, &b->hi, 1) &&
+               same_reals(a->point, b->point, 3) && same_reals(a->normal, b->normal, 3) && a->face == b->face;
+    }
+    const ebpo_ray_hit *a = (const ebpo_ray_hit *)one + i, *b = (const ebpo_ray_hit *)other + i;
+    return same_reals(&a->t, &b->t, 1) && a->face == b->face && a->side == b->side;
+}
+
 /* The batch must say what single questions said, unless time decides. */
 static int compare_answers(const bench_job *job, const void *batch)
 {
-    size_t bytes = bench_answer_bytes(job->query);
     if (job->options.deadline_ns)
         return EXIT_FINE;
     for (uint64_t i = 0; i < job->count; i++)
-        if (memcmp((const char *)job->answers + i * bytes, (const char *)batch + i * bytes, bytes) != 0) {
+        if (!same_answer(job->query, job->answers, batch, i)) {
             fprintf(stderr, "ebpo bench: question %" PRIu64 " has one answer alone and another one in a batch: please report this\n", i);
             return EXIT_FAILED;
         }
@@ -171,9 +224,9 @@ static void count_answers(const bench_job *job, results *r)
         if (job->query == BENCH_INSIDE)
             r->answered[inside[i].where & 3]++;
         else if (job->query == BENCH_DISTANCE)
-            r->answered[distance[i].distance - distance[i].distance == 0]++;
+            r->answered[isnan(distance[i].distance) ? INTERVAL : isinf(distance[i].distance) ? NOTHING : FOUND]++;
         else
-            r->answered[hit[i].face != EBPO_NO_FACE]++;
+            r->answered[hit[i].face != EBPO_NO_FACE ? FOUND : NOTHING]++;
 }
 
 static int save_answers(const bench_job *job, const char *path)
@@ -204,8 +257,11 @@ static void print_answers(const values *v, const results *r)
     if (v->query == BENCH_INSIDE)
         printf("answers        %" PRIu64 " IN, %" PRIu64 " OUT, %" PRIu64 " ON, %" PRIu64 " MAYBE\n", r->answered[EBPO_IN], r->answered[EBPO_OUT],
                r->answered[EBPO_ON], r->answered[EBPO_MAYBE]);
+    else if (v->query == BENCH_DISTANCE)
+        printf("answers        %" PRIu64 " %s, %" PRIu64 " an interval, %" PRIu64 " nothing found\n", r->answered[FOUND],
+               v->q.distance_mode == EBPO_DISTANCE_EXACT ? "exact" : "found", r->answered[INTERVAL], r->answered[NOTHING]);
     else
-        printf("answers        %" PRIu64 " found, %" PRIu64 " not\n", r->answered[1], r->answered[0]);
+        printf("answers        %" PRIu64 " found, %" PRIu64 " nothing found\n", r->answered[FOUND], r->answered[NOTHING]);
 }
 
 static void print_results(const values *v, const char *path, uint64_t count, const results *r)
@@ -232,9 +288,10 @@ static void print_results(const values *v, const char *path, uint64_t count, con
 
 static void json_answers(json *j, const values *v, const results *r)
 {
-    static const char *const inside_names[] = { "out", "in", "on", "maybe" }, *const other_names[] = { "not_found", "found" };
+    static const char *const inside_names[] = { "out", "in", "on", "maybe" }, *const other_names[] = { "not_found", "found", "interval" };
+    int count = v->query == BENCH_INSIDE ? 4 : v->query == BENCH_DISTANCE ? 3 : 2;
     json_object(j, "answers");
-    for (int i = 0; i < (v->query == BENCH_INSIDE ? 4 : 2); i++)
+    for (int i = 0; i < count; i++)
         json_uint(j, v->query == BENCH_INSIDE ? inside_names[i] : other_names[i], r->answered[i]);
     json_end(j);
 }
@@ -280,8 +337,13 @@ static void print_json(const values *v, const char *path, uint64_t count, const 
     json_int(&j, "level", v->q.level);
     json_text(&j, "points", v->points);
     json_uint(&j, "count", count);
-    json_int(&j, "seed", v->seed);
+    if (is_generated(v->points))
+        json_int(&j, "seed", v->seed);
+    else
+        json_null(&j, "seed");
     json_int(&j, "repeat", v->repeat);
+    if (v->rate > 0)
+        json_real(&j, "rate", v->rate);
     json_figures(&j, r);
     json_answers(&j, v, r);
     stats_json(&j, "model", &r->model);
@@ -300,7 +362,7 @@ static int bench(bench_job *job, const values *v, const char *path, const ebpo_m
     int code = cold_start(job, path, holding, &v->q.remote, &r);
     uint64_t begin = bench_clock();
     if (code == EXIT_FINE)
-        code = query_open(&s, "bench", path, holding, &v->q.remote);
+        code = query_open(&s, "bench", path, holding, job->options.level, &v->q.remote);
     r.open_seconds = (double)(bench_clock() - begin) * 1e-9;
     if (code == EXIT_FINE)
         code = measure(job, &s, (int)v->repeat, batch, &r);
@@ -319,11 +381,8 @@ static int bench(bench_job *job, const values *v, const char *path, const ebpo_m
 static int prepare(const values *v, const char *path, bench_points *p)
 {
     points_kind kind = v->query == BENCH_RAY ? POINTS_RAYS : POINTS;
-    int is_hdf5 = command_is_hdf5("bench", path);
     *p = (bench_points){ .rows = NULL };
-    if (is_hdf5 == 0)
-        fprintf(stderr, "ebpo bench: %s: is not an .ebpo.h5 file; make one of a mesh with 'ebpo convert'\n", path);
-    if (is_hdf5 <= 0)
+    if (!command_wants_hdf5("bench", path))
         return EXIT_FAILED;
     int code = bench_points_make(p, kind, path, &v->q.remote, v->points, v->q.raw, (uint64_t)v->count, (uint64_t)v->seed);
     if (code == EXIT_FINE && v->save_points)
@@ -333,7 +392,7 @@ static int prepare(const values *v, const char *path, bench_points *p)
 
 static int run(int argc, char **argv)
 {
-    values v = { .q = QUERY_VALUES_INIT, .points = "uniform", .seed = 1, .repeat = 1 };
+    values v = { .q = QUERY_VALUES_INIT, .points = "uniform", .seed = -1, .repeat = 1 };
     const char *operand[ARGS_OPERANDS_MAX];
     ebpo_model_options holding;
     bench_job job = { .answers = NULL };
@@ -341,13 +400,16 @@ static int run(int argc, char **argv)
     arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
     if (parsed != ARGS_RUN)
         return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
-    if (!set_mode(&v) || !query_options_from("bench", &v.q, &holding, &job.options))
+    if (!set_mode(&v) || !options_fit(&v) || !query_options_from("bench", &v.q, &holding, &job.options))
         return EXIT_USAGE;
+    if (v.seed < 0)
+        v.seed = 1;
     int code = prepare(&v, operand[0], &p);
     job.query = (bench_query)v.query;
     job.rows = p.rows;
     job.width = points_width(p.kind);
     job.count = p.count;
+    job.rate = v.rate;
     size_t bytes = bench_answer_bytes(job.query);
     void *batch = calloc(p.count + 1, bytes);
     job.answers = calloc(p.count + 1, bytes);

@@ -77,7 +77,7 @@ static int run(int argc, char **argv)
         print_json(&p, operand[0]);
     else if (!v.quiet)
         print_words(&p, operand[0]);
-    fflush(stdout);
+    command_flush("check");
     report_warn(stderr, "check", operand[0], &p.report, &p.record);
     ebpo_mesh_free(&p.mesh);
     return v.require_solid && !p.report.balanced ? EXIT_NOT_SOLID : EXIT_FINE;

@@ -100,7 +100,7 @@ static void print_reports(const values *v, const prepared *p, const char *in)
         if (p->mended)
             report_print(stdout, "after mending", &p->mesh, &p->report);
     }
-    fflush(stdout);
+    command_flush("convert");
     report_warn(stderr, "convert", in, &p->report, &p->record);
 }
 

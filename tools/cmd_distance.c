@@ -13,6 +13,7 @@ static const arg_option options[] = {
     ARG_SWITCH("no-warm", 0, query_values, no_warm, "do not begin with the answer before; the answers are the same"),
     QUERY_LIMIT_OPTIONS("look at levels 0 to L only and print lo and hi, between which\nthe distance is"),
     QUERY_MODEL_OPTIONS,
+    QUERY_PREFETCH_OPTION,
     QUERY_FORM_OPTIONS("points are three doubles each, answers seven doubles and a uint64,\nor lo and hi (little-endian)"),
     { 0 },
 };
@@ -50,6 +51,8 @@ static int run(int argc, char **argv)
     arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
     if (parsed != ARGS_RUN)
         return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    if (!query_distance_fits("distance", &v) || (v.level >= 0 && !query_accepts("distance", &v, QUERY_MAX_DISTANCE, "--level")))
+        return EXIT_USAGE;
     static ebpo_distance_result results[POINTS_BATCH];
     query_job job = { .command = "distance", .values = &v, .kind = POINTS, .answer = answer, .results = results };
     return query_run(&job, operand[0], operand[1]);

@@ -94,6 +94,8 @@ static int run(int argc, char **argv)
     int code = check_values(&v, operand[0], operand[1]);
     if (code != EXIT_FINE)
         return code;
+    if (!command_wants_hdf5("extract", operand[0]))
+        return EXIT_FAILED;
     progress_line line;
     ebpo_progress progress = progress_start(&line, "extract", v.quiet);
     ebpo_error error = EBPO_ERROR_INIT;

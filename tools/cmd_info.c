@@ -34,13 +34,8 @@ static int run(int argc, char **argv)
     arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
     if (parsed != ARGS_RUN)
         return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
-    int is_hdf5 = command_is_hdf5("info", operand[0]);
-    if (is_hdf5 < 0)
+    if (!command_wants_hdf5("info", operand[0]))
         return EXIT_FAILED;
-    if (!is_hdf5) {
-        fprintf(stderr, "ebpo info: %s: is not an .ebpo.h5 file; for a mesh try 'ebpo check'\n", operand[0]);
-        return EXIT_FAILED;
-    }
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
     ebpo_status status = remote_open(&file, operand[0], &v.remote, &error);

@@ -10,6 +10,7 @@ static const arg_option options[] = {
       0, 0, inside_modes },
     QUERY_LIMIT_OPTIONS("look at levels 0 to L only: IN and OUT are certain, else MAYBE"),
     QUERY_MODEL_OPTIONS,
+    QUERY_PREFETCH_OPTION,
     QUERY_FORM_OPTIONS("points are three doubles each, answers two int32 (little-endian)"),
     { 0 },
 };
@@ -40,6 +41,8 @@ static int run(int argc, char **argv)
     arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
     if (parsed != ARGS_RUN)
         return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    if (!query_inside_fits("inside", &v))
+        return EXIT_USAGE;
     static ebpo_inside_result results[POINTS_BATCH];
     query_job job = { .command = "inside", .values = &v, .kind = POINTS, .answer = answer, .results = results };
     return query_run(&job, operand[0], operand[1]);

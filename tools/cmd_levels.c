@@ -1,9 +1,7 @@
 /* ebpo levels: the levels as they arrive, coarse to fine. */
-#include <errno.h>
 #include <inttypes.h>
 #include <stddef.h>
 #include <stdio.h>
-#include <string.h>
 #include <time.h>
 
 #include <ebpo/stream.h>
@@ -134,22 +132,13 @@ static ebpo_status tell_nodes(printer *p, ebpo_stream *stream, ebpo_error *error
 
 /* --- all levels --- */
 
-/* Whoever reads along sees each level when it is there; once nobody can, there is no point in reading on. */
-static ebpo_status hand_on(ebpo_error *error)
-{
-    if (fflush(stdout) == 0)
-        return EBPO_OK;
-    error->status = EBPO_E_IO;
-    snprintf(error->message, sizeof error->message, "standard output: %s", strerror(errno));
-    return EBPO_E_IO;
-}
-
-static ebpo_status tell_levels(printer *p, ebpo_stream *stream, int last, ebpo_error *error)
+/* Whoever reads along sees each level when it is there; once nobody can (*arrived false), there is no point in reading on. */
+static ebpo_status tell_levels(printer *p, ebpo_stream *stream, int last, bool *arrived, ebpo_error *error)
 {
     ebpo_stream_level level;
     ebpo_status status = EBPO_OK;
     bool more = true;
-    for (int i = 0; i <= last && status == EBPO_OK; i++) {
+    for (int i = 0; i <= last && status == EBPO_OK && *arrived; i++) {
         status = ebpo_stream_next_level(stream, &level, &more, error);
         if (status != EBPO_OK || !more)
             break;
@@ -162,8 +151,7 @@ static ebpo_status tell_levels(printer *p, ebpo_stream *stream, int last, ebpo_e
             status = tell_nodes(p, stream, error);
         if (p->v->json)
             json_end(&p->j);
-        if (status == EBPO_OK)
-            status = hand_on(error);
+        *arrived = command_flush("levels");
     }
     return status;
 }
@@ -174,17 +162,13 @@ static void print_head(const char *path, const ebpo_info *info)
     printf("%5s %9s %9s %9s %9s %10s %16s %9s %12s %9s\n", "level", "gray", "leaf", "white", "black", "planes", "volume", "% last", "bytes", "ms");
 }
 
-static ebpo_status tell(printer *p, ebpo_file *file, const char *path, ebpo_error *error)
+static ebpo_status tell(printer *p, ebpo_file *file, const char *path, bool *arrived, ebpo_error *error)
 {
     int last = p->info->level_count - 1;
     ebpo_stream_options wanted = EBPO_STREAM_OPTIONS_INIT;
     ebpo_stream *stream = NULL;
     wanted.planes = p->v->nodes;
     wanted.threads = (unsigned)p->v->threads;
-    if (p->v->to > last) {
-        fprintf(stderr, "ebpo levels: there is no level %d; this file has levels 0 to %d\n", (int)p->v->to, last);
-        return EBPO_E_ARGUMENT;
-    }
     ebpo_status status = ebpo_stream_new(&stream, file, &wanted, error);
     if (status != EBPO_OK)
         return status;
@@ -198,7 +182,7 @@ static ebpo_status tell(printer *p, ebpo_file *file, const char *path, ebpo_erro
     }
     int to = p->v->to >= 0 ? (int)p->v->to : last;
     ebpo_file_expect_levels(file, 0, to);
-    status = tell_levels(p, stream, to, error);
+    status = tell_levels(p, stream, to, arrived, error);
     traffic t = traffic_of(file);
     if (p->v->json) {
         json_end(&p->j);
@@ -221,13 +205,18 @@ static int run(int argc, char **argv)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
     printer p = { .v = &v, .begin = now() };
+    if (!command_wants_hdf5("levels", operand[0]))
+        return EXIT_FAILED;
     if (remote_open(&file, operand[0], &v.remote, &error) != EBPO_OK)
         return command_failed("levels", &error);
     p.info = ebpo_file_info(file);
-    ebpo_status status = tell(&p, file, operand[0], &error);
+    bool there = command_has_level("levels", p.info, v.to), arrived = true;
+    ebpo_status status = there ? tell(&p, file, operand[0], &arrived, &error) : EBPO_OK;
     ebpo_close(file);
-    if (status == EBPO_E_ARGUMENT && !error.message[0])
+    if (!there)
         return EXIT_USAGE;
+    if (!arrived)
+        return EXIT_FAILED;
     return status == EBPO_OK ? EXIT_FINE : command_failed("levels", &error);
 }
 

@@ -87,6 +87,11 @@ static int measure(const char *path, const values *v)
     ebpo_mass mass;
     if (remote_open(&file, path, &v->remote, &error) != EBPO_OK)
         return command_failed("measure", &error);
+    if (!(ebpo_file_info(file)->parts & EBPO_PART_MESH)) {
+        ebpo_close(file);
+        fprintf(stderr, "ebpo measure: %s: was written without its mesh, which is measured; convert the mesh again without '--without mesh'\n", path);
+        return EXIT_FAILED;
+    }
     ebpo_status status = ebpo_measure(file, (unsigned)v->threads, &mass, &error);
     traffic t = traffic_of(file);
     if (status == EBPO_OK && v->json) {
@@ -111,13 +116,7 @@ static int run(int argc, char **argv)
     arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
     if (parsed != ARGS_RUN)
         return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
-    int is_hdf5 = command_is_hdf5("measure", operand[0]);
-    if (is_hdf5 < 0)
-        return EXIT_FAILED;
-    if (is_hdf5)
-        return measure(operand[0], &v);
-    fprintf(stderr, "ebpo measure: %s: is not an .ebpo.h5 file; for a mesh try 'ebpo check'\n", operand[0]);
-    return EXIT_FAILED;
+    return command_wants_hdf5("measure", operand[0]) ? measure(operand[0], &v) : EXIT_FAILED;
 }
 
 const command command_measure = { &spec, run };

@@ -138,6 +138,8 @@ static int run(int argc, char **argv)
     arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
     if (parsed != ARGS_RUN)
         return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    if (!command_wants_hdf5("verify", operand[0]))
+        return EXIT_FAILED;
     progress_line line;
     ebpo_progress progress = progress_start(&line, "verify", v.quiet);
     ebpo_error error = EBPO_ERROR_INIT;
@@ -151,7 +153,7 @@ static int run(int argc, char **argv)
         print_json(&report, operand[0], &t, &v.remote);
     else if (!v.quiet)
         print_words(&report, remote_shown(operand[0]));
-    fflush(stdout);
+    command_flush("verify");
     print_violations(&report, remote_shown(operand[0]));
     if (!v.json)
         remote_tell(&t, &v.remote, false);

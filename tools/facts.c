@@ -89,9 +89,9 @@ static void print_bytes(FILE *out, const char *label, const ebpo_info *info, uin
 
 void facts_print(FILE *out, const char *path, const ebpo_info *info)
 {
-    char bytes[32], parts[64];
-    fprintf(out, "%s: EBP-Octree %d.%d, %s, levels 0 to %d, %s\n", path, info->version_major, info->version_minor,
-            info->solid ? "a solid" : "a surface", info->level_count - 1,
+    char bytes[32], parts[64], version[32];
+    fprintf(out, "%s: EBP-Octree %s, %s, levels 0 to %d, %s\n", path,
+            words_format(version, sizeof version, info->version_major, info->version_minor), info->solid ? "a solid" : "a surface", info->level_count - 1,
             words_bytes(bytes, sizeof bytes, info->file_bytes));
     print_source(out, info);
     report_print_mending(out, &info->mend);
@@ -204,9 +204,8 @@ static void json_storage(json *j, const ebpo_info *info)
 void facts_json(json *j, const char *path, const ebpo_info *info)
 {
     char version[32];
-    snprintf(version, sizeof version, "%d.%d", info->version_major, info->version_minor);
     json_text(j, "file", path);
-    json_text(j, "format", version);
+    json_text(j, "format", words_format(version, sizeof version, info->version_major, info->version_minor));
     json_text(j, "generator", info->generator);
     json_source(j, info);
     json_model(j, info);

@@ -9,6 +9,7 @@
 
 #include "command.h"
 #include "signals.h"
+#include "words.h"
 
 static const command *const commands[] = { &command_convert, &command_check,  &command_info, &command_levels,
                                            &command_extract, &command_measure, &command_render, &command_verify,
@@ -44,6 +45,34 @@ int command_is_hdf5(const char *name, const char *path)
     size_t got = fread(head, 1, sizeof head, f);
     fclose(f);
     return got == sizeof head && memcmp(head, signature, sizeof head) == 0;
+}
+
+bool command_wants_hdf5(const char *name, const char *path)
+{
+    int is_hdf5 = command_is_hdf5(name, path);
+    if (is_hdf5 == 0)
+        fprintf(stderr, "ebpo %s: %s: is not an .ebpo.h5 file; make one of a mesh with 'ebpo convert'\n", name, path);
+    return is_hdf5 > 0;
+}
+
+bool command_has_level(const char *name, const ebpo_info *info, int64_t level)
+{
+    if (level < info->level_count)
+        return true;
+    fprintf(stderr, "ebpo %s: there is no level %d; this file has levels 0 to %d\n", name, (int)level, info->level_count - 1);
+    return false;
+}
+
+bool command_flush(const char *name)
+{
+    static bool said;
+    errno = 0;
+    if (fflush(stdout) == 0 && !ferror(stdout))
+        return true;
+    if (!said)
+        fprintf(stderr, "ebpo%s%s: standard output: %s\n", name ? " " : "", name ? name : "", errno ? strerror(errno) : "could not be written");
+    said = true;
+    return false;
 }
 
 static const command *find(const char *name)
@@ -97,7 +126,8 @@ static int dispatch(int argc, char **argv)
     }
     const char *name = argv[1];
     if (strcmp(name, "--version") == 0 || strcmp(name, "-V") == 0) {
-        printf("ebpo %s, format %d.%d\n", ebpo_version(), EBPO_FORMAT_MAJOR, EBPO_FORMAT_MINOR);
+        char format[32];
+        printf("ebpo %s, format %s\n", ebpo_version(), words_format(format, sizeof format, EBPO_FORMAT_MAJOR, EBPO_FORMAT_MINOR));
         return EXIT_FINE;
     }
     if (strcmp(name, "help") == 0 || strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0)
@@ -106,20 +136,13 @@ static int dispatch(int argc, char **argv)
     return c ? c->run(argc - 1, argv + 1) : unknown_command(name);
 }
 
-/* What was printed counts only once it has arrived: a full disk shows here. */
-static int flush_output(int code)
-{
-    errno = 0;
-    if (fflush(stdout) == 0 && !ferror(stdout))
-        return code;
-    fprintf(stderr, "ebpo: standard output: %s\n", errno ? strerror(errno) : "could not be written");
-    return code ? code : EXIT_FAILED;
-}
-
 int main(int argc, char **argv)
 {
     signals_install();
-    int code = flush_output(dispatch(argc, argv));
+    int code = dispatch(argc, argv);
+    const command *c = argc > 1 ? find(argv[1]) : NULL;
+    if (!command_flush(c ? c->spec->command : NULL) && code == EXIT_FINE)
+        code = EXIT_FAILED;
     /* libhdf5 1.10 crashes in its exit handler after a file that could not be written; nothing is left for it to do. */
     if (code == EXIT_FAILED)
         _exit(code);

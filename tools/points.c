@@ -11,6 +11,8 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "command.h"
+
 enum { ROOM = 1 << 18 };
 
 /* What an attempt to take a row came to. */
@@ -30,7 +32,7 @@ __attribute__((format(printf, 2, 3))) static taken fail(points *p, const char *f
 {
     va_list list;
     va_start(list, format);
-    fflush(stdout); /* the answers so far come first where both go to one place */
+    command_flush(p->command); /* the answers so far come first where both go to one place */
     fprintf(stderr, "ebpo %s: %s: ", p->command, p->name);
     vfprintf(stderr, format, list);
     fputc('\n', stderr);
@@ -55,10 +57,10 @@ __attribute__((format(printf, 2, 3))) static taken fail_row(points *p, const cha
 
 /* --- bytes --- */
 
-bool points_open(points *p, const char *command, const char *path, points_kind kind, bool raw, double tmax)
+bool points_open(points *p, const char *by, const char *path, points_kind kind, bool raw, double tmax)
 {
     bool standard = !path || strcmp(path, "-") == 0;
-    *p = (points){ .command = command, .name = standard ? "standard input" : path, .kind = kind, .raw = raw, .tmax = tmax, .fd = STDIN_FILENO, .room = ROOM };
+    *p = (points){ .command = by, .name = standard ? "standard input" : path, .kind = kind, .raw = raw, .tmax = tmax, .fd = STDIN_FILENO, .room = ROOM };
     if (!standard)
         p->fd = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY);
     if (p->fd < 0)
@@ -255,14 +257,41 @@ static taken take_vertex(points *p, double *row)
 
 /* --- batches --- */
 
-/* The first bytes tell a PLY. */
+enum { HEAD = 8 }; /* bytes of HDF5's signature */
+
+static bool begins_as_hdf5(const points *p)
+{
+    return p->end >= HEAD && memcmp(p->buffer, "\211HDF\r\n\032\n", HEAD) == 0;
+}
+
+/* Raw doubles may begin with these four bytes, but hardly with letters behind: then the first one is about 1e219 or 1e243. */
+static bool begins_as_ply(const points *p)
+{
+    if (p->end < 4 || memcmp(p->buffer, "ply", 3) != 0 || (p->buffer[3] != '\n' && p->buffer[3] != '\r'))
+        return false;
+    for (size_t i = 5; i < HEAD && p->raw; i++)
+        if (i >= p->end || p->buffer[i] < 'a' || p->buffer[i] > 'z')
+            return false;
+    return true;
+}
+
+/* The first bytes tell a PLY, and files of other kinds. A short line of text is not kept waiting for more. */
 static void begin(points *p)
 {
     p->begun = true;
-    while (!p->raw && p->end < 4 && !p->ended && !p->failed)
+    while (p->end < (p->raw || (p->end && p->buffer[0] == '\211') ? HEAD : 4) && !p->ended && !p->failed)
         fill(p);
-    if (!p->raw && !p->failed && p->end >= 4 && memcmp(p->buffer, "ply", 3) == 0 && (p->buffer[3] == '\n' || p->buffer[3] == '\r'))
+    static const char *const wanted[] = { "points", "rays", "boxes" };
+    if (p->failed)
+        return;
+    if (begins_as_hdf5(p))
+        fail(p, "is an HDF5 file and holds no %s; the model comes first, what is asked about second", wanted[p->kind]);
+    else if (begins_as_ply(p) && !p->raw)
         read_ply(p);
+    else if (begins_as_ply(p) && p->kind == POINTS)
+        fail(p, "is a PLY and no raw doubles; it is read without --raw");
+    else if (begins_as_ply(p))
+        fail(p, "is a PLY, which holds points; %s are read as text or as raw doubles", wanted[p->kind]);
 }
 
 uint64_t points_next(points *p, double *rows)

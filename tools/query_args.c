@@ -17,6 +17,46 @@ static const struct {
     { EBPO_LOAD_SUBTREE, EBPO_ENVELOPES_SKIP },
 };
 
+/* --- options that have no effect beside others --- */
+
+bool query_accepts(const char *name, const query_values *v, unsigned idle, const char *with)
+{
+    const struct {
+        unsigned bit;
+        bool given;
+        const char *option;
+    } all[] = { { QUERY_LEVEL, v->level >= 0, "--level" },          { QUERY_DEADLINE, v->deadline != NULL, "--deadline" },
+                { QUERY_MAX_DISTANCE, isfinite(v->max_distance), "--max-distance" }, { QUERY_UNSIGNED, v->unsigned_distance, "--unsigned" },
+                { QUERY_NO_WARM, v->no_warm, "--no-warm" },         { QUERY_PREFETCH, v->prefetch, "--prefetch" } };
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
+        if (all[i].given && idle & all[i].bit) {
+            fprintf(stderr, "ebpo %s: %s has no effect with %s; leave one of them away, or try 'ebpo %s --help'\n", name, all[i].option, with, name);
+            return false;
+        }
+    return true;
+}
+
+bool query_inside_fits(const char *name, const query_values *v)
+{
+    char with[40];
+    snprintf(with, sizeof with, "--mode %s", inside_modes[v->inside_mode]);
+    return inside_meanings[v->inside_mode].loading == EBPO_LOAD_CACHE || query_accepts(name, v, QUERY_PREFETCH, with);
+}
+
+bool query_distance_fits(const char *name, const query_values *v)
+{
+    enum { AROUND = QUERY_LEVEL | QUERY_DEADLINE | QUERY_NO_WARM | QUERY_PREFETCH,
+           ENVELOPE = QUERY_DEADLINE | QUERY_MAX_DISTANCE | QUERY_UNSIGNED | QUERY_NO_WARM | QUERY_PREFETCH };
+    static const unsigned idle[] = { 0, AROUND, AROUND, ENVELOPE };
+    char with[40];
+    snprintf(with, sizeof with, "--mode %s", distance_modes[v->distance_mode]);
+    if (!query_accepts(name, v, idle[v->distance_mode], with))
+        return false;
+    return v->level < 0 || query_accepts(name, v, QUERY_UNSIGNED | QUERY_NO_WARM | QUERY_PREFETCH, "--level");
+}
+
+/* --- values --- */
+
 static bool read_size(const char *name, const char *text, uint64_t *out)
 {
     if (words_read_size(text, out))
@@ -39,7 +79,8 @@ bool query_options_from(const char *name, const query_values *v, ebpo_model_opti
 {
     *model = (ebpo_model_options)EBPO_MODEL_OPTIONS_INIT;
     *query = (ebpo_query_options)EBPO_QUERY_OPTIONS_INIT;
-    model->cut_level = (int)v->cut_level;
+    /* What is below the level is not looked at, so it need not be in memory. */
+    model->cut_level = v->cut_level < 0 && !v->memory && v->level >= 0 ? (int)v->level : (int)v->cut_level;
     model->loading = inside_meanings[v->inside_mode].loading;
     model->prefetch = v->prefetch;
     model->threads = (unsigned)v->threads;
@@ -52,18 +93,19 @@ bool query_options_from(const char *name, const query_values *v, ebpo_model_opti
     return (!v->memory || read_size(name, v->memory, &model->memory)) && (!v->deadline || read_time(name, v->deadline, &query->deadline_ns));
 }
 
-int query_open(query_session *s, const char *name, const char *path, const ebpo_model_options *options, const remote_values *remote)
+/* --- sessions --- */
+
+int query_open(query_session *s, const char *name, const char *path, const ebpo_model_options *options, int level, const remote_values *remote)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    int is_hdf5 = command_is_hdf5(name, path);
-    if (is_hdf5 <= 0) {
-        if (is_hdf5 == 0)
-            fprintf(stderr, "ebpo %s: %s: is not an .ebpo.h5 file; make one of a mesh with 'ebpo convert'\n", name, path);
+    if (!command_wants_hdf5(name, path))
         return EXIT_FAILED;
-    }
-    ebpo_status status = remote_open(&s->file, path, remote, &error);
-    if (status == EBPO_OK)
-        status = ebpo_model_open(&s->model, s->file, options, &error);
+    if (remote_open(&s->file, path, remote, &error) != EBPO_OK)
+        return command_failed(name, &error);
+    const ebpo_info *info = ebpo_file_info(s->file);
+    if (!command_has_level(name, info, level) || !command_has_level(name, info, options->cut_level))
+        return EXIT_USAGE;
+    ebpo_status status = ebpo_model_open(&s->model, s->file, options, &error);
     if (status == EBPO_OK)
         status = ebpo_context_new(&s->context, s->model, &error);
     return status == EBPO_OK ? EXIT_FINE : command_failed(name, &error);

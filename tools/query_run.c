@@ -1,22 +1,9 @@
 #include "query_run.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "command.h"
-
-/* An answer that cannot be delivered ends the work. */
-static bool deliver(const query_job *job)
-{
-    errno = 0;
-    if (fflush(stdout) == 0 && !ferror(stdout))
-        return true;
-    fprintf(stderr, "ebpo %s: standard output: %s\n", job->command, errno ? strerror(errno) : "could not be written");
-    clearerr(stdout); /* or main would say it again */
-    return false;
-}
 
 static int answer_all(const query_job *job, ebpo_context *context, points *in, double *rows)
 {
@@ -25,7 +12,7 @@ static int answer_all(const query_job *job, ebpo_context *context, points *in, d
     uint64_t count = 0;
     while (status == EBPO_OK && (count = points_next(in, rows)) > 0) {
         status = job->answer(job, context, rows, count, &error);
-        if (!deliver(job))
+        if (!command_flush(job->command)) /* an answer that cannot be delivered ends the work */
             return EXIT_FAILED;
     }
     if (status != EBPO_OK)
@@ -51,13 +38,14 @@ int query_run(query_job *job, const char *model, const char *path)
     if (!query_options_from(job->command, v, &holding, &job->options))
         return EXIT_USAGE;
     job->form = v->json ? ANSWERS_JSON : v->raw ? ANSWERS_RAW : ANSWERS_TEXT;
+    answers_begin(job->command);
     int code = EXIT_FAILED;
     double *rows = malloc(sizeof *rows * POINTS_BATCH * POINTS_WIDEST);
     bool opened = points_open(&in, job->command, path, job->kind, v->raw, v->tmax);
     if (!rows)
         fprintf(stderr, "ebpo %s: not enough memory\n", job->command);
     else if (opened)
-        code = query_open(&session, job->command, model, &holding, &v->remote);
+        code = query_open(&session, job->command, model, &holding, (int)v->level, &v->remote);
     if (session.context)
         code = answer_all(job, session.context, &in, rows);
     if (session.context && v->remote.stats)

@@ -50,6 +50,12 @@ char *words_parts(char *out, size_t room, uint32_t parts)
     return out;
 }
 
+char *words_format(char *out, size_t room, int major, int minor)
+{
+    snprintf(out, room, "%d.%d%s", major, minor, major == 1 && minor == 0 ? "-draft" : "");
+    return out;
+}
+
 const char *words_rule(ebpo_rule rule)
 {
     return (unsigned)rule < 3 ? rule_words[rule] : "unknown";

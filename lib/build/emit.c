@@ -100,13 +100,13 @@ static bool emit_list(const emitter *e, const ebpo_build_detail *d, ebpo_out *ou
     l->leaf_first[l->leaf_count] = d->first;
     l->leaf_new[l->leaf_count] = d->new_count;
     l->leaf_ref_count[l->leaf_count] = (uint32_t)refs;
-    uint32_t *ref = l->leaf_refs + l->ref_count;
+    uint32_t *refs_here = refs ? l->leaf_refs + l->ref_count : NULL, *ref = refs_here;
     for (uint64_t i = d->entry_begin; i < d->entry_end; i++) {
         uint32_t number = e->b->number[e->s->entries[i]];
         if (number < d->first)
             *ref++ = number;
     }
-    sort_numbers(l->leaf_refs + l->ref_count, refs);
+    sort_numbers(refs_here, refs);
     l->ref_count += refs;
     l->new_count += d->new_count;
     return true;

@@ -107,7 +107,7 @@ static ebpo_status check_leaves(const ebpo_check *check, const ebpo_info *info, 
         news += arrays->leaf_new[i];
         if (arrays->leaf_ref_count[i] > s->ref_count - refs)
             return ebpo_check_fail(check, level, "leaf_ref_count", "the counts exceed the number of references", error);
-        ebpo_status status = check_refs(check, level, arrays->leaf_refs + refs, arrays->leaf_ref_count[i], first, error);
+        ebpo_status status = check_refs(check, level, arrays->leaf_refs ? arrays->leaf_refs + refs : NULL, arrays->leaf_ref_count[i], first, error);
         if (status != EBPO_OK)
             return status;
         refs += arrays->leaf_ref_count[i];

@@ -277,5 +277,6 @@ ebpo_status ebpo_slice_measure(ebpo_chunks *chunks, const ebpo_place *root, ebpo
         if (status == EBPO_OK)
             status = measure_leaves(chunks, &r, out, error);
     }
+    out->outer = root->level == 0 ? 0 : out->refs;
     return status;
 }

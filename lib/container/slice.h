@@ -61,6 +61,7 @@ EBPO_MUST_USE ebpo_status ebpo_slice_read_all(ebpo_slice *out, ebpo_file *file, 
 /* What ebpo_slice_read of this place will need, without reading its faces: nodes, leaves, listed and new faces. */
 typedef struct ebpo_slice_size {
     uint64_t groups, leaves, refs, new_faces;
+    uint64_t outer; /* of the faces that are new elsewhere there are at most so many */
 } ebpo_slice_size;
 EBPO_MUST_USE ebpo_status ebpo_slice_measure(ebpo_chunks *chunks, const ebpo_place *root, ebpo_slice_size *out, ebpo_error *error);
 

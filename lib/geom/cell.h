@@ -4,6 +4,7 @@
 
 #include <stdbool.h>
 #include <stdint.h>
+#include <string.h>
 
 enum { EBPO_MAX_LEVEL = 20 };
 
@@ -21,10 +22,19 @@ typedef struct ebpo_cell {
     uint32_t at[3];
 } ebpo_cell;
 
+/* 2^-n, 0 <= n <= 1000. Multiplying with it rounds as dividing by 2^n does, in a fraction of the time. */
+static inline double ebpo_half_power(int n)
+{
+    uint64_t bits = (uint64_t)(1023 - n) << 52;
+    double out;
+    memcpy(&out, &bits, sizeof out);
+    return out;
+}
+
 /* Coordinate of the wall with number `k` (0 .. 2^level) at `level` on `axis`; exact for level <= grid_level: origin + k * (size / 2^level). */
 static inline double ebpo_wall(const ebpo_box *box, int axis, int level, uint32_t k)
 {
-    return box->origin[axis] + (double)k * (box->size[axis] / (double)(1u << level));
+    return box->origin[axis] + (double)k * (box->size[axis] * ebpo_half_power(level));
 }
 
 /* Builds the root box around [min, max] (finite, min <= max), strictly larger on every side, exact down to `grid_level` (0 .. 20).

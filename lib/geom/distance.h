@@ -26,8 +26,9 @@ typedef struct ebpo_triangle_nearest {
     double point[3];      /* nearest point, each coordinate within 8 ulp of the largest coordinate involved */
     ebpo_feature feature; /* certain, never UNKNOWN; the lowest-dimensional one that contains the nearest point */
 } ebpo_triangle_nearest;
-/* Double-double arithmetic with an error bound, integers of any size (GMP) when that does not decide the rounding. */
-void ebpo_triangle_nearest_exact(const double p[3], const double triangle[3][3], ebpo_triangle_nearest *out);
+/* Double-double arithmetic with an error bound, integers of any size (GMP) when that does not decide the rounding. `bounds`: what ebpo_triangle_distance_bounds gave for the same,
+ * or NULL. */
+void ebpo_triangle_nearest_exact(const double p[3], const double triangle[3][3], const ebpo_distance_bounds *bounds, ebpo_triangle_nearest *out);
 
 /* Sign of distance(p, a) - distance(p, b), exact. */
 int ebpo_triangle_distance_compare(const double p[3], const double a[3][3], const double b[3][3]);

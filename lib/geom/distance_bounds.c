@@ -109,6 +109,22 @@ static double plane_distance(const relation *r, double *error)
     return fabs(dot(r->normal, r->corner[0])) / length;
 }
 
+/* The plane is never farther than the triangle; a plane of unknown tilt tells nothing, but no point of the triangle is farther from its edges than its height. */
+static void bound_by_edges(const relation *r, double plane, double error, ebpo_distance_bounds *out)
+{
+    double edges = edge_distance(r, 0), length = sqrt(dot(r->normal, r->normal));
+    for (int i = 1; i < 3; i++) {
+        double other = edge_distance(r, i);
+        edges = other < edges ? other : edges;
+    }
+    double height = length > 0 ? 2 * length / r->size + 0x1p-44 * r->size : 0x1p-44 * r->size;
+    double low = edges - error - 4 * height, tilted = 0x1p-47 * r->reach + 0x1p-46 * r->size * r->size / length * r->reach;
+    if (tilted < 0x1p-20 * r->reach)
+        low = greater(low, plane < edges ? plane - tilted : edges - tilted);
+    out->lo = low > 0 ? low : 0;
+    out->hi = edges + error;
+}
+
 static void bound(const relation *r, ebpo_distance_bounds *out)
 {
     double error = 0x1p-47 * r->reach, d;
@@ -120,26 +136,13 @@ static void bound(const relation *r, ebpo_distance_bounds *out)
     } else if (out->feature <= EBPO_NEAR_EDGE2) {
         d = edge_distance(r, (int)(out->feature - EBPO_NEAR_EDGE0));
     } else {
-        double edges = edge_distance(r, 0), other, plane, plane_error;
-        other = edge_distance(r, 1);
-        edges = other < edges ? other : edges;
-        other = edge_distance(r, 2);
-        edges = other < edges ? other : edges;
-        plane = plane_distance(r, &plane_error);
-        if (out->feature == EBPO_NEAR_INTERIOR && plane_error < 0x1p-20 * r->reach) {
-            d = plane;
-            error = plane_error;
-        } else {
-            /* The plane is never farther than the triangle; a plane of unknown tilt tells nothing, but no point of the triangle is farther from its edges than its height. */
-            double height = dot(r->normal, r->normal) > 0 ? 2 * sqrt(dot(r->normal, r->normal)) / r->size + 0x1p-44 * r->size : 0x1p-44 * r->size;
-            double low = edges - error - 4 * height;
-            double tilted = 0x1p-47 * r->reach + 0x1p-46 * r->size * r->size / sqrt(dot(r->normal, r->normal)) * r->reach;
-            if (tilted < 0x1p-20 * r->reach)
-                low = greater(low, plane < edges ? plane - tilted : edges - tilted);
-            out->lo = low > 0 ? low : 0;
-            out->hi = edges + error;
+        double plane_error;
+        d = plane_distance(r, &plane_error);
+        if (out->feature != EBPO_NEAR_INTERIOR || !(plane_error < 0x1p-20 * r->reach)) {
+            bound_by_edges(r, d, error, out);
             return;
         }
+        error = plane_error;
     }
     out->lo = d > error ? d - error : 0;
     out->hi = d + error;

@@ -35,9 +35,13 @@ static inline ebpo_pair ebpo_split(double a)
 static inline ebpo_pair ebpo_two_product(double a, double b)
 {
     double head = a * b;
+#ifdef EBPO_PRODUCTS_BY_FMA /* the same while nothing overflows or underflows, and faster */
+    return (ebpo_pair){head, __builtin_fma(a, b, -head)};
+#else
     ebpo_pair p = ebpo_split(a), q = ebpo_split(b);
     double rest = ((head - p.head * q.head) - p.tail * q.head) - p.head * q.tail;
     return (ebpo_pair){head, p.tail * q.tail - rest};
+#endif
 }
 
 static inline int ebpo_expansion_push(double *out, int n, double x)

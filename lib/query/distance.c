@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/error.h"
+#include "query/ahead.h"
 #include "query/clock.h"
 #include "query/inside.h"
 #include "query/limited.h"
@@ -56,7 +57,9 @@ static ebpo_status search_top(ebpo_context *c, ebpo_nearest *n, const ebpo_box *
     }
     if (ebpo_spot_is_below(&spot)) {
         ebpo_status status = ebpo_spot_enter(c, &spot, error);
-        return status == EBPO_OK ? ebpo_nearest_search(n, c, spot.subtree, error) : status;
+        if (status == EBPO_OK)
+            ebpo_nearest_search(n, c, spot.subtree);
+        return status;
     }
     ranked child[8];
     int count = rank_children(c->model, box, &spot, lower, n->p, child);
@@ -68,18 +71,19 @@ static ebpo_status search_top(ebpo_context *c, ebpo_nearest *n, const ebpo_box *
 
 static ebpo_status search_everything(ebpo_context *c, ebpo_nearest *n, ebpo_error *error)
 {
-    if (c->model->whole)
-        return ebpo_nearest_search(n, c, c->model->whole, error);
+    if (c->model->whole) {
+        ebpo_nearest_search(n, c, c->model->whole);
+        return EBPO_OK;
+    }
     ebpo_box box = ebpo_model_box(c->model);
     return search_top(c, n, &box, ebpo_spot_root(c->model), 0, error);
 }
 
-/* Negative inside. */
-static ebpo_status give_sign(ebpo_context *c, const double p[3], ebpo_distance_result *out, ebpo_error *error)
+ebpo_status ebpo_give_sign(ebpo_context *c, const double p[3], const ebpo_query_options *o, ebpo_distance_result *out, ebpo_error *error)
 {
     ebpo_inside_result where;
     ebpo_query_options plain = EBPO_QUERY_OPTIONS_INIT;
-    if (!c->model->info->solid || !(out->distance > 0))
+    if (!c->model->info->solid || o->unsigned_distance || out->face == EBPO_NO_FACE)
         return EBPO_OK;
     ebpo_status status = c->model->whole ? ebpo_inside_whole(c, p, 1, &where, error) : ebpo_inside_walk(c, p, &plain, &where, error);
     if (status == EBPO_OK && where.where == EBPO_IN)
@@ -94,21 +98,25 @@ static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_query_op
     if (o->deadline_ns)
         n.deadline = ebpo_clock() + o->deadline_ns;
     if (o->warm && c->warm)
-        ebpo_nearest_hint(&n, (const double (*)[3])c->warm_triangle);
+        ebpo_nearest_begin_with(&n, (const double (*)[3])c->warm_triangle, c->warm_face, c->warm_told);
     ebpo_status status = search_everything(c, &n, error);
     if (status != EBPO_OK)
         return status;
     if (n.late && n.passed_over <= n.limit) {
-        double lo = fmin(n.passed_over, n.found ? n.lo : n.upper);
+        double lo = fmin(n.passed_over, n.found ? n.bounds.lo : n.upper);
         *out = (ebpo_distance_result){ NAN, lo, n.upper, { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
         return EBPO_OK;
     }
     ebpo_nearest_end(&n, o->max_distance, out);
     if (out->face == EBPO_NO_FACE)
         return EBPO_OK;
+    if (c->pinned && ebpo_looks_ahead(c->model))
+        ebpo_context_look_ahead(c, out->point);
     c->warm = true;
+    c->warm_face = n.file_face;
+    c->warm_told = n.told_face;
     memcpy(c->warm_triangle, n.triangle, sizeof n.triangle);
-    return o->unsigned_distance ? EBPO_OK : give_sign(c, p, out, error);
+    return ebpo_give_sign(c, p, o, out, error);
 }
 
 /* --- the interval that the nodes of a level give --- */
@@ -176,12 +184,25 @@ static ebpo_status one(ebpo_context *c, const double p[3], const ebpo_query_opti
     return o->level >= 0 ? limited(c, p, o, out, error) : exact(c, p, o, out, error);
 }
 
+/* Modes that cannot keep to a level or a deadline say so. */
+static ebpo_status check_mode(const ebpo_query_options *o, ebpo_error *error)
+{
+    bool around = o->mode == EBPO_DISTANCE_RECURSIVE || o->mode == EBPO_DISTANCE_LEAVES;
+    if (around && (o->level >= 0 || o->deadline_ns))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "the recursive and leaves modes of distance know neither level nor deadline; leave these away, or take the exact mode");
+    if (o->mode == EBPO_DISTANCE_ENVELOPE && o->deadline_ns)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "the envelope mode of distance knows no deadline; give a level instead");
+    return EBPO_OK;
+}
+
 ebpo_status ebpo_distance_many(ebpo_context *context, const double *points, uint64_t count, const ebpo_query_options *options,
                                ebpo_distance_result *out, ebpo_error *error)
 {
     static const ebpo_query_options usual = EBPO_QUERY_OPTIONS_INIT;
     const ebpo_query_options *o = options ? options : &usual;
     ebpo_status status = ebpo_check_options(o, error);
+    if (status == EBPO_OK)
+        status = check_mode(o, error);
     if (status == EBPO_OK)
         status = ebpo_check_points(points, count, error);
     if (status == EBPO_OK && o->level < 0 && o->mode != EBPO_DISTANCE_ENVELOPE)

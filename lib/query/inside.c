@@ -33,50 +33,80 @@ static bool cross(const ebpo_kernels *kernels, const ebpo_subtree *s, const ebpo
     return count == 0 || !settle_open(s, open, count, g, point, sum);
 }
 
-/* One segment from a wall that no face meets. */
-static bool from_wall(const ebpo_kernels *kernels, const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const double low[3], const double high[3],
-                      const double p[3], uint32_t *open, int32_t *winding)
+/* A point in a leaf's cell. */
+typedef struct in_leaf {
+    double low[3], high[3]; /* the cell */
+    double xi[3];           /* the point in it, 0 .. 1, rounded */
+    uint8_t cell[3];        /* and in the unit of ebpo_listed_block */
+} in_leaf;
+
+static uint8_t listed_cell(double xi)
+{
+    double cells = xi * EBPO_LISTED_CELLS;
+    return cells < 0 ? 0 : cells < 255 ? (uint8_t)cells : 255; /* no number, as cells of no size give: 255, which meets the boxes of such cells */
+}
+
+static void find_in_leaf(const ebpo_subtree *s, int level, const uint32_t at[3], const double p[3], in_leaf *out)
+{
+    for (int k = 0; k < 3; k++) {
+        out->low[k] = ebpo_wall(&s->box, k, level, at[k]);
+        out->high[k] = ebpo_wall(&s->box, k, level, at[k] + 1);
+        out->xi[k] = (p[k] - out->low[k]) * (1 / (out->high[k] - out->low[k]));
+        out->cell[k] = listed_cell(out->xi[k]);
+    }
+}
+
+/* From the leaf's free wall to the point. */
+static ebpo_axis_segment wall_segment(const ebpo_subtree_leaf *leaf, const in_leaf *i, const double p[3])
 {
     int axis = leaf->wall / 2;
-    ebpo_axis_segment g = { { p[0], p[1], p[2] }, p[axis], axis };
+    ebpo_axis_segment g = { { p[0], p[1], p[2] }, p[axis], axis, { i->cell[0], i->cell[1], i->cell[2] }, { i->cell[0], i->cell[1], i->cell[2] } };
+    if (leaf->wall % 2) {
+        g.to = i->high[axis];
+        g.high[axis] = 255;
+    } else {
+        g.from[axis] = i->low[axis];
+        g.low[axis] = 0;
+    }
+    return g;
+}
+
+/* One segment from a wall that no face meets. */
+static bool from_wall(const ebpo_kernels *kernels, const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const in_leaf *i, const double p[3],
+                      uint32_t *open, int32_t *winding)
+{
+    ebpo_axis_segment g = wall_segment(leaf, i, p);
     int32_t sum;
-    bool upper = leaf->wall % 2;
-    if (upper)
-        g.to = high[axis];
-    else
-        g.from[axis] = low[axis];
     if (!cross(kernels, s, leaf, &g, p, open, &sum))
         return false;
-    *winding = upper ? leaf->winding - sum : leaf->winding + sum;
+    *winding = leaf->wall % 2 ? leaf->winding - sum : leaf->winding + sum;
     return true;
 }
 
 /* Three segments from the lowest corner: format-spec, section 5. Faces that the point lies on come up in the last one. */
-static bool from_corner(const ebpo_kernels *kernels, const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const double low[3], const double p[3],
+static bool from_corner(const ebpo_kernels *kernels, const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const in_leaf *i, const double p[3],
                         uint32_t *open, int32_t *winding)
 {
-    ebpo_axis_segment g = { { low[0], low[1], low[2] }, 0, 0 };
+    ebpo_axis_segment g = { { i->low[0], i->low[1], i->low[2] }, 0, 0, { 0, 0, 0 }, { 0, 0, 0 } };
     *winding = leaf->winding;
     for (int axis = 0; axis < 3; axis++) {
         int32_t sum;
         g.axis = axis;
         g.to = p[axis];
+        g.high[axis] = i->cell[axis];
         if (!cross(kernels, s, leaf, &g, axis == 2 ? p : NULL, open, &sum))
             return false;
         *winding += sum;
         g.from[axis] = p[axis];
+        g.low[axis] = i->cell[axis];
     }
     return true;
 }
 
 /* Signs of the planes alone; false when one is too close to tell. */
-static bool from_planes(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const double low[3], const double high[3], const double p[3],
-                        int32_t *winding)
+static bool from_planes(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const in_leaf *in, int32_t *winding)
 {
-    float xi[3];
-    for (int k = 0; k < 3; k++)
-        xi[k] = (float)((p[k] - low[k]) / (high[k] - low[k]));
-    float most = -INFINITY;
+    float xi[3] = { (float)in->xi[0], (float)in->xi[1], (float)in->xi[2] }, most = -INFINITY;
     for (int i = 0; i < leaf->planes; i += 4) {
         const ebpo_four_planes *q = &s->planes[leaf->first_plane + (uint32_t)i / 4];
         for (int j = 0; j < 4; j++) {
@@ -92,23 +122,17 @@ static bool from_planes(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, co
     return most < -EBPO_PLANE_ERROR;
 }
 
-ebpo_status ebpo_inside_leaf(ebpo_context *context, const ebpo_subtree *s, uint32_t number, int level, const uint32_t at[3], const double p[3],
-                             ebpo_inside_result *out, ebpo_error *error)
+static ebpo_status answer_in_leaf(ebpo_context *context, const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const in_leaf *i, const double p[3],
+                                  ebpo_inside_result *out, ebpo_error *error)
 {
-    const ebpo_subtree_leaf *leaf = &s->leaf[number];
     const ebpo_model *m = context->model;
-    double low[3], high[3];
-    for (int k = 0; k < 3; k++) {
-        low[k] = ebpo_wall(&s->box, k, level, at[k]);
-        high[k] = ebpo_wall(&s->box, k, level, at[k] + 1);
-    }
     if (!ebpo_grow(&context->open, &context->open_room, (uint64_t)leaf->blocks * EBPO_BLOCK, sizeof *context->open))
         return ebpo_fail_memory(error, (uint64_t)leaf->blocks * EBPO_BLOCK * sizeof *context->open);
     int32_t winding;
-    bool off = leaf->kind != EBPO_LEAF_GENERAL && from_planes(s, leaf, low, high, p, &winding);
+    bool off = leaf->kind != EBPO_LEAF_GENERAL && from_planes(s, leaf, i, &winding);
     if (!off)
-        off = leaf->wall != EBPO_NO_WALL ? from_wall(m->kernels, s, leaf, low, high, p, context->open, &winding)
-                                         : from_corner(m->kernels, s, leaf, low, p, context->open, &winding);
+        off = leaf->wall != EBPO_NO_WALL ? from_wall(m->kernels, s, leaf, i, p, context->open, &winding)
+                                         : from_corner(m->kernels, s, leaf, i, p, context->open, &winding);
     if (!off) {
         *out = (ebpo_inside_result){ EBPO_ON, 0, 0 };
         return EBPO_OK;
@@ -117,30 +141,39 @@ ebpo_status ebpo_inside_leaf(ebpo_context *context, const ebpo_subtree *s, uint3
     return EBPO_OK;
 }
 
+ebpo_status ebpo_inside_leaf(ebpo_context *context, const ebpo_subtree *s, uint32_t number, int level, const uint32_t at[3], const double p[3],
+                             ebpo_inside_result *out, ebpo_error *error)
+{
+    in_leaf i;
+    find_in_leaf(s, level, at, p, &i);
+    return answer_in_leaf(context, s, &s->leaf[number], &i, p, out, error);
+}
+
 void ebpo_inside_settled(const ebpo_context *context, uint32_t entry, ebpo_inside_result *out)
 {
     int32_t winding = ebpo_entry_winding(entry);
     *out = (ebpo_inside_result){ ebpo_rule_inside(context->model->info->rule, winding) ? EBPO_IN : EBPO_OUT, winding, 0 };
 }
 
-static ebpo_status answer_entry(ebpo_context *context, const ebpo_subtree *s, uint32_t entry, int level, const uint32_t at[3], const double p[3],
-                                ebpo_inside_result *out, ebpo_error *error)
+static void find_in_entry(const ebpo_subtree *s, int fine_level, int level, const uint32_t at[3], const double p[3], in_leaf *out)
 {
-    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_SETTLED) {
-        ebpo_inside_settled(context, entry, out);
-        return EBPO_OK;
-    }
-    int shift = context->model->info->level_count - 1 - level;
+    int shift = fine_level - level;
     uint32_t cell[3] = { at[0] >> shift, at[1] >> shift, at[2] >> shift };
-    return ebpo_inside_leaf(context, s, ebpo_entry_value(entry), level, cell, p, out, error);
+    find_in_leaf(s, level, cell, p, out);
 }
 
 ebpo_status ebpo_inside_subtree(ebpo_context *context, const ebpo_subtree *s, const uint32_t at[3], const double p[3], ebpo_inside_result *out,
                                 ebpo_error *error)
 {
-    int level;
-    uint32_t entry = ebpo_descend(&s->nodes, context->model->info->level_count - 1, at, &level);
-    return answer_entry(context, s, entry, level, at, p, out, error);
+    int level, fine = context->model->info->level_count - 1;
+    uint32_t entry = ebpo_descend(&s->nodes, fine, at, &level);
+    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_SETTLED) {
+        ebpo_inside_settled(context, entry, out);
+        return EBPO_OK;
+    }
+    in_leaf i;
+    find_in_entry(s, fine, level, at, p, &i);
+    return answer_in_leaf(context, s, &s->leaf[ebpo_entry_value(entry)], &i, p, out, error);
 }
 
 /* Several points at a time, stage by stage, so that the memory that one stage needs is on its way while others are dealt with. */
@@ -152,50 +185,38 @@ typedef struct lane {
     bool within;
 } lane;
 
-static void prefetch_leaf(const ebpo_subtree *s, const lane *l, int stage)
-{
-    if (!l->within || ebpo_entry_kind_of(l->entry) != EBPO_ENTRY_LEAF)
-        return;
-    const ebpo_subtree_leaf *leaf = &s->leaf[ebpo_entry_value(l->entry)];
-    if (stage == 0) {
-        __builtin_prefetch(leaf);
-    } else if (stage == 1) {
-        __builtin_prefetch(s->list + leaf->list);
-        if (leaf->kind != EBPO_LEAF_GENERAL)
-            __builtin_prefetch(s->planes + leaf->first_plane);
-    } else if (leaf->kind == EBPO_LEAF_GENERAL) {
-        for (uint32_t b = 0; b < leaf->blocks && b < 8; b++) {
-            const char *block = s->wide ? (const char *)(s->block64 + (uint64_t)s->list[leaf->list + b] * EBPO_BLOCK_NUMBERS)
-                                        : (const char *)(s->block32 + (uint64_t)s->list[leaf->list + b] * EBPO_BLOCK_NUMBERS);
-            for (size_t line = 0; line < (s->wide ? 576u : 288u); line += 64)
-                __builtin_prefetch(block + line);
-        }
-    }
-}
+/* A point that ended in a leaf. */
+typedef struct waiting {
+    const ebpo_subtree_leaf *leaf;
+    unsigned point;
+    in_leaf in;
+} waiting;
 
-static ebpo_status inside_together(ebpo_context *context, const ebpo_subtree *s, const double *points, unsigned count, ebpo_inside_result *out,
-                                   ebpo_error *error)
+static void start_lanes(const ebpo_subtree *s, int fine, const double *points, unsigned count, lane *l)
 {
-    lane l[TOGETHER];
-    int fine = context->model->info->level_count - 1;
     for (unsigned i = 0; i < count; i++) {
         l[i].within = ebpo_locate(&s->box, fine, points + 3 * i, l[i].at);
+        l[i].entry = s->nodes.root;
+        l[i].level = s->nodes.root_level;
         if (l[i].within && s->nodes.grid) {
             uint64_t cell = ebpo_grid_cell(&s->nodes, fine, l[i].at);
             __builtin_prefetch(&s->nodes.grid[cell]);
             __builtin_prefetch(&s->nodes.grid_depth[cell]);
         }
     }
-    bool more = s->nodes.grid != NULL;
-    for (unsigned i = 0; i < count && more; i++)
+    for (unsigned i = 0; i < count && s->nodes.grid; i++)
         if (l[i].within) {
             uint64_t cell = ebpo_grid_cell(&s->nodes, fine, l[i].at);
             l[i].entry = s->nodes.grid[cell];
-            l[i].level = s->nodes.root_level + s->nodes.grid_depth[cell];
+            l[i].level += s->nodes.grid_depth[cell];
             if (ebpo_entry_kind_of(l[i].entry) == EBPO_ENTRY_GRAY)
                 __builtin_prefetch(s->nodes.group[ebpo_entry_value(l[i].entry)]);
         }
-    while (more) {
+}
+
+static void descend_together(const ebpo_subtree *s, int fine, unsigned count, lane *l)
+{
+    for (bool more = true; more;) {
         more = false;
         for (unsigned i = 0; i < count; i++)
             if (l[i].within && ebpo_entry_kind_of(l[i].entry) == EBPO_ENTRY_GRAY) {
@@ -207,20 +228,64 @@ static ebpo_status inside_together(ebpo_context *context, const ebpo_subtree *s,
                 }
             }
     }
-    for (unsigned i = 0; i < count && !s->nodes.grid; i++)
-        if (l[i].within)
-            l[i].entry = ebpo_descend(&s->nodes, fine, l[i].at, &l[i].level);
-    for (int stage = 0; stage < 3; stage++)
-        for (unsigned i = 0; i < count; i++)
-            prefetch_leaf(s, &l[i], stage);
-    ebpo_status status = EBPO_OK;
-    for (unsigned i = 0; i < count && status == EBPO_OK; i++) {
-        if (l[i].within)
-            status = answer_entry(context, s, l[i].entry, l[i].level, l[i].at, points + 3 * i, &out[i], error);
-        else
-            out[i] = (ebpo_inside_result){ EBPO_OUT, 0, 0 };
+}
+
+/* The cache lines of the blocks that the point's segment may meet. */
+static void prefetch_blocks(const ebpo_subtree *s, const waiting *w, const double p[3])
+{
+    const ebpo_subtree_leaf *leaf = w->leaf;
+    size_t size = EBPO_BLOCK_NUMBERS * (s->wide ? sizeof *s->block64 : sizeof *s->block32);
+    const char *blocks = s->wide ? (const char *)s->block64 : (const char *)s->block32;
+    ebpo_axis_segment g = { .high = { 255, 255, 255 } };
+    if (leaf->kind != EBPO_LEAF_GENERAL)
+        return;
+    if (leaf->wall != EBPO_NO_WALL)
+        g = wall_segment(leaf, &w->in, p);
+    for (uint32_t b = 0; b < leaf->blocks && b < 8; b++)
+        if (ebpo_axis_segment_meets(&g, &s->list[leaf->list + b]))
+            for (size_t line = 0; line < size; line += 64)
+                __builtin_prefetch(blocks + s->list[leaf->list + b].block * size + line);
+}
+
+static ebpo_status answer_waiting(ebpo_context *context, const ebpo_subtree *s, const waiting *w, unsigned count, const double *points,
+                                  ebpo_inside_result *out, ebpo_error *error)
+{
+    for (unsigned i = 0; i < count; i++) {
+        __builtin_prefetch(s->list + w[i].leaf->list);
+        if (w[i].leaf->kind != EBPO_LEAF_GENERAL)
+            __builtin_prefetch(s->planes + w[i].leaf->first_plane);
     }
+    for (unsigned i = 0; i < count; i++)
+        prefetch_blocks(s, &w[i], points + 3 * w[i].point);
+    ebpo_status status = EBPO_OK;
+    for (unsigned i = 0; i < count && status == EBPO_OK; i++)
+        status = answer_in_leaf(context, s, w[i].leaf, &w[i].in, points + 3 * w[i].point, &out[w[i].point], error);
     return status;
+}
+
+static ebpo_status inside_together(ebpo_context *context, const ebpo_subtree *s, const double *points, unsigned count, ebpo_inside_result *out,
+                                   ebpo_error *error)
+{
+    lane l[TOGETHER];
+    waiting w[TOGETHER];
+    unsigned leaves = 0;
+    int fine = context->model->info->level_count - 1;
+    start_lanes(s, fine, points, count, l);
+    descend_together(s, fine, count, l);
+    for (unsigned i = 0; i < count; i++) {
+        if (!l[i].within) {
+            out[i] = (ebpo_inside_result){ EBPO_OUT, 0, 0 };
+        } else if (ebpo_entry_kind_of(l[i].entry) == EBPO_ENTRY_SETTLED) {
+            ebpo_inside_settled(context, l[i].entry, &out[i]);
+        } else {
+            w[leaves].leaf = &s->leaf[ebpo_entry_value(l[i].entry)];
+            w[leaves].point = i;
+            __builtin_prefetch(w[leaves].leaf);
+            find_in_entry(s, fine, l[i].level, l[i].at, points + 3 * i, &w[leaves].in);
+            leaves++;
+        }
+    }
+    return answer_waiting(context, s, w, leaves, points, out, error);
 }
 
 ebpo_status ebpo_inside_whole(ebpo_context *context, const double *points, uint64_t count, ebpo_inside_result *out, ebpo_error *error)

@@ -82,7 +82,9 @@ static ebpo_status leaf_from_file(asking *a, const ebpo_place *place, ebpo_insid
     ebpo_model *m = a->context->model;
     ebpo_slice slice;
     ebpo_subtree *subtree;
-    ebpo_status status = ebpo_slice_read(&slice, m->chunks, place, error);
+    ebpo_status status = ebpo_model_has_room(m, place, error);
+    if (status == EBPO_OK)
+        status = ebpo_slice_read(&slice, m->chunks, place, error);
     if (status == EBPO_OK)
         status = ebpo_subtree_make(&subtree, &slice, m->info, false, 1, error);
     if (status == EBPO_OK) {
@@ -175,28 +177,50 @@ static ebpo_status walk_nodes(asking *a, ebpo_inside_result *out, ebpo_error *er
     return walk_file(a, &spot, out, error);
 }
 
-/* True when everything that p needs is in the context's hands: then envelopes save nothing. */
-static bool answer_at_hand(asking *a, ebpo_inside_result *out, ebpo_status *status, ebpo_error *error)
+/* The subtree that is in the context's hands and holds p, or NULL; *entry: what the levels above say, when they settle it. */
+static const ebpo_subtree *held_around(const asking *a, uint32_t *entry)
 {
-    ebpo_context *c = a->context;
+    const ebpo_context *c = a->context;
+    *entry = ebpo_entry(EBPO_ENTRY_BELOW, 0);
+    if (c->model->whole)
+        return c->model->whole;
     const ebpo_nodes *nodes = &c->model->top->nodes;
     int fine = c->model->info->level_count - 1, level = 0;
-    uint32_t entry = nodes->root;
-    while (ebpo_entry_kind_of(entry) == EBPO_ENTRY_GRAY) {
+    *entry = nodes->root;
+    while (ebpo_entry_kind_of(*entry) == EBPO_ENTRY_GRAY) {
         level++;
-        entry = nodes->group[ebpo_entry_value(entry)][ebpo_octant_at(a->at, fine - level)];
+        *entry = nodes->group[ebpo_entry_value(*entry)][ebpo_octant_at(a->at, fine - level)];
     }
+    bool below = ebpo_entry_kind_of(*entry) == EBPO_ENTRY_BELOW;
+    return below && c->pinned && c->pinned_key == ebpo_entry_value(*entry) ? c->pinned : NULL;
+}
+
+/* True when everything that p needs is in the context's hands: then envelopes save nothing, and only the faces of a leaf take time. */
+static bool answer_at_hand(asking *a, ebpo_inside_result *out, ebpo_status *status, ebpo_error *error)
+{
+    const ebpo_model *m = a->context->model;
+    uint32_t entry;
+    const ebpo_subtree *held = held_around(a, &entry);
     *status = EBPO_OK;
     if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_SETTLED) {
-        ebpo_inside_settled(c, entry, out);
+        ebpo_inside_settled(a->context, entry, out);
         return true;
     }
-    const ebpo_subtree *held = c->pinned && c->pinned_key == ebpo_entry_value(entry) ? c->pinned
-                               : c->own && c->own_key == ebpo_entry_value(entry)     ? c->own
-                                                                                      : NULL;
     if (!held)
         return false;
-    *status = ebpo_inside_subtree(c, held, a->at, a->p, out, error);
+    if (!a->deadline) {
+        *status = ebpo_inside_subtree(a->context, held, a->at, a->p, out, error);
+        return true;
+    }
+    int level, fine = m->info->level_count - 1;
+    entry = ebpo_descend(&held->nodes, fine, a->at, &level);
+    ebpo_spot spot = { held, entry, level, { a->at[0] >> (fine - level), a->at[1] >> (fine - level), a->at[2] >> (fine - level) } };
+    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_SETTLED)
+        ebpo_inside_settled(a->context, entry, out);
+    else if (ebpo_clock() > a->deadline)
+        maybe(m, &spot, out);
+    else
+        *status = ebpo_inside_leaf(a->context, held, ebpo_entry_value(entry), level, spot.at, a->p, out, error);
     return true;
 }
 
@@ -211,8 +235,8 @@ ebpo_status ebpo_inside_walk(ebpo_context *context, const double p[3], const ebp
         return EBPO_OK;
     }
     ebpo_status status;
-    bool plain = options->envelopes != EBPO_ENVELOPES_USE && options->level < 0 && !options->deadline_ns;
-    if (plain && !m->whole && m->options.loading != EBPO_LOAD_NODES && answer_at_hand(&a, out, &status, error))
+    bool plain = options->envelopes != EBPO_ENVELOPES_USE && options->level < 0;
+    if (plain && (m->whole || m->options.loading != EBPO_LOAD_NODES) && answer_at_hand(&a, out, &status, error))
         return status;
     return !m->whole && m->options.loading == EBPO_LOAD_NODES ? walk_nodes(&a, out, error) : walk_down(&a, out, error);
 }

@@ -10,7 +10,15 @@ typedef struct ebpo_axis_segment {
     double from[3];
     double to;
     int axis;
+    uint8_t low[3], high[3]; /* its box in the leaf's cell, in the unit of ebpo_listed_block, rounded down */
 } ebpo_axis_segment;
+
+/* False when nothing that the block has in the cell can meet the segment. */
+static inline bool ebpo_axis_segment_meets(const ebpo_axis_segment *g, const ebpo_listed_block *b)
+{
+    return (g->high[0] >= b->low[0]) & (g->low[0] <= b->high[0]) & (g->high[1] >= b->low[1]) & (g->low[1] <= b->high[1]) &
+           (g->high[2] >= b->low[2]) & (g->low[2] <= b->high[2]);
+}
 
 /* A point as the distance kernels want it. */
 typedef struct ebpo_probe {
@@ -23,9 +31,9 @@ typedef struct ebpo_probe {
 } ebpo_probe;
 
 typedef struct ebpo_kernels {
-    /* Sum of the certain crossings of the blocks' faces (as ebpo_axis_crossing gives them) with the segment; lanes that are not certain are appended to `open` as slots
+    /* Sum of the certain crossings of the blocks' faces, in the part of them that is in the leaf's cell (as ebpo_axis_crossing gives them) with the segment; lanes that are not certain are appended to `open` as slots
      * (room for count * 8), their number to *open_count. Every face on which the segment's end at `to` or `from` lies is among them. */
-    int32_t (*crossings)(const ebpo_subtree *s, const uint32_t *blocks, uint32_t count, const ebpo_axis_segment *segment, uint32_t *open,
+    int32_t (*crossings)(const ebpo_subtree *s, const ebpo_listed_block *blocks, uint32_t count, const ebpo_axis_segment *segment, uint32_t *open,
                          uint32_t *open_count);
     /* Squared lower bounds of the distance to the eight children, in the frame; the result has a bit for each child whose bound is at most `limit2`. */
     unsigned (*bounds)(const ebpo_bound *bound, const ebpo_probe *probe, float limit2, float lower2[8]);

@@ -23,12 +23,13 @@ static uint64_t chunk_budget(uint64_t budget)
 
 static ebpo_slice_size whole_size(const ebpo_info *info)
 {
-    ebpo_slice_size size = { 0, 0, 0, info->face_count };
+    ebpo_slice_size size = { .new_faces = info->face_count };
     for (int i = 0; i < info->level_count; i++) {
         size.groups += info->level[i].gray_count;
         size.leaves += info->level[i].leaf_count;
         size.refs += info->level[i].ref_count;
     }
+    size.outer = size.refs; /* of the subtrees of any level together */
     return size;
 }
 
@@ -44,6 +45,15 @@ static ebpo_status estimate_subtree(void *user, uint64_t key, uint64_t *peak, ui
     return status;
 }
 
+/* Adds a subtree's leaves to what is in memory, or (sign -1) takes them away. */
+static void count_leaves(ebpo_model *m, const ebpo_subtree *s, uint64_t sign)
+{
+    m->leaves += sign * s->leaf_count;
+    m->leaves_one_wall += sign * s->one_wall;
+    for (int k = 0; k < 5; k++)
+        m->leaves_of_kind[k] += sign * s->kinds[k];
+}
+
 static ebpo_status load_subtree(void *user, uint64_t key, void **item, uint64_t *bytes, ebpo_error *error)
 {
     ebpo_model *m = user;
@@ -52,6 +62,8 @@ static ebpo_status load_subtree(void *user, uint64_t key, void **item, uint64_t 
     ebpo_status status = ebpo_slice_read(&slice, m->chunks, &m->top->below[key], error);
     if (status == EBPO_OK)
         status = ebpo_subtree_make(&subtree, &slice, m->info, true, 1, error);
+    if (status == EBPO_OK)
+        count_leaves(m, subtree, 1);
     *item = subtree;
     *bytes = status == EBPO_OK ? subtree->bytes : 0;
     return status;
@@ -59,11 +71,27 @@ static ebpo_status load_subtree(void *user, uint64_t key, void **item, uint64_t 
 
 static void release_subtree(void *user, void *item)
 {
-    (void)user;
+    if (item)
+        count_leaves(user, item, (uint64_t)-1);
     ebpo_subtree_free(item);
 }
 
 /* --- how much, and where to cut --- */
+
+ebpo_status ebpo_model_has_room(const ebpo_model *m, const ebpo_place *place, ebpo_error *error)
+{
+    ebpo_slice_size size;
+    uint64_t keep, peak;
+    ebpo_status status = m->options.memory ? ebpo_slice_measure(m->chunks, place, &size, error) : EBPO_OK;
+    if (status != EBPO_OK || !m->options.memory)
+        return status;
+    ebpo_subtree_estimate(&size, m->info, &keep, &peak);
+    uint64_t taken = m->top->bytes + chunk_budget(m->options.memory);
+    if (taken + peak <= m->options.memory)
+        return EBPO_OK;
+    return ebpo_fail(error, EBPO_E_LIMIT, "the memory budget of %" PRIu64 " bytes does not hold a leaf of level %d, which takes up to %" PRIu64 " more than the %" PRIu64
+                     " in use; give a larger budget", m->options.memory, place->level, peak, taken);
+}
 
 /* Half the budget for subtrees must hold so many of the average size; the top may take a quarter. */
 static int choose_cut(const ebpo_info *info, uint64_t budget)
@@ -97,6 +125,8 @@ static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
     ebpo_status status = ebpo_slice_read_all(&slice, m->file, m->options.threads, error);
     if (status == EBPO_OK)
         status = ebpo_subtree_make(&m->whole, &slice, m->info, true, m->options.threads, error);
+    if (m->whole)
+        count_leaves(m, m->whole, 1);
     return status;
 }
 
@@ -125,6 +155,7 @@ static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
     const ebpo_model_options *o = &m->options;
     ebpo_slice_size size = whole_size(m->info);
     uint64_t keep, peak;
+    size.outer = 0;
     ebpo_subtree_estimate(&size, m->info, &keep, &peak);
     int deepest = m->info->level_count - 1;
     if (o->cut_level >= 0)
@@ -134,9 +165,11 @@ static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
     if (o->memory == 0 || peak <= o->memory)
         return open_whole(m, error);
     int cut = choose_cut(m->info, o->memory);
-    if (cut < 0)
+    if (cut < 0) {
+        uint64_t least = least_budget(m->info);
         return ebpo_fail(error, EBPO_E_LIMIT, "a budget of %" PRIu64 " bytes is too small for this model; give at least %" PRIu64, o->memory,
-                         least_budget(m->info));
+                         least < peak ? least : peak);
+    }
     return open_top(m, cut, error);
 }
 
@@ -180,11 +213,12 @@ void ebpo_model_get_stats(const ebpo_model *m, ebpo_model_stats *out)
     *out = (ebpo_model_stats){ .resident = m->whole != NULL, .cut_level = m->top ? m->top->cut_level : 0, .budget = m->options.memory,
                                .open_seconds = m->open_seconds };
     ebpo_file_traffic(m->file, &out->bytes_read, &out->reads);
+    out->leaves = m->leaves;
+    out->leaves_one_wall = m->leaves_one_wall;
+    for (int k = 0; k < 5; k++)
+        out->leaves_of_kind[k] = m->leaves_of_kind[k];
     if (m->whole) {
         out->memory = out->memory_peak = m->whole->bytes;
-        out->leaves = m->whole->leaf_count;
-        out->leaves_one_wall = m->whole->one_wall;
-        memcpy(out->leaves_of_kind, m->whole->kinds, sizeof out->leaves_of_kind);
         return;
     }
     ebpo_cache_stats subtrees, chunks;
@@ -214,8 +248,7 @@ static void let_go(ebpo_context *c)
 {
     if (c->pinned)
         ebpo_cache_unpin(c->model->cache, c->pinned_key);
-    ebpo_subtree_free(c->own);
-    c->pinned = c->own = NULL;
+    c->pinned = NULL;
 }
 
 void ebpo_context_free(ebpo_context *c)
@@ -229,63 +262,34 @@ void ebpo_context_free(ebpo_context *c)
     free(c);
 }
 
-/* The subtrees whose cells touch this one's: EBP 2017, 4.2.3 (27 with itself). */
-static void prefetch_around(const ebpo_model *m, uint32_t below)
+/* Says what --memory would do instead of what the cache lacks. */
+static ebpo_status too_little(const ebpo_model *m, uint32_t below, ebpo_error *error)
 {
-    const ebpo_place *here = &m->top->below[below];
-    uint64_t keys[26];
-    unsigned count = 0;
-    uint32_t last = (1u << here->level) - 1;
-    for (int i = 0; i < 27; i++) {
-        uint32_t at[3];
-        bool within = i != 13;
-        for (int k = 0, rest = i; k < 3; k++, rest /= 3) {
-            at[k] = here->at[k] + (uint32_t)(rest % 3) - 1;
-            within = within && at[k] <= last;
-        }
-        uint32_t entry = m->top->nodes.root;
-        for (int level = 1; within && level <= here->level && ebpo_entry_kind_of(entry) == EBPO_ENTRY_GRAY; level++)
-            entry = m->top->nodes.group[ebpo_entry_value(entry)][ebpo_octant_at(at, here->level - level)];
-        if (within && ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW)
-            keys[count++] = ebpo_entry_value(entry);
-    }
-    ebpo_cache_prefetch(m->cache, keys, count);
-}
-
-static ebpo_status load_own(ebpo_context *c, uint32_t below, ebpo_subtree **out, ebpo_error *error)
-{
-    void *item = NULL;
-    uint64_t bytes;
-    if (c->own && c->own_key == below) {
-        *out = c->own;
-        return EBPO_OK;
-    }
-    let_go(c);
-    ebpo_status status = load_subtree(c->model, below, &item, &bytes, error);
-    if (status == EBPO_OK) {
-        *out = c->own = item;
-        c->own_key = below;
-    }
-    return status;
+    uint64_t peak, keep, least;
+    if (estimate_subtree((ebpo_model *)m, below, &peak, &keep, NULL) != EBPO_OK)
+        return EBPO_E_LIMIT;
+    least = m->top->bytes + peak;
+    while (m->top->bytes + chunk_budget(least) + peak > least)
+        least += least / 8 + 1;
+    return ebpo_fail(error, EBPO_E_LIMIT, "the memory budget of %" PRIu64 " bytes does not hold one subtree below level %d and what else is in use; a budget of %" PRIu64
+                     " would, or a higher cut level", m->options.memory, m->top->cut_level, least);
 }
 
 ebpo_status ebpo_context_subtree(ebpo_context *c, uint32_t below, ebpo_subtree **out, ebpo_error *error)
 {
     const ebpo_model *m = c->model;
     void *item;
-    if (m->options.loading != EBPO_LOAD_CACHE)
-        return load_own(c, below, out, error);
     if (c->pinned && c->pinned_key == below) {
         *out = c->pinned;
         return EBPO_OK;
     }
     let_go(c);
+    if (m->options.loading != EBPO_LOAD_CACHE)
+        ebpo_cache_clear(m->cache);
     ebpo_status status = ebpo_cache_get(m->cache, below, &item, NULL, error);
     if (status != EBPO_OK)
-        return status;
+        return status == EBPO_E_LIMIT && m->options.memory ? too_little(m, below, error) : status;
     *out = c->pinned = item;
     c->pinned_key = below;
-    if (m->options.prefetch)
-        prefetch_around(m, below);
     return EBPO_OK;
 }

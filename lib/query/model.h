@@ -21,23 +21,25 @@ struct ebpo_model {
     ebpo_chunks *chunks;
     ebpo_cache *cache;     /* subtrees by their number in the top */
     double open_seconds;
+    _Atomic uint64_t leaves, leaves_of_kind[5], leaves_one_wall; /* in the subtrees that are in memory */
 };
 
 struct ebpo_context {
     ebpo_model *model;
     ebpo_subtree *pinned;       /* the subtree last used, when it came from the cache */
     uint64_t pinned_key;
-    ebpo_subtree *own;          /* loaded for this context alone (EBPO_LOAD_SUBTREE, EBPO_LOAD_NODES) */
-    uint64_t own_key;
     uint32_t *open;             /* slots that a filter left open */
     uint64_t open_room;
     ebpo_ray_hit *hits;
     uint64_t hit_room;
     uint64_t *faces;
     uint64_t face_room;
+    bool looked_ahead;          /* from here, in quarters of cells of the cut level */
+    uint32_t looked_from[3];
     /* The last nearest face: where ebpo_distance begins, if asked to. */
     bool warm;
     double warm_triangle[3][3];
+    uint64_t warm_face, warm_told; /* its number in the file, and the one that callers are told */
 };
 
 static inline bool ebpo_rule_inside(ebpo_rule rule, int32_t winding)
@@ -53,6 +55,9 @@ static inline ebpo_box ebpo_model_box(const ebpo_model *m)
 
 /* EBPO_E_ARGUMENT for a point that is not finite; `number` is for the message. */
 EBPO_MUST_USE ebpo_status ebpo_check_points(const double *points, uint64_t count, ebpo_error *error);
+
+/* EBPO_E_LIMIT when the budget does not hold the leaf at `place`, alone, for one context; EBPO_LOAD_NODES loads it past the cache. */
+EBPO_MUST_USE ebpo_status ebpo_model_has_room(const ebpo_model *model, const ebpo_place *place, ebpo_error *error);
 
 /* The subtree with this number, in memory until the context asks for another one. */
 EBPO_MUST_USE ebpo_status ebpo_context_subtree(ebpo_context *context, uint32_t below, ebpo_subtree **out, ebpo_error *error);

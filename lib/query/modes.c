@@ -10,20 +10,7 @@
 #include "query/nearest.h"
 #include "query/walk.h"
 
-static const ebpo_distance_result nothing = { __builtin_inf(), 0, __builtin_inf(), { 0, 0, 0 }, { 0, 0, 0 }, EBPO_NO_FACE };
-
-/* Negative inside, for solids. */
-static ebpo_status give_sign(ebpo_context *c, const double p[3], const ebpo_query_options *o, ebpo_distance_result *out, ebpo_error *error)
-{
-    ebpo_query_options plain = EBPO_QUERY_OPTIONS_INIT;
-    ebpo_inside_result where;
-    if (!c->model->info->solid || o->unsigned_distance || out->face == EBPO_NO_FACE)
-        return EBPO_OK;
-    ebpo_status status = ebpo_inside_many(c, p, 1, &plain, &where, error);
-    if (status == EBPO_OK && where.where == EBPO_IN)
-        out->distance = -out->distance;
-    return status;
-}
+static const ebpo_distance_result nothing = { INFINITY, 0, INFINITY, { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
 
 static ebpo_status all_leaves(ebpo_context *c, ebpo_nearest *n, ebpo_spot spot, ebpo_error *error)
 {
@@ -32,7 +19,9 @@ static ebpo_status all_leaves(ebpo_context *c, ebpo_nearest *n, ebpo_spot spot, 
         return EBPO_OK;
     if (ebpo_spot_is_below(&spot)) {
         status = ebpo_spot_enter(c, &spot, error);
-        return status == EBPO_OK ? ebpo_nearest_search(n, c, spot.subtree, error) : status;
+        if (status == EBPO_OK)
+            ebpo_nearest_search(n, c, spot.subtree);
+        return status;
     }
     if (ebpo_entry_kind_of(spot.entry) == EBPO_ENTRY_LEAF) {
         ebpo_nearest_leaf(n, spot.subtree, &spot.subtree->leaf[ebpo_entry_value(spot.entry)]);
@@ -70,7 +59,7 @@ ebpo_status ebpo_distance_around(ebpo_context *c, const double p[3], const ebpo_
     if (status == EBPO_OK)
         ebpo_nearest_end(&n, o->max_distance, out);
     out->lo = 0; /* not the minimum: only an upper bound is certain */
-    return status == EBPO_OK ? give_sign(c, p, o, out, error) : status;
+    return status == EBPO_OK ? ebpo_give_sign(c, p, o, out, error) : status;
 }
 
 static void corner_of(const ebpo_box *box, const ebpo_spot *spot, const double xi[3], double out[3])
@@ -101,7 +90,7 @@ static void nearest_polygon(const ebpo_polytope *e, const ebpo_box *box, const e
     if (isinf(out->distance))
         return;
     ebpo_triangle_nearest exact;
-    ebpo_triangle_nearest_exact(p, (const double (*)[3])best, &exact);
+    ebpo_triangle_nearest_exact(p, (const double (*)[3])best, NULL, &exact);
     ebpo_triangle_unit_normal((const double (*)[3])best, out->normal);
     out->distance = exact.distance;
     for (int k = 0; k < 3; k++)

@@ -43,12 +43,23 @@ void ebpo_nearest_begin(ebpo_nearest *n, const double p[3], double max_distance)
     n->passed_over = INFINITY;
 }
 
-void ebpo_nearest_hint(ebpo_nearest *n, const double triangle[3][3])
+static void take(ebpo_nearest *n, const double triangle[3][3], const ebpo_distance_bounds *bounds, uint64_t file_face, uint64_t told_face)
+{
+    n->found = true;
+    n->bounds = *bounds;
+    n->file_face = file_face;
+    n->told_face = told_face;
+    memcpy(n->triangle, triangle, sizeof n->triangle);
+    n->upper = fmin(n->upper, bounds->hi);
+    n->limit = fmin(n->limit, bounds->hi);
+}
+
+void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint64_t file_face, uint64_t told_face)
 {
     ebpo_distance_bounds b;
     ebpo_triangle_distance_bounds(n->p, (const double (*)[3])triangle, &b);
-    n->upper = fmin(n->upper, b.hi);
-    n->limit = fmin(n->limit, b.hi);
+    if (b.lo <= n->limit)
+        take(n, triangle, &b, file_face, told_face);
 }
 
 static bool same_corner(const double a[3], const double b[3])
@@ -59,15 +70,15 @@ static bool same_corner(const double a[3], const double b[3])
 /* Sign of the new face's distance less the winner's, exact. Faces around one vertex or edge are the usual tie. */
 static int compare(const ebpo_nearest *n, const double triangle[3][3], const ebpo_distance_bounds *b)
 {
-    if (b->hi < n->lo)
+    if (b->hi < n->bounds.lo)
         return -1;
-    if (b->lo > n->hi)
+    if (b->lo > n->bounds.hi)
         return 1;
-    if (b->feature <= EBPO_NEAR_CORNER2 && n->feature <= EBPO_NEAR_CORNER2 && same_corner(triangle[b->feature], n->triangle[n->feature]))
+    if (b->feature <= EBPO_NEAR_CORNER2 && n->bounds.feature <= EBPO_NEAR_CORNER2 && same_corner(triangle[b->feature], n->triangle[n->bounds.feature]))
         return 0;
-    if (b->feature >= EBPO_NEAR_EDGE0 && b->feature <= EBPO_NEAR_EDGE2 && n->feature >= EBPO_NEAR_EDGE0 && n->feature <= EBPO_NEAR_EDGE2) {
+    if (b->feature >= EBPO_NEAR_EDGE0 && b->feature <= EBPO_NEAR_EDGE2 && n->bounds.feature >= EBPO_NEAR_EDGE0 && n->bounds.feature <= EBPO_NEAR_EDGE2) {
         const double *a0 = triangle[b->feature - EBPO_NEAR_EDGE0], *a1 = triangle[(b->feature - EBPO_NEAR_EDGE0 + 1) % 3];
-        const double *b0 = n->triangle[n->feature - EBPO_NEAR_EDGE0], *b1 = n->triangle[(n->feature - EBPO_NEAR_EDGE0 + 1) % 3];
+        const double *b0 = n->triangle[n->bounds.feature - EBPO_NEAR_EDGE0], *b1 = n->triangle[(n->bounds.feature - EBPO_NEAR_EDGE0 + 1) % 3];
         if ((same_corner(a0, b1) && same_corner(a1, b0)) || (same_corner(a0, b0) && same_corner(a1, b1)))
             return 0;
     }
@@ -79,36 +90,28 @@ static void look_at(ebpo_nearest *n, const ebpo_subtree *s, uint32_t slot)
     uint32_t local = s->slot_face[slot];
     if (local == EBPO_NO_SLOT)
         return;
+    uint64_t file_face = ebpo_subtree_file_face(s, local);
+    if (n->found && file_face == n->file_face)
+        return;
     double triangle[3][3];
     ebpo_distance_bounds b;
     ebpo_subtree_triangle(s, slot, triangle);
     ebpo_triangle_distance_bounds(n->p, (const double (*)[3])triangle, &b);
     if (b.lo > n->limit)
         return;
-    uint64_t file_face = ebpo_subtree_file_face(s, local);
     if (n->found) {
-        if (file_face == n->file_face)
-            return;
         int sign = compare(n, (const double (*)[3])triangle, &b);
         if (sign > 0 || (sign == 0 && file_face > n->file_face))
             return;
     }
-    n->found = true;
-    n->lo = b.lo;
-    n->hi = b.hi;
-    n->feature = b.feature;
-    n->file_face = file_face;
-    n->told_face = ebpo_subtree_told_face(s, local);
-    memcpy(n->triangle, triangle, sizeof triangle);
-    n->upper = fmin(n->upper, b.hi);
-    n->limit = fmin(n->limit, b.hi);
+    take(n, (const double (*)[3])triangle, &b, file_face, ebpo_subtree_told_face(s, local));
 }
 
 void ebpo_nearest_leaf(ebpo_nearest *n, const ebpo_subtree *s, const ebpo_subtree_leaf *leaf)
 {
     for (uint32_t b = 0; b < leaf->blocks; b++)
-        for (uint32_t lane = 0; lane < EBPO_BLOCK; lane++)
-            look_at(n, s, s->list[leaf->list + b] * EBPO_BLOCK + lane);
+        for (unsigned lanes = s->list[leaf->list + b].lanes; lanes; lanes &= lanes - 1)
+            look_at(n, s, s->list[leaf->list + b].block * EBPO_BLOCK + (unsigned)__builtin_ctz(lanes));
 }
 
 /* --- near: single precision --- */
@@ -128,7 +131,7 @@ static bool make_probe(const ebpo_subtree *s, const double p[3], ebpo_probe *out
     }
     out->scale = (float)s->scale;
     out->scale64 = s->scale;
-    out->error = (float)most * 0x1p-20f;
+    out->error = (float)most * 0x1p-19f; /* three axes, three roundings each, of numbers up to `most` + 2 */
     return true;
 }
 
@@ -317,30 +320,28 @@ static void search_far(ebpo_nearest *n, const ebpo_subtree *s, uint32_t child)
     }
 }
 
-ebpo_status ebpo_nearest_search(ebpo_nearest *n, ebpo_context *context, const ebpo_subtree *s, ebpo_error *error)
+void ebpo_nearest_search(ebpo_nearest *n, const ebpo_context *context, const ebpo_subtree *s)
 {
-    (void)error;
     searching g;
     g.n = n;
     g.kernels = context->model->kernels;
     g.s = s;
     g.count = 0;
     if (s->bound_count == 0)
-        return EBPO_OK;
+        return;
     if (make_probe(s, n->p, &g.probe))
         search_near(&g);
     else
         search_far(n, s, s->top);
-    return EBPO_OK;
 }
 
 void ebpo_nearest_end(const ebpo_nearest *n, double max_distance, ebpo_distance_result *out)
 {
     *out = (ebpo_distance_result){ INFINITY, max_distance, INFINITY, { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
-    if (!n->found || (n->hi > max_distance && ebpo_triangle_distance_compare_to(n->p, (const double (*)[3])n->triangle, max_distance) > 0))
+    if (!n->found || (n->bounds.hi > max_distance && ebpo_triangle_distance_compare_to(n->p, (const double (*)[3])n->triangle, max_distance) > 0))
         return;
     ebpo_triangle_nearest exact;
-    ebpo_triangle_nearest_exact(n->p, (const double (*)[3])n->triangle, &exact);
+    ebpo_triangle_nearest_exact(n->p, (const double (*)[3])n->triangle, &n->bounds, &exact);
     out->distance = out->lo = out->hi = exact.distance;
     memcpy(out->point, exact.point, sizeof out->point);
     ebpo_triangle_unit_normal((const double (*)[3])n->triangle, out->normal);

@@ -9,9 +9,8 @@ typedef struct ebpo_nearest {
     double p[3];
     double limit;        /* what is farther does not matter; certain */
     double upper;        /* some face of the model is at most so far away, or INFINITY */
-    double lo, hi;       /* of the winner's distance, certain */
     bool found;
-    ebpo_feature feature;
+    ebpo_distance_bounds bounds; /* of the winner */
     double triangle[3][3];
     uint64_t file_face, told_face;
     uint64_t deadline;   /* of ebpo_clock, or 0 */
@@ -22,11 +21,11 @@ typedef struct ebpo_nearest {
 /* Nothing found yet. */
 void ebpo_nearest_begin(ebpo_nearest *n, const double p[3], double max_distance);
 
-/* Looks at a triangle that is known to be the model's, to have an upper bound early. It does not count as found. */
-void ebpo_nearest_hint(ebpo_nearest *n, const double triangle[3][3]);
+/* Begins with a face of the model that is known from before. */
+void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint64_t file_face, uint64_t told_face);
 
 /* Searches all faces of a subtree. */
-EBPO_MUST_USE ebpo_status ebpo_nearest_search(ebpo_nearest *n, ebpo_context *context, const ebpo_subtree *s, ebpo_error *error);
+void ebpo_nearest_search(ebpo_nearest *n, const ebpo_context *context, const ebpo_subtree *s);
 
 /* Looks at the faces that a leaf lists. */
 void ebpo_nearest_leaf(ebpo_nearest *n, const ebpo_subtree *s, const ebpo_subtree_leaf *leaf);

@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "base/error.h"
+#include "query/ahead.h"
 #include "query/inside.h"
 #include "query/limited.h"
 
@@ -55,8 +56,11 @@ ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64
         status = ebpo_check_mesh(m, error);
     if (status == EBPO_OK && m->whole && o->level < 0 && !o->deadline_ns && o->envelopes != EBPO_ENVELOPES_USE)
         return ebpo_inside_whole(context, points, count, out, error);
-    for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
         status = ebpo_inside_walk(context, points + 3 * i, o, &out[i], error);
+        if (status == EBPO_OK && context->pinned && ebpo_looks_ahead(m))
+            ebpo_context_look_ahead(context, points + 3 * i);
+    }
     return status;
 }
 

@@ -10,6 +10,8 @@
 
 /* Above so many blocks the slab is left away (a ball takes its place): such patches curve too much for one. */
 enum { SLAB_BLOCKS_MAX = 1024 };
+/* A subtree lists faces that reach beyond its cell. Where they reach beyond this, in units of the frame, floats cannot hold a slab closely enough and the box alone bounds. */
+static const double slab_reach = 2;
 /* Widening, in units of the frame (1 is half the subtree's size), for the rounding of what is computed here and of the axis to floats. */
 static const double slack = 0x1p-22;
 
@@ -109,7 +111,7 @@ static void set_child(ebpo_bound *b, int lane, const extent *e, const float axis
         b->axis[k][lane] = axis[k];
         b->middle[k][lane] = (float)(middle[k] + shift * (double)axis[k]);
     }
-    /* The middle is rounded to floats, which moves it by less than the slack. */
+    /* The middle, less than slab_reach, is rounded to floats, which moves it by less than the slack. */
     b->radius[lane] = up(sqrt(w->radius2 > 0 ? w->radius2 : 0) + slack);
     b->half[lane] = up((w->to - w->from) / 2 + slack);
 }
@@ -127,7 +129,13 @@ static void bound_blocks(const ebpo_subtree *s, ebpo_bound *b, int lane, uint32_
     for (int k = 0; k < 3; k++)
         middle[k] = (e.low[k] + e.high[k]) / 2;
     slab w = { 0, 0, 0 };
-    if (last - first > SLAB_BLOCKS_MAX) {
+    double reach = 0;
+    for (int k = 0; k < 3; k++)
+        reach = fmax(reach, fmax(fabs(e.low[k]), fabs(e.high[k])));
+    if (!(reach < slab_reach)) {
+        middle[0] = middle[1] = middle[2] = 0;
+        w.radius2 = INFINITY;
+    } else if (last - first > SLAB_BLOCKS_MAX) {
         for (int k = 0; k < 3; k++)
             w.radius2 += (e.high[k] - middle[k]) * (e.high[k] - middle[k]);
     } else {

@@ -21,7 +21,7 @@ typedef struct leaf_faces {
     int count;
     double p[FACES_MAX][3][3];
     uint32_t slot[FACES_MAX];
-    double low[3], size[3];
+    double low[3], size[3], inverse[3];
 } leaf_faces;
 
 typedef struct piece {
@@ -58,76 +58,108 @@ static inline double most3(double a, double b, double c)
     return high > c ? high : c;
 }
 
-/* Which of a block's faces have boxes that meet the cell, and which walls these boxes come to (bit 2 axis + side). Exact comparisons. */
-static unsigned look_at_block(const ebpo_subtree *s, uint32_t block, const double low[3], const double high[3], unsigned *walls)
+/* The boxes of a block's faces, and those that meet the cell. */
+typedef struct block_boxes {
+    double least[3][EBPO_BLOCK], most[3][EBPO_BLOCK];
+    unsigned near; /* a bit for each face */
+} block_boxes;
+
+/* Finds which of the faces listed in a block have boxes that meet the cell, and which walls these boxes come to (bit 2 axis + side). Exact comparisons. */
+static void look_at_block(const ebpo_subtree *s, const ebpo_listed_block *listed, const double low[3], const double high[3], block_boxes *out, unsigned *walls)
 {
     int away[EBPO_BLOCK] = { 0 }, touches[EBPO_BLOCK] = { 0 };
     for (int k = 0; k < 3; k++) {
         double x[3][EBPO_BLOCK];
         for (int i = 0; i < 3; i++)
             for (int lane = 0; lane < EBPO_BLOCK; lane++) {
-                uint64_t at = (uint64_t)block * EBPO_BLOCK_NUMBERS + (uint64_t)(3 * i + k) * EBPO_BLOCK + (uint64_t)lane;
+                uint64_t at = (uint64_t)listed->block * EBPO_BLOCK_NUMBERS + (uint64_t)(3 * i + k) * EBPO_BLOCK + (uint64_t)lane;
                 x[i][lane] = s->wide ? s->block64[at] : (double)s->block32[at];
             }
         for (int lane = 0; lane < EBPO_BLOCK; lane++) {
             double least = least3(x[0][lane], x[1][lane], x[2][lane]), most = most3(x[0][lane], x[1][lane], x[2][lane]);
+            out->least[k][lane] = least;
+            out->most[k][lane] = most;
             away[lane] |= (least > high[k]) | (most < low[k]);
             touches[lane] |= (least <= low[k]) << 2 * k | (most >= high[k]) << (2 * k + 1);
         }
     }
-    unsigned near = 0;
+    out->near = 0;
     for (int lane = 0; lane < EBPO_BLOCK; lane++) {
-        near |= (unsigned)!away[lane] << lane;
-        *walls |= away[lane] ? 0 : (unsigned)touches[lane];
+        bool near = listed->lanes >> lane & 1 && !away[lane];
+        out->near |= (unsigned)near << lane;
+        *walls |= near ? (unsigned)touches[lane] : 0;
     }
-    return near;
 }
 
-static void add_face(const ebpo_subtree *s, uint32_t slot, const double inverse[3], leaf_faces *f)
+/* A coordinate in the cell, 0 .. EBPO_LISTED_CELLS, widened by far more than the rounding here and in those that ask (2^-40). */
+static uint8_t listed(double x, double low, double inverse, double widening)
+{
+    double cells = (x - low) * inverse * EBPO_LISTED_CELLS + widening;
+    return cells < 0 ? 0 : cells < 255 ? (uint8_t)cells : 255;
+}
+
+static void set_listed_box(ebpo_listed_block *out, const block_boxes *b, const double low[3], const double inverse[3])
+{
+    for (int k = 0; k < 3; k++) {
+        double least = INFINITY, most = -INFINITY;
+        for (int lane = 0; lane < EBPO_BLOCK; lane++)
+            if (b->near >> lane & 1) {
+                least = b->least[k][lane] < least ? b->least[k][lane] : least;
+                most = b->most[k][lane] > most ? b->most[k][lane] : most;
+            }
+        out->low[k] = b->near ? listed(least, low[k], inverse[k], -0x1p-8) : 255;
+        out->high[k] = b->near ? listed(most, low[k], inverse[k], 0x1p-8) : 0;
+    }
+}
+
+static void add_face(const ebpo_subtree *s, uint32_t slot, leaf_faces *f)
 {
     double t[3][3];
     ebpo_subtree_triangle(s, slot, t);
     for (int i = 0; i < 9; i++)
-        f->p[f->count][i / 3][i % 3] = (t[i / 3][i % 3] - f->low[i % 3]) * inverse[i % 3];
+        f->p[f->count][i / 3][i % 3] = (t[i / 3][i % 3] - f->low[i % 3]) * f->inverse[i % 3];
     f->slot[f->count++] = slot;
 }
 
-/* Gathers the faces whose boxes meet the cell, and the walls that they come to. False when they are not to be had: too many, or a cell too small for what follows. */
-static bool gather(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const double low[3], const double high[3], leaf_faces *f, unsigned *walls)
+/* Gathers the faces whose boxes meet the cell, the walls that they come to, and the boxes of the list. False when they are not to be had: too many, or a cell too small for what follows. */
+static bool gather(ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const double low[3], const double high[3], leaf_faces *f, unsigned *walls)
 {
-    double inverse[3];
     bool fine = true;
     f->count = 0;
     *walls = 0;
     for (int k = 0; k < 3; k++) {
         f->low[k] = low[k];
         f->size[k] = high[k] - low[k];
-        inverse[k] = 1 / f->size[k];
+        f->inverse[k] = 1 / f->size[k];
         fine = fine && f->size[k] > 0x1p-900;
     }
+    bool few = fine;
     for (uint32_t b = 0; b < leaf->blocks; b++) {
-        uint32_t block = s->list[leaf->list + b];
-        unsigned near = look_at_block(s, block, low, high, walls); /* lanes without a face are far away */
-        for (; near && fine; near &= near - 1) {
-            fine = f->count < FACES_MAX;
-            if (fine)
-                add_face(s, block * EBPO_BLOCK + (unsigned)__builtin_ctz(near), inverse, f);
+        ebpo_listed_block *block = &s->list[leaf->list + b];
+        block_boxes boxes;
+        look_at_block(s, block, low, high, &boxes, walls);
+        if (fine)
+            set_listed_box(block, &boxes, low, f->inverse);
+        for (unsigned near = boxes.near; near && few; near &= near - 1) {
+            few = f->count < FACES_MAX;
+            if (few)
+                add_face(s, block->block * EBPO_BLOCK + (unsigned)__builtin_ctz(near), f);
         }
     }
-    return fine;
+    return few;
 }
 
 /* Crossings of the leaf's faces with a segment along an axis. */
 static int32_t crossings(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const double from[3], double to, int axis)
 {
     int32_t sum = 0;
-    for (uint32_t i = 0; i < leaf->blocks * EBPO_BLOCK; i++) {
-        uint32_t slot = s->list[leaf->list + i / EBPO_BLOCK] * EBPO_BLOCK + i % EBPO_BLOCK;
-        double t[3][3];
-        if (s->slot_face[slot] == EBPO_NO_SLOT)
-            continue;
-        ebpo_subtree_triangle(s, slot, t);
-        sum += ebpo_axis_crossing(from, to, axis, t[0], t[1], t[2]);
+    for (uint32_t b = 0; b < leaf->blocks; b++) {
+        const ebpo_listed_block *listed = &s->list[leaf->list + b];
+        for (unsigned lanes = listed->lanes; lanes; lanes &= lanes - 1) {
+            double t[3][3];
+            ebpo_subtree_triangle(s, listed->block * EBPO_BLOCK + (unsigned)__builtin_ctz(lanes), t);
+            sum += ebpo_axis_crossing(from, to, axis, t[0], t[1], t[2]);
+        }
     }
     return sum;
 }
@@ -149,19 +181,25 @@ typedef struct plane {
 } plane;
 
 /* The plane of a face in the cell's coordinates, 1-norm 1. False when rounding could have touched it: a sliver, or corners far outside the cell. */
-static bool face_plane(const double p[3][3], plane *out)
+static bool face_plane(const ebpo_subtree *s, const leaf_faces *f, int face, plane *out)
 {
-    double norm = 0, products = 0, reach = 0;
+    const double (*p)[3] = (const double (*)[3])f->p[face];
+    double t[3][3], e[3], g[3], norm = 0, products = 0, reach = 0;
+    ebpo_subtree_triangle(s, f->slot[face], t);
+    for (int k = 0; k < 3; k++) { /* of the corners as they are: those in the cell's coordinates are rounded, which short edges do not stand */
+        e[k] = (t[1][k] - t[0][k]) * f->inverse[k];
+        g[k] = (t[2][k] - t[0][k]) * f->inverse[k];
+    }
     for (int k = 0; k < 3; k++) {
         int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
-        double a = (p[1][u] - p[0][u]) * (p[2][v] - p[0][v]), b = (p[1][v] - p[0][v]) * (p[2][u] - p[0][u]);
+        double a = e[u] * g[v], b = e[v] * g[u];
         out->n[k] = a - b;
         norm += fabs(a - b);
         products += fabs(a) + fabs(b);
         reach = most3(reach, most3(fabs(p[0][k]), fabs(p[1][k]), fabs(p[2][k])), 0);
     }
     /* n is right to 2^-50 of the products, so to 2^-40 of its norm, and n . xi to 2^-33 for every corner: less than what sides_of calls certain. */
-    if (!(norm > products * 0x1p-10) || !(reach < 64))
+    if (!(norm > products * 0x1p-10) || !(products > 0x1p-900) || !(reach < 64))
         return false;
     out->d = 0;
     for (int k = 0; k < 3; k++) {
@@ -215,7 +253,7 @@ static int collect_planes(const ebpo_subtree *s, const leaf_faces *f, plane *out
     unsigned allowed = 3; /* bit 0: convex is still possible, bit 1: concave */
     for (int i = 0; i < f->count; i++) {
         plane q;
-        if (!face_plane(f->p[i], &q))
+        if (!face_plane(s, f, i, &q))
             return 0;
         unsigned sides = sides_of(s, f, i, &q, 3);
         allowed &= (sides & 1 ? 2u : 3u) & (sides & 2 ? 1u : 3u);
@@ -318,7 +356,7 @@ static uint8_t choose_wall(unsigned walls)
     return open ? (uint8_t)__builtin_ctz(open) : EBPO_NO_WALL;
 }
 
-static bool classify(const ebpo_subtree *s, ebpo_subtree_leaf *leaf, const ebpo_leaf_place *place, piece *out)
+static bool classify(ebpo_subtree *s, ebpo_subtree_leaf *leaf, const ebpo_leaf_place *place, piece *out)
 {
     double low[3], high[3];
     leaf_faces f;

@@ -1,3 +1,4 @@
+/* A subtree from its slice, stage by stage, and how much memory that takes. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -60,7 +61,7 @@ static uint64_t count_bytes(const ebpo_subtree *s)
 {
     uint64_t cells = s->nodes.grid_bits ? UINT64_C(1) << 3 * s->nodes.grid_bits : 0;
     uint64_t faces = s->face_source || s->outer ? (uint64_t)s->block_count * 8 : 0;
-    return sizeof *s + s->nodes.group_count * sizeof *s->nodes.group + cells * 5 + s->leaf_count * sizeof *s->leaf + s->list_count * 4 +
+    return sizeof *s + s->nodes.group_count * sizeof *s->nodes.group + cells * 5 + s->leaf_count * sizeof *s->leaf + s->list_count * sizeof *s->list +
            s->plane_groups * sizeof *s->planes + (uint64_t)s->block_count * (EBPO_BLOCK_NUMBERS * (s->wide ? 8 : 4) + EBPO_BLOCK * 4) +
            s->bound_count * sizeof *s->bound + s->outer_count * 4 + (s->face_source ? faces * 4 : 0) +
            (s->gray_first ? (uint64_t)s->nodes.group_count * 4 + s->gray_first[s->nodes.group_count] * 4 : 0);
@@ -147,9 +148,9 @@ void ebpo_subtree_free(ebpo_subtree *s)
 /* Blocks are more than half full but for the last of each leaf or list; lists name at most one block for each listed face. */
 void ebpo_subtree_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep, uint64_t *peak)
 {
-    uint64_t wide = needs_doubles(info) ? 2 : 1, faces = size->new_faces + size->refs;
+    uint64_t wide = needs_doubles(info) ? 2 : 1, faces = size->new_faces + size->outer;
     uint64_t blocks = faces / 4 + 2, bounds = blocks / 3 + 2;
-    *keep = sizeof(ebpo_subtree) + size->groups * 64 + size->leaves * (sizeof(ebpo_subtree_leaf) + 64) + (size->refs + size->new_faces) * 4 +
+    *keep = sizeof(ebpo_subtree) + size->groups * 64 + size->leaves * (sizeof(ebpo_subtree_leaf) + 64) + (size->refs + size->new_faces) * sizeof(ebpo_listed_block) +
             blocks * (EBPO_BLOCK_NUMBERS * 4 * wide + 32) + bounds * sizeof(ebpo_bound) + faces * 8;
     *peak = *keep + size->groups * 128 + size->leaves * 64 + faces * (12 + 36 * wide + 24) + 65536;
 }

@@ -9,14 +9,14 @@
 typedef struct walk {
     ebpo_subtree *s;
     const ebpo_slice *slice;
-    const uint32_t *block_of; /* [local face] */
+    const uint32_t *slot_of; /* [local face] */
     ebpo_leaf_place *places;
     uint64_t rank[EBPO_LEVELS_MAX][4]; /* nodes of each type of each level, seen so far */
     uint64_t refs[EBPO_LEVELS_MAX];
     uint64_t group_begin[EBPO_LEVELS_MAX]; /* number of the first group of each level */
     uint64_t leaf_begin[EBPO_LEVELS_MAX];
     uint64_t list_room;
-    uint32_t *scratch;  /* blocks of one leaf */
+    uint64_t *scratch;  /* blocks of one leaf, with the lanes that it lists: block << EBPO_BLOCK | lanes */
     uint64_t scratch_room;
     ebpo_status status;
     ebpo_error *error;
@@ -24,8 +24,13 @@ typedef struct walk {
 
 static int compare_numbers(const void *a, const void *b)
 {
-    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
     return (x > y) - (x < y);
+}
+
+static bool same_block(uint64_t a, uint64_t b)
+{
+    return a >> EBPO_BLOCK == b >> EBPO_BLOCK;
 }
 
 static void put_list(walk *w, ebpo_subtree_leaf *leaf, uint64_t count)
@@ -34,7 +39,9 @@ static void put_list(walk *w, ebpo_subtree_leaf *leaf, uint64_t count)
     uint64_t kept = 0;
     qsort(w->scratch, count, sizeof *w->scratch, compare_numbers);
     for (uint64_t i = 0; i < count; i++)
-        if (i == 0 || w->scratch[i] != w->scratch[i - 1])
+        if (kept && same_block(w->scratch[kept - 1], w->scratch[i]))
+            w->scratch[kept - 1] |= w->scratch[i];
+        else
             w->scratch[kept++] = w->scratch[i];
     if (!ebpo_grow(&s->list, &w->list_room, s->list_count + kept, sizeof *s->list)) {
         w->status = ebpo_fail_memory(w->error, (s->list_count + kept) * sizeof *s->list);
@@ -44,13 +51,14 @@ static void put_list(walk *w, ebpo_subtree_leaf *leaf, uint64_t count)
         w->status = ebpo_fail(w->error, EBPO_E_LIMIT, "the leaves list too many faces to be held at once; give a memory budget");
         return;
     }
-    memcpy(s->list + s->list_count, w->scratch, kept * sizeof *s->list);
+    for (uint64_t i = 0; i < kept; i++)
+        s->list[s->list_count + i] = (ebpo_listed_block){ (uint32_t)(w->scratch[i] >> EBPO_BLOCK), { 0, 0, 0 }, { 255, 255, 255 }, (uint8_t)w->scratch[i] };
     leaf->list = (uint32_t)s->list_count;
     leaf->blocks = (uint32_t)kept;
     s->list_count += kept;
 }
 
-/* The new faces are a run of blocks; references are looked up one by one, runs of the same block left out at once. */
+/* The new faces are a run of blocks; references are looked up one by one, runs within a block become one entry at once. */
 static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank, uint32_t number)
 {
     ebpo_subtree_leaf *leaf = &w->s->leaf[number];
@@ -61,9 +69,12 @@ static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank
     }
     for (uint64_t i = 0; i < refs + level->leaf_new[rank]; i++) {
         uint64_t face = i < refs ? level->leaf_refs[w->refs[depth] + i] : level->leaf_first[rank] + (i - refs);
-        uint32_t block = w->block_of[face];
-        if (count == 0 || w->scratch[count - 1] != block)
-            w->scratch[count++] = block;
+        uint32_t slot = w->slot_of[face];
+        uint64_t entry = (uint64_t)(slot / EBPO_BLOCK) << EBPO_BLOCK | UINT64_C(1) << slot % EBPO_BLOCK;
+        if (count && same_block(w->scratch[count - 1], entry))
+            w->scratch[count - 1] |= entry;
+        else
+            w->scratch[count++] = entry;
     }
     w->refs[depth] += refs;
     leaf->wall = EBPO_NO_WALL;
@@ -107,7 +118,7 @@ static uint32_t walk_node(walk *w, int depth, ebpo_node_type type, const uint32_
     return ebpo_entry(EBPO_ENTRY_GRAY, (uint32_t)group);
 }
 
-static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **block_of)
+static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **slot_of)
 {
     const ebpo_slice *slice = w->slice;
     ebpo_subtree *s = w->s;
@@ -126,12 +137,12 @@ static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **bloc
     s->leaf_count = (uint32_t)leaves;
     w->places = ebpo_alloc(leaves, sizeof *w->places);
     uint64_t faces = layout->block_count ? layout->block_end[layout->block_count - 1] : 0;
-    uint32_t *map = *block_of = ebpo_alloc(faces, sizeof *map);
+    uint32_t *map = *slot_of = ebpo_alloc(faces, sizeof *map);
     if (!s->nodes.group || !s->leaf || !w->places || !map)
         return ebpo_fail_memory(w->error, groups * 32 + leaves * sizeof *s->leaf + faces * 4);
     for (uint64_t b = 0; b < layout->block_count; b++)
         for (uint32_t face = layout->block_begin[b]; face < layout->block_end[b]; face++)
-            map[face] = (uint32_t)b;
+            map[face] = (uint32_t)(b * EBPO_BLOCK) + face - layout->block_begin[b];
     return EBPO_OK;
 }
 
@@ -139,15 +150,15 @@ ebpo_status ebpo_subtree_fill_nodes(ebpo_subtree *s, const ebpo_slice *slice, co
                                     ebpo_error *error)
 {
     walk w = { .s = s, .slice = slice, .status = EBPO_OK, .error = error };
-    uint32_t *block_of = NULL;
-    ebpo_status status = make_room(&w, layout, &block_of);
+    uint32_t *slot_of = NULL;
+    ebpo_status status = make_room(&w, layout, &slot_of);
     if (status == EBPO_OK) {
-        w.block_of = block_of;
+        w.slot_of = slot_of;
         s->nodes.root_level = slice->root.level;
         s->nodes.root = walk_node(&w, 0, (ebpo_node_type)(slice->level[0].types[0] & 3), slice->root.at);
         status = w.status;
     }
-    free(block_of);
+    free(slot_of);
     free(w.scratch);
     *places = w.places;
     return status;

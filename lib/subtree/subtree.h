@@ -50,6 +50,15 @@ typedef enum ebpo_leaf_kind {
 } ebpo_leaf_kind;
 enum { EBPO_NO_WALL = 6, EBPO_KIND_PLANES_MAX = 16 };
 
+/* A block in a leaf's list, and a box around what its faces may have in the leaf's cell: each axis from 0 to 254, rounded outward; low > high: nothing. Solids only.
+ * Other faces may share the block; `lanes` tells the leaf's own. */
+typedef struct ebpo_listed_block {
+    uint32_t block;
+    uint8_t low[3], high[3];
+    uint8_t lanes;
+} ebpo_listed_block;
+enum { EBPO_LISTED_CELLS = 254 };
+
 typedef struct ebpo_subtree_leaf {
     uint32_t list;        /* its blocks are list[list .. list + blocks - 1] of the subtree */
     uint32_t blocks;
@@ -92,7 +101,7 @@ typedef struct ebpo_subtree {
     ebpo_nodes nodes;
     ebpo_subtree_leaf *leaf;
     uint32_t leaf_count;
-    uint32_t *list;        /* blocks of leaves */
+    ebpo_listed_block *list; /* blocks of leaves */
     uint64_t list_count;
     ebpo_four_planes *planes;
     uint64_t plane_groups;

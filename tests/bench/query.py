@@ -4,8 +4,8 @@
     tests/bench/query.py BUILD_DIR MODEL.ply... [--count N] [--faces-from-generator M [--base BASE.ply]] -o docs/queries.md
 
 BUILD_DIR: a release build configured with -Dpeers=enabled (tools/install-deps.sh --bench installs what that needs).
-Each model is converted once (kept in --work); every figure is the median of --rounds runs in which the programs take turns, one thread each,
-on one core. The modes are measured on the largest model.
+Each model is converted once (kept in --work); every figure is the median of --rounds runs (a third of that above a million faces) in which the programs take turns, one thread each,
+on one core. The modes are measured on the largest model below a million faces.
 
 What is asked of `ebpo bench FILE --query inside|distance|ray --points uniform|path --seed S --count N --json`: --save-points and --save-answers (both
 in the peers' layout: tests/bench/peers/peer.hpp; inside: 0 out, 1 in, 2 on the surface), --mode, --level, --memory BYTES, --prefetch; in its JSON
@@ -25,6 +25,7 @@ import sys
 
 SECTIONS = ["inside", "distance", "ray", "opening", "modes", "distance-modes", "out-of-core", "leaves"]
 PEERS = ["embree", "cgal"]
+CUT = 4 # level, of the second way of opening
 # Of --count; the peers take up to 200 us for the nearest point of a point far away.
 SHARE = {("distance", "uniform"): 10, ("distance", "path"): 2}
 
@@ -61,6 +62,9 @@ class Bench:
         self.work = pathlib.Path(options.work or self.build / "bench-query")
         self.work.mkdir(parents=True, exist_ok=True)
         self.load = []
+
+    def rounds(self, model):
+        return self.options.rounds if model.faces < 1000000 else max(1, self.options.rounds // 3)
 
     def run(self, *command, pinned=True):
         command = [str(c) for c in command]
@@ -184,7 +188,7 @@ def compare(bench, model, query, points):
     raw = bench.work / f"{model.name}.{query}.{points}.raw"
     answers = {who: bench.work / f"answers.{who}" for who in ["ebpo"] + PEERS}
     reports = {who: [] for who in ["ebpo", "embree", "embree warm", "cgal"]}
-    for _ in range(bench.options.rounds):
+    for _ in range(bench.rounds(model)):
         reports["ebpo"].append(bench.ours(model, query, "--count", count, "--save-points", raw, "--save-answers", answers["ebpo"],
                                           points=points))
         for peer in PEERS:
@@ -228,24 +232,26 @@ def tail_rows(model, points, reports):
 
 def section_opening(bench, page, models):
     page.text("## Opening", "", "From a cold file to the first answer: the system is asked to forget the file (posix_fadvise) before each run. Peers load "
-              "the PLY and build their tree. Seconds; peak memory in MB.")
+              "the PLY and build their tree. Ours either decodes everything first (on one core here), or keeps the levels down to the cut level and loads what the answer needs. "
+              "Seconds; peak memory in MB.")
     rows = []
     for query in ["inside", "distance"]:
         for model in sorted(models, key=lambda m: m.faces):
             raw = bench.work / f"{model.name}.{query}.opening.raw"
-            runs = {who: [] for who in ["ebpo"] + PEERS}
-            for _ in range(bench.options.rounds):
+            runs = {who: [] for who in ["ebpo", "cut"] + PEERS}
+            for _ in range(bench.rounds(model)):
                 runs["ebpo"].append(bench.ours(model, query, "--count", 100, "--save-points", raw))
+                runs["cut"].append(bench.ours(model, query, "--count", 1, "--cut-level", CUT))
                 for peer in PEERS:
                     runs[peer].append(bench.peer(peer, model, query, raw, "--cold", "--count", 1))
             first = {who: median(runs[who], "first") for who in runs}
             peak = [median(runs["ebpo"], "peak") / 2**20] + [median(runs[p], "peak") for p in PEERS]
             rows.append([model.name, f"{model.faces:,}", query, figure(model.ply.stat().st_size / 2**20),
                          figure(model.file.stat().st_size / 2**20), figure(median(runs["ebpo"], "read") / 2**20),
-                         figure(median(runs["ebpo"], "open"))] + [figure(first[who]) for who in runs]
-                        + [ratio(first["ebpo"], first[p]) for p in PEERS] + [" / ".join(figure(p) for p in peak)])
-    page.table(["model", "faces", "question", "PLY MB", "file MB", "MB read", "open", "ours, first answer", "Embree", "CGAL",
-                "ours / Embree", "ours / CGAL", "peak MB: ours / Embree / CGAL"], rows)
+                         figure(median(runs["cut"], "read") / 2**20)] + [figure(first[who]) for who in runs]
+                        + [ratio(first[ours], first[p]) for ours in ["ebpo", "cut"] for p in PEERS] + [" / ".join(figure(p) for p in peak)])
+    page.table(["model", "faces", "question", "PLY MB", "file MB", "MB read, all", f"MB read, cut level {CUT}", "ours, all in memory", f"ours, cut level {CUT}", "Embree", "CGAL",
+                "all / Embree", "all / CGAL", "cut / Embree", "cut / CGAL", "peak MB: all / Embree / CGAL"], rows)
 
 
 def small_budget(bench, model):
@@ -262,9 +268,14 @@ def small_budget(bench, model):
     return budget, f"{budget / 2**20:,.1f} MB, {100 * budget / whole:.0f} % of the decoded size"
 
 
+def middling(models):
+    """The largest one that opens in a moment: the tables of modes open it a hundred times."""
+    return max(models, key=lambda m: m.faces if m.faces < 1000000 else 1 / m.faces)
+
+
 def both_points(bench, model, query, count, *arguments):
     """Medians for uniform points and a path."""
-    reports = {points: [bench.ours(model, query, "--count", count, *arguments, points=points) for _ in range(bench.options.rounds)]
+    reports = {points: [bench.ours(model, query, "--count", count, *arguments, points=points) for _ in range(bench.rounds(model))]
                for points in ["uniform", "path"]}
     return reports
 
@@ -274,8 +285,8 @@ def deepest(model, most):
 
 
 def section_modes(bench, page, models):
-    model = max(models, key=lambda m: m.faces)
-    (budget, words), count = small_budget(bench, model), max(1, bench.options.count // 20)
+    model = middling(models)
+    (budget, words), count = small_budget(bench, model), max(1, bench.options.count // 100)
     page.text("## Modes of the EBP thesis", "", f"Point in solid, {model.name} ({model.faces:,} faces), {count:,} points, us; with a budget "
               f"of {words}. Beside EBP 2017, table 25: means of three models of 26 to 28 million faces, on another machine. "
               "*plain*: without envelopes.")
@@ -297,8 +308,8 @@ def section_modes(bench, page, models):
 
 
 def section_distance_modes(bench, page, models):
-    model = max(models, key=lambda m: m.faces)
-    (budget, words), count = small_budget(bench, model), max(1, bench.options.count // 20)
+    model = middling(models)
+    (budget, words), count = small_budget(bench, model), max(1, bench.options.count // 200)
     page.text("## Distance modes of the EBP thesis", "", f"{model.name}, {count:,} points, us; *exact* gives the minimum, the others do not "
               f"promise it. Everything in memory, and with a budget of {words}. Beside EBP 2017, table 28.")
     kinds = [(f"`{mode}`", ["--mode", mode], EBP_DISTANCE.get(mode, ("-", "-"))) for mode in ["exact", "recursive", "leaves"]]
@@ -323,7 +334,7 @@ def section_out_of_core(bench, page, models):
             count = max(1, bench.options.count // SHARE.get((query, "path"), 1))
             for prefetch in [[], ["--prefetch"]]:
                 runs = [bench.ours(model, query, "--count", count, "--memory", budget, *prefetch, points="path", pinned=not prefetch)
-                        for _ in range(bench.options.rounds)]
+                        for _ in range(bench.rounds(model))]
                 rows.append([model.name, f"{model.faces:,}", query, "yes" if prefetch else "no", words.split(" of the")[0]]
                             + [us(median(runs, n)) for n in ["mean", "p50", "p99", "p999", "max"]]
                             + [figure(median(runs, "loads")), figure(median(runs, "memory_peak") / 2**20),
@@ -334,14 +345,20 @@ def section_out_of_core(bench, page, models):
 
 def section_leaves(bench, page, models):
     page.text("## Leaves by kind", "", "Percent of the leaves. All kinds but *general* answer by the signs of planes; a general leaf with "
-              "a wall that no face meets by one segment.")
-    rows = []
+              "a wall that no face meets by one segment. *Gain*: uniform points that fall into leaves of the kind, ns for one, as the same leaves "
+              "taken as general ones and by the planes (`tests/bench_leaves MODEL.ebpo.h5`).")
+    rows, gains = [], []
     for model in models:
         report = bench.ours(model, "inside", "--count", 100)
         leaves = at(report, "leaves")
         rows.append([model.name, f"{model.faces:,}", f"{leaves:,}"]
                     + [figure(100 * n / max(1, leaves)) for n in at(report, "kinds") + [at(report, "one_wall")]])
+        for kind in json.loads(bench.run(bench.build / "tests" / "bench_leaves", model.file, "--json"))[1:]:
+            if kind["points"]:
+                gains.append([model.name, kind["kind"], f"{kind['points']:,}", figure(kind["ns_as_general"]), figure(kind["ns"]),
+                              figure(kind["ns_as_general"] / kind["ns"])])
     page.table(["model", "faces", "leaves", "general", "one plane", "two planes", "convex set", "concave set", "general, one wall free"], rows)
+    page.table(["model", "kind", "points of 2,000,000", "as general, ns", "by planes, ns", "gain"], gains)
 
 
 # ---- the page ----
@@ -354,7 +371,10 @@ def processor():
 
 
 def command_line(options):
-    words = ["tests/bench/query.py", "BUILD_DIR"] + [pathlib.Path(m).name for m in options.models] + ["--count", str(options.count)]
+    words = ["tests/bench/query.py", "BUILD_DIR"] + [pathlib.Path(m).name for m in options.models]
+    words += ["--count", str(options.count), "--rounds", str(options.rounds)]
+    if options.sections != ",".join(SECTIONS):
+        words += ["--sections", options.sections] + (["--update"] if options.update else [])
     if options.faces_from_generator:
         words += ["--faces-from-generator", str(options.faces_from_generator)]
         words += ["--base", pathlib.Path(options.base).name] if options.base else []
@@ -372,6 +392,7 @@ def parse():
     parser.add_argument("--core", type=int, default=os.cpu_count() - 1, help="the core on which everything runs")
     parser.add_argument("--work", help="where converted models and points are kept (default BUILD_DIR/bench-query)")
     parser.add_argument("--sections", default=",".join(SECTIONS), help="comma list of " + ", ".join(SECTIONS))
+    parser.add_argument("--update", action="store_true", help="replace only these sections of an existing OUTPUT")
     parser.add_argument("-v", "--verbose", action="store_true", help="print the commands")
     parser.add_argument("-o", "--output", required=True)
     return parser.parse_args()
@@ -405,12 +426,36 @@ def main():
     bench, page = Bench(options), Page()
     plies = list(options.models) + ([generated(bench)] if options.faces_from_generator else [])
     models = [Model(bench, ply) for ply in plies]
-    sections(bench, page, models, wanted)
+    for section in SECTIONS: # the page is whole after each
+        if section in wanted:
+            sections(bench, page, models, [section])
+            write(options, bench, page)
+
+
+def write(options, bench, page):
     head = Page()
     head.text("# Queries", "", f"Made by `{command_line(options)}`; nothing here was typed in but the theses' figures, which the script names. {processor()}, "
-              f"one thread on one core, medians of {options.rounds} runs in which the programs take turns; load average of the machine meanwhile "
+              f"one thread on one core, medians of {options.rounds} runs (a third of that above a million faces) in which the programs take turns; load average of the machine meanwhile "
               f"{statistics.median(bench.load):.1f} (median), {max(bench.load):.1f} (most). Compare within a row.")
-    pathlib.Path(options.output).write_text("\n".join(head.lines + page.lines).rstrip("\n") + "\n")
+    text = "\n".join(head.lines + page.lines).rstrip("\n") + "\n"
+    out = pathlib.Path(options.output)
+    out.write_text(updated(out.read_text(), text) if options.update and out.exists() else text)
+
+
+def updated(old, new):
+    """The old page with the new one's sections in their places, each with the new one's head."""
+    head, *made = new.split("\n## ")
+    note = head.split("\n\n", 1)[1].strip()
+    fresh = {section.split("\n", 1)[0]: section for section in made}
+    first, *sections = old.split("\n## ")
+    kept = []
+    for section in sections:
+        title = section.split("\n", 1)[0]
+        if title in fresh:
+            name, body = fresh.pop(title).split("\n", 1)
+            section = f"{name}\n\n*{note.replace('*', '')}*\n{body.rstrip()}\n"
+        kept.append(section.rstrip("\n") + "\n")
+    return "\n## ".join([first] + kept + list(fresh.values()))
 
 
 main()

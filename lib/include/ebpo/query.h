@@ -27,7 +27,8 @@ typedef enum ebpo_loading {
 } ebpo_loading;
 
 typedef struct ebpo_model_options {
-    uint64_t memory;      /* bytes that the model may take, with its caches and all contexts; 0: as much as it needs */
+    uint64_t memory;      /* bytes that the model may take, with its caches and what loading needs on the way; 0: as much as it needs. Beside it: the file's table
+                           * of chunks (24 bytes a chunk) and what contexts gather of answers (hits, faces) */
     int cut_level;        /* levels 0 .. cut_level stay in memory and subtrees below are loaded on demand; -1: by the budget (all at once when that fits) */
     ebpo_loading loading; /* only matters where not all fits, or a cut level is given */
     bool prefetch;        /* a thread in the background loads the subtrees around the last one that was used (EBP 2017, 4.2.3) */
@@ -40,7 +41,9 @@ typedef struct ebpo_model_options {
 typedef struct ebpo_model ebpo_model;
 
 /* Reads what the budget allows: everything, or the levels up to the cut level. Levels whose mesh part is absent serve level-limited questions only.
- * EBPO_E_LIMIT when the budget is too small, with the least that would do. The file must stay open as long as the model. `options` may be NULL. */
+ * EBPO_E_LIMIT when the budget is too small, with one that would do (about the least). A budget that opens holds the average subtree many times, but
+ * perhaps not the largest one: the question that needs it then is EBPO_E_LIMIT too, with the budget that would do.
+ * The file must stay open as long as the model. `options` may be NULL. */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_model_open(ebpo_model **out, ebpo_file *file, const ebpo_model_options *options, ebpo_error *error);
 /* After its contexts. NULL is fine. */
 EBPO_API void ebpo_model_close(ebpo_model *model);
@@ -81,12 +84,13 @@ typedef enum ebpo_distance_mode {
     EBPO_DISTANCE_EXACT = 0,
     EBPO_DISTANCE_RECURSIVE = 1, /* EBP 2017, 4.4: the faces below the deepest gray node around the point; not the minimum */
     EBPO_DISTANCE_LEAVES = 2,    /* the faces of the leaf around the point; no answer elsewhere */
-    EBPO_DISTANCE_ENVELOPE = 3   /* the envelope of the deepest gray node around the point, at most at `level`; not the minimum */
+    EBPO_DISTANCE_ENVELOPE = 3   /* the envelope of the deepest gray node around the point, at most at `level`, unsigned; max_distance does not matter; not the minimum */
 } ebpo_distance_mode;
 
 typedef struct ebpo_query_options {
     int level;                   /* look at levels 0 .. level only, with the certainty that these allow; EBPO_LEVEL_ALL: exact answers */
-    uint64_t deadline_ns;        /* stop after about so much time for each point and tell what is certain by then; 0: no deadline */
+    uint64_t deadline_ns;        /* stop after about so much time for each point and tell what is certain by then; 0: no deadline. It bounds the search: a subtree or
+                                  * a leaf that is under way is finished */
     ebpo_envelopes envelopes;
     ebpo_distance_mode mode;     /* of ebpo_distance */
     bool unsigned_distance;      /* leave the sign away: less work; surfaces have none anyway */
@@ -126,9 +130,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_inside_many(ebpo_context *context, const
 #define EBPO_NO_FACE UINT64_MAX
 
 typedef struct ebpo_distance_result {
-    double distance;  /* correctly rounded. Solids, unless unsigned: negative inside. INFINITY: nothing within max_distance; NAN: not determined (lo, hi) */
+    double distance;  /* correctly rounded. Solids, unless unsigned: negative inside (-0.0 where it underflows). INFINITY: nothing within max_distance; NAN: not determined (lo, hi) */
     double lo, hi;    /* the true distance (unsigned) is certainly within; equal to |distance| for exact answers */
-    double point[3];  /* nearest point, rounded */
+    double point[3];  /* nearest point, rounded; NAN: none */
     double normal[3]; /* unit normal of the face (outward by its orientation); of a face without area: (0, 0, 0) */
     uint64_t face;    /* number of the triangle in the source where the file has maps, else in the file. Of several at exactly the same distance the one
                        * that comes first in the file. EBPO_NO_FACE: none (limited answers, envelopes) */

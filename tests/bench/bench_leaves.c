@@ -1,0 +1,143 @@
+/* What the kinds of leaves gain: bench_leaves FILE.ebpo.h5 [--points N] [--json]. Uniform points of the model's box that fall into leaves, by the leaf's kind: nanoseconds for one, with
+ * the kind's planes and with the same leaf taken as a general one. Both the best of seven passes, in turns, in one run. */
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "query/locate.h"
+#include "query/model.h"
+
+enum { KINDS = 5, MOST = 20000, PASSES = 7 };
+
+static const char *const names[KINDS] = { "general", "one plane", "two planes", "convex set", "concave set" };
+
+typedef struct bucket {
+    double points[MOST][3];
+    uint64_t count, seen;
+    double ns, ns_as_general;
+} bucket;
+
+static double now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static double random_unit(uint64_t *state)
+{
+    *state = *state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+    return (double)(*state >> 11) * 0x1p-53;
+}
+
+static void fail(const ebpo_error *error)
+{
+    fprintf(stderr, "bench_leaves: %s\n", error->message);
+    exit(EXIT_FAILURE);
+}
+
+static void sort_points(const ebpo_model *m, uint64_t points, bucket *buckets)
+{
+    const ebpo_subtree *s = m->whole;
+    int fine = m->info->level_count - 1;
+    uint64_t state = 1;
+    for (uint64_t i = 0; i < points; i++) {
+        double p[3];
+        uint32_t at[3];
+        int level;
+        for (int k = 0; k < 3; k++)
+            p[k] = m->info->report.min[k] + (m->info->report.max[k] - m->info->report.min[k]) * random_unit(&state);
+        if (!ebpo_locate(&s->box, fine, p, at))
+            continue;
+        uint32_t entry = ebpo_descend(&s->nodes, fine, at, &level);
+        if (ebpo_entry_kind_of(entry) != EBPO_ENTRY_LEAF)
+            continue;
+        bucket *b = &buckets[s->leaf[ebpo_entry_value(entry)].kind];
+        b->seen++;
+        if (b->count < MOST)
+            memcpy(b->points[b->count++], p, sizeof p);
+    }
+}
+
+static double pass(ebpo_context *c, const bucket *b, ebpo_inside_result *out)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    double begin = now();
+    for (uint64_t i = 0; i < b->count; i++)
+        if (ebpo_inside(c, b->points[i], NULL, &out[i], &error) != EBPO_OK)
+            fail(&error);
+    return (now() - begin) / (double)b->count * 1e9;
+}
+
+static void measure(ebpo_context *c, bucket *b)
+{
+    static ebpo_inside_result with[MOST], without[MOST];
+    ebpo_subtree *s = c->model->whole;
+    uint8_t *kinds = malloc(s->leaf_count);
+    if (!kinds)
+        exit(EXIT_FAILURE);
+    b->ns = b->ns_as_general = 1e300;
+    for (int i = 0; i < PASSES && b->count; i++) {
+        double ns = pass(c, b, with);
+        b->ns = ns < b->ns ? ns : b->ns;
+        for (uint32_t k = 0; k < s->leaf_count; k++) {
+            kinds[k] = s->leaf[k].kind;
+            s->leaf[k].kind = EBPO_LEAF_GENERAL;
+        }
+        ns = pass(c, b, without);
+        b->ns_as_general = ns < b->ns_as_general ? ns : b->ns_as_general;
+        for (uint32_t k = 0; k < s->leaf_count; k++)
+            s->leaf[k].kind = kinds[k];
+        for (uint64_t k = 0; k < b->count; k++)
+            if (with[k].where != without[k].where || with[k].winding != without[k].winding) {
+                fprintf(stderr, "bench_leaves: answers differ\n");
+                exit(EXIT_FAILURE);
+            }
+    }
+    free(kinds);
+}
+
+int main(int argc, char **argv)
+{
+    uint64_t points = 2000000;
+    bool json = false;
+    for (int i = 2; i < argc; i++)
+        if (strcmp(argv[i], "--json") == 0)
+            json = true;
+        else if (strcmp(argv[i], "--points") == 0 && i + 1 < argc)
+            points = strtoull(argv[++i], NULL, 10);
+    if (argc < 2) {
+        fprintf(stderr, "usage: bench_leaves FILE.ebpo.h5 [--points N] [--json]\n");
+        return 2;
+    }
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file;
+    ebpo_model *model;
+    ebpo_context *context;
+    if (ebpo_open(&file, argv[1], &error) != EBPO_OK || ebpo_model_open(&model, file, NULL, &error) != EBPO_OK ||
+        ebpo_context_new(&context, model, &error) != EBPO_OK)
+        fail(&error);
+    bucket *buckets = calloc(KINDS, sizeof *buckets);
+    if (!buckets)
+        return EXIT_FAILURE;
+    sort_points(model, points, buckets);
+    printf(json ? "[" : "%-12s %10s %10s %10s %14s\n", "kind", "leaves", "points", "ns", "ns as general");
+    for (int k = 0; k < KINDS; k++) {
+        bucket *b = &buckets[k];
+        measure(context, b);
+        if (!b->count)
+            b->ns = b->ns_as_general = 0;
+        printf(json ? "%s{\"kind\": \"%s\", \"leaves\": %" PRIu64 ", \"points\": %" PRIu64 ", \"ns\": %.1f, \"ns_as_general\": %.1f}"
+                    : "%s%-12s %10" PRIu64 " %10" PRIu64 " %10.1f %14.1f\n",
+               json && k ? ", " : "", names[k], model->whole->kinds[k], b->seen, b->ns, b->ns_as_general);
+    }
+    if (json)
+        printf("]\n");
+    free(buckets);
+    ebpo_context_free(context);
+    ebpo_model_close(model);
+    ebpo_close(file);
+    return 0;
+}

@@ -1,0 +1,38 @@
+#!/usr/bin/env python3
+"""Answers leave `ebpo COMMAND MODEL` as whole lines, also when it is interrupted: whole_lines.py COMMAND MODEL
+
+Standard output is a pipe that keeps what was written apart (O_DIRECT): each piece must end with a line. Then SIGTERM, of which the program dies.
+"""
+import itertools
+import os
+import signal
+import subprocess
+import sys
+import threading
+
+PIECES = 200
+
+
+def ask(stream):
+    try:
+        for i in itertools.count():
+            stream.write(f"{i % 977 / 100} {i % 13 / 7} {i % 89 / 31}{' -1 0 0' if sys.argv[1] == 'ray' else ''}\n".encode())
+    except (BrokenPipeError, ValueError):
+        pass
+
+
+answers, theirs = os.pipe2(os.O_DIRECT)
+process = subprocess.Popen(["ebpo", *sys.argv[1:]], stdin=subprocess.PIPE, stdout=theirs)
+os.close(theirs)
+asker = threading.Thread(target=ask, args=[process.stdin], daemon=True)
+asker.start()
+broken = 0
+for number in itertools.count():
+    piece = os.read(answers, 1 << 16)
+    if not piece:
+        break
+    broken += not piece.endswith(b"\n")
+    if number == PIECES:
+        process.send_signal(signal.SIGTERM)
+code = process.wait(timeout=60)
+print("fine" if code == -signal.SIGTERM and not broken and number > PIECES else f"code {code}, {broken} of {number} pieces end within a line")
