@@ -196,10 +196,14 @@ START_TEST(content_checksum_does_not_depend_on_the_codec)
 }
 END_TEST
 
+typedef struct metadata_places {
+    uint64_t head, index, index_bytes, chunk_bytes;
+} metadata_places;
+
 static herr_t check_chunks(hid_t group, const char *name, const H5L_info_t *info, void *data)
 {
     (void)info;
-    uint64_t *head = data;
+    metadata_places *m = data;
     hid_t object = H5Oopen(group, name, H5P_DEFAULT);
     if (H5Iget_type(object) == H5I_DATASET) {
         hsize_t count = 0;
@@ -210,8 +214,10 @@ static herr_t check_chunks(hid_t group, const char *name, const H5L_info_t *info
             unsigned mask;
             haddr_t address;
             ck_assert_int_ge(H5Dget_chunk_info(object, space, i, at, &mask, &address, &size), 0);
-            ck_assert_uint_ge(address, head[0]);
-            head[1] += size;
+            ck_assert_uint_ge(address, m->head);
+            ck_assert(address + size <= m->index || address >= m->index + m->index_bytes);
+            ck_assert(count == 1 || address >= m->index + m->index_bytes); /* what one needs to find them comes before them */
+            m->chunk_bytes += size;
         }
         H5Sclose(space);
     }
@@ -219,20 +225,28 @@ static herr_t check_chunks(hid_t group, const char *name, const H5L_info_t *info
     return 0;
 }
 
-START_TEST(all_metadata_is_in_a_small_head)
+/* Headers, the first levels, the index of large arrays, all else; no gaps. */
+START_TEST(all_metadata_is_in_two_pieces)
 {
     ebpo_tree tree;
     random_tree_make(&tree, &shapes[4]);
     ck_assert_int_eq(tree.info.level_count, 12);
     write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, ~0u);
     ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
-    uint64_t head[2] = { ebpo_file_info(file)->head_bytes, 0 }, size = ebpo_file_info(file)->file_bytes;
+    const ebpo_info *info = ebpo_file_info(file);
+    metadata_places m = { info->head_bytes, info->chunk_index_offset, info->chunk_index_bytes, 0 };
+    uint64_t size = info->file_bytes, first_levels = m.head;
+    for (int level = 0; level < info->index_level; level++)
+        first_levels += info->level[level].stored_bytes;
+    ck_assert_int_gt(info->index_level, 3);
+    ck_assert_uint_ge(m.index, first_levels);
+    ck_assert_uint_gt(m.index_bytes, 0);
     ebpo_close(file);
-    ck_assert_uint_lt(head[0], 64 << 10);
+    ck_assert_uint_lt(m.head, 64 << 10);
     hid_t fid = H5Fopen(in_folder("a.ebpo.h5"), H5F_ACC_RDONLY, H5P_DEFAULT);
-    ck_assert_int_ge(H5Lvisit(fid, H5_INDEX_NAME, H5_ITER_NATIVE, check_chunks, head), 0);
+    ck_assert_int_ge(H5Lvisit(fid, H5_INDEX_NAME, H5_ITER_NATIVE, check_chunks, &m), 0);
     H5Fclose(fid);
-    ck_assert_uint_eq(head[0] + head[1], size); /* nothing behind the head but chunks, and no gaps */
+    ck_assert_uint_eq(m.head + m.index_bytes + m.chunk_bytes, size);
     ebpo_tree_free(&tree);
 }
 END_TEST
@@ -375,6 +389,7 @@ START_TEST(every_flipped_bit_behind_the_head_is_noticed)
     write_ok(&tree, in_folder("a.ebpo.h5"), (ebpo_codec)_i, 1, ~0u);
     ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
     uint64_t head = ebpo_file_info(file)->head_bytes;
+    ck_assert_uint_eq(ebpo_file_info(file)->chunk_index_bytes, 0);
     ebpo_close(file);
     uint8_t *data = slurp(in_folder("a.ebpo.h5"), &size);
     unsigned missed = 0;
@@ -615,7 +630,7 @@ int main(void)
     tcase_add_loop_test(tests, trees_come_back_bit_for_bit, 0, SHAPES);
     tcase_add_test(tests, equal_trees_give_equal_bytes_for_any_thread_count);
     tcase_add_test(tests, content_checksum_does_not_depend_on_the_codec);
-    tcase_add_test(tests, all_metadata_is_in_a_small_head);
+    tcase_add_test(tests, all_metadata_is_in_two_pieces);
     tcase_add_test(tests, libhdf5_reads_what_we_compress);
     tcase_add_test(tests, parts_that_are_left_out_are_absent);
     tcase_add_loop_test(tests, source_order_undoes_the_maps, 1, 4);

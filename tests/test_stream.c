@@ -151,7 +151,7 @@ static void expect_tree(ebpo_file *file, bool planes, bool polygons)
     for (; next_level(stream, &level); number++) {
         ck_assert_int_eq(level.level, number);
         ck_assert_uint_eq(level.node_count, number ? 8 * parent_count : 1);
-        bytes += tree.info.level[number].stored_bytes;
+        bytes += tree.info.level[number].stored_bytes + (number == tree.info.index_level ? tree.info.chunk_index_bytes : 0);
         ck_assert_uint_eq(level.cumulative_bytes, bytes);
         expect_level(stream, &tree, number, &parents, &parent_count, planes || polygons);
     }

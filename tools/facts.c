@@ -30,7 +30,7 @@ uint64_t facts_cumulative(const ebpo_info *info, int level)
     uint64_t sum = info->head_bytes;
     for (int i = 0; i <= level; i++)
         sum += info->level[i].stored_bytes;
-    return sum;
+    return sum + (level >= info->index_level ? info->chunk_index_bytes : 0);
 }
 
 /* --- words --- */
@@ -67,11 +67,18 @@ static void print_model(FILE *out, const ebpo_info *info)
             info->leaf_faces, info->epsilon);
 }
 
-/* What the file holds besides head, levels, mesh and maps: checksums and padding. */
+static uint64_t level_bytes(const ebpo_info *info)
+{
+    uint64_t sum = 0;
+    for (int i = 0; i < info->level_count; i++)
+        sum += info->level[i].stored_bytes;
+    return sum;
+}
+
+/* What the file holds besides: nothing, unless another program wrote it. */
 static uint64_t other_bytes(const ebpo_info *info)
 {
-    uint64_t sum = info->mesh_vertex_bytes + info->mesh_face_bytes + info->map_bytes;
-    sum += info->level_count ? facts_cumulative(info, info->level_count - 1) : info->head_bytes;
+    uint64_t sum = info->head_bytes + info->chunk_index_bytes + level_bytes(info) + info->mesh_vertex_bytes + info->mesh_face_bytes + info->map_bytes;
     return info->file_bytes > sum ? info->file_bytes - sum : 0;
 }
 
@@ -98,8 +105,8 @@ void facts_print(FILE *out, const char *path, const ebpo_info *info)
     print_model(out, info);
     fprintf(out, "  holds     %s; codec %s\n", words_parts(parts, sizeof parts, info->parts), words_codec(info->codec));
     print_bytes(out, "head", info, info->head_bytes);
-    print_bytes(out, "levels", info,
-                info->level_count ? facts_cumulative(info, info->level_count - 1) - info->head_bytes : 0);
+    print_bytes(out, "index", info, info->chunk_index_bytes);
+    print_bytes(out, "levels", info, level_bytes(info));
     print_bytes(out, "vertices", info, info->mesh_vertex_bytes);
     print_bytes(out, "faces", info, info->mesh_face_bytes);
     print_bytes(out, "maps", info, info->map_bytes);
@@ -193,7 +200,8 @@ static void json_storage(json *j, const ebpo_info *info)
     json_object(j, "bytes");
     json_uint(j, "file", info->file_bytes);
     json_uint(j, "head", info->head_bytes);
-    json_uint(j, "levels", info->level_count ? facts_cumulative(info, info->level_count - 1) - info->head_bytes : 0);
+    json_uint(j, "index", info->chunk_index_bytes);
+    json_uint(j, "levels", level_bytes(info));
     json_uint(j, "vertices", info->mesh_vertex_bytes);
     json_uint(j, "faces", info->mesh_face_bytes);
     json_uint(j, "maps", info->map_bytes);

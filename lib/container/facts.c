@@ -24,6 +24,7 @@ typedef enum fact_kind {
     INTEGER,  /* int64_t as i64 */
     COUNT32,  /* uint32_t as u64 */
     COUNT,    /* uint64_t as u64 */
+    HINT,     /* the same, may be absent */
     YES_NO,   /* bool as u64 0 or 1 */
     REAL,     /* double */
     REAL3,    /* double[3] */
@@ -99,6 +100,8 @@ static const fact facts[] = {
     { "mesh_min", REAL3, AT(report.min) },
     { "mesh_max", REAL3, AT(report.max) },
     { "content_sha256", DIGEST, AT(content_sha256) },
+    { "chunk_index_offset", HINT, AT(chunk_index_offset) },
+    { "chunk_index_bytes", HINT, AT(chunk_index_bytes) },
 };
 enum { FACTS = sizeof facts / sizeof facts[0] };
 
@@ -140,6 +143,7 @@ static ebpo_status put_fact(ebpo_h5_out *out, ebpo_h5_id id, const fact *f, cons
     case NUMBER: return ebpo_h5_put_int(out, id, f->name, *(const int *)field, error);
     case INTEGER: return ebpo_h5_put_int(out, id, f->name, *(const int64_t *)field, error);
     case COUNT32: return ebpo_h5_put_count(out, id, f->name, *(const uint32_t *)field, error);
+    case HINT:
     case COUNT: return ebpo_h5_put_count(out, id, f->name, *(const uint64_t *)field, error);
     case YES_NO: return ebpo_h5_put_count(out, id, f->name, *(const bool *)field, error);
     case REAL: return ebpo_h5_put_real(out, id, f->name, field, 0, error);
@@ -193,6 +197,12 @@ ebpo_status ebpo_facts_put(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *i
 ebpo_status ebpo_facts_put_digest(ebpo_h5_out *out, ebpo_h5_id root, const uint8_t digest[32], ebpo_error *error)
 {
     return put_digest(out, root, "content_sha256", digest, error);
+}
+
+ebpo_status ebpo_facts_put_index(ebpo_h5_out *out, ebpo_h5_id root, uint64_t offset, uint64_t bytes, ebpo_error *error)
+{
+    ebpo_status status = ebpo_h5_put_count(out, root, "chunk_index_offset", offset, error);
+    return status == EBPO_OK ? ebpo_h5_put_count(out, root, "chunk_index_bytes", bytes, error) : status;
 }
 
 ebpo_status ebpo_facts_put_level(ebpo_h5_out *out, ebpo_h5_id group, const ebpo_level_summary *level, ebpo_error *error)
@@ -281,6 +291,7 @@ static ebpo_status get_fact(ebpo_h5_in *in, ebpo_h5_id id, const char *object, c
     case COUNT32:
     case YES_NO: status = get_limited(in, id, object, f, field, error); break;
     case INTEGER: status = ebpo_h5_get_int(in, id, object, f->name, field, error); break;
+    case HINT:
     case COUNT: status = ebpo_h5_get_count(in, id, object, f->name, field, error); break;
     case REAL: status = ebpo_h5_get_real(in, id, object, f->name, field, 0, error); break;
     case REAL3: status = ebpo_h5_get_real(in, id, object, f->name, field, 3, error); break;
@@ -288,7 +299,7 @@ static ebpo_status get_fact(ebpo_h5_in *in, ebpo_h5_id id, const char *object, c
     }
     if (status != EBPO_E_ABSENT)
         return status;
-    if (f->kind == NOTE)
+    if (f->kind == NOTE || f->kind == HINT)
         return EBPO_OK;
     return ebpo_fail(error, EBPO_E_FORMAT, "%s: %s: attribute %s is missing; get a fresh copy of the file", in->shown, object, f->name);
 }

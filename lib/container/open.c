@@ -18,7 +18,7 @@ static ebpo_status open_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_id id,
     ebpo_schema_path(id, level, a->path);
     if (rows == 0 || (spec->if_needed && ebpo_h5_look(h5, a->path) == EBPO_H5_ABSENT))
         return EBPO_OK;
-    uint64_t most = ebpo_input_is_far(&file->in) ? 1 : UINT64_MAX; /* places of more are behind the headers */
+    uint64_t most = ebpo_input_is_far(&file->in) ? 1 : UINT64_MAX; /* places of more are in the index */
     ebpo_status status = ebpo_h5_read_array(h5, a->path, most, &a->shape, &a->chunks, &a->stored_bytes, error);
     if (status != EBPO_OK)
         return status;
@@ -33,6 +33,8 @@ static ebpo_status open_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_id id,
     a->present = true;
     if (!a->chunks)
         atomic_store(&file->located, false);
+    if (id < EBPO_LEVEL_ARRAYS && level < file->info.index_level && ebpo_h5_chunk_count(&a->shape) > 1)
+        file->info.index_level = level;
     return EBPO_OK;
 }
 
@@ -85,6 +87,7 @@ static ebpo_status sum_stored(ebpo_file *file, ebpo_error *error)
 static ebpo_status open_arrays(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
 {
     ebpo_info *info = &file->info;
+    info->index_level = info->level_count;
     ebpo_status status = open_group(h5, "/mesh", info->parts & EBPO_PART_MESH, error);
     if (status == EBPO_OK)
         status = open_group(h5, "/maps", info->parts & EBPO_PART_MAPS, error);
@@ -103,6 +106,14 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *erro
     return status == EBPO_OK ? sum_stored(file, error) : status;
 }
 
+/* Files that other programs have rewritten may state what is no longer true. */
+static void judge_index(ebpo_info *info, uint64_t size)
+{
+    enum { INDEX_BYTES_MOST = 256 << 20 };
+    if (info->chunk_index_offset > size || info->chunk_index_bytes > size - info->chunk_index_offset || info->chunk_index_bytes > INDEX_BYTES_MOST)
+        info->chunk_index_offset = info->chunk_index_bytes = 0;
+}
+
 static ebpo_status read_head(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
 {
     ebpo_h5_id root = -1;
@@ -110,6 +121,7 @@ static ebpo_status read_head(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
     if (status == EBPO_OK)
         status = ebpo_facts_get(h5, root, &file->info, error);
     ebpo_h5_close_id(root);
+    judge_index(&file->info, file->in.source.size);
     if (status == EBPO_OK && (file->info.level_count < 1 || file->info.level_count > EBPO_LEVELS_MAX))
         status = ebpo_fail(error, EBPO_E_FORMAT, "%s: /: level_count is not 1 to %d; get a fresh copy of the file", file->in.shown, EBPO_LEVELS_MAX);
     if (status == EBPO_OK)
@@ -133,7 +145,7 @@ static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const
     atomic_init(&file->located, true);
     ebpo_status status = ebpo_input_open(&file->in, source, name, error);
     if (status == EBPO_OK)
-        status = ebpo_h5_open(&h5, &file->in, 0, error);
+        status = ebpo_h5_open(&h5, &file->in, (ebpo_range){ 0, 0 }, error);
     if (status == EBPO_OK)
         status = read_head(file, &h5, error);
     status = ebpo_h5_close(&h5, status, error);
@@ -168,10 +180,10 @@ static ebpo_status locate_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_in *
 static ebpo_status locate_all(ebpo_file *file, ebpo_error *error)
 {
     ebpo_h5_in h5 = EBPO_H5_IN_INIT;
-    uint64_t begin = file->in.source.at_hand, end = file->info.head_bytes;
-    if (begin < end)
-        ebpo_input_expect(&file->in, &(ebpo_range){ begin, end - begin }, 1);
-    ebpo_status status = ebpo_h5_open(&h5, &file->in, end, error);
+    ebpo_range index = { file->info.chunk_index_offset, file->info.chunk_index_bytes };
+    if (index.size && index.offset + index.size > file->in.source.at_hand)
+        ebpo_input_expect(&file->in, &index, 1);
+    ebpo_status status = ebpo_h5_open(&h5, &file->in, index, error);
     for (int i = 0; i < EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS && status == EBPO_OK; i++)
         status = locate_array(file, &h5, &file->level_array[i / EBPO_LEVEL_ARRAYS][i % EBPO_LEVEL_ARRAYS], error);
     for (int i = 0; i < EBPO_ARRAYS && status == EBPO_OK; i++)

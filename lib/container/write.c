@@ -1,4 +1,5 @@
-/* ebpo_tree_write: lays the head out once in memory to learn its size, then writes head and chunks in one go. */
+/* ebpo_tree_write: lays the file out once in memory to learn the sizes of its metadata, then writes headers, the chunks of the first levels, the index of large arrays' chunks, and
+ * all other chunks, in one go. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -34,6 +35,7 @@ typedef struct writer {
     ebpo_chunk_coder *coders;   /* one for each thread */
     ebpo_content content;
     uint64_t chunk_bytes, chunks_done, chunks;
+    uint64_t head_bytes, index_bytes, index_at; /* headers; the index of arrays of several chunks, and where it begins (0: there is none, or not yet) */
 } writer;
 
 static ebpo_status make_level_groups(writer *w, ebpo_error *error)
@@ -116,12 +118,14 @@ static void close_handles(writer *w)
     w->root = -1;
 }
 
-/* Size of the head: the same file in memory, with chunks of one byte. */
-static ebpo_status measure_head(writer *w, const char *shown, uint64_t *head_bytes, ebpo_error *error)
+/* Sizes of headers and index: the same file in memory, with chunks of one byte. */
+static ebpo_status measure_metadata(writer *w, const char *shown, ebpo_error *error)
 {
     ebpo_plan *plan = &w->plan;
-    uint64_t room = (256 << 10) + (4 << 10) * (uint64_t)plan->count + 32 * w->chunks, used = 0;
+    uint64_t room = (256 << 10) + (4 << 10) * (uint64_t)plan->count + 32 * w->chunks, headers = 0, all = 0;
     ebpo_status status = lay_out(w, NULL, shown, room, "", 1, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_head_used(&w->out, room, &headers, error);
     for (unsigned i = 0; i < plan->count && status == EBPO_OK; i++) {
         const ebpo_array_out *a = &plan->array[i];
         for (uint64_t k = i == 0; k < ebpo_h5_chunk_count(&a->shape) && status == EBPO_OK; k++)
@@ -129,9 +133,22 @@ static ebpo_status measure_head(writer *w, const char *shown, uint64_t *head_byt
     }
     close_handles(w);
     if (status == EBPO_OK)
-        status = ebpo_h5_head_used(&w->out, room, &used, error);
+        status = ebpo_h5_head_used(&w->out, room, &all, error);
     ebpo_h5_discard(&w->out);
-    *head_bytes = (used + 8 + 7) / 8 * 8; /* the last checksum may end in zero bytes */
+    w->head_bytes = (headers + 8 + 7) / 8 * 8; /* the last checksum may end in zero bytes */
+    w->index_bytes = all > headers ? (all - headers + 8 + 7) / 8 * 8 : 0;
+    return status;
+}
+
+/* What comes now is in a piece of its own, once the first array of several chunks calls for it. */
+static ebpo_status begin_index(writer *w, const char *path, ebpo_error *error)
+{
+    close_handles(w);
+    ebpo_status status = ebpo_h5_reopen(&w->out, path, w->index_bytes, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_root(&w->out, &w->root, error);
+    for (unsigned i = 0; i < w->plan.count && status == EBPO_OK; i++)
+        status = ebpo_h5_open_array(&w->out, w->plan.array[i].path, &w->plan.array[i].handle, error);
     return status;
 }
 
@@ -197,6 +214,8 @@ static ebpo_status flush_window(writer *w, ebpo_error *error)
     ebpo_status status = encode_window(w, error);
     for (unsigned i = 0; i < w->used && status == EBPO_OK; i++) {
         const slot *s = &w->slots[i];
+        if (w->index_at == 0 && ebpo_h5_chunk_count(&s->array->shape) > 1)
+            w->index_at = w->head_bytes + w->chunk_bytes;
         w->chunk_bytes += s->stored_bytes;
         if (w->chunks_done++ == 0)
             continue; /* written by lay_out */
@@ -256,25 +275,29 @@ static ebpo_status encode_first(writer *w, uint8_t *stored, size_t *bytes, ebpo_
 
 static ebpo_status write_file(writer *w, const char *path, const char *shown, ebpo_error *error)
 {
-    uint64_t head_bytes = 0, file_bytes = 0;
+    uint64_t file_bytes = 0;
     uint8_t first[256], digest[32]; /* the chunk is of two bytes */
     size_t first_bytes = 0;
     ebpo_status status = encode_first(w, first, &first_bytes, error);
     if (status == EBPO_OK)
-        status = measure_head(w, shown, &head_bytes, error);
+        status = measure_metadata(w, shown, error);
     if (status == EBPO_OK)
-        status = lay_out(w, path, shown, head_bytes, first, first_bytes, error);
+        status = lay_out(w, path, shown, w->head_bytes, first, first_bytes, error);
+    if (status == EBPO_OK && w->index_bytes)
+        status = begin_index(w, path, error);
     if (status == EBPO_OK)
         status = write_chunks(w, error);
     if (status == EBPO_OK)
         status = ebpo_content_end(&w->content, digest, error);
     if (status == EBPO_OK)
         status = ebpo_facts_put_digest(&w->out, w->root, digest, error);
+    if (status == EBPO_OK)
+        status = ebpo_facts_put_index(&w->out, w->root, w->index_at, w->index_bytes, error);
     close_handles(w);
     if (status == EBPO_OK)
         status = ebpo_h5_finish(&w->out, &file_bytes, error);
-    if (status == EBPO_OK && file_bytes != head_bytes + w->chunk_bytes)
-        status = ebpo_fail(error, EBPO_E_UNSUPPORTED, "%s: this libhdf5 did not keep all metadata at the head of the file; "
+    if (status == EBPO_OK && file_bytes != w->head_bytes + w->index_bytes + w->chunk_bytes)
+        status = ebpo_fail(error, EBPO_E_UNSUPPORTED, "%s: this libhdf5 did not keep metadata in two pieces; "
                            "use one of series 1.10", shown);
     return status;
 }

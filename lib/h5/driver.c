@@ -8,8 +8,8 @@
 #include "h5/h5.h"
 
 enum {
-    HEAD_BYTES = 131072,  /* holds all metadata of a file of some 8 million faces */
-    WINDOW_BYTES = 131072 /* of what lies behind: chunk tables of larger files, and metadata of files that h5repack made */
+    HEAD_BYTES = 131072,  /* holds all headers */
+    WINDOW_BYTES = 131072 /* of what lies behind: indexes of chunks, and metadata of files that h5repack made */
 };
 
 /* What libhdf5 sees of an open file; it begins with libhdf5's own part. */
@@ -24,12 +24,12 @@ typedef struct driver_choice {
     ebpo_h5_driver *driver;
 } driver_choice;
 
-ebpo_status ebpo_h5_driver_open(ebpo_h5_driver *driver, ebpo_input *input, uint64_t metadata_bytes, ebpo_error *error)
+ebpo_status ebpo_h5_driver_open(ebpo_h5_driver *driver, ebpo_input *input, ebpo_range index, ebpo_error *error)
 {
     uint64_t bytes = input->source.size < HEAD_BYTES ? input->source.size : HEAD_BYTES;
     if (ebpo_input_is_far(input) && input->source.at_hand < bytes)
         bytes = input->source.at_hand;
-    *driver = (ebpo_h5_driver){ .input = input, .metadata_bytes = metadata_bytes, .id = -1, .head = ebpo_alloc(bytes, 1), .head_bytes = bytes, .status = EBPO_OK };
+    *driver = (ebpo_h5_driver){ .input = input, .index = index, .id = -1, .head = ebpo_alloc(bytes, 1), .head_bytes = bytes, .status = EBPO_OK };
     ebpo_status status = driver->head ? ebpo_input_read(input, 0, bytes, driver->head, error) : ebpo_fail_memory(error, bytes);
     return status;
 }
@@ -50,9 +50,14 @@ static bool take(const uint8_t *buffer, uint64_t begin, uint64_t bytes, uint64_t
     return true;
 }
 
+static bool in_index(const ebpo_h5_driver *d, uint64_t at)
+{
+    return at >= d->index.offset && at - d->index.offset < d->index.size;
+}
+
 static ebpo_status move_window(ebpo_h5_driver *d, uint64_t at)
 {
-    uint64_t end = at < d->metadata_bytes ? d->metadata_bytes : d->input->source.size, left = end - at;
+    uint64_t left = in_index(d, at) ? d->index.offset + d->index.size - at : d->input->source.size - at;
     if (!d->window)
         d->window = ebpo_alloc(WINDOW_BYTES, 1);
     if (!d->window)
@@ -71,7 +76,7 @@ static ebpo_status fetch(ebpo_h5_driver *d, uint64_t at, uint64_t size, void *da
 {
     if (take(d->head, 0, d->head_bytes, at, size, data) || take(d->window, d->window_at, d->window_bytes, at, size, data))
         return EBPO_OK;
-    if (size > WINDOW_BYTES || (at < d->metadata_bytes && size > d->metadata_bytes - at))
+    if (size > WINDOW_BYTES || (in_index(d, at) && size > d->index.offset + d->index.size - at))
         return ebpo_input_read(d->input, at, size, data, &d->error);
     ebpo_status status = move_window(d, at);
     if (status == EBPO_OK)

@@ -8,13 +8,13 @@
 
 #include "io/source.h"
 
-/* One file's bytes as libhdf5 gets them, buffered: our writer puts all metadata at the start of the file. */
+/* One file's bytes as libhdf5 gets them, buffered: our writer puts headers at the start of the file, and the index of large arrays in one piece behind the first levels. */
 typedef struct ebpo_h5_driver {
     ebpo_input *input;
     hid_t id;               /* libhdf5's registration of the driver */
     uint8_t *head, *window; /* the first bytes, and a piece elsewhere, NULL until needed */
     uint64_t head_bytes, window_at, window_bytes;
-    uint64_t metadata_bytes; /* where windows that begin before it end; 0: not known */
+    ebpo_range index;       /* a window that begins within it ends with it */
     ebpo_status status;     /* of the input's first failure; libhdf5 only learns that there was one */
     ebpo_error error;
     /* While recording, reads of raw data only leave here what they asked for. Reading a chunk is the one call of libhdf5 1.10 that finds
@@ -25,7 +25,7 @@ typedef struct ebpo_h5_driver {
 } ebpo_h5_driver;
 
 /* Fetches the head. */
-EBPO_MUST_USE ebpo_status ebpo_h5_driver_open(ebpo_h5_driver *driver, ebpo_input *input, uint64_t metadata_bytes, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_h5_driver_open(ebpo_h5_driver *driver, ebpo_input *input, ebpo_range index, ebpo_error *error);
 /* After the file that was opened through it. */
 void ebpo_h5_driver_close(ebpo_h5_driver *driver);
 

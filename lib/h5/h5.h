@@ -45,9 +45,11 @@ typedef struct ebpo_h5_out {
 } ebpo_h5_out;
 #define EBPO_H5_OUT_INIT { "", -1, 0 }
 
-/* Creates a file by name, or in memory when path is NULL. The first `head_bytes` bytes are for all metadata. `links`: objects in the root group. */
+/* Creates a file by name, or in memory when path is NULL. The first `head_bytes` bytes are for metadata. `links`: objects in the root group. */
 EBPO_MUST_USE ebpo_status ebpo_h5_create(ebpo_h5_out *out, const char *path, const char *shown, uint64_t head_bytes, unsigned links,
                                          ebpo_error *error);
+/* Closes a file by name and opens it again, nothing else of it being open: from here on metadata that is allocated takes the next `metadata_bytes` in one piece. */
+EBPO_MUST_USE ebpo_status ebpo_h5_reopen(ebpo_h5_out *out, const char *path, uint64_t metadata_bytes, ebpo_error *error);
 /* Opens the root group for its attributes, or creates a group made for `links` links. The caller closes the id. */
 EBPO_MUST_USE ebpo_status ebpo_h5_root(ebpo_h5_out *out, ebpo_h5_id *id, ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_h5_make_group(ebpo_h5_out *out, const char *path, unsigned links, ebpo_h5_id *id, ebpo_error *error);
@@ -59,13 +61,14 @@ EBPO_MUST_USE ebpo_status ebpo_h5_put_count(ebpo_h5_out *out, ebpo_h5_id id, con
 EBPO_MUST_USE ebpo_status ebpo_h5_put_real(ebpo_h5_out *out, ebpo_h5_id id, const char *name, const double *values, unsigned count,
                                            ebpo_error *error);
 
+EBPO_MUST_USE ebpo_status ebpo_h5_open_array(ebpo_h5_out *out, const char *path, ebpo_h5_id *id, ebpo_error *error);
 /* Creates an array; the caller closes the id. Then its chunks, encoded, by number. */
 EBPO_MUST_USE ebpo_status ebpo_h5_make_array(ebpo_h5_out *out, const char *path, const ebpo_h5_shape *shape, ebpo_h5_id *id,
                                              ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_h5_put_chunk(ebpo_h5_out *out, const char *path, ebpo_h5_id id, const ebpo_h5_shape *shape, uint64_t chunk,
                                             const void *data, size_t bytes, ebpo_error *error);
 
-/* Of a file in memory: bytes from the start up to the end of the last metadata, given that raw data begins at first_raw. */
+/* Of a file in memory: bytes from the start up to the end of the last metadata so far, given that raw data begins at first_raw. */
 EBPO_MUST_USE ebpo_status ebpo_h5_head_used(ebpo_h5_out *out, uint64_t first_raw, uint64_t *bytes, ebpo_error *error);
 /* Flushes and closes; *file_bytes (may be NULL) is the size before closing. Harmless when already closed. */
 EBPO_MUST_USE ebpo_status ebpo_h5_finish(ebpo_h5_out *out, uint64_t *file_bytes, ebpo_error *error);
@@ -80,9 +83,9 @@ typedef struct ebpo_h5_in {
 } ebpo_h5_in;
 #define EBPO_H5_IN_INIT { NULL, -1, 0, NULL }
 
-/* Opens for reading, through the input, which stays the caller's and outlives `in`. EBPO_E_FORMAT when it is no HDF5 file. `metadata_bytes`: where raw data begins, if that is
- * known, else 0. */
-EBPO_MUST_USE ebpo_status ebpo_h5_open(ebpo_h5_in *in, ebpo_input *input, uint64_t metadata_bytes, ebpo_error *error);
+/* Opens for reading, through the input, which stays the caller's and outlives `in`. EBPO_E_FORMAT when it is no HDF5 file. `index`: where
+ * more metadata is expected, which is then read in one go; or nothing. */
+EBPO_MUST_USE ebpo_status ebpo_h5_open(ebpo_h5_in *in, ebpo_input *input, ebpo_range index, ebpo_error *error);
 /* Closes everything, also what a failing open left. Returns `status`, unless the input failed at any time since opening: then that, with its
  * message, since libhdf5 reports failed reads as damage or as absence. */
 EBPO_MUST_USE ebpo_status ebpo_h5_close(ebpo_h5_in *in, ebpo_status status, ebpo_error *error);

@@ -22,13 +22,13 @@ static hid_t file_access(ebpo_h5_driver *driver)
     return fapl;
 }
 
-ebpo_status ebpo_h5_open(ebpo_h5_in *in, ebpo_input *input, uint64_t metadata_bytes, ebpo_error *error)
+ebpo_status ebpo_h5_open(ebpo_h5_in *in, ebpo_input *input, ebpo_range index, ebpo_error *error)
 {
     *in = (ebpo_h5_in){ .shown = input->shown, .file = -1, .file_bytes = input->source.size };
     in->driver = ebpo_alloc_zero(1, sizeof *in->driver);
     if (!in->driver)
         return ebpo_fail_memory(error, sizeof *in->driver);
-    ebpo_status status = ebpo_h5_driver_open(in->driver, input, metadata_bytes, error);
+    ebpo_status status = ebpo_h5_driver_open(in->driver, input, index, error);
     if (status != EBPO_OK)
         return status;
     ebpo_h5_scope scope;

@@ -70,6 +70,24 @@ ebpo_status ebpo_h5_create(ebpo_h5_out *out, const char *path, const char *shown
     return status;
 }
 
+ebpo_status ebpo_h5_reopen(ebpo_h5_out *out, const char *path, uint64_t metadata_bytes, ebpo_error *error)
+{
+    ebpo_status status = ebpo_h5_finish(out, NULL, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_h5_scope scope;
+    ebpo_h5_enter(&scope);
+    hid_t fapl = file_access(false, metadata_bytes);
+    if (fapl >= 0)
+        out->file = H5Fopen(path, H5F_ACC_RDWR, fapl);
+    if (out->file < 0)
+        status = ebpo_h5_fail(error, EBPO_E_IO, out->shown, "", "libhdf5 could not open again what it had written");
+    if (fapl >= 0)
+        H5Pclose(fapl);
+    ebpo_h5_leave(&scope);
+    return status;
+}
+
 ebpo_status ebpo_h5_root(ebpo_h5_out *out, ebpo_h5_id *id, ebpo_error *error)
 {
     ebpo_h5_scope scope;
@@ -192,6 +210,16 @@ ebpo_status ebpo_h5_make_array(ebpo_h5_out *out, const char *path, const ebpo_h5
         H5Sclose(space);
     if (dcpl >= 0)
         H5Pclose(dcpl);
+    ebpo_h5_leave(&scope);
+    return status;
+}
+
+ebpo_status ebpo_h5_open_array(ebpo_h5_out *out, const char *path, ebpo_h5_id *id, ebpo_error *error)
+{
+    ebpo_h5_scope scope;
+    ebpo_h5_enter(&scope);
+    *id = H5Dopen2(out->file, path, H5P_DEFAULT);
+    ebpo_status status = *id >= 0 ? EBPO_OK : ebpo_h5_fail(error, EBPO_E_IO, out->shown, path, DISK);
     ebpo_h5_leave(&scope);
     return status;
 }

@@ -225,7 +225,7 @@ ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool 
         drop_passed(&s->kept[next - 1], s->options.polygons);
     s->level = next;
     s->settled += v.settled;
-    s->bytes += s->info->level[next].stored_bytes;
+    s->bytes += s->info->level[next].stored_bytes + (next == s->info->index_level ? s->info->chunk_index_bytes : 0);
     ebpo_walk_begin(&s->walk, s->kept, next);
     *out = (ebpo_stream_level){ next, nodes, s->bytes, v.gray + s->settled };
     *more = true;

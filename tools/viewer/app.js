@@ -74,6 +74,11 @@ function close() {
 // --- from the worker ---
 
 const handlers = {
+  located(m) {
+    Object.assign(state, { bytesTo: m.bytesTo, traffic: m.traffic });
+    makeLevels();
+    levelChanged();
+  },
   opened(m) {
     Object.assign(state, { info: m.info, scene: m.scene, bytesTo: m.bytesTo, size: m.size, traffic: m.traffic });
     const i = m.info, name = state.shownName ?? m.name;
@@ -172,16 +177,18 @@ function refineMore() {
 
 // --- level strip ---
 
+const bytesOf = (size) => (size >= 0 ? bytes(size) : 'not yet known how much');
+
 function makeLevels() {
-  const i = state.info, sizes = i.levels.map((_, l) => state.bytesTo[l] - (l ? state.bytesTo[l - 1] : 0)), stops = [...sizes];
+  const i = state.info, sizes = i.levels.map((_, l) => state.bytesTo[l] - (l ? state.bytesTo[l - 1] : 0)), stops = [...sizes]; // NaN: not known yet
   if (i.parts.has('mesh'))
     stops.push(state.size - state.bytesTo.at(-1));
-  const most = Math.max(...stops);
+  const most = Math.max(...stops.filter((size) => size >= 0), 1);
   $('levels').replaceChildren(...stops.map((size, l) => {
     const b = document.createElement('button'), bar = document.createElement('i'), isMesh = l === i.level_count;
-    bar.style.height = `${4 + 24 * Math.sqrt(size / most)}px`;
+    bar.style.height = `${4 + 24 * Math.sqrt((size || 0) / most)}px`;
     b.append(bar, isMesh ? '▲' : String(l));
-    b.title = isMesh ? `The mesh: ${bytes(size)}, fetched where it is seen` : `Level ${l}: ${bytes(size)}; file up to here ${bytes(state.bytesTo[l])}`;
+    b.title = isMesh ? `The mesh: ${bytesOf(size)}, fetched where it is seen` : `Level ${l}: ${bytesOf(size)}; file up to here ${bytesOf(state.bytesTo[l])}`;
     b.onclick = () => {
       $('level').value = l;
       levelChanged();
@@ -203,7 +210,7 @@ function showLevels() {
 function levelChanged() {
   const at = Number($('level').value), i = state.info, mesh = at === i.level_count;
   $('levelText').textContent = mesh ? 'all, and the mesh' : `0 to ${at}`;
-  $('levelHint').textContent = mesh ? 'Refined where it is seen; leaves show the real faces.' : `Envelopes of level ${at} and of leaves above it: ${bytes(state.bytesTo[at])} of the file.`;
+  $('levelHint').textContent = mesh ? 'Refined where it is seen; leaves show the real faces.' : `Envelopes of level ${at} and of leaves above it: ${bytesOf(state.bytesTo[at])} of the file.`;
   const excess = volumeExcess(Math.min(at, i.level_count - 1));
   $('sExcess').textContent = excess === undefined || mesh ? '–' : `+${excess < 10 ? excess.toFixed(2) : excess.toFixed(0)} %`;
   showLevels();

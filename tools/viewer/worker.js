@@ -1,4 +1,4 @@
-// Reads, chooses and cuts, so that the page stays responsive. The page sends 'open', 'close', 'view' and 'probe'; it gets 'opened', 'tiles', 'loaded', 'probed',
+// Reads, chooses and cuts, so that the page stays responsive. The page sends 'open', 'close', 'view' and 'probe'; it gets 'opened', 'located', 'tiles', 'loaded', 'probed',
 // 'idle' and 'failed'.
 import { ZSTDDecoder } from './node_modules/zstddec/dist/zstddec.mjs'; // workers have no import maps
 import { Cut } from './cut.js';
@@ -37,11 +37,20 @@ class OpenFile {
     this.file = await openEbpo(what, { zstd: await loadZstd(ZSTDDecoder) });
     const { info, source } = this.file;
     this.tree = new Tree(info);
-    const meshBytes = ['/mesh/vertices', '/mesh/faces'].reduce((sum, path) => sum + (this.file.arrays.get(path)?.bytes ?? 0), 0);
+    const meshBytes = ['/mesh/vertices', '/mesh/faces'].reduce((sum, path) => sum + (this.file.arrays.has(path) ? this.file.arrays.get(path).bytes ?? Infinity : 0), 0);
     this.cut = new Cut(this.tree, { small: meshBytes < SMALL_MESH });
     post({ type: 'opened', opening: this.number, name: source.name, size: source.size, info, scene: this.cut.scene,
-      bytesTo: info.levels.map((_, i) => this.file.bytesToLevel(i)), traffic: this.file.traffic, ms: performance.now() - this.began });
+      bytesTo: this.#bytesTo(), traffic: this.file.traffic, ms: performance.now() - this.began });
     await this.load(Math.min(FIRST_LEVELS, info.level_count) - 1);
+    if (!this.file.located) {
+      await this.file.locate();
+      if (!this.ended)
+        post({ type: 'located', opening: this.number, bytesTo: this.#bytesTo(), traffic: this.file.traffic });
+    }
+  }
+
+  #bytesTo() {
+    return this.file.info.levels.map((_, i) => this.file.bytesToLevel(i));
   }
 
   /** Brings levels up to `last` into the tree. Callers that want the same level share the work. */

@@ -106,8 +106,11 @@ typedef struct ebpo_info {
     uint32_t parts;                    /* ebpo_part bits */
     ebpo_codec codec;
     uint8_t content_sha256[32];
+    uint64_t chunk_index_offset, chunk_index_bytes; /* where the places of the chunks of large arrays stand, behind the first levels: for fetching ahead, not
+                                                     * relied on; 0: there are none, or the file does not say */
     ebpo_level_summary level[EBPO_LEVELS_MAX];
-    uint64_t file_bytes, head_bytes, mesh_vertex_bytes, mesh_face_bytes, map_bytes; /* set when reading */
+    uint64_t file_bytes, head_bytes, mesh_vertex_bytes, mesh_face_bytes, map_bytes; /* set when reading; head: up to the first level */
+    int index_level;                   /* set when reading: levels from this one on need the index of chunks as well; level_count: none does */
 } ebpo_info;
 
 /* A whole model in memory: what the builder makes and the writer writes. The mesh is in file order: faces by the first leaf (depth-first

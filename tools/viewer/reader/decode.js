@@ -193,7 +193,7 @@ export function decodeFaces(bytes, array, chunk, index, vertexCount) {
   }
   if (seen > vertexCount)
     throw formatError('/mesh/faces', 'a face names a vertex that does not exist');
-  if (chunk + 1 < array.chunks.length && index[chunk + 1] !== seen)
+  if (chunk + 1 < array.chunkCount && index[chunk + 1] !== seen)
     throw formatError('/mesh/faces_index', 'the index contradicts the faces');
   return out;
 }

@@ -14,6 +14,7 @@ const COUNTS = ['source_size', 'vertex_count', 'face_count', 'source_vertex_coun
   'mesh_nonmanifold_edges', 'mesh_misoriented_edges', 'mesh_unbalanced_edges', 'mesh_bowtie_vertices', 'mesh_zero_area_faces',
   'mesh_index_repeated_faces', 'mesh_repeated_faces', 'mesh_unreferenced_vertices', 'mesh_repeated_positions', 'mesh_edges', 'mesh_components',
   'mesh_boundary_loops'];
+const HINTS = ['chunk_index_offset', 'chunk_index_bytes']; // may be absent, and wrong
 const NUMBERS = ['grid_level', 'max_level', 'level_count'];
 const REALS = ['epsilon', 'mesh_area', 'mesh_volume', 'mesh_mean_edge'];
 const TRIPLES = ['box_origin', 'box_size', 'mesh_min', 'mesh_max'];
@@ -126,6 +127,8 @@ export function readFacts(attributes) {
     out[name] = facts.count(name, 1) === 1;
   for (const name of COUNTS)
     out[name] = facts.count(name);
+  for (const name of HINTS)
+    out[name] = facts.has(name) ? facts.count(name) : 0;
   for (const name of NUMBERS)
     out[name] = facts.int(name);
   out.mesh_genus = facts.int('mesh_genus', Number.MIN_SAFE_INTEGER, Number.MAX_SAFE_INTEGER);

@@ -6,7 +6,7 @@ import { Hdf5, NeedBytes } from './hdf5.js';
 import { checkIndexes, checkLevel, checkOrder, decodeFaces, decodeLeafBlock, decodeLeaves, decodeMap, decodeVertices } from './decode.js';
 import { sourceOf } from './source.js';
 
-const HEAD_BYTES = 144 * 1024, HEAD_BYTES_MOST = 256 * 1024 * 1024;
+const HEAD_BYTES = 144 * 1024, HEAD_BYTES_MOST = 256 * 1024 * 1024, INDEX_BYTES_MOST = 256 * 1024 * 1024;
 const GAP_BYTES = 32 * 1024;            // rather read this much for nothing than ask twice
 const REQUEST_BYTES = 4 * 1024 * 1024;  // a request's most
 const REQUESTS = 6;                     // at once, as browsers do for a host
@@ -42,7 +42,7 @@ export class EbpoFile {
     this.source = source;
     this.zstd = options.zstd;
     this.info = undefined;   // facts.js: attributes by name, `levels`, `parts`, `solid`
-    this.arrays = new Map(); // path: { path, rows, cols, elementSize, signed, chunkRows, pipeline, chunks, bytes }
+    this.arrays = new Map(); // path: { path, rows, cols, elementSize, signed, chunkRows, chunkCount, pipeline, chunks, bytes }; chunks and bytes are undefined until located
     this.cache = new Map();  // decoded chunks by path and number, oldest first
     this.cached = 0;
   }
@@ -94,28 +94,75 @@ export class EbpoFile {
       if (info.parts.has(part))
         group(`/${part}`, root.links.get(part));
     const arrays = new Map();
-    let stored = 0;
     for (const wanted of arraysOf(info)) {
       const cut = wanted.path.lastIndexOf('/'), links = objects.get(wanted.path.slice(0, cut)).links, name = wanted.path.slice(cut + 1);
       if (wanted.mayBeAbsent && !links.has(name))
         continue;
-      const array = describe(hdf5, wanted, links.has(name), links.get(name), info);
-      arrays.set(wanted.path, array);
-      stored += array.bytes;
+      arrays.set(wanted.path, describe(hdf5, wanted, links.has(name), links.get(name), info));
     }
-    if (stored > this.source.size)
-      throw formatError('', "the arrays' chunks take more room than the file has");
     this.info = info;
     this.arrays = arrays;
+    this.hdf5 = hdf5;
+    this.#placeArrays((array) => !array.indexed); // a single chunk's place stands in its array's header
+    try {
+      this.#placeArrays((array) => array.indexed);
+    } catch (error) {
+      if (!(error instanceof NeedBytes)) // else the index has not come with the head
+        throw error;
+    }
   }
 
-  /** Bytes of the file up to the end of a level: what a reader has fetched that went through it in order. */
+  #placeArrays(which) {
+    for (const array of this.arrays.values())
+      if (!array.chunks && which(array)) {
+        array.chunks = this.hdf5.chunks(array.object, array.path, array.chunkCount, array.chunkRows * array.rowBytes, chunkBound(array.chunkRows * array.rowBytes));
+        array.bytes = array.chunks.reduce((sum, c) => sum + c.bytes, 0);
+      }
+    if ([...this.arrays.values()].reduce((sum, a) => sum + (a.bytes ?? 0), 0) > this.source.size)
+      throw formatError('', "the arrays' chunks take more room than the file has");
+  }
+
+  /** Whether it is known where all chunks are. Arrays of several chunks have an index, which stands behind the first levels. */
+  get located() {
+    return [...this.arrays.values()].every((a) => a.chunks);
+  }
+
+  /** Fetches that index, if it is not there yet. Reading does so by itself when it must. */
+  async locate() {
+    if (this.located)
+      return;
+    this.locating ??= this.#readIndex().finally(() => (this.locating = undefined));
+    await this.locating;
+  }
+
+  async #readIndex() {
+    const { chunk_index_offset: at, chunk_index_bytes: bytes } = this.info;
+    let piece = at > 0 && bytes > 0 && bytes <= INDEX_BYTES_MOST && at + bytes <= this.source.size ? { at, end: at + bytes } : undefined;
+    for (;;) {
+      if (piece)
+        this.hdf5.piece = { at: piece.at, data: await this.source.read(piece.at, piece.end - piece.at) };
+      try {
+        this.#placeArrays(() => true);
+        this.hdf5.piece = undefined;
+        return;
+      } catch (error) {
+        if (!(error instanceof NeedBytes))
+          throw named(this.source, error);
+        // Another program wrote the file: ever more of it around what was missed.
+        const from = Math.min(piece?.at ?? error.at, error.at), to = Math.max(piece?.end ?? error.end, error.end);
+        piece = { at: from, end: Math.min(this.source.size, from + 2 * (to - from) + HEAD_BYTES) };
+        if (piece.end - piece.at > INDEX_BYTES_MOST)
+          throw named(this.source, formatError('', 'its chunk indexes are spread over more of the file than can be read at once'));
+      }
+    }
+  }
+
+  /** Bytes of the file up to the end of a level: what a reader has fetched that went through it in order. NaN where that is not known yet (`located`). */
   bytesToLevel(level) {
     let end = 0;
     for (const a of this.arrays.values())
       if (a.level <= level)
-        for (const chunk of a.chunks)
-          end = Math.max(end, chunk.at + chunk.bytes);
+        end = a.chunks ? a.chunks.reduce((most, chunk) => Math.max(most, chunk.at + chunk.bytes), end) : NaN;
     return end;
   }
 
@@ -160,6 +207,8 @@ export class EbpoFile {
 
   // Decoded chunks: wanted is [{ array, chunk }].
   async #chunks(wanted) {
+    if (wanted.some(({ array }) => !array.chunks))
+      await this.locate();
     const stored = await this.#fetch(wanted.map(({ array, chunk }) => array.chunks[chunk]));
     return Promise.all(stored.map(async (data, i) => {
       const { array, chunk } = wanted[i];
@@ -173,12 +222,12 @@ export class EbpoFile {
   // Whole arrays as stored before filters; absent ones are undefined. -> Map(path, bytes)
   async #raw(paths) {
     const arrays = paths.map((path) => this.arrays.get(path)).filter(Boolean);
-    const wanted = arrays.flatMap((array) => array.chunks.map((_, chunk) => ({ array, chunk })));
+    const wanted = arrays.flatMap(everyChunk);
     const chunks = await this.#chunks(wanted), out = new Map();
     let i = 0;
     for (const array of arrays) {
       const all = new Uint8Array(array.rows * array.rowBytes);
-      for (let k = 0; k < array.chunks.length; k++, i++) {
+      for (let k = 0; k < array.chunkCount; k++, i++) {
         const at = k * array.chunkRows * array.rowBytes;
         all.set(chunks[i].subarray(0, all.length - at), at);
       }
@@ -275,8 +324,7 @@ export class EbpoFile {
     this.#needMesh();
     try {
       const vertices = this.arrays.get('/mesh/vertices'), faces = this.arrays.get('/mesh/faces'), index = await this.#facesIndex();
-      const all = (array) => array.chunks.map((_, chunk) => ({ array, chunk }));
-      const chunks = await this.#chunks([...all(vertices), ...all(faces)]);
+      const chunks = await this.#chunks([...everyChunk(vertices), ...everyChunk(faces)]);
       const out = { vertices: new (vertices.elementSize === 8 ? Float64Array : Float32Array)(vertices.rows * 3), faces: new Uint32Array(faces.rows * 3) };
       vertices.chunks.forEach((_, i) => out.vertices.set(decodeVertices(chunks[i], vertices, i), i * vertices.chunkRows * 3));
       faces.chunks.forEach((_, i) => out.faces.set(decodeFaces(chunks[vertices.chunks.length + i], faces, i, index, this.info.vertex_count), i * faces.chunkRows * 3));
@@ -464,7 +512,9 @@ export class EbpoFile {
   }
 }
 
-// An array's object against what the facts call for, and where its chunks are.
+const everyChunk = (array) => Array.from({ length: array.chunkCount }, (_, chunk) => ({ array, chunk }));
+
+// An array's object against what the facts call for.
 function describe(hdf5, wanted, linked, address, info) {
   const { path, rows, cols } = wanted;
   if (!linked)
@@ -494,7 +544,6 @@ function describe(hdf5, wanted, linked, address, info) {
   const rowBytes = elementSize * Math.max(cols, 1), whole = fit * rowBytes;
   if (whole > CHUNK_BYTES_MAX)
     throw formatError(path, "the array's chunks do not have the size that the format fixes");
-  const chunks = hdf5.chunks(o, path, Math.ceil(rows / fit), whole, chunkBound(whole));
-  return { path, level: wanted.level, name: wanted.name, rows, cols, elementSize, signed: o.type.signed, chunkRows: fit, rowBytes, pipeline, chunks,
-    bytes: chunks.reduce((sum, c) => sum + c.bytes, 0) };
+  return { path, level: wanted.level, name: wanted.name, rows, cols, elementSize, signed: o.type.signed, chunkRows: fit, chunkCount: Math.ceil(rows / fit), rowBytes, pipeline,
+    object: o, indexed: o.layout.index !== 1, chunks: undefined, bytes: undefined };
 }

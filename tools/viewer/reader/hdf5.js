@@ -11,10 +11,11 @@ const MESSAGES_MOST = 4096, BLOCKS_MOST = 256; // of one object header: far abov
 const NIL = 0x00, DATASPACE = 0x01, LINK_INFO = 0x02, DATATYPE = 0x03, FILL_OLD = 0x04, FILL = 0x05, LINK = 0x06, LAYOUT = 0x08, GROUP_INFO = 0x0a,
   PIPELINE = 0x0b, ATTRIBUTE = 0x0c, CONTINUATION = 0x10, ATTRIBUTE_INFO = 0x15;
 
-/** Thrown when bytes beyond the part at hand are needed: read up to `end` and parse again. */
+/** Thrown when bytes beyond the parts at hand are needed, from `at` to `end`. */
 export class NeedBytes extends Error {
-  constructor(end) {
-    super('more of the head is needed');
+  constructor(at, end) {
+    super('more of the metadata is needed');
+    this.at = at;
     this.end = end;
   }
 }
@@ -110,7 +111,7 @@ class Cursor {
   }
 }
 
-/** The metadata of a file of `size` bytes, of which the first `head.length` are at hand. */
+/** The metadata of a file of `size` bytes, of which the first `head.length` are at hand, and perhaps a `piece` { at, data } elsewhere. */
 export class Hdf5 {
   constructor(head, size) {
     this.head = head;
@@ -121,8 +122,17 @@ export class Hdf5 {
   #need(at, length, where) {
     if (at + length > this.size)
       throw formatError(where, 'it lies beyond the end of the file');
-    if (at + length > this.head.length)
-      throw new NeedBytes(at + length);
+    if (at + length <= this.head.length)
+      return { bytes: this.head, at };
+    const { piece } = this;
+    if (piece && at >= piece.at && at + length <= piece.at + piece.data.length)
+      return { bytes: piece.data, at: at - piece.at };
+    throw new NeedBytes(at, at + length);
+  }
+
+  #cursor(at, length, where) {
+    const { bytes, at: from } = this.#need(at, length, where);
+    return new Cursor(bytes, from, from + length, where);
   }
 
   #superblock() {
@@ -146,9 +156,9 @@ export class Hdf5 {
   }
 
   #checksum(at, length, where) {
-    this.#need(at, length + 4, where);
-    const stored = new DataView(this.head.buffer, this.head.byteOffset + at + length, 4).getUint32(0, true);
-    if (stored !== lookup3(this.head, at, length))
+    const { bytes, at: from } = this.#need(at, length + 4, where);
+    const stored = new DataView(bytes.buffer, bytes.byteOffset + from + length, 4).getUint32(0, true);
+    if (stored !== lookup3(bytes, from, length))
       throw formatError(where, 'its description is damaged: the checksum differs');
   }
 
@@ -277,16 +287,14 @@ export class Hdf5 {
   #fixedArray(l, where, count, filters, whole) {
     if (l.address === undefined)
       throw formatError(where, 'the array was never written');
-    this.#need(l.address, 28, where);
-    let c = new Cursor(this.head, l.address, l.address + 28, where);
+    let c = this.#cursor(l.address, 28, where);
     c.must(c.u32() === 0x44484146 && c.u8() === 0, "there is no chunk index where one is expected"); // "FAHD"
     this.#checksum(l.address, 24, where);
     const client = c.u8(), entry = c.u8(), pageBits = c.u8(), entries = c.uint(8), data = c.address();
     const filtered = filters.length > 0, sizeBytes = filtered ? entry - 12 : 0;
     c.must(client === (filtered ? 1 : 0) && (filtered ? sizeBytes >= 1 && sizeBytes <= 8 : entry === 8), "the array's index contradicts its filters");
     c.must(entries === count && pageBits === l.pageBits && pageBits >= 1 && pageBits <= 20 && data !== undefined, "the array's index contradicts its shape");
-    this.#need(data, 14, where);
-    c = new Cursor(this.head, data, data + 14, where);
+    c = this.#cursor(data, 14, where);
     c.must(c.u32() === 0x42444146 && c.u8() === 0 && c.u8() === client && c.address() === l.address, "there is no chunk index where one is expected"); // "FADB"
     const perPage = 2 ** pageBits, pages = count > perPage ? Math.ceil(count / perPage) : 0, prefix = 14 + Math.ceil(pages / 8);
     this.#checksum(data, pages ? prefix : prefix + count * entry, where);
@@ -295,11 +303,11 @@ export class Hdf5 {
     for (let page = 0; page < (pages || 1); page++) {
       const here = pages ? Math.min(perPage, count - page * perPage) : count;
       if (pages) {
-        if (!(this.head[data + 14 + (page >> 3)] >> (7 - page % 8) & 1))
+        if (!(this.#cursor(data + 14 + (page >> 3), 1, where).u8() >> (7 - page % 8) & 1))
           throw formatError(where, 'the array was never written');
         this.#checksum(at, here * entry, where);
       }
-      c = new Cursor(this.head, at, at + here * entry, where);
+      c = this.#cursor(at, here * entry, where);
       for (let i = 0; i < here; i++)
         out.push({ at: c.address(), bytes: filtered ? c.uint(sizeBytes) : whole, mask: filtered ? c.u32() : 0 });
       at += here * entry + 4;
