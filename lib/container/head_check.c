@@ -50,8 +50,6 @@ static const char *check_level_counts(const ebpo_info *info, int level)
     bool last = level == info->level_count - 1;
     if (last ? s->gray_count && !info->pruned : s->gray_count == 0)
         return "the gray nodes do not end at the deepest level";
-    if (s->gray_count && level >= info->max_level)
-        return "there are gray nodes at the maximum level";
     if (info->pruned ? s->pruned_count > s->gray_count || (s->pruned_count == s->gray_count) < last : s->pruned_count != 0)
         return "a level's pruned nodes are not some of its gray ones, or not all of them at the deepest level";
     if (!last && info->pruned && (s->pruned_count == s->gray_count || info->level[level + 1].white_count / 8 < s->pruned_count))

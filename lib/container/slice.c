@@ -149,6 +149,8 @@ static void expect_nodes(ebpo_chunks *chunks, const range *r)
     if (grays) {
         ebpo_chunks_expect(chunks, &e, EBPO_A_GRAY_INDEX, r->level, gray_index, 1);
         ebpo_chunks_expect(chunks, &e, EBPO_A_PLANE_COUNTS, r->level, counted, gray + grays - counted);
+    }
+    if (goes_on(chunks, r)) {
         ebpo_chunks_expect(chunks, &e, EBPO_A_TYPES_INDEX, r->level + 1, gray_index, 1);
         ebpo_chunks_expect(chunks, &e, EBPO_A_TYPES, r->level + 1, counted, gray + grays - counted);
     }

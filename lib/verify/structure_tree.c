@@ -79,11 +79,11 @@ static void check_node(descent *d, const ebpo_view_node *node)
 
 static void check_gray(descent *d, const ebpo_view_node *node)
 {
-    node_check(d, node, node->cell.level < d->view->tree->info.max_level, "a node at the maximum level is gray");
-    if (ebpo_view_is_pruned(d->view, node)) {
+    if (ebpo_view_is_pruned(d->view, node)) { /* may have been a leaf */
         d->pruned[node->cell.level]++;
         return;
     }
+    node_check(d, node, node->cell.level < d->view->tree->info.max_level, "a node at the maximum level is gray");
     bool touched = false;
     for (unsigned octant = 0; octant < 8; octant++) {
         ebpo_view_node child = ebpo_view_child(d->view, node, octant);
