@@ -13,7 +13,9 @@
 #include <ebpo/subset.h>
 #include <ebpo/verify.h>
 
+#include "container/reader.h"
 #include "query_kit.h"
+#include "subset/parts.h"
 
 __attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
 const char *__lsan_default_suppressions(void)
@@ -493,6 +495,122 @@ START_TEST(damaged_subsets_do_no_harm)
 }
 END_TEST
 
+/* Changes numbers in one chunk of an unfiltered file, and its checksum with them: what is inside must be checked for itself. */
+static void lie(ebpo_file *file, uint8_t *bytes, uint64_t *state)
+{
+    static uint8_t raw[EBPO_CHUNK_BYTES_MAX], stored[2 * EBPO_CHUNK_BYTES_MAX];
+    const ebpo_array_in *a;
+    do {
+        uint64_t number = ebpo_test_random(state) % (EBPO_ARRAYS + 4 * EBPO_LEVEL_ARRAYS);
+        a = number < EBPO_ARRAYS ? &file->root_array[number] : &file->level_array[(number - EBPO_ARRAYS) / EBPO_LEVEL_ARRAYS][(number - EBPO_ARRAYS) % EBPO_LEVEL_ARRAYS];
+    } while (!a->present);
+    size_t size = a->shape.chunk_rows * ebpo_h5_row_bytes(&a->shape), made = 0;
+    ebpo_chunk_coder coder = { 0 };
+    memcpy(raw, bytes + a->chunks[0].address, size);
+    for (int i = 0; i < 3; i++)
+        raw[ebpo_test_random(state) % size] = ebpo_test_random(state) % 3 ? 0 : (uint8_t)ebpo_test_random(state);
+    ck_assert_int_eq(ebpo_chunk_encode(&coder, a->shape.pipeline, 0, a->shape.element_size, raw, size, stored, &made), EBPO_OK);
+    ck_assert_uint_eq(made, a->chunks[0].bytes);
+    memcpy(bytes + a->chunks[0].address, stored, made);
+    ebpo_chunk_coder_clear(&coder);
+}
+
+/* Everything that goes down a tree; whatever comes of it. */
+static void use_all(ebpo_file *file, const ebpo_subset_options *o)
+{
+    ebpo_tree tree;
+    ebpo_verify_report report;
+    ebpo_verify_options verify = EBPO_VERIFY_OPTIONS_INIT;
+    ebpo_stream *stream;
+    ebpo_stream_level level;
+    ebpo_stream_node node;
+    bool more = true;
+    verify.threads = 1;
+    (void)!ebpo_verify(file, &verify, &report, NULL);
+    if (ebpo_subset_tree(&tree, file, o, NULL) == EBPO_OK)
+        ebpo_tree_free(&tree);
+    if (ebpo_stream_new(&stream, file, NULL, NULL) == EBPO_OK)
+        while (ebpo_stream_next_level(stream, &level, &more, NULL) == EBPO_OK && more)
+            while (ebpo_stream_next_node(stream, &node, &more, NULL) == EBPO_OK && more)
+                continue;
+    ebpo_stream_free(stream);
+    for (int i = 0; i < ebpo_file_info(file)->level_count; i++) {
+        ebpo_mesh mesh;
+        if (ebpo_lod_level(file, i, NULL, &mesh, NULL, NULL) == EBPO_OK)
+            ebpo_mesh_free(&mesh);
+    }
+    for (int cut = -1; cut < 4; cut++) {
+        ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+        ebpo_model *model;
+        ebpo_context *context;
+        options.cut_level = cut;
+        options.threads = 1;
+        options.loading = cut == 3 ? EBPO_LOAD_NODES : EBPO_LOAD_CACHE;
+        if (ebpo_model_open(&model, file, &options, NULL) != EBPO_OK)
+            continue;
+        ck_assert_int_eq(ebpo_context_new(&context, model, NULL), EBPO_OK);
+        for (int i = 0; i < 12; i++) {
+            double p[3] = { 0.1 * i, 0.4, 0.9 - 0.1 * i }, far[3] = { 9, 9, 9 };
+            ebpo_inside_result where;
+            ebpo_distance_result distance;
+            const ebpo_ray_hit *hits;
+            const uint64_t *faces;
+            uint64_t count;
+            ebpo_query_options limited = EBPO_QUERY_OPTIONS_INIT;
+            limited.level = i % 6;
+            (void)!ebpo_inside(context, p, NULL, &where, NULL);
+            (void)!ebpo_inside(context, p, &limited, &where, NULL);
+            (void)!ebpo_distance(context, p, NULL, &distance, NULL);
+            (void)!ebpo_distance(context, p, &limited, &distance, NULL);
+            limited.mode = EBPO_DISTANCE_ENVELOPE;
+            (void)!ebpo_distance(context, p, &limited, &distance, NULL);
+            limited = (ebpo_query_options)EBPO_QUERY_OPTIONS_INIT;
+            limited.mode = EBPO_DISTANCE_RECURSIVE;
+            (void)!ebpo_distance(context, p, &limited, &distance, NULL);
+            (void)!ebpo_ray_all(context, p, far, 10, &hits, &count, NULL);
+            (void)!ebpo_faces_in_box(context, p, far, &faces, &count, NULL);
+        }
+        ebpo_context_free(context);
+        ebpo_model_close(model);
+    }
+}
+
+START_TEST(subsets_that_lie_do_no_harm)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    query_model m;
+    uint64_t state = 5;
+    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), &usual);
+    static uint8_t bytes[1 << 20], lying[1 << 20];
+    for (int kind = 0; kind < 3; kind++) {
+        ebpo_subset_options o = { kind == 1 ? 2 : -1, kind != 1, { 0.2, 0.2, 0.2 }, { 1, 1, 1 }, kind == 2 ? EBPO_PART_PLANES : ~0u, EBPO_WRITE_OPTIONS_INIT };
+        ebpo_file *file;
+        char path[120];
+        o.write.codec = EBPO_CODEC_NONE;
+        o.write.threads = 1;
+        snprintf(path, sizeof path, "%s/part.ebpo.h5", m.folder);
+        fine(ebpo_subset(m.file, path, &o, &error), &error);
+        FILE *f = fopen(path, "rb");
+        size_t size = fread(bytes, 1, sizeof bytes, f);
+        fclose(f);
+        unlink(path);
+        fine(ebpo_open_memory(&file, bytes, size, "honest", &error), &error);
+        use_all(file, &o);
+        for (uint64_t i = 0; i < query_scaled(150); i++) {
+            ebpo_file *liar;
+            memcpy(lying, bytes, size);
+            for (uint64_t k = 0; k <= i % 3; k++)
+                lie(file, lying, &state);
+            fine(ebpo_open_memory(&liar, lying, size, "liar", &error), &error);
+            use_all(liar, &o);
+            ebpo_close(liar);
+        }
+        ebpo_close(file);
+    }
+    query_model_free(&m);
+}
+END_TEST
+
 int main(void)
 {
     Suite *suite = suite_create("subset");
@@ -505,6 +623,7 @@ int main(void)
     tcase_add_test(tests, boxes_that_keep_nothing_are_refused);
     tcase_add_test(tests, a_subset_cannot_be_measured);
     tcase_add_test(tests, damaged_subsets_do_no_harm);
+    tcase_add_test(tests, subsets_that_lie_do_no_harm);
     suite_add_tcase(suite, tests);
     SRunner *runner = srunner_create(suite);
     srunner_run_all(runner, CK_NORMAL);

@@ -131,6 +131,8 @@ ebpo_status subset_settle(const subset_values *v, const ebpo_info *info, const c
         return wrong(error, shown, "--parts asks for maps without the mesh, whose numbers they are; add mesh");
     if (!v->parts && v->profile < 0 && out->last_level >= 0 && out->last_level < info->level_count - 1)
         out->parts &= ~(uint32_t)(EBPO_PART_MESH | EBPO_PART_MAPS);
+    if (v->profile == EBPO_PROFILE_LOD && !(info->parts & EBPO_PART_LEAF_PLANES) && !v->quiet)
+        fprintf(stderr, "note: %s stores no leaf planes, so leaves will have their parents' envelopes; 'ebpo convert --profile lod' stores them\n", shown);
     out->write.codec = v->codec >= 0 ? (ebpo_codec)v->codec : info->codec;
     out->write.codec_level = (int)v->zstd_level;
     if (v->zstd_level && out->write.codec != EBPO_CODEC_ZSTD)
