@@ -86,17 +86,18 @@ static void wipe(ticker *t)
 
 /* --- work --- */
 
-/* What the folder held when the file was opened. */
-static void tell_resuming(const subset_values *v, ebpo_file *file, const char *url, const char *part)
+/* What the folder held when the file was opened; true when that is of use. */
+static bool tell_resuming(const subset_values *v, ebpo_file *file, const char *url, const char *part)
 {
     ebpo_http_stats s;
     char bytes[32];
     if (!ebpo_file_http_stats(file, &s))
-        return;
+        return false;
     if (s.cache_others && !s.cache_held)
         fprintf(stderr, "ebpo fetch: %s: has changed on the server, or is another file than the one in %s; fetching it from the beginning\n", remote_shown(url), part);
     else if (s.cache_held && !v->quiet)
         fprintf(stderr, "ebpo fetch: %s: going on with %s from %s\n", remote_shown(url), words_bytes(bytes, sizeof bytes, s.cache_held), part);
+    return s.cache_held > 0;
 }
 
 static int fetch(subset_values *v, const char *url, const char *out, const char *part, ebpo_subset_options *subset)
@@ -113,8 +114,7 @@ static int fetch(subset_values *v, const char *url, const char *out, const char 
         v->remote.cache_size = "1048576T";
     }
     ebpo_status status = remote_open(&file, url, &v->remote, &error);
-    if (status == EBPO_OK && part)
-        tell_resuming(v, file, url, part);
+    bool held = status == EBPO_OK && part && tell_resuming(v, file, url, part);
     atomic_store(&t.file, file);
     if (status == EBPO_OK)
         status = subset_settle(v, ebpo_file_info(file), remote_shown(url), subset, &error);
@@ -129,7 +129,7 @@ static int fetch(subset_values *v, const char *url, const char *out, const char 
             remote_tell(&seen, &v->remote, false);
     }
     ebpo_close(file);
-    if (part && (status == EBPO_OK || usage))
+    if (part && (status == EBPO_OK || (usage && !held))) /* a slip in an option takes nothing away that came before */
         remove_part(part);
     if (part && status != EBPO_OK && !usage && access(part, F_OK) == 0 && rmdir(part) != 0) { /* an empty one is of no use */
         int code = command_failed("fetch", &error);

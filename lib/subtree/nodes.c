@@ -37,7 +37,8 @@ static void put_list(walk *w, ebpo_subtree_leaf *leaf, uint64_t count)
 {
     ebpo_subtree *s = w->s;
     uint64_t kept = 0;
-    qsort(w->scratch, count, sizeof *w->scratch, compare_numbers);
+    if (count)
+        qsort(w->scratch, count, sizeof *w->scratch, compare_numbers);
     for (uint64_t i = 0; i < count; i++)
         if (kept && same_block(w->scratch[kept - 1], w->scratch[i]))
             w->scratch[kept - 1] |= w->scratch[i];
