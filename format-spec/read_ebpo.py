@@ -114,14 +114,26 @@ def read_level(file, number, parts):
     return out
 
 
+def check_pruned(file, subset):
+    """Subsets: an empty group for each pruned node, and on the last level all gray nodes pruned."""
+    count = int(file.attrs["level_count"])
+    levels = [file[f"/levels/{number:02d}"] for number in range(count)]
+    for number, level in enumerate(levels):
+        gray, pruned = int(level.attrs["gray"]), int(level.attrs.get("pruned", 0))
+        empty = gray if number + 1 == count else int((levels[number + 1]["types"][...] == 0).sum())
+        assert not subset or pruned == empty, f"level {number}: {pruned} pruned nodes, {empty} empty groups"
+        assert subset or (pruned == 0 and (gray == 0) == (number + 1 == count)), f"level {number}: pruned nodes in a file that is no subset"
+
+
 def read(path):
     with h5py.File(path, "r") as file:
         assert text(file.attrs["format"]) == "EBP-Octree in HDF5" and file.attrs["format_version_major"] == 1
         required = text(file.attrs["required_parts"]).split()
-        unknown = set(required) - {"levels", "mesh", "planes", "maps", "leaf-planes"}
+        unknown = set(required) - {"levels", "mesh", "planes", "maps", "leaf-planes", "pruned"}
         assert not unknown, f"needs {unknown}"
         parts = set(required + text(file.attrs["optional_parts"]).split())
         assert content_sha256(file) == text(file.attrs["content_sha256"]), "content_sha256 differs"
+        check_pruned(file, "pruned" in parts)
         out = {name: text(file.attrs[name]) for name in ("kind", "winding_rule", "coordinate_type")}
         out["levels"] = [read_level(file, number, parts) for number in range(int(file.attrs["level_count"]))]
         mesh, maps = "mesh" in parts, "maps" in parts

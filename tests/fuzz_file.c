@@ -1,6 +1,8 @@
 /* Any bytes as a file: opening, reading everything and asking ends in a status, nothing else. */
 #include <ebpo/query.h>
 
+#include "subset/parts.h"
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 /* libhdf5 1.10 itself leaks when it gives up on a damaged object header; that is not what we look for here. */
@@ -55,6 +57,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (ebpo_file_read_source_mesh(file, &mesh, NULL, 1, NULL) == EBPO_OK)
         ebpo_mesh_free(&mesh);
     (void)!ebpo_file_check_content(file, 1, NULL);
+    ebpo_subset_options part = EBPO_SUBSET_OPTIONS_INIT;
+    part.last_level = 2;
+    part.boxed = true;
+    part.max[0] = part.max[1] = part.max[2] = 0.3;
+    part.write.threads = 1;
+    if (ebpo_subset_tree(&tree, file, &part, NULL) == EBPO_OK)
+        ebpo_tree_free(&tree);
     for (int cut = -1; cut < 3; cut++)
         ask(file, cut);
     ebpo_close(file);

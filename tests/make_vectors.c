@@ -10,6 +10,7 @@
 #include <ebpo/build.h>
 
 #include "random_tree.h"
+#include "subset/parts.h"
 #include "tree_json.h"
 #include "vector_read.h"
 
@@ -89,6 +90,18 @@ static void write_vector(const char *name, ebpo_tree *tree, ebpo_codec codec, ui
     ebpo_tree_free(tree);
 }
 
+/* A part of the file of vector 06. */
+static void subset(ebpo_tree *tree, const ebpo_subset_options *options)
+{
+    char path[512];
+    ebpo_file *whole;
+    ebpo_error error = EBPO_ERROR_INIT;
+    snprintf(path, sizeof path, "%s/passed/06_four_levels_leaf_planes.ebpo.h5", folder);
+    if (ebpo_open(&whole, path, &error) != EBPO_OK || ebpo_subset_tree(tree, whole, options, &error) != EBPO_OK)
+        die(path, error.message);
+    ebpo_close(whole);
+}
+
 /* In an order in which each needs only what those before it have shown. */
 static void make_passed(void)
 {
@@ -117,6 +130,16 @@ static void make_passed(void)
     random_tree_options many = { 12, 3, 9, 600, true, false, false, false };
     random_tree_make(&tree, &many);
     write_vector("11_two_chunks_of_faces", &tree, EBPO_CODEC_ZSTD, EBPO_PART_MESH);
+    ebpo_subset_options levels = EBPO_SUBSET_OPTIONS_INIT, box = EBPO_SUBSET_OPTIONS_INIT;
+    levels.last_level = 1;
+    levels.parts = EBPO_PART_PLANES | EBPO_PART_LEAF_PLANES;
+    subset(&tree, &levels);
+    write_vector("12_subset_levels", &tree, EBPO_CODEC_ZSTD, ~0u);
+    box.boxed = true;
+    for (int k = 0; k < 3; k++)
+        box.max[k] = 0.2;
+    subset(&tree, &box);
+    write_vector("13_subset_box", &tree, EBPO_CODEC_ZSTD, ~0u);
 }
 
 /* --- failed --- */
@@ -161,6 +184,14 @@ static void set_reals(const char *name, double a, double b, double c)
     hid_t attribute = H5Aopen_by_name(file, "/", name, H5P_DEFAULT, H5P_DEFAULT);
     need(H5Awrite(attribute, H5T_NATIVE_DOUBLE, values) >= 0, name);
     H5Aclose(attribute);
+}
+
+static void add_count(const char *object, const char *name, uint64_t value)
+{
+    hid_t space = H5Screate(H5S_SCALAR), attribute = H5Acreate_by_name(file, object, name, H5T_STD_U64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    need(attribute >= 0 && H5Awrite(attribute, H5T_NATIVE_UINT64, &value) >= 0, name);
+    H5Aclose(attribute);
+    H5Sclose(space);
 }
 
 static void drop_attribute(const char *object, const char *name) { need(H5Adelete_by_name(file, object, name, H5P_DEFAULT) >= 0, name); }
@@ -216,6 +247,8 @@ static haddr_t chunk_address(const char *path, hsize_t *size)
 #define DEEP "06_four_levels_leaf_planes"
 #define ODD "10_windings_of_all_sizes"
 #define LONG "11_two_chunks_of_faces"
+#define CUT_SHORT "12_subset_levels"
+#define BOXED "13_subset_box"
 
 static void v_format(void) { set_text("/", "format", "EBP-Octree in HDF6"); }
 static void v_format_missing(void) { drop_attribute("/", "format"); }
@@ -223,6 +256,12 @@ static void v_major(void) { set_int("/", "format_version_major", 2); }
 static void v_required(void) { set_text("/", "required_parts", "levels mesh animation"); }
 static void v_no_levels_part(void) { set_text("/", "required_parts", "mesh"); }
 static void v_part_twice(void) { set_text("/", "optional_parts", "planes planes"); }
+static void v_subset_word(void) { set_text("/", "required_parts", "levels mesh"); }
+static void v_subset_of(void) { drop_attribute("/", "subset_of"); }
+static void v_subset_level(void) { set_int("/", "subset_levels", 0); }
+static void v_pruned_more(void) { set_count("/levels/01", "pruned", 99); }
+static void v_pruned_less(void) { drop_attribute("/levels/01", "pruned"); }
+static void v_pruned_whole(void) { add_count("/levels/01", "pruned", 1); }
 static void v_attribute_missing(void) { drop_attribute("/", "epsilon"); }
 static void v_attribute_type(void) { drop_attribute("/", "face_count"); set_text("/", "face_count", "4"); }
 static void v_kind(void) { set_text("/", "kind", "liquid"); }
@@ -312,6 +351,12 @@ static const failed_vector failed[] = {
     { "required_part_unknown", LEAVES, v_required, NONE },
     { "required_part_levels_missing", LEAVES, v_no_levels_part, NONE },
     { "part_listed_twice", LEAVES, v_part_twice, NONE },
+    { "subset_without_its_word", BOXED, v_subset_word, NONE },
+    { "subset_of_missing", BOXED, v_subset_of, NONE },
+    { "subset_levels_0", CUT_SHORT, v_subset_level, NONE },
+    { "pruned_more_than_gray", BOXED, v_pruned_more, NONE },
+    { "pruned_not_counted", BOXED, v_pruned_less, NONE },
+    { "pruned_in_a_whole_file", DEEP, v_pruned_whole, NONE },
     { "attribute_missing", LEAVES, v_attribute_missing, NONE },
     { "attribute_of_wrong_type", LEAVES, v_attribute_type, NONE },
     { "kind_unknown", LEAVES, v_kind, NONE },

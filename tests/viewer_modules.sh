@@ -14,5 +14,8 @@ convert ring_without_mesh --without mesh "$work/ring.ply"
 convert ring_deflate --codec deflate --leaf-faces 4 "$work/ring.ply"
 convert cube --with leaf-planes --max-level 4 --leaf-faces 0 "$work/quads.ply"
 for solid in cavity overlapping_cubes inside_out_cube zero_area_face repeated_faces mobius; do convert $solid "$work/$solid.ply" 2>/dev/null; done
+subset() { out=$1; shift; "$EBPO_TOOL" subset -q "$@" "$work/ring.ebpo.h5" "$work/$out.ebpo.h5"; EBPO_FILES="$EBPO_FILES $work/$out.ebpo.h5"; }
+subset ring_levels --levels 0-3
+subset ring_box --box 0,0,-1,1,1,1 --profile lod
 export EBPO_TOOL EBPO_FILES
 "$1" --test reader/test/*.test.js test/*.test.js

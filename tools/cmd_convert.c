@@ -8,13 +8,14 @@
 #include "prepare.h"
 #include "progress.h"
 #include "report.h"
+#include "subset_run.h"
 #include "words.h"
 
 typedef struct values {
     int64_t max_level, leaf_faces, zstd_level, threads;
     double epsilon;
     uint32_t with, without;
-    int codec, rule;
+    int codec, rule, profile;
     mending mend;
     bool require_solid, json, quiet;
     const char *unit, *crs, *date;
@@ -34,6 +35,9 @@ static const arg_option options[] = {
     { "with", 0, ARG_SET, offsetof(values, with), "LIST", "also store: leaf-planes", 0, 0, with_words },
     { "without", 0, ARG_SET, offsetof(values, without), "LIST",
       "leave out: maps, mesh (and with it maps), planes;\ncommas between, may be repeated", 0, 0, without_words },
+    { "profile", 0, ARG_WORD, offsetof(values, profile), "NAME",
+      "instead of --with and --without: full (all parts), lod (for\nviewers: no mesh), collision (for exact questions: mesh, no\nmaps); as 'ebpo subset --profile' makes it of a full file",
+      0, 0, profile_words },
     { "codec", 0, ARG_WORD, offsetof(values, codec), "NAME", "zstd (the default), deflate or none", 0, 0, codec_words },
     { "zstd-level", 0, ARG_INT, offsetof(values, zstd_level), "N", "effort of zstd, 1 to 22; default 3", 1, 22, NULL },
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
@@ -74,6 +78,8 @@ static int check_values(const values *v, const char *in, const char *out)
 {
     if (v->zstd_level && v->codec != EBPO_CODEC_ZSTD)
         return usage_error("--zstd-level says nothing about --codec deflate or none");
+    if (v->profile >= 0 && (v->with || v->without))
+        return usage_error("--profile says which parts are stored; leave --with and --without away");
     if (strcmp(in, out) == 0 || command_same_file(in, out)) {
         fprintf(stderr, "ebpo convert: %s: is input and output at once; give the output another name\n", out);
         return EXIT_USAGE;
@@ -84,6 +90,8 @@ static int check_values(const values *v, const char *in, const char *out)
 static uint32_t parts_of(const values *v)
 {
     uint32_t without = v->without;
+    if (v->profile >= 0) /* all are built, so that the file is the one that a subset of the full one is */
+        return ebpo_profile_parts(EBPO_PROFILE_FULL);
     if (without & EBPO_PART_MESH)
         without |= EBPO_PART_MAPS;
     uint32_t parts = (EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS) & ~without;
@@ -173,6 +181,8 @@ static ebpo_status build_and_write(const values *v, prepared *p, const char *out
     write.codec_level = (int)v->zstd_level;
     write.threads = (unsigned)v->threads;
     write.progress = progress;
+    if (v->profile >= 0)
+        write.parts = ebpo_profile_parts((ebpo_profile)v->profile);
     status = ebpo_tree_write(&tree, out, &write, error);
     ebpo_tree_free(&tree);
     return status;
@@ -181,7 +191,7 @@ static ebpo_status build_and_write(const values *v, prepared *p, const char *out
 static int run(int argc, char **argv)
 {
     const ebpo_build_options defaults = EBPO_BUILD_OPTIONS_INIT;
-    values v = { .max_level = -1, .leaf_faces = defaults.leaf_faces, .epsilon = defaults.epsilon };
+    values v = { .max_level = -1, .profile = -1, .leaf_faces = defaults.leaf_faces, .epsilon = defaults.epsilon };
     const char *operand[ARGS_OPERANDS_MAX];
     arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
     if (parsed != ARGS_RUN)

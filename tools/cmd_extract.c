@@ -70,6 +70,8 @@ static ebpo_status take(ebpo_file *file, const values *v, const char *path, ebpo
     if (status == EBPO_OK && !source_order)
         fprintf(stderr, "ebpo extract: %s: note: holds no maps, so vertices and faces come in the file's order\n",
                 remote_shown(path));
+    if (status == EBPO_OK && ebpo_file_info(file)->pruned)
+        fprintf(stderr, "ebpo extract: %s: note: is a subset, whose mesh is a part of the model's\n", remote_shown(path));
     return status;
 }
 

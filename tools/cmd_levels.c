@@ -65,7 +65,7 @@ static void print_level(const printer *p, const ebpo_stream_level *level, double
 {
     const ebpo_level_summary *s = &p->info->level[level->level];
     printf("%5d %9" PRIu64 " %9" PRIu64 " %9" PRIu64 " %9" PRIu64 " %10" PRIu64 " %16.10g %9.2f %12" PRIu64 " %9.2f\n", level->level, s->gray_count,
-           s->leaf_count, s->white_count, s->black_count, s->plane_count + s->leaf_plane_count, level->volume, share(p, level->volume),
+           s->leaf_count, facts_white(p->info, level->level), s->black_count, s->plane_count + s->leaf_plane_count, level->volume, share(p, level->volume),
            level->cumulative_bytes, ms);
 }
 
@@ -76,7 +76,7 @@ static void begin_json_level(printer *p, const ebpo_stream_level *level, double 
     json_int(&p->j, "level", level->level);
     json_uint(&p->j, "gray", s->gray_count);
     json_uint(&p->j, "leaf", s->leaf_count);
-    json_uint(&p->j, "white", s->white_count);
+    json_uint(&p->j, "white", facts_white(p->info, level->level));
     json_uint(&p->j, "black", s->black_count);
     json_uint(&p->j, "planes", s->plane_count);
     json_uint(&p->j, "leaf_planes", s->leaf_plane_count);

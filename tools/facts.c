@@ -67,6 +67,32 @@ static void print_model(FILE *out, const ebpo_info *info)
             info->leaf_faces, info->epsilon);
 }
 
+uint64_t facts_white(const ebpo_info *info, int level)
+{
+    return info->level[level].white_count - (level ? 8 * info->level[level - 1].pruned_count : 0);
+}
+
+static uint64_t pruned_nodes(const ebpo_info *info)
+{
+    uint64_t sum = 0;
+    for (int i = 0; i < info->level_count; i++)
+        sum += info->level[i].pruned_count;
+    return sum;
+}
+
+static void print_subset(FILE *out, const ebpo_info *info)
+{
+    const double *b = info->kept_box;
+    char hex[65];
+    words_hex(info->subset_of, hex);
+    fputs("  subset   ", out);
+    if (info->cut_levels)
+        fprintf(out, " levels 0 to %d", info->cut_levels - 1);
+    if (info->boxed)
+        fprintf(out, "%s what meets %.9g,%.9g,%.9g,%.9g,%.9g,%.9g", info->cut_levels ? "," : "", b[0], b[1], b[2], b[3], b[4], b[5]);
+    fprintf(out, "; nothing below %llu pruned nodes\n            of the file with content %s\n", (unsigned long long)pruned_nodes(info), hex);
+}
+
 static uint64_t level_bytes(const ebpo_info *info)
 {
     uint64_t sum = 0;
@@ -101,6 +127,8 @@ void facts_print(FILE *out, const char *path, const ebpo_info *info)
             words_format(version, sizeof version, info->version_major, info->version_minor), info->solid ? "a solid" : "a surface", info->level_count - 1,
             words_bytes(bytes, sizeof bytes, info->file_bytes));
     print_source(out, info);
+    if (info->pruned)
+        print_subset(out, info);
     report_print_mending(out, &info->mend);
     print_model(out, info);
     fprintf(out, "  holds     %s; codec %s\n", words_parts(parts, sizeof parts, info->parts), words_codec(info->codec));
@@ -123,7 +151,7 @@ void facts_table(FILE *out, const ebpo_info *info)
         char stored[32], sum[32];
         fprintf(out, "%5d %9llu %9llu %9llu %9llu %9llu %10llu %12llu %9s %10s %9.2f\n", i,
                 (unsigned long long)l->gray_count, (unsigned long long)l->leaf_count,
-                (unsigned long long)l->white_count, (unsigned long long)l->black_count,
+                (unsigned long long)facts_white(info, i), (unsigned long long)l->black_count,
                 (unsigned long long)(l->plane_count + l->leaf_plane_count), (unsigned long long)l->new_count,
                 (unsigned long long)l->ref_count, words_bytes(stored, sizeof stored, l->stored_bytes),
                 words_bytes(sum, sizeof sum, facts_cumulative(info, i)), facts_percent(info, i));
@@ -139,7 +167,9 @@ static void json_level(json *j, const ebpo_info *info, int number)
     json_int(j, "level", number);
     json_uint(j, "gray", l->gray_count);
     json_uint(j, "leaf", l->leaf_count);
-    json_uint(j, "white", l->white_count);
+    if (info->pruned)
+        json_uint(j, "pruned", l->pruned_count);
+    json_uint(j, "white", facts_white(info, number));
     json_uint(j, "black", l->black_count);
     json_uint(j, "planes", l->plane_count);
     json_uint(j, "leaf_planes", l->leaf_plane_count);
@@ -186,6 +216,22 @@ static void json_model(json *j, const ebpo_info *info)
     json_real(j, "epsilon", info->epsilon);
 }
 
+static void json_subset(json *j, const ebpo_info *info)
+{
+    char hex[65];
+    if (!info->pruned)
+        return;
+    words_hex(info->subset_of, hex);
+    json_object(j, "subset");
+    json_text(j, "of_content_sha256", hex);
+    if (info->cut_levels)
+        json_int(j, "last_level", info->cut_levels - 1);
+    if (info->boxed)
+        json_reals(j, "box", info->kept_box, 6);
+    json_uint(j, "pruned_nodes", pruned_nodes(info));
+    json_end(j);
+}
+
 static void json_storage(json *j, const ebpo_info *info)
 {
     char hex[65];
@@ -196,6 +242,7 @@ static void json_storage(json *j, const ebpo_info *info)
             json_text(j, NULL, part_words[i]);
     json_end(j);
     json_text(j, "codec", words_codec(info->codec));
+    json_subset(j, info);
     json_text(j, "content_sha256", hex);
     json_object(j, "bytes");
     json_uint(j, "file", info->file_bytes);

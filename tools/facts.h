@@ -11,6 +11,9 @@
  * 0 .. level. */
 double facts_volume(const ebpo_info *info, int level);
 /* The same in percent of the solid; of the root box for a surface. */
+/* White nodes of a level without the places of pruned nodes' children. */
+uint64_t facts_white(const ebpo_info *info, int level);
+
 double facts_percent(const ebpo_info *info, int level);
 /* Bytes of the head and of levels 0 .. level. */
 uint64_t facts_cumulative(const ebpo_info *info, int level);

@@ -22,6 +22,8 @@ static bool options_from(const remote_values *v, ebpo_http_options *o, ebpo_erro
     o->user = v->user;
     o->ca_file = v->ca_file;
     o->unversioned = v->unversioned;
+    o->stop = v->stop;
+    o->stop_user = v->stop_user;
     return true;
 }
 

@@ -13,6 +13,8 @@ typedef struct remote_values {
     double timeout, stall;
     int64_t retries, connections;
     arg_list headers;
+    bool (*stop)(void *user); /* not options: as in ebpo_http_options */
+    void *stop_user;
 } remote_values;
 #define REMOTE_VALUES_INIT { .timeout = -1, .stall = -1, .retries = -1, .connections = -1 }
 

@@ -34,6 +34,13 @@ static ebpo_status check_types(const ebpo_check *check, const ebpo_info *info, i
     for (uint64_t i = 0; i < groups; i++)
         for (int octant = 0; octant < (level ? 8 : 1); octant++)
             counts[arrays->types[i] >> 2 * octant & 3]++;
+    if (info->pruned && level) {
+        uint64_t empty = 0;
+        for (uint64_t i = 0; i < groups; i++)
+            empty += arrays->types[i] == 0;
+        if (empty != info->level[level - 1].pruned_count)
+            return ebpo_check_fail(check, level, "types", "there is not one empty group for each pruned node of the level above", error);
+    }
     const ebpo_level_summary *s = &info->level[level];
     if (counts[EBPO_WHITE] != s->white_count || counts[EBPO_BLACK] != s->black_count || counts[EBPO_LEAF] != s->leaf_count ||
         counts[EBPO_GRAY] != s->gray_count)
@@ -146,7 +153,7 @@ static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
     unsigned types = arrays->types[w->group[level]++];
     for (int octant = 0; octant < (level ? 8 : 1); octant++) {
         unsigned type = types >> 2 * octant & 3;
-        if (type == EBPO_GRAY) {
+        if (type == EBPO_GRAY && level + 1 < w->tree->info.level_count) {
             ebpo_status status = walk_group(w, level + 1, error);
             if (status != EBPO_OK)
                 return status;

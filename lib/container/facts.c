@@ -1,6 +1,7 @@
 #include "container/facts.h"
 
 #include <inttypes.h>
+#include <math.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
@@ -119,6 +120,7 @@ static const fact level_facts[] = {
     { "leaf_volume", REAL, LEVEL_AT(leaf_volume) },
 };
 enum { LEVEL_FACTS = sizeof level_facts / sizeof level_facts[0] };
+static const fact pruned_fact = { "pruned", COUNT, LEVEL_AT(pruned_count) }; /* left out when 0 */
 
 static ebpo_status put_word(ebpo_h5_out *out, ebpo_h5_id id, const fact *f, const void *field, ebpo_error *error)
 {
@@ -154,24 +156,38 @@ static ebpo_status put_fact(ebpo_h5_out *out, ebpo_h5_id id, const fact *f, cons
 }
 
 /* A reader that does not know an optional part is none the wiser, but right; without a required one it would be wrong. */
+enum { PRUNED = 1 << 30 }; /* info.pruned: a word in the list of parts, but nothing that one could leave out */
 static const struct { const char *word; unsigned part; bool required; } parts[] = {
     { "levels", 0, true },
     { "mesh", EBPO_PART_MESH, true },
     { "planes", EBPO_PART_PLANES, false },
     { "maps", EBPO_PART_MAPS, false },
     { "leaf-planes", EBPO_PART_LEAF_PLANES, false },
+    { "pruned", PRUNED, true },
 };
 enum { PARTS = sizeof parts / sizeof parts[0] };
 
 static ebpo_status put_parts(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info, bool required, ebpo_error *error)
 {
     char words[128] = "";
+    uint32_t has = info->parts | (info->pruned ? PRUNED : 0);
     for (int i = 0; i < PARTS; i++)
-        if (parts[i].required == required && (!parts[i].part || info->parts & parts[i].part)) {
+        if (parts[i].required == required && (!parts[i].part || has & parts[i].part)) {
             size_t used = strlen(words);
             snprintf(words + used, sizeof words - used, "%s%s", used ? " " : "", parts[i].word);
         }
     return ebpo_h5_put_text(out, root, required ? "required_parts" : "optional_parts", words, error);
+}
+
+/* Only in subsets: other files stay as they are. */
+static ebpo_status put_subset(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info, ebpo_error *error)
+{
+    ebpo_status status = put_digest(out, root, "subset_of", info->subset_of, error);
+    if (status == EBPO_OK && info->cut_levels)
+        status = ebpo_h5_put_int(out, root, "subset_levels", info->cut_levels, error);
+    if (status == EBPO_OK && info->boxed)
+        status = ebpo_h5_put_real(out, root, "subset_box", info->kept_box, 6, error);
+    return status;
 }
 
 ebpo_status ebpo_facts_put(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info, ebpo_error *error)
@@ -191,6 +207,8 @@ ebpo_status ebpo_facts_put(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *i
         status = ebpo_h5_put_text(out, root, "about", ABOUT, error);
     for (int i = 0; i < FACTS && status == EBPO_OK; i++)
         status = put_fact(out, root, &facts[i], info, error);
+    if (status == EBPO_OK && info->pruned)
+        status = put_subset(out, root, info, error);
     return status;
 }
 
@@ -210,6 +228,8 @@ ebpo_status ebpo_facts_put_level(ebpo_h5_out *out, ebpo_h5_id group, const ebpo_
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < LEVEL_FACTS && status == EBPO_OK; i++)
         status = put_fact(out, group, &level_facts[i], level, error);
+    if (status == EBPO_OK && level->pruned_count)
+        status = put_fact(out, group, &pruned_fact, level, error);
     return status;
 }
 
@@ -357,7 +377,29 @@ static ebpo_status get_parts(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, e
     for (int i = 0; i < PARTS; i++)
         if (seen >> i & 1)
             info->parts |= parts[i].part;
+    info->pruned = info->parts & PRUNED;
+    info->parts &= ~(uint32_t)PRUNED;
     return seen & 1 ? EBPO_OK : wrong_value(in, "/", "required_parts", error);
+}
+
+static ebpo_status get_subset(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebpo_error *error)
+{
+    int64_t levels = 0;
+    ebpo_status status = get_digest(in, root, "/", "subset_of", info->subset_of, error);
+    if (status == EBPO_E_ABSENT)
+        return ebpo_fail(error, EBPO_E_FORMAT, "%s: /: attribute subset_of is missing; get a fresh copy of the file", in->shown);
+    if (status == EBPO_OK)
+        status = ebpo_h5_get_int(in, root, "/", "subset_levels", &levels, error);
+    if (status == EBPO_OK && (levels < 1 || levels > EBPO_LEVELS_MAX))
+        return wrong_value(in, "/", "subset_levels", error);
+    info->cut_levels = (int)levels;
+    if (status == EBPO_OK || status == EBPO_E_ABSENT)
+        status = ebpo_h5_get_real(in, root, "/", "subset_box", info->kept_box, 6, error);
+    info->boxed = status == EBPO_OK;
+    for (int k = 0; k < 3 && info->boxed; k++)
+        if (!(isfinite(info->kept_box[k]) && isfinite(info->kept_box[3 + k]) && info->kept_box[k] <= info->kept_box[3 + k]))
+            return wrong_value(in, "/", "subset_box", error);
+    return status == EBPO_E_ABSENT ? EBPO_OK : status;
 }
 
 ebpo_status ebpo_facts_get(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebpo_error *error)
@@ -367,7 +409,7 @@ ebpo_status ebpo_facts_get(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebp
         status = get_parts(in, root, info, error);
     for (int i = 0; i < FACTS && status == EBPO_OK; i++)
         status = get_fact(in, root, "/", &facts[i], info, error);
-    return status;
+    return status == EBPO_OK && info->pruned ? get_subset(in, root, info, error) : status;
 }
 
 ebpo_status ebpo_facts_get_level(ebpo_h5_in *in, ebpo_h5_id group, const char *path, ebpo_level_summary *level, ebpo_error *error)
@@ -375,5 +417,7 @@ ebpo_status ebpo_facts_get_level(ebpo_h5_in *in, ebpo_h5_id group, const char *p
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < LEVEL_FACTS && status == EBPO_OK; i++)
         status = get_fact(in, group, path, &level_facts[i], level, error);
-    return status;
+    if (status == EBPO_OK)
+        status = ebpo_h5_get_count(in, group, path, pruned_fact.name, &level->pruned_count, error);
+    return status == EBPO_E_ABSENT ? EBPO_OK : status;
 }

@@ -47,8 +47,13 @@ static const char *check_level_counts(const ebpo_info *info, int level)
         return "a level has too many nodes";
     if (s->gray_count + s->leaf_count + s->white_count + s->black_count != nodes)
         return "a level does not have eight nodes for each gray one above";
-    if ((s->gray_count == 0) != (level == info->level_count - 1))
+    bool last = level == info->level_count - 1;
+    if (last ? s->gray_count && !info->pruned : s->gray_count == 0)
         return "the gray nodes do not end at the deepest level";
+    if (info->pruned ? s->pruned_count > s->gray_count || (s->pruned_count == s->gray_count) < last : s->pruned_count != 0)
+        return "a level's pruned nodes are not some of its gray ones, or not all of them at the deepest level";
+    if (!last && info->pruned && (s->pruned_count == s->gray_count || info->level[level + 1].white_count / 8 < s->pruned_count))
+        return "a level has nothing but the places of pruned nodes' children, or not all of these";
     if (s->plane_count > (info->parts & EBPO_PART_PLANES ? 255 * s->gray_count : 0) ||
         s->leaf_plane_count > (info->parts & EBPO_PART_LEAF_PLANES ? 255 * s->leaf_count : 0))
         return "a level has more planes than its nodes can";

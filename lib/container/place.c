@@ -32,7 +32,12 @@ static ebpo_status check_type(const ebpo_chunks *chunks, const ebpo_place *place
 ebpo_status ebpo_place_children(ebpo_chunks *chunks, const ebpo_place *gray, uint16_t *types, uint64_t ranks[4], ebpo_error *error)
 {
     uint64_t counts[4];
-    ebpo_status status = check_type(chunks, gray, EBPO_GRAY, "children", error); /* so there is a next level: the head has been checked */
+    ebpo_status status = check_type(chunks, gray, EBPO_GRAY, "children", error);
+    if (status == EBPO_OK && gray->level + 1 == chunks->file->info.level_count) { /* pruned: the head has been checked */
+        *types = 0;
+        memset(ranks, 0, 4 * sizeof *ranks);
+        return EBPO_OK;
+    }
     if (status == EBPO_OK)
         status = ebpo_ranks_before(chunks, gray->level + 1, gray->rank, ranks, error);
     if (status == EBPO_OK)

@@ -33,7 +33,8 @@ static void summarise(ebpo_info *info, const ebpo_tree *tree)
         ebpo_level_summary *s = &info->level[i];
         bool mesh = info->parts & EBPO_PART_MESH;
         *s = (ebpo_level_summary){ .gray_count = l->gray_count, .leaf_count = l->leaf_count, .white_count = l->white_count,
-                                   .black_count = l->black_count, .gray_volume = l->gray_volume, .leaf_volume = l->leaf_volume };
+                                   .black_count = l->black_count, .gray_volume = l->gray_volume, .leaf_volume = l->leaf_volume,
+                                   .pruned_count = info->pruned ? l->pruned_count : 0 };
         s->plane_count = info->parts & EBPO_PART_PLANES ? l->plane_count : 0;
         s->leaf_plane_count = info->parts & EBPO_PART_LEAF_PLANES ? l->leaf_plane_count : 0;
         s->new_count = mesh ? l->new_count : 0;

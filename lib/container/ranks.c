@@ -182,3 +182,15 @@ ebpo_status ebpo_ranks_leaf(ebpo_chunks *chunks, int level, uint64_t leaf, uint6
     *refs = row[1] + listed;
     return EBPO_OK;
 }
+
+ebpo_status ebpo_ranks_leaf_planes(ebpo_chunks *chunks, int level, uint64_t leaf, uint64_t *planes, ebpo_error *error)
+{
+    uint64_t row[3], sum = 0, from = leaf / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS, all = chunks->file->info.level[level].leaf_plane_count;
+    ebpo_status status = index_row(chunks, EBPO_A_LEAF_INDEX, level, leaf, 3, row, error);
+    if (status == EBPO_OK)
+        status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_PLANE_COUNTS, level, from, leaf - from, &sum, error);
+    if (status == EBPO_OK && (row[2] > all || sum > all - row[2]))
+        status = ebpo_chunks_fail(chunks, level, EBPO_A_LEAF_INDEX, contradicts, error);
+    *planes = row[2] + sum;
+    return status;
+}

@@ -175,7 +175,7 @@ ebpo_status ebpo_file_read_level(ebpo_file *file, int level, ebpo_level *out, un
     *out = (ebpo_level){ .group_count = ebpo_schema_groups(info, level), .gray_count = s->gray_count, .leaf_count = s->leaf_count,
                          .white_count = s->white_count, .black_count = s->black_count, .plane_count = s->plane_count,
                          .ref_count = s->ref_count, .new_count = s->new_count, .leaf_plane_count = s->leaf_plane_count,
-                         .gray_volume = s->gray_volume, .leaf_volume = s->leaf_volume };
+                         .gray_volume = s->gray_volume, .leaf_volume = s->leaf_volume, .pruned_count = s->pruned_count };
     ebpo_file_expect_levels(file, level, level);
     ebpo_status status = read_arrays(file, level, out, threads, error);
     if (status == EBPO_OK && out->leaf_count)

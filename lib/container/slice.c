@@ -37,7 +37,13 @@ static ebpo_status root_range(const ebpo_chunks *chunks, const ebpo_place *root,
     return ebpo_place_check(chunks, root, error);
 }
 
-/* The next level's range; there is a next level, as the last has no gray nodes. */
+/* Whether the range has a next level: the gray nodes of the last one are pruned. */
+static bool goes_on(const ebpo_chunks *chunks, const range *r)
+{
+    return r->count[EBPO_GRAY] && r->level + 1 < chunks->file->info.level_count;
+}
+
+/* The next level's range. */
 static ebpo_status next_range(ebpo_chunks *chunks, range *r, uint16_t **types, ebpo_error *error)
 {
     uint64_t group = r->rank[EBPO_GRAY], groups = r->count[EBPO_GRAY];
@@ -143,6 +149,8 @@ static void expect_nodes(ebpo_chunks *chunks, const range *r)
     if (grays) {
         ebpo_chunks_expect(chunks, &e, EBPO_A_GRAY_INDEX, r->level, gray_index, 1);
         ebpo_chunks_expect(chunks, &e, EBPO_A_PLANE_COUNTS, r->level, counted, gray + grays - counted);
+    }
+    if (goes_on(chunks, r)) {
         ebpo_chunks_expect(chunks, &e, EBPO_A_TYPES_INDEX, r->level + 1, gray_index, 1);
         ebpo_chunks_expect(chunks, &e, EBPO_A_TYPES, r->level + 1, counted, gray + grays - counted);
     }
@@ -188,7 +196,7 @@ static ebpo_status read_levels(ebpo_slice *slice, ebpo_chunks *chunks, const ebp
         return ebpo_fail_memory(error, sizeof(uint16_t));
     slice->level[0].types[0] = (uint16_t)root->type;
     status = read_nodes(chunks, &r, &slice->level[0], error);
-    for (slice->level_count = 1; status == EBPO_OK && r.count[EBPO_GRAY]; slice->level_count++) {
+    for (slice->level_count = 1; status == EBPO_OK && goes_on(chunks, &r); slice->level_count++) {
         ebpo_level *out = &slice->level[slice->level_count];
         out->group_count = r.count[EBPO_GRAY];
         status = next_range(chunks, &r, &out->types, error);
@@ -212,7 +220,7 @@ static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
     unsigned types = arrays->types[w->group[level]++];
     for (int octant = 0; octant < (level ? 8 : 1); octant++) {
         unsigned type = types >> 2 * octant & 3;
-        if (type == EBPO_GRAY) {
+        if (type == EBPO_GRAY && level + 1 < w->slice->level_count) {
             ebpo_status status = walk_group(w, level + 1, error);
             if (status != EBPO_OK)
                 return status;
@@ -234,6 +242,7 @@ ebpo_status ebpo_slice_read(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_pla
 {
     memset(out, 0, sizeof *out);
     out->root = *root;
+    out->pruned = chunks->file->info.pruned;
     if (!(chunks->file->info.parts & EBPO_PART_MESH))
         return ebpo_fail(error, EBPO_E_ABSENT, "%s: the file was written without its mesh; build it again with it", chunks->file->in.shown);
     walk w = { .chunks = chunks, .slice = out };
@@ -271,7 +280,7 @@ ebpo_status ebpo_slice_measure(ebpo_chunks *chunks, const ebpo_place *root, ebpo
     ebpo_status status = root_range(chunks, root, &r, error);
     if (status == EBPO_OK)
         status = measure_leaves(chunks, &r, out, error);
-    while (status == EBPO_OK && r.count[EBPO_GRAY]) {
+    while (status == EBPO_OK && goes_on(chunks, &r)) {
         out->groups += r.count[EBPO_GRAY];
         status = next_range(chunks, &r, NULL, error);
         if (status == EBPO_OK)

@@ -24,9 +24,11 @@ typedef struct ebpo_place {
     uint32_t at[3];
     ebpo_node_type type;
     uint64_t rank;
+    bool pruned; /* gray, and known to have no children in the file; callers find out: nothing in slice.h looks at it */
 } ebpo_place;
 
-/* The children of a gray node: the group's types, and the rank of the group's first node of each type (indexed by ebpo_node_type) in level + 1. */
+/* The children of a gray node: the group's types, and the rank of the group's first node of each type (indexed by ebpo_node_type) in level + 1. Of a pruned node the types are 0
+ * (and the file's info says `pruned`). */
 EBPO_MUST_USE ebpo_status ebpo_place_children(ebpo_chunks *chunks, const ebpo_place *gray, uint16_t *types, uint64_t ranks[4], ebpo_error *error);
 
 /* Plane codes that a gray node adds; at most 255 into `codes`. *count is 0 without the part. */
@@ -40,6 +42,7 @@ EBPO_MUST_USE ebpo_status ebpo_place_winding(ebpo_chunks *chunks, const ebpo_pla
  * own new ones, first_face .. first_face + face_count - 1 in the file. leaf_first and leaf_refs of the levels hold local numbers. No planes of leaves. */
 typedef struct ebpo_slice {
     ebpo_place root;
+    bool pruned;              /* the file is a subset: empty groups are those of pruned nodes, as are gray nodes on the last level */
     int level_count;
     ebpo_level level[EBPO_LEVELS_MAX];
     uint32_t outer_count;

@@ -27,6 +27,7 @@ ebpo_status ebpo_slice_read_all(ebpo_slice *out, ebpo_file *file, unsigned threa
     if (status != EBPO_OK)
         return status;
     out->level_count = file->info.level_count;
+    out->pruned = file->info.pruned;
     for (int i = 0; i < out->level_count; i++) {
         drop(&tree.level[i]);
         out->level[i] = tree.level[i];

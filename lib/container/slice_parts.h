@@ -71,6 +71,9 @@ EBPO_MUST_USE ebpo_status ebpo_ranks_planes(ebpo_chunks *chunks, int level, uint
 /* End of the new faces of the leaf before one, and references of the leaves before it. */
 EBPO_MUST_USE ebpo_status ebpo_ranks_leaf(ebpo_chunks *chunks, int level, uint64_t leaf, uint64_t *end, uint64_t *refs, ebpo_error *error);
 
+/* Leaf planes of the leaves before one. */
+EBPO_MUST_USE ebpo_status ebpo_ranks_leaf_planes(ebpo_chunks *chunks, int level, uint64_t leaf, uint64_t *planes, ebpo_error *error);
+
 /* A place that the file has, as far as the head tells; else EBPO_E_ARGUMENT. */
 EBPO_MUST_USE ebpo_status ebpo_place_check(const ebpo_chunks *chunks, const ebpo_place *place, ebpo_error *error);
 

@@ -29,6 +29,7 @@ struct ebpo_disk {
     pthread_mutex_t lock;
     uint64_t written;  /* since the folder was last looked through */
     uint64_t number;   /* for temporary names */
+    uint64_t held, others;
 };
 
 static void digest(const uint8_t head[DIGEST_AT], const void *data, size_t size, uint8_t out[32])
@@ -109,6 +110,23 @@ static entry *list(const ebpo_disk *d, uint64_t *count, uint64_t *bytes)
     return entries;
 }
 
+static void count_held(ebpo_disk *d)
+{
+    uint64_t count, bytes;
+    entry *entries = list(d, &count, &bytes);
+    for (uint64_t i = 0; i < count; i++) {
+        uint64_t own = entries[i].bytes > HEAD_BYTES ? entries[i].bytes - HEAD_BYTES : 0;
+        *(strncmp(entries[i].name, d->key, sizeof d->key - 1) == 0 ? &d->held : &d->others) += own;
+    }
+    free(entries);
+}
+
+void ebpo_disk_held(const ebpo_disk *d, uint64_t *held, uint64_t *others)
+{
+    *held = d->held;
+    *others = d->others;
+}
+
 /* Done after each eighth of the limit that is written, so one process alone stays below it. */
 static void trim(ebpo_disk *d)
 {
@@ -157,6 +175,7 @@ ebpo_status ebpo_disk_open(ebpo_disk **out, const char *folder, uint64_t bytes, 
     pthread_mutex_init(&d->lock, NULL);
     make_key(d, url, version);
     trim(d);
+    count_held(d);
     *out = d;
     return EBPO_OK;
 }

@@ -14,6 +14,8 @@ typedef struct ebpo_disk ebpo_disk;
 
 /* Makes the folder, if its parent is there. EBPO_E_ARGUMENT when it cannot be written. `bytes`: that the folder may hold. */
 EBPO_MUST_USE ebpo_status ebpo_disk_open(ebpo_disk **out, const char *folder, uint64_t bytes, const char *url, const ebpo_http_version *version, ebpo_error *error);
+/* Bytes that the folder held when it was opened: of this version of this file, and others. */
+void ebpo_disk_held(const ebpo_disk *disk, uint64_t *held, uint64_t *others);
 void ebpo_disk_close(ebpo_disk *disk);
 
 /* `size`: EBPO_DISK_BLOCK, less at the end of the file. False: not there. */

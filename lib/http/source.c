@@ -148,6 +148,8 @@ bool ebpo_source_http_stats(const ebpo_source *source, ebpo_http_stats *out)
     ebpo_transfers_add_stats(s->pieces.transfers, out);
     out->cache_hits = s->pieces.disk_hits;
     out->cache_bytes = s->pieces.disk_bytes;
+    if (s->pieces.disk)
+        ebpo_disk_held(s->pieces.disk, &out->cache_held, &out->cache_others);
     out->wait_seconds = s->pieces.wait_seconds;
     pthread_mutex_unlock(&s->pieces.lock);
     return true;

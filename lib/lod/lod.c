@@ -55,6 +55,12 @@ static ebpo_status emit(walker *w, const ebpo_polytope *p, ebpo_cell cell)
 
 static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell, const ebpo_polytope *parent);
 
+/* Nothing is known below it but its envelope, which therefore stands for it at all deeper levels. Only asked above the target. */
+static bool is_pruned(const ebpo_lod_model *model, int level, uint64_t gray)
+{
+    return model->info->pruned && level < model->target && model->level[level + 1].types[gray] == 0;
+}
+
 static ebpo_status visit_gray(walker *w, uint64_t gray, ebpo_cell cell, ebpo_polytope *envelope)
 {
     const ebpo_level *level = &w->j->model->level[cell.level];
@@ -69,6 +75,8 @@ static ebpo_status visit_gray(walker *w, uint64_t gray, ebpo_cell cell, ebpo_pol
         ebpo_polytope_copy(&s->envelope, envelope);
         return EBPO_OK;
     }
+    if (is_pruned(w->j->model, cell.level, gray))
+        return emit(w, envelope, cell);
     return visit_group(w, gray, cell, envelope);
 }
 
@@ -138,7 +146,7 @@ static ebpo_status walk_seeds(void *context, uint64_t begin, uint64_t end, unsig
         walker w = { j, j->pieces[1 + i], &j->scratch[worker], -1, error };
         seed *s = &j->seeds[i];
         /* Seeds are in octcode order, and all gray nodes of their level: the i-th has the i-th group below it. */
-        ebpo_status status = visit_group(&w, i, s->cell, &s->envelope);
+        ebpo_status status = is_pruned(j->model, s->cell.level, i) ? emit(&w, &s->envelope, s->cell) : visit_group(&w, i, s->cell, &s->envelope);
         if (status != EBPO_OK)
             return status;
     }

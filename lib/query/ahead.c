@@ -19,7 +19,7 @@ static bool subtree_at(const ebpo_top *top, int level, const uint32_t at[3], uin
     for (int i = 1; i <= level && ebpo_entry_kind_of(entry) == EBPO_ENTRY_GRAY; i++)
         entry = top->nodes.group[ebpo_entry_value(entry)][ebpo_octant_at(at, level - i)];
     *key = ebpo_entry_value(entry);
-    return ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW;
+    return ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW && !top->below[*key].pruned;
 }
 
 static int add(neighbour *list, int count, uint64_t key, double far2)

@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "geom/ray.h"
 #include "query/options.h"
+#include "query/pruned.h"
 #include "query/walk.h"
 
 /* Number in the file, and the one that is told. */
@@ -71,13 +72,19 @@ static void gather_subtree(gathering *g, const ebpo_subtree *s)
     gather_bound(g, s, low, high, s->top);
 }
 
+static bool box_matters(void *user, const ebpo_box *box, const ebpo_spot *spot)
+{
+    const gathering *g = user;
+    for (int k = 0; k < 3; k++)
+        if (ebpo_wall(box, k, spot->level, spot->at[k]) > g->max[k] || ebpo_wall(box, k, spot->level, spot->at[k] + 1) < g->min[k])
+            return false;
+    return true;
+}
+
 static ebpo_status gather_spot(gathering *g, const ebpo_box *box, ebpo_spot spot, ebpo_error *error)
 {
-    if (ebpo_spot_is_settled(&spot))
+    if (ebpo_spot_is_settled(&spot) || !box_matters(g, box, &spot))
         return EBPO_OK;
-    for (int k = 0; k < 3; k++)
-        if (ebpo_wall(box, k, spot.level, spot.at[k]) > g->max[k] || ebpo_wall(box, k, spot.level, spot.at[k] + 1) < g->min[k])
-            return EBPO_OK;
     ebpo_status status = EBPO_OK;
     if (ebpo_spot_is_below(&spot)) {
         status = ebpo_spot_enter(g->context, &spot, error);
@@ -126,6 +133,8 @@ ebpo_status ebpo_faces_in_box(ebpo_context *context, const double min[3], const 
         ebpo_box box = ebpo_model_box(context->model);
         status = gather_spot(&g, &box, ebpo_spot_root(context->model), error);
     }
+    if (status == EBPO_OK && !g.no_memory)
+        status = ebpo_check_pruned(context, box_matters, &g, error);
     if (status == EBPO_OK)
         status = finish(&g, faces, count, error);
     free(g.list);

@@ -13,6 +13,7 @@
 #include "query/modes.h"
 #include "query/nearest.h"
 #include "query/options.h"
+#include "query/pruned.h"
 #include "query/walk.h"
 
 /* Children that are neither white nor black, nearest first. */
@@ -55,6 +56,8 @@ static ebpo_status search_top(ebpo_context *c, ebpo_nearest *n, const ebpo_box *
         n->passed_over = fmin(n->passed_over, lower);
         return EBPO_OK;
     }
+    if (ebpo_spot_is_pruned(c->model, &spot))
+        return EBPO_OK; /* see look_at_pruned */
     if (ebpo_spot_is_below(&spot)) {
         ebpo_status status = ebpo_spot_enter(c, &spot, error);
         if (status == EBPO_OK)
@@ -79,6 +82,42 @@ static ebpo_status search_everything(ebpo_context *c, ebpo_nearest *n, ebpo_erro
     return search_top(c, n, &box, ebpo_spot_root(c->model), 0, error);
 }
 
+/* --- subsets: when a face that was left out may be nearer than what was found --- */
+
+static ebpo_status pruned_within(ebpo_context *c, const ebpo_nearest *n, const ebpo_box *box, ebpo_spot spot, double lower, double *nearest, ebpo_error *error)
+{
+    const ebpo_model *m = c->model;
+    ebpo_status status = EBPO_OK;
+    if (lower > n->limit || ebpo_spot_is_settled(&spot) || !ebpo_spot_is_gray(m, &spot))
+        return EBPO_OK;
+    if (ebpo_spot_is_pruned(m, &spot) || (ebpo_spot_is_below(&spot) && n->late)) {
+        *nearest = fmin(*nearest, lower);
+        return n->late ? EBPO_OK : ebpo_fail_pruned(m, spot.level, spot.at, error);
+    }
+    if (ebpo_spot_is_below(&spot))
+        status = ebpo_spot_enter(c, &spot, error);
+    if (status != EBPO_OK)
+        return status;
+    ranked child[8];
+    int count = rank_children(m, box, &spot, lower, n->p, child);
+    for (int i = 0; i < count && status == EBPO_OK; i++)
+        status = pruned_within(c, n, box, child[i].spot, child[i].lower, nearest, error);
+    return status;
+}
+
+/* Fails when what was left out may matter; with a deadline that has passed it only widens what is certain. */
+static ebpo_status look_at_pruned(ebpo_context *c, ebpo_nearest *n, ebpo_error *error)
+{
+    ebpo_box box = ebpo_model_box(c->model);
+    ebpo_spot root = ebpo_spot_root(c->model);
+    double nearest = INFINITY;
+    if (!c->model->info->pruned)
+        return EBPO_OK;
+    ebpo_status status = pruned_within(c, n, &box, root, spot_distance(c->model, &box, &root, 0, n->p), &nearest, error);
+    n->passed_over = fmin(n->passed_over, nearest);
+    return status;
+}
+
 ebpo_status ebpo_give_sign(ebpo_context *c, const double p[3], const ebpo_query_options *o, ebpo_distance_result *out, ebpo_error *error)
 {
     ebpo_inside_result where;
@@ -100,6 +139,8 @@ static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_query_op
     if (o->warm && c->warm)
         ebpo_nearest_begin_with(&n, (const double (*)[3])c->warm_triangle, c->warm_face, c->warm_told);
     ebpo_status status = search_everything(c, &n, error);
+    if (status == EBPO_OK)
+        status = look_at_pruned(c, &n, error);
     if (status != EBPO_OK)
         return status;
     if (n.late && n.passed_over <= n.limit) {
@@ -136,7 +177,7 @@ static ebpo_status narrow(interval *v, ebpo_spot spot, double lower, ebpo_error 
     if (lower > v->hi || ebpo_spot_is_settled(&spot))
         return EBPO_OK;
     v->hi = fmin(v->hi, ebpo_cell_far(&v->box, spot.level, spot.at, v->p));
-    if (spot.level >= v->o->level || !ebpo_spot_is_gray(m, &spot) || (v->deadline && ebpo_clock() > v->deadline)) {
+    if (spot.level >= v->o->level || !ebpo_spot_is_gray(m, &spot) || ebpo_spot_is_pruned(m, &spot) || (v->deadline && ebpo_clock() > v->deadline)) {
         v->lo = fmin(v->lo, lower);
         return EBPO_OK;
     }

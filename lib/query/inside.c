@@ -171,6 +171,8 @@ ebpo_status ebpo_inside_subtree(ebpo_context *context, const ebpo_subtree *s, co
         ebpo_inside_settled(context, entry, out);
         return EBPO_OK;
     }
+    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW)
+        return ebpo_inside_pruned(context, p, out, error);
     in_leaf i;
     find_in_entry(s, fine, level, at, p, &i);
     return answer_in_leaf(context, s, &s->leaf[ebpo_entry_value(entry)], &i, p, out, error);
@@ -277,6 +279,10 @@ static ebpo_status inside_together(ebpo_context *context, const ebpo_subtree *s,
             out[i] = (ebpo_inside_result){ EBPO_OUT, 0, 0 };
         } else if (ebpo_entry_kind_of(l[i].entry) == EBPO_ENTRY_SETTLED) {
             ebpo_inside_settled(context, l[i].entry, &out[i]);
+        } else if (ebpo_entry_kind_of(l[i].entry) == EBPO_ENTRY_BELOW) {
+            ebpo_status status = ebpo_inside_pruned(context, points + 3 * i, &out[i], error);
+            if (status != EBPO_OK)
+                return status;
         } else {
             w[leaves].leaf = &s->leaf[ebpo_entry_value(l[i].entry)];
             w[leaves].point = i;

@@ -8,6 +8,9 @@
 EBPO_MUST_USE ebpo_status ebpo_inside_leaf(ebpo_context *context, const ebpo_subtree *s, uint32_t number, int level, const uint32_t at[3],
                                            const double p[3], ebpo_inside_result *out, ebpo_error *error);
 
+/* Below a pruned node of the whole tree or of a subtree: an envelope decides, or EBPO_E_ABSENT. */
+EBPO_MUST_USE ebpo_status ebpo_inside_pruned(ebpo_context *context, const double p[3], ebpo_inside_result *out, ebpo_error *error);
+
 /* In a white or black node. */
 void ebpo_inside_settled(const ebpo_context *context, uint32_t entry, ebpo_inside_result *out);
 

@@ -4,6 +4,7 @@
 #include "query/inside.h"
 #include "query/limited.h"
 #include "query/locate.h"
+#include "query/pruned.h"
 #include "query/walk.h"
 
 static bool uses_envelopes(const ebpo_context *c, const ebpo_query_options *o)
@@ -39,7 +40,8 @@ static bool outside_envelope(const asking *a, const ebpo_spot *spot)
 
 static bool stops_here(const asking *a, const ebpo_spot *spot)
 {
-    if (a->options->level >= 0 && (spot->level >= a->options->level || !ebpo_spot_is_gray(a->context->model, spot)))
+    const ebpo_model *m = a->context->model;
+    if (a->options->level >= 0 && (spot->level >= a->options->level || !ebpo_spot_is_gray(m, spot) || ebpo_spot_is_pruned(m, spot)))
         return true;
     return a->deadline && ebpo_clock() > a->deadline;
 }
@@ -110,6 +112,9 @@ static ebpo_status step_down(const asking *a, ebpo_place *place, ebpo_error *err
     ebpo_status status = ebpo_place_children(a->context->model->chunks, place, &types, ranks, error);
     if (status != EBPO_OK)
         return status;
+    place->pruned = a->context->model->info->pruned && types == 0;
+    if (place->pruned)
+        return EBPO_OK;
     unsigned octant = ebpo_octant_at(a->at, a->context->model->info->level_count - 1 - place->level - 1);
     place->type = (ebpo_node_type)(types >> 2 * octant & 3);
     place->rank = ranks[place->type];
@@ -138,10 +143,12 @@ static ebpo_status walk_file(asking *a, const ebpo_spot *spot, ebpo_inside_resul
             return EBPO_OK;
         }
         ebpo_spot here = { NULL, 0, place.level, { place.at[0], place.at[1], place.at[2] } };
-        if ((a->options->level >= 0 && place.level >= a->options->level) || (a->deadline && ebpo_clock() > a->deadline)) {
+        if ((a->options->level >= 0 && (place.level >= a->options->level || place.pruned)) || (a->deadline && ebpo_clock() > a->deadline)) {
             maybe(m, &here, out);
             return EBPO_OK;
         }
+        if (place.pruned)
+            return ebpo_fail_pruned(m, place.level, place.at, error);
         status = step_down(a, &place, error);
         if (status != EBPO_OK)
             return status;
@@ -214,6 +221,8 @@ static bool answer_at_hand(asking *a, ebpo_inside_result *out, ebpo_status *stat
     }
     int level, fine = m->info->level_count - 1;
     entry = ebpo_descend(&held->nodes, fine, a->at, &level);
+    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW)
+        return false; /* pruned: envelopes may tell */
     ebpo_spot spot = { held, entry, level, { a->at[0] >> (fine - level), a->at[1] >> (fine - level), a->at[2] >> (fine - level) } };
     if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_SETTLED)
         ebpo_inside_settled(a->context, entry, out);
@@ -222,6 +231,19 @@ static bool answer_at_hand(asking *a, ebpo_inside_result *out, ebpo_status *stat
     else
         *status = ebpo_inside_leaf(a->context, held, ebpo_entry_value(entry), level, spot.at, a->p, out, error);
     return true;
+}
+
+ebpo_status ebpo_inside_pruned(ebpo_context *context, const double p[3], ebpo_inside_result *out, ebpo_error *error)
+{
+    const ebpo_model *m = context->model;
+    ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
+    asking a = { .context = context, .options = &options, .box = ebpo_model_box(m), .envelopes = true, .p = p };
+    if (!ebpo_locate(&a.box, m->info->level_count - 1, p, a.at))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "a point outside the root cell has no node");
+    ebpo_status status = walk_down(&a, out, error);
+    if (status == EBPO_OK && out->where == EBPO_OUT && m->info->rule != EBPO_RULE_NONZERO) /* outside, but the winding number is not known */
+        return ebpo_fail_pruned(m, 0, (const uint32_t[3]){ 0, 0, 0 }, error);
+    return status;
 }
 
 ebpo_status ebpo_inside_walk(ebpo_context *context, const double p[3], const ebpo_query_options *options, ebpo_inside_result *out, ebpo_error *error)

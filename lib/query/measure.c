@@ -13,6 +13,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
+#include "container/reader.h"
 #include "geom/double_double.h"
 #include "mesh/mesh.h"
 
@@ -201,6 +202,8 @@ ebpo_status ebpo_measure(ebpo_file *file, unsigned threads, ebpo_mass *out, ebpo
     pass p = {.mesh = &mesh};
     moments sum = {.absolute6 = 0};
     uint64_t block_count = 0;
+    if (ebpo_file_info(file)->pruned)
+        return ebpo_fail(error, EBPO_E_ABSENT, "%s: the file is a subset, of whose mesh a part was left out: it cannot be measured; measure the original", file->in.shown);
     ebpo_status status = ebpo_file_read_mesh(file, &mesh, threads, error);
     if (status != EBPO_OK)
         goto done;

@@ -158,10 +158,10 @@ static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
     size.outer = 0;
     ebpo_subtree_estimate(&size, m->info, &keep, &peak);
     int deepest = m->info->level_count - 1;
+    if (!(m->info->parts & EBPO_PART_MESH)) /* nothing could be loaded from below a cut level */
+        return open_top(m, deepest, error);
     if (o->cut_level >= 0)
         return open_top(m, o->cut_level < deepest ? o->cut_level : deepest, error);
-    if (!(m->info->parts & EBPO_PART_MESH))
-        return open_top(m, deepest, error);
     if (o->memory == 0 || peak <= o->memory)
         return open_whole(m, error);
     int cut = choose_cut(m->info, o->memory);

@@ -8,6 +8,7 @@
 #include "query/limited.h"
 #include "query/locate.h"
 #include "query/nearest.h"
+#include "query/pruned.h"
 #include "query/walk.h"
 
 static const ebpo_distance_result nothing = { INFINITY, 0, INFINITY, { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
@@ -125,6 +126,8 @@ ebpo_status ebpo_distance_to_envelope(ebpo_context *c, const double p[3], const 
         ebpo_spot child = ebpo_spot_child(c->model, &spot, octant);
         if (!ebpo_spot_is_gray(c->model, &child))
             break;
+        if (c->model->info->boxed && ebpo_spot_is_pruned(c->model, &child)) /* leaves outside a subset's box look the same */
+            return ebpo_fail_pruned(c->model, child.level, child.at, error);
         if (!ebpo_polytope_child(&envelope[now], octant, &envelope[1 - now]))
             break;
         now = 1 - now;

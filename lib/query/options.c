@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "base/error.h"
+#include "container/reader.h"
 #include "query/ahead.h"
 #include "query/inside.h"
 #include "query/limited.h"
@@ -31,7 +32,8 @@ ebpo_status ebpo_check_mesh(const ebpo_model *model, ebpo_error *error)
 {
     if (model->info->parts & EBPO_PART_MESH)
         return EBPO_OK;
-    return ebpo_fail(error, EBPO_E_ABSENT, "the file was written without its mesh: exact answers need it; ask with a level, or build the file again with the mesh");
+    return ebpo_fail(error, EBPO_E_ABSENT, "%s: the file was written without its mesh: exact answers need it; ask with a level, or take a file with it (`ebpo subset`, `ebpo fetch` or "
+                     "`ebpo convert` with --profile collision or full)", model->file->in.shown);
 }
 
 ebpo_status ebpo_check_solid(const ebpo_model *model, ebpo_error *error)

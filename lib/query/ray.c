@@ -10,6 +10,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "query/options.h"
+#include "query/pruned.h"
 #include "query/walk.h"
 
 /* A face that the ray meets, with what exact comparison needs. */
@@ -150,18 +151,27 @@ static void cast_subtree(casting *c, const ebpo_subtree *s)
     cast_bound(c, s, &f, s->top);
 }
 
+/* Whether the ray comes to the node's cell before its limit; rather yes than no. */
+static bool meets_cell(const casting *c, const ebpo_box *box, const ebpo_spot *spot)
+{
+    double low[3], high[3], slack = 0, enter;
+    for (int k = 0; k < 3; k++) {
+        low[k] = ebpo_wall(box, k, spot->level, spot->at[k]);
+        high[k] = ebpo_wall(box, k, spot->level, spot->at[k] + 1);
+        slack = fmax(slack, (fabs(low[k]) + fabs(high[k]) + fabs(c->ray.origin[k])) * 0x1p-48);
+    }
+    return meets_slabs(c->ray.origin, c->ray.direction, c->limit, low, high, slack, &enter);
+}
+
+static bool ray_matters(void *user, const ebpo_box *box, const ebpo_spot *spot)
+{
+    return meets_cell(user, box, spot);
+}
+
 static ebpo_status cast_spot(casting *c, const ebpo_box *box, ebpo_spot spot, ebpo_error *error)
 {
     const ebpo_model *m = c->context->model;
-    double low[3], high[3], slack = 0, enter;
-    if (ebpo_spot_is_settled(&spot))
-        return EBPO_OK;
-    for (int k = 0; k < 3; k++) {
-        low[k] = ebpo_wall(box, k, spot.level, spot.at[k]);
-        high[k] = ebpo_wall(box, k, spot.level, spot.at[k] + 1);
-        slack = fmax(slack, (fabs(low[k]) + fabs(high[k]) + fabs(c->ray.origin[k])) * 0x1p-48);
-    }
-    if (!meets_slabs(c->ray.origin, c->ray.direction, c->limit, low, high, slack, &enter))
+    if (ebpo_spot_is_settled(&spot) || !meets_cell(c, box, &spot) || ebpo_spot_is_pruned(m, &spot)) /* pruned: see cast */
         return EBPO_OK;
     if (ebpo_spot_is_below(&spot)) {
         ebpo_status status = ebpo_spot_enter(c->context, &spot, error);
@@ -198,6 +208,8 @@ static ebpo_status cast(casting *c, ebpo_error *error)
         ebpo_box box = ebpo_model_box(c->context->model);
         status = cast_spot(c, &box, ebpo_spot_root(c->context->model), error);
     }
+    if (status == EBPO_OK && !c->no_memory)
+        status = ebpo_check_pruned(c->context, ray_matters, c, error);
     if (status == EBPO_OK && c->no_memory)
         status = ebpo_fail_memory(error, c->count * sizeof *c->list);
     return status;

@@ -5,6 +5,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "container/reader.h"
 
 /* Reading, level by level, with what the next level needs to know of the one before. */
 typedef struct reading {
@@ -12,6 +13,7 @@ typedef struct reading {
     const ebpo_info *info;
     uint64_t group, plane, below; /* next free */
     uint32_t (*at)[3];            /* positions of the last level's gray nodes */
+    uint16_t *next_types;         /* of the level below the one that is read, where they are needed to know pruned nodes */
     uint64_t group_room, gray_room, plane_room, below_room, below_planes_room;
     ebpo_error *error;
 } reading;
@@ -76,6 +78,23 @@ static ebpo_status add_gray(reading *r, const ebpo_level *level, uint64_t rank, 
     return add_planes(r, level, level->plane_counts ? level->plane_counts[rank] : 0, in_level, &t->gray[group]);
 }
 
+static bool is_pruned(const reading *r, int number, uint64_t rank)
+{
+    return r->info->pruned && (number + 1 == r->info->level_count || (r->next_types && r->next_types[rank] == 0));
+}
+
+/* Above the cut the next level has a group for it, which leads nowhere. */
+static ebpo_status add_pruned(reading *r, const ebpo_level *level, const ebpo_place *place, uint64_t *in_level, uint32_t *entry)
+{
+    if (place->level < r->top->cut_level && place->level + 1 < r->info->level_count) {
+        ebpo_level none = { .gray_count = 0 };
+        ebpo_status status = add_gray(r, &none, 0, &(uint64_t){ 0 }, entry);
+        if (status != EBPO_OK)
+            return status;
+    }
+    return add_below(r, level, place, in_level, entry);
+}
+
 static ebpo_status add_node(reading *r, int number, const ebpo_level *level, ebpo_node_type type, const uint32_t at[3], ranks *seen, uint32_t *entry)
 {
     uint64_t rank = seen->of[type]++;
@@ -83,9 +102,11 @@ static ebpo_status add_node(reading *r, int number, const ebpo_level *level, ebp
         return settled(r, level->white_winding, rank, 0, entry);
     if (type == EBPO_BLACK)
         return settled(r, level->black_winding, rank, 1, entry);
+    if (type == EBPO_GRAY && is_pruned(r, number, rank))
+        return add_pruned(r, level, &(ebpo_place){ number, { at[0], at[1], at[2] }, type, rank, true }, &seen->planes, entry);
     if (type == EBPO_GRAY && number < r->top->cut_level)
         return add_gray(r, level, rank, &seen->planes, entry);
-    return add_below(r, level, &(ebpo_place){ number, { at[0], at[1], at[2] }, type, rank }, &seen->planes, entry);
+    return add_below(r, level, &(ebpo_place){ number, { at[0], at[1], at[2] }, type, rank, false }, &seen->planes, entry);
 }
 
 static ebpo_status add_level(reading *r, int number, const ebpo_level *level, uint64_t first_group)
@@ -130,7 +151,12 @@ ebpo_status ebpo_top_read(ebpo_top **out, ebpo_file *file, int cut_level, unsign
         status = ebpo_file_read_level(file, number, &level, threads, error);
         if (status != EBPO_OK)
             break;
-        status = add_level(&r, number, &level, r.group - (number ? level.group_count : 0));
+        if (r.info->level[number].pruned_count && number + 1 < r.info->level_count)
+            status = ebpo_reader_make(file, EBPO_A_TYPES, number + 1, threads, sizeof *r.next_types, &r.next_types, error);
+        if (status == EBPO_OK)
+            status = add_level(&r, number, &level, r.group - (number ? level.group_count : 0));
+        free(r.next_types);
+        r.next_types = NULL;
         ebpo_level_free(&level);
     }
     free(r.at);

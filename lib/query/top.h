@@ -12,7 +12,7 @@ typedef struct ebpo_top_planes {
 
 typedef struct ebpo_top {
     int cut_level;
-    ebpo_nodes nodes;        /* entries SETTLED, GRAY (levels above the cut), BELOW (gray nodes of the cut level, and leaves down to it) */
+    ebpo_nodes nodes;        /* entries SETTLED, GRAY (levels above the cut), BELOW (gray nodes of the cut level, leaves down to it, pruned nodes) */
     uint32_t *planes;        /* codes */
     ebpo_top_planes *gray;   /* which of them are the gray node's whose children are group g */
 

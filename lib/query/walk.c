@@ -5,6 +5,7 @@
 #include <math.h>
 
 #include "geom/plane_code.h"
+#include "query/pruned.h"
 
 ebpo_spot ebpo_spot_root(const ebpo_model *model)
 {
@@ -14,6 +15,8 @@ ebpo_spot ebpo_spot_root(const ebpo_model *model)
 
 bool ebpo_spot_is_gray(const ebpo_model *model, const ebpo_spot *spot)
 {
+    if (ebpo_spot_is_below(spot) && spot->subtree)
+        return true;
     if (ebpo_spot_is_below(spot))
         return model->top->below[ebpo_entry_value(spot->entry)].type == EBPO_GRAY;
     return ebpo_entry_kind_of(spot->entry) == EBPO_ENTRY_GRAY;
@@ -22,11 +25,15 @@ bool ebpo_spot_is_gray(const ebpo_model *model, const ebpo_spot *spot)
 ebpo_status ebpo_spot_enter(ebpo_context *context, ebpo_spot *spot, ebpo_error *error)
 {
     ebpo_subtree *subtree;
+    if (ebpo_spot_is_pruned(context->model, spot))
+        return ebpo_fail_pruned(context->model, spot->level, spot->at, error);
     ebpo_status status = ebpo_context_subtree(context, ebpo_entry_value(spot->entry), &subtree, error);
     if (status != EBPO_OK)
         return status;
     spot->subtree = subtree;
     spot->entry = subtree->nodes.root;
+    if (ebpo_spot_is_below(spot)) /* a file whose counts do not tell of it */
+        return ebpo_fail_pruned(context->model, spot->level, spot->at, error);
     return EBPO_OK;
 }
 
@@ -43,12 +50,12 @@ const uint32_t *ebpo_spot_planes(const ebpo_model *model, const ebpo_spot *spot,
 {
     uint32_t value = ebpo_entry_value(spot->entry);
     *count = 0;
-    if (ebpo_spot_is_below(spot) || (!spot->subtree && ebpo_entry_kind_of(spot->entry) == EBPO_ENTRY_GRAY)) {
+    if ((ebpo_spot_is_below(spot) && !spot->subtree) || (!spot->subtree && ebpo_entry_kind_of(spot->entry) == EBPO_ENTRY_GRAY)) {
         ebpo_top_planes planes = ebpo_spot_is_below(spot) ? model->top->below_planes[value] : model->top->gray[value];
         *count = planes.count;
         return model->top->planes + planes.first;
     }
-    if (ebpo_entry_kind_of(spot->entry) != EBPO_ENTRY_GRAY || !spot->subtree->gray_first)
+    if (!(ebpo_entry_kind_of(spot->entry) & EBPO_ENTRY_GRAY) || !spot->subtree->gray_first) /* GRAY and BELOW */
         return NULL;
     *count = spot->subtree->gray_first[value + 1] - spot->subtree->gray_first[value];
     return spot->subtree->gray_planes + spot->subtree->gray_first[value];

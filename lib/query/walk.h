@@ -17,9 +17,15 @@ ebpo_spot ebpo_spot_root(const ebpo_model *model);
 /* True for gray nodes, also those whose subtree is not in memory. */
 bool ebpo_spot_is_gray(const ebpo_model *model, const ebpo_spot *spot);
 static inline bool ebpo_spot_is_settled(const ebpo_spot *spot) { return ebpo_entry_kind_of(spot->entry) == EBPO_ENTRY_SETTLED; }
+/* Also true for pruned nodes, wherever they are: those cannot be entered. */
 static inline bool ebpo_spot_is_below(const ebpo_spot *spot) { return ebpo_entry_kind_of(spot->entry) == EBPO_ENTRY_BELOW; }
 
-/* For a spot BELOW: the same node as the root of its subtree, loaded if need be; it stays until the context enters another one. */
+static inline bool ebpo_spot_is_pruned(const ebpo_model *model, const ebpo_spot *spot)
+{
+    return ebpo_spot_is_below(spot) && (spot->subtree || model->top->below[ebpo_entry_value(spot->entry)].pruned);
+}
+
+/* EBPO_E_ABSENT for a pruned node. For a spot BELOW: the same node as the root of its subtree, loaded if need be; it stays until the context enters another one. */
 EBPO_MUST_USE ebpo_status ebpo_spot_enter(ebpo_context *context, ebpo_spot *spot, ebpo_error *error);
 
 /* Child of a gray node that is not BELOW. */

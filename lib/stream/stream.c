@@ -157,7 +157,7 @@ static void find_starts(job *j)
 {
     ebpo_walk walk;
     ebpo_walk_node node;
-    ebpo_walk_begin(&walk, j->stream->kept, j->target);
+    ebpo_walk_begin(&walk, j->stream->kept, j->target, j->stream->info->pruned);
     uint64_t seen = 0;
     do {
         if (seen % PIECE == 0)
@@ -210,7 +210,7 @@ ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool 
         return status;
     drop_faces(level);
     volumes v = stated_volumes(s, next);
-    uint64_t nodes = next ? 8 * parents : 1;
+    uint64_t nodes = next ? 8 * (parents - s->info->level[next - 1].pruned_count) : 1; /* the head has been checked: at most all parents */
     status = check_level(level, next, parents, error);
     if (status == EBPO_OK && s->options.polygons) {
         v = (volumes){ 0, 0 };
@@ -226,7 +226,7 @@ ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool 
     s->level = next;
     s->settled += v.settled;
     s->bytes += s->info->level[next].stored_bytes + (next == s->info->index_level ? s->info->chunk_index_bytes : 0);
-    ebpo_walk_begin(&s->walk, s->kept, next);
+    ebpo_walk_begin(&s->walk, s->kept, next, s->info->pruned);
     *out = (ebpo_stream_level){ next, nodes, s->bytes, v.gray + s->settled };
     *more = true;
     return EBPO_OK;

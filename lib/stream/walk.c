@@ -4,11 +4,12 @@
 
 #include "planes/planes.h"
 
-void ebpo_walk_begin(ebpo_walk *walk, const ebpo_level *level, int target)
+void ebpo_walk_begin(ebpo_walk *walk, const ebpo_level *level, int target, bool pruned)
 {
     memset(walk, 0, sizeof *walk);
     walk->level = level;
     walk->target = target;
+    walk->pruned = pruned;
 }
 
 /* The next node of the level at `depth`, of which there is one. */
@@ -44,6 +45,11 @@ bool ebpo_walk_next(ebpo_walk *w, ebpo_walk_node *out)
             w->at[depth].group++;
             w->at[depth].octant = 0;
             w->depth--;
+            continue;
+        }
+        if (w->pruned && depth && w->level[depth].types[w->at[depth].group] == 0) {
+            w->at[depth].rank[EBPO_WHITE] += 8;
+            w->at[depth].octant = 8;
             continue;
         }
         const ebpo_walk_node *node = pass(w, depth);

@@ -19,6 +19,7 @@ typedef struct ebpo_walk_node {
 typedef struct ebpo_walk {
     const ebpo_level *level; /* [target + 1] lent; of those above the target only types, plane counts and planes are used */
     int target, depth;
+    bool pruned; /* the file is a subset: empty groups hold no nodes */
     struct {
         uint64_t group, rank[4], plane, leaf_plane; /* so many were passed in this level */
         unsigned octant;                            /* next one of the group */
@@ -26,7 +27,7 @@ typedef struct ebpo_walk {
     } at[EBPO_LEVELS_MAX];
 } ebpo_walk;
 
-void ebpo_walk_begin(ebpo_walk *walk, const ebpo_level *level, int target);
+void ebpo_walk_begin(ebpo_walk *walk, const ebpo_level *level, int target, bool pruned);
 /* The next node of the target level; false after the last. */
 bool ebpo_walk_next(ebpo_walk *walk, ebpo_walk_node *out);
 

@@ -127,7 +127,7 @@ static bundle walk_gray(walk *w, int depth, uint32_t begin)
 
 static bundle walk_node(walk *w, int depth, ebpo_node_type type, uint32_t begin)
 {
-    if (type == EBPO_GRAY)
+    if (type == EBPO_GRAY && depth + 1 < w->slice->level_count) /* pruned otherwise */
         return walk_gray(w, depth, begin);
     if (type == EBPO_LEAF)
         return split_range(w, begin, begin + w->slice->level[depth].leaf_new[w->leaf[depth]++]);

@@ -54,6 +54,7 @@ static ebpo_status copy_planes(ebpo_subtree *s, const ebpo_slice *slice, ebpo_er
             memcpy(s->gray_planes + first, level->planes, level->plane_count * sizeof *s->gray_planes);
     }
     s->gray_first[gray] = (uint32_t)at;
+    s->gray_count = gray;
     return EBPO_OK;
 }
 
@@ -64,7 +65,7 @@ static uint64_t count_bytes(const ebpo_subtree *s)
     return sizeof *s + s->nodes.group_count * sizeof *s->nodes.group + cells * 5 + s->leaf_count * sizeof *s->leaf + s->list_count * sizeof *s->list +
            s->plane_groups * sizeof *s->planes + (uint64_t)s->block_count * (EBPO_BLOCK_NUMBERS * (s->wide ? 8 : 4) + EBPO_BLOCK * 4) +
            s->bound_count * sizeof *s->bound + s->outer_count * 4 + (s->face_source ? faces * 4 : 0) +
-           (s->gray_first ? (uint64_t)s->nodes.group_count * 4 + s->gray_first[s->nodes.group_count] * 4 : 0);
+           (s->gray_first ? (s->gray_count + s->gray_first[s->gray_count]) * 4 : 0);
 }
 
 static ebpo_status make(ebpo_subtree *s, ebpo_slice *slice, bool with_planes, unsigned threads, ebpo_error *error)

@@ -37,7 +37,8 @@ static void put_list(walk *w, ebpo_subtree_leaf *leaf, uint64_t count)
 {
     ebpo_subtree *s = w->s;
     uint64_t kept = 0;
-    qsort(w->scratch, count, sizeof *w->scratch, compare_numbers);
+    if (count)
+        qsort(w->scratch, count, sizeof *w->scratch, compare_numbers);
     for (uint64_t i = 0; i < count; i++)
         if (kept && same_block(w->scratch[kept - 1], w->scratch[i]))
             w->scratch[kept - 1] |= w->scratch[i];
@@ -109,6 +110,13 @@ static uint32_t walk_node(walk *w, int depth, ebpo_node_type type, const uint32_
         return ebpo_entry(EBPO_ENTRY_LEAF, number);
     }
     uint64_t group = w->group_begin[depth + 1] + rank;
+    if (w->slice->pruned && (depth + 1 == w->slice->level_count || w->slice->level[depth + 1].types[rank] == 0)) {
+        if (depth + 1 < w->slice->level_count) {
+            w->rank[depth + 1][EBPO_WHITE] += 8; /* the places of its children */
+            memset(w->s->nodes.group[group], 0xff, sizeof w->s->nodes.group[group]);
+        }
+        return ebpo_entry(EBPO_ENTRY_BELOW, (uint32_t)group);
+    }
     uint16_t types = w->slice->level[depth + 1].types[rank];
     for (unsigned octant = 0; octant < 8; octant++) {
         uint32_t below[3] = { at[0] * 2 + (octant & 1), at[1] * 2 + (octant >> 1 & 1), at[2] * 2 + (octant >> 2) };
@@ -129,6 +137,8 @@ static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **slot
         groups += depth ? slice->level[depth].group_count : 0;
         leaves += slice->level[depth].leaf_count;
     }
+    if (slice->level_count < EBPO_LEVELS_MAX)
+        w->group_begin[slice->level_count] = groups; /* gray nodes are numbered on where they have no groups */
     if (groups >= EBPO_ENTRY_ZERO || leaves >= EBPO_ENTRY_ZERO)
         return ebpo_fail(w->error, EBPO_E_LIMIT, "the tree has too many nodes to be held at once; give a memory budget");
     s->nodes.group = ebpo_alloc(groups, sizeof *s->nodes.group);

@@ -15,7 +15,7 @@ typedef enum ebpo_entry_kind {
     EBPO_ENTRY_SETTLED = 0, /* white or black; value: winding number + EBPO_ENTRY_ZERO */
     EBPO_ENTRY_LEAF = 1,    /* value: number of the leaf */
     EBPO_ENTRY_GRAY = 2,    /* value: number of the group of its eight children */
-    EBPO_ENTRY_BELOW = 3    /* tables of the top of a tree only: value: number of a subtree that is loaded on demand */
+    EBPO_ENTRY_BELOW = 3    /* in the top of a tree: value: number of a subtree that is loaded on demand; in a subtree: a pruned node, of which value is the number among gray nodes */
 } ebpo_entry_kind;
 enum { EBPO_ENTRY_ZERO = 1 << 29 };
 
@@ -120,6 +120,7 @@ typedef struct ebpo_subtree {
     uint32_t *face_source; /* [local] or NULL */
     uint32_t *gray_planes; /* codes of gray nodes' planes, group numbers' order; only for subtrees loaded on demand */
     uint32_t *gray_first;  /* [group_count + 1]: planes of the gray node whose children are group g */
+    uint64_t gray_count;
     uint64_t kinds[5], one_wall;
     uint64_t bytes;        /* of memory, all in all */
 } ebpo_subtree;

@@ -126,6 +126,35 @@ static ebpo_status compare_as_sets(ebpo_tally *tally, const ebpo_mesh *a, const 
     return EBPO_OK;
 }
 
+/* A subset's mesh: each of its faces and vertices at its number in the source. */
+static ebpo_status compare_some(ebpo_tally *tally, ebpo_file *file, const ebpo_mesh *whole, unsigned threads, ebpo_error *error)
+{
+    ebpo_mesh part = {0};
+    uint32_t *vertex_source = NULL, *face_source = NULL;
+    ebpo_status status = ebpo_file_read_mesh(file, &part, threads, error);
+    if (status == EBPO_OK)
+        status = ebpo_file_read_maps(file, &vertex_source, &face_source, threads, error);
+    if (status == EBPO_OK && CHECK(!whole->xyz32 == !part.xyz32, "the source and the file hold different kinds of coordinates")) {
+        tally->checks[EBPO_VERIFY_SOURCE] += part.vertex_count + part.face_count;
+        for (uint64_t i = 0; i < part.vertex_count; i++)
+            if (vertex_source[i] >= whole->vertex_count || memcmp(vertex_bytes(whole, vertex_source[i]), vertex_bytes(&part, i), vertex_size(&part)) != 0)
+                ebpo_tally_violation(tally, EBPO_VERIFY_SOURCE, &(ebpo_verify_place){0, EBPO_NO_FACE, EBPO_NO_PLANE},
+                                     "vertex %" PRIu32 " of the source has another position in the file", vertex_source[i]);
+        for (uint64_t i = 0; i < part.face_count; i++) {
+            bool equal = face_source[i] < whole->face_count;
+            for (uint64_t c = 0; c < 3 && equal; c++)
+                equal = whole->faces[3 * (uint64_t)face_source[i] + c] == vertex_source[part.faces[3 * i + c]];
+            if (!equal)
+                ebpo_tally_violation(tally, EBPO_VERIFY_SOURCE, &(ebpo_verify_place){0, face_source[i], EBPO_NO_PLANE},
+                                     "the face (by its source number) has other corners in the file");
+        }
+    }
+    free(vertex_source);
+    free(face_source);
+    ebpo_mesh_free(&part);
+    return status;
+}
+
 static void check_digest(ebpo_tally *tally, const ebpo_info *info, const ebpo_mesh *source)
 {
     static const uint8_t none[32];
@@ -135,9 +164,27 @@ static void check_digest(ebpo_tally *tally, const ebpo_info *info, const ebpo_me
           "the source file's digest or size is not the recorded one");
 }
 
-ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_info *info, const ebpo_mesh *stored, bool ordered,
-                              const ebpo_mesh *source, ebpo_error *error)
+static ebpo_status compare(ebpo_tally *tally, const ebpo_mesh *mended, const ebpo_mesh *stored, bool ordered, ebpo_error *error)
 {
+    ebpo_status status = EBPO_OK;
+    bool comparable =
+        CHECK(!mended->xyz32 == !stored->xyz32, "the source and the file hold different kinds of coordinates") &&
+        CHECK(mended->vertex_count == stored->vertex_count && mended->face_count == stored->face_count,
+              "the mended source has %" PRIu64 " vertices and %" PRIu64 " faces, the file %" PRIu64 " and %" PRIu64,
+              mended->vertex_count, mended->face_count, stored->vertex_count, stored->face_count);
+    if (comparable && ordered)
+        compare_in_order(tally, mended, stored);
+    if (comparable && !ordered)
+        status = compare_as_sets(tally, mended, stored, false, error);
+    if (comparable && !ordered && status == EBPO_OK)
+        status = compare_as_sets(tally, mended, stored, true, error);
+    return status;
+}
+
+ebpo_status ebpo_check_source(ebpo_tally *tally, ebpo_file *file, const ebpo_mesh *stored, bool ordered, const ebpo_mesh *source, unsigned threads,
+                              ebpo_error *error)
+{
+    const ebpo_info *info = ebpo_file_info(file);
     check_digest(tally, info, source);
     CHECK(info->source_vertex_count == source->vertex_count && info->source_face_count == source->face_count,
           "the source has %" PRIu64 " vertices and %" PRIu64 " faces, recorded are %" PRIu64 " and %" PRIu64, source->vertex_count,
@@ -150,17 +197,10 @@ ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_info *info, const eb
     status = mend_again(&mended, &info->mend, &did, error);
     if (status == EBPO_OK)
         check_record(tally, &info->mend, &did);
-    bool comparable = status == EBPO_OK &&
-        CHECK(!mended.xyz32 == !stored->xyz32, "the source and the file hold different kinds of coordinates") &&
-        CHECK(mended.vertex_count == stored->vertex_count && mended.face_count == stored->face_count,
-              "the mended source has %" PRIu64 " vertices and %" PRIu64 " faces, the file %" PRIu64 " and %" PRIu64,
-              mended.vertex_count, mended.face_count, stored->vertex_count, stored->face_count);
-    if (comparable && ordered)
-        compare_in_order(tally, &mended, stored);
-    if (comparable && !ordered)
-        status = compare_as_sets(tally, &mended, stored, false, error);
-    if (comparable && !ordered && status == EBPO_OK)
-        status = compare_as_sets(tally, &mended, stored, true, error);
+    if (status == EBPO_OK && stored)
+        status = compare(tally, &mended, stored, ordered, error);
+    else if (status == EBPO_OK && info->parts & EBPO_PART_MAPS) /* without maps, nothing says which faces these are */
+        status = compare_some(tally, file, &mended, threads, error);
     ebpo_mesh_free(&mended);
     return status;
 }

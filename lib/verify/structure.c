@@ -38,7 +38,7 @@ static bool types_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
     return CHECK(count[EBPO_GRAY] == level->gray_count && count[EBPO_LEAF] == level->leaf_count &&
                  count[EBPO_WHITE] == level->white_count && count[EBPO_BLACK] == level->black_count,
                  "level %d: the types do not add up to its counts of nodes", l) &&
-           CHECK(l + 1 < tree->info.level_count || level->gray_count == 0, "level %d, the last one, has gray nodes", l);
+           CHECK(l + 1 < tree->info.level_count || level->gray_count == 0 || tree->info.pruned, "level %d, the last one, has gray nodes", l);
 }
 
 /* Per-node counts and the array they share out. */

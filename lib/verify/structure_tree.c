@@ -40,6 +40,7 @@ typedef struct descent {
     ebpo_tally *tally;
     const ebpo_view *view;
     uint64_t next_face; /* first face that no leaf before has listed */
+    uint64_t pruned[EBPO_LEVELS_MAX];
 } descent;
 
 static void node_check(descent *d, const ebpo_view_node *node, bool holds, const char *text)
@@ -78,6 +79,10 @@ static void check_node(descent *d, const ebpo_view_node *node)
 
 static void check_gray(descent *d, const ebpo_view_node *node)
 {
+    if (ebpo_view_is_pruned(d->view, node)) { /* may have been a leaf */
+        d->pruned[node->cell.level]++;
+        return;
+    }
     node_check(d, node, node->cell.level < d->view->tree->info.max_level, "a node at the maximum level is gray");
     bool touched = false;
     for (unsigned octant = 0; octant < 8; octant++) {
@@ -129,13 +134,16 @@ void ebpo_check_structure(ebpo_tally *tally, const ebpo_view *view)
     const ebpo_tree *tree = view->tree;
     for (int l = 0; l < tree->info.level_count; l++)
         check_summary(tally, tree, l);
-    descent d = {tally, view, 0};
+    descent d = {tally, view, 0, {0}};
     ebpo_view_node root = ebpo_view_root(view);
     check_node(&d, &root);
+    for (int l = 0; l < tree->info.level_count; l++)
+        CHECK(d.pruned[l] == tree->info.level[l].pruned_count, "level %d: %" PRIu64 " nodes are pruned, the head says %" PRIu64, l, d.pruned[l],
+              tree->info.level[l].pruned_count);
     if (!view->has_mesh)
         return;
     CHECK(d.next_face == tree->mesh.face_count, "leaves list %" PRIu64 " of %" PRIu64 " faces", d.next_face, tree->mesh.face_count);
     check_vertices(tally, view);
-    if (tree->info.solid)
+    if (tree->info.solid && !tree->info.pruned) /* a part of a mesh need not balance */
         CHECK(edges_balance(&tree->mesh), "the file says solid, but the directions of the mesh's edges do not cancel");
 }

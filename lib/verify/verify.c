@@ -60,6 +60,8 @@ static ebpo_status check_source(ebpo_file *file, const ebpo_verify_options *opti
     ebpo_error own = EBPO_ERROR_INIT;
     ebpo_mesh stored;
     bool ordered = false;
+    if (ebpo_file_info(file)->pruned)
+        return ebpo_check_source(tally, file, NULL, false, options->source, options->threads, error);
     ebpo_status status = ebpo_file_read_source_mesh(file, &stored, &ordered, options->threads, &own);
     if (is_finding(status)) {
         ebpo_tally_check(tally, EBPO_VERIFY_SOURCE, false, "%s", own.message);
@@ -67,7 +69,7 @@ static ebpo_status check_source(ebpo_file *file, const ebpo_verify_options *opti
     }
     if (status != EBPO_OK)
         return ebpo_fail(error, status, "%s", own.message);
-    status = ebpo_check_source(tally, ebpo_file_info(file), &stored, ordered, options->source, error);
+    status = ebpo_check_source(tally, file, &stored, ordered, options->source, options->threads, error);
     ebpo_mesh_free(&stored);
     return status;
 }

@@ -74,6 +74,14 @@ ebpo_view_node ebpo_view_root(const ebpo_view *view)
     return place(view, 1, (ebpo_cell){0, {0, 0, 0}}, 0, 0);
 }
 
+bool ebpo_view_is_pruned(const ebpo_view *view, const ebpo_view_node *node)
+{
+    const ebpo_tree *tree = view->tree;
+    if (!tree->info.pruned || node->type != EBPO_GRAY)
+        return false;
+    return node->cell.level + 1 >= tree->info.level_count || tree->level[node->cell.level + 1].types[node->rank] == 0;
+}
+
 ebpo_view_node ebpo_view_child(const ebpo_view *view, const ebpo_view_node *node, unsigned octant)
 {
     ebpo_cell cell = {node->cell.level + 1, {0}};

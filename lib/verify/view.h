@@ -40,7 +40,9 @@ static inline ebpo_node_type ebpo_view_type(const ebpo_level *level, uint64_t gr
 }
 
 ebpo_view_node ebpo_view_root(const ebpo_view *view);
-/* Child of a gray node. */
+/* True for a gray node whose children are not in the file: subsets only. */
+bool ebpo_view_is_pruned(const ebpo_view *view, const ebpo_view_node *node);
+/* Child of a gray node that is not pruned. */
 ebpo_view_node ebpo_view_child(const ebpo_view *view, const ebpo_view_node *node, unsigned octant);
 /* The node at a place of a level; climbs to the root to find its cell. */
 ebpo_view_node ebpo_view_at(const ebpo_view *view, int level, uint64_t group, unsigned octant);

@@ -117,7 +117,7 @@ static void visit_faces(const walk *w, worker *self, const ebpo_view_node *node,
 static void check_worth(const walk *w, ebpo_tally *tally, const ebpo_view_node *node, uint64_t touching)
 {
     uint64_t limit = w->view->tree->info.leaf_faces;
-    if (limit == 0 || !w->view->has_mesh)
+    if (limit == 0 || !w->view->has_mesh || w->view->tree->info.pruned) /* of a subset not all leaves are there */
         return;
     tally->checks[EBPO_VERIFY_STRUCTURE]++;
     if (touching <= limit && !ebpo_lists_more_faces(w->view, node, limit))
@@ -144,7 +144,7 @@ static void walk_terminal(const walk *w, worker *self, const ebpo_view_node *nod
 {
     const ebpo_view *view = w->view;
     ebpo_frame frame = ebpo_frame_make(&view->box, node->cell);
-    if (view->has_mesh)
+    if (view->has_mesh && node->type != EBPO_GRAY) /* pruned */
         ebpo_check_terminal_lists(&self->tally, view, node, faces, count);
     ebpo_half_spaces_of(&self->planes, view, node);
     for (uint64_t i = 0; i < count && self->planes.count; i++) {
@@ -152,7 +152,8 @@ static void walk_terminal(const walk *w, worker *self, const ebpo_view_node *nod
         ebpo_face_corners(&view->tree->mesh, faces[i], &face);
         ebpo_check_face_contained(&self->tally, &self->planes, node, &frame, &face, faces[i]);
     }
-    if (!view->tree->info.solid)
+    *corners = (ebpo_corner_windings){{0}, 0};
+    if (!view->tree->info.solid || node->type == EBPO_GRAY)
         return;
     ebpo_check_terminal_label(&self->tally, view, node, &frame, &w->plan, w->rays ? &w->columns : NULL);
     ebpo_terminal_windings(corners, view, node, &frame, faces, count);
@@ -181,7 +182,7 @@ static ebpo_status walk_down(const walk *w, worker *self, const ebpo_view_node *
                              ebpo_corner_windings *corners, ebpo_error *error)
 {
     face_stack *s = &self->stack;
-    if (node->type != EBPO_GRAY) {
+    if (node->type != EBPO_GRAY || ebpo_view_is_pruned(w->view, node)) {
         walk_terminal(w, self, node, s->faces + first, count, corners);
         return EBPO_OK;
     }
@@ -281,7 +282,7 @@ static ebpo_status walk_upper(walk *w, ebpo_error *error)
 {
     ebpo_status status = add_root(w, error);
     for (uint64_t at = 0; at < w->upper_count && status == EBPO_OK; at++)
-        if (w->upper[at].node.type == EBPO_GRAY && w->upper[at].face_count > w->subtree_limit)
+        if (w->upper[at].node.type == EBPO_GRAY && !ebpo_view_is_pruned(w->view, &w->upper[at].node) && w->upper[at].face_count > w->subtree_limit)
             status = open_node(w, at, error);
     if (status != EBPO_OK)
         return status;
@@ -336,7 +337,7 @@ static ebpo_status prepare(walk *w, ebpo_error *error)
         return ebpo_fail_memory(error, w->threads * sizeof *w->workers);
     uint64_t faces = w->view->has_mesh ? w->view->tree->mesh.face_count : 0;
     w->subtree_limit = faces / SUBTREES_WANTED > SUBTREE_FACES ? faces / SUBTREES_WANTED : SUBTREE_FACES;
-    w->rays = faces > 0 && w->view->tree->info.solid;
+    w->rays = faces > 0 && w->view->tree->info.solid && !w->view->tree->info.pruned; /* rays need all faces */
     if (!w->rays)
         return EBPO_OK;
     ebpo_status status = ebpo_columns_make(&w->columns, &w->view->tree->mesh, &w->view->box, error);

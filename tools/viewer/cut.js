@@ -173,7 +173,7 @@ export class Cut {
     while (heap.items.length) {
       const { node, px } = heap.pop();
       const full = estimate + 24 * heap.items.length > want.triangles;
-      if (node.type !== GRAY || node.level >= want.level || px <= want.pixels || full) {
+      if (node.type !== GRAY || node.level >= want.level || px <= want.pixels || full || this.tree.isPruned(node)) {
         add(node, px);
         continue;
       }

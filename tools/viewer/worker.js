@@ -140,13 +140,25 @@ class OpenFile {
     let where;
     if (solid) {
       let found = inside(tree, point);
-      while (found.where === 'maybe' && tree.children(found.node) === undefined && tree.depth + 1 < tree.info.level_count) {
+      while (found.where === 'maybe' && tree.children(found.node) === undefined && !tree.isPruned(found.node) && tree.depth + 1 < tree.info.level_count) {
         await deeper();
         found = inside(tree, point);
       }
+      if (found.where === 'maybe' && tree.isPruned(found.node)) { // a subset: no more is known here
+        answer({ ...coarse, exact: false, done: true });
+        return;
+      }
       where = found.where === 'maybe' ? insideLeaf(tree, found.node, point, (await file.leafFaces([found.node]))[0]).where : found.where;
     }
-    const near = await nearestFace(tree, point, (leaves) => file.leafFaces(leaves), deeper);
+    let near;
+    try {
+      near = await nearestFace(tree, point, (leaves) => file.leafFaces(leaves), deeper);
+    } catch (error) {
+      if (error.code !== 'ABSENT')
+        throw error;
+      answer({ ...coarse, where: where ?? coarse.where, exact: false, done: true });
+      return;
+    }
     answer({ ...coarse, where, distance: near.distance, nearest: near.point, exact: true, done: true });
   }
 }

@@ -10,6 +10,7 @@
 #include <ebpo/lod.h>
 #include <ebpo/query.h>
 #include <ebpo/stream.h>
+#include <ebpo/subset.h>
 #include <ebpo/verify.h>
 
 #endif

@@ -17,7 +17,7 @@ typedef enum ebpo_node_type {
     EBPO_WHITE = 0, /* no face touches the closed cell, which lies outside (in a surface model: no face touches it) */
     EBPO_BLACK = 1, /* no face touches the closed cell, which lies inside */
     EBPO_LEAF = 2,  /* lists its faces, has no children */
-    EBPO_GRAY = 3   /* has eight children */
+    EBPO_GRAY = 3   /* has eight children, or is pruned: has had them, but they are not in this file */
 } ebpo_node_type;
 
 /* Which points a solid is made of, by their winding number w. */
@@ -64,6 +64,8 @@ typedef struct ebpo_level {
     uint64_t leaf_plane_count;
     double gray_volume;       /* volume of the envelopes of this level's gray nodes, in the model's unit cubed */
     double leaf_volume;       /* the same for its leaves (derived envelopes) */
+    uint64_t pruned_count;    /* of the gray nodes: those whose children are not in the file. Their groups in the next level are 0 (and count as eight white nodes); on
+                               * the last level all gray nodes are pruned, and have no groups */
 } ebpo_level;
 
 EBPO_API void ebpo_level_free(ebpo_level *level);
@@ -80,6 +82,7 @@ typedef struct ebpo_level_summary {
     uint64_t new_count, ref_count; /* faces first seen, faces referenced again */
     double gray_volume, leaf_volume;
     uint64_t stored_bytes;         /* in the file, compressed; set when reading */
+    uint64_t pruned_count;         /* gray nodes without children; white_count of the next level counts eight for each */
 } ebpo_level_summary;
 
 /* Everything about a file but its arrays. */
@@ -108,6 +111,11 @@ typedef struct ebpo_info {
     uint8_t content_sha256[32];
     uint64_t chunk_index_offset, chunk_index_bytes; /* where the places of the chunks of large arrays stand, behind the first levels: for fetching ahead, not
                                                      * relied on; 0: there are none, or the file does not say */
+    bool pruned;                       /* a subset: some gray nodes' children were left out (ebpo_subset). The three below say what was asked for then */
+    int cut_levels;                    /* levels 0 .. cut_levels - 1 were kept; 0: all */
+    bool boxed;                        /* what does not meet this box was left out: */
+    double kept_box[6];                /* min, max */
+    uint8_t subset_of[32];             /* content_sha256 of the file that it was taken from; the first one's, when it was a subset itself */
     ebpo_level_summary level[EBPO_LEVELS_MAX];
     uint64_t file_bytes, head_bytes, mesh_vertex_bytes, mesh_face_bytes, map_bytes; /* set when reading; head: up to the first level */
     int index_level;                   /* set when reading: levels from this one on need the index of chunks as well; level_count: none does */

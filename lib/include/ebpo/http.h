@@ -48,6 +48,7 @@ typedef struct ebpo_http_stats {
     uint64_t connections; /* made */
     uint64_t bytes;       /* received in bodies */
     uint64_t cache_hits, cache_bytes; /* requests that the folder answered, bytes taken from it */
+    uint64_t cache_held, cache_others; /* bytes that the folder held at opening: of this version of the file, and of other files and versions */
     double wait_seconds;  /* that readers waited, summed over threads */
 } ebpo_http_stats;
 

@@ -20,6 +20,8 @@ function checkTypes(info, level) {
       counts[types >> 2 * o & 3]++;
   if (counts[WHITE] !== s.white || counts[BLACK] !== s.black || counts[LEAF] !== s.leaf || counts[GRAY] !== s.gray)
     throw formatError(levelPath(level.level, 'types'), 'the types do not add up to the counts in the head');
+  if (info.parts.has('pruned') && level.level && level.types.reduce((sum, t) => sum + (t === 0), 0) !== info.levels[level.level - 1].pruned)
+    throw formatError(levelPath(level.level, 'types'), 'there is not one empty group for each pruned node of the level above');
 }
 
 function checkPlanes(level, countsName, counts, planesName, planes, total) {
@@ -133,7 +135,7 @@ export function checkOrder(info, levels) {
     const level = levels[l], types = level.types[group[l]++];
     for (let o = 0; o < (l ? 8 : 1); o++) {
       const type = types >> 2 * o & 3;
-      if (type === GRAY) {
+      if (type === GRAY && l + 1 < levels.length) {
         walk(l + 1);
       } else if (type === LEAF) {
         const i = leaf[l]++;

@@ -4,7 +4,7 @@ import { text } from './hdf5.js';
 
 export const LEVELS_MAX = 21, INDEX_ROWS = 4096;
 const MESH_MAX = 2 ** 32 - 2, NODES_MAX = 2 ** 40;
-const KNOWN_PARTS = ['levels', 'mesh', 'planes', 'maps', 'leaf-planes'];
+const KNOWN_PARTS = ['levels', 'mesh', 'planes', 'maps', 'leaf-planes', 'pruned'];
 
 const WORDS = { kind: ['surface', 'solid'], winding_rule: ['nonzero', 'evenodd', 'positive'], coordinate_type: ['float32', 'float64'] };
 const TEXTS = ['source_name', 'source_format', 'unit', 'crs', 'date'];
@@ -144,6 +144,15 @@ export function readFacts(attributes) {
   if (out.level_count < 1 || out.level_count > LEVELS_MAX)
     throw formatError('/', `level_count is not 1 to ${LEVELS_MAX}`);
   out.solid = out.kind === 'solid';
+  if (out.parts.has('pruned')) {
+    out.subset_of = facts.text('subset_of');
+    if (!/^[0-9a-f]{64}$/.test(out.subset_of))
+      throw facts.fail('subset_of', 'it has a value that the format does not allow');
+    out.subset_levels = facts.has('subset_levels') ? facts.int('subset_levels', 1, LEVELS_MAX) : undefined;
+    out.subset_box = facts.has('subset_box') ? facts.reals('subset_box', 6) : undefined;
+    if (out.subset_box && ![0, 1, 2].every((k) => Number.isFinite(out.subset_box[k]) && Number.isFinite(out.subset_box[3 + k]) && out.subset_box[k] <= out.subset_box[3 + k]))
+      throw facts.fail('subset_box', 'it has a value that the format does not allow');
+  }
   return out;
 }
 
@@ -154,6 +163,7 @@ export function readLevelFacts(attributes, where) {
     out[name] = facts.count(name);
   out.gray_volume = facts.reals('gray_volume', 1)[0];
   out.leaf_volume = facts.reals('leaf_volume', 1)[0];
+  out.pruned = facts.has('pruned') ? facts.count('pruned') : 0;
   return out;
 }
 
@@ -191,8 +201,13 @@ function checkLevelCounts(info, level) {
     return 'a level has too many nodes';
   if (s.gray + s.leaf + s.white + s.black !== nodes)
     return 'a level does not have eight nodes for each gray one above';
-  if ((s.gray === 0) !== (level === info.level_count - 1))
+  const last = level === info.level_count - 1, subset = has('pruned');
+  if (last ? s.gray && !subset : s.gray === 0)
     return 'the gray nodes do not end at the deepest level';
+  if (subset ? s.pruned > s.gray || (last && s.pruned !== s.gray) : s.pruned !== 0)
+    return "a level's pruned nodes are not some of its gray ones, or not all of them at the deepest level";
+  if (!last && subset && (s.pruned === s.gray || info.levels[level + 1].white < 8 * s.pruned))
+    return "a level has nothing but the places of pruned nodes' children, or not all of these";
   if (s.planes > (has('planes') ? 255 * s.gray : 0) || s.leaf_planes > (has('leaf-planes') ? 255 * s.leaf : 0))
     return 'a level has more planes than its nodes can';
   if (!has('mesh') && (s.faces_new || s.faces_referenced))

@@ -2,6 +2,7 @@
 // exact predicates. Distances to faces are computed in doubles.
 import { BLACK, GRAY, LEAF, WHITE, isInside } from './decode.js';
 import { decodePlane } from './envelope.js';
+import { EbpoError } from './error.js';
 import { axisCrossing, onTriangle } from './predicates.js';
 
 const MORE = 1 + 1e-12, LESS = 1 - 1e-12; // for lengths: a few roundings are 1e-15
@@ -155,8 +156,11 @@ export async function nearestFace(tree, p, facesOf, deeper) {
       leaves.push(queue.pop()[1]);
     if (!leaves.length) {
       const [, node] = queue.pop();
-      while (!tree.children(node))
+      while (!tree.children(node)) {
+        if (tree.isPruned(node))
+          throw new EbpoError('ABSENT', 'the file is a subset: the nearest face may be among those that were left out; take a larger part of the original');
         await deeper();
+      }
       for (const child of tree.children(node))
         if (child.type === GRAY || child.type === LEAF)
           queue.push([cellNear(tree, child, p), child]);

@@ -47,10 +47,20 @@ export class Tree {
     return this.levels.length - 1;
   }
 
-  /** The eight children of a gray node; undefined while their level is not at hand. */
+  /** Whether a gray node has no children in the file, as in a subset; undefined while that is not known, the next level not being at hand. */
+  isPruned(node) {
+    if (node.type !== GRAY || !this.info.parts.has('pruned'))
+      return false;
+    if (node.level + 1 === this.info.level_count)
+      return true;
+    const level = this.levels[node.level + 1];
+    return level && level.types[node.rank] === 0;
+  }
+
+  /** The eight children of a gray node; undefined while their level is not at hand, and for a pruned node. */
   children(node) {
     const level = this.levels[node.level + 1];
-    if (!level || node.type !== GRAY)
+    if (!level || node.type !== GRAY || this.isPruned(node))
       return undefined;
     if (!node.children) {
       const rank = level.before.map((b) => b[node.rank]), types = level.types[node.rank];

@@ -21,7 +21,7 @@ async function load(path) {
 function countTriangles(tree, level) {
   const count = { all: 0, inner: 0 };
   const walk = (node) => {
-    if (node.type === GRAY && node.level < level)
+    if (node.type === GRAY && node.level < level && !tree.isPruned(node))
       tree.children(node).forEach(walk);
     else if (node.type === GRAY || node.type === LEAF || node.type === BLACK) {
       const { faces, first, wall } = tree.polytope(node);

@@ -1,0 +1,47 @@
+/* EBP-Octree in HDF5: a smaller file from a file. Levels, a box, parts.
+ *
+ *     ebpo_subset_options options = EBPO_SUBSET_OPTIONS_INIT;
+ *     options.last_level = 5;
+ *     options.parts = ebpo_profile_parts(EBPO_PROFILE_LOD);
+ *     ebpo_subset(file, "small.ebpo.h5", &options, &error);      `file` may have been opened by its URL: only what is kept is fetched
+ *
+ * What is left out of the tree is cut at gray nodes, which then are "pruned": they have their envelopes, and no children (format-spec, section 5). Questions never get a wrong
+ * answer of such a file: those to a level answer EBPO_MAYBE or a wider interval there, exact ones are answered where what was kept decides, and EBPO_E_ABSENT where not.
+ */
+#ifndef EBPO_SUBSET_H
+#define EBPO_SUBSET_H
+
+#include <ebpo/file.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Parts for a purpose. */
+typedef enum ebpo_profile {
+    EBPO_PROFILE_FULL = 0,     /* everything: for an archive */
+    EBPO_PROFILE_LOD = 1,      /* nodes, envelopes, stored leaf planes: what a viewer draws. No mesh, no maps */
+    EBPO_PROFILE_COLLISION = 2 /* nodes, envelopes, mesh: what exact questions need. No maps, no stored leaf planes, which only spare deriving them */
+} ebpo_profile;
+
+/* Bits of ebpo_part. */
+EBPO_API uint32_t ebpo_profile_parts(ebpo_profile profile);
+
+typedef struct ebpo_subset_options {
+    int last_level;  /* levels 0 .. last_level are kept; -1: all */
+    bool boxed;      /* what does not meet the closed box below is left out: */
+    double min[3], max[3]; /* finite, min <= max on each axis; in the model's unit */
+    uint32_t parts;  /* ebpo_part bits that are kept, of those the file has. Of the mesh, what the leaves that are kept list. No maps without mesh */
+    ebpo_write_options write; /* `parts` of it does not matter */
+} ebpo_subset_options;
+#define EBPO_SUBSET_OPTIONS_INIT { -1, false, { 0, 0, 0 }, { 0, 0, 0 }, ~0u, EBPO_WRITE_OPTIONS_INIT }
+
+/* Writes the subset: whole or not at all. The result does not depend on threads; with everything kept its content (content_sha256) is the source's. Reads what it needs and
+ * holds the result in memory, and of the source up to 64 MiB beside it.
+ * EBPO_E_ARGUMENT: no such level, a box without points, or one that does not meet the model's root cell (or the box that an earlier subset has kept). */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_subset(ebpo_file *file, const char *path, const ebpo_subset_options *options, ebpo_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
