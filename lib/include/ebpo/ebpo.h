@@ -11,5 +11,6 @@
 #include <ebpo/query.h>
 #include <ebpo/stream.h>
 #include <ebpo/verify.h>
+#include <ebpo/view.h>
 
 #endif
