@@ -143,7 +143,7 @@ static double now(void)
     return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
 }
 
-static void print_row(printer *p, const ebpo_view_stream *stream)
+static void print_row(printer *p, const ebpo_view_stream *stream, const char *key)
 {
     ebpo_view_stats s;
     ebpo_view_stream_get_stats(stream, &s);
@@ -153,7 +153,7 @@ static void print_row(printer *p, const ebpo_view_stream *stream)
                s.cut[EBPO_LEAF], s.cut[EBPO_WHITE], s.cut[EBPO_BLACK], s.waiting, s.pixels, ms);
         return;
     }
-    json_object(&p->j, NULL);
+    json_object(&p->j, key);
     json_uint(&p->j, "bytes_read", s.bytes_read);
     json_uint(&p->j, "nodes", s.nodes);
     json_uint(&p->j, "gray", s.cut[EBPO_GRAY]);
@@ -205,12 +205,12 @@ static ebpo_status tell_nodes(printer *p, ebpo_view_stream *stream, ebpo_view_en
         count++;
         if (p->v->nodes)
             print_node(p, &node);
-        if (p->v->json ? count % 4096 == 0 : node.complete && count >= next)
-            *arrived = command_flush("view");
-        if (!p->v->nodes && node.complete && count >= next) {
-            print_row(p, stream);
-            next = 2 * count;
-        }
+        if (!node.complete || count < next)
+            continue;
+        if (!p->v->nodes)
+            print_row(p, stream, NULL);
+        next = 2 * count;
+        *arrived = command_flush("view");
     }
     return *arrived ? status : EBPO_OK;
 }
@@ -233,20 +233,18 @@ static ebpo_status tell(printer *p, ebpo_file *file, const char *path, const ebp
         printf("%s: by %s\n%12s %10s %9s %9s %9s %9s %9s %10s %9s\n", remote_shown(path), order, "bytes", "nodes", "gray", "leaf", "white", "black", "waiting", "pixels", "ms");
     }
     status = tell_nodes(p, stream, &end, arrived, error);
-    if (p->v->json) {
+    if (p->v->json)
         json_end(&p->j);
-        json_array(&p->j, "last");
-    }
-    print_row(p, stream);
+    print_row(p, stream, "last");
     traffic t = traffic_of(file);
     if (p->v->json) {
-        json_end(&p->j);
         json_text(&p->j, "end", status == EBPO_OK ? end_names[end] : "failed");
         remote_json(&p->j, &t, &p->v->remote);
         json_finish(&p->j);
     } else {
         if (status == EBPO_OK && *arrived)
             printf("%s\n", end == EBPO_VIEW_DONE ? "all that was asked for is there" : end == EBPO_VIEW_BYTES ? "stopped by --bytes" : "stopped by --count");
+        (void)command_flush("view");
         remote_tell(&t, &p->v->remote, false);
     }
     if (status == EBPO_OK && *arrived && p->v->out)
