@@ -12,6 +12,8 @@
 
 /* Readers are kept for the next load: setting up a decoder takes longer than a chunk. They are not part of the budget. */
 enum { IDLE_MAX = 4, CHUNK_BITS = 48, AROUND = 4 };
+/* Announced for later: at most so much, and a share of what a limit leaves. */
+enum { AHEAD_MOST = 2 << 20, AHEAD_SHARE = 4 };
 
 struct ebpo_chunk_desk {
     ebpo_chunk_desk *next;
@@ -206,15 +208,17 @@ static bool is_ahead(const ebpo_chunks *c, uint64_t key)
     return false;
 }
 
-void ebpo_chunks_announce(ebpo_chunks *c, const uint64_t *keys, uint64_t count)
+void ebpo_chunks_announce(ebpo_chunks *c, const uint64_t *keys, unsigned now, unsigned count)
 {
     ebpo_expected e = EBPO_EXPECTED_INIT(c->file);
-    for (uint64_t i = 0; i < count; i++) {
+    for (unsigned i = 0; i < count; i++) {
         const ebpo_array_in *array = array_of(c, keys[i]);
         if (ebpo_h5_chunk_count(&array->shape) > 1 && !atomic_load(&c->file->located))
             continue; /* where it lies is not known yet */
-        uint64_t cost = cost_of(c, array, chunk_of(keys[i]));
-        if (is_ahead(c, keys[i]) || !fits(c, cost) || !ebpo_grow(&c->ahead, &c->ahead_room, c->ahead_count + 1, sizeof *c->ahead))
+        uint64_t cost = cost_of(c, array, chunk_of(keys[i])), taken = atomic_load(&c->file->in.bytes);
+        uint64_t left = c->limit > taken ? c->limit - taken : 0, share = left / AHEAD_SHARE < AHEAD_MOST ? left / AHEAD_SHARE : AHEAD_MOST;
+        if (is_ahead(c, keys[i]) || !fits(c, cost) || (i >= now && c->ahead_bytes + cost > share) ||
+            !ebpo_grow(&c->ahead, &c->ahead_room, c->ahead_count + 1, sizeof *c->ahead))
             continue;
         c->ahead[c->ahead_count++] = keys[i];
         c->ahead_bytes += cost;

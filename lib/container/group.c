@@ -223,7 +223,7 @@ ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_place *places
         unsigned own = keys.count;
         for (unsigned i = 1; i < count; i++)
             (void)missing(chunks, &places[i], wanted, &keys);
-        ebpo_chunks_announce(chunks, keys.key, keys.count);
+        ebpo_chunks_announce(chunks, keys.key, own, keys.count);
         for (unsigned i = 0; i < own && status == EBPO_OK; i++) {
             void *item;
             status = ebpo_cache_get(chunks->cache, keys.key[i], &item, NULL, error);

@@ -4,7 +4,7 @@
 
 #include "container/slice.h"
 
-enum { EBPO_GROUP_CODES = 8 * 255 };
+enum { EBPO_GROUP_CODES = 8 * 255, EBPO_GROUP_BLOCK = EBPO_INDEX_ROWS };
 
 /* What of them is wanted beside the types; what the file does not have is left out. */
 enum { EBPO_GROUP_PLANES = 1, EBPO_GROUP_WINDINGS = 2 };
@@ -32,8 +32,8 @@ typedef struct ebpo_group_place {
 /* True when the file is far away (its source wants to know what will be read) and the group is not in memory as a whole. */
 bool ebpo_group_is_far(ebpo_chunks *chunks, const ebpo_group_place *place, unsigned wanted);
 
-/* For files far away: fetches what the first of these groups takes and is not in memory, and announces with it what the others take, as far as that can be told. EBPO_E_LIMIT as
- * ebpo_group_read. */
+/* For files far away: fetches what the first of these groups takes and is not in memory, and announces with it what the others take, as far as that can be told. Of groups
+ * that stand close together (in one block of EBPO_GROUP_BLOCK) one is enough. EBPO_E_LIMIT as ebpo_group_read. */
 EBPO_MUST_USE ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_place *places, unsigned count, unsigned wanted, ebpo_error *error);
 
 #endif

@@ -59,8 +59,9 @@ typedef struct ebpo_chunk_keys {
 
 /* Adds the chunks of rows [row, row + rows), as far as the array has them, that are not in memory; true if there are any. */
 bool ebpo_chunks_missing(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row, uint64_t rows, ebpo_chunk_keys *keys);
-/* Announces chunks of counted arrays to the source, as far as the limit allows: from then on they count as read. */
-void ebpo_chunks_announce(ebpo_chunks *chunks, const uint64_t *keys, uint64_t count);
+/* Announces chunks of counted arrays to the source, as far as the limit allows: from then on they count as read. The first `now` are needed at once; the others only as far as what
+ * has been announced and not been read stays small, also beside what the limit leaves. */
+void ebpo_chunks_announce(ebpo_chunks *chunks, const uint64_t *keys, unsigned now, unsigned count);
 
 /* Sum of rows of an unsigned array; EBPO_E_FORMAT when it is beyond 2^62. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_sum(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row, uint64_t rows, uint64_t *sum,

@@ -61,24 +61,35 @@ void ebpo_frontier_sort(ebpo_frontier *f)
         sink(f, i);
 }
 
-unsigned ebpo_frontier_best(const ebpo_frontier *f, unsigned most, uint64_t *places)
+/* A table of blocks by hash; those for which there is no room are left out. */
+unsigned ebpo_frontier_blocks(const ebpo_frontier *f, uint64_t span, uint64_t places[EBPO_FRONTIER_BLOCKS])
 {
-    uint64_t edge[EBPO_FRONTIER_BEST + 1]; /* the children of those found, and the top */
-    unsigned count = 0, edges = 0;
-    if (f->count)
-        edge[edges++] = 0;
-    while (count < most && count < EBPO_FRONTIER_BEST && edges) {
-        unsigned first = 0;
-        for (unsigned i = 1; i < edges; i++)
-            if (before(&f->at[edge[i]], &f->at[edge[first]]))
-                first = i;
-        uint64_t place = edge[first];
-        if (f->at[place].turn == EBPO_TURN_NEVER)
-            break;
-        places[count++] = place;
-        edge[first] = edge[--edges];
-        for (uint64_t below = 2 * place + 1; below <= 2 * place + 2 && below < f->count; below++)
-            edge[edges++] = below;
+    enum { SLOTS = 1024 };
+    struct { uint64_t block, place; } slot[SLOTS]; /* block 0: free */
+    unsigned count = 0;
+    memset(slot, 0, sizeof slot);
+    for (uint64_t i = 0; i < f->count; i++) {
+        const ebpo_waiting *w = &f->at[i];
+        if (w->turn == EBPO_TURN_NEVER)
+            continue;
+        uint64_t block = (w->below / span) << 6 | (uint64_t)(64 - __builtin_clzll(w->octcode)); /* with the level; not 0 */
+        uint64_t at = block * UINT64_C(0x9e3779b97f4a7c15) >> 54;
+        while (slot[at].block && slot[at].block != block)
+            at = (at + 1) % SLOTS;
+        if (!slot[at].block && count == EBPO_FRONTIER_BLOCKS)
+            continue;
+        count += !slot[at].block;
+        if (!slot[at].block || before(w, &f->at[slot[at].place]))
+            slot[at].place = i;
+        slot[at].block = block;
     }
+    count = 0;
+    for (unsigned at = 0; at < SLOTS; at++)
+        if (slot[at].block) {
+            unsigned i = count++;
+            for (; i > 0 && before(&f->at[slot[at].place], &f->at[places[i - 1]]); i--)
+                places[i] = places[i - 1];
+            places[i] = slot[at].place;
+        }
     return count;
 }

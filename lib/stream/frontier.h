@@ -9,6 +9,7 @@ typedef enum ebpo_turn { EBPO_TURN_SEEN, EBPO_TURN_UNSEEN, EBPO_TURN_NEVER } ebp
 
 typedef struct ebpo_waiting {
     uint64_t key, octcode; /* the least key first, then the least octcode */
+    uint64_t below;        /* number of its children's group in their level */
     uint32_t group;
     uint8_t octant, turn;
 } ebpo_waiting;
@@ -26,8 +27,9 @@ void ebpo_frontier_push(ebpo_frontier *frontier, ebpo_waiting node);
 ebpo_waiting ebpo_frontier_pop(ebpo_frontier *frontier);
 /* After keys or turns have been changed. */
 void ebpo_frontier_sort(ebpo_frontier *frontier);
-/* Places in `at` of the first `most` nodes whose turn comes, in order, at most EBPO_FRONTIER_BEST; returns how many. */
-enum { EBPO_FRONTIER_BEST = 256 };
-unsigned ebpo_frontier_best(const ebpo_frontier *frontier, unsigned most, uint64_t *places);
+/* Of the nodes whose turn comes, the first one of each block of `span` children's groups of a level: their places in `at`, in order. The top is the first. At most
+ * EBPO_FRONTIER_BLOCKS; returns how many. */
+enum { EBPO_FRONTIER_BLOCKS = 256 };
+unsigned ebpo_frontier_blocks(const ebpo_frontier *frontier, uint64_t span, uint64_t places[EBPO_FRONTIER_BLOCKS]);
 
 #endif

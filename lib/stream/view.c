@@ -107,9 +107,9 @@ ebpo_status ebpo_view_stream_change(ebpo_view_stream *s, const ebpo_view_options
     return EBPO_OK;
 }
 
-static ebpo_group_place place_of(const ebpo_view_stream *s, const ebpo_waiting *w)
+static ebpo_group_place place_of(const ebpo_waiting *w)
 {
-    return (ebpo_group_place){ ebpo_octcode_level(w->octcode) + 1, ebpo_grown_children(&s->grown, (ebpo_grown_node){ w->group, w->octant }) };
+    return (ebpo_group_place){ ebpo_octcode_level(w->octcode) + 1, w->below };
 }
 
 /* Into s->read; of a file far away together with what comes soon. */
@@ -119,11 +119,11 @@ static ebpo_status read_group(ebpo_view_stream *s, ebpo_group_place place, ebpo_
     ebpo_status status = EBPO_OK;
     ebpo_chunks_limit(s->chunks, s->options.bytes ? s->options.bytes : UINT64_MAX);
     if (ebpo_group_is_far(s->chunks, &place, wanted)) {
-        uint64_t best[EBPO_FRONTIER_BEST];
-        ebpo_group_place places[EBPO_FRONTIER_BEST] = { place };
-        unsigned count = ebpo_frontier_best(&s->frontier, EBPO_FRONTIER_BEST, best);
+        uint64_t best[EBPO_FRONTIER_BLOCKS];
+        ebpo_group_place places[EBPO_FRONTIER_BLOCKS] = { place };
+        unsigned count = ebpo_frontier_blocks(&s->frontier, EBPO_GROUP_BLOCK, best);
         for (unsigned i = 0; i < count; i++) /* the first is the one at hand */
-            places[i] = place_of(s, &s->frontier.at[best[i]]);
+            places[i] = place_of(&s->frontier.at[best[i]]);
         status = ebpo_group_fetch(s->chunks, places, count ? count : 1, wanted, error);
     }
     return status == EBPO_OK ? ebpo_group_read(s->chunks, place.level, place.group, wanted, &s->read, error) : status;
@@ -143,7 +143,7 @@ static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_err
         return EBPO_OK;
     }
     if (!root)
-        place = place_of(s, &s->frontier.at[0]);
+        place = place_of(&s->frontier.at[0]);
     ebpo_error why = EBPO_ERROR_INIT;
     ebpo_status status = read_group(s, place, &why);
     if (status == EBPO_E_LIMIT && ebpo_chunks_refused(s->chunks)) {
@@ -183,7 +183,7 @@ static void end_group(ebpo_view_stream *s)
         ebpo_node_type type = ebpo_grown_type(&s->grown, node);
         s->cut[type]++;
         if (type == EBPO_GRAY) {
-            ebpo_waiting w = { .octcode = ebpo_grown_octcode(&s->grown, node), .group = group, .octant = (uint8_t)octant };
+            ebpo_waiting w = { .octcode = ebpo_grown_octcode(&s->grown, node), .below = ebpo_grown_children(&s->grown, node), .group = group, .octant = (uint8_t)octant };
             rank(s, &w);
             ebpo_frontier_push(&s->frontier, w);
         }
