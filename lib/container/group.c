@@ -177,6 +177,30 @@ static bool missing_codes(ebpo_chunks *chunks, ebpo_array_id counts, ebpo_array_
     return ebpo_chunks_missing(chunks, codes, level, first, sum, keys);
 }
 
+static uint64_t chunks_of(const ebpo_array_in *array)
+{
+    return array->present ? ebpo_h5_chunk_count(&array->shape) : 0;
+}
+
+/* Of a level, the arrays of a single chunk: they will be needed, whichever group is read. Returns their bytes. */
+static uint64_t add_small(ebpo_chunks *chunks, int level, unsigned wanted, ebpo_chunk_keys *keys)
+{
+    static const struct { ebpo_array_id id; unsigned wanted; } arrays[] = {
+        { EBPO_A_TYPES, ~0u }, { EBPO_A_PLANE_COUNTS, EBPO_GROUP_PLANES }, { EBPO_A_PLANES, EBPO_GROUP_PLANES }, { EBPO_A_LEAF_WINDING, EBPO_GROUP_WINDINGS },
+        { EBPO_A_BLACK_WINDING, EBPO_GROUP_WINDINGS }, { EBPO_A_WHITE_WINDING, EBPO_GROUP_WINDINGS }, { EBPO_A_LEAF_PLANE_COUNTS, EBPO_GROUP_PLANES },
+        { EBPO_A_LEAF_PLANES, EBPO_GROUP_PLANES },
+    };
+    uint64_t bytes = 0;
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) {
+        const ebpo_array_in *array = ebpo_reader_array(chunks->file, arrays[i].id, level);
+        if (!(arrays[i].wanted & wanted) && arrays[i].wanted != ~0u)
+            continue;
+        if (chunks_of(array) == 1 && ebpo_chunks_missing(chunks, arrays[i].id, level, 0, 1, keys))
+            bytes += array->chunks[0].bytes;
+    }
+    return bytes;
+}
+
 /* Adds the chunks for which reading the group would wait next; false: for none. Reads from memory only, and leaves errors to the reading. */
 static bool missing(ebpo_chunks *chunks, const ebpo_group_place *place, unsigned wanted, ebpo_chunk_keys *keys)
 {
@@ -184,8 +208,10 @@ static bool missing(ebpo_chunks *chunks, const ebpo_group_place *place, unsigned
     int level = place->level;
     uint64_t counts[4], first;
     ebpo_group group;
-    if (missing_counted(chunks, EBPO_A_TYPES_INDEX, EBPO_A_TYPES, level, place->group, 1, keys))
+    if (missing_counted(chunks, EBPO_A_TYPES_INDEX, EBPO_A_TYPES, level, place->group, 1, keys)) {
+        (void)add_small(chunks, level, wanted, keys);
         return true;
+    }
     if (read_types(chunks, level, place->group, &group, counts, NULL) != EBPO_OK)
         return false;
     bool gray = wanted & EBPO_GROUP_PLANES && parts & EBPO_PART_PLANES && counts[EBPO_GRAY];
@@ -214,13 +240,16 @@ bool ebpo_group_is_far(ebpo_chunks *chunks, const ebpo_group_place *place, unsig
 
 ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_place *places, unsigned count, unsigned wanted, ebpo_error *error)
 {
-    enum { STAGES = 3 }; /* types, counts, planes */
+    enum { STAGES = 3 /* types, counts, planes */, FIRST_BYTES = 32 << 10 /* of the first levels, which everyone needs */ };
     ebpo_status status = EBPO_OK;
     for (int stage = 0; stage < STAGES && status == EBPO_OK; stage++) {
         ebpo_chunk_keys keys = { .count = 0 };
         if (!missing(chunks, &places[0], wanted, &keys))
             break;
         unsigned own = keys.count;
+        uint64_t small = 0;
+        for (int level = 1; places[0].level == 0 && level < chunks->file->info.level_count && small < FIRST_BYTES; level++)
+            small += add_small(chunks, level, wanted, &keys);
         for (unsigned i = 1; i < count; i++)
             (void)missing(chunks, &places[i], wanted, &keys);
         ebpo_chunks_announce(chunks, keys.key, own, keys.count);
