@@ -801,7 +801,7 @@ START_TEST(options_that_make_no_sense_are_refused)
 {
     ebpo_file *file = open_solid("cube", 4);
     ebpo_observer good = EBPO_OBSERVER_INIT, bad[9];
-    ebpo_view_options usual = EBPO_VIEW_OPTIONS_INIT, o[8];
+    ebpo_view_options usual = EBPO_VIEW_OPTIONS_INIT, o[9];
     ebpo_view_stream *stream = NULL;
     for (int i = 0; i < 9; i++)
         bad[i] = good;
@@ -814,18 +814,19 @@ START_TEST(options_that_make_no_sense_are_refused)
         ck_assert_msg(ebpo_view_stream_new(&stream, file, &usual, NULL) == EBPO_E_ARGUMENT && !stream, "observer %d", i);
     }
     usual.observer = &good;
-    for (int i = 0; i < 8; i++)
+    for (int i = 0; i < 9; i++)
         o[i] = usual;
     o[0].priority = (ebpo_priority)4, o[1].pixels = -1, o[2].pixels = INFINITY, o[3].distance = NAN, o[4].unseen = (ebpo_unseen)2;
     o[5].observer = NULL, o[5].priority = EBPO_PRIORITY_DISTANCE;
     o[6].observer = NULL, o[6].pixels = 1;
     o[7].observer = NULL, o[7].distance = 1;
-    for (int i = 0; i < 8; i++)
+    o[8].memory = 65536;
+    for (int i = 0; i < 9; i++)
         ck_assert_msg(ebpo_view_stream_new(&stream, file, &o[i], NULL) == EBPO_E_ARGUMENT && !stream, "options %d", i);
     ck_assert(ebpo_view_stream_new(&stream, file, NULL, NULL) == EBPO_OK);
     ebpo_view_node node, again;
     ck_assert_int_eq(next(stream, &node), EBPO_VIEW_NODE);
-    for (int i = 0; i < 8; i++)
+    for (int i = 0; i < 9; i++)
         ck_assert_int_eq(ebpo_view_stream_change(stream, &o[i], NULL), EBPO_E_ARGUMENT);
     usual.planes = !usual.planes;
     ck_assert_int_eq(ebpo_view_stream_change(stream, &usual, NULL), EBPO_E_ARGUMENT);

@@ -8,6 +8,8 @@
 #include "base/alloc.h"
 #include "base/error.h"
 
+enum { MEMORY_LEAST = 1 << 20 };
+
 /* --- options --- */
 
 static ebpo_status check_options(const ebpo_view_options *o, ebpo_error *error)
@@ -18,6 +20,8 @@ static ebpo_status check_options(const ebpo_view_options *o, ebpo_error *error)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "view options: there is no rule number %d for what is unseen", (int)o->unseen);
     if (!(o->pixels >= 0) || !(o->distance >= 0) || isinf(o->pixels))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "view options: pixels must be a finite number and distance a number, both at least 0");
+    if (o->memory && o->memory < MEMORY_LEAST) /* less than one group's chunks and their neighbours': every group would read all of them again */
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "view options: memory must be at least %d bytes, or 0", MEMORY_LEAST);
     if (!o->observer && (o->priority != EBPO_PRIORITY_LEVEL || o->pixels > 0 || !isinf(o->distance)))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "view options: pixels, distance and all priorities but the level's need an observer");
     return EBPO_OK;

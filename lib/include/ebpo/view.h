@@ -60,8 +60,8 @@ typedef struct ebpo_view_options {
     /* Fixed. */
     bool planes, polygons; /* as in ebpo_stream_options; without both no planes are read */
     bool windings;         /* read winding numbers; else ebpo_stream_node.winding is 0 */
-    uint64_t memory;       /* bytes for decoded chunks, a few MiB at least; what falls out is read again when it is needed. 0: no limit. Beside it, the stream takes about 10 bytes
-                            * for each node delivered, 4 with winding numbers, and the plane codes */
+    uint64_t memory;       /* bytes for decoded chunks, 1 MiB at least; what falls out is read again when it is needed. 0: no limit. Beside it, the stream takes about 10 bytes for
+                            * each node delivered, 4 more with winding numbers, 32 for each gray node of the cut, and the plane codes */
 } ebpo_view_options;
 #define EBPO_VIEW_OPTIONS_INIT { EBPO_PRIORITY_LEVEL, NULL, EBPO_UNSEEN_LAST, 0, __builtin_inf(), -1, 0, 0, true, false, false, 0 }
 
