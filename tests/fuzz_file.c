@@ -1,5 +1,6 @@
 /* Any bytes as a file: opening, reading everything and asking ends in a status, nothing else. */
 #include <ebpo/query.h>
+#include <ebpo/view.h>
 
 #include "subset/parts.h"
 
@@ -45,6 +46,24 @@ static void ask(ebpo_file *file, int cut_level)
     ebpo_model_close(model);
 }
 
+static void view(ebpo_file *file, ebpo_priority priority)
+{
+    ebpo_view_options options = EBPO_VIEW_OPTIONS_INIT;
+    ebpo_observer observer = EBPO_OBSERVER_INIT;
+    ebpo_view_stream *stream;
+    ebpo_view_node node;
+    ebpo_view_end end;
+    options.priority = priority;
+    options.observer = &observer;
+    options.polygons = options.windings = true;
+    options.nodes = 2000;
+    if (ebpo_view_stream_new(&stream, file, &options, NULL) != EBPO_OK)
+        return;
+    while (ebpo_view_stream_next(stream, &node, &end, NULL) == EBPO_OK && end == EBPO_VIEW_NODE)
+        ;
+    ebpo_view_stream_free(stream);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     ebpo_file *file;
@@ -66,6 +85,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         ebpo_tree_free(&tree);
     for (int cut = -1; cut < 3; cut++)
         ask(file, cut);
+    view(file, EBPO_PRIORITY_LEVEL);
+    view(file, EBPO_PRIORITY_FRONT_TO_BACK);
     ebpo_close(file);
     return 0;
 }

@@ -82,6 +82,13 @@ def check(tool, folder, path, ply, asked, rays, site):
         done = [run(tool, "extract", source, out, *what).returncode for source, out in zip((path, good), outs)]
         expect(f"extract {what}", done == [0, 0] and open(outs[0], "rb").read() == open(outs[1], "rb").read())
 
+    for order in ("level", "distance", "pixels", "front-to-back"):
+        seen = ("--eye", "5,4,3", "--look", "0,0,0", "--order", order)
+        near, far = (json.loads(run(tool, "view", source, *seen, "--json", "--nodes", "--count", "20001").stdout)["nodes"] for source in (path, good))
+        expect(f"view {order}", near == far and len(near) > 19990)
+        t = traffic(tool, "view", good, *seen, "--bytes", "300K")
+        expect(f"view {order} keeps to its budget", t["bytes_read"] <= 300 << 10 and t["bytes"] <= (300 << 10) + (64 << 10), t)
+
     # Requests and bytes.
     size = os.path.getsize(path)
     t = traffic(tool, "levels", good, "--to", "4")

@@ -11,7 +11,7 @@
 #include "signals.h"
 #include "words.h"
 
-static const command *const commands[] = { &command_convert, &command_check,  &command_info, &command_levels,
+static const command *const commands[] = { &command_convert, &command_check,  &command_info, &command_levels, &command_view,
                                            &command_extract, &command_subset, &command_fetch, &command_measure, &command_render, &command_verify,
                                            &command_inside,  &command_distance, &command_ray, &command_box, &command_bench };
 enum { COMMANDS = sizeof commands / sizeof *commands };

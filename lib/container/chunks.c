@@ -12,6 +12,8 @@
 
 /* Readers are kept for the next load: setting up a decoder takes longer than a chunk. They are not part of the budget. */
 enum { IDLE_MAX = 4, CHUNK_BITS = 48, AROUND = 4 };
+/* Announced for later: at most so much, and a share of what a limit leaves. */
+enum { AHEAD_MOST = 2 << 20, AHEAD_SHARE = 4 };
 
 struct ebpo_chunk_desk {
     ebpo_chunk_desk *next;
@@ -166,16 +168,109 @@ static void expect_around(ebpo_chunks *c, const ebpo_array_in *array, uint64_t c
     ebpo_expect_all(&e);
 }
 
+/* --- counting --- */
+
+/* What reading a chunk takes of the file; where the places of chunks have not been read yet, these as well. */
+static uint64_t cost_of(const ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk)
+{
+    if (ebpo_h5_chunk_count(&array->shape) == 1 || atomic_load(&c->file->located))
+        return array->chunks[chunk].bytes;
+    return c->file->info.head_bytes + ebpo_chunk_bound(array->shape.chunk_rows * ebpo_h5_row_bytes(&array->shape));
+}
+
+static bool fits(const ebpo_chunks *c, uint64_t more)
+{
+    uint64_t taken = atomic_load(&c->file->in.bytes) + c->ahead_bytes;
+    return taken <= c->limit && more <= c->limit - taken;
+}
+
+/* Called before a chunk is read: what was announced has been counted then. */
+static ebpo_status admit(ebpo_chunks *c, const ebpo_array_in *array, uint64_t key, ebpo_error *error)
+{
+    uint64_t cost = cost_of(c, array, chunk_of(key));
+    for (uint64_t i = 0; i < c->ahead_count; i++)
+        if (c->ahead[i] == key) {
+            c->ahead[i] = c->ahead[--c->ahead_count];
+            c->ahead_bytes -= cost;
+            return EBPO_OK;
+        }
+    if (fits(c, cost))
+        return EBPO_OK;
+    c->refused = true;
+    return ebpo_fail(error, EBPO_E_LIMIT, "%s: %s: reading on would take more than the %" PRIu64 " bytes allowed", c->file->in.shown, array->path, c->limit);
+}
+
+static bool is_ahead(const ebpo_chunks *c, uint64_t key)
+{
+    for (uint64_t i = 0; i < c->ahead_count; i++)
+        if (c->ahead[i] == key)
+            return true;
+    return false;
+}
+
+void ebpo_chunks_announce(ebpo_chunks *c, const uint64_t *keys, unsigned now, unsigned count)
+{
+    ebpo_expected e = EBPO_EXPECTED_INIT(c->file);
+    for (unsigned i = 0; i < count; i++) {
+        const ebpo_array_in *array = array_of(c, keys[i]);
+        if (ebpo_h5_chunk_count(&array->shape) > 1 && !atomic_load(&c->file->located))
+            continue; /* where it lies is not known yet */
+        uint64_t cost = cost_of(c, array, chunk_of(keys[i])), taken = atomic_load(&c->file->in.bytes);
+        uint64_t left = c->limit > taken ? c->limit - taken : 0, share = left / AHEAD_SHARE < AHEAD_MOST ? left / AHEAD_SHARE : AHEAD_MOST;
+        if (is_ahead(c, keys[i]) || !fits(c, cost) || (i >= now && c->ahead_bytes + cost > share) ||
+            !ebpo_grow(&c->ahead, &c->ahead_room, c->ahead_count + 1, sizeof *c->ahead))
+            continue;
+        c->ahead[c->ahead_count++] = keys[i];
+        c->ahead_bytes += cost;
+        ebpo_expect_chunks(&e, array, chunk_of(keys[i]), chunk_of(keys[i]) + 1);
+    }
+    ebpo_expect_all(&e);
+}
+
+bool ebpo_chunks_missing(ebpo_chunks *c, ebpo_array_id id, int level, uint64_t row, uint64_t rows, ebpo_chunk_keys *keys)
+{
+    const ebpo_array_in *array = ebpo_reader_array(c->file, id, level);
+    bool missing = false;
+    if (!array->present || rows == 0 || row >= array->shape.rows)
+        return false;
+    uint64_t left = array->shape.rows - row, last = (row + (rows < left ? rows : left) - 1) / array->shape.chunk_rows;
+    for (uint64_t i = row / array->shape.chunk_rows; i <= last; i++) {
+        uint64_t key = key_of(array, i);
+        bool listed = ebpo_cache_has(c->cache, key);
+        missing |= !listed;
+        for (unsigned k = 0; k < keys->count && !listed; k++)
+            listed = keys->key[k] == key;
+        if (!listed && keys->count < EBPO_CHUNK_KEYS)
+            keys->key[keys->count++] = key;
+    }
+    return missing;
+}
+
+void ebpo_chunks_limit(ebpo_chunks *chunks, uint64_t bytes)
+{
+    chunks->limit = bytes;
+    chunks->refused = false;
+}
+
+bool ebpo_chunks_refused(const ebpo_chunks *chunks)
+{
+    return chunks->refused;
+}
+
 static ebpo_status load(void *user, uint64_t key, void **item, uint64_t *bytes, ebpo_error *error)
 {
     ebpo_chunks *c = user;
     const ebpo_array_in *array = array_of(c, key);
+    ebpo_status allowed = c->counted ? admit(c, array, key, error) : EBPO_OK;
+    if (allowed != EBPO_OK)
+        return allowed;
     uint64_t rows = chunk_rows(array, chunk_of(key));
     size_t row_bytes = ebpo_h5_row_bytes(&array->shape);
     ebpo_chunk_desk *desk = take_desk(c);
     void *made = desk ? ebpo_alloc(rows, row_bytes) : NULL;
     ebpo_status status = made ? EBPO_OK : ebpo_fail_memory(error, rows * row_bytes + sizeof *desk);
-    expect_around(c, array, chunk_of(key));
+    if (!c->counted)
+        expect_around(c, array, chunk_of(key));
     if (status == EBPO_OK)
         status = ebpo_reader_chunk(c->file, array, chunk_of(key), &desk->reader, desk->raw, error);
     if (status == EBPO_OK)
@@ -197,16 +292,18 @@ static void release(void *user, void *item)
     free(item);
 }
 
-ebpo_status ebpo_chunks_make(ebpo_chunks **out, ebpo_file *file, uint64_t budget, ebpo_error *error)
+static ebpo_status make(ebpo_chunks **out, ebpo_file *file, uint64_t budget, bool counted, ebpo_error *error)
 {
     *out = NULL;
     ebpo_chunks *c = ebpo_alloc_zero(1, sizeof *c);
     if (!c)
         return ebpo_fail_memory(error, sizeof *c);
     c->file = file;
+    c->counted = counted;
+    c->limit = UINT64_MAX;
     pthread_mutex_init(&c->lock, NULL);
     ebpo_cache_source source = { c, estimate, load, release };
-    ebpo_status status = ebpo_reader_make(file, EBPO_A_FACES_INDEX, 0, 1, sizeof *c->seen, &c->seen, error);
+    ebpo_status status = counted ? EBPO_OK : ebpo_reader_make(file, EBPO_A_FACES_INDEX, 0, 1, sizeof *c->seen, &c->seen, error);
     if (status == EBPO_OK)
         status = ebpo_cache_make(&c->cache, &source, "chunk", budget, error);
     if (status == EBPO_OK)
@@ -214,6 +311,16 @@ ebpo_status ebpo_chunks_make(ebpo_chunks **out, ebpo_file *file, uint64_t budget
     else
         ebpo_chunks_free(c);
     return status;
+}
+
+ebpo_status ebpo_chunks_make(ebpo_chunks **out, ebpo_file *file, uint64_t budget, ebpo_error *error)
+{
+    return make(out, file, budget, false, error);
+}
+
+ebpo_status ebpo_chunks_make_counted(ebpo_chunks **out, ebpo_file *file, uint64_t budget, ebpo_error *error)
+{
+    return make(out, file, budget, true, error);
 }
 
 void ebpo_chunks_free(ebpo_chunks *chunks)
@@ -227,6 +334,7 @@ void ebpo_chunks_free(ebpo_chunks *chunks)
         free_desk(desk);
     }
     free(chunks->seen);
+    free(chunks->ahead);
     pthread_mutex_destroy(&chunks->lock);
     free(chunks);
 }
@@ -287,7 +395,8 @@ ebpo_status ebpo_chunks_integers(ebpo_chunks *chunks, ebpo_array_id id, int leve
         return status;
     const ebpo_array_in *array = ebpo_reader_array(chunks->file, id, level);
     ebpo_expected expected = EBPO_EXPECTED_INIT(chunks->file);
-    ebpo_chunks_expect(chunks, &expected, id, level, row, rows);
+    if (!chunks->counted)
+        ebpo_chunks_expect(chunks, &expected, id, level, row, rows);
     ebpo_expect_all(&expected);
     ebpo_view view = { .array = array };
     uint64_t cols = array->shape.cols ? array->shape.cols : 1;

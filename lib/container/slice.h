@@ -11,6 +11,11 @@
 /* Decoded chunks under a budget (0: no limit; the smallest that works is a few MiB). */
 typedef struct ebpo_chunks ebpo_chunks;
 EBPO_MUST_USE ebpo_status ebpo_chunks_make(ebpo_chunks **out, ebpo_file *file, uint64_t budget, ebpo_error *error);
+/* The same for arrays of levels only, by one thread at a time, and counted: nothing is read or announced but what was asked for, and nothing after which the file would have read
+ * more than the limit (ebpo_chunks_limit; none at first). Then EBPO_E_LIMIT, and ebpo_chunks_refused is true. */
+EBPO_MUST_USE ebpo_status ebpo_chunks_make_counted(ebpo_chunks **out, ebpo_file *file, uint64_t budget, ebpo_error *error);
+void ebpo_chunks_limit(ebpo_chunks *chunks, uint64_t bytes);
+bool ebpo_chunks_refused(const ebpo_chunks *chunks);
 void ebpo_chunks_free(ebpo_chunks *chunks);
 void ebpo_chunks_get_stats(ebpo_chunks *chunks, ebpo_cache_stats *out);
 

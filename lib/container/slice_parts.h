@@ -18,6 +18,12 @@ struct ebpo_chunks {
     pthread_mutex_t lock; /* of the desks that nobody uses */
     ebpo_chunk_desk *idle;
     unsigned idle_count;
+    /* Of chunks made by ebpo_chunks_make_counted, which one thread uses at a time. */
+    bool counted;
+    bool refused;           /* a load has been refused because of the limit */
+    uint64_t limit;         /* of the bytes that the file has read, announced ones included */
+    uint64_t *ahead;        /* [ahead_count] keys that have been announced and not been read yet */
+    uint64_t ahead_count, ahead_room, ahead_bytes;
 };
 
 /* A place in an array: at most one chunk, pinned while rows in it are wanted. Begin with { .array = ... }, end with ebpo_view_release. One thread. */
@@ -43,6 +49,19 @@ EBPO_MUST_USE ebpo_status ebpo_chunks_take(ebpo_chunks *chunks, ebpo_array_id id
 
 /* Collects the chunks of rows [row, row + rows), as far as the array has them, that are not in memory. */
 void ebpo_chunks_expect(ebpo_chunks *chunks, ebpo_expected *expected, ebpo_array_id id, int level, uint64_t row, uint64_t rows);
+
+/* Chunks, each once. What does not fit is left out: then it is read without having been announced. */
+enum { EBPO_CHUNK_KEYS = 512 };
+typedef struct ebpo_chunk_keys {
+    unsigned count;
+    uint64_t key[EBPO_CHUNK_KEYS];
+} ebpo_chunk_keys;
+
+/* Adds the chunks of rows [row, row + rows), as far as the array has them, that are not in memory; true if there are any. */
+bool ebpo_chunks_missing(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row, uint64_t rows, ebpo_chunk_keys *keys);
+/* Announces chunks of counted arrays to the source, as far as the limit allows: from then on they count as read. The first `now` are needed at once; the others only as far as what
+ * has been announced and not been read stays small, also beside what the limit leaves. */
+void ebpo_chunks_announce(ebpo_chunks *chunks, const uint64_t *keys, unsigned now, unsigned count);
 
 /* Sum of rows of an unsigned array; EBPO_E_FORMAT when it is beyond 2^62. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_sum(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row, uint64_t rows, uint64_t *sum,

@@ -9,11 +9,10 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "morton/octcode.h"
+#include "stream/node.h"
 #include "stream/walk.h"
-#include "stream/world.h"
 
-enum { PIECE = 4096, CODES_MOST = 255 };
+enum { PIECE = 4096 };
 
 struct ebpo_stream {
     ebpo_file *file;
@@ -26,9 +25,7 @@ struct ebpo_stream {
     double settled; /* volume of the leaves and black nodes of all levels before the next one */
     ebpo_walk walk;
     ebpo_walk_envelopes *envelopes; /* with polygons */
-    double planes[CODES_MOST][4];
-    double vertices[EBPO_POLYTOPE_VERTICES][3];
-    uint32_t polygon_first[EBPO_POLYTOPE_FACES + 1], corners[EBPO_POLYTOPE_CORNERS];
+    ebpo_node_room room;
 };
 
 ebpo_status ebpo_stream_new(ebpo_stream **out, ebpo_file *file, const ebpo_stream_options *options, ebpo_error *error)
@@ -42,9 +39,7 @@ ebpo_status ebpo_stream_new(ebpo_stream **out, ebpo_file *file, const ebpo_strea
     s->info = ebpo_file_info(file);
     s->options = options ? *options : usual;
     s->level = -1;
-    memcpy(s->box.origin, s->info->box_origin, sizeof s->box.origin);
-    memcpy(s->box.size, s->info->box_size, sizeof s->box.size);
-    s->box.grid_level = s->info->grid_level;
+    s->box = ebpo_node_box(s->info);
     s->bytes = s->info->head_bytes;
     if (s->options.polygons && !(s->envelopes = ebpo_alloc_zero(1, sizeof *s->envelopes))) {
         ebpo_stream_free(s);
@@ -130,16 +125,10 @@ typedef struct job {
     ebpo_walk_envelopes *envelopes; /* [threads] */
 } job;
 
-static double cell_volume(const ebpo_box *box, int level)
-{
-    double sides = (double)(1u << level);
-    return box->size[0] / sides * (box->size[1] / sides) * (box->size[2] / sides);
-}
-
 static ebpo_status sum_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
 {
     const job *j = context;
-    double cell = cell_volume(&j->stream->box, j->target);
+    double cell = ebpo_node_cell_volume(&j->stream->box, j->target);
     (void)error;
     for (uint64_t i = begin; i < end; i++) {
         ebpo_walk walk = j->starts[i];
@@ -192,7 +181,7 @@ done:
 static volumes stated_volumes(const ebpo_stream *s, int level)
 {
     const ebpo_level_summary *summary = &s->info->level[level];
-    return (volumes){ summary->gray_volume, summary->leaf_volume + (double)summary->black_count * cell_volume(&s->box, level) };
+    return (volumes){ summary->gray_volume, summary->leaf_volume + (double)summary->black_count * ebpo_node_cell_volume(&s->box, level) };
 }
 
 /* --- levels --- */
@@ -245,32 +234,6 @@ static int32_t winding_of(const ebpo_level *level, const ebpo_walk_node *node)
     }
 }
 
-static void add_planes(ebpo_stream *s, ebpo_cell cell, const ebpo_walk_node *node, ebpo_stream_node *out)
-{
-    for (unsigned i = 0; i < node->code_count; i++) {
-        int32_t n[3], d;
-        if (ebpo_plane_decode(node->codes[i], n, &d))
-            ebpo_plane_to_world(&s->box, cell, n, d, s->planes[out->plane_count++]);
-    }
-    out->planes = (const double(*)[4])s->planes;
-}
-
-static void add_polygons(ebpo_stream *s, ebpo_cell cell, const ebpo_walk_node *node, ebpo_stream_node *out)
-{
-    const ebpo_polytope *p = ebpo_walk_envelope(&s->walk, node, s->envelopes);
-    ebpo_polytope_to_world(p, &s->box, cell, s->vertices);
-    for (int f = 0; f <= p->face_count; f++)
-        s->polygon_first[f] = p->first[f];
-    for (int i = 0; i < p->corner_count; i++)
-        s->corners[i] = p->corner[i];
-    out->volume = ebpo_polytope_volume(p) * cell_volume(&s->box, cell.level);
-    out->vertex_count = (uint32_t)p->vertex_count;
-    out->polygon_count = (uint32_t)p->face_count;
-    out->vertices = (const double(*)[3])s->vertices;
-    out->polygon_first = s->polygon_first;
-    out->corners = s->corners;
-}
-
 ebpo_status ebpo_stream_next_node(ebpo_stream *s, ebpo_stream_node *out, bool *more, ebpo_error *error)
 {
     ebpo_walk_node node;
@@ -279,18 +242,12 @@ ebpo_status ebpo_stream_next_node(ebpo_stream *s, ebpo_stream_node *out, bool *m
         return ebpo_fail(error, EBPO_E_ARGUMENT, "no level has been read yet; call ebpo_stream_next_level first");
     if (!ebpo_walk_next(&s->walk, &node))
         return EBPO_OK;
-    ebpo_cell cell = ebpo_cell_of_octcode(node.octcode);
-    *out = (ebpo_stream_node){ .octcode = node.octcode, .type = node.type, .winding = winding_of(&s->kept[s->level], &node) };
-    for (int k = 0; k < 3; k++) {
-        out->min[k] = ebpo_wall(&s->box, k, cell.level, cell.at[k]);
-        out->max[k] = ebpo_wall(&s->box, k, cell.level, cell.at[k] + 1);
-    }
+    ebpo_node_begin(out, &s->box, node.octcode, node.type);
+    out->winding = winding_of(&s->kept[s->level], &node);
     if (s->options.planes || s->options.polygons)
-        add_planes(s, cell, &node, out);
+        ebpo_node_add_planes(out, &s->box, node.codes, node.code_count, &s->room);
     if (s->options.polygons && node.type != EBPO_WHITE)
-        add_polygons(s, cell, &node, out);
-    else if (node.type == EBPO_BLACK)
-        out->volume = cell_volume(&s->box, cell.level);
+        ebpo_node_add_polygons(out, &s->box, ebpo_walk_envelope(&s->walk, &node, s->envelopes), &s->room);
     *more = true;
     return EBPO_OK;
 }

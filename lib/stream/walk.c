@@ -62,19 +62,19 @@ bool ebpo_walk_next(ebpo_walk *w, ebpo_walk_node *out)
     }
 }
 
-static void cut(ebpo_polytope *envelope, const ebpo_walk_node *node)
+void ebpo_envelope_cut(ebpo_polytope *envelope, const uint32_t *codes, unsigned count)
 {
-    for (unsigned i = 0; i < node->code_count; i++) {
+    for (unsigned i = 0; i < count; i++) {
         int32_t n[3], d;
         double direction[3];
-        if (!ebpo_plane_decode(node->codes[i], n, &d))
+        if (!ebpo_plane_decode(codes[i], n, &d))
             continue;
         double offset = ebpo_plane_as_double(n, d, direction);
         (void)ebpo_polytope_clip(envelope, direction, offset, (int32_t)i);
     }
 }
 
-static void start(const ebpo_polytope *parent, uint64_t octcode, ebpo_polytope *envelope)
+void ebpo_envelope_begin(const ebpo_polytope *parent, uint64_t octcode, ebpo_polytope *envelope)
 {
     if (parent)
         (void)ebpo_polytope_child(parent, octcode & 7, envelope);
@@ -89,8 +89,8 @@ static const ebpo_polytope *ancestor(const ebpo_walk *w, int depth, ebpo_walk_en
         return NULL;
     const ebpo_walk_node *node = &w->at[depth].node;
     if (e->octcode[depth] != node->octcode) {
-        start(ancestor(w, depth - 1, e), node->octcode, &e->at[depth]);
-        cut(&e->at[depth], node);
+        ebpo_envelope_begin(ancestor(w, depth - 1, e), node->octcode, &e->at[depth]);
+        ebpo_envelope_cut(&e->at[depth], node->codes, node->code_count);
         e->octcode[depth] = node->octcode;
     }
     return &e->at[depth];
@@ -101,8 +101,8 @@ const ebpo_polytope *ebpo_walk_envelope(const ebpo_walk *w, const ebpo_walk_node
     if (node->type == EBPO_BLACK) {
         ebpo_polytope_cube(&e->own);
     } else {
-        start(ancestor(w, w->target - 1, e), node->octcode, &e->own);
-        cut(&e->own, node);
+        ebpo_envelope_begin(ancestor(w, w->target - 1, e), node->octcode, &e->own);
+        ebpo_envelope_cut(&e->own, node->codes, node->code_count);
     }
     return &e->own;
 }

@@ -12,5 +12,6 @@
 #include <ebpo/stream.h>
 #include <ebpo/subset.h>
 #include <ebpo/verify.h>
+#include <ebpo/view.h>
 
 #endif

@@ -1,0 +1,62 @@
+/* The part of a tree that has been delivered: groups of siblings, each linked to its parent once it is complete. */
+#ifndef EBPO_STREAM_GROWN_H
+#define EBPO_STREAM_GROWN_H
+
+#include "container/group.h"
+#include "stream/node.h"
+#include "stream/walk.h"
+
+typedef struct ebpo_grown_group {
+    uint64_t parent;        /* octcode; 0: the root's group */
+    uint64_t first_gray;    /* rank in its level of the group's first gray node */
+    uint64_t first_code;    /* into codes */
+    uint32_t child[8];      /* number of the children's group; 0: not there */
+    uint16_t types;
+    uint8_t plane_count[8];
+} ebpo_grown_group;
+
+typedef struct ebpo_grown {
+    ebpo_grown_group *group; /* group 0 is the root's */
+    uint32_t *codes;
+    int32_t (*winding)[8];   /* NULL: not wanted */
+    uint64_t group_count, group_room, winding_room, code_count, code_room;
+    bool windings;
+    uint64_t grays[EBPO_LEVELS_MAX]; /* gray nodes seen of each level; more than the head tells: the file is damaged */
+} ebpo_grown;
+
+void ebpo_grown_free(ebpo_grown *grown);
+
+/* A node by its group and octant. */
+typedef struct ebpo_grown_node {
+    uint32_t group;
+    uint8_t octant;
+} ebpo_grown_node;
+
+static inline ebpo_node_type ebpo_grown_type(const ebpo_grown *g, ebpo_grown_node node)
+{
+    return (ebpo_node_type)(g->group[node.group].types >> 2 * node.octant & 3);
+}
+
+static inline uint64_t ebpo_grown_octcode(const ebpo_grown *g, ebpo_grown_node node)
+{
+    uint64_t parent = g->group[node.group].parent;
+    return parent ? parent << 3 | node.octant : 1;
+}
+
+/* The group in which a gray node's children stand, in the next level of the file. */
+static inline uint64_t ebpo_grown_children(const ebpo_grown *g, ebpo_grown_node gray)
+{
+    unsigned before = g->group[gray.group].types & ((1u << 2 * gray.octant) - 1);
+    return g->group[gray.group].first_gray + (unsigned)__builtin_popcount(before & before >> 1 & 0x5555);
+}
+
+/* Adds a group behind the last one; not linked yet. */
+EBPO_MUST_USE ebpo_status ebpo_grown_add(ebpo_grown *grown, const ebpo_info *info, uint64_t parent, const ebpo_group *read, ebpo_error *error);
+
+/* A node's own plane codes. */
+const uint32_t *ebpo_grown_codes(const ebpo_grown *grown, ebpo_grown_node node, unsigned *count);
+
+/* Its envelope in coordinates of its cell; the nodes above it are linked. Lent until the next call with these envelopes. */
+const ebpo_polytope *ebpo_grown_envelope(const ebpo_grown *grown, ebpo_grown_node node, ebpo_walk_envelopes *envelopes);
+
+#endif

@@ -1,0 +1,57 @@
+/* What of a view has been delivered: its cut, and figures. */
+#include <math.h>
+
+#include "stream/view.h"
+
+typedef struct visitor {
+    ebpo_view_stream *stream;
+    ebpo_view_visit_fn visit;
+    void *user;
+    ebpo_view_node node;
+} visitor;
+
+/* False: enough. */
+static bool visit_node(visitor *v, ebpo_grown_node node)
+{
+    const ebpo_grown *grown = &v->stream->grown;
+    uint32_t below = grown->group[node.group].child[node.octant];
+    if (below == 0) {
+        ebpo_view_fill(v->stream, node, &v->node);
+        v->node.complete = true;
+        return v->visit(v->user, &v->node);
+    }
+    unsigned flip = ebpo_sight_octant(&v->stream->sight, &v->stream->box, ebpo_cell_of_octcode(ebpo_grown_octcode(grown, node)));
+    for (unsigned step = 0; step < 8; step++)
+        if (!visit_node(v, (ebpo_grown_node){ below, (uint8_t)(step ^ flip) }))
+            return false;
+    return true;
+}
+
+void ebpo_view_stream_cut(ebpo_view_stream *s, ebpo_view_visit_fn visit, void *user)
+{
+    visitor v = { .stream = s, .visit = visit, .user = user };
+    if (s->delivered)
+        (void)visit_node(&v, (ebpo_grown_node){ 0, 0 });
+}
+
+static void look_at(const ebpo_view_stream *s, const ebpo_waiting *w, ebpo_view_stats *out)
+{
+    ebpo_cell cell = ebpo_cell_of_octcode(w->octcode);
+    ebpo_seen look = ebpo_sight_look(&s->sight, &s->box, cell);
+    if (look.seen)
+        out->pixels = fmax(out->pixels, ebpo_sight_pixels(&s->sight, cell.level, look.distance2));
+    out->waiting += w->turn != EBPO_TURN_NEVER;
+}
+
+void ebpo_view_stream_get_stats(const ebpo_view_stream *s, ebpo_view_stats *out)
+{
+    uint64_t reads;
+    *out = (ebpo_view_stats){ .nodes = s->delivered, .pixels = s->sight.given ? 0 : NAN };
+    ebpo_file_traffic(s->file, &out->bytes_read, &reads);
+    for (int i = 0; i < 4; i++)
+        out->cut[i] = s->cut[i];
+    for (uint64_t i = 0; i < s->frontier.count; i++)
+        look_at(s, &s->frontier.at[i], out);
+    if (s->delivering && s->grown.group_count > 1)
+        look_at(s, &s->parent, out);
+}

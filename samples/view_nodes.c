@@ -1,0 +1,60 @@
+/* What a viewer with a camera does: the nodes that are largest on the picture first, until no visible one is larger than 16 pixels or a budget is spent; then the camera moves.
+ *
+ *     view_nodes FILE.ebpo.h5 X Y Z [BYTES]
+ *     cc view_nodes.c $(pkg-config --cflags --libs ebpo) */
+#include <ebpo/ebpo.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+static bool draw(void *user, const ebpo_view_node *node)
+{
+    *(uint64_t *)user += node->seen ? node->node.polygon_count : 0; /* a renderer would draw node->node.vertices, polygon_first and corners here, front to back */
+    return true;
+}
+
+int main(int argc, char **argv)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file = NULL;
+    ebpo_view_stream *stream = NULL;
+    ebpo_view_options options = EBPO_VIEW_OPTIONS_INIT;
+    ebpo_observer observer = EBPO_OBSERVER_INIT;
+    ebpo_view_node node;
+    ebpo_view_end end = EBPO_VIEW_NODE;
+    if (argc < 5) {
+        fprintf(stderr, "usage: view_nodes FILE.ebpo.h5 X Y Z [BYTES]\n");
+        return 2;
+    }
+    options.priority = EBPO_PRIORITY_PIXELS;
+    options.observer = &observer;
+    options.unseen = EBPO_UNSEEN_NEVER;
+    options.pixels = 16;
+    options.polygons = true;
+    options.bytes = argc > 5 ? strtoull(argv[5], NULL, 10) : 0;
+    for (int k = 0; k < 3; k++) {
+        observer.eye[k] = strtod(argv[2 + k], NULL);
+        observer.direction[k] = -observer.eye[k]; /* looks at the origin */
+    }
+    if (ebpo_open(&file, argv[1], &error) != EBPO_OK || ebpo_view_stream_new(&stream, file, &options, &error) != EBPO_OK)
+        goto done;
+    for (int frame = 0; frame < 2 && error.status == EBPO_OK; frame++) {
+        uint64_t arrived = 0, polygons = 0;
+        while (ebpo_view_stream_next(stream, &node, &end, &error) == EBPO_OK && end == EBPO_VIEW_NODE)
+            arrived++; /* children replace their parent when node.complete */
+        ebpo_view_stats stats;
+        ebpo_view_stream_get_stats(stream, &stats);
+        ebpo_view_stream_cut(stream, draw, &polygons);
+        printf("%" PRIu64 " nodes more, %" PRIu64 " bytes read: %" PRIu64 " polygons to draw, no node larger than %.3g pixels\n", arrived, stats.bytes_read, polygons, stats.pixels);
+        for (int k = 0; k < 3; k++)
+            observer.eye[k] /= 2; /* half as far away: what is there already is not read again */
+        if (error.status == EBPO_OK && ebpo_view_stream_change(stream, &options, &error) != EBPO_OK)
+            break;
+    }
+done:
+    if (error.status != EBPO_OK)
+        fprintf(stderr, "view_nodes: %s\n", error.message);
+    ebpo_view_stream_free(stream);
+    ebpo_close(file);
+    return error.status != EBPO_OK;
+}
