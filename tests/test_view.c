@@ -546,6 +546,59 @@ START_TEST(trees_of_several_chunks_come_whole_too)
 }
 END_TEST
 
+static bool add_share(void *user, const ebpo_view_node *n)
+{
+    *(double *)user += ldexp(1, -3 * n->level);
+    return true;
+}
+
+/* Nothing is known below a pruned node: it stays, as nothing else covers its cell. */
+START_TEST(pruned_nodes_of_subsets_stay_in_the_cut)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    uint64_t random = 3, pruned = 0;
+    ebpo_file *whole = open_solid(_i % 2 ? "touching_at_vertex" : "sphere", 4);
+    const ebpo_info *info = ebpo_file_info(whole);
+    ebpo_subset_options options = EBPO_SUBSET_OPTIONS_INIT;
+    options.last_level = _i < 2 ? info->level_count - 2 : -1;
+    options.boxed = _i > 1;
+    for (int k = 0; k < 3; k++) {
+        options.min[k] = info->box_origin[k] + 0.2 * info->box_size[k];
+        options.max[k] = info->box_origin[k] + 0.45 * info->box_size[k];
+    }
+    ck_assert_msg(ebpo_subset(whole, path, &options, &error) == EBPO_OK, "%s", error.message);
+    ebpo_close(whole);
+    ebpo_file *file = open_file();
+    info = ebpo_file_info(file);
+    for (int level = 0; level < info->level_count; level++)
+        pruned += info->level[level].pruned_count;
+    ck_assert_uint_gt(pruned, 0);
+    records all = read_records(file, true);
+    for (int priority = 0; priority < PRIORITIES; priority++) {
+        ebpo_observer observer = observer_of(file, &random);
+        ebpo_view_options view = options_of((ebpo_priority)priority, &observer);
+        view.polygons = true;
+        viewer v = viewer_new(&all, &view);
+        ebpo_view_stream *stream = new_view(file, &view);
+        ebpo_view_stats stats;
+        ebpo_view_node node;
+        double share = 0;
+        while (next(stream, &node) == EBPO_VIEW_NODE)
+            take(&v, &node, false);
+        ck_assert_uint_eq(v.count, all.count);
+        ebpo_view_stream_cut(stream, add_share, &share);
+        EXPECT(share == 1);
+        ebpo_view_stream_get_stats(stream, &stats);
+        ck_assert_uint_eq(stats.waiting, 0);
+        ck_assert_uint_eq(stats.cut[EBPO_GRAY], pruned);
+        viewer_free(&v);
+        ebpo_view_stream_free(stream);
+    }
+    free(all.at);
+    ebpo_close(file);
+}
+END_TEST
+
 /* For any ray from the eye: cells that it passes are refined in the order in which it meets them, each with all that is below it. */
 START_TEST(refining_front_to_back_follows_every_ray)
 {
@@ -845,6 +898,7 @@ int main(void)
     tcase_add_checked_fixture(tests, make_folder, remove_folder);
     tcase_add_loop_test(tests, an_exhausted_stream_has_all_nodes_in_order_and_a_cut_at_any_time, 0, ebpo_test_solid_count);
     tcase_add_loop_test(tests, trees_of_several_chunks_come_whole_too, 0, 4);
+    tcase_add_loop_test(tests, pruned_nodes_of_subsets_stay_in_the_cut, 0, 4);
     tcase_add_loop_test(tests, refining_front_to_back_follows_every_ray, 0, 6);
     tcase_add_loop_test(tests, what_is_small_far_deep_or_unseen_is_not_refined, 0, 4);
     tcase_add_loop_test(tests, an_observer_who_moves_changes_what_comes_next, 0, 6);

@@ -109,7 +109,7 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *erro
 /* Files that other programs have rewritten may state what is no longer true. */
 static void judge_index(ebpo_info *info, uint64_t size)
 {
-    enum { INDEX_BYTES_MOST = 256 << 20 };
+    enum { INDEX_BYTES_MOST = 64 << 20 };
     if (info->chunk_index_offset > size || info->chunk_index_bytes > size - info->chunk_index_offset || info->chunk_index_bytes > INDEX_BYTES_MOST)
         info->chunk_index_offset = info->chunk_index_bytes = 0;
 }

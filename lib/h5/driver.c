@@ -50,23 +50,46 @@ static bool take(const uint8_t *buffer, uint64_t begin, uint64_t bytes, uint64_t
     return true;
 }
 
-static bool in_index(const ebpo_h5_driver *d, uint64_t at)
+static bool within(ebpo_range r, uint64_t at, uint64_t size)
 {
-    return at >= d->index.offset && at - d->index.offset < d->index.size;
+    return at >= r.offset && at - r.offset < r.size && size <= r.size - (at - r.offset);
 }
 
-static ebpo_status move_window(ebpo_h5_driver *d, uint64_t at)
+static ebpo_status fetch_table(ebpo_h5_driver *d, uint64_t at, uint64_t size, void *data)
 {
-    uint64_t left = in_index(d, at) ? d->index.offset + d->index.size - at : d->input->source.size - at;
+    uint8_t *table = d->table ? d->table : ebpo_alloc(d->index.size, 1);
+    if (!table)
+        return ebpo_fail_memory(&d->error, d->index.size);
+    ebpo_status status = d->table ? EBPO_OK : ebpo_input_read(d->input, d->index.offset, d->index.size, table, &d->error);
+    if (status != EBPO_OK) {
+        free(table);
+        return status;
+    }
+    d->table = table;
+    memcpy(data, table + (at - d->index.offset), (size_t)size);
+    return EBPO_OK;
+}
+
+/* Windows begin at multiples of half their size, so that reading to and fro around a place does not move them. They do not reach into the index, which comes as a whole. */
+static ebpo_range window_around(const ebpo_h5_driver *d, uint64_t at)
+{
+    uint64_t begin = at / (WINDOW_BYTES / 2) * (WINDOW_BYTES / 2), end = d->input->source.size;
+    if (d->index.size && at < d->index.offset)
+        end = d->index.offset;
+    return (ebpo_range){ begin, end - begin < WINDOW_BYTES ? end - begin : WINDOW_BYTES };
+}
+
+static ebpo_status move_window(ebpo_h5_driver *d, ebpo_range to)
+{
     if (!d->window)
         d->window = ebpo_alloc(WINDOW_BYTES, 1);
     if (!d->window)
         return ebpo_fail_memory(&d->error, WINDOW_BYTES);
     d->window_bytes = 0; /* in case that reading fails */
-    ebpo_status status = ebpo_input_read(d->input, at, left < WINDOW_BYTES ? left : WINDOW_BYTES, d->window, &d->error);
+    ebpo_status status = ebpo_input_read(d->input, to.offset, to.size, d->window, &d->error);
     if (status == EBPO_OK) {
-        d->window_at = at;
-        d->window_bytes = left < WINDOW_BYTES ? left : WINDOW_BYTES;
+        d->window_at = to.offset;
+        d->window_bytes = to.size;
     }
     return status;
 }
@@ -76,11 +99,14 @@ static ebpo_status fetch(ebpo_h5_driver *d, uint64_t at, uint64_t size, void *da
 {
     if (take(d->head, 0, d->head_bytes, at, size, data) || take(d->window, d->window_at, d->window_bytes, at, size, data))
         return EBPO_OK;
-    if (size > WINDOW_BYTES || (in_index(d, at) && size > d->index.offset + d->index.size - at))
+    if (within(d->index, at, size))
+        return fetch_table(d, at, size, data);
+    ebpo_range window = window_around(d, at);
+    if (!within(window, at, size))
         return ebpo_input_read(d->input, at, size, data, &d->error);
-    ebpo_status status = move_window(d, at);
+    ebpo_status status = move_window(d, window);
     if (status == EBPO_OK)
-        memcpy(data, d->window, (size_t)size);
+        memcpy(data, d->window + (at - window.offset), (size_t)size);
     return status;
 }
 

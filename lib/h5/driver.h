@@ -13,8 +13,9 @@ typedef struct ebpo_h5_driver {
     ebpo_input *input;
     hid_t id;               /* libhdf5's registration of the driver */
     uint8_t *head, *window; /* the first bytes, and a piece elsewhere, NULL until needed */
+    uint8_t *table;         /* all of `index`, NULL until needed */
     uint64_t head_bytes, window_at, window_bytes;
-    ebpo_range index;       /* a window that begins within it ends with it */
+    ebpo_range index;
     ebpo_status status;     /* of the input's first failure; libhdf5 only learns that there was one */
     ebpo_error error;
     /* While recording, reads of raw data only leave here what they asked for. Reading a chunk is the one call of libhdf5 1.10 that finds

@@ -133,7 +133,7 @@ static ebpo_status read_group(ebpo_view_stream *s, ebpo_group_place place, ebpo_
     return status == EBPO_OK ? ebpo_group_read(s->chunks, place.level, place.group, wanted, &s->read, error) : status;
 }
 
-/* Begins with the children of the top of the frontier, or with the root. */
+/* Begins with the children of the top of the frontier, or with the root. Of a pruned node there are none: it stays in the cut, and the call is to be made again. */
 static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_error *error)
 {
     bool root = s->grown.group_count == 0;
@@ -152,6 +152,10 @@ static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_err
     ebpo_status status = read_group(s, place, &why);
     if (status == EBPO_E_LIMIT && ebpo_chunks_refused(s->chunks)) {
         *end = EBPO_VIEW_BYTES;
+        return EBPO_OK;
+    }
+    if (status == EBPO_OK && !root && s->info->pruned && s->read.types == 0) {
+        (void)ebpo_frontier_pop(&s->frontier);
         return EBPO_OK;
     }
     if (status == EBPO_OK)
@@ -186,7 +190,7 @@ static void end_group(ebpo_view_stream *s)
         ebpo_grown_node node = { group, (uint8_t)octant };
         ebpo_node_type type = ebpo_grown_type(&s->grown, node);
         s->cut[type]++;
-        if (type == EBPO_GRAY) {
+        if (type == EBPO_GRAY && ebpo_octcode_level(ebpo_grown_octcode(&s->grown, node)) + 1 < s->info->level_count) { /* else pruned */
             ebpo_waiting w = { .octcode = ebpo_grown_octcode(&s->grown, node), .below = ebpo_grown_children(&s->grown, node), .group = group, .octant = (uint8_t)octant };
             rank(s, &w);
             ebpo_frontier_push(&s->frontier, w);
@@ -222,7 +226,7 @@ void ebpo_view_fill(ebpo_view_stream *s, ebpo_grown_node node, ebpo_view_node *o
 ebpo_status ebpo_view_stream_next(ebpo_view_stream *s, ebpo_view_node *out, ebpo_view_end *end, ebpo_error *error)
 {
     *end = EBPO_VIEW_NODE;
-    if (!s->delivering) {
+    while (!s->delivering) {
         ebpo_status status = begin_group(s, end, error);
         if (status != EBPO_OK || *end != EBPO_VIEW_NODE)
             return status;
