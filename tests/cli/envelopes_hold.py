@@ -1,4 +1,4 @@
-"""envelopes_hold.py OUT.xdmf|OUT.vtkhdf INFO.json SOURCE.ply: what ebpo export wrote, read with h5py, is what ebpo info tells.
+"""envelopes_hold.py OUT.xdmf|OUT.vtkhdf INFO.json NODES.json SOURCE.ply: what ebpo export wrote, read with h5py, is what ebpo info and ebpo levels --nodes tell.
 
 Every envelope is a closed polyhedron in its node's cell, with the volume that stands beside it; the nodes of a level cover each place once, and their volumes add up to the level's.
 The mesh is the source's, by the source's numbers."""
@@ -14,6 +14,7 @@ import numpy
 import export_reads
 
 GRAY, LEAF, BLACK = 3, 2, 1
+TYPE_NAMES = ["white", "black", "leaf", "gray"]
 
 
 def xdmf_blocks(path):
@@ -104,7 +105,7 @@ def check_polyhedron(points, polygons):
     return volume
 
 
-def check_level(number, points, cells, data, info):
+def check_level(number, points, cells, data, info, nodes):
     levels = info["levels"]
     assert len(cells) == levels[number]["gray"] + sum(v["leaf"] + v["black"] for v in levels[:number + 1])
     assert all(len(values) == len(cells) for values in data.values())
@@ -115,7 +116,7 @@ def check_level(number, points, cells, data, info):
         level, low, size = cell_of(code, info)
         kind = data["type"][i]
         assert level == data["level"][i] <= number and kind in (GRAY, LEAF, BLACK) and (kind != GRAY or level == number)
-        assert kind == LEAF or (data["winding"][i] == 0) == (kind == GRAY)
+        assert (TYPE_NAMES[kind], data["winding"][i]) == nodes[code]
         corners = sorted({c for polygon in polygons for c in polygon})
         used += len(corners)
         assert (points[corners] >= low - 1e-12 * size).all() and (points[corners] <= low + size * (1 + 1e-12)).all()
@@ -139,16 +140,18 @@ def check_mesh(points, cells, data, source):
 
 
 def main():
-    path, about, source = sys.argv[1:]
+    path, about, told, source = sys.argv[1:]
     with open(about, encoding="utf-8") as f:
         info = json.load(f)
+    with open(told, encoding="utf-8") as f:
+        nodes = {n["octcode"]: (n["type"], n["winding"]) for level in json.load(f)["levels"] for n in level["nodes"]}
     blocks = (xdmf_blocks if path.endswith(".xdmf") else vtkhdf_blocks)(path)
     assert list(blocks) == [f"level_{i:02d}" for i in range(len(info["levels"]))] + ["mesh"], list(blocks)
     for name, (points, cells, data) in blocks.items():
         if name == "mesh":
             check_mesh(points, cells, data, source)
         else:
-            check_level(int(name[6:]), points, cells, data, info)
+            check_level(int(name[6:]), points, cells, data, info, nodes)
     print("fine")
 
 
