@@ -1,13 +1,13 @@
 #!/bin/sh
-# paraview.sh EBPO CLI_INPUTS SOURCE_ROOT: ParaView opens what ebpo export writes, counts what it tells, and draws it. Skips (77) without pvpython, or without a display and xvfb-run:
-# apt install paraview python3-paraview xvfb xauth
+# paraview.sh EBPO CLI_INPUTS SOURCE_ROOT: ParaView opens what ebpo export writes, counts what it tells, and draws it. Skips (77) without pvpython, or without a display and xvfb-run; tools/install-deps.sh --paraview
+# installs all of it.
 set -eu
 tests=$(cd "$(dirname "$0")" && pwd)
 ebpo=$(realpath "$1") inputs=$(realpath "$2") root=$3
-command -v pvpython >/dev/null || { echo "skipped: no pvpython; apt install paraview python3-paraview xvfb xauth"; exit 77; }
+command -v pvpython >/dev/null || { echo "skipped: no pvpython; tools/install-deps.sh --paraview installs it"; exit 77; }
 display=
 if [ -z "${DISPLAY:-}" ]; then
-    command -v xvfb-run >/dev/null || { echo "skipped: no display and no xvfb-run; apt install xvfb xauth"; exit 77; }
+    command -v xvfb-run >/dev/null || { echo "skipped: no display and no xvfb-run; tools/install-deps.sh --paraview installs it"; exit 77; }
     display="xvfb-run -a"
 fi
 folder=$(mktemp -d)
