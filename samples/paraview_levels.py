@@ -71,7 +71,7 @@ def look_at(view):
 
 
 def main():
-    path, picture = os.path.abspath(sys.argv[1]), sys.argv[2]  # beside a relative name this reader does not find the HDF5 file
+    path, picture = os.path.abspath(sys.argv[1]), sys.argv[2]  # beside a bare name this reader does not find the HDF5 file
     reader = Xdmf3ReaderT(FileName=[path])
     reader.UpdatePipeline()
     levels = [int(name[6:]) for name in grid_names(reader) if name.startswith("level_")]

@@ -1,4 +1,5 @@
 /* Any bytes as a file: opening, reading everything and asking ends in a status, nothing else. */
+#include <ebpo/lod.h>
 #include <ebpo/query.h>
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
@@ -43,6 +44,18 @@ static void ask(ebpo_file *file, int cut_level)
     ebpo_model_close(model);
 }
 
+static void cut_level(ebpo_file *file)
+{
+    ebpo_lod_options options = EBPO_LOD_OPTIONS_INIT;
+    ebpo_mesh mesh;
+    ebpo_lod_nodes nodes;
+    options.threads = 1;
+    if (ebpo_lod_level_nodes(file, ebpo_file_info(file)->level_count - 1, &options, &mesh, &nodes, NULL, NULL) != EBPO_OK)
+        return;
+    ebpo_lod_nodes_free(&nodes);
+    ebpo_mesh_free(&mesh);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     ebpo_file *file;
@@ -55,6 +68,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (ebpo_file_read_source_mesh(file, &mesh, NULL, 1, NULL) == EBPO_OK)
         ebpo_mesh_free(&mesh);
     (void)!ebpo_file_check_content(file, 1, NULL);
+    cut_level(file);
     for (int cut = -1; cut < 3; cut++)
         ask(file, cut);
     ebpo_close(file);
