@@ -9,13 +9,13 @@
 #include "morton/octcode.h"
 
 const ebpo_column ebpo_columns[EBPO_COLUMNS] = {
-    { "octcode", "the node: a leading 1 and three bits a level", EBPO_H5_I64 },
-    { "level", "of the node in the octree; mesh -1", EBPO_H5_I32 },
-    { "type", "1 black, 2 leaf, 3 gray; mesh -1", EBPO_H5_I32 },
-    { "winding", "winding number: black in the cell, leaf at its lowest corner", EBPO_H5_I32 },
-    { "volume", "of the envelope", EBPO_H5_F64 },
-    { "source_face", "number in the source mesh, -1: none", EBPO_H5_I64 },
-    { "lod", "level of detail that it is drawn at; mesh -1", EBPO_H5_I32 },
+    { "octcode", EBPO_H5_I64 },     /* of the node; mesh 0 */
+    { "level", EBPO_H5_I32 },       /* of the node in the octree; mesh -1 */
+    { "type", EBPO_H5_I32 },        /* as in ebpo_node_type; mesh -1 */
+    { "winding", EBPO_H5_I32 },     /* black: in the cell; leaf: at its lowest corner; else 0 */
+    { "volume", EBPO_H5_F64 },      /* of the envelope; mesh 0 */
+    { "source_face", EBPO_H5_I64 }, /* number in the source mesh; envelopes, and without maps: -1 */
+    { "lod", EBPO_H5_I32 },         /* level of detail that it belongs to; mesh -1 */
 };
 
 int ebpo_block_count(const ebpo_export_options *o)

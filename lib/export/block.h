@@ -28,7 +28,7 @@ void ebpo_block_tell(const ebpo_block *block, ebpo_export_report *report);
 
 /* A number for each node, or for each polygon that of its node; of the mesh, for each triangle. */
 typedef struct ebpo_column {
-    const char *name, *about;
+    const char *name;
     ebpo_h5_number number;
 } ebpo_column;
 enum { EBPO_COLUMN_OCTCODE, EBPO_COLUMN_LEVEL, EBPO_COLUMN_TYPE, EBPO_COLUMN_WINDING, EBPO_COLUMN_VOLUME, EBPO_COLUMN_SOURCE_FACE, EBPO_COLUMN_LOD, EBPO_COLUMNS,

@@ -75,21 +75,27 @@ def farthest(tool, file, group, info, size):
     return 100 * certain / size, 100 * max(answers[:, 0].max(), 0) / size
 
 
-def study(tool, model, folder):
+def study(tool, model, folder, leaf_planes):
     file = folder / (model.stem + ".ebpo.h5")
-    run(tool, "convert", "-q", model, file)
+    bare = folder / (model.stem + ".bare.ebpo.h5")  # the same tree, as a reader without the mesh has it
+    extra = ["--with", "leaf-planes"] if leaf_planes else []
+    run(tool, "convert", "-q", *extra, model, file)
+    run(tool, "convert", "-q", *extra, "--without", "mesh", model, bare)
     info = json.loads(run(tool, "info", "--json", file))
     levels = json.loads(run(tool, "levels", "--json", file))["levels"]
+    fetched = json.loads(run(tool, "levels", "--json", bare))["levels"]
+    assert all(a[k] == b[k] for a, b in zip(levels, fetched) for k in ("gray", "leaf", "white", "black", "planes"))
     solid = info["report"]["volume"]
     size = numpy.linalg.norm(info["box_size"])
-    rows = [{"level": v["level"], "bytes": v["cumulative_bytes"], "excess": 100 * (v["volume"] - solid) / solid} for v in levels]
+    rows = [{"level": v["level"], "bytes": v["cumulative_bytes"], "excess": 100 * (b["volume"] - solid) / solid, "derived": 100 * (v["volume"] - solid) / solid}
+            for v, b in zip(levels, fetched)]
     last = next((r["level"] for r in rows if r["excess"] <= min(GOALS)), rows[-1]["level"])
-    run(tool, "export", "-q", "--levels", f"0-{last}", file, folder / "x.xdmf")
+    run(tool, "export", "-q", "--levels", f"0-{last}", bare, folder / "x.xdmf")
     with h5py.File(folder / "x.xdmf.h5", "r") as shapes:
         for r in rows[:last + 1]:
             r["certain"], r["seen"] = farthest(tool, file, shapes[f"level_{r['level']:02d}"], info, size)
     packed = len(run("zstd", "-19", "-q", "-c", model))
-    return {"name": model.stem, "info": info, "rows": rows, "last": last, "ply": model.stat().st_size, "packed": packed}
+    return {"name": model.stem, "leaf_planes": leaf_planes, "info": info, "rows": rows, "last": last, "ply": model.stat().st_size, "packed": packed}
 
 
 def table(*rows):
@@ -100,7 +106,7 @@ def table(*rows):
 def goal_table(models):
     rows = [["model", "faces", "PLY, zstd -19", "file", *(f"excess ≤ {g} %" for g in GOALS)]]
     for m in models:
-        row = [m["name"], f"{m['info']['faces']:,}", f"{m['packed']:,}", f"{m['info']['bytes']['file']:,}"]
+        row = [m["name"] + (", leaf planes" if m["leaf_planes"] else ""), f"{m['info']['faces']:,}", f"{m['packed']:,}", f"{m['info']['bytes']['file']:,}"]
         for goal in GOALS:
             r = next((r for r in m["rows"] if r["excess"] <= goal), None)
             row.append(f"{r['bytes']:,} ({100 * r['bytes'] / m['packed']:.1f} % of the PLY's; level {r['level']}, {r['excess']:.2f} %; reaches {r['seen']:.2f} %, "
@@ -110,24 +116,26 @@ def goal_table(models):
 
 
 def level_table(m):
-    rows = [["level", "bytes so far", "% of PLY, zstd -19", "excess of volume, %", "reaches, % of diagonal", "certainly at most, %"]]
+    rows = [["level", "bytes so far", "% of PLY, zstd -19", "excess of volume, %", "leaves derived, %", "reaches, % of diagonal", "certainly at most, %"]]
     for r in m["rows"]:
         far = [f"{r['seen']:.3f}", f"{r['certain']:.2f}"] if "seen" in r else ["", ""]
-        rows.append([r["level"], f"{r['bytes']:,}", f"{100 * r['bytes'] / m['packed']:.1f}", f"{r['excess']:.2f}", *far])
-    rows.append(["file", f"{m['info']['bytes']['file']:,}", f"{100 * m['info']['bytes']['file'] / m['packed']:.1f}", "", "", ""])
-    return f"**{m['name']}**, {m['info']['faces']:,} faces; PLY {m['ply']:,} bytes, with zstd -19 {m['packed']:,}\n\n" + table(*rows)
+        rows.append([r["level"], f"{r['bytes']:,}", f"{100 * r['bytes'] / m['packed']:.1f}", f"{r['excess']:.2f}", f"{r['derived']:.2f}", *far])
+    rows.append(["file", f"{m['info']['bytes']['file']:,}", f"{100 * m['info']['bytes']['file'] / m['packed']:.1f}", "", "", "", ""])
+    return f"**{m['name']}{', with leaf planes' if m['leaf_planes'] else ''}**, {m['info']['faces']:,} faces; PLY {m['ply']:,} bytes, with zstd -19 {m['packed']:,}\n\n" + table(*rows)
 
 
-def thesis_table(m):
-    title, sent, volume = THESIS[m["name"]]
+def thesis_table(plain, planes):
+    title, sent, volume = THESIS[plain["name"]]
     total = list(itertools.accumulate(sent))
-    rows = [["level", f"BP-Octree ({title}): bytes so far", "excess, %", f"here ({m['info']['faces']:,} faces): bytes so far", "excess, %"]]
-    for i in range(max(len(total), len(m["rows"]))):
-        theirs = [f"{total[i]:,}" if i < len(total) else "", f"{volume[i] - 100:.2f}" if i < len(volume) else ""]
-        ours = [f"{m['rows'][i]['bytes']:,}", f"{m['rows'][i]['excess']:.2f}"] if i < len(m["rows"]) else ["", ""]
-        rows.append([i, *theirs, *ours])
-    mesh = m["info"]["bytes"]
-    rows.append(["mesh", "in the levels above", "", f"{m['rows'][-1]['bytes'] + mesh['vertices'] + mesh['faces']:,}", ""])
+    rows = [["level", f"BP-Octree ({title}): bytes so far", "excess, %", f"here ({plain['info']['faces']:,} faces): bytes so far", "excess, %", "with leaf planes: bytes so far",
+             "excess, %"]]
+    for i in range(max(len(total), len(plain["rows"]))):
+        row = [i, f"{total[i]:,}" if i < len(total) else "", f"{volume[i] - 100:.2f}" if i < len(volume) else ""]
+        for m in (plain, planes):
+            row += [f"{m['rows'][i]['bytes']:,}", f"{m['rows'][i]['excess']:.2f}"] if i < len(m["rows"]) else ["", ""]
+        rows.append(row)
+    whole = [f"{m['rows'][-1]['bytes'] + m['info']['bytes']['vertices'] + m['info']['bytes']['faces']:,}" for m in (plain, planes)]
+    rows.append(["mesh", "in the levels above", "", whole[0], "", whole[1], ""])
     return table(*rows)
 
 
@@ -148,8 +156,8 @@ the needle of a leaf, which deeper levels do not change.
 """
 
 LEVELS = """## By level
-Files hold all of this and the mesh, its order in the source, checksums. Volumes are with leaves' planes derived from their faces, as `ebpo info` has them; who has not yet fetched the mesh sees a leaf's parent's envelope
-in the leaf's cell.
+Excess, reach and bound are those of what has been fetched, without the mesh: a leaf has its parent's envelope in its own cell, or with `convert --with leaf-planes` its own. *Leaves derived*: the excess once the mesh
+is there too, and leaves' planes are derived from their faces, as `ebpo info` tells it. *File*: with the mesh, its order in the source, checksums. Distances only down to the level that reaches the last goal.
 """
 
 BESIDE = """## Beside the BP-Octree
@@ -165,9 +173,9 @@ def main():
     parser.add_argument("-o", "--output", type=pathlib.Path, required=True)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        models = [study(arguments.build / "tools" / "ebpo", model, pathlib.Path(folder)) for model in arguments.models]
+        models = [study(arguments.build / "tools" / "ebpo", model, pathlib.Path(folder), leaf_planes) for model in arguments.models for leaf_planes in (False, True)]
     parts = [HEAD, goal_table(models), LEVELS, *(level_table(m) for m in models)]
-    beside = [thesis_table(m) for m in models if m["name"] in THESIS]
+    beside = [thesis_table(plain, planes) for plain, planes in zip(models[::2], models[1::2]) if plain["name"] in THESIS]
     parts += [BESIDE, *beside] if beside else []
     arguments.output.write_text("\n".join(parts), encoding="utf-8")
 
