@@ -40,14 +40,16 @@ ebpo_status ebpo_h5_create_plain(ebpo_h5_out *out, const char *path, const char 
     ebpo_h5_enter(&scope);
     ebpo_status status = EBPO_OK;
     out->shown = shown;
-    hid_t fapl = H5Pcreate(H5P_FILE_ACCESS);
-    if (fapl >= 0 && H5Pset_libver_bounds(fapl, H5F_LIBVER_V18, H5F_LIBVER_V18) >= 0 && H5Pset_fclose_degree(fapl, H5F_CLOSE_STRONG) >= 0 &&
+    hid_t fapl = H5Pcreate(H5P_FILE_ACCESS), fcpl = H5Pcreate(H5P_FILE_CREATE);
+    if (fapl >= 0 && fcpl >= 0 && H5Pset_obj_track_times(fcpl, false) >= 0 && H5Pset_libver_bounds(fapl, H5F_LIBVER_V18, H5F_LIBVER_V18) >= 0 && H5Pset_fclose_degree(fapl, H5F_CLOSE_STRONG) >= 0 &&
         H5Pset_file_locking(fapl, false, true) >= 0)
-        out->file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, fapl);
+        out->file = H5Fcreate(path, H5F_ACC_TRUNC, fcpl, fapl);
     if (out->file < 0)
         status = ebpo_h5_fail(error, EBPO_E_IO, shown, "", "libhdf5 could not create the file");
     if (fapl >= 0)
         H5Pclose(fapl);
+    if (fcpl >= 0)
+        H5Pclose(fcpl);
     ebpo_h5_leave(&scope);
     return status;
 }

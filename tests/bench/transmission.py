@@ -157,7 +157,7 @@ the needle of a leaf, which deeper levels do not change.
 
 LEVELS = """## By level
 Excess, reach and bound are those of what has been fetched, without the mesh: a leaf has its parent's envelope in its own cell, or with `convert --with leaf-planes` its own. *Leaves derived*: the excess once the mesh
-is there too, and leaves' planes are derived from their faces, as `ebpo info` tells it. *File*: with the mesh, its order in the source, checksums. Distances only down to the level that reaches the last goal.
+is there too, and leaves' planes are derived from their faces (where they are stored: those), as `ebpo info` tells it. *File*: with the mesh, its order in the source, checksums. Distances only down to the level that reaches the last goal.
 """
 
 BESIDE = """## Beside the BP-Octree

@@ -110,7 +110,8 @@ def check_level(number, points, cells, data, info, nodes):
     assert len(cells) == levels[number]["gray"] + sum(v["leaf"] + v["black"] for v in levels[:number + 1])
     assert all(len(values) == len(cells) for values in data.values())
     codes = data["octcode"].tolist()
-    assert len(set(codes)) == len(codes) and not any(code >> 3 * i in set(codes) for code in codes for i in range(1, number + 1))
+    all_codes = set(codes)
+    assert len(all_codes) == len(codes) and not any(code >> 3 * i in all_codes for code in codes for i in range(1, number + 1))
     used = 0
     for i, (code, polygons) in enumerate(zip(codes, cells)):
         level, low, size = cell_of(code, info)
