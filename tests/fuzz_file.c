@@ -1,4 +1,5 @@
 /* Any bytes as a file: opening, reading everything and asking ends in a status, nothing else. */
+#include <ebpo/lod.h>
 #include <ebpo/query.h>
 #include <ebpo/view.h>
 
@@ -64,6 +65,18 @@ static void view(ebpo_file *file, ebpo_priority priority)
     ebpo_view_stream_free(stream);
 }
 
+static void cut_level(ebpo_file *file)
+{
+    ebpo_lod_options options = EBPO_LOD_OPTIONS_INIT;
+    ebpo_mesh mesh;
+    ebpo_lod_nodes nodes;
+    options.threads = 1;
+    if (ebpo_lod_level_nodes(file, ebpo_file_info(file)->level_count - 1, &options, &mesh, &nodes, NULL, NULL) != EBPO_OK)
+        return;
+    ebpo_lod_nodes_free(&nodes);
+    ebpo_mesh_free(&mesh);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     ebpo_file *file;
@@ -83,6 +96,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     part.write.threads = 1;
     if (ebpo_subset_tree(&tree, file, &part, NULL) == EBPO_OK)
         ebpo_tree_free(&tree);
+    cut_level(file);
     for (int cut = -1; cut < 3; cut++)
         ask(file, cut);
     view(file, EBPO_PRIORITY_LEVEL);

@@ -13,7 +13,7 @@ typedef struct command {
     int (*run)(int argc, char **argv); /* argv[0] is the command's name; returns the exit code */
 } command;
 
-extern const command command_convert, command_check, command_info, command_levels, command_extract, command_measure, command_render, command_verify;
+extern const command command_convert, command_check, command_info, command_levels, command_extract, command_export, command_measure, command_render, command_verify;
 extern const command command_inside, command_distance, command_ray, command_box, command_bench, command_subset, command_fetch, command_view;
 
 /* Prints "ebpo convert: message" and returns the exit code that the status stands for. */

@@ -12,7 +12,7 @@
 #include "words.h"
 
 static const command *const commands[] = { &command_convert, &command_check,  &command_info, &command_levels, &command_view,
-                                           &command_extract, &command_subset, &command_fetch, &command_measure, &command_render, &command_verify,
+                                           &command_extract, &command_export, &command_subset, &command_fetch, &command_measure, &command_render, &command_verify,
                                            &command_inside,  &command_distance, &command_ray, &command_box, &command_bench };
 enum { COMMANDS = sizeof commands / sizeof *commands };
 

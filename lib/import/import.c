@@ -30,13 +30,23 @@ ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const 
 
 #include "base/alloc.h"
 #include "geom/polygon.h"
+#include "import/assimp_lock.h"
 #include "import/off_check.h"
 #include "import/weld.h"
 
 #define MOST (UINT64_C(0xfffffffe))
 
-/* aiGetErrorString is one text for the whole process. */
-static pthread_mutex_t assimp_lock = PTHREAD_MUTEX_INITIALIZER;
+static pthread_mutex_t assimp_mutex = PTHREAD_MUTEX_INITIALIZER;
+
+void ebpo_assimp_lock(void)
+{
+    pthread_mutex_lock(&assimp_mutex);
+}
+
+void ebpo_assimp_unlock(void)
+{
+    pthread_mutex_unlock(&assimp_mutex);
+}
 
 static const char *const pseudo_names[] = { "model.obj", "model.stl", "model.off" };
 static const char *const format_names[] = { "obj", "stl", "off" };
@@ -289,9 +299,9 @@ ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const 
     if (format == EBPO_IMPORT_OFF)
         status = ebpo_import_check_off(data, size, name, error);
     if (status == EBPO_OK) {
-        pthread_mutex_lock(&assimp_lock);
+        ebpo_assimp_lock();
         status = import_locked(&mesh, &file, name, error);
-        pthread_mutex_unlock(&assimp_lock);
+        ebpo_assimp_unlock();
     }
     if (status == EBPO_OK) {
         snprintf(mesh.source_name, sizeof mesh.source_name, "%s", name);

@@ -11,6 +11,7 @@
 #include "base/parallel.h"
 #include "lod/model.h"
 #include "lod/pieces.h"
+#include "morton/octcode.h"
 
 enum { SEEDS_WANTED = 128 };
 
@@ -23,6 +24,7 @@ typedef struct seed {
 typedef struct job {
     const ebpo_lod_model *model;
     bool walls, polygons; /* keep wall polygons; want polygons at all, or the volume only */
+    bool nodes;           /* want to know whose polygons they are */
     int split;            /* level at which the first walk leaves seeds */
     seed *seeds;
     uint64_t seed_count;
@@ -44,13 +46,14 @@ static double cell_volume(const ebpo_box *box, int level)
     return box->size[0] / side * (box->size[1] / side) * (box->size[2] / side);
 }
 
-static ebpo_status emit(walker *w, const ebpo_polytope *p, ebpo_cell cell)
+static ebpo_status emit(walker *w, const ebpo_polytope *p, ebpo_cell cell, ebpo_node_type type)
 {
     ebpo_lod_piece *piece = &w->out[cell.level];
     piece->volume += ebpo_polytope_volume(p) * cell_volume(&w->j->model->box, cell.level);
     if (!w->j->polygons)
         return EBPO_OK;
-    return ebpo_lod_piece_add(piece, p, &w->j->model->box, cell, w->j->walls, w->error);
+    piece->wants_nodes = w->j->nodes;
+    return ebpo_lod_piece_add(piece, p, &w->j->model->box, cell, type, w->j->walls, w->error);
 }
 
 static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell, const ebpo_polytope *parent);
@@ -68,7 +71,7 @@ static ebpo_status visit_gray(walker *w, uint64_t gray, ebpo_cell cell, ebpo_pol
         ebpo_lod_cut(envelope, level->planes + w->j->model->index[cell.level].plane_first[gray],
                      level->plane_counts[gray]);
     if (cell.level == w->j->model->target)
-        return emit(w, envelope, cell);
+        return emit(w, envelope, cell, EBPO_GRAY);
     if (cell.level == w->stop) {
         seed *s = &w->j->seeds[w->j->seed_count++];
         s->cell = cell;
@@ -91,7 +94,7 @@ static ebpo_status visit_node(walker *w, uint64_t group, unsigned octant, ebpo_c
     if (type == EBPO_GRAY)
         return visit_gray(w, rank + index->gray_before[group], cell, envelope);
     ebpo_status status = ebpo_lod_leaf(model, cell, rank + index->leaf_before[group], w->scratch, envelope, w->error);
-    return status == EBPO_OK ? emit(w, envelope, cell) : status;
+    return status == EBPO_OK ? emit(w, envelope, cell, EBPO_LEAF) : status;
 }
 
 /* Black nodes are their whole cell. */
@@ -99,7 +102,7 @@ static ebpo_status visit_black(walker *w, ebpo_cell cell)
 {
     ebpo_polytope cube;
     ebpo_polytope_cube(&cube);
-    return emit(w, &cube, cell);
+    return emit(w, &cube, cell, EBPO_BLACK);
 }
 
 static ebpo_status visit_root(walker *w)
@@ -184,7 +187,7 @@ static ebpo_status walk(job *j, unsigned threads, const ebpo_progress *progress,
 }
 
 /* Level after level, and within one level first the top's nodes or the seeds' in their order. */
-static ebpo_status join(job *j, ebpo_mesh *out, double *volume, ebpo_error *error)
+static ebpo_status join(job *j, ebpo_mesh *out, ebpo_lod_nodes *nodes, double *volume, ebpo_error *error)
 {
     uint64_t count = j->seed_count + 1, listed = 0;
     ebpo_lod_piece **list = ebpo_alloc(count * EBPO_LEVELS_MAX, sizeof *list);
@@ -198,7 +201,7 @@ static ebpo_status join(job *j, ebpo_mesh *out, double *volume, ebpo_error *erro
         }
     if (volume)
         *volume = sum;
-    ebpo_status status = out ? ebpo_lod_join(out, list, listed, error) : EBPO_OK;
+    ebpo_status status = out ? ebpo_lod_join(out, nodes, list, listed, error) : EBPO_OK;
     free(list);
     return status;
 }
@@ -215,14 +218,52 @@ static void job_free(job *j, unsigned threads)
     free(j->seeds);
 }
 
+void ebpo_lod_nodes_free(ebpo_lod_nodes *nodes)
+{
+    if (!nodes)
+        return;
+    free(nodes->nodes);
+    free(nodes->corners);
+    memset(nodes, 0, sizeof *nodes);
+}
+
+/* Joined nodes come level after level, each in octcode order, and every leaf and black node of a level is there: so running counts are their ranks. */
+static void add_windings(ebpo_lod_nodes *nodes, const ebpo_lod_model *model)
+{
+    uint64_t leaf = 0, black = 0;
+    int before = 0;
+    for (uint64_t i = 0; i < nodes->node_count; i++) {
+        ebpo_lod_node *n = &nodes->nodes[i];
+        int level = ebpo_cell_of_octcode(n->octcode).level;
+        if (level != before)
+            leaf = black = 0;
+        before = level;
+        const ebpo_level *l = &model->level[level];
+        if (n->type == EBPO_LEAF)
+            n->winding = l->leaf_winding ? l->leaf_winding[leaf++] : 0;
+        else if (n->type == EBPO_BLACK)
+            n->winding = l->black_winding ? l->black_winding[black++] : 1;
+    }
+}
+
 ebpo_status ebpo_lod_level(ebpo_file *file, int level, const ebpo_lod_options *options, ebpo_mesh *out, double *volume,
                            ebpo_error *error)
+{
+    return ebpo_lod_level_nodes(file, level, options, out, NULL, volume, error);
+}
+
+ebpo_status ebpo_lod_level_nodes(ebpo_file *file, int level, const ebpo_lod_options *options, ebpo_mesh *out,
+                                 ebpo_lod_nodes *nodes, double *volume, ebpo_error *error)
 {
     static const ebpo_lod_options defaults = EBPO_LOD_OPTIONS_INIT;
     if (!options)
         options = &defaults;
     if (out)
         memset(out, 0, sizeof *out);
+    if (nodes)
+        memset(nodes, 0, sizeof *nodes);
+    if (nodes && !out)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "a level's nodes are told with its polygons only");
     const ebpo_info *info = ebpo_file_info(file);
     if (level < 0 || level >= info->level_count)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "there is no level %d; this file has levels 0 to %d", level,
@@ -232,12 +273,16 @@ ebpo_status ebpo_lod_level(ebpo_file *file, int level, const ebpo_lod_options *o
     ebpo_status status = ebpo_lod_model_read(&model, file, level, threads, error);
     if (status != EBPO_OK)
         return status;
-    job j = { .model = &model, .walls = options->walls, .polygons = out != NULL };
+    job j = { .model = &model, .walls = options->walls, .polygons = out != NULL, .nodes = nodes != NULL };
     status = prepare(&j, threads, error);
     if (status == EBPO_OK)
         status = walk(&j, threads, &options->progress, error);
     if (status == EBPO_OK)
-        status = join(&j, out, volume, error);
+        status = join(&j, out, nodes, volume, error);
+    if (status == EBPO_OK && nodes)
+        add_windings(nodes, &model);
+    if (status != EBPO_OK)
+        ebpo_lod_nodes_free(nodes);
     job_free(&j, threads);
     ebpo_lod_model_free(&model);
     return status;

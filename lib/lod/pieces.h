@@ -2,7 +2,7 @@
 #ifndef EBPO_LOD_PIECES_H
 #define EBPO_LOD_PIECES_H
 
-#include <ebpo/file.h>
+#include <ebpo/lod.h>
 
 #include "geom/cell.h"
 #include "geom/polytope.h"
@@ -12,19 +12,23 @@ typedef struct ebpo_lod_piece {
     double *xyz;     /* [vertex_count][3] */
     uint32_t *faces; /* [face_count][3], numbers within the piece */
     uint64_t vertex_count, vertex_room, face_count, face_room;
+    bool wants_nodes; /* keep the two arrays below */
+    ebpo_lod_node *nodes;
+    uint8_t *corners;
+    uint64_t node_count, node_room, polygon_count, polygon_room;
     double volume;
 } ebpo_lod_piece;
 
 void ebpo_lod_piece_free(ebpo_lod_piece *piece);
 
-/* Appends the polytope (cell coordinates) of a cell as triangle fans; with `walls` false without the polygons on the
- * cell's walls. */
+/* Appends the polytope (cell coordinates) of a cell's node as triangle fans; with `walls` false without the polygons on
+ * the cell's walls. */
 EBPO_MUST_USE ebpo_status ebpo_lod_piece_add(ebpo_lod_piece *piece, const ebpo_polytope *p, const ebpo_box *box,
-                                             ebpo_cell cell, bool walls, ebpo_error *error);
+                                             ebpo_cell cell, ebpo_node_type type, bool walls, ebpo_error *error);
 
 /* Joins `count` pieces, in order, to a mesh of double vertices; pieces are freed on the way. EBPO_E_LIMIT beyond 2^32 -
- * 2 vertices or faces. */
-EBPO_MUST_USE ebpo_status ebpo_lod_join(ebpo_mesh *out, ebpo_lod_piece *const *pieces, uint64_t count,
-                                        ebpo_error *error);
+ * 2 vertices or faces. `nodes` may be NULL, else all pieces have kept theirs; windings are left 0. */
+EBPO_MUST_USE ebpo_status ebpo_lod_join(ebpo_mesh *out, ebpo_lod_nodes *nodes, ebpo_lod_piece *const *pieces,
+                                        uint64_t count, ebpo_error *error);
 
 #endif

@@ -6,6 +6,7 @@
 #include <ebpo/mesh.h>
 #include <ebpo/file.h>
 #include <ebpo/build.h>
+#include <ebpo/export.h>
 #include <ebpo/http.h>
 #include <ebpo/lod.h>
 #include <ebpo/query.h>

@@ -22,6 +22,29 @@ typedef struct ebpo_lod_options {
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_level(ebpo_file *file, int level, const ebpo_lod_options *options,
                                                   ebpo_mesh *out, double *volume, ebpo_error *error);
 
+/* One node of a level's envelopes. */
+typedef struct ebpo_lod_node {
+    uint64_t octcode;
+    double volume;          /* of the envelope, in the model's unit cubed */
+    int32_t winding;        /* black: in the cell; leaf: at the lowest corner; gray, and surfaces: 0 */
+    ebpo_node_type type;    /* gray (of the level asked for only), leaf or black */
+    uint32_t vertex_count, polygon_count; /* of the polyhedron, less what `walls` left out */
+} ebpo_lod_node;
+
+/* Whose the triangles of ebpo_lod_level are. Nodes come level after level and in octcode order; the mesh holds their vertices and triangles in the same order. A polygon of n corners
+ * is a fan of n - 2 triangles around its first corner: corners 0 and 1 of its first triangle, then corner 2 of each. */
+typedef struct ebpo_lod_nodes {
+    uint64_t node_count, polygon_count;
+    ebpo_lod_node *nodes; /* [node_count] */
+    uint8_t *corners;     /* [polygon_count] corners of each polygon, node after node */
+} ebpo_lod_nodes;
+
+EBPO_API void ebpo_lod_nodes_free(ebpo_lod_nodes *nodes);
+
+/* The same with the nodes, freed by ebpo_lod_nodes_free; with `nodes` NULL it is ebpo_lod_level. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_level_nodes(ebpo_file *file, int level, const ebpo_lod_options *options, ebpo_mesh *out,
+                                                        ebpo_lod_nodes *nodes, double *volume, ebpo_error *error);
+
 #ifdef __cplusplus
 }
 #endif

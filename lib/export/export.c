@@ -1,0 +1,84 @@
+/* Levels and the mesh in other programs' formats: what is the same for all. */
+#include <ebpo/export.h>
+
+#include <stdio.h>
+#include <string.h>
+
+#include "base/error.h"
+#include "export/block.h"
+#include "export/formats.h"
+#include "io/file.h"
+
+const char *ebpo_export_format_name(ebpo_export_format format)
+{
+    static const char *const names[] = { "xdmf", "vtkhdf", "gltf", "glb", "obj", "stl" };
+    return (unsigned)format < sizeof names / sizeof *names ? names[format] : NULL;
+}
+
+bool ebpo_export_second_file(ebpo_export_format format, const char *path, char *out, size_t room)
+{
+    const char *name = ebpo_path_name(path), *dot = strrchr(name, '.');
+    int length = -1;
+    if (room)
+        *out = 0;
+    if (format == EBPO_EXPORT_XDMF) /* readers take what follows the first ":" for the place in the HDF5 file */
+        length = strchr(name, ':') ? -1 : snprintf(out, room, "%s.h5", path);
+    else if (format == EBPO_EXPORT_GLTF)
+        length = snprintf(out, room, "%.*s.bin", (int)(dot && dot != name ? dot - path : (int)strlen(path)), path);
+    else
+        return true;
+    return length >= 0 && (size_t)length < room;
+}
+
+bool ebpo_export_goes_on(const ebpo_export_job *job, int i)
+{
+    const ebpo_progress *p = &job->options->progress;
+    return !p->report || p->report(p->user, "exporting", (uint64_t)i, (uint64_t)ebpo_block_count(job->options));
+}
+
+ebpo_status ebpo_export_stopped(ebpo_error *error)
+{
+    return ebpo_fail(error, EBPO_E_CANCELLED, "stopped as asked; nothing was written");
+}
+
+static ebpo_status check(const ebpo_info *info, ebpo_export_format format, const ebpo_export_options *o, ebpo_error *error)
+{
+    int blocks = ebpo_block_count(o), asked = o->first_level < 0 || o->first_level >= info->level_count ? o->first_level : o->last_level;
+    if (blocks == 0)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "there is nothing to export: ask for a level or for the mesh");
+    if (o->first_level <= o->last_level && (asked < 0 || asked >= info->level_count))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "there is no level %d; this file has levels 0 to %d", asked, info->level_count - 1);
+    if (format == EBPO_EXPORT_STL && blocks > 1)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "an STL file holds one thing: one level, or the mesh");
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_export(ebpo_file *file, const char *path, ebpo_export_format format, const ebpo_export_options *options, ebpo_export_report *report,
+                        ebpo_error *error)
+{
+    static const ebpo_export_options usual = EBPO_EXPORT_OPTIONS_INIT;
+    ebpo_export_report own;
+    char second[4096];
+    if (!options)
+        options = &usual;
+    if (!report)
+        report = &own;
+    memset(report, 0, sizeof *report);
+    ebpo_status status = check(ebpo_file_info(file), format, options, error);
+    if (status != EBPO_OK)
+        return status;
+    if (!ebpo_export_second_file(format, path, second, sizeof second))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: is no name for this format: too long, or with a ':'; take another", path);
+    if (options->first_level <= options->last_level)
+        ebpo_file_expect_levels(file, 0, options->last_level);
+    ebpo_export_job job = { file, path, second, format, options, report };
+    switch (format) {
+    case EBPO_EXPORT_XDMF: return ebpo_export_xdmf(&job, error);
+    case EBPO_EXPORT_VTKHDF: return ebpo_export_vtkhdf(&job, error);
+    case EBPO_EXPORT_GLTF:
+    case EBPO_EXPORT_GLB: return ebpo_export_gltf(&job, error);
+    case EBPO_EXPORT_OBJ:
+    case EBPO_EXPORT_STL: return ebpo_export_scene(&job, error);
+    }
+    return ebpo_fail(error, EBPO_E_ARGUMENT, "%d is no export format", (int)format);
+}

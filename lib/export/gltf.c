@@ -1,0 +1,267 @@
+/* glTF 2.0, as one file (GLB) or as a text with a .bin beside it. Not through assimp: its exporter joins vertices that are less than 1e-5 apart, whatever the model's size.
+ * Source: Khronos, "glTF 2.0 specification", sections 3 and 4. */
+#include <float.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/endian.h"
+#include "base/error.h"
+#include "export/block.h"
+#include "export/floats.h"
+#include "export/formats.h"
+#include "io/file.h"
+#include "io/publish.h"
+
+enum { PARTS_MAX = EBPO_LEVELS_MAX + 1, FLOAT32 = 5126, UINT32 = 5125, VERTICES = 34962, INDICES = 34963, BUFFER = 1 << 14 };
+
+typedef struct part {
+    ebpo_block block; /* its positions are in xyz only */
+    float *xyz, low[3], high[3];
+} part;
+
+typedef struct model {
+    part parts[PARTS_MAX];
+    int count;
+    double origin[3], largest_change;
+    const char *bin_name; /* NULL: in the same file */
+} model;
+
+/* --- what is to be written --- */
+
+/* Far from zero a float32 has few digits left for the model: then vertices are told from the box's middle, which is the nodes' translation. */
+static void choose_origin(model *m, const ebpo_info *info)
+{
+    double size = 0, far = 0;
+    for (int k = 0; k < 3; k++) {
+        size = fmax(size, info->box_size[k]);
+        far = fmax(far, fmax(fabs(info->box_origin[k]), fabs(info->box_origin[k] + info->box_size[k])));
+    }
+    for (int k = 0; k < 3 && far > 16 * size; k++) {
+        float middle = (float)(info->box_origin[k] + info->box_size[k] / 2); /* readers keep a translation as float32 */
+        m->origin[k] = isfinite(middle) ? (double)middle : 0;
+    }
+}
+
+static void find_bounds(part *p)
+{
+    for (int k = 0; k < 3; k++)
+        p->low[k] = p->high[k] = p->xyz[k];
+    for (uint64_t i = 0; i < 3 * p->block.mesh.vertex_count; i++) {
+        p->low[i % 3] = fminf(p->low[i % 3], p->xyz[i]);
+        p->high[i % 3] = fmaxf(p->high[i % 3], p->xyz[i]);
+    }
+}
+
+static ebpo_status gather(model *m, const ebpo_export_job *job, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    choose_origin(m, ebpo_file_info(job->file));
+    for (int i = 0; i < ebpo_block_count(job->options) && status == EBPO_OK; i++) {
+        part *p = &m->parts[m->count];
+        if (!ebpo_export_goes_on(job, i))
+            return ebpo_export_stopped(error);
+        status = ebpo_block_read(&p->block, job->file, ebpo_block_level(job->options, i), EBPO_SOURCE_ORDER, job->options, error);
+        if (status == EBPO_OK)
+            ebpo_block_tell(&p->block, job->report);
+        if (status != EBPO_OK || p->block.mesh.face_count == 0) {
+            ebpo_block_free(&p->block);
+            continue;
+        }
+        m->count++;
+        status = ebpo_mesh_floats(&p->xyz, &p->block.mesh, m->origin, &m->largest_change, error);
+        if (status != EBPO_OK)
+            return status;
+        free(p->block.mesh.xyz32);
+        free(p->block.mesh.xyz64);
+        p->block.mesh.xyz32 = NULL;
+        p->block.mesh.xyz64 = NULL;
+        find_bounds(p);
+    }
+    memcpy(job->report->origin, m->origin, sizeof m->origin);
+    job->report->largest_change = m->largest_change;
+    if (status == EBPO_OK && m->count == 0)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: there would be no triangle in it", job->path);
+    return status;
+}
+
+static uint64_t bin_bytes(const model *m)
+{
+    uint64_t sum = 0;
+    for (int i = 0; i < m->count; i++)
+        sum += 12 * (m->parts[i].block.mesh.vertex_count + m->parts[i].block.mesh.face_count);
+    return sum;
+}
+
+/* --- the text --- */
+
+static void print_name(FILE *f, const char *name)
+{
+    static const char hex[] = "0123456789ABCDEF"; /* a URI: what is not plain is written as %XX */
+    for (; *name; name++) {
+        unsigned char c = (unsigned char)*name;
+        if ((c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || strchr("-._~", c))
+            fputc(c, f);
+        else
+            fprintf(f, "%%%c%c", hex[c >> 4], hex[c & 15]);
+    }
+}
+
+static void print_nodes(FILE *f, const model *m)
+{
+    const double *o = m->origin;
+    fprintf(f, "\"scene\":0,\"scenes\":[{\"nodes\":[");
+    for (int i = 0; i < m->count; i++)
+        fprintf(f, "%s%d", i ? "," : "", i);
+    fprintf(f, "]}],\n\"nodes\":[");
+    for (int i = 0; i < m->count; i++) {
+        fprintf(f, "%s{\"name\":\"%s\",\"mesh\":%d", i ? ",\n" : "", m->parts[i].block.name, i);
+        if (o[0] != 0 || o[1] != 0 || o[2] != 0)
+            fprintf(f, ",\"translation\":[%.17g,%.17g,%.17g]", o[0], o[1], o[2]);
+        fputc('}', f);
+    }
+    fprintf(f, "],\n\"meshes\":[");
+    for (int i = 0; i < m->count; i++)
+        fprintf(f, "%s{\"name\":\"%s\",\"primitives\":[{\"attributes\":{\"POSITION\":%d},\"indices\":%d,\"material\":0}]}", i ? ",\n" : "", m->parts[i].block.name,
+                2 * i, 2 * i + 1);
+    fprintf(f, "],\n\"materials\":[{\"name\":\"plain\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[0.6,0.7,0.8,1],\"metallicFactor\":0,\"roughnessFactor\":0.8}}],\n");
+}
+
+static void print_data(FILE *f, const model *m)
+{
+    uint64_t at = 0;
+    fprintf(f, "\"accessors\":[");
+    for (int i = 0; i < m->count; i++) {
+        const part *p = &m->parts[i];
+        fprintf(f, "%s{\"bufferView\":%d,\"componentType\":%d,\"count\":%" PRIu64 ",\"type\":\"VEC3\",\"min\":[%.17g,%.17g,%.17g],\"max\":[%.17g,%.17g,%.17g]},\n", i ? ",\n" : "",
+                2 * i, FLOAT32, p->block.mesh.vertex_count, (double)p->low[0], (double)p->low[1], (double)p->low[2], (double)p->high[0], (double)p->high[1],
+                (double)p->high[2]);
+        fprintf(f, "{\"bufferView\":%d,\"componentType\":%d,\"count\":%" PRIu64 ",\"type\":\"SCALAR\"}", 2 * i + 1, UINT32, 3 * p->block.mesh.face_count);
+    }
+    fprintf(f, "],\n\"bufferViews\":[");
+    for (int i = 0; i < m->count; i++) {
+        uint64_t size[2] = { 12 * m->parts[i].block.mesh.vertex_count, 12 * m->parts[i].block.mesh.face_count };
+        for (int k = 0; k < 2; k++, at += size[k - 1])
+            fprintf(f, "%s{\"buffer\":0,\"byteOffset\":%" PRIu64 ",\"byteLength\":%" PRIu64 ",\"target\":%d}", i || k ? ",\n" : "", at, size[k], k ? INDICES : VERTICES);
+    }
+    fprintf(f, "],\n\"buffers\":[{\"byteLength\":%" PRIu64, at);
+    if (m->bin_name) {
+        fprintf(f, ",\"uri\":\"");
+        print_name(f, m->bin_name);
+        fputc('"', f);
+    }
+    fprintf(f, "}]");
+}
+
+static void print_text(FILE *f, const model *m)
+{
+    fprintf(f, "{\"asset\":{\"version\":\"2.0\",\"generator\":\"ebpo %s\"},\n", ebpo_version());
+    print_nodes(f, m);
+    print_data(f, m);
+    fprintf(f, "}\n");
+}
+
+/* --- the numbers, little-endian --- */
+
+static void write_words(FILE *f, const void *words, uint64_t count)
+{
+    uint8_t buffer[4 * BUFFER];
+    const uint8_t *from = words;
+    for (uint64_t done = 0; done < count;) {
+        size_t n = count - done < BUFFER ? (size_t)(count - done) : BUFFER;
+        for (size_t i = 0; i < n; i++) {
+            uint32_t word;
+            memcpy(&word, from + 4 * (done + i), 4);
+            ebpo_store32(buffer + 4 * i, word);
+        }
+        fwrite(buffer, 4, n, f); /* what fails here, ferror tells */
+        done += n;
+    }
+}
+
+static void write_bin(FILE *f, const model *m)
+{
+    for (int i = 0; i < m->count; i++) {
+        write_words(f, m->parts[i].xyz, 3 * m->parts[i].block.mesh.vertex_count);
+        write_words(f, m->parts[i].block.mesh.faces, 3 * m->parts[i].block.mesh.face_count);
+    }
+}
+
+/* --- the files --- */
+
+static ebpo_status write_glb(FILE *f, const model *m, const char *path, ebpo_error *error)
+{
+    char *text = NULL;
+    size_t length = 0;
+    FILE *t = open_memstream(&text, &length);
+    if (!t)
+        return ebpo_fail_memory(error, BUFSIZ);
+    print_text(t, m);
+    if (fclose(t) != 0 || !text) {
+        free(text);
+        return ebpo_fail_memory(error, length);
+    }
+    size_t padding = -length & 3;
+    uint64_t bin = bin_bytes(m), total = 28 + length + padding + bin;
+    if (total > UINT32_MAX) {
+        free(text);
+        return ebpo_fail(error, EBPO_E_LIMIT, "%s: would have %" PRIu64 " bytes, and a GLB file has at most 2^32; take gltf, or coarser levels", path, total);
+    }
+    const uint32_t head[5] = { 0x46546C67 /* glTF */, 2, (uint32_t)total, (uint32_t)(length + padding), 0x4E4F534A /* JSON */ };
+    const uint32_t bin_head[2] = { (uint32_t)bin, 0x004E4942 /* BIN */ };
+    write_words(f, head, 5);
+    fwrite(text, 1, length, f);
+    fwrite("   ", 1, padding, f);
+    write_words(f, bin_head, 2);
+    write_bin(f, m);
+    free(text);
+    return EBPO_OK;
+}
+
+static ebpo_status write_files(const model *m, const ebpo_export_job *job, ebpo_publish *light, ebpo_publish *heavy, ebpo_error *error)
+{
+    FILE *f = ebpo_publish_stream(light), *b = m->bin_name ? ebpo_publish_stream(heavy) : NULL;
+    ebpo_status status = EBPO_OK;
+    if (!f || (m->bin_name && !b))
+        return ebpo_fail_memory(error, BUFSIZ);
+    if (b) {
+        write_bin(b, m);
+        print_text(f, m);
+    } else {
+        status = write_glb(f, m, job->path, error);
+    }
+    if (status == EBPO_OK && b && (ferror(b) || fflush(b) != 0))
+        status = ebpo_fail_errno(error, job->second, "could not be written");
+    if (status == EBPO_OK && (ferror(f) || fflush(f) != 0))
+        status = ebpo_fail_errno(error, job->path, "could not be written");
+    if (status == EBPO_OK && b)
+        status = ebpo_publish_commit(heavy, error);
+    return status == EBPO_OK ? ebpo_publish_commit(light, error) : status;
+}
+
+ebpo_status ebpo_export_gltf(const ebpo_export_job *job, ebpo_error *error)
+{
+    ebpo_publish light = EBPO_PUBLISH_INIT, heavy = EBPO_PUBLISH_INIT;
+    model *m = ebpo_alloc_zero(1, sizeof *m);
+    if (!m)
+        return ebpo_fail_memory(error, sizeof *m);
+    m->bin_name = *job->second ? ebpo_path_name(job->second) : NULL;
+    /* Before the work, so that a folder which cannot be written is found out at once. */
+    ebpo_status status = ebpo_publish_begin(&light, job->path, error);
+    if (status == EBPO_OK && m->bin_name)
+        status = ebpo_publish_begin(&heavy, job->second, error);
+    if (status == EBPO_OK)
+        status = gather(m, job, error);
+    if (status == EBPO_OK)
+        status = write_files(m, job, &light, &heavy, error);
+    ebpo_publish_abort(&heavy);
+    ebpo_publish_abort(&light);
+    for (int i = 0; i < m->count; i++) {
+        ebpo_block_free(&m->parts[i].block);
+        free(m->parts[i].xyz);
+    }
+    free(m);
+    return status;
+}

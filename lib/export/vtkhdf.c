@@ -1,0 +1,164 @@
+/* VTKHDF 1.0: one unstructured grid of polygons. This version knows neither blocks (2.1 does) nor polyhedra (2.5), so levels are told apart by the cells' number `lod`, and by being
+ * partitions. Source: VTK's documentation, "VTKHDF file format". */
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "export/block.h"
+#include "export/formats.h"
+#include "io/publish.h"
+
+enum { VTK_TRIANGLE = 5, VTK_POLYGON = 7 };
+
+enum { POINTS, CONNECTIVITY, OFFSETS, TYPES, POINT_COUNT, CELL_COUNT, CORNER_COUNT, SOURCE_VERTEX, FIRST_COLUMN, TABLES = FIRST_COLUMN + EBPO_COLUMNS };
+
+static const struct {
+    const char *path;
+    ebpo_h5_number number;
+    uint32_t cols;
+} layout[FIRST_COLUMN] = {
+    { "/VTKHDF/Points", EBPO_H5_F64, 3 },          { "/VTKHDF/Connectivity", EBPO_H5_I64, 0 },  { "/VTKHDF/Offsets", EBPO_H5_I64, 0 },
+    { "/VTKHDF/Types", EBPO_H5_U8, 0 },            { "/VTKHDF/NumberOfPoints", EBPO_H5_I64, 0 }, { "/VTKHDF/NumberOfCells", EBPO_H5_I64, 0 },
+    { "/VTKHDF/NumberOfConnectivityIds", EBPO_H5_I64, 0 }, { "/VTKHDF/PointData/source_vertex", EBPO_H5_I64, 0 },
+};
+
+typedef struct writer {
+    ebpo_h5_out out;
+    ebpo_h5_table table[TABLES];
+} writer;
+
+static ebpo_status make_group(writer *w, const char *path, ebpo_error *error)
+{
+    static const int64_t version[2] = { 1, 0 };
+    ebpo_h5_id id;
+    ebpo_status status = ebpo_h5_make_plain_group(&w->out, path, &id, error);
+    if (status == EBPO_OK && strcmp(path, "/VTKHDF") == 0)
+        status = ebpo_h5_put_ints(&w->out, id, "Version", version, 2, error);
+    if (status == EBPO_OK && strcmp(path, "/VTKHDF") == 0)
+        status = ebpo_h5_put_ascii(&w->out, id, "Type", "UnstructuredGrid", error);
+    ebpo_h5_close_id(id);
+    return status;
+}
+
+static ebpo_status make_tables(writer *w, bool floats, ebpo_error *error)
+{
+    static const char *const groups[] = { "/VTKHDF", "/VTKHDF/PointData", "/VTKHDF/CellData" };
+    ebpo_status status = EBPO_OK;
+    for (int i = 0; i < 3 && status == EBPO_OK; i++)
+        status = make_group(w, groups[i], error);
+    for (int i = 0; i < TABLES && status == EBPO_OK; i++) {
+        char path[64];
+        const ebpo_column *column = i < FIRST_COLUMN ? NULL : &ebpo_columns[i - FIRST_COLUMN];
+        snprintf(path, sizeof path, "/VTKHDF/CellData/%s", column ? column->name : "");
+        ebpo_h5_number number = column ? column->number : i == POINTS && floats ? EBPO_H5_F32 : layout[i].number;
+        status = ebpo_h5_make_table(&w->out, column ? path : layout[i].path, number, column ? 0 : layout[i].cols, &w->table[i], error);
+    }
+    return status;
+}
+
+/* Appends and frees. NULL: memory was short. */
+static ebpo_status append(writer *w, int table, void *values, uint64_t count, ebpo_error *error)
+{
+    ebpo_status status = values ? ebpo_h5_append(&w->out, &w->table[table], values, count, error) : ebpo_fail_memory(error, count * 8);
+    free(values);
+    return status;
+}
+
+static ebpo_status append_points(writer *w, const ebpo_mesh *mesh, ebpo_error *error)
+{
+    if (mesh->xyz32 && w->table[POINTS].number == EBPO_H5_F64) {
+        double *wide = ebpo_alloc(mesh->vertex_count, 3 * sizeof *wide);
+        for (uint64_t i = 0; wide && i < 3 * mesh->vertex_count; i++)
+            wide[i] = (double)mesh->xyz32[i];
+        return append(w, POINTS, wide, mesh->vertex_count, error);
+    }
+    return ebpo_h5_append(&w->out, &w->table[POINTS], mesh->xyz32 ? (const void *)mesh->xyz32 : mesh->xyz64, mesh->vertex_count, error);
+}
+
+static ebpo_status append_cells(writer *w, const ebpo_block *block, uint64_t cells, uint64_t corners, ebpo_error *error)
+{
+    bool mesh = block->level < 0;
+    int64_t *connectivity = ebpo_alloc(corners, sizeof *connectivity), *offsets = ebpo_alloc(cells + 1, sizeof *offsets);
+    uint8_t *types = ebpo_alloc(cells, 1);
+    const uint32_t *triangle = block->mesh.faces;
+    uint64_t at = 0;
+    for (uint64_t i = 0; connectivity && offsets && types && i < cells; i++) {
+        unsigned n = mesh ? 3 : block->nodes.corners[i];
+        types[i] = mesh ? VTK_TRIANGLE : VTK_POLYGON;
+        offsets[i] = (int64_t)at;
+        for (unsigned k = 0; k < n; k++)
+            connectivity[at++] = ebpo_polygon_corner(triangle, k);
+        triangle += 3 * (n - 2);
+    }
+    if (offsets)
+        offsets[cells] = (int64_t)corners;
+    ebpo_status status = append(w, CONNECTIVITY, connectivity, corners, error);
+    if (status == EBPO_OK)
+        status = append(w, OFFSETS, offsets, cells + 1, error);
+    else
+        free(offsets);
+    if (status == EBPO_OK)
+        return append(w, TYPES, types, cells, error);
+    free(types);
+    return status;
+}
+
+static ebpo_status append_block(writer *w, const ebpo_block *block, ebpo_error *error)
+{
+    bool mesh = block->level < 0;
+    uint64_t cells = mesh ? block->mesh.face_count : block->nodes.polygon_count;
+    /* A polygon of n corners has n - 2 triangles. */
+    uint64_t corners = mesh ? 3 * cells : block->mesh.face_count + 2 * cells;
+    int64_t count[3] = { (int64_t)block->mesh.vertex_count, (int64_t)cells, (int64_t)corners };
+    ebpo_status status = append_points(w, &block->mesh, error);
+    if (status == EBPO_OK)
+        status = append_cells(w, block, cells, corners, error);
+    for (int i = 0; i < 3 && status == EBPO_OK; i++)
+        status = ebpo_h5_append(&w->out, &w->table[POINT_COUNT + i], &count[i], 1, error);
+    if (status == EBPO_OK)
+        status = append(w, SOURCE_VERTEX, ebpo_column_of_vertices(block), block->mesh.vertex_count, error);
+    for (int i = 0; i < EBPO_COLUMNS && status == EBPO_OK; i++)
+        status = append(w, FIRST_COLUMN + i, ebpo_column_make(block, i, true), cells, error);
+    return status;
+}
+
+static ebpo_status write_blocks(writer *w, const ebpo_export_job *job, ebpo_error *error)
+{
+    bool levels = ebpo_block_level(job->options, 0) >= 0;
+    ebpo_status status = make_tables(w, !levels && !ebpo_file_info(job->file)->double_coordinates, error);
+    for (int i = 0; i < ebpo_block_count(job->options) && status == EBPO_OK; i++) {
+        ebpo_block block;
+        if (!ebpo_export_goes_on(job, i))
+            return ebpo_export_stopped(error);
+        status = ebpo_block_read(&block, job->file, ebpo_block_level(job->options, i), EBPO_FILE_ORDER, job->options, error);
+        if (status == EBPO_OK)
+            status = append_block(w, &block, error);
+        if (status == EBPO_OK)
+            ebpo_block_tell(&block, job->report);
+        ebpo_block_free(&block);
+    }
+    return status;
+}
+
+ebpo_status ebpo_export_vtkhdf(const ebpo_export_job *job, ebpo_error *error)
+{
+    writer w = { .out = EBPO_H5_OUT_INIT };
+    ebpo_publish target = EBPO_PUBLISH_INIT;
+    for (int i = 0; i < TABLES; i++)
+        w.table[i] = (ebpo_h5_table)EBPO_H5_TABLE_INIT;
+    ebpo_status status = ebpo_publish_begin(&target, job->path, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_create_plain(&w.out, ebpo_publish_path(&target), job->path, error);
+    if (status == EBPO_OK)
+        status = write_blocks(&w, job, error);
+    for (int i = 0; i < TABLES; i++)
+        ebpo_h5_close_table(&w.table[i]);
+    if (status == EBPO_OK)
+        status = ebpo_h5_finish(&w.out, NULL, error);
+    ebpo_h5_discard(&w.out);
+    if (status == EBPO_OK)
+        status = ebpo_publish_commit(&target, error);
+    ebpo_publish_abort(&target);
+    return status;
+}
