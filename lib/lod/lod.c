@@ -79,7 +79,7 @@ static ebpo_status visit_gray(walker *w, uint64_t gray, ebpo_cell cell, ebpo_pol
         return EBPO_OK;
     }
     if (is_pruned(w->j->model, cell.level, gray))
-        return emit(w, envelope, cell);
+        return emit(w, envelope, cell, EBPO_GRAY);
     return visit_group(w, gray, cell, envelope);
 }
 
@@ -149,7 +149,7 @@ static ebpo_status walk_seeds(void *context, uint64_t begin, uint64_t end, unsig
         walker w = { j, j->pieces[1 + i], &j->scratch[worker], -1, error };
         seed *s = &j->seeds[i];
         /* Seeds are in octcode order, and all gray nodes of their level: the i-th has the i-th group below it. */
-        ebpo_status status = is_pruned(j->model, s->cell.level, i) ? emit(&w, &s->envelope, s->cell) : visit_group(&w, i, s->cell, &s->envelope);
+        ebpo_status status = is_pruned(j->model, s->cell.level, i) ? emit(&w, &s->envelope, s->cell, EBPO_GRAY) : visit_group(&w, i, s->cell, &s->envelope);
         if (status != EBPO_OK)
             return status;
     }
