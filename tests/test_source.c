@@ -1,5 +1,6 @@
 /* Files from memory, from paths and from a caller's own source: the same trees, few reads, and every failure of a read told as what it is. */
 #include <check.h>
+#include <limits.h>
 #include <hdf5.h>
 #include <pthread.h>
 #include <sys/stat.h>
@@ -263,6 +264,41 @@ START_TEST(one_read_opens_a_file_and_each_byte_of_an_array_is_read_once)
 }
 END_TEST
 
+static void probe_expect(void *user, const ebpo_range *ranges, size_t count)
+{
+    (void)user;
+    for (size_t i = 0; i < count; i++)
+        ck_assert(ranges[i].offset <= size && ranges[i].size <= size - ranges[i].offset);
+}
+
+/* Of files far away the index is read when it is needed, from where the head says; other programs may have moved it. */
+START_TEST(the_index_is_found_whatever_the_head_says_of_its_place)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    make_file(&large, EBPO_CODEC_ZSTD);
+    for (int lie = 0; lie < 6; lie++) {
+        probe p = { .fail_at = UINT_MAX };
+        ebpo_file *file;
+        ebpo_source source = { .user = &p, .size = size, .read = probe_read, .close = probe_close, .expect = probe_expect, .at_hand = 100000 };
+        ck_assert_msg(ebpo_open_source(&file, &source, "far", &error) == EBPO_OK, "%s", error.message);
+        ebpo_info *info = &file->info;
+        ck_assert(info->chunk_index_bytes > 0 && !atomic_load(&file->located) && p.reads == 1);
+        switch (lie) {
+        case 1: info->chunk_index_offset = info->chunk_index_bytes = 0; break;
+        case 2: info->chunk_index_offset -= 1000; break;
+        case 3: info->chunk_index_bytes /= 2; break;
+        case 4: info->chunk_index_offset = 200000, info->chunk_index_bytes = 300000; break;
+        case 5: info->chunk_index_offset = 0, info->chunk_index_bytes = size; break;
+        }
+        unsigned before = p.reads;
+        ck_assert_msg(ebpo_file_locate(file, &error) == EBPO_OK, "%s", error.message);
+        ck_assert_uint_le(p.reads - before, lie ? 20 : 2); /* the head once more, and the index */
+        expect_tree(file, 1);
+        ebpo_close(file);
+    }
+}
+END_TEST
+
 /* Fails at read 0, 1, 2, ... of opening and of reading everything, until there are no more reads. */
 static unsigned fail_everywhere(ebpo_status status, bool silent)
 {
@@ -510,6 +546,7 @@ int main(void)
     tcase_add_checked_fixture(tests, set_up, tear_down);
     tcase_add_loop_test(tests, memory_paths_and_sources_give_equal_trees, 0, 2);
     tcase_add_test(tests, one_read_opens_a_file_and_each_byte_of_an_array_is_read_once);
+    tcase_add_test(tests, the_index_is_found_whatever_the_head_says_of_its_place);
     tcase_add_test(tests, every_failing_read_is_told_as_such);
     tcase_add_test(tests, every_failing_read_is_told_as_such_where_metadata_is_scattered);
     tcase_add_loop_test(tests, files_that_libhdf5_rearranged_give_equal_trees, 0, 4);

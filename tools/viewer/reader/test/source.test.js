@@ -130,3 +130,31 @@ test('files and bytes are read alike', async () => {
   await readAll(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length));
   await assert.rejects(openEbpo(7), { code: 'ARGUMENT' });
 });
+
+// The index of chunks, which stands behind the first levels: fetched when it is needed, in one go; what the head says of its place is not relied on.
+const indexed = readFileSync(new URL('../../../../format-spec/vectors/passed/11_two_chunks_of_faces.ebpo.h5', import.meta.url));
+async function openIndexed(change) {
+  const whole = await openEbpo(indexed), { chunk_index_offset: at, chunk_index_bytes: size } = whole.info, asked = [];
+  const source = { name: 'a', size: indexed.length, requests: 0, bytes: 0, open: async (n) => indexed.subarray(0, n), read: async (from, n) => {
+    asked.push([from, n]);
+    return indexed.subarray(from, from + n);
+  } };
+  assert.ok(at > 0 && size > 0 && whole.located);
+  const file = await openEbpo(source, { headBytes: at });
+  assert.equal(file.located, false);
+  change?.(file.info);
+  await file.levels(0, file.info.level_count - 1);
+  assert.deepEqual((await file.mesh()).faces, (await whole.mesh()).faces);
+  assert.equal(file.located, true);
+  return { asked, at, size };
+}
+test('the index of chunks comes in one request', async () => {
+  const { asked, at, size } = await openIndexed();
+  assert.equal(asked.filter(([from, n]) => from < at + size && from + n > at).length, 1);
+  assert.deepEqual(asked.find(([from]) => from === at), [at, size]);
+});
+for (const [what, offset, bytes] of [['nowhere', 0, 0], ['somewhere else', 100, 500], ['beyond the end', 1 << 30, 100], ['too short', undefined, 8]])
+  test(`the index of chunks, said to be ${what}`, () => openIndexed((info) => {
+    info.chunk_index_offset = offset ?? info.chunk_index_offset;
+    info.chunk_index_bytes = bytes;
+  }));
