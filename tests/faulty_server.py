@@ -137,6 +137,21 @@ class Handler(http.server.BaseHTTPRequestHandler):
         else:
             self.whole()
 
+    def fault_whole_then_parts(self, times=1):
+        """As by turns from two servers behind one address: everything, broken off, then ranges."""
+        def fault():
+            self.head(200, [("Content-Length", len(self.data))] + self.version())
+            self.wfile.write(self.data[:1000])
+            self.drop()
+        self.first(times, fault)
+
+    def fault_bare_replaced(self):
+        """No version is told, and the file becomes another one while it is read."""
+        if self.number <= 2:
+            self.part(version=[], cut=0 if self.number == 1 else len(self.data) // 2)
+        else:
+            self.part(data=bytes(255 - b for b in self.data), version=[])
+
     def fault_whole_later(self, good=1):
         if self.number <= good:
             self.part()

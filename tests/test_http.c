@@ -18,7 +18,7 @@
 #include "http/http.h"
 #include "web.h"
 
-enum { DATA_BYTES = 3000017, HEAD_BYTES = 147456 };
+enum { DATA_BYTES = 3000017, HEAD_BYTES = 131072 };
 static uint8_t *data;
 
 static uint64_t next_random(uint64_t *state)
@@ -95,7 +95,7 @@ static const struct {
     const char *fault;
     unsigned retries; /* at least */
 } readable[] = {
-    { "good", 0 }, { "modified", 0 }, { "bare", 0 }, { "whole", 0 }, { "whole_bare", 0 }, { "whole_chunked", 0 }, { "whole_dropped-2", 2 }, { "short-2", 2 }, { "empty-2", 2 },
+    { "good", 0 }, { "modified", 0 }, { "bare", 0 }, { "whole", 0 }, { "whole_bare", 0 }, { "whole_chunked", 0 }, { "whole_dropped-2", 2 }, { "whole_then_parts-2", 2 }, { "short-2", 2 }, { "empty-2", 2 },
     { "lying_length-2", 2 }, { "chunked", 0 }, { "stall_head-1", 1 }, { "stall_body-1", 1 }, { "code-503-2", 2 }, { "code-500-1", 1 }, { "code-502-1", 1 }, { "code-504-1", 1 },
     { "code-408-1", 1 }, { "code-429-1", 1 }, { "code_later-503-1-2", 1 }, { "wait-429-1-1", 1 }, { "redirect", 0 },
 };
@@ -109,6 +109,23 @@ START_TEST(what_passes_or_does_no_harm_gives_the_same_bytes)
     ck_assert_msg(status == EBPO_OK, "%s: %s", readable[_i].fault, error.message);
     ck_assert_msg(stats.retries >= readable[_i].retries, "%s: %d retries", readable[_i].fault, (int)stats.retries);
     ck_assert_uint_ge(stats.bytes, DATA_BYTES);
+}
+END_TEST
+
+/* Where no version is told, one answer has it all: two could be of different files. */
+START_TEST(answers_without_a_version_are_not_joined)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_http_options o = quick();
+    ebpo_source s;
+    uint8_t *got = malloc(DATA_BYTES);
+    ck_assert_msg(ebpo_source_of_url(&s, web_url("bare_replaced"), &o, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_int_eq(s.read(s.user, 0, DATA_BYTES, got, &error), EBPO_OK);
+    bool turned = got[0] != data[0];
+    for (uint64_t i = 0; i < DATA_BYTES; i++)
+        ck_assert_msg(got[i] == (turned ? 255 - data[i] : data[i]), "byte %d is of the other file", (int)i);
+    s.close(s.user);
+    free(got);
 }
 END_TEST
 
@@ -137,13 +154,13 @@ static const struct {
     { "short-99", EBPO_E_IO, "given up after" },
     { "empty-99", EBPO_E_IO, "given up after 4 attempts" },
     { "lying_length", EBPO_E_IO, "given up after" },
-    { "wrong_range", EBPO_E_IO, "the server sent bytes 1 to 147456 when asked for 0 to 147455" },
+    { "wrong_range", EBPO_E_IO, "the server sent bytes 1 to 131072 when asked for 0 to 131071" },
     { "wrong_range_later", EBPO_E_IO, "when asked for" },
     { "bad_range", EBPO_E_IO, "Content-Range" },
     { "no_range", EBPO_E_IO, "Content-Range" },
     { "star", EBPO_E_IO, "does not tell the file's size" },
     { "two_ranges", EBPO_E_IO, "Content-Range" },
-    { "wide", EBPO_E_IO, "when asked for 0 to 147455" },
+    { "wide", EBPO_E_IO, "when asked for 0 to 131071" },
     { "longer", EBPO_E_IO, "more bytes than it was asked for" },
     { "multipart", EBPO_E_IO, "Content-Range" },
     { "gzip", EBPO_E_IO, "Content-Encoding" },
@@ -550,6 +567,33 @@ START_TEST(the_next_session_reads_from_the_folder_and_checks_it)
 }
 END_TEST
 
+/* Whatever was read, what comes from the folder is what stands there in the file. */
+START_TEST(the_folder_serves_other_ranges_than_those_it_was_filled_with)
+{
+    char url[300];
+    uint64_t random = 77;
+    ebpo_error error = EBPO_ERROR_INIT;
+    snprintf(url, sizeof url, "%s", web_url("good"));
+    for (int session = 0; session < 12; session++) {
+        ebpo_http_options o = quick();
+        ebpo_source s;
+        o.cache_folder = cache;
+        o.cache_bytes = 1 << 30;
+        o.memory = session % 2 ? 300000 : o.memory;
+        ck_assert_msg(ebpo_source_of_url(&s, url, &o, &error) == EBPO_OK, "%s", error.message);
+        for (int i = 0; i < 12; i++) {
+            uint64_t offset = i == 0 ? HEAD_BYTES - 100 + 100 * (uint64_t)(session % 3) : next_random(&random) % (DATA_BYTES - 1), most = i % 3 ? 90000 : 700000;
+            uint64_t size = 1 + next_random(&random) % most;
+            ebpo_range range = { offset, offset + size > DATA_BYTES ? DATA_BYTES - offset : size };
+            if (i % 2)
+                s.expect(s.user, &range, 1);
+            ck_assert_msg(read_one(&s, range.offset, range.size, &error) == EBPO_OK, "%s", error.message);
+        }
+        s.close(s.user);
+    }
+}
+END_TEST
+
 START_TEST(the_folder_stays_below_its_limit)
 {
     enum { LIMIT = 1000000 };
@@ -693,6 +737,7 @@ int main(int argc, char **argv)
     tcase_add_checked_fixture(folder, set_up_cache, tear_down_cache);
     tcase_add_loop_test(tests, what_passes_or_does_no_harm_gives_the_same_bytes, 0, sizeof readable / sizeof *readable);
     tcase_add_test(tests, a_server_that_sends_less_each_time_is_asked_for_the_rest);
+    tcase_add_test(tests, answers_without_a_version_are_not_joined);
     tcase_add_loop_test(tests, what_is_wrong_is_a_clear_error_that_names_the_file, 0, sizeof unreadable / sizeof *unreadable);
     tcase_add_test(tests, final_codes_are_asked_for_once);
     tcase_add_test(tests, a_page_with_200_is_not_taken_for_a_model);
@@ -710,6 +755,7 @@ int main(int argc, char **argv)
     tcase_add_test(tests, heads_are_judged_by_the_letter);
     tcase_add_test(tests, long_tags_are_told_apart_to_their_end);
     tcase_add_test(folder, the_next_session_reads_from_the_folder_and_checks_it);
+    tcase_add_test(folder, the_folder_serves_other_ranges_than_those_it_was_filled_with);
     tcase_add_test(folder, the_folder_stays_below_its_limit);
     tcase_add_test(folder, another_version_is_not_taken_from_the_folder);
     tcase_add_test(folder, processes_share_the_folder);

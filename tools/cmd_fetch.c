@@ -53,7 +53,8 @@ static void remove_part(const char *folder)
 /* --- progress: the transfers' own thread draws, as this one waits for them --- */
 
 typedef struct ticker {
-    bool active, shown;
+    bool active;
+    _Atomic bool shown; /* the transfers' thread ticks */
     _Atomic(ebpo_file *) file;
     double last;
 } ticker;
@@ -118,9 +119,9 @@ static int fetch(subset_values *v, const char *url, const char *out, const char 
     atomic_store(&t.file, file);
     if (status == EBPO_OK)
         status = subset_settle(v, ebpo_file_info(file), remote_shown(url), subset, &error);
-    bool usage = status == EBPO_E_ARGUMENT;
     if (status == EBPO_OK)
         status = ebpo_subset(file, out, subset, &error);
+    bool usage = status == EBPO_E_ARGUMENT;
     wipe(&t);
     if (status == EBPO_OK) {
         traffic seen = traffic_of(file);

@@ -16,7 +16,10 @@ static void add(ebpo_expected *e, uint64_t offset, uint64_t size)
 void ebpo_expect_chunks(ebpo_expected *e, const ebpo_array_in *array, uint64_t begin, uint64_t end)
 {
     /* A failure is the reading's to tell. */
-    if (!ebpo_input_expects(&e->file->in) || !array->present || ebpo_reader_locate(e->file, array, NULL) != EBPO_OK)
+    if (!ebpo_input_expects(&e->file->in) || !array->present || e->failed)
+        return;
+    e->failed = ebpo_reader_locate(e->file, array, NULL) != EBPO_OK; /* not again and again: each time would take all retries */
+    if (e->failed)
         return;
     for (uint64_t i = begin; i < end; i++)
         add(e, array->chunks[i].address, array->chunks[i].bytes);

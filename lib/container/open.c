@@ -122,6 +122,7 @@ static ebpo_status read_head(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
         status = ebpo_facts_get(h5, root, &file->info, error);
     ebpo_h5_close_id(root);
     judge_index(&file->info, file->in.source.size);
+    ebpo_h5_expect_index(h5, (ebpo_range){ file->info.chunk_index_offset, file->info.chunk_index_bytes });
     if (status == EBPO_OK && (file->info.level_count < 1 || file->info.level_count > EBPO_LEVELS_MAX))
         status = ebpo_fail(error, EBPO_E_FORMAT, "%s: /: level_count is not 1 to %d; get a fresh copy of the file", file->in.shown, EBPO_LEVELS_MAX);
     if (status == EBPO_OK)
@@ -145,7 +146,7 @@ static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const
     atomic_init(&file->located, true);
     ebpo_status status = ebpo_input_open(&file->in, source, name, error);
     if (status == EBPO_OK)
-        status = ebpo_h5_open(&h5, &file->in, (ebpo_range){ 0, 0 }, error);
+        status = ebpo_h5_open(&h5, &file->in, error);
     if (status == EBPO_OK)
         status = read_head(file, &h5, error);
     status = ebpo_h5_close(&h5, status, error);
@@ -183,7 +184,9 @@ static ebpo_status locate_all(ebpo_file *file, ebpo_error *error)
     ebpo_range index = { file->info.chunk_index_offset, file->info.chunk_index_bytes };
     if (index.size && index.offset + index.size > file->in.source.at_hand)
         ebpo_input_expect(&file->in, &index, 1);
-    ebpo_status status = ebpo_h5_open(&h5, &file->in, index, error);
+    ebpo_status status = ebpo_h5_open(&h5, &file->in, error);
+    if (status == EBPO_OK)
+        ebpo_h5_expect_index(&h5, index);
     for (int i = 0; i < EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS && status == EBPO_OK; i++)
         status = locate_array(file, &h5, &file->level_array[i / EBPO_LEVEL_ARRAYS][i % EBPO_LEVEL_ARRAYS], error);
     for (int i = 0; i < EBPO_ARRAYS && status == EBPO_OK; i++)

@@ -43,8 +43,9 @@ typedef struct ebpo_expected {
     ebpo_file *file;
     ebpo_range *range;
     uint64_t count, room;
+    bool failed; /* where chunks lie could not be read */
 } ebpo_expected;
-#define EBPO_EXPECTED_INIT(file) { file, NULL, 0, 0 }
+#define EBPO_EXPECTED_INIT(file) { file, NULL, 0, 0, false }
 /* Chunks [begin, end) of an array that is present or not. */
 void ebpo_expect_chunks(ebpo_expected *expected, const ebpo_array_in *array, uint64_t begin, uint64_t end);
 void ebpo_expect_array(ebpo_expected *expected, const ebpo_array_in *array);

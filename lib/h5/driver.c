@@ -24,12 +24,12 @@ typedef struct driver_choice {
     ebpo_h5_driver *driver;
 } driver_choice;
 
-ebpo_status ebpo_h5_driver_open(ebpo_h5_driver *driver, ebpo_input *input, ebpo_range index, ebpo_error *error)
+ebpo_status ebpo_h5_driver_open(ebpo_h5_driver *driver, ebpo_input *input, ebpo_error *error)
 {
     uint64_t bytes = input->source.size < HEAD_BYTES ? input->source.size : HEAD_BYTES;
     if (ebpo_input_is_far(input) && input->source.at_hand < bytes)
         bytes = input->source.at_hand;
-    *driver = (ebpo_h5_driver){ .input = input, .index = index, .id = -1, .head = ebpo_alloc(bytes, 1), .head_bytes = bytes, .status = EBPO_OK };
+    *driver = (ebpo_h5_driver){ .input = input, .id = -1, .head = ebpo_alloc(bytes, 1), .head_bytes = bytes, .status = EBPO_OK };
     ebpo_status status = driver->head ? ebpo_input_read(input, 0, bytes, driver->head, error) : ebpo_fail_memory(error, bytes);
     return status;
 }

@@ -15,7 +15,7 @@ typedef struct ebpo_h5_driver {
     uint8_t *head, *window; /* the first bytes, and a piece elsewhere, NULL until needed */
     uint8_t *table;         /* all of `index`, NULL until needed */
     uint64_t head_bytes, window_at, window_bytes;
-    ebpo_range index;
+    ebpo_range index;       /* where more metadata is expected, or nothing */
     ebpo_status status;     /* of the input's first failure; libhdf5 only learns that there was one */
     ebpo_error error;
     /* While recording, reads of raw data only leave here what they asked for. Reading a chunk is the one call of libhdf5 1.10 that finds
@@ -26,7 +26,7 @@ typedef struct ebpo_h5_driver {
 } ebpo_h5_driver;
 
 /* Fetches the head. */
-EBPO_MUST_USE ebpo_status ebpo_h5_driver_open(ebpo_h5_driver *driver, ebpo_input *input, ebpo_range index, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_h5_driver_open(ebpo_h5_driver *driver, ebpo_input *input, ebpo_error *error);
 /* After the file that was opened through it. */
 void ebpo_h5_driver_close(ebpo_h5_driver *driver);
 

@@ -83,9 +83,10 @@ typedef struct ebpo_h5_in {
 } ebpo_h5_in;
 #define EBPO_H5_IN_INIT { NULL, -1, 0, NULL }
 
-/* Opens for reading, through the input, which stays the caller's and outlives `in`. EBPO_E_FORMAT when it is no HDF5 file. `index`: where
- * more metadata is expected, which is then read in one go; or nothing. */
-EBPO_MUST_USE ebpo_status ebpo_h5_open(ebpo_h5_in *in, ebpo_input *input, ebpo_range index, ebpo_error *error);
+/* Opens for reading, through the input, which stays the caller's and outlives `in`. EBPO_E_FORMAT when it is no HDF5 file. */
+EBPO_MUST_USE ebpo_status ebpo_h5_open(ebpo_h5_in *in, ebpo_input *input, ebpo_error *error);
+/* Where more metadata is expected (a place within the file): it is then read in one go. */
+void ebpo_h5_expect_index(ebpo_h5_in *in, ebpo_range index);
 /* Closes everything, also what a failing open left. Returns `status`, unless the input failed at any time since opening: then that, with its
  * message, since libhdf5 reports failed reads as damage or as absence. */
 EBPO_MUST_USE ebpo_status ebpo_h5_close(ebpo_h5_in *in, ebpo_status status, ebpo_error *error);

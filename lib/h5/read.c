@@ -22,13 +22,13 @@ static hid_t file_access(ebpo_h5_driver *driver)
     return fapl;
 }
 
-ebpo_status ebpo_h5_open(ebpo_h5_in *in, ebpo_input *input, ebpo_range index, ebpo_error *error)
+ebpo_status ebpo_h5_open(ebpo_h5_in *in, ebpo_input *input, ebpo_error *error)
 {
     *in = (ebpo_h5_in){ .shown = input->shown, .file = -1, .file_bytes = input->source.size };
     in->driver = ebpo_alloc_zero(1, sizeof *in->driver);
     if (!in->driver)
         return ebpo_fail_memory(error, sizeof *in->driver);
-    ebpo_status status = ebpo_h5_driver_open(in->driver, input, index, error);
+    ebpo_status status = ebpo_h5_driver_open(in->driver, input, error);
     if (status != EBPO_OK)
         return status;
     ebpo_h5_scope scope;
@@ -41,6 +41,11 @@ ebpo_status ebpo_h5_open(ebpo_h5_in *in, ebpo_input *input, ebpo_range index, eb
         H5Pclose(fapl);
     ebpo_h5_leave(&scope);
     return status;
+}
+
+void ebpo_h5_expect_index(ebpo_h5_in *in, ebpo_range index)
+{
+    in->driver->index = index;
 }
 
 ebpo_status ebpo_h5_close(ebpo_h5_in *in, ebpo_status status, ebpo_error *error)

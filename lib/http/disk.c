@@ -19,7 +19,7 @@
 
 /* A block's file: magic, block number, size, SHA-256 of these three and the bytes, the bytes. */
 enum { MAGIC_BYTES = 8, DIGEST_AT = 24, HEAD_BYTES = 56, NAME_BYTES = 128 };
-static const char MAGIC[MAGIC_BYTES + 1] = "EBPOBLK1", SUFFIX[] = ".ebpo-block", TEMPORARY[] = ".ebpo-part-";
+static const char MAGIC[MAGIC_BYTES + 1] = "EBPOBLK2", SUFFIX[] = ".ebpo-block", TEMPORARY[] = ".ebpo-part-";
 static const double STALE_SECONDS = 3600; /* a temporary file that old has lost its writer */
 
 struct ebpo_disk {

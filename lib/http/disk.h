@@ -8,7 +8,11 @@
 
 #include "http/answer.h"
 
-enum { EBPO_DISK_BLOCK = 32768 /* divides the bytes of the first request */ };
+enum {
+    EBPO_DISK_BLOCK = 32768,
+    EBPO_HTTP_HEAD = 131072 /* of the first request, after which whole blocks follow: opening needs some 50 KB (13 levels), and levels 0 to 4 come with it */
+};
+_Static_assert(EBPO_HTTP_HEAD % EBPO_DISK_BLOCK == 0, "blocks would begin within the head");
 
 typedef struct ebpo_disk ebpo_disk;
 

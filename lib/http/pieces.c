@@ -125,13 +125,19 @@ static bool cover(ebpo_pieces *p, uint64_t begin, uint64_t end)
 
 /* --- fetching --- */
 
+/* Whether a piece has all of the block at a place, or as much as the file has. Only such blocks go to disk and come from there. */
+static bool has_block(const ebpo_pieces *p, uint64_t at, uint64_t end)
+{
+    return at % EBPO_DISK_BLOCK == 0 && (end - at >= EBPO_DISK_BLOCK || end == p->size);
+}
+
 /* Blocks from disk, from both ends inwards; the lock is released meanwhile. What is left is to be requested. */
 static void load_from_disk(ebpo_pieces *p, ebpo_piece *piece)
 {
     uint64_t begin = piece->begin, end = piece->end, got = 0;
     piece->state = PIECE_LOADING;
     pthread_mutex_unlock(&p->lock);
-    while (begin < end) {
+    while (begin < end && has_block(p, begin, end)) {
         size_t size = (size_t)(end - begin < EBPO_DISK_BLOCK ? end - begin : EBPO_DISK_BLOCK);
         if (!ebpo_disk_get(p->disk, begin / EBPO_DISK_BLOCK, piece->data + (begin - piece->begin), size))
             break;
@@ -140,7 +146,7 @@ static void load_from_disk(ebpo_pieces *p, ebpo_piece *piece)
     }
     while (begin < end) {
         uint64_t block = (end - 1) / EBPO_DISK_BLOCK, at = block * EBPO_DISK_BLOCK;
-        if (at <= begin || !ebpo_disk_get(p->disk, block, piece->data + (at - piece->begin), (size_t)(end - at)))
+        if (at <= begin || (end % EBPO_DISK_BLOCK && end != p->size) || !ebpo_disk_get(p->disk, block, piece->data + (at - piece->begin), (size_t)(end - at)))
             break;
         got += end - at;
         end = at;
@@ -317,7 +323,8 @@ static void store(ebpo_pieces *p, ebpo_piece *piece)
     pthread_mutex_unlock(&p->lock);
     for (uint64_t at = piece->fetch_begin; at < piece->fetch_end; at += EBPO_DISK_BLOCK) {
         uint64_t left = piece->fetch_end - at;
-        ebpo_disk_put(p->disk, at / EBPO_DISK_BLOCK, piece->data + (at - piece->begin), (size_t)(left < EBPO_DISK_BLOCK ? left : EBPO_DISK_BLOCK));
+        if (has_block(p, at, piece->fetch_end))
+            ebpo_disk_put(p->disk, at / EBPO_DISK_BLOCK, piece->data + (at - piece->begin), (size_t)(left < EBPO_DISK_BLOCK ? left : EBPO_DISK_BLOCK));
     }
     pthread_mutex_lock(&p->lock);
 }

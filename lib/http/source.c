@@ -5,11 +5,12 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "http/disk.h"
 #include "http/http.h"
 #include "http/pieces.h"
 
 enum {
-    HEAD_BYTES = 147456,     /* of the first request: opening needs some 100 KB (13 levels); mostly levels 0 to 4 come with it */
+    HEAD_BYTES = EBPO_HTTP_HEAD,
     CONNECTIONS_MAX = 32
 };
 

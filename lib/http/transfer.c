@@ -261,7 +261,10 @@ static bool keep(ebpo_slot *s, CURLcode code)
         memcpy(r->version.etag, s->answer.etag, sizeof r->version.etag);
         memcpy(r->version.modified, s->answer.modified, sizeof r->version.modified);
     }
-    r->got += s->taken;
+    free(r->whole); /* an earlier answer began to send everything */
+    r->whole = NULL;
+    r->whole_room = 0;
+    r->got = s->begin - r->offset + s->taken;
     return r->got == r->size;
 }
 
@@ -276,6 +279,13 @@ static void describe(const ebpo_slot *s, CURLcode code, char *out, size_t room)
         snprintf(out, room, "the server sent %" PRIu64 " bytes of %" PRIu64, s->taken, s->end - s->begin);
     else
         snprintf(out, room, "%s", trouble);
+}
+
+/* Whether the rest may come in another answer: not where nobody could tell that it is of another version. */
+static bool may_join(const ebpo_transfers *t, const ebpo_request *r)
+{
+    const ebpo_http_version *v = r->first ? &r->version : &t->pinned;
+    return *v->etag || *v->modified || t->options->unversioned;
 }
 
 /* Again later, or the end of it. */
@@ -296,6 +306,8 @@ static void try_again(ebpo_transfers *t, ebpo_slot *s, CURLcode code, double now
     else if (pause > PAUSE_ASKED_MOST || now + pause >= r->deadline)
         snprintf(why, sizeof why, "bytes %" PRIu64 " to %" PRIu64 ": %s and is to be asked again in %.0f s; try again then", r->offset, r->offset + r->size - 1, what, pause);
     else {
+        if (!may_join(t, r))
+            r->got = 0;
         r->due = now + pause;
         enqueue(t, r);
         return;

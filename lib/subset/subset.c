@@ -50,7 +50,7 @@ static ebpo_status settle(ebpo_cutting *c)
     const ebpo_subset_options *o = c->options;
     ebpo_info *info = &c->out->info;
     int deepest = c->from->level_count - 1;
-    if (o->last_level < -1 || o->last_level >= EBPO_LEVELS_MAX)
+    if (o->last_level < -1 || o->last_level >= EBPO_LEVELS_MAX || (o->last_level > deepest && !c->from->pruned))
         return ebpo_fail(c->error, EBPO_E_ARGUMENT, "%s: there is no level %d; the file has levels 0 to %d", c->file->in.shown, o->last_level, deepest);
     c->last_level = o->last_level < 0 || o->last_level > deepest ? deepest : o->last_level;
     c->parts = c->from->parts & o->parts;

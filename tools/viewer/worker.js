@@ -84,6 +84,14 @@ class OpenFile {
       return;
     }
     this.running = true;
+    try {
+      await this.#refine();
+    } finally {
+      this.running = false; // also when something was wrong with the data: the next view tries again
+    }
+  }
+
+  async #refine() {
     let result;
     do {
       this.again = false;
@@ -96,7 +104,6 @@ class OpenFile {
         this.#later(this.#loadMesh(result.leaves));
       await new Promise((done) => setTimeout(done)); // lets a newer view in
     } while (!this.ended && (this.again || result.more));
-    this.running = false;
     if (!this.ended && !this.busy.level && !this.busy.mesh)
       post({ type: 'idle', opening: this.number, want: want.number, traffic: this.file.traffic, deeper: result.deeper });
   }

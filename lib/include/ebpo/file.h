@@ -192,7 +192,8 @@ EBPO_API const ebpo_info *ebpo_file_info(const ebpo_file *file);
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_locate(ebpo_file *file, ebpo_error *error);
 
 /* Announces that levels first .. last will be read; last beyond the last level: up to that one. A source far away then fetches them with as few requests as it can, where reading one
- * after the other would ask for each by itself. Does not wait, cannot fail. */
+ * after the other would ask for each by itself. Waits at most for the index of chunks (ebpo_file_locate); cannot fail: what could not
+ * be fetched is told when it is read. */
 EBPO_API void ebpo_file_expect_levels(ebpo_file *file, int first, int last);
 
 /* Reads one level (0 .. level_count - 1) and checks it: counts, ranges, order, index arrays.

@@ -6,7 +6,7 @@
  *     options.cache_folder = "/var/cache/models";
  *     ebpo_open_url(&file, "https://example.org/model.ebpo.h5", &options, &error);
  *
- * Any server that answers "Range: bytes=a-b" with 206 will do. Opening costs one request, for the first 144 KiB, which mostly bring levels 0 to 4 too. What is read later is
+ * Any server that answers "Range: bytes=a-b" with 206 will do. Opening costs one request, for the first 128 KiB, which mostly bring levels 0 to 4 too. What is read later is
  * announced by the reader and fetched in requests of up to 4 MiB, several at once. Every answer is checked: its range, its size, and that it is of the version that was opened
  * (ETag, else Last-Modified, and size). docs/remote.md. A library built without libcurl answers EBPO_E_UNSUPPORTED.
  */

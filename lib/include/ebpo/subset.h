@@ -28,7 +28,7 @@ typedef enum ebpo_profile {
 EBPO_API uint32_t ebpo_profile_parts(ebpo_profile profile);
 
 typedef struct ebpo_subset_options {
-    int last_level;  /* levels 0 .. last_level are kept; -1: all */
+    int last_level;  /* levels 0 .. last_level are kept; -1: all. Of a subset also a level that the whole file may have had: all that is there */
     bool boxed;      /* what does not meet the closed box below is left out: */
     double min[3], max[3]; /* finite, min <= max on each axis; in the model's unit */
     uint32_t parts;  /* ebpo_part bits that are kept, of those the file has. Of the mesh, what the leaves that are kept list. No maps without mesh */

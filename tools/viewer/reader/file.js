@@ -6,7 +6,7 @@ import { Hdf5, NeedBytes } from './hdf5.js';
 import { checkIndexes, checkLevel, checkOrder, decodeFaces, decodeLeafBlock, decodeLeaves, decodeMap, decodeVertices } from './decode.js';
 import { sourceOf } from './source.js';
 
-const HEAD_BYTES = 144 * 1024, HEAD_BYTES_MOST = 256 * 1024 * 1024, INDEX_BYTES_MOST = 256 * 1024 * 1024;
+const HEAD_BYTES = 128 * 1024, HEAD_BYTES_MOST = 256 * 1024 * 1024, INDEX_BYTES_MOST = 256 * 1024 * 1024;
 const GAP_BYTES = 32 * 1024;            // rather read this much for nothing than ask twice
 const REQUEST_BYTES = 4 * 1024 * 1024;  // a request's most
 const REQUESTS = 6;                     // at once, as browsers do for a host
@@ -17,7 +17,7 @@ const folder = (level) => `/levels/${String(level).padStart(2, '0')}/`;
 
 /**
  * Opens a file: a URL (text or URL), a File or Blob, an ArrayBuffer, a Uint8Array (also a Node.js Buffer), or a source (source.js).
- * Options: those of UrlSource; `zstd`, a decoder as loadZstd() gives it; `headBytes`, what the first request asks for (144 KiB).
+ * Options: those of UrlSource; `zstd`, a decoder as loadZstd() gives it; `headBytes`, what the first request asks for (128 KiB).
  * @returns {Promise<EbpoFile>}
  */
 export async function openEbpo(what, options = {}) {
