@@ -329,6 +329,26 @@ static void store(ebpo_pieces *p, ebpo_piece *piece)
     pthread_mutex_lock(&p->lock);
 }
 
+static bool has_come(const ebpo_piece *piece)
+{
+    return piece->to_store && (piece->state == PIECE_THERE || (piece->state == PIECE_COMING && piece->request.done && piece->request.status == EBPO_OK));
+}
+
+/* Stores one piece that has come and that nobody has read yet, so that it is not lost when the process ends; false when there is none. The lock is released meanwhile. */
+static bool store_one(ebpo_pieces *p)
+{
+    for (uint64_t i = 0; p->disk && i < p->count; i++) {
+        ebpo_piece *piece = p->piece[i];
+        if (!has_come(piece))
+            continue;
+        piece->users++;
+        store(p, piece);
+        piece->users--;
+        return true;
+    }
+    return false;
+}
+
 /* Waits for a piece that this thread uses. One that failed while nobody wanted it is asked for again. */
 static ebpo_status await(ebpo_pieces *p, ebpo_piece *piece, ebpo_error *error)
 {
@@ -354,7 +374,8 @@ static ebpo_status await(ebpo_pieces *p, ebpo_piece *piece, ebpo_error *error)
             piece->demanded = true;
             ebpo_transfers_urge(p->transfers, &piece->request);
         }
-        pthread_cond_wait(&p->done, &p->lock);
+        if (!store_one(p))
+            pthread_cond_wait(&p->done, &p->lock);
     }
     if (piece->to_store)
         store(p, piece);
@@ -422,6 +443,12 @@ ebpo_status ebpo_pieces_read(ebpo_pieces *p, uint64_t offset, uint64_t size, uin
 
 void ebpo_pieces_clear(ebpo_pieces *p)
 {
+    if (p->disk) {
+        pthread_mutex_lock(&p->lock);
+        while (store_one(p))
+            continue;
+        pthread_mutex_unlock(&p->lock);
+    }
     for (uint64_t i = 0; i < p->count; i++) {
         free(p->piece[i]->data);
         free(p->piece[i]);

@@ -161,6 +161,7 @@ def main():
         subprocess.run([tool, "convert", "-q", "--leaf-faces", "40", ply, other], check=True)
         Handler.data = content(path)
         server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+        server.handle_error = lambda *arguments: None  # clients that were interrupted
         threading.Thread(target=server.serve_forever, daemon=True).start()
         url = f"http://127.0.0.1:{server.server_address[1]}/m.ebpo.h5"
         parts(tool, folder, path, url)
