@@ -538,9 +538,9 @@ static bool try_all(const ebpo_file *file, ebpo_chunks *chunks, uint64_t *state)
 /* Numbers of a chunk are changed where it lies in the cache: as if the file had them. */
 static bool try_changed(whole *w, ebpo_array_id id, int level, uint64_t *state)
 {
-    ebpo_view view = { .array = ebpo_reader_array(w->file, id, level) };
+    ebpo_held_chunk view = { .array = ebpo_reader_array(w->file, id, level) };
     uint64_t row = ebpo_test_random(state) % view.array->shape.rows;
-    ck_assert_int_eq(ebpo_view_move(w->chunks, &view, row, NULL), EBPO_OK);
+    ck_assert_int_eq(ebpo_held_chunk_move(w->chunks, &view, row, NULL), EBPO_OK);
     size_t size = ebpo_h5_row_bytes(&view.array->shape);
     uint8_t *bytes = (uint8_t *)(uintptr_t)view.rows + (row - view.begin) * size, kept[64];
     memcpy(kept, bytes, size);
@@ -551,7 +551,7 @@ static bool try_changed(whole *w, ebpo_array_id id, int level, uint64_t *state)
     }
     bool well = try_all(w->file, w->chunks, state);
     memcpy(bytes, kept, size);
-    ebpo_view_release(w->chunks, &view);
+    ebpo_held_chunk_release(w->chunks, &view);
     return well;
 }
 
@@ -585,13 +585,13 @@ START_TEST(counts_that_do_not_fit_the_types_are_refused)
     random_tree_make(&tree, &options);
     write_tree(&tree, ~0u);
     whole_open(&w, path, 0);
-    ebpo_view view = { .array = ebpo_reader_array(w.file, EBPO_A_TYPES, 3) };
-    ck_assert_int_eq(ebpo_view_move(w.chunks, &view, 0, NULL), EBPO_OK);
+    ebpo_held_chunk view = { .array = ebpo_reader_array(w.file, EBPO_A_TYPES, 3) };
+    ck_assert_int_eq(ebpo_held_chunk_move(w.chunks, &view, 0, NULL), EBPO_OK);
     ((uint8_t *)(uintptr_t)view.rows)[0] |= 3; /* gray at the deepest level */
     ck_assert_int_eq(ebpo_slice_read(&slice, w.chunks, &(ebpo_place){ .type = EBPO_GRAY }, &error), EBPO_E_FORMAT);
     ck_assert_ptr_nonnull(strstr(error.message, "/levels/03/types: the types contradict the counts"));
     ck_assert(slice.level[0].types == NULL && slice.level_count == 0);
-    ebpo_view_release(w.chunks, &view);
+    ebpo_held_chunk_release(w.chunks, &view);
     whole_close(&w);
 }
 END_TEST

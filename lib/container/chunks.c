@@ -346,18 +346,18 @@ void ebpo_chunks_get_stats(ebpo_chunks *chunks, ebpo_cache_stats *out)
     ebpo_cache_get_stats(chunks->cache, out);
 }
 
-void ebpo_view_release(ebpo_chunks *chunks, ebpo_view *view)
+void ebpo_held_chunk_release(ebpo_chunks *chunks, ebpo_held_chunk *view)
 {
     if (view->rows)
         ebpo_cache_unpin(chunks->cache, view->key);
-    *view = (ebpo_view){ .array = view->array };
+    *view = (ebpo_held_chunk){ .array = view->array };
 }
 
-ebpo_status ebpo_view_load(ebpo_chunks *chunks, ebpo_view *view, uint64_t row, ebpo_error *error)
+ebpo_status ebpo_view_load(ebpo_chunks *chunks, ebpo_held_chunk *view, uint64_t row, ebpo_error *error)
 {
     uint64_t chunk = row / view->array->shape.chunk_rows;
     void *item;
-    ebpo_view_release(chunks, view); /* first: a tight budget may need the room */
+    ebpo_held_chunk_release(chunks, view); /* first: a tight budget may need the room */
     uint64_t key = key_of(view->array, chunk);
     ebpo_status status = ebpo_cache_get(chunks->cache, key, &item, NULL, error);
     if (status != EBPO_OK)
@@ -400,11 +400,11 @@ ebpo_status ebpo_chunks_integers(ebpo_chunks *chunks, ebpo_array_id id, int leve
     if (!chunks->counted)
         ebpo_chunks_expect(chunks, &expected, id, level, row, rows);
     ebpo_expect_all(&expected);
-    ebpo_view view = { .array = array };
+    ebpo_held_chunk view = { .array = array };
     uint64_t cols = array->shape.cols ? array->shape.cols : 1;
     uint8_t *out = values;
     while (rows && status == EBPO_OK) {
-        status = ebpo_view_move(chunks, &view, row, error);
+        status = ebpo_held_chunk_move(chunks, &view, row, error);
         if (status != EBPO_OK)
             break;
         uint64_t here = view.end - row < rows ? view.end - row : rows;
@@ -413,7 +413,7 @@ ebpo_status ebpo_chunks_integers(ebpo_chunks *chunks, ebpo_array_id id, int leve
         row += here;
         rows -= here;
     }
-    ebpo_view_release(chunks, &view);
+    ebpo_held_chunk_release(chunks, &view);
     return status;
 }
 

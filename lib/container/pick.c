@@ -322,14 +322,14 @@ static ebpo_status gather_chunks(void *context, uint64_t begin, uint64_t end, un
     ebpo_status status = EBPO_OK;
     (void)worker;
     for (uint64_t chunk = begin; chunk < end && status == EBPO_OK; chunk++) {
-        ebpo_view view = { .array = g->array };
+        ebpo_held_chunk view = { .array = g->array };
         for (uint64_t i = g->begin[chunk]; i < g->begin[chunk + 1] && status == EBPO_OK; i++) {
             uint32_t row = g->rows[g->order[i]];
-            status = ebpo_view_move(g->chunks, &view, row, error);
+            status = ebpo_held_chunk_move(g->chunks, &view, row, error);
             if (status == EBPO_OK)
                 memcpy(g->out + g->order[i] * g->row_bytes, view.rows + (row - view.begin) * g->row_bytes, g->row_bytes);
         }
-        ebpo_view_release(g->chunks, &view);
+        ebpo_held_chunk_release(g->chunks, &view);
     }
     return status;
 }

@@ -56,10 +56,10 @@ void ebpo_ranks_count(const void *types, uint64_t groups, uint64_t counts[4])
 
 ebpo_status ebpo_ranks_count_file(ebpo_chunks *chunks, int level, uint64_t group, uint64_t groups, uint64_t counts[4], ebpo_error *error)
 {
-    ebpo_view view = { .array = ebpo_reader_array(chunks->file, EBPO_A_TYPES, level) };
+    ebpo_held_chunk view = { .array = ebpo_reader_array(chunks->file, EBPO_A_TYPES, level) };
     ebpo_status status = EBPO_OK;
     memset(counts, 0, 4 * sizeof *counts);
-    while (groups && (status = ebpo_view_move(chunks, &view, group, error)) == EBPO_OK) {
+    while (groups && (status = ebpo_held_chunk_move(chunks, &view, group, error)) == EBPO_OK) {
         uint64_t here = view.end - group < groups ? view.end - group : groups, part[4];
         ebpo_ranks_count(view.rows + 2 * (group - view.begin), here, part);
         for (int k = 0; k < 4; k++)
@@ -67,7 +67,7 @@ ebpo_status ebpo_ranks_count_file(ebpo_chunks *chunks, int level, uint64_t group
         group += here;
         groups -= here;
     }
-    ebpo_view_release(chunks, &view);
+    ebpo_held_chunk_release(chunks, &view);
     return status;
 }
 
@@ -100,11 +100,11 @@ static bool sum_rows(const uint8_t *rows, unsigned element_size, uint64_t count,
 
 ebpo_status ebpo_chunks_sum(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row, uint64_t rows, uint64_t *sum, ebpo_error *error)
 {
-    ebpo_view view = { .array = ebpo_reader_array(chunks->file, id, level) };
+    ebpo_held_chunk view = { .array = ebpo_reader_array(chunks->file, id, level) };
     ebpo_status status = EBPO_OK;
     unsigned size = view.array->shape.element_size;
     *sum = 0;
-    while (rows && (status = ebpo_view_move(chunks, &view, row, error)) == EBPO_OK) {
+    while (rows && (status = ebpo_held_chunk_move(chunks, &view, row, error)) == EBPO_OK) {
         uint64_t here = view.end - row < rows ? view.end - row : rows;
         if (!sum_rows(view.rows + (row - view.begin) * size, size, here, sum)) {
             status = ebpo_chunks_fail(chunks, level, id, "the numbers are too large", error);
@@ -113,7 +113,7 @@ ebpo_status ebpo_chunks_sum(ebpo_chunks *chunks, ebpo_array_id id, int level, ui
         row += here;
         rows -= here;
     }
-    ebpo_view_release(chunks, &view);
+    ebpo_held_chunk_release(chunks, &view);
     return status;
 }
 

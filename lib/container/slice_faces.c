@@ -26,20 +26,20 @@ static void expect_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t *s
 static ebpo_status gather(ebpo_chunks *chunks, ebpo_array_id id, size_t row_bytes, const uint32_t *single, uint64_t singles, uint64_t first,
                           uint64_t rows, void *out, ebpo_error *error)
 {
-    ebpo_view view = { .array = ebpo_reader_array(chunks->file, id, 0) };
+    ebpo_held_chunk view = { .array = ebpo_reader_array(chunks->file, id, 0) };
     ebpo_status status = EBPO_OK;
     uint8_t *to = out;
     expect_rows(chunks, id, single, singles, first, rows);
-    for (uint64_t i = 0; i < singles && (status = ebpo_view_move(chunks, &view, single[i], error)) == EBPO_OK; i++, to += row_bytes)
+    for (uint64_t i = 0; i < singles && (status = ebpo_held_chunk_move(chunks, &view, single[i], error)) == EBPO_OK; i++, to += row_bytes)
         memcpy(to, view.rows + (single[i] - view.begin) * row_bytes, row_bytes);
-    while (rows && status == EBPO_OK && (status = ebpo_view_move(chunks, &view, first, error)) == EBPO_OK) {
+    while (rows && status == EBPO_OK && (status = ebpo_held_chunk_move(chunks, &view, first, error)) == EBPO_OK) {
         uint64_t here = view.end - first < rows ? view.end - first : rows;
         memcpy(to, view.rows + (first - view.begin) * row_bytes, here * row_bytes);
         to += here * row_bytes;
         first += here;
         rows -= here;
     }
-    ebpo_view_release(chunks, &view);
+    ebpo_held_chunk_release(chunks, &view);
     return status;
 }
 
@@ -97,11 +97,11 @@ static ebpo_status number_faces(ebpo_slice *slice, ebpo_error *error)
 /* Vertices are numbered by first use, so those that are new in the slice's own faces are a range, [*begin, *end), and all others that it uses lie before. */
 static ebpo_status new_vertices(ebpo_slice *slice, ebpo_chunks *chunks, uint64_t *begin, uint64_t *end, ebpo_error *error)
 {
-    ebpo_view view = { .array = ebpo_reader_array(chunks->file, EBPO_A_FACES, 0) };
+    ebpo_held_chunk view = { .array = ebpo_reader_array(chunks->file, EBPO_A_FACES, 0) };
     *begin = *end = UINT32_MAX; /* no own faces: all vertices are older */
     if (slice->face_count == 0)
         return EBPO_OK;
-    ebpo_status status = ebpo_view_move(chunks, &view, slice->first_face, error);
+    ebpo_status status = ebpo_held_chunk_move(chunks, &view, slice->first_face, error);
     if (status != EBPO_OK)
         return status;
     const uint32_t *corners = (const uint32_t *)(const void *)view.rows, *own = slice->mesh.faces + 3 * (uint64_t)slice->outer_count;
@@ -111,7 +111,7 @@ static ebpo_status new_vertices(ebpo_slice *slice, ebpo_chunks *chunks, uint64_t
         before = corners[i] + 1 > before ? corners[i] + 1 : before;
     for (uint64_t i = 0; i < 3 * slice->face_count; i++)
         within = own[i] + 1 > within ? own[i] + 1 : within;
-    ebpo_view_release(chunks, &view);
+    ebpo_held_chunk_release(chunks, &view);
     *begin = before > seen ? before : seen;
     *end = within > *begin ? within : *begin;
     return EBPO_OK;

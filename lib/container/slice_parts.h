@@ -26,19 +26,19 @@ struct ebpo_chunks {
     uint64_t ahead_count, ahead_room, ahead_bytes;
 };
 
-/* A place in an array: at most one chunk, pinned while rows in it are wanted. Begin with { .array = ... }, end with ebpo_view_release. One thread. */
-typedef struct ebpo_view {
+/* A place in an array: at most one chunk, pinned while rows in it are wanted. Begin with { .array = ... }, end with ebpo_held_chunk_release. One thread. */
+typedef struct ebpo_held_chunk {
     const ebpo_array_in *array;
     uint64_t key;
     uint64_t begin, end; /* rows of the pinned chunk */
     const uint8_t *rows; /* NULL: none is pinned. Integers as in the file; faces as u32 corners, vertices as floats or doubles, maps as u32 */
-} ebpo_view;
+} ebpo_held_chunk;
 
-EBPO_MUST_USE ebpo_status ebpo_view_load(ebpo_chunks *chunks, ebpo_view *view, uint64_t row, ebpo_error *error);
-void ebpo_view_release(ebpo_chunks *chunks, ebpo_view *view);
+EBPO_MUST_USE ebpo_status ebpo_view_load(ebpo_chunks *chunks, ebpo_held_chunk *view, uint64_t row, ebpo_error *error);
+void ebpo_held_chunk_release(ebpo_chunks *chunks, ebpo_held_chunk *view);
 
 /* Pins the chunk that holds `row`, which the array has. Cheap while rows stay in one chunk. */
-EBPO_MUST_USE static inline ebpo_status ebpo_view_move(ebpo_chunks *chunks, ebpo_view *view, uint64_t row, ebpo_error *error)
+EBPO_MUST_USE static inline ebpo_status ebpo_held_chunk_move(ebpo_chunks *chunks, ebpo_held_chunk *view, uint64_t row, ebpo_error *error)
 {
     return row >= view->begin && row < view->end ? EBPO_OK : ebpo_view_load(chunks, view, row, error);
 }

@@ -109,6 +109,21 @@ static void print_name(FILE *f, const char *name)
     }
 }
 
+/* Three numbers as JSON wants them, whatever the locale's decimal point. */
+static void print_three(FILE *f, const char *before, const double x[3])
+{
+    fputs(before, f);
+    for (int k = 0; k < 3; k++) {
+        char text[40];
+        snprintf(text, sizeof text, "%.17g", x[k]);
+        for (char *c = text; *c; c++)
+            if (!strchr("+-0123456789eE", *c))
+                *c = '.';
+        fprintf(f, "%s%s", k ? "," : "[", text);
+    }
+    fputc(']', f);
+}
+
 static void print_nodes(FILE *f, const model *m)
 {
     const double *o = m->origin;
@@ -119,7 +134,7 @@ static void print_nodes(FILE *f, const model *m)
     for (int i = 0; i < m->count; i++) {
         fprintf(f, "%s{\"name\":\"%s\",\"mesh\":%d", i ? ",\n" : "", m->parts[i].block.name, i);
         if (o[0] != 0 || o[1] != 0 || o[2] != 0)
-            fprintf(f, ",\"translation\":[%.17g,%.17g,%.17g]", o[0], o[1], o[2]);
+            print_three(f, ",\"translation\":", o);
         fputc('}', f);
     }
     fprintf(f, "],\n\"meshes\":[");
@@ -135,9 +150,11 @@ static void print_data(FILE *f, const model *m)
     fprintf(f, "\"accessors\":[");
     for (int i = 0; i < m->count; i++) {
         const part *p = &m->parts[i];
-        fprintf(f, "%s{\"bufferView\":%d,\"componentType\":%d,\"count\":%" PRIu64 ",\"type\":\"VEC3\",\"min\":[%.17g,%.17g,%.17g],\"max\":[%.17g,%.17g,%.17g]},\n", i ? ",\n" : "",
-                2 * i, FLOAT32, p->block.mesh.vertex_count, (double)p->low[0], (double)p->low[1], (double)p->low[2], (double)p->high[0], (double)p->high[1],
-                (double)p->high[2]);
+        const double low[3] = { (double)p->low[0], (double)p->low[1], (double)p->low[2] }, high[3] = { (double)p->high[0], (double)p->high[1], (double)p->high[2] };
+        fprintf(f, "%s{\"bufferView\":%d,\"componentType\":%d,\"count\":%" PRIu64 ",\"type\":\"VEC3\"", i ? ",\n" : "", 2 * i, FLOAT32, p->block.mesh.vertex_count);
+        print_three(f, ",\"min\":", low);
+        print_three(f, ",\"max\":", high);
+        fputs("},\n", f);
         fprintf(f, "{\"bufferView\":%d,\"componentType\":%d,\"count\":%" PRIu64 ",\"type\":\"SCALAR\"}", 2 * i + 1, UINT32, 3 * p->block.mesh.face_count);
     }
     fprintf(f, "],\n\"bufferViews\":[");

@@ -11,7 +11,7 @@
 
 static const double eps = 0x1p-53;
 
-void ebpo_half_spaces_of(ebpo_half_spaces *out, const ebpo_view *view, const ebpo_view_node *node)
+void ebpo_half_spaces_of(ebpo_half_spaces *out, const ebpo_tree_view *view, const ebpo_tree_view_node *node)
 {
     uint32_t count;
     const uint32_t *codes = ebpo_view_planes(view, node, &count);
@@ -112,7 +112,7 @@ static bool face_keeps(ebpo_tally *tally, const ebpo_half_spaces *planes, int i,
     return ebpo_exact_half_space(frame->low, frame->high, face, planes->normal[i], planes->d[i]);
 }
 
-void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_half_spaces *planes, const ebpo_view_node *node,
+void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_half_spaces *planes, const ebpo_tree_view_node *node,
                                const ebpo_frame *frame, const ebpo_corners *face, uint64_t number)
 {
     ebpo_local local;
@@ -124,7 +124,7 @@ void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_half_spaces *planes
                                  "the plane cuts off a part of the face in the cell");
 }
 
-void ebpo_check_corners_contained(ebpo_tally *tally, const ebpo_half_spaces *planes, const ebpo_view_node *node, unsigned corners)
+void ebpo_check_corners_contained(ebpo_tally *tally, const ebpo_half_spaces *planes, const ebpo_tree_view_node *node, unsigned corners)
 {
     for (int i = 0; i < planes->count; i++)
         for (unsigned corner = 0; corner < 8; corner++) {

@@ -8,7 +8,7 @@ static const double ray_work_affordable = 4e8;
 
 __extension__ typedef unsigned __int128 wide;
 
-void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_view *view, const ebpo_columns *columns, uint64_t samples)
+void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_tree_view *view, const ebpo_columns *columns, uint64_t samples)
 {
     uint64_t all = 0, classes = 0;
     for (int l = 0; l < view->tree->info.level_count; l++) {
@@ -36,7 +36,7 @@ void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_view *view, const eb
 }
 
 /* True for `take` of the `cells` ranks, evenly spread. */
-static bool planned(const ebpo_label_plan *plan, const ebpo_view_node *node)
+static bool planned(const ebpo_label_plan *plan, const ebpo_tree_view_node *node)
 {
     uint64_t cells = plan->cells[node->cell.level][node->type], take = plan->take[node->cell.level][node->type];
     if (take >= cells)
@@ -64,7 +64,7 @@ static void add_crossings(int64_t change[7], const ebpo_frame *frame, const ebpo
     }
 }
 
-void ebpo_terminal_windings(ebpo_corner_windings *out, const ebpo_view *view, const ebpo_view_node *node,
+void ebpo_terminal_windings(ebpo_corner_windings *out, const ebpo_tree_view *view, const ebpo_tree_view_node *node,
                             const ebpo_frame *frame, const uint32_t *faces, uint64_t count)
 {
     int64_t first = ebpo_view_winding(view, node), change[7] = {0};
@@ -82,7 +82,7 @@ void ebpo_terminal_windings(ebpo_corner_windings *out, const ebpo_view *view, co
         out->at[edge_tree[e].to] = out->at[edge_tree[e].from] + change[e];
 }
 
-void ebpo_check_terminal_label(ebpo_tally *tally, const ebpo_view *view, const ebpo_view_node *node, const ebpo_frame *frame,
+void ebpo_check_terminal_label(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo_tree_view_node *node, const ebpo_frame *frame,
                                const ebpo_label_plan *plan, const ebpo_columns *columns)
 {
     ebpo_verify_place place = {node->code, EBPO_NO_FACE, EBPO_NO_PLANE};
@@ -112,7 +112,7 @@ static int shared_point(unsigned octant, unsigned corner)
     return point;
 }
 
-void ebpo_check_links(ebpo_tally *tally, const ebpo_view_node *node, const ebpo_corner_windings children[8],
+void ebpo_check_links(ebpo_tally *tally, const ebpo_tree_view_node *node, const ebpo_corner_windings children[8],
                       ebpo_corner_windings *out)
 {
     int64_t value[27];
@@ -153,7 +153,7 @@ void ebpo_check_root_corners(ebpo_tally *tally, const ebpo_corner_windings *root
     }
 }
 
-unsigned ebpo_windings_inside(const ebpo_view *view, const ebpo_corner_windings *corners)
+unsigned ebpo_windings_inside(const ebpo_tree_view *view, const ebpo_corner_windings *corners)
 {
     unsigned inside = 0;
     for (unsigned i = 0; i < 8; i++)

@@ -23,24 +23,24 @@ typedef struct ebpo_label_plan {
 } ebpo_label_plan;
 
 /* samples 0: all when that is affordable, else 4096. */
-void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_view *view, const ebpo_columns *columns, uint64_t samples);
+void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_tree_view *view, const ebpo_columns *columns, uint64_t samples);
 
 /* Corner windings of a leaf, white or black node; `faces`: the `count` faces that touch it. */
-void ebpo_terminal_windings(ebpo_corner_windings *out, const ebpo_view *view, const ebpo_view_node *node,
+void ebpo_terminal_windings(ebpo_corner_windings *out, const ebpo_tree_view *view, const ebpo_tree_view_node *node,
                             const ebpo_frame *frame, const uint32_t *faces, uint64_t count);
 
 /* White outside, black inside; the winding number by a ray where the plan says so (columns may be NULL). */
-void ebpo_check_terminal_label(ebpo_tally *tally, const ebpo_view *view, const ebpo_view_node *node, const ebpo_frame *frame,
+void ebpo_check_terminal_label(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo_tree_view_node *node, const ebpo_frame *frame,
                                const ebpo_label_plan *plan, const ebpo_columns *columns);
 
 /* Compares the children of a gray node with each other and gives the node's own corners. */
-void ebpo_check_links(ebpo_tally *tally, const ebpo_view_node *node, const ebpo_corner_windings children[8],
+void ebpo_check_links(ebpo_tally *tally, const ebpo_tree_view_node *node, const ebpo_corner_windings children[8],
                       ebpo_corner_windings *out);
 
 /* The root's corners are outside. */
 void ebpo_check_root_corners(ebpo_tally *tally, const ebpo_corner_windings *root);
 
 /* Bit i: corner i lies in the solid. */
-unsigned ebpo_windings_inside(const ebpo_view *view, const ebpo_corner_windings *corners);
+unsigned ebpo_windings_inside(const ebpo_tree_view *view, const ebpo_corner_windings *corners);
 
 #endif

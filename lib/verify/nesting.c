@@ -6,7 +6,7 @@ enum { NODES_PER_LEVEL = 256, POINTS_PER_NODE = 8, POINT_BITS = 16 };
 
 __extension__ typedef __int128 wide;
 
-static void check_codes(ebpo_tally *tally, const ebpo_view *view, int l, ebpo_node_type type, const uint8_t *counts)
+static void check_codes(ebpo_tally *tally, const ebpo_tree_view *view, int l, ebpo_node_type type, const uint8_t *counts)
 {
     const ebpo_level *level = &view->tree->level[l];
     for (uint64_t group = 0; group < level->group_count; group++)
@@ -16,7 +16,7 @@ static void check_codes(ebpo_tally *tally, const ebpo_view *view, int l, ebpo_no
             uint64_t rank = view->groups[l][group].of_type[type];
             for (unsigned i = 0; i < octant; i++)
                 rank += ebpo_view_type(level, group, i) == type;
-            ebpo_view_node node = {.group = group, .octant = octant, .type = type, .rank = rank, .cell.level = l};
+            ebpo_tree_view_node node = {.group = group, .octant = octant, .type = type, .rank = rank, .cell.level = l};
             uint32_t count;
             const uint32_t *codes = counts[rank] ? ebpo_view_planes(view, &node, &count) : NULL;
             for (uint32_t i = 0; i < counts[rank]; i++) {
@@ -32,10 +32,10 @@ static void check_codes(ebpo_tally *tally, const ebpo_view *view, int l, ebpo_no
 /* A chain of nodes from the root down. */
 typedef struct chain {
     int depth;
-    ebpo_view_node node[EBPO_LEVELS_MAX];
+    ebpo_tree_view_node node[EBPO_LEVELS_MAX];
 } chain;
 
-static void chain_to(chain *out, const ebpo_view *view, const ebpo_view_node *end)
+static void chain_to(chain *out, const ebpo_tree_view *view, const ebpo_tree_view_node *end)
 {
     out->depth = end->cell.level;
     out->node[0] = ebpo_view_root(view);
@@ -66,7 +66,7 @@ static bool keeps_below(const chain *c, int from, int to, const int64_t point[3]
     return 4096 * sum <= (wide)d * (1 << POINT_BITS);
 }
 
-static void check_point(ebpo_tally *tally, const ebpo_view *view, const chain *c, const int64_t point[3])
+static void check_point(ebpo_tally *tally, const ebpo_tree_view *view, const chain *c, const int64_t point[3])
 {
     const ebpo_cell *at = &c->node[c->depth].cell;
     for (int l = 0; l < c->depth; l++) {
@@ -86,7 +86,7 @@ static void check_point(ebpo_tally *tally, const ebpo_view *view, const chain *c
 }
 
 /* Walls of a cell are walls or the middle of its parent, as doubles too. */
-static void check_walls(ebpo_tally *tally, const ebpo_view *view, const ebpo_view_node *node)
+static void check_walls(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo_tree_view_node *node)
 {
     int level = node->cell.level;
     bool same = true;
@@ -112,7 +112,7 @@ static uint64_t next_random(uint64_t *state)
 }
 
 /* Random points of the cell, and its corners. */
-static void check_node(ebpo_tally *tally, const ebpo_view *view, const ebpo_view_node *node)
+static void check_node(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo_tree_view_node *node)
 {
     chain c;
     chain_to(&c, view, node);
@@ -129,7 +129,7 @@ static void check_node(ebpo_tally *tally, const ebpo_view *view, const ebpo_view
     }
 }
 
-void ebpo_check_nesting(ebpo_tally *tally, const ebpo_view *view)
+void ebpo_check_nesting(ebpo_tally *tally, const ebpo_tree_view *view)
 {
     for (int l = 0; l < view->tree->info.level_count; l++) {
         const ebpo_level *level = &view->tree->level[l];
@@ -140,7 +140,7 @@ void ebpo_check_nesting(ebpo_tally *tally, const ebpo_view *view)
         uint64_t cells = 8 * level->group_count;
         for (uint64_t i = 0; l > 0 && i < NODES_PER_LEVEL && i < cells; i++) {
             uint64_t cell = cells <= NODES_PER_LEVEL ? i : (uint64_t)((wide)cells * i / NODES_PER_LEVEL) + i % 8;
-            ebpo_view_node node = ebpo_view_at(view, l, (cell % cells) / 8, (unsigned)(cell % 8));
+            ebpo_tree_view_node node = ebpo_view_at(view, l, (cell % cells) / 8, (unsigned)(cell % 8));
             check_node(tally, view, &node);
         }
     }

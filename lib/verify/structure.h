@@ -9,6 +9,6 @@
 bool ebpo_check_shape(ebpo_tally *tally, const ebpo_tree *tree);
 
 /* The rest: summaries, leaf sizes, order of faces, root box around the vertices, balanced edges of a solid. */
-void ebpo_check_structure(ebpo_tally *tally, const ebpo_view *view);
+void ebpo_check_structure(ebpo_tally *tally, const ebpo_tree_view *view);
 
 #endif

@@ -12,7 +12,7 @@ ebpo_status ebpo_verify_tree(ebpo_tally *tally, const ebpo_tree *tree, const ebp
 {
     if (!ebpo_check_shape(tally, tree))
         return EBPO_OK;
-    ebpo_view view;
+    ebpo_tree_view view;
     ebpo_status status = ebpo_view_make(&view, tree, error);
     if (status != EBPO_OK)
         return status;

@@ -6,7 +6,7 @@
 #include "base/error.h"
 
 /* Adds what a group holds to the running counts. */
-static void add_group(ebpo_view_group *sum, const ebpo_view *view, const ebpo_level *level, uint64_t group, unsigned octants)
+static void add_group(ebpo_view_group *sum, const ebpo_tree_view *view, const ebpo_level *level, uint64_t group, unsigned octants)
 {
     for (unsigned octant = 0; octant < octants; octant++) {
         ebpo_node_type type = ebpo_view_type(level, group, octant);
@@ -25,9 +25,9 @@ static unsigned octants_at(int level)
     return level == 0 ? 1 : 8;
 }
 
-ebpo_status ebpo_view_make(ebpo_view *out, const ebpo_tree *tree, ebpo_error *error)
+ebpo_status ebpo_view_make(ebpo_tree_view *out, const ebpo_tree *tree, ebpo_error *error)
 {
-    *out = (ebpo_view){.tree = tree, .box.grid_level = tree->info.grid_level};
+    *out = (ebpo_tree_view){.tree = tree, .box.grid_level = tree->info.grid_level};
     for (int k = 0; k < 3; k++) {
         out->box.origin[k] = tree->info.box_origin[k];
         out->box.size[k] = tree->info.box_size[k];
@@ -51,30 +51,30 @@ ebpo_status ebpo_view_make(ebpo_view *out, const ebpo_tree *tree, ebpo_error *er
     return EBPO_OK;
 }
 
-void ebpo_view_free(ebpo_view *view)
+void ebpo_view_free(ebpo_tree_view *view)
 {
     for (int l = 0; l < EBPO_LEVELS_MAX; l++)
         free(view->groups[l]);
-    *view = (ebpo_view){0};
+    *view = (ebpo_tree_view){0};
 }
 
 /* Fills in type and rank. */
-static ebpo_view_node place(const ebpo_view *view, ebpo_octcode code, ebpo_cell cell, uint64_t group, unsigned octant)
+static ebpo_tree_view_node place(const ebpo_tree_view *view, ebpo_octcode code, ebpo_cell cell, uint64_t group, unsigned octant)
 {
     const ebpo_level *level = &view->tree->level[cell.level];
-    ebpo_view_node node = {code, cell, group, octant, ebpo_view_type(level, group, octant), 0};
+    ebpo_tree_view_node node = {code, cell, group, octant, ebpo_view_type(level, group, octant), 0};
     node.rank = view->groups[cell.level][group].of_type[node.type];
     for (unsigned i = 0; i < octant; i++)
         node.rank += ebpo_view_type(level, group, i) == node.type;
     return node;
 }
 
-ebpo_view_node ebpo_view_root(const ebpo_view *view)
+ebpo_tree_view_node ebpo_view_root(const ebpo_tree_view *view)
 {
     return place(view, 1, (ebpo_cell){0, {0, 0, 0}}, 0, 0);
 }
 
-bool ebpo_view_is_pruned(const ebpo_view *view, const ebpo_view_node *node)
+bool ebpo_view_is_pruned(const ebpo_tree_view *view, const ebpo_tree_view_node *node)
 {
     const ebpo_tree *tree = view->tree;
     if (!tree->info.pruned || node->type != EBPO_GRAY)
@@ -82,7 +82,7 @@ bool ebpo_view_is_pruned(const ebpo_view *view, const ebpo_view_node *node)
     return node->cell.level + 1 >= tree->info.level_count || tree->level[node->cell.level + 1].types[node->rank] == 0;
 }
 
-ebpo_view_node ebpo_view_child(const ebpo_view *view, const ebpo_view_node *node, unsigned octant)
+ebpo_tree_view_node ebpo_view_child(const ebpo_tree_view *view, const ebpo_tree_view_node *node, unsigned octant)
 {
     ebpo_cell cell = {node->cell.level + 1, {0}};
     for (int k = 0; k < 3; k++)
@@ -91,7 +91,7 @@ ebpo_view_node ebpo_view_child(const ebpo_view *view, const ebpo_view_node *node
 }
 
 /* Group of `level` that holds the gray node of this rank. */
-static uint64_t group_of_gray(const ebpo_view *view, int level, uint64_t rank)
+static uint64_t group_of_gray(const ebpo_tree_view *view, int level, uint64_t rank)
 {
     uint64_t low = 0, high = view->tree->level[level].group_count;
     while (high - low > 1) {
@@ -104,7 +104,7 @@ static uint64_t group_of_gray(const ebpo_view *view, int level, uint64_t rank)
     return low;
 }
 
-ebpo_view_node ebpo_view_at(const ebpo_view *view, int level, uint64_t group, unsigned octant)
+ebpo_tree_view_node ebpo_view_at(const ebpo_tree_view *view, int level, uint64_t group, unsigned octant)
 {
     unsigned path[EBPO_LEVELS_MAX];
     path[level] = octant;
@@ -117,13 +117,13 @@ ebpo_view_node ebpo_view_at(const ebpo_view *view, int level, uint64_t group, un
             i++;
         path[l] = i;
     }
-    ebpo_view_node node = ebpo_view_root(view);
+    ebpo_tree_view_node node = ebpo_view_root(view);
     for (int l = 1; l <= level; l++)
         node = ebpo_view_child(view, &node, path[l]);
     return node;
 }
 
-const uint32_t *ebpo_view_planes(const ebpo_view *view, const ebpo_view_node *node, uint32_t *count)
+const uint32_t *ebpo_view_planes(const ebpo_tree_view *view, const ebpo_tree_view_node *node, uint32_t *count)
 {
     const ebpo_level *level = &view->tree->level[node->cell.level];
     const ebpo_view_group *group = &view->groups[node->cell.level][node->group];
@@ -139,7 +139,7 @@ const uint32_t *ebpo_view_planes(const ebpo_view *view, const ebpo_view_node *no
     return *count ? (gray ? level->planes : level->leaf_planes) + first : NULL;
 }
 
-const uint32_t *ebpo_view_refs(const ebpo_view *view, const ebpo_view_node *leaf, uint32_t *count)
+const uint32_t *ebpo_view_refs(const ebpo_tree_view *view, const ebpo_tree_view_node *leaf, uint32_t *count)
 {
     const ebpo_level *level = &view->tree->level[leaf->cell.level];
     const ebpo_view_group *group = &view->groups[leaf->cell.level][leaf->group];
@@ -150,7 +150,7 @@ const uint32_t *ebpo_view_refs(const ebpo_view *view, const ebpo_view_node *leaf
     return *count ? level->leaf_refs + first : NULL;
 }
 
-int64_t ebpo_view_winding(const ebpo_view *view, const ebpo_view_node *node)
+int64_t ebpo_view_winding(const ebpo_tree_view *view, const ebpo_tree_view_node *node)
 {
     const ebpo_level *level = &view->tree->level[node->cell.level];
     switch (node->type) {

@@ -29,7 +29,7 @@ typedef struct worker {
 
 /* A node of the upper part. `children` 0: the root of a subtree that is walked by one thread. */
 typedef struct upper_node {
-    ebpo_view_node node;
+    ebpo_tree_view_node node;
     uint32_t *faces;
     uint64_t face_count;
     uint64_t children; /* the first of eight, in the same array */
@@ -37,7 +37,7 @@ typedef struct upper_node {
 } upper_node;
 
 typedef struct walk {
-    const ebpo_view *view;
+    const ebpo_tree_view *view;
     const ebpo_verify_options *options;
     unsigned threads;
     ebpo_columns columns;
@@ -60,7 +60,7 @@ typedef struct family {
     double middle[3];
 } family;
 
-static void family_make(family *out, const ebpo_box *box, const ebpo_view_node *node)
+static void family_make(family *out, const ebpo_box *box, const ebpo_tree_view_node *node)
 {
     out->self = ebpo_frame_make(box, node->cell);
     for (int k = 0; k < 3; k++)
@@ -101,7 +101,7 @@ static unsigned touched_octants(const family *f, const ebpo_corners *face, ebpo_
 }
 
 /* What is done for each face at a gray node. */
-static void visit_faces(const walk *w, worker *self, const ebpo_view_node *node, const family *f,
+static void visit_faces(const walk *w, worker *self, const ebpo_tree_view_node *node, const family *f,
                         const uint32_t *faces, uint8_t *octants, uint64_t count)
 {
     for (uint64_t i = 0; i < count; i++) {
@@ -114,7 +114,7 @@ static void visit_faces(const walk *w, worker *self, const ebpo_view_node *node,
 }
 
 /* A gray node with so few faces that it ought to be a leaf. */
-static void check_worth(const walk *w, ebpo_tally *tally, const ebpo_view_node *node, uint64_t touching)
+static void check_worth(const walk *w, ebpo_tally *tally, const ebpo_tree_view_node *node, uint64_t touching)
 {
     uint64_t limit = w->view->tree->info.leaf_faces;
     if (limit == 0 || !w->view->has_mesh || w->view->tree->info.pruned) /* of a subset not all leaves are there */
@@ -126,7 +126,7 @@ static void check_worth(const walk *w, ebpo_tally *tally, const ebpo_view_node *
 }
 
 /* What is left to do at a gray node when its children are done. */
-static void finish_gray(const walk *w, worker *self, const ebpo_view_node *node, const ebpo_corner_windings children[8],
+static void finish_gray(const walk *w, worker *self, const ebpo_tree_view_node *node, const ebpo_corner_windings children[8],
                         ebpo_corner_windings *corners)
 {
     if (!w->view->tree->info.solid)
@@ -139,10 +139,10 @@ static void finish_gray(const walk *w, worker *self, const ebpo_view_node *node,
     ebpo_check_corners_contained(&self->tally, &self->planes, node, inside);
 }
 
-static void walk_terminal(const walk *w, worker *self, const ebpo_view_node *node, const uint32_t *faces, uint64_t count,
+static void walk_terminal(const walk *w, worker *self, const ebpo_tree_view_node *node, const uint32_t *faces, uint64_t count,
                           ebpo_corner_windings *corners)
 {
-    const ebpo_view *view = w->view;
+    const ebpo_tree_view *view = w->view;
     ebpo_frame frame = ebpo_frame_make(&view->box, node->cell);
     if (view->has_mesh && node->type != EBPO_GRAY) /* pruned */
         ebpo_check_terminal_lists(&self->tally, view, node, faces, count);
@@ -178,7 +178,7 @@ static bool stack_reserve(face_stack *s, uint64_t need)
 }
 
 /* The node's faces are [first, first + count) on the stack. */
-static ebpo_status walk_down(const walk *w, worker *self, const ebpo_view_node *node, uint64_t first, uint64_t count,
+static ebpo_status walk_down(const walk *w, worker *self, const ebpo_tree_view_node *node, uint64_t first, uint64_t count,
                              ebpo_corner_windings *corners, ebpo_error *error)
 {
     face_stack *s = &self->stack;
@@ -199,7 +199,7 @@ static ebpo_status walk_down(const walk *w, worker *self, const ebpo_view_node *
         for (uint64_t i = 0; i < count; i++)
             if (s->octants[first + i] >> octant & 1)
                 s->faces[first + count + own++] = s->faces[first + i];
-        ebpo_view_node child = ebpo_view_child(w->view, node, octant);
+        ebpo_tree_view_node child = ebpo_view_child(w->view, node, octant);
         ebpo_status status = walk_down(w, self, &child, first + count, own, &children[octant], error);
         if (status != EBPO_OK)
             return status;
@@ -362,7 +362,7 @@ static void release(walk *w)
         ebpo_columns_free(&w->columns);
 }
 
-ebpo_status ebpo_walk(ebpo_tally *tally, const ebpo_view *view, const ebpo_verify_options *options, ebpo_error *error)
+ebpo_status ebpo_walk(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo_verify_options *options, ebpo_error *error)
 {
     walk w = {.view = view, .options = options, .threads = ebpo_thread_count(options->threads)};
     ebpo_status status = prepare(&w, error);

@@ -48,9 +48,11 @@ typedef struct ebpo_export_report {
  * XDMF's). */
 EBPO_API bool ebpo_export_second_file(ebpo_export_format format, const char *path, char *out, size_t room);
 
-/* Writes the file: whole or not at all (temporary name, fsync, rename); a second file is put in place just before it. XDMF and VTKHDF hold one level in memory at a time, the others
+/* Writes the file: whole or not at all (temporary name, fsync, rename). So is a second file, which is put in place just before it: when the first then fails (EBPO_E_IO), the second is new already. XDMF and VTKHDF hold one level in memory at a time, the others
  * all of them. `report` may be NULL. EBPO_E_ARGUMENT: no such level, nothing to write, or more than the format holds; EBPO_E_UNSUPPORTED: a build without assimp; EBPO_E_ABSENT: `mesh`,
- * and the file has none; EBPO_E_LIMIT: more than 2^32 - 2 vertices or faces. */
+ * and the file has none; EBPO_E_LIMIT: more than 2^32 - 2 vertices or faces, a coordinate beyond
+ * float32 in a format that holds these, or a GLB beyond 2^32 bytes; EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY, EBPO_E_CANCELLED as everywhere. `options` may be NULL. Any thread; the file may be in use
+ * elsewhere. */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_export(ebpo_file *file, const char *path, ebpo_export_format format, const ebpo_export_options *options,
                                                ebpo_export_report *report, ebpo_error *error);
 

@@ -38,6 +38,7 @@ typedef struct ebpo_subset_options {
 
 /* Writes the subset: whole or not at all. The result does not depend on threads; with everything kept its content (content_sha256) is the source's. Reads what it needs and
  * holds the result in memory, and of the source up to 64 MiB beside it.
+ * `options` may be NULL: everything is kept. Any thread; the file may be in use elsewhere. EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY, EBPO_E_CANCELLED as everywhere.
  * EBPO_E_ARGUMENT: no such level, a box without points, or one that does not meet the model's root cell (or the box that an earlier subset has kept). */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_subset(ebpo_file *file, const char *path, const ebpo_subset_options *options, ebpo_error *error);
 

@@ -89,12 +89,13 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_view_stream_new(ebpo_view_stream **out, 
 EBPO_API void ebpo_view_stream_free(ebpo_view_stream *stream); /* NULL is fine */
 
 /* The next node, lent until the next call on the stream. Of the file, the chunks are read that the node and its siblings stand in, unless they are in memory; files far away are asked
- * ahead, within the budget, for what stands next in the order. One may stop anywhere and go on later, and try again after a failure (EBPO_E_IO, EBPO_E_MEMORY).
+ * ahead, within the budget, for what stands next in the order. One may stop anywhere and go on later, and try again after a failure (EBPO_E_IO, EBPO_E_MEMORY; EBPO_E_FORMAT and
+ * EBPO_E_LIMIT, for more than 2^32 groups, stay).
  * *end tells why *out is untouched when it is not EBPO_VIEW_NODE. The sequence depends on the file and the options only; a budget cuts it short and changes nothing else. */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_view_stream_next(ebpo_view_stream *stream, ebpo_view_node *out, ebpo_view_end *end, ebpo_error *error);
 
 /* Takes other options, for example an observer who has moved: the cut stays, what comes next is chosen anew. Siblings that are on the way come first. On failure nothing changes;
- * EBPO_E_ARGUMENT also when a fixed option is another one. */
+ * EBPO_E_ARGUMENT also when a fixed option is another one. `options` must not be NULL. */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_view_stream_change(ebpo_view_stream *stream, const ebpo_view_options *options, ebpo_error *error);
 
 /* Called for one node after the other; lent until it returns. False: enough. */

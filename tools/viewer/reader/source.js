@@ -59,7 +59,7 @@ const RETRY_STATUS = new Set([429, 500, 502, 503, 504]);
 /**
  * A file on any static web server, by range requests. The server must answer 206 with Content-Range; one that answers 200 is read once as a
  * whole when the file is not larger than `wholeLimit`. The ETag of the first answer (else Last-Modified) is pinned: a file that changes under
- * way is an error, never a mixture. Failed requests are repeated a few times, with pauses that grow and vary.
+ * way is an error, never a mixture, where the server tells either (and, to pages of other origins, exposes it). Failed requests are repeated a few times, with pauses that grow and vary.
  *
  * Options: `wholeLimit` (bytes, 64 MiB), `timeout` (ms without a byte, 30000), `fetch` (another implementation), `headers` (for credentials).
  */
