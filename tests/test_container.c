@@ -251,6 +251,30 @@ START_TEST(all_metadata_is_in_two_pieces)
 }
 END_TEST
 
+/* Checksums at the end of headers that end in zero bytes, and files of one array: sizes of metadata are right for all of them. */
+START_TEST(files_of_all_sizes_have_no_gaps)
+{
+    static const uint32_t parts[] = { ~0u, EBPO_PART_PLANES, 0, EBPO_PART_MESH };
+    for (unsigned seed = 1; seed <= 100; seed++) {
+        random_tree_options options = { seed, 1 + (int)(seed % 3), 2 + seed % 5, seed * 7 % 260 + 1, seed % 2 == 0, false, seed % 3 == 0, false };
+        ebpo_tree tree;
+        random_tree_make(&tree, &options);
+        for (int codec = EBPO_CODEC_ZSTD; codec <= EBPO_CODEC_NONE; codec++) {
+            uint32_t some = parts[seed % 4];
+            write_ok(&tree, in_folder("a.ebpo.h5"), (ebpo_codec)codec, 1, some);
+            ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
+            const ebpo_info *info = ebpo_file_info(file);
+            uint64_t sum = info->head_bytes + info->chunk_index_bytes + info->mesh_vertex_bytes + info->mesh_face_bytes + info->map_bytes;
+            for (int level = 0; level < info->level_count; level++)
+                sum += info->level[level].stored_bytes;
+            ck_assert_msg(sum == info->file_bytes, "seed %u, codec %d: %d bytes, the file has %d", seed, codec, (int)sum, (int)info->file_bytes);
+            ebpo_close(file);
+        }
+        ebpo_tree_free(&tree);
+    }
+}
+END_TEST
+
 START_TEST(libhdf5_reads_what_we_compress)
 {
     ebpo_tree tree;
@@ -631,6 +655,7 @@ int main(void)
     tcase_add_test(tests, equal_trees_give_equal_bytes_for_any_thread_count);
     tcase_add_test(tests, content_checksum_does_not_depend_on_the_codec);
     tcase_add_test(tests, all_metadata_is_in_two_pieces);
+    tcase_add_test(tests, files_of_all_sizes_have_no_gaps);
     tcase_add_test(tests, libhdf5_reads_what_we_compress);
     tcase_add_test(tests, parts_that_are_left_out_are_absent);
     tcase_add_loop_test(tests, source_order_undoes_the_maps, 1, 4);

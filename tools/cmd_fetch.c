@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "command.h"
@@ -130,6 +131,12 @@ static int fetch(subset_values *v, const char *url, const char *out, const char 
             remote_tell(&seen, &v->remote, false);
     }
     ebpo_close(file);
+    if (part && status == EBPO_E_FORMAT && access(part, F_OK) == 0) { /* kept blocks would be damaged the next time as well */
+        remove_part(part);
+        int code = command_failed("fetch", &error);
+        fprintf(stderr, "ebpo fetch: what had come was removed, as it may have been damaged on the way; the same command begins anew\n");
+        return code;
+    }
     if (part && (status == EBPO_OK || (usage && !held))) /* a slip in an option takes nothing away that came before */
         remove_part(part);
     if (part && status != EBPO_OK && !usage && access(part, F_OK) == 0 && rmdir(part) != 0) { /* an empty one is of no use */
@@ -138,6 +145,21 @@ static int fetch(subset_values *v, const char *url, const char *out, const char 
         return code;
     }
     return status == EBPO_OK ? EXIT_FINE : command_failed("fetch", &error);
+}
+
+/* Before anything is fetched: false when it could not be put in its place. */
+static bool out_fits(const char *out, const char *part)
+{
+    struct stat s;
+    if (stat(out, &s) == 0 && S_ISDIR(s.st_mode)) {
+        fprintf(stderr, "ebpo fetch: %s: is a folder; name a file in it\n", out);
+        return false;
+    }
+    if (part && lstat(part, &s) == 0 && !S_ISDIR(s.st_mode)) {
+        fprintf(stderr, "ebpo fetch: %s: stands where what has come would be kept, and is no folder; move it away\n", part);
+        return false;
+    }
+    return true;
 }
 
 static int run(int argc, char **argv)
@@ -158,7 +180,7 @@ static int run(int argc, char **argv)
         fprintf(stderr, "ebpo fetch: out of memory\n");
         return EXIT_FAILED;
     }
-    code = fetch(&v, operand[0], operand[1], part, &subset);
+    code = out_fits(operand[1], part) ? fetch(&v, operand[0], operand[1], part, &subset) : EXIT_FAILED;
     free(part);
     return code;
 }

@@ -96,11 +96,17 @@ ebpo_source ebpo_source_of_memory(const void *data, uint64_t size)
     return (ebpo_source){ (void *)(uintptr_t)data, size, memory_read, NULL, NULL, 0 }; /* read only, whatever the type of `user` says */
 }
 
+/* What the source had to fetch before it could be opened: counted once, however often it is looked at. */
+static uint64_t at_hand(const ebpo_input *input)
+{
+    return input->source.at_hand < input->source.size ? input->source.at_hand : input->source.size;
+}
+
 ebpo_status ebpo_input_open(ebpo_input *input, const ebpo_source *source, const char *name, ebpo_error *error)
 {
     input->source = *source;
     input->shown = strdup(name);
-    atomic_init(&input->bytes, 0);
+    atomic_init(&input->bytes, at_hand(input));
     atomic_init(&input->reads, 0);
     if (input->shown)
         return EBPO_OK;
@@ -125,7 +131,8 @@ ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size, v
     if (offset > input->source.size || size > input->source.size - offset)
         return ebpo_fail(error, EBPO_E_FORMAT, "%s: bytes %" PRIu64 " to %" PRIu64 " are named, but the file ends at %" PRIu64
                          "; get a fresh copy of the file", input->shown, offset, offset + size - 1, input->source.size);
-    atomic_fetch_add_explicit(&input->bytes, size, memory_order_relaxed);
+    uint64_t begin = offset > at_hand(input) ? offset : at_hand(input);
+    atomic_fetch_add_explicit(&input->bytes, offset + size > begin ? offset + size - begin : 0, memory_order_relaxed);
     atomic_fetch_add_explicit(&input->reads, 1, memory_order_relaxed);
     ebpo_status status = input->source.read(input->source.user, offset, size, data, &cause);
     if (status == EBPO_OK)
