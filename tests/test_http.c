@@ -95,7 +95,7 @@ static const struct {
     const char *fault;
     unsigned retries; /* at least */
 } readable[] = {
-    { "good", 0 }, { "modified", 0 }, { "bare", 0 }, { "whole", 0 }, { "whole_bare", 0 }, { "whole_chunked", 0 }, { "whole_dropped-2", 2 }, { "whole_then_parts-2", 2 }, { "short-2", 2 }, { "empty-2", 2 },
+    { "good", 0 }, { "modified", 0 }, { "bare", 0 }, { "whole", 0 }, { "whole_bare", 0 }, { "whole_chunked", 0 }, { "whole_dropped-2", 2 }, { "whole_then_parts-2", 2 }, { "small_parts", 0 }, { "short-2", 2 }, { "empty-2", 2 },
     { "lying_length-2", 2 }, { "chunked", 0 }, { "stall_head-1", 1 }, { "stall_body-1", 1 }, { "code-503-2", 2 }, { "code-500-1", 1 }, { "code-502-1", 1 }, { "code-504-1", 1 },
     { "code-408-1", 1 }, { "code-429-1", 1 }, { "code_later-503-1-2", 1 }, { "wait-429-1-1", 1 }, { "redirect", 0 },
 };

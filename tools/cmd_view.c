@@ -247,7 +247,12 @@ static ebpo_status tell(printer *p, ebpo_file *file, const char *path, const ebp
         (void)command_flush("view");
         remote_tell(&t, &p->v->remote, false);
     }
-    if (status == EBPO_OK && *arrived && p->v->out)
+    ebpo_view_stats stats;
+    ebpo_view_stream_get_stats(stream, &stats);
+    if (status == EBPO_OK && *arrived && p->v->out && stats.nodes == 0) {
+        fprintf(stderr, "ebpo view: %s: not written: the budget does not hold even the root, and no node at all contains nothing; give --bytes more\n", p->v->out);
+        *arrived = false;
+    } else if (status == EBPO_OK && *arrived && p->v->out)
         status = cut_mesh_write(stream, p->v->out, error);
     ebpo_view_stream_free(stream);
     return status;

@@ -293,7 +293,8 @@ static void try_again(ebpo_transfers *t, ebpo_slot *s, CURLcode code, double now
 {
     ebpo_request *r = s->request;
     char what[CURL_ERROR_SIZE], why[CURL_ERROR_SIZE + 160];
-    if (code == CURLE_OK && s->judged && s->verdict == EBPO_ANSWER_PART && s->taken && may_join(t, r) && now < r->deadline) {
+    if (code == CURLE_OK && s->judged && s->verdict == EBPO_ANSWER_PART && s->taken && s->taken == s->answer.last - s->answer.begin + 1 && may_join(t, r) &&
+        now < r->deadline) {
         r->due = now; /* a server that answers in smaller parts: no failure */
         enqueue(t, r);
         return;
