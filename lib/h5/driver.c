@@ -39,6 +39,7 @@ void ebpo_h5_driver_close(ebpo_h5_driver *driver)
     ebpo_h5_close_id(driver->id);
     free(driver->head);
     free(driver->window);
+    free(driver->table);
     *driver = (ebpo_h5_driver){ .id = -1 };
 }
 
