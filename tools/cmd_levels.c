@@ -2,14 +2,15 @@
 #include <inttypes.h>
 #include <stddef.h>
 #include <stdio.h>
-#include <time.h>
 
 #include <ebpo/stream.h>
 
 #include "command.h"
 #include "facts.h"
 #include "json.h"
+#include "progress.h"
 #include "remote.h"
+#include "words.h"
 
 typedef struct values {
     int64_t to, threads;
@@ -36,21 +37,12 @@ static const arg_spec spec = {
     .options = options,
 };
 
-static const char *const type_names[] = { "white", "black", "leaf", "gray" };
-
 typedef struct printer {
     const values *v;
     const ebpo_info *info;
     double begin;
     json j;
 } printer;
-
-static double now(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
-}
 
 /* Of the last level's volume; a flat surface has none. */
 static double share(const printer *p, double volume)
@@ -90,7 +82,7 @@ static void begin_json_level(printer *p, const ebpo_stream_level *level, double 
 
 static void print_node(const ebpo_stream_node *n)
 {
-    printf("%" PRIu64 " %s %.17g %.17g %.17g %.17g %.17g %.17g %d %" PRIu32, n->octcode, type_names[n->type], n->min[0], n->min[1], n->min[2], n->max[0],
+    printf("%" PRIu64 " %s %.17g %.17g %.17g %.17g %.17g %.17g %d %" PRIu32, n->octcode, words_node_type(n->type), n->min[0], n->min[1], n->min[2], n->max[0],
            n->max[1], n->max[2], (int)n->winding, n->plane_count);
     for (uint32_t i = 0; i < n->plane_count; i++)
         printf(" %.17g %.17g %.17g %.17g", n->planes[i][0], n->planes[i][1], n->planes[i][2], n->planes[i][3]);
@@ -101,7 +93,7 @@ static void json_node(json *j, const ebpo_stream_node *n)
 {
     json_object(j, NULL);
     json_uint(j, "octcode", n->octcode);
-    json_text(j, "type", type_names[n->type]);
+    json_text(j, "type", words_node_type(n->type));
     json_reals(j, "min", n->min, 3);
     json_reals(j, "max", n->max, 3);
     json_int(j, "winding", n->winding);
@@ -142,7 +134,7 @@ static ebpo_status tell_levels(printer *p, ebpo_stream *stream, int last, bool *
         status = ebpo_stream_next_level(stream, &level, &more, error);
         if (status != EBPO_OK || !more)
             break;
-        double ms = now() - p->begin;
+        double ms = (progress_now() - p->begin) * 1e3;
         if (p->v->json)
             begin_json_level(p, &level, ms);
         else
@@ -204,7 +196,7 @@ static int run(int argc, char **argv)
         return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
-    printer p = { .v = &v, .begin = now() };
+    printer p = { .v = &v, .begin = progress_now() };
     if (!command_wants_hdf5("levels", operand[0]))
         return EXIT_FAILED;
     if (remote_open(&file, operand[0], &v.remote, &error) != EBPO_OK)

@@ -4,13 +4,13 @@
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <time.h>
 
 #include <ebpo/view.h>
 
 #include "command.h"
 #include "cut_mesh.h"
 #include "json.h"
+#include "progress.h"
 #include "remote.h"
 #include "words.h"
 
@@ -56,7 +56,6 @@ static const arg_spec spec = {
     .options = options,
 };
 
-static const char *const type_names[] = { "white", "black", "leaf", "gray" };
 static const char *const end_names[] = { "", "done", "bytes", "nodes" };
 
 typedef struct printer {
@@ -136,18 +135,11 @@ static bool read_options(const values *v, ebpo_view_options *o, ebpo_observer *o
 
 /* --- printing --- */
 
-static double now(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
-}
-
 static void print_row(printer *p, const ebpo_view_stream *stream, const char *key)
 {
     ebpo_view_stats s;
     ebpo_view_stream_get_stats(stream, &s);
-    double ms = now() - p->begin;
+    double ms = (progress_now() - p->begin) * 1e3;
     if (!p->v->json) {
         printf("%12" PRIu64 " %10" PRIu64 " %9" PRIu64 " %9" PRIu64 " %9" PRIu64 " %9" PRIu64 " %9" PRIu64 " %10.5g %9.2f\n", s.bytes_read, s.nodes, s.cut[EBPO_GRAY],
                s.cut[EBPO_LEAF], s.cut[EBPO_WHITE], s.cut[EBPO_BLACK], s.waiting, s.pixels, ms);
@@ -170,7 +162,7 @@ static void print_node(printer *p, const ebpo_view_node *v)
 {
     const ebpo_stream_node *n = &v->node;
     if (!p->v->json) {
-        printf("%" PRIu64 " %s %.17g %.17g %.17g %.17g %.17g %.17g %d %.17g %.17g %d %d %" PRIu32, n->octcode, type_names[n->type], n->min[0], n->min[1], n->min[2], n->max[0],
+        printf("%" PRIu64 " %s %.17g %.17g %.17g %.17g %.17g %.17g %d %.17g %.17g %d %d %" PRIu32, n->octcode, words_node_type(n->type), n->min[0], n->min[1], n->min[2], n->max[0],
                n->max[1], n->max[2], (int)n->winding, v->distance, v->pixels, v->seen, v->complete, n->plane_count);
         for (uint32_t i = 0; i < n->plane_count; i++)
             printf(" %.17g %.17g %.17g %.17g", n->planes[i][0], n->planes[i][1], n->planes[i][2], n->planes[i][3]);
@@ -179,7 +171,7 @@ static void print_node(printer *p, const ebpo_view_node *v)
     }
     json_object(&p->j, NULL);
     json_uint(&p->j, "octcode", n->octcode);
-    json_text(&p->j, "type", type_names[n->type]);
+    json_text(&p->j, "type", words_node_type(n->type));
     json_reals(&p->j, "min", n->min, 3);
     json_reals(&p->j, "max", n->max, 3);
     json_int(&p->j, "winding", n->winding);
@@ -269,7 +261,7 @@ static int run(int argc, char **argv)
     ebpo_file *file = NULL;
     ebpo_observer observer = EBPO_OBSERVER_INIT;
     ebpo_view_options wanted = EBPO_VIEW_OPTIONS_INIT;
-    printer p = { .v = &v, .begin = now() };
+    printer p = { .v = &v, .begin = progress_now() };
     int code = check_values(&v);
     if (code != EXIT_FINE)
         return code;

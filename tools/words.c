@@ -56,6 +56,12 @@ char *words_format(char *out, size_t room, int major, int minor)
     return out;
 }
 
+const char *words_node_type(ebpo_node_type type)
+{
+    static const char *const words[] = { "white", "black", "leaf", "gray" };
+    return words[type];
+}
+
 const char *words_rule(ebpo_rule rule)
 {
     return (unsigned)rule < 3 ? rule_words[rule] : "unknown";

@@ -17,6 +17,7 @@ char *words_plural(char *out, size_t room, uint64_t count, const char *one, cons
 char *words_parts(char *out, size_t room, uint32_t parts);
 /* "1.0-draft": until the format is frozen, 1.0 is the draft's number. */
 char *words_format(char *out, size_t room, int major, int minor);
+const char *words_node_type(ebpo_node_type type);
 const char *words_rule(ebpo_rule rule);
 const char *words_codec(ebpo_codec codec);
 /* Digits, then nothing or one of the units (NULL-terminated); the number times its factor. */

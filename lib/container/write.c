@@ -303,7 +303,7 @@ static ebpo_status write_file(writer *w, const char *path, const char *shown, eb
         status = ebpo_facts_put_index(&w->out, w->root, w->index_at, w->index_bytes, error);
     close_handles(w);
     if (status == EBPO_OK)
-        status = ebpo_h5_finish(&w->out, NULL, error); /* another libhdf5 may have placed metadata otherwise: no reader relies on it, tests do */
+        status = ebpo_h5_finish(&w->out, error); /* another libhdf5 may have placed metadata otherwise: no reader relies on it, tests do */
     return status;
 }
 

@@ -155,7 +155,7 @@ ebpo_status ebpo_export_vtkhdf(const ebpo_export_job *job, ebpo_error *error)
     for (int i = 0; i < TABLES; i++)
         ebpo_h5_close_table(&w.table[i]);
     if (status == EBPO_OK)
-        status = ebpo_h5_finish(&w.out, NULL, error);
+        status = ebpo_h5_finish(&w.out, error);
     ebpo_h5_discard(&w.out);
     if (status == EBPO_OK)
         status = ebpo_publish_commit(&target, error);

@@ -168,7 +168,7 @@ ebpo_status ebpo_export_xdmf(const ebpo_export_job *job, ebpo_error *error)
     if (status == EBPO_OK && ferror(w.text))
         status = ebpo_fail_errno(error, job->path, "could not be written");
     if (status == EBPO_OK)
-        status = ebpo_h5_finish(&w.out, NULL, error);
+        status = ebpo_h5_finish(&w.out, error);
     ebpo_h5_discard(&w.out);
     if (status == EBPO_OK)
         status = ebpo_publish_commit(&heavy, error);

@@ -70,8 +70,8 @@ EBPO_MUST_USE ebpo_status ebpo_h5_put_chunk(ebpo_h5_out *out, const char *path, 
 
 /* Of a file in memory: bytes from the start up to the end of the last metadata so far, given that raw data begins at first_raw. */
 EBPO_MUST_USE ebpo_status ebpo_h5_head_used(ebpo_h5_out *out, uint64_t first_raw, uint64_t *bytes, ebpo_error *error);
-/* Flushes and closes; *file_bytes (may be NULL) is the size before closing. Harmless when already closed. */
-EBPO_MUST_USE ebpo_status ebpo_h5_finish(ebpo_h5_out *out, uint64_t *file_bytes, ebpo_error *error);
+/* Flushes and closes. Harmless when already closed. */
+EBPO_MUST_USE ebpo_status ebpo_h5_finish(ebpo_h5_out *out, ebpo_error *error);
 void ebpo_h5_discard(ebpo_h5_out *out);
 
 /* --- reading: the head and where the chunks are; libhdf5 never sees the chunks themselves --- */

@@ -72,7 +72,7 @@ ebpo_status ebpo_h5_create(ebpo_h5_out *out, const char *path, const char *shown
 
 ebpo_status ebpo_h5_reopen(ebpo_h5_out *out, const char *path, uint64_t metadata_bytes, ebpo_error *error)
 {
-    ebpo_status status = ebpo_h5_finish(out, NULL, error);
+    ebpo_status status = ebpo_h5_finish(out, error);
     if (status != EBPO_OK)
         return status;
     ebpo_h5_scope scope;
@@ -258,20 +258,17 @@ ebpo_status ebpo_h5_head_used(ebpo_h5_out *out, uint64_t first_raw, uint64_t *by
     return status;
 }
 
-ebpo_status ebpo_h5_finish(ebpo_h5_out *out, uint64_t *file_bytes, ebpo_error *error)
+ebpo_status ebpo_h5_finish(ebpo_h5_out *out, ebpo_error *error)
 {
     if (out->file < 0)
         return EBPO_OK;
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
     ebpo_status status = EBPO_OK;
-    hsize_t size = 0;
-    if (H5Fflush(out->file, H5F_SCOPE_LOCAL) < 0 || H5Fget_filesize(out->file, &size) < 0 || H5Fclose(out->file) < 0)
+    if (H5Fflush(out->file, H5F_SCOPE_LOCAL) < 0 || H5Fclose(out->file) < 0)
         status = ebpo_h5_fail(error, EBPO_E_IO, out->shown, "", DISK);
     else
         out->file = -1;
-    if (file_bytes)
-        *file_bytes = size;
     ebpo_h5_leave(&scope);
     return status;
 }

@@ -4,7 +4,7 @@ import { ZSTDDecoder } from './node_modules/zstddec/dist/zstddec.mjs'; // worker
 import { Cut } from './cut.js';
 import { Tree, distanceInterval, inside, insideLeaf, loadZstd, nearestFace, openEbpo } from './reader/index.js';
 
-const FIRST_LEVELS = 5;                   // come with the first one or two requests
+const FIRST_LEVELS = 5;                   // come with the first request, as a rule
 const TREE_BYTES_MOST = 512 * 1024 * 1024; // decoded arrays of levels, roughly
 
 const SMALL_MESH = 8 * 1024 * 1024;       // stored bytes
