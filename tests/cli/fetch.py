@@ -24,6 +24,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
     """One file by ranges. `left`: requests that are answered before all others get 404; `nap`: seconds before each answer."""
     protocol_version = "HTTP/1.1"
     data, etag, left, nap, sent, requests = b"", '"1"', 10 ** 9, 0, 0, 0
+    damage = False  # of a bit of the second answer
     lock = threading.Lock()
 
     def log_message(self, *arguments):
@@ -39,6 +40,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
         found = re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers.get("Range", ""))
         begin, end = int(found[1]), min(int(found[2]) + 1, len(self.data))
         body = b"" if refused else self.data[begin:end]
+        if site.damage and begin > 0 and body:
+            site.damage, body = False, bytes([body[0] ^ 1]) + body[1:]
         self.send_response_only(404 if refused else 206)
         self.send_header("ETag", self.etag)
         self.send_header("Content-Length", str(len(body)))
@@ -87,6 +90,26 @@ def parts(tool, folder, path, url):
     Handler.reset()
     told = json.loads(run(tool, "fetch", "--json", "--levels", "0-2", url, out).stdout)
     expect("json", told["fetched_bytes"] == Handler.sent and told["fetched_requests"] == Handler.requests and told["subset"]["last_level"] == 2, told.get("fetched_bytes"))
+    os.remove(out)
+
+
+def refusals(tool, folder, path, url):
+    """What could not be put in its place is said before anything is fetched; what came damaged is not kept."""
+    out = os.path.join(folder, "o.ebpo.h5")
+    part = out + ".part"
+    Handler.reset()
+    done = run(tool, "fetch", url, folder)
+    expect("a folder as OUT", done.returncode == 1 and "is a folder" in done.stderr and Handler.requests == 0, (done.stderr, Handler.requests))
+    os.symlink(folder, part)
+    done = run(tool, "fetch", url, out)
+    expect("a link as OUT.part", done.returncode == 1 and "move it away" in done.stderr and Handler.requests == 0 and os.path.islink(part), (done.stderr, Handler.requests))
+    os.remove(part)
+    Handler.reset()
+    Handler.damage = True
+    done = run(tool, "fetch", url, out)
+    expect("a transfer that was damaged", done.returncode == 1 and "begins anew" in done.stderr and not os.path.exists(part) and not os.path.exists(out), done.stderr)
+    done = run(tool, "fetch", url, out)
+    expect("and the next one", done.returncode == 0 and content(out) == content(path), done.stderr)
     os.remove(out)
 
 
@@ -165,6 +188,7 @@ def main():
         threading.Thread(target=server.serve_forever, daemon=True).start()
         url = f"http://127.0.0.1:{server.server_address[1]}/m.ebpo.h5"
         parts(tool, folder, path, url)
+        refusals(tool, folder, path, url)
         resume(tool, folder, path, url)
         change(tool, folder, path, url)
         interrupt(tool, folder, path, url)
