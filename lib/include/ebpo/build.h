@@ -8,6 +8,21 @@
 extern "C" {
 #endif
 
+/* How the planes of an envelope are chosen among the normals of the faces below a node. Whatever the choice, offsets are such that the envelope contains the solid. */
+typedef enum ebpo_selection {
+    EBPO_SELECT_INHERIT = 0,  /* from the root down: a node starts from its parent's envelope and adds, greedily by removed volume, what removes at least epsilon */
+    EBPO_SELECT_KMEDOIDS = 1, /* the other three are the theses', from the leaves up, of the children's planes and around the children's envelopes (EBP 2017, 3.3.4.3 and
+                               * 3.4.1; BP 2008, 3.4): the medoids of clusters of normals */
+    EBPO_SELECT_OFFSET = 2,   /* those that had to move least from their faces */
+    EBPO_SELECT_RANDOM = 3    /* consecutive ones from a random place on */
+} ebpo_selection;
+
+/* What k-medoids takes for the distance of two normals. */
+typedef enum ebpo_normal_distance {
+    EBPO_NORMALS_SPHERICAL = 0, /* squared differences of the two spherical coordinates (EBP 2017, equation 4): has poles and a seam */
+    EBPO_NORMALS_ANGLE = 1      /* squared length of the difference of the unit vectors */
+} ebpo_normal_distance;
+
 typedef struct ebpo_build_options {
     int max_level;          /* 0 .. 20, or -1: EBP 2017, equation 3 */
     uint32_t leaf_faces;    /* a node with at most so many faces becomes a leaf (BP 2008, 3.3.1); 0: only the maximum level stops */
@@ -16,11 +31,17 @@ typedef struct ebpo_build_options {
     ebpo_rule rule;
     bool require_solid;     /* EBPO_E_NOT_SOLID for a mesh that does not balance */
     unsigned threads;       /* 0: all cores; the result does not depend on it */
+    ebpo_selection select;
+    double percent;         /* the theses' selections: share of the candidates that is taken, rounded up (EBP 2017, equation 5); (0, 100] */
+    double k_root;          /* instead of percent: so many planes at the root, half as many at each next level, and halved on in a node until below the number
+                             * of its candidates (BP 2008, 3.5.1); 0: percent */
+    ebpo_normal_distance normals;
+    uint64_t seed;          /* of random and k-medoids: equal seeds give equal files */
     const char *unit, *crs, *date; /* UTF-8 without control characters, or NULL */
     ebpo_progress progress;
 } ebpo_build_options;
 #define EBPO_BUILD_OPTIONS_INIT { -1, 16, 0.003, EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS, EBPO_RULE_NONZERO, \
-                                  false, 0, NULL, NULL, NULL, { NULL, NULL } }
+                                  false, 0, EBPO_SELECT_INHERIT, 40, 0, EBPO_NORMALS_SPHERICAL, 1, NULL, NULL, NULL, { NULL, NULL } }
 
 /* Builds the tree of a checked and perhaps mended mesh; `report` and `mend` are copied into the file's facts.
  * The mesh is consumed: its arrays are reordered into `out` (on failure it is freed all the same). */

@@ -6,8 +6,10 @@
 #include <ebpo/mesh.h>
 #include <ebpo/file.h>
 #include <ebpo/build.h>
+#include <ebpo/deviation.h>
 #include <ebpo/export.h>
 #include <ebpo/http.h>
+#include <ebpo/limit.h>
 #include <ebpo/lod.h>
 #include <ebpo/query.h>
 #include <ebpo/stream.h>

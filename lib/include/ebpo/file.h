@@ -104,6 +104,10 @@ typedef struct ebpo_info {
     int level_count;                   /* levels 0 .. level_count - 1 are present */
     uint32_t leaf_faces;
     double epsilon;
+    int selection;                     /* ebpo_selection (build.h) by which planes were chosen, and what it was told: */
+    double percent, k_root;            /* percent or k_root: the theses' selections; else 0 */
+    int normals;                       /* ebpo_normal_distance; k-medoids */
+    uint64_t seed;                     /* k-medoids and random; else 0 */
     ebpo_mend_record mend;
     ebpo_mesh_report report;           /* counts and measures; places are not stored */
     uint32_t parts;                    /* ebpo_part bits */
@@ -111,10 +115,11 @@ typedef struct ebpo_info {
     uint8_t content_sha256[32];
     uint64_t chunk_index_offset, chunk_index_bytes; /* where the places of the chunks of large arrays stand, behind the first levels: for fetching ahead, not
                                                      * relied on; 0: there are none, or the file does not say */
-    bool pruned;                       /* a subset: some gray nodes' children were left out (ebpo_subset). The three below say what was asked for then */
+    bool pruned;                       /* a subset: some gray nodes' children were left out (ebpo_subset). The rest below says what was asked for then */
     int cut_levels;                    /* levels 0 .. cut_levels - 1 were kept; 0: all */
     bool boxed;                        /* what does not meet this box was left out: */
     double kept_box[6];                /* min, max */
+    double kept_error;                 /* where nodes were pruned for it, their envelopes reach at most so far beyond the model; 0: not asked for */
     uint8_t subset_of[32];             /* content_sha256 of the file that it was taken from; the first one's, when it was a subset itself */
     ebpo_level_summary level[EBPO_LEVELS_MAX];
     uint64_t file_bytes, head_bytes, mesh_vertex_bytes, mesh_face_bytes, map_bytes; /* set when reading; head: up to the first level */

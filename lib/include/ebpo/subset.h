@@ -33,8 +33,10 @@ typedef struct ebpo_subset_options {
     double min[3], max[3]; /* finite, min <= max on each axis; in the model's unit */
     uint32_t parts;  /* ebpo_part bits that are kept, of those the file has. Of the mesh, what the leaves that are kept list. No maps without mesh */
     ebpo_write_options write; /* `parts` of it does not matter */
+    double max_error;       /* refine no further where the envelope certainly reaches at most so far beyond the model (model's unit): the node is pruned; 0: everywhere */
+    uint64_t target_bytes;  /* the least max_error with which the file has at most so many bytes is found and used; 0: not wanted. Not together with max_error */
 } ebpo_subset_options;
-#define EBPO_SUBSET_OPTIONS_INIT { -1, false, { 0, 0, 0 }, { 0, 0, 0 }, ~0u, EBPO_WRITE_OPTIONS_INIT }
+#define EBPO_SUBSET_OPTIONS_INIT { -1, false, { 0, 0, 0 }, { 0, 0, 0 }, ~0u, EBPO_WRITE_OPTIONS_INIT, 0, 0 }
 
 /* Writes the subset: whole or not at all. The result does not depend on threads; with everything kept its content (content_sha256) is the source's. Reads what it needs and
  * holds the result in memory, and of the source up to 64 MiB beside it.
