@@ -10,8 +10,8 @@
 
 enum {
     TOP_LEVELS = 4,        /* nearly free of bytes */
-    HULL_LEVELS = 6,       /* few nodes beside those below */
-    CANDIDATES_BELOW = 48,
+    HULL_LEVELS = 20,      /* few nodes beside those below */
+    CANDIDATES_BELOW = 24, FACES_BELOW = 16,
     HULL_ROUNDS = 3,
     HULL_DIRECTIONS = 160  /* at most, in a round */
 };
@@ -176,7 +176,7 @@ int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo
 {
     bool top = cell.level <= TOP_LEVELS, hull = cell.level <= HULL_LEVELS;
     ebpo_candidate faces[EBPO_PLANES_CANDIDATES];
-    int count = ebpo_build_candidates(b, branch, detail, top ? EBPO_PLANES_CANDIDATES / 2 : CANDIDATES_BELOW, faces);
+    int count = ebpo_build_candidates(b, branch, detail, top ? EBPO_PLANES_CANDIDATES / 2 : FACES_BELOW, faces);
     if (!ebpo_supports_gather(&s->supports, b, branch, detail, cell, winding))
         return -1;
     double volume = ebpo_polytope_volume(envelope), epsilon = b->options->epsilon * (top ? top_share(volume) : 1);
