@@ -79,7 +79,7 @@ static void try_normal(ebpo_envelope_scratch *s, uint32_t normal, const ebpo_pol
     double enough = hopeless(envelope, volume, n, epsilon);
     double support = ebpo_supports_find(&s->supports, n, enough, where);
     if (support < enough && s->count < EBPO_PLANES_CANDIDATES)
-        s->candidates[s->count++] = (ebpo_candidate){ normal, support };
+        s->candidates[s->count++] = (ebpo_candidate){ .normal = normal, .support = support };
     if (s->tried_count < 2 * EBPO_PLANES_CANDIDATES)
         s->tried[s->tried_count++] = normal;
 }
@@ -189,5 +189,6 @@ int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo
     }
     if (hull && volume > 0)
         try_hull(s, envelope, volume, epsilon, top ? HULL_DIRECTIONS : CANDIDATES_BELOW);
-    return ebpo_select_greedy(envelope, s->candidates, s->count, epsilon, EBPO_PLANES_MAX, codes);
+    ebpo_choice choice = { .candidates = s->candidates, .count = s->count, .most = EBPO_PLANES_MAX, .epsilon = epsilon };
+    return ebpo_select_greedy(envelope, &choice, codes);
 }

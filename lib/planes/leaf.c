@@ -20,7 +20,7 @@ static bool add_candidate(uint32_t normal, ebpo_candidate *out, int *count)
         if (out[i].normal == normal)
             return true;
     if (*count < LEAF_CANDIDATES)
-        out[(*count)++] = (ebpo_candidate){ normal, -1e300 };
+        out[(*count)++] = (ebpo_candidate){ .normal = normal, .support = -1e300 };
     return *count < LEAF_CANDIDATES;
 }
 
@@ -162,6 +162,6 @@ int ebpo_leaf_planes(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *f
     ebpo_candidate candidates[LEAF_CANDIDATES];
     int kept = leaf_candidates(box, cell, faces, count, inside_corners, candidates);
     if (epsilon > 0)
-        return ebpo_select_greedy(envelope, candidates, kept, epsilon, EBPO_PLANES_MAX, codes);
+        return ebpo_select_greedy(envelope, &(ebpo_choice){ .candidates = candidates, .count = kept, .most = EBPO_PLANES_MAX, .epsilon = epsilon }, codes);
     return ebpo_select_all(envelope, candidates, kept, EBPO_PLANES_MAX, codes);
 }
