@@ -212,10 +212,29 @@ START_TEST(hull_has_the_facets_that_trying_all_triples_finds)
             for (int b = a + 1; b < count; b++)
                 for (int c = b + 1; c < count; c++)
                     expected += is_facet((const double (*)[3])p, count, a, b, c) || is_facet((const double (*)[3])p, count, a, c, b);
-        int found = ebpo_hull_facets((const double (*)[3])p, count, facets);
+        int found = ebpo_hull_facets((const double (*)[3])p, count, facets, EBPO_HULL_FACETS);
         ck_assert_int_eq(found, expected);
         for (int i = 0; i < found; i++)
             ck_assert(is_facet((const double (*)[3])p, count, facets[i].corner[0], facets[i].corner[1], facets[i].corner[2]));
+    }
+}
+END_TEST
+
+START_TEST(hull_of_nearly_flat_points_stays_within_its_room)
+{
+    uint64_t seed = 15;
+    for (int round = 0; round < 2000; round++) {
+        ebpo_hull_facet facets[2 * 40 + 1];
+        double p[40][3], thin = ldexp(1, -(round % 60));
+        int room = 4 + round % 77;
+        memset(&facets[room], 0x5a, sizeof *facets);
+        for (int i = 0; i < 40; i++) { /* on a cylinder, a grid, a plane: whatever makes signs waver */
+            double a = 0.1 * (double)(ebpo_test_random(&seed) % 63);
+            p[i][0] = round % 3 ? cos(a) : ebpo_test_random_unit(&seed), p[i][1] = round % 3 ? sin(a) : ebpo_test_random_unit(&seed), p[i][2] = thin * ebpo_test_random_unit(&seed);
+        }
+        ck_assert_int_le(ebpo_hull_facets((const double (*)[3])p, 40, facets, room), room);
+        for (size_t i = 0; i < sizeof *facets; i++)
+            ck_assert_int_eq(((const unsigned char *)&facets[room])[i], 0x5a);
     }
 }
 END_TEST
@@ -224,14 +243,14 @@ START_TEST(hull_of_flat_or_repeated_points_is_nothing_and_of_a_grid_its_box)
 {
     static ebpo_hull_facet facets[EBPO_HULL_FACETS];
     static double p[EBPO_HULL_POINTS][3];
-    ck_assert_int_eq(ebpo_hull_facets((const double (*)[3])p, 3, facets), 0);
-    ck_assert_int_eq(ebpo_hull_facets((const double (*)[3])p, 100, facets), 0); /* all at one point */
+    ck_assert_int_eq(ebpo_hull_facets((const double (*)[3])p, 3, facets, EBPO_HULL_FACETS), 0);
+    ck_assert_int_eq(ebpo_hull_facets((const double (*)[3])p, 100, facets, EBPO_HULL_FACETS), 0); /* all at one point */
     for (int i = 0; i < 100; i++)
         p[i][0] = i % 10, p[i][1] = i / 10;
-    ck_assert_int_eq(ebpo_hull_facets((const double (*)[3])p, 100, facets), 0); /* in a plane */
+    ck_assert_int_eq(ebpo_hull_facets((const double (*)[3])p, 100, facets, EBPO_HULL_FACETS), 0); /* in a plane */
     for (int i = 0; i < 512; i++)
         p[i][0] = i % 8, p[i][1] = i / 8 % 8, p[i][2] = i / 64;
-    int count = ebpo_hull_facets((const double (*)[3])p, 512, facets);
+    int count = ebpo_hull_facets((const double (*)[3])p, 512, facets, EBPO_HULL_FACETS);
     double area = 0;
     for (int i = 0; i < count; i++) {
         area += facets[i].area;
@@ -434,6 +453,7 @@ int main(void)
     tcase_add_test(tests, random_takes_consecutive_candidates_from_a_place_that_the_seed_tells);
     tcase_add_test(tests, counts_wanted_are_those_of_the_theses);
     tcase_add_test(tests, hull_has_the_facets_that_trying_all_triples_finds);
+    tcase_add_test(tests, hull_of_nearly_flat_points_stays_within_its_room);
     tcase_add_test(tests, hull_of_flat_or_repeated_points_is_nothing_and_of_a_grid_its_box);
     tcase_add_test(tests, selections_and_their_numbers_that_make_no_sense_are_refused);
     suite_add_tcase(suite, tests);

@@ -143,7 +143,7 @@ static bool was_tried(const ebpo_envelope_scratch *s, uint32_t normal)
 static bool hull_round(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, double volume, double epsilon, int most)
 {
     static const double worth = 1e-3; /* of the cell */
-    int facets = ebpo_hull_facets((const double (*)[3])s->core, s->core_count, s->facet), before = s->core_count;
+    int facets = ebpo_hull_facets((const double (*)[3])s->core, s->core_count, s->facet, EBPO_HULL_FACETS), before = s->core_count;
     qsort(s->facet, (size_t)facets, sizeof *s->facet, by_area);
     for (int i = 0; i < facets && most > 0; i++) {
         const ebpo_hull_facet *f = &s->facet[i];

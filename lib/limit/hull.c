@@ -60,7 +60,7 @@ static double volume_by(ebpo_hull *hull, double *points, int count, char *comman
 
 double ebpo_hull_volume(ebpo_hull *hull, double *points, uint64_t count)
 {
-    static char merged[] = "qhull Pp", joggled[] = "qhull QJ Pp";
+    static char merged[] = "qhull Qt Pp", joggled[] = "qhull QJ Pp";
     bool failed;
     if (count < 4 || count > INT_MAX / 3)
         return 0;
