@@ -1,0 +1,237 @@
+/* The tables of the page. */
+#include "report_page.h"
+
+#include <inttypes.h>
+
+bool any_level_figure(const comparison *c, level_figure which)
+{
+    for (int i = 0; i < c->count; i++)
+        for (int k = c->first; k <= method_last(c, &c->methods[i]); k++)
+            if (!isnan(c->methods[i].level[k][which]))
+                return true;
+    return false;
+}
+
+/* --- cells --- */
+
+static void cell_text(FILE *out, const char *class, const char *text)
+{
+    if (class)
+        fprintf(out, "<td class=\"%s\">%s</td>", class, text);
+    else
+        fprintf(out, "<td>%s</td>", text);
+}
+
+static void cell_marked(FILE *out, const char *class, plot_unit unit, double v)
+{
+    char text[40];
+    if (isnan(v))
+        cell_text(out, "none", "–");
+    else if (isinf(v))
+        cell_text(out, class, "∞");
+    else
+        cell_text(out, class, plot_value(text, sizeof text, unit, v));
+}
+
+void cell(FILE *out, plot_unit unit, double v)
+{
+    cell_marked(out, NULL, unit, v);
+}
+
+void cell_count(FILE *out, double v)
+{
+    char digits[32], text[48];
+    int length = snprintf(digits, sizeof digits, "%.0f", v), at = 0;
+    if (!isfinite(v)) {
+        cell_text(out, "none", "–");
+        return;
+    }
+    for (int i = 0; i < length; i++) {
+        if (i && (length - i) % 3 == 0)
+            text[at++] = ',';
+        text[at++] = digits[i];
+    }
+    text[at] = 0;
+    cell_text(out, NULL, text);
+}
+
+static double of_diagonal(const comparison *c, double v)
+{
+    return c->diagonal > 0 ? 100 * (v / c->diagonal) : NAN;
+}
+
+/* --- methods side by side --- */
+
+/* Bytes of the first level that is good enough. */
+static double bytes_until(const comparison *c, const method *m, double goal)
+{
+    for (int k = c->first; k <= method_last(c, m); k++)
+        if (m->level[k][OF_LEVELS_EXCESS] <= goal)
+            return m->level[k][OF_CUMULATIVE_BYTES];
+    return NAN;
+}
+
+void page_glance(FILE *out, const comparison *c)
+{
+    static const double goals[] = { 10, 3, 1 };
+    page_section(out, "glance", "At a glance", "Bytes until the levels alone exceed the solid’s volume by no more than 10, 3 and 1 percent; the build; exact questions.");
+    fputs("<div class=\"scroll\"><table><thead><tr><th>method</th><th>file</th><th>levels</th><th>planes</th><th>≤ 10 %</th><th>≤ 3 %</th><th>≤ 1 %</th><th>build</th>"
+          "<th>into memory</th><th>memory</th><th>point in solid,<br/>exact</th><th>distance,<br/>exact</th></tr></thead><tbody>\n",
+          out);
+    for (int i = 0; i < c->count; i++) {
+        const method *m = &c->methods[i];
+        fputs("<tr><th>", out);
+        html_text(out, m->name);
+        fputs("</th>", out);
+        cell(out, PLOT_BYTES, m->whole[OF_FILE_BYTES]);
+        cell(out, PLOT_LEVEL, m->levels);
+        cell_count(out, m->whole[OF_ALL_PLANES]);
+        for (int k = 0; k < 3; k++)
+            cell(out, PLOT_BYTES, bytes_until(c, m, goals[k]));
+        cell(out, PLOT_SECONDS, m->whole[OF_BUILD_SECONDS]);
+        cell(out, PLOT_SECONDS, m->whole[OF_OPEN_SECONDS]);
+        cell(out, PLOT_BYTES, m->whole[OF_MEMORY_BYTES]);
+        cell(out, PLOT_SECONDS, 1e-9 * m->whole[OF_EXACT_INSIDE_NS]);
+        cell(out, PLOT_SECONDS, 1e-9 * m->whole[OF_EXACT_DISTANCE_NS]);
+        fputs("</tr>\n", out);
+    }
+    fputs("</tbody></table></div></section>\n", out);
+}
+
+static void limit_row(FILE *out, const comparison *c, int level)
+{
+    double best[2] = { INFINITY, INFINITY }, limit = NAN;
+    for (int i = 0; i < c->count; i++) {
+        const double *f = c->methods[i].level[level];
+        best[0] = f[OF_EXCESS] < best[0] ? f[OF_EXCESS] : best[0];
+        best[1] = f[OF_CUMULATIVE_BYTES] < best[1] ? f[OF_CUMULATIVE_BYTES] : best[1];
+        limit = isnan(limit) || f[OF_LIMIT_EXCESS] < limit ? f[OF_LIMIT_EXCESS] : limit;
+    }
+    fprintf(out, "<tr><th>%d</th>", level);
+    cell(out, PLOT_NUMBER, limit);
+    for (int i = 0; i < c->count; i++) {
+        const double *f = c->methods[i].level[level];
+        cell_marked(out, f[OF_EXCESS] <= best[0] && c->count > 1 ? "first best" : "first", PLOT_NUMBER, f[OF_EXCESS]);
+        cell(out, PLOT_NUMBER, f[OF_EXCESS_TO_LIMIT]);
+        cell_marked(out, f[OF_CUMULATIVE_BYTES] <= best[1] && c->count > 1 ? "best" : NULL, PLOT_BYTES, f[OF_CUMULATIVE_BYTES]);
+    }
+    fputs("</tr>\n", out);
+}
+
+void page_against_limit(FILE *out, const comparison *c)
+{
+    if (!any_level_figure(c, OF_EXCESS))
+        return;
+    fputs("<h3>Excess of volume in percent of the solid’s, times the limit’s, and bytes so far</h3>\n<div class=\"scroll\"><table><thead><tr class=\"groups\"><th></th><th>limit</th>", out);
+    for (int i = 0; i < c->count; i++) {
+        fputs("<th colspan=\"3\">", out);
+        html_text(out, c->methods[i].name);
+        fputs("</th>", out);
+    }
+    fputs("</tr><tr><th>level</th><th class=\"first\">%</th>", out);
+    for (int i = 0; i < c->count; i++)
+        fputs("<th class=\"first\">%</th><th>× limit</th><th>bytes</th>", out);
+    fputs("</tr></thead><tbody>\n", out);
+    for (int k = c->first; k <= comparison_last(c); k++)
+        limit_row(out, c, k);
+    fputs("</tbody></table></div>\n", out);
+}
+
+/* --- needs --- */
+
+static void need_rows(FILE *out, const comparison *c, const method *m)
+{
+    for (int i = 0; i < m->need_count; i++) {
+        const need_result *n = &m->need[i];
+        char text[48];
+        fputs("<tr><th>", out);
+        html_text(out, m->name);
+        if (n->kind == NEED_ERROR)
+            fprintf(out, "</th><td>error ≤ %s of the diagonal</td>", plot_value(text, sizeof text, PLOT_PERCENT, of_diagonal(c, n->asked)));
+        else
+            fprintf(out, "</th><td>size ≤ %s</td>", plot_value(text, sizeof text, PLOT_BYTES, n->asked));
+        cell_count(out, n->figure[OF_NEED_BYTES]);
+        cell(out, PLOT_PERCENT, of_diagonal(c, n->figure[OF_NEED_FAR_LO]));
+        cell(out, PLOT_PERCENT, of_diagonal(c, n->figure[OF_NEED_FAR_HI]));
+        cell(out, PLOT_NUMBER, n->figure[OF_NEED_RATIO]);
+        cell(out, PLOT_SECONDS, n->figure[OF_NEED_SECONDS]);
+        fputs("</tr>\n", out);
+    }
+}
+
+void page_needs(FILE *out, const comparison *c)
+{
+    int count = 0;
+    for (int i = 0; i < c->count; i++)
+        count += c->methods[i].need_count;
+    if (!count)
+        return;
+    page_section(out, "needs", "Choosing by need",
+                 "Files without mesh, cut to an error or to a size. Kept: how far the envelopes certainly reach, divided by the error that was asked for, or the bytes divided by the size; 1 or less keeps "
+                 "the word.");
+    fputs("<div class=\"scroll\"><table><thead><tr><th>method</th><th>asked for</th><th>bytes</th><th>reaches,<br/>at least</th><th>reaches,<br/>at most</th><th>kept</th><th>made in</th></tr></thead>"
+          "<tbody>\n",
+          out);
+    for (int i = 0; i < c->count; i++)
+        need_rows(out, c, &c->methods[i]);
+    fputs("</tbody></table></div></section>\n", out);
+}
+
+/* --- one method's levels --- */
+
+static void level_row(FILE *out, const comparison *c, int level, const double *f, bool alone)
+{
+    fprintf(out, "<tr><th>%d</th>", level);
+    cell(out, PLOT_BYTES, f[OF_BYTES]);
+    cell(out, PLOT_BYTES, f[OF_CUMULATIVE_BYTES]);
+    cell_count(out, f[OF_GRAY]);
+    cell_count(out, f[OF_LEAVES]);
+    cell_count(out, f[OF_PLANES] + f[OF_LEAF_PLANES]);
+    cell_marked(out, "first", PLOT_NUMBER, f[OF_VOLUME]);
+    cell(out, PLOT_NUMBER, f[OF_EXCESS]);
+    if (alone)
+        cell(out, PLOT_NUMBER, f[OF_LEVELS_EXCESS]);
+    cell(out, PLOT_NUMBER, f[OF_EXCESS_TO_LIMIT]);
+    cell_marked(out, "first", PLOT_NUMBER, of_diagonal(c, f[OF_FAR_LO]));
+    cell(out, PLOT_NUMBER, of_diagonal(c, f[OF_FAR_HI]));
+    cell(out, PLOT_NUMBER, of_diagonal(c, f[OF_FAR_MEAN]));
+    cell_marked(out, "first", PLOT_NUMBER, 100 * f[OF_MAYBE_UNIFORM]);
+    cell(out, PLOT_NUMBER, 100 * f[OF_MAYBE_NEAR]);
+    cell(out, PLOT_SECONDS, 1e-9 * f[OF_INSIDE_NS]);
+    cell_marked(out, "first", PLOT_NUMBER, of_diagonal(c, f[OF_WIDTH_MEAN]));
+    cell(out, PLOT_NUMBER, of_diagonal(c, f[OF_WIDTH_MEDIAN]));
+    cell(out, PLOT_NUMBER, of_diagonal(c, f[OF_WIDTH_P99]));
+    cell(out, PLOT_SECONDS, 1e-9 * f[OF_DISTANCE_NS]);
+    cell_marked(out, "first", PLOT_SECONDS, f[OF_HAVE_SECONDS]);
+    cell(out, PLOT_BYTES, f[OF_READ_BYTES]);
+    cell_count(out, f[OF_READS]);
+    fputs("</tr>\n", out);
+}
+
+static void method_table(FILE *out, const comparison *c, const method *m)
+{
+    bool alone = !(m->info.parts & EBPO_PART_LEAF_PLANES);
+    fputs("<h3>", out);
+    html_text(out, m->name);
+    fprintf(out,
+            "</h3>\n<div class=\"scroll\"><table><thead><tr class=\"groups\"><th></th><th colspan=\"5\">in the file</th><th colspan=\"%d\">volume</th><th colspan=\"3\">distance to the model</th>"
+            "<th colspan=\"3\">point in solid</th><th colspan=\"4\">interval of the distance</th><th colspan=\"3\">to have it</th></tr>\n",
+            alone ? 4 : 3);
+    fputs("<tr><th>level</th><th>bytes</th><th>so far</th><th>gray</th><th>leaves</th><th>planes</th><th class=\"first\">envelopes</th><th>excess, %</th>", out);
+    if (alone)
+        fputs("<th>levels<br/>alone, %</th>", out);
+    fputs("<th>× limit</th><th class=\"first\">farthest ≥, %</th><th>≤, %</th><th>mean, %</th><th class=\"first\">MAYBE, %</th><th>near, %</th><th>time</th>"
+          "<th class=\"first\">mean, %</th><th>median</th><th>99 %</th><th>time</th><th class=\"first\">time</th><th>read</th><th>reads</th></tr></thead><tbody>\n",
+          out);
+    for (int k = c->first; k <= method_last(c, m); k++)
+        level_row(out, c, k, m->level[k], alone);
+    fputs("</tbody></table></div>\n", out);
+}
+
+void page_tables(FILE *out, const comparison *c)
+{
+    page_section(out, "tables", "All figures by level", "Distances and widths in percent of the diagonal of the model’s box. Exact values, in the model’s unit, are in report.csv and report.json.");
+    for (int i = 0; i < c->count; i++)
+        method_table(out, c, &c->methods[i]);
+    fputs("</section>\n", out);
+}
