@@ -214,7 +214,7 @@ START_TEST(lazy_greedy_takes_what_plain_greedy_takes)
         ebpo_polytope_cube(&fast);
         ebpo_polytope_cube(&slow);
         uint32_t a[EBPO_PLANES_MAX], b[EBPO_PLANES_MAX];
-        int na = ebpo_select_greedy(&fast, c, 40, 0.002, EBPO_PLANES_MAX, a);
+        int na = ebpo_select_greedy(&fast, &(ebpo_choice){ .candidates = c, .count = 40, .most = EBPO_PLANES_MAX, .epsilon = 0.002 }, a);
         int nb = plain_greedy(&slow, c, 40, 0.002, EBPO_PLANES_MAX, b);
         ck_assert_int_eq(na, nb);
         for (int i = 0; i < na; i++)

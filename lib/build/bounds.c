@@ -52,7 +52,7 @@ void ebpo_bounds_free(ebpo_bounds *bounds)
 typedef struct query {
     const ebpo_builder *b;
     double corner[3], size[3], n[3];
-    uint64_t begin, end;
+    uint64_t begin, end, at;
     double best;
 } query;
 
@@ -74,7 +74,10 @@ static void visit(query *q, int level, uint64_t block)
     if (level == 0) {
         const double *p = q->b->position[block];
         double v = value(q, p, p);
-        q->best = v > q->best ? v : q->best;
+        if (v > q->best) {
+            q->best = v;
+            q->at = block;
+        }
         return;
     }
     const double (*box)[3] = (const double (*)[3])q->b->bounds.box[level - 1][block];
@@ -85,9 +88,10 @@ static void visit(query *q, int level, uint64_t block)
         visit(q, level - 1, i);
 }
 
-double ebpo_bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n[3], uint64_t begin, uint64_t end, double least)
+double ebpo_bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n[3], uint64_t begin, uint64_t end, double least,
+                           uint64_t *at)
 {
-    query q = { .b = b, .begin = begin, .end = end, .best = least };
+    query q = { .b = b, .begin = begin, .end = end, .at = EBPO_NO_VERTEX, .best = least };
     for (int k = 0; k < 3; k++) {
         q.corner[k] = ebpo_wall(&b->box, k, cell.level, cell.at[k]);
         q.size[k] = b->box.size[k] / (double)(1u << cell.level);
@@ -103,5 +107,6 @@ double ebpo_bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n
     if (begin < end)
         for (uint64_t block = begin / width; block * width < end; block++)
             visit(&q, level, block);
+    *at = q.at;
     return q.best;
 }

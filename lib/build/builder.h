@@ -16,6 +16,7 @@
 
 #define EBPO_NO_NUMBER UINT32_MAX
 #define EBPO_NO_NORMAL UINT32_MAX
+#define EBPO_NO_VERTEX UINT64_MAX
 
 /* A node of a subtree under construction. Empty nodes get their colour with the labels. */
 typedef struct ebpo_build_node {
@@ -93,10 +94,11 @@ typedef struct ebpo_builder {
 ebpo_status ebpo_build_order(ebpo_builder *b, const ebpo_mesh *mesh, ebpo_error *error);
 void ebpo_build_vertex_range(const ebpo_builder *b, ebpo_cell cell, uint64_t *begin, uint64_t *end);
 
-/* bounds.c: greatest n . xi over vertices [begin, end), in coordinates of the cell that holds them, and `least`. */
+/* bounds.c: greatest n . xi over vertices [begin, end), in coordinates of the cell that holds them, and `least`; `*at`: the vertex, or EBPO_NO_VERTEX when
+ * `least` is the greatest. */
 ebpo_status ebpo_bounds_make(ebpo_bounds *bounds, double (*position)[3], uint64_t count, ebpo_error *error);
 double ebpo_bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n[3], uint64_t begin, uint64_t end,
-                           double least);
+                           double least, uint64_t *at);
 void ebpo_bounds_free(ebpo_bounds *bounds);
 
 /* partition.c */

@@ -78,7 +78,7 @@ int ebpo_build_candidates(const ebpo_builder *b, const ebpo_branch *s, const ebp
     for (int i = 0; i < used; i++) {
         bin *t = &table[slots[i]];
         uint32_t u = (uint32_t)((t->sum_u + t->count / 2) / t->count), v = (uint32_t)((t->sum_v + t->count / 2) / t->count);
-        out[i] = (ebpo_candidate){ u | v << 10, -1e300 };
+        out[i] = (ebpo_candidate){ .normal = u | v << 10, .support = -1e300 };
         t->key = 0;
     }
     return used;

@@ -1,28 +1,30 @@
-/* Planes of a gray node: its solid's support in each candidate direction, then a selection. The support is that of the extreme points of solid ∩ cell:
- * mesh vertices in the cell, points where faces cross its boundary, corners that lie inside. */
+/* The planes of a gray node, from the root down: candidates are the normals of faces below it and, in the top levels, those of the solid's hull in the cell. */
 #include <math.h>
 #include <stdlib.h>
-#ifdef __SSE2__
-#include <emmintrin.h>
-#endif
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "build/builder.h"
+#include "build/supports.h"
 #include "geom/plane_code.h"
+#include "planes/hull.h"
 
-enum { FEW_VERTICES = 192, TOP_LEVELS = 4, CANDIDATES_BELOW = 48 };
-
-typedef double pair __attribute__((vector_size(16)));
-#ifndef __SSE2__
-typedef int64_t pair_mask __attribute__((vector_size(16)));
-#endif
+enum {
+    TOP_LEVELS = 4,        /* nearly free of bytes */
+    HULL_LEVELS = 20,      /* few nodes beside those below */
+    CANDIDATES_BELOW = 24, FACES_BELOW = 16,
+    HULL_ROUNDS = 3,
+    HULL_DIRECTIONS = 160  /* at most, in a round */
+};
 
 struct ebpo_envelope_scratch {
-    pair (*point)[4]; /* two points: cell coordinates, and what rounding may add to a support */
-    uint64_t count, capacity; /* points; twos */
+    ebpo_supports supports;
     ebpo_candidate candidates[EBPO_PLANES_CANDIDATES];
-    double normal[EBPO_PLANES_CANDIDATES][3];
+    int count;
+    uint32_t tried[2 * EBPO_PLANES_CANDIDATES]; /* normals, of candidates and of those that were dropped */
+    int tried_count;
+    double core[EBPO_HULL_POINTS][3]; /* extreme points of the solid in the cell */
+    int core_count;
+    ebpo_hull_facet facet[EBPO_HULL_FACETS];
 };
 
 ebpo_status ebpo_scratch_make(ebpo_envelope_scratch **out, ebpo_error *error)
@@ -34,7 +36,7 @@ ebpo_status ebpo_scratch_make(ebpo_envelope_scratch **out, ebpo_error *error)
 void ebpo_scratch_free(ebpo_envelope_scratch *scratch)
 {
     if (scratch)
-        free(scratch->point);
+        ebpo_supports_free(&scratch->supports);
     free(scratch);
 }
 
@@ -56,85 +58,8 @@ unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32
     return mask;
 }
 
-static bool add_point(ebpo_envelope_scratch *scratch, double x, double y, double z, double slack)
-{
-    if (!ebpo_grow(&scratch->point, &scratch->capacity, scratch->count / 2 + 1, sizeof *scratch->point))
-        return false;
-    pair *p = scratch->point[scratch->count / 2];
-    double values[4] = { x, y, z, EBPO_NORMAL_NORM * slack };
-    for (int k = 0; k < 4; k++) /* the second of two is a copy until it comes */
-        p[k] = scratch->count % 2 ? (pair){ p[k][0], values[k] } : (pair){ values[k], values[k] };
-    scratch->count++;
-    return true;
-}
-
-static bool add_vertices(const ebpo_builder *b, ebpo_envelope_scratch *scratch, ebpo_cell cell, uint64_t begin, uint64_t end)
-{
-    double corner[3], size[3];
-    for (int k = 0; k < 3; k++) {
-        corner[k] = ebpo_wall(&b->box, k, cell.level, cell.at[k]);
-        size[k] = b->box.size[k] / (double)(1u << cell.level);
-    }
-    for (uint64_t i = begin; i < end; i++) {
-        const double *p = b->position[i];
-        /* Two roundings of values up to 1, far below the slack that ebpo_plane_code_offset adds. */
-        if (!add_point(scratch, (p[0] - corner[0]) / size[0], (p[1] - corner[1]) / size[1], (p[2] - corner[2]) / size[2], 0))
-            return false;
-    }
-    return true;
-}
-
-static bool add_crossings(const ebpo_builder *b, ebpo_envelope_scratch *scratch, const ebpo_branch *s,
-                          const ebpo_build_detail *d, ebpo_cell cell)
-{
-    for (uint64_t i = d->cross_begin; i < d->cross_end; i++) {
-        ebpo_triangle face;
-        double points[9][3], slack;
-        ebpo_build_triangle(b, s->crossing[i], &face);
-        int count = ebpo_clip_triangle(&b->box, cell, &face, points, &slack);
-        for (int p = 0; p < count; p++)
-            if (!add_point(scratch, points[p][0], points[p][1], points[p][2], slack))
-                return false;
-    }
-    return true;
-}
-
-static pair greater(pair a, pair b)
-{
-#ifdef __SSE2__
-    return _mm_max_pd(a, b);
-#else
-    pair_mask m = a > b;
-    return (pair)(((pair_mask)a & m) | ((pair_mask)b & ~m));
-#endif
-}
-
-/* Raises *support by the points, until it reaches `enough`. Points come in twos of a coordinate, so that one instruction serves both; the greatest
- * of them does not depend on the order. */
-static void raise_support(const ebpo_envelope_scratch *scratch, const double n[3], double enough, double *support)
-{
-    enum { STRETCH = 16 };
-    pair nx = { n[0], n[0] }, ny = { n[1], n[1] }, nz = { n[2], n[2] }, best = { *support, *support };
-    uint64_t twos = (scratch->count + 1) / 2, i = 0;
-    while (i < twos && *support < enough) {
-        uint64_t end = twos - i < STRETCH ? twos : i + STRETCH;
-        pair other = best;
-        for (; i + 1 < end; i += 2) { /* two chains of comparisons side by side */
-            const pair *p = scratch->point[i], *q = scratch->point[i + 1];
-            best = greater(nx * p[0] + ny * p[1] + nz * p[2] + p[3], best);
-            other = greater(nx * q[0] + ny * q[1] + nz * q[2] + q[3], other);
-        }
-        if (i < end) {
-            const pair *p = scratch->point[i++];
-            best = greater(nx * p[0] + ny * p[1] + nz * p[2] + p[3], best);
-        }
-        best = greater(best, other);
-        *support = best[0] > best[1] ? best[0] : best[1];
-    }
-}
-
 /* A support from which on a plane cannot remove epsilon: a cap of height h of a body of width H and volume V has at most V (1 - (1 - h/H)^3) <= 3 V h / H. */
-static double hopeless(const ebpo_polytope *envelope, double volume, const double n[3], double epsilon)
+static double hopeless(const ebpo_polytope *envelope, double volume, const int32_t n[3], double epsilon)
 {
     double most = -1e300, least = 1e300;
     for (int i = 0; i < envelope->vertex_count; i++) {
@@ -146,52 +71,124 @@ static double hopeless(const ebpo_polytope *envelope, double volume, const doubl
     return most - (most - least) * epsilon / (3 * volume);
 }
 
-/* Supports of all candidates, over the points and the vertices [begin, end). Those that cannot gain epsilon are dropped as soon as that shows. */
-static int find_supports(const ebpo_builder *b, ebpo_envelope_scratch *scratch, ebpo_cell cell, int count, uint64_t begin,
-                         uint64_t end, const ebpo_polytope *envelope, double epsilon)
+/* Looks at one more direction. Those that cannot gain epsilon are dropped as soon as that shows. The extreme point is kept for the hull. */
+static void try_normal(ebpo_envelope_scratch *s, uint32_t normal, const ebpo_polytope *envelope, double volume, double epsilon, double where[3])
 {
-    double volume = ebpo_polytope_volume(envelope);
-    int kept = 0;
-    for (int j = 0; j < count && volume > 0; j++) {
-        ebpo_candidate c = scratch->candidates[j];
-        int32_t v[3], d;
-        ebpo_plane_code_decode(c.normal, v, &d);
-        double n[3] = { v[0], v[1], v[2] }, enough = hopeless(envelope, volume, n, epsilon);
-        raise_support(scratch, n, enough, &c.support);
-        if (begin < end && c.support < enough)
-            c.support = ebpo_bounds_support(b, cell, n, begin, end, c.support);
-        if (c.support < enough)
-            scratch->candidates[kept++] = c;
-    }
-    return kept;
+    int32_t n[3], d;
+    ebpo_plane_code_decode(normal, n, &d);
+    double enough = hopeless(envelope, volume, n, epsilon);
+    double support = ebpo_supports_find(&s->supports, n, enough, where);
+    if (support < enough && s->count < EBPO_PLANES_CANDIDATES)
+        s->candidates[s->count++] = (ebpo_candidate){ .normal = normal, .support = support };
+    if (s->tried_count < 2 * EBPO_PLANES_CANDIDATES)
+        s->tried[s->tried_count++] = normal;
 }
+
+/* --- directions of the hull --- */
+
+static void add_core(ebpo_envelope_scratch *s, const double where[3])
+{
+    static const double near = 1e-12;
+    for (int i = 0; i < s->core_count; i++) {
+        double square = 0;
+        for (int k = 0; k < 3; k++)
+            square += (s->core[i][k] - where[k]) * (s->core[i][k] - where[k]);
+        if (square < near)
+            return;
+    }
+    if (s->core_count == EBPO_HULL_POINTS)
+        return;
+    for (int k = 0; k < 3; k++)
+        s->core[s->core_count][k] = where[k];
+    s->core_count++;
+}
+
+/* The ways to the walls, edges and corners of a cell: whatever the faces look like, the hull is known from all sides then. */
+static void look_around(ebpo_envelope_scratch *s)
+{
+    for (int i = 0; i < 27; i++) {
+        double way[3] = { i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1 }, where[3];
+        uint32_t normal;
+        int32_t n[3], d;
+        if (!ebpo_plane_code_normal(way, &normal) || !ebpo_plane_code_decode(normal, n, &d))
+            continue;
+        if (ebpo_supports_find(&s->supports, n, 1e300, where) > -1e300)
+            add_core(s, where);
+    }
+}
+
+static int by_area(const void *a, const void *b)
+{
+    const ebpo_hull_facet *f = a, *g = b;
+    if (f->area != g->area)
+        return f->area < g->area ? 1 : -1;
+    for (int i = 0; i < 3; i++)
+        if (f->corner[i] != g->corner[i])
+            return f->corner[i] < g->corner[i] ? -1 : 1;
+    return 0;
+}
+
+static bool was_tried(const ebpo_envelope_scratch *s, uint32_t normal)
+{
+    for (int i = 0; i < s->tried_count; i++)
+        if (s->tried[i] == normal)
+            return true;
+    return false;
+}
+
+/* One round: the hull of the points known so far proposes its facets, and what reaches beyond a facet is one more point. False when nothing was new. */
+static bool hull_round(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, double volume, double epsilon, int most)
+{
+    static const double worth = 1e-3; /* of the cell */
+    int facets = ebpo_hull_facets((const double (*)[3])s->core, s->core_count, s->facet), before = s->core_count;
+    qsort(s->facet, (size_t)facets, sizeof *s->facet, by_area);
+    for (int i = 0; i < facets && most > 0; i++) {
+        const ebpo_hull_facet *f = &s->facet[i];
+        uint32_t normal;
+        double where[3] = { 0, 0, 0 };
+        if (!ebpo_plane_code_normal(f->n, &normal) || was_tried(s, normal))
+            continue;
+        try_normal(s, normal, envelope, volume, epsilon, where);
+        most--;
+        if (f->n[0] * where[0] + f->n[1] * where[1] + f->n[2] * where[2] > f->d + worth)
+            add_core(s, where);
+    }
+    return s->core_count > before;
+}
+
+static void try_hull(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, double volume, double epsilon, int most)
+{
+    look_around(s);
+    for (int round = 0; round < HULL_ROUNDS && hull_round(s, envelope, volume, epsilon, most); round++)
+        ;
+}
+
+/* --- the node --- */
 
 /* Top levels are nearly free of bytes, and a needle that fills a thousandth of its cell deserves planes all the same. */
-static double top_share(const ebpo_polytope *envelope)
+static double top_share(double volume)
 {
-    return 0.1 * sqrt(fmax(0, ebpo_polytope_volume(envelope)));
+    return 0.1 * sqrt(fmax(0, volume));
 }
 
-int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, const ebpo_branch *s,
-                     const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope,
-                     uint32_t codes[EBPO_PLANES_MAX])
+int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo_branch *branch, const ebpo_build_detail *detail,
+                     ebpo_cell cell, int32_t winding, ebpo_polytope *envelope, uint32_t codes[EBPO_PLANES_MAX])
 {
-    bool top = cell.level <= TOP_LEVELS;
-    int count = ebpo_build_candidates(b, s, detail, top ? EBPO_PLANES_CANDIDATES : CANDIDATES_BELOW, scratch->candidates);
-    uint64_t begin, end;
-    ebpo_build_vertex_range(b, cell, &begin, &end);
-    scratch->count = 0;
-    bool few = end - begin <= FEW_VERTICES;
-    /* Corners first: they reach far and show soonest which directions are hopeless. */
-    unsigned corners = ebpo_inside_corners(b, winding, detail->delta);
-    for (int i = 0; i < 8; i++)
-        if (corners >> i & 1 && !add_point(scratch, i & 1, i >> 1 & 1, i >> 2 & 1, 0))
-            return -1;
-    if (few && !add_vertices(b, scratch, cell, begin, end))
+    bool top = cell.level <= TOP_LEVELS, hull = cell.level <= HULL_LEVELS;
+    ebpo_candidate faces[EBPO_PLANES_CANDIDATES];
+    int count = ebpo_build_candidates(b, branch, detail, top ? EBPO_PLANES_CANDIDATES / 2 : FACES_BELOW, faces);
+    if (!ebpo_supports_gather(&s->supports, b, branch, detail, cell, winding))
         return -1;
-    if (!add_crossings(b, scratch, s, detail, cell))
-        return -1;
-    double epsilon = b->options->epsilon * (top ? top_share(envelope) : 1);
-    count = find_supports(b, scratch, cell, count, few ? 0 : begin, few ? 0 : end, envelope, epsilon);
-    return ebpo_select_greedy(envelope, scratch->candidates, count, epsilon, EBPO_PLANES_MAX, codes);
+    double volume = ebpo_polytope_volume(envelope), epsilon = b->options->epsilon * (top ? top_share(volume) : 1);
+    s->count = s->tried_count = s->core_count = 0;
+    for (int i = 0; i < count && volume > 0; i++) {
+        double where[3];
+        try_normal(s, faces[i].normal, envelope, volume, epsilon, where);
+        if (hull)
+            add_core(s, where);
+    }
+    if (hull && volume > 0)
+        try_hull(s, envelope, volume, epsilon, top ? HULL_DIRECTIONS : CANDIDATES_BELOW);
+    ebpo_choice choice = { .candidates = s->candidates, .count = s->count, .most = EBPO_PLANES_MAX, .epsilon = epsilon };
+    return ebpo_select_greedy(envelope, &choice, codes);
 }

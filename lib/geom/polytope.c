@@ -20,7 +20,7 @@ static double dot(const double a[3], const double b[3])
 void ebpo_polytope_cube(ebpo_polytope *p)
 {
     /* Vertex i has bit 0 x, bit 1 y, bit 2 z. */
-    static const uint8_t loops[6][4] = { { 0, 4, 6, 2 }, { 1, 3, 7, 5 }, { 0, 1, 5, 4 },
+    static const uint16_t loops[6][4] = { { 0, 4, 6, 2 }, { 1, 3, 7, 5 }, { 0, 1, 5, 4 },
                                          { 2, 6, 7, 3 }, { 0, 2, 3, 1 }, { 4, 5, 7, 6 } };
     p->vertex_count = 8;
     p->face_count = 6;
@@ -31,7 +31,7 @@ void ebpo_polytope_cube(ebpo_polytope *p)
     for (int f = 0; f < 6; f++) {
         p->tag[f] = -1 - f;
         p->first[f] = (uint16_t)(4 * f);
-        memcpy(p->corner + 4 * f, loops[f], 4);
+        memcpy(p->corner + 4 * f, loops[f], sizeof loops[f]);
     }
     p->first[6] = 24;
 }
@@ -66,7 +66,7 @@ static void between(const double a[3], double da, const double b[3], double db, 
 static int beyond(const ebpo_polytope *p, int f, const double *dist, double (*points)[3])
 {
     int count = p->first[f + 1] - p->first[f], kept = 0;
-    const uint8_t *loop = p->corner + p->first[f];
+    const uint16_t *loop = p->corner + p->first[f];
     for (int i = 0, a = loop[count - 1]; i < count; i++) {
         int b = loop[i];
         bool a_out = dist[a] > 0, b_out = dist[b] > 0;
@@ -135,17 +135,17 @@ typedef struct cut {
     const ebpo_polytope *in;
     ebpo_polytope *out;
     double dist[EBPO_POLYTOPE_VERTICES];
-    uint8_t number[EBPO_POLYTOPE_VERTICES]; /* of kept vertices in `out` */
+    uint16_t number[EBPO_POLYTOPE_VERTICES]; /* of kept vertices in `out` */
     bool on[EBPO_POLYTOPE_VERTICES];        /* `out` vertex lies on the cutting plane */
-    struct { uint8_t in, out, number; } edge[EBPO_POLYTOPE_FACES]; /* cut edges and their new vertices */
+    struct { uint16_t in, out, number; } edge[EBPO_POLYTOPE_FACES]; /* cut edges and their new vertices */
     int edges;
-    struct { uint8_t from, to; } rim[EBPO_POLYTOPE_CORNERS]; /* edges of kept loops that lie on the plane */
+    struct { uint16_t from, to; } rim[EBPO_POLYTOPE_CORNERS]; /* edges of kept loops that lie on the plane */
     int rims;
     bool full;
     bool touched; /* old vertices lie on the plane: rim edges may have kept faces on both sides */
 } cut;
 
-static uint8_t add_vertex(cut *c, const double x[3], bool on)
+static uint16_t add_vertex(cut *c, const double x[3], bool on)
 {
     if (c->out->vertex_count == EBPO_POLYTOPE_VERTICES) {
         c->full = true;
@@ -154,10 +154,10 @@ static uint8_t add_vertex(cut *c, const double x[3], bool on)
     int i = c->out->vertex_count++;
     memcpy(c->out->vertex[i], x, sizeof c->out->vertex[i]);
     c->on[i] = on;
-    return (uint8_t)i;
+    return (uint16_t)i;
 }
 
-static uint8_t crossing(cut *c, uint8_t in, uint8_t out)
+static uint16_t crossing(cut *c, uint16_t in, uint16_t out)
 {
     if (c->dist[in] >= -tolerance)
         return c->number[in]; /* the inner end itself lies on the plane */
@@ -170,14 +170,14 @@ static uint8_t crossing(cut *c, uint8_t in, uint8_t out)
     }
     double x[3];
     between(c->in->vertex[in], c->dist[in], c->in->vertex[out], c->dist[out], x);
-    uint8_t number = add_vertex(c, x, true);
+    uint16_t number = add_vertex(c, x, true);
     c->edge[c->edges].in = in;
     c->edge[c->edges].out = out;
     c->edge[c->edges++].number = number;
     return number;
 }
 
-static void add_corner(cut *c, int loop_start, uint8_t v)
+static void add_corner(cut *c, int loop_start, uint16_t v)
 {
     ebpo_polytope *o = c->out;
     if (o->corner_count > loop_start && o->corner[o->corner_count - 1] == v)
@@ -194,8 +194,8 @@ static void close_face(cut *c, int start, int32_t tag)
     ebpo_polytope *o = c->out;
     while (o->corner_count > start + 1 && o->corner[o->corner_count - 1] == o->corner[start])
         o->corner_count--;
-    if (o->corner_count - start < 3 || o->face_count == EBPO_POLYTOPE_FACES) {
-        c->full |= o->face_count == EBPO_POLYTOPE_FACES;
+    if (o->corner_count - start < 3 || o->corner_count - start > 255 || o->face_count == EBPO_POLYTOPE_FACES) {
+        c->full |= o->corner_count - start > 255 || o->face_count == EBPO_POLYTOPE_FACES; /* users count corners in bytes */
         o->corner_count = start;
         return;
     }
@@ -207,7 +207,7 @@ static void close_face(cut *c, int start, int32_t tag)
 static void clip_face(cut *c, int f)
 {
     const ebpo_polytope *p = c->in;
-    const uint8_t *loop = p->corner + p->first[f];
+    const uint16_t *loop = p->corner + p->first[f];
     int count = p->first[f + 1] - p->first[f], start = c->out->corner_count;
     bool inside = false;
     for (int i = 0; i < count; i++)
@@ -215,7 +215,7 @@ static void clip_face(cut *c, int f)
     if (!inside)
         return;
     for (int i = 0; i < count; i++) {
-        uint8_t a = loop[i], b = loop[i + 1 < count ? i + 1 : 0];
+        uint16_t a = loop[i], b = loop[i + 1 < count ? i + 1 : 0];
         bool a_out = c->dist[a] > tolerance, b_out = c->dist[b] > tolerance;
         if (!a_out)
             add_corner(c, start, c->number[a]);
@@ -224,7 +224,7 @@ static void clip_face(cut *c, int f)
     }
     close_face(c, start, p->tag[f]);
     for (int i = start; i < c->out->corner_count && !c->full; i++) {
-        uint8_t a = c->out->corner[i], b = c->out->corner[i + 1 < c->out->corner_count ? i + 1 : start];
+        uint16_t a = c->out->corner[i], b = c->out->corner[i + 1 < c->out->corner_count ? i + 1 : start];
         if (c->on[a] && c->on[b]) {
             c->rim[c->rims].from = a;
             c->rim[c->rims++].to = b;
@@ -236,7 +236,7 @@ static void clip_face(cut *c, int f)
 static bool close_cap(cut *c, int32_t tag)
 {
     int16_t next[EBPO_POLYTOPE_VERTICES];
-    memset(next, -1, sizeof next);
+    memset(next, -1, (size_t)c->out->vertex_count * sizeof *next);
     int open = 0, begin = -1;
     for (int i = 0; i < c->rims; i++) {
         bool paired = false;
@@ -254,7 +254,7 @@ static bool close_cap(cut *c, int32_t tag)
         return false;
     int start = c->out->corner_count, at = begin, steps = 0;
     do {
-        add_corner(c, start, (uint8_t)at);
+        add_corner(c, start, (uint16_t)at);
         at = next[at];
         steps++;
     } while (at != -1 && at != begin && steps <= open);
@@ -298,7 +298,7 @@ ebpo_clip ebpo_polytope_clip(ebpo_polytope *p, const double n[3], double d, int3
     memcpy(p->vertex, out.vertex, (size_t)out.vertex_count * sizeof out.vertex[0]);
     memcpy(p->tag, out.tag, (size_t)out.face_count * sizeof out.tag[0]);
     memcpy(p->first, out.first, (size_t)(out.face_count + 1) * sizeof out.first[0]);
-    memcpy(p->corner, out.corner, (size_t)out.corner_count);
+    memcpy(p->corner, out.corner, (size_t)out.corner_count * sizeof out.corner[0]);
     p->vertex_count = out.vertex_count;
     p->face_count = out.face_count;
     p->corner_count = out.corner_count;
@@ -313,7 +313,7 @@ void ebpo_polytope_copy(ebpo_polytope *to, const ebpo_polytope *from)
     memcpy(to->vertex, from->vertex, (size_t)from->vertex_count * sizeof from->vertex[0]);
     memcpy(to->tag, from->tag, (size_t)from->face_count * sizeof from->tag[0]);
     memcpy(to->first, from->first, (size_t)(from->face_count + 1) * sizeof from->first[0]);
-    memcpy(to->corner, from->corner, (size_t)from->corner_count);
+    memcpy(to->corner, from->corner, (size_t)from->corner_count * sizeof from->corner[0]);
 }
 
 bool ebpo_polytope_half(const ebpo_polytope *p, int axis, int side, ebpo_polytope *out)

@@ -7,7 +7,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-enum { EBPO_POLYTOPE_VERTICES = 192, EBPO_POLYTOPE_FACES = 96, EBPO_POLYTOPE_CORNERS = 576 };
+/* Room for the 255 planes that a node may have, on a cube, where no more than three meet in a point. */
+enum { EBPO_POLYTOPE_VERTICES = 528, EBPO_POLYTOPE_FACES = 264, EBPO_POLYTOPE_CORNERS = 1584 };
 
 /* Face loops run counter-clockwise seen from outside. A face's tag tells the half-space it comes from: -1 - (2 * axis + side) for the walls of
  * the first cube, then what ebpo_polytope_clip was given. */
@@ -16,7 +17,7 @@ typedef struct ebpo_polytope {
     double vertex[EBPO_POLYTOPE_VERTICES][3];
     int32_t tag[EBPO_POLYTOPE_FACES];
     uint16_t first[EBPO_POLYTOPE_FACES + 1]; /* corners of face f: first[f] .. first[f + 1] - 1 */
-    uint8_t corner[EBPO_POLYTOPE_CORNERS];   /* vertex numbers */
+    uint16_t corner[EBPO_POLYTOPE_CORNERS];  /* vertex numbers */
 } ebpo_polytope;
 
 typedef enum ebpo_clip {

@@ -43,7 +43,7 @@ static void find_sides(const ebpo_polytope *p, uint8_t sides[EBPO_POLYTOPE_VERTI
             sides[p->corner[i]] |= (uint8_t)(1u << (-1 - p->tag[f]));
 }
 
-static void add_fan(ebpo_lod_piece *piece, const uint32_t *number, const uint8_t *loop, int corners)
+static void add_fan(ebpo_lod_piece *piece, const uint32_t *number, const uint16_t *loop, int corners)
 {
     for (int i = 1; i + 1 < corners; i++) {
         uint32_t *face = piece->faces + 3 * piece->face_count++;
@@ -94,7 +94,7 @@ ebpo_status ebpo_lod_piece_add(ebpo_lod_piece *piece, const ebpo_polytope *p, co
         if (p->tag[f] < 0 && !walls)
             continue;
         for (int i = p->first[f]; i < p->first[f + 1]; i++) {
-            uint8_t v = p->corner[i];
+            uint16_t v = p->corner[i];
             if (number[v] != UINT32_MAX)
                 continue;
             for (int k = 0; k < 3; k++)

@@ -2,31 +2,59 @@
 #ifndef EBPO_PLANES_PLANES_H
 #define EBPO_PLANES_PLANES_H
 
-#include <ebpo/base.h>
+#include <ebpo/build.h>
 
 #include "geom/cell.h"
 #include "geom/polytope.h"
 
 enum {
-    EBPO_PLANES_MAX = 32,         /* a node adds at most so many */
-    EBPO_PLANES_CANDIDATES = 512  /* and chooses among at most so many */
+    EBPO_PLANES_MAX = 32,         /* a node adds at most so many to its parent's */
+    EBPO_PLANES_CANDIDATES = 512, /* and chooses among at most so many */
+    EBPO_PLANES_STORED = 255      /* the theses' selections, which start from the cell; more than a byte counts is not stored */
 };
 
 /* A candidate: a normal (bits 0-19 of a plane code) and the support of the solid in the cell in that direction: an upper bound of
- * n . xi over it, in cell coordinates. */
+ * n . xi over it, in cell coordinates. `moved`: how far from its face's plane that is, in the model's unit; the theses' selections only. */
 typedef struct ebpo_candidate {
     uint32_t normal;
-    double support;
+    double support, moved;
 } ebpo_candidate;
 
-/* A selection: takes planes from `candidates` (count <= EBPO_PLANES_CANDIDATES), clips `envelope` by them and writes their codes;
- * returns how many (<= most <= EBPO_PLANES_MAX). Adding a method means one function of this shape. */
-typedef int (*ebpo_select_fn)(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, double epsilon, int most,
-                              uint32_t *codes);
+/* What a selection is told of a node. */
+typedef struct ebpo_choice {
+    const ebpo_candidate *candidates; /* normals differ */
+    int count, most;                  /* candidates; codes that may be taken */
+    double epsilon;                   /* inherit: least share of the cell that a plane removes */
+    int wanted;                       /* the theses': so many of the candidates */
+    const double *cell_size;          /* [3] cell coordinates to the model's unit */
+    ebpo_normal_distance normals;
+    uint64_t seed;                    /* of this node */
+} ebpo_choice;
+
+/* A selection: takes planes from the candidates, clips `envelope` by them and writes their codes; returns how many, -1: out of memory.
+ * Adding a method means one function of this shape and a line in selections.c. */
+typedef int (*ebpo_select_fn)(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes);
+
+typedef struct ebpo_selection_method {
+    ebpo_select_fn select;
+    bool from_leaves; /* nodes after their children, each from its cell alone (EBP 2017, 3.4.1); else from the root down, each from its parent's envelope */
+    bool has_seed, has_normals;
+} ebpo_selection_method;
+
+/* NULL for what is none. */
+const ebpo_selection_method *ebpo_selection_of(ebpo_selection selection);
 
 /* Greedy by removed volume, lazily re-evaluated, until the gain falls below epsilon * cell volume. */
-int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, double epsilon, int most,
-                       uint32_t *codes);
+int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes);
+
+/* The theses' (theses.c). */
+int ebpo_select_kmedoids(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes);
+int ebpo_select_offset(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes);
+int ebpo_select_random(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes);
+
+/* How many of `count` candidates: `percent` of them, rounded up (EBP 2017, equation 5); or, with k_root > 0, BP's K: k_root / 2^level, halved on while it is not below `count`
+ * (2008, 3.5.1); all of them where that is below 1 to begin with (as there). */
+int ebpo_selection_wanted(int count, int level, double percent, double k_root);
 
 /* Every candidate that may remove 0.03 % of the cell or more, deepest cut first: nearly the tightest envelope, and with few candidates the
  * cheapest to find. */

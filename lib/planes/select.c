@@ -27,8 +27,7 @@ static double cap_bound(const ebpo_polytope *p, double volume, const double n[3]
     return volume * (1 - left * left * left);
 }
 
-static int rank_candidates(const ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, double epsilon,
-                           ranked *out)
+static int rank_candidates(const ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, double epsilon, ranked *out)
 {
     double volume = ebpo_polytope_volume(envelope);
     int kept = 0;
@@ -82,11 +81,11 @@ static void drop_first(ranked *heap, int *count)
         sift_down(heap, *count, 0);
 }
 
-int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, double epsilon, int most,
-                       uint32_t *codes)
+int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
 {
     ranked heap[EBPO_PLANES_CANDIDATES];
-    int left = rank_candidates(envelope, candidates, count, epsilon, heap), taken = 0;
+    double epsilon = choice->epsilon;
+    int left = rank_candidates(envelope, choice->candidates, choice->count, epsilon, heap), taken = 0, most = choice->most;
     make_heap(heap, left);
     while (left > 0 && taken < most) {
         ranked *r = &heap[0];

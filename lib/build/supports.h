@@ -1,0 +1,27 @@
+/* The support of the solid in a gray node's cell: the greatest n . xi over mesh vertices in the cell, points where faces cross its walls, and its corners inside. */
+#ifndef EBPO_BUILD_SUPPORTS_H
+#define EBPO_BUILD_SUPPORTS_H
+
+#include "build/builder.h"
+
+typedef double ebpo_pair __attribute__((vector_size(16)));
+
+typedef struct ebpo_supports {
+    const ebpo_builder *b;
+    ebpo_cell cell;
+    ebpo_pair (*point)[4];     /* two points: cell coordinates, and what rounding may add to a support */
+    uint64_t count, capacity;  /* points; twos */
+    uint64_t begin, end;       /* vertices that are not among the points: looked at through their bounds */
+} ebpo_supports;
+
+/* Gathers the points of a node. False: out of memory. */
+bool ebpo_supports_gather(ebpo_supports *s, const ebpo_builder *b, const ebpo_branch *branch, const ebpo_build_detail *detail,
+                          ebpo_cell cell, int32_t winding);
+
+/* An upper bound of n . xi, exact but for roundings that ebpo_plane_code_offset allows for; a search that has reached `enough` ends there. `where` is the point that reaches
+ * it, in cell coordinates. -1e300 when there are no points. */
+double ebpo_supports_find(const ebpo_supports *s, const int32_t n[3], double enough, double where[3]);
+
+void ebpo_supports_free(ebpo_supports *s);
+
+#endif

@@ -1,0 +1,19 @@
+/* A small convex hull, for directions only: what it gets wrong costs volume, never containment. */
+#ifndef EBPO_PLANES_HULL_H
+#define EBPO_PLANES_HULL_H
+
+#include <stdint.h>
+
+enum { EBPO_HULL_POINTS = 512, EBPO_HULL_FACETS = 2 * EBPO_HULL_POINTS };
+
+typedef struct ebpo_hull_facet {
+    uint16_t corner[3]; /* of the points, counter-clockwise seen from outside */
+    double n[3], d;     /* unit normal outward: n . x <= d for the hull */
+    double area;
+} ebpo_hull_facet;
+
+/* Triangles of the hull of points [count], at most EBPO_HULL_POINTS of them, of the order of 1; returns how many, 0 when the points lie (nearly) in a plane. `facets` has room
+ * for EBPO_HULL_FACETS. Points nearer than 1e-9 to the hull found so far are left out. */
+int ebpo_hull_facets(const double (*points)[3], int count, ebpo_hull_facet *facets);
+
+#endif
