@@ -144,6 +144,11 @@ static ebpo_status measure(comparison *c, ebpo_error *error)
     ebpo_status status = report_make_points(c, error);
     for (int i = 0; i < c->count && status == EBPO_OK; i++)
         status = report_gather(c, &c->methods[i], error);
+    for (int round = 0; round < ROUNDS; round++)
+        for (int i = 0; i < c->count && status == EBPO_OK; i++)
+            status = report_round(c, &c->methods[i], round, error);
+    for (int i = 0; i < c->count; i++)
+        report_settle(c, &c->methods[i]);
     if (c->v->no_pictures)
         c->without_pictures = "--no-pictures was given";
     else if (status == EBPO_OK)

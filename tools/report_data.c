@@ -95,6 +95,14 @@ void method_begin(method *m, const char *name, const char *path)
     fill_nan(m->whole, WHOLE_FIGURES);
     fill_nan(&m->level[0][0], EBPO_LEVELS_MAX * LEVEL_FIGURES);
     fill_nan(&m->due[0][0], DEADLINES * DEADLINE_FIGURES);
+    for (int i = 0; i < ROUNDS; i++) {
+        round_times *r = &m->round[i];
+        fill_nan(r->have, EBPO_LEVELS_MAX);
+        fill_nan(r->inside, EBPO_LEVELS_MAX);
+        fill_nan(r->distance, EBPO_LEVELS_MAX);
+        fill_nan(&r->due[0][0], DEADLINES * DEADLINE_FIGURES);
+        r->open = r->exact_inside = r->exact_distance = NAN;
+    }
 }
 
 void method_note(method *m, const char *what, const char *why)

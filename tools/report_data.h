@@ -9,7 +9,7 @@
 #include "progress.h"
 #include "remote.h"
 
-enum { METHODS_MAX = ARGS_OPERANDS_MAX, METHOD_NOTES = 6, DEADLINES = 8, NEEDS = 8 };
+enum { METHODS_MAX = ARGS_OPERANDS_MAX, METHOD_NOTES = 6, DEADLINES = 8, NEEDS = 8, ROUNDS = 3 };
 
 /* Of each level; the table level_figures says what they are. */
 typedef enum level_figure {
@@ -54,12 +54,20 @@ typedef struct need_result {
     double figure[NEED_FIGURES];
 } need_result;
 
+/* What the clock said in one round; methods take turns, so that what else the machine does meanwhile is shared out. Medians of the rounds become figures. */
+typedef struct round_times {
+    double have[EBPO_LEVELS_MAX], inside[EBPO_LEVELS_MAX], distance[EBPO_LEVELS_MAX];
+    double open, exact_inside, exact_distance;
+    double due[DEADLINES][DEADLINE_FIGURES];
+} round_times;
+
 /* One file. Figures that could not be had are NAN, and a note says why. */
 typedef struct method {
     char name[64], path[4096];
     ebpo_info info;
     int levels; /* of the file */
     double whole[WHOLE_FIGURES], level[EBPO_LEVELS_MAX][LEVEL_FIGURES], due[DEADLINES][DEADLINE_FIGURES];
+    round_times round[ROUNDS];
     need_result need[NEEDS];
     int need_count, note_count;
     char note[METHOD_NOTES][320];
@@ -115,8 +123,11 @@ double quantile_of(double *values, uint64_t count, double share);
 EBPO_MUST_USE ebpo_status report_make_points(comparison *c, ebpo_error *error);
 EBPO_MUST_USE ebpo_status report_gather(comparison *c, method *m, ebpo_error *error);
 EBPO_MUST_USE ebpo_status report_thesis(comparison *c, method *m, ebpo_file *file, ebpo_error *error);
-EBPO_MUST_USE ebpo_status report_limited(comparison *c, method *m, ebpo_model *model, ebpo_error *error);
-EBPO_MUST_USE ebpo_status report_deadlines(comparison *c, method *m, ebpo_model *model, ebpo_error *error);
+EBPO_MUST_USE ebpo_status report_round(comparison *c, method *m, int round, ebpo_error *error);
+EBPO_MUST_USE ebpo_status report_limited(comparison *c, method *m, ebpo_model *model, int round, ebpo_error *error);
+EBPO_MUST_USE ebpo_status report_deadlines(comparison *c, method *m, ebpo_model *model, int round, ebpo_error *error);
+/* After the last round. */
+void report_settle(const comparison *c, method *m);
 EBPO_MUST_USE ebpo_status report_needs(comparison *c, method *m, ebpo_file *file, ebpo_model *model, ebpo_error *error);
 EBPO_MUST_USE ebpo_status report_pictures(comparison *c, ebpo_error *error);
 

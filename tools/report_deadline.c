@@ -44,7 +44,7 @@ static void note(const comparison *c, timing *t, double *f)
     f[OF_DUE_TOOK_MAX] = t->took[c->points - 1]; /* they are sorted now */
 }
 
-ebpo_status report_deadlines(comparison *c, method *m, ebpo_model *model, ebpo_error *error)
+ebpo_status report_deadlines(comparison *c, method *m, ebpo_model *model, int round, ebpo_error *error)
 {
     timing t = { .width = malloc(c->points * sizeof(double)), .took = malloc(c->points * sizeof(double)) };
     uint64_t clock_cost = bench_clock_cost();
@@ -59,7 +59,7 @@ ebpo_status report_deadlines(comparison *c, method *m, ebpo_model *model, ebpo_e
             c->progress.report(c->progress.user, "deadlines", (uint64_t)i, DEADLINES);
         status = ask(c, context, deadlines_us[i], clock_cost, &t, error);
         if (status == EBPO_OK)
-            note(c, &t, m->due[i]);
+            note(c, &t, m->round[round].due[i]);
     }
     free(t.width);
     free(t.took);

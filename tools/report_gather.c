@@ -1,12 +1,9 @@
-/* The figures of one method, step by step: what the head tells, having a level, the limit, how far the envelopes reach; then questions, needs and the theses' costs. */
+/* The figures of one method, but for times: what the head tells, volumes, the limit, how far the envelopes reach; then needs and the theses' costs. */
 #include <stdio.h>
 #include <string.h>
 
-#include "bench_run.h"
 #include "facts.h"
 #include "report_data.h"
-
-enum { COLD_REPEATS = 3 };
 
 static double excess(const ebpo_info *info, double volume)
 {
@@ -37,50 +34,7 @@ static void from_head(const comparison *c, method *m)
     }
 }
 
-/* --- having a level --- */
-
-static ebpo_status have_once(const comparison *c, const method *m, int level, double *seconds, traffic *t, ebpo_error *error)
-{
-    ebpo_stream_options wanted = EBPO_STREAM_OPTIONS_INIT;
-    ebpo_stream_level told;
-    ebpo_stream *stream = NULL;
-    ebpo_file *file = NULL;
-    bool more = true;
-    if (!ebpo_is_url(m->path))
-        bench_drop_file(m->path);
-    wanted.threads = (unsigned)c->v->threads;
-    uint64_t begin = bench_clock();
-    ebpo_status status = remote_open(&file, m->path, &c->v->remote, error);
-    if (status == EBPO_OK) {
-        ebpo_file_expect_levels(file, 0, level);
-        status = ebpo_stream_new(&stream, file, &wanted, error);
-    }
-    for (int i = 0; i <= level && status == EBPO_OK; i++)
-        status = ebpo_stream_next_level(stream, &told, &more, error);
-    *seconds = 1e-9 * (double)(bench_clock() - begin);
-    if (status == EBPO_OK)
-        *t = traffic_of(file);
-    ebpo_stream_free(stream);
-    ebpo_close(file);
-    return status;
-}
-
-static ebpo_status having(comparison *c, method *m, ebpo_error *error)
-{
-    double seconds[COLD_REPEATS];
-    traffic t = { 0 };
-    for (int i = c->first; i <= method_last(c, m); i++) {
-        for (int k = 0; k < COLD_REPEATS; k++) {
-            ebpo_status status = have_once(c, m, i, &seconds[k], &t, error);
-            if (status != EBPO_OK)
-                return status;
-        }
-        m->level[i][OF_HAVE_SECONDS] = quantile_of(seconds, COLD_REPEATS, 0.5);
-        m->level[i][OF_READ_BYTES] = (double)t.bytes;
-        m->level[i][OF_READS] = (double)t.reads;
-    }
-    return EBPO_OK;
-}
+/* --- what the levels are --- */
 
 /* Volumes from the levels alone. */
 static ebpo_status levels_alone(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
@@ -141,27 +95,28 @@ static ebpo_status deviations(comparison *c, method *m, ebpo_file *file, ebpo_mo
 
 /* --- all of it --- */
 
-static ebpo_status open_model(comparison *c, method *m, ebpo_file *file, ebpo_model **model, ebpo_error *error)
+static ebpo_status with_model(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
     ebpo_model_stats stats;
+    ebpo_model *model = NULL;
     options.threads = (unsigned)c->v->threads;
-    ebpo_status status = ebpo_model_open(model, file, &options, error);
+    ebpo_status status = ebpo_model_open(&model, file, &options, error);
     if (status != EBPO_OK)
         return status;
-    ebpo_model_get_stats(*model, &stats);
-    m->whole[OF_OPEN_SECONDS] = stats.open_seconds;
+    ebpo_model_get_stats(model, &stats);
     m->whole[OF_MEMORY_BYTES] = (double)stats.memory;
-    return EBPO_OK;
+    status = deviations(c, m, file, model, error);
+    if (status == EBPO_OK && c->v->need)
+        status = report_needs(c, m, file, model, error);
+    ebpo_model_close(model);
+    return status;
 }
 
 ebpo_status report_gather(comparison *c, method *m, ebpo_error *error)
 {
     ebpo_file *file = NULL;
-    ebpo_model *model = NULL;
     ebpo_status status = remote_open(&file, m->path, &c->v->remote, error);
-    if (status == EBPO_OK)
-        status = having(c, m, error);
     from_head(c, m);
     if (status == EBPO_OK)
         status = levels_alone(c, m, file, error);
@@ -170,16 +125,7 @@ ebpo_status report_gather(comparison *c, method *m, ebpo_error *error)
     if (status == EBPO_OK)
         status = limits(c, m, file, error);
     if (status == EBPO_OK)
-        status = open_model(c, m, file, &model, error);
-    if (status == EBPO_OK)
-        status = deviations(c, m, file, model, error);
-    if (status == EBPO_OK)
-        status = report_limited(c, m, model, error);
-    if (status == EBPO_OK)
-        status = report_deadlines(c, m, model, error);
-    if (status == EBPO_OK && c->v->need)
-        status = report_needs(c, m, file, model, error);
-    ebpo_model_close(model);
+        status = with_model(c, m, file, error);
     ebpo_close(file);
     return status;
 }

@@ -30,7 +30,7 @@ void page_legend(FILE *out, const comparison *c)
 
 static void fact(FILE *out, const char *name, const char *text, const char *more)
 {
-    fprintf(out, "<div><dt>%s</dt><dd>", name);
+    fprintf(out, "<div%s><dt>%s</dt><dd>", strlen(text) > 24 ? " class=\"wide\"" : "", name);
     html_text(out, text);
     if (more && more[0]) {
         fputs(" <small>", out);
@@ -53,6 +53,12 @@ static void grouped(char *out, size_t room, uint64_t v)
     out[at] = 0;
 }
 
+static const char *real(char *out, size_t room, double v)
+{
+    snprintf(out, room, "%.4g", v);
+    return out;
+}
+
 static void facts(FILE *out, const comparison *c)
 {
     const ebpo_info *info = &c->methods->info;
@@ -65,8 +71,8 @@ static void facts(FILE *out, const comparison *c)
     fact(out, "vertices", text, info->double_coordinates ? "double" : "float");
     fact(out, "kind", info->solid ? "solid" : "surface", info->solid ? words_rule(info->rule) : "no inside");
     if (info->solid)
-        fact(out, "volume", plot_value(text, sizeof text, PLOT_NUMBER, r->volume), info->unit[0] ? info->unit : NULL);
-    fact(out, "area", plot_value(text, sizeof text, PLOT_NUMBER, r->area), NULL);
+        fact(out, "volume", real(text, sizeof text, r->volume), info->unit[0] ? info->unit : NULL);
+    fact(out, "area", real(text, sizeof text, r->area), NULL);
     snprintf(text, sizeof text, "%.4g × %.4g × %.4g", r->max[0] - r->min[0], r->max[1] - r->min[1], r->max[2] - r->min[2]);
     snprintf(more, sizeof more, "diagonal %.4g", c->diagonal);
     fact(out, "size", text, more);

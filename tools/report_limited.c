@@ -7,8 +7,6 @@
 #include "bench_walk.h"
 #include "report_data.h"
 
-enum { TIMES = 3 }; /* that all points are asked; the median counts */
-
 static ebpo_status no_memory(ebpo_error *error)
 {
     snprintf(error->message, sizeof error->message, "not enough memory for the points; give fewer with --points");
@@ -117,26 +115,22 @@ typedef struct asker {
     ebpo_inside_result *inside;
     ebpo_distance_result *distance;
     double *width;
+    round_times *round;
+    bool first; /* round: later ones only look at the clock */
 } asker;
 
-/* Median of some runs, a point. */
+/* Nanoseconds a point; answers in a->distance or a->inside. */
 static ebpo_status timed(asker *a, bool distance, const double *points, int level, double *ns, ebpo_error *error)
 {
     ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
-    double took[TIMES];
     options.level = level;
     options.warm = false;
     options.unsigned_distance = true;
-    for (int i = 0; i < TIMES; i++) {
-        uint64_t begin = bench_clock();
-        ebpo_status status = distance ? ebpo_distance_many(a->context, points, a->c->points, &options, a->distance, error)
-                                      : ebpo_inside_many(a->context, points, a->c->points, &options, a->inside, error);
-        took[i] = (double)(bench_clock() - begin) / (double)a->c->points;
-        if (status != EBPO_OK)
-            return status;
-    }
-    *ns = quantile_of(took, TIMES, 0.5);
-    return EBPO_OK;
+    uint64_t begin = bench_clock();
+    ebpo_status status = distance ? ebpo_distance_many(a->context, points, a->c->points, &options, a->distance, error)
+                                  : ebpo_inside_many(a->context, points, a->c->points, &options, a->inside, error);
+    *ns = (double)(bench_clock() - begin) / (double)a->c->points;
+    return status;
 }
 
 static double share_of_maybe(const asker *a)
@@ -150,30 +144,43 @@ static double share_of_maybe(const asker *a)
 static ebpo_status inside_at(asker *a, int level, ebpo_error *error)
 {
     double *f = a->m->level[level], ignored;
-    ebpo_status status = timed(a, false, a->c->uniform, level, &f[OF_INSIDE_NS], error);
-    if (status == EBPO_OK)
-        f[OF_MAYBE_UNIFORM] = share_of_maybe(a);
-    if (status == EBPO_OK && a->c->near) {
-        status = timed(a, false, a->c->near, level, &ignored, error);
-        f[OF_MAYBE_NEAR] = share_of_maybe(a);
-    }
+    ebpo_status status = timed(a, false, a->c->uniform, level, &a->round->inside[level], error);
+    if (status != EBPO_OK || !a->first)
+        return status;
+    f[OF_MAYBE_UNIFORM] = share_of_maybe(a);
+    if (!a->c->near)
+        return EBPO_OK;
+    status = timed(a, false, a->c->near, level, &ignored, error);
+    f[OF_MAYBE_NEAR] = share_of_maybe(a);
     return status;
 }
 
 static ebpo_status distance_at(asker *a, int level, ebpo_error *error)
 {
     double *f = a->m->level[level], sum = 0;
-    ebpo_status status = timed(a, true, a->c->uniform, level, &f[OF_DISTANCE_NS], error);
-    if (status != EBPO_OK)
+    ebpo_status status = timed(a, true, a->c->uniform, level, &a->round->distance[level], error);
+    if (status != EBPO_OK || !a->first)
         return status;
     for (uint64_t i = 0; i < a->c->points; i++) {
         a->width[i] = a->distance[i].hi - a->distance[i].lo;
-        sum += a->width[i];
+        sum += a->width[i] / (double)a->c->points;
     }
-    f[OF_WIDTH_MEAN] = sum / (double)a->c->points;
+    f[OF_WIDTH_MEAN] = sum;
     f[OF_WIDTH_MEDIAN] = quantile_of(a->width, a->c->points, 0.5);
     f[OF_WIDTH_P99] = quantile_of(a->width, a->c->points, 0.99);
     return EBPO_OK;
+}
+
+/* Needs the mesh. */
+static ebpo_status exact(asker *a, ebpo_error *error)
+{
+    ebpo_status status = a->m->info.solid ? timed(a, false, a->c->uniform, EBPO_LEVEL_ALL, &a->round->exact_inside, error) : EBPO_OK;
+    if (status == EBPO_OK)
+        status = timed(a, true, a->c->uniform, EBPO_LEVEL_ALL, &a->round->exact_distance, error);
+    if (status == EBPO_OK)
+        return EBPO_OK;
+    a->round->exact_inside = a->round->exact_distance = NAN;
+    return method_without(a->m, "exact answers", status, error);
 }
 
 static ebpo_status ask_all(asker *a, ebpo_error *error)
@@ -189,16 +196,12 @@ static ebpo_status ask_all(asker *a, ebpo_error *error)
         if (status == EBPO_OK)
             status = distance_at(a, i, error);
     }
-    if (status == EBPO_OK && a->m->info.solid)
-        status = method_without(a->m, "exact answers", timed(a, false, c->uniform, EBPO_LEVEL_ALL, &a->m->whole[OF_EXACT_INSIDE_NS], error), error);
-    if (status == EBPO_OK)
-        status = method_without(a->m, "exact answers", timed(a, true, c->uniform, EBPO_LEVEL_ALL, &a->m->whole[OF_EXACT_DISTANCE_NS], error), error);
-    return status;
+    return status == EBPO_OK ? exact(a, error) : status;
 }
 
-ebpo_status report_limited(comparison *c, method *m, ebpo_model *model, ebpo_error *error)
+ebpo_status report_limited(comparison *c, method *m, ebpo_model *model, int round, ebpo_error *error)
 {
-    asker a = { .c = c, .m = m };
+    asker a = { .c = c, .m = m, .round = &m->round[round], .first = round == 0 };
     ebpo_status status = ebpo_context_new(&a.context, model, error);
     a.inside = malloc(c->points * sizeof *a.inside);
     a.distance = malloc(c->points * sizeof *a.distance);

@@ -7,7 +7,7 @@
 #include "report_data.h"
 
 static const double errors[] = { 10, 3, 1, 0.3 }; /* percent of the diagonal */
-static const double sizes[] = { 5, 10, 20, 50 };  /* percent of the file */
+static const double sizes[] = { 5, 10, 20, 50 };  /* percent of the first file */
 
 /* What a viewer needs: envelopes without mesh. */
 static ebpo_status cut(const comparison *c, ebpo_file *file, const need_result *n, const char *path, ebpo_error *error)
@@ -68,7 +68,7 @@ ebpo_status report_needs(comparison *c, method *m, ebpo_file *file, ebpo_model *
 {
     for (unsigned i = 0; i < NEEDS; i++) {
         bool by_error = i < NEEDS / 2;
-        double asked = by_error ? errors[i] / 100 * c->diagonal : floor(sizes[i - NEEDS / 2] / 100 * (double)m->info.file_bytes);
+        double asked = by_error ? errors[i] / 100 * c->diagonal : floor(sizes[i - NEEDS / 2] / 100 * (double)c->methods[0].info.file_bytes);
         ebpo_status status = one_need(c, m, file, model, by_error ? NEED_ERROR : NEED_SIZE, asked, error);
         if (status == EBPO_E_MEMORY || status == EBPO_E_IO || status == EBPO_E_CANCELLED)
             return status;

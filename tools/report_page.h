@@ -24,9 +24,12 @@ void page_legend(FILE *out, const comparison *c);
 /* <section id="..."><h2>...</h2><p>...</p>; text is HTML. */
 void page_section(FILE *out, const char *id, const char *title, const char *text);
 
-/* Table cells. `scale` is multiplied in; NAN is a dash. */
+/* Table cells. NAN is a dash. */
 void cell(FILE *out, plot_unit unit, double v);
+void cell_first(FILE *out, plot_unit unit, double v); /* of a group of columns */
 void cell_count(FILE *out, double v);
+/* Begins a table with a group of `columns` for each method: `group` heads what stands before them (HTML), `before` and `each` are the columns' heads. */
+void page_groups(FILE *out, const comparison *c, int columns, const char *group, const char *before, const char *each);
 
 bool any_level_figure(const comparison *c, level_figure which);
 

@@ -135,6 +135,36 @@ static double rounded(double v, bool up)
     return best;
 }
 
+/* Less than a factor of five is divided as a linear axis is, or there would be hardly a number at it. */
+static bool is_narrow(const axis *a)
+{
+    return a->high < 5 * a->low;
+}
+
+static double narrow_step(const axis *a)
+{
+    return rounded((a->high - a->low) / 5, true);
+}
+
+static void widen(axis *a)
+{
+    double margin = pow(a->high / a->low, 0.03); /* points do not stand on the frame */
+    a->low /= margin;
+    a->high *= margin;
+    if (!(a->high > a->low * 1.02)) {
+        a->low *= 0.8;
+        a->high *= 1.25;
+    }
+    if (!is_narrow(a)) {
+        a->low = rounded(a->low, false);
+        a->high = rounded(a->high, true);
+        return;
+    }
+    double step = narrow_step(a), low = step * floor(a->low / step * 1.0001);
+    a->low = low > 0 ? low : a->low;
+    a->high = step * ceil(a->high / step * 0.9999);
+}
+
 static axis axis_of(const plot *p, bool vertical)
 {
     axis a = { INFINITY, -INFINITY, false, vertical ? p->y : p->x, vertical ? HEIGHT - BOTTOM : LEFT, vertical ? TOP : WIDTH - RIGHT };
@@ -150,11 +180,7 @@ static axis axis_of(const plot *p, bool vertical)
         a.high += 0.25;
         return a;
     }
-    double margin = pow(a.high / a.low, 0.03); /* points do not stand on the frame */
-    a.low = rounded(a.low / margin, false);
-    a.high = rounded(a.high * margin, true);
-    if (!(a.high > a.low))
-        a.high = 10 * a.low;
+    widen(&a);
     return a;
 }
 
@@ -162,11 +188,7 @@ static axis axis_of(const plot *p, bool vertical)
 static bool labelled(const axis *a, int digit)
 {
     double decades = log10(a->high / a->low);
-    if (digit == 1)
-        return true;
-    if (decades < 0.7)
-        return true;
-    return decades < 2.4 && (digit == 2 || digit == 5);
+    return digit == 1 || (decades < 2.4 && (digit == 2 || digit == 5));
 }
 
 static void grid_line(FILE *out, const axis *a, double v, bool strong)
@@ -190,13 +212,18 @@ static void tick_label(FILE *out, const axis *a, double v)
         fprintf(out, "<text class=\"t\" x=\"%.1f\" y=\"%d\" text-anchor=\"middle\">%s</text>\n", at, HEIGHT - BOTTOM + 17, text);
 }
 
+static void linear_ticks(FILE *out, const axis *a, double step)
+{
+    for (double v = step * ceil(a->low / step - 1e-6); v <= a->high + step * 1e-6; v += step) {
+        grid_line(out, a, v, true);
+        tick_label(out, a, fabs(v));
+    }
+}
+
 static void write_axis(FILE *out, const axis *a)
 {
-    if (a->linear) {
-        for (double v = ceil(a->low); v <= a->high; v++) {
-            grid_line(out, a, v, true);
-            tick_label(out, a, v);
-        }
+    if (a->linear || is_narrow(a)) {
+        linear_ticks(out, a, a->linear ? 1 : narrow_step(a));
         return;
     }
     double decades = log10(a->high / a->low), last = -100;

@@ -100,7 +100,7 @@ void page_plots_by_bytes(FILE *out, const comparison *c)
     plot mean = { .title = "Mean distance of the surface from the model, sampled", .x_name = "bytes so far", .y_name = mean_name, .x = PLOT_BYTES, .y = PLOT_PERCENT };
     lines(&mean, c, OF_CUMULATIVE_BYTES, AS_IT_IS, OF_FAR_MEAN, OF_DIAGONAL, false);
     write_if_any(out, &mean);
-    plot maybe = { .title = "Points that stay undecided, within 1 % of the diagonal from the surface", .x_name = "bytes so far", .y_name = "MAYBE, % of the points", .x = PLOT_BYTES, .y = PLOT_PERCENT };
+    plot maybe = { .title = "Points near the surface that stay undecided", .x_name = "bytes so far", .y_name = "MAYBE, % of points within 1 % of the diagonal", .x = PLOT_BYTES, .y = PLOT_PERCENT };
     lines(&maybe, c, OF_CUMULATIVE_BYTES, AS_IT_IS, OF_MAYBE_NEAR, SHARE, false);
     write_if_any(out, &maybe);
     fputs("</div></section>\n", out);
@@ -138,23 +138,18 @@ static void due_lines(plot *p, const comparison *c, deadline_figure which, relat
     }
 }
 
-static void due_table(FILE *out, const comparison *c, const method *m)
+static void due_table(FILE *out, const comparison *c)
 {
-    fputs("<h3>", out);
-    html_text(out, m->name);
-    fputs("</h3><div class=\"scroll\"><table><thead><tr><th>within</th><th>exact</th><th>interval,<br/>median, % diagonal</th><th>interval,<br/>99 %, % diagonal</th>"
-          "<th>took,<br/>median</th><th>took,<br/>99 %</th><th>took,<br/>longest</th><th>later than<br/>promised</th></tr></thead><tbody>\n",
-          out);
+    page_groups(out, c, 4, "", "<th>within</th>", "<th class=\"first\">exact</th><th>interval, %</th><th>took</th><th>late</th>");
     for (int k = 0; k < DEADLINES; k++) {
-        const double *f = m->due[k];
         fprintf(out, "<tr><th>%u µs</th>", deadlines_us[k]);
-        cell(out, PLOT_PERCENT, 100 * f[OF_DUE_EXACT]);
-        cell(out, PLOT_NUMBER, shown(c, f[OF_DUE_WIDTH_MEDIAN], OF_DIAGONAL));
-        cell(out, PLOT_NUMBER, shown(c, f[OF_DUE_WIDTH_P99], OF_DIAGONAL));
-        cell(out, PLOT_SECONDS, 1e-9 * f[OF_DUE_TOOK_MEDIAN]);
-        cell(out, PLOT_SECONDS, 1e-9 * f[OF_DUE_TOOK_P99]);
-        cell(out, PLOT_SECONDS, 1e-9 * f[OF_DUE_TOOK_MAX]);
-        cell(out, PLOT_PERCENT, 100 * f[OF_DUE_LATE]);
+        for (int i = 0; i < c->count; i++) {
+            const double *f = c->methods[i].due[k];
+            cell_first(out, PLOT_PERCENT, 100 * f[OF_DUE_EXACT]);
+            cell(out, PLOT_NUMBER, shown(c, f[OF_DUE_WIDTH_P99], OF_DIAGONAL));
+            cell(out, PLOT_SECONDS, 1e-9 * f[OF_DUE_TOOK_P99]);
+            cell(out, PLOT_PERCENT, 100 * f[OF_DUE_LATE]);
+        }
         fputs("</tr>\n", out);
     }
     fputs("</tbody></table></div>\n", out);
@@ -177,8 +172,8 @@ void page_deadlines(FILE *out, const comparison *c)
     write_if_any(out, &width);
     write_if_any(out, &took);
     fputs("</div>\n", out);
-    for (int i = 0; i < c->count; i++)
-        due_table(out, c, &c->methods[i]);
+    fputs("<h3>Share of exact answers, width of the interval in percent of the diagonal and time taken (99 % of the points are below), share of answers later than promised</h3>\n", out);
+    due_table(out, c);
     fputs("</section>\n", out);
 }
 
@@ -186,24 +181,15 @@ void page_deadlines(FILE *out, const comparison *c)
 
 static void transmission_table(FILE *out, const comparison *c)
 {
-    fputs("<div class=\"scroll\"><table><thead><tr class=\"groups\"><th></th>", out);
-    for (int i = 0; i < c->count; i++) {
-        fputs("<th colspan=\"4\">", out);
-        html_text(out, c->methods[i].name);
-        fputs("</th>", out);
-    }
-    fputs("</tr><tr><th>level</th>", out);
-    for (int i = 0; i < c->count; i++)
-        fputs("<th class=\"first\">theirs</th><th>theirs, so far</th><th>ours</th><th>ours, so far</th>", out);
-    fputs("</tr></thead><tbody>\n", out);
+    page_groups(out, c, 4, "", "<th>level</th>", "<th class=\"first\">theirs</th><th>so far</th><th>ours</th><th>so far</th>");
     for (int k = c->first; k <= comparison_last(c); k++) {
         fprintf(out, "<tr><th>%d</th>", k);
         for (int i = 0; i < c->count; i++) {
             const double *f = c->methods[i].level[k];
-            cell_count(out, f[OF_THESIS_BYTES]);
-            cell_count(out, f[OF_THESIS_CUMULATIVE]);
-            cell_count(out, f[OF_BYTES]);
-            cell_count(out, f[OF_CUMULATIVE_BYTES]);
+            cell_first(out, PLOT_BYTES, f[OF_THESIS_BYTES]);
+            cell(out, PLOT_BYTES, f[OF_THESIS_CUMULATIVE]);
+            cell(out, PLOT_BYTES, f[OF_BYTES]);
+            cell(out, PLOT_BYTES, f[OF_CUMULATIVE_BYTES]);
         }
         fputs("</tr>\n", out);
     }

@@ -17,7 +17,7 @@ const char report_style[] =
     "h2{margin:0 0 4px;font-size:22px;line-height:1.25;letter-spacing:-.01em;font-weight:640}\n"
     "h3{margin:22px 0 8px;font-size:15px;font-weight:640}\n"
     "section{margin-top:48px}\n"
-    "section>p{margin:0 0 16px;max-width:82ch;color:var(--soft)}\n"
+    "section>p{margin:0 0 16px;max-width:104ch;color:var(--soft)}\n"
     "dl{display:grid;grid-template-columns:repeat(auto-fill,minmax(170px,1fr));gap:14px 24px;margin:0}\n"
     "dl div.wide{grid-column:span 2}\n"
     "dt{color:var(--soft);font-size:12.5px}\n"

@@ -1,7 +1,7 @@
 /* The tables of the page. */
 #include "report_page.h"
 
-#include <inttypes.h>
+#include <string.h>
 
 bool any_level_figure(const comparison *c, level_figure which)
 {
@@ -26,7 +26,7 @@ static void cell_marked(FILE *out, const char *class, plot_unit unit, double v)
 {
     char text[40];
     if (isnan(v))
-        cell_text(out, "none", "–");
+        cell_text(out, class && strncmp(class, "first", 5) == 0 ? "first none" : "none", "–");
     else if (isinf(v))
         cell_text(out, class, "∞");
     else
@@ -36,6 +36,11 @@ static void cell_marked(FILE *out, const char *class, plot_unit unit, double v)
 void cell(FILE *out, plot_unit unit, double v)
 {
     cell_marked(out, NULL, unit, v);
+}
+
+void cell_first(FILE *out, plot_unit unit, double v)
+{
+    cell_marked(out, isnan(v) ? "first none" : "first", unit, v);
 }
 
 void cell_count(FILE *out, double v)
@@ -61,6 +66,20 @@ static double of_diagonal(const comparison *c, double v)
 }
 
 /* --- methods side by side --- */
+
+void page_groups(FILE *out, const comparison *c, int columns, const char *group, const char *before, const char *each)
+{
+    fprintf(out, "<div class=\"scroll\"><table><thead><tr class=\"groups\"><th></th>%s", group);
+    for (int i = 0; i < c->count; i++) {
+        fprintf(out, "<th colspan=\"%d\">", columns);
+        html_text(out, c->methods[i].name);
+        fputs("</th>", out);
+    }
+    fprintf(out, "</tr><tr>%s", before);
+    for (int i = 0; i < c->count; i++)
+        fputs(each, out);
+    fputs("</tr></thead><tbody>\n", out);
+}
 
 /* Bytes of the first level that is good enough. */
 static double bytes_until(const comparison *c, const method *m, double goal)
@@ -122,16 +141,8 @@ void page_against_limit(FILE *out, const comparison *c)
 {
     if (!any_level_figure(c, OF_EXCESS))
         return;
-    fputs("<h3>Excess of volume in percent of the solid’s, times the limit’s, and bytes so far</h3>\n<div class=\"scroll\"><table><thead><tr class=\"groups\"><th></th><th>limit</th>", out);
-    for (int i = 0; i < c->count; i++) {
-        fputs("<th colspan=\"3\">", out);
-        html_text(out, c->methods[i].name);
-        fputs("</th>", out);
-    }
-    fputs("</tr><tr><th>level</th><th class=\"first\">%</th>", out);
-    for (int i = 0; i < c->count; i++)
-        fputs("<th class=\"first\">%</th><th>× limit</th><th>bytes</th>", out);
-    fputs("</tr></thead><tbody>\n", out);
+    fputs("<h3>Excess of volume in percent of the solid’s, times the limit’s, and bytes so far</h3>\n", out);
+    page_groups(out, c, 3, "<th>limit</th>", "<th>level</th><th class=\"first\">%</th>", "<th class=\"first\">%</th><th>× limit</th><th>bytes</th>");
     for (int k = c->first; k <= comparison_last(c); k++)
         limit_row(out, c, k);
     fputs("</tbody></table></div>\n", out);
@@ -139,41 +150,47 @@ void page_against_limit(FILE *out, const comparison *c)
 
 /* --- needs --- */
 
-static void need_rows(FILE *out, const comparison *c, const method *m)
+static const need_result *need_of(const method *m, const need_result *wanted)
 {
-    for (int i = 0; i < m->need_count; i++) {
-        const need_result *n = &m->need[i];
-        char text[48];
-        fputs("<tr><th>", out);
-        html_text(out, m->name);
-        if (n->kind == NEED_ERROR)
-            fprintf(out, "</th><td>error ≤ %s of the diagonal</td>", plot_value(text, sizeof text, PLOT_PERCENT, of_diagonal(c, n->asked)));
-        else
-            fprintf(out, "</th><td>size ≤ %s</td>", plot_value(text, sizeof text, PLOT_BYTES, n->asked));
-        cell_count(out, n->figure[OF_NEED_BYTES]);
-        cell(out, PLOT_PERCENT, of_diagonal(c, n->figure[OF_NEED_FAR_LO]));
-        cell(out, PLOT_PERCENT, of_diagonal(c, n->figure[OF_NEED_FAR_HI]));
-        cell(out, PLOT_NUMBER, n->figure[OF_NEED_RATIO]);
-        cell(out, PLOT_SECONDS, n->figure[OF_NEED_SECONDS]);
-        fputs("</tr>\n", out);
-    }
+    for (int i = 0; i < m->need_count; i++)
+        if (m->need[i].kind == wanted->kind && fabs(m->need[i].asked - wanted->asked) <= 0)
+            return &m->need[i];
+    return NULL;
 }
 
+static void need_row(FILE *out, const comparison *c, const need_result *wanted)
+{
+    static const double nothing[NEED_FIGURES] = { NAN, NAN, NAN, NAN, NAN };
+    char text[48];
+    if (wanted->kind == NEED_ERROR)
+        fprintf(out, "<tr><th>error ≤ %s</th>", plot_value(text, sizeof text, PLOT_PERCENT, of_diagonal(c, wanted->asked)));
+    else
+        fprintf(out, "<tr><th>size ≤ %s</th>", plot_value(text, sizeof text, PLOT_BYTES, wanted->asked));
+    for (int i = 0; i < c->count; i++) {
+        const need_result *n = need_of(&c->methods[i], wanted);
+        const double *f = n ? n->figure : nothing;
+        cell_first(out, PLOT_BYTES, f[OF_NEED_BYTES]);
+        cell(out, PLOT_NUMBER, of_diagonal(c, f[OF_NEED_FAR_LO]));
+        cell(out, PLOT_NUMBER, of_diagonal(c, f[OF_NEED_FAR_HI]));
+        cell(out, PLOT_NUMBER, f[OF_NEED_RATIO]);
+    }
+    fputs("</tr>\n", out);
+}
+
+/* Rows are needs; each method's results of them. */
 void page_needs(FILE *out, const comparison *c)
 {
-    int count = 0;
+    const method *most = c->methods;
     for (int i = 0; i < c->count; i++)
-        count += c->methods[i].need_count;
-    if (!count)
+        most = c->methods[i].need_count > most->need_count ? &c->methods[i] : most;
+    if (!most->need_count)
         return;
     page_section(out, "needs", "Choosing by need",
-                 "Files without mesh, cut to an error or to a size. Kept: how far the envelopes certainly reach, divided by the error that was asked for, or the bytes divided by the size; 1 or less keeps "
-                 "the word.");
-    fputs("<div class=\"scroll\"><table><thead><tr><th>method</th><th>asked for</th><th>bytes</th><th>reaches,<br/>at least</th><th>reaches,<br/>at most</th><th>kept</th><th>made in</th></tr></thead>"
-          "<tbody>\n",
-          out);
-    for (int i = 0; i < c->count; i++)
-        need_rows(out, c, &c->methods[i]);
+                 "Files without mesh, cut to an error (in percent of the diagonal) or to a size. Reaches: how far the envelopes reach beyond the model, at least and certainly at most, in percent of the "
+                 "diagonal. Kept: that bound divided by the error that was asked for, or the bytes divided by the size; 1 or less keeps the word.");
+    page_groups(out, c, 4, "", "<th>asked for</th>", "<th class=\"first\">bytes</th><th>reaches ≥</th><th>≤</th><th>kept</th>");
+    for (int i = 0; i < most->need_count; i++)
+        need_row(out, c, &most->need[i]);
     fputs("</tbody></table></div></section>\n", out);
 }
 
@@ -187,22 +204,22 @@ static void level_row(FILE *out, const comparison *c, int level, const double *f
     cell_count(out, f[OF_GRAY]);
     cell_count(out, f[OF_LEAVES]);
     cell_count(out, f[OF_PLANES] + f[OF_LEAF_PLANES]);
-    cell_marked(out, "first", PLOT_NUMBER, f[OF_VOLUME]);
+    cell_first(out, PLOT_NUMBER, f[OF_VOLUME]);
     cell(out, PLOT_NUMBER, f[OF_EXCESS]);
     if (alone)
         cell(out, PLOT_NUMBER, f[OF_LEVELS_EXCESS]);
     cell(out, PLOT_NUMBER, f[OF_EXCESS_TO_LIMIT]);
-    cell_marked(out, "first", PLOT_NUMBER, of_diagonal(c, f[OF_FAR_LO]));
+    cell_first(out, PLOT_NUMBER, of_diagonal(c, f[OF_FAR_LO]));
     cell(out, PLOT_NUMBER, of_diagonal(c, f[OF_FAR_HI]));
     cell(out, PLOT_NUMBER, of_diagonal(c, f[OF_FAR_MEAN]));
-    cell_marked(out, "first", PLOT_NUMBER, 100 * f[OF_MAYBE_UNIFORM]);
+    cell_first(out, PLOT_NUMBER, 100 * f[OF_MAYBE_UNIFORM]);
     cell(out, PLOT_NUMBER, 100 * f[OF_MAYBE_NEAR]);
     cell(out, PLOT_SECONDS, 1e-9 * f[OF_INSIDE_NS]);
-    cell_marked(out, "first", PLOT_NUMBER, of_diagonal(c, f[OF_WIDTH_MEAN]));
+    cell_first(out, PLOT_NUMBER, of_diagonal(c, f[OF_WIDTH_MEAN]));
     cell(out, PLOT_NUMBER, of_diagonal(c, f[OF_WIDTH_MEDIAN]));
     cell(out, PLOT_NUMBER, of_diagonal(c, f[OF_WIDTH_P99]));
     cell(out, PLOT_SECONDS, 1e-9 * f[OF_DISTANCE_NS]);
-    cell_marked(out, "first", PLOT_SECONDS, f[OF_HAVE_SECONDS]);
+    cell_first(out, PLOT_SECONDS, f[OF_HAVE_SECONDS]);
     cell(out, PLOT_BYTES, f[OF_READ_BYTES]);
     cell_count(out, f[OF_READS]);
     fputs("</tr>\n", out);
