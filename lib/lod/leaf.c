@@ -28,7 +28,7 @@ static bool take_face(const ebpo_mesh *mesh, uint64_t face, ebpo_triangle *out)
 }
 
 /* The leaf's faces in the order in which the builder saw them: ascending numbers, so references before new ones. */
-static ebpo_status gather_faces(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf, ebpo_leaf_scratch *scratch,
+ebpo_status ebpo_lod_leaf_faces(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf, ebpo_leaf_scratch *scratch,
                                 uint64_t *count, ebpo_error *error)
 {
     const ebpo_level *level = &model->level[cell.level];
@@ -65,6 +65,20 @@ static unsigned inside_corners(const ebpo_lod_model *model, ebpo_cell cell, uint
     return inside;
 }
 
+ebpo_status ebpo_lod_leaf_planes(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf, ebpo_leaf_scratch *scratch,
+                                 ebpo_polytope *envelope, uint32_t codes[EBPO_PLANES_MAX], int *plane_count,
+                                 ebpo_error *error)
+{
+    uint64_t count = 0;
+    ebpo_status status = ebpo_lod_leaf_faces(model, cell, leaf, scratch, &count, error);
+    if (status != EBPO_OK)
+        return status;
+    unsigned inside = inside_corners(model, cell, leaf, scratch->faces, count);
+    /* Derived planes cost no bytes: each that removes anything is taken, as in the volumes that the file states. */
+    *plane_count = ebpo_leaf_planes(&model->box, cell, scratch->faces, count, inside, 0, envelope, codes);
+    return EBPO_OK;
+}
+
 ebpo_status ebpo_lod_leaf(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf, ebpo_leaf_scratch *scratch,
                           ebpo_polytope *envelope, ebpo_error *error)
 {
@@ -72,15 +86,9 @@ ebpo_status ebpo_lod_leaf(const ebpo_lod_model *model, ebpo_cell cell, uint64_t 
     const ebpo_lod_index *index = &model->index[cell.level];
     if (model->leaf_source == EBPO_LEAF_STORED && index->leaf_plane_first && level->leaf_plane_counts[leaf])
         ebpo_lod_cut(envelope, level->leaf_planes + index->leaf_plane_first[leaf], level->leaf_plane_counts[leaf]);
+    uint32_t codes[EBPO_PLANES_MAX];
+    int count;
     if (model->leaf_source != EBPO_LEAF_DERIVED)
         return EBPO_OK;
-    uint64_t count = 0;
-    ebpo_status status = gather_faces(model, cell, leaf, scratch, &count, error);
-    if (status != EBPO_OK)
-        return status;
-    uint32_t codes[EBPO_PLANES_MAX];
-    unsigned inside = inside_corners(model, cell, leaf, scratch->faces, count);
-    /* Derived planes cost no bytes: each that removes anything is taken, as in the volumes that the file states. */
-    (void)ebpo_leaf_planes(&model->box, cell, scratch->faces, count, inside, 0, envelope, codes);
-    return EBPO_OK;
+    return ebpo_lod_leaf_planes(model, cell, leaf, scratch, envelope, codes, &count, error);
 }

@@ -41,6 +41,15 @@ typedef struct ebpo_leaf_scratch {
 EBPO_MUST_USE ebpo_status ebpo_lod_leaf(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf,
                                         ebpo_leaf_scratch *scratch, ebpo_polytope *envelope, ebpo_error *error);
 
+/* The triangles that a leaf lists, in scratch->faces. */
+EBPO_MUST_USE ebpo_status ebpo_lod_leaf_faces(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf,
+                                              ebpo_leaf_scratch *scratch, uint64_t *count, ebpo_error *error);
+
+/* The planes that a leaf derives from its faces; `envelope` as in ebpo_lod_leaf. */
+EBPO_MUST_USE ebpo_status ebpo_lod_leaf_planes(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf,
+                                               ebpo_leaf_scratch *scratch, ebpo_polytope *envelope,
+                                               uint32_t codes[EBPO_PLANES_MAX], int *plane_count, ebpo_error *error);
+
 /* Cuts the envelope by plane codes of its own cell. */
 void ebpo_lod_cut(ebpo_polytope *envelope, const uint32_t *codes, uint64_t count);
 

@@ -1,0 +1,253 @@
+/* A level's bounds are those of its nodes. A short look at each gives bounds that dismiss most; the others are searched in the order of what they may reach. */
+#include "geom/strict_fp.h"
+
+#include <ebpo/deviation.h>
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "deviation/bound.h"
+#include "deviation/samples.h"
+#include "query/model.h"
+
+enum { BLOCK_MOST = 512, QUESTIONS_MOST = 1 << 20 }; /* of one node: with less than that left to find, rounding is all there is */
+
+typedef struct level_node {
+    ebpo_cell cell;
+    ebpo_reach_bound bound;
+} level_node;
+
+typedef struct survey {
+    const ebpo_lod_model *tree, *whole; /* of the file, of the model's file; perhaps the same */
+    int level;
+    level_node *nodes;
+    uint64_t count, room, *order;
+    ebpo_bounder *bounders; /* [threads] */
+    unsigned threads;
+    ebpo_bound_wish wish;
+    uint64_t first;         /* of `order`, of the block at hand */
+    const ebpo_progress *progress;
+    ebpo_error *error;
+} survey;
+
+/* --- the level's nodes --- */
+
+static ebpo_status add_node(survey *s, const ebpo_tree_place *place)
+{
+    if (!ebpo_grow(&s->nodes, &s->room, s->count + 1, sizeof *s->nodes))
+        return ebpo_fail_memory(s->error, (s->count + 1) * sizeof *s->nodes);
+    s->nodes[s->count++] = (level_node){ place->cell, { 0, INFINITY, { 0, 0, 0 }, 0 } };
+    return EBPO_OK;
+}
+
+static ebpo_status list_nodes(survey *s, const ebpo_tree_place *place)
+{
+    if (place->type == EBPO_LEAF)
+        return add_node(s, place);
+    if (place->type != EBPO_GRAY)
+        return EBPO_OK;
+    if (place->cell.level == s->level || ebpo_tree_is_pruned(s->tree, place))
+        return add_node(s, place);
+    ebpo_status status = EBPO_OK;
+    for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
+        ebpo_tree_place child = ebpo_tree_child(s->tree, place, octant);
+        status = list_nodes(s, &child);
+    }
+    return status;
+}
+
+/* --- bounds of nodes --- */
+
+static ebpo_status bound_node(survey *s, ebpo_bounder *b, level_node *node, ebpo_error *error)
+{
+    ebpo_tree_place place;
+    ebpo_reach_bound found;
+    ebpo_status status = EBPO_OK;
+    (void)ebpo_tree_find(s->tree, node->cell, true, true, &place, &b->halves);
+    if (place.type == EBPO_LEAF && s->tree->leaf_source == EBPO_LEAF_DERIVED)
+        status = ebpo_tree_derive(s->tree, &place, &b->scratch, &b->halves, error);
+    if (status == EBPO_OK)
+        status = ebpo_bound_envelope(b, node->cell, &s->wish, &found, error);
+    if (status != EBPO_OK)
+        return status;
+    found.questions += node->bound.questions;
+    found.hi = fmin(found.hi, node->bound.hi);
+    if (node->bound.lo > found.lo) {
+        found.lo = node->bound.lo;
+        memcpy(found.place, node->bound.place, sizeof found.place);
+    }
+    node->bound = found;
+    return EBPO_OK;
+}
+
+static ebpo_status bound_some(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+{
+    survey *s = context;
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
+        status = bound_node(s, &s->bounders[worker], &s->nodes[s->order[s->first + i]], error);
+    return status;
+}
+
+typedef struct ranked {
+    double hi;
+    uint64_t node;
+} ranked;
+
+static int farthest_first(const void *a, const void *b)
+{
+    const ranked *x = a, *y = b;
+    if (x->hi != y->hi)
+        return x->hi < y->hi ? 1 : -1;
+    return (x->node > y->node) - (x->node < y->node);
+}
+
+static ebpo_status sort_nodes(survey *s)
+{
+    ranked *list = ebpo_alloc(s->count, sizeof *list);
+    if (!list)
+        return ebpo_fail_memory(s->error, s->count * sizeof *list);
+    for (uint64_t i = 0; i < s->count; i++)
+        list[i] = (ranked){ s->nodes[i].bound.hi, i };
+    if (s->count)
+        qsort(list, s->count, sizeof *list, farthest_first);
+    for (uint64_t i = 0; i < s->count; i++)
+        s->order[i] = list[i].node;
+    free(list);
+    return EBPO_OK;
+}
+
+/* What nodes first .. last - 1 in the order have brought. */
+static void gather(const survey *s, uint64_t first, uint64_t last, ebpo_deviation *out)
+{
+    for (uint64_t i = first; i < last; i++) {
+        const ebpo_reach_bound *b = &s->nodes[s->order[i]].bound;
+        if (b->lo > out->lo) {
+            out->lo = b->lo;
+            memcpy(out->place, b->place, sizeof out->place);
+        }
+    }
+}
+
+static uint64_t count_questions(const survey *s)
+{
+    uint64_t sum = 0;
+    for (uint64_t i = 0; i < s->count; i++)
+        sum += s->nodes[i].bound.questions;
+    return sum;
+}
+
+/* Blocks are what is decided together, for any number of threads: what one block finds is known to the next. */
+static ebpo_status search(survey *s, const ebpo_deviation_options *o, ebpo_deviation *out)
+{
+    uint64_t done = 0, block = 4, asked = count_questions(s);
+    ebpo_status status = EBPO_OK;
+    s->wish.ratio = 1 + o->tolerance;
+    while (done < s->count && status == EBPO_OK && (!o->questions || asked < o->questions)) {
+        uint64_t size = 0;
+        s->wish.enough = (1 + o->tolerance) * out->lo;
+        while (size < block && done + size < s->count && s->nodes[s->order[done + size]].bound.hi > s->wish.enough)
+            size++;
+        if (!size)
+            break;
+        s->wish.questions = o->questions ? (o->questions - asked) / size + 1 : QUESTIONS_MOST;
+        s->first = done;
+        uint64_t before = 0, after = 0;
+        for (uint64_t i = 0; i < size; i++)
+            before += s->nodes[s->order[done + i]].bound.questions;
+        status = ebpo_parallel_for(s->threads, size, 1, bound_some, s, NULL, NULL, s->error);
+        for (uint64_t i = 0; i < size; i++)
+            after += s->nodes[s->order[done + i]].bound.questions;
+        asked += after - before;
+        gather(s, done, done + size, out);
+        done += size;
+        block = block < BLOCK_MOST ? 2 * block : block;
+        if (status == EBPO_OK && s->progress->report && !s->progress->report(s->progress->user, "bounding envelopes", done, s->count))
+            status = ebpo_fail(s->error, EBPO_E_CANCELLED, "stopped on request while envelopes were bounded");
+    }
+    return status;
+}
+
+static ebpo_status bound_level(survey *s, const ebpo_deviation_options *o, ebpo_deviation *out)
+{
+    ebpo_tree_place root;
+    (void)ebpo_tree_find(s->tree, (ebpo_cell){ 0, { 0, 0, 0 } }, false, false, &root, NULL);
+    ebpo_status status = list_nodes(s, &root);
+    if (status == EBPO_OK && !(s->order = ebpo_alloc(s->count, sizeof *s->order)))
+        status = ebpo_fail_memory(s->error, s->count * sizeof *s->order);
+    for (uint64_t i = 0; i < s->count && status == EBPO_OK; i++)
+        s->order[i] = i;
+    s->wish = (ebpo_bound_wish){ 0, INFINITY, 0, 1 };
+    if (status == EBPO_OK)
+        status = ebpo_parallel_for(s->threads, s->count, 16, bound_some, s, s->progress, "looking at envelopes", s->error);
+    if (status == EBPO_OK)
+        status = sort_nodes(s);
+    if (status != EBPO_OK)
+        return status;
+    gather(s, 0, s->count, out);
+    status = search(s, o, out);
+    for (uint64_t i = 0; i < s->count; i++)
+        out->hi = fmax(out->hi, s->nodes[i].bound.hi);
+    out->questions = count_questions(s);
+    return status;
+}
+
+/* --- --- */
+
+static ebpo_status make_bounders(survey *s, ebpo_model *model)
+{
+    ebpo_status status = EBPO_OK;
+    if (!(s->bounders = ebpo_alloc_zero(s->threads, sizeof *s->bounders)))
+        return ebpo_fail_memory(s->error, s->threads * sizeof *s->bounders);
+    for (unsigned i = 0; i < s->threads && status == EBPO_OK; i++)
+        status = ebpo_bounder_make(&s->bounders[i], s->whole, model, s->error);
+    return status;
+}
+
+static ebpo_status check(const ebpo_info *info, const ebpo_info *model, int level, const ebpo_deviation_options *o, ebpo_error *error)
+{
+    if (level < 0 || level >= info->level_count)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "there is no level %d; this file has levels 0 to %d", level, info->level_count - 1);
+    if (!(o->tolerance > 0) || !(o->tolerance <= 1e6))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "tolerance %g: give a number above 0, such as 0.05", o->tolerance);
+    if (o->samples > UINT32_MAX)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "more than 4294967295 samples; a million tell the mean to three digits");
+    for (int k = 0; k < 3; k++)
+        if (info->box_origin[k] != model->box_origin[k] || info->box_size[k] != model->box_size[k])
+            return ebpo_fail(error, EBPO_E_ARGUMENT, "the file is neither the model's nor a subset of it: their root cells differ");
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_deviation_level(ebpo_model *model, ebpo_file *file, int level, const ebpo_deviation_options *options, ebpo_deviation *out, ebpo_error *error)
+{
+    static const ebpo_deviation_options usual = EBPO_DEVIATION_OPTIONS_INIT;
+    const ebpo_deviation_options *o = options ? options : &usual;
+    ebpo_lod_model whole = { 0 }, own = { 0 };
+    survey s = { .level = level, .threads = ebpo_thread_count(o->threads), .progress = &o->progress, .error = error, .whole = &whole, .tree = &whole };
+    *out = (ebpo_deviation){ .mean = NAN, .rms = NAN };
+    ebpo_status status = check(ebpo_file_info(file), model->info, level, o, error);
+    if (status == EBPO_OK)
+        status = ebpo_tree_read_whole(&whole, model->file, s.threads, error);
+    if (status == EBPO_OK && file != model->file) {
+        status = ebpo_lod_model_read(&own, file, level, s.threads, error);
+        s.tree = &own;
+    }
+    if (status == EBPO_OK)
+        status = make_bounders(&s, model);
+    if (status == EBPO_OK)
+        status = bound_level(&s, o, out);
+    for (unsigned i = 0; s.bounders && i < s.threads; i++)
+        ebpo_bounder_free(&s.bounders[i]);
+    free(s.bounders);
+    free(s.nodes);
+    free(s.order);
+    if (status == EBPO_OK && o->samples)
+        status = ebpo_deviation_sample(model, file, level, o, out, error);
+    ebpo_lod_model_free(&own);
+    ebpo_lod_model_free(&whole);
+    return status;
+}
