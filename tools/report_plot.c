@@ -13,6 +13,7 @@ typedef struct axis {
     bool linear;
     plot_unit unit;
     double from, to; /* on the picture */
+    double step;     /* between ticks; 0: at 1, 2, 5 times powers of ten */
 } axis;
 
 plot_series *plot_add(plot *p, const char *name, int colour)
@@ -136,16 +137,6 @@ static double rounded(double v, bool up)
 }
 
 /* Less than a factor of five is divided as a linear axis is, or there would be hardly a number at it. */
-static bool is_narrow(const axis *a)
-{
-    return a->high < 5 * a->low;
-}
-
-static double narrow_step(const axis *a)
-{
-    return rounded((a->high - a->low) / 5, true);
-}
-
 static void widen(axis *a)
 {
     double margin = pow(a->high / a->low, 0.03); /* points do not stand on the frame */
@@ -155,19 +146,20 @@ static void widen(axis *a)
         a->low *= 0.8;
         a->high *= 1.25;
     }
-    if (!is_narrow(a)) {
+    if (a->high > 5 * a->low) {
         a->low = rounded(a->low, false);
         a->high = rounded(a->high, true);
         return;
     }
-    double step = narrow_step(a), low = step * floor(a->low / step * 1.0001);
+    a->step = rounded((a->high - a->low) / 5, true);
+    double low = a->step * floor(a->low / a->step * 1.0001);
     a->low = low > 0 ? low : a->low;
-    a->high = step * ceil(a->high / step * 0.9999);
+    a->high = a->step * ceil(a->high / a->step * 0.9999);
 }
 
 static axis axis_of(const plot *p, bool vertical)
 {
-    axis a = { INFINITY, -INFINITY, false, vertical ? p->y : p->x, vertical ? HEIGHT - BOTTOM : LEFT, vertical ? TOP : WIDTH - RIGHT };
+    axis a = { INFINITY, -INFINITY, false, vertical ? p->y : p->x, vertical ? HEIGHT - BOTTOM : LEFT, vertical ? TOP : WIDTH - RIGHT, 0 };
     for (int i = 0; i < p->count; i++)
         for (int k = 0; k < p->series[i].count; k++) {
             double v = vertical ? p->series[i].point[k].y : p->series[i].point[k].x;
@@ -176,6 +168,7 @@ static axis axis_of(const plot *p, bool vertical)
         }
     a.linear = a.unit == PLOT_LEVEL;
     if (a.linear) {
+        a.step = 1;
         a.low -= 0.25;
         a.high += 0.25;
         return a;
@@ -212,9 +205,9 @@ static void tick_label(FILE *out, const axis *a, double v)
         fprintf(out, "<text class=\"t\" x=\"%.1f\" y=\"%d\" text-anchor=\"middle\">%s</text>\n", at, HEIGHT - BOTTOM + 17, text);
 }
 
-static void linear_ticks(FILE *out, const axis *a, double step)
+static void stepped_ticks(FILE *out, const axis *a)
 {
-    for (double v = step * ceil(a->low / step - 1e-6); v <= a->high + step * 1e-6; v += step) {
+    for (double v = a->step * ceil(a->low / a->step - 1e-6); v <= a->high + a->step * 1e-6; v += a->step) {
         grid_line(out, a, v, true);
         tick_label(out, a, fabs(v));
     }
@@ -222,8 +215,8 @@ static void linear_ticks(FILE *out, const axis *a, double step)
 
 static void write_axis(FILE *out, const axis *a)
 {
-    if (a->linear || is_narrow(a)) {
-        linear_ticks(out, a, a->linear ? 1 : narrow_step(a));
+    if (a->step > 0) {
+        stepped_ticks(out, a);
         return;
     }
     double decades = log10(a->high / a->low), last = -100;
