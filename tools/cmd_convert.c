@@ -1,6 +1,8 @@
 /* ebpo convert: from a mesh to an .ebpo.h5 file. */
+#include <math.h>
 #include <stddef.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "command.h"
@@ -13,7 +15,10 @@
 
 typedef struct values {
     int64_t max_level, leaf_faces, zstd_level, threads;
-    double epsilon;
+    double epsilon, percent;
+    int select, normals;
+    int64_t seed;
+    const char *k_root;
     uint32_t with, without;
     int codec, rule, profile;
     mending mend;
@@ -32,6 +37,15 @@ static const arg_option options[] = {
       NULL },
     { "epsilon", 0, ARG_REAL, offsetof(values, epsilon), "E",
       "a plane is kept while it removes at least this share of\nits cell; default 0.003", 0, 1, NULL },
+    { "select", 0, ARG_WORD, offsetof(values, select), "NAME",
+      "how planes are chosen: inherit (the default), or as in the\ntheses: kmedoids, offset (least), random", 0, 0, selection_words },
+    { "percent", 0, ARG_REAL, offsetof(values, percent), "P",
+      "the theses' ways: share of the candidates that is taken;\ndefault 40", 0, 100, NULL },
+    { "k-root", 0, ARG_TEXT, offsetof(values, k_root), "K",
+      "instead: K planes at the root, or 'K%' of the faces, half as\nmany at each next level (BP-Octree)", 0, 0, NULL },
+    { "normals", 0, ARG_WORD, offsetof(values, normals), "NAME",
+      "kmedoids' distance of normals: spherical (the default, the\ntheses') or angle (without their poles)", 0, 0, normals_words },
+    { "seed", 0, ARG_INT, offsetof(values, seed), "N", "of kmedoids and random; default 1", 0, 9007199254740992.0, NULL },
     { "with", 0, ARG_SET, offsetof(values, with), "LIST", "also store: leaf-planes", 0, 0, with_words },
     { "without", 0, ARG_SET, offsetof(values, without), "LIST",
       "leave out: maps, mesh (and with it maps), planes;\ncommas between, may be repeated", 0, 0, without_words },
@@ -74,8 +88,43 @@ static int usage_error(const char *message)
     return EXIT_USAGE;
 }
 
+/* Planes, or percent of the faces; -1: neither. */
+static double k_root_of(const char *text, uint64_t faces)
+{
+    char *end;
+    double k = strtod(text, &end);
+    if (*end == '%' && !end[1])
+        k *= (double)faces / 100;
+    else if (*end)
+        return -1;
+    return k > 0 && k <= 1e9 ? k : -1;
+}
+
+static int check_selection(const values *v)
+{
+    bool theirs = v->select != EBPO_SELECT_INHERIT;
+    if (!theirs && (v->percent >= 0 || v->k_root || v->normals >= 0 || v->seed >= 0))
+        return usage_error("--percent, --k-root, --normals and --seed are for --select kmedoids, offset or random");
+    if (theirs && v->epsilon >= 0)
+        return usage_error("--epsilon is for --select inherit");
+    if (v->percent >= 0 && v->k_root)
+        return usage_error("--percent and --k-root are two answers to one question; give one");
+    if (v->percent == 0)
+        return usage_error("--percent 0 leaves no planes; --without planes does that");
+    if (v->k_root && k_root_of(v->k_root, 100) < 0)
+        return usage_error("--k-root wants a number of planes, such as 500, or of percent, such as 1%");
+    if (v->normals >= 0 && v->select != EBPO_SELECT_KMEDOIDS)
+        return usage_error("--normals is for --select kmedoids");
+    if (v->seed >= 0 && v->select == EBPO_SELECT_OFFSET)
+        return usage_error("--seed says nothing about --select offset");
+    return EXIT_FINE;
+}
+
 static int check_values(const values *v, const char *in, const char *out)
 {
+    int code = check_selection(v);
+    if (code != EXIT_FINE)
+        return code;
     if (v->zstd_level && v->codec != EBPO_CODEC_ZSTD)
         return usage_error("--zstd-level says nothing about --codec deflate or none");
     if (v->profile >= 0 && (v->with || v->without))
@@ -163,7 +212,12 @@ static ebpo_status build_and_write(const values *v, prepared *p, const char *out
     ebpo_build_options build = EBPO_BUILD_OPTIONS_INIT;
     build.max_level = (int)v->max_level;
     build.leaf_faces = (uint32_t)v->leaf_faces;
-    build.epsilon = v->epsilon;
+    build.epsilon = v->epsilon >= 0 ? v->epsilon : build.epsilon;
+    build.select = (ebpo_selection)v->select;
+    build.percent = v->percent >= 0 ? v->percent : build.percent;
+    build.k_root = v->k_root ? fmax(1, k_root_of(v->k_root, p->mesh.face_count)) : 0;
+    build.normals = v->normals >= 0 ? (ebpo_normal_distance)v->normals : build.normals;
+    build.seed = v->seed >= 0 ? (uint64_t)v->seed : build.seed;
     build.parts = parts_of(v);
     build.rule = (ebpo_rule)v->rule;
     build.require_solid = v->require_solid;
@@ -191,7 +245,7 @@ static ebpo_status build_and_write(const values *v, prepared *p, const char *out
 static int run(int argc, char **argv)
 {
     const ebpo_build_options defaults = EBPO_BUILD_OPTIONS_INIT;
-    values v = { .max_level = -1, .profile = -1, .leaf_faces = defaults.leaf_faces, .epsilon = defaults.epsilon };
+    values v = { .max_level = -1, .profile = -1, .leaf_faces = defaults.leaf_faces, .epsilon = -1, .percent = -1, .normals = -1, .seed = -1 };
     const char *operand[ARGS_OPERANDS_MAX];
     arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
     if (parsed != ARGS_RUN)

@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include <ebpo/build.h>
+
 #include "report.h"
 #include "words.h"
 
@@ -63,8 +65,15 @@ static void print_model(FILE *out, const ebpo_info *info)
         fprintf(out, "  crs       %s\n", info->crs);
     if (info->date[0])
         fprintf(out, "  date      %s\n", info->date);
-    fprintf(out, "  built by  %s: maximum level %d, leaf faces %u, epsilon %g\n", info->generator, info->max_level,
-            info->leaf_faces, info->epsilon);
+    fprintf(out, "  built by  %s: maximum level %d, leaf faces %u, ", info->generator, info->max_level, info->leaf_faces);
+    if (info->selection == EBPO_SELECT_INHERIT)
+        fprintf(out, "epsilon %g\n", info->epsilon);
+    else if (info->selection < 0)
+        fputs("planes chosen in a way that this version does not know\n", out);
+    else if (info->k_root > 0)
+        fprintf(out, "selection %s, K %.10g at the root\n", selection_words[info->selection], info->k_root);
+    else
+        fprintf(out, "selection %s, %.10g %%\n", selection_words[info->selection], info->percent);
 }
 
 uint64_t facts_white(const ebpo_info *info, int level)
@@ -214,6 +223,13 @@ static void json_model(json *j, const ebpo_info *info)
     json_int(j, "max_level", info->max_level);
     json_uint(j, "leaf_faces", info->leaf_faces);
     json_real(j, "epsilon", info->epsilon);
+    json_text(j, "selection", info->selection < 0 ? "unknown" : selection_words[info->selection]);
+    if (info->selection <= EBPO_SELECT_INHERIT)
+        return;
+    json_real(j, "percent", info->percent);
+    json_real(j, "k_root", info->k_root);
+    json_text(j, "normals", info->normals < 0 ? "unknown" : normals_words[info->normals]);
+    json_uint(j, "seed", info->seed);
 }
 
 static void json_subset(json *j, const ebpo_info *info)

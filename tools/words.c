@@ -6,6 +6,8 @@
 #include <string.h>
 
 const char *const rule_words[] = { "nonzero", "evenodd", "positive", NULL };
+const char *const selection_words[] = { "inherit", "kmedoids", "offset", "random", NULL };
+const char *const normals_words[] = { "spherical", "angle", NULL };
 const char *const codec_words[] = { "zstd", "deflate", "none", NULL };
 const char *const part_words[] = { "planes", "mesh", "maps", "leaf-planes", NULL };
 

@@ -28,6 +28,8 @@ void words_hex(const uint8_t digest[32], char out[65]);
 
 /* NULL-terminated, in the order of the enums; for option tables. */
 extern const char *const rule_words[];
+extern const char *const selection_words[]; /* by ebpo_selection */
+extern const char *const normals_words[];   /* by ebpo_normal_distance */
 extern const char *const codec_words[];
 extern const char *const part_words[]; /* word i is bit i */
 

@@ -6,7 +6,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "build/builder.h"
+#include "build/propose.h"
 #include "ebpo_config.h"
 
 /* EBP 2017, equation 3: the least i >= 1 with L / 2^i below the mean edge. */
@@ -41,6 +41,14 @@ static ebpo_status check_options(const ebpo_build_options *o, const ebpo_info *i
         return ebpo_fail(error, EBPO_E_ARGUMENT, "epsilon %g is not in 0 .. 1", o->epsilon);
     if (o->rule > EBPO_RULE_POSITIVE)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown winding rule %d", (int)o->rule);
+    if (!ebpo_selection_of(o->select))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown selection %d", (int)o->select);
+    if (!(o->percent > 0 && o->percent <= 100))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "percent %g is not above 0 and at most 100", o->percent);
+    if (!(o->k_root == 0 || (o->k_root >= 1 && o->k_root <= 1e9)))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "k_root %g is neither 0 nor in 1 .. 1e9", o->k_root);
+    if ((unsigned)o->normals > EBPO_NORMALS_ANGLE)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown distance of normals %d", (int)o->normals);
     ebpo_status status = check_text("unit", o->unit, sizeof info->unit, error);
     if (status == EBPO_OK)
         status = check_text("crs", o->crs, sizeof info->crs, error);
@@ -102,6 +110,12 @@ static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *m
     info->max_level = b->max_level;
     info->leaf_faces = o->leaf_faces;
     info->epsilon = o->epsilon;
+    const ebpo_selection_method *method = ebpo_selection_of(o->select);
+    info->selection = o->select;
+    info->percent = method->from_leaves && !(o->k_root > 0) ? o->percent : 0;
+    info->k_root = method->from_leaves ? o->k_root : 0;
+    info->normals = method->has_normals ? o->normals : 0;
+    info->seed = method->has_seed ? o->seed : 0;
     if (mend)
         info->mend = *mend;
     info->report = *report;
@@ -161,6 +175,8 @@ static ebpo_status run_stages(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, 
         status = ebpo_build_labels(b, error);
     if (status == EBPO_OK)
         status = ebpo_build_number(b, error);
+    if (status == EBPO_OK)
+        status = ebpo_build_propose(b, error);
     if (status == EBPO_OK)
         status = ebpo_build_top(b, error);
     if (status == EBPO_OK)

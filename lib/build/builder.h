@@ -55,6 +55,7 @@ typedef struct ebpo_branch {
     int32_t winding;         /* at the lowest corner */
     uint8_t root_type;       /* of nodes[0], and its corner differences: they outlive the nodes */
     int32_t root_delta[8];
+    struct ebpo_proposals *proposals; /* NULL: planes are chosen on the way down */
     ebpo_out *out;           /* [EBPO_LEVELS_MAX] what envelopes makes */
     ebpo_polytope *above;    /* the parent's envelope cut to this cell */
 } ebpo_branch;
@@ -130,10 +131,10 @@ int ebpo_build_candidates(const ebpo_builder *b, const ebpo_branch *s, const ebp
 typedef struct ebpo_envelope_scratch ebpo_envelope_scratch;
 ebpo_status ebpo_scratch_make(ebpo_envelope_scratch **out, ebpo_error *error);
 void ebpo_scratch_free(ebpo_envelope_scratch *scratch);
-/* The own planes of a gray node; `envelope` is its parent's cut to its cell, then its own. Returns their number, -1: out of memory. */
-int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, const ebpo_branch *s,
-                     const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope,
-                     uint32_t codes[EBPO_PLANES_MAX]);
+/* The own planes of a gray node, chosen now or proposed before; `envelope` is its parent's cut to its cell, then its own. Returns their number, -1: out of memory. */
+int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, const ebpo_branch *s, uint32_t detail, ebpo_cell cell, int32_t winding,
+                     ebpo_polytope *envelope, uint32_t codes[EBPO_PLANES_STORED]);
+void ebpo_cut_by_codes(ebpo_polytope *envelope, const uint32_t *codes, int count);
 unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32_t delta[8]);
 double ebpo_cell_volume(const ebpo_builder *b, int level);
 

@@ -5,7 +5,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "build/builder.h"
+#include "build/propose.h"
 
 typedef struct emitter {
     const ebpo_builder *b;
@@ -138,20 +138,34 @@ static bool gather_faces(emitter *e, const ebpo_build_detail *d)
     return true;
 }
 
-static bool emit_leaf(emitter *e, const ebpo_build_detail *d, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope)
+/* Stored planes are the selection's own; others are what a reader will derive. */
+static int leaf_planes(const emitter *e, uint32_t detail, ebpo_cell cell, int32_t winding, bool stored, ebpo_polytope *envelope, uint32_t *codes)
 {
     const ebpo_builder *b = e->b;
+    const ebpo_build_detail *d = &e->s->details[detail];
+    int count;
+    const uint32_t *proposed = stored ? ebpo_proposed(e->s, detail, &count) : NULL;
+    if (!proposed)
+        return ebpo_leaf_planes(&b->box, cell, e->faces, d->entry_end - d->entry_begin, ebpo_inside_corners(b, winding, d->delta),
+                                stored ? b->options->epsilon : 0, envelope, codes);
+    memcpy(codes, proposed, (size_t)count * sizeof *codes);
+    ebpo_cut_by_codes(envelope, codes, count);
+    return count;
+}
+
+static bool emit_leaf(emitter *e, uint32_t detail, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope)
+{
+    const ebpo_builder *b = e->b;
+    const ebpo_build_detail *d = &e->s->details[detail];
     ebpo_out *out = &e->s->out[cell.level];
     ebpo_level *l = &out->level;
-    uint64_t count = d->entry_end - d->entry_begin;
     if (!emit_list(e, d, out, winding) || !gather_faces(e, d))
         return false;
-    uint32_t codes[EBPO_PLANES_MAX];
+    uint32_t codes[EBPO_PLANES_STORED];
     bool stored = b->options->parts & EBPO_PART_LEAF_PLANES;
     int planes = 0;
     if (stored || b->options->parts & EBPO_PART_MESH) /* else a reader has nothing to derive them from */
-        planes = ebpo_leaf_planes(&b->box, cell, e->faces, count, ebpo_inside_corners(b, winding, d->delta),
-                                  stored ? b->options->epsilon : 0, envelope, codes);
+        planes = leaf_planes(e, detail, cell, winding, stored, envelope, codes);
     l->leaf_volume += ebpo_polytope_volume(envelope) * ebpo_cell_volume(b, cell.level);
     l->leaf_plane_counts[l->leaf_count++] = (uint8_t)planes;
     if (!stored)
@@ -203,11 +217,10 @@ static bool emit_children(emitter *e, uint32_t child, ebpo_cell cell, int32_t wi
 static bool emit_gray(emitter *e, const ebpo_build_node *node, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope)
 {
     const ebpo_builder *b = e->b;
-    const ebpo_build_detail *d = &e->s->details[node->detail];
-    uint32_t codes[EBPO_PLANES_MAX];
+    uint32_t codes[EBPO_PLANES_STORED];
     int planes = 0;
     if (b->options->parts & EBPO_PART_PLANES)
-        planes = ebpo_gray_planes(b, e->scratch, e->s, d, cell, winding, envelope, codes);
+        planes = ebpo_gray_planes(b, e->scratch, e->s, node->detail, cell, winding, envelope, codes);
     if (planes < 0 || !ebpo_emit_gray(&e->s->out[cell.level], codes, planes,
                                       ebpo_polytope_volume(envelope) * ebpo_cell_volume(b, cell.level)))
         return false;
@@ -231,7 +244,7 @@ static bool emit(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding, eb
 {
     ebpo_build_node node = e->s->nodes[index];
     switch (node.type) {
-    case EBPO_LEAF: return emit_leaf(e, &e->s->details[node.detail], cell, winding, envelope);
+    case EBPO_LEAF: return emit_leaf(e, node.detail, cell, winding, envelope);
     case EBPO_GRAY: return emit_gray(e, &node, cell, winding, envelope);
     default: return emit_empty(e, cell, winding);
     }

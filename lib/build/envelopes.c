@@ -1,9 +1,11 @@
 /* The planes of a gray node, from the root down: candidates are the normals of faces below it and, in the top levels, those of the solid's hull in the cell. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "build/propose.h"
 #include "build/supports.h"
 #include "geom/plane_code.h"
 #include "planes/hull.h"
@@ -171,8 +173,8 @@ static double top_share(double volume)
     return 0.1 * sqrt(fmax(0, volume));
 }
 
-int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo_branch *branch, const ebpo_build_detail *detail,
-                     ebpo_cell cell, int32_t winding, ebpo_polytope *envelope, uint32_t codes[EBPO_PLANES_MAX])
+static int choose_now(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo_branch *branch, const ebpo_build_detail *detail, ebpo_cell cell,
+                      int32_t winding, ebpo_polytope *envelope, uint32_t *codes)
 {
     bool top = cell.level <= TOP_LEVELS, hull = cell.level <= HULL_LEVELS;
     ebpo_candidate faces[EBPO_PLANES_CANDIDATES];
@@ -191,4 +193,28 @@ int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo
         try_hull(s, envelope, volume, epsilon, top ? HULL_DIRECTIONS : CANDIDATES_BELOW);
     ebpo_choice choice = { .candidates = s->candidates, .count = s->count, .most = EBPO_PLANES_MAX, .epsilon = epsilon };
     return ebpo_select_greedy(envelope, &choice, codes);
+}
+
+void ebpo_cut_by_codes(ebpo_polytope *envelope, const uint32_t *codes, int count)
+{
+    for (int i = 0; i < count; i++) {
+        int32_t v[3], d;
+        double n[3];
+        if (!ebpo_plane_code_decode(codes[i], v, &d))
+            continue;
+        double offset = ebpo_plane_as_double(v, d, n);
+        (void)ebpo_polytope_clip(envelope, n, offset, i);
+    }
+}
+
+int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo_branch *branch, uint32_t detail, ebpo_cell cell, int32_t winding,
+                     ebpo_polytope *envelope, uint32_t codes[EBPO_PLANES_STORED])
+{
+    int count;
+    const uint32_t *proposed = ebpo_proposed(branch, detail, &count);
+    if (!proposed)
+        return choose_now(b, s, branch, &branch->details[detail], cell, winding, envelope, codes);
+    memcpy(codes, proposed, (size_t)count * sizeof *codes);
+    ebpo_cut_by_codes(envelope, codes, count);
+    return count;
 }

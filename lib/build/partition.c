@@ -7,7 +7,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "build/builder.h"
+#include "build/propose.h"
 #include "morton/octcode.h"
 #include "planes/octants.h"
 
@@ -45,6 +45,8 @@ void ebpo_subtree_release(ebpo_branch *s)
     free(s->entries);
     free(s->crossing);
     free(s->above);
+    ebpo_proposals_free(s->proposals);
+    s->proposals = NULL;
     s->list = NULL;
     s->nodes = NULL;
     s->details = NULL;

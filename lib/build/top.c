@@ -38,7 +38,7 @@ static ebpo_status wave_envelopes(void *context, uint64_t begin, uint64_t end, u
         uint32_t detail = b->top.nodes[p->node].detail;
         ebpo_top_envelope *t = &b->top_envelope[detail];
         if (b->options->parts & EBPO_PART_PLANES)
-            t->count = ebpo_gray_planes(b, scratch, &b->top, &b->top.details[detail], p->cell, p->winding, p->envelope, t->codes);
+            t->count = ebpo_gray_planes(b, scratch, &b->top, detail, p->cell, p->winding, p->envelope, t->codes);
         t->volume = ebpo_polytope_volume(p->envelope) * ebpo_cell_volume(b, p->cell.level);
         if (t->count < 0)
             status = no_memory(error);

@@ -5,7 +5,7 @@
 #include "build/builder.h"
 
 typedef struct ebpo_top_envelope {
-    uint32_t codes[EBPO_PLANES_MAX];
+    uint32_t codes[EBPO_PLANES_STORED];
     int count;
     double volume;
 } ebpo_top_envelope;

@@ -179,6 +179,28 @@ static ebpo_status put_parts(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info 
     return ebpo_h5_put_text(out, root, required ? "required_parts" : "optional_parts", words, error);
 }
 
+/* How planes were chosen, where that was not the usual way: told, and needed by no reader. */
+static const char *const SELECTIONS[] = { "inherit", "kmedoids", "offset", "random", NULL };
+static const char *const NORMALS[] = { "spherical", "angle", NULL };
+static const fact selection_facts[] = {
+    { "selection_percent", REAL, AT(percent) },
+    { "selection_k_root", REAL, AT(k_root) },
+    { "selection_seed", COUNT, AT(seed) },
+};
+enum { SELECTION_FACTS = sizeof selection_facts / sizeof selection_facts[0] };
+
+static ebpo_status put_selection(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info, ebpo_error *error)
+{
+    if (info->selection <= 0 || info->selection > 3 || info->normals < 0 || info->normals > 1)
+        return EBPO_OK;
+    ebpo_status status = ebpo_h5_put_text(out, root, "selection", SELECTIONS[info->selection], error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_put_text(out, root, "selection_normals", NORMALS[info->normals], error);
+    for (int i = 0; i < SELECTION_FACTS && status == EBPO_OK; i++)
+        status = put_fact(out, root, &selection_facts[i], info, error);
+    return status;
+}
+
 /* Only in subsets: other files stay as they are. */
 static ebpo_status put_subset(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info, ebpo_error *error)
 {
@@ -207,6 +229,8 @@ ebpo_status ebpo_facts_put(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *i
         status = ebpo_h5_put_text(out, root, "about", ABOUT, error);
     for (int i = 0; i < FACTS && status == EBPO_OK; i++)
         status = put_fact(out, root, &facts[i], info, error);
+    if (status == EBPO_OK)
+        status = put_selection(out, root, info, error);
     if (status == EBPO_OK && info->pruned)
         status = put_subset(out, root, info, error);
     return status;
@@ -402,6 +426,30 @@ static ebpo_status get_subset(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, 
     return status == EBPO_E_ABSENT ? EBPO_OK : status;
 }
 
+/* Place of the attribute's word in `words`; -1: another one, of a newer library. Without the attribute *out stays. */
+static ebpo_status get_known(ebpo_h5_in *in, ebpo_h5_id root, const char *name, const char *const *words, int *out, ebpo_error *error)
+{
+    char word[64];
+    ebpo_status status = ebpo_h5_get_text(in, root, "/", name, word, sizeof word, error);
+    if (status == EBPO_E_ABSENT)
+        return EBPO_OK;
+    *out = -1;
+    for (int i = 0; words[i] && status == EBPO_OK; i++)
+        if (strcmp(words[i], word) == 0)
+            *out = i;
+    return status;
+}
+
+static ebpo_status get_selection(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebpo_error *error)
+{
+    ebpo_status status = get_known(in, root, "selection", SELECTIONS, &info->selection, error);
+    if (status == EBPO_OK)
+        status = get_known(in, root, "selection_normals", NORMALS, &info->normals, error);
+    for (int i = 0; i < SELECTION_FACTS && status == EBPO_OK && info->selection > 0; i++)
+        status = get_fact(in, root, "/", &selection_facts[i], info, error);
+    return status;
+}
+
 ebpo_status ebpo_facts_get(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebpo_error *error)
 {
     ebpo_status status = get_version(in, root, info, error);
@@ -409,6 +457,8 @@ ebpo_status ebpo_facts_get(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebp
         status = get_parts(in, root, info, error);
     for (int i = 0; i < FACTS && status == EBPO_OK; i++)
         status = get_fact(in, root, "/", &facts[i], info, error);
+    if (status == EBPO_OK)
+        status = get_selection(in, root, info, error);
     return status == EBPO_OK && info->pruned ? get_subset(in, root, info, error) : status;
 }
 

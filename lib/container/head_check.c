@@ -36,6 +36,8 @@ static const char *check_box(const ebpo_info *info)
         return "box_origin and box_size are not on a grid of exact doubles";
     if (!(info->epsilon >= 0 && isfinite(info->epsilon)))
         return "epsilon is negative or not a number";
+    if (!(info->percent >= 0 && info->percent <= 100) || !(info->k_root >= 0 && isfinite(info->k_root)))
+        return "selection_percent or selection_k_root is out of range";
     return NULL;
 }
 
