@@ -15,10 +15,11 @@
 
 typedef struct values {
     int64_t max_level, leaf_faces, zstd_level, threads;
-    double epsilon, percent;
+    double epsilon, percent, max_error;
     int select, normals;
     int64_t seed;
     const char *k_root;
+    const char *target_size;
     uint32_t with, without;
     int codec, rule, profile;
     mending mend;
@@ -52,6 +53,7 @@ static const arg_option options[] = {
     { "profile", 0, ARG_WORD, offsetof(values, profile), "NAME",
       "instead of --with and --without: full (all parts), lod (for\nviewers: no mesh), collision (for exact questions: mesh, no\nmaps); as 'ebpo subset --profile' makes it of a full file",
       0, 0, profile_words },
+    NEED_OPTIONS(values),
     { "codec", 0, ARG_WORD, offsetof(values, codec), "NAME", "zstd (the default), deflate or none", 0, 0, codec_words },
     { "zstd-level", 0, ARG_INT, offsetof(values, zstd_level), "N", "effort of zstd, 1 to 22; default 3", 1, 22, NULL },
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
@@ -136,10 +138,15 @@ static int check_values(const values *v, const char *in, const char *out)
     return EXIT_FINE;
 }
 
+static bool chooses_parts(const values *v)
+{
+    return v->target_size && v->profile < 0 && !v->with && !v->without;
+}
+
 static uint32_t parts_of(const values *v)
 {
     uint32_t without = v->without;
-    if (v->profile >= 0) /* all are built, so that the file is the one that a subset of the full one is */
+    if (v->profile >= 0 || chooses_parts(v)) /* all are built, so that the file is the one that a subset of the full one is */
         return ebpo_profile_parts(EBPO_PROFILE_FULL);
     if (without & EBPO_PART_MESH)
         without |= EBPO_PART_MAPS;
@@ -161,7 +168,7 @@ static void print_reports(const values *v, const prepared *p, const char *in)
     report_warn(stderr, "convert", in, &p->report, &p->record);
 }
 
-static void print_summary(const ebpo_info *info, const char *out, double seconds)
+static void print_summary(const values *v, const ebpo_info *info, const char *out, double seconds)
 {
     char bytes[32];
     int last = info->level_count - 1;
@@ -170,6 +177,7 @@ static void print_summary(const ebpo_info *info, const char *out, double seconds
            info->face_count ? (double)info->file_bytes / (double)info->face_count : 0);
     if (info->source_size)
         printf(", %.0f %% of the source", 100 * (double)info->file_bytes / (double)info->source_size);
+    subset_print_need(info, chooses_parts(v));
     printf(", in %.1f s\n", seconds);
 }
 
@@ -199,15 +207,16 @@ static ebpo_status print_result(const values *v, const prepared *p, const char *
     if (v->json)
         print_json(p, ebpo_file_info(file), out, seconds);
     else
-        print_summary(ebpo_file_info(file), out, seconds);
+        print_summary(v, ebpo_file_info(file), out, seconds);
     ebpo_close(file);
     return EBPO_OK;
 }
 
 /* --- work --- */
 
-static ebpo_status build_and_write(const values *v, prepared *p, const char *out, ebpo_progress progress,
-                                   ebpo_error *error)
+/* `need`: the error or size that was asked for. */
+static ebpo_status build_and_write(const values *v, prepared *p, const char *out, const ebpo_subset_options *need,
+                                   ebpo_progress progress, ebpo_error *error)
 {
     ebpo_build_options build = EBPO_BUILD_OPTIONS_INIT;
     build.max_level = (int)v->max_level;
@@ -235,6 +244,14 @@ static ebpo_status build_and_write(const values *v, prepared *p, const char *out
     write.codec_level = (int)v->zstd_level;
     write.threads = (unsigned)v->threads;
     write.progress = progress;
+    if (need->max_error > 0 || need->target_bytes) {
+        ebpo_subset_options subset = *need;
+        subset.write = write;
+        subset.choose_parts = chooses_parts(v);
+        if (v->profile >= 0)
+            subset.parts = ebpo_profile_parts((ebpo_profile)v->profile);
+        return ebpo_subset_of_tree(&tree, out, &subset, error);
+    }
     if (v->profile >= 0)
         write.parts = ebpo_profile_parts((ebpo_profile)v->profile);
     status = ebpo_tree_write(&tree, out, &write, error);
@@ -254,6 +271,11 @@ static int run(int argc, char **argv)
     int code = check_values(&v, in, out);
     if (code != EXIT_FINE)
         return code;
+    ebpo_subset_options need = EBPO_SUBSET_OPTIONS_INIT;
+    if ((code = subset_need("convert", v.max_error, v.target_size, &need)) != EXIT_FINE)
+        return code;
+    if ((v.max_error > 0 || v.target_size) && v.without & EBPO_PART_MESH)
+        return usage_error("--max-error and --target-size measure against the mesh; leave it out with --profile lod instead of --without mesh");
     progress_line line;
     ebpo_progress progress = progress_start(&line, "convert", v.quiet);
     double begun = progress_now();
@@ -269,7 +291,7 @@ static int run(int argc, char **argv)
                     in);
             return EXIT_NOT_SOLID;
         }
-        status = build_and_write(&v, &p, out, progress, &error);
+        status = build_and_write(&v, &p, out, &need, progress, &error);
         progress_wipe(&line);
     }
     if (status == EBPO_OK)

@@ -7,14 +7,14 @@
 #include "subset_run.h"
 #include "words.h"
 
-static const arg_option options[] = { SUBSET_OPTIONS, { 0 } };
+static const arg_option options[] = { NEED_OPTIONS(subset_values), SUBSET_OPTIONS, { 0 } };
 
 static const arg_spec spec = {
     .command = "subset",
     .operands = "FILE OUT.ebpo.h5",
     .least = 2,
     .most = 2,
-    .summary = "a smaller .ebpo.h5 file of a file: levels, a box, parts",
+    .summary = "a smaller .ebpo.h5 file of a file: levels, a box, parts, an error or a size",
     .text = "FILE is an .ebpo.h5 file or its URL (what is interrupted begins anew; 'ebpo fetch' goes on). OUT appears\n"
             "whole or not at all. Questions to it are answered as by FILE, or refused where what was left out matters.",
     .options = options,

@@ -99,6 +99,8 @@ static void print_subset(FILE *out, const ebpo_info *info)
         fprintf(out, " levels 0 to %d", info->cut_levels - 1);
     if (info->boxed)
         fprintf(out, "%s what meets %.9g,%.9g,%.9g,%.9g,%.9g,%.9g", info->cut_levels ? "," : "", b[0], b[1], b[2], b[3], b[4], b[5]);
+    if (info->kept_error > 0)
+        fprintf(out, "%s pruned where envelopes reach at most %.9g beyond the model", info->cut_levels || info->boxed ? "," : "", info->kept_error);
     fprintf(out, "; nothing below %llu pruned nodes\n            of the file with content %s\n", (unsigned long long)pruned_nodes(info), hex);
 }
 
@@ -244,6 +246,8 @@ static void json_subset(json *j, const ebpo_info *info)
         json_int(j, "last_level", info->cut_levels - 1);
     if (info->boxed)
         json_reals(j, "box", info->kept_box, 6);
+    if (info->kept_error > 0)
+        json_real(j, "max_error", info->kept_error);
     json_uint(j, "pruned_nodes", pruned_nodes(info));
     json_end(j);
 }

@@ -84,6 +84,24 @@ static bool read_parts(const char *text, uint32_t *parts)
     return true;
 }
 
+int subset_need(const char *name, double max_error, const char *target_size, ebpo_subset_options *out)
+{
+    if (target_size && (!words_read_size(target_size, &out->target_bytes) || !out->target_bytes))
+        return usage(name, "--target-size: '%s' is not a number of bytes such as 500K or 20M", target_size);
+    if (target_size && max_error > 0)
+        return usage(name, "--max-error and --target-size exclude each other%s", "");
+    out->max_error = max_error;
+    return EXIT_FINE;
+}
+
+void subset_print_need(const ebpo_info *info, bool chosen)
+{
+    if (chosen)
+        printf(", profile %s", profile_words[info->parts & EBPO_PART_MAPS ? EBPO_PROFILE_FULL : info->parts & EBPO_PART_MESH ? EBPO_PROFILE_COLLISION : EBPO_PROFILE_LOD]);
+    if (info->kept_error > 0)
+        printf(", pruned where envelopes reach at most %.6g beyond the model", info->kept_error);
+}
+
 int subset_options(const char *name, const subset_values *v, const char *in, const char *out_path, ebpo_subset_options *out)
 {
     *out = (ebpo_subset_options)EBPO_SUBSET_OPTIONS_INIT;
@@ -104,7 +122,8 @@ int subset_options(const char *name, const subset_values *v, const char *in, con
     if (v->profile >= 0)
         out->parts = ebpo_profile_parts((ebpo_profile)v->profile);
     out->write.threads = (unsigned)v->threads;
-    return EXIT_FINE;
+    out->choose_parts = v->target_size && !v->parts && v->profile < 0 && !v->levels;
+    return subset_need(name, v->max_error, v->target_size, out);
 }
 
 static ebpo_status wrong(ebpo_error *error, const char *shown, const char *what)
@@ -140,7 +159,7 @@ ebpo_status subset_settle(const subset_values *v, const ebpo_info *info, const c
     return EBPO_OK;
 }
 
-static void print_summary(const char *out_path, const ebpo_info *info, const ebpo_info *from, const traffic *t, double seconds)
+static void print_summary(const subset_values *v, const char *out_path, const ebpo_info *info, const ebpo_info *from, const traffic *t, double seconds)
 {
     char bytes[32], whole[32], parts[80], got[32];
     printf("%s: levels 0 to %d", out_path, info->level_count - 1);
@@ -148,6 +167,7 @@ static void print_summary(const char *out_path, const ebpo_info *info, const ebp
     printf(", %s, %s of %s", parts[0] ? parts : "types only", words_bytes(bytes, sizeof bytes, info->file_bytes), words_bytes(whole, sizeof whole, from->file_bytes));
     if (info->parts & EBPO_PART_MESH && info->face_count < from->face_count)
         printf(", %" PRIu64 " of %" PRIu64 " faces", info->face_count, from->face_count);
+    subset_print_need(info, v->target_size && !v->parts && v->profile < 0 && !v->levels);
     if (t->far)
         printf(", %s in %" PRIu64 " requests", words_bytes(got, sizeof got, t->http.bytes), t->http.requests);
     if (t->far && t->http.cache_bytes)
@@ -178,7 +198,7 @@ ebpo_status subset_tell(const subset_values *v, const char *out_path, const ebpo
         remote_json(&j, t, &v->remote);
         json_finish(&j);
     } else {
-        print_summary(out_path, ebpo_file_info(file), from, t, seconds);
+        print_summary(v, out_path, ebpo_file_info(file), from, t, seconds);
     }
     ebpo_close(file);
     return EBPO_OK;

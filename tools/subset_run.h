@@ -8,7 +8,8 @@
 #include "remote.h"
 
 typedef struct subset_values {
-    const char *levels, *box, *parts;
+    const char *levels, *box, *parts, *target_size;
+    double max_error; /* 0: none given */
     int profile, codec; /* -1: none given */
     int64_t zstd_level, threads;
     bool json, quiet;
@@ -32,6 +33,19 @@ extern const char *const profile_words[];
     ARG_SWITCH("json", 0, subset_values, json, "print the facts of the result as JSON"), \
     ARG_SWITCH("quiet", 'q', subset_values, quiet, "no summary, no progress: errors and warnings only"), \
     REMOTE_OPTIONS(subset_values, remote)
+
+/* The same for choosing by need, which takes the whole model: `ebpo subset` only. */
+#define NEED_OPTIONS(type) \
+    { "max-error", 0, ARG_REAL, offsetof(type, max_error), "E", \
+      "refine only where envelopes may reach more than E beyond the\nmodel (in its unit): what is left out is certainly closer", 0, 1.7976931348623157e308, NULL }, \
+    { "target-size", 0, ARG_TEXT, offsetof(type, target_size), "S", \
+      "at most so many bytes (k, M, G: powers of 1024), with the least\n--max-error for which that holds; which parts are kept is\nchosen too, unless said", 0, 0, NULL }
+
+/* The two, read; the exit code. */
+int subset_need(const char *name, double max_error, const char *target_size, ebpo_subset_options *out);
+
+/* ", ..." for summaries: the error that was kept to and, if it was `chosen`, the profile; or nothing. */
+void subset_print_need(const ebpo_info *info, bool chosen);
 
 /* What can be said before the file is open; the exit code, EXIT_FINE to go on. `out` gets all but what depends on the file. */
 int subset_options(const char *name, const subset_values *v, const char *in, const char *out_path, ebpo_subset_options *out);

@@ -209,6 +209,8 @@ static ebpo_status put_subset(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info
         status = ebpo_h5_put_int(out, root, "subset_levels", info->cut_levels, error);
     if (status == EBPO_OK && info->boxed)
         status = ebpo_h5_put_real(out, root, "subset_box", info->kept_box, 6, error);
+    if (status == EBPO_OK && info->kept_error > 0)
+        status = ebpo_h5_put_real(out, root, "subset_error", &info->kept_error, 0, error);
     return status;
 }
 
@@ -423,6 +425,10 @@ static ebpo_status get_subset(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, 
     for (int k = 0; k < 3 && info->boxed; k++)
         if (!(isfinite(info->kept_box[k]) && isfinite(info->kept_box[3 + k]) && info->kept_box[k] <= info->kept_box[3 + k]))
             return wrong_value(in, "/", "subset_box", error);
+    if (status == EBPO_OK || status == EBPO_E_ABSENT)
+        status = ebpo_h5_get_real(in, root, "/", "subset_error", &info->kept_error, 0, error);
+    if (status == EBPO_OK && !(isfinite(info->kept_error) && info->kept_error > 0))
+        return wrong_value(in, "/", "subset_error", error);
     return status == EBPO_E_ABSENT ? EBPO_OK : status;
 }
 

@@ -87,6 +87,9 @@ static ebpo_status judge(ebpo_need *n, ebpo_bounder *b, ebpo_need_node *node, eb
     ebpo_tree_place place;
     ebpo_reach_bound found;
     ebpo_bound_wish wish = { n->max_error, n->max_error, 0, QUESTIONS };
+    node->enough = false;
+    if (!node->asked)
+        return EBPO_OK;
     if (!ebpo_tree_find(&n->tree, node->cell, false, false, &place, NULL) || (place.type != EBPO_GRAY && place.type != EBPO_LEAF))
         return ebpo_fail(error, EBPO_E_FORMAT, "level %d: a node is missing in its tree; run ebpo verify", node->cell.level);
     memory *m = place.type == EBPO_GRAY ? &n->gray[node->cell.level][place.rank] : &n->leaf[node->cell.level][place.rank];

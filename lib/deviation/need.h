@@ -11,7 +11,8 @@ typedef struct ebpo_need ebpo_need;
 /* A gray node, as stored; or a leaf, with its parent's envelope in its cell. */
 typedef struct ebpo_need_node {
     ebpo_cell cell;
-    bool enough; /* the answer */
+    bool asked;  /* else the answer does not matter */
+    bool enough; /* the answer; false where none was asked for */
 } ebpo_need_node;
 
 /* EBPO_E_ABSENT for a file without mesh or a subset. Opens a model of all of the file. `planes` false: envelopes are cells. The file stays open as long. */

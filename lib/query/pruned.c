@@ -1,6 +1,7 @@
 #include "query/pruned.h"
 
 #include <stdio.h>
+#include <string.h>
 
 #include "base/error.h"
 #include "container/reader.h"
@@ -15,6 +16,9 @@ static void describe(const ebpo_info *info, char *out, size_t room)
         used = (size_t)snprintf(out, room, "it was cut to levels 0 to %d", info->cut_levels - 1);
     if (info->boxed && used < room)
         snprintf(out + used, room - used, "%s %.9g,%.9g,%.9g to %.9g,%.9g,%.9g", used ? " and to the box" : "it was cut to the box", b[0], b[1], b[2], b[3], b[4], b[5]);
+    used = strlen(out);
+    if (info->kept_error > 0 && used < room)
+        snprintf(out + used, room - used, "%s %.9g", used ? " and to an error of" : "it was cut to an error of", info->kept_error);
     if (!out[0])
         snprintf(out, room, "it is a part of another file");
 }

@@ -25,6 +25,8 @@ typedef struct descent {
     ebpo_level from, *to;
     place read;
     gray *parent, *child;
+    ebpo_need_node *judged; /* gray nodes and leaves as they come, with max_error; else NULL */
+    uint64_t next_judged;
     uint64_t parent_count, child_count;
     uint64_t filled; /* groups of the result that are not empty */
     bool goes_on;    /* some child has children */
@@ -37,6 +39,12 @@ static bool meets_box(const ebpo_cutting *c, int level, const uint32_t at[3])
         if (ebpo_wall(&c->box, k, level, at[k]) > o->max[k] || ebpo_wall(&c->box, k, level, at[k] + 1) < o->min[k])
             return false;
     return true;
+}
+
+/* Gray nodes of this level may have children in the result. */
+static bool may_go_on(const ebpo_cutting *c, int level)
+{
+    return level < c->last_level && level + 1 < c->from->level_count;
 }
 
 /* --- runs of groups that are wanted --- */
@@ -109,10 +117,17 @@ static void add_gray(descent *d, const uint32_t at[3], uint64_t group, const uin
     d->goes_on = d->goes_on || group != NOTHING;
 }
 
+/* Whether the envelope is close enough to the model: asked once for each gray node and leaf, in their order. */
+static bool is_enough(descent *d)
+{
+    return d->judged && d->judged[d->next_judged++].enough;
+}
+
 static void take_gray(descent *d, const uint32_t at[3])
 {
     uint64_t rank = d->read.of_type[EBPO_GRAY]++, group = d->child[d->from.leaf_count + rank].group, count = d->from.plane_counts ? d->from.plane_counts[rank] : 0;
-    if (d->level >= d->c->last_level || d->level + 1 >= d->c->from->level_count || !meets_box(d->c, d->level, at))
+    bool enough = is_enough(d);
+    if (enough || !may_go_on(d->c, d->level) || !meets_box(d->c, d->level, at))
         group = NOTHING;
     add_gray(d, at, group, d->from.planes ? d->from.planes + d->read.planes : NULL, count);
     d->read.planes += count;
@@ -142,14 +157,16 @@ static void add_leaf(descent *d, uint64_t rank)
     }
 }
 
-/* Outside the box a leaf becomes a pruned node; its own planes bound what is in its cell as well as a gray node's do. */
+/* Outside the box a leaf becomes a pruned node; its own planes bound what is in its cell as well as a gray node's do. Where its parent's do well enough, it needs none. */
 static ebpo_node_type take_leaf(descent *d, const uint32_t at[3])
 {
     const ebpo_level *f = &d->from;
     uint64_t rank = d->read.of_type[EBPO_LEAF]++, planes = f->leaf_plane_counts ? f->leaf_plane_counts[rank] : 0;
-    bool kept = meets_box(d->c, d->level, at);
+    bool enough = is_enough(d), kept = !enough && meets_box(d->c, d->level, at);
     if (kept)
         add_leaf(d, rank);
+    else if (enough)
+        add_gray(d, at, NOTHING, NULL, 0);
     else
         add_gray(d, at, NOTHING, f->leaf_planes ? f->leaf_planes + d->read.leaf_planes : NULL, d->to->plane_counts ? planes : 0);
     d->read.leaf_planes += planes;
@@ -179,15 +196,46 @@ static ebpo_node_type take_node(descent *d, ebpo_node_type type, const uint32_t 
     return type;
 }
 
+static void child_place(const descent *d, uint64_t number, unsigned octant, uint32_t at[3])
+{
+    for (int k = 0; k < 3; k++)
+        at[k] = d->level ? 2 * d->parent[number].at[k] + (octant >> k & 1) : 0;
+}
+
 static void take_group(descent *d, uint64_t number, uint16_t types)
 {
-    const gray *parent = &d->parent[number];
     for (unsigned octant = 0; octant < (d->level ? 8u : 1u); octant++) {
-        uint32_t at[3] = { 0, 0, 0 };
-        for (int k = 0; k < 3 && d->level; k++)
-            at[k] = 2 * parent->at[k] + (octant >> k & 1);
+        uint32_t at[3];
+        child_place(d, number, octant, at);
         d->to->types[number] |= (uint16_t)(take_node(d, (ebpo_node_type)(types >> 2 * octant & 3), at) << 2 * octant);
     }
+}
+
+/* --- how close envelopes are, all of a level at once --- */
+
+static ebpo_status judge(descent *d)
+{
+    uint64_t next = 0, count = 0;
+    d->next_judged = 0;
+    if (!d->c->need)
+        return EBPO_OK;
+    if (!(d->judged = ebpo_alloc_zero(d->from.gray_count + d->from.leaf_count, sizeof *d->judged)))
+        return ebpo_fail_memory(d->c->error, (d->from.gray_count + d->from.leaf_count) * sizeof *d->judged);
+    for (uint64_t i = 0; i < d->parent_count; i++) {
+        if (d->parent[i].group == NOTHING)
+            continue;
+        uint16_t types = d->from.types[next++];
+        for (unsigned octant = 0; octant < (d->level ? 8u : 1u); octant++) {
+            unsigned type = types >> 2 * octant & 3;
+            if (type != EBPO_GRAY && type != EBPO_LEAF)
+                continue;
+            ebpo_need_node *node = &d->judged[count++];
+            node->cell.level = d->level;
+            child_place(d, i, octant, node->cell.at);
+            node->asked = meets_box(d->c, d->level, node->cell.at) && (type == EBPO_LEAF || may_go_on(d->c, d->level));
+        }
+    }
+    return ebpo_need_judge(d->c->need, d->judged, count, d->c->options->max_error, d->c->error);
 }
 
 /* The parents are done for good after this. */
@@ -196,6 +244,8 @@ static ebpo_status cut_level(descent *d)
     ebpo_status status = pick(d);
     if (status == EBPO_OK)
         status = make_room(d);
+    if (status == EBPO_OK)
+        status = judge(d);
     uint64_t next = 0;
     d->to->group_count = d->parent_count;
     for (uint64_t i = 0; i < d->parent_count && status == EBPO_OK; i++) {
@@ -206,6 +256,8 @@ static ebpo_status cut_level(descent *d)
         d->filled += d->to->types[i] != 0;
     }
     ebpo_level_free(&d->from);
+    free(d->judged);
+    d->judged = NULL;
     free(d->parent);
     d->parent = d->child;
     d->parent_count = d->child_count;

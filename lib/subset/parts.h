@@ -5,6 +5,7 @@
 #include <ebpo/subset.h>
 
 #include "container/pick.h"
+#include "deviation/need.h"
 #include "geom/cell.h"
 
 typedef struct ebpo_cutting {
@@ -12,6 +13,7 @@ typedef struct ebpo_cutting {
     const ebpo_info *from;
     const ebpo_subset_options *options;
     ebpo_chunks *chunks;
+    ebpo_need *need;       /* with max_error */
     ebpo_box box;          /* the root cell */
     int last_level;        /* deepest that may be kept */
     uint32_t parts;        /* kept, and in the file */
@@ -27,6 +29,12 @@ EBPO_MUST_USE ebpo_status ebpo_cut_faces(ebpo_cutting *c);
 
 /* --- volumes.c: of the envelopes of the nodes that remain --- */
 void ebpo_cut_volumes(ebpo_cutting *c);
+
+/* The same with what is known of envelopes already: `need` of this file, for the planes that are kept. */
+EBPO_MUST_USE ebpo_status ebpo_subset_tree_needed(ebpo_tree *out, ebpo_file *file, const ebpo_subset_options *options, ebpo_need *need, ebpo_error *error);
+
+/* --- size.c: options->target_bytes in terms of max_error and parts. `path`: of the output, beside which files are written to see how large they are --- */
+EBPO_MUST_USE ebpo_status ebpo_subset_fit(ebpo_file *file, const char *path, ebpo_subset_options *options, ebpo_error *error);
 
 /* The tree that would be written; for tests too. `options->write` only for its threads and progress. */
 EBPO_MUST_USE ebpo_status ebpo_subset_tree(ebpo_tree *out, ebpo_file *file, const ebpo_subset_options *options, ebpo_error *error);

@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "container/reader.h"
+#include "io/publish.h"
 #include "subset/parts.h"
 
 enum { CHUNK_BUDGET = 64 << 20 };
@@ -52,6 +53,8 @@ static ebpo_status settle(ebpo_cutting *c)
     int deepest = c->from->level_count - 1;
     if (o->last_level < -1 || o->last_level >= EBPO_LEVELS_MAX || (o->last_level > deepest && !c->from->pruned))
         return ebpo_fail(c->error, EBPO_E_ARGUMENT, "%s: there is no level %d; the file has levels 0 to %d", c->file->in.shown, o->last_level, deepest);
+    if (!(o->max_error >= 0) || !isfinite(o->max_error))
+        return ebpo_fail(c->error, EBPO_E_ARGUMENT, "maximum error %g: give a length above 0, or 0 to keep everything", o->max_error);
     c->last_level = o->last_level < 0 || o->last_level > deepest ? deepest : o->last_level;
     c->parts = c->from->parts & o->parts;
     if (!(c->parts & EBPO_PART_MESH))
@@ -66,6 +69,8 @@ static ebpo_status settle(ebpo_cutting *c)
         memcpy(info->subset_of, c->from->content_sha256, sizeof info->subset_of);
     if (c->last_level < deepest)
         info->cut_levels = c->last_level + 1;
+    if (o->max_error > 0)
+        info->kept_error = o->max_error;
     return settle_box(c);
 }
 
@@ -73,7 +78,7 @@ static ebpo_status settle(ebpo_cutting *c)
 static void announce(const ebpo_cutting *c)
 {
     ebpo_expected e = EBPO_EXPECTED_INIT(c->file);
-    if (c->options->boxed || !ebpo_input_expects(&c->file->in))
+    if (c->options->boxed || c->need || !ebpo_input_expects(&c->file->in))
         return;
     for (int level = 0; level <= c->last_level; level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++) {
@@ -100,7 +105,19 @@ static void name_mesh(ebpo_tree *out)
 
 ebpo_status ebpo_subset_tree(ebpo_tree *out, ebpo_file *file, const ebpo_subset_options *options, ebpo_error *error)
 {
-    ebpo_cutting c = { .file = file, .from = ebpo_file_info(file), .options = options, .out = out, .error = error };
+    ebpo_need *need = NULL;
+    ebpo_status status = EBPO_OK;
+    if (options->max_error > 0)
+        status = ebpo_need_open(&need, file, options->parts & EBPO_PART_PLANES, options->write.threads, options->write.progress, error);
+    if (status == EBPO_OK)
+        status = ebpo_subset_tree_needed(out, file, options, need, error);
+    ebpo_need_close(need);
+    return status;
+}
+
+ebpo_status ebpo_subset_tree_needed(ebpo_tree *out, ebpo_file *file, const ebpo_subset_options *options, ebpo_need *need, ebpo_error *error)
+{
+    ebpo_cutting c = { .file = file, .from = ebpo_file_info(file), .options = options, .out = out, .error = error, .need = options->max_error > 0 ? need : NULL };
     memset(out, 0, sizeof *out);
     ebpo_status status = settle(&c);
     if (status == EBPO_OK)
@@ -118,11 +135,12 @@ ebpo_status ebpo_subset_tree(ebpo_tree *out, ebpo_file *file, const ebpo_subset_
     }
     bool lost_planes = c.from->parts & ~c.parts & EBPO_PART_PLANES;
     out->info.parts = c.parts;
-    if ((options->boxed && out->info.pruned) || lost_planes)
+    if (((options->boxed || c.need) && out->info.pruned) || lost_planes)
         ebpo_cut_volumes(&c);
     if (!out->info.pruned) {
         out->info.cut_levels = 0;
         out->info.boxed = false;
+        out->info.kept_error = 0;
     }
     name_mesh(out);
     return EBPO_OK;
@@ -131,14 +149,36 @@ ebpo_status ebpo_subset_tree(ebpo_tree *out, ebpo_file *file, const ebpo_subset_
 ebpo_status ebpo_subset(ebpo_file *file, const char *path, const ebpo_subset_options *options, ebpo_error *error)
 {
     static const ebpo_subset_options usual = EBPO_SUBSET_OPTIONS_INIT;
-    options = options ? options : &usual;
-    ebpo_write_options write = options->write;
+    ebpo_subset_options wanted = options ? *options : usual;
     ebpo_tree tree;
-    ebpo_status status = ebpo_subset_tree(&tree, file, options, error);
+    ebpo_status status = wanted.target_bytes ? ebpo_subset_fit(file, path, &wanted, error) : EBPO_OK;
+    if (status == EBPO_OK)
+        status = ebpo_subset_tree(&tree, file, &wanted, error);
     if (status != EBPO_OK)
         return status;
-    write.parts = ~0u;
-    status = ebpo_tree_write(&tree, path, &write, error);
+    wanted.write.parts = ~0u;
+    status = ebpo_tree_write(&tree, path, &wanted.write, error);
     ebpo_tree_free(&tree);
+    return status;
+}
+
+ebpo_status ebpo_subset_of_tree(ebpo_tree *tree, const char *path, const ebpo_subset_options *options, ebpo_error *error)
+{
+    static const ebpo_subset_options usual = EBPO_SUBSET_OPTIONS_INIT;
+    const ebpo_subset_options *o = options ? options : &usual;
+    ebpo_publish whole = EBPO_PUBLISH_INIT;
+    ebpo_write_options write = o->write;
+    ebpo_file *file = NULL;
+    write.parts = ~0u;
+    ebpo_status status = ebpo_publish_begin(&whole, path, error);
+    if (status == EBPO_OK)
+        status = ebpo_tree_write(tree, ebpo_publish_path(&whole), &write, error);
+    ebpo_tree_free(tree);
+    if (status == EBPO_OK)
+        status = ebpo_open(&file, ebpo_publish_path(&whole), error);
+    if (status == EBPO_OK)
+        status = ebpo_subset(file, path, o, error);
+    ebpo_close(file);
+    ebpo_publish_abort(&whole);
     return status;
 }

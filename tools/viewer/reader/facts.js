@@ -149,6 +149,9 @@ export function readFacts(attributes) {
     if (!/^[0-9a-f]{64}$/.test(out.subset_of))
       throw facts.fail('subset_of', 'it has a value that the format does not allow');
     out.subset_levels = facts.has('subset_levels') ? facts.int('subset_levels', 1, LEVELS_MAX) : undefined;
+    out.subset_error = facts.has('subset_error') ? facts.reals('subset_error', 1)[0] : undefined;
+    if (out.subset_error !== undefined && !(Number.isFinite(out.subset_error) && out.subset_error > 0))
+      throw facts.fail('subset_error', 'it has a value that the format does not allow');
     out.subset_box = facts.has('subset_box') ? facts.reals('subset_box', 6) : undefined;
     if (out.subset_box && ![0, 1, 2].every((k) => Number.isFinite(out.subset_box[k]) && Number.isFinite(out.subset_box[3 + k]) && out.subset_box[k] <= out.subset_box[3 + k]))
       throw facts.fail('subset_box', 'it has a value that the format does not allow');
