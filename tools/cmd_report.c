@@ -8,18 +8,17 @@
 #include "command.h"
 #include "report_data.h"
 #include "report_output.h"
+#include "words.h"
 
-static const char *const select_words[] = { "inherit", "kmedoids", "offset", "random", NULL }; /* by ebpo_selection */
-static const char *const normals_words[] = { "spherical", "angle", NULL };                      /* by ebpo_normal_distance */
 static const char *const up_words[] = { "x", "y", "z", NULL };
 
 static const arg_option options[] = {
     { "out", 'o', ARG_TEXT, offsetof(report_values, out), "DIR", "the folder to make; default: report-NAME, here", 0, 0, NULL },
     { "name", 0, ARG_LIST, offsetof(report_values, names), "NAME", "of a FILE's method, in their order; default: the file's name", 0, 0, NULL },
     { "select", 0, ARG_SET, offsetof(report_values, select), "LIST", "of a mesh: make a file with each of these selections of planes,\ninherit, kmedoids, offset, random; default: inherit", 0, 0,
-      select_words },
+      selection_words },
     { "percent", 0, ARG_REAL, offsetof(report_values, percent), "P", "of the theses' selections: share of the candidates; default 40", 1e-9, 100, NULL },
-    { "k-root", 0, ARG_REAL, offsetof(report_values, k_root), "K", "instead: so many planes at the root, half as many at each\nnext level", 0, 1e9, NULL },
+    { "k-root", 0, ARG_TEXT, offsetof(report_values, k_root), "K", "instead: K planes at the root, or 'K%' of the faces, half as\nmany at each next level (BP-Octree)", 0, 0, NULL },
     { "normals", 0, ARG_WORD, offsetof(report_values, normals), "NAME", "distance of normals for k-medoids: spherical (the default)\nor angle", 0, 0, normals_words },
     { "max-level", 0, ARG_INT, offsetof(report_values, max_level), "N", "of a mesh: as for 'ebpo convert'", 0, 20, NULL },
     { "leaf-faces", 0, ARG_INT, offsetof(report_values, leaf_faces), "N", "of a mesh: as for 'ebpo convert'", 0, 4294967295.0, NULL },
@@ -68,16 +67,18 @@ static int read_options(comparison *c, report_values *v, bool mesh)
         return wrong("--levels", v->levels, "the first level, a hyphen and the last one, such as 0-6");
     if (sscanf(v->view, "%lf,%lf%c", &c->azimuth, &c->elevation, &rest) != 2 || !(fabs(c->azimuth) <= 360) || !(fabs(c->elevation) <= 90))
         return wrong("--view", v->view, "an azimuth from -360 to 360, a comma, and an elevation from -90 to 90");
-    bool building = v->select || v->percent > 0 || v->k_root > 0 || v->normals >= 0 || v->max_level >= 0 || v->leaf_faces >= 0 || v->epsilon >= 0 || v->keep;
+    bool building = v->select || v->percent > 0 || v->k_root || v->normals >= 0 || v->max_level >= 0 || v->leaf_faces >= 0 || v->epsilon >= 0 || v->keep;
     if (!mesh && building) {
         fprintf(stderr, "ebpo report: --select, --percent, --k-root, --normals, --max-level, --leaf-faces, --epsilon and --keep are for a mesh, from which files are made; try 'ebpo "
                         "report --help'\n");
         return EXIT_USAGE;
     }
-    if (v->percent > 0 && v->k_root > 0) {
+    if (v->percent > 0 && v->k_root) {
         fprintf(stderr, "ebpo report: --percent and --k-root exclude each other; try 'ebpo report --help'\n");
         return EXIT_USAGE;
     }
+    if (v->k_root && words_k_root(v->k_root, 100) < 0)
+        return wrong("--k-root", v->k_root, "a number of planes, such as 500, or of percent, such as 1%");
     const ebpo_build_options usual = EBPO_BUILD_OPTIONS_INIT;
     v->select = v->select ? v->select : 1u << EBPO_SELECT_INHERIT;
     v->percent = v->percent > 0 ? v->percent : usual.percent;
@@ -194,7 +195,7 @@ static void default_place(const char *operand, char *out, size_t room)
 
 static int run(int argc, char **argv)
 {
-    report_values v = { .percent = -1, .k_root = -1, .normals = -1, .max_level = -1, .leaf_faces = -1, .epsilon = -1, .points = 10000, .seed = 1, .up = 1, .view = "30,20",
+    report_values v = { .percent = -1, .normals = -1, .max_level = -1, .leaf_faces = -1, .epsilon = -1, .points = 10000, .seed = 1, .up = 1, .view = "30,20",
                         .remote = REMOTE_VALUES_INIT };
     const char *operand[ARGS_OPERANDS_MAX];
     char usual[256];

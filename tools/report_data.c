@@ -64,7 +64,7 @@ const figure_name need_figures[NEED_FIGURES] = {
     [OF_NEED_BYTES] = { "need_bytes", "B", false, "of the file that was cut to the need" },
     [OF_NEED_FAR_LO] = { "need_hausdorff_lo", "model", false, "its envelopes reach beyond the model by at least this" },
     [OF_NEED_FAR_HI] = { "need_hausdorff_hi", "model", false, "and certainly by at most this" },
-    [OF_NEED_RATIO] = { "need_ratio", "1", false, "need_hausdorff_hi / the error, or need_bytes / the size that was asked for: 1 or less keeps the word" },
+    [OF_NEED_RATIO] = { "need_ratio", "1", false, "need_hausdorff_hi / the error that was asked for, or / what the whole file reaches where that is more (leaves cannot be refined); need_bytes / the size: 1 or less keeps the word" },
     [OF_NEED_SECONDS] = { "need_seconds", "s", true, "to make the file" },
 };
 

@@ -75,10 +75,10 @@ typedef struct method {
 } method;
 
 typedef struct report_values {
-    const char *out, *levels;
+    const char *out, *levels, *k_root;
     uint32_t select;
     int normals, up;
-    double percent, k_root, epsilon;
+    double percent, epsilon;
     int64_t max_level, leaf_faces, points, seed, threads;
     const char *view;
     arg_list names;

@@ -7,8 +7,7 @@
 #include "prepare.h"
 #include "report.h"
 #include "report_data.h"
-
-static const char *const selections[] = { "inherit", "kmedoids", "offset", "random" };
+#include "words.h"
 
 /* "dir/bunny.ebpo.h5" is bunny. */
 static void stem_of(const char *path, char *out, size_t room)
@@ -76,7 +75,7 @@ static int add_file(comparison *c, const char *path)
 
 /* --- from a mesh --- */
 
-static void build_options(const comparison *c, int selection, ebpo_build_options *o)
+static void build_options(const comparison *c, int selection, uint64_t faces, ebpo_build_options *o)
 {
     const report_values *v = c->v;
     *o = (ebpo_build_options)EBPO_BUILD_OPTIONS_INIT;
@@ -86,7 +85,7 @@ static void build_options(const comparison *c, int selection, ebpo_build_options
     o->parts |= EBPO_PART_LEAF_PLANES; /* so that each method's levels hold all of its own planes */
     o->select = (ebpo_selection)selection;
     o->percent = v->percent;
-    o->k_root = v->k_root;
+    o->k_root = v->k_root ? fmax(1, words_k_root(v->k_root, faces)) : 0;
     o->normals = (ebpo_normal_distance)v->normals;
     o->seed = (uint64_t)v->seed;
     o->threads = (unsigned)v->threads;
@@ -108,7 +107,7 @@ static ebpo_status build_one(comparison *c, const char *mesh, int selection, con
             progress_wipe(c->progress.user);
         report_warn(stderr, "report", mesh, &p.report, &p.record);
     }
-    build_options(c, selection, &build);
+    build_options(c, selection, p.mesh.face_count, &build);
     double begin = progress_now();
     status = ebpo_build(&tree, &p.mesh, &p.report, &p.record, &build, error);
     *seconds = progress_now() - begin;
@@ -123,13 +122,13 @@ static ebpo_status build_one(comparison *c, const char *mesh, int selection, con
 
 static int build_all(comparison *c, const char *mesh)
 {
-    for (int i = 0; i < 4; i++) {
+    for (int i = 0; selection_words[i]; i++) {
         char path[sizeof c->folder + 32];
         ebpo_error error = EBPO_ERROR_INIT;
         double seconds = 0;
         if (!(c->v->select >> i & 1))
             continue;
-        snprintf(path, sizeof path, "%s/%s.ebpo.h5", c->folder, selections[i]);
+        snprintf(path, sizeof path, "%s/%s.ebpo.h5", c->folder, selection_words[i]);
         if (build_one(c, mesh, i, path, &seconds, &error) != EBPO_OK)
             return command_failed("report", &error);
         int code = add_file(c, path);

@@ -45,6 +45,13 @@ static ebpo_status reach(const comparison *c, ebpo_model *model, const char *pat
     return status;
 }
 
+/* Leaves cannot be refined: no subset is promised to be closer than the file's last level is. */
+static double own_reach(const method *m)
+{
+    double reach = m->level[m->levels - 1][OF_FAR_HI];
+    return isnan(reach) ? 0 : reach;
+}
+
 static ebpo_status one_need(comparison *c, method *m, ebpo_file *file, ebpo_model *model, need_kind kind, double asked, ebpo_error *error)
 {
     char path[sizeof c->folder + 16];
@@ -57,7 +64,7 @@ static ebpo_status one_need(comparison *c, method *m, ebpo_file *file, ebpo_mode
     if (status == EBPO_OK)
         status = reach(c, model, path, n, error);
     unlink(path);
-    n->figure[OF_NEED_RATIO] = (kind == NEED_ERROR ? n->figure[OF_NEED_FAR_HI] : n->figure[OF_NEED_BYTES]) / asked;
+    n->figure[OF_NEED_RATIO] = kind == NEED_ERROR ? n->figure[OF_NEED_FAR_HI] / fmax(asked, own_reach(m)) : n->figure[OF_NEED_BYTES] / asked;
     if (status == EBPO_OK || status == EBPO_E_ABSENT)
         m->need_count++;
     return status;

@@ -187,7 +187,8 @@ void page_needs(FILE *out, const comparison *c)
         return;
     page_section(out, "needs", "Choosing by need",
                  "Files without mesh, cut to an error (in percent of the diagonal) or to a size. Reaches: how far the envelopes reach beyond the model, at least and certainly at most, in percent of the "
-                 "diagonal. Kept: that bound divided by the error that was asked for, or the bytes divided by the size; 1 or less keeps the word.");
+                 "diagonal. Kept: that bound divided by the error that was asked for, or by what the whole file reaches where that is more (leaves cannot be refined); bytes divided by the size. 1 or less "
+                 "keeps the word.");
     page_groups(out, c, 4, "", "<th>asked for</th>", "<th class=\"first\">bytes</th><th>reaches ≥</th><th>≤</th><th>kept</th>");
     for (int i = 0; i < most->need_count; i++)
         need_row(out, c, &most->need[i]);
