@@ -25,7 +25,7 @@ static const arg_option options[] = {
     { "epsilon", 0, ARG_REAL, offsetof(report_values, epsilon), "E", "of a mesh: as for 'ebpo convert'", 0, 1, NULL },
     ARG_SWITCH("keep", 0, report_values, keep, "keep the files that were made of a mesh in DIR"),
     { "levels", 0, ARG_TEXT, offsetof(report_values, levels), "A-B", "measure these levels only", 0, 0, NULL },
-    { "points", 0, ARG_INT, offsetof(report_values, points), "N", "questions of each kind; default 10000", 1, 1e8, NULL },
+    { "points", 0, ARG_INT, offsetof(report_values, points), "N", "questions of each kind; default 5000", 1, 1e8, NULL },
     { "seed", 0, ARG_INT, offsetof(report_values, seed), "S", "of all that is drawn at random; default 1", 0, 1e15, NULL },
     ARG_SWITCH("need", 0, report_values, need, "also cut files to errors and to sizes, and see how well they\nkeep to them"),
     ARG_SWITCH("no-pictures", 0, report_values, no_pictures, "no pictures of the levels"),
@@ -195,7 +195,7 @@ static void default_place(const char *operand, char *out, size_t room)
 
 static int run(int argc, char **argv)
 {
-    report_values v = { .percent = -1, .normals = -1, .max_level = -1, .leaf_faces = -1, .epsilon = -1, .points = 10000, .seed = 1, .up = 1, .view = "30,20",
+    report_values v = { .percent = -1, .normals = -1, .max_level = -1, .leaf_faces = -1, .epsilon = -1, .points = 5000, .seed = 1, .up = 1, .view = "30,20",
                         .remote = REMOTE_VALUES_INIT };
     const char *operand[ARGS_OPERANDS_MAX];
     char usual[256];

@@ -152,9 +152,6 @@ static void widen(axis *a)
         return;
     }
     a->step = rounded((a->high - a->low) / 5, true);
-    double low = a->step * floor(a->low / a->step * 1.0001);
-    a->low = low > 0 ? low : a->low;
-    a->high = a->step * ceil(a->high / a->step * 0.9999);
 }
 
 static axis axis_of(const plot *p, bool vertical)
@@ -207,7 +204,7 @@ static void tick_label(FILE *out, const axis *a, double v)
 
 static void stepped_ticks(FILE *out, const axis *a)
 {
-    for (double v = a->step * ceil(a->low / a->step - 1e-6); v <= a->high + a->step * 1e-6; v += a->step) {
+    for (double v = a->step * ceil(a->low / a->step); v <= a->high; v += a->step) {
         grid_line(out, a, v, true);
         tick_label(out, a, fabs(v));
     }

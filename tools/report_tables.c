@@ -197,22 +197,46 @@ void page_needs(FILE *out, const comparison *c)
 
 /* --- one method's levels --- */
 
-static void level_row(FILE *out, const comparison *c, int level, const double *f, bool alone)
+/* Bytes, volumes and distances of one level. */
+static void shape_row(FILE *out, const comparison *c, int level, const double *f, bool alone)
 {
     fprintf(out, "<tr><th>%d</th>", level);
-    cell(out, PLOT_BYTES, f[OF_BYTES]);
+    cell_first(out, PLOT_BYTES, f[OF_BYTES]);
     cell(out, PLOT_BYTES, f[OF_CUMULATIVE_BYTES]);
     cell_count(out, f[OF_GRAY]);
     cell_count(out, f[OF_LEAVES]);
-    cell_count(out, f[OF_PLANES] + f[OF_LEAF_PLANES]);
+    cell_count(out, f[OF_PLANES]);
+    cell_count(out, f[OF_LEAF_PLANES]);
     cell_first(out, PLOT_NUMBER, f[OF_VOLUME]);
     cell(out, PLOT_NUMBER, f[OF_EXCESS]);
     if (alone)
         cell(out, PLOT_NUMBER, f[OF_LEVELS_EXCESS]);
+    cell(out, PLOT_NUMBER, f[OF_LIMIT_EXCESS]);
     cell(out, PLOT_NUMBER, f[OF_EXCESS_TO_LIMIT]);
     cell_first(out, PLOT_NUMBER, of_diagonal(c, f[OF_FAR_LO]));
     cell(out, PLOT_NUMBER, of_diagonal(c, f[OF_FAR_HI]));
     cell(out, PLOT_NUMBER, of_diagonal(c, f[OF_FAR_MEAN]));
+    cell(out, PLOT_NUMBER, of_diagonal(c, f[OF_FAR_RMS]));
+    fputs("</tr>\n", out);
+}
+
+static void shape_table(FILE *out, const comparison *c, const method *m)
+{
+    bool alone = !(m->info.parts & EBPO_PART_LEAF_PLANES);
+    fprintf(out,
+            "<div class=\"scroll\"><table><thead><tr class=\"groups\"><th></th><th colspan=\"6\">in the file</th><th colspan=\"%d\">volume</th><th colspan=\"4\">distance to the model, %%</th></tr>\n"
+            "<tr><th>level</th><th class=\"first\">bytes</th><th>so far</th><th>gray</th><th>leaves</th><th>planes</th><th>of leaves</th><th class=\"first\">envelopes</th><th>excess, %%</th>%s"
+            "<th>limit’s, %%</th><th>× limit</th><th class=\"first\">farthest ≥</th><th>≤</th><th>mean</th><th>rms</th></tr></thead><tbody>\n",
+            alone ? 5 : 4, alone ? "<th>levels alone, %</th>" : "");
+    for (int k = c->first; k <= method_last(c, m); k++)
+        shape_row(out, c, k, m->level[k], alone);
+    fputs("</tbody></table></div>\n", out);
+}
+
+/* Questions to one level, and having it. */
+static void answer_row(FILE *out, const comparison *c, int level, const double *f)
+{
+    fprintf(out, "<tr><th>%d</th>", level);
     cell_first(out, PLOT_NUMBER, 100 * f[OF_MAYBE_UNIFORM]);
     cell(out, PLOT_NUMBER, 100 * f[OF_MAYBE_NEAR]);
     cell(out, PLOT_SECONDS, 1e-9 * f[OF_INSIDE_NS]);
@@ -226,24 +250,24 @@ static void level_row(FILE *out, const comparison *c, int level, const double *f
     fputs("</tr>\n", out);
 }
 
-static void method_table(FILE *out, const comparison *c, const method *m)
+static void answer_table(FILE *out, const comparison *c, const method *m)
 {
-    bool alone = !(m->info.parts & EBPO_PART_LEAF_PLANES);
-    fputs("<h3>", out);
-    html_text(out, m->name);
-    fprintf(out,
-            "</h3>\n<div class=\"scroll\"><table><thead><tr class=\"groups\"><th></th><th colspan=\"5\">in the file</th><th colspan=\"%d\">volume</th><th colspan=\"3\">distance to the model</th>"
-            "<th colspan=\"3\">point in solid</th><th colspan=\"4\">interval of the distance</th><th colspan=\"3\">to have it</th></tr>\n",
-            alone ? 4 : 3);
-    fputs("<tr><th>level</th><th>bytes</th><th>so far</th><th>gray</th><th>leaves</th><th>planes</th><th class=\"first\">envelopes</th><th>excess, %</th>", out);
-    if (alone)
-        fputs("<th>levels<br/>alone, %</th>", out);
-    fputs("<th>× limit</th><th class=\"first\">farthest ≥, %</th><th>≤, %</th><th>mean, %</th><th class=\"first\">MAYBE, %</th><th>near, %</th><th>time</th>"
-          "<th class=\"first\">mean, %</th><th>median</th><th>99 %</th><th>time</th><th class=\"first\">time</th><th>read</th><th>reads</th></tr></thead><tbody>\n",
+    fputs("<div class=\"scroll\"><table><thead><tr class=\"groups\"><th></th><th colspan=\"3\">point in solid, to the level</th><th colspan=\"4\">distance, to the level: width of the interval, %</th>"
+          "<th colspan=\"3\">to have the level</th></tr>\n<tr><th>level</th><th class=\"first\">MAYBE, uniform, %</th><th>near the surface, %</th><th>time</th>"
+          "<th class=\"first\">mean</th><th>median</th><th>99 %</th><th>time</th><th class=\"first\">time</th><th>read</th><th>reads</th></tr></thead><tbody>\n",
           out);
     for (int k = c->first; k <= method_last(c, m); k++)
-        level_row(out, c, k, m->level[k], alone);
+        answer_row(out, c, k, m->level[k]);
     fputs("</tbody></table></div>\n", out);
+}
+
+static void method_table(FILE *out, const comparison *c, const method *m)
+{
+    fputs("<h3>", out);
+    html_text(out, m->name);
+    fputs("</h3>\n", out);
+    shape_table(out, c, m);
+    answer_table(out, c, m);
 }
 
 void page_tables(FILE *out, const comparison *c)
