@@ -1,4 +1,4 @@
-/* The planes of a gray node, from the root down: candidates are the normals of faces below it and, in the top levels, those of the solid's hull in the cell. */
+/* The planes of a gray node, from the root down: candidates are the normals of faces below it and those of the solid's hull in the cell. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,8 +12,9 @@
 
 enum {
     TOP_LEVELS = 4,        /* nearly free of bytes */
-    HULL_LEVELS = 20,      /* few nodes beside those below */
-    CANDIDATES_BELOW = 24, FACES_BELOW = 16,
+    MANY_LEVELS = 2,       /* round solids deserve more planes there: 73 nodes at most */
+    FACES_BELOW = 16,      /* normals of faces that are tried below the top */
+    HULL_BELOW = 24,       /* and directions of the hull, in a round */
     HULL_ROUNDS = 3,
     HULL_DIRECTIONS = 160  /* at most, in a round */
 };
@@ -142,7 +143,7 @@ static bool was_tried(const ebpo_envelope_scratch *s, uint32_t normal)
 static bool hull_round(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, double volume, double epsilon, int most)
 {
     static const double worth = 1e-3; /* of the cell */
-    int facets = ebpo_hull_facets((const double (*)[3])s->core, s->core_count, s->facet), before = s->core_count;
+    int facets = ebpo_hull_facets((const double (*)[3])s->core, s->core_count, s->facet, EBPO_HULL_FACETS), before = s->core_count;
     qsort(s->facet, (size_t)facets, sizeof *s->facet, by_area);
     for (int i = 0; i < facets && most > 0; i++) {
         const ebpo_hull_facet *f = &s->facet[i];
@@ -176,7 +177,7 @@ static double top_share(double volume)
 static int choose_now(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo_branch *branch, const ebpo_build_detail *detail, ebpo_cell cell,
                       int32_t winding, ebpo_polytope *envelope, uint32_t *codes)
 {
-    bool top = cell.level <= TOP_LEVELS, hull = cell.level <= HULL_LEVELS;
+    bool top = cell.level <= TOP_LEVELS;
     ebpo_candidate faces[EBPO_PLANES_CANDIDATES];
     int count = ebpo_build_candidates(b, branch, detail, top ? EBPO_PLANES_CANDIDATES / 2 : FACES_BELOW, faces);
     if (!ebpo_supports_gather(&s->supports, b, branch, detail, cell, winding))
@@ -186,12 +187,12 @@ static int choose_now(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebp
     for (int i = 0; i < count && volume > 0; i++) {
         double where[3];
         try_normal(s, faces[i].normal, envelope, volume, epsilon, where);
-        if (hull)
-            add_core(s, where);
+        add_core(s, where);
     }
-    if (hull && volume > 0)
-        try_hull(s, envelope, volume, epsilon, top ? HULL_DIRECTIONS : CANDIDATES_BELOW);
-    ebpo_choice choice = { .candidates = s->candidates, .count = s->count, .most = EBPO_PLANES_MAX, .epsilon = epsilon };
+    if (volume > 0)
+        try_hull(s, envelope, volume, epsilon, top ? HULL_DIRECTIONS : HULL_BELOW);
+    ebpo_choice choice = { .candidates = s->candidates, .count = s->count, 
+                           .most = cell.level <= MANY_LEVELS ? 2 * EBPO_PLANES_MAX : EBPO_PLANES_MAX, .epsilon = epsilon };
     return ebpo_select_greedy(envelope, &choice, codes);
 }
 

@@ -1,5 +1,6 @@
 #include <limits.h>
 #include <setjmp.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -34,25 +35,36 @@ void ebpo_hull_free(ebpo_hull *hull)
     free(hull);
 }
 
-double ebpo_hull_volume(ebpo_hull *hull, double *points, uint64_t count)
+static double volume_by(ebpo_hull *hull, double *points, int count, char *command, bool *failed)
 {
-    static char command[] = "qhull Pp";
     qhT *qh = &hull->qhull;
     volatile double volume = 0; /* set between setjmp and a jump */
-    if (count < 4 || count > INT_MAX / 3)
-        return 0;
+    volatile bool wrong = true;
     qh_zero(qh, hull->silence);
-    if (qh_new_qhull(qh, 3, (int)count, points, False, command, NULL, hull->silence) == 0) {
-        int failed = setjmp(qh->errexit); /* qhull's errors jump */
+    if (qh_new_qhull(qh, 3, count, points, False, command, NULL, hull->silence) == 0) {
+        int jumped = setjmp(qh->errexit); /* qhull's errors jump */
         qh->NOerrexit = False;
-        if (!failed) {
+        if (!jumped) {
             qh_getarea(qh, qh->facet_list);
             volume = qh->totvol;
+            wrong = false;
         }
         qh->NOerrexit = True;
     }
     int left, size;
     qh_freeqhull(qh, !qh_ALL);
     qh_memfreeshort(qh, &left, &size);
+    *failed = wrong;
     return volume > 0 ? volume : 0;
+}
+
+double ebpo_hull_volume(ebpo_hull *hull, double *points, uint64_t count)
+{
+    static char merged[] = "qhull Qt Pp", joggled[] = "qhull QJ Pp";
+    bool failed;
+    if (count < 4 || count > INT_MAX / 3)
+        return 0;
+    double volume = volume_by(hull, points, (int)count, merged, &failed);
+    /* Thin hulls whose facets merge into nothing: with points moved by some 1e-11 they have a volume; flat ones have next to none then. */
+    return failed ? volume_by(hull, points, (int)count, joggled, &failed) : volume;
 }

@@ -105,7 +105,7 @@ static bool has_twin(const edge *edges, int count, edge e)
 }
 
 /* False when the hull is to stay as it is: too much in one step. */
-static bool add_point(const double (*p)[3], int point, ebpo_hull_facet *facets, int *count)
+static bool add_point(const double (*p)[3], int point, ebpo_hull_facet *facets, int *count, int room)
 {
     enum { EDGES = 3 * 192 };
     edge edges[EDGES];
@@ -115,7 +115,7 @@ static bool add_point(const double (*p)[3], int point, ebpo_hull_facet *facets, 
     for (int i = 0; i < listed; i++) {
         if (has_twin(edges, listed, edges[i]))
             continue;
-        if (*count == EBPO_HULL_FACETS)
+        if (*count == room)
             return false;
         if (make_facet(p, edges[i].from, edges[i].to, point, &facets[*count]))
             ++*count;
@@ -123,14 +123,14 @@ static bool add_point(const double (*p)[3], int point, ebpo_hull_facet *facets, 
     return true;
 }
 
-int ebpo_hull_facets(const double (*points)[3], int count, ebpo_hull_facet *facets)
+int ebpo_hull_facets(const double (*points)[3], int count, ebpo_hull_facet *facets, int room)
 {
     int corner[4], made = 0;
-    if (count < 4 || count > EBPO_HULL_POINTS || !first_four(points, count, corner))
+    if (count < 4 || room < 4 || count > EBPO_HULL_POINTS || !first_four(points, count, corner))
         return 0;
     made = first_facets(points, corner, facets);
     for (int i = 0; i < count && made > 0; i++)
-        if (i != corner[0] && i != corner[1] && i != corner[2] && i != corner[3] && !add_point(points, i, facets, &made))
+        if (i != corner[0] && i != corner[1] && i != corner[2] && i != corner[3] && !add_point(points, i, facets, &made, room))
             break;
     return made;
 }

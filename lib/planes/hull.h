@@ -13,7 +13,7 @@ typedef struct ebpo_hull_facet {
 } ebpo_hull_facet;
 
 /* Triangles of the hull of points [count], at most EBPO_HULL_POINTS of them, of the order of 1; returns how many, 0 when the points lie (nearly) in a plane. `facets` has room
- * for EBPO_HULL_FACETS. Points nearer than 1e-9 to the hull found so far are left out. */
-int ebpo_hull_facets(const double (*points)[3], int count, ebpo_hull_facet *facets);
+ * for `room`; a hull of n points has 2 n - 4, but rounding may make more of them, and what does not fit is left out. Points nearer than 1e-9 to the hull found so far are left out. */
+int ebpo_hull_facets(const double (*points)[3], int count, ebpo_hull_facet *facets, int room);
 
 #endif

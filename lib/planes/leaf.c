@@ -72,7 +72,7 @@ static int by_area(const void *a, const void *b)
 static int hull_normals(const leaf_points *points, ebpo_candidate *out)
 {
     ebpo_hull_facet facets[2 * LEAF_POINTS];
-    int count = ebpo_hull_facets((const double (*)[3])points->at, points->count, facets), kept = 0;
+    int count = ebpo_hull_facets((const double (*)[3])points->at, points->count, facets, 2 * LEAF_POINTS), kept = 0;
     if (count > LEAF_CANDIDATES)
         qsort(facets, (size_t)count, sizeof *facets, by_area);
     for (int i = 0; i < count; i++) {

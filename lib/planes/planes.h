@@ -8,7 +8,7 @@
 #include "geom/polytope.h"
 
 enum {
-    EBPO_PLANES_MAX = 32,         /* a node adds at most so many to its parent's */
+    EBPO_PLANES_MAX = 32,         /* a leaf, and a gray node below the first levels, adds at most so many to its parent's */
     EBPO_PLANES_CANDIDATES = 512, /* and chooses among at most so many */
     EBPO_PLANES_STORED = 255      /* the theses' selections, which start from the cell; more than a byte counts is not stored */
 };

@@ -1,0 +1,472 @@
+/* Selections: the theses' against plain twins; the hull that proposes directions; files of every selection keep the promises; and what no envelope can be better than. */
+#include <check.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <ebpo/build.h>
+#include <ebpo/limit.h>
+#include <ebpo/lod.h>
+#include <ebpo/verify.h>
+
+#include "geom/plane_code.h"
+#include "planes/hull.h"
+#include "planes/planes.h"
+#include "solids.h"
+
+enum { MOST = 48 };
+static const double unit_cell[3] = { 1, 1, 1 };
+
+/* --- candidates on a sphere inside of the cell: each plane cuts something, so that codes tell which were chosen --- */
+
+static int make_candidates(ebpo_candidate *c, int count, uint64_t *seed)
+{
+    int made = 0;
+    while (made < count) {
+        double n[3];
+        int32_t v[3], d;
+        for (int k = 0; k < 3; k++)
+            n[k] = ebpo_test_random_unit(seed) - 0.5;
+        if (!ebpo_plane_code_normal(n, &c[made].normal))
+            continue;
+        ebpo_plane_code_decode(c[made].normal, v, &d);
+        bool far = true;
+        for (int i = 0; i < made && far; i++) {
+            int32_t w[3];
+            ebpo_plane_code_decode(c[i].normal, w, &d);
+            double dot = (double)v[0] * w[0] + (double)v[1] * w[1] + (double)v[2] * w[2];
+            double a = (double)v[0] * v[0] + (double)v[1] * v[1] + (double)v[2] * v[2], b = (double)w[0] * w[0] + (double)w[1] * w[1] + (double)w[2] * w[2];
+            far = dot < 0.96 * sqrt(a * b);
+        }
+        if (!far)
+            continue;
+        double length = sqrt((double)v[0] * v[0] + (double)v[1] * v[1] + (double)v[2] * v[2]);
+        c[made].support = 0.5 * (v[0] + v[1] + v[2]) + 0.3 * length;
+        c[made].moved = ebpo_test_random_unit(seed);
+        made++;
+    }
+    return made;
+}
+
+static int choose(ebpo_selection selection, const ebpo_choice *choice, bool *chosen)
+{
+    uint32_t codes[EBPO_PLANES_STORED];
+    ebpo_polytope p;
+    ebpo_polytope_cube(&p);
+    int count = ebpo_selection_of(selection)->select(&p, choice, codes);
+    ck_assert_int_ge(count, 0);
+    for (int i = 0; i < choice->count; i++) {
+        chosen[i] = false;
+        for (int j = 0; j < count; j++)
+            chosen[i] = chosen[i] || (codes[j] & 0xfffff) == choice->candidates[i].normal;
+    }
+    return count;
+}
+
+static void angles(uint32_t normal, double *around, double *down)
+{
+    int32_t v[3], d;
+    ebpo_plane_code_decode(normal, v, &d);
+    *around = atan2(v[1], v[0]);
+    *down = atan2(hypot(v[0], v[1]), v[2]);
+}
+
+static double difference(const ebpo_choice *choice, int a, int b)
+{
+    double aa, ad, ba, bd;
+    angles(choice->candidates[a].normal, &aa, &ad);
+    angles(choice->candidates[b].normal, &ba, &bd);
+    if (choice->normals == EBPO_NORMALS_SPHERICAL)
+        return (aa - ba) * (aa - ba) + (ad - bd) * (ad - bd);
+    double dot = sin(ad) * sin(bd) * cos(aa - ba) + cos(ad) * cos(bd);
+    return 2 - 2 * dot;
+}
+
+static double cost(const ebpo_choice *choice, const bool *chosen)
+{
+    double sum = 0;
+    for (int i = 0; i < choice->count; i++) {
+        double least = INFINITY;
+        for (int m = 0; m < choice->count; m++)
+            if (chosen[m])
+                least = fmin(least, difference(choice, i, m));
+        sum += least;
+    }
+    return sum;
+}
+
+START_TEST(no_swap_of_a_medoid_makes_kmedoids_cheaper)
+{
+    uint64_t seed = 11;
+    for (int round = 0; round < 60; round++) {
+        ebpo_candidate c[MOST];
+        bool chosen[MOST];
+        int count = 3 + (int)(ebpo_test_random(&seed) % 30);
+        ebpo_choice choice = { .candidates = c, .count = make_candidates(c, count, &seed), .most = EBPO_PLANES_STORED, .cell_size = unit_cell, .seed = ebpo_test_random(&seed),
+                               .wanted = 1 + (int)(ebpo_test_random(&seed) % (uint64_t)count), .normals = round % 2 ? EBPO_NORMALS_ANGLE : EBPO_NORMALS_SPHERICAL };
+        ck_assert_int_eq(choose(EBPO_SELECT_KMEDOIDS, &choice, chosen), choice.wanted);
+        double reached = cost(&choice, chosen);
+        for (int out = 0; out < count; out++)
+            for (int in = 0; in < count; in++) {
+                if (!chosen[out] || chosen[in])
+                    continue;
+                chosen[out] = false, chosen[in] = true;
+                ck_assert_double_ge(cost(&choice, chosen), reached - 1e-5);
+                chosen[out] = true, chosen[in] = false;
+            }
+    }
+}
+END_TEST
+
+START_TEST(least_offset_takes_those_that_moved_least)
+{
+    uint64_t seed = 12;
+    for (int round = 0; round < 50; round++) {
+        ebpo_candidate c[MOST];
+        bool chosen[MOST];
+        ebpo_choice choice = { .candidates = c, .count = make_candidates(c, 25, &seed), .most = EBPO_PLANES_STORED, .cell_size = unit_cell, .wanted = 1 + round % 25 };
+        ck_assert_int_eq(choose(EBPO_SELECT_OFFSET, &choice, chosen), choice.wanted);
+        double most_taken = 0, least_left = INFINITY;
+        for (int i = 0; i < choice.count; i++)
+            if (chosen[i])
+                most_taken = fmax(most_taken, c[i].moved);
+            else
+                least_left = fmin(least_left, c[i].moved);
+        ck_assert_double_le(most_taken, least_left);
+    }
+}
+END_TEST
+
+START_TEST(random_takes_consecutive_candidates_from_a_place_that_the_seed_tells)
+{
+    uint64_t seed = 13;
+    uint32_t starts = 0;
+    ebpo_candidate c[MOST];
+    ebpo_choice choice = { .candidates = c, .count = make_candidates(c, 20, &seed), .most = EBPO_PLANES_STORED, .cell_size = unit_cell, .wanted = 7 };
+    for (int round = 0; round < 200; round++) {
+        bool chosen[MOST], again[MOST];
+        choice.seed = ebpo_test_random(&seed);
+        ck_assert_int_eq(choose(EBPO_SELECT_RANDOM, &choice, chosen), 7);
+        ck_assert_int_eq(choose(EBPO_SELECT_RANDOM, &choice, again), 7);
+        ck_assert_mem_eq(chosen, again, sizeof(bool) * 20);
+        int begins = 0;
+        for (int i = 0; i < 20; i++)
+            if (chosen[i] && !chosen[(i + 19) % 20]) {
+                begins++;
+                starts |= 1u << i;
+            }
+        ck_assert_int_eq(begins, 1);
+    }
+    ck_assert_uint_eq(starts, (1u << 20) - 1);
+}
+END_TEST
+
+START_TEST(counts_wanted_are_those_of_the_theses)
+{
+    ck_assert_int_eq(ebpo_selection_wanted(10, 3, 40, 0), 4);
+    ck_assert_int_eq(ebpo_selection_wanted(11, 3, 40, 0), 5); /* rounded up */
+    ck_assert_int_eq(ebpo_selection_wanted(1, 0, 10, 0), 1);
+    ck_assert_int_eq(ebpo_selection_wanted(0, 0, 40, 0), 0);
+    ck_assert_int_eq(ebpo_selection_wanted(1000, 0, 40, 694), 694);
+    ck_assert_int_eq(ebpo_selection_wanted(1000, 1, 40, 694), 347);
+    ck_assert_int_eq(ebpo_selection_wanted(100, 1, 40, 694), 86);  /* 347, 173.5, 86.75 */
+    ck_assert_int_eq(ebpo_selection_wanted(100, 10, 40, 694), 100); /* K below 1: all of them */
+    ck_assert_int_eq(ebpo_selection_wanted(1, 0, 40, 694), 1);
+}
+END_TEST
+
+/* --- the hull --- */
+
+/* A triple is a facet when all points lie on one side of it. */
+static bool is_facet(const double (*p)[3], int count, int a, int b, int c)
+{
+    double u[3], v[3];
+    for (int k = 0; k < 3; k++) {
+        u[k] = p[b][k] - p[a][k];
+        v[k] = p[c][k] - p[a][k];
+    }
+    double n[3] = { u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0] };
+    for (int i = 0; i < count; i++) {
+        double height = 0;
+        for (int k = 0; k < 3; k++)
+            height += n[k] * (p[i][k] - p[a][k]);
+        if (height > 1e-12)
+            return false;
+    }
+    return true;
+}
+
+START_TEST(hull_has_the_facets_that_trying_all_triples_finds)
+{
+    uint64_t seed = 14;
+    static ebpo_hull_facet facets[EBPO_HULL_FACETS];
+    for (int round = 0; round < 200; round++) {
+        double p[24][3];
+        int count = 4 + (int)(ebpo_test_random(&seed) % 21), expected = 0;
+        for (int i = 0; i < count; i++)
+            for (int k = 0; k < 3; k++)
+                p[i][k] = ebpo_test_random_unit(&seed);
+        for (int a = 0; a < count; a++)
+            for (int b = a + 1; b < count; b++)
+                for (int c = b + 1; c < count; c++)
+                    expected += is_facet((const double (*)[3])p, count, a, b, c) || is_facet((const double (*)[3])p, count, a, c, b);
+        int found = ebpo_hull_facets((const double (*)[3])p, count, facets, EBPO_HULL_FACETS);
+        ck_assert_int_eq(found, expected);
+        for (int i = 0; i < found; i++)
+            ck_assert(is_facet((const double (*)[3])p, count, facets[i].corner[0], facets[i].corner[1], facets[i].corner[2]));
+    }
+}
+END_TEST
+
+START_TEST(hull_of_nearly_flat_points_stays_within_its_room)
+{
+    uint64_t seed = 15;
+    for (int round = 0; round < 2000; round++) {
+        ebpo_hull_facet facets[2 * 40 + 1];
+        double p[40][3], thin = ldexp(1, -(round % 60));
+        int room = 4 + round % 77;
+        memset(&facets[room], 0x5a, sizeof *facets);
+        for (int i = 0; i < 40; i++) { /* on a cylinder, a grid, a plane: whatever makes signs waver */
+            double a = 0.1 * (double)(ebpo_test_random(&seed) % 63);
+            p[i][0] = round % 3 ? cos(a) : ebpo_test_random_unit(&seed), p[i][1] = round % 3 ? sin(a) : ebpo_test_random_unit(&seed), p[i][2] = thin * ebpo_test_random_unit(&seed);
+        }
+        ck_assert_int_le(ebpo_hull_facets((const double (*)[3])p, 40, facets, room), room);
+        for (size_t i = 0; i < sizeof *facets; i++)
+            ck_assert_int_eq(((const unsigned char *)&facets[room])[i], 0x5a);
+    }
+}
+END_TEST
+
+START_TEST(hull_of_flat_or_repeated_points_is_nothing_and_of_a_grid_its_box)
+{
+    static ebpo_hull_facet facets[EBPO_HULL_FACETS];
+    static double p[EBPO_HULL_POINTS][3];
+    ck_assert_int_eq(ebpo_hull_facets((const double (*)[3])p, 3, facets, EBPO_HULL_FACETS), 0);
+    ck_assert_int_eq(ebpo_hull_facets((const double (*)[3])p, 100, facets, EBPO_HULL_FACETS), 0); /* all at one point */
+    for (int i = 0; i < 100; i++)
+        p[i][0] = i % 10, p[i][1] = i / 10;
+    ck_assert_int_eq(ebpo_hull_facets((const double (*)[3])p, 100, facets, EBPO_HULL_FACETS), 0); /* in a plane */
+    for (int i = 0; i < 512; i++)
+        p[i][0] = i % 8, p[i][1] = i / 8 % 8, p[i][2] = i / 64;
+    int count = ebpo_hull_facets((const double (*)[3])p, 512, facets, EBPO_HULL_FACETS);
+    double area = 0;
+    for (int i = 0; i < count; i++) {
+        area += facets[i].area;
+        int axes = 0;
+        for (int k = 0; k < 3; k++)
+            axes += fabs(fabs(facets[i].n[k]) - 1) < 1e-12;
+        ck_assert_int_eq(axes, 1);
+    }
+    ck_assert_double_eq_tol(area, 6 * 49, 1e-9);
+}
+END_TEST
+
+/* --- files --- */
+
+static char folder[32], path[64];
+
+static void enter(void)
+{
+    strcpy(folder, "/tmp/ebpo-select-XXXXXX");
+    ck_assert(mkdtemp(folder) != NULL);
+    snprintf(path, sizeof path, "%s/model.ebpo.h5", folder);
+}
+
+static void leave(void)
+{
+    unlink(path);
+    ck_assert(rmdir(folder) == 0);
+}
+
+static void write_file(ebpo_mesh mesh, const ebpo_build_options *options)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_mesh_report facts;
+    ebpo_tree tree;
+    ck_assert(ebpo_mesh_check(&facts, &mesh, 1, (ebpo_progress){0}, &error) == EBPO_OK);
+    ck_assert_msg(ebpo_build(&tree, &mesh, &facts, NULL, options, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_tree_write(&tree, path, NULL, &error) == EBPO_OK, "%s", error.message);
+    ebpo_tree_free(&tree);
+}
+
+static ebpo_file *open_file(void)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file;
+    ck_assert_msg(ebpo_open(&file, path, &error) == EBPO_OK, "%s", error.message);
+    return file;
+}
+
+static const ebpo_selection all[] = { EBPO_SELECT_INHERIT, EBPO_SELECT_KMEDOIDS, EBPO_SELECT_OFFSET, EBPO_SELECT_RANDOM };
+
+START_TEST(every_selection_makes_files_without_violations)
+{
+    const ebpo_test_solid *solid = &ebpo_test_solids[_i];
+    for (int s = _i % 2; s < 8; s += 2) { /* each solid with every second way, so that it takes half the time */
+        ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+        ebpo_error error = EBPO_ERROR_INIT;
+        ebpo_verify_report report;
+        ebpo_mesh mesh = solid->make();
+        if (mesh.face_count > 20000) {
+            ebpo_mesh_free(&mesh);
+            return;
+        }
+        options.select = all[s / 2];
+        options.leaf_faces = s % 2 ? 0 : 4;
+        options.k_root = s % 2 ? 100 : 0;
+        options.normals = s % 2 ? EBPO_NORMALS_ANGLE : EBPO_NORMALS_SPHERICAL;
+        options.parts |= EBPO_PART_LEAF_PLANES;
+        options.max_level = 5;
+        write_file(mesh, &options);
+        ebpo_file *file = open_file();
+        ck_assert_int_eq(ebpo_file_info(file)->selection, (int)options.select);
+        ck_assert_msg(ebpo_verify(file, NULL, &report, &error) == EBPO_OK, "%s", error.message);
+        ck_assert_msg(report.violations == 0, "%s, selection %d: %llu violations", solid->name, s, (unsigned long long)report.violations);
+        ebpo_close(file);
+    }
+}
+END_TEST
+
+static void digest_of(ebpo_selection select, uint64_t seed, unsigned threads, uint8_t digest[32])
+{
+    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+    options.select = select;
+    options.seed = seed;
+    options.threads = threads;
+    options.parts |= EBPO_PART_LEAF_PLANES;
+    write_file(ebpo_test_torus(2, 0.7, 160, 80), &options); /* more than one subtree */
+    ebpo_file *file = open_file();
+    memcpy(digest, ebpo_file_info(file)->content_sha256, 32);
+    ebpo_close(file);
+}
+
+START_TEST(equal_seeds_give_equal_files_for_any_number_of_threads)
+{
+    for (int s = 0; s < 4; s++) {
+        uint8_t a[32], b[32], c[32];
+        digest_of(all[s], 5, 1, a);
+        digest_of(all[s], 5, 3, b);
+        digest_of(all[s], 6, 2, c);
+        ck_assert_mem_eq(a, b, 32);
+        ck_assert(!memcmp(a, c, 32) == !ebpo_selection_of(all[s])->has_seed);
+    }
+}
+END_TEST
+
+START_TEST(selections_and_their_numbers_that_make_no_sense_are_refused)
+{
+    struct { ebpo_selection select; double percent, k_root; int normals; } wrong[] = {
+        { (ebpo_selection)4, 40, 0, 0 }, { EBPO_SELECT_RANDOM, 0, 0, 0 }, { EBPO_SELECT_RANDOM, 101, 0, 0 }, { EBPO_SELECT_RANDOM, NAN, 0, 0 },
+        { EBPO_SELECT_KMEDOIDS, 40, -1, 0 }, { EBPO_SELECT_KMEDOIDS, 40, 0.5, 0 }, { EBPO_SELECT_KMEDOIDS, 40, INFINITY, 0 }, { EBPO_SELECT_KMEDOIDS, 40, 0, 2 } };
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+        ebpo_error error = EBPO_ERROR_INIT;
+        ebpo_mesh mesh = ebpo_test_tetrahedron(1);
+        ebpo_mesh_report facts;
+        ebpo_tree tree;
+        ck_assert(ebpo_mesh_check(&facts, &mesh, 1, (ebpo_progress){0}, &error) == EBPO_OK);
+        options.select = wrong[i].select;
+        options.percent = wrong[i].percent;
+        options.k_root = wrong[i].k_root;
+        options.normals = (ebpo_normal_distance)wrong[i].normals;
+        ck_assert_int_eq(ebpo_build(&tree, &mesh, &facts, NULL, &options, &error), EBPO_E_ARGUMENT);
+    }
+}
+END_TEST
+
+/* --- the limit --- */
+
+static bool has_hulls(ebpo_file *file)
+{
+    ebpo_limit limit;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_status status = ebpo_limit_level(file, 0, 1, NULL, &limit, &error);
+    ck_assert(status == EBPO_OK || status == EBPO_E_ABSENT);
+    return status == EBPO_OK;
+}
+
+START_TEST(hulls_of_a_convex_solid_fill_it_at_every_level)
+{
+    ebpo_mesh meshes[] = { ebpo_test_tetrahedron(2), ebpo_test_sphere((double[3]){ 3, -1, 1e3 }, 0.5, 3), ebpo_test_box((double[3]){ 0, 0, 0 }, (double[3]){ 1, 2, 0.001 }, 4) };
+    for (size_t i = 0; i < sizeof meshes / sizeof *meshes; i++) {
+        ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+        options.leaf_faces = 2;
+        write_file(meshes[i], &options);
+        ebpo_file *file = open_file();
+        const ebpo_info *info = ebpo_file_info(file);
+        for (int level = 0; level < info->level_count && has_hulls(file); level++) {
+            ebpo_limit limit;
+            ebpo_error error = EBPO_ERROR_INIT;
+            ck_assert(ebpo_limit_level(file, level, 2, NULL, &limit, &error) == EBPO_OK);
+            ck_assert_msg(fabs(limit.volume / info->report.volume - 1) < 1e-7, "solid %zu, level %d: hulls fill %.9f", i, level, limit.volume / info->report.volume);
+        }
+        ebpo_close(file);
+    }
+}
+END_TEST
+
+START_TEST(no_envelope_is_smaller_than_the_limit_and_inherited_ones_come_close)
+{
+    const ebpo_test_solid *solid = &ebpo_test_solids[_i];
+    if (!solid->balanced)
+        return;
+    for (int s = 0; s < 4; s += 1 + _i % 3) {
+        ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+        ebpo_mesh mesh = solid->make();
+        if (mesh.face_count > 20000) {
+            ebpo_mesh_free(&mesh);
+            return;
+        }
+        options.select = all[s];
+        options.parts |= EBPO_PART_LEAF_PLANES;
+        options.max_level = 5;
+        write_file(mesh, &options);
+        ebpo_file *file = open_file();
+        const ebpo_info *info = ebpo_file_info(file);
+        double before = INFINITY, root = info->box_size[0] * info->box_size[1] * info->box_size[2];
+        for (int level = 0; level < info->level_count && has_hulls(file); level++) {
+            ebpo_limit limit;
+            ebpo_error error = EBPO_ERROR_INIT;
+            double volume;
+            ck_assert(ebpo_limit_level(file, level, 2, NULL, &limit, &error) == EBPO_OK);
+            ck_assert(ebpo_lod_level(file, level, NULL, NULL, &volume, &error) == EBPO_OK);
+            ck_assert_msg(volume >= limit.volume - 1e-9 * root, "%s, level %d: %g below the limit %g", solid->name, level, volume, limit.volume);
+            ck_assert_double_le(volume, before * (1 + 1e-9) + 1e-12 * root);
+            if (s == 0 && level <= 3) /* offsets in 4096ths of a cell alone cost some */
+                ck_assert_msg(volume - limit.volume <= 0.03 * root, "%s, level %d: %g where %g is possible", solid->name, level, volume, limit.volume);
+            before = volume;
+        }
+        ebpo_close(file);
+    }
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("selections");
+    TCase *tests = tcase_create("choosing"), *files = tcase_create("files");
+    tcase_set_timeout(tests, 300);
+    tcase_add_test(tests, no_swap_of_a_medoid_makes_kmedoids_cheaper);
+    tcase_add_test(tests, least_offset_takes_those_that_moved_least);
+    tcase_add_test(tests, random_takes_consecutive_candidates_from_a_place_that_the_seed_tells);
+    tcase_add_test(tests, counts_wanted_are_those_of_the_theses);
+    tcase_add_test(tests, hull_has_the_facets_that_trying_all_triples_finds);
+    tcase_add_test(tests, hull_of_nearly_flat_points_stays_within_its_room);
+    tcase_add_test(tests, hull_of_flat_or_repeated_points_is_nothing_and_of_a_grid_its_box);
+    tcase_add_test(tests, selections_and_their_numbers_that_make_no_sense_are_refused);
+    suite_add_tcase(suite, tests);
+    tcase_set_timeout(files, 600);
+    tcase_add_checked_fixture(files, enter, leave);
+    tcase_add_loop_test(files, every_selection_makes_files_without_violations, 0, ebpo_test_solid_count);
+    tcase_add_test(files, equal_seeds_give_equal_files_for_any_number_of_threads);
+    tcase_add_test(files, hulls_of_a_convex_solid_fill_it_at_every_level);
+    tcase_add_loop_test(files, no_envelope_is_smaller_than_the_limit_and_inherited_ones_come_close, 0, ebpo_test_solid_count);
+    suite_add_tcase(suite, files);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_NORMAL);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed ? 1 : 0;
+}
