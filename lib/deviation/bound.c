@@ -10,8 +10,8 @@
 #include "base/error.h"
 #include "query/model.h"
 
-enum { CUT_FACES = 12 };             /* so many faces are cut along; with more, halving makes them fewer */
-static const double smallest = 1e-6; /* pieces are not cut below this, in cells */
+enum { CUT_FACES = 64 };             /* so many faces are cut along; with more, halving makes them fewer */
+static const double smallest = 1e-6; /* pieces are not cut below this, in sides of the cell */
 static const double side_least = 2e-7; /* a plane cuts a piece that reaches so far to both sides; in cells, above what ebpo_polytope_clip refuses */
 
 typedef enum piece_kind {
@@ -109,22 +109,21 @@ static ebpo_status give_leaf_faces(ebpo_bounder *b, ebpo_piece *piece, const ebp
 
 typedef struct look {
     double centre[3], reach; /* all of the piece is within reach of the centre */
-    double least;            /* half of its longest side, in cells */
     double distance;         /* of the centre; negative inside */
     double upper;
+    double face[3][3];       /* the nearest one, in the model's unit */
 } look;
 
 static void find_centre(const ebpo_bounder *b, const ebpo_polytope *p, look *l)
 {
     ebpo_extent e;
     ebpo_extent_of(p, &e);
-    l->reach = l->least = 0;
+    l->reach = 0;
     for (int k = 0; k < 3; k++) {
         l->centre[k] = 0;
         for (int i = 0; i < p->vertex_count; i++)
             l->centre[k] += p->vertex[i][k];
         l->centre[k] = fmin(fmax(l->centre[k] / p->vertex_count, fmax(e.min[k], 0)), fmin(e.max[k], 1));
-        l->least = fmax(l->least, .5 * (e.max[k] - e.min[k]));
     }
     for (int i = 0; i < p->vertex_count; i++)
         l->reach = fmax(l->reach, ebpo_cell_frame_apart(&b->frame, p->vertex[i], l->centre));
@@ -164,16 +163,16 @@ static void learn(ebpo_bounder *b, const double xi[3], double distance)
 
 static ebpo_status look_at(ebpo_bounder *b, const ebpo_piece *piece, look *l)
 {
-    double corner = 0, t[3][3];
+    double corner = 0;
     int farthest = 0;
     find_centre(b, &piece->p, l);
     ebpo_status status = ask(b, l->centre, &l->distance);
     if (status != EBPO_OK)
         return status;
-    memcpy(t, b->context->warm_triangle, sizeof t);
+    memcpy(l->face, b->context->warm_triangle, sizeof l->face);
     learn(b, l->centre, l->distance);
     for (int i = 0; i < piece->p.vertex_count; i++) {
-        double d = ebpo_cell_frame_distance(&b->frame, piece->p.vertex[i], (const double (*)[3])t);
+        double d = ebpo_cell_frame_distance(&b->frame, piece->p.vertex[i], (const double (*)[3])l->face);
         farthest = d > corner ? i : farthest;
         corner = fmax(corner, d);
     }
@@ -264,7 +263,8 @@ static bool find_plane(const ebpo_bounder *b, uint64_t face, double n[3], double
     return true;
 }
 
-static ebpo_status cut_along(ebpo_bounder *b, const ebpo_piece *piece, const double n[3], double d, bool *done)
+/* Both halves along a plane, |n| = 1; not `done` when clipping gives up. */
+static ebpo_status cut_along(ebpo_bounder *b, const ebpo_piece *piece, piece_kind kind, const double n[3], double d, bool *done)
 {
     ebpo_polytope side[2];
     double back[3] = { -n[0], -n[1], -n[2] };
@@ -272,11 +272,50 @@ static ebpo_status cut_along(ebpo_bounder *b, const ebpo_piece *piece, const dou
     *done = ebpo_cut_plane(&piece->p, n, d, &side[0]) && ebpo_cut_plane(&piece->p, back, -d, &side[1]);
     for (int i = 0; i < 2 && *done && status == EBPO_OK; i++) {
         ebpo_piece *next = NULL;
-        status = push_polytope(b, PIECE_LEAF, piece, &side[i], &next);
-        if (status == EBPO_OK)
+        status = push_polytope(b, kind, piece, &side[i], &next);
+        if (status == EBPO_OK && kind == PIECE_LEAF)
             status = give_faces(b, next, piece->face_first, piece->face_count);
     }
     return status;
+}
+
+/* Over a face, its plane's distance is the face's: pieces of about its size are cut along the prism above it, so that flat places need no fine ones. */
+static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_piece *piece, const look *l)
+{
+    double t[3][3], edge[3][3], normal[3], longest = 0;
+    bool done = false;
+    ebpo_status status = EBPO_OK;
+    (void)ebpo_cell_frame_triangle(&b->frame, l->face, t);
+    for (int i = 0; i < 3; i++) {
+        double sum = 0;
+        for (int k = 0; k < 3; k++) {
+            edge[i][k] = (t[(i + 1) % 3][k] - t[i][k]) * b->frame.side[k];
+            sum += edge[i][k] * edge[i][k];
+        }
+        longest = fmax(longest, sqrt(sum));
+    }
+    for (int k = 0; k < 3; k++)
+        normal[k] = edge[0][(k + 1) % 3] * edge[1][(k + 2) % 3] - edge[0][(k + 2) % 3] * edge[1][(k + 1) % 3];
+    for (int i = 0; i < 3 && l->reach <= 2 * longest && !done && status == EBPO_OK; i++) {
+        double n[3], d = 0, length = 0, most = -INFINITY, least = INFINITY;
+        for (int k = 0; k < 3; k++) {
+            n[k] = (edge[i][(k + 1) % 3] * normal[(k + 2) % 3] - edge[i][(k + 2) % 3] * normal[(k + 1) % 3]) * b->frame.side[k];
+            length += n[k] * n[k];
+        }
+        length = sqrt(length);
+        for (int k = 0; k < 3; k++) {
+            n[k] /= length;
+            d += n[k] * t[i][k];
+        }
+        for (int v = 0; v < piece->p.vertex_count; v++) {
+            double e = n[0] * piece->p.vertex[v][0] + n[1] * piece->p.vertex[v][1] + n[2] * piece->p.vertex[v][2] - d;
+            most = fmax(most, e);
+            least = fmin(least, e);
+        }
+        if (most > side_least && least < -side_least) /* never with NAN, of a face without area */
+            status = cut_along(b, piece, PIECE_OUT, n, d, &done);
+    }
+    return status != EBPO_OK || done ? status : cut_longest(b, piece, PIECE_OUT);
 }
 
 /* No face passes through the piece, but some may through its outermost bit: a segment from the centre to a point behind one ends so far behind it. */
@@ -298,6 +337,12 @@ static double behind_faces(const ebpo_bounder *b, const ebpo_piece *piece, const
     return share * l->reach + b->frame.grain;
 }
 
+/* The cell is thinner on some axis than coordinates are sharp. */
+static bool is_flat(const ebpo_bounder *b)
+{
+    return fmin(fmin(b->frame.side[0], b->frame.side[1]), b->frame.side[2]) < 1e10 * b->frame.grain;
+}
+
 /* A piece within a leaf, with an inside and an outside. */
 static ebpo_status cut_leaf(ebpo_bounder *b, const ebpo_piece *piece, const look *l)
 {
@@ -312,16 +357,18 @@ static ebpo_status cut_leaf(ebpo_bounder *b, const ebpo_piece *piece, const look
             least = fmin(least, e);
         }
         if (known && most > side_least && least < -side_least) {
-            status = cut_along(b, piece, n, d, &done);
+            status = cut_along(b, piece, PIECE_LEAF, n, d, &done);
             known = done;
         }
     }
     if (status != EBPO_OK || done)
         return status;
+    if (!known && is_flat(b)) /* sides cannot be told apart: as a surface */
+        return cut_prism(b, piece, l);
     if (!known)
         return cut_longest(b, piece, PIECE_LEAF);
     if (l->distance >= 0)
-        return cut_longest(b, piece, PIECE_OUT);
+        return cut_prism(b, piece, l);
     double behind = behind_faces(b, piece, l);
     if (behind > smallest && behind > b->target)
         return cut_longest(b, piece, PIECE_LEAF);
@@ -333,10 +380,10 @@ static ebpo_status cut(ebpo_bounder *b, const ebpo_piece *piece, const look *l)
 {
     switch (piece->kind) {
     case PIECE_GRAY: return cut_gray(b, piece);
-    case PIECE_LEAF: return b->whole->info->solid ? cut_leaf(b, piece, l) : cut_longest(b, piece, PIECE_OUT);
+    case PIECE_LEAF: return b->whole->info->solid ? cut_leaf(b, piece, l) : cut_prism(b, piece, l);
     case PIECE_OUT: break;
     }
-    return cut_longest(b, piece, PIECE_OUT);
+    return cut_prism(b, piece, l);
 }
 
 /* --- the search --- */
@@ -376,7 +423,7 @@ static ebpo_status step(ebpo_bounder *b)
     if (status != EBPO_OK)
         return status;
     piece.upper = l.upper;
-    if (l.upper <= b->target || l.least < smallest) {
+    if (l.upper <= b->target || l.reach < smallest) {
         settle(b, l.upper);
         return EBPO_OK;
     }
@@ -400,4 +447,43 @@ ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell, const ebpo_boun
         settle(b, b->pieces[i].upper);
     *out = (ebpo_reach_bound){ b->lo > 0 ? ldexp(b->lo, b->frame.exponent) : 0, ebpo_cell_frame_model_length(&b->frame, b->hi), { b->place[0], b->place[1], b->place[2] }, b->questions };
     return status;
+}
+
+static void merge(ebpo_reach_bound *known, const ebpo_reach_bound *found)
+{
+    known->hi = fmin(known->hi, found->hi);
+    known->questions += found->questions;
+    if (found->lo <= known->lo)
+        return;
+    known->lo = found->lo;
+    memcpy(known->place, found->place, sizeof known->place);
+}
+
+ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound_wish *wish, ebpo_reach_bound *out, ebpo_error *error)
+{
+    ebpo_reach_bound found;
+    ebpo_bound_wish now = *wish;
+    uint64_t asked = 0;
+    ebpo_status status = EBPO_OK;
+    if (isinf(out->hi)) {
+        ebpo_cell_frame frame;
+        ebpo_box box = b->whole->box;
+        ebpo_cell_frame_make(&frame, &box, cell);
+        out->hi = ebpo_cell_frame_model_length(&frame, ebpo_cell_frame_diagonal(&frame, 0)); /* a gray node or leaf touches a face */
+    }
+    for (;;) {
+        double good = fmax(wish->enough, wish->ratio * out->lo);
+        if (status != EBPO_OK || out->hi <= good || asked >= wish->questions || out->lo > wish->too_much)
+            return status;
+        now.enough = fmax(out->hi / 2, good);
+        now.questions = wish->questions - asked;
+        status = ebpo_bound_envelope(b, cell, &now, &found, error);
+        if (status != EBPO_OK)
+            return status;
+        bool stuck = found.hi >= out->hi && found.lo <= out->lo;
+        asked += found.questions;
+        merge(out, &found);
+        if (stuck)
+            return EBPO_OK; /* rounding is all there is left */
+    }
 }

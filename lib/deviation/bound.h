@@ -29,7 +29,7 @@ typedef struct ebpo_bounder {
 typedef struct ebpo_bound_wish {
     double enough;      /* an upper bound of so much is good enough; 0: none is */
     double too_much;    /* stop once it certainly reaches farther; INFINITY: never */
-    double ratio;       /* an upper bound of `ratio` times the lower one is good enough; 0: none is */
+    double ratio;       /* an upper bound of `ratio` times the lower one is good enough, > 1; 0: none is */
     uint64_t questions; /* stop after about so many distances */
 } ebpo_bound_wish;
 
@@ -47,5 +47,9 @@ void ebpo_bounder_free(ebpo_bounder *b);
  * its largest value over a piece is that at a corner. Pieces follow the model's tree down to leaves; within these, they are cut along the faces' planes, until each is inside or
  * outside. The order and the cuts depend on the envelope alone, so with a larger `enough` no more is asked. */
 EBPO_MUST_USE ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound_wish *wish, ebpo_reach_bound *out, ebpo_error *error);
+
+/* The same for a `ratio`, from what is known on entry in *out (0, INFINITY and 0 questions: nothing): step by step with half the upper bound, so that far places are found before close ones are looked at
+ * closely, and with what is certain when the questions are spent. */
+EBPO_MUST_USE ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound_wish *wish, ebpo_reach_bound *out, ebpo_error *error);
 
 #endif

@@ -14,7 +14,7 @@
 #include "deviation/samples.h"
 #include "query/model.h"
 
-enum { BLOCK_MOST = 512, QUESTIONS_MOST = 1 << 20 }; /* of one node: with less than that left to find, rounding is all there is */
+enum { BLOCK_MOST = 512, QUESTIONS_MOST = 1 << 16 }; /* of one node: what is left to find then lies in flat places, close to the model */
 
 typedef struct level_node {
     ebpo_cell cell;
@@ -65,23 +65,13 @@ static ebpo_status list_nodes(survey *s, const ebpo_tree_place *place)
 static ebpo_status bound_node(survey *s, ebpo_bounder *b, level_node *node, ebpo_error *error)
 {
     ebpo_tree_place place;
-    ebpo_reach_bound found;
     ebpo_status status = EBPO_OK;
     (void)ebpo_tree_find(s->tree, node->cell, true, true, &place, &b->halves);
     if (place.type == EBPO_LEAF && s->tree->leaf_source == EBPO_LEAF_DERIVED)
         status = ebpo_tree_derive(s->tree, &place, &b->scratch, &b->halves, error);
-    if (status == EBPO_OK)
-        status = ebpo_bound_envelope(b, node->cell, &s->wish, &found, error);
     if (status != EBPO_OK)
         return status;
-    found.questions += node->bound.questions;
-    found.hi = fmin(found.hi, node->bound.hi);
-    if (node->bound.lo > found.lo) {
-        found.lo = node->bound.lo;
-        memcpy(found.place, node->bound.place, sizeof found.place);
-    }
-    node->bound = found;
-    return EBPO_OK;
+    return s->wish.ratio > 0 ? ebpo_bound_closely(b, node->cell, &s->wish, &node->bound, error) : ebpo_bound_envelope(b, node->cell, &s->wish, &node->bound, error);
 }
 
 static ebpo_status bound_some(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)

@@ -128,13 +128,13 @@ ebpo_status ebpo_need_judge(ebpo_need *n, ebpo_need_node *nodes, uint64_t count,
 ebpo_status ebpo_need_most(ebpo_need *n, double *out, ebpo_error *error)
 {
     ebpo_tree_place place;
-    ebpo_reach_bound found;
+    ebpo_reach_bound found = { 0, INFINITY, { 0, 0, 0 }, 0 };
     ebpo_cell root = { 0, { 0, 0, 0 } };
     ebpo_bound_wish wish = { 0, INFINITY, 1.02, QUESTIONS };
     (void)ebpo_tree_find(&n->tree, root, n->planes, true, &place, &n->bounders[0].halves);
     if (place.type == EBPO_LEAF)
         n->bounders[0].halves.count = 0;
-    ebpo_status status = ebpo_bound_envelope(&n->bounders[0], root, &wish, &found, error);
+    ebpo_status status = ebpo_bound_closely(&n->bounders[0], root, &wish, &found, error);
     if (status != EBPO_OK)
         return status;
     memory *m = place.type == EBPO_GRAY ? n->gray[0] : n->leaf[0];

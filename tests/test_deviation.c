@@ -1,0 +1,235 @@
+/* How far levels reach: bounds that hold, meet, and do not depend on scale, place or threads. */
+#include <check.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <ebpo/deviation.h>
+#include <ebpo/subset.h>
+
+#include "query_kit.h"
+#include "twin_reach.h"
+
+__attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
+const char *__lsan_default_suppressions(void)
+{
+    return "leak:libhdf5";
+}
+
+static const query_variant stored = { "stored", 4, 5, EBPO_RULE_NONZERO, EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES };
+static const query_variant derived = { "derived", 8, 5, EBPO_RULE_NONZERO, EBPO_PART_PLANES | EBPO_PART_MESH };
+static const query_variant cells = { "cells", 4, 4, EBPO_RULE_NONZERO, EBPO_PART_MESH | EBPO_PART_MAPS };
+
+static ebpo_deviation deviation(query_model *m, int level, double tolerance, uint64_t samples, unsigned threads)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_deviation_options o = EBPO_DEVIATION_OPTIONS_INIT;
+    ebpo_deviation out;
+    o.tolerance = tolerance;
+    o.samples = samples;
+    o.threads = threads;
+    ck_assert_msg(ebpo_deviation_level(m->model, m->file, level, &o, &out, &error) == EBPO_OK, "%s, level %d: %s", m->name, level, error.message);
+    return out;
+}
+
+/* Rounding is all that may remain of hi: some 1e-5 of the model. */
+static void check_level(query_model *m, int level)
+{
+    ebpo_deviation d = deviation(m, level, 0.05, 500, 1);
+    double twin = twin_reach(m->file, level, &m->mesh, m->info.solid, 400, (uint64_t)level), slack = 1e-9 * (m->size + m->largest);
+    ck_assert_msg(twin <= d.hi + slack, "%s, %s, level %d: %.17g found, at most %.17g certified", m->name, m->variant, level, twin, d.hi);
+    ck_assert_msg(d.hi <= 1.05 * d.lo + 1e-5 * m->size, "%s, %s, level %d: %.17g to %.17g", m->name, m->variant, level, d.lo, d.hi);
+    ck_assert(d.lo >= 0 && d.lo <= d.hi);
+    if (d.lo > 0) {
+        double there = twin_distance(&m->mesh, m->info.solid, d.place);
+        ck_assert_msg(fabs(there - d.lo) <= slack, "%s, %s, level %d: the place is %.17g away, not %.17g", m->name, m->variant, level, there, d.lo);
+    }
+    ck_assert(d.samples <= 500);
+    if (d.samples)
+        ck_assert(d.mean >= 0 && d.mean <= d.rms * (1 + 1e-12) && d.rms <= d.hi + slack);
+    else
+        ck_assert(isnan(d.mean) && isnan(d.rms));
+}
+
+START_TEST(bounds_hold_and_meet)
+{
+    static const char *const names[] = { "torus", "sphere", "blob", "cone", "staircase", "sheet", "tetrahedra" };
+    for (int i = 0; i < 7; i++)
+        for (int v = 0; v < 3; v++) {
+            const query_variant *variants[] = { &stored, &derived, &cells };
+            query_model m;
+            double centre[3] = { 1, 2, 3 };
+            ebpo_mesh mesh = i == 0 ? ebpo_test_torus(3, 1, 24, 12) : i == 1 ? ebpo_test_sphere(centre, 2, 2) : i == 2 ? ebpo_test_blob(4, 40, 7) : i == 3 ? ebpo_test_cone(1, 3, 40) :
+                             i == 4 ? ebpo_test_staircase(8) : i == 5 ? ebpo_test_sheet(4, 6) : ebpo_test_tetrahedra(9);
+            query_model_make(&m, names[i], mesh, variants[v]);
+            for (int level = 0; level < m.info.level_count; level++)
+                check_level(&m, level);
+            query_model_free(&m);
+        }
+}
+END_TEST
+
+START_TEST(bounds_hold_on_random_solids)
+{
+    for (uint64_t i = 0; i < query_scaled(8); i++) {
+        query_model m;
+        query_model_make(&m, "random", query_random_solid(i, i % 2), i % 3 ? &stored : &derived);
+        for (int level = 0; level < m.info.level_count; level++)
+            check_level(&m, level);
+        query_model_free(&m);
+    }
+}
+END_TEST
+
+static ebpo_mesh hollow_box(void)
+{
+    ebpo_mesh mesh = ebpo_test_box((double[3]){ 0, 0, 0 }, (double[3]){ 8, 8, 8 }, 2), inner = ebpo_test_box((double[3]){ 1, 1, 1 }, (double[3]){ 7, 7, 7 }, 2);
+    ebpo_test_reverse(&inner);
+    ebpo_test_append(&mesh, &inner);
+    ebpo_mesh_free(&inner);
+    return mesh;
+}
+
+START_TEST(a_cavity_within_an_envelope_counts)
+{
+    query_model m;
+    query_model_make(&m, "hollow box", hollow_box(), &stored);
+    ebpo_deviation d = deviation(&m, 0, 0.01, 0, 1);
+    ck_assert_msg(d.lo > 2.95 && d.hi >= 3 && d.hi < 3.04, "%.17g to %.17g, and the cavity's middle is 3 from its walls", d.lo, d.hi);
+    query_model_free(&m);
+}
+END_TEST
+
+START_TEST(threads_do_not_change_the_result)
+{
+    query_model m;
+    query_model_make(&m, "torus", ebpo_test_torus(3, 1, 60, 30), &stored);
+    for (int level = 0; level < m.info.level_count; level++) {
+        ebpo_deviation one = deviation(&m, level, 0.02, 300, 1), three = deviation(&m, level, 0.02, 300, 3), again = deviation(&m, level, 0.02, 300, 1);
+        ck_assert(memcmp(&one, &three, sizeof one) == 0 && memcmp(&one, &again, sizeof one) == 0);
+    }
+    query_model_free(&m);
+}
+END_TEST
+
+START_TEST(a_limit_of_questions_leaves_wider_bounds_that_hold)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_deviation_options o = EBPO_DEVIATION_OPTIONS_INIT;
+    ebpo_deviation exact, limited;
+    query_model m;
+    query_model_make(&m, "torus", ebpo_test_torus(3, 1, 60, 30), &stored);
+    exact = deviation(&m, 2, 0.001, 0, 1);
+    o.tolerance = 0.001;
+    o.questions = 10;
+    o.samples = 0;
+    ck_assert(ebpo_deviation_level(m.model, m.file, 2, &o, &limited, &error) == EBPO_OK);
+    ck_assert_msg(limited.lo <= exact.hi && limited.hi >= exact.lo && limited.questions < exact.questions, "%g to %g, %g to %g", limited.lo, limited.hi, exact.lo, exact.hi);
+    query_model_free(&m);
+}
+END_TEST
+
+START_TEST(scale_and_place_scale_and_place_the_result)
+{
+    static const double scale[] = { 0x1p-1000, 0x1p-500, 0x1p-20, 0x1p20, 0x1p500, 0x1p900 };
+    query_model unit;
+    query_model_make(&unit, "torus", ebpo_test_torus(3, 1, 24, 12), &stored);
+    for (int i = 0; i < 6; i++) {
+        query_model m;
+        double matrix[3][3] = { { scale[i], 0, 0 }, { 0, scale[i], 0 }, { 0, 0, scale[i] } }, nowhere[3] = { 0, 0, 0 };
+        ebpo_mesh mesh = ebpo_test_torus(3, 1, 24, 12);
+        ebpo_test_transform(&mesh, (const double (*)[3])matrix, nowhere);
+        query_model_make(&m, "scaled torus", mesh, &stored);
+        for (int level = 0; level < m.info.level_count; level++) {
+            ebpo_deviation a = deviation(&unit, level, 0.05, 100, 1), b = deviation(&m, level, 0.05, 100, 1);
+            ck_assert_msg(fabs(b.lo / scale[i] - a.lo) < 1e-9 && fabs(b.hi / scale[i] - a.hi) < 1e-9 && fabs(b.mean / scale[i] - a.mean) < 1e-9, "scale %g, level %d: %g %g %g, %g %g %g",
+                          scale[i], level, b.lo / scale[i], b.hi / scale[i], b.mean / scale[i], a.lo, a.hi, a.mean);
+        }
+        query_model_free(&m);
+    }
+    double identity[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, far[3] = { 1e7, -1e7, 1e7 };
+    ebpo_mesh mesh = ebpo_test_torus(3, 1, 24, 12);
+    query_model m;
+    ebpo_test_transform(&mesh, (const double (*)[3])identity, far);
+    query_model_make(&m, "torus on the map", mesh, &stored);
+    for (int level = 0; level < m.info.level_count; level++) {
+        ebpo_deviation d = deviation(&m, level, 0.05, 0, 1);
+        ck_assert_msg(d.hi <= 1.05 * d.lo + 1e-4, "level %d: %g to %g", level, d.lo, d.hi);
+        ck_assert(d.hi + 1e-6 >= twin_reach(m.file, level, &m.mesh, true, 200, 1));
+    }
+    query_model_free(&m);
+    query_model_free(&unit);
+}
+END_TEST
+
+static void refused(ebpo_model *model, ebpo_file *file, int level, double tolerance, ebpo_status status, const char *says)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_deviation_options o = EBPO_DEVIATION_OPTIONS_INIT;
+    ebpo_deviation out;
+    o.tolerance = tolerance;
+    ck_assert_int_eq(ebpo_deviation_level(model, file, level, &o, &out, &error), status);
+    ck_assert_msg(strstr(error.message, says) != NULL, "%s", error.message);
+}
+
+static bool cancel(void *user, const char *stage, uint64_t done, uint64_t total)
+{
+    (void)user, (void)stage, (void)done, (void)total;
+    return false;
+}
+
+START_TEST(what_cannot_be_measured_is_refused)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    query_model m, other;
+    ebpo_subset_options o = EBPO_SUBSET_OPTIONS_INIT;
+    ebpo_file *part;
+    ebpo_model *part_model;
+    char path[120];
+    query_model_make(&m, "torus", ebpo_test_torus(3, 1, 24, 12), &stored);
+    query_model_make(&other, "box", hollow_box(), &stored);
+    refused(m.model, m.file, -1, 0.05, EBPO_E_ARGUMENT, "no level -1");
+    refused(m.model, m.file, m.info.level_count, 0.05, EBPO_E_ARGUMENT, "no level");
+    refused(m.model, m.file, 0, 0, EBPO_E_ARGUMENT, "tolerance");
+    refused(m.model, m.file, 0, NAN, EBPO_E_ARGUMENT, "tolerance");
+    refused(m.model, other.file, 0, 0.05, EBPO_E_ARGUMENT, "root cells differ");
+    snprintf(path, sizeof path, "%s/part.ebpo.h5", m.folder);
+    for (int i = 0; i < 2; i++) {
+        o.parts = i ? EBPO_PART_PLANES : EBPO_PART_PLANES | EBPO_PART_MESH;
+        o.last_level = i ? -1 : m.info.level_count - 2;
+        ck_assert(ebpo_subset(m.file, path, &o, &error) == EBPO_OK && ebpo_open(&part, path, &error) == EBPO_OK && ebpo_model_open(&part_model, part, NULL, &error) == EBPO_OK);
+        refused(part_model, part, 0, 0.05, EBPO_E_ABSENT, i ? "mesh" : "subset");
+        ebpo_model_close(part_model);
+        ebpo_close(part);
+        unlink(path);
+    }
+    ebpo_deviation_options canceled = EBPO_DEVIATION_OPTIONS_INIT;
+    ebpo_deviation out;
+    canceled.progress.report = cancel;
+    ck_assert_int_eq(ebpo_deviation_level(m.model, m.file, 2, &canceled, &out, &error), EBPO_E_CANCELLED);
+    query_model_free(&other);
+    query_model_free(&m);
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("deviation");
+    TCase *tests = tcase_create("deviation");
+    tcase_set_timeout(tests, 900);
+    tcase_add_test(tests, bounds_hold_and_meet);
+    tcase_add_test(tests, bounds_hold_on_random_solids);
+    tcase_add_test(tests, a_cavity_within_an_envelope_counts);
+    tcase_add_test(tests, threads_do_not_change_the_result);
+    tcase_add_test(tests, a_limit_of_questions_leaves_wider_bounds_that_hold);
+    tcase_add_test(tests, scale_and_place_scale_and_place_the_result);
+    tcase_add_test(tests, what_cannot_be_measured_is_refused);
+    suite_add_tcase(suite, tests);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_NORMAL);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+}
