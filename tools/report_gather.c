@@ -5,8 +5,6 @@
 #include "facts.h"
 #include "report_data.h"
 
-enum { DISTANCES = 100000 }; /* for the bounds of a level; some never meet the tolerance, as they reach hardly beyond the model at all */
-
 static double excess(const ebpo_info *info, double volume)
 {
     double solid = fabs(info->report.volume);
@@ -81,7 +79,6 @@ static ebpo_status deviations(comparison *c, method *m, ebpo_file *file, ebpo_mo
     options.seed = (uint64_t)c->v->seed;
     options.threads = (unsigned)c->v->threads;
     options.progress = c->progress;
-    options.questions = DISTANCES;
     for (int i = c->first; i <= method_last(c, m); i++) {
         ebpo_deviation far = { 0 };
         double *f = m->level[i];

@@ -29,7 +29,6 @@ static ebpo_status reach(const comparison *c, ebpo_model *model, const char *pat
     ebpo_deviation far = { 0 };
     ebpo_file *file = NULL;
     options.samples = 0;
-    options.questions = 100000;
     options.tolerance = 0.01; /* or a word that is kept would seem broken */
     options.threads = (unsigned)c->v->threads;
     options.progress = c->progress;
