@@ -143,7 +143,7 @@ static void due_lines(plot *p, const comparison *c, deadline_figure which, relat
 
 static void due_table(FILE *out, const comparison *c)
 {
-    page_groups(out, c, 4, "", "<th>within</th>", "<th class=\"first\">exact</th><th>interval, %</th><th>took</th><th>late</th>");
+    page_groups(out, c, 4, "", "<th>within</th>", "<th class=\"first\">exact</th><th>width, %</th><th>took</th><th>late</th>");
     for (int k = 0; k < DEADLINES; k++) {
         fprintf(out, "<tr><th>%u µs</th>", deadlines_us[k]);
         for (int i = 0; i < c->count; i++) {

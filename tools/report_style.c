@@ -40,7 +40,7 @@ const char report_style[] =
     "svg .lead{fill:none;stroke-width:.8;opacity:.45}svg .p{stroke:var(--card);stroke-width:1.2}svg .p:hover{stroke:var(--ink)}\n"
     ".scroll{overflow-x:auto;background:var(--card);border:1px solid var(--line);border-radius:10px;margin-bottom:14px}\n"
     "table{border-collapse:collapse;width:100%;font-size:13px}\n"
-    "th,td{padding:6px 9px;text-align:right;white-space:nowrap;border-bottom:1px solid var(--grid2)}\n"
+    "th,td{padding:6px 8px;text-align:right;white-space:nowrap;border-bottom:1px solid var(--grid2)}\n"
     "tbody tr:last-child td,tbody tr:last-child th{border-bottom:0}\n"
     "th:first-child,td:first-child{text-align:left;padding-left:16px}th:last-child,td:last-child{padding-right:16px}\n"
     "thead th{color:var(--soft);font-weight:550;vertical-align:bottom;border-bottom:1px solid var(--line);line-height:1.3}\n"
