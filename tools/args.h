@@ -49,7 +49,7 @@ typedef struct arg_spec {
 
 typedef enum arg_result { ARGS_RUN, ARGS_HELPED, ARGS_WRONG } arg_result;
 
-enum { ARGS_OPERANDS_MAX = 4 };
+enum { ARGS_OPERANDS_MAX = 12 };
 
 /* Parses argv[1 ..] into `values` (set to defaults before) and `operands` (unused ones NULL). Options may stand
  * anywhere; "--" ends them.

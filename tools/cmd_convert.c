@@ -89,18 +89,6 @@ static int usage_error(const char *message)
     return EXIT_USAGE;
 }
 
-/* Planes, or percent of the faces; -1: neither. */
-static double k_root_of(const char *text, uint64_t faces)
-{
-    char *end;
-    double k = strtod(text, &end);
-    if (*end == '%' && !end[1])
-        k *= (double)faces / 100;
-    else if (*end)
-        return -1;
-    return k > 0 && k <= 1e9 ? k : -1;
-}
-
 static int check_selection(const values *v)
 {
     bool theirs = v->select != EBPO_SELECT_INHERIT;
@@ -112,7 +100,7 @@ static int check_selection(const values *v)
         return usage_error("--percent and --k-root are two answers to one question; give one");
     if (v->percent == 0)
         return usage_error("--percent 0 leaves no planes; --without planes does that");
-    if (v->k_root && k_root_of(v->k_root, 100) < 0)
+    if (v->k_root && words_k_root(v->k_root, 100) < 0)
         return usage_error("--k-root wants a number of planes, such as 500, or of percent, such as 1%");
     if (v->normals >= 0 && v->select != EBPO_SELECT_KMEDOIDS)
         return usage_error("--normals is for --select kmedoids");
@@ -223,7 +211,7 @@ static ebpo_status build_and_write(const values *v, prepared *p, const char *out
     build.epsilon = v->epsilon >= 0 ? v->epsilon : build.epsilon;
     build.select = (ebpo_selection)v->select;
     build.percent = v->percent >= 0 ? v->percent : build.percent;
-    build.k_root = v->k_root ? fmax(1, k_root_of(v->k_root, p->mesh.face_count)) : 0;
+    build.k_root = v->k_root ? fmax(1, words_k_root(v->k_root, p->mesh.face_count)) : 0;
     build.normals = v->normals >= 0 ? (ebpo_normal_distance)v->normals : build.normals;
     build.seed = v->seed >= 0 ? (uint64_t)v->seed : build.seed;
     build.parts = parts_of(v);

@@ -14,7 +14,7 @@ typedef struct command {
 } command;
 
 extern const command command_convert, command_check, command_info, command_levels, command_extract, command_export, command_measure, command_render, command_verify;
-extern const command command_inside, command_distance, command_ray, command_box, command_bench, command_subset, command_fetch, command_view;
+extern const command command_inside, command_distance, command_ray, command_box, command_bench, command_subset, command_fetch, command_view, command_report;
 
 /* Prints "ebpo convert: message" and returns the exit code that the status stands for. */
 int command_failed(const char *name, const ebpo_error *error);

@@ -20,27 +20,40 @@ void picture_free(picture *p)
     p->rgb = NULL;
 }
 
-ebpo_status picture_write_png(const picture *p, const char *path, ebpo_error *error)
+ebpo_status picture_encode_png(const uint8_t *pixels, int width, int height, int channels, const char *what, void **bytes, size_t *size, ebpo_error *error)
 {
     png_image image;
     memset(&image, 0, sizeof image);
     image.version = PNG_IMAGE_VERSION;
-    image.width = (png_uint_32)p->width;
-    image.height = (png_uint_32)p->height;
-    image.format = PNG_FORMAT_RGB;
-    png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
-    void *bytes = malloc(size);
+    image.width = (png_uint_32)width;
+    image.height = (png_uint_32)height;
+    image.format = channels == 4 ? PNG_FORMAT_RGBA : PNG_FORMAT_RGB;
+    png_alloc_size_t room = PNG_IMAGE_PNG_SIZE_MAX(image);
     ebpo_status status = EBPO_E_MEMORY;
-    if (!bytes)
-        snprintf(error->message, sizeof error->message, "%s: no memory for %zu bytes; take a smaller --size", path,
-                 (size_t)size);
-    else if (!png_image_write_to_memory(&image, bytes, &size, 0, p->rgb, 0, NULL))
-        snprintf(error->message, sizeof error->message, "%s: libpng cannot encode the picture: %s", path,
-                 image.message);
+    *bytes = malloc(room);
+    if (!*bytes)
+        snprintf(error->message, sizeof error->message, "%s: no memory for %zu bytes; take a smaller picture", what, (size_t)room);
+    else if (!png_image_write_to_memory(&image, *bytes, &room, 0, pixels, 0, NULL))
+        snprintf(error->message, sizeof error->message, "%s: libpng cannot encode the picture: %s", what, image.message);
     else
-        status = ebpo_write_file(path, bytes, size, error);
+        status = EBPO_OK;
+    *size = room;
     error->status = status;
     png_image_free(&image);
+    if (status != EBPO_OK) {
+        free(*bytes);
+        *bytes = NULL;
+    }
+    return status;
+}
+
+ebpo_status picture_write_png(const picture *p, const char *path, ebpo_error *error)
+{
+    void *bytes;
+    size_t size;
+    ebpo_status status = picture_encode_png(p->rgb, p->width, p->height, 3, path, &bytes, &size, error);
+    if (status == EBPO_OK)
+        status = error->status = ebpo_write_file(path, bytes, size, error);
     free(bytes);
     return status;
 }

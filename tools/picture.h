@@ -18,6 +18,10 @@ void picture_free(picture *p);
 void picture_text(picture *p, int x, int y, int scale, const uint8_t colour[3], const char *text);
 int picture_text_width(int scale, const char *text);
 
+/* PNG in memory, to be freed: `channels` 3 (RGB) or 4 (RGB and opacity), 8 bits each, rows from the top. `what` is for messages. */
+EBPO_MUST_USE ebpo_status picture_encode_png(const uint8_t *pixels, int width, int height, int channels, const char *what, void **bytes, size_t *size,
+                                             ebpo_error *error);
+
 /* As a PNG file, whole or not at all. */
 EBPO_MUST_USE ebpo_status picture_write_png(const picture *p, const char *path, ebpo_error *error);
 

@@ -4,9 +4,18 @@
 #include <signal.h>
 #include <string.h>
 
+static void (*volatile also)(void);
+
+void signals_also(void (*clean_up)(void))
+{
+    also = clean_up;
+}
+
 static void give_up(int number)
 {
     ebpo_abandon_outputs();
+    if (also)
+        also();
     /* SA_RESETHAND brought the default back: the parent sees which signal it was. At once, and not when this handler returns: another thread may be
      * about to open the output by its name again. */
     sigset_t only;

@@ -5,4 +5,7 @@
 
 void signals_install(void);
 
+/* Called as well, once, when such a signal comes: it may only do what a signal handler may. */
+void signals_also(void (*clean_up)(void));
+
 #endif

@@ -1,0 +1,284 @@
+#!/usr/bin/env python3
+"""report.py TOOL INPUTS: the figures of `ebpo report`, against other commands, against figures made here, and against each other."""
+import csv
+import html.parser
+import json
+import math
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import xml.etree.ElementTree
+
+TOOL, INPUTS = (os.path.abspath(a) for a in sys.argv[1:])
+POINTS, SEED = 400, 7
+MASK = 2**64 - 1
+VOID = {"meta", "img", "br"}
+
+
+def run(*arguments, data=None):
+    return subprocess.run([TOOL, *map(str, arguments)], input=data, check=True, stdout=subprocess.PIPE).stdout
+
+
+def report(folder, *arguments, seed=SEED):
+    run("report", "-q", "--points", POINTS, "--seed", seed, "-o", folder, *arguments)
+    with open(folder / "report.csv", encoding="utf-8", newline="") as f:
+        rows = list(csv.DictReader(f))
+    return rows, json.loads((folder / "report.json").read_text(encoding="utf-8")), (folder / "report.html").read_text(encoding="utf-8")
+
+
+def value(text):
+    return None if text == "" or not math.isfinite(float(text)) else float(text)
+
+
+# --- the three files say the same ---
+
+def from_json(told):
+    """(method, level, parameter, quantity) -> value, as the lines of the CSV."""
+    found = {}
+    of = {q["name"]: q for q in told["quantities"]}
+    for m in told["methods"]:
+        places = [("", "", m)] + [(str(l["level"]), "", l) for l in m["levels"]] + [("", f"{d['microseconds']}us", d) for d in m["deadlines"]]
+        places += [("", "=".join([k, repr_c(n[k])]), n) for n in m["needs"] for k in ("max_error", "target_bytes") if k in n]
+        for level, parameter, figures in places:
+            found.update({(m["name"], level, parameter, k): v for k, v in figures.items() if k in of})
+    return found, of
+
+
+def repr_c(v):
+    return "%.17g" % v
+
+
+def agree(rows, told):
+    found, of = from_json(told)
+    lines = {(r["method"], r["level"], r["parameter"], r["quantity"]): r for r in rows}
+    assert len(lines) == len(rows) and lines.keys() == found.keys(), lines.keys() ^ found.keys()
+    for key, line in lines.items():
+        assert value(line["value"]) == found[key] and line["unit"] == of[key[3]]["unit"], (key, line)
+    return of
+
+
+class Well(html.parser.HTMLParser):
+    """Tags close in order, nothing comes from elsewhere."""
+
+    def __init__(self):
+        super().__init__()
+        self.open = []
+
+    def handle_starttag(self, tag, attributes):
+        assert tag not in ("script", "link", "iframe", "object"), tag
+        for name, text in attributes:
+            if name in ("src", "href"):
+                assert text.startswith("data:image/png;base64,") or text.startswith("#"), text[:40]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        assert tag in VOID | {"line", "path"}, tag
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag, tag
+
+
+def well_formed(page, plots):
+    parser = Well()
+    parser.feed(page)
+    parser.close()
+    assert parser.open == [], parser.open
+    assert not re.search(r"url\(|@import|https?://(?!www\.w3\.org/2000/svg)", page)
+    pictures = re.findall(r"<svg.*?</svg>", page, re.DOTALL)
+    assert sum("role=" in p for p in pictures) >= plots, len(pictures)
+    for picture in pictures:
+        xml.etree.ElementTree.fromstring(picture)
+        for number in re.findall(r' (?:x|y|x1|y1|x2|y2)="([^"]*)"', picture):
+            assert -60 <= float(number) <= 620, picture
+    assert not re.search(r"\b(?:nan|inf)\b", re.sub(r"<details>.*?</details>|data:[^\"]*", "", page, flags=re.DOTALL)), "a figure that is none"
+
+
+# --- against other commands ---
+
+def against_info(told, folder):
+    for m in told["methods"]:
+        info = json.loads(run("info", "--json", folder / f"{m['name']}.ebpo.h5"))
+        assert m["file_bytes"] == info["bytes"]["file"] and m["head_bytes"] == info["bytes"]["head"]
+        assert m["all_planes"] == sum(l["planes"] + l["leaf_planes"] for l in info["levels"])
+        solid = abs(info["report"]["volume"])
+        for mine, theirs in zip(m["levels"], info["levels"], strict=True):
+            assert mine["level"] == theirs["level"]
+            for a, b in (("bytes", "stored_bytes"), ("cumulative_bytes",) * 2, ("gray",) * 2, ("leaf",) * 2, ("planes",) * 2, ("leaf_planes",) * 2, ("envelope_volume",) * 2):
+                assert mine[a] == theirs[b], (m["name"], a, mine[a], theirs[b])
+            if told["model"]["kind"] == "solid" and solid > 0:
+                assert math.isclose(mine["excess"], 100 * (theirs["envelope_volume"] - solid) / solid, rel_tol=1e-9, abs_tol=1e-9)
+            assert mine["read_bytes"] >= mine["cumulative_bytes"] - info["bytes"]["head"] and mine["reads"] >= 1
+
+
+def unit_numbers(state):
+    while True:
+        state = (state + 0x9e3779b97f4a7c15) & MASK
+        z = ((state ^ state >> 30) * 0xbf58476d1ce4e5b9) & MASK
+        z = ((z ^ z >> 27) * 0x94d049bb133111eb) & MASK
+        yield ((z ^ z >> 31) >> 11) / 2**53
+
+
+def uniform_points(model):
+    numbers = unit_numbers(SEED)
+    axes = [(low, high) for low, high in zip(model["min"], model["max"])] * POINTS
+    return [(1 - t) * low + t * high for (low, high), t in zip(axes, numbers)]
+
+
+def quantile(values, share):
+    return sorted(values)[max(math.ceil(share * len(values)), 1) - 1]
+
+
+def questions(told, folder):
+    numbers = uniform_points(told["model"])
+    text = "".join(f"{x!r} {y!r} {z!r}\n" for x, y, z in zip(numbers[::3], numbers[1::3], numbers[2::3])).encode()
+    for m in told["methods"]:
+        file = folder / f"{m['name']}.ebpo.h5"
+        for l in m["levels"]:
+            if told["model"]["kind"] == "solid":
+                answers = run("inside", "--level", l["level"], file, data=text).decode()
+                assert l["maybe_uniform"] == sum(line.startswith("MAYBE") for line in answers.splitlines()) / POINTS
+                assert 0 <= l["maybe_near"] <= 1
+            told_widths = run("distance", "--json", "--level", l["level"], file, data=text).decode()
+            widths = [a["hi"] - a["lo"] for a in map(json.loads, told_widths.splitlines())]
+            assert l["width_median"] == quantile(widths, 0.5) and l["width_p99"] == quantile(widths, 0.99)
+            assert math.isclose(l["width_mean"], sum(widths) / POINTS, rel_tol=1e-12)
+        for due in m["deadlines"]:
+            assert 0 <= due["deadline_exact"] <= 1 and due["deadline_took_median"] <= due["deadline_took_p99"] <= due["deadline_took_max"]
+
+
+def shapes(told, folder):
+    """What the deviation certifies holds for the vertices of the envelopes, by exact distances; the limit is one."""
+    for m in told["methods"]:
+        file = folder / f"{m['name']}.ebpo.h5"
+        for l in m["levels"]:
+            run("extract", "-q", file, folder / "level.ply", "--level", l["level"])
+            answers = run("distance", "--json", file, folder / "level.ply")
+            reach = max([0, *(json.loads(line)["distance"] for line in answers.decode().splitlines())])
+            slack = 1e-6 * told["model"]["diagonal"]
+            assert reach <= l["hausdorff_hi"] + slack, (m["name"], l["level"], reach, l["hausdorff_hi"])
+            assert 0 <= l["hausdorff_lo"] <= l["hausdorff_hi"] and l["distance_mean"] <= l["distance_rms"] * (1 + 1e-12) <= l["hausdorff_hi"] + slack
+            if l["limit_volume"] is not None:
+                assert l["limit_volume"] <= l["envelope_volume"] * (1 + 1e-9)
+                assert l["excess_to_limit"] is None or math.isclose(l["excess_to_limit"], l["excess"] / l["limit_excess"], rel_tol=1e-12)
+        (folder / "level.ply").unlink()
+
+
+def needs(told):
+    for m in told["methods"]:
+        for n in m["needs"]:
+            if "target_bytes" in n:
+                assert n["need_bytes"] <= n["target_bytes"], n
+            elif n["need_hausdorff_lo"] is not None:
+                assert n["need_hausdorff_lo"] <= max(n["max_error"], m["levels"][-1]["hausdorff_hi"]) * (1 + 1e-9), n
+
+
+# --- cases ---
+
+def folder_of(inputs, name):
+    return pathlib.Path(inputs) / name
+
+
+def usual(inputs):
+    folder = folder_of(inputs, "r")
+    arguments = ("--select", "inherit,kmedoids,offset,random", "--keep", "--no-pictures", "--need", "--max-level", "3", folder_of(inputs, "torus.ply"))
+    rows, told, page = report(folder, *arguments)
+    of = agree(rows, told)
+    well_formed(page, 10)
+    against_info(told, folder)
+    questions(told, folder)
+    shapes(told, folder)
+    needs(told)
+    assert [m["name"] for m in told["methods"]] == ["inherit", "kmedoids", "offset", "random"] and all(m["build_seconds"] > 0 for m in told["methods"])
+    thesis_is_at_least(told)
+    again, _, _ = report(folder_of(inputs, "again"), *arguments, "--threads", "1")
+    steady = [[r for r in all_rows if not of[r["quantity"]]["timed"]] for all_rows in (rows, again)]
+    assert steady[0] == steady[1] and len(steady[0]) > 100, [x for x in zip(*steady) if x[0] != x[1]][:3]
+    other, _, _ = report(folder_of(inputs, "other"), *arguments, seed=SEED + 1)
+    assert [r for r in other if r["quantity"] == "maybe_uniform"] != [r for r in rows if r["quantity"] == "maybe_uniform"]
+
+
+def thesis_is_at_least(told):
+    """Every leaf, plane, face and vertex comes once, and is paid for."""
+    for m in told["methods"]:
+        total = m["levels"][-1]["thesis_cumulative_bytes"]
+        least = sum(l["leaf"] for l in m["levels"]) + 8 * m["all_planes"] + 12 * (told["model"]["faces"] + told["model"]["vertices"])
+        assert least <= total, (least, total)
+        assert math.isclose(sum(l["thesis_bytes"] for l in m["levels"]), total)
+
+
+def files(inputs):
+    a, b = folder_of(inputs, "a.ebpo.h5"), folder_of(inputs, "b.ebpo.h5")
+    run("convert", "-q", "--max-level", "2", folder_of(inputs, "sphere.ply"), a)
+    run("convert", "-q", "--max-level", "3", "--with", "leaf-planes", folder_of(inputs, "sphere.ply"), b)
+    rows, told, page = report(folder_of(inputs, "files"), "--name", "short", "--name", "<long> & 'odd'", a, b)
+    agree(rows, told)
+    well_formed(page, 10)
+    assert [len(m["levels"]) for m in told["methods"]] == [3, 4] and told["methods"][0]["build_seconds"] is None
+    for l in told["methods"][0]["levels"]:
+        assert l["levels_volume"] >= l["envelope_volume"] * (1 - 1e-9)
+    rows, told, page = report(folder_of(inputs, "some"), "--levels", "1-2", b)
+    assert [l["level"] for l in told["methods"][0]["levels"]] == [1, 2]
+    well_formed(page, 8)
+
+
+def surface(inputs):
+    folder = folder_of(inputs, "surface")
+    rows, told, page = report(folder, "--keep", "--no-pictures", "--max-level", "2", folder_of(inputs, "open_box.ply"))
+    agree(rows, told)
+    well_formed(page, 4)
+    against_info(told, folder)
+    questions(told, folder)
+    for l in told["methods"][0]["levels"]:
+        assert l["excess"] is None and l["maybe_uniform"] is None and l["inside_ns"] is None and l["width_median"] > 0 and l["hausdorff_hi"] >= 0
+    assert "exact_inside_ns" in told["methods"][0] and told["methods"][0]["exact_inside_ns"] is None
+
+
+def single_leaf(inputs):
+    folder = folder_of(inputs, "leaf")
+    rows, told, page = report(folder, "--keep", "--max-level", "0", folder_of(inputs, "cube.ply"))
+    agree(rows, told)
+    well_formed(page, 1)
+    against_info(told, folder)
+    level, = told["methods"][0]["levels"]
+    assert (level["gray"], level["leaf"]) == (0, 1)
+    # 12 faces and 8 vertices once; each plane of the box has a normal of its own
+    assert level["thesis_bytes"] == 1 + 12 * 12 + 12 * 8 + 20 * level["leaf_planes"]
+    assert abs(level["excess"]) < 1 and level["hausdorff_lo"] < 0.01 * told["model"]["diagonal"]
+
+
+def no_volume(inputs):
+    flat = folder_of(inputs, "flat.ply")
+    flat.write_text("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 2\n"
+                    "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 2 1\n", encoding="ascii")
+    rows, told, page = report(folder_of(inputs, "flat"), "--max-level", "1", flat)
+    agree(rows, told)
+    well_formed(page, 1)
+    assert told["model"]["volume"] == 0 and all(l["excess"] is None for l in told["methods"][0]["levels"])
+
+
+def without_mesh(inputs):
+    file = folder_of(inputs, "bare.ebpo.h5")
+    run("convert", "-q", "--max-level", "2", "--without", "mesh", folder_of(inputs, "torus.ply"), file)
+    rows, told, page = report(folder_of(inputs, "bare"), file)
+    agree(rows, told)
+    well_formed(page, 5)
+    method, = told["methods"]
+    assert method["exact_distance_ns"] is None and method["notes"]
+    for l in method["levels"]:
+        assert l["hausdorff_hi"] is None and l["limit_volume"] is None and l["maybe_near"] is None and l["thesis_bytes"] is None
+        assert l["maybe_uniform"] is not None and l["width_median"] > 0 and l["levels_volume"] > 0
+
+
+def main():
+    with tempfile.TemporaryDirectory() as inputs:
+        subprocess.run([INPUTS, inputs], check=True)
+        for case in (usual, files, surface, single_leaf, no_volume, without_mesh):
+            case(inputs)
+            print(f"{case.__name__}: fine")
+
+
+main()

@@ -1,0 +1,131 @@
+/* The figures of one method, but for times: what the head tells, volumes, the limit, how far the envelopes reach; then needs and the theses' costs. */
+#include <stdio.h>
+#include <string.h>
+
+#include "facts.h"
+#include "report_data.h"
+
+static double excess(const ebpo_info *info, double volume)
+{
+    double solid = fabs(info->report.volume);
+    return info->solid && solid > 0 ? 100 * (volume - solid) / solid : NAN;
+}
+
+static void from_head(const comparison *c, method *m)
+{
+    const ebpo_info *info = &m->info;
+    double planes = 0;
+    for (int i = 0; i < info->level_count; i++)
+        planes += (double)(info->level[i].plane_count + info->level[i].leaf_plane_count);
+    m->whole[OF_FILE_BYTES] = (double)info->file_bytes;
+    m->whole[OF_HEAD_BYTES] = (double)info->head_bytes;
+    m->whole[OF_ALL_PLANES] = planes;
+    for (int i = c->first; i <= method_last(c, m); i++) {
+        const ebpo_level_summary *s = &info->level[i];
+        double *f = m->level[i];
+        f[OF_BYTES] = (double)s->stored_bytes;
+        f[OF_CUMULATIVE_BYTES] = (double)facts_cumulative(info, i);
+        f[OF_GRAY] = (double)s->gray_count;
+        f[OF_LEAVES] = (double)s->leaf_count;
+        f[OF_PLANES] = (double)s->plane_count;
+        f[OF_LEAF_PLANES] = (double)s->leaf_plane_count;
+        f[OF_VOLUME] = facts_volume(info, i);
+        f[OF_EXCESS] = excess(info, f[OF_VOLUME]);
+    }
+}
+
+/* --- what the levels are --- */
+
+/* Volumes from the levels alone. */
+static ebpo_status levels_alone(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
+{
+    ebpo_stream_options wanted = { true, true, (unsigned)c->v->threads };
+    ebpo_stream *stream = NULL;
+    bool more = true;
+    ebpo_status status = ebpo_stream_new(&stream, file, &wanted, error);
+    for (int i = 0; i <= method_last(c, m) && status == EBPO_OK; i++) {
+        ebpo_stream_level told;
+        status = ebpo_stream_next_level(stream, &told, &more, error);
+        if (status == EBPO_OK && i >= c->first) {
+            m->level[i][OF_LEVELS_VOLUME] = told.volume;
+            m->level[i][OF_LEVELS_EXCESS] = excess(&m->info, told.volume);
+        }
+    }
+    ebpo_stream_free(stream);
+    return status;
+}
+
+/* --- the limit, and how far envelopes reach --- */
+
+static ebpo_status limits(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
+{
+    for (int i = c->first; i <= method_last(c, m); i++) {
+        ebpo_limit limit = { 0 };
+        double *f = m->level[i];
+        ebpo_status status = ebpo_limit_level(file, i, (unsigned)c->v->threads, &c->progress, &limit, error);
+        if (status != EBPO_OK)
+            return method_without(m, "limit", status, error);
+        f[OF_LIMIT_VOLUME] = limit.volume;
+        f[OF_LIMIT_EXCESS] = excess(&m->info, limit.volume);
+        if (f[OF_LIMIT_EXCESS] > 0)
+            f[OF_EXCESS_TO_LIMIT] = f[OF_EXCESS] / f[OF_LIMIT_EXCESS];
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status deviations(comparison *c, method *m, ebpo_file *file, ebpo_model *model, ebpo_error *error)
+{
+    ebpo_deviation_options options = EBPO_DEVIATION_OPTIONS_INIT;
+    options.seed = (uint64_t)c->v->seed;
+    options.threads = (unsigned)c->v->threads;
+    options.progress = c->progress;
+    for (int i = c->first; i <= method_last(c, m); i++) {
+        ebpo_deviation far = { 0 };
+        double *f = m->level[i];
+        ebpo_status status = ebpo_deviation_level(model, file, i, &options, &far, error);
+        if (status != EBPO_OK)
+            return method_without(m, "Hausdorff distance", status, error);
+        f[OF_FAR_LO] = far.lo;
+        f[OF_FAR_HI] = far.hi;
+        f[OF_FAR_MEAN] = far.mean;
+        f[OF_FAR_RMS] = far.rms;
+    }
+    return EBPO_OK;
+}
+
+/* --- all of it --- */
+
+static ebpo_status with_model(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
+{
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model_stats stats;
+    ebpo_model *model = NULL;
+    options.threads = (unsigned)c->v->threads;
+    ebpo_status status = ebpo_model_open(&model, file, &options, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_model_get_stats(model, &stats);
+    m->whole[OF_MEMORY_BYTES] = (double)stats.memory;
+    status = deviations(c, m, file, model, error);
+    if (status == EBPO_OK && c->v->need)
+        status = report_needs(c, m, file, model, error);
+    ebpo_model_close(model);
+    return status;
+}
+
+ebpo_status report_gather(comparison *c, method *m, ebpo_error *error)
+{
+    ebpo_file *file = NULL;
+    ebpo_status status = remote_open(&file, m->path, &c->v->remote, error);
+    from_head(c, m);
+    if (status == EBPO_OK)
+        status = levels_alone(c, m, file, error);
+    if (status == EBPO_OK)
+        status = report_thesis(c, m, file, error);
+    if (status == EBPO_OK)
+        status = limits(c, m, file, error);
+    if (status == EBPO_OK)
+        status = with_model(c, m, file, error);
+    ebpo_close(file);
+    return status;
+}
