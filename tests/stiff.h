@@ -47,7 +47,7 @@ typedef struct stiff_result {
     char fault[640];         /* why it is not stable; "": it is */
 } stiff_result;
 
-/* Builds, writes, verifies, asks `questions` points and as many rays; for all that fails `fault` tells. */
+/* Builds, writes, verifies, asks `questions` points and a quarter as many rays; for all that fails `fault` tells. */
 void stiff_run(const stiff_case *c, uint64_t questions, stiff_result *out);
 /* Check and build alone, the mesh is consumed. */
 ebpo_status stiff_build(const stiff_case *c, ebpo_mesh *mesh, ebpo_tree *tree, ebpo_error *error);

@@ -198,7 +198,7 @@ static void run_converted(const stiff_case *c, query_model *m, const ebpo_mesh *
     if (m->info.solid)
         run_volumes(c, m, r);
     if (ask_points(m, questions, r))
-        ask_rays(m, questions, r);
+        ask_rays(m, questions / 4 + 1, r);
     if (r->wrong)
         fault(r, "%llu wrong answers of %llu", (unsigned long long)r->wrong, (unsigned long long)r->asked);
 }
