@@ -24,6 +24,7 @@ struct stiff_case {
     int reached;         /* number of levels of the tree; 0: any */
     double volume;       /* integral of the winding number by a formula; 0: none */
     double within;       /* relative error that rounding the coordinates may make in that; 0: STIFF_MEASURE */
+    double measure;      /* relative error that ebpo_measure may make; 0: STIFF_MEASURE */
     double set;          /* volume of the set of points; 0: as the integral; NAN: not known */
 };
 extern const stiff_case stiff_cases[];

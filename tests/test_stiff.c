@@ -10,7 +10,7 @@
 static uint64_t questions_for(const stiff_case *c)
 {
     ebpo_mesh mesh = c->make(c);
-    uint64_t count = query_scaled(mesh.face_count < 500 ? 600 : mesh.face_count < 7000 ? 120 : mesh.face_count < 15000 ? 24 : 12);
+    uint64_t count = query_scaled(mesh.face_count < 500 ? 600 : mesh.face_count < 7000 ? 120 : mesh.face_count < 15000 ? 24 : mesh.face_count < 150000 ? 12 : 4);
     ebpo_mesh_free(&mesh);
     return count < 4 ? 4 : count;
 }
