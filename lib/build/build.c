@@ -1,4 +1,6 @@
 /* From a mesh to a tree: the stages in their order. */
+#include "geom/strict_fp.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,5 +1,7 @@
 /* Planes of a gray node: its solid's support in each candidate direction, then a selection. The support is that of the extreme points of solid ∩ cell:
  * mesh vertices in the cell, points where faces cross its boundary, corners that lie inside. */
+#include "geom/strict_fp.h"
+
 #include <math.h>
 #include <stdlib.h>
 #ifdef __SSE2__

@@ -1,6 +1,8 @@
 /* A level's envelopes: from the root down, each cut from its parent's. The top of the tree is walked first; the
  * subtrees that hang from it are independent of each other. Where it is cut depends on the tree alone, so the result
  * does not depend on the number of threads. */
+#include "geom/strict_fp.h"
+
 #include <ebpo/lod.h>
 
 #include <stdlib.h>

@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include <math.h>
 #include <stdlib.h>
 

@@ -1,4 +1,6 @@
 /* The envelope of a leaf, from its faces. */
+#include "geom/strict_fp.h"
+
 #include "geom/plane_code.h"
 #include "planes/planes.h"
 

@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include <inttypes.h>
 #include <stdarg.h>
 #include <stdio.h>

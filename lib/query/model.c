@@ -1,4 +1,6 @@
 /* Opening a model: everything at once when that fits, else the top of the tree and a cache. */
+#include "geom/strict_fp.h"
+
 #include "query/model.h"
 
 #include <inttypes.h>

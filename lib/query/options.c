@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "query/options.h"
 
 #include <inttypes.h>

@@ -1,4 +1,6 @@
 /* Levels one after the other. Of a level that has been passed only its types stay, and with polygons its planes: enough to walk down to the nodes of the next one. */
+#include "geom/strict_fp.h"
+
 #include <ebpo/stream.h>
 
 #include <inttypes.h>
