@@ -7,6 +7,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "base/parallel.h"
 #include "build/builder.h"
 #include "ebpo_config.h"
@@ -177,6 +178,7 @@ static ebpo_status run_stages(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, 
 ebpo_status ebpo_build(ebpo_tree *out, ebpo_mesh *mesh, const ebpo_mesh_report *report, const ebpo_mend_record *mend,
                        const ebpo_build_options *options, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     ebpo_build_options defaults = EBPO_BUILD_OPTIONS_INIT;
     ebpo_builder b = { 0 };
     memset(out, 0, sizeof *out);

@@ -6,6 +6,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "base/parallel.h"
 #include "mesh/check_parts.h"
 #include "mesh/positions.h"
@@ -187,6 +188,7 @@ static ebpo_status run(ebpo_check *c, ebpo_error *error)
 ebpo_status ebpo_mesh_check(ebpo_mesh_report *report, const ebpo_mesh *mesh, unsigned threads, ebpo_progress progress,
                             ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     memset(report, 0, sizeof *report);
     ebpo_status status = ebpo_mesh_check_shape(mesh, error);
     if (status != EBPO_OK)

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "container/reader.h"
 #include "subset/parts.h"
 
@@ -130,6 +131,7 @@ ebpo_status ebpo_subset_tree(ebpo_tree *out, ebpo_file *file, const ebpo_subset_
 
 ebpo_status ebpo_subset(ebpo_file *file, const char *path, const ebpo_subset_options *options, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     static const ebpo_subset_options usual = EBPO_SUBSET_OPTIONS_INIT;
     options = options ? options : &usual;
     ebpo_write_options write = options->write;
