@@ -1,5 +1,7 @@
 /* The convex hull of the solid in each cell. Its extreme points are mesh vertices in the cell, corners of what faces leave on the cell's walls, and
  * the cell's corners that lie inside. */
+#include "geom/strict_fp.h"
+
 #include <ebpo/limit.h>
 
 #include <stdlib.h>
