@@ -166,6 +166,7 @@ ebpo_status ebpo_subset(ebpo_file *file, const char *path, const ebpo_subset_opt
 
 ebpo_status ebpo_subset_of_tree(ebpo_tree *tree, const char *path, const ebpo_subset_options *options, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     static const ebpo_subset_options usual = EBPO_SUBSET_OPTIONS_INIT;
     const ebpo_subset_options *o = options ? options : &usual;
     ebpo_publish whole = EBPO_PUBLISH_INIT;
