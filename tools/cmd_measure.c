@@ -2,13 +2,15 @@
 #include <stddef.h>
 #include <stdio.h>
 
+#include <ebpo/limit.h>
+
 #include "command.h"
 #include "facts.h"
 #include "progress.h"
 #include "remote.h"
 
 typedef struct values {
-    bool json, deviation;
+    bool json, deviation, limit;
     int64_t threads;
     double tolerance;
     remote_values remote;
@@ -20,6 +22,7 @@ static const arg_option options[] = {
                "also how far each level reaches beyond the model: certain\nbounds of the farthest point, mean and rms over its surface"),
     { "tolerance", 0, ARG_REAL, offsetof(values, tolerance), "T",
       "with --deviation: bounds are refined until the upper one is\nat most 1 + T times the lower one; default 0.05", 1e-6, 1000, NULL },
+    ARG_SWITCH("limit", 0, values, limit, "also the volume of the solid's convex hull in each cell, summed:\nno convex envelopes of these cells are smaller"),
     ARG_SWITCH("json", 0, values, json, "print the numbers as JSON"),
     REMOTE_OPTIONS(values, remote),
     { 0 },
@@ -38,22 +41,39 @@ static const arg_spec spec = {
 
 /* --- words --- */
 
-/* `deviation`: [level_count], or NULL. */
-static void print_levels(const ebpo_info *info, const ebpo_deviation *deviation)
+/* What is measured of levels, as wished; [level_count], or NULL. */
+typedef struct measures {
+    const ebpo_deviation *deviation;
+    const ebpo_limit *limit;
+} measures;
+
+static double excess_ratio(const ebpo_info *info, int level, const ebpo_limit *limit)
 {
+    return (facts_volume(info, level) - info->report.volume) / (limit->volume - info->report.volume);
+}
+
+static void print_levels(const ebpo_info *info, const measures *m)
+{
+    const ebpo_deviation *deviation = m->deviation;
     printf("%5s %24s %9s", "level", "envelopes' volume", info->solid ? "% solid" : "% box");
     if (deviation)
         printf(" %13s %13s %13s %13s", "reaches", "at most", "mean", "rms");
+    if (m->limit)
+        printf(" %24s%s", "hulls' volume", info->solid ? "   excess to limit" : "");
     putchar('\n');
     for (int i = 0; i < info->level_count; i++) {
         printf("%5d %24.16g %9.2f", i, facts_volume(info, i), facts_percent(info, i));
         if (deviation)
             printf(" %13.6g %13.6g %13.6g %13.6g", deviation[i].lo, deviation[i].hi, deviation[i].mean, deviation[i].rms);
+        if (m->limit)
+            printf(" %24.16g", m->limit[i].volume);
+        if (m->limit && info->solid)
+            printf(" %17.4f", excess_ratio(info, i, &m->limit[i]));
         putchar('\n');
     }
 }
 
-static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass *mass, const ebpo_deviation *deviation)
+static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass *mass, const measures *m)
 {
     printf("%s: %s%s%s\n", path, info->solid ? "a solid" : "a surface", info->unit[0] ? ", unit " : "", info->unit);
     printf("  area      %.16g\n", mass->area);
@@ -64,7 +84,7 @@ static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass 
             printf("  %-9s %.16g %.16g %.16g\n", k ? "" : "inertia", mass->inertia[k][0], mass->inertia[k][1], mass->inertia[k][2]);
     }
     putchar('\n');
-    print_levels(info, deviation);
+    print_levels(info, m);
 }
 
 /* --- JSON --- */
@@ -82,7 +102,16 @@ static void json_deviation(json *j, const ebpo_deviation *d)
     json_end(j);
 }
 
-static void json_mass(json *j, const char *path, const ebpo_info *info, const ebpo_mass *mass, const ebpo_deviation *deviation)
+static void json_limit(json *j, const ebpo_info *info, int level, const ebpo_limit *limit)
+{
+    json_real(j, "limit_volume", limit->volume);
+    if (info->solid)
+        json_real(j, "excess_to_limit", excess_ratio(info, level, limit));
+    json_uint(j, "hulls", limit->hulls);
+    json_uint(j, "flat_hulls", limit->flat);
+}
+
+static void json_mass(json *j, const char *path, const ebpo_info *info, const ebpo_mass *mass, const measures *m)
 {
     json_text(j, "file", path);
     json_text(j, "kind", info->solid ? "solid" : "surface");
@@ -102,34 +131,44 @@ static void json_mass(json *j, const char *path, const ebpo_info *info, const eb
         json_int(j, "level", i);
         json_real(j, "envelope_volume", facts_volume(info, i));
         json_real(j, info->solid ? "percent_of_solid" : "percent_of_box", facts_percent(info, i));
-        if (deviation)
-            json_deviation(j, &deviation[i]);
+        if (m->deviation)
+            json_deviation(j, &m->deviation[i]);
+        if (m->limit)
+            json_limit(j, info, i, &m->limit[i]);
         json_end(j);
     }
     json_end(j);
 }
 
-static ebpo_status measure_levels(ebpo_file *file, const values *v, ebpo_deviation *out, ebpo_error *error)
+static ebpo_status measure_levels(ebpo_file *file, const values *v, ebpo_progress progress, ebpo_deviation *out, ebpo_error *error)
 {
-    progress_line line;
     ebpo_model *model = NULL;
     ebpo_model_options opening = EBPO_MODEL_OPTIONS_INIT;
     ebpo_deviation_options wanted = EBPO_DEVIATION_OPTIONS_INIT;
     opening.threads = wanted.threads = (unsigned)v->threads;
     wanted.tolerance = v->tolerance;
-    wanted.progress = opening.progress = progress_start(&line, "measure", v->json);
+    wanted.progress = opening.progress = progress;
     ebpo_status status = ebpo_model_open(&model, file, &opening, error);
     for (int i = 0; i < ebpo_file_info(file)->level_count && status == EBPO_OK; i++)
         status = ebpo_deviation_level(model, file, i, &wanted, &out[i], error);
     ebpo_model_close(model);
-    progress_wipe(&line);
+    return status;
+}
+
+static ebpo_status limit_levels(ebpo_file *file, const values *v, ebpo_progress progress, ebpo_limit *out, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (int i = 0; i < ebpo_file_info(file)->level_count && status == EBPO_OK; i++)
+        status = ebpo_limit_level(file, i, (unsigned)v->threads, &progress, &out[i], error);
     return status;
 }
 
 static int measure(const char *path, const values *v)
 {
     ebpo_deviation levels[EBPO_LEVELS_MAX];
-    const ebpo_deviation *deviation = v->deviation ? levels : NULL;
+    ebpo_limit limits[EBPO_LEVELS_MAX];
+    measures m = { v->deviation ? levels : NULL, v->limit ? limits : NULL };
+    progress_line line;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
     ebpo_mass mass;
@@ -141,18 +180,22 @@ static int measure(const char *path, const values *v)
         return EXIT_FAILED;
     }
     ebpo_status status = ebpo_measure(file, (unsigned)v->threads, &mass, &error);
+    ebpo_progress progress = progress_start(&line, "measure", v->json);
     if (status == EBPO_OK && v->deviation)
-        status = measure_levels(file, v, levels, &error);
+        status = measure_levels(file, v, progress, levels, &error);
+    if (status == EBPO_OK && v->limit)
+        status = limit_levels(file, v, progress, limits, &error);
+    progress_wipe(&line);
     traffic t = traffic_of(file);
     if (status == EBPO_OK && v->json) {
         json j;
         json_begin(&j, stdout);
         json_object(&j, NULL);
-        json_mass(&j, remote_shown(path), ebpo_file_info(file), &mass, deviation);
+        json_mass(&j, remote_shown(path), ebpo_file_info(file), &mass, &m);
         remote_json(&j, &t, &v->remote);
         json_finish(&j);
     } else if (status == EBPO_OK) {
-        print_mass(remote_shown(path), ebpo_file_info(file), &mass, deviation);
+        print_mass(remote_shown(path), ebpo_file_info(file), &mass, &m);
         remote_tell(&t, &v->remote, false);
     }
     ebpo_close(file);
