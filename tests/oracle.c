@@ -145,6 +145,26 @@ double oracle_round(const mpz_t num, const mpz_t den, int exponent, bool root)
     return value;
 }
 
+double oracle_volume(oracle *o)
+{
+    mpz_t sum, den, one;
+    mpz_inits(sum, den, one, NULL);
+    o->e = o->exponent;
+    for (int k = 0; k < 3; k++)
+        mpz_set_ui(o->p[k], 0);
+    for (uint32_t f = 0; f < o->face_count; f++) {
+        oracle_load(o, f);
+        oracle_dot(one, o->a[0], o->normal);
+        mpz_add(sum, sum, one);
+    }
+    mpz_set_ui(den, 6);
+    int sign = mpz_sgn(sum);
+    mpz_abs(sum, sum);
+    double value = sign * oracle_round(sum, den, 3 * o->exponent, false);
+    mpz_clears(sum, den, one, NULL);
+    return value;
+}
+
 /* --- making --- */
 
 static void copy_mesh(oracle *o, const ebpo_mesh *mesh)

@@ -31,6 +31,9 @@ double oracle_face_distance(oracle *o, const double p[3], uint32_t face);
  * no face that it meets. */
 int32_t oracle_winding(oracle *o, const double p[3]);
 
+/* The integral of the winding number over space, correctly rounded; the mesh balances. */
+double oracle_volume(oracle *o);
+
 /* Unit normal by orientation, within some ulps; (0, 0, 0) without area. */
 void oracle_normal(oracle *o, uint32_t face, double out[3]);
 

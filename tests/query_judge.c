@@ -25,7 +25,8 @@ enum { SHOWN = 3 };
 void *query_room(uint64_t count, size_t size)
 {
     void *block = calloc(count + 1, size);
-    ck_assert_ptr_nonnull(block);
+    if (!block)
+        abort();
     return block;
 }
 
@@ -38,12 +39,14 @@ uint64_t query_scaled(uint64_t count)
 
 /* --- models --- */
 
-static void write_tree(query_model *m, ebpo_mesh mesh, const query_variant *variant)
+ebpo_status query_build(ebpo_tree *tree, ebpo_mesh *mesh, const query_variant *variant, ebpo_error *error)
 {
-    ebpo_error error = EBPO_ERROR_INIT;
     ebpo_mesh_report report;
-    ebpo_tree tree;
-    ck_assert_msg(ebpo_mesh_check(&report, &mesh, 1, (ebpo_progress){ NULL, NULL }, &error) == EBPO_OK, "%s: %s", m->name, error.message);
+    ebpo_status status = ebpo_mesh_check(&report, mesh, 1, (ebpo_progress){ NULL, NULL }, error);
+    if (status != EBPO_OK) {
+        ebpo_mesh_free(mesh);
+        return status;
+    }
     ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
     options.leaf_faces = variant->leaf_faces;
     options.max_level = variant->max_level;
@@ -51,10 +54,18 @@ static void write_tree(query_model *m, ebpo_mesh mesh, const query_variant *vari
     options.threads = 1;
     if (variant->parts)
         options.parts = variant->parts;
-    ck_assert_msg(ebpo_build(&tree, &mesh, &report, NULL, &options, &error) == EBPO_OK, "%s, %s: %s", m->name, variant->name, error.message);
+    return ebpo_build(tree, mesh, &report, NULL, &options, error);
+}
+
+static ebpo_status write_tree(query_model *m, ebpo_mesh mesh, const query_variant *variant, ebpo_error *error)
+{
+    ebpo_tree tree;
+    ebpo_status status = query_build(&tree, &mesh, variant, error);
+    if (status != EBPO_OK)
+        return status;
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
     write.threads = 1;
-    ck_assert_msg(ebpo_tree_write(&tree, m->path, &write, &error) == EBPO_OK, "%s", error.message);
+    status = ebpo_tree_write(&tree, m->path, &write, error);
     m->info = tree.info;
     m->mesh = tree.mesh;
     m->face_source = tree.info.parts & EBPO_PART_MAPS ? tree.face_source : NULL;
@@ -63,6 +74,7 @@ static void write_tree(query_model *m, ebpo_mesh mesh, const query_variant *vari
     tree.face_source = NULL;
     memset(&tree.mesh, 0, sizeof tree.mesh);
     ebpo_tree_free(&tree);
+    return status;
 }
 
 static void measure(query_model *m)
@@ -84,21 +96,35 @@ static void measure(query_model *m)
         oracle_normal(m->judge, f, m->normal[f]);
 }
 
-void query_model_make(query_model *m, const char *name, ebpo_mesh mesh, const query_variant *variant)
+ebpo_status query_model_try(query_model *m, const char *name, ebpo_mesh mesh, const query_variant *variant, ebpo_error *error)
 {
-    ebpo_error error = EBPO_ERROR_INIT;
     memset(m, 0, sizeof *m);
     m->name = name;
     m->variant = variant->name;
     strcpy(m->folder, "/tmp/ebpo-query-XXXXXX");
-    ck_assert(mkdtemp(m->folder) != NULL);
+    if (!mkdtemp(m->folder))
+        abort();
     snprintf(m->path, sizeof m->path, "%s/model.ebpo.h5", m->folder);
-    write_tree(m, mesh, variant);
-    ck_assert_msg(ebpo_open(&m->file, m->path, &error) == EBPO_OK, "%s: %s", name, error.message);
-    ck_assert_msg(ebpo_model_open(&m->model, m->file, NULL, &error) == EBPO_OK, "%s, %s: %s", name, variant->name, error.message);
-    ck_assert_msg(ebpo_context_new(&m->context, m->model, &error) == EBPO_OK, "%s: %s", name, error.message);
+    ebpo_status status = write_tree(m, mesh, variant, error);
+    if (status == EBPO_OK)
+        status = ebpo_open(&m->file, m->path, error);
+    if (status == EBPO_OK)
+        status = ebpo_model_open(&m->model, m->file, NULL, error);
+    if (status == EBPO_OK)
+        status = ebpo_context_new(&m->context, m->model, error);
+    if (status != EBPO_OK) {
+        query_model_free(m);
+        return status;
+    }
     m->judge = oracle_make(&m->mesh);
     measure(m);
+    return EBPO_OK;
+}
+
+void query_model_make(query_model *m, const char *name, ebpo_mesh mesh, const query_variant *variant)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert_msg(query_model_try(m, name, mesh, variant, &error) == EBPO_OK, "%s, %s: %s", name, variant->name, error.message);
 }
 
 void query_model_free(query_model *m)
@@ -256,6 +282,73 @@ uint64_t query_wrong_limited_distance(const query_model *m, const double *points
             fprintf(stderr, "limited distance says %a in [%a, %a], face %llu; it is %a, where %d, face %llu\n", got[i].distance, got[i].lo, got[i].hi,
                     (unsigned long long)got[i].face, truth[i].distance, truth[i].where, (unsigned long long)truth[i].face);
     return wrong;
+}
+
+/* --- rays --- */
+
+uint64_t query_told(const query_model *m, uint32_t face)
+{
+    return m->face_source ? m->face_source[face] : face;
+}
+
+/* Steps between two doubles of the same sign. */
+static uint64_t steps(double a, double b)
+{
+    int64_t x, y;
+    memcpy(&x, &a, sizeof x);
+    memcpy(&y, &b, sizeof y);
+    return (uint64_t)(x < y ? y - x : x - y);
+}
+
+static bool hit_fits(const query_model *m, const oracle_hit *expected, const ebpo_ray_hit *got)
+{
+    return got->face == query_told(m, expected->face) && got->side == expected->side && steps(got->t + 0.0, expected->t) <= 2;
+}
+
+static void show_ray(const query_model *m, const query_ray *r)
+{
+    fprintf(stderr, "%s, %s: ray (%a, %a, %a) + t (%a, %a, %a), t <= %a: ", m->name, m->variant, r->origin[0], r->origin[1], r->origin[2],
+            r->direction[0], r->direction[1], r->direction[2], r->t_max);
+}
+
+static bool hits_fit(const query_model *m, const query_ray *r, const oracle_hit *expected, uint32_t n, const ebpo_ray_hit *got, uint64_t count)
+{
+    for (uint32_t i = 0; i < n && i < count; i++)
+        if (!hit_fits(m, &expected[i], &got[i])) {
+            show_ray(m, r);
+            fprintf(stderr, "hit %u says t %a, face %llu, side %d; it is t %a, face %llu, side %d\n", i, got[i].t, (unsigned long long)got[i].face,
+                    got[i].side, expected[i].t, (unsigned long long)query_told(m, expected[i].face), expected[i].side);
+            return false;
+        }
+    if (count != n) {
+        show_ray(m, r);
+        fprintf(stderr, "%llu hits; there are %u\n", (unsigned long long)count, n);
+    }
+    return count == n;
+}
+
+bool query_ask_ray(query_model *m, ebpo_context *context, const query_ray *r)
+{
+    const oracle_hit *expected;
+    const ebpo_ray_hit *hits;
+    ebpo_ray_hit first;
+    uint32_t n;
+    uint64_t count;
+    bool hit;
+    ebpo_error error = EBPO_ERROR_INIT;
+    oracle_ray(m->judge, r->origin, r->direction, r->t_max, &expected, &n);
+    if (ebpo_ray_first(context, r->origin, r->direction, r->t_max, &first, &hit, &error) != EBPO_OK ||
+        ebpo_ray_all(context, r->origin, r->direction, r->t_max, &hits, &count, &error) != EBPO_OK) {
+        show_ray(m, r);
+        fprintf(stderr, "%s\n", error.message);
+        return false;
+    }
+    if (hit != (n > 0) || (n > 0 && !hit_fits(m, &expected[0], &first))) {
+        show_ray(m, r);
+        fprintf(stderr, "the first hit is not right: %d, t %a, face %llu, side %d\n", hit, first.t, (unsigned long long)first.face, first.side);
+        return false;
+    }
+    return hits_fit(m, r, expected, n, hits, count);
 }
 
 void query_ask(query_model *m, uint64_t count, uint64_t seed)

@@ -49,6 +49,10 @@ typedef struct query_model {
 /* Builds, writes a file, opens it. The mesh is consumed. Failures are test failures. */
 void query_model_make(query_model *m, const char *name, ebpo_mesh mesh, const query_variant *variant);
 void query_model_free(query_model *m);
+/* The same for programs that are no Check tests, or want to see the failure: what the library says. On failure nothing is left. */
+ebpo_status query_model_try(query_model *m, const char *name, ebpo_mesh mesh, const query_variant *variant, ebpo_error *error);
+/* Check and build alone, one thread; the mesh is consumed. */
+ebpo_status query_build(ebpo_tree *tree, ebpo_mesh *mesh, const query_variant *variant, ebpo_error *error);
 
 /* The truth about a point. */
 typedef struct query_truth {
@@ -72,6 +76,15 @@ uint64_t query_wrong_limited_distance(const query_model *m, const double *points
 
 /* Asks everything about `count` awkward points of `seed`: inside and distance, in batches; fails the test when an answer is wrong. */
 void query_ask(query_model *m, uint64_t count, uint64_t seed);
+
+/* The number by which callers are told of a face of the file. */
+uint64_t query_told(const query_model *m, uint32_t face);
+
+/* A ray's hits, the first one and all, against the oracle: false when one is wrong, and prints it. */
+typedef struct query_ray {
+    double origin[3], direction[3], t_max;
+} query_ray;
+bool query_ask_ray(query_model *m, ebpo_context *context, const query_ray *r);
 
 /* EBPO_TEST_SCALE times `count`, at least 1; sanitizers do a tenth. */
 uint64_t query_scaled(uint64_t count);

@@ -76,7 +76,9 @@ static void wall_near_surface(const query_model *m, uint64_t *state, double out[
 
 static void near_surface(const query_model *m, uint64_t *state, double out[3])
 {
-    double step = m->size * pow(10, -(double)pick(state, 17));
+    double step = m->size;
+    for (uint64_t i = pick(state, 17); i > 0; i--)
+        step /= 10;
     if (pick(state, 2))
         face_point(m, state, out);
     else

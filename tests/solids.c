@@ -64,6 +64,24 @@ double ebpo_test_random_unit(uint64_t *state)
     return (double)(ebpo_test_random(state) >> 11) * 0x1p-53;
 }
 
+void ebpo_test_circle(uint32_t i, uint32_t n, double *cosine, double *sine)
+{
+    uint64_t eighth = 8 * (uint64_t)(i % n) / n, odd = eighth % 2; /* the turn lies between eighth / 8 and that + 1/8; of odd ones the end is taken */
+    double part = odd ? (double)((eighth + 1) * n - 8 * (uint64_t)(i % n)) : (double)(8 * (uint64_t)(i % n) - eighth * n);
+    double x = part / n * (PI / 4), x2 = x * x, c = 0, s = 0;
+    for (int k = 20; k > 0; k -= 2) { /* Taylor, from the far end */
+        c = (1 + c) * (-x2 / (k * (k - 1)));
+        s = (1 + s) * (-x2 / (k * (k + 1)));
+    }
+    c = 1 + c, s = odd ? -x * (1 + s) : x * (1 + s);
+    switch ((eighth + odd) / 2 % 4) {
+    case 0: *cosine = c, *sine = s; break;
+    case 1: *cosine = -s, *sine = c; break;
+    case 2: *cosine = -c, *sine = -s; break;
+    default: *cosine = s, *sine = -c; break;
+    }
+}
+
 void ebpo_test_point(const ebpo_mesh *m, uint64_t v, double out[3])
 {
     for (int k = 0; k < 3; k++)
@@ -381,8 +399,11 @@ ebpo_mesh ebpo_test_torus(double radius, double tube, uint32_t n, uint32_t m)
     ebpo_mesh out = empty();
     for (uint32_t i = 0; i < n; i++)
         for (uint32_t j = 0; j < m; j++) {
-            double a = 2 * PI * i / n, b = 2 * PI * j / m, r = radius + tube * cos(b);
-            vertex(&out, r * cos(a), r * sin(a), tube * sin(b));
+            double ca, sa, cb, sb;
+            ebpo_test_circle(i, n, &ca, &sa);
+            ebpo_test_circle(j, m, &cb, &sb);
+            double r = radius + tube * cb;
+            vertex(&out, r * ca, r * sa, tube * sb);
         }
     for (uint32_t i = 0; i < n; i++)
         for (uint32_t j = 0; j < m; j++) {
@@ -396,8 +417,11 @@ ebpo_mesh ebpo_test_cone(double radius, double height, uint32_t n)
 {
     ebpo_mesh m = empty();
     uint32_t base = vertex(&m, 0, 0, 0), apex = vertex(&m, 0, 0, height);
-    for (uint32_t i = 0; i < n; i++)
-        vertex(&m, radius * cos(2 * PI * i / n), radius * sin(2 * PI * i / n), 0);
+    for (uint32_t i = 0; i < n; i++) {
+        double c, s;
+        ebpo_test_circle(i, n, &c, &s);
+        vertex(&m, radius * c, radius * s, 0);
+    }
     for (uint32_t i = 0; i < n; i++) {
         face(&m, 2 + i, 2 + (i + 1) % n, apex);
         face(&m, 2 + (i + 1) % n, 2 + i, base);
@@ -449,10 +473,13 @@ ebpo_mesh ebpo_test_band(uint32_t n, bool twisted)
 {
     ebpo_mesh m = empty();
     for (uint32_t i = 0; i < n; i++) {
-        double a = 2 * PI * i / n, half = twisted ? a / 2 : 0;
+        double c, s, c_half = 1, s_half = 0;
+        ebpo_test_circle(i, n, &c, &s);
+        if (twisted)
+            ebpo_test_circle(i, 2 * n, &c_half, &s_half);
         for (int side = -1; side <= 1; side += 2) {
-            double r = 2 + side * 0.5 * sin(half);
-            vertex(&m, r * cos(a), r * sin(a), side * 0.5 * cos(half));
+            double r = 2 + side * 0.5 * s_half;
+            vertex(&m, r * c, r * s, side * 0.5 * c_half);
         }
     }
     for (uint32_t i = 0; i < n; i++) {

@@ -44,6 +44,8 @@ void ebpo_test_point(const ebpo_mesh *mesh, uint64_t vertex, double out[3]);
 /* splitmix64 (Steele, Lea, Flood 2014). */
 uint64_t ebpo_test_random(uint64_t *state);
 double ebpo_test_random_unit(uint64_t *state); /* [0, 1) */
+/* Cosine and sine of the turn i / n, 0 <= i, within some ulps and without libm: the same bits wherever arithmetic is IEEE's. */
+void ebpo_test_circle(uint32_t i, uint32_t n, double *cosine, double *sine);
 
 /* One solid (or surface) of the table. */
 typedef struct ebpo_test_solid {

@@ -7,72 +7,7 @@
 
 #include "query_kit.h"
 
-static uint64_t told(const query_model *m, uint32_t face)
-{
-    return m->face_source ? m->face_source[face] : face;
-}
-
-/* Steps between two doubles of the same sign. */
-static uint64_t steps(double a, double b)
-{
-    int64_t x, y;
-    memcpy(&x, &a, sizeof x);
-    memcpy(&y, &b, sizeof y);
-    return (uint64_t)(x < y ? y - x : x - y);
-}
-
-static bool hit_fits(const query_model *m, const oracle_hit *expected, const ebpo_ray_hit *got)
-{
-    return got->face == told(m, expected->face) && got->side == expected->side && steps(got->t + 0.0, expected->t) <= 2;
-}
-
-typedef struct ray {
-    double origin[3], direction[3], t_max;
-} ray;
-
-static void show(const query_model *m, const ray *r)
-{
-    fprintf(stderr, "%s, %s: ray (%a, %a, %a) + t (%a, %a, %a), t <= %a: ", m->name, m->variant, r->origin[0], r->origin[1], r->origin[2],
-            r->direction[0], r->direction[1], r->direction[2], r->t_max);
-}
-
-static bool all_fit(const query_model *m, const ray *r, const oracle_hit *expected, uint32_t n, const ebpo_ray_hit *got, uint64_t count)
-{
-    for (uint32_t i = 0; i < n && i < count; i++)
-        if (!hit_fits(m, &expected[i], &got[i])) {
-            show(m, r);
-            fprintf(stderr, "hit %u says t %a, face %llu, side %d; it is t %a, face %llu, side %d\n", i, got[i].t, (unsigned long long)got[i].face,
-                    got[i].side, expected[i].t, (unsigned long long)told(m, expected[i].face), expected[i].side);
-            return false;
-        }
-    if (count != n) {
-        show(m, r);
-        fprintf(stderr, "%llu hits; there are %u\n", (unsigned long long)count, n);
-    }
-    return count == n;
-}
-
-static bool ask_ray(query_model *m, ebpo_context *context, const ray *r)
-{
-    const oracle_hit *expected;
-    const ebpo_ray_hit *hits;
-    ebpo_ray_hit first;
-    uint32_t n;
-    uint64_t count;
-    bool hit;
-    ebpo_error error = EBPO_ERROR_INIT;
-    oracle_ray(m->judge, r->origin, r->direction, r->t_max, &expected, &n);
-    ck_assert_msg(ebpo_ray_first(context, r->origin, r->direction, r->t_max, &first, &hit, &error) == EBPO_OK, "%s", error.message);
-    ck_assert_msg(ebpo_ray_all(context, r->origin, r->direction, r->t_max, &hits, &count, &error) == EBPO_OK, "%s", error.message);
-    if (hit != (n > 0) || (n > 0 && !hit_fits(m, &expected[0], &first))) {
-        show(m, r);
-        fprintf(stderr, "the first hit is not right: %d, t %a, face %llu, side %d\n", hit, first.t, (unsigned long long)first.face, first.side);
-        return false;
-    }
-    return all_fit(m, r, expected, n, hits, count);
-}
-
-static void some_ray(query_model *m, uint64_t *state, ray *r)
+static void some_ray(query_model *m, uint64_t *state, query_ray *r)
 {
     query_make_ray(m, state, r->origin, r->direction, &r->t_max);
     if (ebpo_test_random(state) % 8 == 0) { /* any length */
@@ -92,7 +27,7 @@ static void some_ray(query_model *m, uint64_t *state, ray *r)
 }
 
 /* The ray once more, ending where it meets a face, or a step before or after that. */
-static bool ask_ends(query_model *m, ebpo_context *context, const ray *r)
+static bool ask_ends(query_model *m, ebpo_context *context, const query_ray *r)
 {
     const oracle_hit *expected;
     uint32_t n;
@@ -100,9 +35,9 @@ static bool ask_ends(query_model *m, ebpo_context *context, const ray *r)
     oracle_ray(m->judge, r->origin, r->direction, INFINITY, &expected, &n);
     double t = n ? expected[n / 2].t : 1;
     for (int i = -1; i <= 1 && isfinite(t); i++) {
-        ray cut = *r;
+        query_ray cut = *r;
         cut.t_max = i < 0 ? fmax(0, nextafter(t, -INFINITY)) : i > 0 ? nextafter(t, INFINITY) : t;
-        good &= ask_ray(m, context, &cut);
+        good &= query_ask_ray(m, context, &cut);
     }
     return good;
 }
@@ -116,9 +51,9 @@ START_TEST(rays_meet_what_brute_force_says)
     if (strcmp(m.name, "all_scales") == 0)
         count = query_scaled(100);
     for (uint64_t i = 0; i < count && wrong < 3; i++) {
-        ray r;
+        query_ray r;
         some_ray(&m, &state, &r);
-        wrong += !ask_ray(&m, m.context, &r);
+        wrong += !query_ask_ray(&m, m.context, &r);
         if (i % 8 == 0)
             wrong += !ask_ends(&m, m.context, &r);
     }
@@ -144,9 +79,9 @@ START_TEST(rays_do_not_depend_on_what_is_in_memory)
             ck_assert_msg(ebpo_model_open(&model, m.file, &how, &error) == EBPO_OK, "%s", error.message);
             ck_assert_msg(ebpo_context_new(&context, model, &error) == EBPO_OK, "%s", error.message);
             for (uint64_t i = 0; i < query_scaled(60) && wrong == 0; i++) {
-                ray r;
+                query_ray r;
                 some_ray(&m, &state, &r);
-                wrong += !ask_ray(&m, context, &r);
+                wrong += !query_ask_ray(&m, context, &r);
             }
             ck_assert_uint_eq(wrong, 0);
             ebpo_context_free(context);
@@ -158,7 +93,7 @@ END_TEST
 
 START_TEST(rays_that_make_no_sense_are_refused)
 {
-    static const ray rays[] = {
+    static const query_ray rays[] = {
         { { 0, 0, 0 }, { 0, 0, 0 }, 1 },        { { NAN, 0, 0 }, { 1, 0, 0 }, 1 },  { { 0, INFINITY, 0 }, { 1, 0, 0 }, 1 },
         { { 0, 0, 0 }, { 1, NAN, 0 }, 1 },      { { 0, 0, 0 }, { 1, 0, INFINITY }, 1 }, { { 0, 0, 0 }, { 1, 0, 0 }, -1 },
         { { 0, 0, 0 }, { 1, 0, 0 }, NAN },
@@ -192,7 +127,7 @@ static bool ask_box(query_model *m, const double low[3], const double high[3])
     ck_assert_msg(ebpo_faces_in_box(m->context, low, high, &faces, &count, &error) == EBPO_OK, "%s", error.message);
     bool same = count == n;
     for (uint32_t i = 0; i < n && same; i++)
-        same = faces[i] == told(m, expected[i]);
+        same = faces[i] == query_told(m, expected[i]);
     if (!same)
         fprintf(stderr, "%s, %s: box (%a, %a, %a) .. (%a, %a, %a): %llu faces, %u expected, or others\n", m->name, m->variant, low[0], low[1], low[2],
                 high[0], high[1], high[2], (unsigned long long)count, n);

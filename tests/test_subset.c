@@ -408,7 +408,7 @@ START_TEST(threads_do_not_change_the_bytes)
     char one[120], four[120], command[400];
     snprintf(one, sizeof one, "%s/one.ebpo.h5", m.folder);
     snprintf(four, sizeof four, "%s/four.ebpo.h5", m.folder);
-    ebpo_subset_options o = { -1, true, { 0, 0, -1 }, { 4, 4, 1 }, ~0u, EBPO_WRITE_OPTIONS_INIT };
+    ebpo_subset_options o = { -1, true, { 0, 0, -1 }, { 4, 4, 1 }, ~0u, EBPO_WRITE_OPTIONS_INIT, 0, 0, false };
     o.write.threads = 1;
     fine(ebpo_subset(m.file, one, &o, &error), &error);
     o.write.threads = 4;
@@ -428,7 +428,7 @@ START_TEST(boxes_that_keep_nothing_are_refused)
     query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), &usual);
     char path[120];
     snprintf(path, sizeof path, "%s/never.ebpo.h5", m.folder);
-    ebpo_subset_options o = { -1, true, { 5, 5, 5 }, { 6, 6, 6 }, ~0u, EBPO_WRITE_OPTIONS_INIT };
+    ebpo_subset_options o = { -1, true, { 5, 5, 5 }, { 6, 6, 6 }, ~0u, EBPO_WRITE_OPTIONS_INIT, 0, 0, false };
     ck_assert_int_eq(ebpo_subset(m.file, path, &o, &error), EBPO_E_ARGUMENT);
     o.max[1] = 4;
     ck_assert_int_eq(ebpo_subset(m.file, path, &o, &error), EBPO_E_ARGUMENT);
@@ -449,7 +449,7 @@ START_TEST(a_subset_cannot_be_measured)
     query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 3), &usual);
     char path[120];
     snprintf(path, sizeof path, "%s/part.ebpo.h5", m.folder);
-    ebpo_subset_options o = { -1, true, { 0.5, 0.5, 0.5 }, { 1, 1, 1 }, ~0u, EBPO_WRITE_OPTIONS_INIT };
+    ebpo_subset_options o = { -1, true, { 0.5, 0.5, 0.5 }, { 1, 1, 1 }, ~0u, EBPO_WRITE_OPTIONS_INIT, 0, 0, false };
     part p;
     part_open(&p, m.file, path, &o);
     ck_assert_msg(p.info->pruned && p.info->boxed && p.info->face_count < m.info.face_count, "nothing was left out");
@@ -468,7 +468,7 @@ START_TEST(damaged_subsets_do_no_harm)
     query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 3), &usual);
     char path[120];
     snprintf(path, sizeof path, "%s/part.ebpo.h5", m.folder);
-    ebpo_subset_options o = { 3, true, { 0.2, 0.2, 0.2 }, { 1, 1, 1 }, ~0u, EBPO_WRITE_OPTIONS_INIT };
+    ebpo_subset_options o = { 3, true, { 0.2, 0.2, 0.2 }, { 1, 1, 1 }, ~0u, EBPO_WRITE_OPTIONS_INIT, 0, 0, false };
     o.write.codec = EBPO_CODEC_NONE;
     fine(ebpo_subset(m.file, path, &o, &error), &error);
     FILE *f = fopen(path, "rb");
@@ -584,7 +584,7 @@ START_TEST(subsets_that_lie_do_no_harm)
     query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), &usual);
     static uint8_t bytes[1 << 20], lying[1 << 20];
     for (int kind = 0; kind < 3; kind++) {
-        ebpo_subset_options o = { kind == 1 ? 2 : -1, kind != 1, { 0.2, 0.2, 0.2 }, { 1, 1, 1 }, kind == 2 ? EBPO_PART_PLANES : ~0u, EBPO_WRITE_OPTIONS_INIT };
+        ebpo_subset_options o = { kind == 1 ? 2 : -1, kind != 1, { 0.2, 0.2, 0.2 }, { 1, 1, 1 }, kind == 2 ? EBPO_PART_PLANES : ~0u, EBPO_WRITE_OPTIONS_INIT, 0, 0, false };
         ebpo_file *file;
         char path[120];
         o.write.codec = EBPO_CODEC_NONE;

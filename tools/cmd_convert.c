@@ -18,8 +18,7 @@ typedef struct values {
     double epsilon, percent, max_error;
     int select, normals;
     int64_t seed;
-    const char *k_root;
-    const char *target_size;
+    const char *k_root, *target_size;
     uint32_t with, without;
     int codec, rule, profile;
     mending mend;

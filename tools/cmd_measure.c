@@ -4,16 +4,22 @@
 
 #include "command.h"
 #include "facts.h"
+#include "progress.h"
 #include "remote.h"
 
 typedef struct values {
-    bool json;
+    bool json, deviation;
     int64_t threads;
+    double tolerance;
     remote_values remote;
 } values;
 
 static const arg_option options[] = {
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
+    ARG_SWITCH("deviation", 0, values, deviation,
+               "also how far each level reaches beyond the model: certain\nbounds of the farthest point, mean and rms over its surface"),
+    { "tolerance", 0, ARG_REAL, offsetof(values, tolerance), "T",
+      "with --deviation: bounds are refined until the upper one is\nat most 1 + T times the lower one; default 0.05", 1e-6, 1000, NULL },
     ARG_SWITCH("json", 0, values, json, "print the numbers as JSON"),
     REMOTE_OPTIONS(values, remote),
     { 0 },
@@ -24,7 +30,7 @@ static const arg_spec spec = {
     .operands = "FILE",
     .least = 1,
     .most = 1,
-    .summary = "area, volume, centroid and inertia, and the volume of each level",
+    .summary = "area, volume, centroid and inertia, and the volume of each level or how far it reaches",
     .text = "FILE is an .ebpo.h5 file with its mesh, or its URL. Volume, centroid and inertia are those of the winding number's integral\n"
             "(density 1); a surface has an area only.",
     .options = options,
@@ -32,14 +38,22 @@ static const arg_spec spec = {
 
 /* --- words --- */
 
-static void print_levels(const ebpo_info *info)
+/* `deviation`: [level_count], or NULL. */
+static void print_levels(const ebpo_info *info, const ebpo_deviation *deviation)
 {
-    printf("%5s %24s %9s\n", "level", "envelopes' volume", info->solid ? "% solid" : "% box");
-    for (int i = 0; i < info->level_count; i++)
-        printf("%5d %24.16g %9.2f\n", i, facts_volume(info, i), facts_percent(info, i));
+    printf("%5s %24s %9s", "level", "envelopes' volume", info->solid ? "% solid" : "% box");
+    if (deviation)
+        printf(" %13s %13s %13s %13s", "reaches", "at most", "mean", "rms");
+    putchar('\n');
+    for (int i = 0; i < info->level_count; i++) {
+        printf("%5d %24.16g %9.2f", i, facts_volume(info, i), facts_percent(info, i));
+        if (deviation)
+            printf(" %13.6g %13.6g %13.6g %13.6g", deviation[i].lo, deviation[i].hi, deviation[i].mean, deviation[i].rms);
+        putchar('\n');
+    }
 }
 
-static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass *mass)
+static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass *mass, const ebpo_deviation *deviation)
 {
     printf("%s: %s%s%s\n", path, info->solid ? "a solid" : "a surface", info->unit[0] ? ", unit " : "", info->unit);
     printf("  area      %.16g\n", mass->area);
@@ -50,12 +64,25 @@ static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass 
             printf("  %-9s %.16g %.16g %.16g\n", k ? "" : "inertia", mass->inertia[k][0], mass->inertia[k][1], mass->inertia[k][2]);
     }
     putchar('\n');
-    print_levels(info);
+    print_levels(info, deviation);
 }
 
 /* --- JSON --- */
 
-static void json_mass(json *j, const char *path, const ebpo_info *info, const ebpo_mass *mass)
+static void json_deviation(json *j, const ebpo_deviation *d)
+{
+    json_object(j, "deviation");
+    json_real(j, "lo", d->lo);
+    json_real(j, "hi", d->hi);
+    json_reals(j, "place", d->place, 3);
+    json_real(j, "mean", d->mean);
+    json_real(j, "rms", d->rms);
+    json_uint(j, "samples", d->samples);
+    json_uint(j, "questions", d->questions);
+    json_end(j);
+}
+
+static void json_mass(json *j, const char *path, const ebpo_info *info, const ebpo_mass *mass, const ebpo_deviation *deviation)
 {
     json_text(j, "file", path);
     json_text(j, "kind", info->solid ? "solid" : "surface");
@@ -75,13 +102,34 @@ static void json_mass(json *j, const char *path, const ebpo_info *info, const eb
         json_int(j, "level", i);
         json_real(j, "envelope_volume", facts_volume(info, i));
         json_real(j, info->solid ? "percent_of_solid" : "percent_of_box", facts_percent(info, i));
+        if (deviation)
+            json_deviation(j, &deviation[i]);
         json_end(j);
     }
     json_end(j);
 }
 
+static ebpo_status measure_levels(ebpo_file *file, const values *v, ebpo_deviation *out, ebpo_error *error)
+{
+    progress_line line;
+    ebpo_model *model = NULL;
+    ebpo_model_options opening = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_deviation_options wanted = EBPO_DEVIATION_OPTIONS_INIT;
+    opening.threads = wanted.threads = (unsigned)v->threads;
+    wanted.tolerance = v->tolerance;
+    wanted.progress = opening.progress = progress_start(&line, "measure", v->json);
+    ebpo_status status = ebpo_model_open(&model, file, &opening, error);
+    for (int i = 0; i < ebpo_file_info(file)->level_count && status == EBPO_OK; i++)
+        status = ebpo_deviation_level(model, file, i, &wanted, &out[i], error);
+    ebpo_model_close(model);
+    progress_wipe(&line);
+    return status;
+}
+
 static int measure(const char *path, const values *v)
 {
+    ebpo_deviation levels[EBPO_LEVELS_MAX];
+    const ebpo_deviation *deviation = v->deviation ? levels : NULL;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
     ebpo_mass mass;
@@ -93,16 +141,18 @@ static int measure(const char *path, const values *v)
         return EXIT_FAILED;
     }
     ebpo_status status = ebpo_measure(file, (unsigned)v->threads, &mass, &error);
+    if (status == EBPO_OK && v->deviation)
+        status = measure_levels(file, v, levels, &error);
     traffic t = traffic_of(file);
     if (status == EBPO_OK && v->json) {
         json j;
         json_begin(&j, stdout);
         json_object(&j, NULL);
-        json_mass(&j, remote_shown(path), ebpo_file_info(file), &mass);
+        json_mass(&j, remote_shown(path), ebpo_file_info(file), &mass, deviation);
         remote_json(&j, &t, &v->remote);
         json_finish(&j);
     } else if (status == EBPO_OK) {
-        print_mass(remote_shown(path), ebpo_file_info(file), &mass);
+        print_mass(remote_shown(path), ebpo_file_info(file), &mass, deviation);
         remote_tell(&t, &v->remote, false);
     }
     ebpo_close(file);
@@ -111,7 +161,7 @@ static int measure(const char *path, const values *v)
 
 static int run(int argc, char **argv)
 {
-    values v = { .remote = REMOTE_VALUES_INIT };
+    values v = { .tolerance = 0.05, .remote = REMOTE_VALUES_INIT };
     const char *operand[ARGS_OPERANDS_MAX];
     arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
     if (parsed != ARGS_RUN)

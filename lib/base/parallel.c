@@ -6,6 +6,7 @@
 #include <time.h>
 
 #include "base/error.h"
+#include "base/fp_env.h"
 
 enum { MAX_THREADS = 256 };
 
@@ -82,6 +83,7 @@ static void work(run *r, unsigned number)
 
 static void *run_worker(void *argument)
 {
+    EBPO_DEFAULT_FP;
     worker *w = argument;
     work(w->r, w->number);
     return NULL;

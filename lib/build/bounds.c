@@ -1,5 +1,7 @@
 /* Support of runs of vertices by boxes of boxes. Rounding is monotone, so a box's bound computed in the same order of operations is
  * never below that of a point in it: skipping a box never loses the greatest point. */
+#include "geom/strict_fp.h"
+
 #include <stdlib.h>
 
 #include "base/alloc.h"

@@ -1,10 +1,13 @@
 /* From a mesh to a tree: the stages in their order. */
+#include "geom/strict_fp.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "base/parallel.h"
 #include "build/propose.h"
 #include "ebpo_config.h"
@@ -191,6 +194,7 @@ static ebpo_status run_stages(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, 
 ebpo_status ebpo_build(ebpo_tree *out, ebpo_mesh *mesh, const ebpo_mesh_report *report, const ebpo_mend_record *mend,
                        const ebpo_build_options *options, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     ebpo_build_options defaults = EBPO_BUILD_OPTIONS_INIT;
     ebpo_builder b = { 0 };
     memset(out, 0, sizeof *out);

@@ -1,4 +1,6 @@
 /* Subtrees to stretches of level arrays: a depth-first walk meets the nodes of each level in octcode order. */
+#include "geom/strict_fp.h"
+
 #include <stdlib.h>
 #include <string.h>
 

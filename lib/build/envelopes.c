@@ -1,4 +1,6 @@
 /* The planes of a gray node, from the root down: candidates are the normals of faces below it and those of the solid's hull in the cell. */
+#include "geom/strict_fp.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

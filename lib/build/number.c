@@ -1,4 +1,6 @@
 /* Final numbers: faces by the first leaf, depth first, that they touch; vertices by first use. */
+#include "geom/strict_fp.h"
+
 #include <stdlib.h>
 #include <string.h>
 

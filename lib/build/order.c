@@ -1,4 +1,6 @@
 /* Vertices and faces along the Morton curve: then every cell's vertices are one run, and neighbours in space are neighbours in memory. */
+#include "geom/strict_fp.h"
+
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "build/propose.h"
 
 #include <math.h>

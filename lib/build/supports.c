@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "build/supports.h"
 
 #include <stdlib.h>

@@ -5,6 +5,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "container/facts.h"
 #include "container/reader.h"
 #include "http/http.h"
@@ -218,6 +219,7 @@ ebpo_status ebpo_reader_locate(ebpo_file *file, const ebpo_array_in *array, ebpo
 
 ebpo_status ebpo_open(ebpo_file **out, const char *path, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     ebpo_source source;
     *out = NULL;
     if (ebpo_is_url(path))
@@ -239,6 +241,7 @@ ebpo_status ebpo_open_url(ebpo_file **out, const char *url, const ebpo_http_opti
 
 ebpo_status ebpo_open_memory(ebpo_file **out, const void *data, uint64_t size, const char *name, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     *out = NULL;
     if (!data && size)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: no bytes; give the file's bytes with their count", name ? name : "memory");
@@ -248,6 +251,7 @@ ebpo_status ebpo_open_memory(ebpo_file **out, const void *data, uint64_t size, c
 
 ebpo_status ebpo_open_source(ebpo_file **out, const ebpo_source *source, const char *name, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     *out = NULL;
     if (source->read)
         return open_source(out, source, name ? name : "source", error);

@@ -4,6 +4,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "base/parallel.h"
 #include "container/plan.h"
 #include "container/reader.h"
@@ -166,6 +167,7 @@ static ebpo_status read_arrays(ebpo_file *file, int number, ebpo_level *level, u
 
 ebpo_status ebpo_file_read_level(ebpo_file *file, int level, ebpo_level *out, unsigned threads, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     memset(out, 0, sizeof *out);
     const ebpo_info *info = &file->info;
     if (level < 0 || level >= info->level_count)

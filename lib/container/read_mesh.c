@@ -5,6 +5,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "codec/coding.h"
 #include "container/reader.h"
 
@@ -82,6 +83,7 @@ static ebpo_status make_mesh(const ebpo_info *info, ebpo_mesh *out, ebpo_error *
 
 ebpo_status ebpo_file_read_mesh(ebpo_file *file, ebpo_mesh *out, unsigned threads, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     memset(out, 0, sizeof *out);
     if (!(file->info.parts & EBPO_PART_MESH))
         return absent(file, "mesh", error);
@@ -157,6 +159,7 @@ ebpo_status ebpo_file_read_maps(ebpo_file *file, uint32_t **vertex_source, uint3
 
 ebpo_status ebpo_file_read_tree(ebpo_file *file, ebpo_tree *out, unsigned threads, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     memset(out, 0, sizeof *out);
     ebpo_expect_tree(file);
     out->info = file->info;
@@ -249,6 +252,7 @@ static ebpo_status to_source_order(ebpo_file *file, ebpo_mesh *mesh, unsigned th
 
 ebpo_status ebpo_file_read_source_mesh(ebpo_file *file, ebpo_mesh *out, bool *source_order, unsigned threads, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     bool maps = file->info.parts & EBPO_PART_MAPS;
     ebpo_expected expected = EBPO_EXPECTED_INIT(file);
     ebpo_expect_mesh(&expected);

@@ -6,6 +6,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "base/parallel.h"
 #include "base/sha256.h"
 #include "container/content.h"
@@ -317,6 +318,7 @@ static ebpo_status check_options(const ebpo_write_options *options, const char *
 
 ebpo_status ebpo_tree_write(const ebpo_tree *tree, const char *path, const ebpo_write_options *options, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     static const ebpo_write_options usual = EBPO_WRITE_OPTIONS_INIT;
     ebpo_publish publish = EBPO_PUBLISH_INIT;
     writer *w = ebpo_alloc_zero(1, sizeof *w);

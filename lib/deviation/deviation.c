@@ -9,6 +9,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "base/parallel.h"
 #include "deviation/bound.h"
 #include "deviation/samples.h"
@@ -214,6 +215,7 @@ static ebpo_status check(const ebpo_info *info, const ebpo_info *model, int leve
 
 ebpo_status ebpo_deviation_level(ebpo_model *model, ebpo_file *file, int level, const ebpo_deviation_options *options, ebpo_deviation *out, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     static const ebpo_deviation_options usual = EBPO_DEVIATION_OPTIONS_INIT;
     const ebpo_deviation_options *o = options ? options : &usual;
     ebpo_lod_model whole = { 0 }, own = { 0 };

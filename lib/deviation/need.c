@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "deviation/need.h"
 
 #include <math.h>

@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "export/block.h"
 
 #include <stdio.h>

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "export/block.h"
 #include "export/formats.h"
 #include "io/file.h"
@@ -56,6 +57,7 @@ static ebpo_status check(const ebpo_info *info, ebpo_export_format format, const
 ebpo_status ebpo_export(ebpo_file *file, const char *path, ebpo_export_format format, const ebpo_export_options *options, ebpo_export_report *report,
                         ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     static const ebpo_export_options usual = EBPO_EXPORT_OPTIONS_INIT;
     ebpo_export_report own;
     char second[4096];

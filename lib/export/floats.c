@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "export/floats.h"
 
 #include <math.h>

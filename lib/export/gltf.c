@@ -1,5 +1,7 @@
 /* glTF 2.0, as one file (GLB) or as a text with a .bin beside it. Not through assimp: its exporter joins vertices that are less than 1e-5 apart, whatever the model's size.
  * Source: Khronos, "glTF 2.0 specification", sections 3 and 4. */
+#include "geom/strict_fp.h"
+
 #include <float.h>
 #include <inttypes.h>
 #include <math.h>

@@ -1,4 +1,6 @@
 /* OBJ and STL through assimp's exporters. All that they keep of a coordinate is a float32. */
+#include "geom/strict_fp.h"
+
 #include "export/formats.h"
 
 #include "base/error.h"

@@ -1,5 +1,7 @@
 /* Predicates on a triangle, made of orientations only: what is exact there is exact here.
  * Source of the shift: Edelsbrunner and Muecke, "Simulation of Simplicity", 1990. */
+#include "geom/strict_fp.h"
+
 #include "geom/predicates.h"
 
 static inline double min3(double a, double b, double c)

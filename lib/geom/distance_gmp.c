@@ -1,4 +1,6 @@
 /* Distance to a triangle without rounding: coordinates as integers in a common power of two, the squared distance as a fraction of integers. */
+#include "geom/strict_fp.h"
+
 #include <float.h>
 #include <limits.h>
 #include <math.h>

@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "geom/plane_code.h"
 
 #include <math.h>

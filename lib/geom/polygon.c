@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "geom/polygon.h"
 
 #include <math.h>

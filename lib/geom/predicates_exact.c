@@ -1,5 +1,7 @@
 /* A finite double is an integer times a power of two. Coordinates of one axis are brought to a common power, which scales the
  * determinant by a positive factor and leaves integers. */
+#include "geom/strict_fp.h"
+
 #include "geom/predicates_exact.h"
 
 #include <limits.h>

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "base/sha256.h"
 #include "import/import.h"
 #include "io/file.h"
@@ -66,6 +67,7 @@ static ebpo_status parse(ebpo_mesh *out, const ebpo_whole_file *file, const char
 
 ebpo_status ebpo_mesh_read(ebpo_mesh *out, const char *path, const ebpo_mesh_read_options *options, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     static const ebpo_progress silent = { NULL, NULL };
     ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
     hashing hash = { .file = &file };

@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include <limits.h>
 #include <setjmp.h>
 #include <stdbool.h>

@@ -1,5 +1,7 @@
 /* The convex hull of the solid in each cell. Its extreme points are mesh vertices in the cell, corners of what faces leave on the cell's walls, and
  * the cell's corners that lie inside. */
+#include "geom/strict_fp.h"
+
 #include <ebpo/limit.h>
 
 #include <stdlib.h>
@@ -7,6 +9,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "base/parallel.h"
 #include "limit/hull.h"
 #include "lod/model.h"
@@ -260,6 +263,7 @@ static void job_free(job *j, unsigned threads)
 
 ebpo_status ebpo_limit_level(ebpo_file *file, int level, unsigned threads, const ebpo_progress *progress, ebpo_limit *out, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     static const ebpo_progress silent;
     job j = { 0 };
     memset(out, 0, sizeof *out);

@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "base/error.h"
 #include "limit/hull.h"
 

@@ -1,4 +1,6 @@
 /* Envelopes of leaves. */
+#include "geom/strict_fp.h"
+
 #include "base/alloc.h"
 #include "base/error.h"
 #include "lod/model.h"

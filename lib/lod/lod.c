@@ -1,6 +1,8 @@
 /* A level's envelopes: from the root down, each cut from its parent's. The top of the tree is walked first; the
  * subtrees that hang from it are independent of each other. Where it is cut depends on the tree alone, so the result
  * does not depend on the number of threads. */
+#include "geom/strict_fp.h"
+
 #include <ebpo/lod.h>
 
 #include <stdlib.h>
@@ -8,6 +10,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "base/parallel.h"
 #include "lod/model.h"
 #include "lod/pieces.h"
@@ -255,6 +258,7 @@ ebpo_status ebpo_lod_level(ebpo_file *file, int level, const ebpo_lod_options *o
 ebpo_status ebpo_lod_level_nodes(ebpo_file *file, int level, const ebpo_lod_options *options, ebpo_mesh *out,
                                  ebpo_lod_nodes *nodes, double *volume, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     static const ebpo_lod_options defaults = EBPO_LOD_OPTIONS_INIT;
     if (!options)
         options = &defaults;

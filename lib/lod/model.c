@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "lod/model.h"
 
 #include <stdlib.h>

@@ -1,9 +1,12 @@
+#include "geom/strict_fp.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "base/parallel.h"
 #include "mesh/check_parts.h"
 #include "mesh/positions.h"
@@ -65,6 +68,26 @@ static ebpo_status vertices(void *context, uint64_t begin, uint64_t end, unsigne
     return EBPO_OK;
 }
 
+/* Squares and cubes of what lies between these are far from overflow and underflow. */
+enum { EXPONENT_MAX = 256 };
+
+static ebpo_units choose_units(const ebpo_mesh_report *r)
+{
+    ebpo_units u = { .scaled = false };
+    for (int k = 0; k < 3; k++) {
+        frexp(fmax(fabs(r->min[k]), fabs(r->max[k])), &u.exponent[k]); /* 0 for 0 */
+        u.scaled |= u.exponent[k] > EXPONENT_MAX || u.exponent[k] < -EXPONENT_MAX;
+    }
+    if (!u.scaled)
+        return (ebpo_units){ .scaled = false };
+    int x = u.exponent[0], y = u.exponent[1], z = u.exponent[2], least = x < y ? x : y;
+    u.length = x > y ? x : y;
+    u.length = z > u.length ? z : u.length;
+    u.volume = x + y + z;
+    u.area = u.volume - (z < least ? z : least);
+    return u;
+}
+
 ebpo_status ebpo_check_vertices(ebpo_check *check, ebpo_error *error)
 {
     ebpo_mesh_report *r = check->report;
@@ -83,6 +106,7 @@ ebpo_status ebpo_check_vertices(ebpo_check *check, ebpo_error *error)
         ebpo_finding_merge(&r->unreferenced_vertices, &b->unreferenced);
         check->referenced += b->referenced;
     }
+    check->units = choose_units(r);
     free(pass.blocks);
     return status;
 }
@@ -164,6 +188,7 @@ static ebpo_status run(ebpo_check *c, ebpo_error *error)
 ebpo_status ebpo_mesh_check(ebpo_mesh_report *report, const ebpo_mesh *mesh, unsigned threads, ebpo_progress progress,
                             ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     memset(report, 0, sizeof *report);
     ebpo_status status = ebpo_mesh_check_shape(mesh, error);
     if (status != EBPO_OK)

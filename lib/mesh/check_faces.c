@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include <math.h>
 #include <stdlib.h>
 
@@ -70,9 +72,17 @@ static bool zero_area(const double a[3], const double b[3], const double c[3])
     return ebpo_zero_area(a, b, c);
 }
 
-static void measure(face_block *block, const double centre[3], const double a[3], const double cross[3])
+static double cross_length(const ebpo_units *u, const double cross[3])
 {
-    ebpo_sum_add(&block->area2, sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]));
+    if (!u->scaled)
+        return sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]);
+    const int exponent[3] = { u->exponent[1] + u->exponent[2], u->exponent[2] + u->exponent[0], u->exponent[0] + u->exponent[1] };
+    return ebpo_scaled_length(cross, exponent, u->area);
+}
+
+static void measure(face_block *block, const ebpo_units *units, const double centre[3], const double a[3], const double cross[3])
+{
+    ebpo_sum_add(&block->area2, cross_length(units, cross));
     ebpo_sum_add(&block->volume6, (a[0] - centre[0]) * cross[0] + (a[1] - centre[1]) * cross[1] +
                                   (a[2] - centre[2]) * cross[2]);
 }
@@ -94,11 +104,16 @@ static ebpo_status faces(void *context, uint64_t begin, uint64_t end, unsigned w
             continue;
         }
         double a[3], b[3], c[3], cross[3];
-        ebpo_mesh_position(mesh, v[0], a);
-        ebpo_mesh_position(mesh, v[1], b);
-        ebpo_mesh_position(mesh, v[2], c);
+        ebpo_check_position(pass->check, v[0], a);
+        ebpo_check_position(pass->check, v[1], b);
+        ebpo_check_position(pass->check, v[2], c);
         ebpo_face_cross(a, b, c, cross);
-        measure(&block, pass->centre, a, cross);
+        measure(&block, &pass->check->units, pass->centre, a, cross);
+        if (pass->check->units.scaled) { /* the test is exact: on the coordinates themselves */
+            ebpo_mesh_position(mesh, v[0], a);
+            ebpo_mesh_position(mesh, v[1], b);
+            ebpo_mesh_position(mesh, v[2], c);
+        }
         if (zero_area(a, b, c))
             ebpo_finding_add(&block.zero_area, f);
     }
@@ -114,7 +129,7 @@ ebpo_status ebpo_check_faces(ebpo_check *check, ebpo_error *error)
     if (!pass.blocks)
         return ebpo_fail_memory(error, blocks * sizeof *pass.blocks);
     for (int k = 0; k < 3; k++)
-        pass.centre[k] = 0.5 * r->min[k] + 0.5 * r->max[k];
+        pass.centre[k] = ldexp(0.5 * r->min[k] + 0.5 * r->max[k], -check->units.exponent[k]);
     ebpo_status status = ebpo_parallel_for(check->threads, count, FACE_GRAIN, faces, &pass, &check->progress,
                                            "measuring faces", error);
     ebpo_sum area2 = { 0, 0 }, volume6 = { 0, 0 };
@@ -124,8 +139,8 @@ ebpo_status ebpo_check_faces(ebpo_check *check, ebpo_error *error)
         ebpo_finding_merge(&r->zero_area_faces, &pass.blocks[i].zero_area);
         ebpo_finding_merge(&r->index_repeated_faces, &pass.blocks[i].index_repeated);
     }
-    r->area = ebpo_sum_value(&area2) / 2;
-    r->volume = ebpo_sum_value(&volume6) / 6;
+    r->area = ldexp(ebpo_sum_value(&area2) / 2, check->units.area);
+    r->volume = ldexp(ebpo_sum_value(&volume6) / 6, check->units.volume);
     free(pass.blocks);
     return status;
 }

@@ -2,9 +2,18 @@
 #ifndef EBPO_MESH_CHECK_PARTS_H
 #define EBPO_MESH_CHECK_PARTS_H
 
+#include <math.h>
+
 #include "mesh/boundary.h"
 #include "mesh/stars.h"
 #include "mesh/sum.h"
+
+/* Along axis k, lengths are measured in units of 2^exponent[k], where squares and cubes could leave a double's range otherwise; 0 else. */
+typedef struct ebpo_units {
+    bool scaled;
+    int exponent[3];
+    int length, area, volume; /* exponents of what sums are kept in */
+} ebpo_units;
 
 typedef struct ebpo_check {
     const ebpo_mesh *mesh;
@@ -15,7 +24,30 @@ typedef struct ebpo_check {
     ebpo_stars stars;
     ebpo_boundary boundary; /* all boundary edges, in no order */
     uint64_t referenced;    /* vertices that faces use */
+    ebpo_units units;
 } ebpo_check;
+
+/* For measuring: the position in the units. */
+static inline void ebpo_check_position(const ebpo_check *check, uint64_t vertex, double out[3])
+{
+    ebpo_mesh_position(check->mesh, vertex, out);
+    if (check->units.scaled)
+        for (int k = 0; k < 3; k++)
+            out[k] = ldexp(out[k], -check->units.exponent[k]);
+}
+
+/* Length of a vector whose component k is d[k] 2^exponent[k], in units of 2^unit. */
+static inline double ebpo_scaled_length(const double d[3], const int exponent[3], int unit)
+{
+    double x[3], most = 0, sum = 0;
+    for (int k = 0; k < 3; k++) {
+        x[k] = ldexp(d[k], exponent[k] - unit);
+        most = fmax(most, fabs(x[k]));
+    }
+    for (int k = 0; k < 3 && most > 0; k++)
+        sum += x[k] / most * (x[k] / most);
+    return most * sqrt(sum);
+}
 
 /* Counts `place`, and keeps it when it is among the lowest. */
 static inline void ebpo_finding_add(ebpo_finding *finding, uint64_t place)
@@ -40,7 +72,7 @@ static inline void ebpo_finding_merge(ebpo_finding *finding, const ebpo_finding 
 
 /* Every coordinate finite. */
 EBPO_MUST_USE ebpo_status ebpo_check_coordinates(ebpo_check *check, ebpo_error *error);
-/* Bounding box and unreferenced vertices; needs stars. */
+/* Bounding box, unit for measuring, unreferenced vertices; needs stars. */
 EBPO_MUST_USE ebpo_status ebpo_check_vertices(ebpo_check *check, ebpo_error *error);
 /* Area, volume (about the box's centre), zero areas, repeated indices; joins components. Needs the bounding box. */
 EBPO_MUST_USE ebpo_status ebpo_check_faces(ebpo_check *check, ebpo_error *error);

@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include <math.h>
 #include <stdlib.h>
 
@@ -71,16 +73,18 @@ static bool classify_edge(star_block *block, scratch *s, uint32_t v, const ebpo_
     return ebpo_boundary_add(&s->boundary, (ebpo_boundary_edge){ out ? v : neighbour, out ? neighbour : v, face });
 }
 
-static double edge_length(const ebpo_mesh *mesh, uint32_t a, uint32_t b)
+static double edge_length(const ebpo_check *check, uint32_t a, uint32_t b)
 {
     double p[3], q[3];
-    ebpo_mesh_position(mesh, a, p);
-    ebpo_mesh_position(mesh, b, q);
+    ebpo_check_position(check, a, p);
+    ebpo_check_position(check, b, q);
     double d[3] = { q[0] - p[0], q[1] - p[1], q[2] - p[2] };
+    if (check->units.scaled)
+        return ebpo_scaled_length(d, check->units.exponent, check->units.length);
     return sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
 }
 
-static bool check_edges(const ebpo_mesh *mesh, star_block *block, scratch *s, uint32_t v)
+static bool check_edges(const ebpo_check *check, star_block *block, scratch *s, uint32_t v)
 {
     const ebpo_star *star = &s->star;
     uint64_t fans = star->faces;
@@ -94,7 +98,7 @@ static bool check_edges(const ebpo_mesh *mesh, star_block *block, scratch *s, ui
         uint32_t neighbour = ebpo_link_neighbour(&star->links[begin]);
         if (neighbour < v) /* the edge is counted at its lower end */
             continue;
-        ebpo_sum_add(&block->length, edge_length(mesh, v, neighbour));
+        ebpo_sum_add(&block->length, edge_length(check, v, neighbour));
         if (!classify_edge(block, s, v, star->links + begin, end - begin))
             return false;
     }
@@ -160,15 +164,16 @@ static ebpo_status stars(void *context, uint64_t begin, uint64_t end, unsigned w
             continue;
         block.components += check->parents[v] == v;
         if (!ebpo_star_gather(&s->star, &check->stars, check->mesh, vertex) ||
-            !check_edges(check->mesh, &block, s, vertex) || !check_repeated(check, &block, s, vertex))
+            !check_edges(check, &block, s, vertex) || !check_repeated(check, &block, s, vertex))
             return ebpo_fail_memory(error, degree * 2 * sizeof *s->star.links);
     }
     pass->blocks[begin / STAR_GRAIN] = block;
     return EBPO_OK;
 }
 
-static void join_blocks(ebpo_mesh_report *r, const star_block *blocks, uint64_t count)
+static void join_blocks(const ebpo_check *check, const star_block *blocks, uint64_t count)
 {
+    ebpo_mesh_report *r = check->report;
     ebpo_sum length = { 0, 0 };
     for (uint64_t i = 0; i < count; i++) {
         const star_block *b = &blocks[i];
@@ -182,7 +187,7 @@ static void join_blocks(ebpo_mesh_report *r, const star_block *blocks, uint64_t 
         r->edges += b->edges;
         r->components += b->components;
     }
-    r->mean_edge = r->edges ? ebpo_sum_value(&length) / (double)r->edges : 0;
+    r->mean_edge = r->edges ? ldexp(ebpo_sum_value(&length) / (double)r->edges, check->units.length) : 0;
 }
 
 static bool gather_boundary(ebpo_check *check, const scratch *scratches)
@@ -216,7 +221,7 @@ ebpo_status ebpo_check_stars(ebpo_check *check, ebpo_error *error)
                                error);
     if (status != EBPO_OK)
         goto done;
-    join_blocks(check->report, pass.blocks, blocks);
+    join_blocks(check, pass.blocks, blocks);
     if (!gather_boundary(check, pass.scratch))
         status = ebpo_fail_memory(error, check->report->boundary_edges.count * sizeof *check->boundary.edges);
 done:

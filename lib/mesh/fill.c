@@ -1,8 +1,11 @@
+#include "geom/strict_fp.h"
+
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "mesh/boundary.h"
 #include "mesh/mesh.h"
 #include "mesh/stars.h"
@@ -136,6 +139,7 @@ static ebpo_status run(filling *f, ebpo_error *error)
 
 ebpo_status ebpo_mesh_fill_holes(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     filling f = { .mesh = mesh };
     ebpo_status status = ebpo_mesh_check_shape(mesh, error);
     if (status != EBPO_OK)

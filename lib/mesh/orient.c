@@ -1,7 +1,10 @@
+#include "geom/strict_fp.h"
+
 #include <stdlib.h>
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "mesh/mesh.h"
 #include "mesh/stars.h"
 #include "mesh/sum.h"
@@ -134,6 +137,7 @@ static void settle_patch(orienting *o, const patch *p)
 
 ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     ebpo_status status = ebpo_mesh_check_shape(mesh, error);
     if (status != EBPO_OK)
         return status;

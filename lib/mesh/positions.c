@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "mesh/positions.h"
 
 #include <stdlib.h>

@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "mesh/triangulate.h"
 
 #include <math.h>

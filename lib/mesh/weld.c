@@ -3,6 +3,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "mesh/mesh.h"
 #include "mesh/positions.h"
 
@@ -48,6 +49,7 @@ static void move_vertices(ebpo_mesh *mesh, const uint32_t *map, uint64_t kept)
 
 ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     ebpo_positions positions = { .mesh = NULL };
     uint32_t *map = NULL;
     uint64_t removed = 0;

@@ -1,4 +1,6 @@
 /* Winding numbers at a cell's corners, from one corner along the cell's edges. */
+#include "geom/strict_fp.h"
+
 #include <string.h>
 
 #include "geom/predicates.h"

@@ -1,4 +1,6 @@
 /* Incremental: each point beyond the hull takes the place of the facets that it sees. */
+#include "geom/strict_fp.h"
+
 #include "planes/hull.h"
 
 #include <math.h>

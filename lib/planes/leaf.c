@@ -1,4 +1,6 @@
 /* The envelope of a leaf, from its faces: the directions of the hull of what they leave in the cell. */
+#include "geom/strict_fp.h"
+
 #include <math.h>
 #include <stdlib.h>
 

@@ -1,5 +1,7 @@
 /* Greedy selection: the plane that removes most volume first. Gains only shrink while the envelope does, so a gain computed
  * earlier bounds today's and most candidates are never looked at again (lazy evaluation). */
+#include "geom/strict_fp.h"
+
 #include "geom/plane_code.h"
 #include "planes/planes.h"
 

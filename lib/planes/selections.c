@@ -1,4 +1,6 @@
 /* The table of selections. */
+#include "geom/strict_fp.h"
+
 #include <math.h>
 
 #include "planes/planes.h"

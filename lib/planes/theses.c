@@ -1,4 +1,6 @@
 /* The theses' selections (EBP 2017, 3.3.4.3; BP 2008, 3.4.2): which of the candidates, whatever they cut. */
+#include "geom/strict_fp.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,5 +1,7 @@
 /* A face against a cell: which octants it may touch, and its part in the cell. Everything errs on the safe side by a bound on the
  * rounding, so that no exact arithmetic is needed: including a neighbour costs nothing, missing one is a bug. */
+#include "geom/strict_fp.h"
+
 #include <math.h>
 
 #include "geom/plane_code.h"

@@ -1,4 +1,6 @@
 /* The body of a binary PLY file, of either byte order. */
+#include "geom/strict_fp.h"
+
 #include <inttypes.h>
 #include <string.h>
 

@@ -1,4 +1,6 @@
 /* Faces and strips of a PLY file become triangles. */
+#include "geom/strict_fp.h"
+
 #include <inttypes.h>
 #include <stdlib.h>
 

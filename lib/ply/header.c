@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "ply/header.h"
 
 #include <inttypes.h>

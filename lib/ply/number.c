@@ -4,6 +4,8 @@
  * 2. Up to 19 digits over a power of ten up to 10^27: a 128-bit quotient with its remainder, rounded by hand.
  * 3. The C library.
  */
+#include "geom/strict_fp.h"
+
 #include "ply/number.h"
 
 #include <math.h>

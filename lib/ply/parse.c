@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include <inttypes.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -6,6 +8,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "io/file.h"
 #include "ply/parser.h"
 #include "ply/ply.h"
@@ -242,6 +245,7 @@ static ebpo_status give_points(ply_parser *p, double **xyz, uint64_t *count)
 
 ebpo_status ebpo_points_parse_ply(double **xyz, uint64_t *count, const void *data, uint64_t size, const char *name, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     ebpo_mesh mesh = { 0 };
     ply_parser p = { .data = data, .size = size, .name = ebpo_path_name(name), .mesh = &mesh, .error = error };
     *xyz = NULL;

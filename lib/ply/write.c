@@ -1,4 +1,6 @@
 /* Writing a mesh as a binary little-endian PLY file. */
+#include "geom/strict_fp.h"
+
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,4 +1,6 @@
 /* What will be asked for next: the subtrees around the last position, the nearest first. EBP 2017, 4.2.3, where all 26 neighbours are loaded in a fixed order. */
+#include "geom/strict_fp.h"
+
 #include "query/ahead.h"
 
 #include <string.h>

@@ -8,6 +8,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "geom/ray.h"
 #include "query/options.h"
 #include "query/pruned.h"
@@ -120,6 +121,7 @@ static ebpo_status finish(gathering *g, const uint64_t **faces, uint64_t *count,
 ebpo_status ebpo_faces_in_box(ebpo_context *context, const double min[3], const double max[3], const uint64_t **faces, uint64_t *count,
                               ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     *faces = NULL;
     *count = 0;
     for (int k = 0; k < 3; k++)

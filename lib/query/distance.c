@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "query/ahead.h"
 #include "query/clock.h"
 #include "query/inside.h"
@@ -239,6 +240,7 @@ static ebpo_status check_mode(const ebpo_query_options *o, ebpo_error *error)
 ebpo_status ebpo_distance_many(ebpo_context *context, const double *points, uint64_t count, const ebpo_query_options *options,
                                ebpo_distance_result *out, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     static const ebpo_query_options usual = EBPO_QUERY_OPTIONS_INIT;
     const ebpo_query_options *o = options ? options : &usual;
     ebpo_status status = ebpo_check_options(o, error);

@@ -1,4 +1,6 @@
 /* Point in solid, node by node: EBP 2017, 4.2. */
+#include "geom/strict_fp.h"
+
 #include "base/error.h"
 #include "query/clock.h"
 #include "query/inside.h"

@@ -12,6 +12,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "base/parallel.h"
 #include "container/reader.h"
 #include "geom/double_double.h"
@@ -198,6 +199,7 @@ static void mass_of(ebpo_mass *out, const moments *m, const frame *f, bool solid
 
 ebpo_status ebpo_measure(ebpo_file *file, unsigned threads, ebpo_mass *out, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     ebpo_mesh mesh = {0};
     pass p = {.mesh = &mesh};
     moments sum = {.absolute6 = 0};

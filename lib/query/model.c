@@ -1,4 +1,6 @@
 /* Opening a model: everything at once when that fits, else the top of the tree and a cache. */
+#include "geom/strict_fp.h"
+
 #include "query/model.h"
 
 #include <inttypes.h>
@@ -8,6 +10,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "query/clock.h"
 #include "query/locate.h"
 
@@ -175,6 +178,7 @@ static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
 
 ebpo_status ebpo_model_open(ebpo_model **out, ebpo_file *file, const ebpo_model_options *options, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     static const ebpo_model_options usual = EBPO_MODEL_OPTIONS_INIT;
     *out = NULL;
     ebpo_model *m = ebpo_alloc_zero(1, sizeof *m);
@@ -237,6 +241,7 @@ void ebpo_model_get_stats(const ebpo_model *m, ebpo_model_stats *out)
 
 ebpo_status ebpo_context_new(ebpo_context **out, ebpo_model *model, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     *out = ebpo_alloc_zero(1, sizeof **out);
     if (!*out)
         return ebpo_fail_memory(error, sizeof **out);

@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "query/modes.h"
 
 #include <math.h>

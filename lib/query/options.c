@@ -1,9 +1,12 @@
+#include "geom/strict_fp.h"
+
 #include "query/options.h"
 
 #include <inttypes.h>
 #include <math.h>
 
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "container/reader.h"
 #include "query/ahead.h"
 #include "query/inside.h"
@@ -46,6 +49,7 @@ ebpo_status ebpo_check_solid(const ebpo_model *model, ebpo_error *error)
 ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64_t count, const ebpo_query_options *options,
                              ebpo_inside_result *out, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     static const ebpo_query_options usual = EBPO_QUERY_OPTIONS_INIT;
     const ebpo_query_options *o = options ? options : &usual;
     const ebpo_model *m = context->model;

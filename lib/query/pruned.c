@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "query/pruned.h"
 
 #include <stdio.h>

@@ -9,6 +9,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "query/options.h"
 #include "query/pruned.h"
 #include "query/walk.h"
@@ -227,6 +228,7 @@ static casting make_casting(ebpo_context *context, const double origin[3], const
 ebpo_status ebpo_ray_first(ebpo_context *context, const double origin[3], const double direction[3], double t_max, ebpo_ray_hit *out, bool *hit,
                            ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     casting c = make_casting(context, origin, direction, t_max, false);
     ebpo_status status = cast(&c, error);
     *hit = status == EBPO_OK && c.count;
@@ -246,6 +248,7 @@ static int compare_met(const void *a, const void *b, void *ray)
 ebpo_status ebpo_ray_all(ebpo_context *context, const double origin[3], const double direction[3], double t_max, const ebpo_ray_hit **hits,
                          uint64_t *count, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     casting c = make_casting(context, origin, direction, t_max, true);
     *hits = NULL;
     *count = 0;

@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "stream/node.h"
 
 #include <string.h>

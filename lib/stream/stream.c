@@ -1,4 +1,6 @@
 /* Levels one after the other. Of a level that has been passed only its types stay, and with polygons its planes: enough to walk down to the nodes of the next one. */
+#include "geom/strict_fp.h"
+
 #include <ebpo/stream.h>
 
 #include <inttypes.h>
@@ -8,6 +10,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "base/parallel.h"
 #include "stream/node.h"
 #include "stream/walk.h"
@@ -188,6 +191,7 @@ static volumes stated_volumes(const ebpo_stream *s, int level)
 
 ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool *more, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     int next = s->level + 1;
     *more = false;
     if (next >= s->info->level_count)
@@ -236,6 +240,7 @@ static int32_t winding_of(const ebpo_level *level, const ebpo_walk_node *node)
 
 ebpo_status ebpo_stream_next_node(ebpo_stream *s, ebpo_stream_node *out, bool *more, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     ebpo_walk_node node;
     *more = false;
     if (s->level < 0)

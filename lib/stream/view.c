@@ -7,6 +7,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/fp_env.h"
 
 enum { MEMORY_LEAST = 1 << 20 };
 
@@ -45,6 +46,7 @@ static ebpo_status take_options(ebpo_view_stream *s, const ebpo_view_options *op
 
 ebpo_status ebpo_view_stream_new(ebpo_view_stream **out, ebpo_file *file, const ebpo_view_options *options, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     static const ebpo_view_options usual = EBPO_VIEW_OPTIONS_INIT;
     *out = NULL;
     ebpo_view_stream *s = ebpo_alloc_zero(1, sizeof *s);
@@ -99,6 +101,7 @@ static void rank(const ebpo_view_stream *s, ebpo_waiting *w)
 
 ebpo_status ebpo_view_stream_change(ebpo_view_stream *s, const ebpo_view_options *options, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     const ebpo_view_options *now = &s->options;
     if (options->planes != now->planes || options->polygons != now->polygons || options->windings != now->windings || options->memory != now->memory)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "view options: planes, polygons, windings and memory cannot be changed; make another stream");
@@ -225,6 +228,7 @@ void ebpo_view_fill(ebpo_view_stream *s, ebpo_grown_node node, ebpo_view_node *o
 
 ebpo_status ebpo_view_stream_next(ebpo_view_stream *s, ebpo_view_node *out, ebpo_view_end *end, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     *end = EBPO_VIEW_NODE;
     while (!s->delivering) {
         ebpo_status status = begin_group(s, end, error);

@@ -1,6 +1,7 @@
 /* What of a view has been delivered: its cut, and figures. */
 #include <math.h>
 
+#include "base/fp_env.h"
 #include "stream/view.h"
 
 typedef struct visitor {
@@ -29,6 +30,7 @@ static bool visit_node(visitor *v, ebpo_grown_node node)
 
 void ebpo_view_stream_cut(ebpo_view_stream *s, ebpo_view_visit_fn visit, void *user)
 {
+    EBPO_DEFAULT_FP;
     visitor v = { .stream = s, .visit = visit, .user = user };
     if (s->delivered)
         (void)visit_node(&v, (ebpo_grown_node){ 0, 0 });

@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "stream/walk.h"
 
 #include <string.h>

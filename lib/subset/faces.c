@@ -1,5 +1,7 @@
 /* Depth first through what remains, as the specification numbers faces. Maps from old numbers to new ones are as long as the source's mesh, but pages that nothing is written to
  * take no memory, and what lies close together in space does so in numbers. */
+#include "geom/strict_fp.h"
+
 #include <stdlib.h>
 #include <string.h>
 

@@ -1,5 +1,7 @@
 /* Choosing by size: the file's size falls as max_error grows, so the least max_error that fits is found by trying. Coarse files come first, as they are small and quick to make; what is
  * known of envelopes serves all trials. */
+#include "geom/strict_fp.h"
+
 #include <inttypes.h>
 #include <math.h>
 #include <sys/stat.h>

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "container/reader.h"
 #include "io/publish.h"
 #include "subset/parts.h"
@@ -148,6 +149,7 @@ ebpo_status ebpo_subset_tree_needed(ebpo_tree *out, ebpo_file *file, const ebpo_
 
 ebpo_status ebpo_subset(ebpo_file *file, const char *path, const ebpo_subset_options *options, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     static const ebpo_subset_options usual = EBPO_SUBSET_OPTIONS_INIT;
     ebpo_subset_options wanted = options ? *options : usual;
     ebpo_tree tree;
@@ -164,6 +166,7 @@ ebpo_status ebpo_subset(ebpo_file *file, const char *path, const ebpo_subset_opt
 
 ebpo_status ebpo_subset_of_tree(ebpo_tree *tree, const char *path, const ebpo_subset_options *options, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     static const ebpo_subset_options usual = EBPO_SUBSET_OPTIONS_INIT;
     const ebpo_subset_options *o = options ? options : &usual;
     ebpo_publish whole = EBPO_PUBLISH_INIT;

@@ -1,4 +1,6 @@
 /* Envelopes are cut as a reader of levels cuts them: leaves by stored planes or not at all. */
+#include "geom/strict_fp.h"
+
 #include "subset/parts.h"
 
 #include "lod/model.h"

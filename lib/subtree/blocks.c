@@ -1,4 +1,6 @@
 /* Corners of faces, eight faces together. */
+#include "geom/strict_fp.h"
+
 #include <float.h>
 #include <stdlib.h>
 

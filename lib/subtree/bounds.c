@@ -1,4 +1,6 @@
 /* Boxes and round slabs around the blocks below each child. All in doubles, in the subtree's frame, then rounded outward to floats. */
+#include "geom/strict_fp.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

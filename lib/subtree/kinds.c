@@ -4,6 +4,8 @@
  * boundary of P, so the winding number is constant within P's interior; and it is constant in each component of the rest of the cell. Every such component contains a corner of the
  * cell: a point above plane i can move to the corner that is farthest along that plane's normal and stays above. So when all corners of the cell that do not lie in P's closure have the
  * same winding number, and one point of P's interior is known, the planes decide. The same holds with "above" for "below" (concave). */
+#include "geom/strict_fp.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,4 +1,6 @@
 /* A subtree from its slice, stage by stage, and how much memory that takes. */
+#include "geom/strict_fp.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "verify/labels.h"
 
 #include <inttypes.h>

@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "verify/lists.h"
 
 #include <stdlib.h>

@@ -1,4 +1,6 @@
 /* What a tree must be beyond fitting its arrays. */
+#include "geom/strict_fp.h"
+
 #include "verify/structure.h"
 
 #include <inttypes.h>

@@ -2,6 +2,7 @@
 #include "verify/verify.h"
 
 #include "base/error.h"
+#include "base/fp_env.h"
 #include "mesh/mesh.h"
 #include "verify/nesting.h"
 #include "verify/source.h"
@@ -76,6 +77,7 @@ static ebpo_status check_source(ebpo_file *file, const ebpo_verify_options *opti
 
 ebpo_status ebpo_verify(ebpo_file *file, const ebpo_verify_options *options, ebpo_verify_report *report, ebpo_error *error)
 {
+    EBPO_DEFAULT_FP;
     static const ebpo_verify_options defaults = EBPO_VERIFY_OPTIONS_INIT;
     options = options ? options : &defaults;
     *report = (ebpo_verify_report){0};

@@ -1,5 +1,7 @@
 /* Nodes with many faces come first, one after the other, with their faces shared out to all threads; what remains below are many smaller subtrees,
  * each walked depth-first by one thread. Every face is tested exactly against every cell that it comes near. */
+#include "geom/strict_fp.h"
+
 #include "verify/walk.h"
 
 #include <stdlib.h>

@@ -1,6 +1,8 @@
 /* Seen along the axis, a face winds around the ray once or not at all: the edges that cross a half-line beside the point are counted. The half-line
  * runs along the axis of the larger shift, so that the smaller shift decides which end of an edge lies where, and the larger one every tie
  * that is left. */
+#include "geom/strict_fp.h"
+
 #include "verify/winding.h"
 
 #include <stdlib.h>

@@ -3,6 +3,9 @@
  * Every function that can fail returns an ebpo_status. The detail goes into an
  * ebpo_error that the caller owns; passing NULL for it is always allowed.
  * There is no global or thread-local error state.
+ *
+ * The caller's floating-point environment does not matter: rounding mode, flushing of denormals and traps are put
+ * aside while a function computes, and are as they were when it returns. Callbacks run in the default environment.
  */
 #ifndef EBPO_BASE_H
 #define EBPO_BASE_H

@@ -6,7 +6,7 @@
  *     ebpo_inside(c, point, NULL, &answer, &error);
  *
  * "Exact" means: the decision is that of arithmetic without rounding on the file's coordinates, for every finite double that is asked about, whatever the
- * compiler, the number of threads, the memory budget or the mode. Source of the methods: BP 2008, chapter 5; EBP 2017, chapter 4; format-spec/README.md, section 5.
+ * compiler, the floating-point environment, the number of threads, the memory budget or the mode. Source of the methods: BP 2008, chapter 5; EBP 2017, chapter 4; format-spec/README.md, section 5.
  */
 #ifndef EBPO_QUERY_H
 #define EBPO_QUERY_H

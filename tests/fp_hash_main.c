@@ -1,0 +1,19 @@
+/* Prints a line for each small stiff case: hash of the content, hash of the answers, name. Built once for each set of compiler flags, with the library's numeric sources built the same way. */
+#include <fenv.h>
+#include <inttypes.h>
+#include <stdio.h>
+
+#include "fp_hash.h"
+
+int main(void)
+{
+    const fp_setting usual = { FE_TONEAREST, 0 };
+    for (int i = 0; i < stiff_case_count; i++) {
+        fp_hashes h;
+        if (!fp_hash_takes(&stiff_cases[i]))
+            continue;
+        fp_hash_case(&stiff_cases[i], &usual, 100, &h);
+        printf("%016" PRIx64 " %016" PRIx64 " %s\n", h.content, h.answers, stiff_cases[i].name);
+    }
+    return 0;
+}
