@@ -7,7 +7,7 @@
 #include "report_data.h"
 
 static const double errors[] = { 10, 3, 1, 0.3 }; /* percent of the diagonal */
-static const double sizes[] = { 5, 10, 20, 50 };  /* percent of the first file */
+static const double sizes[] = { 3, 5, 10, 50 };  /* percent of the first file */
 
 /* What a viewer needs: envelopes without mesh. */
 static ebpo_status cut(const comparison *c, ebpo_file *file, const need_result *n, const char *path, ebpo_error *error)

@@ -151,7 +151,7 @@ static void widen(axis *a)
         a->high = rounded(a->high, true);
         return;
     }
-    a->step = rounded((a->high - a->low) / 5, true);
+    a->step = rounded((a->high - a->low) / 8, true);
 }
 
 static axis axis_of(const plot *p, bool vertical)

@@ -85,6 +85,9 @@ void page_plots_by_level(FILE *out, const comparison *c)
     excess_plot(out, c, "Excess of volume", "level", PLOT_LEVEL, LEVEL_FIGURES, AS_IT_IS);
     plot ratio = { .title = "Excess against the limit’s", .x_name = "level", .y_name = "times the limit’s excess", .x = PLOT_LEVEL, .y = PLOT_TIMES };
     lines(&ratio, c, LEVEL_FIGURES, AS_IT_IS, OF_EXCESS_TO_LIMIT, AS_IT_IS, false);
+    plot_series *one = plot_add(&ratio, "limit", -1);
+    for (int k = c->first; k <= comparison_last(c); k++)
+        plot_at(&ratio, one, k, 1, k);
     write_if_any(out, &ratio);
     fputs("</div>\n", out);
     page_against_limit(out, c);
