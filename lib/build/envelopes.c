@@ -63,7 +63,7 @@ unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32
     return mask;
 }
 
-/* A support from which on a plane cannot remove epsilon: a cap of height h of a body of width H and volume V has at most V (1 - (1 - h/H)^3) <= 3 V h / H. */
+/* A support from which on a plane cannot remove epsilon, nor a needle: a cap of height h of a body of width H and volume V has at most V (1 - (1 - h/H)^3) <= 3 V h / H. */
 static double hopeless(const ebpo_polytope *envelope, double volume, const int32_t n[3], double epsilon)
 {
     double most = -1e300, least = 1e300;
@@ -73,7 +73,8 @@ static double hopeless(const ebpo_polytope *envelope, double volume, const int32
         most = e > most ? e : most;
         least = e < least ? e : least;
     }
-    return most - (most - least) * epsilon / (3 * volume);
+    double length = sqrt((double)n[0] * n[0] + (double)n[1] * n[1] + (double)n[2] * n[2]);
+    return most - fmin((most - least) * epsilon / (3 * volume), ebpo_needle * length);
 }
 
 /* Looks at one more direction. Those that cannot gain epsilon are dropped as soon as that shows. The extreme point is kept for the hull. */
@@ -194,7 +195,7 @@ static int choose_now(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebp
     if (volume > 0)
         try_hull(s, envelope, volume, epsilon, top ? HULL_DIRECTIONS : HULL_BELOW);
     ebpo_choice choice = { .candidates = s->candidates, .count = s->count, 
-                           .most = cell.level <= MANY_LEVELS ? 2 * EBPO_PLANES_MAX : EBPO_PLANES_MAX, .epsilon = epsilon };
+                           .most = cell.level <= MANY_LEVELS ? 2 * EBPO_PLANES_MAX : EBPO_PLANES_MAX, .epsilon = epsilon, .reach = ebpo_needle };
     return ebpo_select_greedy(envelope, &choice, codes);
 }
 

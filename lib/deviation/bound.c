@@ -151,13 +151,35 @@ static bool is_in_envelope(const ebpo_bounder *b, const double xi[3])
     return true;
 }
 
+/* Pieces reach a little beyond the envelope, and where it is sharp all of a piece may lie there. So a point outside is pulled towards the middle until it is inside: its distance changes by no more than it
+ * was moved. */
+static void pull_in(const ebpo_bounder *b, const double xi[3], double out[3])
+{
+    double share = 0;
+    for (int i = 0; i < b->halves.count; i++) {
+        double n[3], d = ebpo_plane_as_double(b->halves.half[i].n, b->halves.half[i].d, n) - 2e-12, at = -d, middle = -d;
+        for (int k = 0; k < 3; k++) {
+            at += n[k] * xi[k];
+            middle += n[k] * b->inner[k];
+        }
+        if (at > 0)
+            share = middle < 0 ? fmax(share, at / (at - middle)) : 1;
+    }
+    for (int k = 0; k < 3; k++)
+        out[k] = xi[k] + share * (b->inner[k] - xi[k]);
+}
+
 static void learn(ebpo_bounder *b, const double xi[3], double distance)
 {
-    double certain = distance - 4 * b->frame.grain;
-    if (certain <= b->lo || !is_in_envelope(b, xi))
+    double at[3], certain = distance - 4 * b->frame.grain;
+    if (certain <= b->lo)
+        return;
+    pull_in(b, xi, at);
+    certain -= ebpo_cell_frame_apart(&b->frame, xi, at);
+    if (certain <= b->lo || !is_in_envelope(b, at))
         return;
     b->lo = certain;
-    ebpo_cell_frame_point(&b->frame, xi, b->place);
+    ebpo_cell_frame_point(&b->frame, at, b->place);
     b->target = fmax(b->target, b->ratio * b->lo);
 }
 
@@ -196,6 +218,17 @@ static void settle(ebpo_bounder *b, double upper)
 
 /* --- cutting --- */
 
+static void settle_thin(ebpo_bounder *b, const ebpo_polytope *p, const double low[3], double half, unsigned octant)
+{
+    ebpo_extent e;
+    ebpo_extent_of(p, &e);
+    for (int k = 0; k < 3; k++) {
+        double from = low[k] + (octant >> k & 1 ? half : 0);
+        if (e.min[k] < from - EBPO_CUT_SLACK || e.max[k] > from + half + EBPO_CUT_SLACK)
+            settle(b, 2 * EBPO_CUT_THIN * ebpo_cell_frame_diagonal(&b->frame, 0));
+    }
+}
+
 static ebpo_status cut_gray(ebpo_bounder *b, const ebpo_piece *piece)
 {
     ebpo_polytope z, y, x;
@@ -206,9 +239,13 @@ static ebpo_status cut_gray(ebpo_bounder *b, const ebpo_piece *piece)
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
         ebpo_tree_place child = ebpo_tree_child(b->whole, &piece->place, octant);
         ebpo_piece *next = NULL;
-        if (child.type == EBPO_BLACK || !ebpo_cut_axis(&piece->p, 2, octant >> 2 & 1, low[2] + half, &z) || !ebpo_cut_axis(&z, 1, octant >> 1 & 1, low[1] + half, &y) ||
+        if (!ebpo_cut_axis(&piece->p, 2, octant >> 2 & 1, low[2] + half, &z) || !ebpo_cut_axis(&z, 1, octant >> 1 & 1, low[1] + half, &y) ||
             !ebpo_cut_axis(&y, 0, octant & 1, low[0] + half, &x))
             continue;
+        if (child.type == EBPO_BLACK) { /* inside, but for what thin part of the neighbours went with it */
+            settle_thin(b, &x, low, half, octant);
+            continue;
+        }
         status = push_polytope(b, child.type == EBPO_GRAY ? PIECE_GRAY : child.type == EBPO_LEAF ? PIECE_LEAF : PIECE_OUT, piece, &x, &next);
         if (status != EBPO_OK)
             break;
@@ -402,6 +439,11 @@ static ebpo_status begin(ebpo_bounder *b)
         return status;
     ebpo_halves_cut(&b->halves, EBPO_CUT_SLACK, &first->p);
     first->place = place;
+    for (int k = 0; k < 3; k++) {
+        b->inner[k] = 0;
+        for (int i = 0; i < first->p.vertex_count; i++)
+            b->inner[k] += first->p.vertex[i][k] / first->p.vertex_count;
+    }
     return place.type == EBPO_LEAF ? give_leaf_faces(b, first, &place) : EBPO_OK;
 }
 

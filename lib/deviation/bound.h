@@ -21,6 +21,7 @@ typedef struct ebpo_bounder {
     /* The node at hand: */
     ebpo_cell_frame frame;
     double target, quit, ratio, lo, hi, place[3];
+    double inner[3];             /* about the envelope's middle, in cell coordinates */
     uint64_t questions;
     ebpo_error *error;
 } ebpo_bounder;

@@ -18,30 +18,19 @@ void ebpo_extent_of(const ebpo_polytope *p, ebpo_extent *out)
     }
 }
 
-static void make_box(const ebpo_extent *e, ebpo_polytope *out)
-{
-    ebpo_polytope_cube(out);
-    for (int i = 0; i < 8; i++)
-        for (int k = 0; k < 3; k++)
-            out->vertex[i][k] = i >> k & 1 ? e->max[k] : e->min[k];
-}
-
 bool ebpo_cut_axis(const ebpo_polytope *p, int axis, int side, double at, ebpo_polytope *out)
 {
     double n[3] = { 0, 0, 0 };
     ebpo_extent e;
     ebpo_extent_of(p, &e);
-    if (side ? e.max[axis] < at - EBPO_CUT_SLACK : e.min[axis] > at + EBPO_CUT_SLACK)
+    /* Clipping gives up where next to nothing would be left, and a box around a thin part reaches far beyond it. So thin parts go with the thick ones. */
+    bool high_is_thin = e.max[axis] - at <= EBPO_CUT_THIN, low_is_thin = !high_is_thin && at - e.min[axis] <= EBPO_CUT_THIN;
+    if (side ? high_is_thin : low_is_thin)
         return false;
-    n[axis] = side ? -1 : 1;
     ebpo_polytope_copy(out, p);
-    if (ebpo_polytope_clip(out, n, (side ? -at : at) + EBPO_CUT_SLACK, CUT_TAG) != EBPO_CLIP_REFUSED)
-        return true;
-    if (side)
-        e.min[axis] = fmax(e.min[axis], at - EBPO_CUT_SLACK);
-    else
-        e.max[axis] = fmin(e.max[axis], at + EBPO_CUT_SLACK);
-    make_box(&e, out);
+    n[axis] = side ? -1 : 1;
+    if (!high_is_thin && !low_is_thin)
+        (void)ebpo_polytope_clip(out, n, (side ? -at : at) + EBPO_CUT_SLACK, CUT_TAG); /* where it gives up all the same, too much is kept */
     return true;
 }
 

@@ -14,7 +14,10 @@ typedef struct ebpo_extent {
 
 void ebpo_extent_of(const ebpo_polytope *p, ebpo_extent *out);
 
-/* The part with x[axis] <= at (side 0) or >= at (side 1). False: there is none. Where clipping gives up, a box around the part. */
+/* A part of so little width goes with the other side; less than a quarter of the smallest piece that is cut. */
+#define EBPO_CUT_THIN 1.2e-7 /* ebpo_polytope_clip refuses 1e-7 */
+
+/* The part with x[axis] <= at (side 0) or >= at (side 1), and what of the other side is thin. False: there is none, or it is thin. */
 bool ebpo_cut_axis(const ebpo_polytope *p, int axis, int side, double at, ebpo_polytope *out);
 
 /* The part with n . x <= d, |n| = 1; false when clipping gives up. */

@@ -164,6 +164,6 @@ int ebpo_leaf_planes(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *f
     ebpo_candidate candidates[LEAF_CANDIDATES];
     int kept = leaf_candidates(box, cell, faces, count, inside_corners, candidates);
     if (epsilon > 0)
-        return ebpo_select_greedy(envelope, &(ebpo_choice){ .candidates = candidates, .count = kept, .most = EBPO_PLANES_MAX, .epsilon = epsilon }, codes);
+        return ebpo_select_greedy(envelope, &(ebpo_choice){ .candidates = candidates, .count = kept, .most = EBPO_PLANES_MAX, .epsilon = epsilon, .reach = ebpo_needle }, codes);
     return ebpo_select_all(envelope, candidates, kept, EBPO_PLANES_MAX, codes);
 }

@@ -2,6 +2,8 @@
  * earlier bounds today's and most candidates are never looked at again (lazy evaluation). */
 #include "geom/strict_fp.h"
 
+#include <math.h>
+
 #include "geom/plane_code.h"
 #include "planes/planes.h"
 
@@ -83,6 +85,45 @@ static void drop_first(ranked *heap, int *count)
         sift_down(heap, *count, 0);
 }
 
+static double depth_of(const ebpo_polytope *p, const double n[3], double d)
+{
+    double most = -1e300;
+    for (int i = 0; i < p->vertex_count; i++) {
+        double e = n[0] * p->vertex[i][0] + n[1] * p->vertex[i][1] + n[2] * p->vertex[i][2];
+        most = e > most ? e : most;
+    }
+    return (most - d) / sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+}
+
+/* Volume alone leaves needles, which have next to none: cuts off what reaches far, farthest first. */
+static int cut_needles(ebpo_polytope *envelope, const ebpo_choice *choice, int taken, uint32_t *codes)
+{
+    while (taken < choice->most) {
+        double deepest = choice->reach, best[3] = { 0, 0, 0 }, at = 0;
+        uint32_t code = 0;
+        for (int i = 0; i < choice->count; i++) {
+            int32_t v[3], d;
+            double n[3];
+            if (!ebpo_plane_code_decode(ebpo_plane_code_make(choice->candidates[i].normal, 0), v, &d))
+                continue;
+            int q = ebpo_plane_code_offset(v, choice->candidates[i].support);
+            if (q < 0)
+                continue;
+            uint32_t c = ebpo_plane_code_make(choice->candidates[i].normal, q);
+            ebpo_plane_code_decode(c, v, &d);
+            double offset = ebpo_plane_as_double(v, d, n), depth = depth_of(envelope, n, offset);
+            if (depth > deepest) {
+                deepest = depth, at = offset, code = c;
+                best[0] = n[0], best[1] = n[1], best[2] = n[2];
+            }
+        }
+        if (!(deepest > choice->reach) || ebpo_polytope_clip(envelope, best, at, taken) != EBPO_CLIP_CUT)
+            break;
+        codes[taken++] = code;
+    }
+    return taken;
+}
+
 int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
 {
     ranked heap[EBPO_PLANES_CANDIDATES];
@@ -104,7 +145,7 @@ int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint3
             codes[taken++] = r->code;
         drop_first(heap, &left);
     }
-    return taken;
+    return choice->reach > 0 ? cut_needles(envelope, choice, taken, codes) : taken;
 }
 
 /* Share of the cell below which a derived plane is not worth the time of a clip. */
@@ -118,5 +159,5 @@ int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, i
     for (; left > 0 && taken < most; drop_first(heap, &left))
         if (ebpo_polytope_clip(envelope, heap[0].n, heap[0].d, taken) == EBPO_CLIP_CUT)
             codes[taken++] = heap[0].code;
-    return taken;
+    return cut_needles(envelope, &(ebpo_choice){ .candidates = candidates, .count = count, .most = most, .reach = ebpo_needle }, taken, codes);
 }
