@@ -145,8 +145,10 @@ static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_query_op
     if (status != EBPO_OK)
         return status;
     if (n.late && n.passed_over <= n.limit) {
-        double lo = fmin(n.passed_over, n.found ? n.bounds.lo : n.upper);
-        *out = (ebpo_distance_result){ NAN, lo, n.upper, { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
+        /* With hardly any time nothing may have been found; but some face is in the root cell. */
+        ebpo_box box = ebpo_model_box(c->model);
+        double hi = fmin(n.upper, ebpo_cell_far(&box, 0, (const uint32_t[3]){ 0, 0, 0 }, p)), lo = fmin(fmin(n.passed_over, n.found ? n.bounds.lo : n.upper), hi);
+        *out = (ebpo_distance_result){ NAN, lo, hi, { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
         return EBPO_OK;
     }
     ebpo_nearest_end(&n, o->max_distance, out);
