@@ -299,11 +299,20 @@ static ebpo_file *open_file(void)
     return file;
 }
 
+/* With EBPO_TEST_SCALE below 1 every fourth solid does: other compilers and sanitizers look for other things. */
+static bool left_out(int solid)
+{
+    const char *text = getenv("EBPO_TEST_SCALE");
+    return text && atof(text) < 1 && solid % 4;
+}
+
 static const ebpo_selection all[] = { EBPO_SELECT_INHERIT, EBPO_SELECT_KMEDOIDS, EBPO_SELECT_OFFSET, EBPO_SELECT_RANDOM };
 
 START_TEST(every_selection_makes_files_without_violations)
 {
     const ebpo_test_solid *solid = &ebpo_test_solids[_i];
+    if (left_out(_i))
+        return;
     for (int s = _i % 2; s < 8; s += 2) { /* each solid with every second way, so that it takes half the time */
         ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
         ebpo_error error = EBPO_ERROR_INIT;
@@ -410,7 +419,7 @@ END_TEST
 START_TEST(no_envelope_is_smaller_than_the_limit_and_inherited_ones_come_close)
 {
     const ebpo_test_solid *solid = &ebpo_test_solids[_i];
-    if (!solid->balanced)
+    if (!solid->balanced || left_out(_i))
         return;
     for (int s = 0; s < 4; s += 1 + _i % 3) {
         ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;

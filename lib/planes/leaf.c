@@ -3,17 +3,19 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "geom/plane_code.h"
 #include "planes/hull.h"
 #include "planes/planes.h"
 
-enum { LEAF_CANDIDATES = 64, LEAF_POINTS = 192 };
+enum { LEAF_CANDIDATES = 64, LEAF_POINTS = 192, LEAF_TABLE = 512 };
 
 /* Extreme points of the solid in the cell, and what rounding may add to a coordinate. */
 typedef struct leaf_points {
     double at[LEAF_POINTS][3], slack[LEAF_POINTS];
     int count;
+    uint8_t number[LEAF_TABLE]; /* by hash: 1 + place of the point; most corners of faces come several times */
 } leaf_points;
 
 static bool add_candidate(uint32_t normal, ebpo_candidate *out, int *count)
@@ -30,13 +32,20 @@ static bool add_candidate(uint32_t normal, ebpo_candidate *out, int *count)
 
 static bool add_point(leaf_points *points, const double p[3], double slack)
 {
-    for (int i = 0; i < points->count; i++)
+    uint64_t bits[3];
+    memcpy(bits, p, sizeof bits);
+    uint64_t key = (bits[0] * 0x9e3779b97f4a7c15u ^ bits[1]) * 0xbf58476d1ce4e5b9u ^ bits[2] * 0x94d049bb133111ebu;
+    unsigned place = (unsigned)(key >> 40) % LEAF_TABLE;
+    for (; points->number[place]; place = (place + 1) % LEAF_TABLE) {
+        int i = points->number[place] - 1;
         if (points->at[i][0] == p[0] && points->at[i][1] == p[1] && points->at[i][2] == p[2]) {
             points->slack[i] = fmax(points->slack[i], slack);
             return true;
         }
+    }
     if (points->count == LEAF_POINTS)
         return false;
+    points->number[place] = (uint8_t)(points->count + 1);
     for (int k = 0; k < 3; k++)
         points->at[points->count][k] = p[k];
     points->slack[points->count++] = slack;
@@ -47,6 +56,7 @@ static bool add_point(leaf_points *points, const double p[3], double slack)
 static bool gather_points(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces, uint64_t count, unsigned inside, leaf_points *points)
 {
     points->count = 0;
+    memset(points->number, 0, sizeof points->number);
     for (int i = 0; i < 8; i++)
         if (inside >> i & 1)
             (void)add_point(points, (const double[3]){ i & 1, i >> 1 & 1, i >> 2 & 1 }, 0);
