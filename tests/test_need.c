@@ -162,7 +162,7 @@ static void keeps_its_word(query_model *m, uint32_t parts)
 
 START_TEST(no_envelope_reaches_farther_than_asked_for)
 {
-    for (int i = 0; i < 5; i++) {
+    for (int i = query_scaled(4) < 4 ? 2 : 0; i < 5; i++) { /* other compilers and sanitizers: the small ones */
         query_model m;
         ebpo_mesh mesh = i == 0 ? ebpo_test_torus(3, 1, 48, 24) : i == 1 ? ebpo_test_sphere((double[3]){ 1, 2, 3 }, 2, 3) : i == 2 ? ebpo_test_blob(4, 40, 7) : i == 3 ?
                          ebpo_test_cone(1, 3, 40) : ebpo_test_sheet(4, 8);
@@ -201,7 +201,8 @@ START_TEST(a_size_is_kept_to_with_the_least_error)
     query_model m;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_subset_options o = EBPO_SUBSET_OPTIONS_INIT;
-    query_model_make(&m, "torus", ebpo_test_torus(3, 1, 96, 48), &stored);
+    uint32_t n = query_scaled(4) < 4 ? 24 : 96;
+    query_model_make(&m, "torus", ebpo_test_torus(3, 1, n, n / 2), &stored);
     uint64_t whole = ebpo_file_info(m.file)->file_bytes;
     for (int i = 0; i < 3; i++) {
         result r, finer;
