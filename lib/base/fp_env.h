@@ -1,6 +1,6 @@
 /* The floating-point environment of public functions: rounding to nearest, denormals kept, no traps, whatever the caller has set.
  *
- * EBPO_DEFAULT_FP; as the first line of a public function puts the caller's environment aside until the function returns, by any way. It costs two or three nanoseconds where the environment is the default
+ * EBPO_DEFAULT_FP; as the first line of a public function puts the caller's environment aside until the function returns, by any way. It costs a few nanoseconds where the environment is the default
  * one, as nothing is written then. Threads that the function starts inherit the environment. Exception flags that the caller had raised stay; those of the library's own operations are added or not. */
 #ifndef EBPO_BASE_FP_ENV_H
 #define EBPO_BASE_FP_ENV_H

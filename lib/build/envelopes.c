@@ -123,17 +123,6 @@ static void look_around(ebpo_envelope_scratch *s)
     }
 }
 
-static int by_area(const void *a, const void *b)
-{
-    const ebpo_hull_facet *f = a, *g = b;
-    if (f->area != g->area)
-        return f->area < g->area ? 1 : -1;
-    for (int i = 0; i < 3; i++)
-        if (f->corner[i] != g->corner[i])
-            return f->corner[i] < g->corner[i] ? -1 : 1;
-    return 0;
-}
-
 static bool was_tried(const ebpo_envelope_scratch *s, uint32_t normal)
 {
     for (int i = 0; i < s->tried_count; i++)
@@ -147,7 +136,7 @@ static bool hull_round(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, 
 {
     static const double worth = 1e-3; /* of the cell */
     int facets = ebpo_hull_facets((const double (*)[3])s->core, s->core_count, s->facet, EBPO_HULL_FACETS), before = s->core_count;
-    qsort(s->facet, (size_t)facets, sizeof *s->facet, by_area);
+    qsort(s->facet, (size_t)facets, sizeof *s->facet, ebpo_hull_by_area);
     for (int i = 0; i < facets && most > 0; i++) {
         const ebpo_hull_facet *f = &s->facet[i];
         uint32_t normal;
@@ -194,7 +183,7 @@ static int choose_now(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebp
     }
     if (volume > 0)
         try_hull(s, envelope, volume, epsilon, top ? HULL_DIRECTIONS : HULL_BELOW);
-    ebpo_choice choice = { .candidates = s->candidates, .count = s->count, 
+    ebpo_choice choice = { .candidates = s->candidates, .count = s->count,
                            .most = cell.level <= MANY_LEVELS ? 2 * EBPO_PLANES_MAX : EBPO_PLANES_MAX, .epsilon = epsilon, .reach = ebpo_needle };
     return ebpo_select_greedy(envelope, &choice, codes);
 }

@@ -72,7 +72,16 @@ static int by_normal(const void *a, const void *b)
     return x->origin > y->origin ? -1 : x->origin < y->origin; /* of equal normals the one that has to move least */
 }
 
+static int by_normal_alone(const void *a, const void *b)
+{
+    const ebpo_offer *x = a, *y = b;
+    return (x->normal > y->normal) - (x->normal < y->normal);
+}
+
 /* Of equal normals one is left. Their supports are still to be found. */
+/* More candidates than that are thinned out evenly: only leaves without a limit of faces have so many, and k-medoids looks at all pairs. */
+enum { CANDIDATES_MOST = 4096 };
+
 static bool make_candidates(proposer *p, ebpo_handover *given)
 {
     uint64_t kept = 0;
@@ -80,7 +89,11 @@ static bool make_candidates(proposer *p, ebpo_handover *given)
     for (uint64_t i = 0; i < given->offer_count; i++)
         if (i == 0 || given->offers[i].normal != given->offers[i - 1].normal)
             given->offers[kept++] = given->offers[i];
-    given->offer_count = kept;
+    uint64_t step = kept / CANDIDATES_MOST + 1;
+    given->offer_count = 0;
+    for (uint64_t i = 0; i < kept; i += step)
+        given->offers[given->offer_count++] = given->offers[i];
+    kept = given->offer_count;
     if (!ebpo_grow(&p->candidates, &p->candidate_room, kept, sizeof *p->candidates))
         return false;
     for (uint64_t i = 0; i < kept; i++)
@@ -127,11 +140,10 @@ static bool choose(proposer *p, uint32_t detail, ebpo_cell cell, const ebpo_hand
         return false;
     all->first[detail] = all->code_count;
     all->count[detail] = (uint8_t)count;
-    for (int i = 0, at = 0; i < count; i++) { /* codes come in the candidates' order */
+    for (int i = 0; i < count; i++) {
+        ebpo_offer *offer = bsearch(&(ebpo_offer){ .normal = codes[i] & 0xfffff }, given->offers, given->offer_count, sizeof *offer, by_normal_alone);
         all->codes[all->code_count++] = codes[i];
-        while (given->offers[at].normal != (codes[i] & 0xfffff))
-            at++;
-        if (!add_offer(out, given->offers[at].normal, given->offers[at].origin))
+        if (offer && !add_offer(out, offer->normal, offer->origin))
             return false;
     }
     if (!ebpo_grow(&out->corner, &out->corner_room, (uint64_t)own.vertex_count, sizeof *out->corner))

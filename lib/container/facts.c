@@ -191,7 +191,8 @@ enum { SELECTION_FACTS = sizeof selection_facts / sizeof selection_facts[0] };
 
 static ebpo_status put_selection(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info, ebpo_error *error)
 {
-    if (info->selection <= 0 || info->selection > 3 || info->normals < 0 || info->normals > 1)
+    int known = sizeof SELECTIONS / sizeof *SELECTIONS - 1;
+    if (info->selection <= 0 || info->selection >= known || info->normals < 0 || info->normals > 1)
         return EBPO_OK;
     ebpo_status status = ebpo_h5_put_text(out, root, "selection", SELECTIONS[info->selection], error);
     if (status == EBPO_OK)

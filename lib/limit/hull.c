@@ -44,9 +44,8 @@ static double volume_by(ebpo_hull *hull, double *points, int count, char *comman
     volatile bool wrong = true;
     qh_zero(qh, hull->silence);
     if (qh_new_qhull(qh, 3, count, points, False, command, NULL, hull->silence) == 0) {
-        int jumped = setjmp(qh->errexit); /* qhull's errors jump */
-        qh->NOerrexit = False;
-        if (!jumped) {
+        if (setjmp(qh->errexit) == 0) { /* qhull's errors jump */
+            qh->NOerrexit = False;
             qh_getarea(qh, qh->facet_list);
             volume = qh->totvol;
             wrong = false;

@@ -38,6 +38,7 @@ typedef struct job {
     wanted *nodes;
     uint64_t node_count, node_room;
     double *volume; /* [node_count] in cells */
+    uint64_t *empty_before[EBPO_LEVELS_MAX][2]; /* white, black: such nodes in the groups before; where their windings are stored */
     double black;
     scratch *scratch; /* [threads] */
 } job;
@@ -146,27 +147,20 @@ static bool take_faces(const job *j, scratch *s)
 
 /* --- its corners --- */
 
-static bool is_inside(ebpo_rule rule, int32_t winding)
-{
-    return rule == EBPO_RULE_EVENODD ? winding & 1 : rule == EBPO_RULE_POSITIVE ? winding > 0 : winding != 0;
-}
-
 /* Winding number at a gray node's lowest corner: that of the node in its lowest corner. */
-static int32_t lowest_winding(const ebpo_lod_model *m, int number, uint64_t gray)
+static int32_t lowest_winding(const job *j, int number, uint64_t gray)
 {
+    const ebpo_lod_model *m = &j->model;
     for (;; number++) {
         const ebpo_level *level = &m->level[number + 1];
         const ebpo_lod_index *index = &m->index[number + 1];
         switch (ebpo_type_of(level->types[gray], 0)) {
         case EBPO_GRAY: gray = index->gray_before[gray]; break;
         case EBPO_LEAF: return level->leaf_winding[index->leaf_before[gray]];
-        default: { /* ranks of empty nodes have no index; only windings that are not 0 or 1 are stored */
+        default: { /* only windings that are not 0 or 1 are stored; octant 0 is the first of its group */
             bool black = ebpo_type_of(level->types[gray], 0) == EBPO_BLACK;
             const int32_t *stored = black ? level->black_winding : level->white_winding;
-            uint64_t rank = 0;
-            for (uint64_t g = 0; stored && g < gray; g++)
-                rank += ebpo_count_type(level->types[g], black ? EBPO_BLACK : EBPO_WHITE, 8);
-            return stored ? stored[rank] : black;
+            return stored ? stored[j->empty_before[number + 1][black][gray]] : black;
         }
         }
     }
@@ -177,12 +171,12 @@ static bool add_corners(const job *j, scratch *s, const wanted *w)
     const ebpo_lod_model *m = &j->model;
     if (!m->info->solid)
         return true;
-    int32_t delta[8], lowest = w->gray ? lowest_winding(m, w->cell.level, w->rank) : m->level[w->cell.level].leaf_winding[w->rank];
+    int32_t delta[8], lowest = w->gray ? lowest_winding(j, w->cell.level, w->rank) : m->level[w->cell.level].leaf_winding[w->rank];
     ebpo_corner_windings(&m->box, w->cell, s->faces, s->list_count, delta);
     if (!ebpo_grow(&s->points, &s->points_room, s->point_count + 8, 3 * sizeof *s->points))
         return false;
     for (int i = 0; i < 8; i++)
-        if (is_inside(m->info->rule, lowest + delta[i])) {
+        if (ebpo_lod_rule_inside(m->info->rule, lowest + delta[i])) {
             double *p = s->points + 3 * s->point_count++;
             p[0] = i & 1, p[1] = i >> 1 & 1, p[2] = i >> 2 & 1;
         }
@@ -229,6 +223,24 @@ static ebpo_status check(ebpo_file *file, int level, ebpo_error *error)
     return EBPO_OK;
 }
 
+static bool count_empty(job *j)
+{
+    for (int i = 0; i <= j->model.target; i++)
+        for (int black = 0; black < 2; black++) {
+            const ebpo_level *level = &j->model.level[i];
+            if (!(black ? level->black_winding : level->white_winding))
+                continue;
+            uint64_t sum = 0, *before = j->empty_before[i][black] = ebpo_alloc(level->group_count, sizeof *before);
+            for (uint64_t g = 0; before && g < level->group_count; g++) {
+                before[g] = sum;
+                sum += ebpo_count_type(level->types[g], black ? EBPO_BLACK : EBPO_WHITE, 8);
+            }
+            if (!before)
+                return false;
+        }
+    return true;
+}
+
 static ebpo_status prepare(job *j, ebpo_file *file, int level, unsigned threads, ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(file);
@@ -237,7 +249,7 @@ static ebpo_status prepare(job *j, ebpo_file *file, int level, unsigned threads,
     if (status == EBPO_OK)
         status = ebpo_file_read_mesh(file, &j->mesh, threads, error);
     j->scratch = ebpo_alloc_zero(threads, sizeof *j->scratch);
-    if (status == EBPO_OK && (!j->scratch || !list_node(j, 0, 0, (ebpo_cell){ 0, { 0, 0, 0 } })))
+    if (status == EBPO_OK && (!j->scratch || !count_empty(j) || !list_node(j, 0, 0, (ebpo_cell){ 0, { 0, 0, 0 } })))
         status = ebpo_fail_memory(error, j->node_count * sizeof *j->nodes);
     for (unsigned i = 0; i < threads && status == EBPO_OK; i++)
         status = ebpo_hull_new(&j->scratch[i].hull, error);
@@ -253,6 +265,10 @@ static void job_free(job *j, unsigned threads)
         free(j->scratch[i].list);
         free(j->scratch[i].faces);
         free(j->scratch[i].points);
+    }
+    for (int i = 0; i < EBPO_LEVELS_MAX; i++) {
+        free(j->empty_before[i][0]);
+        free(j->empty_before[i][1]);
     }
     free(j->scratch);
     free(j->nodes);
@@ -275,7 +291,7 @@ ebpo_status ebpo_limit_level(ebpo_file *file, int level, unsigned threads, const
     if (status == EBPO_OK)
         status = ebpo_parallel_for(threads, j.node_count, 1, hulls, &j, progress ? progress : &silent, "convex hulls", error);
     for (uint64_t i = 0; i < j.node_count && status == EBPO_OK; i++) {
-        double volume = j.volume[i] * cell_volume(&j, j.nodes[i].cell.level);
+        double volume = j.volume[i] > 0 ? j.volume[i] * cell_volume(&j, j.nodes[i].cell.level) : 0; /* not 0 times infinity */
         out->volume += volume;
         out->gray_volume += j.nodes[i].gray ? volume : 0;
         out->flat += j.volume[i] == 0;

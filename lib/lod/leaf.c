@@ -5,7 +5,7 @@
 #include "base/error.h"
 #include "lod/model.h"
 
-static bool is_inside(ebpo_rule rule, int32_t winding)
+bool ebpo_lod_rule_inside(ebpo_rule rule, int32_t winding)
 {
     switch (rule) {
     case EBPO_RULE_EVENODD: return winding & 1;
@@ -63,7 +63,7 @@ static unsigned inside_corners(const ebpo_lod_model *model, ebpo_cell cell, uint
     ebpo_corner_windings(&model->box, cell, faces, count, delta);
     unsigned inside = 0;
     for (unsigned i = 0; i < 8; i++)
-        inside |= (unsigned)is_inside(model->info->rule, winding[leaf] + delta[i]) << i;
+        inside |= (unsigned)ebpo_lod_rule_inside(model->info->rule, winding[leaf] + delta[i]) << i;
     return inside;
 }
 

@@ -83,14 +83,16 @@ static int first_facets(const double (*p)[3], const int c[4], ebpo_hull_facet *f
 /* Takes out the facets that see the point and lists their edges; returns how many edges, -1: more than fit. */
 static int take_visible(ebpo_hull_facet *facets, int *count, const double p[3], edge *edges, int most)
 {
-    int listed = 0, kept = 0;
+    int listed = 0, kept = 0, seen = 0;
+    for (int i = 0; i < *count; i++)
+        seen += height(&facets[i], p) > beyond;
+    if (3 * seen > most)
+        return -1;
     for (int i = 0; i < *count; i++) {
         if (height(&facets[i], p) <= beyond) {
             facets[kept++] = facets[i];
             continue;
         }
-        if (listed + 3 > most)
-            return -1;
         for (int e = 0; e < 3; e++)
             edges[listed++] = (edge){ facets[i].corner[e], facets[i].corner[(e + 1) % 3] };
     }
@@ -135,4 +137,15 @@ int ebpo_hull_facets(const double (*points)[3], int count, ebpo_hull_facet *face
         if (i != corner[0] && i != corner[1] && i != corner[2] && i != corner[3] && !add_point(points, i, facets, &made, room))
             break;
     return made;
+}
+
+int ebpo_hull_by_area(const void *a, const void *b)
+{
+    const ebpo_hull_facet *f = a, *g = b;
+    if (f->area != g->area)
+        return f->area < g->area ? 1 : -1;
+    for (int i = 0; i < 3; i++)
+        if (f->corner[i] != g->corner[i])
+            return f->corner[i] < g->corner[i] ? -1 : 1;
+    return 0;
 }

@@ -16,4 +16,7 @@ typedef struct ebpo_hull_facet {
  * for `room`; a hull of n points has 2 n - 4, but rounding may make more of them, and what does not fit is left out. Points nearer than 1e-9 to the hull found so far are left out. */
 int ebpo_hull_facets(const double (*points)[3], int count, ebpo_hull_facet *facets, int room);
 
+/* For qsort: largest first; facets of equal area by their corners, so that the order is the same everywhere. */
+int ebpo_hull_by_area(const void *a, const void *b);
+
 #endif

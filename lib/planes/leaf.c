@@ -70,23 +70,12 @@ static bool gather_points(const ebpo_box *box, ebpo_cell cell, const ebpo_triang
     return true;
 }
 
-static int by_area(const void *a, const void *b)
-{
-    const ebpo_hull_facet *f = a, *g = b;
-    if (f->area != g->area)
-        return f->area < g->area ? 1 : -1;
-    for (int i = 0; i < 3; i++)
-        if (f->corner[i] != g->corner[i])
-            return f->corner[i] < g->corner[i] ? -1 : 1;
-    return 0;
-}
-
 static int hull_normals(const leaf_points *points, ebpo_candidate *out)
 {
     ebpo_hull_facet facets[2 * LEAF_POINTS];
     int count = ebpo_hull_facets((const double (*)[3])points->at, points->count, facets, 2 * LEAF_POINTS), kept = 0;
     if (count > LEAF_CANDIDATES)
-        qsort(facets, (size_t)count, sizeof *facets, by_area);
+        qsort(facets, (size_t)count, sizeof *facets, ebpo_hull_by_area);
     for (int i = 0; i < count; i++) {
         uint32_t normal;
         if (ebpo_plane_code_normal(facets[i].n, &normal) && !add_candidate(normal, out, &kept))

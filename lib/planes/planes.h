@@ -13,8 +13,7 @@ enum {
     EBPO_PLANES_STORED = 255      /* the theses' selections, which start from the cell; more than a byte counts is not stored */
 };
 
-/* What reaches so far beyond a candidate plane, in cells, is cut off even when it has no volume. Lower values cost bytes, and move the farthest point little: 0.05 took 2 to 3 % more on a
- * dragon (`ebpo measure --deviation`). */
+/* What reaches so far beyond a candidate plane, in cells, is cut off even when it has no volume. */
 static const double ebpo_needle = 0.1;
 
 /* A candidate: a normal (bits 0-19 of a plane code) and the support of the solid in the cell in that direction: an upper bound of
@@ -36,7 +35,8 @@ typedef struct ebpo_choice {
 } ebpo_choice;
 
 /* A selection: takes planes from the candidates, clips `envelope` by them and writes their codes; returns how many, -1: out of memory.
- * Adding a method means one function of this shape and a line in selections.c. */
+ * Adding a method means one function of this shape, a line in selections.c, and its name in three lists: ebpo_selection (build.h), SELECTIONS (container/facts.c), selection_words (the tool's words.c).
+ * Codes may come in any order; the count of candidates is at most EBPO_PLANES_CANDIDATES from the root down, anything from the leaves up. */
 typedef int (*ebpo_select_fn)(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes);
 
 typedef struct ebpo_selection_method {
@@ -60,7 +60,7 @@ int ebpo_select_random(ebpo_polytope *envelope, const ebpo_choice *choice, uint3
  * (2008, 3.5.1); all of them where that is below 1 to begin with (as there). */
 int ebpo_selection_wanted(int count, int level, double percent, double k_root);
 
-/* Every candidate that may remove 0.03 % of the cell or more, deepest cut first: nearly the tightest envelope, and with few candidates the
+/* Every candidate that may remove 0.03 % of the cell or more, deepest cut first, then needles: nearly the tightest envelope, and with few candidates the
  * cheapest to find. */
 int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, int most, uint32_t *codes);
 

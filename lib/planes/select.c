@@ -31,20 +31,29 @@ static double cap_bound(const ebpo_polytope *p, double volume, const double n[3]
     return volume * (1 - left * left * left);
 }
 
+/* The plane that a candidate would be; false when only the whole cell would do. */
+static bool plane_of(const ebpo_candidate *candidate, uint32_t *code, double n[3], double *offset)
+{
+    int32_t v[3], d;
+    if (!ebpo_plane_code_decode(ebpo_plane_code_make(candidate->normal, 0), v, &d))
+        return false;
+    int q = ebpo_plane_code_offset(v, candidate->support);
+    if (q < 0)
+        return false;
+    *code = ebpo_plane_code_make(candidate->normal, q);
+    ebpo_plane_code_decode(*code, v, &d);
+    *offset = ebpo_plane_as_double(v, d, n);
+    return true;
+}
+
 static int rank_candidates(const ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, double epsilon, ranked *out)
 {
     double volume = ebpo_polytope_volume(envelope);
     int kept = 0;
-    for (int i = 0; i < count; i++) {
-        int32_t n[3], d;
-        if (!ebpo_plane_code_decode(ebpo_plane_code_make(candidates[i].normal, 0), n, &d))
+    for (int i = 0; i < count && i < EBPO_PLANES_CANDIDATES; i++) {
+        ranked r = { .round = -1 };
+        if (!plane_of(&candidates[i], &r.code, r.n, &r.d))
             continue;
-        int q = ebpo_plane_code_offset(n, candidates[i].support);
-        if (q < 0)
-            continue;
-        ranked r = { .round = -1, .code = ebpo_plane_code_make(candidates[i].normal, q) };
-        ebpo_plane_code_decode(r.code, n, &d);
-        r.d = ebpo_plane_as_double(n, d, r.n);
         r.gain = cap_bound(envelope, volume, r.n, r.d);
         if (r.gain >= epsilon && r.gain > 0)
             out[kept++] = r;
@@ -95,31 +104,31 @@ static double depth_of(const ebpo_polytope *p, const double n[3], double d)
     return (most - d) / sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
 }
 
-/* Volume alone leaves needles, which have next to none: cuts off what reaches far, farthest first. */
+/* Volume alone leaves needles, which have next to none: cuts off what reaches far, farthest first. A plane that clipping refuses is left out, and the next one tried. */
 static int cut_needles(ebpo_polytope *envelope, const ebpo_choice *choice, int taken, uint32_t *codes)
 {
+    bool refused[EBPO_PLANES_CANDIDATES] = { false };
     while (taken < choice->most) {
         double deepest = choice->reach, best[3] = { 0, 0, 0 }, at = 0;
         uint32_t code = 0;
+        int which = -1;
         for (int i = 0; i < choice->count; i++) {
-            int32_t v[3], d;
-            double n[3];
-            if (!ebpo_plane_code_decode(ebpo_plane_code_make(choice->candidates[i].normal, 0), v, &d))
+            double n[3], offset;
+            uint32_t c;
+            if (refused[i] || !plane_of(&choice->candidates[i], &c, n, &offset))
                 continue;
-            int q = ebpo_plane_code_offset(v, choice->candidates[i].support);
-            if (q < 0)
-                continue;
-            uint32_t c = ebpo_plane_code_make(choice->candidates[i].normal, q);
-            ebpo_plane_code_decode(c, v, &d);
-            double offset = ebpo_plane_as_double(v, d, n), depth = depth_of(envelope, n, offset);
+            double depth = depth_of(envelope, n, offset);
             if (depth > deepest) {
-                deepest = depth, at = offset, code = c;
+                deepest = depth, at = offset, code = c, which = i;
                 best[0] = n[0], best[1] = n[1], best[2] = n[2];
             }
         }
-        if (!(deepest > choice->reach) || ebpo_polytope_clip(envelope, best, at, taken) != EBPO_CLIP_CUT)
+        if (which < 0)
             break;
-        codes[taken++] = code;
+        if (ebpo_polytope_clip(envelope, best, at, taken) == EBPO_CLIP_CUT)
+            codes[taken++] = code;
+        else
+            refused[which] = true;
     }
     return taken;
 }

@@ -104,6 +104,26 @@ typedef struct clustering {
     double *lost, *gain;        /* [wanted] */
 } clustering;
 
+/* The angle of (x, y) from the x axis, -pi .. pi, to about 1e-15, by operations that round alike everywhere: libm's own differ from one to the next, and choices must not. */
+static double angle_of(double y, double x)
+{
+    double least = fmin(fabs(x), fabs(y)), most = fmax(fabs(x), fabs(y));
+    if (!(most > 0))
+        return 0;
+    double t = least / most; /* halved twice: atan t = 2 atan (t / (1 + sqrt (1 + t^2))) */
+    for (int i = 0; i < 2; i++)
+        t /= 1 + sqrt(1 + t * t);
+    double square = t * t, sum = 0;
+    for (int power = 21; power > 0; power -= 2)
+        sum = 1.0 / power - square * sum;
+    double angle = 4 * t * sum;
+    if (fabs(y) > fabs(x))
+        angle = 0x1.921fb54442d18p0 - angle;
+    if (x < 0)
+        angle = 0x1.921fb54442d18p1 - angle;
+    return y < 0 ? -angle : angle;
+}
+
 /* The normal in the model's coordinates, as a unit vector or as the theses' two angles. */
 static void place_normal(const ebpo_choice *choice, uint32_t normal, double out[3])
 {
@@ -122,7 +142,7 @@ static void place_normal(const ebpo_choice *choice, uint32_t normal, double out[
         out[k] /= sqrt(length);
     if (choice->normals == EBPO_NORMALS_ANGLE)
         return;
-    double around = atan2(out[1], out[0]), down = acos(fmax(-1, fmin(1, out[2])));
+    double around = angle_of(out[1], out[0]), down = angle_of(sqrt(out[0] * out[0] + out[1] * out[1]), out[2]);
     out[0] = around, out[1] = down, out[2] = 0;
 }
 

@@ -8,10 +8,12 @@
 extern "C" {
 #endif
 
-/* How the planes of an envelope are chosen among the normals of the faces below a node. Whatever the choice, offsets are such that the envelope contains the solid. */
+/* How the planes of an envelope are chosen: their directions among those of the hull of the solid in the cell (inherit), or among the normals of the faces below the node (the theses'). Whatever the
+ * choice, offsets are such that the envelope contains the solid. */
 typedef enum ebpo_selection {
-    EBPO_SELECT_INHERIT = 0,  /* from the root down: a node starts from its parent's envelope and adds, greedily by removed volume, what removes at least epsilon */
-    EBPO_SELECT_KMEDOIDS = 1, /* the other three are the theses', from the leaves up, of the children's planes and around the children's envelopes (EBP 2017, 3.3.4.3 and
+    EBPO_SELECT_INHERIT = 0,  /* from the root down: a node starts from its parent's envelope and adds, greedily by removed volume, what removes at least epsilon,
+                               * then what cuts off needles */
+    EBPO_SELECT_KMEDOIDS = 1, /* the other three are the theses', from the leaves up, of the children's planes and around the polygons of these planes (EBP 2017, 3.3.4.3 and
                                * 3.4.1; BP 2008, 3.4): the medoids of clusters of normals */
     EBPO_SELECT_OFFSET = 2,   /* those that had to move least from their faces */
     EBPO_SELECT_RANDOM = 3    /* consecutive ones from a random place on */
@@ -26,7 +28,8 @@ typedef enum ebpo_normal_distance {
 typedef struct ebpo_build_options {
     int max_level;          /* 0 .. 20, or -1: EBP 2017, equation 3 */
     uint32_t leaf_faces;    /* a node with at most so many faces becomes a leaf (BP 2008, 3.3.1); 0: only the maximum level stops */
-    double epsilon;         /* a plane is kept while it removes at least this share of the cell; >= 0 */
+    double epsilon;         /* inherit, and leaf planes that are stored with it: a plane is kept while it removes at least this share of the cell (in levels 0 to 4 a tenth of it, less where the solid is
+                             * thin), or cuts off what reaches a tenth of the cell beyond it; 0 .. 1 */
     uint32_t parts;         /* ebpo_part bits to make; leaf planes only on request */
     ebpo_rule rule;
     bool require_solid;     /* EBPO_E_NOT_SOLID for a mesh that does not balance */
