@@ -8,15 +8,17 @@
 #include <string.h>
 #include <unistd.h>
 
+#include <ebpo/deviation.h>
 #include <ebpo/lod.h>
 #include <ebpo/stream.h>
+#include <ebpo/subset.h>
 #include <ebpo/verify.h>
 
 #if defined(__SSE2__)
 #include <xmmintrin.h>
 #endif
 
-enum { FACES_MAX = 4000 };
+enum { FACES_MAX = 4000, FEW_FACES = 600 };
 
 typedef struct hashing {
     const fp_setting *setting;
@@ -243,29 +245,109 @@ static void hash_questions(hashing *h, const stiff_case *c, query_model *m, uint
             hash_ray(h, c, m->context, &r);
     }
     free(points);
+    hash_reach(h, c, m);
     ebpo_context_free(m->context);
     ebpo_model_close(m->model);
 }
 
+/* How far levels reach, and a subset by need. */
+static void hash_reach(hashing *h, const stiff_case *c, query_model *m)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_status status = EBPO_OK;
+    ebpo_deviation d = { 0 };
+    for (int level = 0; level < m->info.level_count && level < 4 && status == EBPO_OK; level++) {
+        ebpo_deviation_options options = EBPO_DEVIATION_OPTIONS_INIT;
+        options.tolerance = 0.5;
+        options.samples = 50;
+        options.questions = 500;
+        options.threads = 2;
+        CALL(status, ebpo_deviation_level(m->model, m->file, level, &options, &d, &error));
+        number(h, (uint64_t)status);
+        real(h, d.lo);
+        real(h, d.hi);
+        real(h, d.mean);
+        real(h, d.rms);
+        number(h, d.questions);
+    }
+    ebpo_subset_options options = EBPO_SUBSET_OPTIONS_INIT;
+    char path[128];
+    ebpo_file *file;
+    options.max_error = d.hi;
+    snprintf(path, sizeof path, "%s/subset.ebpo.h5", m->folder);
+    if (status != EBPO_OK || !(d.hi > 0 && isfinite(d.hi)) || m->mesh.face_count > FEW_FACES)
+        return;
+    CALL(status, ebpo_subset(m->file, path, &options, &error));
+    if (status == EBPO_OK)
+        status = ebpo_open(&file, path, &error);
+    if (status != EBPO_OK)
+        fail(c, "subset", &error);
+    bytes(h, ebpo_file_info(file)->content_sha256, 32);
+    ebpo_close(file);
+    unlink(path);
+}
+
 /* --- a case --- */
+
+static ebpo_status check_mesh(hashing *h, const stiff_case *c, ebpo_mesh *mesh, ebpo_mesh_report *report, ebpo_build_options *options)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_status status;
+    *mesh = c->make(c);
+    CALL(status, ebpo_mesh_check(report, mesh, 2, (ebpo_progress){ NULL, NULL }, &error));
+    if (status != EBPO_OK)
+        ebpo_mesh_free(mesh);
+    *options = (ebpo_build_options)EBPO_BUILD_OPTIONS_INIT;
+    options->leaf_faces = c->leaf ? c->leaf : 16;
+    options->max_level = c->levels ? c->levels - 1 : -1;
+    options->rule = c->rule;
+    options->threads = 2;
+    return status;
+}
+
+/* The other selections, leaf planes too. */
+static void hash_selections(hashing *h, const stiff_case *c)
+{
+    for (int way = 0; way < 5; way++) {
+        static const ebpo_selection selections[] = { EBPO_SELECT_KMEDOIDS, EBPO_SELECT_KMEDOIDS, EBPO_SELECT_OFFSET, EBPO_SELECT_RANDOM, EBPO_SELECT_INHERIT };
+        ebpo_error error = EBPO_ERROR_INIT;
+        ebpo_mesh mesh;
+        ebpo_mesh_report report;
+        ebpo_build_options options;
+        ebpo_tree tree;
+        ebpo_status status = check_mesh(h, c, &mesh, &report, &options);
+        if (status != EBPO_OK || mesh.face_count > FEW_FACES) {
+            if (status == EBPO_OK)
+                ebpo_mesh_free(&mesh);
+            return;
+        }
+        options.select = selections[way];
+        options.normals = way == 1 ? EBPO_NORMALS_ANGLE : EBPO_NORMALS_SPHERICAL;
+        options.parts |= EBPO_PART_LEAF_PLANES;
+        CALL(status, ebpo_build(&tree, &mesh, &report, NULL, &options, &error));
+        number(h, (uint64_t)status);
+        for (int level = 0; status == EBPO_OK && level < tree.info.level_count; level++) {
+            const ebpo_level *l = &tree.level[level];
+            bytes(h, l->planes, l->plane_count * sizeof *l->planes);
+            bytes(h, l->leaf_planes, l->leaf_plane_count * sizeof *l->leaf_planes);
+            real(h, l->gray_volume);
+            real(h, l->leaf_volume);
+        }
+        if (status == EBPO_OK)
+            ebpo_tree_free(&tree);
+    }
+}
 
 static ebpo_status make_tree(hashing *h, const stiff_case *c, ebpo_tree *tree)
 {
-    ebpo_mesh mesh = c->make(c);
     ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_mesh mesh;
     ebpo_mesh_report report;
-    ebpo_status status;
-    CALL(status, ebpo_mesh_check(&report, &mesh, 2, (ebpo_progress){ NULL, NULL }, &error));
-    if (status != EBPO_OK) {
-        ebpo_mesh_free(&mesh);
+    ebpo_build_options options;
+    ebpo_status status = check_mesh(h, c, &mesh, &report, &options);
+    if (status != EBPO_OK)
         return status;
-    }
     hash_report(h, &report);
-    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
-    options.leaf_faces = c->leaf ? c->leaf : 16;
-    options.max_level = c->levels ? c->levels - 1 : -1;
-    options.rule = c->rule;
-    options.threads = 2;
     CALL(status, ebpo_build(tree, &mesh, &report, NULL, &options, &error));
     return status;
 }
@@ -308,6 +390,7 @@ void fp_hash_case(const stiff_case *c, const fp_setting *setting, uint64_t quest
         fail(c, "file", &error);
     m.info = *ebpo_file_info(m.file);
     hash_info(h, &m.info);
+    hash_selections(h, c);
     h->hash = &out->answers;
     m.mesh = tree.mesh;
     measure_mesh(&m);
