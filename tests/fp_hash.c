@@ -18,7 +18,7 @@
 #include <xmmintrin.h>
 #endif
 
-enum { FACES_MAX = 4000, FEW_FACES = 600 };
+enum { FACES_MAX = 4000, FEW_FACES = 130 };
 
 typedef struct hashing {
     const fp_setting *setting;
@@ -219,6 +219,45 @@ static void hash_ray(hashing *h, const stiff_case *c, ebpo_context *context, con
     bytes(h, faces, count * sizeof *faces);
 }
 
+/* How far levels reach, and a subset by need. */
+static void hash_reach(hashing *h, const stiff_case *c, query_model *m)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_status status = EBPO_OK;
+    ebpo_deviation d = { 0 };
+    if (m->mesh.face_count > FEW_FACES)
+        return;
+    for (int level = 0; level < m->info.level_count && level < 4 && status == EBPO_OK; level++) {
+        ebpo_deviation_options options = EBPO_DEVIATION_OPTIONS_INIT;
+        options.tolerance = 0.5;
+        options.samples = 20;
+        options.questions = 60;
+        options.threads = 2;
+        CALL(status, ebpo_deviation_level(m->model, m->file, level, &options, &d, &error));
+        number(h, (uint64_t)status);
+        real(h, d.lo);
+        real(h, d.hi);
+        real(h, d.mean);
+        real(h, d.rms);
+        number(h, d.questions);
+    }
+    ebpo_subset_options options = EBPO_SUBSET_OPTIONS_INIT;
+    char path[128];
+    ebpo_file *file;
+    options.max_error = d.hi;
+    snprintf(path, sizeof path, "%s/subset.ebpo.h5", m->folder);
+    if (status != EBPO_OK || !(d.hi > 0 && isfinite(d.hi)))
+        return;
+    CALL(status, ebpo_subset(m->file, path, &options, &error));
+    if (status == EBPO_OK)
+        status = ebpo_open(&file, path, &error);
+    if (status != EBPO_OK)
+        fail(c, "subset", &error);
+    bytes(h, ebpo_file_info(file)->content_sha256, 32);
+    ebpo_close(file);
+    unlink(path);
+}
+
 static void hash_questions(hashing *h, const stiff_case *c, query_model *m, uint64_t questions)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -248,43 +287,6 @@ static void hash_questions(hashing *h, const stiff_case *c, query_model *m, uint
     hash_reach(h, c, m);
     ebpo_context_free(m->context);
     ebpo_model_close(m->model);
-}
-
-/* How far levels reach, and a subset by need. */
-static void hash_reach(hashing *h, const stiff_case *c, query_model *m)
-{
-    ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_status status = EBPO_OK;
-    ebpo_deviation d = { 0 };
-    for (int level = 0; level < m->info.level_count && level < 4 && status == EBPO_OK; level++) {
-        ebpo_deviation_options options = EBPO_DEVIATION_OPTIONS_INIT;
-        options.tolerance = 0.5;
-        options.samples = 50;
-        options.questions = 500;
-        options.threads = 2;
-        CALL(status, ebpo_deviation_level(m->model, m->file, level, &options, &d, &error));
-        number(h, (uint64_t)status);
-        real(h, d.lo);
-        real(h, d.hi);
-        real(h, d.mean);
-        real(h, d.rms);
-        number(h, d.questions);
-    }
-    ebpo_subset_options options = EBPO_SUBSET_OPTIONS_INIT;
-    char path[128];
-    ebpo_file *file;
-    options.max_error = d.hi;
-    snprintf(path, sizeof path, "%s/subset.ebpo.h5", m->folder);
-    if (status != EBPO_OK || !(d.hi > 0 && isfinite(d.hi)) || m->mesh.face_count > FEW_FACES)
-        return;
-    CALL(status, ebpo_subset(m->file, path, &options, &error));
-    if (status == EBPO_OK)
-        status = ebpo_open(&file, path, &error);
-    if (status != EBPO_OK)
-        fail(c, "subset", &error);
-    bytes(h, ebpo_file_info(file)->content_sha256, 32);
-    ebpo_close(file);
-    unlink(path);
 }
 
 /* --- a case --- */
