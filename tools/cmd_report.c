@@ -209,8 +209,9 @@ static int run(int argc, char **argv)
         return code;
     default_place(operand[0], usual, sizeof usual);
     const char *place = v.out ? v.out : usual;
-    if (!output_begin(place, c.folder, sizeof c.folder))
-        return EXIT_FAILED;
+    code = output_begin(place, operand, c.folder, sizeof c.folder);
+    if (code != EXIT_FINE)
+        return code;
     progress_line line;
     c.progress = progress_start(&line, "report", v.quiet);
     c.methods = calloc(METHODS_MAX, sizeof *c.methods);
