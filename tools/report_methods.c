@@ -7,6 +7,7 @@
 #include "prepare.h"
 #include "report.h"
 #include "report_data.h"
+#include "selection.h"
 #include "words.h"
 
 /* "dir/bunny.ebpo.h5" is bunny. */
@@ -75,7 +76,7 @@ static int add_file(comparison *c, const char *path)
 
 /* --- from a mesh --- */
 
-static void build_options(const comparison *c, int selection, uint64_t faces, ebpo_build_options *o)
+static void build_options(const comparison *c, int selection, ebpo_build_options *o)
 {
     const report_values *v = c->v;
     *o = (ebpo_build_options)EBPO_BUILD_OPTIONS_INIT;
@@ -85,7 +86,6 @@ static void build_options(const comparison *c, int selection, uint64_t faces, eb
     o->parts |= EBPO_PART_LEAF_PLANES; /* so that each method's levels hold all of its own planes */
     o->select = (ebpo_selection)selection;
     o->percent = v->percent;
-    o->k_root = v->k_root ? fmax(1, words_k_root(v->k_root, faces)) : 0;
     o->normals = (ebpo_normal_distance)v->normals;
     o->seed = (uint64_t)v->seed;
     o->threads = (unsigned)v->threads;
@@ -107,7 +107,12 @@ static ebpo_status build_one(comparison *c, const char *mesh, int selection, con
             progress_wipe(c->progress.user);
         report_warn(stderr, "report", mesh, &p.report, &p.record);
     }
-    build_options(c, selection, p.mesh.face_count, &build);
+    build_options(c, selection, &build);
+    status = selection_k_root(c->v->k_root, p.mesh.face_count, &build.k_root, error);
+    if (status != EBPO_OK) {
+        ebpo_mesh_free(&p.mesh);
+        return status;
+    }
     double begin = progress_now();
     status = ebpo_build(&tree, &p.mesh, &p.report, &p.record, &build, error);
     *seconds = progress_now() - begin;
