@@ -184,12 +184,9 @@ static int work(comparison *c, const char *const *operand, const char *place, pr
 /* Of "dir/bunny.ply" report-bunny. */
 static void default_place(const char *operand, char *out, size_t room)
 {
-    const char *shown = remote_shown(operand), *slash = strrchr(shown, '/');
-    snprintf(out, room, "report-%.200s", slash ? slash + 1 : shown);
-    char *ending = strstr(out, ".ebpo.h5");
-    char *dot = ending ? ending : strrchr(out, '.');
-    if (dot)
-        *dot = 0;
+    char stem[201];
+    report_stem(operand, stem, sizeof stem);
+    snprintf(out, room, "report-%s", stem);
 }
 
 static int run(int argc, char **argv)

@@ -10,17 +10,6 @@
 #include "selection.h"
 #include "words.h"
 
-/* "dir/bunny.ebpo.h5" is bunny. */
-static void stem_of(const char *path, char *out, size_t room)
-{
-    const char *shown = remote_shown(path), *slash = strrchr(shown, '/');
-    snprintf(out, room, "%s", slash ? slash + 1 : shown);
-    char *ending = strstr(out, ".ebpo.h5");
-    char *dot = ending ? ending : strrchr(out, '.');
-    if (dot && dot != out)
-        *dot = 0;
-}
-
 static int told(const char *message, const char *what)
 {
     fprintf(stderr, "ebpo report: %s: %s; try 'ebpo report --help'\n", what, message);
@@ -61,7 +50,7 @@ static int add_file(comparison *c, const char *path)
     if (c->count < c->v->names.count)
         snprintf(name, sizeof name, "%s", c->v->names.item[c->count]);
     else
-        stem_of(path, name, sizeof name);
+        report_stem(path, name, sizeof name);
     if (strlen(path) >= sizeof c->methods->path)
         return told("the name is too long", path);
     if (strpbrk(name, "/,\"\n"))
@@ -148,7 +137,7 @@ static int build_all(comparison *c, const char *mesh)
 
 static int find(comparison *c, const char *const *operand)
 {
-    stem_of(operand[0], c->model, sizeof c->model);
+    report_stem(operand[0], c->model, sizeof c->model);
     for (int i = 0; operand[i]; i++) {
         int is_hdf5 = command_is_hdf5("report", operand[i]);
         if (is_hdf5 < 0)
@@ -173,7 +162,7 @@ int report_find_methods(comparison *c, const char *const *operand)
     if (code != EXIT_FINE)
         return code;
     if (c->count > 1 && c->methods->info.source_name[0])
-        stem_of(c->methods->info.source_name, c->model, sizeof c->model);
+        report_stem(c->methods->info.source_name, c->model, sizeof c->model);
     c->diagonal = hypot(hypot(r->max[0] - r->min[0], r->max[1] - r->min[1]), r->max[2] - r->min[2]);
     if (c->first > comparison_last(c)) {
         fprintf(stderr, "ebpo report: --levels: there is no level %d; the deepest is %d\n", c->first, comparison_last(c));
