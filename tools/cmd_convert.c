@@ -1,5 +1,4 @@
 /* ebpo convert: from a mesh to an .ebpo.h5 file. */
-#include <math.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,6 +9,7 @@
 #include "prepare.h"
 #include "progress.h"
 #include "report.h"
+#include "selection.h"
 #include "subset_run.h"
 #include "words.h"
 
@@ -89,29 +89,10 @@ static int usage_error(const char *message)
     return EXIT_USAGE;
 }
 
-static int check_selection(const values *v)
-{
-    bool theirs = v->select != EBPO_SELECT_INHERIT;
-    if (!theirs && (v->percent >= 0 || v->k_root || v->normals >= 0 || v->seed >= 0))
-        return usage_error("--percent, --k-root, --normals and --seed are for --select kmedoids, offset or random");
-    if (theirs && v->epsilon >= 0)
-        return usage_error("--epsilon is for --select inherit");
-    if (v->percent >= 0 && v->k_root)
-        return usage_error("--percent and --k-root are two answers to one question; give one");
-    if (v->percent == 0)
-        return usage_error("--percent 0 leaves no planes; --without planes does that");
-    if (v->k_root && words_k_root(v->k_root, 100) < 0)
-        return usage_error("--k-root wants a number of planes, such as 500, or of percent, such as 1%");
-    if (v->normals >= 0 && v->select != EBPO_SELECT_KMEDOIDS)
-        return usage_error("--normals is for --select kmedoids");
-    if (v->seed >= 0 && v->select == EBPO_SELECT_OFFSET)
-        return usage_error("--seed says nothing about --select offset");
-    return EXIT_FINE;
-}
-
 static int check_values(const values *v, const char *in, const char *out)
 {
-    int code = check_selection(v);
+    selection_options chosen = { 1u << v->select, v->percent, v->epsilon, v->k_root, v->normals, v->seed };
+    int code = selection_check("convert", &chosen);
     if (code != EXIT_FINE)
         return code;
     if (v->zstd_level && v->codec != EBPO_CODEC_ZSTD)
@@ -211,7 +192,6 @@ static ebpo_status build_and_write(const values *v, prepared *p, const char *out
     build.epsilon = v->epsilon >= 0 ? v->epsilon : build.epsilon;
     build.select = (ebpo_selection)v->select;
     build.percent = v->percent >= 0 ? v->percent : build.percent;
-    build.k_root = v->k_root ? fmax(1, words_k_root(v->k_root, p->mesh.face_count)) : 0;
     build.normals = v->normals >= 0 ? (ebpo_normal_distance)v->normals : build.normals;
     build.seed = v->seed >= 0 ? (uint64_t)v->seed : build.seed;
     build.parts = parts_of(v);
@@ -223,7 +203,12 @@ static ebpo_status build_and_write(const values *v, prepared *p, const char *out
     build.date = v->date;
     build.progress = progress;
     ebpo_tree tree;
-    ebpo_status status = ebpo_build(&tree, &p->mesh, &p->report, &p->record, &build, error);
+    ebpo_status status = selection_k_root(v->k_root, p->mesh.face_count, &build.k_root, error);
+    if (status != EBPO_OK) {
+        ebpo_mesh_free(&p->mesh);
+        return status;
+    }
+    status = ebpo_build(&tree, &p->mesh, &p->report, &p->record, &build, error);
     if (status != EBPO_OK)
         return status;
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;

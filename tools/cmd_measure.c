@@ -1,4 +1,5 @@
 /* ebpo measure: area, volume, centroid, inertia, and the volume of each level. */
+#include <math.h>
 #include <stddef.h>
 #include <stdio.h>
 
@@ -47,9 +48,14 @@ typedef struct measures {
     const ebpo_limit *limit;
 } measures;
 
-static double excess_ratio(const ebpo_info *info, int level, const ebpo_limit *limit)
+static void print_limit(const ebpo_info *info, int level, const ebpo_limit *limit)
 {
-    return (facts_volume(info, level) - info->report.volume) / (limit->volume - info->report.volume);
+    double ratio = facts_excess_ratio(info, facts_volume(info, level), limit->volume);
+    printf(" %24.16g", limit->volume);
+    if (info->solid && isnan(ratio))
+        printf(" %17s", "-");
+    else if (info->solid)
+        printf(" %17.4f", ratio);
 }
 
 static void print_levels(const ebpo_info *info, const measures *m)
@@ -66,9 +72,7 @@ static void print_levels(const ebpo_info *info, const measures *m)
         if (deviation)
             printf(" %13.6g %13.6g %13.6g %13.6g", deviation[i].lo, deviation[i].hi, deviation[i].mean, deviation[i].rms);
         if (m->limit)
-            printf(" %24.16g", m->limit[i].volume);
-        if (m->limit && info->solid)
-            printf(" %17.4f", excess_ratio(info, i, &m->limit[i]));
+            print_limit(info, i, &m->limit[i]);
         putchar('\n');
     }
 }
@@ -106,7 +110,7 @@ static void json_limit(json *j, const ebpo_info *info, int level, const ebpo_lim
 {
     json_real(j, "limit_volume", limit->volume);
     if (info->solid)
-        json_real(j, "excess_to_limit", excess_ratio(info, level, limit));
+        json_real(j, "excess_to_limit", facts_excess_ratio(info, facts_volume(info, level), limit->volume));
     json_uint(j, "hulls", limit->hulls);
     json_uint(j, "flat_hulls", limit->flat);
 }

@@ -8,6 +8,7 @@
 #include "command.h"
 #include "report_data.h"
 #include "report_output.h"
+#include "selection.h"
 #include "words.h"
 
 static const char *const up_words[] = { "x", "y", "z", NULL };
@@ -17,7 +18,7 @@ static const arg_option options[] = {
     { "name", 0, ARG_LIST, offsetof(report_values, names), "NAME", "of a FILE's method, in their order; default: the file's name", 0, 0, NULL },
     { "select", 0, ARG_SET, offsetof(report_values, select), "LIST", "of a mesh: make a file with each of these selections of planes,\ninherit, kmedoids, offset, random; default: inherit", 0, 0,
       selection_words },
-    { "percent", 0, ARG_REAL, offsetof(report_values, percent), "P", "of the theses' selections: share of the candidates; default 40", 1e-9, 100, NULL },
+    { "percent", 0, ARG_REAL, offsetof(report_values, percent), "P", "of the theses' selections: share of the candidates; default 40", 0, 100, NULL },
     { "k-root", 0, ARG_TEXT, offsetof(report_values, k_root), "K", "instead: K planes at the root, or 'K%' of the faces, half as\nmany at each next level (BP-Octree)", 0, 0, NULL },
     { "normals", 0, ARG_WORD, offsetof(report_values, normals), "NAME", "distance of normals for k-medoids: spherical (the default)\nor angle", 0, 0, normals_words },
     { "max-level", 0, ARG_INT, offsetof(report_values, max_level), "N", "of a mesh: as for 'ebpo convert'", 0, 20, NULL },
@@ -67,21 +68,19 @@ static int read_options(comparison *c, report_values *v, bool mesh)
         return wrong("--levels", v->levels, "the first level, a hyphen and the last one, such as 0-6");
     if (sscanf(v->view, "%lf,%lf%c", &c->azimuth, &c->elevation, &rest) != 2 || !(fabs(c->azimuth) <= 360) || !(fabs(c->elevation) <= 90))
         return wrong("--view", v->view, "an azimuth from -360 to 360, a comma, and an elevation from -90 to 90");
-    bool building = v->select || v->percent > 0 || v->k_root || v->normals >= 0 || v->max_level >= 0 || v->leaf_faces >= 0 || v->epsilon >= 0 || v->keep;
+    bool building = v->select || v->percent >= 0 || v->k_root || v->normals >= 0 || v->max_level >= 0 || v->leaf_faces >= 0 || v->epsilon >= 0 || v->keep;
     if (!mesh && building) {
         fprintf(stderr, "ebpo report: --select, --percent, --k-root, --normals, --max-level, --leaf-faces, --epsilon and --keep are for a mesh, from which files are made; try 'ebpo "
                         "report --help'\n");
         return EXIT_USAGE;
     }
-    if (v->percent > 0 && v->k_root) {
-        fprintf(stderr, "ebpo report: --percent and --k-root exclude each other; try 'ebpo report --help'\n");
-        return EXIT_USAGE;
-    }
-    if (v->k_root && words_k_root(v->k_root, 100) < 0)
-        return wrong("--k-root", v->k_root, "a number of planes, such as 500, or of percent, such as 1%");
     const ebpo_build_options usual = EBPO_BUILD_OPTIONS_INIT;
     v->select = v->select ? v->select : 1u << EBPO_SELECT_INHERIT;
-    v->percent = v->percent > 0 ? v->percent : usual.percent;
+    selection_options chosen = { v->select, v->percent, v->epsilon, v->k_root, v->normals, -1 }; /* the seed is of the points, too */
+    int code = selection_check("report", &chosen);
+    if (code != EXIT_FINE)
+        return code;
+    v->percent = v->percent >= 0 ? v->percent : usual.percent;
     v->normals = v->normals >= 0 ? v->normals : (int)usual.normals;
     v->leaf_faces = v->leaf_faces >= 0 ? v->leaf_faces : usual.leaf_faces;
     v->epsilon = v->epsilon >= 0 ? v->epsilon : usual.epsilon;
@@ -185,12 +184,9 @@ static int work(comparison *c, const char *const *operand, const char *place, pr
 /* Of "dir/bunny.ply" report-bunny. */
 static void default_place(const char *operand, char *out, size_t room)
 {
-    const char *shown = remote_shown(operand), *slash = strrchr(shown, '/');
-    snprintf(out, room, "report-%.200s", slash ? slash + 1 : shown);
-    char *ending = strstr(out, ".ebpo.h5");
-    char *dot = ending ? ending : strrchr(out, '.');
-    if (dot)
-        *dot = 0;
+    char stem[201];
+    report_stem(operand, stem, sizeof stem);
+    snprintf(out, room, "report-%s", stem);
 }
 
 static int run(int argc, char **argv)
@@ -209,8 +205,9 @@ static int run(int argc, char **argv)
         return code;
     default_place(operand[0], usual, sizeof usual);
     const char *place = v.out ? v.out : usual;
-    if (!output_begin(place, c.folder, sizeof c.folder))
-        return EXIT_FAILED;
+    code = output_begin(place, operand, c.folder, sizeof c.folder);
+    if (code != EXIT_FINE)
+        return code;
     progress_line line;
     c.progress = progress_start(&line, "report", v.quiet);
     c.methods = calloc(METHODS_MAX, sizeof *c.methods);

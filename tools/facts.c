@@ -27,6 +27,18 @@ double facts_percent(const ebpo_info *info, int level)
     return 100 * facts_volume(info, level) / whole;
 }
 
+double facts_excess(const ebpo_info *info, double volume)
+{
+    double solid = fabs(info->report.volume); /* negative: turned inside out */
+    return info->solid && solid > 0 ? 100 * (volume - solid) / solid : NAN;
+}
+
+double facts_excess_ratio(const ebpo_info *info, double volume, double limit)
+{
+    double least = facts_excess(info, limit);
+    return least > 1e-7 ? facts_excess(info, volume) / least : NAN; /* 1e-9 of the volume: what rounding may do to it */
+}
+
 uint64_t facts_cumulative(const ebpo_info *info, int level)
 {
     uint64_t sum = info->head_bytes;

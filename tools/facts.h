@@ -11,10 +11,13 @@
  * 0 .. level. */
 double facts_volume(const ebpo_info *info, int level);
 /* The same in percent of the solid; of the root box for a surface. */
+double facts_percent(const ebpo_info *info, int level);
+/* How much `volume` is above the solid's, in percent of the solid's; NAN for a surface, or a solid without volume. */
+double facts_excess(const ebpo_info *info, double volume);
+/* Excess of `volume` / excess of `limit`, the volume of the convex hulls; NAN where either has none, or the hulls are the solid but for rounding. */
+double facts_excess_ratio(const ebpo_info *info, double volume, double limit);
 /* White nodes of a level without the places of pruned nodes' children. */
 uint64_t facts_white(const ebpo_info *info, int level);
-
-double facts_percent(const ebpo_info *info, int level);
 /* Bytes of the head and of levels 0 .. level. */
 uint64_t facts_cumulative(const ebpo_info *info, int level);
 

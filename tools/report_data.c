@@ -136,6 +136,21 @@ void comparison_free(comparison *c)
     free(c->near);
 }
 
+void report_stem(const char *path, char *out, size_t room)
+{
+    const char *shown = remote_shown(path), *slash = strrchr(shown, '/');
+    snprintf(out, room, "%s", slash ? slash + 1 : shown);
+    char *ending = strstr(out, ".ebpo.h5");
+    char *dot = ending ? ending : strrchr(out, '.');
+    if (dot && dot != out)
+        *dot = 0;
+}
+
+double report_of_diagonal(const comparison *c, double v)
+{
+    return c->diagonal > 0 ? 100 * (v / c->diagonal) : NAN;
+}
+
 static int compare_doubles(const void *a, const void *b)
 {
     double x, y;

@@ -5,12 +5,6 @@
 #include "facts.h"
 #include "report_data.h"
 
-static double excess(const ebpo_info *info, double volume)
-{
-    double solid = fabs(info->report.volume);
-    return info->solid && solid > 0 ? 100 * (volume - solid) / solid : NAN;
-}
-
 static void from_head(const comparison *c, method *m)
 {
     const ebpo_info *info = &m->info;
@@ -30,7 +24,7 @@ static void from_head(const comparison *c, method *m)
         f[OF_PLANES] = (double)s->plane_count;
         f[OF_LEAF_PLANES] = (double)s->leaf_plane_count;
         f[OF_VOLUME] = facts_volume(info, i);
-        f[OF_EXCESS] = excess(info, f[OF_VOLUME]);
+        f[OF_EXCESS] = facts_excess(info, f[OF_VOLUME]);
     }
 }
 
@@ -48,7 +42,7 @@ static ebpo_status levels_alone(comparison *c, method *m, ebpo_file *file, ebpo_
         status = ebpo_stream_next_level(stream, &told, &more, error);
         if (status == EBPO_OK && i >= c->first) {
             m->level[i][OF_LEVELS_VOLUME] = told.volume;
-            m->level[i][OF_LEVELS_EXCESS] = excess(&m->info, told.volume);
+            m->level[i][OF_LEVELS_EXCESS] = facts_excess(&m->info, told.volume);
         }
     }
     ebpo_stream_free(stream);
@@ -66,9 +60,8 @@ static ebpo_status limits(comparison *c, method *m, ebpo_file *file, ebpo_error 
         if (status != EBPO_OK)
             return method_without(m, "limit", status, error);
         f[OF_LIMIT_VOLUME] = limit.volume;
-        f[OF_LIMIT_EXCESS] = excess(&m->info, limit.volume);
-        if (f[OF_LIMIT_EXCESS] > 0)
-            f[OF_EXCESS_TO_LIMIT] = f[OF_EXCESS] / f[OF_LIMIT_EXCESS];
+        f[OF_LIMIT_EXCESS] = facts_excess(&m->info, limit.volume);
+        f[OF_EXCESS_TO_LIMIT] = facts_excess_ratio(&m->info, f[OF_VOLUME], limit.volume);
     }
     return EBPO_OK;
 }

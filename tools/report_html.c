@@ -133,24 +133,33 @@ static void tile(FILE *out, const method *m, int level)
     fputs("</figure>\n", out);
 }
 
-static void pictures(FILE *out, const comparison *c)
+/* Levels first to last, a row for each method. */
+static void strip(FILE *out, const comparison *c, int first, int last, int columns)
 {
-    int last = pictured(c, comparison_last(c));
-    if (last < 0)
-        return;
-    page_section(out, "pictures", "The levels", "Excess of volume, and bytes of the file up to the level’s end.");
-    fprintf(out, "<div class=\"strip\" style=\"--n:%d\"><span></span>", last - c->first + 1);
-    for (int k = c->first; k <= last; k++)
+    fprintf(out, "<div class=\"strip\" style=\"--n:%d\"><span></span>", columns);
+    for (int k = first; k <= last; k++)
         fprintf(out, "<div class=\"head\">level %d</div>", k);
     fputc('\n', out);
     for (int i = 0; i < c->count; i++) {
         fprintf(out, "<div class=\"who\" style=\"color:var(--m%d)\">", i % 8);
         html_text(out, c->methods[i].name);
         fputs("</div>", out);
-        for (int k = c->first; k <= last; k++)
+        for (int k = first; k <= last; k++)
             tile(out, &c->methods[i], k);
     }
-    fputs("</div></section>\n", out);
+    fputs("</div>\n", out);
+}
+
+static void pictures(FILE *out, const comparison *c)
+{
+    enum { ROW = 6 };
+    int last = pictured(c, comparison_last(c));
+    if (last < 0)
+        return;
+    page_section(out, "pictures", "The levels", "Excess of volume, and bytes of the file up to the level’s end.");
+    for (int k = c->first; k <= last; k += ROW)
+        strip(out, c, k, last < k + ROW ? last : k + ROW - 1, last - c->first < ROW ? last - c->first + 1 : ROW);
+    fputs("</section>\n", out);
 }
 
 /* --- the end --- */

@@ -7,18 +7,8 @@
 #include "prepare.h"
 #include "report.h"
 #include "report_data.h"
+#include "selection.h"
 #include "words.h"
-
-/* "dir/bunny.ebpo.h5" is bunny. */
-static void stem_of(const char *path, char *out, size_t room)
-{
-    const char *shown = remote_shown(path), *slash = strrchr(shown, '/');
-    snprintf(out, room, "%s", slash ? slash + 1 : shown);
-    char *ending = strstr(out, ".ebpo.h5");
-    char *dot = ending ? ending : strrchr(out, '.');
-    if (dot && dot != out)
-        *dot = 0;
-}
 
 static int told(const char *message, const char *what)
 {
@@ -60,7 +50,7 @@ static int add_file(comparison *c, const char *path)
     if (c->count < c->v->names.count)
         snprintf(name, sizeof name, "%s", c->v->names.item[c->count]);
     else
-        stem_of(path, name, sizeof name);
+        report_stem(path, name, sizeof name);
     if (strlen(path) >= sizeof c->methods->path)
         return told("the name is too long", path);
     if (strpbrk(name, "/,\"\n"))
@@ -75,7 +65,7 @@ static int add_file(comparison *c, const char *path)
 
 /* --- from a mesh --- */
 
-static void build_options(const comparison *c, int selection, uint64_t faces, ebpo_build_options *o)
+static void build_options(const comparison *c, int selection, ebpo_build_options *o)
 {
     const report_values *v = c->v;
     *o = (ebpo_build_options)EBPO_BUILD_OPTIONS_INIT;
@@ -85,7 +75,6 @@ static void build_options(const comparison *c, int selection, uint64_t faces, eb
     o->parts |= EBPO_PART_LEAF_PLANES; /* so that each method's levels hold all of its own planes */
     o->select = (ebpo_selection)selection;
     o->percent = v->percent;
-    o->k_root = v->k_root ? fmax(1, words_k_root(v->k_root, faces)) : 0;
     o->normals = (ebpo_normal_distance)v->normals;
     o->seed = (uint64_t)v->seed;
     o->threads = (unsigned)v->threads;
@@ -107,7 +96,12 @@ static ebpo_status build_one(comparison *c, const char *mesh, int selection, con
             progress_wipe(c->progress.user);
         report_warn(stderr, "report", mesh, &p.report, &p.record);
     }
-    build_options(c, selection, p.mesh.face_count, &build);
+    build_options(c, selection, &build);
+    status = selection_k_root(c->v->k_root, p.mesh.face_count, &build.k_root, error);
+    if (status != EBPO_OK) {
+        ebpo_mesh_free(&p.mesh);
+        return status;
+    }
     double begin = progress_now();
     status = ebpo_build(&tree, &p.mesh, &p.report, &p.record, &build, error);
     *seconds = progress_now() - begin;
@@ -143,7 +137,7 @@ static int build_all(comparison *c, const char *mesh)
 
 static int find(comparison *c, const char *const *operand)
 {
-    stem_of(operand[0], c->model, sizeof c->model);
+    report_stem(operand[0], c->model, sizeof c->model);
     for (int i = 0; operand[i]; i++) {
         int is_hdf5 = command_is_hdf5("report", operand[i]);
         if (is_hdf5 < 0)
@@ -168,7 +162,7 @@ int report_find_methods(comparison *c, const char *const *operand)
     if (code != EXIT_FINE)
         return code;
     if (c->count > 1 && c->methods->info.source_name[0])
-        stem_of(c->methods->info.source_name, c->model, sizeof c->model);
+        report_stem(c->methods->info.source_name, c->model, sizeof c->model);
     c->diagonal = hypot(hypot(r->max[0] - r->min[0], r->max[1] - r->min[1]), r->max[2] - r->min[2]);
     if (c->first > comparison_last(c)) {
         fprintf(stderr, "ebpo report: --levels: there is no level %d; the deepest is %d\n", c->first, comparison_last(c));

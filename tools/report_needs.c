@@ -46,14 +46,23 @@ static ebpo_status reach(const comparison *c, ebpo_model *model, const char *pat
     return status;
 }
 
-/* Leaves cannot be refined: no subset is promised to be closer than the file's last level is. */
-static double own_reach(const method *m)
+/* Leaves cannot be refined: no subset is promised to be closer than the file's last level is, which --levels may have left out. 0: not known. */
+static ebpo_status own_reach(const comparison *c, method *m, ebpo_file *file, ebpo_model *model, double *reach, ebpo_error *error)
 {
-    double reach = m->level[m->levels - 1][OF_FAR_HI];
-    return isnan(reach) ? 0 : reach;
+    ebpo_deviation_options options = EBPO_DEVIATION_OPTIONS_INIT;
+    ebpo_deviation far = { 0 };
+    *reach = m->level[m->levels - 1][OF_FAR_HI];
+    if (!isnan(*reach))
+        return EBPO_OK;
+    options.samples = 0;
+    options.threads = (unsigned)c->v->threads;
+    options.progress = c->progress;
+    ebpo_status status = ebpo_deviation_level(model, file, m->levels - 1, &options, &far, error);
+    *reach = status == EBPO_OK ? far.hi : 0;
+    return method_without(m, "Hausdorff distance", status, error);
 }
 
-static ebpo_status one_need(comparison *c, method *m, ebpo_file *file, ebpo_model *model, need_kind kind, double asked, ebpo_error *error)
+static ebpo_status one_need(comparison *c, method *m, ebpo_file *file, ebpo_model *model, need_kind kind, double asked, double own, ebpo_error *error)
 {
     char path[sizeof c->folder + 16];
     need_result *n = &m->need[m->need_count];
@@ -65,7 +74,7 @@ static ebpo_status one_need(comparison *c, method *m, ebpo_file *file, ebpo_mode
     if (status == EBPO_OK)
         status = reach(c, model, path, n, error);
     unlink(path);
-    n->figure[OF_NEED_RATIO] = kind == NEED_ERROR ? n->figure[OF_NEED_FAR_HI] / fmax(asked, own_reach(m)) : n->figure[OF_NEED_BYTES] / asked;
+    n->figure[OF_NEED_RATIO] = kind == NEED_ERROR ? n->figure[OF_NEED_FAR_HI] / fmax(asked, own) : n->figure[OF_NEED_BYTES] / asked;
     if (status == EBPO_OK || status == EBPO_E_ABSENT)
         m->need_count++;
     return status;
@@ -74,15 +83,18 @@ static ebpo_status one_need(comparison *c, method *m, ebpo_file *file, ebpo_mode
 /* What cannot be cut to a need is noted, and left out. */
 ebpo_status report_needs(comparison *c, method *m, ebpo_file *file, ebpo_model *model, ebpo_error *error)
 {
-    for (unsigned i = 0; i < NEEDS; i++) {
+    double own;
+    ebpo_status status = own_reach(c, m, file, model, &own, error);
+    for (unsigned i = 0; i < NEEDS && status == EBPO_OK; i++) {
         bool by_error = i < NEEDS / 2;
         double asked = by_error ? errors[i] / 100 * c->diagonal : floor(sizes[i - NEEDS / 2] / 100 * (double)c->methods[0].info.file_bytes);
-        ebpo_status status = one_need(c, m, file, model, by_error ? NEED_ERROR : NEED_SIZE, asked, error);
+        status = one_need(c, m, file, model, by_error ? NEED_ERROR : NEED_SIZE, asked, own, error);
         if (status == EBPO_E_MEMORY || status == EBPO_E_IO || status == EBPO_E_CANCELLED)
             return status;
         if (status != EBPO_OK)
             method_note(m, by_error ? "choosing by error" : "choosing by size", error->message);
         *error = (ebpo_error)EBPO_ERROR_INIT;
+        status = EBPO_OK;
     }
-    return EBPO_OK;
+    return status;
 }

@@ -8,61 +8,108 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "command.h"
 #include "signals.h"
 
 static char being_made[4096]; /* for the signal handler */
 
-static bool said(const char *path, const char *what)
+static int told(int code, const char *path, const char *what)
 {
     fprintf(stderr, "ebpo report: %s: %s\n", path, what);
+    return code;
+}
+
+static bool is_named(const char *name, const char *const *names)
+{
+    for (; *names; names++)
+        if (strcmp(name, *names) == 0)
+            return true;
     return false;
 }
 
-static bool ends_in(const char *name, const char *ending)
+static bool is_dot(const char *name)
 {
-    size_t length = strlen(name), tail = strlen(ending);
-    return length >= tail && strcmp(name + length - tail, ending) == 0;
+    return strcmp(name, ".") == 0 || strcmp(name, "..") == 0;
 }
 
-/* report.csv, report.json, report.html, and files that --keep kept. */
-static bool is_ours(const char *name)
+/* Only files of the names that a report has: whatever else is there is somebody's own. */
+static bool is_ours(const char *folder, const char *name)
 {
-    return strcmp(name, ".") == 0 || strcmp(name, "..") == 0 || strcmp(name, "report.csv") == 0 || strcmp(name, "report.json") == 0 || strcmp(name, "report.html") == 0 ||
-           ends_in(name, ".ebpo.h5");
-}
-
-static bool place_is_free(const char *place)
-{
+    static const char *const names[] = { "report.csv", "report.json", "report.html", "inherit.ebpo.h5", "kmedoids.ebpo.h5", "offset.ebpo.h5", "random.ebpo.h5", NULL };
+    char path[8192];
     struct stat st;
-    char text[600];
-    bool fine = true;
-    if (lstat(place, &st) != 0)
-        return errno == ENOENT || said(place, strerror(errno));
-    DIR *folder = S_ISDIR(st.st_mode) ? opendir(place) : NULL;
-    if (!folder)
-        return said(place, "is in the way and no folder; give another one with -o");
-    for (struct dirent *entry; fine && (entry = readdir(folder));)
-        if (!is_ours(entry->d_name)) {
-            snprintf(text, sizeof text, "is a folder with something else than a report in it, '%.255s'; give another one with -o", entry->d_name);
-            fine = said(place, text);
-        }
-    closedir(folder);
-    return fine;
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    return is_named(name, names) && lstat(path, &st) == 0 && S_ISREG(st.st_mode);
 }
 
-void output_drop(const char *folder)
+static bool is_operand(const char *folder, const char *name, const char *const *operand)
 {
     char path[8192];
-    DIR *d = folder[0] ? opendir(folder) : NULL;
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    for (; *operand; operand++)
+        if (command_same_file(path, *operand))
+            return true;
+    return false;
+}
+
+/* What is there would be deleted, so it has to be a report, and not the one that is compared. */
+static int look_into(const char *place, DIR *folder, const char *const *operand)
+{
+    char text[600];
+    bool empty = true, report = false;
+    for (struct dirent *entry; (entry = readdir(folder));) {
+        const char *name = entry->d_name;
+        if (is_dot(name))
+            continue;
+        empty = false;
+        report = report || strcmp(name, "report.json") == 0;
+        if (is_operand(place, name, operand)) {
+            snprintf(text, sizeof text, "is a folder with an input in it, '%.255s', and would be replaced; give another one with -o", name);
+            return told(EXIT_USAGE, place, text);
+        }
+        if (!is_ours(place, name)) {
+            snprintf(text, sizeof text, "is a folder with something else than a report in it, '%.255s'; give another one with -o", name);
+            return told(EXIT_FAILED, place, text);
+        }
+    }
+    if (!empty && !report)
+        return told(EXIT_FAILED, place, "is a folder without report.json, so it may be no report; give another one with -o");
+    return EXIT_FINE;
+}
+
+static int place_is_free(const char *place, const char *const *operand)
+{
+    struct stat st;
+    if (lstat(place, &st) != 0)
+        return errno == ENOENT ? EXIT_FINE : told(EXIT_FAILED, place, strerror(errno));
+    DIR *folder = S_ISDIR(st.st_mode) ? opendir(place) : NULL;
+    if (!folder)
+        return told(EXIT_FAILED, place, "is in the way and no folder; give another one with -o");
+    int code = look_into(place, folder, operand);
+    closedir(folder);
+    return code;
+}
+
+/* Removes the files, and the folder if nothing is left in it. */
+static bool remove_folder(const char *folder, bool ours_only)
+{
+    char path[8192];
+    DIR *d = opendir(folder);
     if (!d)
-        return;
+        return false;
     for (struct dirent *entry; (entry = readdir(d));)
-        if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0) {
+        if (!is_dot(entry->d_name) && (!ours_only || is_ours(folder, entry->d_name))) {
             snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
             unlink(path);
         }
     closedir(d);
-    rmdir(folder);
+    return rmdir(folder) == 0;
+}
+
+void output_drop(const char *folder)
+{
+    if (folder[0])
+        remove_folder(folder, false);
     being_made[0] = 0;
 }
 
@@ -82,25 +129,26 @@ static void abandon(void)
     rmdir(being_made);
 }
 
-bool output_begin(const char *place, char *folder, size_t room)
+int output_begin(const char *place, const char *const *operand, char *folder, size_t room)
 {
     size_t length = strlen(place);
     while (length > 1 && place[length - 1] == '/')
         length--;
     folder[0] = 0;
     if (length + 40 > room || length + 40 > sizeof being_made)
-        return said(place, "the name is too long");
-    if (!place_is_free(place))
-        return false;
+        return told(EXIT_USAGE, place, "the name is too long");
+    int code = place_is_free(place, operand);
+    if (code != EXIT_FINE)
+        return code;
     snprintf(folder, room, "%.*s.part-XXXXXX", (int)length, place);
     if (!mkdtemp(folder)) {
         folder[0] = 0;
-        return said(place, strerror(errno));
+        return told(EXIT_FAILED, place, strerror(errno));
     }
     chmod(folder, 0755);
     memcpy(being_made, folder, strlen(folder) + 1);
     signals_also(abandon);
-    return true;
+    return EXIT_FINE;
 }
 
 bool output_commit(const char *place, const char *folder)
@@ -113,13 +161,13 @@ bool output_commit(const char *place, const char *folder)
     snprintf(older, sizeof older, "%s.old", folder);
     bool moved = rename(target, older) == 0;
     if (rename(folder, target) != 0) {
-        said(place, strerror(errno));
+        told(EXIT_FAILED, place, strerror(errno));
         if (moved && rename(older, target) != 0)
             fprintf(stderr, "ebpo report: the report that was there is now %s\n", older);
         return false;
     }
     being_made[0] = 0;
-    if (moved)
-        output_drop(older);
+    if (moved && !remove_folder(older, true)) /* something came into it meanwhile */
+        fprintf(stderr, "ebpo report: warning: what else is in the report that was there is now in %s\n", older);
     return true;
 }

@@ -12,7 +12,7 @@
 #include "picture.h"
 #include "raster.h"
 
-enum { TILE_WIDTH = 320, TILE_HEIGHT = 250, PORTRAIT_WIDTH = 720, PORTRAIT_HEIGHT = 540, TILES = 6 };
+enum { TILE_WIDTH = 320, TILE_HEIGHT = 250, PORTRAIT_WIDTH = 720, PORTRAIT_HEIGHT = 540, LEVELS_DRAWN = 12 };
 
 static ebpo_status no_memory(ebpo_error *error)
 {
@@ -118,7 +118,7 @@ static ebpo_status one_method(comparison *c, method *m, ebpo_file *file, const c
 {
     static const raster_style style = { { 0.30, 0.48, 0.66 }, true, false };
     ebpo_status status = EBPO_OK;
-    for (int i = c->first; i <= method_last(c, m) && i < c->first + TILES && status == EBPO_OK; i++) {
+    for (int i = c->first; i <= method_last(c, m) && i < c->first + LEVELS_DRAWN && status == EBPO_OK; i++) {
         ebpo_mesh mesh = { 0 };
         status = level_mesh(c, file, i, &mesh, error);
         if (status == EBPO_OK && mesh.face_count)

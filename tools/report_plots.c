@@ -9,7 +9,7 @@ typedef enum relative { AS_IT_IS, OF_DIAGONAL, SHARE, NANOSECONDS } relative;
 static double shown(const comparison *c, double v, relative how)
 {
     switch (how) {
-    case OF_DIAGONAL: return c->diagonal > 0 ? 100 * (v / c->diagonal) : NAN;
+    case OF_DIAGONAL: return report_of_diagonal(c, v);
     case SHARE: return 100 * v;
     case NANOSECONDS: return 1e-9 * v;
     default: return v;

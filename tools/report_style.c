@@ -50,7 +50,7 @@ const char report_style[] =
     "td.best{font-weight:680;color:var(--accent)}td .none,td.none{color:var(--faint)}\n"
     ".scroll+.scroll{margin-top:-4px}\n"
     ".strip{display:grid;grid-template-columns:96px repeat(var(--n),minmax(0,1fr));gap:4px 10px;align-items:end}\n"
-    ".strip .who{align-self:center;font-weight:640;font-size:14px;overflow-wrap:anywhere}\n"
+    ".strip+.strip{margin-top:14px}.strip .who{grid-column:1;align-self:center;font-weight:640;font-size:14px;overflow-wrap:anywhere}\n"
     ".strip figure{margin:0;min-width:0}.strip img{width:100%;height:auto;display:block}\n"
     ".strip figcaption{font-size:12.5px;line-height:1.35;color:var(--soft);text-align:center;padding-bottom:10px}.strip figcaption b{color:var(--ink);font-weight:600}\n"
     ".strip .head{font-size:13px;color:var(--soft);text-align:center;font-weight:600}\n"

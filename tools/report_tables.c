@@ -60,11 +60,6 @@ void cell_count(FILE *out, double v)
     cell_text(out, NULL, text);
 }
 
-static double of_diagonal(const comparison *c, double v)
-{
-    return c->diagonal > 0 ? 100 * (v / c->diagonal) : NAN;
-}
-
 /* --- methods side by side --- */
 
 void page_groups(FILE *out, const comparison *c, int columns, const char *group, const char *before, const char *each)
@@ -163,15 +158,15 @@ static void need_row(FILE *out, const comparison *c, const need_result *wanted)
     static const double nothing[NEED_FIGURES] = { NAN, NAN, NAN, NAN, NAN };
     char text[48];
     if (wanted->kind == NEED_ERROR)
-        fprintf(out, "<tr><th>error ≤ %s</th>", plot_value(text, sizeof text, PLOT_PERCENT, of_diagonal(c, wanted->asked)));
+        fprintf(out, "<tr><th>error ≤ %s</th>", plot_value(text, sizeof text, PLOT_PERCENT, report_of_diagonal(c, wanted->asked)));
     else
         fprintf(out, "<tr><th>size ≤ %s</th>", plot_value(text, sizeof text, PLOT_BYTES, wanted->asked));
     for (int i = 0; i < c->count; i++) {
         const need_result *n = need_of(&c->methods[i], wanted);
         const double *f = n ? n->figure : nothing;
         cell_first(out, PLOT_BYTES, f[OF_NEED_BYTES]);
-        cell(out, PLOT_NUMBER, of_diagonal(c, f[OF_NEED_FAR_LO]));
-        cell(out, PLOT_NUMBER, of_diagonal(c, f[OF_NEED_FAR_HI]));
+        cell(out, PLOT_NUMBER, report_of_diagonal(c, f[OF_NEED_FAR_LO]));
+        cell(out, PLOT_NUMBER, report_of_diagonal(c, f[OF_NEED_FAR_HI]));
         cell(out, PLOT_NUMBER, f[OF_NEED_RATIO]);
     }
     fputs("</tr>\n", out);
@@ -213,10 +208,10 @@ static void shape_row(FILE *out, const comparison *c, int level, const double *f
         cell(out, PLOT_NUMBER, f[OF_LEVELS_EXCESS]);
     cell(out, PLOT_NUMBER, f[OF_LIMIT_EXCESS]);
     cell(out, PLOT_NUMBER, f[OF_EXCESS_TO_LIMIT]);
-    cell_first(out, PLOT_NUMBER, of_diagonal(c, f[OF_FAR_LO]));
-    cell(out, PLOT_NUMBER, of_diagonal(c, f[OF_FAR_HI]));
-    cell(out, PLOT_NUMBER, of_diagonal(c, f[OF_FAR_MEAN]));
-    cell(out, PLOT_NUMBER, of_diagonal(c, f[OF_FAR_RMS]));
+    cell_first(out, PLOT_NUMBER, report_of_diagonal(c, f[OF_FAR_LO]));
+    cell(out, PLOT_NUMBER, report_of_diagonal(c, f[OF_FAR_HI]));
+    cell(out, PLOT_NUMBER, report_of_diagonal(c, f[OF_FAR_MEAN]));
+    cell(out, PLOT_NUMBER, report_of_diagonal(c, f[OF_FAR_RMS]));
     fputs("</tr>\n", out);
 }
 
@@ -240,9 +235,9 @@ static void answer_row(FILE *out, const comparison *c, int level, const double *
     cell_first(out, PLOT_NUMBER, 100 * f[OF_MAYBE_UNIFORM]);
     cell(out, PLOT_NUMBER, 100 * f[OF_MAYBE_NEAR]);
     cell(out, PLOT_SECONDS, 1e-9 * f[OF_INSIDE_NS]);
-    cell_first(out, PLOT_NUMBER, of_diagonal(c, f[OF_WIDTH_MEAN]));
-    cell(out, PLOT_NUMBER, of_diagonal(c, f[OF_WIDTH_MEDIAN]));
-    cell(out, PLOT_NUMBER, of_diagonal(c, f[OF_WIDTH_P99]));
+    cell_first(out, PLOT_NUMBER, report_of_diagonal(c, f[OF_WIDTH_MEAN]));
+    cell(out, PLOT_NUMBER, report_of_diagonal(c, f[OF_WIDTH_MEDIAN]));
+    cell(out, PLOT_NUMBER, report_of_diagonal(c, f[OF_WIDTH_P99]));
     cell(out, PLOT_SECONDS, 1e-9 * f[OF_DISTANCE_NS]);
     cell_first(out, PLOT_SECONDS, f[OF_HAVE_SECONDS]);
     cell(out, PLOT_BYTES, f[OF_READ_BYTES]);

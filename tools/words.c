@@ -99,14 +99,3 @@ bool words_read_size(const char *text, uint64_t *out)
     static const uint64_t factors[] = { 1, 1u << 10, 1u << 20, 1u << 30, UINT64_C(1) << 40, 1u << 10, 1u << 20, 1u << 30, UINT64_C(1) << 40 };
     return words_read_unit(text, units, factors, out);
 }
-
-double words_k_root(const char *text, uint64_t faces)
-{
-    char *end;
-    double k = strtod(text, &end);
-    if (*end == '%' && !end[1])
-        k *= (double)faces / 100;
-    else if (*end)
-        return -1;
-    return k > 0 && k <= 1e9 ? k : -1;
-}

@@ -24,8 +24,6 @@ const char *words_codec(ebpo_codec codec);
 bool words_read_unit(const char *text, const char *const *units, const uint64_t *factors, uint64_t *out);
 /* 64M, 1G, 512K, 1000000: powers of 1024. */
 bool words_read_size(const char *text, uint64_t *out);
-/* --k-root: "500" planes, or "1%" of so many faces; -1: neither. */
-double words_k_root(const char *text, uint64_t faces);
 void words_hex(const uint8_t digest[32], char out[65]);
 
 /* NULL-terminated, in the order of the enums; for option tables. */

@@ -221,9 +221,14 @@ def files(inputs):
     assert [len(m["levels"]) for m in told["methods"]] == [3, 4] and told["methods"][0]["build_seconds"] is None
     for l in told["methods"][0]["levels"]:
         assert l["levels_volume"] >= l["envelope_volume"] * (1 - 1e-9)
-    rows, told, page = report(folder_of(inputs, "some"), "--levels", "1-2", b)
+    _, whole, _ = report(folder_of(inputs, "all"), "--need", "--no-pictures", b)
+    rows, told, page = report(folder_of(inputs, "some"), "--need", "--levels", "1-2", b)
     assert [l["level"] for l in told["methods"][0]["levels"]] == [1, 2]
     well_formed(page, 8)
+    # What the whole file reaches is that of its last level, measured or not.
+    ratios = [[n["need_ratio"] for n in j["methods"][0]["needs"]] for j in (whole, told)]
+    last = whole["methods"][0]["levels"][-1]["hausdorff_hi"]
+    assert ratios[0] == ratios[1] and any(n.get("max_error", last) < last for n in told["methods"][0]["needs"]), (ratios, last)
 
 
 def surface(inputs):
