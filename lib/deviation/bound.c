@@ -23,8 +23,9 @@ typedef enum piece_kind {
 struct ebpo_piece {
     piece_kind kind;
     double upper;
-    ebpo_tree_place place; /* GRAY */
+    ebpo_tree_place place; /* GRAY, LEAF */
     int levels;            /* GRAY, LEAF: of the cell below the node's */
+    double beyond;         /* GRAY, LEAF: every point of the piece is at most so far from that cell */
     uint64_t face_first, face_count; /* LEAF */
     ebpo_polytope p;
 };
@@ -52,12 +53,16 @@ static ebpo_status push(ebpo_bounder *b, piece_kind kind, const ebpo_piece *pare
 {
     double upper = parent ? parent->upper : INFINITY;
     int levels = parent ? parent->levels : 0;
+    double beyond = parent ? parent->beyond : 0;
+    ebpo_tree_place place = parent ? parent->place : (ebpo_tree_place){ .rank = 0 };
     if (!ebpo_grow(&b->pieces, &b->piece_room, b->piece_count + 1, sizeof *b->pieces))
         return ebpo_fail_memory(b->error, (b->piece_count + 1) * sizeof *b->pieces);
     *out = &b->pieces[b->piece_count++];
     (*out)->kind = kind;
     (*out)->upper = upper;
     (*out)->levels = levels;
+    (*out)->beyond = beyond;
+    (*out)->place = place;
     (*out)->face_first = b->face_count;
     (*out)->face_count = 0;
     return EBPO_OK;
@@ -218,15 +223,42 @@ static void settle(ebpo_bounder *b, double upper)
 
 /* --- cutting --- */
 
-static void settle_thin(ebpo_bounder *b, const ebpo_polytope *p, const double low[3], double half, unsigned octant)
+/* Walls of a cell `levels` below the node's, in cell coordinates. */
+static void find_walls(const ebpo_bounder *b, ebpo_cell cell, int levels, double low[3], double high[3])
 {
+    double side = ebpo_half_power(levels);
+    for (int k = 0; k < 3; k++) {
+        uint32_t first = b->frame.cell.at[k] << levels;
+        low[k] = (double)(cell.at[k] - first) * side;
+        high[k] = (double)(cell.at[k] - first + 1) * side;
+    }
+}
+
+/* A piece reaches up to EBPO_CUT_THIN, or the slack of a cut, beyond its cell, where a neighbour's part was thin and went with it. That is measured in the node's cells: far below, it is
+ * not small beside the piece's own cell. What is known of the cell holds for the points beyond it, too, when their distance to it is added. */
+static double find_beyond(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_cell cell, int levels)
+{
+    double low[3], high[3], origin[3] = { 0, 0, 0 }, apart[3];
     ebpo_extent e;
     ebpo_extent_of(p, &e);
-    for (int k = 0; k < 3; k++) {
-        double from = low[k] + (octant >> k & 1 ? half : 0);
-        if (e.min[k] < from - EBPO_CUT_SLACK || e.max[k] > from + half + EBPO_CUT_SLACK)
-            settle(b, 2 * EBPO_CUT_THIN * ebpo_cell_frame_diagonal(&b->frame, 0));
-    }
+    find_walls(b, cell, levels, low, high);
+    for (int k = 0; k < 3; k++)
+        apart[k] = fmax(fmax(low[k] - e.min[k], e.max[k] - high[k]), 0);
+    return ebpo_cell_frame_apart(&b->frame, apart, origin);
+}
+
+/* Inside, but for what thin part of the neighbours went with it: more than the slack, by which neighbours overlap. */
+static void settle_black(ebpo_bounder *b, const ebpo_polytope *p, ebpo_cell cell, int levels)
+{
+    double low[3], high[3];
+    bool thin = false;
+    ebpo_extent e;
+    ebpo_extent_of(p, &e);
+    find_walls(b, cell, levels, low, high);
+    for (int k = 0; k < 3; k++)
+        thin = thin || e.min[k] < low[k] - EBPO_CUT_SLACK || e.max[k] > high[k] + EBPO_CUT_SLACK;
+    if (thin)
+        settle(b, find_beyond(b, p, cell, levels));
 }
 
 static ebpo_status cut_gray(ebpo_bounder *b, const ebpo_piece *piece)
@@ -242,8 +274,8 @@ static ebpo_status cut_gray(ebpo_bounder *b, const ebpo_piece *piece)
         if (!ebpo_cut_axis(&piece->p, 2, octant >> 2 & 1, low[2] + half, &z) || !ebpo_cut_axis(&z, 1, octant >> 1 & 1, low[1] + half, &y) ||
             !ebpo_cut_axis(&y, 0, octant & 1, low[0] + half, &x))
             continue;
-        if (child.type == EBPO_BLACK) { /* inside, but for what thin part of the neighbours went with it */
-            settle_thin(b, &x, low, half, octant);
+        if (child.type == EBPO_BLACK) {
+            settle_black(b, &x, child.cell, piece->levels + 1);
             continue;
         }
         status = push_polytope(b, child.type == EBPO_GRAY ? PIECE_GRAY : child.type == EBPO_LEAF ? PIECE_LEAF : PIECE_OUT, piece, &x, &next);
@@ -251,6 +283,7 @@ static ebpo_status cut_gray(ebpo_bounder *b, const ebpo_piece *piece)
             break;
         next->levels++;
         next->place = child;
+        next->beyond = find_beyond(b, &next->p, child.cell, next->levels);
         if (child.type == EBPO_LEAF)
             status = give_leaf_faces(b, next, &child);
     }
@@ -355,10 +388,22 @@ static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_piece *piece, const loo
     return status != EBPO_OK || done ? status : cut_longest(b, piece, PIECE_OUT);
 }
 
-/* No face passes through the piece, but some may through its outermost bit: a segment from the centre to a point behind one ends so far behind it. */
+/* No face passes through the piece, but some may through its outermost bit: a segment from the centre to a point behind one ends so far behind it. So it is with the leaf's walls, where the
+ * piece reaches beyond them by more than cuts overlap: faces there are in the neighbour's list, not in this one. */
 static double behind_faces(const ebpo_bounder *b, const ebpo_piece *piece, const look *l)
 {
-    double share = 0;
+    double share = 0, low[3], high[3];
+    ebpo_extent all;
+    ebpo_extent_of(&piece->p, &all);
+    find_walls(b, piece->place.cell, piece->levels, low, high);
+    for (int k = 0; k < 3; k++)
+        for (int side = 0; side < 2; side++) {
+            double other = side ? all.max[k] - high[k] : low[k] - all.min[k], own = side ? high[k] - l->centre[k] : l->centre[k] - low[k];
+            if (other > EBPO_CUT_SLACK && !(own > 0))
+                return INFINITY; /* the centre is beyond the wall: only its own distance is known */
+            if (other > EBPO_CUT_SLACK)
+                share = fmax(share, (other + 2e-9) / (other + 2e-9 + own));
+        }
     for (uint64_t i = 0; i < piece->face_count; i++) {
         double n[3], d, reach[2] = { 0, 0 };
         if (!find_plane(b, piece->face_first + i, n, &d))
@@ -456,7 +501,7 @@ static ebpo_status step(ebpo_bounder *b)
     ebpo_polytope_copy(&piece.p, &top->p);
     b->face_count = piece.face_first + piece.face_count;
     if (piece.kind != PIECE_OUT)
-        piece.upper = fmin(piece.upper, ebpo_cell_frame_diagonal(&b->frame, piece.levels));
+        piece.upper = fmin(piece.upper, ebpo_cell_frame_diagonal(&b->frame, piece.levels) + piece.beyond);
     if (piece.upper <= b->target) {
         settle(b, piece.upper);
         return EBPO_OK;
