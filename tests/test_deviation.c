@@ -195,6 +195,15 @@ START_TEST(what_cannot_be_measured_is_refused)
     refused(m.model, m.file, 0, 0, EBPO_E_ARGUMENT, "tolerance");
     refused(m.model, m.file, 0, NAN, EBPO_E_ARGUMENT, "tolerance");
     refused(m.model, other.file, 0, 0.05, EBPO_E_ARGUMENT, "root cells differ");
+    query_model_free(&other);
+    query_model_make(&other, "torus in other leaves", ebpo_test_torus(3, 1, 24, 12), &derived);
+    refused(m.model, other.file, 0, 0.05, EBPO_E_ARGUMENT, "ways of building differ");
+    query_model_free(&other);
+    query_model_make(&other, "box", ebpo_test_box((double[3]){ 0, 0, 0 }, (double[3]){ 8, 8, 8 }, 2), &stored);
+    query_model solid = other;
+    query_model_make(&other, "hollow box", hollow_box(), &stored);
+    refused(solid.model, other.file, 0, 0.05, EBPO_E_ARGUMENT, "sources differ");
+    query_model_free(&solid);
     snprintf(path, sizeof path, "%s/part.ebpo.h5", m.folder);
     for (int i = 0; i < 2; i++) {
         o.parts = i ? EBPO_PART_PLANES : EBPO_PART_PLANES | EBPO_PART_MESH;

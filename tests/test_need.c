@@ -242,6 +242,42 @@ START_TEST(a_size_is_kept_to_with_the_least_error)
 }
 END_TEST
 
+/* Envelopes of boxes on the lattice coincide with the solid: nodes are pruned however small the error is, and no error gives the whole. */
+START_TEST(no_file_is_larger_than_asked_for)
+{
+    for (int i = 0; i < 3; i++) {
+        query_model m;
+        ebpo_mesh mesh = i == 0 ? ebpo_test_box((double[3]){ 0, 0, 0 }, (double[3]){ 8, 8, 8 }, 2) : i == 1 ? ebpo_test_staircase(4) : ebpo_test_torus(3, 1, 12, 6);
+        query_model_make(&m, i == 0 ? "box" : i == 1 ? "staircase" : "torus", mesh, &stored);
+        uint64_t whole = ebpo_file_info(m.file)->file_bytes, last = 0, targets = query_scaled(8);
+        for (uint64_t k = 1; k <= targets; k++) {
+            ebpo_error error = EBPO_ERROR_INIT;
+            ebpo_subset_options o = EBPO_SUBSET_OPTIONS_INIT, e = EBPO_SUBSET_OPTIONS_INIT;
+            char path[120];
+            o.target_bytes = whole * k / targets - (k == targets);
+            snprintf(path, sizeof path, "%s/fit.ebpo.h5", m.folder);
+            ebpo_status status = ebpo_subset(m.file, path, &o, &error);
+            if (status == EBPO_E_ARGUMENT && !last)
+                continue; /* below the least size */
+            fine(status, &error);
+            unlink(path);
+            result r, same;
+            result_make(&r, &m, "fit", &o);
+            ck_assert_msg(r.info->file_bytes <= o.target_bytes, "%s: %llu of %llu bytes", m.name, (unsigned long long)r.info->file_bytes, (unsigned long long)o.target_bytes);
+            verify(&r);
+            e.max_error = r.info->kept_error;
+            result_make(&same, &m, "same", &e);
+            ck_assert(memcmp(same.info->content_sha256, r.info->content_sha256, 32) == 0 && same.info->file_bytes == r.info->file_bytes);
+            last = r.info->file_bytes;
+            result_free(&same);
+            result_free(&r);
+        }
+        ck_assert(last > 0);
+        query_model_free(&m);
+    }
+}
+END_TEST
+
 START_TEST(parts_are_chosen_from_full_to_lod)
 {
     query_model m;
@@ -356,6 +392,7 @@ int main(void)
     tcase_add_test(tests, no_envelope_reaches_farther_than_asked_for);
     tcase_add_test(tests, a_large_error_leaves_the_root_and_a_tiny_one_everything);
     tcase_add_test(tests, a_size_is_kept_to_with_the_least_error);
+    tcase_add_test(tests, no_file_is_larger_than_asked_for);
     tcase_add_test(tests, parts_are_chosen_from_full_to_lod);
     tcase_add_test(tests, threads_and_a_detour_by_a_tree_do_not_change_the_bytes);
     tcase_add_test(tests, what_cannot_be_kept_to_is_refused);

@@ -12,6 +12,7 @@
 #include "container/content.h"
 #include "container/facts.h"
 #include "container/plan.h"
+#include "container/write.h"
 #include "io/publish.h"
 
 /* Chunks that are in memory at a time: 8 MiB raw and as much encoded. */
@@ -316,33 +317,31 @@ static ebpo_status check_options(const ebpo_write_options *options, const char *
     return EBPO_OK;
 }
 
-ebpo_status ebpo_tree_write(const ebpo_tree *tree, const char *path, const ebpo_write_options *options, ebpo_error *error)
+/* Publishes the file under its name; without `publish` writes right into `path`. */
+static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const char *shown, ebpo_publish *publish, const ebpo_write_options *options, ebpo_error *error)
 {
-    EBPO_DEFAULT_FP;
     static const ebpo_write_options usual = EBPO_WRITE_OPTIONS_INIT;
-    ebpo_publish publish = EBPO_PUBLISH_INIT;
     writer *w = ebpo_alloc_zero(1, sizeof *w);
     if (!w)
         return ebpo_fail_memory(error, sizeof *w);
     w->options = options ? options : &usual;
     w->out = (ebpo_h5_out)EBPO_H5_OUT_INIT;
     w->root = -1;
-    ebpo_status status = check_options(w->options, path, error);
+    ebpo_status status = check_options(w->options, shown, error);
     if (status == EBPO_OK)
-        status = ebpo_plan_make(&w->plan, tree, w->options, path, error);
+        status = ebpo_plan_make(&w->plan, tree, w->options, shown, error);
     for (unsigned i = 0; i < w->plan.count; i++)
         w->chunks += ebpo_h5_chunk_count(&w->plan.array[i].shape);
     if (status == EBPO_OK)
         status = make_window(w, error);
+    if (status == EBPO_OK && publish)
+        status = ebpo_publish_begin(publish, path, error);
     if (status == EBPO_OK)
-        status = ebpo_publish_begin(&publish, path, error);
-    if (status == EBPO_OK)
-        status = write_file(w, ebpo_publish_path(&publish), path, error);
+        status = write_file(w, publish ? ebpo_publish_path(publish) : path, shown, error);
     close_handles(w);
     ebpo_h5_discard(&w->out);
-    if (status == EBPO_OK)
-        status = ebpo_publish_commit(&publish, error);
-    ebpo_publish_abort(&publish);
+    if (status == EBPO_OK && publish)
+        status = ebpo_publish_commit(publish, error);
     for (unsigned i = 0; w->coders && i < w->threads; i++)
         ebpo_chunk_coder_clear(&w->coders[i]);
     free(w->coders);
@@ -351,4 +350,18 @@ ebpo_status ebpo_tree_write(const ebpo_tree *tree, const char *path, const ebpo_
     ebpo_content_free(&w->content);
     free(w);
     return status;
+}
+
+ebpo_status ebpo_tree_write(const ebpo_tree *tree, const char *path, const ebpo_write_options *options, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_publish publish = EBPO_PUBLISH_INIT;
+    ebpo_status status = write_tree(tree, path, path, &publish, options, error);
+    ebpo_publish_abort(&publish);
+    return status;
+}
+
+ebpo_status ebpo_tree_write_into(const ebpo_tree *tree, const char *path, const char *shown, const ebpo_write_options *options, ebpo_error *error)
+{
+    return write_tree(tree, path, shown, NULL, options, error);
 }

@@ -1,6 +1,6 @@
 #include "geom/strict_fp.h"
 
-#include "deviation/bound.h"
+#include "deviation/pieces.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -9,25 +9,6 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "query/model.h"
-
-enum { CUT_FACES = 64 };             /* so many faces are cut along; with more, halving makes them fewer */
-static const double smallest = 1e-6; /* pieces are not cut below this, in sides of the cell */
-static const double side_least = 2e-7; /* a plane cuts a piece that reaches so far to both sides; in cells, above what ebpo_polytope_clip refuses */
-
-typedef enum piece_kind {
-    PIECE_GRAY, /* the part in a gray node's cell */
-    PIECE_LEAF, /* within a leaf's: its faces that may meet the piece are known */
-    PIECE_OUT   /* in a white cell, or cut off from all faces, or of a surface, which has no inside */
-} piece_kind;
-
-struct ebpo_piece {
-    piece_kind kind;
-    double upper;
-    ebpo_tree_place place; /* GRAY */
-    int levels;            /* GRAY, LEAF: of the cell below the node's */
-    uint64_t face_first, face_count; /* LEAF */
-    ebpo_polytope p;
-};
 
 ebpo_status ebpo_bounder_make(ebpo_bounder *out, const ebpo_lod_model *whole, ebpo_model *model, ebpo_error *error)
 {
@@ -45,76 +26,9 @@ void ebpo_bounder_free(ebpo_bounder *b)
     memset(b, 0, sizeof *b);
 }
 
-/* --- the stack --- */
-
-/* The new piece is valid until the next call. Its polytope is not set. */
-static ebpo_status push(ebpo_bounder *b, piece_kind kind, const ebpo_piece *parent, ebpo_piece **out)
-{
-    double upper = parent ? parent->upper : INFINITY;
-    int levels = parent ? parent->levels : 0;
-    if (!ebpo_grow(&b->pieces, &b->piece_room, b->piece_count + 1, sizeof *b->pieces))
-        return ebpo_fail_memory(b->error, (b->piece_count + 1) * sizeof *b->pieces);
-    *out = &b->pieces[b->piece_count++];
-    (*out)->kind = kind;
-    (*out)->upper = upper;
-    (*out)->levels = levels;
-    (*out)->face_first = b->face_count;
-    (*out)->face_count = 0;
-    return EBPO_OK;
-}
-
-static ebpo_status push_polytope(ebpo_bounder *b, piece_kind kind, const ebpo_piece *parent, const ebpo_polytope *p, ebpo_piece **out)
-{
-    ebpo_status status = push(b, kind, parent, out);
-    if (status == EBPO_OK)
-        ebpo_polytope_copy(&(*out)->p, p);
-    return status;
-}
-
-/* Gives the piece those of `count` triangles that may meet it; they may be at the beginning of the stack of faces. */
-static ebpo_status give_faces(ebpo_bounder *b, ebpo_piece *piece, uint64_t first, uint64_t count)
-{
-    ebpo_extent e;
-    ebpo_extent_of(&piece->p, &e);
-    piece->face_first = b->face_count;
-    if (!ebpo_grow(&b->faces, &b->face_room, b->face_count + count, sizeof *b->faces))
-        return ebpo_fail_memory(b->error, (b->face_count + count) * sizeof *b->faces);
-    for (uint64_t i = first; i < first + count; i++) {
-        double t[3][3], error = ebpo_cell_frame_triangle(&b->frame, (const double (*)[3])b->faces[i], t) + 1e-9;
-        bool meets = true;
-        for (int k = 0; k < 3; k++)
-            meets = meets && fmin(fmin(t[0][k], t[1][k]), t[2][k]) <= e.max[k] + error && fmax(fmax(t[0][k], t[1][k]), t[2][k]) >= e.min[k] - error;
-        if (meets)
-            memcpy(b->faces[b->face_count++], b->faces[i], sizeof *b->faces);
-    }
-    piece->face_count = b->face_count - piece->face_first;
-    return EBPO_OK;
-}
-
-/* A leaf's faces, as the first ones of its piece. */
-static ebpo_status give_leaf_faces(ebpo_bounder *b, ebpo_piece *piece, const ebpo_tree_place *leaf)
-{
-    uint64_t count = 0, first = b->face_count;
-    ebpo_status status = ebpo_lod_leaf_faces(b->whole, leaf->cell, leaf->rank, &b->scratch, &count, b->error);
-    if (status == EBPO_OK && !ebpo_grow(&b->faces, &b->face_room, first + count, sizeof *b->faces))
-        status = ebpo_fail_memory(b->error, (first + count) * sizeof *b->faces);
-    for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
-        memcpy(b->faces[b->face_count++], b->scratch.faces[i].corner, sizeof *b->faces);
-    piece->face_first = first;
-    piece->face_count = count;
-    return status;
-}
-
 /* --- what is known of a piece --- */
 
-typedef struct look {
-    double centre[3], reach; /* all of the piece is within reach of the centre */
-    double distance;         /* of the centre; negative inside */
-    double upper;
-    double face[3][3];       /* the nearest one, in the model's unit */
-} look;
-
-static void find_centre(const ebpo_bounder *b, const ebpo_polytope *p, look *l)
+static void find_centre(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_look *l)
 {
     ebpo_extent e;
     ebpo_extent_of(p, &e);
@@ -183,7 +97,7 @@ static void learn(ebpo_bounder *b, const double xi[3], double distance)
     b->target = fmax(b->target, b->ratio * b->lo);
 }
 
-static ebpo_status look_at(ebpo_bounder *b, const ebpo_piece *piece, look *l)
+static ebpo_status look_at(ebpo_bounder *b, const ebpo_piece *piece, ebpo_look *l)
 {
     double corner = 0;
     int farthest = 0;
@@ -211,218 +125,6 @@ static ebpo_status look_at(ebpo_bounder *b, const ebpo_piece *piece, look *l)
     return status;
 }
 
-static void settle(ebpo_bounder *b, double upper)
-{
-    b->hi = fmax(b->hi, upper);
-}
-
-/* --- cutting --- */
-
-static void settle_thin(ebpo_bounder *b, const ebpo_polytope *p, const double low[3], double half, unsigned octant)
-{
-    ebpo_extent e;
-    ebpo_extent_of(p, &e);
-    for (int k = 0; k < 3; k++) {
-        double from = low[k] + (octant >> k & 1 ? half : 0);
-        if (e.min[k] < from - EBPO_CUT_SLACK || e.max[k] > from + half + EBPO_CUT_SLACK)
-            settle(b, 2 * EBPO_CUT_THIN * ebpo_cell_frame_diagonal(&b->frame, 0));
-    }
-}
-
-static ebpo_status cut_gray(ebpo_bounder *b, const ebpo_piece *piece)
-{
-    ebpo_polytope z, y, x;
-    ebpo_status status = EBPO_OK;
-    double low[3], half = .5 * ebpo_half_power(piece->levels);
-    for (int k = 0; k < 3; k++)
-        low[k] = (double)(piece->place.cell.at[k] - (b->frame.cell.at[k] << piece->levels)) * 2 * half;
-    for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
-        ebpo_tree_place child = ebpo_tree_child(b->whole, &piece->place, octant);
-        ebpo_piece *next = NULL;
-        if (!ebpo_cut_axis(&piece->p, 2, octant >> 2 & 1, low[2] + half, &z) || !ebpo_cut_axis(&z, 1, octant >> 1 & 1, low[1] + half, &y) ||
-            !ebpo_cut_axis(&y, 0, octant & 1, low[0] + half, &x))
-            continue;
-        if (child.type == EBPO_BLACK) { /* inside, but for what thin part of the neighbours went with it */
-            settle_thin(b, &x, low, half, octant);
-            continue;
-        }
-        status = push_polytope(b, child.type == EBPO_GRAY ? PIECE_GRAY : child.type == EBPO_LEAF ? PIECE_LEAF : PIECE_OUT, piece, &x, &next);
-        if (status != EBPO_OK)
-            break;
-        next->levels++;
-        next->place = child;
-        if (child.type == EBPO_LEAF)
-            status = give_leaf_faces(b, next, &child);
-    }
-    return status;
-}
-
-static ebpo_status cut_longest(ebpo_bounder *b, const ebpo_piece *piece, piece_kind kind)
-{
-    ebpo_extent e;
-    int axis = 0;
-    ebpo_status status = EBPO_OK;
-    ebpo_extent_of(&piece->p, &e);
-    for (int k = 1; k < 3; k++)
-        if ((e.max[k] - e.min[k]) * b->frame.side[k] > (e.max[axis] - e.min[axis]) * b->frame.side[axis])
-            axis = k;
-    for (int side = 0; side < 2 && status == EBPO_OK; side++) {
-        ebpo_polytope part;
-        ebpo_piece *next = NULL;
-        if (!ebpo_cut_axis(&piece->p, axis, side, .5 * e.min[axis] + .5 * e.max[axis], &part))
-            continue;
-        status = push_polytope(b, kind, piece, &part, &next);
-        if (status == EBPO_OK && kind == PIECE_LEAF)
-            status = give_faces(b, next, piece->face_first, piece->face_count);
-    }
-    return status;
-}
-
-/* The plane of a face in cell coordinates, n of length 1; false when rounding leaves it too uncertain to rely on. */
-static bool find_plane(const ebpo_bounder *b, uint64_t face, double n[3], double *d)
-{
-    double t[3][3], u[3], v[3], error = ebpo_cell_frame_triangle(&b->frame, (const double (*)[3])b->faces[face], t);
-    for (int k = 0; k < 3; k++) {
-        u[k] = t[1][k] - t[0][k];
-        v[k] = t[2][k] - t[0][k];
-    }
-    for (int k = 0; k < 3; k++)
-        n[k] = u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3];
-    double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]), edge = 0;
-    for (int k = 0; k < 3; k++)
-        edge += fabs(u[k]) + fabs(v[k]);
-    /* A corner off by the error tilts the plane by about error * edge / length, over distances of a cell or an edge. */
-    if (!(length > 0) || !(error * edge / length * (1 + edge) < 1e-9))
-        return false;
-    for (int k = 0; k < 3; k++)
-        n[k] /= length;
-    *d = n[0] * t[0][0] + n[1] * t[0][1] + n[2] * t[0][2];
-    return true;
-}
-
-/* Both halves along a plane, |n| = 1; not `done` when clipping gives up. */
-static ebpo_status cut_along(ebpo_bounder *b, const ebpo_piece *piece, piece_kind kind, const double n[3], double d, bool *done)
-{
-    ebpo_polytope side[2];
-    double back[3] = { -n[0], -n[1], -n[2] };
-    ebpo_status status = EBPO_OK;
-    *done = ebpo_cut_plane(&piece->p, n, d, &side[0]) && ebpo_cut_plane(&piece->p, back, -d, &side[1]);
-    for (int i = 0; i < 2 && *done && status == EBPO_OK; i++) {
-        ebpo_piece *next = NULL;
-        status = push_polytope(b, kind, piece, &side[i], &next);
-        if (status == EBPO_OK && kind == PIECE_LEAF)
-            status = give_faces(b, next, piece->face_first, piece->face_count);
-    }
-    return status;
-}
-
-/* Over a face, its plane's distance is the face's: pieces of about its size are cut along the prism above it, so that flat places need no fine ones. */
-static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_piece *piece, const look *l)
-{
-    double t[3][3], edge[3][3], normal[3], longest = 0;
-    bool done = false;
-    ebpo_status status = EBPO_OK;
-    (void)ebpo_cell_frame_triangle(&b->frame, l->face, t);
-    for (int i = 0; i < 3; i++) {
-        double sum = 0;
-        for (int k = 0; k < 3; k++) {
-            edge[i][k] = (t[(i + 1) % 3][k] - t[i][k]) * b->frame.side[k];
-            sum += edge[i][k] * edge[i][k];
-        }
-        longest = fmax(longest, sqrt(sum));
-    }
-    for (int k = 0; k < 3; k++)
-        normal[k] = edge[0][(k + 1) % 3] * edge[1][(k + 2) % 3] - edge[0][(k + 2) % 3] * edge[1][(k + 1) % 3];
-    for (int i = 0; i < 3 && l->reach <= 2 * longest && !done && status == EBPO_OK; i++) {
-        double n[3], d = 0, length = 0, most = -INFINITY, least = INFINITY;
-        for (int k = 0; k < 3; k++) {
-            n[k] = (edge[i][(k + 1) % 3] * normal[(k + 2) % 3] - edge[i][(k + 2) % 3] * normal[(k + 1) % 3]) * b->frame.side[k];
-            length += n[k] * n[k];
-        }
-        length = sqrt(length);
-        for (int k = 0; k < 3; k++) {
-            n[k] /= length;
-            d += n[k] * t[i][k];
-        }
-        for (int v = 0; v < piece->p.vertex_count; v++) {
-            double e = n[0] * piece->p.vertex[v][0] + n[1] * piece->p.vertex[v][1] + n[2] * piece->p.vertex[v][2] - d;
-            most = fmax(most, e);
-            least = fmin(least, e);
-        }
-        if (most > side_least && least < -side_least) /* never with NAN, of a face without area */
-            status = cut_along(b, piece, PIECE_OUT, n, d, &done);
-    }
-    return status != EBPO_OK || done ? status : cut_longest(b, piece, PIECE_OUT);
-}
-
-/* No face passes through the piece, but some may through its outermost bit: a segment from the centre to a point behind one ends so far behind it. */
-static double behind_faces(const ebpo_bounder *b, const ebpo_piece *piece, const look *l)
-{
-    double share = 0;
-    for (uint64_t i = 0; i < piece->face_count; i++) {
-        double n[3], d, reach[2] = { 0, 0 };
-        if (!find_plane(b, piece->face_first + i, n, &d))
-            return INFINITY;
-        double own = n[0] * l->centre[0] + n[1] * l->centre[1] + n[2] * l->centre[2] - d;
-        for (int v = 0; v < piece->p.vertex_count; v++) {
-            double e = n[0] * piece->p.vertex[v][0] + n[1] * piece->p.vertex[v][1] + n[2] * piece->p.vertex[v][2] - d;
-            reach[e > 0] = fmax(reach[e > 0], fabs(e));
-        }
-        double other = reach[own < 0] + 2e-9;
-        share = fmax(share, other / (other + fabs(own)));
-    }
-    return share * l->reach + b->frame.grain;
-}
-
-/* The cell is thinner on some axis than coordinates are sharp. */
-static bool is_flat(const ebpo_bounder *b)
-{
-    return fmin(fmin(b->frame.side[0], b->frame.side[1]), b->frame.side[2]) < 1e10 * b->frame.grain;
-}
-
-/* A piece within a leaf, with an inside and an outside. */
-static ebpo_status cut_leaf(ebpo_bounder *b, const ebpo_piece *piece, const look *l)
-{
-    bool done = false, known = piece->face_count <= CUT_FACES;
-    ebpo_status status = EBPO_OK;
-    for (uint64_t i = 0; i < piece->face_count && known && !done && status == EBPO_OK; i++) {
-        double n[3], d, most = -INFINITY, least = INFINITY;
-        known = find_plane(b, piece->face_first + i, n, &d);
-        for (int v = 0; v < piece->p.vertex_count && known; v++) {
-            double e = n[0] * piece->p.vertex[v][0] + n[1] * piece->p.vertex[v][1] + n[2] * piece->p.vertex[v][2] - d;
-            most = fmax(most, e);
-            least = fmin(least, e);
-        }
-        if (known && most > side_least && least < -side_least) {
-            status = cut_along(b, piece, PIECE_LEAF, n, d, &done);
-            known = done;
-        }
-    }
-    if (status != EBPO_OK || done)
-        return status;
-    if (!known && is_flat(b)) /* sides cannot be told apart: as a surface */
-        return cut_prism(b, piece, l);
-    if (!known)
-        return cut_longest(b, piece, PIECE_LEAF);
-    if (l->distance >= 0)
-        return cut_prism(b, piece, l);
-    double behind = behind_faces(b, piece, l);
-    if (behind > smallest && behind > b->target)
-        return cut_longest(b, piece, PIECE_LEAF);
-    settle(b, fmin(behind, l->upper));
-    return EBPO_OK;
-}
-
-static ebpo_status cut(ebpo_bounder *b, const ebpo_piece *piece, const look *l)
-{
-    switch (piece->kind) {
-    case PIECE_GRAY: return cut_gray(b, piece);
-    case PIECE_LEAF: return b->whole->info->solid ? cut_leaf(b, piece, l) : cut_prism(b, piece, l);
-    case PIECE_OUT: break;
-    }
-    return cut_prism(b, piece, l);
-}
-
 /* --- the search --- */
 
 static ebpo_status begin(ebpo_bounder *b)
@@ -434,7 +136,7 @@ static ebpo_status begin(ebpo_bounder *b)
     b->piece_count = b->face_count = 0;
     if (place.type == EBPO_BLACK)
         return EBPO_OK;
-    ebpo_status status = push(b, place.type == EBPO_GRAY ? PIECE_GRAY : place.type == EBPO_LEAF ? PIECE_LEAF : PIECE_OUT, NULL, &first);
+    ebpo_status status = ebpo_piece_push(b, place.type == EBPO_GRAY ? EBPO_PIECE_GRAY : place.type == EBPO_LEAF ? EBPO_PIECE_LEAF : EBPO_PIECE_OUT, NULL, &first);
     if (status != EBPO_OK)
         return status;
     ebpo_halves_cut(&b->halves, EBPO_CUT_SLACK, &first->p);
@@ -444,32 +146,32 @@ static ebpo_status begin(ebpo_bounder *b)
         for (int i = 0; i < first->p.vertex_count; i++)
             b->inner[k] += first->p.vertex[i][k] / first->p.vertex_count;
     }
-    return place.type == EBPO_LEAF ? give_leaf_faces(b, first, &place) : EBPO_OK;
+    return place.type == EBPO_LEAF ? ebpo_piece_leaf_faces(b, first, &place) : EBPO_OK;
 }
 
 static ebpo_status step(ebpo_bounder *b)
 {
     ebpo_piece piece;
-    look l;
+    ebpo_look l;
     const ebpo_piece *top = &b->pieces[--b->piece_count];
     memcpy(&piece, top, offsetof(ebpo_piece, p));
     ebpo_polytope_copy(&piece.p, &top->p);
     b->face_count = piece.face_first + piece.face_count;
-    if (piece.kind != PIECE_OUT)
-        piece.upper = fmin(piece.upper, ebpo_cell_frame_diagonal(&b->frame, piece.levels));
+    if (piece.kind != EBPO_PIECE_OUT)
+        piece.upper = fmin(piece.upper, ebpo_cell_frame_diagonal(&b->frame, piece.levels) + piece.beyond);
     if (piece.upper <= b->target) {
-        settle(b, piece.upper);
+        ebpo_bound_settle(b, piece.upper);
         return EBPO_OK;
     }
     ebpo_status status = look_at(b, &piece, &l);
     if (status != EBPO_OK)
         return status;
     piece.upper = l.upper;
-    if (l.upper <= b->target || l.reach < smallest) {
-        settle(b, l.upper);
+    if (l.upper <= b->target || l.reach < EBPO_PIECE_LEAST) {
+        ebpo_bound_settle(b, l.upper);
         return EBPO_OK;
     }
-    return cut(b, &piece, &l);
+    return ebpo_piece_cut(b, &piece, &l);
 }
 
 ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound_wish *wish, ebpo_reach_bound *out, ebpo_error *error)
@@ -486,7 +188,7 @@ ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell, const ebpo_boun
     while (status == EBPO_OK && b->piece_count && b->questions < wish->questions && b->lo <= b->quit)
         status = step(b);
     for (uint64_t i = 0; i < b->piece_count; i++)
-        settle(b, b->pieces[i].upper);
+        ebpo_bound_settle(b, b->pieces[i].upper);
     *out = (ebpo_reach_bound){ b->lo > 0 ? ldexp(b->lo, b->frame.exponent) : 0, ebpo_cell_frame_model_length(&b->frame, b->hi), { b->place[0], b->place[1], b->place[2] }, b->questions };
     return status;
 }

@@ -199,6 +199,22 @@ static ebpo_status make_bounders(survey *s, ebpo_model *model)
     return status;
 }
 
+/* What shows that the file is no subset of the model's; NULL: nothing. Digests cannot, as subsets of subsets name only the first file, or none when all nodes were kept. */
+static const char *find_difference(const ebpo_info *info, const ebpo_info *model)
+{
+    if (memcmp(info->box_origin, model->box_origin, sizeof info->box_origin) != 0 || memcmp(info->box_size, model->box_size, sizeof info->box_size) != 0)
+        return "root cells";
+    if (memcmp(info->content_sha256, model->content_sha256, sizeof info->content_sha256) == 0 || (info->pruned && memcmp(info->subset_of, model->content_sha256, sizeof info->subset_of) == 0))
+        return NULL;
+    if (memcmp(info->source_sha256, model->source_sha256, sizeof info->source_sha256) != 0 || info->source_vertex_count != model->source_vertex_count ||
+        info->source_face_count != model->source_face_count)
+        return "sources";
+    if (info->solid != model->solid || info->rule != model->rule || info->max_level != model->max_level || info->leaf_faces != model->leaf_faces || info->epsilon != model->epsilon ||
+        info->selection != model->selection || info->percent != model->percent || info->k_root != model->k_root || info->seed != model->seed)
+        return "ways of building";
+    return NULL;
+}
+
 static ebpo_status check(const ebpo_info *info, const ebpo_info *model, int level, const ebpo_deviation_options *o, ebpo_error *error)
 {
     if (level < 0 || level >= info->level_count)
@@ -207,9 +223,9 @@ static ebpo_status check(const ebpo_info *info, const ebpo_info *model, int leve
         return ebpo_fail(error, EBPO_E_ARGUMENT, "tolerance %g: give a number above 0, such as 0.05", o->tolerance);
     if (o->samples > UINT32_MAX)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "more than 4294967295 samples; a million tell the mean to three digits");
-    for (int k = 0; k < 3; k++)
-        if (info->box_origin[k] != model->box_origin[k] || info->box_size[k] != model->box_size[k])
-            return ebpo_fail(error, EBPO_E_ARGUMENT, "the file is neither the model's nor a subset of it: their root cells differ");
+    const char *differ = find_difference(info, model);
+    if (differ)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "the file is neither the model's nor a subset of it: their %s differ; open the model of the file it was taken from", differ);
     return EBPO_OK;
 }
 

@@ -2,6 +2,7 @@
 
 #include "deviation/need.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -12,7 +13,8 @@
 
 enum { QUESTIONS = 4096 }; /* a node that takes more is refined: its children's envelopes are smaller and closer */
 
-/* The least max_error known to be enough, the largest one that was not, and a certain lower bound. */
+/* The least max_error that was found to be enough, the largest one that was not, and a certain lower bound. A search for a larger max_error asks no more and settles at no more (bound.h), so
+ * these tell what it would find; an upper bound from another search would not, as this one might run out of questions just above it. */
 typedef struct memory {
     double enough, failed, lo;
 } memory;
@@ -105,7 +107,7 @@ static ebpo_status judge(ebpo_need *n, ebpo_bounder *b, ebpo_need_node *node, eb
     node->enough = found.hi <= n->max_error;
     m->lo = fmax(m->lo, found.lo);
     if (node->enough)
-        m->enough = fmin(m->enough, found.hi);
+        m->enough = fmin(m->enough, n->max_error);
     else
         m->failed = fmax(m->failed, n->max_error);
     return EBPO_OK;
@@ -137,10 +139,15 @@ ebpo_status ebpo_need_most(ebpo_need *n, double *out, ebpo_error *error)
     if (place.type == EBPO_LEAF)
         n->bounders[0].halves.count = 0;
     ebpo_status status = ebpo_bound_closely(&n->bounders[0], root, &wish, &found, error);
-    if (status != EBPO_OK)
-        return status;
-    memory *m = place.type == EBPO_GRAY ? n->gray[0] : n->leaf[0];
-    m->enough = fmin(m->enough, found.hi);
-    *out = m->enough;
-    return EBPO_OK;
+    /* A search of its own may need a little more; with the root cell's diagonal none is left. */
+    ebpo_need_node node = { root, true, false };
+    double most = found.hi > 0 ? found.hi : DBL_MIN;
+    *out = most;
+    for (double more = 0x1p-30; status == EBPO_OK && !node.enough; more *= 2) {
+        n->max_error = *out;
+        status = judge(n, &n->bounders[0], &node, error);
+        if (!node.enough)
+            *out = most * (1 + more);
+    }
+    return status;
 }

@@ -33,7 +33,7 @@ void ebpo_cut_volumes(ebpo_cutting *c);
 /* The same with what is known of envelopes already: `need` of this file, for the planes that are kept. */
 EBPO_MUST_USE ebpo_status ebpo_subset_tree_needed(ebpo_tree *out, ebpo_file *file, const ebpo_subset_options *options, ebpo_need *need, ebpo_error *error);
 
-/* --- size.c: options->target_bytes in terms of max_error and parts. `path`: of the output, beside which files are written to see how large they are --- */
+/* --- size.c: the subset for options->target_bytes, published as `path`; trials are written beside it. Changes max_error and parts of the options --- */
 EBPO_MUST_USE ebpo_status ebpo_subset_fit(ebpo_file *file, const char *path, ebpo_subset_options *options, ebpo_error *error);
 
 /* The tree that would be written; for tests too. `options->write` only for its threads and progress. */

@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "container/reader.h"
+#include "container/write.h"
 #include "io/publish.h"
 #include "subset/parts.h"
 
@@ -153,9 +154,9 @@ ebpo_status ebpo_subset(ebpo_file *file, const char *path, const ebpo_subset_opt
     static const ebpo_subset_options usual = EBPO_SUBSET_OPTIONS_INIT;
     ebpo_subset_options wanted = options ? *options : usual;
     ebpo_tree tree;
-    ebpo_status status = wanted.target_bytes ? ebpo_subset_fit(file, path, &wanted, error) : EBPO_OK;
-    if (status == EBPO_OK)
-        status = ebpo_subset_tree(&tree, file, &wanted, error);
+    if (wanted.target_bytes)
+        return ebpo_subset_fit(file, path, &wanted, error);
+    ebpo_status status = ebpo_subset_tree(&tree, file, &wanted, error);
     if (status != EBPO_OK)
         return status;
     wanted.write.parts = ~0u;
@@ -175,7 +176,7 @@ ebpo_status ebpo_subset_of_tree(ebpo_tree *tree, const char *path, const ebpo_su
     write.parts = ~0u;
     ebpo_status status = ebpo_publish_begin(&whole, path, error);
     if (status == EBPO_OK)
-        status = ebpo_tree_write(tree, ebpo_publish_path(&whole), &write, error);
+        status = ebpo_tree_write_into(tree, ebpo_publish_path(&whole), path, &write, error);
     ebpo_tree_free(tree);
     if (status == EBPO_OK)
         status = ebpo_open(&file, ebpo_publish_path(&whole), error);
