@@ -12,7 +12,7 @@
 
 typedef struct values {
     bool json, deviation, limit;
-    int64_t threads;
+    int64_t threads, questions;
     double tolerance;
     remote_values remote;
 } values;
@@ -23,6 +23,8 @@ static const arg_option options[] = {
                "also how far each level reaches beyond the model: certain\nbounds of the farthest point, mean and rms over its surface"),
     { "tolerance", 0, ARG_REAL, offsetof(values, tolerance), "T",
       "with --deviation: bounds are refined until the upper one is\nat most 1 + T times the lower one; default 0.05", 1e-6, 1000, NULL },
+    { "questions", 0, ARG_INT, offsetof(values, questions), "N",
+      "with --deviation: stop after about N distances for each level\nand tell what is certain then; default 200000; 0: no limit", 0, 9007199254740992.0, NULL },
     ARG_SWITCH("limit", 0, values, limit, "also the volume of the solid's convex hull in each cell, summed:\nno convex envelopes of these cells are smaller"),
     ARG_SWITCH("json", 0, values, json, "print the numbers as JSON"),
     REMOTE_OPTIONS(values, remote),
@@ -151,6 +153,7 @@ static ebpo_status measure_levels(ebpo_file *file, const values *v, ebpo_progres
     ebpo_deviation_options wanted = EBPO_DEVIATION_OPTIONS_INIT;
     opening.threads = wanted.threads = (unsigned)v->threads;
     wanted.tolerance = v->tolerance;
+    wanted.questions = (uint64_t)v->questions;
     wanted.progress = opening.progress = progress;
     ebpo_status status = ebpo_model_open(&model, file, &opening, error);
     for (int i = 0; i < ebpo_file_info(file)->level_count && status == EBPO_OK; i++)
@@ -208,7 +211,7 @@ static int measure(const char *path, const values *v)
 
 static int run(int argc, char **argv)
 {
-    values v = { .tolerance = 0.05, .remote = REMOTE_VALUES_INIT };
+    values v = { .tolerance = 0.05, .questions = 200000, .remote = REMOTE_VALUES_INIT };
     const char *operand[ARGS_OPERANDS_MAX];
     arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
     if (parsed != ARGS_RUN)

@@ -24,7 +24,8 @@ double facts_volume(const ebpo_info *info, int level)
 double facts_percent(const ebpo_info *info, int level)
 {
     double whole = info->solid ? fabs(info->report.volume) : cell_volume(info, 0);
-    return 100 * facts_volume(info, level) / whole;
+    double percent = 100 * facts_volume(info, level) / whole;
+    return isnan(percent) ? NAN : percent; /* without a sign that means nothing */
 }
 
 double facts_excess(const ebpo_info *info, double volume)

@@ -1,5 +1,6 @@
 /* The command line: `ebpo COMMAND ...`. One table of commands, one cmd_*.c for each. */
 #include <errno.h>
+#include <fenv.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -138,6 +139,7 @@ static int dispatch(int argc, char **argv)
 
 int main(int argc, char **argv)
 {
+    fesetenv(FE_DFL_ENV); /* whatever a preloaded library has set: numbers are parsed and printed here, too */
     signals_install();
     int code = dispatch(argc, argv);
     const command *c = argc > 1 ? find(argv[1]) : NULL;

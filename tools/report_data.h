@@ -9,7 +9,8 @@
 #include "progress.h"
 #include "remote.h"
 
-enum { METHODS_MAX = ARGS_OPERANDS_MAX, METHOD_NOTES = 6, DEADLINES = 8, NEEDS = 8, ROUNDS = 3 };
+enum { METHODS_MAX = ARGS_OPERANDS_MAX, METHOD_NOTES = 6, DEADLINES = 8, NEEDS = 8, ROUNDS = 3,
+       REPORT_QUESTIONS = 200000 /* for the bounds of a level's deviation: flat and huge models would take for ever */ };
 
 /* Of each level; the table level_figures says what they are. */
 typedef enum level_figure {

@@ -69,6 +69,7 @@ static ebpo_status limits(comparison *c, method *m, ebpo_file *file, ebpo_error 
 static ebpo_status deviations(comparison *c, method *m, ebpo_file *file, ebpo_model *model, ebpo_error *error)
 {
     ebpo_deviation_options options = EBPO_DEVIATION_OPTIONS_INIT;
+    options.questions = REPORT_QUESTIONS;
     options.seed = (uint64_t)c->v->seed;
     options.threads = (unsigned)c->v->threads;
     options.progress = c->progress;

@@ -44,13 +44,22 @@ static int learn(comparison *c, method *m)
     return EXIT_FAILED;
 }
 
+/* A file's name makes a method's, whatever is in it. */
+static void usable_stem(const char *path, char *name, size_t room)
+{
+    report_stem(path, name, room);
+    for (char *c = name; *c; c++)
+        if (strchr("/,\"\n\r", *c))
+            *c = '_';
+}
+
 static int add_file(comparison *c, const char *path)
 {
     char name[64];
     if (c->count < c->v->names.count)
         snprintf(name, sizeof name, "%s", c->v->names.item[c->count]);
     else
-        report_stem(path, name, sizeof name);
+        usable_stem(path, name, sizeof name);
     if (strlen(path) >= sizeof c->methods->path)
         return told("the name is too long", path);
     if (strpbrk(name, "/,\"\n"))

@@ -26,6 +26,7 @@ static ebpo_status cut(const comparison *c, ebpo_file *file, const need_result *
 static ebpo_status reach(const comparison *c, ebpo_model *model, const char *path, need_result *n, ebpo_error *error)
 {
     ebpo_deviation_options options = EBPO_DEVIATION_OPTIONS_INIT;
+    options.questions = REPORT_QUESTIONS;
     ebpo_deviation far = { 0 };
     ebpo_file *file = NULL;
     options.samples = 0;
@@ -50,6 +51,7 @@ static ebpo_status reach(const comparison *c, ebpo_model *model, const char *pat
 static ebpo_status own_reach(const comparison *c, method *m, ebpo_file *file, ebpo_model *model, double *reach, ebpo_error *error)
 {
     ebpo_deviation_options options = EBPO_DEVIATION_OPTIONS_INIT;
+    options.questions = REPORT_QUESTIONS;
     ebpo_deviation far = { 0 };
     *reach = m->level[m->levels - 1][OF_FAR_HI];
     if (!isnan(*reach))

@@ -151,8 +151,7 @@ all bytes of the file up to its end, head included (`ebpo levels`).
 - *Certainly at most*: a bound on that Hausdorff distance: the largest diameter of an envelope in whose cell a face lies, which then lies in the envelope too, and the cell's diagonal and 1/256 for envelopes
   of nodes that a face only comes near. The other way round the distance is 0: the envelopes contain the solid.
 
-Planes are chosen by the volume that they remove, so a node that the surface only grazes may keep a long needle of an envelope with next to no volume. Where *reaches* stands still from level to level, it is
-the needle of a leaf, which deeper levels do not change.
+Where *reaches* stands still from level to level, it is that of a leaf whose convex hull spans a hollow: a node with few faces is not refined, so deeper levels do not change it.
 """
 
 LEVELS = """## By level
