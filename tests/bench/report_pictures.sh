@@ -15,7 +15,7 @@ python3 - "$folder/thin_shell.ply" <<'PYTHON'
 import math
 import sys
 
-AROUND, ACROSS, WALL = 240, 120, 5e-4
+AROUND, ACROSS, WALL = 120, 60, 5e-4
 
 
 def torus(radius, first, turn):
@@ -44,6 +44,6 @@ page() { # NAME PICTURE
 }
 
 "$build/tools/ebpo" report --select $methods --need -o "$folder/dragon" "$models/dragon100k.ply"
-"$build/tools/ebpo" report --select $methods --need --view 30,35 -o "$folder/stiff" "$folder/thin_shell.ply"
+"$build/tools/ebpo" report --select $methods --points 2000 --view 30,35 -o "$folder/stiff" "$folder/thin_shell.ply"
 page dragon report-dragon.png
 page stiff report-stiff.png
