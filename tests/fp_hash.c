@@ -243,7 +243,7 @@ static void hash_reach(hashing *h, const stiff_case *c, query_model *m)
     }
     ebpo_subset_options options = EBPO_SUBSET_OPTIONS_INIT;
     char path[128];
-    ebpo_file *file;
+    ebpo_file *file = NULL;
     options.max_error = d.hi;
     snprintf(path, sizeof path, "%s/subset.ebpo.h5", m->folder);
     if (status != EBPO_OK || !(d.hi > 0 && isfinite(d.hi)))
