@@ -134,7 +134,6 @@ void ebpo_scratch_free(ebpo_envelope_scratch *scratch);
 /* The own planes of a gray node, chosen now or proposed before; `envelope` is its parent's cut to its cell, then its own. Returns their number, -1: out of memory. */
 int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, const ebpo_branch *s, uint32_t detail, ebpo_cell cell, int32_t winding,
                      ebpo_polytope *envelope, uint32_t codes[EBPO_PLANES_STORED]);
-void ebpo_cut_by_codes(ebpo_polytope *envelope, const uint32_t *codes, int count);
 unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32_t delta[8]);
 double ebpo_cell_volume(const ebpo_builder *b, int level);
 

@@ -151,7 +151,7 @@ static int leaf_planes(const emitter *e, uint32_t detail, ebpo_cell cell, int32_
         return ebpo_leaf_planes(&b->box, cell, e->faces, d->entry_end - d->entry_begin, ebpo_inside_corners(b, winding, d->delta),
                                 stored ? b->options->epsilon : 0, envelope, codes);
     memcpy(codes, proposed, (size_t)count * sizeof *codes);
-    ebpo_cut_by_codes(envelope, codes, count);
+    ebpo_planes_cut(envelope, codes, (uint64_t)count);
     return count;
 }
 

@@ -188,18 +188,6 @@ static int choose_now(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebp
     return ebpo_select_greedy(envelope, &choice, codes);
 }
 
-void ebpo_cut_by_codes(ebpo_polytope *envelope, const uint32_t *codes, int count)
-{
-    for (int i = 0; i < count; i++) {
-        int32_t v[3], d;
-        double n[3];
-        if (!ebpo_plane_code_decode(codes[i], v, &d))
-            continue;
-        double offset = ebpo_plane_as_double(v, d, n);
-        (void)ebpo_polytope_clip(envelope, n, offset, i);
-    }
-}
-
 int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo_branch *branch, uint32_t detail, ebpo_cell cell, int32_t winding,
                      ebpo_polytope *envelope, uint32_t codes[EBPO_PLANES_STORED])
 {
@@ -208,6 +196,6 @@ int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo
     if (!proposed)
         return choose_now(b, s, branch, &branch->details[detail], cell, winding, envelope, codes);
     memcpy(codes, proposed, (size_t)count * sizeof *codes);
-    ebpo_cut_by_codes(envelope, codes, count);
+    ebpo_planes_cut(envelope, codes, (uint64_t)count);
     return count;
 }

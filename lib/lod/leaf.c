@@ -87,7 +87,7 @@ ebpo_status ebpo_lod_leaf(const ebpo_lod_model *model, ebpo_cell cell, uint64_t 
     const ebpo_level *level = &model->level[cell.level];
     const ebpo_lod_index *index = &model->index[cell.level];
     if (model->leaf_source == EBPO_LEAF_STORED && index->leaf_plane_first && level->leaf_plane_counts[leaf])
-        ebpo_lod_cut(envelope, level->leaf_planes + index->leaf_plane_first[leaf], level->leaf_plane_counts[leaf]);
+        ebpo_planes_cut(envelope, level->leaf_planes + index->leaf_plane_first[leaf], level->leaf_plane_counts[leaf]);
     uint32_t codes[EBPO_PLANES_MAX];
     int count;
     if (model->leaf_source != EBPO_LEAF_DERIVED)

@@ -71,7 +71,7 @@ static ebpo_status visit_gray(walker *w, uint64_t gray, ebpo_cell cell, ebpo_pol
 {
     const ebpo_level *level = &w->j->model->level[cell.level];
     if (level->plane_counts && level->plane_counts[gray])
-        ebpo_lod_cut(envelope, level->planes + w->j->model->index[cell.level].plane_first[gray],
+        ebpo_planes_cut(envelope, level->planes + w->j->model->index[cell.level].plane_first[gray],
                      level->plane_counts[gray]);
     if (cell.level == w->j->model->target)
         return emit(w, envelope, cell, EBPO_GRAY);

@@ -61,15 +61,3 @@ ebpo_status ebpo_lod_model_read(ebpo_lod_model *out, ebpo_file *file, int target
         ebpo_lod_model_free(out);
     return status;
 }
-
-void ebpo_lod_cut(ebpo_polytope *envelope, const uint32_t *codes, uint64_t count)
-{
-    for (uint64_t i = 0; i < count; i++) {
-        int32_t n[3], d;
-        double direction[3];
-        if (!ebpo_plane_decode(codes[i], n, &d))
-            continue;
-        double offset = ebpo_plane_as_double(n, d, direction);
-        (void)ebpo_polytope_clip(envelope, direction, offset, (int32_t)i);
-    }
-}

@@ -53,7 +53,4 @@ EBPO_MUST_USE ebpo_status ebpo_lod_leaf_planes(const ebpo_lod_model *model, ebpo
 /* Whether points of this winding number are in the solid. */
 bool ebpo_lod_rule_inside(ebpo_rule rule, int32_t winding);
 
-/* Cuts the envelope by plane codes of its own cell. */
-void ebpo_lod_cut(ebpo_polytope *envelope, const uint32_t *codes, uint64_t count);
-
 #endif

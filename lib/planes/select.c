@@ -31,8 +31,7 @@ static double cap_bound(const ebpo_polytope *p, double volume, const double n[3]
     return volume * (1 - left * left * left);
 }
 
-/* The plane that a candidate would be; false when only the whole cell would do. */
-static bool plane_of(const ebpo_candidate *candidate, uint32_t *code, double n[3], double *offset)
+bool ebpo_candidate_plane(const ebpo_candidate *candidate, uint32_t *code, double n[3], double *offset)
 {
     int32_t v[3], d;
     if (!ebpo_plane_code_decode(ebpo_plane_code_make(candidate->normal, 0), v, &d))
@@ -52,7 +51,7 @@ static int rank_candidates(const ebpo_polytope *envelope, const ebpo_candidate *
     int kept = 0;
     for (int i = 0; i < count && i < EBPO_PLANES_CANDIDATES; i++) {
         ranked r = { .round = -1 };
-        if (!plane_of(&candidates[i], &r.code, r.n, &r.d))
+        if (!ebpo_candidate_plane(&candidates[i], &r.code, r.n, &r.d))
             continue;
         r.gain = cap_bound(envelope, volume, r.n, r.d);
         if (r.gain >= epsilon && r.gain > 0)
@@ -115,7 +114,7 @@ static int cut_needles(ebpo_polytope *envelope, const ebpo_choice *choice, int t
         for (int i = 0; i < choice->count; i++) {
             double n[3], offset;
             uint32_t c;
-            if (refused[i] || !plane_of(&choice->candidates[i], &c, n, &offset))
+            if (refused[i] || !ebpo_candidate_plane(&choice->candidates[i], &c, n, &offset))
                 continue;
             double depth = depth_of(envelope, n, offset);
             if (depth > deepest) {
@@ -169,4 +168,16 @@ int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, i
         if (ebpo_polytope_clip(envelope, heap[0].n, heap[0].d, taken) == EBPO_CLIP_CUT)
             codes[taken++] = heap[0].code;
     return cut_needles(envelope, &(ebpo_choice){ .candidates = candidates, .count = count, .most = most, .reach = ebpo_needle }, taken, codes);
+}
+
+void ebpo_planes_cut(ebpo_polytope *envelope, const uint32_t *codes, uint64_t count)
+{
+    for (uint64_t i = 0; i < count; i++) {
+        int32_t v[3], d;
+        double n[3];
+        if (!ebpo_plane_code_decode(codes[i], v, &d))
+            continue;
+        double offset = ebpo_plane_as_double(v, d, n);
+        (void)ebpo_polytope_clip(envelope, n, offset, (int32_t)i);
+    }
 }

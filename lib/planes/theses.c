@@ -23,16 +23,10 @@ static int take(ebpo_polytope *envelope, const ebpo_choice *choice, const bool *
 {
     int taken = 0;
     for (int i = 0; i < choice->count && taken < choice->most; i++) {
-        int32_t v[3], d;
-        double n[3];
-        if (!chosen[i] || !ebpo_plane_code_decode(ebpo_plane_code_make(choice->candidates[i].normal, 0), v, &d))
+        double n[3], offset;
+        uint32_t code;
+        if (!chosen[i] || !ebpo_candidate_plane(&choice->candidates[i], &code, n, &offset))
             continue;
-        int q = ebpo_plane_code_offset(v, choice->candidates[i].support);
-        if (q < 0)
-            continue;
-        uint32_t code = ebpo_plane_code_make(choice->candidates[i].normal, q);
-        ebpo_plane_code_decode(code, v, &d);
-        double offset = ebpo_plane_as_double(v, d, n);
         if (ebpo_polytope_clip(envelope, n, offset, taken) == EBPO_CLIP_CUT)
             codes[taken++] = code;
     }

@@ -115,7 +115,7 @@ ebpo_status ebpo_distance_to_envelope(ebpo_context *c, const double p[3], const 
     for (;;) {
         uint32_t count;
         const uint32_t *codes = ebpo_spot_planes(c->model, &spot, &count);
-        ebpo_lod_cut(&envelope[now], codes, count);
+        ebpo_planes_cut(&envelope[now], codes, count);
         gray = spot;
         if ((o->level >= 0 && spot.level >= o->level) || !ebpo_spot_is_gray(c->model, &spot))
             break;

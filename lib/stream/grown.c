@@ -6,6 +6,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "morton/octcode.h"
+#include "planes/planes.h"
 
 void ebpo_grown_free(ebpo_grown *grown)
 {
@@ -76,13 +77,13 @@ const ebpo_polytope *ebpo_grown_envelope(const ebpo_grown *g, ebpo_grown_node no
         if (e->octcode[depth] != own) {
             ebpo_envelope_begin(above, own, &e->at[depth]);
             codes = ebpo_grown_codes(g, at, &count);
-            ebpo_envelope_cut(&e->at[depth], codes, count);
+            ebpo_planes_cut(&e->at[depth], codes, count);
             e->octcode[depth] = own;
         }
         above = &e->at[depth];
     }
     ebpo_envelope_begin(above, octcode, &e->own);
     codes = ebpo_grown_codes(g, node, &count);
-    ebpo_envelope_cut(&e->own, codes, count);
+    ebpo_planes_cut(&e->own, codes, count);
     return &e->own;
 }

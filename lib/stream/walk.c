@@ -64,18 +64,6 @@ bool ebpo_walk_next(ebpo_walk *w, ebpo_walk_node *out)
     }
 }
 
-void ebpo_envelope_cut(ebpo_polytope *envelope, const uint32_t *codes, unsigned count)
-{
-    for (unsigned i = 0; i < count; i++) {
-        int32_t n[3], d;
-        double direction[3];
-        if (!ebpo_plane_decode(codes[i], n, &d))
-            continue;
-        double offset = ebpo_plane_as_double(n, d, direction);
-        (void)ebpo_polytope_clip(envelope, direction, offset, (int32_t)i);
-    }
-}
-
 void ebpo_envelope_begin(const ebpo_polytope *parent, uint64_t octcode, ebpo_polytope *envelope)
 {
     if (parent)
@@ -92,7 +80,7 @@ static const ebpo_polytope *ancestor(const ebpo_walk *w, int depth, ebpo_walk_en
     const ebpo_walk_node *node = &w->at[depth].node;
     if (e->octcode[depth] != node->octcode) {
         ebpo_envelope_begin(ancestor(w, depth - 1, e), node->octcode, &e->at[depth]);
-        ebpo_envelope_cut(&e->at[depth], node->codes, node->code_count);
+        ebpo_planes_cut(&e->at[depth], node->codes, node->code_count);
         e->octcode[depth] = node->octcode;
     }
     return &e->at[depth];
@@ -104,7 +92,7 @@ const ebpo_polytope *ebpo_walk_envelope(const ebpo_walk *w, const ebpo_walk_node
         ebpo_polytope_cube(&e->own);
     } else {
         ebpo_envelope_begin(ancestor(w, w->target - 1, e), node->octcode, &e->own);
-        ebpo_envelope_cut(&e->own, node->codes, node->code_count);
+        ebpo_planes_cut(&e->own, node->codes, node->code_count);
     }
     return &e->own;
 }

@@ -38,9 +38,8 @@ typedef struct ebpo_walk_envelopes {
     ebpo_polytope own;
 } ebpo_walk_envelopes;
 
-/* One step on the way down: the parent's envelope in a child's cell (without a parent: the cube), which is then cut by the child's own planes. */
+/* One step on the way down: the parent's envelope in a child's cell (without a parent: the cube), which is then cut by the child's own planes (ebpo_planes_cut). */
 void ebpo_envelope_begin(const ebpo_polytope *parent, uint64_t octcode, ebpo_polytope *envelope);
-void ebpo_envelope_cut(ebpo_polytope *envelope, const uint32_t *codes, unsigned count);
 
 /* Envelope of the node that ebpo_walk_next gave last, in coordinates of its cell; gray nodes and leaves: from the cube down, cut by the planes of all ancestors and its own. Black
  * nodes: the cube. Lent until the next call with these envelopes. */

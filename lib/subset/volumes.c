@@ -21,7 +21,7 @@ static void cut(ebpo_polytope *envelope, const uint8_t *counts, const uint32_t *
 {
     uint64_t count = counts ? counts[*node] : 0;
     if (count)
-        ebpo_lod_cut(envelope, planes + *plane, count);
+        ebpo_planes_cut(envelope, planes + *plane, count);
     *plane += count;
     ++*node;
 }
