@@ -173,7 +173,8 @@ static void copy_mesh(oracle *o, const ebpo_mesh *mesh)
     o->face_count = (uint32_t)mesh->face_count;
     o->xyz = room(mesh->vertex_count, 3 * sizeof *o->xyz);
     o->faces = room(mesh->face_count, 3 * sizeof *o->faces);
-    memcpy(o->faces, mesh->faces, mesh->face_count * 3 * sizeof *o->faces);
+    if (mesh->face_count) /* there may be no array */
+        memcpy(o->faces, mesh->faces, mesh->face_count * 3 * sizeof *o->faces);
     for (size_t i = 0; i < 3 * mesh->vertex_count; i++)
         o->xyz[i] = mesh->xyz32 ? (double)mesh->xyz32[i] : mesh->xyz64[i];
 }

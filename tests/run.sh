@@ -21,7 +21,7 @@ for suite in "$@"; do
     case $suite in
     gcc) run gcc gcc ;;
     clang) EBPO_TEST_SCALE=0.2 run clang clang ;; # the number of random points is gcc's business
-    sanitize) EBPO_TEST_SCALE=0.25 run sanitize gcc -Db_sanitize=address,undefined -Db_lundef=false --buildtype=debugoptimized ;;
+    sanitize) EBPO_TEST_SCALE=0.2 run sanitize gcc -Db_sanitize=address,undefined -Db_lundef=false --buildtype=debugoptimized -Dc_args=-fno-sanitize-recover=all -Dcpp_args=-fno-sanitize-recover=all ;;
     *) echo "usage: tests/run.sh [gcc] [clang] [sanitize]" >&2; exit 2 ;;
     esac
 done

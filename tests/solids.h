@@ -47,6 +47,11 @@ double ebpo_test_random_unit(uint64_t *state); /* [0, 1) */
 /* Cosine and sine of the turn i / n, 0 <= i, within some ulps and without libm: the same bits wherever arithmetic is IEEE's. */
 void ebpo_test_circle(uint32_t i, uint32_t n, double *cosine, double *sine);
 
+/* EBPO_TEST_SCALE times `count`, at least 1: with other compilers and sanitizers less is repeated. */
+uint64_t ebpo_test_scaled(uint64_t count);
+/* Of a loop's turns: every turn, or with EBPO_TEST_SCALE below 1 so many of them, evenly. */
+bool ebpo_test_wanted(int turn);
+
 /* One solid (or surface) of the table. */
 typedef struct ebpo_test_solid {
     const char *name;

@@ -84,6 +84,8 @@ static double largest_volume(const ebpo_info *info)
 
 START_TEST(level_volumes_equal_those_stored_in_the_file)
 {
+    if (!ebpo_test_wanted(_i))
+        return;
     for (int variant = 0; variant < 2; variant++) {
         ebpo_file *file = build(ebpo_test_solids[_i].make(), variant ? USUAL | EBPO_PART_LEAF_PLANES : USUAL, 4);
         const ebpo_info *info = ebpo_file_info(file);
@@ -117,6 +119,8 @@ END_TEST
 
 START_TEST(envelopes_are_closed_and_fill_the_stated_volume)
 {
+    if (!ebpo_test_wanted(_i))
+        return;
     ebpo_file *file = build(ebpo_test_solids[_i].make(), USUAL, 4);
     const ebpo_info *info = ebpo_file_info(file);
     for (int level = 0; level < info->level_count; level++) {
@@ -139,6 +143,8 @@ END_TEST
 
 START_TEST(deeper_levels_are_never_larger)
 {
+    if (!ebpo_test_wanted(_i))
+        return;
     ebpo_file *file = build(ebpo_test_solids[_i].make(), USUAL, 0);
     double before = INFINITY;
     for (int level = 0; level < ebpo_file_info(file)->level_count; level++) {

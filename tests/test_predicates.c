@@ -8,13 +8,14 @@
 #include "geom/predicates.h"
 #include "geom/predicates_exact.h"
 #include "geom/predicates_expansion.h"
+#include "solids.h"
 
 enum { CASES_2D = 20000, CASES_3D = 15000, CASES_PRODUCTS = 60000 };
 
 START_TEST(orient2d_equals_rational_determinant)
 {
     uint64_t state = (uint64_t)_i + 1;
-    for (int i = 0; i < CASES_2D; i++) {
+    for (int i = 0; i < (int)ebpo_test_scaled(CASES_2D); i++) {
         double p[6];
         twin_points(p, 2, _i, &state);
         int expected = twin_orient2d(p);
@@ -29,7 +30,7 @@ END_TEST
 START_TEST(orient3d_equals_rational_determinant)
 {
     uint64_t state = (uint64_t)_i + 1;
-    for (int i = 0; i < CASES_3D; i++) {
+    for (int i = 0; i < (int)ebpo_test_scaled(CASES_3D); i++) {
         double p[12];
         twin_points(p, 3, _i, &state);
         int expected = twin_orient3d(p);
@@ -58,7 +59,7 @@ END_TEST
 START_TEST(orientation_changes_sign_when_two_points_swap)
 {
     uint64_t state = (uint64_t)_i + 77;
-    for (int i = 0; i < 20000; i++) {
+    for (int i = 0; i < (int)ebpo_test_scaled(20000); i++) {
         double p[12];
         const double *a = p, *b = p + 3, *c = p + 6, *d = p + 9;
         twin_points(p, 3, _i, &state);

@@ -84,6 +84,8 @@ static void ask_loaded(asked *a, const ebpo_model_options *how)
 
 START_TEST(every_way_of_loading_gives_the_same_answers)
 {
+    if (!ebpo_test_wanted(_i + 1))
+        return;
     asked a;
     begin(&a, _i, 300);
     for (int loading = 0; loading < 3; loading++)
@@ -130,6 +132,8 @@ static bool ask_within(asked *a, uint64_t budget, bool *resident)
 
 START_TEST(budgets_are_kept_and_do_not_change_answers)
 {
+    if (!ebpo_test_wanted(_i + 2))
+        return;
     asked a;
     begin(&a, _i, 300);
     bool resident = false, fits = false;
@@ -148,6 +152,8 @@ END_TEST
 
 START_TEST(batches_give_what_single_questions_give)
 {
+    if (!ebpo_test_wanted(_i + 3))
+        return;
     asked a;
     begin(&a, _i, 1000);
     ask_exactly(&a, a.m.context, NULL);
@@ -165,6 +171,8 @@ END_TEST
 
 START_TEST(warm_starts_and_signs_do_not_change_answers)
 {
+    if (!ebpo_test_wanted(_i + 4))
+        return;
     asked a;
     begin(&a, _i, 600);
     for (int form = 0; form < 4; form++) {
@@ -189,6 +197,8 @@ END_TEST
 
 START_TEST(what_is_beyond_max_distance_is_left_out)
 {
+    if (!ebpo_test_wanted(_i + 5))
+        return;
     asked a;
     begin(&a, _i, 500);
     for (uint64_t i = 0; i < a.count; i++) {
@@ -229,6 +239,8 @@ static void ask_limited(asked *a, ebpo_context *context, const ebpo_query_option
 
 START_TEST(answers_limited_to_a_level_are_certain)
 {
+    if (!ebpo_test_wanted(_i + 6))
+        return;
     asked a;
     begin(&a, _i, 600);
     for (int level = 0; level < a.m.info.level_count; level++)
@@ -244,6 +256,8 @@ END_TEST
 
 START_TEST(answers_limited_to_a_level_do_not_depend_on_what_is_in_memory)
 {
+    if (!ebpo_test_wanted(_i + 7))
+        return;
     asked a;
     begin(&a, _i, 300);
     ebpo_distance_result *first = query_room(a.count, sizeof *first);
@@ -274,6 +288,8 @@ END_TEST
 
 START_TEST(answers_limited_by_a_deadline_are_certain)
 {
+    if (!ebpo_test_wanted(_i + 8))
+        return;
     static const uint64_t deadlines[] = { 1, 100, 1000, 10000, 100000, 1000000 };
     asked a;
     begin(&a, _i, 300);
@@ -299,6 +315,8 @@ END_TEST
 
 START_TEST(the_theses_modes_never_claim_too_much)
 {
+    if (!ebpo_test_wanted(_i + 9))
+        return;
     asked a;
     begin(&a, _i, 600);
     for (int mode = EBPO_DISTANCE_RECURSIVE; mode <= EBPO_DISTANCE_ENVELOPE; mode++) {
@@ -323,6 +341,8 @@ END_TEST
 /* What a leaf or a node has is told by the file, not by what lies beside it in memory. */
 START_TEST(the_theses_modes_do_not_depend_on_what_is_in_memory)
 {
+    if (!ebpo_test_wanted(_i + 10))
+        return;
     asked a;
     begin(&a, _i, 300);
     ebpo_distance_result *resident = calloc(a.count, sizeof *resident);
@@ -356,6 +376,8 @@ END_TEST
 
 START_TEST(a_file_without_mesh_answers_by_levels_only)
 {
+    if (!ebpo_test_wanted(_i + 11))
+        return;
     static const query_variant bare = { "planes only", 4, -1, EBPO_RULE_NONZERO, EBPO_PART_PLANES };
     asked a;
     begin(&a, _i, 500);
@@ -441,6 +463,8 @@ static void ask_in_threads(asked *a, const ebpo_model_options *how)
 /* With ThreadSanitizer (meson setup build-tsan -Db_sanitize=thread; CK_RUN_CASE=threads build-tsan/tests/test_query_modes) these two look for races. */
 START_TEST(four_threads_get_the_answers_of_one)
 {
+    if (!ebpo_test_wanted(_i + 12))
+        return;
     asked a;
     begin(&a, _i, 400);
     ask_exactly(&a, a.m.context, NULL);
@@ -460,6 +484,8 @@ END_TEST
 /* The smallest budgets that four contexts fit into, where subtrees come and go all the time. */
 START_TEST(four_threads_share_a_small_budget)
 {
+    if (!ebpo_test_wanted(_i + 13))
+        return;
     asked a;
     begin(&a, _i, 400);
     ask_exactly(&a, a.m.context, NULL);

@@ -291,6 +291,8 @@ static void check_all(const whole *w, uint64_t step)
 
 START_TEST(slices_of_random_trees_are_what_the_whole_file_says)
 {
+    if (!ebpo_test_wanted(_i))
+        return;
     random_tree_options options = { (uint64_t)_i, 2 + _i % 4, 2 + (unsigned)_i % 5, 1 + (unsigned)_i % 9, _i % 3 != 0, _i % 2 != 0,
                                     _i % 3 == 1, _i % 5 == 0 };
     ebpo_tree tree;
@@ -305,6 +307,8 @@ END_TEST
 
 START_TEST(slices_of_solids_are_what_the_whole_file_says)
 {
+    if (!ebpo_test_wanted(_i))
+        return;
     whole w;
     build(ebpo_test_solids[_i].make(), 1, -1, _i % 2 ? USUAL : EBPO_PART_MESH | EBPO_PART_LEAF_PLANES);
     whole_open(&w, path, 0);

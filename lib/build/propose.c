@@ -85,6 +85,8 @@ enum { CANDIDATES_MOST = 4096 };
 static bool make_candidates(proposer *p, ebpo_handover *given)
 {
     uint64_t kept = 0;
+    if (given->offer_count == 0)
+        return true;
     qsort(given->offers, given->offer_count, sizeof *given->offers, by_normal);
     for (uint64_t i = 0; i < given->offer_count; i++)
         if (i == 0 || given->offers[i].normal != given->offers[i - 1].normal)
