@@ -32,8 +32,7 @@ void *query_room(uint64_t count, size_t size)
 
 uint64_t query_scaled(uint64_t count)
 {
-    const char *text = getenv("EBPO_TEST_SCALE");
-    double n = (double)count * (text ? atof(text) : 1) * (SANITIZED ? 0.1 : 1);
+    double n = (double)count * ebpo_test_scale() * (SANITIZED ? 0.1 : 1);
     return n >= 1 ? (uint64_t)n : 1;
 }
 

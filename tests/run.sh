@@ -1,5 +1,5 @@
 #!/bin/sh
-# All tests: installs what they need, builds with gcc, clang and sanitizers (warnings are errors) and runs every suite.
+# All tests: installs what they need, builds with gcc, clang and sanitizers (warnings are errors) and runs every suite with gcc; with clang and sanitizers less of it, as said below.
 # Usage: tests/run.sh [gcc] [clang] [sanitize]; all three by default. Needs no model files; with ../shared/models or $EBPO_MODELS the real ones are tested too.
 set -eu
 cd "$(dirname "$0")/.."

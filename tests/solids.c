@@ -59,22 +59,21 @@ uint64_t ebpo_test_random(uint64_t *state)
     return z ^ z >> 31;
 }
 
-static double scale(void)
+double ebpo_test_scale(void)
 {
     const char *text = getenv("EBPO_TEST_SCALE");
-    double s = text ? atof(text) : 1;
-    return s > 0 ? s : 1;
+    return text ? atof(text) : 1;
 }
 
 uint64_t ebpo_test_scaled(uint64_t count)
 {
-    double n = (double)count * scale();
+    double n = (double)count * ebpo_test_scale();
     return n >= 1 ? (uint64_t)n : 1;
 }
 
 bool ebpo_test_wanted(int turn)
 {
-    double s = scale();
+    double s = ebpo_test_scale();
     return s >= 1 || turn == 0 || (long)(turn * s) != (long)((turn - 1) * s);
 }
 

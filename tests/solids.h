@@ -47,7 +47,9 @@ double ebpo_test_random_unit(uint64_t *state); /* [0, 1) */
 /* Cosine and sine of the turn i / n, 0 <= i, within some ulps and without libm: the same bits wherever arithmetic is IEEE's. */
 void ebpo_test_circle(uint32_t i, uint32_t n, double *cosine, double *sine);
 
-/* EBPO_TEST_SCALE times `count`, at least 1: with other compilers and sanitizers less is repeated. */
+/* EBPO_TEST_SCALE, 1 where it is not set: with other compilers and sanitizers less is repeated. */
+double ebpo_test_scale(void);
+/* So many times `count`, at least 1. */
 uint64_t ebpo_test_scaled(uint64_t count);
 /* Of a loop's turns: every turn, or with EBPO_TEST_SCALE below 1 so many of them, evenly. */
 bool ebpo_test_wanted(int turn);

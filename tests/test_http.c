@@ -16,6 +16,7 @@
 
 #include "http/answer.h"
 #include "http/http.h"
+#include "solids.h"
 #include "web.h"
 
 enum { DATA_BYTES = 3000017, HEAD_BYTES = 131072 };
@@ -358,9 +359,7 @@ END_TEST
 
 static int schedules(void)
 {
-    const char *text = getenv("EBPO_TEST_SCALE");
-    double scale = text ? atof(text) : 1;
-    int count = (int)(12 * scale);
+    int count = (int)(12 * ebpo_test_scale());
     return count < 2 ? 2 : count;
 }
 

@@ -82,6 +82,8 @@ static void ask_loaded(asked *a, const ebpo_model_options *how)
     ebpo_model_close(model);
 }
 
+/* With EBPO_TEST_SCALE below 1 each test takes other cases than the one before it, so that all have their turn. */
+
 START_TEST(every_way_of_loading_gives_the_same_answers)
 {
     if (!ebpo_test_wanted(_i + 1))

@@ -302,8 +302,7 @@ static ebpo_file *open_file(void)
 /* With EBPO_TEST_SCALE below 1 every fourth solid does: other compilers and sanitizers look for other things. */
 static bool left_out(int solid)
 {
-    const char *text = getenv("EBPO_TEST_SCALE");
-    return text && atof(text) < 1 && solid % 4;
+    return ebpo_test_scale() < 1 && solid % 4;
 }
 
 static const ebpo_selection all[] = { EBPO_SELECT_INHERIT, EBPO_SELECT_KMEDOIDS, EBPO_SELECT_OFFSET, EBPO_SELECT_RANDOM };
