@@ -128,6 +128,7 @@ def check_pruned(file, subset):
 def read(path):
     with h5py.File(path, "r") as file:
         assert text(file.attrs["format"]) == "EBP-Octree in HDF5" and file.attrs["format_version_major"] == 1
+        assert text(file.attrs.get("format_version", "")) != "1.0-draft"
         required = text(file.attrs["required_parts"]).split()
         unknown = set(required) - {"levels", "mesh", "planes", "maps", "leaf-planes", "pruned"}
         assert not unknown, f"needs {unknown}"

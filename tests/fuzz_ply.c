@@ -30,7 +30,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     ebpo_mesh mesh;
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_status status = ebpo_ply_parse_memory(&mesh, data, size, "fuzz.ply", NULL, &error);
+    ebpo_status status = ebpo_ply_parse_memory(&mesh, data, size, "fuzz.ply", NULL, 0, NULL, &error);
     if (status != EBPO_OK && (error.status != status || !error.message[0] || mesh.faces || mesh.xyz32 || mesh.xyz64))
         abort();
     if (status == EBPO_OK && (!mesh.face_count || !mesh.xyz32 == !mesh.xyz64))

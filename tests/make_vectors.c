@@ -252,6 +252,7 @@ static haddr_t chunk_address(const char *path, hsize_t *size)
 
 static void v_format(void) { set_text("/", "format", "EBP-Octree in HDF6"); }
 static void v_format_missing(void) { drop_attribute("/", "format"); }
+static void v_draft(void) { set_text("/", "format_version", "1.0-draft"); }
 static void v_major(void) { set_int("/", "format_version_major", 2); }
 static void v_required(void) { set_text("/", "required_parts", "levels mesh animation"); }
 static void v_no_levels_part(void) { set_text("/", "required_parts", "mesh"); }
@@ -348,6 +349,7 @@ static const failed_vector failed[] = {
     { "format_wrong", LEAVES, v_format, NONE },
     { "format_missing", LEAVES, v_format_missing, NONE },
     { "version_major_2", LEAVES, v_major, NONE },
+    { "version_draft", LEAVES, v_draft, NONE },
     { "required_part_unknown", LEAVES, v_required, NONE },
     { "required_part_levels_missing", LEAVES, v_no_levels_part, NONE },
     { "part_listed_twice", LEAVES, v_part_twice, NONE },

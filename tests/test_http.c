@@ -693,6 +693,31 @@ START_TEST(heads_are_judged_by_the_letter)
 }
 END_TEST
 
+START_TEST(ranges_beyond_4_gib_are_judged_by_all_their_digits)
+{
+    ebpo_http_version pinned = { UINT64_C(900000000000), "\"a\"", "" };
+    char why[EBPO_WHY_BYTES];
+    static const struct { const char *line; uint64_t last; ebpo_verdict verdict; } answers[] = {
+        { "Content-Range: bytes 8589934592-8589934691/900000000000", UINT64_C(8589934691), EBPO_ANSWER_PART },
+        { "Content-Range: bytes 4294967296-4294967395/900000000000", 0, EBPO_ANSWER_REFUSED }, /* 2^32 less */
+        { "Content-Range: bytes 8589934592-12884901887/900000000000", 0, EBPO_ANSWER_REFUSED }, /* 2^32 more than was asked for */
+        { "Content-Range: bytes 8589934592-8589934691/2349901312", 0, EBPO_ANSWER_REFUSED },
+        { "Content-Range: bytes 8589934592-8589934691/18446744073709551616", 0, EBPO_ANSWER_REFUSED },
+    };
+    for (size_t i = 0; i < sizeof answers / sizeof *answers; i++) {
+        ebpo_answer answer = { .code = 0 };
+        ebpo_asked asked = { UINT64_C(8589934592), UINT64_C(8589934692), &pinned, 1000 };
+        ebpo_status status;
+        const char *const lines[] = { "HTTP/1.1 206 Partial", "ETag: \"a\"", answers[i].line };
+        for (int k = 0; k < 3; k++)
+            ebpo_answer_line(&answer, lines[k], strlen(lines[k]));
+        ck_assert_msg(ebpo_answer_judge(&answer, &asked, &status, why) == answers[i].verdict, "%s", answers[i].line);
+        if (answers[i].verdict == EBPO_ANSWER_PART)
+            ck_assert_uint_eq(answer.last, answers[i].last);
+    }
+}
+END_TEST
+
 START_TEST(long_tags_are_told_apart_to_their_end)
 {
     char line[2000], other[2000], why[EBPO_WHY_BYTES];
@@ -752,6 +777,7 @@ int main(int argc, char **argv)
     tcase_add_test(tests, options_out_of_range_are_refused);
     tcase_add_test(tests, a_server_that_is_not_there_is_an_error);
     tcase_add_test(tests, heads_are_judged_by_the_letter);
+    tcase_add_test(tests, ranges_beyond_4_gib_are_judged_by_all_their_digits);
     tcase_add_test(tests, long_tags_are_told_apart_to_their_end);
     tcase_add_test(folder, the_next_session_reads_from_the_folder_and_checks_it);
     tcase_add_test(folder, the_folder_serves_other_ranges_than_those_it_was_filled_with);

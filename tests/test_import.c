@@ -8,6 +8,7 @@
 #include <ebpo/mesh.h>
 
 #include "base/endian.h"
+#include "base/workspace.h"
 #include "ebpo_config.h"
 #include "import/import.h"
 #include "import/weld.h"
@@ -19,7 +20,7 @@ static ebpo_status import(ebpo_mesh *mesh, const char *name, const void *data, s
     memcpy(exact, data, size);
     ebpo_status status = EBPO_E_ARGUMENT;
     if (ebpo_import_recognise(&format, exact, size, name))
-        status = ebpo_import_memory(mesh, format, exact, size, name, error);
+        status = ebpo_import_memory(mesh, format, exact, size, name, NULL, error);
     free(exact);
     return status;
 }
@@ -150,6 +151,23 @@ START_TEST(off_faces_that_assimp_would_leave_out_are_refused)
 }
 END_TEST
 
+START_TEST(what_assimp_would_take_too_much_memory_for_is_refused)
+{
+    ebpo_mesh mesh;
+    ebpo_workspace *w;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert(ebpo_workspace_make_any(&w, 1 << 20, NULL, &error) == EBPO_OK);
+    static char text[300000] = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    memset(text + strlen(text), '\n', sizeof text - strlen(text));
+    ck_assert_int_eq(ebpo_import_memory(&mesh, EBPO_IMPORT_OBJ, (const uint8_t *)text, sizeof text, "a.obj", w, &error), EBPO_E_LIMIT);
+    ck_assert_msg(strstr(error.message, "a.obj: reading it takes some 3 MiB") && strstr(error.message, "1 MiB are allowed"), "%s", error.message);
+    ck_assert_msg(ebpo_import_memory(&mesh, EBPO_IMPORT_OBJ, (const uint8_t *)text, 100000, "a.obj", w, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_uint_eq(mesh.face_count, 1);
+    ebpo_mesh_free(&mesh);
+    ebpo_workspace_free(w);
+}
+END_TEST
+
 START_TEST(damaged_files_are_refused_by_name)
 {
     ebpo_mesh mesh;
@@ -202,6 +220,7 @@ int main(void)
     tcase_add_test(tests, stl_of_both_kinds_is_welded);
     tcase_add_test(tests, polygons_of_obj_are_cut_by_ears);
     tcase_add_test(tests, off_faces_that_assimp_would_leave_out_are_refused);
+    tcase_add_test(tests, what_assimp_would_take_too_much_memory_for_is_refused);
     tcase_add_loop_test(tests, damaged_files_are_refused_by_name, 0, (int)(sizeof bad / sizeof *bad));
     tcase_add_test(tests, bunny_of_glmark2_is_closed_when_it_is_there);
 #else

@@ -179,7 +179,7 @@ static int plain_greedy(ebpo_polytope *envelope, const ebpo_candidate *c, int co
                 continue;
             uint32_t code = ebpo_plane_code_make(c[i].normal, q);
             ebpo_plane_code_decode(code, v, &d);
-            double offset = ebpo_plane_as_double(v, d, n), gain = ebpo_polytope_removed(envelope, n, offset);
+            double offset = ebpo_plane_as_double(v, d, n), gain = ebpo_polytope_removed(envelope, n, offset, 0, 0);
             if (gain > best || (gain == best && code < best_code)) {
                 best = gain;
                 best_code = code;

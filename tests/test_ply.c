@@ -11,6 +11,7 @@
 
 #include "base/sha256.h"
 #include "ply/ply.h"
+#include "solids.h"
 
 /* --- files made here --- */
 
@@ -140,7 +141,7 @@ static ebpo_status parse(ebpo_mesh *mesh, const bytes *b, ebpo_error *error)
     /* A block of just this size, so that the sanitizer sees a read behind its end. */
     uint8_t *copy = malloc(b->size ? b->size : 1);
     memcpy(copy, b->data, b->size);
-    ebpo_status status = ebpo_ply_parse_memory(mesh, copy, b->size, "folder/made.ply", NULL, error);
+    ebpo_status status = ebpo_ply_parse_memory(mesh, copy, b->size, "folder/made.ply", NULL, 0, NULL, error);
     free(copy);
     return status;
 }
@@ -373,7 +374,7 @@ START_TEST(a_header_longer_than_a_megabyte_is_refused)
     memcpy(data, "ply\nformat ascii 1.0\n", 21);
     ebpo_mesh mesh;
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert(ebpo_ply_parse_memory(&mesh, data, size, "x", NULL, &error) == EBPO_E_FORMAT);
+    ck_assert(ebpo_ply_parse_memory(&mesh, data, size, "x", NULL, 0, NULL, &error) == EBPO_E_FORMAT);
     ck_assert(strstr(error.message, "a megabyte of header") != NULL);
     free(data);
 }
@@ -472,8 +473,100 @@ START_TEST(reader_stops_on_request)
     ebpo_mesh mesh;
     const ebpo_progress progress = { refuse, NULL };
     make_cube(&b, BIG, true, 4, "\n");
-    ck_assert(ebpo_ply_parse_memory(&mesh, b.data, b.size, "x", &progress, NULL) == EBPO_E_CANCELLED);
+    ck_assert(ebpo_ply_parse_memory(&mesh, b.data, b.size, "x", NULL, 0, &progress, NULL) == EBPO_E_CANCELLED);
     ck_assert(!mesh.faces);
+}
+END_TEST
+
+/* --- rows on all cores --- */
+
+/* What one row of many does otherwise. */
+enum deviation { TRIANGLES, QUAD, TWO_CORNERS, NO_CORNERS, BAD_INDEX, NEGATIVE_INDEX, LONG_LIST, CUT, FEW_VERTICES, DEVIATIONS };
+
+enum { MANY_VERTICES = 40000, MANY_FACES = 90000 };
+
+/* Without Check's bookkeeping for every value, of which there are a million. */
+static uint8_t *put_raw(uint8_t *to, enum encoding e, uint64_t raw, int width)
+{
+    for (int i = 0; i < width; i++)
+        *to++ = (uint8_t)(raw >> 8 * (e == LITTLE ? i : width - 1 - i));
+    return to;
+}
+
+/* `second_list`: faces have another list, empty, which makes the reader go row by row. */
+static uint8_t *make_many(size_t *size, enum encoding e, enum deviation what, uint64_t at, bool second_list)
+{
+    static bytes b;
+    uint8_t *file = malloc(MANY_VERTICES * 13 + MANY_FACES * 40);
+    uint64_t state = 3;
+    b.size = 0;
+    text(&b, "ply\nformat %s 1.0\nelement vertex %d\nproperty float x\nproperty uchar shade\nproperty float y\nproperty float z\nelement face %d\nproperty ushort tag\n"
+         "property list uchar int vertex_indices\n%s", encoding_names[e], what == FEW_VERTICES ? 0 : MANY_VERTICES, MANY_FACES, second_list ? "property list uchar float more\n" : "");
+    text(&b, "property uchar last\nend_header\n");
+    memcpy(file, b.data, b.size);
+    *size = b.size;
+    uint8_t *to = file + *size;
+    for (uint64_t v = 0; v < MANY_VERTICES && what != FEW_VERTICES; v++) {
+        to = put_raw(to, e, ebpo_test_random(&state) & 0xffffffff, 4); /* any bits */
+        to = put_raw(to, e, v & 255, 1);
+        to = put_raw(to, e, ebpo_test_random(&state) & 0xffffffff, 4);
+        to = put_raw(to, e, ebpo_test_random(&state) & 0xffffffff, 4);
+    }
+    for (uint64_t f = 0; f < MANY_FACES; f++) {
+        int count = f != at ? 3 : what == QUAD ? 4 : what == TWO_CORNERS ? 2 : what == NO_CORNERS ? 0 : 3;
+        uint8_t *row = to;
+        to = put_raw(to, e, f & 65535, 2);
+        to = put_raw(to, e, f == at && what == LONG_LIST ? 255 : (uint64_t)count, 1);
+        for (int k = 0; k < count; k++)
+            to = put_raw(to, e, f == at && k == 1 && what == BAD_INDEX ? MANY_VERTICES : f == at && k == 1 && what == NEGATIVE_INDEX ? UINT32_MAX : ebpo_test_random(&state) % MANY_VERTICES, 4);
+        if (second_list)
+            to = put_raw(to, e, 0, 1);
+        to = put_raw(to, e, 9, 1);
+        if (f == at && what == CUT) {
+            to = row + (to - row) / 2;
+            break;
+        }
+    }
+    *size = (size_t)(to - file);
+    return file;
+}
+
+/* What a message says before it names a byte, and what it says after. */
+static void expect_message(const ebpo_error *error, const ebpo_error *twin)
+{
+    const char *a = strstr(error->message, ": "), *b = strstr(twin->message, ": ");
+    ck_assert(a && b && (a = strstr(a + 2, ": ")) && (b = strstr(b + 2, ": ")));
+    if (!strstr(a, "bytes")) /* the files differ in size */
+        ck_assert_str_eq(a, b);
+}
+
+START_TEST(rows_on_all_cores_read_as_row_by_row)
+{
+    static const uint64_t places[] = { 0, 16383, 16384, 50000, MANY_FACES - 1 };
+    enum deviation what = (enum deviation)(_i / 5);
+    for (enum encoding e = LITTLE; e <= BIG; e = (enum encoding)(e + 1)) {
+        size_t size, twin_size;
+        uint8_t *file = make_many(&size, e, what, places[_i % 5], false), *twin_file = make_many(&twin_size, e, what, places[_i % 5], true);
+        ebpo_mesh m, twin;
+        ebpo_error error = EBPO_ERROR_INIT, twin_error = EBPO_ERROR_INIT;
+        ebpo_status status = ebpo_ply_parse_memory(&m, file, size, "x", NULL, 3, NULL, &error), wanted = ebpo_ply_parse_memory(&twin, twin_file, twin_size, "x", NULL, 1, NULL, &twin_error);
+        ck_assert_int_eq(status, wanted);
+        ck_assert_uint_eq(m.vertex_count, twin.vertex_count);
+        ck_assert_uint_eq(m.face_count, twin.face_count);
+        if (status == EBPO_OK) {
+            ck_assert(m.polygons_dropped == twin.polygons_dropped && m.polygons_triangulated == twin.polygons_triangulated);
+            ck_assert(memcmp(m.xyz32, twin.xyz32, (size_t)m.vertex_count * 12) == 0);
+            ck_assert(memcmp(m.faces, twin.faces, (size_t)m.face_count * 12) == 0);
+        } else {
+            ck_assert(what >= BAD_INDEX);
+            if (what != LONG_LIST) /* whose items are whatever stands behind */
+                expect_message(&error, &twin_error);
+        }
+        ebpo_mesh_free(&m);
+        ebpo_mesh_free(&twin);
+        free(file);
+        free(twin_file);
+    }
 }
 END_TEST
 
@@ -649,6 +742,7 @@ int main(void)
     tcase_add_loop_test(tests, what_is_written_reads_back_with_the_same_bits, 0, 2);
     tcase_add_test(tests, writer_refuses_a_mesh_that_contradicts_itself);
     tcase_add_test(tests, read_file_records_its_digest);
+    tcase_add_loop_test(tests, rows_on_all_cores_read_as_row_by_row, 0, 5 * DEVIATIONS);
     tcase_add_test(tests, reading_what_is_no_model_file_says_so);
     tcase_add_loop_test(tests, wild_files_are_read_whole, 0, (int)(sizeof wild / sizeof *wild));
     tcase_add_test(tests, truncated_point_cloud_is_refused_with_its_place);

@@ -59,7 +59,7 @@ START_TEST(removed_volume_is_what_clipping_removes)
             random_direction(&seed, n);
             /* Near the middle first, then closer to the faces, so that something is left. */
             double d = 0.5 * (n[0] + n[1] + n[2]) + 0.2 + 0.5 * ebpo_test_random_unit(&seed);
-            double removed = ebpo_polytope_removed(&p, n, d);
+            double removed = ebpo_polytope_removed(&p, n, d, 0, 0);
             ebpo_clip result = ebpo_polytope_clip(&p, n, d, cut);
             double after = ebpo_polytope_volume(&p);
             if (result == EBPO_CLIP_CUT)

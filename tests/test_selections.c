@@ -11,6 +11,7 @@
 #include <ebpo/lod.h>
 #include <ebpo/verify.h>
 
+#include "base/workspace.h"
 #include "geom/plane_code.h"
 #include "planes/hull.h"
 #include "planes/planes.h"
@@ -212,7 +213,7 @@ START_TEST(hull_has_the_facets_that_trying_all_triples_finds)
             for (int b = a + 1; b < count; b++)
                 for (int c = b + 1; c < count; c++)
                     expected += is_facet((const double (*)[3])p, count, a, b, c) || is_facet((const double (*)[3])p, count, a, c, b);
-        int found = ebpo_hull_facets((const double (*)[3])p, count, facets, EBPO_HULL_FACETS);
+        int found = ebpo_hull_facets((const double (*)[3])p, count, 1e-9, facets, EBPO_HULL_FACETS);
         ck_assert_int_eq(found, expected);
         for (int i = 0; i < found; i++)
             ck_assert(is_facet((const double (*)[3])p, count, facets[i].corner[0], facets[i].corner[1], facets[i].corner[2]));
@@ -232,7 +233,7 @@ START_TEST(hull_of_nearly_flat_points_stays_within_its_room)
             double a = 0.1 * (double)(ebpo_test_random(&seed) % 63);
             p[i][0] = round % 3 ? cos(a) : ebpo_test_random_unit(&seed), p[i][1] = round % 3 ? sin(a) : ebpo_test_random_unit(&seed), p[i][2] = thin * ebpo_test_random_unit(&seed);
         }
-        ck_assert_int_le(ebpo_hull_facets((const double (*)[3])p, 40, facets, room), room);
+        ck_assert_int_le(ebpo_hull_facets((const double (*)[3])p, 40, 1e-9, facets, room), room);
         for (size_t i = 0; i < sizeof *facets; i++)
             ck_assert_int_eq(((const unsigned char *)&facets[room])[i], 0x5a);
     }
@@ -243,14 +244,14 @@ START_TEST(hull_of_flat_or_repeated_points_is_nothing_and_of_a_grid_its_box)
 {
     static ebpo_hull_facet facets[EBPO_HULL_FACETS];
     static double p[EBPO_HULL_POINTS][3];
-    ck_assert_int_eq(ebpo_hull_facets((const double (*)[3])p, 3, facets, EBPO_HULL_FACETS), 0);
-    ck_assert_int_eq(ebpo_hull_facets((const double (*)[3])p, 100, facets, EBPO_HULL_FACETS), 0); /* all at one point */
+    ck_assert_int_eq(ebpo_hull_facets((const double (*)[3])p, 3, 1e-9, facets, EBPO_HULL_FACETS), 0);
+    ck_assert_int_eq(ebpo_hull_facets((const double (*)[3])p, 100, 1e-9, facets, EBPO_HULL_FACETS), 0); /* all at one point */
     for (int i = 0; i < 100; i++)
         p[i][0] = i % 10, p[i][1] = i / 10;
-    ck_assert_int_eq(ebpo_hull_facets((const double (*)[3])p, 100, facets, EBPO_HULL_FACETS), 0); /* in a plane */
+    ck_assert_int_eq(ebpo_hull_facets((const double (*)[3])p, 100, 1e-9, facets, EBPO_HULL_FACETS), 0); /* in a plane */
     for (int i = 0; i < 512; i++)
         p[i][0] = i % 8, p[i][1] = i / 8 % 8, p[i][2] = i / 64;
-    int count = ebpo_hull_facets((const double (*)[3])p, 512, facets, EBPO_HULL_FACETS);
+    int count = ebpo_hull_facets((const double (*)[3])p, 512, 1e-9, facets, EBPO_HULL_FACETS);
     double area = 0;
     for (int i = 0; i < count; i++) {
         area += facets[i].area;
@@ -337,14 +338,16 @@ START_TEST(every_selection_makes_files_without_violations)
 }
 END_TEST
 
-static void digest_of(ebpo_selection select, uint64_t seed, unsigned threads, uint8_t digest[32])
+static void digest_of(ebpo_selection select, uint64_t seed, unsigned threads, ebpo_workspace *workspace, uint8_t digest[32])
 {
     ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
     options.select = select;
     options.seed = seed;
     options.threads = threads;
     options.parts |= EBPO_PART_LEAF_PLANES;
-    write_file(ebpo_test_torus(2, 0.7, 160, 80), &options); /* more than one subtree */
+    ebpo_mesh mesh = ebpo_test_torus(2, 0.7, 160, 80); /* more than one subtree */
+    mesh.workspace = workspace;
+    write_file(mesh, &options);
     ebpo_file *file = open_file();
     memcpy(digest, ebpo_file_info(file)->content_sha256, 32);
     ebpo_close(file);
@@ -354,11 +357,29 @@ START_TEST(equal_seeds_give_equal_files_for_any_number_of_threads)
 {
     for (int s = 0; s < 4; s++) {
         uint8_t a[32], b[32], c[32];
-        digest_of(all[s], 5, 1, a);
-        digest_of(all[s], 5, 3, b);
-        digest_of(all[s], 6, 2, c);
+        digest_of(all[s], 5, 1, NULL, a);
+        digest_of(all[s], 5, 3, NULL, b);
+        digest_of(all[s], 6, 2, NULL, c);
         ck_assert_mem_eq(a, b, 32);
         ck_assert(!memcmp(a, c, 32) == !ebpo_selection_of(all[s])->has_seed);
+    }
+}
+END_TEST
+
+START_TEST(memory_does_not_change_what_is_selected)
+{
+    for (int s = 0; s < 4; s++) {
+        uint8_t a[32], b[32];
+        ebpo_workspace *w;
+        ebpo_error error = EBPO_ERROR_INIT;
+        ebpo_workspace_figures f;
+        ck_assert_msg(ebpo_workspace_make_any(&w, 1 << 20, NULL, &error) == EBPO_OK, "%s", error.message);
+        digest_of(all[s], 5, 1, NULL, a);
+        digest_of(all[s], 5, 2, w, b);
+        ck_assert_mem_eq(a, b, 32);
+        ebpo_workspace_tell(w, &f);
+        ck_assert(f.filed_total > 0 && f.filed == 0);
+        ebpo_workspace_free(w);
     }
 }
 END_TEST
@@ -471,6 +492,7 @@ int main(void)
     tcase_add_checked_fixture(files, enter, leave);
     tcase_add_loop_test(files, every_selection_makes_files_without_violations, 0, ebpo_test_solid_count);
     tcase_add_test(files, equal_seeds_give_equal_files_for_any_number_of_threads);
+    tcase_add_test(files, memory_does_not_change_what_is_selected);
     tcase_add_test(files, hulls_of_a_convex_solid_fill_it_at_every_level);
     tcase_add_loop_test(files, no_envelope_is_smaller_than_the_limit_and_inherited_ones_come_close, 0, ebpo_test_solid_count);
     suite_add_tcase(suite, files);

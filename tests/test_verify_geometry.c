@@ -3,11 +3,13 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/workspace.h"
 #include "geom/plane_code.h"
 #include "geom/predicates.h"
 #include "solids.h"
 #include "verify/containment.h"
 #include "verify/exact.h"
+#include "verify/rays.h"
 #include "verify/winding.h"
 
 enum { ROUNDS = 6000 };
@@ -130,8 +132,7 @@ static void check_rays(const char *name)
     ebpo_mesh mesh = ebpo_test_make(name);
     ebpo_box around = {{-16, -16, -16}, {32, 32, 32}, 20};
     uint64_t state = 3;
-    ebpo_columns columns;
-    ck_assert(ebpo_columns_make(&columns, &mesh, &around, NULL) == EBPO_OK);
+    ebpo_ray_points points = {0};
     for (int i = 0; i < 100; i++) {
         double p[3];
         uint64_t v = ebpo_test_random(&state) % mesh.vertex_count, w = ebpo_test_random(&state) % mesh.vertex_count;
@@ -152,9 +153,13 @@ static void check_rays(const char *name)
         }
         ck_assert_int_eq(sums[0], sums[1]);
         ck_assert_int_eq(sums[0], sums[2]);
-        ck_assert_int_eq(sums[0], ebpo_columns_winding(&columns, p));
+        ck_assert(ebpo_rays_add(&points, &(ebpo_ray_point){{p[0], p[1], p[2]}, 1, sums[0], 99}));
     }
-    ebpo_columns_free(&columns);
+    ck_assert(ebpo_rays_follow(&points, &mesh, &around, 2, NULL, NULL) == EBPO_OK);
+    ck_assert_uint_eq(points.count, 100);
+    for (uint64_t i = 0; i < points.count; i++)
+        ck_assert_int_eq(points.point[i].found, points.point[i].told);
+    ebpo_array_free(points.point);
     ebpo_mesh_free(&mesh);
 }
 

@@ -3,6 +3,7 @@
 #include <stdio.h>
 
 #include "command.h"
+#include "memory.h"
 #include "prepare.h"
 #include "progress.h"
 #include "report.h"
@@ -11,6 +12,7 @@ typedef struct values {
     mending mend;
     bool require_solid, json, quiet;
     int64_t threads;
+    memory_values memory;
 } values;
 
 static const arg_option options[] = {
@@ -19,6 +21,7 @@ static const arg_option options[] = {
     ARG_SWITCH("fill-holes", 0, values, mend.fill_holes, "then close simple boundary loops"),
     ARG_SWITCH("require-solid", 0, values, require_solid, "end with code 3 if the mesh is not a solid"),
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
+    MEMORY_OPTIONS(values, memory),
     ARG_SWITCH("json", 0, values, json, "print the report as JSON"),
     ARG_SWITCH("quiet", 'q', values, quiet, "no report, no progress: errors and warnings only"),
     { 0 },
@@ -65,14 +68,22 @@ static int run(int argc, char **argv)
     arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
     if (parsed != ARGS_RUN)
         return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
-    progress_line line;
-    ebpo_progress progress = progress_start(&line, "check", v.quiet);
+    if (!memory_good("check", &v.memory))
+        return EXIT_USAGE;
     ebpo_error error = EBPO_ERROR_INIT;
-    prepared p;
-    ebpo_status status = prepare_mesh(&p, operand[0], v.mend, (unsigned)v.threads, progress, &error);
-    progress_wipe(&line);
+    ebpo_workspace *workspace = NULL;
+    ebpo_status status = memory_make(&workspace, &v.memory, &error);
     if (status != EBPO_OK)
         return command_failed("check", &error);
+    progress_line line;
+    ebpo_progress progress = progress_start(&line, "check", v.quiet);
+    prepared p;
+    status = prepare_mesh(&p, operand[0], v.mend, workspace, (unsigned)v.threads, progress, &error);
+    progress_wipe(&line);
+    if (status != EBPO_OK) {
+        ebpo_workspace_free(workspace);
+        return command_failed("check", &error);
+    }
     if (v.json)
         print_json(&p, operand[0]);
     else if (!v.quiet)
@@ -80,6 +91,7 @@ static int run(int argc, char **argv)
     command_flush("check");
     report_warn(stderr, "check", operand[0], &p.report, &p.record);
     ebpo_mesh_free(&p.mesh);
+    ebpo_workspace_free(workspace);
     return v.require_solid && !p.report.balanced ? EXIT_NOT_SOLID : EXIT_FINE;
 }
 

@@ -3,13 +3,16 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #include "command.h"
 #include "facts.h"
+#include "memory.h"
 #include "prepare.h"
 #include "progress.h"
 #include "report.h"
 #include "selection.h"
+#include "stages.h"
 #include "subset_run.h"
 #include "words.h"
 
@@ -19,6 +22,7 @@ typedef struct values {
     int select, normals;
     int64_t seed;
     const char *k_root, *target_size;
+    memory_values memory;
     uint32_t with, without;
     int codec, rule, profile;
     mending mend;
@@ -56,6 +60,7 @@ static const arg_option options[] = {
     { "codec", 0, ARG_WORD, offsetof(values, codec), "NAME", "zstd (the default), deflate or none", 0, 0, codec_words },
     { "zstd-level", 0, ARG_INT, offsetof(values, zstd_level), "N", "effort of zstd, 1 to 22; default 3", 1, 22, NULL },
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
+    MEMORY_OPTIONS(values, memory),
     ARG_SWITCH("weld", 0, values, mend.weld, "first merge vertices at one position (STL: always)"),
     ARG_SWITCH("orient", 0, values, mend.orient, "then make neighbouring faces agree in orientation"),
     ARG_SWITCH("fill-holes", 0, values, mend.fill_holes, "then close simple boundary loops"),
@@ -95,6 +100,8 @@ static int check_values(const values *v, const char *in, const char *out)
     int code = selection_check("convert", &chosen);
     if (code != EXIT_FINE)
         return code;
+    if (!memory_good("convert", &v->memory))
+        return EXIT_USAGE;
     if (v->zstd_level && v->codec != EBPO_CODEC_ZSTD)
         return usage_error("--zstd-level says nothing about --codec deflate or none");
     if (v->profile >= 0 && (v->with || v->without))
@@ -149,7 +156,7 @@ static void print_summary(const values *v, const ebpo_info *info, const char *ou
     printf(", in %.1f s\n", seconds);
 }
 
-static void print_json(const prepared *p, const ebpo_info *info, const char *out, double seconds)
+static void print_json(const prepared *p, const ebpo_info *info, const char *out, const progress_line *line, const stage_facts *stages, double seconds)
 {
     json j;
     json_begin(&j, stdout);
@@ -160,11 +167,12 @@ static void print_json(const prepared *p, const ebpo_info *info, const char *out
     report_json(&j, "report", &p->before);
     json_end(&j);
     json_real(&j, "seconds", seconds);
+    stages_json(&j, line, stages);
     json_finish(&j);
 }
 
 /* What is on the disk, as a reader sees it. */
-static ebpo_status print_result(const values *v, const prepared *p, const char *out, double seconds, ebpo_error *error)
+static ebpo_status print_result(const values *v, const prepared *p, const char *out, const progress_line *line, const stage_facts *stages, double seconds, ebpo_error *error)
 {
     if (v->quiet && !v->json)
         return EBPO_OK;
@@ -173,9 +181,11 @@ static ebpo_status print_result(const values *v, const prepared *p, const char *
     if (status != EBPO_OK)
         return status;
     if (v->json)
-        print_json(p, ebpo_file_info(file), out, seconds);
-    else
+        print_json(p, ebpo_file_info(file), out, line, stages, seconds);
+    else {
         print_summary(v, ebpo_file_info(file), out, seconds);
+        stages_print(stdout, line, stages, seconds);
+    }
     ebpo_close(file);
     return EBPO_OK;
 }
@@ -184,7 +194,7 @@ static ebpo_status print_result(const values *v, const prepared *p, const char *
 
 /* `need`: the error or size that was asked for. */
 static ebpo_status build_and_write(const values *v, prepared *p, const char *out, const ebpo_subset_options *need,
-                                   ebpo_progress progress, ebpo_error *error)
+                                   ebpo_progress progress, ebpo_build_times *times, ebpo_error *error)
 {
     ebpo_build_options build = EBPO_BUILD_OPTIONS_INIT;
     build.max_level = (int)v->max_level;
@@ -202,6 +212,7 @@ static ebpo_status build_and_write(const values *v, prepared *p, const char *out
     build.crs = v->crs;
     build.date = v->date;
     build.progress = progress;
+    build.times = times;
     ebpo_tree tree;
     ebpo_status status = selection_k_root(v->k_root, p->mesh.face_count, &build.k_root, error);
     if (status != EBPO_OK) {
@@ -231,6 +242,14 @@ static ebpo_status build_and_write(const values *v, prepared *p, const char *out
     return status;
 }
 
+/* What is known before the mesh is read; the rest afterwards. */
+static stage_facts plan_stages(const values *v, const char *in)
+{
+    const char *dot = strrchr(in, '.');
+    return (stage_facts){ .mended = v->mend.weld || v->mend.orient || v->mend.fill_holes || (dot && strcasecmp(dot, ".stl") == 0), .solid = true,
+                          .from_leaves = v->select != EBPO_SELECT_INHERIT, .judged = v->max_error > 0 || v->target_size, .leaf_planes = parts_of(v) & EBPO_PART_LEAF_PLANES };
+}
+
 static int run(int argc, char **argv)
 {
     const ebpo_build_options defaults = EBPO_BUILD_OPTIONS_INIT;
@@ -248,26 +267,38 @@ static int run(int argc, char **argv)
         return code;
     if ((v.max_error > 0 || v.target_size) && v.without & EBPO_PART_MESH)
         return usage_error("--max-error and --target-size measure against the mesh; leave it out with --profile lod instead of --without mesh");
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_workspace *workspace = NULL;
+    ebpo_status status = memory_make(&workspace, &v.memory, &error);
+    if (status != EBPO_OK)
+        return command_failed("convert", &error);
     progress_line line;
     ebpo_progress progress = progress_start(&line, "convert", v.quiet);
+    stage_facts stages = plan_stages(&v, in);
+    int plan[STAGE_PLAN_MAX];
+    prepared p = { .mended = false };
+    progress_plan(&line, plan, stages_plan(&stages, plan), &p.as_read.face_count);
     double begun = progress_now();
-    ebpo_error error = EBPO_ERROR_INIT;
-    prepared p;
-    ebpo_status status = prepare_mesh(&p, in, v.mend, (unsigned)v.threads, progress, &error);
+    status = prepare_mesh(&p, in, v.mend, workspace, (unsigned)v.threads, progress, &error);
     progress_wipe(&line);
     if (status == EBPO_OK) {
         print_reports(&v, &p, in);
         if (v.require_solid && !p.report.balanced) {
             ebpo_mesh_free(&p.mesh);
+            ebpo_workspace_free(workspace);
             fprintf(stderr, "ebpo convert: %s: is not a solid, and --require-solid was given; nothing was written\n",
                     in);
             return EXIT_NOT_SOLID;
         }
-        status = build_and_write(&v, &p, out, &need, progress, &error);
+        status = build_and_write(&v, &p, out, &need, progress, &stages.times, &error);
         progress_wipe(&line);
     }
+    progress_end_stage(&line);
+    stages_split(&line, &stages.times);
+    stages.faces = p.as_read.face_count;
     if (status == EBPO_OK)
-        status = print_result(&v, &p, out, progress_now() - begun, &error);
+        status = print_result(&v, &p, out, &line, &stages, progress_now() - begun, &error);
+    ebpo_workspace_free(workspace);
     return status == EBPO_OK ? EXIT_FINE : command_failed("convert", &error);
 }
 

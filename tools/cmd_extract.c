@@ -4,12 +4,14 @@
 #include <string.h>
 
 #include "command.h"
+#include "memory.h"
 #include "progress.h"
 #include "remote.h"
 #include "words.h"
 
 typedef struct values {
     int64_t level, threads;
+    memory_values memory;
     bool mesh, no_walls, quiet;
     remote_values remote;
 } values;
@@ -21,6 +23,7 @@ static const arg_option options[] = {
                "the model itself, bit for bit; in the source's order where\nthe maps are stored"),
     ARG_SWITCH("no-walls", 0, values, no_walls, "with --level: leave out polygons that lie on cell walls"),
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
+    MEMORY_OPTIONS(values, memory),
     ARG_SWITCH("quiet", 'q', values, quiet, "no summary, no progress: errors and warnings only"),
     REMOTE_OPTIONS(values, remote),
     { 0 },
@@ -32,7 +35,7 @@ static const arg_spec spec = {
     .least = 2,
     .most = 2,
     .summary = "a level's envelopes, or the model itself, as PLY",
-    .text = "FILE is an .ebpo.h5 file or its URL. Either --level or --mesh is needed.",
+    .text = "FILE is an .ebpo.h5 file or its URL. Either --level or --mesh is needed. A level's polygons are in memory whatever --memory says.",
     .options = options,
 };
 
@@ -96,6 +99,8 @@ static int run(int argc, char **argv)
     int code = check_values(&v, operand[0], operand[1]);
     if (code != EXIT_FINE)
         return code;
+    if (!memory_good("extract", &v.memory))
+        return EXIT_USAGE;
     if (!command_wants_hdf5("extract", operand[0]))
         return EXIT_FAILED;
     progress_line line;
@@ -104,7 +109,12 @@ static int run(int argc, char **argv)
     ebpo_file *file = NULL;
     ebpo_mesh mesh = { 0 };
     double volume = 0;
-    ebpo_status status = remote_open(&file, operand[0], &v.remote, &error);
+    ebpo_workspace *workspace = NULL;
+    ebpo_status status = memory_make(&workspace, &v.memory, &error);
+    if (status == EBPO_OK)
+        status = remote_open(&file, operand[0], &v.remote, &error);
+    if (status == EBPO_OK)
+        ebpo_file_set_workspace(file, workspace);
     if (status == EBPO_OK)
         status = take(file, &v, operand[0], progress, &mesh, &volume, &error);
     if (status == EBPO_OK)
@@ -118,6 +128,7 @@ static int run(int argc, char **argv)
     }
     ebpo_mesh_free(&mesh);
     ebpo_close(file);
+    ebpo_workspace_free(workspace);
     return status == EBPO_OK ? EXIT_FINE : command_failed("extract", &error);
 }
 

@@ -11,7 +11,7 @@
 #include "remote.h"
 
 typedef struct values {
-    bool json, deviation, limit;
+    bool json, deviation, derived, limit;
     int64_t threads, questions;
     double tolerance;
     remote_values remote;
@@ -25,7 +25,8 @@ static const arg_option options[] = {
       "with --deviation: bounds are refined until the upper one is\nat most 1 + T times the lower one; default 0.05", 1e-6, 1000, NULL },
     { "questions", 0, ARG_INT, offsetof(values, questions), "N",
       "with --deviation: stop after about N distances for each level\nand tell what is certain then; default 200000; 0: no limit", 0, 9007199254740992.0, NULL },
-    ARG_SWITCH("limit", 0, values, limit, "also the volume of the solid's convex hull in each cell, summed:\nno convex envelopes of these cells are smaller"),
+    ARG_SWITCH("derived", 0, values, derived, "also the volume of each level with leaves cut by planes derived\nfrom their faces"),
+    ARG_SWITCH("limit", 0, values, limit, "that too, and the volume of the solid's convex hull in each cell, summed:\nno convex envelopes of these cells are smaller"),
     ARG_SWITCH("json", 0, values, json, "print the numbers as JSON"),
     REMOTE_OPTIONS(values, remote),
     { 0 },
@@ -46,13 +47,14 @@ static const arg_spec spec = {
 
 /* What is measured of levels, as wished; [level_count], or NULL. */
 typedef struct measures {
+    const double *derived; /* with limit: always */
     const ebpo_deviation *deviation;
     const ebpo_limit *limit;
 } measures;
 
-static void print_limit(const ebpo_info *info, int level, const ebpo_limit *limit)
+static void print_limit(const ebpo_info *info, double volume, const ebpo_limit *limit)
 {
-    double ratio = facts_excess_ratio(info, facts_volume(info, level), limit->volume);
+    double ratio = facts_excess_ratio(info, volume, limit->volume);
     printf(" %24.16g", limit->volume);
     if (info->solid && isnan(ratio))
         printf(" %17s", "-");
@@ -66,6 +68,8 @@ static void print_levels(const ebpo_info *info, const measures *m)
     printf("%5s %24s %9s", "level", "envelopes' volume", info->solid ? "% solid" : "% box");
     if (deviation)
         printf(" %13s %13s %13s %13s", "reaches", "at most", "mean", "rms");
+    if (m->derived)
+        printf(" %24s %9s", "leaves' planes derived", info->solid ? "% solid" : "% box");
     if (m->limit)
         printf(" %24s%s", "hulls' volume", info->solid ? "   excess to limit" : "");
     putchar('\n');
@@ -73,8 +77,10 @@ static void print_levels(const ebpo_info *info, const measures *m)
         printf("%5d %24.16g %9.2f", i, facts_volume(info, i), facts_percent(info, i));
         if (deviation)
             printf(" %13.6g %13.6g %13.6g %13.6g", deviation[i].lo, deviation[i].hi, deviation[i].mean, deviation[i].rms);
+        if (m->derived)
+            printf(" %24.16g %9.2f", m->derived[i], facts_share(info, m->derived[i]));
         if (m->limit)
-            print_limit(info, i, &m->limit[i]);
+            print_limit(info, m->derived[i], &m->limit[i]);
         putchar('\n');
     }
 }
@@ -108,11 +114,11 @@ static void json_deviation(json *j, const ebpo_deviation *d)
     json_end(j);
 }
 
-static void json_limit(json *j, const ebpo_info *info, int level, const ebpo_limit *limit)
+static void json_limit(json *j, const ebpo_info *info, double volume, const ebpo_limit *limit)
 {
     json_real(j, "limit_volume", limit->volume);
     if (info->solid)
-        json_real(j, "excess_to_limit", facts_excess_ratio(info, facts_volume(info, level), limit->volume));
+        json_real(j, "excess_to_limit", facts_excess_ratio(info, volume, limit->volume));
     json_uint(j, "hulls", limit->hulls);
     json_uint(j, "flat_hulls", limit->flat);
 }
@@ -139,8 +145,10 @@ static void json_mass(json *j, const char *path, const ebpo_info *info, const eb
         json_real(j, info->solid ? "percent_of_solid" : "percent_of_box", facts_percent(info, i));
         if (m->deviation)
             json_deviation(j, &m->deviation[i]);
+        if (m->derived)
+            json_real(j, "derived_volume", m->derived[i]);
         if (m->limit)
-            json_limit(j, info, i, &m->limit[i]);
+            json_limit(j, info, m->derived[i], &m->limit[i]);
         json_end(j);
     }
     json_end(j);
@@ -170,11 +178,21 @@ static ebpo_status limit_levels(ebpo_file *file, const values *v, ebpo_progress 
     return status;
 }
 
+static ebpo_status derive_levels(ebpo_file *file, const values *v, ebpo_progress progress, double *out, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (int i = 0; i < ebpo_file_info(file)->level_count && status == EBPO_OK; i++)
+        status = facts_derived(file, i, (unsigned)v->threads, progress, &out[i], error);
+    return status;
+}
+
 static int measure(const char *path, const values *v)
 {
     ebpo_deviation levels[EBPO_LEVELS_MAX];
     ebpo_limit limits[EBPO_LEVELS_MAX];
-    measures m = { v->deviation ? levels : NULL, v->limit ? limits : NULL };
+    double volumes[EBPO_LEVELS_MAX];
+    bool derived = v->derived || v->limit;
+    measures m = { derived ? volumes : NULL, v->deviation ? levels : NULL, v->limit ? limits : NULL };
     progress_line line;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
@@ -190,6 +208,8 @@ static int measure(const char *path, const values *v)
     ebpo_progress progress = progress_start(&line, "measure", v->json);
     if (status == EBPO_OK && v->deviation)
         status = measure_levels(file, v, progress, levels, &error);
+    if (status == EBPO_OK && derived)
+        status = derive_levels(file, v, progress, volumes, &error);
     if (status == EBPO_OK && v->limit)
         status = limit_levels(file, v, progress, limits, &error);
     progress_wipe(&line);

@@ -164,7 +164,8 @@ static ebpo_status load_file(job *j, ebpo_progress progress, ebpo_error *error)
 
 static ebpo_status load_mesh(job *j, ebpo_progress progress, ebpo_error *error)
 {
-    ebpo_mesh_read_options read = { progress };
+    ebpo_mesh_read_options read = EBPO_MESH_READ_OPTIONS_INIT;
+    read.progress = progress;
     ebpo_mesh_report report;
     tile *t = &j->tiles[0];
     if (t->level != MESH || j->tile_count > 1) {

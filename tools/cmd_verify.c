@@ -4,6 +4,7 @@
 
 #include "command.h"
 #include "json.h"
+#include "memory.h"
 #include "progress.h"
 #include "remote.h"
 #include "words.h"
@@ -11,6 +12,7 @@
 typedef struct values {
     const char *against;
     int64_t samples, threads;
+    memory_values memory;
     bool json, quiet;
     remote_values remote;
 } values;
@@ -19,10 +21,10 @@ static const arg_option options[] = {
     { "against", 0, ARG_TEXT, offsetof(values, against), "IN.ply",
       "also compare the model with its source, bit for bit", 0, 0, NULL },
     { "samples", 0, ARG_INT, offsetof(values, samples), "N",
-      "cells whose labels are checked by an independent winding\nnumber; 0, the default: all of a small file, 4096 of "
-      "a large",
+      "cells whose labels are checked by an independent winding\nnumber; 0, the default: all of up to four million, a million of more",
       0, 9007199254740992.0, NULL },
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
+    MEMORY_OPTIONS(values, memory),
     ARG_SWITCH("json", 0, values, json, "print the counts as JSON"),
     ARG_SWITCH("quiet", 'q', values, quiet, "print violations and errors only"),
     REMOTE_OPTIONS(values, remote),
@@ -112,8 +114,14 @@ static ebpo_status verify(const values *v, const char *path, ebpo_progress progr
 {
     ebpo_mesh source = { 0 };
     ebpo_file *file = NULL;
-    ebpo_mesh_read_options read = { progress };
-    ebpo_status status = remote_open(&file, path, &v->remote, error);
+    ebpo_workspace *workspace = NULL;
+    ebpo_status status = memory_make(&workspace, &v->memory, error);
+    ebpo_mesh_read_options read = EBPO_MESH_READ_OPTIONS_INIT;
+    read.progress = progress;
+    read.workspace = workspace;
+    read.threads = (unsigned)v->threads;
+    if (status == EBPO_OK)
+        status = remote_open(&file, path, &v->remote, error);
     if (status == EBPO_OK && v->against)
         status = ebpo_mesh_read(&source, v->against, &read, error);
     if (status == EBPO_OK) {
@@ -122,12 +130,14 @@ static ebpo_status verify(const values *v, const char *path, ebpo_progress progr
         verify_options.threads = (unsigned)v->threads;
         verify_options.label_samples = (uint64_t)v->samples;
         verify_options.progress = progress;
+        verify_options.workspace = workspace;
         status = ebpo_verify(file, &verify_options, report, error);
     }
     if (status == EBPO_OK)
         *t = traffic_of(file);
     ebpo_mesh_free(&source);
     ebpo_close(file);
+    ebpo_workspace_free(workspace);
     return status;
 }
 
@@ -138,6 +148,8 @@ static int run(int argc, char **argv)
     arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
     if (parsed != ARGS_RUN)
         return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    if (!memory_good("verify", &v.memory))
+        return EXIT_USAGE;
     if (!command_wants_hdf5("verify", operand[0]))
         return EXIT_FAILED;
     progress_line line;

@@ -36,8 +36,8 @@ ebpo_status cut_mesh_write(ebpo_view_stream *stream, const char *path, ebpo_erro
     maker m = { .filling = false };
     ebpo_view_stream_cut(stream, add, &m);
     uint64_t vertices = m.mesh.vertex_count, faces = m.mesh.face_count;
-    if (vertices >= UINT32_MAX - 2) {
-        snprintf(error->message, sizeof error->message, "%s: the cut has %" PRIu64 " vertices, more than a mesh can have; give a budget or --pixels", path, vertices);
+    if (vertices > UINT32_MAX - 1 || faces > UINT32_MAX - 1) {
+        snprintf(error->message, sizeof error->message, "%s: the cut has %" PRIu64 " vertices and %" PRIu64 " faces, more than a mesh can have; give a budget or --pixels", path, vertices, faces);
         return error->status = EBPO_E_LIMIT;
     }
     m.mesh.xyz64 = calloc(vertices ? vertices : 1, 3 * sizeof *m.mesh.xyz64);

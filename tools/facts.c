@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include <ebpo/build.h>
+#include <ebpo/lod.h>
 
 #include "report.h"
 #include "words.h"
@@ -21,11 +22,24 @@ double facts_volume(const ebpo_info *info, int level)
     return sum;
 }
 
-double facts_percent(const ebpo_info *info, int level)
+ebpo_status facts_derived(ebpo_file *file, int level, unsigned threads, ebpo_progress progress, double *volume, ebpo_error *error)
+{
+    ebpo_lod_options options = EBPO_LOD_OPTIONS_INIT;
+    options.threads = threads;
+    options.progress = progress;
+    return ebpo_lod_level(file, level, &options, NULL, volume, error);
+}
+
+double facts_share(const ebpo_info *info, double volume)
 {
     double whole = info->solid ? fabs(info->report.volume) : cell_volume(info, 0);
-    double percent = 100 * facts_volume(info, level) / whole;
+    double percent = 100 * volume / whole;
     return isnan(percent) ? NAN : percent; /* without a sign that means nothing */
+}
+
+double facts_percent(const ebpo_info *info, int level)
+{
+    return facts_share(info, facts_volume(info, level));
 }
 
 double facts_excess(const ebpo_info *info, double volume)

@@ -1,6 +1,6 @@
 #!/bin/sh
 # Installs the Debian packages that building needs; with --tests also what the tests need, with --demo what the quick start needs,
-# with --bench the peers of the benchmarks, with --viewer what serves the web viewer, with --paraview ParaView (1 GB).
+# with --bench the peers of the benchmarks and profilers, with --viewer what serves the web viewer, with --paraview ParaView (1 GB).
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 # Debian's nodejs comes without npm; others' brings it and conflicts with Debian's.
@@ -13,7 +13,7 @@ for option in "$@"; do
     case $option in
     --tests) packages="$packages check hdf5-tools python3 python3-h5py python3-numpy clang libclang-rt-14-dev g++ mandoc chromium $viewer"; [ $modules = yes ] || modules=tests ;;
     --demo) packages="$packages hdf5-tools glmark2-data python3-h5py" ;;
-    --bench) packages="$packages g++ libembree-dev libcgal-dev python3" ;;
+    --bench) packages="$packages g++ libembree-dev libcgal-dev python3 linux-perf valgrind" ;;
     --paraview) packages="$packages paraview python3-paraview xvfb xauth" ;;
     --viewer) packages="$packages $viewer" modules=yes ;;
     *) echo "usage: install-deps.sh [--tests] [--demo] [--bench] [--viewer] [--paraview]" >&2; exit 2 ;;

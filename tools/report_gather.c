@@ -23,12 +23,22 @@ static void from_head(const comparison *c, method *m)
         f[OF_LEAVES] = (double)s->leaf_count;
         f[OF_PLANES] = (double)s->plane_count;
         f[OF_LEAF_PLANES] = (double)s->leaf_plane_count;
-        f[OF_VOLUME] = facts_volume(info, i);
-        f[OF_EXCESS] = facts_excess(info, f[OF_VOLUME]);
     }
 }
 
 /* --- what the levels are --- */
+
+/* With all that the file holds. */
+static ebpo_status volumes(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (int i = c->first; i <= method_last(c, m) && status == EBPO_OK; i++) {
+        double *f = m->level[i];
+        status = facts_derived(file, i, (unsigned)c->v->threads, c->progress, &f[OF_VOLUME], error);
+        f[OF_EXCESS] = facts_excess(&m->info, f[OF_VOLUME]);
+    }
+    return status;
+}
 
 /* Volumes from the levels alone. */
 static ebpo_status levels_alone(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
@@ -112,6 +122,8 @@ ebpo_status report_gather(comparison *c, method *m, ebpo_error *error)
     ebpo_file *file = NULL;
     ebpo_status status = remote_open(&file, m->path, &c->v->remote, error);
     from_head(c, m);
+    if (status == EBPO_OK)
+        status = volumes(c, m, file, error);
     if (status == EBPO_OK)
         status = levels_alone(c, m, file, error);
     if (status == EBPO_OK)

@@ -97,7 +97,7 @@ static ebpo_status build_one(comparison *c, const char *mesh, int selection, con
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
     ebpo_tree tree;
     prepared p;
-    ebpo_status status = prepare_mesh(&p, mesh, (mending){ false, false, false }, (unsigned)c->v->threads, c->progress, error);
+    ebpo_status status = prepare_mesh(&p, mesh, (mending){ false, false, false }, NULL, (unsigned)c->v->threads, c->progress, error);
     if (status != EBPO_OK)
         return status;
     if (c->count == 0) {

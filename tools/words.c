@@ -54,7 +54,7 @@ char *words_parts(char *out, size_t room, uint32_t parts)
 
 char *words_format(char *out, size_t room, int major, int minor)
 {
-    snprintf(out, room, "%d.%d%s", major, minor, major == 1 && minor == 0 ? "-draft" : "");
+    snprintf(out, room, "%d.%d", major, minor);
     return out;
 }
 

@@ -15,7 +15,7 @@ char *words_bytes(char *out, size_t room, uint64_t bytes);
 char *words_plural(char *out, size_t room, uint64_t count, const char *one, const char *many);
 /* Names of the ebpo_part bits with commas: "planes, mesh, maps". */
 char *words_parts(char *out, size_t room, uint32_t parts);
-/* "1.0-draft": until the format is frozen, 1.0 is the draft's number. */
+/* "1.0" */
 char *words_format(char *out, size_t room, int major, int minor);
 const char *words_node_type(ebpo_node_type type);
 const char *words_rule(ebpo_rule rule);

@@ -3,10 +3,12 @@
 #include "geom/strict_fp.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/alloc.h"
 #include "base/error.h"
 #include "build/builder.h"
+#include "morton/octcode.h"
 
 static void join(double (*box)[3], const double low[3], const double high[3])
 {
@@ -16,28 +18,28 @@ static void join(double (*box)[3], const double low[3], const double high[3])
     }
 }
 
-ebpo_status ebpo_bounds_make(ebpo_bounds *bounds, double (*position)[3], uint64_t count, ebpo_error *error)
+ebpo_status ebpo_bounds_make(ebpo_builder *b, ebpo_error *error)
 {
-    uint64_t below = count;
+    ebpo_bounds *bounds = &b->bounds;
+    uint64_t below = b->vertex_count;
     for (int level = 0; level < EBPO_BOUNDS_LEVELS && below > 1; level++) {
         uint64_t n = (below + EBPO_BOUNDS_FAN - 1) / EBPO_BOUNDS_FAN;
-        double (*box)[2][3] = ebpo_alloc(n, sizeof *box);
+        double (*box)[2][3] = ebpo_array_alloc(b->workspace, n, sizeof *box);
         if (!box)
-            return ebpo_fail_memory(error, n * sizeof *box);
+            return ebpo_workspace_fail(b->workspace, n * sizeof *box, error);
         bounds->box[level] = box;
         bounds->count[level] = n;
         bounds->levels = level + 1;
         for (uint64_t i = 0; i < below; i++) {
-            double *low = level ? bounds->box[level - 1][i][0] : position[i];
-            double *high = level ? bounds->box[level - 1][i][1] : position[i];
-            double (*b)[3] = box[i / EBPO_BOUNDS_FAN];
-            if (i % EBPO_BOUNDS_FAN == 0)
-                for (int k = 0; k < 3; k++) {
-                    b[0][k] = low[k];
-                    b[1][k] = high[k];
-                }
-            else
-                join(b, low, high);
+            double p[3], *low = level ? bounds->box[level - 1][i][0] : p, *high = level ? bounds->box[level - 1][i][1] : p;
+            ebpo_workspace_settle_at(b->workspace, i);
+            if (level == 0)
+                ebpo_mesh_position(b->mesh, i, p);
+            if (i % EBPO_BOUNDS_FAN == 0) {
+                memcpy(box[i / EBPO_BOUNDS_FAN][0], low, sizeof p);
+                memcpy(box[i / EBPO_BOUNDS_FAN][1], high, sizeof p);
+            } else
+                join(box[i / EBPO_BOUNDS_FAN], low, high);
         }
         below = n;
     }
@@ -47,7 +49,7 @@ ebpo_status ebpo_bounds_make(ebpo_bounds *bounds, double (*position)[3], uint64_
 void ebpo_bounds_free(ebpo_bounds *bounds)
 {
     for (int i = 0; i < bounds->levels; i++)
-        free(bounds->box[i]);
+        ebpo_array_free(bounds->box[i]);
     bounds->levels = 0;
 }
 
@@ -74,7 +76,8 @@ static void visit(query *q, int level, uint64_t block)
     if (block * width >= q->end || (block + 1) * width <= q->begin)
         return;
     if (level == 0) {
-        const double *p = q->b->position[block];
+        double p[3];
+        ebpo_mesh_position(q->b->mesh, block, p);
         double v = value(q, p, p);
         if (v > q->best) {
             q->best = v;
@@ -111,4 +114,26 @@ double ebpo_bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n
             visit(&q, level, block);
     *at = q.at;
     return q.best;
+}
+
+static uint64_t lower_bound(const uint64_t *key, uint64_t count, uint64_t wanted)
+{
+    uint64_t low = 0;
+    while (count) {
+        uint64_t half = count / 2;
+        if (key[low + half] < wanted) {
+            low += half + 1;
+            count -= half + 1;
+        } else
+            count = half;
+    }
+    return low;
+}
+
+void ebpo_build_vertex_range(const ebpo_builder *b, ebpo_cell cell, uint64_t *begin, uint64_t *end)
+{
+    ebpo_octcode code = ebpo_octcode_of_cell(cell);
+    int below = 3 * (b->box.grid_level - cell.level);
+    *begin = lower_bound(b->key, b->vertex_count, code << below);
+    *end = *begin + lower_bound(b->key + *begin, b->vertex_count - *begin, (code + 1) << below);
 }

@@ -4,7 +4,9 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
+#include "arrange/arrange.h"
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/fp_env.h"
@@ -125,15 +127,27 @@ static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *m
     info->parts = o->parts;
 }
 
-static double greatest_coordinate(const ebpo_mesh_report *report)
+/* A tree that is deeper than the order is good for needs another one. */
+static ebpo_status arrange(ebpo_builder *b, ebpo_mesh *mesh, ebpo_error *error)
 {
-    double most = 0;
-    for (int k = 0; k < 3; k++)
-        most = fmax(most, fmax(fabs(report->min[k]), fabs(report->max[k])));
-    return most;
+    const ebpo_progress *progress = &b->options->progress;
+    ebpo_status status = mesh->arrangement && mesh->arrangement->key ? EBPO_OK : ebpo_arrange(mesh, -1, b->threads, progress, error);
+    if (status == EBPO_OK && mesh->arrangement->box.grid_level < b->max_level)
+        status = ebpo_arrange(mesh, b->max_level, b->threads, progress, error);
+    if (status != EBPO_OK)
+        return status;
+    b->mesh = mesh;
+    b->box = mesh->arrangement->box;
+    b->vertex_count = mesh->arrangement->referenced;
+    b->key = mesh->arrangement->key;
+    b->face_count = mesh->face_count;
+    b->face = (const uint32_t (*)[3])mesh->faces;
+    if (!ebpo_stage(progress, "bounds", error))
+        return EBPO_E_CANCELLED;
+    return ebpo_bounds_make(b, error);
 }
 
-static ebpo_status prepare(ebpo_builder *b, const ebpo_mesh *mesh, const ebpo_mesh_report *report,
+static ebpo_status prepare(ebpo_builder *b, ebpo_mesh *mesh, const ebpo_mesh_report *report,
                            const ebpo_build_options *options, ebpo_error *error)
 {
     b->options = options;
@@ -146,46 +160,100 @@ static ebpo_status prepare(ebpo_builder *b, const ebpo_mesh *mesh, const ebpo_me
                          mesh->source_name[0] ? mesh->source_name : "the mesh",
                          (unsigned long long)report->unbalanced_edges.count);
     b->max_level = options->max_level >= 0 ? options->max_level : level_limit(report);
-    if (!ebpo_box_make(&b->box, report->min, report->max, b->max_level))
-        return ebpo_fail(error, EBPO_E_LIMIT, "coordinates up to %g are too large for an exact grid of %d levels; scale the model",
-                         greatest_coordinate(report), b->max_level);
-    return EBPO_OK;
+    return arrange(b, mesh, error);
 }
 
 static void builder_free(ebpo_builder *b)
 {
-    free(b->position);
-    free(b->key);
-    free(b->vertex_source);
-    free(b->face);
-    free(b->face_source);
-    free(b->normal);
     ebpo_bounds_free(&b->bounds);
-    free(b->number);
+    ebpo_array_free(b->number);
     ebpo_branch_free(&b->top);
     for (uint64_t i = 0; i < b->sub_count; i++)
         ebpo_branch_free(&b->sub[i]);
     free(b->sub);
     free(b->top_envelope);
+    ebpo_store_free(b->store);
 }
 
-static ebpo_status run_stages(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, ebpo_error *error)
+typedef struct piece_job {
+    ebpo_builder *b;
+    ebpo_emit_scratch **scratch; /* [threads] */
+    _Atomic uint64_t cells_ns, envelopes_ns; /* of all threads */
+} piece_job;
+
+static uint64_t nanoseconds(void)
 {
-    ebpo_status status = ebpo_build_order(b, mesh, error);
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (uint64_t)t.tv_sec * UINT64_C(1000000000) + (uint64_t)t.tv_nsec;
+}
+
+static ebpo_status work_on_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+{
+    piece_job *job = context;
+    ebpo_builder *b = job->b;
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
+        ebpo_branch *s = &b->sub[i];
+        uint64_t begun = nanoseconds();
+        status = ebpo_build_partition(b, s, error);
+        if (status == EBPO_OK)
+            status = ebpo_build_number(b, s, error);
+        uint64_t cut = nanoseconds();
+        job->cells_ns += cut - begun;
+        if (status == EBPO_OK)
+            status = ebpo_emit_piece(b, job->scratch[worker], s, error);
+        ebpo_subtree_release(s);
+        if (status == EBPO_OK)
+            status = ebpo_build_pack(b, s->out, error);
+        ebpo_workspace_settle(b->workspace);
+        job->envelopes_ns += nanoseconds() - cut;
+    }
+    return status;
+}
+
+static ebpo_status build_pieces(ebpo_builder *b, ebpo_error *error)
+{
+    piece_job job = { .b = b, .scratch = ebpo_alloc_zero(b->threads, sizeof *job.scratch) };
+    ebpo_status status = job.scratch ? EBPO_OK : ebpo_fail_memory(error, b->threads * sizeof *job.scratch);
+    for (unsigned i = 0; i < b->threads && status == EBPO_OK; i++)
+        status = ebpo_emit_scratch_make(&job.scratch[i], error);
     if (status == EBPO_OK)
-        status = ebpo_build_partition(b, error);
-    if (status == EBPO_OK)
-        status = ebpo_build_labels(b, error);
-    if (status == EBPO_OK)
-        status = ebpo_build_number(b, error);
+        status = ebpo_parallel_for(b->threads, b->sub_count, 1, work_on_pieces, &job, &b->options->progress, "envelopes", error);
+    for (unsigned i = 0; i < b->threads && job.scratch; i++)
+        ebpo_emit_scratch_free(job.scratch[i]);
+    free(job.scratch);
+    if (b->options->times) {
+        b->options->times->cells += 1e-9 * (double)job.cells_ns;
+        b->options->times->envelopes += 1e-9 * (double)job.envelopes_ns;
+    }
+    return status;
+}
+
+/* From the root down a piece is done in one go. From the leaves up the top needs all pieces first: their cells are made twice rather than kept. */
+static ebpo_status build_tree(ebpo_builder *b, ebpo_error *error)
+{
+    ebpo_status status = ebpo_build_labels(b, error);
     if (status == EBPO_OK)
         status = ebpo_build_propose(b, error);
     if (status == EBPO_OK)
         status = ebpo_build_top(b, error);
     if (status == EBPO_OK)
-        status = ebpo_emit_subtrees(b, error);
+        status = build_pieces(b, error);
+    return status;
+}
+
+static ebpo_status run_stages(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, ebpo_error *error)
+{
+    ebpo_status status = ebpo_build_split(b, error);
+    if (status == EBPO_OK)
+        status = build_tree(b, error);
+    if (status == EBPO_OK && !ebpo_stage(&b->options->progress, "joining levels", error))
+        status = EBPO_E_CANCELLED;
     if (status == EBPO_OK)
         status = ebpo_build_levels(b, out, error);
+    if (status == EBPO_OK && !ebpo_stage(&b->options->progress, "numbering vertices", error))
+        status = EBPO_E_CANCELLED;
     if (status == EBPO_OK && b->options->parts & EBPO_PART_MESH)
         status = ebpo_build_mesh(b, mesh, out, error);
     return status;
@@ -196,10 +264,13 @@ ebpo_status ebpo_build(ebpo_tree *out, ebpo_mesh *mesh, const ebpo_mesh_report *
 {
     EBPO_DEFAULT_FP;
     ebpo_build_options defaults = EBPO_BUILD_OPTIONS_INIT;
-    ebpo_builder b = { 0 };
+    ebpo_builder b = { .workspace = mesh->workspace };
     memset(out, 0, sizeof *out);
+    out->mesh.workspace = mesh->workspace;
     if (!options)
         options = &defaults;
+    if (options->times)
+        *options->times = (ebpo_build_times){ 0, 0 };
     ebpo_status status = check_options(options, &out->info, error);
     if (status == EBPO_OK)
         status = prepare(&b, mesh, report, options, error);

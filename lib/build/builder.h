@@ -1,9 +1,9 @@
 /* The builder's working state, shared by its stages:
- *   order      vertices and faces along the Morton curve, bounds for support queries
- *   partition  faces to cells, subtree by subtree: nodes, leaf lists, corner winding differences
- *   number     final face and vertex numbers
- *   envelopes  labels and planes from the root down, arrays of each level
- * Subtrees are independent in partition and envelopes, so that they can run on all cores or one after the other. */
+ *   (before: vertices and faces are arranged along the Morton curve)
+ *   top      faces to the pieces that the tree is cut into, winding numbers, the envelopes above the pieces
+ *   pieces   piece by piece, on all cores: faces to cells, numbers, envelopes, stretches of the levels' arrays
+ *   join     the arrays of the levels, final vertex numbers
+ * A piece (a subtree) needs nothing of another but what the top tells it, and gives back nothing but its stretches and its faces' numbers. */
 #ifndef EBPO_BUILD_BUILDER_H
 #define EBPO_BUILD_BUILDER_H
 
@@ -11,11 +11,12 @@
 
 #include <ebpo/build.h>
 
+#include "base/workspace.h"
 #include "geom/cell.h"
+#include "mesh/mesh.h"
 #include "planes/planes.h"
 
 #define EBPO_NO_NUMBER UINT32_MAX
-#define EBPO_NO_NORMAL UINT32_MAX
 #define EBPO_NO_VERTEX UINT64_MAX
 
 /* A node of a subtree under construction. Empty nodes get their colour with the labels. */
@@ -35,6 +36,7 @@ typedef struct ebpo_build_detail {
 /* A stretch of one level's arrays under construction. */
 typedef struct ebpo_out {
     ebpo_level level;
+    bool packed; /* its arrays are in the builder's store */
     uint64_t group_capacity, gray_capacity, plane_capacity, leaf_capacity[6], ref_capacity, black_capacity, white_capacity,
         leaf_plane_capacity;
 } ebpo_out;
@@ -42,15 +44,17 @@ typedef struct ebpo_out {
 /* A subtree: its nodes, depth first. nodes[0] is its root. */
 typedef struct ebpo_branch {
     ebpo_cell cell;
-    uint32_t *list;          /* faces that touch the cell; freed once partitioned */
+    uint32_t *list;          /* faces that touch the cell, ascending; NULL for the top, which goes by the faces' own numbers */
     uint64_t list_count;
+    uint8_t *fresh;          /* bit i: no piece before this one lists face list[i] */
+    uint64_t fresh_count, first; /* how many; the final number of the first */
     ebpo_build_node *nodes;
     uint64_t node_count, node_capacity;
     ebpo_build_detail *details;
     uint64_t detail_count, detail_capacity;
-    uint32_t *entries;
+    uint32_t *entries;       /* places in `list` */
     uint64_t entry_count, entry_capacity;
-    uint32_t *crossing;
+    uint32_t *crossing;      /* likewise */
     uint64_t cross_count, cross_capacity;
     int32_t winding;         /* at the lowest corner */
     uint8_t root_type;       /* of nodes[0], and its corner differences: they outlive the nodes */
@@ -70,46 +74,58 @@ typedef struct ebpo_bounds {
 
 typedef struct ebpo_builder {
     const ebpo_build_options *options;
+    ebpo_workspace *workspace;
     unsigned threads;
     bool solid;
     int max_level;
     ebpo_box box;
-    uint64_t vertex_count;    /* referenced ones, along the curve */
+    const ebpo_mesh *mesh;    /* arranged along the curve */
+    uint64_t vertex_count;    /* referenced ones, which come first */
     uint64_t face_count;
-    double (*position)[3];
-    uint64_t *key;            /* Morton code of the vertex's cell at max_level, ascending */
-    uint32_t *vertex_source;  /* number in the mesh */
-    uint32_t (*face)[3];      /* in vertices along the curve */
-    uint32_t *face_source;
-    uint32_t *normal;         /* normal part of a plane code, or EBPO_NO_NORMAL */
+    const uint64_t *key;      /* octcode of the vertex's cell at box.grid_level, ascending */
+    const uint32_t (*face)[3];
     ebpo_bounds bounds;
-    uint32_t *number;         /* final number of each face */
+    uint32_t *number;         /* final number of each face; a piece sets those of its fresh ones */
     ebpo_branch top;         /* gray nodes above the subtrees; its leaves name subtrees in `detail` */
     ebpo_branch *sub;
     uint64_t sub_count, sub_capacity;
     _Atomic uint64_t leaf_count, entry_count; /* in all subtrees so far */
     struct ebpo_top_envelope *top_envelope; /* of the top's gray nodes, by detail */
+    struct ebpo_store *store;
 } ebpo_builder;
 
-/* order.c */
-ebpo_status ebpo_build_order(ebpo_builder *b, const ebpo_mesh *mesh, ebpo_error *error);
+/* bounds.c */
 void ebpo_build_vertex_range(const ebpo_builder *b, ebpo_cell cell, uint64_t *begin, uint64_t *end);
 
-/* bounds.c: greatest n . xi over vertices [begin, end), in coordinates of the cell that holds them, and `least`; `*at`: the vertex, or EBPO_NO_VERTEX when
+ebpo_status ebpo_bounds_make(ebpo_builder *b, ebpo_error *error);
+/* Greatest n . xi over vertices [begin, end), in coordinates of the cell that holds them, and `least`; `*at`: the vertex, or EBPO_NO_VERTEX when
  * `least` is the greatest. */
-ebpo_status ebpo_bounds_make(ebpo_bounds *bounds, double (*position)[3], uint64_t count, ebpo_error *error);
 double ebpo_bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n[3], uint64_t begin, uint64_t end,
                            double least, uint64_t *at);
 void ebpo_bounds_free(ebpo_bounds *bounds);
 
-/* partition.c */
-ebpo_status ebpo_build_partition(ebpo_builder *b, ebpo_error *error);
+/* split.c: the top, and the pieces' lists */
+ebpo_status ebpo_build_split(ebpo_builder *b, ebpo_error *error);
+
+/* partition.c: a piece's nodes and leaf lists */
+ebpo_status ebpo_build_partition(ebpo_builder *b, ebpo_branch *s, ebpo_error *error);
+bool ebpo_branch_detail(ebpo_branch *s, uint32_t *index);
+bool ebpo_branch_children(ebpo_branch *s, uint32_t *first);
+bool ebpo_build_is_leaf(const ebpo_builder *b, int level, uint64_t count);
+/* EBPO_E_LIMIT when a mesh of so many faces has more leaves, or more faces listed in them, than it may. */
+ebpo_status ebpo_build_check_lists(uint64_t face_count, uint64_t leaves, uint64_t entries, ebpo_error *error);
+/* EBPO_E_LIMIT when the branch has as many nodes as 32 bits can number. */
+ebpo_status ebpo_build_check_branch(const ebpo_branch *s, ebpo_error *error);
+/* Notes which of the faces list[0 .. count) (places in the branch's list, or faces) are not wholly inside. False: out of memory. */
+bool ebpo_build_crossing(const ebpo_builder *b, ebpo_branch *s, ebpo_cell cell, const uint32_t *list, uint64_t count, ebpo_build_detail *detail);
 void ebpo_branch_free(ebpo_branch *s);
+/* Frees what partition made of the piece's list: it can be made again. */
+void ebpo_branch_forget(ebpo_branch *s);
 /* Frees what only partition and envelopes need; `out` and the root's facts stay. */
 void ebpo_subtree_release(ebpo_branch *s);
 
 /* number.c */
-ebpo_status ebpo_build_number(ebpo_builder *b, ebpo_error *error);
+ebpo_status ebpo_build_number(ebpo_builder *b, ebpo_branch *s, ebpo_error *error); /* a piece's fresh faces */
 ebpo_status ebpo_build_mesh(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, ebpo_error *error);
 
 /* labels.c */
@@ -137,8 +153,11 @@ int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, cons
 unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32_t delta[8]);
 double ebpo_cell_volume(const ebpo_builder *b, int level);
 
-/* emit.c: subtrees to stretches of level arrays */
-ebpo_status ebpo_emit_subtrees(ebpo_builder *b, ebpo_error *error);
+/* emit.c: a piece to stretches of level arrays. What leaves refer to (leaf_refs) is still told by the faces' numbers along the curve. */
+typedef struct ebpo_emit_scratch ebpo_emit_scratch;
+ebpo_status ebpo_emit_scratch_make(ebpo_emit_scratch **out, ebpo_error *error);
+void ebpo_emit_scratch_free(ebpo_emit_scratch *scratch);
+ebpo_status ebpo_emit_piece(const ebpo_builder *b, ebpo_emit_scratch *scratch, ebpo_branch *s, ebpo_error *error);
 bool ebpo_emit_group(ebpo_out *out, uint16_t types);
 bool ebpo_emit_gray(ebpo_out *out, const uint32_t *codes, int count, double volume);
 bool ebpo_emit_empty(ebpo_out *out, bool black, int32_t winding);
@@ -147,14 +166,30 @@ void ebpo_out_free(ebpo_out *out);
 /* top.c: the nodes above the subtrees */
 ebpo_status ebpo_build_top(ebpo_builder *b, ebpo_error *error);
 
+/* pack.c: moves what a piece gave to the builder's store, out of the way: to be read once, when the levels are joined. Nothing to do without a workspace. */
+ebpo_status ebpo_build_pack(ebpo_builder *b, ebpo_out *out, ebpo_error *error);
+/* Room in it, aligned for 8 bytes, until it is freed; NULL: see ebpo_workspace_fail. Needs a workspace. */
+void *ebpo_store_room(ebpo_builder *b, uint64_t bytes);
+void ebpo_store_free(struct ebpo_store *store);
+
 /* join.c */
 ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error);
 
 static inline void ebpo_build_triangle(const ebpo_builder *b, uint32_t face, ebpo_triangle *out)
 {
     for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++)
-            out->corner[i][k] = b->position[b->face[face][i]][k];
+        ebpo_mesh_position(b->mesh, b->face[face][i], out->corner[i]);
+}
+
+/* The face that an entry of a branch names. */
+static inline uint32_t ebpo_branch_face(const ebpo_branch *s, uint32_t entry)
+{
+    return s->list ? s->list[entry] : entry;
+}
+
+static inline void ebpo_branch_triangle(const ebpo_builder *b, const ebpo_branch *s, uint32_t entry, ebpo_triangle *out)
+{
+    ebpo_build_triangle(b, ebpo_branch_face(s, entry), out);
 }
 
 static inline ebpo_cell ebpo_child_cell(ebpo_cell cell, unsigned octant)

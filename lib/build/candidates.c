@@ -13,13 +13,18 @@ typedef struct bin {
     uint64_t sum_u, sum_v;
 } bin;
 
-static void sample_entries(const ebpo_builder *b, const uint32_t *entries, uint64_t begin, uint64_t end, uint64_t *skip,
-                           uint64_t step, uint32_t *sample, int *count)
+/* Every `step`-th of the entries, or of the branch's whole list. */
+static void sample_faces(const ebpo_builder *b, const ebpo_branch *s, const uint32_t *entries, uint64_t begin, uint64_t end, uint64_t *skip, uint64_t step, uint32_t *sample,
+                         int *count)
 {
     uint64_t i = begin + *skip;
     for (; i < end; i += step) {
-        uint32_t normal = b->normal[entries[i]];
-        if (normal != EBPO_NO_NORMAL && *count < SAMPLE_MOST)
+        ebpo_triangle face;
+        uint32_t normal;
+        if (step > 64 && *count % 16 == 0) /* each from another place of the files */
+            ebpo_workspace_settle(b->workspace);
+        ebpo_branch_triangle(b, s, entries ? entries[i] : (uint32_t)i, &face);
+        if (*count < SAMPLE_MOST && ebpo_face_normal_code(&b->box, &face, &normal))
             sample[(*count)++] = normal;
     }
     *skip = i - end;
@@ -29,15 +34,15 @@ static int take_sample(const ebpo_builder *b, const ebpo_branch *s, const ebpo_b
 {
     int count = 0;
     uint64_t skip = 0, total = 0;
-    if (s != &b->top) {
+    if (s->list) {
         uint64_t step = (d->entry_end - d->entry_begin) / SAMPLE_MOST + 1;
-        sample_entries(b, s->entries, d->entry_begin, d->entry_end, &skip, step, sample, &count);
+        sample_faces(b, s, s->entries, d->entry_begin, d->entry_end, &skip, step, sample, &count);
         return count;
     }
     for (uint64_t i = d->entry_begin; i < d->entry_end; i++)
-        total += b->sub[i].entry_count;
+        total += b->sub[i].list_count;
     for (uint64_t i = d->entry_begin; i < d->entry_end; i++)
-        sample_entries(b, b->sub[i].entries, 0, b->sub[i].entry_count, &skip, total / SAMPLE_MOST + 1, sample, &count);
+        sample_faces(b, &b->sub[i], NULL, 0, b->sub[i].list_count, &skip, total / SAMPLE_MOST + 1, sample, &count);
     return count;
 }
 

@@ -6,23 +6,46 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "base/parallel.h"
 #include "build/propose.h"
+
+struct ebpo_emit_scratch {
+    ebpo_envelope_scratch *envelope;
+    ebpo_triangle *faces; /* of one leaf */
+    uint64_t faces_capacity;
+};
 
 typedef struct emitter {
     const ebpo_builder *b;
     ebpo_branch *s;
-    ebpo_envelope_scratch *scratch;
-    ebpo_triangle *faces; /* of one leaf */
-    uint64_t *list;       /* final number << 32 | face, of one leaf */
-    uint64_t faces_capacity, list_capacity;
+    ebpo_emit_scratch *scratch;
 } emitter;
+
+ebpo_status ebpo_emit_scratch_make(ebpo_emit_scratch **out, ebpo_error *error)
+{
+    *out = ebpo_alloc_zero(1, sizeof **out);
+    ebpo_status status = *out ? ebpo_scratch_make(&(*out)->envelope, error) : ebpo_fail_memory(error, sizeof **out);
+    if (status != EBPO_OK) {
+        free(*out);
+        *out = NULL;
+    }
+    return status;
+}
+
+void ebpo_emit_scratch_free(ebpo_emit_scratch *scratch)
+{
+    if (!scratch)
+        return;
+    ebpo_scratch_free(scratch->envelope);
+    free(scratch->faces);
+    free(scratch);
+}
 
 void ebpo_out_free(ebpo_out *out)
 {
     for (int i = 0; out && i < EBPO_LEVELS_MAX; i++)
-        ebpo_level_free(&out[i].level);
-    free(out);
+        if (!out[i].packed)
+            ebpo_level_free(&out[i].level);
+    ebpo_array_free(out);
 }
 
 bool ebpo_emit_group(ebpo_out *out, uint16_t types)
@@ -59,27 +82,6 @@ bool ebpo_emit_empty(ebpo_out *out, bool black, int32_t winding)
     return true;
 }
 
-static int compare_numbers(const void *a, const void *b)
-{
-    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
-    return (x > y) - (x < y);
-}
-
-static void sort_numbers(uint32_t *a, uint64_t n)
-{
-    if (n > 32) {
-        qsort(a, n, sizeof *a, compare_numbers);
-        return;
-    }
-    for (uint64_t i = 1; i < n; i++) {
-        uint32_t v = a[i];
-        uint64_t j = i;
-        for (; j > 0 && a[j - 1] > v; j--)
-            a[j] = a[j - 1];
-        a[j] = v;
-    }
-}
-
 static bool grow_leaf_arrays(ebpo_out *out, uint64_t refs)
 {
     ebpo_level *l = &out->level;
@@ -102,54 +104,38 @@ static bool emit_list(const emitter *e, const ebpo_build_detail *d, ebpo_out *ou
     l->leaf_first[l->leaf_count] = d->first;
     l->leaf_new[l->leaf_count] = d->new_count;
     l->leaf_ref_count[l->leaf_count] = (uint32_t)refs;
-    uint32_t *refs_here = refs ? l->leaf_refs + l->ref_count : NULL, *ref = refs_here;
-    for (uint64_t i = d->entry_begin; i < d->entry_end; i++) {
-        uint32_t number = e->b->number[e->s->entries[i]];
-        if (number < d->first)
-            *ref++ = number;
+    for (uint64_t i = d->entry_begin, ref = l->ref_count; i < d->entry_end; i++) {
+        uint32_t place = e->s->entries[i], face = e->s->list[place];
+        if (!(e->s->fresh[place / 8] >> place % 8 & 1) || e->b->number[face] < d->first)
+            l->leaf_refs[ref++] = face;
     }
-    sort_numbers(refs_here, refs);
     l->ref_count += refs;
     l->new_count += d->new_count;
     return true;
 }
 
-static int compare_keys(const void *a, const void *b)
-{
-    uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
-    return (x > y) - (x < y);
-}
-
-/* The leaf's faces by final number. A reader has them in this order too, and what follows from them depends on it where faces are many. */
 static bool gather_faces(emitter *e, const ebpo_build_detail *d)
 {
+    ebpo_emit_scratch *scratch = e->scratch;
     uint64_t count = d->entry_end - d->entry_begin;
-    if (!ebpo_grow(&e->faces, &e->faces_capacity, count, sizeof *e->faces) ||
-        !ebpo_grow(&e->list, &e->list_capacity, count, sizeof *e->list))
+    if (!ebpo_grow(&scratch->faces, &scratch->faces_capacity, count, sizeof *scratch->faces))
         return false;
-    bool sorted = true;
-    for (uint64_t i = 0; i < count; i++) {
-        uint32_t face = e->s->entries[d->entry_begin + i];
-        e->list[i] = (uint64_t)e->b->number[face] << 32 | face;
-        sorted = sorted && (i == 0 || e->list[i - 1] < e->list[i]);
-    }
-    if (!sorted)
-        qsort(e->list, count, sizeof *e->list, compare_keys);
     for (uint64_t i = 0; i < count; i++)
-        ebpo_build_triangle(e->b, (uint32_t)e->list[i], &e->faces[i]);
+        ebpo_branch_triangle(e->b, e->s, e->s->entries[d->entry_begin + i], &scratch->faces[i]);
     return true;
 }
 
-/* Stored planes are the selection's own; others are what a reader will derive. */
-static int leaf_planes(const emitter *e, uint32_t detail, ebpo_cell cell, int32_t winding, bool stored, ebpo_polytope *envelope, uint32_t *codes)
+/* Planes that are to be stored: the selection's own. Else readers derive them. -1: out of memory. */
+static int leaf_planes(emitter *e, uint32_t detail, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope, uint32_t *codes)
 {
     const ebpo_builder *b = e->b;
     const ebpo_build_detail *d = &e->s->details[detail];
     int count;
-    const uint32_t *proposed = stored ? ebpo_proposed(e->s, detail, &count) : NULL;
+    const uint32_t *proposed = ebpo_proposed(e->s, detail, &count);
+    if (!proposed && !gather_faces(e, d))
+        return -1;
     if (!proposed)
-        return ebpo_leaf_planes(&b->box, cell, e->faces, d->entry_end - d->entry_begin, ebpo_inside_corners(b, winding, d->delta),
-                                stored ? b->options->epsilon : 0, envelope, codes);
+        return ebpo_leaf_planes(&b->box, cell, e->scratch->faces, d->entry_end - d->entry_begin, ebpo_inside_corners(b, winding, d->delta), b->options->epsilon, envelope, codes);
     memcpy(codes, proposed, (size_t)count * sizeof *codes);
     ebpo_planes_cut(envelope, codes, (uint64_t)count);
     return count;
@@ -161,13 +147,13 @@ static bool emit_leaf(emitter *e, uint32_t detail, ebpo_cell cell, int32_t windi
     const ebpo_build_detail *d = &e->s->details[detail];
     ebpo_out *out = &e->s->out[cell.level];
     ebpo_level *l = &out->level;
-    if (!emit_list(e, d, out, winding) || !gather_faces(e, d))
+    if (!emit_list(e, d, out, winding))
         return false;
     uint32_t codes[EBPO_PLANES_STORED];
     bool stored = b->options->parts & EBPO_PART_LEAF_PLANES;
-    int planes = 0;
-    if (stored || b->options->parts & EBPO_PART_MESH) /* else a reader has nothing to derive them from */
-        planes = leaf_planes(e, detail, cell, winding, stored, envelope, codes);
+    int planes = stored ? leaf_planes(e, detail, cell, winding, envelope, codes) : 0;
+    if (planes < 0)
+        return false;
     l->leaf_volume += ebpo_polytope_volume(envelope) * ebpo_cell_volume(b, cell.level);
     l->leaf_plane_counts[l->leaf_count++] = (uint8_t)planes;
     if (!stored)
@@ -222,7 +208,7 @@ static bool emit_gray(emitter *e, const ebpo_build_node *node, ebpo_cell cell, i
     uint32_t codes[EBPO_PLANES_STORED];
     int planes = 0;
     if (b->options->parts & EBPO_PART_PLANES)
-        planes = ebpo_gray_planes(b, e->scratch, e->s, node->detail, cell, winding, envelope, codes);
+        planes = ebpo_gray_planes(b, e->scratch->envelope, e->s, node->detail, cell, winding, envelope, codes);
     if (planes < 0 || !ebpo_emit_gray(&e->s->out[cell.level], codes, planes,
                                       ebpo_polytope_volume(envelope) * ebpo_cell_volume(b, cell.level)))
         return false;
@@ -252,26 +238,11 @@ static bool emit(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding, eb
     }
 }
 
-static ebpo_status emit_subtrees(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+ebpo_status ebpo_emit_piece(const ebpo_builder *b, ebpo_emit_scratch *scratch, ebpo_branch *s, ebpo_error *error)
 {
-    ebpo_builder *b = context;
-    (void)worker;
-    emitter e = { .b = b };
-    ebpo_status status = ebpo_scratch_make(&e.scratch, error);
-    for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
-        ebpo_branch *s = e.s = &b->sub[i];
-        s->out = ebpo_alloc_zero(EBPO_LEVELS_MAX, sizeof *s->out);
-        if (!s->out || !emit(&e, 0, s->cell, s->winding, s->above))
-            status = ebpo_fail(error, EBPO_E_MEMORY, "out of memory while computing envelopes");
-        ebpo_subtree_release(s);
-    }
-    ebpo_scratch_free(e.scratch);
-    free(e.faces);
-    free(e.list);
-    return status;
-}
-
-ebpo_status ebpo_emit_subtrees(ebpo_builder *b, ebpo_error *error)
-{
-    return ebpo_parallel_for(b->threads, b->sub_count, 1, emit_subtrees, b, &b->options->progress, "envelopes", error);
+    emitter e = { b, s, scratch };
+    s->out = ebpo_array_zero(b->workspace, EBPO_LEVELS_MAX, sizeof *s->out);
+    if (!s->out || !emit(&e, 0, s->cell, s->winding, s->above))
+        return ebpo_workspace_fail_while(b->workspace, "while computing envelopes", error);
+    return EBPO_OK;
 }

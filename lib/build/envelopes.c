@@ -1,4 +1,5 @@
-/* The planes of a gray node, from the root down: candidates are the normals of faces below it and those of the solid's hull in the cell. */
+/* The planes of a gray node, from the root down: candidates are the directions of the solid's hull in the cell. Few points: their hull. Many, or none that span a volume: the hull of the
+ * extreme ones, found by asking in its own directions, and normals of faces. */
 #include "geom/strict_fp.h"
 
 #include <math.h>
@@ -18,7 +19,8 @@ enum {
     FACES_BELOW = 16,      /* normals of faces that are tried below the top */
     HULL_BELOW = 24,       /* and directions of the hull, in a round */
     HULL_ROUNDS = 3,
-    HULL_DIRECTIONS = 160  /* at most, in a round */
+    HULL_DIRECTIONS = 160, /* at most, in a round */
+    TABLE = 1024           /* of normals */
 };
 
 struct ebpo_envelope_scratch {
@@ -27,6 +29,7 @@ struct ebpo_envelope_scratch {
     int count;
     uint32_t tried[2 * EBPO_PLANES_CANDIDATES]; /* normals, of candidates and of those that were dropped */
     int tried_count;
+    uint32_t normals[TABLE];                    /* 1 + normal, by hash */
     double core[EBPO_HULL_POINTS][3]; /* extreme points of the solid in the cell */
     int core_count;
     ebpo_hull_facet facet[EBPO_HULL_FACETS];
@@ -83,7 +86,7 @@ static void try_normal(ebpo_envelope_scratch *s, uint32_t normal, const ebpo_pol
     int32_t n[3], d;
     ebpo_plane_code_decode(normal, n, &d);
     double enough = hopeless(envelope, volume, n, epsilon);
-    double support = ebpo_supports_find(&s->supports, n, enough, where);
+    double support = ebpo_supports_find_from(&s->supports, n, enough, (const double (*)[3])s->core, s->core_count, where);
     if (support < enough && s->count < EBPO_PLANES_CANDIDATES)
         s->candidates[s->count++] = (ebpo_candidate){ .normal = normal, .support = support };
     if (s->tried_count < 2 * EBPO_PLANES_CANDIDATES)
@@ -118,7 +121,7 @@ static void look_around(ebpo_envelope_scratch *s)
         int32_t n[3], d;
         if (!ebpo_plane_code_normal(way, &normal) || !ebpo_plane_code_decode(normal, n, &d))
             continue;
-        if (ebpo_supports_find(&s->supports, n, 1e300, where) > -1e300)
+        if (ebpo_supports_find_from(&s->supports, n, 1e300, (const double (*)[3])s->core, s->core_count, where) > -1e300)
             add_core(s, where);
     }
 }
@@ -135,7 +138,7 @@ static bool was_tried(const ebpo_envelope_scratch *s, uint32_t normal)
 static bool hull_round(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, double volume, double epsilon, int most)
 {
     static const double worth = 1e-3; /* of the cell */
-    int facets = ebpo_hull_facets((const double (*)[3])s->core, s->core_count, s->facet, EBPO_HULL_FACETS), before = s->core_count;
+    int facets = ebpo_hull_facets((const double (*)[3])s->core, s->core_count, 1e-9, s->facet, EBPO_HULL_FACETS), before = s->core_count;
     qsort(s->facet, (size_t)facets, sizeof *s->facet, ebpo_hull_by_area);
     for (int i = 0; i < facets && most > 0; i++) {
         const ebpo_hull_facet *f = &s->facet[i];
@@ -153,9 +156,61 @@ static bool hull_round(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, 
 
 static void try_hull(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, double volume, double epsilon, int most)
 {
-    look_around(s);
     for (int round = 0; round < HULL_ROUNDS && hull_round(s, envelope, volume, epsilon, most); round++)
         ;
+}
+
+/* --- few points --- */
+
+/* Points so near to the hull give directions that are hardly different. */
+static const double hull_tolerance = 1e-3;
+
+/* All points of the node; false when they are too many, or some are known by their bounds only. */
+static bool take_points(ebpo_envelope_scratch *s)
+{
+    const ebpo_supports *from = &s->supports;
+    if (from->begin < from->end || from->count > EBPO_HULL_POINTS)
+        return false;
+    for (uint64_t i = 0; i < from->count; i++) {
+        for (int k = 0; k < 3; k++)
+            s->core[i][k] = from->point[i / 4][k][i % 4];
+    }
+    s->core_count = (int)from->count;
+    return true;
+}
+
+/* False when the table has it. */
+static bool new_normal(ebpo_envelope_scratch *s, uint32_t normal)
+{
+    uint32_t at = normal * 2654435761u >> 22;
+    for (; s->normals[at]; at = (at + 1) % TABLE)
+        if (s->normals[at] == 1 + normal)
+            return false;
+    s->normals[at] = 1 + normal;
+    return true;
+}
+
+/* The hull's facets as candidates; the volume of the hull, or -1 when there is none. */
+static double hull_candidates(ebpo_envelope_scratch *s, double tolerance)
+{
+    int facets = ebpo_hull_facets((const double (*)[3])s->core, s->core_count, tolerance, s->facet, EBPO_HULL_FACETS);
+    if (facets == 0)
+        return -1;
+    if (facets > EBPO_PLANES_CANDIDATES)
+        qsort(s->facet, (size_t)facets, sizeof *s->facet, ebpo_hull_by_area);
+    memset(s->normals, 0, sizeof s->normals);
+    double volume = 0;
+    for (int i = 0; i < facets; i++) {
+        uint32_t normal;
+        int32_t n[3], d;
+        volume += s->facet[i].area * s->facet[i].d / 3;
+        if (s->count == EBPO_PLANES_CANDIDATES || !ebpo_plane_code_normal(s->facet[i].n, &normal) || !new_normal(s, normal))
+            continue;
+        double where[3];
+        ebpo_plane_code_decode(normal, n, &d);
+        s->candidates[s->count++] = (ebpo_candidate){ .normal = normal, .support = ebpo_supports_find(&s->supports, n, 1e300, where) };
+    }
+    return fmax(0, volume);
 }
 
 /* --- the node --- */
@@ -166,25 +221,37 @@ static double top_share(double volume)
     return 0.1 * sqrt(fmax(0, volume));
 }
 
-static int choose_now(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo_branch *branch, const ebpo_build_detail *detail, ebpo_cell cell,
-                      int32_t winding, ebpo_polytope *envelope, uint32_t *codes)
+static void choose_directions(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo_branch *branch, const ebpo_build_detail *detail, int level, const ebpo_polytope *envelope,
+                              double volume, double epsilon)
 {
-    bool top = cell.level <= TOP_LEVELS;
+    bool top = level <= TOP_LEVELS;
     ebpo_candidate faces[EBPO_PLANES_CANDIDATES];
-    int count = ebpo_build_candidates(b, branch, detail, top ? EBPO_PLANES_CANDIDATES / 2 : FACES_BELOW, faces);
-    if (!ebpo_supports_gather(&s->supports, b, branch, detail, cell, winding))
-        return -1;
-    double volume = ebpo_polytope_volume(envelope), epsilon = b->options->epsilon * (top ? top_share(volume) : 1);
-    s->count = s->tried_count = s->core_count = 0;
-    for (int i = 0; i < count && volume > 0; i++) {
+    int count = ebpo_build_candidates(b, branch, detail, FACES_BELOW, faces);
+    s->core_count = 0;
+    look_around(s);
+    for (int i = 0; i < count; i++) {
         double where[3];
         try_normal(s, faces[i].normal, envelope, volume, epsilon, where);
         add_core(s, where);
     }
-    if (volume > 0)
-        try_hull(s, envelope, volume, epsilon, top ? HULL_DIRECTIONS : HULL_BELOW);
-    ebpo_choice choice = { .candidates = s->candidates, .count = s->count,
-                           .most = cell.level <= MANY_LEVELS ? 2 * EBPO_PLANES_MAX : EBPO_PLANES_MAX, .epsilon = epsilon, .reach = ebpo_needle };
+    try_hull(s, envelope, volume, epsilon, top ? HULL_DIRECTIONS : HULL_BELOW);
+}
+
+static int choose_now(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo_branch *branch, const ebpo_build_detail *detail, ebpo_cell cell,
+                      int32_t winding, ebpo_polytope *envelope, uint32_t *codes)
+{
+    if (!ebpo_supports_gather(&s->supports, b, branch, detail, cell, winding))
+        return -1;
+    double volume = ebpo_polytope_volume(envelope), epsilon = b->options->epsilon * (cell.level <= TOP_LEVELS ? top_share(volume) : 1);
+    ebpo_choice choice = { .candidates = s->candidates, .most = cell.level <= MANY_LEVELS ? 2 * EBPO_PLANES_MAX : EBPO_PLANES_MAX, .epsilon = epsilon, .reach = ebpo_needle };
+    s->count = s->tried_count = s->core_count = 0;
+    if (!(volume > 0))
+        return 0;
+    if (!take_points(s) || (choice.core = hull_candidates(s, cell.level <= TOP_LEVELS ? 1e-9 : hull_tolerance)) < 0) {
+        choose_directions(b, s, branch, detail, cell.level, envelope, volume, epsilon);
+        choice.core = 0;
+    }
+    choice.count = s->count;
     return ebpo_select_greedy(envelope, &choice, codes);
 }
 

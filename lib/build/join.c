@@ -4,7 +4,9 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/parallel.h"
 #include "build/builder.h"
+#include "build/slices.h"
 #include "build/top.h"
 
 typedef struct joiner {
@@ -12,7 +14,15 @@ typedef struct joiner {
     ebpo_out **stretch; /* depth first: pieces of the top and whole subtrees by turns */
     uint64_t count, capacity;
     ebpo_out *current;
+    ebpo_level *level; /* what comes out */
 } joiner;
+
+static const char stage[] = "joining levels";
+
+static ebpo_status no_memory(const ebpo_builder *b, ebpo_error *error)
+{
+    return ebpo_workspace_fail_while(b->workspace, "while joining levels", error);
+}
 
 static bool push(joiner *j, ebpo_out *out)
 {
@@ -77,68 +87,115 @@ static bool walk(joiner *j, uint32_t index, ebpo_cell cell, int32_t winding)
     return true;
 }
 
-typedef struct slice {
-    size_t array, count; /* offsets in ebpo_level of the pointer and of its length */
-    size_t size;
-} slice;
-
-#define SLICE(array, count, type) { offsetof(ebpo_level, array), offsetof(ebpo_level, count), sizeof(type) }
-static const slice slices[] = {
-    SLICE(types, group_count, uint16_t), SLICE(plane_counts, gray_count, uint8_t), SLICE(planes, plane_count, uint32_t),
-    SLICE(leaf_winding, leaf_count, int32_t), SLICE(black_winding, black_count, int32_t),
-    SLICE(white_winding, white_count, int32_t), SLICE(leaf_first, leaf_count, uint64_t),
-    SLICE(leaf_new, leaf_count, uint32_t), SLICE(leaf_ref_count, leaf_count, uint32_t),
-    SLICE(leaf_refs, ref_count, uint32_t), SLICE(leaf_plane_counts, leaf_count, uint8_t),
-    SLICE(leaf_planes, leaf_plane_count, uint32_t)
-};
-#undef SLICE
-
-static void *array_of(const ebpo_level *level, const slice *s)
+/* Arrays may share a count. */
+static void count_slices(const joiner *j, int level)
 {
-    void *array;
-    memcpy(&array, (const char *)level + s->array, sizeof array);
-    return array;
+    for (size_t s = 0; s < EBPO_SLICES; s++) {
+        uint64_t total = 0;
+        for (uint64_t i = 0; i < j->count; i++)
+            total += ebpo_slice_count(&j->stretch[i][level].level, &ebpo_slices[s]);
+        memcpy((char *)&j->level[level] + ebpo_slices[s].count, &total, sizeof total);
+    }
 }
 
-static uint64_t count_of(const ebpo_level *level, const slice *s)
+static bool join_slice(const joiner *j, int level, const ebpo_slice *s, ebpo_level *out)
 {
-    uint64_t count;
-    memcpy(&count, (const char *)level + s->count, sizeof count);
-    return count;
-}
-
-static bool join_slice(const joiner *j, int level, const slice *s, ebpo_level *out)
-{
-    uint64_t total = 0;
-    for (uint64_t i = 0; i < j->count; i++)
-        total += count_of(&j->stretch[i][level].level, s);
-    memcpy((char *)out + s->count, &total, sizeof total);
+    uint64_t total = ebpo_slice_count(out, s);
     if (!total)
         return true;
-    char *to = ebpo_alloc(total, s->size);
+    char *to = ebpo_array_alloc(j->b->workspace, total, s->size);
     if (!to)
         return false;
     memcpy((char *)out + s->array, &to, sizeof to);
     for (uint64_t i = 0; i < j->count; i++) {
         ebpo_level *from = &j->stretch[i][level].level;
-        void *array = array_of(from, s), *none = NULL;
-        size_t bytes = (size_t)(count_of(from, s) * s->size);
+        void *array = ebpo_slice_array(from, s), *none = NULL;
+        size_t bytes = (size_t)(ebpo_slice_count(from, s) * s->size);
         if (array)
             memcpy(to, array, bytes);
         to += bytes;
-        free(array);
+        if (!j->stretch[i][level].packed)
+            free(array);
         memcpy((char *)from + s->array, &none, sizeof none);
+        ebpo_workspace_settle(j->b->workspace);
     }
     return true;
 }
 
-/* Arrays that say only what is understood anyway are left out. */
-static void drop_if_all(int32_t **array, uint64_t count, int32_t value)
+static int compare_numbers(const void *a, const void *b)
 {
-    for (uint64_t i = 0; i < count; i++)
+    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
+}
+
+static void sort_numbers(uint32_t *a, uint64_t n)
+{
+    if (n > 32) {
+        qsort(a, n, sizeof *a, compare_numbers);
+        return;
+    }
+    for (uint64_t i = 1; i < n; i++) {
+        uint32_t v = a[i];
+        uint64_t j = i;
+        for (; j > 0 && a[j - 1] > v; j--)
+            a[j] = a[j - 1];
+        a[j] = v;
+    }
+}
+
+enum { LEAF_GRAIN = 1 << 13 };
+
+typedef struct numbering {
+    const ebpo_builder *b;
+    ebpo_level *level;
+    uint64_t *first; /* of each block of leaves: its place in leaf_refs */
+} numbering;
+
+/* Leaves refer to faces by their numbers along the curve, as other pieces' final ones were not known: now they are. */
+static ebpo_status number_block(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+{
+    numbering *n = context;
+    ebpo_level *l = n->level;
+    uint32_t *refs = l->leaf_refs + n->first[begin / LEAF_GRAIN];
+    (void)worker, (void)error;
+    for (uint64_t i = begin; i < end; refs += l->leaf_ref_count[i++]) {
+        ebpo_workspace_settle_often(n->b->workspace, i);
+        for (uint32_t k = 0; k < l->leaf_ref_count[i]; k++)
+            refs[k] = n->b->number[refs[k]];
+        sort_numbers(refs, l->leaf_ref_count[i]);
+    }
+    return EBPO_OK;
+}
+
+/* `all`: references of all levels, of which `before` have been numbered. */
+static ebpo_status number_refs(const ebpo_builder *b, ebpo_level *l, uint64_t before, uint64_t all, ebpo_error *error)
+{
+    if (!l->ref_count)
+        return EBPO_OK;
+    numbering n = { b, l, ebpo_alloc(l->leaf_count / LEAF_GRAIN + 1, sizeof *n.first) };
+    if (!n.first)
+        return no_memory(b, error);
+    for (uint64_t i = 0, refs = 0; i < l->leaf_count; refs += l->leaf_ref_count[i++]) {
+        ebpo_workspace_settle_at(b->workspace, i);
+        if (i % LEAF_GRAIN == 0)
+            n.first[i / LEAF_GRAIN] = refs;
+    }
+    ebpo_pass pass = { &b->options->progress, all + before, all + before + l->ref_count, 2 * all };
+    ebpo_progress progress = ebpo_pass_progress(&pass);
+    ebpo_status status = ebpo_parallel_for(b->threads, l->leaf_count, LEAF_GRAIN, number_block, &n, &progress, stage, error);
+    free(n.first);
+    return status;
+}
+
+/* Arrays that say only what is understood anyway are left out. */
+static void drop_if_all(const ebpo_builder *b, int32_t **array, uint64_t count, int32_t value)
+{
+    for (uint64_t i = 0; i < count; i++) {
+        ebpo_workspace_settle_at(b->workspace, i);
         if ((*array)[i] != value)
             return;
-    free(*array);
+    }
+    ebpo_array_free(*array);
     *array = NULL;
 }
 
@@ -146,15 +203,15 @@ static void drop(void *array)
 {
     void *block, *none = NULL;
     memcpy(&block, array, sizeof block);
-    free(block);
+    ebpo_array_free(block);
     memcpy(array, &none, sizeof none);
 }
 
 static void leave_out(const ebpo_builder *b, ebpo_level *l)
 {
     uint32_t parts = b->options->parts;
-    drop_if_all(&l->black_winding, l->black_count, 1);
-    drop_if_all(&l->white_winding, l->white_count, 0);
+    drop_if_all(b, &l->black_winding, l->black_count, 1);
+    drop_if_all(b, &l->white_winding, l->white_count, 0);
     if (!b->solid)
         drop(&l->leaf_winding);
     if (!(parts & EBPO_PART_LEAF_PLANES))
@@ -170,19 +227,29 @@ static void leave_out(const ebpo_builder *b, ebpo_level *l)
     l->ref_count = l->new_count = 0;
 }
 
-static bool join_level(const joiner *j, int level, ebpo_level *out)
+static ebpo_status join_slices(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
 {
-    for (size_t s = 0; s < sizeof slices / sizeof *slices; s++)
-        if (!join_slice(j, level, &slices[s], out))
-            return false;
+    joiner *j = context;
+    (void)worker;
+    for (uint64_t i = begin; i < end; i++)
+        if (!join_slice(j, (int)(i / EBPO_SLICES), &ebpo_slices[i % EBPO_SLICES], &j->level[i / EBPO_SLICES]))
+            return no_memory(j->b, error);
+    return EBPO_OK;
+}
+
+/* Volumes are added in one order whatever the number of threads. */
+static ebpo_status finish_level(const joiner *j, int level, uint64_t before, uint64_t all, ebpo_error *error)
+{
+    ebpo_level *out = &j->level[level];
     for (uint64_t i = 0; i < j->count; i++) {
         const ebpo_level *l = &j->stretch[i][level].level;
         out->gray_volume += l->gray_volume;
         out->leaf_volume += l->leaf_volume;
         out->new_count += l->new_count;
     }
+    ebpo_status status = j->b->options->parts & EBPO_PART_MESH ? number_refs(j->b, out, before, all, error) : EBPO_OK;
     leave_out(j->b, out);
-    return true;
+    return status;
 }
 
 static void summarise(ebpo_tree *out, int level)
@@ -197,16 +264,27 @@ static void summarise(ebpo_tree *out, int level)
 static bool root_group(joiner *j)
 {
     ebpo_builder *b = j->b;
-    ebpo_out *first = b->top.nodes[0].type == EBPO_LEAF ? b->sub[0].out : current(j);
+    ebpo_out *first = current(j); /* never a piece's, whose arrays may be packed */
     return first && ebpo_emit_group(&first[0], (uint16_t)type_of(b, &b->top.nodes[0], 0));
 }
 
 ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error)
 {
-    joiner j = { .b = b };
-    bool fine = root_group(&j) && walk(&j, 0, b->top.cell, 0);
-    for (int level = 0; level < EBPO_LEVELS_MAX && fine; level++) {
-        fine = join_level(&j, level, &out->level[level]);
+    joiner j = { .b = b, .level = out->level };
+    ebpo_status status = root_group(&j) && walk(&j, 0, b->top.cell, 0) ? EBPO_OK : no_memory(b, error);
+    uint64_t refs = 0, all = 0;
+    for (int level = 0; level < EBPO_LEVELS_MAX && status == EBPO_OK; level++) {
+        count_slices(&j, level);
+        all += out->level[level].ref_count;
+    }
+    ebpo_pass pass = { &b->options->progress, 0, all, 2 * all };
+    ebpo_progress progress = ebpo_pass_progress(&pass);
+    if (status == EBPO_OK)
+        status = ebpo_parallel_for(b->threads, EBPO_LEVELS_MAX * EBPO_SLICES, 1, join_slices, &j, &progress, stage, error);
+    for (int level = 0; level < EBPO_LEVELS_MAX && status == EBPO_OK; level++) {
+        uint64_t own = out->level[level].ref_count;
+        status = finish_level(&j, level, refs, all, error);
+        refs += own;
         if (out->level[level].group_count)
             out->info.level_count = level + 1;
         summarise(out, level);
@@ -214,5 +292,7 @@ ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error
     for (uint64_t i = 0; i < j.count; i++)
         ebpo_out_free(j.stretch[i]);
     free(j.stretch);
-    return fine ? EBPO_OK : ebpo_fail(error, EBPO_E_MEMORY, "out of memory while joining levels");
+    ebpo_store_free(b->store);
+    b->store = NULL;
+    return status;
 }

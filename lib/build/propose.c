@@ -36,9 +36,11 @@ void ebpo_proposals_free(ebpo_proposals *p)
 {
     if (!p)
         return;
-    free(p->first);
-    free(p->count);
-    free(p->codes);
+    if (!p->packed) {
+        free(p->first);
+        free(p->count);
+        free(p->codes);
+    }
     handover_free(&p->root);
     free(p);
 }
@@ -78,10 +80,10 @@ static int by_normal_alone(const void *a, const void *b)
     return (x->normal > y->normal) - (x->normal < y->normal);
 }
 
-/* Of equal normals one is left. Their supports are still to be found. */
 /* More candidates than that are thinned out evenly: only leaves without a limit of faces have so many, and k-medoids looks at all pairs. */
 enum { CANDIDATES_MOST = 4096 };
 
+/* Of equal normals one is left. Their supports are still to be found. */
 static bool make_candidates(proposer *p, ebpo_handover *given)
 {
     uint64_t kept = 0;
@@ -166,20 +168,20 @@ static bool offer_faces(proposer *p, const ebpo_build_detail *d, ebpo_cell cell,
 {
     const ebpo_builder *b = p->b;
     for (uint64_t i = d->entry_begin; i < d->entry_end; i++) {
-        uint32_t face = p->s->entries[i];
         ebpo_triangle t;
+        uint32_t normal;
         int32_t n[3], e;
         double origin = 0;
-        if (b->normal[face] == EBPO_NO_NORMAL)
+        ebpo_branch_triangle(b, p->s, p->s->entries[i], &t);
+        if (!ebpo_face_normal_code(&b->box, &t, &normal))
             continue;
-        ebpo_build_triangle(b, face, &t);
-        ebpo_plane_code_decode(b->normal[face], n, &e);
+        ebpo_plane_code_decode(normal, n, &e);
         for (int k = 0; k < 3; k++) {
             double corner = ebpo_wall(&b->box, k, cell.level, cell.at[k]), size = b->box.size[k] / (double)(1u << cell.level);
             for (int c = 0; c < 3; c++)
                 origin += n[k] * ((t.corner[c][k] - corner) / size) / 3;
         }
-        if (!add_offer(given, b->normal[face], origin))
+        if (!add_offer(given, normal, origin))
             return false;
     }
     return true;
@@ -192,7 +194,7 @@ static void leaf_supports(proposer *p, const ebpo_build_detail *d, ebpo_cell cel
     for (uint64_t i = d->entry_begin; i < d->entry_end; i++) {
         ebpo_triangle t;
         double points[9][3], slack;
-        ebpo_build_triangle(b, p->s->entries[i], &t);
+        ebpo_branch_triangle(b, p->s, p->s->entries[i], &t);
         int corners = ebpo_clip_triangle(&b->box, cell, &t, points, &slack);
         for (int c = 0; c < corners; c++)
             for (uint64_t j = 0; j < count; j++)
@@ -305,6 +307,32 @@ static ebpo_status no_memory(ebpo_error *error)
     return ebpo_fail(error, EBPO_E_MEMORY, "out of memory while choosing planes");
 }
 
+/* To the builder's store, until the walk down comes by. */
+static ebpo_status pack(ebpo_builder *b, ebpo_branch *s, ebpo_error *error)
+{
+    ebpo_proposals *p = s->proposals;
+    uint64_t n = s->detail_count, bytes = n * (sizeof *p->first + 1) + p->code_count * sizeof *p->codes;
+    if (!b->workspace)
+        return EBPO_OK;
+    uint64_t *first = ebpo_store_room(b, bytes);
+    if (!first)
+        return ebpo_workspace_fail(b->workspace, bytes, error);
+    uint32_t *codes = (uint32_t *)(first + n);
+    uint8_t *count = (uint8_t *)(codes + p->code_count);
+    memcpy(first, p->first, (size_t)n * sizeof *first);
+    memcpy(count, p->count, (size_t)n);
+    if (p->code_count)
+        memcpy(codes, p->codes, (size_t)p->code_count * sizeof *codes);
+    free(p->first);
+    free(p->count);
+    free(p->codes);
+    p->first = first;
+    p->codes = codes;
+    p->count = count;
+    p->packed = true;
+    return EBPO_OK;
+}
+
 static ebpo_status propose_subtrees(void *context, uint64_t first, uint64_t last, unsigned worker, ebpo_error *error)
 {
     ebpo_builder *b = context;
@@ -313,8 +341,13 @@ static ebpo_status propose_subtrees(void *context, uint64_t first, uint64_t last
     (void)worker;
     for (uint64_t i = first; i < last && status == EBPO_OK; i++) {
         p.s = &b->sub[i];
-        if (!begin(p.s) || !propose(&p, 0, p.s->cell, p.s->winding, &p.s->proposals->root))
+        status = ebpo_build_partition(b, p.s, error);
+        if (status == EBPO_OK && (!begin(p.s) || !propose(&p, 0, p.s->cell, p.s->winding, &p.s->proposals->root)))
             status = no_memory(error);
+        if (status == EBPO_OK)
+            status = pack(b, p.s, error);
+        ebpo_branch_forget(p.s);
+        ebpo_workspace_settle(b->workspace);
     }
     end(&p);
     return status;
@@ -384,8 +417,11 @@ static ebpo_status propose_top_nodes(void *context, uint64_t first, uint64_t las
         bool good = begin(&alone);
         for (unsigned o = 0; o < 8 && good; o++) {
             const ebpo_build_node *child = &b->top.nodes[node->child + o];
-            if (child->type == EBPO_LEAF)
-                good = gather(&n->given, &b->sub[child->detail].proposals->root, o);
+            if (child->type != EBPO_LEAF)
+                continue;
+            ebpo_handover *root = &b->sub[child->detail].proposals->root;
+            good = gather(&n->given, root, o);
+            handover_free(root);
         }
         good = good && propose_gray(&p, detail, n->cell, n->winding, &n->given, &n->out);
         if (good) {
@@ -420,16 +456,19 @@ static bool note_top(top_list *t)
     return true;
 }
 
-static ebpo_status propose_top(top_list *t, ebpo_error *error)
+static ebpo_status propose_top(top_list *t, ebpo_pass *pass, ebpo_error *error)
 {
     ebpo_builder *b = t->b;
+    ebpo_progress progress = ebpo_pass_progress(pass);
     ebpo_status status = EBPO_OK;
     uint64_t end_of_level = t->count;
     while (end_of_level && status == EBPO_OK) {
         t->base = end_of_level - 1;
         while (t->base && t->nodes[t->base - 1].cell.level == t->nodes[end_of_level - 1].cell.level)
             t->base--;
-        status = ebpo_parallel_for(b->threads, end_of_level - t->base, 1, propose_top_nodes, t, &b->options->progress, "choosing planes", error);
+        pass->begin = pass->end;
+        pass->end += end_of_level - t->base;
+        status = ebpo_parallel_for(b->threads, end_of_level - t->base, 1, propose_top_nodes, t, &progress, "choosing planes", error);
         for (uint64_t i = t->base; i < end_of_level && status == EBPO_OK; i++) {
             top_node *n = &t->nodes[i];
             if (n->parent != UINT64_MAX && !gather(&t->nodes[n->parent].given, &n->out, n->octant))
@@ -447,10 +486,14 @@ ebpo_status ebpo_build_propose(ebpo_builder *b, ebpo_error *error)
         return EBPO_OK;
     top_list t = { .b = b };
     ebpo_status status = list_top(&t) ? EBPO_OK : no_memory(error);
+    ebpo_pass pass = { &b->options->progress, 0, b->sub_count, b->sub_count + t.count };
+    ebpo_progress progress = ebpo_pass_progress(&pass);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(b->threads, b->sub_count, 1, propose_subtrees, b, &b->options->progress, "choosing planes", error);
+        status = ebpo_parallel_for(b->threads, b->sub_count, 1, propose_subtrees, b, &progress, "choosing planes", error);
+    atomic_store(&b->leaf_count, 0); /* the pieces are made once more */
+    atomic_store(&b->entry_count, 0);
     if (status == EBPO_OK)
-        status = propose_top(&t, error);
+        status = propose_top(&t, &pass, error);
     if (status == EBPO_OK && !note_top(&t))
         status = no_memory(error);
     for (uint64_t i = 0; i < t.count; i++) {

@@ -23,10 +23,11 @@ typedef struct ebpo_proposals {
     uint8_t *count;  /* [detail_count] */
     uint32_t *codes;
     uint64_t code_count, code_room;
+    bool packed;     /* the arrays are in the builder's store */
     ebpo_handover root; /* a subtree's, until the top has used it */
 } ebpo_proposals;
 
-/* All branches; nothing to do for a selection from the root. After labels (which tell windings) and numbering. */
+/* All branches; nothing to do for a selection from the root. After labels (which tell windings). Pieces are partitioned for it, and forgotten again. */
 EBPO_MUST_USE ebpo_status ebpo_build_propose(ebpo_builder *b, ebpo_error *error);
 
 /* The planes of a node; NULL when the selection works from the root. */

@@ -3,14 +3,18 @@
 #define EBPO_BUILD_SUPPORTS_H
 
 #include "build/builder.h"
-
-typedef double ebpo_pair __attribute__((vector_size(16)));
+#include "planes/sweep.h"
 
 typedef struct ebpo_supports {
     const ebpo_builder *b;
     ebpo_cell cell;
-    ebpo_pair (*point)[4];     /* two points: cell coordinates, and what rounding may add to a support */
-    uint64_t count, capacity;  /* points; twos */
+    double (*point)[4][4];     /* four points: cell coordinates, and what rounding may add to a support (see sweep.h) */
+    uint64_t count, capacity;  /* points; fours */
+    const ebpo_sweep *sweep;
+    uint16_t *place;           /* by hash: 1 + number of the point; most come several times. */
+    uint64_t place_capacity, place_count; /* a power of two */
+    double (*box)[7];          /* of each stretch of points: least and greatest coordinates, greatest slack */
+    uint64_t box_capacity;
     uint64_t begin, end;       /* vertices that are not among the points: looked at through their bounds */
 } ebpo_supports;
 
@@ -21,6 +25,9 @@ bool ebpo_supports_gather(ebpo_supports *s, const ebpo_builder *b, const ebpo_br
 /* An upper bound of n . xi, exact but for roundings that ebpo_plane_code_offset allows for; a search that has reached `enough` ends there. `where` is the point that reaches
  * it, in cell coordinates. -1e300 when there are no points. */
 double ebpo_supports_find(const ebpo_supports *s, const int32_t n[3], double enough, double where[3]);
+
+/* The same, with points of the solid that were found before: the search among vertices begins with the best of them. */
+double ebpo_supports_find_from(const ebpo_supports *s, const int32_t n[3], double enough, const double (*known)[3], int known_count, double where[3]);
 
 void ebpo_supports_free(ebpo_supports *s);
 

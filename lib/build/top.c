@@ -21,9 +21,9 @@ typedef struct wave {
     uint64_t count, capacity;
 } wave;
 
-static ebpo_status no_memory(ebpo_error *error)
+static ebpo_status no_memory(const ebpo_builder *b, ebpo_error *error)
 {
-    return ebpo_fail(error, EBPO_E_MEMORY, "out of memory while computing envelopes");
+    return ebpo_workspace_fail_while(b->workspace, "while computing envelopes", error);
 }
 
 static ebpo_status wave_envelopes(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
@@ -41,7 +41,7 @@ static ebpo_status wave_envelopes(void *context, uint64_t begin, uint64_t end, u
             t->count = ebpo_gray_planes(b, scratch, &b->top, detail, p->cell, p->winding, p->envelope, t->codes);
         t->volume = ebpo_polytope_volume(p->envelope) * ebpo_cell_volume(b, p->cell.level);
         if (t->count < 0)
-            status = no_memory(error);
+            status = no_memory(b, error);
     }
     ebpo_scratch_free(scratch);
     return status;
@@ -59,7 +59,7 @@ static bool hand_down(ebpo_builder *b, const pending *p, wave *next)
         const ebpo_build_node *child = &b->top.nodes[node->child + o];
         if (child->type == EBPO_WHITE)
             continue;
-        ebpo_polytope *envelope = ebpo_alloc(1, sizeof *envelope);
+        ebpo_polytope *envelope = ebpo_array_alloc(b->workspace, 1, sizeof *envelope);
         if (!envelope)
             return false;
         ebpo_polytope_child(p->envelope, o, envelope);
@@ -69,7 +69,7 @@ static bool hand_down(ebpo_builder *b, const pending *p, wave *next)
             continue;
         }
         if (!ebpo_grow(&next->nodes, &next->capacity, next->count + 1, sizeof *next->nodes)) {
-            free(envelope);
+            ebpo_array_free(envelope);
             return false;
         }
         next->nodes[next->count++] = (pending){ node->child + o, ebpo_child_cell(p->cell, o), p->winding + offset[o], envelope };
@@ -80,24 +80,24 @@ static bool hand_down(ebpo_builder *b, const pending *p, wave *next)
 static void wave_free(wave *w)
 {
     for (uint64_t i = 0; i < w->count; i++)
-        free(w->nodes[i].envelope);
+        ebpo_array_free(w->nodes[i].envelope);
     free(w->nodes);
     *w = (wave){ .b = w->b };
 }
 
 static ebpo_status start(ebpo_builder *b, wave *w, ebpo_error *error)
 {
-    ebpo_polytope *cube = ebpo_alloc(1, sizeof *cube);
+    ebpo_polytope *cube = ebpo_array_alloc(b->workspace, 1, sizeof *cube);
     if (!cube)
-        return no_memory(error);
+        return no_memory(b, error);
     ebpo_polytope_cube(cube);
     if (b->top.nodes[0].type == EBPO_LEAF) { /* a small model is one subtree */
         b->sub[0].above = cube;
         return EBPO_OK;
     }
     if (!ebpo_grow(&w->nodes, &w->capacity, 1, sizeof *w->nodes)) {
-        free(cube);
-        return no_memory(error);
+        ebpo_array_free(cube);
+        return no_memory(b, error);
     }
     w->nodes[w->count++] = (pending){ 0, b->top.cell, 0, cube };
     return EBPO_OK;
@@ -107,14 +107,18 @@ ebpo_status ebpo_build_top(ebpo_builder *b, ebpo_error *error)
 {
     b->top_envelope = ebpo_alloc_zero(b->top.detail_count + 1, sizeof *b->top_envelope);
     if (!b->top_envelope)
-        return no_memory(error);
+        return no_memory(b, error);
     wave now = { .b = b }, next = { .b = b };
     ebpo_status status = start(b, &now, error);
+    ebpo_pass pass = { &b->options->progress, 0, 0, b->top.detail_count };
+    ebpo_progress progress = ebpo_pass_progress(&pass);
     while (status == EBPO_OK && now.count) {
-        status = ebpo_parallel_for(b->threads, now.count, 1, wave_envelopes, &now, &b->options->progress, "top envelopes", error);
+        pass.begin = pass.end;
+        pass.end += now.count;
+        status = ebpo_parallel_for(b->threads, now.count, 1, wave_envelopes, &now, &progress, "top envelopes", error);
         for (uint64_t i = 0; i < now.count && status == EBPO_OK; i++)
             if (!hand_down(b, &now.nodes[i], &next))
-                status = no_memory(error);
+                status = no_memory(b, error);
         wave_free(&now);
         now = next;
         next = (wave){ .b = b };

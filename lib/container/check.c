@@ -7,6 +7,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/workspace.h"
 #include "container/schema.h"
 #include "geom/plane_code.h"
 
@@ -31,9 +32,11 @@ static ebpo_status check_types(const ebpo_check *check, const ebpo_info *info, i
         return ebpo_check_fail(check, level, "types", "there is not one group for each gray node of the level above", error);
     if (level == 0 && arrays->types[0] > 3)
         return ebpo_check_fail(check, level, "types", "the root has siblings", error);
-    for (uint64_t i = 0; i < groups; i++)
+    for (uint64_t i = 0; i < groups; i++) {
+        ebpo_settle_all_at(i);
         for (int octant = 0; octant < (level ? 8 : 1); octant++)
             counts[arrays->types[i] >> 2 * octant & 3]++;
+    }
     if (info->pruned && level) {
         uint64_t empty = 0;
         for (uint64_t i = 0; i < groups; i++)
@@ -60,6 +63,7 @@ static ebpo_status check_planes(const ebpo_check *check, int level, const char *
         return ebpo_check_fail(check, level, counts_name, "the counts do not add up to the number of planes", error);
     for (uint64_t i = 0; i < plane_count; i++) {
         int32_t n[3], d;
+        ebpo_settle_all_at(i);
         if (!ebpo_plane_code_decode(planes[i], n, &d))
             return ebpo_check_fail(check, level, planes_name, "a code stands for no plane", error);
     }
@@ -81,11 +85,11 @@ static ebpo_status check_windings(const ebpo_check *check, const ebpo_info *info
     if (arrays->leaf_count && !arrays->leaf_winding)
         return ebpo_check_fail(check, level, "leaf_winding", "the array is missing", error);
     if (arrays->black_winding)
-        for (uint64_t i = 0; i < arrays->black_count; i++)
+        for (uint64_t i = 0; i < arrays->black_count; ebpo_settle_all_at(i++))
             if (!ebpo_check_inside(info->rule, arrays->black_winding[i]))
                 return ebpo_check_fail(check, level, "black_winding", "a black node lies outside by the winding rule", error);
     if (arrays->white_winding)
-        for (uint64_t i = 0; i < arrays->white_count; i++)
+        for (uint64_t i = 0; i < arrays->white_count; ebpo_settle_all_at(i++))
             if (ebpo_check_inside(info->rule, arrays->white_winding[i]))
                 return ebpo_check_fail(check, level, "white_winding", "a white node lies inside by the winding rule", error);
     return EBPO_OK;
@@ -108,6 +112,7 @@ static ebpo_status check_leaves(const ebpo_check *check, const ebpo_info *info, 
         return ebpo_check_fail(check, level, "leaf_skip", "the leaves' face lists are missing", error);
     for (uint64_t i = 0; i < arrays->leaf_count; i++) {
         uint64_t first = arrays->leaf_first[i];
+        ebpo_settle_all_at(i);
         if (first < end || first > info->face_count || arrays->leaf_new[i] > info->face_count - first)
             return ebpo_check_fail(check, level, "leaf_skip", "a leaf's new faces overlap another's or lie beyond the last face", error);
         end = first + arrays->leaf_new[i];
@@ -179,12 +184,14 @@ ebpo_status ebpo_check_order(const ebpo_check *check, const ebpo_tree *tree, ebp
 ebpo_status ebpo_check_map(const ebpo_check *check, const char *array, const uint32_t *map, uint64_t count, uint64_t limit,
                            ebpo_error *error)
 {
+    limit = limit <= UINT32_MAX ? limit : UINT64_C(1) << 32; /* all that 32 bits can name */
     uint64_t *seen = ebpo_alloc_zero(limit / 64 + 1, sizeof *seen);
     if (!seen)
         return ebpo_fail_memory(error, limit / 8);
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
         uint64_t bit = UINT64_C(1) << map[i] % 64;
+        ebpo_settle_all_at(i);
         if (map[i] >= limit || seen[map[i] / 64] & bit)
             status = ebpo_check_fail(check, -1, array, "a source number is out of range or used twice", error);
         else
@@ -197,7 +204,7 @@ ebpo_status ebpo_check_map(const ebpo_check *check, const char *array, const uin
 ebpo_status ebpo_check_finite(const ebpo_check *check, const ebpo_mesh *mesh, ebpo_error *error)
 {
     bool finite = true;
-    for (uint64_t i = 0; i < mesh->vertex_count * 3; i++)
+    for (uint64_t i = 0; i < mesh->vertex_count * 3; ebpo_settle_all_at(i++))
         finite &= mesh->xyz32 ? isfinite(mesh->xyz32[i]) : isfinite(mesh->xyz64[i]);
     return finite ? EBPO_OK : ebpo_check_fail(check, -1, "/mesh/vertices", "a coordinate is not a finite number", error);
 }

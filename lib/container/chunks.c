@@ -7,6 +7,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/workspace.h"
 #include "codec/coding.h"
 #include "container/slice_parts.h"
 
@@ -337,7 +338,7 @@ void ebpo_chunks_free(ebpo_chunks *chunks)
         chunks->idle = desk->next;
         free_desk(desk);
     }
-    free(chunks->seen);
+    ebpo_array_free(chunks->seen);
     free(chunks->ahead);
     pthread_mutex_destroy(&chunks->lock);
     free(chunks);

@@ -12,7 +12,7 @@
 #include "ebpo_config.h"
 
 static const char FORMAT[] = "EBP-Octree in HDF5";
-static const char FORMAT_VERSION[] = "1.0-draft";
+static const char FORMAT_VERSION[] = "1.0", DRAFT[] = "1.0-draft";
 static const char ABOUT[] = "A triangle mesh with an octree of convex envelopes (EBP-Octree), level by level: /levels/00 and so on, "
                             "then /mesh, then /maps. Each array's attributes name its coding; the specification is format-spec/README.md of ebpo.";
 
@@ -366,6 +366,9 @@ static ebpo_status get_version(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info,
     if (status == EBPO_OK && info->version_major != EBPO_FORMAT_MAJOR)
         status = ebpo_fail(error, EBPO_E_VERSION, "%s: format version %d.%d, and this library reads version %d; use a newer one", in->shown,
                            info->version_major, info->version_minor, EBPO_FORMAT_MAJOR);
+    char words[32]; /* they are for people, but files of the draft have the same numbers */
+    if (status == EBPO_OK && ebpo_h5_get_text(in, root, "/", "format_version", words, sizeof words, NULL) == EBPO_OK && strcmp(words, DRAFT) == 0)
+        status = ebpo_fail(error, EBPO_E_VERSION, "%s: was written while the format was a draft, which is not read any more; convert the model again", in->shown);
     return status;
 }
 

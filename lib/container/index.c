@@ -1,5 +1,6 @@
 /* Prefix sums that let a reader start in the middle of a level. Arrays of an absent part count as zeros. */
 #include "base/alloc.h"
+#include "base/workspace.h"
 #include "container/plan.h"
 
 static uint64_t *make(uint64_t count, unsigned cols)
@@ -12,6 +13,7 @@ uint64_t *ebpo_index_types(const ebpo_level *level, bool root)
     uint64_t *index = make(level->group_count, 4);
     uint64_t before[4] = { 0, 0, 0, 0 };
     for (uint64_t i = 0; index && i < level->group_count; i++) {
+        ebpo_settle_all_at(i);
         if (i % EBPO_INDEX_ROWS == 0)
             for (int k = 0; k < 4; k++)
                 index[i / EBPO_INDEX_ROWS * 4 + k] = before[k];
@@ -38,6 +40,7 @@ uint64_t *ebpo_index_leaves(const ebpo_level *level)
     uint64_t *index = make(level->leaf_count, 3);
     uint64_t end = 0, refs = 0, planes = 0;
     for (uint64_t i = 0; index && i < level->leaf_count; i++) {
+        ebpo_settle_all_at(i);
         if (i % EBPO_INDEX_ROWS == 0) {
             index[i / EBPO_INDEX_ROWS * 3] = end;
             index[i / EBPO_INDEX_ROWS * 3 + 1] = refs;

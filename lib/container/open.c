@@ -284,6 +284,11 @@ bool ebpo_file_http_stats(const ebpo_file *file, ebpo_http_stats *out)
     return ebpo_source_http_stats(&file->in.source, out);
 }
 
+void ebpo_file_set_workspace(ebpo_file *file, ebpo_workspace *workspace)
+{
+    file->workspace = workspace;
+}
+
 const ebpo_info *ebpo_file_info(const ebpo_file *file)
 {
     return &file->info;

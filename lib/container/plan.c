@@ -7,6 +7,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/workspace.h"
 #include "codec/coding.h"
 #include "container/check.h"
 #include "container/facts.h"
@@ -132,6 +133,7 @@ static ebpo_status index_faces(ebpo_plan *plan, const ebpo_check *check, ebpo_er
         return ebpo_fail_memory(error, mesh->face_count / rows * 8);
     uint64_t seen = 0;
     for (uint64_t i = 0; i < mesh->face_count * 3; i++) {
+        ebpo_settle_all_at(i);
         if (i % (3 * (uint64_t)rows) == 0)
             plan->faces_index[i / (3 * (uint64_t)rows)] = seen;
         if (mesh->faces[i] > seen || mesh->faces[i] >= mesh->vertex_count)
@@ -145,7 +147,7 @@ static ebpo_status index_faces(ebpo_plan *plan, const ebpo_check *check, ebpo_er
 static uint8_t narrow_unsigned(const uint32_t *values, uint64_t count)
 {
     uint32_t all = 0;
-    for (uint64_t i = 0; i < count; i++)
+    for (uint64_t i = 0; i < count; ebpo_settle_all_at(i++))
         all |= values[i];
     return all <= UINT8_MAX ? 1 : all <= UINT16_MAX ? 2 : 4;
 }
@@ -154,6 +156,7 @@ static uint8_t narrow_signed(const int32_t *values, uint64_t count)
 {
     int32_t low = 0, high = 0;
     for (uint64_t i = 0; i < count; i++) {
+        ebpo_settle_all_at(i);
         low = values[i] < low ? values[i] : low;
         high = values[i] > high ? values[i] : high;
     }
@@ -164,6 +167,7 @@ static uint8_t narrow_skips(const ebpo_level *level)
 {
     uint64_t end = 0, all = 0;
     for (uint64_t i = 0; i < level->leaf_count; i++) {
+        ebpo_settle_all_at(i);
         all |= level->leaf_first[i] - end;
         end = level->leaf_first[i] + level->leaf_new[i];
     }
@@ -172,7 +176,7 @@ static uint8_t narrow_skips(const ebpo_level *level)
 
 static bool all_are(const int32_t *values, uint64_t count, int32_t usual)
 {
-    for (uint64_t i = 0; values && i < count; i++)
+    for (uint64_t i = 0; values && i < count; ebpo_settle_all_at(i++))
         if (values[i] != usual)
             return false;
     return true;

@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
+#include "base/workspace.h"
 #include "container/plan.h"
 #include "container/reader.h"
 
@@ -13,18 +14,18 @@ void ebpo_level_free(ebpo_level *level)
 {
     if (!level)
         return;
-    free(level->types);
-    free(level->plane_counts);
-    free(level->planes);
-    free(level->leaf_winding);
-    free(level->black_winding);
-    free(level->white_winding);
-    free(level->leaf_first);
-    free(level->leaf_new);
-    free(level->leaf_ref_count);
-    free(level->leaf_refs);
-    free(level->leaf_plane_counts);
-    free(level->leaf_planes);
+    ebpo_array_free(level->types);
+    ebpo_array_free(level->plane_counts);
+    ebpo_array_free(level->planes);
+    ebpo_array_free(level->leaf_winding);
+    ebpo_array_free(level->black_winding);
+    ebpo_array_free(level->white_winding);
+    ebpo_array_free(level->leaf_first);
+    ebpo_array_free(level->leaf_new);
+    ebpo_array_free(level->leaf_ref_count);
+    ebpo_array_free(level->leaf_refs);
+    ebpo_array_free(level->leaf_plane_counts);
+    ebpo_array_free(level->leaf_planes);
     memset(level, 0, sizeof *level);
 }
 
@@ -34,6 +35,7 @@ static ebpo_status add_up_skips(ebpo_file *file, int number, ebpo_level *level, 
     ebpo_check check = ebpo_reader_check(file);
     uint64_t end = 0, faces = file->info.face_count;
     for (uint64_t i = 0; i < level->leaf_count; i++) {
+        ebpo_workspace_settle_at(file->workspace, i);
         uint64_t skip = level->leaf_first[i];
         if (skip > faces - end || level->leaf_new[i] > faces - end - skip)
             return ebpo_check_fail(&check, number, "leaf_skip", "a leaf's new faces lie beyond the last face", error);
@@ -73,6 +75,7 @@ static ebpo_status decode_refs(void *context, uint64_t begin, uint64_t end, unsi
     (void)worker;
     uint64_t leaf = begin * EBPO_INDEX_ROWS, at = j->index[begin * 3 + 1];
     uint64_t stop = end * EBPO_INDEX_ROWS < j->level->leaf_count ? end * EBPO_INDEX_ROWS : j->level->leaf_count;
+    ebpo_workspace_settle(j->file->workspace);
     for (; leaf < stop; at += j->level->leaf_ref_count[leaf++])
         if (!ebpo_refs_decode(j->level->leaf_refs + at, j->level->leaf_ref_count[leaf], j->level->leaf_first[leaf])) {
             ebpo_check check = ebpo_reader_check(j->file);
@@ -92,7 +95,7 @@ static ebpo_status check_index(ebpo_file *file, ebpo_array_id id, int number, co
         ebpo_check check = ebpo_reader_check(file);
         status = ebpo_check_fail(&check, number, ebpo_schema[id].name, "the index contradicts the arrays that it is about", error);
     }
-    free(stored);
+    ebpo_array_free(stored);
     return status;
 }
 
@@ -108,7 +111,7 @@ static ebpo_status read_faces(ebpo_file *file, int number, ebpo_level *level, un
     if (status != EBPO_OK || !level->leaf_first)
         return status;
     uint64_t refs = 0;
-    for (uint64_t i = 0; i < level->leaf_count; i++)
+    for (uint64_t i = 0; i < level->leaf_count; ebpo_workspace_settle_at(file->workspace, i++))
         refs += level->leaf_ref_count[i];
     ebpo_check check = ebpo_reader_check(file);
     if (refs != level->ref_count)

@@ -6,6 +6,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/fp_env.h"
+#include "base/workspace.h"
 #include "codec/coding.h"
 #include "container/reader.h"
 
@@ -16,8 +17,8 @@ void ebpo_tree_free(ebpo_tree *tree)
     for (int i = 0; i < EBPO_LEVELS_MAX; i++)
         ebpo_level_free(&tree->level[i]);
     ebpo_mesh_free(&tree->mesh);
-    free(tree->vertex_source);
-    free(tree->face_source);
+    ebpo_array_free(tree->vertex_source);
+    ebpo_array_free(tree->face_source);
     memset(tree, 0, sizeof *tree);
 }
 
@@ -63,21 +64,23 @@ static ebpo_status take_faces(void *context, const ebpo_array_in *array, uint64_
     return EBPO_OK;
 }
 
-static ebpo_status make_mesh(const ebpo_info *info, ebpo_mesh *out, ebpo_error *error)
+static ebpo_status make_mesh(ebpo_file *file, ebpo_mesh *out, ebpo_error *error)
 {
+    const ebpo_info *info = &file->info;
+    ebpo_workspace *workspace = out->workspace = file->workspace;
     out->vertex_count = info->vertex_count;
     out->face_count = info->face_count;
     if (info->double_coordinates)
-        out->xyz64 = ebpo_alloc(info->vertex_count, 3 * sizeof *out->xyz64);
+        out->xyz64 = ebpo_array_alloc(workspace, info->vertex_count, 3 * sizeof *out->xyz64);
     else
-        out->xyz32 = ebpo_alloc(info->vertex_count, 3 * sizeof *out->xyz32);
-    out->faces = ebpo_alloc(info->face_count, 3 * sizeof *out->faces);
+        out->xyz32 = ebpo_array_alloc(workspace, info->vertex_count, 3 * sizeof *out->xyz32);
+    out->faces = ebpo_array_alloc(workspace, info->face_count, 3 * sizeof *out->faces);
     snprintf(out->source_name, sizeof out->source_name, "%s", info->source_name);
     snprintf(out->source_format, sizeof out->source_format, "%s", info->source_format);
     memcpy(out->source_sha256, info->source_sha256, sizeof out->source_sha256);
     out->source_size = info->source_size;
     if (!out->faces || (!out->xyz32 && !out->xyz64))
-        return ebpo_fail_memory(error, info->vertex_count * 24 + info->face_count * 12);
+        return ebpo_workspace_fail(workspace, info->vertex_count * 24 + info->face_count * 12, error);
     return EBPO_OK;
 }
 
@@ -92,7 +95,7 @@ ebpo_status ebpo_file_read_mesh(ebpo_file *file, ebpo_mesh *out, unsigned thread
     ebpo_expect_all(&expected);
     mesh_job j = { .file = file, .mesh = out };
     ebpo_check check = ebpo_reader_check(file);
-    ebpo_status status = make_mesh(&file->info, out, error);
+    ebpo_status status = make_mesh(file, out, error);
     if (status == EBPO_OK)
         status = ebpo_reader_rows(file, ebpo_reader_array(file, EBPO_A_VERTICES, 0), threads, take_vertices, &j, error);
     if (status == EBPO_OK)
@@ -101,7 +104,7 @@ ebpo_status ebpo_file_read_mesh(ebpo_file *file, ebpo_mesh *out, unsigned thread
         status = ebpo_reader_make(file, EBPO_A_FACES_INDEX, 0, 1, 8, &j.faces_index, error);
     if (status == EBPO_OK)
         status = ebpo_reader_rows(file, ebpo_reader_array(file, EBPO_A_FACES, 0), threads, take_faces, &j, error);
-    free(j.faces_index);
+    ebpo_array_free(j.faces_index);
     if (status != EBPO_OK)
         ebpo_mesh_free(out);
     return status;
@@ -117,20 +120,20 @@ static ebpo_status take_numbers(void *context, const ebpo_array_in *array, uint6
     return EBPO_OK;
 }
 
-static ebpo_status read_map(ebpo_file *file, ebpo_array_id id, uint64_t limit, unsigned threads, uint32_t **out, ebpo_error *error)
+static ebpo_status read_map(ebpo_file *file, ebpo_workspace *workspace, ebpo_array_id id, uint64_t limit, unsigned threads, uint32_t **out, ebpo_error *error)
 {
     const ebpo_array_in *array = ebpo_reader_array(file, id, 0);
     ebpo_check check = ebpo_reader_check(file);
-    uint32_t *map = ebpo_alloc(array->shape.rows, sizeof *map);
+    uint32_t *map = ebpo_array_alloc(workspace, array->shape.rows, sizeof *map);
     if (!map)
-        return ebpo_fail_memory(error, array->shape.rows * sizeof *map);
+        return ebpo_workspace_fail(workspace, array->shape.rows * sizeof *map, error);
     ebpo_status status = ebpo_reader_rows(file, array, threads, take_numbers, map, error);
     if (status == EBPO_OK)
         status = ebpo_check_map(&check, array->path, map, array->shape.rows, limit, error);
     if (status == EBPO_OK)
         *out = map;
     else
-        free(map);
+        ebpo_array_free(map);
     return status;
 }
 
@@ -139,7 +142,7 @@ static uint64_t face_limit(const ebpo_info *info)
     return info->source_face_count + info->mend.added_faces;
 }
 
-ebpo_status ebpo_file_read_maps(ebpo_file *file, uint32_t **vertex_source, uint32_t **face_source, unsigned threads, ebpo_error *error)
+static ebpo_status read_maps(ebpo_file *file, ebpo_workspace *workspace, uint32_t **vertex_source, uint32_t **face_source, unsigned threads, ebpo_error *error)
 {
     *vertex_source = *face_source = NULL;
     if (!(file->info.parts & EBPO_PART_MAPS))
@@ -147,14 +150,25 @@ ebpo_status ebpo_file_read_maps(ebpo_file *file, uint32_t **vertex_source, uint3
     ebpo_expected expected = EBPO_EXPECTED_INIT(file);
     ebpo_expect_maps(&expected);
     ebpo_expect_all(&expected);
-    ebpo_status status = read_map(file, EBPO_A_VERTEX_SOURCE, file->info.source_vertex_count, threads, vertex_source, error);
+    ebpo_status status = read_map(file, workspace, EBPO_A_VERTEX_SOURCE, file->info.source_vertex_count, threads, vertex_source, error);
     if (status == EBPO_OK)
-        status = read_map(file, EBPO_A_FACE_SOURCE, face_limit(&file->info), threads, face_source, error);
+        status = read_map(file, workspace, EBPO_A_FACE_SOURCE, face_limit(&file->info), threads, face_source, error);
     if (status != EBPO_OK) {
-        free(*vertex_source);
+        ebpo_array_free(*vertex_source);
         *vertex_source = NULL;
     }
     return status;
+}
+
+ebpo_status ebpo_reader_maps(ebpo_file *file, uint32_t **vertex_source, uint32_t **face_source, unsigned threads, ebpo_error *error)
+{
+    return read_maps(file, file->workspace, vertex_source, face_source, threads, error);
+}
+
+ebpo_status ebpo_file_read_maps(ebpo_file *file, uint32_t **vertex_source, uint32_t **face_source, unsigned threads, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    return read_maps(file, NULL, vertex_source, face_source, threads, error);
 }
 
 ebpo_status ebpo_file_read_tree(ebpo_file *file, ebpo_tree *out, unsigned threads, ebpo_error *error)
@@ -172,48 +186,57 @@ ebpo_status ebpo_file_read_tree(ebpo_file *file, ebpo_tree *out, unsigned thread
     if (status == EBPO_OK && file->info.parts & EBPO_PART_MESH)
         status = ebpo_file_read_mesh(file, &out->mesh, threads, error);
     if (status == EBPO_OK && file->info.parts & EBPO_PART_MAPS)
-        status = ebpo_file_read_maps(file, &out->vertex_source, &out->face_source, threads, error);
+        status = ebpo_reader_maps(file, &out->vertex_source, &out->face_source, threads, error);
     if (status != EBPO_OK)
         ebpo_tree_free(out);
     return status;
 }
 
-/* Place of each item when they are sorted by their source number (distinct, below limit): in *place, to be freed. */
-static ebpo_status sort_by_source(const uint32_t *source, uint64_t count, uint64_t limit, uint32_t **place, ebpo_error *error)
+/* Place of each item when they are sorted by their source number (distinct, below limit): how many smaller ones there are. In *place, to be freed. Counted in a bit for each number that
+ * there may be, as a head may state far more of them than the file has items: pages without items stay empty. */
+static ebpo_status sort_by_source(ebpo_workspace *workspace, const uint32_t *source, uint64_t count, uint64_t limit, uint32_t **place, ebpo_error *error)
 {
-    static const uint32_t none = UINT32_MAX;
-    uint32_t *item = ebpo_alloc(limit, sizeof *item), *out = ebpo_alloc(count, sizeof *out);
-    if (!item || !out) {
-        free(item);
-        free(out);
-        return ebpo_fail_memory(error, (limit + count) * sizeof *item);
+    enum { WORDS = 8 /* between two counts */ };
+    uint64_t words = (limit <= UINT32_MAX ? limit : UINT64_C(1) << 32) / 64 + 1;
+    uint64_t *bits = ebpo_alloc_zero(words, sizeof *bits);
+    uint32_t *before = ebpo_alloc(words / WORDS + 1, sizeof *before), *out = ebpo_array_alloc(workspace, count, sizeof *out), sum = 0;
+    ebpo_status status = bits && before && out ? EBPO_OK : ebpo_workspace_fail(workspace, words * 9 + count * sizeof *out, error);
+    for (uint64_t i = 0; i < count && status == EBPO_OK; ebpo_workspace_settle_at(workspace, i++))
+        bits[source[i] / 64] |= UINT64_C(1) << source[i] % 64;
+    for (uint64_t w = 0; w < words && status == EBPO_OK; w++) {
+        if (w % WORDS == 0)
+            before[w / WORDS] = sum;
+        sum += (uint32_t)__builtin_popcountll(bits[w]);
     }
-    memset(item, 0xff, limit * sizeof *item);
-    for (uint64_t i = 0; i < count; i++)
-        item[source[i]] = (uint32_t)i;
-    uint32_t next = 0;
-    for (uint64_t i = 0; i < limit; i++)
-        if (item[i] != none)
-            out[item[i]] = next++;
-    free(item);
-    *place = out;
-    return EBPO_OK;
+    for (uint64_t i = 0; i < count && status == EBPO_OK; ebpo_workspace_settle_at(workspace, i++)) {
+        uint64_t word = source[i] / 64;
+        out[i] = before[word / WORDS] + (uint32_t)__builtin_popcountll(bits[word] & ((UINT64_C(1) << source[i] % 64) - 1));
+        for (uint64_t w = word / WORDS * WORDS; w < word; w++)
+            out[i] += (uint32_t)__builtin_popcountll(bits[w]);
+    }
+    free(bits);
+    free(before);
+    if (status == EBPO_OK)
+        *place = out;
+    else
+        ebpo_array_free(out);
+    return status;
 }
 
 static ebpo_status reorder_vertices(ebpo_mesh *mesh, const uint32_t *place, ebpo_error *error)
 {
     size_t size = mesh->xyz32 ? 3 * sizeof *mesh->xyz32 : 3 * sizeof *mesh->xyz64;
     const uint8_t *old = mesh->xyz32 ? (const uint8_t *)mesh->xyz32 : (const uint8_t *)mesh->xyz64;
-    uint8_t *sorted = ebpo_alloc(mesh->vertex_count, size);
+    uint8_t *sorted = ebpo_array_alloc(mesh->workspace, mesh->vertex_count, size);
     if (!sorted)
-        return ebpo_fail_memory(error, mesh->vertex_count * size);
-    for (uint64_t i = 0; i < mesh->vertex_count; i++)
+        return ebpo_workspace_fail(mesh->workspace, mesh->vertex_count * size, error);
+    for (uint64_t i = 0; i < mesh->vertex_count; ebpo_workspace_settle_often(mesh->workspace, i++))
         memcpy(sorted + place[i] * size, old + i * size, size);
     if (mesh->xyz32) {
-        free(mesh->xyz32);
+        ebpo_array_free(mesh->xyz32);
         mesh->xyz32 = (float *)(void *)sorted;
     } else {
-        free(mesh->xyz64);
+        ebpo_array_free(mesh->xyz64);
         mesh->xyz64 = (double *)(void *)sorted;
     }
     return EBPO_OK;
@@ -221,12 +244,12 @@ static ebpo_status reorder_vertices(ebpo_mesh *mesh, const uint32_t *place, ebpo
 
 static ebpo_status reorder_faces(ebpo_mesh *mesh, const uint32_t *vertex_place, const uint32_t *face_place, ebpo_error *error)
 {
-    uint32_t *sorted = ebpo_alloc(mesh->face_count, 3 * sizeof *sorted);
+    uint32_t *sorted = ebpo_array_alloc(mesh->workspace, mesh->face_count, 3 * sizeof *sorted);
     if (!sorted)
-        return ebpo_fail_memory(error, mesh->face_count * 12);
-    for (uint64_t i = 0; i < mesh->face_count * 3; i++)
+        return ebpo_workspace_fail(mesh->workspace, mesh->face_count * 12, error);
+    for (uint64_t i = 0; i < mesh->face_count * 3; ebpo_workspace_settle_often(mesh->workspace, i++))
         sorted[3 * (uint64_t)face_place[i / 3] + i % 3] = vertex_place[mesh->faces[i]];
-    free(mesh->faces);
+    ebpo_array_free(mesh->faces);
     mesh->faces = sorted;
     return EBPO_OK;
 }
@@ -234,19 +257,20 @@ static ebpo_status reorder_faces(ebpo_mesh *mesh, const uint32_t *vertex_place, 
 static ebpo_status to_source_order(ebpo_file *file, ebpo_mesh *mesh, unsigned threads, ebpo_error *error)
 {
     uint32_t *vertex_source, *face_source, *vertex_place = NULL, *face_place = NULL;
-    ebpo_status status = ebpo_file_read_maps(file, &vertex_source, &face_source, threads, error);
+    ebpo_workspace *workspace = file->workspace;
+    ebpo_status status = ebpo_reader_maps(file, &vertex_source, &face_source, threads, error);
     if (status == EBPO_OK)
-        status = sort_by_source(vertex_source, mesh->vertex_count, file->info.source_vertex_count, &vertex_place, error);
+        status = sort_by_source(workspace, vertex_source, mesh->vertex_count, file->info.source_vertex_count, &vertex_place, error);
     if (status == EBPO_OK)
-        status = sort_by_source(face_source, mesh->face_count, face_limit(&file->info), &face_place, error);
-    free(vertex_source);
-    free(face_source);
+        status = sort_by_source(workspace, face_source, mesh->face_count, face_limit(&file->info), &face_place, error);
+    ebpo_array_free(vertex_source);
+    ebpo_array_free(face_source);
     if (status == EBPO_OK)
         status = reorder_vertices(mesh, vertex_place, error);
     if (status == EBPO_OK)
         status = reorder_faces(mesh, vertex_place, face_place, error);
-    free(vertex_place);
-    free(face_place);
+    ebpo_array_free(vertex_place);
+    ebpo_array_free(face_place);
     return status;
 }
 

@@ -7,6 +7,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/workspace.h"
 #include "codec/coding.h"
 
 enum {
@@ -115,6 +116,7 @@ static ebpo_status read_chunks(void *context, uint64_t begin, uint64_t end, unsi
         size_t bytes;
         uint64_t run = find_run(j->array, begin, end, &bytes);
         status = read_run(j, j->scratch[worker], begin, run, bytes, error);
+        ebpo_workspace_settle(j->file->workspace);
         begin = run;
     }
     return status;
@@ -176,12 +178,12 @@ ebpo_status ebpo_reader_make(ebpo_file *file, ebpo_array_id id, int level, unsig
     ebpo_status status = EBPO_OK;
     if (array->present) {
         uint64_t cols = array->shape.cols ? array->shape.cols : 1;
-        values = ebpo_alloc(array->shape.rows, size * cols);
+        values = ebpo_array_alloc(file->workspace, array->shape.rows, size * cols);
         status = values ? ebpo_reader_integers(file, array, threads, values, size, error)
-                        : ebpo_fail_memory(error, array->shape.rows * size * cols);
+                        : ebpo_workspace_fail(file->workspace, array->shape.rows * size * cols, error);
     }
     if (status != EBPO_OK) {
-        free(values);
+        ebpo_array_free(values);
         values = NULL;
     }
     memcpy(values_out, &values, sizeof values);

@@ -26,6 +26,7 @@ struct ebpo_file {
     ebpo_info info;
     ebpo_array_in level_array[EBPO_LEVELS_MAX][EBPO_LEVEL_ARRAYS];
     ebpo_array_in root_array[EBPO_ARRAYS]; /* those from EBPO_A_VERTICES on */
+    ebpo_workspace *workspace; /* what whole arrays keep to, or NULL; borrowed */
     pthread_mutex_t lock;
     atomic_bool located;   /* the chunks of all arrays are known */
 };
@@ -92,9 +93,12 @@ EBPO_MUST_USE ebpo_status ebpo_reader_rows(ebpo_file *file, const ebpo_array_in 
 EBPO_MUST_USE ebpo_status ebpo_reader_integers(ebpo_file *file, const ebpo_array_in *array, unsigned threads, void *values, size_t size,
                                                ebpo_error *error);
 
-/* The same into new memory: NULL when the array is absent. */
+/* The same into new memory: NULL when the array is absent. To be freed with ebpo_array_free. */
 EBPO_MUST_USE ebpo_status ebpo_reader_make(ebpo_file *file, ebpo_array_id id, int level, unsigned threads, size_t size, void *values_out,
                                            ebpo_error *error);
+
+/* Like ebpo_file_read_maps, but in the file's workspace: to be freed with ebpo_array_free. */
+EBPO_MUST_USE ebpo_status ebpo_reader_maps(ebpo_file *file, uint32_t **vertex_source, uint32_t **face_source, unsigned threads, ebpo_error *error);
 
 /* A leaf's references in place: gaps, counted down from its first new face, to ascending numbers. False when one falls below 0. */
 bool ebpo_refs_decode(uint32_t *refs, uint64_t count, uint64_t first);

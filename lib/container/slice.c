@@ -6,6 +6,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/workspace.h"
 #include "container/slice_parts.h"
 #include "geom/plane_code.h"
 
@@ -17,7 +18,7 @@ void ebpo_slice_free(ebpo_slice *slice)
         ebpo_level_free(&slice->level[i]);
     free(slice->outer);
     ebpo_mesh_free(&slice->mesh);
-    free(slice->face_source);
+    ebpo_array_free(slice->face_source);
     memset(slice, 0, sizeof *slice);
 }
 

@@ -3,14 +3,15 @@
 #include <string.h>
 
 #include "base/error.h"
+#include "base/workspace.h"
 #include "container/reader.h"
 #include "container/slice.h"
 
 /* What a slice does not have. */
 static void drop(ebpo_level *level)
 {
-    free(level->leaf_plane_counts);
-    free(level->leaf_planes);
+    ebpo_array_free(level->leaf_plane_counts);
+    ebpo_array_free(level->leaf_planes);
     level->leaf_plane_counts = NULL;
     level->leaf_planes = NULL;
     level->leaf_plane_count = 0;

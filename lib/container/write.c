@@ -9,6 +9,7 @@
 #include "base/fp_env.h"
 #include "base/parallel.h"
 #include "base/sha256.h"
+#include "base/workspace.h"
 #include "container/content.h"
 #include "container/facts.h"
 #include "container/plan.h"
@@ -233,9 +234,10 @@ static ebpo_status flush_window(writer *w, ebpo_error *error)
         status = ebpo_h5_put_chunk(&w->out, s->array->path, s->array->handle, &s->array->shape, s->chunk, s->stored, s->stored_bytes, error);
     }
     w->used = 0;
+    ebpo_workspace_settle(w->plan.tree->mesh.workspace);
     const ebpo_progress *progress = &w->options->progress;
-    if (status == EBPO_OK && progress->report && !progress->report(progress->user, "write", w->chunks_done, w->chunks))
-        status = ebpo_fail(error, EBPO_E_CANCELLED, "stopped on request during write");
+    if (status == EBPO_OK && !ebpo_tell(progress, "writing", w->chunks_done, w->chunks, error))
+        status = EBPO_E_CANCELLED;
     return status;
 }
 
@@ -328,6 +330,8 @@ static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const cha
     w->out = (ebpo_h5_out)EBPO_H5_OUT_INIT;
     w->root = -1;
     ebpo_status status = check_options(w->options, shown, error);
+    if (status == EBPO_OK && !ebpo_stage(&w->options->progress, "writing", error))
+        status = EBPO_E_CANCELLED;
     if (status == EBPO_OK)
         status = ebpo_plan_make(&w->plan, tree, w->options, shown, error);
     for (unsigned i = 0; i < w->plan.count; i++)

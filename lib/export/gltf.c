@@ -57,10 +57,21 @@ static void find_bounds(part *p)
     }
 }
 
+static uint64_t bin_bytes(const model *m)
+{
+    uint64_t sum = 0;
+    for (int i = 0; i < m->count; i++)
+        sum += 12 * (m->parts[i].block.mesh.vertex_count + m->parts[i].block.mesh.face_count);
+    return sum;
+}
+
 static ebpo_status gather(model *m, const ebpo_export_job *job, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    choose_origin(m, ebpo_file_info(job->file));
+    const ebpo_info *info = ebpo_file_info(job->file);
+    choose_origin(m, info);
+    if (!m->bin_name && job->options->mesh) /* known before anything is read */
+        status = ebpo_export_check_glb(job->path, 0, 12 * (info->vertex_count + info->face_count), error);
     for (int i = 0; i < ebpo_block_count(job->options) && status == EBPO_OK; i++) {
         part *p = &m->parts[m->count];
         if (!ebpo_export_goes_on(job, i))
@@ -73,6 +84,9 @@ static ebpo_status gather(model *m, const ebpo_export_job *job, ebpo_error *erro
             continue;
         }
         m->count++;
+        status = m->bin_name ? EBPO_OK : ebpo_export_check_glb(job->path, 0, bin_bytes(m), error); /* before more is read */
+        if (status != EBPO_OK)
+            return status;
         status = ebpo_mesh_floats(&p->xyz, &p->block.mesh, m->origin, &m->largest_change, error);
         if (status != EBPO_OK)
             return status;
@@ -87,14 +101,6 @@ static ebpo_status gather(model *m, const ebpo_export_job *job, ebpo_error *erro
     if (status == EBPO_OK && m->count == 0)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: there would be no triangle in it", job->path);
     return status;
-}
-
-static uint64_t bin_bytes(const model *m)
-{
-    uint64_t sum = 0;
-    for (int i = 0; i < m->count; i++)
-        sum += 12 * (m->parts[i].block.mesh.vertex_count + m->parts[i].block.mesh.face_count);
-    return sum;
 }
 
 /* --- the text --- */
@@ -223,10 +229,11 @@ static ebpo_status write_glb(FILE *f, const model *m, const char *path, ebpo_err
         return ebpo_fail_memory(error, length);
     }
     size_t padding = -length & 3;
-    uint64_t bin = bin_bytes(m), total = 28 + length + padding + bin;
-    if (total > UINT32_MAX) {
+    uint64_t bin = bin_bytes(m), total = EBPO_GLB_HEADS + length + padding + bin;
+    ebpo_status status = ebpo_export_check_glb(path, length, bin, error);
+    if (status != EBPO_OK) {
         free(text);
-        return ebpo_fail(error, EBPO_E_LIMIT, "%s: would have %" PRIu64 " bytes, and a GLB file has at most 2^32; take gltf, or coarser levels", path, total);
+        return status;
     }
     const uint32_t head[5] = { 0x46546C67 /* glTF */, 2, (uint32_t)total, (uint32_t)(length + padding), 0x4E4F534A /* JSON */ };
     const uint32_t bin_head[2] = { (uint32_t)bin, 0x004E4942 /* BIN */ };

@@ -125,12 +125,17 @@ static void scene_free(scene *s)
 
 static ebpo_status gather(scene *s, const ebpo_export_job *job, ebpo_error *error)
 {
-    ebpo_status status = EBPO_OK;
+    const ebpo_info *info = ebpo_file_info(job->file);
+    /* Of the mesh known before anything is read. */
+    ebpo_status status = job->options->mesh ? ebpo_export_check_scene(job->path, info->vertex_count, info->face_count, error) : EBPO_OK;
+    uint64_t vertices = 0, faces = 0;
     for (int i = 0; i < ebpo_block_count(job->options) && status == EBPO_OK; i++) {
         ebpo_block block;
         if (!ebpo_export_goes_on(job, i))
             return ebpo_export_stopped(error);
         status = ebpo_block_read(&block, job->file, ebpo_block_level(job->options, i), EBPO_SOURCE_ORDER, job->options, error);
+        if (status == EBPO_OK)
+            status = ebpo_export_check_scene(job->path, vertices += block.mesh.vertex_count, faces += block.mesh.face_count, error);
         if (status == EBPO_OK)
             ebpo_block_tell(&block, job->report);
         if (status == EBPO_OK && block.mesh.face_count)

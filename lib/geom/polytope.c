@@ -64,71 +64,113 @@ static void between(const double a[3], double da, const double b[3], double db, 
         out[k] = a[k] + t * (b[k] - a[k]);
 }
 
-/* The corners of face f beyond the plane, in order; the points where its edges cross it included. */
-static int beyond(const ebpo_polytope *p, int f, const double *dist, double (*points)[3])
+double ebpo_polytope_cap_bound(double volume, double width, double height)
 {
-    int count = p->first[f + 1] - p->first[f], kept = 0;
+    if (!(height > 1e-9) || !(width > 0))
+        return 0;
+    double left = height < width ? 1 - height / width : 0;
+    return volume * (1 - left * left * left);
+}
+
+static void minus(const double a[3], const double b[3], double out[3])
+{
+    for (int k = 0; k < 3; k++)
+        out[k] = a[k] - b[k];
+}
+
+/* What lies beyond a plane, seen from its farthest vertex: faces that have this vertex add nothing, the others a fan each, and the cut is a polygon whose area follows from its edges in
+ * any order. */
+typedef struct beyond {
+    const ebpo_polytope *p;
+    double dist[EBPO_POLYTOPE_VERTICES], fans, area[3], origin[3]; /* area: twice the cut's, as a vector; origin: a point of the plane */
+    int farthest;
+    bool started;
+} beyond;
+
+static void point_between(const beyond *c, int out, int in, double x[3])
+{
+    between(c->p->vertex[out], c->dist[out], c->p->vertex[in], c->dist[in], x); /* always from the outer end, so that neighbours get the same point */
+}
+
+/* An edge of the cut. */
+static void add_edge(beyond *c, const double from[3], const double to[3])
+{
+    if (!c->started) {
+        c->started = true;
+        memcpy(c->origin, from, sizeof c->origin);
+        return; /* seen from its own end it spans nothing */
+    }
+    double u[3], v[3], n[3];
+    minus(from, c->origin, u);
+    minus(to, c->origin, v);
+    cross(u, v, n);
+    for (int k = 0; k < 3; k++)
+        c->area[k] += n[k];
+}
+
+static void add_to_fan(beyond *c, const double x[3], int *kept, double first[3], double last[3])
+{
+    double v[3], n[3];
+    minus(x, c->p->vertex[c->farthest], v);
+    if (*kept == 0)
+        memcpy(first, v, sizeof v);
+    else if (*kept > 1) {
+        cross(last, v, n);
+        c->fans += dot(first, n);
+    }
+    memcpy(last, v, sizeof v);
+    ++*kept;
+}
+
+static void face_beyond(beyond *c, int f)
+{
+    const ebpo_polytope *p = c->p;
     const uint16_t *loop = p->corner + p->first[f];
-    for (int i = 0, a = loop[count - 1]; i < count; i++) {
+    int count = p->first[f + 1] - p->first[f], outside = 0, kept = 0;
+    bool fan = true;
+    for (int i = 0; i < count; i++) {
+        outside += c->dist[loop[i]] > 0;
+        fan &= loop[i] != c->farthest;
+    }
+    if (!outside)
+        return;
+    double enter[3] = { 0, 0, 0 }, leave[3] = { 0, 0, 0 }, first[3] = { 0, 0, 0 }, last[3] = { 0, 0, 0 };
+    for (int i = 0, a = loop[count - 1]; i < count; a = loop[i++]) {
         int b = loop[i];
-        bool a_out = dist[a] > 0, b_out = dist[b] > 0;
+        bool a_out = c->dist[a] > 0, b_out = c->dist[b] > 0;
         if (a_out != b_out) {
-            /* The same end first from both sides, so that neighbours get the same point. */
-            int out = a_out ? a : b, in = a_out ? b : a;
-            between(p->vertex[out], dist[out], p->vertex[in], dist[in], points[kept]);
-            kept++;
+            point_between(c, a_out ? a : b, a_out ? b : a, a_out ? leave : enter);
+            if (fan)
+                add_to_fan(c, a_out ? leave : enter, &kept, first, last);
         }
-        if (b_out) {
-            for (int k = 0; k < 3; k++)
-                points[kept][k] = p->vertex[b][k];
-            kept++;
-        }
-        a = b;
+        if (fan && b_out)
+            add_to_fan(c, p->vertex[b], &kept, first, last);
     }
-    return kept;
+    if (outside < count)
+        add_edge(c, enter, leave);
 }
 
-static double fan_volume(double (*points)[3], int count, const double o[3])
+double ebpo_polytope_removed(const ebpo_polytope *p, const double n[3], double d, double volume, double least)
 {
-    double u[3] = { points[0][0] - o[0], points[0][1] - o[1], points[0][2] - o[2] };
-    double v[3] = { points[1][0] - o[0], points[1][1] - o[1], points[1][2] - o[2] }, sum = 0;
-    for (int i = 2; i < count; i++) {
-        double w[3] = { points[i][0] - o[0], points[i][1] - o[1], points[i][2] - o[2] }, c[3];
-        cross(v, w, c);
-        sum += dot(u, c);
-        v[0] = w[0], v[1] = w[1], v[2] = w[2];
-    }
-    return sum;
-}
-
-double ebpo_polytope_removed(const ebpo_polytope *p, const double n[3], double d)
-{
-    double dist[EBPO_POLYTOPE_VERTICES] , points[2 * EBPO_POLYTOPE_VERTICES][3], reference[3];
-    bool out[EBPO_POLYTOPE_VERTICES];
-    int nearest = 0;
-    for (int i = 0; i < p->vertex_count; i++) {
-        dist[i] = dot(n, p->vertex[i]) - d;
-        out[i] = dist[i] > 0;
-        nearest = fabs(dist[i]) < fabs(dist[nearest]) ? i : nearest;
-    }
+    beyond c;
+    double low = 1e300, high = -1e300;
     if (!p->vertex_count)
         return 0;
-    double lift = dist[nearest] / dot(n, n);
-    for (int k = 0; k < 3; k++)
-        reference[k] = p->vertex[nearest][k] - lift * n[k]; /* any point on the plane */
-    /* The parts of the faces beyond the plane, as fans seen from a point on the plane: the cap itself adds nothing. */
-    double sum = 0;
-    for (int f = 0; f < p->face_count; f++) {
-        bool any = false;
-        for (int i = p->first[f]; i < p->first[f + 1]; i++)
-            any |= out[p->corner[i]];
-        if (!any)
-            continue;
-        int kept = beyond(p, f, dist, points);
-        if (kept >= 3)
-            sum += fan_volume(points, kept, reference);
+    for (int i = 0; i < p->vertex_count; i++) {
+        double e = dot(n, p->vertex[i]) - d;
+        c.dist[i] = e;
+        low = e < low ? e : low;
+        if (e > high)
+            high = e, c.farthest = i;
     }
-    return sum / 6;
+    if (!(high > 0) || (least > 0 && ebpo_polytope_cap_bound(volume, high - low, high) < least))
+        return 0;
+    c.p = p;
+    c.fans = c.area[0] = c.area[1] = c.area[2] = 0;
+    c.started = false;
+    for (int f = 0; f < p->face_count; f++)
+        face_beyond(&c, f);
+    return (c.fans + high * fabs(dot(n, c.area)) / dot(n, n)) / 6;
 }
 
 /* --- clipping --- */

@@ -45,7 +45,11 @@ void ebpo_polytope_copy(ebpo_polytope *to, const ebpo_polytope *from);
 
 double ebpo_polytope_volume(const ebpo_polytope *p);
 
-/* Volume that clipping by n . x <= d would remove. */
-double ebpo_polytope_removed(const ebpo_polytope *p, const double n[3], double d);
+/* Volume that clipping by n . x <= d would remove; 0 when it is certainly below `least`, for which `volume` is the polytope's own. */
+double ebpo_polytope_removed(const ebpo_polytope *p, const double n[3], double d, double volume, double least);
+
+/* Upper bound of the volume beyond a plane, for a body of that volume which is so wide along the plane's normal and reaches so far beyond it: among convex bodies of volume V and width H
+ * the cap of height h is largest for the cone with its base on the far side, V (1 - (1 - h/H)^3). */
+double ebpo_polytope_cap_bound(double volume, double width, double height);
 
 #endif

@@ -24,7 +24,7 @@ typedef struct ebpo_h5_shape {
 uint32_t ebpo_h5_chunk_rows(uint64_t rows, uint32_t cols, uint32_t element_size);
 static inline uint64_t ebpo_h5_chunk_count(const ebpo_h5_shape *shape)
 {
-    return (shape->rows + shape->chunk_rows - 1) / shape->chunk_rows;
+    return shape->rows / shape->chunk_rows + (shape->rows % shape->chunk_rows != 0);
 }
 static inline size_t ebpo_h5_row_bytes(const ebpo_h5_shape *shape)
 {

@@ -16,10 +16,11 @@ typedef enum ebpo_import_format { EBPO_IMPORT_OBJ, EBPO_IMPORT_STL, EBPO_IMPORT_
 bool ebpo_import_recognise(ebpo_import_format *format, const uint8_t *data, uint64_t size, const char *name);
 
 /* Parses a file that is in memory. Positions are float32. source_size, source_name and source_format are set.
- * EBPO_E_UNSUPPORTED in a build without assimp, EBPO_E_FORMAT when assimp refuses the file. No other file is opened (material
+ * The arrays are in the workspace, but assimp itself has all of the file in memory, several times over: EBPO_E_LIMIT when that is likely more than `workspace`
+ * (which may be NULL) allows. EBPO_E_UNSUPPORTED in a build without assimp, EBPO_E_FORMAT when assimp refuses the file. No other file is opened (material
  * libraries are not read). Runs one at a time in a process, since assimp's error text is global. On failure `out` is cleared.
  * Faces keep the file's order within each object or group of an OBJ file; vertices are numbered by first use. */
 EBPO_MUST_USE ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data, uint64_t size,
-                                             const char *name, ebpo_error *error);
+                                             const char *name, ebpo_workspace *workspace, ebpo_error *error);
 
 #endif

@@ -6,22 +6,33 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/sha256.h"
+#include "base/workspace.h"
 #include "import/import.h"
 #include "io/file.h"
+#include "mesh/mesh.h"
 #include "ply/ply.h"
 
 void ebpo_mesh_free(ebpo_mesh *mesh)
 {
     if (!mesh)
         return;
-    free(mesh->xyz32);
-    free(mesh->xyz64);
-    free(mesh->faces);
+    ebpo_array_free(mesh->xyz32);
+    ebpo_array_free(mesh->xyz64);
+    ebpo_array_free(mesh->faces);
+    if (mesh->arrangement) {
+        ebpo_array_free(mesh->arrangement->key);
+        ebpo_array_free(mesh->arrangement->vertex_source);
+        ebpo_array_free(mesh->arrangement->face_source);
+        free(mesh->arrangement);
+    }
     memset(mesh, 0, sizeof *mesh);
 }
 
+enum { HASH_STEP = 1 << 22 };
+
 typedef struct hashing {
     const ebpo_whole_file *file;
+    ebpo_workspace *workspace;
     uint8_t digest[32];
     pthread_t thread;
     bool threaded;
@@ -32,7 +43,10 @@ static void *hash_file(void *argument)
     hashing *h = argument;
     ebpo_sha256 state;
     ebpo_sha256_begin(&state);
-    ebpo_sha256_add(&state, h->file->data, (size_t)h->file->size);
+    for (uint64_t at = 0; at < h->file->size; at += HASH_STEP) {
+        ebpo_sha256_add(&state, h->file->data + at, h->file->size - at < HASH_STEP ? (size_t)(h->file->size - at) : HASH_STEP);
+        ebpo_workspace_settle(h->workspace);
+    }
     ebpo_sha256_end(&state, h->digest);
     return NULL;
 }
@@ -51,16 +65,16 @@ static void hash_end(hashing *h)
         pthread_join(h->thread, NULL);
 }
 
-static ebpo_status parse(ebpo_mesh *out, const ebpo_whole_file *file, const char *path, const ebpo_progress *progress, ebpo_error *error)
+static ebpo_status parse(ebpo_mesh *out, const ebpo_whole_file *file, const char *path, ebpo_workspace *workspace, unsigned threads, const ebpo_progress *progress, ebpo_error *error)
 {
     const char *dot = strrchr(ebpo_path_name(path), '.');
     ebpo_import_format format;
     if (ebpo_ply_recognise(file->data, file->size))
-        return ebpo_ply_parse_memory(out, file->data, file->size, path, progress, error);
+        return ebpo_ply_parse_memory(out, file->data, file->size, path, workspace, threads, progress, error);
     if (ebpo_import_recognise(&format, file->data, file->size, path))
-        return ebpo_import_memory(out, format, file->data, file->size, path, error);
+        return ebpo_import_memory(out, format, file->data, file->size, path, workspace, error);
     if (dot && strcasecmp(dot, ".ply") == 0) /* its reader says best what is wrong */
-        return ebpo_ply_parse_memory(out, file->data, file->size, path, progress, error);
+        return ebpo_ply_parse_memory(out, file->data, file->size, path, workspace, threads, progress, error);
     return ebpo_fail(error, EBPO_E_FORMAT, "%s: neither its first bytes nor its name tell a PLY, OBJ, STL or OFF file",
                      ebpo_path_name(path));
 }
@@ -70,20 +84,24 @@ ebpo_status ebpo_mesh_read(ebpo_mesh *out, const char *path, const ebpo_mesh_rea
     EBPO_DEFAULT_FP;
     static const ebpo_progress silent = { NULL, NULL };
     ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
-    hashing hash = { .file = &file };
+    ebpo_workspace *workspace = options ? options->workspace : NULL;
+    hashing hash = { .file = &file, .workspace = workspace };
     memset(out, 0, sizeof *out);
     ebpo_status status = ebpo_whole_file_open(&file, path, error);
     if (status != EBPO_OK)
         return status;
+    ebpo_workspace_watch(workspace, file.mapped, (size_t)file.size);
     hash_begin(&hash);
-    status = parse(out, &file, path, options ? &options->progress : &silent, error);
+    status = parse(out, &file, path, workspace, options ? options->threads : 0, options ? &options->progress : &silent, error);
     hash_end(&hash);
+    out->workspace = workspace;
     if (status == EBPO_OK)
         status = ebpo_whole_file_unchanged(&file, path, error);
     if (status == EBPO_OK)
         memcpy(out->source_sha256, hash.digest, sizeof hash.digest);
     else
         ebpo_mesh_free(out);
+    ebpo_workspace_unwatch(workspace, file.mapped);
     ebpo_whole_file_close(&file);
     return status;
 }

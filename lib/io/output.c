@@ -1,5 +1,6 @@
 /* The public face of publish.h: whole files, and giving up. */
 #include "base/error.h"
+#include "base/workspace.h"
 #include "io/publish.h"
 
 ebpo_status ebpo_write_file(const char *path, const void *data, size_t size, ebpo_error *error)
@@ -22,4 +23,5 @@ ebpo_status ebpo_write_file(const char *path, const void *data, size_t size, ebp
 void ebpo_abandon_outputs(void)
 {
     ebpo_publish_abandon_all();
+    ebpo_workspace_abandon();
 }

@@ -5,65 +5,150 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/sort.h"
+#include "base/workspace.h"
 
 #define NONE UINT64_MAX
 
-bool ebpo_boundary_add(ebpo_boundary *boundary, ebpo_boundary_edge edge)
+bool ebpo_boundary_add(ebpo_boundary *boundary, const ebpo_mesh *mesh, uint32_t from, uint32_t to, uint32_t face)
 {
-    if (!ebpo_grow(&boundary->edges, &boundary->capacity, boundary->count + 1, sizeof *boundary->edges))
+    if (!ebpo_array_grow(mesh->workspace, &boundary->edges, &boundary->capacity, boundary->count + 1, sizeof *boundary->edges))
         return false;
-    boundary->edges[boundary->count++] = edge;
+    boundary->edges[boundary->count++] =
+        (ebpo_boundary_edge){ .key = (uint64_t)from << 32 | ebpo_mesh_source_vertex(mesh, to), .from = from, .to = to, .face = face };
     return true;
+}
+
+ebpo_status ebpo_boundary_join(ebpo_boundary *boundary, ebpo_boundary *lists, unsigned count, const ebpo_mesh *mesh, ebpo_error *error)
+{
+    uint64_t total = 0;
+    for (unsigned i = 0; i < count; i++)
+        total += lists[i].count;
+    if (total && !ebpo_array_grow(mesh->workspace, &boundary->edges, &boundary->capacity, total, sizeof *boundary->edges))
+        return ebpo_workspace_fail(mesh->workspace, total * sizeof *boundary->edges, error);
+    for (unsigned i = 0; i < count; i++) {
+        for (uint64_t k = 0; k < lists[i].count; k++) {
+            boundary->edges[boundary->count++] = lists[i].edges[k];
+            ebpo_workspace_settle_at(mesh->workspace, k);
+        }
+        ebpo_boundary_free(&lists[i]);
+    }
+    return EBPO_OK;
 }
 
 void ebpo_boundary_free(ebpo_boundary *boundary)
 {
-    free(boundary->edges);
+    ebpo_array_free(boundary->edges);
     *boundary = (ebpo_boundary){ .edges = NULL };
 }
 
 void ebpo_loops_free(ebpo_loops *loops)
 {
-    free(loops->first);
-    free(loops->vertex);
+    ebpo_array_free(loops->first);
+    ebpo_array_free(loops->vertex);
+    ebpo_array_free(loops->start);
     *loops = (ebpo_loops){ .count = 0 };
 }
 
 typedef struct arrival {
-    uint32_t to;
+    uint64_t key; /* to << 32 | the source's number of from */
     uint64_t edge;
 } arrival;
 
 typedef struct chaining {
-    const ebpo_boundary_edge *edges; /* sorted by from, to */
+    ebpo_boundary_edge *edges; /* sorted by key */
     uint64_t count;
-    arrival *arrivals;               /* sorted by to, edge */
+    arrival *arrivals;               /* sorted by key */
     uint64_t *next;                  /* of each edge; NONE when nothing continues it */
     uint8_t *continued;              /* the edge is some edge's next */
     uint8_t *walked;
     uint32_t *place;                 /* [vertex_count] place on the path, or EBPO_NO_INDEX */
     uint32_t *path;
     uint64_t path_length;
+    uint64_t start;                  /* of the walk: for ebpo_loops.start */
+    uint64_t steps;                  /* of all walks */
     const ebpo_stars *stars;
     const ebpo_mesh *mesh;
+    unsigned threads;
     ebpo_star star;
     ebpo_loops *out;
 } chaining;
 
+/* --- sorting --- */
+
+static ebpo_status make_edges(void *context, uint64_t begin, uint64_t end, void *records, ebpo_error *error)
+{
+    const chaining *c = context;
+    (void)error;
+    memcpy(records, c->edges + begin, (size_t)(end - begin) * sizeof *c->edges);
+    return EBPO_OK;
+}
+
+/* Never asked: an edge that is used once has a key of its own. */
 static int compare_edges(const void *a, const void *b)
 {
     const ebpo_boundary_edge *x = a, *y = b;
-    if (x->from != y->from)
-        return x->from < y->from ? -1 : 1;
-    return x->to < y->to ? -1 : x->to > y->to;
+    return (x->face > y->face) - (x->face < y->face);
+}
+
+static void take_edges(void *context, uint64_t place, const void *records, uint64_t count)
+{
+    chaining *c = context;
+    memcpy(c->edges + place, records, (size_t)count * sizeof *c->edges);
+}
+
+static ebpo_status make_arrivals(void *context, uint64_t begin, uint64_t end, void *records, ebpo_error *error)
+{
+    const chaining *c = context;
+    (void)error;
+    for (uint64_t e = begin; e < end; e++)
+        ((arrival *)records)[e - begin] = (arrival){ (uint64_t)c->edges[e].to << 32 | ebpo_mesh_source_vertex(c->mesh, c->edges[e].from), e };
+    return EBPO_OK;
 }
 
 static int compare_arrivals(const void *a, const void *b)
 {
     const arrival *x = a, *y = b;
-    if (x->to != y->to)
-        return x->to < y->to ? -1 : 1;
-    return x->edge < y->edge ? -1 : x->edge > y->edge;
+    return (x->edge > y->edge) - (x->edge < y->edge);
+}
+
+static void take_arrivals(void *context, uint64_t place, const void *records, uint64_t count)
+{
+    chaining *c = context;
+    memcpy(c->arrivals + place, records, (size_t)count * sizeof *c->arrivals);
+}
+
+static const ebpo_progress silent = { NULL, NULL };
+
+/* Where the leading bits of a vertex << 32 are. */
+static unsigned leading(const ebpo_mesh *mesh)
+{
+    unsigned shift = 32;
+    while (mesh->vertex_count >> (shift - 32) >= EBPO_SORT_BINS)
+        shift++;
+    return shift;
+}
+
+static ebpo_status sort_all(chaining *c, ebpo_error *error)
+{
+    ebpo_sort sort = { .workspace = c->mesh->workspace, .threads = c->threads, .progress = &silent, .stage = "", .count = c->count, .record = sizeof *c->edges, .shift = leading(c->mesh),
+                       .context = c, .make = make_edges, .compare = compare_edges, .take = take_edges };
+    ebpo_status status = ebpo_sort_run(&sort, error);
+    sort.record = sizeof *c->arrivals;
+    sort.make = make_arrivals;
+    sort.compare = compare_arrivals;
+    sort.take = take_arrivals;
+    return status == EBPO_OK ? ebpo_sort_run(&sort, error) : status;
+}
+
+/* --- which edge continues which --- */
+
+/* A step may go to another place in each of ten arrays. */
+static void let_go(const chaining *c, uint64_t steps)
+{
+    enum { OFTEN = 32 };
+    if (steps % OFTEN == 0)
+        ebpo_workspace_settle(c->mesh->workspace);
 }
 
 static void connect(chaining *c, uint64_t edge, uint64_t next)
@@ -98,14 +183,15 @@ static uint32_t fan_end(const chaining *c, uint32_t vertex, uint32_t face)
     return EBPO_NO_INDEX;
 }
 
-/* The edge that leaves for `neighbour` among the sorted [begin, end); NONE when there is none. */
-static uint64_t departure(const chaining *c, uint64_t begin, uint64_t end, uint32_t neighbour)
+/* The edge that leaves for `neighbour` (the source's number) among the sorted [begin, end); NONE when there is none. */
+static uint64_t departure(const chaining *c, uint64_t begin, uint64_t end, uint64_t neighbour)
 {
     while (begin < end) {
         uint64_t middle = begin + (end - begin) / 2;
-        if (c->edges[middle].to == neighbour)
+        uint64_t to = (uint32_t)c->edges[middle].key;
+        if (to == neighbour)
             return middle;
-        if (c->edges[middle].to < neighbour)
+        if (to < neighbour)
             begin = middle + 1;
         else
             end = middle;
@@ -122,7 +208,7 @@ static bool connect_vertex(chaining *c, uint32_t vertex, uint64_t a, uint64_t b,
         for (uint64_t i = a; i < b; i++) {
             uint64_t edge = c->arrivals[i].edge;
             uint32_t neighbour = fan_end(c, vertex, c->edges[edge].face);
-            uint64_t next = neighbour == EBPO_NO_INDEX ? NONE : departure(c, d, e, neighbour);
+            uint64_t next = neighbour == EBPO_NO_INDEX ? NONE : departure(c, d, e, ebpo_mesh_source_vertex(c->mesh, neighbour));
             if (next != NONE && !c->continued[next])
                 connect(c, edge, next);
         }
@@ -141,17 +227,18 @@ static bool connect_vertex(chaining *c, uint32_t vertex, uint64_t a, uint64_t b,
 
 static bool connect_all(chaining *c)
 {
-    uint64_t a = 0, d = 0;
+    uint64_t a = 0, d = 0, visits = 0;
     while (a < c->count) {
-        uint32_t vertex = c->arrivals[a].to;
         uint64_t b = a;
-        while (b < c->count && c->arrivals[b].to == vertex)
+        uint32_t vertex = (uint32_t)(c->arrivals[a].key >> 32);
+        while (b < c->count && c->arrivals[b].key >> 32 == vertex)
             b++;
         while (d < c->count && c->edges[d].from < vertex)
             d++;
         uint64_t e = d;
         while (e < c->count && c->edges[e].from == vertex)
             e++;
+        let_go(c, visits++);
         if (!connect_vertex(c, vertex, a, b, d, e))
             return false;
         a = b;
@@ -159,6 +246,8 @@ static bool connect_all(chaining *c)
     }
     return true;
 }
+
+/* --- loops --- */
 
 /* Takes the path back to `place` off as a loop. */
 static void emit_loop(chaining *c, uint64_t place)
@@ -169,7 +258,8 @@ static void emit_loop(chaining *c, uint64_t place)
         out->vertex[at++] = c->path[i];
         c->place[c->path[i]] = EBPO_NO_INDEX;
     }
-    out->first[++out->count] = at;
+    out->start[out->count++] = c->start;
+    out->first[out->count] = at;
     c->path_length = place;
 }
 
@@ -181,14 +271,35 @@ static void visit(chaining *c, uint32_t vertex)
     c->path[c->path_length++] = vertex;
 }
 
+/* The edge's key, were the mesh in the source's order. */
+static uint64_t source_key(const chaining *c, uint64_t edge)
+{
+    return ebpo_mesh_source_vertex(c->mesh, c->edges[edge].from) << 32 | (uint32_t)c->edges[edge].key;
+}
+
+/* Chains have no edges in common, so it does not matter which is walked first; but a closed one is walked from the edge that the source has first. */
+static uint64_t first_of_cycle(chaining *c, uint64_t edge)
+{
+    uint64_t first = edge, key = source_key(c, edge);
+    for (uint64_t e = c->next[edge]; e != edge; e = c->next[e]) {
+        uint64_t other = source_key(c, e);
+        first = other < key ? e : first;
+        key = other < key ? other : key;
+        let_go(c, ++c->steps);
+    }
+    return first;
+}
+
 static void walk(chaining *c, uint64_t edge)
 {
     c->path_length = 0;
+    c->start = source_key(c, edge);
     visit(c, c->edges[edge].from);
     while (edge != NONE && !c->walked[edge]) {
         c->walked[edge] = 1;
         visit(c, c->edges[edge].to);
         edge = c->next[edge];
+        let_go(c, ++c->steps);
     }
     if (c->path_length > 1)
         c->out->open_chains++;
@@ -198,53 +309,125 @@ static void walk(chaining *c, uint64_t edge)
 
 static bool allocate(chaining *c)
 {
+    ebpo_workspace *w = c->mesh->workspace;
     uint64_t n = c->count, vertices = c->mesh->vertex_count;
-    c->arrivals = ebpo_alloc(n, sizeof *c->arrivals);
-    c->next = ebpo_alloc(n, sizeof *c->next);
-    c->continued = ebpo_alloc_zero(n, 1);
-    c->walked = ebpo_alloc_zero(n, 1);
-    c->place = ebpo_alloc(vertices, sizeof *c->place);
-    c->path = ebpo_alloc(n + 1, sizeof *c->path);
-    c->out->first = ebpo_alloc_zero(n / 3 + 2, sizeof *c->out->first);
-    c->out->vertex = ebpo_alloc(n, sizeof *c->out->vertex);
+    c->arrivals = ebpo_array_alloc(w, n, sizeof *c->arrivals);
+    c->next = ebpo_array_alloc(w, n, sizeof *c->next);
+    c->continued = ebpo_array_zero(w, n, 1);
+    c->walked = ebpo_array_zero(w, n, 1);
+    c->place = ebpo_array_alloc(w, vertices, sizeof *c->place);
+    c->path = ebpo_array_alloc(w, n + 1, sizeof *c->path);
+    c->out->first = ebpo_array_zero(w, n / 3 + 2, sizeof *c->out->first);
+    c->out->vertex = ebpo_array_alloc(w, n, sizeof *c->out->vertex);
+    c->out->start = ebpo_array_alloc(w, n / 3 + 1, sizeof *c->out->start);
     if (!c->arrivals || !c->next || !c->continued || !c->walked || !c->place || !c->path || !c->out->first ||
-        !c->out->vertex)
+        !c->out->vertex || !c->out->start)
         return false;
-    memset(c->next, 0xff, n * sizeof *c->next);
-    memset(c->place, 0xff, vertices * sizeof *c->place);
-    for (uint64_t i = 0; i < n; i++)
-        c->arrivals[i] = (arrival){ c->edges[i].to, i };
-    qsort(c->arrivals, n, sizeof *c->arrivals, compare_arrivals);
+    ebpo_array_fill(w, c->next, 0xff, n * sizeof *c->next);
+    ebpo_array_fill(w, c->place, 0xff, vertices * sizeof *c->place);
     return true;
 }
 
+static ebpo_status chain(chaining *c, ebpo_error *error)
+{
+    ebpo_workspace *w = c->mesh->workspace;
+    if (!allocate(c))
+        return ebpo_workspace_fail(w, c->count * 56 + c->mesh->vertex_count * sizeof *c->place, error);
+    ebpo_status status = sort_all(c, error);
+    if (status != EBPO_OK)
+        return status;
+    if (!connect_all(c))
+        return ebpo_fail_memory(error, c->star.capacity * 2 * sizeof *c->star.links);
+    for (uint64_t e = 0; e < c->count; e++) {
+        ebpo_workspace_settle_at(w, e);
+        if (!c->continued[e])
+            walk(c, e);
+    }
+    c->out->on_paths = c->out->count;
+    for (uint64_t e = 0; e < c->count; e++) {
+        ebpo_workspace_settle_at(w, e);
+        if (!c->walked[e])
+            walk(c, first_of_cycle(c, e));
+    }
+    return EBPO_OK;
+}
+
 ebpo_status ebpo_boundary_loops(ebpo_loops *out, ebpo_boundary *boundary, const ebpo_stars *stars,
-                                const ebpo_mesh *mesh, ebpo_error *error)
+                                const ebpo_mesh *mesh, unsigned threads, ebpo_error *error)
 {
     *out = (ebpo_loops){ .count = 0 };
-    chaining c = { .edges = boundary->edges, .count = boundary->count, .stars = stars, .mesh = mesh, .out = out };
-    ebpo_status status = EBPO_OK;
-    if (boundary->count)
-        qsort(boundary->edges, boundary->count, sizeof *boundary->edges, compare_edges);
-    if (!allocate(&c) || !connect_all(&c)) {
-        status = ebpo_fail_memory(error, boundary->count * 48 + mesh->vertex_count * sizeof *c.place);
-        goto done;
-    }
-    for (uint64_t e = 0; e < c.count; e++)
-        if (!c.continued[e])
-            walk(&c, e);
-    for (uint64_t e = 0; e < c.count; e++)
-        if (!c.walked[e])
-            walk(&c, e);
-done:
+    chaining c = { .edges = boundary->edges, .count = boundary->count, .stars = stars, .mesh = mesh, .threads = threads, .out = out };
+    ebpo_status status = chain(&c, error);
     ebpo_star_free(&c.star);
-    free(c.arrivals);
-    free(c.next);
-    free(c.continued);
-    free(c.walked);
-    free(c.place);
-    free(c.path);
+    ebpo_array_free(c.arrivals);
+    ebpo_array_free(c.next);
+    ebpo_array_free(c.continued);
+    ebpo_array_free(c.walked);
+    ebpo_array_free(c.place);
+    ebpo_array_free(c.path);
     if (status != EBPO_OK)
         ebpo_loops_free(out);
+    return status;
+}
+
+/* --- in the source's order --- */
+
+typedef struct rank {
+    uint64_t key;
+    uint32_t number, triangles;
+} rank;
+
+typedef struct ranking {
+    const ebpo_loops *loops;
+    uint64_t begin; /* loops from here on */
+    rank *sorted;
+} ranking;
+
+static ebpo_status make_ranks(void *context, uint64_t begin, uint64_t end, void *records, ebpo_error *error)
+{
+    const ranking *r = context;
+    (void)error;
+    for (uint64_t i = begin; i < end; i++) {
+        uint64_t number = r->begin + i;
+        ((rank *)records)[i - begin] = (rank){ r->loops->start[number], (uint32_t)number, (uint32_t)(r->loops->first[number + 1] - r->loops->first[number] - 2) };
+    }
+    return EBPO_OK;
+}
+
+/* Of one walk: as they were taken off it. */
+static int compare_ranks(const void *a, const void *b)
+{
+    const rank *x = a, *y = b;
+    return (x->number > y->number) - (x->number < y->number);
+}
+
+static void take_ranks(void *context, uint64_t place, const void *records, uint64_t count)
+{
+    ranking *r = context;
+    memcpy(r->sorted + place, records, (size_t)count * sizeof *r->sorted);
+}
+
+ebpo_status ebpo_loops_rank(uint64_t **triangles, const ebpo_loops *loops, const ebpo_mesh *mesh, unsigned threads, ebpo_error *error)
+{
+    ranking r = { .loops = loops, .sorted = ebpo_array_alloc(mesh->workspace, loops->count, sizeof *r.sorted) };
+    uint64_t *before = ebpo_array_alloc(mesh->workspace, loops->count, sizeof *before), sum = 0;
+    ebpo_status status = r.sorted && before ? EBPO_OK : ebpo_workspace_fail(mesh->workspace, loops->count * 24, error);
+    for (int part = 0; part < 2 && status == EBPO_OK; part++) {
+        uint64_t count = part ? loops->count - loops->on_paths : loops->on_paths;
+        r.begin = part ? loops->on_paths : 0;
+        ebpo_sort sort = { .workspace = mesh->workspace, .threads = threads, .progress = &silent, .stage = "", .count = count, .record = sizeof *r.sorted, .shift = leading(mesh),
+                           .context = &r, .make = make_ranks, .compare = compare_ranks, .take = take_ranks };
+        status = ebpo_sort_run(&sort, error);
+        for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
+            before[r.sorted[i].number] = sum;
+            sum += r.sorted[i].triangles;
+            ebpo_workspace_settle_often(mesh->workspace, i);
+        }
+    }
+    ebpo_array_free(r.sorted);
+    if (status != EBPO_OK)
+        ebpo_array_free(before);
+    else
+        *triangles = before;
     return status;
 }

@@ -6,6 +6,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/workspace.h"
 #include "geom/predicates.h"
 #include "mesh/check_parts.h"
 
@@ -93,14 +94,15 @@ static ebpo_status faces(void *context, uint64_t begin, uint64_t end, unsigned w
     const face_pass *pass = context;
     const ebpo_mesh *mesh = pass->check->mesh;
     uint32_t *parents = pass->check->parents;
-    face_block block = { .area2 = { 0, 0 } };
+    face_block block = { .area2 = { .adds = 0 } };
     for (uint64_t f = begin; f < end; f++) {
         const uint32_t *v = mesh->faces + 3 * f;
+        ebpo_workspace_settle_often(mesh->workspace, f);
         join(parents, v[0], v[1]);
         join(parents, v[1], v[2]);
         if (ebpo_face_repeats_index(v)) {
-            ebpo_finding_add(&block.index_repeated, f);
-            ebpo_finding_add(&block.zero_area, f);
+            ebpo_finding_add(&block.index_repeated, ebpo_mesh_source_face(mesh, f));
+            ebpo_finding_add(&block.zero_area, ebpo_mesh_source_face(mesh, f));
             continue;
         }
         double a[3], b[3], c[3], cross[3];
@@ -115,7 +117,7 @@ static ebpo_status faces(void *context, uint64_t begin, uint64_t end, unsigned w
             ebpo_mesh_position(mesh, v[2], c);
         }
         if (zero_area(a, b, c))
-            ebpo_finding_add(&block.zero_area, f);
+            ebpo_finding_add(&block.zero_area, ebpo_mesh_source_face(mesh, f));
     }
     pass->blocks[begin / FACE_GRAIN] = block;
     return EBPO_OK;
@@ -132,7 +134,7 @@ ebpo_status ebpo_check_faces(ebpo_check *check, ebpo_error *error)
         pass.centre[k] = ldexp(0.5 * r->min[k] + 0.5 * r->max[k], -check->units.exponent[k]);
     ebpo_status status = ebpo_parallel_for(check->threads, count, FACE_GRAIN, faces, &pass, &check->progress,
                                            "measuring faces", error);
-    ebpo_sum area2 = { 0, 0 }, volume6 = { 0, 0 };
+    ebpo_sum area2 = { .adds = 0 }, volume6 = { .adds = 0 };
     for (uint64_t i = 0; status == EBPO_OK && i < blocks; i++) {
         ebpo_sum_merge(&area2, &pass.blocks[i].area2);
         ebpo_sum_merge(&volume6, &pass.blocks[i].volume6);

@@ -6,6 +6,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/workspace.h"
 #include "mesh/check_parts.h"
 
 enum { STAR_GRAIN = 1 << 13, INSERTION_LIMIT = 32 };
@@ -28,7 +29,7 @@ typedef struct scratch {
     uint64_t fan_capacity;
     opposite *opposites;
     uint64_t opposite_capacity;
-    ebpo_boundary boundary;
+    ebpo_boundary *boundary;
 } scratch;
 
 typedef struct star_pass {
@@ -54,12 +55,16 @@ static uint64_t join_fans(uint32_t *fans, const ebpo_link *links, uint64_t uses)
     return a != b;
 }
 
-static bool classify_edge(star_block *block, scratch *s, uint32_t v, const ebpo_link *links, uint64_t uses)
+static bool classify_edge(const ebpo_mesh *mesh, star_block *block, scratch *s, uint32_t v, const ebpo_link *links, uint64_t uses)
 {
     uint64_t out = 0;
-    uint32_t face = ebpo_link_face(&links[0]), neighbour = ebpo_link_neighbour(&links[0]);
-    for (uint64_t i = 0; i < uses; i++)
+    uint32_t neighbour = ebpo_link_neighbour(&links[0]);
+    uint64_t face = UINT64_MAX; /* the lowest */
+    for (uint64_t i = 0; i < uses; i++) {
+        uint64_t source = ebpo_mesh_source_face(mesh, ebpo_link_face(&links[i]));
         out += links[i].out;
+        face = source < face ? source : face;
+    }
     block->edges++;
     if (uses > 2)
         ebpo_finding_add(&block->nonmanifold, face);
@@ -70,7 +75,7 @@ static bool classify_edge(star_block *block, scratch *s, uint32_t v, const ebpo_
     if (uses != 1)
         return true;
     ebpo_finding_add(&block->boundary, face);
-    return ebpo_boundary_add(&s->boundary, (ebpo_boundary_edge){ out ? v : neighbour, out ? neighbour : v, face });
+    return ebpo_boundary_add(s->boundary, mesh, out ? v : neighbour, out ? neighbour : v, ebpo_link_face(&links[0]));
 }
 
 static double edge_length(const ebpo_check *check, uint32_t a, uint32_t b)
@@ -99,11 +104,11 @@ static bool check_edges(const ebpo_check *check, star_block *block, scratch *s, 
         if (neighbour < v) /* the edge is counted at its lower end */
             continue;
         ebpo_sum_add(&block->length, edge_length(check, v, neighbour));
-        if (!classify_edge(block, s, v, star->links + begin, end - begin))
+        if (!classify_edge(check->mesh, block, s, v, star->links + begin, end - begin))
             return false;
     }
     if (fans > 1)
-        ebpo_finding_add(&block->bowtie, v);
+        ebpo_finding_add(&block->bowtie, ebpo_mesh_source_vertex(check->mesh, v));
     return true;
 }
 
@@ -142,7 +147,7 @@ static bool check_repeated(const ebpo_check *check, star_block *block, scratch *
         if (c[0] < v || c[1] < v || c[2] < v || ebpo_face_repeats_index(c))
             continue;
         uint32_t p = c[0] == v ? c[1] : c[0], q = c[2] == v ? c[1] : c[2];
-        s->opposites[count++] = (opposite){ p < q ? (uint64_t)p << 32 | q : (uint64_t)q << 32 | p, f };
+        s->opposites[count++] = (opposite){ p < q ? (uint64_t)p << 32 | q : (uint64_t)q << 32 | p, (uint32_t)ebpo_mesh_source_face(check->mesh, f) };
     }
     sort_opposites(s->opposites, count);
     for (uint64_t i = 1; i < count; i++)
@@ -159,13 +164,14 @@ static ebpo_status stars(void *context, uint64_t begin, uint64_t end, unsigned w
     star_block block = { .edges = 0 };
     for (uint64_t v = begin; v < end; v++) {
         uint32_t vertex = (uint32_t)v;
+        ebpo_workspace_settle_often(check->mesh->workspace, v);
         uint64_t degree = ebpo_stars_degree(&check->stars, vertex);
         if (degree == 0)
             continue;
         block.components += check->parents[v] == v;
         if (!ebpo_star_gather(&s->star, &check->stars, check->mesh, vertex) ||
             !check_edges(check, &block, s, vertex) || !check_repeated(check, &block, s, vertex))
-            return ebpo_fail_memory(error, degree * 2 * sizeof *s->star.links);
+            return ebpo_workspace_fail(check->mesh->workspace, degree * 2 * sizeof *s->star.links, error);
     }
     pass->blocks[begin / STAR_GRAIN] = block;
     return EBPO_OK;
@@ -174,7 +180,7 @@ static ebpo_status stars(void *context, uint64_t begin, uint64_t end, unsigned w
 static void join_blocks(const ebpo_check *check, const star_block *blocks, uint64_t count)
 {
     ebpo_mesh_report *r = check->report;
-    ebpo_sum length = { 0, 0 };
+    ebpo_sum length = { .adds = 0 };
     for (uint64_t i = 0; i < count; i++) {
         const star_block *b = &blocks[i];
         ebpo_finding_merge(&r->boundary_edges, &b->boundary);
@@ -190,21 +196,11 @@ static void join_blocks(const ebpo_check *check, const star_block *blocks, uint6
     r->mean_edge = r->edges ? ldexp(ebpo_sum_value(&length) / (double)r->edges, check->units.length) : 0;
 }
 
-static bool gather_boundary(ebpo_check *check, const scratch *scratches)
-{
-    bool ok = true;
-    for (unsigned t = 0; t < check->threads; t++)
-        for (uint64_t i = 0; ok && i < scratches[t].boundary.count; i++)
-            ok = ebpo_boundary_add(&check->boundary, scratches[t].boundary.edges[i]);
-    return ok;
-}
-
 static void free_scratch(scratch *s)
 {
     ebpo_star_free(&s->star);
     free(s->fans);
     free(s->opposites);
-    ebpo_boundary_free(&s->boundary);
 }
 
 ebpo_status ebpo_check_stars(ebpo_check *check, ebpo_error *error)
@@ -212,21 +208,26 @@ ebpo_status ebpo_check_stars(ebpo_check *check, ebpo_error *error)
     uint64_t count = check->mesh->vertex_count, blocks = (count + STAR_GRAIN - 1) / STAR_GRAIN;
     star_pass pass = { .check = check, .blocks = ebpo_alloc(blocks, sizeof *pass.blocks),
                        .scratch = ebpo_alloc_zero(check->threads, sizeof *pass.scratch) };
+    ebpo_boundary *boundaries = ebpo_alloc_zero(check->threads, sizeof *boundaries);
     ebpo_status status = EBPO_OK;
-    if (!pass.blocks || !pass.scratch) {
+    if (!pass.blocks || !pass.scratch || !boundaries) {
         status = ebpo_fail_memory(error, blocks * sizeof *pass.blocks);
         goto done;
     }
+    for (unsigned t = 0; t < check->threads; t++)
+        pass.scratch[t].boundary = &boundaries[t];
     status = ebpo_parallel_for(check->threads, count, STAR_GRAIN, stars, &pass, &check->progress, "checking edges",
                                error);
     if (status != EBPO_OK)
         goto done;
     join_blocks(check, pass.blocks, blocks);
-    if (!gather_boundary(check, pass.scratch))
-        status = ebpo_fail_memory(error, check->report->boundary_edges.count * sizeof *check->boundary.edges);
+    status = ebpo_boundary_join(&check->boundary, boundaries, check->threads, check->mesh, error);
 done:
     for (unsigned t = 0; pass.scratch && t < check->threads; t++)
         free_scratch(&pass.scratch[t]);
+    for (unsigned t = 0; boundaries && t < check->threads; t++)
+        ebpo_boundary_free(&boundaries[t]);
+    free(boundaries);
     free(pass.scratch);
     free(pass.blocks);
     return status;

@@ -4,7 +4,25 @@
 
 #include <ebpo/mesh.h>
 
+#include "geom/cell.h"
+
 #define EBPO_NO_INDEX UINT32_MAX
+
+/* Of a mesh whose vertices and faces are in the order of a Morton curve (ebpo_mesh_arrange). */
+struct ebpo_arrangement {
+    ebpo_box box;            /* around the referenced vertices, with exact walls down to box.grid_level */
+    uint64_t referenced;     /* vertices that faces name come first, along the curve; the others after them, likewise */
+    uint64_t *key;           /* [vertex_count] octcode of the vertex's cell at box.grid_level, ascending among the referenced and among the others. NULL: arranged for mending, or mended since;
+                                neighbours in space are still neighbours in memory, but what builds has to arrange again */
+    int level;               /* that was asked for: -1: as deep as is sensible */
+    bool grouped;            /* vertices at one position are one run */
+    uint32_t *vertex_source; /* [vertex_count] numbers in the source */
+    uint32_t *face_source;   /* [face_count] */
+};
+
+/* Numbers for messages and reports. */
+static inline uint64_t ebpo_mesh_source_vertex(const ebpo_mesh *mesh, uint64_t v) { return mesh->arrangement ? mesh->arrangement->vertex_source[v] : v; }
+static inline uint64_t ebpo_mesh_source_face(const ebpo_mesh *mesh, uint64_t f) { return mesh->arrangement ? mesh->arrangement->face_source[f] : f; }
 
 /* Position of vertex i (< vertex_count) as doubles; exact for both kinds of coordinates. */
 static inline void ebpo_mesh_position(const ebpo_mesh *mesh, uint64_t i, double out[3])

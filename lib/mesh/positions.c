@@ -8,6 +8,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/workspace.h"
 
 enum { VERTEX_GRAIN = 1 << 14 };
 
@@ -69,8 +70,10 @@ static ebpo_status insert_range(void *context, uint64_t begin, uint64_t end, uns
     (void)worker, (void)error;
     ebpo_positions *t = context;
     uint64_t repeated = 0;
-    for (uint64_t v = begin; v < end; v++)
+    for (uint64_t v = begin; v < end; v++) {
+        ebpo_workspace_settle_often(t->mesh->workspace, v);
         repeated += insert(t, (uint32_t)v);
+    }
     __atomic_fetch_add(&t->repeated, repeated, __ATOMIC_RELAXED);
     return EBPO_OK;
 }
@@ -82,10 +85,10 @@ ebpo_status ebpo_positions_build(ebpo_positions *out, const ebpo_mesh *mesh, uns
     while (size < mesh->vertex_count + mesh->vertex_count / 3)
         size *= 2;
     *out = (ebpo_positions){ .mesh = mesh, .mask = size - 1 };
-    out->slots = ebpo_alloc(size, sizeof *out->slots);
+    out->slots = ebpo_array_alloc(mesh->workspace, size, sizeof *out->slots);
     if (!out->slots)
-        return ebpo_fail_memory(error, size * sizeof *out->slots);
-    memset(out->slots, 0xff, size * sizeof *out->slots);
+        return ebpo_workspace_fail(mesh->workspace, size * sizeof *out->slots, error);
+    ebpo_array_fill(mesh->workspace, out->slots, 0xff, size * sizeof *out->slots);
     ebpo_status status = ebpo_parallel_for(threads, mesh->vertex_count, VERTEX_GRAIN, insert_range, out, progress,
                                            "comparing positions", error);
     if (status != EBPO_OK)
@@ -95,7 +98,7 @@ ebpo_status ebpo_positions_build(ebpo_positions *out, const ebpo_mesh *mesh, uns
 
 void ebpo_positions_free(ebpo_positions *positions)
 {
-    free(positions->slots);
+    ebpo_array_free(positions->slots);
     *positions = (ebpo_positions){ .mesh = NULL };
 }
 

@@ -5,6 +5,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/workspace.h"
 
 enum { FACE_GRAIN = 1 << 15, INSERTION_LIMIT = 48 };
 
@@ -16,7 +17,7 @@ typedef struct build {
 static ebpo_status bad_index(const ebpo_mesh *mesh, uint64_t face, uint32_t vertex, ebpo_error *error)
 {
     return ebpo_fail(error, EBPO_E_FORMAT, "%s: face %llu names vertex %lu, but there are %llu vertices; "
-                     "repair the file or drop the face", ebpo_mesh_label(mesh), (unsigned long long)face,
+                     "repair the file or drop the face", ebpo_mesh_label(mesh), (unsigned long long)ebpo_mesh_source_face(mesh, face),
                      (unsigned long)vertex, (unsigned long long)mesh->vertex_count);
 }
 
@@ -26,6 +27,7 @@ static ebpo_status count_faces(void *context, uint64_t begin, uint64_t end, unsi
     build *b = context;
     for (uint64_t f = begin; f < end; f++) {
         const uint32_t *v = b->mesh->faces + 3 * f;
+        ebpo_workspace_settle_often(b->mesh->workspace, f);
         for (int k = 0; k < 3; k++)
             if (v[k] >= b->mesh->vertex_count)
                 return bad_index(b->mesh, f, v[k], error);
@@ -50,6 +52,7 @@ static ebpo_status place_faces(void *context, uint64_t begin, uint64_t end, unsi
     build *b = context;
     for (uint64_t f = begin; f < end; f++) {
         const uint32_t *v = b->mesh->faces + 3 * f;
+        ebpo_workspace_settle_often(b->mesh->workspace, f);
         put(b->stars, v[0], f);
         if (v[1] != v[0])
             put(b->stars, v[1], f);
@@ -64,20 +67,22 @@ ebpo_status ebpo_stars_build(ebpo_stars *out, const ebpo_mesh *mesh, unsigned th
 {
     *out = (ebpo_stars){ NULL, NULL };
     build b = { mesh, out };
-    out->first = ebpo_alloc_zero(mesh->vertex_count + 1, sizeof *out->first);
+    out->first = ebpo_array_zero(mesh->workspace, mesh->vertex_count + 1, sizeof *out->first);
     if (!out->first)
-        return ebpo_fail_memory(error, (mesh->vertex_count + 1) * sizeof *out->first);
+        return ebpo_workspace_fail(mesh->workspace, (mesh->vertex_count + 1) * sizeof *out->first, error);
     ebpo_status status = ebpo_parallel_for(threads, mesh->face_count, FACE_GRAIN, count_faces, &b, progress,
                                            "counting faces at vertices", error);
     if (status != EBPO_OK)
         goto done;
     uint64_t total = 0;
-    for (uint64_t v = 0; v < mesh->vertex_count; v++)
+    for (uint64_t v = 0; v < mesh->vertex_count; v++) {
+        ebpo_workspace_settle_at(mesh->workspace, v);
         out->first[v] = total += out->first[v];
+    }
     out->first[mesh->vertex_count] = total;
-    out->face = ebpo_alloc(total, sizeof *out->face);
+    out->face = ebpo_array_alloc(mesh->workspace, total, sizeof *out->face);
     if (!out->face) {
-        status = ebpo_fail_memory(error, total * sizeof *out->face);
+        status = ebpo_workspace_fail(mesh->workspace, total * sizeof *out->face, error);
         goto done;
     }
     status = ebpo_parallel_for(threads, mesh->face_count, FACE_GRAIN, place_faces, &b, progress,
@@ -90,8 +95,8 @@ done:
 
 void ebpo_stars_free(ebpo_stars *stars)
 {
-    free(stars->first);
-    free(stars->face);
+    ebpo_array_free(stars->first);
+    ebpo_array_free(stars->face);
     *stars = (ebpo_stars){ NULL, NULL };
 }
 

@@ -1,29 +1,100 @@
-/* Compensated summation (Neumaier 1974): sums of millions of terms that keep nearly all digits, in a fixed order. */
+/* Exact summation of doubles: the sum of millions of terms, rounded once, in whatever order they come. A fixed-point number wide enough for all doubles, in limbs of 32 bits that carry late
+ * (Kulisch's long accumulator). */
 #ifndef EBPO_MESH_SUM_H
 #define EBPO_MESH_SUM_H
 
 #include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <string.h>
+
+/* From 2^-1074 to 2^1024, and 2^62 terms. */
+enum { EBPO_SUM_LIMBS = (1074 + 1024 + 63) / 32 + 2, EBPO_SUM_CARRY = 1 << 29 };
+
+__extension__ typedef unsigned __int128 ebpo_wide;
 
 typedef struct ebpo_sum {
-    double sum, lost;
+    int64_t limb[EBPO_SUM_LIMBS]; /* [i] counts 2^(32 i - 1074) */
+    uint32_t adds;                /* since carries were settled */
+    double beyond;                /* sum of what is infinite or NaN */
 } ebpo_sum;
+
+/* Leaves 0 .. 2^32 - 1 in all limbs but the last, which has the sign. */
+static inline void ebpo_sum_carry(ebpo_sum *s)
+{
+    for (int i = 0; i + 1 < EBPO_SUM_LIMBS; i++) {
+        int64_t carry = s->limb[i] >> 32;
+        s->limb[i] -= carry * (INT64_C(1) << 32);
+        s->limb[i + 1] += carry;
+    }
+    s->adds = 0;
+}
 
 static inline void ebpo_sum_add(ebpo_sum *s, double x)
 {
-    double t = s->sum + x;
-    s->lost += fabs(s->sum) >= fabs(x) ? (s->sum - t) + x : (x - t) + s->sum;
-    s->sum = t;
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    unsigned exponent = bits >> 52 & 2047;
+    if (exponent == 2047) {
+        s->beyond += x;
+        return;
+    }
+    uint64_t mantissa = (bits & ((UINT64_C(1) << 52) - 1)) | (uint64_t)(exponent > 0) << 52;
+    unsigned place = exponent ? exponent - 1 : 0; /* of the lowest bit, above 2^-1074 */
+    int64_t *limb = s->limb + place / 32, sign = bits >> 63 ? -1 : 1;
+    uint64_t low = mantissa << place % 32, high = place % 32 ? mantissa >> (64 - place % 32) : 0;
+    limb[0] += sign * (int64_t)(low & 0xffffffff);
+    limb[1] += sign * (int64_t)(low >> 32);
+    limb[2] += sign * (int64_t)high;
+    if (++s->adds == EBPO_SUM_CARRY)
+        ebpo_sum_carry(s);
 }
 
 static inline void ebpo_sum_merge(ebpo_sum *s, const ebpo_sum *other)
 {
-    ebpo_sum_add(s, other->sum);
-    ebpo_sum_add(s, other->lost);
+    ebpo_sum o = *other;
+    ebpo_sum_carry(&o);
+    ebpo_sum_carry(s);
+    for (int i = 0; i < EBPO_SUM_LIMBS; i++)
+        s->limb[i] += o.limb[i];
+    s->adds = 1;
+    s->beyond += o.beyond;
 }
 
-static inline double ebpo_sum_value(const ebpo_sum *s)
+/* To nearest, ties to even. */
+static inline double ebpo_sum_value(const ebpo_sum *sum)
 {
-    return s->sum + s->lost;
+    ebpo_sum s = *sum;
+    if (s.beyond != 0)
+        return s.beyond;
+    ebpo_sum_carry(&s);
+    bool negative = s.limb[EBPO_SUM_LIMBS - 1] < 0;
+    for (int i = 0; i < EBPO_SUM_LIMBS && negative; i++)
+        s.limb[i] = -s.limb[i];
+    ebpo_sum_carry(&s);
+    int top = EBPO_SUM_LIMBS - 1;
+    while (top > 0 && s.limb[top] == 0)
+        top--;
+    /* The leading 64 bits and more, then whether anything follows. */
+    ebpo_wide head = (ebpo_wide)(uint64_t)s.limb[top] << 64;
+    head |= top > 0 ? (ebpo_wide)(uint64_t)s.limb[top - 1] << 32 : 0;
+    head |= top > 1 ? (ebpo_wide)(uint64_t)s.limb[top - 2] : 0;
+    bool rest = false;
+    for (int i = 0; i < top - 2; i++)
+        rest |= s.limb[i] != 0;
+    int unit = 32 * (top - 2) - 1074; /* head counts 2^unit */
+    uint64_t high = (uint64_t)(head >> 64), low = (uint64_t)head;
+    int bits = high ? 128 - __builtin_clzll(high) : low ? 64 - __builtin_clzll(low) : 0, drop = bits - 53;
+    if (unit + drop < -1074)
+        drop = -1074 - unit; /* a denormal result */
+    if (drop > 0) {
+        ebpo_wide half = (ebpo_wide)1 << (drop - 1), below = head & ((half << 1) - 1);
+        head >>= drop;
+        unit += drop;
+        head += below > half || (below == half && (rest || (head & 1)));
+    }
+    double value = ldexp((double)(uint64_t)head, unit);
+    return negative ? -value : value;
 }
 
 #endif

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 
 #include "base/alloc.h"
+#include "base/workspace.h"
 #include "mesh/mesh.h"
 
 static double triangle_area(const ebpo_chain *c, uint32_t i, uint32_t j, uint32_t k)
@@ -153,13 +154,15 @@ static void start_cutting(cutting *c)
 static bool cut_ears(const ebpo_chain *chain, uint32_t (*triangles)[3])
 {
     uint64_t n = chain->n, written = 0;
-    cutting c = { .chain = chain, .before = ebpo_alloc(n, sizeof *c.before), .after = ebpo_alloc(n, sizeof *c.after),
-                  .version = ebpo_alloc_zero(n, sizeof *c.version), .heap = ebpo_alloc(3 * n, sizeof *c.heap) };
+    ebpo_workspace *w = chain->workspace;
+    cutting c = { .chain = chain, .before = ebpo_array_alloc(w, n, sizeof *c.before), .after = ebpo_array_alloc(w, n, sizeof *c.after),
+                  .version = ebpo_array_zero(w, n, sizeof *c.version), .heap = ebpo_array_alloc(w, 3 * n, sizeof *c.heap) };
     bool ok = c.before && c.after && c.version && c.heap;
     if (ok)
         start_cutting(&c);
     while (ok && written < n - 2) {
         ear e = pop_ear(&c);
+        ebpo_workspace_settle_often(w, written);
         if (e.version != c.version[e.tip])
             continue;
         uint32_t p = c.before[e.tip], q = c.after[e.tip];
@@ -170,10 +173,10 @@ static bool cut_ears(const ebpo_chain *chain, uint32_t (*triangles)[3])
         push_ear(&c, p);
         push_ear(&c, q);
     }
-    free(c.before);
-    free(c.after);
-    free(c.version);
-    free(c.heap);
+    ebpo_array_free(c.before);
+    ebpo_array_free(c.after);
+    ebpo_array_free(c.version);
+    ebpo_array_free(c.heap);
     return ok;
 }
 

@@ -2,8 +2,7 @@
 #ifndef EBPO_MESH_TRIANGULATE_H
 #define EBPO_MESH_TRIANGULATE_H
 
-#include <stdbool.h>
-#include <stdint.h>
+#include <ebpo/workspace.h>
 
 /* Chains up to this length get the triangulation of least area, O(n^3); longer ones are cut ear by ear, O(n log n). */
 #define EBPO_OPTIMAL_CHAIN 256
@@ -14,6 +13,7 @@ typedef struct ebpo_chain {
     const double (*point)[3];
     const uint8_t *taken; /* NULL, or [n][n]: 1 where the mesh has an edge between two points already (a triangle there would make it
                              non-manifold); avoided where possible; only for n <= EBPO_OPTIMAL_CHAIN */
+    ebpo_workspace *workspace; /* for long ones, or NULL */
 } ebpo_chain;
 
 /* Writes n - 2 triangles, as numbers of points, that run along the chain (point i to i + 1). The result depends on the points only. False when

@@ -73,7 +73,7 @@ static bool gather_points(const ebpo_box *box, ebpo_cell cell, const ebpo_triang
 static int hull_normals(const leaf_points *points, ebpo_candidate *out)
 {
     ebpo_hull_facet facets[2 * LEAF_POINTS];
-    int count = ebpo_hull_facets((const double (*)[3])points->at, points->count, facets, 2 * LEAF_POINTS), kept = 0;
+    int count = ebpo_hull_facets((const double (*)[3])points->at, points->count, 1e-9, facets, 2 * LEAF_POINTS), kept = 0;
     if (count > LEAF_CANDIDATES)
         qsort(facets, (size_t)count, sizeof *facets, ebpo_hull_by_area);
     for (int i = 0; i < count; i++) {

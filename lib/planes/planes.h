@@ -27,6 +27,7 @@ typedef struct ebpo_candidate {
 typedef struct ebpo_choice {
     const ebpo_candidate *candidates; /* normals differ */
     int count, most;                  /* candidates; codes that may be taken */
+    double core;                      /* inherit: volume that no candidate can remove, in cells (0: not known) */
     double epsilon, reach;            /* inherit: a plane removes at least this share of the cell, or cuts off what reaches farther beyond it, in cells (0: whatever reaches) */
     int wanted;                       /* the theses': so many of the candidates */
     const double *cell_size;          /* [3] cell coordinates to the model's unit */

@@ -3,6 +3,7 @@
 #include "geom/strict_fp.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "geom/plane_code.h"
 #include "planes/planes.h"
@@ -14,22 +15,11 @@ typedef struct ranked {
     int round; /* -1: never evaluated */
 } ranked;
 
-/* Upper bound of the volume beyond a plane, much cheaper than the volume itself: among convex bodies of volume V and width H the cap of height h is largest for the cone with its base on the far side,
- * V (1 - (1 - h/H)^3). */
-static double cap_bound(const ebpo_polytope *p, double volume, const double n[3], double d)
-{
-    double most = -1e300, least = 1e300;
-    for (int i = 0; i < p->vertex_count; i++) {
-        double e = n[0] * p->vertex[i][0] + n[1] * p->vertex[i][1] + n[2] * p->vertex[i][2];
-        most = e > most ? e : most;
-        least = e < least ? e : least;
-    }
-    double h = most - d, width = most - least;
-    if (!(h > 1e-9) || !(width > 0))
-        return 0;
-    double left = h < width ? 1 - h / width : 0;
-    return volume * (1 - left * left * left);
-}
+/* Candidates that may still be worth a plane: by the volume that they remove (a heap), and by how far the envelope reaches beyond them. */
+typedef struct contest {
+    ranked by_gain[EBPO_PLANES_CANDIDATES], by_reach[EBPO_PLANES_CANDIDATES];
+    int gains, reaches;
+} contest;
 
 bool ebpo_candidate_plane(const ebpo_candidate *candidate, uint32_t *code, double n[3], double *offset)
 {
@@ -45,19 +35,39 @@ bool ebpo_candidate_plane(const ebpo_candidate *candidate, uint32_t *code, doubl
     return true;
 }
 
-static int rank_candidates(const ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, double epsilon, ranked *out)
+/* How far the envelope reaches along n. */
+static void extent(const ebpo_polytope *p, const double n[3], double *least, double *most)
 {
-    double volume = ebpo_polytope_volume(envelope);
-    int kept = 0;
+    double low = 1e300, high = -1e300;
+    for (int i = 0; i < p->vertex_count; i++) {
+        double e = n[0] * p->vertex[i][0] + n[1] * p->vertex[i][1] + n[2] * p->vertex[i][2];
+        high = e > high ? e : high;
+        low = e < low ? e : low;
+    }
+    *least = low;
+    *most = high;
+}
+
+static double length_of(const double n[3])
+{
+    return sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+}
+
+static void rank_candidates(const ebpo_polytope *envelope, double volume, const ebpo_candidate *candidates, int count, double epsilon, double reach, contest *c)
+{
+    c->gains = c->reaches = 0;
     for (int i = 0; i < count && i < EBPO_PLANES_CANDIDATES; i++) {
         ranked r = { .round = -1 };
+        double least, most;
         if (!ebpo_candidate_plane(&candidates[i], &r.code, r.n, &r.d))
             continue;
-        r.gain = cap_bound(envelope, volume, r.n, r.d);
+        extent(envelope, r.n, &least, &most);
+        r.gain = ebpo_polytope_cap_bound(volume, most - least, most - r.d);
         if (r.gain >= epsilon && r.gain > 0)
-            out[kept++] = r;
+            c->by_gain[c->gains++] = r;
+        if (reach > 0 && most - r.d > reach * length_of(r.n)) /* cutting only shortens it */
+            c->by_reach[c->reaches++] = r;
     }
-    return kept;
 }
 
 static bool before(const ranked *a, const ranked *b)
@@ -93,67 +103,59 @@ static void drop_first(ranked *heap, int *count)
         sift_down(heap, *count, 0);
 }
 
-static double depth_of(const ebpo_polytope *p, const double n[3], double d)
-{
-    double most = -1e300;
-    for (int i = 0; i < p->vertex_count; i++) {
-        double e = n[0] * p->vertex[i][0] + n[1] * p->vertex[i][1] + n[2] * p->vertex[i][2];
-        most = e > most ? e : most;
-    }
-    return (most - d) / sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-}
-
 /* Volume alone leaves needles, which have next to none: cuts off what reaches far, farthest first. A plane that clipping refuses is left out, and the next one tried. */
-static int cut_needles(ebpo_polytope *envelope, const ebpo_choice *choice, int taken, uint32_t *codes)
+static int cut_needles(ebpo_polytope *envelope, contest *c, double reach, int most, int taken, uint32_t *codes)
 {
-    bool refused[EBPO_PLANES_CANDIDATES] = { false };
-    while (taken < choice->most) {
-        double deepest = choice->reach, best[3] = { 0, 0, 0 }, at = 0;
-        uint32_t code = 0;
-        int which = -1;
-        for (int i = 0; i < choice->count; i++) {
-            double n[3], offset;
-            uint32_t c;
-            if (refused[i] || !ebpo_candidate_plane(&choice->candidates[i], &c, n, &offset))
+    while (taken < most && c->reaches > 0) {
+        double deepest = reach;
+        int which = -1, left = 0;
+        for (int i = 0; i < c->reaches; i++) {
+            double low, high;
+            extent(envelope, c->by_reach[i].n, &low, &high);
+            double depth = (high - c->by_reach[i].d) / length_of(c->by_reach[i].n);
+            if (!(depth > reach))
                 continue;
-            double depth = depth_of(envelope, n, offset);
-            if (depth > deepest) {
-                deepest = depth, at = offset, code = c, which = i;
-                best[0] = n[0], best[1] = n[1], best[2] = n[2];
-            }
+            c->by_reach[left] = c->by_reach[i];
+            if (depth > deepest)
+                deepest = depth, which = left;
+            left++;
         }
+        c->reaches = left;
         if (which < 0)
             break;
-        if (ebpo_polytope_clip(envelope, best, at, taken) == EBPO_CLIP_CUT)
-            codes[taken++] = code;
-        else
-            refused[which] = true;
+        ranked r = c->by_reach[which];
+        memmove(&c->by_reach[which], &c->by_reach[which + 1], (size_t)(--c->reaches - which) * sizeof r);
+        if (ebpo_polytope_clip(envelope, r.n, r.d, taken) == EBPO_CLIP_CUT)
+            codes[taken++] = r.code;
     }
     return taken;
 }
 
 int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
 {
-    ranked heap[EBPO_PLANES_CANDIDATES];
-    double epsilon = choice->epsilon;
-    int left = rank_candidates(envelope, choice->candidates, choice->count, epsilon, heap), taken = 0, most = choice->most;
-    make_heap(heap, left);
-    while (left > 0 && taken < most) {
-        ranked *r = &heap[0];
+    contest c;
+    double epsilon = choice->epsilon, volume = ebpo_polytope_volume(envelope);
+    int taken = 0, most = choice->most;
+    rank_candidates(envelope, volume, choice->candidates, choice->count, epsilon, choice->reach, &c);
+    make_heap(c.by_gain, c.gains);
+    while (c.gains > 0 && taken < most && volume - choice->core >= epsilon) {
+        ranked *r = &c.by_gain[0];
         if (r->round != taken) {
-            r->gain = ebpo_polytope_removed(envelope, r->n, r->d);
+            r->gain = ebpo_polytope_removed(envelope, r->n, r->d, volume, epsilon);
             r->round = taken;
             if (r->gain >= epsilon && r->gain > 0)
-                sift_down(heap, left, 0);
+                sift_down(c.by_gain, c.gains, 0);
             else
-                drop_first(heap, &left);
+                drop_first(c.by_gain, &c.gains);
             continue;
         }
-        if (ebpo_polytope_clip(envelope, r->n, r->d, taken) == EBPO_CLIP_CUT)
+        if (ebpo_polytope_clip(envelope, r->n, r->d, taken) == EBPO_CLIP_CUT) {
             codes[taken++] = r->code;
-        drop_first(heap, &left);
+            volume -= r->gain;
+        }
+        drop_first(c.by_gain, &c.gains);
     }
-    return choice->reach > 0 ? cut_needles(envelope, choice, taken, codes) : taken;
+    return cut_needles(envelope, &c, choice->reach, most, taken, codes);
 }
 
 /* Share of the cell below which a derived plane is not worth the time of a clip. */
@@ -161,13 +163,14 @@ static const double hardly_anything = 3e-4;
 
 int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, int most, uint32_t *codes)
 {
-    ranked heap[EBPO_PLANES_CANDIDATES];
-    int left = rank_candidates(envelope, candidates, count, hardly_anything, heap), taken = 0;
-    make_heap(heap, left);
-    for (; left > 0 && taken < most; drop_first(heap, &left))
-        if (ebpo_polytope_clip(envelope, heap[0].n, heap[0].d, taken) == EBPO_CLIP_CUT)
-            codes[taken++] = heap[0].code;
-    return cut_needles(envelope, &(ebpo_choice){ .candidates = candidates, .count = count, .most = most, .reach = ebpo_needle }, taken, codes);
+    contest c;
+    int taken = 0;
+    rank_candidates(envelope, ebpo_polytope_volume(envelope), candidates, count, hardly_anything, ebpo_needle, &c);
+    make_heap(c.by_gain, c.gains);
+    for (; c.gains > 0 && taken < most; drop_first(c.by_gain, &c.gains))
+        if (ebpo_polytope_clip(envelope, c.by_gain[0].n, c.by_gain[0].d, taken) == EBPO_CLIP_CUT)
+            codes[taken++] = c.by_gain[0].code;
+    return cut_needles(envelope, &c, ebpo_needle, most, taken, codes);
 }
 
 void ebpo_planes_cut(ebpo_polytope *envelope, const uint32_t *codes, uint64_t count)

@@ -24,10 +24,11 @@ static double to_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *
     return most;
 }
 
-/* With coordinates up to M: 2.01 u M from to_cell, and at most 8 u M for each of six clips; 128 u M covers their sum. */
+/* With coordinates up to M: 2.01 u M from to_cell, and at most 8 u M for each of six clips; 128 u M covers their sum. One value for all faces that do not reach far: then the
+ * points that two faces share come out the same from both. */
 static double slack_for(double most)
 {
-    return most * 0x1p-46;
+    return most <= 2 ? 0x1p-45 : most * 0x1p-46;
 }
 
 static int clip_wall(double in[9][3], int count, int axis, double sign, double limit, double out[9][3])
@@ -42,9 +43,11 @@ static int clip_wall(double in[9][3], int count, int axis, double sign, double l
             kept++;
         }
         if ((da < 0 && db > 0) || (da > 0 && db < 0)) {
-            double t = da / (da - db);
+            bool back = da > 0; /* from the inner end, whichever way the face runs along its edge */
+            const double *from = back ? b : a, *to = back ? a : b;
+            double t = back ? db / (db - da) : da / (da - db);
             for (int k = 0; k < 3; k++)
-                out[kept][k] = a[k] + t * (b[k] - a[k]);
+                out[kept][k] = from[k] + t * (to[k] - from[k]);
             out[kept][axis] = sign * limit;
             kept++;
         }
@@ -115,22 +118,28 @@ static bool separated(const separation *s, const double centre[3], double half)
     return false;
 }
 
-unsigned ebpo_octants_touched(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face)
+/* By the walls between the octants, which are exact. */
+static unsigned octants_of_bounds(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face)
 {
-    separation s;
-    s.most = to_cell(box, cell, face, s.x);
-    double e = slack_for(s.most);
-    unsigned mask = 255;
     static const unsigned low_side[3] = { 0x55, 0x33, 0x0f };
+    unsigned mask = 255;
     for (int k = 0; k < 3; k++) {
-        double low = fmin(s.x[0][k], fmin(s.x[1][k], s.x[2][k])), high = fmax(s.x[0][k], fmax(s.x[1][k], s.x[2][k]));
-        if (low > 0.5 + e)
+        double wall = ebpo_wall(box, k, cell.level + 1, 2 * cell.at[k] + 1), a = face->corner[0][k], b = face->corner[1][k], c = face->corner[2][k];
+        if (a > wall && b > wall && c > wall)
             mask &= ~low_side[k];
-        if (high < 0.5 - e)
+        if (a < wall && b < wall && c < wall)
             mask &= low_side[k];
     }
+    return mask;
+}
+
+unsigned ebpo_octants_touched(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face)
+{
+    unsigned mask = octants_of_bounds(box, cell, face);
     if ((mask & (mask - 1)) == 0)
         return mask;
+    separation s;
+    s.most = to_cell(box, cell, face, s.x);
     prepare(&s);
     for (unsigned octant = 0; octant < 8; octant++) {
         if (!(mask >> octant & 1))

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "base/error.h"
-#include "ply/parser.h"
+#include "ply/binary.h"
 
 #if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
 enum { FOREIGN = PLY_BIG };
@@ -21,34 +21,9 @@ typedef struct rows {
     bool store;
 } rows;
 
-static uint64_t load(const uint8_t *at, unsigned bytes, bool swap)
-{
-    uint8_t b1;
-    uint16_t b2;
-    uint32_t b4;
-    uint64_t b8;
-    switch (bytes) {
-    case 1: memcpy(&b1, at, 1); return b1;
-    case 2: memcpy(&b2, at, 2); return swap ? __builtin_bswap16(b2) : b2;
-    case 4: memcpy(&b4, at, 4); return swap ? __builtin_bswap32(b4) : b4;
-    default: memcpy(&b8, at, 8); return swap ? __builtin_bswap64(b8) : b8;
-    }
-}
-
-static int64_t load_integer(const uint8_t *at, ply_type type, bool swap)
-{
-    uint64_t raw = load(at, ebpo_ply_type_bytes(type), swap);
-    switch (type) {
-    case PLY_INT8: return (int8_t)raw;
-    case PLY_INT16: return (int16_t)raw;
-    case PLY_INT32: return (int32_t)raw;
-    default: return (int64_t)raw;
-    }
-}
-
 static float load_float(const uint8_t *at, bool swap)
 {
-    uint32_t raw = (uint32_t)load(at, 4, swap);
+    uint32_t raw = (uint32_t)ebpo_ply_load(at, 4, swap);
     float value;
     memcpy(&value, &raw, sizeof value);
     return value;
@@ -59,22 +34,21 @@ static double load_number(const uint8_t *at, ply_type type, bool swap)
     if (type == PLY_FLOAT32)
         return (double)load_float(at, swap);
     if (type != PLY_FLOAT64)
-        return (double)load_integer(at, type, swap);
-    uint64_t raw = load(at, 8, swap);
+        return (double)ebpo_ply_load_integer(at, type, swap);
+    uint64_t raw = ebpo_ply_load(at, 8, swap);
     double value;
     memcpy(&value, &raw, sizeof value);
     return value;
 }
 
 /* Floats go through as bits: not even the payload of a NaN changes. */
-static void store_coordinate(const rows *r, const ply_property *property, const uint8_t *at)
+void ebpo_ply_store_coordinate(ebpo_mesh *mesh, uint64_t row, const ply_property *property, const uint8_t *at, bool swap)
 {
-    ebpo_mesh *mesh = r->p->mesh;
-    uint64_t place = 3 * r->row + (uint64_t)(property->role - PLY_ROLE_X);
+    uint64_t place = 3 * row + (uint64_t)(property->role - PLY_ROLE_X);
     if (mesh->xyz64) {
-        mesh->xyz64[place] = load_number(at, property->type, r->swap);
+        mesh->xyz64[place] = load_number(at, property->type, swap);
     } else {
-        uint32_t raw = (uint32_t)load(at, 4, r->swap);
+        uint32_t raw = (uint32_t)ebpo_ply_load(at, 4, swap);
         memcpy(&mesh->xyz32[place], &raw, sizeof raw);
     }
 }
@@ -89,7 +63,7 @@ static ebpo_status store_corners(rows *r, const ply_property *property, uint64_t
     bool strips = r->element->kind == PLY_KIND_STRIPS;
     unsigned bytes = ebpo_ply_type_bytes(property->type);
     for (uint64_t i = 0; i < count; i++) {
-        int64_t index = load_integer(p->data + p->at + i * bytes, property->type, r->swap);
+        int64_t index = ebpo_ply_load_integer(p->data + p->at + i * bytes, property->type, r->swap);
         if (strips && (index == -1 || index == UINT32_MAX)) {
             p->corners[i] = PLY_RESTART;
         } else if ((uint64_t)index >= vertices) {
@@ -109,7 +83,7 @@ static ebpo_status read_list(rows *r, const ply_property *property)
     unsigned count_bytes = ebpo_ply_type_bytes(property->count_type), bytes = ebpo_ply_type_bytes(property->type);
     if (p->size - p->at < count_bytes)
         return ebpo_ply_fail_end(p, r->element, r->row);
-    int64_t count = load_integer(p->data + p->at, property->count_type, r->swap);
+    int64_t count = ebpo_ply_load_integer(p->data + p->at, property->count_type, r->swap);
     if (count < 0)
         return ebpo_ply_fail(p, "%s %" PRIu64 " has a list of %" PRId64 " items; the file is damaged",
                              ebpo_ply_row_name(r->element), r->row, count);
@@ -139,7 +113,7 @@ static ebpo_status read_row(rows *r)
         if (p->size - p->at < bytes)
             return ebpo_ply_fail_end(p, r->element, r->row);
         if (r->store && property->role != PLY_ROLE_NONE)
-            store_coordinate(r, property, p->data + p->at);
+            ebpo_ply_store_coordinate(p->mesh, r->row, property, p->data + p->at, r->swap);
         p->at += bytes;
     }
     if (r->store && r->element->kind == PLY_KIND_FACE)
@@ -169,6 +143,10 @@ ebpo_status ebpo_ply_binary_element(ply_parser *p, const ply_element *element, b
     if (!r.store && !element->has_list)
         return step_over(&r);
     ebpo_status status = EBPO_OK;
+    if (r.store && element->kind == PLY_KIND_VERTEX)
+        status = ebpo_ply_plain_vertices(p, element, r.swap, &r.row);
+    else if (r.store && element->kind == PLY_KIND_FACE)
+        status = ebpo_ply_plain_faces(p, element, r.swap, &r.row);
     for (; r.row < element->count && status == EBPO_OK; r.row++) {
         status = read_row(&r);
         if (status == EBPO_OK && ebpo_ply_report_due(p))

@@ -6,6 +6,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/workspace.h"
 #include "geom/polygon.h"
 #include "ply/parser.h"
 
@@ -31,8 +32,8 @@ static ebpo_status face_room(ply_parser *p, uint64_t more)
     ebpo_mesh *mesh = p->mesh;
     if (more > MOST_FACES - mesh->face_count)
         return ebpo_fail(p->error, EBPO_E_LIMIT, "%s: more than 2^32 - 2 triangles; split the model", p->name);
-    if (!ebpo_grow(&mesh->faces, &p->face_capacity, mesh->face_count + more, 3 * sizeof *mesh->faces))
-        return ebpo_fail_memory(p->error, (mesh->face_count + more) * 3 * sizeof *mesh->faces);
+    if (!ebpo_array_grow(mesh->workspace, &mesh->faces, &p->face_capacity, mesh->face_count + more, 3 * sizeof *mesh->faces))
+        return ebpo_workspace_fail(mesh->workspace, (mesh->face_count + more) * 3 * sizeof *mesh->faces, p->error);
     return EBPO_OK;
 }
 

@@ -9,12 +9,13 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/fp_env.h"
+#include "base/workspace.h"
 #include "io/file.h"
 #include "ply/parser.h"
 #include "ply/ply.h"
 
 #define MOST_VERTICES (UINT64_C(0xfffffffe))
-enum { REPORT_BYTES = 1 << 24 };
+enum { REPORT_BYTES = 1 << 22 };
 
 bool ebpo_ply_recognise(const uint8_t *data, uint64_t size)
 {
@@ -47,12 +48,18 @@ ebpo_status ebpo_ply_fail_end(const ply_parser *p, const ply_element *element, u
                          " of element '%s'; it is cut short, get it again", p->size, row, element->count, name);
 }
 
+ebpo_status ebpo_ply_fail_stopped(const ply_parser *p)
+{
+    return ebpo_fail(p->error, EBPO_E_CANCELLED, "stopped on request while reading %s", p->name);
+}
+
 ebpo_status ebpo_ply_report(ply_parser *p)
 {
     p->next_report = p->at + REPORT_BYTES;
+    ebpo_workspace_settle(p->mesh->workspace);
     if (!p->progress || !p->progress->report || p->progress->report(p->progress->user, "reading", p->at, p->size))
         return EBPO_OK;
-    return ebpo_fail(p->error, EBPO_E_CANCELLED, "stopped on request while reading %s", p->name);
+    return ebpo_ply_fail_stopped(p);
 }
 
 /* Least bytes of all rows; false when they exceed any file. */
@@ -118,13 +125,13 @@ static ebpo_status allocate_vertices(ply_parser *p)
     ebpo_mesh *mesh = p->mesh;
     mesh->vertex_count = h->element[h->vertex].count;
     size_t width = all_float(h) ? sizeof(float) : sizeof(double);
-    void *coordinates = ebpo_alloc(mesh->vertex_count, 3 * width);
+    void *coordinates = ebpo_array_alloc(mesh->workspace, mesh->vertex_count, 3 * width);
     if (width == sizeof(float))
         mesh->xyz32 = coordinates;
     else
         mesh->xyz64 = coordinates;
     if (!coordinates)
-        return ebpo_fail_memory(p->error, mesh->vertex_count * 3 * width);
+        return ebpo_workspace_fail(mesh->workspace, mesh->vertex_count * 3 * width, p->error);
     if (h->encoding == PLY_ASCII && !(p->c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0)))
         return ebpo_fail_memory(p->error, 0);
     return EBPO_OK;
@@ -134,9 +141,9 @@ static ebpo_status allocate(ply_parser *p)
 {
     const ply_header *h = &p->header;
     p->face_capacity = h->face >= 0 ? h->element[h->face].count : 0;
-    p->mesh->faces = ebpo_alloc(p->face_capacity, 3 * sizeof *p->mesh->faces);
+    p->mesh->faces = ebpo_array_alloc(p->mesh->workspace, p->face_capacity, 3 * sizeof *p->mesh->faces);
     if (!p->mesh->faces)
-        return ebpo_fail_memory(p->error, p->face_capacity * 3 * sizeof *p->mesh->faces);
+        return ebpo_workspace_fail(p->mesh->workspace, p->face_capacity * 3 * sizeof *p->mesh->faces, p->error);
     return allocate_vertices(p);
 }
 
@@ -179,7 +186,7 @@ static ebpo_status read_body(ply_parser *p)
 /* The face array grew by halves; give back what is left over. */
 static void trim(ply_parser *p)
 {
-    if (p->face_capacity == p->mesh->face_count)
+    if (p->face_capacity == p->mesh->face_count || p->mesh->workspace)
         return;
     uint32_t *faces = ebpo_realloc(p->mesh->faces, p->mesh->face_count, 3 * sizeof *faces);
     if (faces)
@@ -194,11 +201,11 @@ static void describe(ply_parser *p)
     p->mesh->source_size = p->size;
 }
 
-ebpo_status ebpo_ply_parse_memory(ebpo_mesh *out, const uint8_t *data, uint64_t size, const char *name,
+ebpo_status ebpo_ply_parse_memory(ebpo_mesh *out, const uint8_t *data, uint64_t size, const char *name, ebpo_workspace *workspace, unsigned threads,
                                   const ebpo_progress *progress, ebpo_error *error)
 {
-    ebpo_mesh mesh = { 0 };
-    ply_parser p = { .data = data, .size = size, .name = ebpo_path_name(name), .mesh = &mesh, .progress = progress, .error = error };
+    ebpo_mesh mesh = { .workspace = workspace };
+    ply_parser p = { .data = data, .size = size, .name = ebpo_path_name(name), .mesh = &mesh, .threads = threads, .progress = progress, .error = error };
     ebpo_status status = ebpo_ply_header_parse(&p.header, data, size, p.name, error);
     if (status == EBPO_OK)
         status = check_counts(&p);
@@ -212,9 +219,9 @@ ebpo_status ebpo_ply_parse_memory(ebpo_mesh *out, const uint8_t *data, uint64_t 
         trim(&p);
         describe(&p);
     } else {
-        free(mesh.xyz32);
-        free(mesh.xyz64);
-        free(mesh.faces);
+        ebpo_array_free(mesh.xyz32);
+        ebpo_array_free(mesh.xyz64);
+        ebpo_array_free(mesh.faces);
         mesh = (ebpo_mesh){ 0 };
     }
     if (p.c_locale)

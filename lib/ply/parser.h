@@ -15,6 +15,7 @@ typedef struct ply_parser {
     ply_header header;
     ebpo_mesh *mesh;
     uint64_t face_capacity;
+    unsigned threads; /* 0: all cores */
 
     uint32_t *corners; /* of the face or strip being read */
     uint64_t corner_count, corner_capacity;
@@ -38,6 +39,8 @@ const char *ebpo_ply_row_name(const ply_element *element);
 /* Reports progress now and then; EBPO_E_CANCELLED when asked to stop. Cheap: call it for each row. */
 static inline bool ebpo_ply_report_due(const ply_parser *p) { return p->at >= p->next_report; }
 ebpo_status ebpo_ply_report(ply_parser *p);
+/* EBPO_E_CANCELLED. */
+ebpo_status ebpo_ply_fail_stopped(const ply_parser *p);
 
 /* Appends a vertex number of the row being read; room has been made by ebpo_ply_corner_room. */
 ebpo_status ebpo_ply_corner_room(ply_parser *p, uint64_t count);

@@ -8,6 +8,7 @@
 #include "base/alloc.h"
 #include "base/endian.h"
 #include "base/error.h"
+#include "base/workspace.h"
 #include "io/publish.h"
 #include <ebpo/mesh.h>
 
@@ -15,9 +16,12 @@ enum { BUFFER = 1 << 16, FACE_BYTES = 13 };
 
 static ebpo_status check(const ebpo_mesh *mesh, ebpo_error *error)
 {
+    if (mesh->vertex_count > UINT32_MAX - 1 || mesh->face_count > UINT32_MAX - 1)
+        return ebpo_fail(error, EBPO_E_LIMIT, "the mesh to write has %" PRIu64 " vertices and %" PRIu64 " faces, but 2^32 - 2 of each is the limit; split it", mesh->vertex_count,
+                         mesh->face_count);
     if ((mesh->vertex_count && !mesh->xyz32 == !mesh->xyz64) || (mesh->face_count && !mesh->faces))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "the mesh to write has counts without arrays, or positions of both kinds");
-    for (uint64_t i = 0; i < 3 * mesh->face_count; i++)
+    for (uint64_t i = 0; i < 3 * mesh->face_count; ebpo_settle_all_at(i++))
         if (mesh->faces[i] >= mesh->vertex_count)
             return ebpo_fail(error, EBPO_E_ARGUMENT, "face %" PRIu64 " of the mesh to write names vertex %" PRIu32 ", but there are %" PRIu64 " vertices",
                              i / 3, mesh->faces[i], mesh->vertex_count);
@@ -51,6 +55,7 @@ static bool write_vertices(FILE *f, const ebpo_mesh *mesh, uint8_t *buffer)
                 ebpo_store64(buffer + 8 * i, wide);
             }
         }
+        ebpo_settle_all();
         if (fwrite(buffer, width, n, f) != n)
             return false;
         done += n;
@@ -69,6 +74,7 @@ static bool write_faces(FILE *f, const ebpo_mesh *mesh, uint8_t *buffer)
             for (int k = 0; k < 3; k++)
                 ebpo_store32(at + 1 + 4 * k, mesh->faces[3 * (done + i) + (uint64_t)k]);
         }
+        ebpo_settle_all();
         if (fwrite(buffer, FACE_BYTES, n, f) != n)
             return false;
         done += n;

@@ -5,6 +5,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/workspace.h"
 #include "container/reader.h"
 
 /* Reading, level by level, with what the next level needs to know of the one before. */
@@ -155,7 +156,7 @@ ebpo_status ebpo_top_read(ebpo_top **out, ebpo_file *file, int cut_level, unsign
             status = ebpo_reader_make(file, EBPO_A_TYPES, number + 1, threads, sizeof *r.next_types, &r.next_types, error);
         if (status == EBPO_OK)
             status = add_level(&r, number, &level, r.group - (number ? level.group_count : 0));
-        free(r.next_types);
+        ebpo_array_free(r.next_types);
         r.next_types = NULL;
         ebpo_level_free(&level);
     }

@@ -18,13 +18,14 @@ typedef struct walk {
     ebpo_layout *out;
     const ebpo_slice *slice;
     uint64_t gray[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX]; /* of each level, seen so far */
+    uint64_t most;   /* blocks */
     bool failed;
 } walk;
 
 static uint32_t add_block(walk *w, uint32_t begin, uint32_t end)
 {
     ebpo_layout *o = w->out;
-    if (o->block_count >= EBPO_IS_BLOCK - 1 || !ebpo_grow(&o->block_begin, &o->block_room, o->block_count + 1, sizeof *o->block_begin) ||
+    if (o->block_count >= w->most || !ebpo_grow(&o->block_begin, &o->block_room, o->block_count + 1, sizeof *o->block_begin) ||
         !ebpo_grow(&o->block_end, &o->block_room2, o->block_count + 1, sizeof *o->block_end)) {
         w->failed = true;
         return EBPO_NO_CHILD;
@@ -169,10 +170,10 @@ static bool number_blocks(ebpo_layout *o, uint64_t faces)
     return true;
 }
 
-ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, ebpo_error *error)
+ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, uint64_t most, ebpo_error *error)
 {
     memset(out, 0, sizeof *out);
-    walk w = { .out = out, .slice = slice };
+    walk w = { .out = out, .slice = slice, .most = most };
     bundle part[2];
     int parts = 0;
     if (slice->outer_count)
@@ -188,8 +189,9 @@ ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, ebpo_err
     }
     if (!w.failed)
         return EBPO_OK;
+    bool full = out->block_count >= most;
     ebpo_layout_free(out);
-    return ebpo_fail_memory(error, slice->mesh.face_count * 8);
+    return full ? ebpo_fail(error, EBPO_E_LIMIT, "the model has too many faces to be held at once; give a memory budget") : ebpo_fail_memory(error, slice->mesh.face_count * 8);
 }
 
 void ebpo_layout_free(ebpo_layout *layout)

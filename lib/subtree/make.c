@@ -40,6 +40,8 @@ static ebpo_status copy_planes(ebpo_subtree *s, const ebpo_slice *slice, ebpo_er
         grays += slice->level[i].gray_count;
         planes += slice->level[i].plane_count;
     }
+    if (planes > UINT32_MAX) /* what gray_first holds */
+        return ebpo_fail(error, EBPO_E_LIMIT, "the tree has too many planes to be held at once; give a memory budget");
     s->gray_planes = ebpo_alloc(planes, sizeof *s->gray_planes);
     s->gray_first = ebpo_alloc(grays + 1, sizeof *s->gray_first);
     if (!s->gray_planes || !s->gray_first)
@@ -66,7 +68,7 @@ static uint64_t count_bytes(const ebpo_subtree *s)
     uint64_t faces = s->face_source || s->outer ? (uint64_t)s->block_count * 8 : 0;
     return sizeof *s + s->nodes.group_count * sizeof *s->nodes.group + cells * 5 + s->leaf_count * sizeof *s->leaf + s->list_count * sizeof *s->list +
            s->plane_groups * sizeof *s->planes + (uint64_t)s->block_count * (EBPO_BLOCK_NUMBERS * (s->wide ? 8 : 4) + EBPO_BLOCK * 4) +
-           s->bound_count * sizeof *s->bound + s->outer_count * 4 + (s->face_source ? faces * 4 : 0) +
+           s->bound_count * sizeof *s->bound + (uint64_t)s->outer_count * 4 + (s->face_source ? faces * 4 : 0) +
            (s->gray_first ? (s->gray_count + s->gray_first[s->gray_count]) * 4 : 0);
 }
 
@@ -74,7 +76,7 @@ static ebpo_status make(ebpo_subtree *s, ebpo_slice *slice, bool with_planes, un
 {
     ebpo_layout layout;
     ebpo_leaf_place *places = NULL;
-    ebpo_status status = ebpo_layout_make(&layout, slice, error);
+    ebpo_status status = ebpo_layout_make(&layout, slice, EBPO_BLOCKS_MOST, error);
     if (status != EBPO_OK)
         return status;
     status = ebpo_subtree_fill_blocks(s, slice, &layout, threads, error);

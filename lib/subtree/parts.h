@@ -16,7 +16,8 @@ typedef struct ebpo_layout {
     uint32_t top;
 } ebpo_layout;
 
-EBPO_MUST_USE ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, ebpo_error *error);
+/* EBPO_E_LIMIT for more than `most` blocks, which is EBPO_BLOCKS_MOST but in tests. */
+EBPO_MUST_USE ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, uint64_t most, ebpo_error *error);
 void ebpo_layout_free(ebpo_layout *layout);
 
 /* Fills blocks and slots (parallel). */

@@ -80,6 +80,8 @@ typedef struct ebpo_four_planes {
 
 /* Blocks of eight faces: [9][8] coordinates: x, y, z of corner 0, of corner 1, of corner 2, in the model's unit. Lanes without a face hold FLT_MAX (or DBL_MAX). */
 enum { EBPO_BLOCK = 8, EBPO_BLOCK_NUMBERS = 72, EBPO_NO_SLOT = 0x7fffffff };
+/* At most: slots (block * EBPO_BLOCK + lane) have 32 bits. */
+enum { EBPO_BLOCKS_MOST = 1 << 29 };
 
 /* --- bounding hierarchy over the blocks --- */
 

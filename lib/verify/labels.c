@@ -4,13 +4,22 @@
 
 #include <inttypes.h>
 
-enum { SAMPLES_DEFAULT = 4096 };
-/* Faces looked at by rays, in all: some seconds. */
+#include "base/workspace.h"
+#include "verify/winding.h"
+
+enum { SAMPLES_LEAST = 4096, SAMPLES_MANY = 1 << 20, CELLS_ALL = 1 << 22 };
+/* Points looked at by faces, in all: some seconds. */
 static const double ray_work_affordable = 4e8;
 
 __extension__ typedef unsigned __int128 wide;
 
-void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_tree_view *view, const ebpo_columns *columns, uint64_t samples)
+static uint64_t usual_samples(const ebpo_tree_view *view, uint64_t cells)
+{
+    uint64_t samples = cells <= CELLS_ALL ? cells : SAMPLES_MANY;
+    return ebpo_rays_work(&view->tree->mesh, &view->box, samples) <= ray_work_affordable ? samples : SAMPLES_LEAST;
+}
+
+void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_tree_view *view, uint64_t samples)
 {
     uint64_t all = 0, classes = 0;
     for (int l = 0; l < view->tree->info.level_count; l++) {
@@ -24,9 +33,8 @@ void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_tree_view *view, con
             classes += plan->cells[l][type] > 0;
         }
     }
-    double per_ray = (double)columns->first[columns->side * columns->side] / (double)(columns->side * columns->side);
     if (samples == 0)
-        samples = per_ray * (double)all <= ray_work_affordable ? all : SAMPLES_DEFAULT;
+        samples = usual_samples(view, all);
     /* Half of the samples go to the classes evenly, so that small levels are seen too; half by size. */
     for (int l = 0; l < view->tree->info.level_count; l++)
         for (int type = 0; type <= EBPO_GRAY; type++) {
@@ -84,25 +92,36 @@ void ebpo_terminal_windings(ebpo_corner_windings *out, const ebpo_tree_view *vie
         out->at[edge_tree[e].to] = out->at[edge_tree[e].from] + change[e];
 }
 
-void ebpo_check_terminal_label(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo_tree_view_node *node, const ebpo_frame *frame,
-                               const ebpo_label_plan *plan, const ebpo_columns *columns)
+void ebpo_check_terminal_label(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo_tree_view_node *node)
 {
-    ebpo_verify_place place = {node->code, EBPO_NO_FACE, EBPO_NO_PLANE};
-    int64_t told = ebpo_view_winding(view, node);
-    if (node->type != EBPO_LEAF) {
-        tally->checks[EBPO_VERIFY_LABELS]++;
-        if (ebpo_view_inside(view, told) != (node->type == EBPO_BLACK))
-            ebpo_tally_violation(tally, EBPO_VERIFY_LABELS, &place, "%s, but winding number %" PRId64 " lies %s by the file's rule",
-                                 node->type == EBPO_BLACK ? "black" : "white", told,
-                                 node->type == EBPO_BLACK ? "outside" : "inside");
-    }
-    if (!columns || !planned(plan, node))
+    if (node->type == EBPO_LEAF)
         return;
+    int64_t told = ebpo_view_winding(view, node);
     tally->checks[EBPO_VERIFY_LABELS]++;
-    int64_t found = ebpo_columns_winding(columns, frame->low);
-    if (found != told)
-        ebpo_tally_violation(tally, EBPO_VERIFY_LABELS, &place, "winding number %" PRId64 " is stored, a ray through the mesh finds %"
-                             PRId64, told, found);
+    if (ebpo_view_inside(view, told) != (node->type == EBPO_BLACK))
+        ebpo_tally_violation(tally, EBPO_VERIFY_LABELS, &(ebpo_verify_place){node->code, EBPO_NO_FACE, EBPO_NO_PLANE},
+                             "%s, but winding number %" PRId64 " lies %s by the file's rule", node->type == EBPO_BLACK ? "black" : "white",
+                             told, node->type == EBPO_BLACK ? "outside" : "inside");
+}
+
+bool ebpo_label_note(ebpo_ray_points *points, const ebpo_tree_view *view, const ebpo_tree_view_node *node, const ebpo_frame *frame,
+                     const ebpo_label_plan *plan)
+{
+    if (!planned(plan, node))
+        return true;
+    ebpo_ray_point p = {{frame->low[0], frame->low[1], frame->low[2]}, node->code, ebpo_view_winding(view, node), 0};
+    return ebpo_rays_add(points, &p);
+}
+
+void ebpo_check_rays(ebpo_tally *tally, const ebpo_ray_points *points)
+{
+    tally->checks[EBPO_VERIFY_LABELS] += points->count;
+    for (uint64_t i = 0; i < points->count; ebpo_workspace_settle_at(points->workspace, i++)) {
+        const ebpo_ray_point *p = &points->point[i];
+        if (p->found != p->told)
+            ebpo_tally_violation(tally, EBPO_VERIFY_LABELS, &(ebpo_verify_place){p->octcode, EBPO_NO_FACE, EBPO_NO_PLANE},
+                                 "winding number %" PRId64 " is stored, a ray through the mesh finds %" PRId64, p->told, p->found);
+    }
 }
 
 /* Number of the point, 0 .. 26, that a child's corner is. */

@@ -9,7 +9,9 @@
 #define EBPO_VERIFY_LABELS_H
 
 #include "verify/view.h"
-#include "verify/winding.h"
+#include "verify/rays.h"
+#include "verify/tally.h"
+#include "verify/touch.h"
 
 /* Winding numbers of a cell's corners (bit 0 x, bit 1 y, bit 2 z). */
 typedef struct ebpo_corner_windings {
@@ -22,16 +24,21 @@ typedef struct ebpo_label_plan {
     uint64_t cells[EBPO_LEVELS_MAX][4], take[EBPO_LEVELS_MAX][4];
 } ebpo_label_plan;
 
-/* samples 0: all when that is affordable, else 4096. */
-void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_tree_view *view, const ebpo_columns *columns, uint64_t samples);
+/* samples 0: as many as ebpo_verify_options says. */
+void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_tree_view *view, uint64_t samples);
 
 /* Corner windings of a leaf, white or black node; `faces`: the `count` faces that touch it. */
 void ebpo_terminal_windings(ebpo_corner_windings *out, const ebpo_tree_view *view, const ebpo_tree_view_node *node,
                             const ebpo_frame *frame, const uint32_t *faces, uint64_t count);
 
-/* White outside, black inside; the winding number by a ray where the plan says so (columns may be NULL). */
-void ebpo_check_terminal_label(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo_tree_view_node *node, const ebpo_frame *frame,
-                               const ebpo_label_plan *plan, const ebpo_columns *columns);
+/* White outside, black inside. */
+void ebpo_check_terminal_label(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo_tree_view_node *node);
+
+/* Where the plan says so, puts the cell's lowest corner on the list of points to be checked by rays. False when memory is short. */
+EBPO_MUST_USE bool ebpo_label_note(ebpo_ray_points *points, const ebpo_tree_view *view, const ebpo_tree_view_node *node, const ebpo_frame *frame,
+                                   const ebpo_label_plan *plan);
+/* Compares what rays found with what the file says. */
+void ebpo_check_rays(ebpo_tally *tally, const ebpo_ray_points *points);
 
 /* Compares the children of a gray node with each other and gives the node's own corners. */
 void ebpo_check_links(ebpo_tally *tally, const ebpo_tree_view_node *node, const ebpo_corner_windings children[8],

@@ -2,6 +2,8 @@
 
 #include "verify/nesting.h"
 
+#include "base/workspace.h"
+
 #include "geom/plane_code.h"
 
 enum { NODES_PER_LEVEL = 256, POINTS_PER_NODE = 8, POINT_BITS = 16 };
@@ -11,7 +13,7 @@ __extension__ typedef __int128 wide;
 static void check_codes(ebpo_tally *tally, const ebpo_tree_view *view, int l, ebpo_node_type type, const uint8_t *counts)
 {
     const ebpo_level *level = &view->tree->level[l];
-    for (uint64_t group = 0; group < level->group_count; group++)
+    for (uint64_t group = 0; group < level->group_count; ebpo_settle_all_at(group++))
         for (unsigned octant = 0; octant < (l == 0 ? 1u : 8u); octant++) {
             if (ebpo_view_type(level, group, octant) != type)
                 continue;

@@ -6,6 +6,8 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/workspace.h"
+#include "container/reader.h"
 #include "mesh/mesh.h"
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_SOURCE, condition, __VA_ARGS__)
@@ -25,18 +27,20 @@ static ebpo_status copy_mesh(ebpo_mesh *out, const ebpo_mesh *mesh, ebpo_error *
     *out = *mesh;
     out->xyz32 = NULL;
     out->xyz64 = NULL;
-    out->faces = ebpo_alloc(mesh->face_count, 3 * sizeof *out->faces);
-    void *xyz = ebpo_alloc(mesh->vertex_count, vertex_size(mesh));
+    out->faces = ebpo_array_alloc(mesh->workspace, mesh->face_count, 3 * sizeof *out->faces);
+    void *xyz = ebpo_array_alloc(mesh->workspace, mesh->vertex_count, vertex_size(mesh));
     if (mesh->xyz32)
         out->xyz32 = xyz;
     else
         out->xyz64 = xyz;
     if (!out->faces || !xyz) {
         ebpo_mesh_free(out);
-        return ebpo_fail_memory(error, mesh->vertex_count * vertex_size(mesh) + mesh->face_count * 12);
+        return ebpo_workspace_fail(mesh->workspace, mesh->vertex_count * vertex_size(mesh) + mesh->face_count * 12, error);
     }
-    memcpy(out->faces, mesh->faces, mesh->face_count * 3 * sizeof *out->faces);
-    memcpy(xyz, vertex_bytes(mesh, 0), mesh->vertex_count * vertex_size(mesh));
+    for (uint64_t i = 0; i < mesh->face_count; ebpo_workspace_settle_at(mesh->workspace, i++))
+        memcpy(out->faces + 3 * i, mesh->faces + 3 * i, 3 * sizeof *out->faces);
+    for (uint64_t i = 0; i < mesh->vertex_count; ebpo_workspace_settle_at(mesh->workspace, i++))
+        memcpy((char *)xyz + i * vertex_size(mesh), vertex_bytes(mesh, i), vertex_size(mesh));
     return EBPO_OK;
 }
 
@@ -68,11 +72,11 @@ static void compare_in_order(ebpo_tally *tally, const ebpo_mesh *a, const ebpo_m
 {
     size_t size = vertex_size(a);
     tally->checks[EBPO_VERIFY_SOURCE] += a->vertex_count + a->face_count;
-    for (uint64_t i = 0; i < a->vertex_count; i++)
+    for (uint64_t i = 0; i < a->vertex_count; ebpo_workspace_settle_at(a->workspace, i++))
         if (memcmp(vertex_bytes(a, i), vertex_bytes(b, i), size) != 0)
             ebpo_tally_violation(tally, EBPO_VERIFY_SOURCE, &(ebpo_verify_place){0, EBPO_NO_FACE, EBPO_NO_PLANE},
                                  "vertex %" PRIu64 " of the source has another position in the file", i);
-    for (uint64_t i = 0; i < a->face_count; i++)
+    for (uint64_t i = 0; i < a->face_count; ebpo_workspace_settle_at(a->workspace, i++))
         if (memcmp(a->faces + 3 * i, b->faces + 3 * i, 3 * sizeof *a->faces) != 0)
             ebpo_tally_violation(tally, EBPO_VERIFY_SOURCE, &(ebpo_verify_place){0, i, EBPO_NO_PLANE},
                                  "the face (by its source number) has other corners in the file");
@@ -99,10 +103,10 @@ static int compare_faces(const void *a, const void *b, void *mesh)
 /* 0 .. count - 1, sorted; NULL when memory is short. */
 static uint32_t *sorted(const ebpo_mesh *mesh, uint64_t count, int (*compare)(const void *, const void *, void *))
 {
-    uint32_t *order = ebpo_alloc(count, sizeof *order);
+    uint32_t *order = ebpo_array_alloc(mesh->workspace, count, sizeof *order);
     if (!order)
         return NULL;
-    for (uint64_t i = 0; i < count; i++)
+    for (uint64_t i = 0; i < count; ebpo_workspace_settle_at(mesh->workspace, i++))
         order[i] = (uint32_t)i;
     qsort_r(order, count, sizeof *order, compare, (void *)(uintptr_t)mesh);
     return order;
@@ -114,13 +118,13 @@ static ebpo_status compare_as_sets(ebpo_tally *tally, const ebpo_mesh *a, const 
     uint32_t *left = sorted(a, count, faces ? compare_faces : compare_vertices);
     uint32_t *right = sorted(b, count, faces ? compare_faces : compare_vertices);
     bool short_of_memory = !left || !right;
-    for (uint64_t i = 0; i < count && !short_of_memory; i++)
+    for (uint64_t i = 0; i < count && !short_of_memory; ebpo_workspace_settle_often(a->workspace, i++))
         differ += faces ? face_order(a, left[i], b, right[i]) != 0
                         : memcmp(vertex_bytes(a, left[i]), vertex_bytes(b, right[i]), vertex_size(a)) != 0;
-    free(left);
-    free(right);
+    ebpo_array_free(left);
+    ebpo_array_free(right);
     if (short_of_memory)
-        return ebpo_fail_memory(error, count * sizeof *left);
+        return ebpo_workspace_fail(a->workspace, count * sizeof *left, error);
     tally->checks[EBPO_VERIFY_SOURCE] += count - 1;
     CHECK(differ == 0, "as sets, the %s of source and file differ", faces ? "faces" : "vertices");
     return EBPO_OK;
@@ -133,14 +137,14 @@ static ebpo_status compare_some(ebpo_tally *tally, ebpo_file *file, const ebpo_m
     uint32_t *vertex_source = NULL, *face_source = NULL;
     ebpo_status status = ebpo_file_read_mesh(file, &part, threads, error);
     if (status == EBPO_OK)
-        status = ebpo_file_read_maps(file, &vertex_source, &face_source, threads, error);
+        status = ebpo_reader_maps(file, &vertex_source, &face_source, threads, error);
     if (status == EBPO_OK && CHECK(!whole->xyz32 == !part.xyz32, "the source and the file hold different kinds of coordinates")) {
         tally->checks[EBPO_VERIFY_SOURCE] += part.vertex_count + part.face_count;
-        for (uint64_t i = 0; i < part.vertex_count; i++)
+        for (uint64_t i = 0; i < part.vertex_count; ebpo_workspace_settle_often(part.workspace, i++))
             if (vertex_source[i] >= whole->vertex_count || memcmp(vertex_bytes(whole, vertex_source[i]), vertex_bytes(&part, i), vertex_size(&part)) != 0)
                 ebpo_tally_violation(tally, EBPO_VERIFY_SOURCE, &(ebpo_verify_place){0, EBPO_NO_FACE, EBPO_NO_PLANE},
                                      "vertex %" PRIu32 " of the source has another position in the file", vertex_source[i]);
-        for (uint64_t i = 0; i < part.face_count; i++) {
+        for (uint64_t i = 0; i < part.face_count; ebpo_workspace_settle_often(part.workspace, i++)) {
             bool equal = face_source[i] < whole->face_count;
             for (uint64_t c = 0; c < 3 && equal; c++)
                 equal = whole->faces[3 * (uint64_t)face_source[i] + c] == vertex_source[part.faces[3 * i + c]];
@@ -149,8 +153,8 @@ static ebpo_status compare_some(ebpo_tally *tally, ebpo_file *file, const ebpo_m
                                      "the face (by its source number) has other corners in the file");
         }
     }
-    free(vertex_source);
-    free(face_source);
+    ebpo_array_free(vertex_source);
+    ebpo_array_free(face_source);
     ebpo_mesh_free(&part);
     return status;
 }
@@ -189,18 +193,22 @@ ebpo_status ebpo_check_source(ebpo_tally *tally, ebpo_file *file, const ebpo_mes
     CHECK(info->source_vertex_count == source->vertex_count && info->source_face_count == source->face_count,
           "the source has %" PRIu64 " vertices and %" PRIu64 " faces, recorded are %" PRIu64 " and %" PRIu64, source->vertex_count,
           source->face_count, info->source_vertex_count, info->source_face_count);
-    ebpo_mesh mended;
+    ebpo_mesh mended = {0};
+    const ebpo_mend_record *asked = &info->mend;
+    bool as_it_is = !asked->weld && !asked->orient && !asked->fill_holes;
     ebpo_mend_record did = {.weld = info->mend.weld, .orient = info->mend.orient, .fill_holes = info->mend.fill_holes};
-    ebpo_status status = copy_mesh(&mended, source, error);
+    ebpo_status status = as_it_is ? EBPO_OK : copy_mesh(&mended, source, error);
     if (status != EBPO_OK)
         return status;
-    status = mend_again(&mended, &info->mend, &did, error);
+    if (!as_it_is)
+        status = mend_again(&mended, asked, &did, error);
+    const ebpo_mesh *made = as_it_is ? source : &mended;
     if (status == EBPO_OK)
         check_record(tally, &info->mend, &did);
     if (status == EBPO_OK && stored)
-        status = compare(tally, &mended, stored, ordered, error);
+        status = compare(tally, made, stored, ordered, error);
     else if (status == EBPO_OK && info->parts & EBPO_PART_MAPS) /* without maps, nothing says which faces these are */
-        status = compare_some(tally, file, &mended, threads, error);
+        status = compare_some(tally, file, made, threads, error);
     ebpo_mesh_free(&mended);
     return status;
 }

@@ -5,6 +5,7 @@
 #include <inttypes.h>
 #include <math.h>
 
+#include "base/workspace.h"
 #include "mesh/mesh.h"
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
@@ -34,7 +35,7 @@ static bool types_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
         !CHECK(level->types || groups == 0, "level %d has no types", l))
         return false;
     uint64_t count[4] = {0};
-    for (uint64_t group = 0; group < groups; group++)
+    for (uint64_t group = 0; group < groups; ebpo_settle_all_at(group++))
         for (unsigned octant = 0; octant < (l == 0 ? 1u : 8u); octant++)
             count[ebpo_view_type(level, group, octant)]++;
     return CHECK(count[EBPO_GRAY] == level->gray_count && count[EBPO_LEAF] == level->leaf_count &&
@@ -50,7 +51,7 @@ static bool counted_shape(ebpo_tally *tally, int l, const char *what, uint64_t n
     if (!CHECK((counts || nodes == 0) && (items || total == 0), "level %d: %s are missing", l, what))
         return false;
     uint64_t sum = 0;
-    for (uint64_t i = 0; i < nodes; i++)
+    for (uint64_t i = 0; i < nodes; ebpo_settle_all_at(i++))
         sum += counts[i];
     return CHECK(sum == total, "level %d: counts of %s sum to %" PRIu64 ", but there are %" PRIu64, l, what, sum, total);
 }
@@ -84,7 +85,7 @@ static bool lists_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
         !CHECK(level->leaf_refs || level->ref_count == 0, "level %d: back-references are missing", l))
         return false;
     uint64_t refs = 0, fresh = 0;
-    for (uint64_t leaf = 0; leaf < level->leaf_count; leaf++) {
+    for (uint64_t leaf = 0; leaf < level->leaf_count; ebpo_settle_all_at(leaf++)) {
         refs += level->leaf_ref_count[leaf];
         fresh += level->leaf_new[leaf];
     }
@@ -93,7 +94,7 @@ static bool lists_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
         return false;
     refs = 0;
     bool ok = true;
-    for (uint64_t leaf = 0; leaf < level->leaf_count; leaf++) {
+    for (uint64_t leaf = 0; leaf < level->leaf_count; ebpo_settle_all_at(leaf++)) {
         ok &= CHECK(leaf_faces_in_range(level, leaf, refs, tree->mesh.face_count),
                     "level %d, leaf %" PRIu64 ": its list leaves the faces, or its references do not ascend below its first new face",
                     l, leaf);
@@ -113,9 +114,9 @@ static bool mesh_shape(ebpo_tally *tally, const ebpo_tree *tree)
         !CHECK(!!mesh->xyz64 == tree->info.double_coordinates, "the head and the mesh differ about the kind of coordinates"))
         return false;
     uint64_t outside = 0, infinite = 0;
-    for (uint64_t i = 0; i < 3 * mesh->face_count; i++)
+    for (uint64_t i = 0; i < 3 * mesh->face_count; ebpo_settle_all_at(i++))
         outside += mesh->faces[i] >= mesh->vertex_count;
-    for (uint64_t i = 0; i < mesh->vertex_count; i++) {
+    for (uint64_t i = 0; i < mesh->vertex_count; ebpo_settle_all_at(i++)) {
         double p[3];
         ebpo_mesh_position(mesh, i, p);
         infinite += !isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2]);

@@ -6,6 +6,7 @@
 #include <inttypes.h>
 #include <math.h>
 
+#include "base/workspace.h"
 #include "mesh/mesh.h"
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
@@ -42,6 +43,7 @@ typedef struct descent {
     ebpo_tally *tally;
     const ebpo_tree_view *view;
     uint64_t next_face; /* first face that no leaf before has listed */
+    uint64_t grays;
     uint64_t pruned[EBPO_LEVELS_MAX];
 } descent;
 
@@ -87,6 +89,7 @@ static void check_gray(descent *d, const ebpo_tree_view_node *node)
     }
     node_check(d, node, node->cell.level < d->view->tree->info.max_level, "a node at the maximum level is gray");
     bool touched = false;
+    ebpo_settle_all_at(d->grays++);
     for (unsigned octant = 0; octant < 8; octant++) {
         ebpo_tree_view_node child = ebpo_view_child(d->view, node, octant);
         touched |= child.type >= EBPO_LEAF;
@@ -101,6 +104,7 @@ static void check_vertices(ebpo_tally *tally, const ebpo_tree_view *view)
     uint64_t outside = 0, first = 0;
     for (uint64_t i = 3 * mesh->face_count; i-- > 0;) {
         double p[3];
+        ebpo_settle_all_at(i);
         ebpo_mesh_position(mesh, mesh->faces[i], p);
         bool within = true;
         for (int k = 0; k < 3; k++)
@@ -122,7 +126,7 @@ static uint64_t mix(uint64_t x)
 static bool edges_balance(const ebpo_mesh *mesh)
 {
     uint64_t sum = 0;
-    for (uint64_t f = 0; f < mesh->face_count; f++)
+    for (uint64_t f = 0; f < mesh->face_count; ebpo_settle_all_at(f++))
         for (int i = 0; i < 3; i++) {
             uint64_t a = mesh->faces[3 * f + (uint64_t)i], b = mesh->faces[3 * f + (uint64_t)(i + 1) % 3];
             uint64_t value = a < b ? mix(a << 32 | b) : -mix(b << 32 | a);
@@ -136,7 +140,7 @@ void ebpo_check_structure(ebpo_tally *tally, const ebpo_tree_view *view)
     const ebpo_tree *tree = view->tree;
     for (int l = 0; l < tree->info.level_count; l++)
         check_summary(tally, tree, l);
-    descent d = {tally, view, 0, {0}};
+    descent d = {.tally = tally, .view = view};
     ebpo_tree_view_node root = ebpo_view_root(view);
     check_node(&d, &root);
     for (int l = 0; l < tree->info.level_count; l++)

@@ -14,7 +14,7 @@ ebpo_status ebpo_verify_tree(ebpo_tally *tally, const ebpo_tree *tree, const ebp
     if (!ebpo_check_shape(tally, tree))
         return EBPO_OK;
     ebpo_tree_view view;
-    ebpo_status status = ebpo_view_make(&view, tree, error);
+    ebpo_status status = ebpo_view_make(&view, tree, options->workspace, error);
     if (status != EBPO_OK)
         return status;
     ebpo_check_structure(tally, &view);
@@ -87,8 +87,12 @@ ebpo_status ebpo_verify(ebpo_file *file, const ebpo_verify_options *options, ebp
         ebpo_status shape = ebpo_mesh_check_shape(options->source, error);
         if (shape != EBPO_OK)
             return shape;
+        if (options->source->arrangement)
+            return ebpo_fail(error, EBPO_E_ARGUMENT, "verify: the source has been arranged (ebpo_mesh_arrange); give it as it was read");
     }
     ebpo_tally tally = {0};
+    if (options->workspace)
+        ebpo_file_set_workspace(file, options->workspace);
     ebpo_status status = check_content(file, options, &tally, error);
     if (status == EBPO_OK)
         status = check_tree(file, options, &tally, error);

@@ -1,9 +1,7 @@
 #include "verify/view.h"
 
-#include <stdlib.h>
-
-#include "base/alloc.h"
 #include "base/error.h"
+#include "base/workspace.h"
 
 /* Adds what a group holds to the running counts. */
 static void add_group(ebpo_view_group *sum, const ebpo_tree_view *view, const ebpo_level *level, uint64_t group, unsigned octants)
@@ -25,7 +23,7 @@ static unsigned octants_at(int level)
     return level == 0 ? 1 : 8;
 }
 
-ebpo_status ebpo_view_make(ebpo_tree_view *out, const ebpo_tree *tree, ebpo_error *error)
+ebpo_status ebpo_view_make(ebpo_tree_view *out, const ebpo_tree *tree, ebpo_workspace *workspace, ebpo_error *error)
 {
     *out = (ebpo_tree_view){.tree = tree, .box.grid_level = tree->info.grid_level};
     for (int k = 0; k < 3; k++) {
@@ -37,13 +35,13 @@ ebpo_status ebpo_view_make(ebpo_tree_view *out, const ebpo_tree *tree, ebpo_erro
     out->has_leaf_planes = tree->info.parts & EBPO_PART_LEAF_PLANES;
     for (int l = 0; l < tree->info.level_count; l++) {
         const ebpo_level *level = &tree->level[l];
-        out->groups[l] = ebpo_alloc(level->group_count, sizeof *out->groups[l]);
+        out->groups[l] = ebpo_array_alloc(workspace, level->group_count, sizeof *out->groups[l]);
         if (!out->groups[l]) {
             ebpo_view_free(out);
-            return ebpo_fail_memory(error, level->group_count * sizeof *out->groups[l]);
+            return ebpo_workspace_fail(workspace, level->group_count * sizeof *out->groups[l], error);
         }
         ebpo_view_group sum = {0};
-        for (uint64_t group = 0; group < level->group_count; group++) {
+        for (uint64_t group = 0; group < level->group_count; ebpo_workspace_settle_at(workspace, group++)) {
             out->groups[l][group] = sum;
             add_group(&sum, out, level, group, octants_at(l));
         }
@@ -54,7 +52,7 @@ ebpo_status ebpo_view_make(ebpo_tree_view *out, const ebpo_tree *tree, ebpo_erro
 void ebpo_view_free(ebpo_tree_view *view)
 {
     for (int l = 0; l < EBPO_LEVELS_MAX; l++)
-        free(view->groups[l]);
+        ebpo_array_free(view->groups[l]);
     *view = (ebpo_tree_view){0};
 }
 

@@ -30,8 +30,8 @@ typedef struct ebpo_tree_view_node {
     uint64_t rank;
 } ebpo_tree_view_node;
 
-/* The tree must have passed ebpo_check_shape as far as level arrays go. Cleared on failure. */
-EBPO_MUST_USE ebpo_status ebpo_view_make(ebpo_tree_view *out, const ebpo_tree *tree, ebpo_error *error);
+/* The tree must have passed ebpo_check_shape as far as level arrays go. `workspace`: what it keeps to, or NULL. Cleared on failure. */
+EBPO_MUST_USE ebpo_status ebpo_view_make(ebpo_tree_view *out, const ebpo_tree *tree, ebpo_workspace *workspace, ebpo_error *error);
 void ebpo_view_free(ebpo_tree_view *view);
 
 static inline ebpo_node_type ebpo_view_type(const ebpo_level *level, uint64_t group, unsigned octant)

@@ -10,9 +10,11 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/workspace.h"
 #include "verify/containment.h"
 #include "verify/labels.h"
 #include "verify/lists.h"
+#include "verify/winding.h"
 
 enum { FACE_GRAIN = 4096, SUBTREE_FACES = 1024, SUBTREES_WANTED = 64 };
 
@@ -27,6 +29,8 @@ typedef struct worker {
     ebpo_tally tally;
     face_stack stack;
     ebpo_half_spaces planes;
+    ebpo_ray_points points;
+    uint64_t visited; /* faces */
 } worker;
 
 /* A node of the upper part. `children` 0: the root of a subtree that is walked by one thread. */
@@ -42,7 +46,6 @@ typedef struct walk {
     const ebpo_tree_view *view;
     const ebpo_verify_options *options;
     unsigned threads;
-    ebpo_columns columns;
     ebpo_label_plan plan;
     bool rays;
     worker *workers;
@@ -113,6 +116,11 @@ static void visit_faces(const walk *w, worker *self, const ebpo_tree_view_node *
             ebpo_check_face_contained(&self->tally, &self->planes, node, &f->self, &face, faces[i]);
         octants[i] = (uint8_t)touched_octants(f, &face, &self->tally);
     }
+    /* Pages come in by faces looked at, but here and there a few for a node. */
+    if ((self->visited += count + 64) >= 1 << 15) {
+        self->visited = 0;
+        ebpo_workspace_settle(w->options->workspace);
+    }
 }
 
 /* A gray node with so few faces that it ought to be a leaf. */
@@ -141,7 +149,8 @@ static void finish_gray(const walk *w, worker *self, const ebpo_tree_view_node *
     ebpo_check_corners_contained(&self->tally, &self->planes, node, inside);
 }
 
-static void walk_terminal(const walk *w, worker *self, const ebpo_tree_view_node *node, const uint32_t *faces, uint64_t count,
+/* False when memory is short. */
+static bool walk_terminal(const walk *w, worker *self, const ebpo_tree_view_node *node, const uint32_t *faces, uint64_t count,
                           ebpo_corner_windings *corners)
 {
     const ebpo_tree_view *view = w->view;
@@ -156,11 +165,14 @@ static void walk_terminal(const walk *w, worker *self, const ebpo_tree_view_node
     }
     *corners = (ebpo_corner_windings){{0}, 0};
     if (!view->tree->info.solid || node->type == EBPO_GRAY)
-        return;
-    ebpo_check_terminal_label(&self->tally, view, node, &frame, &w->plan, w->rays ? &w->columns : NULL);
+        return true;
+    ebpo_check_terminal_label(&self->tally, view, node);
+    if (w->rays && !ebpo_label_note(&self->points, view, node, &frame, &w->plan))
+        return false;
     ebpo_terminal_windings(corners, view, node, &frame, faces, count);
     if (self->planes.count)
         ebpo_check_corners_contained(&self->tally, &self->planes, node, ebpo_windings_inside(view, corners));
+    return true;
 }
 
 static bool stack_reserve(face_stack *s, uint64_t need)
@@ -185,7 +197,8 @@ static ebpo_status walk_down(const walk *w, worker *self, const ebpo_tree_view_n
 {
     face_stack *s = &self->stack;
     if (node->type != EBPO_GRAY || ebpo_view_is_pruned(w->view, node)) {
-        walk_terminal(w, self, node, s->faces + first, count, corners);
+        if (!walk_terminal(w, self, node, s->faces + first, count, corners))
+            return ebpo_workspace_fail(w->options->workspace, self->points.count * sizeof *self->points.point, error);
         return EBPO_OK;
     }
     if (!stack_reserve(s, first + 2 * count))
@@ -230,9 +243,9 @@ static ebpo_status add_child(walk *w, uint64_t parent, unsigned octant, ebpo_err
     *to = (upper_node){.node = ebpo_view_child(w->view, &from->node, octant)};
     for (uint64_t i = 0; i < from->face_count; i++)
         to->face_count += w->shared_octants[i] >> octant & 1;
-    to->faces = ebpo_alloc(to->face_count, sizeof *to->faces);
+    to->faces = ebpo_array_alloc(w->options->workspace, to->face_count, sizeof *to->faces);
     if (!to->faces)
-        return ebpo_fail_memory(error, to->face_count * sizeof *to->faces);
+        return ebpo_workspace_fail(w->options->workspace, to->face_count * sizeof *to->faces, error);
     uint64_t own = 0;
     for (uint64_t i = 0; i < from->face_count; i++)
         if (w->shared_octants[i] >> octant & 1)
@@ -248,18 +261,18 @@ static ebpo_status open_node(walk *w, uint64_t at, ebpo_error *error)
         return ebpo_fail_memory(error, (w->upper_count + 8) * sizeof *w->upper);
     upper_node *n = &w->upper[at];
     w->shared = n;
-    w->shared_octants = ebpo_alloc(n->face_count, 1);
+    w->shared_octants = ebpo_array_alloc(w->options->workspace, n->face_count, 1);
     if (!w->shared_octants)
-        return ebpo_fail_memory(error, n->face_count);
+        return ebpo_workspace_fail(w->options->workspace, n->face_count, error);
     ebpo_status status = ebpo_parallel_for(w->threads, n->face_count, FACE_GRAIN, shared_task, w, &w->options->progress,
                                            "verifying upper levels", error);
     check_worth(w, &w->workers[0].tally, &n->node, n->face_count);
     n->children = w->upper_count;
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)
         status = add_child(w, at, octant, error);
-    free(w->shared_octants);
+    ebpo_array_free(w->shared_octants);
     w->shared_octants = NULL;
-    free(n->faces);
+    ebpo_array_free(n->faces);
     n->faces = NULL;
     return status;
 }
@@ -269,10 +282,10 @@ static ebpo_status add_root(walk *w, ebpo_error *error)
     uint64_t count = w->view->has_mesh ? w->view->tree->mesh.face_count : 0;
     if (!ebpo_grow(&w->upper, &w->upper_capacity, 1, sizeof *w->upper))
         return ebpo_fail_memory(error, sizeof *w->upper);
-    upper_node root = {.node = ebpo_view_root(w->view), .face_count = count, .faces = ebpo_alloc(count, sizeof *root.faces)};
+    upper_node root = {.node = ebpo_view_root(w->view), .face_count = count, .faces = ebpo_array_alloc(w->options->workspace, count, sizeof *root.faces)};
     if (!root.faces)
-        return ebpo_fail_memory(error, count * sizeof *root.faces);
-    for (uint64_t i = 0; i < count; i++)
+        return ebpo_workspace_fail(w->options->workspace, count * sizeof *root.faces, error);
+    for (uint64_t i = 0; i < count; ebpo_workspace_settle_at(w->options->workspace, i++))
         root.faces[i] = (uint32_t)i;
     w->upper[0] = root;
     w->upper_count = 1;
@@ -308,7 +321,7 @@ static ebpo_status subtree_task(void *context, uint64_t begin, uint64_t end, uns
         if (n->face_count)
             memcpy(self->stack.faces, n->faces, n->face_count * sizeof *n->faces);
         ebpo_status status = walk_down(w, self, &n->node, 0, n->face_count, &n->corners, error);
-        free(n->faces);
+        ebpo_array_free(n->faces);
         n->faces = NULL;
         if (status != EBPO_OK)
             return status;
@@ -340,11 +353,28 @@ static ebpo_status prepare(walk *w, ebpo_error *error)
     uint64_t faces = w->view->has_mesh ? w->view->tree->mesh.face_count : 0;
     w->subtree_limit = faces / SUBTREES_WANTED > SUBTREE_FACES ? faces / SUBTREES_WANTED : SUBTREE_FACES;
     w->rays = faces > 0 && w->view->tree->info.solid && !w->view->tree->info.pruned; /* rays need all faces */
-    if (!w->rays)
-        return EBPO_OK;
-    ebpo_status status = ebpo_columns_make(&w->columns, &w->view->tree->mesh, &w->view->box, error);
+    for (unsigned i = 0; i < w->threads; i++)
+        w->workers[i].points.workspace = w->options->workspace;
+    if (w->rays)
+        ebpo_label_plan_make(&w->plan, w->view, w->options->label_samples);
+    return EBPO_OK;
+}
+
+/* All workers' points become the first one's. */
+static ebpo_status follow_rays(walk *w, ebpo_error *error)
+{
+    ebpo_ray_points *all = &w->workers[0].points;
+    for (unsigned i = 1; i < w->threads; i++) {
+        ebpo_ray_points *own = &w->workers[i].points;
+        for (uint64_t k = 0; k < own->count; ebpo_workspace_settle_at(own->workspace, k++))
+            if (!ebpo_rays_add(all, &own->point[k]))
+                return ebpo_workspace_fail(all->workspace, all->count * sizeof *all->point, error);
+        ebpo_array_free(own->point);
+        *own = (ebpo_ray_points){.workspace = all->workspace};
+    }
+    ebpo_status status = ebpo_rays_follow(all, &w->view->tree->mesh, &w->view->box, w->threads, &w->options->progress, error);
     if (status == EBPO_OK)
-        ebpo_label_plan_make(&w->plan, w->view, &w->columns, w->options->label_samples);
+        ebpo_check_rays(&w->workers[0].tally, all);
     return status;
 }
 
@@ -353,15 +383,14 @@ static void release(walk *w)
     for (unsigned i = 0; w->workers && i < w->threads; i++) {
         free(w->workers[i].stack.faces);
         free(w->workers[i].stack.octants);
+        ebpo_array_free(w->workers[i].points.point);
     }
     for (uint64_t at = 0; at < w->upper_count; at++)
-        free(w->upper[at].faces);
+        ebpo_array_free(w->upper[at].faces);
     free(w->workers);
     free(w->upper);
     free(w->subtrees);
-    free(w->shared_octants);
-    if (w->rays)
-        ebpo_columns_free(&w->columns);
+    ebpo_array_free(w->shared_octants);
 }
 
 ebpo_status ebpo_walk(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo_verify_options *options, ebpo_error *error)
@@ -372,6 +401,8 @@ ebpo_status ebpo_walk(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo_
         status = walk_upper(&w, error);
     if (status == EBPO_OK)
         status = ebpo_parallel_for(w.threads, w.subtree_count, 1, subtree_task, &w, &options->progress, "verifying subtrees", error);
+    if (status == EBPO_OK && w.rays)
+        status = follow_rays(&w, error);
     if (status == EBPO_OK) {
         finish_upper(&w);
         for (unsigned i = 0; i < w.threads; i++)

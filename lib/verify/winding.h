@@ -13,22 +13,6 @@
 /* The face's share in the winding number of p: -1, 0 or 1. Exact. */
 int ebpo_ray_hit(const double p[3], int axis, const ebpo_corners *face);
 
-/* All faces sorted into columns along x, for rays in that direction: at most 40 bytes a face. */
-typedef struct ebpo_columns {
-    const ebpo_mesh *mesh; /* borrowed */
-    double low[2], scale[2];
-    uint64_t side;      /* columns on each of the axes y and z */
-    uint64_t *first;    /* [side * side + 1] */
-    uint32_t *faces;
-} ebpo_columns;
-
-/* The mesh is not empty, its coordinates finite and indices in range. Cleared on failure. */
-EBPO_MUST_USE ebpo_status ebpo_columns_make(ebpo_columns *out, const ebpo_mesh *mesh, const ebpo_box *box, ebpo_error *error);
-void ebpo_columns_free(ebpo_columns *columns);
-
-/* Winding number of p, shifted, over the whole mesh. Exact. p lies in the box that the columns were made for. */
-int64_t ebpo_columns_winding(const ebpo_columns *columns, const double p[3]);
-
 /* Corners of a face of a mesh. */
 void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, ebpo_corners *out);
 

@@ -458,4 +458,5 @@ def updated(old, new):
     return "\n## ".join([first] + kept + list(fresh.values()))
 
 
-main()
+if __name__ == "__main__":
+    main()

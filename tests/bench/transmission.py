@@ -83,12 +83,13 @@ def study(tool, model, folder, leaf_planes):
     run(tool, "convert", "-q", *extra, "--without", "mesh", model, bare)
     info = json.loads(run(tool, "info", "--json", file))
     levels = json.loads(run(tool, "levels", "--json", file))["levels"]
+    derived = [v["derived_volume"] for v in json.loads(run(tool, "measure", "--json", "--derived", file))["levels"]]
     fetched = json.loads(run(tool, "levels", "--json", bare))["levels"]
     assert all(a[k] == b[k] for a, b in zip(levels, fetched) for k in ("gray", "leaf", "white", "black", "planes"))
     solid = info["report"]["volume"]
     size = numpy.linalg.norm(info["box_size"])
-    rows = [{"level": v["level"], "bytes": v["cumulative_bytes"], "excess": 100 * (b["volume"] - solid) / solid, "derived": 100 * (v["volume"] - solid) / solid}
-            for v, b in zip(levels, fetched)]
+    rows = [{"level": v["level"], "bytes": v["cumulative_bytes"], "excess": 100 * (b["volume"] - solid) / solid, "derived": 100 * (d - solid) / solid}
+            for v, b, d in zip(levels, fetched, derived)]
     last = next((r["level"] for r in rows if r["excess"] <= min(GOALS)), rows[-1]["level"])
     run(tool, "export", "-q", "--levels", f"0-{last}", bare, folder / "x.xdmf")
     with h5py.File(folder / "x.xdmf.h5", "r") as shapes:
@@ -156,7 +157,7 @@ Where *reaches* stands still from level to level, it is that of a leaf whose con
 
 LEVELS = """## By level
 Excess, reach and bound are those of what has been fetched, without the mesh: a leaf has its parent's envelope in its own cell, or with `convert --with leaf-planes` its own. *Leaves derived*: the excess once the mesh
-is there too, and leaves' planes are derived from their faces (where they are stored: those), as `ebpo info` tells it. *File*: with the mesh, its order in the source, checksums. Distances only down to the level that reaches the last goal.
+is there too, and leaves' planes are derived from their faces (where they are stored: those), as `ebpo measure --derived` tells it. *File*: with the mesh, its order in the source, checksums. Distances only down to the level that reaches the last goal.
 """
 
 BESIDE = """## Beside the BP-Octree

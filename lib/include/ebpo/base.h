@@ -57,7 +57,7 @@ EBPO_API const char *ebpo_status_name(ebpo_status status);
 /* Library version, "major.minor.patch"; a static string. */
 EBPO_API const char *ebpo_version(void);
 
-/* Called from the thread that called the library, some times a second at most.
+/* Called from the thread that called the library, when a stage begins and then some times a second at most.
  * `stage` is a static string; `total` is 0 when it is not known.
  * Return false to stop: the running call then ends with EBPO_E_CANCELLED and leaves no file behind. */
 typedef bool (*ebpo_progress_fn)(void *user, const char *stage, uint64_t done, uint64_t total);

@@ -16,5 +16,6 @@
 #include <ebpo/subset.h>
 #include <ebpo/verify.h>
 #include <ebpo/view.h>
+#include <ebpo/workspace.h>
 
 #endif

@@ -63,7 +63,7 @@ typedef struct ebpo_level {
     uint32_t *leaf_planes;    /* [leaf_plane_count] */
     uint64_t leaf_plane_count;
     double gray_volume;       /* volume of the envelopes of this level's gray nodes, in the model's unit cubed */
-    double leaf_volume;       /* the same for its leaves (derived envelopes) */
+    double leaf_volume;       /* the same for its leaves: cut by stored planes, else as inherited (planes that readers derive cut off more) */
     uint64_t pruned_count;    /* of the gray nodes: those whose children are not in the file. Their groups in the next level are 0 (and count as eight white nodes); on
                                * the last level all gray nodes are pruned, and have no groups */
 } ebpo_level;
@@ -200,6 +200,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_locate(ebpo_file *file, ebpo_error 
  * after the other would ask for each by itself. Waits at most for the index of chunks (ebpo_file_locate); cannot fail: what could not
  * be fetched is told when it is read. */
 EBPO_API void ebpo_file_expect_levels(ebpo_file *file, int first, int last);
+
+/* Levels, meshes and trees that are read from now on keep to `workspace` (NULL: to none, as at first), which is freed after the last call that is given the file
+ * or one of them (ebpo_workspace_free). Before other threads use the file. */
+EBPO_API void ebpo_file_set_workspace(ebpo_file *file, ebpo_workspace *workspace);
 
 /* Reads one level (0 .. level_count - 1) and checks it: counts, ranges, order, index arrays.
  * The caller frees it with ebpo_level_free. `threads` 0: all cores. */

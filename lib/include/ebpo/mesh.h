@@ -2,7 +2,7 @@
 #ifndef EBPO_MESH_H
 #define EBPO_MESH_H
 
-#include <ebpo/base.h>
+#include <ebpo/workspace.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -24,6 +24,8 @@ typedef struct ebpo_mesh {
     uint8_t source_sha256[32];      /* of the source file's bytes; zero if not from a file */
     uint64_t source_size;           /* bytes */
     char source_format[16];         /* "ply-ascii", "ply-le", "ply-be", "obj", "stl", "off", "" */
+    struct ebpo_arrangement *arrangement; /* set by ebpo_mesh_arrange; NULL: in the source's order */
+    ebpo_workspace *workspace;      /* what checking and building may use; NULL: as much memory as they like. Its arrays may be in it, or malloc's */
 } ebpo_mesh;
 
 /* Frees the arrays and clears the struct. NULL is fine. */
@@ -31,8 +33,10 @@ EBPO_API void ebpo_mesh_free(ebpo_mesh *mesh);
 
 typedef struct ebpo_mesh_read_options {
     ebpo_progress progress;
+    ebpo_workspace *workspace; /* the mesh keeps to it, and so does what is done with it; freed after the last of that. NULL: none */
+    unsigned threads;          /* 0: all cores; the result does not depend on it */
 } ebpo_mesh_read_options;
-#define EBPO_MESH_READ_OPTIONS_INIT { { NULL, NULL } }
+#define EBPO_MESH_READ_OPTIONS_INIT { { NULL, NULL }, NULL, 0 }
 
 /* Reads a mesh; the format is told from the file's first bytes, then from its name.
  * PLY always; OBJ, STL and OFF when the library was built with assimp (else EBPO_E_UNSUPPORTED).
@@ -92,6 +96,15 @@ typedef struct ebpo_mesh_report {
  * everything else is counted in the report. `threads` 0: all cores. */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_check(ebpo_mesh_report *report, const ebpo_mesh *mesh, unsigned threads,
                                                    ebpo_progress progress, ebpo_error *error);
+
+/* Puts vertices and faces in the order of a Morton curve, so that neighbours in space are neighbours in memory: what is checked or built then goes through memory in order, which also lets it be
+ * larger than memory. The mesh keeps what numbers they had; reports and files tell those. ebpo_build does it itself where it was not done. Needs what ebpo_mesh_check needs, and has its errors for coordinates and indices.
+ * `threads` 0: all cores; the result does not depend on it. On failure the mesh is as it was. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_arrange(ebpo_mesh *mesh, unsigned threads, ebpo_progress progress, ebpo_error *error);
+
+/* The same for what is to be mended: vertices that no face names stand among the others, so that those at one position are neighbours. Mending, and checking before it, then go through memory in order too;
+ * afterwards ebpo_mesh_arrange puts in order what mending changed (ebpo_build does so itself). The source's numbers are those of the mended mesh in the source's order: the result is the same as without it. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_arrange_to_mend(ebpo_mesh *mesh, unsigned threads, ebpo_progress progress, ebpo_error *error);
 
 /* What mending did; recorded in the file. */
 typedef struct ebpo_mend_record {

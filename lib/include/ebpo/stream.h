@@ -37,7 +37,7 @@ typedef struct ebpo_stream_level {
     uint64_t node_count;      /* of all types */
     uint64_t cumulative_bytes; /* of the file, head included, that levels 0 .. level took */
     /* Of the model's outer approximation at this level: envelopes of its gray nodes and of the leaves so far, and black cells so far. With `polygons`: the sum of the nodes'
-     * volumes, which is larger than what the file states when its leaves have no stored planes. Without: as the file states (ebpo_info), leaves by planes derived from their faces. */
+     * volumes; without: as the file states (ebpo_info). Either way leaves by stored planes, or as inherited: planes derived from their faces cut off more (ebpo_lod_level). */
     double volume; /* of a subset: of what it holds; where a box left nodes out, these count at their own level only */
 } ebpo_stream_level;
 

@@ -26,13 +26,14 @@ typedef struct ebpo_verify_report {
 } ebpo_verify_report;
 
 typedef struct ebpo_verify_options {
-    const ebpo_mesh *source;  /* mesh as read (before mending), or NULL; mending recorded in the file is done again */
+    const ebpo_mesh *source;  /* mesh as read (before mending and arranging), or NULL; mending recorded in the file is done again */
     unsigned threads;         /* 0: all cores */
-    uint64_t label_samples;   /* cells whose labels are checked by an independent winding number; 0: all when
-                             * that takes some seconds (4e8 looks at a face), else 4096; at least one of each level and type */
+    uint64_t label_samples;   /* cells whose labels are checked by an independent winding number; 0: all of up to 2^22, 2^20 of more, but 4096
+                               * where that would take more than some seconds (4e8 looks at a point); at least one of each level and type */
     ebpo_progress progress;
+    ebpo_workspace *workspace; /* what the work keeps to, in memory and temporary files; NULL: as much memory as it takes. Outlives the file */
 } ebpo_verify_options;
-#define EBPO_VERIFY_OPTIONS_INIT { NULL, 0, 0, { NULL, NULL } }
+#define EBPO_VERIFY_OPTIONS_INIT { NULL, 0, 0, { NULL, NULL }, NULL }
 
 /* Verifies an open file. EBPO_OK when the work could be done, whatever it found: look at report->violations.
  * A file too damaged to be read counts as a structure violation. */

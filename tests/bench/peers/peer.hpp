@@ -31,6 +31,9 @@ struct settings {
     bool cold = false, warm = false;
 };
 
+// For building; where the peer can use more than one. 0: all cores.
+inline unsigned threads = 1;
+
 // What is written to --answers: for inside one byte, 1 inside and 0 outside; for the others 16 bytes.
 struct hit {
     double value;  // distance, or the ray's parameter; infinity: none
@@ -275,6 +278,21 @@ template <class Peer> void run(const settings &s)
            times.back(), cost, peak);
 }
 
+// Only loads and builds.
+template <class Peer> void run_build(const settings &s)
+{
+    if (s.cold)
+        drop_from_memory(s.model);
+    Peer peer(s.warm);
+    uint64_t start = nanoseconds();
+    peer.load(s.model.c_str());
+    uint64_t loaded = nanoseconds();
+    peer.build();
+    uint64_t built = nanoseconds();
+    printf("{\"peer\": \"%s\", \"query\": \"build\", \"threads\": %u, \"load_s\": %.6f, \"build_s\": %.6f, \"peak_mb\": %.1f}\n", Peer::name, threads,
+           (double)(loaded - start) * 1e-9, (double)(built - loaded) * 1e-9, peak_megabytes());
+}
+
 inline bool parse(int argc, char **argv, settings &s)
 {
     std::vector<std::string> words;
@@ -286,6 +304,8 @@ inline bool parse(int argc, char **argv, settings &s)
             s.warm = true;
         else if (word == "--count" && i + 1 < argc)
             s.count = strtoull(argv[++i], nullptr, 10);
+        else if (word == "--threads" && i + 1 < argc)
+            threads = (unsigned)strtoul(argv[++i], nullptr, 10);
         else if (word == "--answers" && i + 1 < argc)
             s.answers = argv[++i];
         else if (word.rfind("--", 0) == 0)
@@ -293,10 +313,12 @@ inline bool parse(int argc, char **argv, settings &s)
         else
             words.push_back(word);
     }
+    if (words.size() == 2 && words[1] == "build")
+        words.push_back("");
     if (words.size() != 3 || !s.count)
         return false;
     s.model = words[0], s.query = words[1], s.points = words[2];
-    return s.query == "inside" || s.query == "distance" || s.query == "ray";
+    return s.query == "inside" || s.query == "distance" || s.query == "ray" || s.query == "build";
 }
 
 template <class Inside, class Distance, class Ray> int main(int argc, char **argv)
@@ -304,9 +326,11 @@ template <class Inside, class Distance, class Ray> int main(int argc, char **arg
     settings s;
     if (!parse(argc, argv, s)) {
         fprintf(stderr, "usage: %s MODEL.ply inside|distance|ray POINTS.raw [--count N] [--warm] [--cold] [--answers FILE]\n"
+                "       %s MODEL.ply build [--threads N] [--cold]\n"
                 "POINTS.raw: little-endian doubles, x y z for each point; rays: origin and direction.\n"
                 "--warm  distance: search no farther than the last answer allows\n"
-                "--cold  ask the system to drop MODEL.ply from its cache first\n", argv[0]);
+                "--cold  ask the system to drop MODEL.ply from its cache first\n"
+                "build    only load and build what rays need; --threads 0: on all cores, where the peer can\n", argv[0], argv[0]);
         return 2;
     }
     try {
@@ -314,6 +338,8 @@ template <class Inside, class Distance, class Ray> int main(int argc, char **arg
             run<Inside>(s);
         else if (s.query == "distance")
             run<Distance>(s);
+        else if (s.query == "build")
+            run_build<Ray>(s);
         else
             run<Ray>(s);
     } catch (const std::exception &error) {

@@ -1,4 +1,4 @@
-// Embree 3 as a peer: one thread, single precision.
+// Embree 3 as a peer: one thread (building: more, if told so), single precision.
 //
 // inside: parity of all hits of a ray in a fixed oblique direction, robust scene. distance: rtcPointQuery with a shrinking radius. ray: first hit.
 #include <embree3/rtcore.h>
@@ -12,7 +12,7 @@ namespace {
 // Embree's scene over a mesh whose buffers it shares.
 class scene {
 public:
-    scene(RTCSceneFlags flags, RTCBuildQuality quality) : device(rtcNewDevice("threads=1")), handle(rtcNewScene(device))
+    scene(RTCSceneFlags flags, RTCBuildQuality quality) : device(rtcNewDevice(("threads=" + std::to_string(bench::threads)).c_str())), handle(rtcNewScene(device))
     {
         rtcSetSceneFlags(handle, flags);
         rtcSetSceneBuildQuality(handle, quality);

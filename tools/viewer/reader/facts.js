@@ -117,6 +117,8 @@ export function readFacts(attributes) {
   out.format_version_minor = facts.int('format_version_minor');
   if (out.format_version_major !== 1)
     throw new EbpoError('VERSION', `format version ${out.format_version_major}.${out.format_version_minor}, and this reader reads version 1; use a newer one`);
+  if (facts.has('format_version') && facts.text('format_version') === '1.0-draft') // for people, but files of the draft have the same numbers
+    throw new EbpoError('VERSION', 'was written while the format was a draft, which is not read any more; convert the model again');
   out.parts = readParts(facts);
   out.generator = facts.text('generator');
   for (const name of TEXTS)

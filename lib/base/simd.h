@@ -1,6 +1,6 @@
 /* Eight floats or four doubles at a time, in the compiler's own vectors. */
-#ifndef EBPO_QUERY_SIMD_H
-#define EBPO_QUERY_SIMD_H
+#ifndef EBPO_BASE_SIMD_H
+#define EBPO_BASE_SIMD_H
 
 #include <stdint.h>
 

@@ -1,0 +1,120 @@
+#include "embedded.h"
+
+#include <math.h>
+
+/* Far more than what a dozen roundings of products of such coordinates add up to, far less than what a face of a billion measures. */
+static const double slack = 1e-14;
+
+typedef struct corners {
+    double p[3][3];
+} corners;
+
+static corners corners_of(const ebpo_mesh *mesh, uint64_t face)
+{
+    corners c;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            c.p[i][k] = mesh->xyz32[3 * (uint64_t)mesh->faces[3 * face + (unsigned)i] + (unsigned)k];
+    return c;
+}
+
+static double dot(const double *a, const double *b)
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void cross(double out[3], const double *a, const double *b)
+{
+    for (int k = 0; k < 3; k++)
+        out[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+}
+
+static double volume(const double *a, const double *b, const double *c)
+{
+    double n[3];
+    cross(n, a, b);
+    return dot(n, c);
+}
+
+/* How a face stands to a ray from `origin`: 1 crossed, 0 passed by, -1 too close to an edge to tell. Faces that the line crosses behind the origin are passed by. */
+static int crossed(const corners *c, const double origin[3], const double direction[3])
+{
+    double q[3][3], sides[3];
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            q[i][k] = c->p[i][k] - origin[k];
+    int left = 0, right = 0;
+    for (int i = 0; i < 3; i++) {
+        sides[i] = volume(direction, q[i], q[(i + 1) % 3]);
+        left += sides[i] > slack;
+        right += sides[i] < -slack;
+    }
+    if (left && right)
+        return 0;
+    double ahead = volume(q[0], q[1], q[2]), sum = sides[0] + sides[1] + sides[2]; /* where along the ray: ahead / sum */
+    if (left == 3 || right == 3)
+        return fabs(ahead) <= slack ? -1 : (ahead > 0) == (sum > 0);
+    return -1;
+}
+
+/* One face only meets the ray. */
+static bool leaves_once(const ebpo_mesh *mesh, const double origin[3], const double direction[3])
+{
+    uint64_t times = 0;
+    for (uint64_t f = 0; f < mesh->face_count; f++) {
+        corners c = corners_of(mesh, f);
+        int meets = crossed(&c, origin, direction);
+        if (meets < 0)
+            return false;
+        times += (unsigned)meets;
+    }
+    return times == 1;
+}
+
+bool ebpo_embedded_sphere(const ebpo_mesh *mesh)
+{
+    static const double centre[3] = { 0, 0, 0 }, oblique[3] = { 0.5407, 0.6131, 0.5760 };
+    for (uint64_t f = 0; f < mesh->face_count; f++) {
+        corners c = corners_of(mesh, f);
+        if (!(volume(c.p[0], c.p[1], c.p[2]) > slack))
+            return false;
+    }
+    return leaves_once(mesh, centre, oblique);
+}
+
+/* The points of the circle that are nearest to the face's points lie on an arc between those nearest to two of its corners; c^2 / 7 bounds how high an arc of chord c <= 1 stands above the chord.
+ * So the support of the arc in the direction of the normal is known, and the plane must lie beyond that. */
+static bool faces_outwards(const corners *c)
+{
+    double centre[3][3], e[2][3], n[3], support = -INFINITY, longest = 0;
+    for (int i = 0; i < 3; i++) {
+        double r = hypot(c->p[i][0], c->p[i][1]);
+        if (!(r > 1e-3))
+            return false;
+        centre[i][0] = c->p[i][0] / r, centre[i][1] = c->p[i][1] / r, centre[i][2] = 0;
+    }
+    for (int k = 0; k < 3; k++) {
+        e[0][k] = c->p[1][k] - c->p[0][k];
+        e[1][k] = c->p[2][k] - c->p[0][k];
+    }
+    cross(n, e[0], e[1]);
+    for (int i = 0; i < 3; i++) {
+        const double *a = centre[i], *b = centre[(i + 1) % 3];
+        longest = fmax(longest, (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]));
+        support = fmax(support, dot(n, a));
+    }
+    double rounding = slack * sqrt(dot(e[0], e[0]) * dot(e[1], e[1]));
+    return longest <= 1 && dot(n, c->p[0]) - support > hypot(n[0], n[1]) * longest / 7 + rounding;
+}
+
+bool ebpo_embedded_torus(const ebpo_mesh *mesh)
+{
+    /* From the circle outwards and up, in the half plane through the axis, so that the ray stays there. */
+    const double x = 0.7431, y = sqrt(1 - x * x), origin[3] = { x, y, 0 }, oblique[3] = { 0.8 * x, 0.8 * y, 0.6 };
+    for (uint64_t f = 0; f < mesh->face_count; f++) {
+        corners c = corners_of(mesh, f);
+        if (!faces_outwards(&c))
+            return false;
+    }
+    return leaves_once(mesh, origin, oblique);
+}

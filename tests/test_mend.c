@@ -1,0 +1,239 @@
+/* Mending of arranged meshes, in little memory and on all cores, against mending in the source's order. */
+#include <check.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/ebpo.h>
+
+#include "base/workspace.h"
+#include "mesh/mesh.h"
+#include "solids.h"
+
+__attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
+const char *__lsan_default_suppressions(void)
+{
+    return "leak:libhdf5";
+}
+
+static const ebpo_progress silent = { NULL, NULL };
+
+enum { WELD = 1, ORIENT = 2, FILL = 4, ALL = 7 };
+
+static void mend(ebpo_mesh *m, int steps, ebpo_mend_record *record)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    memset(record, 0, sizeof *record);
+    if (steps & WELD)
+        ck_assert_msg(ebpo_mesh_weld(m, record, &error) == EBPO_OK, "%s", error.message);
+    if (steps & ORIENT)
+        ck_assert_msg(ebpo_mesh_orient(m, record, &error) == EBPO_OK, "%s", error.message);
+    if (steps & FILL)
+        ck_assert_msg(ebpo_mesh_fill_holes(m, record, &error) == EBPO_OK, "%s", error.message);
+}
+
+static ebpo_mesh copy_of(const ebpo_mesh *m)
+{
+    ebpo_mesh c = *m;
+    size_t bytes = (size_t)m->vertex_count * 3 * (m->xyz32 ? sizeof(float) : sizeof(double)), faces = (size_t)m->face_count * 12;
+    void *xyz = malloc(bytes + 1);
+    memcpy(xyz, m->xyz32 ? (const void *)m->xyz32 : (const void *)m->xyz64, bytes);
+    c.xyz32 = m->xyz32 ? xyz : NULL;
+    c.xyz64 = m->xyz32 ? NULL : xyz;
+    c.faces = malloc(faces + 1);
+    memcpy(c.faces, m->faces, faces);
+    return c;
+}
+
+/* The arranged mesh, told in the numbers that it says the source has, is the other. */
+static void expect_same(const ebpo_mesh *arranged, const ebpo_mesh *plain)
+{
+    const struct ebpo_arrangement *a = arranged->arrangement;
+    size_t width = 3 * (plain->xyz32 ? sizeof(float) : sizeof(double));
+    ck_assert_uint_eq(arranged->vertex_count, plain->vertex_count);
+    ck_assert_uint_eq(arranged->face_count, plain->face_count);
+    uint8_t *seen = calloc(1, plain->vertex_count + plain->face_count + 1);
+    const char *here = arranged->xyz32 ? (const char *)arranged->xyz32 : (const char *)arranged->xyz64, *there = plain->xyz32 ? (const char *)plain->xyz32 : (const char *)plain->xyz64;
+    for (uint64_t v = 0; v < plain->vertex_count; v++) {
+        uint64_t from = a->vertex_source[v];
+        if (from >= plain->vertex_count || seen[from]++ || memcmp(here + v * width, there + from * width, width) != 0)
+            ck_abort_msg("vertex %llu", (unsigned long long)v);
+    }
+    for (uint64_t f = 0; f < plain->face_count; f++) {
+        uint64_t from = a->face_source[f];
+        if (from >= plain->face_count || seen[plain->vertex_count + from]++)
+            ck_abort_msg("face %llu", (unsigned long long)f);
+        for (uint64_t k = 0; k < 3; k++)
+            if (a->vertex_source[arranged->faces[3 * f + k]] != plain->faces[3 * from + k])
+                ck_abort_msg("face %llu, corner %llu", (unsigned long long)f, (unsigned long long)k);
+    }
+    free(seen);
+}
+
+static void expect_same_report(const ebpo_mesh *plain, const ebpo_mesh *m)
+{
+    ebpo_mesh_report a, b;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert(ebpo_mesh_check(&a, plain, 1, silent, &error) == EBPO_OK);
+    ck_assert(ebpo_mesh_check(&b, m, 2, silent, &error) == EBPO_OK);
+    for (int k = 0; k < 3; k++) { /* which of two zeros it is */
+        a.min[k] += 0.0, a.max[k] += 0.0;
+        b.min[k] += 0.0, b.max[k] += 0.0;
+    }
+    ck_assert(memcmp(&a, &b, sizeof a) == 0);
+}
+
+/* Mends `plain` as it is, and a copy that is arranged and in the workspace; both are arranged in the end, and one. Frees `plain`. */
+static void mend_both(ebpo_mesh plain, int steps, ebpo_workspace *workspace)
+{
+    ebpo_mesh m = copy_of(&plain);
+    ebpo_mend_record record, other;
+    ebpo_error error = EBPO_ERROR_INIT;
+    m.workspace = workspace;
+    ck_assert_msg(ebpo_mesh_arrange_to_mend(&m, 3, silent, &error) == EBPO_OK, "%s", error.message);
+    expect_same_report(&plain, &m);
+    mend(&plain, steps, &record);
+    mend(&m, steps, &other);
+    ck_assert(memcmp(&record, &other, sizeof record) == 0);
+    expect_same(&m, &plain);
+    ck_assert_msg(ebpo_mesh_arrange(&m, 3, silent, &error) == EBPO_OK, "%s", error.message);
+    expect_same_report(&plain, &m);
+    ck_assert_msg(ebpo_mesh_arrange(&plain, 1, silent, &error) == EBPO_OK, "%s", error.message);
+    ck_assert(m.arrangement->key && m.arrangement->referenced == plain.arrangement->referenced);
+    ck_assert(memcmp(m.arrangement->key, plain.arrangement->key, (size_t)m.arrangement->referenced * 8) == 0);
+    ck_assert(memcmp(m.faces, plain.faces, (size_t)m.face_count * 12) == 0);
+    ck_assert(memcmp(m.arrangement->vertex_source, plain.arrangement->vertex_source, (size_t)m.vertex_count * 4) == 0);
+    ck_assert(memcmp(m.arrangement->face_source, plain.arrangement->face_source, (size_t)m.face_count * 4) == 0);
+    ebpo_mesh_free(&m);
+    ebpo_mesh_free(&plain);
+}
+
+/* Few positions, some of them of two zeros: everything that can be wrong with a mesh is, many times over. */
+static ebpo_mesh random_mesh(uint64_t *state)
+{
+    static const double line[] = { -0.0, 0, 1, 2, 5 };
+    ebpo_mesh m;
+    memset(&m, 0, sizeof m);
+    uint32_t vertices = 3 + (uint32_t)(ebpo_test_random(state) % 40), faces = 1 + (uint32_t)(ebpo_test_random(state) % 60);
+    uint64_t kinds = 2 + ebpo_test_random(state) % 4;
+    for (uint32_t v = 0; v < vertices; v++) {
+        double p[3];
+        for (int k = 0; k < 3; k++)
+            p[k] = line[ebpo_test_random(state) % kinds];
+        ebpo_test_append_vertex(&m, p[0], p[1], p[2]);
+    }
+    for (uint32_t f = 0; f < faces; f++)
+        ebpo_test_append_face(&m, (uint32_t)(ebpo_test_random(state) % vertices), (uint32_t)(ebpo_test_random(state) % vertices), (uint32_t)(ebpo_test_random(state) % vertices));
+    return m;
+}
+
+START_TEST(random_meshes_are_mended_alike_in_any_order)
+{
+    uint64_t state = 77, rounds = ebpo_test_scaled(3000);
+    for (uint64_t i = 0; i < rounds; i++) {
+        ebpo_mesh m = random_mesh(&state);
+        if (i % 3 == 1)
+            ebpo_test_to_float(&m);
+        mend_both(m, 1 + (int)(i % 7), NULL);
+    }
+}
+END_TEST
+
+/* Faces turned and left out, vertices of their own or shared, some that nobody names. */
+static ebpo_mesh damaged(int i)
+{
+    ebpo_mesh m = i < ebpo_test_solid_count ? ebpo_test_solids[i].make() : i % 2 ? ebpo_test_torus(2, 0.7, 300, 200) : ebpo_test_tetrahedra(8000);
+    uint64_t state = 5 + (uint64_t)i, kept = 0;
+    for (uint64_t f = 0; f < m.face_count; f++) {
+        uint64_t r = ebpo_test_random(&state) % 100;
+        if (r < 3 && f)
+            continue;
+        memmove(m.faces + 3 * kept, m.faces + 3 * f, 12);
+        if (r < 30)
+            ebpo_test_turn_face(&m, kept);
+        kept++;
+    }
+    m.face_count = kept;
+    if (i % 2 == 0)
+        ebpo_test_split_vertices(&m);
+    for (int k = 0; k < 5 && m.xyz64; k++) {
+        double p[3];
+        ebpo_test_point(&m, ebpo_test_random(&state) % m.vertex_count, p);
+        ebpo_test_append_vertex(&m, p[0], p[1] + (k == 4), p[2]);
+    }
+    if (i % 3)
+        ebpo_test_shuffle(&m, state);
+    return m;
+}
+
+START_TEST(damaged_solids_are_mended_alike_in_any_order)
+{
+    mend_both(damaged(_i), ALL, NULL);
+    mend_both(damaged(_i), WELD | FILL, NULL);
+    mend_both(damaged(_i), ORIENT, NULL);
+}
+END_TEST
+
+START_TEST(memory_does_not_change_what_mending_makes)
+{
+    ebpo_workspace *w;
+    ebpo_workspace_figures f;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert(ebpo_workspace_make_any(&w, 2 << 20, NULL, &error) == EBPO_OK);
+    mend_both(damaged(ebpo_test_solid_count + _i), ALL, w);
+    ebpo_workspace_tell(w, &f);
+    ck_assert_uint_gt(f.filed_most, 8 << 20);
+    ck_assert(f.held == 0 && f.filed == 0);
+    ebpo_workspace_free(w);
+}
+END_TEST
+
+START_TEST(a_mesh_that_is_arranged_for_building_is_welded_alike)
+{
+    uint64_t state = 99, rounds = ebpo_test_scaled(500);
+    for (uint64_t i = 0; i < rounds; i++) {
+        ebpo_mesh plain = random_mesh(&state), m = copy_of(&plain);
+        ebpo_mend_record record;
+        ebpo_error error = EBPO_ERROR_INIT;
+        ck_assert_msg(ebpo_mesh_arrange(&m, 1, silent, &error) == EBPO_OK, "%s", error.message);
+        mend(&plain, ALL, &record);
+        mend(&m, ALL, &record);
+        expect_same(&m, &plain);
+        ebpo_mesh_free(&m);
+        ebpo_mesh_free(&plain);
+    }
+}
+END_TEST
+
+START_TEST(what_was_mended_is_arranged_again_by_building)
+{
+    ebpo_mesh m = damaged(ebpo_test_solid_count + 1);
+    ebpo_mend_record record;
+    ebpo_mesh_report report;
+    ebpo_tree tree;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert(ebpo_mesh_arrange_to_mend(&m, 0, silent, &error) == EBPO_OK);
+    mend(&m, ALL, &record);
+    ck_assert(ebpo_mesh_check(&report, &m, 0, silent, &error) == EBPO_OK && report.balanced);
+    ck_assert_msg(ebpo_build(&tree, &m, &report, &record, NULL, &error) == EBPO_OK, "%s", error.message);
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("mend");
+    TCase *tests = tcase_create("all");
+    tcase_set_timeout(tests, 600);
+    tcase_add_test(tests, random_meshes_are_mended_alike_in_any_order);
+    tcase_add_loop_test(tests, damaged_solids_are_mended_alike_in_any_order, 0, ebpo_test_solid_count + 2);
+    tcase_add_loop_test(tests, memory_does_not_change_what_mending_makes, 0, 2);
+    tcase_add_test(tests, a_mesh_that_is_arranged_for_building_is_welded_alike);
+    tcase_add_test(tests, what_was_mended_is_arranged_again_by_building);
+    suite_add_tcase(suite, tests);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_NORMAL);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed ? 1 : 0;
+}

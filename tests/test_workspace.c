@@ -1,0 +1,181 @@
+/* Arrays in memory or in files, and what stays resident. */
+#include <check.h>
+#include <dirent.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/workspace.h"
+
+static char folder[] = "/tmp/ebpo-workspace-XXXXXX";
+
+static int names_in_folder(void)
+{
+    int count = 0;
+    DIR *d = opendir(folder);
+    for (struct dirent *e = d ? readdir(d) : NULL; e; e = readdir(d))
+        count += strcmp(e->d_name, ".") != 0 && strcmp(e->d_name, "..") != 0;
+    closedir(d);
+    return count;
+}
+
+static uint64_t resident(void)
+{
+    unsigned long long size = 0, pages = 0;
+    FILE *f = fopen("/proc/self/statm", "r");
+    ck_assert(f && fscanf(f, "%llu %llu", &size, &pages) == 2);
+    fclose(f);
+    return pages * (uint64_t)sysconf(_SC_PAGESIZE);
+}
+
+static ebpo_workspace *make(uint64_t memory)
+{
+    ebpo_workspace *w;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert_msg(ebpo_workspace_make_any(&w, memory, folder, &error) == EBPO_OK, "%s", error.message);
+    return w;
+}
+
+START_TEST(what_does_not_fit_goes_to_files_without_names)
+{
+    enum { MIB = 1 << 20 };
+    ebpo_workspace *w = make(8 * MIB);
+    ebpo_workspace_figures f;
+    char *small = ebpo_array_alloc(w, 1000, 1), *held = ebpo_array_alloc(w, 3 * MIB, 1), *filed = ebpo_array_zero(w, 5 * MIB, 1);
+    ck_assert(small && held && filed);
+    ebpo_workspace_tell(w, &f);
+    ck_assert_uint_eq(f.memory, 8 * MIB);
+    ck_assert_uint_eq(f.held, 3 * MIB);
+    ck_assert_uint_eq(f.filed, 5 * MIB);
+    ck_assert_int_eq(names_in_folder(), 0);
+    for (int i = 0; i < 5 * MIB; i++)
+        ck_assert_msg(filed[i] == 0, "byte %d", i);
+    memset(filed, 7, 5 * MIB);
+    ebpo_array_free(held);
+    ebpo_array_free(small);
+    ebpo_workspace_free(w); /* blocks outlive it */
+    ck_assert(filed[0] == 7 && filed[5 * MIB - 1] == 7);
+    ebpo_array_free(filed);
+}
+END_TEST
+
+START_TEST(growing_keeps_what_was_there)
+{
+    ebpo_workspace *w = make(4 << 20);
+    uint32_t *a = NULL;
+    uint64_t capacity = 0;
+    for (uint32_t i = 0; i < 3000000; i++) {
+        ck_assert(i < capacity || ebpo_array_grow(w, &a, &capacity, i + (uint64_t)1, sizeof *a));
+        a[i] = i * 2654435761u;
+    }
+    for (uint32_t i = 0; i < 3000000; i++)
+        if (a[i] != i * 2654435761u)
+            ck_abort_msg("number %lu changed", (unsigned long)i);
+    ebpo_array_free(a);
+    ebpo_workspace_figures f;
+    ebpo_workspace_tell(w, &f);
+    ck_assert(f.held == 0 && f.filed == 0 && f.filed_most > 0 && f.held_most > 0);
+    ebpo_workspace_free(w);
+}
+END_TEST
+
+START_TEST(pages_of_files_are_let_go_of)
+{
+#ifdef __SANITIZE_ADDRESS__
+    return; /* whose own memory is resident too */
+#endif
+    uint64_t before = resident(), budget = before + (32 << 20), most = 0;
+    ebpo_workspace *w = make(budget / 3 * 4); /* a quarter is left for what happens between two looks */
+    enum { BYTES = 256 << 20 };
+    unsigned char *a = ebpo_array_alloc(w, BYTES, 1);
+    ck_assert_ptr_nonnull(a);
+    for (int round = 0; round < 2; round++)
+        for (int i = 0; i < BYTES; i += 4096) {
+            if (round == 0)
+                a[i] = (unsigned char)(i >> 12);
+            else
+                ck_assert_msg(a[i] == (unsigned char)(i >> 12), "page %d", i >> 12);
+            if (i % (1 << 20) == 0) {
+                ebpo_workspace_settle(w);
+                most = resident() > most ? resident() : most;
+            }
+        }
+    ck_assert_msg(most <= budget / 3 * 4, "%llu MiB of %llu", (unsigned long long)most >> 20, (unsigned long long)(budget / 3 * 4) >> 20);
+    ebpo_array_free(a);
+    ebpo_workspace_free(w);
+}
+END_TEST
+
+START_TEST(without_a_workspace_it_is_malloc)
+{
+    char *a = ebpo_array_alloc(NULL, 10 << 20, 1);
+    uint64_t capacity = 10 << 20;
+    ck_assert(a && ebpo_array_grow(NULL, &a, &capacity, 20 << 20, 1));
+    ebpo_workspace_settle(NULL);
+    ebpo_settle_all();
+    ebpo_array_free(a);
+    ebpo_array_free(NULL);
+    ebpo_workspace_free(NULL);
+    ck_assert_ptr_null(ebpo_array_alloc(NULL, UINT64_MAX / 2, 16));
+}
+END_TEST
+
+START_TEST(bad_wishes_are_refused)
+{
+    ebpo_workspace *w;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_workspace_options o = { 1000000, NULL };
+    ck_assert_int_eq(ebpo_workspace_make(&w, &o, &error), EBPO_E_ARGUMENT);
+    ck_assert(w == NULL && strstr(error.message, "128 MiB") != NULL);
+    o = (ebpo_workspace_options){ 0, "/no/such/folder" };
+    ck_assert_int_eq(ebpo_workspace_make(&w, &o, &error), EBPO_E_IO);
+    ck_assert(strstr(error.message, "/no/such/folder") != NULL);
+    o = (ebpo_workspace_options){ 0, "/proc" };
+    ck_assert_int_eq(ebpo_workspace_make(&w, &o, &error), EBPO_E_IO);
+    ck_assert_int_eq(ebpo_workspace_make(&w, NULL, &error), EBPO_OK);
+    ebpo_workspace_free(w);
+}
+END_TEST
+
+START_TEST(a_file_that_may_not_grow_is_an_error_that_names_the_folder)
+{
+    ebpo_workspace *w = make(4 << 20);
+    ebpo_error error = EBPO_ERROR_INIT;
+    struct rlimit limit = { 1 << 20, 1 << 20 };
+    signal(SIGXFSZ, SIG_IGN);
+    ck_assert_int_eq(setrlimit(RLIMIT_FSIZE, &limit), 0);
+    ck_assert_ptr_null(ebpo_array_alloc(w, 5 << 20, 1));
+    ck_assert_int_eq(ebpo_workspace_fail(w, 5 << 20, &error), EBPO_E_IO);
+    ck_assert_msg(strstr(error.message, folder) && strstr(error.message, "5242880"), "%s", error.message);
+    ebpo_workspace_figures f;
+    ebpo_workspace_tell(w, &f);
+    ck_assert(f.held == 0 && f.filed == 0);
+    ebpo_workspace_free(w);
+}
+END_TEST
+
+int main(void)
+{
+    if (!mkdtemp(folder))
+        return 1;
+    Suite *suite = suite_create("workspace");
+    TCase *tests = tcase_create("arrays");
+    tcase_set_timeout(tests, 120);
+    tcase_add_test(tests, what_does_not_fit_goes_to_files_without_names);
+    tcase_add_test(tests, growing_keeps_what_was_there);
+    tcase_add_test(tests, pages_of_files_are_let_go_of);
+    tcase_add_test(tests, without_a_workspace_it_is_malloc);
+    tcase_add_test(tests, bad_wishes_are_refused);
+    tcase_add_test(tests, a_file_that_may_not_grow_is_an_error_that_names_the_folder);
+    suite_add_tcase(suite, tests);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_NORMAL);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    rmdir(folder);
+    return failed ? 1 : 0;
+}
