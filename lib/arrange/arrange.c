@@ -354,16 +354,6 @@ static ebpo_status sort_faces(arranging *a, ebpo_error *error)
 
 /* --- all --- */
 
-static void free_arrangement(struct ebpo_arrangement *to)
-{
-    if (!to)
-        return;
-    ebpo_array_free(to->key);
-    ebpo_array_free(to->vertex_source);
-    ebpo_array_free(to->face_source);
-    free(to);
-}
-
 /* A mesh that was arranged already: the source's numbers of vertices come from its own map; those of faces were sorted by. */
 static void compose(const struct ebpo_arrangement *before, ebpo_workspace *workspace, uint32_t *map, uint64_t count)
 {
@@ -378,7 +368,7 @@ static void put_in_place(arranging *a)
     ebpo_mesh *mesh = a->mesh;
     struct ebpo_arrangement *before = mesh->arrangement;
     compose(before, mesh->workspace, a->to->vertex_source, mesh->vertex_count);
-    free_arrangement(before);
+    ebpo_arrangement_free(before);
     ebpo_array_free(mesh->xyz32);
     ebpo_array_free(mesh->xyz64);
     ebpo_array_free(mesh->faces);
@@ -412,7 +402,7 @@ static ebpo_status run(arranging a, int level, ebpo_error *error)
         a.to->level = level;
         put_in_place(&a);
     }
-    free_arrangement(a.to);
+    ebpo_arrangement_free(a.to);
     ebpo_array_free(a.referenced);
     free(a.bounds);
     ebpo_array_free(a.xyz32);

@@ -19,12 +19,7 @@ void ebpo_mesh_free(ebpo_mesh *mesh)
     ebpo_array_free(mesh->xyz32);
     ebpo_array_free(mesh->xyz64);
     ebpo_array_free(mesh->faces);
-    if (mesh->arrangement) {
-        ebpo_array_free(mesh->arrangement->key);
-        ebpo_array_free(mesh->arrangement->vertex_source);
-        ebpo_array_free(mesh->arrangement->face_source);
-        free(mesh->arrangement);
-    }
+    ebpo_arrangement_free(mesh->arrangement);
     memset(mesh, 0, sizeof *mesh);
 }
 

@@ -20,6 +20,9 @@ struct ebpo_arrangement {
     uint32_t *face_source;   /* [face_count] */
 };
 
+/* NULL: nothing. */
+void ebpo_arrangement_free(struct ebpo_arrangement *arrangement);
+
 /* Numbers for messages and reports. */
 static inline uint64_t ebpo_mesh_source_vertex(const ebpo_mesh *mesh, uint64_t v) { return mesh->arrangement ? mesh->arrangement->vertex_source[v] : v; }
 static inline uint64_t ebpo_mesh_source_face(const ebpo_mesh *mesh, uint64_t f) { return mesh->arrangement ? mesh->arrangement->face_source[f] : f; }

@@ -1,6 +1,9 @@
 #include "mesh/mesh.h"
 
+#include <stdlib.h>
+
 #include "base/error.h"
+#include "base/workspace.h"
 
 const char *ebpo_mesh_label(const ebpo_mesh *mesh)
 {
@@ -22,4 +25,14 @@ ebpo_status ebpo_mesh_check_shape(const ebpo_mesh *mesh, ebpo_error *error)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: an array that the counts promise is NULL; allocate it",
                          ebpo_mesh_label(mesh));
     return EBPO_OK;
+}
+
+void ebpo_arrangement_free(struct ebpo_arrangement *arrangement)
+{
+    if (!arrangement)
+        return;
+    ebpo_array_free(arrangement->key);
+    ebpo_array_free(arrangement->vertex_source);
+    ebpo_array_free(arrangement->face_source);
+    free(arrangement);
 }

@@ -232,17 +232,27 @@ template <class Answer> void write_answers(const std::string &path, const std::v
 
 // ---- the run ----
 
-template <class Peer> void run(const settings &s)
+struct build_times {
+    uint64_t start;
+    double load, build; // seconds
+};
+
+template <class Peer> build_times timed_build(Peer &peer, const settings &s)
 {
-    std::vector<double> point = read_points(s.points, 1, Peer::doubles);
     if (s.cold)
         drop_from_memory(s.model);
-    Peer peer(s.warm);
     uint64_t start = nanoseconds();
     peer.load(s.model.c_str());
     uint64_t loaded = nanoseconds();
     peer.build();
-    uint64_t built = nanoseconds();
+    return { start, (double)(loaded - start) * 1e-9, (double)(nanoseconds() - loaded) * 1e-9 };
+}
+
+template <class Peer> void run(const settings &s)
+{
+    std::vector<double> point = read_points(s.points, 1, Peer::doubles);
+    Peer peer(s.warm);
+    build_times took = timed_build(peer, s);
     volatile auto first = peer.answer(point.data());
     (void)first;
     uint64_t answered = nanoseconds();
@@ -272,8 +282,7 @@ template <class Peer> void run(const settings &s)
     printf("{\"peer\": \"%s\", \"query\": \"%s\", \"warm\": %s, \"points\": %" PRIu64 ", \"load_s\": %.6f, \"build_s\": %.6f, "
            "\"first_answer_s\": %.6f, \"mean_ns\": %.1f, \"mean_cpu_ns\": %.1f, \"clocked_mean_ns\": %.1f, \"p50_ns\": %" PRIu64
            ", \"p99_ns\": %" PRIu64 ", \"p999_ns\": %" PRIu64 ", \"max_ns\": %" PRIu64 ", \"clock_ns\": %" PRIu64
-           ", \"peak_mb\": %.1f}\n", Peer::name, s.query.c_str(), s.warm ? "true" : "false", count, (double)(loaded - start) * 1e-9,
-           (double)(built - loaded) * 1e-9, (double)(answered - start) * 1e-9, (double)wall / (double)count,
+           ", \"peak_mb\": %.1f}\n", Peer::name, s.query.c_str(), s.warm ? "true" : "false", count, took.load, took.build, (double)(answered - took.start) * 1e-9, (double)wall / (double)count,
            (double)processor / (double)count, clocked, quantile(times, 0.5), quantile(times, 0.99), quantile(times, 0.999),
            times.back(), cost, peak);
 }
@@ -281,16 +290,10 @@ template <class Peer> void run(const settings &s)
 // Only loads and builds.
 template <class Peer> void run_build(const settings &s)
 {
-    if (s.cold)
-        drop_from_memory(s.model);
     Peer peer(s.warm);
-    uint64_t start = nanoseconds();
-    peer.load(s.model.c_str());
-    uint64_t loaded = nanoseconds();
-    peer.build();
-    uint64_t built = nanoseconds();
+    build_times took = timed_build(peer, s);
     printf("{\"peer\": \"%s\", \"query\": \"build\", \"threads\": %u, \"load_s\": %.6f, \"build_s\": %.6f, \"peak_mb\": %.1f}\n", Peer::name, threads,
-           (double)(loaded - start) * 1e-9, (double)(built - loaded) * 1e-9, peak_megabytes());
+           took.load, took.build, peak_megabytes());
 }
 
 inline bool parse(int argc, char **argv, settings &s)
