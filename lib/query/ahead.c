@@ -1,77 +1,83 @@
-/* What will be asked for next: the subtrees around the last position, the nearest first. EBP 2017, 4.2.3, where all 26 neighbours are loaded in a fixed order. */
+/* What will be asked for next: the subtrees that queries about places around the last one may need. EBP 2017, 4.2.3, loads the 26 neighbours of the subtree that holds the position instead. */
 #include "geom/strict_fp.h"
 
 #include "query/ahead.h"
 
+#include <math.h>
 #include <string.h>
 
-#include "query/locate.h"
+#include "query/walk.h"
 
-enum { AROUND = 27, FINER = 2 };
-
-typedef struct neighbour {
+typedef struct wanted {
     uint64_t key;
-    double far2; /* squared distance from the position to its cell, in cells */
-} neighbour;
+    double lower; /* bound of the distance */
+} wanted;
 
-/* The subtree that holds the cell at the cut level; false when that is settled or beyond the root cell. */
-static bool subtree_at(const ebpo_top *top, int level, const uint32_t at[3], uint64_t *key)
+/* The nearest subtrees within `limit` of p. */
+typedef struct looking {
+    const ebpo_model *model;
+    ebpo_box box;
+    const double *p;
+    double limit;
+    unsigned count;
+    wanted list[EBPO_CACHE_AHEAD]; /* the nearest first */
+} looking;
+
+static void add(looking *l, uint64_t key, double lower)
 {
-    uint32_t entry = top->nodes.root;
-    for (int i = 1; i <= level && ebpo_entry_kind_of(entry) == EBPO_ENTRY_GRAY; i++)
-        entry = top->nodes.group[ebpo_entry_value(entry)][ebpo_octant_at(at, level - i)];
-    *key = ebpo_entry_value(entry);
-    return ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW && !top->below[*key].pruned;
+    unsigned at = l->count < EBPO_CACHE_AHEAD ? l->count++ : EBPO_CACHE_AHEAD - 1;
+    for (; at > 0 && l->list[at - 1].lower > lower; at--)
+        l->list[at] = l->list[at - 1];
+    l->list[at] = (wanted){ key, lower };
+    if (l->count == EBPO_CACHE_AHEAD)
+        l->limit = fmin(l->limit, l->list[EBPO_CACHE_AHEAD - 1].lower);
 }
 
-static int add(neighbour *list, int count, uint64_t key, double far2)
+static void look(looking *l, ebpo_spot spot, double lower)
 {
-    for (int i = 0; i < count; i++)
-        if (list[i].key == key) /* a subtree above the cut level holds several cells */
-            return count;
-    int at = count;
-    for (; at > 0 && list[at - 1].far2 > far2; at--)
-        list[at] = list[at - 1];
-    list[at] = (neighbour){ key, far2 };
-    return count + 1;
-}
-
-/* `fine`: the position in quarters of cells of the cut level. */
-static int neighbours(const ebpo_top *top, const uint32_t fine[3], neighbour list[AROUND])
-{
-    int count = 0;
-    uint32_t last = (1u << top->cut_level) - 1;
-    for (int i = 0; i < AROUND; i++) {
-        uint32_t at[3];
-        uint64_t key;
-        double far2 = 0;
-        bool within = true;
-        for (int k = 0, rest = i; k < 3; k++, rest /= 3) {
-            int step = rest % 3 - 1;
-            double inside = ((fine[k] & ((1u << FINER) - 1)) + 0.5) / (1 << FINER), away = step < 0 ? inside : step > 0 ? 1 - inside : 0;
-            at[k] = (fine[k] >> FINER) + (uint32_t)step;
-            within = within && at[k] <= last;
-            far2 += away * away;
-        }
-        if (within && subtree_at(top, top->cut_level, at, &key))
-            count = add(list, count, key, far2);
+    if (lower > l->limit || ebpo_spot_is_settled(&spot) || ebpo_spot_is_pruned(l->model, &spot))
+        return;
+    if (ebpo_spot_is_below(&spot)) {
+        add(l, ebpo_entry_value(spot.entry), lower);
+        return;
     }
-    return count;
+    ebpo_ranked child[8];
+    int count = ebpo_rank_children(l->model, &l->box, &spot, lower, l->p, child);
+    for (int i = 0; i < count; i++)
+        look(l, child[i].spot, child[i].lower);
 }
 
-void ebpo_context_look_ahead(ebpo_context *c, const double p[3])
+unsigned ebpo_subtrees_near(const ebpo_model *m, const double p[3], double limit, uint64_t keys[EBPO_CACHE_AHEAD])
+{
+    looking l = { .model = m, .box = ebpo_model_box(m), .p = p, .limit = limit };
+    ebpo_spot root = ebpo_spot_root(m);
+    look(&l, root, ebpo_spot_distance(m, &l.box, &root, 0, p));
+    for (unsigned i = 0; i < l.count; i++)
+        keys[i] = l.list[i].key;
+    return l.count;
+}
+
+static double longest_side(const ebpo_box *box, int level)
+{
+    return ldexp(fmax(box->size[0], fmax(box->size[1], box->size[2])), -level);
+}
+
+static double apart(const double a[3], const double b[3])
+{
+    return fmax(fabs(a[0] - b[0]), fmax(fabs(a[1] - b[1]), fabs(a[2] - b[2])));
+}
+
+void ebpo_context_look_ahead(ebpo_context *c, const double p[3], double reach)
 {
     const ebpo_model *m = c->model;
     ebpo_box box = ebpo_model_box(m);
-    uint32_t fine[3];
-    if (!ebpo_locate(&box, m->top->cut_level + FINER, p, fine) || (c->looked_ahead && memcmp(fine, c->looked_from, sizeof fine) == 0))
+    double side = longest_side(&box, m->top->cut_level);
+    if (c->looked_ahead && apart(p, c->looked_from) < side / 4 && fabs(reach) <= c->looked_reach + side / 4)
         return;
     c->looked_ahead = true;
-    memcpy(c->looked_from, fine, sizeof fine);
-    neighbour list[AROUND];
-    uint64_t keys[AROUND];
-    int count = neighbours(m->top, fine, list);
-    for (int i = 0; i < count; i++)
-        keys[i] = list[i].key;
-    ebpo_cache_prefetch(m->cache, keys, (unsigned)count);
+    c->looked_reach = fabs(reach);
+    memcpy(c->looked_from, p, sizeof c->looked_from);
+    /* Over a way w distances and their bounds change by at most w each: what is needed until then is within the reach and 2 w. */
+    uint64_t keys[EBPO_CACHE_AHEAD];
+    ebpo_cache_prefetch(m->cache, keys, ebpo_subtrees_near(m, p, fabs(reach) + 2 * side, keys));
 }

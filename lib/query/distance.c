@@ -2,8 +2,10 @@
 #include "geom/strict_fp.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
+#include "base/alloc.h"
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "query/ahead.h"
@@ -17,59 +19,68 @@
 #include "query/pruned.h"
 #include "query/walk.h"
 
-/* Children that are neither white nor black, nearest first. */
-typedef struct ranked {
-    ebpo_spot spot;
-    double lower;
-} ranked;
-
-static double spot_distance(const ebpo_model *m, const ebpo_box *box, const ebpo_spot *spot, double parent, const double p[3])
-{
-    uint32_t count;
-    const uint32_t *codes = ebpo_spot_planes(m, spot, &count);
-    return fmax(parent, ebpo_envelope_distance(box, spot->level, spot->at, codes, count, p));
-}
-
-static int rank_children(const ebpo_model *m, const ebpo_box *box, const ebpo_spot *gray, double parent, const double p[3], ranked out[8])
-{
-    int count = 0;
-    for (unsigned octant = 0; octant < 8; octant++) {
-        ranked r = { ebpo_spot_child(m, gray, octant), 0 };
-        if (ebpo_spot_is_settled(&r.spot))
-            continue;
-        r.lower = spot_distance(m, box, &r.spot, parent, p);
-        int at = count++;
-        for (; at > 0 && out[at - 1].lower > r.lower; at--)
-            out[at] = out[at - 1];
-        out[at] = r;
-    }
-    return count;
-}
-
 /* --- exact: every subtree that may hold something nearer --- */
+
+/* Loading can wait: what is in memory, or nearer, may tell that it is not needed. */
+static bool put_off(ebpo_context *c, const ebpo_spot *spot, double lower)
+{
+    uint64_t key = ebpo_entry_value(spot->entry);
+    if ((c->pinned && c->pinned_key == key) || ebpo_cache_has(c->model->cache, key) || !ebpo_grow(&c->later, &c->later_room, c->later_count + 1, sizeof *c->later))
+        return false;
+    c->later[c->later_count++] = (ebpo_ranked){ *spot, lower };
+    return true;
+}
+
+static ebpo_status search_below(ebpo_context *c, ebpo_nearest *n, ebpo_spot spot, ebpo_error *error)
+{
+    ebpo_status status = ebpo_spot_enter(c, &spot, error);
+    if (status == EBPO_OK)
+        ebpo_nearest_search(n, c, spot.subtree);
+    return status;
+}
+
+static bool is_late(ebpo_nearest *n, double lower)
+{
+    if (!n->late && (!n->deadline || ebpo_clock() <= n->deadline))
+        return false;
+    n->late = true;
+    n->passed_over = fmin(n->passed_over, lower);
+    return true;
+}
 
 static ebpo_status search_top(ebpo_context *c, ebpo_nearest *n, const ebpo_box *box, ebpo_spot spot, double lower, ebpo_error *error)
 {
-    if (lower > n->limit || ebpo_spot_is_settled(&spot))
+    if (lower > n->limit || ebpo_spot_is_settled(&spot) || is_late(n, lower) || ebpo_spot_is_pruned(c->model, &spot)) /* pruned: see look_at_pruned */
         return EBPO_OK;
-    if (n->late || (n->deadline && ebpo_clock() > n->deadline)) {
-        n->late = true;
-        n->passed_over = fmin(n->passed_over, lower);
-        return EBPO_OK;
-    }
-    if (ebpo_spot_is_pruned(c->model, &spot))
-        return EBPO_OK; /* see look_at_pruned */
     if (ebpo_spot_is_below(&spot)) {
-        ebpo_status status = ebpo_spot_enter(c, &spot, error);
-        if (status == EBPO_OK)
-            ebpo_nearest_search(n, c, spot.subtree);
-        return status;
+        n->upper = fmin(n->upper, ebpo_cell_far(box, spot.level, spot.at, n->p)); /* it holds some face */
+        n->limit = fmin(n->limit, n->upper);
+        return put_off(c, &spot, lower) ? EBPO_OK : search_below(c, n, spot, error);
     }
-    ranked child[8];
-    int count = rank_children(c->model, box, &spot, lower, n->p, child);
+    ebpo_ranked child[8];
+    int count = ebpo_rank_children(c->model, box, &spot, lower, n->p, child);
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < count && status == EBPO_OK; i++)
         status = search_top(c, n, box, child[i].spot, child[i].lower, error);
+    return status;
+}
+
+static int compare_ranked(const void *x, const void *y)
+{
+    const ebpo_ranked *a = x, *b = y;
+    if (a->lower != b->lower)
+        return a->lower < b->lower ? -1 : 1;
+    return (a->spot.entry > b->spot.entry) - (a->spot.entry < b->spot.entry);
+}
+
+/* The nearest first: then none is loaded that a nearer one makes needless. */
+static ebpo_status search_later(ebpo_context *c, ebpo_nearest *n, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    qsort(c->later, c->later_count, sizeof *c->later, compare_ranked);
+    for (uint64_t i = 0; i < c->later_count && status == EBPO_OK; i++)
+        if (c->later[i].lower <= n->limit && !is_late(n, c->later[i].lower))
+            status = search_below(c, n, c->later[i].spot, error);
     return status;
 }
 
@@ -80,7 +91,9 @@ static ebpo_status search_everything(ebpo_context *c, ebpo_nearest *n, ebpo_erro
         return EBPO_OK;
     }
     ebpo_box box = ebpo_model_box(c->model);
-    return search_top(c, n, &box, ebpo_spot_root(c->model), 0, error);
+    c->later_count = 0;
+    ebpo_status status = search_top(c, n, &box, ebpo_spot_root(c->model), 0, error);
+    return status == EBPO_OK && c->later_count ? search_later(c, n, error) : status;
 }
 
 /* --- subsets: when a face that was left out may be nearer than what was found --- */
@@ -99,8 +112,8 @@ static ebpo_status pruned_within(ebpo_context *c, const ebpo_nearest *n, const e
         status = ebpo_spot_enter(c, &spot, error);
     if (status != EBPO_OK)
         return status;
-    ranked child[8];
-    int count = rank_children(m, box, &spot, lower, n->p, child);
+    ebpo_ranked child[8];
+    int count = ebpo_rank_children(m, box, &spot, lower, n->p, child);
     for (int i = 0; i < count && status == EBPO_OK; i++)
         status = pruned_within(c, n, box, child[i].spot, child[i].lower, nearest, error);
     return status;
@@ -114,7 +127,7 @@ static ebpo_status look_at_pruned(ebpo_context *c, ebpo_nearest *n, ebpo_error *
     double nearest = INFINITY;
     if (!c->model->info->pruned)
         return EBPO_OK;
-    ebpo_status status = pruned_within(c, n, &box, root, spot_distance(c->model, &box, &root, 0, n->p), &nearest, error);
+    ebpo_status status = pruned_within(c, n, &box, root, ebpo_spot_distance(c->model, &box, &root, 0, n->p), &nearest, error);
     n->passed_over = fmin(n->passed_over, nearest);
     return status;
 }
@@ -154,8 +167,8 @@ static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_query_op
     ebpo_nearest_end(&n, o->max_distance, out);
     if (out->face == EBPO_NO_FACE)
         return EBPO_OK;
-    if (c->pinned && ebpo_looks_ahead(c->model))
-        ebpo_context_look_ahead(c, out->point);
+    if (ebpo_looks_ahead(c->model))
+        ebpo_context_look_ahead(c, p, out->distance);
     c->warm = true;
     c->warm_face = n.file_face;
     c->warm_told = n.told_face;
@@ -189,8 +202,8 @@ static ebpo_status narrow(interval *v, ebpo_spot spot, double lower, ebpo_error 
         if (status != EBPO_OK)
             return status;
     }
-    ranked child[8];
-    int count = rank_children(m, &v->box, &spot, lower, v->p, child);
+    ebpo_ranked child[8];
+    int count = ebpo_rank_children(m, &v->box, &spot, lower, v->p, child);
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < count && status == EBPO_OK; i++)
         status = narrow(v, child[i].spot, child[i].lower, error);
@@ -204,7 +217,7 @@ ebpo_status ebpo_distance_interval(ebpo_context *context, const double p[3], con
     if (options->deadline_ns)
         v.deadline = ebpo_clock() + options->deadline_ns;
     ebpo_spot root = ebpo_spot_root(context->model);
-    ebpo_status status = narrow(&v, root, spot_distance(context->model, &v.box, &root, 0, p), error);
+    ebpo_status status = narrow(&v, root, ebpo_spot_distance(context->model, &v.box, &root, 0, p), error);
     *lo = fmin(v.lo, v.hi);
     *hi = v.hi;
     return status;

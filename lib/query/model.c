@@ -263,6 +263,7 @@ void ebpo_context_free(ebpo_context *c)
     let_go(c);
     free(c->open);
     free(c->hits);
+    free(c->later);
     free(c->faces);
     free(c);
 }

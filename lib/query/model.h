@@ -24,6 +24,8 @@ struct ebpo_model {
     _Atomic uint64_t leaves, leaves_of_kind[5], leaves_one_wall; /* in the subtrees that are in memory */
 };
 
+typedef struct ebpo_ranked ebpo_ranked; /* query/walk.h */
+
 struct ebpo_context {
     ebpo_model *model;
     ebpo_subtree *pinned;       /* the subtree last used, when it came from the cache */
@@ -34,8 +36,10 @@ struct ebpo_context {
     uint64_t hit_room;
     uint64_t *faces;
     uint64_t face_room;
-    bool looked_ahead;          /* from here, in quarters of cells of the cut level */
-    uint32_t looked_from[3];
+    ebpo_ranked *later;         /* subtrees that a search has put off */
+    uint64_t later_count, later_room;
+    bool looked_ahead;          /* from here, by a query that reached so far */
+    double looked_from[3], looked_reach;
     /* The last nearest face: where ebpo_distance begins, if asked to. */
     bool warm;
     double warm_triangle[3][3];

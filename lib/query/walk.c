@@ -150,3 +150,26 @@ double ebpo_cell_far(const ebpo_box *box, int level, const uint32_t at[3], const
         d[k] = fmax(fabs(p[k] - low[k]), fabs(p[k] - (low[k] + size[k])));
     return length3(d) * (1 + 0x1p-40) + length3(size) * near_share;
 }
+
+double ebpo_spot_distance(const ebpo_model *m, const ebpo_box *box, const ebpo_spot *spot, double parent, const double p[3])
+{
+    uint32_t count;
+    const uint32_t *codes = ebpo_spot_planes(m, spot, &count);
+    return fmax(parent, ebpo_envelope_distance(box, spot->level, spot->at, codes, count, p));
+}
+
+int ebpo_rank_children(const ebpo_model *m, const ebpo_box *box, const ebpo_spot *gray, double parent, const double p[3], ebpo_ranked out[8])
+{
+    int count = 0;
+    for (unsigned octant = 0; octant < 8; octant++) {
+        ebpo_ranked r = { ebpo_spot_child(m, gray, octant), 0 };
+        if (ebpo_spot_is_settled(&r.spot))
+            continue;
+        r.lower = ebpo_spot_distance(m, box, &r.spot, parent, p);
+        int at = count++;
+        for (; at > 0 && out[at - 1].lower > r.lower; at--)
+            out[at] = out[at - 1];
+        out[at] = r;
+    }
+    return count;
+}

@@ -46,4 +46,15 @@ bool ebpo_outside_planes(const ebpo_box *box, int level, const uint32_t at[3], c
 double ebpo_envelope_distance(const ebpo_box *box, int level, const uint32_t at[3], const uint32_t *codes, uint32_t count, const double p[3]);
 double ebpo_cell_far(const ebpo_box *box, int level, const uint32_t at[3], const double p[3]);
 
+/* The same for a node and the envelopes of its ancestors: `parent` is its parent's bound, 0 for the root. */
+double ebpo_spot_distance(const ebpo_model *model, const ebpo_box *box, const ebpo_spot *spot, double parent, const double p[3]);
+
+/* Children of a gray node that are neither white nor black, nearest first; returns how many. */
+struct ebpo_ranked {
+    ebpo_spot spot;
+    double lower;
+};
+
+int ebpo_rank_children(const ebpo_model *model, const ebpo_box *box, const ebpo_spot *gray, double parent, const double p[3], ebpo_ranked out[8]);
+
 #endif

@@ -31,7 +31,7 @@ typedef struct ebpo_model_options {
                            * of chunks (24 bytes a chunk) and what contexts gather of answers (hits, faces) */
     int cut_level;        /* levels 0 .. cut_level stay in memory and subtrees below are loaded on demand; -1: by the budget (all at once when that fits) */
     ebpo_loading loading; /* only matters where not all fits, or a cut level is given */
-    bool prefetch;        /* a thread in the background loads the subtrees around the last one that was used (EBP 2017, 4.2.3) */
+    bool prefetch;        /* a thread in the background loads the subtrees that queries about places around the last one may need, the nearest first (EBP 2017, 4.2.3) */
     unsigned threads;     /* for opening; 0: all cores */
     ebpo_progress progress;
 } ebpo_model_options;

@@ -1,0 +1,131 @@
+/* Which subtrees are loaded ahead: what queries about places nearby need is among them. */
+#include <check.h>
+#include <math.h>
+#include <stdlib.h>
+
+#include "query/ahead.h"
+#include "query_kit.h"
+
+#define ASSERT_OK(call)                                                       \
+    do {                                                                      \
+        ebpo_error error_ = EBPO_ERROR_INIT, *error = &error_;                \
+        ebpo_status status_ = (call);                                         \
+        ck_assert_msg(status_ == EBPO_OK, "%s: %s", #call, error_.message);   \
+    } while (0)
+
+static const struct {
+    const char *name;
+    int variant;
+} cases[] = { { "sphere", 5 }, { "boxes_in_walls", 0 }, { "blob", 2 }, { "touching_shells", 5 }, { "giant_and_dust", 0 } };
+enum { CASES = sizeof cases / sizeof *cases };
+
+static void load(ebpo_model *model, const uint64_t *keys, unsigned count)
+{
+    for (unsigned i = 0; i < count; i++) {
+        void *item;
+        ASSERT_OK(ebpo_cache_get(model->cache, keys[i], &item, NULL, error));
+        ebpo_cache_unpin(model->cache, keys[i]);
+    }
+}
+
+static double distance_and_sign(ebpo_model *model, const double p[3])
+{
+    ebpo_context *context;
+    ebpo_distance_result distance;
+    ebpo_inside_result inside;
+    ASSERT_OK(ebpo_context_new(&context, model, error));
+    ASSERT_OK(ebpo_distance(context, p, NULL, &distance, error));
+    ASSERT_OK(ebpo_inside(context, p, NULL, &inside, error));
+    ebpo_context_free(context);
+    return fabs(distance.distance);
+}
+
+/* A query about a place `away` from p, when only what is said to be near p is there. */
+static bool loads_nothing_more(ebpo_model *model, const double p[3], const double away[3])
+{
+    double way = sqrt(away[0] * away[0] + away[1] * away[1] + away[2] * away[2]) * (1 + 0x1p-40), q[3] = { p[0] + away[0], p[1] + away[1], p[2] + away[2] };
+    uint64_t keys[EBPO_CACHE_AHEAD];
+    unsigned count = ebpo_subtrees_near(model, p, distance_and_sign(model, p) + 2 * way, keys);
+    if (count == EBPO_CACHE_AHEAD)
+        return false; /* there may be more */
+    ebpo_cache_stats before, after;
+    ebpo_cache_clear(model->cache);
+    load(model, keys, count);
+    ebpo_cache_get_stats(model->cache, &before);
+    distance_and_sign(model, q);
+    ebpo_cache_get_stats(model->cache, &after);
+    ck_assert_uint_eq(after.loads, before.loads);
+    return count > 0;
+}
+
+START_TEST(what_is_near_is_all_that_queries_nearby_need)
+{
+    query_model m;
+    uint64_t count = query_scaled(200), looked = 0;
+    double *points = query_room(2 * count, 3 * sizeof *points);
+    query_model_make(&m, cases[_i].name, query_solid_by_name(cases[_i].name), &query_variants[cases[_i].variant]);
+    query_make_points(&m, 2 * count, (uint64_t)_i + 77, points);
+    for (int cut = 1; cut < 4 && cut < m.info.level_count; cut++) {
+        ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+        ebpo_model *model;
+        how.memory = UINT64_C(1) << 40;
+        how.cut_level = cut;
+        ASSERT_OK(ebpo_model_open(&model, m.file, &how, error));
+        for (uint64_t i = 0; i < count && !model->whole; i++) {
+            const double *p = points + 6 * i;
+            double away[3];
+            for (int k = 0; k < 3; k++)
+                away[k] = (p[k + 3] - p[k]) / (double)(4 << i % 8);
+            looked += loads_nothing_more(model, p, away);
+        }
+        ebpo_model_close(model);
+    }
+    ck_assert_uint_gt(looked, 0);
+    query_model_free(&m);
+    free(points);
+}
+END_TEST
+
+START_TEST(the_nearest_come_first_and_a_larger_reach_only_adds)
+{
+    query_model m;
+    uint64_t count = query_scaled(100);
+    double *points = query_room(count, 3 * sizeof *points);
+    query_model_make(&m, cases[_i].name, query_solid_by_name(cases[_i].name), &query_variants[cases[_i].variant]);
+    query_make_points(&m, count, (uint64_t)_i + 78, points);
+    ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model *model;
+    how.memory = UINT64_C(1) << 40;
+    how.cut_level = 2;
+    ASSERT_OK(ebpo_model_open(&model, m.file, &how, error));
+    for (uint64_t i = 0; i < count && model->top; i++) {
+        uint64_t all[EBPO_CACHE_AHEAD], some[EBPO_CACHE_AHEAD];
+        unsigned most = ebpo_subtrees_near(model, points + 3 * i, INFINITY, all);
+        ck_assert_uint_eq(most, model->top->below_count < EBPO_CACHE_AHEAD ? model->top->below_count : EBPO_CACHE_AHEAD);
+        for (double limit = m.size / 64; limit < m.size; limit *= 2) {
+            unsigned fewer = ebpo_subtrees_near(model, points + 3 * i, limit, some);
+            ck_assert_uint_le(fewer, most);
+            for (unsigned k = 0; k < fewer; k++)
+                ck_assert_uint_eq(some[k], all[k]);
+        }
+    }
+    ebpo_model_close(model);
+    query_model_free(&m);
+    free(points);
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("ahead");
+    TCase *tests = tcase_create("ahead");
+    tcase_set_timeout(tests, 1000);
+    tcase_add_loop_test(tests, what_is_near_is_all_that_queries_nearby_need, 0, CASES);
+    tcase_add_loop_test(tests, the_nearest_come_first_and_a_larger_reach_only_adds, 0, CASES);
+    suite_add_tcase(suite, tests);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_NORMAL);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+}
