@@ -192,6 +192,21 @@ static ebpo_status print_result(const values *v, const prepared *p, const char *
 
 /* --- work --- */
 
+/* Judging what is needed opens the whole model: bytes a face, measured. Told before the hours of building that it would be too much. */
+static ebpo_status room_to_judge(const values *v, const prepared *p, const char *in, const ebpo_workspace *workspace, ebpo_error *error)
+{
+    ebpo_workspace_figures figures;
+    double leaves = 1800 / (double)v->leaf_faces, needed = (double)p->mesh.face_count * (130 + (leaves < 430 ? leaves : 430)) + (16 << 20);
+    char bytes[32], budget[32];
+    ebpo_workspace_tell(workspace, &figures);
+    if (needed <= (double)figures.memory)
+        return EBPO_OK;
+    snprintf(error->message, sizeof error->message,
+             "%s: --max-error and --target-size measure with the whole model in memory, some %s of it, and the budget is %s; allow more (--memory), or leave them out here and use "
+             "'ebpo subset' where there is more", in, words_bytes(bytes, sizeof bytes, (uint64_t)needed), words_bytes(budget, sizeof budget, figures.memory));
+    return EBPO_E_LIMIT;
+}
+
 /* `need`: the error or size that was asked for. */
 static ebpo_status build_and_write(const values *v, prepared *p, const char *out, const ebpo_subset_options *need,
                                    ebpo_progress progress, ebpo_build_times *times, ebpo_error *error)
@@ -290,7 +305,11 @@ static int run(int argc, char **argv)
                     in);
             return EXIT_NOT_SOLID;
         }
-        status = build_and_write(&v, &p, out, &need, progress, &stages.times, &error);
+        status = stages.judged ? room_to_judge(&v, &p, in, workspace, &error) : EBPO_OK;
+        if (status == EBPO_OK)
+            status = build_and_write(&v, &p, out, &need, progress, &stages.times, &error);
+        else
+            ebpo_mesh_free(&p.mesh);
         progress_wipe(&line);
     }
     progress_end_stage(&line);
