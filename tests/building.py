@@ -54,7 +54,8 @@ class Place:
 
 def limits(file_bytes=None):
     def apply():
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        for number in signal.SIGINT, signal.SIGTERM, signal.SIGHUP:  # nohup and background jobs hand down that these are ignored
+            signal.signal(number, signal.SIG_DFL)
         if file_bytes:
             resource.setrlimit(resource.RLIMIT_FSIZE, (file_bytes, file_bytes))
     return apply

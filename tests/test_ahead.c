@@ -33,9 +33,12 @@ static double distance_and_sign(ebpo_model *model, const double p[3])
     ebpo_context *context;
     ebpo_distance_result distance;
     ebpo_inside_result inside;
+    ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
     ASSERT_OK(ebpo_context_new(&context, model, error));
-    ASSERT_OK(ebpo_distance(context, p, NULL, &distance, error));
-    ASSERT_OK(ebpo_inside(context, p, NULL, &inside, error));
+    options.unsigned_distance = model->info->rule != EBPO_RULE_NONZERO; /* envelopes do not decide then: the cell that holds p is needed, however far its envelope is */
+    ASSERT_OK(ebpo_distance(context, p, &options, &distance, error));
+    if (!options.unsigned_distance)
+        ASSERT_OK(ebpo_inside(context, p, NULL, &inside, error));
     ebpo_context_free(context);
     return fabs(distance.distance);
 }

@@ -206,15 +206,19 @@ static void take_vertices(void *context, uint64_t place, const void *records, ui
 {
     arranging *a = context;
     for (uint64_t i = 0; i < count; i++, place++) {
-        const float_record *f = (const float_record *)records + i;
-        const vertex_record *d = (const vertex_record *)records + i;
-        uint32_t at = a->xyz32 ? f->at : d->at;
-        if (a->xyz32)
-            memcpy(a->xyz32 + 3 * place, f->p, sizeof f->p);
-        else
-            memcpy(a->xyz64 + 3 * place, d->p, sizeof d->p);
+        uint64_t key;
+        uint32_t at;
+        if (a->xyz32) {
+            const float_record *r = (const float_record *)records + i;
+            memcpy(a->xyz32 + 3 * place, r->p, sizeof r->p);
+            key = r->key, at = r->at;
+        } else {
+            const vertex_record *r = (const vertex_record *)records + i;
+            memcpy(a->xyz64 + 3 * place, r->p, sizeof r->p);
+            key = r->key, at = r->at;
+        }
         if (a->to->key)
-            a->to->key[place] = ((a->xyz32 ? f->key : d->key) & ~UNREFERENCED) >> 3 * (EBPO_MAX_LEVEL - a->to->box.grid_level);
+            a->to->key[place] = (key & ~UNREFERENCED) >> 3 * (EBPO_MAX_LEVEL - a->to->box.grid_level);
         a->to->vertex_source[place] = at; /* told in the source's numbers at the end */
     }
 }
@@ -275,7 +279,7 @@ static ebpo_status translate_faces(arranging *a, uint64_t *passes, ebpo_error *e
     if (mesh->workspace)
         ebpo_workspace_tell(mesh->workspace, &figures);
     uint64_t window = figures.memory / 8 / sizeof *a->rank;
-    a->rank_count = mesh->vertex_count < window ? mesh->vertex_count : window;
+    a->rank_count = mesh->vertex_count < window ? mesh->vertex_count : window ? window : 1;
     a->rank = ebpo_alloc(a->rank_count, sizeof *a->rank);
     a->corners = ebpo_array_alloc(mesh->workspace, mesh->face_count, 3 * sizeof *a->corners);
     if (!a->rank || !a->corners) {

@@ -8,7 +8,7 @@
 #include "base/parallel.h"
 
 /* Records of a group, more or less: few enough for a core's own cache. No more groups than places that may be written to at a time. */
-enum { GROUP = 1 << 16, GROUPS_MOST = 1024, GRAIN = 1 << 14, DIGIT = 256, ALONE = 1 << 12, JUMPS = 4 };
+enum { GROUP = 1 << 16, LARGE_GROUP = 4 * GROUP, GROUPS_MOST = 1024, GRAIN = 1 << 14, DIGIT = 256, ALONE = 1 << 12, JUMPS = 4 };
 
 typedef struct sorting {
     const ebpo_sort *s;
@@ -138,7 +138,7 @@ static keyed *radix(keyed *from, keyed *to, uint64_t count)
 static void break_ties(const ebpo_sort *s, uint8_t *records, uint64_t begin, uint64_t end)
 {
     enum { FEW = 16 };
-    uint8_t held[64];
+    uint8_t held[EBPO_SORT_RECORD_MOST];
     if (end - begin > FEW) {
         qsort(records + begin * s->record, (size_t)(end - begin), s->record, s->compare);
         return;
@@ -157,7 +157,7 @@ static ebpo_status sort_group(const sorting *t, uint64_t g, ebpo_error *error)
     const ebpo_sort *s = t->s;
     uint64_t count = t->first[g + 1] - t->first[g];
     const uint8_t *group = t->dealt + t->first[g] * s->record;
-    ebpo_workspace *room = count > 4 * GROUP ? s->workspace : NULL; /* records that differ in no leading bit */
+    ebpo_workspace *room = count > LARGE_GROUP ? s->workspace : NULL; /* records that differ in no leading bit */
     keyed *keys = ebpo_array_alloc(room, 2 * count, sizeof *keys);
     uint8_t *sorted = ebpo_array_alloc(room, count, s->record);
     ebpo_status status = EBPO_OK;
@@ -212,12 +212,16 @@ static ebpo_status run_alone(sorting *t, ebpo_error *error)
 }
 
 /* Each thread has a group in its hands: an eighth of the budget for all of them. */
-static unsigned threads_for_groups(const ebpo_sort *s)
+static unsigned threads_for_groups(const sorting *t)
 {
+    const ebpo_sort *s = t->s;
     ebpo_workspace_figures figures = { .memory = UINT64_MAX };
+    uint64_t largest = 1;
     if (s->workspace)
         ebpo_workspace_tell(s->workspace, &figures);
-    uint64_t fit = figures.memory / 8 / (GROUP * (2 * sizeof(keyed) + s->record));
+    for (uint64_t g = 0; g < t->groups; g++)
+        largest = t->first[g + 1] - t->first[g] > largest ? t->first[g + 1] - t->first[g] : largest;
+    uint64_t fit = figures.memory / 8 / ((largest < LARGE_GROUP ? largest : LARGE_GROUP) * (2 * sizeof(keyed) + s->record));
     return fit < 1 ? 1 : s->threads < fit ? s->threads : (unsigned)fit;
 }
 
@@ -236,12 +240,14 @@ static ebpo_status run(sorting *t, ebpo_error *error)
     t->made = NULL;
     pass.begin = pass.end++;
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads_for_groups(s), t->groups, 1, sort_groups, t, &progress, s->stage, error);
+        status = ebpo_parallel_for(threads_for_groups(t), t->groups, 1, sort_groups, t, &progress, s->stage, error);
     return status;
 }
 
 ebpo_status ebpo_sort_run(const ebpo_sort *sort, ebpo_error *error)
 {
+    if (sort->record > EBPO_SORT_RECORD_MOST)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "records of %zu bytes are not sorted", sort->record);
     sorting t = { .s = sort };
     uint64_t bytes = sort->count * sort->record;
     if (sort->count <= ALONE) {

@@ -5,7 +5,7 @@
 
 #include "base/workspace.h"
 
-enum { EBPO_SORT_BINS = 1 << 18, EBPO_SORT_PASSES = 3 };
+enum { EBPO_SORT_BINS = 1 << 18, EBPO_SORT_PASSES = 3, EBPO_SORT_RECORD_MOST = 64 };
 
 typedef struct ebpo_sort {
     ebpo_workspace *workspace;
@@ -14,7 +14,7 @@ typedef struct ebpo_sort {
     const char *stage;
     uint64_t passes_before; /* of this stage, that its caller has done; sorting takes EBPO_SORT_PASSES */
     uint64_t count;
-    size_t record;  /* bytes; each begins with its key, 8 bytes */
+    size_t record;  /* bytes, at most EBPO_SORT_RECORD_MOST; each begins with its key, 8 bytes */
     unsigned shift; /* key >> shift is below EBPO_SORT_BINS, for all keys */
     void *context;
     /* Writes the records of items [begin, end). From any thread. */

@@ -54,13 +54,13 @@ static ebpo_workspace *list;
 static int listed; /* read without the lock */
 
 /* All blocks of the process, by address: who frees an array need not know where it comes from. Pieces of a build have their arrays freed one by one, so there are thousands at most. */
-enum { BUCKETS = 1024 };
+enum { BUCKETS = 1 << 10 };
 static pthread_mutex_t table_lock = PTHREAD_MUTEX_INITIALIZER;
 static block *table[BUCKETS];
 
 static block **bucket_of(const void *at)
 {
-    return &table[((uintptr_t)at / PAGE) * 2654435761u % BUCKETS];
+    return &table[(uint64_t)((uintptr_t)at / PAGE) * UINT64_C(0x9e3779b97f4a7c15) >> 54];
 }
 
 static void enter(block *b)
@@ -107,13 +107,46 @@ static uint64_t number_in(const char *path)
     return value;
 }
 
+/* The least limit of the group `path` (it is cut short) and of those above it. */
+static uint64_t least_limit(const char *mounted, char *path, const char *file, uint64_t least)
+{
+    for (;;) {
+        char name[PATH_BYTES + 128];
+        snprintf(name, sizeof name, "%s%s/%s", mounted, path, file);
+        uint64_t limit = number_in(name);
+        least = limit && limit < least ? limit : least;
+        char *slash = strrchr(path, '/');
+        if (!slash)
+            return least;
+        *slash = 0;
+    }
+}
+
+/* Of the control groups of this process (cgroups(7): lines "0::/path", or of version 1 "4:memory:/path"); within a container the path may not be there, but the topmost group is its own. */
+static uint64_t group_memory(const char *groups, uint64_t least)
+{
+    char line[PATH_BYTES];
+    FILE *f = fopen(groups, "re");
+    while (f && fgets(line, sizeof line, f)) {
+        line[strcspn(line, "\n")] = 0;
+        char *controller = strchr(line, ':'), *path = controller ? strchr(controller + 1, ':') : NULL;
+        if (!path)
+            continue;
+        *path++ = 0;
+        if (!controller[1])
+            least = least_limit("/sys/fs/cgroup", path, "memory.max", least);
+        else if (strstr(controller, "memory"))
+            least = least_limit("/sys/fs/cgroup/memory", path, "memory.limit_in_bytes", least);
+    }
+    if (f)
+        fclose(f);
+    return least;
+}
+
 static uint64_t machine_memory(void)
 {
-    uint64_t all = (uint64_t)sysconf(_SC_PHYS_PAGES) * (uint64_t)sysconf(_SC_PAGESIZE);
-    uint64_t group = number_in("/sys/fs/cgroup/memory.max");
-    if (!group)
-        group = number_in("/sys/fs/cgroup/memory/memory.limit_in_bytes");
-    return group && group < all ? group : all;
+    long pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGESIZE);
+    return group_memory("/proc/self/cgroup", pages > 0 && page > 0 ? (uint64_t)pages * (uint64_t)page : UINT64_C(1) << 32);
 }
 
 /* The name that a file has for a moment, where files cannot be made without one: a signal may come in that moment. One at a time. */

@@ -25,7 +25,7 @@ static size_t room_for(uint64_t count, size_t size)
 
 static char *take_room(ebpo_builder *b, struct ebpo_store *s, size_t bytes)
 {
-    if (bytes > s->left) {
+    if (!s->block_count || bytes > s->left) {
         size_t block = bytes > STORE_BYTES ? bytes : STORE_BYTES;
         char *made = ebpo_grow(&s->blocks, &s->block_capacity, s->block_count + 1, sizeof *s->blocks) ? ebpo_array_alloc(b->workspace, block, 1) : NULL;
         if (!made)

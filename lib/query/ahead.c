@@ -77,7 +77,8 @@ void ebpo_context_look_ahead(ebpo_context *c, const double p[3], double reach)
     c->looked_ahead = true;
     c->looked_reach = fabs(reach);
     memcpy(c->looked_from, p, sizeof c->looked_from);
-    /* Over a way w distances and their bounds change by at most w each: what is needed until then is within the reach and 2 w. */
+    /* Over a way w distances and their bounds change by at most w each: what is needed until then is within the reach and 2 w. A cell's diagonal is 1.73 sides: where envelopes do not decide (other rules than
+     * nonzero), the cell that holds the place is needed. */
     uint64_t keys[EBPO_CACHE_AHEAD];
-    ebpo_cache_prefetch(m->cache, keys, ebpo_subtrees_near(m, p, fabs(reach) + 2 * side, keys));
+    ebpo_cache_prefetch(m->cache, keys, ebpo_subtrees_near(m, p, fabs(reach) + 2.25 * side, keys));
 }

@@ -4,7 +4,7 @@
 
 #include "query/model.h"
 
-/* Asks for the subtrees whose envelopes are within `reach` (of either sign) and two sides of a cell of the cut level of p, the nearest first, when p has moved on by a quarter of such a side. `reach`: how far
+/* Asks for the subtrees whose envelopes are within `reach` (of either sign) and 2.25 sides of a cell of the cut level of p, the nearest first, when p has moved on by a quarter of such a side. `reach`: how far
  * the query about p looked, 0 for point in solid. Models with a cache only. */
 void ebpo_context_look_ahead(ebpo_context *context, const double p[3], double reach);
 

@@ -21,11 +21,11 @@
 
 /* --- exact: every subtree that may hold something nearer --- */
 
-/* Loading can wait: what is in memory, or nearer, may tell that it is not needed. */
-static bool put_off(ebpo_context *c, const ebpo_spot *spot, double lower)
+/* Loading can wait: what is in memory, or nearer, may tell that it is not needed. Not under a deadline, which might pass before anything is loaded, each time. */
+static bool put_off(ebpo_context *c, const ebpo_nearest *n, const ebpo_spot *spot, double lower)
 {
     uint64_t key = ebpo_entry_value(spot->entry);
-    if ((c->pinned && c->pinned_key == key) || ebpo_cache_has(c->model->cache, key) || !ebpo_grow(&c->later, &c->later_room, c->later_count + 1, sizeof *c->later))
+    if (n->deadline || (c->pinned && c->pinned_key == key) || ebpo_cache_has(c->model->cache, key) || !ebpo_grow(&c->later, &c->later_room, c->later_count + 1, sizeof *c->later))
         return false;
     c->later[c->later_count++] = (ebpo_ranked){ *spot, lower };
     return true;
@@ -55,7 +55,7 @@ static ebpo_status search_top(ebpo_context *c, ebpo_nearest *n, const ebpo_box *
     if (ebpo_spot_is_below(&spot)) {
         n->upper = fmin(n->upper, ebpo_cell_far(box, spot.level, spot.at, n->p)); /* it holds some face */
         n->limit = fmin(n->limit, n->upper);
-        return put_off(c, &spot, lower) ? EBPO_OK : search_below(c, n, spot, error);
+        return put_off(c, n, &spot, lower) ? EBPO_OK : search_below(c, n, spot, error);
     }
     ebpo_ranked child[8];
     int count = ebpo_rank_children(c->model, box, &spot, lower, n->p, child);
@@ -79,7 +79,7 @@ static ebpo_status search_later(ebpo_context *c, ebpo_nearest *n, ebpo_error *er
     ebpo_status status = EBPO_OK;
     qsort(c->later, c->later_count, sizeof *c->later, compare_ranked);
     for (uint64_t i = 0; i < c->later_count && status == EBPO_OK; i++)
-        if (c->later[i].lower <= n->limit && !is_late(n, c->later[i].lower))
+        if (c->later[i].lower <= n->limit)
             status = search_below(c, n, c->later[i].spot, error);
     return status;
 }
@@ -144,6 +144,12 @@ ebpo_status ebpo_give_sign(ebpo_context *c, const double p[3], const ebpo_query_
     return status;
 }
 
+static void look_ahead(ebpo_context *c, const double p[3], double reach)
+{
+    if (ebpo_looks_ahead(c->model))
+        ebpo_context_look_ahead(c, p, reach);
+}
+
 static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_query_options *o, ebpo_distance_result *out, ebpo_error *error)
 {
     ebpo_nearest n;
@@ -162,13 +168,13 @@ static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_query_op
         ebpo_box box = ebpo_model_box(c->model);
         double hi = fmin(n.upper, ebpo_cell_far(&box, 0, (const uint32_t[3]){ 0, 0, 0 }, p)), lo = fmin(fmin(n.passed_over, n.found ? n.bounds.lo : n.upper), hi);
         *out = (ebpo_distance_result){ NAN, lo, hi, { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
+        look_ahead(c, p, hi);
         return EBPO_OK;
     }
     ebpo_nearest_end(&n, o->max_distance, out);
+    look_ahead(c, p, out->face == EBPO_NO_FACE ? o->max_distance : out->distance);
     if (out->face == EBPO_NO_FACE)
         return EBPO_OK;
-    if (ebpo_looks_ahead(c->model))
-        ebpo_context_look_ahead(c, p, out->distance);
     c->warm = true;
     c->warm_face = n.file_face;
     c->warm_told = n.told_face;

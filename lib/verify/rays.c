@@ -116,11 +116,12 @@ static ebpo_status follow(void *context, uint64_t begin, uint64_t end, unsigned 
     const columns *c = context;
     (void)worker;
     (void)error;
+    uint64_t rows = 0; /* jumps */
     for (uint64_t f = begin; f < end; f++) {
         ebpo_corners face;
         ebpo_face_corners(c->mesh, f, &face);
         column_range r = columns_of_face(c, &face);
-        for (uint64_t z = r.from[1]; z <= r.to[1]; z++) /* the columns of a row stand side by side */
+        for (uint64_t z = r.from[1]; z <= r.to[1]; z++, ebpo_workspace_settle_often(c->mesh->workspace, ++rows)) /* the columns of a row stand side by side */
             look(c, &face, c->first[z * c->side + r.from[0]], c->first[z * c->side + r.to[0] + 1]);
     }
     ebpo_workspace_settle(c->mesh->workspace);

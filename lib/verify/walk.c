@@ -16,7 +16,7 @@
 #include "verify/lists.h"
 #include "verify/winding.h"
 
-enum { FACE_GRAIN = 4096, SUBTREE_FACES = 1024, SUBTREES_WANTED = 64 };
+enum { FACE_GRAIN = 4096, SUBTREE_FACES = 1024, SUBTREE_FACES_MOST = 1 << 18, SUBTREES_WANTED = 64 };
 
 /* Face numbers on a stack: a node's faces, then its child's, and so on down; and for each which children it touches. */
 typedef struct face_stack {
@@ -351,7 +351,8 @@ static ebpo_status prepare(walk *w, ebpo_error *error)
     if (!w->workers)
         return ebpo_fail_memory(error, w->threads * sizeof *w->workers);
     uint64_t faces = w->view->has_mesh ? w->view->tree->mesh.face_count : 0;
-    w->subtree_limit = faces / SUBTREES_WANTED > SUBTREE_FACES ? faces / SUBTREES_WANTED : SUBTREE_FACES;
+    uint64_t share = faces / SUBTREES_WANTED; /* each thread holds the faces on the way down: 15 B for each of a subtree */
+    w->subtree_limit = share < SUBTREE_FACES ? SUBTREE_FACES : share > SUBTREE_FACES_MOST ? SUBTREE_FACES_MOST : share;
     w->rays = faces > 0 && w->view->tree->info.solid && !w->view->tree->info.pruned; /* rays need all faces */
     for (unsigned i = 0; i < w->threads; i++)
         w->workers[i].points.workspace = w->options->workspace;
