@@ -12,6 +12,7 @@
 #include <ebpo/build.h>
 
 #include "base/workspace.h"
+#include "container/rule.h"
 #include "geom/cell.h"
 #include "mesh/mesh.h"
 #include "planes/planes.h"
@@ -130,7 +131,6 @@ ebpo_status ebpo_build_mesh(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, eb
 
 /* labels.c */
 ebpo_status ebpo_build_labels(ebpo_builder *b, ebpo_error *error);
-bool ebpo_rule_inside(ebpo_rule rule, int32_t winding);
 /* Winding number at corner 0 of each child minus that of the parent's, from the children's corner differences. Crossings along any way
  * between two corners agree when the mesh balances: false when they do not. */
 bool ebpo_child_offsets(const int32_t *child_delta[8], int32_t offset[8]);

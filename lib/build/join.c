@@ -6,7 +6,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "build/builder.h"
-#include "build/slices.h"
+#include "build/level_arrays.h"
 #include "build/top.h"
 
 typedef struct joiner {
@@ -88,19 +88,19 @@ static bool walk(joiner *j, uint32_t index, ebpo_cell cell, int32_t winding)
 }
 
 /* Arrays may share a count. */
-static void count_slices(const joiner *j, int level)
+static void count_arrays(const joiner *j, int level)
 {
-    for (size_t s = 0; s < EBPO_SLICES; s++) {
+    for (size_t s = 0; s < EBPO_LEVEL_ARRAYS; s++) {
         uint64_t total = 0;
         for (uint64_t i = 0; i < j->count; i++)
-            total += ebpo_slice_count(&j->stretch[i][level].level, &ebpo_slices[s]);
-        memcpy((char *)&j->level[level] + ebpo_slices[s].count, &total, sizeof total);
+            total += ebpo_count_of_level(&j->stretch[i][level].level, &ebpo_level_arrays[s]);
+        memcpy((char *)&j->level[level] + ebpo_level_arrays[s].count, &total, sizeof total);
     }
 }
 
-static bool join_slice(const joiner *j, int level, const ebpo_slice *s, ebpo_level *out)
+static bool join_slice(const joiner *j, int level, const ebpo_level_array *s, ebpo_level *out)
 {
-    uint64_t total = ebpo_slice_count(out, s);
+    uint64_t total = ebpo_count_of_level(out, s);
     if (!total)
         return true;
     char *to = ebpo_array_alloc(j->b->workspace, total, s->size);
@@ -109,8 +109,8 @@ static bool join_slice(const joiner *j, int level, const ebpo_slice *s, ebpo_lev
     memcpy((char *)out + s->array, &to, sizeof to);
     for (uint64_t i = 0; i < j->count; i++) {
         ebpo_level *from = &j->stretch[i][level].level;
-        void *array = ebpo_slice_array(from, s), *none = NULL;
-        size_t bytes = (size_t)(ebpo_slice_count(from, s) * s->size);
+        void *array = ebpo_array_of_level(from, s), *none = NULL;
+        size_t bytes = (size_t)(ebpo_count_of_level(from, s) * s->size);
         if (array)
             memcpy(to, array, bytes);
         to += bytes;
@@ -227,12 +227,12 @@ static void leave_out(const ebpo_builder *b, ebpo_level *l)
     l->ref_count = l->new_count = 0;
 }
 
-static ebpo_status join_slices(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status join_arrays(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
 {
     joiner *j = context;
     (void)worker;
     for (uint64_t i = begin; i < end; i++)
-        if (!join_slice(j, (int)(i / EBPO_SLICES), &ebpo_slices[i % EBPO_SLICES], &j->level[i / EBPO_SLICES]))
+        if (!join_slice(j, (int)(i / EBPO_LEVEL_ARRAYS), &ebpo_level_arrays[i % EBPO_LEVEL_ARRAYS], &j->level[i / EBPO_LEVEL_ARRAYS]))
             return no_memory(j->b, error);
     return EBPO_OK;
 }
@@ -274,13 +274,13 @@ ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error
     ebpo_status status = root_group(&j) && walk(&j, 0, b->top.cell, 0) ? EBPO_OK : no_memory(b, error);
     uint64_t refs = 0, all = 0;
     for (int level = 0; level < EBPO_LEVELS_MAX && status == EBPO_OK; level++) {
-        count_slices(&j, level);
+        count_arrays(&j, level);
         all += out->level[level].ref_count;
     }
     ebpo_pass pass = { &b->options->progress, 0, all, 2 * all };
     ebpo_progress progress = ebpo_pass_progress(&pass);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(b->threads, EBPO_LEVELS_MAX * EBPO_SLICES, 1, join_slices, &j, &progress, stage, error);
+        status = ebpo_parallel_for(b->threads, EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS, 1, join_arrays, &j, &progress, stage, error);
     for (int level = 0; level < EBPO_LEVELS_MAX && status == EBPO_OK; level++) {
         uint64_t own = out->level[level].ref_count;
         status = finish_level(&j, level, refs, all, error);

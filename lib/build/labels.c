@@ -4,16 +4,6 @@
 #include "base/error.h"
 #include "build/builder.h"
 
-bool ebpo_rule_inside(ebpo_rule rule, int32_t winding)
-{
-    switch (rule) {
-    case EBPO_RULE_NONZERO: return winding != 0;
-    case EBPO_RULE_EVENODD: return winding & 1;
-    case EBPO_RULE_POSITIVE: return winding > 0;
-    }
-    return false;
-}
-
 bool ebpo_child_offsets(const int32_t *child_delta[8], int32_t offset[8])
 {
     offset[0] = 0;

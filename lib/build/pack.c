@@ -5,7 +5,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "build/slices.h"
+#include "build/level_arrays.h"
 
 enum { STORE_BYTES = 16 << 20, ALIGNMENT = 8 };
 
@@ -67,23 +67,23 @@ ebpo_status ebpo_build_pack(ebpo_builder *b, ebpo_out *out, ebpo_error *error)
     if (!b->workspace)
         return EBPO_OK;
     for (int level = 0; level < EBPO_LEVELS_MAX; level++)
-        for (int s = 0; s < EBPO_SLICES; s++)
-            bytes += room_for(ebpo_slice_count(&out[level].level, &ebpo_slices[s]), ebpo_slices[s].size);
+        for (int s = 0; s < EBPO_LEVEL_ARRAYS; s++)
+            bytes += room_for(ebpo_count_of_level(&out[level].level, &ebpo_level_arrays[s]), ebpo_level_arrays[s].size);
     char *to = ebpo_store_room(b, bytes);
     if (!to)
         return ebpo_workspace_fail(b->workspace, bytes, error);
     for (int level = 0; level < EBPO_LEVELS_MAX; level++) {
-        for (int s = 0; s < EBPO_SLICES; s++) {
+        for (int s = 0; s < EBPO_LEVEL_ARRAYS; s++) {
             ebpo_level *l = &out[level].level;
-            void *array = ebpo_slice_array(l, &ebpo_slices[s]), *here = to;
-            uint64_t count = ebpo_slice_count(l, &ebpo_slices[s]);
+            void *array = ebpo_array_of_level(l, &ebpo_level_arrays[s]), *here = to;
+            uint64_t count = ebpo_count_of_level(l, &ebpo_level_arrays[s]);
             if (array && count)
-                memcpy(to, array, (size_t)count * ebpo_slices[s].size);
+                memcpy(to, array, (size_t)count * ebpo_level_arrays[s].size);
             free(array);
             if (!array || !count)
                 here = NULL;
-            memcpy((char *)l + ebpo_slices[s].array, &here, sizeof here);
-            to += room_for(count, ebpo_slices[s].size);
+            memcpy((char *)l + ebpo_level_arrays[s].array, &here, sizeof here);
+            to += room_for(count, ebpo_level_arrays[s].size);
         }
         out[level].packed = true;
     }

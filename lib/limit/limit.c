@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
+#include "container/rule.h"
 #include "limit/hull.h"
 #include "lod/model.h"
 
@@ -176,7 +177,7 @@ static bool add_corners(const job *j, scratch *s, const wanted *w)
     if (!ebpo_grow(&s->points, &s->points_room, s->point_count + 8, 3 * sizeof *s->points))
         return false;
     for (int i = 0; i < 8; i++)
-        if (ebpo_lod_rule_inside(m->info->rule, lowest + delta[i])) {
+        if (ebpo_rule_inside(m->info->rule, lowest + delta[i])) {
             double *p = s->points + 3 * s->point_count++;
             p[0] = i & 1, p[1] = i >> 1 & 1, p[2] = i >> 2 & 1;
         }

@@ -3,17 +3,8 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "container/rule.h"
 #include "lod/model.h"
-
-bool ebpo_lod_rule_inside(ebpo_rule rule, int32_t winding)
-{
-    switch (rule) {
-    case EBPO_RULE_EVENODD: return winding & 1;
-    case EBPO_RULE_POSITIVE: return winding > 0;
-    case EBPO_RULE_NONZERO:
-    default: return winding != 0;
-    }
-}
 
 static bool take_face(const ebpo_mesh *mesh, uint64_t face, ebpo_triangle *out)
 {
@@ -63,7 +54,7 @@ static unsigned inside_corners(const ebpo_lod_model *model, ebpo_cell cell, uint
     ebpo_corner_windings(&model->box, cell, faces, count, delta);
     unsigned inside = 0;
     for (unsigned i = 0; i < 8; i++)
-        inside |= (unsigned)ebpo_lod_rule_inside(model->info->rule, winding[leaf] + delta[i]) << i;
+        inside |= (unsigned)ebpo_rule_inside(model->info->rule, winding[leaf] + delta[i]) << i;
     return inside;
 }
 

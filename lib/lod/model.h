@@ -51,6 +51,5 @@ EBPO_MUST_USE ebpo_status ebpo_lod_leaf_planes(const ebpo_lod_model *model, ebpo
                                                uint32_t codes[EBPO_PLANES_MAX], int *plane_count, ebpo_error *error);
 
 /* Whether points of this winding number are in the solid. */
-bool ebpo_lod_rule_inside(ebpo_rule rule, int32_t winding);
 
 #endif

@@ -6,6 +6,7 @@
 #include <pthread.h>
 
 #include "cache/cache.h"
+#include "container/rule.h"
 #include "container/slice.h"
 #include "query/kernels.h"
 #include "query/top.h"
@@ -45,11 +46,6 @@ struct ebpo_context {
     double warm_triangle[3][3];
     uint64_t warm_face, warm_told; /* its number in the file, and the one that callers are told */
 };
-
-static inline bool ebpo_rule_inside(ebpo_rule rule, int32_t winding)
-{
-    return rule == EBPO_RULE_EVENODD ? winding & 1 : rule == EBPO_RULE_POSITIVE ? winding > 0 : winding != 0;
-}
 
 static inline ebpo_box ebpo_model_box(const ebpo_model *m)
 {
