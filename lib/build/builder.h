@@ -131,13 +131,10 @@ ebpo_status ebpo_build_mesh(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, eb
 
 /* labels.c */
 ebpo_status ebpo_build_labels(ebpo_builder *b, ebpo_error *error);
-/* Winding number at corner 0 of each child minus that of the parent's, from the children's corner differences. Crossings along any way
- * between two corners agree when the mesh balances: false when they do not. */
-bool ebpo_child_offsets(const int32_t *child_delta[8], int32_t offset[8]);
-/* A gray node's own corner differences from its children's. */
-bool ebpo_gather_delta(const int32_t *child_delta[8], int32_t delta[8]);
-/* The corner differences of the eight children; those of empty ones are zero. */
-void ebpo_child_deltas(const ebpo_builder *b, const ebpo_branch *s, uint32_t child, const int32_t *child_delta[8]);
+/* Winding number at corner 0 of each child minus that of the parent's, from the children's corner differences. */
+void ebpo_child_windings(const ebpo_builder *b, const ebpo_branch *s, uint32_t child, int32_t offset[8]);
+/* A gray node's own corner differences from its children's. Crossings along any way between two corners agree when the mesh balances: false when they do not. */
+bool ebpo_gather_delta(const ebpo_builder *b, const ebpo_branch *s, uint32_t child, int32_t delta[8]);
 
 /* candidates.c */
 int ebpo_build_candidates(const ebpo_builder *b, const ebpo_branch *s, const ebpo_build_detail *detail, int most,

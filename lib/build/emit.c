@@ -212,10 +212,8 @@ static bool emit_gray(emitter *e, const ebpo_build_node *node, ebpo_cell cell, i
     if (planes < 0 || !ebpo_emit_gray(&e->s->out[cell.level], codes, planes,
                                       ebpo_polytope_volume(envelope) * ebpo_cell_volume(b, cell.level)))
         return false;
-    const int32_t *child_delta[8];
     int32_t offset[8];
-    ebpo_child_deltas(b, e->s, node->child, child_delta);
-    ebpo_child_offsets(child_delta, offset);
+    ebpo_child_windings(b, e->s, node->child, offset);
     uint16_t types = 0;
     for (uint32_t o = 0; o < 8; o++) {
         unsigned type = e->s->nodes[node->child + o].type;

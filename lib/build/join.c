@@ -72,10 +72,8 @@ static bool walk(joiner *j, uint32_t index, ebpo_cell cell, int32_t winding)
     if (node.type == EBPO_WHITE)
         return ebpo_emit_empty(&out[cell.level], b->solid && ebpo_rule_inside(b->options->rule, winding), winding);
     const ebpo_top_envelope *t = &b->top_envelope[node.detail];
-    const int32_t *child_delta[8];
     int32_t offset[8];
-    ebpo_child_deltas(b, &b->top, node.child, child_delta);
-    ebpo_child_offsets(child_delta, offset);
+    ebpo_child_windings(b, &b->top, node.child, offset);
     uint16_t types = 0;
     for (uint32_t o = 0; o < 8; o++)
         types |= (uint16_t)(type_of(b, &b->top.nodes[node.child + o], winding + offset[o]) << 2 * o);

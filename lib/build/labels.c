@@ -4,7 +4,8 @@
 #include "base/error.h"
 #include "build/builder.h"
 
-bool ebpo_child_offsets(const int32_t *child_delta[8], int32_t offset[8])
+/* False when crossings along two ways to a corner do not agree. */
+static bool child_offsets(const int32_t *child_delta[8], int32_t offset[8])
 {
     offset[0] = 0;
     bool agree = true;
@@ -23,16 +24,8 @@ bool ebpo_child_offsets(const int32_t *child_delta[8], int32_t offset[8])
     return agree;
 }
 
-bool ebpo_gather_delta(const int32_t *child_delta[8], int32_t delta[8])
-{
-    int32_t offset[8];
-    bool agree = ebpo_child_offsets(child_delta, offset);
-    for (int i = 0; i < 8; i++)
-        delta[i] = offset[i] + child_delta[i][i];
-    return agree;
-}
-
-void ebpo_child_deltas(const ebpo_builder *b, const ebpo_branch *s, uint32_t child, const int32_t *child_delta[8])
+/* The corner differences of the eight children; those of empty ones are zero. */
+static void child_deltas(const ebpo_builder *b, const ebpo_branch *s, uint32_t child, const int32_t *child_delta[8])
 {
     static const int32_t none[8];
     for (uint32_t o = 0; o < 8; o++) {
@@ -46,6 +39,24 @@ void ebpo_child_deltas(const ebpo_builder *b, const ebpo_branch *s, uint32_t chi
     }
 }
 
+void ebpo_child_windings(const ebpo_builder *b, const ebpo_branch *s, uint32_t child, int32_t offset[8])
+{
+    const int32_t *child_delta[8];
+    child_deltas(b, s, child, child_delta);
+    child_offsets(child_delta, offset);
+}
+
+bool ebpo_gather_delta(const ebpo_builder *b, const ebpo_branch *s, uint32_t child, int32_t delta[8])
+{
+    const int32_t *child_delta[8];
+    int32_t offset[8];
+    child_deltas(b, s, child, child_delta);
+    bool agree = child_offsets(child_delta, offset);
+    for (int i = 0; i < 8; i++)
+        delta[i] = offset[i] + child_delta[i][i];
+    return agree;
+}
+
 static bool top_deltas(ebpo_builder *b, uint32_t index)
 {
     ebpo_branch *s = &b->top;
@@ -55,9 +66,7 @@ static bool top_deltas(ebpo_builder *b, uint32_t index)
     bool agree = true;
     for (uint32_t o = 0; o < 8; o++)
         agree = top_deltas(b, node->child + o) && agree;
-    const int32_t *child_delta[8];
-    ebpo_child_deltas(b, s, node->child, child_delta);
-    return ebpo_gather_delta(child_delta, s->details[node->detail].delta) && agree;
+    return ebpo_gather_delta(b, s, node->child, s->details[node->detail].delta) && agree;
 }
 
 ebpo_status ebpo_build_labels(ebpo_builder *b, ebpo_error *error)

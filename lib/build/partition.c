@@ -279,15 +279,8 @@ static ebpo_status grow(grower *g, uint32_t index, ebpo_cell cell, uint64_t at, 
     if (status != EBPO_OK)
         return status;
     d.entry_end = s->entry_count;
-    if (g->b->solid) {
-        const int32_t *child_delta[8];
-        static const int32_t none[8];
-        for (unsigned o = 0; o < 8; o++) {
-            const ebpo_build_node *n = &s->nodes[child + o];
-            child_delta[o] = n->type == EBPO_WHITE ? none : s->details[n->detail].delta;
-        }
-        ebpo_gather_delta(child_delta, d.delta);
-    }
+    if (g->b->solid)
+        ebpo_gather_delta(g->b, s, child, d.delta);
     s->details[detail] = d;
     return collapse_if_few(g, index, cell, at, count);
 }

@@ -268,12 +268,10 @@ static bool propose(proposer *p, uint32_t index, ebpo_cell cell, int32_t winding
         return propose_leaf(p, node.detail, cell, winding, out);
     if (node.type != EBPO_GRAY)
         return true;
-    const int32_t *child_delta[8];
     int32_t offset[8];
     ebpo_handover given = { 0 };
     bool good = true;
-    ebpo_child_deltas(p->b, p->s, node.child, child_delta);
-    ebpo_child_offsets(child_delta, offset);
+    ebpo_child_windings(p->b, p->s, node.child, offset);
     for (unsigned o = 0; o < 8 && good; o++) {
         ebpo_handover child = { 0 };
         good = propose(p, node.child + o, ebpo_child_cell(cell, o), winding + offset[o], &child) && gather(&given, &child, o);
@@ -382,10 +380,8 @@ static bool list_top(top_list *t)
     t->nodes[t->count++] = (top_node){ .cell = b->top.cell, .parent = UINT64_MAX };
     for (uint64_t i = 0; i < t->count; i++) {
         const ebpo_build_node *node = &b->top.nodes[t->nodes[i].node];
-        const int32_t *child_delta[8];
         int32_t offset[8];
-        ebpo_child_deltas(b, &b->top, node->child, child_delta);
-        ebpo_child_offsets(child_delta, offset);
+        ebpo_child_windings(b, &b->top, node->child, offset);
         for (uint32_t o = 0; o < 8; o++) {
             const ebpo_build_node *child = &b->top.nodes[node->child + o];
             int32_t winding = t->nodes[i].winding + offset[o];

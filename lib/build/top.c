@@ -51,10 +51,8 @@ static ebpo_status wave_envelopes(void *context, uint64_t begin, uint64_t end, u
 static bool hand_down(ebpo_builder *b, const pending *p, wave *next)
 {
     const ebpo_build_node *node = &b->top.nodes[p->node];
-    const int32_t *child_delta[8];
     int32_t offset[8];
-    ebpo_child_deltas(b, &b->top, node->child, child_delta);
-    ebpo_child_offsets(child_delta, offset);
+    ebpo_child_windings(b, &b->top, node->child, offset);
     for (uint32_t o = 0; o < 8; o++) {
         const ebpo_build_node *child = &b->top.nodes[node->child + o];
         if (child->type == EBPO_WHITE)
