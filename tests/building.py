@@ -52,10 +52,14 @@ class Place:
         return [TOOL, "convert", *options, "--temp-dir", self.temp_dir, *more, model, self.out]
 
 
+def usual_signals():
+    for number in signal.SIGINT, signal.SIGTERM, signal.SIGHUP:  # nohup and background jobs hand down that these are ignored
+        signal.signal(number, signal.SIG_DFL)
+
+
 def limits(file_bytes=None):
     def apply():
-        for number in signal.SIGINT, signal.SIGTERM, signal.SIGHUP:  # nohup and background jobs hand down that these are ignored
-            signal.signal(number, signal.SIG_DFL)
+        usual_signals()
         if file_bytes:
             resource.setrlimit(resource.RLIMIT_FSIZE, (file_bytes, file_bytes))
     return apply
@@ -144,7 +148,7 @@ def run_until(command, stage, number):
     """Runs on a terminal, sends the signal once the stage is shown; how it ended and whether the stage was seen."""
     pid, terminal = pty.fork()
     if pid == 0:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        usual_signals()
         os.execv(command[0], command)
     text, seen = b"", False
     while True:
@@ -161,6 +165,13 @@ def run_until(command, stage, number):
             os.kill(pid, number)
     os.close(terminal)
     return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]), seen
+
+
+def one_cell(root, model):
+    """Cells that may not be cut are worked on in memory: half of the budget must do."""
+    place = Place(root, "one cell")
+    code, said, _, _ = run(place.command(model, "-q", "--memory", "128M", options=["--max-level", "0"]), place.temp_dir)
+    check(code == 1 and "a cell of level 0, the deepest that was allowed, lists " in said and "allow more levels or more memory" in said and not place.left(), f"one cell: {said.strip()} ({code}, {place.left()})")
 
 
 def interrupted(root, model):
@@ -236,6 +247,7 @@ def main():
         same_bytes_and_bounded_memory(root, model)
         generate(model, FEWER_FACES)
         same_bytes_as_usual(root, model)
+        one_cell(root, model)
         interrupted(root, model)
         files_with_names(root, model)
         full_disk(root, model)

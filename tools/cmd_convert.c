@@ -284,7 +284,9 @@ static int run(int argc, char **argv)
         return usage_error("--max-error and --target-size measure against the mesh; leave it out with --profile lod instead of --without mesh");
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_workspace *workspace = NULL;
-    ebpo_status status = memory_make(&workspace, &v.memory, &error);
+    ebpo_status status = ebpo_check_output(out, &error);
+    if (status == EBPO_OK)
+        status = memory_make(&workspace, &v.memory, &error);
     if (status != EBPO_OK)
         return command_failed("convert", &error);
     progress_line line;

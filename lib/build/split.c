@@ -269,10 +269,32 @@ static ebpo_status corners_of_pieces(void *context, uint64_t begin, uint64_t end
     return EBPO_OK;
 }
 
+/* A piece is worked on in a thread's own memory, and cells of the deepest level that is allowed are not cut, whatever they list: as many threads as half of the budget has room for. */
+static ebpo_status fit_largest_piece(ebpo_builder *b, ebpo_error *error)
+{
+    enum { BYTES_A_FACE = 110 }; /* measured: one piece of 28 million faces */
+    ebpo_workspace_figures figures = { .memory = 0 };
+    uint64_t most = 1;
+    if (b->workspace)
+        ebpo_workspace_tell(b->workspace, &figures);
+    if (figures.memory < EBPO_WORKSPACE_LEAST)
+        return EBPO_OK; /* none, or a test's */
+    for (uint64_t i = 0; i < b->sub_count; i++)
+        most = b->sub[i].list_count > most ? b->sub[i].list_count : most;
+    uint64_t fit = figures.memory / 2 / BYTES_A_FACE / most;
+    if (fit < 1)
+        return ebpo_fail(error, EBPO_E_LIMIT, "a cell of level %d, the deepest that was allowed, lists %llu faces, for which half of the memory budget of %llu bytes is too little; allow more levels or more memory",
+                         b->max_level, (unsigned long long)most, (unsigned long long)figures.memory);
+    b->threads = b->threads < fit ? b->threads : (unsigned)fit;
+    return EBPO_OK;
+}
+
 ebpo_status ebpo_build_split(ebpo_builder *b, ebpo_error *error)
 {
     b->top.cell = (ebpo_cell){ 0, { 0, 0, 0 } };
     ebpo_status status = cut(b, error);
+    if (status == EBPO_OK)
+        status = fit_largest_piece(b, error);
     b->number = ebpo_array_alloc(b->workspace, b->face_count, sizeof *b->number);
     if (status == EBPO_OK && !b->number)
         status = no_memory(b, error);

@@ -2,6 +2,8 @@
 
 #include <pthread.h>
 #include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include "base/error.h"
 #include "h5/h5.h"
@@ -23,22 +25,26 @@ void ebpo_h5_leave(ebpo_h5_scope *scope)
     pthread_mutex_unlock(&library);
 }
 
+enum { CAUSE_BYTES = 8192, CAUSE_SHOWN = 160 }; /* libhdf5 tells the path first, the number of the error behind it */
+
 static herr_t take_first(unsigned depth, const H5E_error2_t *entry, void *data)
 {
     (void)depth;
     if (entry->desc)
-        snprintf(data, 160, "%s", entry->desc);
+        snprintf(data, CAUSE_BYTES, "%s", entry->desc);
     return 1; /* the innermost is enough */
 }
 
 ebpo_status ebpo_h5_fail(ebpo_error *error, ebpo_status status, const char *shown, const char *object, const char *what)
 {
-    char cause[160] = "";
+    char cause[CAUSE_BYTES] = "";
     H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take_first, cause);
     H5Eclear2(H5E_DEFAULT);
-    const char *colon = *object ? ": " : "";
+    const char *colon = *object ? ": " : "", *number = strstr(cause, "errno = ");
+    if (number && atoi(number + 8) > 0)
+        return ebpo_fail(error, status, "%s%s%s: %s: %s", shown, colon, object, what, strerror(atoi(number + 8)));
     if (*cause)
-        return ebpo_fail(error, status, "%s%s%s: %s (libhdf5: %s)", shown, colon, object, what, cause);
+        return ebpo_fail(error, status, "%s%s%s: %s (libhdf5: %.*s)", shown, colon, object, what, CAUSE_SHOWN, cause);
     return ebpo_fail(error, status, "%s%s%s: %s", shown, colon, object, what);
 }
 

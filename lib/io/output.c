@@ -20,6 +20,14 @@ ebpo_status ebpo_write_file(const char *path, const void *data, size_t size, ebp
     return status;
 }
 
+ebpo_status ebpo_check_output(const char *path, ebpo_error *error)
+{
+    ebpo_publish out;
+    ebpo_status status = ebpo_publish_begin(&out, path, error);
+    ebpo_publish_abort(&out);
+    return status;
+}
+
 void ebpo_abandon_outputs(void)
 {
     ebpo_publish_abandon_all();

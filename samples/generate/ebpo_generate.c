@@ -27,7 +27,7 @@ static const char usage[] =
     "  --roughness R             height of the fine relief in local edge lengths, 0 to 0.5 (default 0.15)\n"
     "  --relief H                height of the broad relief of sphere (radius 1) and torus (tube 0.4), 0 to 0.2 (default 0.08)\n"
     "The output is a closed manifold where the base is one. Sphere and torus never meet themselves: that is proved for each file\n"
-    "before it is written. A file's shape may, where the base does or where its walls are thinner than the relief; tests/crossing_faces looks.\n";
+    "before it is written. A file's shape may, where the base does or where its walls are closer than the roughness; tests/crossing_faces looks.\n";
 
 static bool parse_count(const char *name, const char *text, uint64_t most, uint64_t *out)
 {

@@ -70,6 +70,9 @@ typedef struct ebpo_progress {
 /* Writes `size` bytes as one file, which appears whole or not at all (temporary name, fsync, rename); an existing regular file is replaced. */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_write_file(const char *path, const void *data, size_t size, ebpo_error *error);
 
+/* EBPO_E_IO when an output could not even be begun at `path` now: a folder that is not there or cannot be written to, a path that is a folder or a device. For asking before hours of work. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_check_output(const char *path, ebpo_error *error);
+
 /* Removes the temporary files of all outputs that this process is writing; they cannot be finished afterwards. Only calls unlink: made for
  * signal handlers, just before the process ends. */
 EBPO_API void ebpo_abandon_outputs(void);

@@ -31,7 +31,7 @@ typedef struct ebpo_verify_options {
     uint64_t label_samples;   /* cells whose labels are checked by an independent winding number; 0: all of up to 2^22, 2^20 of more, but 4096
                                * where that would take more than some seconds (4e8 looks at a point); at least one of each level and type */
     ebpo_progress progress;
-    ebpo_workspace *workspace; /* what the work keeps to, in memory and temporary files; NULL: as much memory as it takes. Outlives the file */
+    ebpo_workspace *workspace; /* what the work keeps to, in memory and temporary files; NULL: as much memory as it takes. Freed after the last call that is given the file (ebpo_file_set_workspace) */
 } ebpo_verify_options;
 #define EBPO_VERIFY_OPTIONS_INIT { NULL, 0, 0, { NULL, NULL }, NULL }
 
