@@ -454,12 +454,22 @@ void ebpo_array_free(void *at)
         free_block(b);
 }
 
+enum { STEP = 4 << 20 };
+
 void ebpo_array_fill(ebpo_workspace *workspace, void *array, int byte, uint64_t bytes)
 {
-    enum { STEP = 4 << 20 };
     for (uint64_t at = 0; at < bytes; at += STEP) {
         memset((char *)array + at, byte, bytes - at < STEP ? (size_t)(bytes - at) : STEP);
         ebpo_workspace_settle(workspace);
+    }
+}
+
+void ebpo_array_copy(ebpo_workspace *workspace, void *to, const void *from, uint64_t bytes)
+{
+    for (uint64_t at = 0; at < bytes; at += STEP) {
+        memcpy((char *)to + at, (const char *)from + at, bytes - at < STEP ? (size_t)(bytes - at) : STEP);
+        if (bytes > STEP)
+            ebpo_workspace_settle(workspace);
     }
 }
 
@@ -474,15 +484,20 @@ bool ebpo_array_grow(ebpo_workspace *workspace, void *array, uint64_t *capacity,
     if (!bigger)
         return false;
     memcpy(&old, array, sizeof old);
-    enum { STEP = 4 << 20 };
-    for (size_t at = 0, bytes = old ? (size_t)*capacity * size : 0; at < bytes; at += STEP) {
-        memcpy((char *)bigger + at, (char *)old + at, bytes - at < STEP ? bytes - at : STEP);
-        ebpo_workspace_settle(workspace);
-    }
+    if (old)
+        ebpo_array_copy(workspace, bigger, old, *capacity * size);
     ebpo_array_free(old);
     memcpy(array, &bigger, sizeof bigger);
     *capacity = wanted;
     return true;
+}
+
+bool ebpo_array_grow_late(ebpo_workspace *workspace, void *array, uint64_t *capacity, uint64_t need, size_t size)
+{
+    enum { LATE = 1 << 20 };
+    if (need <= *capacity)
+        return true;
+    return workspace && need > LATE / size ? ebpo_array_grow(workspace, array, capacity, need, size) : ebpo_grow(array, capacity, need, size);
 }
 
 ebpo_status ebpo_workspace_fail(const ebpo_workspace *workspace, uint64_t bytes, ebpo_error *error)

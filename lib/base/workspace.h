@@ -14,6 +14,8 @@ void *ebpo_array_alloc(ebpo_workspace *workspace, uint64_t count, size_t size);
 void *ebpo_array_zero(ebpo_workspace *workspace, uint64_t count, size_t size);
 /* Like ebpo_grow, for arrays of this kind. */
 bool ebpo_array_grow(ebpo_workspace *workspace, void *array, uint64_t *capacity, uint64_t need, size_t size);
+/* ebpo_grow while the array is small, as nearly all of a kind are, and the above once it is large. */
+bool ebpo_array_grow_late(ebpo_workspace *workspace, void *array, uint64_t *capacity, uint64_t need, size_t size);
 void ebpo_array_free(void *block); /* NULL is fine */
 
 /* Why the last allocation of this size failed: EBPO_E_MEMORY, or EBPO_E_IO with the folder. */
@@ -34,7 +36,7 @@ static inline void ebpo_workspace_settle_at(ebpo_workspace *workspace, uint64_t 
 /* And within one that jumps about: each jump may bring in 16 pages. */
 static inline void ebpo_workspace_settle_often(ebpo_workspace *workspace, uint64_t i)
 {
-    if (workspace && (i & 0xff) == 0)
+    if (workspace && (i & 0x7f) == 0)
         ebpo_workspace_settle(workspace);
 }
 
@@ -46,7 +48,8 @@ static inline void ebpo_settle_all_at(uint64_t i)
         ebpo_settle_all();
 }
 
-/* memset for arrays. */
+/* memcpy and memset for arrays. */
+void ebpo_array_copy(ebpo_workspace *workspace, void *to, const void *from, uint64_t bytes);
 void ebpo_array_fill(ebpo_workspace *workspace, void *array, int byte, uint64_t bytes);
 
 /* Removes the file that is being made just now, if it has a name: for signal handlers, just before the process ends. */

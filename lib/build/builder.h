@@ -37,7 +37,8 @@ typedef struct ebpo_build_detail {
 /* A stretch of one level's arrays under construction. */
 typedef struct ebpo_out {
     ebpo_level level;
-    bool packed; /* its arrays are in the builder's store */
+    ebpo_workspace *workspace; /* for large arrays */
+    bool packed;               /* its arrays are in the builder's store */
     uint64_t group_capacity, gray_capacity, plane_capacity, leaf_capacity[6], ref_capacity, black_capacity, white_capacity,
         leaf_plane_capacity;
 } ebpo_out;
@@ -110,8 +111,8 @@ ebpo_status ebpo_build_split(ebpo_builder *b, ebpo_error *error);
 
 /* partition.c: a piece's nodes and leaf lists */
 ebpo_status ebpo_build_partition(ebpo_builder *b, ebpo_branch *s, ebpo_error *error);
-bool ebpo_branch_detail(ebpo_branch *s, uint32_t *index);
-bool ebpo_branch_children(ebpo_branch *s, uint32_t *first);
+bool ebpo_branch_detail(const ebpo_builder *b, ebpo_branch *s, uint32_t *index);
+bool ebpo_branch_children(const ebpo_builder *b, ebpo_branch *s, uint32_t *first);
 bool ebpo_build_is_leaf(const ebpo_builder *b, int level, uint64_t count);
 /* EBPO_E_LIMIT when a mesh of so many faces has more leaves, or more faces listed in them, than it may. */
 ebpo_status ebpo_build_check_lists(uint64_t face_count, uint64_t leaves, uint64_t entries, ebpo_error *error);
@@ -133,6 +134,10 @@ ebpo_status ebpo_build_mesh(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, eb
 ebpo_status ebpo_build_labels(ebpo_builder *b, ebpo_error *error);
 /* Winding number at corner 0 of each child minus that of the parent's, from the children's corner differences. */
 void ebpo_child_windings(const ebpo_builder *b, const ebpo_branch *s, uint32_t child, int32_t offset[8]);
+/* The corner differences of a cell from the branch's faces that touch it: list[places[i]], or with NULL the first `count` of the list. Long lists are gone through by parts of EBPO_CORNER_FACES, the least of
+ * which and `count` is the room that is needed. */
+enum { EBPO_CORNER_FACES = 1 << 14 };
+void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell, const uint32_t *places, uint64_t count, ebpo_triangle *room, int32_t delta[8]);
 /* A gray node's own corner differences from its children's. Crossings along any way between two corners agree when the mesh balances: false when they do not. */
 bool ebpo_gather_delta(const ebpo_builder *b, const ebpo_branch *s, uint32_t child, int32_t delta[8]);
 

@@ -36,7 +36,7 @@ void ebpo_emit_scratch_free(ebpo_emit_scratch *scratch)
     if (!scratch)
         return;
     ebpo_scratch_free(scratch->envelope);
-    free(scratch->faces);
+    ebpo_array_free(scratch->faces);
     free(scratch);
 }
 
@@ -51,7 +51,7 @@ void ebpo_out_free(ebpo_out *out)
 bool ebpo_emit_group(ebpo_out *out, uint16_t types)
 {
     ebpo_level *l = &out->level;
-    if (!ebpo_grow(&l->types, &out->group_capacity, l->group_count + 1, sizeof *l->types))
+    if (!ebpo_array_grow_late(out->workspace, &l->types, &out->group_capacity, l->group_count + 1, sizeof *l->types))
         return false;
     l->types[l->group_count++] = types;
     return true;
@@ -60,8 +60,8 @@ bool ebpo_emit_group(ebpo_out *out, uint16_t types)
 bool ebpo_emit_gray(ebpo_out *out, const uint32_t *codes, int count, double volume)
 {
     ebpo_level *l = &out->level;
-    if (!ebpo_grow(&l->plane_counts, &out->gray_capacity, l->gray_count + 1, 1) ||
-        !ebpo_grow(&l->planes, &out->plane_capacity, l->plane_count + (uint64_t)count, sizeof *l->planes))
+    if (!ebpo_array_grow_late(out->workspace, &l->plane_counts, &out->gray_capacity, l->gray_count + 1, 1) ||
+        !ebpo_array_grow_late(out->workspace, &l->planes, &out->plane_capacity, l->plane_count + (uint64_t)count, sizeof *l->planes))
         return false;
     l->plane_counts[l->gray_count++] = (uint8_t)count;
     if (count) /* the array may not be there yet */
@@ -76,7 +76,7 @@ bool ebpo_emit_empty(ebpo_out *out, bool black, int32_t winding)
     ebpo_level *l = &out->level;
     int32_t **array = black ? &l->black_winding : &l->white_winding;
     uint64_t *count = black ? &l->black_count : &l->white_count;
-    if (!ebpo_grow(array, black ? &out->black_capacity : &out->white_capacity, *count + 1, sizeof **array))
+    if (!ebpo_array_grow_late(out->workspace, array, black ? &out->black_capacity : &out->white_capacity, *count + 1, sizeof **array))
         return false;
     (*array)[(*count)++] = winding;
     return true;
@@ -86,12 +86,12 @@ static bool grow_leaf_arrays(ebpo_out *out, uint64_t refs)
 {
     ebpo_level *l = &out->level;
     uint64_t n = l->leaf_count + 1, *c = out->leaf_capacity;
-    return ebpo_grow(&l->leaf_winding, &c[0], n, sizeof *l->leaf_winding) &&
-           ebpo_grow(&l->leaf_first, &c[1], n, sizeof *l->leaf_first) &&
-           ebpo_grow(&l->leaf_new, &c[2], n, sizeof *l->leaf_new) &&
-           ebpo_grow(&l->leaf_ref_count, &c[3], n, sizeof *l->leaf_ref_count) &&
-           ebpo_grow(&l->leaf_plane_counts, &c[4], n, sizeof *l->leaf_plane_counts) &&
-           ebpo_grow(&l->leaf_refs, &out->ref_capacity, l->ref_count + refs, sizeof *l->leaf_refs);
+    return ebpo_array_grow_late(out->workspace, &l->leaf_winding, &c[0], n, sizeof *l->leaf_winding) &&
+           ebpo_array_grow_late(out->workspace, &l->leaf_first, &c[1], n, sizeof *l->leaf_first) &&
+           ebpo_array_grow_late(out->workspace, &l->leaf_new, &c[2], n, sizeof *l->leaf_new) &&
+           ebpo_array_grow_late(out->workspace, &l->leaf_ref_count, &c[3], n, sizeof *l->leaf_ref_count) &&
+           ebpo_array_grow_late(out->workspace, &l->leaf_plane_counts, &c[4], n, sizeof *l->leaf_plane_counts) &&
+           ebpo_array_grow_late(out->workspace, &l->leaf_refs, &out->ref_capacity, l->ref_count + refs, sizeof *l->leaf_refs);
 }
 
 static bool emit_list(const emitter *e, const ebpo_build_detail *d, ebpo_out *out, int32_t winding)
@@ -118,7 +118,7 @@ static bool gather_faces(emitter *e, const ebpo_build_detail *d)
 {
     ebpo_emit_scratch *scratch = e->scratch;
     uint64_t count = d->entry_end - d->entry_begin;
-    if (!ebpo_grow(&scratch->faces, &scratch->faces_capacity, count, sizeof *scratch->faces))
+    if (!ebpo_array_grow_late(e->b->workspace, &scratch->faces, &scratch->faces_capacity, count, sizeof *scratch->faces))
         return false;
     for (uint64_t i = 0; i < count; i++)
         ebpo_branch_triangle(e->b, e->s, e->s->entries[d->entry_begin + i], &scratch->faces[i]);
@@ -158,7 +158,7 @@ static bool emit_leaf(emitter *e, uint32_t detail, ebpo_cell cell, int32_t windi
     l->leaf_plane_counts[l->leaf_count++] = (uint8_t)planes;
     if (!stored)
         return true;
-    if (!ebpo_grow(&l->leaf_planes, &out->leaf_plane_capacity, l->leaf_plane_count + (uint64_t)planes, sizeof *l->leaf_planes))
+    if (!ebpo_array_grow_late(out->workspace, &l->leaf_planes, &out->leaf_plane_capacity, l->leaf_plane_count + (uint64_t)planes, sizeof *l->leaf_planes))
         return false;
     if (planes)
         memcpy(l->leaf_planes + l->leaf_plane_count, codes, (size_t)planes * sizeof *codes);
@@ -207,6 +207,7 @@ static bool emit_gray(emitter *e, const ebpo_build_node *node, ebpo_cell cell, i
     const ebpo_builder *b = e->b;
     uint32_t codes[EBPO_PLANES_STORED];
     int planes = 0;
+    ebpo_workspace_settle_often(b->workspace, e->s->out[cell.level].level.gray_count);
     if (b->options->parts & EBPO_PART_PLANES)
         planes = ebpo_gray_planes(b, e->scratch->envelope, e->s, node->detail, cell, winding, envelope, codes);
     if (planes < 0 || !ebpo_emit_gray(&e->s->out[cell.level], codes, planes,
@@ -240,6 +241,8 @@ ebpo_status ebpo_emit_piece(const ebpo_builder *b, ebpo_emit_scratch *scratch, e
 {
     emitter e = { b, s, scratch };
     s->out = ebpo_array_zero(b->workspace, EBPO_LEVELS_MAX, sizeof *s->out);
+    for (int level = 0; s->out && level < EBPO_LEVELS_MAX; level++)
+        s->out[level].workspace = b->workspace;
     if (!s->out || !emit(&e, 0, s->cell, s->winding, s->above))
         return ebpo_workspace_fail_while(b->workspace, "while computing envelopes", error);
     return EBPO_OK;

@@ -41,6 +41,8 @@ static ebpo_out *current(joiner *j)
         free(out);
         return NULL;
     }
+    for (int level = 0; level < EBPO_LEVELS_MAX; level++)
+        out[level].workspace = j->b->workspace;
     return j->current = out;
 }
 
@@ -110,10 +112,10 @@ static bool join_slice(const joiner *j, int level, const ebpo_level_array *s, eb
         void *array = ebpo_array_of_level(from, s), *none = NULL;
         size_t bytes = (size_t)(ebpo_count_of_level(from, s) * s->size);
         if (array)
-            memcpy(to, array, bytes);
+            ebpo_array_copy(j->b->workspace, to, array, bytes);
         to += bytes;
         if (!j->stretch[i][level].packed)
-            free(array);
+            ebpo_array_free(array);
         memcpy((char *)from + s->array, &none, sizeof none);
         ebpo_workspace_settle(j->b->workspace);
     }

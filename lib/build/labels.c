@@ -1,8 +1,26 @@
 /* Winding numbers at cell corners. A subtree's corner differences come from its own leaves alone; a walk from corner to corner along the
  * children's edges adds them up, and the root's lowest corner lies outside the model, where the winding number is 0.
  * Replaces the special cases of BP 2008, 3.4.1.1. */
+#include <string.h>
+
 #include "base/error.h"
 #include "build/builder.h"
+
+void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell, const uint32_t *places, uint64_t count, ebpo_triangle *room, int32_t delta[8])
+{
+    memset(delta, 0, 8 * sizeof *delta);
+    for (uint64_t first = 0; first < count; first += EBPO_CORNER_FACES) {
+        uint64_t part = count - first < EBPO_CORNER_FACES ? count - first : EBPO_CORNER_FACES;
+        int32_t own[8];
+        for (uint64_t i = 0; i < part; i++)
+            ebpo_branch_triangle(b, s, places ? places[first + i] : (uint32_t)(first + i), &room[i]);
+        ebpo_corner_windings(&b->box, cell, room, part, own);
+        for (int i = 0; i < 8; i++)
+            delta[i] += own[i];
+        if (part == EBPO_CORNER_FACES)
+            ebpo_workspace_settle(b->workspace);
+    }
+}
 
 /* False when crossings along two ways to a corner do not agree. */
 static bool child_offsets(const int32_t *child_delta[8], int32_t offset[8])

@@ -23,6 +23,7 @@ static void number_leaf(ebpo_builder *b, const ebpo_branch *s, ebpo_build_detail
 static void number_node(ebpo_builder *b, ebpo_branch *s, uint32_t index, uint32_t *next)
 {
     const ebpo_build_node *node = &s->nodes[index];
+    ebpo_workspace_settle_often(b->workspace, index);
     if (node->type == EBPO_LEAF)
         number_leaf(b, s, &s->details[node->detail], next);
     else if (node->type == EBPO_GRAY)

@@ -78,8 +78,8 @@ ebpo_status ebpo_build_pack(ebpo_builder *b, ebpo_out *out, ebpo_error *error)
             void *array = ebpo_array_of_level(l, &ebpo_level_arrays[s]), *here = to;
             uint64_t count = ebpo_count_of_level(l, &ebpo_level_arrays[s]);
             if (array && count)
-                memcpy(to, array, (size_t)count * ebpo_level_arrays[s].size);
-            free(array);
+                ebpo_array_copy(b->workspace, to, array, count * ebpo_level_arrays[s].size);
+            ebpo_array_free(array);
             if (!array || !count)
                 here = NULL;
             memcpy((char *)l + ebpo_level_arrays[s].array, &here, sizeof here);

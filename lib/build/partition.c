@@ -8,6 +8,8 @@
 #include "build/propose.h"
 #include "planes/octants.h"
 
+enum { SETTLE_FACES = 1 << 13 };
+
 /* A mesh with huge faces and a deep maximum level would list every face in millions of cells. */
 static const uint64_t leaves_per_face = 64, leaves_always = 1 << 22, entries_per_face = 512, entries_always = 1 << 26;
 
@@ -25,7 +27,7 @@ typedef struct grower {
     uint64_t stack_used, stack_capacity;
     uint8_t *mask;
     uint64_t mask_capacity;
-    ebpo_triangle *faces; /* of one leaf */
+    ebpo_triangle *faces; /* room for a leaf's */
     uint64_t faces_capacity;
     face_set set;
     ebpo_error *error;
@@ -35,10 +37,10 @@ void ebpo_subtree_release(ebpo_branch *s)
 {
     ebpo_array_free(s->list);
     free(s->fresh);
-    free(s->nodes);
-    free(s->details);
-    free(s->entries);
-    free(s->crossing);
+    ebpo_array_free(s->nodes);
+    ebpo_array_free(s->details);
+    ebpo_array_free(s->entries);
+    ebpo_array_free(s->crossing);
     ebpo_array_free(s->above);
     ebpo_proposals_free(s->proposals);
     s->proposals = NULL;
@@ -52,10 +54,10 @@ void ebpo_subtree_release(ebpo_branch *s)
 
 void ebpo_branch_forget(ebpo_branch *s)
 {
-    free(s->nodes);
-    free(s->details);
-    free(s->entries);
-    free(s->crossing);
+    ebpo_array_free(s->nodes);
+    ebpo_array_free(s->details);
+    ebpo_array_free(s->entries);
+    ebpo_array_free(s->crossing);
     s->nodes = NULL;
     s->details = NULL;
     s->entries = s->crossing = NULL;
@@ -96,18 +98,18 @@ static ebpo_status no_memory(ebpo_error *error)
     return ebpo_fail(error, EBPO_E_MEMORY, "out of memory while assigning faces to cells");
 }
 
-bool ebpo_branch_detail(ebpo_branch *s, uint32_t *index)
+bool ebpo_branch_detail(const ebpo_builder *b, ebpo_branch *s, uint32_t *index)
 {
-    if (!ebpo_grow(&s->details, &s->detail_capacity, s->detail_count + 1, sizeof *s->details))
+    if (!ebpo_array_grow_late(b->workspace, &s->details, &s->detail_capacity, s->detail_count + 1, sizeof *s->details))
         return false;
     memset(&s->details[s->detail_count], 0, sizeof s->details[0]);
     *index = (uint32_t)s->detail_count++;
     return true;
 }
 
-bool ebpo_branch_children(ebpo_branch *s, uint32_t *first)
+bool ebpo_branch_children(const ebpo_builder *b, ebpo_branch *s, uint32_t *first)
 {
-    if (!ebpo_grow(&s->nodes, &s->node_capacity, s->node_count + 8, sizeof *s->nodes))
+    if (!ebpo_array_grow_late(b->workspace, &s->nodes, &s->node_capacity, s->node_count + 8, sizeof *s->nodes))
         return false;
     *first = (uint32_t)s->node_count;
     memset(&s->nodes[s->node_count], 0, 8 * sizeof s->nodes[0]);
@@ -126,7 +128,7 @@ bool ebpo_build_crossing(const ebpo_builder *b, ebpo_branch *s, ebpo_cell cell, 
         const uint32_t *f = b->face[ebpo_branch_face(s, list[i])];
         if (f[0] - begin < end - begin && f[1] - begin < end - begin && f[2] - begin < end - begin)
             continue;
-        if (!ebpo_grow(&s->crossing, &s->cross_capacity, s->cross_count + 1, sizeof *s->crossing))
+        if (!ebpo_array_grow_late(b->workspace, &s->crossing, &s->cross_capacity, s->cross_count + 1, sizeof *s->crossing))
             return false;
         s->crossing[s->cross_count++] = list[i];
     }
@@ -139,22 +141,20 @@ static ebpo_status grow_leaf(grower *g, ebpo_build_node *node, ebpo_cell cell, u
     ebpo_builder *b = g->b;
     ebpo_branch *s = g->s;
     node->type = EBPO_LEAF;
-    if (!ebpo_branch_detail(s, &node->detail) || !ebpo_grow(&s->entries, &s->entry_capacity, s->entry_count + count, sizeof *s->entries))
+    if (!ebpo_branch_detail(g->b, s, &node->detail) || !ebpo_array_grow_late(g->b->workspace, &s->entries, &s->entry_capacity, s->entry_count + count, sizeof *s->entries))
         return no_memory(g->error);
     ebpo_build_detail *d = &s->details[node->detail];
     d->entry_begin = s->entry_count;
-    memcpy(s->entries + s->entry_count, g->stack + at, (size_t)count * sizeof *g->stack);
+    ebpo_array_copy(b->workspace, s->entries + s->entry_count, g->stack + at, count * sizeof *g->stack);
     s->entry_count += count;
     d->entry_end = s->entry_count;
     uint64_t leaves = atomic_fetch_add(&b->leaf_count, 1) + 1, entries = atomic_fetch_add(&b->entry_count, count) + count;
     ebpo_status status = ebpo_build_check_lists(b->face_count, leaves, entries, g->error);
     if (status != EBPO_OK || !b->solid)
         return status;
-    if (!ebpo_grow(&g->faces, &g->faces_capacity, count, sizeof *g->faces))
+    if (!ebpo_grow(&g->faces, &g->faces_capacity, count < EBPO_CORNER_FACES ? count : EBPO_CORNER_FACES, sizeof *g->faces))
         return no_memory(g->error);
-    for (uint64_t i = 0; i < count; i++)
-        ebpo_branch_triangle(b, s, g->stack[at + i], &g->faces[i]);
-    ebpo_corner_windings(&b->box, cell, g->faces, count, d->delta);
+    ebpo_branch_corners(b, s, cell, g->stack + at, count, g->faces, d->delta);
     return EBPO_OK;
 }
 
@@ -162,11 +162,13 @@ static ebpo_status grow_leaf(grower *g, ebpo_build_node *node, ebpo_cell cell, u
 static ebpo_status split(grower *g, ebpo_cell cell, uint64_t at, uint64_t count, uint64_t top, uint64_t begin[9])
 {
     const ebpo_builder *b = g->b;
-    if (!ebpo_grow(&g->mask, &g->mask_capacity, count, 1))
+    if (!ebpo_array_grow_late(g->b->workspace, &g->mask, &g->mask_capacity, count, 1))
         return no_memory(g->error);
     uint64_t sizes[8] = { 0 };
     for (uint64_t i = 0; i < count; i++) {
         ebpo_triangle face;
+        if (i % SETTLE_FACES == SETTLE_FACES - 1)
+            ebpo_workspace_settle(b->workspace);
         ebpo_branch_triangle(b, g->s, g->stack[at + i], &face);
         unsigned mask = ebpo_octants_touched(&b->box, cell, &face);
         g->mask[i] = (uint8_t)mask;
@@ -176,13 +178,16 @@ static ebpo_status split(grower *g, ebpo_cell cell, uint64_t at, uint64_t count,
     begin[0] = top;
     for (int o = 0; o < 8; o++)
         begin[o + 1] = begin[o] + sizes[o];
-    if (!ebpo_grow(&g->stack, &g->stack_capacity, begin[8], sizeof *g->stack))
+    if (!ebpo_array_grow_late(g->b->workspace, &g->stack, &g->stack_capacity, begin[8], sizeof *g->stack))
         return no_memory(g->error);
     uint64_t next[8];
     memcpy(next, begin, sizeof next);
-    for (uint64_t i = 0; i < count; i++)
+    for (uint64_t i = 0; i < count; i++) {
+        if (i % SETTLE_FACES == SETTLE_FACES - 1)
+            ebpo_workspace_settle(b->workspace);
         for (unsigned mask = g->mask[i]; mask; mask &= mask - 1)
             g->stack[next[__builtin_ctz(mask)]++] = g->stack[at + i];
+    }
     return EBPO_OK;
 }
 
@@ -268,7 +273,8 @@ static ebpo_status grow(grower *g, uint32_t index, ebpo_cell cell, uint64_t at, 
         status = ebpo_build_check_branch(s, g->error);
     if (status != EBPO_OK)
         return status;
-    if (!ebpo_branch_detail(s, &detail) || !ebpo_branch_children(s, &child))
+    ebpo_workspace_settle_often(g->b->workspace, s->detail_count);
+    if (!ebpo_branch_detail(g->b, s, &detail) || !ebpo_branch_children(g->b, s, &child))
         return no_memory(g->error);
     s->nodes[index] = (ebpo_build_node){ EBPO_GRAY, child, detail };
     ebpo_build_detail d = { .entry_begin = s->entry_count };
@@ -288,7 +294,7 @@ static ebpo_status grow(grower *g, uint32_t index, ebpo_cell cell, uint64_t at, 
 static ebpo_status grow_from_list(grower *g)
 {
     ebpo_branch *s = g->s;
-    if (!ebpo_grow(&g->stack, &g->stack_capacity, s->list_count, sizeof *g->stack) || !ebpo_grow(&s->nodes, &s->node_capacity, 1, sizeof *s->nodes))
+    if (!ebpo_array_grow_late(g->b->workspace, &g->stack, &g->stack_capacity, s->list_count, sizeof *g->stack) || !ebpo_array_grow_late(g->b->workspace, &s->nodes, &s->node_capacity, 1, sizeof *s->nodes))
         return no_memory(g->error);
     for (uint64_t i = 0; i < s->list_count; i++)
         g->stack[i] = (uint32_t)i;
@@ -303,8 +309,8 @@ ebpo_status ebpo_build_partition(ebpo_builder *b, ebpo_branch *s, ebpo_error *er
     ebpo_status status = grow_from_list(&g);
     if (status == EBPO_OK)
         s->root_type = s->nodes[0].type;
-    free(g.stack);
-    free(g.mask);
+    ebpo_array_free(g.stack);
+    ebpo_array_free(g.mask);
     free(g.faces);
     free(g.set.slots);
     return status;

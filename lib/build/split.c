@@ -115,7 +115,7 @@ static ebpo_status make_room(ebpo_builder *b, top_split *t, uint32_t *lists[8], 
     for (unsigned o = 0; o < 8; o++)
         if (!(t->to[o] = lists[o] = ebpo_array_alloc(b->workspace, sizes[o], sizeof *lists[o])))
             return no_memory(b, error);
-    if (!ebpo_grow(&s->crossing, &s->cross_capacity, s->cross_count + sizes[8], sizeof *s->crossing))
+    if (!ebpo_array_grow_late(b->workspace, &s->crossing, &s->cross_capacity, s->cross_count + sizes[8], sizeof *s->crossing))
         return no_memory(b, error);
     t->to[8] = s->crossing + s->cross_count;
     s->cross_count += sizes[8];
@@ -205,7 +205,7 @@ static ebpo_status grow_top(cutting *c, uint32_t index, ebpo_cell cell, uint32_t
     ebpo_status status = ebpo_build_check_branch(s, c->error);
     if (status == EBPO_OK)
         status = split_top(b, cell, list, count, lists, sizes, c->error);
-    if (status == EBPO_OK && (!ebpo_branch_detail(s, &detail) || !ebpo_branch_children(s, &child)))
+    if (status == EBPO_OK && (!ebpo_branch_detail(b, s, &detail) || !ebpo_branch_children(b, s, &child)))
         status = no_memory(b, c->error);
     if (status == EBPO_OK) {
         s->nodes[index] = (ebpo_build_node){ EBPO_GRAY, child, detail };
@@ -230,7 +230,7 @@ static ebpo_status cut(ebpo_builder *b, ebpo_error *error)
     if (c.piece < 2 * (uint64_t)b->options->leaf_faces) /* so that no node of the top can turn out to be a leaf */
         c.piece = 2 * (uint64_t)b->options->leaf_faces;
     ebpo_status status = EBPO_OK;
-    if (!all || !c.listed || !ebpo_grow(&b->top.nodes, &b->top.node_capacity, 1, sizeof *b->top.nodes)) {
+    if (!all || !c.listed || !ebpo_array_grow_late(b->workspace, &b->top.nodes, &b->top.node_capacity, 1, sizeof *b->top.nodes)) {
         ebpo_array_free(all);
         status = no_memory(b, error);
     } else {
@@ -252,17 +252,12 @@ static ebpo_status corners_of_pieces(void *context, uint64_t begin, uint64_t end
 {
     ebpo_builder *b = context;
     (void)worker;
-    uint64_t most = 0;
-    for (uint64_t i = begin; i < end; i++)
-        most = b->sub[i].list_count > most ? b->sub[i].list_count : most;
-    ebpo_triangle *faces = ebpo_alloc(most, sizeof *faces);
+    ebpo_triangle *faces = ebpo_alloc(EBPO_CORNER_FACES, sizeof *faces);
     if (!faces)
         return no_memory(b, error);
     for (uint64_t i = begin; i < end; i++) {
         ebpo_branch *s = &b->sub[i];
-        for (uint64_t f = 0; f < s->list_count; f++)
-            ebpo_build_triangle(b, s->list[f], &faces[f]);
-        ebpo_corner_windings(&b->box, s->cell, faces, s->list_count, s->root_delta);
+        ebpo_branch_corners(b, s, s->cell, NULL, s->list_count, faces, s->root_delta);
         ebpo_workspace_settle(b->workspace);
     }
     free(faces);
@@ -272,7 +267,7 @@ static ebpo_status corners_of_pieces(void *context, uint64_t begin, uint64_t end
 /* A piece is worked on in a thread's own memory, and cells of the deepest level that is allowed are not cut, whatever they list: as many threads as half of the budget has room for. */
 static ebpo_status fit_largest_piece(ebpo_builder *b, ebpo_error *error)
 {
-    enum { BYTES_A_FACE = 110 }; /* measured: one piece of 28 million faces */
+    enum { BYTES_A_FACE = 160 }; /* points that a hull is made of; measured: a million faces at one vertex */
     ebpo_workspace_figures figures = { .memory = 0 };
     uint64_t most = 1;
     if (b->workspace)

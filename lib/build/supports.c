@@ -8,7 +8,7 @@
 #include "base/alloc.h"
 #include "geom/plane_code.h"
 
-enum { FEW_VERTICES = 4096, TABLE_MOST = 1 << 16 };
+enum { FEW_VERTICES = 4096, TABLE_MOST = 1 << 16, MANY_POINTS = 1 << 15 };
 
 static uint32_t hash_of(const double x[3])
 {
@@ -39,7 +39,7 @@ static bool known_point(ebpo_supports *s, const double x[3], double slack)
 
 static bool add_point(ebpo_supports *s, const double x[3], double slack)
 {
-    if (!ebpo_grow(&s->point, &s->capacity, s->count / 4 + 1, sizeof *s->point))
+    if (!ebpo_array_grow_late(s->b->workspace, &s->point, &s->capacity, s->count / 4 + 1, sizeof *s->point))
         return false;
     if (known_point(s, x, EBPO_NORMAL_NORM * slack))
         return true;
@@ -75,7 +75,7 @@ static bool add_crossings(ebpo_supports *s, const ebpo_branch *branch, const ebp
     for (uint64_t i = d->cross_begin; i < d->cross_end; i++) {
         ebpo_triangle face;
         double points[9][3], slack;
-        if (!branch->list && i % 32 == 0) /* of the top: each from another place of the files */
+        if (i % (branch->list ? 1024 : 32) == 0) /* of the top: each from another place of the files */
             ebpo_workspace_settle(s->b->workspace);
         ebpo_branch_triangle(s->b, branch, branch->crossing[i], &face);
         int count = ebpo_clip_triangle(&s->b->box, s->cell, &face, points, &slack);
@@ -93,7 +93,7 @@ static bool clear_table(ebpo_supports *s, uint64_t points)
     while (size < 2 * points && size < TABLE_MOST)
         size *= 2;
     s->place_count = size;
-    if (!ebpo_grow(&s->place, &s->place_capacity, size, sizeof *s->place))
+    if (!ebpo_array_grow_late(s->b->workspace, &s->place, &s->place_capacity, size, sizeof *s->place))
         return false;
     memset(s->place, 0, size * sizeof *s->place);
     return true;
@@ -137,6 +137,8 @@ static void locate(const ebpo_supports *s, uint64_t first, const double n[3], do
 /* Raises `support`. */
 static void among_points(const ebpo_supports *s, const double n[3], double enough, double *support, double where[3])
 {
+    if (s->count > MANY_POINTS)
+        ebpo_workspace_settle(s->b->workspace);
     const ebpo_sweep_points points = { (const double(*)[4][4])s->point, (const double(*)[7])s->box, (s->count + 3) / 4 };
     uint64_t stretch = s->sweep->highest(&points, n, enough, support);
     if (stretch != UINT64_MAX)
@@ -146,7 +148,7 @@ static void among_points(const ebpo_supports *s, const double n[3], double enoug
 static bool box_points(ebpo_supports *s)
 {
     uint64_t fours = (s->count + 3) / 4;
-    if (!ebpo_grow(&s->box, &s->box_capacity, fours / EBPO_STRETCH + 1, sizeof *s->box))
+    if (!ebpo_array_grow_late(s->b->workspace, &s->box, &s->box_capacity, fours / EBPO_STRETCH + 1, sizeof *s->box))
         return false;
     for (uint64_t i = 0; i < fours; i++) {
         double *box = s->box[i / EBPO_STRETCH];
@@ -200,9 +202,9 @@ double ebpo_supports_find_from(const ebpo_supports *s, const int32_t normal[3], 
 
 void ebpo_supports_free(ebpo_supports *s)
 {
-    free(s->point);
-    free(s->box);
-    free(s->place);
+    ebpo_array_free(s->point);
+    ebpo_array_free(s->box);
+    ebpo_array_free(s->place);
     s->point = NULL;
     s->place = NULL;
     s->box = NULL;

@@ -93,7 +93,7 @@ static bool check_edges(const ebpo_check *check, star_block *block, scratch *s, 
 {
     const ebpo_star *star = &s->star;
     uint64_t fans = star->faces;
-    if (!ebpo_grow(&s->fans, &s->fan_capacity, star->faces, sizeof *s->fans))
+    if (!ebpo_array_grow_late(check->mesh->workspace, &s->fans, &s->fan_capacity, star->faces, sizeof *s->fans))
         return false;
     for (uint64_t i = 0; i < star->faces; i++)
         s->fans[i] = (uint32_t)i;
@@ -139,7 +139,7 @@ static void sort_opposites(opposite *o, uint64_t count)
 static bool check_repeated(const ebpo_check *check, star_block *block, scratch *s, uint32_t v)
 {
     uint64_t begin = check->stars.first[v], end = check->stars.first[v + (uint64_t)1], count = 0;
-    if (!ebpo_grow(&s->opposites, &s->opposite_capacity, end - begin, sizeof *s->opposites))
+    if (!ebpo_array_grow_late(check->mesh->workspace, &s->opposites, &s->opposite_capacity, end - begin, sizeof *s->opposites))
         return false;
     for (uint64_t i = begin; i < end; i++) {
         uint32_t f = check->stars.face[i];
@@ -199,8 +199,8 @@ static void join_blocks(const ebpo_check *check, const star_block *blocks, uint6
 static void free_scratch(scratch *s)
 {
     ebpo_star_free(&s->star);
-    free(s->fans);
-    free(s->opposites);
+    ebpo_array_free(s->fans);
+    ebpo_array_free(s->opposites);
 }
 
 ebpo_status ebpo_check_stars(ebpo_check *check, ebpo_error *error)

@@ -133,7 +133,7 @@ bool ebpo_star_gather(ebpo_star *star, const ebpo_stars *stars, const ebpo_mesh 
 {
     uint64_t degree = ebpo_stars_degree(stars, v);
     star->count = star->faces = 0;
-    if (!ebpo_grow(&star->links, &star->capacity, 2 * degree, sizeof *star->links))
+    if (!ebpo_array_grow_late(mesh->workspace, &star->links, &star->capacity, 2 * degree, sizeof *star->links))
         return false;
     const uint32_t *faces = stars->face + stars->first[v];
     for (uint64_t i = 0; i < degree; i++) {
@@ -153,7 +153,7 @@ bool ebpo_star_gather(ebpo_star *star, const ebpo_stars *stars, const ebpo_mesh 
 
 void ebpo_star_free(ebpo_star *star)
 {
-    free(star->links);
+    ebpo_array_free(star->links);
     *star = (ebpo_star){ .links = NULL };
 }
 
