@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "base/fp_env.h"
+#include "base/parallel.h"
 #include "base/sha256.h"
 #include "base/workspace.h"
 #include "import/import.h"
@@ -67,7 +68,7 @@ static ebpo_status parse(ebpo_mesh *out, const ebpo_whole_file *file, const char
     if (ebpo_ply_recognise(file->data, file->size))
         return ebpo_ply_parse_memory(out, file->data, file->size, path, workspace, threads, progress, error);
     if (ebpo_import_recognise(&format, file->data, file->size, path))
-        return ebpo_import_memory(out, format, file->data, file->size, path, workspace, error);
+        return !ebpo_stage(progress, "reading", error) ? EBPO_E_CANCELLED : ebpo_import_memory(out, format, file->data, file->size, path, workspace, error);
     if (dot && strcasecmp(dot, ".ply") == 0) /* its reader says best what is wrong */
         return ebpo_ply_parse_memory(out, file->data, file->size, path, workspace, threads, progress, error);
     return ebpo_fail(error, EBPO_E_FORMAT, "%s: neither its first bytes nor its name tell a PLY, OBJ, STL or OFF file",

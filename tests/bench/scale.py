@@ -223,7 +223,7 @@ def section_size(page, results):
 
 
 def section_decode(page, results):
-    page.text("### Decoding", "", "All of a file, checks included, on one core, from the system's memory: `tests/bench_decode FILE`. Bytes are those of the arrays that a reader gets.")
+    page.text("### Decoding", "", "All of a file, checks included, on one core, from the system's memory: `tests/bench_decode FILE` of BUILD_DIR. Bytes are those of the arrays that a reader gets.")
     rows = []
     for r in results:
         if r["decode"]:
@@ -308,7 +308,7 @@ def section_goals(page, scale, results):
         unit = 1e3 if name.endswith("ms") else 1e-3 if name.endswith("us") else 1
         met = "-" if value is None else "yes" if (value <= goal if side == "most" else value >= goal) else "no"
         rows.append([name, figure(value if value is None else value * unit), f"at {side} {figure(goal * unit)}", met])
-    page.text(f"## {r['millions']:g} million faces and the goals", "", "First answers, tails and peaks: the worst of all; the rest as in the tables below. Some goals are meant for 28 million faces only.")
+    page.text(f"## {r['millions']:g} million faces and the goals", "", "First answers, tails and peaks: the worst of all; the rest as in the tables below. All are of the largest model, but for the growth.")
     page.table(["what", "measured", "goal", "met"], rows)
 
 
