@@ -9,6 +9,7 @@ What `ebpo convert` promises of memory, temporary files and bytes, on a model th
 FULL_DISK is preloaded to make a disk full without being root.
 """
 import contextlib
+import math
 import os
 import pty
 import re
@@ -16,6 +17,7 @@ import resource
 import select
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
@@ -50,6 +52,29 @@ class Place:
 
     def command(self, model, *more, options=QUICK):
         return [TOOL, "convert", *options, "--temp-dir", self.temp_dir, *more, model, self.out]
+
+
+def write_ply(path, vertices, faces):
+    with open(path, "wb") as f:
+        f.write(b"ply\nformat binary_little_endian 1.0\nelement vertex %d\nproperty double x\nproperty double y\nproperty double z\n"
+                b"element face %d\nproperty list uchar int vertex_indices\nend_header\n" % (len(vertices), len(faces)))
+        f.write(b"".join(struct.pack("<3d", *v) for v in vertices))
+        f.write(b"".join(struct.pack("<B3i", 3, *t) for t in faces))
+
+
+def write_fan(path, faces):
+    """Two cones over one circle: half of the faces at each apex."""
+    n = faces // 2
+    ring = [(math.cos(2 * math.pi * i / n), math.sin(2 * math.pi * i / n), 0.001 * (i % 7)) for i in range(n)]
+    sides = [t for i in range(n) for t in ((i, (i + 1) % n, n), ((i + 1) % n, i, n + 1))]
+    write_ply(path, ring + [(0, 0, 1), (0, 0, -1)], sides)
+
+
+def write_box(path):
+    """Twelve large faces."""
+    corners = [(i & 1, 1.03 * (i >> 1 & 1), 0.97 * (i >> 2 & 1)) for i in range(8)]
+    squares = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    write_ply(path, corners, [t for a, b, c, d in squares for t in ((a, b, c), (a, c, d))])
 
 
 def usual_signals():
@@ -174,6 +199,20 @@ def one_cell(root, model):
     check(code == 1 and "a cell of level 0, the deepest that was allowed, lists " in said and "allow more levels or more memory" in said and not place.left(), f"one cell: {said.strip()} ({code}, {place.left()})")
 
 
+def unlike_scans(root):
+    """Models whose pieces are large for their faces, or have many faces in one cell."""
+    place, model = Place(root, "unlike scans"), os.path.join(root, "unlike.ply")
+    write_box(model)
+    for threads in "1", "3":
+        code, said, peak, _ = run(place.command(model, "-q", "--memory", "128M", "--threads", threads, options=["--leaf-faces", "0", "--max-level", "9"]), place.temp_dir)
+        check(code == 0 and peak <= SMALL, f"12 faces in 1.5 million leaves, {threads} threads: {peak / MIB:.0f} MiB resident at most ({said.strip()})")
+    write_fan(model, 1_000_000)
+    for threads in "1", "3":
+        code, said, peak, _ = run(place.command(model, "-q", "--memory", "192M", "--threads", threads, options=[]), place.temp_dir)
+        check(code == 0 and peak <= 192 * MIB, f"half a million faces at a vertex, {threads} threads: {peak / MIB:.0f} MiB resident at most ({said.strip()})")
+    os.unlink(model)
+
+
 def interrupted(root, model):
     cases = [(s, signal.SIGTERM) for s in ("reading", "ordering faces", "checking edges", "cutting into pieces", "top envelopes", "joining levels", "numbering vertices")]
     cases += [(s, signal.SIGINT) for s in ("ordering vertices", "envelopes", "writing")] + [("writing", signal.SIGTERM), ("envelopes", signal.SIGHUP)]
@@ -248,6 +287,7 @@ def main():
         generate(model, FEWER_FACES)
         same_bytes_as_usual(root, model)
         one_cell(root, model)
+        unlike_scans(root)
         interrupted(root, model)
         files_with_names(root, model)
         full_disk(root, model)
