@@ -8,6 +8,14 @@
 #include "oracle.h"
 #include "solids.h"
 
+/* For Check tests: `call` may name `error`. */
+#define ASSERT_OK(call)                                                       \
+    do {                                                                      \
+        ebpo_error error_ = EBPO_ERROR_INIT, *error = &error_;                \
+        ebpo_status status_ = (call);                                         \
+        ck_assert_msg(status_ == EBPO_OK, "%s: %s", #call, error_.message);   \
+    } while (0)
+
 /* --- solids: query_solids.c --- */
 
 /* All balanced solids of solids.h, and some more. */

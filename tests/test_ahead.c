@@ -6,13 +6,6 @@
 #include "query/ahead.h"
 #include "query_kit.h"
 
-#define ASSERT_OK(call)                                                       \
-    do {                                                                      \
-        ebpo_error error_ = EBPO_ERROR_INIT, *error = &error_;                \
-        ebpo_status status_ = (call);                                         \
-        ck_assert_msg(status_ == EBPO_OK, "%s: %s", #call, error_.message);   \
-    } while (0)
-
 static const struct {
     const char *name;
     int variant;

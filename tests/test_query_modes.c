@@ -50,13 +50,6 @@ static void end(asked *a)
     free(a->distance);
 }
 
-#define ASSERT_OK(call)                                                       \
-    do {                                                                      \
-        ebpo_error error_ = EBPO_ERROR_INIT, *error = &error_;                \
-        ebpo_status status_ = (call);                                         \
-        ck_assert_msg(status_ == EBPO_OK, "%s: %s", #call, error_.message);   \
-    } while (0)
-
 static void ask_exactly(asked *a, ebpo_context *context, const ebpo_query_options *options)
 {
     ASSERT_OK(ebpo_inside_many(context, a->points, a->count, options, a->inside, error));

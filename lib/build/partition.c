@@ -33,25 +33,6 @@ typedef struct grower {
     ebpo_error *error;
 } grower;
 
-void ebpo_subtree_release(ebpo_branch *s)
-{
-    ebpo_array_free(s->list);
-    free(s->fresh);
-    ebpo_array_free(s->nodes);
-    ebpo_array_free(s->details);
-    ebpo_array_free(s->entries);
-    ebpo_array_free(s->crossing);
-    ebpo_array_free(s->above);
-    ebpo_proposals_free(s->proposals);
-    s->proposals = NULL;
-    s->list = NULL;
-    s->fresh = NULL;
-    s->nodes = NULL;
-    s->details = NULL;
-    s->entries = s->crossing = NULL;
-    s->above = NULL;
-}
-
 void ebpo_branch_forget(ebpo_branch *s)
 {
     ebpo_array_free(s->nodes);
@@ -63,6 +44,19 @@ void ebpo_branch_forget(ebpo_branch *s)
     s->entries = s->crossing = NULL;
     s->node_count = s->node_capacity = s->detail_count = s->detail_capacity = 0;
     s->entry_count = s->entry_capacity = s->cross_count = s->cross_capacity = 0;
+}
+
+void ebpo_subtree_release(ebpo_branch *s)
+{
+    ebpo_branch_forget(s);
+    ebpo_array_free(s->list);
+    free(s->fresh);
+    ebpo_array_free(s->above);
+    ebpo_proposals_free(s->proposals);
+    s->proposals = NULL;
+    s->list = NULL;
+    s->fresh = NULL;
+    s->above = NULL;
 }
 
 void ebpo_branch_free(ebpo_branch *s)
