@@ -12,10 +12,12 @@ static bool answer(ebpo_context *context, bool solid, const double point[3], ebp
 {
     ebpo_inside_result where = { EBPO_MAYBE, 0, 0 }; /* a surface has no inside, but distances */
     ebpo_distance_result nearest;
-    if ((solid && ebpo_inside(context, point, NULL, &where, error) != EBPO_OK) || ebpo_distance(context, point, NULL, &nearest, error) != EBPO_OK)
+    if ((solid && ebpo_inside(context, point, NULL, &where, error) != EBPO_OK) ||
+        ebpo_distance(context, point, NULL, &nearest, error) != EBPO_OK)
         return false;
-    printf("%s, %.17g from face %" PRIu64 " at %.17g %.17g %.17g\n", solid ? words[where.where] : "surface", nearest.distance, nearest.face,
-           nearest.point[0], nearest.point[1], nearest.point[2]);
+    printf("%s, %.17g from face %" PRIu64 " at %.17g %.17g %.17g\n",
+           solid ? words[where.where] : "surface", nearest.distance, nearest.face, nearest.point[0],
+           nearest.point[1], nearest.point[2]);
     return true;
 }
 
@@ -29,7 +31,8 @@ int main(int argc, char **argv)
     double p[3];
     if (argc != 2)
         return fputs("usage: query MODEL.ebpo.h5 <points.txt\n", stderr), 2;
-    bool good = ebpo_open(&file, argv[1], &error) == EBPO_OK && ebpo_model_open(&model, file, NULL, &error) == EBPO_OK &&
+    bool good = ebpo_open(&file, argv[1], &error) == EBPO_OK &&
+                ebpo_model_open(&model, file, NULL, &error) == EBPO_OK &&
                 ebpo_context_new(&context, model, &error) == EBPO_OK;
     for (long number = 1; good && fgets(line, sizeof line, stdin); number++) {
         int end = 0, count = sscanf(line, "%lf %lf %lf %n", &p[0], &p[1], &p[2], &end);
@@ -39,7 +42,8 @@ int main(int argc, char **argv)
         if (good)
             good = answer(context, ebpo_file_info(file)->solid, p, &error);
         else
-            snprintf(error.message, sizeof error.message, "line %ld: three numbers are expected", number);
+            snprintf(error.message, sizeof error.message, "line %ld: three numbers are expected",
+                     number);
     }
     if (!good)
         fprintf(stderr, "query: %s\n", error.message);

@@ -1,4 +1,5 @@
-/* A coarse-to-fine viewer's main loop: each level's envelopes as closed polyhedra, drawn (here: summed up) as soon as the level is there.
+/* A coarse-to-fine viewer's main loop: each level's envelopes as closed polyhedra, drawn (here:
+ * summed up) as soon as the level is there.
  *
  *     stream_levels FILE.ebpo.h5 [LEVEL]
  *     cc stream_levels.c $(pkg-config --cflags --libs ebpo) */
@@ -22,16 +23,19 @@ int main(int argc, char **argv)
         return 2;
     }
     options.polygons = true;
-    if (ebpo_open(&file, argv[1], &error) != EBPO_OK || ebpo_stream_new(&stream, file, &options, &error) != EBPO_OK)
+    if (ebpo_open(&file, argv[1], &error) != EBPO_OK ||
+        ebpo_stream_new(&stream, file, &options, &error) != EBPO_OK)
         goto done;
     while (ebpo_stream_next_level(stream, &level, &more, &error) == EBPO_OK && more) {
         uint64_t polyhedra = 0, polygons = 0;
         while (ebpo_stream_next_node(stream, &node, &more, &error) == EBPO_OK && more) {
             polyhedra += node.polygon_count > 0; /* white nodes have none */
-            polygons += node.polygon_count;      /* a renderer would take node.vertices, polygon_first and corners here */
+            /* a renderer would take node.vertices, polygon_first and corners here */
+            polygons += node.polygon_count;
         }
-        printf("level %d after %" PRIu64 " bytes: %" PRIu64 " new polyhedra with %" PRIu64 " polygons; with the leaves before, volume %.9g\n", level.level,
-               level.cumulative_bytes, polyhedra, polygons, level.volume);
+        printf("level %d after %" PRIu64 " bytes: %" PRIu64 " new polyhedra with %" PRIu64
+               " polygons; with the leaves before, volume %.9g\n",
+               level.level, level.cumulative_bytes, polyhedra, polygons, level.volume);
         if (error.status != EBPO_OK || level.level >= last)
             break;
     }

@@ -1,4 +1,5 @@
-/* What a viewer with a camera does: the nodes that are largest on the picture first, until no visible one is larger than 16 pixels or a budget is spent; then the camera moves.
+/* What a viewer with a camera does: the nodes that are largest on the picture first, until no
+ * visible one is larger than 16 pixels or a budget is spent; then the camera moves.
  *
  *     view_nodes FILE.ebpo.h5 X Y Z [BYTES]
  *     cc view_nodes.c $(pkg-config --cflags --libs ebpo) */
@@ -9,7 +10,9 @@
 
 static bool draw(void *user, const ebpo_view_node *node)
 {
-    *(uint64_t *)user += node->seen ? node->node.polygon_count : 0; /* a renderer would draw node->node.vertices, polygon_first and corners here, front to back */
+    *(uint64_t *)user += node->seen ? node->node.polygon_count
+                                    : 0; /* a renderer would draw node->node.vertices, polygon_first
+                                            and corners here, front to back */
     return true;
 }
 
@@ -36,16 +39,20 @@ int main(int argc, char **argv)
         observer.eye[k] = strtod(argv[2 + k], NULL);
         observer.direction[k] = -observer.eye[k]; /* looks at the origin */
     }
-    if (ebpo_open(&file, argv[1], &error) != EBPO_OK || ebpo_view_stream_new(&stream, file, &options, &error) != EBPO_OK)
+    if (ebpo_open(&file, argv[1], &error) != EBPO_OK ||
+        ebpo_view_stream_new(&stream, file, &options, &error) != EBPO_OK)
         goto done;
     for (int frame = 0; frame < 2 && error.status == EBPO_OK; frame++) {
         uint64_t arrived = 0, polygons = 0;
-        while (ebpo_view_stream_next(stream, &node, &end, &error) == EBPO_OK && end == EBPO_VIEW_NODE)
+        while (ebpo_view_stream_next(stream, &node, &end, &error) == EBPO_OK &&
+               end == EBPO_VIEW_NODE)
             arrived++; /* children replace their parent when node.complete */
         ebpo_view_stats stats;
         ebpo_view_stream_get_stats(stream, &stats);
         ebpo_view_stream_cut(stream, draw, &polygons);
-        printf("%" PRIu64 " nodes more, %" PRIu64 " bytes read: %" PRIu64 " polygons to draw, no node larger than %.3g pixels\n", arrived, stats.bytes_read, polygons, stats.pixels);
+        printf("%" PRIu64 " nodes more, %" PRIu64 " bytes read: %" PRIu64
+               " polygons to draw, no node larger than %.3g pixels\n",
+               arrived, stats.bytes_read, polygons, stats.pixels);
         for (int k = 0; k < 3; k++)
             observer.eye[k] /= 2; /* half as far away: what is there already is not read again */
         if (error.status == EBPO_OK && ebpo_view_stream_change(stream, &options, &error) != EBPO_OK)

@@ -1,5 +1,5 @@
-/* Meshes for the command-line tests, good and bad, written into a folder: cli_inputs FOLDER, or cli_inputs --large FILE for one that takes a
- * while to convert. */
+/* Meshes for the command-line tests, good and bad, written into a folder: cli_inputs FOLDER, or
+ * cli_inputs --large FILE for one that takes a while to convert. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -38,28 +38,42 @@ static const struct {
 } texts[] = {
     { "empty.ply", "" },
     { "nonsense.ply", "this is not a mesh\n" },
-    { "no_faces.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n" },
-    { "cut_short.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-                       "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n" },
-    { "bad_index.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-                       "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 99\n" },
-    { "nan.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-                 "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 nan 0\n0 1 0\n3 0 1 2\n" },
-    { "quads.ply", "ply\nformat ascii 1.0\nelement vertex 8\nproperty double x\nproperty double y\nproperty double z\n"
+    { "no_faces.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
+                      "y\nproperty float z\nend_header\n0 0 0\n" },
+    { "cut_short.ply",
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float "
+      "z\n"
+      "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n" },
+    { "bad_index.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float "
+                       "y\nproperty float z\n"
+                       "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 "
+                       "0\n1 0 0\n0 1 0\n3 0 1 99\n" },
+    { "nan.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float "
+                 "y\nproperty float z\n"
+                 "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 nan "
+                 "0\n0 1 0\n3 0 1 2\n" },
+    { "quads.ply", "ply\nformat ascii 1.0\nelement vertex 8\nproperty double x\nproperty double "
+                   "y\nproperty double z\n"
                    "element face 6\nproperty list uchar int vertex_indices\nend_header\n"
                    "0 0 0\n1 0 0\n0 1 0\n1 1 0\n0 0 1\n1 0 1\n0 1 1\n1 1 1\n"
                    "4 0 4 6 2\n4 1 3 7 5\n4 0 1 5 4\n4 2 6 7 3\n4 0 2 3 1\n4 4 5 7 6\n" },
     { "tetrahedron.stl", "solid t\n"
-                         "facet normal 0 0 -1\nouter loop\nvertex 0 0 0\nvertex 0 1 0\nvertex 1 0 0\nendloop\nendfacet\n"
-                         "facet normal 0 -1 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 0 1\nendloop\nendfacet\n"
-                         "facet normal -1 0 0\nouter loop\nvertex 0 0 0\nvertex 0 0 1\nvertex 0 1 0\nendloop\nendfacet\n"
-                         "facet normal 1 1 1\nouter loop\nvertex 1 0 0\nvertex 0 1 0\nvertex 0 0 1\nendloop\nendfacet\n"
+                         "facet normal 0 0 -1\nouter loop\nvertex 0 0 0\nvertex 0 1 0\nvertex 1 0 "
+                         "0\nendloop\nendfacet\n"
+                         "facet normal 0 -1 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 0 "
+                         "1\nendloop\nendfacet\n"
+                         "facet normal -1 0 0\nouter loop\nvertex 0 0 0\nvertex 0 0 1\nvertex 0 1 "
+                         "0\nendloop\nendfacet\n"
+                         "facet normal 1 1 1\nouter loop\nvertex 1 0 0\nvertex 0 1 0\nvertex 0 0 "
+                         "1\nendloop\nendfacet\n"
                          "endsolid t\n" },
 };
 
-static const char *const solids[] = { "tetrahedron", "cube", "cube_float", "sphere", "sphere_float", "torus", "cavity", "open_box",
-                                      "flipped_face_cube", "mobius", "blob", "overlapping_cubes", "zero_area_face",
-                                      "repeated_faces", "inside_out_cube" };
+static const char *const solids[] = { "tetrahedron",    "cube",           "cube_float",
+                                      "sphere",         "sphere_float",   "torus",
+                                      "cavity",         "open_box",       "flipped_face_cube",
+                                      "mobius",         "blob",           "overlapping_cubes",
+                                      "zero_area_face", "repeated_faces", "inside_out_cube" };
 
 int main(int argc, char **argv)
 {

@@ -6,7 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Orientations in doubles where a bound on their rounding allows it, else in GMP's integers, and a uniform grid that brings together the faces that may meet. */
+/* Orientations in doubles where a bound on their rounding allows it, else in GMP's integers, and a
+ * uniform grid that brings together the faces that may meet. */
 
 static void *make(uint64_t count, size_t size)
 {
@@ -20,10 +21,7 @@ static void *make(uint64_t count, size_t size)
 
 /* --- signs --- */
 
-static int sign_of(double x)
-{
-    return (x > 0) - (x < 0);
-}
+static int sign_of(double x) { return (x > 0) - (x < 0); }
 
 /* Floats are whole multiples of 2^-149. */
 static void set_whole(mpz_t z, float x)
@@ -76,14 +74,17 @@ static int orient3(const float *a, const float *b, const float *c, const float *
         sum += e[0][k] * (s - t);
         size += fabs(e[0][k]) * (fabs(s) + fabs(t));
     }
-    /* Eight roundings at most in each summand; the last term is for what is too small to be rounded relatively. */
+    /* Eight roundings at most in each summand; the last term is for what is too small to be rounded
+     * relatively. */
     return fabs(sum) > 1e-14 * size + 1e-300 ? sign_of(sum) : exact_orient3(p);
 }
 
 /* The same of a triangle in the plane of axes k and l. */
 static int orient2(const float *a, const float *b, const float *c, int k, int l)
 {
-    float flat[4][3] = { { a[k], a[l], 0 }, { b[k], b[l], 0 }, { c[k], c[l], 0 }, { c[k], c[l], 1 } };
+    float flat[4][3] = {
+        { a[k], a[l], 0 }, { b[k], b[l], 0 }, { c[k], c[l], 0 }, { c[k], c[l], 1 }
+    };
     return -orient3(flat[0], flat[1], flat[2], flat[3]);
 }
 
@@ -100,9 +101,11 @@ static int view_of(const triangle t)
     return -1;
 }
 
-static bool flat_segments_meet(const float *p, const float *q, const float *r, const float *s, int k, int l)
+static bool flat_segments_meet(const float *p, const float *q, const float *r, const float *s,
+                               int k, int l)
 {
-    int a = orient2(p, q, r, k, l), b = orient2(p, q, s, k, l), c = orient2(r, s, p, k, l), d = orient2(r, s, q, k, l);
+    int a = orient2(p, q, r, k, l), b = orient2(p, q, s, k, l), c = orient2(r, s, p, k, l),
+        d = orient2(r, s, q, k, l);
     if (a || b || c || d)
         return a * b <= 0 && c * d <= 0;
     const int axes[2] = { k, l }; /* all on one line: do the intervals overlap along both axes? */
@@ -167,14 +170,17 @@ static bool meet(const face_model *m, uint64_t f, uint64_t g)
                 return true;
         return false;
     }
-    if (shared == 1) { /* what they have in common is convex and holds the shared corner, so it reaches an edge opposite to that */
+    if (shared == 1) { /* what they have in common is convex and holds the shared corner, so it
+                          reaches an edge opposite to that */
         int i = at_a[0], j = at_b[0];
-        return segment_meets(a[(i + 1) % 3], a[(i + 2) % 3], b) || segment_meets(b[(j + 1) % 3], b[(j + 2) % 3], a);
+        return segment_meets(a[(i + 1) % 3], a[(i + 2) % 3], b) ||
+               segment_meets(b[(j + 1) % 3], b[(j + 2) % 3], a);
     }
     if (shared > 2)
         return true;
     /* They share an edge: then they overlap if they lie in one plane, on the same side of it. */
-    const float *p = a[at_a[0]], *q = a[at_a[1]], *r = a[3 - at_a[0] - at_a[1]], *s = b[3 - at_b[0] - at_b[1]];
+    const float *p = a[at_a[0]], *q = a[at_a[1]], *r = a[3 - at_a[0] - at_a[1]],
+                *s = b[3 - at_b[0] - at_b[1]];
     if (orient3(p, q, r, s) != 0)
         return false;
     int view = view_of(a), k = (view + 1) % 3, l = (view + 2) % 3;
@@ -196,7 +202,8 @@ typedef struct entry {
 static void box_of(const face_model *m, uint64_t f, float low[3], float high[3])
 {
     for (int k = 0; k < 3; k++) {
-        float x = m->xyz[m->corners[f][0]][k], y = m->xyz[m->corners[f][1]][k], z = m->xyz[m->corners[f][2]][k];
+        float x = m->xyz[m->corners[f][0]][k], y = m->xyz[m->corners[f][1]][k],
+              z = m->xyz[m->corners[f][2]][k];
         low[k] = fminf(x, fminf(y, z));
         high[k] = fmaxf(x, fmaxf(y, z));
     }
@@ -291,7 +298,8 @@ uint64_t crossing_faces(const face_model *m, uint64_t first[2])
     qsort(entries, count, sizeof *entries, by_cell);
     for (uint64_t i = 0; i < count; i++)
         for (uint64_t j = i + 1; j < count && entries[j].cell == entries[i].cell; j++)
-            if (near(m, &g, entries[i].cell, entries[i].face, entries[j].face) && meet(m, entries[i].face, entries[j].face) && !found++) {
+            if (near(m, &g, entries[i].cell, entries[i].face, entries[j].face) &&
+                meet(m, entries[i].face, entries[j].face) && !found++) {
                 first[0] = entries[i].face;
                 first[1] = entries[j].face;
             }
@@ -319,7 +327,8 @@ bool crossing_closed_manifold(const face_model *m)
     half_edge *all = make(count, sizeof *all);
     for (uint64_t f = 0; f < m->faces; f++)
         for (int k = 0; k < 3; k++)
-            all[3 * f + (unsigned)k] = (half_edge){ m->corners[f][k], m->corners[f][(k + 1) % 3], m->corners[f][(k + 2) % 3] };
+            all[3 * f + (unsigned)k] = (half_edge){ m->corners[f][k], m->corners[f][(k + 1) % 3],
+                                                    m->corners[f][(k + 2) % 3] };
     qsort(all, count, sizeof *all, by_ends);
     bool ok = true;
     for (uint64_t i = 0, end; ok && i < count; i = end) {

@@ -1,5 +1,6 @@
-/* crossing_faces MODEL.ply...: is each model a closed 2-manifold of which no two faces meet but where they share a corner or an edge? One line for each, and code 1 unless all are.
- * For models as ebpo-generate writes them. */
+/* crossing_faces MODEL.ply...: is each model a closed 2-manifold of which no two faces meet but
+ * where they share a corner or an edge? One line for each, and code 1 unless all are. For models as
+ * ebpo-generate writes them. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,7 +16,8 @@ typedef struct model {
 
 static bool read_head(FILE *in, model *m)
 {
-    static const char *const lines[] = { "property float x\n", "property float y\n", "property float z\n" };
+    static const char *const lines[] = { "property float x\n", "property float y\n",
+                                         "property float z\n" };
     char line[256];
     int same = 0;
     bool little = false;
@@ -24,9 +26,11 @@ static bool read_head(FILE *in, model *m)
         sscanf(line, "element vertex %" SCNu64, &m->vertices);
         sscanf(line, "element face %" SCNu64, &m->faces);
         if (strncmp(line, "property", 8) == 0)
-            same += same < 3 ? strcmp(line, lines[same]) == 0 : strncmp(line, "property list uchar ", 20) == 0;
+            same += same < 3 ? strcmp(line, lines[same]) == 0
+                             : strncmp(line, "property list uchar ", 20) == 0;
     }
-    return little && same == 4 && m->vertices && m->faces && m->vertices < UINT32_MAX && m->faces < UINT32_MAX;
+    return little && same == 4 && m->vertices && m->faces && m->vertices < UINT32_MAX &&
+           m->faces < UINT32_MAX;
 }
 
 static bool read_model(const char *path, model *m)
@@ -57,10 +61,12 @@ static bool check(const char *path)
     if (!ok) {
         printf("%s: no PLY as ebpo-generate writes it\n", path);
     } else {
-        face_model faces = { (const float (*)[3])m.xyz, (const uint32_t (*)[3])m.corners, m.vertices, m.faces };
+        face_model faces = { (const float(*)[3])m.xyz, (const uint32_t(*)[3])m.corners, m.vertices,
+                             m.faces };
         uint64_t flat = crossing_flat_faces(&faces);
         bool manifold = crossing_closed_manifold(&faces);
-        printf("%s: %" PRIu64 " faces, %s, %" PRIu64 " without area", path, m.faces, manifold ? "a closed manifold" : "not a closed manifold", flat);
+        printf("%s: %" PRIu64 " faces, %s, %" PRIu64 " without area", path, m.faces,
+               manifold ? "a closed manifold" : "not a closed manifold", flat);
         if (flat == 0) {
             meetings = crossing_faces(&faces, first);
             printf(", %" PRIu64 " pairs meet", meetings);

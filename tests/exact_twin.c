@@ -17,15 +17,13 @@ int64_t twin_integer(uint64_t *state, int64_t low, int64_t high)
     return low + (int64_t)(twin_random(state) % (uint64_t)(high - low + 1));
 }
 
-double twin_uniform(uint64_t *state)
-{
-    return (double)(twin_random(state) >> 11) * 0x1p-52 - 1;
-}
+double twin_uniform(uint64_t *state) { return (double)(twin_random(state) >> 11) * 0x1p-52 - 1; }
 
 /* Determinant by Leibniz over differences to the last point. */
 static int rational_determinant_sign(const double *p, int n)
 {
-    static const int permutation[6][4] = {{0, 1, 2, 1}, {1, 2, 0, 1}, {2, 0, 1, 1}, {0, 2, 1, -1}, {2, 1, 0, -1}, {1, 0, 2, -1}};
+    static const int permutation[6][4] = { { 0, 1, 2, 1 },  { 1, 2, 0, 1 },  { 2, 0, 1, 1 },
+                                           { 0, 2, 1, -1 }, { 2, 1, 0, -1 }, { 1, 0, 2, -1 } };
     mpq_t m[3][3], last, product, sum;
     mpq_inits(last, product, sum, NULL);
     for (int i = 0; i < 3; i++)
@@ -54,16 +52,10 @@ static int rational_determinant_sign(const double *p, int n)
     return sign;
 }
 
-int twin_orient2d(const double p[6])
-{
-    return rational_determinant_sign(p, 2);
-}
+int twin_orient2d(const double p[6]) { return rational_determinant_sign(p, 2); }
 
 /* |a - d, b - d, c - d| is -(b - a) x (c - a) . (d - a). */
-int twin_orient3d(const double p[12])
-{
-    return -rational_determinant_sign(p, 3);
-}
+int twin_orient3d(const double p[12]) { return -rational_determinant_sign(p, 3); }
 
 int twin_sign_of_products(const double *factor, int n)
 {
@@ -84,10 +76,20 @@ int twin_sign_of_products(const double *factor, int n)
 
 const char *twin_kind_name(int kind)
 {
-    static const char *const names[TWIN_KINDS] = {
-        "uniform", "small integers", "single precision", "translated by 1e7", "denormal", "near 1e300", "largest doubles", "any exponent",
-        "nearly degenerate", "nearly degenerate, translated", "degenerate integers times a power of two", "large integers",
-        "degenerate large integers", "small integers with few odd ulps"};
+    static const char *const names[TWIN_KINDS] = { "uniform",
+                                                   "small integers",
+                                                   "single precision",
+                                                   "translated by 1e7",
+                                                   "denormal",
+                                                   "near 1e300",
+                                                   "largest doubles",
+                                                   "any exponent",
+                                                   "nearly degenerate",
+                                                   "nearly degenerate, translated",
+                                                   "degenerate integers times a power of two",
+                                                   "large integers",
+                                                   "degenerate large integers",
+                                                   "small integers with few odd ulps" };
     return names[kind];
 }
 
@@ -110,7 +112,8 @@ static double one_coordinate(int kind, uint64_t *state)
     }
 }
 
-/* The last point an affine combination of the others: nearly so in doubles, then moved by some ulps. */
+/* The last point an affine combination of the others: nearly so in doubles, then moved by some
+ * ulps. */
 static void nearly_degenerate(double *p, int n, double shift, uint64_t *state)
 {
     double s[2];
@@ -128,14 +131,16 @@ static void nearly_degenerate(double *p, int n, double shift, uint64_t *state)
     }
 }
 
-/* The last point an integer affine combination of the others: exactly degenerate, except one time in four. */
+/* The last point an integer affine combination of the others: exactly degenerate, except one time
+ * in four. */
 static void degenerate_integers(double *p, int n, int64_t size, int exponent, uint64_t *state)
 {
     int64_t s = twin_integer(state, -4, 4), t = n == 3 ? twin_integer(state, -4, 4) : 0;
     for (int i = 0; i < n * n; i++)
         p[i] = (double)twin_integer(state, -size, size);
     for (int k = 0; k < n; k++)
-        p[n * n + k] = p[k] + (double)s * (p[n + k] - p[k]) + (n == 3 ? (double)t * (p[2 * n + k] - p[k]) : 0);
+        p[n * n + k] =
+            p[k] + (double)s * (p[n + k] - p[k]) + (n == 3 ? (double)t * (p[2 * n + k] - p[k]) : 0);
     if (twin_random(state) % 4 == 0)
         p[n * n]++;
     for (int i = 0; i < n * (n + 1); i++)
@@ -156,7 +161,8 @@ void twin_points(double *p, int dimension, int kind, uint64_t *state)
         for (int i = 0; i < dimension * (dimension + 1); i++)
             p[i] = one_coordinate(kind, state);
     /* Shared coordinates and shared points, as meshes have them. */
-    int64_t to = twin_integer(state, 0, dimension), from = twin_integer(state, 0, dimension * dimension);
+    int64_t to = twin_integer(state, 0, dimension),
+            from = twin_integer(state, 0, dimension * dimension);
     if (twin_random(state) % 4 == 0)
         p[to] = p[from];
     if (twin_random(state) % 8 == 0)

@@ -55,11 +55,11 @@ static void end_call(hashing *h, unsigned before)
 #endif
 }
 
-#define CALL(status, call) \
-    do { \
+#define CALL(status, call)                \
+    do {                                  \
         unsigned before_ = begin_call(h); \
-        status = call; \
-        end_call(h, before_); \
+        status = call;                    \
+        end_call(h, before_);             \
     } while (0)
 
 /* --- hashes --- */
@@ -71,10 +71,7 @@ static void bytes(hashing *h, const void *data, size_t size)
         *h->hash = (*h->hash ^ p[i]) * 0x100000001b3;
 }
 
-static void number(hashing *h, uint64_t x)
-{
-    bytes(h, &x, sizeof x);
-}
+static void number(hashing *h, uint64_t x) { bytes(h, &x, sizeof x); }
 
 /* All NaNs are one: their bits are the compiler's. */
 static void real(hashing *h, double x)
@@ -164,7 +161,8 @@ static void hash_measures(hashing *h, const stiff_case *c, ebpo_file *file)
     number(h, report.violations);
 }
 
-static void hash_point(hashing *h, const stiff_case *c, ebpo_context *context, bool solid, const double p[3])
+static void hash_point(hashing *h, const stiff_case *c, ebpo_context *context, bool solid,
+                       const double p[3])
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status;
@@ -279,7 +277,8 @@ static void hash_questions(hashing *h, const stiff_case *c, query_model *m, uint
         bool fine = true;
         query_make_ray(m, &state, r.origin, r.direction, &r.t_max);
         for (int k = 0; k < 3; k++)
-            fine &= isfinite(r.origin[k]) && isfinite(r.direction[k]) && isfinite(r.origin[k] + r.direction[k]);
+            fine &= isfinite(r.origin[k]) && isfinite(r.direction[k]) &&
+                    isfinite(r.origin[k] + r.direction[k]);
         if (fine)
             hash_ray(h, c, m->context, &r);
     }
@@ -291,7 +290,8 @@ static void hash_questions(hashing *h, const stiff_case *c, query_model *m, uint
 
 /* --- a case --- */
 
-static ebpo_status check_mesh(hashing *h, const stiff_case *c, ebpo_mesh *mesh, ebpo_mesh_report *report, ebpo_build_options *options)
+static ebpo_status check_mesh(hashing *h, const stiff_case *c, ebpo_mesh *mesh,
+                              ebpo_mesh_report *report, ebpo_build_options *options)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status;
@@ -311,7 +311,9 @@ static ebpo_status check_mesh(hashing *h, const stiff_case *c, ebpo_mesh *mesh, 
 static void hash_selections(hashing *h, const stiff_case *c)
 {
     for (int way = 0; way < 5; way++) {
-        static const ebpo_selection selections[] = { EBPO_SELECT_KMEDOIDS, EBPO_SELECT_KMEDOIDS, EBPO_SELECT_OFFSET, EBPO_SELECT_RANDOM, EBPO_SELECT_INHERIT };
+        static const ebpo_selection selections[] = { EBPO_SELECT_KMEDOIDS, EBPO_SELECT_KMEDOIDS,
+                                                     EBPO_SELECT_OFFSET, EBPO_SELECT_RANDOM,
+                                                     EBPO_SELECT_INHERIT };
         ebpo_error error = EBPO_ERROR_INIT;
         ebpo_mesh mesh;
         ebpo_mesh_report report;
@@ -368,7 +370,8 @@ static void measure_mesh(query_model *m)
     }
 }
 
-void fp_hash_case(const stiff_case *c, const fp_setting *setting, uint64_t questions, fp_hashes *out)
+void fp_hash_case(const stiff_case *c, const fp_setting *setting, uint64_t questions,
+                  fp_hashes *out)
 {
     hashing hashing_now = { setting, true, &out->content }, *h = &hashing_now;
     ebpo_error error = EBPO_ERROR_INIT;

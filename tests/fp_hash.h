@@ -4,7 +4,8 @@
 
 #include "stiff.h"
 
-/* The floating-point environment in which the library is called; the test's own arithmetic runs in the default one. */
+/* The floating-point environment in which the library is called; the test's own arithmetic runs in
+ * the default one. */
 typedef struct fp_setting {
     int rounding;          /* of <fenv.h> */
     unsigned control_bits; /* x86: set in the SSE control register besides */
@@ -17,7 +18,8 @@ typedef struct fp_hashes {
     bool kept;          /* each call returned with the environment as it was */
 } fp_hashes;
 
-void fp_hash_case(const stiff_case *c, const fp_setting *setting, uint64_t questions, fp_hashes *out);
+void fp_hash_case(const stiff_case *c, const fp_setting *setting, uint64_t questions,
+                  fp_hashes *out);
 
 /* Small enough to be hashed by all builds. */
 bool fp_hash_takes(const stiff_case *c);

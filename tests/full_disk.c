@@ -1,7 +1,7 @@
 /* Preloaded: a disk that is full, and file systems that know no files without names.
- *   EBPO_TEST_FULL_AT=N   the N-th reservation of room for a file fails with ENOSPC, and all after it
- *   EBPO_TEST_NAMED=1     O_TMPFILE is not known
- *   EBPO_TEST_PAUSE=1     a file that is about to lose its name keeps it for a second */
+ *   EBPO_TEST_FULL_AT=N   the N-th reservation of room for a file fails with ENOSPC, and all after
+ * it EBPO_TEST_NAMED=1     O_TMPFILE is not known EBPO_TEST_PAUSE=1     a file that is about to
+ * lose its name keeps it for a second */
 #undef _FILE_OFFSET_BITS /* both names of each call are made here */
 #ifndef _GNU_SOURCE
 #define _GNU_SOURCE
@@ -47,10 +47,7 @@ int posix_fallocate64(int fd, off64_t offset, off64_t length)
     return reserve(fd, offset, length);
 }
 
-int posix_fallocate(int fd, off_t offset, off_t length)
-{
-    return reserve(fd, offset, length);
-}
+int posix_fallocate(int fd, off_t offset, off_t length) { return reserve(fd, offset, length); }
 
 static int open_really(const char *path, int flags, mode_t mode)
 {

@@ -7,17 +7,17 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-/* libhdf5 1.10 itself leaks when it gives up on a damaged object header; that is not what we look for here. */
+/* libhdf5 1.10 itself leaks when it gives up on a damaged object header; that is not what we look
+ * for here. */
 __attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void)
-{
-    return "leak:libhdf5";
-}
+const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
 
 /* Questions through whole models and through subtrees loaded on demand. */
 static void ask(ebpo_file *file, int cut_level)
 {
-    static const double points[4][3] = { { 0, 0, 0 }, { 0.25, 0.3, 0.2 }, { 1, 1, 1 }, { 1e9, -3, 0.5 } };
+    static const double points[4][3] = {
+        { 0, 0, 0 }, { 0.25, 0.3, 0.2 }, { 1, 1, 1 }, { 1e9, -3, 0.5 }
+    };
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
     ebpo_model *model;
     ebpo_context *context;
@@ -71,7 +71,8 @@ static void cut_level(ebpo_file *file)
     ebpo_mesh mesh;
     ebpo_lod_nodes nodes;
     options.threads = 1;
-    if (ebpo_lod_level_nodes(file, ebpo_file_info(file)->level_count - 1, &options, &mesh, &nodes, NULL, NULL) != EBPO_OK)
+    if (ebpo_lod_level_nodes(file, ebpo_file_info(file)->level_count - 1, &options, &mesh, &nodes,
+                             NULL, NULL) != EBPO_OK)
         return;
     ebpo_lod_nodes_free(&nodes);
     ebpo_mesh_free(&mesh);

@@ -1,8 +1,10 @@
-/* Drives a fuzz target without libFuzzer: replays files, then mutates each of them, always in the same way.
+/* Drives a fuzz target without libFuzzer: replays files, then mutates each of them, always in the
+ * same way.
  *
  *     fuzz_x [-n MUTATIONS] [-s SEED] FILE_OR_FOLDER...
  *
- * When the target crashes, its last words name the file, the seed and the number of the mutation; -1 is the file as it is. */
+ * When the target crashes, its last words name the file, the seed and the number of the mutation;
+ * -1 is the file as it is. */
 #include <dirent.h>
 #include <inttypes.h>
 #include <signal.h>
@@ -36,7 +38,8 @@ static uint64_t next(uint64_t *state)
 static void last_words(void)
 {
     char line[512];
-    int n = snprintf(line, sizeof line, "\ncrashed on %.300s, seed %" PRIu64 ", mutation %ld\n", now.file, now.seed, now.mutation);
+    int n = snprintf(line, sizeof line, "\ncrashed on %.300s, seed %" PRIu64 ", mutation %ld\n",
+                     now.file, now.seed, now.mutation);
     if (write(STDERR_FILENO, line, (size_t)n) < 0)
         _exit(1);
 }
@@ -53,7 +56,8 @@ void __sanitizer_set_death_callback(void (*callback)(void)) __attribute__((weak)
 
 static void run(const uint8_t *data, size_t size)
 {
-    uint8_t *exact = malloc(size ? size : 1); /* of this very size, so that a read behind its end is seen */
+    /* of this very size, so that a read behind its end is seen */
+    uint8_t *exact = malloc(size ? size : 1);
     if (!exact)
         exit(2);
     memcpy(exact, data, size);
@@ -76,7 +80,9 @@ static void overwrite(uint8_t *data, size_t size, size_t at, const void *bytes, 
 
 static size_t mutate_once(uint8_t *data, size_t size, uint64_t *state)
 {
-    static const uint32_t extremes[] = { 0, 1, 0x7f, 0x80, 0xff, 0x7fff, 0x8000, 0xffff, 0x7fffffff, 0x80000000, 0xfffffffe, 0xffffffff };
+    static const uint32_t extremes[] = { 0,          1,          0x7f,       0x80,
+                                         0xff,       0x7fff,     0x8000,     0xffff,
+                                         0x7fffffff, 0x80000000, 0xfffffffe, 0xffffffff };
     static const char letters[] = "0123456789-+.eE \t\r\n,nifx\0";
     if (!size)
         return 0;
@@ -88,7 +94,7 @@ static size_t mutate_once(uint8_t *data, size_t size, uint64_t *state)
     case 2: data[at] = (uint8_t)letters[next(state) % (sizeof letters - 1)]; return size;
     case 3: overwrite(data, size, at, &value, 4); return size;
     case 4: return at; /* cut */
-    case 5: /* drop some bytes */
+    case 5:            /* drop some bytes */
         n = size - at < n ? size - at : n;
         memmove(data + at, data + at + n, size - at - n);
         return size - n;

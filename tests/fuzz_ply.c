@@ -1,4 +1,5 @@
-/* Fuzz target: any bytes as a PLY file. A mesh that comes out must be whole: counts, arrays and indices that agree. */
+/* Fuzz target: any bytes as a PLY file. A mesh that comes out must be whole: counts, arrays and
+ * indices that agree. */
 #include <stdlib.h>
 
 #include <ebpo/mesh.h>
@@ -14,7 +15,8 @@ static void read_points(const ebpo_mesh *mesh, const uint8_t *data, size_t size)
     uint64_t count;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status = ebpo_points_parse_ply(&xyz, &count, data, size, "fuzz.ply", &error);
-    if (status != EBPO_OK && (mesh->face_count || xyz || count || error.status != status || !error.message[0]))
+    if (status != EBPO_OK &&
+        (mesh->face_count || xyz || count || error.status != status || !error.message[0]))
         abort();
     if (status == EBPO_OK && mesh->face_count && count != mesh->vertex_count)
         abort();
@@ -30,8 +32,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     ebpo_mesh mesh;
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_status status = ebpo_ply_parse_memory(&mesh, data, size, "fuzz.ply", NULL, 0, NULL, &error);
-    if (status != EBPO_OK && (error.status != status || !error.message[0] || mesh.faces || mesh.xyz32 || mesh.xyz64))
+    ebpo_status status =
+        ebpo_ply_parse_memory(&mesh, data, size, "fuzz.ply", NULL, 0, NULL, &error);
+    if (status != EBPO_OK &&
+        (error.status != status || !error.message[0] || mesh.faces || mesh.xyz32 || mesh.xyz64))
         abort();
     if (status == EBPO_OK && (!mesh.face_count || !mesh.xyz32 == !mesh.xyz64))
         abort();

@@ -1,5 +1,6 @@
-/* Makes the files of format-spec/vectors: make_vectors FOLDER. passed/ with what must be read, failed/ with what must be refused and why;
- * each failed file is a passed one with a single named change. Run it when the format changes, look at the difference, and commit both. */
+/* Makes the files of format-spec/vectors: make_vectors FOLDER. passed/ with what must be read,
+ * failed/ with what must be refused and why; each failed file is a passed one with a single named
+ * change. Run it when the format changes, look at the difference, and commit both. */
 #include <hdf5.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,12 +15,10 @@
 #include "tree_json.h"
 #include "vector_read.h"
 
-/* libhdf5 1.10 itself leaks when it gives up on a damaged object header; that is not what we look for here. */
+/* libhdf5 1.10 itself leaks when it gives up on a damaged object header; that is not what we look
+ * for here. */
 __attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void)
-{
-    return "leak:libhdf5";
-}
+const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
 
 static const char *folder;
 
@@ -51,7 +50,8 @@ static ebpo_mesh make_mesh(uint64_t faces, bool doubles)
     return mesh;
 }
 
-static void build(ebpo_tree *tree, uint64_t faces, bool doubles, int max_level, uint32_t leaf_faces, uint32_t more_parts)
+static void build(ebpo_tree *tree, uint64_t faces, bool doubles, int max_level, uint32_t leaf_faces,
+                  uint32_t more_parts)
 {
     ebpo_mesh mesh = make_mesh(faces, doubles);
     ebpo_mesh_report report;
@@ -64,7 +64,8 @@ static void build(ebpo_tree *tree, uint64_t faces, bool doubles, int max_level, 
     options.parts |= more_parts;
     options.threads = 1;
     options.unit = "m";
-    if (ebpo_mesh_check(&report, &mesh, 1, silent, &error) != EBPO_OK || ebpo_build(tree, &mesh, &report, &mend, &options, &error) != EBPO_OK)
+    if (ebpo_mesh_check(&report, &mesh, 1, silent, &error) != EBPO_OK ||
+        ebpo_build(tree, &mesh, &report, &mend, &options, &error) != EBPO_OK)
         die("build", error.message);
 }
 
@@ -78,7 +79,8 @@ static void write_vector(const char *name, ebpo_tree *tree, ebpo_codec codec, ui
     options.parts = parts;
     snprintf(tree->info.generator, sizeof tree->info.generator, "make_vectors");
     snprintf(path, sizeof path, "%s/passed/%s.ebpo.h5", folder, name);
-    if (ebpo_tree_write(tree, path, &options, &error) != EBPO_OK || vector_read(path, &back, &error) != EBPO_OK)
+    if (ebpo_tree_write(tree, path, &options, &error) != EBPO_OK ||
+        vector_read(path, &back, &error) != EBPO_OK)
         die(name, error.message);
     snprintf(path, sizeof path, "%s/passed/%s.json", folder, name);
     FILE *out = fopen(path, "w");
@@ -97,7 +99,8 @@ static void subset(ebpo_tree *tree, const ebpo_subset_options *options)
     ebpo_file *whole;
     ebpo_error error = EBPO_ERROR_INIT;
     snprintf(path, sizeof path, "%s/passed/06_four_levels_leaf_planes.ebpo.h5", folder);
-    if (ebpo_open(&whole, path, &error) != EBPO_OK || ebpo_subset_tree(tree, whole, options, &error) != EBPO_OK)
+    if (ebpo_open(&whole, path, &error) != EBPO_OK ||
+        ebpo_subset_tree(tree, whole, options, &error) != EBPO_OK)
         die(path, error.message);
     ebpo_close(whole);
 }
@@ -154,7 +157,8 @@ static void need(bool ok, const char *what)
 
 static void set_text(const char *object, const char *name, const char *text)
 {
-    hid_t id = H5Oopen(file, object, H5P_DEFAULT), type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR);
+    hid_t id = H5Oopen(file, object, H5P_DEFAULT), type = H5Tcopy(H5T_C_S1),
+          space = H5Screate(H5S_SCALAR);
     H5Tset_size(type, strlen(text));
     H5Tset_strpad(type, H5T_STR_NULLPAD);
     H5Tset_cset(type, H5T_CSET_UTF8);
@@ -175,8 +179,14 @@ static void set_number(const char *object, const char *name, hid_t type, int64_t
     H5Aclose(attribute);
     H5Oclose(id);
 }
-static void set_int(const char *object, const char *name, int64_t value) { set_number(object, name, H5T_NATIVE_INT64, value); }
-static void set_count(const char *object, const char *name, int64_t value) { set_number(object, name, H5T_NATIVE_UINT64, value); }
+static void set_int(const char *object, const char *name, int64_t value)
+{
+    set_number(object, name, H5T_NATIVE_INT64, value);
+}
+static void set_count(const char *object, const char *name, int64_t value)
+{
+    set_number(object, name, H5T_NATIVE_UINT64, value);
+}
 
 static void set_reals(const char *name, double a, double b, double c)
 {
@@ -188,13 +198,18 @@ static void set_reals(const char *name, double a, double b, double c)
 
 static void add_count(const char *object, const char *name, uint64_t value)
 {
-    hid_t space = H5Screate(H5S_SCALAR), attribute = H5Acreate_by_name(file, object, name, H5T_STD_U64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    hid_t space = H5Screate(H5S_SCALAR),
+          attribute = H5Acreate_by_name(file, object, name, H5T_STD_U64LE, space, H5P_DEFAULT,
+                                        H5P_DEFAULT, H5P_DEFAULT);
     need(attribute >= 0 && H5Awrite(attribute, H5T_NATIVE_UINT64, &value) >= 0, name);
     H5Aclose(attribute);
     H5Sclose(space);
 }
 
-static void drop_attribute(const char *object, const char *name) { need(H5Adelete_by_name(file, object, name, H5P_DEFAULT) >= 0, name); }
+static void drop_attribute(const char *object, const char *name)
+{
+    need(H5Adelete_by_name(file, object, name, H5P_DEFAULT) >= 0, name);
+}
 static void drop(const char *path) { need(H5Ldelete(file, path, H5P_DEFAULT) >= 0, path); }
 
 /* One value of an array, counted row by row. */
@@ -209,10 +224,13 @@ static void poke(const char *path, unsigned at, int64_t value)
     free(values);
 }
 
-/* An array in place of another: `chunk` 0 stands for contiguous storage, `limit` 0 for unlimited rows. */
-static void replace(const char *path, hid_t type, hsize_t rows, hsize_t cols, hsize_t chunk, hsize_t limit, void (*filters)(hid_t))
+/* An array in place of another: `chunk` 0 stands for contiguous storage, `limit` 0 for unlimited
+ * rows. */
+static void replace(const char *path, hid_t type, hsize_t rows, hsize_t cols, hsize_t chunk,
+                    hsize_t limit, void (*filters)(hid_t))
 {
-    hsize_t dims[2] = { rows, cols }, most[2] = { limit ? limit : H5S_UNLIMITED, cols }, chunks[2] = { chunk, cols };
+    hsize_t dims[2] = { rows, cols }, most[2] = { limit ? limit : H5S_UNLIMITED, cols },
+            chunks[2] = { chunk, cols };
     static const int64_t zeros[4096];
     int rank = cols ? 2 : 1;
     drop(path);
@@ -223,14 +241,18 @@ static void replace(const char *path, hid_t type, hsize_t rows, hsize_t cols, hs
     if (filters)
         filters(dcpl);
     hid_t id = H5Dcreate2(file, path, type, space, H5P_DEFAULT, dcpl, H5P_DEFAULT);
-    need(id >= 0 && H5Dwrite(id, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, zeros) >= 0, path);
+    need(id >= 0 && H5Dwrite(id, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, zeros) >= 0,
+         path);
     H5Dclose(id);
     H5Pclose(dcpl);
     H5Sclose(space);
 }
 
 static void checksum(hid_t dcpl) { H5Pset_fletcher32(dcpl); }
-static void scale_offset(hid_t dcpl) { H5Pset_scaleoffset(dcpl, H5Z_SO_INT, H5Z_SO_INT_MINBITS_DEFAULT); }
+static void scale_offset(hid_t dcpl)
+{
+    H5Pset_scaleoffset(dcpl, H5Z_SO_INT, H5Z_SO_INT_MINBITS_DEFAULT);
+}
 
 static haddr_t chunk_address(const char *path, hsize_t *size)
 {
@@ -243,12 +265,12 @@ static haddr_t chunk_address(const char *path, hsize_t *size)
     return address;
 }
 
-#define LEAVES "05_two_levels"
-#define DEEP "06_four_levels_leaf_planes"
-#define ODD "10_windings_of_all_sizes"
-#define LONG "11_two_chunks_of_faces"
+#define LEAVES    "05_two_levels"
+#define DEEP      "06_four_levels_leaf_planes"
+#define ODD       "10_windings_of_all_sizes"
+#define LONG      "11_two_chunks_of_faces"
 #define CUT_SHORT "12_subset_levels"
-#define BOXED "13_subset_box"
+#define BOXED     "13_subset_box"
 
 static void v_format(void) { set_text("/", "format", "EBP-Octree in HDF6"); }
 static void v_format_missing(void) { drop_attribute("/", "format"); }
@@ -264,7 +286,11 @@ static void v_pruned_more(void) { set_count("/levels/01", "pruned", 99); }
 static void v_pruned_less(void) { drop_attribute("/levels/01", "pruned"); }
 static void v_pruned_whole(void) { add_count("/levels/01", "pruned", 1); }
 static void v_attribute_missing(void) { drop_attribute("/", "epsilon"); }
-static void v_attribute_type(void) { drop_attribute("/", "face_count"); set_text("/", "face_count", "4"); }
+static void v_attribute_type(void)
+{
+    drop_attribute("/", "face_count");
+    set_text("/", "face_count", "4");
+}
 static void v_kind(void) { set_text("/", "kind", "liquid"); }
 static void v_control(void) { set_text("/", "unit", "m\nm"); }
 static void v_digest_text(void) { set_text("/", "content_sha256", "none"); }
@@ -295,12 +321,15 @@ static void v_group_for_array(void)
 static void v_soft_link(void)
 {
     drop("/mesh/faces");
-    need(H5Lcreate_soft("/levels/00/types", file, "/mesh/faces", H5P_DEFAULT, H5P_DEFAULT) >= 0, "link");
+    need(H5Lcreate_soft("/levels/00/types", file, "/mesh/faces", H5P_DEFAULT, H5P_DEFAULT) >= 0,
+         "link");
 }
 static void v_external_link(void)
 {
     drop("/mesh");
-    need(H5Lcreate_external("03_one_leaf.ebpo.h5", "/mesh", file, "/mesh", H5P_DEFAULT, H5P_DEFAULT) >= 0, "link");
+    need(H5Lcreate_external("03_one_leaf.ebpo.h5", "/mesh", file, "/mesh", H5P_DEFAULT,
+                            H5P_DEFAULT) >= 0,
+         "link");
 }
 static void v_big_endian(void) { replace("/mesh/faces", H5T_STD_U32BE, 4, 3, 4, 4, checksum); }
 static void v_signed(void) { replace("/mesh/faces", H5T_STD_I32LE, 4, 3, 4, 4, checksum); }
@@ -445,7 +474,8 @@ static void change_bytes(const char *path, late_change late)
     hsize_t chunk_size = 0, other_size = 0;
     uint8_t *data = slurp(path, &size);
     file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
-    haddr_t faces = chunk_address("/mesh/faces", &chunk_size), types = chunk_address("/levels/00/types", &other_size);
+    haddr_t faces = chunk_address("/mesh/faces", &chunk_size),
+            types = chunk_address("/levels/00/types", &other_size);
     H5Fclose(file);
     switch (late) {
     case CUT: size -= 40; break;

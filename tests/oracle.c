@@ -96,7 +96,8 @@ void oracle_fraction_swap(oracle_fraction *a, oracle_fraction *b)
 
 /* --- rounding --- */
 
-/* m * 2^e, a little more when `sticky`, to the nearest double, ties to even. m has more than 60 bits. */
+/* m * 2^e, a little more when `sticky`, to the nearest double, ties to even. m has more than 60
+ * bits. */
 static double round_integer(const mpz_t m, int e, bool sticky)
 {
     int top = (int)mpz_sizeinbase(m, 2) + e, low = top - 53 < -1074 ? -1074 : top - 53;
@@ -108,7 +109,8 @@ static double round_integer(const mpz_t m, int e, bool sticky)
     bool rest = sticky || mpz_scan1(m, 0) < drop - 1;
     if (half && (rest || mpz_odd_p(kept)))
         mpz_add_ui(kept, kept, 1);
-    double value = ldexp(mpz_get_d(kept), low); /* at most 2^53: exact, and ldexp is exact or overflows */
+    /* at most 2^53: exact, and ldexp is exact or overflows */
+    double value = ldexp(mpz_get_d(kept), low);
     mpz_clear(kept);
     return value;
 }
@@ -135,7 +137,8 @@ double oracle_round(const mpz_t num, const mpz_t den, int exponent, bool root)
         sticky |= mpz_sgn(r) != 0;
         e /= 2;
     }
-    /* Far below the least double there may be too few bits to drop: 2^-1074 has its own rounding. */
+    /* Far below the least double there may be too few bits to drop: 2^-1074 has its own rounding.
+     */
     if ((int)mpz_sizeinbase(q, 2) + e < -1074) {
         mpz_clears(q, r, NULL);
         return 0;
@@ -243,9 +246,11 @@ oracle *oracle_make(const ebpo_mesh *mesh)
     o->e = o->exponent;
     for (uint32_t f = 0; f < o->face_count; f++) {
         oracle_load(o, f);
-        o->flat[f] = mpz_sgn(o->normal[0]) == 0 && mpz_sgn(o->normal[1]) == 0 && mpz_sgn(o->normal[2]) == 0;
+        o->flat[f] =
+            mpz_sgn(o->normal[0]) == 0 && mpz_sgn(o->normal[1]) == 0 && mpz_sgn(o->normal[2]) == 0;
         for (size_t i = 0; i < 9; i++)
-            o->corner[f][i] = ldexp(o->xyz[3 * (size_t)o->faces[3 * (size_t)f + i / 3] + i % 3], -o->scale);
+            o->corner[f][i] =
+                ldexp(o->xyz[3 * (size_t)o->faces[3 * (size_t)f + i / 3] + i % 3], -o->scale);
     }
     return o;
 }
@@ -268,7 +273,8 @@ void oracle_free(oracle *o)
     for (int i = 0; i < 12; i++)
         mpz_clear(o->s[i]);
     mpz_clears(o->best.num, o->best.den, o->one.num, o->one.den, o->other.num, o->other.den, NULL);
-    void *blocks[] = { o->faces, o->xyz, o->corner, o->box, o->integer, o->flat, o->found, o->low, o->hits, o->items };
+    void *blocks[] = { o->faces, o->xyz,   o->corner, o->box,  o->integer,
+                       o->flat,  o->found, o->low,    o->hits, o->items };
     for (size_t i = 0; i < sizeof blocks / sizeof *blocks; i++)
         free(blocks[i]);
     free(o);

@@ -92,13 +92,15 @@ static double dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Weights of a point of the triangle near the origin's nearest one. Their precision does not matter for the bounds' truth. Ericson 2005, 5.1.5. */
+/* Weights of a point of the triangle near the origin's nearest one. Their precision does not matter
+ * for the bounds' truth. Ericson 2005, 5.1.5. */
 static void near_weights(double a[3][3], double w[3])
 {
     double ab[3], ac[3];
     for (int k = 0; k < 3; k++)
         ab[k] = a[1][k] - a[0][k], ac[k] = a[2][k] - a[0][k];
-    double d1 = -dot(ab, a[0]), d2 = -dot(ac, a[0]), d3 = -dot(ab, a[1]), d4 = -dot(ac, a[1]), d5 = -dot(ab, a[2]), d6 = -dot(ac, a[2]);
+    double d1 = -dot(ab, a[0]), d2 = -dot(ac, a[0]), d3 = -dot(ab, a[1]), d4 = -dot(ac, a[1]),
+           d5 = -dot(ab, a[2]), d6 = -dot(ac, a[2]);
     double va = d3 * d6 - d5 * d4, vb = d5 * d2 - d1 * d6, vc = d1 * d4 - d3 * d2;
     w[0] = 1, w[1] = w[2] = 0;
     if (d1 <= 0 && d2 <= 0)
@@ -124,7 +126,8 @@ static void near_weights(double a[3][3], double w[3])
         w[0] = 1 - w[1] - w[2];
 }
 
-/* low <= distance <= high for the origin, whatever the rounding: high is the distance of a point of the triangle, low that of a plane before it. */
+/* low <= distance <= high for the origin, whatever the rounding: high is the distance of a point of
+ * the triangle, low that of a plane before it. */
 static void face_bounds(const double corner[9], const double p[3], double *low, double *high)
 {
     double a[3][3], w[3], q[3], reach = 0;
@@ -137,7 +140,8 @@ static void face_bounds(const double corner[9], const double p[3], double *low, 
     if (!(reach > 0x1p-400 && reach < 0x1p400))
         return;
     near_weights(a, w);
-    if (!(w[0] >= -1e-13 && w[1] >= -1e-13 && w[2] >= -1e-13 && fabs(w[0] + w[1] + w[2] - 1) < 1e-13))
+    if (!(w[0] >= -1e-13 && w[1] >= -1e-13 && w[2] >= -1e-13 &&
+          fabs(w[0] + w[1] + w[2] - 1) < 1e-13))
         w[0] = 1, w[1] = w[2] = 0;
     for (int k = 0; k < 3; k++)
         q[k] = w[0] * a[0][k] + w[1] * a[1][k] + w[2] * a[2][k];
@@ -157,13 +161,17 @@ static double box_squared(const double corner[9], const double p[3])
             low = x < low ? x : low;
             high = x > high ? x : high;
         }
-        double below = low - p[k], above = p[k] - high, d = below > 0 ? below : above > 0 ? above : 0;
+        double below = low - p[k], above = p[k] - high,
+               d = below > 0   ? below
+                   : above > 0 ? above
+                               : 0;
         sum += d * d;
     }
     return sum;
 }
 
-/* Candidates into found, `*count` of them: every face that is at the least distance is among them. */
+/* Candidates into found, `*count` of them: every face that is at the least distance is among them.
+ */
 static uint32_t candidates(oracle *o, const double p[3])
 {
     double q[3], best = INFINITY;
@@ -214,7 +222,8 @@ static int fast_sign(const double d[3], const double b[3], const double c[3])
 {
     double rb = fabs(b[0]) + fabs(b[1]) + fabs(b[2]), rc = fabs(c[0]) + fabs(c[1]) + fabs(c[2]);
     double bound = 1e-12 * (fabs(d[0]) + fabs(d[1]) + fabs(d[2])) * rb * rc;
-    double v = d[0] * (b[1] * c[2] - b[2] * c[1]) + d[1] * (b[2] * c[0] - b[0] * c[2]) + d[2] * (b[0] * c[1] - b[1] * c[0]);
+    double v = d[0] * (b[1] * c[2] - b[2] * c[1]) + d[1] * (b[2] * c[0] - b[0] * c[2]) +
+               d[2] * (b[0] * c[1] - b[1] * c[0]);
     if (!(bound > 0x1p-400 && bound < 0x1p400))
         return 2;
     return v > bound ? 1 : v < -bound ? -1 : 2;
@@ -230,7 +239,8 @@ static void exact_signs(oracle *o, int sign[3])
     }
 }
 
-/* 1: leaves through the face, -1: enters, 0: neither, 2: the ray meets an edge or a vertex, or is in the plane. */
+/* 1: leaves through the face, -1: enters, 0: neither, 2: the ray meets an edge or a vertex, or is
+ * in the plane. */
 static int crossing(oracle *o, uint32_t face, const double p[3], const double d[3])
 {
     double a[3][3];
@@ -245,7 +255,8 @@ static int crossing(oracle *o, uint32_t face, const double p[3], const double d[
             return 0;
     oracle_load(o, face);
     exact_signs(o, sign);
-    bool negative = sign[0] < 0 || sign[1] < 0 || sign[2] < 0, positive = sign[0] > 0 || sign[1] > 0 || sign[2] > 0;
+    bool negative = sign[0] < 0 || sign[1] < 0 || sign[2]<0, positive = sign[0]> 0 || sign[1] > 0 ||
+                    sign[2] > 0;
     if (negative && positive)
         return 0; /* the line passes by */
     if (!negative && !positive)
@@ -253,7 +264,8 @@ static int crossing(oracle *o, uint32_t face, const double p[3], const double d[
     oracle_dot(o->s[0], o->normal, o->a[0]);
     int ahead = mpz_sgn(o->s[0]) * (positive ? 1 : -1);
     if (ahead <= 0)
-        return 0; /* the face is behind; not 0 where the line meets the face, as the point is not on it */
+        /* the face is behind; not 0 where the line meets the face, as the point is not on it */
+        return 0;
     if (sign[0] == 0 || sign[1] == 0 || sign[2] == 0)
         return 2;
     return positive ? 1 : -1;
@@ -296,9 +308,11 @@ int32_t oracle_winding(oracle *o, const double p[3])
     set_point(o, p);
     for (;;) {
         double d[3];
-        for (int k = 0; k < 3; k++) { /* towards the nearer side of the mesh's box: fewer faces to look at */
+        for (int k = 0; k < 3;
+             k++) { /* towards the nearer side of the mesh's box: fewer faces to look at */
             state = state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
-            d[k] = (double)(1 + (state >> 40) % 1000) * (p[k] - o->min[k] > o->max[k] - p[k] ? 1 : -1);
+            d[k] =
+                (double)(1 + (state >> 40) % 1000) * (p[k] - o->min[k] > o->max[k] - p[k] ? 1 : -1);
         }
         if (count_crossings(o, p, d, &sum))
             return sum;

@@ -36,7 +36,8 @@ static void meet_along(oracle *o, int i, bool *any, oracle_fraction *best)
     keep_least(o, any, best, &o->one);
 }
 
-/* Edge i against the ray, both in space: t = (a x u) . c / c^2, place on the edge s = (a x d) . c / c^2, c = d x u. */
+/* Edge i against the ray, both in space: t = (a x u) . c / c^2, place on the edge s = (a x d) . c /
+ * c^2, c = d x u. */
 static void meet_edge(oracle *o, int i, bool *any, oracle_fraction *best)
 {
     oracle_cross(o->v[0], o->direction, o->edge[i]);
@@ -149,12 +150,14 @@ static oracle_ray_item *item(oracle *o, uint32_t i)
 static bool passes_by(const double box[6], const double origin[3], const double direction[3])
 {
     for (int k = 0; k < 3; k++)
-        if ((direction[k] >= 0 && box[3 + k] < origin[k]) || (direction[k] <= 0 && box[k] > origin[k]))
+        if ((direction[k] >= 0 && box[3 + k] < origin[k]) ||
+            (direction[k] <= 0 && box[k] > origin[k]))
             return true;
     return false;
 }
 
-void oracle_ray(oracle *o, const double origin[3], const double direction[3], double t_max, const oracle_hit **hits, uint32_t *count)
+void oracle_ray(oracle *o, const double origin[3], const double direction[3], double t_max,
+                const oracle_hit **hits, uint32_t *count)
 {
     int unit = INT_MAX;
     uint32_t n = 0;
@@ -208,7 +211,8 @@ static bool separates(oracle *o, mpz_t *axis)
     return above == 3 || below == 3;
 }
 
-/* Separating axes of two convex polytopes; flat ones are limits of thick ones, so the same axes do. */
+/* Separating axes of two convex polytopes; flat ones are limits of thick ones, so the same axes do.
+ */
 static bool meets_box(oracle *o, uint32_t face)
 {
     oracle_load(o, face);
@@ -229,7 +233,8 @@ static bool meets_box(oracle *o, uint32_t face)
     return true;
 }
 
-void oracle_box(oracle *o, const double min[3], const double max[3], const uint32_t **faces, uint32_t *count)
+void oracle_box(oracle *o, const double min[3], const double max[3], const uint32_t **faces,
+                uint32_t *count)
 {
     double both[6] = { min[0], min[1], min[2], max[0], max[1], max[2] };
     oracle_choose_unit(o, both, 6);

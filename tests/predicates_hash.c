@@ -1,4 +1,5 @@
-/* Built once for each set of compiler flags, with the predicates' sources built the same way: prints one hash of many results, of all stages. */
+/* Built once for each set of compiler flags, with the predicates' sources built the same way:
+ * prints one hash of many results, of all stages. */
 #include "geom/strict_fp.h"
 
 #include <inttypes.h>
@@ -24,7 +25,7 @@ static uint64_t mix_double(uint64_t hash, double x)
     union {
         double number;
         uint64_t bits;
-    } u = {x};
+    } u = { x };
     return (hash ^ u.bits) * 0x100000001b3;
 }
 
@@ -43,7 +44,7 @@ static uint64_t hash_points(uint64_t hash, const double *p)
 
 static uint64_t hash_box(uint64_t hash, const double min[3], double extent)
 {
-    const double max[3] = {min[0] + extent, min[1] + extent, min[2] + extent};
+    const double max[3] = { min[0] + extent, min[1] + extent, min[2] + extent };
     ebpo_box box;
     if (!ebpo_box_make(&box, min, max, 17))
         return mix(hash, 0);
@@ -55,15 +56,18 @@ static uint64_t hash_box(uint64_t hash, const double min[3], double extent)
 /* The ray from the first point to one near the last, and to the middle of the others. */
 static uint64_t hash_rays(uint64_t hash, const double *p)
 {
-    const double triangle[3][3] = {{p[0], p[1], p[2]}, {p[3], p[4], p[5]}, {p[6], p[7], p[8]}};
-    const double other[3][3] = {{p[0], p[1], p[2]}, {p[6], p[7], p[8]}, {p[3], p[5], p[4]}};
-    ebpo_segment ray = {.t_max = 1.5};
+    const double triangle[3][3] = { { p[0], p[1], p[2] },
+                                    { p[3], p[4], p[5] },
+                                    { p[6], p[7], p[8] } };
+    const double other[3][3] = { { p[0], p[1], p[2] }, { p[6], p[7], p[8] }, { p[3], p[5], p[4] } };
+    ebpo_segment ray = { .t_max = 1.5 };
     for (int aim = 0; aim < 2; aim++) {
         ebpo_ray_meeting m, n;
         for (int k = 0; k < 3; k++) {
             double to = aim == 0 ? p[k] : .25 * p[k] + .25 * p[3 + k] + .5 * p[6 + k];
             ray.origin[k] = p[9 + k];
-            ray.direction[k] = to - p[9 + k] < INFINITY && to - p[9 + k] > -INFINITY ? to - p[9 + k] : 1;
+            ray.direction[k] =
+                to - p[9 + k] < INFINITY && to - p[9 + k] > -INFINITY ? to - p[9 + k] : 1;
         }
         if (ray.direction[0] == 0 && ray.direction[1] == 0)
             ray.direction[0] = 1;
@@ -73,14 +77,17 @@ static uint64_t hash_rays(uint64_t hash, const double *p)
         if (m.meets && n.meets)
             hash = mix(hash, ebpo_ray_compare(&ray, triangle, other));
     }
-    const double low[3] = {p[9], fmin(p[10], p[1]), p[11]}, high[3] = {p[9], fmax(p[10], p[1]), p[11]};
+    const double low[3] = { p[9], fmin(p[10], p[1]), p[11] },
+                 high[3] = { p[9], fmax(p[10], p[1]), p[11] };
     return mix(hash, ebpo_triangle_meets_box(triangle, low, high));
 }
 
 static uint64_t hash_distances(uint64_t hash, const double *p)
 {
-    const double triangle[3][3] = {{p[0], p[1], p[2]}, {p[3], p[4], p[5]}, {p[6], p[7], p[8]}};
-    const double other[3][3] = {{p[0], p[1], p[2]}, {p[6], p[7], p[8]}, {p[3], p[5], p[4]}};
+    const double triangle[3][3] = { { p[0], p[1], p[2] },
+                                    { p[3], p[4], p[5] },
+                                    { p[6], p[7], p[8] } };
+    const double other[3][3] = { { p[0], p[1], p[2] }, { p[6], p[7], p[8] }, { p[3], p[5], p[4] } };
     ebpo_distance_bounds b;
     ebpo_triangle_nearest n;
     double normal[3];

@@ -38,7 +38,8 @@ uint64_t query_scaled(uint64_t count)
 
 /* --- models --- */
 
-ebpo_status query_build(ebpo_tree *tree, ebpo_mesh *mesh, const query_variant *variant, ebpo_error *error)
+ebpo_status query_build(ebpo_tree *tree, ebpo_mesh *mesh, const query_variant *variant,
+                        ebpo_error *error)
 {
     ebpo_mesh_report report;
     ebpo_status status = ebpo_mesh_check(&report, mesh, 1, (ebpo_progress){ NULL, NULL }, error);
@@ -56,7 +57,8 @@ ebpo_status query_build(ebpo_tree *tree, ebpo_mesh *mesh, const query_variant *v
     return ebpo_build(tree, mesh, &report, NULL, &options, error);
 }
 
-static ebpo_status write_tree(query_model *m, ebpo_mesh mesh, const query_variant *variant, ebpo_error *error)
+static ebpo_status write_tree(query_model *m, ebpo_mesh mesh, const query_variant *variant,
+                              ebpo_error *error)
 {
     ebpo_tree tree;
     ebpo_status status = query_build(&tree, &mesh, variant, error);
@@ -95,7 +97,8 @@ static void measure(query_model *m)
         oracle_normal(m->judge, f, m->normal[f]);
 }
 
-ebpo_status query_model_try(query_model *m, const char *name, ebpo_mesh mesh, const query_variant *variant, ebpo_error *error)
+ebpo_status query_model_try(query_model *m, const char *name, ebpo_mesh mesh,
+                            const query_variant *variant, ebpo_error *error)
 {
     memset(m, 0, sizeof *m);
     m->name = name;
@@ -120,10 +123,12 @@ ebpo_status query_model_try(query_model *m, const char *name, ebpo_mesh mesh, co
     return EBPO_OK;
 }
 
-void query_model_make(query_model *m, const char *name, ebpo_mesh mesh, const query_variant *variant)
+void query_model_make(query_model *m, const char *name, ebpo_mesh mesh,
+                      const query_variant *variant)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert_msg(query_model_try(m, name, mesh, variant, &error) == EBPO_OK, "%s, %s: %s", name, variant->name, error.message);
+    ck_assert_msg(query_model_try(m, name, mesh, variant, &error) == EBPO_OK, "%s, %s: %s", name,
+                  variant->name, error.message);
 }
 
 void query_model_free(query_model *m)
@@ -143,7 +148,9 @@ void query_model_free(query_model *m)
 
 static bool inside_by(ebpo_rule rule, int32_t winding)
 {
-    return rule == EBPO_RULE_NONZERO ? winding != 0 : rule == EBPO_RULE_EVENODD ? winding % 2 != 0 : winding > 0;
+    return rule == EBPO_RULE_NONZERO   ? winding != 0
+           : rule == EBPO_RULE_EVENODD ? winding % 2 != 0
+                                       : winding > 0;
 }
 
 void query_find_truths(query_model *m, const double *points, uint64_t count, query_truth *out)
@@ -175,7 +182,8 @@ static bool show(const query_model *m, const double *p, uint64_t *wrong)
     return true;
 }
 
-uint64_t query_wrong_inside(const query_model *m, const double *points, const query_truth *truth, uint64_t count, const ebpo_inside_result *got)
+uint64_t query_wrong_inside(const query_model *m, const double *points, const query_truth *truth,
+                            uint64_t count, const ebpo_inside_result *got)
 {
     uint64_t wrong = 0;
     for (uint64_t i = 0; i < count; i++) {
@@ -183,14 +191,16 @@ uint64_t query_wrong_inside(const query_model *m, const double *points, const qu
         if (got[i].where == t->where && got[i].winding == t->winding && got[i].doubt == 0)
             continue;
         if (show(m, points + 3 * i, &wrong))
-            fprintf(stderr, "inside says %d, winding %d, doubt %a; it is %d, winding %d\n", got[i].where, got[i].winding, got[i].doubt, t->where,
-                    t->winding);
+            fprintf(stderr, "inside says %d, winding %d, doubt %a; it is %d, winding %d\n",
+                    got[i].where, got[i].winding, got[i].doubt, t->where, t->winding);
     }
     return wrong;
 }
 
-/* The nearest point is about at the distance from the point: within some ulps of the largest coordinate. */
-static bool point_fits(const query_model *m, const double *p, const query_truth *t, const ebpo_distance_result *got)
+/* The nearest point is about at the distance from the point: within some ulps of the largest
+ * coordinate. */
+static bool point_fits(const query_model *m, const double *p, const query_truth *t,
+                       const ebpo_distance_result *got)
 {
     long double sum = 0;
     double largest = m->largest;
@@ -212,7 +222,8 @@ static bool normal_fits(const query_model *m, const query_truth *t, const ebpo_d
     return true;
 }
 
-static const char *distance_fault(const query_model *m, const double *p, const query_truth *t, bool is_unsigned, const ebpo_distance_result *got)
+static const char *distance_fault(const query_model *m, const double *p, const query_truth *t,
+                                  bool is_unsigned, const ebpo_distance_result *got)
 {
     double expected = t->where == EBPO_IN && !is_unsigned ? -t->distance : t->distance;
     if (got->distance != expected)
@@ -228,8 +239,8 @@ static const char *distance_fault(const query_model *m, const double *p, const q
     return NULL;
 }
 
-uint64_t query_wrong_distance(const query_model *m, const double *points, const query_truth *truth, uint64_t count, bool is_unsigned,
-                              const ebpo_distance_result *got)
+uint64_t query_wrong_distance(const query_model *m, const double *points, const query_truth *truth,
+                              uint64_t count, bool is_unsigned, const ebpo_distance_result *got)
 {
     uint64_t wrong = 0;
     for (uint64_t i = 0; i < count; i++) {
@@ -238,25 +249,35 @@ uint64_t query_wrong_distance(const query_model *m, const double *points, const 
             continue;
         const query_truth *t = truth + i;
         const double *n = m->normal[t->file_face];
-        fprintf(stderr, "wrong %s: distance %a in [%a, %a], face %llu, point (%a, %a, %a), normal (%a, %a, %a); it is %a, where %d, face %llu (%u at this distance), normal (%a, %a, %a)\n",
-                fault, got[i].distance, got[i].lo, got[i].hi, (unsigned long long)got[i].face, got[i].point[0], got[i].point[1], got[i].point[2],
-                got[i].normal[0], got[i].normal[1], got[i].normal[2], t->distance, t->where, (unsigned long long)t->face, t->ties, n[0], n[1], n[2]);
+        fprintf(stderr,
+                "wrong %s: distance %a in [%a, %a], face %llu, point (%a, %a, %a), normal (%a, %a, "
+                "%a); it is %a, where %d, face %llu (%u at this distance), normal (%a, %a, %a)\n",
+                fault, got[i].distance, got[i].lo, got[i].hi, (unsigned long long)got[i].face,
+                got[i].point[0], got[i].point[1], got[i].point[2], got[i].normal[0],
+                got[i].normal[1], got[i].normal[2], t->distance, t->where,
+                (unsigned long long)t->face, t->ties, n[0], n[1], n[2]);
     }
     return wrong;
 }
 
-uint64_t query_wrong_limited_inside(const query_model *m, const double *points, const query_truth *truth, uint64_t count,
+uint64_t query_wrong_limited_inside(const query_model *m, const double *points,
+                                    const query_truth *truth, uint64_t count,
                                     const ebpo_inside_result *got)
 {
     uint64_t wrong = 0;
     for (uint64_t i = 0; i < count; i++) {
         const query_truth *t = truth + i;
-        bool maybe = got[i].where == EBPO_MAYBE && got[i].winding == 0 && got[i].doubt >= t->distance;
-        bool winding = got[i].winding == t->winding || (t->where == EBPO_OUT && got[i].winding == 0); /* an envelope does not tell more */
+        bool maybe =
+            got[i].where == EBPO_MAYBE && got[i].winding == 0 && got[i].doubt >= t->distance;
+        /* an envelope does not tell more */
+        bool winding =
+            got[i].winding == t->winding || (t->where == EBPO_OUT && got[i].winding == 0);
         bool certain = got[i].where == t->where && winding && got[i].doubt == 0;
         if (!maybe && !certain && show(m, points + 3 * i, &wrong))
-            fprintf(stderr, "limited inside says %d, winding %d, doubt %a; it is %d, winding %d, at distance %a\n", got[i].where, got[i].winding,
-                    got[i].doubt, t->where, t->winding, t->distance);
+            fprintf(stderr,
+                    "limited inside says %d, winding %d, doubt %a; it is %d, winding %d, at "
+                    "distance %a\n",
+                    got[i].where, got[i].winding, got[i].doubt, t->where, t->winding, t->distance);
     }
     return wrong;
 }
@@ -272,14 +293,18 @@ static bool limited_distance_fits(const query_truth *t, const ebpo_distance_resu
     return got->distance == (t->where == EBPO_IN ? -t->distance : t->distance);
 }
 
-uint64_t query_wrong_limited_distance(const query_model *m, const double *points, const query_truth *truth, uint64_t count,
+uint64_t query_wrong_limited_distance(const query_model *m, const double *points,
+                                      const query_truth *truth, uint64_t count,
                                       const ebpo_distance_result *got)
 {
     uint64_t wrong = 0;
     for (uint64_t i = 0; i < count; i++)
         if (!limited_distance_fits(truth + i, got + i) && show(m, points + 3 * i, &wrong))
-            fprintf(stderr, "limited distance says %a in [%a, %a], face %llu; it is %a, where %d, face %llu\n", got[i].distance, got[i].lo, got[i].hi,
-                    (unsigned long long)got[i].face, truth[i].distance, truth[i].where, (unsigned long long)truth[i].face);
+            fprintf(
+                stderr,
+                "limited distance says %a in [%a, %a], face %llu; it is %a, where %d, face %llu\n",
+                got[i].distance, got[i].lo, got[i].hi, (unsigned long long)got[i].face,
+                truth[i].distance, truth[i].where, (unsigned long long)truth[i].face);
     return wrong;
 }
 
@@ -301,22 +326,27 @@ static uint64_t steps(double a, double b)
 
 static bool hit_fits(const query_model *m, const oracle_hit *expected, const ebpo_ray_hit *got)
 {
-    return got->face == query_told(m, expected->face) && got->side == expected->side && steps(got->t + 0.0, expected->t) <= 2;
+    return got->face == query_told(m, expected->face) && got->side == expected->side &&
+           steps(got->t + 0.0, expected->t) <= 2;
 }
 
 static void show_ray(const query_model *m, const query_ray *r)
 {
-    fprintf(stderr, "%s, %s: ray (%a, %a, %a) + t (%a, %a, %a), t <= %a: ", m->name, m->variant, r->origin[0], r->origin[1], r->origin[2],
-            r->direction[0], r->direction[1], r->direction[2], r->t_max);
+    fprintf(stderr, "%s, %s: ray (%a, %a, %a) + t (%a, %a, %a), t <= %a: ", m->name, m->variant,
+            r->origin[0], r->origin[1], r->origin[2], r->direction[0], r->direction[1],
+            r->direction[2], r->t_max);
 }
 
-static bool hits_fit(const query_model *m, const query_ray *r, const oracle_hit *expected, uint32_t n, const ebpo_ray_hit *got, uint64_t count)
+static bool hits_fit(const query_model *m, const query_ray *r, const oracle_hit *expected,
+                     uint32_t n, const ebpo_ray_hit *got, uint64_t count)
 {
     for (uint32_t i = 0; i < n && i < count; i++)
         if (!hit_fits(m, &expected[i], &got[i])) {
             show_ray(m, r);
-            fprintf(stderr, "hit %u says t %a, face %llu, side %d; it is t %a, face %llu, side %d\n", i, got[i].t, (unsigned long long)got[i].face,
-                    got[i].side, expected[i].t, (unsigned long long)query_told(m, expected[i].face), expected[i].side);
+            fprintf(stderr,
+                    "hit %u says t %a, face %llu, side %d; it is t %a, face %llu, side %d\n", i,
+                    got[i].t, (unsigned long long)got[i].face, got[i].side, expected[i].t,
+                    (unsigned long long)query_told(m, expected[i].face), expected[i].side);
             return false;
         }
     if (count != n) {
@@ -336,15 +366,18 @@ bool query_ask_ray(query_model *m, ebpo_context *context, const query_ray *r)
     bool hit;
     ebpo_error error = EBPO_ERROR_INIT;
     oracle_ray(m->judge, r->origin, r->direction, r->t_max, &expected, &n);
-    if (ebpo_ray_first(context, r->origin, r->direction, r->t_max, &first, &hit, &error) != EBPO_OK ||
-        ebpo_ray_all(context, r->origin, r->direction, r->t_max, &hits, &count, &error) != EBPO_OK) {
+    if (ebpo_ray_first(context, r->origin, r->direction, r->t_max, &first, &hit, &error) !=
+            EBPO_OK ||
+        ebpo_ray_all(context, r->origin, r->direction, r->t_max, &hits, &count, &error) !=
+            EBPO_OK) {
         show_ray(m, r);
         fprintf(stderr, "%s\n", error.message);
         return false;
     }
     if (hit != (n > 0) || (n > 0 && !hit_fits(m, &expected[0], &first))) {
         show_ray(m, r);
-        fprintf(stderr, "the first hit is not right: %d, t %a, face %llu, side %d\n", hit, first.t, (unsigned long long)first.face, first.side);
+        fprintf(stderr, "the first hit is not right: %d, t %a, face %llu, side %d\n", hit, first.t,
+                (unsigned long long)first.face, first.side);
         return false;
     }
     return hits_fit(m, r, expected, n, hits, count);
@@ -364,12 +397,15 @@ void query_ask(query_model *m, uint64_t count, uint64_t seed)
         const double *p = points + 3 * at;
         uint64_t n = count - at < BATCH ? count - at : BATCH;
         query_find_truths(m, p, n, truth);
-        ck_assert_msg(ebpo_inside_many(m->context, p, n, NULL, inside, &error) == EBPO_OK, "%s, %s: %s", m->name, m->variant, error.message);
-        ck_assert_msg(ebpo_distance_many(m->context, p, n, NULL, distance, &error) == EBPO_OK, "%s, %s: %s", m->name, m->variant, error.message);
+        ck_assert_msg(ebpo_inside_many(m->context, p, n, NULL, inside, &error) == EBPO_OK,
+                      "%s, %s: %s", m->name, m->variant, error.message);
+        ck_assert_msg(ebpo_distance_many(m->context, p, n, NULL, distance, &error) == EBPO_OK,
+                      "%s, %s: %s", m->name, m->variant, error.message);
         wrong += query_wrong_inside(m, p, truth, n, inside);
         wrong += query_wrong_distance(m, p, truth, n, false, distance);
     }
-    ck_assert_msg(wrong == 0, "%s, %s, seed %llu: %llu wrong answers", m->name, m->variant, (unsigned long long)seed, (unsigned long long)wrong);
+    ck_assert_msg(wrong == 0, "%s, %s, seed %llu: %llu wrong answers", m->name, m->variant,
+                  (unsigned long long)seed, (unsigned long long)wrong);
     free(points);
     free(truth);
     free(inside);

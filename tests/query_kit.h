@@ -1,4 +1,5 @@
-/* What the tests of questions share: solids, files made of them, awkward points, and the judge's verdict. */
+/* What the tests of questions share: solids, files made of them, awkward points, and the judge's
+ * verdict. */
 #ifndef EBPO_TESTS_QUERY_KIT_H
 #define EBPO_TESTS_QUERY_KIT_H
 
@@ -9,11 +10,11 @@
 #include "solids.h"
 
 /* For Check tests: `call` may name `error`. */
-#define ASSERT_OK(call)                                                       \
-    do {                                                                      \
-        ebpo_error error_ = EBPO_ERROR_INIT, *error = &error_;                \
-        ebpo_status status_ = (call);                                         \
-        ck_assert_msg(status_ == EBPO_OK, "%s: %s", #call, error_.message);   \
+#define ASSERT_OK(call)                                                     \
+    do {                                                                    \
+        ebpo_error error_ = EBPO_ERROR_INIT, *error = &error_;              \
+        ebpo_status status_ = (call);                                       \
+        ck_assert_msg(status_ == EBPO_OK, "%s: %s", #call, error_.message); \
     } while (0)
 
 /* --- solids: query_solids.c --- */
@@ -35,7 +36,8 @@ typedef struct query_variant {
 extern const query_variant query_variants[];
 extern const int query_variant_count;
 
-/* A small solid of boxes and tetrahedra that touch, nest, overlap, face inward or repeat; on a grid of small integers or anywhere. */
+/* A small solid of boxes and tetrahedra that touch, nest, overlap, face inward or repeat; on a grid
+ * of small integers or anywhere. */
 ebpo_mesh query_random_solid(uint64_t seed, bool on_grid);
 
 /* --- models: query_judge.c --- */
@@ -43,11 +45,11 @@ ebpo_mesh query_random_solid(uint64_t seed, bool on_grid);
 typedef struct query_model {
     const char *name, *variant;
     ebpo_info info;
-    ebpo_mesh mesh;         /* in file order */
-    uint32_t *face_source;  /* [face_count] or NULL */
-    double (*normal)[3];    /* [face_count] */
-    double size, largest;   /* longest side of the mesh's box; largest coordinate */
-    oracle *judge;          /* not for several threads */
+    ebpo_mesh mesh;        /* in file order */
+    uint32_t *face_source; /* [face_count] or NULL */
+    double (*normal)[3];   /* [face_count] */
+    double size, largest;  /* longest side of the mesh's box; largest coordinate */
+    oracle *judge;         /* not for several threads */
     char folder[64], path[96];
     ebpo_file *file;
     ebpo_model *model;
@@ -55,40 +57,50 @@ typedef struct query_model {
 } query_model;
 
 /* Builds, writes a file, opens it. The mesh is consumed. Failures are test failures. */
-void query_model_make(query_model *m, const char *name, ebpo_mesh mesh, const query_variant *variant);
+void query_model_make(query_model *m, const char *name, ebpo_mesh mesh,
+                      const query_variant *variant);
 void query_model_free(query_model *m);
-/* The same for programs that are no Check tests, or want to see the failure: what the library says. On failure nothing is left. */
-ebpo_status query_model_try(query_model *m, const char *name, ebpo_mesh mesh, const query_variant *variant, ebpo_error *error);
+/* The same for programs that are no Check tests, or want to see the failure: what the library says.
+ * On failure nothing is left. */
+ebpo_status query_model_try(query_model *m, const char *name, ebpo_mesh mesh,
+                            const query_variant *variant, ebpo_error *error);
 /* Check and build alone, one thread; the mesh is consumed. */
-ebpo_status query_build(ebpo_tree *tree, ebpo_mesh *mesh, const query_variant *variant, ebpo_error *error);
+ebpo_status query_build(ebpo_tree *tree, ebpo_mesh *mesh, const query_variant *variant,
+                        ebpo_error *error);
 
 /* The truth about a point. */
 typedef struct query_truth {
-    double distance;  /* correctly rounded, not signed */
-    int32_t winding;  /* 0 when on */
-    int32_t where;    /* IN, OUT or ON; a surface: OUT or ON */
-    uint64_t face;    /* the nearest one that comes first in the file, as callers are told */
+    double distance; /* correctly rounded, not signed */
+    int32_t winding; /* 0 when on */
+    int32_t where;   /* IN, OUT or ON; a surface: OUT or ON */
+    uint64_t face;   /* the nearest one that comes first in the file, as callers are told */
     uint32_t file_face, ties;
 } query_truth;
 void query_find_truths(query_model *m, const double *points, uint64_t count, query_truth *out);
 
-/* Wrong answers among `count` exact ones; the first ones are printed. `is_unsigned`: no signs were asked for. */
-uint64_t query_wrong_inside(const query_model *m, const double *points, const query_truth *truth, uint64_t count, const ebpo_inside_result *got);
-uint64_t query_wrong_distance(const query_model *m, const double *points, const query_truth *truth, uint64_t count, bool is_unsigned,
-                              const ebpo_distance_result *got);
+/* Wrong answers among `count` exact ones; the first ones are printed. `is_unsigned`: no signs were
+ * asked for. */
+uint64_t query_wrong_inside(const query_model *m, const double *points, const query_truth *truth,
+                            uint64_t count, const ebpo_inside_result *got);
+uint64_t query_wrong_distance(const query_model *m, const double *points, const query_truth *truth,
+                              uint64_t count, bool is_unsigned, const ebpo_distance_result *got);
 /* The same for answers that a level or a deadline limits. */
-uint64_t query_wrong_limited_inside(const query_model *m, const double *points, const query_truth *truth, uint64_t count,
+uint64_t query_wrong_limited_inside(const query_model *m, const double *points,
+                                    const query_truth *truth, uint64_t count,
                                     const ebpo_inside_result *got);
-uint64_t query_wrong_limited_distance(const query_model *m, const double *points, const query_truth *truth, uint64_t count,
+uint64_t query_wrong_limited_distance(const query_model *m, const double *points,
+                                      const query_truth *truth, uint64_t count,
                                       const ebpo_distance_result *got);
 
-/* Asks everything about `count` awkward points of `seed`: inside and distance, in batches; fails the test when an answer is wrong. */
+/* Asks everything about `count` awkward points of `seed`: inside and distance, in batches; fails
+ * the test when an answer is wrong. */
 void query_ask(query_model *m, uint64_t count, uint64_t seed);
 
 /* The number by which callers are told of a face of the file. */
 uint64_t query_told(const query_model *m, uint32_t face);
 
-/* A ray's hits, the first one and all, against the oracle: false when one is wrong, and prints it. */
+/* A ray's hits, the first one and all, against the oracle: false when one is wrong, and prints it.
+ */
 typedef struct query_ray {
     double origin[3], direction[3], t_max;
 } query_ray;
@@ -99,11 +111,13 @@ uint64_t query_scaled(uint64_t count);
 
 /* --- points: query_points.c --- */
 
-/* `count` points [3]: vertices, points of edges and faces, cell walls and corners of all levels, coordinates of vertices mixed, middles between vertices, close to the surface, random, outside,
+/* `count` points [3]: vertices, points of edges and faces, cell walls and corners of all levels,
+ * coordinates of vertices mixed, middles between vertices, close to the surface, random, outside,
  * far away; half of them moved by an ulp on some axes. */
 void query_make_points(const query_model *m, uint64_t count, uint64_t seed, double *out);
 /* Rays likewise: through vertices, along edges, within faces, between awkward points. */
-void query_make_ray(const query_model *m, uint64_t *state, double origin[3], double direction[3], double *t_max);
+void query_make_ray(const query_model *m, uint64_t *state, double origin[3], double direction[3],
+                    double *t_max);
 
 void *query_room(uint64_t count, size_t size);
 

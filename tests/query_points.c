@@ -5,10 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static uint64_t pick(uint64_t *state, uint64_t below)
-{
-    return ebpo_test_random(state) % below;
-}
+static uint64_t pick(uint64_t *state, uint64_t below) { return ebpo_test_random(state) % below; }
 
 static void vertex_of_face(const query_model *m, uint64_t face, uint64_t i, double out[3])
 {
@@ -36,7 +33,8 @@ static void edge_point(const query_model *m, uint64_t *state, double out[3])
 static void face_point(const query_model *m, uint64_t *state, double out[3])
 {
     double a[3], b[3], c[3];
-    uint64_t face = pick(state, m->mesh.face_count), i = pick(state, 3), n = pick(state, 8) + 1, j = pick(state, n + 1);
+    uint64_t face = pick(state, m->mesh.face_count), i = pick(state, 3), n = pick(state, 8) + 1,
+             j = pick(state, n + 1);
     double s = (double)j / 8, t = (double)(n - j) / 8;
     vertex_of_face(m, face, i, a);
     vertex_of_face(m, face, i + 1, b);
@@ -47,13 +45,15 @@ static void face_point(const query_model *m, uint64_t *state, double out[3])
 
 static double wall(const query_model *m, uint64_t *state, int k, int level)
 {
-    return m->info.box_origin[k] + (double)pick(state, (UINT64_C(1) << level) + 1) * (m->info.box_size[k] / (double)(1u << level));
+    return m->info.box_origin[k] + (double)pick(state, (UINT64_C(1) << level) + 1) *
+                                       (m->info.box_size[k] / (double)(1u << level));
 }
 
 /* All coordinates on walls of one level, or some. */
 static void cell_point(const query_model *m, uint64_t *state, bool corner, double out[3])
 {
-    int top = m->info.level_count + 1 < m->info.grid_level ? m->info.level_count + 1 : m->info.grid_level;
+    int top =
+        m->info.level_count + 1 < m->info.grid_level ? m->info.level_count + 1 : m->info.grid_level;
     int level = (int)pick(state, (uint64_t)top + 1);
     face_point(m, state, out);
     for (int k = 0; k < 3; k++)
@@ -90,7 +90,9 @@ static void near_surface(const query_model *m, uint64_t *state, double out[3])
 static void in_box(const query_model *m, uint64_t *state, double factor, double out[3])
 {
     for (int k = 0; k < 3; k++) {
-        double middle = m->info.box_origin[k] / 2 + (m->info.box_origin[k] + m->info.box_size[k]) / 2, side = fmax(m->info.box_size[k], m->size);
+        double middle =
+                   m->info.box_origin[k] / 2 + (m->info.box_origin[k] + m->info.box_size[k]) / 2,
+               side = fmax(m->info.box_size[k], m->size);
         if (factor <= 1)
             side = m->info.box_size[k];
         out[k] = middle + factor * side * (ebpo_test_random_unit(state) - 0.5);
@@ -119,15 +121,20 @@ static void one_point(const query_model *m, uint64_t *state, double out[3])
 {
     switch (pick(state, 16)) {
     case 0: random_vertex(m, state, out); break;
-    case 1: case 2: edge_point(m, state, out); break;
-    case 3: case 4: face_point(m, state, out); break;
+    case 1:
+    case 2: edge_point(m, state, out); break;
+    case 3:
+    case 4: face_point(m, state, out); break;
     case 5: cell_point(m, state, true, out); break;
     case 6: cell_point(m, state, false, out); break;
     case 7: wall_near_surface(m, state, out); break;
     case 8: mixed(m, state, out); break;
     case 9: middle(m, state, out); break;
-    case 10: case 11: case 12: near_surface(m, state, out); break;
-    case 13: case 14: in_box(m, state, 1, out); break;
+    case 10:
+    case 11:
+    case 12: near_surface(m, state, out); break;
+    case 13:
+    case 14: in_box(m, state, 1, out); break;
     default: in_box(m, state, pick(state, 4) ? 3 : 1e6, out); break;
     }
     if (pick(state, 2))
@@ -147,7 +154,8 @@ void query_make_points(const query_model *m, uint64_t count, uint64_t seed, doub
         one_point(m, &state, out + 3 * i);
 }
 
-void query_make_ray(const query_model *m, uint64_t *state, double origin[3], double direction[3], double *t_max)
+void query_make_ray(const query_model *m, uint64_t *state, double origin[3], double direction[3],
+                    double *t_max)
 {
     static const double ends[] = { INFINITY, INFINITY, 1, 2, 0.5, 0, 1e-3, 1e9 };
     double to[3];

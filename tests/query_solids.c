@@ -12,7 +12,8 @@ const query_variant query_variants[] = {
     { "N=4, even-odd", 4, -1, EBPO_RULE_EVENODD, 0 },
     { "N=8, positive, without maps", 8, 6, EBPO_RULE_POSITIVE, EBPO_PART_PLANES | EBPO_PART_MESH },
     { "one leaf", 1000000, 3, EBPO_RULE_NONZERO, 0 },
-    { "N=2, levels to 7, without planes", 2, 7, EBPO_RULE_NONZERO, EBPO_PART_MESH | EBPO_PART_MAPS },
+    { "N=2, levels to 7, without planes", 2, 7, EBPO_RULE_NONZERO,
+      EBPO_PART_MESH | EBPO_PART_MAPS },
 };
 const int query_variant_count = sizeof query_variants / sizeof *query_variants;
 
@@ -123,7 +124,8 @@ static ebpo_mesh make_sliver(void)
     return m;
 }
 
-/* A flat box (winding number 0 everywhere, all of it coplanar) and a tetrahedron collapsed to a line. */
+/* A flat box (winding number 0 everywhere, all of it coplanar) and a tetrahedron collapsed to a
+ * line. */
 static ebpo_mesh make_flat(void)
 {
     ebpo_mesh m = box(0, 0, 0.5, 1, 1, 0.5), line = ebpo_test_tetrahedron(1);
@@ -133,7 +135,8 @@ static ebpo_mesh make_flat(void)
     return m;
 }
 
-/* Its sides lie in cell walls: the root box is that of two tetrahedra in opposite corners, and what is between does not change it. */
+/* Its sides lie in cell walls: the root box is that of two tetrahedra in opposite corners, and what
+ * is between does not change it. */
 static ebpo_mesh make_boxes_in_walls(void)
 {
     ebpo_mesh m = ebpo_test_tetrahedron(0.5), frame, other = ebpo_test_tetrahedron(0.5);
@@ -148,7 +151,10 @@ static ebpo_mesh make_boxes_in_walls(void)
     if (ebpo_mesh_check(&report, &frame, 1, (ebpo_progress){ NULL, NULL }, NULL) != EBPO_OK ||
         ebpo_build(&tree, &frame, &report, NULL, &options, NULL) != EBPO_OK)
         abort();
-    static const double eighths[][6] = { { 2, 2, 2, 4, 4, 4 }, { 4, 4, 4, 6, 6, 6 }, { 4, 2, 2, 5, 3, 3 }, { 2, 4, 4, 2.5, 5.25, 4.5 } };
+    static const double eighths[][6] = { { 2, 2, 2, 4, 4, 4 },
+                                         { 4, 4, 4, 6, 6, 6 },
+                                         { 4, 2, 2, 5, 3, 3 },
+                                         { 2, 4, 4, 2.5, 5.25, 4.5 } };
     for (size_t i = 0; i < sizeof eighths / sizeof *eighths; i++) {
         double at[6];
         for (int k = 0; k < 6; k++)
@@ -194,7 +200,10 @@ static ebpo_mesh make_small(void) { return scaled_shells(1e-160); }
 static ebpo_mesh make_huge(void) { return scaled_shells(1e300); }
 static ebpo_mesh make_large(void) { return scaled_shells(1e160); }
 static ebpo_mesh make_denormal(void) { return scaled_shells(0x1p-1060); }
-static ebpo_mesh make_least(void) { return scaled_shells(0x1p-1072); } /* its quarters are the least doubles */
+static ebpo_mesh make_least(void)
+{
+    return scaled_shells(0x1p-1072);
+} /* its quarters are the least doubles */
 
 static ebpo_mesh make_all_scales(void)
 {
@@ -237,13 +246,31 @@ static const struct {
     const char *name;
     ebpo_mesh (*make)(void);
 } more[] = {
-    { "touching_shells", make_touching_shells }, { "nested_windings", make_nested_windings }, { "cancelling_overlap", make_cancelling_overlap },
-    { "cube_twice", make_cube_twice }, { "cube_and_its_inverse", make_cube_and_its_inverse }, { "gap_of_one_ulp", make_gap_of_one_ulp },
-    { "overlap_of_one_ulp", make_overlap_of_one_ulp }, { "thin_hollow", make_thin_hollow }, { "sliver", make_sliver }, { "flat", make_flat },
-    { "boxes_in_walls", make_boxes_in_walls }, { "far_away", make_far_away }, { "far_away_float", make_far_away_float },
-    { "turned_boxes", make_turned_boxes }, { "tiny", make_tiny }, { "small", make_small }, { "huge", make_huge }, { "large", make_large },
-    { "denormal", make_denormal }, { "least", make_least }, { "all_scales", make_all_scales }, { "tetrahedra_at_random", make_tetrahedra_at_random },
-    { "mixed_grid", make_mixed_grid }, { "coarse_sphere", make_coarse_sphere }, { "shared_edges_blob", make_shared_edges_blob },
+    { "touching_shells", make_touching_shells },
+    { "nested_windings", make_nested_windings },
+    { "cancelling_overlap", make_cancelling_overlap },
+    { "cube_twice", make_cube_twice },
+    { "cube_and_its_inverse", make_cube_and_its_inverse },
+    { "gap_of_one_ulp", make_gap_of_one_ulp },
+    { "overlap_of_one_ulp", make_overlap_of_one_ulp },
+    { "thin_hollow", make_thin_hollow },
+    { "sliver", make_sliver },
+    { "flat", make_flat },
+    { "boxes_in_walls", make_boxes_in_walls },
+    { "far_away", make_far_away },
+    { "far_away_float", make_far_away_float },
+    { "turned_boxes", make_turned_boxes },
+    { "tiny", make_tiny },
+    { "small", make_small },
+    { "huge", make_huge },
+    { "large", make_large },
+    { "denormal", make_denormal },
+    { "least", make_least },
+    { "all_scales", make_all_scales },
+    { "tetrahedra_at_random", make_tetrahedra_at_random },
+    { "mixed_grid", make_mixed_grid },
+    { "coarse_sphere", make_coarse_sphere },
+    { "shared_edges_blob", make_shared_edges_blob },
 };
 enum { MORE = sizeof more / sizeof *more };
 
@@ -323,7 +350,8 @@ ebpo_mesh query_random_solid(uint64_t seed, bool on_grid)
     ebpo_mesh m;
     memset(&m, 0, sizeof m);
     for (uint64_t parts = 1 + ebpo_test_random(&state) % 5; parts > 0; parts--) {
-        bool is_box = ebpo_test_random(&state) % 2, inward = ebpo_test_random(&state) % 5 == 0, again = ebpo_test_random(&state) % 8 == 0;
+        bool is_box = ebpo_test_random(&state) % 2, inward = ebpo_test_random(&state) % 5 == 0,
+             again = ebpo_test_random(&state) % 8 == 0;
         ebpo_mesh part = is_box ? random_box(&state, on_grid) : random_tetrahedron(&state, on_grid);
         if (again)
             ebpo_test_append(&m, &part);

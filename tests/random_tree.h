@@ -1,4 +1,5 @@
-/* Trees that are valid as files go (counts, orders, ranges) but describe no shape: what the container must carry. */
+/* Trees that are valid as files go (counts, orders, ranges) but describe no shape: what the
+ * container must carry. */
 #ifndef RANDOM_TREE_H
 #define RANDOM_TREE_H
 
@@ -34,11 +35,11 @@ static uint32_t rt_random(random_tree_maker *m, uint32_t below)
     return (uint32_t)((m->state >> 33) % below);
 }
 
-#define RT_PUSH(level_, slot_, array_, count_, value_)                                                                                 \
-    do {                                                                                                                               \
-        if (!ebpo_grow(&(array_), &m->capacity[level_][slot_], (count_) + 1, sizeof *(array_)))                                        \
-            abort();                                                                                                                   \
-        (array_)[(count_)] = (value_);                                                                                                 \
+#define RT_PUSH(level_, slot_, array_, count_, value_)                                          \
+    do {                                                                                        \
+        if (!ebpo_grow(&(array_), &m->capacity[level_][slot_], (count_) + 1, sizeof *(array_))) \
+            abort();                                                                            \
+        (array_)[(count_)] = (value_);                                                          \
     } while (0)
 
 static uint32_t rt_plane(random_tree_maker *m)
@@ -65,7 +66,8 @@ static void rt_leaf(random_tree_maker *m, int level)
         l->ref_count++;
     }
     if (m->options->solid) {
-        int32_t winding = m->options->windings ? (int32_t)rt_random(m, 70000) - 35000 : (int32_t)rt_random(m, 2);
+        int32_t winding =
+            m->options->windings ? (int32_t)rt_random(m, 70000) - 35000 : (int32_t)rt_random(m, 2);
         RT_PUSH(level, 1, l->leaf_winding, l->leaf_count, winding);
     }
     RT_PUSH(level, 2, l->leaf_first, l->leaf_count, m->seen);
@@ -99,7 +101,9 @@ static void rt_gray(random_tree_maker *m, int level)
     l->gray_count++;
     bool may_divide = level + 2 < m->options->levels;
     for (int octant = 0; octant < 8; octant++) {
-        unsigned type = may_divide && (rt_random(m, 16) < m->options->gray_share || octant == 0) ? EBPO_GRAY : rt_random(m, 3);
+        unsigned type = may_divide && (rt_random(m, 16) < m->options->gray_share || octant == 0)
+                            ? EBPO_GRAY
+                            : rt_random(m, 3);
         if (type == EBPO_BLACK && !m->options->solid)
             type = EBPO_LEAF;
         if (!may_divide && octant == 0)
@@ -126,14 +130,16 @@ static void rt_node(random_tree_maker *m, int level, ebpo_node_type type)
         l->black_count++;
     } else {
         if (odd)
-            RT_PUSH(level, 11, l->white_winding, l->white_count, 2 * (int32_t)rt_random(m, 90) - 90);
+            RT_PUSH(level, 11, l->white_winding, l->white_count,
+                    2 * (int32_t)rt_random(m, 90) - 90);
         l->white_count++;
     }
 }
 
 static float rt_coordinate(random_tree_maker *m)
 {
-    return rt_random(m, 50) == 0 ? -0.0f : (float)((double)rt_random(m, 1u << 30) / (1u << 30) - 0.5);
+    return rt_random(m, 50) == 0 ? -0.0f
+                                 : (float)((double)rt_random(m, 1u << 30) / (1u << 30) - 0.5);
 }
 
 static void rt_mesh(random_tree_maker *m)
@@ -144,7 +150,9 @@ static void rt_mesh(random_tree_maker *m)
     mesh->faces = ebpo_alloc(m->seen, 3 * sizeof *mesh->faces);
     for (uint64_t i = 0; i < 3 * m->seen; i++) {
         bool fresh = seen < 3 || rt_random(m, 6) == 0;
-        mesh->faces[i] = fresh ? (uint32_t)seen++ : (uint32_t)(seen - 1 - rt_random(m, seen < 500 ? (uint32_t)seen : 500));
+        mesh->faces[i] =
+            fresh ? (uint32_t)seen++
+                  : (uint32_t)(seen - 1 - rt_random(m, seen < 500 ? (uint32_t)seen : 500));
     }
     mesh->vertex_count = seen + 2; /* two that no face uses */
     mesh->xyz32 = m->options->doubles ? NULL : ebpo_alloc(mesh->vertex_count, 3 * sizeof(float));
@@ -188,7 +196,8 @@ static void rt_facts(random_tree_maker *m)
     info->face_count = info->source_face_count = m->tree->mesh.face_count;
     info->leaf_faces = 16;
     info->epsilon = 0.003;
-    info->parts = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | (m->options->leaf_planes ? EBPO_PART_LEAF_PLANES : 0);
+    info->parts = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS |
+                  (m->options->leaf_planes ? EBPO_PART_LEAF_PLANES : 0);
     snprintf(info->source_name, sizeof info->source_name, "r\xc3\xa4ndom.ply");
     snprintf(info->source_format, sizeof info->source_format, "ply-le");
     info->source_size = 12345;

@@ -21,7 +21,8 @@ static void *checked(void *block)
 static uint32_t vertex(ebpo_mesh *m, double x, double y, double z)
 {
     if ((m->vertex_count & (m->vertex_count - 1)) == 0) /* full at each power of two */
-        m->xyz64 = checked(realloc(m->xyz64, (m->vertex_count ? 2 * m->vertex_count : 1) * 3 * sizeof *m->xyz64));
+        m->xyz64 = checked(
+            realloc(m->xyz64, (m->vertex_count ? 2 * m->vertex_count : 1) * 3 * sizeof *m->xyz64));
     double *p = m->xyz64 + 3 * m->vertex_count;
     p[0] = x, p[1] = y, p[2] = z;
     return (uint32_t)m->vertex_count++;
@@ -30,7 +31,8 @@ static uint32_t vertex(ebpo_mesh *m, double x, double y, double z)
 static void face(ebpo_mesh *m, uint32_t a, uint32_t b, uint32_t c)
 {
     if ((m->face_count & (m->face_count - 1)) == 0)
-        m->faces = checked(realloc(m->faces, (m->face_count ? 2 * m->face_count : 1) * 3 * sizeof *m->faces));
+        m->faces = checked(
+            realloc(m->faces, (m->face_count ? 2 * m->face_count : 1) * 3 * sizeof *m->faces));
     uint32_t *f = m->faces + 3 * m->face_count++;
     f[0] = a, f[1] = b, f[2] = c;
 }
@@ -84,8 +86,10 @@ double ebpo_test_random_unit(uint64_t *state)
 
 void ebpo_test_circle(uint32_t i, uint32_t n, double *cosine, double *sine)
 {
-    uint64_t eighth = 8 * (uint64_t)(i % n) / n, odd = eighth % 2; /* the turn lies between eighth / 8 and that + 1/8; of odd ones the end is taken */
-    double part = odd ? (double)((eighth + 1) * n - 8 * (uint64_t)(i % n)) : (double)(8 * (uint64_t)(i % n) - eighth * n);
+    /* the turn lies between eighth / 8 and that + 1/8; of odd ones the end is taken */
+    uint64_t eighth = 8 * (uint64_t)(i % n) / n, odd = eighth % 2;
+    double part = odd ? (double)((eighth + 1) * n - 8 * (uint64_t)(i % n))
+                      : (double)(8 * (uint64_t)(i % n) - eighth * n);
     double x = part / n * (PI / 4), x2 = x * x, c = 0, s = 0;
     for (int k = 20; k > 0; k -= 2) { /* Taylor, from the far end */
         c = (1 + c) * (-x2 / (k * (k - 1)));
@@ -195,8 +199,10 @@ static uint32_t *permutation(uint64_t n, uint64_t *state)
 void ebpo_test_shuffle(ebpo_mesh *m, uint64_t seed)
 {
     size_t size = 3 * (m->xyz32 ? sizeof *m->xyz32 : sizeof *m->xyz64);
-    char *from = m->xyz32 ? (char *)m->xyz32 : (char *)m->xyz64, *to = checked(malloc(m->vertex_count * size + 1));
-    uint32_t *vertices = permutation(m->vertex_count, &seed), *order = permutation(m->face_count, &seed);
+    char *from = m->xyz32 ? (char *)m->xyz32 : (char *)m->xyz64,
+         *to = checked(malloc(m->vertex_count * size + 1));
+    uint32_t *vertices = permutation(m->vertex_count, &seed),
+             *order = permutation(m->face_count, &seed);
     uint32_t *faces = checked(malloc((m->face_count * 3 + 1) * sizeof *faces));
     for (uint64_t v = 0; v < m->vertex_count; v++)
         memcpy(to + vertices[v] * size, from + v * size, size);
@@ -217,7 +223,8 @@ void ebpo_test_split_vertices(ebpo_mesh *m)
 {
     uint64_t corners = 3 * m->face_count;
     size_t size = 3 * (m->xyz32 ? sizeof *m->xyz32 : sizeof *m->xyz64);
-    char *from = m->xyz32 ? (char *)m->xyz32 : (char *)m->xyz64, *to = checked(malloc(corners * size + 1));
+    char *from = m->xyz32 ? (char *)m->xyz32 : (char *)m->xyz64,
+         *to = checked(malloc(corners * size + 1));
     for (uint64_t i = 0; i < corners; i++) {
         memcpy(to + i * size, from + m->faces[i] * size, size);
         m->faces[i] = (uint32_t)i;
@@ -235,7 +242,8 @@ void ebpo_test_split_vertices(ebpo_mesh *m)
 ebpo_mesh ebpo_test_tetrahedron(double size)
 {
     ebpo_mesh m = empty();
-    uint32_t o = vertex(&m, 0, 0, 0), x = vertex(&m, size, 0, 0), y = vertex(&m, 0, size, 0), z = vertex(&m, 0, 0, size);
+    uint32_t o = vertex(&m, 0, 0, 0), x = vertex(&m, size, 0, 0), y = vertex(&m, 0, size, 0),
+             z = vertex(&m, 0, 0, size);
     face(&m, o, y, x);
     face(&m, o, x, z);
     face(&m, o, z, y);
@@ -284,7 +292,9 @@ static void lattice_square(lattice *l, const uint32_t at[3], int axis, bool up)
 static lattice lattice_begin(ebpo_mesh *m, uint32_t n, const double low[3], const double high[3])
 {
     size_t side = (size_t)n + 1;
-    lattice l = { .mesh = m, .n = n, .index = checked(calloc(side * side * side, sizeof(uint32_t))) };
+    lattice l = { .mesh = m,
+                  .n = n,
+                  .index = checked(calloc(side * side * side, sizeof(uint32_t))) };
     memcpy(l.low, low, sizeof l.low);
     memcpy(l.high, high, sizeof l.high);
     return l;
@@ -338,7 +348,8 @@ ebpo_mesh ebpo_test_voxels(const uint8_t *filled, uint32_t n, double cell)
     return m;
 }
 
-/* 1 to 4, with midpoints found by plain search among the edges of the lower end: small meshes only. */
+/* 1 to 4, with midpoints found by plain search among the edges of the lower end: small meshes only.
+ */
 static ebpo_mesh subdivide(const ebpo_mesh *m)
 {
     ebpo_mesh out = empty();
@@ -354,7 +365,8 @@ static ebpo_mesh subdivide(const ebpo_mesh *m)
         uint32_t mid[3];
         for (int k = 0; k < 3; k++) {
             uint32_t a = v[k], b = v[(k + 1) % 3];
-            uint64_t key = a < b ? (uint64_t)a << 32 | b : (uint64_t)b << 32 | a, h = key * 0x9e3779b97f4a7c15u >> 20;
+            uint64_t key = a < b ? (uint64_t)a << 32 | b : (uint64_t)b << 32 | a,
+                     h = key * 0x9e3779b97f4a7c15u >> 20;
             for (h &= slots - 1; keys[h] && keys[h] != key; h = (h + 1) & (slots - 1))
                 ;
             if (!keys[h]) {
@@ -376,10 +388,11 @@ static ebpo_mesh subdivide(const ebpo_mesh *m)
 
 static ebpo_mesh icosahedron(void)
 {
-    static const uint8_t faces[20][3] = {
-        { 0, 11, 5 }, { 0, 5, 1 }, { 0, 1, 7 }, { 0, 7, 10 }, { 0, 10, 11 }, { 1, 5, 9 }, { 5, 11, 4 },
-        { 11, 10, 2 }, { 10, 7, 6 }, { 7, 1, 8 }, { 3, 9, 4 }, { 3, 4, 2 }, { 3, 2, 6 }, { 3, 6, 8 },
-        { 3, 8, 9 }, { 4, 9, 5 }, { 2, 4, 11 }, { 6, 2, 10 }, { 8, 6, 7 }, { 9, 8, 1 } };
+    static const uint8_t faces[20][3] = { { 0, 11, 5 },  { 0, 5, 1 },  { 0, 1, 7 },  { 0, 7, 10 },
+                                          { 0, 10, 11 }, { 1, 5, 9 },  { 5, 11, 4 }, { 11, 10, 2 },
+                                          { 10, 7, 6 },  { 7, 1, 8 },  { 3, 9, 4 },  { 3, 4, 2 },
+                                          { 3, 2, 6 },   { 3, 6, 8 },  { 3, 8, 9 },  { 4, 9, 5 },
+                                          { 2, 4, 11 },  { 6, 2, 10 }, { 8, 6, 7 },  { 9, 8, 1 } };
     const double t = (1 + sqrt(5)) / 2;
     ebpo_mesh m = empty();
     for (int axis = 0; axis < 3; axis++) /* three golden rectangles */

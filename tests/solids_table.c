@@ -103,7 +103,8 @@ static ebpo_mesh make_touching_at_face(void)
     return m;
 }
 
-/* The same two cubes with shared vertices: the wall between them is there twice, in both directions. */
+/* The same two cubes with shared vertices: the wall between them is there twice, in both
+ * directions. */
 static ebpo_mesh make_coincident_opposite_faces(void)
 {
     ebpo_mesh m = make_touching_at_face();

@@ -1,4 +1,5 @@
-/* The table of stiff and extreme cases. A new case is a new line, here; what its fields mean is in stiff.h, the generators are in stiff_shapes.c. */
+/* The table of stiff and extreme cases. A new case is a new line, here; what its fields mean is in
+ * stiff.h, the generators are in stiff_shapes.c. */
 #include <math.h>
 
 #include "stiff.h"

@@ -27,7 +27,8 @@ __attribute__((format(printf, 2, 3))) static void fault(stiff_result *r, const c
 
 static query_variant variant_of(const stiff_case *c)
 {
-    query_variant v = { "stiff", c->leaf ? c->leaf : 16, c->levels ? c->levels - 1 : -1, c->rule, 0 };
+    query_variant v = { "stiff", c->leaf ? c->leaf : 16, c->levels ? c->levels - 1 : -1, c->rule,
+                        0 };
     return v;
 }
 
@@ -42,7 +43,8 @@ static void run_refused(const stiff_case *c, stiff_result *r)
     if (c->status == EBPO_OK)
         fault(r, "does not convert: %s: %s", ebpo_status_name(r->status), r->message);
     else if (r->status != c->status || !strstr(r->message, c->message))
-        fault(r, "fails with %s, \"%s\", instead of %s, \"%s\"", ebpo_status_name(r->status), r->message, ebpo_status_name(c->status), c->message);
+        fault(r, "fails with %s, \"%s\", instead of %s, \"%s\"", ebpo_status_name(r->status),
+              r->message, ebpo_status_name(c->status), c->message);
 }
 
 static void run_verify(const query_model *m, const ebpo_mesh *source, stiff_result *r)
@@ -60,10 +62,13 @@ static void run_verify(const query_model *m, const ebpo_mesh *source, stiff_resu
     r->violations = report.violations;
     if (r->violations == 0)
         return;
-    const ebpo_verify_count *kinds[] = { &report.structure, &report.content, &report.containment, &report.nesting, &report.labels, &report.lists, &report.source };
+    const ebpo_verify_count *kinds[] = { &report.structure, &report.content, &report.containment,
+                                         &report.nesting,   &report.labels,  &report.lists,
+                                         &report.source };
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
         if (kinds[i]->violations)
-            fault(r, "%llu violations, first %s", (unsigned long long)kinds[i]->violations, kinds[i]->first);
+            fault(r, "%llu violations, first %s", (unsigned long long)kinds[i]->violations,
+                  kinds[i]->first);
 }
 
 static bool ask_points(query_model *m, uint64_t count, stiff_result *r)
@@ -138,7 +143,8 @@ static void run_levels(const stiff_case *c, query_model *m, stiff_result *r)
         double rise = before < INFINITY ? volume / before - 1 : -1;
         r->rise = fmax(r->rise, rise);
         if (!(rise <= STIFF_ENVELOPE))
-            fault(r, "level %d of volume %.17g does not lie in the one before, of %.17g", level, volume, before);
+            fault(r, "level %d of volume %.17g does not lie in the one before, of %.17g", level,
+                  volume, before);
         if (!isnan(set) && !(volume >= set * (1 - STIFF_ENVELOPE)))
             fault(r, "level %d of volume %.17g cannot hold the solid of %.17g", level, volume, set);
         before = volume;
@@ -159,7 +165,9 @@ static void run_volumes(const stiff_case *c, query_model *m, stiff_result *r)
     if (c->volume > 0 && !(relative(r->volume, c->volume) <= within))
         fault(r, "the mesh's volume is %.17g, by the formula %.17g", r->volume, c->volume);
     if (!isnormal(r->volume)) {
-        if (r->volume == 0 || isinf(r->volume) ? mass.volume != r->volume : !(fabs(mass.volume - r->volume) <= DBL_MIN * DBL_EPSILON))
+        if (r->volume == 0 || isinf(r->volume)
+                ? mass.volume != r->volume
+                : !(fabs(mass.volume - r->volume) <= DBL_MIN * DBL_EPSILON))
             fault(r, "the measured volume is %.17g, exactly %.17g", mass.volume, r->volume);
         return;
     }
@@ -176,14 +184,18 @@ static ebpo_mesh copy_of(const ebpo_mesh *mesh)
     ebpo_mesh copy = *mesh;
     size_t size = 3 * mesh->vertex_count;
     if (mesh->xyz32)
-        copy.xyz32 = memcpy(query_room(size, sizeof *copy.xyz32), mesh->xyz32, size * sizeof *copy.xyz32);
+        copy.xyz32 =
+            memcpy(query_room(size, sizeof *copy.xyz32), mesh->xyz32, size * sizeof *copy.xyz32);
     if (mesh->xyz64)
-        copy.xyz64 = memcpy(query_room(size, sizeof *copy.xyz64), mesh->xyz64, size * sizeof *copy.xyz64);
-    copy.faces = memcpy(query_room(mesh->face_count, 3 * sizeof *copy.faces), mesh->faces, mesh->face_count * 3 * sizeof *copy.faces);
+        copy.xyz64 =
+            memcpy(query_room(size, sizeof *copy.xyz64), mesh->xyz64, size * sizeof *copy.xyz64);
+    copy.faces = memcpy(query_room(mesh->face_count, 3 * sizeof *copy.faces), mesh->faces,
+                        mesh->face_count * 3 * sizeof *copy.faces);
     return copy;
 }
 
-static void run_converted(const stiff_case *c, query_model *m, const ebpo_mesh *source, uint64_t questions, stiff_result *r)
+static void run_converted(const stiff_case *c, query_model *m, const ebpo_mesh *source,
+                          uint64_t questions, stiff_result *r)
 {
     struct stat file;
     r->levels = m->info.level_count;
@@ -200,7 +212,8 @@ static void run_converted(const stiff_case *c, query_model *m, const ebpo_mesh *
     if (ask_points(m, questions, r))
         ask_rays(m, questions / 4 + 1, r);
     if (r->wrong)
-        fault(r, "%llu wrong answers of %llu", (unsigned long long)r->wrong, (unsigned long long)r->asked);
+        fault(r, "%llu wrong answers of %llu", (unsigned long long)r->wrong,
+              (unsigned long long)r->asked);
 }
 
 void stiff_run(const stiff_case *c, uint64_t questions, stiff_result *r)

@@ -5,7 +5,10 @@
 
 #include "stiff.h"
 
-static const double turn[3][3] = { { 0.75, -0.5, 0.4375 }, { 0.5, 0.8125, -0.3125 }, { -0.25, 0.375, 0.8125 } }; /* about a rotation, of exact numbers */
+/* about a rotation, of exact numbers */
+static const double turn[3][3] = { { 0.75, -0.5, 0.4375 },
+                                   { 0.5, 0.8125, -0.3125 },
+                                   { -0.25, 0.375, 0.8125 } };
 
 static uint32_t vertex(ebpo_mesh *m, double x, double y, double z)
 {
@@ -36,10 +39,7 @@ static ebpo_mesh box(double x0, double y0, double z0, double x1, double y1, doub
     return ebpo_test_box(low, high, n);
 }
 
-ebpo_mesh stiff_named(const stiff_case *c)
-{
-    return query_solid_by_name(c->solid);
-}
+ebpo_mesh stiff_named(const stiff_case *c) { return query_solid_by_name(c->solid); }
 
 ebpo_mesh stiff_shells(const stiff_case *c)
 {
@@ -84,12 +84,10 @@ ebpo_mesh stiff_sphere(const stiff_case *c)
     return ebpo_test_sphere(centre, c->a[0], (uint32_t)c->a[1]);
 }
 
-ebpo_mesh stiff_cone(const stiff_case *c)
-{
-    return ebpo_test_cone(1, 1, (uint32_t)c->a[0]);
-}
+ebpo_mesh stiff_cone(const stiff_case *c) { return ebpo_test_cone(1, 1, (uint32_t)c->a[0]); }
 
-/* --- prisms: a profile (x, z) that is seen whole from its first point, along y from 0 to `length` --- */
+/* --- prisms: a profile (x, z) that is seen whole from its first point, along y from 0 to `length`
+ * --- */
 
 static ebpo_mesh prism(const double (*profile)[2], uint32_t n, double length)
 {
@@ -97,7 +95,8 @@ static ebpo_mesh prism(const double (*profile)[2], uint32_t n, double length)
     for (uint32_t side = 0; side < 2; side++)
         for (uint32_t i = 0; i < n; i++)
             vertex(&m, profile[i][0], side * length, profile[i][1]);
-    for (uint32_t i = 1; i < n; i++) { /* the first point is in the middle, the others counter-clockwise around it as seen from -y */
+    for (uint32_t i = 1; i < n; i++) { /* the first point is in the middle, the others
+                                          counter-clockwise around it as seen from -y */
         uint32_t j = i + 1 < n ? i + 1 : 1;
         face(&m, 0, i, j);
         face(&m, n, n + j, n + i);
@@ -110,11 +109,11 @@ static ebpo_mesh prism(const double (*profile)[2], uint32_t n, double length)
 ebpo_mesh stiff_cylinder(const stiff_case *c)
 {
     uint32_t n = (uint32_t)c->a[0];
-    double (*p)[2] = query_room(n + 1, sizeof *p);
+    double(*p)[2] = query_room(n + 1, sizeof *p);
     p[0][0] = p[0][1] = 0;
     for (uint32_t i = 0; i < n; i++)
         ebpo_test_circle(i, n, &p[i + 1][0], &p[i + 1][1]);
-    ebpo_mesh m = prism((const double (*)[2])p, n + 1, 3);
+    ebpo_mesh m = prism((const double(*)[2])p, n + 1, 3);
     free(p);
     return m;
 }
@@ -122,7 +121,7 @@ ebpo_mesh stiff_cylinder(const stiff_case *c)
 ebpo_mesh stiff_dome(const stiff_case *c)
 {
     uint32_t n = (uint32_t)c->a[0];
-    double (*p)[2] = query_room(n + 4, sizeof *p), step = c->a[1] / n, half = c->a[1] / 2;
+    double(*p)[2] = query_room(n + 4, sizeof *p), step = c->a[1] / n, half = c->a[1] / 2;
     p[0][0] = 0, p[0][1] = -half;
     for (uint32_t i = 0; i <= n; i++) { /* a parabola: slopes grow by equal steps */
         double x = half - i * step;
@@ -130,7 +129,7 @@ ebpo_mesh stiff_dome(const stiff_case *c)
     }
     p[n + 2][0] = -half, p[n + 2][1] = -2 * half;
     p[n + 3][0] = half, p[n + 3][1] = -2 * half;
-    ebpo_mesh m = prism((const double (*)[2])p, n + 4, c->a[1]);
+    ebpo_mesh m = prism((const double(*)[2])p, n + 4, c->a[1]);
     free(p);
     return m;
 }
@@ -149,7 +148,8 @@ ebpo_mesh stiff_lantern(const stiff_case *c)
     for (uint32_t i = 0; i < n; i++) {
         uint32_t next = (i + 1) % n;
         for (uint32_t j = 0; j < rows; j++) {
-            uint32_t a = j * n + i, b = j * n + next, up = (j + 1) * n + i, up_next = (j + 1) * n + next;
+            uint32_t a = j * n + i, b = j * n + next, up = (j + 1) * n + i,
+                     up_next = (j + 1) * n + next;
             if (j % 2 == 0) {
                 face(&m, a, b, up);
                 face(&m, b, up_next, up);
@@ -321,7 +321,8 @@ ebpo_mesh stiff_staircase(const stiff_case *c)
         }
     uint32_t back = 3 * (n + 1);
     for (uint32_t x = 0; x < n; x++) {
-        uint32_t a = x == 0 ? 1 : 3 * x, low = 3 * x + 1, high = 3 * x + 2, b = 3 * x + 3, top = 3 * x + 4;
+        uint32_t a = x == 0 ? 1 : 3 * x, low = 3 * x + 1, high = 3 * x + 2, b = 3 * x + 3,
+                 top = 3 * x + 4;
         for (uint32_t y = 0; y < 2; y++) { /* in the first column a is low */
             uint32_t s = y * back, polygon[5] = { top + s, high + s, low + s, a + s, b + s };
             if (x == 0)
@@ -350,10 +351,7 @@ ebpo_mesh stiff_dust(const stiff_case *c)
     return m;
 }
 
-ebpo_mesh stiff_tetrahedra(const stiff_case *c)
-{
-    return ebpo_test_tetrahedra((uint32_t)c->a[0]);
-}
+ebpo_mesh stiff_tetrahedra(const stiff_case *c) { return ebpo_test_tetrahedra((uint32_t)c->a[0]); }
 
 ebpo_mesh stiff_nested(const stiff_case *c)
 {
@@ -401,7 +399,8 @@ ebpo_mesh stiff_needles(const stiff_case *c)
         ebpo_mesh needle = ebpo_test_tetrahedron(c->a[1]);
         double *tip = needle.xyz64 + 9; /* in the half-space that keeps the orientation */
         for (int k = 0; k < 3; k++)
-            tip[k] = k == 2 ? 0.125 + ebpo_test_random_unit(&state) : 2 * ebpo_test_random_unit(&state) - 1;
+            tip[k] = k == 2 ? 0.125 + ebpo_test_random_unit(&state)
+                            : 2 * ebpo_test_random_unit(&state) - 1;
         add(&m, needle);
     }
     return m;

@@ -57,7 +57,8 @@ static double build_seconds(const stiff_case *c)
 static double distance_seconds(const stiff_case *c)
 {
     query_model m;
-    query_variant v = { "table", c->leaf ? c->leaf : 16, c->levels ? c->levels - 1 : -1, c->rule, 0 };
+    query_variant v = { "table", c->leaf ? c->leaf : 16, c->levels ? c->levels - 1 : -1, c->rule,
+                        0 };
     ebpo_error error;
     double points[POINTS][3], seconds[RUNS];
     ebpo_distance_result out[POINTS];
@@ -109,12 +110,17 @@ static void row(const stiff_case *c, bool *fine)
         fprintf(stderr, "not stable: %s\n", r.fault);
     printf("| %s | %llu |", c->name, (unsigned long long)r.faces);
     if (r.status != EBPO_OK) {
-        printf(" | %s `%s` | | | | | | | | | |\n", r.fault[0] ? "**fails**" : "refused:", r.message);
+        printf(" | %s `%s` | | | | | | | | | |\n",
+               r.fault[0] ? "**fails**" : "refused:", r.message);
         return;
     }
     stiff_case tame = tame_like(faces);
-    printf(" %d | %s | %llu | %llu | %llu |", r.levels, r.fault[0] ? "**not stable**" : c->surface ? "surface" : "solid", (unsigned long long)r.violations,
-           (unsigned long long)r.asked, (unsigned long long)r.wrong);
+    printf(" %d | %s | %llu | %llu | %llu |", r.levels,
+           r.fault[0]   ? "**not stable**"
+           : c->surface ? "surface"
+                        : "solid",
+           (unsigned long long)r.violations, (unsigned long long)r.asked,
+           (unsigned long long)r.wrong);
     put(" %.1g |", r.has_volume ? r.volume_error : NAN);
     put(" %.3g |", r.has_volume ? 100 * r.excess : NAN);
     put(" %.1g |", r.has_volume && r.levels > 1 ? r.rise : NAN);
@@ -126,18 +132,32 @@ static void row(const stiff_case *c, bool *fine)
 
 static const char introduction[] =
     "# Stiff and extreme cases\n\n"
-    "Made by `ninja -C build tests/stiff_table && build/tests/stiff_table > docs/stiff.md`; nothing here was typed in. The cases are one line each in `tests/stiff_cases.c`; `meson test stiff` holds\n"
+    "Made by `ninja -C build tests/stiff_table && build/tests/stiff_table > docs/stiff.md`; "
+    "nothing here was typed in. The cases are one line each in `tests/stiff_cases.c`; `meson test "
+    "stiff` holds\n"
     "every one to its limits. A new case is a new line there.\n\n"
-    "*Stable* means, for each case: it converts; `ebpo verify` (with the source to compare with) finds 0 violations; 0 answers are wrong; or converting fails with the status and the message that the line names.\n"
-    "Asked are inside, signed distance with nearest face, nearest point and normal, and rays; the points lie on vertices, edges, faces and cell walls, next to them, between them and far away; the judge is brute force in rational\n"
+    "*Stable* means, for each case: it converts; `ebpo verify` (with the source to compare with) "
+    "finds 0 violations; 0 answers are wrong; or converting fails with the status and the message "
+    "that the line names.\n"
+    "Asked are inside, signed distance with nearest face, nearest point and normal, and rays; the "
+    "points lie on vertices, edges, faces and cell walls, next to them, between them and far away; "
+    "the judge is brute force in rational\n"
     "arithmetic (`tests/oracle.h`). Besides:\n\n"
-    "- *volume error*: of `ebpo measure` against the exact volume of the mesh, relative; at most 1e-15 where a line does not say otherwise. Empty where there is no volume, or none that is a normal double. Where a formula gives the volume, the mesh must have\n"
+    "- *volume error*: of `ebpo measure` against the exact volume of the mesh, relative; at most "
+    "1e-15 where a line does not say otherwise. Empty where there is no volume, or none that is a "
+    "normal double. Where a formula gives the volume, the mesh must have\n"
     "  it up to the rounding of its coordinates.\n"
-    "- *excess*: of the last level's envelopes over the solid, in percent of it; every level's volume is at least the solid's (up to 1e-9). Empty where shells overlap and the solid's volume is not known.\n"
-    "- *rise*: the greatest of V(level + 1) / V(level) - 1; levels lie in one another, so it is at most 0 but for rounding (1e-9).\n"
-    "- *build* and *distance*: time for it over that of a torus of about as many faces, medians of up to 5 runs on one thread. They are printed only: conditioning may cost time, never answers.\n"
+    "- *excess*: of the last level's envelopes over the solid, in percent of it; every level's "
+    "volume is at least the solid's (up to 1e-9). Empty where shells overlap and the solid's "
+    "volume is not known.\n"
+    "- *rise*: the greatest of V(level + 1) / V(level) - 1; levels lie in one another, so it is at "
+    "most 0 but for rounding (1e-9).\n"
+    "- *build* and *distance*: time for it over that of a torus of about as many faces, medians of "
+    "up to 5 runs on one thread. They are printed only: conditioning may cost time, never "
+    "answers.\n"
     "- *bytes*: of the file for each face; files of few faces are mostly headers.\n\n"
-    "| case | faces | levels | outcome | violations | asked | wrong | volume error | excess % | rise | build | distance | bytes |\n"
+    "| case | faces | levels | outcome | violations | asked | wrong | volume error | excess % | "
+    "rise | build | distance | bytes |\n"
     "|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
 
 int main(int argc, char **argv)

@@ -9,7 +9,11 @@
 static const struct {
     const char *name;
     int variant;
-} cases[] = { { "sphere", 5 }, { "boxes_in_walls", 0 }, { "blob", 2 }, { "touching_shells", 5 }, { "giant_and_dust", 0 } };
+} cases[] = { { "sphere", 5 },
+              { "boxes_in_walls", 0 },
+              { "blob", 2 },
+              { "touching_shells", 5 },
+              { "giant_and_dust", 0 } };
 enum { CASES = sizeof cases / sizeof *cases };
 
 static void load(ebpo_model *model, const uint64_t *keys, unsigned count)
@@ -28,7 +32,8 @@ static double distance_and_sign(ebpo_model *model, const double p[3])
     ebpo_inside_result inside;
     ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
     ASSERT_OK(ebpo_context_new(&context, model, error));
-    options.unsigned_distance = model->info->rule != EBPO_RULE_NONZERO; /* envelopes do not decide then: the cell that holds p is needed, however far its envelope is */
+    /* envelopes do not decide then: the cell that holds p is needed, however far its envelope is */
+    options.unsigned_distance = model->info->rule != EBPO_RULE_NONZERO;
     ASSERT_OK(ebpo_distance(context, p, &options, &distance, error));
     if (!options.unsigned_distance)
         ASSERT_OK(ebpo_inside(context, p, NULL, &inside, error));
@@ -39,7 +44,8 @@ static double distance_and_sign(ebpo_model *model, const double p[3])
 /* A query about a place `away` from p, when only what is said to be near p is there. */
 static bool loads_nothing_more(ebpo_model *model, const double p[3], const double away[3])
 {
-    double way = sqrt(away[0] * away[0] + away[1] * away[1] + away[2] * away[2]) * (1 + 0x1p-40), q[3] = { p[0] + away[0], p[1] + away[1], p[2] + away[2] };
+    double way = sqrt(away[0] * away[0] + away[1] * away[1] + away[2] * away[2]) * (1 + 0x1p-40),
+           q[3] = { p[0] + away[0], p[1] + away[1], p[2] + away[2] };
     uint64_t keys[EBPO_CACHE_AHEAD];
     unsigned count = ebpo_subtrees_near(model, p, distance_and_sign(model, p) + 2 * way, keys);
     if (count == EBPO_CACHE_AHEAD)
@@ -59,7 +65,8 @@ START_TEST(what_is_near_is_all_that_queries_nearby_need)
     query_model m;
     uint64_t count = query_scaled(200), looked = 0;
     double *points = query_room(2 * count, 3 * sizeof *points);
-    query_model_make(&m, cases[_i].name, query_solid_by_name(cases[_i].name), &query_variants[cases[_i].variant]);
+    query_model_make(&m, cases[_i].name, query_solid_by_name(cases[_i].name),
+                     &query_variants[cases[_i].variant]);
     query_make_points(&m, 2 * count, (uint64_t)_i + 77, points);
     for (int cut = 1; cut < 4 && cut < m.info.level_count; cut++) {
         ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
@@ -87,7 +94,8 @@ START_TEST(the_nearest_come_first_and_a_larger_reach_only_adds)
     query_model m;
     uint64_t count = query_scaled(100);
     double *points = query_room(count, 3 * sizeof *points);
-    query_model_make(&m, cases[_i].name, query_solid_by_name(cases[_i].name), &query_variants[cases[_i].variant]);
+    query_model_make(&m, cases[_i].name, query_solid_by_name(cases[_i].name),
+                     &query_variants[cases[_i].variant]);
     query_make_points(&m, count, (uint64_t)_i + 78, points);
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
     ebpo_model *model;
@@ -97,7 +105,8 @@ START_TEST(the_nearest_come_first_and_a_larger_reach_only_adds)
     for (uint64_t i = 0; i < count && model->top; i++) {
         uint64_t all[EBPO_CACHE_AHEAD], some[EBPO_CACHE_AHEAD];
         unsigned most = ebpo_subtrees_near(model, points + 3 * i, INFINITY, all);
-        ck_assert_uint_eq(most, model->top->below_count < EBPO_CACHE_AHEAD ? model->top->below_count : EBPO_CACHE_AHEAD);
+        ck_assert_uint_eq(most, model->top->below_count < EBPO_CACHE_AHEAD ? model->top->below_count
+                                                                           : EBPO_CACHE_AHEAD);
         for (double limit = m.size / 64; limit < m.size; limit *= 2) {
             unsigned fewer = ebpo_subtrees_near(model, points + 3 * i, limit, some);
             ck_assert_uint_le(fewer, most);

@@ -14,10 +14,7 @@
 #include "solids.h"
 
 __attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void)
-{
-    return "leak:libhdf5";
-}
+const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
 
 static const ebpo_progress silent = { NULL, NULL };
 
@@ -33,7 +30,8 @@ typedef struct items {
     uint64_t taken;
 } items;
 
-static ebpo_status make(void *context, uint64_t begin, uint64_t end, void *records, ebpo_error *error)
+static ebpo_status make(void *context, uint64_t begin, uint64_t end, void *records,
+                        ebpo_error *error)
 {
     const items *t = context;
     (void)error;
@@ -81,9 +79,19 @@ START_TEST(groups_sort_as_qsort_does)
         ck_assert(ebpo_workspace_make_any(&w, 4 << 20, NULL, &error) == EBPO_OK);
     items t = { malloc(count * sizeof(item)), malloc(count * sizeof(item)), 0 };
     for (uint64_t i = 0; i < count; i++)
-        t.in[i] = (item){ key_of_kind(_i % 5, i, &state), (uint32_t)(i * 2654435761u), (uint32_t)i };
-    ebpo_sort sort = { .workspace = w, .threads = 1 + (unsigned)_i % 3, .progress = &silent, .stage = "", .count = count, .record = sizeof(item), .shift = 46, .context = &t,
-                       .make = make, .compare = by_number, .take = take };
+        t.in[i] =
+            (item){ key_of_kind(_i % 5, i, &state), (uint32_t)(i * 2654435761u), (uint32_t)i };
+    ebpo_sort sort = { .workspace = w,
+                       .threads = 1 + (unsigned)_i % 3,
+                       .progress = &silent,
+                       .stage = "",
+                       .count = count,
+                       .record = sizeof(item),
+                       .shift = 46,
+                       .context = &t,
+                       .make = make,
+                       .compare = by_number,
+                       .take = take };
     ck_assert_msg(ebpo_sort_run(&sort, &error) == EBPO_OK, "%s", error.message);
     ck_assert_uint_eq(t.taken, count);
     qsort(t.in, count, sizeof *t.in, by_all);
@@ -98,7 +106,8 @@ END_TEST
 
 static ebpo_mesh some_mesh(int i)
 {
-    ebpo_mesh m = i < ebpo_test_solid_count ? ebpo_test_solids[i].make() : ebpo_test_torus(2, 0.7, 300, 200);
+    ebpo_mesh m =
+        i < ebpo_test_solid_count ? ebpo_test_solids[i].make() : ebpo_test_torus(2, 0.7, 300, 200);
     if (i % 3 == 1)
         ebpo_test_shuffle(&m, (uint64_t)i);
     if (i % 4 == 2 && m.xyz64)
@@ -113,7 +122,8 @@ static bool lies_in(const ebpo_box *box, const ebpo_mesh *m, uint64_t v, ebpo_ce
     uint32_t last = (uint32_t)((UINT64_C(1) << cell.level) - 1);
     ebpo_mesh_position(m, v, p);
     for (int k = 0; k < 3; k++)
-        if ((cell.at[k] > 0 && p[k] < ebpo_wall(box, k, cell.level, cell.at[k])) || (cell.at[k] < last && p[k] >= ebpo_wall(box, k, cell.level, cell.at[k] + 1)))
+        if ((cell.at[k] > 0 && p[k] < ebpo_wall(box, k, cell.level, cell.at[k])) ||
+            (cell.at[k] < last && p[k] >= ebpo_wall(box, k, cell.level, cell.at[k] + 1)))
             return false;
     return true;
 }
@@ -121,7 +131,8 @@ static bool lies_in(const ebpo_box *box, const ebpo_mesh *m, uint64_t v, ebpo_ce
 static void expect_arranged(const ebpo_mesh *m, const ebpo_mesh *source)
 {
     const struct ebpo_arrangement *a = m->arrangement;
-    uint8_t *seen = calloc(1, source->vertex_count + source->face_count + 1), *named = calloc(1, source->vertex_count + 1);
+    uint8_t *seen = calloc(1, source->vertex_count + source->face_count + 1),
+            *named = calloc(1, source->vertex_count + 1);
     ck_assert(m->vertex_count == source->vertex_count && m->face_count == source->face_count);
     for (uint64_t v = 0; v < m->vertex_count; v++) {
         uint32_t from = a->vertex_source[v];
@@ -148,7 +159,8 @@ static void expect_arranged(const ebpo_mesh *m, const ebpo_mesh *source)
         ck_assert_int_eq(named[v], v < a->referenced);
     for (uint64_t v = 0; v < a->referenced; v++) {
         ck_assert(v == 0 || a->key[v] >= a->key[v - 1]);
-        ck_assert(ebpo_octcode_level(a->key[v]) == a->box.grid_level && lies_in(&a->box, m, v, ebpo_cell_of_octcode(a->key[v])));
+        ck_assert(ebpo_octcode_level(a->key[v]) == a->box.grid_level &&
+                  lies_in(&a->box, m, v, ebpo_cell_of_octcode(a->key[v])));
     }
     free(seen);
     free(named);
@@ -167,11 +179,13 @@ START_TEST(meshes_are_the_same_in_another_order)
         ck_assert(ebpo_mesh_check(&after, &m, 2, silent, &error) == EBPO_OK);
         ck_assert_msg(memcmp(&before, &after, sizeof before) == 0, "mesh %d: another report", _i);
         /* From any order, with other threads, and once more. */
-        ck_assert(ebpo_arrange(&again, 3, 4, &silent, &error) == EBPO_OK && again.arrangement->box.grid_level == 3);
+        ck_assert(ebpo_arrange(&again, 3, 4, &silent, &error) == EBPO_OK &&
+                  again.arrangement->box.grid_level == 3);
         expect_arranged(&again, &source);
         ck_assert(ebpo_mesh_arrange(&again, 3, silent, &error) == EBPO_OK);
         expect_arranged(&again, &source);
-        ck_assert(memcmp(&again.arrangement->box, &m.arrangement->box, sizeof m.arrangement->box) == 0);
+        ck_assert(memcmp(&again.arrangement->box, &m.arrangement->box, sizeof m.arrangement->box) ==
+                  0);
     }
     ebpo_mesh_free(&source);
     ebpo_mesh_free(&m);
@@ -194,8 +208,10 @@ START_TEST(memory_does_not_change_the_order)
     ck_assert_uint_gt(f.filed_most, 20 << 20);
     ck_assert(memcmp(m.faces, small.faces, m.face_count * 12) == 0);
     ck_assert(memcmp(m.xyz64, small.xyz64, m.vertex_count * 24) == 0);
-    ck_assert(memcmp(m.arrangement->vertex_source, small.arrangement->vertex_source, m.vertex_count * 4) == 0);
-    ck_assert(memcmp(m.arrangement->face_source, small.arrangement->face_source, m.face_count * 4) == 0);
+    ck_assert(memcmp(m.arrangement->vertex_source, small.arrangement->vertex_source,
+                     m.vertex_count * 4) == 0);
+    ck_assert(
+        memcmp(m.arrangement->face_source, small.arrangement->face_source, m.face_count * 4) == 0);
     ebpo_mesh_free(&m);
     ebpo_mesh_free(&small);
     ebpo_workspace_free(w);

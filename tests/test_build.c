@@ -1,4 +1,5 @@
-/* The builder: trees keep their promises to the reader, on solids of every kind. Envelopes and labels are proved by test_verify. */
+/* The builder: trees keep their promises to the reader, on solids of every kind. Envelopes and
+ * labels are proved by test_verify. */
 #include <check.h>
 #include <math.h>
 #include <stdlib.h>
@@ -78,7 +79,8 @@ static void assert_same_mesh(const ebpo_tree *tree, const ebpo_mesh *source)
     ck_assert_uint_eq(tree->mesh.vertex_count, source->vertex_count);
     ck_assert_uint_eq(tree->mesh.face_count, source->face_count);
     for (uint64_t v = 0; v < source->vertex_count; v++)
-        ck_assert_mem_eq(tree->mesh.xyz64 + 3 * v, source->xyz64 + 3 * (uint64_t)tree->vertex_source[v], 24);
+        ck_assert_mem_eq(tree->mesh.xyz64 + 3 * v,
+                         source->xyz64 + 3 * (uint64_t)tree->vertex_source[v], 24);
     for (uint64_t f = 0; f < source->face_count; f++)
         for (uint64_t k = 0; k < 3; k++)
             ck_assert_uint_eq(tree->vertex_source[tree->mesh.faces[3 * f + k]],
@@ -123,8 +125,10 @@ START_TEST(tree_of_every_solid_is_consistent)
             assert_same_mesh(&tree, &source);
         for (int i = 1; i < tree.info.level_count; i++)
             ck_assert_double_le(level_volume(&tree, i), level_volume(&tree, i - 1) * (1 + 1e-9));
-        if (solid->balanced && isfinite(solid->volume) && solid->volume > 0 && single_shell_everywhere(&tree))
-            ck_assert_double_ge(level_volume(&tree, tree.info.level_count - 1), solid->volume * (1 - 1e-9));
+        if (solid->balanced && isfinite(solid->volume) && solid->volume > 0 &&
+            single_shell_everywhere(&tree))
+            ck_assert_double_ge(level_volume(&tree, tree.info.level_count - 1),
+                                solid->volume * (1 - 1e-9));
         ebpo_tree_free(&tree);
         ebpo_mesh_free(&source);
     }
@@ -166,12 +170,14 @@ END_TEST
 
 START_TEST(maximum_level_follows_equation_3)
 {
-    /* A cube of side 1 cut into n x n squares: edges 1/n and the diagonals; L / 2^i falls below their mean. */
+    /* A cube of side 1 cut into n x n squares: edges 1/n and the diagonals; L / 2^i falls below
+     * their mean. */
     double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
     for (uint32_t n = 1; n <= 32; n *= 2) {
         ebpo_mesh mesh = ebpo_test_box(low, high, n);
         ebpo_mesh_report report;
-        ck_assert_int_eq(ebpo_mesh_check(&report, &mesh, 1, (ebpo_progress){ NULL, NULL }, NULL), EBPO_OK);
+        ck_assert_int_eq(ebpo_mesh_check(&report, &mesh, 1, (ebpo_progress){ NULL, NULL }, NULL),
+                         EBPO_OK);
         int expected = 1;
         while (ldexp(1, -expected) >= report.mean_edge)
             expected++;
@@ -244,13 +250,19 @@ static double black_volume(const ebpo_tree *tree)
 
 START_TEST(gray_nodes_are_worth_it_when_faces_pass_cells_by_a_rounding_error)
 {
-    /* Found by trial: faces of this tetrahedron pass cell corners so closely that they are listed at a node and, below it, no more. */
-    static const double corners[4][3] = { { 0x1.67aea7c6db494p-2, 0x1.32011afef3792p-1, 0x1.919bdc2a4022fp-1 },
-                                   { 0x1.f842fe606bc34p-2, -0x1.856424e430e74p-2, 0x1.b45abf9f65a79p-1 },
-                                   { 0x1.b7f319f3fdce0p-2, 0x1.b3d56d74263ebp-5, 0x1.a4cb893fcf7c9p-1 },
-                                   { 0x1.678f38ecc0a48p-2, 0x1.3210eb60a9d0fp-1, 0x1.919b1b66b5d7cp-1 } };
+    /* Found by trial: faces of this tetrahedron pass cell corners so closely that they are listed
+     * at a node and, below it, no more. */
+    static const double corners[4][3] = {
+        { 0x1.67aea7c6db494p-2, 0x1.32011afef3792p-1, 0x1.919bdc2a4022fp-1 },
+        { 0x1.f842fe606bc34p-2, -0x1.856424e430e74p-2, 0x1.b45abf9f65a79p-1 },
+        { 0x1.b7f319f3fdce0p-2, 0x1.b3d56d74263ebp-5, 0x1.a4cb893fcf7c9p-1 },
+        { 0x1.678f38ecc0a48p-2, 0x1.3210eb60a9d0fp-1, 0x1.919b1b66b5d7cp-1 }
+    };
     static const uint32_t faces[4][3] = { { 0, 2, 1 }, { 0, 1, 3 }, { 0, 3, 2 }, { 1, 2, 3 } };
-    ebpo_mesh mesh = { .vertex_count = 4, .face_count = 4, .xyz64 = malloc(sizeof corners), .faces = malloc(sizeof faces) };
+    ebpo_mesh mesh = { .vertex_count = 4,
+                       .face_count = 4,
+                       .xyz64 = malloc(sizeof corners),
+                       .faces = malloc(sizeof faces) };
     memcpy(mesh.xyz64, corners, sizeof corners);
     memcpy(mesh.faces, faces, sizeof faces);
     ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;

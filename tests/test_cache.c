@@ -1,4 +1,5 @@
-/* The cache against a plain model of itself, and under threads: the source counts what is loading and what lives, and the budget holds at every moment. */
+/* The cache against a plain model of itself, and under threads: the source counts what is loading
+ * and what lives, and the budget holds at every moment. */
 #include <check.h>
 #include <pthread.h>
 #include <stdatomic.h>
@@ -38,7 +39,8 @@ static void account(source *s, int64_t change)
     s->faults += s->budget && s->bytes > s->budget;
 }
 
-static ebpo_status estimate(void *user, uint64_t key, uint64_t *peak, uint64_t *keep, ebpo_error *error)
+static ebpo_status estimate(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
+                            ebpo_error *error)
 {
     source *s = user;
     (void)error;
@@ -239,10 +241,13 @@ static void step(twin *t, uint64_t *random)
     int key = (int)(ebpo_test_random(random) % 40);
     void *it;
     switch (ebpo_test_random(random) % 8) {
-    case 0: case 1: case 2: {
+    case 0:
+    case 1:
+    case 2: {
         ebpo_error error = EBPO_ERROR_INIT;
         bool there = twin_at(t, key) >= 0, hit, fits = twin_get(t, key);
-        ck_assert_int_eq(ebpo_cache_get(cache, (uint64_t)key, &it, &hit, &error), fits ? EBPO_OK : EBPO_E_LIMIT);
+        ck_assert_int_eq(ebpo_cache_get(cache, (uint64_t)key, &it, &hit, &error),
+                         fits ? EBPO_OK : EBPO_E_LIMIT);
         ck_assert(hit == there);
         break;
     }
@@ -339,7 +344,8 @@ START_TEST(a_failed_load_tells_why_and_leaves_nothing)
 }
 END_TEST
 
-static ebpo_status say_little(void *user, uint64_t key, uint64_t *peak, uint64_t *keep, ebpo_error *error)
+static ebpo_status say_little(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
+                              ebpo_error *error)
 {
     ebpo_status status = estimate(user, key, peak, keep, error);
     *peak = *keep = 10;
@@ -458,12 +464,14 @@ START_TEST(a_get_waits_for_the_room_that_another_load_holds)
     pthread_join(a.thread, NULL);
     pthread_join(b.thread, NULL);
     ck_assert_int_eq(a.status, EBPO_OK);
-    ck_assert(b.status == EBPO_OK || b.status == EBPO_E_LIMIT); /* refused if it came while 1 was in use */
+    /* refused if it came while 1 was in use */
+    ck_assert(b.status == EBPO_OK || b.status == EBPO_E_LIMIT);
     finish();
 }
 END_TEST
 
-/* Small loads, one after the other on several threads, never leave room for a large one by chance. */
+/* Small loads, one after the other on several threads, never leave room for a large one by chance.
+ */
 static void *run_small(void *context)
 {
     atomic_bool *stop = context;
@@ -482,7 +490,8 @@ START_TEST(a_large_load_is_not_starved_by_small_ones)
     atomic_bool stop = false;
     begin_with(400, 100, 100);
     src->jitter = true;
-    src->size[200] = src->peak[200] = 290; /* a small one in use leaves no room: that is a refusal; beside loads it waits */
+    /* a small one in use leaves no room: that is a refusal; beside loads it waits */
+    src->size[200] = src->peak[200] = 290;
     for (int i = 0; i < 3; i++)
         pthread_create(&small[i], NULL, run_small, &stop);
     int done = 0;

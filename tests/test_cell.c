@@ -33,9 +33,10 @@ static void check_walls(const ebpo_box *box, uint64_t *state)
     for (int axis = 0; axis < 3; axis++)
         for (int level = 0; level <= box->grid_level; level++) {
             uint32_t last = (uint32_t)1 << level;
-            const uint32_t k[5] = {0, 1, last - 1, last, (uint32_t)twin_integer(state, 0, last)};
+            const uint32_t k[5] = { 0, 1, last - 1, last, (uint32_t)twin_integer(state, 0, last) };
             for (int i = 0; i < 5; i++)
-                ck_assert_msg(wall_is_exact(box, axis, level, k[i]), "axis %d level %d wall %u", axis, level, k[i]);
+                ck_assert_msg(wall_is_exact(box, axis, level, k[i]), "axis %d level %d wall %u",
+                              axis, level, k[i]);
         }
 }
 
@@ -85,7 +86,8 @@ START_TEST(box_walls_are_exact_and_outside_the_model)
             min[k] = fmin(a, b);
             max[k] = fmax(a, b);
         }
-        check_box(min, max, i % 3 ? EBPO_MAX_LEVEL : (int)twin_integer(&state, 0, EBPO_MAX_LEVEL), &state);
+        check_box(min, max, i % 3 ? EBPO_MAX_LEVEL : (int)twin_integer(&state, 0, EBPO_MAX_LEVEL),
+                  &state);
     }
 }
 END_TEST
@@ -110,7 +112,7 @@ END_TEST
 /* The finest step that 53 bits allow 1e7 from 0 is 2^-29: 2^20 cells of it make 2^-9. */
 START_TEST(box_of_translated_model_is_as_tight_as_doubles_allow)
 {
-    const double min[3] = {1e7, 1e7, 1e7}, max[3] = {1e7 + 1e-3, 1e7 + 1e-3, 1e7 + 1e-3};
+    const double min[3] = { 1e7, 1e7, 1e7 }, max[3] = { 1e7 + 1e-3, 1e7 + 1e-3, 1e7 + 1e-3 };
     ebpo_box box;
     ck_assert(ebpo_box_make(&box, min, max, EBPO_MAX_LEVEL));
     ck_assert(box.size[0] == 0x1p-9);
@@ -121,7 +123,7 @@ END_TEST
 
 START_TEST(box_of_single_point_has_volume)
 {
-    const double zero[3] = {0, 0, 0}, point[3] = {3, -4, 0};
+    const double zero[3] = { 0, 0, 0 }, point[3] = { 3, -4, 0 };
     uint64_t state = 1;
     check_box(zero, zero, EBPO_MAX_LEVEL, &state);
     check_box(point, point, EBPO_MAX_LEVEL, &state);
@@ -130,7 +132,9 @@ END_TEST
 
 START_TEST(box_make_refuses_bounds_out_of_range)
 {
-    const double good[3] = {0, 0, 0}, bad[][3] = {{0, NAN, 0}, {INFINITY, 0, 0}, {0, 0, 0x1.1p1000}, {0, -INFINITY, 0}, {-1, 1, 1}};
+    const double good[3] = { 0, 0, 0 }, bad[][3] = {
+        { 0, NAN, 0 }, { INFINITY, 0, 0 }, { 0, 0, 0x1.1p1000 }, { 0, -INFINITY, 0 }, { -1, 1, 1 }
+    };
     ebpo_box box;
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
         ck_assert(!ebpo_box_make(&box, good, bad[i], 5));
@@ -142,9 +146,12 @@ END_TEST
 
 START_TEST(box_valid_refuses_hostile_boxes)
 {
-    const ebpo_box good = {{-1, 0, 0x1p30}, {2, 3, 1}, 20};
-    const double bad_size[] = {NAN, INFINITY, -INFINITY, -1, 0, -0.0, 0x1p-1074, 0x1.8p1003, 1.1, 0x1.0000000000001p0};
-    const double bad_origin[] = {NAN, INFINITY, -INFINITY, 0x1p1003, 0.1, 0x1p-60, 0x1p40, -0x1p60};
+    const ebpo_box good = { { -1, 0, 0x1p30 }, { 2, 3, 1 }, 20 };
+    const double bad_size[] = { NAN,  INFINITY,  -INFINITY,  -1,  0,
+                                -0.0, 0x1p-1074, 0x1.8p1003, 1.1, 0x1.0000000000001p0 };
+    const double bad_origin[] = {
+        NAN, INFINITY, -INFINITY, 0x1p1003, 0.1, 0x1p-60, 0x1p40, -0x1p60
+    };
     ck_assert(ebpo_box_valid(&good));
     for (size_t i = 0; i < sizeof bad_size / sizeof *bad_size; i++) {
         ebpo_box box = good;
@@ -171,12 +178,13 @@ START_TEST(box_valid_accepts_only_boxes_with_exact_walls)
     uint64_t state = 6;
     int valid = 0;
     for (int i = 0; i < 3000; i++) {
-        ebpo_box box = {.grid_level = (int)twin_integer(&state, -1, 21)};
+        ebpo_box box = { .grid_level = (int)twin_integer(&state, -1, 21) };
         int e = (int)twin_integer(&state, -1074, 1000), bits = (int)twin_integer(&state, 30, 53);
         for (int k = 0; k < 3; k++) {
             int64_t limit = (int64_t)1 << bits;
             box.origin[k] = ldexp((double)twin_integer(&state, -limit, limit), e - bits);
-            box.size[k] = ldexp((double)twin_integer(&state, 1, limit), e - bits + (int)twin_integer(&state, 0, 20));
+            box.size[k] = ldexp((double)twin_integer(&state, 1, limit),
+                                e - bits + (int)twin_integer(&state, 0, 20));
         }
         if (!ebpo_box_valid(&box))
             continue;
@@ -194,7 +202,8 @@ static ebpo_octcode plain_octcode(ebpo_cell cell)
 {
     ebpo_octcode code = 1;
     for (int bit = cell.level - 1; bit >= 0; bit--)
-        code = ebpo_octcode_child(code, (cell.at[0] >> bit & 1) | (cell.at[1] >> bit & 1) << 1 | (cell.at[2] >> bit & 1) << 2);
+        code = ebpo_octcode_child(code, (cell.at[0] >> bit & 1) | (cell.at[1] >> bit & 1) << 1 |
+                                            (cell.at[2] >> bit & 1) << 2);
     return code;
 }
 
@@ -203,7 +212,7 @@ START_TEST(octcode_equals_plain_twin_and_comes_back)
     uint64_t state = (uint64_t)_i + 50;
     int64_t last = ((int64_t)1 << _i) - 1;
     for (int i = 0; i < 20000; i++) {
-        ebpo_cell cell = {_i, {0, 0, 0}};
+        ebpo_cell cell = { _i, { 0, 0, 0 } };
         for (int k = 0; k < 3; k++)
             cell.at[k] = (uint32_t)(i == 0 ? last : twin_integer(&state, 0, last));
         ebpo_octcode code = ebpo_octcode_of_cell(cell);
@@ -211,11 +220,13 @@ START_TEST(octcode_equals_plain_twin_and_comes_back)
         ck_assert(ebpo_octcode_valid(code));
         ck_assert_int_eq(ebpo_octcode_level(code), _i);
         ebpo_cell back = ebpo_cell_of_octcode(code);
-        ck_assert(back.level == _i && back.at[0] == cell.at[0] && back.at[1] == cell.at[1] && back.at[2] == cell.at[2]);
+        ck_assert(back.level == _i && back.at[0] == cell.at[0] && back.at[1] == cell.at[1] &&
+                  back.at[2] == cell.at[2]);
         if (_i == 0)
             continue;
         ebpo_cell up = ebpo_cell_of_octcode(ebpo_octcode_parent(code));
-        ck_assert(up.level == _i - 1 && up.at[0] == cell.at[0] / 2 && up.at[1] == cell.at[1] / 2 && up.at[2] == cell.at[2] / 2);
+        ck_assert(up.level == _i - 1 && up.at[0] == cell.at[0] / 2 && up.at[1] == cell.at[1] / 2 &&
+                  up.at[2] == cell.at[2] / 2);
     }
 }
 END_TEST

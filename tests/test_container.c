@@ -1,4 +1,5 @@
-/* The container: trees come back bit for bit, equal trees give equal files, and damage is noticed. */
+/* The container: trees come back bit for bit, equal trees give equal files, and damage is noticed.
+ */
 #include <check.h>
 #include <fcntl.h>
 #include <hdf5.h>
@@ -10,12 +11,10 @@
 #include "h5/h5.h"
 #include "random_tree.h"
 
-/* libhdf5 1.10 itself leaks when it gives up on a damaged object header; that is not what we look for here. */
+/* libhdf5 1.10 itself leaks when it gives up on a damaged object header; that is not what we look
+ * for here. */
 __attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void)
-{
-    return "leak:libhdf5";
-}
+const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
 
 static char folder[64];
 
@@ -62,7 +61,8 @@ static void spill(const char *path, const uint8_t *data, size_t size)
     fclose(f);
 }
 
-static void write_ok(const ebpo_tree *tree, const char *path, ebpo_codec codec, unsigned threads, uint32_t parts)
+static void write_ok(const ebpo_tree *tree, const char *path, ebpo_codec codec, unsigned threads,
+                     uint32_t parts)
 {
     ebpo_write_options options = EBPO_WRITE_OPTIONS_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -124,16 +124,20 @@ static void same_tree(const ebpo_tree *a, const ebpo_tree *b)
     ck_assert_str_eq(a->info.source_name, b->info.source_name);
     ck_assert_str_eq(a->info.unit, b->info.unit);
     ck_assert_str_eq(a->info.crs, b->info.crs);
-    ck_assert(memcmp(a->info.box_origin, b->info.box_origin, 24) == 0 && memcmp(a->info.box_size, b->info.box_size, 24) == 0);
-    ck_assert(a->info.report.genus == b->info.report.genus && a->info.report.volume == b->info.report.volume);
-    ck_assert(a->info.rule == b->info.rule && a->info.solid == b->info.solid && a->info.epsilon == b->info.epsilon);
+    ck_assert(memcmp(a->info.box_origin, b->info.box_origin, 24) == 0 &&
+              memcmp(a->info.box_size, b->info.box_size, 24) == 0);
+    ck_assert(a->info.report.genus == b->info.report.genus &&
+              a->info.report.volume == b->info.report.volume);
+    ck_assert(a->info.rule == b->info.rule && a->info.solid == b->info.solid &&
+              a->info.epsilon == b->info.epsilon);
 }
 
-/* Shapes of trees: single leaf, several levels, many items (index arrays, several chunks), odd windings, surface, doubles, leaf planes. */
+/* Shapes of trees: single leaf, several levels, many items (index arrays, several chunks), odd
+ * windings, surface, doubles, leaf planes. */
 static const random_tree_options shapes[] = {
-    { 1, 1, 0, 9, true, false, false, false },   { 2, 2, 0, 5, true, false, false, false },
-    { 3, 5, 8, 6, true, true, true, false },     { 4, 6, 7, 9, false, false, false, true },
-    { 5, 12, 1, 300, true, false, false, true }, { 6, 8, 8, 9, true, false, true, true },
+    { 1, 1, 0, 9, true, false, false, false },     { 2, 2, 0, 5, true, false, false, false },
+    { 3, 5, 8, 6, true, true, true, false },       { 4, 6, 7, 9, false, false, false, true },
+    { 5, 12, 1, 300, true, false, false, true },   { 6, 8, 8, 9, true, false, true, true },
     { 7, 7, 9, 90000, true, false, false, false },
 };
 enum { SHAPES = sizeof shapes / sizeof shapes[0] };
@@ -150,9 +154,11 @@ START_TEST(trees_come_back_bit_for_bit)
             write_ok(&tree, in_folder("t.ebpo.h5"), (ebpo_codec)codec, threads, ~0u);
             ebpo_file *file = open_ok(in_folder("t.ebpo.h5"));
             ebpo_error error = EBPO_ERROR_INIT;
-            ck_assert_msg(ebpo_file_read_tree(file, &back, threads, &error) == EBPO_OK, "%s", error.message);
+            ck_assert_msg(ebpo_file_read_tree(file, &back, threads, &error) == EBPO_OK, "%s",
+                          error.message);
             ck_assert_int_eq(ebpo_file_info(file)->codec, codec);
-            ck_assert_msg(ebpo_file_check_content(file, threads, &error) == EBPO_OK, "%s", error.message);
+            ck_assert_msg(ebpo_file_check_content(file, threads, &error) == EBPO_OK, "%s",
+                          error.message);
             same_tree(&tree, &back);
             ebpo_tree_free(&back);
             ebpo_close(file);
@@ -169,7 +175,8 @@ START_TEST(equal_trees_give_equal_bytes_for_any_thread_count)
         size_t size, other_size;
         write_ok(&tree, in_folder("a.ebpo.h5"), (ebpo_codec)codec, 1, ~0u);
         write_ok(&tree, in_folder("b.ebpo.h5"), (ebpo_codec)codec, 7, ~0u);
-        uint8_t *a = slurp(in_folder("a.ebpo.h5"), &size), *b = slurp(in_folder("b.ebpo.h5"), &other_size);
+        uint8_t *a = slurp(in_folder("a.ebpo.h5"), &size),
+                *b = slurp(in_folder("b.ebpo.h5"), &other_size);
         ck_assert_uint_eq(size, other_size);
         ck_assert_int_eq(memcmp(a, b, size), 0);
         free(a);
@@ -216,7 +223,8 @@ static herr_t check_chunks(hid_t group, const char *name, const H5L_info_t *info
             ck_assert_int_ge(H5Dget_chunk_info(object, space, i, at, &mask, &address, &size), 0);
             ck_assert_uint_ge(address, m->head);
             ck_assert(address + size <= m->index || address >= m->index + m->index_bytes);
-            ck_assert(count == 1 || address >= m->index + m->index_bytes); /* what one needs to find them comes before them */
+            /* what one needs to find them comes before them */
+            ck_assert(count == 1 || address >= m->index + m->index_bytes);
             m->chunk_bytes += size;
         }
         H5Sclose(space);
@@ -251,12 +259,16 @@ START_TEST(all_metadata_is_in_two_pieces)
 }
 END_TEST
 
-/* Checksums at the end of headers that end in zero bytes, and files of one array: sizes of metadata are right for all of them. */
+/* Checksums at the end of headers that end in zero bytes, and files of one array: sizes of metadata
+ * are right for all of them. */
 START_TEST(files_of_all_sizes_have_no_gaps)
 {
     static const uint32_t parts[] = { ~0u, EBPO_PART_PLANES, 0, EBPO_PART_MESH };
     for (unsigned seed = 1; seed <= 100; seed++) {
-        random_tree_options options = { seed, 1 + (int)(seed % 3), 2 + seed % 5, seed * 7 % 260 + 1, seed % 2 == 0, false, seed % 3 == 0, false };
+        random_tree_options options = { seed,          1 + (int)(seed % 3),
+                                        2 + seed % 5,  seed * 7 % 260 + 1,
+                                        seed % 2 == 0, false,
+                                        seed % 3 == 0, false };
         ebpo_tree tree;
         random_tree_make(&tree, &options);
         for (int codec = EBPO_CODEC_ZSTD; codec <= EBPO_CODEC_NONE; codec++) {
@@ -264,10 +276,12 @@ START_TEST(files_of_all_sizes_have_no_gaps)
             write_ok(&tree, in_folder("a.ebpo.h5"), (ebpo_codec)codec, 1, some);
             ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
             const ebpo_info *info = ebpo_file_info(file);
-            uint64_t sum = info->head_bytes + info->chunk_index_bytes + info->mesh_vertex_bytes + info->mesh_face_bytes + info->map_bytes;
+            uint64_t sum = info->head_bytes + info->chunk_index_bytes + info->mesh_vertex_bytes +
+                           info->mesh_face_bytes + info->map_bytes;
             for (int level = 0; level < info->level_count; level++)
                 sum += info->level[level].stored_bytes;
-            ck_assert_msg(sum == info->file_bytes, "seed %u, codec %d: %d bytes, the file has %d", seed, codec, (int)sum, (int)info->file_bytes);
+            ck_assert_msg(sum == info->file_bytes, "seed %u, codec %d: %d bytes, the file has %d",
+                          seed, codec, (int)sum, (int)info->file_bytes);
             ebpo_close(file);
         }
         ebpo_tree_free(&tree);
@@ -283,10 +297,14 @@ START_TEST(libhdf5_reads_what_we_compress)
     for (int codec = EBPO_CODEC_ZSTD; codec <= EBPO_CODEC_NONE; codec++) {
         write_ok(&tree, in_folder("a.ebpo.h5"), (ebpo_codec)codec, 2, ~0u);
         hid_t fid = H5Fopen(in_folder("a.ebpo.h5"), H5F_ACC_RDONLY, H5P_DEFAULT);
-        hid_t planes = H5Dopen2(fid, "/levels/06/planes", H5P_DEFAULT), codes = H5Dopen2(fid, "/mesh/faces", H5P_DEFAULT);
-        uint32_t *values = malloc(tree.level[6].plane_count * 4), *faces = malloc(tree.mesh.face_count * 12);
-        ck_assert_int_ge(H5Dread(planes, H5T_NATIVE_UINT32, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), 0);
-        ck_assert_int_ge(H5Dread(codes, H5T_NATIVE_UINT32, H5S_ALL, H5S_ALL, H5P_DEFAULT, faces), 0);
+        hid_t planes = H5Dopen2(fid, "/levels/06/planes", H5P_DEFAULT),
+              codes = H5Dopen2(fid, "/mesh/faces", H5P_DEFAULT);
+        uint32_t *values = malloc(tree.level[6].plane_count * 4),
+                 *faces = malloc(tree.mesh.face_count * 12);
+        ck_assert_int_ge(H5Dread(planes, H5T_NATIVE_UINT32, H5S_ALL, H5S_ALL, H5P_DEFAULT, values),
+                         0);
+        ck_assert_int_ge(H5Dread(codes, H5T_NATIVE_UINT32, H5S_ALL, H5S_ALL, H5P_DEFAULT, faces),
+                         0);
         ck_assert_int_eq(memcmp(values, tree.level[6].planes, tree.level[6].plane_count * 4), 0);
         uint64_t seen = 0;
         ck_assert(ebpo_corners_decode((uint8_t *)faces, tree.mesh.face_count, &seen, faces));
@@ -317,9 +335,11 @@ START_TEST(parts_that_are_left_out_are_absent)
         ck_assert_int_eq(back.level[5].leaf_planes != NULL, (there & EBPO_PART_LEAF_PLANES) != 0);
         ck_assert_int_eq(back.level[4].planes != NULL, (there & EBPO_PART_PLANES) != 0);
         ck_assert_int_eq(back.level[5].leaf_first != NULL, (there & EBPO_PART_MESH) != 0);
-        ck_assert_int_eq(ebpo_file_read_mesh(file, &mesh, 1, NULL), there & EBPO_PART_MESH ? EBPO_OK : EBPO_E_ABSENT);
+        ck_assert_int_eq(ebpo_file_read_mesh(file, &mesh, 1, NULL),
+                         there & EBPO_PART_MESH ? EBPO_OK : EBPO_E_ABSENT);
         ebpo_mesh_free(&mesh);
-        ck_assert_int_eq(ebpo_file_read_maps(file, &vertex_source, &face_source, 1, NULL), there & EBPO_PART_MAPS ? EBPO_OK : EBPO_E_ABSENT);
+        ck_assert_int_eq(ebpo_file_read_maps(file, &vertex_source, &face_source, 1, NULL),
+                         there & EBPO_PART_MAPS ? EBPO_OK : EBPO_E_ABSENT);
         free(vertex_source);
         free(face_source);
         ck_assert_int_eq(ebpo_file_check_content(file, 2, NULL), EBPO_OK);
@@ -336,7 +356,8 @@ START_TEST(source_order_undoes_the_maps)
     ebpo_mesh mesh;
     bool ordered;
     random_tree_make(&tree, &shapes[_i]);
-    tree.info.source_vertex_count = tree.mesh.vertex_count * 2; /* as after welding: every second number is gone */
+    /* as after welding: every second number is gone */
+    tree.info.source_vertex_count = tree.mesh.vertex_count * 2;
     for (uint64_t i = 0; i < tree.mesh.vertex_count; i++)
         tree.vertex_source[i] *= 2;
     write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, ~0u);
@@ -345,12 +366,14 @@ START_TEST(source_order_undoes_the_maps)
     ck_assert(ordered);
     for (uint64_t i = 0; i < tree.mesh.face_count; i++)
         for (int k = 0; k < 3; k++)
-            ck_assert_uint_eq(mesh.faces[3 * (uint64_t)tree.face_source[i] + k], tree.vertex_source[tree.mesh.faces[3 * i + k]] / 2);
+            ck_assert_uint_eq(mesh.faces[3 * (uint64_t)tree.face_source[i] + k],
+                              tree.vertex_source[tree.mesh.faces[3 * i + k]] / 2);
     size_t size = mesh.xyz32 ? 12 : 24;
     const char *sorted = mesh.xyz32 ? (char *)mesh.xyz32 : (char *)mesh.xyz64;
     const char *stored = mesh.xyz32 ? (char *)tree.mesh.xyz32 : (char *)tree.mesh.xyz64;
     for (uint64_t i = 0; i < tree.mesh.vertex_count; i++)
-        ck_assert_int_eq(memcmp(sorted + tree.vertex_source[i] / 2 * size, stored + i * size, size), 0);
+        ck_assert_int_eq(memcmp(sorted + tree.vertex_source[i] / 2 * size, stored + i * size, size),
+                         0);
     ebpo_mesh_free(&mesh);
     ebpo_close(file);
     ebpo_tree_free(&tree);
@@ -404,7 +427,8 @@ START_TEST(every_cut_off_file_is_refused)
 }
 END_TEST
 
-/* zstd frames have a few bits without meaning; reads_well has compared the content, so a flip that it passes changed nothing. */
+/* zstd frames have a few bits without meaning; reads_well has compared the content, so a flip that
+ * it passes changed nothing. */
 START_TEST(every_flipped_bit_behind_the_head_is_noticed)
 {
     ebpo_tree tree;
@@ -431,7 +455,8 @@ START_TEST(every_flipped_bit_behind_the_head_is_noticed)
 }
 END_TEST
 
-/* Flips in the head: refused, or without effect (bytes that HDF5 leaves unused); never a crash, never other content. */
+/* Flips in the head: refused, or without effect (bytes that HDF5 leaves unused); never a crash,
+ * never other content. */
 START_TEST(flipped_bits_in_the_head_do_no_harm)
 {
     ebpo_tree tree, back;
@@ -481,8 +506,10 @@ static void spoil_refs(ebpo_tree *t)
     l->leaf_refs[at] = l->leaf_refs[at + 1];
     l->leaf_refs[at + 1] = first;
 }
-static const spoil_fn spoils[] = { spoil_refs, spoil_types, spoil_root, spoil_first_use, spoil_vertex, spoil_map, spoil_plane, spoil_text, spoil_box,
-                                   spoil_order, spoil_black, spoil_mesh, spoil_levels };
+static const spoil_fn spoils[] = { spoil_refs,   spoil_types, spoil_root,  spoil_first_use,
+                                   spoil_vertex, spoil_map,   spoil_plane, spoil_text,
+                                   spoil_box,    spoil_order, spoil_black, spoil_mesh,
+                                   spoil_levels };
 
 START_TEST(writer_refuses_a_tree_that_readers_would_refuse)
 {
@@ -548,7 +575,8 @@ START_TEST(a_stopped_writer_leaves_the_old_file)
     uint8_t *before = slurp(in_folder("a.ebpo.h5"), &size);
     ebpo_write_options options = EBPO_WRITE_OPTIONS_INIT;
     options.progress.report = stop_soon;
-    ck_assert_int_eq(ebpo_tree_write(&tree, in_folder("a.ebpo.h5"), &options, NULL), EBPO_E_CANCELLED);
+    ck_assert_int_eq(ebpo_tree_write(&tree, in_folder("a.ebpo.h5"), &options, NULL),
+                     EBPO_E_CANCELLED);
     uint8_t *after = slurp(in_folder("a.ebpo.h5"), &again);
     ck_assert(size == again && memcmp(before, after, size) == 0);
     free(before);
@@ -561,15 +589,21 @@ START_TEST(codec_and_level_are_checked)
 {
     ebpo_tree tree;
     random_tree_make(&tree, &shapes[0]);
-    const struct { ebpo_codec codec; int level; ebpo_status status; } cases[] = {
-        { EBPO_CODEC_ZSTD, 22, EBPO_OK }, { EBPO_CODEC_ZSTD, 23, EBPO_E_ARGUMENT }, { EBPO_CODEC_DEFLATE, 9, EBPO_OK },
-        { EBPO_CODEC_DEFLATE, 10, EBPO_E_ARGUMENT }, { EBPO_CODEC_NONE, 1, EBPO_E_ARGUMENT }, { (ebpo_codec)7, 0, EBPO_E_ARGUMENT },
+    const struct {
+        ebpo_codec codec;
+        int level;
+        ebpo_status status;
+    } cases[] = {
+        { EBPO_CODEC_ZSTD, 22, EBPO_OK },        { EBPO_CODEC_ZSTD, 23, EBPO_E_ARGUMENT },
+        { EBPO_CODEC_DEFLATE, 9, EBPO_OK },      { EBPO_CODEC_DEFLATE, 10, EBPO_E_ARGUMENT },
+        { EBPO_CODEC_NONE, 1, EBPO_E_ARGUMENT }, { (ebpo_codec)7, 0, EBPO_E_ARGUMENT },
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         ebpo_write_options options = EBPO_WRITE_OPTIONS_INIT;
         options.codec = cases[i].codec;
         options.codec_level = cases[i].level;
-        ck_assert_int_eq(ebpo_tree_write(&tree, in_folder("a.ebpo.h5"), &options, NULL), cases[i].status);
+        ck_assert_int_eq(ebpo_tree_write(&tree, in_folder("a.ebpo.h5"), &options, NULL),
+                         cases[i].status);
     }
     ebpo_tree_free(&tree);
 }
@@ -617,10 +651,15 @@ START_TEST(chunks_come_back_from_every_pipeline)
                 uint8_t *stored = malloc(ebpo_chunk_bound(bytes));
                 size_t used = 0;
                 const char *why;
-                ck_assert_int_eq(ebpo_chunk_encode(&coder, (ebpo_pipeline)pipeline, 0, size, raw, bytes, stored, &used), EBPO_OK);
-                ck_assert_int_eq(ebpo_chunk_decode(&coder, (ebpo_pipeline)pipeline, size, stored, used, back, bytes, &why), EBPO_OK);
+                ck_assert_int_eq(ebpo_chunk_encode(&coder, (ebpo_pipeline)pipeline, 0, size, raw,
+                                                   bytes, stored, &used),
+                                 EBPO_OK);
+                ck_assert_int_eq(ebpo_chunk_decode(&coder, (ebpo_pipeline)pipeline, size, stored,
+                                                   used, back, bytes, &why),
+                                 EBPO_OK);
                 ck_assert_int_eq(memcmp(raw, back, bytes), 0);
-                ck_assert_int_eq(ebpo_chunk_decode(&coder, (ebpo_pipeline)pipeline, size, stored, used - 1, back, bytes, &why),
+                ck_assert_int_eq(ebpo_chunk_decode(&coder, (ebpo_pipeline)pipeline, size, stored,
+                                                   used - 1, back, bytes, &why),
                                  EBPO_E_FORMAT);
                 free(stored);
             }
@@ -630,7 +669,9 @@ END_TEST
 
 START_TEST(codings_return_every_bit_pattern)
 {
-    uint32_t bits[12] = { 0, 1, 0x80000000u, 0x7fffffffu, 0xffffffffu, 0x7f800000u, 0xff800000u, 0x3f800000u, 0xbf800000u, 2, 3, 4 };
+    uint32_t bits[12] = { 0,           1,           0x80000000u, 0x7fffffffu,
+                          0xffffffffu, 0x7f800000u, 0xff800000u, 0x3f800000u,
+                          0xbf800000u, 2,           3,           4 };
     float xyz[12], back[12];
     uint8_t file[48];
     memcpy(xyz, bits, sizeof bits);
@@ -663,7 +704,8 @@ int main(void)
     tcase_add_test(tests, every_cut_off_file_is_refused);
     tcase_add_loop_test(tests, every_flipped_bit_behind_the_head_is_noticed, 0, 3);
     tcase_add_test(tests, flipped_bits_in_the_head_do_no_harm);
-    tcase_add_loop_test(tests, writer_refuses_a_tree_that_readers_would_refuse, 0, sizeof spoils / sizeof spoils[0]);
+    tcase_add_loop_test(tests, writer_refuses_a_tree_that_readers_would_refuse, 0,
+                        sizeof spoils / sizeof spoils[0]);
     tcase_add_loop_test(tests, an_index_that_contradicts_its_arrays_is_refused, 0, 3);
     tcase_add_test(tests, a_stopped_writer_leaves_the_old_file);
     tcase_add_test(tests, codec_and_level_are_checked);

@@ -1,4 +1,5 @@
-/* Crossings of faces by axis-parallel segments: against a twin that really shifts the segment, and on closed meshes. */
+/* Crossings of faces by axis-parallel segments: against a twin that really shifts the segment, and
+ * on closed meshes. */
 #include <check.h>
 #include <math.h>
 #include <stdlib.h>
@@ -95,7 +96,7 @@ static bool inside_face(vector x, vector corner[3], vector normal)
 /* p + shift with d0 = 2^-s, d1 = 2^-3s, d2 = 2^-7s. */
 static void set_shifted(vector out, const double p[3], unsigned s)
 {
-    static const unsigned factor[3] = {1, 3, 7};
+    static const unsigned factor[3] = { 1, 3, 7 };
     mpq_t d;
     mpq_init(d);
     for (int k = 0; k < 3; k++) {
@@ -111,7 +112,7 @@ static int twin_crossing(const double from[3], double to, int axis, const double
 {
     vector p, q, x, normal, corner[3];
     mpq_t hp, hq, t;
-    double end[3] = {from[0], from[1], from[2]};
+    double end[3] = { from[0], from[1], from[2] };
     int result = 0;
     end[axis] = to;
     mpq_inits(hp, hq, t, NULL);
@@ -182,11 +183,13 @@ START_TEST(crossing_equals_rational_twin_on_single_precision)
         double face[9], from[3];
         int axis = (int)twin_integer(&state, 0, 2), weight[3], sum = 0;
         for (int k = 0; k < 9; k++)
-            face[k] = (double)twin_integer(&state, 1 << 10, 1 << 24) * 0x1p-24 + (_i == 1 ? 65536 : 0);
+            face[k] =
+                (double)twin_integer(&state, 1 << 10, 1 << 24) * 0x1p-24 + (_i == 1 ? 65536 : 0);
         for (int k = 0; k < 3; k++)
             sum += weight[k] = (int)twin_integer(&state, k == 0, 1);
         for (int k = 0; k < 3; k++)
-            from[k] = (face[k] * weight[0] + face[3 + k] * weight[1] + face[6 + k] * weight[2]) / sum;
+            from[k] =
+                (face[k] * weight[0] + face[3 + k] * weight[1] + face[6 + k] * weight[2]) / sum;
         double to = from[axis] + 0.5 * (double)twin_integer(&state, 0, 2);
         if (twin_random(&state) % 2) {
             to = from[axis];
@@ -232,11 +235,12 @@ static void add_face(soup *mesh, const double *a, const double *b, const double 
 /* Winding number of p by the faces between it and a point far below it on `axis`. */
 static int winding(const soup *mesh, const double p[3], int axis)
 {
-    double from[3] = {p[0], p[1], p[2]};
+    double from[3] = { p[0], p[1], p[2] };
     int sum = 0;
     from[axis] = -100;
     for (int i = 0; i < mesh->count; i++)
-        sum += ebpo_axis_crossing(from, p[axis], axis, mesh->face[i], mesh->face[i] + 3, mesh->face[i] + 6);
+        sum += ebpo_axis_crossing(from, p[axis], axis, mesh->face[i], mesh->face[i] + 3,
+                                  mesh->face[i] + 6);
     return sum;
 }
 
@@ -248,7 +252,8 @@ static bool filled(const bool *voxel, int x, int y, int z)
     return in && voxel[(x * GRID + y) * GRID + z];
 }
 
-/* The two faces of the voxel's wall on `side` (0 low, 1 high) of `axis`, outward, over a random diagonal. */
+/* The two faces of the voxel's wall on `side` (0 low, 1 high) of `axis`, outward, over a random
+ * diagonal. */
 static void add_wall(soup *mesh, const int at[3], int axis, int side, uint64_t *state)
 {
     double q[4][3];
@@ -258,7 +263,8 @@ static void add_wall(soup *mesh, const int at[3], int axis, int side, uint64_t *
         q[i][u] = at[u] + (i == 1 || i == 2);
         q[i][v] = at[v] + (i >= 2);
     }
-    const double *a = q[turn], *b = q[(turn + 1) % 4], *c = q[(turn + 2) % 4], *d = q[(turn + 3) % 4];
+    const double *a = q[turn], *b = q[(turn + 1) % 4], *c = q[(turn + 2) % 4],
+                 *d = q[(turn + 3) % 4];
     add_face(mesh, a, side ? b : c, side ? c : b);
     add_face(mesh, a, side ? c : d, side ? d : c);
 }
@@ -269,7 +275,7 @@ static void add_voxels(soup *mesh, const bool *voxel, uint64_t *state)
         for (int y = 0; y < GRID; y++)
             for (int z = 0; z < GRID; z++)
                 for (int w = 0; w < 6; w++) {
-                    int at[3] = {x, y, z}, next[3] = {x, y, z};
+                    int at[3] = { x, y, z }, next[3] = { x, y, z };
                     next[w / 2] += w % 2 ? 1 : -1;
                     if (filled(voxel, x, y, z) && !filled(voxel, next[0], next[1], next[2]))
                         add_wall(mesh, at, w / 2, w % 2, state);
@@ -289,7 +295,7 @@ START_TEST(winding_of_voxel_solids_is_right_at_every_vertex_edge_and_face)
     for (int x = -1; x <= 2 * GRID + 1; x++)
         for (int y = -1; y <= 2 * GRID + 1; y++)
             for (int z = -1; z <= 2 * GRID + 1; z++) {
-                const double p[3] = {x / 2.0, y / 2.0, z / 2.0};
+                const double p[3] = { x / 2.0, y / 2.0, z / 2.0 };
                 int expected = filled(voxel, (int)floor(p[0]), (int)floor(p[1]), (int)floor(p[2]));
                 for (int axis = 0; axis < 3; axis++)
                     ck_assert_int_eq(winding(&mesh, p, axis), expected);
@@ -316,7 +322,7 @@ START_TEST(winding_of_tetrahedra_does_not_depend_on_the_path)
     for (int x = -1; x <= 7; x++)
         for (int y = -1; y <= 7; y++)
             for (int z = -1; z <= 7; z++) {
-                const double p[3] = {x / 2.0, y / 2.0, z / 2.0};
+                const double p[3] = { x / 2.0, y / 2.0, z / 2.0 };
                 int w = winding(&mesh, p, 0);
                 ck_assert_int_eq(winding(&mesh, p, 1), w);
                 ck_assert_int_eq(winding(&mesh, p, 2), w);
@@ -331,7 +337,8 @@ END_TEST
 START_TEST(winding_inside_an_outward_tetrahedron_is_one)
 {
     static soup mesh;
-    const double v[4][3] = {{0, 0, 0}, {8, 0, 0}, {0, 8, 0}, {0, 0, 8}}, p[3] = {1, 1, 1};
+    const double v[4][3] = { { 0, 0, 0 }, { 8, 0, 0 }, { 0, 8, 0 }, { 0, 0, 8 } },
+                 p[3] = { 1, 1, 1 };
     mesh.count = 0;
     add_face(&mesh, v[0], v[2], v[1]);
     add_face(&mesh, v[0], v[1], v[3]);
@@ -344,7 +351,8 @@ END_TEST
 
 /* --- points on faces --- */
 
-/* True when p = sum w_i corner_i for weights i/n with n = 0 .. 60: complete for lattice points of faces this small. */
+/* True when p = sum w_i corner_i for weights i/n with n = 0 .. 60: complete for lattice points of
+ * faces this small. */
 static bool plain_point_on_triangle(const double p[3], const double *f)
 {
     for (int n = 1; n <= 48; n++)
@@ -384,7 +392,8 @@ int main(void)
     tcase_add_loop_test(tests, crossing_equals_rational_twin_on_small_integers, 0, 4);
     tcase_add_loop_test(tests, crossing_equals_rational_twin_on_single_precision, 0, 2);
     tcase_add_test(tests, segment_without_length_never_crosses);
-    tcase_add_loop_test(tests, winding_of_voxel_solids_is_right_at_every_vertex_edge_and_face, 0, 20);
+    tcase_add_loop_test(tests, winding_of_voxel_solids_is_right_at_every_vertex_edge_and_face, 0,
+                        20);
     tcase_add_loop_test(tests, winding_of_tetrahedra_does_not_depend_on_the_path, 0, 60);
     tcase_add_test(tests, winding_inside_an_outward_tetrahedron_is_one);
     tcase_add_test(tests, point_on_triangle_includes_edges_corners_and_flat_faces);

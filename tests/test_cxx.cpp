@@ -26,7 +26,8 @@ int main()
         std::puts(error.message);
         return 1;
     }
-    std::printf("%s: %d levels, volume %g\n", ebpo_version(), tree.info.level_count, tree.info.report.volume);
+    std::printf("%s: %d levels, volume %g\n", ebpo_version(), tree.info.level_count,
+                tree.info.report.volume);
     ebpo_tree_free(&tree);
     return 0;
 }

@@ -13,16 +13,18 @@
 #include "twin_reach.h"
 
 __attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void)
-{
-    return "leak:libhdf5";
-}
+const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
 
-static const query_variant stored = { "stored", 4, 5, EBPO_RULE_NONZERO, EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES };
-static const query_variant derived = { "derived", 8, 5, EBPO_RULE_NONZERO, EBPO_PART_PLANES | EBPO_PART_MESH };
-static const query_variant cells = { "cells", 4, 4, EBPO_RULE_NONZERO, EBPO_PART_MESH | EBPO_PART_MAPS };
+static const query_variant stored = { "stored", 4, 5, EBPO_RULE_NONZERO,
+                                      EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS |
+                                          EBPO_PART_LEAF_PLANES };
+static const query_variant derived = { "derived", 8, 5, EBPO_RULE_NONZERO,
+                                       EBPO_PART_PLANES | EBPO_PART_MESH };
+static const query_variant cells = { "cells", 4, 4, EBPO_RULE_NONZERO,
+                                     EBPO_PART_MESH | EBPO_PART_MAPS };
 
-static ebpo_deviation deviation(query_model *m, int level, double tolerance, uint64_t samples, unsigned threads)
+static ebpo_deviation deviation(query_model *m, int level, double tolerance, uint64_t samples,
+                                unsigned threads)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_deviation_options o = EBPO_DEVIATION_OPTIONS_INIT;
@@ -30,7 +32,8 @@ static ebpo_deviation deviation(query_model *m, int level, double tolerance, uin
     o.tolerance = tolerance;
     o.samples = samples;
     o.threads = threads;
-    ck_assert_msg(ebpo_deviation_level(m->model, m->file, level, &o, &out, &error) == EBPO_OK, "%s, level %d: %s", m->name, level, error.message);
+    ck_assert_msg(ebpo_deviation_level(m->model, m->file, level, &o, &out, &error) == EBPO_OK,
+                  "%s, level %d: %s", m->name, level, error.message);
     return out;
 }
 
@@ -38,13 +41,18 @@ static ebpo_deviation deviation(query_model *m, int level, double tolerance, uin
 static void check_level(query_model *m, int level)
 {
     ebpo_deviation d = deviation(m, level, 0.05, 500, 1);
-    double twin = twin_reach(m->file, level, &m->mesh, m->info.solid, 400, (uint64_t)level), slack = 1e-9 * (m->size + m->largest);
-    ck_assert_msg(twin <= d.hi + slack, "%s, %s, level %d: %.17g found, at most %.17g certified", m->name, m->variant, level, twin, d.hi);
-    ck_assert_msg(d.hi <= 1.05 * d.lo + 1e-5 * m->size, "%s, %s, level %d: %.17g to %.17g", m->name, m->variant, level, d.lo, d.hi);
+    double twin = twin_reach(m->file, level, &m->mesh, m->info.solid, 400, (uint64_t)level),
+           slack = 1e-9 * (m->size + m->largest);
+    ck_assert_msg(twin <= d.hi + slack, "%s, %s, level %d: %.17g found, at most %.17g certified",
+                  m->name, m->variant, level, twin, d.hi);
+    ck_assert_msg(d.hi <= 1.05 * d.lo + 1e-5 * m->size, "%s, %s, level %d: %.17g to %.17g", m->name,
+                  m->variant, level, d.lo, d.hi);
     ck_assert(d.lo >= 0 && d.lo <= d.hi);
     if (d.lo > 0) {
         double there = twin_distance(&m->mesh, m->info.solid, d.place);
-        ck_assert_msg(fabs(there - d.lo) <= slack, "%s, %s, level %d: the place is %.17g away, not %.17g", m->name, m->variant, level, there, d.lo);
+        ck_assert_msg(fabs(there - d.lo) <= slack,
+                      "%s, %s, level %d: the place is %.17g away, not %.17g", m->name, m->variant,
+                      level, there, d.lo);
     }
     ck_assert(d.samples <= 500);
     if (d.samples)
@@ -55,14 +63,20 @@ static void check_level(query_model *m, int level)
 
 START_TEST(bounds_hold_and_meet)
 {
-    static const char *const names[] = { "torus", "sphere", "blob", "cone", "staircase", "sheet", "tetrahedra" };
+    static const char *const names[] = { "torus",     "sphere", "blob",      "cone",
+                                         "staircase", "sheet",  "tetrahedra" };
     for (int i = 0; i < 7; i += query_scaled(40) < 4 ? 3 : 1) /* sanitizers: three of them */
         for (int v = 0; v < 3; v += query_scaled(4) < 4 ? 2 : 1) {
             const query_variant *variants[] = { &stored, &derived, &cells };
             query_model m;
             double centre[3] = { 1, 2, 3 };
-            ebpo_mesh mesh = i == 0 ? ebpo_test_torus(3, 1, 24, 12) : i == 1 ? ebpo_test_sphere(centre, 2, 2) : i == 2 ? ebpo_test_blob(4, 40, 7) : i == 3 ? ebpo_test_cone(1, 3, 40) :
-                             i == 4 ? ebpo_test_staircase(8) : i == 5 ? ebpo_test_sheet(4, 6) : ebpo_test_tetrahedra(9);
+            ebpo_mesh mesh = i == 0   ? ebpo_test_torus(3, 1, 24, 12)
+                             : i == 1 ? ebpo_test_sphere(centre, 2, 2)
+                             : i == 2 ? ebpo_test_blob(4, 40, 7)
+                             : i == 3 ? ebpo_test_cone(1, 3, 40)
+                             : i == 4 ? ebpo_test_staircase(8)
+                             : i == 5 ? ebpo_test_sheet(4, 6)
+                                      : ebpo_test_tetrahedra(9);
             query_model_make(&m, names[i], mesh, variants[v]);
             for (int level = 0; level < m.info.level_count; level++)
                 check_level(&m, level);
@@ -85,7 +99,8 @@ END_TEST
 
 static ebpo_mesh hollow_box(void)
 {
-    ebpo_mesh mesh = ebpo_test_box((double[3]){ 0, 0, 0 }, (double[3]){ 8, 8, 8 }, 2), inner = ebpo_test_box((double[3]){ 1, 1, 1 }, (double[3]){ 7, 7, 7 }, 2);
+    ebpo_mesh mesh = ebpo_test_box((double[3]){ 0, 0, 0 }, (double[3]){ 8, 8, 8 }, 2),
+              inner = ebpo_test_box((double[3]){ 1, 1, 1 }, (double[3]){ 7, 7, 7 }, 2);
     ebpo_test_reverse(&inner);
     ebpo_test_append(&mesh, &inner);
     ebpo_mesh_free(&inner);
@@ -97,7 +112,8 @@ START_TEST(a_cavity_within_an_envelope_counts)
     query_model m;
     query_model_make(&m, "hollow box", hollow_box(), &stored);
     ebpo_deviation d = deviation(&m, 0, 0.01, 0, 1);
-    ck_assert_msg(d.lo > 2.95 && d.hi >= 3 && d.hi < 3.04, "%.17g to %.17g, and the cavity's middle is 3 from its walls", d.lo, d.hi);
+    ck_assert_msg(d.lo > 2.95 && d.hi >= 3 && d.hi < 3.04,
+                  "%.17g to %.17g, and the cavity's middle is 3 from its walls", d.lo, d.hi);
     query_model_free(&m);
 }
 END_TEST
@@ -112,7 +128,9 @@ START_TEST(threads_do_not_change_the_result)
     query_model m;
     query_model_make(&m, "torus", ebpo_test_torus(3, 1, rings(), rings() / 2), &stored);
     for (int level = 0; level < m.info.level_count; level++) {
-        ebpo_deviation one = deviation(&m, level, 0.02, 300, 1), three = deviation(&m, level, 0.02, 300, 3), again = deviation(&m, level, 0.02, 300, 1);
+        ebpo_deviation one = deviation(&m, level, 0.02, 300, 1),
+                       three = deviation(&m, level, 0.02, 300, 3),
+                       again = deviation(&m, level, 0.02, 300, 1);
         ck_assert(memcmp(&one, &three, sizeof one) == 0 && memcmp(&one, &again, sizeof one) == 0);
     }
     query_model_free(&m);
@@ -131,7 +149,9 @@ START_TEST(a_limit_of_questions_leaves_wider_bounds_that_hold)
     o.questions = 10;
     o.samples = 0;
     ck_assert(ebpo_deviation_level(m.model, m.file, 2, &o, &limited, &error) == EBPO_OK);
-    ck_assert_msg(limited.lo <= exact.hi && limited.hi >= exact.lo && limited.questions < exact.questions, "%g to %g, %g to %g", limited.lo, limited.hi, exact.lo, exact.hi);
+    ck_assert_msg(limited.lo <= exact.hi && limited.hi >= exact.lo &&
+                      limited.questions < exact.questions,
+                  "%g to %g, %g to %g", limited.lo, limited.hi, exact.lo, exact.hi);
     query_model_free(&m);
 }
 END_TEST
@@ -143,21 +163,26 @@ START_TEST(scale_and_place_scale_and_place_the_result)
     query_model_make(&unit, "torus", ebpo_test_torus(3, 1, 24, 12), &stored);
     for (int i = 0; i < 6; i++) {
         query_model m;
-        double matrix[3][3] = { { scale[i], 0, 0 }, { 0, scale[i], 0 }, { 0, 0, scale[i] } }, nowhere[3] = { 0, 0, 0 };
+        double matrix[3][3] = { { scale[i], 0, 0 }, { 0, scale[i], 0 }, { 0, 0, scale[i] } },
+               nowhere[3] = { 0, 0, 0 };
         ebpo_mesh mesh = ebpo_test_torus(3, 1, 24, 12);
-        ebpo_test_transform(&mesh, (const double (*)[3])matrix, nowhere);
+        ebpo_test_transform(&mesh, (const double(*)[3])matrix, nowhere);
         query_model_make(&m, "scaled torus", mesh, &stored);
         for (int level = 0; level < m.info.level_count; level++) {
-            ebpo_deviation a = deviation(&unit, level, 0.05, 100, 1), b = deviation(&m, level, 0.05, 100, 1);
-            ck_assert_msg(fabs(b.lo / scale[i] - a.lo) < 1e-9 && fabs(b.hi / scale[i] - a.hi) < 1e-9 && fabs(b.mean / scale[i] - a.mean) < 1e-9, "scale %g, level %d: %g %g %g, %g %g %g",
-                          scale[i], level, b.lo / scale[i], b.hi / scale[i], b.mean / scale[i], a.lo, a.hi, a.mean);
+            ebpo_deviation a = deviation(&unit, level, 0.05, 100, 1),
+                           b = deviation(&m, level, 0.05, 100, 1);
+            ck_assert_msg(fabs(b.lo / scale[i] - a.lo) < 1e-9 &&
+                              fabs(b.hi / scale[i] - a.hi) < 1e-9 &&
+                              fabs(b.mean / scale[i] - a.mean) < 1e-9,
+                          "scale %g, level %d: %g %g %g, %g %g %g", scale[i], level,
+                          b.lo / scale[i], b.hi / scale[i], b.mean / scale[i], a.lo, a.hi, a.mean);
         }
         query_model_free(&m);
     }
     double identity[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, far[3] = { 1e7, -1e7, 1e7 };
     ebpo_mesh mesh = ebpo_test_torus(3, 1, 24, 12);
     query_model m;
-    ebpo_test_transform(&mesh, (const double (*)[3])identity, far);
+    ebpo_test_transform(&mesh, (const double(*)[3])identity, far);
     query_model_make(&m, "torus on the map", mesh, &stored);
     for (int level = 0; level < m.info.level_count; level++) {
         ebpo_deviation d = deviation(&m, level, 0.05, 0, 1);
@@ -169,7 +194,8 @@ START_TEST(scale_and_place_scale_and_place_the_result)
 }
 END_TEST
 
-static void refused(ebpo_model *model, ebpo_file *file, int level, double tolerance, ebpo_status status, const char *says)
+static void refused(ebpo_model *model, ebpo_file *file, int level, double tolerance,
+                    ebpo_status status, const char *says)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_deviation_options o = EBPO_DEVIATION_OPTIONS_INIT;
@@ -204,7 +230,8 @@ START_TEST(what_cannot_be_measured_is_refused)
     query_model_make(&other, "torus in other leaves", ebpo_test_torus(3, 1, 24, 12), &derived);
     refused(m.model, other.file, 0, 0.05, EBPO_E_ARGUMENT, "ways of building differ");
     query_model_free(&other);
-    query_model_make(&other, "box", ebpo_test_box((double[3]){ 0, 0, 0 }, (double[3]){ 8, 8, 8 }, 2), &stored);
+    query_model_make(&other, "box",
+                     ebpo_test_box((double[3]){ 0, 0, 0 }, (double[3]){ 8, 8, 8 }, 2), &stored);
     query_model solid = other;
     query_model_make(&other, "hollow box", hollow_box(), &stored);
     refused(solid.model, other.file, 0, 0.05, EBPO_E_ARGUMENT, "sources differ");
@@ -213,7 +240,9 @@ START_TEST(what_cannot_be_measured_is_refused)
     for (int i = 0; i < 2; i++) {
         o.parts = i ? EBPO_PART_PLANES : EBPO_PART_PLANES | EBPO_PART_MESH;
         o.last_level = i ? -1 : m.info.level_count - 2;
-        ck_assert(ebpo_subset(m.file, path, &o, &error) == EBPO_OK && ebpo_open(&part, path, &error) == EBPO_OK && ebpo_model_open(&part_model, part, NULL, &error) == EBPO_OK);
+        ck_assert(ebpo_subset(m.file, path, &o, &error) == EBPO_OK &&
+                  ebpo_open(&part, path, &error) == EBPO_OK &&
+                  ebpo_model_open(&part_model, part, NULL, &error) == EBPO_OK);
         refused(part_model, part, 0, 0.05, EBPO_E_ABSENT, i ? "mesh" : "subset");
         ebpo_model_close(part_model);
         ebpo_close(part);
@@ -222,7 +251,8 @@ START_TEST(what_cannot_be_measured_is_refused)
     ebpo_deviation_options canceled = EBPO_DEVIATION_OPTIONS_INIT;
     ebpo_deviation out;
     canceled.progress.report = cancel;
-    ck_assert_int_eq(ebpo_deviation_level(m.model, m.file, 2, &canceled, &out, &error), EBPO_E_CANCELLED);
+    ck_assert_int_eq(ebpo_deviation_level(m.model, m.file, 2, &canceled, &out, &error),
+                     EBPO_E_CANCELLED);
     query_model_free(&other);
     query_model_free(&m);
 }

@@ -1,4 +1,5 @@
-/* Point and triangle, against rationals: the definition (the least of the plane's distance, if the point projects inside, and the three edges'), written down with mpq. */
+/* Point and triangle, against rationals: the definition (the least of the plane's distance, if the
+ * point projects inside, and the three edges'), written down with mpq. */
 #include <check.h>
 #include <float.h>
 #include <gmp.h>
@@ -156,7 +157,8 @@ static bool rounded_correctly(double d, const mpq_t square)
 {
     if (d == 0)
         return mpq_sgn(square) == 0 || compare_square(0, DBL_TRUE_MIN, square) >= 0;
-    return compare_square(d, nextafter(d, 0), square) <= 0 && compare_square(d, nextafter(d, INFINITY), square) >= 0;
+    return compare_square(d, nextafter(d, 0), square) <= 0 &&
+           compare_square(d, nextafter(d, INFINITY), square) >= 0;
 }
 
 /* Twelve kinds of trouble. */
@@ -165,7 +167,10 @@ static void make_case(int kind, double p[3], double t[3][3])
     double scale = kind == 9 ? 0x1p990 : kind == 10 ? 0x1p-1000 : 1;
     for (int i = 0; i < 12; i++) {
         double r = random_unit();
-        double x = kind < 3 ? floor(r * 4) * (kind == 1 && i > 8 ? 0.5 : 1) : kind == 3 ? (double)(float)r : kind == 11 ? 1e7 + 1e-3 * r : (2 * r - 1) * scale;
+        double x = kind < 3     ? floor(r * 4) * (kind == 1 && i > 8 ? 0.5 : 1)
+                   : kind == 3  ? (double)(float)r
+                   : kind == 11 ? 1e7 + 1e-3 * r
+                                : (2 * r - 1) * scale;
         if (i < 9)
             t[i / 3][i % 3] = x;
         else
@@ -192,16 +197,20 @@ START_TEST(distances_are_rounded_correctly_and_lie_within_their_bounds)
     for (int i = 0; i < CASES; i++) {
         double p[3], t[3][3];
         make_case(i % 12, p, t);
-        exact_square(square, p, (const double (*)[3])t);
+        exact_square(square, p, (const double(*)[3])t);
         ebpo_triangle_nearest n;
         ebpo_distance_bounds b;
-        ebpo_triangle_nearest_exact(p, (const double (*)[3])t, NULL, &n);
-        ebpo_triangle_distance_bounds(p, (const double (*)[3])t, &b);
-        ck_assert_msg(rounded_correctly(n.distance, square), "case %d: %a is not the distance", i, n.distance);
-        ck_assert_msg(compare_square(b.lo, b.lo, square) <= 0, "case %d: lower bound %a is above %a", i, b.lo, n.distance);
-        ck_assert_msg(isinf(b.hi) || compare_square(b.hi, b.hi, square) >= 0, "case %d: upper bound %a is below %a", i, b.hi, n.distance);
-        ck_assert_msg(b.feature == EBPO_NEAR_UNKNOWN || b.feature == n.feature, "case %d: feature %d, it is %d", i, b.feature, n.feature);
-        int sign = ebpo_triangle_distance_compare_to(p, (const double (*)[3])t, n.distance);
+        ebpo_triangle_nearest_exact(p, (const double(*)[3])t, NULL, &n);
+        ebpo_triangle_distance_bounds(p, (const double(*)[3])t, &b);
+        ck_assert_msg(rounded_correctly(n.distance, square), "case %d: %a is not the distance", i,
+                      n.distance);
+        ck_assert_msg(compare_square(b.lo, b.lo, square) <= 0,
+                      "case %d: lower bound %a is above %a", i, b.lo, n.distance);
+        ck_assert_msg(isinf(b.hi) || compare_square(b.hi, b.hi, square) >= 0,
+                      "case %d: upper bound %a is below %a", i, b.hi, n.distance);
+        ck_assert_msg(b.feature == EBPO_NEAR_UNKNOWN || b.feature == n.feature,
+                      "case %d: feature %d, it is %d", i, b.feature, n.feature);
+        int sign = ebpo_triangle_distance_compare_to(p, (const double(*)[3])t, n.distance);
         ck_assert_int_eq(sign, -compare_square(n.distance, n.distance, square));
     }
     mpq_clear(square);
@@ -220,12 +229,14 @@ START_TEST(comparisons_are_exact_also_of_equal_distances)
         make_case(i % 12, q, b);
         if (i % 2) /* neighbours share an edge */
             memcpy(b, a, 2 * sizeof a[0]);
-        exact_square(x, p, (const double (*)[3])a);
-        exact_square(y, p, (const double (*)[3])b);
+        exact_square(x, p, (const double(*)[3])a);
+        exact_square(y, p, (const double(*)[3])b);
         int right = mpq_cmp(x, y);
         right = (right > 0) - (right < 0);
         ties += right == 0;
-        ck_assert_int_eq(ebpo_triangle_distance_compare(p, (const double (*)[3])a, (const double (*)[3])b), right);
+        ck_assert_int_eq(ebpo_triangle_distance_compare(p, (const double(*)[3])a,
+                                                        (const double(*)[3])b),
+                         right);
     }
     ck_assert_int_gt(ties, CASES / 20);
     mpq_clears(x, y, NULL);
@@ -242,7 +253,7 @@ START_TEST(unit_normals_are_right_also_of_slivers)
         double p[3], t[3][3], normal[3];
         point e, f, n;
         make_case(i % 12, p, t);
-        ebpo_triangle_unit_normal((const double (*)[3])t, normal);
+        ebpo_triangle_unit_normal((const double(*)[3])t, normal);
         init(&e);
         init(&f);
         init(&n);
@@ -258,7 +269,9 @@ START_TEST(unit_normals_are_right_also_of_slivers)
             mpq_mul(y, n.x[k], n.x[k]);
             mpq_div(y, y, nn);
             double size = fabs(normal[k]), ulp = nextafter(size, INFINITY) - size;
-            ck_assert_msg((normal[k] < 0) == (mpq_sgn(n.x[k]) < 0) && compare_square(fmax(size - 3 * ulp, 0), fmax(size - 3 * ulp, 0), y) <= 0 &&
+            ck_assert_msg((normal[k] < 0) == (mpq_sgn(n.x[k]) < 0) &&
+                              compare_square(fmax(size - 3 * ulp, 0), fmax(size - 3 * ulp, 0), y) <=
+                                  0 &&
                               compare_square(size + 3 * ulp, size + 3 * ulp, y) >= 0,
                           "case %d, axis %d: %a", i, k, normal[k]);
         }
@@ -290,17 +303,18 @@ START_TEST(processors_with_fma_give_the_same_bits)
         double p[3], t[3][3], n[3] = { 0, 0, 0 }, m[3] = { 0, 0, 0 };
         make_case(i % 12, p, t);
         ebpo_distance_bounds b;
-        ebpo_triangle_distance_bounds(p, (const double (*)[3])t, &b);
-        bool base = ebpo_distance_pairs_base.unit_normal((const double (*)[3])t, n);
-        ck_assert_int_eq(base, ebpo_distance_pairs_fma.unit_normal((const double (*)[3])t, m));
+        ebpo_triangle_distance_bounds(p, (const double(*)[3])t, &b);
+        bool base = ebpo_distance_pairs_base.unit_normal((const double(*)[3])t, n);
+        ck_assert_int_eq(base, ebpo_distance_pairs_fma.unit_normal((const double(*)[3])t, m));
         ck_assert_msg(!base || memcmp(n, m, sizeof n) == 0, "case %d: normals differ", i);
         normals += base;
         if (b.feature == EBPO_NEAR_UNKNOWN || !in_range(p, 3) || !in_range(t[0], 9))
             continue;
         ebpo_measured x, y;
-        ebpo_distance_pairs_base.measure(p, (const double (*)[3])t, b.feature, &x);
-        ebpo_distance_pairs_fma.measure(p, (const double (*)[3])t, b.feature, &y);
-        ck_assert_msg(memcmp(&x, &y, sizeof x) == 0, "case %d: %a and %a", i, x.distance.head, y.distance.head);
+        ebpo_distance_pairs_base.measure(p, (const double(*)[3])t, b.feature, &x);
+        ebpo_distance_pairs_fma.measure(p, (const double(*)[3])t, b.feature, &y);
+        ck_assert_msg(memcmp(&x, &y, sizeof x) == 0, "case %d: %a and %a", i, x.distance.head,
+                      y.distance.head);
         measured++;
     }
     ck_assert_int_gt(measured, CASES);

@@ -1,4 +1,5 @@
-/* Bytes, rows and elements beyond 2^32, without the data: sparse files and mappings, of which only what is looked at takes room. */
+/* Bytes, rows and elements beyond 2^32, without the data: sparse files and mappings, of which only
+ * what is looked at takes room. */
 #include <check.h>
 #include <fcntl.h>
 #include <stdio.h>
@@ -21,10 +22,12 @@
 static const uint64_t FAR = UINT64_C(1) << 32;
 static char folder[] = "/tmp/ebpo-far-XXXXXX", path[64];
 
-/* Zeros that take no room until they are written to. NULL where the system does not lend what it may not have. */
+/* Zeros that take no room until they are written to. NULL where the system does not lend what it
+ * may not have. */
 static uint8_t *lend(uint64_t bytes)
 {
-    void *at = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    void *at = mmap(NULL, bytes, PROT_READ | PROT_WRITE,
+                    MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
     return at == MAP_FAILED ? NULL : at;
 }
 
@@ -35,8 +38,13 @@ static uint64_t far_tetrahedron(uint8_t *data, uint64_t bytes, const char *encod
 {
     static const uint32_t faces[4][3] = { { 0, 2, 1 }, { 0, 1, 3 }, { 0, 3, 2 }, { 1, 2, 3 } };
     static const float xyz[4][3] = { { 0, 0, 0 }, { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
-    uint8_t *at = data + sprintf((char *)data, "ply\nformat %s 1.0\nelement other %llu\nproperty uchar a\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
-                                 "element face 4\nproperty list uchar uint vertex_indices\nend_header\n", encoding, (unsigned long long)bytes) + bytes;
+    uint8_t *at = data +
+                  sprintf((char *)data,
+                          "ply\nformat %s 1.0\nelement other %llu\nproperty uchar a\nelement "
+                          "vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+                          "element face 4\nproperty list uchar uint vertex_indices\nend_header\n",
+                          encoding, (unsigned long long)bytes) +
+                  bytes;
     memcpy(at, xyz, sizeof xyz);
     at += sizeof xyz;
     for (int f = 0; f < 4; f++, at += 13) {
@@ -55,7 +63,9 @@ START_TEST(ply_elements_behind_4_gib_are_read)
     ebpo_mesh mesh;
     ebpo_error error = EBPO_ERROR_INIT;
     uint64_t size = far_tetrahedron(data, skipped, "binary_little_endian");
-    ck_assert_msg(ebpo_ply_parse_memory(&mesh, data, size, "far.ply", NULL, 0, NULL, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_ply_parse_memory(&mesh, data, size, "far.ply", NULL, 0, NULL, &error) ==
+                      EBPO_OK,
+                  "%s", error.message);
     ck_assert_uint_eq(mesh.vertex_count, 4);
     ck_assert_uint_eq(mesh.face_count, 4);
     ck_assert_uint_eq(mesh.source_size, size);
@@ -64,14 +74,17 @@ START_TEST(ply_elements_behind_4_gib_are_read)
     ebpo_mesh_free(&mesh);
     double *points;
     uint64_t count;
-    ck_assert_msg(ebpo_points_parse_ply(&points, &count, data, size, "far.ply", &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_points_parse_ply(&points, &count, data, size, "far.ply", &error) == EBPO_OK,
+                  "%s", error.message);
     ck_assert_uint_eq(count, 4);
     ck_assert_double_eq(points[11], 1);
     free(points);
     /* One byte less, or a bad corner: the message has the offset, above 2^32. */
-    ck_assert_int_eq(ebpo_ply_parse_memory(&mesh, data, size - 1, "far.ply", NULL, 0, NULL, &error), EBPO_E_FORMAT);
+    ck_assert_int_eq(ebpo_ply_parse_memory(&mesh, data, size - 1, "far.ply", NULL, 0, NULL, &error),
+                     EBPO_E_FORMAT);
     data[size - 1] = 1;
-    ck_assert_int_eq(ebpo_ply_parse_memory(&mesh, data, size, "far.ply", NULL, 0, NULL, &error), EBPO_E_FORMAT);
+    ck_assert_int_eq(ebpo_ply_parse_memory(&mesh, data, size, "far.ply", NULL, 0, NULL, &error),
+                     EBPO_E_FORMAT);
     char wanted[64];
     snprintf(wanted, sizeof wanted, "byte %llu:", (unsigned long long)size - 4);
     ck_assert_msg(strstr(error.message, wanted) != NULL, "%s lacks %s", error.message, wanted);
@@ -87,9 +100,13 @@ static ebpo_status claims(const char *vertices, const char *faces, uint64_t size
     ebpo_mesh mesh;
     if (!data)
         return EBPO_E_UNSUPPORTED;
-    int header = sprintf((char *)data, "ply\nformat binary_little_endian 1.0\nelement vertex %s\nproperty uchar x\nproperty uchar y\nproperty uchar z\n"
-                         "element face %s\nproperty list uchar uint vertex_indices\nend_header\n", vertices, faces);
-    ebpo_status status = ebpo_ply_parse_memory(&mesh, data, size ? size : (uint64_t)header + 40, "huge.ply", NULL, 0, NULL, error);
+    int header = sprintf((char *)data,
+                         "ply\nformat binary_little_endian 1.0\nelement vertex %s\nproperty uchar "
+                         "x\nproperty uchar y\nproperty uchar z\n"
+                         "element face %s\nproperty list uchar uint vertex_indices\nend_header\n",
+                         vertices, faces);
+    ebpo_status status = ebpo_ply_parse_memory(&mesh, data, size ? size : (uint64_t)header + 40,
+                                               "huge.ply", NULL, 0, NULL, error);
     ck_assert_ptr_null(mesh.faces);
     munmap(data, room);
     return status;
@@ -97,7 +114,9 @@ static ebpo_status claims(const char *vertices, const char *faces, uint64_t size
 
 START_TEST(ply_counts_that_a_short_file_cannot_hold_are_damage)
 {
-    static const char *const counts[] = { "4294967294", "4294967295", "4294967296", "1099511627776", "9223372036854775808", "18446744073709551615" };
+    static const char *const counts[] = { "4294967294",          "4294967295",
+                                          "4294967296",          "1099511627776",
+                                          "9223372036854775808", "18446744073709551615" };
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
         ebpo_error error = EBPO_ERROR_INIT;
         ck_assert_int_eq(claims(counts[i], "4", 0, &error), EBPO_E_FORMAT);
@@ -118,7 +137,9 @@ START_TEST(ply_counts_beyond_the_limit_are_refused_before_anything_is_allocated)
     if (status == EBPO_E_UNSUPPORTED)
         return;
     ck_assert_int_eq(status, EBPO_E_LIMIT);
-    ck_assert_msg(strstr(error.message, "2^32 - 2") != NULL && strstr(error.message, "split") != NULL, "%s", error.message);
+    ck_assert_msg(strstr(error.message, "2^32 - 2") != NULL &&
+                      strstr(error.message, "split") != NULL,
+                  "%s", error.message);
     ck_assert_int_eq(claims("4", "4294967295", 2 * FAR, &error), EBPO_E_LIMIT);
     ck_assert_int_eq(claims("4", "4294967296", 2 * FAR, &error), EBPO_E_LIMIT);
 }
@@ -132,7 +153,8 @@ START_TEST(other_formats_end_at_4_gib)
     if (!data)
         return;
     /* A binary STL of 1,431,655,766 faces: three times that is 2 in 32 bits. */
-    ebpo_status status = ebpo_import_memory(&mesh, EBPO_IMPORT_STL, data, FAR, "a.stl", NULL, &error);
+    ebpo_status status =
+        ebpo_import_memory(&mesh, EBPO_IMPORT_STL, data, FAR, "a.stl", NULL, &error);
     ck_assert_int_eq(status, status == EBPO_E_UNSUPPORTED ? EBPO_E_UNSUPPORTED : EBPO_E_LIMIT);
     ck_assert_msg(strstr(error.message, "PLY") != NULL, "%s", error.message);
     munmap(data, FAR + 4096);
@@ -158,7 +180,8 @@ END_TEST
 
 /* --- containers --- */
 
-/* HDF5 files may stand behind something else, at 512 times a power of two: here 8 GiB of nothing. */
+/* HDF5 files may stand behind something else, at 512 times a power of two: here 8 GiB of nothing.
+ */
 typedef struct shifted {
     uint8_t *bytes;
     uint64_t size, by, beyond, announced; /* reads, and announced ranges, beyond 2^32 */
@@ -173,7 +196,8 @@ static void expect_shifted(void *user, const ebpo_range *ranges, size_t count)
     }
 }
 
-static ebpo_status read_shifted(void *user, uint64_t offset, uint64_t size, void *data, ebpo_error *error)
+static ebpo_status read_shifted(void *user, uint64_t offset, uint64_t size, void *data,
+                                ebpo_error *error)
 {
     shifted *s = user;
     (void)error;
@@ -219,15 +243,23 @@ static char *text_of(ebpo_file *file)
 
 START_TEST(containers_are_read_from_beyond_8_gib)
 {
-    static const char *const names[] = { "01_one_leaf_unfiltered", "06_four_levels_leaf_planes", "11_two_chunks_of_faces" };
-    for (size_t i = 0; i < 2 * sizeof names / sizeof *names; i++) { /* then all again, from far away: places of chunks are read later, and what will be read is announced */
+    static const char *const names[] = { "01_one_leaf_unfiltered", "06_four_levels_leaf_planes",
+                                         "11_two_chunks_of_faces" };
+    for (size_t i = 0; i < 2 * sizeof names / sizeof *names;
+         i++) { /* then all again, from far away: places of chunks are read later, and what will be
+                   read is announced */
         bool away = i >= sizeof names / sizeof *names;
         shifted s = vector_of(names[i % (sizeof names / sizeof *names)]);
         ebpo_error error = EBPO_ERROR_INIT;
         ebpo_file *near, *far;
-        ebpo_source source = { .user = &s, .size = s.by + s.size, .read = read_shifted, .expect = away ? expect_shifted : NULL };
-        ck_assert_msg(ebpo_open_memory(&near, s.bytes, s.size, "near", &error) == EBPO_OK, "%s", error.message);
-        ck_assert_msg(ebpo_open_source(&far, &source, "far", &error) == EBPO_OK, "%s", error.message);
+        ebpo_source source = { .user = &s,
+                               .size = s.by + s.size,
+                               .read = read_shifted,
+                               .expect = away ? expect_shifted : NULL };
+        ck_assert_msg(ebpo_open_memory(&near, s.bytes, s.size, "near", &error) == EBPO_OK, "%s",
+                      error.message);
+        ck_assert_msg(ebpo_open_source(&far, &source, "far", &error) == EBPO_OK, "%s",
+                      error.message);
         ck_assert_uint_gt(far->level_array[0][EBPO_A_TYPES].chunks[0].address, 2 * FAR);
         char *here = text_of(near), *there = text_of(far);
         ck_assert_str_eq(here, there);
@@ -250,7 +282,8 @@ START_TEST(container_files_on_disk_are_read_from_beyond_8_gib)
     ebpo_file *near, *far;
     int fd = open(path, O_CREAT | O_RDWR | O_TRUNC, 0600);
     if (pwrite(fd, s.bytes, s.size, (off_t)s.by) == (ssize_t)s.size) {
-        ck_assert_msg(ebpo_open_memory(&near, s.bytes, s.size, "near", &error) == EBPO_OK, "%s", error.message);
+        ck_assert_msg(ebpo_open_memory(&near, s.bytes, s.size, "near", &error) == EBPO_OK, "%s",
+                      error.message);
         ck_assert_msg(ebpo_open(&far, path, &error) == EBPO_OK, "%s", error.message);
         ck_assert_uint_eq(ebpo_file_info(far)->file_bytes, s.by + s.size);
         char *here = text_of(near), *there = text_of(far);
@@ -276,7 +309,8 @@ START_TEST(containers_have_addresses_and_lengths_of_8_bytes)
 }
 END_TEST
 
-/* A leaf whose references begin at row 2^32 + 65536, behind a row of the index that says so: what the writer makes of it. */
+/* A leaf whose references begin at row 2^32 + 65536, behind a row of the index that says so: what
+ * the writer makes of it. */
 START_TEST(references_beyond_2_to_the_32_are_encoded_where_they_are)
 {
     enum { ROWS = 16384, LEAVES = EBPO_INDEX_ROWS + 1 };
@@ -293,15 +327,24 @@ START_TEST(references_beyond_2_to_the_32_are_encoded_where_they_are)
         refs[before + i] = 3 * i;
     ebpo_tree *tree = calloc(1, sizeof *tree);
     ebpo_plan plan = { .tree = tree };
-    tree->level[5] = (ebpo_level){ .leaf_count = LEAVES, .leaf_first = first, .leaf_new = news, .leaf_ref_count = counts, .leaf_refs = refs, .ref_count = before + ROWS };
+    tree->level[5] = (ebpo_level){ .leaf_count = LEAVES,
+                                   .leaf_first = first,
+                                   .leaf_new = news,
+                                   .leaf_ref_count = counts,
+                                   .leaf_refs = refs,
+                                   .ref_count = before + ROWS };
     plan.leaf_index[5] = ebpo_index_leaves(&tree->level[5]);
-    ebpo_array_out array = { .id = EBPO_A_LEAF_REFS, .level = 5, .shape = { .rows = before + ROWS, .chunk_rows = ROWS, .element_size = 4 } };
+    ebpo_array_out array = { .id = EBPO_A_LEAF_REFS,
+                             .level = 5,
+                             .shape = {
+                                 .rows = before + ROWS, .chunk_rows = ROWS, .element_size = 4 } };
     uint32_t *rows = malloc(4 * ROWS);
     ebpo_plan_encode(&plan, &array, before, ROWS, (uint8_t *)rows);
     ck_assert(ebpo_refs_decode(rows, ROWS, first[LEAVES - 1]));
     for (uint32_t i = 0; i < ROWS; i++)
         ck_assert_uint_eq(rows[i], 3 * i);
-    ebpo_plan_encode(&plan, &array, FAR / 2, ROWS, (uint8_t *)rows); /* in the first leaf, of zeros: 0 - 1 - 0 */
+    /* in the first leaf, of zeros: 0 - 1 - 0 */
+    ebpo_plan_encode(&plan, &array, FAR / 2, ROWS, (uint8_t *)rows);
     ck_assert_uint_eq(rows[0], UINT32_MAX);
     ck_assert_uint_eq(rows[ROWS - 1], UINT32_MAX);
     free(rows);
@@ -336,7 +379,8 @@ START_TEST(workspaces_hold_arrays_beyond_4_gib_in_memory)
     ebpo_workspace *w;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_workspace_figures f;
-    ck_assert_msg(ebpo_workspace_make_any(&w, 64 * FAR, folder, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_workspace_make_any(&w, 64 * FAR, folder, &error) == EBPO_OK, "%s",
+                  error.message);
     touch_ends(w);
     ebpo_workspace_tell(w, &f);
     ck_assert_uint_gt(f.held_most, FAR);
@@ -345,14 +389,16 @@ START_TEST(workspaces_hold_arrays_beyond_4_gib_in_memory)
 }
 END_TEST
 
-/* A file's blocks are taken from the disk at once, which takes no time where the file system can. */
+/* A file's blocks are taken from the disk at once, which takes no time where the file system can.
+ */
 static bool disk_lends(const char *where)
 {
     enum { EXT = 0xef53, XFS = 0x58465342 };
     static const long BTRFS = 0x9123683e;
     struct statfs kind;
     struct statvfs room;
-    return statfs(where, &kind) == 0 && statvfs(where, &room) == 0 && (kind.f_type == EXT || kind.f_type == XFS || kind.f_type == BTRFS) &&
+    return statfs(where, &kind) == 0 && statvfs(where, &room) == 0 &&
+           (kind.f_type == EXT || kind.f_type == XFS || kind.f_type == BTRFS) &&
            (uint64_t)room.f_bavail * room.f_frsize > 4 * FAR;
 }
 
@@ -363,7 +409,8 @@ START_TEST(workspaces_hold_arrays_beyond_4_gib_in_files)
     ebpo_workspace_figures f;
     if (!disk_lends(folder))
         return;
-    ck_assert_msg(ebpo_workspace_make_any(&w, 1 << 20, folder, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_workspace_make_any(&w, 1 << 20, folder, &error) == EBPO_OK, "%s",
+                  error.message);
     touch_ends(w);
     ebpo_workspace_tell(w, &f);
     ck_assert_uint_gt(f.filed_most, FAR);
@@ -376,7 +423,8 @@ START_TEST(workspaces_refuse_what_overflows)
     ebpo_workspace *w;
     ebpo_error error = EBPO_ERROR_INIT;
     ck_assert_int_eq(ebpo_workspace_make_any(&w, 1 << 20, folder, &error), EBPO_OK);
-    ck_assert_ptr_null(ebpo_array_alloc(w, (UINT64_C(1) << 61) + (1 << 18), 8)); /* 2^64 + 2^21 bytes */
+    /* 2^64 + 2^21 bytes */
+    ck_assert_ptr_null(ebpo_array_alloc(w, (UINT64_C(1) << 61) + (1 << 18), 8));
     ck_assert_ptr_null(ebpo_array_zero(w, (UINT64_C(1) << 60) + (1 << 17), 16));
     ck_assert_int_eq(ebpo_workspace_fail(w, UINT64_MAX, &error), EBPO_E_MEMORY);
     ebpo_workspace_free(w);

@@ -1,4 +1,5 @@
-/* A caller's rounding mode, flushing of denormals and traps change no result, and are as they were after each call. */
+/* A caller's rounding mode, flushing of denormals and traps change no result, and are as they were
+ * after each call. */
 #include <check.h>
 #include <fenv.h>
 #include <stdlib.h>
@@ -7,7 +8,7 @@
 
 static const fp_setting usual = { FE_TONEAREST, 0 };
 static const fp_setting settings[] = {
-    { FE_UPWARD, 0 }, { FE_DOWNWARD, 0 }, { FE_TOWARDZERO, 0 },
+    { FE_UPWARD, 0 },         { FE_DOWNWARD, 0 }, { FE_TOWARDZERO, 0 },
 #if defined(__SSE2__)
     { FE_TONEAREST, 0x8040 }, /* flush to zero, denormals are zero */
     { FE_UPWARD, 0x8040 },
@@ -26,12 +27,16 @@ START_TEST(the_callers_environment_changes_no_result_and_stays)
         return;
     fp_hash_case(c, &usual, questions, &plain);
     ck_assert_msg(plain.kept, "%s: the default environment did not stay", c->name);
-    for (int i = _i % SETTINGS; i < SETTINGS; i += SETTINGS) { /* each case in one environment: there are enough */
+    for (int i = _i % SETTINGS; i < SETTINGS;
+         i += SETTINGS) { /* each case in one environment: there are enough */
         fp_hash_case(c, &settings[i], questions, &other);
         ck_assert_msg(other.kept, "%s: environment %d did not stay", c->name, i);
-        ck_assert_msg(plain.status == other.status, "%s: environment %d changes the status", c->name, i);
-        ck_assert_msg(plain.content == other.content, "%s: environment %d changes the content", c->name, i);
-        ck_assert_msg(plain.answers == other.answers, "%s: environment %d changes answers", c->name, i);
+        ck_assert_msg(plain.status == other.status, "%s: environment %d changes the status",
+                      c->name, i);
+        ck_assert_msg(plain.content == other.content, "%s: environment %d changes the content",
+                      c->name, i);
+        ck_assert_msg(plain.answers == other.answers, "%s: environment %d changes answers", c->name,
+                      i);
     }
 }
 END_TEST
@@ -44,7 +49,8 @@ START_TEST(traps_of_the_caller_are_not_sprung)
     if (!fp_hash_takes(c))
         return;
     fp_hash_case(c, &usual, 10, &plain);
-    /* The test's own arithmetic between the calls runs with them too: only invalid operations and divisions by zero, which it does not make. */
+    /* The test's own arithmetic between the calls runs with them too: only invalid operations and
+     * divisions by zero, which it does not make. */
     feclearexcept(FE_ALL_EXCEPT);
     feenableexcept(FE_INVALID | FE_DIVBYZERO);
     fp_hash_case(c, &usual, 10, &other);
@@ -59,7 +65,8 @@ int main(void)
     Suite *suite = suite_create("fp_env");
     TCase *tests = tcase_create("environments");
     tcase_set_timeout(tests, 600);
-    tcase_add_loop_test(tests, the_callers_environment_changes_no_result_and_stays, 0, stiff_case_count);
+    tcase_add_loop_test(tests, the_callers_environment_changes_no_result_and_stays, 0,
+                        stiff_case_count);
     tcase_add_loop_test(tests, traps_of_the_caller_are_not_sprung, 0, 12);
     suite_add_tcase(suite, tests);
     SRunner *runner = srunner_create(suite);

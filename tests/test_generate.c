@@ -10,7 +10,8 @@
 
 static face_model model_of(const ebpo_mesh *mesh)
 {
-    return (face_model){ (const float (*)[3])mesh->xyz32, (const uint32_t (*)[3])mesh->faces, mesh->vertex_count, mesh->face_count };
+    return (face_model){ (const float(*)[3])mesh->xyz32, (const uint32_t(*)[3])mesh->faces,
+                         mesh->vertex_count, mesh->face_count };
 }
 
 static uint64_t meetings(const ebpo_mesh *mesh)
@@ -51,38 +52,51 @@ static uint64_t pairs_that_meet(const float (*xyz)[3], const uint32_t (*corners)
 START_TEST(two_faces_meet_that_share_no_corner)
 {
     static const uint32_t two[2][3] = { { 0, 1, 2 }, { 3, 4, 5 } };
-    static const struct { float other[3][3]; uint64_t meets; } cases[] = {
-        { { { 1, 1, -1 }, { 1, 1, 1 }, { 5, 5, 0 } }, 1 },         /* goes through */
-        { { { 1, 1, 0 }, { 1, 1, 1 }, { 2, 1, 1 } }, 1 },          /* stands on it with a corner */
-        { { { 1, 1, 0x1p-149f }, { 1, 1, 1 }, { 2, 1, 1 } }, 0 },  /* hovers over it by the least float */
-        { { { 1, 0, 0 }, { 2, 0, 0 }, { 1, 0, 1 } }, 1 },          /* stands on its edge */
-        { { { 0, 0, 0 }, { -1, 0, 0 }, { 0, -1, 0 } }, 1 },        /* touches a corner, of another number */
-        { { { 1, 1, 0 }, { 2, 1, 0 }, { 1, 2, 0 } }, 1 },          /* lies within it */
-        { { { -9, -9, 0 }, { 30, -9, 0 }, { -9, 30, 0 } }, 1 },    /* lies around it */
-        { { { 5, 5, 0 }, { 9, 5, 0 }, { 5, 9, 0 } }, 0 },          /* lies beside it */
-        { { { 1, 1, 1 }, { 2, 1, 1 }, { 1, 2, 1 } }, 0 },          /* lies above it */
-        { { { -1, -1, -1 }, { 9, -1, 1 }, { -1, -2, 1 } }, 0 } };  /* goes through its plane elsewhere */
+    static const struct {
+        float other[3][3];
+        uint64_t meets;
+    } cases[] = { { { { 1, 1, -1 }, { 1, 1, 1 }, { 5, 5, 0 } }, 1 }, /* goes through */
+                  { { { 1, 1, 0 }, { 1, 1, 1 }, { 2, 1, 1 } }, 1 }, /* stands on it with a corner */
+                  /* hovers over it by the least float */
+                  { { { 1, 1, 0x1p-149f }, { 1, 1, 1 }, { 2, 1, 1 } }, 0 },
+                  { { { 1, 0, 0 }, { 2, 0, 0 }, { 1, 0, 1 } }, 1 }, /* stands on its edge */
+                  /* touches a corner, of another number */
+                  { { { 0, 0, 0 }, { -1, 0, 0 }, { 0, -1, 0 } }, 1 },
+                  { { { 1, 1, 0 }, { 2, 1, 0 }, { 1, 2, 0 } }, 1 },       /* lies within it */
+                  { { { -9, -9, 0 }, { 30, -9, 0 }, { -9, 30, 0 } }, 1 }, /* lies around it */
+                  { { { 5, 5, 0 }, { 9, 5, 0 }, { 5, 9, 0 } }, 0 },       /* lies beside it */
+                  { { { 1, 1, 1 }, { 2, 1, 1 }, { 1, 2, 1 } }, 0 },       /* lies above it */
+                  /* goes through its plane elsewhere */
+                  { { { -1, -1, -1 }, { 9, -1, 1 }, { -1, -2, 1 } }, 0 } };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         float xyz[9][3] = { { 0, 0, 0 }, { 4, 0, 0 }, { 0, 4, 0 } };
         memcpy(xyz[3], cases[i].other, sizeof cases[i].other);
-        ck_assert_msg(pairs_that_meet((const float (*)[3])xyz, two, 2) == cases[i].meets, "case %zu", i);
+        ck_assert_msg(pairs_that_meet((const float(*)[3])xyz, two, 2) == cases[i].meets, "case %zu",
+                      i);
     }
 }
 END_TEST
 
 START_TEST(neighbours_meet_where_they_fold_or_run_through_each_other)
 {
-    static const float xyz[9][3] = { { 0, 0, 0 }, { 4, 0, 0 }, { 0, 4, 0 }, { 4, 4, 0 }, { 1, 1, 0 }, { 1, 1, 1 }, { 2, 2, -1 }, { -4, 0, 0 }, { 0, -4, 1 } };
-    static const struct { uint32_t faces[2][3]; uint64_t meets; } cases[] = {
-        { { { 0, 1, 2 }, { 2, 1, 3 } }, 0 }, /* a flat square */
-        { { { 0, 1, 2 }, { 1, 0, 4 } }, 1 }, /* folded flat over an edge */
-        { { { 0, 1, 2 }, { 1, 0, 5 } }, 0 }, /* at an angle */
-        { { { 0, 1, 2 }, { 0, 5, 6 } }, 1 }, /* one corner in common, and through it */
-        { { { 0, 1, 2 }, { 0, 7, 8 } }, 0 }, /* one corner in common */
-        { { { 0, 1, 2 }, { 0, 3, 5 } }, 1 }, /* one corner in common, and an edge that lies in it */
-        { { { 0, 1, 2 }, { 1, 2, 0 } }, 1 } }; /* twice the same */
+    static const float xyz[9][3] = { { 0, 0, 0 },  { 4, 0, 0 },  { 0, 4, 0 },
+                                     { 4, 4, 0 },  { 1, 1, 0 },  { 1, 1, 1 },
+                                     { 2, 2, -1 }, { -4, 0, 0 }, { 0, -4, 1 } };
+    static const struct {
+        uint32_t faces[2][3];
+        uint64_t meets;
+    } cases[] = { { { { 0, 1, 2 }, { 2, 1, 3 } }, 0 }, /* a flat square */
+                  { { { 0, 1, 2 }, { 1, 0, 4 } }, 1 }, /* folded flat over an edge */
+                  { { { 0, 1, 2 }, { 1, 0, 5 } }, 0 }, /* at an angle */
+                  { { { 0, 1, 2 }, { 0, 5, 6 } }, 1 }, /* one corner in common, and through it */
+                  { { { 0, 1, 2 }, { 0, 7, 8 } }, 0 }, /* one corner in common */
+                  { { { 0, 1, 2 }, { 0, 3, 5 } },
+                    1 }, /* one corner in common, and an edge that lies in it */
+                  { { { 0, 1, 2 }, { 1, 2, 0 } }, 1 } }; /* twice the same */
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
-        ck_assert_msg(pairs_that_meet(xyz, (const uint32_t (*)[3])cases[i].faces, 2) == cases[i].meets, "case %zu", i);
+        ck_assert_msg(pairs_that_meet(xyz, (const uint32_t(*)[3])cases[i].faces, 2) ==
+                          cases[i].meets,
+                      "case %zu", i);
 }
 END_TEST
 
@@ -97,7 +111,8 @@ START_TEST(the_judge_knows_closed_manifolds)
     ebpo_test_turn_face(&sphere, 7);
     ck_assert(!crossing_closed_manifold(&m));
     ebpo_test_turn_face(&sphere, 7);
-    for (uint64_t i = 0; i < 3 * sphere.face_count; i++) /* the south pole becomes the north pole: one vertex with two rings */
+    for (uint64_t i = 0; i < 3 * sphere.face_count;
+         i++) /* the south pole becomes the north pole: one vertex with two rings */
         sphere.faces[i] = sphere.faces[i] == 11 ? 0 : sphere.faces[i];
     ck_assert(!crossing_closed_manifold(&m));
     ebpo_mesh_free(&sphere);
@@ -106,7 +121,8 @@ END_TEST
 
 /* --- the models --- */
 
-static void check_model(ebpo_mesh *mesh, bool (*embedded)(const ebpo_mesh *), double relief, double roughness, uint64_t seed)
+static void check_model(ebpo_mesh *mesh, bool (*embedded)(const ebpo_mesh *), double relief,
+                        double roughness, uint64_t seed)
 {
     ck_assert(ebpo_displace(mesh, relief, roughness, seed));
     face_model m = model_of(mesh);
@@ -136,7 +152,8 @@ START_TEST(what_is_proved_is_true_up_to_reliefs_that_cannot_be)
     int proved = 0, met = 0;
     for (int i = 1; i <= 40; i++) {
         ebpo_mesh shapes[2] = { make_sphere(3), make_torus(40, 16) };
-        bool (*const embedded[2])(const ebpo_mesh *) = { ebpo_embedded_sphere, ebpo_embedded_torus };
+        bool (*const embedded[2])(const ebpo_mesh *) = { ebpo_embedded_sphere,
+                                                         ebpo_embedded_torus };
         for (int k = 0; k < 2; k++) {
             ck_assert(ebpo_displace(&shapes[k], 0.1 * i, 0.05 * i, (uint64_t)i));
             bool proof = embedded[k](&shapes[k]);

@@ -110,7 +110,8 @@ static void refused(const char *path, const char *message)
     ebpo_publish out;
     ebpo_error error = EBPO_ERROR_INIT;
     ck_assert(ebpo_publish_begin(&out, path, &error) == EBPO_E_IO);
-    ck_assert_msg(strstr(error.message, message) && strstr(error.message, path), "%s", error.message);
+    ck_assert_msg(strstr(error.message, message) && strstr(error.message, path), "%s",
+                  error.message);
 }
 
 START_TEST(targets_that_cannot_be_replaced_are_refused)
@@ -163,7 +164,8 @@ START_TEST(signal_handler_removes_what_is_unfinished)
         ebpo_publish done, open1, open2;
         signal(SIGTERM, on_signal);
         if (ebpo_publish_begin(&done, target, NULL) || ebpo_publish_commit(&done, NULL) ||
-            ebpo_publish_begin(&open1, target, NULL) || ebpo_publish_begin(&open2, target, NULL) || files_in_folder() != 3)
+            ebpo_publish_begin(&open1, target, NULL) || ebpo_publish_begin(&open2, target, NULL) ||
+            files_in_folder() != 3)
             _exit(1);
         raise(SIGTERM);
     }
@@ -197,8 +199,10 @@ START_TEST(pipes_and_folders_are_refused_without_hanging)
     ebpo_whole_file file;
     ebpo_error error = EBPO_ERROR_INIT;
     ck_assert(mkfifo(target, 0600) == 0);
-    ck_assert(ebpo_whole_file_open(&file, target, &error) == EBPO_E_IO && strstr(error.message, "pipe") != NULL);
-    ck_assert(ebpo_whole_file_open(&file, folder, &error) == EBPO_E_IO && strstr(error.message, "folder") != NULL);
+    ck_assert(ebpo_whole_file_open(&file, target, &error) == EBPO_E_IO &&
+              strstr(error.message, "pipe") != NULL);
+    ck_assert(ebpo_whole_file_open(&file, folder, &error) == EBPO_E_IO &&
+              strstr(error.message, "folder") != NULL);
     ck_assert(file.fd == -1 && !file.data);
 }
 END_TEST

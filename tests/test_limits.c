@@ -1,4 +1,5 @@
-/* Counts near and beyond what 32 bits hold, faked: right arithmetic where they are allowed, EBPO_E_LIMIT before anything is touched where not. */
+/* Counts near and beyond what 32 bits hold, faked: right arithmetic where they are allowed,
+ * EBPO_E_LIMIT before anything is touched where not. */
 #include <check.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -32,7 +33,10 @@ START_TEST(meshes_beyond_the_limit_are_refused_before_they_are_looked_at)
     uint32_t face[3] = { 0, 1, 2 };
     float xyz[9] = { 0, 0, 0, 1, 0, 0, 0, 1, 0 };
     for (int faces = 0; faces < 2; faces++) {
-        ebpo_mesh mesh = { .vertex_count = faces ? 3 : TWO32 - 1, .face_count = faces ? TWO32 - 1 : 1, .xyz32 = xyz, .faces = face };
+        ebpo_mesh mesh = { .vertex_count = faces ? 3 : TWO32 - 1,
+                           .face_count = faces ? TWO32 - 1 : 1,
+                           .xyz32 = xyz,
+                           .faces = face };
         ebpo_mesh_report report;
         ebpo_error error = EBPO_ERROR_INIT;
         ck_assert_int_eq(ebpo_mesh_check(&report, &mesh, 1, silent, &error), EBPO_E_LIMIT);
@@ -52,7 +56,9 @@ START_TEST(octcodes_reach_level_20_and_no_further)
     uint32_t last = (1u << EBPO_MAX_LEVEL) - 1;
     ck_assert_int_eq(EBPO_MAX_LEVEL, 20);
     for (unsigned corner = 0; corner < 8; corner++) {
-        ebpo_cell cell = { EBPO_MAX_LEVEL, { corner & 1 ? last : 0, corner & 2 ? last : 0, corner & 4 ? last : 0 } };
+        ebpo_cell cell = {
+            EBPO_MAX_LEVEL, { corner & 1 ? last : 0, corner & 2 ? last : 0, corner & 4 ? last : 0 }
+        };
         ebpo_octcode code = ebpo_octcode_of_cell(cell), up = code;
         ck_assert(ebpo_octcode_valid(code));
         ck_assert_int_eq(ebpo_octcode_level(code), EBPO_MAX_LEVEL);
@@ -70,7 +76,8 @@ END_TEST
 START_TEST(lists_of_a_build_have_a_limit_that_does_not_wrap)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    uint64_t faces = TWO32 - 2, leaves = (UINT64_C(1) << 22) + 64 * faces, entries = (UINT64_C(1) << 26) + 512 * faces;
+    uint64_t faces = TWO32 - 2, leaves = (UINT64_C(1) << 22) + 64 * faces,
+             entries = (UINT64_C(1) << 26) + 512 * faces;
     ck_assert_int_eq(ebpo_build_check_lists(faces, leaves, entries, &error), EBPO_OK);
     ck_assert_int_eq(ebpo_build_check_lists(faces, leaves + 1, entries, &error), EBPO_E_LIMIT);
     ck_assert_int_eq(ebpo_build_check_lists(faces, leaves, entries + 1, &error), EBPO_E_LIMIT);
@@ -89,9 +96,12 @@ END_TEST
 
 START_TEST(chunks_are_counted_beyond_2_to_the_32_rows)
 {
-    static const uint64_t counts[] = { (UINT64_C(1) << 32) - 1, UINT64_C(1) << 32, (UINT64_C(1) << 32) + 1, (UINT64_C(1) << 33) + 5, UINT64_C(255) << 40, UINT64_MAX };
+    static const uint64_t counts[] = { (UINT64_C(1) << 32) - 1, UINT64_C(1) << 32,
+                                       (UINT64_C(1) << 32) + 1, (UINT64_C(1) << 33) + 5,
+                                       UINT64_C(255) << 40,     UINT64_MAX };
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
-        ebpo_h5_shape faces = { .rows = counts[i], .cols = 3, .element_size = 4 }, codes = { .rows = counts[i], .element_size = 4 };
+        ebpo_h5_shape faces = { .rows = counts[i], .cols = 3, .element_size = 4 },
+                      codes = { .rows = counts[i], .element_size = 4 };
         faces.chunk_rows = ebpo_h5_chunk_rows(faces.rows, 3, 4);
         codes.chunk_rows = ebpo_h5_chunk_rows(codes.rows, 0, 4);
         ck_assert_uint_eq(faces.chunk_rows, 4096);
@@ -130,7 +140,9 @@ START_TEST(heads_state_at_most_what_32_bits_number)
     ck_assert_uint_eq(ebpo_schema_rows(info, EBPO_A_FACES, 0), TWO32 - 2);
     ck_assert_uint_eq(ebpo_schema_rows(info, EBPO_A_FACES_INDEX, 0), TWO32 / 4096);
     ck_assert_uint_eq(ebpo_schema_rows(info, EBPO_A_VERTEX_SOURCE, 0), TWO32 - 2);
-    uint64_t *const limited[] = { &info->vertex_count, &info->source_vertex_count, &info->source_face_count, &info->mend.added_faces, &info->face_count };
+    uint64_t *const limited[] = { &info->vertex_count, &info->source_vertex_count,
+                                  &info->source_face_count, &info->mend.added_faces,
+                                  &info->face_count };
     for (size_t i = 0; i < sizeof limited / sizeof *limited; i++) {
         uint64_t right = *limited[i];
         for (uint64_t wrong = TWO32 - 1; wrong <= TWO32 + 4; wrong++) {
@@ -148,14 +160,17 @@ START_TEST(levels_of_a_head_are_counted_in_64_bits)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_info *info = head_of(TWO32 - 2, TWO32 - 2);
-    /* Beyond 2^33 leaves and 2^35 references below 2^31 gray nodes: more than any count of 32 bits, and all right. */
+    /* Beyond 2^33 leaves and 2^35 references below 2^31 gray nodes: more than any count of 32 bits,
+     * and all right. */
     info->max_level = info->grid_level = 20;
     info->level_count = 13;
     info->level[0] = (ebpo_level_summary){ .gray_count = 1 };
     uint64_t grays = 1;
     for (int level = 1; level < 12; level++, grays = info->level[level - 1].gray_count)
         info->level[level] = (ebpo_level_summary){ .gray_count = grays * 7, .white_count = grays };
-    info->level[12] = (ebpo_level_summary){ .leaf_count = grays * 8, .new_count = TWO32 - 2, .ref_count = UINT64_C(1) << 35 };
+    info->level[12] = (ebpo_level_summary){ .leaf_count = grays * 8,
+                                            .new_count = TWO32 - 2,
+                                            .ref_count = UINT64_C(1) << 35 };
     info->level[11].plane_count = grays * 255;
     ck_assert_uint_gt(info->level[12].leaf_count, UINT64_C(1) << 33);
     ck_assert_uint_gt(info->level[11].plane_count, UINT64_C(1) << 38);
@@ -182,7 +197,9 @@ START_TEST(index_rows_add_up_beyond_2_to_the_32)
         first[i] = (uint64_t)i * EACH / 4;
         news[i] = EACH / 4;
     }
-    ebpo_level level = { .leaf_count = LEAVES, .leaf_first = first, .leaf_new = news, .leaf_ref_count = refs };
+    ebpo_level level = {
+        .leaf_count = LEAVES, .leaf_first = first, .leaf_new = news, .leaf_ref_count = refs
+    };
     uint64_t *index = ebpo_index_leaves(&level);
     ck_assert_uint_eq(index[3 * 1 + 1], TWO32);
     ck_assert_uint_eq(index[3 * 2 + 1], 2 * TWO32);
@@ -216,7 +233,8 @@ START_TEST(corners_and_numbers_near_2_to_the_32_come_back)
 }
 END_TEST
 
-/* A head that states 2^32 - 2 source vertices and faces for a mesh of a few must not make a reader take room for them. */
+/* A head that states 2^32 - 2 source vertices and faces for a mesh of a few must not make a reader
+ * take room for them. */
 START_TEST(sources_of_billions_take_no_memory)
 {
     random_tree_options options = { 5, 5, 8, 9, true, false, false, false };
@@ -232,14 +250,19 @@ START_TEST(sources_of_billions_take_no_memory)
     ck_assert_msg(ebpo_tree_write(&tree, path, NULL, &error) == EBPO_OK, "%s", error.message);
     ck_assert_msg(ebpo_open(&file, path, &error) == EBPO_OK, "%s", error.message);
     getrusage(RUSAGE_SELF, &before);
-    ck_assert_msg(ebpo_file_read_source_mesh(file, &mesh, &ordered, 1, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_file_read_source_mesh(file, &mesh, &ordered, 1, &error) == EBPO_OK, "%s",
+                  error.message);
     getrusage(RUSAGE_SELF, &after);
     ck_assert(ordered);
-    ck_assert_int_lt(after.ru_maxrss - before.ru_maxrss, 1 << 20); /* KiB; a number for each would be 16 GiB, and sanitizers take their own */
+    /* KiB; a number for each would be 16 GiB, and sanitizers take their own */
+    ck_assert_int_lt(after.ru_maxrss - before.ru_maxrss, 1 << 20);
     uint64_t last = mesh.vertex_count - 1;
     size_t size = tree.mesh.xyz32 ? 3 * sizeof(float) : 3 * sizeof(double);
-    ck_assert_mem_eq(tree.mesh.xyz32 ? (void *)(mesh.xyz32 + 3 * last) : (void *)(mesh.xyz64 + 3 * last),
-                     tree.mesh.xyz32 ? (void *)(tree.mesh.xyz32 + 3 * last) : (void *)(tree.mesh.xyz64 + 3 * last), size);
+    ck_assert_mem_eq(tree.mesh.xyz32 ? (void *)(mesh.xyz32 + 3 * last)
+                                     : (void *)(mesh.xyz64 + 3 * last),
+                     tree.mesh.xyz32 ? (void *)(tree.mesh.xyz32 + 3 * last)
+                                     : (void *)(tree.mesh.xyz64 + 3 * last),
+                     size);
     ebpo_mesh_free(&mesh);
     ebpo_close(file);
     ebpo_tree_free(&tree);
@@ -262,7 +285,12 @@ static ebpo_slice leaf_slice(uint16_t *types, uint64_t *first, uint32_t *news, u
 {
     ebpo_slice slice = { .root = { .type = EBPO_LEAF }, .level_count = 1, .face_count = *news };
     *types = EBPO_LEAF;
-    slice.level[0] = (ebpo_level){ .types = types, .group_count = 1, .leaf_count = 1, .leaf_first = first, .leaf_new = news, .leaf_ref_count = refs };
+    slice.level[0] = (ebpo_level){ .types = types,
+                                   .group_count = 1,
+                                   .leaf_count = 1,
+                                   .leaf_first = first,
+                                   .leaf_new = news,
+                                   .leaf_ref_count = refs };
     slice.mesh.face_count = *news;
     return slice;
 }
@@ -306,7 +334,8 @@ START_TEST(subtrees_refuse_what_they_cannot_number)
     ebpo_info *info = head_of(3, 1);
     info->solid = false;
     ebpo_slice slice = fake_slice();
-    ck_assert_msg(ebpo_subtree_make(&subtree, &slice, info, true, 1, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_subtree_make(&subtree, &slice, info, true, 1, &error) == EBPO_OK, "%s",
+                  error.message);
     ebpo_subtree_free(subtree);
     slice = fake_slice();
     slice.mesh.face_count = UINT64_C(1) << 31; /* faces are numbered in 31 bits */
@@ -328,9 +357,14 @@ START_TEST(estimates_of_billions_do_not_wrap)
 {
     uint64_t keep, peak;
     ebpo_info *info = head_of(TWO32 - 2, TWO32 - 2);
-    ebpo_slice_size size = { .groups = UINT64_C(1) << 33, .leaves = UINT64_C(1) << 34, .refs = UINT64_C(1) << 36, .new_faces = TWO32 - 2, .outer = UINT64_C(1) << 36 };
+    ebpo_slice_size size = { .groups = UINT64_C(1) << 33,
+                             .leaves = UINT64_C(1) << 34,
+                             .refs = UINT64_C(1) << 36,
+                             .new_faces = TWO32 - 2,
+                             .outer = UINT64_C(1) << 36 };
     ebpo_subtree_estimate(&size, info, &keep, &peak);
-    ck_assert_uint_gt(keep, size.refs * sizeof(ebpo_listed_block) + size.outer / 4 * EBPO_BLOCK_NUMBERS * 4);
+    ck_assert_uint_gt(keep, size.refs * sizeof(ebpo_listed_block) +
+                                size.outer / 4 * EBPO_BLOCK_NUMBERS * 4);
     ck_assert_uint_gt(peak, keep);
     free(info);
 }
@@ -340,7 +374,8 @@ END_TEST
 
 START_TEST(levels_of_too_many_vertices_are_refused_before_they_are_joined)
 {
-    ebpo_lod_piece half = { .vertex_count = UINT64_C(1) << 31, .face_count = 5 }, faces = { .face_count = UINT64_C(1) << 31 };
+    ebpo_lod_piece half = { .vertex_count = UINT64_C(1) << 31, .face_count = 5 },
+                   faces = { .face_count = UINT64_C(1) << 31 };
     ebpo_lod_piece *vertex_heavy[2] = { &half, &half }, *face_heavy[2] = { &faces, &faces };
     ebpo_mesh mesh;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -350,7 +385,9 @@ START_TEST(levels_of_too_many_vertices_are_refused_before_they_are_joined)
     ebpo_polytope cube;
     ebpo_polytope_cube(&cube);
     ebpo_lod_piece full = { .vertex_count = TWO32 - 8 };
-    ck_assert_int_eq(ebpo_lod_piece_add(&full, &cube, &(ebpo_box){ { 0, 0, 0 }, { 1, 1, 1 }, 0 }, (ebpo_cell){ 0, { 0, 0, 0 } }, EBPO_GRAY, true, &error), EBPO_E_LIMIT);
+    ck_assert_int_eq(ebpo_lod_piece_add(&full, &cube, &(ebpo_box){ { 0, 0, 0 }, { 1, 1, 1 }, 0 },
+                                        (ebpo_cell){ 0, { 0, 0, 0 } }, EBPO_GRAY, true, &error),
+                     EBPO_E_LIMIT);
 }
 END_TEST
 
@@ -362,7 +399,10 @@ START_TEST(views_tell_groups_beyond_2_to_the_32_apart)
     uint64_t places[EBPO_FRONTIER_BLOCKS];
     ck_assert_int_eq(ebpo_frontier_reserve(&frontier, NODES, &error), EBPO_OK);
     for (uint64_t i = 0; i < NODES; i++) /* the same blocks in 32 bits */
-        ebpo_frontier_push(&frontier, (ebpo_waiting){ .key = i, .octcode = UINT64_C(1) << 48, .below = i << 38, .turn = EBPO_TURN_SEEN });
+        ebpo_frontier_push(&frontier, (ebpo_waiting){ .key = i,
+                                                      .octcode = UINT64_C(1) << 48,
+                                                      .below = i << 38,
+                                                      .turn = EBPO_TURN_SEEN });
     ck_assert_uint_eq(ebpo_frontier_blocks(&frontier, EBPO_GROUP_BLOCK, places), NODES);
     ebpo_frontier_free(&frontier);
     ebpo_info *info = head_of(4, 4);
@@ -382,15 +422,21 @@ END_TEST
 START_TEST(exports_that_a_format_cannot_count_are_refused)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert_int_eq(ebpo_export_check_glb("a.glb", 1000, TWO32 - 1 - EBPO_GLB_HEADS - 1000, &error), EBPO_OK);
-    ck_assert_int_eq(ebpo_export_check_glb("a.glb", 1001, TWO32 - 1 - EBPO_GLB_HEADS - 1001, &error), EBPO_E_LIMIT); /* the text is filled up to 1004 */
+    ck_assert_int_eq(ebpo_export_check_glb("a.glb", 1000, TWO32 - 1 - EBPO_GLB_HEADS - 1000,
+                                           &error),
+                     EBPO_OK);
+    ck_assert_int_eq(ebpo_export_check_glb("a.glb", 1001, TWO32 - 1 - EBPO_GLB_HEADS - 1001,
+                                           &error),
+                     EBPO_E_LIMIT); /* the text is filled up to 1004 */
     ck_assert_int_eq(ebpo_export_check_glb("a.glb", 0, TWO32 + 100, &error), EBPO_E_LIMIT);
     ck_assert_int_eq(ebpo_export_check_glb("a.glb", 0, 12 * (TWO32 - 2) * 2, &error), EBPO_E_LIMIT);
-    ck_assert_msg(strstr(error.message, "a.glb") && strstr(error.message, "gltf"), "%s", error.message);
+    ck_assert_msg(strstr(error.message, "a.glb") && strstr(error.message, "gltf"), "%s",
+                  error.message);
     ck_assert_int_eq(ebpo_export_check_scene("a.stl", TWO32 - 2, 1431655765, &error), EBPO_OK);
     ck_assert_int_eq(ebpo_export_check_scene("a.stl", TWO32 - 2, 1431655766, &error), EBPO_E_LIMIT);
     ck_assert_int_eq(ebpo_export_check_scene("a.stl", TWO32, 5, &error), EBPO_E_LIMIT);
-    ck_assert_msg(strstr(error.message, "a.stl") && strstr(error.message, "coarser"), "%s", error.message);
+    ck_assert_msg(strstr(error.message, "a.stl") && strstr(error.message, "coarser"), "%s",
+                  error.message);
 }
 END_TEST
 

@@ -36,8 +36,10 @@ static ebpo_file *build(ebpo_mesh mesh, uint32_t parts, uint32_t leaf_faces)
     ebpo_file *file = NULL;
     options.parts = parts;
     options.leaf_faces = leaf_faces;
-    ck_assert_msg(ebpo_mesh_check(&report, &mesh, 0, options.progress, &error) == EBPO_OK, "%s", error.message);
-    ck_assert_msg(ebpo_build(&tree, &mesh, &report, &mend, &options, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_mesh_check(&report, &mesh, 0, options.progress, &error) == EBPO_OK, "%s",
+                  error.message);
+    ck_assert_msg(ebpo_build(&tree, &mesh, &report, &mend, &options, &error) == EBPO_OK, "%s",
+                  error.message);
     ck_assert_msg(ebpo_tree_write(&tree, path, &write, &error) == EBPO_OK, "%s", error.message);
     ebpo_tree_free(&tree);
     ck_assert_msg(ebpo_open(&file, path, &error) == EBPO_OK, "%s", error.message);
@@ -48,9 +50,11 @@ enum { USUAL = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS };
 
 static double stored_volume(const ebpo_info *info, int level)
 {
-    double cell = info->box_size[0] * info->box_size[1] * info->box_size[2], sum = info->level[level].gray_volume;
+    double cell = info->box_size[0] * info->box_size[1] * info->box_size[2],
+           sum = info->level[level].gray_volume;
     for (int i = 0; i <= level; i++)
-        sum += info->level[i].leaf_volume + (double)info->level[i].black_count * ldexp(cell, -3 * i);
+        sum +=
+            info->level[i].leaf_volume + (double)info->level[i].black_count * ldexp(cell, -3 * i);
     return sum;
 }
 
@@ -61,7 +65,8 @@ static double take(ebpo_file *file, int level, bool walls, unsigned threads, ebp
     double volume = -1;
     options.walls = walls;
     options.threads = threads;
-    ck_assert_msg(ebpo_lod_level(file, level, &options, out, &volume, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_lod_level(file, level, &options, out, &volume, &error) == EBPO_OK, "%s",
+                  error.message);
     return volume;
 }
 
@@ -70,9 +75,11 @@ static double mesh_volume(const ebpo_mesh *mesh)
 {
     double sum = 0;
     for (uint64_t f = 0; f < mesh->face_count; f++) {
-        const double *a = mesh->xyz64 + 3 * (uint64_t)mesh->faces[3 * f], *b = mesh->xyz64 + 3 * (uint64_t)mesh->faces[3 * f + 1],
+        const double *a = mesh->xyz64 + 3 * (uint64_t)mesh->faces[3 * f],
+                     *b = mesh->xyz64 + 3 * (uint64_t)mesh->faces[3 * f + 1],
                      *c = mesh->xyz64 + 3 * (uint64_t)mesh->faces[3 * f + 2];
-        sum += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
+        sum += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+               a[2] * (b[0] * c[1] - b[1] * c[0]);
     }
     return sum / 6;
 }
@@ -88,13 +95,16 @@ START_TEST(level_volumes_equal_those_stored_in_the_file)
     if (!ebpo_test_wanted(_i))
         return;
     for (int variant = 0; variant < 2; variant++) {
-        ebpo_file *file = build(ebpo_test_solids[_i].make(), variant ? USUAL | EBPO_PART_LEAF_PLANES : USUAL, 4);
+        ebpo_file *file =
+            build(ebpo_test_solids[_i].make(), variant ? USUAL | EBPO_PART_LEAF_PLANES : USUAL, 4);
         const ebpo_info *info = ebpo_file_info(file);
         for (int level = 0; level < info->level_count; level++) {
             double volume = take(file, level, true, 0, NULL), stored = stored_volume(info, level);
             double less = variant ? 0 : fmax(0, stored - volume);
-            ck_assert_msg(fabs(volume + less - stored) <= 1e-6 * stored + 1e-12 * largest_volume(info), "%s level %d: %.17g, stored %.17g",
-                          ebpo_test_solids[_i].name, level, volume, stored);
+            ck_assert_msg(fabs(volume + less - stored) <=
+                              1e-6 * stored + 1e-12 * largest_volume(info),
+                          "%s level %d: %.17g, stored %.17g", ebpo_test_solids[_i].name, level,
+                          volume, stored);
         }
         ebpo_close(file);
     }
@@ -113,7 +123,8 @@ START_TEST(volumes_of_a_real_model_agree_too)
     const ebpo_info *info = ebpo_file_info(file);
     for (int level = 0; level < info->level_count; level++) {
         double volume = take(file, level, true, 0, NULL), stored = stored_volume(info, level);
-        ck_assert_msg(fabs(volume - stored) <= 1e-7 * stored, "level %d: %.17g, stored %.17g", level, volume, stored);
+        ck_assert_msg(fabs(volume - stored) <= 1e-7 * stored, "level %d: %.17g, stored %.17g",
+                      level, volume, stored);
     }
     ebpo_close(file);
 }
@@ -130,13 +141,15 @@ START_TEST(envelopes_are_closed_and_fill_the_stated_volume)
         ebpo_mesh_report report;
         double volume = take(file, level, true, 0, &mesh);
         ck_assert_uint_gt(mesh.face_count, 0);
-        ck_assert(ebpo_mesh_check(&report, &mesh, 0, (ebpo_progress){ NULL, NULL }, NULL) == EBPO_OK);
-        ck_assert_msg(report.balanced && report.unreferenced_vertices.count == 0, "%s level %d", ebpo_test_solids[_i].name, level);
+        ck_assert(ebpo_mesh_check(&report, &mesh, 0, (ebpo_progress){ NULL, NULL }, NULL) ==
+                  EBPO_OK);
+        ck_assert_msg(report.balanced && report.unreferenced_vertices.count == 0, "%s level %d",
+                      ebpo_test_solids[_i].name, level);
         double own = mesh_volume(&mesh), offset = 1e-9 * largest_volume(info);
         for (int k = 0; k < 3; k++) /* far from the origin, rounding eats into the sum */
             offset *= 1 + fabs(info->box_origin[k]) / info->box_size[k];
-        ck_assert_msg(fabs(own - volume) <= 1e-7 * volume + offset, "%s level %d: %.17g, %.17g", ebpo_test_solids[_i].name, level, own,
-                      volume);
+        ck_assert_msg(fabs(own - volume) <= 1e-7 * volume + offset, "%s level %d: %.17g, %.17g",
+                      ebpo_test_solids[_i].name, level, own, volume);
         ebpo_mesh_free(&mesh);
     }
     ebpo_close(file);
@@ -151,7 +164,8 @@ START_TEST(deeper_levels_are_never_larger)
     double before = INFINITY;
     for (int level = 0; level < ebpo_file_info(file)->level_count; level++) {
         double volume = take(file, level, true, 0, NULL);
-        ck_assert_msg(volume <= before * (1 + 1e-9), "%s level %d", ebpo_test_solids[_i].name, level);
+        ck_assert_msg(volume <= before * (1 + 1e-9), "%s level %d", ebpo_test_solids[_i].name,
+                      level);
         before = volume;
     }
     ebpo_close(file);
@@ -161,7 +175,8 @@ END_TEST
 static bool same_mesh(const ebpo_mesh *a, const ebpo_mesh *b)
 {
     return a->vertex_count == b->vertex_count && a->face_count == b->face_count &&
-           memcmp(a->xyz64, b->xyz64, a->vertex_count * 24) == 0 && memcmp(a->faces, b->faces, a->face_count * 12) == 0;
+           memcmp(a->xyz64, b->xyz64, a->vertex_count * 24) == 0 &&
+           memcmp(a->faces, b->faces, a->face_count * 12) == 0;
 }
 
 START_TEST(result_does_not_depend_on_the_number_of_threads)
@@ -186,7 +201,8 @@ static bool on_wall(const ebpo_info *info, const ebpo_mesh *mesh, uint64_t face,
     for (int k = 0; k < 3; k++) {
         const double *x = mesh->xyz64 + k;
         const uint32_t *f = mesh->faces + 3 * face;
-        double a = x[3 * (uint64_t)f[0]], at = (a - info->box_origin[k]) / info->box_size[k] * ldexp(1, level);
+        double a = x[3 * (uint64_t)f[0]],
+               at = (a - info->box_origin[k]) / info->box_size[k] * ldexp(1, level);
         if (a == x[3 * (uint64_t)f[1]] && a == x[3 * (uint64_t)f[2]] && at == round(at))
             return true;
     }
@@ -216,7 +232,8 @@ END_TEST
 
 START_TEST(envelopes_come_level_by_level_in_octcode_order)
 {
-    /* Without planes and mesh each envelope is its cell: twelve triangles, whose middle tells the cell. */
+    /* Without planes and mesh each envelope is its cell: twelve triangles, whose middle tells the
+     * cell. */
     ebpo_file *file = build(ebpo_test_make("blob"), 0, 4);
     const ebpo_info *info = ebpo_file_info(file);
     ebpo_mesh mesh;
@@ -234,7 +251,8 @@ START_TEST(envelopes_come_level_by_level_in_octcode_order)
         uint64_t code = 1;
         for (int bit = level - 1; bit >= 0; bit--)
             for (int k = 2; k >= 0; k--) {
-                uint64_t at = (uint64_t)llround((low[k] - info->box_origin[k]) / info->box_size[k] * ldexp(1, level));
+                uint64_t at = (uint64_t)llround((low[k] - info->box_origin[k]) / info->box_size[k] *
+                                                ldexp(1, level));
                 code = code << 1 | (at >> bit & 1);
             }
         ck_assert_uint_gt(code, before);
@@ -289,7 +307,8 @@ START_TEST(a_cancelled_run_leaves_nothing)
     options.threads = 1;
     options.progress = (ebpo_progress){ stop_at_once, &go_on };
     ebpo_mesh mesh;
-    ebpo_status status = ebpo_lod_level(file, ebpo_file_info(file)->level_count - 1, &options, &mesh, NULL, NULL);
+    ebpo_status status =
+        ebpo_lod_level(file, ebpo_file_info(file)->level_count - 1, &options, &mesh, NULL, NULL);
     /* A machine that is done before the first report is fine too. */
     ck_assert(status == EBPO_E_CANCELLED || status == EBPO_OK);
     ck_assert(status == EBPO_OK || mesh.xyz64 == NULL);
@@ -304,8 +323,10 @@ int main(void)
     TCase *cases = tcase_create("lod");
     tcase_set_timeout(cases, 120);
     tcase_add_checked_fixture(cases, make_folder, remove_folder);
-    tcase_add_loop_test(cases, level_volumes_equal_those_stored_in_the_file, 0, ebpo_test_solid_count);
-    tcase_add_loop_test(cases, envelopes_are_closed_and_fill_the_stated_volume, 0, ebpo_test_solid_count);
+    tcase_add_loop_test(cases, level_volumes_equal_those_stored_in_the_file, 0,
+                        ebpo_test_solid_count);
+    tcase_add_loop_test(cases, envelopes_are_closed_and_fill_the_stated_volume, 0,
+                        ebpo_test_solid_count);
     tcase_add_loop_test(cases, deeper_levels_are_never_larger, 0, ebpo_test_solid_count);
     tcase_add_test(cases, volumes_of_a_real_model_agree_too);
     tcase_add_test(cases, result_does_not_depend_on_the_number_of_threads);

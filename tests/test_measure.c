@@ -1,4 +1,5 @@
-/* Area, volume, centroid and inertia, held against closed forms and against the mesh's own integrals in rational numbers. */
+/* Area, volume, centroid and inertia, held against closed forms and against the mesh's own
+ * integrals in rational numbers. */
 #include <check.h>
 #include <math.h>
 #include <stdio.h>
@@ -36,7 +37,8 @@ static ebpo_mesh copy_of(const ebpo_mesh *mesh)
         ebpo_test_append_vertex(&copy, at[0], at[1], at[2]);
     }
     for (uint64_t f = 0; f < mesh->face_count; f++)
-        ebpo_test_append_face(&copy, mesh->faces[3 * f], mesh->faces[3 * f + 1], mesh->faces[3 * f + 2]);
+        ebpo_test_append_face(&copy, mesh->faces[3 * f], mesh->faces[3 * f + 1],
+                              mesh->faces[3 * f + 2]);
     return copy;
 }
 
@@ -52,8 +54,10 @@ static ebpo_file *file_of(const ebpo_mesh *mesh, uint32_t parts)
     ebpo_file *file = NULL;
     ebpo_mesh copy = copy_of(mesh);
     options.parts = parts;
-    ck_assert_msg(ebpo_mesh_check(&report, mesh, 0, options.progress, &error) == EBPO_OK, "%s", error.message);
-    ck_assert_msg(ebpo_build(&tree, &copy, &report, &mend, &options, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_mesh_check(&report, mesh, 0, options.progress, &error) == EBPO_OK, "%s",
+                  error.message);
+    ck_assert_msg(ebpo_build(&tree, &copy, &report, &mend, &options, &error) == EBPO_OK, "%s",
+                  error.message);
     ck_assert_msg(ebpo_tree_write(&tree, path, &write, &error) == EBPO_OK, "%s", error.message);
     ebpo_tree_free(&tree);
     ck_assert_msg(ebpo_open(&file, path, &error) == EBPO_OK, "%s", error.message);
@@ -70,24 +74,24 @@ static ebpo_mass mass_on(const ebpo_mesh *mesh, unsigned threads)
     return mass;
 }
 
-static ebpo_mass mass_of(const ebpo_mesh *mesh)
-{
-    return mass_on(mesh, 0);
-}
+static ebpo_mass mass_of(const ebpo_mesh *mesh) { return mass_on(mesh, 0); }
 
 static void assert_near(double value, double expected, double size, const char *what)
 {
-    ck_assert_msg(fabs(value - expected) <= 1e-13 * size, "%s: %.17g, expected %.17g", what, value, expected);
+    ck_assert_msg(fabs(value - expected) <= 1e-13 * size, "%s: %.17g, expected %.17g", what, value,
+                  expected);
 }
 
 /* `reach`: the model's size, for centroids near 0. */
 static void assert_masses_near(const ebpo_mass *m, const ebpo_mass *expected, double reach)
 {
-    double trace = fabs(expected->inertia[0][0]) + fabs(expected->inertia[1][1]) + fabs(expected->inertia[2][2]);
+    double trace = fabs(expected->inertia[0][0]) + fabs(expected->inertia[1][1]) +
+                   fabs(expected->inertia[2][2]);
     assert_near(m->area, expected->area, expected->area, "area");
     assert_near(m->volume, expected->volume, fabs(expected->volume), "volume");
     for (int k = 0; k < 3; k++) {
-        assert_near(m->centroid[k], expected->centroid[k], fmax(reach, fabs(expected->centroid[k])), "centroid");
+        assert_near(m->centroid[k], expected->centroid[k], fmax(reach, fabs(expected->centroid[k])),
+                    "centroid");
         for (int l = 0; l < 3; l++)
             assert_near(m->inertia[k][l], expected->inertia[k][l], trace, "inertia");
     }
@@ -170,8 +174,9 @@ static void add_area(exact_moments *m, mpq_t p[3][3])
     mpf_clear(root);
 }
 
-/* The tetrahedron of the origin and a face: over its affine parameters the integral of x y is det / 120 times the sum of a_x b_y over all
- * pairs of corners, equal ones twice; written out as such a sum. */
+/* The tetrahedron of the origin and a face: over its affine parameters the integral of x y is det /
+ * 120 times the sum of a_x b_y over all pairs of corners, equal ones twice; written out as such a
+ * sum. */
 static void add_tetrahedron(exact_moments *m, mpq_t p[3][3])
 {
     mpq_t n[3], det, term, share;
@@ -288,7 +293,9 @@ static void move_mesh(ebpo_mesh *mesh, double by)
 
 START_TEST(boxes_have_the_mass_of_boxes)
 {
-    static const double corners[][2][3] = { { { 0, 0, 0 }, { 1, 1, 1 } }, { { -1, 2, 3 }, { 4, 2.5, 11 } }, { { 1e6, -1e6, 5 }, { 1e6 + 1, -1e6 + 2, 5.25 } } };
+    static const double corners[][2][3] = { { { 0, 0, 0 }, { 1, 1, 1 } },
+                                            { { -1, 2, 3 }, { 4, 2.5, 11 } },
+                                            { { 1e6, -1e6, 5 }, { 1e6 + 1, -1e6 + 2, 5.25 } } };
     for (size_t i = 0; i < sizeof corners / sizeof *corners; i++) {
         ebpo_mesh mesh = ebpo_test_box(corners[i][0], corners[i][1], 3);
         ebpo_mass m = mass_of(&mesh), expected = box_mass(corners[i][0], corners[i][1]);
@@ -298,7 +305,8 @@ START_TEST(boxes_have_the_mass_of_boxes)
 }
 END_TEST
 
-/* Corners 0, (3, 0, 0), (0, 3, 0), (0, 0, 3): volume 27 / 6, second moments s^5 / 60 and s^5 / 120 about the corner. */
+/* Corners 0, (3, 0, 0), (0, 3, 0), (0, 0, 3): volume 27 / 6, second moments s^5 / 60 and s^5 / 120
+ * about the corner. */
 START_TEST(a_tetrahedron_has_the_mass_of_a_tetrahedron)
 {
     ebpo_mesh mesh = { .xyz64 = calloc(1, 1), .faces = calloc(1, 1) };
@@ -311,7 +319,11 @@ START_TEST(a_tetrahedron_has_the_mass_of_a_tetrahedron)
     ebpo_test_append_face(&mesh, 0, 3, 2);
     ebpo_test_append_face(&mesh, 1, 2, 3);
     double v = 4.5, c = .75, xx = 243 / 60. - v * c * c, xy = 243 / 120. - v * c * c;
-    ebpo_mass expected = { 13.5 + 4.5 * sqrt(3), v, { c, c, c }, { { 2 * xx, -xy, -xy }, { -xy, 2 * xx, -xy }, { -xy, -xy, 2 * xx } } }, m = mass_of(&mesh);
+    ebpo_mass expected = { 13.5 + 4.5 * sqrt(3),
+                           v,
+                           { c, c, c },
+                           { { 2 * xx, -xy, -xy }, { -xy, 2 * xx, -xy }, { -xy, -xy, 2 * xx } } },
+              m = mass_of(&mesh);
     assert_masses_near(&m, &expected, 3);
     ebpo_mesh_free(&mesh);
 }
@@ -328,7 +340,8 @@ START_TEST(masses_are_the_exact_integrals_of_the_mesh)
             if (m.volume != 0)
                 assert_masses_near(&m, &expected, 1);
             else
-                ck_assert_msg(expected.volume == 0 || isnan(expected.volume), "%s", ebpo_test_solids[i].name);
+                ck_assert_msg(expected.volume == 0 || isnan(expected.volume), "%s",
+                              ebpo_test_solids[i].name);
         }
         ebpo_mesh_free(&mesh);
     }
@@ -348,11 +361,13 @@ START_TEST(spheres_far_away_keep_their_mass)
 }
 END_TEST
 
-/* A thin plate across the space that it fills hardly: volumes cancel nearly wholly when measured from afar. */
+/* A thin plate across the space that it fills hardly: volumes cancel nearly wholly when measured
+ * from afar. */
 START_TEST(thin_plates_keep_their_mass)
 {
     const double low[3] = { 0, 0, 0 }, high[3] = { 1000, 1000, 0x1p-30 };
-    const double turn[3][3] = { { .8, -.36, .48 }, { .6, .48, -.64 }, { 0, .8, .6 } }, offset[3] = { 3, 4, 5 };
+    const double turn[3][3] = { { .8, -.36, .48 }, { .6, .48, -.64 }, { 0, .8, .6 } },
+                 offset[3] = { 3, 4, 5 };
     ebpo_mesh mesh = ebpo_test_box(low, high, 4);
     ebpo_test_transform(&mesh, turn, offset);
     ebpo_mass m = mass_of(&mesh), expected = twin_of(&mesh);
@@ -390,8 +405,12 @@ START_TEST(what_does_not_fit_becomes_infinite_or_zero)
         ebpo_mesh mesh = ebpo_test_box(low, high, 1);
         ebpo_mass m = mass_of(&mesh);
         double area = 14 * s * s, volume = 3 * s * s * s;
-        ck_assert_msg(area < 1e-300 || area > 1e300 ? m.area == area : fabs(m.area / area - 1) < 1e-13, "size %g: area %g", s, m.area);
-        ck_assert_msg(volume < 1e-300 || volume > 1e308 ? m.volume == volume : fabs(m.volume / volume - 1) < 1e-13, "size %g: volume %g", s, m.volume);
+        ck_assert_msg(area < 1e-300 || area > 1e300 ? m.area == area
+                                                    : fabs(m.area / area - 1) < 1e-13,
+                      "size %g: area %g", s, m.area);
+        ck_assert_msg(volume < 1e-300 || volume > 1e308 ? m.volume == volume
+                                                        : fabs(m.volume / volume - 1) < 1e-13,
+                      "size %g: volume %g", s, m.volume);
         for (int k = 0; k < 3; k++) {
             ck_assert(fabs(m.centroid[k] / (k ? (k == 1 ? 1.5 : .5) * s : .5 * s) - 1) < 1e-13);
             for (int l = 0; l < 3; l++)
@@ -405,16 +424,21 @@ END_TEST
 
 START_TEST(shells_within_shells_add_up)
 {
-    const double low[3] = { 0, 0, 0 }, high[3] = { 8, 8, 8 }, low_hole[3] = { 1, 2, 3 }, high_hole[3] = { 4, 6, 5 };
+    const double low[3] = { 0, 0, 0 }, high[3] = { 8, 8, 8 }, low_hole[3] = { 1, 2, 3 },
+                 high_hole[3] = { 4, 6, 5 };
     ebpo_mesh mesh = ebpo_test_box(low, high, 2), hole = ebpo_test_box(low_hole, high_hole, 1);
     ebpo_test_reverse(&hole);
     ebpo_test_append(&mesh, &hole);
-    ebpo_mass m = mass_of(&mesh), expected = twin_of(&mesh), outer = box_mass(low, high), inner = box_mass(low_hole, high_hole);
+    ebpo_mass m = mass_of(&mesh), expected = twin_of(&mesh), outer = box_mass(low, high),
+              inner = box_mass(low_hole, high_hole);
     assert_masses_near(&m, &expected, 8);
     assert_near(m.volume, outer.volume - inner.volume, outer.volume, "volume");
     assert_near(m.area, outer.area + inner.area, outer.area, "area");
     for (int k = 0; k < 3; k++)
-        assert_near(m.centroid[k], (outer.volume * outer.centroid[k] - inner.volume * inner.centroid[k]) / m.volume, 8, "centroid");
+        assert_near(m.centroid[k],
+                    (outer.volume * outer.centroid[k] - inner.volume * inner.centroid[k]) /
+                        m.volume,
+                    8, "centroid");
     ebpo_mesh_free(&hole);
     ebpo_mesh_free(&mesh);
 }
@@ -444,7 +468,8 @@ END_TEST
 START_TEST(solids_without_volume_have_no_centroid)
 {
     ebpo_mesh mesh = ebpo_test_sheet(.7, 5), back = ebpo_test_sheet(.7, 5);
-    const double turn[3][3] = { { .3, -.7, .2 }, { .1, .45, -.64 }, { .9, .8, .6 } }, offset[3] = { 3.3, 4.1, 5.7 };
+    const double turn[3][3] = { { .3, -.7, .2 }, { .1, .45, -.64 }, { .9, .8, .6 } },
+                 offset[3] = { 3.3, 4.1, 5.7 };
     ebpo_test_reverse(&back);
     ebpo_test_append(&mesh, &back);
     ebpo_test_transform(&mesh, turn, offset);

@@ -1,4 +1,5 @@
-/* Mending of arranged meshes, in little memory and on all cores, against mending in the source's order. */
+/* Mending of arranged meshes, in little memory and on all cores, against mending in the source's
+ * order. */
 #include <check.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,10 +12,7 @@
 #include "solids.h"
 
 __attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void)
-{
-    return "leak:libhdf5";
-}
+const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
 
 static const ebpo_progress silent = { NULL, NULL };
 
@@ -35,7 +33,8 @@ static void mend(ebpo_mesh *m, int steps, ebpo_mend_record *record)
 static ebpo_mesh copy_of(const ebpo_mesh *m)
 {
     ebpo_mesh c = *m;
-    size_t bytes = (size_t)m->vertex_count * 3 * (m->xyz32 ? sizeof(float) : sizeof(double)), faces = (size_t)m->face_count * 12;
+    size_t bytes = (size_t)m->vertex_count * 3 * (m->xyz32 ? sizeof(float) : sizeof(double)),
+           faces = (size_t)m->face_count * 12;
     void *xyz = malloc(bytes + 1);
     memcpy(xyz, m->xyz32 ? (const void *)m->xyz32 : (const void *)m->xyz64, bytes);
     c.xyz32 = m->xyz32 ? xyz : NULL;
@@ -53,10 +52,13 @@ static void expect_same(const ebpo_mesh *arranged, const ebpo_mesh *plain)
     ck_assert_uint_eq(arranged->vertex_count, plain->vertex_count);
     ck_assert_uint_eq(arranged->face_count, plain->face_count);
     uint8_t *seen = calloc(1, plain->vertex_count + plain->face_count + 1);
-    const char *here = arranged->xyz32 ? (const char *)arranged->xyz32 : (const char *)arranged->xyz64, *there = plain->xyz32 ? (const char *)plain->xyz32 : (const char *)plain->xyz64;
+    const char *here =
+                   arranged->xyz32 ? (const char *)arranged->xyz32 : (const char *)arranged->xyz64,
+               *there = plain->xyz32 ? (const char *)plain->xyz32 : (const char *)plain->xyz64;
     for (uint64_t v = 0; v < plain->vertex_count; v++) {
         uint64_t from = a->vertex_source[v];
-        if (from >= plain->vertex_count || seen[from]++ || memcmp(here + v * width, there + from * width, width) != 0)
+        if (from >= plain->vertex_count || seen[from]++ ||
+            memcmp(here + v * width, there + from * width, width) != 0)
             ck_abort_msg("vertex %llu", (unsigned long long)v);
     }
     for (uint64_t f = 0; f < plain->face_count; f++) {
@@ -65,7 +67,8 @@ static void expect_same(const ebpo_mesh *arranged, const ebpo_mesh *plain)
             ck_abort_msg("face %llu", (unsigned long long)f);
         for (uint64_t k = 0; k < 3; k++)
             if (a->vertex_source[arranged->faces[3 * f + k]] != plain->faces[3 * from + k])
-                ck_abort_msg("face %llu, corner %llu", (unsigned long long)f, (unsigned long long)k);
+                ck_abort_msg("face %llu, corner %llu", (unsigned long long)f,
+                             (unsigned long long)k);
     }
     free(seen);
 }
@@ -83,7 +86,8 @@ static void expect_same_report(const ebpo_mesh *plain, const ebpo_mesh *m)
     ck_assert(memcmp(&a, &b, sizeof a) == 0);
 }
 
-/* Mends `plain` as it is, and a copy that is arranged and in the workspace; both are arranged in the end, and one. Frees `plain`. */
+/* Mends `plain` as it is, and a copy that is arranged and in the workspace; both are arranged in
+ * the end, and one. Frees `plain`. */
 static void mend_both(ebpo_mesh plain, int steps, ebpo_workspace *workspace)
 {
     ebpo_mesh m = copy_of(&plain);
@@ -100,21 +104,26 @@ static void mend_both(ebpo_mesh plain, int steps, ebpo_workspace *workspace)
     expect_same_report(&plain, &m);
     ck_assert_msg(ebpo_mesh_arrange(&plain, 1, silent, &error) == EBPO_OK, "%s", error.message);
     ck_assert(m.arrangement->key && m.arrangement->referenced == plain.arrangement->referenced);
-    ck_assert(memcmp(m.arrangement->key, plain.arrangement->key, (size_t)m.arrangement->referenced * 8) == 0);
+    ck_assert(memcmp(m.arrangement->key, plain.arrangement->key,
+                     (size_t)m.arrangement->referenced * 8) == 0);
     ck_assert(memcmp(m.faces, plain.faces, (size_t)m.face_count * 12) == 0);
-    ck_assert(memcmp(m.arrangement->vertex_source, plain.arrangement->vertex_source, (size_t)m.vertex_count * 4) == 0);
-    ck_assert(memcmp(m.arrangement->face_source, plain.arrangement->face_source, (size_t)m.face_count * 4) == 0);
+    ck_assert(memcmp(m.arrangement->vertex_source, plain.arrangement->vertex_source,
+                     (size_t)m.vertex_count * 4) == 0);
+    ck_assert(memcmp(m.arrangement->face_source, plain.arrangement->face_source,
+                     (size_t)m.face_count * 4) == 0);
     ebpo_mesh_free(&m);
     ebpo_mesh_free(&plain);
 }
 
-/* Few positions, some of them of two zeros: everything that can be wrong with a mesh is, many times over. */
+/* Few positions, some of them of two zeros: everything that can be wrong with a mesh is, many times
+ * over. */
 static ebpo_mesh random_mesh(uint64_t *state)
 {
     static const double line[] = { -0.0, 0, 1, 2, 5 };
     ebpo_mesh m;
     memset(&m, 0, sizeof m);
-    uint32_t vertices = 3 + (uint32_t)(ebpo_test_random(state) % 40), faces = 1 + (uint32_t)(ebpo_test_random(state) % 60);
+    uint32_t vertices = 3 + (uint32_t)(ebpo_test_random(state) % 40),
+             faces = 1 + (uint32_t)(ebpo_test_random(state) % 60);
     uint64_t kinds = 2 + ebpo_test_random(state) % 4;
     for (uint32_t v = 0; v < vertices; v++) {
         double p[3];
@@ -123,7 +132,9 @@ static ebpo_mesh random_mesh(uint64_t *state)
         ebpo_test_append_vertex(&m, p[0], p[1], p[2]);
     }
     for (uint32_t f = 0; f < faces; f++)
-        ebpo_test_append_face(&m, (uint32_t)(ebpo_test_random(state) % vertices), (uint32_t)(ebpo_test_random(state) % vertices), (uint32_t)(ebpo_test_random(state) % vertices));
+        ebpo_test_append_face(&m, (uint32_t)(ebpo_test_random(state) % vertices),
+                              (uint32_t)(ebpo_test_random(state) % vertices),
+                              (uint32_t)(ebpo_test_random(state) % vertices));
     return m;
 }
 
@@ -142,7 +153,9 @@ END_TEST
 /* Faces turned and left out, vertices of their own or shared, some that nobody names. */
 static ebpo_mesh damaged(int i)
 {
-    ebpo_mesh m = i < ebpo_test_solid_count ? ebpo_test_solids[i].make() : i % 2 ? ebpo_test_torus(2, 0.7, 300, 200) : ebpo_test_tetrahedra(8000);
+    ebpo_mesh m = i < ebpo_test_solid_count ? ebpo_test_solids[i].make()
+                  : i % 2                   ? ebpo_test_torus(2, 0.7, 300, 200)
+                                            : ebpo_test_tetrahedra(8000);
     uint64_t state = 5 + (uint64_t)i, kept = 0;
     for (uint64_t f = 0; f < m.face_count; f++) {
         uint64_t r = ebpo_test_random(&state) % 100;
@@ -215,7 +228,8 @@ START_TEST(what_was_mended_is_arranged_again_by_building)
     ck_assert(ebpo_mesh_arrange_to_mend(&m, 0, silent, &error) == EBPO_OK);
     mend(&m, ALL, &record);
     ck_assert(ebpo_mesh_check(&report, &m, 0, silent, &error) == EBPO_OK && report.balanced);
-    ck_assert_msg(ebpo_build(&tree, &m, &report, &record, NULL, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_build(&tree, &m, &report, &record, NULL, &error) == EBPO_OK, "%s",
+                  error.message);
     ebpo_tree_free(&tree);
 }
 END_TEST
@@ -226,7 +240,8 @@ int main(void)
     TCase *tests = tcase_create("all");
     tcase_set_timeout(tests, 600);
     tcase_add_test(tests, random_meshes_are_mended_alike_in_any_order);
-    tcase_add_loop_test(tests, damaged_solids_are_mended_alike_in_any_order, 0, ebpo_test_solid_count + 2);
+    tcase_add_loop_test(tests, damaged_solids_are_mended_alike_in_any_order, 0,
+                        ebpo_test_solid_count + 2);
     tcase_add_loop_test(tests, memory_does_not_change_what_mending_makes, 0, 2);
     tcase_add_test(tests, a_mesh_that_is_arranged_for_building_is_welded_alike);
     tcase_add_test(tests, what_was_mended_is_arranged_again_by_building);

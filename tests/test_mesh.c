@@ -20,10 +20,7 @@ static ebpo_mesh_report check_with(const ebpo_mesh *mesh, unsigned threads)
     return report;
 }
 
-static ebpo_mesh_report check(const ebpo_mesh *mesh)
-{
-    return check_with(mesh, 2);
-}
+static ebpo_mesh_report check(const ebpo_mesh *mesh) { return check_with(mesh, 2); }
 
 static ebpo_mesh_report check_named(const char *name)
 {
@@ -33,7 +30,8 @@ static ebpo_mesh_report check_named(const char *name)
     return report;
 }
 
-static ebpo_mend_record mend(ebpo_mesh *mesh, ebpo_status (*how)(ebpo_mesh *, ebpo_mend_record *, ebpo_error *))
+static ebpo_mend_record mend(ebpo_mesh *mesh,
+                             ebpo_status (*how)(ebpo_mesh *, ebpo_mend_record *, ebpo_error *))
 {
     ebpo_mend_record record;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -57,8 +55,8 @@ START_TEST(every_solid_has_the_stated_properties)
     ck_assert_msg(r.balanced == solid->balanced, "%s: balanced is %d", solid->name, r.balanced);
     ck_assert_msg(r.manifold == solid->manifold, "%s: manifold is %d", solid->name, r.manifold);
     if (!isnan(solid->volume))
-        ck_assert_msg(fabs(r.volume - solid->volume) <= 1e-13 * fabs(solid->volume), "%s: volume %.17g, expected %.17g",
-                      solid->name, r.volume, solid->volume);
+        ck_assert_msg(fabs(r.volume - solid->volume) <= 1e-13 * fabs(solid->volume),
+                      "%s: volume %.17g, expected %.17g", solid->name, r.volume, solid->volume);
     else
         ck_assert_msg(r.volume > 0, "%s: volume %g", solid->name, r.volume);
     ebpo_mesh_free(&mesh);
@@ -90,7 +88,8 @@ START_TEST(cube_is_measured_exactly)
     ck_assert_double_eq(r.area, 384);
     ck_assert_double_eq(r.min[0], -4);
     ck_assert_double_eq(r.max[2], 4);
-    ck_assert_double_eq_tol(r.mean_edge, (2 + sqrt(2)) / 3, 1e-15); /* each square: two sides and a diagonal */
+    /* each square: two sides and a diagonal */
+    ck_assert_double_eq_tol(r.mean_edge, (2 + sqrt(2)) / 3, 1e-15);
 }
 END_TEST
 
@@ -201,7 +200,8 @@ START_TEST(places_are_the_first_ones_ascending)
     ck_assert_uint_eq(r.misoriented_edges.count, 18);
     for (int i = 1; i < EBPO_FINDING_PLACES; i++)
         ck_assert(r.misoriented_edges.place[i - 1] <= r.misoriented_edges.place[i]);
-    ck_assert_uint_eq(r.misoriented_edges.place[0], 8); /* face 9 is turned; 8 shares an edge with it */
+    /* face 9 is turned; 8 shares an edge with it */
+    ck_assert_uint_eq(r.misoriented_edges.place[0], 8);
     ebpo_mesh_free(&mesh);
 }
 END_TEST
@@ -385,13 +385,15 @@ START_TEST(fill_closes_the_open_box)
 }
 END_TEST
 
-/* A cylinder without lids whose rim has n edges: lids by least area up to 256 edges, by ears beyond. */
+/* A cylinder without lids whose rim has n edges: lids by least area up to 256 edges, by ears
+ * beyond. */
 START_TEST(fill_closes_both_ends_of_a_tube)
 {
     static const uint32_t sizes[] = { 3, 4, 20, 256, 257, 3000 };
     uint32_t n = sizes[_i];
     ebpo_mesh mesh = ebpo_test_band(n, false);
-    double area = n / 2.0 * sin(2 * acos(-1) / n) * 4; /* of the polygon of radius 2; the tube is 1 high */
+    /* of the polygon of radius 2; the tube is 1 high */
+    double area = n / 2.0 * sin(2 * acos(-1) / n) * 4;
     ebpo_mend_record record = mend(&mesh, ebpo_mesh_fill_holes);
     ck_assert_uint_eq(record.filled_holes, 2);
     ck_assert_uint_eq(record.added_faces, 2 * (n - 2));
@@ -407,7 +409,8 @@ START_TEST(fill_closes_holes_that_share_a_vertex)
     ebpo_mesh mesh = ebpo_test_box((double[3]){ 0, 0, 0 }, (double[3]){ 1, 1, 1 }, 4);
     ebpo_mesh_report whole = check(&mesh);
     uint64_t kept = 0;
-    for (uint64_t f = 0; f < mesh.face_count; f++) { /* two squares of one side that meet at a corner */
+    for (uint64_t f = 0; f < mesh.face_count;
+         f++) { /* two squares of one side that meet at a corner */
         uint64_t pair = f / 2;
         if (pair != 10 && pair != 20)
             memcpy(mesh.faces + 3 * kept++, mesh.faces + 3 * f, 3 * sizeof *mesh.faces);
@@ -468,9 +471,10 @@ END_TEST
 
 typedef struct model {
     const char *name;
-    uint64_t boundary, nonmanifold, misoriented, bowties, shells, zero_area, repeated, unused, positions;
-    int64_t genus;  /* -1: not a closed 2-manifold */
-    double volume;  /* NAN: does not balance */
+    uint64_t boundary, nonmanifold, misoriented, bowties, shells, zero_area, repeated, unused,
+        positions;
+    int64_t genus; /* -1: not a closed 2-manifold */
+    double volume; /* NAN: does not balance */
 } model;
 
 static const model models[] = {
@@ -511,13 +515,13 @@ static ebpo_mesh read_model(const char *name)
     return mesh;
 }
 
-#define EXPECT(field, value) \
-    do { \
-        if ((uint64_t)(field) != (value)) { \
-            fprintf(stderr, "%s: " #field " is %llu, expected %llu\n", m->name, (unsigned long long)(field), \
-                    (unsigned long long)(value)); \
-            bad++; \
-        } \
+#define EXPECT(field, value)                                                    \
+    do {                                                                        \
+        if ((uint64_t)(field) != (value)) {                                     \
+            fprintf(stderr, "%s: " #field " is %llu, expected %llu\n", m->name, \
+                    (unsigned long long)(field), (unsigned long long)(value));  \
+            bad++;                                                              \
+        }                                                                       \
     } while (0)
 
 START_TEST(real_models_have_the_known_counts)
@@ -547,8 +551,10 @@ END_TEST
 
 START_TEST(filled_scans_are_balanced)
 {
-    static const struct { const char *name; uint64_t holes; } scans[] = { { "dragon_vrip", 407 }, { "blade", 0 },
-                                                                          { "bunny", 5 } };
+    static const struct {
+        const char *name;
+        uint64_t holes;
+    } scans[] = { { "dragon_vrip", 407 }, { "blade", 0 }, { "bunny", 5 } };
     ebpo_mesh mesh = read_model(scans[_i].name);
     ebpo_mesh_report open = check(&mesh);
     if (scans[_i].holes)

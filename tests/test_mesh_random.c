@@ -1,4 +1,5 @@
-/* The mesh check against a plain twin, on small meshes made at random: every kind of defect, many at once. */
+/* The mesh check against a plain twin, on small meshes made at random: every kind of defect, many
+ * at once. */
 #include <check.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,8 +16,10 @@ static ebpo_mesh random_mesh(uint64_t *state)
     memset(&mesh, 0, sizeof mesh);
     uint32_t vertices = 1 + (uint32_t)(ebpo_test_random(state) % MOST_VERTICES);
     uint32_t faces = 1 + (uint32_t)(ebpo_test_random(state) % MOST_FACES);
-    for (uint32_t v = 0; v < vertices; v++) /* few positions, so that some repeat and many faces have no area */
-        ebpo_test_append_vertex(&mesh, (double)(ebpo_test_random(state) % 3), (double)(ebpo_test_random(state) % 3), 0);
+    for (uint32_t v = 0; v < vertices;
+         v++) /* few positions, so that some repeat and many faces have no area */
+        ebpo_test_append_vertex(&mesh, (double)(ebpo_test_random(state) % 3),
+                                (double)(ebpo_test_random(state) % 3), 0);
     while (mesh.face_count < faces)
         ebpo_test_append_face(&mesh, (uint32_t)(ebpo_test_random(state) % vertices),
                               (uint32_t)(ebpo_test_random(state) % vertices),
@@ -28,20 +31,15 @@ static ebpo_mesh random_mesh(uint64_t *state)
 
 typedef struct twin {
     uint64_t uses[MOST_VERTICES][MOST_VERTICES]; /* directed */
-    uint64_t edges, boundary, nonmanifold, misoriented, unbalanced, bowties, repeated, index_repeated, zero_area;
+    uint64_t edges, boundary, nonmanifold, misoriented, unbalanced, bowties, repeated,
+        index_repeated, zero_area;
     uint64_t unreferenced, positions, components;
     uint64_t first_boundary; /* lowest face with a boundary edge */
 } twin;
 
-static bool names(const uint32_t *f, uint32_t v)
-{
-    return f[0] == v || f[1] == v || f[2] == v;
-}
+static bool names(const uint32_t *f, uint32_t v) { return f[0] == v || f[1] == v || f[2] == v; }
 
-static bool degenerate(const uint32_t *f)
-{
-    return f[0] == f[1] || f[1] == f[2] || f[0] == f[2];
-}
+static bool degenerate(const uint32_t *f) { return f[0] == f[1] || f[1] == f[2] || f[0] == f[2]; }
 
 static void twin_edges(twin *t, const ebpo_mesh *m)
 {
@@ -74,7 +72,8 @@ static bool share_twofold_edge(const twin *t, const uint32_t *f, const uint32_t 
     return false;
 }
 
-/* Spreads labels until nothing changes; returns how many labels stay among the faces with label > 0. */
+/* Spreads labels until nothing changes; returns how many labels stay among the faces with label >
+ * 0. */
 static uint64_t spread(const twin *t, const ebpo_mesh *m, uint64_t *label, uint32_t v, bool fans)
 {
     for (bool changed = true; changed;) {
@@ -82,7 +81,8 @@ static uint64_t spread(const twin *t, const ebpo_mesh *m, uint64_t *label, uint3
         for (uint64_t f = 0; f < m->face_count; f++)
             for (uint64_t g = 0; g < m->face_count; g++) {
                 const uint32_t *a = m->faces + 3 * f, *b = m->faces + 3 * g;
-                bool joined = fans ? share_twofold_edge(t, a, b, v) : names(b, a[0]) || names(b, a[1]) || names(b, a[2]);
+                bool joined = fans ? share_twofold_edge(t, a, b, v)
+                                   : names(b, a[0]) || names(b, a[1]) || names(b, a[2]);
                 if (label[f] && label[g] && label[g] < label[f] && joined) {
                     label[f] = label[g];
                     changed = true;
@@ -111,7 +111,8 @@ static void twin_fans(twin *t, const ebpo_mesh *m)
 static bool flat(const ebpo_mesh *m, const uint32_t *f)
 {
     const double *a = m->xyz64 + 3 * f[0], *b = m->xyz64 + 3 * f[1], *c = m->xyz64 + 3 * f[2];
-    return (b[0] - a[0]) * (c[1] - a[1]) == (b[1] - a[1]) * (c[0] - a[0]); /* small whole numbers in z = 0 */
+    /* small whole numbers in z = 0 */
+    return (b[0] - a[0]) * (c[1] - a[1]) == (b[1] - a[1]) * (c[0] - a[0]);
 }
 
 static void twin_faces(twin *t, const ebpo_mesh *m)
@@ -142,8 +143,9 @@ static ebpo_mesh_report check(const ebpo_mesh *mesh)
 {
     ebpo_mesh_report report;
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert_msg(ebpo_mesh_check(&report, mesh, 1, (ebpo_progress){ NULL, NULL }, &error) == EBPO_OK, "%s",
-                  error.message);
+    ck_assert_msg(ebpo_mesh_check(&report, mesh, 1, (ebpo_progress){ NULL, NULL }, &error) ==
+                      EBPO_OK,
+                  "%s", error.message);
     return report;
 }
 
@@ -189,7 +191,8 @@ START_TEST(mending_random_meshes_keeps_its_promises)
         ck_assert_int_eq(ebpo_mesh_fill_holes(&mesh, &record, &error), EBPO_OK);
         ck_assert_uint_eq(record.filled_holes, before.boundary_loops);
         ebpo_mesh_report filled = check(&mesh);
-        if (before.unbalanced_edges.count == before.boundary_edges.count && record.unfilled_holes == 0)
+        if (before.unbalanced_edges.count == before.boundary_edges.count &&
+            record.unfilled_holes == 0)
             ck_assert(filled.balanced);
         ck_assert_int_eq(ebpo_mesh_orient(&mesh, &record, &error), EBPO_OK);
         if (record.unorientable_components == 0)

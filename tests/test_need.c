@@ -15,12 +15,11 @@
 #include "twin_reach.h"
 
 __attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void)
-{
-    return "leak:libhdf5";
-}
+const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
 
-static const query_variant stored = { "stored", 4, 6, EBPO_RULE_NONZERO, EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES };
+static const query_variant stored = { "stored", 4, 6, EBPO_RULE_NONZERO,
+                                      EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS |
+                                          EBPO_PART_LEAF_PLANES };
 
 static void fine(ebpo_status status, const ebpo_error *error)
 {
@@ -64,8 +63,9 @@ static void verify(const result *r)
     ebpo_verify_options o = EBPO_VERIFY_OPTIONS_INIT;
     ebpo_verify_report report;
     fine(ebpo_verify(r->file, &o, &report, &error), &error);
-    ck_assert_msg(report.violations == 0, "%s %s %s %s %s %s", report.structure.first, report.content.first, report.containment.first, report.nesting.first, report.labels.first,
-                  report.lists.first);
+    ck_assert_msg(report.violations == 0, "%s %s %s %s %s %s", report.structure.first,
+                  report.content.first, report.containment.first, report.nesting.first,
+                  report.labels.first, report.lists.first);
 }
 
 /* Every gray node and leaf of the coarser file is one in the finer file. */
@@ -76,16 +76,20 @@ static uint64_t missing(ebpo_file *coarse, ebpo_file *fine_file, uint64_t *nodes
     uint64_t out = 0;
     fine(ebpo_file_read_tree(coarse, &a, 1, &error), &error);
     fine(ebpo_file_read_tree(fine_file, &b, 1, &error), &error);
-    struct pair { uint64_t a, b; } *now = query_room(1, sizeof *now), *next;
+    struct pair {
+        uint64_t a, b;
+    } *now = query_room(1, sizeof *now), *next;
     uint64_t count = 1;
     *now = (struct pair){ 0, 0 };
     for (int level = 0; level < a.info.level_count && count; level++) {
         const ebpo_level *x = &a.level[level], *y = &b.level[level];
-        uint64_t *rank[2] = { query_room(x->group_count + 1, 8), query_room(level < b.info.level_count ? y->group_count + 1 : 1, 8) };
+        uint64_t *rank[2] = { query_room(x->group_count + 1, 8),
+                              query_room(level < b.info.level_count ? y->group_count + 1 : 1, 8) };
         const ebpo_level *of[2] = { x, y };
         for (int f = 0; f < 2; f++) {
             uint64_t sum = 0;
-            for (uint64_t i = 0; (f == 0 || level < b.info.level_count) && i < of[f]->group_count; i++) {
+            for (uint64_t i = 0; (f == 0 || level < b.info.level_count) && i < of[f]->group_count;
+                 i++) {
                 rank[f][i] = sum;
                 for (int k = 0; k < 8; k++)
                     sum += (of[f]->types[i] >> 2 * k & 3) == EBPO_GRAY;
@@ -97,12 +101,14 @@ static uint64_t missing(ebpo_file *coarse, ebpo_file *fine_file, uint64_t *nodes
             bool there = level < b.info.level_count && y->types[now[i].b] != 0;
             uint64_t ra = rank[0][now[i].a], rb = there ? rank[1][now[i].b] : 0;
             for (int k = 0; k < 8; k++) {
-                int ta = x->types[now[i].a] >> 2 * k & 3, tb = there ? y->types[now[i].b] >> 2 * k & 3 : EBPO_WHITE;
+                int ta = x->types[now[i].a] >> 2 * k & 3,
+                    tb = there ? y->types[now[i].b] >> 2 * k & 3 : EBPO_WHITE;
                 if (ta >= EBPO_LEAF) {
                     *nodes += 1;
                     out += tb < EBPO_LEAF || (ta == EBPO_LEAF && tb == EBPO_GRAY);
                 }
-                if (ta == EBPO_GRAY && tb == EBPO_GRAY && level + 1 < a.info.level_count && a.level[level + 1].types[ra] != 0)
+                if (ta == EBPO_GRAY && tb == EBPO_GRAY && level + 1 < a.info.level_count &&
+                    a.level[level + 1].types[ra] != 0)
                     next[kept++] = (struct pair){ ra, rb };
                 ra += ta == EBPO_GRAY;
                 rb += tb == EBPO_GRAY;
@@ -135,14 +141,19 @@ static void keeps_its_word(query_model *m, uint32_t parts)
         o.max_error = e;
         result_make(&r, m, first ? "a" : e < coarsest / 4 ? "c" : "b", &o);
         verify(&r);
-        double hi = reach(m, r.file, r.info->level_count - 1), twin = twin_reach(r.file, r.info->level_count - 1, &m->mesh, m->info.solid, 300, 1);
-        ck_assert_msg(hi <= e * 1.06 + 1e-5 * m->size, "%s: asked for %g, and it may reach %g", m->name, e, hi);
-        ck_assert_msg(twin <= e + 1e-9 * m->size, "%s: asked for %g, and it reaches %g", m->name, e, twin);
+        double hi = reach(m, r.file, r.info->level_count - 1),
+               twin = twin_reach(r.file, r.info->level_count - 1, &m->mesh, m->info.solid, 300, 1);
+        ck_assert_msg(hi <= e * 1.06 + 1e-5 * m->size, "%s: asked for %g, and it may reach %g",
+                      m->name, e, hi);
+        ck_assert_msg(twin <= e + 1e-9 * m->size, "%s: asked for %g, and it reaches %g", m->name, e,
+                      twin);
         ck_assert(r.info->pruned ? r.info->kept_error == e : r.info->kept_error == 0);
         if (!first) {
             uint64_t nodes = 0;
-            ck_assert_msg(before.info->file_bytes <= r.info->file_bytes, "%s: a smaller error gives fewer bytes, %llu instead of %llu", m->name,
-                          (unsigned long long)r.info->file_bytes, (unsigned long long)before.info->file_bytes);
+            ck_assert_msg(before.info->file_bytes <= r.info->file_bytes,
+                          "%s: a smaller error gives fewer bytes, %llu instead of %llu", m->name,
+                          (unsigned long long)r.info->file_bytes,
+                          (unsigned long long)before.info->file_bytes);
             ck_assert_uint_eq(missing(before.file, r.file, &nodes), 0);
             ck_assert(nodes > 0);
             ebpo_close(before.file);
@@ -162,11 +173,21 @@ static void keeps_its_word(query_model *m, uint32_t parts)
 
 START_TEST(no_envelope_reaches_farther_than_asked_for)
 {
-    for (int i = query_scaled(4) < 4 ? 3 : 0; i < 5; i++) { /* other compilers and sanitizers: the small ones */
+    for (int i = query_scaled(4) < 4 ? 3 : 0; i < 5;
+         i++) { /* other compilers and sanitizers: the small ones */
         query_model m;
-        ebpo_mesh mesh = i == 0 ? ebpo_test_torus(3, 1, 48, 24) : i == 1 ? ebpo_test_sphere((double[3]){ 1, 2, 3 }, 2, 3) : i == 2 ? ebpo_test_blob(4, 40, 7) : i == 3 ?
-                         ebpo_test_cone(1, 3, 40) : ebpo_test_sheet(4, 8);
-        query_model_make(&m, i == 0 ? "torus" : i == 1 ? "sphere" : i == 2 ? "blob" : i == 3 ? "cone" : "sheet", mesh, &stored);
+        ebpo_mesh mesh = i == 0   ? ebpo_test_torus(3, 1, 48, 24)
+                         : i == 1 ? ebpo_test_sphere((double[3]){ 1, 2, 3 }, 2, 3)
+                         : i == 2 ? ebpo_test_blob(4, 40, 7)
+                         : i == 3 ? ebpo_test_cone(1, 3, 40)
+                                  : ebpo_test_sheet(4, 8);
+        query_model_make(&m,
+                         i == 0   ? "torus"
+                         : i == 1 ? "sphere"
+                         : i == 2 ? "blob"
+                         : i == 3 ? "cone"
+                                  : "sheet",
+                         mesh, &stored);
         keeps_its_word(&m, ~0u);
         if (i < 2)
             keeps_its_word(&m, EBPO_PART_PLANES | EBPO_PART_LEAF_PLANES);
@@ -190,7 +211,8 @@ START_TEST(a_large_error_leaves_the_root_and_a_tiny_one_everything)
     result_free(&r);
     o.max_error = 1e-300;
     result_make(&r, &m, "all", &o);
-    ck_assert(!r.info->pruned && r.info->kept_error == 0 && memcmp(r.info->content_sha256, ebpo_file_info(m.file)->content_sha256, 32) == 0);
+    ck_assert(!r.info->pruned && r.info->kept_error == 0 &&
+              memcmp(r.info->content_sha256, ebpo_file_info(m.file)->content_sha256, 32) == 0);
     result_free(&r);
     query_model_free(&m);
 }
@@ -208,17 +230,22 @@ START_TEST(a_size_is_kept_to_with_the_least_error)
         result r, finer;
         o.target_bytes = whole * (uint64_t)(i == 0 ? 90 : i == 1 ? 60 : 30) / 100;
         result_make(&r, &m, "fit", &o);
-        ck_assert_msg(r.info->file_bytes <= o.target_bytes && r.info->kept_error > 0, "%llu of %llu bytes", (unsigned long long)r.info->file_bytes, (unsigned long long)o.target_bytes);
+        ck_assert_msg(r.info->file_bytes <= o.target_bytes && r.info->kept_error > 0,
+                      "%llu of %llu bytes", (unsigned long long)r.info->file_bytes,
+                      (unsigned long long)o.target_bytes);
         verify(&r);
         ebpo_subset_options e = EBPO_SUBSET_OPTIONS_INIT;
         e.max_error = r.info->kept_error;
         result_make(&finer, &m, "same", &e);
-        ck_assert(memcmp(finer.info->content_sha256, r.info->content_sha256, 32) == 0 && finer.info->file_bytes == r.info->file_bytes);
+        ck_assert(memcmp(finer.info->content_sha256, r.info->content_sha256, 32) == 0 &&
+                  finer.info->file_bytes == r.info->file_bytes);
         result_free(&finer);
         e.max_error = r.info->kept_error / 1.02;
         result_make(&finer, &m, "finer", &e);
         /* Sizes of nearly the same content go up and down a little, as compression does. */
-        ck_assert_msg(finer.info->file_bytes > o.target_bytes * 99 / 100, "a smaller error would have fitted: %llu of %llu bytes", (unsigned long long)finer.info->file_bytes,
+        ck_assert_msg(finer.info->file_bytes > o.target_bytes * 99 / 100,
+                      "a smaller error would have fitted: %llu of %llu bytes",
+                      (unsigned long long)finer.info->file_bytes,
                       (unsigned long long)o.target_bytes);
         result_free(&finer);
         result_free(&r);
@@ -242,12 +269,15 @@ START_TEST(a_size_is_kept_to_with_the_least_error)
 }
 END_TEST
 
-/* Envelopes of boxes on the lattice coincide with the solid: nodes are pruned however small the error is, and no error gives the whole. */
+/* Envelopes of boxes on the lattice coincide with the solid: nodes are pruned however small the
+ * error is, and no error gives the whole. */
 START_TEST(no_file_is_larger_than_asked_for)
 {
     for (int i = 0; i < 3; i++) {
         query_model m;
-        ebpo_mesh mesh = i == 0 ? ebpo_test_box((double[3]){ 0, 0, 0 }, (double[3]){ 8, 8, 8 }, 2) : i == 1 ? ebpo_test_staircase(4) : ebpo_test_torus(3, 1, 12, 6);
+        ebpo_mesh mesh = i == 0   ? ebpo_test_box((double[3]){ 0, 0, 0 }, (double[3]){ 8, 8, 8 }, 2)
+                         : i == 1 ? ebpo_test_staircase(4)
+                                  : ebpo_test_torus(3, 1, 12, 6);
         query_model_make(&m, i == 0 ? "box" : i == 1 ? "staircase" : "torus", mesh, &stored);
         uint64_t whole = ebpo_file_info(m.file)->file_bytes, last = 0, targets = query_scaled(8);
         for (uint64_t k = 1; k <= targets; k++) {
@@ -263,11 +293,14 @@ START_TEST(no_file_is_larger_than_asked_for)
             unlink(path);
             result r, same;
             result_make(&r, &m, "fit", &o);
-            ck_assert_msg(r.info->file_bytes <= o.target_bytes, "%s: %llu of %llu bytes", m.name, (unsigned long long)r.info->file_bytes, (unsigned long long)o.target_bytes);
+            ck_assert_msg(r.info->file_bytes <= o.target_bytes, "%s: %llu of %llu bytes", m.name,
+                          (unsigned long long)r.info->file_bytes,
+                          (unsigned long long)o.target_bytes);
             verify(&r);
             e.max_error = r.info->kept_error;
             result_make(&same, &m, "same", &e);
-            ck_assert(memcmp(same.info->content_sha256, r.info->content_sha256, 32) == 0 && same.info->file_bytes == r.info->file_bytes);
+            ck_assert(memcmp(same.info->content_sha256, r.info->content_sha256, 32) == 0 &&
+                      same.info->file_bytes == r.info->file_bytes);
             last = r.info->file_bytes;
             result_free(&same);
             result_free(&r);
@@ -286,7 +319,8 @@ START_TEST(parts_are_chosen_from_full_to_lod)
     uint64_t bytes[3];
     query_model_make(&m, "torus", ebpo_test_torus(3, 1, 96, 48), &stored);
     for (int i = 0; i < 3; i++) {
-        static const ebpo_profile order[] = { EBPO_PROFILE_FULL, EBPO_PROFILE_COLLISION, EBPO_PROFILE_LOD };
+        static const ebpo_profile order[] = { EBPO_PROFILE_FULL, EBPO_PROFILE_COLLISION,
+                                              EBPO_PROFILE_LOD };
         o.parts = ebpo_profile_parts(order[i]);
         result_make(&r, &m, "profile", &o);
         bytes[i] = r.info->file_bytes;
@@ -297,8 +331,10 @@ START_TEST(parts_are_chosen_from_full_to_lod)
     for (int i = 0; i < 4; i++) {
         o.target_bytes = i < 3 ? bytes[i] : bytes[2] * 8 / 10;
         result_make(&r, &m, "chosen", &o);
-        ck_assert_msg(r.info->file_bytes <= o.target_bytes, "%llu of %llu bytes", (unsigned long long)r.info->file_bytes, (unsigned long long)o.target_bytes);
-        ck_assert(i == 3 ? r.info->pruned && r.info->kept_error > 0 : r.info->file_bytes == bytes[i] && !r.info->pruned);
+        ck_assert_msg(r.info->file_bytes <= o.target_bytes, "%llu of %llu bytes",
+                      (unsigned long long)r.info->file_bytes, (unsigned long long)o.target_bytes);
+        ck_assert(i == 3 ? r.info->pruned && r.info->kept_error > 0
+                         : r.info->file_bytes == bytes[i] && !r.info->pruned);
         result_free(&r);
     }
     query_model_free(&m);
@@ -338,13 +374,15 @@ START_TEST(threads_and_a_detour_by_a_tree_do_not_change_the_bytes)
 }
 END_TEST
 
-static void refused(ebpo_file *file, const char *folder, const ebpo_subset_options *o, ebpo_status status, const char *says)
+static void refused(ebpo_file *file, const char *folder, const ebpo_subset_options *o,
+                    ebpo_status status, const char *says)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     char path[120];
     snprintf(path, sizeof path, "%s/no.ebpo.h5", folder);
     ck_assert_int_eq(ebpo_subset(file, path, o, &error), status);
-    ck_assert_msg(strstr(error.message, says) != NULL && access(path, F_OK) != 0, "%s", error.message);
+    ck_assert_msg(strstr(error.message, says) != NULL && access(path, F_OK) != 0, "%s",
+                  error.message);
 }
 
 START_TEST(what_cannot_be_kept_to_is_refused)

@@ -19,9 +19,12 @@ static void compare(const char *s, locale_t c)
 {
     float f = 1, expected_f = strtof(s, NULL);
     double d = 1, expected_d = strtod(s, NULL);
-    ck_assert_msg(ebpo_number_float(&f, s, strlen(s), c) && ebpo_number_double(&d, s, strlen(s), c), "%s refused", s);
-    ck_assert_msg(memcmp(&f, &expected_f, sizeof f) == 0, "%s as float: %a instead of %a", s, (double)f, (double)expected_f);
-    ck_assert_msg(memcmp(&d, &expected_d, sizeof d) == 0, "%s as double: %a instead of %a", s, d, expected_d);
+    ck_assert_msg(ebpo_number_float(&f, s, strlen(s), c) && ebpo_number_double(&d, s, strlen(s), c),
+                  "%s refused", s);
+    ck_assert_msg(memcmp(&f, &expected_f, sizeof f) == 0, "%s as float: %a instead of %a", s,
+                  (double)f, (double)expected_f);
+    ck_assert_msg(memcmp(&d, &expected_d, sizeof d) == 0, "%s as double: %a instead of %a", s, d,
+                  expected_d);
 }
 
 /* Of every length of digits, exponent and place of the point. */
@@ -81,10 +84,34 @@ END_TEST
 
 START_TEST(edges_of_the_range_are_read)
 {
-    static const char *const cases[] = { "0", "-0", "0.0", "-0.000", "1e400", "-1e400", "1e-400", "1.17549435e-38", "1e-45", "7.0e-46", "3.4028235e38",
-        "3.4028236e38", "2.2250738585072011e-308", "4.9e-324", "2.4e-324", "1.7976931348623159e308", "9007199254740993", "18446744073709551615",
-        "0.000000000000000000000000000000000000000000000001", "1.", ".5", "+1", "1E+2", "00000000000000000000000000000001.5", "0e99999999999",
-        "1e-99999999999", "9999999999999999999", "99999999999999999999" };
+    static const char *const cases[] = { "0",
+                                         "-0",
+                                         "0.0",
+                                         "-0.000",
+                                         "1e400",
+                                         "-1e400",
+                                         "1e-400",
+                                         "1.17549435e-38",
+                                         "1e-45",
+                                         "7.0e-46",
+                                         "3.4028235e38",
+                                         "3.4028236e38",
+                                         "2.2250738585072011e-308",
+                                         "4.9e-324",
+                                         "2.4e-324",
+                                         "1.7976931348623159e308",
+                                         "9007199254740993",
+                                         "18446744073709551615",
+                                         "0.000000000000000000000000000000000000000000000001",
+                                         "1.",
+                                         ".5",
+                                         "+1",
+                                         "1E+2",
+                                         "00000000000000000000000000000001.5",
+                                         "0e99999999999",
+                                         "1e-99999999999",
+                                         "9999999999999999999",
+                                         "99999999999999999999" };
     locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
         compare(cases[i], c);
@@ -94,12 +121,16 @@ END_TEST
 
 START_TEST(what_is_no_number_is_refused)
 {
-    static const char *const cases[] = { "", "-", "+", ".", "e5", "1e", "1e+", "1.2.3", "1,5", "0x10", "1f", "--1", "nanx", "in", "1 ", " 1", "1e5.0" };
+    static const char *const cases[] = { "",     "-",     "+",   ".",    "e5",   "1e",
+                                         "1e+",  "1.2.3", "1,5", "0x10", "1f",   "--1",
+                                         "nanx", "in",    "1 ",  " 1",   "1e5.0" };
     locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
     float f;
     double d;
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
-        ck_assert_msg(!ebpo_number_float(&f, cases[i], strlen(cases[i]), c) && !ebpo_number_double(&d, cases[i], strlen(cases[i]), c), "%s", cases[i]);
+        ck_assert_msg(!ebpo_number_float(&f, cases[i], strlen(cases[i]), c) &&
+                          !ebpo_number_double(&d, cases[i], strlen(cases[i]), c),
+                      "%s", cases[i]);
     char *many = malloc(EBPO_NUMBER_LONGEST + 1);
     memset(many, '7', EBPO_NUMBER_LONGEST + 1);
     ck_assert(ebpo_number_double(&d, many, EBPO_NUMBER_LONGEST, c) && isinf(d));
@@ -116,7 +147,8 @@ START_TEST(integers_are_read_whole_or_not_at_all)
     ck_assert(ebpo_number_integer(&value, "+7", 2) && value == 7);
     ck_assert(ebpo_number_integer(&value, "999999999999999999", 18) && value == 999999999999999999);
     ck_assert(!ebpo_number_integer(&value, "9999999999999999999", 19));
-    ck_assert(!ebpo_number_integer(&value, "1.", 2) && !ebpo_number_integer(&value, "", 0) && !ebpo_number_integer(&value, "-", 1));
+    ck_assert(!ebpo_number_integer(&value, "1.", 2) && !ebpo_number_integer(&value, "", 0) &&
+              !ebpo_number_integer(&value, "-", 1));
 }
 END_TEST
 

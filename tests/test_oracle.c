@@ -1,4 +1,5 @@
-/* The judge judged: the oracle against closed forms, against itself without its shortcuts, and against the library's exact predicates. */
+/* The judge judged: the oracle against closed forms, against itself without its shortcuts, and
+ * against the library's exact predicates. */
 #include <check.h>
 #include <math.h>
 #include <stdlib.h>
@@ -18,7 +19,8 @@ static double some(uint64_t *state, double low, double high)
 /* Multiples of 1/8 in -range .. range. */
 static double eighth(uint64_t *state, int range)
 {
-    return (double)((int64_t)(ebpo_test_random(state) % (uint64_t)(16 * range + 1)) - 8 * range) / 8;
+    return (double)((int64_t)(ebpo_test_random(state) % (uint64_t)(16 * range + 1)) - 8 * range) /
+           8;
 }
 
 static ebpo_mesh box_mesh(double low, double high, uint32_t n)
@@ -29,7 +31,8 @@ static ebpo_mesh box_mesh(double low, double high, uint32_t n)
 
 /* --- rounding --- */
 
-static double rounded(uint64_t num, uint64_t shift, uint64_t plus, uint64_t den, int exponent, bool root)
+static double rounded(uint64_t num, uint64_t shift, uint64_t plus, uint64_t den, int exponent,
+                      bool root)
 {
     mpz_t n, d;
     mpz_init_set_ui(n, num);
@@ -59,14 +62,17 @@ END_TEST
 START_TEST(rounding_holds_at_the_ends_of_the_range)
 {
     ck_assert_double_eq(rounded(1, 0, 0, 1, -2148, true), 0x1p-1074);
-    ck_assert_double_eq(rounded(1, 0, 0, 1, -2150, true), 0);       /* half of the least one: ties to even */
-    ck_assert_double_eq(rounded(1, 200, 1, 1, -2350, true), 0x1p-1074); /* a little more than half */
+    /* half of the least one: ties to even */
+    ck_assert_double_eq(rounded(1, 0, 0, 1, -2150, true), 0);
+    /* a little more than half */
+    ck_assert_double_eq(rounded(1, 200, 1, 1, -2350, true), 0x1p-1074);
     ck_assert_double_eq(rounded(9, 0, 0, 1, -2150, true), 0x1p-1073); /* 1.5 of it: to 2 */
     ck_assert_double_eq(rounded(1, 0, 0, 1, -3000, true), 0);
     ck_assert_double_eq(rounded(1, 0, 0, 1, 2046, true), 0x1p1023);
     ck_assert(isinf(rounded(1, 0, 0, 1, 2048, true)));
     ck_assert(isinf(rounded((UINT64_C(1) << 54) - 1, 0, 0, 1, 970, false)));
-    ck_assert_double_eq(rounded((UINT64_C(1) << 53) - 1, 0, 0, 1, 971, false), 0x1.fffffffffffffp1023);
+    ck_assert_double_eq(rounded((UINT64_C(1) << 53) - 1, 0, 0, 1, 971, false),
+                        0x1.fffffffffffffp1023);
 }
 END_TEST
 
@@ -77,7 +83,8 @@ START_TEST(roots_of_rounded_squares_agree_with_the_processor)
         uint64_t n = ebpo_test_random(&state) >> 11;
         ck_assert_double_eq(rounded(n, 0, 0, 1, 0, true), sqrt((double)n));
         ck_assert_double_eq(rounded(n, 0, 0, 1, -600, true), sqrt((double)n) * 0x1p-300);
-        ck_assert_double_eq(rounded(n, 0, 0, 1 + (n & 0xffff), 0, false), (double)n / (double)(1 + (n & 0xffff)));
+        ck_assert_double_eq(rounded(n, 0, 0, 1 + (n & 0xffff), 0, false),
+                            (double)n / (double)(1 + (n & 0xffff)));
     }
 }
 END_TEST
@@ -117,7 +124,8 @@ START_TEST(distance_to_a_cube_is_that_of_the_formula)
         double centre[3] = { 1, 1, 1 };
         oracle_nearest near;
         oracle_find_nearest(o, centre, &near);
-        ck_assert_uint_eq(near.count, n % 2 ? 2 * 6 : 6 * 6); /* the two halves of the middle squares, or all halves that touch the middle */
+        /* the two halves of the middle squares, or all halves that touch the middle */
+        ck_assert_uint_eq(near.count, n % 2 ? 2 * 6 : 6 * 6);
         oracle_free(o);
         ebpo_mesh_free(&mesh);
     }
@@ -127,7 +135,8 @@ END_TEST
 /* All faces, one by one, without leaving out any. */
 START_TEST(faces_left_out_are_never_the_nearest)
 {
-    const char *names[] = { "sphere", "cone_slivers", "needle", "giant_and_dust", "thin_wall", "zero_area_face", "blob" };
+    const char *names[] = { "sphere",    "cone_slivers",   "needle", "giant_and_dust",
+                            "thin_wall", "zero_area_face", "blob" };
     uint64_t state = 3;
     for (size_t m = 0; m < sizeof names / sizeof *names; m++) {
         ebpo_mesh mesh = ebpo_test_make(names[m]);
@@ -230,7 +239,8 @@ START_TEST(winding_numbers_agree_with_the_librarys_predicates)
         double p[3];
         oracle_nearest near;
         ebpo_test_point(&mesh, ebpo_test_random(&state) % mesh.vertex_count, p);
-        for (int k = 0; k < 3 && i % 8; k++) { /* coordinates of vertices: aligned with edges and faces */
+        for (int k = 0; k < 3 && i % 8;
+             k++) { /* coordinates of vertices: aligned with edges and faces */
             double q[3];
             ebpo_test_point(&mesh, ebpo_test_random(&state) % mesh.vertex_count, q);
             p[k] = q[k] + (i % 2 ? 0 : some(&state, -1e-2, 1e-2));
@@ -251,14 +261,18 @@ END_TEST
 
 START_TEST(hits_of_a_ray_from_inside_sum_up_to_the_winding_number)
 {
-    const char *names[] = { "sphere", "torus", "cavity", "nested_same_direction", "overlapping_cubes", "inside_out_cube", "blob" };
+    const char *names[] = {
+        "sphere",          "torus", "cavity", "nested_same_direction", "overlapping_cubes",
+        "inside_out_cube", "blob"
+    };
     uint64_t state = 5;
     for (size_t m = 0; m < sizeof names / sizeof *names; m++) {
         ebpo_mesh mesh = ebpo_test_make(names[m]);
         oracle *o = oracle_make(&mesh);
         for (int i = 0; i < 300; i++) {
             double p[3] = { some(&state, -1, 3), some(&state, -1, 3), some(&state, -1, 3) };
-            double d[3] = { some(&state, -1, 1), some(&state, -1, 1), some(&state, -1, 1) }, last = 0;
+            double d[3] = { some(&state, -1, 1), some(&state, -1, 1), some(&state, -1, 1) },
+                   last = 0;
             const oracle_hit *hits;
             uint32_t count;
             int32_t sum = oracle_winding(o, p);
@@ -288,13 +302,16 @@ START_TEST(rays_along_edges_and_through_vertices_meet_what_they_must)
         double first, last;
         int side; /* of the first */
     } rows[] = {
-        { { -1, 1, 2 }, { 1, 0, 0 }, INFINITY, 2, 1, 5, 1 },   /* through two faces */
-        { { -1, 1, 2 }, { 1, 0, 0 }, 1, 1, 1, 1, 1 },          /* up to the wall */
+        { { -1, 1, 2 }, { 1, 0, 0 }, INFINITY, 2, 1, 5, 1 }, /* through two faces */
+        { { -1, 1, 2 }, { 1, 0, 0 }, 1, 1, 1, 1, 1 },        /* up to the wall */
         { { -1, 1, 2 }, { 1, 0, 0 }, 0.999, 0, 0, 0, 0 },
-        { { 1, 3, 2 }, { 0.5, 0, 0 }, INFINITY, 1, 6, 6, -1 }, /* from inside; t counts directions */
-        { { -1, 0, 1 }, { 1, 0, 0 }, INFINITY, 4, 1, 5, 0 },   /* within the side y = 0: its two faces, and the edges of the two ends */
+        /* from inside; t counts directions */
+        { { 1, 3, 2 }, { 0.5, 0, 0 }, INFINITY, 1, 6, 6, -1 },
+        /* within the side y = 0: its two faces, and the edges of the two ends */
+        { { -1, 0, 1 }, { 1, 0, 0 }, INFINITY, 4, 1, 5, 0 },
         { { 5, 5, 5 }, { 1, 1, 1 }, INFINITY, 0, 0, 0, 0 },
-        { { 0, 0, 0 }, { 0, 0, 1e-300 }, 0, 6, 0, 0, 0 },      /* a point: the vertex has 6 faces or fewer */
+        /* a point: the vertex has 6 faces or fewer */
+        { { 0, 0, 0 }, { 0, 0, 1e-300 }, 0, 6, 0, 0, 0 },
     };
     ebpo_mesh mesh = box_mesh(0, 4, 1);
     oracle *o = oracle_make(&mesh);
@@ -371,7 +388,8 @@ START_TEST(boxes_agree_with_the_verifiers_clipping)
                 ebpo_corners face;
                 for (int c = 0; c < 3; c++)
                     ebpo_test_point(&mesh, mesh.faces[3 * (size_t)f + (size_t)c], face.at[c]);
-                bool meets = ebpo_exact_touches(low, high, &face), listed = at < count && faces[at] == f;
+                bool meets = ebpo_exact_touches(low, high, &face),
+                     listed = at < count && faces[at] == f;
                 ck_assert_int_eq(meets, listed);
                 at += listed;
                 met += meets;
@@ -392,8 +410,9 @@ START_TEST(flat_boxes_and_points_meet_what_they_touch)
         double low[3], high[3];
         uint32_t count;
     } rows[] = {
-        { { 4, 1, 2 }, { 4, 1, 2 }, 1 },     { { 1, 1, 1 }, { 3, 3, 3 }, 0 }, { { 4, 0, 0 }, { 4, 4, 4 }, 12 - 2 },
-        { { -1, 1, 2 }, { 5, 1, 2 }, 2 },    { { -9, -9, -9 }, { 9, 9, 9 }, 12 }, { { 4.5, 0, 0 }, { 5, 4, 4 }, 0 },
+        { { 4, 1, 2 }, { 4, 1, 2 }, 1 },      { { 1, 1, 1 }, { 3, 3, 3 }, 0 },
+        { { 4, 0, 0 }, { 4, 4, 4 }, 12 - 2 }, { { -1, 1, 2 }, { 5, 1, 2 }, 2 },
+        { { -9, -9, -9 }, { 9, 9, 9 }, 12 },  { { 4.5, 0, 0 }, { 5, 4, 4 }, 0 },
         { { 1, 2.5, 4 }, { 2, 3, 4 }, 1 },
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
@@ -418,7 +437,8 @@ int main(void)
     tcase_add_test(tests, distance_to_a_cube_is_that_of_the_formula);
     tcase_add_test(tests, faces_left_out_are_never_the_nearest);
     tcase_add_test(tests, scaled_models_have_scaled_distances);
-    tcase_add_loop_test(tests, winding_numbers_agree_with_the_librarys_predicates, 0, ebpo_test_solid_count);
+    tcase_add_loop_test(tests, winding_numbers_agree_with_the_librarys_predicates, 0,
+                        ebpo_test_solid_count);
     tcase_add_test(tests, hits_of_a_ray_from_inside_sum_up_to_the_winding_number);
     tcase_add_test(tests, rays_along_edges_and_through_vertices_meet_what_they_must);
     tcase_add_test(tests, points_of_hits_are_on_their_faces);

@@ -1,4 +1,5 @@
-/* Faces against cells, corner windings and selections, against plain twins that sample or enumerate. */
+/* Faces against cells, corner windings and selections, against plain twins that sample or
+ * enumerate. */
 #include <check.h>
 #include <math.h>
 #include <stdlib.h>
@@ -8,17 +9,20 @@
 #include "planes/planes.h"
 #include "solids.h"
 
-static const double shapes[][6] = {
-    { 0, 0, 0, 1, 1, 1 }, { -0.5, -0.5, -0.5, 1, 2, 0.001 }, { 1e7, -1e7, 3, 4, 8, 16 }, { 1e-30, 0, 0, 1e-30, 1e-30, 1e-30 }
-};
+static const double shapes[][6] = { { 0, 0, 0, 1, 1, 1 },
+                                    { -0.5, -0.5, -0.5, 1, 2, 0.001 },
+                                    { 1e7, -1e7, 3, 4, 8, 16 },
+                                    { 1e-30, 0, 0, 1e-30, 1e-30, 1e-30 } };
 
-/* Corners on a coarse grid around the box, so that touching walls, edges and corners exactly is common. */
+/* Corners on a coarse grid around the box, so that touching walls, edges and corners exactly is
+ * common. */
 static ebpo_triangle random_face(const ebpo_box *box, uint64_t *seed, bool on_grid)
 {
     ebpo_triangle t;
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++) {
-            double at = on_grid ? (double)(ebpo_test_random(seed) % 17) / 16 : ebpo_test_random_unit(seed);
+            double at =
+                on_grid ? (double)(ebpo_test_random(seed) % 17) / 16 : ebpo_test_random_unit(seed);
             t.corner[i][k] = box->origin[k] + at * box->size[k];
         }
     return t;
@@ -27,7 +31,8 @@ static ebpo_triangle random_face(const ebpo_box *box, uint64_t *seed, bool on_gr
 static void point_of(const ebpo_triangle *t, uint64_t *seed, double out[3])
 {
     /* Weights in 64ths: corners and edge points are common. */
-    int a = (int)(ebpo_test_random(seed) % 65), b = (int)(ebpo_test_random(seed) % (uint64_t)(65 - a));
+    int a = (int)(ebpo_test_random(seed) % 65),
+        b = (int)(ebpo_test_random(seed) % (uint64_t)(65 - a));
     for (int k = 0; k < 3; k++)
         out[k] = (a * t->corner[0][k] + b * t->corner[1][k] + (64 - a - b) * t->corner[2][k]) / 64;
 }
@@ -48,7 +53,8 @@ static ebpo_box box_of(int i, int grid_level)
 static bool clearly_in(const ebpo_box *box, ebpo_cell cell, const double p[3])
 {
     for (int k = 0; k < 3; k++) {
-        double low = ebpo_wall(box, k, cell.level, cell.at[k]), high = ebpo_wall(box, k, cell.level, cell.at[k] + 1);
+        double low = ebpo_wall(box, k, cell.level, cell.at[k]),
+               high = ebpo_wall(box, k, cell.level, cell.at[k] + 1);
         double margin = 1e-12 * (fabs(low) + fabs(high) + (high - low));
         if (p[k] < low + margin || p[k] > high - margin)
             return false;
@@ -74,7 +80,8 @@ START_TEST(no_octant_that_a_face_reaches_is_missed)
                         for (unsigned k = 0; k < 3; k++)
                             child.at[k] = cell.at[k] * 2 + (o >> k & 1);
                         if (clearly_in(&box, child, p)) {
-                            ck_assert_msg(mask >> o & 1, "octant %u missed at level %d", o, cell.level);
+                            ck_assert_msg(mask >> o & 1, "octant %u missed at level %d", o,
+                                          cell.level);
                             ck_assert(!ebpo_triangle_misses_cell(&box, child, &t));
                         }
                     }
@@ -127,7 +134,8 @@ START_TEST(clipped_face_bounds_every_point_of_it_in_the_cell)
                 for (int k = 0; k < 3; k++)
                     n[k] = 2 * ebpo_test_random_unit(&seed) - 1;
                 for (int q = 0; q < count; q++)
-                    best = fmax(best, n[0] * points[q][0] + n[1] * points[q][1] + n[2] * points[q][2]);
+                    best =
+                        fmax(best, n[0] * points[q][0] + n[1] * points[q][1] + n[2] * points[q][2]);
                 for (int k = 0; k < 3; k++) {
                     double low = ebpo_wall(&box, k, level, cell.at[k]);
                     value += n[k] * ((p[k] - low) / (box.size[k] / (1 << level)));
@@ -164,7 +172,8 @@ START_TEST(corner_windings_of_a_cube_in_a_cell_are_zero_and_inside_ones_are_one)
 END_TEST
 
 /* The slow twin: always the greatest removal, everything evaluated in every round. */
-static int plain_greedy(ebpo_polytope *envelope, const ebpo_candidate *c, int count, double epsilon, int most, uint32_t *codes)
+static int plain_greedy(ebpo_polytope *envelope, const ebpo_candidate *c, int count, double epsilon,
+                        int most, uint32_t *codes)
 {
     int taken = 0;
     while (taken < most) {
@@ -179,7 +188,8 @@ static int plain_greedy(ebpo_polytope *envelope, const ebpo_candidate *c, int co
                 continue;
             uint32_t code = ebpo_plane_code_make(c[i].normal, q);
             ebpo_plane_code_decode(code, v, &d);
-            double offset = ebpo_plane_as_double(v, d, n), gain = ebpo_polytope_removed(envelope, n, offset, 0, 0);
+            double offset = ebpo_plane_as_double(v, d, n),
+                   gain = ebpo_polytope_removed(envelope, n, offset, 0, 0);
             if (gain > best || (gain == best && code < best_code)) {
                 best = gain;
                 best_code = code;
@@ -204,17 +214,24 @@ START_TEST(lazy_greedy_takes_what_plain_greedy_takes)
     for (int round = 0; round < 400; round++) {
         ebpo_candidate c[40];
         for (int i = 0; i < 40; i++) {
-            double n[3] = { ebpo_test_random_unit(&seed) - 0.5, ebpo_test_random_unit(&seed) - 0.5, ebpo_test_random_unit(&seed) - 0.5 };
+            double n[3] = { ebpo_test_random_unit(&seed) - 0.5, ebpo_test_random_unit(&seed) - 0.5,
+                            ebpo_test_random_unit(&seed) - 0.5 };
             int32_t v[3], d;
             ck_assert(ebpo_plane_code_normal(n, &c[i].normal));
             ebpo_plane_code_decode(c[i].normal, v, &d);
-            c[i].support = 0.5 * (v[0] + v[1] + v[2]) + 511 * (0.15 + 0.3 * ebpo_test_random_unit(&seed));
+            c[i].support =
+                0.5 * (v[0] + v[1] + v[2]) + 511 * (0.15 + 0.3 * ebpo_test_random_unit(&seed));
         }
         ebpo_polytope fast, slow;
         ebpo_polytope_cube(&fast);
         ebpo_polytope_cube(&slow);
         uint32_t a[EBPO_PLANES_MAX], b[EBPO_PLANES_MAX];
-        int na = ebpo_select_greedy(&fast, &(ebpo_choice){ .candidates = c, .count = 40, .most = EBPO_PLANES_MAX, .epsilon = 0.002 }, a);
+        int na = ebpo_select_greedy(&fast,
+                                    &(ebpo_choice){ .candidates = c,
+                                                    .count = 40,
+                                                    .most = EBPO_PLANES_MAX,
+                                                    .epsilon = 0.002 },
+                                    a);
         int nb = plain_greedy(&slow, c, 40, 0.002, EBPO_PLANES_MAX, b);
         ck_assert_int_eq(na, nb);
         for (int i = 0; i < na; i++)

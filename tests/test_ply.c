@@ -39,7 +39,8 @@ static void text(bytes *b, const char *format, ...)
 }
 
 enum encoding { ASCII, LITTLE, BIG };
-static const char *const encoding_names[] = { "ascii", "binary_little_endian", "binary_big_endian" };
+static const char *const encoding_names[] = { "ascii", "binary_little_endian",
+                                              "binary_big_endian" };
 static const char *const format_names[] = { "ply-ascii", "ply-le", "ply-be" };
 
 static void put_ordered(bytes *b, enum encoding e, uint64_t raw, int width)
@@ -78,9 +79,11 @@ static void end_row(bytes *b, enum encoding e)
         text(b, "\n");
 }
 
-static const double corner[8][3] = { { 0.1, 0.2, 0.3 }, { 1.1, 0.2, 0.3 }, { 1.1, 1.2, 0.3 }, { 0.1, 1.2, 0.3 },
-                                     { 0.1, 0.2, 1.3 }, { 1.1, 0.2, 1.3 }, { 1.1, 1.2, 1.3 }, { 0.1, 1.2, 1.3 } };
-static const int side[6][4] = { { 0, 3, 2, 1 }, { 4, 5, 6, 7 }, { 0, 1, 5, 4 }, { 1, 2, 6, 5 }, { 2, 3, 7, 6 }, { 3, 0, 4, 7 } };
+static const double corner[8][3] = { { 0.1, 0.2, 0.3 }, { 1.1, 0.2, 0.3 }, { 1.1, 1.2, 0.3 },
+                                     { 0.1, 1.2, 0.3 }, { 0.1, 0.2, 1.3 }, { 1.1, 0.2, 1.3 },
+                                     { 1.1, 1.2, 1.3 }, { 0.1, 1.2, 1.3 } };
+static const int side[6][4] = { { 0, 3, 2, 1 }, { 4, 5, 6, 7 }, { 0, 1, 5, 4 },
+                                { 1, 2, 6, 5 }, { 2, 3, 7, 6 }, { 3, 0, 4, 7 } };
 
 static void cube_vertices(bytes *b, enum encoding e, int width)
 {
@@ -122,11 +125,18 @@ static void make_cube(bytes *b, enum encoding e, bool faces_first, int width, co
     const char *real_name = width == 4 ? "float32" : "float64";
     char vertex[300], face[200];
     b->size = 0;
-    snprintf(vertex, sizeof vertex, "element vertex 8%sproperty uint8 red%sproperty %s x%sproperty %s y%sproperty %s z%sproperty list ushort double w%s",
-             line_end, line_end, real_name, line_end, real_name, line_end, real_name, line_end, line_end);
-    snprintf(face, sizeof face, "element face 6%sproperty int32 flag%sproperty list uchar int16 vertex_index%s", line_end, line_end, line_end);
-    text(b, "ply%sformat %s 1.0%scomment element vertex 99%sobj_info made here%s", line_end, encoding_names[e], line_end, line_end, line_end);
-    text(b, "%selement edge 2%sproperty list char int ends%sproperty float weight%s%s", faces_first ? face : "", line_end, line_end, line_end, vertex);
+    snprintf(vertex, sizeof vertex,
+             "element vertex 8%sproperty uint8 red%sproperty %s x%sproperty %s y%sproperty %s "
+             "z%sproperty list ushort double w%s",
+             line_end, line_end, real_name, line_end, real_name, line_end, real_name, line_end,
+             line_end);
+    snprintf(face, sizeof face,
+             "element face 6%sproperty int32 flag%sproperty list uchar int16 vertex_index%s",
+             line_end, line_end, line_end);
+    text(b, "ply%sformat %s 1.0%scomment element vertex 99%sobj_info made here%s", line_end,
+         encoding_names[e], line_end, line_end, line_end);
+    text(b, "%selement edge 2%sproperty list char int ends%sproperty float weight%s%s",
+         faces_first ? face : "", line_end, line_end, line_end, vertex);
     text(b, "%send_header%s", faces_first ? "" : face, line_end);
     if (faces_first)
         cube_faces(b, e);
@@ -141,7 +151,8 @@ static ebpo_status parse(ebpo_mesh *mesh, const bytes *b, ebpo_error *error)
     /* A block of just this size, so that the sanitizer sees a read behind its end. */
     uint8_t *copy = malloc(b->size ? b->size : 1);
     memcpy(copy, b->data, b->size);
-    ebpo_status status = ebpo_ply_parse_memory(mesh, copy, b->size, "folder/made.ply", NULL, 0, NULL, error);
+    ebpo_status status =
+        ebpo_ply_parse_memory(mesh, copy, b->size, "folder/made.ply", NULL, 0, NULL, error);
     free(copy);
     return status;
 }
@@ -156,7 +167,8 @@ static ebpo_status parse_text(ebpo_mesh *mesh, const char *source, ebpo_error *e
 
 static void check_cube(const ebpo_mesh *mesh, int width)
 {
-    ck_assert(mesh->vertex_count == 8 && mesh->face_count == 12 && mesh->polygons_triangulated == 6);
+    ck_assert(mesh->vertex_count == 8 && mesh->face_count == 12 &&
+              mesh->polygons_triangulated == 6);
     ck_assert(mesh->polygons_concave == 0 && mesh->polygons_dropped == 0 && mesh->strips == 0);
     ck_assert(!mesh->xyz32 == (width == 8) && !mesh->xyz64 == (width == 4));
     for (int i = 0; i < 24; i++)
@@ -165,8 +177,9 @@ static void check_cube(const ebpo_mesh *mesh, int width)
         else
             ck_assert(mesh->xyz64[i] == corner[i / 3][i % 3]);
     for (int i = 0; i < 6; i++) {
-        const uint32_t expected[6] = { (uint32_t)side[i][0], (uint32_t)side[i][1], (uint32_t)side[i][2],
-                                       (uint32_t)side[i][0], (uint32_t)side[i][2], (uint32_t)side[i][3] };
+        const uint32_t expected[6] = { (uint32_t)side[i][0], (uint32_t)side[i][1],
+                                       (uint32_t)side[i][2], (uint32_t)side[i][0],
+                                       (uint32_t)side[i][2], (uint32_t)side[i][3] };
         ck_assert(memcmp(mesh->faces + 6 * i, expected, sizeof expected) == 0);
     }
 }
@@ -216,7 +229,10 @@ START_TEST(integer_coordinates_are_read_as_doubles)
     for (int e = 0; e < 3; e++) {
         ebpo_mesh mesh;
         b.size = 0;
-        text(&b, "ply\nformat %s 1.0\nelement vertex 3\nproperty %s x\nproperty %s y\nproperty float z\n", encoding_names[e], types[_i], types[_i]);
+        text(&b,
+             "ply\nformat %s 1.0\nelement vertex 3\nproperty %s x\nproperty %s y\nproperty float "
+             "z\n",
+             encoding_names[e], types[_i], types[_i]);
         text(&b, "element face 1\nproperty list uint uint vertex_indices\nend_header\n");
         for (int i = 0; i < 3; i++) {
             integer(&b, (enum encoding)e, value, widths[_i]);
@@ -227,13 +243,16 @@ START_TEST(integer_coordinates_are_read_as_doubles)
         for (int i = 0; i < 4; i++)
             integer(&b, (enum encoding)e, i ? i - 1 : 3, 4);
         ck_assert(parse(&mesh, &b, NULL) == EBPO_OK);
-        ck_assert(mesh.xyz64 && mesh.xyz64[0] == (double)value && mesh.xyz64[4] == 1 && mesh.xyz64[5] == (double)0.1f);
+        ck_assert(mesh.xyz64 && mesh.xyz64[0] == (double)value && mesh.xyz64[4] == 1 &&
+                  mesh.xyz64[5] == (double)0.1f);
         ebpo_mesh_free(&mesh);
     }
 }
 END_TEST
 
-#define POINTS(n) "ply\nformat ascii 1.0\nelement vertex " #n "\nproperty float x\nproperty float y\nproperty float z\n"
+#define POINTS(n)                               \
+    "ply\nformat ascii 1.0\nelement vertex " #n \
+    "\nproperty float x\nproperty float y\nproperty float z\n"
 #define FACES(n) "element face " #n "\nproperty list uchar int vertex_indices\nend_header\n"
 #define TRIANGLE POINTS(3) FACES(1) "0 0 0\n1 0 0\n0 1 0\n"
 
@@ -241,7 +260,8 @@ START_TEST(reader_passes_nan_and_infinity_through)
 {
     ebpo_mesh mesh;
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert(parse_text(&mesh, POINTS(3) FACES(1) "nan -inf 0\n1 Infinity 0\n0 1 0\n3 0 1 2\n", &error) == EBPO_OK);
+    ck_assert(parse_text(&mesh, POINTS(3) FACES(1) "nan -inf 0\n1 Infinity 0\n0 1 0\n3 0 1 2\n",
+                         &error) == EBPO_OK);
     ck_assert(mesh.xyz32[0] != mesh.xyz32[0] && mesh.xyz32[1] < -3e38f && mesh.xyz32[4] > 3e38f);
     ebpo_mesh_free(&mesh);
 }
@@ -250,7 +270,9 @@ END_TEST
 START_TEST(rows_may_be_broken_into_lines_and_short_faces_are_counted)
 {
     ebpo_mesh mesh;
-    ck_assert(parse_text(&mesh, POINTS(3) FACES(4) "0 0\n 0\n1 0 0\n\n0 1 0\n3 0\n1\n2\n2 0 1\n0\n1 2", NULL) == EBPO_OK);
+    ck_assert(parse_text(&mesh,
+                         POINTS(3) FACES(4) "0 0\n 0\n1 0 0\n\n0 1 0\n3 0\n1\n2\n2 0 1\n0\n1 2",
+                         NULL) == EBPO_OK);
     ck_assert(mesh.face_count == 1 && mesh.polygons_dropped == 3);
     ebpo_mesh_free(&mesh);
 }
@@ -259,8 +281,12 @@ END_TEST
 START_TEST(a_comment_without_its_word_is_allowed_before_the_first_element)
 {
     ebpo_mesh mesh;
-    ck_assert(parse_text(&mesh, "ply\nformat ascii 1.0\nCreated by hand\n" "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-                         FACES(1) "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", NULL) == EBPO_OK);
+    ck_assert(
+        parse_text(&mesh,
+                   "ply\nformat ascii 1.0\nCreated by hand\n"
+                   "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n" FACES(
+                       1) "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+                   NULL) == EBPO_OK);
     ebpo_mesh_free(&mesh);
 }
 END_TEST
@@ -270,8 +296,10 @@ END_TEST
 START_TEST(concave_faces_are_cut_by_ears)
 {
     ebpo_mesh mesh;
-    ck_assert(parse_text(&mesh, POINTS(4) FACES(1) "0 0 0\n1 0 0\n0.2 0.2 0\n0 1 0\n4 0 1 2 3\n", NULL) == EBPO_OK);
-    ck_assert(mesh.face_count == 2 && mesh.polygons_triangulated == 1 && mesh.polygons_concave == 1);
+    ck_assert(parse_text(&mesh, POINTS(4) FACES(1) "0 0 0\n1 0 0\n0.2 0.2 0\n0 1 0\n4 0 1 2 3\n",
+                         NULL) == EBPO_OK);
+    ck_assert(mesh.face_count == 2 && mesh.polygons_triangulated == 1 &&
+              mesh.polygons_concave == 1);
     for (int i = 0; i < 2; i++) { /* only the diagonal 0-2 lies inside */
         const uint32_t *f = mesh.faces + 3 * i;
         ck_assert((f[0] == 0 || f[1] == 0 || f[2] == 0) && (f[0] == 2 || f[1] == 2 || f[2] == 2));
@@ -280,7 +308,7 @@ START_TEST(concave_faces_are_cut_by_ears)
 }
 END_TEST
 
-#define STRIPS(n) "element tristrips " #n "\nproperty list int int vertex_indices\nend_header\n"
+#define STRIPS(n)   "element tristrips " #n "\nproperty list int int vertex_indices\nend_header\n"
 #define FIVE_POINTS "0 0 0\n1 0 0\n0 1 0\n1 1 0\n0 2 0\n"
 
 START_TEST(strips_alternate_restart_and_lose_their_glue)
@@ -288,8 +316,13 @@ START_TEST(strips_alternate_restart_and_lose_their_glue)
     ebpo_mesh mesh;
     const uint32_t expected[] = { 0, 1, 2, 2, 1, 3, 2, 3, 4, 1, 4, 3, 0, 3, 1 };
     ebpo_error error = EBPO_ERROR_INIT;
-    /* In the second strip a repeated vertex turns the parity: 1 4 3 3, then (3 3 0) and (3 0 1) follow. */
-    ck_assert_msg(parse_text(&mesh, POINTS(5) STRIPS(2) FIVE_POINTS "6 0 1 2 3 4 -1\n10 -1 -1 1 4 3 3 0 1 -1 2\n", &error) == EBPO_OK, "%s", error.message);
+    /* In the second strip a repeated vertex turns the parity: 1 4 3 3, then (3 3 0) and (3 0 1)
+     * follow. */
+    ck_assert_msg(parse_text(&mesh,
+                             POINTS(5) STRIPS(2) FIVE_POINTS
+                             "6 0 1 2 3 4 -1\n10 -1 -1 1 4 3 3 0 1 -1 2\n",
+                             &error) == EBPO_OK,
+                  "%s", error.message);
     ck_assert(mesh.strips == 2 && mesh.face_count == 5);
     ck_assert(memcmp(mesh.faces, expected, sizeof expected) == 0);
     ebpo_mesh_free(&mesh);
@@ -298,46 +331,80 @@ END_TEST
 
 /* --- messages --- */
 
-static const struct { const char *source; ebpo_status status; const char *message; } bad[] = {
+static const struct {
+    const char *source;
+    ebpo_status status;
+    const char *message;
+} bad[] = {
     { "", EBPO_E_FORMAT, "line 1: no PLY file" },
     { "plyx\n", EBPO_E_FORMAT, "line 1: no PLY file" },
     { "ply\nformat ascii 1.0\n", EBPO_E_FORMAT, "line 3: the file ends before 'end_header'" },
     { "ply\nformat ascii 2.0\n", EBPO_E_FORMAT, "line 2: unknown format version '2.0'" },
     { "ply\nformat text 1.0\n", EBPO_E_FORMAT, "line 2: unknown format 'text'" },
-    { "ply\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nend_header\n", EBPO_E_FORMAT, "no format was named" },
-    { "ply\nformat ascii 1.0\nelement vertex three\n", EBPO_E_FORMAT, "line 3: not a count: 'three'" },
-    { "ply\nformat ascii 1.0\nelement vertex 99999999999999999999\n", EBPO_E_FORMAT, "line 3: not a count" },
+    { "ply\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nend_header\n",
+      EBPO_E_FORMAT, "no format was named" },
+    { "ply\nformat ascii 1.0\nelement vertex three\n", EBPO_E_FORMAT,
+      "line 3: not a count: 'three'" },
+    { "ply\nformat ascii 1.0\nelement vertex 99999999999999999999\n", EBPO_E_FORMAT,
+      "line 3: not a count" },
     { "ply\nformat ascii 1.0\nelement vertex -3\n", EBPO_E_FORMAT, "line 3: not a count: '-3'" },
-    { "ply\nformat ascii 1.0\nproperty float x\n", EBPO_E_FORMAT, "line 3: no element stands before" },
-    { "ply\nformat ascii 1.0\nelement vertex 3\nproperty real x\n", EBPO_E_FORMAT, "line 4: unknown type 'real'" },
-    { "ply\nformat ascii 1.0\nelement vertex 3\nproperty list float int x\n", EBPO_E_FORMAT, "line 4: no type for a list's length: 'float'" },
-    { "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float x\n", EBPO_E_FORMAT, "line 5: a second property 'x'" },
-    { "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nelement vertex 3\n", EBPO_E_FORMAT, "line 5: a second element 'vertex'" },
-    { "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nend_header\n", EBPO_E_FORMAT, "line 3: this element has no property 'z'" },
-    { "ply\nformat ascii 1.0\nelement vertex 3\npropertie float x\n", EBPO_E_FORMAT, "line 4: unknown statement 'propertie'" },
-    { POINTS(3) "element face 1\nproperty list uchar float vertex_indices\n", EBPO_E_FORMAT, "line 8: no type for vertex numbers: 'float'" },
-    { POINTS(3) "element face 1\nproperty list uchar int corners\nend_header\n", EBPO_E_FORMAT, "line 7: this element has no list 'vertex_indices'" },
-    { "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n", EBPO_E_FORMAT, "no element 'vertex'" },
-    { POINTS(3) "end_header\n0 0 0\n1 0 0\n0 1 0\n", EBPO_E_FORMAT, "3 vertices but no faces: a point cloud" },
-    { POINTS(3) FACES(0) "0 0 0\n1 0 0\n0 1 0\n", EBPO_E_FORMAT, "3 vertices but no faces: a point cloud" },
-    { POINTS(1000000000000) FACES(1) "0 0 0\n", EBPO_E_FORMAT, "line 3: 1000000000000 rows of element 'vertex' do not fit into the rest of the file" },
-    { POINTS(10000000000000000000) FACES(1) "0 0 0\n", EBPO_E_FORMAT, "do not fit into the rest of the file" },
-    { POINTS(3) FACES(1000000000) "0 0 0\n0 0 0\n0 0 0\n", EBPO_E_FORMAT, "line 7: 1000000000 rows of element 'face'" },
-    { TRIANGLE "3 0 1 3\n", EBPO_E_FORMAT, "made.ply: line 13: face 0 names vertex 3, but there are 3 vertices; repair the file or drop the face" },
+    { "ply\nformat ascii 1.0\nproperty float x\n", EBPO_E_FORMAT,
+      "line 3: no element stands before" },
+    { "ply\nformat ascii 1.0\nelement vertex 3\nproperty real x\n", EBPO_E_FORMAT,
+      "line 4: unknown type 'real'" },
+    { "ply\nformat ascii 1.0\nelement vertex 3\nproperty list float int x\n", EBPO_E_FORMAT,
+      "line 4: no type for a list's length: 'float'" },
+    { "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float x\n",
+      EBPO_E_FORMAT, "line 5: a second property 'x'" },
+    { "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nelement vertex 3\n",
+      EBPO_E_FORMAT, "line 5: a second element 'vertex'" },
+    { "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nend_header\n",
+      EBPO_E_FORMAT, "line 3: this element has no property 'z'" },
+    { "ply\nformat ascii 1.0\nelement vertex 3\npropertie float x\n", EBPO_E_FORMAT,
+      "line 4: unknown statement 'propertie'" },
+    { POINTS(3) "element face 1\nproperty list uchar float vertex_indices\n", EBPO_E_FORMAT,
+      "line 8: no type for vertex numbers: 'float'" },
+    { POINTS(3) "element face 1\nproperty list uchar int corners\nend_header\n", EBPO_E_FORMAT,
+      "line 7: this element has no list 'vertex_indices'" },
+    { "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n",
+      EBPO_E_FORMAT, "no element 'vertex'" },
+    { POINTS(3) "end_header\n0 0 0\n1 0 0\n0 1 0\n", EBPO_E_FORMAT,
+      "3 vertices but no faces: a point cloud" },
+    { POINTS(3) FACES(0) "0 0 0\n1 0 0\n0 1 0\n", EBPO_E_FORMAT,
+      "3 vertices but no faces: a point cloud" },
+    { POINTS(1000000000000) FACES(1) "0 0 0\n", EBPO_E_FORMAT,
+      "line 3: 1000000000000 rows of element 'vertex' do not fit into the rest of the file" },
+    { POINTS(10000000000000000000) FACES(1) "0 0 0\n", EBPO_E_FORMAT,
+      "do not fit into the rest of the file" },
+    { POINTS(3) FACES(1000000000) "0 0 0\n0 0 0\n0 0 0\n", EBPO_E_FORMAT,
+      "line 7: 1000000000 rows of element 'face'" },
+    { TRIANGLE "3 0 1 3\n", EBPO_E_FORMAT,
+      "made.ply: line 13: face 0 names vertex 3, but there are 3 vertices; repair the file or drop "
+      "the face" },
     { TRIANGLE "3 0 -1 2\n", EBPO_E_FORMAT, "line 13: face 0 names vertex -1" },
-    { TRIANGLE "3 0 1 9999999999999999999\n", EBPO_E_FORMAT, "line 13: no whole number: '9999999999999999999' in face 0" },
+    { TRIANGLE "3 0 1 9999999999999999999\n", EBPO_E_FORMAT,
+      "line 13: no whole number: '9999999999999999999' in face 0" },
     { TRIANGLE "3 0 1 2.0\n", EBPO_E_FORMAT, "line 13: no whole number: '2.0' in face 0" },
-    { TRIANGLE "3 0 1 2 0\n", EBPO_E_FORMAT, "line 13: a value more than the header describes: '0' in face 0" },
-    { TRIANGLE "3 0 1", EBPO_E_FORMAT, "line 13: face 0 has a list of 3 items, more than the rest" },
+    { TRIANGLE "3 0 1 2 0\n", EBPO_E_FORMAT,
+      "line 13: a value more than the header describes: '0' in face 0" },
+    { TRIANGLE "3 0 1", EBPO_E_FORMAT,
+      "line 13: face 0 has a list of 3 items, more than the rest" },
     { TRIANGLE "-3 0 1 2\n", EBPO_E_FORMAT, "line 13: face 0 has a list of -3 items" },
-    { TRIANGLE "200000000 0 1 2\n", EBPO_E_FORMAT, "line 13: face 0 has a list of 200000000 items, more than the rest" },
+    { TRIANGLE "200000000 0 1 2\n", EBPO_E_FORMAT,
+      "line 13: face 0 has a list of 200000000 items, more than the rest" },
     { TRIANGLE "2 0 1 \n", EBPO_E_FORMAT, "none of its faces has three corners" },
-    { POINTS(3) FACES(1) "0 0 0\n1 zero 0\n0 1 0\n3 0 1 2\n", EBPO_E_FORMAT, "line 11: no number: 'zero' in vertex 1" },
-    { POINTS(3) FACES(1) "0 0 0\n1 0x1p3 0\n0 1 0\n3 0 1 2\n", EBPO_E_FORMAT, "line 11: no number: '0x1p3' in vertex 1" },
-    { POINTS(3) FACES(1) "0 0 0\n1 0,5 0\n0 1 0\n3 0 1 2\n", EBPO_E_FORMAT, "line 11: no number: '0,5' in vertex 1" },
-    { POINTS(3) FACES(1) "0 0 0\n1 0 0 0\n0 1 0\n3 0 1 2\n", EBPO_E_FORMAT, "line 11: a value more than the header describes: '0' in vertex 1" },
-    { POINTS(3) FACES(1) "0.00000 0.0000 0.0000\n1.000000 0\n", EBPO_E_FORMAT, "line 12: the file ends after 187 bytes within row 1 of the 3 of element 'vertex'" },
-    { POINTS(5) STRIPS(1) FIVE_POINTS "4 0 1 2 5\n", EBPO_E_FORMAT, "line 15: strip 0 names vertex 5" },
+    { POINTS(3) FACES(1) "0 0 0\n1 zero 0\n0 1 0\n3 0 1 2\n", EBPO_E_FORMAT,
+      "line 11: no number: 'zero' in vertex 1" },
+    { POINTS(3) FACES(1) "0 0 0\n1 0x1p3 0\n0 1 0\n3 0 1 2\n", EBPO_E_FORMAT,
+      "line 11: no number: '0x1p3' in vertex 1" },
+    { POINTS(3) FACES(1) "0 0 0\n1 0,5 0\n0 1 0\n3 0 1 2\n", EBPO_E_FORMAT,
+      "line 11: no number: '0,5' in vertex 1" },
+    { POINTS(3) FACES(1) "0 0 0\n1 0 0 0\n0 1 0\n3 0 1 2\n", EBPO_E_FORMAT,
+      "line 11: a value more than the header describes: '0' in vertex 1" },
+    { POINTS(3) FACES(1) "0.00000 0.0000 0.0000\n1.000000 0\n", EBPO_E_FORMAT,
+      "line 12: the file ends after 187 bytes within row 1 of the 3 of element 'vertex'" },
+    { POINTS(5) STRIPS(1) FIVE_POINTS "4 0 1 2 5\n", EBPO_E_FORMAT,
+      "line 15: strip 0 names vertex 5" },
 };
 
 START_TEST(reader_says_what_is_wrong_and_where)
@@ -346,7 +413,8 @@ START_TEST(reader_says_what_is_wrong_and_where)
     ebpo_error error = EBPO_ERROR_INIT;
     memset(&mesh, 1, sizeof mesh);
     ck_assert_int_eq(parse_text(&mesh, bad[_i].source, &error), bad[_i].status);
-    ck_assert_msg(strstr(error.message, bad[_i].message) != NULL, "'%s' is not in '%s'", bad[_i].message, error.message);
+    ck_assert_msg(strstr(error.message, bad[_i].message) != NULL, "'%s' is not in '%s'",
+                  bad[_i].message, error.message);
     ck_assert(error.status == bad[_i].status && !mesh.faces && !mesh.xyz32 && !mesh.vertex_count);
 }
 END_TEST
@@ -358,11 +426,14 @@ START_TEST(binary_index_out_of_range_is_named_with_face_and_byte)
     ebpo_error error = EBPO_ERROR_INIT;
     make_cube(&b, LITTLE, false, 4, "\n");
     size_t row = 4 + 1 + 4 * 2, begin = b.size - 6 * row; /* of the faces */
-    b.data[begin + 2 * row + 4 + 1 + 2 * 3] = 8; /* last corner of face 2 */
+    b.data[begin + 2 * row + 4 + 1 + 2 * 3] = 8;          /* last corner of face 2 */
     char expected[100];
-    snprintf(expected, sizeof expected, "made.ply: byte %zu: face 2 names vertex 8, but there are 8 vertices", begin + 2 * row + 11);
+    snprintf(expected, sizeof expected,
+             "made.ply: byte %zu: face 2 names vertex 8, but there are 8 vertices",
+             begin + 2 * row + 11);
     ck_assert(parse(&mesh, &b, &error) == EBPO_E_FORMAT);
-    ck_assert_msg(strstr(error.message, expected) != NULL, "'%s' is not in '%s'", expected, error.message);
+    ck_assert_msg(strstr(error.message, expected) != NULL, "'%s' is not in '%s'", expected,
+                  error.message);
 }
 END_TEST
 
@@ -374,7 +445,8 @@ START_TEST(a_header_longer_than_a_megabyte_is_refused)
     memcpy(data, "ply\nformat ascii 1.0\n", 21);
     ebpo_mesh mesh;
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert(ebpo_ply_parse_memory(&mesh, data, size, "x", NULL, 0, NULL, &error) == EBPO_E_FORMAT);
+    ck_assert(ebpo_ply_parse_memory(&mesh, data, size, "x", NULL, 0, NULL, &error) ==
+              EBPO_E_FORMAT);
     ck_assert(strstr(error.message, "a megabyte of header") != NULL);
     free(data);
 }
@@ -390,7 +462,8 @@ START_TEST(a_file_cut_at_any_byte_is_refused)
         ebpo_error error = EBPO_ERROR_INIT;
         b.size = n;
         ebpo_status status = parse(&mesh, &b, &error);
-        if (status == EBPO_OK) /* ascii: nothing but blanks and digits of the last value may be missing */
+        if (status ==
+            EBPO_OK) /* ascii: nothing but blanks and digits of the last value may be missing */
             ck_assert(_i % 3 == ASCII && n + 2 + (_i == 3 ? 2 : 0) >= whole);
         else
             ck_assert(status == EBPO_E_FORMAT && error.message[0] && !mesh.faces);
@@ -405,7 +478,8 @@ static ebpo_status parse_points(double **xyz, uint64_t *count, const bytes *b, e
 {
     uint8_t *copy = malloc(b->size ? b->size : 1);
     memcpy(copy, b->data, b->size);
-    ebpo_status status = ebpo_points_parse_ply(xyz, count, copy, b->size, "folder/points.ply", error);
+    ebpo_status status =
+        ebpo_points_parse_ply(xyz, count, copy, b->size, "folder/points.ply", error);
     free(copy);
     return status;
 }
@@ -421,14 +495,16 @@ START_TEST(points_are_the_vertices_of_any_dialect_widened)
     ck_assert_msg(parse_points(&xyz, &count, &b, &error) == EBPO_OK, "%s", error.message);
     ck_assert(count == 8);
     for (int i = 0; i < 24; i++)
-        ck_assert(xyz[i] == (width == 4 ? (double)(float)corner[i / 3][i % 3] : corner[i / 3][i % 3]));
+        ck_assert(xyz[i] ==
+                  (width == 4 ? (double)(float)corner[i / 3][i % 3] : corner[i / 3][i % 3]));
     free(xyz);
 }
 END_TEST
 
 START_TEST(points_need_no_faces_and_faces_behind_them_are_not_looked_at)
 {
-    static const char *const sources[] = { POINTS(2) "end_header\n0 0 0\n1 2.5 nan\n", POINTS(2) FACES(1) "0 0 0\n1 2.5 inf\n3 0 1 99\n" };
+    static const char *const sources[] = { POINTS(2) "end_header\n0 0 0\n1 2.5 nan\n",
+                                           POINTS(2) FACES(1) "0 0 0\n1 2.5 inf\n3 0 1 99\n" };
     static bytes b;
     for (int i = 0; i < 2; i++) {
         double *xyz;
@@ -451,7 +527,8 @@ START_TEST(points_that_are_damaged_are_refused_with_their_place)
     b.size = 0;
     text(&b, POINTS(2) "end_header\n0 0 0\n1 x 0\n");
     ck_assert(parse_points(&xyz, &count, &b, &error) == EBPO_E_FORMAT && !xyz && !count);
-    ck_assert_msg(strstr(error.message, "points.ply: line 9: no number: 'x' in vertex 1") != NULL, "%s", error.message);
+    ck_assert_msg(strstr(error.message, "points.ply: line 9: no number: 'x' in vertex 1") != NULL,
+                  "%s", error.message);
     make_cube(&b, LITTLE, true, 4, "\n");
     for (size_t whole = b.size, n = 0; n < whole; n++) {
         b.size = n;
@@ -473,7 +550,8 @@ START_TEST(reader_stops_on_request)
     ebpo_mesh mesh;
     const ebpo_progress progress = { refuse, NULL };
     make_cube(&b, BIG, true, 4, "\n");
-    ck_assert(ebpo_ply_parse_memory(&mesh, b.data, b.size, "x", NULL, 0, &progress, NULL) == EBPO_E_CANCELLED);
+    ck_assert(ebpo_ply_parse_memory(&mesh, b.data, b.size, "x", NULL, 0, &progress, NULL) ==
+              EBPO_E_CANCELLED);
     ck_assert(!mesh.faces);
 }
 END_TEST
@@ -481,7 +559,18 @@ END_TEST
 /* --- rows on all cores --- */
 
 /* What one row of many does otherwise. */
-enum deviation { TRIANGLES, QUAD, TWO_CORNERS, NO_CORNERS, BAD_INDEX, NEGATIVE_INDEX, LONG_LIST, CUT, FEW_VERTICES, DEVIATIONS };
+enum deviation {
+    TRIANGLES,
+    QUAD,
+    TWO_CORNERS,
+    NO_CORNERS,
+    BAD_INDEX,
+    NEGATIVE_INDEX,
+    LONG_LIST,
+    CUT,
+    FEW_VERTICES,
+    DEVIATIONS
+};
 
 enum { MANY_VERTICES = 40000, MANY_FACES = 90000 };
 
@@ -494,14 +583,19 @@ static uint8_t *put_raw(uint8_t *to, enum encoding e, uint64_t raw, int width)
 }
 
 /* `second_list`: faces have another list, empty, which makes the reader go row by row. */
-static uint8_t *make_many(size_t *size, enum encoding e, enum deviation what, uint64_t at, bool second_list)
+static uint8_t *make_many(size_t *size, enum encoding e, enum deviation what, uint64_t at,
+                          bool second_list)
 {
     static bytes b;
     uint8_t *file = malloc(MANY_VERTICES * 13 + MANY_FACES * 40);
     uint64_t state = 3;
     b.size = 0;
-    text(&b, "ply\nformat %s 1.0\nelement vertex %d\nproperty float x\nproperty uchar shade\nproperty float y\nproperty float z\nelement face %d\nproperty ushort tag\n"
-         "property list uchar int vertex_indices\n%s", encoding_names[e], what == FEW_VERTICES ? 0 : MANY_VERTICES, MANY_FACES, second_list ? "property list uchar float more\n" : "");
+    text(&b,
+         "ply\nformat %s 1.0\nelement vertex %d\nproperty float x\nproperty uchar shade\nproperty "
+         "float y\nproperty float z\nelement face %d\nproperty ushort tag\n"
+         "property list uchar int vertex_indices\n%s",
+         encoding_names[e], what == FEW_VERTICES ? 0 : MANY_VERTICES, MANY_FACES,
+         second_list ? "property list uchar float more\n" : "");
     text(&b, "property uchar last\nend_header\n");
     memcpy(file, b.data, b.size);
     *size = b.size;
@@ -513,12 +607,21 @@ static uint8_t *make_many(size_t *size, enum encoding e, enum deviation what, ui
         to = put_raw(to, e, ebpo_test_random(&state) & 0xffffffff, 4);
     }
     for (uint64_t f = 0; f < MANY_FACES; f++) {
-        int count = f != at ? 3 : what == QUAD ? 4 : what == TWO_CORNERS ? 2 : what == NO_CORNERS ? 0 : 3;
+        int count = f != at               ? 3
+                    : what == QUAD        ? 4
+                    : what == TWO_CORNERS ? 2
+                    : what == NO_CORNERS  ? 0
+                                          : 3;
         uint8_t *row = to;
         to = put_raw(to, e, f & 65535, 2);
         to = put_raw(to, e, f == at && what == LONG_LIST ? 255 : (uint64_t)count, 1);
         for (int k = 0; k < count; k++)
-            to = put_raw(to, e, f == at && k == 1 && what == BAD_INDEX ? MANY_VERTICES : f == at && k == 1 && what == NEGATIVE_INDEX ? UINT32_MAX : ebpo_test_random(&state) % MANY_VERTICES, 4);
+            to = put_raw(to, e,
+                         f == at && k == 1 && what == BAD_INDEX ? MANY_VERTICES
+                         : f == at && k == 1 && what == NEGATIVE_INDEX
+                             ? UINT32_MAX
+                             : ebpo_test_random(&state) % MANY_VERTICES,
+                         4);
         if (second_list)
             to = put_raw(to, e, 0, 1);
         to = put_raw(to, e, 9, 1);
@@ -546,15 +649,19 @@ START_TEST(rows_on_all_cores_read_as_row_by_row)
     enum deviation what = (enum deviation)(_i / 5);
     for (enum encoding e = LITTLE; e <= BIG; e = (enum encoding)(e + 1)) {
         size_t size, twin_size;
-        uint8_t *file = make_many(&size, e, what, places[_i % 5], false), *twin_file = make_many(&twin_size, e, what, places[_i % 5], true);
+        uint8_t *file = make_many(&size, e, what, places[_i % 5], false),
+                *twin_file = make_many(&twin_size, e, what, places[_i % 5], true);
         ebpo_mesh m, twin;
         ebpo_error error = EBPO_ERROR_INIT, twin_error = EBPO_ERROR_INIT;
-        ebpo_status status = ebpo_ply_parse_memory(&m, file, size, "x", NULL, 3, NULL, &error), wanted = ebpo_ply_parse_memory(&twin, twin_file, twin_size, "x", NULL, 1, NULL, &twin_error);
+        ebpo_status status = ebpo_ply_parse_memory(&m, file, size, "x", NULL, 3, NULL, &error),
+                    wanted = ebpo_ply_parse_memory(&twin, twin_file, twin_size, "x", NULL, 1, NULL,
+                                                   &twin_error);
         ck_assert_int_eq(status, wanted);
         ck_assert_uint_eq(m.vertex_count, twin.vertex_count);
         ck_assert_uint_eq(m.face_count, twin.face_count);
         if (status == EBPO_OK) {
-            ck_assert(m.polygons_dropped == twin.polygons_dropped && m.polygons_triangulated == twin.polygons_triangulated);
+            ck_assert(m.polygons_dropped == twin.polygons_dropped &&
+                      m.polygons_triangulated == twin.polygons_triangulated);
             ck_assert(memcmp(m.xyz32, twin.xyz32, (size_t)m.vertex_count * 12) == 0);
             ck_assert(memcmp(m.faces, twin.faces, (size_t)m.face_count * 12) == 0);
         } else {
@@ -649,20 +756,30 @@ START_TEST(reading_what_is_no_model_file_says_so)
     ebpo_error error = EBPO_ERROR_INIT;
     ck_assert(ebpo_mesh_read(&mesh, "/nowhere/at.ply", NULL, &error) == EBPO_E_IO);
     ck_assert(strstr(error.message, "/nowhere/at.ply") != NULL);
-    ck_assert(ebpo_mesh_read(&mesh, "/tmp", NULL, &error) == EBPO_E_IO && strstr(error.message, "is a folder") != NULL);
+    ck_assert(ebpo_mesh_read(&mesh, "/tmp", NULL, &error) == EBPO_E_IO &&
+              strstr(error.message, "is a folder") != NULL);
     ck_assert(ebpo_mesh_read(&mesh, "/dev/null", NULL, &error) == EBPO_E_IO);
 }
 END_TEST
 
 /* --- real models --- */
 
-static const struct { const char *name; uint64_t vertices, faces; } wild[] = {
-    { "buddha_le_trailing_bytes.ply", 29609, 51414 }, { "bunny_ascii.ply", 35947, 69451 },
-    { "cycloidal_le_vertex_and_face_colours.ply", 21384, 43368 }, { "dragon100k_le_normals_flags.ply", 50000, 100000 },
-    { "dragon_res3_ascii.ply", 22998, 47794 }, { "elephant_le_tristrips_restart.ply", 19753, 39290 },
-    { "igea_le_tristrips.ply", 134345, 268686 }, { "screwdriver_bigendian_confidence.ply", 6789, 13574 },
-    { "sphere_ascii_double.ply", 162, 320 }, { "suzanne_ascii_quads_normals_uv.ply", 1966, 968 },
-    { "tetra_ascii_double_normals_colours_edges.ply", 4, 4 }, { "wuson_ascii_split.ply", 11184, 3732 },
+static const struct {
+    const char *name;
+    uint64_t vertices, faces;
+} wild[] = {
+    { "buddha_le_trailing_bytes.ply", 29609, 51414 },
+    { "bunny_ascii.ply", 35947, 69451 },
+    { "cycloidal_le_vertex_and_face_colours.ply", 21384, 43368 },
+    { "dragon100k_le_normals_flags.ply", 50000, 100000 },
+    { "dragon_res3_ascii.ply", 22998, 47794 },
+    { "elephant_le_tristrips_restart.ply", 19753, 39290 },
+    { "igea_le_tristrips.ply", 134345, 268686 },
+    { "screwdriver_bigendian_confidence.ply", 6789, 13574 },
+    { "sphere_ascii_double.ply", 162, 320 },
+    { "suzanne_ascii_quads_normals_uv.ply", 1966, 968 },
+    { "tetra_ascii_double_normals_colours_edges.ply", 4, 4 },
+    { "wuson_ascii_split.ply", 11184, 3732 },
 };
 
 static bool read_model(ebpo_mesh *mesh, const char *name, ebpo_status expected, ebpo_error *error)
@@ -672,7 +789,8 @@ static bool read_model(ebpo_mesh *mesh, const char *name, ebpo_status expected, 
     snprintf(path, sizeof path, "%s/%s", models ? models : "", name);
     if (!models || access(path, R_OK) != 0)
         return false;
-    ck_assert_msg(ebpo_mesh_read(mesh, path, NULL, error) == expected, "%s: %s", path, error->message);
+    ck_assert_msg(ebpo_mesh_read(mesh, path, NULL, error) == expected, "%s: %s", path,
+                  error->message);
     return true;
 }
 
@@ -685,7 +803,8 @@ START_TEST(wild_files_are_read_whole)
     if (!read_model(&mesh, name, EBPO_OK, &error))
         return;
     ck_assert_msg(mesh.vertex_count == wild[_i].vertices && mesh.face_count == wild[_i].faces,
-                  "%s: %" PRIu64 " vertices, %" PRIu64 " faces", name, mesh.vertex_count, mesh.face_count);
+                  "%s: %" PRIu64 " vertices, %" PRIu64 " faces", name, mesh.vertex_count,
+                  mesh.face_count);
     ebpo_mesh_free(&mesh);
 }
 END_TEST
@@ -695,7 +814,8 @@ START_TEST(truncated_point_cloud_is_refused_with_its_place)
     ebpo_mesh mesh;
     ebpo_error error = EBPO_ERROR_INIT;
     if (read_model(&mesh, "wild/pond_truncated_points.ply", EBPO_E_FORMAT, &error))
-        ck_assert(strstr(error.message, "byte 2171788") && strstr(error.message, "row 70048 of the 70051 of element 'vertex'"));
+        ck_assert(strstr(error.message, "byte 2171788") &&
+                  strstr(error.message, "row 70048 of the 70051 of element 'vertex'"));
 }
 END_TEST
 
@@ -708,7 +828,8 @@ START_TEST(igea_in_strips_is_igea_in_triangles)
     if (read_model(&triangles, "igea.ply", EBPO_OK, &error)) {
         ck_assert(memcmp(strips.xyz32, triangles.xyz32, strips.vertex_count * 12) == 0);
         ck_assert(strips.face_count == triangles.face_count && strips.strips == 35048);
-        for (uint64_t i = 0; i < strips.face_count; i++) { /* the same faces in the same order, up to rotation */
+        for (uint64_t i = 0; i < strips.face_count;
+             i++) { /* the same faces in the same order, up to rotation */
             const uint32_t *a = strips.faces + 3 * i, *b = triangles.faces + 3 * i;
             int turn = b[0] == a[0] ? 0 : b[1] == a[0] ? 1 : 2;
             ck_assert(a[0] == b[turn] && a[1] == b[(turn + 1) % 3] && a[2] == b[(turn + 2) % 3]);
@@ -734,7 +855,8 @@ int main(void)
     tcase_add_test(tests, a_comment_without_its_word_is_allowed_before_the_first_element);
     tcase_add_test(tests, concave_faces_are_cut_by_ears);
     tcase_add_test(tests, strips_alternate_restart_and_lose_their_glue);
-    tcase_add_loop_test(tests, reader_says_what_is_wrong_and_where, 0, (int)(sizeof bad / sizeof *bad));
+    tcase_add_loop_test(tests, reader_says_what_is_wrong_and_where, 0,
+                        (int)(sizeof bad / sizeof *bad));
     tcase_add_test(tests, binary_index_out_of_range_is_named_with_face_and_byte);
     tcase_add_test(tests, a_header_longer_than_a_megabyte_is_refused);
     tcase_add_loop_test(tests, a_file_cut_at_any_byte_is_refused, 0, 6);

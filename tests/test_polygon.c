@@ -40,9 +40,11 @@ static ebpo_polygon_kind cut(int axis, bool mirrored)
         corner[i][(axis + 2) % 3] = s.at[from][1];
     }
     void *scratch = malloc(ebpo_polygon_scratch_bytes(s.n));
-    ebpo_polygon_kind kind = ebpo_polygon_triangulate(s.triangle, (const double (*)[3])corner, s.n, scratch);
+    ebpo_polygon_kind kind =
+        ebpo_polygon_triangulate(s.triangle, (const double(*)[3])corner, s.n, scratch);
     free(scratch);
-    for (uint32_t i = 0; mirrored && i + 2 < s.n; i++) /* back to the numbers of the shape, as it turns */
+    for (uint32_t i = 0; mirrored && i + 2 < s.n;
+         i++) /* back to the numbers of the shape, as it turns */
         for (int k = 0; k < 3; k++)
             s.triangle[i][k] = s.n - 1 - s.triangle[i][k];
     return kind;
@@ -54,11 +56,13 @@ static void check_cover(bool mirrored)
     for (uint32_t i = 1; i + 1 < s.n; i++)
         expected += twice_area(s.at[0], s.at[i], s.at[i + 1]);
     for (uint32_t i = 0; i + 2 < s.n; i++) {
-        const double *a = s.at[s.triangle[i][0]], *b = s.at[s.triangle[i][1]], *c = s.at[s.triangle[i][2]];
+        const double *a = s.at[s.triangle[i][0]], *b = s.at[s.triangle[i][1]],
+                     *c = s.at[s.triangle[i][2]];
         ck_assert_int_eq(ebpo_orient2d(a, b, c), mirrored ? -1 : 1);
         sum += fabs(twice_area(a, b, c));
     }
-    ck_assert_msg(fabs(sum - expected) <= 1e-9 * expected, "triangles cover %g of %g", sum, expected);
+    ck_assert_msg(fabs(sum - expected) <= 1e-9 * expected, "triangles cover %g of %g", sum,
+                  expected);
 }
 
 static void check_shape(ebpo_polygon_kind kind)
@@ -86,7 +90,8 @@ END_TEST
 
 START_TEST(straight_corners_make_no_triangle_without_area)
 {
-    static const double at[][2] = { { 0, 0 }, { 1, 0 }, { 2, 0 }, { 3, 0 }, { 3, 1 }, { 3, 2 }, { 0, 2 }, { 0, 1 } };
+    static const double at[][2] = { { 0, 0 }, { 1, 0 }, { 2, 0 }, { 3, 0 },
+                                    { 3, 1 }, { 3, 2 }, { 0, 2 }, { 0, 1 } };
     shape_of(at, 8);
     check_shape(EBPO_POLYGON_FLAT);
 }
@@ -95,9 +100,12 @@ END_TEST
 START_TEST(concave_shapes_are_covered)
 {
     static const double arrow[][2] = { { 0, 0 }, { 2, 0 }, { 0.5, 0.5 }, { 0, 2 } };
-    static const double comb[][2] = { { 0, 0 }, { 7, 0 }, { 7, 3 }, { 6, 3 }, { 6, 1 }, { 5, 1 }, { 5, 3 }, { 4, 3 }, { 4, 1 }, { 3, 1 }, { 3, 3 },
-                                      { 2, 3 }, { 2, 1 }, { 1, 1 }, { 1, 3 }, { 0, 3 } };
-    static const double slit[][2] = { { 0, 0 }, { 4, 0 }, { 4, 4 }, { 0, 4 }, { 0, 0 }, { 1, 1 }, { 1, 3 }, { 3, 3 }, { 3, 1 }, { 1, 1 } }; /* a square with a hole */
+    static const double comb[][2] = { { 0, 0 }, { 7, 0 }, { 7, 3 }, { 6, 3 }, { 6, 1 }, { 5, 1 },
+                                      { 5, 3 }, { 4, 3 }, { 4, 1 }, { 3, 1 }, { 3, 3 }, { 2, 3 },
+                                      { 2, 1 }, { 1, 1 }, { 1, 3 }, { 0, 3 } };
+    /* a square with a hole */
+    static const double slit[][2] = { { 0, 0 }, { 4, 0 }, { 4, 4 }, { 0, 4 }, { 0, 0 },
+                                      { 1, 1 }, { 1, 3 }, { 3, 3 }, { 3, 1 }, { 1, 1 } };
     shape_of(arrow, 4);
     check_shape(EBPO_POLYGON_CONCAVE);
     shape_of(comb, 16);
@@ -133,7 +141,8 @@ static void check_fan(const double (*at)[2], uint32_t n)
 
 START_TEST(polygons_without_an_answer_become_fans)
 {
-    static const double line[][2] = { { 0, 0 }, { 1, 1 }, { 2, 2 }, { 3, 3 } }, point[][2] = { { 1, 1 }, { 1, 1 }, { 1, 1 }, { 1, 1 } };
+    static const double line[][2] = { { 0, 0 }, { 1, 1 }, { 2, 2 }, { 3, 3 } },
+                        point[][2] = { { 1, 1 }, { 1, 1 }, { 1, 1 }, { 1, 1 } };
     static const double infinite[][2] = { { 0, 0 }, { 1, 0 }, { INFINITY, 1 }, { 0, NAN } };
     static const double pentagram[][2] = { { 0, 3 }, { -2, -3 }, { 3, 1 }, { -3, 1 }, { 2, -3 } };
     check_fan(line, 4);

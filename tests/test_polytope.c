@@ -1,4 +1,5 @@
-/* Polytopes and plane codes: volumes add up, codes decode to what was encoded, and never to less than the support. */
+/* Polytopes and plane codes: volumes add up, codes decode to what was encoded, and never to less
+ * than the support. */
 #include <check.h>
 #include <math.h>
 #include <stdlib.h>
@@ -108,7 +109,8 @@ START_TEST(two_thousand_nearly_parallel_planes_do_no_harm)
     ebpo_polytope_cube(&p);
     uint64_t seed = 3;
     for (int i = 0; i < 2000; i++) {
-        double n[3] = { 1e-6 * ebpo_test_random_unit(&seed), 1e-6 * ebpo_test_random_unit(&seed), 1 };
+        double n[3] = { 1e-6 * ebpo_test_random_unit(&seed), 1e-6 * ebpo_test_random_unit(&seed),
+                        1 };
         ebpo_polytope_clip(&p, n, 0.5 + 1e-9 * ebpo_test_random_unit(&seed), i);
         assert_closed(&p);
     }
@@ -125,7 +127,9 @@ START_TEST(children_have_eight_times_the_volume_together)
         for (int cut = 0; cut < 6; cut++) {
             double n[3];
             random_direction(&seed, n);
-            ebpo_polytope_clip(&p, n, 0.5 * (n[0] + n[1] + n[2]) + 0.3 * ebpo_test_random_unit(&seed), cut);
+            ebpo_polytope_clip(&p, n,
+                               0.5 * (n[0] + n[1] + n[2]) + 0.3 * ebpo_test_random_unit(&seed),
+                               cut);
         }
         double sum = 0;
         for (unsigned o = 0; o < 8; o++) {
@@ -140,7 +144,8 @@ END_TEST
 
 START_TEST(every_code_decodes_to_norm_511_or_is_refused)
 {
-    uint32_t step = (uint32_t)(16 / ebpo_test_scaled(16)) | 1; /* odd, to meet all columns of the map */
+    /* odd, to meet all columns of the map */
+    uint32_t step = (uint32_t)(16 / ebpo_test_scaled(16)) | 1;
     for (uint32_t normal = 0; normal < 1 << 20; normal += step) {
         int32_t n[3], d;
         bool plane = ebpo_plane_code_decode(normal | 7u << 20, n, &d);

@@ -19,7 +19,8 @@ START_TEST(orient2d_equals_rational_determinant)
         double p[6];
         twin_points(p, 2, _i, &state);
         int expected = twin_orient2d(p);
-        ck_assert_msg(ebpo_orient2d(p, p + 2, p + 4) == expected, "%s, case %d", twin_kind_name(_i), i);
+        ck_assert_msg(ebpo_orient2d(p, p + 2, p + 4) == expected, "%s, case %d", twin_kind_name(_i),
+                      i);
         ck_assert_int_eq(ebpo_orient2d_exact(p, p + 2, p + 4), expected);
         int stage = ebpo_orient2d_expansion(p, p + 2, p + 4);
         ck_assert(stage == expected || stage == EBPO_SIGN_UNKNOWN);
@@ -34,7 +35,8 @@ START_TEST(orient3d_equals_rational_determinant)
         double p[12];
         twin_points(p, 3, _i, &state);
         int expected = twin_orient3d(p);
-        ck_assert_msg(ebpo_orient3d(p, p + 3, p + 6, p + 9) == expected, "%s, case %d", twin_kind_name(_i), i);
+        ck_assert_msg(ebpo_orient3d(p, p + 3, p + 6, p + 9) == expected, "%s, case %d",
+                      twin_kind_name(_i), i);
         ck_assert_int_eq(ebpo_orient3d_exact(p, p + 3, p + 6, p + 9), expected);
         int stage = ebpo_orient3d_expansion(p, p + 3, p + 6, p + 9);
         ck_assert(stage == expected || stage == EBPO_SIGN_UNKNOWN);
@@ -44,7 +46,7 @@ END_TEST
 
 START_TEST(expansion_stage_answers_ordinary_coordinates)
 {
-    static const int kinds[] = {0, 1, 2, 3, 8, 9, 11, 12, 13};
+    static const int kinds[] = { 0, 1, 2, 3, 8, 9, 11, 12, 13 };
     uint64_t state = 5;
     for (size_t k = 0; k < sizeof kinds / sizeof *kinds; k++)
         for (int i = 0; i < 1000; i++) {
@@ -55,7 +57,8 @@ START_TEST(expansion_stage_answers_ordinary_coordinates)
 }
 END_TEST
 
-/* Millions of calls without a twin: swapping two points turns the sign, turning three around keeps it. */
+/* Millions of calls without a twin: swapping two points turns the sign, turning three around keeps
+ * it. */
 START_TEST(orientation_changes_sign_when_two_points_swap)
 {
     uint64_t state = (uint64_t)_i + 77;
@@ -78,11 +81,11 @@ END_TEST
 
 START_TEST(orientation_signs_are_as_documented)
 {
-    const double o[3] = {0, 0, 0}, x[3] = {1, 0, 0}, y[3] = {0, 1, 0}, z[3] = {0, 0, 1};
+    const double o[3] = { 0, 0, 0 }, x[3] = { 1, 0, 0 }, y[3] = { 0, 1, 0 }, z[3] = { 0, 0, 1 };
     ck_assert_int_eq(ebpo_orient2d(o, x, y), 1);
     ck_assert_int_eq(ebpo_orient3d(o, x, y, z), 1);
     ck_assert_int_eq(ebpo_orient3d(o, y, x, z), -1);
-    const double tiny[3] = {0, 0, 0x1p-1074};
+    const double tiny[3] = { 0, 0, 0x1p-1074 };
     ck_assert_int_eq(ebpo_orient3d(o, x, y, tiny), 1);
 }
 END_TEST
@@ -98,7 +101,8 @@ START_TEST(zero_area_finds_collinear_and_coinciding_points)
         bool expected = true;
         for (int k = 0; k < 3; k++) {
             int u = (k + 1) % 3, v = (k + 2) % 3;
-            expected &= twin_orient2d((double[]){p[u], p[v], p[3 + u], p[3 + v], p[6 + u], p[6 + v]}) == 0;
+            expected &= twin_orient2d(
+                            (double[]){ p[u], p[v], p[3 + u], p[3 + v], p[6 + u], p[6 + v] }) == 0;
         }
         zero += expected;
         ck_assert_int_eq(ebpo_zero_area(p, p + 3, p + 6), expected);
@@ -130,7 +134,8 @@ START_TEST(sign_of_products_equals_rational_sum)
         double f[16];
         int kind = i % TWIN_KINDS, n = cancelling_factors(f, kind, &state);
         int expected = twin_sign_of_products(f, n);
-        ck_assert_msg(ebpo_sign_of_products(f, n) == expected, "%s, case %d", twin_kind_name(kind), i);
+        ck_assert_msg(ebpo_sign_of_products(f, n) == expected, "%s, case %d", twin_kind_name(kind),
+                      i);
         ck_assert_int_eq(ebpo_sign_of_products_exact(f, n), expected);
         int stage = ebpo_sign_of_products_expansion(f, n);
         ck_assert(stage == expected || stage == EBPO_SIGN_UNKNOWN);

@@ -1,4 +1,5 @@
-/* Runs the programs named on the command line, each the predicates built with other compiler flags: all must print the same hash. */
+/* Runs the programs named on the command line, each the predicates built with other compiler flags:
+ * all must print the same hash. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,7 +25,8 @@ int main(int argc, char **argv)
     }
     for (int i = 2; i < argc; i++)
         if (read_hash(argv[i], hash) != 0 || strcmp(hash, first) != 0) {
-            fprintf(stderr, "predicates_give_equal_results_for_all_flags: %s differs from %s\n", argv[i], argv[1]);
+            fprintf(stderr, "predicates_give_equal_results_for_all_flags: %s differs from %s\n",
+                    argv[i], argv[1]);
             return EXIT_FAILURE;
         }
     printf("%d builds, hash %s", argc - 1, first);

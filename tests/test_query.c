@@ -1,4 +1,5 @@
-/* Questions to small models of every kind, a million awkward points against the oracle. EBPO_TEST_SCALE scales their number. */
+/* Questions to small models of every kind, a million awkward points against the oracle.
+ * EBPO_TEST_SCALE scales their number. */
 #include <check.h>
 #include <math.h>
 #include <stdlib.h>
@@ -19,7 +20,8 @@ START_TEST(answers_to_awkward_points_are_those_of_brute_force)
 {
     int solid = _i / query_variant_count, variant = _i % query_variant_count;
     query_model m;
-    query_model_make(&m, query_solid_name(solid), query_solid_make(solid), &query_variants[variant]);
+    query_model_make(&m, query_solid_name(solid), query_solid_make(solid),
+                     &query_variants[variant]);
     query_ask(&m, query_scaled(points_for(m.name, m.mesh.face_count)), (uint64_t)_i);
     query_model_free(&m);
 }
@@ -51,10 +53,13 @@ START_TEST(points_that_are_not_finite_are_refused_by_their_number)
         ebpo_error error = EBPO_ERROR_INIT;
         points[4][i % 3] = odd[i / 3];
         ck_assert_int_eq(ebpo_inside(m.context, points[4], NULL, inside, &error), EBPO_E_ARGUMENT);
-        ck_assert_int_eq(ebpo_distance(m.context, points[4], NULL, distance, &error), EBPO_E_ARGUMENT);
-        ck_assert_int_eq(ebpo_inside_many(m.context, points[0], 6, NULL, inside, &error), EBPO_E_ARGUMENT);
+        ck_assert_int_eq(ebpo_distance(m.context, points[4], NULL, distance, &error),
+                         EBPO_E_ARGUMENT);
+        ck_assert_int_eq(ebpo_inside_many(m.context, points[0], 6, NULL, inside, &error),
+                         EBPO_E_ARGUMENT);
         ck_assert_msg(strchr(error.message, '4') != NULL, "%s", error.message);
-        ck_assert_int_eq(ebpo_distance_many(m.context, points[0], 6, NULL, distance, &error), EBPO_E_ARGUMENT);
+        ck_assert_int_eq(ebpo_distance_many(m.context, points[0], 6, NULL, distance, &error),
+                         EBPO_E_ARGUMENT);
         ck_assert_msg(strchr(error.message, '4') != NULL, "%s", error.message);
         ck_assert_int_eq(ebpo_inside_many(m.context, points[0], 4, NULL, inside, &error), EBPO_OK);
     }
@@ -74,7 +79,8 @@ END_TEST
 
 START_TEST(surfaces_have_distances_but_no_inside)
 {
-    static const char *const names[] = { "open_box", "flipped_face_cube", "mobius", "band", "sheet" };
+    static const char *const names[] = { "open_box", "flipped_face_cube", "mobius", "band",
+                                         "sheet" };
     const char *name = names[_i];
     query_model m;
     query_model_make(&m, name, query_solid_by_name(name), &query_variants[0]);
@@ -92,7 +98,8 @@ START_TEST(surfaces_have_distances_but_no_inside)
     for (int is_unsigned = 0; is_unsigned < 2; is_unsigned++) {
         ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
         options.unsigned_distance = is_unsigned;
-        ck_assert_int_eq(ebpo_distance_many(m.context, points, count, &options, distance, &error), EBPO_OK);
+        ck_assert_int_eq(ebpo_distance_many(m.context, points, count, &options, distance, &error),
+                         EBPO_OK);
         ck_assert_uint_eq(query_wrong_distance(&m, points, truth, count, is_unsigned, distance), 0);
     }
     free(points);
@@ -108,7 +115,8 @@ int main(void)
     TCase *points = tcase_create("points"), *refusals = tcase_create("refusals");
     tcase_set_timeout(points, 600);
     tcase_set_timeout(refusals, 600);
-    tcase_add_loop_test(points, answers_to_awkward_points_are_those_of_brute_force, 0, query_solid_count() * query_variant_count);
+    tcase_add_loop_test(points, answers_to_awkward_points_are_those_of_brute_force, 0,
+                        query_solid_count() * query_variant_count);
     tcase_add_test(points, a_million_points_are_asked_about);
     tcase_add_test(refusals, points_that_are_not_finite_are_refused_by_their_number);
     tcase_add_test(refusals, no_points_are_no_failure);

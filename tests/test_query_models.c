@@ -29,7 +29,8 @@ int main(void)
     Suite *suite = suite_create("query_models");
     TCase *tests = tcase_create("models");
     tcase_set_timeout(tests, 1000);
-    tcase_add_loop_test(tests, real_models_answer_like_brute_force, 0, sizeof names / sizeof *names);
+    tcase_add_loop_test(tests, real_models_answer_like_brute_force, 0,
+                        sizeof names / sizeof *names);
     suite_add_tcase(suite, tests);
     SRunner *runner = srunner_create(suite);
     srunner_run_all(runner, CK_NORMAL);

@@ -1,4 +1,5 @@
-/* Questions in all modes: however a file is loaded, whatever the budget, the order, the threads: the answers are the same; with limits they are certain. */
+/* Questions in all modes: however a file is loaded, whatever the budget, the order, the threads:
+ * the answers are the same; with limits they are certain. */
 #include <check.h>
 #include <inttypes.h>
 #include <math.h>
@@ -13,9 +14,10 @@ static const struct {
     const char *name;
     int variant;
 } cases[] = {
-    { "sphere", 5 },          { "boxes_in_walls", 0 },       { "nested_windings", 1 }, { "blob", 2 },
-    { "touching_shells", 5 }, { "tetrahedra_at_random", 3 }, { "giant_and_dust", 0 }, { "cube_in_cell_walls", 1 },
-    { "far_away_float", 0 },  { "tetrahedron", 0 },
+    { "sphere", 5 },         { "boxes_in_walls", 0 },     { "nested_windings", 1 },
+    { "blob", 2 },           { "touching_shells", 5 },    { "tetrahedra_at_random", 3 },
+    { "giant_and_dust", 0 }, { "cube_in_cell_walls", 1 }, { "far_away_float", 0 },
+    { "tetrahedron", 0 },
 };
 enum { CASES = sizeof cases / sizeof *cases };
 
@@ -31,7 +33,8 @@ typedef struct asked {
 
 static void begin(asked *a, int i, uint64_t count)
 {
-    query_model_make(&a->m, cases[i].name, query_solid_by_name(cases[i].name), &query_variants[cases[i].variant]);
+    query_model_make(&a->m, cases[i].name, query_solid_by_name(cases[i].name),
+                     &query_variants[cases[i].variant]);
     a->count = query_scaled(count / 3);
     a->points = query_room(a->count, 3 * sizeof *a->points);
     a->truth = query_room(a->count, sizeof *a->truth);
@@ -55,7 +58,9 @@ static void ask_exactly(asked *a, ebpo_context *context, const ebpo_query_option
     ASSERT_OK(ebpo_inside_many(context, a->points, a->count, options, a->inside, error));
     ck_assert_uint_eq(query_wrong_inside(&a->m, a->points, a->truth, a->count, a->inside), 0);
     ASSERT_OK(ebpo_distance_many(context, a->points, a->count, options, a->distance, error));
-    ck_assert_uint_eq(query_wrong_distance(&a->m, a->points, a->truth, a->count, options && options->unsigned_distance, a->distance), 0);
+    ck_assert_uint_eq(query_wrong_distance(&a->m, a->points, a->truth, a->count,
+                                           options && options->unsigned_distance, a->distance),
+                      0);
 }
 
 /* --- loading and memory --- */
@@ -75,7 +80,8 @@ static void ask_loaded(asked *a, const ebpo_model_options *how)
     ebpo_model_close(model);
 }
 
-/* With EBPO_TEST_SCALE below 1 each test takes other cases than the one before it, so that all have their turn. */
+/* With EBPO_TEST_SCALE below 1 each test takes other cases than the one before it, so that all have
+ * their turn. */
 
 START_TEST(every_way_of_loading_gives_the_same_answers)
 {
@@ -179,7 +185,8 @@ START_TEST(warm_starts_and_signs_do_not_change_answers)
     /* along a path, where the last answer is close */
     for (uint64_t i = 1; i < a.count; i++)
         for (uint64_t k = 0; k < 3; k++)
-            a.points[3 * i + k] = a.points[k] + (a.points[3 + k] - a.points[k]) * (double)i / (double)a.count;
+            a.points[3 * i + k] =
+                a.points[k] + (a.points[3 + k] - a.points[k]) * (double)i / (double)a.count;
     query_find_truths(&a.m, a.points, a.count, a.truth);
     for (int warm = 0; warm < 2; warm++) {
         ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
@@ -198,7 +205,9 @@ START_TEST(what_is_beyond_max_distance_is_left_out)
     begin(&a, _i, 500);
     for (uint64_t i = 0; i < a.count; i++) {
         double d = a.truth[i].distance;
-        const double limits[] = { d, nextafter(d, INFINITY), d > 0 ? nextafter(d, 0) : 0, d / 2, 2 * d, 0, INFINITY };
+        const double limits[] = {
+            d, nextafter(d, INFINITY), d > 0 ? nextafter(d, 0) : 0, d / 2, 2 * d, 0, INFINITY
+        };
         oracle_nearest near;
         oracle_find_nearest(a.m.judge, a.points + 3 * i, &near);
         for (size_t l = 0; l < sizeof limits / sizeof *limits; l++) {
@@ -208,10 +217,13 @@ START_TEST(what_is_beyond_max_distance_is_left_out)
             options.warm = i & 1;
             ASSERT_OK(ebpo_distance(a.m.context, a.points + 3 * i, &options, &got, error));
             if (oracle_distance_compare(a.m.judge, limits[l]) <= 0) {
-                ck_assert_uint_eq(query_wrong_distance(&a.m, a.points + 3 * i, a.truth + i, 1, false, &got), 0);
+                ck_assert_uint_eq(query_wrong_distance(&a.m, a.points + 3 * i, a.truth + i, 1,
+                                                       false, &got),
+                                  0);
             } else {
-                ck_assert_msg(isinf(got.distance), "point (%a, %a, %a), max_distance %a: %a", a.points[3 * i], a.points[3 * i + 1],
-                              a.points[3 * i + 2], limits[l], got.distance);
+                ck_assert_msg(isinf(got.distance), "point (%a, %a, %a), max_distance %a: %a",
+                              a.points[3 * i], a.points[3 * i + 1], a.points[3 * i + 2], limits[l],
+                              got.distance);
                 ck_assert(got.face == EBPO_NO_FACE);
                 ck_assert_double_le(got.lo, d);
                 ck_assert_double_ge(got.hi, d);
@@ -227,9 +239,12 @@ END_TEST
 static void ask_limited(asked *a, ebpo_context *context, const ebpo_query_options *options)
 {
     ASSERT_OK(ebpo_inside_many(context, a->points, a->count, options, a->inside, error));
-    ck_assert_uint_eq(query_wrong_limited_inside(&a->m, a->points, a->truth, a->count, a->inside), 0);
+    ck_assert_uint_eq(query_wrong_limited_inside(&a->m, a->points, a->truth, a->count, a->inside),
+                      0);
     ASSERT_OK(ebpo_distance_many(context, a->points, a->count, options, a->distance, error));
-    ck_assert_uint_eq(query_wrong_limited_distance(&a->m, a->points, a->truth, a->count, a->distance), 0);
+    ck_assert_uint_eq(query_wrong_limited_distance(&a->m, a->points, a->truth, a->count,
+                                                   a->distance),
+                      0);
 }
 
 START_TEST(answers_limited_to_a_level_are_certain)
@@ -299,8 +314,13 @@ START_TEST(answers_limited_by_a_deadline_are_certain)
             ASSERT_OK(ebpo_model_open(&model, a.m.file, &how, error));
             ASSERT_OK(ebpo_context_new(&context, model, error));
             ask_limited(&a, context, &options);
-            for (uint64_t i = 0; i < a.count; i++) /* however short it is, some face is in the root cell; beyond the largest double nobody can tell */
-                ck_assert(isfinite(a.distance[i].hi) || isinf(a.truth[i].distance) || fabs(a.points[3 * i]) + fabs(a.points[3 * i + 1]) + fabs(a.points[3 * i + 2]) > 1e300);
+            for (uint64_t i = 0; i < a.count;
+                 i++) /* however short it is, some face is in the root cell; beyond the largest
+                         double nobody can tell */
+                ck_assert(isfinite(a.distance[i].hi) || isinf(a.truth[i].distance) ||
+                          fabs(a.points[3 * i]) + fabs(a.points[3 * i + 1]) +
+                                  fabs(a.points[3 * i + 2]) >
+                              1e300);
             ebpo_context_free(context);
             ebpo_model_close(model);
         }
@@ -321,9 +341,11 @@ START_TEST(the_theses_modes_never_claim_too_much)
         for (uint64_t i = 0; i < a.count; i++) {
             const ebpo_distance_result *got = a.distance + i;
             double d = a.truth[i].distance;
-            ck_assert_msg(got->lo <= d && d <= got->hi, "mode %d, point (%a, %a, %a): [%a, %a], it is %a", mode, a.points[3 * i], a.points[3 * i + 1],
-                          a.points[3 * i + 2], got->lo, got->hi, d);
-            if (mode != EBPO_DISTANCE_ENVELOPE && isfinite(got->distance)) { /* the distance of some face */
+            ck_assert_msg(got->lo <= d && d <= got->hi,
+                          "mode %d, point (%a, %a, %a): [%a, %a], it is %a", mode, a.points[3 * i],
+                          a.points[3 * i + 1], a.points[3 * i + 2], got->lo, got->hi, d);
+            if (mode != EBPO_DISTANCE_ENVELOPE &&
+                isfinite(got->distance)) { /* the distance of some face */
                 ck_assert_double_ge(fabs(got->distance), d);
                 ck_assert(got->face != EBPO_NO_FACE);
             }
@@ -355,8 +377,12 @@ START_TEST(the_theses_modes_do_not_depend_on_what_is_in_memory)
             ASSERT_OK(ebpo_distance_many(context, a.points, a.count, &options, a.distance, error));
             for (uint64_t i = 0; i < a.count; i++) {
                 const ebpo_distance_result *got = a.distance + i, *want = resident + i;
-                ck_assert_msg(got->face == want->face && memcmp(&got->distance, &want->distance, sizeof got->distance) == 0, "mode %d, cut level %d, point (%a, %a, %a): %a of face %" PRIu64
-                              ", resident %a of face %" PRIu64, mode, cut, a.points[3 * i], a.points[3 * i + 1], a.points[3 * i + 2], got->distance, got->face, want->distance, want->face);
+                ck_assert_msg(got->face == want->face && memcmp(&got->distance, &want->distance,
+                                                                sizeof got->distance) == 0,
+                              "mode %d, cut level %d, point (%a, %a, %a): %a of face %" PRIu64
+                              ", resident %a of face %" PRIu64,
+                              mode, cut, a.points[3 * i], a.points[3 * i + 1], a.points[3 * i + 2],
+                              got->distance, got->face, want->distance, want->face);
             }
             ebpo_context_free(context);
             ebpo_model_close(model);
@@ -390,8 +416,12 @@ START_TEST(a_file_without_mesh_answers_by_levels_only)
     ck_assert_int_eq(ebpo_inside(m.context, p, NULL, &inside, &error), EBPO_E_ABSENT);
     ck_assert_int_ne(error.message[0], 0);
     ck_assert_int_eq(ebpo_distance(m.context, p, NULL, &distance, &error), EBPO_E_ABSENT);
-    ck_assert_int_eq(ebpo_ray_first(m.context, p, (double[3]){ 1, 0, 0 }, INFINITY, &one, &hit, &error), EBPO_E_ABSENT);
-    ck_assert_int_eq(ebpo_ray_all(m.context, p, (double[3]){ 1, 0, 0 }, INFINITY, &hits, &count, &error), EBPO_E_ABSENT);
+    ck_assert_int_eq(ebpo_ray_first(m.context, p, (double[3]){ 1, 0, 0 }, INFINITY, &one, &hit,
+                                    &error),
+                     EBPO_E_ABSENT);
+    ck_assert_int_eq(ebpo_ray_all(m.context, p, (double[3]){ 1, 0, 0 }, INFINITY, &hits, &count,
+                                  &error),
+                     EBPO_E_ABSENT);
     ck_assert_int_eq(ebpo_faces_in_box(m.context, p, p, &faces, &count, &error), EBPO_E_ABSENT);
     if (query_variants[cases[_i].variant].rule == EBPO_RULE_NONZERO)
         for (int level = 0; level < m.info.level_count; level++) {
@@ -429,7 +459,8 @@ static void *ask_in_thread(void *user)
         if (job->status == EBPO_OK)
             job->status = ebpo_distance(context, a->points + 3 * at, NULL, &distance, NULL);
         if (job->status == EBPO_OK)
-            job->different += memcmp(&inside, &a->inside[at], sizeof inside) != 0 || memcmp(&distance, &a->distance[at], sizeof distance) != 0;
+            job->different += memcmp(&inside, &a->inside[at], sizeof inside) != 0 ||
+                              memcmp(&distance, &a->distance[at], sizeof distance) != 0;
     }
     ebpo_context_free(context);
     return NULL;
@@ -455,7 +486,8 @@ static void ask_in_threads(asked *a, const ebpo_model_options *how)
     ebpo_model_close(model);
 }
 
-/* With ThreadSanitizer (meson setup build-tsan -Db_sanitize=thread; CK_RUN_CASE=threads build-tsan/tests/test_query_modes) these two look for races. */
+/* With ThreadSanitizer (meson setup build-tsan -Db_sanitize=thread; CK_RUN_CASE=threads
+ * build-tsan/tests/test_query_modes) these two look for races. */
 START_TEST(four_threads_get_the_answers_of_one)
 {
     if (!ebpo_test_wanted(_i + 12))
@@ -518,7 +550,8 @@ int main(void)
     tcase_add_loop_test(tests, warm_starts_and_signs_do_not_change_answers, 0, CASES);
     tcase_add_loop_test(tests, what_is_beyond_max_distance_is_left_out, 0, CASES);
     tcase_add_loop_test(tests, answers_limited_to_a_level_are_certain, 0, CASES);
-    tcase_add_loop_test(tests, answers_limited_to_a_level_do_not_depend_on_what_is_in_memory, 0, CASES);
+    tcase_add_loop_test(tests, answers_limited_to_a_level_do_not_depend_on_what_is_in_memory, 0,
+                        CASES);
     tcase_add_loop_test(tests, answers_limited_by_a_deadline_are_certain, 0, CASES);
     tcase_add_loop_test(tests, the_theses_modes_never_claim_too_much, 0, CASES);
     tcase_add_loop_test(tests, the_theses_modes_do_not_depend_on_what_is_in_memory, 0, CASES);

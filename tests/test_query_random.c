@@ -1,4 +1,5 @@
-/* Questions to small random solids against brute force: boxes and tetrahedra that touch, nest, overlap and repeat. A failure prints the solid's seed; EBPO_TEST_SEED=<seed> asks that one only,
+/* Questions to small random solids against brute force: boxes and tetrahedra that touch, nest,
+ * overlap and repeat. A failure prints the solid's seed; EBPO_TEST_SEED=<seed> asks that one only,
  * EBPO_TEST_SCALE scales their number. */
 #include <check.h>
 #include <math.h>
@@ -19,12 +20,18 @@ static void ask_rays(query_model *m, uint64_t *state)
         uint64_t count;
         query_make_ray(m, state, origin, direction, &t_max);
         oracle_ray(m->judge, origin, direction, t_max, &expected, &n);
-        ck_assert_int_eq(ebpo_ray_all(m->context, origin, direction, t_max, &hits, &count, NULL), EBPO_OK);
+        ck_assert_int_eq(ebpo_ray_all(m->context, origin, direction, t_max, &hits, &count, NULL),
+                         EBPO_OK);
         bool same = count == n;
         for (uint32_t h = 0; h < n && same; h++)
-            same = hits[h].side == expected[h].side && hits[h].face == (m->face_source ? m->face_source[expected[h].face] : expected[h].face);
-        ck_assert_msg(same, "%s: ray (%a, %a, %a) + t (%a, %a, %a), t <= %a: %llu hits, %u expected, or others", m->name, origin[0], origin[1], origin[2],
-                      direction[0], direction[1], direction[2], t_max, (unsigned long long)count, n);
+            same = hits[h].side == expected[h].side &&
+                   hits[h].face ==
+                       (m->face_source ? m->face_source[expected[h].face] : expected[h].face);
+        ck_assert_msg(
+            same,
+            "%s: ray (%a, %a, %a) + t (%a, %a, %a), t <= %a: %llu hits, %u expected, or others",
+            m->name, origin[0], origin[1], origin[2], direction[0], direction[1], direction[2],
+            t_max, (unsigned long long)count, n);
     }
 }
 
@@ -47,8 +54,10 @@ static void ask_boxes(query_model *m, uint64_t *state)
         bool same = count == n;
         for (uint32_t f = 0; f < n && same; f++)
             same = faces[f] == (m->face_source ? m->face_source[expected[f]] : expected[f]);
-        ck_assert_msg(same, "%s: box (%a, %a, %a) .. (%a, %a, %a): %llu faces, %u expected, or others", m->name, low[0], low[1], low[2], high[0], high[1],
-                      high[2], (unsigned long long)count, n);
+        ck_assert_msg(same,
+                      "%s: box (%a, %a, %a) .. (%a, %a, %a): %llu faces, %u expected, or others",
+                      m->name, low[0], low[1], low[2], high[0], high[1], high[2],
+                      (unsigned long long)count, n);
     }
 }
 
@@ -58,7 +67,8 @@ static void ask_solid(uint64_t seed)
     char name[64];
     uint64_t state = seed;
     snprintf(name, sizeof name, "EBPO_TEST_SEED=%llu", (unsigned long long)seed);
-    query_model_make(&m, name, query_random_solid(seed, seed % 4 != 3), &query_variants[seed % (uint64_t)query_variant_count]);
+    query_model_make(&m, name, query_random_solid(seed, seed % 4 != 3),
+                     &query_variants[seed % (uint64_t)query_variant_count]);
     query_ask(&m, POINTS, seed);
     ask_rays(&m, &state);
     ask_boxes(&m, &state);

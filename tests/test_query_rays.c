@@ -1,4 +1,5 @@
-/* Rays and boxes against the oracle: through vertices, along edges, within faces, from everywhere to everywhere. */
+/* Rays and boxes against the oracle: through vertices, along edges, within faces, from everywhere
+ * to everywhere. */
 #include <check.h>
 #include <math.h>
 #include <stdio.h>
@@ -47,7 +48,8 @@ START_TEST(rays_meet_what_brute_force_says)
     int variant = _i % query_variant_count;
     query_model m;
     query_model_make(&m, query_solid_name(_i), query_solid_make(_i), &query_variants[variant]);
-    uint64_t state = (uint64_t)_i, wrong = 0, count = query_scaled(m.mesh.face_count > 500 ? 500 : 3000);
+    uint64_t state = (uint64_t)_i, wrong = 0,
+             count = query_scaled(m.mesh.face_count > 500 ? 500 : 3000);
     if (strcmp(m.name, "all_scales") == 0)
         count = query_scaled(100);
     for (uint64_t i = 0; i < count && wrong < 3; i++) {
@@ -76,8 +78,10 @@ START_TEST(rays_do_not_depend_on_what_is_in_memory)
             uint64_t state = (uint64_t)(3 * loading + cut), wrong = 0;
             how.loading = (ebpo_loading)loading;
             how.cut_level = cut;
-            ck_assert_msg(ebpo_model_open(&model, m.file, &how, &error) == EBPO_OK, "%s", error.message);
-            ck_assert_msg(ebpo_context_new(&context, model, &error) == EBPO_OK, "%s", error.message);
+            ck_assert_msg(ebpo_model_open(&model, m.file, &how, &error) == EBPO_OK, "%s",
+                          error.message);
+            ck_assert_msg(ebpo_context_new(&context, model, &error) == EBPO_OK, "%s",
+                          error.message);
             for (uint64_t i = 0; i < query_scaled(60) && wrong == 0; i++) {
                 query_ray r;
                 some_ray(&m, &state, &r);
@@ -94,8 +98,9 @@ END_TEST
 START_TEST(rays_that_make_no_sense_are_refused)
 {
     static const query_ray rays[] = {
-        { { 0, 0, 0 }, { 0, 0, 0 }, 1 },        { { NAN, 0, 0 }, { 1, 0, 0 }, 1 },  { { 0, INFINITY, 0 }, { 1, 0, 0 }, 1 },
-        { { 0, 0, 0 }, { 1, NAN, 0 }, 1 },      { { 0, 0, 0 }, { 1, 0, INFINITY }, 1 }, { { 0, 0, 0 }, { 1, 0, 0 }, -1 },
+        { { 0, 0, 0 }, { 0, 0, 0 }, 1 },        { { NAN, 0, 0 }, { 1, 0, 0 }, 1 },
+        { { 0, INFINITY, 0 }, { 1, 0, 0 }, 1 }, { { 0, 0, 0 }, { 1, NAN, 0 }, 1 },
+        { { 0, 0, 0 }, { 1, 0, INFINITY }, 1 }, { { 0, 0, 0 }, { 1, 0, 0 }, -1 },
         { { 0, 0, 0 }, { 1, 0, 0 }, NAN },
     };
     query_model m;
@@ -106,8 +111,12 @@ START_TEST(rays_that_make_no_sense_are_refused)
         uint64_t count;
         bool hit;
         ebpo_error error = EBPO_ERROR_INIT;
-        ck_assert_int_eq(ebpo_ray_first(m.context, rays[i].origin, rays[i].direction, rays[i].t_max, &one, &hit, &error), EBPO_E_ARGUMENT);
-        ck_assert_int_eq(ebpo_ray_all(m.context, rays[i].origin, rays[i].direction, rays[i].t_max, &hits, &count, &error), EBPO_E_ARGUMENT);
+        ck_assert_int_eq(ebpo_ray_first(m.context, rays[i].origin, rays[i].direction, rays[i].t_max,
+                                        &one, &hit, &error),
+                         EBPO_E_ARGUMENT);
+        ck_assert_int_eq(ebpo_ray_all(m.context, rays[i].origin, rays[i].direction, rays[i].t_max,
+                                      &hits, &count, &error),
+                         EBPO_E_ARGUMENT);
         ck_assert_int_ne(error.message[0], 0);
     }
     query_model_free(&m);
@@ -124,22 +133,27 @@ static bool ask_box(query_model *m, const double low[3], const double high[3])
     uint64_t count;
     ebpo_error error = EBPO_ERROR_INIT;
     oracle_box(m->judge, low, high, &expected, &n);
-    ck_assert_msg(ebpo_faces_in_box(m->context, low, high, &faces, &count, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_faces_in_box(m->context, low, high, &faces, &count, &error) == EBPO_OK, "%s",
+                  error.message);
     bool same = count == n;
     for (uint32_t i = 0; i < n && same; i++)
         same = faces[i] == query_told(m, expected[i]);
     if (!same)
-        fprintf(stderr, "%s, %s: box (%a, %a, %a) .. (%a, %a, %a): %llu faces, %u expected, or others\n", m->name, m->variant, low[0], low[1], low[2],
-                high[0], high[1], high[2], (unsigned long long)count, n);
+        fprintf(stderr,
+                "%s, %s: box (%a, %a, %a) .. (%a, %a, %a): %llu faces, %u expected, or others\n",
+                m->name, m->variant, low[0], low[1], low[2], high[0], high[1], high[2],
+                (unsigned long long)count, n);
     return same;
 }
 
 START_TEST(boxes_hold_what_brute_force_says)
 {
     query_model m;
-    query_model_make(&m, query_solid_name(_i), query_solid_make(_i), &query_variants[(_i + 1) % query_variant_count]);
-    uint64_t count = query_scaled(m.mesh.face_count > 500 ? 200 : 1500), wrong = 0, state = (uint64_t)_i;
-    double (*p)[3] = query_room(2 * count, sizeof *p);
+    query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
+                     &query_variants[(_i + 1) % query_variant_count]);
+    uint64_t count = query_scaled(m.mesh.face_count > 500 ? 200 : 1500), wrong = 0,
+             state = (uint64_t)_i;
+    double(*p)[3] = query_room(2 * count, sizeof *p);
     if (strcmp(m.name, "all_scales") == 0)
         count = query_scaled(100);
     query_make_points(&m, 2 * count, (uint64_t)_i + 77, p[0]);
@@ -161,14 +175,18 @@ END_TEST
 
 START_TEST(boxes_that_make_no_sense_are_refused)
 {
-    static const double boxes[][6] = { { 1, 0, 0, 0, 1, 1 }, { NAN, 0, 0, 1, 1, 1 }, { 0, 0, 0, 1, NAN, 1 }, { 0, 0, 1, 1, 1, 0.5 } };
+    static const double boxes[][6] = {
+        { 1, 0, 0, 0, 1, 1 }, { NAN, 0, 0, 1, 1, 1 }, { 0, 0, 0, 1, NAN, 1 }, { 0, 0, 1, 1, 1, 0.5 }
+    };
     query_model m;
     query_model_make(&m, "cube", query_solid_by_name("cube"), &query_variants[0]);
     for (size_t i = 0; i < sizeof boxes / sizeof *boxes; i++) {
         const uint64_t *faces;
         uint64_t count;
         ebpo_error error = EBPO_ERROR_INIT;
-        ck_assert_int_eq(ebpo_faces_in_box(m.context, boxes[i], boxes[i] + 3, &faces, &count, &error), EBPO_E_ARGUMENT);
+        ck_assert_int_eq(ebpo_faces_in_box(m.context, boxes[i], boxes[i] + 3, &faces, &count,
+                                           &error),
+                         EBPO_E_ARGUMENT);
         ck_assert_int_ne(error.message[0], 0);
     }
     query_model_free(&m);

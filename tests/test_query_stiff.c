@@ -1,4 +1,5 @@
-/* Questions where numbers of very different size meet: faces far larger than a subtree, edges far shorter than a cell. */
+/* Questions where numbers of very different size meet: faces far larger than a subtree, edges far
+ * shorter than a cell. */
 #include <check.h>
 #include <math.h>
 #include <stdlib.h>
@@ -6,7 +7,8 @@
 
 #include "query_kit.h"
 
-static const query_variant deep = { "N=8, all levels", 8, 20, EBPO_RULE_NONZERO, 0 }, one_leaf = { "one leaf", 1000, 0, EBPO_RULE_NONZERO, 0 };
+static const query_variant deep = { "N=8, all levels", 8, 20, EBPO_RULE_NONZERO, 0 },
+                           one_leaf = { "one leaf", 1000, 0, EBPO_RULE_NONZERO, 0 };
 
 static void add(ebpo_mesh *m, ebpo_mesh other)
 {
@@ -33,7 +35,8 @@ static void large_face(const ebpo_mesh *m, double normal[3], double middle[3])
         normal[k] = e[(k + 1) % 3] * f[(k + 2) % 3] - e[(k + 2) % 3] * f[(k + 1) % 3];
         length += normal[k] * normal[k];
     }
-    length = copysign(sqrt(length), normal[0] * middle[0] + normal[1] * middle[1] + normal[2] * middle[2]);
+    length = copysign(sqrt(length),
+                      normal[0] * middle[0] + normal[1] * middle[1] + normal[2] * middle[2]);
     for (int k = 0; k < 3; k++)
         normal[k] /= length;
 }
@@ -52,7 +55,8 @@ static ebpo_mesh make_ball_before_face(uint64_t *state, double normal[3], double
 }
 
 /* Points over the face from where it is as far as the ball, by halving. */
-static void make_ties(query_model *m, const double normal[3], const double middle[3], double points[TIES][3])
+static void make_ties(query_model *m, const double normal[3], const double middle[3],
+                      double points[TIES][3])
 {
     double base[TIES][3], low[TIES], high[TIES];
     uint64_t state = 5;
@@ -76,7 +80,8 @@ static void make_ties(query_model *m, const double normal[3], const double middl
                 points[i][k] = base[i][k] + at * normal[k];
             cold.warm = false;
             ck_assert_int_eq(ebpo_distance(m->context, points[i], &cold, &d, NULL), EBPO_OK);
-            *(d.face < 4 ? &low[i] : &high[i]) = at; /* the tetrahedron's faces come first in the source */
+            *(d.face < 4 ? &low[i] : &high[i]) =
+                at; /* the tetrahedron's faces come first in the source */
         }
 }
 
@@ -87,7 +92,8 @@ START_TEST(faces_far_larger_than_a_subtree_are_weighed_exactly)
     query_truth truth[TIES];
     ebpo_distance_result got[TIES];
     uint64_t state = (uint64_t)_i;
-    query_model_make(&m, "ball before a face", make_ball_before_face(&state, normal, middle), &deep);
+    query_model_make(&m, "ball before a face", make_ball_before_face(&state, normal, middle),
+                     &deep);
     ck_assert_int_gt(m.info.level_count, 14);
     make_ties(&m, normal, middle, points);
     query_find_truths(&m, points[0], TIES, truth);
@@ -105,8 +111,10 @@ START_TEST(faces_far_larger_than_a_subtree_are_weighed_exactly)
             options.warm = warm;
             ck_assert_int_eq(ebpo_model_open(&model, m.file, &how, NULL), EBPO_OK);
             ck_assert_int_eq(ebpo_context_new(&context, model, NULL), EBPO_OK);
-            ck_assert_int_eq(ebpo_distance_many(context, points[0], TIES, &options, got, NULL), EBPO_OK);
-            ck_assert_msg(query_wrong_distance(&m, points[0], truth, TIES, false, got) == 0, "cut level %d, warm %d", cut, warm);
+            ck_assert_int_eq(ebpo_distance_many(context, points[0], TIES, &options, got, NULL),
+                             EBPO_OK);
+            ck_assert_msg(query_wrong_distance(&m, points[0], truth, TIES, false, got) == 0,
+                          "cut level %d, warm %d", cut, warm);
             ebpo_context_free(context);
             ebpo_model_close(model);
         }
@@ -118,11 +126,19 @@ END_TEST
 
 static ebpo_mesh make_doubled_vertex(double apart, const double axis[3], uint64_t *state)
 {
-    static const uint32_t faces[][3] = { { 0, 1, 3 }, { 1, 2, 3 }, { 1, 0, 6 }, { 1, 6, 2 }, { 2, 4, 3 }, { 2, 6, 4 }, { 3, 4, 5 }, { 4, 6, 5 }, { 3, 5, 0 }, { 0, 5, 6 } };
-    double xyz[7][3] = { { axis[0], 0, 0 }, { axis[0] - axis[0] * apart, axis[1] * apart, 0 }, { 0, axis[1], 0 }, { 0, 0, axis[2] } };
+    static const uint32_t faces[][3] = { { 0, 1, 3 }, { 1, 2, 3 }, { 1, 0, 6 }, { 1, 6, 2 },
+                                         { 2, 4, 3 }, { 2, 6, 4 }, { 3, 4, 5 }, { 4, 6, 5 },
+                                         { 3, 5, 0 }, { 0, 5, 6 } };
+    double xyz[7][3] = { { axis[0], 0, 0 },
+                         { axis[0] - axis[0] * apart, axis[1] * apart, 0 },
+                         { 0, axis[1], 0 },
+                         { 0, 0, axis[2] } };
     for (int k = 0; k < 3; k++)
         xyz[4 + k][k] = -0.2 - 5 * ebpo_test_random_unit(state);
-    ebpo_mesh m = { .vertex_count = 7, .face_count = 10, .xyz64 = malloc(sizeof xyz), .faces = malloc(sizeof faces) };
+    ebpo_mesh m = { .vertex_count = 7,
+                    .face_count = 10,
+                    .xyz64 = malloc(sizeof xyz),
+                    .faces = malloc(sizeof faces) };
     memcpy(m.xyz64, xyz, sizeof xyz);
     memcpy(m.faces, faces, sizeof faces);
     return m;
@@ -143,7 +159,8 @@ START_TEST(short_edges_do_not_tilt_the_planes_of_convex_leaves)
     double apart = ldexp(1 + (double)(ebpo_test_random(&state) % 32) / 32, -32 - _i % 10);
     query_model_make(&m, "doubled vertex", make_doubled_vertex(apart, axis, &state), &one_leaf);
     for (int i = 0; i < POINTS; i++) { /* about the plane of the first faces */
-        double a = 0.2 * ebpo_test_random_unit(&state), c = 0.2 * ebpo_test_random_unit(&state), far = 1 + off[i % 7];
+        double a = 0.2 * ebpo_test_random_unit(&state), c = 0.2 * ebpo_test_random_unit(&state),
+               far = 1 + off[i % 7];
         points[i][0] = a * axis[0] * far;
         points[i][1] = (1 - a - c) * axis[1] * far;
         points[i][2] = c * axis[2] * far;

@@ -1,5 +1,6 @@
-/* Rays and boxes against triangles, held against twins in rational numbers that share no method with the library: a ray is clipped by linear conditions
- * on t, a triangle is clipped as a polygon by the box's half-spaces. */
+/* Rays and boxes against triangles, held against twins in rational numbers that share no method
+ * with the library: a ray is clipped by linear conditions on t, a triangle is clipped as a polygon
+ * by the box's half-spaces. */
 #include <check.h>
 #include <math.h>
 #include <stdlib.h>
@@ -18,15 +19,9 @@ typedef struct rational3 {
     mpq_t x[3];
 } rational3;
 
-static void init3(rational3 *a)
-{
-    mpq_inits(a->x[0], a->x[1], a->x[2], NULL);
-}
+static void init3(rational3 *a) { mpq_inits(a->x[0], a->x[1], a->x[2], NULL); }
 
-static void clear3(rational3 *a)
-{
-    mpq_clears(a->x[0], a->x[1], a->x[2], NULL);
-}
+static void clear3(rational3 *a) { mpq_clears(a->x[0], a->x[1], a->x[2], NULL); }
 
 static void set3(rational3 *a, const double x[3])
 {
@@ -115,7 +110,8 @@ static void keep_zero(interval *r, mpq_t c0, mpq_t c1)
 }
 
 /* Condition normal . (origin + t direction - at) >= 0, or = 0. */
-static void keep_plane(interval *r, const rational3 *normal, const rational3 *origin, const rational3 *direction, const rational3 *at, bool equal)
+static void keep_plane(interval *r, const rational3 *normal, const rational3 *origin,
+                       const rational3 *direction, const rational3 *at, bool equal)
 {
     rational3 from;
     mpq_t c0, c1;
@@ -132,7 +128,8 @@ static void keep_plane(interval *r, const rational3 *normal, const rational3 *or
 }
 
 /* At r->low, is normal . (point - at) > 0? */
-static bool strictly_within(const interval *r, const rational3 *normal, const rational3 *origin, const rational3 *direction, const rational3 *at)
+static bool strictly_within(const interval *r, const rational3 *normal, const rational3 *origin,
+                            const rational3 *direction, const rational3 *at)
 {
     rational3 point;
     mpq_t c;
@@ -150,7 +147,8 @@ static bool strictly_within(const interval *r, const rational3 *normal, const ra
     return within;
 }
 
-static void keep_area(interval *r, const rational3 p[3], const rational3 *normal, const rational3 *origin, const rational3 *direction)
+static void keep_area(interval *r, const rational3 p[3], const rational3 *normal,
+                      const rational3 *origin, const rational3 *direction)
 {
     r->strict = true;
     keep_plane(r, normal, origin, direction, &p[0], true);
@@ -169,7 +167,8 @@ static void keep_area(interval *r, const rational3 p[3], const rational3 *normal
 }
 
 /* The corners lie on one line: between the two that are farthest apart. */
-static void keep_segment(interval *r, const rational3 p[3], const rational3 *origin, const rational3 *direction)
+static void keep_segment(interval *r, const rational3 p[3], const rational3 *origin,
+                         const rational3 *direction)
 {
     mpq_t length, longest;
     int from = 0, to = 1;
@@ -243,16 +242,14 @@ static int twin_ray(const ebpo_segment *ray, const double triangle[3][3], interv
     return side;
 }
 
-static void interval_clear(interval *r)
-{
-    mpq_clears(r->low, r->high, NULL);
-}
+static void interval_clear(interval *r) { mpq_clears(r->low, r->high, NULL); }
 
 /* |t - exact| <= 2 ulp: exact lies between the doubles two steps away. */
 static bool close_enough(double t, const mpq_t exact)
 {
     mpq_t end;
-    double low = nextafter(nextafter(t, -INFINITY), -INFINITY), high = nextafter(nextafter(t, INFINITY), INFINITY);
+    double low = nextafter(nextafter(t, -INFINITY), -INFINITY),
+           high = nextafter(nextafter(t, INFINITY), INFINITY);
     if (t == INFINITY) {
         low = 0x1.fffffffffffffp1023;
         high = INFINITY;
@@ -285,7 +282,9 @@ static double nudged(double x, uint64_t *state)
 /* A point of the triangle: inside, on an edge or a corner. */
 static void point_of(const double triangle[3][3], double out[3], uint64_t *state)
 {
-    static const double weights[][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {.5, .5, 0}, {0, .25, .75}, {.25, .25, .5}, {.5, .25, .25}, {.375, 0, .625}};
+    static const double weights[][3] = { { 1, 0, 0 },      { 0, 1, 0 },      { 0, 0, 1 },
+                                         { .5, .5, 0 },    { 0, .25, .75 },  { .25, .25, .5 },
+                                         { .5, .25, .25 }, { .375, 0, .625 } };
     const double *w = weights[twin_integer(state, 0, 7)];
     for (int k = 0; k < 3; k++)
         out[k] = w[0] * triangle[0][k] + w[1] * triangle[1][k] + w[2] * triangle[2][k];
@@ -328,8 +327,12 @@ static void ray_case(int kind, ebpo_segment *ray, double triangle[3][3], uint64_
     bool whole = kind <= 3 || kind == 8 || kind == 10;
     for (int k = 0; k < 3; k++) {
         for (int i = 0; i < 3; i++)
-            triangle[i][k] = whole ? small(state, kind == 0 ? 2 : 8) * 8 : kind == 7 ? 1e7 + twin_uniform(state) : twin_uniform(state);
-        ray->origin[k] = whole ? small(state, kind == 0 ? 2 : 8) * 8 : kind == 7 ? 1e7 + twin_uniform(state) : twin_uniform(state);
+            triangle[i][k] = whole       ? small(state, kind == 0 ? 2 : 8) * 8
+                             : kind == 7 ? 1e7 + twin_uniform(state)
+                                         : twin_uniform(state);
+        ray->origin[k] = whole       ? small(state, kind == 0 ? 2 : 8) * 8
+                         : kind == 7 ? 1e7 + twin_uniform(state)
+                                     : twin_uniform(state);
         ray->direction[k] = whole ? small(state, 2) : twin_uniform(state);
     }
     if (kind == 2 || kind == 3) /* in one plane, or without area */
@@ -347,7 +350,7 @@ static void ray_case(int kind, ebpo_segment *ray, double triangle[3][3], uint64_
     if (kind == 8 || kind == 9) /* along an axis, through the triangle when it can */
         for (int k = 0, axis = (int)twin_integer(state, 0, 2); k < 3; k++)
             ray->direction[k] = k == axis ? (twin_random(state) & 1 ? 1 : -1) : 0;
-    point_of((const double (*)[3])triangle, target, state);
+    point_of((const double(*)[3])triangle, target, state);
     if (kind == 9)
         for (int k = 0; k < 3; k++)
             ray->origin[k] = ray->direction[k] == 0 ? nudged(target[k], state) : ray->origin[k];
@@ -362,7 +365,8 @@ static void ray_case(int kind, ebpo_segment *ray, double triangle[3][3], uint64_
     if (choice == 1)
         ray->t_max = nudged(1, state);
     if (kind == 5 || kind == 11) {
-        int range = kind == 11 ? 1000 : 300, lengths = (int)twin_integer(state, -range, range - 1), directions = (int)twin_integer(state, -range, range - 1);
+        int range = kind == 11 ? 1000 : 300, lengths = (int)twin_integer(state, -range, range - 1),
+            directions = (int)twin_integer(state, -range, range - 1);
         scale_all(ray, triangle, lengths, directions);
         ray->t_max = ldexp(ray->t_max, lengths - directions);
     }
@@ -380,10 +384,13 @@ static void check_ray(const ebpo_segment *ray, const double triangle[3][3], int 
     ebpo_ray_meeting m;
     int side = twin_ray(ray, triangle, &r);
     ebpo_ray_triangle(ray, triangle, &m);
-    ck_assert_msg(m.meets == r.any, "kind %d, case %ld: meets %d, twin %d", kind, count->cases, m.meets, r.any);
+    ck_assert_msg(m.meets == r.any, "kind %d, case %ld: meets %d, twin %d", kind, count->cases,
+                  m.meets, r.any);
     if (m.meets) {
-        ck_assert_msg(m.side == side, "kind %d, case %ld: side %d, twin %d", kind, count->cases, m.side, side);
-        ck_assert_msg(close_enough(m.t, r.low), "kind %d, case %ld: t %a, twin %a", kind, count->cases, m.t, mpq_get_d(r.low));
+        ck_assert_msg(m.side == side, "kind %d, case %ld: side %d, twin %d", kind, count->cases,
+                      m.side, side);
+        ck_assert_msg(close_enough(m.t, r.low), "kind %d, case %ld: t %a, twin %a", kind,
+                      count->cases, m.t, mpq_get_d(r.low));
         ck_assert(m.t <= ray->t_max);
     }
     count->cases++;
@@ -409,27 +416,29 @@ static void check_limits(ebpo_segment *ray, const double triangle[3][3], int kin
 
 START_TEST(rays_meet_triangles_as_rational_clipping_says)
 {
-    tally count = {0};
+    tally count = { 0 };
     uint64_t state = 11 + (uint64_t)_i;
     for (int i = 0; i < (_i == 11 ? ROUNDS / 4 : ROUNDS); i++) {
         ebpo_segment ray;
         double triangle[3][3];
         ray_case(_i, &ray, triangle, &state);
-        check_ray(&ray, (const double (*)[3])triangle, _i, &count);
-        check_limits(&ray, (const double (*)[3])triangle, _i, &count);
+        check_ray(&ray, (const double(*)[3])triangle, _i, &count);
+        check_limits(&ray, (const double(*)[3])triangle, _i, &count);
     }
-    ck_assert_msg(count.hits + count.touches > 400 && count.misses > 400, "kind %d: %ld hits, %ld touches, %ld misses", _i, count.hits, count.touches, count.misses);
+    ck_assert_msg(count.hits + count.touches > 400 && count.misses > 400,
+                  "kind %d: %ld hits, %ld touches, %ld misses", _i, count.hits, count.touches,
+                  count.misses);
 }
 END_TEST
 
 START_TEST(rays_meet_triangles_of_hard_coordinates)
 {
-    tally count = {0};
+    tally count = { 0 };
     uint64_t state = 99;
     for (int i = 0; i < 1500; i++)
         for (int kind = 0; kind < TWIN_KINDS; kind++) {
             double p[12], triangle[3][3];
-            ebpo_segment ray = {.t_max = INFINITY};
+            ebpo_segment ray = { .t_max = INFINITY };
             twin_points(p, 3, kind, &state);
             memcpy(triangle, p, sizeof triangle);
             memcpy(ray.origin, p + 9, sizeof ray.origin);
@@ -441,8 +450,8 @@ START_TEST(rays_meet_triangles_of_hard_coordinates)
             }
             if (ray.direction[0] == 0 && ray.direction[1] == 0 && ray.direction[2] == 0)
                 ray.direction[i % 3] = -1;
-            check_ray(&ray, (const double (*)[3])triangle, kind, &count);
-            check_limits(&ray, (const double (*)[3])triangle, kind, &count);
+            check_ray(&ray, (const double(*)[3])triangle, kind, &count);
+            check_limits(&ray, (const double(*)[3])triangle, kind, &count);
         }
     ck_assert(count.hits > 100 && count.touches > 100 && count.misses > 100);
 }
@@ -467,13 +476,15 @@ START_TEST(hits_are_ordered_as_rationals_are)
             b[1][0] = nudged(b[1][0], &state);
         if (twin_random(&state) % 8 == 0)
             memcpy(b, other_case, sizeof b);
-        twin_ray(&ray, (const double (*)[3])a, &ra);
-        twin_ray(&ray, (const double (*)[3])b, &rb);
+        twin_ray(&ray, (const double(*)[3])a, &ra);
+        twin_ray(&ray, (const double(*)[3])b, &rb);
         if (ra.any && rb.any) {
             int order = mpq_cmp(ra.low, rb.low);
             order = (order > 0) - (order < 0);
-            ck_assert_int_eq(ebpo_ray_compare(&ray, (const double (*)[3])a, (const double (*)[3])b), order);
-            ck_assert_int_eq(ebpo_ray_compare(&ray, (const double (*)[3])b, (const double (*)[3])a), -order);
+            ck_assert_int_eq(ebpo_ray_compare(&ray, (const double(*)[3])a, (const double(*)[3])b),
+                             order);
+            ck_assert_int_eq(ebpo_ray_compare(&ray, (const double(*)[3])b, (const double(*)[3])a),
+                             -order);
             ties += order == 0;
             other += order != 0;
         }
@@ -486,34 +497,36 @@ END_TEST
 
 START_TEST(simple_rays_are_answered_by_hand)
 {
-    const double t[3][3] = {{0, 0, 1}, {2, 0, 1}, {0, 2, 1}}; /* normal +z */
-    const double flat[3][3] = {{1, 0, 0}, {3, 0, 0}, {2, 0, 0}}, point[3][3] = {{1, 1, 1}, {1, 1, 1}, {1, 1, 1}};
+    const double t[3][3] = { { 0, 0, 1 }, { 2, 0, 1 }, { 0, 2, 1 } }; /* normal +z */
+    const double flat[3][3] = { { 1, 0, 0 }, { 3, 0, 0 }, { 2, 0, 0 } },
+                 point[3][3] = { { 1, 1, 1 }, { 1, 1, 1 }, { 1, 1, 1 } };
     const struct {
         ebpo_segment ray;
         const double (*triangle)[3];
         ebpo_ray_meeting expected;
     } cases[] = {
-        {{{.5, .5, 0}, {0, 0, 2}, INFINITY}, t, {true, -1, .5}},
-        {{{.5, .5, 2}, {0, 0, -1}, INFINITY}, t, {true, 1, 1}},
-        {{{.5, .5, 2}, {0, 0, -1}, 1}, t, {true, 1, 1}},
-        {{{.5, .5, 2}, {0, 0, -1}, 0x1.fffffffffffffp-1}, t, {false, 0, 0}},
-        {{{.5, .5, 1}, {0, 0, -1}, 0}, t, {true, 1, 0}},
-        {{{.5, .5, 0}, {0, 0, -1}, INFINITY}, t, {false, 0, 0}},
-        {{{1, 1, 0}, {0, 0, 1}, INFINITY}, t, {true, 0, 1}},
-        {{{0, 0, 0}, {0, 0, 1}, INFINITY}, t, {true, 0, 1}},
-        {{{-1, 1, 1}, {1, 0, 0}, INFINITY}, t, {true, 0, 1}},
-        {{{.5, .5, 1}, {1, 0, 0}, INFINITY}, t, {true, 0, 0}},
-        {{{-1, 1, 1.5}, {1, 0, 0}, INFINITY}, t, {false, 0, 0}},
-        {{{2, -1, 0}, {0, 4, 0}, INFINITY}, flat, {true, 0, .25}},
-        {{{0, 0, 0}, {1, 0, 0}, INFINITY}, flat, {true, 0, 1}},
-        {{{4, 0, 0}, {1, 0, 0}, INFINITY}, flat, {false, 0, 0}},
-        {{{0, 0, 0}, {1, 1, 1}, 1}, point, {true, 0, 1}},
-        {{{0, 0, 0}, {1, 1, 2}, INFINITY}, point, {false, 0, 0}},
+        { { { .5, .5, 0 }, { 0, 0, 2 }, INFINITY }, t, { true, -1, .5 } },
+        { { { .5, .5, 2 }, { 0, 0, -1 }, INFINITY }, t, { true, 1, 1 } },
+        { { { .5, .5, 2 }, { 0, 0, -1 }, 1 }, t, { true, 1, 1 } },
+        { { { .5, .5, 2 }, { 0, 0, -1 }, 0x1.fffffffffffffp-1 }, t, { false, 0, 0 } },
+        { { { .5, .5, 1 }, { 0, 0, -1 }, 0 }, t, { true, 1, 0 } },
+        { { { .5, .5, 0 }, { 0, 0, -1 }, INFINITY }, t, { false, 0, 0 } },
+        { { { 1, 1, 0 }, { 0, 0, 1 }, INFINITY }, t, { true, 0, 1 } },
+        { { { 0, 0, 0 }, { 0, 0, 1 }, INFINITY }, t, { true, 0, 1 } },
+        { { { -1, 1, 1 }, { 1, 0, 0 }, INFINITY }, t, { true, 0, 1 } },
+        { { { .5, .5, 1 }, { 1, 0, 0 }, INFINITY }, t, { true, 0, 0 } },
+        { { { -1, 1, 1.5 }, { 1, 0, 0 }, INFINITY }, t, { false, 0, 0 } },
+        { { { 2, -1, 0 }, { 0, 4, 0 }, INFINITY }, flat, { true, 0, .25 } },
+        { { { 0, 0, 0 }, { 1, 0, 0 }, INFINITY }, flat, { true, 0, 1 } },
+        { { { 4, 0, 0 }, { 1, 0, 0 }, INFINITY }, flat, { false, 0, 0 } },
+        { { { 0, 0, 0 }, { 1, 1, 1 }, 1 }, point, { true, 0, 1 } },
+        { { { 0, 0, 0 }, { 1, 1, 2 }, INFINITY }, point, { false, 0, 0 } },
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         ebpo_ray_meeting m;
         ebpo_ray_triangle(&cases[i].ray, cases[i].triangle, &m);
-        ck_assert_msg(m.meets == cases[i].expected.meets && m.side == cases[i].expected.side, "case %zu", i);
+        ck_assert_msg(m.meets == cases[i].expected.meets && m.side == cases[i].expected.side,
+                      "case %zu", i);
         ck_assert_msg(!m.meets || m.t == cases[i].expected.t, "case %zu: t %g", i, m.t);
     }
 }
@@ -544,7 +557,8 @@ static void polygon_clear(rational_polygon *poly)
 }
 
 /* Where the segment from p to q meets x[axis] = at. */
-static void push_cut(rational_polygon *out, const rational3 *p, const rational3 *q, int axis, const mpq_t at)
+static void push_cut(rational_polygon *out, const rational3 *p, const rational3 *q, int axis,
+                     const mpq_t at)
 {
     rational3 cut;
     mpq_t s, length;
@@ -566,7 +580,7 @@ static void push_cut(rational_polygon *out, const rational3 *p, const rational3 
 /* Sutherland and Hodgman 1974: keeps side * (x[axis] - at) >= 0. */
 static void cut_polygon(rational_polygon *poly, int axis, int side, double at)
 {
-    rational_polygon out = {.n = 0};
+    rational_polygon out = { .n = 0 };
     mpq_t limit;
     mpq_init(limit);
     mpq_set_d(limit, at);
@@ -585,7 +599,7 @@ static void cut_polygon(rational_polygon *poly, int axis, int side, double at)
 
 static bool twin_box(const double triangle[3][3], const double min[3], const double max[3])
 {
-    rational_polygon poly = {.n = 0};
+    rational_polygon poly = { .n = 0 };
     for (int i = 0; i < 3; i++) {
         rational3 p;
         set3(&p, triangle[i]);
@@ -606,15 +620,19 @@ static void box_case(int kind, double triangle[3][3], double min[3], double max[
     double centre[3], half = kind == 0 ? 1 : .25 * fabs(twin_uniform(state));
     for (int k = 0; k < 3; k++)
         for (int i = 0; i < 3; i++)
-            triangle[i][k] = kind == 0 ? small(state, 3) : kind == 1 ? small(state, 20) : twin_uniform(state);
-    point_of((const double (*)[3])triangle, centre, state);
+            triangle[i][k] = kind == 0   ? small(state, 3)
+                             : kind == 1 ? small(state, 20)
+                                         : twin_uniform(state);
+    point_of((const double(*)[3])triangle, centre, state);
     if (kind == 3)
         for (int k = 0; k < 3; k++)
             triangle[2][k] = nudged(.5 * (triangle[0][k] + triangle[1][k]), state);
     if (kind == 4 || (kind <= 1 && twin_random(state) % 4 == 0))
         flatten(triangle, state);
     for (int k = 0; k < 3; k++) {
-        double a = kind == 0 ? small(state, 3) : kind == 1 ? small(state, 20) : centre[k] - 2 * half * twin_uniform(state);
+        double a = kind == 0   ? small(state, 3)
+                   : kind == 1 ? small(state, 20)
+                               : centre[k] - 2 * half * twin_uniform(state);
         double b = kind == 0 ? small(state, 3) : kind == 1 ? a + 16 : a + half;
         /* A corner of the box on the triangle, or one step off; flat boxes and points. */
         if (kind == 2 || kind == 5) {
@@ -646,8 +664,9 @@ START_TEST(boxes_meet_triangles_as_rational_clipping_says)
     for (int i = 0; i < (_i == 6 ? ROUNDS / 2 : ROUNDS); i++) {
         double triangle[3][3], min[3], max[3];
         box_case(_i, triangle, min, max, &state);
-        bool expected = twin_box((const double (*)[3])triangle, min, max);
-        ck_assert_msg(ebpo_triangle_meets_box((const double (*)[3])triangle, min, max) == expected, "kind %d, case %d: twin says %d", _i, i, expected);
+        bool expected = twin_box((const double(*)[3])triangle, min, max);
+        ck_assert_msg(ebpo_triangle_meets_box((const double(*)[3])triangle, min, max) == expected,
+                      "kind %d, case %d: twin says %d", _i, i, expected);
         meets += expected;
         apart += !expected;
     }
@@ -657,8 +676,10 @@ END_TEST
 
 START_TEST(boxes_of_points_meet_what_they_lie_on)
 {
-    const double t[3][3] = {{0, 0, 0}, {4, 0, 0}, {0, 4, 4}}, on[3] = {1, 1, 1}, off[3] = {1, 1, 0x1.0000000000001p0};
-    const double far[3] = {3, 3, 3}, low[3] = {2, 2, 2}, edge[3] = {2, 2, 2}, high[3] = {9, 9, 9};
+    const double t[3][3] = { { 0, 0, 0 }, { 4, 0, 0 }, { 0, 4, 4 } }, on[3] = { 1, 1, 1 },
+                 off[3] = { 1, 1, 0x1.0000000000001p0 };
+    const double far[3] = { 3, 3, 3 }, low[3] = { 2, 2, 2 }, edge[3] = { 2, 2, 2 },
+                 high[3] = { 9, 9, 9 };
     ck_assert(ebpo_triangle_meets_box(t, on, on));
     ck_assert(!ebpo_triangle_meets_box(t, off, off));
     ck_assert(!ebpo_triangle_meets_box(t, far, far));

@@ -1,4 +1,5 @@
-/* Selections: the theses' against plain twins; the hull that proposes directions; files of every selection keep the promises; and what no envelope can be better than. */
+/* Selections: the theses' against plain twins; the hull that proposes directions; files of every
+ * selection keep the promises; and what no envelope can be better than. */
 #include <check.h>
 #include <math.h>
 #include <stdio.h>
@@ -20,7 +21,8 @@
 enum { MOST = 48 };
 static const double unit_cell[3] = { 1, 1, 1 };
 
-/* --- candidates on a sphere inside of the cell: each plane cuts something, so that codes tell which were chosen --- */
+/* --- candidates on a sphere inside of the cell: each plane cuts something, so that codes tell
+ * which were chosen --- */
 
 static int make_candidates(ebpo_candidate *c, int count, uint64_t *seed)
 {
@@ -38,7 +40,8 @@ static int make_candidates(ebpo_candidate *c, int count, uint64_t *seed)
             int32_t w[3];
             ebpo_plane_code_decode(c[i].normal, w, &d);
             double dot = (double)v[0] * w[0] + (double)v[1] * w[1] + (double)v[2] * w[2];
-            double a = (double)v[0] * v[0] + (double)v[1] * v[1] + (double)v[2] * v[2], b = (double)w[0] * w[0] + (double)w[1] * w[1] + (double)w[2] * w[2];
+            double a = (double)v[0] * v[0] + (double)v[1] * v[1] + (double)v[2] * v[2],
+                   b = (double)w[0] * w[0] + (double)w[1] * w[1] + (double)w[2] * w[2];
             far = dot < 0.96 * sqrt(a * b);
         }
         if (!far)
@@ -105,8 +108,13 @@ START_TEST(no_swap_of_a_medoid_makes_kmedoids_cheaper)
         ebpo_candidate c[MOST];
         bool chosen[MOST];
         int count = 3 + (int)(ebpo_test_random(&seed) % 30);
-        ebpo_choice choice = { .candidates = c, .count = make_candidates(c, count, &seed), .most = EBPO_PLANES_STORED, .cell_size = unit_cell, .seed = ebpo_test_random(&seed),
-                               .wanted = 1 + (int)(ebpo_test_random(&seed) % (uint64_t)count), .normals = round % 2 ? EBPO_NORMALS_ANGLE : EBPO_NORMALS_SPHERICAL };
+        ebpo_choice choice = { .candidates = c,
+                               .count = make_candidates(c, count, &seed),
+                               .most = EBPO_PLANES_STORED,
+                               .cell_size = unit_cell,
+                               .seed = ebpo_test_random(&seed),
+                               .wanted = 1 + (int)(ebpo_test_random(&seed) % (uint64_t)count),
+                               .normals = round % 2 ? EBPO_NORMALS_ANGLE : EBPO_NORMALS_SPHERICAL };
         ck_assert_int_eq(choose(EBPO_SELECT_KMEDOIDS, &choice, chosen), choice.wanted);
         double reached = cost(&choice, chosen);
         for (int out = 0; out < count; out++)
@@ -127,7 +135,11 @@ START_TEST(least_offset_takes_those_that_moved_least)
     for (int round = 0; round < 50; round++) {
         ebpo_candidate c[MOST];
         bool chosen[MOST];
-        ebpo_choice choice = { .candidates = c, .count = make_candidates(c, 25, &seed), .most = EBPO_PLANES_STORED, .cell_size = unit_cell, .wanted = 1 + round % 25 };
+        ebpo_choice choice = { .candidates = c,
+                               .count = make_candidates(c, 25, &seed),
+                               .most = EBPO_PLANES_STORED,
+                               .cell_size = unit_cell,
+                               .wanted = 1 + round % 25 };
         ck_assert_int_eq(choose(EBPO_SELECT_OFFSET, &choice, chosen), choice.wanted);
         double most_taken = 0, least_left = INFINITY;
         for (int i = 0; i < choice.count; i++)
@@ -145,7 +157,11 @@ START_TEST(random_takes_consecutive_candidates_from_a_place_that_the_seed_tells)
     uint64_t seed = 13;
     uint32_t starts = 0;
     ebpo_candidate c[MOST];
-    ebpo_choice choice = { .candidates = c, .count = make_candidates(c, 20, &seed), .most = EBPO_PLANES_STORED, .cell_size = unit_cell, .wanted = 7 };
+    ebpo_choice choice = { .candidates = c,
+                           .count = make_candidates(c, 20, &seed),
+                           .most = EBPO_PLANES_STORED,
+                           .cell_size = unit_cell,
+                           .wanted = 7 };
     for (int round = 0; round < 200; round++) {
         bool chosen[MOST], again[MOST];
         choice.seed = ebpo_test_random(&seed);
@@ -172,7 +188,7 @@ START_TEST(counts_wanted_are_those_of_the_theses)
     ck_assert_int_eq(ebpo_selection_wanted(0, 0, 40, 0), 0);
     ck_assert_int_eq(ebpo_selection_wanted(1000, 0, 40, 694), 694);
     ck_assert_int_eq(ebpo_selection_wanted(1000, 1, 40, 694), 347);
-    ck_assert_int_eq(ebpo_selection_wanted(100, 1, 40, 694), 86);  /* 347, 173.5, 86.75 */
+    ck_assert_int_eq(ebpo_selection_wanted(100, 1, 40, 694), 86);   /* 347, 173.5, 86.75 */
     ck_assert_int_eq(ebpo_selection_wanted(100, 10, 40, 694), 100); /* K below 1: all of them */
     ck_assert_int_eq(ebpo_selection_wanted(1, 0, 40, 694), 1);
 }
@@ -188,7 +204,8 @@ static bool is_facet(const double (*p)[3], int count, int a, int b, int c)
         u[k] = p[b][k] - p[a][k];
         v[k] = p[c][k] - p[a][k];
     }
-    double n[3] = { u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0] };
+    double n[3] = { u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
+                    u[0] * v[1] - u[1] * v[0] };
     for (int i = 0; i < count; i++) {
         double height = 0;
         for (int k = 0; k < 3; k++)
@@ -212,11 +229,13 @@ START_TEST(hull_has_the_facets_that_trying_all_triples_finds)
         for (int a = 0; a < count; a++)
             for (int b = a + 1; b < count; b++)
                 for (int c = b + 1; c < count; c++)
-                    expected += is_facet((const double (*)[3])p, count, a, b, c) || is_facet((const double (*)[3])p, count, a, c, b);
-        int found = ebpo_hull_facets((const double (*)[3])p, count, 1e-9, facets, EBPO_HULL_FACETS);
+                    expected += is_facet((const double(*)[3])p, count, a, b, c) ||
+                                is_facet((const double(*)[3])p, count, a, c, b);
+        int found = ebpo_hull_facets((const double(*)[3])p, count, 1e-9, facets, EBPO_HULL_FACETS);
         ck_assert_int_eq(found, expected);
         for (int i = 0; i < found; i++)
-            ck_assert(is_facet((const double (*)[3])p, count, facets[i].corner[0], facets[i].corner[1], facets[i].corner[2]));
+            ck_assert(is_facet((const double(*)[3])p, count, facets[i].corner[0],
+                               facets[i].corner[1], facets[i].corner[2]));
     }
 }
 END_TEST
@@ -229,11 +248,14 @@ START_TEST(hull_of_nearly_flat_points_stays_within_its_room)
         double p[40][3], thin = ldexp(1, -(round % 60));
         int room = 4 + round % 77;
         memset(&facets[room], 0x5a, sizeof *facets);
-        for (int i = 0; i < 40; i++) { /* on a cylinder, a grid, a plane: whatever makes signs waver */
+        for (int i = 0; i < 40;
+             i++) { /* on a cylinder, a grid, a plane: whatever makes signs waver */
             double a = 0.1 * (double)(ebpo_test_random(&seed) % 63);
-            p[i][0] = round % 3 ? cos(a) : ebpo_test_random_unit(&seed), p[i][1] = round % 3 ? sin(a) : ebpo_test_random_unit(&seed), p[i][2] = thin * ebpo_test_random_unit(&seed);
+            p[i][0] = round % 3 ? cos(a) : ebpo_test_random_unit(&seed),
+            p[i][1] = round % 3 ? sin(a) : ebpo_test_random_unit(&seed),
+            p[i][2] = thin * ebpo_test_random_unit(&seed);
         }
-        ck_assert_int_le(ebpo_hull_facets((const double (*)[3])p, 40, 1e-9, facets, room), room);
+        ck_assert_int_le(ebpo_hull_facets((const double(*)[3])p, 40, 1e-9, facets, room), room);
         for (size_t i = 0; i < sizeof *facets; i++)
             ck_assert_int_eq(((const unsigned char *)&facets[room])[i], 0x5a);
     }
@@ -244,14 +266,18 @@ START_TEST(hull_of_flat_or_repeated_points_is_nothing_and_of_a_grid_its_box)
 {
     static ebpo_hull_facet facets[EBPO_HULL_FACETS];
     static double p[EBPO_HULL_POINTS][3];
-    ck_assert_int_eq(ebpo_hull_facets((const double (*)[3])p, 3, 1e-9, facets, EBPO_HULL_FACETS), 0);
-    ck_assert_int_eq(ebpo_hull_facets((const double (*)[3])p, 100, 1e-9, facets, EBPO_HULL_FACETS), 0); /* all at one point */
+    ck_assert_int_eq(ebpo_hull_facets((const double(*)[3])p, 3, 1e-9, facets, EBPO_HULL_FACETS), 0);
+    /* all at one point */
+    ck_assert_int_eq(ebpo_hull_facets((const double(*)[3])p, 100, 1e-9, facets, EBPO_HULL_FACETS),
+                     0);
     for (int i = 0; i < 100; i++)
         p[i][0] = i % 10, p[i][1] = i / 10;
-    ck_assert_int_eq(ebpo_hull_facets((const double (*)[3])p, 100, 1e-9, facets, EBPO_HULL_FACETS), 0); /* in a plane */
+    /* in a plane */
+    ck_assert_int_eq(ebpo_hull_facets((const double(*)[3])p, 100, 1e-9, facets, EBPO_HULL_FACETS),
+                     0);
     for (int i = 0; i < 512; i++)
         p[i][0] = i % 8, p[i][1] = i / 8 % 8, p[i][2] = i / 64;
-    int count = ebpo_hull_facets((const double (*)[3])p, 512, 1e-9, facets, EBPO_HULL_FACETS);
+    int count = ebpo_hull_facets((const double(*)[3])p, 512, 1e-9, facets, EBPO_HULL_FACETS);
     double area = 0;
     for (int i = 0; i < count; i++) {
         area += facets[i].area;
@@ -286,8 +312,9 @@ static void write_file(ebpo_mesh mesh, const ebpo_build_options *options)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_mesh_report facts;
     ebpo_tree tree;
-    ck_assert(ebpo_mesh_check(&facts, &mesh, 1, (ebpo_progress){0}, &error) == EBPO_OK);
-    ck_assert_msg(ebpo_build(&tree, &mesh, &facts, NULL, options, &error) == EBPO_OK, "%s", error.message);
+    ck_assert(ebpo_mesh_check(&facts, &mesh, 1, (ebpo_progress){ 0 }, &error) == EBPO_OK);
+    ck_assert_msg(ebpo_build(&tree, &mesh, &facts, NULL, options, &error) == EBPO_OK, "%s",
+                  error.message);
     ck_assert_msg(ebpo_tree_write(&tree, path, NULL, &error) == EBPO_OK, "%s", error.message);
     ebpo_tree_free(&tree);
 }
@@ -300,20 +327,20 @@ static ebpo_file *open_file(void)
     return file;
 }
 
-/* With EBPO_TEST_SCALE below 1 every fourth solid does: other compilers and sanitizers look for other things. */
-static bool left_out(int solid)
-{
-    return ebpo_test_scale() < 1 && solid % 4;
-}
+/* With EBPO_TEST_SCALE below 1 every fourth solid does: other compilers and sanitizers look for
+ * other things. */
+static bool left_out(int solid) { return ebpo_test_scale() < 1 && solid % 4; }
 
-static const ebpo_selection all[] = { EBPO_SELECT_INHERIT, EBPO_SELECT_KMEDOIDS, EBPO_SELECT_OFFSET, EBPO_SELECT_RANDOM };
+static const ebpo_selection all[] = { EBPO_SELECT_INHERIT, EBPO_SELECT_KMEDOIDS, EBPO_SELECT_OFFSET,
+                                      EBPO_SELECT_RANDOM };
 
 START_TEST(every_selection_makes_files_without_violations)
 {
     const ebpo_test_solid *solid = &ebpo_test_solids[_i];
     if (left_out(_i))
         return;
-    for (int s = _i % 2; s < 8; s += 2) { /* each solid with every second way, so that it takes half the time */
+    for (int s = _i % 2; s < 8;
+         s += 2) { /* each solid with every second way, so that it takes half the time */
         ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
         ebpo_error error = EBPO_ERROR_INIT;
         ebpo_verify_report report;
@@ -332,13 +359,15 @@ START_TEST(every_selection_makes_files_without_violations)
         ebpo_file *file = open_file();
         ck_assert_int_eq(ebpo_file_info(file)->selection, (int)options.select);
         ck_assert_msg(ebpo_verify(file, NULL, &report, &error) == EBPO_OK, "%s", error.message);
-        ck_assert_msg(report.violations == 0, "%s, selection %d: %llu violations", solid->name, s, (unsigned long long)report.violations);
+        ck_assert_msg(report.violations == 0, "%s, selection %d: %llu violations", solid->name, s,
+                      (unsigned long long)report.violations);
         ebpo_close(file);
     }
 }
 END_TEST
 
-static void digest_of(ebpo_selection select, uint64_t seed, unsigned threads, ebpo_workspace *workspace, uint8_t digest[32])
+static void digest_of(ebpo_selection select, uint64_t seed, unsigned threads,
+                      ebpo_workspace *workspace, uint8_t digest[32])
 {
     ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
     options.select = select;
@@ -373,7 +402,8 @@ START_TEST(memory_does_not_change_what_is_selected)
         ebpo_workspace *w;
         ebpo_error error = EBPO_ERROR_INIT;
         ebpo_workspace_figures f;
-        ck_assert_msg(ebpo_workspace_make_any(&w, 1 << 20, NULL, &error) == EBPO_OK, "%s", error.message);
+        ck_assert_msg(ebpo_workspace_make_any(&w, 1 << 20, NULL, &error) == EBPO_OK, "%s",
+                      error.message);
         digest_of(all[s], 5, 1, NULL, a);
         digest_of(all[s], 5, 2, w, b);
         ck_assert_mem_eq(a, b, 32);
@@ -386,16 +416,21 @@ END_TEST
 
 START_TEST(selections_and_their_numbers_that_make_no_sense_are_refused)
 {
-    struct { ebpo_selection select; double percent, k_root; int normals; } wrong[] = {
-        { (ebpo_selection)4, 40, 0, 0 }, { EBPO_SELECT_RANDOM, 0, 0, 0 }, { EBPO_SELECT_RANDOM, 101, 0, 0 }, { EBPO_SELECT_RANDOM, NAN, 0, 0 },
-        { EBPO_SELECT_KMEDOIDS, 40, -1, 0 }, { EBPO_SELECT_KMEDOIDS, 40, 0.5, 0 }, { EBPO_SELECT_KMEDOIDS, 40, INFINITY, 0 }, { EBPO_SELECT_KMEDOIDS, 40, 0, 2 } };
+    struct {
+        ebpo_selection select;
+        double percent, k_root;
+        int normals;
+    } wrong[] = { { (ebpo_selection)4, 40, 0, 0 },           { EBPO_SELECT_RANDOM, 0, 0, 0 },
+                  { EBPO_SELECT_RANDOM, 101, 0, 0 },         { EBPO_SELECT_RANDOM, NAN, 0, 0 },
+                  { EBPO_SELECT_KMEDOIDS, 40, -1, 0 },       { EBPO_SELECT_KMEDOIDS, 40, 0.5, 0 },
+                  { EBPO_SELECT_KMEDOIDS, 40, INFINITY, 0 }, { EBPO_SELECT_KMEDOIDS, 40, 0, 2 } };
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
         ebpo_error error = EBPO_ERROR_INIT;
         ebpo_mesh mesh = ebpo_test_tetrahedron(1);
         ebpo_mesh_report facts;
         ebpo_tree tree;
-        ck_assert(ebpo_mesh_check(&facts, &mesh, 1, (ebpo_progress){0}, &error) == EBPO_OK);
+        ck_assert(ebpo_mesh_check(&facts, &mesh, 1, (ebpo_progress){ 0 }, &error) == EBPO_OK);
         options.select = wrong[i].select;
         options.percent = wrong[i].percent;
         options.k_root = wrong[i].k_root;
@@ -420,7 +455,9 @@ static bool has_hulls(ebpo_file *file)
 
 START_TEST(hulls_of_a_convex_solid_fill_it_at_every_level)
 {
-    ebpo_mesh meshes[] = { ebpo_test_tetrahedron(2), ebpo_test_sphere((double[3]){ 3, -1, 1e3 }, 0.5, 3), ebpo_test_box((double[3]){ 0, 0, 0 }, (double[3]){ 1, 2, 0.001 }, 4) };
+    ebpo_mesh meshes[] = { ebpo_test_tetrahedron(2),
+                           ebpo_test_sphere((double[3]){ 3, -1, 1e3 }, 0.5, 3),
+                           ebpo_test_box((double[3]){ 0, 0, 0 }, (double[3]){ 1, 2, 0.001 }, 4) };
     for (size_t i = 0; i < sizeof meshes / sizeof *meshes; i++) {
         ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
         options.leaf_faces = 2;
@@ -431,7 +468,9 @@ START_TEST(hulls_of_a_convex_solid_fill_it_at_every_level)
             ebpo_limit limit;
             ebpo_error error = EBPO_ERROR_INIT;
             ck_assert(ebpo_limit_level(file, level, 2, NULL, &limit, &error) == EBPO_OK);
-            ck_assert_msg(fabs(limit.volume / info->report.volume - 1) < 1e-7, "solid %zu, level %d: hulls fill %.9f", i, level, limit.volume / info->report.volume);
+            ck_assert_msg(fabs(limit.volume / info->report.volume - 1) < 1e-7,
+                          "solid %zu, level %d: hulls fill %.9f", i, level,
+                          limit.volume / info->report.volume);
         }
         ebpo_close(file);
     }
@@ -463,10 +502,14 @@ START_TEST(no_envelope_is_smaller_than_the_limit_and_inherited_ones_come_close)
             double volume;
             ck_assert(ebpo_limit_level(file, level, 2, NULL, &limit, &error) == EBPO_OK);
             ck_assert(ebpo_lod_level(file, level, NULL, NULL, &volume, &error) == EBPO_OK);
-            ck_assert_msg(volume >= limit.volume - 1e-9 * root, "%s, level %d: %g below the limit %g", solid->name, level, volume, limit.volume);
+            ck_assert_msg(volume >= limit.volume - 1e-9 * root,
+                          "%s, level %d: %g below the limit %g", solid->name, level, volume,
+                          limit.volume);
             ck_assert_double_le(volume, before * (1 + 1e-9) + 1e-12 * root);
             if (s == 0 && level <= 3) /* offsets in 4096ths of a cell alone cost some */
-                ck_assert_msg(volume - limit.volume <= 0.03 * root, "%s, level %d: %g where %g is possible", solid->name, level, volume, limit.volume);
+                ck_assert_msg(volume - limit.volume <= 0.03 * root,
+                              "%s, level %d: %g where %g is possible", solid->name, level, volume,
+                              limit.volume);
             before = volume;
         }
         ebpo_close(file);
@@ -490,11 +533,13 @@ int main(void)
     suite_add_tcase(suite, tests);
     tcase_set_timeout(files, 600);
     tcase_add_checked_fixture(files, enter, leave);
-    tcase_add_loop_test(files, every_selection_makes_files_without_violations, 0, ebpo_test_solid_count);
+    tcase_add_loop_test(files, every_selection_makes_files_without_violations, 0,
+                        ebpo_test_solid_count);
     tcase_add_test(files, equal_seeds_give_equal_files_for_any_number_of_threads);
     tcase_add_test(files, memory_does_not_change_what_is_selected);
     tcase_add_test(files, hulls_of_a_convex_solid_fill_it_at_every_level);
-    tcase_add_loop_test(files, no_envelope_is_smaller_than_the_limit_and_inherited_ones_come_close, 0, ebpo_test_solid_count);
+    tcase_add_loop_test(files, no_envelope_is_smaller_than_the_limit_and_inherited_ones_come_close,
+                        0, ebpo_test_solid_count);
     suite_add_tcase(suite, files);
     SRunner *runner = srunner_create(suite);
     srunner_run_all(runner, CK_NORMAL);

@@ -11,12 +11,10 @@
 #include "random_tree.h"
 #include "solids.h"
 
-/* libhdf5 1.10 itself leaks when it gives up on a damaged object header; that is not what we look for here. */
+/* libhdf5 1.10 itself leaks when it gives up on a damaged object header; that is not what we look
+ * for here. */
 __attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void)
-{
-    return "leak:libhdf5";
-}
+const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
 
 static char folder[] = "/tmp/ebpo-slice-XXXXXX", path[64];
 
@@ -33,7 +31,8 @@ static void remove_folder(void)
     strcpy(folder + strlen(folder) - 6, "XXXXXX");
 }
 
-/* A file, all of it in memory, and the number of nodes of each type before each group, counted one by one. */
+/* A file, all of it in memory, and the number of nodes of each type before each group, counted one
+ * by one. */
 typedef struct whole {
     ebpo_file *file;
     ebpo_tree tree;
@@ -69,8 +68,10 @@ static void whole_open(whole *w, const char *name, uint64_t budget)
     ebpo_error error = EBPO_ERROR_INIT;
     memset(w, 0, sizeof *w);
     ck_assert_msg(ebpo_open(&w->file, name, &error) == EBPO_OK, "%s", error.message);
-    ck_assert_msg(ebpo_file_read_tree(w->file, &w->tree, 1, &error) == EBPO_OK, "%s", error.message);
-    ck_assert_msg(ebpo_chunks_make(&w->chunks, w->file, budget, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_file_read_tree(w->file, &w->tree, 1, &error) == EBPO_OK, "%s",
+                  error.message);
+    ck_assert_msg(ebpo_chunks_make(&w->chunks, w->file, budget, &error) == EBPO_OK, "%s",
+                  error.message);
     for (int i = 0; i < w->tree.info.level_count; i++)
         count_level(w, i);
 }
@@ -108,8 +109,10 @@ static void build(ebpo_mesh mesh, uint32_t leaf_faces, int max_level, uint32_t p
     options.leaf_faces = leaf_faces;
     options.max_level = max_level;
     options.parts = parts;
-    ck_assert_msg(ebpo_mesh_check(&report, &mesh, 0, options.progress, &error) == EBPO_OK, "%s", error.message);
-    ck_assert_msg(ebpo_build(&tree, &mesh, &report, &mend, &options, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_mesh_check(&report, &mesh, 0, options.progress, &error) == EBPO_OK, "%s",
+                  error.message);
+    ck_assert_msg(ebpo_build(&tree, &mesh, &report, &mend, &options, &error) == EBPO_OK, "%s",
+                  error.message);
     write_tree(&tree, ~0u);
 }
 
@@ -118,7 +121,9 @@ static void build(ebpo_mesh mesh, uint32_t leaf_faces, int max_level, uint32_t p
 typedef struct compare {
     const whole *w;
     const ebpo_slice *slice;
-    uint64_t next[EBPO_LEVELS_MAX][4], group[EBPO_LEVELS_MAX], plane[EBPO_LEVELS_MAX], ref[EBPO_LEVELS_MAX]; /* of the slice */
+    /* of the slice */
+    uint64_t next[EBPO_LEVELS_MAX][4], group[EBPO_LEVELS_MAX], plane[EBPO_LEVELS_MAX],
+        ref[EBPO_LEVELS_MAX];
     uint8_t *listed; /* local faces */
 } compare;
 
@@ -130,13 +135,16 @@ static void compare_leaf(compare *c, int i, uint64_t at, int level, uint64_t ran
     ck_assert_uint_ge(a->leaf_first[at], c->slice->outer_count);
     for (uint64_t k = 0; k < a->leaf_new[at]; k++) {
         ck_assert_uint_lt(a->leaf_first[at] + k, c->slice->mesh.face_count);
-        ck_assert_uint_eq(ebpo_slice_file_face(c->slice, (uint32_t)(a->leaf_first[at] + k)), b->leaf_first[rank] + k);
+        ck_assert_uint_eq(ebpo_slice_file_face(c->slice, (uint32_t)(a->leaf_first[at] + k)),
+                          b->leaf_first[rank] + k);
     }
-    ck_assert_uint_eq(c->slice->first_face + (a->leaf_first[at] - c->slice->outer_count), b->leaf_first[rank]);
+    ck_assert_uint_eq(c->slice->first_face + (a->leaf_first[at] - c->slice->outer_count),
+                      b->leaf_first[rank]);
     for (uint64_t k = 0; k < a->leaf_ref_count[at]; k++) {
         uint32_t local = a->leaf_refs[c->ref[i]++];
         ck_assert_uint_lt(local, c->slice->mesh.face_count);
-        ck_assert_uint_eq(ebpo_slice_file_face(c->slice, local), b->leaf_refs[c->w->refs_before[level][rank] + k]);
+        ck_assert_uint_eq(ebpo_slice_file_face(c->slice, local),
+                          b->leaf_refs[c->w->refs_before[level][rank] + k]);
         c->listed[local] = 1;
     }
 }
@@ -147,18 +155,24 @@ static void compare_node(compare *c, int i, unsigned type, uint64_t rank)
     const ebpo_level *a = &c->slice->level[i], *b = &c->w->tree.level[level];
     uint64_t at = c->next[i][type]++;
     if (type == EBPO_LEAF) {
-        ck_assert(!a->leaf_winding == !b->leaf_winding && (!a->leaf_winding || a->leaf_winding[at] == b->leaf_winding[rank]));
+        ck_assert(!a->leaf_winding == !b->leaf_winding &&
+                  (!a->leaf_winding || a->leaf_winding[at] == b->leaf_winding[rank]));
         compare_leaf(c, i, at, level, rank);
     } else if (type == EBPO_BLACK) {
-        ck_assert(!a->black_winding == !b->black_winding && (!a->black_winding || a->black_winding[at] == b->black_winding[rank]));
+        ck_assert(!a->black_winding == !b->black_winding &&
+                  (!a->black_winding || a->black_winding[at] == b->black_winding[rank]));
     } else if (type == EBPO_WHITE) {
-        ck_assert(!a->white_winding == !b->white_winding && (!a->white_winding || a->white_winding[at] == b->white_winding[rank]));
+        ck_assert(!a->white_winding == !b->white_winding &&
+                  (!a->white_winding || a->white_winding[at] == b->white_winding[rank]));
     } else {
-        ck_assert(!a->plane_counts == !b->plane_counts && (!a->plane_counts || a->plane_counts[at] == b->plane_counts[rank]));
+        ck_assert(!a->plane_counts == !b->plane_counts &&
+                  (!a->plane_counts || a->plane_counts[at] == b->plane_counts[rank]));
         for (unsigned k = 0; a->plane_counts && k < a->plane_counts[at]; k++)
-            ck_assert_uint_eq(a->planes[c->plane[i]++], b->planes[c->w->planes_before[level][rank] + k]);
+            ck_assert_uint_eq(a->planes[c->plane[i]++],
+                              b->planes[c->w->planes_before[level][rank] + k]);
         uint64_t group = c->group[i + 1]++, ranks[4];
-        ck_assert_uint_eq(c->slice->level[i + 1].types[group], c->w->tree.level[level + 1].types[rank]);
+        ck_assert_uint_eq(c->slice->level[i + 1].types[group],
+                          c->w->tree.level[level + 1].types[rank]);
         memcpy(ranks, c->w->before[level + 1][rank], sizeof ranks);
         for (int octant = 0; octant < 8; octant++) {
             unsigned child = type_at(&c->w->tree.level[level + 1], rank, octant);
@@ -176,7 +190,8 @@ static void compare_faces(const ebpo_slice *s, const ebpo_tree *tree)
     for (uint64_t f = 0; f < s->mesh.face_count; f++) {
         uint64_t in_file = ebpo_slice_file_face(s, (uint32_t)f);
         for (int k = 0; k < 3; k++) {
-            uint64_t a = s->mesh.faces[3 * f + (unsigned)k], b = tree->mesh.faces[3 * in_file + (unsigned)k];
+            uint64_t a = s->mesh.faces[3 * f + (unsigned)k],
+                     b = tree->mesh.faces[3 * in_file + (unsigned)k];
             ck_assert_uint_lt(a, s->mesh.vertex_count);
             used[a] = 1;
             if (s->mesh.xyz32)
@@ -238,7 +253,8 @@ static void check_slice(const whole *w, const ebpo_place *root)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_slice slice;
     ebpo_slice_size size;
-    ck_assert_msg(ebpo_slice_measure(w->chunks, root, &size, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_slice_measure(w->chunks, root, &size, &error) == EBPO_OK, "%s",
+                  error.message);
     ck_assert_msg(ebpo_slice_read(&slice, w->chunks, root, &error) == EBPO_OK, "%s", error.message);
     ck_assert_mem_eq(&slice.root, root, sizeof *root);
     compare_slice(w, &slice, &size);
@@ -254,17 +270,23 @@ static void check_place(const whole *w, const ebpo_place *place)
     uint16_t types;
     int32_t winding;
     if (place->type == EBPO_GRAY) {
-        ck_assert_msg(ebpo_place_children(w->chunks, place, &types, ranks, &error) == EBPO_OK, "%s", error.message);
+        ck_assert_msg(ebpo_place_children(w->chunks, place, &types, ranks, &error) == EBPO_OK, "%s",
+                      error.message);
         ck_assert_uint_eq(types, w->tree.level[place->level + 1].types[place->rank]);
         ck_assert_mem_eq(ranks, w->before[place->level + 1][place->rank], sizeof ranks);
-        ck_assert_msg(ebpo_place_planes(w->chunks, place, codes, &count, &error) == EBPO_OK, "%s", error.message);
+        ck_assert_msg(ebpo_place_planes(w->chunks, place, codes, &count, &error) == EBPO_OK, "%s",
+                      error.message);
         ck_assert_uint_eq(count, l->plane_counts ? l->plane_counts[place->rank] : 0);
         for (uint32_t k = 0; k < count; k++)
             ck_assert_uint_eq(codes[k], l->planes[w->planes_before[place->level][place->rank] + k]);
-        ck_assert_int_eq(ebpo_place_winding(w->chunks, place, &winding, NULL), w->tree.info.solid ? EBPO_E_ARGUMENT : EBPO_E_NOT_SOLID);
+        ck_assert_int_eq(ebpo_place_winding(w->chunks, place, &winding, NULL),
+                         w->tree.info.solid ? EBPO_E_ARGUMENT : EBPO_E_NOT_SOLID);
     } else if (w->tree.info.solid) {
-        const int32_t *windings = place->type == EBPO_LEAF ? l->leaf_winding : place->type == EBPO_BLACK ? l->black_winding : l->white_winding;
-        ck_assert_msg(ebpo_place_winding(w->chunks, place, &winding, &error) == EBPO_OK, "%s", error.message);
+        const int32_t *windings = place->type == EBPO_LEAF    ? l->leaf_winding
+                                  : place->type == EBPO_BLACK ? l->black_winding
+                                                              : l->white_winding;
+        ck_assert_msg(ebpo_place_winding(w->chunks, place, &winding, &error) == EBPO_OK, "%s",
+                      error.message);
         ck_assert_int_eq(winding, windings ? windings[place->rank] : place->type == EBPO_BLACK);
     } else {
         ck_assert_int_eq(ebpo_place_winding(w->chunks, place, &winding, NULL), EBPO_E_NOT_SOLID);
@@ -293,8 +315,9 @@ START_TEST(slices_of_random_trees_are_what_the_whole_file_says)
 {
     if (!ebpo_test_wanted(_i))
         return;
-    random_tree_options options = { (uint64_t)_i, 2 + _i % 4, 2 + (unsigned)_i % 5, 1 + (unsigned)_i % 9, _i % 3 != 0, _i % 2 != 0,
-                                    _i % 3 == 1, _i % 5 == 0 };
+    random_tree_options options = { (uint64_t)_i,         2 + _i % 4,  2 + (unsigned)_i % 5,
+                                    1 + (unsigned)_i % 9, _i % 3 != 0, _i % 2 != 0,
+                                    _i % 3 == 1,          _i % 5 == 0 };
     ebpo_tree tree;
     whole w;
     random_tree_make(&tree, &options);
@@ -310,14 +333,16 @@ START_TEST(slices_of_solids_are_what_the_whole_file_says)
     if (!ebpo_test_wanted(_i))
         return;
     whole w;
-    build(ebpo_test_solids[_i].make(), 1, -1, _i % 2 ? USUAL : EBPO_PART_MESH | EBPO_PART_LEAF_PLANES);
+    build(ebpo_test_solids[_i].make(), 1, -1,
+          _i % 2 ? USUAL : EBPO_PART_MESH | EBPO_PART_LEAF_PLANES);
     whole_open(&w, path, 0);
     check_all(&w, 7);
     whole_close(&w);
 }
 END_TEST
 
-/* More than 4,096 groups, gray nodes and leaves in a level, so that index arrays are there and tell where to begin; chunks by the dozen. */
+/* More than 4,096 groups, gray nodes and leaves in a level, so that index arrays are there and tell
+ * where to begin; chunks by the dozen. */
 START_TEST(slices_are_found_by_index_arrays_and_with_little_room)
 {
     random_tree_options options = { 5, 7, 13, 2, true, _i == 1, true, _i == 1 };
@@ -373,7 +398,9 @@ static void same_level(const ebpo_level *a, const ebpo_level *b)
 
 START_TEST(the_slice_of_the_root_is_the_whole_tree)
 {
-    random_tree_options options = { 3 + (uint64_t)_i, 1 + _i, 6, 5, true, false, _i % 2 == 0, true };
+    random_tree_options options = {
+        3 + (uint64_t)_i, 1 + _i, 6, 5, true, false, _i % 2 == 0, true
+    };
     ebpo_tree tree;
     whole w;
     ebpo_slice all, root;
@@ -385,7 +412,8 @@ START_TEST(the_slice_of_the_root_is_the_whole_tree)
     ck_assert_int_eq(ebpo_slice_read(&root, w.chunks, &all.root, NULL), EBPO_OK);
     ck_assert_int_eq(ebpo_slice_measure(w.chunks, &all.root, &size, NULL), EBPO_OK);
     ck_assert_int_eq(all.level_count, root.level_count);
-    ck_assert(all.face_count == root.face_count && all.first_face == 0 && root.first_face == 0 && !all.outer && !root.outer);
+    ck_assert(all.face_count == root.face_count && all.first_face == 0 && root.first_face == 0 &&
+              !all.outer && !root.outer);
     same(all.face_source, root.face_source, all.face_count * 4);
     for (int i = 0; i < all.level_count; i++)
         same_level(&all.level[i], &root.level[i]);
@@ -448,8 +476,10 @@ START_TEST(places_that_the_file_does_not_have_are_refused)
         ebpo_slice_size size;
         ck_assert_int_eq(ebpo_slice_read(&slice, w.chunks, &wrong[i], &error), EBPO_E_ARGUMENT);
         ck_assert_int_eq(ebpo_slice_measure(w.chunks, &wrong[i], &size, &error), EBPO_E_ARGUMENT);
-        ck_assert_int_eq(ebpo_place_children(w.chunks, &wrong[i], &types, ranks, &error), EBPO_E_ARGUMENT);
-        ck_assert_int_eq(ebpo_place_planes(w.chunks, &wrong[i], codes, &count, &error), EBPO_E_ARGUMENT);
+        ck_assert_int_eq(ebpo_place_children(w.chunks, &wrong[i], &types, ranks, &error),
+                         EBPO_E_ARGUMENT);
+        ck_assert_int_eq(ebpo_place_planes(w.chunks, &wrong[i], codes, &count, &error),
+                         EBPO_E_ARGUMENT);
     }
     whole_close(&w);
 }
@@ -467,16 +497,27 @@ START_TEST(ranges_of_integers_are_widened_and_checked)
     ck_assert_uint_gt(l->leaf_count, 20000); /* two chunks of i32 at least */
     int64_t windings[3];
     uint64_t row = 16383, index[3];
-    ck_assert_int_eq(ebpo_chunks_integers(w.chunks, EBPO_A_LEAF_WINDING, 6, row, 3, windings, 8, NULL), EBPO_OK);
+    ck_assert_int_eq(ebpo_chunks_integers(w.chunks, EBPO_A_LEAF_WINDING, 6, row, 3, windings, 8,
+                                          NULL),
+                     EBPO_OK);
     for (int i = 0; i < 3; i++)
         ck_assert_int_eq(windings[i], l->leaf_winding[row + (unsigned)i]);
-    ck_assert_int_eq(ebpo_chunks_integers(w.chunks, EBPO_A_LEAF_INDEX, 6, 2, 1, index, 8, NULL), EBPO_OK);
+    ck_assert_int_eq(ebpo_chunks_integers(w.chunks, EBPO_A_LEAF_INDEX, 6, 2, 1, index, 8, NULL),
+                     EBPO_OK);
     ck_assert_uint_eq(index[1], w.refs_before[6][2 * EBPO_INDEX_ROWS]);
-    ck_assert_int_eq(ebpo_chunks_integers(w.chunks, EBPO_A_LEAF_NEW, 6, l->leaf_count, 0, windings, 8, NULL), EBPO_OK);
-    ck_assert_int_eq(ebpo_chunks_integers(w.chunks, EBPO_A_LEAF_NEW, 6, l->leaf_count - 1, 2, windings, 8, NULL), EBPO_E_ARGUMENT);
-    ck_assert_int_eq(ebpo_chunks_integers(w.chunks, EBPO_A_LEAF_NEW, 6, 1, UINT64_MAX, windings, 8, NULL), EBPO_E_ARGUMENT);
-    ck_assert_int_eq(ebpo_chunks_integers(w.chunks, EBPO_A_LEAF_SKIP, 6, 0, 1, windings, 2, NULL), EBPO_E_ARGUMENT);
-    ck_assert_int_eq(ebpo_chunks_integers(w.chunks, EBPO_A_PLANES, 6, 0, 1, windings, 8, NULL), EBPO_E_ARGUMENT);
+    ck_assert_int_eq(ebpo_chunks_integers(w.chunks, EBPO_A_LEAF_NEW, 6, l->leaf_count, 0, windings,
+                                          8, NULL),
+                     EBPO_OK);
+    ck_assert_int_eq(ebpo_chunks_integers(w.chunks, EBPO_A_LEAF_NEW, 6, l->leaf_count - 1, 2,
+                                          windings, 8, NULL),
+                     EBPO_E_ARGUMENT);
+    ck_assert_int_eq(ebpo_chunks_integers(w.chunks, EBPO_A_LEAF_NEW, 6, 1, UINT64_MAX, windings, 8,
+                                          NULL),
+                     EBPO_E_ARGUMENT);
+    ck_assert_int_eq(ebpo_chunks_integers(w.chunks, EBPO_A_LEAF_SKIP, 6, 0, 1, windings, 2, NULL),
+                     EBPO_E_ARGUMENT);
+    ck_assert_int_eq(ebpo_chunks_integers(w.chunks, EBPO_A_PLANES, 6, 0, 1, windings, 8, NULL),
+                     EBPO_E_ARGUMENT);
     whole_close(&w);
 }
 END_TEST
@@ -507,9 +548,13 @@ static bool try_all(const ebpo_file *file, ebpo_chunks *chunks, uint64_t *state)
     const ebpo_info *info = ebpo_file_info(file);
     bool well = true;
     for (int n = 0; n < 12; n++) {
-        int level = info->level_count > 5 ? 2 + n % (info->level_count - 2) : n % info->level_count; /* of large trees, small parts */
-        ebpo_place place = { .level = level, .type = info->level[level].gray_count && n % 3 ? EBPO_GRAY : EBPO_LEAF };
-        uint64_t count = place.type == EBPO_GRAY ? info->level[level].gray_count : info->level[level].leaf_count;
+        /* of large trees, small parts */
+        int level = info->level_count > 5 ? 2 + n % (info->level_count - 2) : n % info->level_count;
+        ebpo_place place = { .level = level,
+                             .type =
+                                 info->level[level].gray_count && n % 3 ? EBPO_GRAY : EBPO_LEAF };
+        uint64_t count =
+            place.type == EBPO_GRAY ? info->level[level].gray_count : info->level[level].leaf_count;
         if (count == 0)
             continue;
         place.rank = n < 3 ? 0 : ebpo_test_random(state) % count;
@@ -520,8 +565,9 @@ static bool try_all(const ebpo_file *file, ebpo_chunks *chunks, uint64_t *state)
         uint64_t ranks[4];
         uint32_t codes[255], planes;
         int32_t winding;
-        ebpo_status status[5] = { ebpo_slice_measure(chunks, &place, &size, NULL), ebpo_slice_read(&slice, chunks, &place, &error),
-                                  EBPO_OK, EBPO_OK, EBPO_OK };
+        ebpo_status status[5] = { ebpo_slice_measure(chunks, &place, &size, NULL),
+                                  ebpo_slice_read(&slice, chunks, &place, &error), EBPO_OK, EBPO_OK,
+                                  EBPO_OK };
         if (place.type == EBPO_GRAY) {
             status[2] = ebpo_place_children(chunks, &place, &types, ranks, NULL);
             status[3] = ebpo_place_planes(chunks, &place, codes, &planes, NULL);
@@ -531,7 +577,9 @@ static bool try_all(const ebpo_file *file, ebpo_chunks *chunks, uint64_t *state)
         if (status[1] == EBPO_OK)
             check_bounds(&slice);
         for (int k = 0; k < 5; k++) {
-            ck_assert_msg(status[k] == EBPO_OK || status[k] == EBPO_E_FORMAT || status[k] == EBPO_E_ABSENT, "%d: %s", k, error.message);
+            ck_assert_msg(status[k] == EBPO_OK || status[k] == EBPO_E_FORMAT ||
+                              status[k] == EBPO_E_ABSENT,
+                          "%d: %s", k, error.message);
             well &= status[k] == EBPO_OK;
         }
         ebpo_slice_free(&slice);
@@ -561,7 +609,9 @@ static bool try_changed(whole *w, ebpo_array_id id, int level, uint64_t *state)
 
 START_TEST(changed_numbers_never_lead_outside)
 {
-    random_tree_options options = { 31 + (uint64_t)_i, _i ? 7 : 4, _i ? 9 : 7, 4, true, false, true, true };
+    random_tree_options options = {
+        31 + (uint64_t)_i, _i ? 7 : 4, _i ? 9 : 7, 4, true, false, true, true
+    };
     ebpo_tree tree;
     whole w;
     uint64_t state = 4711;
@@ -572,7 +622,9 @@ START_TEST(changed_numbers_never_lead_outside)
     ck_assert(try_all(w.file, w.chunks, &state));
     for (int level = 0; level < w.tree.info.level_count; level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
-            for (int n = 0; n < (_i ? 1 : 40) && ebpo_reader_array(w.file, (ebpo_array_id)id, level)->present; n++)
+            for (int n = 0;
+                 n < (_i ? 1 : 40) && ebpo_reader_array(w.file, (ebpo_array_id)id, level)->present;
+                 n++)
                 refused += !try_changed(&w, (ebpo_array_id)id, level, &state);
     ck_assert_uint_gt(refused, _i ? 5 : 100);
     whole_close(&w);
@@ -592,19 +644,28 @@ START_TEST(counts_that_do_not_fit_the_types_are_refused)
     ebpo_held_chunk view = { .array = ebpo_reader_array(w.file, EBPO_A_TYPES, 3) };
     ck_assert_int_eq(ebpo_held_chunk_move(w.chunks, &view, 0, NULL), EBPO_OK);
     ((uint8_t *)(uintptr_t)view.rows)[0] |= 3; /* gray at the deepest level */
-    ck_assert_int_eq(ebpo_slice_read(&slice, w.chunks, &(ebpo_place){ .type = EBPO_GRAY }, &error), EBPO_E_FORMAT);
-    ck_assert_ptr_nonnull(strstr(error.message, "/levels/03/types: the types contradict the counts"));
+    ck_assert_int_eq(ebpo_slice_read(&slice, w.chunks, &(ebpo_place){ .type = EBPO_GRAY }, &error),
+                     EBPO_E_FORMAT);
+    ck_assert_ptr_nonnull(
+        strstr(error.message, "/levels/03/types: the types contradict the counts"));
     ck_assert(slice.level[0].types == NULL && slice.level_count == 0);
     ebpo_held_chunk_release(w.chunks, &view);
     whole_close(&w);
 }
 END_TEST
 
-/* What is wrong with these is seen in parts, too; others are refused at opening, or only when the whole is checked. */
+/* What is wrong with these is seen in parts, too; others are refused at opening, or only when the
+ * whole is checked. */
 START_TEST(failed_vectors_give_errors_here_too)
 {
-    static const char *const sure[] = { "vertex_nan", "face_vertex_below_zero", "faces_index_wrong", "chunk_bit_flipped",
-                                        "plane_code_of_no_plane", "leaf_ref_not_before_first", "leaves_out_of_depth_first_order", "white_node_inside" };
+    static const char *const sure[] = { "vertex_nan",
+                                        "face_vertex_below_zero",
+                                        "faces_index_wrong",
+                                        "chunk_bit_flipped",
+                                        "plane_code_of_no_plane",
+                                        "leaf_ref_not_before_first",
+                                        "leaves_out_of_depth_first_order",
+                                        "white_node_inside" };
     const char *vectors = getenv("EBPO_VECTORS");
     unsigned opened = 0, found = 0;
     char name[4096];
@@ -670,7 +731,9 @@ static void *read_random(void *context)
     reader *r = context;
     uint64_t count = r->w->tree.level[r->level].gray_count;
     for (uint64_t n = 0; n < (r->fill ? count : 60); n++) {
-        ebpo_place place = { .level = r->level, .type = EBPO_GRAY, .rank = r->fill ? n : ebpo_test_random(&r->state) % count };
+        ebpo_place place = { .level = r->level,
+                             .type = EBPO_GRAY,
+                             .rank = r->fill ? n : ebpo_test_random(&r->state) % count };
         ebpo_slice slice;
         if (ebpo_slice_read(&slice, r->w->chunks, &place, NULL) != EBPO_OK) {
             r->wrong++;
@@ -727,7 +790,9 @@ START_TEST(subtrees_of_a_real_model_add_up)
     whole_open(&w, path, 3 << 20);
     for (int level = 0; level <= CUT; level++)
         for (int type = EBPO_LEAF; type <= (level == CUT ? EBPO_GRAY : EBPO_LEAF); type++)
-            for (uint64_t rank = 0; rank < (type == EBPO_GRAY ? w.tree.level[level].gray_count : w.tree.level[level].leaf_count); rank++) {
+            for (uint64_t rank = 0; rank < (type == EBPO_GRAY ? w.tree.level[level].gray_count
+                                                              : w.tree.level[level].leaf_count);
+                 rank++) {
                 ebpo_place place = { .level = level, .type = (ebpo_node_type)type, .rank = rank };
                 ebpo_slice_size size;
                 check_slice(&w, &place);
@@ -750,7 +815,8 @@ int main(void)
     tcase_set_timeout(cases, 300);
     tcase_add_checked_fixture(cases, make_folder, remove_folder);
     tcase_add_loop_test(cases, slices_of_random_trees_are_what_the_whole_file_says, 0, 20);
-    tcase_add_loop_test(cases, slices_of_solids_are_what_the_whole_file_says, 0, ebpo_test_solid_count);
+    tcase_add_loop_test(cases, slices_of_solids_are_what_the_whole_file_says, 0,
+                        ebpo_test_solid_count);
     tcase_add_loop_test(cases, slices_are_found_by_index_arrays_and_with_little_room, 0, 2);
     tcase_add_loop_test(cases, slices_of_a_mesh_of_many_chunks_agree, 0, 2);
     tcase_add_loop_test(cases, the_slice_of_the_root_is_the_whole_tree, 0, 5);

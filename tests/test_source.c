@@ -1,4 +1,5 @@
-/* Files from memory, from paths and from a caller's own source: the same trees, few reads, and every failure of a read told as what it is. */
+/* Files from memory, from paths and from a caller's own source: the same trees, few reads, and
+ * every failure of a read told as what it is. */
 #include <check.h>
 #include <limits.h>
 #include <hdf5.h>
@@ -10,12 +11,10 @@
 #include "random_tree.h"
 #include "tree_json.h"
 
-/* libhdf5 1.10 itself leaks when opening a damaged file fails; that is not what we look for here. */
+/* libhdf5 1.10 itself leaks when opening a damaged file fails; that is not what we look for here.
+ */
 __attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void)
-{
-    return "leak:libhdf5";
-}
+const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
 
 static char folder[64], path[128], rewritten[128];
 static uint8_t *data; /* the bytes of `path`, in a block of exactly their size */
@@ -49,7 +48,8 @@ static char *read_text(ebpo_file *file, unsigned threads)
 {
     ebpo_tree tree;
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert_msg(ebpo_file_read_tree(file, &tree, threads, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_file_read_tree(file, &tree, threads, &error) == EBPO_OK, "%s",
+                  error.message);
     char *text = text_of(&tree);
     ebpo_tree_free(&tree);
     return text;
@@ -83,7 +83,8 @@ static void make_file(const random_tree_options *options, ebpo_codec codec)
 }
 
 static const random_tree_options small = { 2, 3, 3, 5, true, false, false, false };
-static const random_tree_options large = { 7, 3, 9, 90000, true, false, false, false }; /* several chunks in many arrays */
+/* several chunks in many arrays */
+static const random_tree_options large = { 7, 3, 9, 90000, true, false, false, false };
 
 static void set_up(void)
 {
@@ -112,7 +113,8 @@ typedef struct probe {
     bool silent;
 } probe;
 
-static ebpo_status probe_read(void *user, uint64_t offset, uint64_t bytes, void *to, ebpo_error *error)
+static ebpo_status probe_read(void *user, uint64_t offset, uint64_t bytes, void *to,
+                              ebpo_error *error)
 {
     probe *p = user;
     ck_assert(offset <= size && bytes <= size - offset && bytes > 0);
@@ -139,18 +141,21 @@ static ebpo_status open_probe(ebpo_file **file, probe *p, ebpo_error *error)
     return ebpo_open_source(file, &source, "afar", error);
 }
 
-/* The same content as libhdf5 arranges it by default: metadata here and there, chunks in B-trees. */
+/* The same content as libhdf5 arranges it by default: metadata here and there, chunks in B-trees.
+ */
 static void rewrite_with_trees(void)
 {
     static const char *const groups[] = { "levels", "mesh", "maps" };
-    hid_t in = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT), out = H5Fcreate(rewritten, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+    hid_t in = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT),
+          out = H5Fcreate(rewritten, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
     for (int i = 0; i < 3; i++)
         ck_assert_int_ge(H5Ocopy(in, groups[i], out, groups[i], H5P_DEFAULT, H5P_DEFAULT), 0);
     H5O_info_t facts;
     ck_assert_int_ge(H5Oget_info2(in, &facts, H5O_INFO_NUM_ATTRS), 0);
     for (hsize_t i = 0; i < facts.num_attrs; i++) {
         char name[64], value[512];
-        hid_t from = H5Aopen_by_idx(in, ".", H5_INDEX_NAME, H5_ITER_INC, i, H5P_DEFAULT, H5P_DEFAULT);
+        hid_t from =
+            H5Aopen_by_idx(in, ".", H5_INDEX_NAME, H5_ITER_INC, i, H5P_DEFAULT, H5P_DEFAULT);
         hid_t type = H5Aget_type(from), space = H5Aget_space(from);
         ck_assert_int_gt(H5Aget_name(from, sizeof name, name), 0);
         ck_assert_int_ge(H5Aread(from, type, value), 0);
@@ -165,10 +170,12 @@ static void rewrite_with_trees(void)
     H5Fclose(out);
 }
 
-/* One array again without filters, all chunks set aside at once: libhdf5 then computes their places and stores no table. */
+/* One array again without filters, all chunks set aside at once: libhdf5 then computes their places
+ * and stores no table. */
 static void strip(hid_t file, const char *name)
 {
-    hid_t old = H5Dopen2(file, name, H5P_DEFAULT), type = H5Dget_type(old), space = H5Dget_space(old);
+    hid_t old = H5Dopen2(file, name, H5P_DEFAULT), type = H5Dget_type(old),
+          space = H5Dget_space(old);
     hid_t from = H5Dget_create_plist(old), plain = H5Pcreate(H5P_DATASET_CREATE);
     hsize_t chunk[2], dims[2] = { 1, 1 };
     int rank = H5Pget_chunk(from, 2, chunk);
@@ -209,7 +216,8 @@ static void rewrite_without_filters(void)
     hid_t fapl = H5Pcreate(H5P_FILE_ACCESS);
     H5Pset_libver_bounds(fapl, H5F_LIBVER_V110, H5F_LIBVER_V110);
     hid_t file = H5Fopen(rewritten, H5F_ACC_RDWR, fapl);
-    ck_assert_int_ge(H5Ovisit2(file, H5_INDEX_NAME, H5_ITER_INC, list_array, &next, H5O_INFO_BASIC), 0);
+    ck_assert_int_ge(H5Ovisit2(file, H5_INDEX_NAME, H5_ITER_INC, list_array, &next, H5O_INFO_BASIC),
+                     0);
     while (next-- != names)
         strip(file, *next);
     H5Pclose(fapl);
@@ -252,13 +260,15 @@ START_TEST(one_read_opens_a_file_and_each_byte_of_an_array_is_read_once)
     ck_assert_uint_eq(later - bytes, size - info->head_bytes - info->chunk_index_bytes);
     uint64_t arrays = 0, chunks = 0;
     for (int i = 0; i < EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS; i++) {
-        const ebpo_array_in *a = i < EBPO_ARRAYS ? &file->root_array[i] : &file->level_array[0][0] + (i - EBPO_ARRAYS);
+        const ebpo_array_in *a =
+            i < EBPO_ARRAYS ? &file->root_array[i] : &file->level_array[0][0] + (i - EBPO_ARRAYS);
         arrays += a->present;
         chunks += a->present ? ebpo_h5_chunk_count(&a->shape) : 0;
     }
     ck_assert_uint_gt(chunks, arrays + 20);
     ck_assert_uint_ge(later_reads - reads, arrays);
-    ck_assert_uint_lt(later_reads - reads, arrays + (chunks - arrays) / 2); /* neighbours come together */
+    /* neighbours come together */
+    ck_assert_uint_lt(later_reads - reads, arrays + (chunks - arrays) / 2);
     ebpo_tree_free(&tree);
     ebpo_close(file);
 }
@@ -271,7 +281,8 @@ static void probe_expect(void *user, const ebpo_range *ranges, size_t count)
         ck_assert(ranges[i].offset <= size && ranges[i].size <= size - ranges[i].offset);
 }
 
-/* Of files far away the index is read when it is needed, from where the head says; other programs may have moved it. */
+/* Of files far away the index is read when it is needed, from where the head says; other programs
+ * may have moved it. */
 START_TEST(the_index_is_found_whatever_the_head_says_of_its_place)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -279,8 +290,14 @@ START_TEST(the_index_is_found_whatever_the_head_says_of_its_place)
     for (int lie = 0; lie < 6; lie++) {
         probe p = { .fail_at = UINT_MAX };
         ebpo_file *file;
-        ebpo_source source = { .user = &p, .size = size, .read = probe_read, .close = probe_close, .expect = probe_expect, .at_hand = 100000 };
-        ck_assert_msg(ebpo_open_source(&file, &source, "far", &error) == EBPO_OK, "%s", error.message);
+        ebpo_source source = { .user = &p,
+                               .size = size,
+                               .read = probe_read,
+                               .close = probe_close,
+                               .expect = probe_expect,
+                               .at_hand = 100000 };
+        ck_assert_msg(ebpo_open_source(&file, &source, "far", &error) == EBPO_OK, "%s",
+                      error.message);
         ebpo_info *info = &file->info;
         ck_assert(info->chunk_index_bytes > 0 && !atomic_load(&file->located) && p.reads == 1);
         switch (lie) {
@@ -299,7 +316,8 @@ START_TEST(the_index_is_found_whatever_the_head_says_of_its_place)
 }
 END_TEST
 
-/* Fails at read 0, 1, 2, ... of opening and of reading everything, until there are no more reads. */
+/* Fails at read 0, 1, 2, ... of opening and of reading everything, until there are no more reads.
+ */
 static unsigned fail_everywhere(ebpo_status status, bool silent)
 {
     for (unsigned k = 0;; k++) {
@@ -399,7 +417,8 @@ START_TEST(chunk_tables_are_what_libhdf5_says)
     ck_assert_int_eq(ebpo_open(&file, name, NULL), EBPO_OK);
     hid_t fid = H5Fopen(name, H5F_ACC_RDONLY, H5P_DEFAULT);
     for (int i = 0; i < EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS; i++) {
-        const ebpo_array_in *a = i < EBPO_ARRAYS ? &file->root_array[i] : &file->level_array[0][0] + (i - EBPO_ARRAYS);
+        const ebpo_array_in *a =
+            i < EBPO_ARRAYS ? &file->root_array[i] : &file->level_array[0][0] + (i - EBPO_ARRAYS);
         ck_assert_int_eq(a->present, a->chunks != NULL);
         arrays += a->present;
         if (a->present)
@@ -421,7 +440,8 @@ START_TEST(nothing_of_libhdf5_is_open_once_a_file_is)
     ck_assert_int_eq(H5close(), 0); /* not even the library is needed any more */
     expect_tree(file, 2);
     ebpo_close(file);
-    ck_assert_msg(ebpo_open(&file, path, &error) == EBPO_OK, "%s", error.message); /* and it comes back */
+    ck_assert_msg(ebpo_open(&file, path, &error) == EBPO_OK, "%s",
+                  error.message); /* and it comes back */
     ebpo_close(file);
 }
 END_TEST
@@ -490,10 +510,7 @@ START_TEST(missing_arguments_are_refused_and_the_source_closed)
 }
 END_TEST
 
-static void *read_in_thread(void *user)
-{
-    return read_text(user, 2);
-}
+static void *read_in_thread(void *user) { return read_text(user, 2); }
 
 START_TEST(threads_read_one_file_at_once)
 {

@@ -1,4 +1,5 @@
-/* Each stiff case keeps its limits: stiff_cases.c. `test_stiff TEXT` runs those whose name holds the text. */
+/* Each stiff case keeps its limits: stiff_cases.c. `test_stiff TEXT` runs those whose name holds
+ * the text. */
 #include <check.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,7 +11,11 @@
 static uint64_t questions_for(const stiff_case *c)
 {
     ebpo_mesh mesh = c->make(c);
-    uint64_t count = query_scaled(mesh.face_count < 500 ? 600 : mesh.face_count < 7000 ? 120 : mesh.face_count < 15000 ? 24 : mesh.face_count < 150000 ? 12 : 4);
+    uint64_t count = query_scaled(mesh.face_count < 500      ? 600
+                                  : mesh.face_count < 7000   ? 120
+                                  : mesh.face_count < 15000  ? 24
+                                  : mesh.face_count < 150000 ? 12
+                                                             : 4);
     ebpo_mesh_free(&mesh);
     return count < 4 ? 4 : count;
 }
@@ -49,7 +54,8 @@ int main(int argc, char **argv)
     Suite *suite = suite_create("stiff");
     TCase *tests = tcase_create("cases");
     tcase_set_timeout(tests, 600);
-    tcase_add_loop_test(tests, stiff_cases_convert_verify_and_answer_exactly_or_are_refused_clearly, 0, stiff_case_count);
+    tcase_add_loop_test(tests, stiff_cases_convert_verify_and_answer_exactly_or_are_refused_clearly,
+                        0, stiff_case_count);
     suite_add_tcase(suite, tests);
     SRunner *runner = srunner_create(suite);
     srunner_run_all(runner, CK_NORMAL);

@@ -1,4 +1,5 @@
-/* Levels one after the other: the same nodes as in the tree read at once, planes that contain what the codes contain (proved with rationals), closed polygons, volumes. */
+/* Levels one after the other: the same nodes as in the tree read at once, planes that contain what
+ * the codes contain (proved with rationals), closed polygons, volumes. */
 #include <check.h>
 #include <gmp.h>
 #include <math.h>
@@ -42,8 +43,10 @@ static void write_file(ebpo_mesh mesh, uint32_t parts, uint32_t leaf_faces)
     ebpo_tree tree;
     options.parts = parts;
     options.leaf_faces = leaf_faces;
-    ck_assert_msg(ebpo_mesh_check(&report, &mesh, 0, options.progress, &error) == EBPO_OK, "%s", error.message);
-    ck_assert_msg(ebpo_build(&tree, &mesh, &report, &mend, &options, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_mesh_check(&report, &mesh, 0, options.progress, &error) == EBPO_OK, "%s",
+                  error.message);
+    ck_assert_msg(ebpo_build(&tree, &mesh, &report, &mend, &options, &error) == EBPO_OK, "%s",
+                  error.message);
     ck_assert_msg(ebpo_tree_write(&tree, path, &write, &error) == EBPO_OK, "%s", error.message);
     ebpo_tree_free(&tree);
 }
@@ -70,7 +73,8 @@ static bool next_level(ebpo_stream *stream, ebpo_stream_level *level)
 {
     bool more = false;
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert_msg(ebpo_stream_next_level(stream, level, &more, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_stream_next_level(stream, level, &more, &error) == EBPO_OK, "%s",
+                  error.message);
     return more;
 }
 
@@ -78,7 +82,8 @@ static bool next_node(ebpo_stream *stream, ebpo_stream_node *node)
 {
     bool more = false;
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert_msg(ebpo_stream_next_node(stream, node, &more, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_stream_next_node(stream, node, &more, &error) == EBPO_OK, "%s",
+                  error.message);
     return more;
 }
 
@@ -109,8 +114,10 @@ static uint64_t planes_in(const ebpo_level *level, ebpo_node_type type, uint64_t
     return type == EBPO_LEAF && level->leaf_plane_counts ? level->leaf_plane_counts[rank] : 0;
 }
 
-/* One level against the tree's; `parents`: octcodes of the level before's gray nodes, replaced by this level's. */
-static void expect_level(ebpo_stream *stream, const ebpo_tree *tree, int number, uint64_t **parents, uint64_t *parent_count, bool planes)
+/* One level against the tree's; `parents`: octcodes of the level before's gray nodes, replaced by
+ * this level's. */
+static void expect_level(ebpo_stream *stream, const ebpo_tree *tree, int number, uint64_t **parents,
+                         uint64_t *parent_count, bool planes)
 {
     const ebpo_level *level = &tree->level[number];
     ebpo_box box = box_of(&tree->info);
@@ -127,7 +134,8 @@ static void expect_level(ebpo_stream *stream, const ebpo_tree *tree, int number,
             ck_assert_int_eq(node.winding, winding_in(level, type, rank[type]));
             ck_assert_uint_eq(node.plane_count, planes ? planes_in(level, type, rank[type]) : 0);
             for (int i = 0; i < 3; i++)
-                ck_assert(node.min[i] == ebpo_wall(&box, i, number, cell.at[i]) && node.max[i] == ebpo_wall(&box, i, number, cell.at[i] + 1));
+                ck_assert(node.min[i] == ebpo_wall(&box, i, number, cell.at[i]) &&
+                          node.max[i] == ebpo_wall(&box, i, number, cell.at[i] + 1));
             if (type == EBPO_GRAY)
                 grays[rank[type]] = octcode;
             rank[type]++;
@@ -151,7 +159,8 @@ static void expect_tree(ebpo_file *file, bool planes, bool polygons)
     for (; next_level(stream, &level); number++) {
         ck_assert_int_eq(level.level, number);
         ck_assert_uint_eq(level.node_count, number ? 8 * parent_count : 1);
-        bytes += tree.info.level[number].stored_bytes + (number == tree.info.index_level ? tree.info.chunk_index_bytes : 0);
+        bytes += tree.info.level[number].stored_bytes +
+                 (number == tree.info.index_level ? tree.info.chunk_index_bytes : 0);
         ck_assert_uint_eq(level.cumulative_bytes, bytes);
         expect_level(stream, &tree, number, &parents, &parent_count, planes || polygons);
     }
@@ -167,7 +176,11 @@ START_TEST(levels_and_nodes_equal_the_tree_read_at_once)
     if (!ebpo_test_wanted(_i))
         return;
     for (int variant = 0; variant < 3; variant++) {
-        ebpo_file *file = build(ebpo_test_solids[_i].make(), variant == 0 ? USUAL : variant == 1 ? USUAL | EBPO_PART_LEAF_PLANES : EBPO_PART_MESH, 4);
+        ebpo_file *file = build(ebpo_test_solids[_i].make(),
+                                variant == 0   ? USUAL
+                                : variant == 1 ? USUAL | EBPO_PART_LEAF_PLANES
+                                               : EBPO_PART_MESH,
+                                4);
         expect_tree(file, variant == 0, variant == 1);
         expect_tree(file, false, false);
         ebpo_close(file);
@@ -187,13 +200,17 @@ START_TEST(one_may_stop_within_a_level_and_go_on_with_the_next)
     ck_assert(!more && strstr(error.message, "ebpo_stream_next_level"));
     while (next_level(whole, &a)) {
         ck_assert(next_level(some, &b));
-        ck_assert(a.volume == b.volume && a.node_count == b.node_count); /* whatever the number of threads */
+        /* whatever the number of threads */
+        ck_assert(a.volume == b.volume && a.node_count == b.node_count);
         for (uint64_t i = 0; next_node(whole, &p); i++)
             if (i < a.node_count / 2) {
                 ck_assert(next_node(some, &q));
-                ck_assert(p.octcode == q.octcode && p.volume == q.volume && p.vertex_count == q.vertex_count && p.plane_count == q.plane_count);
-                ck_assert(p.vertex_count == 0 || memcmp(p.vertices, q.vertices, p.vertex_count * sizeof *p.vertices) == 0);
-                ck_assert(p.plane_count == 0 || memcmp(p.planes, q.planes, p.plane_count * sizeof *p.planes) == 0);
+                ck_assert(p.octcode == q.octcode && p.volume == q.volume &&
+                          p.vertex_count == q.vertex_count && p.plane_count == q.plane_count);
+                ck_assert(p.vertex_count == 0 ||
+                          memcmp(p.vertices, q.vertices, p.vertex_count * sizeof *p.vertices) == 0);
+                ck_assert(p.plane_count == 0 ||
+                          memcmp(p.planes, q.planes, p.plane_count * sizeof *p.planes) == 0);
             }
     }
     ck_assert(!next_level(some, &b));
@@ -211,7 +228,8 @@ typedef struct memory {
     bool failing;
 } memory;
 
-static ebpo_status read_memory(void *user, uint64_t offset, uint64_t size, void *data, ebpo_error *error)
+static ebpo_status read_memory(void *user, uint64_t offset, uint64_t size, void *data,
+                               ebpo_error *error)
 {
     memory *m = user;
     if (m->failing) {
@@ -235,7 +253,8 @@ static ebpo_file *open_memory(memory *m)
     ck_assert_uint_eq(fread(m->data, 1, size, f), size);
     fclose(f);
     ebpo_source source = { .user = m, .size = size, .read = read_memory };
-    ck_assert_msg(ebpo_open_source(&file, &source, "memory", &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_open_source(&file, &source, "memory", &error) == EBPO_OK, "%s",
+                  error.message);
     return file;
 }
 
@@ -320,11 +339,13 @@ static double polygon_volume(const ebpo_stream_node *node)
     for (uint32_t f = 0; f < node->polygon_count; f++)
         for (uint32_t i = node->polygon_first[f] + 1; i + 1 < node->polygon_first[f + 1]; i++) {
             double p[3][3];
-            uint32_t corner[3] = { node->corners[node->polygon_first[f]], node->corners[i], node->corners[i + 1] };
+            uint32_t corner[3] = { node->corners[node->polygon_first[f]], node->corners[i],
+                                   node->corners[i + 1] };
             for (int j = 0; j < 3; j++)
                 for (int k = 0; k < 3; k++)
                     p[j][k] = node->vertices[corner[j]][k] - node->min[k];
-            sum += p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) + p[0][1] * (p[1][2] * p[2][0] - p[1][0] * p[2][2]) +
+            sum += p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) +
+                   p[0][1] * (p[1][2] * p[2][0] - p[1][0] * p[2][2]) +
                    p[0][2] * (p[1][0] * p[2][1] - p[1][1] * p[2][0]);
         }
     return sum / 6;
@@ -333,7 +354,8 @@ static double polygon_volume(const ebpo_stream_node *node)
 static void expect_volumes(ebpo_file *file, bool stored_leaves)
 {
     const ebpo_info *info = ebpo_file_info(file);
-    ebpo_stream *stream = new_stream(file, true, true, 0), *plain = new_stream(file, false, false, 0);
+    ebpo_stream *stream = new_stream(file, true, true, 0),
+                *plain = new_stream(file, false, false, 0);
     ebpo_stream_level level, told;
     ebpo_stream_node node;
     double settled = 0, room = info->box_size[0] * info->box_size[1] * info->box_size[2];
@@ -353,7 +375,8 @@ static void expect_volumes(ebpo_file *file, bool stored_leaves)
             ck_assert_double_eq_tol(polygon_volume(&node) / cell, node.volume / cell, away);
         }
         double stated = info->level[level.level].gray_volume;
-        ck_assert_msg(fabs(gray - stated) <= 1e-7 * stated + 1e-12 * room, "level %d: %.17g, stated %.17g", level.level, gray, stated);
+        ck_assert_msg(fabs(gray - stated) <= 1e-7 * stated + 1e-12 * room,
+                      "level %d: %.17g, stated %.17g", level.level, gray, stated);
         ck_assert_double_eq_tol(level.volume / room, (gray + settled) / room, 1e-12);
         ck_assert(next_level(plain, &told));
         ck_assert_double_eq_tol(level.volume / room, told.volume / room, 1e-6);
@@ -371,7 +394,8 @@ START_TEST(volumes_and_polygons_agree_with_the_file_and_with_levels_read_at_once
     if (!ebpo_test_wanted(_i))
         return;
     for (int variant = 0; variant < 2; variant++) {
-        ebpo_file *file = build(ebpo_test_solids[_i].make(), variant ? USUAL | EBPO_PART_LEAF_PLANES : USUAL, 4);
+        ebpo_file *file =
+            build(ebpo_test_solids[_i].make(), variant ? USUAL | EBPO_PART_LEAF_PLANES : USUAL, 4);
         expect_volumes(file, variant == 1);
         ebpo_close(file);
     }
@@ -427,12 +451,14 @@ static void check_point(exact *e)
         mpq_add(e->p[k], e->p[k], e->value);
     }
     set_cross(e->value, e->plane, e->p);
-    ck_assert_msg(mpq_cmp(e->value, e->limit) <= 0, "the plane cuts off a point that the code keeps");
+    ck_assert_msg(mpq_cmp(e->value, e->limit) <= 0,
+                  "the plane cuts off a point that the code keeps");
     if (!e->checked++ || mpq_cmp(e->value, e->most) > 0)
         mpq_set(e->most, e->value);
 }
 
-/* Extreme points of the cell within the code's half-space: its corners that are in it, and where its edges cross the plane. */
+/* Extreme points of the cell within the code's half-space: its corners that are in it, and where
+ * its edges cross the plane. */
 static void check_code(exact *e, const int32_t n[3], int32_t d)
 {
     mpq_t at_low, at_high;
@@ -464,10 +490,12 @@ static ebpo_box random_box(uint64_t *random)
 {
     double low[3], high[3];
     ebpo_box box;
-    bool flat = ebpo_test_random(random) % 4 == 0, far = ebpo_test_random(random) % 4 == 0, tiny = ebpo_test_random(random) % 8 == 0;
+    bool flat = ebpo_test_random(random) % 4 == 0, far = ebpo_test_random(random) % 4 == 0,
+         tiny = ebpo_test_random(random) % 8 == 0;
     for (int k = 0; k < 3; k++) {
         low[k] = (ebpo_test_random_unit(random) - 0.5) * (far ? 1e7 : 10) * (tiny ? 1e-290 : 1);
-        high[k] = low[k] + (0.1 + ebpo_test_random_unit(random)) * (flat && k == 1 ? 1e-6 : 1) * (tiny ? 1e-290 : 1);
+        high[k] = low[k] + (0.1 + ebpo_test_random_unit(random)) * (flat && k == 1 ? 1e-6 : 1) *
+                               (tiny ? 1e-290 : 1);
     }
     ck_assert(ebpo_box_make(&box, low, high, 20));
     return box;
@@ -477,7 +505,8 @@ START_TEST(planes_contain_exactly_what_their_codes_contain)
 {
     uint64_t random = 7 + (uint64_t)_i;
     exact e;
-    mpq_inits(e.xi[0], e.xi[1], e.xi[2], e.p[0], e.p[1], e.p[2], e.value, e.side, e.limit, e.most, NULL);
+    mpq_inits(e.xi[0], e.xi[1], e.xi[2], e.p[0], e.p[1], e.p[2], e.value, e.side, e.limit, e.most,
+              NULL);
     for (int i = 0; i < 4000; i++) {
         ebpo_box box = random_box(&random);
         int level = (int)(ebpo_test_random(&random) % (uint64_t)(box.grid_level + 1));
@@ -491,14 +520,19 @@ START_TEST(planes_contain_exactly_what_their_codes_contain)
         ebpo_plane_to_world(&box, e.cell, n, d, e.plane);
         mpq_set_d(e.limit, e.plane[3]);
         check_code(&e, n, d);
-        double length = sqrt(e.plane[0] * e.plane[0] + e.plane[1] * e.plane[1] + e.plane[2] * e.plane[2]), reach = 0;
+        double length = sqrt(e.plane[0] * e.plane[0] + e.plane[1] * e.plane[1] +
+                             e.plane[2] * e.plane[2]),
+               reach = 0;
         ck_assert_double_eq_tol(length, 1, 1e-15);
         for (int k = 0; k < 3; k++)
-            reach += fabs(e.plane[k]) * (fabs(ebpo_wall(&box, k, level, e.cell.at[k])) + box.size[k] / (double)(1u << level));
+            reach += fabs(e.plane[k]) * (fabs(ebpo_wall(&box, k, level, e.cell.at[k])) +
+                                         box.size[k] / (double)(1u << level));
         mpq_sub(e.value, e.limit, e.most);
-        ck_assert_msg(mpq_get_d(e.value) <= 1e-14 * reach + 1e-300, "%g of %g too wide", mpq_get_d(e.value), reach);
+        ck_assert_msg(mpq_get_d(e.value) <= 1e-14 * reach + 1e-300, "%g of %g too wide",
+                      mpq_get_d(e.value), reach);
     }
-    mpq_clears(e.xi[0], e.xi[1], e.xi[2], e.p[0], e.p[1], e.p[2], e.value, e.side, e.limit, e.most, NULL);
+    mpq_clears(e.xi[0], e.xi[1], e.xi[2], e.p[0], e.p[1], e.p[2], e.value, e.side, e.limit, e.most,
+               NULL);
 }
 END_TEST
 
@@ -517,7 +551,8 @@ static bool satisfies(const ebpo_stream_node *node, const double p[3])
 {
     for (uint32_t i = 0; i < node->plane_count; i++) {
         const double *a = node->planes[i];
-        if (a[0] * p[0] + a[1] * p[1] + a[2] * p[2] > a[3] || a[2] * p[2] + a[1] * p[1] + a[0] * p[0] > a[3])
+        if (a[0] * p[0] + a[1] * p[1] + a[2] * p[2] > a[3] ||
+            a[2] * p[2] + a[1] * p[1] + a[0] * p[0] > a[3])
             return false;
     }
     return true;
@@ -572,7 +607,8 @@ static int by_octcode(const void *a, const void *b)
 }
 
 /* The vertices by the cell of `level` that they lie in (lower walls belong to it). */
-static void place(placed *list, const ebpo_mesh *mesh, uint64_t count, const ebpo_box *box, int level)
+static void place(placed *list, const ebpo_mesh *mesh, uint64_t count, const ebpo_box *box,
+                  int level)
 {
     for (uint64_t v = 0; v < count; v++) {
         ebpo_cell cell = { level, { 0, 0, 0 } };
@@ -607,7 +643,8 @@ static void expect_vertices_within(ebpo_file *file)
                 double p[3];
                 vertex(&mesh, list[at].vertex, p);
                 ck_assert_int_ge(node.type, EBPO_LEAF);
-                ck_assert_msg(satisfies(&node, p), "level %d: vertex %llu", level.level, (unsigned long long)list[at].vertex);
+                ck_assert_msg(satisfies(&node, p), "level %d: vertex %llu", level.level,
+                              (unsigned long long)list[at].vertex);
                 checked++;
                 planes += node.plane_count;
             }
@@ -642,13 +679,17 @@ int main(void)
     TCase *tests = tcase_create("stream");
     tcase_set_timeout(tests, 900);
     tcase_add_checked_fixture(tests, make_folder, remove_folder);
-    tcase_add_loop_test(tests, levels_and_nodes_equal_the_tree_read_at_once, 0, ebpo_test_solid_count);
+    tcase_add_loop_test(tests, levels_and_nodes_equal_the_tree_read_at_once, 0,
+                        ebpo_test_solid_count);
     tcase_add_test(tests, one_may_stop_within_a_level_and_go_on_with_the_next);
     tcase_add_test(tests, only_the_level_asked_for_is_read);
     tcase_add_test(tests, a_level_that_could_not_be_read_can_be_asked_for_again);
-    tcase_add_loop_test(tests, volumes_and_polygons_agree_with_the_file_and_with_levels_read_at_once, 0, ebpo_test_solid_count);
+    tcase_add_loop_test(tests,
+                        volumes_and_polygons_agree_with_the_file_and_with_levels_read_at_once, 0,
+                        ebpo_test_solid_count);
     tcase_add_loop_test(tests, planes_contain_exactly_what_their_codes_contain, 0, 4);
-    tcase_add_loop_test(tests, all_vertices_in_a_closed_cell_satisfy_its_planes, 0, ebpo_test_solid_count);
+    tcase_add_loop_test(tests, all_vertices_in_a_closed_cell_satisfy_its_planes, 0,
+                        ebpo_test_solid_count);
     tcase_add_loop_test(tests, real_models_lie_within_their_streamed_planes, 0, 2);
     suite_add_tcase(suite, tests);
     SRunner *runner = srunner_create(suite);

@@ -18,12 +18,11 @@
 #include "subset/parts.h"
 
 __attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void)
-{
-    return "leak:libhdf5";
-}
+const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
 
-static const query_variant usual = { "usual", 4, 6, EBPO_RULE_NONZERO, EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES };
+static const query_variant usual = { "usual", 4, 6, EBPO_RULE_NONZERO,
+                                     EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS |
+                                         EBPO_PART_LEAF_PLANES };
 
 static void fine(ebpo_status status, const ebpo_error *error)
 {
@@ -41,7 +40,8 @@ typedef struct part {
     ebpo_context *context[WAYS];
 } part;
 
-static void part_open(part *p, ebpo_file *from, const char *path, const ebpo_subset_options *options)
+static void part_open(part *p, ebpo_file *from, const char *path,
+                      const ebpo_subset_options *options)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     memset(p, 0, sizeof *p);
@@ -76,8 +76,9 @@ static void part_verify(part *p)
     ebpo_verify_report report;
     o.threads = 1;
     fine(ebpo_verify(p->file, &o, &report, &error), &error);
-    ck_assert_msg(report.violations == 0, "%s %s %s %s %s %s", report.structure.first, report.content.first, report.containment.first, report.nesting.first, report.labels.first,
-                  report.lists.first);
+    ck_assert_msg(report.violations == 0, "%s %s %s %s %s %s", report.structure.first,
+                  report.content.first, report.containment.first, report.nesting.first,
+                  report.labels.first, report.lists.first);
 }
 
 /* --- one question to the whole and to the part --- */
@@ -88,8 +89,10 @@ typedef struct tally {
 
 static bool answered(tally *t, ebpo_status status, const ebpo_error *error)
 {
-    ck_assert_msg(status == EBPO_OK || (status == EBPO_E_ABSENT && strstr(error->message, "left out")) || (status == EBPO_E_ABSENT && strstr(error->message, "mesh")), "%s: %s",
-                  ebpo_status_name(status), error->message);
+    ck_assert_msg(status == EBPO_OK ||
+                      (status == EBPO_E_ABSENT && strstr(error->message, "left out")) ||
+                      (status == EBPO_E_ABSENT && strstr(error->message, "mesh")),
+                  "%s: %s", ebpo_status_name(status), error->message);
     t->given += status == EBPO_OK;
     t->refused += status != EBPO_OK;
     return status == EBPO_OK;
@@ -97,10 +100,12 @@ static bool answered(tally *t, ebpo_status status, const ebpo_error *error)
 
 static bool within(const double p[3], const ebpo_subset_options *o)
 {
-    return !o->boxed || (p[0] >= o->min[0] && p[0] <= o->max[0] && p[1] >= o->min[1] && p[1] <= o->max[1] && p[2] >= o->min[2] && p[2] <= o->max[2]);
+    return !o->boxed || (p[0] >= o->min[0] && p[0] <= o->max[0] && p[1] >= o->min[1] &&
+                         p[1] <= o->max[1] && p[2] >= o->min[2] && p[2] <= o->max[2]);
 }
 
-static void ask_exact(tally *t, query_model *m, part *p, int way, const double point[3], const ebpo_subset_options *cut, const query_truth *truth)
+static void ask_exact(tally *t, query_model *m, part *p, int way, const double point[3],
+                      const ebpo_subset_options *cut, const query_truth *truth)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_inside_result whole, some;
@@ -109,19 +114,25 @@ static void ask_exact(tally *t, query_model *m, part *p, int way, const double p
     if (m->info.solid) {
         fine(ebpo_inside(m->context, point, NULL, &whole, &error), &error);
         ebpo_status status = ebpo_inside(p->context[way], point, NULL, &some, &error);
-        ck_assert_msg(!complete || !within(point, cut) || status == EBPO_OK, "a point in the box was refused: %s", error.message);
+        ck_assert_msg(!complete || !within(point, cut) || status == EBPO_OK,
+                      "a point in the box was refused: %s", error.message);
         if (answered(t, status, &error))
-            ck_assert_msg(whole.where == some.where && whole.winding == some.winding, "%.17g %.17g %.17g: %d %d, the whole says %d %d", point[0], point[1], point[2], some.where,
-                          some.winding, whole.where, whole.winding);
+            ck_assert_msg(whole.where == some.where && whole.winding == some.winding,
+                          "%.17g %.17g %.17g: %d %d, the whole says %d %d", point[0], point[1],
+                          point[2], some.where, some.winding, whole.where, whole.winding);
     }
     fine(ebpo_distance(m->context, point, NULL, &far, &error), &error);
     if (answered(t, ebpo_distance(p->context[way], point, NULL, &near, &error), &error))
-        ck_assert_msg(memcmp(&far.distance, &near.distance, 8) == 0 && (far.face == near.face || truth->ties > 1 || !(p->info->parts & EBPO_PART_MAPS)),
-                      "%.17g %.17g %.17g: distance %.17g to %lld, the whole says %.17g to %lld", point[0], point[1], point[2], near.distance, (long long)near.face, far.distance,
-                      (long long)far.face);
+        ck_assert_msg(memcmp(&far.distance, &near.distance, 8) == 0 &&
+                          (far.face == near.face || truth->ties > 1 ||
+                           !(p->info->parts & EBPO_PART_MAPS)),
+                      "%.17g %.17g %.17g: distance %.17g to %lld, the whole says %.17g to %lld",
+                      point[0], point[1], point[2], near.distance, (long long)near.face,
+                      far.distance, (long long)far.face);
 }
 
-static void ask_limited(query_model *m, part *p, int way, const double point[3], const ebpo_subset_options *cut, const query_truth *truth)
+static void ask_limited(query_model *m, part *p, int way, const double point[3],
+                        const ebpo_subset_options *cut, const query_truth *truth)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_query_options o = EBPO_QUERY_OPTIONS_INIT;
@@ -133,14 +144,17 @@ static void ask_limited(query_model *m, part *p, int way, const double point[3],
         if (m->info.solid) {
             fine(ebpo_inside(p->context[way], point, &o, &some, &error), &error);
             fine(ebpo_inside(m->context, point, &o, &whole, &error), &error);
-            ck_assert_msg(some.where == EBPO_MAYBE || some.where == truth->where, "level %d: %d, and it is %d", o.level, some.where, truth->where);
+            ck_assert_msg(some.where == EBPO_MAYBE || some.where == truth->where,
+                          "level %d: %d, and it is %d", o.level, some.where, truth->where);
             ck_assert(some.where != EBPO_MAYBE || truth->distance <= some.doubt);
             if (same)
                 ck_assert(some.where == whole.where && some.doubt == whole.doubt);
         }
         fine(ebpo_distance(p->context[way], point, &o, &near, &error), &error);
         fine(ebpo_distance(m->context, point, &o, &far, &error), &error);
-        ck_assert_msg(near.lo <= truth->distance && truth->distance <= near.hi, "level %d: %.17g is not within %.17g and %.17g", o.level, truth->distance, near.lo, near.hi);
+        ck_assert_msg(near.lo <= truth->distance && truth->distance <= near.hi,
+                      "level %d: %.17g is not within %.17g and %.17g", o.level, truth->distance,
+                      near.lo, near.hi);
         if (same)
             ck_assert(near.lo == far.lo && near.hi == far.hi);
         o.mode = EBPO_DISTANCE_ENVELOPE;
@@ -148,7 +162,9 @@ static void ask_limited(query_model *m, part *p, int way, const double point[3],
         ebpo_status status = ebpo_distance(p->context[way], point, &o, &near, &error);
         ck_assert_msg(status == EBPO_OK || (status == EBPO_E_ABSENT && !same), "%s", error.message);
         if (status == EBPO_OK && cut->parts & EBPO_PART_PLANES)
-            ck_assert_msg(near.distance == far.distance, "level %d: an envelope is %.17g away, the whole says %.17g", o.level, near.distance, far.distance);
+            ck_assert_msg(near.distance == far.distance,
+                          "level %d: an envelope is %.17g away, the whole says %.17g", o.level,
+                          near.distance, far.distance);
         o.mode = EBPO_DISTANCE_EXACT;
     }
 }
@@ -164,10 +180,15 @@ static void ask_rays(tally *t, query_model *m, part *p, int way, uint64_t seed)
         uint64_t count, found;
         query_make_ray(m, &seed, origin, direction, &t_max);
         fine(ebpo_ray_first(m->context, origin, direction, t_max, &far, &hit, &error), &error);
-        if (answered(t, ebpo_ray_first(p->context[way], origin, direction, t_max, &near, &too, &error), &error))
-            ck_assert(hit == too && (!hit || far.t == near.t)); /* of faces at one t the first in its own file is told, which may be another one */
+        if (answered(t,
+                     ebpo_ray_first(p->context[way], origin, direction, t_max, &near, &too, &error),
+                     &error))
+            /* of faces at one t the first in its own file is told, which may be another one */
+            ck_assert(hit == too && (!hit || far.t == near.t));
         fine(ebpo_ray_all(m->context, origin, direction, t_max, &all, &count, &error), &error);
-        if (answered(t, ebpo_ray_all(p->context[way], origin, direction, t_max, &some, &found, &error), &error))
+        if (answered(t,
+                     ebpo_ray_all(p->context[way], origin, direction, t_max, &some, &found, &error),
+                     &error))
             ck_assert(count == found);
     }
 }
@@ -178,14 +199,16 @@ static int compare_faces(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static void ask_box(tally *t, query_model *m, part *p, int way, const double min[3], const double max[3], bool must)
+static void ask_box(tally *t, query_model *m, part *p, int way, const double min[3],
+                    const double max[3], bool must)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     const uint64_t *all, *some;
     uint64_t count, found;
     fine(ebpo_faces_in_box(m->context, min, max, &all, &count, &error), &error);
     ebpo_status status = ebpo_faces_in_box(p->context[way], min, max, &some, &found, &error);
-    ck_assert_msg(!must || status == EBPO_OK, "the box that was kept is refused: %s", error.message);
+    ck_assert_msg(!must || status == EBPO_OK, "the box that was kept is refused: %s",
+                  error.message);
     if (!answered(t, status, &error))
         return;
     ck_assert_uint_eq(count, found);
@@ -210,11 +233,13 @@ static void stream_levels(part *p)
     ebpo_stream_level level;
     bool more = true;
     fine(ebpo_stream_new(&stream, p->file, &o, &error), &error);
-    for (fine(ebpo_stream_next_level(stream, &level, &more, &error), &error); more; fine(ebpo_stream_next_level(stream, &level, &more, &error), &error)) {
+    for (fine(ebpo_stream_next_level(stream, &level, &more, &error), &error); more;
+         fine(ebpo_stream_next_level(stream, &level, &more, &error), &error)) {
         ebpo_stream_node node;
         uint64_t nodes = 0;
         bool another = true;
-        for (fine(ebpo_stream_next_node(stream, &node, &another, &error), &error); another; fine(ebpo_stream_next_node(stream, &node, &another, &error), &error))
+        for (fine(ebpo_stream_next_node(stream, &node, &another, &error), &error); another;
+             fine(ebpo_stream_next_node(stream, &node, &another, &error), &error))
             nodes++;
         ck_assert_uint_eq(nodes, level.node_count);
         ebpo_mesh mesh;
@@ -242,7 +267,9 @@ static void random_box(query_model *m, uint64_t *state, ebpo_subset_options *o)
 
 static void random_cut(query_model *m, uint64_t *state, ebpo_subset_options *o)
 {
-    static const uint32_t parts[] = { ~0u, ~0u, EBPO_PART_PLANES | EBPO_PART_LEAF_PLANES, EBPO_PART_PLANES | EBPO_PART_MESH, EBPO_PART_MESH | EBPO_PART_MAPS };
+    static const uint32_t parts[] = { ~0u, ~0u, EBPO_PART_PLANES | EBPO_PART_LEAF_PLANES,
+                                      EBPO_PART_PLANES | EBPO_PART_MESH,
+                                      EBPO_PART_MESH | EBPO_PART_MAPS };
     *o = (ebpo_subset_options)EBPO_SUBSET_OPTIONS_INIT;
     o->write.threads = 1;
     o->parts = parts[ebpo_test_random(state) % 5];
@@ -300,12 +327,16 @@ START_TEST(answers_of_a_subset_are_those_of_the_whole)
         v.leaf_faces = i % 2 ? 2 : 8;
         if (i % 4 == 3)
             v.parts &= ~(uint32_t)EBPO_PART_LEAF_PLANES;
-        query_model_make(&m, "random", i % 3 == 2 ? query_solid_make((int)(i % (uint64_t)query_solid_count())) : query_random_solid(i, i % 2), &v);
+        query_model_make(&m, "random",
+                         i % 3 == 2 ? query_solid_make((int)(i % (uint64_t)query_solid_count()))
+                                    : query_random_solid(i, i % 2),
+                         &v);
         for (uint64_t k = 0; k < scaled; k++)
             compare_one(&m, 1000 * i + k, &t);
         query_model_free(&m);
     }
-    ck_assert_msg(t.given > 100 && t.refused > 100, "%llu answers, %llu refused", (unsigned long long)t.given, (unsigned long long)t.refused);
+    ck_assert_msg(t.given > 100 && t.refused > 100, "%llu answers, %llu refused",
+                  (unsigned long long)t.given, (unsigned long long)t.refused);
 }
 END_TEST
 
@@ -326,7 +357,8 @@ START_TEST(everything_kept_is_the_same_content)
         }
         fine(ebpo_subset(m.file, path, &o, &error), &error);
         fine(ebpo_open(&file, path, &error), &error);
-        ck_assert(memcmp(ebpo_file_info(file)->content_sha256, ebpo_file_info(m.file)->content_sha256, 32) == 0);
+        ck_assert(memcmp(ebpo_file_info(file)->content_sha256,
+                         ebpo_file_info(m.file)->content_sha256, 32) == 0);
         ck_assert(!ebpo_file_info(file)->pruned);
         ebpo_close(file);
         char command[400];
@@ -338,7 +370,8 @@ START_TEST(everything_kept_is_the_same_content)
 }
 END_TEST
 
-/* Nodes, planes and source faces; numbers of faces may differ, as they come from the file that the subset is taken of. */
+/* Nodes, planes and source faces; numbers of faces may differ, as they come from the file that the
+ * subset is taken of. */
 static void same_parts(const char *a, const char *b)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -351,13 +384,18 @@ static void same_parts(const char *a, const char *b)
     ck_assert_int_eq(tree[0].info.level_count, tree[1].info.level_count);
     for (int l = 0; l < tree[0].info.level_count; l++) {
         const ebpo_level *x = &tree[0].level[l], *y = &tree[1].level[l];
-        ck_assert(x->group_count == y->group_count && memcmp(x->types, y->types, x->group_count * sizeof *x->types) == 0);
-        ck_assert(x->plane_count == y->plane_count && (x->plane_count == 0 || memcmp(x->planes, y->planes, x->plane_count * 4) == 0));
-        ck_assert(x->pruned_count == y->pruned_count && x->new_count + x->ref_count == y->new_count + y->ref_count);
+        ck_assert(x->group_count == y->group_count &&
+                  memcmp(x->types, y->types, x->group_count * sizeof *x->types) == 0);
+        ck_assert(x->plane_count == y->plane_count &&
+                  (x->plane_count == 0 || memcmp(x->planes, y->planes, x->plane_count * 4) == 0));
+        ck_assert(x->pruned_count == y->pruned_count &&
+                  x->new_count + x->ref_count == y->new_count + y->ref_count);
         ck_assert(x->gray_volume == y->gray_volume && x->leaf_volume == y->leaf_volume);
     }
-    ck_assert(tree[0].mesh.face_count == tree[1].mesh.face_count && tree[0].mesh.vertex_count == tree[1].mesh.vertex_count);
-    ck_assert(memcmp(tree[0].info.subset_of, tree[1].info.subset_of, 32) == 0 && memcmp(tree[0].info.kept_box, tree[1].info.kept_box, 48) == 0);
+    ck_assert(tree[0].mesh.face_count == tree[1].mesh.face_count &&
+              tree[0].mesh.vertex_count == tree[1].mesh.vertex_count);
+    ck_assert(memcmp(tree[0].info.subset_of, tree[1].info.subset_of, 32) == 0 &&
+              memcmp(tree[0].info.kept_box, tree[1].info.kept_box, 48) == 0);
     uint64_t sum[2] = { 0, 0 };
     for (int i = 0; i < 2; i++) {
         for (uint64_t f = 0; f < tree[i].mesh.face_count; f++)
@@ -384,7 +422,8 @@ START_TEST(a_subset_of_a_subset_is_the_subset)
         random_box(&m, &state, &outer);
         inner = outer;
         for (int k = 0; k < 3; k++)
-            inner.max[k] = outer.min[k] + (outer.max[k] - outer.min[k]) * ebpo_test_random_unit(&state);
+            inner.max[k] =
+                outer.min[k] + (outer.max[k] - outer.min[k]) * ebpo_test_random_unit(&state);
         inner.last_level = i % 3 == 0 ? 3 : -1;
         fine(ebpo_subset(m.file, direct, &inner, &error), &error);
         fine(ebpo_subset(m.file, first, &outer, &error), &error);
@@ -408,7 +447,8 @@ START_TEST(threads_do_not_change_the_bytes)
     char one[120], four[120], command[400];
     snprintf(one, sizeof one, "%s/one.ebpo.h5", m.folder);
     snprintf(four, sizeof four, "%s/four.ebpo.h5", m.folder);
-    ebpo_subset_options o = { -1, true, { 0, 0, -1 }, { 4, 4, 1 }, ~0u, EBPO_WRITE_OPTIONS_INIT, 0, 0, false };
+    ebpo_subset_options o = { -1, true, { 0, 0, -1 }, { 4, 4, 1 }, ~0u, EBPO_WRITE_OPTIONS_INIT,
+                              0,  0,    false };
     o.write.threads = 1;
     fine(ebpo_subset(m.file, one, &o, &error), &error);
     o.write.threads = 4;
@@ -428,7 +468,8 @@ START_TEST(boxes_that_keep_nothing_are_refused)
     query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), &usual);
     char path[120];
     snprintf(path, sizeof path, "%s/never.ebpo.h5", m.folder);
-    ebpo_subset_options o = { -1, true, { 5, 5, 5 }, { 6, 6, 6 }, ~0u, EBPO_WRITE_OPTIONS_INIT, 0, 0, false };
+    ebpo_subset_options o = { -1, true, { 5, 5, 5 }, { 6, 6, 6 }, ~0u, EBPO_WRITE_OPTIONS_INIT,
+                              0,  0,    false };
     ck_assert_int_eq(ebpo_subset(m.file, path, &o, &error), EBPO_E_ARGUMENT);
     o.max[1] = 4;
     ck_assert_int_eq(ebpo_subset(m.file, path, &o, &error), EBPO_E_ARGUMENT);
@@ -449,10 +490,13 @@ START_TEST(a_subset_cannot_be_measured)
     query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 3), &usual);
     char path[120];
     snprintf(path, sizeof path, "%s/part.ebpo.h5", m.folder);
-    ebpo_subset_options o = { -1, true, { 0.5, 0.5, 0.5 }, { 1, 1, 1 }, ~0u, EBPO_WRITE_OPTIONS_INIT, 0, 0, false };
+    ebpo_subset_options o = { -1,          true, { 0.5, 0.5, 0.5 },
+                              { 1, 1, 1 }, ~0u,  EBPO_WRITE_OPTIONS_INIT,
+                              0,           0,    false };
     part p;
     part_open(&p, m.file, path, &o);
-    ck_assert_msg(p.info->pruned && p.info->boxed && p.info->face_count < m.info.face_count, "nothing was left out");
+    ck_assert_msg(p.info->pruned && p.info->boxed && p.info->face_count < m.info.face_count,
+                  "nothing was left out");
     ebpo_mass mass;
     ck_assert_int_eq(ebpo_measure(p.file, 1, &mass, &error), EBPO_E_ABSENT);
     part_close(&p);
@@ -460,7 +504,8 @@ START_TEST(a_subset_cannot_be_measured)
 }
 END_TEST
 
-/* Bytes of the head changed one by one, with HDF5's checksums in the way most of the time; and the library itself with a file whose counts lie. */
+/* Bytes of the head changed one by one, with HDF5's checksums in the way most of the time; and the
+ * library itself with a file whose counts lie. */
 START_TEST(damaged_subsets_do_no_harm)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -468,7 +513,9 @@ START_TEST(damaged_subsets_do_no_harm)
     query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 3), &usual);
     char path[120];
     snprintf(path, sizeof path, "%s/part.ebpo.h5", m.folder);
-    ebpo_subset_options o = { 3, true, { 0.2, 0.2, 0.2 }, { 1, 1, 1 }, ~0u, EBPO_WRITE_OPTIONS_INIT, 0, 0, false };
+    ebpo_subset_options o = { 3,           true, { 0.2, 0.2, 0.2 },
+                              { 1, 1, 1 }, ~0u,  EBPO_WRITE_OPTIONS_INIT,
+                              0,           0,    false };
     o.write.codec = EBPO_CODEC_NONE;
     fine(ebpo_subset(m.file, path, &o, &error), &error);
     FILE *f = fopen(path, "rb");
@@ -496,21 +543,27 @@ START_TEST(damaged_subsets_do_no_harm)
 }
 END_TEST
 
-/* Changes numbers in one chunk of an unfiltered file, and its checksum with them: what is inside must be checked for itself. */
+/* Changes numbers in one chunk of an unfiltered file, and its checksum with them: what is inside
+ * must be checked for itself. */
 static void lie(ebpo_file *file, uint8_t *bytes, uint64_t *state)
 {
     static uint8_t raw[EBPO_CHUNK_BYTES_MAX], stored[2 * EBPO_CHUNK_BYTES_MAX];
     const ebpo_array_in *a;
     do {
         uint64_t number = ebpo_test_random(state) % (EBPO_ARRAYS + 4 * EBPO_LEVEL_ARRAYS);
-        a = number < EBPO_ARRAYS ? &file->root_array[number] : &file->level_array[(number - EBPO_ARRAYS) / EBPO_LEVEL_ARRAYS][(number - EBPO_ARRAYS) % EBPO_LEVEL_ARRAYS];
+        a = number < EBPO_ARRAYS ? &file->root_array[number]
+                                 : &file->level_array[(number - EBPO_ARRAYS) / EBPO_LEVEL_ARRAYS]
+                                                     [(number - EBPO_ARRAYS) % EBPO_LEVEL_ARRAYS];
     } while (!a->present);
     size_t size = a->shape.chunk_rows * ebpo_h5_row_bytes(&a->shape), made = 0;
     ebpo_chunk_coder coder = { 0 };
     memcpy(raw, bytes + a->chunks[0].address, size);
     for (int i = 0; i < 3; i++)
-        raw[ebpo_test_random(state) % size] = ebpo_test_random(state) % 3 ? 0 : (uint8_t)ebpo_test_random(state);
-    ck_assert_int_eq(ebpo_chunk_encode(&coder, a->shape.pipeline, 0, a->shape.element_size, raw, size, stored, &made), EBPO_OK);
+        raw[ebpo_test_random(state) % size] =
+            ebpo_test_random(state) % 3 ? 0 : (uint8_t)ebpo_test_random(state);
+    ck_assert_int_eq(ebpo_chunk_encode(&coder, a->shape.pipeline, 0, a->shape.element_size, raw,
+                                       size, stored, &made),
+                     EBPO_OK);
     ck_assert_uint_eq(made, a->chunks[0].bytes);
     memcpy(bytes + a->chunks[0].address, stored, made);
     ebpo_chunk_coder_clear(&coder);
@@ -584,7 +637,15 @@ START_TEST(subsets_that_lie_do_no_harm)
     query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), &usual);
     static uint8_t bytes[1 << 20], lying[1 << 20];
     for (int kind = 0; kind < 3; kind++) {
-        ebpo_subset_options o = { kind == 1 ? 2 : -1, kind != 1, { 0.2, 0.2, 0.2 }, { 1, 1, 1 }, kind == 2 ? EBPO_PART_PLANES : ~0u, EBPO_WRITE_OPTIONS_INIT, 0, 0, false };
+        ebpo_subset_options o = { kind == 1 ? 2 : -1,
+                                  kind != 1,
+                                  { 0.2, 0.2, 0.2 },
+                                  { 1, 1, 1 },
+                                  kind == 2 ? EBPO_PART_PLANES : ~0u,
+                                  EBPO_WRITE_OPTIONS_INIT,
+                                  0,
+                                  0,
+                                  false };
         ebpo_file *file;
         char path[120];
         o.write.codec = EBPO_CODEC_NONE;

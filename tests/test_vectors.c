@@ -1,4 +1,5 @@
-/* The files of format-spec/vectors: argument 1 is that folder, argument 2 the program make_vectors. */
+/* The files of format-spec/vectors: argument 1 is that folder, argument 2 the program make_vectors.
+ */
 #include <check.h>
 #include <dirent.h>
 #include <stdlib.h>
@@ -10,12 +11,10 @@
 #include "tree_json.h"
 #include "vector_read.h"
 
-/* libhdf5 1.10 itself leaks when it gives up on a damaged object header; that is not what we look for here. */
+/* libhdf5 1.10 itself leaks when it gives up on a damaged object header; that is not what we look
+ * for here. */
 __attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void)
-{
-    return "leak:libhdf5";
-}
+const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
 
 static const char *vectors, *maker;
 
@@ -33,7 +32,8 @@ static char *slurp(const char *path, size_t *size)
 }
 
 /* Calls `check` for every .ebpo.h5 in a folder with its path and the path of its companion. */
-static unsigned each(const char *part, const char *companion, void (*check)(const char *path, const char *expected))
+static unsigned each(const char *part, const char *companion,
+                     void (*check)(const char *path, const char *expected))
 {
     char path[1024], other[1024];
     snprintf(path, sizeof path, "%s/%s", vectors, part);
@@ -45,7 +45,8 @@ static unsigned each(const char *part, const char *companion, void (*check)(cons
         if (!end)
             continue;
         snprintf(path, sizeof path, "%s/%s/%s", vectors, part, entry->d_name);
-        snprintf(other, sizeof other, "%s/%s/%.*s%s", vectors, part, (int)(end - entry->d_name), entry->d_name, companion);
+        snprintf(other, sizeof other, "%s/%s/%.*s%s", vectors, part, (int)(end - entry->d_name),
+                 entry->d_name, companion);
         check(path, other);
         count++;
     }
@@ -95,16 +96,20 @@ START_TEST(failed_vectors_are_refused_with_their_text)
 }
 END_TEST
 
-/* Compressors may change their output from version to version: bytes are compared only where the vectors were made. */
+/* Compressors may change their output from version to version: bytes are compared only where the
+ * vectors were made. */
 START_TEST(vectors_are_what_make_vectors_makes)
 {
     unsigned major, minor, release;
     H5get_libversion(&major, &minor, &release);
-    if (ZSTD_versionNumber() != 10504 || strcmp(zlibVersion(), "1.2.13") != 0 || major != 1 || minor != 10 || release != 8)
+    if (ZSTD_versionNumber() != 10504 || strcmp(zlibVersion(), "1.2.13") != 0 || major != 1 ||
+        minor != 10 || release != 8)
         return;
     char folder[] = "/tmp/ebpo-vectors-XXXXXX", command[4096];
     ck_assert_ptr_nonnull(mkdtemp(folder));
-    snprintf(command, sizeof command, "'%s' %s 2>/dev/null && diff -r %s/passed '%s/passed' && diff -r %s/failed '%s/failed'; r=$?; rm -rf %s; exit $r",
+    snprintf(command, sizeof command,
+             "'%s' %s 2>/dev/null && diff -r %s/passed '%s/passed' && diff -r %s/failed "
+             "'%s/failed'; r=$?; rm -rf %s; exit $r",
              maker, folder, folder, vectors, folder, vectors, folder);
     ck_assert_int_eq(system(command), 0);
 }

@@ -1,4 +1,5 @@
-/* The verifier on trees that are right, and on trees with one thing wrong in each: caught, and in the right kind. */
+/* The verifier on trees that are right, and on trees with one thing wrong in each: caught, and in
+ * the right kind. */
 #include <check.h>
 #include <math.h>
 #include <stdio.h>
@@ -17,19 +18,21 @@ static void build_mesh(ebpo_mesh *mesh, uint32_t leaf_faces, ebpo_rule rule, ebp
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_mesh_report report;
-    ck_assert_msg(ebpo_mesh_check(&report, mesh, 1, (ebpo_progress){0}, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_mesh_check(&report, mesh, 1, (ebpo_progress){ 0 }, &error) == EBPO_OK, "%s",
+                  error.message);
     ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
     options.leaf_faces = leaf_faces;
     options.rule = rule;
     options.threads = 1;
     options.parts |= EBPO_PART_LEAF_PLANES;
-    ck_assert_msg(ebpo_build(&tree, mesh, &report, &mend, &options, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_build(&tree, mesh, &report, &mend, &options, &error) == EBPO_OK, "%s",
+                  error.message);
 }
 
 static void build(const char *name, uint32_t leaf_faces, ebpo_rule rule)
 {
     ebpo_mesh mesh = ebpo_test_make(name);
-    build_mesh(&mesh, leaf_faces, rule, (ebpo_mend_record){0});
+    build_mesh(&mesh, leaf_faces, rule, (ebpo_mend_record){ 0 });
 }
 
 static void verify_with(unsigned threads)
@@ -38,18 +41,20 @@ static void verify_with(unsigned threads)
     ebpo_verify_options options = EBPO_VERIFY_OPTIONS_INIT;
     options.threads = threads;
     memset(&tally, 0, sizeof tally);
-    ck_assert_msg(ebpo_verify_tree(&tally, &tree, &options, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_verify_tree(&tally, &tree, &options, &error) == EBPO_OK, "%s",
+                  error.message);
 }
 
 static void expect_fine(const char *what)
 {
     verify_with(2);
     for (int kind = 0; kind < EBPO_VERIFY_KINDS; kind++)
-        ck_assert_msg(tally.violations[kind] == 0, "%s: kind %d: %llu violations, first: %s", what, kind,
-                      (unsigned long long)tally.violations[kind], tally.first[kind]);
+        ck_assert_msg(tally.violations[kind] == 0, "%s: kind %d: %llu violations, first: %s", what,
+                      kind, (unsigned long long)tally.violations[kind], tally.first[kind]);
 }
 
-/* After a mutation: caught in this kind, at the same place whatever the number of threads, and the tree is gone. */
+/* After a mutation: caught in this kind, at the same place whatever the number of threads, and the
+ * tree is gone. */
 static void expect_caught(ebpo_verify_kind kind, const char *text)
 {
     static ebpo_verify_report one, three;
@@ -60,7 +65,8 @@ static void expect_caught(ebpo_verify_kind kind, const char *text)
     ck_assert(memcmp(&one, &three, sizeof one) == 0);
     ck_assert_msg(tally.violations[kind] > 0, "not caught: %s", text);
     ck_assert_uint_le(tally.violations[kind], tally.checks[kind]);
-    ck_assert_msg(strstr(tally.first[kind], text) != NULL, "'%s' is not in '%s'", text, tally.first[kind]);
+    ck_assert_msg(strstr(tally.first[kind], text) != NULL, "'%s' is not in '%s'", text,
+                  tally.first[kind]);
     ebpo_tree_free(&tree);
 }
 
@@ -88,14 +94,14 @@ static spot find_from(int first_level, int type)
         for (uint64_t group = 0; group < tree.level[l].group_count; group++)
             for (unsigned octant = 0; octant < (l ? 8u : 1u); octant++)
                 if (type_of(l, group, octant) == type)
-                    return (spot){l, group, 0, octant};
+                    return (spot){ l, group, 0, octant };
     ck_abort_msg("no node of type %d", type);
-    return (spot){0};
+    return (spot){ 0 };
 }
 
 static void recount(int l)
 {
-    uint64_t count[4] = {0};
+    uint64_t count[4] = { 0 };
     for (uint64_t group = 0; group < tree.level[l].group_count; group++)
         for (unsigned octant = 0; octant < (l ? 8u : 1u); octant++)
             count[type_of(l, group, octant)]++;
@@ -107,7 +113,7 @@ static void recount(int l)
 
 START_TEST(built_solids_keep_their_promises)
 {
-    static const uint32_t limits[] = {0, 1, 16, 1000000};
+    static const uint32_t limits[] = { 0, 1, 16, 1000000 };
     for (int i = 0; i < ebpo_test_solid_count; i++)
         for (int j = 0; j < 4; j++) {
             build(ebpo_test_solids[i].name, limits[j], (ebpo_rule)(j % 3));
@@ -174,13 +180,15 @@ static void add_plane(int l, uint32_t code)
 
 START_TEST(plane_that_cuts_an_inside_corner_only_is_caught)
 {
-    /* The middle of the box lies inside and far from faces; it is corner 7 of the lowest cell of level 1. The normal is (170, 170, 171). */
+    /* The middle of the box lies inside and far from faces; it is corner 7 of the lowest cell of
+     * level 1. The normal is (170, 170, 171). */
     build("box_subdivided", 8, EBPO_RULE_NONZERO);
     ck_assert_int_eq(type_of(1, 0, 0), EBPO_GRAY);
     add_plane(1, 681u | 681u << 10 | 4094u << 20);
     verify_with(1);
     ck_assert_uint_eq(tally.violations[EBPO_VERIFY_CONTAINMENT], 1);
-    expect_caught(EBPO_VERIFY_CONTAINMENT, "level 1, octcode 0o10, plane 0: the plane cuts off corner 7");
+    expect_caught(EBPO_VERIFY_CONTAINMENT,
+                  "level 1, octcode 0o10, plane 0: the plane cuts off corner 7");
 }
 END_TEST
 
@@ -235,10 +243,11 @@ END_TEST
 
 START_TEST(another_rule_makes_black_cells_wrong)
 {
-    ebpo_mesh mesh = ebpo_test_sphere((double[3]){0, 0, 0}, 2, 3), inner = ebpo_test_sphere((double[3]){0, 0, 0}, 1, 3);
+    ebpo_mesh mesh = ebpo_test_sphere((double[3]){ 0, 0, 0 }, 2, 3),
+              inner = ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 3);
     ebpo_test_append(&mesh, &inner);
     ebpo_mesh_free(&inner);
-    build_mesh(&mesh, 8, EBPO_RULE_NONZERO, (ebpo_mend_record){0});
+    build_mesh(&mesh, 8, EBPO_RULE_NONZERO, (ebpo_mend_record){ 0 });
     tree.info.rule = EBPO_RULE_EVENODD;
     expect_caught(EBPO_VERIFY_LABELS, "outside by the file's rule");
 }
@@ -254,7 +263,8 @@ static void drop_reference(void)
             end += level->leaf_ref_count[leaf];
             if (level->leaf_ref_count[leaf] == 0)
                 continue;
-            memmove(level->leaf_refs + end - 1, level->leaf_refs + end, (level->ref_count - end) * sizeof *level->leaf_refs);
+            memmove(level->leaf_refs + end - 1, level->leaf_refs + end,
+                    (level->ref_count - end) * sizeof *level->leaf_refs);
             level->leaf_ref_count[leaf]--;
             tree.info.level[l].ref_count = --level->ref_count;
             return;
@@ -352,7 +362,8 @@ static void move_vertex(uint64_t i, double by)
 {
     for (int k = 0; k < 3; k++) {
         double middle = tree.info.box_origin[k] + tree.info.box_size[k] / 2;
-        tree.mesh.xyz64[3 * i + (uint64_t)k] += by * (middle - tree.mesh.xyz64[3 * i + (uint64_t)k]);
+        tree.mesh.xyz64[3 * i + (uint64_t)k] +=
+            by * (middle - tree.mesh.xyz64[3 * i + (uint64_t)k]);
     }
 }
 
@@ -385,10 +396,15 @@ END_TEST
 
 START_TEST(head_that_contradicts_the_tree_is_caught)
 {
-    static const struct { size_t offset; const char *text; } fields[] = {
-        {offsetof(ebpo_level_summary, gray_count), "counts of nodes"}, {offsetof(ebpo_level_summary, leaf_count), "counts of nodes"},
-        {offsetof(ebpo_level_summary, plane_count), "counts of planes"}, {offsetof(ebpo_level_summary, new_count), "counts of faces"},
-        {offsetof(ebpo_level_summary, ref_count), "counts of faces"}, {offsetof(ebpo_level_summary, gray_volume), "volumes"}};
+    static const struct {
+        size_t offset;
+        const char *text;
+    } fields[] = { { offsetof(ebpo_level_summary, gray_count), "counts of nodes" },
+                   { offsetof(ebpo_level_summary, leaf_count), "counts of nodes" },
+                   { offsetof(ebpo_level_summary, plane_count), "counts of planes" },
+                   { offsetof(ebpo_level_summary, new_count), "counts of faces" },
+                   { offsetof(ebpo_level_summary, ref_count), "counts of faces" },
+                   { offsetof(ebpo_level_summary, gray_volume), "volumes" } };
     for (size_t i = 0; i < sizeof fields / sizeof *fields; i++) {
         build("sphere", 8, EBPO_RULE_NONZERO);
         ((unsigned char *)&tree.info.level[1])[fields[i].offset] ^= 64;
@@ -470,14 +486,15 @@ END_TEST
 START_TEST(real_models_keep_their_promises)
 {
     const char *folder = getenv("EBPO_MODELS");
-    static const char *names[] = {"fertility", "selfint_A", "twin7081_right", "cad_adis16480", "cheese_g133", "office_chair"};
+    static const char *names[] = { "fertility",     "selfint_A",   "twin7081_right",
+                                   "cad_adis16480", "cheese_g133", "office_chair" };
     for (size_t i = 0; folder && i < sizeof names / sizeof *names; i++) {
         char path[4096];
         snprintf(path, sizeof path, "%s/%s.ply", folder, names[i]);
         ebpo_mesh mesh;
         if (ebpo_mesh_read(&mesh, path, NULL, NULL) != EBPO_OK)
             continue; /* the folder may hold only some of them */
-        build_mesh(&mesh, 16, EBPO_RULE_NONZERO, (ebpo_mend_record){0});
+        build_mesh(&mesh, 16, EBPO_RULE_NONZERO, (ebpo_mend_record){ 0 });
         expect_fine(names[i]);
         ebpo_tree_free(&tree);
     }

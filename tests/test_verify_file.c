@@ -1,4 +1,5 @@
-/* The verifier on files: with and without their parts, against their source and against another one, whole and damaged. */
+/* The verifier on files: with and without their parts, against their source and against another
+ * one, whole and damaged. */
 #include <check.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -37,11 +38,12 @@ static ebpo_mesh worn_mesh(void)
     return mesh;
 }
 
-/* Builds and writes a file of a copy-like second mesh (makers are deterministic), mended as asked. */
+/* Builds and writes a file of a copy-like second mesh (makers are deterministic), mended as asked.
+ */
 static void write_file(ebpo_mesh mesh, bool mended, uint32_t parts)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_mend_record mend = {0};
+    ebpo_mend_record mend = { 0 };
     if (mended) {
         mend.weld = mend.orient = mend.fill_holes = true;
         ck_assert(ebpo_mesh_weld(&mesh, &mend, &error) == EBPO_OK);
@@ -49,13 +51,14 @@ static void write_file(ebpo_mesh mesh, bool mended, uint32_t parts)
         ck_assert(ebpo_mesh_fill_holes(&mesh, &mend, &error) == EBPO_OK);
     }
     ebpo_mesh_report facts;
-    ck_assert(ebpo_mesh_check(&facts, &mesh, 1, (ebpo_progress){0}, &error) == EBPO_OK);
+    ck_assert(ebpo_mesh_check(&facts, &mesh, 1, (ebpo_progress){ 0 }, &error) == EBPO_OK);
     ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
     options.leaf_faces = 8;
     options.threads = 1;
     options.parts |= EBPO_PART_LEAF_PLANES;
     ebpo_tree tree;
-    ck_assert_msg(ebpo_build(&tree, &mesh, &facts, &mend, &options, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_build(&tree, &mesh, &facts, &mend, &options, &error) == EBPO_OK, "%s",
+                  error.message);
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
     write.parts = parts;
     ck_assert_msg(ebpo_tree_write(&tree, path, &write, &error) == EBPO_OK, "%s", error.message);
@@ -80,8 +83,9 @@ static bool verify_against(const ebpo_mesh *source)
 static void expect_fine(const ebpo_mesh *source)
 {
     ck_assert(verify_against(source));
-    ck_assert_msg(report.violations == 0, "%s%s%s%s%s%s%s", report.structure.first, report.content.first, report.containment.first,
-                  report.nesting.first, report.labels.first, report.lists.first, report.source.first);
+    ck_assert_msg(report.violations == 0, "%s%s%s%s%s%s%s", report.structure.first,
+                  report.content.first, report.containment.first, report.nesting.first,
+                  report.labels.first, report.lists.first, report.source.first);
     ck_assert_uint_gt(report.content.checks, 0);
 }
 
@@ -107,7 +111,8 @@ END_TEST
 
 START_TEST(files_without_parts_keep_what_they_promise)
 {
-    static const uint32_t parts[] = {EBPO_PART_PLANES, EBPO_PART_MESH, EBPO_PART_MESH | EBPO_PART_LEAF_PLANES, 0};
+    static const uint32_t parts[] = { EBPO_PART_PLANES, EBPO_PART_MESH,
+                                      EBPO_PART_MESH | EBPO_PART_LEAF_PLANES, 0 };
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
         write_file(ebpo_test_make("torus"), false, parts[i]);
         expect_fine(NULL);
@@ -117,7 +122,7 @@ END_TEST
 
 START_TEST(another_source_is_noticed_down_to_the_sign_of_zero)
 {
-    static const uint32_t parts[] = {~0u, EBPO_PART_MESH | EBPO_PART_PLANES};
+    static const uint32_t parts[] = { ~0u, EBPO_PART_MESH | EBPO_PART_PLANES };
     for (int i = 0; i < 2; i++) {
         write_file(ebpo_test_make("box_subdivided"), false, parts[i]);
         ebpo_mesh source = ebpo_test_make("box_subdivided");
@@ -152,8 +157,8 @@ START_TEST(another_source_is_noticed_down_to_the_sign_of_zero)
 }
 END_TEST
 
-/* Flips a bit of the arrays here and there (libhdf5 leaks memory of its own when its head is damaged): a finding, or a byte that means nothing, but
- * never a crash and never a failed call. */
+/* Flips a bit of the arrays here and there (libhdf5 leaks memory of its own when its head is
+ * damaged): a finding, or a byte that means nothing, but never a crash and never a failed call. */
 START_TEST(damaged_files_are_findings_and_not_failures)
 {
     write_file(ebpo_test_make("sphere"), false, ~0u);
@@ -200,7 +205,8 @@ START_TEST(verifying_needs_a_file_and_may_be_stopped)
     ebpo_verify_options options = EBPO_VERIFY_OPTIONS_INIT;
     options.progress.report = stop_at_once;
     ebpo_status status = ebpo_verify(file, &options, &report, &error);
-    ck_assert(status == EBPO_OK || status == EBPO_E_CANCELLED); /* a small file is done before the first report */
+    /* a small file is done before the first report */
+    ck_assert(status == EBPO_OK || status == EBPO_E_CANCELLED);
     ck_assert(ebpo_verify(file, NULL, &report, &error) == EBPO_OK);
     ck_assert_uint_eq(report.violations, 0);
     ebpo_close(file);

@@ -1,4 +1,5 @@
-/* The verifier's own geometry: floating-point answers against rationals, rays against the library's crossings, the certificates against clipping. */
+/* The verifier's own geometry: floating-point answers against rationals, rays against the library's
+ * crossings, the certificates against clipping. */
 #include <check.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,27 +15,27 @@
 
 enum { ROUNDS = 6000 };
 
-static const ebpo_box box = {{-1, -2, 0.5}, {3, 5, 7}, 20};
+static const ebpo_box box = { { -1, -2, 0.5 }, { 3, 5, 7 }, 20 };
 
 static ebpo_cell some_cell(uint64_t *state)
 {
-    ebpo_cell cell = {(int)(ebpo_test_random(state) % 6), {0}};
+    ebpo_cell cell = { (int)(ebpo_test_random(state) % 6), { 0 } };
     for (int k = 0; k < 3; k++)
         cell.at[k] = (uint32_t)(ebpo_test_random(state) % (1u << cell.level));
     return cell;
 }
 
-/* Coordinates near the cell; often exactly on its walls, corners and middle, so that every kind of contact comes up. */
+/* Coordinates near the cell; often exactly on its walls, corners and middle, so that every kind of
+ * contact comes up. */
 static double some_coordinate(const ebpo_frame *frame, int k, uint64_t *state)
 {
     double size = frame->high[k] - frame->low[k];
     switch (ebpo_test_random(state) % 4) {
-    case 0:
-        return frame->low[k] + size * 0.5 * ((double)(ebpo_test_random(state) % 7) - 2);
+    case 0: return frame->low[k] + size * 0.5 * ((double)(ebpo_test_random(state) % 7) - 2);
     case 1:
-        return frame->low[k] + size * (ebpo_test_random_unit(state) * 0.001 + (double)(ebpo_test_random(state) % 2));
-    default:
-        return frame->low[k] + size * (ebpo_test_random_unit(state) * 4 - 1.5);
+        return frame->low[k] + size * (ebpo_test_random_unit(state) * 0.001 +
+                                       (double)(ebpo_test_random(state) % 2));
+    default: return frame->low[k] + size * (ebpo_test_random_unit(state) * 4 - 1.5);
     }
 }
 
@@ -53,7 +54,7 @@ START_TEST(touching_agrees_with_rationals)
 {
     uint64_t state = 1;
     int touching = 0;
-    ebpo_tally tally = {0};
+    ebpo_tally tally = { 0 };
     for (int i = 0; i < ROUNDS; i++) {
         ebpo_frame frame = ebpo_frame_make(&box, some_cell(&state));
         ebpo_corners face = some_face(&frame, &state);
@@ -69,11 +70,11 @@ END_TEST
 
 START_TEST(contact_in_one_point_is_touching_and_next_to_it_is_not)
 {
-    const ebpo_box unit = {{0, 0, 0}, {1, 1, 1}, 20};
-    ebpo_frame frame = ebpo_frame_make(&unit, (ebpo_cell){0, {0, 0, 0}});
-    ebpo_tally tally = {0};
+    const ebpo_box unit = { { 0, 0, 0 }, { 1, 1, 1 }, 20 };
+    ebpo_frame frame = ebpo_frame_make(&unit, (ebpo_cell){ 0, { 0, 0, 0 } });
+    ebpo_tally tally = { 0 };
     /* An edge through the cell's upper corner, the rest outside. */
-    ebpo_corners face = {{{0.5, 1.5, 1}, {1.5, 0.5, 1}, {1.5, 1.5, 1.75}}};
+    ebpo_corners face = { { { 0.5, 1.5, 1 }, { 1.5, 0.5, 1 }, { 1.5, 1.5, 1.75 } } };
     ck_assert(ebpo_face_touches(&frame, &face, &tally));
     face.at[0][0] += 0x1p-50;
     ck_assert(!ebpo_face_touches(&frame, &face, &tally));
@@ -87,22 +88,25 @@ START_TEST(half_space_certificates_agree_with_rationals)
 {
     uint64_t state = 2;
     int kept = 0, all = 0;
-    ebpo_tally tally = {0};
+    ebpo_tally tally = { 0 };
     for (int i = 0; i < ROUNDS; i++) {
         ebpo_frame frame = ebpo_frame_make(&box, some_cell(&state));
         ebpo_corners face = some_face(&frame, &state);
         if (!ebpo_exact_touches(frame.low, frame.high, &face))
             continue;
-        ebpo_half_spaces planes = {.count = 1};
-        uint32_t code = (uint32_t)(ebpo_test_random(&state) % 1023) | (uint32_t)(ebpo_test_random(&state) % 1023) << 10 |
+        ebpo_half_spaces planes = { .count = 1 };
+        uint32_t code = (uint32_t)(ebpo_test_random(&state) % 1023) |
+                        (uint32_t)(ebpo_test_random(&state) % 1023) << 10 |
                         (uint32_t)(ebpo_test_random(&state) % 4095) << 20;
         ck_assert(ebpo_plane_decode(code, planes.normal[0], &planes.d[0]));
         for (int k = 0; k < 3; k++)
             planes.n[0][k] = planes.normal[0][k];
         planes.bound[0] = planes.d[0] / 4096.0;
         uint64_t before = tally.violations[EBPO_VERIFY_CONTAINMENT];
-        ebpo_check_face_contained(&tally, &planes, &(ebpo_tree_view_node){.code = 1}, &frame, &face, 0);
-        bool exact = ebpo_exact_half_space(frame.low, frame.high, &face, planes.normal[0], planes.d[0]);
+        ebpo_check_face_contained(&tally, &planes, &(ebpo_tree_view_node){ .code = 1 }, &frame,
+                                  &face, 0);
+        bool exact =
+            ebpo_exact_half_space(frame.low, frame.high, &face, planes.normal[0], planes.d[0]);
         ck_assert_int_eq(tally.violations[EBPO_VERIFY_CONTAINMENT] == before, exact);
         kept += exact;
         all++;
@@ -114,12 +118,12 @@ END_TEST
 
 START_TEST(plane_through_the_highest_point_keeps_it_and_one_step_less_does_not)
 {
-    const ebpo_box unit = {{0, 0, 0}, {1, 1, 1}, 20};
-    ebpo_frame frame = ebpo_frame_make(&unit, (ebpo_cell){0, {0, 0, 0}});
-    ebpo_corners face = {{{0.25, 0.25, 0.5}, {0.5, 0.25, 0.5}, {0.25, 0.5, 3}}};
+    const ebpo_box unit = { { 0, 0, 0 }, { 1, 1, 1 }, 20 };
+    ebpo_frame frame = ebpo_frame_make(&unit, (ebpo_cell){ 0, { 0, 0, 0 } });
+    ebpo_corners face = { { { 0.25, 0.25, 0.5 }, { 0.5, 0.25, 0.5 }, { 0.25, 0.5, 3 } } };
     int32_t n[3], d;
     uint32_t normal;
-    ck_assert(ebpo_plane_code_normal((double[3]){1, 0, 0}, &normal));
+    ck_assert(ebpo_plane_code_normal((double[3]){ 1, 0, 0 }, &normal));
     ck_assert(ebpo_plane_decode(ebpo_plane_code_make(normal, 2047), n, &d));
     ck_assert_int_eq(d, 511 * 2048); /* x <= 0.5 */
     ck_assert(ebpo_exact_half_space(frame.low, frame.high, &face, n, d));
@@ -130,30 +134,35 @@ END_TEST
 static void check_rays(const char *name)
 {
     ebpo_mesh mesh = ebpo_test_make(name);
-    ebpo_box around = {{-16, -16, -16}, {32, 32, 32}, 20};
+    ebpo_box around = { { -16, -16, -16 }, { 32, 32, 32 }, 20 };
     uint64_t state = 3;
-    ebpo_ray_points points = {0};
+    ebpo_ray_points points = { 0 };
     for (int i = 0; i < 100; i++) {
         double p[3];
-        uint64_t v = ebpo_test_random(&state) % mesh.vertex_count, w = ebpo_test_random(&state) % mesh.vertex_count;
+        uint64_t v = ebpo_test_random(&state) % mesh.vertex_count,
+                 w = ebpo_test_random(&state) % mesh.vertex_count;
         double a[3], b[3];
         ebpo_test_point(&mesh, v, a);
         ebpo_test_point(&mesh, w, b);
         for (int k = 0; k < 3; k++) /* on vertices, in line with them, half-way between them */
-            p[k] = ebpo_test_random(&state) % 3 == 0 ? (a[k] + b[k]) / 2 : ebpo_test_random(&state) % 2 ? a[k] : b[k];
-        int64_t sums[3] = {0};
+            p[k] = ebpo_test_random(&state) % 3 == 0 ? (a[k] + b[k]) / 2
+                   : ebpo_test_random(&state) % 2    ? a[k]
+                                                     : b[k];
+        int64_t sums[3] = { 0 };
         for (uint64_t f = 0; f < mesh.face_count; f++) {
             ebpo_corners face;
             ebpo_face_corners(&mesh, f, &face);
             for (int axis = 0; axis < 3; axis++) {
                 int hit = ebpo_ray_hit(p, axis, &face);
-                ck_assert_int_eq(hit, -ebpo_axis_crossing(p, 1e9, axis, face.at[0], face.at[1], face.at[2]));
+                ck_assert_int_eq(hit, -ebpo_axis_crossing(p, 1e9, axis, face.at[0], face.at[1],
+                                                          face.at[2]));
                 sums[axis] += hit;
             }
         }
         ck_assert_int_eq(sums[0], sums[1]);
         ck_assert_int_eq(sums[0], sums[2]);
-        ck_assert(ebpo_rays_add(&points, &(ebpo_ray_point){{p[0], p[1], p[2]}, 1, sums[0], 99}));
+        ck_assert(
+            ebpo_rays_add(&points, &(ebpo_ray_point){ { p[0], p[1], p[2] }, 1, sums[0], 99 }));
     }
     ck_assert(ebpo_rays_follow(&points, &mesh, &around, 2, NULL, NULL) == EBPO_OK);
     ck_assert_uint_eq(points.count, 100);

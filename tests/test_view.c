@@ -1,4 +1,5 @@
-/* Nodes in the order of an observer: against the ordinary stream, and against plain twins of every key. */
+/* Nodes in the order of an observer: against the ordinary stream, and against plain twins of every
+ * key. */
 #include <check.h>
 #include <math.h>
 #include <stdio.h>
@@ -12,8 +13,16 @@
 #include "solids.h"
 
 /* ck_assert tells its parent process each time that it is passed. */
-#define EXPECT(condition) do { if (!(condition)) ck_abort_msg("line %d: %s", __LINE__, #condition); } while (0)
-#define EXPECT_MSG(condition, ...) do { if (!(condition)) ck_abort_msg(__VA_ARGS__); } while (0)
+#define EXPECT(condition)                                      \
+    do {                                                       \
+        if (!(condition))                                      \
+            ck_abort_msg("line %d: %s", __LINE__, #condition); \
+    } while (0)
+#define EXPECT_MSG(condition, ...)     \
+    do {                               \
+        if (!(condition))              \
+            ck_abort_msg(__VA_ARGS__); \
+    } while (0)
 
 static char folder[] = "/tmp/ebpo-view-XXXXXX", path[64];
 
@@ -51,8 +60,10 @@ static void write_solid(ebpo_mesh mesh, uint32_t parts, uint32_t leaf_faces)
     ebpo_tree tree;
     options.parts = parts;
     options.leaf_faces = leaf_faces;
-    ck_assert_msg(ebpo_mesh_check(&report, &mesh, 0, options.progress, &error) == EBPO_OK, "%s", error.message);
-    ck_assert_msg(ebpo_build(&tree, &mesh, &report, &mend, &options, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_mesh_check(&report, &mesh, 0, options.progress, &error) == EBPO_OK, "%s",
+                  error.message);
+    ck_assert_msg(ebpo_build(&tree, &mesh, &report, &mend, &options, &error) == EBPO_OK, "%s",
+                  error.message);
     write_tree(&tree);
 }
 
@@ -93,7 +104,8 @@ static void touch(counted *c, uint64_t offset, uint64_t size)
     }
 }
 
-static ebpo_status read_counted(void *user, uint64_t offset, uint64_t size, void *data, ebpo_error *error)
+static ebpo_status read_counted(void *user, uint64_t offset, uint64_t size, void *data,
+                                ebpo_error *error)
 {
     counted *c = user;
     if (c->failing) {
@@ -129,7 +141,8 @@ static ebpo_file *open_counted(counted *c, bool far)
         source.expect = expect_counted;
         source.at_hand = c->size < 4096 ? c->size : 4096;
     }
-    ck_assert_msg(ebpo_open_source(&file, &source, "counted", &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_open_source(&file, &source, "counted", &error) == EBPO_OK, "%s",
+                  error.message);
     return file;
 }
 
@@ -157,7 +170,12 @@ typedef struct records {
 
 static record record_of(const ebpo_stream_node *n)
 {
-    record r = { .octcode = n->octcode, .type = n->type, .winding = n->winding, .plane_count = n->plane_count, .vertex_count = n->vertex_count, .volume = n->volume };
+    record r = { .octcode = n->octcode,
+                 .type = n->type,
+                 .winding = n->winding,
+                 .plane_count = n->plane_count,
+                 .vertex_count = n->vertex_count,
+                 .volume = n->volume };
     memcpy(r.min, n->min, sizeof r.min);
     memcpy(r.max, n->max, sizeof r.max);
     for (uint32_t i = 0; i < n->plane_count; i++)
@@ -171,9 +189,11 @@ static record record_of(const ebpo_stream_node *n)
 
 static bool same(const record *a, const record *b)
 {
-    return a->octcode == b->octcode && a->type == b->type && a->winding == b->winding && a->plane_count == b->plane_count && a->vertex_count == b->vertex_count &&
-           memcmp(a->min, b->min, sizeof a->min) == 0 && memcmp(a->max, b->max, sizeof a->max) == 0 && a->volume == b->volume && a->planes_sum == b->planes_sum &&
-           a->vertices_sum == b->vertices_sum;
+    return a->octcode == b->octcode && a->type == b->type && a->winding == b->winding &&
+           a->plane_count == b->plane_count && a->vertex_count == b->vertex_count &&
+           memcmp(a->min, b->min, sizeof a->min) == 0 &&
+           memcmp(a->max, b->max, sizeof a->max) == 0 && a->volume == b->volume &&
+           a->planes_sum == b->planes_sum && a->vertices_sum == b->vertices_sum;
 }
 
 static records read_records(ebpo_file *file, bool polygons)
@@ -228,7 +248,8 @@ static double plain_distance(const ebpo_observer *o, const record *r)
 
 static double plain_pixels(const ebpo_observer *o, const record *r)
 {
-    double diagonal = sqrt(pow(r->max[0] - r->min[0], 2) + pow(r->max[1] - r->min[1], 2) + pow(r->max[2] - r->min[2], 2));
+    double diagonal = sqrt(pow(r->max[0] - r->min[0], 2) + pow(r->max[1] - r->min[1], 2) +
+                           pow(r->max[2] - r->min[2], 2));
     return diagonal / plain_distance(o, r) * o->height / (2 * tan(o->fov * M_PI / 360));
 }
 
@@ -244,7 +265,8 @@ static double plain_dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Of the walls of the view, how far the cell reaches into the one beyond which it lies most: negative means unseen. Relative to the distances. */
+/* Of the walls of the view, how far the cell reaches into the one beyond which it lies most:
+ * negative means unseen. Relative to the distances. */
 static double plain_reach(const ebpo_observer *o, const record *r)
 {
     double right[3], up[3], least = INFINITY, length = sqrt(plain_dot(o->direction, o->direction));
@@ -252,14 +274,16 @@ static double plain_reach(const ebpo_observer *o, const record *r)
         return 1;
     plain_cross(o->direction, o->up, right);
     plain_cross(right, o->direction, up);
-    double right_length = sqrt(plain_dot(right, right)), up_length = sqrt(plain_dot(up, up)), tangent = tan(o->fov * M_PI / 360);
+    double right_length = sqrt(plain_dot(right, right)), up_length = sqrt(plain_dot(up, up)),
+           tangent = tan(o->fov * M_PI / 360);
     for (int wall = 0; wall < 5; wall++) {
         double most = -INFINITY, away = 0;
         for (int corner = 0; corner < 8; corner++) {
             double p[3];
             for (int k = 0; k < 3; k++)
                 p[k] = (corner >> k & 1 ? r->max[k] : r->min[k]) - o->eye[k];
-            double depth = plain_dot(p, o->direction) / length, x = plain_dot(p, right) / right_length, y = plain_dot(p, up) / up_length;
+            double depth = plain_dot(p, o->direction) / length,
+                   x = plain_dot(p, right) / right_length, y = plain_dot(p, up) / up_length;
             double wide = depth * tangent * o->width / o->height, high = depth * tangent;
             const double reach[5] = { wide - x, wide + x, high - y, high + y, depth };
             most = fmax(most, reach[wall]);
@@ -270,9 +294,11 @@ static double plain_reach(const ebpo_observer *o, const record *r)
     return least;
 }
 
-/* Of two cells that do not meet inside: does a ray from the eye pass a and then b? Cells are boxes, so one coordinate at which they are apart decides against it, and if the nearer
- * side is b's on no axis, a is never behind. Sampled with rays: */
-static bool ray_meets(const double eye[3], const double direction[3], const record *r, double *in, double *out)
+/* Of two cells that do not meet inside: does a ray from the eye pass a and then b? Cells are boxes,
+ * so one coordinate at which they are apart decides against it, and if the nearer side is b's on no
+ * axis, a is never behind. Sampled with rays: */
+static bool ray_meets(const double eye[3], const double direction[3], const record *r, double *in,
+                      double *out)
 {
     *in = 0;
     *out = INFINITY;
@@ -293,8 +319,12 @@ static ebpo_observer observer_of(ebpo_file *file, uint64_t *random)
     bool everywhere = ebpo_test_random(random) % 4 == 0, inside = ebpo_test_random(random) % 4 == 0;
     for (int k = 0; k < 3; k++) {
         double middle = info->box_origin[k] + info->box_size[k] / 2;
-        o.eye[k] = middle + (ebpo_test_random_unit(random) - 0.5) * info->box_size[k] * (inside ? 0.9 : 5);
-        o.direction[k] = everywhere ? 0 : middle + (ebpo_test_random_unit(random) - 0.5) * info->box_size[k] - o.eye[k];
+        o.eye[k] =
+            middle + (ebpo_test_random_unit(random) - 0.5) * info->box_size[k] * (inside ? 0.9 : 5);
+        o.direction[k] =
+            everywhere
+                ? 0
+                : middle + (ebpo_test_random_unit(random) - 0.5) * info->box_size[k] - o.eye[k];
         o.up[k] = ebpo_test_random_unit(random) - 0.5;
     }
     o.fov = 10 + 80 * ebpo_test_random_unit(random);
@@ -315,7 +345,8 @@ static ebpo_view_stream *new_view(ebpo_file *file, const ebpo_view_options *opti
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_view_stream *stream = NULL;
-    ck_assert_msg(ebpo_view_stream_new(&stream, file, options, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_view_stream_new(&stream, file, options, &error) == EBPO_OK, "%s",
+                  error.message);
     return stream;
 }
 
@@ -339,8 +370,13 @@ typedef struct viewer {
 
 static viewer viewer_new(const records *all, const ebpo_view_options *options)
 {
-    return (viewer){ .all = all, .observer = options->observer, .options = *options, .come = calloc(all->count, 1), .in_cut = calloc(all->count, 1),
-                     .seen = calloc(all->count, 1), .order = malloc(all->count * sizeof(uint64_t)) };
+    return (viewer){ .all = all,
+                     .observer = options->observer,
+                     .options = *options,
+                     .come = calloc(all->count, 1),
+                     .in_cut = calloc(all->count, 1),
+                     .seen = calloc(all->count, 1),
+                     .order = malloc(all->count * sizeof(uint64_t)) };
 }
 
 static void viewer_free(viewer *v)
@@ -355,8 +391,10 @@ static bool wanted(const viewer *v, uint64_t i)
 {
     const record *r = &v->all->at[i];
     const ebpo_view_options *o = &v->options;
-    return r->type == EBPO_GRAY && (o->level < 0 || level_of(r->octcode) < o->level) && (o->pixels == 0 || plain_pixels(v->observer, r) > o->pixels) &&
-           (isinf(o->distance) || plain_distance(v->observer, r) <= o->distance) && (o->unseen == EBPO_UNSEEN_LAST || v->seen[i]);
+    return r->type == EBPO_GRAY && (o->level < 0 || level_of(r->octcode) < o->level) &&
+           (o->pixels == 0 || plain_pixels(v->observer, r) > o->pixels) &&
+           (isinf(o->distance) || plain_distance(v->observer, r) <= o->distance) &&
+           (o->unseen == EBPO_UNSEEN_LAST || v->seen[i]);
 }
 
 /* The least is to come first; those that are equal but for rounding may come in any order. */
@@ -379,11 +417,13 @@ static void expect_first(const viewer *v, uint64_t parent)
     for (uint64_t i = 0; i < v->all->count; i++) {
         if (!v->in_cut[i] || i == parent || !wanted(v, i))
             continue;
-        EXPECT_MSG(v->seen[parent] >= v->seen[i], "%llu, which is not seen, before %llu", (unsigned long long)v->all->at[parent].octcode,
-                      (unsigned long long)v->all->at[i].octcode);
+        EXPECT_MSG(v->seen[parent] >= v->seen[i], "%llu, which is not seen, before %llu",
+                   (unsigned long long)v->all->at[parent].octcode,
+                   (unsigned long long)v->all->at[i].octcode);
         if (v->seen[parent] == v->seen[i])
-            EXPECT_MSG(plain_key(v, i) >= key * (1 - 1e-9), "%llu waits while %llu is refined", (unsigned long long)v->all->at[i].octcode,
-                          (unsigned long long)v->all->at[parent].octcode);
+            EXPECT_MSG(plain_key(v, i) >= key * (1 - 1e-9), "%llu waits while %llu is refined",
+                       (unsigned long long)v->all->at[i].octcode,
+                       (unsigned long long)v->all->at[parent].octcode);
     }
 }
 
@@ -391,7 +431,8 @@ static void take(viewer *v, const ebpo_view_node *n, bool check_order)
 {
     uint64_t i = find(v->all, n->node.octcode), parent = n->node.octcode >> 3;
     record r = record_of(&n->node);
-    EXPECT_MSG(same(&r, &v->all->at[i]), "node %llu is not what the file says", (unsigned long long)r.octcode);
+    EXPECT_MSG(same(&r, &v->all->at[i]), "node %llu is not what the file says",
+               (unsigned long long)r.octcode);
     EXPECT(!v->come[i] && n->level == level_of(r.octcode));
     if (v->observer) {
         double reach = plain_reach(v->observer, &r), pixels = plain_pixels(v->observer, &r);
@@ -469,7 +510,9 @@ static void expect_cut(const viewer *v, ebpo_view_stream *stream, uint64_t *rand
     for (uint64_t i = 0; i < v->all->count; i++)
         kept += v->in_cut[i];
     ck_assert_uint_eq(c.count, kept);
-    EXPECT(c.share == (v->count ? 1 : 0)); /* different cells that cover as much as the root, none within another as all are in the viewer's cut: */
+    /* different cells that cover as much as the root, none within another as all are in the
+     * viewer's cut: */
+    EXPECT(c.share == (v->count ? 1 : 0));
     ebpo_view_stream_get_stats(stream, &stats);
     uint64_t waiting = 0;
     double pixels = 0;
@@ -485,7 +528,8 @@ static void expect_cut(const viewer *v, ebpo_view_stream *stream, uint64_t *rand
     for (int k = 0; k < 4; k++)
         ck_assert_uint_eq(stats.cut[k], c.types[k]);
     ck_assert_uint_eq(stats.waiting, waiting);
-    EXPECT(v->observer ? stats.pixels == pixels || fabs(stats.pixels - pixels) < 1e-9 * pixels : isnan(stats.pixels));
+    EXPECT(v->observer ? stats.pixels == pixels || fabs(stats.pixels - pixels) < 1e-9 * pixels
+                       : isnan(stats.pixels));
     if (c.count > 2) { /* one may stop */
         cutter some = { .v = v, .met = calloc(v->all->count, 1), .stop = c.count / 2 };
         ebpo_view_stream_cut(stream, visit, &some);
@@ -497,7 +541,8 @@ static void expect_cut(const viewer *v, ebpo_view_stream *stream, uint64_t *rand
 
 /* --- tests --- */
 
-static void expect_whole(ebpo_file *file, ebpo_priority priority, const ebpo_observer *observer, bool polygons, bool check_order, uint64_t *random)
+static void expect_whole(ebpo_file *file, ebpo_priority priority, const ebpo_observer *observer,
+                         bool polygons, bool check_order, uint64_t *random)
 {
     records all = read_records(file, polygons);
     ebpo_view_options options = options_of(priority, observer);
@@ -525,12 +570,14 @@ START_TEST(an_exhausted_stream_has_all_nodes_in_order_and_a_cut_at_any_time)
         return;
     uint64_t random = 11 + (uint64_t)_i;
     for (int variant = 0; variant < 2; variant++) {
-        write_solid(ebpo_test_solids[_i].make(), variant ? USUAL | EBPO_PART_LEAF_PLANES : USUAL, 4);
+        write_solid(ebpo_test_solids[_i].make(), variant ? USUAL | EBPO_PART_LEAF_PLANES : USUAL,
+                    4);
         ebpo_file *file = open_file();
         for (int priority = 0; priority < PRIORITIES; priority++) {
             ebpo_observer observer = observer_of(file, &random);
             bool observed = priority != EBPO_PRIORITY_LEVEL || variant;
-            expect_whole(file, (ebpo_priority)priority, observed ? &observer : NULL, variant == 1, true, &random);
+            expect_whole(file, (ebpo_priority)priority, observed ? &observer : NULL, variant == 1,
+                         true, &random);
         }
         ebpo_close(file);
     }
@@ -543,7 +590,9 @@ START_TEST(trees_of_several_chunks_come_whole_too)
     write_random(_i == 0 ? 8 : 5, 13, _i != 0, true); /* 8 levels: several chunks in most arrays */
     ebpo_file *file = open_file();
     ebpo_observer observer = observer_of(file, &random);
-    expect_whole(file, (ebpo_priority)(_i % PRIORITIES == 0 ? EBPO_PRIORITY_PIXELS : _i % PRIORITIES), &observer, false, _i != 0, &random);
+    expect_whole(file,
+                 (ebpo_priority)(_i % PRIORITIES == 0 ? EBPO_PRIORITY_PIXELS : _i % PRIORITIES),
+                 &observer, false, _i != 0, &random);
     ebpo_close(file);
 }
 END_TEST
@@ -601,7 +650,8 @@ START_TEST(pruned_nodes_of_subsets_stay_in_the_cut)
 }
 END_TEST
 
-/* For any ray from the eye: cells that it passes are refined in the order in which it meets them, each with all that is below it. */
+/* For any ray from the eye: cells that it passes are refined in the order in which it meets them,
+ * each with all that is below it. */
 START_TEST(refining_front_to_back_follows_every_ray)
 {
     uint64_t random = 77 + (uint64_t)_i;
@@ -619,14 +669,19 @@ START_TEST(refining_front_to_back_follows_every_ray)
     for (int ray = 0; ray < 200; ray++) {
         double direction[3], in[2], out[2];
         for (int k = 0; k < 3; k++) /* through a random place in the root cell */
-            direction[k] = all.at[0].min[k] + ebpo_test_random_unit(&random) * (all.at[0].max[k] - all.at[0].min[k]) - observer.eye[k];
+            direction[k] = all.at[0].min[k] +
+                           ebpo_test_random_unit(&random) * (all.at[0].max[k] - all.at[0].min[k]) -
+                           observer.eye[k];
         for (uint64_t a = 0; a < v.refined; a++) {
-            if (!ray_meets(observer.eye, direction, &all.at[find(&all, v.order[a])], &in[0], &out[0]))
+            if (!ray_meets(observer.eye, direction, &all.at[find(&all, v.order[a])], &in[0],
+                           &out[0]))
                 continue;
             for (uint64_t b = a + 1; b < v.refined; b++) /* later, so not before a */
-                if (ray_meets(observer.eye, direction, &all.at[find(&all, v.order[b])], &in[1], &out[1])) {
-                    EXPECT_MSG(out[1] > in[0] + 1e-9 * (1 + in[0]), "%llu is in front of %llu, and comes later", (unsigned long long)v.order[b],
-                                  (unsigned long long)v.order[a]);
+                if (ray_meets(observer.eye, direction, &all.at[find(&all, v.order[b])], &in[1],
+                              &out[1])) {
+                    EXPECT_MSG(out[1] > in[0] + 1e-9 * (1 + in[0]),
+                               "%llu is in front of %llu, and comes later",
+                               (unsigned long long)v.order[b], (unsigned long long)v.order[a]);
                     pairs++;
                 }
         }
@@ -649,7 +704,9 @@ START_TEST(what_is_small_far_deep_or_unseen_is_not_refined)
         ebpo_observer observer = observer_of(file, &random);
         ebpo_view_options options = options_of((ebpo_priority)(round % PRIORITIES), &observer);
         options.pixels = round % 3 == 0 ? 200 * ebpo_test_random_unit(&random) : 0;
-        options.distance = round % 3 == 1 ? plain_distance(&observer, &all.at[0]) + ebpo_test_random_unit(&random) : INFINITY;
+        options.distance =
+            round % 3 == 1 ? plain_distance(&observer, &all.at[0]) + ebpo_test_random_unit(&random)
+                           : INFINITY;
         options.level = round % 3 == 2 ? 3 : -1;
         options.unseen = round % 2 ? EBPO_UNSEEN_NEVER : EBPO_UNSEEN_LAST;
         viewer v = viewer_new(&all, &options);
@@ -659,7 +716,8 @@ START_TEST(what_is_small_far_deep_or_unseen_is_not_refined)
             take(&v, &node, true);
         for (uint64_t i = 0; i < all.count; i++) {
             uint64_t parent = all.at[i].octcode >> 3;
-            EXPECT(v.come[i] == (parent == 0 || (v.come[find(&all, parent)] && wanted(&v, find(&all, parent)))));
+            EXPECT(v.come[i] ==
+                   (parent == 0 || (v.come[find(&all, parent)] && wanted(&v, find(&all, parent)))));
         }
         expect_cut(&v, stream, &random);
         viewer_free(&v);
@@ -682,7 +740,8 @@ START_TEST(an_observer_who_moves_changes_what_comes_next)
     ebpo_view_node node;
     while (next(stream, &node) == EBPO_VIEW_NODE) {
         take(&v, &node, true);
-        if (ebpo_test_random(&random) % 60 || v.siblings) /* a change within a group is looked at below */
+        if (ebpo_test_random(&random) % 60 ||
+            v.siblings) /* a change within a group is looked at below */
             continue;
         observer = observer_of(file, &random);
         options.priority = (ebpo_priority)(ebpo_test_random(&random) % PRIORITIES);
@@ -718,7 +777,8 @@ static uint64_t *sequence(ebpo_view_stream *stream, uint64_t *count, ebpo_view_e
 {
     uint64_t room = 1024, *out = malloc(room * sizeof *out);
     ebpo_view_node node;
-    for (*count = 0; (*end = next(stream, &node)) == EBPO_VIEW_NODE; out[(*count)++] = node.node.octcode)
+    for (*count = 0; (*end = next(stream, &node)) == EBPO_VIEW_NODE;
+         out[(*count)++] = node.node.octcode)
         if (*count == room)
             out = realloc(out, (room *= 2) * sizeof *out);
     return out;
@@ -754,8 +814,9 @@ START_TEST(budgets_of_bytes_are_kept_and_only_cut_the_sequence_short)
             free(some);
             ebpo_file_traffic(file, &bytes, &reads);
             uint64_t allowed = options.bytes < opening ? opening : options.bytes;
-            ck_assert_msg(bytes <= allowed && c.asked <= allowed, "%llu read, %llu asked for, %llu allowed", (unsigned long long)bytes, (unsigned long long)c.asked,
-                          (unsigned long long)allowed);
+            ck_assert_msg(bytes <= allowed && c.asked <= allowed,
+                          "%llu read, %llu asked for, %llu allowed", (unsigned long long)bytes,
+                          (unsigned long long)c.asked, (unsigned long long)allowed);
             if (end == EBPO_VIEW_DONE)
                 break;
             ck_assert_int_eq(end, EBPO_VIEW_BYTES);
@@ -799,7 +860,8 @@ START_TEST(budgets_of_nodes_memory_and_planes_left_away_do_not_change_the_sequen
         ck_assert(ebpo_view_stream_change(stream, &options, NULL) == EBPO_OK);
         uint64_t rest;
         some = sequence(stream, &rest, &end);
-        ck_assert(end == EBPO_VIEW_DONE && count + rest == all_count && memcmp(all + count, some, rest * sizeof *some) == 0);
+        ck_assert(end == EBPO_VIEW_DONE && count + rest == all_count &&
+                  memcmp(all + count, some, rest * sizeof *some) == 0);
         free(some);
         ebpo_file_traffic(file, &bytes[variant], &reads);
         ebpo_view_stream_free(stream);
@@ -860,24 +922,30 @@ START_TEST(options_that_make_no_sense_are_refused)
     ebpo_view_stream *stream = NULL;
     for (int i = 0; i < 9; i++)
         bad[i] = good;
-    bad[0].eye[1] = NAN, bad[1].direction[0] = INFINITY, bad[2].fov = 180, bad[3].fov = 0, bad[4].width = 0, bad[5].height = 0;
+    bad[0].eye[1] = NAN, bad[1].direction[0] = INFINITY, bad[2].fov = 180, bad[3].fov = 0,
+    bad[4].width = 0, bad[5].height = 0;
     bad[6].direction[1] = -3; /* along up */
     bad[7].direction[0] = 1, bad[7].up[1] = 0;
     bad[8].up[2] = NAN;
     for (int i = 0; i < 9; i++) {
         usual.observer = &bad[i];
-        ck_assert_msg(ebpo_view_stream_new(&stream, file, &usual, NULL) == EBPO_E_ARGUMENT && !stream, "observer %d", i);
+        ck_assert_msg(ebpo_view_stream_new(&stream, file, &usual, NULL) == EBPO_E_ARGUMENT &&
+                          !stream,
+                      "observer %d", i);
     }
     usual.observer = &good;
     for (int i = 0; i < 9; i++)
         o[i] = usual;
-    o[0].priority = (ebpo_priority)4, o[1].pixels = -1, o[2].pixels = INFINITY, o[3].distance = NAN, o[4].unseen = (ebpo_unseen)2;
+    o[0].priority = (ebpo_priority)4, o[1].pixels = -1, o[2].pixels = INFINITY, o[3].distance = NAN,
+    o[4].unseen = (ebpo_unseen)2;
     o[5].observer = NULL, o[5].priority = EBPO_PRIORITY_DISTANCE;
     o[6].observer = NULL, o[6].pixels = 1;
     o[7].observer = NULL, o[7].distance = 1;
     o[8].memory = 65536;
     for (int i = 0; i < 9; i++)
-        ck_assert_msg(ebpo_view_stream_new(&stream, file, &o[i], NULL) == EBPO_E_ARGUMENT && !stream, "options %d", i);
+        ck_assert_msg(ebpo_view_stream_new(&stream, file, &o[i], NULL) == EBPO_E_ARGUMENT &&
+                          !stream,
+                      "options %d", i);
     ck_assert(ebpo_view_stream_new(&stream, file, NULL, NULL) == EBPO_OK);
     ebpo_view_node node, again;
     ck_assert_int_eq(next(stream, &node), EBPO_VIEW_NODE);
@@ -898,7 +966,8 @@ int main(void)
     TCase *tests = tcase_create("view");
     tcase_set_timeout(tests, 900);
     tcase_add_checked_fixture(tests, make_folder, remove_folder);
-    tcase_add_loop_test(tests, an_exhausted_stream_has_all_nodes_in_order_and_a_cut_at_any_time, 0, ebpo_test_solid_count);
+    tcase_add_loop_test(tests, an_exhausted_stream_has_all_nodes_in_order_and_a_cut_at_any_time, 0,
+                        ebpo_test_solid_count);
     tcase_add_loop_test(tests, trees_of_several_chunks_come_whole_too, 0, 4);
     tcase_add_loop_test(tests, pruned_nodes_of_subsets_stay_in_the_cut, 0, 4);
     tcase_add_loop_test(tests, refining_front_to_back_follows_every_ray, 0, 6);
@@ -906,7 +975,9 @@ int main(void)
     tcase_add_loop_test(tests, an_observer_who_moves_changes_what_comes_next, 0, 6);
     tcase_add_loop_test(tests, budgets_of_bytes_are_kept_and_only_cut_the_sequence_short, 0, 4);
     tcase_add_test(tests, budgets_of_nodes_memory_and_planes_left_away_do_not_change_the_sequence);
-    tcase_add_loop_test(tests, one_may_try_again_after_a_failure_and_streams_do_not_disturb_each_other, 0, 2);
+    tcase_add_loop_test(tests,
+                        one_may_try_again_after_a_failure_and_streams_do_not_disturb_each_other, 0,
+                        2);
     tcase_add_test(tests, options_that_make_no_sense_are_refused);
     suite_add_tcase(suite, tests);
     SRunner *runner = srunner_create(suite);

@@ -36,7 +36,8 @@ static ebpo_workspace *make(uint64_t memory)
 {
     ebpo_workspace *w;
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert_msg(ebpo_workspace_make_any(&w, memory, folder, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_workspace_make_any(&w, memory, folder, &error) == EBPO_OK, "%s",
+                  error.message);
     return w;
 }
 
@@ -45,7 +46,8 @@ START_TEST(what_does_not_fit_goes_to_files_without_names)
     enum { MIB = 1 << 20 };
     ebpo_workspace *w = make(8 * MIB);
     ebpo_workspace_figures f;
-    char *small = ebpo_array_alloc(w, 1000, 1), *held = ebpo_array_alloc(w, 3 * MIB, 1), *filed = ebpo_array_zero(w, 5 * MIB, 1);
+    char *small = ebpo_array_alloc(w, 1000, 1), *held = ebpo_array_alloc(w, 3 * MIB, 1),
+         *filed = ebpo_array_zero(w, 5 * MIB, 1);
     ck_assert(small && held && filed);
     ebpo_workspace_tell(w, &f);
     ck_assert_uint_eq(f.memory, 8 * MIB);
@@ -89,7 +91,8 @@ START_TEST(pages_of_files_are_let_go_of)
     return; /* whose own memory is resident too */
 #endif
     uint64_t before = resident(), budget = before + (32 << 20), most = 0;
-    ebpo_workspace *w = make(budget / 3 * 4); /* a quarter is left for what happens between two looks */
+    /* a quarter is left for what happens between two looks */
+    ebpo_workspace *w = make(budget / 3 * 4);
     enum { BYTES = 256 << 20 };
     unsigned char *a = ebpo_array_alloc(w, BYTES, 1);
     ck_assert_ptr_nonnull(a);
@@ -104,7 +107,8 @@ START_TEST(pages_of_files_are_let_go_of)
                 most = resident() > most ? resident() : most;
             }
         }
-    ck_assert_msg(most <= budget / 3 * 4, "%llu MiB of %llu", (unsigned long long)most >> 20, (unsigned long long)(budget / 3 * 4) >> 20);
+    ck_assert_msg(most <= budget / 3 * 4, "%llu MiB of %llu", (unsigned long long)most >> 20,
+                  (unsigned long long)(budget / 3 * 4) >> 20);
     ebpo_array_free(a);
     ebpo_workspace_free(w);
 }
@@ -150,7 +154,8 @@ START_TEST(a_file_that_may_not_grow_is_an_error_that_names_the_folder)
     ck_assert_int_eq(setrlimit(RLIMIT_FSIZE, &limit), 0);
     ck_assert_ptr_null(ebpo_array_alloc(w, 5 << 20, 1));
     ck_assert_int_eq(ebpo_workspace_fail(w, 5 << 20, &error), EBPO_E_IO);
-    ck_assert_msg(strstr(error.message, folder) && strstr(error.message, "5242880"), "%s", error.message);
+    ck_assert_msg(strstr(error.message, folder) && strstr(error.message, "5242880"), "%s",
+                  error.message);
     ebpo_workspace_figures f;
     ebpo_workspace_tell(w, &f);
     ck_assert(f.held == 0 && f.filed == 0);

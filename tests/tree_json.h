@@ -1,5 +1,5 @@
-/* A tree as JSON: what the vectors' .json files hold and what every reader must get out of a file. Arrays as ebpo_tree has them; coordinates
- * with as many digits as bring every bit back. */
+/* A tree as JSON: what the vectors' .json files hold and what every reader must get out of a file.
+ * Arrays as ebpo_tree has them; coordinates with as many digits as bring every bit back. */
 #ifndef TREE_JSON_H
 #define TREE_JSON_H
 
@@ -23,26 +23,27 @@ static void tj_digest(FILE *out, const void *values, size_t bytes)
     fprintf(out, "\"sha256 %s\"", hex);
 }
 
-#define TJ_ARRAY(out, name, values, count, format)                                        \
-    do {                                                                                  \
-        fprintf(out, ",\n   \"%s\": ", name);                                              \
-        if (!(values)) {                                                                  \
-            fprintf(out, "null");                                                         \
-            break;                                                                        \
-        }                                                                                 \
-        if ((count) > 1000) {                                                             \
-            tj_digest(out, values, (count) * sizeof *(values));                           \
-            break;                                                                        \
-        }                                                                                 \
-        fprintf(out, "[");                                                                \
-        for (uint64_t tj_i = 0; tj_i < (count); tj_i++)                                   \
-            fprintf(out, "%s" format, tj_i ? "," : "", (values)[tj_i]);                   \
-        fprintf(out, "]");                                                                \
+#define TJ_ARRAY(out, name, values, count, format)                      \
+    do {                                                                \
+        fprintf(out, ",\n   \"%s\": ", name);                           \
+        if (!(values)) {                                                \
+            fprintf(out, "null");                                       \
+            break;                                                      \
+        }                                                               \
+        if ((count) > 1000) {                                           \
+            tj_digest(out, values, (count) * sizeof *(values));         \
+            break;                                                      \
+        }                                                               \
+        fprintf(out, "[");                                              \
+        for (uint64_t tj_i = 0; tj_i < (count); tj_i++)                 \
+            fprintf(out, "%s" format, tj_i ? "," : "", (values)[tj_i]); \
+        fprintf(out, "]");                                              \
     } while (0)
 
 static void tj_level(FILE *out, const ebpo_level *l, int number)
 {
-    fprintf(out, "  {\"level\": %d,\n   \"gray_volume\": %.17g,\n   \"leaf_volume\": %.17g", number, l->gray_volume, l->leaf_volume);
+    fprintf(out, "  {\"level\": %d,\n   \"gray_volume\": %.17g,\n   \"leaf_volume\": %.17g", number,
+            l->gray_volume, l->leaf_volume);
     TJ_ARRAY(out, "types", l->types, l->group_count, "%" PRIu16);
     TJ_ARRAY(out, "plane_counts", l->plane_counts, l->gray_count, "%" PRIu8);
     TJ_ARRAY(out, "planes", l->planes, l->plane_count, "%" PRIu32);
@@ -62,8 +63,11 @@ static void tree_json(FILE *out, const ebpo_tree *tree)
 {
     const ebpo_info *info = &tree->info;
     static const char *const rules[] = { "nonzero", "evenodd", "positive" };
-    fprintf(out, "{\"kind\": \"%s\",\n \"winding_rule\": \"%s\",\n \"coordinate_type\": \"%s\",\n \"levels\": [\n",
-            info->solid ? "solid" : "surface", rules[info->rule], info->double_coordinates ? "float64" : "float32");
+    fprintf(out,
+            "{\"kind\": \"%s\",\n \"winding_rule\": \"%s\",\n \"coordinate_type\": \"%s\",\n "
+            "\"levels\": [\n",
+            info->solid ? "solid" : "surface", rules[info->rule],
+            info->double_coordinates ? "float64" : "float32");
     for (int i = 0; i < info->level_count; i++) {
         tj_level(out, &tree->level[i], i);
         fprintf(out, i + 1 < info->level_count ? ",\n" : "],\n \"mesh\": {\"level\": null");

@@ -36,7 +36,9 @@ static double to_segment(const double p[3], const double a[3], const double b[3]
 /* To the plane, where the foot is in the triangle; else to the sides. */
 static double to_triangle(const double p[3], const double t[3][3])
 {
-    double u[3], v[3], n[3], w[3], best = fmin(to_segment(p, t[0], t[1]), fmin(to_segment(p, t[1], t[2]), to_segment(p, t[2], t[0])));
+    double u[3], v[3], n[3], w[3],
+        best = fmin(to_segment(p, t[0], t[1]),
+                    fmin(to_segment(p, t[1], t[2]), to_segment(p, t[2], t[0])));
     minus(t[1], t[0], u);
     minus(t[2], t[0], v);
     cross(u, v, n);
@@ -62,7 +64,8 @@ static double solid_angle(const double p[3], const double t[3][3])
         length[i] = sqrt(dot(r[i], r[i]));
     }
     cross(r[1], r[2], c);
-    double below = length[0] * length[1] * length[2] + dot(r[0], r[1]) * length[2] + dot(r[1], r[2]) * length[0] + dot(r[2], r[0]) * length[1];
+    double below = length[0] * length[1] * length[2] + dot(r[0], r[1]) * length[2] +
+                   dot(r[1], r[2]) * length[0] + dot(r[2], r[0]) * length[1];
     return 2 * atan2(dot(r[0], c), below);
 }
 
@@ -73,26 +76,30 @@ double twin_distance(const ebpo_mesh *mesh, bool solid, const double p[3])
         double t[3][3];
         for (int c = 0; c < 3; c++)
             ebpo_test_point(mesh, mesh->faces[3 * i + (uint64_t)c], t[c]);
-        best = fmin(best, to_triangle(p, (const double (*)[3])t));
-        angle += solid ? solid_angle(p, (const double (*)[3])t) : 0;
+        best = fmin(best, to_triangle(p, (const double(*)[3])t));
+        angle += solid ? solid_angle(p, (const double(*)[3])t) : 0;
     }
     return fabs(angle) > 6.28 ? 0 : best;
 }
 
-double twin_reach(ebpo_file *file, int level, const ebpo_mesh *mesh, bool solid, uint64_t points, uint64_t seed)
+double twin_reach(ebpo_file *file, int level, const ebpo_mesh *mesh, bool solid, uint64_t points,
+                  uint64_t seed)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_mesh lod;
     ebpo_lod_nodes nodes;
     double most = 0;
-    ck_assert_msg(ebpo_lod_level_nodes(file, level, NULL, &lod, &nodes, NULL, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_lod_level_nodes(file, level, NULL, &lod, &nodes, NULL, &error) == EBPO_OK,
+                  "%s", error.message);
     for (uint64_t i = 0; i < points && lod.face_count; i++) {
         const uint32_t *face = lod.faces + 3 * (ebpo_test_random(&seed) % lod.face_count);
         double a = ebpo_test_random_unit(&seed), b = ebpo_test_random_unit(&seed) * (1 - a), p[3];
         if (i % 4 == 0) /* corners are where most maxima are */
             a = b = 0;
         for (int k = 0; k < 3; k++)
-            p[k] = a * lod.xyz64[3 * face[1] + (uint32_t)k] + b * lod.xyz64[3 * face[2] + (uint32_t)k] + (1 - a - b) * lod.xyz64[3 * face[0] + (uint32_t)k];
+            p[k] = a * lod.xyz64[3 * face[1] + (uint32_t)k] +
+                   b * lod.xyz64[3 * face[2] + (uint32_t)k] +
+                   (1 - a - b) * lod.xyz64[3 * face[0] + (uint32_t)k];
         if (i % 2) { /* between it and another corner of the same node */
             uint64_t node = 0, first = 0;
             while (first + nodes.nodes[node].vertex_count <= face[0])

@@ -1,4 +1,5 @@
-/* Reading a vector file whole, and its outcome as two lines: status, message. Words of libhdf5's own and the folder are left out. */
+/* Reading a vector file whole, and its outcome as two lines: status, message. Words of libhdf5's
+ * own and the folder are left out. */
 #ifndef VECTOR_READ_H
 #define VECTOR_READ_H
 
@@ -25,7 +26,9 @@ static ebpo_status vector_read(const char *path, ebpo_tree *tree, ebpo_error *er
 static void vector_outcome(const char *path, const ebpo_error *error, char *text, size_t size)
 {
     const char *name = strrchr(path, '/') ? strrchr(path, '/') + 1 : path;
-    const char *rest = strncmp(error->message, path, strlen(path)) == 0 ? error->message + strlen(path) : error->message;
+    const char *rest = strncmp(error->message, path, strlen(path)) == 0
+                           ? error->message + strlen(path)
+                           : error->message;
     snprintf(text, size, "%s\n%s%s\n", ebpo_status_name(error->status), name, rest);
     char *cause = strstr(text, " (libhdf5: ");
     if (cause)

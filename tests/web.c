@@ -13,7 +13,9 @@ static char folder[] = "/tmp/ebpo-web-XXXXXX", path[sizeof folder + 16];
 
 static bool write_file(const void *data, size_t size)
 {
-    FILE *f = mkdtemp(folder) ? (snprintf(path, sizeof path, "%s/served", folder), fopen(path, "wb")) : NULL;
+    FILE *f = mkdtemp(folder)
+                  ? (snprintf(path, sizeof path, "%s/served", folder), fopen(path, "wb"))
+                  : NULL;
     bool good = f && fwrite(data, 1, size, f) == size;
     return f && fclose(f) == 0 && good;
 }
@@ -56,6 +58,7 @@ void web_stop(void)
 const char *web_url(const char *fault)
 {
     static char url[300];
-    snprintf(url, sizeof url, "http://127.0.0.1:%d/%s/%ld-%d", port, fault, (long)getpid(), number++);
+    snprintf(url, sizeof url, "http://127.0.0.1:%d/%s/%ld-%d", port, fault, (long)getpid(),
+             number++);
     return url;
 }

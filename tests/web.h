@@ -1,8 +1,10 @@
-/* A faulty web server for a test program: tests/faulty_server.py, started once, ended with the program whatever happens. */
+/* A faulty web server for a test program: tests/faulty_server.py, started once, ended with the
+ * program whatever happens. */
 #ifndef EBPO_TESTS_WEB_H
 #define EBPO_TESTS_WEB_H
 
-/* Serves these bytes as a file; false when Python is not to be had. The server reads from a pipe that the system closes with this process. */
+/* Serves these bytes as a file; false when Python is not to be had. The server reads from a pipe
+ * that the system closes with this process. */
 #include <stdbool.h>
 #include <stddef.h>
 

@@ -12,7 +12,8 @@ const char *const where_words[] = { "OUT", "IN", "ON", "MAYBE" };
 
 /* --- answers leave whole --- */
 
-/* A pipe takes so much at once; the last answer under it leaves before the next one begins. ANSWER: the longest one, but for lists of hits and faces. */
+/* A pipe takes so much at once; the last answer under it leaves before the next one begins. ANSWER:
+ * the longest one, but for lists of hits and faces. */
 enum { CHUNK = 4096, ANSWER = 512 };
 
 static const char *printing; /* the command */
@@ -26,7 +27,8 @@ void answers_begin(const char *name)
 static void leave_whole(void)
 {
     if (__fpending(stdout) > CHUNK - ANSWER)
-        command_flush(printing); /* a failure stays with the stream: the loop of questions sees it */
+        /* a failure stays with the stream: the loop of questions sees it */
+        command_flush(printing);
 }
 
 /* --- raw --- */
@@ -156,10 +158,13 @@ static void distance_raw(bool limited, const ebpo_distance_result *r)
     raw_u64(stdout, r->face);
 }
 
-void answers_distance(answer_form form, bool limited, const ebpo_distance_result *results, uint64_t count)
+void answers_distance(answer_form form, bool limited, const ebpo_distance_result *results,
+                      uint64_t count)
 {
     for (uint64_t i = 0; i < count; i++) {
-        (form == ANSWERS_RAW ? distance_raw : form == ANSWERS_JSON ? distance_json : distance_text)(limited, &results[i]);
+        (form == ANSWERS_RAW    ? distance_raw
+         : form == ANSWERS_JSON ? distance_json
+                                : distance_text)(limited, &results[i]);
         leave_whole();
     }
 }
@@ -168,7 +173,8 @@ void answers_distance(answer_form form, bool limited, const ebpo_distance_result
 
 static void hit_json(const char *lead, const ebpo_ray_hit *hit)
 {
-    printf("%s{\"t\": %.17g, \"face\": %" PRIu64 ", \"side\": %" PRId32 "}", lead, hit->t, hit->face, hit->side);
+    printf("%s{\"t\": %.17g, \"face\": %" PRIu64 ", \"side\": %" PRId32 "}", lead, hit->t,
+           hit->face, hit->side);
 }
 
 static void hit_raw(const ebpo_ray_hit *hit)
@@ -271,13 +277,18 @@ void stats_print(FILE *out, bool as_json, const ebpo_model_stats *stats)
         else
             fprintf(out, "%s%s ", i ? ", " : "", sums[i].name);
         switch (sums[i].kind) {
-        case SUM_BOOL: fputs(*(const bool *)field ? (as_json ? "true" : "yes") : (as_json ? "false" : "no"), out); break;
+        case SUM_BOOL:
+            fputs(*(const bool *)field ? (as_json ? "true" : "yes") : (as_json ? "false" : "no"),
+                  out);
+            break;
         case SUM_INT: fprintf(out, "%d", *(const int *)(const void *)field); break;
         case SUM_UINT: fprintf(out, "%" PRIu64, *u); break;
         case SUM_REAL: fprintf(out, "%.6f", *(const double *)(const void *)field); break;
         case SUM_FIVE:
-            fprintf(out, as_json ? "[%" PRIu64 ", %" PRIu64 ", %" PRIu64 ", %" PRIu64 ", %" PRIu64 "]"
-                                 : "%" PRIu64 "/%" PRIu64 "/%" PRIu64 "/%" PRIu64 "/%" PRIu64, u[0], u[1], u[2], u[3], u[4]);
+            fprintf(out,
+                    as_json ? "[%" PRIu64 ", %" PRIu64 ", %" PRIu64 ", %" PRIu64 ", %" PRIu64 "]"
+                            : "%" PRIu64 "/%" PRIu64 "/%" PRIu64 "/%" PRIu64 "/%" PRIu64,
+                    u[0], u[1], u[2], u[3], u[4]);
         }
     }
     fputs(as_json ? "}\n" : "\n", out);

@@ -11,13 +11,14 @@ typedef enum answer_form { ANSWERS_TEXT, ANSWERS_JSON, ANSWERS_RAW } answer_form
 
 extern const char *const where_words[]; /* OUT, IN, ON, MAYBE */
 
-/* Before the first answer of a command: from then on answers leave the process whole (those longer than 4096 bytes: to files), so that who is
- * interrupted has printed complete lines. */
+/* Before the first answer of a command: from then on answers leave the process whole (those longer
+ * than 4096 bytes: to files), so that who is interrupted has printed complete lines. */
 void answers_begin(const char *command);
 
 void answers_inside(answer_form form, const ebpo_inside_result *results, uint64_t count);
 /* `limited`: lo and hi only. */
-void answers_distance(answer_form form, bool limited, const ebpo_distance_result *results, uint64_t count);
+void answers_distance(answer_form form, bool limited, const ebpo_distance_result *results,
+                      uint64_t count);
 /* `hit` NULL: none. */
 void answers_ray_first(answer_form form, const ebpo_ray_hit *hit);
 void answers_ray_all(answer_form form, const ebpo_ray_hit *hits, uint64_t count);

@@ -7,9 +7,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const arg_option help_option = { "help", 'h', ARG_FLAG, 0, NULL, "print this and end", 0, 0, NULL };
+static const arg_option help_option = { "help", 'h', ARG_FLAG, 0, NULL, "print this and end",
+                                        0,      0,   NULL };
 
-__attribute__((format(printf, 2, 3))) static arg_result wrong(const arg_spec *spec, const char *format, ...)
+__attribute__((format(printf, 2, 3))) static arg_result wrong(const arg_spec *spec,
+                                                              const char *format, ...)
 {
     va_list list;
     va_start(list, format);
@@ -28,7 +30,8 @@ static arg_result set_int(const arg_spec *spec, const arg_option *o, const char 
     errno = 0;
     long long v = strtoll(text, &end, 10);
     if (end == text || *end || errno || (double)v < o->low || (double)v > o->high)
-        return wrong(spec, "--%s: '%s' is not a whole number from %.0f to %.0f", o->name, text, o->low, o->high);
+        return wrong(spec, "--%s: '%s' is not a whole number from %.0f to %.0f", o->name, text,
+                     o->low, o->high);
     *out = v;
     return ARGS_RUN;
 }
@@ -38,7 +41,8 @@ static arg_result set_real(const arg_spec *spec, const arg_option *o, const char
     char *end;
     double v = strtod(text, &end);
     if (end == text || *end || !isfinite(v) || v < o->low || v > o->high)
-        return wrong(spec, "--%s: '%s' is not a number from %g to %g", o->name, text, o->low, o->high);
+        return wrong(spec, "--%s: '%s' is not a number from %g to %g", o->name, text, o->low,
+                     o->high);
     *out = v;
     return ARGS_RUN;
 }
@@ -51,7 +55,8 @@ static void join_words(const char *const *words, char *out, size_t room)
         used += (size_t)snprintf(out + used, room - used, "%s%s", i ? ", " : "", words[i]);
 }
 
-static arg_result find_word(const arg_spec *spec, const arg_option *o, const char *text, size_t length, int *out)
+static arg_result find_word(const arg_spec *spec, const arg_option *o, const char *text,
+                            size_t length, int *out)
 {
     for (int i = 0; o->words[i]; i++)
         if (strlen(o->words[i]) == length && memcmp(o->words[i], text, length) == 0) {
@@ -63,7 +68,8 @@ static arg_result find_word(const arg_spec *spec, const arg_option *o, const cha
     return wrong(spec, "--%s: '%.*s' is none of: %s", o->name, (int)length, text, all);
 }
 
-static arg_result set_bits(const arg_spec *spec, const arg_option *o, const char *text, uint32_t *out)
+static arg_result set_bits(const arg_spec *spec, const arg_option *o, const char *text,
+                           uint32_t *out)
 {
     for (const char *at = text;; at++) {
         size_t length = strcspn(at, ",");
@@ -78,7 +84,8 @@ static arg_result set_bits(const arg_spec *spec, const arg_option *o, const char
     }
 }
 
-static arg_result add_to_list(const arg_spec *spec, const arg_option *o, const char *text, arg_list *out)
+static arg_result add_to_list(const arg_spec *spec, const arg_option *o, const char *text,
+                              arg_list *out)
 {
     if (out->count == ARG_LIST_MAX)
         return wrong(spec, "--%s: is given more than %d times", o->name, ARG_LIST_MAX);
@@ -86,7 +93,8 @@ static arg_result add_to_list(const arg_spec *spec, const arg_option *o, const c
     return ARGS_RUN;
 }
 
-static arg_result set_value(const arg_spec *spec, const arg_option *o, const char *text, void *values)
+static arg_result set_value(const arg_spec *spec, const arg_option *o, const char *text,
+                            void *values)
 {
     void *field = (char *)values + o->offset;
     switch (o->kind) {
@@ -165,7 +173,8 @@ static arg_result take(parser *p, const arg_option *o, const char *joined)
         return ARGS_HELPED;
     }
     if (o->kind == ARG_FLAG)
-        return joined ? wrong(p->spec, "--%s takes no value", o->name) : set_value(p->spec, o, NULL, p->values);
+        return joined ? wrong(p->spec, "--%s takes no value", o->name)
+                      : set_value(p->spec, o, NULL, p->values);
     if (!joined && p->at + 1 < p->argc)
         joined = p->argv[++p->at];
     if (!joined)
@@ -223,8 +232,8 @@ arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values,
             return result;
     }
     if (count < spec->least)
-        return wrong(spec, "%s; expected: %s", count ? "an operand is missing" : "operands are missing",
-                     spec->operands);
+        return wrong(spec, "%s; expected: %s",
+                     count ? "an operand is missing" : "operands are missing", spec->operands);
     return ARGS_RUN;
 }
 

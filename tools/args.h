@@ -35,8 +35,10 @@ typedef struct arg_list {
 } arg_list;
 
 /* An option without a value: its field is a bool of the struct `type`. */
-#define ARG_SWITCH(name, letter, type, field, help) \
-    { name, letter, ARG_FLAG, offsetof(type, field), NULL, help, 0, 0, NULL }
+#define ARG_SWITCH(name, letter, type, field, help)                           \
+    {                                                                         \
+        name, letter, ARG_FLAG, offsetof(type, field), NULL, help, 0, 0, NULL \
+    }
 
 typedef struct arg_spec {
     const char *command;  /* "convert" */
@@ -51,8 +53,8 @@ typedef enum arg_result { ARGS_RUN, ARGS_HELPED, ARGS_WRONG } arg_result;
 
 enum { ARGS_OPERANDS_MAX = 12 };
 
-/* Parses argv[1 ..] into `values` (set to defaults before) and `operands` (unused ones NULL). Options may stand
- * anywhere; "--" ends them.
+/* Parses argv[1 ..] into `values` (set to defaults before) and `operands` (unused ones NULL).
+ * Options may stand anywhere; "--" ends them.
  * --help is printed on stdout; what is wrong is said on stderr. */
 arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values,
                       const char *operands[ARGS_OPERANDS_MAX]);

@@ -30,7 +30,8 @@ static int make_room(bench_points *out, uint64_t count)
     return EXIT_FINE;
 }
 
-/* Of any length but about 1, uniform over the sphere: by rejection, which takes no functions that differ between systems. */
+/* Of any length but about 1, uniform over the sphere: by rejection, which takes no functions that
+ * differ between systems. */
 static void random_direction(uint64_t *random, double out[3])
 {
     double square;
@@ -76,7 +77,8 @@ static int fill_path(bench_points *out, ebpo_file *file, uint64_t seed)
     return good ? EXIT_FINE : no_memory();
 }
 
-static int generate(bench_points *out, const char *model, const remote_values *remote, bool path, uint64_t seed)
+static int generate(bench_points *out, const char *model, const remote_values *remote, bool path,
+                    uint64_t seed)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
@@ -112,12 +114,15 @@ static int read_all(bench_points *out, points *in, uint64_t most)
     return out->count ? EXIT_FINE : EXIT_FAILED;
 }
 
-int bench_points_make(bench_points *out, points_kind kind, const char *model, const remote_values *remote, const char *what, bool raw, uint64_t count, uint64_t seed)
+int bench_points_make(bench_points *out, points_kind kind, const char *model,
+                      const remote_values *remote, const char *what, bool raw, uint64_t count,
+                      uint64_t seed)
 {
     bool path = strcmp(what, "path") == 0;
     *out = (bench_points){ .kind = kind, .count = count ? count : USUAL_COUNT };
     if (path && kind == POINTS_RAYS) {
-        fprintf(stderr, "ebpo bench: a path has points; for rays give --points uniform or a file; try 'ebpo bench --help'\n");
+        fprintf(stderr, "ebpo bench: a path has points; for rays give --points uniform or a file; "
+                        "try 'ebpo bench --help'\n");
         return EXIT_USAGE;
     }
     if (path || strcmp(what, "uniform") == 0)

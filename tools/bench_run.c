@@ -16,7 +16,9 @@
 
 size_t bench_answer_bytes(bench_query query)
 {
-    return query == BENCH_INSIDE ? sizeof(ebpo_inside_result) : query == BENCH_DISTANCE ? sizeof(ebpo_distance_result) : sizeof(ebpo_ray_hit);
+    return query == BENCH_INSIDE     ? sizeof(ebpo_inside_result)
+           : query == BENCH_DISTANCE ? sizeof(ebpo_distance_result)
+                                     : sizeof(ebpo_ray_hit);
 }
 
 /* --- clock --- */
@@ -50,7 +52,8 @@ uint64_t bench_clock_cost(void)
 
 /* --- questions --- */
 
-static ebpo_status ask_ray(const double *row, ebpo_context *context, ebpo_ray_hit *out, ebpo_error *error)
+static ebpo_status ask_ray(const double *row, ebpo_context *context, ebpo_ray_hit *out,
+                           ebpo_error *error)
 {
     bool hit = false;
     ebpo_status status = ebpo_ray_first(context, row, row + 3, row[6], out, &hit, error);
@@ -59,17 +62,22 @@ static ebpo_status ask_ray(const double *row, ebpo_context *context, ebpo_ray_hi
     return status;
 }
 
-static inline ebpo_status ask_into(const bench_job *job, ebpo_context *context, uint64_t i, void *answers, ebpo_error *error)
+static inline ebpo_status ask_into(const bench_job *job, ebpo_context *context, uint64_t i,
+                                   void *answers, ebpo_error *error)
 {
     const double *row = job->rows + i * (uint64_t)job->width;
     switch (job->query) {
-    case BENCH_INSIDE: return ebpo_inside(context, row, &job->options, (ebpo_inside_result *)answers + i, error);
-    case BENCH_DISTANCE: return ebpo_distance(context, row, &job->options, (ebpo_distance_result *)answers + i, error);
+    case BENCH_INSIDE:
+        return ebpo_inside(context, row, &job->options, (ebpo_inside_result *)answers + i, error);
+    case BENCH_DISTANCE:
+        return ebpo_distance(context, row, &job->options, (ebpo_distance_result *)answers + i,
+                             error);
     default: return ask_ray(row, context, (ebpo_ray_hit *)answers + i, error);
     }
 }
 
-ebpo_status bench_ask(const bench_job *job, ebpo_context *context, uint64_t number, ebpo_error *error)
+ebpo_status bench_ask(const bench_job *job, ebpo_context *context, uint64_t number,
+                      ebpo_error *error)
 {
     return ask_into(job, context, number, job->answers, error);
 }
@@ -89,7 +97,8 @@ static uint64_t quantile(const uint64_t *sorted, uint64_t count, unsigned thousa
     return sorted[below ? below - 1 : 0];
 }
 
-ebpo_status bench_singly(const bench_job *job, ebpo_context *context, uint64_t clock_cost, bench_figures *out, ebpo_error *error)
+ebpo_status bench_singly(const bench_job *job, ebpo_context *context, uint64_t clock_cost,
+                         bench_figures *out, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     double sum = 0;
@@ -115,7 +124,8 @@ ebpo_status bench_singly(const bench_job *job, ebpo_context *context, uint64_t c
     return EBPO_OK;
 }
 
-ebpo_status bench_batch(const bench_job *job, ebpo_context *context, void *answers, bench_figures *out, ebpo_error *error)
+ebpo_status bench_batch(const bench_job *job, ebpo_context *context, void *answers,
+                        bench_figures *out, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     uint64_t start = bench_clock();

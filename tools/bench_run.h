@@ -18,11 +18,11 @@ typedef struct bench_job {
     bench_query query;
     ebpo_query_options options;
     const double *rows;
-    int width;      /* doubles a row */
+    int width; /* doubles a row */
     uint64_t count;
-    double rate;    /* single questions a second; 0: as fast as they are answered */
-    uint64_t *ns;   /* [count] */
-    void *answers;  /* [count] of one member of bench_answer */
+    double rate;   /* single questions a second; 0: as fast as they are answered */
+    uint64_t *ns;  /* [count] */
+    void *answers; /* [count] of one member of bench_answer */
 } bench_job;
 
 size_t bench_answer_bytes(bench_query query);
@@ -38,15 +38,21 @@ uint64_t bench_clock(void);
 /* What a reading of the clock adds to a time: the median of 10,001. */
 uint64_t bench_clock_cost(void);
 
-EBPO_MUST_USE ebpo_status bench_ask(const bench_job *job, ebpo_context *context, uint64_t number, ebpo_error *error);
+EBPO_MUST_USE ebpo_status bench_ask(const bench_job *job, ebpo_context *context, uint64_t number,
+                                    ebpo_error *error);
 /* Each query by itself, timed singly: all figures but `batch`. Sorts job->ns. */
-EBPO_MUST_USE ebpo_status bench_singly(const bench_job *job, ebpo_context *context, uint64_t clock_cost, bench_figures *out, ebpo_error *error);
-/* All at once through the functions for many points (rays: one after the other), into `answers`, of the same room as job->answers. */
-EBPO_MUST_USE ebpo_status bench_batch(const bench_job *job, ebpo_context *context, void *answers, bench_figures *out, ebpo_error *error);
+EBPO_MUST_USE ebpo_status bench_singly(const bench_job *job, ebpo_context *context,
+                                       uint64_t clock_cost, bench_figures *out, ebpo_error *error);
+/* All at once through the functions for many points (rays: one after the other), into `answers`, of
+ * the same room as job->answers. */
+EBPO_MUST_USE ebpo_status bench_batch(const bench_job *job, ebpo_context *context, void *answers,
+                                      bench_figures *out, ebpo_error *error);
 
-/* Asks the system to forget what it holds of a file. Returns the share of the file's pages that it still holds; -1 where that is not known. */
+/* Asks the system to forget what it holds of a file. Returns the share of the file's pages that it
+ * still holds; -1 where that is not known. */
 double bench_drop_file(const char *path);
-/* The most memory that this process has had (Linux), since the last reset where the system allows one; 0 where it is not known. */
+/* The most memory that this process has had (Linux), since the last reset where the system allows
+ * one; 0 where it is not known. */
 uint64_t bench_peak_memory(void);
 void bench_reset_peak(void);
 

@@ -26,10 +26,7 @@ uint64_t bench_random(uint64_t *state)
     return z ^ z >> 31;
 }
 
-double bench_random_unit(uint64_t *state)
-{
-    return (double)(bench_random(state) >> 11) * 0x1p-53;
-}
+double bench_random_unit(uint64_t *state) { return (double)(bench_random(state) >> 11) * 0x1p-53; }
 
 /* --- vectors --- */
 
@@ -94,10 +91,12 @@ static bool index_vertices(walker *w)
 static void vertex(const ebpo_mesh *m, uint32_t number, double out[3])
 {
     for (int k = 0; k < 3; k++)
-        out[k] = m->xyz32 ? (double)m->xyz32[3 * (uint64_t)number + (unsigned)k] : m->xyz64[3 * (uint64_t)number + (unsigned)k];
+        out[k] = m->xyz32 ? (double)m->xyz32[3 * (uint64_t)number + (unsigned)k]
+                          : m->xyz64[3 * (uint64_t)number + (unsigned)k];
 }
 
-/* The corner of `face` from which its edge from a to b (or, with `any`, from b to a) starts; -1: it has none. */
+/* The corner of `face` from which its edge from a to b (or, with `any`, from b to a) starts; -1: it
+ * has none. */
 static int edge_corner(const ebpo_mesh *m, uint64_t face, uint32_t a, uint32_t b, bool any)
 {
     const uint32_t *f = m->faces + 3 * face;
@@ -107,7 +106,8 @@ static int edge_corner(const ebpo_mesh *m, uint64_t face, uint32_t a, uint32_t b
     return -1;
 }
 
-/* The face beyond the edge from a to b, the opposite one first; UINT64_MAX: there is none. `third`: its other corner. */
+/* The face beyond the edge from a to b, the opposite one first; UINT64_MAX: there is none. `third`:
+ * its other corner. */
 static uint64_t neighbour(const walker *w, uint32_t a, uint32_t b, uint32_t *third)
 {
     for (int any = 0; any < 2; any++)
@@ -157,7 +157,8 @@ static bool land(walker *w)
     return false;
 }
 
-/* How far the face's edge i is ahead; infinite when it is behind. `inward`: unit normal of the edge in the plane. */
+/* How far the face's edge i is ahead; infinite when it is behind. `inward`: unit normal of the edge
+ * in the plane. */
 static double ahead(const walker *w, int i, double inward[3])
 {
     double edge[3], from[3];
@@ -245,7 +246,8 @@ static double wave(double phase)
     return 4 * x * (1 - fabs(x));
 }
 
-bool bench_walk(const ebpo_mesh *mesh, double mean_edge, double diagonal, uint64_t seed, uint64_t count, double *out)
+bool bench_walk(const ebpo_mesh *mesh, double mean_edge, double diagonal, uint64_t seed,
+                uint64_t count, double *out)
 {
     walker w = { .mesh = mesh, .random = seed };
     double step = mean_edge > 0 ? mean_edge / 10 : diagonal / 1000;

@@ -8,10 +8,12 @@
 uint64_t bench_random(uint64_t *state);
 double bench_random_unit(uint64_t *state);
 
-/* Fills out[count][3]. The walk goes straight across edges (as on the unfolded surface), turns slowly, and swings within 1 % of `diagonal` to both sides of
- * the surface; a step is a tenth of `mean_edge`. Where an edge has no neighbour it turns
- * back; where it gets stuck, at faces without area, it goes on elsewhere. The same points everywhere: only + - * / and square roots. False when memory
- * is short. */
-bool bench_walk(const ebpo_mesh *mesh, double mean_edge, double diagonal, uint64_t seed, uint64_t count, double *out);
+/* Fills out[count][3]. The walk goes straight across edges (as on the unfolded surface), turns
+ * slowly, and swings within 1 % of `diagonal` to both sides of the surface; a step is a tenth of
+ * `mean_edge`. Where an edge has no neighbour it turns back; where it gets stuck, at faces without
+ * area, it goes on elsewhere. The same points everywhere: only + - * / and square roots. False when
+ * memory is short. */
+bool bench_walk(const ebpo_mesh *mesh, double mean_edge, double diagonal, uint64_t seed,
+                uint64_t count, double *out);
 
 #endif

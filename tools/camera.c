@@ -47,8 +47,10 @@ static void centre(camera *c, const ebpo_mesh *mesh)
         c->target[k] = low[k] / 2 + high[k] / 2;
 }
 
-/* The distance at which every vertex is seen, and by how much the picture is then off its middle. */
-static void measure(camera *c, const ebpo_mesh *mesh, double aspect, double *shift_x, double *shift_y)
+/* The distance at which every vertex is seen, and by how much the picture is then off its middle.
+ */
+static void measure(camera *c, const ebpo_mesh *mesh, double aspect, double *shift_x,
+                    double *shift_y)
 {
     double tx = c->tangent * aspect * margin, ty = c->tangent * margin, distance = 0;
     double low[2] = { INFINITY, INFINITY }, high[2] = { -INFINITY, -INFINITY };
@@ -77,8 +79,8 @@ static void measure(camera *c, const ebpo_mesh *mesh, double aspect, double *shi
     *shift_y = (low[1] + high[1]) / 2 * distance;
 }
 
-void camera_fit(camera *out, const ebpo_mesh *mesh, double azimuth, double elevation, int up_axis, int width,
-                int height)
+void camera_fit(camera *out, const ebpo_mesh *mesh, double azimuth, double elevation, int up_axis,
+                int width, int height)
 {
     double aspect = (double)width / height, sx, sy;
     memset(out, 0, sizeof *out);

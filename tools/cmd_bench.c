@@ -25,28 +25,41 @@ typedef struct values {
 
 static const char *const query_words[] = { "inside", "distance", "ray", NULL };
 enum { REPEAT_MAX = 99 };
-/* What became of a question for a distance or a ray. Interval: level or deadline did not suffice. */
+/* What became of a question for a distance or a ray. Interval: level or deadline did not suffice.
+ */
 enum { NOTHING, FOUND, INTERVAL };
 
 static const arg_option options[] = {
-    { "query", 0, ARG_WORD, offsetof(values, query), "QUERY", "inside (the default), distance or ray", 0, 0, query_words },
+    { "query", 0, ARG_WORD, offsetof(values, query), "QUERY",
+      "inside (the default), distance or ray", 0, 0, query_words },
     { "points", 0, ARG_TEXT, offsetof(values, points), "WHAT",
-      "uniform (the default): in the bounding box; path: a walk along\nthe surface; or a file of points or rays", 0, 0, NULL },
+      "uniform (the default): in the bounding box; path: a walk along\nthe surface; or a file of "
+      "points or rays",
+      0, 0, NULL },
     ARG_SWITCH("raw", 0, query_values, raw, "the file of points holds little-endian doubles"),
-    { "count", 0, ARG_INT, offsetof(values, count), "N", "how many; the default: 100000, or all of the file", 1, 1e9, NULL },
-    { "seed", 0, ARG_INT, offsetof(values, seed), "S", "of uniform points and paths; the default: 1", 0, 1e15, NULL },
-    { "repeat", 0, ARG_INT, offsetof(values, repeat), "R", "ask everything R times; the figures are those of the median mean", 1, REPEAT_MAX, NULL },
-    { "rate", 0, ARG_REAL, offsetof(values, rate), "HZ", "ask so many single questions a second, and sleep in between", 0, 1e9, NULL },
-    { "mode", 'm', ARG_TEXT, offsetof(values, mode), "MODE", "as for 'ebpo inside' or 'ebpo distance'", 0, 0, NULL },
-    { "max-distance", 0, ARG_REAL, offsetof(query_values, max_distance), "D", "as for 'ebpo distance'", 0, DBL_MAX, NULL },
+    { "count", 0, ARG_INT, offsetof(values, count), "N",
+      "how many; the default: 100000, or all of the file", 1, 1e9, NULL },
+    { "seed", 0, ARG_INT, offsetof(values, seed), "S",
+      "of uniform points and paths; the default: 1", 0, 1e15, NULL },
+    { "repeat", 0, ARG_INT, offsetof(values, repeat), "R",
+      "ask everything R times; the figures are those of the median mean", 1, REPEAT_MAX, NULL },
+    { "rate", 0, ARG_REAL, offsetof(values, rate), "HZ",
+      "ask so many single questions a second, and sleep in between", 0, 1e9, NULL },
+    { "mode", 'm', ARG_TEXT, offsetof(values, mode), "MODE",
+      "as for 'ebpo inside' or 'ebpo distance'", 0, 0, NULL },
+    { "max-distance", 0, ARG_REAL, offsetof(query_values, max_distance), "D",
+      "as for 'ebpo distance'", 0, DBL_MAX, NULL },
     ARG_SWITCH("unsigned", 0, query_values, unsigned_distance, "as for 'ebpo distance'"),
     ARG_SWITCH("no-warm", 0, query_values, no_warm, "as for 'ebpo distance'"),
     QUERY_LIMIT_OPTIONS("look at levels 0 to L only"),
     QUERY_MODEL_OPTIONS,
     QUERY_PREFETCH_OPTION,
-    { "save-points", 0, ARG_TEXT, offsetof(values, save_points), "FILE", "write what was asked about, as little-endian doubles", 0, 0, NULL },
+    { "save-points", 0, ARG_TEXT, offsetof(values, save_points), "FILE",
+      "write what was asked about, as little-endian doubles", 0, 0, NULL },
     { "save-answers", 0, ARG_TEXT, offsetof(values, save_answers), "FILE",
-      "write the answers: inside a byte each, as in 'where';\nelse a double (distance or t) and an int64 (face or -1)", 0, 0, NULL },
+      "write the answers: inside a byte each, as in 'where';\nelse a double (distance or t) and an "
+      "int64 (face or -1)",
+      0, 0, NULL },
     ARG_SWITCH("json", 0, query_values, json, "print all of it as JSON"),
     REMOTE_OPTIONS(query_values, remote),
     { 0 },
@@ -58,7 +71,8 @@ static const arg_spec spec = {
     .least = 1,
     .most = 1,
     .summary = "how long questions to a file take",
-    .text = "MODEL is an .ebpo.h5 file or its URL. One thread asks. First a cold start (the system is asked to forget the file), then each question by\n"
+    .text = "MODEL is an .ebpo.h5 file or its URL. One thread asks. First a cold start (the system "
+            "is asked to forget the file), then each question by\n"
             "itself, then all of them at once.",
     .options = options,
 };
@@ -85,7 +99,8 @@ static bool set_mode(values *v)
             *(v->query == BENCH_INSIDE ? &v->q.inside_mode : &v->q.distance_mode) = i;
             return true;
         }
-    fprintf(stderr, "ebpo bench: --mode: '%s' is no mode of %s; 'ebpo %s --help' %s\n", v->mode, query_words[v->query], query_words[v->query],
+    fprintf(stderr, "ebpo bench: --mode: '%s' is no mode of %s; 'ebpo %s --help' %s\n", v->mode,
+            query_words[v->query], query_words[v->query],
             v->query == BENCH_RAY ? "has no modes" : "names them");
     return false;
 }
@@ -93,7 +108,8 @@ static bool set_mode(values *v)
 /* --- measuring --- */
 
 /* From a file that the system has forgotten to the first answer. */
-static int cold_start(const bench_job *job, const char *path, const ebpo_model_options *holding, const remote_values *remote, results *r)
+static int cold_start(const bench_job *job, const char *path, const ebpo_model_options *holding,
+                      const remote_values *remote, results *r)
 {
     query_session s = QUERY_SESSION_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -149,11 +165,17 @@ static bool options_fit(const values *v)
         idle |= QUERY_LEVEL | QUERY_DEADLINE | QUERY_PREFETCH;
     snprintf(with, sizeof with, "--query %s", query_words[v->query]);
     if (v->q.raw && is_generated(v->points)) {
-        fprintf(stderr, "ebpo bench: --raw has no effect with --points %s; leave one of them away, or try 'ebpo bench --help'\n", v->points);
+        fprintf(stderr,
+                "ebpo bench: --raw has no effect with --points %s; leave one of them away, or try "
+                "'ebpo bench --help'\n",
+                v->points);
         return false;
     }
     if (v->seed >= 0 && !is_generated(v->points)) {
-        fprintf(stderr, "ebpo bench: --seed has no effect with --points %s; leave one of them away, or try 'ebpo bench --help'\n", v->points);
+        fprintf(stderr,
+                "ebpo bench: --seed has no effect with --points %s; leave one of them away, or try "
+                "'ebpo bench --help'\n",
+                v->points);
         return false;
     }
     if (v->query == BENCH_DISTANCE)
@@ -170,13 +192,17 @@ static bool same_reals(const double *a, const double *b, int count)
 static bool same_answer(bench_query query, const void *one, const void *other, uint64_t i)
 {
     if (query == BENCH_INSIDE) {
-        const ebpo_inside_result *a = (const ebpo_inside_result *)one + i, *b = (const ebpo_inside_result *)other + i;
-        return a->where == b->where && a->winding == b->winding && same_reals(&a->doubt, &b->doubt, 1);
+        const ebpo_inside_result *a = (const ebpo_inside_result *)one + i,
+                                 *b = (const ebpo_inside_result *)other + i;
+        return a->where == b->where && a->winding == b->winding &&
+               same_reals(&a->doubt, &b->doubt, 1);
     }
     if (query == BENCH_DISTANCE) {
-        const ebpo_distance_result *a = (const ebpo_distance_result *)one + i, *b = (const ebpo_distance_result *)other + i;
-        return same_reals(&a->distance, &b->distance, 1) && same_reals(&a->lo, &b->lo, 1) && same_reals(&a->hi, &b->hi, 1) &&
-               same_reals(a->point, b->point, 3) && same_reals(a->normal, b->normal, 3) && a->face == b->face;
+        const ebpo_distance_result *a = (const ebpo_distance_result *)one + i,
+                                   *b = (const ebpo_distance_result *)other + i;
+        return same_reals(&a->distance, &b->distance, 1) && same_reals(&a->lo, &b->lo, 1) &&
+               same_reals(&a->hi, &b->hi, 1) && same_reals(a->point, b->point, 3) &&
+               same_reals(a->normal, b->normal, 3) && a->face == b->face;
     }
     const ebpo_ray_hit *a = (const ebpo_ray_hit *)one + i, *b = (const ebpo_ray_hit *)other + i;
     return same_reals(&a->t, &b->t, 1) && a->face == b->face && a->side == b->side;
@@ -189,7 +215,10 @@ static int compare_answers(const bench_job *job, const void *batch)
         return EXIT_FINE;
     for (uint64_t i = 0; i < job->count; i++)
         if (!same_answer(job->query, job->answers, batch, i)) {
-            fprintf(stderr, "ebpo bench: question %" PRIu64 " has one answer alone and another one in a batch: please report this\n", i);
+            fprintf(stderr,
+                    "ebpo bench: question %" PRIu64
+                    " has one answer alone and another one in a batch: please report this\n",
+                    i);
             return EXIT_FAILED;
         }
     return EXIT_FINE;
@@ -224,7 +253,9 @@ static void count_answers(const bench_job *job, results *r)
         if (job->query == BENCH_INSIDE)
             r->answered[inside[i].where & 3]++;
         else if (job->query == BENCH_DISTANCE)
-            r->answered[isnan(distance[i].distance) ? INTERVAL : isinf(distance[i].distance) ? NOTHING : FOUND]++;
+            r->answered[isnan(distance[i].distance)   ? INTERVAL
+                        : isinf(distance[i].distance) ? NOTHING
+                                                      : FOUND]++;
         else
             r->answered[hit[i].face != EBPO_NO_FACE ? FOUND : NOTHING]++;
 }
@@ -255,13 +286,18 @@ static int save_answers(const bench_job *job, const char *path)
 static void print_answers(const values *v, const results *r)
 {
     if (v->query == BENCH_INSIDE)
-        printf("answers        %" PRIu64 " IN, %" PRIu64 " OUT, %" PRIu64 " ON, %" PRIu64 " MAYBE\n", r->answered[EBPO_IN], r->answered[EBPO_OUT],
-               r->answered[EBPO_ON], r->answered[EBPO_MAYBE]);
+        printf("answers        %" PRIu64 " IN, %" PRIu64 " OUT, %" PRIu64 " ON, %" PRIu64
+               " MAYBE\n",
+               r->answered[EBPO_IN], r->answered[EBPO_OUT], r->answered[EBPO_ON],
+               r->answered[EBPO_MAYBE]);
     else if (v->query == BENCH_DISTANCE)
-        printf("answers        %" PRIu64 " %s, %" PRIu64 " an interval, %" PRIu64 " nothing found\n", r->answered[FOUND],
-               v->q.distance_mode == EBPO_DISTANCE_EXACT ? "exact" : "found", r->answered[INTERVAL], r->answered[NOTHING]);
+        printf("answers        %" PRIu64 " %s, %" PRIu64 " an interval, %" PRIu64
+               " nothing found\n",
+               r->answered[FOUND], v->q.distance_mode == EBPO_DISTANCE_EXACT ? "exact" : "found",
+               r->answered[INTERVAL], r->answered[NOTHING]);
     else
-        printf("answers        %" PRIu64 " found, %" PRIu64 " nothing found\n", r->answered[FOUND], r->answered[NOTHING]);
+        printf("answers        %" PRIu64 " found, %" PRIu64 " nothing found\n", r->answered[FOUND],
+               r->answered[NOTHING]);
 }
 
 static void print_results(const values *v, const char *path, uint64_t count, const results *r)
@@ -269,16 +305,22 @@ static void print_results(const values *v, const char *path, uint64_t count, con
     const bench_figures *f = &r->figures;
     char bytes[40], peak[40], memory[40];
     printf("%s: %s, %s, %" PRIu64 " of them\n", path, query_words[v->query], v->points, count);
-    printf("single         mean %.1f ns, p50 %" PRIu64 ", p99 %" PRIu64 ", p99.9 %" PRIu64 ", max %" PRIu64 "\n", f->mean, f->p50, f->p99, f->p999, f->max);
+    printf("single         mean %.1f ns, p50 %" PRIu64 ", p99 %" PRIu64 ", p99.9 %" PRIu64
+           ", max %" PRIu64 "\n",
+           f->mean, f->p50, f->p99, f->p999, f->max);
     printf("               (the clock's %" PRIu64 " ns are subtracted)\n", r->clock_ns);
     printf("batch          %.1f ns a query\n", f->batch);
     printf("open           %.6f s\n", r->open_seconds);
-    printf("cold start     %.6f s to the first answer, of which %.6f s to open; %s in %" PRIu64 " reads", r->cold_seconds, r->cold_open_seconds,
-           words_bytes(bytes, sizeof bytes, r->cold_bytes), r->cold_reads);
+    printf("cold start     %.6f s to the first answer, of which %.6f s to open; %s in %" PRIu64
+           " reads",
+           r->cold_seconds, r->cold_open_seconds, words_bytes(bytes, sizeof bytes, r->cold_bytes),
+           r->cold_reads);
     if (r->cold_pages >= 0)
         printf("; the system still held %.0f %% of the file", 100 * r->cold_pages);
-    printf("\nread           %s in %" PRIu64 " reads\n", words_bytes(bytes, sizeof bytes, r->model.bytes_read), r->model.reads);
-    printf("peak memory    %s of the process, %s of the model\n", r->peak ? words_bytes(peak, sizeof peak, r->peak) : "unknown",
+    printf("\nread           %s in %" PRIu64 " reads\n",
+           words_bytes(bytes, sizeof bytes, r->model.bytes_read), r->model.reads);
+    printf("peak memory    %s of the process, %s of the model\n",
+           r->peak ? words_bytes(peak, sizeof peak, r->peak) : "unknown",
            words_bytes(memory, sizeof memory, r->model_end.memory_peak));
     print_answers(v, r);
     printf("model          ");
@@ -288,7 +330,8 @@ static void print_results(const values *v, const char *path, uint64_t count, con
 
 static void json_answers(json *j, const values *v, const results *r)
 {
-    static const char *const inside_names[] = { "out", "in", "on", "maybe" }, *const other_names[] = { "not_found", "found", "interval" };
+    static const char *const inside_names[] = { "out", "in", "on", "maybe" },
+                             *const other_names[] = { "not_found", "found", "interval" };
     int count = v->query == BENCH_INSIDE ? 4 : v->query == BENCH_DISTANCE ? 3 : 2;
     json_object(j, "answers");
     for (int i = 0; i < count; i++)
@@ -333,7 +376,9 @@ static void print_json(const values *v, const char *path, uint64_t count, const 
     if (v->query == BENCH_RAY)
         json_null(&j, "mode");
     else
-        json_text(&j, "mode", v->query == BENCH_INSIDE ? inside_modes[v->q.inside_mode] : distance_modes[v->q.distance_mode]);
+        json_text(&j, "mode",
+                  v->query == BENCH_INSIDE ? inside_modes[v->q.inside_mode]
+                                           : distance_modes[v->q.distance_mode]);
     json_int(&j, "level", v->q.level);
     json_text(&j, "points", v->points);
     json_uint(&j, "count", count);
@@ -354,7 +399,8 @@ static void print_json(const values *v, const char *path, uint64_t count, const 
 
 /* --- the command --- */
 
-static int bench(bench_job *job, const values *v, const char *path, const ebpo_model_options *holding, void *batch)
+static int bench(bench_job *job, const values *v, const char *path,
+                 const ebpo_model_options *holding, void *batch)
 {
     results r = { .clock_ns = bench_clock_cost() };
     query_session s = QUERY_SESSION_INIT;
@@ -384,7 +430,8 @@ static int prepare(const values *v, const char *path, bench_points *p)
     *p = (bench_points){ .rows = NULL };
     if (!command_wants_hdf5("bench", path))
         return EXIT_FAILED;
-    int code = bench_points_make(p, kind, path, &v->q.remote, v->points, v->q.raw, (uint64_t)v->count, (uint64_t)v->seed);
+    int code = bench_points_make(p, kind, path, &v->q.remote, v->points, v->q.raw,
+                                 (uint64_t)v->count, (uint64_t)v->seed);
     if (code == EXIT_FINE && v->save_points)
         code = bench_points_save(p, v->save_points);
     return code;
@@ -400,7 +447,8 @@ static int run(int argc, char **argv)
     arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
     if (parsed != ARGS_RUN)
         return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
-    if (!set_mode(&v) || !options_fit(&v) || !query_options_from("bench", &v.q, &holding, &job.options))
+    if (!set_mode(&v) || !options_fit(&v) ||
+        !query_options_from("bench", &v.q, &holding, &job.options))
         return EXIT_USAGE;
     if (v.seed < 0)
         v.seed = 1;

@@ -6,7 +6,8 @@
 
 static const arg_option options[] = {
     QUERY_MODEL_OPTIONS,
-    QUERY_FORM_OPTIONS("boxes are six doubles each, answers a uint64 count and as many\nuint64 (little-endian)"),
+    QUERY_FORM_OPTIONS(
+        "boxes are six doubles each, answers a uint64 count and as many\nuint64 (little-endian)"),
     { 0 },
 };
 
@@ -16,12 +17,14 @@ static const arg_spec spec = {
     .least = 1,
     .most = 2,
     .summary = "which faces meet boxes: how many, and their numbers",
-    .text = "MODEL is an .ebpo.h5 file. BOXES: lines 'x0 y0 z0 x1 y1 z1', the lower corner first; absent or '-': standard input. Faces and\n"
+    .text = "MODEL is an .ebpo.h5 file. BOXES: lines 'x0 y0 z0 x1 y1 z1', the lower corner first; "
+            "absent or '-': standard input. Faces and\n"
             "boxes are closed: touching counts.",
     .options = options,
 };
 
-static ebpo_status answer(const query_job *job, ebpo_context *context, const double *rows, uint64_t count, ebpo_error *error)
+static ebpo_status answer(const query_job *job, ebpo_context *context, const double *rows,
+                          uint64_t count, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {

@@ -17,10 +17,13 @@ typedef struct values {
 
 static const arg_option options[] = {
     ARG_SWITCH("weld", 0, values, mend.weld, "first merge vertices at one position (STL: always)"),
-    ARG_SWITCH("orient", 0, values, mend.orient, "then make neighbouring faces agree in orientation"),
+    ARG_SWITCH("orient", 0, values, mend.orient,
+               "then make neighbouring faces agree in orientation"),
     ARG_SWITCH("fill-holes", 0, values, mend.fill_holes, "then close simple boundary loops"),
-    ARG_SWITCH("require-solid", 0, values, require_solid, "end with code 3 if the mesh is not a solid"),
-    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
+    ARG_SWITCH("require-solid", 0, values, require_solid,
+               "end with code 3 if the mesh is not a solid"),
+    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores",
+      0, 256, NULL },
     MEMORY_OPTIONS(values, memory),
     ARG_SWITCH("json", 0, values, json, "print the report as JSON"),
     ARG_SWITCH("quiet", 'q', values, quiet, "no report, no progress: errors and warnings only"),

@@ -19,15 +19,24 @@ typedef struct values {
     remote_values remote;
 } values;
 
-static const char *const format_words[] = { "xdmf", "vtkhdf", "gltf", "glb", "obj", "stl", NULL }; /* as in ebpo_export_format */
+static const char *const format_words[] = {
+    "xdmf", "vtkhdf", "gltf", "glb", "obj", "stl", NULL
+}; /* as in ebpo_export_format */
 
 static const arg_option options[] = {
     { "format", 0, ARG_WORD, offsetof(values, format), "FORMAT",
-      "xdmf, vtkhdf, gltf, glb, obj or stl; the default: as OUT ends.\nxdmf comes with a second file OUT.h5, gltf with one that ends in .bin", 0, 0, format_words },
-    { "level", 0, ARG_INT, offsetof(values, level), "N", "the envelopes of level N, and leaves and black nodes above it", 0, 20, NULL },
-    { "levels", 0, ARG_TEXT, offsetof(values, levels), "A-B", "levels A to B, each a block of its own; not for stl", 0, 0, NULL },
-    ARG_SWITCH("mesh", 0, values, mesh, "the model itself; beside levels a block of its own. xdmf and\nvtkhdf tell its source's numbers, the others have its order"),
-    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
+      "xdmf, vtkhdf, gltf, glb, obj or stl; the default: as OUT ends.\nxdmf comes with a second "
+      "file OUT.h5, gltf with one that ends in .bin",
+      0, 0, format_words },
+    { "level", 0, ARG_INT, offsetof(values, level), "N",
+      "the envelopes of level N, and leaves and black nodes above it", 0, 20, NULL },
+    { "levels", 0, ARG_TEXT, offsetof(values, levels), "A-B",
+      "levels A to B, each a block of its own; not for stl", 0, 0, NULL },
+    ARG_SWITCH("mesh", 0, values, mesh,
+               "the model itself; beside levels a block of its own. xdmf and\nvtkhdf tell its "
+               "source's numbers, the others have its order"),
+    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores",
+      0, 256, NULL },
     ARG_SWITCH("json", 0, values, json, "print what was written as JSON"),
     ARG_SWITCH("quiet", 'q', values, quiet, "no summary, no progress: errors and warnings only"),
     REMOTE_OPTIONS(values, remote),
@@ -40,7 +49,8 @@ static const arg_spec spec = {
     .least = 2,
     .most = 2,
     .summary = "levels and the model for ParaView (XDMF, VTKHDF), as glTF, OBJ or STL",
-    .text = "FILE is an .ebpo.h5 file or its URL. --level, --levels or --mesh is needed. XDMF and VTKHDF keep double\n"
+    .text = "FILE is an .ebpo.h5 file or its URL. --level, --levels or --mesh is needed. XDMF and "
+            "VTKHDF keep double\n"
             "coordinates and the nodes' data; glTF, OBJ and STL hold float32.",
     .options = options,
 };
@@ -59,7 +69,9 @@ static int choose_format(values *v, const char *out)
     for (int i = 0; dot && v->format < 0 && format_words[i]; i++)
         if (strcasecmp(dot + 1, format_words[i]) == 0)
             v->format = i;
-    return v->format >= 0 ? EXIT_FINE : usage_error("the format is not told by the output's ending; give --format");
+    return v->format >= 0
+               ? EXIT_FINE
+               : usage_error("the format is not told by the output's ending; give --format");
 }
 
 static int choose_levels(const values *v, ebpo_export_options *o)
@@ -76,8 +88,10 @@ static int choose_levels(const values *v, ebpo_export_options *o)
         o->first_level = o->last_level = (int)v->level;
     if (!v->levels)
         return EXIT_FINE;
-    if (sscanf(v->levels, "%2d-%2d%c", &first, &last, &rest) != 2 || first < 0 || last < first || last >= EBPO_LEVELS_MAX)
-        return usage_error("--levels wants the first level, a hyphen and the last one, such as 0-6");
+    if (sscanf(v->levels, "%2d-%2d%c", &first, &last, &rest) != 2 || first < 0 || last < first ||
+        last >= EBPO_LEVELS_MAX)
+        return usage_error(
+            "--levels wants the first level, a hyphen and the last one, such as 0-6");
     o->first_level = first;
     o->last_level = last;
     return EXIT_FINE;
@@ -88,7 +102,9 @@ static int check_names(const char *in, const char *out, const char *second)
     const char *names[] = { out, second };
     for (int i = 0; i < 2; i++)
         if (*names[i] && (strcmp(in, names[i]) == 0 || command_same_file(in, names[i]))) {
-            fprintf(stderr, "ebpo export: %s: is input and output at once; give the output another name\n", names[i]);
+            fprintf(stderr,
+                    "ebpo export: %s: is input and output at once; give the output another name\n",
+                    names[i]);
             return EXIT_USAGE;
         }
     return EXIT_FINE;
@@ -107,10 +123,12 @@ static void print_report(const char *out, const char *second, const ebpo_export_
         if (b->level < 0)
             printf("mesh: %s, %s\n", count[0], count[1]);
         else
-            printf("level %d: %" PRIu64 " envelopes, %s, %s, volume %.9g\n", b->level, b->nodes, count[0], count[1], b->volume);
+            printf("level %d: %" PRIu64 " envelopes, %s, %s, volume %.9g\n", b->level, b->nodes,
+                   count[0], count[1], b->volume);
     }
     if (r->origin[0] != 0 || r->origin[1] != 0 || r->origin[2] != 0)
-        printf("vertices are relative to %.9g %.9g %.9g, the nodes' translation\n", r->origin[0], r->origin[1], r->origin[2]);
+        printf("vertices are relative to %.9g %.9g %.9g, the nodes' translation\n", r->origin[0],
+               r->origin[1], r->origin[2]);
     if (r->largest_change > 0)
         printf("float32: coordinates are rounded by up to %.3g\n", r->largest_change);
 }
@@ -132,7 +150,8 @@ static void json_block(json *j, const ebpo_export_block *b)
     json_end(j);
 }
 
-static void print_json(const values *v, const char *out, const char *second, const ebpo_export_report *r, const traffic *t)
+static void print_json(const values *v, const char *out, const char *second,
+                       const ebpo_export_report *r, const traffic *t)
 {
     json j;
     json_begin(&j, stdout);
@@ -155,7 +174,8 @@ static void print_json(const values *v, const char *out, const char *second, con
 
 /* --- the command --- */
 
-static int write_out(const values *v, const char *in, const char *out, const char *second, ebpo_export_options *o)
+static int write_out(const values *v, const char *in, const char *out, const char *second,
+                     ebpo_export_options *o)
 {
     progress_line line;
     o->progress = progress_start(&line, "export", v->quiet);

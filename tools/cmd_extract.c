@@ -21,8 +21,10 @@ static const arg_option options[] = {
       "the envelopes of level N, and leaves and black nodes above it", 0, 20, NULL },
     ARG_SWITCH("mesh", 0, values, mesh,
                "the model itself, bit for bit; in the source's order where\nthe maps are stored"),
-    ARG_SWITCH("no-walls", 0, values, no_walls, "with --level: leave out polygons that lie on cell walls"),
-    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
+    ARG_SWITCH("no-walls", 0, values, no_walls,
+               "with --level: leave out polygons that lie on cell walls"),
+    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores",
+      0, 256, NULL },
     MEMORY_OPTIONS(values, memory),
     ARG_SWITCH("quiet", 'q', values, quiet, "no summary, no progress: errors and warnings only"),
     REMOTE_OPTIONS(values, remote),
@@ -35,7 +37,8 @@ static const arg_spec spec = {
     .least = 2,
     .most = 2,
     .summary = "a level's envelopes, or the model itself, as PLY",
-    .text = "FILE is an .ebpo.h5 file or its URL. Either --level or --mesh is needed. A level's polygons are in memory whatever --memory says.",
+    .text = "FILE is an .ebpo.h5 file or its URL. Either --level or --mesh is needed. A level's "
+            "polygons are in memory whatever --memory says.",
     .options = options,
 };
 
@@ -43,8 +46,8 @@ static int check_values(const values *v, const char *in, const char *out)
 {
     const char *message = NULL;
     if ((v->level >= 0) == v->mesh)
-        message =
-            v->mesh ? "--level and --mesh exclude each other" : "what shall be extracted? give --level N or --mesh";
+        message = v->mesh ? "--level and --mesh exclude each other"
+                          : "what shall be extracted? give --level N or --mesh";
     else if (v->mesh && v->no_walls)
         message = "--no-walls belongs to --level; the model has no cell walls";
     if (message) {
@@ -52,14 +55,16 @@ static int check_values(const values *v, const char *in, const char *out)
         return EXIT_USAGE;
     }
     if (strcmp(in, out) == 0 || command_same_file(in, out)) {
-        fprintf(stderr, "ebpo extract: %s: is input and output at once; give the output another name\n", out);
+        fprintf(stderr,
+                "ebpo extract: %s: is input and output at once; give the output another name\n",
+                out);
         return EXIT_USAGE;
     }
     return EXIT_FINE;
 }
 
-static ebpo_status take(ebpo_file *file, const values *v, const char *path, ebpo_progress progress, ebpo_mesh *out,
-                        double *volume, ebpo_error *error)
+static ebpo_status take(ebpo_file *file, const values *v, const char *path, ebpo_progress progress,
+                        ebpo_mesh *out, double *volume, ebpo_error *error)
 {
     if (!v->mesh) {
         ebpo_lod_options lod = EBPO_LOD_OPTIONS_INIT;
@@ -69,12 +74,17 @@ static ebpo_status take(ebpo_file *file, const values *v, const char *path, ebpo
         return ebpo_lod_level(file, (int)v->level, &lod, out, volume, error);
     }
     bool source_order = false;
-    ebpo_status status = ebpo_file_read_source_mesh(file, out, &source_order, (unsigned)v->threads, error);
+    ebpo_status status =
+        ebpo_file_read_source_mesh(file, out, &source_order, (unsigned)v->threads, error);
     if (status == EBPO_OK && !source_order)
-        fprintf(stderr, "ebpo extract: %s: note: holds no maps, so vertices and faces come in the file's order\n",
+        fprintf(stderr,
+                "ebpo extract: %s: note: holds no maps, so vertices and faces come in the file's "
+                "order\n",
                 remote_shown(path));
     if (status == EBPO_OK && ebpo_file_info(file)->pruned)
-        fprintf(stderr, "ebpo extract: %s: note: is a subset, whose mesh is a part of the model's\n", remote_shown(path));
+        fprintf(stderr,
+                "ebpo extract: %s: note: is a subset, whose mesh is a part of the model's\n",
+                remote_shown(path));
     return status;
 }
 

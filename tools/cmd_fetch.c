@@ -1,4 +1,5 @@
-/* ebpo fetch: a file, or a part of it, from a web server; what has come stays when it is interrupted. */
+/* ebpo fetch: a file, or a part of it, from a web server; what has come stays when it is
+ * interrupted. */
 #include <dirent.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -23,8 +24,10 @@ static const arg_spec spec = {
     .least = 2,
     .most = 2,
     .summary = "a file by its URL, or levels, a box, parts of it; goes on where it was interrupted",
-    .text = "Only what is kept is fetched. OUT appears whole or not at all; until then what has come lies in the folder\n"
-            "OUT.part, from which the same command goes on. Without options the whole content is fetched.",
+    .text = "Only what is kept is fetched. OUT appears whole or not at all; until then what has "
+            "come lies in the folder\n"
+            "OUT.part, from which the same command goes on. Without options the whole content is "
+            "fetched.",
     .options = options,
 };
 
@@ -35,7 +38,8 @@ static const char BLOCK[] = ".ebpo-block", TEMPORARY[] = ".ebpo-part-";
 static bool is_ours(const char *name)
 {
     size_t length = strlen(name), end = sizeof BLOCK - 1;
-    return (length > end && strcmp(name + length - end, BLOCK) == 0) || strncmp(name, TEMPORARY, sizeof TEMPORARY - 1) == 0;
+    return (length > end && strcmp(name + length - end, BLOCK) == 0) ||
+           strncmp(name, TEMPORARY, sizeof TEMPORARY - 1) == 0;
 }
 
 /* Takes the blocks away, and the folder when nothing else is in it. */
@@ -70,7 +74,8 @@ static bool tick(void *user)
     if (!t->active || !file || now - t->last < 0.2 || !ebpo_file_http_stats(file, &s))
         return false;
     t->last = now;
-    fprintf(stderr, "\r\033[Kfetch: %s in %" PRIu64 " requests", words_bytes(bytes, sizeof bytes, s.bytes), s.requests);
+    fprintf(stderr, "\r\033[Kfetch: %s in %" PRIu64 " requests",
+            words_bytes(bytes, sizeof bytes, s.bytes), s.requests);
     if (s.cache_bytes)
         fprintf(stderr, ", %s had come before", words_bytes(before, sizeof before, s.cache_bytes));
     fflush(stderr);
@@ -89,20 +94,26 @@ static void wipe(ticker *t)
 /* --- work --- */
 
 /* What the folder held when the file was opened; true when that is of use. */
-static bool tell_resuming(const subset_values *v, ebpo_file *file, const char *url, const char *part)
+static bool tell_resuming(const subset_values *v, ebpo_file *file, const char *url,
+                          const char *part)
 {
     ebpo_http_stats s;
     char bytes[32];
     if (!ebpo_file_http_stats(file, &s))
         return false;
     if (s.cache_others && !s.cache_held)
-        fprintf(stderr, "ebpo fetch: %s: has changed on the server, or is another file than the one in %s; fetching it from the beginning\n", remote_shown(url), part);
+        fprintf(stderr,
+                "ebpo fetch: %s: has changed on the server, or is another file than the one in %s; "
+                "fetching it from the beginning\n",
+                remote_shown(url), part);
     else if (s.cache_held && !v->quiet)
-        fprintf(stderr, "ebpo fetch: %s: going on with %s from %s\n", remote_shown(url), words_bytes(bytes, sizeof bytes, s.cache_held), part);
+        fprintf(stderr, "ebpo fetch: %s: going on with %s from %s\n", remote_shown(url),
+                words_bytes(bytes, sizeof bytes, s.cache_held), part);
     return s.cache_held > 0;
 }
 
-static int fetch(subset_values *v, const char *url, const char *out, const char *part, ebpo_subset_options *subset)
+static int fetch(subset_values *v, const char *url, const char *out, const char *part,
+                 ebpo_subset_options *subset)
 {
     double begun = progress_now();
     ebpo_error error = EBPO_ERROR_INIT;
@@ -131,17 +142,23 @@ static int fetch(subset_values *v, const char *url, const char *out, const char 
             remote_tell(&seen, &v->remote, false);
     }
     ebpo_close(file);
-    if (part && status == EBPO_E_FORMAT && access(part, F_OK) == 0) { /* kept blocks would be damaged the next time as well */
+    if (part && status == EBPO_E_FORMAT &&
+        access(part, F_OK) == 0) { /* kept blocks would be damaged the next time as well */
         remove_part(part);
         int code = command_failed("fetch", &error);
-        fprintf(stderr, "ebpo fetch: what had come was removed, as it may have been damaged on the way; the same command begins anew\n");
+        fprintf(stderr, "ebpo fetch: what had come was removed, as it may have been damaged on the "
+                        "way; the same command begins anew\n");
         return code;
     }
-    if (part && (status == EBPO_OK || (usage && !held))) /* a slip in an option takes nothing away that came before */
+    if (part && (status == EBPO_OK ||
+                 (usage && !held))) /* a slip in an option takes nothing away that came before */
         remove_part(part);
-    if (part && status != EBPO_OK && !usage && access(part, F_OK) == 0 && rmdir(part) != 0) { /* an empty one is of no use */
+    if (part && status != EBPO_OK && !usage && access(part, F_OK) == 0 &&
+        rmdir(part) != 0) { /* an empty one is of no use */
         int code = command_failed("fetch", &error);
-        fprintf(stderr, "ebpo fetch: what has come is kept in %s; the same command goes on from there\n", part);
+        fprintf(stderr,
+                "ebpo fetch: what has come is kept in %s; the same command goes on from there\n",
+                part);
         return code;
     }
     return status == EBPO_OK ? EXIT_FINE : command_failed("fetch", &error);
@@ -156,7 +173,10 @@ static bool out_fits(const char *out, const char *part)
         return false;
     }
     if (part && lstat(part, &s) == 0 && !S_ISDIR(s.st_mode)) {
-        fprintf(stderr, "ebpo fetch: %s: stands where what has come would be kept, and is no folder; move it away\n", part);
+        fprintf(stderr,
+                "ebpo fetch: %s: stands where what has come would be kept, and is no folder; move "
+                "it away\n",
+                part);
         return false;
     }
     return true;
@@ -180,7 +200,8 @@ static int run(int argc, char **argv)
         fprintf(stderr, "ebpo fetch: out of memory\n");
         return EXIT_FAILED;
     }
-    code = out_fits(operand[1], part) ? fetch(&v, operand[0], operand[1], part, &subset) : EXIT_FAILED;
+    code =
+        out_fits(operand[1], part) ? fetch(&v, operand[0], operand[1], part, &subset) : EXIT_FAILED;
     free(part);
     return code;
 }

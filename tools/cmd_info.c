@@ -23,7 +23,8 @@ static const arg_spec spec = {
     .least = 1,
     .most = 1,
     .summary = "what a file is, what it holds, bytes by part, and a table by level",
-    .text = "Only the head of the file is read. FILE is an .ebpo.h5 file or its URL; for meshes there is 'ebpo check'.",
+    .text = "Only the head of the file is read. FILE is an .ebpo.h5 file or its URL; for meshes "
+            "there is 'ebpo check'.",
     .options = options,
 };
 

@@ -6,7 +6,8 @@
 
 static const arg_option options[] = {
     { "mode", 'm', ARG_WORD, offsetof(query_values, inside_mode), "MODE",
-      "how to get there; the answers are the same. fast, the default,\nor one of EBP 2017: cache, nodes, subtree, each also with -plain\n(without envelopes)",
+      "how to get there; the answers are the same. fast, the default,\nor one of EBP 2017: cache, "
+      "nodes, subtree, each also with -plain\n(without envelopes)",
       0, 0, inside_modes },
     QUERY_LIMIT_OPTIONS("look at levels 0 to L only: IN and OUT are certain, else MAYBE"),
     QUERY_MODEL_OPTIONS,
@@ -21,11 +22,13 @@ static const arg_spec spec = {
     .least = 1,
     .most = 2,
     .summary = "which points are in the solid: IN, OUT or ON, and the winding number",
-    .text = "MODEL is an .ebpo.h5 file of a solid. POINTS: lines 'x y z', or a PLY; absent or '-': standard input. The answers are exact.",
+    .text = "MODEL is an .ebpo.h5 file of a solid. POINTS: lines 'x y z', or a PLY; absent or '-': "
+            "standard input. The answers are exact.",
     .options = options,
 };
 
-static ebpo_status answer(const query_job *job, ebpo_context *context, const double *rows, uint64_t count, ebpo_error *error)
+static ebpo_status answer(const query_job *job, ebpo_context *context, const double *rows,
+                          uint64_t count, ebpo_error *error)
 {
     ebpo_inside_result *results = job->results;
     ebpo_status status = ebpo_inside_many(context, rows, count, &job->options, results, error);
@@ -44,7 +47,9 @@ static int run(int argc, char **argv)
     if (!query_inside_fits("inside", &v))
         return EXIT_USAGE;
     static ebpo_inside_result results[POINTS_BATCH];
-    query_job job = { .command = "inside", .values = &v, .kind = POINTS, .answer = answer, .results = results };
+    query_job job = {
+        .command = "inside", .values = &v, .kind = POINTS, .answer = answer, .results = results
+    };
     return query_run(&job, operand[0], operand[1]);
 }
 

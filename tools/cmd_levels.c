@@ -19,10 +19,13 @@ typedef struct values {
 } values;
 
 static const arg_option options[] = {
-    { "to", 0, ARG_INT, offsetof(values, to), "L", "end with level L; deeper ones are not read", 0, 20, NULL },
-    ARG_SWITCH("nodes", 0, values, nodes, "a line for each node as well: octcode, type, cell, planes"),
+    { "to", 0, ARG_INT, offsetof(values, to), "L", "end with level L; deeper ones are not read", 0,
+      20, NULL },
+    ARG_SWITCH("nodes", 0, values, nodes,
+               "a line for each node as well: octcode, type, cell, planes"),
     ARG_SWITCH("json", 0, values, json, "print all of it as JSON"),
-    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
+    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores",
+      0, 256, NULL },
     REMOTE_OPTIONS(values, remote),
     { 0 },
 };
@@ -33,7 +36,8 @@ static const arg_spec spec = {
     .least = 1,
     .most = 1,
     .summary = "reads a file level by level and tells of each as it arrives",
-    .text = "FILE is an .ebpo.h5 file or its URL. Bytes are those of the file up to and with the level, times are since opening.",
+    .text = "FILE is an .ebpo.h5 file or its URL. Bytes are those of the file up to and with the "
+            "level, times are since opening.",
     .options = options,
 };
 
@@ -56,9 +60,11 @@ static double share(const printer *p, double volume)
 static void print_level(const printer *p, const ebpo_stream_level *level, double ms)
 {
     const ebpo_level_summary *s = &p->info->level[level->level];
-    printf("%5d %9" PRIu64 " %9" PRIu64 " %9" PRIu64 " %9" PRIu64 " %10" PRIu64 " %16.10g %9.2f %12" PRIu64 " %9.2f\n", level->level, s->gray_count,
-           s->leaf_count, facts_white(p->info, level->level), s->black_count, s->plane_count + s->leaf_plane_count, level->volume, share(p, level->volume),
-           level->cumulative_bytes, ms);
+    printf("%5d %9" PRIu64 " %9" PRIu64 " %9" PRIu64 " %9" PRIu64 " %10" PRIu64
+           " %16.10g %9.2f %12" PRIu64 " %9.2f\n",
+           level->level, s->gray_count, s->leaf_count, facts_white(p->info, level->level),
+           s->black_count, s->plane_count + s->leaf_plane_count, level->volume,
+           share(p, level->volume), level->cumulative_bytes, ms);
 }
 
 static void begin_json_level(printer *p, const ebpo_stream_level *level, double ms)
@@ -82,10 +88,12 @@ static void begin_json_level(printer *p, const ebpo_stream_level *level, double 
 
 static void print_node(const ebpo_stream_node *n)
 {
-    printf("%" PRIu64 " %s %.17g %.17g %.17g %.17g %.17g %.17g %d %" PRIu32, n->octcode, words_node_type(n->type), n->min[0], n->min[1], n->min[2], n->max[0],
-           n->max[1], n->max[2], (int)n->winding, n->plane_count);
+    printf("%" PRIu64 " %s %.17g %.17g %.17g %.17g %.17g %.17g %d %" PRIu32, n->octcode,
+           words_node_type(n->type), n->min[0], n->min[1], n->min[2], n->max[0], n->max[1],
+           n->max[2], (int)n->winding, n->plane_count);
     for (uint32_t i = 0; i < n->plane_count; i++)
-        printf(" %.17g %.17g %.17g %.17g", n->planes[i][0], n->planes[i][1], n->planes[i][2], n->planes[i][3]);
+        printf(" %.17g %.17g %.17g %.17g", n->planes[i][0], n->planes[i][1], n->planes[i][2],
+               n->planes[i][3]);
     putchar('\n');
 }
 
@@ -124,8 +132,10 @@ static ebpo_status tell_nodes(printer *p, ebpo_stream *stream, ebpo_error *error
 
 /* --- all levels --- */
 
-/* Whoever reads along sees each level when it is there; once nobody can (*arrived false), there is no point in reading on. */
-static ebpo_status tell_levels(printer *p, ebpo_stream *stream, int last, bool *arrived, ebpo_error *error)
+/* Whoever reads along sees each level when it is there; once nobody can (*arrived false), there is
+ * no point in reading on. */
+static ebpo_status tell_levels(printer *p, ebpo_stream *stream, int last, bool *arrived,
+                               ebpo_error *error)
 {
     ebpo_stream_level level;
     ebpo_status status = EBPO_OK;
@@ -151,10 +161,12 @@ static ebpo_status tell_levels(printer *p, ebpo_stream *stream, int last, bool *
 static void print_head(const char *path, const ebpo_info *info)
 {
     printf("%s: %s, %d levels\n", path, info->solid ? "a solid" : "a surface", info->level_count);
-    printf("%5s %9s %9s %9s %9s %10s %16s %9s %12s %9s\n", "level", "gray", "leaf", "white", "black", "planes", "volume", "% last", "bytes", "ms");
+    printf("%5s %9s %9s %9s %9s %10s %16s %9s %12s %9s\n", "level", "gray", "leaf", "white",
+           "black", "planes", "volume", "% last", "bytes", "ms");
 }
 
-static ebpo_status tell(printer *p, ebpo_file *file, const char *path, bool *arrived, ebpo_error *error)
+static ebpo_status tell(printer *p, ebpo_file *file, const char *path, bool *arrived,
+                        ebpo_error *error)
 {
     int last = p->info->level_count - 1;
     ebpo_stream_options wanted = EBPO_STREAM_OPTIONS_INIT;

@@ -18,15 +18,24 @@ typedef struct values {
 } values;
 
 static const arg_option options[] = {
-    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
+    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores",
+      0, 256, NULL },
     ARG_SWITCH("deviation", 0, values, deviation,
-               "also how far each level reaches beyond the model: certain\nbounds of the farthest point, mean and rms over its surface"),
+               "also how far each level reaches beyond the model: certain\nbounds of the farthest "
+               "point, mean and rms over its surface"),
     { "tolerance", 0, ARG_REAL, offsetof(values, tolerance), "T",
-      "with --deviation: bounds are refined until the upper one is\nat most 1 + T times the lower one; default 0.05", 1e-6, 1000, NULL },
+      "with --deviation: bounds are refined until the upper one is\nat most 1 + T times the lower "
+      "one; default 0.05",
+      1e-6, 1000, NULL },
     { "questions", 0, ARG_INT, offsetof(values, questions), "N",
-      "with --deviation: stop after about N distances for each level\nand tell what is certain then; default 200000; 0: no limit", 0, 9007199254740992.0, NULL },
-    ARG_SWITCH("derived", 0, values, derived, "also the volume of each level with leaves cut by planes derived\nfrom their faces"),
-    ARG_SWITCH("limit", 0, values, limit, "that too, and the volume of the solid's convex hull in each cell, summed:\nno convex envelopes of these cells are smaller"),
+      "with --deviation: stop after about N distances for each level\nand tell what is certain "
+      "then; default 200000; 0: no limit",
+      0, 9007199254740992.0, NULL },
+    ARG_SWITCH("derived", 0, values, derived,
+               "also the volume of each level with leaves cut by planes derived\nfrom their faces"),
+    ARG_SWITCH("limit", 0, values, limit,
+               "that too, and the volume of the solid's convex hull in each cell, summed:\nno "
+               "convex envelopes of these cells are smaller"),
     ARG_SWITCH("json", 0, values, json, "print the numbers as JSON"),
     REMOTE_OPTIONS(values, remote),
     { 0 },
@@ -37,8 +46,10 @@ static const arg_spec spec = {
     .operands = "FILE",
     .least = 1,
     .most = 1,
-    .summary = "area, volume, centroid and inertia, and the volume of each level or how far it reaches",
-    .text = "FILE is an .ebpo.h5 file with its mesh, or its URL. Volume, centroid and inertia are those of the winding number's integral\n"
+    .summary =
+        "area, volume, centroid and inertia, and the volume of each level or how far it reaches",
+    .text = "FILE is an .ebpo.h5 file with its mesh, or its URL. Volume, centroid and inertia are "
+            "those of the winding number's integral\n"
             "(density 1); a surface has an area only.",
     .options = options,
 };
@@ -76,7 +87,8 @@ static void print_levels(const ebpo_info *info, const measures *m)
     for (int i = 0; i < info->level_count; i++) {
         printf("%5d %24.16g %9.2f", i, facts_volume(info, i), facts_percent(info, i));
         if (deviation)
-            printf(" %13.6g %13.6g %13.6g %13.6g", deviation[i].lo, deviation[i].hi, deviation[i].mean, deviation[i].rms);
+            printf(" %13.6g %13.6g %13.6g %13.6g", deviation[i].lo, deviation[i].hi,
+                   deviation[i].mean, deviation[i].rms);
         if (m->derived)
             printf(" %24.16g %9.2f", m->derived[i], facts_share(info, m->derived[i]));
         if (m->limit)
@@ -85,15 +97,19 @@ static void print_levels(const ebpo_info *info, const measures *m)
     }
 }
 
-static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass *mass, const measures *m)
+static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass *mass,
+                       const measures *m)
 {
-    printf("%s: %s%s%s\n", path, info->solid ? "a solid" : "a surface", info->unit[0] ? ", unit " : "", info->unit);
+    printf("%s: %s%s%s\n", path, info->solid ? "a solid" : "a surface",
+           info->unit[0] ? ", unit " : "", info->unit);
     printf("  area      %.16g\n", mass->area);
     if (info->solid) {
         const double *c = mass->centroid;
-        printf("  volume    %.16g\n  centroid  %.16g %.16g %.16g\n", mass->volume, c[0], c[1], c[2]);
+        printf("  volume    %.16g\n  centroid  %.16g %.16g %.16g\n", mass->volume, c[0], c[1],
+               c[2]);
         for (int k = 0; k < 3; k++)
-            printf("  %-9s %.16g %.16g %.16g\n", k ? "" : "inertia", mass->inertia[k][0], mass->inertia[k][1], mass->inertia[k][2]);
+            printf("  %-9s %.16g %.16g %.16g\n", k ? "" : "inertia", mass->inertia[k][0],
+                   mass->inertia[k][1], mass->inertia[k][2]);
     }
     putchar('\n');
     print_levels(info, m);
@@ -123,7 +139,8 @@ static void json_limit(json *j, const ebpo_info *info, double volume, const ebpo
     json_uint(j, "flat_hulls", limit->flat);
 }
 
-static void json_mass(json *j, const char *path, const ebpo_info *info, const ebpo_mass *mass, const measures *m)
+static void json_mass(json *j, const char *path, const ebpo_info *info, const ebpo_mass *mass,
+                      const measures *m)
 {
     json_text(j, "file", path);
     json_text(j, "kind", info->solid ? "solid" : "surface");
@@ -154,7 +171,8 @@ static void json_mass(json *j, const char *path, const ebpo_info *info, const eb
     json_end(j);
 }
 
-static ebpo_status measure_levels(ebpo_file *file, const values *v, ebpo_progress progress, ebpo_deviation *out, ebpo_error *error)
+static ebpo_status measure_levels(ebpo_file *file, const values *v, ebpo_progress progress,
+                                  ebpo_deviation *out, ebpo_error *error)
 {
     ebpo_model *model = NULL;
     ebpo_model_options opening = EBPO_MODEL_OPTIONS_INIT;
@@ -170,7 +188,8 @@ static ebpo_status measure_levels(ebpo_file *file, const values *v, ebpo_progres
     return status;
 }
 
-static ebpo_status limit_levels(ebpo_file *file, const values *v, ebpo_progress progress, ebpo_limit *out, ebpo_error *error)
+static ebpo_status limit_levels(ebpo_file *file, const values *v, ebpo_progress progress,
+                                ebpo_limit *out, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < ebpo_file_info(file)->level_count && status == EBPO_OK; i++)
@@ -178,7 +197,8 @@ static ebpo_status limit_levels(ebpo_file *file, const values *v, ebpo_progress 
     return status;
 }
 
-static ebpo_status derive_levels(ebpo_file *file, const values *v, ebpo_progress progress, double *out, ebpo_error *error)
+static ebpo_status derive_levels(ebpo_file *file, const values *v, ebpo_progress progress,
+                                 double *out, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < ebpo_file_info(file)->level_count && status == EBPO_OK; i++)
@@ -192,7 +212,8 @@ static int measure(const char *path, const values *v)
     ebpo_limit limits[EBPO_LEVELS_MAX];
     double volumes[EBPO_LEVELS_MAX];
     bool derived = v->derived || v->limit;
-    measures m = { derived ? volumes : NULL, v->deviation ? levels : NULL, v->limit ? limits : NULL };
+    measures m = { derived ? volumes : NULL, v->deviation ? levels : NULL,
+                   v->limit ? limits : NULL };
     progress_line line;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
@@ -201,7 +222,10 @@ static int measure(const char *path, const values *v)
         return command_failed("measure", &error);
     if (!(ebpo_file_info(file)->parts & EBPO_PART_MESH)) {
         ebpo_close(file);
-        fprintf(stderr, "ebpo measure: %s: was written without its mesh, which is measured; convert the mesh again without '--without mesh'\n", path);
+        fprintf(stderr,
+                "ebpo measure: %s: was written without its mesh, which is measured; convert the "
+                "mesh again without '--without mesh'\n",
+                path);
         return EXIT_FAILED;
     }
     ebpo_status status = ebpo_measure(file, (unsigned)v->threads, &mass, &error);

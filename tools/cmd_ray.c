@@ -6,10 +6,13 @@
 #include "query_run.h"
 
 static const arg_option options[] = {
-    ARG_SWITCH("all", 'a', query_values, all, "all hits: their number, then t, face and side of each"),
-    { "tmax", 0, ARG_REAL, offsetof(query_values, tmax), "T", "of rays that tell none: they end at origin + T direction", 0, DBL_MAX, NULL },
+    ARG_SWITCH("all", 'a', query_values, all,
+               "all hits: their number, then t, face and side of each"),
+    { "tmax", 0, ARG_REAL, offsetof(query_values, tmax), "T",
+      "of rays that tell none: they end at origin + T direction", 0, DBL_MAX, NULL },
     QUERY_MODEL_OPTIONS,
-    QUERY_FORM_OPTIONS("rays are six doubles each, answers a double, a uint64 and an int64\n(little-endian)"),
+    QUERY_FORM_OPTIONS(
+        "rays are six doubles each, answers a double, a uint64 and an int64\n(little-endian)"),
     { 0 },
 };
 
@@ -19,12 +22,14 @@ static const arg_spec spec = {
     .least = 1,
     .most = 2,
     .summary = "what rays hit: t, face and side of the first face",
-    .text = "MODEL is an .ebpo.h5 file. RAYS: lines 'ox oy oz dx dy dz [tmax]'; absent or '-': standard input. What is hit, and in which order,\n"
+    .text = "MODEL is an .ebpo.h5 file. RAYS: lines 'ox oy oz dx dy dz [tmax]'; absent or '-': "
+            "standard input. What is hit, and in which order,\n"
             "is exact; '-' stands for nothing.",
     .options = options,
 };
 
-static ebpo_status answer_one(const query_job *job, ebpo_context *context, const double *ray, ebpo_error *error)
+static ebpo_status answer_one(const query_job *job, ebpo_context *context, const double *ray,
+                              ebpo_error *error)
 {
     ebpo_status status;
     if (job->values->all) {
@@ -43,7 +48,8 @@ static ebpo_status answer_one(const query_job *job, ebpo_context *context, const
     return status;
 }
 
-static ebpo_status answer(const query_job *job, ebpo_context *context, const double *rows, uint64_t count, ebpo_error *error)
+static ebpo_status answer(const query_job *job, ebpo_context *context, const double *rows,
+                          uint64_t count, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)

@@ -30,14 +30,17 @@ static const arg_option options[] = {
     { "level", 0, ARG_INT, offsetof(values, level), "N", "the envelopes of level N", 0, 20, NULL },
     ARG_SWITCH("mesh", 0, values, mesh, "the model itself; the default"),
     { "levels", 0, ARG_TEXT, offsetof(values, levels), "LIST",
-      "several side by side, with captions: levels and 'mesh',\nfor example 0,2,4,mesh", 0, 0, NULL },
+      "several side by side, with captions: levels and 'mesh',\nfor example 0,2,4,mesh", 0, 0,
+      NULL },
     { "view", 0, ARG_TEXT, offsetof(values, view), "AZ,EL",
       "from where: azimuth and elevation in degrees; default 30,20", 0, 0, NULL },
-    { "up", 0, ARG_WORD, offsetof(values, up), "AXIS", "the axis that points upwards: x, y (the default) or z", 0, 0,
-      up_words },
-    { "size", 0, ARG_TEXT, offsetof(values, size), "WxH", "pixels, 16 to 8192 each; default 1200x900", 0, 0, NULL },
+    { "up", 0, ARG_WORD, offsetof(values, up), "AXIS",
+      "the axis that points upwards: x, y (the default) or z", 0, 0, up_words },
+    { "size", 0, ARG_TEXT, offsetof(values, size), "WxH",
+      "pixels, 16 to 8192 each; default 1200x900", 0, 0, NULL },
     ARG_SWITCH("edges", 0, values, edges, "draw the outlines of the polygons"),
-    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
+    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores",
+      0, 256, NULL },
     ARG_SWITCH("quiet", 'q', values, quiet, "no progress: errors and warnings only"),
     REMOTE_OPTIONS(values, remote),
     { 0 },
@@ -75,7 +78,8 @@ typedef struct job {
 
 static int usage_error(const char *what, const char *value, const char *expected)
 {
-    fprintf(stderr, "ebpo render: %s: '%s' is not %s; try 'ebpo render --help'\n", what, value, expected);
+    fprintf(stderr, "ebpo render: %s: '%s' is not %s; try 'ebpo render --help'\n", what, value,
+            expected);
     return EXIT_USAGE;
 }
 
@@ -108,14 +112,16 @@ static int parse(job *j)
     char rest;
     const values *v = &j->v;
     if ((v->level >= 0) + v->mesh + (v->levels != NULL) > 1) {
-        fprintf(stderr, "ebpo render: --level, --levels and --mesh exclude each other; try 'ebpo render --help'\n");
+        fprintf(stderr, "ebpo render: --level, --levels and --mesh exclude each other; try 'ebpo "
+                        "render --help'\n");
         return EXIT_USAGE;
     }
     if (sscanf(v->view, "%lf,%lf%c", &j->azimuth, &j->elevation, &rest) != 2 ||
         !(j->azimuth >= -360 && j->azimuth <= 360) || !(j->elevation >= -90 && j->elevation <= 90))
-        return usage_error("--view", v->view, "an azimuth from -360 to 360, a comma, and an elevation from -90 to 90");
-    if (sscanf(v->size, "%5dx%5d%c", &j->width, &j->height, &rest) != 2 || j->width < 16 || j->width > SIDE_MAX ||
-        j->height < 16 || j->height > SIDE_MAX)
+        return usage_error("--view", v->view,
+                           "an azimuth from -360 to 360, a comma, and an elevation from -90 to 90");
+    if (sscanf(v->size, "%5dx%5d%c", &j->width, &j->height, &rest) != 2 || j->width < 16 ||
+        j->width > SIDE_MAX || j->height < 16 || j->height > SIDE_MAX)
         return usage_error("--size", v->size, "a width, an x, and a height, each from 16 to 8192");
     if (v->levels && !parse_levels(j))
         return usage_error("--levels", v->levels,
@@ -127,24 +133,28 @@ static int parse(job *j)
 
 /* --- what to draw --- */
 
-static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress progress, ebpo_error *error)
+static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress progress,
+                             ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(file);
     unsigned threads = (unsigned)j->v.threads;
     if (t->level == MESH) {
-        snprintf(t->caption, sizeof t->caption, "mesh, %llu faces", (unsigned long long)info->face_count);
+        snprintf(t->caption, sizeof t->caption, "mesh, %llu faces",
+                 (unsigned long long)info->face_count);
         t->closed = info->solid && info->report.manifold;
         return ebpo_file_read_mesh(file, &t->mesh, threads, error);
     }
     ebpo_lod_options lod =
-        EBPO_LOD_OPTIONS_INIT; /* walls too: they close the envelopes, and inner ones cannot be seen */
+        /* walls too: they close the envelopes, and inner ones cannot be seen */
+        EBPO_LOD_OPTIONS_INIT;
     lod.threads = threads;
     lod.progress = progress;
     t->closed = true;
     ebpo_status status = ebpo_lod_level(file, t->level, &lod, &t->mesh, NULL, error);
     if (status == EBPO_OK)
-        snprintf(t->caption, sizeof t->caption, info->solid ? "level %d: %.1f %%" : "level %d: %.1f %% of box",
-                 t->level, facts_percent(info, t->level));
+        snprintf(t->caption, sizeof t->caption,
+                 info->solid ? "level %d: %.1f %%" : "level %d: %.1f %% of box", t->level,
+                 facts_percent(info, t->level));
     return status;
 }
 
@@ -169,7 +179,8 @@ static ebpo_status load_mesh(job *j, ebpo_progress progress, ebpo_error *error)
     ebpo_mesh_report report;
     tile *t = &j->tiles[0];
     if (t->level != MESH || j->tile_count > 1) {
-        snprintf(error->message, sizeof error->message, "%s: is a mesh, which has no levels; convert it first", j->in);
+        snprintf(error->message, sizeof error->message,
+                 "%s: is a mesh, which has no levels; convert it first", j->in);
         return error->status = EBPO_E_ARGUMENT;
     }
     ebpo_status status = ebpo_mesh_read(&t->mesh, j->in, &read, error);
@@ -208,25 +219,27 @@ static unsigned thread_count(const job *j)
     return j->v.threads ? (unsigned)j->v.threads : cores > 0 ? (unsigned)cores : 1;
 }
 
-static ebpo_status draw_tile(const job *j, const tile *t, picture *p, const camera *view, const int at[4],
-                             ebpo_error *error)
+static ebpo_status draw_tile(const job *j, const tile *t, picture *p, const camera *view,
+                             const int at[4], ebpo_error *error)
 {
     static const uint8_t ink[3] = { 60, 66, 76 };
     raster_style style = { { 0.30, 0.48, 0.66 }, t->closed, j->v.edges };
     if (t->level == MESH)
         memcpy(style.colour, (const double[3]){ 0.66, 0.54, 0.40 }, sizeof style.colour);
     int caption = j->v.levels ? 1 + at[2] / 240 : 0;
-    ebpo_status status =
-        raster_draw(p, at[0], at[1], at[2], at[3] - 14 * caption, view, &t->mesh, &style, thread_count(j), error);
+    ebpo_status status = raster_draw(p, at[0], at[1], at[2], at[3] - 14 * caption, view, &t->mesh,
+                                     &style, thread_count(j), error);
     if (status == EBPO_OK && caption)
-        picture_text(p, at[0] + (at[2] - picture_text_width(caption, t->caption)) / 2, at[1] + at[3] - 12 * caption,
-                     caption, ink, t->caption);
+        picture_text(p, at[0] + (at[2] - picture_text_width(caption, t->caption)) / 2,
+                     at[1] + at[3] - 12 * caption, caption, ink, t->caption);
     return status;
 }
 
 static ebpo_status draw(const job *j, picture *p, ebpo_error *error)
 {
-    int columns = j->tile_count <= 5 ? j->tile_count : (j->tile_count + 1) / 2 <= 6 ? (j->tile_count + 1) / 2 : 6;
+    int columns = j->tile_count <= 5             ? j->tile_count
+                  : (j->tile_count + 1) / 2 <= 6 ? (j->tile_count + 1) / 2
+                                                 : 6;
     int rows = (j->tile_count + columns - 1) / columns;
     int width = j->width / columns, height = j->height / rows;
     int caption = j->v.levels ? 14 * (1 + width / 240) : 0;
@@ -234,8 +247,8 @@ static ebpo_status draw(const job *j, picture *p, ebpo_error *error)
     camera view;
     const tile *first = coarsest(j);
     if (height <= caption) {
-        snprintf(error->message, sizeof error->message, "--size %s has no room for %d tiles; take a larger one",
-                 j->v.size, j->tile_count);
+        snprintf(error->message, sizeof error->message,
+                 "--size %s has no room for %d tiles; take a larger one", j->v.size, j->tile_count);
         return error->status = EBPO_E_ARGUMENT;
     }
     paint_background(p);
@@ -255,8 +268,8 @@ static ebpo_status render(job *j, bool is_file, ebpo_progress progress, ebpo_err
     picture p = { 0 };
     ebpo_status status = is_file ? load_file(j, progress, error) : load_mesh(j, progress, error);
     if (status == EBPO_OK && !picture_make(&p, j->width, j->height, white)) {
-        snprintf(error->message, sizeof error->message, "no memory for a picture of %s; take a smaller --size",
-                 j->v.size);
+        snprintf(error->message, sizeof error->message,
+                 "no memory for a picture of %s; take a smaller --size", j->v.size);
         status = error->status = EBPO_E_MEMORY;
     }
     if (status == EBPO_OK)
@@ -275,7 +288,9 @@ static int run_job(job *j)
     if (code != EXIT_FINE)
         return code;
     if (strcmp(j->in, j->out) == 0 || command_same_file(j->in, j->out)) {
-        fprintf(stderr, "ebpo render: %s: is input and output at once; give the output another name\n", j->out);
+        fprintf(stderr,
+                "ebpo render: %s: is input and output at once; give the output another name\n",
+                j->out);
         return EXIT_USAGE;
     }
     int is_file = command_is_hdf5("render", j->in);
@@ -293,7 +308,9 @@ static int run_job(job *j)
 
 static int run(int argc, char **argv)
 {
-    values v = { .level = -1, .view = "30,20", .size = "1200x900", .up = 1, .remote = REMOTE_VALUES_INIT };
+    values v = {
+        .level = -1, .view = "30,20", .size = "1200x900", .up = 1, .remote = REMOTE_VALUES_INIT
+    };
     const char *operand[ARGS_OPERANDS_MAX];
     arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
     if (parsed != ARGS_RUN)

@@ -15,8 +15,10 @@ static const arg_spec spec = {
     .least = 2,
     .most = 2,
     .summary = "a smaller .ebpo.h5 file of a file: levels, a box, parts, an error or a size",
-    .text = "FILE is an .ebpo.h5 file or its URL (what is interrupted begins anew; 'ebpo fetch' goes on). OUT appears\n"
-            "whole or not at all. Questions to it are answered as by FILE, or refused where what was left out matters.",
+    .text = "FILE is an .ebpo.h5 file or its URL (what is interrupted begins anew; 'ebpo fetch' "
+            "goes on). OUT appears\n"
+            "whole or not at all. Questions to it are answered as by FILE, or refused where what "
+            "was left out matters.",
     .options = options,
 };
 
@@ -46,7 +48,8 @@ static int run(int argc, char **argv)
     progress_wipe(&line);
     if (status == EBPO_OK) {
         traffic t = traffic_of(file);
-        status = subset_tell(&v, operand[1], ebpo_file_info(file), &t, progress_now() - begun, &error);
+        status =
+            subset_tell(&v, operand[1], ebpo_file_info(file), &t, progress_now() - begun, &error);
         if (status == EBPO_OK && !v.json)
             remote_tell(&t, &v.remote, false);
     }

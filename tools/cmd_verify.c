@@ -21,9 +21,11 @@ static const arg_option options[] = {
     { "against", 0, ARG_TEXT, offsetof(values, against), "IN.ply",
       "also compare the model with its source, bit for bit", 0, 0, NULL },
     { "samples", 0, ARG_INT, offsetof(values, samples), "N",
-      "cells whose labels are checked by an independent winding\nnumber; 0, the default: all of up to four million, a million of more",
+      "cells whose labels are checked by an independent winding\nnumber; 0, the default: all of up "
+      "to four million, a million of more",
       0, 9007199254740992.0, NULL },
-    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores", 0, 256, NULL },
+    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores",
+      0, 256, NULL },
     MEMORY_OPTIONS(values, memory),
     ARG_SWITCH("json", 0, values, json, "print the counts as JSON"),
     ARG_SWITCH("quiet", 'q', values, quiet, "print violations and errors only"),
@@ -37,7 +39,8 @@ static const arg_spec spec = {
     .least = 1,
     .most = 1,
     .summary = "checks every promise of a file; ends with code 1 if one is broken",
-    .text = "FILE is an .ebpo.h5 file or its URL. Containment is checked with the decoded half-spaces, exactly, not with rounded polyhedra.",
+    .text = "FILE is an .ebpo.h5 file or its URL. Containment is checked with the decoded "
+            "half-spaces, exactly, not with rounded polyhedra.",
     .options = options,
 };
 
@@ -47,7 +50,8 @@ static const struct kind {
 } kinds[] = {
     { offsetof(ebpo_verify_report, structure), "structure", "head, shapes, counts, order" },
     { offsetof(ebpo_verify_report, content), "content", "checksum of all arrays" },
-    { offsetof(ebpo_verify_report, containment), "containment", "the solid lies in every half-space" },
+    { offsetof(ebpo_verify_report, containment), "containment",
+      "the solid lies in every half-space" },
     { offsetof(ebpo_verify_report, nesting), "nesting", "envelopes lie in their parents'" },
     { offsetof(ebpo_verify_report, labels), "labels", "white, black, winding numbers" },
     { offsetof(ebpo_verify_report, lists), "lists", "faces are listed where they touch" },
@@ -80,12 +84,14 @@ static void print_violations(const ebpo_verify_report *report, const char *path)
     for (int i = 0; i < KINDS; i++) {
         const ebpo_verify_count *c = count_of(report, i);
         if (c->violations)
-            fprintf(stderr, "ebpo verify: %s: %s: %llu of %llu checks failed; first: %s\n", path, kinds[i].name,
-                    (unsigned long long)c->violations, (unsigned long long)c->checks, c->first);
+            fprintf(stderr, "ebpo verify: %s: %s: %llu of %llu checks failed; first: %s\n", path,
+                    kinds[i].name, (unsigned long long)c->violations, (unsigned long long)c->checks,
+                    c->first);
     }
 }
 
-static void print_json(const ebpo_verify_report *report, const char *path, const traffic *t, const remote_values *remote)
+static void print_json(const ebpo_verify_report *report, const char *path, const traffic *t,
+                       const remote_values *remote)
 {
     json j;
     json_begin(&j, stdout);
@@ -109,8 +115,8 @@ static void print_json(const ebpo_verify_report *report, const char *path, const
     json_finish(&j);
 }
 
-static ebpo_status verify(const values *v, const char *path, ebpo_progress progress, ebpo_verify_report *report,
-                          traffic *t, ebpo_error *error)
+static ebpo_status verify(const values *v, const char *path, ebpo_progress progress,
+                          ebpo_verify_report *report, traffic *t, ebpo_error *error)
 {
     ebpo_mesh source = { 0 };
     ebpo_file *file = NULL;

@@ -16,7 +16,8 @@ static bool add(void *user, const ebpo_view_node *v)
     const ebpo_stream_node *n = &v->node;
     uint32_t first = (uint32_t)m->mesh.vertex_count;
     if (m->filling && n->vertex_count)
-        memcpy(m->mesh.xyz64 + 3 * m->mesh.vertex_count, n->vertices, n->vertex_count * sizeof *n->vertices);
+        memcpy(m->mesh.xyz64 + 3 * m->mesh.vertex_count, n->vertices,
+               n->vertex_count * sizeof *n->vertices);
     m->mesh.vertex_count += n->vertex_count;
     for (uint32_t p = 0; p < n->polygon_count; p++)
         for (uint32_t i = n->polygon_first[p] + 1; i + 1 < n->polygon_first[p + 1]; i++) {
@@ -37,7 +38,10 @@ ebpo_status cut_mesh_write(ebpo_view_stream *stream, const char *path, ebpo_erro
     ebpo_view_stream_cut(stream, add, &m);
     uint64_t vertices = m.mesh.vertex_count, faces = m.mesh.face_count;
     if (vertices > UINT32_MAX - 1 || faces > UINT32_MAX - 1) {
-        snprintf(error->message, sizeof error->message, "%s: the cut has %" PRIu64 " vertices and %" PRIu64 " faces, more than a mesh can have; give a budget or --pixels", path, vertices, faces);
+        snprintf(error->message, sizeof error->message,
+                 "%s: the cut has %" PRIu64 " vertices and %" PRIu64
+                 " faces, more than a mesh can have; give a budget or --pixels",
+                 path, vertices, faces);
         return error->status = EBPO_E_LIMIT;
     }
     m.mesh.xyz64 = calloc(vertices ? vertices : 1, 3 * sizeof *m.mesh.xyz64);
@@ -49,7 +53,9 @@ ebpo_status cut_mesh_write(ebpo_view_stream *stream, const char *path, ebpo_erro
         ebpo_view_stream_cut(stream, add, &m);
         status = ebpo_mesh_write_ply(&m.mesh, path, error);
     } else {
-        snprintf(error->message, sizeof error->message, "%s: no memory for the cut's %" PRIu64 " faces; give a budget or --pixels", path, faces);
+        snprintf(error->message, sizeof error->message,
+                 "%s: no memory for the cut's %" PRIu64 " faces; give a budget or --pixels", path,
+                 faces);
         status = error->status = EBPO_E_MEMORY;
     }
     free(m.mesh.xyz64);

@@ -4,7 +4,9 @@
 
 #include <ebpo/ebpo.h>
 
-/* The envelopes of gray nodes and leaves, and black cells, each closed, as triangles. The stream was made with polygons. */
-EBPO_MUST_USE ebpo_status cut_mesh_write(ebpo_view_stream *stream, const char *path, ebpo_error *error);
+/* The envelopes of gray nodes and leaves, and black cells, each closed, as triangles. The stream
+ * was made with polygons. */
+EBPO_MUST_USE ebpo_status cut_mesh_write(ebpo_view_stream *stream, const char *path,
+                                         ebpo_error *error);
 
 #endif

@@ -18,11 +18,13 @@ double facts_volume(const ebpo_info *info, int level)
 {
     double sum = info->level[level].gray_volume;
     for (int i = 0; i <= level; i++)
-        sum += info->level[i].leaf_volume + (double)info->level[i].black_count * cell_volume(info, i);
+        sum +=
+            info->level[i].leaf_volume + (double)info->level[i].black_count * cell_volume(info, i);
     return sum;
 }
 
-ebpo_status facts_derived(ebpo_file *file, int level, unsigned threads, ebpo_progress progress, double *volume, ebpo_error *error)
+ebpo_status facts_derived(ebpo_file *file, int level, unsigned threads, ebpo_progress progress,
+                          double *volume, ebpo_error *error)
 {
     ebpo_lod_options options = EBPO_LOD_OPTIONS_INIT;
     options.threads = threads;
@@ -51,7 +53,8 @@ double facts_excess(const ebpo_info *info, double volume)
 double facts_excess_ratio(const ebpo_info *info, double volume, double limit)
 {
     double least = facts_excess(info, limit);
-    return least > 1e-7 ? facts_excess(info, volume) / least : NAN; /* 1e-9 of the volume: what rounding may do to it */
+    /* 1e-9 of the volume: what rounding may do to it */
+    return least > 1e-7 ? facts_excess(info, volume) / least : NAN;
 }
 
 uint64_t facts_cumulative(const ebpo_info *info, int level)
@@ -72,33 +75,37 @@ static void print_source(FILE *out, const ebpo_info *info)
     if (info->source_format[0])
         fprintf(out, ", %s, %s\n            SHA-256 %s", info->source_format,
                 words_bytes(bytes, sizeof bytes, info->source_size), hex);
-    fprintf(out, "\n            %llu vertices, %llu triangles\n", (unsigned long long)info->source_vertex_count,
+    fprintf(out, "\n            %llu vertices, %llu triangles\n",
+            (unsigned long long)info->source_vertex_count,
             (unsigned long long)info->source_face_count);
 }
 
 static void print_model(FILE *out, const ebpo_info *info)
 {
-    fprintf(out, "  mesh      %llu vertices, %llu faces, %s coordinates", (unsigned long long)info->vertex_count,
-            (unsigned long long)info->face_count, info->double_coordinates ? "double" : "float");
+    fprintf(out, "  mesh      %llu vertices, %llu faces, %s coordinates",
+            (unsigned long long)info->vertex_count, (unsigned long long)info->face_count,
+            info->double_coordinates ? "double" : "float");
     if (!(info->parts & EBPO_PART_MESH))
         fputs(" (not in this file)", out);
     if (info->solid)
         fprintf(out, "\n  solid     volume %.6g, by winding number, rule %s", info->report.volume,
                 words_rule(info->rule));
-    fprintf(out, "\n  box       %.6g %.6g %.6g, size %.6g %.6g %.6g%s%s\n", info->box_origin[0], info->box_origin[1],
-            info->box_origin[2], info->box_size[0], info->box_size[1], info->box_size[2], info->unit[0] ? " " : "",
-            info->unit);
+    fprintf(out, "\n  box       %.6g %.6g %.6g, size %.6g %.6g %.6g%s%s\n", info->box_origin[0],
+            info->box_origin[1], info->box_origin[2], info->box_size[0], info->box_size[1],
+            info->box_size[2], info->unit[0] ? " " : "", info->unit);
     if (info->crs[0])
         fprintf(out, "  crs       %s\n", info->crs);
     if (info->date[0])
         fprintf(out, "  date      %s\n", info->date);
-    fprintf(out, "  built by  %s: maximum level %d, leaf faces %u, ", info->generator, info->max_level, info->leaf_faces);
+    fprintf(out, "  built by  %s: maximum level %d, leaf faces %u, ", info->generator,
+            info->max_level, info->leaf_faces);
     if (info->selection == EBPO_SELECT_INHERIT)
         fprintf(out, "epsilon %g\n", info->epsilon);
     else if (info->selection < 0)
         fputs("planes chosen in a way that this version does not know\n", out);
     else if (info->k_root > 0)
-        fprintf(out, "selection %s, K %.10g at the root\n", selection_words[info->selection], info->k_root);
+        fprintf(out, "selection %s, K %.10g at the root\n", selection_words[info->selection],
+                info->k_root);
     else
         fprintf(out, "selection %s, %.10g %%\n", selection_words[info->selection], info->percent);
 }
@@ -125,10 +132,13 @@ static void print_subset(FILE *out, const ebpo_info *info)
     if (info->cut_levels)
         fprintf(out, " levels 0 to %d", info->cut_levels - 1);
     if (info->boxed)
-        fprintf(out, "%s what meets %.9g,%.9g,%.9g,%.9g,%.9g,%.9g", info->cut_levels ? "," : "", b[0], b[1], b[2], b[3], b[4], b[5]);
+        fprintf(out, "%s what meets %.9g,%.9g,%.9g,%.9g,%.9g,%.9g", info->cut_levels ? "," : "",
+                b[0], b[1], b[2], b[3], b[4], b[5]);
     if (info->kept_error > 0)
-        fprintf(out, "%s pruned where envelopes reach at most %.9g beyond the model", info->cut_levels || info->boxed ? "," : "", info->kept_error);
-    fprintf(out, "; nothing below %llu pruned nodes\n            of the file with content %s\n", (unsigned long long)pruned_nodes(info), hex);
+        fprintf(out, "%s pruned where envelopes reach at most %.9g beyond the model",
+                info->cut_levels || info->boxed ? "," : "", info->kept_error);
+    fprintf(out, "; nothing below %llu pruned nodes\n            of the file with content %s\n",
+            (unsigned long long)pruned_nodes(info), hex);
 }
 
 static uint64_t level_bytes(const ebpo_info *info)
@@ -142,7 +152,8 @@ static uint64_t level_bytes(const ebpo_info *info)
 /* What the file holds besides: nothing, unless another program wrote it. */
 static uint64_t other_bytes(const ebpo_info *info)
 {
-    uint64_t sum = info->head_bytes + info->chunk_index_bytes + level_bytes(info) + info->mesh_vertex_bytes + info->mesh_face_bytes + info->map_bytes;
+    uint64_t sum = info->head_bytes + info->chunk_index_bytes + level_bytes(info) +
+                   info->mesh_vertex_bytes + info->mesh_face_bytes + info->map_bytes;
     return info->file_bytes > sum ? info->file_bytes - sum : 0;
 }
 
@@ -162,14 +173,16 @@ void facts_print(FILE *out, const char *path, const ebpo_info *info)
 {
     char bytes[32], parts[64], version[32];
     fprintf(out, "%s: EBP-Octree %s, %s, levels 0 to %d, %s\n", path,
-            words_format(version, sizeof version, info->version_major, info->version_minor), info->solid ? "a solid" : "a surface", info->level_count - 1,
+            words_format(version, sizeof version, info->version_major, info->version_minor),
+            info->solid ? "a solid" : "a surface", info->level_count - 1,
             words_bytes(bytes, sizeof bytes, info->file_bytes));
     print_source(out, info);
     if (info->pruned)
         print_subset(out, info);
     report_print_mending(out, &info->mend);
     print_model(out, info);
-    fprintf(out, "  holds     %s; codec %s\n", words_parts(parts, sizeof parts, info->parts), words_codec(info->codec));
+    fprintf(out, "  holds     %s; codec %s\n", words_parts(parts, sizeof parts, info->parts),
+            words_codec(info->codec));
     print_bytes(out, "head", info, info->head_bytes);
     print_bytes(out, "index", info, info->chunk_index_bytes);
     print_bytes(out, "levels", info, level_bytes(info));
@@ -182,16 +195,18 @@ void facts_print(FILE *out, const char *path, const ebpo_info *info)
 
 void facts_table(FILE *out, const ebpo_info *info)
 {
-    fprintf(out, "%5s %9s %9s %9s %9s %9s %10s %12s %9s %10s %9s\n", "level", "gray", "leaf", "white", "black",
-            "planes", "faces new", "faces again", "stored", "cumulative", info->solid ? "% solid" : "% box");
+    fprintf(out, "%5s %9s %9s %9s %9s %9s %10s %12s %9s %10s %9s\n", "level", "gray", "leaf",
+            "white", "black", "planes", "faces new", "faces again", "stored", "cumulative",
+            info->solid ? "% solid" : "% box");
     for (int i = 0; i < info->level_count; i++) {
         const ebpo_level_summary *l = &info->level[i];
         char stored[32], sum[32];
         fprintf(out, "%5d %9llu %9llu %9llu %9llu %9llu %10llu %12llu %9s %10s %9.2f\n", i,
                 (unsigned long long)l->gray_count, (unsigned long long)l->leaf_count,
                 (unsigned long long)facts_white(info, i), (unsigned long long)l->black_count,
-                (unsigned long long)(l->plane_count + l->leaf_plane_count), (unsigned long long)l->new_count,
-                (unsigned long long)l->ref_count, words_bytes(stored, sizeof stored, l->stored_bytes),
+                (unsigned long long)(l->plane_count + l->leaf_plane_count),
+                (unsigned long long)l->new_count, (unsigned long long)l->ref_count,
+                words_bytes(stored, sizeof stored, l->stored_bytes),
                 words_bytes(sum, sizeof sum, facts_cumulative(info, i)), facts_percent(info, i));
     }
 }
@@ -307,7 +322,8 @@ void facts_json(json *j, const char *path, const ebpo_info *info)
 {
     char version[32];
     json_text(j, "file", path);
-    json_text(j, "format", words_format(version, sizeof version, info->version_major, info->version_minor));
+    json_text(j, "format",
+              words_format(version, sizeof version, info->version_major, info->version_minor));
     json_text(j, "generator", info->generator);
     json_source(j, info);
     json_model(j, info);

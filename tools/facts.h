@@ -7,18 +7,23 @@
 
 #include "json.h"
 
-/* Volume of the envelopes that stand for the model at `level`: its gray nodes, and the leaves and black nodes of levels
- * 0 .. level, these as the file states them (planes that readers derive cut off more). */
+/* Volume of the envelopes that stand for the model at `level`: its gray nodes, and the leaves and
+ * black nodes of levels 0 .. level, these as the file states them (planes that readers derive cut
+ * off more). */
 double facts_volume(const ebpo_info *info, int level);
-/* The same with leaves cut by planes derived from their faces, where the file has faces and no planes of leaves: reads them. */
-EBPO_MUST_USE ebpo_status facts_derived(ebpo_file *file, int level, unsigned threads, ebpo_progress progress, double *volume, ebpo_error *error);
+/* The same with leaves cut by planes derived from their faces, where the file has faces and no
+ * planes of leaves: reads them. */
+EBPO_MUST_USE ebpo_status facts_derived(ebpo_file *file, int level, unsigned threads,
+                                        ebpo_progress progress, double *volume, ebpo_error *error);
 /* facts_volume in percent of the solid; of the root box for a surface. */
 double facts_percent(const ebpo_info *info, int level);
 /* Any volume in percent of the same. */
 double facts_share(const ebpo_info *info, double volume);
-/* How much `volume` is above the solid's, in percent of the solid's; NAN for a surface, or a solid without volume. */
+/* How much `volume` is above the solid's, in percent of the solid's; NAN for a surface, or a solid
+ * without volume. */
 double facts_excess(const ebpo_info *info, double volume);
-/* Excess of `volume` / excess of `limit`, the volume of the convex hulls; NAN where either has none, or the hulls are the solid but for rounding. */
+/* Excess of `volume` / excess of `limit`, the volume of the convex hulls; NAN where either has
+ * none, or the hulls are the solid but for rounding. */
 double facts_excess_ratio(const ebpo_info *info, double volume, double limit);
 /* White nodes of a level without the places of pruned nodes' children. */
 uint64_t facts_white(const ebpo_info *info, int level);

@@ -1,5 +1,5 @@
-/* Letters of 5 x 9 pixels, drawn for this program. Each row is five bits, the leftmost pixel the highest; rows from the top, the last two
- * for descenders. */
+/* Letters of 5 x 9 pixels, drawn for this program. Each row is five bits, the leftmost pixel the
+ * highest; rows from the top, the last two for descenders. */
 #include "picture.h"
 
 #include <ctype.h>
@@ -73,10 +73,7 @@ static void fill(picture *p, int x, int y, int side, const uint8_t colour[3])
             memcpy(p->rgb + 3 * ((size_t)j * (size_t)p->width + (size_t)i), colour, 3);
 }
 
-int picture_text_width(int scale, const char *text)
-{
-    return (int)strlen(text) * ADVANCE * scale;
-}
+int picture_text_width(int scale, const char *text) { return (int)strlen(text) * ADVANCE * scale; }
 
 void picture_text(picture *p, int x, int y, int scale, const uint8_t colour[3], const char *text)
 {

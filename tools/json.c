@@ -11,7 +11,8 @@ static void newline(json *j)
         fputs("  ", j->out);
 }
 
-/* Length of the UTF-8 sequence at `s` (no surrogates, nothing overlong, up to U+10FFFF), 0 if there is none. */
+/* Length of the UTF-8 sequence at `s` (no surrogates, nothing overlong, up to U+10FFFF), 0 if there
+ * is none. */
 static int sequence(const unsigned char *s)
 {
     unsigned char a = s[0];
@@ -23,8 +24,8 @@ static int sequence(const unsigned char *s)
     for (int i = 1; i < length; i++)
         if ((s[i] & 0xc0) != 0x80)
             return 0;
-    bool bad = (a == 0xe0 && s[1] < 0xa0) || (a == 0xed && s[1] > 0x9f) || (a == 0xf0 && s[1] < 0x90) ||
-               (a == 0xf4 && s[1] > 0x8f);
+    bool bad = (a == 0xe0 && s[1] < 0xa0) || (a == 0xed && s[1] > 0x9f) ||
+               (a == 0xf0 && s[1] < 0x90) || (a == 0xf4 && s[1] > 0x8f);
     return bad ? 0 : length;
 }
 
@@ -77,15 +78,9 @@ void json_begin(json *j, FILE *out)
     j->out = out;
 }
 
-void json_object(json *j, const char *key)
-{
-    open_level(j, key, '{', '}');
-}
+void json_object(json *j, const char *key) { open_level(j, key, '{', '}'); }
 
-void json_array(json *j, const char *key)
-{
-    open_level(j, key, '[', ']');
-}
+void json_array(json *j, const char *key) { open_level(j, key, '[', ']'); }
 
 void json_end(json *j)
 {

@@ -12,15 +12,18 @@ bool memory_good(const char *command, const memory_values *v)
     if (!v->memory)
         return true;
     if (!words_read_size(v->memory, &bytes)) {
-        fprintf(stderr, "ebpo %s: --memory: '%s' is not a size such as 2G; try 'ebpo %s --help'\n", command, v->memory, command);
+        fprintf(stderr, "ebpo %s: --memory: '%s' is not a size such as 2G; try 'ebpo %s --help'\n",
+                command, v->memory, command);
         return false;
     }
     if (bytes < EBPO_WORKSPACE_LEAST)
-        fprintf(stderr, "ebpo %s: --memory %s is too little for any mesh; allow %dM at least\n", command, v->memory, EBPO_WORKSPACE_LEAST >> 20);
+        fprintf(stderr, "ebpo %s: --memory %s is too little for any mesh; allow %dM at least\n",
+                command, v->memory, EBPO_WORKSPACE_LEAST >> 20);
     return bytes >= EBPO_WORKSPACE_LEAST;
 }
 
-/* Memory that is free again goes back to the system instead of waiting in each thread's heap: it would count as resident. */
+/* Memory that is free again goes back to the system instead of waiting in each thread's heap: it
+ * would count as resident. */
 static void return_memory(void)
 {
 #ifdef __GLIBC__

@@ -20,7 +20,8 @@ void picture_free(picture *p)
     p->rgb = NULL;
 }
 
-ebpo_status picture_encode_png(const uint8_t *pixels, int width, int height, int channels, const char *what, void **bytes, size_t *size, ebpo_error *error)
+ebpo_status picture_encode_png(const uint8_t *pixels, int width, int height, int channels,
+                               const char *what, void **bytes, size_t *size, ebpo_error *error)
 {
     png_image image;
     memset(&image, 0, sizeof image);
@@ -32,9 +33,11 @@ ebpo_status picture_encode_png(const uint8_t *pixels, int width, int height, int
     ebpo_status status = EBPO_E_MEMORY;
     *bytes = malloc(room);
     if (!*bytes)
-        snprintf(error->message, sizeof error->message, "%s: no memory for %zu bytes; take a smaller picture", what, (size_t)room);
+        snprintf(error->message, sizeof error->message,
+                 "%s: no memory for %zu bytes; take a smaller picture", what, (size_t)room);
     else if (!png_image_write_to_memory(&image, *bytes, &room, 0, pixels, 0, NULL))
-        snprintf(error->message, sizeof error->message, "%s: libpng cannot encode the picture: %s", what, image.message);
+        snprintf(error->message, sizeof error->message, "%s: libpng cannot encode the picture: %s",
+                 what, image.message);
     else
         status = EBPO_OK;
     *size = room;
@@ -51,7 +54,8 @@ ebpo_status picture_write_png(const picture *p, const char *path, ebpo_error *er
 {
     void *bytes;
     size_t size;
-    ebpo_status status = picture_encode_png(p->rgb, p->width, p->height, 3, path, &bytes, &size, error);
+    ebpo_status status =
+        picture_encode_png(p->rgb, p->width, p->height, 3, path, &bytes, &size, error);
     if (status == EBPO_OK)
         status = error->status = ebpo_write_file(path, bytes, size, error);
     free(bytes);

@@ -18,15 +18,9 @@ enum { ROOM = 1 << 18 };
 /* What an attempt to take a row came to. */
 typedef enum taken { TAKEN, NOTHING_THERE, MORE_NEEDED, NOT_GOOD } taken;
 
-int points_width(points_kind kind)
-{
-    return kind == POINTS ? 3 : kind == POINTS_RAYS ? 7 : 6;
-}
+int points_width(points_kind kind) { return kind == POINTS ? 3 : kind == POINTS_RAYS ? 7 : 6; }
 
-int points_raw_width(points_kind kind)
-{
-    return kind == POINTS ? 3 : 6;
-}
+int points_raw_width(points_kind kind) { return kind == POINTS ? 3 : 6; }
 
 __attribute__((format(printf, 2, 3))) static taken fail(points *p, const char *format, ...)
 {
@@ -57,10 +51,17 @@ __attribute__((format(printf, 2, 3))) static taken fail_row(points *p, const cha
 
 /* --- bytes --- */
 
-bool points_open(points *p, const char *by, const char *path, points_kind kind, bool raw, double tmax)
+bool points_open(points *p, const char *by, const char *path, points_kind kind, bool raw,
+                 double tmax)
 {
     bool standard = !path || strcmp(path, "-") == 0;
-    *p = (points){ .command = by, .name = standard ? "standard input" : path, .kind = kind, .raw = raw, .tmax = tmax, .fd = STDIN_FILENO, .room = ROOM };
+    *p = (points){ .command = by,
+                   .name = standard ? "standard input" : path,
+                   .kind = kind,
+                   .raw = raw,
+                   .tmax = tmax,
+                   .fd = STDIN_FILENO,
+                   .room = ROOM };
     if (!standard)
         p->fd = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY);
     if (p->fd < 0)
@@ -110,7 +111,9 @@ static taken check_row(points *p, const double *row)
         return fail_row(p, "tmax is not 0 or more");
     for (int k = 0; k < 3 && p->kind == POINTS_BOXES; k++)
         if (row[k] > row[3 + k])
-            return fail_row(p, "the first corner of a box is the lower one, but %c0 is greater than %c1", "xyz"[k], "xyz"[k]);
+            return fail_row(
+                p, "the first corner of a box is the lower one, but %c0 is greater than %c1",
+                "xyz"[k], "xyz"[k]);
     return TAKEN;
 }
 
@@ -125,8 +128,11 @@ static char *skip_blanks(char *s)
 
 static taken wrong_count(points *p)
 {
-    static const char *const expected[] = { "three numbers are expected", "six or seven numbers are expected: origin, direction and tmax",
-                                            "six numbers are expected: the lower and the upper corner" };
+    static const char *const expected[] = {
+        "three numbers are expected",
+        "six or seven numbers are expected: origin, direction and tmax",
+        "six numbers are expected: the lower and the upper corner"
+    };
     return fail_row(p, "%s", expected[p->kind]);
 }
 
@@ -165,7 +171,10 @@ static taken take_line(points *p, double *row)
             return MORE_NEEDED;
         if (!p->ended) {
             p->line++;
-            return fail_row(p, "is longer than %d bytes; this is no text of points (raw doubles are read with --raw)", ROOM);
+            return fail_row(p,
+                            "is longer than %d bytes; this is no text of points (raw doubles are "
+                            "read with --raw)",
+                            ROOM);
         }
         if (p->at == p->end)
             return MORE_NEEDED;
@@ -174,7 +183,8 @@ static taken take_line(points *p, double *row)
     p->at = (size_t)(end - p->buffer) + (end < p->buffer + p->end);
     p->line++;
     if (memchr(begin, 0, (size_t)(end - begin)))
-        return fail_row(p, "holds a zero byte; this is no text of points (raw doubles are read with --raw)");
+        return fail_row(
+            p, "holds a zero byte; this is no text of points (raw doubles are read with --raw)");
     *end = 0;
     if (p->line == 1 && strncmp(begin, "\xef\xbb\xbf", 3) == 0) /* byte order mark */
         begin += 3;
@@ -202,7 +212,10 @@ static taken take_raw(points *p, double *row)
     if (left < bytes && (!p->ended || !left))
         return MORE_NEEDED;
     if (left < bytes)
-        return fail(p, "%zu bytes are left over at the end, but each takes %zu; it is cut short or holds something else", left, bytes);
+        return fail(p,
+                    "%zu bytes are left over at the end, but each takes %zu; it is cut short or "
+                    "holds something else",
+                    left, bytes);
     for (int i = 0; i < width; i++)
         row[i] = load_little(p->buffer + p->at + 8 * i);
     if (p->kind == POINTS_RAYS)
@@ -234,12 +247,14 @@ static void read_ply(points *p)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     if (p->kind != POINTS) {
-        fail(p, "is a PLY, which holds points; %s are read as text or with --raw", p->kind == POINTS_RAYS ? "rays" : "boxes");
+        fail(p, "is a PLY, which holds points; %s are read as text or with --raw",
+             p->kind == POINTS_RAYS ? "rays" : "boxes");
         return;
     }
     if (!read_all(p))
         return;
-    if (ebpo_points_parse_ply(&p->ply, &p->ply_count, p->buffer, p->end, p->name, &error) != EBPO_OK) {
+    if (ebpo_points_parse_ply(&p->ply, &p->ply_count, p->buffer, p->end, p->name, &error) !=
+        EBPO_OK) {
         fprintf(stderr, "ebpo %s: %s\n", p->command, error.message);
         p->failed = true;
     }
@@ -264,10 +279,12 @@ static bool begins_as_hdf5(const points *p)
     return p->end >= HEAD && memcmp(p->buffer, "\211HDF\r\n\032\n", HEAD) == 0;
 }
 
-/* Raw doubles may begin with these four bytes, but hardly with letters behind: then the first one is about 1e219 or 1e243. */
+/* Raw doubles may begin with these four bytes, but hardly with letters behind: then the first one
+ * is about 1e219 or 1e243. */
 static bool begins_as_ply(const points *p)
 {
-    if (p->end < 4 || memcmp(p->buffer, "ply", 3) != 0 || (p->buffer[3] != '\n' && p->buffer[3] != '\r'))
+    if (p->end < 4 || memcmp(p->buffer, "ply", 3) != 0 ||
+        (p->buffer[3] != '\n' && p->buffer[3] != '\r'))
         return false;
     for (size_t i = 5; i < HEAD && p->raw; i++)
         if (i >= p->end || p->buffer[i] < 'a' || p->buffer[i] > 'z')
@@ -275,23 +292,28 @@ static bool begins_as_ply(const points *p)
     return true;
 }
 
-/* The first bytes tell a PLY, and files of other kinds. A short line of text is not kept waiting for more. */
+/* The first bytes tell a PLY, and files of other kinds. A short line of text is not kept waiting
+ * for more. */
 static void begin(points *p)
 {
     p->begun = true;
-    while (p->end < (p->raw || (p->end && p->buffer[0] == '\211') ? HEAD : 4) && !p->ended && !p->failed)
+    while (p->end < (p->raw || (p->end && p->buffer[0] == '\211') ? HEAD : 4) && !p->ended &&
+           !p->failed)
         fill(p);
     static const char *const wanted[] = { "points", "rays", "boxes" };
     if (p->failed)
         return;
     if (begins_as_hdf5(p))
-        fail(p, "is an HDF5 file and holds no %s; the model comes first, what is asked about second", wanted[p->kind]);
+        fail(p,
+             "is an HDF5 file and holds no %s; the model comes first, what is asked about second",
+             wanted[p->kind]);
     else if (begins_as_ply(p) && !p->raw)
         read_ply(p);
     else if (begins_as_ply(p) && p->kind == POINTS)
         fail(p, "is a PLY and no raw doubles; it is read without --raw");
     else if (begins_as_ply(p))
-        fail(p, "is a PLY, which holds points; %s are read as text or as raw doubles", wanted[p->kind]);
+        fail(p, "is a PLY, which holds points; %s are read as text or as raw doubles",
+             wanted[p->kind]);
 }
 
 uint64_t points_next(points *p, double *rows)
@@ -305,7 +327,9 @@ uint64_t points_next(points *p, double *rows)
         taken t = p->ply ? take_vertex(p, row) : p->raw ? take_raw(p, row) : take_line(p, row);
         if (t == TAKEN)
             count++;
-        else if (t == MORE_NEEDED && (count || p->ended || !fill(p))) /* what is there is answered before more is waited for */
+        else if (t == MORE_NEEDED &&
+                 (count || p->ended ||
+                  !fill(p))) /* what is there is answered before more is waited for */
             break;
     }
     return count;

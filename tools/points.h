@@ -1,4 +1,5 @@
-/* Reading what is asked about: points, rays or boxes, a batch at a time, from standard input or a file. */
+/* Reading what is asked about: points, rays or boxes, a batch at a time, from standard input or a
+ * file. */
 #ifndef EBPO_TOOLS_POINTS_H
 #define EBPO_TOOLS_POINTS_H
 
@@ -33,9 +34,12 @@ typedef struct points {
     uint64_t ply_count, ply_at;
 } points;
 
-/* `by`: the command. `path` NULL or "-": standard input. False: it cannot be opened (said on stderr). points_close in any case. */
-bool points_open(points *p, const char *by, const char *path, points_kind kind, bool raw, double tmax);
-/* Fills rows[POINTS_BATCH][points_width], as many as there are without waiting, but at least one; returns their number, 0 at the end or after an error. */
+/* `by`: the command. `path` NULL or "-": standard input. False: it cannot be opened (said on
+ * stderr). points_close in any case. */
+bool points_open(points *p, const char *by, const char *path, points_kind kind, bool raw,
+                 double tmax);
+/* Fills rows[POINTS_BATCH][points_width], as many as there are without waiting, but at least one;
+ * returns their number, 0 at the end or after an error. */
 uint64_t points_next(points *p, double *rows);
 void points_close(points *p);
 

@@ -35,8 +35,8 @@ static ebpo_status unless_too_large(ebpo_status status)
     return status == EBPO_E_LIMIT ? EBPO_OK : status;
 }
 
-ebpo_status prepare_mesh(prepared *out, const char *path, mending asked, ebpo_workspace *workspace, unsigned threads, ebpo_progress progress,
-                         ebpo_error *error)
+ebpo_status prepare_mesh(prepared *out, const char *path, mending asked, ebpo_workspace *workspace,
+                         unsigned threads, ebpo_progress progress, ebpo_error *error)
 {
     memset(out, 0, sizeof *out);
     ebpo_mesh_read_options options = { progress, workspace, threads };

@@ -17,9 +17,12 @@ typedef struct prepared {
     bool mended; /* a mending step ran, so the two reports may differ */
 } prepared;
 
-/* Weld (always for STL, which has no shared vertices), orient, fill holes, each if asked; checks before and after. The mesh is put into the order that
- * building needs before all that, so that every step keeps to the workspace's memory. On failure nothing is left to free; else ebpo_mesh_free(&out->mesh). */
-EBPO_MUST_USE ebpo_status prepare_mesh(prepared *out, const char *path, mending asked, ebpo_workspace *workspace, unsigned threads,
+/* Weld (always for STL, which has no shared vertices), orient, fill holes, each if asked; checks
+ * before and after. The mesh is put into the order that building needs before all that, so that
+ * every step keeps to the workspace's memory. On failure nothing is left to free; else
+ * ebpo_mesh_free(&out->mesh). */
+EBPO_MUST_USE ebpo_status prepare_mesh(prepared *out, const char *path, mending asked,
+                                       ebpo_workspace *workspace, unsigned threads,
                                        ebpo_progress progress, ebpo_error *error);
 
 #endif

@@ -23,7 +23,8 @@ static void draw_rate(const progress_line *line, double speed, uint64_t total)
     if (line->faces && !faces)
         fprintf(stderr, ", %s/s", words_bytes(rate, sizeof rate, (uint64_t)speed));
     else if (faces && total)
-        fprintf(stderr, ", %s faces/s", words_count(rate, sizeof rate, speed / (double)total * (double)faces));
+        fprintf(stderr, ", %s faces/s",
+                words_count(rate, sizeof rate, speed / (double)total * (double)faces));
     else
         fprintf(stderr, ", %s/s", words_count(rate, sizeof rate, speed));
 }

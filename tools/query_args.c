@@ -5,15 +5,17 @@
 #include "command.h"
 #include "words.h"
 
-const char *const inside_modes[] = { "fast", "cache", "nodes", "subtree", "cache-plain", "nodes-plain", "subtree-plain", NULL };
+const char *const inside_modes[] = { "fast",        "cache",       "nodes",         "subtree",
+                                     "cache-plain", "nodes-plain", "subtree-plain", NULL };
 const char *const distance_modes[] = { "exact", "recursive", "leaves", "envelope", NULL };
 
 static const struct {
     ebpo_loading loading;
     ebpo_envelopes envelopes;
 } inside_meanings[] = {
-    { EBPO_LOAD_CACHE, EBPO_ENVELOPES_AUTO },   { EBPO_LOAD_CACHE, EBPO_ENVELOPES_USE },  { EBPO_LOAD_NODES, EBPO_ENVELOPES_USE },
-    { EBPO_LOAD_SUBTREE, EBPO_ENVELOPES_USE },  { EBPO_LOAD_CACHE, EBPO_ENVELOPES_SKIP }, { EBPO_LOAD_NODES, EBPO_ENVELOPES_SKIP },
+    { EBPO_LOAD_CACHE, EBPO_ENVELOPES_AUTO },   { EBPO_LOAD_CACHE, EBPO_ENVELOPES_USE },
+    { EBPO_LOAD_NODES, EBPO_ENVELOPES_USE },    { EBPO_LOAD_SUBTREE, EBPO_ENVELOPES_USE },
+    { EBPO_LOAD_CACHE, EBPO_ENVELOPES_SKIP },   { EBPO_LOAD_NODES, EBPO_ENVELOPES_SKIP },
     { EBPO_LOAD_SUBTREE, EBPO_ENVELOPES_SKIP },
 };
 
@@ -25,12 +27,18 @@ bool query_accepts(const char *name, const query_values *v, unsigned idle, const
         unsigned bit;
         bool given;
         const char *option;
-    } all[] = { { QUERY_LEVEL, v->level >= 0, "--level" },          { QUERY_DEADLINE, v->deadline != NULL, "--deadline" },
-                { QUERY_MAX_DISTANCE, isfinite(v->max_distance), "--max-distance" }, { QUERY_UNSIGNED, v->unsigned_distance, "--unsigned" },
-                { QUERY_NO_WARM, v->no_warm, "--no-warm" },         { QUERY_PREFETCH, v->prefetch, "--prefetch" } };
+    } all[] = { { QUERY_LEVEL, v->level >= 0, "--level" },
+                { QUERY_DEADLINE, v->deadline != NULL, "--deadline" },
+                { QUERY_MAX_DISTANCE, isfinite(v->max_distance), "--max-distance" },
+                { QUERY_UNSIGNED, v->unsigned_distance, "--unsigned" },
+                { QUERY_NO_WARM, v->no_warm, "--no-warm" },
+                { QUERY_PREFETCH, v->prefetch, "--prefetch" } };
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         if (all[i].given && idle & all[i].bit) {
-            fprintf(stderr, "ebpo %s: %s has no effect with %s; leave one of them away, or try 'ebpo %s --help'\n", name, all[i].option, with, name);
+            fprintf(stderr,
+                    "ebpo %s: %s has no effect with %s; leave one of them away, or try 'ebpo %s "
+                    "--help'\n",
+                    name, all[i].option, with, name);
             return false;
         }
     return true;
@@ -40,19 +48,24 @@ bool query_inside_fits(const char *name, const query_values *v)
 {
     char with[40];
     snprintf(with, sizeof with, "--mode %s", inside_modes[v->inside_mode]);
-    return inside_meanings[v->inside_mode].loading == EBPO_LOAD_CACHE || query_accepts(name, v, QUERY_PREFETCH, with);
+    return inside_meanings[v->inside_mode].loading == EBPO_LOAD_CACHE ||
+           query_accepts(name, v, QUERY_PREFETCH, with);
 }
 
 bool query_distance_fits(const char *name, const query_values *v)
 {
-    enum { AROUND = QUERY_LEVEL | QUERY_DEADLINE | QUERY_NO_WARM | QUERY_PREFETCH,
-           ENVELOPE = QUERY_DEADLINE | QUERY_MAX_DISTANCE | QUERY_UNSIGNED | QUERY_NO_WARM | QUERY_PREFETCH };
+    enum {
+        AROUND = QUERY_LEVEL | QUERY_DEADLINE | QUERY_NO_WARM | QUERY_PREFETCH,
+        ENVELOPE =
+            QUERY_DEADLINE | QUERY_MAX_DISTANCE | QUERY_UNSIGNED | QUERY_NO_WARM | QUERY_PREFETCH
+    };
     static const unsigned idle[] = { 0, AROUND, AROUND, ENVELOPE };
     char with[40];
     snprintf(with, sizeof with, "--mode %s", distance_modes[v->distance_mode]);
     if (!query_accepts(name, v, idle[v->distance_mode], with))
         return false;
-    return v->level < 0 || query_accepts(name, v, QUERY_UNSIGNED | QUERY_NO_WARM | QUERY_PREFETCH, "--level");
+    return v->level < 0 ||
+           query_accepts(name, v, QUERY_UNSIGNED | QUERY_NO_WARM | QUERY_PREFETCH, "--level");
 }
 
 /* --- values --- */
@@ -61,7 +74,10 @@ static bool read_size(const char *name, const char *text, uint64_t *out)
 {
     if (words_read_size(text, out))
         return true;
-    fprintf(stderr, "ebpo %s: --memory: '%s' is not a size such as 64M, 1G, 512K or 1000000; try 'ebpo %s --help'\n", name, text, name);
+    fprintf(stderr,
+            "ebpo %s: --memory: '%s' is not a size such as 64M, 1G, 512K or 1000000; try 'ebpo %s "
+            "--help'\n",
+            name, text, name);
     return false;
 }
 
@@ -71,16 +87,21 @@ static bool read_time(const char *name, const char *text, uint64_t *out)
     static const uint64_t factors[] = { 1000, 1000, 1, 1000000, 1000000000 };
     if (words_read_unit(text, units, factors, out) && *out > 0 && *out < UINT64_C(1000000000000000))
         return true;
-    fprintf(stderr, "ebpo %s: --deadline: '%s' is not a time such as 50us, 500ns, 1ms or 20 (microseconds); try 'ebpo %s --help'\n", name, text, name);
+    fprintf(stderr,
+            "ebpo %s: --deadline: '%s' is not a time such as 50us, 500ns, 1ms or 20 "
+            "(microseconds); try 'ebpo %s --help'\n",
+            name, text, name);
     return false;
 }
 
-bool query_options_from(const char *name, const query_values *v, ebpo_model_options *model, ebpo_query_options *query)
+bool query_options_from(const char *name, const query_values *v, ebpo_model_options *model,
+                        ebpo_query_options *query)
 {
     *model = (ebpo_model_options)EBPO_MODEL_OPTIONS_INIT;
     *query = (ebpo_query_options)EBPO_QUERY_OPTIONS_INIT;
     /* What is below the level is not looked at, so it need not be in memory. */
-    model->cut_level = v->cut_level < 0 && !v->memory && v->level >= 0 ? (int)v->level : (int)v->cut_level;
+    model->cut_level =
+        v->cut_level < 0 && !v->memory && v->level >= 0 ? (int)v->level : (int)v->cut_level;
     model->loading = inside_meanings[v->inside_mode].loading;
     model->prefetch = v->prefetch;
     model->threads = (unsigned)v->threads;
@@ -90,12 +111,14 @@ bool query_options_from(const char *name, const query_values *v, ebpo_model_opti
     query->unsigned_distance = v->unsigned_distance;
     query->warm = !v->no_warm;
     query->max_distance = v->max_distance;
-    return (!v->memory || read_size(name, v->memory, &model->memory)) && (!v->deadline || read_time(name, v->deadline, &query->deadline_ns));
+    return (!v->memory || read_size(name, v->memory, &model->memory)) &&
+           (!v->deadline || read_time(name, v->deadline, &query->deadline_ns));
 }
 
 /* --- sessions --- */
 
-int query_open(query_session *s, const char *name, const char *path, const ebpo_model_options *options, int level, const remote_values *remote)
+int query_open(query_session *s, const char *name, const char *path,
+               const ebpo_model_options *options, int level, const remote_values *remote)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     if (!command_wants_hdf5(name, path))

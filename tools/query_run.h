@@ -1,4 +1,5 @@
-/* The loop of the commands inside, distance, ray and box: batches of points in, their answers out. */
+/* The loop of the commands inside, distance, ray and box: batches of points in, their answers out.
+ */
 #ifndef EBPO_TOOLS_QUERY_RUN_H
 #define EBPO_TOOLS_QUERY_RUN_H
 
@@ -11,9 +12,11 @@ struct query_job {
     const char *command;
     const query_values *values;
     points_kind kind;
-    /* Answers rows[count][points_width(kind)] and prints. Asked with no rows first, so that what cannot be asked at all is said before input is waited for. */
-    ebpo_status (*answer)(const query_job *job, ebpo_context *context, const double *rows, uint64_t count, ebpo_error *error);
-    void *results; /* room for the answers of a batch, as `answer` wants it */
+    /* Answers rows[count][points_width(kind)] and prints. Asked with no rows first, so that what
+     * cannot be asked at all is said before input is waited for. */
+    ebpo_status (*answer)(const query_job *job, ebpo_context *context, const double *rows,
+                          uint64_t count, ebpo_error *error);
+    void *results;              /* room for the answers of a batch, as `answer` wants it */
     ebpo_query_options options; /* these two are set by query_run */
     answer_form form;
 };

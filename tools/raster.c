@@ -1,5 +1,5 @@
-/* Two steps: each sample gets the nearest triangle (z-buffer on 1/depth, which is linear on the screen); then pixels
- * are shaded from their samples. */
+/* Two steps: each sample gets the nearest triangle (z-buffer on 1/depth, which is linear on the
+ * screen); then pixels are shaded from their samples. */
 #include "raster.h"
 
 #include <math.h>
@@ -51,7 +51,8 @@ static void to_camera(const raster *r, uint64_t i, double out[3])
 {
     double v[3];
     for (uint64_t k = 0; k < 3; k++)
-        v[k] = (r->mesh->xyz32 ? (double)r->mesh->xyz32[3 * i + k] : r->mesh->xyz64[3 * i + k]) - r->view->target[k];
+        v[k] = (r->mesh->xyz32 ? (double)r->mesh->xyz32[3 * i + k] : r->mesh->xyz64[3 * i + k]) -
+               r->view->target[k];
     out[0] = dot(v, r->view->right);
     out[1] = dot(v, r->view->up);
     out[2] = dot(v, r->view->back);
@@ -60,7 +61,8 @@ static void to_camera(const raster *r, uint64_t i, double out[3])
 static seen project(const raster *r, const double v[3])
 {
     double inverse = 1 / (r->view->distance - v[2]);
-    return (seen){ r->width / 2.0 + r->focal * v[0] * inverse, r->height / 2.0 - r->focal * v[1] * inverse, inverse };
+    return (seen){ r->width / 2.0 + r->focal * v[0] * inverse,
+                   r->height / 2.0 - r->focal * v[1] * inverse, inverse };
 }
 
 static bool unit_normal(double (*c)[3], double out[3])
@@ -79,8 +81,8 @@ static bool unit_normal(double (*c)[3], double out[3])
 
 /* --- first step --- */
 
-/* Which sides (bit i: from corner i to the next) are outlines of the polygon: in the fans of ebpo_lod_level the sides
- * between neighbouring triangles of one plane are none. */
+/* Which sides (bit i: from corner i to the next) are outlines of the polygon: in the fans of
+ * ebpo_lod_level the sides between neighbouring triangles of one plane are none. */
 static unsigned outline(const raster *r, uint64_t face, const double normal[3])
 {
     const uint32_t *f = r->mesh->faces + 3 * face;
@@ -122,10 +124,7 @@ static bool make_sides(const seen p[3], sides *out)
     return true;
 }
 
-static int clamp(double v, int most)
-{
-    return v < 0 ? 0 : v > most ? most : (int)v;
-}
+static int clamp(double v, int most) { return v < 0 ? 0 : v > most ? most : (int)v; }
 
 static void fill_triangle(raster *r, const seen p[3], uint32_t what, unsigned outlines)
 {
@@ -134,10 +133,12 @@ static void fill_triangle(raster *r, const seen p[3], uint32_t what, unsigned ou
         return;
     double line = 0.42 * r->side; /* half the outline's breadth */
     double det = (p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x);
-    double gx =
-        ((p[1].inverse - p[0].inverse) * (p[2].y - p[0].y) - (p[2].inverse - p[0].inverse) * (p[1].y - p[0].y)) / det;
-    double gy =
-        ((p[2].inverse - p[0].inverse) * (p[1].x - p[0].x) - (p[1].inverse - p[0].inverse) * (p[2].x - p[0].x)) / det;
+    double gx = ((p[1].inverse - p[0].inverse) * (p[2].y - p[0].y) -
+                 (p[2].inverse - p[0].inverse) * (p[1].y - p[0].y)) /
+                det;
+    double gy = ((p[2].inverse - p[0].inverse) * (p[1].x - p[0].x) -
+                 (p[1].inverse - p[0].inverse) * (p[2].x - p[0].x)) /
+                det;
     int x0 = clamp(fmin(p[0].x, fmin(p[1].x, p[2].x)), r->width),
         x1 = clamp(fmax(p[0].x, fmax(p[1].x, p[2].x)) + 1, r->width);
     int y0 = clamp(fmin(p[0].y, fmin(p[1].y, p[2].y)), r->height),
@@ -153,8 +154,8 @@ static void fill_triangle(raster *r, const seen p[3], uint32_t what, unsigned ou
             sample *at = &r->samples[(size_t)y * (size_t)r->width + (size_t)x];
             if (inverse <= at->inverse)
                 continue;
-            bool on_line =
-                (outlines & 1 && d[0] < line) || (outlines & 2 && d[1] < line) || (outlines & 4 && d[2] < line);
+            bool on_line = (outlines & 1 && d[0] < line) || (outlines & 2 && d[1] < line) ||
+                           (outlines & 4 && d[2] < line);
             *at = (sample){ inverse, what | (on_line ? EDGE : 0) };
         }
 }
@@ -187,8 +188,10 @@ static void position(const raster *r, int x, int y, double inverse, double out[3
     out[2] = r->view->distance - depth;
 }
 
-/* How much of the sky near a sample is hidden, 0 .. 1: points on a spiral around it that lie above its plane. */
-static double occlusion(const raster *r, int x, int y, const sample *at, const float n[3], double reach)
+/* How much of the sky near a sample is hidden, 0 .. 1: points on a spiral around it that lie above
+ * its plane. */
+static double occlusion(const raster *r, int x, int y, const sample *at, const float n[3],
+                        double reach)
 {
     double p[3], sum = 0;
     position(r, x, y, at->inverse, p);
@@ -217,7 +220,8 @@ static double occlusion(const raster *r, int x, int y, const sample *at, const f
     return hidden > 1 ? 1 : hidden;
 }
 
-/* Key light from the upper left, a weak fill from the right, the sky above, a gloss. Linear light. */
+/* Key light from the upper left, a weak fill from the right, the sky above, a gloss. Linear light.
+ */
 static void light(const raster *r, const float n[3], double hidden, double out[3])
 {
     static const double key[3] = { -0.46, 0.62, 0.635 }, fill[3] = { 0.86, 0.10, 0.50 },
@@ -232,7 +236,9 @@ static void light(const raster *r, const float n[3], double hidden, double out[3
     static const double warm[3] = { 1.0, 0.97, 0.92 }, cool[3] = { 0.90, 0.95, 1.0 };
     for (int i = 0; i < 3; i++) {
         double ambient = (0.07 + 0.22 * sky) * cool[i] * open;
-        out[i] = r->style->colour[i] * (ambient + direct * (0.95 * k * warm[i] + 0.16 * f * cool[i])) + gloss * direct;
+        out[i] =
+            r->style->colour[i] * (ambient + direct * (0.95 * k * warm[i] + 0.16 * f * cool[i])) +
+            gloss * direct;
     }
 }
 
@@ -299,19 +305,27 @@ static void *resolve_rows(void *argument)
     for (int j = (int)s->number; j < s->height; j += (int)s->threads)
         for (int i = 0; i < s->width; i++)
             resolve_pixel(s->r, i, j, reach,
-                          s->out->rgb + 3 * ((size_t)(s->y + j) * (size_t)s->out->width + (size_t)(s->x + i)));
+                          s->out->rgb + 3 * ((size_t)(s->y + j) * (size_t)s->out->width +
+                                             (size_t)(s->x + i)));
     return NULL;
 }
 
-static void resolve(const raster *r, picture *out, int x, int y, int width, int height, unsigned threads)
+static void resolve(const raster *r, picture *out, int x, int y, int width, int height,
+                    unsigned threads)
 {
     share shares[THREADS_MAX];
     unsigned count = threads < 1 ? 1 : threads < THREADS_MAX ? threads : THREADS_MAX, started = 1;
     for (unsigned i = 0; i < count; i++)
-        shares[i] = (share){
-            .r = r, .out = out, .x = x, .y = y, .width = width, .height = height, .number = i, .threads = count
-        };
-    while (started < count && pthread_create(&shares[started].thread, NULL, resolve_rows, &shares[started]) == 0)
+        shares[i] = (share){ .r = r,
+                             .out = out,
+                             .x = x,
+                             .y = y,
+                             .width = width,
+                             .height = height,
+                             .number = i,
+                             .threads = count };
+    while (started < count &&
+           pthread_create(&shares[started].thread, NULL, resolve_rows, &shares[started]) == 0)
         started++;
     resolve_rows(&shares[0]);
     for (unsigned i = started; i < count; i++) /* threads that could not be had */
@@ -320,8 +334,9 @@ static void resolve(const raster *r, picture *out, int x, int y, int width, int 
         pthread_join(shares[i].thread, NULL);
 }
 
-ebpo_status raster_draw(picture *out, int x, int y, int width, int height, const camera *view, const ebpo_mesh *mesh,
-                        const raster_style *style, unsigned threads, ebpo_error *error)
+ebpo_status raster_draw(picture *out, int x, int y, int width, int height, const camera *view,
+                        const ebpo_mesh *mesh, const raster_style *style, unsigned threads,
+                        ebpo_error *error)
 {
     if (mesh->face_count >= EDGE) {
         snprintf(error->message, sizeof error->message,
@@ -329,9 +344,12 @@ ebpo_status raster_draw(picture *out, int x, int y, int width, int height, const
         return error->status = EBPO_E_LIMIT;
     }
     int side = (int64_t)width * height > 4000000 ? 2 : 3;
-    raster r = {
-        .view = view, .mesh = mesh, .style = style, .width = side * width, .height = side * height, .side = side
-    };
+    raster r = { .view = view,
+                 .mesh = mesh,
+                 .style = style,
+                 .width = side * width,
+                 .height = side * height,
+                 .side = side };
     r.focal = r.height / 2.0 / view->tangent;
     r.per_focal = 1 / r.focal;
     r.samples = calloc((size_t)r.width * (size_t)r.height, sizeof *r.samples);
@@ -339,8 +357,8 @@ ebpo_status raster_draw(picture *out, int x, int y, int width, int height, const
     ebpo_status status = EBPO_OK;
     if (!r.samples || !r.normal) {
         status = error->status = EBPO_E_MEMORY;
-        snprintf(error->message, sizeof error->message, "no memory for a picture of %d x %d; take a smaller --size",
-                 width, height);
+        snprintf(error->message, sizeof error->message,
+                 "no memory for a picture of %d x %d; take a smaller --size", width, height);
         goto done;
     }
     for (uint64_t face = 0; face < mesh->face_count; face++)

@@ -1,4 +1,5 @@
-/* Drawing triangle meshes without a display: perspective, z-buffer, supersampling, ambient occlusion from the depths.
+/* Drawing triangle meshes without a display: perspective, z-buffer, supersampling, ambient
+ * occlusion from the depths.
  */
 #ifndef EBPO_TOOLS_RASTER_H
 #define EBPO_TOOLS_RASTER_H
@@ -13,10 +14,10 @@ typedef struct camera {
     double tangent;                  /* of half the vertical angle of view */
 } camera;
 
-/* Looks from azimuth and elevation (degrees) with `up_axis` (0 x, 1 y, 2 z) upwards, near enough that the mesh's
- * vertices just fit a picture of that size. The mesh has at least one face. */
-void camera_fit(camera *out, const ebpo_mesh *mesh, double azimuth, double elevation, int up_axis, int width,
-                int height);
+/* Looks from azimuth and elevation (degrees) with `up_axis` (0 x, 1 y, 2 z) upwards, near enough
+ * that the mesh's vertices just fit a picture of that size. The mesh has at least one face. */
+void camera_fit(camera *out, const ebpo_mesh *mesh, double azimuth, double elevation, int up_axis,
+                int width, int height);
 
 typedef struct raster_style {
     double colour[3]; /* linear, 0 .. 1 */
@@ -24,10 +25,11 @@ typedef struct raster_style {
     bool edges;       /* draw the outlines of polygons */
 } raster_style;
 
-/* Draws the mesh into the rectangle (x, y, width, height) of the picture, over what is there. `threads` 1 to 64; the
- * picture does not depend on it. */
-EBPO_MUST_USE ebpo_status raster_draw(picture *out, int x, int y, int width, int height, const camera *view,
-                                      const ebpo_mesh *mesh, const raster_style *style, unsigned threads,
+/* Draws the mesh into the rectangle (x, y, width, height) of the picture, over what is there.
+ * `threads` 1 to 64; the picture does not depend on it. */
+EBPO_MUST_USE ebpo_status raster_draw(picture *out, int x, int y, int width, int height,
+                                      const camera *view, const ebpo_mesh *mesh,
+                                      const raster_style *style, unsigned threads,
                                       ebpo_error *error);
 
 #endif

@@ -11,7 +11,8 @@ static bool options_from(const remote_values *v, ebpo_http_options *o, ebpo_erro
     o->cache_folder = v->cache;
     if (v->cache_size && !words_read_size(v->cache_size, &o->cache_bytes)) {
         error->status = EBPO_E_ARGUMENT;
-        snprintf(error->message, sizeof error->message, "--http-cache-size: '%s' is not a size such as 512M or 4G", v->cache_size);
+        snprintf(error->message, sizeof error->message,
+                 "--http-cache-size: '%s' is not a size such as 512M or 4G", v->cache_size);
         return false;
     }
     o->time_limit = v->timeout > 0 ? v->timeout : o->time_limit;
@@ -27,13 +28,15 @@ static bool options_from(const remote_values *v, ebpo_http_options *o, ebpo_erro
     return true;
 }
 
-ebpo_status remote_open(ebpo_file **out, const char *name, const remote_values *values, ebpo_error *error)
+ebpo_status remote_open(ebpo_file **out, const char *name, const remote_values *values,
+                        ebpo_error *error)
 {
     ebpo_http_options options;
     *out = NULL;
     if (!options_from(values, &options, error))
         return EBPO_E_ARGUMENT;
-    return ebpo_is_url(name) ? ebpo_open_url(out, name, &options, error) : ebpo_open(out, name, error);
+    return ebpo_is_url(name) ? ebpo_open_url(out, name, &options, error)
+                             : ebpo_open(out, name, error);
 }
 
 const char *remote_shown(const char *name)
@@ -80,9 +83,12 @@ void remote_tell(const traffic *t, const remote_values *values, bool as_json)
     } else if (values->stats) {
         fprintf(stderr, "reads %" PRIu64 ", bytes read %" PRIu64, t->reads, t->bytes);
         if (t->far)
-            fprintf(stderr, ", requests %" PRIu64 ", bytes %" PRIu64 ", retries %" PRIu64 ", connections %" PRIu64 ", seconds waited %.6f, cache hits %" PRIu64
-                    ", cache bytes %" PRIu64, t->http.requests, t->http.bytes, t->http.retries, t->http.connections, t->http.wait_seconds, t->http.cache_hits,
-                    t->http.cache_bytes);
+            fprintf(stderr,
+                    ", requests %" PRIu64 ", bytes %" PRIu64 ", retries %" PRIu64
+                    ", connections %" PRIu64 ", seconds waited %.6f, cache hits %" PRIu64
+                    ", cache bytes %" PRIu64,
+                    t->http.requests, t->http.bytes, t->http.retries, t->http.connections,
+                    t->http.wait_seconds, t->http.cache_hits, t->http.cache_bytes);
         fputc('\n', stderr);
     }
 }

@@ -9,25 +9,29 @@ static const struct finding_text {
     size_t offset;
     const char *key, *one, *many, *place;
 } findings[] = {
-    { offsetof(ebpo_mesh_report, boundary_edges), "boundary_edges", "boundary edge (used by one face only)",
-      "boundary edges (used by one face only)", "face" },
-    { offsetof(ebpo_mesh_report, nonmanifold_edges), "nonmanifold_edges", "edge shared by more than two faces",
-      "edges shared by more than two faces", "face" },
+    { offsetof(ebpo_mesh_report, boundary_edges), "boundary_edges",
+      "boundary edge (used by one face only)", "boundary edges (used by one face only)", "face" },
+    { offsetof(ebpo_mesh_report, nonmanifold_edges), "nonmanifold_edges",
+      "edge shared by more than two faces", "edges shared by more than two faces", "face" },
     { offsetof(ebpo_mesh_report, misoriented_edges), "misoriented_edges",
-      "edge whose two faces disagree in orientation", "edges whose two faces disagree in orientation", "face" },
-    { offsetof(ebpo_mesh_report, unbalanced_edges), "unbalanced_edges", "edge does not balance", "edges do not balance",
-      "face" },
-    { offsetof(ebpo_mesh_report, bowtie_vertices), "bowtie_vertices", "vertex where several fans of faces meet",
-      "vertices where several fans of faces meet", "vertex" },
-    { offsetof(ebpo_mesh_report, zero_area_faces), "zero_area_faces", "face without area", "faces without area",
-      "face" },
-    { offsetof(ebpo_mesh_report, index_repeated_faces), "index_repeated_faces", "face that names a vertex twice",
-      "faces that name a vertex twice", "face" },
-    { offsetof(ebpo_mesh_report, repeated_faces), "repeated_faces", "repeated face", "repeated faces", "face" },
-    { offsetof(ebpo_mesh_report, unreferenced_vertices), "unreferenced_vertices", "vertex that no face uses",
-      "vertices that no face uses", "vertex" },
-    { offsetof(ebpo_mesh_report, repeated_positions), "repeated_positions", "vertex at an earlier vertex's position",
-      "vertices at an earlier vertex's position", "vertex" },
+      "edge whose two faces disagree in orientation",
+      "edges whose two faces disagree in orientation", "face" },
+    { offsetof(ebpo_mesh_report, unbalanced_edges), "unbalanced_edges", "edge does not balance",
+      "edges do not balance", "face" },
+    { offsetof(ebpo_mesh_report, bowtie_vertices), "bowtie_vertices",
+      "vertex where several fans of faces meet", "vertices where several fans of faces meet",
+      "vertex" },
+    { offsetof(ebpo_mesh_report, zero_area_faces), "zero_area_faces", "face without area",
+      "faces without area", "face" },
+    { offsetof(ebpo_mesh_report, index_repeated_faces), "index_repeated_faces",
+      "face that names a vertex twice", "faces that name a vertex twice", "face" },
+    { offsetof(ebpo_mesh_report, repeated_faces), "repeated_faces", "repeated face",
+      "repeated faces", "face" },
+    { offsetof(ebpo_mesh_report, unreferenced_vertices), "unreferenced_vertices",
+      "vertex that no face uses", "vertices that no face uses", "vertex" },
+    { offsetof(ebpo_mesh_report, repeated_positions), "repeated_positions",
+      "vertex at an earlier vertex's position", "vertices at an earlier vertex's position",
+      "vertex" },
 };
 enum { FINDINGS = sizeof findings / sizeof *findings };
 
@@ -59,7 +63,8 @@ static void print_findings(FILE *out, const ebpo_mesh_report *report)
         if (f->count == 0)
             continue;
         any = true;
-        fprintf(out, "  %llu %s", (unsigned long long)f->count, f->count == 1 ? findings[i].one : findings[i].many);
+        fprintf(out, "  %llu %s", (unsigned long long)f->count,
+                f->count == 1 ? findings[i].one : findings[i].many);
         print_places(out, f, findings[i].place);
     }
     if (!any)
@@ -71,7 +76,8 @@ static void print_reading(FILE *out, const ebpo_mesh *mesh)
     char text[80];
     if (mesh->polygons_triangulated) {
         fprintf(out, "  %s cut into triangles",
-                words_plural(text, sizeof text, mesh->polygons_triangulated, "polygon", "polygons"));
+                words_plural(text, sizeof text, mesh->polygons_triangulated, "polygon",
+                             "polygons"));
         if (mesh->polygons_concave)
             fprintf(out, " (%llu concave)", (unsigned long long)mesh->polygons_concave);
         fputc('\n', out);
@@ -88,28 +94,34 @@ static const char *kind(const ebpo_mesh_report *report)
 {
     if (!report->balanced)
         return "a surface: its edges do not balance, so there is no inside";
-    return report->manifold ? "a solid, closed 2-manifold" : "a solid: its edges balance, though it is no 2-manifold";
+    return report->manifold ? "a solid, closed 2-manifold"
+                            : "a solid: its edges balance, though it is no 2-manifold";
 }
 
-void report_print(FILE *out, const char *path, const ebpo_mesh *mesh, const ebpo_mesh_report *report)
+void report_print(FILE *out, const char *path, const ebpo_mesh *mesh,
+                  const ebpo_mesh_report *report)
 {
     char bytes[32], parts[64];
     fprintf(out, "%s: %llu vertices, %llu faces", path, (unsigned long long)mesh->vertex_count,
             (unsigned long long)mesh->face_count);
     if (mesh->source_format[0])
-        fprintf(out, " (%s, %s, %s)", mesh->source_format, words_bytes(bytes, sizeof bytes, mesh->source_size),
+        fprintf(out, " (%s, %s, %s)", mesh->source_format,
+                words_bytes(bytes, sizeof bytes, mesh->source_size),
                 mesh->xyz32 ? "float" : "double");
     fprintf(out, "\n  %s\n", kind(report));
-    fprintf(out, "  %s", words_plural(parts, sizeof parts, report->components, "component", "components"));
+    fprintf(out, "  %s",
+            words_plural(parts, sizeof parts, report->components, "component", "components"));
     if (report->boundary_loops)
-        fprintf(out, ", %s", words_plural(parts, sizeof parts, report->boundary_loops, "hole", "holes"));
+        fprintf(out, ", %s",
+                words_plural(parts, sizeof parts, report->boundary_loops, "hole", "holes"));
     if (report->genus_known)
         fprintf(out, ", genus %lld", (long long)report->genus);
     fprintf(out, ", area %.6g", report->area);
     if (report->balanced)
         fprintf(out, ", volume %.6g", report->volume);
-    fprintf(out, ", mean edge %.4g\n  box %.6g %.6g %.6g to %.6g %.6g %.6g\n", report->mean_edge, report->min[0],
-            report->min[1], report->min[2], report->max[0], report->max[1], report->max[2]);
+    fprintf(out, ", mean edge %.4g\n  box %.6g %.6g %.6g to %.6g %.6g %.6g\n", report->mean_edge,
+            report->min[0], report->min[1], report->min[2], report->max[0], report->max[1],
+            report->max[2]);
     print_reading(out, mesh);
     print_findings(out, report);
 }
@@ -121,14 +133,17 @@ void report_print_mending(FILE *out, const ebpo_mend_record *r)
         fprintf(out, "  welded: %s merged\n",
                 words_plural(text, sizeof text, r->welded_vertices, "vertex", "vertices"));
     if (r->orient) {
-        fprintf(out, "  oriented: %s turned", words_plural(text, sizeof text, r->flipped_faces, "face", "faces"));
+        fprintf(out, "  oriented: %s turned",
+                words_plural(text, sizeof text, r->flipped_faces, "face", "faces"));
         if (r->unorientable_components)
             fprintf(out, ", %s cannot be oriented",
-                    words_plural(text, sizeof text, r->unorientable_components, "component", "components"));
+                    words_plural(text, sizeof text, r->unorientable_components, "component",
+                                 "components"));
         fputc('\n', out);
     }
     if (r->fill_holes) {
-        fprintf(out, "  filled: %s", words_plural(text, sizeof text, r->filled_holes, "hole", "holes"));
+        fprintf(out, "  filled: %s",
+                words_plural(text, sizeof text, r->filled_holes, "hole", "holes"));
         fprintf(out, " with %s", words_plural(text, sizeof text, r->added_faces, "face", "faces"));
         if (r->unfilled_holes)
             fprintf(out, ", %s left (not simple loops)",
@@ -145,15 +160,18 @@ static void advise(FILE *out, bool *any, uint64_t count, const char *what, const
     *any = true;
 }
 
-static void advise_boundary(FILE *out, bool *any, const ebpo_mesh_report *report, const ebpo_mend_record *record)
+static void advise_boundary(FILE *out, bool *any, const ebpo_mesh_report *report,
+                            const ebpo_mend_record *record)
 {
     uint64_t edges = report->boundary_edges.count;
     if (!edges)
         return;
     if (report->repeated_positions.count && !record->weld)
-        advise(out, any, report->repeated_positions.count, "repeated positions", "try --weld first");
+        advise(out, any, report->repeated_positions.count, "repeated positions",
+               "try --weld first");
     advise(out, any, edges, "boundary edges",
-           record->fill_holes ? "holes that are no simple loops need a mesh editor" : "try --fill-holes");
+           record->fill_holes ? "holes that are no simple loops need a mesh editor"
+                              : "try --fill-holes");
 }
 
 void report_warn(FILE *out, const char *command, const char *path, const ebpo_mesh_report *report,
@@ -162,8 +180,10 @@ void report_warn(FILE *out, const char *command, const char *path, const ebpo_me
     if (report->balanced)
         return;
     bool any = false;
-    fprintf(out, "ebpo %s: %s: warning: this is a surface, not a solid, so what is inside stays unknown;", command,
-            path);
+    fprintf(
+        out,
+        "ebpo %s: %s: warning: this is a surface, not a solid, so what is inside stays unknown;",
+        command, path);
     advise_boundary(out, &any, report, record);
     if (report->misoriented_edges.count)
         advise(out, &any, report->misoriented_edges.count, "misoriented edges",

@@ -8,10 +8,12 @@
 #include "json.h"
 
 /* What the mesh is, then each finding with its first places. */
-void report_print(FILE *out, const char *path, const ebpo_mesh *mesh, const ebpo_mesh_report *report);
+void report_print(FILE *out, const char *path, const ebpo_mesh *mesh,
+                  const ebpo_mesh_report *report);
 /* What mending did; nothing when nothing was asked for. */
 void report_print_mending(FILE *out, const ebpo_mend_record *record);
-/* For a mesh that does not balance: which finding to mend with which option. `record`: what was tried already. */
+/* For a mesh that does not balance: which finding to mend with which option. `record`: what was
+ * tried already. */
 void report_warn(FILE *out, const char *command, const char *path, const ebpo_mesh_report *report,
                  const ebpo_mend_record *record);
 

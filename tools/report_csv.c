@@ -4,7 +4,8 @@
 #include "report_data.h"
 
 /* Names have no commas; the empty value stands for what could not be had. */
-static void line(FILE *out, const char *name, int level, const char *parameter, const figure_name *q, double v)
+static void line(FILE *out, const char *name, int level, const char *parameter,
+                 const figure_name *q, double v)
 {
     fprintf(out, "%s,", name);
     if (level >= 0)
@@ -29,7 +30,8 @@ static void one_method(FILE *out, const comparison *c, const method *m)
             line(out, m->name, -1, parameter, &deadline_figures[k], m->due[i][k]);
     }
     for (int i = 0; i < m->need_count; i++) {
-        snprintf(parameter, sizeof parameter, "%s=%.17g", m->need[i].kind == NEED_ERROR ? "max_error" : "target_bytes", m->need[i].asked);
+        snprintf(parameter, sizeof parameter, "%s=%.17g",
+                 m->need[i].kind == NEED_ERROR ? "max_error" : "target_bytes", m->need[i].asked);
         for (int k = 0; k < NEED_FIGURES; k++)
             line(out, m->name, -1, parameter, &need_figures[k], m->need[i].figure[k]);
     }

@@ -9,62 +9,101 @@ const unsigned deadlines_us[DEADLINES] = { 1, 2, 5, 10, 20, 50, 100, 1000 };
 
 const figure_name level_figures[LEVEL_FIGURES] = {
     [OF_BYTES] = { "bytes", "B", false, "of the level in the file" },
-    [OF_CUMULATIVE_BYTES] = { "cumulative_bytes", "B", false, "of the head and of levels 0 to this one" },
+    [OF_CUMULATIVE_BYTES] = { "cumulative_bytes", "B", false,
+                              "of the head and of levels 0 to this one" },
     [OF_GRAY] = { "gray", "nodes", false, "gray nodes of the level" },
     [OF_LEAVES] = { "leaf", "nodes", false, "leaves of the level" },
     [OF_PLANES] = { "planes", "planes", false, "stored for the level's gray nodes" },
     [OF_LEAF_PLANES] = { "leaf_planes", "planes", false, "stored for the level's leaves" },
-    [OF_VOLUME] = { "envelope_volume", "model^3", false, "of the envelopes that stand for the model at this level; leaves by their stored planes, else by planes derived from their faces" },
-    [OF_EXCESS] = { "excess", "%", false, "volume of the envelopes beyond the solid's, in percent of the solid's" },
-    [OF_LEVELS_VOLUME] = { "levels_volume", "model^3", false, "the same from levels 0 to this one alone, without the mesh: leaves without stored planes have their parent's envelope" },
+    [OF_VOLUME] = { "envelope_volume", "model^3", false,
+                    "of the envelopes that stand for the model at this level; leaves by their "
+                    "stored planes, else by planes derived from their faces" },
+    [OF_EXCESS] = { "excess", "%", false,
+                    "volume of the envelopes beyond the solid's, in percent of the solid's" },
+    [OF_LEVELS_VOLUME] = { "levels_volume", "model^3", false,
+                           "the same from levels 0 to this one alone, without the mesh: leaves "
+                           "without stored planes have their parent's envelope" },
     [OF_LEVELS_EXCESS] = { "levels_excess", "%", false, "its excess" },
-    [OF_LIMIT_VOLUME] = { "limit_volume", "model^3", false, "of the convex hulls of the solid in each cell: no convex envelope is smaller" },
+    [OF_LIMIT_VOLUME] = { "limit_volume", "model^3", false,
+                          "of the convex hulls of the solid in each cell: no convex envelope is "
+                          "smaller" },
     [OF_LIMIT_EXCESS] = { "limit_excess", "%", false, "its excess" },
     [OF_EXCESS_TO_LIMIT] = { "excess_to_limit", "1", false, "excess / limit_excess" },
-    [OF_FAR_LO] = { "hausdorff_lo", "model", false, "the one-sided Hausdorff distance from the envelopes to the model is at least this" },
+    [OF_FAR_LO] = { "hausdorff_lo", "model", false,
+                    "the one-sided Hausdorff distance from the envelopes to the model is at least "
+                    "this" },
     [OF_FAR_HI] = { "hausdorff_hi", "model", false, "and certainly at most this" },
-    [OF_FAR_MEAN] = { "distance_mean", "model", false, "mean distance from the level's surface to the model, sampled" },
+    [OF_FAR_MEAN] = { "distance_mean", "model", false,
+                      "mean distance from the level's surface to the model, sampled" },
     [OF_FAR_RMS] = { "distance_rms", "model", false, "root of its mean square" },
-    [OF_MAYBE_UNIFORM] = { "maybe_uniform", "1", false, "share of points, uniform in the model's box, that a point-in-solid test to this level leaves open" },
-    [OF_MAYBE_NEAR] = { "maybe_near", "1", false, "the same of points within 1 % of the diagonal from the surface" },
-    [OF_WIDTH_MEAN] = { "width_mean", "model", false, "of the interval that holds the distance, known to this level; uniform points" },
-    [OF_WIDTH_MEDIAN] = { "width_median", "model", false, "half of the points have a narrower one" },
+    [OF_MAYBE_UNIFORM] = { "maybe_uniform", "1", false,
+                           "share of points, uniform in the model's box, that a point-in-solid "
+                           "test to this level leaves open" },
+    [OF_MAYBE_NEAR] = { "maybe_near", "1", false,
+                        "the same of points within 1 % of the diagonal from the surface" },
+    [OF_WIDTH_MEAN] = { "width_mean", "model", false,
+                        "of the interval that holds the distance, known to this level; uniform "
+                        "points" },
+    [OF_WIDTH_MEDIAN] = { "width_median", "model", false,
+                          "half of the points have a narrower one" },
     [OF_WIDTH_P99] = { "width_p99", "model", false, "99 % of the points have a narrower one" },
-    [OF_INSIDE_NS] = { "inside_ns", "ns", true, "a point-in-solid test to this level, uniform points, many at a time, one thread" },
+    [OF_INSIDE_NS] = { "inside_ns", "ns", true,
+                       "a point-in-solid test to this level, uniform points, many at a time, one "
+                       "thread" },
     [OF_DISTANCE_NS] = { "distance_ns", "ns", true, "a distance to this level, the same way" },
-    [OF_HAVE_SECONDS] = { "have_seconds", "s", true, "to open the file and read levels 0 to this one, after the system was asked to forget the file" },
+    [OF_HAVE_SECONDS] = { "have_seconds", "s", true,
+                          "to open the file and read levels 0 to this one, after the system was "
+                          "asked to forget the file" },
     [OF_READ_BYTES] = { "read_bytes", "B", false, "asked of the file for that" },
     [OF_READS] = { "reads", "reads", false, "in so many reads" },
-    [OF_THESIS_BYTES] = { "thesis_bytes", "B", false, "what the theses' cost model takes for the level" },
-    [OF_THESIS_CUMULATIVE] = { "thesis_cumulative_bytes", "B", false, "and for levels 0 to this one" },
+    [OF_THESIS_BYTES] = { "thesis_bytes", "B", false,
+                          "what the theses' cost model takes for the level" },
+    [OF_THESIS_CUMULATIVE] = { "thesis_cumulative_bytes", "B", false,
+                               "and for levels 0 to this one" },
 };
 
 const figure_name whole_figures[WHOLE_FIGURES] = {
-    [OF_FILE_BYTES] = { "file_bytes", "B", false, "of the file, mesh included where it is in the file" },
+    [OF_FILE_BYTES] = { "file_bytes", "B", false,
+                        "of the file, mesh included where it is in the file" },
     [OF_HEAD_BYTES] = { "head_bytes", "B", false, "in front of level 0" },
     [OF_ALL_PLANES] = { "all_planes", "planes", false, "stored in the file" },
-    [OF_BUILD_SECONDS] = { "build_seconds", "s", true, "to build the tree from the checked mesh; files that were there before do not tell" },
-    [OF_OPEN_SECONDS] = { "open_seconds", "s", true, "to take the whole model into memory, made for questions" },
+    [OF_BUILD_SECONDS] = { "build_seconds", "s", true,
+                           "to build the tree from the checked mesh; files that were there before "
+                           "do not tell" },
+    [OF_OPEN_SECONDS] = { "open_seconds", "s", true,
+                          "to take the whole model into memory, made for questions" },
     [OF_MEMORY_BYTES] = { "memory_bytes", "B", false, "that it takes there" },
-    [OF_EXACT_INSIDE_NS] = { "exact_inside_ns", "ns", true, "an exact point-in-solid test, uniform points, many at a time, one thread" },
+    [OF_EXACT_INSIDE_NS] = { "exact_inside_ns", "ns", true,
+                             "an exact point-in-solid test, uniform points, many at a time, one "
+                             "thread" },
     [OF_EXACT_DISTANCE_NS] = { "exact_distance_ns", "ns", true, "an exact distance, the same way" },
 };
 
 const figure_name deadline_figures[DEADLINE_FIGURES] = {
-    [OF_DUE_EXACT] = { "deadline_exact", "1", true, "share of distances that are exact by then; uniform points, one at a time" },
-    [OF_DUE_WIDTH_MEDIAN] = { "deadline_width_median", "model", true, "width of the interval that is certain by then: half of the points have a narrower one" },
-    [OF_DUE_WIDTH_P99] = { "deadline_width_p99", "model", true, "99 % of the points have a narrower one" },
-    [OF_DUE_TOOK_MEDIAN] = { "deadline_took_median", "ns", true, "time that the answer took: half took less" },
+    [OF_DUE_EXACT] = { "deadline_exact", "1", true,
+                       "share of distances that are exact by then; uniform points, one at a time" },
+    [OF_DUE_WIDTH_MEDIAN] = { "deadline_width_median", "model", true,
+                              "width of the interval that is certain by then: half of the points "
+                              "have a narrower one" },
+    [OF_DUE_WIDTH_P99] = { "deadline_width_p99", "model", true,
+                           "99 % of the points have a narrower one" },
+    [OF_DUE_TOOK_MEDIAN] = { "deadline_took_median", "ns", true,
+                             "time that the answer took: half took less" },
     [OF_DUE_TOOK_P99] = { "deadline_took_p99", "ns", true, "99 % took less" },
     [OF_DUE_TOOK_MAX] = { "deadline_took_max", "ns", true, "the longest" },
-    [OF_DUE_LATE] = { "deadline_late", "1", true, "share of answers that took longer than the deadline" },
+    [OF_DUE_LATE] = { "deadline_late", "1", true,
+                      "share of answers that took longer than the deadline" },
 };
 
 const figure_name need_figures[NEED_FIGURES] = {
     [OF_NEED_BYTES] = { "need_bytes", "B", false, "of the file that was cut to the need" },
-    [OF_NEED_FAR_LO] = { "need_hausdorff_lo", "model", false, "its envelopes reach beyond the model by at least this" },
+    [OF_NEED_FAR_LO] = { "need_hausdorff_lo", "model", false,
+                         "its envelopes reach beyond the model by at least this" },
     [OF_NEED_FAR_HI] = { "need_hausdorff_hi", "model", false, "and certainly by at most this" },
-    [OF_NEED_RATIO] = { "need_ratio", "1", false, "need_hausdorff_hi / the error that was asked for, or / what the whole file reaches where that is more (leaves cannot be refined); need_bytes / the size: 1 or less keeps the word" },
+    [OF_NEED_RATIO] = { "need_ratio", "1", false,
+                        "need_hausdorff_hi / the error that was asked for, or / what the whole "
+                        "file reaches where that is more (leaves cannot be refined); need_bytes / "
+                        "the size: 1 or less keeps the word" },
     [OF_NEED_SECONDS] = { "need_seconds", "s", true, "to make the file" },
 };
 

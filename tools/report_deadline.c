@@ -1,4 +1,5 @@
-/* The best distance within so many microseconds: how wide what is certain then is, and how long it really took. */
+/* The best distance within so many microseconds: how wide what is certain then is, and how long it
+ * really took. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -10,7 +11,8 @@ typedef struct timing {
     uint64_t exact, late;
 } timing;
 
-static ebpo_status ask(const comparison *c, ebpo_context *context, unsigned us, uint64_t clock_cost, timing *t, ebpo_error *error)
+static ebpo_status ask(const comparison *c, ebpo_context *context, unsigned us, uint64_t clock_cost,
+                       timing *t, ebpo_error *error)
 {
     ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
     options.deadline_ns = UINT64_C(1000) * us;
@@ -44,14 +46,17 @@ static void note(const comparison *c, timing *t, double *f)
     f[OF_DUE_TOOK_MAX] = t->took[c->points - 1]; /* they are sorted now */
 }
 
-ebpo_status report_deadlines(comparison *c, method *m, ebpo_model *model, int round, ebpo_error *error)
+ebpo_status report_deadlines(comparison *c, method *m, ebpo_model *model, int round,
+                             ebpo_error *error)
 {
-    timing t = { .width = malloc(c->points * sizeof(double)), .took = malloc(c->points * sizeof(double)) };
+    timing t = { .width = malloc(c->points * sizeof(double)),
+                 .took = malloc(c->points * sizeof(double)) };
     uint64_t clock_cost = bench_clock_cost();
     ebpo_context *context = NULL;
     ebpo_status status = ebpo_context_new(&context, model, error);
     if (status == EBPO_OK && (!t.width || !t.took)) {
-        snprintf(error->message, sizeof error->message, "not enough memory for the points; give fewer with --points");
+        snprintf(error->message, sizeof error->message,
+                 "not enough memory for the points; give fewer with --points");
         status = error->status = EBPO_E_MEMORY;
     }
     for (int i = 0; i < DEADLINES && status == EBPO_OK; i++) {

@@ -1,4 +1,5 @@
-/* The figures of one method, but for times: what the head tells, volumes, the limit, how far the envelopes reach; then needs and the theses' costs. */
+/* The figures of one method, but for times: what the head tells, volumes, the limit, how far the
+ * envelopes reach; then needs and the theses' costs. */
 #include <stdio.h>
 #include <string.h>
 
@@ -66,7 +67,8 @@ static ebpo_status limits(comparison *c, method *m, ebpo_file *file, ebpo_error 
     for (int i = c->first; i <= method_last(c, m); i++) {
         ebpo_limit limit = { 0 };
         double *f = m->level[i];
-        ebpo_status status = ebpo_limit_level(file, i, (unsigned)c->v->threads, &c->progress, &limit, error);
+        ebpo_status status =
+            ebpo_limit_level(file, i, (unsigned)c->v->threads, &c->progress, &limit, error);
         if (status != EBPO_OK)
             return method_without(m, "limit", status, error);
         f[OF_LIMIT_VOLUME] = limit.volume;
@@ -76,7 +78,8 @@ static ebpo_status limits(comparison *c, method *m, ebpo_file *file, ebpo_error 
     return EBPO_OK;
 }
 
-static ebpo_status deviations(comparison *c, method *m, ebpo_file *file, ebpo_model *model, ebpo_error *error)
+static ebpo_status deviations(comparison *c, method *m, ebpo_file *file, ebpo_model *model,
+                              ebpo_error *error)
 {
     ebpo_deviation_options options = EBPO_DEVIATION_OPTIONS_INIT;
     options.questions = REPORT_QUESTIONS;

@@ -69,11 +69,13 @@ static void facts(FILE *out, const comparison *c)
     fact(out, "faces", text, NULL);
     grouped(text, sizeof text, info->vertex_count);
     fact(out, "vertices", text, info->double_coordinates ? "double" : "float");
-    fact(out, "kind", info->solid ? "solid" : "surface", info->solid ? words_rule(info->rule) : "no inside");
+    fact(out, "kind", info->solid ? "solid" : "surface",
+         info->solid ? words_rule(info->rule) : "no inside");
     if (info->solid)
         fact(out, "volume", real(text, sizeof text, r->volume), info->unit[0] ? info->unit : NULL);
     fact(out, "area", real(text, sizeof text, r->area), NULL);
-    snprintf(text, sizeof text, "%.4g × %.4g × %.4g", r->max[0] - r->min[0], r->max[1] - r->min[1], r->max[2] - r->min[2]);
+    snprintf(text, sizeof text, "%.4g × %.4g × %.4g", r->max[0] - r->min[0], r->max[1] - r->min[1],
+             r->max[2] - r->min[2]);
     snprintf(more, sizeof more, "diagonal %.4g", c->diagonal);
     fact(out, "size", text, more);
     if (info->source_name[0])
@@ -90,7 +92,10 @@ static void facts(FILE *out, const comparison *c)
 
 static void head(FILE *out, const comparison *c)
 {
-    fprintf(out, "<header%s><div>\n<p class=\"over\">Envelopes level by level: bytes, error, run time</p>\n<h1>", c->portrait ? "" : " class=\"bare\"");
+    fprintf(out,
+            "<header%s><div>\n<p class=\"over\">Envelopes level by level: bytes, error, run "
+            "time</p>\n<h1>",
+            c->portrait ? "" : " class=\"bare\"");
     html_text(out, c->model);
     fputs("</h1>\n", out);
     facts(out, c);
@@ -128,7 +133,8 @@ static void tile(FILE *out, const method *m, int level)
     if (isfinite(f[OF_EXCESS]))
         plot_value(percent, sizeof percent, PLOT_PERCENT, f[OF_EXCESS]);
     if (isfinite(f[OF_CUMULATIVE_BYTES]))
-        fprintf(out, "<figcaption>%s%s%s%s</figcaption>", percent[0] ? "<b>+" : "", percent, percent[0] ? "</b> · " : "",
+        fprintf(out, "<figcaption>%s%s%s%s</figcaption>", percent[0] ? "<b>+" : "", percent,
+                percent[0] ? "</b> · " : "",
                 plot_value(bytes, sizeof bytes, PLOT_BYTES, f[OF_CUMULATIVE_BYTES]));
     fputs("</figure>\n", out);
 }
@@ -156,9 +162,11 @@ static void pictures(FILE *out, const comparison *c)
     int last = pictured(c, comparison_last(c));
     if (last < 0)
         return;
-    page_section(out, "pictures", "The levels", "Excess of volume, and bytes of the file up to the level’s end.");
+    page_section(out, "pictures", "The levels",
+                 "Excess of volume, and bytes of the file up to the level’s end.");
     for (int k = c->first; k <= last; k += ROW)
-        strip(out, c, k, last < k + ROW ? last : k + ROW - 1, last - c->first < ROW ? last - c->first + 1 : ROW);
+        strip(out, c, k, last < k + ROW ? last : k + ROW - 1,
+              last - c->first < ROW ? last - c->first + 1 : ROW);
     fputs("</section>\n", out);
 }
 
@@ -193,7 +201,9 @@ static void notes(FILE *out, const comparison *c)
             }
         fputs("</ul>\n", out);
     }
-    fputs("<details><summary>All quantities, as report.csv and report.json name them</summary><dl>\n", out);
+    fputs(
+        "<details><summary>All quantities, as report.csv and report.json name them</summary><dl>\n",
+        out);
     meanings(out, whole_figures, WHOLE_FIGURES);
     meanings(out, level_figures, LEVEL_FIGURES);
     meanings(out, deadline_figures, DEADLINE_FIGURES);
@@ -203,9 +213,12 @@ static void notes(FILE *out, const comparison *c)
 
 void report_page(FILE *out, const comparison *c)
 {
-    fputs("<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/><meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"/><title>", out);
+    fputs("<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/><meta "
+          "name=\"viewport\" content=\"width=device-width,initial-scale=1\"/><title>",
+          out);
     html_text(out, c->model);
-    fprintf(out, ": bytes, error, run time</title>\n<style>\n%s</style></head>\n<body><main>\n", report_style);
+    fprintf(out, ": bytes, error, run time</title>\n<style>\n%s</style></head>\n<body><main>\n",
+            report_style);
     head(out, c);
     pictures(out, c);
     page_glance(out, c);
@@ -217,5 +230,8 @@ void report_page(FILE *out, const comparison *c)
     page_transmission(out, c);
     page_tables(out, c);
     notes(out, c);
-    fprintf(out, "<footer>Made by <code>ebpo report</code>, version %s, in %.0f s.</footer>\n</main></body></html>\n", ebpo_version(), c->seconds);
+    fprintf(out,
+            "<footer>Made by <code>ebpo report</code>, version %s, in %.0f "
+            "s.</footer>\n</main></body></html>\n",
+            ebpo_version(), c->seconds);
 }

@@ -1,4 +1,5 @@
-/* Questions to a level: how many points it leaves open, how wide its intervals are, and how long it takes. */
+/* Questions to a level: how many points it leaves open, how wide its intervals are, and how long it
+ * takes. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,7 +10,8 @@
 
 static ebpo_status no_memory(ebpo_error *error)
 {
-    snprintf(error->message, sizeof error->message, "not enough memory for the points; give fewer with --points");
+    snprintf(error->message, sizeof error->message,
+             "not enough memory for the points; give fewer with --points");
     return error->status = EBPO_E_MEMORY;
 }
 
@@ -32,7 +34,8 @@ static double area_of(const ebpo_mesh *mesh, uint64_t face, double unit)
         a[k] = (p[1][k] - p[0][k]) / unit;
         b[k] = (p[2][k] - p[0][k]) / unit;
     }
-    return sqrt(pow(a[1] * b[2] - a[2] * b[1], 2) + pow(a[2] * b[0] - a[0] * b[2], 2) + pow(a[0] * b[1] - a[1] * b[0], 2));
+    return sqrt(pow(a[1] * b[2] - a[2] * b[1], 2) + pow(a[2] * b[0] - a[0] * b[2], 2) +
+                pow(a[0] * b[1] - a[1] * b[0], 2));
 }
 
 static uint64_t pick(const double *sums, uint64_t count, double value)
@@ -49,9 +52,11 @@ static uint64_t pick(const double *sums, uint64_t count, double value)
 }
 
 /* Anywhere in a ball around a point that is uniform on the surface. */
-static void near_point(const ebpo_mesh *mesh, const double *sums, double reach, uint64_t *random, double out[3])
+static void near_point(const ebpo_mesh *mesh, const double *sums, double reach, uint64_t *random,
+                       double out[3])
 {
-    uint64_t face = pick(sums, mesh->face_count, bench_random_unit(random) * sums[mesh->face_count - 1]);
+    uint64_t face =
+        pick(sums, mesh->face_count, bench_random_unit(random) * sums[mesh->face_count - 1]);
     double s = bench_random_unit(random), t = bench_random_unit(random), p[3][3], d[3];
     if (s + t > 1) {
         s = 1 - s;
@@ -76,7 +81,8 @@ static ebpo_status make_near(comparison *c, const method *m, ebpo_error *error)
     ebpo_status status = remote_open(&file, m->path, &c->v->remote, error);
     if (status == EBPO_OK)
         status = ebpo_file_read_mesh(file, &mesh, (unsigned)c->v->threads, error);
-    if (status == EBPO_OK && (!(sums = malloc((mesh.face_count + 1) * sizeof *sums)) || !(c->near = malloc(3 * c->points * sizeof *c->near))))
+    if (status == EBPO_OK && (!(sums = malloc((mesh.face_count + 1) * sizeof *sums)) ||
+                              !(c->near = malloc(3 * c->points * sizeof *c->near))))
         status = no_memory(error);
     for (uint64_t i = 0; status == EBPO_OK && i < mesh.face_count; i++)
         sums[i] = sum += area_of(&mesh, i, c->diagonal);
@@ -97,7 +103,8 @@ ebpo_status report_make_points(comparison *c, ebpo_error *error)
     if (!c->uniform)
         return no_memory(error);
     for (uint64_t i = 0; i < 3 * c->points; i++) {
-        double low = info->report.min[i % 3], high = info->report.max[i % 3], t = bench_random_unit(&random);
+        double low = info->report.min[i % 3], high = info->report.max[i % 3],
+               t = bench_random_unit(&random);
         c->uniform[i] = (1 - t) * low + t * high;
     }
     for (int i = 0; i < c->count; i++)
@@ -120,15 +127,18 @@ typedef struct asker {
 } asker;
 
 /* Nanoseconds a point; answers in a->distance or a->inside. */
-static ebpo_status timed(asker *a, bool distance, const double *points, int level, double *ns, ebpo_error *error)
+static ebpo_status timed(asker *a, bool distance, const double *points, int level, double *ns,
+                         ebpo_error *error)
 {
     ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
     options.level = level;
     options.warm = false;
     options.unsigned_distance = true;
     uint64_t begin = bench_clock();
-    ebpo_status status = distance ? ebpo_distance_many(a->context, points, a->c->points, &options, a->distance, error)
-                                  : ebpo_inside_many(a->context, points, a->c->points, &options, a->inside, error);
+    ebpo_status status =
+        distance
+            ? ebpo_distance_many(a->context, points, a->c->points, &options, a->distance, error)
+            : ebpo_inside_many(a->context, points, a->c->points, &options, a->inside, error);
     *ns = (double)(bench_clock() - begin) / (double)a->c->points;
     return status;
 }
@@ -174,7 +184,9 @@ static ebpo_status distance_at(asker *a, int level, ebpo_error *error)
 /* Needs the mesh. */
 static ebpo_status exact(asker *a, ebpo_error *error)
 {
-    ebpo_status status = a->m->info.solid ? timed(a, false, a->c->uniform, EBPO_LEVEL_ALL, &a->round->exact_inside, error) : EBPO_OK;
+    ebpo_status status = a->m->info.solid ? timed(a, false, a->c->uniform, EBPO_LEVEL_ALL,
+                                                  &a->round->exact_inside, error)
+                                          : EBPO_OK;
     if (status == EBPO_OK)
         status = timed(a, true, a->c->uniform, EBPO_LEVEL_ALL, &a->round->exact_distance, error);
     if (status == EBPO_OK)
@@ -190,7 +202,8 @@ static ebpo_status ask_all(asker *a, ebpo_error *error)
     int last = method_last(c, a->m);
     for (int i = c->first; i <= last && status == EBPO_OK; i++) {
         if (c->progress.report)
-            c->progress.report(c->progress.user, "questions", (uint64_t)(i - c->first), (uint64_t)(last - c->first + 1));
+            c->progress.report(c->progress.user, "questions", (uint64_t)(i - c->first),
+                               (uint64_t)(last - c->first + 1));
         if (a->m->info.solid)
             status = inside_at(a, i, error);
         if (status == EBPO_OK)
@@ -199,7 +212,8 @@ static ebpo_status ask_all(asker *a, ebpo_error *error)
     return status == EBPO_OK ? exact(a, error) : status;
 }
 
-ebpo_status report_limited(comparison *c, method *m, ebpo_model *model, int round, ebpo_error *error)
+ebpo_status report_limited(comparison *c, method *m, ebpo_model *model, int round,
+                           ebpo_error *error)
 {
     asker a = { .c = c, .m = m, .round = &m->round[round], .first = round == 0 };
     ebpo_status status = ebpo_context_new(&a.context, model, error);

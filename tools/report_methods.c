@@ -20,8 +20,11 @@ static int told(const char *message, const char *what)
 
 static bool same_model(const ebpo_info *a, const ebpo_info *b)
 {
-    return memcmp(a->source_sha256, b->source_sha256, sizeof a->source_sha256) == 0 && a->solid == b->solid && a->rule == b->rule && a->source_face_count == b->source_face_count &&
-           memcmp(a->report.min, b->report.min, sizeof a->report.min) == 0 && memcmp(a->report.max, b->report.max, sizeof a->report.max) == 0 &&
+    return memcmp(a->source_sha256, b->source_sha256, sizeof a->source_sha256) == 0 &&
+           a->solid == b->solid && a->rule == b->rule &&
+           a->source_face_count == b->source_face_count &&
+           memcmp(a->report.min, b->report.min, sizeof a->report.min) == 0 &&
+           memcmp(a->report.max, b->report.max, sizeof a->report.max) == 0 &&
            memcmp(&a->report.volume, &b->report.volume, sizeof a->report.volume) == 0;
 }
 
@@ -40,7 +43,10 @@ static int learn(comparison *c, method *m)
         return command_failed("report", &error);
     if (m == c->methods || same_model(&c->methods->info, &m->info))
         return EXIT_FINE;
-    fprintf(stderr, "ebpo report: %s and %s are made of different meshes; a report compares files of one model\n", remote_shown(c->methods->path), remote_shown(m->path));
+    fprintf(stderr,
+            "ebpo report: %s and %s are made of different meshes; a report compares files of one "
+            "model\n",
+            remote_shown(c->methods->path), remote_shown(m->path));
     return EXIT_FAILED;
 }
 
@@ -63,7 +69,9 @@ static int add_file(comparison *c, const char *path)
     if (strlen(path) >= sizeof c->methods->path)
         return told("the name is too long", path);
     if (strpbrk(name, "/,\"\n"))
-        return told("a method's name has no '/', comma, quotation mark or new line; give another --name", name);
+        return told(
+            "a method's name has no '/', comma, quotation mark or new line; give another --name",
+            name);
     for (int i = 0; i < c->count; i++)
         if (strcmp(c->methods[i].name, name) == 0)
             return told("two methods would have this name; give a --name for each file", name);
@@ -91,13 +99,15 @@ static void build_options(const comparison *c, int selection, ebpo_build_options
 }
 
 /* The builder consumes the mesh, so it is read for each. */
-static ebpo_status build_one(comparison *c, const char *mesh, int selection, const char *path, double *seconds, ebpo_error *error)
+static ebpo_status build_one(comparison *c, const char *mesh, int selection, const char *path,
+                             double *seconds, ebpo_error *error)
 {
     ebpo_build_options build;
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
     ebpo_tree tree;
     prepared p;
-    ebpo_status status = prepare_mesh(&p, mesh, (mending){ false, false, false }, NULL, (unsigned)c->v->threads, c->progress, error);
+    ebpo_status status = prepare_mesh(&p, mesh, (mending){ false, false, false }, NULL,
+                                      (unsigned)c->v->threads, c->progress, error);
     if (status != EBPO_OK)
         return status;
     if (c->count == 0) {
@@ -154,7 +164,8 @@ static int find(comparison *c, const char *const *operand)
         if (!is_hdf5 && operand[1])
             return told("a mesh stands alone; its methods are named by --select", operand[i]);
         if (!is_hdf5 && c->v->names.count)
-            return told("the methods of a mesh have the selections' names; leave --name away", operand[i]);
+            return told("the methods of a mesh have the selections' names; leave --name away",
+                        operand[i]);
         if (!is_hdf5)
             return build_all(c, operand[i]);
         int code = add_file(c, operand[i]);
@@ -174,7 +185,8 @@ int report_find_methods(comparison *c, const char *const *operand)
         report_stem(c->methods->info.source_name, c->model, sizeof c->model);
     c->diagonal = hypot(hypot(r->max[0] - r->min[0], r->max[1] - r->min[1]), r->max[2] - r->min[2]);
     if (c->first > comparison_last(c)) {
-        fprintf(stderr, "ebpo report: --levels: there is no level %d; the deepest is %d\n", c->first, comparison_last(c));
+        fprintf(stderr, "ebpo report: --levels: there is no level %d; the deepest is %d\n",
+                c->first, comparison_last(c));
         return EXIT_USAGE;
     }
     return EXIT_FINE;

@@ -7,10 +7,11 @@
 #include "report_data.h"
 
 static const double errors[] = { 10, 3, 1, 0.3 }; /* percent of the diagonal */
-static const double sizes[] = { 3, 5, 10, 50 };  /* percent of the first file */
+static const double sizes[] = { 3, 5, 10, 50 };   /* percent of the first file */
 
 /* What a viewer needs: envelopes without mesh. */
-static ebpo_status cut(const comparison *c, ebpo_file *file, const need_result *n, const char *path, ebpo_error *error)
+static ebpo_status cut(const comparison *c, ebpo_file *file, const need_result *n, const char *path,
+                       ebpo_error *error)
 {
     ebpo_subset_options options = EBPO_SUBSET_OPTIONS_INIT;
     options.parts = ebpo_profile_parts(EBPO_PROFILE_LOD);
@@ -23,7 +24,8 @@ static ebpo_status cut(const comparison *c, ebpo_file *file, const need_result *
     return ebpo_subset(file, path, &options, error);
 }
 
-static ebpo_status reach(const comparison *c, ebpo_model *model, const char *path, need_result *n, ebpo_error *error)
+static ebpo_status reach(const comparison *c, ebpo_model *model, const char *path, need_result *n,
+                         ebpo_error *error)
 {
     ebpo_deviation_options options = EBPO_DEVIATION_OPTIONS_INIT;
     options.questions = REPORT_QUESTIONS;
@@ -47,8 +49,10 @@ static ebpo_status reach(const comparison *c, ebpo_model *model, const char *pat
     return status;
 }
 
-/* Leaves cannot be refined: no subset is promised to be closer than the file's last level is, which --levels may have left out. 0: not known. */
-static ebpo_status own_reach(const comparison *c, method *m, ebpo_file *file, ebpo_model *model, double *reach, ebpo_error *error)
+/* Leaves cannot be refined: no subset is promised to be closer than the file's last level is, which
+ * --levels may have left out. 0: not known. */
+static ebpo_status own_reach(const comparison *c, method *m, ebpo_file *file, ebpo_model *model,
+                             double *reach, ebpo_error *error)
 {
     ebpo_deviation_options options = EBPO_DEVIATION_OPTIONS_INIT;
     options.questions = REPORT_QUESTIONS;
@@ -64,7 +68,8 @@ static ebpo_status own_reach(const comparison *c, method *m, ebpo_file *file, eb
     return method_without(m, "Hausdorff distance", status, error);
 }
 
-static ebpo_status one_need(comparison *c, method *m, ebpo_file *file, ebpo_model *model, need_kind kind, double asked, double own, ebpo_error *error)
+static ebpo_status one_need(comparison *c, method *m, ebpo_file *file, ebpo_model *model,
+                            need_kind kind, double asked, double own, ebpo_error *error)
 {
     char path[sizeof c->folder + 16];
     need_result *n = &m->need[m->need_count];
@@ -76,20 +81,24 @@ static ebpo_status one_need(comparison *c, method *m, ebpo_file *file, ebpo_mode
     if (status == EBPO_OK)
         status = reach(c, model, path, n, error);
     unlink(path);
-    n->figure[OF_NEED_RATIO] = kind == NEED_ERROR ? n->figure[OF_NEED_FAR_HI] / fmax(asked, own) : n->figure[OF_NEED_BYTES] / asked;
+    n->figure[OF_NEED_RATIO] = kind == NEED_ERROR ? n->figure[OF_NEED_FAR_HI] / fmax(asked, own)
+                                                  : n->figure[OF_NEED_BYTES] / asked;
     if (status == EBPO_OK || status == EBPO_E_ABSENT)
         m->need_count++;
     return status;
 }
 
 /* What cannot be cut to a need is noted, and left out. */
-ebpo_status report_needs(comparison *c, method *m, ebpo_file *file, ebpo_model *model, ebpo_error *error)
+ebpo_status report_needs(comparison *c, method *m, ebpo_file *file, ebpo_model *model,
+                         ebpo_error *error)
 {
     double own;
     ebpo_status status = own_reach(c, m, file, model, &own, error);
     for (unsigned i = 0; i < NEEDS && status == EBPO_OK; i++) {
         bool by_error = i < NEEDS / 2;
-        double asked = by_error ? errors[i] / 100 * c->diagonal : floor(sizes[i - NEEDS / 2] / 100 * (double)c->methods[0].info.file_bytes);
+        double asked =
+            by_error ? errors[i] / 100 * c->diagonal
+                     : floor(sizes[i - NEEDS / 2] / 100 * (double)c->methods[0].info.file_bytes);
         status = one_need(c, m, file, model, by_error ? NEED_ERROR : NEED_SIZE, asked, own, error);
         if (status == EBPO_E_MEMORY || status == EBPO_E_IO || status == EBPO_E_CANCELLED)
             return status;

@@ -27,15 +27,15 @@ static bool is_named(const char *name, const char *const *names)
     return false;
 }
 
-static bool is_dot(const char *name)
-{
-    return strcmp(name, ".") == 0 || strcmp(name, "..") == 0;
-}
+static bool is_dot(const char *name) { return strcmp(name, ".") == 0 || strcmp(name, "..") == 0; }
 
 /* Only files of the names that a report has: whatever else is there is somebody's own. */
 static bool is_ours(const char *folder, const char *name)
 {
-    static const char *const names[] = { "report.csv", "report.json", "report.html", "inherit.ebpo.h5", "kmedoids.ebpo.h5", "offset.ebpo.h5", "random.ebpo.h5", NULL };
+    static const char *const names[] = { "report.csv",       "report.json",
+                                         "report.html",      "inherit.ebpo.h5",
+                                         "kmedoids.ebpo.h5", "offset.ebpo.h5",
+                                         "random.ebpo.h5",   NULL };
     char path[8192];
     struct stat st;
     snprintf(path, sizeof path, "%s/%s", folder, name);
@@ -64,16 +64,24 @@ static int look_into(const char *place, DIR *folder, const char *const *operand)
         empty = false;
         report = report || strcmp(name, "report.json") == 0;
         if (is_operand(place, name, operand)) {
-            snprintf(text, sizeof text, "is a folder with an input in it, '%.255s', and would be replaced; give another one with -o", name);
+            snprintf(text, sizeof text,
+                     "is a folder with an input in it, '%.255s', and would be replaced; give "
+                     "another one with -o",
+                     name);
             return told(EXIT_USAGE, place, text);
         }
         if (!is_ours(place, name)) {
-            snprintf(text, sizeof text, "is a folder with something else than a report in it, '%.255s'; give another one with -o", name);
+            snprintf(text, sizeof text,
+                     "is a folder with something else than a report in it, '%.255s'; give another "
+                     "one with -o",
+                     name);
             return told(EXIT_FAILED, place, text);
         }
     }
     if (!empty && !report)
-        return told(EXIT_FAILED, place, "is a folder without report.json, so it may be no report; give another one with -o");
+        return told(
+            EXIT_FAILED, place,
+            "is a folder without report.json, so it may be no report; give another one with -o");
     return EXIT_FINE;
 }
 
@@ -116,7 +124,9 @@ void output_drop(const char *folder)
 /* In a signal handler: only what may be called there. Names are known beforehand. */
 static void abandon(void)
 {
-    static const char *const names[] = { "report.csv", "report.json", "report.html", "need.ebpo.h5", "inherit.ebpo.h5", "kmedoids.ebpo.h5", "offset.ebpo.h5", "random.ebpo.h5" };
+    static const char *const names[] = { "report.csv",     "report.json",     "report.html",
+                                         "need.ebpo.h5",   "inherit.ebpo.h5", "kmedoids.ebpo.h5",
+                                         "offset.ebpo.h5", "random.ebpo.h5" };
     size_t length = strlen(being_made);
     if (!length)
         return;
@@ -168,6 +178,8 @@ bool output_commit(const char *place, const char *folder)
     }
     being_made[0] = 0;
     if (moved && !remove_folder(older, true)) /* something came into it meanwhile */
-        fprintf(stderr, "ebpo report: warning: what else is in the report that was there is now in %s\n", older);
+        fprintf(stderr,
+                "ebpo report: warning: what else is in the report that was there is now in %s\n",
+                older);
     return true;
 }

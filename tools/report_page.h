@@ -28,8 +28,10 @@ void page_section(FILE *out, const char *id, const char *title, const char *text
 void cell(FILE *out, plot_unit unit, double v);
 void cell_first(FILE *out, plot_unit unit, double v); /* of a group of columns */
 void cell_count(FILE *out, double v);
-/* Begins a table with a group of `columns` for each method: `group` heads what stands before them (HTML), `before` and `each` are the columns' heads. */
-void page_groups(FILE *out, const comparison *c, int columns, const char *group, const char *before, const char *each);
+/* Begins a table with a group of `columns` for each method: `group` heads what stands before them
+ * (HTML), `before` and `each` are the columns' heads. */
+void page_groups(FILE *out, const comparison *c, int columns, const char *group, const char *before,
+                 const char *each);
 
 bool any_level_figure(const comparison *c, level_figure which);
 

@@ -1,4 +1,5 @@
-/* Pictures of the levels for the page: drawn by the renderer, see-through where nothing is, as data URIs. */
+/* Pictures of the levels for the page: drawn by the renderer, see-through where nothing is, as data
+ * URIs. */
 #include "ebpo_config.h"
 
 #include <stdio.h>
@@ -12,25 +13,34 @@
 #include "picture.h"
 #include "raster.h"
 
-enum { TILE_WIDTH = 320, TILE_HEIGHT = 250, PORTRAIT_WIDTH = 720, PORTRAIT_HEIGHT = 540, LEVELS_DRAWN = 12 };
+enum {
+    TILE_WIDTH = 320,
+    TILE_HEIGHT = 250,
+    PORTRAIT_WIDTH = 720,
+    PORTRAIT_HEIGHT = 540,
+    LEVELS_DRAWN = 12
+};
 
 static ebpo_status no_memory(ebpo_error *error)
 {
-    snprintf(error->message, sizeof error->message, "no memory for pictures; leave them away with --no-pictures");
+    snprintf(error->message, sizeof error->message,
+             "no memory for pictures; leave them away with --no-pictures");
     return error->status = EBPO_E_MEMORY;
 }
 
 /* "data:image/png;base64,..." or NULL. */
 static char *data_uri(const uint8_t *bytes, size_t size)
 {
-    static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/", head[] = "data:image/png;base64,";
+    static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/",
+                      head[] = "data:image/png;base64,";
     char *text = malloc(sizeof head + (size + 2) / 3 * 4), *at = text;
     if (!text)
         return NULL;
     memcpy(text, head, sizeof head);
     at += sizeof head - 1;
     for (size_t i = 0; i < size; i += 3) {
-        uint32_t v = (uint32_t)bytes[i] << 16 | (i + 1 < size ? (uint32_t)bytes[i + 1] << 8 : 0) | (i + 2 < size ? bytes[i + 2] : 0);
+        uint32_t v = (uint32_t)bytes[i] << 16 | (i + 1 < size ? (uint32_t)bytes[i + 1] << 8 : 0) |
+                     (i + 2 < size ? bytes[i + 2] : 0);
         for (unsigned k = 0; k < 4; k++)
             *at++ = i + k <= size ? digits[v >> (18 - 6 * k) & 63] : '=';
     }
@@ -55,7 +65,8 @@ static void make_see_through(const picture *black, const picture *white, uint8_t
     }
 }
 
-static ebpo_status draw(const comparison *c, const ebpo_mesh *mesh, const camera *view, int width, int height, const raster_style *style, char **uri, ebpo_error *error)
+static ebpo_status draw(const comparison *c, const ebpo_mesh *mesh, const camera *view, int width,
+                        int height, const raster_style *style, char **uri, ebpo_error *error)
 {
     static const uint8_t grounds[2][3] = { { 0, 0, 0 }, { 255, 255, 255 } };
     unsigned threads = c->v->threads ? (unsigned)c->v->threads : machine_cores();
@@ -65,7 +76,9 @@ static ebpo_status draw(const comparison *c, const ebpo_mesh *mesh, const camera
     size_t size = 0;
     ebpo_status status = rgba ? EBPO_OK : no_memory(error);
     for (int i = 0; i < 2 && status == EBPO_OK; i++)
-        status = picture_make(&on[i], width, height, grounds[i]) ? raster_draw(&on[i], 0, 0, width, height, view, mesh, style, threads, error) : no_memory(error);
+        status = picture_make(&on[i], width, height, grounds[i])
+                     ? raster_draw(&on[i], 0, 0, width, height, view, mesh, style, threads, error)
+                     : no_memory(error);
     if (status == EBPO_OK) {
         make_see_through(&on[0], &on[1], rgba);
         status = picture_encode_png(rgba, width, height, 4, "picture", &png, &size, error);
@@ -81,7 +94,8 @@ static ebpo_status draw(const comparison *c, const ebpo_mesh *mesh, const camera
 
 /* --- what is drawn --- */
 
-static ebpo_status level_mesh(const comparison *c, ebpo_file *file, int level, ebpo_mesh *out, ebpo_error *error)
+static ebpo_status level_mesh(const comparison *c, ebpo_file *file, int level, ebpo_mesh *out,
+                              ebpo_error *error)
 {
     ebpo_lod_options options = EBPO_LOD_OPTIONS_INIT;
     options.threads = (unsigned)c->v->threads;
@@ -98,7 +112,10 @@ static ebpo_status fit(const comparison *c, ebpo_file *const *file, camera *view
         if (c->first > method_last(c, &c->methods[i]))
             continue;
         status = level_mesh(c, file[i], c->first, &one, error);
-        double *both = status == EBPO_OK ? realloc(all.xyz64, 3 * (all.vertex_count + one.vertex_count + 1) * sizeof *both) : NULL;
+        double *both =
+            status == EBPO_OK
+                ? realloc(all.xyz64, 3 * (all.vertex_count + one.vertex_count + 1) * sizeof *both)
+                : NULL;
         if (both) {
             memcpy(both + 3 * all.vertex_count, one.xyz64, 3 * one.vertex_count * sizeof *both);
             all.xyz64 = both;
@@ -114,11 +131,13 @@ static ebpo_status fit(const comparison *c, ebpo_file *const *file, camera *view
     return status;
 }
 
-static ebpo_status one_method(comparison *c, method *m, ebpo_file *file, const camera *view, ebpo_error *error)
+static ebpo_status one_method(comparison *c, method *m, ebpo_file *file, const camera *view,
+                              ebpo_error *error)
 {
     static const raster_style style = { { 0.30, 0.48, 0.66 }, true, false };
     ebpo_status status = EBPO_OK;
-    for (int i = c->first; i <= method_last(c, m) && i < c->first + LEVELS_DRAWN && status == EBPO_OK; i++) {
+    for (int i = c->first;
+         i <= method_last(c, m) && i < c->first + LEVELS_DRAWN && status == EBPO_OK; i++) {
         ebpo_mesh mesh = { 0 };
         status = level_mesh(c, file, i, &mesh, error);
         if (status == EBPO_OK && mesh.face_count)
@@ -135,8 +154,10 @@ static ebpo_status portrait(comparison *c, method *m, ebpo_file *file, ebpo_erro
     camera view;
     ebpo_status status = ebpo_file_read_mesh(file, &mesh, (unsigned)c->v->threads, error);
     if (status == EBPO_OK && mesh.face_count) {
-        camera_fit(&view, &mesh, c->azimuth, c->elevation, c->v->up, PORTRAIT_WIDTH, PORTRAIT_HEIGHT);
-        status = draw(c, &mesh, &view, PORTRAIT_WIDTH, PORTRAIT_HEIGHT, &style, &c->portrait, error);
+        camera_fit(&view, &mesh, c->azimuth, c->elevation, c->v->up, PORTRAIT_WIDTH,
+                   PORTRAIT_HEIGHT);
+        status =
+            draw(c, &mesh, &view, PORTRAIT_WIDTH, PORTRAIT_HEIGHT, &style, &c->portrait, error);
     }
     ebpo_mesh_free(&mesh);
     return method_without(m, "picture of the model", status, error);

@@ -84,7 +84,10 @@ static void number(char *out, size_t room, double v)
 
 static void seconds(char *out, size_t room, double v)
 {
-    static const struct { double factor; const char *unit; } units[] = { { 1, "s" }, { 1e-3, "ms" }, { 1e-6, "µs" }, { 1e-9, "ns" } };
+    static const struct {
+        double factor;
+        const char *unit;
+    } units[] = { { 1, "s" }, { 1e-3, "ms" }, { 1e-6, "µs" }, { 1e-9, "ns" } };
     char text[32];
     int i = 0;
     while (i < 3 && v < 0.9995 * units[i].factor)
@@ -109,7 +112,10 @@ char *plot_value(char *out, size_t room, plot_unit unit, double v)
         return out;
     default:
         number(text, sizeof text, v);
-        snprintf(out, room, "%s%s", text, unit == PLOT_PERCENT ? " %" : unit == PLOT_TIMES ? " ×" : "");
+        snprintf(out, room, "%s%s", text,
+                 unit == PLOT_PERCENT ? " %"
+                 : unit == PLOT_TIMES ? " ×"
+                                      : "");
         return out;
     }
 }
@@ -118,7 +124,8 @@ char *plot_value(char *out, size_t room, plot_unit unit, double v)
 
 static double place(const axis *a, double v)
 {
-    double share = a->linear ? (v - a->low) / (a->high - a->low) : log(v / a->low) / log(a->high / a->low);
+    double share =
+        a->linear ? (v - a->low) / (a->high - a->low) : log(v / a->low) / log(a->high / a->low);
     return a->from + share * (a->to - a->from);
 }
 
@@ -136,7 +143,8 @@ static double rounded(double v, bool up)
     return best;
 }
 
-/* Less than a factor of five is divided as a linear axis is, or there would be hardly a number at it. */
+/* Less than a factor of five is divided as a linear axis is, or there would be hardly a number at
+ * it. */
 static void widen(axis *a)
 {
     double margin = pow(a->high / a->low, 0.03); /* points do not stand on the frame */
@@ -156,7 +164,13 @@ static void widen(axis *a)
 
 static axis axis_of(const plot *p, bool vertical)
 {
-    axis a = { INFINITY, -INFINITY, false, vertical ? p->y : p->x, vertical ? HEIGHT - BOTTOM : LEFT, vertical ? TOP : WIDTH - RIGHT, 0 };
+    axis a = { INFINITY,
+               -INFINITY,
+               false,
+               vertical ? p->y : p->x,
+               vertical ? HEIGHT - BOTTOM : LEFT,
+               vertical ? TOP : WIDTH - RIGHT,
+               0 };
     for (int i = 0; i < p->count; i++)
         for (int k = 0; k < p->series[i].count; k++) {
             double v = vertical ? p->series[i].point[k].y : p->series[i].point[k].x;
@@ -174,7 +188,8 @@ static axis axis_of(const plot *p, bool vertical)
     return a;
 }
 
-/* Which of the digits 1 to 9 get a label: so many that there are at least four, and not more than there is room for. */
+/* Which of the digits 1 to 9 get a label: so many that there are at least four, and not more than
+ * there is room for. */
 static bool labelled(const axis *a, int digit)
 {
     double decades = log10(a->high / a->low);
@@ -186,9 +201,11 @@ static void grid_line(FILE *out, const axis *a, double v, bool strong)
     double at = place(a, v);
     bool vertical = a->from > a->to; /* the axis goes upwards */
     if (vertical)
-        fprintf(out, "<line class=\"%s\" x1=\"%d\" x2=\"%d\" y1=\"%.1f\" y2=\"%.1f\"/>", strong ? "g" : "h", LEFT, WIDTH - RIGHT, at, at);
+        fprintf(out, "<line class=\"%s\" x1=\"%d\" x2=\"%d\" y1=\"%.1f\" y2=\"%.1f\"/>",
+                strong ? "g" : "h", LEFT, WIDTH - RIGHT, at, at);
     else
-        fprintf(out, "<line class=\"%s\" x1=\"%.1f\" x2=\"%.1f\" y1=\"%d\" y2=\"%d\"/>", strong ? "g" : "h", at, at, TOP, HEIGHT - BOTTOM);
+        fprintf(out, "<line class=\"%s\" x1=\"%.1f\" x2=\"%.1f\" y1=\"%d\" y2=\"%d\"/>",
+                strong ? "g" : "h", at, at, TOP, HEIGHT - BOTTOM);
 }
 
 static void tick_label(FILE *out, const axis *a, double v)
@@ -197,9 +214,11 @@ static void tick_label(FILE *out, const axis *a, double v)
     double at = place(a, v);
     plot_value(text, sizeof text, a->unit, v);
     if (a->from > a->to)
-        fprintf(out, "<text class=\"t\" x=\"%d\" y=\"%.1f\" text-anchor=\"end\">%s</text>\n", LEFT - 8, at + 4, text);
+        fprintf(out, "<text class=\"t\" x=\"%d\" y=\"%.1f\" text-anchor=\"end\">%s</text>\n",
+                LEFT - 8, at + 4, text);
     else
-        fprintf(out, "<text class=\"t\" x=\"%.1f\" y=\"%d\" text-anchor=\"middle\">%s</text>\n", at, HEIGHT - BOTTOM + 17, text);
+        fprintf(out, "<text class=\"t\" x=\"%.1f\" y=\"%d\" text-anchor=\"middle\">%s</text>\n", at,
+                HEIGHT - BOTTOM + 17, text);
 }
 
 static void stepped_ticks(FILE *out, const axis *a)
@@ -217,7 +236,8 @@ static void write_axis(FILE *out, const axis *a)
         return;
     }
     double decades = log10(a->high / a->low), last = -100;
-    for (double decade = pow(10, floor(log10(a->low) + 1e-9)); decade <= a->high * 1.0001; decade *= 10)
+    for (double decade = pow(10, floor(log10(a->low) + 1e-9)); decade <= a->high * 1.0001;
+         decade *= 10)
         for (int digit = 1; digit <= 9; digit++) {
             double v = digit * decade;
             if (v < a->low * 0.9999 || v > a->high * 1.0001)
@@ -248,18 +268,31 @@ void plot_marker(FILE *out, int colour, double x, double y, double size)
     fputs("<path class=\"p\" fill=\"", out);
     colour_of(out, colour);
     switch (colour < 0 ? 0 : colour % 4) {
-    case 1: fprintf(out, "\" d=\"M%.1f %.1fh%.1fv%.1fh%.1fz\"", x - s * 0.9, y - s * 0.9, 1.8 * s, 1.8 * s, -1.8 * s); break;
-    case 2: fprintf(out, "\" d=\"M%.1f %.1fL%.1f %.1fL%.1f %.1fz\"", x, y - t, x + t, y + 0.8 * t, x - t, y + 0.8 * t); break;
-    case 3: fprintf(out, "\" d=\"M%.1f %.1fL%.1f %.1fL%.1f %.1fL%.1f %.1fz\"", x, y - t, x + t, y, x, y + t, x - t, y); break;
-    default: fprintf(out, "\" d=\"M%.1f %.1fa%.1f %.1f 0 1 0 %.1f 0a%.1f %.1f 0 1 0 %.1f 0z\"", x - s, y, s, s, 2 * s, s, s, -2 * s);
+    case 1:
+        fprintf(out, "\" d=\"M%.1f %.1fh%.1fv%.1fh%.1fz\"", x - s * 0.9, y - s * 0.9, 1.8 * s,
+                1.8 * s, -1.8 * s);
+        break;
+    case 2:
+        fprintf(out, "\" d=\"M%.1f %.1fL%.1f %.1fL%.1f %.1fz\"", x, y - t, x + t, y + 0.8 * t,
+                x - t, y + 0.8 * t);
+        break;
+    case 3:
+        fprintf(out, "\" d=\"M%.1f %.1fL%.1f %.1fL%.1f %.1fL%.1f %.1fz\"", x, y - t, x + t, y, x,
+                y + t, x - t, y);
+        break;
+    default:
+        fprintf(out, "\" d=\"M%.1f %.1fa%.1f %.1f 0 1 0 %.1f 0a%.1f %.1f 0 1 0 %.1f 0z\"", x - s, y,
+                s, s, 2 * s, s, s, -2 * s);
     }
     fputs(">", out); /* left open for a title */
 }
 
-static void write_point(FILE *out, const plot *p, const plot_series *s, const plot_point *at, const axis *x, const axis *y)
+static void write_point(FILE *out, const plot *p, const plot_series *s, const plot_point *at,
+                        const axis *x, const axis *y)
 {
     char text[2][40];
-    plot_marker(out, s->colour, place(x, at->x), place(y, at->y), s->colour < 0 || s->dashed ? 2.2 : 3.6);
+    plot_marker(out, s->colour, place(x, at->x), place(y, at->y),
+                s->colour < 0 || s->dashed ? 2.2 : 3.6);
     fputs("<title>", out);
     html_text(out, s->name);
     if (at->mark >= 0 && p->x != PLOT_LEVEL)
@@ -271,7 +304,8 @@ static void write_point(FILE *out, const plot *p, const plot_series *s, const pl
     fprintf(out, " %s</title></path>\n", plot_value(text[1], sizeof text[1], p->x, at->x));
 }
 
-static void write_series(FILE *out, const plot *p, const plot_series *s, const axis *x, const axis *y)
+static void write_series(FILE *out, const plot *p, const plot_series *s, const axis *x,
+                         const axis *y)
 {
     fputs("<path class=\"", out);
     fputs(s->colour < 0 ? "l ref" : s->dashed ? "l dash" : "l", out);
@@ -279,13 +313,15 @@ static void write_series(FILE *out, const plot *p, const plot_series *s, const a
     colour_of(out, s->colour);
     fputs("\" d=\"", out);
     for (int i = 0; i < s->count; i++)
-        fprintf(out, "%s%.1f %.1f", i ? "L" : "M", place(x, s->point[i].x), place(y, s->point[i].y));
+        fprintf(out, "%s%.1f %.1f", i ? "L" : "M", place(x, s->point[i].x),
+                place(y, s->point[i].y));
     fputs("\"/>\n", out);
     for (int i = 0; i < s->count; i++)
         write_point(out, p, s, &s->point[i], x, y);
 }
 
-/* The first series' numbers, which tell which point is which level; left out where they would stand on each other. */
+/* The first series' numbers, which tell which point is which level; left out where they would stand
+ * on each other. */
 static void write_marks(FILE *out, const plot_series *s, const axis *x, const axis *y)
 {
     double last_x = -100, last_y = -100;
@@ -293,7 +329,8 @@ static void write_marks(FILE *out, const plot_series *s, const axis *x, const ax
         double px = place(x, s->point[i].x), py = place(y, s->point[i].y);
         if (s->point[i].mark < 0 || hypot(px - last_x, py - last_y) < 13)
             continue;
-        fprintf(out, "<text class=\"k\" x=\"%.1f\" y=\"%.1f\" text-anchor=\"middle\">%d</text>\n", px, py - 8, s->point[i].mark);
+        fprintf(out, "<text class=\"k\" x=\"%.1f\" y=\"%.1f\" text-anchor=\"middle\">%d</text>\n",
+                px, py - 8, s->point[i].mark);
         last_x = px;
         last_y = py;
     }
@@ -338,7 +375,8 @@ static void write_labels(FILE *out, const plot *p, const axis *x, const axis *y)
     for (int i = 0; i < count; i++) {
         fprintf(out, "<path class=\"lead\" stroke=\"");
         colour_of(out, l[i].series->colour);
-        fprintf(out, "\" d=\"M%.1f %.1fL%d %.1f\"/><text class=\"n\" fill=\"", l[i].x + 5, l[i].y, WIDTH - RIGHT + 6, l[i].at);
+        fprintf(out, "\" d=\"M%.1f %.1fL%d %.1f\"/><text class=\"n\" fill=\"", l[i].x + 5, l[i].y,
+                WIDTH - RIGHT + 6, l[i].at);
         colour_of(out, l[i].series->colour);
         fprintf(out, "\" x=\"%d\" y=\"%.1f\">", WIDTH - RIGHT + 9, l[i].at + 4);
         html_text(out, l[i].series->name);
@@ -354,7 +392,8 @@ static void write_frame(FILE *out, const plot *p, const axis *x, const axis *y)
     write_axis(out, y);
     fputs("<text class=\"a\" x=\"4\" y=\"18\">", out);
     html_text(out, p->y_name);
-    fprintf(out, "</text><text class=\"a\" x=\"%d\" y=\"%d\" text-anchor=\"end\">", WIDTH - RIGHT, HEIGHT - 8);
+    fprintf(out, "</text><text class=\"a\" x=\"%d\" y=\"%d\" text-anchor=\"end\">", WIDTH - RIGHT,
+            HEIGHT - 8);
     html_text(out, p->x_name);
     fputs("</text>\n", out);
 }
@@ -363,8 +402,10 @@ static void write_diagonal(FILE *out, const axis *x, const axis *y)
 {
     double low = fmax(x->low, y->low), high = fmin(x->high, y->high);
     if (low < high)
-        fprintf(out, "<path class=\"l ref\" stroke=\"var(--ref)\" d=\"M%.1f %.1fL%.1f %.1f\"><title>the word kept exactly</title></path>\n", place(x, low), place(y, low),
-                place(x, high), place(y, high));
+        fprintf(out,
+                "<path class=\"l ref\" stroke=\"var(--ref)\" d=\"M%.1f %.1fL%.1f %.1f\"><title>the "
+                "word kept exactly</title></path>\n",
+                place(x, low), place(y, low), place(x, high), place(y, high));
 }
 
 void plot_write(FILE *out, const plot *p)
@@ -372,7 +413,10 @@ void plot_write(FILE *out, const plot *p)
     axis x = axis_of(p, false), y = axis_of(p, true);
     fputs("<figure class=\"plot\"><figcaption>", out);
     html_text(out, p->title);
-    fprintf(out, "</figcaption>\n<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" role=\"img\" aria-label=\"", WIDTH, HEIGHT);
+    fprintf(out,
+            "</figcaption>\n<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" "
+            "role=\"img\" aria-label=\"",
+            WIDTH, HEIGHT);
     html_text(out, p->title);
     fputs("\">\n", out);
     write_frame(out, p, &x, &y);

@@ -1,4 +1,5 @@
-/* Line plots as inline SVG: logarithmic axes (or whole numbers along x), a grid that can be read, labels at the lines' ends. Colours are the page's: style sheet variables. */
+/* Line plots as inline SVG: logarithmic axes (or whole numbers along x), a grid that can be read,
+ * labels at the lines' ends. Colours are the page's: style sheet variables. */
 #ifndef EBPO_TOOLS_REPORT_PLOT_H
 #define EBPO_TOOLS_REPORT_PLOT_H
 
@@ -8,7 +9,14 @@
 enum { PLOT_SERIES_MAX = 26, PLOT_POINTS_MAX = 24 };
 
 /* How an axis' values are written. */
-typedef enum plot_unit { PLOT_NUMBER, PLOT_PERCENT, PLOT_BYTES, PLOT_SECONDS, PLOT_LEVEL, PLOT_TIMES } plot_unit;
+typedef enum plot_unit {
+    PLOT_NUMBER,
+    PLOT_PERCENT,
+    PLOT_BYTES,
+    PLOT_SECONDS,
+    PLOT_LEVEL,
+    PLOT_TIMES
+} plot_unit;
 
 typedef struct plot_point {
     double x, y;

@@ -1,4 +1,5 @@
-/* What the clock tells, in rounds in which the methods take turns: having a level, questions to a level, questions with a deadline. */
+/* What the clock tells, in rounds in which the methods take turns: having a level, questions to a
+ * level, questions with a deadline. */
 #include <stdio.h>
 
 #include "bench_run.h"
@@ -6,7 +7,8 @@
 
 /* --- having a level --- */
 
-static ebpo_status have_level(const comparison *c, const method *m, int level, double *seconds, traffic *t, ebpo_error *error)
+static ebpo_status have_level(const comparison *c, const method *m, int level, double *seconds,
+                              traffic *t, ebpo_error *error)
 {
     ebpo_stream_options wanted = EBPO_STREAM_OPTIONS_INIT;
     ebpo_stream_level told;

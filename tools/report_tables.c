@@ -33,10 +33,7 @@ static void cell_marked(FILE *out, const char *class, plot_unit unit, double v)
         cell_text(out, class, plot_value(text, sizeof text, unit, v));
 }
 
-void cell(FILE *out, plot_unit unit, double v)
-{
-    cell_marked(out, NULL, unit, v);
-}
+void cell(FILE *out, plot_unit unit, double v) { cell_marked(out, NULL, unit, v); }
 
 void cell_first(FILE *out, plot_unit unit, double v)
 {
@@ -62,7 +59,8 @@ void cell_count(FILE *out, double v)
 
 /* --- methods side by side --- */
 
-void page_groups(FILE *out, const comparison *c, int columns, const char *group, const char *before, const char *each)
+void page_groups(FILE *out, const comparison *c, int columns, const char *group, const char *before,
+                 const char *each)
 {
     fprintf(out, "<div class=\"scroll\"><table><thead><tr class=\"groups\"><th></th>%s", group);
     for (int i = 0; i < c->count; i++) {
@@ -88,9 +86,14 @@ static double bytes_until(const comparison *c, const method *m, double goal)
 void page_glance(FILE *out, const comparison *c)
 {
     static const double goals[] = { 10, 3, 1 };
-    page_section(out, "glance", "At a glance", "Bytes until the levels alone exceed the solid’s volume by no more than 10, 3 and 1 percent; the build; exact questions.");
-    fputs("<div class=\"scroll\"><table><thead><tr><th>method</th><th>file</th><th>levels</th><th>planes</th><th>≤ 10 %</th><th>≤ 3 %</th><th>≤ 1 %</th><th>build</th>"
-          "<th>into memory</th><th>memory</th><th>point in solid,<br/>exact</th><th>distance,<br/>exact</th></tr></thead><tbody>\n",
+    page_section(out, "glance", "At a glance",
+                 "Bytes until the levels alone exceed the solid’s volume by no more than 10, 3 and "
+                 "1 percent; the build; exact questions.");
+    fputs("<div "
+          "class=\"scroll\"><table><thead><tr><th>method</th><th>file</th><th>levels</"
+          "th><th>planes</th><th>≤ 10 %</th><th>≤ 3 %</th><th>≤ 1 %</th><th>build</th>"
+          "<th>into memory</th><th>memory</th><th>point in "
+          "solid,<br/>exact</th><th>distance,<br/>exact</th></tr></thead><tbody>\n",
           out);
     for (int i = 0; i < c->count; i++) {
         const method *m = &c->methods[i];
@@ -125,9 +128,11 @@ static void limit_row(FILE *out, const comparison *c, int level)
     cell(out, PLOT_NUMBER, limit);
     for (int i = 0; i < c->count; i++) {
         const double *f = c->methods[i].level[level];
-        cell_marked(out, f[OF_EXCESS] <= best[0] && c->count > 1 ? "first best" : "first", PLOT_NUMBER, f[OF_EXCESS]);
+        cell_marked(out, f[OF_EXCESS] <= best[0] && c->count > 1 ? "first best" : "first",
+                    PLOT_NUMBER, f[OF_EXCESS]);
         cell(out, PLOT_NUMBER, f[OF_EXCESS_TO_LIMIT]);
-        cell_marked(out, f[OF_CUMULATIVE_BYTES] <= best[1] && c->count > 1 ? "best" : NULL, PLOT_BYTES, f[OF_CUMULATIVE_BYTES]);
+        cell_marked(out, f[OF_CUMULATIVE_BYTES] <= best[1] && c->count > 1 ? "best" : NULL,
+                    PLOT_BYTES, f[OF_CUMULATIVE_BYTES]);
     }
     fputs("</tr>\n", out);
 }
@@ -136,8 +141,11 @@ void page_against_limit(FILE *out, const comparison *c)
 {
     if (!any_level_figure(c, OF_EXCESS))
         return;
-    fputs("<h3>Excess of volume in percent of the solid’s, times the limit’s, and bytes so far</h3>\n", out);
-    page_groups(out, c, 3, "<th>limit</th>", "<th>level</th><th class=\"first\">%</th>", "<th class=\"first\">%</th><th>× limit</th><th>bytes</th>");
+    fputs("<h3>Excess of volume in percent of the solid’s, times the limit’s, and bytes so "
+          "far</h3>\n",
+          out);
+    page_groups(out, c, 3, "<th>limit</th>", "<th>level</th><th class=\"first\">%</th>",
+                "<th class=\"first\">%</th><th>× limit</th><th>bytes</th>");
     for (int k = c->first; k <= comparison_last(c); k++)
         limit_row(out, c, k);
     fputs("</tbody></table></div>\n", out);
@@ -158,9 +166,11 @@ static void need_row(FILE *out, const comparison *c, const need_result *wanted)
     static const double nothing[NEED_FIGURES] = { NAN, NAN, NAN, NAN, NAN };
     char text[48];
     if (wanted->kind == NEED_ERROR)
-        fprintf(out, "<tr><th>error ≤ %s</th>", plot_value(text, sizeof text, PLOT_PERCENT, report_of_diagonal(c, wanted->asked)));
+        fprintf(out, "<tr><th>error ≤ %s</th>",
+                plot_value(text, sizeof text, PLOT_PERCENT, report_of_diagonal(c, wanted->asked)));
     else
-        fprintf(out, "<tr><th>size ≤ %s</th>", plot_value(text, sizeof text, PLOT_BYTES, wanted->asked));
+        fprintf(out, "<tr><th>size ≤ %s</th>",
+                plot_value(text, sizeof text, PLOT_BYTES, wanted->asked));
     for (int i = 0; i < c->count; i++) {
         const need_result *n = need_of(&c->methods[i], wanted);
         const double *f = n ? n->figure : nothing;
@@ -181,10 +191,15 @@ void page_needs(FILE *out, const comparison *c)
     if (!most->need_count)
         return;
     page_section(out, "needs", "Choosing by need",
-                 "Files without mesh, cut to an error (in percent of the diagonal) or to a size. Reaches: how far the envelopes reach beyond the model, at least and certainly at most, in percent of the "
-                 "diagonal. Kept: that bound divided by the error that was asked for, or by what the whole file reaches where that is more (leaves cannot be refined); bytes divided by the size. 1 or less "
+                 "Files without mesh, cut to an error (in percent of the diagonal) or to a size. "
+                 "Reaches: how far the envelopes reach beyond the model, at least and certainly at "
+                 "most, in percent of the "
+                 "diagonal. Kept: that bound divided by the error that was asked for, or by what "
+                 "the whole file reaches where that is more (leaves cannot be refined); bytes "
+                 "divided by the size. 1 or less "
                  "keeps the word.");
-    page_groups(out, c, 4, "", "<th>asked for</th>", "<th class=\"first\">bytes</th><th>reaches ≥</th><th>≤</th><th>kept</th>");
+    page_groups(out, c, 4, "", "<th>asked for</th>",
+                "<th class=\"first\">bytes</th><th>reaches ≥</th><th>≤</th><th>kept</th>");
     for (int i = 0; i < most->need_count; i++)
         need_row(out, c, &most->need[i]);
     fputs("</tbody></table></div></section>\n", out);
@@ -219,9 +234,14 @@ static void shape_table(FILE *out, const comparison *c, const method *m)
 {
     bool alone = !(m->info.parts & EBPO_PART_LEAF_PLANES);
     fprintf(out,
-            "<div class=\"scroll\"><table><thead><tr class=\"groups\"><th></th><th colspan=\"6\">in the file</th><th colspan=\"%d\">volume</th><th colspan=\"4\">distance to the model, %%</th></tr>\n"
-            "<tr><th>level</th><th class=\"first\">bytes</th><th>so far</th><th>gray</th><th>leaves</th><th>planes</th><th>of leaves</th><th class=\"first\">envelopes</th><th>excess, %%</th>%s"
-            "<th>limit’s, %%</th><th>× limit</th><th class=\"first\">farthest ≥</th><th>≤</th><th>mean</th><th>rms</th></tr></thead><tbody>\n",
+            "<div class=\"scroll\"><table><thead><tr class=\"groups\"><th></th><th "
+            "colspan=\"6\">in the file</th><th colspan=\"%d\">volume</th><th "
+            "colspan=\"4\">distance to the model, %%</th></tr>\n"
+            "<tr><th>level</th><th class=\"first\">bytes</th><th>so "
+            "far</th><th>gray</th><th>leaves</th><th>planes</th><th>of leaves</th><th "
+            "class=\"first\">envelopes</th><th>excess, %%</th>%s"
+            "<th>limit’s, %%</th><th>× limit</th><th class=\"first\">farthest "
+            "≥</th><th>≤</th><th>mean</th><th>rms</th></tr></thead><tbody>\n",
             alone ? 5 : 4, alone ? "<th>levels alone, %</th>" : "");
     for (int k = c->first; k <= method_last(c, m); k++)
         shape_row(out, c, k, m->level[k], alone);
@@ -247,9 +267,13 @@ static void answer_row(FILE *out, const comparison *c, int level, const double *
 
 static void answer_table(FILE *out, const comparison *c, const method *m)
 {
-    fputs("<div class=\"scroll\"><table><thead><tr class=\"groups\"><th></th><th colspan=\"3\">point in solid, to the level</th><th colspan=\"4\">distance, to the level: width of the interval, %</th>"
-          "<th colspan=\"3\">to have the level</th></tr>\n<tr><th>level</th><th class=\"first\">MAYBE, uniform, %</th><th>near the surface, %</th><th>time</th>"
-          "<th class=\"first\">mean</th><th>median</th><th>99 %</th><th>time</th><th class=\"first\">time</th><th>read</th><th>reads</th></tr></thead><tbody>\n",
+    fputs("<div class=\"scroll\"><table><thead><tr class=\"groups\"><th></th><th "
+          "colspan=\"3\">point in solid, to the level</th><th colspan=\"4\">distance, to the "
+          "level: width of the interval, %</th>"
+          "<th colspan=\"3\">to have the level</th></tr>\n<tr><th>level</th><th "
+          "class=\"first\">MAYBE, uniform, %</th><th>near the surface, %</th><th>time</th>"
+          "<th class=\"first\">mean</th><th>median</th><th>99 %</th><th>time</th><th "
+          "class=\"first\">time</th><th>read</th><th>reads</th></tr></thead><tbody>\n",
           out);
     for (int k = c->first; k <= method_last(c, m); k++)
         answer_row(out, c, k, m->level[k]);
@@ -267,7 +291,9 @@ static void method_table(FILE *out, const comparison *c, const method *m)
 
 void page_tables(FILE *out, const comparison *c)
 {
-    page_section(out, "tables", "All figures by level", "Distances and widths in percent of the diagonal of the model’s box. Exact values, in the model’s unit, are in report.csv and report.json.");
+    page_section(out, "tables", "All figures by level",
+                 "Distances and widths in percent of the diagonal of the model’s box. Exact "
+                 "values, in the model’s unit, are in report.csv and report.json.");
     for (int i = 0; i < c->count; i++)
         method_table(out, c, &c->methods[i]);
     fputs("</section>\n", out);

@@ -1,6 +1,8 @@
-/* What the theses' cost model takes to send each level of a tree (BP 2008, section 4.2): uncompressed, level after level from the root, a leaf with its faces and their
- * vertices. A leaf: 1 byte for its corners. A plane: 16 bytes the first time its normal comes, else 4, and 4 for its offset. A face: 12 bytes the first time, else 4. A vertex
- * of a leaf: 12 bytes the first time, else 4. */
+/* What the theses' cost model takes to send each level of a tree (BP 2008, section 4.2):
+ * uncompressed, level after level from the root, a leaf with its faces and their vertices. A leaf:
+ * 1 byte for its corners. A plane: 16 bytes the first time its normal comes, else 4, and 4 for its
+ * offset. A face: 12 bytes the first time, else 4. A vertex of a leaf: 12 bytes the first time,
+ * else 4. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -11,7 +13,8 @@ enum { NORMAL_SPAN = 1023 }; /* -511 .. 511 */
 typedef struct sent {
     ebpo_mesh mesh;
     uint8_t *normals, *faces, *vertices; /* bits: came before */
-    uint64_t *leaf_of;                   /* [vertex_count] number of the leaf that had the vertex last, from 1 */
+    /* [vertex_count] number of the leaf that had the vertex last, from 1 */
+    uint64_t *leaf_of;
     uint64_t leaves;
 } sent;
 
@@ -31,7 +34,8 @@ static double plane_costs(sent *s, const uint32_t *codes, uint64_t count)
         int32_t n[3], d;
         if (!ebpo_plane_decode(codes[i], n, &d))
             continue;
-        uint64_t key = ((uint64_t)(n[0] + 511) * NORMAL_SPAN + (uint64_t)(n[1] + 511)) * 2 + (n[2] < 0);
+        uint64_t key =
+            ((uint64_t)(n[0] + 511) * NORMAL_SPAN + (uint64_t)(n[1] + 511)) * 2 + (n[2] < 0);
         sum += 4 + (first_time(s->normals, key) ? 16 : 4);
     }
     return sum;
@@ -81,7 +85,8 @@ static ebpo_status add_up(comparison *c, method *m, ebpo_file *file, sent *s, eb
         ebpo_status status = ebpo_file_read_level(file, i, &l, (unsigned)c->v->threads, error);
         if (status != EBPO_OK)
             return status;
-        double cost = plane_costs(s, l.planes, l.plane_count) + plane_costs(s, l.leaf_planes, l.leaf_plane_count) + leaf_costs(s, &l);
+        double cost = plane_costs(s, l.planes, l.plane_count) +
+                      plane_costs(s, l.leaf_planes, l.leaf_plane_count) + leaf_costs(s, &l);
         ebpo_level_free(&l);
         sum += cost;
         if (i < c->first)
@@ -101,7 +106,8 @@ ebpo_status report_thesis(comparison *c, method *m, ebpo_file *file, ebpo_error 
     }
     ebpo_status status = ebpo_file_read_mesh(file, &s.mesh, (unsigned)c->v->threads, error);
     if (status == EBPO_OK && !begin(&s)) {
-        snprintf(error->message, sizeof error->message, "not enough memory for a mark on each face and vertex");
+        snprintf(error->message, sizeof error->message,
+                 "not enough memory for a mark on each face and vertex");
         status = error->status = EBPO_E_MEMORY;
     }
     if (status == EBPO_OK)

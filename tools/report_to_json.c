@@ -1,4 +1,5 @@
-/* report.json: the same figures as report.csv, with what the quantities are, the model and the machine. */
+/* report.json: the same figures as report.csv, with what the quantities are, the model and the
+ * machine. */
 #include "json.h"
 #include "report_data.h"
 #include "words.h"
@@ -48,7 +49,8 @@ static void one_method(json *j, const comparison *c, const method *m)
     json_array(j, "needs");
     for (int i = 0; i < m->need_count; i++) {
         json_object(j, NULL);
-        json_real(j, m->need[i].kind == NEED_ERROR ? "max_error" : "target_bytes", m->need[i].asked);
+        json_real(j, m->need[i].kind == NEED_ERROR ? "max_error" : "target_bytes",
+                  m->need[i].asked);
         figures(j, need_figures, m->need[i].figure, NEED_FIGURES);
         json_end(j);
     }

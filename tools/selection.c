@@ -32,15 +32,20 @@ static int check_k_root(const char *name, const char *text)
     bool share;
     if (read_k_root(text, &k, &share))
         return EXIT_FINE;
-    fprintf(stderr, "ebpo %s: --k-root: '%s' is not a number of planes from 1 to 1e9, such as 500, or a share of the faces, such as 1%%; try 'ebpo %s --help'\n", name, text, name);
+    fprintf(stderr,
+            "ebpo %s: --k-root: '%s' is not a number of planes from 1 to 1e9, such as 500, or a "
+            "share of the faces, such as 1%%; try 'ebpo %s --help'\n",
+            name, text, name);
     return EXIT_USAGE;
 }
 
 int selection_check(const char *name, const selection_options *o)
 {
-    const uint32_t inherit = 1u << EBPO_SELECT_INHERIT, kmedoids = 1u << EBPO_SELECT_KMEDOIDS, random = 1u << EBPO_SELECT_RANDOM;
+    const uint32_t inherit = 1u << EBPO_SELECT_INHERIT, kmedoids = 1u << EBPO_SELECT_KMEDOIDS,
+                   random = 1u << EBPO_SELECT_RANDOM;
     if (!(o->chosen & ~inherit) && (o->percent >= 0 || o->k_root || o->normals >= 0))
-        return refused(name, "--percent, --k-root and --normals are for --select kmedoids, offset or random");
+        return refused(
+            name, "--percent, --k-root and --normals are for --select kmedoids, offset or random");
     if (!(o->chosen & inherit) && o->epsilon >= 0)
         return refused(name, "--epsilon is for --select inherit");
     if (o->normals >= 0 && !(o->chosen & kmedoids))
@@ -65,7 +70,10 @@ ebpo_status selection_k_root(const char *text, uint64_t faces, double *out, ebpo
     if (share)
         k = fmax(1, k / 100 * (double)faces);
     if (!fine || !(k <= most_planes)) {
-        snprintf(error->message, sizeof error->message, "--k-root: %.40s of %" PRIu64 " faces is more than 1e9 planes; give a smaller share", text, faces);
+        snprintf(error->message, sizeof error->message,
+                 "--k-root: %.40s of %" PRIu64
+                 " faces is more than 1e9 planes; give a smaller share",
+                 text, faces);
         return error->status = EBPO_E_ARGUMENT;
     }
     *out = k;

@@ -1,4 +1,5 @@
-/* The options that say how planes are chosen: what `ebpo convert` and `ebpo report` refuse, and what --k-root means. */
+/* The options that say how planes are chosen: what `ebpo convert` and `ebpo report` refuse, and
+ * what --k-root means. */
 #ifndef EBPO_TOOLS_SELECTION_H
 #define EBPO_TOOLS_SELECTION_H
 
@@ -12,10 +13,13 @@ typedef struct selection_options {
     int64_t seed;            /* of the selections alone; negative: not given */
 } selection_options;
 
-/* Refuses what would be without effect, and what is out of range. An exit code; what is wrong has been said on stderr. */
+/* Refuses what would be without effect, and what is out of range. An exit code; what is wrong has
+ * been said on stderr. */
 int selection_check(const char *name, const selection_options *o);
 
-/* Planes at the root, 1 to 1e9, of a text that was checked: "500", or "1%" of so many faces, at least 1. NULL: 0. EBPO_E_ARGUMENT: a share that is more than 1e9 planes. */
-EBPO_MUST_USE ebpo_status selection_k_root(const char *text, uint64_t faces, double *out, ebpo_error *error);
+/* Planes at the root, 1 to 1e9, of a text that was checked: "500", or "1%" of so many faces, at
+ * least 1. NULL: 0. EBPO_E_ARGUMENT: a share that is more than 1e9 planes. */
+EBPO_MUST_USE ebpo_status selection_k_root(const char *text, uint64_t faces, double *out,
+                                           ebpo_error *error);
 
 #endif

@@ -6,18 +6,16 @@
 
 static void (*volatile also)(void);
 
-void signals_also(void (*clean_up)(void))
-{
-    also = clean_up;
-}
+void signals_also(void (*clean_up)(void)) { also = clean_up; }
 
 static void give_up(int number)
 {
     ebpo_abandon_outputs();
     if (also)
         also();
-    /* SA_RESETHAND brought the default back: the parent sees which signal it was. At once, and not when this handler returns: another thread may be
-     * about to open the output by its name again. */
+    /* SA_RESETHAND brought the default back: the parent sees which signal it was. At once, and not
+     * when this handler returns: another thread may be about to open the output by its name again.
+     */
     sigset_t only;
     sigemptyset(&only);
     sigaddset(&only, number);

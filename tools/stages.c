@@ -5,9 +5,20 @@
 #include "words.h"
 
 /* EBP 2017, 3.6.4 and tables 8 to 10 and 18: six stages, and their sum. */
-enum { LEAVES = 1 << 0, CORNERS = 1 << 1, LEAF_PLANES = 1 << 2, PATHS = 1 << 3, CLIPPING = 1 << 4, STORING = 1 << 5, THESIS_STAGES = 6 };
+enum {
+    LEAVES = 1 << 0,
+    CORNERS = 1 << 1,
+    LEAF_PLANES = 1 << 2,
+    PATHS = 1 << 3,
+    CLIPPING = 1 << 4,
+    STORING = 1 << 5,
+    THESIS_STAGES = 6
+};
 
-static const char *const thesis_names[THESIS_STAGES + 1] = { "leaf creation", "corner labels", "leaf planes", "tree paths", "leaf clipping", "storing and propagating", "total" };
+static const char *const thesis_names[THESIS_STAGES + 1] = {
+    "leaf creation", "corner labels",           "leaf planes", "tree paths",
+    "leaf clipping", "storing and propagating", "total"
+};
 
 static const struct {
     const char *name;
@@ -16,9 +27,15 @@ static const struct {
 } rows[STAGE_ROWS] = {
     [STAGE_READING] = { "reading", 0, { "reading" } },
     [STAGE_MENDING] = { "mending", 0, { "mending" } },
-    [STAGE_ORDERING] = { "ordering", LEAVES, { "looking at faces", "measuring the box", "ordering vertices", "ordering faces", "bounds" } },
-    [STAGE_CHECKING] = { "checking", 0,
-                         { "checking coordinates", "counting faces at vertices", "linking faces to vertices", "checking vertices", "measuring faces", "checking edges", "comparing positions" } },
+    [STAGE_ORDERING] = { "ordering",
+                         LEAVES,
+                         { "looking at faces", "measuring the box", "ordering vertices",
+                           "ordering faces", "bounds" } },
+    [STAGE_CHECKING] = { "checking",
+                         0,
+                         { "checking coordinates", "counting faces at vertices",
+                           "linking faces to vertices", "checking vertices", "measuring faces",
+                           "checking edges", "comparing positions" } },
     [STAGE_CUTTING] = { "cutting", LEAVES | PATHS, { "cutting into pieces" } },
     [STAGE_CORNERS] = { "corners", CORNERS, { "winding numbers" } },
     [STAGE_CELLS] = { "cells", LEAVES | CORNERS | PATHS, { "cells" } },
@@ -28,7 +45,10 @@ static const struct {
     [STAGE_JOINING] = { "joining", STORING, { "joining levels" } },
     [STAGE_NUMBERING] = { "numbering", STORING, { "numbering vertices" } },
     [STAGE_WRITING] = { "writing", STORING, { "writing" } },
-    [STAGE_JUDGING] = { "judging", 0, { "reading levels", "looking at envelopes", "bounding envelopes", "judging envelopes" } },
+    [STAGE_JUDGING] = { "judging",
+                        0,
+                        { "reading levels", "looking at envelopes", "bounding envelopes",
+                          "judging envelopes" } },
     [STAGE_OTHER] = { "other", 0, { NULL } },
 };
 
@@ -51,7 +71,9 @@ int stages_plan(const stage_facts *f, int plan[STAGE_PLAN_MAX])
 {
     int n = 0;
     for (int r = 0; r < STAGE_OTHER; r++) {
-        bool left_out = (r == STAGE_MENDING && !f->mended) || (r == STAGE_CORNERS && !f->solid) || r == STAGE_CELLS || (r == STAGE_CHOOSING && !f->from_leaves) || /* cells are split off later */
+        bool left_out = (r == STAGE_MENDING && !f->mended) || (r == STAGE_CORNERS && !f->solid) ||
+                        r == STAGE_CELLS ||
+                        (r == STAGE_CHOOSING && !f->from_leaves) || /* cells are split off later */
                         (r == STAGE_JUDGING && !f->judged);
         if (r == STAGE_MENDING && f->mended) {
             plan[n++] = STAGE_ORDERING;
@@ -75,7 +97,8 @@ void stages_split(progress_line *line, const ebpo_build_times *times)
     }
     if (at == 0 || !(both > 0) || line->stage_count == PROGRESS_STAGES)
         return;
-    memmove(&line->stages[at + 1], &line->stages[at], (size_t)(line->stage_count - at) * sizeof *line->stages);
+    memmove(&line->stages[at + 1], &line->stages[at],
+            (size_t)(line->stage_count - at) * sizeof *line->stages);
     line->stage_count++;
     line->stages[at].name = "cells";
     line->stages[at].seconds *= times->cells / both;
@@ -103,7 +126,8 @@ static void print_thesis(FILE *out, unsigned thesis)
     fprintf(out, "%s\n", thesis ? "" : "-");
 }
 
-static unsigned of_thesis(const progress_line *line, const stage_facts *f, double seconds[STAGE_ROWS], bool began[STAGE_ROWS])
+static unsigned of_thesis(const progress_line *line, const stage_facts *f,
+                          double seconds[STAGE_ROWS], bool began[STAGE_ROWS])
 {
     unsigned all = 0;
     for (int i = 0; i < line->stage_count; i++) {
@@ -120,7 +144,8 @@ void stages_print(FILE *out, const progress_line *line, const stage_facts *f, do
     double taken[STAGE_ROWS] = { 0 }, sum = 0;
     bool began[STAGE_ROWS] = { false };
     unsigned done = of_thesis(line, f, taken, began);
-    fprintf(out, "  %-10s%9s%10s  %s\n", "stage", "seconds", "faces/s", "stages of the thesis (EBP-Octree 2017, 3.6.4)");
+    fprintf(out, "  %-10s%9s%10s  %s\n", "stage", "seconds", "faces/s",
+            "stages of the thesis (EBP-Octree 2017, 3.6.4)");
     for (int r = 0; r < STAGE_ROWS; r++) {
         if (!began[r])
             continue;
@@ -131,7 +156,8 @@ void stages_print(FILE *out, const progress_line *line, const stage_facts *f, do
     print_row(out, "all", seconds, f->faces);
     fprintf(out, "7 total: %.2f of it in 1 to 6\n", sum);
     if (!(done & LEAF_PLANES))
-        fprintf(out, "  not made: 3 leaf planes, 5 leaf clipping; readers derive them from a leaf's faces ('--with leaf-planes' stores them)\n");
+        fprintf(out, "  not made: 3 leaf planes, 5 leaf clipping; readers derive them from a "
+                     "leaf's faces ('--with leaf-planes' stores them)\n");
 }
 
 /* --- JSON --- */
@@ -146,7 +172,8 @@ static void thesis_numbers(json *j, unsigned thesis)
 }
 
 /* A stage of the thesis, and the rows that do its work; the last one is the sum. */
-static void thesis_stage(json *j, int number, const stage_facts *f, const bool began[STAGE_ROWS], const double taken[STAGE_ROWS])
+static void thesis_stage(json *j, int number, const stage_facts *f, const bool began[STAGE_ROWS],
+                         const double taken[STAGE_ROWS])
 {
     double sum = 0;
     unsigned wanted = number == THESIS_STAGES ? (1u << THESIS_STAGES) - 1 : 1u << number;

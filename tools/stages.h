@@ -9,10 +9,25 @@
 #include "json.h"
 #include "progress.h"
 
-/* In the order in which they begin, but for ordering and checking, which come before mending as well. */
+/* In the order in which they begin, but for ordering and checking, which come before mending as
+ * well. */
 typedef enum stage_row {
-    STAGE_READING, STAGE_MENDING, STAGE_ORDERING, STAGE_CHECKING, STAGE_CUTTING, STAGE_CORNERS, STAGE_CELLS, STAGE_CHOOSING, STAGE_TOP, STAGE_ENVELOPES, STAGE_JOINING,
-    STAGE_NUMBERING, STAGE_WRITING, STAGE_JUDGING, STAGE_OTHER, STAGE_ROWS
+    STAGE_READING,
+    STAGE_MENDING,
+    STAGE_ORDERING,
+    STAGE_CHECKING,
+    STAGE_CUTTING,
+    STAGE_CORNERS,
+    STAGE_CELLS,
+    STAGE_CHOOSING,
+    STAGE_TOP,
+    STAGE_ENVELOPES,
+    STAGE_JOINING,
+    STAGE_NUMBERING,
+    STAGE_WRITING,
+    STAGE_JUDGING,
+    STAGE_OTHER,
+    STAGE_ROWS
 } stage_row;
 
 /* Which of them the library's stage belongs to. */
@@ -29,7 +44,8 @@ enum { STAGE_PLAN_MAX = STAGE_ROWS + 3 };
 /* The rows that will come, in their order, for progress; returns how many. */
 int stages_plan(const stage_facts *f, int plan[STAGE_PLAN_MAX]);
 
-/* Cells and envelopes of the pieces are one stage of the library's: makes it two, by what their threads took. Before the two below. */
+/* Cells and envelopes of the pieces are one stage of the library's: makes it two, by what their
+ * threads took. Before the two below. */
 void stages_split(progress_line *line, const ebpo_build_times *times);
 
 /* Both after progress_end_stage. `seconds`: of all. */

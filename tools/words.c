@@ -26,10 +26,7 @@ static char *scaled(char *out, size_t room, double v, const char *unit)
     return out;
 }
 
-char *words_count(char *out, size_t room, double v)
-{
-    return scaled(out, room, v, "");
-}
+char *words_count(char *out, size_t room, double v) { return scaled(out, room, v, ""); }
 
 char *words_bytes(char *out, size_t room, uint64_t bytes)
 {
@@ -48,7 +45,8 @@ char *words_parts(char *out, size_t room, uint32_t parts)
     out[0] = 0;
     for (int i = 0; part_words[i]; i++)
         if (parts >> i & 1 && used < room)
-            used += (size_t)snprintf(out + used, room - used, "%s%s", used ? ", " : "", part_words[i]);
+            used +=
+                (size_t)snprintf(out + used, room - used, "%s%s", used ? ", " : "", part_words[i]);
     return out;
 }
 
@@ -64,10 +62,7 @@ const char *words_node_type(ebpo_node_type type)
     return words[type];
 }
 
-const char *words_rule(ebpo_rule rule)
-{
-    return (unsigned)rule < 3 ? rule_words[rule] : "unknown";
-}
+const char *words_rule(ebpo_rule rule) { return (unsigned)rule < 3 ? rule_words[rule] : "unknown"; }
 
 const char *words_codec(ebpo_codec codec)
 {
@@ -80,7 +75,8 @@ void words_hex(const uint8_t digest[32], char out[65])
         snprintf(out + 2 * i, 3, "%02x", digest[i]);
 }
 
-bool words_read_unit(const char *text, const char *const *units, const uint64_t *factors, uint64_t *out)
+bool words_read_unit(const char *text, const char *const *units, const uint64_t *factors,
+                     uint64_t *out)
 {
     char *end;
     errno = 0;
@@ -96,6 +92,8 @@ bool words_read_unit(const char *text, const char *const *units, const uint64_t 
 bool words_read_size(const char *text, uint64_t *out)
 {
     static const char *const units[] = { "", "K", "M", "G", "T", "k", "m", "g", "t", NULL };
-    static const uint64_t factors[] = { 1, 1u << 10, 1u << 20, 1u << 30, UINT64_C(1) << 40, 1u << 10, 1u << 20, 1u << 30, UINT64_C(1) << 40 };
+    static const uint64_t factors[] = { 1,        1u << 10,          1u << 20,
+                                        1u << 30, UINT64_C(1) << 40, 1u << 10,
+                                        1u << 20, 1u << 30,          UINT64_C(1) << 40 };
     return words_read_unit(text, units, factors, out);
 }

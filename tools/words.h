@@ -21,7 +21,8 @@ const char *words_node_type(ebpo_node_type type);
 const char *words_rule(ebpo_rule rule);
 const char *words_codec(ebpo_codec codec);
 /* Digits, then nothing or one of the units (NULL-terminated); the number times its factor. */
-bool words_read_unit(const char *text, const char *const *units, const uint64_t *factors, uint64_t *out);
+bool words_read_unit(const char *text, const char *const *units, const uint64_t *factors,
+                     uint64_t *out);
 /* 64M, 1G, 512K, 1000000: powers of 1024. */
 bool words_read_size(const char *text, uint64_t *out);
 void words_hex(const uint8_t digest[32], char out[65]);

@@ -1,4 +1,5 @@
-/* Vertices and faces along a Morton curve: then every cell's vertices are one run, and neighbours in space are neighbours in memory. */
+/* Vertices and faces along a Morton curve: then every cell's vertices are one run, and neighbours
+ * in space are neighbours in memory. */
 #include "geom/strict_fp.h"
 
 #include <math.h>
@@ -21,15 +22,16 @@ enum { GRAIN = 1 << 15 };
 typedef struct arranging {
     ebpo_mesh *mesh;
     unsigned threads;
-    bool together;                 /* referenced or not, vertices go where their positions say */
+    bool together; /* referenced or not, vertices go where their positions say */
     const ebpo_progress *progress;
-    uint8_t *referenced;           /* bit v: a face names vertex v */
-    double (*bounds)[2][3];        /* of each GRAIN of vertices */
+    uint8_t *referenced;    /* bit v: a face names vertex v */
+    double (*bounds)[2][3]; /* of each GRAIN of vertices */
     struct ebpo_arrangement *to;
     float *xyz32;
     double *xyz64;
     uint32_t *rank, *corners, *faces;
-    uint64_t rank_first, rank_count; /* the window of `rank`: of vertices with these source numbers */
+    /* the window of `rank`: of vertices with these source numbers */
+    uint64_t rank_first, rank_count;
 } arranging;
 
 static bool is_referenced(const arranging *a, uint64_t v)
@@ -39,15 +41,20 @@ static bool is_referenced(const arranging *a, uint64_t v)
 
 /* --- what is there --- */
 
-static ebpo_status mark_vertices(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status mark_vertices(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
 {
     arranging *a = context;
     (void)worker;
     for (uint64_t i = 3 * begin; i < 3 * end; i++) {
         uint32_t v = a->mesh->faces[i];
         if (v >= a->mesh->vertex_count)
-            return ebpo_fail(error, EBPO_E_FORMAT, "%s: face %llu names vertex %lu, but there are %llu vertices; repair the file or drop the face", ebpo_mesh_label(a->mesh),
-                             (unsigned long long)ebpo_mesh_source_face(a->mesh, i / 3), (unsigned long)v, (unsigned long long)a->mesh->vertex_count);
+            return ebpo_fail(error, EBPO_E_FORMAT,
+                             "%s: face %llu names vertex %lu, but there are %llu vertices; repair "
+                             "the file or drop the face",
+                             ebpo_mesh_label(a->mesh),
+                             (unsigned long long)ebpo_mesh_source_face(a->mesh, i / 3),
+                             (unsigned long)v, (unsigned long long)a->mesh->vertex_count);
         uint8_t bit = (uint8_t)(1u << v % 8);
         if (!(__atomic_load_n(&a->referenced[v / 8], __ATOMIC_RELAXED) & bit))
             __atomic_fetch_or(&a->referenced[v / 8], bit, __ATOMIC_RELAXED);
@@ -56,11 +63,12 @@ static ebpo_status mark_vertices(void *context, uint64_t begin, uint64_t end, un
     return EBPO_OK;
 }
 
-static ebpo_status find_bounds(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status find_bounds(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
 {
     arranging *a = context;
     (void)worker;
-    double (*b)[3] = a->bounds[begin / GRAIN];
+    double(*b)[3] = a->bounds[begin / GRAIN];
     for (int k = 0; k < 3; k++)
         b[0][k] = INFINITY, b[1][k] = -INFINITY;
     for (uint64_t v = begin; v < end; v++) {
@@ -68,8 +76,14 @@ static ebpo_status find_bounds(void *context, uint64_t begin, uint64_t end, unsi
         ebpo_mesh_position(a->mesh, v, p);
         for (int k = 0; k < 3; k++)
             if (!isfinite(p[k]))
-                return ebpo_fail(error, EBPO_E_FORMAT, "%s: vertex %llu has %c = %s; repair the coordinate or drop the vertex and its faces", ebpo_mesh_label(a->mesh),
-                                 (unsigned long long)ebpo_mesh_source_vertex(a->mesh, v), "xyz"[k], isnan(p[k]) ? "nan" : p[k] > 0 ? "inf" : "-inf");
+                return ebpo_fail(error, EBPO_E_FORMAT,
+                                 "%s: vertex %llu has %c = %s; repair the coordinate or drop the "
+                                 "vertex and its faces",
+                                 ebpo_mesh_label(a->mesh),
+                                 (unsigned long long)ebpo_mesh_source_vertex(a->mesh, v), "xyz"[k],
+                                 isnan(p[k]) ? "nan"
+                                 : p[k] > 0  ? "inf"
+                                             : "-inf");
         for (int k = 0; k < 3 && is_referenced(a, v); k++) {
             b[0][k] = p[k] < b[0][k] ? p[k] : b[0][k];
             b[1][k] = p[k] > b[1][k] ? p[k] : b[1][k];
@@ -79,7 +93,8 @@ static ebpo_status find_bounds(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Exact walls at deep levels cost room around a model that is small and far from the origin: the deepest level for which that hardly shows. */
+/* Exact walls at deep levels cost room around a model that is small and far from the origin: the
+ * deepest level for which that hardly shows. */
 static bool choose_box(ebpo_box *out, const double min[3], const double max[3], int level)
 {
     static const double larger = 1 + 0x1p-16;
@@ -89,7 +104,8 @@ static bool choose_box(ebpo_box *out, const double min[3], const double max[3], 
     if (!ebpo_box_make(&least, min, max, 0))
         return false;
     for (int deep = EBPO_MAX_LEVEL; deep > 0; deep--)
-        if (ebpo_box_make(out, min, max, deep) && out->size[0] <= least.size[0] * larger && out->size[1] <= least.size[1] * larger && out->size[2] <= least.size[2] * larger)
+        if (ebpo_box_make(out, min, max, deep) && out->size[0] <= least.size[0] * larger &&
+            out->size[1] <= least.size[1] * larger && out->size[2] <= least.size[2] * larger)
             return true;
     *out = least;
     return true;
@@ -102,10 +118,13 @@ static ebpo_status look_at_all(arranging *a, int level, ebpo_error *error)
     a->referenced = ebpo_array_zero(mesh->workspace, mesh->vertex_count / 8 + 1, 1);
     a->bounds = ebpo_alloc(blocks, sizeof *a->bounds);
     if (!a->referenced || !a->bounds)
-        return ebpo_workspace_fail(mesh->workspace, mesh->vertex_count / 8 + blocks * sizeof *a->bounds, error);
-    ebpo_status status = ebpo_parallel_for(a->threads, mesh->face_count, GRAIN, mark_vertices, a, a->progress, "looking at faces", error);
+        return ebpo_workspace_fail(mesh->workspace,
+                                   mesh->vertex_count / 8 + blocks * sizeof *a->bounds, error);
+    ebpo_status status = ebpo_parallel_for(a->threads, mesh->face_count, GRAIN, mark_vertices, a,
+                                           a->progress, "looking at faces", error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(a->threads, mesh->vertex_count, GRAIN, find_bounds, a, a->progress, "measuring the box", error);
+        status = ebpo_parallel_for(a->threads, mesh->vertex_count, GRAIN, find_bounds, a,
+                                   a->progress, "measuring the box", error);
     if (status != EBPO_OK)
         return status;
     double min[3] = { INFINITY, INFINITY, INFINITY }, max[3] = { -INFINITY, -INFINITY, -INFINITY };
@@ -118,7 +137,10 @@ static ebpo_status look_at_all(arranging *a, int level, ebpo_error *error)
     for (int k = 0; k < 3; k++)
         most = fmax(most, fmax(fabs(min[k]), fabs(max[k])));
     if (!choose_box(&a->to->box, min, max, level))
-        return ebpo_fail(error, EBPO_E_LIMIT, "%s: coordinates up to %g are too large for an exact grid; scale the model", ebpo_mesh_label(mesh), most);
+        return ebpo_fail(
+            error, EBPO_E_LIMIT,
+            "%s: coordinates up to %g are too large for an exact grid; scale the model",
+            ebpo_mesh_label(mesh), most);
     return EBPO_OK;
 }
 
@@ -137,7 +159,8 @@ typedef struct float_record {
     float p[3];
 } float_record;
 
-/* The wall numbers around a coordinate; division may round to the wrong side of a wall, comparing with the exact wall does not. */
+/* The wall numbers around a coordinate; division may round to the wrong side of a wall, comparing
+ * with the exact wall does not. */
 static uint32_t slot(const ebpo_box *box, int axis, int level, double x)
 {
     double cells = (double)(1u << level), at = (x - box->origin[axis]) / (box->size[axis] / cells);
@@ -149,7 +172,8 @@ static uint32_t slot(const ebpo_box *box, int axis, int level, double x)
     return k;
 }
 
-/* An octcode as if of level 20, so that sorting knows where its leading bits are. What no face names goes behind all that is. */
+/* An octcode as if of level 20, so that sorting knows where its leading bits are. What no face
+ * names goes behind all that is. */
 static uint64_t key_of(const arranging *a, uint64_t v)
 {
     const ebpo_box *box = &a->to->box;
@@ -158,10 +182,12 @@ static uint64_t key_of(const arranging *a, uint64_t v)
     ebpo_cell cell = { box->grid_level, { 0, 0, 0 } };
     for (int k = 0; k < 3; k++)
         cell.at[k] = slot(box, k, cell.level, p[k]);
-    return ebpo_octcode_of_cell(cell) << 3 * (EBPO_MAX_LEVEL - box->grid_level) | (a->together || is_referenced(a, v) ? 0 : UNREFERENCED);
+    return ebpo_octcode_of_cell(cell) << 3 * (EBPO_MAX_LEVEL - box->grid_level) |
+           (a->together || is_referenced(a, v) ? 0 : UNREFERENCED);
 }
 
-static ebpo_status make_vertices(void *context, uint64_t begin, uint64_t end, void *records, ebpo_error *error)
+static ebpo_status make_vertices(void *context, uint64_t begin, uint64_t end, void *records,
+                                 ebpo_error *error)
 {
     const arranging *a = context;
     const ebpo_mesh *mesh = a->mesh;
@@ -218,7 +244,8 @@ static void take_vertices(void *context, uint64_t place, const void *records, ui
             key = r->key, at = r->at;
         }
         if (a->to->key)
-            a->to->key[place] = (key & ~UNREFERENCED) >> 3 * (EBPO_MAX_LEVEL - a->to->box.grid_level);
+            a->to->key[place] =
+                (key & ~UNREFERENCED) >> 3 * (EBPO_MAX_LEVEL - a->to->box.grid_level);
         a->to->vertex_source[place] = at; /* told in the source's numbers at the end */
     }
 }
@@ -237,15 +264,24 @@ static ebpo_status sort_vertices(arranging *a, ebpo_error *error)
     a->xyz64 = mesh->xyz32 ? NULL : ebpo_array_alloc(mesh->workspace, n, 3 * sizeof *a->xyz64);
     if ((ordered && !a->to->key) || !a->to->vertex_source || (!a->xyz32 && !a->xyz64))
         return ebpo_workspace_fail(mesh->workspace, n * 36, error);
-    ebpo_sort sort = { .workspace = mesh->workspace, .threads = a->threads, .progress = a->progress, .stage = "ordering vertices", .count = n,
-                       .record = mesh->xyz32 ? sizeof(float_record) : sizeof(vertex_record), .shift = 46, .context = a, .make = make_vertices,
-                       .compare = mesh->xyz32 ? compare_floats : compare_doubles, .take = take_vertices };
+    ebpo_sort sort = { .workspace = mesh->workspace,
+                       .threads = a->threads,
+                       .progress = a->progress,
+                       .stage = "ordering vertices",
+                       .count = n,
+                       .record = mesh->xyz32 ? sizeof(float_record) : sizeof(vertex_record),
+                       .shift = 46,
+                       .context = a,
+                       .make = make_vertices,
+                       .compare = mesh->xyz32 ? compare_floats : compare_doubles,
+                       .take = take_vertices };
     return ebpo_sort_run(&sort, error);
 }
 
 /* --- faces: first told in the vertices' new numbers, then sorted by the least of these --- */
 
-static ebpo_status fill_ranks(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status fill_ranks(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
 {
     arranging *a = context;
     (void)worker, (void)error;
@@ -258,7 +294,8 @@ static ebpo_status fill_ranks(void *context, uint64_t begin, uint64_t end, unsig
     return EBPO_OK;
 }
 
-static ebpo_status translate(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status translate(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                             ebpo_error *error)
 {
     arranging *a = context;
     (void)worker, (void)error;
@@ -271,7 +308,8 @@ static ebpo_status translate(void *context, uint64_t begin, uint64_t end, unsign
     return EBPO_OK;
 }
 
-/* By windows of vertices that fit into memory, all faces for each: memory is gone through in order, but for the window. */
+/* By windows of vertices that fit into memory, all faces for each: memory is gone through in order,
+ * but for the window. */
 static ebpo_status translate_faces(arranging *a, uint64_t *passes, ebpo_error *error)
 {
     ebpo_mesh *mesh = a->mesh;
@@ -285,18 +323,22 @@ static ebpo_status translate_faces(arranging *a, uint64_t *passes, ebpo_error *e
     if (!a->rank || !a->corners) {
         free(a->rank);
         a->rank = NULL;
-        return ebpo_workspace_fail(mesh->workspace, a->rank_count * 4 + mesh->face_count * 12, error);
+        return ebpo_workspace_fail(mesh->workspace, a->rank_count * 4 + mesh->face_count * 12,
+                                   error);
     }
     ebpo_status status = EBPO_OK;
     *passes = 2 * ((mesh->vertex_count + a->rank_count - 1) / a->rank_count);
     ebpo_pass pass = { a->progress, 0, 0, *passes + EBPO_SORT_PASSES };
     ebpo_progress progress = ebpo_pass_progress(&pass);
-    for (a->rank_first = 0; a->rank_first < mesh->vertex_count && status == EBPO_OK; a->rank_first += a->rank_count) {
+    for (a->rank_first = 0; a->rank_first < mesh->vertex_count && status == EBPO_OK;
+         a->rank_first += a->rank_count) {
         pass.begin = pass.end++;
-        status = ebpo_parallel_for(a->threads, mesh->vertex_count, GRAIN, fill_ranks, a, &progress, "ordering faces", error);
+        status = ebpo_parallel_for(a->threads, mesh->vertex_count, GRAIN, fill_ranks, a, &progress,
+                                   "ordering faces", error);
         pass.begin = pass.end++;
         if (status == EBPO_OK)
-            status = ebpo_parallel_for(a->threads, mesh->face_count, GRAIN, translate, a, &progress, "ordering faces", error);
+            status = ebpo_parallel_for(a->threads, mesh->face_count, GRAIN, translate, a, &progress,
+                                       "ordering faces", error);
     }
     free(a->rank);
     a->rank = NULL;
@@ -304,11 +346,13 @@ static ebpo_status translate_faces(arranging *a, uint64_t *passes, ebpo_error *e
 }
 
 typedef struct face_record {
-    uint64_t key;        /* least vertex << 32 | number in the source: from whatever order, the result is the same */
+    /* least vertex << 32 | number in the source: from whatever order, the result is the same */
+    uint64_t key;
     uint32_t corner[3], unused;
 } face_record;
 
-static ebpo_status make_faces(void *context, uint64_t begin, uint64_t end, void *records, ebpo_error *error)
+static ebpo_status make_faces(void *context, uint64_t begin, uint64_t end, void *records,
+                              ebpo_error *error)
 {
     const arranging *a = context;
     (void)error;
@@ -316,7 +360,9 @@ static ebpo_status make_faces(void *context, uint64_t begin, uint64_t end, void 
         face_record *r = (face_record *)records + (f - begin);
         const uint32_t *c = a->corners + 3 * f;
         uint32_t least = c[0] < c[1] ? c[0] : c[1];
-        *r = (face_record){ .key = (uint64_t)(c[2] < least ? c[2] : least) << 32 | ebpo_mesh_source_face(a->mesh, f), .corner = { c[0], c[1], c[2] } };
+        *r = (face_record){ .key = (uint64_t)(c[2] < least ? c[2] : least) << 32 |
+                                   ebpo_mesh_source_face(a->mesh, f),
+                            .corner = { c[0], c[1], c[2] } };
     }
     return EBPO_OK;
 }
@@ -346,20 +392,33 @@ static ebpo_status sort_faces(arranging *a, ebpo_error *error)
     if (status != EBPO_OK)
         return status;
     a->faces = ebpo_array_alloc(mesh->workspace, mesh->face_count, 3 * sizeof *a->faces);
-    a->to->face_source = ebpo_array_alloc(mesh->workspace, mesh->face_count, sizeof *a->to->face_source);
+    a->to->face_source =
+        ebpo_array_alloc(mesh->workspace, mesh->face_count, sizeof *a->to->face_source);
     if (!a->faces || !a->to->face_source)
         return ebpo_workspace_fail(mesh->workspace, mesh->face_count * 16, error);
     while (mesh->vertex_count >> (shift - 32) >= EBPO_SORT_BINS)
         shift++;
-    ebpo_sort sort = { .workspace = mesh->workspace, .threads = a->threads, .progress = a->progress, .stage = "ordering faces", .passes_before = passes, .count = mesh->face_count, .record = sizeof(face_record),
-                       .shift = shift, .context = a, .make = make_faces, .compare = compare_faces, .take = take_faces };
+    ebpo_sort sort = { .workspace = mesh->workspace,
+                       .threads = a->threads,
+                       .progress = a->progress,
+                       .stage = "ordering faces",
+                       .passes_before = passes,
+                       .count = mesh->face_count,
+                       .record = sizeof(face_record),
+                       .shift = shift,
+                       .context = a,
+                       .make = make_faces,
+                       .compare = compare_faces,
+                       .take = take_faces };
     return ebpo_sort_run(&sort, error);
 }
 
 /* --- all --- */
 
-/* A mesh that was arranged already: the source's numbers of vertices come from its own map; those of faces were sorted by. */
-static void compose(const struct ebpo_arrangement *before, ebpo_workspace *workspace, uint32_t *map, uint64_t count)
+/* A mesh that was arranged already: the source's numbers of vertices come from its own map; those
+ * of faces were sorted by. */
+static void compose(const struct ebpo_arrangement *before, ebpo_workspace *workspace, uint32_t *map,
+                    uint64_t count)
 {
     for (uint64_t i = 0; before && i < count; i++) {
         ebpo_workspace_settle_often(workspace, i);
@@ -391,7 +450,9 @@ static ebpo_status run(arranging a, int level, ebpo_error *error)
     ebpo_mesh *mesh = a.mesh;
     ebpo_status status = ebpo_mesh_check_shape(mesh, error);
     if (status == EBPO_OK && mesh->face_count == 0)
-        return ebpo_fail(error, EBPO_E_FORMAT, "%s: %llu vertices but no faces; give a triangle mesh, not a point cloud", ebpo_mesh_label(mesh), (unsigned long long)mesh->vertex_count);
+        return ebpo_fail(error, EBPO_E_FORMAT,
+                         "%s: %llu vertices but no faces; give a triangle mesh, not a point cloud",
+                         ebpo_mesh_label(mesh), (unsigned long long)mesh->vertex_count);
     if (status != EBPO_OK)
         return status;
     if (mesh->arrangement && mesh->arrangement->key && mesh->arrangement->level == level)
@@ -416,19 +477,29 @@ static ebpo_status run(arranging a, int level, ebpo_error *error)
     return status;
 }
 
-ebpo_status ebpo_mesh_arrange(ebpo_mesh *mesh, unsigned threads, ebpo_progress progress, ebpo_error *error)
+ebpo_status ebpo_mesh_arrange(ebpo_mesh *mesh, unsigned threads, ebpo_progress progress,
+                              ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     return ebpo_arrange(mesh, -1, threads, &progress, error);
 }
 
-ebpo_status ebpo_mesh_arrange_to_mend(ebpo_mesh *mesh, unsigned threads, ebpo_progress progress, ebpo_error *error)
+ebpo_status ebpo_mesh_arrange_to_mend(ebpo_mesh *mesh, unsigned threads, ebpo_progress progress,
+                                      ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    return run((arranging){ .mesh = mesh, .threads = ebpo_thread_count(threads), .progress = &progress, .together = true }, -1, error);
+    return run((arranging){ .mesh = mesh,
+                            .threads = ebpo_thread_count(threads),
+                            .progress = &progress,
+                            .together = true },
+               -1, error);
 }
 
-ebpo_status ebpo_arrange(ebpo_mesh *mesh, int level, unsigned threads, const ebpo_progress *progress, ebpo_error *error)
+ebpo_status ebpo_arrange(ebpo_mesh *mesh, int level, unsigned threads,
+                         const ebpo_progress *progress, ebpo_error *error)
 {
-    return run((arranging){ .mesh = mesh, .threads = ebpo_thread_count(threads), .progress = progress }, level, error);
+    return run((arranging){ .mesh = mesh,
+                            .threads = ebpo_thread_count(threads),
+                            .progress = progress },
+               level, error);
 }

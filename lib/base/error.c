@@ -8,10 +8,7 @@
 
 #include "ebpo_config.h"
 
-const char *ebpo_version(void)
-{
-    return EBPO_VERSION;
-}
+const char *ebpo_version(void) { return EBPO_VERSION; }
 
 const char *ebpo_status_name(ebpo_status status)
 {
@@ -49,7 +46,8 @@ ebpo_status ebpo_fail(ebpo_error *error, ebpo_status status, const char *format,
 
 ebpo_status ebpo_fail_memory(ebpo_error *error, uint64_t bytes)
 {
-    return ebpo_fail(error, EBPO_E_MEMORY, "out of memory: %" PRIu64 " bytes could not be had", bytes);
+    return ebpo_fail(error, EBPO_E_MEMORY, "out of memory: %" PRIu64 " bytes could not be had",
+                     bytes);
 }
 
 ebpo_status ebpo_fail_errno(ebpo_error *error, const char *path, const char *what)

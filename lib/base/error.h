@@ -4,9 +4,10 @@
 
 #include <ebpo/base.h>
 
-/* Writes the message (printf style) and returns `status`, so that `return ebpo_fail(...)` reads well. `error` may be NULL.
- * An error that is already set is overwritten. */
-ebpo_status ebpo_fail(ebpo_error *error, ebpo_status status, const char *format, ...) EBPO_PRINTF(3, 4);
+/* Writes the message (printf style) and returns `status`, so that `return ebpo_fail(...)` reads
+ * well. `error` may be NULL. An error that is already set is overwritten. */
+ebpo_status ebpo_fail(ebpo_error *error, ebpo_status status, const char *format, ...)
+    EBPO_PRINTF(3, 4);
 
 /* EBPO_E_MEMORY with the number of bytes that could not be had. */
 ebpo_status ebpo_fail_memory(ebpo_error *error, uint64_t bytes);

@@ -1,7 +1,11 @@
-/* The floating-point environment of public functions: rounding to nearest, denormals kept, no traps, whatever the caller has set.
+/* The floating-point environment of public functions: rounding to nearest, denormals kept, no
+ * traps, whatever the caller has set.
  *
- * EBPO_DEFAULT_FP; as the first line of a public function puts the caller's environment aside until the function returns, by any way. It costs a few nanoseconds where the environment is the default
- * one, as nothing is written then. Threads that the function starts inherit the environment. Exception flags that the caller had raised stay; those of the library's own operations are added or not. */
+ * EBPO_DEFAULT_FP; as the first line of a public function puts the caller's environment aside until
+ * the function returns, by any way. It costs a few nanoseconds where the environment is the default
+ * one, as nothing is written then. Threads that the function starts inherit the environment.
+ * Exception flags that the caller had raised stay; those of the library's own operations are added
+ * or not. */
 #ifndef EBPO_BASE_FP_ENV_H
 #define EBPO_BASE_FP_ENV_H
 
@@ -13,7 +17,8 @@ typedef struct ebpo_fp_env {
     unsigned control;
 } ebpo_fp_env;
 
-/* Of the control register, all but the six exception flags; and its default: all exceptions masked, to nearest, no flush to zero, no denormals-are-zero. */
+/* Of the control register, all but the six exception flags; and its default: all exceptions masked,
+ * to nearest, no flush to zero, no denormals-are-zero. */
 enum { EBPO_FP_CONTROL = 0xffc0, EBPO_FP_DEFAULT = 0x1f80 };
 
 /* The asm keeps the compiler from moving memory reads, and what is computed from them, across. */
@@ -75,13 +80,11 @@ static inline ebpo_fp_env ebpo_fp_enter(void)
     return env;
 }
 
-static inline void ebpo_fp_leave(const ebpo_fp_env *env)
-{
-    fesetenv(&env->all);
-}
+static inline void ebpo_fp_leave(const ebpo_fp_env *env) { fesetenv(&env->all); }
 #endif
 
-#define EBPO_DEFAULT_FP \
-    __attribute__((cleanup(ebpo_fp_leave), unused)) const ebpo_fp_env ebpo_callers_fp = ebpo_fp_enter()
+#define EBPO_DEFAULT_FP                                                                 \
+    __attribute__((cleanup(ebpo_fp_leave), unused)) const ebpo_fp_env ebpo_callers_fp = \
+        ebpo_fp_enter()
 
 #endif

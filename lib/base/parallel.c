@@ -89,9 +89,11 @@ static void *run_worker(void *argument)
     return NULL;
 }
 
-bool ebpo_tell(const ebpo_progress *progress, const char *stage, uint64_t done, uint64_t total, ebpo_error *error)
+bool ebpo_tell(const ebpo_progress *progress, const char *stage, uint64_t done, uint64_t total,
+               ebpo_error *error)
 {
-    if (!progress || !progress->report || !*stage || progress->report(progress->user, stage, done, total))
+    if (!progress || !progress->report || !*stage ||
+        progress->report(progress->user, stage, done, total))
         return true;
     ebpo_fail(error, EBPO_E_CANCELLED, "stopped on request during %s", stage);
     return false;
@@ -107,7 +109,9 @@ static bool report_pass(void *user, const char *stage, uint64_t done, uint64_t t
     const ebpo_pass *p = user;
     double share = total ? (double)done / (double)total : 0;
     enum { PARTS = 1024 }; /* a pass may be one of few */
-    return p->to->report(p->to->user, stage, PARTS * p->begin + (uint64_t)(share * PARTS * (double)(p->end - p->begin)), PARTS * p->of);
+    return p->to->report(p->to->user, stage,
+                         PARTS * p->begin + (uint64_t)(share * PARTS * (double)(p->end - p->begin)),
+                         PARTS * p->of);
 }
 
 ebpo_progress ebpo_pass_progress(ebpo_pass *pass)
@@ -115,11 +119,18 @@ ebpo_progress ebpo_pass_progress(ebpo_pass *pass)
     return (ebpo_progress){ pass->to && pass->to->report ? report_pass : NULL, pass };
 }
 
-ebpo_status ebpo_parallel_for(unsigned threads, uint64_t count, uint64_t grain, ebpo_task_fn task, void *context,
-                              const ebpo_progress *progress, const char *stage, ebpo_error *error)
+ebpo_status ebpo_parallel_for(unsigned threads, uint64_t count, uint64_t grain, ebpo_task_fn task,
+                              void *context, const ebpo_progress *progress, const char *stage,
+                              ebpo_error *error)
 {
-    run r = { .count = count, .grain = grain ? grain : 1, .task = task, .context = context, .progress = progress,
-              .stage = stage, .lock = PTHREAD_MUTEX_INITIALIZER, .status = EBPO_OK };
+    run r = { .count = count,
+              .grain = grain ? grain : 1,
+              .task = task,
+              .context = context,
+              .progress = progress,
+              .stage = stage,
+              .lock = PTHREAD_MUTEX_INITIALIZER,
+              .status = EBPO_OK };
     /* A stage is told when it begins, however short it will be: callers add up times by stages. */
     if (!ebpo_tell(progress, stage, 0, count, error))
         return EBPO_E_CANCELLED;

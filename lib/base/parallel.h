@@ -4,32 +4,41 @@
 
 #include <ebpo/base.h>
 
-/* One piece: items [begin, end). `worker` is 0 .. threads - 1, for per-thread scratch. Anything but EBPO_OK stops the whole run
- * after the pieces that are under way; `error` belongs to this worker. */
-typedef ebpo_status (*ebpo_task_fn)(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error);
+/* One piece: items [begin, end). `worker` is 0 .. threads - 1, for per-thread scratch. Anything but
+ * EBPO_OK stops the whole run after the pieces that are under way; `error` belongs to this worker.
+ */
+typedef ebpo_status (*ebpo_task_fn)(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                    ebpo_error *error);
 
 /* Number of threads for a request; 0 means the cores this process may use. Never 0, at most 256. */
 unsigned ebpo_thread_count(unsigned requested);
 
-/* Calls `task` over [0, count) in pieces of `grain` items (at least 1), handed out in ascending order to `threads` threads (as ebpo_thread_count
- * gives them); the calling thread works too and reports progress (`stage`, items done; at the beginning 0). Which thread runs which piece is not determined: results
- * must not depend on it. Of several failures the one of the lowest piece is returned. */
-ebpo_status ebpo_parallel_for(unsigned threads, uint64_t count, uint64_t grain, ebpo_task_fn task, void *context,
-                              const ebpo_progress *progress, const char *stage, ebpo_error *error);
+/* Calls `task` over [0, count) in pieces of `grain` items (at least 1), handed out in ascending
+ * order to `threads` threads (as ebpo_thread_count gives them); the calling thread works too and
+ * reports progress (`stage`, items done; at the beginning 0). Which thread runs which piece is not
+ * determined: results must not depend on it. Of several failures the one of the lowest piece is
+ * returned. */
+ebpo_status ebpo_parallel_for(unsigned threads, uint64_t count, uint64_t grain, ebpo_task_fn task,
+                              void *context, const ebpo_progress *progress, const char *stage,
+                              ebpo_error *error);
 
 /* A stage without pieces begins. False when it is to stop; `error` then says so. */
 bool ebpo_stage(const ebpo_progress *progress, const char *stage, ebpo_error *error);
 
-/* How far a stage without pieces is; false as above. Not more often than for each few thousand steps. */
-bool ebpo_tell(const ebpo_progress *progress, const char *stage, uint64_t done, uint64_t total, ebpo_error *error);
+/* How far a stage without pieces is; false as above. Not more often than for each few thousand
+ * steps. */
+bool ebpo_tell(const ebpo_progress *progress, const char *stage, uint64_t done, uint64_t total,
+               ebpo_error *error);
 
 /* The same within a loop that goes through arrays in order. */
-static inline bool ebpo_tell_at(const ebpo_progress *progress, const char *stage, uint64_t i, uint64_t done, uint64_t total, ebpo_error *error)
+static inline bool ebpo_tell_at(const ebpo_progress *progress, const char *stage, uint64_t i,
+                                uint64_t done, uint64_t total, ebpo_error *error)
 {
     return (i & 0xfffff) || ebpo_tell(progress, stage, done, total, error);
 }
 
-/* One of several passes of a stage: what it tells of itself is told as a stretch, `begin` to `end` of `of`, so that what is done only grows. */
+/* One of several passes of a stage: what it tells of itself is told as a stretch, `begin` to `end`
+ * of `of`, so that what is done only grows. */
 typedef struct ebpo_pass {
     const ebpo_progress *to; /* NULL is fine */
     uint64_t begin, end, of;

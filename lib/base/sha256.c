@@ -1,19 +1,13 @@
 #include "base/sha256.h"
 
-void ebpo_sha256_begin(ebpo_sha256 *state)
-{
-    sha256_init(state);
-}
+void ebpo_sha256_begin(ebpo_sha256 *state) { sha256_init(state); }
 
 void ebpo_sha256_add(ebpo_sha256 *state, const void *data, size_t size)
 {
     sha256_update(state, size, data);
 }
 
-void ebpo_sha256_end(ebpo_sha256 *state, uint8_t digest[32])
-{
-    sha256_digest(state, 32, digest);
-}
+void ebpo_sha256_end(ebpo_sha256 *state, uint8_t digest[32]) { sha256_digest(state, 32, digest); }
 
 void ebpo_sha256_hex(const uint8_t digest[32], char hex[65])
 {

@@ -12,13 +12,17 @@ typedef float v8f __attribute__((vector_size(32)));
 typedef int32_t v8i __attribute__((vector_size(32)));
 typedef double v4d __attribute__((vector_size(32)));
 typedef int64_t v4l __attribute__((vector_size(32)));
-typedef float v8f_stored __attribute__((vector_size(32), may_alias)); /* eight floats in an array, aligned to 32 bytes */
+/* eight floats in an array, aligned to 32 bytes */
+typedef float v8f_stored __attribute__((vector_size(32), may_alias));
 
 static inline v8f v8f_all(float x) { return (v8f){ x, x, x, x, x, x, x, x }; }
 static inline v4d v4d_all(double x) { return (v4d){ x, x, x, x }; }
 static inline v8f v8f_abs(v8f x) { return (v8f)((v8i)x & 0x7fffffff); }
 static inline v4d v4d_abs(v4d x) { return (v4d)((v4l)x & INT64_MAX); }
-static inline v8f v8f_pick(v8i mask, v8f yes, v8f no) { return (v8f)(((v8i)yes & mask) | ((v8i)no & ~mask)); }
+static inline v8f v8f_pick(v8i mask, v8f yes, v8f no)
+{
+    return (v8f)(((v8i)yes & mask) | ((v8i)no & ~mask));
+}
 
 /* The greater, and the lesser; the second one when one is no number. */
 #if defined(__AVX__)
@@ -38,10 +42,10 @@ typedef union ebpo_halves {
     __m128 ps[2];
     __m128d pd[2];
 } ebpo_halves;
-#define EBPO_HALVES(op, a, b) \
+#define EBPO_HALVES(op, a, b)                   \
     ebpo_halves x = { .f = a }, y = { .f = b }; \
-    x.ps[0] = op(x.ps[0], y.ps[0]); \
-    x.ps[1] = op(x.ps[1], y.ps[1]); \
+    x.ps[0] = op(x.ps[0], y.ps[0]);             \
+    x.ps[1] = op(x.ps[1], y.ps[1]);             \
     return x.f
 static inline v8f v8f_max(v8f a, v8f b) { EBPO_HALVES(_mm_max_ps, a, b); }
 static inline v8f v8f_min(v8f a, v8f b) { EBPO_HALVES(_mm_min_ps, a, b); }
@@ -69,7 +73,10 @@ static inline unsigned v4l_mask(v4l m)
     ebpo_halves x = { .l = m };
     return (unsigned)(_mm_movemask_pd(x.pd[0]) | _mm_movemask_pd(x.pd[1]) << 2);
 }
-static inline v4d v4d_from_floats(const float *p) { return (v4d){ (double)p[0], (double)p[1], (double)p[2], (double)p[3] }; }
+static inline v4d v4d_from_floats(const float *p)
+{
+    return (v4d){ (double)p[0], (double)p[1], (double)p[2], (double)p[3] };
+}
 #else
 #include <math.h>
 static inline v8f v8f_max(v8f a, v8f b) { return v8f_pick(a > b, a, b); }
@@ -95,10 +102,14 @@ static inline unsigned v4l_mask(v4l m)
         out |= (unsigned)(m[i] < 0) << i;
     return out;
 }
-static inline v4d v4d_from_floats(const float *p) { return (v4d){ (double)p[0], (double)p[1], (double)p[2], (double)p[3] }; }
+static inline v4d v4d_from_floats(const float *p)
+{
+    return (v4d){ (double)p[0], (double)p[1], (double)p[2], (double)p[3] };
+}
 #endif
 
-/* 1 / a to about 2^-22, not always the same on all processors: for filters only. No number for 0. */
+/* 1 / a to about 2^-22, not always the same on all processors: for filters only. No number for 0.
+ */
 static inline v8f v8f_inverse(v8f a)
 {
     v8f x = v8f_about_inverse(a);

@@ -7,16 +7,25 @@
 #include "base/error.h"
 #include "base/parallel.h"
 
-/* Records of a group, more or less: few enough for a core's own cache. No more groups than places that may be written to at a time. */
-enum { GROUP = 1 << 16, LARGE_GROUP = 4 * GROUP, GROUPS_MOST = 1024, GRAIN = 1 << 14, DIGIT = 256, ALONE = 1 << 12, JUMPS = 4 };
+/* Records of a group, more or less: few enough for a core's own cache. No more groups than places
+ * that may be written to at a time. */
+enum {
+    GROUP = 1 << 16,
+    LARGE_GROUP = 4 * GROUP,
+    GROUPS_MOST = 1024,
+    GRAIN = 1 << 14,
+    DIGIT = 256,
+    ALONE = 1 << 12,
+    JUMPS = 4
+};
 
 typedef struct sorting {
     const ebpo_sort *s;
-    uint8_t *made, *dealt;  /* records: as made, and by groups */
-    uint64_t *first;        /* [groups + 1] of each group, in `dealt` */
-    uint64_t *next;         /* [groups] where its next records go */
-    uint32_t *group_of;     /* [EBPO_SORT_BINS] */
-    uint64_t *in_bin;       /* [EBPO_SORT_BINS] */
+    uint8_t *made, *dealt; /* records: as made, and by groups */
+    uint64_t *first;       /* [groups + 1] of each group, in `dealt` */
+    uint64_t *next;        /* [groups] where its next records go */
+    uint32_t *group_of;    /* [EBPO_SORT_BINS] */
+    uint64_t *in_bin;      /* [EBPO_SORT_BINS] */
     uint64_t groups;
 } sorting;
 
@@ -27,7 +36,8 @@ static uint64_t key_of(const uint8_t *record)
     return key;
 }
 
-static ebpo_status make_records(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status make_records(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                ebpo_error *error)
 {
     sorting *t = context;
     const ebpo_sort *s = t->s;
@@ -43,7 +53,8 @@ static ebpo_status make_records(void *context, uint64_t begin, uint64_t end, uns
 /* Neighbouring bins go together until they are enough. */
 static bool form_groups(sorting *t)
 {
-    uint64_t enough = t->s->count / GROUPS_MOST > GROUP ? t->s->count / GROUPS_MOST : GROUP, capacity = 0, sum = 0;
+    uint64_t enough = t->s->count / GROUPS_MOST > GROUP ? t->s->count / GROUPS_MOST : GROUP,
+             capacity = 0, sum = 0;
     t->groups = 0;
     for (uint32_t bin = 0; bin < EBPO_SORT_BINS; bin++) {
         t->group_of[bin] = (uint32_t)t->groups;
@@ -64,8 +75,10 @@ static bool form_groups(sorting *t)
     return t->next != NULL;
 }
 
-/* Sorts a piece by groups, in the core's own cache, and moves each group's records together: whatever order they came in, there are no more jumps than groups. */
-static ebpo_status deal(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+/* Sorts a piece by groups, in the core's own cache, and moves each group's records together:
+ * whatever order they came in, there are no more jumps than groups. */
+static ebpo_status deal(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                        ebpo_error *error)
 {
     sorting *t = context;
     const ebpo_sort *s = t->s;
@@ -157,7 +170,8 @@ static ebpo_status sort_group(const sorting *t, uint64_t g, ebpo_error *error)
     const ebpo_sort *s = t->s;
     uint64_t count = t->first[g + 1] - t->first[g];
     const uint8_t *group = t->dealt + t->first[g] * s->record;
-    ebpo_workspace *room = count > LARGE_GROUP ? s->workspace : NULL; /* records that differ in no leading bit */
+    /* records that differ in no leading bit */
+    ebpo_workspace *room = count > LARGE_GROUP ? s->workspace : NULL;
     keyed *keys = ebpo_array_alloc(room, 2 * count, sizeof *keys);
     uint8_t *sorted = ebpo_array_alloc(room, count, s->record);
     ebpo_status status = EBPO_OK;
@@ -181,7 +195,8 @@ static ebpo_status sort_group(const sorting *t, uint64_t g, ebpo_error *error)
     return status;
 }
 
-static ebpo_status sort_groups(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status sort_groups(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
 {
     sorting *t = context;
     (void)worker;
@@ -221,33 +236,40 @@ static unsigned threads_for_groups(const sorting *t)
         ebpo_workspace_tell(s->workspace, &figures);
     for (uint64_t g = 0; g < t->groups; g++)
         largest = t->first[g + 1] - t->first[g] > largest ? t->first[g + 1] - t->first[g] : largest;
-    uint64_t fit = figures.memory / 8 / ((largest < LARGE_GROUP ? largest : LARGE_GROUP) * (2 * sizeof(keyed) + s->record));
+    uint64_t fit =
+        figures.memory / 8 /
+        ((largest < LARGE_GROUP ? largest : LARGE_GROUP) * (2 * sizeof(keyed) + s->record));
     return fit < 1 ? 1 : s->threads < fit ? s->threads : (unsigned)fit;
 }
 
 static ebpo_status run(sorting *t, ebpo_error *error)
 {
     const ebpo_sort *s = t->s;
-    ebpo_pass pass = { s->progress, s->passes_before, s->passes_before + 1, s->passes_before + EBPO_SORT_PASSES };
+    ebpo_pass pass = { s->progress, s->passes_before, s->passes_before + 1,
+                       s->passes_before + EBPO_SORT_PASSES };
     ebpo_progress progress = ebpo_pass_progress(&pass);
-    ebpo_status status = ebpo_parallel_for(s->threads, s->count, GRAIN, make_records, t, &progress, s->stage, error);
+    ebpo_status status =
+        ebpo_parallel_for(s->threads, s->count, GRAIN, make_records, t, &progress, s->stage, error);
     pass.begin = pass.end++;
     if (status == EBPO_OK && !form_groups(t))
         status = ebpo_fail_memory(error, 0);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(s->threads, s->count, GRAIN, deal, t, &progress, s->stage, error);
+        status =
+            ebpo_parallel_for(s->threads, s->count, GRAIN, deal, t, &progress, s->stage, error);
     ebpo_array_free(t->made);
     t->made = NULL;
     pass.begin = pass.end++;
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads_for_groups(t), t->groups, 1, sort_groups, t, &progress, s->stage, error);
+        status = ebpo_parallel_for(threads_for_groups(t), t->groups, 1, sort_groups, t, &progress,
+                                   s->stage, error);
     return status;
 }
 
 ebpo_status ebpo_sort_run(const ebpo_sort *sort, ebpo_error *error)
 {
     if (sort->record > EBPO_SORT_RECORD_MOST)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "records of %zu bytes are not sorted", sort->record);
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "records of %zu bytes are not sorted",
+                         sort->record);
     sorting t = { .s = sort };
     uint64_t bytes = sort->count * sort->record;
     if (sort->count <= ALONE) {
@@ -259,7 +281,9 @@ ebpo_status ebpo_sort_run(const ebpo_sort *sort, ebpo_error *error)
     t.dealt = ebpo_array_alloc(sort->workspace, sort->count, sort->record);
     t.group_of = ebpo_alloc(EBPO_SORT_BINS, sizeof *t.group_of);
     t.in_bin = ebpo_alloc_zero(EBPO_SORT_BINS, sizeof *t.in_bin);
-    ebpo_status status = t.made && t.dealt && t.group_of && t.in_bin ? run(&t, error) : ebpo_workspace_fail(sort->workspace, 2 * bytes, error);
+    ebpo_status status = t.made && t.dealt && t.group_of && t.in_bin
+                             ? run(&t, error)
+                             : ebpo_workspace_fail(sort->workspace, 2 * bytes, error);
     ebpo_array_free(t.made);
     ebpo_array_free(t.dealt);
     free(t.first);

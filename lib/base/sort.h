@@ -1,5 +1,6 @@
-/* Sorting far more records than memory holds: they are dealt out to groups by the leading bits of their keys, and each group, a stretch of the result, is sorted by itself. Arrays are gone
- * through in order, or in as many places at a time as there are groups. */
+/* Sorting far more records than memory holds: they are dealt out to groups by the leading bits of
+ * their keys, and each group, a stretch of the result, is sorted by itself. Arrays are gone through
+ * in order, or in as many places at a time as there are groups. */
 #ifndef EBPO_BASE_SORT_H
 #define EBPO_BASE_SORT_H
 
@@ -12,13 +13,15 @@ typedef struct ebpo_sort {
     unsigned threads;
     const ebpo_progress *progress;
     const char *stage;
-    uint64_t passes_before; /* of this stage, that its caller has done; sorting takes EBPO_SORT_PASSES */
+    /* of this stage, that its caller has done; sorting takes EBPO_SORT_PASSES */
+    uint64_t passes_before;
     uint64_t count;
     size_t record;  /* bytes, at most EBPO_SORT_RECORD_MOST; each begins with its key, 8 bytes */
     unsigned shift; /* key >> shift is below EBPO_SORT_BINS, for all keys */
     void *context;
     /* Writes the records of items [begin, end). From any thread. */
-    ebpo_status (*make)(void *context, uint64_t begin, uint64_t end, void *records, ebpo_error *error);
+    ebpo_status (*make)(void *context, uint64_t begin, uint64_t end, void *records,
+                        ebpo_error *error);
     /* Decides between records of one key, which must differ: less than 0 when `a` comes first. */
     int (*compare)(const void *a, const void *b);
     /* Is given the sorted records, group by group, from any thread: those of places `place` on. */

@@ -13,7 +13,8 @@
 #include "base/alloc.h"
 #include "base/error.h"
 
-/* Arrays smaller than a page are malloc's; those smaller than a block are parts of a pool, which is a block: a build has thousands of them. */
+/* Arrays smaller than a page are malloc's; those smaller than a block are parts of a pool, which is
+ * a block: a build has thousands of them. */
 enum { PAGE = 4096, LEAST_BLOCK = 1 << 16, POOL_BYTES = 1 << 20, PATH_BYTES = 4096 };
 
 typedef enum block_kind {
@@ -39,11 +40,12 @@ struct ebpo_workspace {
     pthread_mutex_t lock; /* guards the figures */
     pthread_mutex_t pool_lock;
     ebpo_workspace_figures figures;
-    uint64_t blocks; /* and the owner is one */
-    block *pool;     /* that the next part comes from; NULL: none */
+    uint64_t blocks;    /* and the owner is one */
+    block *pool;        /* that the next part comes from; NULL: none */
     _Atomic int failed; /* errno of the last allocation in a file that failed, 0: memory */
-    int statm;       /* /proc/self/statm */
-    uint64_t floor;  /* bytes of files, libraries among them, that stayed resident when pages were let go of */
+    int statm;          /* /proc/self/statm */
+    /* bytes of files, libraries among them, that stayed resident when pages were let go of */
+    uint64_t floor;
     size_t page;
     char folder[PATH_BYTES];
     ebpo_workspace *next; /* in the list of all */
@@ -53,7 +55,8 @@ static pthread_mutex_t list_lock = PTHREAD_MUTEX_INITIALIZER;
 static ebpo_workspace *list;
 static int listed; /* read without the lock */
 
-/* All blocks of the process, by address: who frees an array need not know where it comes from. Pieces of a build have their arrays freed one by one, so there are thousands at most. */
+/* All blocks of the process, by address: who frees an array need not know where it comes from.
+ * Pieces of a build have their arrays freed one by one, so there are thousands at most. */
 enum { BUCKETS = 1 << 10 };
 static pthread_mutex_t table_lock = PTHREAD_MUTEX_INITIALIZER;
 static block *table[BUCKETS];
@@ -122,14 +125,17 @@ static uint64_t least_limit(const char *mounted, char *path, const char *file, u
     }
 }
 
-/* Of the control groups of this process (cgroups(7): lines "0::/path", or of version 1 "4:memory:/path"); within a container the path may not be there, but the topmost group is its own. */
+/* Of the control groups of this process (cgroups(7): lines "0::/path", or of version 1
+ * "4:memory:/path"); within a container the path may not be there, but the topmost group is its
+ * own. */
 static uint64_t group_memory(const char *groups, uint64_t least)
 {
     char line[PATH_BYTES];
     FILE *f = fopen(groups, "re");
     while (f && fgets(line, sizeof line, f)) {
         line[strcspn(line, "\n")] = 0;
-        char *controller = strchr(line, ':'), *path = controller ? strchr(controller + 1, ':') : NULL;
+        char *controller = strchr(line, ':'),
+             *path = controller ? strchr(controller + 1, ':') : NULL;
         if (!path)
             continue;
         *path++ = 0;
@@ -146,10 +152,13 @@ static uint64_t group_memory(const char *groups, uint64_t least)
 static uint64_t machine_memory(void)
 {
     long pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGESIZE);
-    return group_memory("/proc/self/cgroup", pages > 0 && page > 0 ? (uint64_t)pages * (uint64_t)page : UINT64_C(1) << 32);
+    return group_memory("/proc/self/cgroup", pages > 0 && page > 0
+                                                 ? (uint64_t)pages * (uint64_t)page
+                                                 : UINT64_C(1) << 32);
 }
 
-/* The name that a file has for a moment, where files cannot be made without one: a signal may come in that moment. One at a time. */
+/* The name that a file has for a moment, where files cannot be made without one: a signal may come
+ * in that moment. One at a time. */
 static pthread_mutex_t passing_lock = PTHREAD_MUTEX_INITIALIZER;
 static atomic_bool is_passing;
 static char passing[PATH_BYTES + 64];
@@ -169,7 +178,8 @@ static int open_and_unlink(const char *folder)
     pthread_mutex_lock(&passing_lock);
     for (int attempt = 0; attempt < 100 && fd < 0; attempt++) {
         snprintf(passing, sizeof passing, "%s/.ebpo-%ld-%u.tmp", folder, (long)getpid(), counter++);
-        atomic_store(&is_passing, true); /* before it exists, so that there is no moment in which it would be left behind */
+        /* before it exists, so that there is no moment in which it would be left behind */
+        atomic_store(&is_passing, true);
         fd = open(passing, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
         if (fd >= 0)
             unlink(passing);
@@ -187,7 +197,9 @@ static int open_and_unlink(const char *folder)
 static int open_unnamed(const char *folder)
 {
     int fd = open(folder, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
-    return fd >= 0 || (errno != EOPNOTSUPP && errno != EISDIR && errno != EINVAL) ? fd : open_and_unlink(folder);
+    return fd >= 0 || (errno != EOPNOTSUPP && errno != EISDIR && errno != EINVAL)
+               ? fd
+               : open_and_unlink(folder);
 }
 
 static ebpo_status choose_folder(ebpo_workspace *w, const char *wanted, ebpo_error *error)
@@ -196,29 +208,37 @@ static ebpo_status choose_folder(ebpo_workspace *w, const char *wanted, ebpo_err
     if (!folder || !*folder)
         folder = "/var/tmp";
     if (strlen(folder) >= sizeof w->folder)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "the name of the folder for temporary files is longer than %zu bytes", sizeof w->folder - 1);
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "the name of the folder for temporary files is longer than %zu bytes",
+                         sizeof w->folder - 1);
     strcpy(w->folder, folder);
     int fd = open_unnamed(folder);
     if (fd < 0)
-        return ebpo_fail(error, EBPO_E_IO, "%s: cannot hold temporary files: %s; name another folder for them", folder, strerror(errno));
+        return ebpo_fail(error, EBPO_E_IO,
+                         "%s: cannot hold temporary files: %s; name another folder for them",
+                         folder, strerror(errno));
     close(fd);
     return EBPO_OK;
 }
 
-ebpo_status ebpo_workspace_make(ebpo_workspace **out, const ebpo_workspace_options *options, ebpo_error *error)
+ebpo_status ebpo_workspace_make(ebpo_workspace **out, const ebpo_workspace_options *options,
+                                ebpo_error *error)
 {
     static const ebpo_workspace_options usual = EBPO_WORKSPACE_OPTIONS_INIT;
     options = options ? options : &usual;
     *out = NULL;
     uint64_t memory = options->memory ? options->memory : machine_memory() / 2;
     if (memory < EBPO_WORKSPACE_LEAST && options->memory)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "%llu bytes of memory are too few; %d MiB are the least", (unsigned long long)memory, EBPO_WORKSPACE_LEAST >> 20);
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "%llu bytes of memory are too few; %d MiB are the least",
+                         (unsigned long long)memory, EBPO_WORKSPACE_LEAST >> 20);
     if (memory < EBPO_WORKSPACE_LEAST)
         memory = EBPO_WORKSPACE_LEAST;
     return ebpo_workspace_make_any(out, memory, options->temp_dir, error);
 }
 
-ebpo_status ebpo_workspace_make_any(ebpo_workspace **out, uint64_t memory, const char *temp_dir, ebpo_error *error)
+ebpo_status ebpo_workspace_make_any(ebpo_workspace **out, uint64_t memory, const char *temp_dir,
+                                    ebpo_error *error)
 {
     *out = NULL;
     ebpo_workspace *w = ebpo_alloc_zero(1, sizeof *w);
@@ -312,7 +332,8 @@ static void dismiss(ebpo_workspace *w, size_t bytes, bool filed)
     leave(w);
 }
 
-/* The file's blocks are had before it is written to: a full disk would otherwise show as a signal. */
+/* The file's blocks are had before it is written to: a full disk would otherwise show as a signal.
+ */
 static void *map_file(ebpo_workspace *w, size_t bytes)
 {
     int fd = open_unnamed(w->folder), fault = fd < 0 ? errno : EINTR;
@@ -394,7 +415,12 @@ static void *make_part(ebpo_workspace *w, size_t bytes)
         w->pool = make_block(w, POOL_BYTES, BLOCK_POOL);
     block *pool = part ? w->pool : NULL;
     if (pool) {
-        *part = (block){ .at = (char *)pool->at + pool->used, .bytes = bytes, .kind = BLOCK_PART, .filed = pool->filed, .workspace = w, .pool = pool };
+        *part = (block){ .at = (char *)pool->at + pool->used,
+                         .bytes = bytes,
+                         .kind = BLOCK_PART,
+                         .filed = pool->filed,
+                         .workspace = w,
+                         .pool = pool };
         pool->used += bytes;
         pool->parts++;
     }
@@ -411,7 +437,8 @@ static void *make_part(ebpo_workspace *w, size_t bytes)
 static void free_part(block *part)
 {
     block *pool = part->pool;
-    if (part->workspace->page == PAGE) /* whole pages, so none of a neighbour's; whether it can be done or not */
+    if (part->workspace->page ==
+        PAGE) /* whole pages, so none of a neighbour's; whether it can be done or not */
         madvise(part->at, part->bytes, part->filed ? MADV_REMOVE : MADV_DONTNEED);
     free(part);
     leave_pool(pool);
@@ -467,13 +494,15 @@ void ebpo_array_fill(ebpo_workspace *workspace, void *array, int byte, uint64_t 
 void ebpo_array_copy(ebpo_workspace *workspace, void *to, const void *from, uint64_t bytes)
 {
     for (uint64_t at = 0; at < bytes; at += STEP) {
-        memcpy((char *)to + at, (const char *)from + at, bytes - at < STEP ? (size_t)(bytes - at) : STEP);
+        memcpy((char *)to + at, (const char *)from + at,
+               bytes - at < STEP ? (size_t)(bytes - at) : STEP);
         if (bytes > STEP)
             ebpo_workspace_settle(workspace);
     }
 }
 
-bool ebpo_array_grow(ebpo_workspace *workspace, void *array, uint64_t *capacity, uint64_t need, size_t size)
+bool ebpo_array_grow(ebpo_workspace *workspace, void *array, uint64_t *capacity, uint64_t need,
+                     size_t size)
 {
     if (need <= *capacity)
         return true;
@@ -492,12 +521,14 @@ bool ebpo_array_grow(ebpo_workspace *workspace, void *array, uint64_t *capacity,
     return true;
 }
 
-bool ebpo_array_grow_late(ebpo_workspace *workspace, void *array, uint64_t *capacity, uint64_t need, size_t size)
+bool ebpo_array_grow_late(ebpo_workspace *workspace, void *array, uint64_t *capacity, uint64_t need,
+                          size_t size)
 {
     enum { LATE = 1 << 20 };
     if (need <= *capacity)
         return true;
-    return workspace && need > LATE / size ? ebpo_array_grow(workspace, array, capacity, need, size) : ebpo_grow(array, capacity, need, size);
+    return workspace && need > LATE / size ? ebpo_array_grow(workspace, array, capacity, need, size)
+                                           : ebpo_grow(array, capacity, need, size);
 }
 
 ebpo_status ebpo_workspace_fail(const ebpo_workspace *workspace, uint64_t bytes, ebpo_error *error)
@@ -505,16 +536,22 @@ ebpo_status ebpo_workspace_fail(const ebpo_workspace *workspace, uint64_t bytes,
     int fault = workspace ? workspace->failed : 0;
     if (!fault)
         return ebpo_fail_memory(error, bytes);
-    return ebpo_fail(error, EBPO_E_IO, "%s: cannot hold %llu bytes of temporary files: %s; name another folder, or allow more memory", workspace->folder, (unsigned long long)bytes,
-                     strerror(fault));
+    return ebpo_fail(error, EBPO_E_IO,
+                     "%s: cannot hold %llu bytes of temporary files: %s; name another folder, or "
+                     "allow more memory",
+                     workspace->folder, (unsigned long long)bytes, strerror(fault));
 }
 
-ebpo_status ebpo_workspace_fail_while(const ebpo_workspace *workspace, const char *what, ebpo_error *error)
+ebpo_status ebpo_workspace_fail_while(const ebpo_workspace *workspace, const char *what,
+                                      ebpo_error *error)
 {
     int fault = workspace ? workspace->failed : 0;
     if (!fault)
         return ebpo_fail(error, EBPO_E_MEMORY, "out of memory %s", what);
-    return ebpo_fail(error, EBPO_E_IO, "%s: cannot hold the temporary files %s: %s; name another folder, or allow more memory", workspace->folder, what, strerror(fault));
+    return ebpo_fail(
+        error, EBPO_E_IO,
+        "%s: cannot hold the temporary files %s: %s; name another folder, or allow more memory",
+        workspace->folder, what, strerror(fault));
 }
 
 /* --- residency --- */
@@ -541,14 +578,17 @@ void ebpo_workspace_settle(ebpo_workspace *workspace)
         return;
     pthread_mutex_lock(&table_lock);
     residency now = resident(w); /* another thread may have done it meanwhile */
-    if (now.all <= w->figures.memory / 4 * 3 || now.files < w->floor + w->figures.memory / 16) { /* there is hardly anything to let go of */
+    if (now.all <= w->figures.memory / 4 * 3 ||
+        now.files < w->floor + w->figures.memory / 16) { /* there is hardly anything to let go of */
         pthread_mutex_unlock(&table_lock);
         return;
     }
     for (int i = 0; i < BUCKETS; i++)
         for (block *b = table[i]; b; b = b->next)
-            if (b->workspace == w && b->kind != BLOCK_PART && (b->filed || b->kind == BLOCK_FOREIGN))
-                madvise(b->at, b->bytes, MADV_DONTNEED); /* of a file: what was written stays in it */
+            if (b->workspace == w && b->kind != BLOCK_PART &&
+                (b->filed || b->kind == BLOCK_FOREIGN))
+                /* of a file: what was written stays in it */
+                madvise(b->at, b->bytes, MADV_DONTNEED);
     /* Other threads bring pages in meanwhile, which are no floor: it rises slowly. */
     uint64_t left = resident(w).files, most = w->floor + w->figures.memory / 64;
     w->floor = left < most ? left : most;

@@ -1,5 +1,6 @@
-/* Support of runs of vertices by boxes of boxes. Rounding is monotone, so a box's bound computed in the same order of operations is
- * never below that of a point in it: skipping a box never loses the greatest point. */
+/* Support of runs of vertices by boxes of boxes. Rounding is monotone, so a box's bound computed in
+ * the same order of operations is never below that of a point in it: skipping a box never loses the
+ * greatest point. */
 #include "geom/strict_fp.h"
 
 #include <stdlib.h>
@@ -24,14 +25,15 @@ ebpo_status ebpo_bounds_make(ebpo_builder *b, ebpo_error *error)
     uint64_t below = b->vertex_count;
     for (int level = 0; level < EBPO_BOUNDS_LEVELS && below > 1; level++) {
         uint64_t n = (below + EBPO_BOUNDS_FAN - 1) / EBPO_BOUNDS_FAN;
-        double (*box)[2][3] = ebpo_array_alloc(b->workspace, n, sizeof *box);
+        double(*box)[2][3] = ebpo_array_alloc(b->workspace, n, sizeof *box);
         if (!box)
             return ebpo_workspace_fail(b->workspace, n * sizeof *box, error);
         bounds->box[level] = box;
         bounds->count[level] = n;
         bounds->levels = level + 1;
         for (uint64_t i = 0; i < below; i++) {
-            double p[3], *low = level ? bounds->box[level - 1][i][0] : p, *high = level ? bounds->box[level - 1][i][1] : p;
+            double p[3], *low = level ? bounds->box[level - 1][i][0] : p,
+                         *high = level ? bounds->box[level - 1][i][1] : p;
             ebpo_workspace_settle_at(b->workspace, i);
             if (level == 0)
                 ebpo_mesh_position(b->mesh, i, p);
@@ -62,8 +64,10 @@ typedef struct query {
 
 static double value(const query *q, const double low[3], const double high[3])
 {
-    double x = (q->n[0] < 0 ? low[0] : high[0]), y = (q->n[1] < 0 ? low[1] : high[1]), z = (q->n[2] < 0 ? low[2] : high[2]);
-    return q->n[0] * ((x - q->corner[0]) / q->size[0]) + q->n[1] * ((y - q->corner[1]) / q->size[1]) +
+    double x = (q->n[0] < 0 ? low[0] : high[0]), y = (q->n[1] < 0 ? low[1] : high[1]),
+           z = (q->n[2] < 0 ? low[2] : high[2]);
+    return q->n[0] * ((x - q->corner[0]) / q->size[0]) +
+           q->n[1] * ((y - q->corner[1]) / q->size[1]) +
            q->n[2] * ((z - q->corner[2]) / q->size[2]);
 }
 
@@ -85,7 +89,7 @@ static void visit(query *q, int level, uint64_t block)
         }
         return;
     }
-    const double (*box)[3] = (const double (*)[3])q->b->bounds.box[level - 1][block];
+    const double(*box)[3] = (const double(*)[3])q->b->bounds.box[level - 1][block];
     if (value(q, box[0], box[1]) <= q->best)
         return;
     uint64_t below = level > 1 ? q->b->bounds.count[level - 2] : q->b->vertex_count;
@@ -93,8 +97,8 @@ static void visit(query *q, int level, uint64_t block)
         visit(q, level - 1, i);
 }
 
-double ebpo_bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n[3], uint64_t begin, uint64_t end, double least,
-                           uint64_t *at)
+double ebpo_bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n[3], uint64_t begin,
+                           uint64_t end, double least, uint64_t *at)
 {
     query q = { .b = b, .begin = begin, .end = end, .at = EBPO_NO_VERTEX, .best = least };
     for (int k = 0; k < 3; k++) {

@@ -38,10 +38,12 @@ static ebpo_status check_text(const char *name, const char *text, size_t room, e
     return EBPO_OK;
 }
 
-static ebpo_status check_options(const ebpo_build_options *o, const ebpo_info *info, ebpo_error *error)
+static ebpo_status check_options(const ebpo_build_options *o, const ebpo_info *info,
+                                 ebpo_error *error)
 {
     if (o->max_level < -1 || o->max_level > EBPO_MAX_LEVEL)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "max_level %d is not in 0 .. %d", o->max_level, EBPO_MAX_LEVEL);
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "max_level %d is not in 0 .. %d", o->max_level,
+                         EBPO_MAX_LEVEL);
     if (!(o->epsilon >= 0) || o->epsilon > 1)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "epsilon %g is not in 0 .. 1", o->epsilon);
     if (o->rule > EBPO_RULE_POSITIVE)
@@ -49,9 +51,11 @@ static ebpo_status check_options(const ebpo_build_options *o, const ebpo_info *i
     if (!ebpo_selection_of(o->select))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown selection %d", (int)o->select);
     if (!(o->percent > 0 && o->percent <= 100))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "percent %g is not above 0 and at most 100", o->percent);
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "percent %g is not above 0 and at most 100",
+                         o->percent);
     if (!(o->k_root == 0 || (o->k_root >= 1 && o->k_root <= 1e9)))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "k_root %g is neither 0 nor in 1 .. 1e9", o->k_root);
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "k_root %g is neither 0 nor in 1 .. 1e9",
+                         o->k_root);
     if ((unsigned)o->normals > EBPO_NORMALS_ANGLE)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown distance of normals %d", (int)o->normals);
     ebpo_status status = check_text("unit", o->unit, sizeof info->unit, error);
@@ -68,18 +72,25 @@ static void copy_text(char *to, const char *from)
         strcpy(to, from); /* check_options saw to the length */
 }
 
-/* Names of files may be any bytes; the format wants text. What is neither printable ASCII nor part of a valid UTF-8 sequence becomes "_". */
+/* Names of files may be any bytes; the format wants text. What is neither printable ASCII nor part
+ * of a valid UTF-8 sequence becomes "_". */
 static void copy_name(char *to, const char *from)
 {
     while (*from) {
         const unsigned char *c = (const unsigned char *)from;
-        int length = c[0] < 0x80 ? 1 : c[0] >= 0xc2 && c[0] < 0xe0 ? 2 : c[0] >= 0xe0 && c[0] < 0xf0 ? 3 : c[0] >= 0xf0 && c[0] < 0xf5 ? 4 : 0;
+        int length = c[0] < 0x80                   ? 1
+                     : c[0] >= 0xc2 && c[0] < 0xe0 ? 2
+                     : c[0] >= 0xe0 && c[0] < 0xf0 ? 3
+                     : c[0] >= 0xf0 && c[0] < 0xf5 ? 4
+                                                   : 0;
         bool fine = length > 0 && c[0] >= 32 && c[0] != 127;
         for (int i = 1; i < length && fine; i++)
             fine = (c[i] & 0xc0) == 0x80;
-        /* Control characters of Latin 1, sequences longer than need be, surrogates, what lies beyond Unicode. */
-        if ((c[0] == 0xc2 && c[1] < 0xa0) || (c[0] == 0xe0 && c[1] < 0xa0) || (c[0] == 0xed && c[1] >= 0xa0) ||
-            (c[0] == 0xf0 && c[1] < 0x90) || (c[0] == 0xf4 && c[1] >= 0x90))
+        /* Control characters of Latin 1, sequences longer than need be, surrogates, what lies
+         * beyond Unicode. */
+        if ((c[0] == 0xc2 && c[1] < 0xa0) || (c[0] == 0xe0 && c[1] < 0xa0) ||
+            (c[0] == 0xed && c[1] >= 0xa0) || (c[0] == 0xf0 && c[1] < 0x90) ||
+            (c[0] == 0xf4 && c[1] >= 0x90))
             fine = false;
         for (int i = 0; i < (fine ? length : 1); i++)
             *to++ = fine ? from[i] : '_';
@@ -88,8 +99,8 @@ static void copy_name(char *to, const char *from)
     *to = 0;
 }
 
-static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *mesh, const ebpo_mesh_report *report,
-                      const ebpo_mend_record *mend)
+static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *mesh,
+                      const ebpo_mesh_report *report, const ebpo_mend_record *mend)
 {
     const ebpo_build_options *o = b->options;
     info->version_major = EBPO_FORMAT_MAJOR;
@@ -131,7 +142,9 @@ static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *m
 static ebpo_status arrange(ebpo_builder *b, ebpo_mesh *mesh, ebpo_error *error)
 {
     const ebpo_progress *progress = &b->options->progress;
-    ebpo_status status = mesh->arrangement && mesh->arrangement->key ? EBPO_OK : ebpo_arrange(mesh, -1, b->threads, progress, error);
+    ebpo_status status = mesh->arrangement && mesh->arrangement->key
+                             ? EBPO_OK
+                             : ebpo_arrange(mesh, -1, b->threads, progress, error);
     if (status == EBPO_OK && mesh->arrangement->box.grid_level < b->max_level)
         status = ebpo_arrange(mesh, b->max_level, b->threads, progress, error);
     if (status != EBPO_OK)
@@ -141,7 +154,7 @@ static ebpo_status arrange(ebpo_builder *b, ebpo_mesh *mesh, ebpo_error *error)
     b->vertex_count = mesh->arrangement->referenced;
     b->key = mesh->arrangement->key;
     b->face_count = mesh->face_count;
-    b->face = (const uint32_t (*)[3])mesh->faces;
+    b->face = (const uint32_t(*)[3])mesh->faces;
     if (!ebpo_stage(progress, "bounds", error))
         return EBPO_E_CANCELLED;
     return ebpo_bounds_make(b, error);
@@ -155,8 +168,10 @@ static ebpo_status prepare(ebpo_builder *b, ebpo_mesh *mesh, const ebpo_mesh_rep
     b->solid = report->balanced;
     if (!b->solid && options->require_solid)
         return ebpo_fail(error, EBPO_E_NOT_SOLID,
-                         "%s does not balance (%llu edges are not used as often one way as the other), so it bounds no solid; "
-                         "try --fill-holes, --orient or --weld, or leave out --require-solid for a surface model",
+                         "%s does not balance (%llu edges are not used as often one way as the "
+                         "other), so it bounds no solid; "
+                         "try --fill-holes, --orient or --weld, or leave out --require-solid for a "
+                         "surface model",
                          mesh->source_name[0] ? mesh->source_name : "the mesh",
                          (unsigned long long)report->unbalanced_edges.count);
     b->max_level = options->max_level >= 0 ? options->max_level : level_limit(report);
@@ -177,7 +192,7 @@ static void builder_free(ebpo_builder *b)
 
 typedef struct piece_job {
     ebpo_builder *b;
-    ebpo_emit_scratch **scratch; /* [threads] */
+    ebpo_emit_scratch **scratch;             /* [threads] */
     _Atomic uint64_t cells_ns, envelopes_ns; /* of all threads */
 } piece_job;
 
@@ -188,7 +203,8 @@ static uint64_t nanoseconds(void)
     return (uint64_t)t.tv_sec * UINT64_C(1000000000) + (uint64_t)t.tv_nsec;
 }
 
-static ebpo_status work_on_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status work_on_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                  ebpo_error *error)
 {
     piece_job *job = context;
     ebpo_builder *b = job->b;
@@ -215,11 +231,13 @@ static ebpo_status work_on_pieces(void *context, uint64_t begin, uint64_t end, u
 static ebpo_status build_pieces(ebpo_builder *b, ebpo_error *error)
 {
     piece_job job = { .b = b, .scratch = ebpo_alloc_zero(b->threads, sizeof *job.scratch) };
-    ebpo_status status = job.scratch ? EBPO_OK : ebpo_fail_memory(error, b->threads * sizeof *job.scratch);
+    ebpo_status status =
+        job.scratch ? EBPO_OK : ebpo_fail_memory(error, b->threads * sizeof *job.scratch);
     for (unsigned i = 0; i < b->threads && status == EBPO_OK; i++)
         status = ebpo_emit_scratch_make(&job.scratch[i], error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(b->threads, b->sub_count, 1, work_on_pieces, &job, &b->options->progress, "envelopes", error);
+        status = ebpo_parallel_for(b->threads, b->sub_count, 1, work_on_pieces, &job,
+                                   &b->options->progress, "envelopes", error);
     for (unsigned i = 0; i < b->threads && job.scratch; i++)
         ebpo_emit_scratch_free(job.scratch[i]);
     free(job.scratch);
@@ -230,7 +248,8 @@ static ebpo_status build_pieces(ebpo_builder *b, ebpo_error *error)
     return status;
 }
 
-/* From the root down a piece is done in one go. From the leaves up the top needs all pieces first: their cells are made twice rather than kept. */
+/* From the root down a piece is done in one go. From the leaves up the top needs all pieces first:
+ * their cells are made twice rather than kept. */
 static ebpo_status build_tree(ebpo_builder *b, ebpo_error *error)
 {
     ebpo_status status = ebpo_build_labels(b, error);
@@ -259,8 +278,9 @@ static ebpo_status run_stages(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, 
     return status;
 }
 
-ebpo_status ebpo_build(ebpo_tree *out, ebpo_mesh *mesh, const ebpo_mesh_report *report, const ebpo_mend_record *mend,
-                       const ebpo_build_options *options, ebpo_error *error)
+ebpo_status ebpo_build(ebpo_tree *out, ebpo_mesh *mesh, const ebpo_mesh_report *report,
+                       const ebpo_mend_record *mend, const ebpo_build_options *options,
+                       ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_build_options defaults = EBPO_BUILD_OPTIONS_INIT;

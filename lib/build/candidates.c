@@ -1,5 +1,5 @@
-/* Candidate normals of a gray node: those of the faces below it; where there are many, the mean of each occupied bin of the
- * octahedral map, with bins no finer than needed. */
+/* Candidate normals of a gray node: those of the faces below it; where there are many, the mean of
+ * each occupied bin of the octahedral map, with bins no finer than needed. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -14,8 +14,9 @@ typedef struct bin {
 } bin;
 
 /* Every `step`-th of the entries, or of the branch's whole list. */
-static void sample_faces(const ebpo_builder *b, const ebpo_branch *s, const uint32_t *entries, uint64_t begin, uint64_t end, uint64_t *skip, uint64_t step, uint32_t *sample,
-                         int *count)
+static void sample_faces(const ebpo_builder *b, const ebpo_branch *s, const uint32_t *entries,
+                         uint64_t begin, uint64_t end, uint64_t *skip, uint64_t step,
+                         uint32_t *sample, int *count)
 {
     uint64_t i = begin + *skip;
     for (; i < end; i += step) {
@@ -30,7 +31,8 @@ static void sample_faces(const ebpo_builder *b, const ebpo_branch *s, const uint
     *skip = i - end;
 }
 
-static int take_sample(const ebpo_builder *b, const ebpo_branch *s, const ebpo_build_detail *d, uint32_t *sample)
+static int take_sample(const ebpo_builder *b, const ebpo_branch *s, const ebpo_build_detail *d,
+                       uint32_t *sample)
 {
     int count = 0;
     uint64_t skip = 0, total = 0;
@@ -42,18 +44,21 @@ static int take_sample(const ebpo_builder *b, const ebpo_branch *s, const ebpo_b
     for (uint64_t i = d->entry_begin; i < d->entry_end; i++)
         total += b->sub[i].list_count;
     for (uint64_t i = d->entry_begin; i < d->entry_end; i++)
-        sample_faces(b, &b->sub[i], NULL, 0, b->sub[i].list_count, &skip, total / SAMPLE_MOST + 1, sample, &count);
+        sample_faces(b, &b->sub[i], NULL, 0, b->sub[i].list_count, &skip, total / SAMPLE_MOST + 1,
+                     sample, &count);
     return count;
 }
 
 /* Fills the table with bins of `width` codes; false when more than `most` are occupied. */
-static bool fill_bins(bin *table, int *used, int *slots, const uint32_t *sample, int count, uint32_t width, int most)
+static bool fill_bins(bin *table, int *used, int *slots, const uint32_t *sample, int count,
+                      uint32_t width, int most)
 {
     for (int i = 0; i < *used; i++)
         table[slots[i]].key = 0;
     *used = 0;
     for (int i = 0; i < count; i++) {
-        uint32_t u = sample[i] & 1023, v = sample[i] >> 10 & 1023, key = 1 + u / width + (v / width << 10);
+        uint32_t u = sample[i] & 1023, v = sample[i] >> 10 & 1023,
+                 key = 1 + u / width + (v / width << 10);
         uint32_t at = (key * 2654435761u) >> 18;
         while (table[at].key && table[at].key != key)
             at = (at + 1) % TABLE;
@@ -70,8 +75,8 @@ static bool fill_bins(bin *table, int *used, int *slots, const uint32_t *sample,
     return true;
 }
 
-int ebpo_build_candidates(const ebpo_builder *b, const ebpo_branch *s, const ebpo_build_detail *detail, int most,
-                          ebpo_candidate *out)
+int ebpo_build_candidates(const ebpo_builder *b, const ebpo_branch *s,
+                          const ebpo_build_detail *detail, int most, ebpo_candidate *out)
 {
     uint32_t sample[SAMPLE_MOST];
     static _Thread_local bin table[TABLE];
@@ -82,7 +87,8 @@ int ebpo_build_candidates(const ebpo_builder *b, const ebpo_branch *s, const ebp
         width = width < 4 ? 4 : width + width / 2;
     for (int i = 0; i < used; i++) {
         bin *t = &table[slots[i]];
-        uint32_t u = (uint32_t)((t->sum_u + t->count / 2) / t->count), v = (uint32_t)((t->sum_v + t->count / 2) / t->count);
+        uint32_t u = (uint32_t)((t->sum_u + t->count / 2) / t->count),
+                 v = (uint32_t)((t->sum_v + t->count / 2) / t->count);
         out[i] = (ebpo_candidate){ .normal = u | v << 10, .support = -1e300 };
         t->key = 0;
     }

@@ -1,4 +1,5 @@
-/* Subtrees to stretches of level arrays: a depth-first walk meets the nodes of each level in octcode order. */
+/* Subtrees to stretches of level arrays: a depth-first walk meets the nodes of each level in
+ * octcode order. */
 #include "geom/strict_fp.h"
 
 #include <stdlib.h>
@@ -23,7 +24,8 @@ typedef struct emitter {
 ebpo_status ebpo_emit_scratch_make(ebpo_emit_scratch **out, ebpo_error *error)
 {
     *out = ebpo_alloc_zero(1, sizeof **out);
-    ebpo_status status = *out ? ebpo_scratch_make(&(*out)->envelope, error) : ebpo_fail_memory(error, sizeof **out);
+    ebpo_status status =
+        *out ? ebpo_scratch_make(&(*out)->envelope, error) : ebpo_fail_memory(error, sizeof **out);
     if (status != EBPO_OK) {
         free(*out);
         *out = NULL;
@@ -51,7 +53,8 @@ void ebpo_out_free(ebpo_out *out)
 bool ebpo_emit_group(ebpo_out *out, uint16_t types)
 {
     ebpo_level *l = &out->level;
-    if (!ebpo_array_grow_late(out->workspace, &l->types, &out->group_capacity, l->group_count + 1, sizeof *l->types))
+    if (!ebpo_array_grow_late(out->workspace, &l->types, &out->group_capacity, l->group_count + 1,
+                              sizeof *l->types))
         return false;
     l->types[l->group_count++] = types;
     return true;
@@ -60,8 +63,10 @@ bool ebpo_emit_group(ebpo_out *out, uint16_t types)
 bool ebpo_emit_gray(ebpo_out *out, const uint32_t *codes, int count, double volume)
 {
     ebpo_level *l = &out->level;
-    if (!ebpo_array_grow_late(out->workspace, &l->plane_counts, &out->gray_capacity, l->gray_count + 1, 1) ||
-        !ebpo_array_grow_late(out->workspace, &l->planes, &out->plane_capacity, l->plane_count + (uint64_t)count, sizeof *l->planes))
+    if (!ebpo_array_grow_late(out->workspace, &l->plane_counts, &out->gray_capacity,
+                              l->gray_count + 1, 1) ||
+        !ebpo_array_grow_late(out->workspace, &l->planes, &out->plane_capacity,
+                              l->plane_count + (uint64_t)count, sizeof *l->planes))
         return false;
     l->plane_counts[l->gray_count++] = (uint8_t)count;
     if (count) /* the array may not be there yet */
@@ -76,7 +81,9 @@ bool ebpo_emit_empty(ebpo_out *out, bool black, int32_t winding)
     ebpo_level *l = &out->level;
     int32_t **array = black ? &l->black_winding : &l->white_winding;
     uint64_t *count = black ? &l->black_count : &l->white_count;
-    if (!ebpo_array_grow_late(out->workspace, array, black ? &out->black_capacity : &out->white_capacity, *count + 1, sizeof **array))
+    if (!ebpo_array_grow_late(out->workspace, array,
+                              black ? &out->black_capacity : &out->white_capacity, *count + 1,
+                              sizeof **array))
         return false;
     (*array)[(*count)++] = winding;
     return true;
@@ -86,12 +93,16 @@ static bool grow_leaf_arrays(ebpo_out *out, uint64_t refs)
 {
     ebpo_level *l = &out->level;
     uint64_t n = l->leaf_count + 1, *c = out->leaf_capacity;
-    return ebpo_array_grow_late(out->workspace, &l->leaf_winding, &c[0], n, sizeof *l->leaf_winding) &&
+    return ebpo_array_grow_late(out->workspace, &l->leaf_winding, &c[0], n,
+                                sizeof *l->leaf_winding) &&
            ebpo_array_grow_late(out->workspace, &l->leaf_first, &c[1], n, sizeof *l->leaf_first) &&
            ebpo_array_grow_late(out->workspace, &l->leaf_new, &c[2], n, sizeof *l->leaf_new) &&
-           ebpo_array_grow_late(out->workspace, &l->leaf_ref_count, &c[3], n, sizeof *l->leaf_ref_count) &&
-           ebpo_array_grow_late(out->workspace, &l->leaf_plane_counts, &c[4], n, sizeof *l->leaf_plane_counts) &&
-           ebpo_array_grow_late(out->workspace, &l->leaf_refs, &out->ref_capacity, l->ref_count + refs, sizeof *l->leaf_refs);
+           ebpo_array_grow_late(out->workspace, &l->leaf_ref_count, &c[3], n,
+                                sizeof *l->leaf_ref_count) &&
+           ebpo_array_grow_late(out->workspace, &l->leaf_plane_counts, &c[4], n,
+                                sizeof *l->leaf_plane_counts) &&
+           ebpo_array_grow_late(out->workspace, &l->leaf_refs, &out->ref_capacity,
+                                l->ref_count + refs, sizeof *l->leaf_refs);
 }
 
 static bool emit_list(const emitter *e, const ebpo_build_detail *d, ebpo_out *out, int32_t winding)
@@ -118,15 +129,18 @@ static bool gather_faces(emitter *e, const ebpo_build_detail *d)
 {
     ebpo_emit_scratch *scratch = e->scratch;
     uint64_t count = d->entry_end - d->entry_begin;
-    if (!ebpo_array_grow_late(e->b->workspace, &scratch->faces, &scratch->faces_capacity, count, sizeof *scratch->faces))
+    if (!ebpo_array_grow_late(e->b->workspace, &scratch->faces, &scratch->faces_capacity, count,
+                              sizeof *scratch->faces))
         return false;
     for (uint64_t i = 0; i < count; i++)
         ebpo_branch_triangle(e->b, e->s, e->s->entries[d->entry_begin + i], &scratch->faces[i]);
     return true;
 }
 
-/* Planes that are to be stored: the selection's own. Else readers derive them. -1: out of memory. */
-static int leaf_planes(emitter *e, uint32_t detail, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope, uint32_t *codes)
+/* Planes that are to be stored: the selection's own. Else readers derive them. -1: out of memory.
+ */
+static int leaf_planes(emitter *e, uint32_t detail, ebpo_cell cell, int32_t winding,
+                       ebpo_polytope *envelope, uint32_t *codes)
 {
     const ebpo_builder *b = e->b;
     const ebpo_build_detail *d = &e->s->details[detail];
@@ -135,13 +149,16 @@ static int leaf_planes(emitter *e, uint32_t detail, ebpo_cell cell, int32_t wind
     if (!proposed && !gather_faces(e, d))
         return -1;
     if (!proposed)
-        return ebpo_leaf_planes(&b->box, cell, e->scratch->faces, d->entry_end - d->entry_begin, ebpo_inside_corners(b, winding, d->delta), b->options->epsilon, envelope, codes);
+        return ebpo_leaf_planes(&b->box, cell, e->scratch->faces, d->entry_end - d->entry_begin,
+                                ebpo_inside_corners(b, winding, d->delta), b->options->epsilon,
+                                envelope, codes);
     memcpy(codes, proposed, (size_t)count * sizeof *codes);
     ebpo_planes_cut(envelope, codes, (uint64_t)count);
     return count;
 }
 
-static bool emit_leaf(emitter *e, uint32_t detail, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope)
+static bool emit_leaf(emitter *e, uint32_t detail, ebpo_cell cell, int32_t winding,
+                      ebpo_polytope *envelope)
 {
     const ebpo_builder *b = e->b;
     const ebpo_build_detail *d = &e->s->details[detail];
@@ -158,7 +175,8 @@ static bool emit_leaf(emitter *e, uint32_t detail, ebpo_cell cell, int32_t windi
     l->leaf_plane_counts[l->leaf_count++] = (uint8_t)planes;
     if (!stored)
         return true;
-    if (!ebpo_array_grow_late(out->workspace, &l->leaf_planes, &out->leaf_plane_capacity, l->leaf_plane_count + (uint64_t)planes, sizeof *l->leaf_planes))
+    if (!ebpo_array_grow_late(out->workspace, &l->leaf_planes, &out->leaf_plane_capacity,
+                              l->leaf_plane_count + (uint64_t)planes, sizeof *l->leaf_planes))
         return false;
     if (planes)
         memcpy(l->leaf_planes + l->leaf_plane_count, codes, (size_t)planes * sizeof *codes);
@@ -172,7 +190,8 @@ static bool emit_empty(emitter *e, ebpo_cell cell, int32_t winding)
     return ebpo_emit_empty(&e->s->out[cell.level], black, winding);
 }
 
-static bool emit(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope);
+static bool emit(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding,
+                 ebpo_polytope *envelope);
 
 static unsigned filled_children(const ebpo_branch *s, uint32_t child)
 {
@@ -182,10 +201,11 @@ static unsigned filled_children(const ebpo_branch *s, uint32_t child)
     return mask;
 }
 
-/* In octant order; neighbours share the halves that their envelopes are cut from. A half that rounding leaves nothing of stays the whole
- * cube, and so do its parts: too large, never too small. */
-static bool emit_children(emitter *e, uint32_t child, ebpo_cell cell, int32_t winding, const int32_t offset[8],
-                          const ebpo_polytope *envelope)
+/* In octant order; neighbours share the halves that their envelopes are cut from. A half that
+ * rounding leaves nothing of stays the whole cube, and so do its parts: too large, never too small.
+ */
+static bool emit_children(emitter *e, uint32_t child, ebpo_cell cell, int32_t winding,
+                          const int32_t offset[8], const ebpo_polytope *envelope)
 {
     unsigned filled = filled_children(e->s, child);
     ebpo_polytope z, y, x;
@@ -202,23 +222,27 @@ static bool emit_children(emitter *e, uint32_t child, ebpo_cell cell, int32_t wi
     return true;
 }
 
-static bool emit_gray(emitter *e, const ebpo_build_node *node, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope)
+static bool emit_gray(emitter *e, const ebpo_build_node *node, ebpo_cell cell, int32_t winding,
+                      ebpo_polytope *envelope)
 {
     const ebpo_builder *b = e->b;
     uint32_t codes[EBPO_PLANES_STORED];
     int planes = 0;
     ebpo_workspace_settle_often(b->workspace, e->s->out[cell.level].level.gray_count);
     if (b->options->parts & EBPO_PART_PLANES)
-        planes = ebpo_gray_planes(b, e->scratch->envelope, e->s, node->detail, cell, winding, envelope, codes);
-    if (planes < 0 || !ebpo_emit_gray(&e->s->out[cell.level], codes, planes,
-                                      ebpo_polytope_volume(envelope) * ebpo_cell_volume(b, cell.level)))
+        planes = ebpo_gray_planes(b, e->scratch->envelope, e->s, node->detail, cell, winding,
+                                  envelope, codes);
+    if (planes < 0 ||
+        !ebpo_emit_gray(&e->s->out[cell.level], codes, planes,
+                        ebpo_polytope_volume(envelope) * ebpo_cell_volume(b, cell.level)))
         return false;
     int32_t offset[8];
     ebpo_child_windings(b, e->s, node->child, offset);
     uint16_t types = 0;
     for (uint32_t o = 0; o < 8; o++) {
         unsigned type = e->s->nodes[node->child + o].type;
-        if (type == EBPO_WHITE && b->solid && ebpo_rule_inside(b->options->rule, winding + offset[o]))
+        if (type == EBPO_WHITE && b->solid &&
+            ebpo_rule_inside(b->options->rule, winding + offset[o]))
             type = EBPO_BLACK;
         types |= (uint16_t)(type << 2 * o);
     }
@@ -227,7 +251,8 @@ static bool emit_gray(emitter *e, const ebpo_build_node *node, ebpo_cell cell, i
     return emit_children(e, node->child, cell, winding, offset, envelope);
 }
 
-static bool emit(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope)
+static bool emit(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding,
+                 ebpo_polytope *envelope)
 {
     ebpo_build_node node = e->s->nodes[index];
     switch (node.type) {
@@ -237,7 +262,8 @@ static bool emit(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding, eb
     }
 }
 
-ebpo_status ebpo_emit_piece(const ebpo_builder *b, ebpo_emit_scratch *scratch, ebpo_branch *s, ebpo_error *error)
+ebpo_status ebpo_emit_piece(const ebpo_builder *b, ebpo_emit_scratch *scratch, ebpo_branch *s,
+                            ebpo_error *error)
 {
     emitter e = { b, s, scratch };
     s->out = ebpo_array_zero(b->workspace, EBPO_LEVELS_MAX, sizeof *s->out);

@@ -1,5 +1,6 @@
-/* The planes of a gray node, from the root down: candidates are the directions of the solid's hull in the cell. Few points: their hull. Many, or none that span a volume: the hull of the
- * extreme ones, found by asking in its own directions, and normals of faces. */
+/* The planes of a gray node, from the root down: candidates are the directions of the solid's hull
+ * in the cell. Few points: their hull. Many, or none that span a volume: the hull of the extreme
+ * ones, found by asking in its own directions, and normals of faces. */
 #include "geom/strict_fp.h"
 
 #include <math.h>
@@ -14,10 +15,10 @@
 #include "planes/hull.h"
 
 enum {
-    TOP_LEVELS = 4,        /* nearly free of bytes */
-    MANY_LEVELS = 2,       /* round solids deserve more planes there: 73 nodes at most */
-    FACES_BELOW = 16,      /* normals of faces that are tried below the top */
-    HULL_BELOW = 24,       /* and directions of the hull, in a round */
+    TOP_LEVELS = 4,   /* nearly free of bytes */
+    MANY_LEVELS = 2,  /* round solids deserve more planes there: 73 nodes at most */
+    FACES_BELOW = 16, /* normals of faces that are tried below the top */
+    HULL_BELOW = 24,  /* and directions of the hull, in a round */
     HULL_ROUNDS = 3,
     HULL_DIRECTIONS = 160, /* at most, in a round */
     TABLE = 1024           /* of normals */
@@ -27,9 +28,10 @@ struct ebpo_envelope_scratch {
     ebpo_supports supports;
     ebpo_candidate candidates[EBPO_PLANES_CANDIDATES];
     int count;
-    uint32_t tried[2 * EBPO_PLANES_CANDIDATES]; /* normals, of candidates and of those that were dropped */
+    /* normals, of candidates and of those that were dropped */
+    uint32_t tried[2 * EBPO_PLANES_CANDIDATES];
     int tried_count;
-    uint32_t normals[TABLE];                    /* 1 + normal, by hash */
+    uint32_t normals[TABLE];          /* 1 + normal, by hash */
     double core[EBPO_HULL_POINTS][3]; /* extreme points of the solid in the cell */
     int core_count;
     ebpo_hull_facet facet[EBPO_HULL_FACETS];
@@ -66,8 +68,10 @@ unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32
     return mask;
 }
 
-/* A support from which on a plane cannot remove epsilon, nor a needle: a cap of height h of a body of width H and volume V has at most V (1 - (1 - h/H)^3) <= 3 V h / H. */
-static double hopeless(const ebpo_polytope *envelope, double volume, const int32_t n[3], double epsilon)
+/* A support from which on a plane cannot remove epsilon, nor a needle: a cap of height h of a body
+ * of width H and volume V has at most V (1 - (1 - h/H)^3) <= 3 V h / H. */
+static double hopeless(const ebpo_polytope *envelope, double volume, const int32_t n[3],
+                       double epsilon)
 {
     double most = -1e300, least = 1e300;
     for (int i = 0; i < envelope->vertex_count; i++) {
@@ -80,13 +84,16 @@ static double hopeless(const ebpo_polytope *envelope, double volume, const int32
     return most - fmin((most - least) * epsilon / (3 * volume), ebpo_needle * length);
 }
 
-/* Looks at one more direction. Those that cannot gain epsilon are dropped as soon as that shows. The extreme point is kept for the hull. */
-static void try_normal(ebpo_envelope_scratch *s, uint32_t normal, const ebpo_polytope *envelope, double volume, double epsilon, double where[3])
+/* Looks at one more direction. Those that cannot gain epsilon are dropped as soon as that shows.
+ * The extreme point is kept for the hull. */
+static void try_normal(ebpo_envelope_scratch *s, uint32_t normal, const ebpo_polytope *envelope,
+                       double volume, double epsilon, double where[3])
 {
     int32_t n[3], d;
     ebpo_plane_code_decode(normal, n, &d);
     double enough = hopeless(envelope, volume, n, epsilon);
-    double support = ebpo_supports_find_from(&s->supports, n, enough, (const double (*)[3])s->core, s->core_count, where);
+    double support = ebpo_supports_find_from(&s->supports, n, enough, (const double(*)[3])s->core,
+                                             s->core_count, where);
     if (support < enough && s->count < EBPO_PLANES_CANDIDATES)
         s->candidates[s->count++] = (ebpo_candidate){ .normal = normal, .support = support };
     if (s->tried_count < 2 * EBPO_PLANES_CANDIDATES)
@@ -112,7 +119,8 @@ static void add_core(ebpo_envelope_scratch *s, const double where[3])
     s->core_count++;
 }
 
-/* The ways to the walls, edges and corners of a cell: whatever the faces look like, the hull is known from all sides then. */
+/* The ways to the walls, edges and corners of a cell: whatever the faces look like, the hull is
+ * known from all sides then. */
 static void look_around(ebpo_envelope_scratch *s)
 {
     for (int i = 0; i < 27; i++) {
@@ -121,7 +129,8 @@ static void look_around(ebpo_envelope_scratch *s)
         int32_t n[3], d;
         if (!ebpo_plane_code_normal(way, &normal) || !ebpo_plane_code_decode(normal, n, &d))
             continue;
-        if (ebpo_supports_find_from(&s->supports, n, 1e300, (const double (*)[3])s->core, s->core_count, where) > -1e300)
+        if (ebpo_supports_find_from(&s->supports, n, 1e300, (const double(*)[3])s->core,
+                                    s->core_count, where) > -1e300)
             add_core(s, where);
     }
 }
@@ -134,11 +143,15 @@ static bool was_tried(const ebpo_envelope_scratch *s, uint32_t normal)
     return false;
 }
 
-/* One round: the hull of the points known so far proposes its facets, and what reaches beyond a facet is one more point. False when nothing was new. */
-static bool hull_round(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, double volume, double epsilon, int most)
+/* One round: the hull of the points known so far proposes its facets, and what reaches beyond a
+ * facet is one more point. False when nothing was new. */
+static bool hull_round(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, double volume,
+                       double epsilon, int most)
 {
     static const double worth = 1e-3; /* of the cell */
-    int facets = ebpo_hull_facets((const double (*)[3])s->core, s->core_count, 1e-9, s->facet, EBPO_HULL_FACETS), before = s->core_count;
+    int facets = ebpo_hull_facets((const double(*)[3])s->core, s->core_count, 1e-9, s->facet,
+                                  EBPO_HULL_FACETS),
+        before = s->core_count;
     qsort(s->facet, (size_t)facets, sizeof *s->facet, ebpo_hull_by_area);
     for (int i = 0; i < facets && most > 0; i++) {
         const ebpo_hull_facet *f = &s->facet[i];
@@ -154,9 +167,11 @@ static bool hull_round(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, 
     return s->core_count > before;
 }
 
-static void try_hull(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, double volume, double epsilon, int most)
+static void try_hull(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, double volume,
+                     double epsilon, int most)
 {
-    for (int round = 0; round < HULL_ROUNDS && hull_round(s, envelope, volume, epsilon, most); round++)
+    for (int round = 0; round < HULL_ROUNDS && hull_round(s, envelope, volume, epsilon, most);
+         round++)
         ;
 }
 
@@ -193,7 +208,8 @@ static bool new_normal(ebpo_envelope_scratch *s, uint32_t normal)
 /* The hull's facets as candidates; the volume of the hull, or -1 when there is none. */
 static double hull_candidates(ebpo_envelope_scratch *s, double tolerance)
 {
-    int facets = ebpo_hull_facets((const double (*)[3])s->core, s->core_count, tolerance, s->facet, EBPO_HULL_FACETS);
+    int facets = ebpo_hull_facets((const double(*)[3])s->core, s->core_count, tolerance, s->facet,
+                                  EBPO_HULL_FACETS);
     if (facets == 0)
         return -1;
     if (facets > EBPO_PLANES_CANDIDATES)
@@ -204,25 +220,27 @@ static double hull_candidates(ebpo_envelope_scratch *s, double tolerance)
         uint32_t normal;
         int32_t n[3], d;
         volume += s->facet[i].area * s->facet[i].d / 3;
-        if (s->count == EBPO_PLANES_CANDIDATES || !ebpo_plane_code_normal(s->facet[i].n, &normal) || !new_normal(s, normal))
+        if (s->count == EBPO_PLANES_CANDIDATES || !ebpo_plane_code_normal(s->facet[i].n, &normal) ||
+            !new_normal(s, normal))
             continue;
         double where[3];
         ebpo_plane_code_decode(normal, n, &d);
-        s->candidates[s->count++] = (ebpo_candidate){ .normal = normal, .support = ebpo_supports_find(&s->supports, n, 1e300, where) };
+        s->candidates[s->count++] =
+            (ebpo_candidate){ .normal = normal,
+                              .support = ebpo_supports_find(&s->supports, n, 1e300, where) };
     }
     return fmax(0, volume);
 }
 
 /* --- the node --- */
 
-/* Top levels are nearly free of bytes, and a needle that fills a thousandth of its cell deserves planes all the same. */
-static double top_share(double volume)
-{
-    return 0.1 * sqrt(fmax(0, volume));
-}
+/* Top levels are nearly free of bytes, and a needle that fills a thousandth of its cell deserves
+ * planes all the same. */
+static double top_share(double volume) { return 0.1 * sqrt(fmax(0, volume)); }
 
-static void choose_directions(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo_branch *branch, const ebpo_build_detail *detail, int level, const ebpo_polytope *envelope,
-                              double volume, double epsilon)
+static void choose_directions(const ebpo_builder *b, ebpo_envelope_scratch *s,
+                              const ebpo_branch *branch, const ebpo_build_detail *detail, int level,
+                              const ebpo_polytope *envelope, double volume, double epsilon)
 {
     bool top = level <= TOP_LEVELS;
     ebpo_candidate faces[EBPO_PLANES_CANDIDATES];
@@ -237,17 +255,24 @@ static void choose_directions(const ebpo_builder *b, ebpo_envelope_scratch *s, c
     try_hull(s, envelope, volume, epsilon, top ? HULL_DIRECTIONS : HULL_BELOW);
 }
 
-static int choose_now(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo_branch *branch, const ebpo_build_detail *detail, ebpo_cell cell,
-                      int32_t winding, ebpo_polytope *envelope, uint32_t *codes)
+static int choose_now(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo_branch *branch,
+                      const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding,
+                      ebpo_polytope *envelope, uint32_t *codes)
 {
     if (!ebpo_supports_gather(&s->supports, b, branch, detail, cell, winding))
         return -1;
-    double volume = ebpo_polytope_volume(envelope), epsilon = b->options->epsilon * (cell.level <= TOP_LEVELS ? top_share(volume) : 1);
-    ebpo_choice choice = { .candidates = s->candidates, .most = cell.level <= MANY_LEVELS ? 2 * EBPO_PLANES_MAX : EBPO_PLANES_MAX, .epsilon = epsilon, .reach = ebpo_needle };
+    double volume = ebpo_polytope_volume(envelope),
+           epsilon = b->options->epsilon * (cell.level <= TOP_LEVELS ? top_share(volume) : 1);
+    ebpo_choice choice = { .candidates = s->candidates,
+                           .most =
+                               cell.level <= MANY_LEVELS ? 2 * EBPO_PLANES_MAX : EBPO_PLANES_MAX,
+                           .epsilon = epsilon,
+                           .reach = ebpo_needle };
     s->count = s->tried_count = s->core_count = 0;
     if (!(volume > 0))
         return 0;
-    if (!take_points(s) || (choice.core = hull_candidates(s, cell.level <= TOP_LEVELS ? 1e-9 : hull_tolerance)) < 0) {
+    if (!take_points(s) ||
+        (choice.core = hull_candidates(s, cell.level <= TOP_LEVELS ? 1e-9 : hull_tolerance)) < 0) {
         choose_directions(b, s, branch, detail, cell.level, envelope, volume, epsilon);
         choice.core = 0;
     }
@@ -255,8 +280,9 @@ static int choose_now(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebp
     return ebpo_select_greedy(envelope, &choice, codes);
 }
 
-int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo_branch *branch, uint32_t detail, ebpo_cell cell, int32_t winding,
-                     ebpo_polytope *envelope, uint32_t codes[EBPO_PLANES_STORED])
+int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo_branch *branch,
+                     uint32_t detail, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope,
+                     uint32_t codes[EBPO_PLANES_STORED])
 {
     int count;
     const uint32_t *proposed = ebpo_proposed(branch, detail, &count);

@@ -1,4 +1,5 @@
-/* All stretches of level arrays joined in depth-first order, which is octcode order in each level. */
+/* All stretches of level arrays joined in depth-first order, which is octcode order in each level.
+ */
 #include <stdlib.h>
 #include <string.h>
 
@@ -72,14 +73,17 @@ static bool walk(joiner *j, uint32_t index, ebpo_cell cell, int32_t winding)
     if (!out)
         return false;
     if (node.type == EBPO_WHITE)
-        return ebpo_emit_empty(&out[cell.level], b->solid && ebpo_rule_inside(b->options->rule, winding), winding);
+        return ebpo_emit_empty(&out[cell.level],
+                               b->solid && ebpo_rule_inside(b->options->rule, winding), winding);
     const ebpo_top_envelope *t = &b->top_envelope[node.detail];
     int32_t offset[8];
     ebpo_child_windings(b, &b->top, node.child, offset);
     uint16_t types = 0;
     for (uint32_t o = 0; o < 8; o++)
-        types |= (uint16_t)(type_of(b, &b->top.nodes[node.child + o], winding + offset[o]) << 2 * o);
-    if (!ebpo_emit_gray(&out[cell.level], t->codes, t->count, t->volume) || !ebpo_emit_group(&out[cell.level + 1], types))
+        types |=
+            (uint16_t)(type_of(b, &b->top.nodes[node.child + o], winding + offset[o]) << 2 * o);
+    if (!ebpo_emit_gray(&out[cell.level], t->codes, t->count, t->volume) ||
+        !ebpo_emit_group(&out[cell.level + 1], types))
         return false;
     for (uint32_t o = 0; o < 8; o++)
         if (!walk(j, node.child + o, ebpo_child_cell(cell, o), winding + offset[o]))
@@ -151,8 +155,10 @@ typedef struct numbering {
     uint64_t *first; /* of each block of leaves: its place in leaf_refs */
 } numbering;
 
-/* Leaves refer to faces by their numbers along the curve, as other pieces' final ones were not known: now they are. */
-static ebpo_status number_block(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+/* Leaves refer to faces by their numbers along the curve, as other pieces' final ones were not
+ * known: now they are. */
+static ebpo_status number_block(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                ebpo_error *error)
 {
     numbering *n = context;
     ebpo_level *l = n->level;
@@ -168,7 +174,8 @@ static ebpo_status number_block(void *context, uint64_t begin, uint64_t end, uns
 }
 
 /* `all`: references of all levels, of which `before` have been numbered. */
-static ebpo_status number_refs(const ebpo_builder *b, ebpo_level *l, uint64_t before, uint64_t all, ebpo_error *error)
+static ebpo_status number_refs(const ebpo_builder *b, ebpo_level *l, uint64_t before, uint64_t all,
+                               ebpo_error *error)
 {
     if (!l->ref_count)
         return EBPO_OK;
@@ -182,7 +189,8 @@ static ebpo_status number_refs(const ebpo_builder *b, ebpo_level *l, uint64_t be
     }
     ebpo_pass pass = { &b->options->progress, all + before, all + before + l->ref_count, 2 * all };
     ebpo_progress progress = ebpo_pass_progress(&pass);
-    ebpo_status status = ebpo_parallel_for(b->threads, l->leaf_count, LEAF_GRAIN, number_block, &n, &progress, stage, error);
+    ebpo_status status = ebpo_parallel_for(b->threads, l->leaf_count, LEAF_GRAIN, number_block, &n,
+                                           &progress, stage, error);
     free(n.first);
     return status;
 }
@@ -227,18 +235,21 @@ static void leave_out(const ebpo_builder *b, ebpo_level *l)
     l->ref_count = l->new_count = 0;
 }
 
-static ebpo_status join_arrays(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status join_arrays(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
 {
     joiner *j = context;
     (void)worker;
     for (uint64_t i = begin; i < end; i++)
-        if (!join_slice(j, (int)(i / EBPO_LEVEL_ARRAYS), &ebpo_level_arrays[i % EBPO_LEVEL_ARRAYS], &j->level[i / EBPO_LEVEL_ARRAYS]))
+        if (!join_slice(j, (int)(i / EBPO_LEVEL_ARRAYS), &ebpo_level_arrays[i % EBPO_LEVEL_ARRAYS],
+                        &j->level[i / EBPO_LEVEL_ARRAYS]))
             return no_memory(j->b, error);
     return EBPO_OK;
 }
 
 /* Volumes are added in one order whatever the number of threads. */
-static ebpo_status finish_level(const joiner *j, int level, uint64_t before, uint64_t all, ebpo_error *error)
+static ebpo_status finish_level(const joiner *j, int level, uint64_t before, uint64_t all,
+                                ebpo_error *error)
 {
     ebpo_level *out = &j->level[level];
     for (uint64_t i = 0; i < j->count; i++) {
@@ -247,7 +258,9 @@ static ebpo_status finish_level(const joiner *j, int level, uint64_t before, uin
         out->leaf_volume += l->leaf_volume;
         out->new_count += l->new_count;
     }
-    ebpo_status status = j->b->options->parts & EBPO_PART_MESH ? number_refs(j->b, out, before, all, error) : EBPO_OK;
+    ebpo_status status = j->b->options->parts & EBPO_PART_MESH
+                             ? number_refs(j->b, out, before, all, error)
+                             : EBPO_OK;
     leave_out(j->b, out);
     return status;
 }
@@ -255,10 +268,16 @@ static ebpo_status finish_level(const joiner *j, int level, uint64_t before, uin
 static void summarise(ebpo_tree *out, int level)
 {
     const ebpo_level *l = &out->level[level];
-    out->info.level[level] = (ebpo_level_summary){
-        .gray_count = l->gray_count, .leaf_count = l->leaf_count, .white_count = l->white_count, .black_count = l->black_count,
-        .plane_count = l->plane_count, .leaf_plane_count = l->leaf_plane_count, .new_count = l->new_count,
-        .ref_count = l->ref_count, .gray_volume = l->gray_volume, .leaf_volume = l->leaf_volume };
+    out->info.level[level] = (ebpo_level_summary){ .gray_count = l->gray_count,
+                                                   .leaf_count = l->leaf_count,
+                                                   .white_count = l->white_count,
+                                                   .black_count = l->black_count,
+                                                   .plane_count = l->plane_count,
+                                                   .leaf_plane_count = l->leaf_plane_count,
+                                                   .new_count = l->new_count,
+                                                   .ref_count = l->ref_count,
+                                                   .gray_volume = l->gray_volume,
+                                                   .leaf_volume = l->leaf_volume };
 }
 
 static bool root_group(joiner *j)
@@ -271,7 +290,8 @@ static bool root_group(joiner *j)
 ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error)
 {
     joiner j = { .b = b, .level = out->level };
-    ebpo_status status = root_group(&j) && walk(&j, 0, b->top.cell, 0) ? EBPO_OK : no_memory(b, error);
+    ebpo_status status =
+        root_group(&j) && walk(&j, 0, b->top.cell, 0) ? EBPO_OK : no_memory(b, error);
     uint64_t refs = 0, all = 0;
     for (int level = 0; level < EBPO_LEVELS_MAX && status == EBPO_OK; level++) {
         count_arrays(&j, level);
@@ -280,7 +300,8 @@ ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error
     ebpo_pass pass = { &b->options->progress, 0, all, 2 * all };
     ebpo_progress progress = ebpo_pass_progress(&pass);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(b->threads, EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS, 1, join_arrays, &j, &progress, stage, error);
+        status = ebpo_parallel_for(b->threads, EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS, 1, join_arrays,
+                                   &j, &progress, stage, error);
     for (int level = 0; level < EBPO_LEVELS_MAX && status == EBPO_OK; level++) {
         uint64_t own = out->level[level].ref_count;
         status = finish_level(&j, level, refs, all, error);

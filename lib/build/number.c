@@ -37,13 +37,15 @@ ebpo_status ebpo_build_number(ebpo_builder *b, ebpo_branch *s, ebpo_error *error
     number_node(b, s, 0, &next);
     uint64_t given = next - s->first;
     if (given != s->fresh_count)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "internal: %llu faces of a piece are in none of its leaves", (unsigned long long)(s->fresh_count - given));
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "internal: %llu faces of a piece are in none of its leaves",
+                         (unsigned long long)(s->fresh_count - given));
     return EBPO_OK;
 }
 
 /* order[i]: mesh vertex that gets final number i. */
-static void order_vertices(const ebpo_builder *b, const ebpo_mesh *mesh, const uint32_t *face_at, uint32_t *order,
-                           uint32_t *final)
+static void order_vertices(const ebpo_builder *b, const ebpo_mesh *mesh, const uint32_t *face_at,
+                           uint32_t *order, uint32_t *final)
 {
     ebpo_array_fill(b->workspace, final, 0xff, mesh->vertex_count * sizeof *final);
     uint32_t next = 0;
@@ -76,7 +78,8 @@ typedef struct moving {
 
 enum { MOVE_GRAIN = 1 << 14 };
 
-static ebpo_status turn_around(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status turn_around(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
 {
     moving *m = context;
     (void)worker, (void)error;
@@ -87,7 +90,8 @@ static ebpo_status turn_around(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-static ebpo_status move_vertices(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status move_vertices(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
 {
     moving *m = context;
     const ebpo_mesh *mesh = m->mesh;
@@ -105,7 +109,8 @@ static ebpo_status move_vertices(void *context, uint64_t begin, uint64_t end, un
     return EBPO_OK;
 }
 
-static ebpo_status move_faces(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status move_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
 {
     moving *m = context;
     (void)worker, (void)error;
@@ -123,24 +128,32 @@ static ebpo_status move_all(moving *m, uint32_t *final, ebpo_error *error)
 {
     const ebpo_builder *b = m->b;
     static const char stage[] = "numbering vertices";
-    uint64_t faces = m->mesh->face_count, vertices = m->mesh->vertex_count, all = 3 * faces + vertices;
-    ebpo_pass turn = { &b->options->progress, 0, faces, all }, place = { turn.to, 2 * faces, 2 * faces + vertices, all }, move = { turn.to, 2 * faces + vertices, all, all };
+    uint64_t faces = m->mesh->face_count, vertices = m->mesh->vertex_count,
+             all = 3 * faces + vertices;
+    ebpo_pass turn = { &b->options->progress, 0, faces, all },
+              place = { turn.to, 2 * faces, 2 * faces + vertices, all },
+              move = { turn.to, 2 * faces + vertices, all, all };
     ebpo_progress progress = ebpo_pass_progress(&turn);
-    ebpo_status status = ebpo_parallel_for(b->threads, faces, MOVE_GRAIN, turn_around, m, &progress, stage, error);
+    ebpo_status status =
+        ebpo_parallel_for(b->threads, faces, MOVE_GRAIN, turn_around, m, &progress, stage, error);
     if (status != EBPO_OK)
         return status;
     order_vertices(b, m->mesh, m->face_at, m->out->vertex_source, final);
     m->final = final;
     progress = ebpo_pass_progress(&place);
-    status = ebpo_parallel_for(b->threads, vertices, MOVE_GRAIN, move_vertices, m, &progress, stage, error);
+    status = ebpo_parallel_for(b->threads, vertices, MOVE_GRAIN, move_vertices, m, &progress, stage,
+                               error);
     progress = ebpo_pass_progress(&move);
-    return status == EBPO_OK ? ebpo_parallel_for(b->threads, faces, MOVE_GRAIN, move_faces, m, &progress, stage, error) : status;
+    return status == EBPO_OK ? ebpo_parallel_for(b->threads, faces, MOVE_GRAIN, move_faces, m,
+                                                 &progress, stage, error)
+                             : status;
 }
 
 ebpo_status ebpo_build_mesh(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, ebpo_error *error)
 {
     uint64_t nv = mesh->vertex_count, nf = mesh->face_count;
-    uint32_t *face_at = ebpo_array_alloc(b->workspace, nf, sizeof *face_at), *final = ebpo_array_alloc(b->workspace, nv, sizeof *final);
+    uint32_t *face_at = ebpo_array_alloc(b->workspace, nf, sizeof *face_at),
+             *final = ebpo_array_alloc(b->workspace, nv, sizeof *final);
     ebpo_mesh *m = &out->mesh;
     *m = *mesh;
     m->arrangement = NULL;
@@ -151,7 +164,8 @@ ebpo_status ebpo_build_mesh(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, eb
     out->face_source = ebpo_array_alloc(b->workspace, nf, sizeof(uint32_t));
     moving job = { .b = b, .mesh = mesh, .face_at = face_at, .out = out };
     ebpo_status status;
-    if (!face_at || !final || (!m->xyz32 && !m->xyz64) || !m->faces || !out->vertex_source || !out->face_source)
+    if (!face_at || !final || (!m->xyz32 && !m->xyz64) || !m->faces || !out->vertex_source ||
+        !out->face_source)
         status = ebpo_workspace_fail(b->workspace, nv * 16 + nf * 16, error);
     else
         status = move_all(&job, final, error);

@@ -27,7 +27,10 @@ static char *take_room(ebpo_builder *b, struct ebpo_store *s, size_t bytes)
 {
     if (!s->block_count || bytes > s->left) {
         size_t block = bytes > STORE_BYTES ? bytes : STORE_BYTES;
-        char *made = ebpo_grow(&s->blocks, &s->block_capacity, s->block_count + 1, sizeof *s->blocks) ? ebpo_array_alloc(b->workspace, block, 1) : NULL;
+        char *made =
+            ebpo_grow(&s->blocks, &s->block_capacity, s->block_count + 1, sizeof *s->blocks)
+                ? ebpo_array_alloc(b->workspace, block, 1)
+                : NULL;
         if (!made)
             return NULL;
         s->blocks[s->block_count++] = made;
@@ -68,7 +71,8 @@ ebpo_status ebpo_build_pack(ebpo_builder *b, ebpo_out *out, ebpo_error *error)
         return EBPO_OK;
     for (int level = 0; level < EBPO_LEVELS_MAX; level++)
         for (int s = 0; s < EBPO_LEVEL_ARRAYS; s++)
-            bytes += room_for(ebpo_count_of_level(&out[level].level, &ebpo_level_arrays[s]), ebpo_level_arrays[s].size);
+            bytes += room_for(ebpo_count_of_level(&out[level].level, &ebpo_level_arrays[s]),
+                              ebpo_level_arrays[s].size);
     char *to = ebpo_store_room(b, bytes);
     if (!to)
         return ebpo_workspace_fail(b->workspace, bytes, error);

@@ -1,5 +1,6 @@
-/* Faces to cells: a piece becomes a subtree, depth first. What a node is depends on its cell and its faces alone, so neither the pieces nor the threads show in the result.
- * Source: EBP 2017, 3.3 (assignment of faces to leaves); BP 2008, 3.3.1 (coalescing). */
+/* Faces to cells: a piece becomes a subtree, depth first. What a node is depends on its cell and
+ * its faces alone, so neither the pieces nor the threads show in the result. Source: EBP 2017, 3.3
+ * (assignment of faces to leaves); BP 2008, 3.3.1 (coalescing). */
 #include <stdlib.h>
 #include <string.h>
 
@@ -11,11 +12,14 @@
 enum { SETTLE_FACES = 1 << 13 };
 
 /* A mesh with huge faces and a deep maximum level would list every face in millions of cells. */
-static const uint64_t leaves_per_face = 64, leaves_always = 1 << 22, entries_per_face = 512, entries_always = 1 << 26;
+static const uint64_t leaves_per_face = 64, leaves_always = 1 << 22, entries_per_face = 512,
+                      entries_always = 1 << 26;
 
 /* Faces seen below a node; a round number saves clearing. */
 typedef struct face_set {
-    struct { uint32_t face, round; } *slots;
+    struct {
+        uint32_t face, round;
+    } * slots;
     uint64_t mask, count;
     uint32_t round;
 } face_set;
@@ -23,7 +27,7 @@ typedef struct face_set {
 typedef struct grower {
     ebpo_builder *b;
     ebpo_branch *s;
-    uint32_t *stack;  /* lists of the nodes on the way down, one behind the other */
+    uint32_t *stack; /* lists of the nodes on the way down, one behind the other */
     uint64_t stack_used, stack_capacity;
     uint8_t *mask;
     uint64_t mask_capacity;
@@ -71,12 +75,16 @@ bool ebpo_build_is_leaf(const ebpo_builder *b, int level, uint64_t count)
     return level == b->max_level || count <= b->options->leaf_faces;
 }
 
-ebpo_status ebpo_build_check_lists(uint64_t face_count, uint64_t leaves, uint64_t entries, ebpo_error *error)
+ebpo_status ebpo_build_check_lists(uint64_t face_count, uint64_t leaves, uint64_t entries,
+                                   ebpo_error *error)
 {
-    uint64_t most_leaves = leaves_always + leaves_per_face * face_count, most_entries = entries_always + entries_per_face * face_count;
+    uint64_t most_leaves = leaves_always + leaves_per_face * face_count,
+             most_entries = entries_always + entries_per_face * face_count;
     if (leaves <= most_leaves && entries <= most_entries)
         return EBPO_OK;
-    return ebpo_fail(error, EBPO_E_LIMIT, "the faces touch too many cells (more than %llu leaves or %llu listed faces): lower --max-level or raise --leaf-faces",
+    return ebpo_fail(error, EBPO_E_LIMIT,
+                     "the faces touch too many cells (more than %llu leaves or %llu listed faces): "
+                     "lower --max-level or raise --leaf-faces",
                      (unsigned long long)most_leaves, (unsigned long long)most_entries);
 }
 
@@ -84,7 +92,9 @@ ebpo_status ebpo_build_check_branch(const ebpo_branch *s, ebpo_error *error)
 {
     if (s->node_count <= UINT32_MAX - 8 && s->detail_count < UINT32_MAX)
         return EBPO_OK;
-    return ebpo_fail(error, EBPO_E_LIMIT, "more than 2^32 nodes in one piece of the tree: lower --max-level or raise --leaf-faces");
+    return ebpo_fail(
+        error, EBPO_E_LIMIT,
+        "more than 2^32 nodes in one piece of the tree: lower --max-level or raise --leaf-faces");
 }
 
 static ebpo_status no_memory(ebpo_error *error)
@@ -94,7 +104,8 @@ static ebpo_status no_memory(ebpo_error *error)
 
 bool ebpo_branch_detail(const ebpo_builder *b, ebpo_branch *s, uint32_t *index)
 {
-    if (!ebpo_array_grow_late(b->workspace, &s->details, &s->detail_capacity, s->detail_count + 1, sizeof *s->details))
+    if (!ebpo_array_grow_late(b->workspace, &s->details, &s->detail_capacity, s->detail_count + 1,
+                              sizeof *s->details))
         return false;
     memset(&s->details[s->detail_count], 0, sizeof s->details[0]);
     *index = (uint32_t)s->detail_count++;
@@ -103,7 +114,8 @@ bool ebpo_branch_detail(const ebpo_builder *b, ebpo_branch *s, uint32_t *index)
 
 bool ebpo_branch_children(const ebpo_builder *b, ebpo_branch *s, uint32_t *first)
 {
-    if (!ebpo_array_grow_late(b->workspace, &s->nodes, &s->node_capacity, s->node_count + 8, sizeof *s->nodes))
+    if (!ebpo_array_grow_late(b->workspace, &s->nodes, &s->node_capacity, s->node_count + 8,
+                              sizeof *s->nodes))
         return false;
     *first = (uint32_t)s->node_count;
     memset(&s->nodes[s->node_count], 0, 8 * sizeof s->nodes[0]);
@@ -111,8 +123,10 @@ bool ebpo_branch_children(const ebpo_builder *b, ebpo_branch *s, uint32_t *first
     return true;
 }
 
-/* Faces with a vertex outside the cell's run of vertices reach over its walls (or touch an upper one). */
-bool ebpo_build_crossing(const ebpo_builder *b, ebpo_branch *s, ebpo_cell cell, const uint32_t *list, uint64_t count, ebpo_build_detail *detail)
+/* Faces with a vertex outside the cell's run of vertices reach over its walls (or touch an upper
+ * one). */
+bool ebpo_build_crossing(const ebpo_builder *b, ebpo_branch *s, ebpo_cell cell,
+                         const uint32_t *list, uint64_t count, ebpo_build_detail *detail)
 {
     uint64_t begin, end;
     ebpo_build_vertex_range(b, cell, &begin, &end);
@@ -122,7 +136,8 @@ bool ebpo_build_crossing(const ebpo_builder *b, ebpo_branch *s, ebpo_cell cell, 
         const uint32_t *f = b->face[ebpo_branch_face(s, list[i])];
         if (f[0] - begin < end - begin && f[1] - begin < end - begin && f[2] - begin < end - begin)
             continue;
-        if (!ebpo_array_grow_late(b->workspace, &s->crossing, &s->cross_capacity, s->cross_count + 1, sizeof *s->crossing))
+        if (!ebpo_array_grow_late(b->workspace, &s->crossing, &s->cross_capacity,
+                                  s->cross_count + 1, sizeof *s->crossing))
             return false;
         s->crossing[s->cross_count++] = list[i];
     }
@@ -130,30 +145,37 @@ bool ebpo_build_crossing(const ebpo_builder *b, ebpo_branch *s, ebpo_cell cell, 
     return true;
 }
 
-static ebpo_status grow_leaf(grower *g, ebpo_build_node *node, ebpo_cell cell, uint64_t at, uint64_t count)
+static ebpo_status grow_leaf(grower *g, ebpo_build_node *node, ebpo_cell cell, uint64_t at,
+                             uint64_t count)
 {
     ebpo_builder *b = g->b;
     ebpo_branch *s = g->s;
     node->type = EBPO_LEAF;
-    if (!ebpo_branch_detail(g->b, s, &node->detail) || !ebpo_array_grow_late(g->b->workspace, &s->entries, &s->entry_capacity, s->entry_count + count, sizeof *s->entries))
+    if (!ebpo_branch_detail(g->b, s, &node->detail) ||
+        !ebpo_array_grow_late(g->b->workspace, &s->entries, &s->entry_capacity,
+                              s->entry_count + count, sizeof *s->entries))
         return no_memory(g->error);
     ebpo_build_detail *d = &s->details[node->detail];
     d->entry_begin = s->entry_count;
-    ebpo_array_copy(b->workspace, s->entries + s->entry_count, g->stack + at, count * sizeof *g->stack);
+    ebpo_array_copy(b->workspace, s->entries + s->entry_count, g->stack + at,
+                    count * sizeof *g->stack);
     s->entry_count += count;
     d->entry_end = s->entry_count;
-    uint64_t leaves = atomic_fetch_add(&b->leaf_count, 1) + 1, entries = atomic_fetch_add(&b->entry_count, count) + count;
+    uint64_t leaves = atomic_fetch_add(&b->leaf_count, 1) + 1,
+             entries = atomic_fetch_add(&b->entry_count, count) + count;
     ebpo_status status = ebpo_build_check_lists(b->face_count, leaves, entries, g->error);
     if (status != EBPO_OK || !b->solid)
         return status;
-    if (!ebpo_grow(&g->faces, &g->faces_capacity, count < EBPO_CORNER_FACES ? count : EBPO_CORNER_FACES, sizeof *g->faces))
+    if (!ebpo_grow(&g->faces, &g->faces_capacity,
+                   count < EBPO_CORNER_FACES ? count : EBPO_CORNER_FACES, sizeof *g->faces))
         return no_memory(g->error);
     ebpo_branch_corners(b, s, cell, g->stack + at, count, g->faces, d->delta);
     return EBPO_OK;
 }
 
 /* Splits the list at stack[at] into eight lists at stack[top]. */
-static ebpo_status split(grower *g, ebpo_cell cell, uint64_t at, uint64_t count, uint64_t top, uint64_t begin[9])
+static ebpo_status split(grower *g, ebpo_cell cell, uint64_t at, uint64_t count, uint64_t top,
+                         uint64_t begin[9])
 {
     const ebpo_builder *b = g->b;
     if (!ebpo_array_grow_late(g->b->workspace, &g->mask, &g->mask_capacity, count, 1))
@@ -172,7 +194,8 @@ static ebpo_status split(grower *g, ebpo_cell cell, uint64_t at, uint64_t count,
     begin[0] = top;
     for (int o = 0; o < 8; o++)
         begin[o + 1] = begin[o] + sizes[o];
-    if (!ebpo_array_grow_late(g->b->workspace, &g->stack, &g->stack_capacity, begin[8], sizeof *g->stack))
+    if (!ebpo_array_grow_late(g->b->workspace, &g->stack, &g->stack_capacity, begin[8],
+                              sizeof *g->stack))
         return no_memory(g->error);
     uint64_t next[8];
     memcpy(next, begin, sizeof next);
@@ -215,14 +238,17 @@ static bool set_start(face_set *set, uint64_t most)
     return set->slots != NULL;
 }
 
-/* A face that passes by at the distance of a rounding error may be listed here and, where cells are smaller, no more. When the leaves
- * below a gray node list no more faces than one leaf may, the node is a leaf of just those; when they list none, it is empty. */
-static ebpo_status collapse_if_few(grower *g, uint32_t index, ebpo_cell cell, uint64_t at, uint64_t count)
+/* A face that passes by at the distance of a rounding error may be listed here and, where cells are
+ * smaller, no more. When the leaves below a gray node list no more faces than one leaf may, the
+ * node is a leaf of just those; when they list none, it is empty. */
+static ebpo_status collapse_if_few(grower *g, uint32_t index, ebpo_cell cell, uint64_t at,
+                                   uint64_t count)
 {
     ebpo_branch *s = g->s;
     ebpo_build_node gray = s->nodes[index];
     ebpo_build_detail d = s->details[gray.detail];
-    uint64_t most = g->b->options->leaf_faces < g->b->face_count ? g->b->options->leaf_faces : g->b->face_count;
+    uint64_t most =
+        g->b->options->leaf_faces < g->b->face_count ? g->b->options->leaf_faces : g->b->face_count;
     if (!set_start(&g->set, most))
         return no_memory(g->error);
     for (uint64_t i = d.entry_begin; i < d.entry_end; i++) {
@@ -249,7 +275,8 @@ static ebpo_status collapse_if_few(grower *g, uint32_t index, ebpo_cell cell, ui
 }
 
 /* The node's list is stack[at] to stack[at + count - 1]; the stack is free from `top` on. */
-static ebpo_status grow(grower *g, uint32_t index, ebpo_cell cell, uint64_t at, uint64_t count, uint64_t top)
+static ebpo_status grow(grower *g, uint32_t index, ebpo_cell cell, uint64_t at, uint64_t count,
+                        uint64_t top)
 {
     ebpo_branch *s = g->s;
     if (count == 0)
@@ -275,7 +302,8 @@ static ebpo_status grow(grower *g, uint32_t index, ebpo_cell cell, uint64_t at, 
     if (!ebpo_build_crossing(g->b, s, cell, g->stack + at, count, &d))
         status = no_memory(g->error);
     for (unsigned o = 0; o < 8 && status == EBPO_OK; o++)
-        status = grow(g, child + o, ebpo_child_cell(cell, o), begin[o], begin[o + 1] - begin[o], begin[8]);
+        status = grow(g, child + o, ebpo_child_cell(cell, o), begin[o], begin[o + 1] - begin[o],
+                      begin[8]);
     if (status != EBPO_OK)
         return status;
     d.entry_end = s->entry_count;
@@ -288,7 +316,9 @@ static ebpo_status grow(grower *g, uint32_t index, ebpo_cell cell, uint64_t at, 
 static ebpo_status grow_from_list(grower *g)
 {
     ebpo_branch *s = g->s;
-    if (!ebpo_array_grow_late(g->b->workspace, &g->stack, &g->stack_capacity, s->list_count, sizeof *g->stack) || !ebpo_array_grow_late(g->b->workspace, &s->nodes, &s->node_capacity, 1, sizeof *s->nodes))
+    if (!ebpo_array_grow_late(g->b->workspace, &g->stack, &g->stack_capacity, s->list_count,
+                              sizeof *g->stack) ||
+        !ebpo_array_grow_late(g->b->workspace, &s->nodes, &s->node_capacity, 1, sizeof *s->nodes))
         return no_memory(g->error);
     for (uint64_t i = 0; i < s->list_count; i++)
         g->stack[i] = (uint32_t)i;

@@ -13,7 +13,8 @@
 #include "geom/plane_code.h"
 #include "morton/octcode.h"
 
-/* Corners of a child's envelope are rounded: what that may be in a support, in cells, many times over. */
+/* Corners of a child's envelope are rounded: what that may be in a support, in cells, many times
+ * over. */
 static const double rounded = 1e-9;
 
 typedef struct proposer {
@@ -71,7 +72,8 @@ static int by_normal(const void *a, const void *b)
     const ebpo_offer *x = a, *y = b;
     if (x->normal != y->normal)
         return x->normal < y->normal ? -1 : 1;
-    return x->origin > y->origin ? -1 : x->origin < y->origin; /* of equal normals the one that has to move least */
+    /* of equal normals the one that has to move least */
+    return x->origin > y->origin ? -1 : x->origin < y->origin;
 }
 
 static int by_normal_alone(const void *a, const void *b)
@@ -80,7 +82,8 @@ static int by_normal_alone(const void *a, const void *b)
     return (x->normal > y->normal) - (x->normal < y->normal);
 }
 
-/* More candidates than that are thinned out evenly: only leaves without a limit of faces have so many, and k-medoids looks at all pairs. */
+/* More candidates than that are thinned out evenly: only leaves without a limit of faces have so
+ * many, and k-medoids looks at all pairs. */
 enum { CANDIDATES_MOST = 4096 };
 
 /* Of equal normals one is left. Their supports are still to be found. */
@@ -124,7 +127,8 @@ static double moved_by(const ebpo_offer *offer, double support, const double siz
 }
 
 /* Chooses among p->candidates, notes the planes and makes what the parent will get. */
-static bool choose(proposer *p, uint32_t detail, ebpo_cell cell, const ebpo_handover *given, ebpo_handover *out)
+static bool choose(proposer *p, uint32_t detail, ebpo_cell cell, const ebpo_handover *given,
+                   ebpo_handover *out)
 {
     const ebpo_build_options *o = p->b->options;
     ebpo_proposals *all = p->s->proposals;
@@ -136,35 +140,45 @@ static bool choose(proposer *p, uint32_t detail, ebpo_cell cell, const ebpo_hand
         size[k] = p->b->box.size[k] / (double)(1u << cell.level);
     for (uint64_t i = 0; i < given->offer_count; i++)
         p->candidates[i].moved = moved_by(&given->offers[i], p->candidates[i].support, size);
-    ebpo_choice choice = { .candidates = p->candidates, .count = (int)given->offer_count, .most = EBPO_PLANES_STORED, .cell_size = size, .normals = o->normals,
-                           .wanted = ebpo_selection_wanted((int)given->offer_count, cell.level, o->percent, o->k_root),
+    ebpo_choice choice = { .candidates = p->candidates,
+                           .count = (int)given->offer_count,
+                           .most = EBPO_PLANES_STORED,
+                           .cell_size = size,
+                           .normals = o->normals,
+                           .wanted = ebpo_selection_wanted((int)given->offer_count, cell.level,
+                                                           o->percent, o->k_root),
                            .seed = o->seed ^ ebpo_octcode_of_cell(cell) * 0x9e3779b97f4a7c15u };
     int count = p->method->select(&own, &choice, codes);
-    if (count < 0 || !ebpo_grow(&all->codes, &all->code_room, all->code_count + (uint64_t)count, sizeof *all->codes))
+    if (count < 0 || !ebpo_grow(&all->codes, &all->code_room, all->code_count + (uint64_t)count,
+                                sizeof *all->codes))
         return false;
     all->first[detail] = all->code_count;
     all->count[detail] = (uint8_t)count;
     for (int i = 0; i < count; i++) {
-        ebpo_offer *offer = bsearch(&(ebpo_offer){ .normal = codes[i] & 0xfffff }, given->offers, given->offer_count, sizeof *offer, by_normal_alone);
+        ebpo_offer *offer = bsearch(&(ebpo_offer){ .normal = codes[i] & 0xfffff }, given->offers,
+                                    given->offer_count, sizeof *offer, by_normal_alone);
         all->codes[all->code_count++] = codes[i];
         if (offer && !add_offer(out, offer->normal, offer->origin))
             return false;
     }
-    if (!ebpo_grow(&out->corner, &out->corner_room, (uint64_t)own.vertex_count, sizeof *out->corner))
+    if (!ebpo_grow(&out->corner, &out->corner_room, (uint64_t)own.vertex_count,
+                   sizeof *out->corner))
         return false;
     bool used[EBPO_POLYTOPE_VERTICES] = { false };
     for (int f = 0; f < own.face_count; f++)
         for (int i = own.first[f]; i < own.first[f + 1] && own.tag[f] >= 0; i++)
             if (!used[own.corner[i]]) {
                 used[own.corner[i]] = true;
-                memcpy(out->corner[out->corner_count++], own.vertex[own.corner[i]], sizeof *out->corner);
+                memcpy(out->corner[out->corner_count++], own.vertex[own.corner[i]],
+                       sizeof *out->corner);
             }
     return true;
 }
 
 /* --- leaves: planes of faces, around the solid --- */
 
-static bool offer_faces(proposer *p, const ebpo_build_detail *d, ebpo_cell cell, ebpo_handover *given)
+static bool offer_faces(proposer *p, const ebpo_build_detail *d, ebpo_cell cell,
+                        ebpo_handover *given)
 {
     const ebpo_builder *b = p->b;
     for (uint64_t i = d->entry_begin; i < d->entry_end; i++) {
@@ -177,7 +191,8 @@ static bool offer_faces(proposer *p, const ebpo_build_detail *d, ebpo_cell cell,
             continue;
         ebpo_plane_code_decode(normal, n, &e);
         for (int k = 0; k < 3; k++) {
-            double corner = ebpo_wall(&b->box, k, cell.level, cell.at[k]), size = b->box.size[k] / (double)(1u << cell.level);
+            double corner = ebpo_wall(&b->box, k, cell.level, cell.at[k]),
+                   size = b->box.size[k] / (double)(1u << cell.level);
             for (int c = 0; c < 3; c++)
                 origin += n[k] * ((t.corner[c][k] - corner) / size) / 3;
         }
@@ -187,7 +202,8 @@ static bool offer_faces(proposer *p, const ebpo_build_detail *d, ebpo_cell cell,
     return true;
 }
 
-static void leaf_supports(proposer *p, const ebpo_build_detail *d, ebpo_cell cell, int32_t winding, uint64_t count)
+static void leaf_supports(proposer *p, const ebpo_build_detail *d, ebpo_cell cell, int32_t winding,
+                          uint64_t count)
 {
     const ebpo_builder *b = p->b;
     unsigned inside = ebpo_inside_corners(b, winding, d->delta);
@@ -205,7 +221,8 @@ static void leaf_supports(proposer *p, const ebpo_build_detail *d, ebpo_cell cel
             raise_support(&p->candidates[j], (const double[3]){ i & 1, i >> 1 & 1, i >> 2 & 1 }, 0);
 }
 
-static bool propose_leaf(proposer *p, uint32_t detail, ebpo_cell cell, int32_t winding, ebpo_handover *out)
+static bool propose_leaf(proposer *p, uint32_t detail, ebpo_cell cell, int32_t winding,
+                         ebpo_handover *out)
 {
     const ebpo_build_detail *d = &p->s->details[detail];
     ebpo_handover given = { 0 };
@@ -223,7 +240,8 @@ static bool propose_leaf(proposer *p, uint32_t detail, ebpo_cell cell, int32_t w
 /* From a child's coordinates to its parent's. */
 static bool gather(ebpo_handover *given, const ebpo_handover *child, unsigned octant)
 {
-    if (!ebpo_grow(&given->corner, &given->corner_room, given->corner_count + child->corner_count, sizeof *given->corner))
+    if (!ebpo_grow(&given->corner, &given->corner_room, given->corner_count + child->corner_count,
+                   sizeof *given->corner))
         return false;
     for (uint64_t i = 0; i < child->corner_count; i++, given->corner_count++)
         for (int k = 0; k < 3; k++)
@@ -239,8 +257,10 @@ static bool gather(ebpo_handover *given, const ebpo_handover *child, unsigned oc
     return true;
 }
 
-/* Besides the children's envelopes the solid itself counts, so that the guarantee never rests on rounded corners. */
-static bool gray_supports(proposer *p, const ebpo_build_detail *d, ebpo_cell cell, int32_t winding, const ebpo_handover *given)
+/* Besides the children's envelopes the solid itself counts, so that the guarantee never rests on
+ * rounded corners. */
+static bool gray_supports(proposer *p, const ebpo_build_detail *d, ebpo_cell cell, int32_t winding,
+                          const ebpo_handover *given)
 {
     if (!ebpo_supports_gather(&p->supports, p->b, p->s, d, cell, winding))
         return false;
@@ -256,12 +276,16 @@ static bool gray_supports(proposer *p, const ebpo_build_detail *d, ebpo_cell cel
     return true;
 }
 
-static bool propose_gray(proposer *p, uint32_t detail, ebpo_cell cell, int32_t winding, ebpo_handover *given, ebpo_handover *out)
+static bool propose_gray(proposer *p, uint32_t detail, ebpo_cell cell, int32_t winding,
+                         ebpo_handover *given, ebpo_handover *out)
 {
-    return make_candidates(p, given) && gray_supports(p, &p->s->details[detail], cell, winding, given) && choose(p, detail, cell, given, out);
+    return make_candidates(p, given) &&
+           gray_supports(p, &p->s->details[detail], cell, winding, given) &&
+           choose(p, detail, cell, given, out);
 }
 
-static bool propose(proposer *p, uint32_t index, ebpo_cell cell, int32_t winding, ebpo_handover *out)
+static bool propose(proposer *p, uint32_t index, ebpo_cell cell, int32_t winding,
+                    ebpo_handover *out)
 {
     ebpo_build_node node = p->s->nodes[index];
     if (node.type == EBPO_LEAF)
@@ -274,7 +298,8 @@ static bool propose(proposer *p, uint32_t index, ebpo_cell cell, int32_t winding
     ebpo_child_windings(p->b, p->s, node.child, offset);
     for (unsigned o = 0; o < 8 && good; o++) {
         ebpo_handover child = { 0 };
-        good = propose(p, node.child + o, ebpo_child_cell(cell, o), winding + offset[o], &child) && gather(&given, &child, o);
+        good = propose(p, node.child + o, ebpo_child_cell(cell, o), winding + offset[o], &child) &&
+               gather(&given, &child, o);
         handover_free(&child);
     }
     good = good && propose_gray(p, node.detail, cell, winding, &given, out);
@@ -309,7 +334,8 @@ static ebpo_status no_memory(ebpo_error *error)
 static ebpo_status pack(ebpo_builder *b, ebpo_branch *s, ebpo_error *error)
 {
     ebpo_proposals *p = s->proposals;
-    uint64_t n = s->detail_count, bytes = n * (sizeof *p->first + 1) + p->code_count * sizeof *p->codes;
+    uint64_t n = s->detail_count,
+             bytes = n * (sizeof *p->first + 1) + p->code_count * sizeof *p->codes;
     if (!b->workspace)
         return EBPO_OK;
     uint64_t *first = ebpo_store_room(b, bytes);
@@ -331,7 +357,8 @@ static ebpo_status pack(ebpo_builder *b, ebpo_branch *s, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status propose_subtrees(void *context, uint64_t first, uint64_t last, unsigned worker, ebpo_error *error)
+static ebpo_status propose_subtrees(void *context, uint64_t first, uint64_t last, unsigned worker,
+                                    ebpo_error *error)
 {
     ebpo_builder *b = context;
     proposer p = { .b = b, .method = ebpo_selection_of(b->options->select) };
@@ -340,7 +367,8 @@ static ebpo_status propose_subtrees(void *context, uint64_t first, uint64_t last
     for (uint64_t i = first; i < last && status == EBPO_OK; i++) {
         p.s = &b->sub[i];
         status = ebpo_build_partition(b, p.s, error);
-        if (status == EBPO_OK && (!begin(p.s) || !propose(&p, 0, p.s->cell, p.s->winding, &p.s->proposals->root)))
+        if (status == EBPO_OK &&
+            (!begin(p.s) || !propose(&p, 0, p.s->cell, p.s->winding, &p.s->proposals->root)))
             status = no_memory(error);
         if (status == EBPO_OK)
             status = pack(b, p.s, error);
@@ -391,13 +419,18 @@ static bool list_top(top_list *t)
                 continue;
             if (!ebpo_grow(&t->nodes, &t->room, t->count + 1, sizeof *t->nodes))
                 return false;
-            t->nodes[t->count++] = (top_node){ .node = node->child + o, .cell = ebpo_child_cell(t->nodes[i].cell, o), .winding = winding, .parent = i, .octant = o };
+            t->nodes[t->count++] = (top_node){ .node = node->child + o,
+                                               .cell = ebpo_child_cell(t->nodes[i].cell, o),
+                                               .winding = winding,
+                                               .parent = i,
+                                               .octant = o };
         }
     }
     return true;
 }
 
-static ebpo_status propose_top_nodes(void *context, uint64_t first, uint64_t last, unsigned worker, ebpo_error *error)
+static ebpo_status propose_top_nodes(void *context, uint64_t first, uint64_t last, unsigned worker,
+                                     ebpo_error *error)
 {
     top_list *t = context;
     ebpo_builder *b = t->b;
@@ -441,7 +474,8 @@ static bool note_top(top_list *t)
     for (uint64_t i = 0; i < t->count; i++) {
         top_node *n = &t->nodes[i];
         uint32_t detail = s->nodes[n->node].detail;
-        if (!ebpo_grow(&p->codes, &p->code_room, p->code_count + (uint64_t)n->count, sizeof *p->codes))
+        if (!ebpo_grow(&p->codes, &p->code_room, p->code_count + (uint64_t)n->count,
+                       sizeof *p->codes))
             return false;
         p->first[detail] = p->code_count;
         p->count[detail] = (uint8_t)n->count;
@@ -464,7 +498,8 @@ static ebpo_status propose_top(top_list *t, ebpo_pass *pass, ebpo_error *error)
             t->base--;
         pass->begin = pass->end;
         pass->end += end_of_level - t->base;
-        status = ebpo_parallel_for(b->threads, end_of_level - t->base, 1, propose_top_nodes, t, &progress, "choosing planes", error);
+        status = ebpo_parallel_for(b->threads, end_of_level - t->base, 1, propose_top_nodes, t,
+                                   &progress, "choosing planes", error);
         for (uint64_t i = t->base; i < end_of_level && status == EBPO_OK; i++) {
             top_node *n = &t->nodes[i];
             if (n->parent != UINT64_MAX && !gather(&t->nodes[n->parent].given, &n->out, n->octant))
@@ -478,14 +513,16 @@ static ebpo_status propose_top(top_list *t, ebpo_pass *pass, ebpo_error *error)
 
 ebpo_status ebpo_build_propose(ebpo_builder *b, ebpo_error *error)
 {
-    if (!ebpo_selection_of(b->options->select)->from_leaves || !(b->options->parts & (EBPO_PART_PLANES | EBPO_PART_LEAF_PLANES)))
+    if (!ebpo_selection_of(b->options->select)->from_leaves ||
+        !(b->options->parts & (EBPO_PART_PLANES | EBPO_PART_LEAF_PLANES)))
         return EBPO_OK;
     top_list t = { .b = b };
     ebpo_status status = list_top(&t) ? EBPO_OK : no_memory(error);
     ebpo_pass pass = { &b->options->progress, 0, b->sub_count, b->sub_count + t.count };
     ebpo_progress progress = ebpo_pass_progress(&pass);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(b->threads, b->sub_count, 1, propose_subtrees, b, &progress, "choosing planes", error);
+        status = ebpo_parallel_for(b->threads, b->sub_count, 1, propose_subtrees, b, &progress,
+                                   "choosing planes", error);
     atomic_store(&b->leaf_count, 0); /* the pieces are made once more */
     atomic_store(&b->entry_count, 0);
     if (status == EBPO_OK)

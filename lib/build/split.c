@@ -1,5 +1,6 @@
-/* The top of the tree: cut until the pieces are small enough to be worked on side by side, by the model's measure, never by the machine's. What a piece must know of the others is settled
- * here: which of its faces no piece before it lists, and the winding numbers at its corners. */
+/* The top of the tree: cut until the pieces are small enough to be worked on side by side, by the
+ * model's measure, never by the machine's. What a piece must know of the others is settled here:
+ * which of its faces no piece before it lists, and the winding numbers at its corners. */
 #include "geom/strict_fp.h"
 
 #include <stdlib.h>
@@ -20,14 +21,15 @@ static ebpo_status no_memory(const ebpo_builder *b, ebpo_error *error)
     return ebpo_workspace_fail_while(b->workspace, "while cutting the tree into pieces", error);
 }
 
-/* A node of the top: its faces are looked at in blocks, which are then handed out to the children's lists side by side. */
+/* A node of the top: its faces are looked at in blocks, which are then handed out to the children's
+ * lists side by side. */
 typedef struct top_split {
     const ebpo_builder *b;
     ebpo_cell cell;
     const uint32_t *list;
     uint64_t count;
     uint64_t first_vertex, end_vertex; /* in the cell */
-    uint16_t *mask;      /* bits 0 to 7: octants; bit 8: the face crosses the cell's walls */
+    uint16_t *mask;       /* bits 0 to 7: octants; bit 8: the face crosses the cell's walls */
     uint64_t (*begin)[9]; /* of each block: how many of each bit; then where they go */
     uint32_t *to[9];
 } top_split;
@@ -53,7 +55,8 @@ static unsigned octants_exactly(const ebpo_builder *b, ebpo_cell cell, const ebp
     return mask;
 }
 
-static ebpo_status make_masks(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status make_masks(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
 {
     top_split *t = context;
     const ebpo_builder *b = t->b;
@@ -65,7 +68,8 @@ static ebpo_status make_masks(void *context, uint64_t begin, uint64_t end, unsig
         ebpo_workspace_settle_often(b->workspace, i);
         ebpo_build_triangle(b, t->list[i], &face);
         const uint32_t *f = b->face[t->list[i]];
-        bool within = f[0] - t->first_vertex < inside && f[1] - t->first_vertex < inside && f[2] - t->first_vertex < inside;
+        bool within = f[0] - t->first_vertex < inside && f[1] - t->first_vertex < inside &&
+                      f[2] - t->first_vertex < inside;
         unsigned mask = octants_exactly(b, t->cell, &face) | (unsigned)!within << 8;
         t->mask[i] = (uint16_t)mask;
         for (; mask; mask &= mask - 1)
@@ -75,7 +79,8 @@ static ebpo_status make_masks(void *context, uint64_t begin, uint64_t end, unsig
     return EBPO_OK;
 }
 
-static ebpo_status hand_out(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status hand_out(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                            ebpo_error *error)
 {
     top_split *t = context;
     uint64_t *next = t->begin[begin / SPLIT_GRAIN];
@@ -109,37 +114,46 @@ static void add_up(top_split *t, uint64_t sizes[9])
 }
 
 /* Those that cross the walls are appended to the top's. */
-static ebpo_status make_room(ebpo_builder *b, top_split *t, uint32_t *lists[8], uint64_t sizes[9], ebpo_error *error)
+static ebpo_status make_room(ebpo_builder *b, top_split *t, uint32_t *lists[8], uint64_t sizes[9],
+                             ebpo_error *error)
 {
     ebpo_branch *s = &b->top;
     for (unsigned o = 0; o < 8; o++)
         if (!(t->to[o] = lists[o] = ebpo_array_alloc(b->workspace, sizes[o], sizeof *lists[o])))
             return no_memory(b, error);
-    if (!ebpo_array_grow_late(b->workspace, &s->crossing, &s->cross_capacity, s->cross_count + sizes[8], sizeof *s->crossing))
+    if (!ebpo_array_grow_late(b->workspace, &s->crossing, &s->cross_capacity,
+                              s->cross_count + sizes[8], sizeof *s->crossing))
         return no_memory(b, error);
     t->to[8] = s->crossing + s->cross_count;
     s->cross_count += sizes[8];
     return EBPO_OK;
 }
 
-static ebpo_status split_top(ebpo_builder *b, ebpo_cell cell, const uint32_t *list, uint64_t count, uint32_t *lists[8],
-                             uint64_t sizes[9], ebpo_error *error)
+static ebpo_status split_top(ebpo_builder *b, ebpo_cell cell, const uint32_t *list, uint64_t count,
+                             uint32_t *lists[8], uint64_t sizes[9], ebpo_error *error)
 {
-    uint64_t done = faces_done(b); /* stays so for the node: asked for all the same, to be stopped */
+    /* stays so for the node: asked for all the same, to be stopped */
+    uint64_t done = faces_done(b);
     ebpo_pass pass = { &b->options->progress, done, done, b->face_count };
     ebpo_progress progress = ebpo_pass_progress(&pass);
-    top_split t = { .b = b, .cell = cell, .list = list, .count = count, .mask = ebpo_array_alloc(b->workspace, count, sizeof *t.mask),
+    top_split t = { .b = b,
+                    .cell = cell,
+                    .list = list,
+                    .count = count,
+                    .mask = ebpo_array_alloc(b->workspace, count, sizeof *t.mask),
                     .begin = ebpo_alloc(count / SPLIT_GRAIN + 1, sizeof *t.begin) };
     ebpo_build_vertex_range(b, cell, &t.first_vertex, &t.end_vertex);
     ebpo_status status = t.mask && t.begin ? EBPO_OK : no_memory(b, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(b->threads, count, SPLIT_GRAIN, make_masks, &t, &progress, "cutting into pieces", error);
+        status = ebpo_parallel_for(b->threads, count, SPLIT_GRAIN, make_masks, &t, &progress,
+                                   "cutting into pieces", error);
     if (status == EBPO_OK) {
         add_up(&t, sizes);
         status = make_room(b, &t, lists, sizes, error);
     }
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(b->threads, count, SPLIT_GRAIN, hand_out, &t, &progress, "cutting into pieces", error);
+        status = ebpo_parallel_for(b->threads, count, SPLIT_GRAIN, hand_out, &t, &progress,
+                                   "cutting into pieces", error);
     ebpo_array_free(t.mask);
     free(t.begin);
     return status;
@@ -151,7 +165,8 @@ static bool mark_fresh(ebpo_builder *b, ebpo_branch *s, uint8_t *listed)
     s->fresh = ebpo_alloc_zero(s->list_count / 8 + 1, 1);
     if (!s->fresh)
         return false;
-    s->first = b->sub_count ? b->sub[b->sub_count - 1].first + b->sub[b->sub_count - 1].fresh_count : 0;
+    s->first =
+        b->sub_count ? b->sub[b->sub_count - 1].first + b->sub[b->sub_count - 1].fresh_count : 0;
     for (uint64_t i = 0; i < s->list_count; i++) {
         ebpo_workspace_settle_at(b->workspace, i);
         uint32_t f = s->list[i];
@@ -171,13 +186,18 @@ typedef struct cutting {
     ebpo_error *error;
 } cutting;
 
-/* Takes over `list`. A piece has a leaf at least, and its leaves list all of its faces: what is too much for them is too much here, and found out before it is made. */
-static ebpo_status add_piece(cutting *c, ebpo_build_node *node, ebpo_cell cell, uint32_t *list, uint64_t count)
+/* Takes over `list`. A piece has a leaf at least, and its leaves list all of its faces: what is too
+ * much for them is too much here, and found out before it is made. */
+static ebpo_status add_piece(cutting *c, ebpo_build_node *node, ebpo_cell cell, uint32_t *list,
+                             uint64_t count)
 {
     ebpo_builder *b = c->b;
     ebpo_branch s = { .cell = cell, .list = list, .list_count = count };
-    ebpo_status status = ebpo_build_check_lists(b->face_count, b->sub_count + 1, c->entries += count, c->error);
-    if (status == EBPO_OK && (!ebpo_grow(&b->sub, &b->sub_capacity, b->sub_count + 1, sizeof *b->sub) || !mark_fresh(b, &s, c->listed)))
+    ebpo_status status =
+        ebpo_build_check_lists(b->face_count, b->sub_count + 1, c->entries += count, c->error);
+    if (status == EBPO_OK &&
+        (!ebpo_grow(&b->sub, &b->sub_capacity, b->sub_count + 1, sizeof *b->sub) ||
+         !mark_fresh(b, &s, c->listed)))
         status = no_memory(b, c->error);
     if (status != EBPO_OK) {
         ebpo_array_free(list);
@@ -190,7 +210,8 @@ static ebpo_status add_piece(cutting *c, ebpo_build_node *node, ebpo_cell cell, 
 }
 
 /* Takes over `list`. */
-static ebpo_status grow_top(cutting *c, uint32_t index, ebpo_cell cell, uint32_t *list, uint64_t count)
+static ebpo_status grow_top(cutting *c, uint32_t index, ebpo_cell cell, uint32_t *list,
+                            uint64_t count)
 {
     ebpo_builder *b = c->b;
     ebpo_branch *s = &b->top;
@@ -205,11 +226,14 @@ static ebpo_status grow_top(cutting *c, uint32_t index, ebpo_cell cell, uint32_t
     ebpo_status status = ebpo_build_check_branch(s, c->error);
     if (status == EBPO_OK)
         status = split_top(b, cell, list, count, lists, sizes, c->error);
-    if (status == EBPO_OK && (!ebpo_branch_detail(b, s, &detail) || !ebpo_branch_children(b, s, &child)))
+    if (status == EBPO_OK &&
+        (!ebpo_branch_detail(b, s, &detail) || !ebpo_branch_children(b, s, &child)))
         status = no_memory(b, c->error);
     if (status == EBPO_OK) {
         s->nodes[index] = (ebpo_build_node){ EBPO_GRAY, child, detail };
-        s->details[detail] = (ebpo_build_detail){ .entry_begin = b->sub_count, .cross_begin = crossing, .cross_end = s->cross_count };
+        s->details[detail] = (ebpo_build_detail){ .entry_begin = b->sub_count,
+                                                  .cross_begin = crossing,
+                                                  .cross_end = s->cross_count };
     }
     ebpo_array_free(list);
     for (unsigned o = 0; o < 8; o++) {
@@ -226,11 +250,17 @@ static ebpo_status grow_top(cutting *c, uint32_t index, ebpo_cell cell, uint32_t
 static ebpo_status cut(ebpo_builder *b, ebpo_error *error)
 {
     uint32_t *all = ebpo_array_alloc(b->workspace, b->face_count, sizeof *all);
-    cutting c = { b, b->face_count / PIECES_MOST > PIECE_FACES ? b->face_count / PIECES_MOST : PIECE_FACES, ebpo_array_zero(b->workspace, b->face_count / 8 + 1, 1), 0, error };
-    if (c.piece < 2 * (uint64_t)b->options->leaf_faces) /* so that no node of the top can turn out to be a leaf */
+    cutting c = { b,
+                  b->face_count / PIECES_MOST > PIECE_FACES ? b->face_count / PIECES_MOST
+                                                            : PIECE_FACES,
+                  ebpo_array_zero(b->workspace, b->face_count / 8 + 1, 1), 0, error };
+    if (c.piece < 2 * (uint64_t)b->options
+                          ->leaf_faces) /* so that no node of the top can turn out to be a leaf */
         c.piece = 2 * (uint64_t)b->options->leaf_faces;
     ebpo_status status = EBPO_OK;
-    if (!all || !c.listed || !ebpo_array_grow_late(b->workspace, &b->top.nodes, &b->top.node_capacity, 1, sizeof *b->top.nodes)) {
+    if (!all || !c.listed ||
+        !ebpo_array_grow_late(b->workspace, &b->top.nodes, &b->top.node_capacity, 1,
+                              sizeof *b->top.nodes)) {
         ebpo_array_free(all);
         status = no_memory(b, error);
     } else {
@@ -248,7 +278,8 @@ static ebpo_status cut(ebpo_builder *b, ebpo_error *error)
 
 /* --- corners --- */
 
-static ebpo_status corners_of_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status corners_of_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                     ebpo_error *error)
 {
     ebpo_builder *b = context;
     (void)worker;
@@ -264,10 +295,12 @@ static ebpo_status corners_of_pieces(void *context, uint64_t begin, uint64_t end
     return EBPO_OK;
 }
 
-/* A piece is worked on in a thread's own memory, and cells of the deepest level that is allowed are not cut, whatever they list: as many threads as half of the budget has room for. */
+/* A piece is worked on in a thread's own memory, and cells of the deepest level that is allowed are
+ * not cut, whatever they list: as many threads as half of the budget has room for. */
 static ebpo_status fit_largest_piece(ebpo_builder *b, ebpo_error *error)
 {
-    enum { BYTES_A_FACE = 160 }; /* points that a hull is made of; measured: a million faces at one vertex */
+    /* points that a hull is made of; measured: a million faces at one vertex */
+    enum { BYTES_A_FACE = 160 };
     ebpo_workspace_figures figures = { .memory = 0 };
     uint64_t most = 1;
     if (b->workspace)
@@ -278,8 +311,11 @@ static ebpo_status fit_largest_piece(ebpo_builder *b, ebpo_error *error)
         most = b->sub[i].list_count > most ? b->sub[i].list_count : most;
     uint64_t fit = figures.memory / 2 / BYTES_A_FACE / most;
     if (fit < 1)
-        return ebpo_fail(error, EBPO_E_LIMIT, "a cell of level %d, the deepest that was allowed, lists %llu faces, for which half of the memory budget of %llu bytes is too little; allow more levels or more memory",
-                         b->max_level, (unsigned long long)most, (unsigned long long)figures.memory);
+        return ebpo_fail(
+            error, EBPO_E_LIMIT,
+            "a cell of level %d, the deepest that was allowed, lists %llu faces, for which half of "
+            "the memory budget of %llu bytes is too little; allow more levels or more memory",
+            b->max_level, (unsigned long long)most, (unsigned long long)figures.memory);
     b->threads = b->threads < fit ? b->threads : (unsigned)fit;
     return EBPO_OK;
 }
@@ -296,6 +332,7 @@ ebpo_status ebpo_build_split(ebpo_builder *b, ebpo_error *error)
     if (status == EBPO_OK)
         ebpo_array_fill(b->workspace, b->number, 0xff, b->face_count * sizeof *b->number);
     if (status == EBPO_OK && b->solid)
-        status = ebpo_parallel_for(b->threads, b->sub_count, 1, corners_of_pieces, b, &b->options->progress, "winding numbers", error);
+        status = ebpo_parallel_for(b->threads, b->sub_count, 1, corners_of_pieces, b,
+                                   &b->options->progress, "winding numbers", error);
     return status;
 }

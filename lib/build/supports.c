@@ -14,7 +14,9 @@ static uint32_t hash_of(const double x[3])
 {
     uint64_t bits[3];
     memcpy(bits, x, sizeof bits);
-    return (uint32_t)(((bits[0] * 0x9e3779b97f4a7c15u ^ bits[1]) * 0xbf58476d1ce4e5b9u ^ bits[2]) * 0x94d049bb133111ebu >> 40);
+    return (uint32_t)(((bits[0] * 0x9e3779b97f4a7c15u ^ bits[1]) * 0xbf58476d1ce4e5b9u ^ bits[2]) *
+                          0x94d049bb133111ebu >>
+                      40);
 }
 
 /* True when the point is there already; its slack is then the greater of the two. */
@@ -39,11 +41,13 @@ static bool known_point(ebpo_supports *s, const double x[3], double slack)
 
 static bool add_point(ebpo_supports *s, const double x[3], double slack)
 {
-    if (!ebpo_array_grow_late(s->b->workspace, &s->point, &s->capacity, s->count / 4 + 1, sizeof *s->point))
+    if (!ebpo_array_grow_late(s->b->workspace, &s->point, &s->capacity, s->count / 4 + 1,
+                              sizeof *s->point))
         return false;
     if (known_point(s, x, EBPO_NORMAL_NORM * slack))
         return true;
-    double(*p)[4] = s->point[s->count / 4], values[4] = { x[0], x[1], x[2], EBPO_NORMAL_NORM * slack };
+    double(*p)[4] = s->point[s->count / 4],
+    values[4] = { x[0], x[1], x[2], EBPO_NORMAL_NORM * slack };
     unsigned own = s->count % 4;
     for (int k = 0; k < 4; k++) /* the others of four are copies of the first until they come */
         for (unsigned lane = own; lane < (own ? own + 1 : 4); lane++)
@@ -64,7 +68,11 @@ static bool add_vertices(ebpo_supports *s, uint64_t begin, uint64_t end)
         double p[3];
         ebpo_mesh_position(b->mesh, i, p);
         /* Two roundings of values up to 1, far below the slack that ebpo_plane_code_offset adds. */
-        if (!add_point(s, (const double[3]){ (p[0] - corner[0]) / size[0], (p[1] - corner[1]) / size[1], (p[2] - corner[2]) / size[2] }, 0))
+        if (!add_point(s,
+                       (const double[3]){ (p[0] - corner[0]) / size[0],
+                                          (p[1] - corner[1]) / size[1],
+                                          (p[2] - corner[2]) / size[2] },
+                       0))
             return false;
     }
     return true;
@@ -75,7 +83,8 @@ static bool add_crossings(ebpo_supports *s, const ebpo_branch *branch, const ebp
     for (uint64_t i = d->cross_begin; i < d->cross_end; i++) {
         ebpo_triangle face;
         double points[9][3], slack;
-        if (i % (branch->list ? 1024 : 32) == 0) /* of the top: each from another place of the files */
+        if (i % (branch->list ? 1024 : 32) ==
+            0) /* of the top: each from another place of the files */
             ebpo_workspace_settle(s->b->workspace);
         ebpo_branch_triangle(s->b, branch, branch->crossing[i], &face);
         int count = ebpo_clip_triangle(&s->b->box, s->cell, &face, points, &slack);
@@ -93,13 +102,15 @@ static bool clear_table(ebpo_supports *s, uint64_t points)
     while (size < 2 * points && size < TABLE_MOST)
         size *= 2;
     s->place_count = size;
-    if (!ebpo_array_grow_late(s->b->workspace, &s->place, &s->place_capacity, size, sizeof *s->place))
+    if (!ebpo_array_grow_late(s->b->workspace, &s->place, &s->place_capacity, size,
+                              sizeof *s->place))
         return false;
     memset(s->place, 0, size * sizeof *s->place);
     return true;
 }
 
-static bool gather(ebpo_supports *s, const ebpo_builder *b, const ebpo_branch *branch, const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding)
+static bool gather(ebpo_supports *s, const ebpo_builder *b, const ebpo_branch *branch,
+                   const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding)
 {
     uint64_t begin, end;
     ebpo_build_vertex_range(b, cell, &begin, &end);
@@ -108,20 +119,23 @@ static bool gather(ebpo_supports *s, const ebpo_builder *b, const ebpo_branch *b
     s->sweep = ebpo_sweep_best();
     s->count = 0;
     bool few = end - begin <= FEW_VERTICES;
-    if (!clear_table(s, 8 + (few ? end - begin : 0) + 2 * (detail->cross_end - detail->cross_begin)))
+    if (!clear_table(s,
+                     8 + (few ? end - begin : 0) + 2 * (detail->cross_end - detail->cross_begin)))
         return false;
     s->begin = few ? 0 : begin;
     s->end = few ? 0 : end;
     /* Corners first: they reach far and show soonest which directions are hopeless. */
     unsigned corners = ebpo_inside_corners(b, winding, detail->delta);
     for (int i = 0; i < 8; i++)
-        if (corners >> i & 1 && !add_point(s, (const double[3]){ i & 1, i >> 1 & 1, i >> 2 & 1 }, 0))
+        if (corners >> i & 1 &&
+            !add_point(s, (const double[3]){ i & 1, i >> 1 & 1, i >> 2 & 1 }, 0))
             return false;
     return (!few || add_vertices(s, begin, end)) && add_crossings(s, branch, detail);
 }
 
 /* Which of the points in a stretch has the value `best`. */
-static void locate(const ebpo_supports *s, uint64_t first, const double n[3], double best, double where[3])
+static void locate(const ebpo_supports *s, uint64_t first, const double n[3], double best,
+                   double where[3])
 {
     for (uint64_t i = first; i < s->count && i < first + 4 * EBPO_STRETCH; i++) {
         double(*p)[4] = s->point[i / 4];
@@ -135,11 +149,13 @@ static void locate(const ebpo_supports *s, uint64_t first, const double n[3], do
 }
 
 /* Raises `support`. */
-static void among_points(const ebpo_supports *s, const double n[3], double enough, double *support, double where[3])
+static void among_points(const ebpo_supports *s, const double n[3], double enough, double *support,
+                         double where[3])
 {
     if (s->count > MANY_POINTS)
         ebpo_workspace_settle(s->b->workspace);
-    const ebpo_sweep_points points = { (const double(*)[4][4])s->point, (const double(*)[7])s->box, (s->count + 3) / 4 };
+    const ebpo_sweep_points points = { (const double(*)[4][4])s->point, (const double(*)[7])s->box,
+                                       (s->count + 3) / 4 };
     uint64_t stretch = s->sweep->highest(&points, n, enough, support);
     if (stretch != UINT64_MAX)
         locate(s, stretch, n, *support, where);
@@ -148,7 +164,8 @@ static void among_points(const ebpo_supports *s, const double n[3], double enoug
 static bool box_points(ebpo_supports *s)
 {
     uint64_t fours = (s->count + 3) / 4;
-    if (!ebpo_array_grow_late(s->b->workspace, &s->box, &s->box_capacity, fours / EBPO_STRETCH + 1, sizeof *s->box))
+    if (!ebpo_array_grow_late(s->b->workspace, &s->box, &s->box_capacity, fours / EBPO_STRETCH + 1,
+                              sizeof *s->box))
         return false;
     for (uint64_t i = 0; i < fours; i++) {
         double *box = s->box[i / EBPO_STRETCH];
@@ -165,17 +182,20 @@ static bool box_points(ebpo_supports *s)
     return true;
 }
 
-bool ebpo_supports_gather(ebpo_supports *s, const ebpo_builder *b, const ebpo_branch *branch, const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding)
+bool ebpo_supports_gather(ebpo_supports *s, const ebpo_builder *b, const ebpo_branch *branch,
+                          const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding)
 {
     return gather(s, b, branch, detail, cell, winding) && box_points(s);
 }
 
-double ebpo_supports_find(const ebpo_supports *s, const int32_t n[3], double enough, double where[3])
+double ebpo_supports_find(const ebpo_supports *s, const int32_t n[3], double enough,
+                          double where[3])
 {
     return ebpo_supports_find_from(s, n, enough, NULL, 0, where);
 }
 
-double ebpo_supports_find_from(const ebpo_supports *s, const int32_t normal[3], double enough, const double (*known)[3], int known_count, double where[3])
+double ebpo_supports_find_from(const ebpo_supports *s, const int32_t normal[3], double enough,
+                               const double (*known)[3], int known_count, double where[3])
 {
     double n[3] = { normal[0], normal[1], normal[2] }, support = -1e300;
     for (int i = 0; i < known_count; i++) {
@@ -196,7 +216,8 @@ double ebpo_supports_find_from(const ebpo_supports *s, const int32_t normal[3], 
         ebpo_mesh_position(s->b->mesh, at, p);
     if (at != EBPO_NO_VERTEX)
         for (int k = 0; k < 3; k++)
-            where[k] = (p[k] - ebpo_wall(&s->b->box, k, s->cell.level, s->cell.at[k])) / (s->b->box.size[k] / (double)(1u << s->cell.level));
+            where[k] = (p[k] - ebpo_wall(&s->b->box, k, s->cell.level, s->cell.at[k])) /
+                       (s->b->box.size[k] / (double)(1u << s->cell.level));
     return support;
 }
 

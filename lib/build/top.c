@@ -1,4 +1,5 @@
-/* The nodes above the subtrees: their envelopes level by level, so that every subtree knows its parent's. */
+/* The nodes above the subtrees: their envelopes level by level, so that every subtree knows its
+ * parent's. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -26,7 +27,8 @@ static ebpo_status no_memory(const ebpo_builder *b, ebpo_error *error)
     return ebpo_workspace_fail_while(b->workspace, "while computing envelopes", error);
 }
 
-static ebpo_status wave_envelopes(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status wave_envelopes(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                  ebpo_error *error)
 {
     wave *w = context;
     ebpo_builder *b = w->b;
@@ -38,7 +40,8 @@ static ebpo_status wave_envelopes(void *context, uint64_t begin, uint64_t end, u
         uint32_t detail = b->top.nodes[p->node].detail;
         ebpo_top_envelope *t = &b->top_envelope[detail];
         if (b->options->parts & EBPO_PART_PLANES)
-            t->count = ebpo_gray_planes(b, scratch, &b->top, detail, p->cell, p->winding, p->envelope, t->codes);
+            t->count = ebpo_gray_planes(b, scratch, &b->top, detail, p->cell, p->winding,
+                                        p->envelope, t->codes);
         t->volume = ebpo_polytope_volume(p->envelope) * ebpo_cell_volume(b, p->cell.level);
         if (t->count < 0)
             status = no_memory(b, error);
@@ -47,7 +50,8 @@ static ebpo_status wave_envelopes(void *context, uint64_t begin, uint64_t end, u
     return status;
 }
 
-/* The children of a finished node: gray ones wait for the next wave, subtrees get what they need. */
+/* The children of a finished node: gray ones wait for the next wave, subtrees get what they need.
+ */
 static bool hand_down(ebpo_builder *b, const pending *p, wave *next)
 {
     const ebpo_build_node *node = &b->top.nodes[p->node];
@@ -70,7 +74,8 @@ static bool hand_down(ebpo_builder *b, const pending *p, wave *next)
             ebpo_array_free(envelope);
             return false;
         }
-        next->nodes[next->count++] = (pending){ node->child + o, ebpo_child_cell(p->cell, o), p->winding + offset[o], envelope };
+        next->nodes[next->count++] = (pending){ node->child + o, ebpo_child_cell(p->cell, o),
+                                                p->winding + offset[o], envelope };
     }
     return true;
 }
@@ -113,7 +118,8 @@ ebpo_status ebpo_build_top(ebpo_builder *b, ebpo_error *error)
     while (status == EBPO_OK && now.count) {
         pass.begin = pass.end;
         pass.end += now.count;
-        status = ebpo_parallel_for(b->threads, now.count, 1, wave_envelopes, &now, &progress, "top envelopes", error);
+        status = ebpo_parallel_for(b->threads, now.count, 1, wave_envelopes, &now, &progress,
+                                   "top envelopes", error);
         for (uint64_t i = 0; i < now.count && status == EBPO_OK; i++)
             if (!hand_down(b, &now.nodes[i], &next))
                 status = no_memory(b, error);

@@ -12,17 +12,19 @@
 
 typedef enum slot_state { LOADING, READY, FAILED } slot_state;
 
-/* One key. In the table while LOADING or READY; a FAILED one lives on until its last waiter has seen it. */
+/* One key. In the table while LOADING or READY; a FAILED one lives on until its last waiter has
+ * seen it. */
 typedef struct slot {
     uint64_t key, bytes;
     slot_state state;
     unsigned pins, waiters;
     void *item;
-    struct slot *chain;        /* in its bucket, or in a list of items that leave */
+    struct slot *chain;         /* in its bucket, or in a list of items that leave */
     struct slot *older, *newer; /* READY and not pinned: by last use */
 } slot;
 
-/* What there must be room for. The background yields to everyone else, and drops nothing that was asked for together. */
+/* What there must be room for. The background yields to everyone else, and drops nothing that was
+ * asked for together. */
 typedef struct demand {
     uint64_t key, peak;
     bool ahead;
@@ -33,15 +35,20 @@ struct ebpo_cache {
     ebpo_cache_source source;
     char name[32];
     uint64_t budget;
-    pthread_mutex_t lock; /* guards all below; never held while the source is called */
+    pthread_mutex_t lock;   /* guards all below; never held while the source is called */
     pthread_cond_t changed; /* loads ended, room came free */
-    pthread_cond_t asked;   /* the background has something to do: apart from `changed`, or each unpin would wake it */
+    /* the background has something to do: apart from `changed`, or each unpin would wake it */
+    pthread_cond_t asked;
     slot **bucket;
     uint64_t bucket_count, slot_count;
     slot *oldest, *newest;
-    uint64_t pinned;           /* bytes of items that are in use */
-    uint64_t passing;          /* bytes reserved for loads under way, and of items on their way out: these become free or pinned without anyone's help */
-    uint64_t tickets, serving; /* gets that wait for room are served in the order they came, or a large one might wait for ever */
+    uint64_t pinned; /* bytes of items that are in use */
+    /* bytes reserved for loads under way, and of items on their way out: these become free or
+     * pinned without anyone's help */
+    uint64_t passing;
+    /* gets that wait for room are served in the order they came, or a large one might wait for ever
+     */
+    uint64_t tickets, serving;
     ebpo_cache_stats stats;
     bool ahead_runs, stop;
     pthread_t ahead_thread;
@@ -156,7 +163,8 @@ static bool asked_ahead(const ebpo_cache *c, uint64_t key)
     return false;
 }
 
-/* Releases items that are out of the table. Their bytes count until they are really gone, or another thread would use them twice. */
+/* Releases items that are out of the table. Their bytes count until they are really gone, or
+ * another thread would use them twice. */
 static void release_all(ebpo_cache *c, slot *leaving)
 {
     uint64_t bytes = 0;
@@ -195,14 +203,12 @@ static uint64_t kept_for(const ebpo_cache *c, const demand *d)
     return bytes;
 }
 
-static uint64_t sum(uint64_t a, uint64_t b)
-{
-    return a > UINT64_MAX - b ? UINT64_MAX : a + b;
-}
+static uint64_t sum(uint64_t a, uint64_t b) { return a > UINT64_MAX - b ? UINT64_MAX : a + b; }
 
 typedef enum room { ROOM_MADE, ROOM_LATER, ROOM_NEVER } room;
 
-/* Reserves d->peak, dropping the least recently used items. ROOM_LATER: when loads under way end. */
+/* Reserves d->peak, dropping the least recently used items. ROOM_LATER: when loads under way end.
+ */
 static room make_room(ebpo_cache *c, const demand *d)
 {
     while (c->budget && sum(c->stats.bytes, d->peak) > c->budget) {
@@ -239,13 +245,17 @@ static ebpo_status wait_for_room(ebpo_cache *c, uint64_t peak, ebpo_error *error
     pthread_cond_broadcast(&c->changed);
     if (got == ROOM_MADE)
         return EBPO_OK;
-    return ebpo_fail(error, EBPO_E_LIMIT, "the %s cache's budget is %" PRIu64 " bytes, of which %" PRIu64 " are in use, and one %s more takes up to %" PRIu64
-                     "; a budget of %" PRIu64 " would do", c->name, c->budget, c->pinned, c->name, peak, sum(c->pinned, peak));
+    return ebpo_fail(error, EBPO_E_LIMIT,
+                     "the %s cache's budget is %" PRIu64 " bytes, of which %" PRIu64
+                     " are in use, and one %s more takes up to %" PRIu64 "; a budget of %" PRIu64
+                     " would do",
+                     c->name, c->budget, c->pinned, c->name, peak, sum(c->pinned, peak));
 }
 
 /* --- loading --- */
 
-/* Ends a load: `reserved` gives way to the item, which is pinned by whoever waits for it (and `own` times more), or to nothing. */
+/* Ends a load: `reserved` gives way to the item, which is pinned by whoever waits for it (and `own`
+ * times more), or to nothing. */
 static void settle(ebpo_cache *c, slot *s, bool loaded, uint64_t reserved, unsigned own)
 {
     c->stats.bytes -= reserved;
@@ -284,8 +294,10 @@ static ebpo_status call_load(ebpo_cache *c, slot *s, uint64_t reserved, ebpo_err
     ebpo_status status = c->source.load(c->source.user, s->key, &item, &bytes, error);
     if (status == EBPO_OK && bytes > reserved && c->budget) {
         c->source.release(c->source.user, item);
-        return ebpo_fail(error, EBPO_E_LIMIT, "%s %" PRIu64 " takes %" PRIu64 " bytes, and at most %" PRIu64 " were reckoned with; report this", c->name,
-                         s->key, bytes, reserved);
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "%s %" PRIu64 " takes %" PRIu64 " bytes, and at most %" PRIu64
+                         " were reckoned with; report this",
+                         c->name, s->key, bytes, reserved);
     }
     s->item = item;
     s->bytes = bytes;
@@ -407,7 +419,8 @@ void ebpo_cache_unpin(ebpo_cache *c, uint64_t key)
 
 /* --- ahead --- */
 
-/* Loads d->key in the background, or lets it be; false when it must wait for the loads of others. Nobody waits for our key meanwhile: whoever wants it loads it. */
+/* Loads d->key in the background, or lets it be; false when it must wait for the loads of others.
+ * Nobody waits for our key meanwhile: whoever wants it loads it. */
 static bool load_ahead(ebpo_cache *c, demand *d)
 {
     slot *s = find(c, d->key) ? NULL : add_slot(c, d->key);
@@ -467,7 +480,8 @@ static bool start_ahead(ebpo_cache *c)
     return started;
 }
 
-/* Takes the list, without repetitions. What is there already becomes the newest, the first key last: it is about to be used. */
+/* Takes the list, without repetitions. What is there already becomes the newest, the first key
+ * last: it is about to be used. */
 static void take_list(ebpo_cache *c, const uint64_t *keys, unsigned count)
 {
     c->ahead_count = c->ahead_next = 0;
@@ -497,7 +511,8 @@ void ebpo_cache_prefetch(ebpo_cache *c, const uint64_t *keys, unsigned count)
 
 /* --- the whole --- */
 
-ebpo_status ebpo_cache_make(ebpo_cache **out, const ebpo_cache_source *source, const char *name, uint64_t budget, ebpo_error *error)
+ebpo_status ebpo_cache_make(ebpo_cache **out, const ebpo_cache_source *source, const char *name,
+                            uint64_t budget, ebpo_error *error)
 {
     enum { BUCKETS = 64 };
     *out = NULL;

@@ -1,4 +1,5 @@
-/* Things in memory under a budget: found by key, loaded when missing, the least recently used go first. Any thread may call. */
+/* Things in memory under a budget: found by key, loaded when missing, the least recently used go
+ * first. Any thread may call. */
 #ifndef EBPO_CACHE_CACHE_H
 #define EBPO_CACHE_CACHE_H
 
@@ -6,11 +7,14 @@
 
 typedef struct ebpo_cache ebpo_cache;
 
-/* Where items come from. Called without locks held, by any thread; estimate and load never twice at a time for one key. They may use other caches, not this one. */
+/* Where items come from. Called without locks held, by any thread; estimate and load never twice at
+ * a time for one key. They may use other caches, not this one. */
 typedef struct ebpo_cache_source {
     void *user;
-    /* Bytes that loading `key` will take at most, the item itself included; room for that is made first. *keep: what the item takes once loaded, at most. */
-    ebpo_status (*estimate)(void *user, uint64_t key, uint64_t *peak, uint64_t *keep, ebpo_error *error);
+    /* Bytes that loading `key` will take at most, the item itself included; room for that is made
+     * first. *keep: what the item takes once loaded, at most. */
+    ebpo_status (*estimate)(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
+                            ebpo_error *error);
     /* *bytes: at most the peak that was said, or the get fails with EBPO_E_LIMIT. */
     ebpo_status (*load)(void *user, uint64_t key, void **item, uint64_t *bytes, ebpo_error *error);
     void (*release)(void *user, void *item);
@@ -19,18 +23,22 @@ typedef struct ebpo_cache_source {
 typedef struct ebpo_cache_stats {
     uint64_t hits;                       /* finds that needed no waiting */
     uint64_t loads, prefetched, evicted; /* by get, in the background, to make room */
-    uint64_t bytes, peak_bytes;   /* items, and what loads under way may take */
-    double load_seconds;          /* that callers of get waited */
+    uint64_t bytes, peak_bytes;          /* items, and what loads under way may take */
+    double load_seconds;                 /* that callers of get waited */
 } ebpo_cache_stats;
 
 /* `budget` in bytes, 0: no limit. `name` ("subtree") is for messages. */
-EBPO_MUST_USE ebpo_status ebpo_cache_make(ebpo_cache **out, const ebpo_cache_source *source, const char *name, uint64_t budget, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_cache_make(ebpo_cache **out, const ebpo_cache_source *source,
+                                          const char *name, uint64_t budget, ebpo_error *error);
 /* Stops the background thread, releases all items; none may be pinned. NULL is fine. */
 void ebpo_cache_free(ebpo_cache *cache);
 
-/* Finds or loads an item and pins it: it stays until unpinned as often as it was got. Waits while another thread loads the same key, or while a background load holds
- * the room. EBPO_E_LIMIT when the budget has no room even with everything unpinned gone; it says how much would do. *hit may be NULL. */
-EBPO_MUST_USE ebpo_status ebpo_cache_get(ebpo_cache *cache, uint64_t key, void **item, bool *hit, ebpo_error *error);
+/* Finds or loads an item and pins it: it stays until unpinned as often as it was got. Waits while
+ * another thread loads the same key, or while a background load holds the room. EBPO_E_LIMIT when
+ * the budget has no room even with everything unpinned gone; it says how much would do. *hit may be
+ * NULL. */
+EBPO_MUST_USE ebpo_status ebpo_cache_get(ebpo_cache *cache, uint64_t key, void **item, bool *hit,
+                                         ebpo_error *error);
 /* True if an item is there now; no use of it, no hit. */
 bool ebpo_cache_has(ebpo_cache *cache, uint64_t key);
 void ebpo_cache_unpin(ebpo_cache *cache, uint64_t key);
@@ -38,9 +46,11 @@ void ebpo_cache_unpin(ebpo_cache *cache, uint64_t key);
 /* Pins an item if it is there; false, without waiting, when it is not. */
 bool ebpo_cache_try(ebpo_cache *cache, uint64_t key, void **item);
 
-/* Asks a background thread (started by the first call) to load these, in this order; what was asked before and is not done yet is forgotten. Loading in the background
- * evicts only what is unpinned and not among the keys asked for; its failures are silent (the key will be loaded when it is needed). At most EBPO_CACHE_AHEAD keys; what is
- * beyond is ignored. Those that are there already count as just used. */
+/* Asks a background thread (started by the first call) to load these, in this order; what was asked
+ * before and is not done yet is forgotten. Loading in the background evicts only what is unpinned
+ * and not among the keys asked for; its failures are silent (the key will be loaded when it is
+ * needed). At most EBPO_CACHE_AHEAD keys; what is beyond is ignored. Those that are there already
+ * count as just used. */
 enum { EBPO_CACHE_AHEAD = 64 };
 void ebpo_cache_prefetch(ebpo_cache *cache, const uint64_t *keys, unsigned count);
 

@@ -27,7 +27,8 @@ void ebpo_shuffle(const uint8_t *in, size_t bytes, size_t element_size, uint8_t 
             out[k * count + i] = in[i * element_size + k];
 }
 
-/* The usual element sizes byte by byte but element after element, which compilers turn into vector code. */
+/* The usual element sizes byte by byte but element after element, which compilers turn into vector
+ * code. */
 static void unshuffle2(const uint8_t *in, size_t count, uint8_t *out)
 {
     for (size_t i = 0; i < count; i++) {
@@ -39,7 +40,9 @@ static void unshuffle2(const uint8_t *in, size_t count, uint8_t *out)
 static void unshuffle4(const uint8_t *in, size_t count, uint8_t *out)
 {
     for (size_t i = 0; i < count; i++)
-        ebpo_store32(out + 4 * i, in[i] | (uint32_t)in[count + i] << 8 | (uint32_t)in[2 * count + i] << 16 | (uint32_t)in[3 * count + i] << 24);
+        ebpo_store32(out + 4 * i, in[i] | (uint32_t)in[count + i] << 8 |
+                                      (uint32_t)in[2 * count + i] << 16 |
+                                      (uint32_t)in[3 * count + i] << 24);
 }
 
 void ebpo_unshuffle(const uint8_t *in, size_t bytes, size_t element_size, uint8_t *out)
@@ -63,7 +66,8 @@ uint32_t ebpo_fletcher32(const uint8_t *data, size_t bytes)
     uint32_t low = 0, high = 0;
     size_t words = bytes / 2;
     while (words) {
-        size_t run = words > 360 ? 360 : words; /* no overflow of 32 bits before the sums are folded */
+        /* no overflow of 32 bits before the sums are folded */
+        size_t run = words > 360 ? 360 : words;
         words -= run;
         for (; run; run--, data += 2) {
             low += (uint32_t)data[0] << 8 | data[1];
@@ -83,13 +87,15 @@ uint32_t ebpo_fletcher32(const uint8_t *data, size_t bytes)
     return high << 16 | low;
 }
 
-static ebpo_status zstd_encode(ebpo_chunk_coder *coder, int level, const uint8_t *raw, size_t raw_bytes, uint8_t *out, size_t *out_bytes)
+static ebpo_status zstd_encode(ebpo_chunk_coder *coder, int level, const uint8_t *raw,
+                               size_t raw_bytes, uint8_t *out, size_t *out_bytes)
 {
     if (!coder->zstd_out)
         coder->zstd_out = ZSTD_createCCtx();
     if (!coder->zstd_out)
         return EBPO_E_MEMORY;
-    size_t failed = ZSTD_isError(ZSTD_CCtx_setParameter(coder->zstd_out, ZSTD_c_compressionLevel, level ? level : EBPO_ZSTD_LEVEL));
+    size_t failed = ZSTD_isError(ZSTD_CCtx_setParameter(coder->zstd_out, ZSTD_c_compressionLevel,
+                                                        level ? level : EBPO_ZSTD_LEVEL));
     failed |= ZSTD_isError(ZSTD_CCtx_setParameter(coder->zstd_out, ZSTD_c_checksumFlag, 1));
     if (failed)
         return EBPO_E_ARGUMENT;
@@ -98,7 +104,8 @@ static ebpo_status zstd_encode(ebpo_chunk_coder *coder, int level, const uint8_t
     return ZSTD_isError(size) ? EBPO_E_MEMORY : EBPO_OK; /* the bound leaves no other cause */
 }
 
-static ebpo_status deflate_encode(int level, const uint8_t *raw, size_t raw_bytes, uint8_t *out, size_t *out_bytes)
+static ebpo_status deflate_encode(int level, const uint8_t *raw, size_t raw_bytes, uint8_t *out,
+                                  size_t *out_bytes)
 {
     uLongf size = (uLongf)ebpo_chunk_bound(raw_bytes);
     int code = compress2(out, &size, raw, (uLong)raw_bytes, level ? level : EBPO_DEFLATE_LEVEL);
@@ -106,8 +113,9 @@ static ebpo_status deflate_encode(int level, const uint8_t *raw, size_t raw_byte
     return code == Z_OK ? EBPO_OK : code == Z_MEM_ERROR ? EBPO_E_MEMORY : EBPO_E_ARGUMENT;
 }
 
-ebpo_status ebpo_chunk_encode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline, int level, size_t element_size,
-                              const uint8_t *raw, size_t raw_bytes, uint8_t *out, size_t *out_bytes)
+ebpo_status ebpo_chunk_encode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline, int level,
+                              size_t element_size, const uint8_t *raw, size_t raw_bytes,
+                              uint8_t *out, size_t *out_bytes)
 {
     ebpo_status status = EBPO_OK;
     bool compressed = pipeline == EBPO_PIPELINE_ZSTD || pipeline == EBPO_PIPELINE_DEFLATE;
@@ -136,8 +144,8 @@ static ebpo_status broken(const char **why, const char *what)
     return EBPO_E_FORMAT;
 }
 
-static ebpo_status zstd_decode(ebpo_chunk_coder *coder, const uint8_t *stored, size_t stored_bytes, uint8_t *raw, size_t raw_bytes,
-                               const char **why)
+static ebpo_status zstd_decode(ebpo_chunk_coder *coder, const uint8_t *stored, size_t stored_bytes,
+                               uint8_t *raw, size_t raw_bytes, const char **why)
 {
     if (!coder->zstd_in)
         coder->zstd_in = ZSTD_createDCtx();
@@ -150,10 +158,13 @@ static ebpo_status zstd_decode(ebpo_chunk_coder *coder, const uint8_t *stored, s
     size_t size = ZSTD_decompressDCtx(coder->zstd_in, raw, raw_bytes, stored, stored_bytes);
     if (ZSTD_isError(size))
         return broken(why, ZSTD_getErrorName(size));
-    return size == raw_bytes ? EBPO_OK : broken(why, "the zstd frame decodes to another size than the chunk's");
+    return size == raw_bytes
+               ? EBPO_OK
+               : broken(why, "the zstd frame decodes to another size than the chunk's");
 }
 
-static ebpo_status deflate_decode(const uint8_t *stored, size_t stored_bytes, uint8_t *raw, size_t raw_bytes, const char **why)
+static ebpo_status deflate_decode(const uint8_t *stored, size_t stored_bytes, uint8_t *raw,
+                                  size_t raw_bytes, const char **why)
 {
     uLongf size = (uLongf)raw_bytes;
     uLong used = (uLong)stored_bytes;
@@ -165,16 +176,19 @@ static ebpo_status deflate_decode(const uint8_t *stored, size_t stored_bytes, ui
     return EBPO_OK;
 }
 
-ebpo_status ebpo_chunk_decode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline, size_t element_size, const uint8_t *stored,
-                              size_t stored_bytes, uint8_t *raw, size_t raw_bytes, const char **why)
+ebpo_status ebpo_chunk_decode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline, size_t element_size,
+                              const uint8_t *stored, size_t stored_bytes, uint8_t *raw,
+                              size_t raw_bytes, const char **why)
 {
     *why = "";
     if (pipeline == EBPO_PIPELINE_DEFLATE || pipeline == EBPO_PIPELINE_CHECKSUM) {
-        if (stored_bytes < 4 || ebpo_load32(stored + stored_bytes - 4) != ebpo_fletcher32(stored, stored_bytes - 4))
+        if (stored_bytes < 4 ||
+            ebpo_load32(stored + stored_bytes - 4) != ebpo_fletcher32(stored, stored_bytes - 4))
             return broken(why, "the fletcher32 checksum does not match");
         stored_bytes -= 4;
     }
-    bool shuffled = (pipeline == EBPO_PIPELINE_ZSTD || pipeline == EBPO_PIPELINE_DEFLATE) && element_size > 1;
+    bool shuffled =
+        (pipeline == EBPO_PIPELINE_ZSTD || pipeline == EBPO_PIPELINE_DEFLATE) && element_size > 1;
     uint8_t *into = shuffled ? coder->scratch : raw;
     ebpo_status status = EBPO_OK;
     if (pipeline == EBPO_PIPELINE_ZSTD)

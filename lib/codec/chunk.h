@@ -1,4 +1,5 @@
-/* A chunk's bytes as HDF5 stores them: shuffle, compression, checksum. Bit for bit what libhdf5's own filters read and write. */
+/* A chunk's bytes as HDF5 stores them: shuffle, compression, checksum. Bit for bit what libhdf5's
+ * own filters read and write. */
 #ifndef EBPO_CODEC_CHUNK_H
 #define EBPO_CODEC_CHUNK_H
 
@@ -10,7 +11,8 @@ enum {
     EBPO_DEFLATE_LEVEL = 6
 };
 
-/* Filter pipelines. Shuffle comes first where elements have more than one byte (but not in the last two). */
+/* Filter pipelines. Shuffle comes first where elements have more than one byte (but not in the last
+ * two). */
 typedef enum ebpo_pipeline {
     EBPO_PIPELINE_ZSTD,     /* shuffle, zstd frame with content size and checksum */
     EBPO_PIPELINE_DEFLATE,  /* shuffle, zlib stream, fletcher32 */
@@ -26,23 +28,30 @@ typedef struct ebpo_chunk_coder {
 
 void ebpo_chunk_coder_clear(ebpo_chunk_coder *coder);
 
-/* Bytes that an encoded chunk of `raw_bytes` <= EBPO_CHUNK_BYTES_MAX can have at most, in any pipeline. */
+/* Bytes that an encoded chunk of `raw_bytes` <= EBPO_CHUNK_BYTES_MAX can have at most, in any
+ * pipeline. */
 size_t ebpo_chunk_bound(size_t raw_bytes);
 
-/* Encodes raw_bytes (a multiple of element_size) into `out` of ebpo_chunk_bound(raw_bytes) bytes. `level` 0: the default. */
-EBPO_MUST_USE ebpo_status ebpo_chunk_encode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline, int level, size_t element_size,
-                                            const uint8_t *raw, size_t raw_bytes, uint8_t *out, size_t *out_bytes);
+/* Encodes raw_bytes (a multiple of element_size) into `out` of ebpo_chunk_bound(raw_bytes) bytes.
+ * `level` 0: the default. */
+EBPO_MUST_USE ebpo_status ebpo_chunk_encode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline,
+                                            int level, size_t element_size, const uint8_t *raw,
+                                            size_t raw_bytes, uint8_t *out, size_t *out_bytes);
 
-/* Decodes into exactly raw_bytes. On EBPO_E_FORMAT *why is a static string that says what is wrong. Safe on any bytes. */
-EBPO_MUST_USE ebpo_status ebpo_chunk_decode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline, size_t element_size,
-                                            const uint8_t *stored, size_t stored_bytes, uint8_t *raw, size_t raw_bytes,
+/* Decodes into exactly raw_bytes. On EBPO_E_FORMAT *why is a static string that says what is wrong.
+ * Safe on any bytes. */
+EBPO_MUST_USE ebpo_status ebpo_chunk_decode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline,
+                                            size_t element_size, const uint8_t *stored,
+                                            size_t stored_bytes, uint8_t *raw, size_t raw_bytes,
                                             const char **why);
 
-/* HDF5's shuffle: byte k of every element, for k = 0, 1, ...; bytes is a multiple of element_size. */
+/* HDF5's shuffle: byte k of every element, for k = 0, 1, ...; bytes is a multiple of element_size.
+ */
 void ebpo_shuffle(const uint8_t *in, size_t bytes, size_t element_size, uint8_t *out);
 void ebpo_unshuffle(const uint8_t *in, size_t bytes, size_t element_size, uint8_t *out);
 
-/* HDF5's fletcher32: over big-endian 16-bit words, both sums kept modulo 65535 (never reduced to 0 from a positive sum). */
+/* HDF5's fletcher32: over big-endian 16-bit words, both sums kept modulo 65535 (never reduced to 0
+ * from a positive sum). */
 uint32_t ebpo_fletcher32(const uint8_t *data, size_t bytes);
 
 #endif

@@ -98,7 +98,8 @@ static uint64_t native(const void *values, size_t size, uint64_t i)
     }
 }
 
-void ebpo_integers_encode(const void *values, size_t size, uint64_t rows, size_t file_size, uint8_t *file)
+void ebpo_integers_encode(const void *values, size_t size, uint64_t rows, size_t file_size,
+                          uint8_t *file)
 {
     for (uint64_t i = 0; i < rows; i++) {
         uint64_t value = native(values, size, i);
@@ -121,7 +122,8 @@ static uint64_t load(const uint8_t *p, size_t size, bool is_signed)
     }
 }
 
-void ebpo_integers_decode(const uint8_t *file, size_t file_size, bool is_signed, uint64_t rows, void *values, size_t size)
+void ebpo_integers_decode(const uint8_t *file, size_t file_size, bool is_signed, uint64_t rows,
+                          void *values, size_t size)
 {
     for (uint64_t i = 0; i < rows; i++) {
         uint64_t value = load(file + file_size * i, file_size, is_signed);

@@ -1,4 +1,5 @@
-/* What must hold of a tree, whether it comes from a file or from a caller about to write one: format-spec/README.md, "Constraints". */
+/* What must hold of a tree, whether it comes from a file or from a caller about to write one:
+ * format-spec/README.md, "Constraints". */
 #ifndef EBPO_CONTAINER_CHECK_H
 #define EBPO_CONTAINER_CHECK_H
 
@@ -11,23 +12,28 @@ typedef struct ebpo_check {
 } ebpo_check;
 
 /* One array of one level is wrong: "shown: /levels/03/planes: what; next". */
-ebpo_status ebpo_check_fail(const ebpo_check *check, int level, const char *array, const char *what, ebpo_error *error);
+ebpo_status ebpo_check_fail(const ebpo_check *check, int level, const char *array, const char *what,
+                            ebpo_error *error);
 
 /* Whether the rule takes a winding number as inside. */
 bool ebpo_check_inside(ebpo_rule rule, int32_t winding);
 
 /* A level's arrays against the head's counts, and against themselves. */
-EBPO_MUST_USE ebpo_status ebpo_check_level(const ebpo_check *check, const ebpo_info *info, int level, const ebpo_level *arrays,
+EBPO_MUST_USE ebpo_status ebpo_check_level(const ebpo_check *check, const ebpo_info *info,
+                                           int level, const ebpo_level *arrays, ebpo_error *error);
+
+/* Leaves in depth-first order have faces 0 .. face_count - 1 as their new ones, in order. For trees
+ * with their face lists. */
+EBPO_MUST_USE ebpo_status ebpo_check_order(const ebpo_check *check, const ebpo_tree *tree,
                                            ebpo_error *error);
 
-/* Leaves in depth-first order have faces 0 .. face_count - 1 as their new ones, in order. For trees with their face lists. */
-EBPO_MUST_USE ebpo_status ebpo_check_order(const ebpo_check *check, const ebpo_tree *tree, ebpo_error *error);
-
 /* A map's values are distinct and below `limit`. */
-EBPO_MUST_USE ebpo_status ebpo_check_map(const ebpo_check *check, const char *array, const uint32_t *map, uint64_t count, uint64_t limit,
+EBPO_MUST_USE ebpo_status ebpo_check_map(const ebpo_check *check, const char *array,
+                                         const uint32_t *map, uint64_t count, uint64_t limit,
                                          ebpo_error *error);
 
 /* Vertices are finite and faces name vertices that exist, in first-use order. */
-EBPO_MUST_USE ebpo_status ebpo_check_finite(const ebpo_check *check, const ebpo_mesh *mesh, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_check_finite(const ebpo_check *check, const ebpo_mesh *mesh,
+                                            ebpo_error *error);
 
 #endif

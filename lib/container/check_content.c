@@ -14,8 +14,8 @@ typedef struct content_job {
     unsigned count;
 } content_job;
 
-static ebpo_status take(void *context, const ebpo_array_in *array, uint64_t chunk, uint64_t row, uint64_t rows, const uint8_t *bytes,
-                        ebpo_error *error)
+static ebpo_status take(void *context, const ebpo_array_in *array, uint64_t chunk, uint64_t row,
+                        uint64_t rows, const uint8_t *bytes, ebpo_error *error)
 {
     (void)chunk;
     (void)row;
@@ -24,7 +24,8 @@ static ebpo_status take(void *context, const ebpo_array_in *array, uint64_t chun
     return EBPO_OK;
 }
 
-static ebpo_status digest_arrays(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status digest_arrays(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
 {
     content_job *j = context;
     (void)worker;
@@ -47,7 +48,9 @@ static ebpo_status compare(content_job *j, ebpo_error *error)
     ebpo_status status = ebpo_content_end(&content, digest, error);
     ebpo_content_free(&content);
     if (status == EBPO_OK && memcmp(digest, j->file->info.content_sha256, 32) != 0)
-        status = ebpo_fail(error, EBPO_E_FORMAT, "%s: the content is not what content_sha256 says: the file was changed; get a fresh copy",
+        status = ebpo_fail(error, EBPO_E_FORMAT,
+                           "%s: the content is not what content_sha256 says: the file was changed; "
+                           "get a fresh copy",
                            j->file->in.shown);
     return status;
 }
@@ -55,7 +58,8 @@ static ebpo_status compare(content_job *j, ebpo_error *error)
 ebpo_status ebpo_file_check_content(ebpo_file *file, unsigned threads, ebpo_error *error)
 {
     content_job j = { .file = file };
-    bool far = ebpo_input_expects(&file->in); /* then in the order of the file, in which it comes; else the largest first */
+    /* then in the order of the file, in which it comes; else the largest first */
+    bool far = ebpo_input_expects(&file->in);
     for (int id = EBPO_ARRAYS - 1; id >= EBPO_LEVEL_ARRAYS; id--)
         if (file->root_array[id].present)
             j.array[j.count++] = &file->root_array[id];
@@ -69,6 +73,7 @@ ebpo_status ebpo_file_check_content(ebpo_file *file, unsigned threads, ebpo_erro
         j.array[j.count - 1 - i] = other;
     }
     ebpo_expect_tree(file);
-    ebpo_status status = ebpo_parallel_for(threads, j.count, 1, digest_arrays, &j, NULL, "check", error);
+    ebpo_status status =
+        ebpo_parallel_for(threads, j.count, 1, digest_arrays, &j, NULL, "check", error);
     return status == EBPO_OK ? compare(&j, error) : status;
 }

@@ -11,7 +11,8 @@
 #include "codec/coding.h"
 #include "container/slice_parts.h"
 
-/* Readers are kept for the next load: setting up a decoder takes longer than a chunk. They are not part of the budget. */
+/* Readers are kept for the next load: setting up a decoder takes longer than a chunk. They are not
+ * part of the budget. */
 enum { IDLE_MAX = 4, CHUNK_BITS = 48, AROUND = 4 };
 /* Announced for later: at most so much, and a share of what a limit leaves. */
 enum { AHEAD_MOST = 2 << 20, AHEAD_SHARE = 4 };
@@ -56,22 +57,21 @@ static void give_desk(ebpo_chunks *c, ebpo_chunk_desk *desk)
 
 static uint64_t key_of(const ebpo_array_in *array, uint64_t chunk)
 {
-    uint64_t number = array->id < EBPO_LEVEL_ARRAYS ? (uint64_t)array->level * EBPO_LEVEL_ARRAYS + array->id
-                                                    : (uint64_t)EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + array->id;
+    uint64_t number = array->id < EBPO_LEVEL_ARRAYS
+                          ? (uint64_t)array->level * EBPO_LEVEL_ARRAYS + array->id
+                          : (uint64_t)EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + array->id;
     return number << CHUNK_BITS | chunk;
 }
 
 static const ebpo_array_in *array_of(const ebpo_chunks *c, uint64_t key)
 {
     uint64_t number = key >> CHUNK_BITS, levels = (uint64_t)EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS;
-    return number < levels ? &c->file->level_array[number / EBPO_LEVEL_ARRAYS][number % EBPO_LEVEL_ARRAYS]
-                           : &c->file->root_array[number - levels];
+    return number < levels
+               ? &c->file->level_array[number / EBPO_LEVEL_ARRAYS][number % EBPO_LEVEL_ARRAYS]
+               : &c->file->root_array[number - levels];
 }
 
-static uint64_t chunk_of(uint64_t key)
-{
-    return key & ((UINT64_C(1) << CHUNK_BITS) - 1);
-}
+static uint64_t chunk_of(uint64_t key) { return key & ((UINT64_C(1) << CHUNK_BITS) - 1); }
 
 /* Without the filling of the last chunk. */
 static uint64_t chunk_rows(const ebpo_array_in *array, uint64_t chunk)
@@ -80,7 +80,8 @@ static uint64_t chunk_rows(const ebpo_array_in *array, uint64_t chunk)
     return left < array->shape.chunk_rows ? left : array->shape.chunk_rows;
 }
 
-static ebpo_status estimate(void *user, uint64_t key, uint64_t *peak, uint64_t *keep, ebpo_error *error)
+static ebpo_status estimate(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
+                            ebpo_error *error)
 {
     const ebpo_array_in *array = array_of(user, key);
     (void)error;
@@ -88,20 +89,25 @@ static ebpo_status estimate(void *user, uint64_t key, uint64_t *peak, uint64_t *
     return EBPO_OK;
 }
 
-static ebpo_status decode_faces(const ebpo_chunks *c, uint64_t chunk, uint64_t rows, const uint8_t *raw, uint32_t *corners, ebpo_error *error)
+static ebpo_status decode_faces(const ebpo_chunks *c, uint64_t chunk, uint64_t rows,
+                                const uint8_t *raw, uint32_t *corners, ebpo_error *error)
 {
     const ebpo_array_in *array = &c->file->root_array[EBPO_A_FACES];
     uint64_t vertices = c->file->info.vertex_count, seen = c->seen ? c->seen[chunk] : 0;
     if (seen > vertices || (chunk == 0 && seen))
-        return ebpo_chunks_fail(c, -1, EBPO_A_FACES_INDEX, "the index names more vertices than there are", error);
+        return ebpo_chunks_fail(c, -1, EBPO_A_FACES_INDEX,
+                                "the index names more vertices than there are", error);
     if (!ebpo_corners_decode(raw, rows, &seen, corners) || seen > vertices)
-        return ebpo_chunks_fail(c, -1, EBPO_A_FACES, "a face names a vertex that does not exist", error);
+        return ebpo_chunks_fail(c, -1, EBPO_A_FACES, "a face names a vertex that does not exist",
+                                error);
     if (chunk + 1 < ebpo_h5_chunk_count(&array->shape) && seen != c->seen[chunk + 1])
-        return ebpo_chunks_fail(c, -1, EBPO_A_FACES_INDEX, "the index contradicts the faces", error);
+        return ebpo_chunks_fail(c, -1, EBPO_A_FACES_INDEX, "the index contradicts the faces",
+                                error);
     return EBPO_OK;
 }
 
-static ebpo_status decode_vertices(const ebpo_chunks *c, uint64_t rows, const uint8_t *raw, void *xyz, ebpo_error *error)
+static ebpo_status decode_vertices(const ebpo_chunks *c, uint64_t rows, const uint8_t *raw,
+                                   void *xyz, ebpo_error *error)
 {
     bool finite = true;
     if (c->file->info.double_coordinates) {
@@ -115,22 +121,30 @@ static ebpo_status decode_vertices(const ebpo_chunks *c, uint64_t rows, const ui
         for (uint64_t i = 0; i < 3 * rows; i++)
             finite &= isfinite(numbers[i]) != 0;
     }
-    return finite ? EBPO_OK : ebpo_chunks_fail(c, -1, EBPO_A_VERTICES, "a coordinate is not a finite number", error);
+    return finite ? EBPO_OK
+                  : ebpo_chunks_fail(c, -1, EBPO_A_VERTICES, "a coordinate is not a finite number",
+                                     error);
 }
 
-static ebpo_status decode_map(const ebpo_chunks *c, ebpo_array_id id, uint64_t rows, const uint8_t *raw, uint32_t *numbers, ebpo_error *error)
+static ebpo_status decode_map(const ebpo_chunks *c, ebpo_array_id id, uint64_t rows,
+                              const uint8_t *raw, uint32_t *numbers, ebpo_error *error)
 {
     const ebpo_info *info = &c->file->info;
-    uint64_t limit = id == EBPO_A_FACE_SOURCE ? info->source_face_count + info->mend.added_faces : info->source_vertex_count;
+    uint64_t limit = id == EBPO_A_FACE_SOURCE ? info->source_face_count + info->mend.added_faces
+                                              : info->source_vertex_count;
     uint32_t largest = 0;
     ebpo_numbers_decode(raw, rows, numbers);
     for (uint64_t i = 0; i < rows; i++)
         largest = numbers[i] > largest ? numbers[i] : largest;
-    return largest < limit ? EBPO_OK : ebpo_chunks_fail(c, -1, id, "a source number is out of range or used twice", error);
+    return largest < limit
+               ? EBPO_OK
+               : ebpo_chunks_fail(c, -1, id, "a source number is out of range or used twice",
+                                  error);
 }
 
 /* Once for each load, so that using a chunk again costs nothing but finding it. */
-static ebpo_status decode(const ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk, const uint8_t *raw, void *item, ebpo_error *error)
+static ebpo_status decode(const ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk,
+                          const uint8_t *raw, void *item, ebpo_error *error)
 {
     uint64_t rows = chunk_rows(array, chunk);
     switch (array->id) {
@@ -142,23 +156,27 @@ static ebpo_status decode(const ebpo_chunks *c, const ebpo_array_in *array, uint
     }
 }
 
-static void expect_missing(ebpo_chunks *c, ebpo_expected *e, const ebpo_array_in *array, uint64_t begin, uint64_t end)
+static void expect_missing(ebpo_chunks *c, ebpo_expected *e, const ebpo_array_in *array,
+                           uint64_t begin, uint64_t end)
 {
     for (uint64_t i = begin; i < end; i++)
         if (!ebpo_cache_has(c->cache, key_of(array, i)))
             ebpo_expect_chunks(e, array, i, i + 1);
 }
 
-void ebpo_chunks_expect(ebpo_chunks *c, ebpo_expected *e, ebpo_array_id id, int level, uint64_t row, uint64_t rows)
+void ebpo_chunks_expect(ebpo_chunks *c, ebpo_expected *e, ebpo_array_id id, int level, uint64_t row,
+                        uint64_t rows)
 {
     const ebpo_array_in *array = ebpo_reader_array(c->file, id, level);
-    if (!ebpo_input_expects(&c->file->in) || !array->present || rows == 0 || row >= array->shape.rows)
+    if (!ebpo_input_expects(&c->file->in) || !array->present || rows == 0 ||
+        row >= array->shape.rows)
         return;
     uint64_t left = array->shape.rows - row, last = row + (rows < left ? rows : left) - 1;
     expect_missing(c, e, array, row / array->shape.chunk_rows, last / array->shape.chunk_rows + 1);
 }
 
-/* A request takes about as long for a few chunks as for one, and its neighbours are likely to be the next. */
+/* A request takes about as long for a few chunks as for one, and its neighbours are likely to be
+ * the next. */
 static void expect_around(ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk)
 {
     uint64_t begin = chunk / AROUND * AROUND, count = ebpo_h5_chunk_count(&array->shape);
@@ -171,16 +189,22 @@ static void expect_around(ebpo_chunks *c, const ebpo_array_in *array, uint64_t c
 
 /* --- counting --- */
 
-/* What reading a chunk takes of the file; where the places of chunks have not been read yet, these as well. */
+/* What reading a chunk takes of the file; where the places of chunks have not been read yet, these
+ * as well. */
 static uint64_t cost_of(const ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk)
 {
     if (ebpo_h5_chunk_count(&array->shape) == 1 || atomic_load(&c->file->located))
         return array->chunks[chunk].bytes;
     const ebpo_info *info = &c->file->info;
-    uint64_t at_hand = c->file->in.source.at_hand, index_end = info->chunk_index_offset + info->chunk_index_bytes;
-    uint64_t again = at_hand < info->head_bytes ? info->chunk_index_offset : 0; /* libhdf5 goes through the headers once more */
-    uint64_t index = index_end <= at_hand ? 0 : info->chunk_index_offset < at_hand ? index_end - at_hand : info->chunk_index_bytes;
-    return again + index + ebpo_chunk_bound(array->shape.chunk_rows * ebpo_h5_row_bytes(&array->shape));
+    uint64_t at_hand = c->file->in.source.at_hand,
+             index_end = info->chunk_index_offset + info->chunk_index_bytes;
+    /* libhdf5 goes through the headers once more */
+    uint64_t again = at_hand < info->head_bytes ? info->chunk_index_offset : 0;
+    uint64_t index = index_end <= at_hand                 ? 0
+                     : info->chunk_index_offset < at_hand ? index_end - at_hand
+                                                          : info->chunk_index_bytes;
+    return again + index +
+           ebpo_chunk_bound(array->shape.chunk_rows * ebpo_h5_row_bytes(&array->shape));
 }
 
 static bool fits(const ebpo_chunks *c, uint64_t more)
@@ -190,7 +214,8 @@ static bool fits(const ebpo_chunks *c, uint64_t more)
 }
 
 /* Called before a chunk is read: what was announced has been counted then. */
-static ebpo_status admit(ebpo_chunks *c, const ebpo_array_in *array, uint64_t key, ebpo_error *error)
+static ebpo_status admit(ebpo_chunks *c, const ebpo_array_in *array, uint64_t key,
+                         ebpo_error *error)
 {
     uint64_t cost = cost_of(c, array, chunk_of(key));
     for (uint64_t i = 0; i < c->ahead_count; i++)
@@ -202,7 +227,9 @@ static ebpo_status admit(ebpo_chunks *c, const ebpo_array_in *array, uint64_t ke
     if (fits(c, cost))
         return EBPO_OK;
     c->refused = true;
-    return ebpo_fail(error, EBPO_E_LIMIT, "%s: %s: reading on would take more than the %" PRIu64 " bytes allowed", c->file->in.shown, array->path, c->limit);
+    return ebpo_fail(error, EBPO_E_LIMIT,
+                     "%s: %s: reading on would take more than the %" PRIu64 " bytes allowed",
+                     c->file->in.shown, array->path, c->limit);
 }
 
 static bool is_ahead(const ebpo_chunks *c, uint64_t key)
@@ -220,8 +247,10 @@ void ebpo_chunks_announce(ebpo_chunks *c, const uint64_t *keys, unsigned now, un
         const ebpo_array_in *array = array_of(c, keys[i]);
         if (ebpo_h5_chunk_count(&array->shape) > 1 && !atomic_load(&c->file->located))
             continue; /* where it lies is not known yet */
-        uint64_t cost = cost_of(c, array, chunk_of(keys[i])), taken = atomic_load(&c->file->in.bytes);
-        uint64_t left = c->limit > taken ? c->limit - taken : 0, share = left / AHEAD_SHARE < AHEAD_MOST ? left / AHEAD_SHARE : AHEAD_MOST;
+        uint64_t cost = cost_of(c, array, chunk_of(keys[i])),
+                 taken = atomic_load(&c->file->in.bytes);
+        uint64_t left = c->limit > taken ? c->limit - taken : 0,
+                 share = left / AHEAD_SHARE < AHEAD_MOST ? left / AHEAD_SHARE : AHEAD_MOST;
         if (is_ahead(c, keys[i]) || !fits(c, cost) || (i >= now && c->ahead_bytes + cost > share) ||
             !ebpo_grow(&c->ahead, &c->ahead_room, c->ahead_count + 1, sizeof *c->ahead))
             continue;
@@ -232,13 +261,15 @@ void ebpo_chunks_announce(ebpo_chunks *c, const uint64_t *keys, unsigned now, un
     ebpo_expect_all(&e);
 }
 
-bool ebpo_chunks_missing(ebpo_chunks *c, ebpo_array_id id, int level, uint64_t row, uint64_t rows, ebpo_chunk_keys *keys)
+bool ebpo_chunks_missing(ebpo_chunks *c, ebpo_array_id id, int level, uint64_t row, uint64_t rows,
+                         ebpo_chunk_keys *keys)
 {
     const ebpo_array_in *array = ebpo_reader_array(c->file, id, level);
     bool missing = false;
     if (!array->present || rows == 0 || row >= array->shape.rows)
         return false;
-    uint64_t left = array->shape.rows - row, last = (row + (rows < left ? rows : left) - 1) / array->shape.chunk_rows;
+    uint64_t left = array->shape.rows - row,
+             last = (row + (rows < left ? rows : left) - 1) / array->shape.chunk_rows;
     for (uint64_t i = row / array->shape.chunk_rows; i <= last; i++) {
         uint64_t key = key_of(array, i);
         bool listed = ebpo_cache_has(c->cache, key);
@@ -257,10 +288,7 @@ void ebpo_chunks_limit(ebpo_chunks *chunks, uint64_t bytes)
     chunks->refused = false;
 }
 
-bool ebpo_chunks_refused(const ebpo_chunks *chunks)
-{
-    return chunks->refused;
-}
+bool ebpo_chunks_refused(const ebpo_chunks *chunks) { return chunks->refused; }
 
 static ebpo_status load(void *user, uint64_t key, void **item, uint64_t *bytes, ebpo_error *error)
 {
@@ -297,7 +325,8 @@ static void release(void *user, void *item)
     free(item);
 }
 
-static ebpo_status make(ebpo_chunks **out, ebpo_file *file, uint64_t budget, bool counted, ebpo_error *error)
+static ebpo_status make(ebpo_chunks **out, ebpo_file *file, uint64_t budget, bool counted,
+                        ebpo_error *error)
 {
     *out = NULL;
     ebpo_chunks *c = ebpo_alloc_zero(1, sizeof *c);
@@ -308,7 +337,9 @@ static ebpo_status make(ebpo_chunks **out, ebpo_file *file, uint64_t budget, boo
     c->limit = UINT64_MAX;
     pthread_mutex_init(&c->lock, NULL);
     ebpo_cache_source source = { c, estimate, load, release };
-    ebpo_status status = counted ? EBPO_OK : ebpo_reader_make(file, EBPO_A_FACES_INDEX, 0, 1, sizeof *c->seen, &c->seen, error);
+    ebpo_status status = counted ? EBPO_OK
+                                 : ebpo_reader_make(file, EBPO_A_FACES_INDEX, 0, 1, sizeof *c->seen,
+                                                    &c->seen, error);
     if (status == EBPO_OK)
         status = ebpo_cache_make(&c->cache, &source, "chunk", budget, error);
     if (status == EBPO_OK)
@@ -323,7 +354,8 @@ ebpo_status ebpo_chunks_make(ebpo_chunks **out, ebpo_file *file, uint64_t budget
     return make(out, file, budget, false, error);
 }
 
-ebpo_status ebpo_chunks_make_counted(ebpo_chunks **out, ebpo_file *file, uint64_t budget, ebpo_error *error)
+ebpo_status ebpo_chunks_make_counted(ebpo_chunks **out, ebpo_file *file, uint64_t budget,
+                                     ebpo_error *error)
 {
     return make(out, file, budget, true, error);
 }
@@ -356,7 +388,8 @@ void ebpo_held_chunk_release(ebpo_chunks *chunks, ebpo_held_chunk *view)
     *view = (ebpo_held_chunk){ .array = view->array };
 }
 
-ebpo_status ebpo_view_load(ebpo_chunks *chunks, ebpo_held_chunk *view, uint64_t row, ebpo_error *error)
+ebpo_status ebpo_view_load(ebpo_chunks *chunks, ebpo_held_chunk *view, uint64_t row,
+                           ebpo_error *error)
 {
     uint64_t chunk = row / view->array->shape.chunk_rows;
     void *item;
@@ -372,7 +405,8 @@ ebpo_status ebpo_view_load(ebpo_chunks *chunks, ebpo_held_chunk *view, uint64_t 
     return EBPO_OK;
 }
 
-static void widen(const ebpo_h5_shape *shape, const uint8_t *rows, uint64_t numbers, uint8_t *values, size_t size)
+static void widen(const ebpo_h5_shape *shape, const uint8_t *rows, uint64_t numbers,
+                  uint8_t *values, size_t size)
 {
     if (shape->element_size == size && __BYTE_ORDER == __LITTLE_ENDIAN)
         memcpy(values, rows, numbers * size);
@@ -380,20 +414,26 @@ static void widen(const ebpo_h5_shape *shape, const uint8_t *rows, uint64_t numb
         ebpo_integers_decode(rows, shape->element_size, shape->is_signed, numbers, values, size);
 }
 
-static ebpo_status check_rows(const ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row, uint64_t rows, size_t size, ebpo_error *error)
+static ebpo_status check_rows(const ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row,
+                              uint64_t rows, size_t size, ebpo_error *error)
 {
     const char *shown = chunks->file->in.shown;
     if (id >= EBPO_LEVEL_ARRAYS || level < 0 || level >= chunks->file->info.level_count)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: level %d has no array number %d of integers", shown, level, (int)id);
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: level %d has no array number %d of integers",
+                         shown, level, (int)id);
     const ebpo_array_in *array = ebpo_reader_array(chunks->file, id, level);
-    if (!array->present || row > array->shape.rows || rows > array->shape.rows - row || size < array->shape.element_size)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: %s: rows %" PRIu64 " to %" PRIu64 " of %zu bytes are asked for, and the array has %" PRIu64
-                         " of %d", shown, array->path, row, row + rows, size, array->shape.rows, array->shape.element_size);
+    if (!array->present || row > array->shape.rows || rows > array->shape.rows - row ||
+        size < array->shape.element_size)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "%s: %s: rows %" PRIu64 " to %" PRIu64
+                         " of %zu bytes are asked for, and the array has %" PRIu64 " of %d",
+                         shown, array->path, row, row + rows, size, array->shape.rows,
+                         array->shape.element_size);
     return EBPO_OK;
 }
 
-ebpo_status ebpo_chunks_integers(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row, uint64_t rows, void *values, size_t size,
-                                 ebpo_error *error)
+ebpo_status ebpo_chunks_integers(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row,
+                                 uint64_t rows, void *values, size_t size, ebpo_error *error)
 {
     ebpo_status status = check_rows(chunks, id, level, row, rows, size, error);
     if (status != EBPO_OK)
@@ -411,7 +451,8 @@ ebpo_status ebpo_chunks_integers(ebpo_chunks *chunks, ebpo_array_id id, int leve
         if (status != EBPO_OK)
             break;
         uint64_t here = view.end - row < rows ? view.end - row : rows;
-        widen(&array->shape, view.rows + (row - view.begin) * ebpo_h5_row_bytes(&array->shape), here * cols, out, size);
+        widen(&array->shape, view.rows + (row - view.begin) * ebpo_h5_row_bytes(&array->shape),
+              here * cols, out, size);
         out += here * cols * size;
         row += here;
         rows -= here;
@@ -420,16 +461,18 @@ ebpo_status ebpo_chunks_integers(ebpo_chunks *chunks, ebpo_array_id id, int leve
     return status;
 }
 
-ebpo_status ebpo_chunks_take(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row, uint64_t rows, size_t size, void *values_out,
-                             ebpo_error *error)
+ebpo_status ebpo_chunks_take(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row,
+                             uint64_t rows, size_t size, void *values_out, ebpo_error *error)
 {
     void *values = NULL;
-    ebpo_status status = rows ? check_rows(chunks, id, level, row, rows, size, error) : EBPO_OK; /* before room is made */
+    /* before room is made */
+    ebpo_status status = rows ? check_rows(chunks, id, level, row, rows, size, error) : EBPO_OK;
     if (status == EBPO_OK && rows) {
         const ebpo_array_in *array = ebpo_reader_array(chunks->file, id, level);
         uint64_t cols = array->shape.cols ? array->shape.cols : 1;
         values = ebpo_alloc(rows, size * cols);
-        status = values ? ebpo_chunks_integers(chunks, id, level, row, rows, values, size, error) : ebpo_fail_memory(error, rows * size * cols);
+        status = values ? ebpo_chunks_integers(chunks, id, level, row, rows, values, size, error)
+                        : ebpo_fail_memory(error, rows * size * cols);
     }
     if (status != EBPO_OK) {
         free(values);

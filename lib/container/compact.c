@@ -15,13 +15,16 @@ ebpo_status ebpo_compact_make(ebpo_compact *out, uint64_t room, ebpo_error *erro
         bits++;
     *out = (ebpo_compact){ .shift = 32 - bits };
     if (room > UINT64_C(1) << 31)
-        return ebpo_fail(error, EBPO_E_LIMIT, "%llu references in one subtree are more than can be numbered; choose a deeper level",
-                         (unsigned long long)room);
+        return ebpo_fail(
+            error, EBPO_E_LIMIT,
+            "%llu references in one subtree are more than can be numbered; choose a deeper level",
+            (unsigned long long)room);
     out->slot = ebpo_alloc(UINT64_C(1) << bits, sizeof *out->slot);
     out->sorted = ebpo_alloc(room, sizeof *out->sorted);
     if (!out->slot || !out->sorted) {
         ebpo_compact_free(out);
-        return ebpo_fail_memory(error, (UINT64_C(1) << bits) * sizeof *out->slot + room * sizeof *out->sorted);
+        return ebpo_fail_memory(error, (UINT64_C(1) << bits) * sizeof *out->slot +
+                                           room * sizeof *out->sorted);
     }
     memset(out->slot, 0xff, (UINT64_C(1) << bits) * sizeof *out->slot);
     return EBPO_OK;

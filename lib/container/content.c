@@ -17,7 +17,8 @@ void ebpo_content_add(ebpo_content *content, const void *data, size_t bytes)
 
 void ebpo_content_put(ebpo_content *content, const char *path, const uint8_t digest[32])
 {
-    if (!ebpo_grow(&content->entries, &content->capacity, content->count + 1, sizeof *content->entries)) {
+    if (!ebpo_grow(&content->entries, &content->capacity, content->count + 1,
+                   sizeof *content->entries)) {
         content->short_of_memory = true;
         return;
     }

@@ -9,7 +9,8 @@ static void add(ebpo_expected *e, uint64_t offset, uint64_t size)
     ebpo_range *last = e->count ? &e->range[e->count - 1] : NULL;
     if (last && last->offset + last->size == offset)
         last->size += size;
-    else if (ebpo_grow(&e->range, &e->room, e->count + 1, sizeof *e->range)) /* else it is read without having been announced */
+    else if (ebpo_grow(&e->range, &e->room, e->count + 1,
+                       sizeof *e->range)) /* else it is read without having been announced */
         e->range[e->count++] = (ebpo_range){ offset, size };
 }
 
@@ -18,7 +19,8 @@ void ebpo_expect_chunks(ebpo_expected *e, const ebpo_array_in *array, uint64_t b
     /* A failure is the reading's to tell. */
     if (!ebpo_input_expects(&e->file->in) || !array->present || e->failed)
         return;
-    e->failed = ebpo_reader_locate(e->file, array, NULL) != EBPO_OK; /* not again and again: each time would take all retries */
+    /* not again and again: each time would take all retries */
+    e->failed = ebpo_reader_locate(e->file, array, NULL) != EBPO_OK;
     if (e->failed)
         return;
     for (uint64_t i = begin; i < end; i++)

@@ -13,23 +13,25 @@
 
 static const char FORMAT[] = "EBP-Octree in HDF5";
 static const char FORMAT_VERSION[] = "1.0", DRAFT[] = "1.0-draft";
-static const char ABOUT[] = "A triangle mesh with an octree of convex envelopes (EBP-Octree), level by level: /levels/00 and so on, "
-                            "then /mesh, then /maps. Each array's attributes name its coding; the specification is format-spec/README.md of ebpo.";
+static const char ABOUT[] = "A triangle mesh with an octree of convex envelopes (EBP-Octree), "
+                            "level by level: /levels/00 and so on, "
+                            "then /mesh, then /maps. Each array's attributes name its coding; the "
+                            "specification is format-spec/README.md of ebpo.";
 
 /* How a field of ebpo_info becomes an attribute. */
 typedef enum fact_kind {
-    TEXT,     /* char[size], required */
-    NOTE,     /* char[size], left out when empty */
-    DIGEST,   /* uint8_t[32] as hexadecimal text */
-    NUMBER,   /* int as i64 */
-    INTEGER,  /* int64_t as i64 */
-    COUNT32,  /* uint32_t as u64 */
-    COUNT,    /* uint64_t as u64 */
-    HINT,     /* the same, may be absent */
-    YES_NO,   /* bool as u64 0 or 1 */
-    REAL,     /* double */
-    REAL3,    /* double[3] */
-    WORD      /* enumeration in a word, see `words` */
+    TEXT,    /* char[size], required */
+    NOTE,    /* char[size], left out when empty */
+    DIGEST,  /* uint8_t[32] as hexadecimal text */
+    NUMBER,  /* int as i64 */
+    INTEGER, /* int64_t as i64 */
+    COUNT32, /* uint32_t as u64 */
+    COUNT,   /* uint64_t as u64 */
+    HINT,    /* the same, may be absent */
+    YES_NO,  /* bool as u64 0 or 1 */
+    REAL,    /* double */
+    REAL3,   /* double[3] */
+    WORD     /* enumeration in a word, see `words` */
 } fact_kind;
 
 typedef struct fact {
@@ -39,11 +41,12 @@ typedef struct fact {
     const char *const *words;
 } fact;
 
-static const char *const KINDS[] = { "surface", "solid", NULL };          /* by info.solid */
-static const char *const COORDINATES[] = { "float32", "float64", NULL };  /* by info.double_coordinates */
+static const char *const KINDS[] = { "surface", "solid", NULL }; /* by info.solid */
+static const char *const COORDINATES[] = { "float32", "float64",
+                                           NULL }; /* by info.double_coordinates */
 static const char *const RULES[] = { "nonzero", "evenodd", "positive", NULL };
 
-#define AT(field) offsetof(ebpo_info, field), sizeof(((ebpo_info *)0)->field), NULL
+#define AT(field)           offsetof(ebpo_info, field), sizeof(((ebpo_info *)0)->field), NULL
 #define WORDS(field, words) offsetof(ebpo_info, field), sizeof(((ebpo_info *)0)->field), words
 
 static const fact facts[] = {
@@ -106,7 +109,8 @@ static const fact facts[] = {
 };
 enum { FACTS = sizeof facts / sizeof facts[0] };
 
-#define LEVEL_AT(field) offsetof(ebpo_level_summary, field), sizeof(((ebpo_level_summary *)0)->field), NULL
+#define LEVEL_AT(field) \
+    offsetof(ebpo_level_summary, field), sizeof(((ebpo_level_summary *)0)->field), NULL
 static const fact level_facts[] = {
     { "gray", COUNT, LEVEL_AT(gray_count) },
     { "leaf", COUNT, LEVEL_AT(leaf_count) },
@@ -122,25 +126,30 @@ static const fact level_facts[] = {
 enum { LEVEL_FACTS = sizeof level_facts / sizeof level_facts[0] };
 static const fact pruned_fact = { "pruned", COUNT, LEVEL_AT(pruned_count) }; /* left out when 0 */
 
-static ebpo_status put_word(ebpo_h5_out *out, ebpo_h5_id id, const fact *f, const void *field, ebpo_error *error)
+static ebpo_status put_word(ebpo_h5_out *out, ebpo_h5_id id, const fact *f, const void *field,
+                            ebpo_error *error)
 {
-    size_t value = f->size == sizeof(bool) ? *(const bool *)field : (size_t)*(const ebpo_rule *)field;
+    size_t value =
+        f->size == sizeof(bool) ? *(const bool *)field : (size_t) * (const ebpo_rule *)field;
     return ebpo_h5_put_text(out, id, f->name, f->words[value], error);
 }
 
-static ebpo_status put_digest(ebpo_h5_out *out, ebpo_h5_id id, const char *name, const uint8_t *digest, ebpo_error *error)
+static ebpo_status put_digest(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
+                              const uint8_t *digest, ebpo_error *error)
 {
     char hex[65];
     ebpo_sha256_hex(digest, hex);
     return ebpo_h5_put_text(out, id, name, hex, error);
 }
 
-static ebpo_status put_fact(ebpo_h5_out *out, ebpo_h5_id id, const fact *f, const void *record, ebpo_error *error)
+static ebpo_status put_fact(ebpo_h5_out *out, ebpo_h5_id id, const fact *f, const void *record,
+                            ebpo_error *error)
 {
     const void *field = (const char *)record + f->offset;
     switch (f->kind) {
     case TEXT: return ebpo_h5_put_text(out, id, f->name, field, error);
-    case NOTE: return *(const char *)field ? ebpo_h5_put_text(out, id, f->name, field, error) : EBPO_OK;
+    case NOTE:
+        return *(const char *)field ? ebpo_h5_put_text(out, id, f->name, field, error) : EBPO_OK;
     case DIGEST: return put_digest(out, id, f->name, field, error);
     case NUMBER: return ebpo_h5_put_int(out, id, f->name, *(const int *)field, error);
     case INTEGER: return ebpo_h5_put_int(out, id, f->name, *(const int64_t *)field, error);
@@ -155,9 +164,15 @@ static ebpo_status put_fact(ebpo_h5_out *out, ebpo_h5_id id, const fact *f, cons
     return EBPO_E_ARGUMENT;
 }
 
-/* A reader that does not know an optional part is none the wiser, but right; without a required one it would be wrong. */
-enum { PRUNED = 1 << 30 }; /* info.pruned: a word in the list of parts, but nothing that one could leave out */
-static const struct { const char *word; unsigned part; bool required; } parts[] = {
+/* A reader that does not know an optional part is none the wiser, but right; without a required one
+ * it would be wrong. */
+/* info.pruned: a word in the list of parts, but nothing that one could leave out */
+enum { PRUNED = 1 << 30 };
+static const struct {
+    const char *word;
+    unsigned part;
+    bool required;
+} parts[] = {
     { "levels", 0, true },
     { "mesh", EBPO_PART_MESH, true },
     { "planes", EBPO_PART_PLANES, false },
@@ -167,7 +182,8 @@ static const struct { const char *word; unsigned part; bool required; } parts[] 
 };
 enum { PARTS = sizeof parts / sizeof parts[0] };
 
-static ebpo_status put_parts(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info, bool required, ebpo_error *error)
+static ebpo_status put_parts(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info,
+                             bool required, ebpo_error *error)
 {
     char words[128] = "";
     uint32_t has = info->parts | (info->pruned ? PRUNED : 0);
@@ -176,7 +192,8 @@ static ebpo_status put_parts(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info 
             size_t used = strlen(words);
             snprintf(words + used, sizeof words - used, "%s%s", used ? " " : "", parts[i].word);
         }
-    return ebpo_h5_put_text(out, root, required ? "required_parts" : "optional_parts", words, error);
+    return ebpo_h5_put_text(out, root, required ? "required_parts" : "optional_parts", words,
+                            error);
 }
 
 /* How planes were chosen, where that was not the usual way: told, and needed by no reader. */
@@ -189,12 +206,14 @@ static const fact selection_facts[] = {
 };
 enum { SELECTION_FACTS = sizeof selection_facts / sizeof selection_facts[0] };
 
-static ebpo_status put_selection(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info, ebpo_error *error)
+static ebpo_status put_selection(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info,
+                                 ebpo_error *error)
 {
     int known = sizeof SELECTIONS / sizeof *SELECTIONS - 1;
     if (info->selection <= 0 || info->selection >= known || info->normals < 0 || info->normals > 1)
         return EBPO_OK;
-    ebpo_status status = ebpo_h5_put_text(out, root, "selection", SELECTIONS[info->selection], error);
+    ebpo_status status =
+        ebpo_h5_put_text(out, root, "selection", SELECTIONS[info->selection], error);
     if (status == EBPO_OK)
         status = ebpo_h5_put_text(out, root, "selection_normals", NORMALS[info->normals], error);
     for (int i = 0; i < SELECTION_FACTS && status == EBPO_OK; i++)
@@ -203,7 +222,8 @@ static ebpo_status put_selection(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_i
 }
 
 /* Only in subsets: other files stay as they are. */
-static ebpo_status put_subset(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info, ebpo_error *error)
+static ebpo_status put_subset(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info,
+                              ebpo_error *error)
 {
     ebpo_status status = put_digest(out, root, "subset_of", info->subset_of, error);
     if (status == EBPO_OK && info->cut_levels)
@@ -215,7 +235,8 @@ static ebpo_status put_subset(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info
     return status;
 }
 
-ebpo_status ebpo_facts_put(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info, ebpo_error *error)
+ebpo_status ebpo_facts_put(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info,
+                           ebpo_error *error)
 {
     ebpo_status status = ebpo_h5_put_text(out, root, "format", FORMAT, error);
     if (status == EBPO_OK)
@@ -239,18 +260,22 @@ ebpo_status ebpo_facts_put(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *i
     return status;
 }
 
-ebpo_status ebpo_facts_put_digest(ebpo_h5_out *out, ebpo_h5_id root, const uint8_t digest[32], ebpo_error *error)
+ebpo_status ebpo_facts_put_digest(ebpo_h5_out *out, ebpo_h5_id root, const uint8_t digest[32],
+                                  ebpo_error *error)
 {
     return put_digest(out, root, "content_sha256", digest, error);
 }
 
-ebpo_status ebpo_facts_put_index(ebpo_h5_out *out, ebpo_h5_id root, uint64_t offset, uint64_t bytes, ebpo_error *error)
+ebpo_status ebpo_facts_put_index(ebpo_h5_out *out, ebpo_h5_id root, uint64_t offset, uint64_t bytes,
+                                 ebpo_error *error)
 {
     ebpo_status status = ebpo_h5_put_count(out, root, "chunk_index_offset", offset, error);
-    return status == EBPO_OK ? ebpo_h5_put_count(out, root, "chunk_index_bytes", bytes, error) : status;
+    return status == EBPO_OK ? ebpo_h5_put_count(out, root, "chunk_index_bytes", bytes, error)
+                             : status;
 }
 
-ebpo_status ebpo_facts_put_level(ebpo_h5_out *out, ebpo_h5_id group, const ebpo_level_summary *level, ebpo_error *error)
+ebpo_status ebpo_facts_put_level(ebpo_h5_out *out, ebpo_h5_id group,
+                                 const ebpo_level_summary *level, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < LEVEL_FACTS && status == EBPO_OK; i++)
@@ -260,13 +285,17 @@ ebpo_status ebpo_facts_put_level(ebpo_h5_out *out, ebpo_h5_id group, const ebpo_
     return status;
 }
 
-static ebpo_status wrong_value(ebpo_h5_in *in, const char *object, const char *name, ebpo_error *error)
+static ebpo_status wrong_value(ebpo_h5_in *in, const char *object, const char *name,
+                               ebpo_error *error)
 {
-    return ebpo_fail(error, EBPO_E_FORMAT, "%s: %s: attribute %s has a value that the format does not allow; get a fresh copy of the file",
+    return ebpo_fail(error, EBPO_E_FORMAT,
+                     "%s: %s: attribute %s has a value that the format does not allow; get a fresh "
+                     "copy of the file",
                      in->shown, object, name);
 }
 
-static ebpo_status get_word(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const fact *f, void *field, ebpo_error *error)
+static ebpo_status get_word(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const fact *f,
+                            void *field, ebpo_error *error)
 {
     char word[32];
     ebpo_status status = ebpo_h5_get_text(in, id, object, f->name, word, sizeof word, error);
@@ -289,7 +318,8 @@ static int hex_digit(char c)
     return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
 }
 
-static ebpo_status get_digest(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const char *name, uint8_t *digest, ebpo_error *error)
+static ebpo_status get_digest(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const char *name,
+                              uint8_t *digest, ebpo_error *error)
 {
     char hex[66];
     ebpo_status status = ebpo_h5_get_text(in, id, object, name, hex, sizeof hex, error);
@@ -306,7 +336,8 @@ static ebpo_status get_digest(ebpo_h5_in *in, ebpo_h5_id id, const char *object,
     return EBPO_OK;
 }
 
-static ebpo_status get_limited(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const fact *f, void *field, ebpo_error *error)
+static ebpo_status get_limited(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const fact *f,
+                               void *field, ebpo_error *error)
 {
     int64_t number = 0;
     uint64_t count = 0;
@@ -315,7 +346,8 @@ static ebpo_status get_limited(ebpo_h5_in *in, ebpo_h5_id id, const char *object
                                 : ebpo_h5_get_count(in, id, object, f->name, &count, error);
     if (status != EBPO_OK)
         return status;
-    if ((f->kind == YES_NO && count > 1) || (f->kind == COUNT32 && count > UINT32_MAX) || (is_int && (number < 0 || number > 1 << 20)))
+    if ((f->kind == YES_NO && count > 1) || (f->kind == COUNT32 && count > UINT32_MAX) ||
+        (is_int && (number < 0 || number > 1 << 20)))
         return wrong_value(in, object, f->name, error);
     if (f->kind == YES_NO)
         *(bool *)field = count;
@@ -326,7 +358,8 @@ static ebpo_status get_limited(ebpo_h5_in *in, ebpo_h5_id id, const char *object
     return EBPO_OK;
 }
 
-static ebpo_status get_fact(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const fact *f, void *record, ebpo_error *error)
+static ebpo_status get_fact(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const fact *f,
+                            void *record, ebpo_error *error)
 {
     void *field = (char *)record + f->offset;
     ebpo_status status = EBPO_E_ARGUMENT;
@@ -348,7 +381,9 @@ static ebpo_status get_fact(ebpo_h5_in *in, ebpo_h5_id id, const char *object, c
         return status;
     if (f->kind == NOTE || f->kind == HINT)
         return EBPO_OK;
-    return ebpo_fail(error, EBPO_E_FORMAT, "%s: %s: attribute %s is missing; get a fresh copy of the file", in->shown, object, f->name);
+    return ebpo_fail(error, EBPO_E_FORMAT,
+                     "%s: %s: attribute %s is missing; get a fresh copy of the file", in->shown,
+                     object, f->name);
 }
 
 static ebpo_status get_version(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebpo_error *error)
@@ -358,35 +393,50 @@ static ebpo_status get_version(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info,
     char format[32];
     ebpo_status status = ebpo_h5_get_text(in, root, "/", "format", format, sizeof format, NULL);
     if (status != EBPO_OK || strcmp(format, FORMAT) != 0)
-        return ebpo_fail(error, EBPO_E_FORMAT, "%s: an HDF5 file, but not an EBP-Octree (its root attribute format does not say \"%s\"); "
-                         "make one with `ebpo convert`", in->shown, FORMAT);
+        return ebpo_fail(error, EBPO_E_FORMAT,
+                         "%s: an HDF5 file, but not an EBP-Octree (its root attribute format does "
+                         "not say \"%s\"); "
+                         "make one with `ebpo convert`",
+                         in->shown, FORMAT);
     status = get_fact(in, root, "/", &major, info, error);
     if (status == EBPO_OK)
         status = get_fact(in, root, "/", &minor, info, error);
     if (status == EBPO_OK && info->version_major != EBPO_FORMAT_MAJOR)
-        status = ebpo_fail(error, EBPO_E_VERSION, "%s: format version %d.%d, and this library reads version %d; use a newer one", in->shown,
-                           info->version_major, info->version_minor, EBPO_FORMAT_MAJOR);
+        status = ebpo_fail(
+            error, EBPO_E_VERSION,
+            "%s: format version %d.%d, and this library reads version %d; use a newer one",
+            in->shown, info->version_major, info->version_minor, EBPO_FORMAT_MAJOR);
     char words[32]; /* they are for people, but files of the draft have the same numbers */
-    if (status == EBPO_OK && ebpo_h5_get_text(in, root, "/", "format_version", words, sizeof words, NULL) == EBPO_OK && strcmp(words, DRAFT) == 0)
-        status = ebpo_fail(error, EBPO_E_VERSION, "%s: was written while the format was a draft, which is not read any more; convert the model again", in->shown);
+    if (status == EBPO_OK &&
+        ebpo_h5_get_text(in, root, "/", "format_version", words, sizeof words, NULL) == EBPO_OK &&
+        strcmp(words, DRAFT) == 0)
+        status = ebpo_fail(error, EBPO_E_VERSION,
+                           "%s: was written while the format was a draft, which is not read any "
+                           "more; convert the model again",
+                           in->shown);
     return status;
 }
 
 /* A part may stand in either list; one that we know counts as present. */
-static ebpo_status take_part(ebpo_h5_in *in, const char *word, bool required, unsigned *seen, ebpo_error *error)
+static ebpo_status take_part(ebpo_h5_in *in, const char *word, bool required, unsigned *seen,
+                             ebpo_error *error)
 {
     for (int i = 0; i < PARTS; i++) {
         if (strcmp(word, parts[i].word) != 0)
             continue;
         if (*seen >> i & 1)
-            return ebpo_fail(error, EBPO_E_FORMAT, "%s: part \"%s\" is listed twice; get a fresh copy of the file", in->shown, word);
+            return ebpo_fail(error, EBPO_E_FORMAT,
+                             "%s: part \"%s\" is listed twice; get a fresh copy of the file",
+                             in->shown, word);
         *seen |= 1u << i;
         return EBPO_OK;
     }
     if (!required)
         return EBPO_OK;
-    return ebpo_fail(error, EBPO_E_VERSION, "%s: the file needs part \"%s\", which this library does not know; use a newer one", in->shown,
-                     word);
+    return ebpo_fail(
+        error, EBPO_E_VERSION,
+        "%s: the file needs part \"%s\", which this library does not know; use a newer one",
+        in->shown, word);
 }
 
 static ebpo_status get_parts(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebpo_error *error)
@@ -397,7 +447,9 @@ static ebpo_status get_parts(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, e
         char words[1024], *rest = words, *word;
         ebpo_status status = ebpo_h5_get_text(in, root, "/", name, words, sizeof words, error);
         if (status == EBPO_E_ABSENT)
-            return ebpo_fail(error, EBPO_E_FORMAT, "%s: /: attribute %s is missing; get a fresh copy of the file", in->shown, name);
+            return ebpo_fail(error, EBPO_E_FORMAT,
+                             "%s: /: attribute %s is missing; get a fresh copy of the file",
+                             in->shown, name);
         while (status == EBPO_OK && (word = strsep(&rest, " ")) != NULL)
             if (*word)
                 status = take_part(in, word, required, &seen, error);
@@ -417,7 +469,9 @@ static ebpo_status get_subset(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, 
     int64_t levels = 0;
     ebpo_status status = get_digest(in, root, "/", "subset_of", info->subset_of, error);
     if (status == EBPO_E_ABSENT)
-        return ebpo_fail(error, EBPO_E_FORMAT, "%s: /: attribute subset_of is missing; get a fresh copy of the file", in->shown);
+        return ebpo_fail(error, EBPO_E_FORMAT,
+                         "%s: /: attribute subset_of is missing; get a fresh copy of the file",
+                         in->shown);
     if (status == EBPO_OK)
         status = ebpo_h5_get_int(in, root, "/", "subset_levels", &levels, error);
     if (status == EBPO_OK && (levels < 1 || levels > EBPO_LEVELS_MAX))
@@ -427,7 +481,8 @@ static ebpo_status get_subset(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, 
         status = ebpo_h5_get_real(in, root, "/", "subset_box", info->kept_box, 6, error);
     info->boxed = status == EBPO_OK;
     for (int k = 0; k < 3 && info->boxed; k++)
-        if (!(isfinite(info->kept_box[k]) && isfinite(info->kept_box[3 + k]) && info->kept_box[k] <= info->kept_box[3 + k]))
+        if (!(isfinite(info->kept_box[k]) && isfinite(info->kept_box[3 + k]) &&
+              info->kept_box[k] <= info->kept_box[3 + k]))
             return wrong_value(in, "/", "subset_box", error);
     if (status == EBPO_OK || status == EBPO_E_ABSENT)
         status = ebpo_h5_get_real(in, root, "/", "subset_error", &info->kept_error, 0, error);
@@ -436,8 +491,10 @@ static ebpo_status get_subset(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, 
     return status == EBPO_E_ABSENT ? EBPO_OK : status;
 }
 
-/* Place of the attribute's word in `words`; -1: another one, of a newer library. Without the attribute *out stays. */
-static ebpo_status get_known(ebpo_h5_in *in, ebpo_h5_id root, const char *name, const char *const *words, int *out, ebpo_error *error)
+/* Place of the attribute's word in `words`; -1: another one, of a newer library. Without the
+ * attribute *out stays. */
+static ebpo_status get_known(ebpo_h5_in *in, ebpo_h5_id root, const char *name,
+                             const char *const *words, int *out, ebpo_error *error)
 {
     char word[64];
     ebpo_status status = ebpo_h5_get_text(in, root, "/", name, word, sizeof word, error);
@@ -450,7 +507,8 @@ static ebpo_status get_known(ebpo_h5_in *in, ebpo_h5_id root, const char *name, 
     return status;
 }
 
-static ebpo_status get_selection(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebpo_error *error)
+static ebpo_status get_selection(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info,
+                                 ebpo_error *error)
 {
     ebpo_status status = get_known(in, root, "selection", SELECTIONS, &info->selection, error);
     if (status == EBPO_OK)
@@ -472,7 +530,8 @@ ebpo_status ebpo_facts_get(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebp
     return status == EBPO_OK && info->pruned ? get_subset(in, root, info, error) : status;
 }
 
-ebpo_status ebpo_facts_get_level(ebpo_h5_in *in, ebpo_h5_id group, const char *path, ebpo_level_summary *level, ebpo_error *error)
+ebpo_status ebpo_facts_get_level(ebpo_h5_in *in, ebpo_h5_id group, const char *path,
+                                 ebpo_level_summary *level, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < LEVEL_FACTS && status == EBPO_OK; i++)

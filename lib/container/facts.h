@@ -1,4 +1,5 @@
-/* The attributes of the root and of the levels' groups: ebpo_info but for what the reader measures. */
+/* The attributes of the root and of the levels' groups: ebpo_info but for what the reader measures.
+ */
 #ifndef EBPO_CONTAINER_FACTS_H
 #define EBPO_CONTAINER_FACTS_H
 
@@ -6,18 +7,27 @@
 
 #include "h5/h5.h"
 
-/* Writes the root's attributes; content_sha256 and chunk_index_* as they stand (put them again later). */
-EBPO_MUST_USE ebpo_status ebpo_facts_put(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info, ebpo_error *error);
-EBPO_MUST_USE ebpo_status ebpo_facts_put_digest(ebpo_h5_out *out, ebpo_h5_id root, const uint8_t digest[32], ebpo_error *error);
-EBPO_MUST_USE ebpo_status ebpo_facts_put_index(ebpo_h5_out *out, ebpo_h5_id root, uint64_t offset, uint64_t bytes, ebpo_error *error);
-EBPO_MUST_USE ebpo_status ebpo_facts_put_level(ebpo_h5_out *out, ebpo_h5_id group, const ebpo_level_summary *level, ebpo_error *error);
+/* Writes the root's attributes; content_sha256 and chunk_index_* as they stand (put them again
+ * later). */
+EBPO_MUST_USE ebpo_status ebpo_facts_put(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info,
+                                         ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_facts_put_digest(ebpo_h5_out *out, ebpo_h5_id root,
+                                                const uint8_t digest[32], ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_facts_put_index(ebpo_h5_out *out, ebpo_h5_id root, uint64_t offset,
+                                               uint64_t bytes, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_facts_put_level(ebpo_h5_out *out, ebpo_h5_id group,
+                                               const ebpo_level_summary *level, ebpo_error *error);
 
-/* Reads the root's attributes: version and required parts first, so that a newer file is refused by name and not for its details. */
-EBPO_MUST_USE ebpo_status ebpo_facts_get(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebpo_error *error);
-EBPO_MUST_USE ebpo_status ebpo_facts_get_level(ebpo_h5_in *in, ebpo_h5_id group, const char *path, ebpo_level_summary *level,
-                                               ebpo_error *error);
+/* Reads the root's attributes: version and required parts first, so that a newer file is refused by
+ * name and not for its details. */
+EBPO_MUST_USE ebpo_status ebpo_facts_get(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info,
+                                         ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_facts_get_level(ebpo_h5_in *in, ebpo_h5_id group, const char *path,
+                                               ebpo_level_summary *level, ebpo_error *error);
 
-/* Checks that the facts agree with each other: ranges, and sums over the levels. For files (EBPO_E_FORMAT) and for callers' trees (EBPO_E_ARGUMENT). */
-EBPO_MUST_USE ebpo_status ebpo_facts_check(const ebpo_info *info, const char *shown, ebpo_status as, ebpo_error *error);
+/* Checks that the facts agree with each other: ranges, and sums over the levels. For files
+ * (EBPO_E_FORMAT) and for callers' trees (EBPO_E_ARGUMENT). */
+EBPO_MUST_USE ebpo_status ebpo_facts_check(const ebpo_info *info, const char *shown, ebpo_status as,
+                                           ebpo_error *error);
 
 #endif

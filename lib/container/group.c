@@ -7,21 +7,17 @@
 #include "container/slice_parts.h"
 #include "geom/plane_code.h"
 
-static uint64_t block_of(uint64_t item)
-{
-    return item / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS;
-}
+static uint64_t block_of(uint64_t item) { return item / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS; }
 
-static unsigned type_of(uint16_t types, unsigned octant)
-{
-    return types >> 2 * octant & 3;
-}
+static unsigned type_of(uint16_t types, unsigned octant) { return types >> 2 * octant & 3; }
 
-static ebpo_status read_types(ebpo_chunks *chunks, int level, uint64_t group, ebpo_group *out, uint64_t counts[4], ebpo_error *error)
+static ebpo_status read_types(ebpo_chunks *chunks, int level, uint64_t group, ebpo_group *out,
+                              uint64_t counts[4], ebpo_error *error)
 {
     ebpo_status status = ebpo_ranks_before(chunks, level, group, out->rank, error);
     if (status == EBPO_OK)
-        status = ebpo_chunks_integers(chunks, EBPO_A_TYPES, level, group, 1, &out->types, sizeof out->types, error);
+        status = ebpo_chunks_integers(chunks, EBPO_A_TYPES, level, group, 1, &out->types,
+                                      sizeof out->types, error);
     if (status != EBPO_OK)
         return status;
     ebpo_ranks_count(&out->types, 1, counts);
@@ -32,7 +28,8 @@ static ebpo_status read_types(ebpo_chunks *chunks, int level, uint64_t group, eb
 
 /* --- planes --- */
 
-static ebpo_status take_codes(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t first, uint64_t all, const uint8_t *counts, uint64_t nodes, ebpo_group *out,
+static ebpo_status take_codes(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t first,
+                              uint64_t all, const uint8_t *counts, uint64_t nodes, ebpo_group *out,
                               ebpo_node_type type, ebpo_error *error)
 {
     uint32_t codes[EBPO_GROUP_CODES];
@@ -40,8 +37,11 @@ static ebpo_status take_codes(ebpo_chunks *chunks, ebpo_array_id id, int level, 
     for (uint64_t i = 0; i < nodes; i++)
         sum += counts[i];
     if (first > all || sum > all - first)
-        return ebpo_chunks_fail(chunks, level, id, "the counts do not add up to the number of planes", error);
-    ebpo_status status = sum ? ebpo_chunks_integers(chunks, id, level, first, sum, codes, sizeof *codes, error) : EBPO_OK;
+        return ebpo_chunks_fail(chunks, level, id,
+                                "the counts do not add up to the number of planes", error);
+    ebpo_status status =
+        sum ? ebpo_chunks_integers(chunks, id, level, first, sum, codes, sizeof *codes, error)
+            : EBPO_OK;
     for (uint64_t i = 0; i < sum && status == EBPO_OK; i++) {
         int32_t n[3], d;
         if (!ebpo_plane_code_decode(codes[i], n, &d))
@@ -56,7 +56,8 @@ static ebpo_status take_codes(ebpo_chunks *chunks, ebpo_array_id id, int level, 
     return status;
 }
 
-static ebpo_status read_gray_planes(ebpo_chunks *chunks, int level, uint64_t count, ebpo_group *out, ebpo_error *error)
+static ebpo_status read_gray_planes(ebpo_chunks *chunks, int level, uint64_t count, ebpo_group *out,
+                                    ebpo_error *error)
 {
     uint64_t first, rank = out->rank[EBPO_GRAY];
     uint8_t counts[8];
@@ -64,28 +65,36 @@ static ebpo_status read_gray_planes(ebpo_chunks *chunks, int level, uint64_t cou
         return EBPO_OK;
     ebpo_status status = ebpo_ranks_planes(chunks, level, rank, &first, error);
     if (status == EBPO_OK)
-        status = ebpo_chunks_integers(chunks, EBPO_A_PLANE_COUNTS, level, rank, count, counts, sizeof *counts, error);
+        status = ebpo_chunks_integers(chunks, EBPO_A_PLANE_COUNTS, level, rank, count, counts,
+                                      sizeof *counts, error);
     if (status != EBPO_OK)
         return status;
-    return take_codes(chunks, EBPO_A_PLANES, level, first, chunks->file->info.level[level].plane_count, counts, count, out, EBPO_GRAY, error);
+    return take_codes(chunks, EBPO_A_PLANES, level, first,
+                      chunks->file->info.level[level].plane_count, counts, count, out, EBPO_GRAY,
+                      error);
 }
 
 /* Stored planes of leaves before one. */
-static ebpo_status leaf_planes_before(ebpo_chunks *chunks, int level, uint64_t rank, uint64_t *planes, ebpo_error *error)
+static ebpo_status leaf_planes_before(ebpo_chunks *chunks, int level, uint64_t rank,
+                                      uint64_t *planes, ebpo_error *error)
 {
     uint64_t row[3] = { 0, 0, 0 }, sum = 0, all = chunks->file->info.level[level].leaf_plane_count;
     ebpo_status status = EBPO_OK;
     if (rank >= EBPO_INDEX_ROWS)
-        status = ebpo_chunks_integers(chunks, EBPO_A_LEAF_INDEX, level, rank / EBPO_INDEX_ROWS, 1, row, sizeof *row, error);
+        status = ebpo_chunks_integers(chunks, EBPO_A_LEAF_INDEX, level, rank / EBPO_INDEX_ROWS, 1,
+                                      row, sizeof *row, error);
     if (status == EBPO_OK)
-        status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_PLANE_COUNTS, level, block_of(rank), rank - block_of(rank), &sum, error);
+        status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_PLANE_COUNTS, level, block_of(rank),
+                                 rank - block_of(rank), &sum, error);
     if (status == EBPO_OK && (row[2] > all || sum > all - row[2]))
-        status = ebpo_chunks_fail(chunks, level, EBPO_A_LEAF_INDEX, "the index contradicts the counts in the head", error);
+        status = ebpo_chunks_fail(chunks, level, EBPO_A_LEAF_INDEX,
+                                  "the index contradicts the counts in the head", error);
     *planes = row[2] + sum;
     return status;
 }
 
-static ebpo_status read_leaf_planes(ebpo_chunks *chunks, int level, uint64_t count, ebpo_group *out, ebpo_error *error)
+static ebpo_status read_leaf_planes(ebpo_chunks *chunks, int level, uint64_t count, ebpo_group *out,
+                                    ebpo_error *error)
 {
     uint64_t first, rank = out->rank[EBPO_LEAF];
     uint8_t counts[8];
@@ -93,10 +102,13 @@ static ebpo_status read_leaf_planes(ebpo_chunks *chunks, int level, uint64_t cou
         return EBPO_OK;
     ebpo_status status = leaf_planes_before(chunks, level, rank, &first, error);
     if (status == EBPO_OK)
-        status = ebpo_chunks_integers(chunks, EBPO_A_LEAF_PLANE_COUNTS, level, rank, count, counts, sizeof *counts, error);
+        status = ebpo_chunks_integers(chunks, EBPO_A_LEAF_PLANE_COUNTS, level, rank, count, counts,
+                                      sizeof *counts, error);
     if (status != EBPO_OK)
         return status;
-    return take_codes(chunks, EBPO_A_LEAF_PLANES, level, first, chunks->file->info.level[level].leaf_plane_count, counts, count, out, EBPO_LEAF, error);
+    return take_codes(chunks, EBPO_A_LEAF_PLANES, level, first,
+                      chunks->file->info.level[level].leaf_plane_count, counts, count, out,
+                      EBPO_LEAF, error);
 }
 
 /* Gray nodes' codes were put first, then the leaves': brings them in the order of the nodes. */
@@ -115,9 +127,11 @@ static void sort_codes(ebpo_group *group, unsigned gray_codes)
 
 /* --- winding numbers --- */
 
-static const ebpo_array_id windings[3] = { EBPO_A_WHITE_WINDING, EBPO_A_BLACK_WINDING, EBPO_A_LEAF_WINDING };
+static const ebpo_array_id windings[3] = { EBPO_A_WHITE_WINDING, EBPO_A_BLACK_WINDING,
+                                           EBPO_A_LEAF_WINDING };
 
-static ebpo_status read_windings(ebpo_chunks *chunks, int level, const uint64_t counts[4], ebpo_group *out, ebpo_error *error)
+static ebpo_status read_windings(ebpo_chunks *chunks, int level, const uint64_t counts[4],
+                                 ebpo_group *out, ebpo_error *error)
 {
     const ebpo_info *info = &chunks->file->info;
     int32_t of_type[3][8];
@@ -125,11 +139,15 @@ static ebpo_status read_windings(ebpo_chunks *chunks, int level, const uint64_t 
     for (unsigned type = 0; type < 3 && status == EBPO_OK; type++) {
         for (unsigned i = 0; i < 8; i++)
             of_type[type][i] = type == EBPO_BLACK;
-        if (counts[type] && info->solid && ebpo_reader_array(chunks->file, windings[type], level)->present)
-            status = ebpo_chunks_integers(chunks, windings[type], level, out->rank[type], counts[type], of_type[type], sizeof **of_type, error);
-        for (uint64_t i = 0; i < counts[type] && status == EBPO_OK && info->solid && type != EBPO_LEAF; i++)
+        if (counts[type] && info->solid &&
+            ebpo_reader_array(chunks->file, windings[type], level)->present)
+            status = ebpo_chunks_integers(chunks, windings[type], level, out->rank[type],
+                                          counts[type], of_type[type], sizeof **of_type, error);
+        for (uint64_t i = 0;
+             i < counts[type] && status == EBPO_OK && info->solid && type != EBPO_LEAF; i++)
             if (ebpo_check_inside(info->rule, of_type[type][i]) != (type == EBPO_BLACK))
-                status = ebpo_chunks_fail(chunks, level, windings[type], "a node's winding number contradicts its type", error);
+                status = ebpo_chunks_fail(chunks, level, windings[type],
+                                          "a node's winding number contradicts its type", error);
     }
     unsigned next[3] = { 0, 0, 0 };
     for (unsigned octant = 0; octant < (level ? 8u : 1u) && status == EBPO_OK; octant++) {
@@ -139,7 +157,8 @@ static ebpo_status read_windings(ebpo_chunks *chunks, int level, const uint64_t 
     return status;
 }
 
-ebpo_status ebpo_group_read(ebpo_chunks *chunks, int level, uint64_t group, unsigned wanted, ebpo_group *out, ebpo_error *error)
+ebpo_status ebpo_group_read(ebpo_chunks *chunks, int level, uint64_t group, unsigned wanted,
+                            ebpo_group *out, ebpo_error *error)
 {
     uint64_t counts[4];
     memset(out->plane_count, 0, sizeof out->plane_count);
@@ -154,19 +173,26 @@ ebpo_status ebpo_group_read(ebpo_chunks *chunks, int level, uint64_t group, unsi
         if (status == EBPO_OK && gray_codes && out->code_count > gray_codes)
             sort_codes(out, gray_codes);
     }
-    return status == EBPO_OK && wanted & EBPO_GROUP_WINDINGS ? read_windings(chunks, level, counts, out, error) : status;
+    return status == EBPO_OK && wanted & EBPO_GROUP_WINDINGS
+               ? read_windings(chunks, level, counts, out, error)
+               : status;
 }
 
 /* --- what reading would take --- */
 
 /* Where an item's number among others is counted from, and the items themselves. */
-static bool missing_counted(ebpo_chunks *chunks, ebpo_array_id index, ebpo_array_id counts, int level, uint64_t item, uint64_t items, ebpo_chunk_keys *keys)
+static bool missing_counted(ebpo_chunks *chunks, ebpo_array_id index, ebpo_array_id counts,
+                            int level, uint64_t item, uint64_t items, ebpo_chunk_keys *keys)
 {
-    bool missing = item >= EBPO_INDEX_ROWS && ebpo_chunks_missing(chunks, index, level, item / EBPO_INDEX_ROWS, 1, keys);
-    return ebpo_chunks_missing(chunks, counts, level, block_of(item), item - block_of(item) + items, keys) || missing;
+    bool missing = item >= EBPO_INDEX_ROWS &&
+                   ebpo_chunks_missing(chunks, index, level, item / EBPO_INDEX_ROWS, 1, keys);
+    return ebpo_chunks_missing(chunks, counts, level, block_of(item), item - block_of(item) + items,
+                               keys) ||
+           missing;
 }
 
-static bool missing_codes(ebpo_chunks *chunks, ebpo_array_id counts, ebpo_array_id codes, int level, uint64_t rank, uint64_t count, uint64_t first, ebpo_chunk_keys *keys)
+static bool missing_codes(ebpo_chunks *chunks, ebpo_array_id counts, ebpo_array_id codes, int level,
+                          uint64_t rank, uint64_t count, uint64_t first, ebpo_chunk_keys *keys)
 {
     uint8_t own[8];
     uint64_t sum = 0;
@@ -182,12 +208,21 @@ static uint64_t chunks_of(const ebpo_array_in *array)
     return array->present ? ebpo_h5_chunk_count(&array->shape) : 0;
 }
 
-/* Of a level, the arrays of a single chunk: they will be needed, whichever group is read. Returns their bytes. */
+/* Of a level, the arrays of a single chunk: they will be needed, whichever group is read. Returns
+ * their bytes. */
 static uint64_t add_small(ebpo_chunks *chunks, int level, unsigned wanted, ebpo_chunk_keys *keys)
 {
-    static const struct { ebpo_array_id id; unsigned wanted; } arrays[] = {
-        { EBPO_A_TYPES, ~0u }, { EBPO_A_PLANE_COUNTS, EBPO_GROUP_PLANES }, { EBPO_A_PLANES, EBPO_GROUP_PLANES }, { EBPO_A_LEAF_WINDING, EBPO_GROUP_WINDINGS },
-        { EBPO_A_BLACK_WINDING, EBPO_GROUP_WINDINGS }, { EBPO_A_WHITE_WINDING, EBPO_GROUP_WINDINGS }, { EBPO_A_LEAF_PLANE_COUNTS, EBPO_GROUP_PLANES },
+    static const struct {
+        ebpo_array_id id;
+        unsigned wanted;
+    } arrays[] = {
+        { EBPO_A_TYPES, ~0u },
+        { EBPO_A_PLANE_COUNTS, EBPO_GROUP_PLANES },
+        { EBPO_A_PLANES, EBPO_GROUP_PLANES },
+        { EBPO_A_LEAF_WINDING, EBPO_GROUP_WINDINGS },
+        { EBPO_A_BLACK_WINDING, EBPO_GROUP_WINDINGS },
+        { EBPO_A_WHITE_WINDING, EBPO_GROUP_WINDINGS },
+        { EBPO_A_LEAF_PLANE_COUNTS, EBPO_GROUP_PLANES },
         { EBPO_A_LEAF_PLANES, EBPO_GROUP_PLANES },
     };
     uint64_t bytes = 0;
@@ -201,8 +236,10 @@ static uint64_t add_small(ebpo_chunks *chunks, int level, unsigned wanted, ebpo_
     return bytes;
 }
 
-/* Adds the chunks for which reading the group would wait next; false: for none. Reads from memory only, and leaves errors to the reading. */
-static bool missing(ebpo_chunks *chunks, const ebpo_group_place *place, unsigned wanted, ebpo_chunk_keys *keys)
+/* Adds the chunks for which reading the group would wait next; false: for none. Reads from memory
+ * only, and leaves errors to the reading. */
+static bool missing(ebpo_chunks *chunks, const ebpo_group_place *place, unsigned wanted,
+                    ebpo_chunk_keys *keys)
 {
     uint32_t parts = chunks->file->info.parts;
     int level = place->level;
@@ -215,20 +252,25 @@ static bool missing(ebpo_chunks *chunks, const ebpo_group_place *place, unsigned
     if (read_types(chunks, level, place->group, &group, counts, NULL) != EBPO_OK)
         return false;
     bool gray = wanted & EBPO_GROUP_PLANES && parts & EBPO_PART_PLANES && counts[EBPO_GRAY];
-    bool leaf = wanted & EBPO_GROUP_PLANES && parts & EBPO_PART_LEAF_PLANES && counts[EBPO_LEAF], any = false;
+    bool leaf = wanted & EBPO_GROUP_PLANES && parts & EBPO_PART_LEAF_PLANES && counts[EBPO_LEAF],
+         any = false;
     const uint64_t *rank = group.rank;
     if (gray)
-        any |= missing_counted(chunks, EBPO_A_GRAY_INDEX, EBPO_A_PLANE_COUNTS, level, rank[EBPO_GRAY], counts[EBPO_GRAY], keys);
+        any |= missing_counted(chunks, EBPO_A_GRAY_INDEX, EBPO_A_PLANE_COUNTS, level,
+                               rank[EBPO_GRAY], counts[EBPO_GRAY], keys);
     if (leaf)
-        any |= missing_counted(chunks, EBPO_A_LEAF_INDEX, EBPO_A_LEAF_PLANE_COUNTS, level, rank[EBPO_LEAF], counts[EBPO_LEAF], keys);
+        any |= missing_counted(chunks, EBPO_A_LEAF_INDEX, EBPO_A_LEAF_PLANE_COUNTS, level,
+                               rank[EBPO_LEAF], counts[EBPO_LEAF], keys);
     for (unsigned type = 0; type < 3 && wanted & EBPO_GROUP_WINDINGS; type++)
         any |= ebpo_chunks_missing(chunks, windings[type], level, rank[type], counts[type], keys);
     if (any)
         return true;
     if (gray && ebpo_ranks_planes(chunks, level, rank[EBPO_GRAY], &first, NULL) == EBPO_OK)
-        any |= missing_codes(chunks, EBPO_A_PLANE_COUNTS, EBPO_A_PLANES, level, rank[EBPO_GRAY], counts[EBPO_GRAY], first, keys);
+        any |= missing_codes(chunks, EBPO_A_PLANE_COUNTS, EBPO_A_PLANES, level, rank[EBPO_GRAY],
+                             counts[EBPO_GRAY], first, keys);
     if (leaf && leaf_planes_before(chunks, level, rank[EBPO_LEAF], &first, NULL) == EBPO_OK)
-        any |= missing_codes(chunks, EBPO_A_LEAF_PLANE_COUNTS, EBPO_A_LEAF_PLANES, level, rank[EBPO_LEAF], counts[EBPO_LEAF], first, keys);
+        any |= missing_codes(chunks, EBPO_A_LEAF_PLANE_COUNTS, EBPO_A_LEAF_PLANES, level,
+                             rank[EBPO_LEAF], counts[EBPO_LEAF], first, keys);
     return any;
 }
 
@@ -238,9 +280,13 @@ bool ebpo_group_is_far(ebpo_chunks *chunks, const ebpo_group_place *place, unsig
     return ebpo_input_expects(&chunks->file->in) && missing(chunks, place, wanted, &keys);
 }
 
-ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_place *places, unsigned count, unsigned wanted, ebpo_error *error)
+ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_place *places, unsigned count,
+                             unsigned wanted, ebpo_error *error)
 {
-    enum { STAGES = 3 /* types, counts, planes */, FIRST_BYTES = 32 << 10 /* of the first levels, which everyone needs */ };
+    enum {
+        STAGES = 3 /* types, counts, planes */,
+        FIRST_BYTES = 32 << 10 /* of the first levels, which everyone needs */
+    };
     ebpo_status status = EBPO_OK;
     for (int stage = 0; stage < STAGES && status == EBPO_OK; stage++) {
         ebpo_chunk_keys keys = { .count = 0 };
@@ -248,7 +294,9 @@ ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_place *places
             break;
         unsigned own = keys.count;
         uint64_t small = 0;
-        for (int level = 1; places[0].level == 0 && level < chunks->file->info.level_count && small < FIRST_BYTES; level++)
+        for (int level = 1;
+             places[0].level == 0 && level < chunks->file->info.level_count && small < FIRST_BYTES;
+             level++)
             small += add_small(chunks, level, wanted, &keys);
         for (unsigned i = 1; i < count; i++)
             (void)missing(chunks, &places[i], wanted, &keys);

@@ -1,4 +1,5 @@
-/* Prefix sums that let a reader start in the middle of a level. Arrays of an absent part count as zeros. */
+/* Prefix sums that let a reader start in the middle of a level. Arrays of an absent part count as
+ * zeros. */
 #include "base/alloc.h"
 #include "base/workspace.h"
 #include "container/plan.h"

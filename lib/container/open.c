@@ -1,4 +1,5 @@
-/* Opening a file: the head, and whether every array is there in the shape that the head's counts call for. */
+/* Opening a file: the head, and whether every array is there in the shape that the head's counts
+ * call for. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,31 +11,41 @@
 #include "container/reader.h"
 #include "http/http.h"
 
-static ebpo_status open_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_id id, int level, ebpo_error *error)
+static ebpo_status open_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_id id, int level,
+                              ebpo_error *error)
 {
     const ebpo_array_spec *spec = &ebpo_schema[id];
-    ebpo_array_in *a = id < EBPO_LEVEL_ARRAYS ? &file->level_array[level][id] : &file->root_array[id];
+    ebpo_array_in *a =
+        id < EBPO_LEVEL_ARRAYS ? &file->level_array[level][id] : &file->root_array[id];
     uint64_t rows = ebpo_schema_rows(&file->info, id, level);
     *a = (ebpo_array_in){ .id = id, .level = level };
     ebpo_schema_path(id, level, a->path);
     if (rows == 0 || (spec->if_needed && ebpo_h5_look(h5, a->path) == EBPO_H5_ABSENT))
         return EBPO_OK;
-    uint64_t most = ebpo_input_is_far(&file->in) ? 1 : UINT64_MAX; /* places of more are in the index */
-    ebpo_status status = ebpo_h5_read_array(h5, a->path, most, &a->shape, &a->chunks, &a->stored_bytes, error);
+    /* places of more are in the index */
+    uint64_t most = ebpo_input_is_far(&file->in) ? 1 : UINT64_MAX;
+    ebpo_status status =
+        ebpo_h5_read_array(h5, a->path, most, &a->shape, &a->chunks, &a->stored_bytes, error);
     if (status != EBPO_OK)
         return status;
     ebpo_check check = ebpo_reader_check(file);
     if (a->shape.rows != rows)
-        return ebpo_check_fail(&check, -1, a->path, "the array's length contradicts the counts in the head", error);
-    if (a->shape.cols != spec->cols || !(spec->sizes & a->shape.element_size) || a->shape.is_signed != spec->is_signed)
-        return ebpo_check_fail(&check, -1, a->path, "the array has the wrong type or the wrong number of columns", error);
+        return ebpo_check_fail(&check, -1, a->path,
+                               "the array's length contradicts the counts in the head", error);
+    if (a->shape.cols != spec->cols || !(spec->sizes & a->shape.element_size) ||
+        a->shape.is_signed != spec->is_signed)
+        return ebpo_check_fail(&check, -1, a->path,
+                               "the array has the wrong type or the wrong number of columns",
+                               error);
     bool wide = file->info.double_coordinates;
     if (id == EBPO_A_VERTICES && a->shape.element_size != (wide ? 8 : 4))
-        return ebpo_check_fail(&check, -1, a->path, "the array's type contradicts coordinate_type", error);
+        return ebpo_check_fail(&check, -1, a->path, "the array's type contradicts coordinate_type",
+                               error);
     a->present = true;
     if (!a->chunks)
         atomic_store(&file->located, false);
-    if (id < EBPO_LEVEL_ARRAYS && level < file->info.index_level && ebpo_h5_chunk_count(&a->shape) > 1)
+    if (id < EBPO_LEVEL_ARRAYS && level < file->info.index_level &&
+        ebpo_h5_chunk_count(&a->shape) > 1)
         file->info.index_level = level;
     return EBPO_OK;
 }
@@ -74,14 +85,18 @@ static ebpo_status sum_stored(ebpo_file *file, ebpo_error *error)
             info->level[level].stored_bytes += file->level_array[level][id].stored_bytes;
     }
     info->mesh_vertex_bytes = file->root_array[EBPO_A_VERTICES].stored_bytes;
-    info->mesh_face_bytes = file->root_array[EBPO_A_FACES].stored_bytes + file->root_array[EBPO_A_FACES_INDEX].stored_bytes;
-    info->map_bytes = file->root_array[EBPO_A_VERTEX_SOURCE].stored_bytes + file->root_array[EBPO_A_FACE_SOURCE].stored_bytes;
+    info->mesh_face_bytes = file->root_array[EBPO_A_FACES].stored_bytes +
+                            file->root_array[EBPO_A_FACES_INDEX].stored_bytes;
+    info->map_bytes = file->root_array[EBPO_A_VERTEX_SOURCE].stored_bytes +
+                      file->root_array[EBPO_A_FACE_SOURCE].stored_bytes;
     for (int level = 0; level < info->level_count; level++)
         stored += info->level[level].stored_bytes;
     stored += info->mesh_vertex_bytes + info->mesh_face_bytes + info->map_bytes;
     if (stored > info->file_bytes)
-        return ebpo_fail(error, EBPO_E_FORMAT, "%s: the arrays' chunks take more room than the file has; get a fresh copy of the file",
-                         file->in.shown);
+        return ebpo_fail(
+            error, EBPO_E_FORMAT,
+            "%s: the arrays' chunks take more room than the file has; get a fresh copy of the file",
+            file->in.shown);
     return EBPO_OK;
 }
 
@@ -103,7 +118,9 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *erro
         status = open_array(file, h5, (ebpo_array_id)id, 0, error);
     info->file_bytes = file->in.source.size;
     ebpo_pipeline pipeline = file->level_array[0][EBPO_A_TYPES].shape.pipeline;
-    info->codec = pipeline == EBPO_PIPELINE_ZSTD ? EBPO_CODEC_ZSTD : pipeline == EBPO_PIPELINE_DEFLATE ? EBPO_CODEC_DEFLATE : EBPO_CODEC_NONE;
+    info->codec = pipeline == EBPO_PIPELINE_ZSTD      ? EBPO_CODEC_ZSTD
+                  : pipeline == EBPO_PIPELINE_DEFLATE ? EBPO_CODEC_DEFLATE
+                                                      : EBPO_CODEC_NONE;
     return status == EBPO_OK ? sum_stored(file, error) : status;
 }
 
@@ -111,7 +128,9 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *erro
 static void judge_index(ebpo_info *info, uint64_t size)
 {
     enum { INDEX_BYTES_MOST = 64 << 20 };
-    if (info->chunk_index_offset > size || info->chunk_index_bytes > size - info->chunk_index_offset || info->chunk_index_bytes > INDEX_BYTES_MOST)
+    if (info->chunk_index_offset > size ||
+        info->chunk_index_bytes > size - info->chunk_index_offset ||
+        info->chunk_index_bytes > INDEX_BYTES_MOST)
         info->chunk_index_offset = info->chunk_index_bytes = 0;
 }
 
@@ -123,9 +142,13 @@ static ebpo_status read_head(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
         status = ebpo_facts_get(h5, root, &file->info, error);
     ebpo_h5_close_id(root);
     judge_index(&file->info, file->in.source.size);
-    ebpo_h5_expect_index(h5, (ebpo_range){ file->info.chunk_index_offset, file->info.chunk_index_bytes });
-    if (status == EBPO_OK && (file->info.level_count < 1 || file->info.level_count > EBPO_LEVELS_MAX))
-        status = ebpo_fail(error, EBPO_E_FORMAT, "%s: /: level_count is not 1 to %d; get a fresh copy of the file", file->in.shown, EBPO_LEVELS_MAX);
+    ebpo_h5_expect_index(h5, (ebpo_range){ file->info.chunk_index_offset,
+                                           file->info.chunk_index_bytes });
+    if (status == EBPO_OK &&
+        (file->info.level_count < 1 || file->info.level_count > EBPO_LEVELS_MAX))
+        status = ebpo_fail(error, EBPO_E_FORMAT,
+                           "%s: /: level_count is not 1 to %d; get a fresh copy of the file",
+                           file->in.shown, EBPO_LEVELS_MAX);
     if (status == EBPO_OK)
         status = open_levels(file, h5, error);
     if (status == EBPO_OK)
@@ -134,7 +157,8 @@ static ebpo_status read_head(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
 }
 
 /* Takes the source over, whatever happens. */
-static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const char *name, ebpo_error *error)
+static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const char *name,
+                               ebpo_error *error)
 {
     ebpo_file *file = ebpo_alloc_zero(1, sizeof *file);
     if (!file) {
@@ -160,19 +184,24 @@ static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const
 
 /* --- files far away: what the opening left for later --- */
 
-static ebpo_status locate_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_in *a, ebpo_error *error)
+static ebpo_status locate_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_in *a,
+                                ebpo_error *error)
 {
     ebpo_h5_shape shape;
     ebpo_h5_chunk *chunks;
     uint64_t stored;
     if (!a->present || a->chunks)
         return EBPO_OK;
-    ebpo_status status = ebpo_h5_read_array(h5, a->path, UINT64_MAX, &shape, &chunks, &stored, error);
+    ebpo_status status =
+        ebpo_h5_read_array(h5, a->path, UINT64_MAX, &shape, &chunks, &stored, error);
     if (status != EBPO_OK)
         return status;
-    if (shape.rows != a->shape.rows || shape.cols != a->shape.cols || shape.element_size != a->shape.element_size || shape.pipeline != a->shape.pipeline) {
+    if (shape.rows != a->shape.rows || shape.cols != a->shape.cols ||
+        shape.element_size != a->shape.element_size || shape.pipeline != a->shape.pipeline) {
         free(chunks);
-        return ebpo_fail(error, EBPO_E_IO, "%s: %s: the file has changed while it was open; open it again", file->in.shown, a->path);
+        return ebpo_fail(error, EBPO_E_IO,
+                         "%s: %s: the file has changed while it was open; open it again",
+                         file->in.shown, a->path);
     }
     a->chunks = chunks;
     a->stored_bytes = stored;
@@ -189,7 +218,9 @@ static ebpo_status locate_all(ebpo_file *file, ebpo_error *error)
     if (status == EBPO_OK)
         ebpo_h5_expect_index(&h5, index);
     for (int i = 0; i < EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS && status == EBPO_OK; i++)
-        status = locate_array(file, &h5, &file->level_array[i / EBPO_LEVEL_ARRAYS][i % EBPO_LEVEL_ARRAYS], error);
+        status =
+            locate_array(file, &h5,
+                         &file->level_array[i / EBPO_LEVEL_ARRAYS][i % EBPO_LEVEL_ARRAYS], error);
     for (int i = 0; i < EBPO_ARRAYS && status == EBPO_OK; i++)
         status = locate_array(file, &h5, &file->root_array[i], error);
     status = ebpo_h5_close(&h5, status, error);
@@ -228,7 +259,8 @@ ebpo_status ebpo_open(ebpo_file **out, const char *path, ebpo_error *error)
     return status == EBPO_OK ? open_source(out, &source, path, error) : status;
 }
 
-ebpo_status ebpo_open_url(ebpo_file **out, const char *url, const ebpo_http_options *options, ebpo_error *error)
+ebpo_status ebpo_open_url(ebpo_file **out, const char *url, const ebpo_http_options *options,
+                          ebpo_error *error)
 {
     ebpo_source source;
     *out = NULL;
@@ -239,17 +271,21 @@ ebpo_status ebpo_open_url(ebpo_file **out, const char *url, const ebpo_http_opti
     return open_source(out, &source, ebpo_url_shown(url, shown, sizeof shown), error);
 }
 
-ebpo_status ebpo_open_memory(ebpo_file **out, const void *data, uint64_t size, const char *name, ebpo_error *error)
+ebpo_status ebpo_open_memory(ebpo_file **out, const void *data, uint64_t size, const char *name,
+                             ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     *out = NULL;
     if (!data && size)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: no bytes; give the file's bytes with their count", name ? name : "memory");
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "%s: no bytes; give the file's bytes with their count",
+                         name ? name : "memory");
     ebpo_source source = ebpo_source_of_memory(data, size);
     return open_source(out, &source, name ? name : "memory", error);
 }
 
-ebpo_status ebpo_open_source(ebpo_file **out, const ebpo_source *source, const char *name, ebpo_error *error)
+ebpo_status ebpo_open_source(ebpo_file **out, const ebpo_source *source, const char *name,
+                             ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     *out = NULL;
@@ -257,7 +293,8 @@ ebpo_status ebpo_open_source(ebpo_file **out, const ebpo_source *source, const c
         return open_source(out, source, name ? name : "source", error);
     if (source->close)
         source->close(source->user);
-    return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: a source without a read function; set one", name ? name : "source");
+    return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: a source without a read function; set one",
+                     name ? name : "source");
 }
 
 void ebpo_close(ebpo_file *file)
@@ -289,12 +326,6 @@ void ebpo_file_set_workspace(ebpo_file *file, ebpo_workspace *workspace)
     file->workspace = workspace;
 }
 
-const ebpo_info *ebpo_file_info(const ebpo_file *file)
-{
-    return &file->info;
-}
+const ebpo_info *ebpo_file_info(const ebpo_file *file) { return &file->info; }
 
-ebpo_status ebpo_register_filters(ebpo_error *error)
-{
-    return ebpo_h5_register(error);
-}
+ebpo_status ebpo_register_filters(ebpo_error *error) { return ebpo_h5_register(error); }

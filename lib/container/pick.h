@@ -1,5 +1,6 @@
-/* Picking here and there: runs of sibling groups of one level, and rows of the mesh's arrays, each chunk fetched once and what is needed announced together.
- * Everything that comes out has been checked, as in slice.h. */
+/* Picking here and there: runs of sibling groups of one level, and rows of the mesh's arrays, each
+ * chunk fetched once and what is needed announced together. Everything that comes out has been
+ * checked, as in slice.h. */
 #ifndef EBPO_CONTAINER_PICK_H
 #define EBPO_CONTAINER_PICK_H
 
@@ -11,14 +12,18 @@ typedef struct ebpo_run {
     uint64_t rank[4], count[4]; /* filled in by ebpo_pick_level: its nodes by type */
 } ebpo_run;
 
-/* All nodes of ascending runs that do not overlap, as one level: group_count is the sum of the runs'. `parts` of those that the file has: planes, face lists (numbers of the
- * file, leaf_first too), leaf planes. Winding numbers where the file has them. Volumes are left 0. The caller frees it with ebpo_level_free. */
-EBPO_MUST_USE ebpo_status ebpo_pick_level(ebpo_chunks *chunks, int level, ebpo_run *runs, uint64_t run_count, uint32_t parts, ebpo_level *out,
+/* All nodes of ascending runs that do not overlap, as one level: group_count is the sum of the
+ * runs'. `parts` of those that the file has: planes, face lists (numbers of the file, leaf_first
+ * too), leaf planes. Winding numbers where the file has them. Volumes are left 0. The caller frees
+ * it with ebpo_level_free. */
+EBPO_MUST_USE ebpo_status ebpo_pick_level(ebpo_chunks *chunks, int level, ebpo_run *runs,
+                                          uint64_t run_count, uint32_t parts, ebpo_level *out,
                                           ebpo_error *error);
 
-/* Rows of a decoded array without level (faces: three corners; vertices: three floats or doubles; maps: a number), in any order. EBPO_E_FORMAT for a row
- * that is not there. */
-EBPO_MUST_USE ebpo_status ebpo_pick_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t *rows, uint64_t count, unsigned threads, void *out,
-                                         ebpo_error *error);
+/* Rows of a decoded array without level (faces: three corners; vertices: three floats or doubles;
+ * maps: a number), in any order. EBPO_E_FORMAT for a row that is not there. */
+EBPO_MUST_USE ebpo_status ebpo_pick_rows(ebpo_chunks *chunks, ebpo_array_id id,
+                                         const uint32_t *rows, uint64_t count, unsigned threads,
+                                         void *out, ebpo_error *error);
 
 #endif

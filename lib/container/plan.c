@@ -33,8 +33,12 @@ static void summarise(ebpo_info *info, const ebpo_tree *tree)
         const ebpo_level *l = &tree->level[i];
         ebpo_level_summary *s = &info->level[i];
         bool mesh = info->parts & EBPO_PART_MESH;
-        *s = (ebpo_level_summary){ .gray_count = l->gray_count, .leaf_count = l->leaf_count, .white_count = l->white_count,
-                                   .black_count = l->black_count, .gray_volume = l->gray_volume, .leaf_volume = l->leaf_volume,
+        *s = (ebpo_level_summary){ .gray_count = l->gray_count,
+                                   .leaf_count = l->leaf_count,
+                                   .white_count = l->white_count,
+                                   .black_count = l->black_count,
+                                   .gray_volume = l->gray_volume,
+                                   .leaf_volume = l->leaf_volume,
                                    .pruned_count = info->pruned ? l->pruned_count : 0 };
         s->plane_count = info->parts & EBPO_PART_PLANES ? l->plane_count : 0;
         s->leaf_plane_count = info->parts & EBPO_PART_LEAF_PLANES ? l->leaf_plane_count : 0;
@@ -45,10 +49,16 @@ static void summarise(ebpo_info *info, const ebpo_tree *tree)
 
 static bool texts_ok(const ebpo_info *info)
 {
-    const struct { const char *text; size_t size; } texts[] = {
-        { info->generator, sizeof info->generator }, { info->source_name, sizeof info->source_name },
-        { info->source_format, sizeof info->source_format }, { info->unit, sizeof info->unit },
-        { info->crs, sizeof info->crs }, { info->date, sizeof info->date },
+    const struct {
+        const char *text;
+        size_t size;
+    } texts[] = {
+        { info->generator, sizeof info->generator },
+        { info->source_name, sizeof info->source_name },
+        { info->source_format, sizeof info->source_format },
+        { info->unit, sizeof info->unit },
+        { info->crs, sizeof info->crs },
+        { info->date, sizeof info->date },
     };
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++)
         if (!memchr(texts[i].text, 0, texts[i].size) || !ebpo_h5_text_ok(texts[i].text))
@@ -56,8 +66,10 @@ static bool texts_ok(const ebpo_info *info)
     return true;
 }
 
-/* The facts as the file will state them: parts that are wanted and there, counts of what is written. */
-static ebpo_status settle_facts(ebpo_plan *plan, const ebpo_write_options *options, const ebpo_check *check, ebpo_error *error)
+/* The facts as the file will state them: parts that are wanted and there, counts of what is
+ * written. */
+static ebpo_status settle_facts(ebpo_plan *plan, const ebpo_write_options *options,
+                                const ebpo_check *check, ebpo_error *error)
 {
     const ebpo_tree *tree = plan->tree;
     ebpo_info *info = &plan->info;
@@ -72,17 +84,23 @@ static ebpo_status settle_facts(ebpo_plan *plan, const ebpo_write_options *optio
         snprintf(info->generator, sizeof info->generator, "ebpo %s", EBPO_VERSION);
     if (info->parts & EBPO_PART_MESH) {
         bool one = !tree->mesh.xyz32 != !tree->mesh.xyz64;
-        if (!one || !tree->mesh.faces || tree->mesh.vertex_count != info->vertex_count || tree->mesh.face_count != info->face_count)
-            return ebpo_check_fail(check, -1, "/mesh", "the mesh is missing or its counts are not those of the facts", error);
+        if (!one || !tree->mesh.faces || tree->mesh.vertex_count != info->vertex_count ||
+            tree->mesh.face_count != info->face_count)
+            return ebpo_check_fail(check, -1, "/mesh",
+                                   "the mesh is missing or its counts are not those of the facts",
+                                   error);
         info->double_coordinates = tree->mesh.xyz64 != NULL;
     }
     if (info->parts & EBPO_PART_MAPS && (!tree->vertex_source || !tree->face_source))
         return ebpo_check_fail(check, -1, "/maps", "the maps are missing", error);
-    if (info->level_count < 1 || info->level_count > EBPO_LEVELS_MAX || info->grid_level < 0 || info->max_level < 0 ||
-        (unsigned)info->rule > EBPO_RULE_POSITIVE)
-        return ebpo_check_fail(check, -1, "/levels", "there are no levels, too many, or impossible facts", error);
+    if (info->level_count < 1 || info->level_count > EBPO_LEVELS_MAX || info->grid_level < 0 ||
+        info->max_level < 0 || (unsigned)info->rule > EBPO_RULE_POSITIVE)
+        return ebpo_check_fail(check, -1, "/levels",
+                               "there are no levels, too many, or impossible facts", error);
     if (!texts_ok(info))
-        return ebpo_check_fail(check, -1, "/", "a name, unit, CRS or date is not UTF-8 without control characters", error);
+        return ebpo_check_fail(check, -1, "/",
+                               "a name, unit, CRS or date is not UTF-8 without control characters",
+                               error);
     summarise(info, tree);
     return ebpo_facts_check(info, check->shown, check->as, error);
 }
@@ -99,7 +117,8 @@ static ebpo_status check_tree(ebpo_plan *plan, const ebpo_check *check, ebpo_err
     if (status == EBPO_OK && info->parts & EBPO_PART_MESH)
         status = ebpo_check_finite(check, &tree->mesh, error);
     if (status == EBPO_OK && info->parts & EBPO_PART_MAPS)
-        status = ebpo_check_map(check, "/maps/vertex_source", tree->vertex_source, info->vertex_count, info->source_vertex_count, error);
+        status = ebpo_check_map(check, "/maps/vertex_source", tree->vertex_source,
+                                info->vertex_count, info->source_vertex_count, error);
     if (status == EBPO_OK && info->parts & EBPO_PART_MAPS)
         status = ebpo_check_map(check, "/maps/face_source", tree->face_source, info->face_count,
                                 info->source_face_count + info->mend.added_faces, error);
@@ -137,7 +156,9 @@ static ebpo_status index_faces(ebpo_plan *plan, const ebpo_check *check, ebpo_er
         if (i % (3 * (uint64_t)rows) == 0)
             plan->faces_index[i / (3 * (uint64_t)rows)] = seen;
         if (mesh->faces[i] > seen || mesh->faces[i] >= mesh->vertex_count)
-            return ebpo_check_fail(check, -1, "/mesh/faces", "the vertices are not in the order of their first use by the faces", error);
+            return ebpo_check_fail(
+                check, -1, "/mesh/faces",
+                "the vertices are not in the order of their first use by the faces", error);
         seen += mesh->faces[i] == seen;
     }
     return EBPO_OK;
@@ -192,12 +213,22 @@ static void find_values(const ebpo_plan *plan, ebpo_array_out *a)
     case EBPO_A_TYPES: values = l->types, native = stored = 2; break;
     case EBPO_A_PLANE_COUNTS: values = l->plane_counts, native = stored = 1; break;
     case EBPO_A_PLANES: values = l->planes; break;
-    case EBPO_A_LEAF_WINDING: values = l->leaf_winding, stored = narrow_signed(values, l->leaf_count); break;
-    case EBPO_A_BLACK_WINDING: values = l->black_winding, stored = narrow_signed(values, l->black_count); break;
-    case EBPO_A_WHITE_WINDING: values = l->white_winding, stored = narrow_signed(values, l->white_count); break;
+    case EBPO_A_LEAF_WINDING:
+        values = l->leaf_winding, stored = narrow_signed(values, l->leaf_count);
+        break;
+    case EBPO_A_BLACK_WINDING:
+        values = l->black_winding, stored = narrow_signed(values, l->black_count);
+        break;
+    case EBPO_A_WHITE_WINDING:
+        values = l->white_winding, stored = narrow_signed(values, l->white_count);
+        break;
     case EBPO_A_LEAF_SKIP: stored = narrow_skips(l); break;
-    case EBPO_A_LEAF_NEW: values = l->leaf_new, stored = narrow_unsigned(values, l->leaf_count); break;
-    case EBPO_A_LEAF_REF_COUNT: values = l->leaf_ref_count, stored = narrow_unsigned(values, l->leaf_count); break;
+    case EBPO_A_LEAF_NEW:
+        values = l->leaf_new, stored = narrow_unsigned(values, l->leaf_count);
+        break;
+    case EBPO_A_LEAF_REF_COUNT:
+        values = l->leaf_ref_count, stored = narrow_unsigned(values, l->leaf_count);
+        break;
     case EBPO_A_TYPES_INDEX: values = plan->types_index[a->level], native = stored = 8; break;
     case EBPO_A_GRAY_INDEX: values = plan->gray_index[a->level], native = stored = 8; break;
     case EBPO_A_LEAF_INDEX: values = plan->leaf_index[a->level], native = stored = 8; break;
@@ -214,7 +245,9 @@ static void find_values(const ebpo_plan *plan, ebpo_array_out *a)
 
 static ebpo_pipeline pipeline_of(ebpo_codec codec)
 {
-    return codec == EBPO_CODEC_ZSTD ? EBPO_PIPELINE_ZSTD : codec == EBPO_CODEC_DEFLATE ? EBPO_PIPELINE_DEFLATE : EBPO_PIPELINE_CHECKSUM;
+    return codec == EBPO_CODEC_ZSTD      ? EBPO_PIPELINE_ZSTD
+           : codec == EBPO_CODEC_DEFLATE ? EBPO_PIPELINE_DEFLATE
+                                         : EBPO_PIPELINE_CHECKSUM;
 }
 
 static void add_array(ebpo_plan *plan, ebpo_array_id id, int level)
@@ -235,8 +268,8 @@ static void add_array(ebpo_plan *plan, ebpo_array_id id, int level)
     a->shape.pipeline = pipeline_of(plan->info.codec);
 }
 
-ebpo_status ebpo_plan_make(ebpo_plan *plan, const ebpo_tree *tree, const ebpo_write_options *options, const char *shown,
-                           ebpo_error *error)
+ebpo_status ebpo_plan_make(ebpo_plan *plan, const ebpo_tree *tree,
+                           const ebpo_write_options *options, const char *shown, ebpo_error *error)
 {
     ebpo_check check = { shown, EBPO_E_ARGUMENT };
     memset(plan, 0, sizeof *plan);
@@ -250,7 +283,8 @@ ebpo_status ebpo_plan_make(ebpo_plan *plan, const ebpo_tree *tree, const ebpo_wr
         status = index_faces(plan, &check, error);
     if (status != EBPO_OK)
         goto done;
-    plan->array = ebpo_alloc((uint64_t)plan->info.level_count * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS, sizeof *plan->array);
+    plan->array = ebpo_alloc((uint64_t)plan->info.level_count * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS,
+                             sizeof *plan->array);
     if (!plan->array) {
         status = ebpo_fail_memory(error, sizeof *plan->array);
         goto done;

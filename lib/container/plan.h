@@ -12,29 +12,36 @@ typedef struct ebpo_array_out {
     int level;
     char path[EBPO_PATH_BYTES];
     ebpo_h5_shape shape;
-    const void *values;     /* native integers, row after row; NULL for arrays with a coding of their own */
+    /* native integers, row after row; NULL for arrays with a coding of their own */
+    const void *values;
     uint8_t value_size;
     ebpo_h5_id handle;
 } ebpo_array_out;
 
 typedef struct ebpo_plan {
     const ebpo_tree *tree;
-    ebpo_info info;         /* as it will be in the file */
+    ebpo_info info; /* as it will be in the file */
     ebpo_array_out *array;
     unsigned count;
-    uint64_t *types_index[EBPO_LEVELS_MAX], *gray_index[EBPO_LEVELS_MAX], *leaf_index[EBPO_LEVELS_MAX];
-    uint64_t *faces_index;  /* vertices seen before each chunk of faces */
+    uint64_t *types_index[EBPO_LEVELS_MAX], *gray_index[EBPO_LEVELS_MAX],
+        *leaf_index[EBPO_LEVELS_MAX];
+    uint64_t *faces_index; /* vertices seen before each chunk of faces */
 } ebpo_plan;
 
-/* Checks the tree (EBPO_E_ARGUMENT) and lists its arrays. The tree stays the caller's and must outlive the plan. */
-EBPO_MUST_USE ebpo_status ebpo_plan_make(ebpo_plan *plan, const ebpo_tree *tree, const ebpo_write_options *options, const char *shown,
+/* Checks the tree (EBPO_E_ARGUMENT) and lists its arrays. The tree stays the caller's and must
+ * outlive the plan. */
+EBPO_MUST_USE ebpo_status ebpo_plan_make(ebpo_plan *plan, const ebpo_tree *tree,
+                                         const ebpo_write_options *options, const char *shown,
                                          ebpo_error *error);
 void ebpo_plan_free(ebpo_plan *plan);
 
-/* Rows [row, row + rows) of an array, as stored before compression; row is a multiple of the chunk's rows, rows at most that many. */
-void ebpo_plan_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64_t row, uint64_t rows, uint8_t *file);
+/* Rows [row, row + rows) of an array, as stored before compression; row is a multiple of the
+ * chunk's rows, rows at most that many. */
+void ebpo_plan_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64_t row,
+                      uint64_t rows, uint8_t *file);
 
-/* Index arrays (also what readers compare against), one row for each EBPO_INDEX_ROWS items, at least one; NULL when memory is short. */
+/* Index arrays (also what readers compare against), one row for each EBPO_INDEX_ROWS items, at
+ * least one; NULL when memory is short. */
 uint64_t *ebpo_index_types(const ebpo_level *level, bool root);
 uint64_t *ebpo_index_gray(const ebpo_level *level);
 uint64_t *ebpo_index_leaves(const ebpo_level *level);

@@ -1,13 +1,14 @@
-/* Ranks: where a node's group, planes and faces begin. An index row each 4,096 items, and counting from there; such a block lies in one chunk, as
- * chunks of more than one have a power of two of rows, at least 4,096 for all arrays of one column. */
+/* Ranks: where a node's group, planes and faces begin. An index row each 4,096 items, and counting
+ * from there; such a block lies in one chunk, as chunks of more than one have a power of two of
+ * rows, at least 4,096 for all arrays of one column. */
 #include <string.h>
 
 #include "base/endian.h"
 #include "base/error.h"
 #include "container/slice_parts.h"
 
-static const uint64_t EVEN = UINT64_C(0x5555555555555555), PAIRS = UINT64_C(0x3333333333333333), NIBBLES = UINT64_C(0x0f0f0f0f0f0f0f0f),
-                      BYTES = UINT64_C(0x00ff00ff00ff00ff);
+static const uint64_t EVEN = UINT64_C(0x5555555555555555), PAIRS = UINT64_C(0x3333333333333333),
+                      NIBBLES = UINT64_C(0x0f0f0f0f0f0f0f0f), BYTES = UINT64_C(0x00ff00ff00ff00ff);
 
 /* Set bits of each byte; only even bits are set. */
 static inline uint64_t bits_of_bytes(uint64_t x)
@@ -54,7 +55,8 @@ void ebpo_ranks_count(const void *types, uint64_t groups, uint64_t counts[4])
     counts[EBPO_WHITE] = 8 * groups - counts[EBPO_BLACK] - counts[EBPO_LEAF] - counts[EBPO_GRAY];
 }
 
-ebpo_status ebpo_ranks_count_file(ebpo_chunks *chunks, int level, uint64_t group, uint64_t groups, uint64_t counts[4], ebpo_error *error)
+ebpo_status ebpo_ranks_count_file(ebpo_chunks *chunks, int level, uint64_t group, uint64_t groups,
+                                  uint64_t counts[4], ebpo_error *error)
 {
     ebpo_held_chunk view = { .array = ebpo_reader_array(chunks->file, EBPO_A_TYPES, level) };
     ebpo_status status = EBPO_OK;
@@ -98,7 +100,8 @@ static bool sum_rows(const uint8_t *rows, unsigned element_size, uint64_t count,
     return all < UINT64_C(1) << 40 && *sum < UINT64_C(1) << 62;
 }
 
-ebpo_status ebpo_chunks_sum(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row, uint64_t rows, uint64_t *sum, ebpo_error *error)
+ebpo_status ebpo_chunks_sum(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row,
+                            uint64_t rows, uint64_t *sum, ebpo_error *error)
 {
     ebpo_held_chunk view = { .array = ebpo_reader_array(chunks->file, id, level) };
     ebpo_status status = EBPO_OK;
@@ -118,25 +121,32 @@ ebpo_status ebpo_chunks_sum(ebpo_chunks *chunks, ebpo_array_id id, int level, ui
 }
 
 /* Row of an index array for an item; row 0 is all zeros, whatever the file says there. */
-static ebpo_status index_row(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t item, unsigned cols, uint64_t *row, ebpo_error *error)
+static ebpo_status index_row(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t item,
+                             unsigned cols, uint64_t *row, ebpo_error *error)
 {
     memset(row, 0, cols * sizeof *row);
-    return item < EBPO_INDEX_ROWS ? EBPO_OK : ebpo_chunks_integers(chunks, id, level, item / EBPO_INDEX_ROWS, 1, row, sizeof *row, error);
+    return item < EBPO_INDEX_ROWS ? EBPO_OK
+                                  : ebpo_chunks_integers(chunks, id, level, item / EBPO_INDEX_ROWS,
+                                                         1, row, sizeof *row, error);
 }
 
 static const char *const contradicts = "the index contradicts the counts in the head";
 
-ebpo_status ebpo_ranks_check(const ebpo_chunks *chunks, int level, const uint64_t ranks[4], const uint64_t counts[4], ebpo_error *error)
+ebpo_status ebpo_ranks_check(const ebpo_chunks *chunks, int level, const uint64_t ranks[4],
+                             const uint64_t counts[4], ebpo_error *error)
 {
     const ebpo_level_summary *s = &chunks->file->info.level[level];
     const uint64_t all[4] = { s->white_count, s->black_count, s->leaf_count, s->gray_count };
     for (int k = 0; k < 4; k++)
         if (ranks[k] > all[k] || counts[k] > all[k] - ranks[k])
-            return ebpo_chunks_fail(chunks, level, EBPO_A_TYPES, "the types contradict the counts in the head or the index", error);
+            return ebpo_chunks_fail(chunks, level, EBPO_A_TYPES,
+                                    "the types contradict the counts in the head or the index",
+                                    error);
     return EBPO_OK;
 }
 
-ebpo_status ebpo_ranks_before(ebpo_chunks *chunks, int level, uint64_t group, uint64_t ranks[4], ebpo_error *error)
+ebpo_status ebpo_ranks_before(ebpo_chunks *chunks, int level, uint64_t group, uint64_t ranks[4],
+                              ebpo_error *error)
 {
     uint64_t counts[4], from = group / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS;
     ebpo_status status = index_row(chunks, EBPO_A_TYPES_INDEX, level, group, 4, ranks, error);
@@ -149,33 +159,41 @@ ebpo_status ebpo_ranks_before(ebpo_chunks *chunks, int level, uint64_t group, ui
     return status;
 }
 
-ebpo_status ebpo_ranks_planes(ebpo_chunks *chunks, int level, uint64_t gray, uint64_t *planes, ebpo_error *error)
+ebpo_status ebpo_ranks_planes(ebpo_chunks *chunks, int level, uint64_t gray, uint64_t *planes,
+                              ebpo_error *error)
 {
-    uint64_t sum = 0, from = gray / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS, all = chunks->file->info.level[level].plane_count;
+    uint64_t sum = 0, from = gray / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS,
+             all = chunks->file->info.level[level].plane_count;
     ebpo_status status = index_row(chunks, EBPO_A_GRAY_INDEX, level, gray, 1, planes, error);
     if (status == EBPO_OK)
-        status = ebpo_chunks_sum(chunks, EBPO_A_PLANE_COUNTS, level, from, gray - from, &sum, error);
+        status =
+            ebpo_chunks_sum(chunks, EBPO_A_PLANE_COUNTS, level, from, gray - from, &sum, error);
     if (status == EBPO_OK && (*planes > all || sum > all - *planes))
         status = ebpo_chunks_fail(chunks, level, EBPO_A_GRAY_INDEX, contradicts, error);
     *planes += sum;
     return status;
 }
 
-ebpo_status ebpo_ranks_leaf(ebpo_chunks *chunks, int level, uint64_t leaf, uint64_t *end, uint64_t *refs, ebpo_error *error)
+ebpo_status ebpo_ranks_leaf(ebpo_chunks *chunks, int level, uint64_t leaf, uint64_t *end,
+                            uint64_t *refs, ebpo_error *error)
 {
     const ebpo_info *info = &chunks->file->info;
-    uint64_t row[3], skip = 0, fresh = 0, listed = 0, from = leaf / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS;
+    uint64_t row[3], skip = 0, fresh = 0, listed = 0,
+                     from = leaf / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS;
     ebpo_status status = index_row(chunks, EBPO_A_LEAF_INDEX, level, leaf, 3, row, error);
     if (status == EBPO_OK)
         status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_SKIP, level, from, leaf - from, &skip, error);
     if (status == EBPO_OK)
         status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_NEW, level, from, leaf - from, &fresh, error);
     if (status == EBPO_OK)
-        status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_REF_COUNT, level, from, leaf - from, &listed, error);
+        status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_REF_COUNT, level, from, leaf - from, &listed,
+                                 error);
     if (status != EBPO_OK)
         return status;
-    if (row[0] > info->face_count || skip > info->face_count - row[0] || fresh > info->face_count - row[0] - skip)
-        return ebpo_chunks_fail(chunks, level, EBPO_A_LEAF_SKIP, "a leaf's new faces lie beyond the last face", error);
+    if (row[0] > info->face_count || skip > info->face_count - row[0] ||
+        fresh > info->face_count - row[0] - skip)
+        return ebpo_chunks_fail(chunks, level, EBPO_A_LEAF_SKIP,
+                                "a leaf's new faces lie beyond the last face", error);
     if (row[1] > info->level[level].ref_count || listed > info->level[level].ref_count - row[1])
         return ebpo_chunks_fail(chunks, level, EBPO_A_LEAF_INDEX, contradicts, error);
     *end = row[0] + skip + fresh;
@@ -183,12 +201,15 @@ ebpo_status ebpo_ranks_leaf(ebpo_chunks *chunks, int level, uint64_t leaf, uint6
     return EBPO_OK;
 }
 
-ebpo_status ebpo_ranks_leaf_planes(ebpo_chunks *chunks, int level, uint64_t leaf, uint64_t *planes, ebpo_error *error)
+ebpo_status ebpo_ranks_leaf_planes(ebpo_chunks *chunks, int level, uint64_t leaf, uint64_t *planes,
+                                   ebpo_error *error)
 {
-    uint64_t row[3], sum = 0, from = leaf / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS, all = chunks->file->info.level[level].leaf_plane_count;
+    uint64_t row[3], sum = 0, from = leaf / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS,
+                     all = chunks->file->info.level[level].leaf_plane_count;
     ebpo_status status = index_row(chunks, EBPO_A_LEAF_INDEX, level, leaf, 3, row, error);
     if (status == EBPO_OK)
-        status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_PLANE_COUNTS, level, from, leaf - from, &sum, error);
+        status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_PLANE_COUNTS, level, from, leaf - from, &sum,
+                                 error);
     if (status == EBPO_OK && (row[2] > all || sum > all - row[2]))
         status = ebpo_chunks_fail(chunks, level, EBPO_A_LEAF_INDEX, contradicts, error);
     *planes = row[2] + sum;

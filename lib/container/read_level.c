@@ -38,7 +38,8 @@ static ebpo_status add_up_skips(ebpo_file *file, int number, ebpo_level *level, 
         ebpo_workspace_settle_at(file->workspace, i);
         uint64_t skip = level->leaf_first[i];
         if (skip > faces - end || level->leaf_new[i] > faces - end - skip)
-            return ebpo_check_fail(&check, number, "leaf_skip", "a leaf's new faces lie beyond the last face", error);
+            return ebpo_check_fail(&check, number, "leaf_skip",
+                                   "a leaf's new faces lie beyond the last face", error);
         level->leaf_first[i] = end + skip;
         end += skip + level->leaf_new[i];
     }
@@ -69,45 +70,58 @@ bool ebpo_refs_decode(uint32_t *refs, uint64_t count, uint64_t first)
     return true;
 }
 
-static ebpo_status decode_refs(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status decode_refs(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
 {
     refs_job *j = context;
     (void)worker;
     uint64_t leaf = begin * EBPO_INDEX_ROWS, at = j->index[begin * 3 + 1];
-    uint64_t stop = end * EBPO_INDEX_ROWS < j->level->leaf_count ? end * EBPO_INDEX_ROWS : j->level->leaf_count;
+    uint64_t stop =
+        end * EBPO_INDEX_ROWS < j->level->leaf_count ? end * EBPO_INDEX_ROWS : j->level->leaf_count;
     ebpo_workspace_settle(j->file->workspace);
     for (; leaf < stop; at += j->level->leaf_ref_count[leaf++])
-        if (!ebpo_refs_decode(j->level->leaf_refs + at, j->level->leaf_ref_count[leaf], j->level->leaf_first[leaf])) {
+        if (!ebpo_refs_decode(j->level->leaf_refs + at, j->level->leaf_ref_count[leaf],
+                              j->level->leaf_first[leaf])) {
             ebpo_check check = ebpo_reader_check(j->file);
-            return ebpo_check_fail(&check, j->number, "leaf_refs", "a reference does not lead to a face before the leaf's own", error);
+            return ebpo_check_fail(&check, j->number, "leaf_refs",
+                                   "a reference does not lead to a face before the leaf's own",
+                                   error);
         }
     return EBPO_OK;
 }
 
-static ebpo_status check_index(ebpo_file *file, ebpo_array_id id, int number, const uint64_t *right, ebpo_error *error)
+static ebpo_status check_index(ebpo_file *file, ebpo_array_id id, int number, const uint64_t *right,
+                               ebpo_error *error)
 {
     const ebpo_array_in *array = ebpo_reader_array(file, id, number);
     uint64_t *stored = NULL;
     if (!array->present)
         return EBPO_OK;
     ebpo_status status = ebpo_reader_make(file, id, number, 1, sizeof *stored, &stored, error);
-    if (status == EBPO_OK && memcmp(stored, right, array->shape.rows * array->shape.cols * sizeof *stored) != 0) {
+    if (status == EBPO_OK &&
+        memcmp(stored, right, array->shape.rows * array->shape.cols * sizeof *stored) != 0) {
         ebpo_check check = ebpo_reader_check(file);
-        status = ebpo_check_fail(&check, number, ebpo_schema[id].name, "the index contradicts the arrays that it is about", error);
+        status = ebpo_check_fail(&check, number, ebpo_schema[id].name,
+                                 "the index contradicts the arrays that it is about", error);
     }
     ebpo_array_free(stored);
     return status;
 }
 
-static ebpo_status read_faces(ebpo_file *file, int number, ebpo_level *level, unsigned threads, ebpo_error *error)
+static ebpo_status read_faces(ebpo_file *file, int number, ebpo_level *level, unsigned threads,
+                              ebpo_error *error)
 {
-    ebpo_status status = ebpo_reader_make(file, EBPO_A_LEAF_SKIP, number, threads, 8, &level->leaf_first, error);
+    ebpo_status status =
+        ebpo_reader_make(file, EBPO_A_LEAF_SKIP, number, threads, 8, &level->leaf_first, error);
     if (status == EBPO_OK)
-        status = ebpo_reader_make(file, EBPO_A_LEAF_NEW, number, threads, 4, &level->leaf_new, error);
+        status =
+            ebpo_reader_make(file, EBPO_A_LEAF_NEW, number, threads, 4, &level->leaf_new, error);
     if (status == EBPO_OK)
-        status = ebpo_reader_make(file, EBPO_A_LEAF_REF_COUNT, number, threads, 4, &level->leaf_ref_count, error);
+        status = ebpo_reader_make(file, EBPO_A_LEAF_REF_COUNT, number, threads, 4,
+                                  &level->leaf_ref_count, error);
     if (status == EBPO_OK)
-        status = ebpo_reader_make(file, EBPO_A_LEAF_REFS, number, threads, 4, &level->leaf_refs, error);
+        status =
+            ebpo_reader_make(file, EBPO_A_LEAF_REFS, number, threads, 4, &level->leaf_refs, error);
     if (status != EBPO_OK || !level->leaf_first)
         return status;
     uint64_t refs = 0;
@@ -115,30 +129,37 @@ static ebpo_status read_faces(ebpo_file *file, int number, ebpo_level *level, un
         refs += level->leaf_ref_count[i];
     ebpo_check check = ebpo_reader_check(file);
     if (refs != level->ref_count)
-        return ebpo_check_fail(&check, number, "leaf_ref_count", "the counts do not add up to the number of references", error);
+        return ebpo_check_fail(&check, number, "leaf_ref_count",
+                               "the counts do not add up to the number of references", error);
     return add_up_skips(file, number, level, error);
 }
 
 /* References are decoded here: leaf_index tells each block of leaves where to begin. */
-static ebpo_status finish_leaves(ebpo_file *file, int number, ebpo_level *level, unsigned threads, ebpo_error *error)
+static ebpo_status finish_leaves(ebpo_file *file, int number, ebpo_level *level, unsigned threads,
+                                 ebpo_error *error)
 {
     uint64_t *index = ebpo_index_leaves(level);
-    ebpo_status status = index ? EBPO_OK : ebpo_fail_memory(error, level->leaf_count / EBPO_INDEX_ROWS * 24);
+    ebpo_status status =
+        index ? EBPO_OK : ebpo_fail_memory(error, level->leaf_count / EBPO_INDEX_ROWS * 24);
     if (status == EBPO_OK)
         status = check_index(file, EBPO_A_LEAF_INDEX, number, index, error);
     if (status == EBPO_OK && level->leaf_refs) {
         refs_job j = { file, number, level, index };
         uint64_t blocks = (level->leaf_count - 1) / EBPO_INDEX_ROWS + 1;
-        status = ebpo_parallel_for(blocks > 1 ? threads : 1, blocks, 1, decode_refs, &j, NULL, "read", error);
+        status = ebpo_parallel_for(blocks > 1 ? threads : 1, blocks, 1, decode_refs, &j, NULL,
+                                   "read", error);
     }
     free(index);
     return status;
 }
 
-static ebpo_status check_indexes(ebpo_file *file, int number, const ebpo_level *level, ebpo_error *error)
+static ebpo_status check_indexes(ebpo_file *file, int number, const ebpo_level *level,
+                                 ebpo_error *error)
 {
     uint64_t *types = ebpo_index_types(level, number == 0), *gray = ebpo_index_gray(level);
-    ebpo_status status = types && gray ? EBPO_OK : ebpo_fail_memory(error, level->group_count / EBPO_INDEX_ROWS * 32);
+    ebpo_status status = types && gray
+                             ? EBPO_OK
+                             : ebpo_fail_memory(error, level->group_count / EBPO_INDEX_ROWS * 32);
     if (status == EBPO_OK)
         status = check_index(file, EBPO_A_TYPES_INDEX, number, types, error);
     if (status == EBPO_OK)
@@ -148,9 +169,14 @@ static ebpo_status check_indexes(ebpo_file *file, int number, const ebpo_level *
     return status;
 }
 
-static ebpo_status read_arrays(ebpo_file *file, int number, ebpo_level *level, unsigned threads, ebpo_error *error)
+static ebpo_status read_arrays(ebpo_file *file, int number, ebpo_level *level, unsigned threads,
+                               ebpo_error *error)
 {
-    const struct { ebpo_array_id id; size_t size; void *values; } plain[] = {
+    const struct {
+        ebpo_array_id id;
+        size_t size;
+        void *values;
+    } plain[] = {
         { EBPO_A_TYPES, 2, &level->types },
         { EBPO_A_PLANE_COUNTS, 1, &level->plane_counts },
         { EBPO_A_PLANES, 4, &level->planes },
@@ -162,25 +188,36 @@ static ebpo_status read_arrays(ebpo_file *file, int number, ebpo_level *level, u
     };
     ebpo_status status = EBPO_OK;
     for (size_t i = 0; i < sizeof plain / sizeof plain[0] && status == EBPO_OK; i++)
-        status = ebpo_reader_make(file, plain[i].id, number, threads, plain[i].size, plain[i].values, error);
+        status = ebpo_reader_make(file, plain[i].id, number, threads, plain[i].size,
+                                  plain[i].values, error);
     if (status == EBPO_OK)
         status = read_faces(file, number, level, threads, error);
     return status;
 }
 
-ebpo_status ebpo_file_read_level(ebpo_file *file, int level, ebpo_level *out, unsigned threads, ebpo_error *error)
+ebpo_status ebpo_file_read_level(ebpo_file *file, int level, ebpo_level *out, unsigned threads,
+                                 ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     memset(out, 0, sizeof *out);
     const ebpo_info *info = &file->info;
     if (level < 0 || level >= info->level_count)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: there is no level %d; the file has levels 0 to %d", file->in.shown, level,
-                         info->level_count - 1);
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "%s: there is no level %d; the file has levels 0 to %d", file->in.shown,
+                         level, info->level_count - 1);
     const ebpo_level_summary *s = &info->level[level];
-    *out = (ebpo_level){ .group_count = ebpo_schema_groups(info, level), .gray_count = s->gray_count, .leaf_count = s->leaf_count,
-                         .white_count = s->white_count, .black_count = s->black_count, .plane_count = s->plane_count,
-                         .ref_count = s->ref_count, .new_count = s->new_count, .leaf_plane_count = s->leaf_plane_count,
-                         .gray_volume = s->gray_volume, .leaf_volume = s->leaf_volume, .pruned_count = s->pruned_count };
+    *out = (ebpo_level){ .group_count = ebpo_schema_groups(info, level),
+                         .gray_count = s->gray_count,
+                         .leaf_count = s->leaf_count,
+                         .white_count = s->white_count,
+                         .black_count = s->black_count,
+                         .plane_count = s->plane_count,
+                         .ref_count = s->ref_count,
+                         .new_count = s->new_count,
+                         .leaf_plane_count = s->leaf_plane_count,
+                         .gray_volume = s->gray_volume,
+                         .leaf_volume = s->leaf_volume,
+                         .pruned_count = s->pruned_count };
     ebpo_file_expect_levels(file, level, level);
     ebpo_status status = read_arrays(file, level, out, threads, error);
     if (status == EBPO_OK && out->leaf_count)

@@ -24,7 +24,9 @@ void ebpo_tree_free(ebpo_tree *tree)
 
 static ebpo_status absent(const ebpo_file *file, const char *part, ebpo_error *error)
 {
-    return ebpo_fail(error, EBPO_E_ABSENT, "%s: the file was written without its %s; build it again with that part", file->in.shown, part);
+    return ebpo_fail(error, EBPO_E_ABSENT,
+                     "%s: the file was written without its %s; build it again with that part",
+                     file->in.shown, part);
 }
 
 typedef struct mesh_job {
@@ -34,7 +36,8 @@ typedef struct mesh_job {
     uint64_t seen;         /* by the last chunk */
 } mesh_job;
 
-static ebpo_status take_vertices(void *context, const ebpo_array_in *array, uint64_t chunk, uint64_t row, uint64_t rows, const uint8_t *bytes,
+static ebpo_status take_vertices(void *context, const ebpo_array_in *array, uint64_t chunk,
+                                 uint64_t row, uint64_t rows, const uint8_t *bytes,
                                  ebpo_error *error)
 {
     (void)array;
@@ -48,19 +51,23 @@ static ebpo_status take_vertices(void *context, const ebpo_array_in *array, uint
     return EBPO_OK;
 }
 
-static ebpo_status take_faces(void *context, const ebpo_array_in *array, uint64_t chunk, uint64_t row, uint64_t rows, const uint8_t *bytes,
-                              ebpo_error *error)
+static ebpo_status take_faces(void *context, const ebpo_array_in *array, uint64_t chunk,
+                              uint64_t row, uint64_t rows, const uint8_t *bytes, ebpo_error *error)
 {
     mesh_job *j = context;
     ebpo_check check = ebpo_reader_check(j->file);
     uint64_t last = ebpo_h5_chunk_count(&array->shape) - 1;
     uint64_t seen = j->faces_index ? j->faces_index[chunk] : 0;
     if (seen > j->mesh->vertex_count || (chunk == 0 && seen))
-        return ebpo_check_fail(&check, -1, "/mesh/faces_index", "the index names more vertices than there are", error);
-    if (!ebpo_corners_decode(bytes, rows, &seen, j->mesh->faces + 3 * row) || seen > j->mesh->vertex_count)
-        return ebpo_check_fail(&check, -1, "/mesh/faces", "a face names a vertex that does not exist", error);
+        return ebpo_check_fail(&check, -1, "/mesh/faces_index",
+                               "the index names more vertices than there are", error);
+    if (!ebpo_corners_decode(bytes, rows, &seen, j->mesh->faces + 3 * row) ||
+        seen > j->mesh->vertex_count)
+        return ebpo_check_fail(&check, -1, "/mesh/faces",
+                               "a face names a vertex that does not exist", error);
     if (chunk < last && seen != j->faces_index[chunk + 1])
-        return ebpo_check_fail(&check, -1, "/mesh/faces_index", "the index contradicts the faces", error);
+        return ebpo_check_fail(&check, -1, "/mesh/faces_index", "the index contradicts the faces",
+                               error);
     return EBPO_OK;
 }
 
@@ -80,11 +87,13 @@ static ebpo_status make_mesh(ebpo_file *file, ebpo_mesh *out, ebpo_error *error)
     memcpy(out->source_sha256, info->source_sha256, sizeof out->source_sha256);
     out->source_size = info->source_size;
     if (!out->faces || (!out->xyz32 && !out->xyz64))
-        return ebpo_workspace_fail(workspace, info->vertex_count * 24 + info->face_count * 12, error);
+        return ebpo_workspace_fail(workspace, info->vertex_count * 24 + info->face_count * 12,
+                                   error);
     return EBPO_OK;
 }
 
-ebpo_status ebpo_file_read_mesh(ebpo_file *file, ebpo_mesh *out, unsigned threads, ebpo_error *error)
+ebpo_status ebpo_file_read_mesh(ebpo_file *file, ebpo_mesh *out, unsigned threads,
+                                ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     memset(out, 0, sizeof *out);
@@ -97,20 +106,23 @@ ebpo_status ebpo_file_read_mesh(ebpo_file *file, ebpo_mesh *out, unsigned thread
     ebpo_check check = ebpo_reader_check(file);
     ebpo_status status = make_mesh(file, out, error);
     if (status == EBPO_OK)
-        status = ebpo_reader_rows(file, ebpo_reader_array(file, EBPO_A_VERTICES, 0), threads, take_vertices, &j, error);
+        status = ebpo_reader_rows(file, ebpo_reader_array(file, EBPO_A_VERTICES, 0), threads,
+                                  take_vertices, &j, error);
     if (status == EBPO_OK)
         status = ebpo_check_finite(&check, out, error);
     if (status == EBPO_OK)
         status = ebpo_reader_make(file, EBPO_A_FACES_INDEX, 0, 1, 8, &j.faces_index, error);
     if (status == EBPO_OK)
-        status = ebpo_reader_rows(file, ebpo_reader_array(file, EBPO_A_FACES, 0), threads, take_faces, &j, error);
+        status = ebpo_reader_rows(file, ebpo_reader_array(file, EBPO_A_FACES, 0), threads,
+                                  take_faces, &j, error);
     ebpo_array_free(j.faces_index);
     if (status != EBPO_OK)
         ebpo_mesh_free(out);
     return status;
 }
 
-static ebpo_status take_numbers(void *context, const ebpo_array_in *array, uint64_t chunk, uint64_t row, uint64_t rows, const uint8_t *bytes,
+static ebpo_status take_numbers(void *context, const ebpo_array_in *array, uint64_t chunk,
+                                uint64_t row, uint64_t rows, const uint8_t *bytes,
                                 ebpo_error *error)
 {
     (void)array;
@@ -120,7 +132,8 @@ static ebpo_status take_numbers(void *context, const ebpo_array_in *array, uint6
     return EBPO_OK;
 }
 
-static ebpo_status read_map(ebpo_file *file, ebpo_workspace *workspace, ebpo_array_id id, uint64_t limit, unsigned threads, uint32_t **out, ebpo_error *error)
+static ebpo_status read_map(ebpo_file *file, ebpo_workspace *workspace, ebpo_array_id id,
+                            uint64_t limit, unsigned threads, uint32_t **out, ebpo_error *error)
 {
     const ebpo_array_in *array = ebpo_reader_array(file, id, 0);
     ebpo_check check = ebpo_reader_check(file);
@@ -142,7 +155,8 @@ static uint64_t face_limit(const ebpo_info *info)
     return info->source_face_count + info->mend.added_faces;
 }
 
-static ebpo_status read_maps(ebpo_file *file, ebpo_workspace *workspace, uint32_t **vertex_source, uint32_t **face_source, unsigned threads, ebpo_error *error)
+static ebpo_status read_maps(ebpo_file *file, ebpo_workspace *workspace, uint32_t **vertex_source,
+                             uint32_t **face_source, unsigned threads, ebpo_error *error)
 {
     *vertex_source = *face_source = NULL;
     if (!(file->info.parts & EBPO_PART_MAPS))
@@ -150,9 +164,11 @@ static ebpo_status read_maps(ebpo_file *file, ebpo_workspace *workspace, uint32_
     ebpo_expected expected = EBPO_EXPECTED_INIT(file);
     ebpo_expect_maps(&expected);
     ebpo_expect_all(&expected);
-    ebpo_status status = read_map(file, workspace, EBPO_A_VERTEX_SOURCE, file->info.source_vertex_count, threads, vertex_source, error);
+    ebpo_status status = read_map(file, workspace, EBPO_A_VERTEX_SOURCE,
+                                  file->info.source_vertex_count, threads, vertex_source, error);
     if (status == EBPO_OK)
-        status = read_map(file, workspace, EBPO_A_FACE_SOURCE, face_limit(&file->info), threads, face_source, error);
+        status = read_map(file, workspace, EBPO_A_FACE_SOURCE, face_limit(&file->info), threads,
+                          face_source, error);
     if (status != EBPO_OK) {
         ebpo_array_free(*vertex_source);
         *vertex_source = NULL;
@@ -160,18 +176,21 @@ static ebpo_status read_maps(ebpo_file *file, ebpo_workspace *workspace, uint32_
     return status;
 }
 
-ebpo_status ebpo_reader_maps(ebpo_file *file, uint32_t **vertex_source, uint32_t **face_source, unsigned threads, ebpo_error *error)
+ebpo_status ebpo_reader_maps(ebpo_file *file, uint32_t **vertex_source, uint32_t **face_source,
+                             unsigned threads, ebpo_error *error)
 {
     return read_maps(file, file->workspace, vertex_source, face_source, threads, error);
 }
 
-ebpo_status ebpo_file_read_maps(ebpo_file *file, uint32_t **vertex_source, uint32_t **face_source, unsigned threads, ebpo_error *error)
+ebpo_status ebpo_file_read_maps(ebpo_file *file, uint32_t **vertex_source, uint32_t **face_source,
+                                unsigned threads, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     return read_maps(file, NULL, vertex_source, face_source, threads, error);
 }
 
-ebpo_status ebpo_file_read_tree(ebpo_file *file, ebpo_tree *out, unsigned threads, ebpo_error *error)
+ebpo_status ebpo_file_read_tree(ebpo_file *file, ebpo_tree *out, unsigned threads,
+                                ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     memset(out, 0, sizeof *out);
@@ -192,15 +211,22 @@ ebpo_status ebpo_file_read_tree(ebpo_file *file, ebpo_tree *out, unsigned thread
     return status;
 }
 
-/* Place of each item when they are sorted by their source number (distinct, below limit): how many smaller ones there are. In *place, to be freed. Counted in a bit for each number that
- * there may be, as a head may state far more of them than the file has items: pages without items stay empty. */
-static ebpo_status sort_by_source(ebpo_workspace *workspace, const uint32_t *source, uint64_t count, uint64_t limit, uint32_t **place, ebpo_error *error)
+/* Place of each item when they are sorted by their source number (distinct, below limit): how many
+ * smaller ones there are. In *place, to be freed. Counted in a bit for each number that there may
+ * be, as a head may state far more of them than the file has items: pages without items stay empty.
+ */
+static ebpo_status sort_by_source(ebpo_workspace *workspace, const uint32_t *source, uint64_t count,
+                                  uint64_t limit, uint32_t **place, ebpo_error *error)
 {
     enum { WORDS = 8 /* between two counts */ };
     uint64_t words = (limit <= UINT32_MAX ? limit : UINT64_C(1) << 32) / 64 + 1;
     uint64_t *bits = ebpo_alloc_zero(words, sizeof *bits);
-    uint32_t *before = ebpo_alloc(words / WORDS + 1, sizeof *before), *out = ebpo_array_alloc(workspace, count, sizeof *out), sum = 0;
-    ebpo_status status = bits && before && out ? EBPO_OK : ebpo_workspace_fail(workspace, words * 9 + count * sizeof *out, error);
+    uint32_t *before = ebpo_alloc(words / WORDS + 1, sizeof *before),
+             *out = ebpo_array_alloc(workspace, count, sizeof *out), sum = 0;
+    ebpo_status status =
+        bits && before && out
+            ? EBPO_OK
+            : ebpo_workspace_fail(workspace, words * 9 + count * sizeof *out, error);
     for (uint64_t i = 0; i < count && status == EBPO_OK; ebpo_workspace_settle_at(workspace, i++))
         bits[source[i] / 64] |= UINT64_C(1) << source[i] % 64;
     for (uint64_t w = 0; w < words && status == EBPO_OK; w++) {
@@ -210,7 +236,8 @@ static ebpo_status sort_by_source(ebpo_workspace *workspace, const uint32_t *sou
     }
     for (uint64_t i = 0; i < count && status == EBPO_OK; ebpo_workspace_settle_at(workspace, i++)) {
         uint64_t word = source[i] / 64;
-        out[i] = before[word / WORDS] + (uint32_t)__builtin_popcountll(bits[word] & ((UINT64_C(1) << source[i] % 64) - 1));
+        out[i] = before[word / WORDS] +
+                 (uint32_t)__builtin_popcountll(bits[word] & ((UINT64_C(1) << source[i] % 64) - 1));
         for (uint64_t w = word / WORDS * WORDS; w < word; w++)
             out[i] += (uint32_t)__builtin_popcountll(bits[w]);
     }
@@ -242,27 +269,32 @@ static ebpo_status reorder_vertices(ebpo_mesh *mesh, const uint32_t *place, ebpo
     return EBPO_OK;
 }
 
-static ebpo_status reorder_faces(ebpo_mesh *mesh, const uint32_t *vertex_place, const uint32_t *face_place, ebpo_error *error)
+static ebpo_status reorder_faces(ebpo_mesh *mesh, const uint32_t *vertex_place,
+                                 const uint32_t *face_place, ebpo_error *error)
 {
     uint32_t *sorted = ebpo_array_alloc(mesh->workspace, mesh->face_count, 3 * sizeof *sorted);
     if (!sorted)
         return ebpo_workspace_fail(mesh->workspace, mesh->face_count * 12, error);
-    for (uint64_t i = 0; i < mesh->face_count * 3; ebpo_workspace_settle_often(mesh->workspace, i++))
+    for (uint64_t i = 0; i < mesh->face_count * 3;
+         ebpo_workspace_settle_often(mesh->workspace, i++))
         sorted[3 * (uint64_t)face_place[i / 3] + i % 3] = vertex_place[mesh->faces[i]];
     ebpo_array_free(mesh->faces);
     mesh->faces = sorted;
     return EBPO_OK;
 }
 
-static ebpo_status to_source_order(ebpo_file *file, ebpo_mesh *mesh, unsigned threads, ebpo_error *error)
+static ebpo_status to_source_order(ebpo_file *file, ebpo_mesh *mesh, unsigned threads,
+                                   ebpo_error *error)
 {
     uint32_t *vertex_source, *face_source, *vertex_place = NULL, *face_place = NULL;
     ebpo_workspace *workspace = file->workspace;
     ebpo_status status = ebpo_reader_maps(file, &vertex_source, &face_source, threads, error);
     if (status == EBPO_OK)
-        status = sort_by_source(workspace, vertex_source, mesh->vertex_count, file->info.source_vertex_count, &vertex_place, error);
+        status = sort_by_source(workspace, vertex_source, mesh->vertex_count,
+                                file->info.source_vertex_count, &vertex_place, error);
     if (status == EBPO_OK)
-        status = sort_by_source(workspace, face_source, mesh->face_count, face_limit(&file->info), &face_place, error);
+        status = sort_by_source(workspace, face_source, mesh->face_count, face_limit(&file->info),
+                                &face_place, error);
     ebpo_array_free(vertex_source);
     ebpo_array_free(face_source);
     if (status == EBPO_OK)
@@ -274,7 +306,8 @@ static ebpo_status to_source_order(ebpo_file *file, ebpo_mesh *mesh, unsigned th
     return status;
 }
 
-ebpo_status ebpo_file_read_source_mesh(ebpo_file *file, ebpo_mesh *out, bool *source_order, unsigned threads, ebpo_error *error)
+ebpo_status ebpo_file_read_source_mesh(ebpo_file *file, ebpo_mesh *out, bool *source_order,
+                                       unsigned threads, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     bool maps = file->info.parts & EBPO_PART_MAPS;

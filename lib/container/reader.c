@@ -37,7 +37,8 @@ void ebpo_chunk_reader_clear(ebpo_chunk_reader *reader)
 }
 
 /* Bytes [address, address + bytes) of the file to reader->stored, with room for at least `room`. */
-static ebpo_status fetch(ebpo_file *file, ebpo_chunk_reader *reader, uint64_t address, size_t bytes, size_t room, ebpo_error *error)
+static ebpo_status fetch(ebpo_file *file, ebpo_chunk_reader *reader, uint64_t address, size_t bytes,
+                         size_t room, ebpo_error *error)
 {
     if (room < bytes)
         room = bytes;
@@ -51,23 +52,26 @@ static ebpo_status fetch(ebpo_file *file, ebpo_chunk_reader *reader, uint64_t ad
     return ebpo_input_read(&file->in, address, bytes, reader->stored, error);
 }
 
-static ebpo_status decode(ebpo_file *file, const ebpo_array_in *array, uint64_t chunk, ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *raw_out,
+static ebpo_status decode(ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
+                          ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *raw_out,
                           ebpo_error *error)
 {
     const ebpo_h5_shape *shape = &array->shape;
     size_t raw = shape->chunk_rows * ebpo_h5_row_bytes(shape);
     const char *why;
-    ebpo_status status = ebpo_chunk_decode(coder, shape->pipeline, shape->element_size, stored, array->chunks[chunk].bytes, raw_out, raw, &why);
+    ebpo_status status = ebpo_chunk_decode(coder, shape->pipeline, shape->element_size, stored,
+                                           array->chunks[chunk].bytes, raw_out, raw, &why);
     if (status == EBPO_E_MEMORY)
         return ebpo_fail_memory(error, raw);
     if (status != EBPO_OK)
-        return ebpo_fail(error, status, "%s: %s: chunk %" PRIu64 " is damaged: %s; get a fresh copy of the file", file->in.shown,
-                         array->path, chunk, why);
+        return ebpo_fail(error, status,
+                         "%s: %s: chunk %" PRIu64 " is damaged: %s; get a fresh copy of the file",
+                         file->in.shown, array->path, chunk, why);
     return EBPO_OK;
 }
 
-ebpo_status ebpo_reader_chunk(ebpo_file *file, const ebpo_array_in *array, uint64_t chunk, ebpo_chunk_reader *reader, uint8_t *raw,
-                              ebpo_error *error)
+ebpo_status ebpo_reader_chunk(ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
+                              ebpo_chunk_reader *reader, uint8_t *raw, ebpo_error *error)
 {
     ebpo_status status = ebpo_reader_locate(file, array, error);
     if (status != EBPO_OK)
@@ -75,21 +79,26 @@ ebpo_status ebpo_reader_chunk(ebpo_file *file, const ebpo_array_in *array, uint6
     const ebpo_h5_chunk *at = &array->chunks[chunk];
     size_t bound = ebpo_chunk_bound(array->shape.chunk_rows * ebpo_h5_row_bytes(&array->shape));
     status = fetch(file, reader, at->address, at->bytes, bound, error);
-    return status == EBPO_OK ? decode(file, array, chunk, &reader->coder, reader->stored, raw, error) : status;
+    return status == EBPO_OK
+               ? decode(file, array, chunk, &reader->coder, reader->stored, raw, error)
+               : status;
 }
 
-/* End of the run of chunks from `begin` on (at most to `end`) that lie one behind the other in the file, up to RUN_BYTES: one read brings them all. */
+/* End of the run of chunks from `begin` on (at most to `end`) that lie one behind the other in the
+ * file, up to RUN_BYTES: one read brings them all. */
 static uint64_t find_run(const ebpo_array_in *array, uint64_t begin, uint64_t end, size_t *bytes)
 {
     const ebpo_h5_chunk *c = array->chunks;
     uint64_t next = begin + 1;
     *bytes = c[begin].bytes;
-    while (next < end && c[next].address == c[begin].address + *bytes && *bytes + c[next].bytes <= RUN_BYTES)
+    while (next < end && c[next].address == c[begin].address + *bytes &&
+           *bytes + c[next].bytes <= RUN_BYTES)
         *bytes += c[next++].bytes;
     return next;
 }
 
-static ebpo_status read_run(job *j, scratch *s, uint64_t begin, uint64_t end, size_t bytes, ebpo_error *error)
+static ebpo_status read_run(job *j, scratch *s, uint64_t begin, uint64_t end, size_t bytes,
+                            ebpo_error *error)
 {
     const ebpo_array_in *a = j->array;
     ebpo_status status = fetch(j->file, &s->reader, a->chunks[begin].address, bytes, 0, error);
@@ -98,13 +107,16 @@ static ebpo_status read_run(job *j, scratch *s, uint64_t begin, uint64_t end, si
         uint64_t row = chunk * a->shape.chunk_rows, left = a->shape.rows - row;
         status = decode(j->file, a, chunk, &s->reader.coder, s->reader.stored + at, s->raw, error);
         if (status == EBPO_OK)
-            status = j->take(j->context, a, chunk, row, left < a->shape.chunk_rows ? left : a->shape.chunk_rows, s->raw, error);
+            status =
+                j->take(j->context, a, chunk, row,
+                        left < a->shape.chunk_rows ? left : a->shape.chunk_rows, s->raw, error);
         at += a->chunks[chunk].bytes;
     }
     return status;
 }
 
-static ebpo_status read_chunks(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status read_chunks(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
 {
     job *j = context;
     if (!j->scratch[worker])
@@ -122,8 +134,8 @@ static ebpo_status read_chunks(void *context, uint64_t begin, uint64_t end, unsi
     return status;
 }
 
-ebpo_status ebpo_reader_rows(ebpo_file *file, const ebpo_array_in *array, unsigned threads, ebpo_rows_fn take, void *context,
-                             ebpo_error *error)
+ebpo_status ebpo_reader_rows(ebpo_file *file, const ebpo_array_in *array, unsigned threads,
+                             ebpo_rows_fn take, void *context, ebpo_error *error)
 {
     uint64_t chunks = ebpo_h5_chunk_count(&array->shape);
     ebpo_status status = ebpo_reader_locate(file, array, error);
@@ -134,7 +146,8 @@ ebpo_status ebpo_reader_rows(ebpo_file *file, const ebpo_array_in *array, unsign
     j.scratch = ebpo_alloc_zero(threads, sizeof *j.scratch);
     if (!j.scratch)
         return ebpo_fail_memory(error, threads * sizeof *j.scratch);
-    uint64_t grain = chunks / (threads * 4) + 1; /* each thread gets a few turns, of runs as long as that allows */
+    /* each thread gets a few turns, of runs as long as that allows */
+    uint64_t grain = chunks / (threads * 4) + 1;
     if (grain > RUN_CHUNKS)
         grain = RUN_CHUNKS;
     status = ebpo_parallel_for(threads, chunks, grain, read_chunks, &j, NULL, "read", error);
@@ -152,26 +165,28 @@ typedef struct target {
     size_t size;
 } target;
 
-static ebpo_status take_integers(void *context, const ebpo_array_in *array, uint64_t chunk, uint64_t row, uint64_t rows, const uint8_t *bytes,
+static ebpo_status take_integers(void *context, const ebpo_array_in *array, uint64_t chunk,
+                                 uint64_t row, uint64_t rows, const uint8_t *bytes,
                                  ebpo_error *error)
 {
     (void)chunk;
     (void)error;
     const target *t = context;
     uint64_t cols = array->shape.cols ? array->shape.cols : 1;
-    ebpo_integers_decode(bytes, array->shape.element_size, array->shape.is_signed, rows * cols, t->values + row * cols * t->size, t->size);
+    ebpo_integers_decode(bytes, array->shape.element_size, array->shape.is_signed, rows * cols,
+                         t->values + row * cols * t->size, t->size);
     return EBPO_OK;
 }
 
-ebpo_status ebpo_reader_integers(ebpo_file *file, const ebpo_array_in *array, unsigned threads, void *values, size_t size,
-                                 ebpo_error *error)
+ebpo_status ebpo_reader_integers(ebpo_file *file, const ebpo_array_in *array, unsigned threads,
+                                 void *values, size_t size, ebpo_error *error)
 {
     target t = { values, size };
     return ebpo_reader_rows(file, array, threads, take_integers, &t, error);
 }
 
-ebpo_status ebpo_reader_make(ebpo_file *file, ebpo_array_id id, int level, unsigned threads, size_t size, void *values_out,
-                             ebpo_error *error)
+ebpo_status ebpo_reader_make(ebpo_file *file, ebpo_array_id id, int level, unsigned threads,
+                             size_t size, void *values_out, ebpo_error *error)
 {
     const ebpo_array_in *array = ebpo_reader_array(file, id, level);
     void *values = NULL;
@@ -179,8 +194,9 @@ ebpo_status ebpo_reader_make(ebpo_file *file, ebpo_array_id id, int level, unsig
     if (array->present) {
         uint64_t cols = array->shape.cols ? array->shape.cols : 1;
         values = ebpo_array_alloc(file->workspace, array->shape.rows, size * cols);
-        status = values ? ebpo_reader_integers(file, array, threads, values, size, error)
-                        : ebpo_workspace_fail(file->workspace, array->shape.rows * size * cols, error);
+        status = values
+                     ? ebpo_reader_integers(file, array, threads, values, size, error)
+                     : ebpo_workspace_fail(file->workspace, array->shape.rows * size * cols, error);
     }
     if (status != EBPO_OK) {
         ebpo_array_free(values);

@@ -18,7 +18,9 @@ typedef struct ebpo_array_in {
     char path[EBPO_PATH_BYTES];
     ebpo_h5_shape shape;
     uint64_t stored_bytes;
-    ebpo_h5_chunk *chunks; /* [ebpo_h5_chunk_count(&shape)] where each is; NULL when the array is absent. After ebpo_reader_locate, unless it has one chunk only */
+    /* [ebpo_h5_chunk_count(&shape)] where each is; NULL when the array is absent. After
+     * ebpo_reader_locate, unless it has one chunk only */
+    ebpo_h5_chunk *chunks;
 } ebpo_array_in;
 
 struct ebpo_file {
@@ -26,15 +28,18 @@ struct ebpo_file {
     ebpo_info info;
     ebpo_array_in level_array[EBPO_LEVELS_MAX][EBPO_LEVEL_ARRAYS];
     ebpo_array_in root_array[EBPO_ARRAYS]; /* those from EBPO_A_VERTICES on */
-    ebpo_workspace *workspace; /* what whole arrays keep to, or NULL; borrowed */
+    ebpo_workspace *workspace;             /* what whole arrays keep to, or NULL; borrowed */
     pthread_mutex_t lock;
-    atomic_bool located;   /* the chunks of all arrays are known */
+    atomic_bool located; /* the chunks of all arrays are known */
 };
 
-/* After this the chunks of an array that is present are known. Reads from a file that is far away, once. Any thread. */
-EBPO_MUST_USE ebpo_status ebpo_reader_locate(ebpo_file *file, const ebpo_array_in *array, ebpo_error *error);
+/* After this the chunks of an array that is present are known. Reads from a file that is far away,
+ * once. Any thread. */
+EBPO_MUST_USE ebpo_status ebpo_reader_locate(ebpo_file *file, const ebpo_array_in *array,
+                                             ebpo_error *error);
 
-/* What will be read, collected and then announced; nothing is done for sources that do not want to know. For one thread.
+/* What will be read, collected and then announced; nothing is done for sources that do not want to
+ * know. For one thread.
  *
  *     ebpo_expected expected = EBPO_EXPECTED_INIT(file);
  *     ebpo_expect_array(&expected, array);    ...
@@ -46,9 +51,13 @@ typedef struct ebpo_expected {
     uint64_t count, room;
     bool failed; /* where chunks lie could not be read */
 } ebpo_expected;
-#define EBPO_EXPECTED_INIT(file) { file, NULL, 0, 0, false }
+#define EBPO_EXPECTED_INIT(file) \
+    {                            \
+        file, NULL, 0, 0, false  \
+    }
 /* Chunks [begin, end) of an array that is present or not. */
-void ebpo_expect_chunks(ebpo_expected *expected, const ebpo_array_in *array, uint64_t begin, uint64_t end);
+void ebpo_expect_chunks(ebpo_expected *expected, const ebpo_array_in *array, uint64_t begin,
+                        uint64_t end);
 void ebpo_expect_array(ebpo_expected *expected, const ebpo_array_in *array);
 void ebpo_expect_level(ebpo_expected *expected, int level);
 void ebpo_expect_mesh(ebpo_expected *expected);
@@ -58,7 +67,8 @@ void ebpo_expect_tree(ebpo_file *file);
 /* Announces what was collected, and frees it. */
 void ebpo_expect_all(ebpo_expected *expected);
 
-static inline const ebpo_array_in *ebpo_reader_array(const ebpo_file *file, ebpo_array_id id, int level)
+static inline const ebpo_array_in *ebpo_reader_array(const ebpo_file *file, ebpo_array_id id,
+                                                     int level)
 {
     return id < EBPO_LEVEL_ARRAYS ? &file->level_array[level][id] : &file->root_array[id];
 }
@@ -76,31 +86,41 @@ typedef struct ebpo_chunk_reader {
 } ebpo_chunk_reader;
 void ebpo_chunk_reader_clear(ebpo_chunk_reader *reader);
 
-/* Fetches chunk number `chunk` of an array that is present and decodes it: chunk_rows rows as the specification describes them (the last chunk with its filling), into `raw` of
+/* Fetches chunk number `chunk` of an array that is present and decodes it: chunk_rows rows as the
+ * specification describes them (the last chunk with its filling), into `raw` of
  * EBPO_CHUNK_BYTES_MAX bytes. Several threads at once, each with its own reader. */
-EBPO_MUST_USE ebpo_status ebpo_reader_chunk(ebpo_file *file, const ebpo_array_in *array, uint64_t chunk, ebpo_chunk_reader *reader, uint8_t *raw,
+EBPO_MUST_USE ebpo_status ebpo_reader_chunk(ebpo_file *file, const ebpo_array_in *array,
+                                            uint64_t chunk, ebpo_chunk_reader *reader, uint8_t *raw,
                                             ebpo_error *error);
 
-/* Takes rows [row, row + rows) of chunk number `chunk`, decoded to the bytes that the specification describes. Called from several threads. */
-typedef ebpo_status (*ebpo_rows_fn)(void *context, const ebpo_array_in *array, uint64_t chunk, uint64_t row, uint64_t rows,
-                                    const uint8_t *bytes, ebpo_error *error);
+/* Takes rows [row, row + rows) of chunk number `chunk`, decoded to the bytes that the specification
+ * describes. Called from several threads. */
+typedef ebpo_status (*ebpo_rows_fn)(void *context, const ebpo_array_in *array, uint64_t chunk,
+                                    uint64_t row, uint64_t rows, const uint8_t *bytes,
+                                    ebpo_error *error);
 
 /* Reads all chunks of an array that is present. Chunks come in any order, unless threads is 1. */
-EBPO_MUST_USE ebpo_status ebpo_reader_rows(ebpo_file *file, const ebpo_array_in *array, unsigned threads, ebpo_rows_fn take, void *context,
+EBPO_MUST_USE ebpo_status ebpo_reader_rows(ebpo_file *file, const ebpo_array_in *array,
+                                           unsigned threads, ebpo_rows_fn take, void *context,
                                            ebpo_error *error);
 
 /* Reads integers into `values`, of `size` bytes each. */
-EBPO_MUST_USE ebpo_status ebpo_reader_integers(ebpo_file *file, const ebpo_array_in *array, unsigned threads, void *values, size_t size,
+EBPO_MUST_USE ebpo_status ebpo_reader_integers(ebpo_file *file, const ebpo_array_in *array,
+                                               unsigned threads, void *values, size_t size,
                                                ebpo_error *error);
 
 /* The same into new memory: NULL when the array is absent. To be freed with ebpo_array_free. */
-EBPO_MUST_USE ebpo_status ebpo_reader_make(ebpo_file *file, ebpo_array_id id, int level, unsigned threads, size_t size, void *values_out,
+EBPO_MUST_USE ebpo_status ebpo_reader_make(ebpo_file *file, ebpo_array_id id, int level,
+                                           unsigned threads, size_t size, void *values_out,
                                            ebpo_error *error);
 
 /* Like ebpo_file_read_maps, but in the file's workspace: to be freed with ebpo_array_free. */
-EBPO_MUST_USE ebpo_status ebpo_reader_maps(ebpo_file *file, uint32_t **vertex_source, uint32_t **face_source, unsigned threads, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_reader_maps(ebpo_file *file, uint32_t **vertex_source,
+                                           uint32_t **face_source, unsigned threads,
+                                           ebpo_error *error);
 
-/* A leaf's references in place: gaps, counted down from its first new face, to ascending numbers. False when one falls below 0. */
+/* A leaf's references in place: gaps, counted down from its first new face, to ascending numbers.
+ * False when one falls below 0. */
 bool ebpo_refs_decode(uint32_t *refs, uint64_t count, uint64_t first);
 
 #endif

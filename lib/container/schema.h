@@ -36,9 +36,9 @@ enum {
 };
 
 typedef struct ebpo_array_spec {
-    const char *name;   /* within /levels/NN, or the whole path */
-    uint8_t cols;       /* 0: one dimension */
-    uint8_t sizes;      /* allowed element sizes, summed: 1 + 2 + 4 + 8 */
+    const char *name; /* within /levels/NN, or the whole path */
+    uint8_t cols;     /* 0: one dimension */
+    uint8_t sizes;    /* allowed element sizes, summed: 1 + 2 + 4 + 8 */
     bool is_signed;
     bool if_needed;     /* may be absent where its rows exist: then every value is the usual one */
     const char *coding; /* attribute */
@@ -53,7 +53,8 @@ void ebpo_schema_path(ebpo_array_id id, int level, char path[EBPO_PATH_BYTES]);
 /* Rows that the head's counts and parts call for; 0: the array is not in the file. */
 uint64_t ebpo_schema_rows(const ebpo_info *info, ebpo_array_id id, int level);
 
-/* Rows of an index array over `count` items: one each EBPO_INDEX_ROWS, but none when one would do (it is all zeros). */
+/* Rows of an index array over `count` items: one each EBPO_INDEX_ROWS, but none when one would do
+ * (it is all zeros). */
 uint64_t ebpo_schema_index_rows(uint64_t count);
 
 /* Groups of eight of a level, from the head's counts. */

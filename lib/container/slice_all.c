@@ -18,11 +18,14 @@ static void drop(ebpo_level *level)
     level->gray_volume = level->leaf_volume = 0;
 }
 
-ebpo_status ebpo_slice_read_all(ebpo_slice *out, ebpo_file *file, unsigned threads, ebpo_error *error)
+ebpo_status ebpo_slice_read_all(ebpo_slice *out, ebpo_file *file, unsigned threads,
+                                ebpo_error *error)
 {
     memset(out, 0, sizeof *out);
     if (!(file->info.parts & EBPO_PART_MESH))
-        return ebpo_fail(error, EBPO_E_ABSENT, "%s: the file was written without its mesh; build it again with it", file->in.shown);
+        return ebpo_fail(error, EBPO_E_ABSENT,
+                         "%s: the file was written without its mesh; build it again with it",
+                         file->in.shown);
     ebpo_tree tree;
     ebpo_status status = ebpo_file_read_tree(file, &tree, threads, error);
     if (status != EBPO_OK)

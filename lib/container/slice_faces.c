@@ -1,4 +1,5 @@
-/* The faces of a slice: its own, those that it only refers to, their vertices, and local numbers for all. */
+/* The faces of a slice: its own, those that it only refers to, their vertices, and local numbers
+ * for all. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -6,10 +7,12 @@
 #include "base/error.h"
 #include "container/slice_parts.h"
 
-static void expect_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t *single, uint64_t singles, uint64_t first, uint64_t rows)
+static void expect_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t *single,
+                        uint64_t singles, uint64_t first, uint64_t rows)
 {
     ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
-    uint64_t chunk_rows = ebpo_reader_array(chunks->file, id, 0)->shape.chunk_rows, next = 0; /* rows before `next` are in */
+    /* rows before `next` are in */
+    uint64_t chunk_rows = ebpo_reader_array(chunks->file, id, 0)->shape.chunk_rows, next = 0;
     if (!ebpo_input_expects(&chunks->file->in))
         return;
     for (uint64_t i = 0; i < singles; i++)
@@ -18,21 +21,27 @@ static void expect_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t *s
             next = (single[i] / chunk_rows + 1) * chunk_rows;
         }
     if (rows && first + rows > next)
-        ebpo_chunks_expect(chunks, &e, id, 0, first > next ? first : next, first + rows - (first > next ? first : next));
+        ebpo_chunks_expect(chunks, &e, id, 0, first > next ? first : next,
+                           first + rows - (first > next ? first : next));
     ebpo_expect_all(&e);
 }
 
-/* Rows of a decoded array: those of `single` (ascending), then [first, first + rows). Chunks stay pinned while rows are in them. */
-static ebpo_status gather(ebpo_chunks *chunks, ebpo_array_id id, size_t row_bytes, const uint32_t *single, uint64_t singles, uint64_t first,
-                          uint64_t rows, void *out, ebpo_error *error)
+/* Rows of a decoded array: those of `single` (ascending), then [first, first + rows). Chunks stay
+ * pinned while rows are in them. */
+static ebpo_status gather(ebpo_chunks *chunks, ebpo_array_id id, size_t row_bytes,
+                          const uint32_t *single, uint64_t singles, uint64_t first, uint64_t rows,
+                          void *out, ebpo_error *error)
 {
     ebpo_held_chunk view = { .array = ebpo_reader_array(chunks->file, id, 0) };
     ebpo_status status = EBPO_OK;
     uint8_t *to = out;
     expect_rows(chunks, id, single, singles, first, rows);
-    for (uint64_t i = 0; i < singles && (status = ebpo_held_chunk_move(chunks, &view, single[i], error)) == EBPO_OK; i++, to += row_bytes)
+    for (uint64_t i = 0;
+         i < singles && (status = ebpo_held_chunk_move(chunks, &view, single[i], error)) == EBPO_OK;
+         i++, to += row_bytes)
         memcpy(to, view.rows + (single[i] - view.begin) * row_bytes, row_bytes);
-    while (rows && status == EBPO_OK && (status = ebpo_held_chunk_move(chunks, &view, first, error)) == EBPO_OK) {
+    while (rows && status == EBPO_OK &&
+           (status = ebpo_held_chunk_move(chunks, &view, first, error)) == EBPO_OK) {
         uint64_t here = view.end - first < rows ? view.end - first : rows;
         memcpy(to, view.rows + (first - view.begin) * row_bytes, here * row_bytes);
         to += here * row_bytes;
@@ -63,14 +72,16 @@ static ebpo_status collect_outer(ebpo_slice *slice, ebpo_compact *outer, ebpo_er
 
 static void localise(ebpo_slice *slice, const ebpo_compact *outer)
 {
-    uint64_t less = slice->first_face - outer->count; /* the outer faces are some of those before the first */
+    /* the outer faces are some of those before the first */
+    uint64_t less = slice->first_face - outer->count;
     for (int i = 0; i < slice->level_count; i++) {
         ebpo_level *level = &slice->level[i];
         for (uint64_t k = 0; k < level->leaf_count; k++)
             level->leaf_first[k] -= less;
         for (uint64_t k = 0; k < level->ref_count; k++) {
             uint32_t ref = level->leaf_refs[k];
-            level->leaf_refs[k] = ref < slice->first_face ? ebpo_compact_find(outer, ref) : (uint32_t)(ref - less);
+            level->leaf_refs[k] =
+                ref < slice->first_face ? ebpo_compact_find(outer, ref) : (uint32_t)(ref - less);
         }
     }
 }
@@ -94,8 +105,10 @@ static ebpo_status number_faces(ebpo_slice *slice, ebpo_error *error)
 
 /* --- vertices --- */
 
-/* Vertices are numbered by first use, so those that are new in the slice's own faces are a range, [*begin, *end), and all others that it uses lie before. */
-static ebpo_status new_vertices(ebpo_slice *slice, ebpo_chunks *chunks, uint64_t *begin, uint64_t *end, ebpo_error *error)
+/* Vertices are numbered by first use, so those that are new in the slice's own faces are a range,
+ * [*begin, *end), and all others that it uses lie before. */
+static ebpo_status new_vertices(ebpo_slice *slice, ebpo_chunks *chunks, uint64_t *begin,
+                                uint64_t *end, ebpo_error *error)
 {
     ebpo_held_chunk view = { .array = ebpo_reader_array(chunks->file, EBPO_A_FACES, 0) };
     *begin = *end = UINT32_MAX; /* no own faces: all vertices are older */
@@ -104,7 +117,8 @@ static ebpo_status new_vertices(ebpo_slice *slice, ebpo_chunks *chunks, uint64_t
     ebpo_status status = ebpo_held_chunk_move(chunks, &view, slice->first_face, error);
     if (status != EBPO_OK)
         return status;
-    const uint32_t *corners = (const uint32_t *)(const void *)view.rows, *own = slice->mesh.faces + 3 * (uint64_t)slice->outer_count;
+    const uint32_t *corners = (const uint32_t *)(const void *)view.rows,
+                   *own = slice->mesh.faces + 3 * (uint64_t)slice->outer_count;
     uint64_t seen = chunks->seen ? chunks->seen[view.begin / view.array->shape.chunk_rows] : 0;
     uint32_t before = 0, within = 0; /* one past the largest; vertex numbers are below 2^32 - 2 */
     for (uint64_t i = 0; i < 3 * (slice->first_face - view.begin); i++)
@@ -117,7 +131,8 @@ static ebpo_status new_vertices(ebpo_slice *slice, ebpo_chunks *chunks, uint64_t
     return EBPO_OK;
 }
 
-static ebpo_status collect_older(const ebpo_mesh *mesh, uint64_t begin, ebpo_compact *older, ebpo_error *error)
+static ebpo_status collect_older(const ebpo_mesh *mesh, uint64_t begin, ebpo_compact *older,
+                                 ebpo_error *error)
 {
     uint64_t room = 0, corners = 3 * mesh->face_count;
     for (uint64_t i = 0; i < corners; i++)
@@ -134,7 +149,8 @@ static void renumber(ebpo_mesh *mesh, uint64_t begin, const ebpo_compact *older)
 {
     uint32_t less = (uint32_t)(begin - older->count);
     for (uint64_t i = 0; i < 3 * mesh->face_count; i++)
-        mesh->faces[i] = mesh->faces[i] < begin ? ebpo_compact_find(older, mesh->faces[i]) : mesh->faces[i] - less;
+        mesh->faces[i] = mesh->faces[i] < begin ? ebpo_compact_find(older, mesh->faces[i])
+                                                : mesh->faces[i] - less;
 }
 
 static ebpo_status take_vertices(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_error *error)
@@ -153,7 +169,8 @@ static ebpo_status take_vertices(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_er
         void *xyz = ebpo_alloc(mesh->vertex_count, row_bytes);
         mesh->xyz32 = wide ? NULL : xyz;
         mesh->xyz64 = wide ? xyz : NULL;
-        status = xyz ? gather(chunks, EBPO_A_VERTICES, row_bytes, older.sorted, older.count, begin, end - begin, xyz, error)
+        status = xyz ? gather(chunks, EBPO_A_VERTICES, row_bytes, older.sorted, older.count, begin,
+                              end - begin, xyz, error)
                      : ebpo_fail_memory(error, mesh->vertex_count * row_bytes);
     }
     ebpo_compact_free(&older);
@@ -167,8 +184,9 @@ static ebpo_status take_source(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_erro
     slice->face_source = ebpo_alloc(slice->mesh.face_count, sizeof *slice->face_source);
     if (!slice->face_source)
         return ebpo_fail_memory(error, slice->mesh.face_count * sizeof *slice->face_source);
-    return gather(chunks, EBPO_A_FACE_SOURCE, sizeof *slice->face_source, slice->outer, slice->outer_count, slice->first_face, slice->face_count,
-                  slice->face_source, error);
+    return gather(chunks, EBPO_A_FACE_SOURCE, sizeof *slice->face_source, slice->outer,
+                  slice->outer_count, slice->first_face, slice->face_count, slice->face_source,
+                  error);
 }
 
 ebpo_status ebpo_slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_error *error)
@@ -181,7 +199,8 @@ ebpo_status ebpo_slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_e
     slice->mesh.faces = ebpo_alloc(slice->mesh.face_count, ROW);
     if (!slice->mesh.faces)
         return ebpo_fail_memory(error, slice->mesh.face_count * ROW);
-    status = gather(chunks, EBPO_A_FACES, ROW, slice->outer, slice->outer_count, slice->first_face, slice->face_count, slice->mesh.faces, error);
+    status = gather(chunks, EBPO_A_FACES, ROW, slice->outer, slice->outer_count, slice->first_face,
+                    slice->face_count, slice->mesh.faces, error);
     if (status == EBPO_OK)
         status = take_vertices(slice, chunks, error);
     return status == EBPO_OK ? take_source(slice, chunks, error) : status;

@@ -1,5 +1,6 @@
-/* ebpo_tree_write: lays the file out once in memory to learn the sizes of its metadata, then writes headers, the chunks of the first levels, the index of large arrays' chunks, and
- * all other chunks, in one go. */
+/* ebpo_tree_write: lays the file out once in memory to learn the sizes of its metadata, then writes
+ * headers, the chunks of the first levels, the index of large arrays' chunks, and all other chunks,
+ * in one go. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,7 +20,8 @@
 /* Chunks that are in memory at a time: 8 MiB raw and as much encoded. */
 enum { WINDOW = 128 };
 
-/* HDF5 lets a header grow within its metadata block by a tenth of what is left there: room for that where no other header follows. */
+/* HDF5 lets a header grow within its metadata block by a tenth of what is left there: room for that
+ * where no other header follows. */
 enum { ALONE_BYTES = 4096 };
 
 typedef struct slot {
@@ -37,18 +39,21 @@ typedef struct writer {
     ebpo_h5_out out;
     ebpo_h5_id root;
     slot slots[WINDOW];
-    unsigned used;              /* slots */
-    ebpo_chunk_coder *coders;   /* one for each thread */
+    unsigned used;            /* slots */
+    ebpo_chunk_coder *coders; /* one for each thread */
     ebpo_content content;
     uint64_t chunk_bytes, chunks_done, chunks;
-    uint64_t head_bytes, index_bytes, index_at; /* headers; the index of arrays of several chunks, and where it begins (0: there is none, or not yet) */
+    /* headers; the index of arrays of several chunks, and where it begins (0: there is none, or not
+     * yet) */
+    uint64_t head_bytes, index_bytes, index_at;
 } writer;
 
 static ebpo_status make_level_groups(writer *w, ebpo_error *error)
 {
     const ebpo_info *info = &w->plan.info;
     ebpo_h5_id id;
-    ebpo_status status = ebpo_h5_make_group(&w->out, "/levels", (unsigned)info->level_count, &id, error);
+    ebpo_status status =
+        ebpo_h5_make_group(&w->out, "/levels", (unsigned)info->level_count, &id, error);
     ebpo_h5_close_id(status == EBPO_OK ? id : -1);
     for (int level = 0; level < info->level_count && status == EBPO_OK; level++) {
         char path[EBPO_PATH_BYTES];
@@ -85,11 +90,13 @@ typedef struct first_chunk {
     size_t bytes;
 } first_chunk;
 
-static ebpo_status make_array(writer *w, ebpo_array_out *a, const first_chunk *first, ebpo_error *error)
+static ebpo_status make_array(writer *w, ebpo_array_out *a, const first_chunk *first,
+                              ebpo_error *error)
 {
     ebpo_status status = ebpo_h5_make_array(&w->out, a->path, &a->shape, &a->handle, error);
     if (status == EBPO_OK && first)
-        status = ebpo_h5_put_chunk(&w->out, a->path, a->handle, &a->shape, 0, first->data, first->bytes, error);
+        status = ebpo_h5_put_chunk(&w->out, a->path, a->handle, &a->shape, 0, first->data,
+                                   first->bytes, error);
     if (status == EBPO_OK)
         status = ebpo_h5_put_text(&w->out, a->handle, "coding", ebpo_schema[a->id].coding, error);
     if (status == EBPO_OK)
@@ -97,8 +104,10 @@ static ebpo_status make_array(writer *w, ebpo_array_out *a, const first_chunk *f
     return status;
 }
 
-/* Everything but the chunks, and the first of these, before the first header grows by attributes: HDF5 then cannot grow the metadata block at the end of the file, but only fill it. */
-static ebpo_status lay_out(writer *w, const char *path, const char *shown, uint64_t head_bytes, first_chunk first, ebpo_error *error)
+/* Everything but the chunks, and the first of these, before the first header grows by attributes:
+ * HDF5 then cannot grow the metadata block at the end of the file, but only fill it. */
+static ebpo_status lay_out(writer *w, const char *path, const char *shown, uint64_t head_bytes,
+                           first_chunk first, ebpo_error *error)
 {
     ebpo_plan *plan = &w->plan;
     w->out.codec_level = w->options->codec_level;
@@ -130,7 +139,8 @@ static void close_handles(writer *w)
 static ebpo_status measure_metadata(writer *w, const char *shown, ebpo_error *error)
 {
     ebpo_plan *plan = &w->plan;
-    uint64_t room = (256 << 10) + (4 << 10) * (uint64_t)plan->count + 32 * w->chunks, headers = 0, all = 0;
+    uint64_t room = (256 << 10) + (4 << 10) * (uint64_t)plan->count + 32 * w->chunks, headers = 0,
+             all = 0;
     bool indexed = false;
     ebpo_status status = lay_out(w, NULL, shown, room, (first_chunk){ "", 1 }, error);
     if (status == EBPO_OK)
@@ -148,7 +158,8 @@ static ebpo_status measure_metadata(writer *w, const char *shown, ebpo_error *er
     w->head_bytes = (headers + 8 + 7) / 8 * 8; /* the last checksum may end in zero bytes */
     if (plan->count == 1)
         w->head_bytes += ALONE_BYTES;
-    w->index_bytes = indexed ? (all - headers + 8 + 7) / 8 * 8 : 0; /* not by the sizes, which are too small where a checksum ends in zero bytes */
+    /* not by the sizes, which are too small where a checksum ends in zero bytes */
+    w->index_bytes = indexed ? (all - headers + 8 + 7) / 8 * 8 : 0;
     return status;
 }
 
@@ -160,11 +171,13 @@ static ebpo_status begin_index(writer *w, const char *path, ebpo_error *error)
     if (status == EBPO_OK)
         status = ebpo_h5_root(&w->out, &w->root, error);
     for (unsigned i = 0; i < w->plan.count && status == EBPO_OK; i++)
-        status = ebpo_h5_open_array(&w->out, w->plan.array[i].path, &w->plan.array[i].handle, error);
+        status =
+            ebpo_h5_open_array(&w->out, w->plan.array[i].path, &w->plan.array[i].handle, error);
     return status;
 }
 
-static ebpo_status fill_slot(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status fill_slot(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                             ebpo_error *error)
 {
     writer *w = context;
     (void)worker;
@@ -172,7 +185,9 @@ static ebpo_status fill_slot(void *context, uint64_t begin, uint64_t end, unsign
     for (uint64_t i = begin; i < end; i++) {
         slot *s = &w->slots[i];
         const ebpo_h5_shape *shape = &s->array->shape;
-        uint64_t row = s->chunk * shape->chunk_rows, rows = shape->rows - row < shape->chunk_rows ? shape->rows - row : shape->chunk_rows;
+        uint64_t row = s->chunk * shape->chunk_rows, rows = shape->rows - row < shape->chunk_rows
+                                                                ? shape->rows - row
+                                                                : shape->chunk_rows;
         size_t bytes = rows * ebpo_h5_row_bytes(shape);
         s->raw_bytes = shape->chunk_rows * ebpo_h5_row_bytes(shape);
         ebpo_plan_encode(&w->plan, s->array, row, rows, s->raw);
@@ -195,7 +210,8 @@ static void digest_slots(writer *w)
 }
 
 /* Item 0 digests the whole window, the others compress one slot each. */
-static ebpo_status compress_slot(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status compress_slot(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
 {
     writer *w = context;
     for (uint64_t i = begin; i < end; i++) {
@@ -204,10 +220,13 @@ static ebpo_status compress_slot(void *context, uint64_t begin, uint64_t end, un
             continue;
         }
         slot *s = &w->slots[i - 1];
-        ebpo_status status = ebpo_chunk_encode(&w->coders[worker], s->array->shape.pipeline, w->options->codec_level,
-                                               s->array->shape.element_size, s->raw, s->raw_bytes, s->stored, &s->stored_bytes);
+        ebpo_status status =
+            ebpo_chunk_encode(&w->coders[worker], s->array->shape.pipeline, w->options->codec_level,
+                              s->array->shape.element_size, s->raw, s->raw_bytes, s->stored,
+                              &s->stored_bytes);
         if (status != EBPO_OK)
-            return ebpo_fail(error, status, "%s: %s: a chunk could not be compressed", w->out.shown, s->array->path);
+            return ebpo_fail(error, status, "%s: %s: a chunk could not be compressed", w->out.shown,
+                             s->array->path);
     }
     return EBPO_OK;
 }
@@ -217,7 +236,8 @@ static ebpo_status encode_window(writer *w, ebpo_error *error)
     unsigned threads = w->used > 4 ? w->threads : 1;
     ebpo_status status = ebpo_parallel_for(threads, w->used, 1, fill_slot, w, NULL, "write", error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, w->used + 1u, 1, compress_slot, w, NULL, "write", error);
+        status =
+            ebpo_parallel_for(threads, w->used + 1u, 1, compress_slot, w, NULL, "write", error);
     return status;
 }
 
@@ -231,7 +251,8 @@ static ebpo_status flush_window(writer *w, ebpo_error *error)
         w->chunk_bytes += s->stored_bytes;
         if (w->chunks_done++ == 0)
             continue; /* written by lay_out */
-        status = ebpo_h5_put_chunk(&w->out, s->array->path, s->array->handle, &s->array->shape, s->chunk, s->stored, s->stored_bytes, error);
+        status = ebpo_h5_put_chunk(&w->out, s->array->path, s->array->handle, &s->array->shape,
+                                   s->chunk, s->stored, s->stored_bytes, error);
     }
     w->used = 0;
     ebpo_workspace_settle(w->plan.tree->mesh.workspace);
@@ -258,7 +279,8 @@ static ebpo_status write_chunks(writer *w, ebpo_error *error)
 
 static ebpo_status make_window(writer *w, ebpo_error *error)
 {
-    size_t bound = ebpo_chunk_bound(EBPO_CHUNK_BYTES_MAX), slot_bytes = EBPO_CHUNK_BYTES_MAX + bound;
+    size_t bound = ebpo_chunk_bound(EBPO_CHUNK_BYTES_MAX),
+           slot_bytes = EBPO_CHUNK_BYTES_MAX + bound;
     uint64_t wanted = w->chunks < WINDOW ? w->chunks : WINDOW;
     w->threads = ebpo_thread_count(w->options->threads);
     w->coders = ebpo_alloc_zero(w->threads, sizeof *w->coders);
@@ -307,20 +329,30 @@ static ebpo_status write_file(writer *w, const char *path, const char *shown, eb
         status = ebpo_facts_put_index(&w->out, w->root, w->index_at, w->index_bytes, error);
     close_handles(w);
     if (status == EBPO_OK)
-        status = ebpo_h5_finish(&w->out, error); /* another libhdf5 may have placed metadata otherwise: no reader relies on it, tests do */
+        /* another libhdf5 may have placed metadata otherwise: no reader relies on it, tests do */
+        status = ebpo_h5_finish(&w->out, error);
     return status;
 }
 
-static ebpo_status check_options(const ebpo_write_options *options, const char *path, ebpo_error *error)
+static ebpo_status check_options(const ebpo_write_options *options, const char *path,
+                                 ebpo_error *error)
 {
-    int most = options->codec == EBPO_CODEC_ZSTD ? 22 : options->codec == EBPO_CODEC_DEFLATE ? 9 : 0;
-    if ((unsigned)options->codec > EBPO_CODEC_NONE || options->codec_level < 0 || options->codec_level > most)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: no such codec or codec level; zstd takes 1 to 22, deflate 1 to 9, none takes 0", path);
+    int most = options->codec == EBPO_CODEC_ZSTD      ? 22
+               : options->codec == EBPO_CODEC_DEFLATE ? 9
+                                                      : 0;
+    if ((unsigned)options->codec > EBPO_CODEC_NONE || options->codec_level < 0 ||
+        options->codec_level > most)
+        return ebpo_fail(
+            error, EBPO_E_ARGUMENT,
+            "%s: no such codec or codec level; zstd takes 1 to 22, deflate 1 to 9, none takes 0",
+            path);
     return EBPO_OK;
 }
 
 /* Publishes the file under its name; without `publish` writes right into `path`. */
-static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const char *shown, ebpo_publish *publish, const ebpo_write_options *options, ebpo_error *error)
+static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const char *shown,
+                              ebpo_publish *publish, const ebpo_write_options *options,
+                              ebpo_error *error)
 {
     static const ebpo_write_options usual = EBPO_WRITE_OPTIONS_INIT;
     writer *w = ebpo_alloc_zero(1, sizeof *w);
@@ -356,7 +388,8 @@ static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const cha
     return status;
 }
 
-ebpo_status ebpo_tree_write(const ebpo_tree *tree, const char *path, const ebpo_write_options *options, ebpo_error *error)
+ebpo_status ebpo_tree_write(const ebpo_tree *tree, const char *path,
+                            const ebpo_write_options *options, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_publish publish = EBPO_PUBLISH_INIT;
@@ -365,7 +398,8 @@ ebpo_status ebpo_tree_write(const ebpo_tree *tree, const char *path, const ebpo_
     return status;
 }
 
-ebpo_status ebpo_tree_write_into(const ebpo_tree *tree, const char *path, const char *shown, const ebpo_write_options *options, ebpo_error *error)
+ebpo_status ebpo_tree_write_into(const ebpo_tree *tree, const char *path, const char *shown,
+                                 const ebpo_write_options *options, ebpo_error *error)
 {
     return write_tree(tree, path, shown, NULL, options, error);
 }

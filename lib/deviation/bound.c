@@ -10,7 +10,8 @@
 #include "base/error.h"
 #include "query/model.h"
 
-ebpo_status ebpo_bounder_make(ebpo_bounder *out, const ebpo_lod_model *whole, ebpo_model *model, ebpo_error *error)
+ebpo_status ebpo_bounder_make(ebpo_bounder *out, const ebpo_lod_model *whole, ebpo_model *model,
+                              ebpo_error *error)
 {
     memset(out, 0, sizeof *out);
     out->whole = whole;
@@ -37,7 +38,8 @@ static void find_centre(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_look
         l->centre[k] = 0;
         for (int i = 0; i < p->vertex_count; i++)
             l->centre[k] += p->vertex[i][k];
-        l->centre[k] = fmin(fmax(l->centre[k] / p->vertex_count, fmax(e.min[k], 0)), fmin(e.max[k], 1));
+        l->centre[k] =
+            fmin(fmax(l->centre[k] / p->vertex_count, fmax(e.min[k], 0)), fmin(e.max[k], 1));
     }
     for (int i = 0; i < p->vertex_count; i++)
         l->reach = fmax(l->reach, ebpo_cell_frame_apart(&b->frame, p->vertex[i], l->centre));
@@ -65,13 +67,15 @@ static bool is_in_envelope(const ebpo_bounder *b, const double xi[3])
     return true;
 }
 
-/* Pieces reach a little beyond the envelope, and where it is sharp all of a piece may lie there. So a point outside is pulled towards the middle until it is inside: its distance changes by no more than it
- * was moved. */
+/* Pieces reach a little beyond the envelope, and where it is sharp all of a piece may lie there. So
+ * a point outside is pulled towards the middle until it is inside: its distance changes by no more
+ * than it was moved. */
 static void pull_in(const ebpo_bounder *b, const double xi[3], double out[3])
 {
     double share = 0;
     for (int i = 0; i < b->halves.count; i++) {
-        double n[3], d = ebpo_plane_as_double(b->halves.half[i].n, b->halves.half[i].d, n) - 2e-12, at = -d, middle = -d;
+        double n[3], d = ebpo_plane_as_double(b->halves.half[i].n, b->halves.half[i].d, n) - 2e-12,
+                     at = -d, middle = -d;
         for (int k = 0; k < 3; k++) {
             at += n[k] * xi[k];
             middle += n[k] * b->inner[k];
@@ -108,17 +112,22 @@ static ebpo_status look_at(ebpo_bounder *b, const ebpo_piece *piece, ebpo_look *
     memcpy(l->face, b->context->warm_triangle, sizeof l->face);
     learn(b, l->centre, l->distance);
     for (int i = 0; i < piece->p.vertex_count; i++) {
-        double d = ebpo_cell_frame_distance(&b->frame, piece->p.vertex[i], (const double (*)[3])l->face);
+        double d =
+            ebpo_cell_frame_distance(&b->frame, piece->p.vertex[i], (const double(*)[3])l->face);
         farthest = d > corner ? i : farthest;
         corner = fmax(corner, d);
     }
-    l->upper = fmin(fmin(piece->upper, corner), fmax(0, l->distance + l->reach)) + 4 * b->frame.grain;
+    l->upper =
+        fmin(fmin(piece->upper, corner), fmax(0, l->distance + l->reach)) + 4 * b->frame.grain;
     if (l->upper <= b->target || (l->distance < 0 && corner <= -l->distance))
         return EBPO_OK;
     /* The likeliest place of the largest distance: that corner, moved off the rounded surface. */
     double xi[3], d;
     for (int k = 0; k < 3; k++)
-        xi[k] = fmin(fmax(piece->p.vertex[farthest][k] + 1e-5 * (l->centre[k] - piece->p.vertex[farthest][k]), 0), 1);
+        xi[k] = fmin(fmax(piece->p.vertex[farthest][k] +
+                              1e-5 * (l->centre[k] - piece->p.vertex[farthest][k]),
+                          0),
+                     1);
     status = ask(b, xi, &d);
     if (status == EBPO_OK)
         learn(b, xi, d);
@@ -132,11 +141,18 @@ static ebpo_status begin(ebpo_bounder *b)
     ebpo_tree_place place;
     ebpo_piece *first = NULL;
     if (!ebpo_tree_find(b->whole, b->frame.cell, false, false, &place, NULL))
-        return ebpo_fail(b->error, EBPO_E_ARGUMENT, "the model has no node of level %d where the level has one: they are not of the same file", b->frame.cell.level);
+        return ebpo_fail(b->error, EBPO_E_ARGUMENT,
+                         "the model has no node of level %d where the level has one: they are not "
+                         "of the same file",
+                         b->frame.cell.level);
     b->piece_count = b->face_count = 0;
     if (place.type == EBPO_BLACK)
         return EBPO_OK;
-    ebpo_status status = ebpo_piece_push(b, place.type == EBPO_GRAY ? EBPO_PIECE_GRAY : place.type == EBPO_LEAF ? EBPO_PIECE_LEAF : EBPO_PIECE_OUT, NULL, &first);
+    ebpo_status status = ebpo_piece_push(b,
+                                         place.type == EBPO_GRAY   ? EBPO_PIECE_GRAY
+                                         : place.type == EBPO_LEAF ? EBPO_PIECE_LEAF
+                                                                   : EBPO_PIECE_OUT,
+                                         NULL, &first);
     if (status != EBPO_OK)
         return status;
     ebpo_halves_cut(&b->halves, EBPO_CUT_SLACK, &first->p);
@@ -158,7 +174,8 @@ static ebpo_status step(ebpo_bounder *b)
     ebpo_polytope_copy(&piece.p, &top->p);
     b->face_count = piece.face_first + piece.face_count;
     if (piece.kind != EBPO_PIECE_OUT)
-        piece.upper = fmin(piece.upper, ebpo_cell_frame_diagonal(&b->frame, piece.levels) + piece.beyond);
+        piece.upper =
+            fmin(piece.upper, ebpo_cell_frame_diagonal(&b->frame, piece.levels) + piece.beyond);
     if (piece.upper <= b->target) {
         ebpo_bound_settle(b, piece.upper);
         return EBPO_OK;
@@ -174,7 +191,8 @@ static ebpo_status step(ebpo_bounder *b)
     return ebpo_piece_cut(b, &piece, &l);
 }
 
-ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound_wish *wish, ebpo_reach_bound *out, ebpo_error *error)
+ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound_wish *wish,
+                                ebpo_reach_bound *out, ebpo_error *error)
 {
     ebpo_box box = b->whole->box;
     ebpo_cell_frame_make(&b->frame, &box, cell);
@@ -185,11 +203,15 @@ ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell, const ebpo_boun
     b->lo = b->hi = 0;
     b->questions = 0;
     ebpo_status status = begin(b);
-    while (status == EBPO_OK && b->piece_count && b->questions < wish->questions && b->lo <= b->quit)
+    while (status == EBPO_OK && b->piece_count && b->questions < wish->questions &&
+           b->lo <= b->quit)
         status = step(b);
     for (uint64_t i = 0; i < b->piece_count; i++)
         ebpo_bound_settle(b, b->pieces[i].upper);
-    *out = (ebpo_reach_bound){ b->lo > 0 ? ldexp(b->lo, b->frame.exponent) : 0, ebpo_cell_frame_model_length(&b->frame, b->hi), { b->place[0], b->place[1], b->place[2] }, b->questions };
+    *out = (ebpo_reach_bound){ b->lo > 0 ? ldexp(b->lo, b->frame.exponent) : 0,
+                               ebpo_cell_frame_model_length(&b->frame, b->hi),
+                               { b->place[0], b->place[1], b->place[2] },
+                               b->questions };
     return status;
 }
 
@@ -203,7 +225,8 @@ static void merge(ebpo_reach_bound *known, const ebpo_reach_bound *found)
     memcpy(known->place, found->place, sizeof known->place);
 }
 
-ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound_wish *wish, ebpo_reach_bound *out, ebpo_error *error)
+ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound_wish *wish,
+                               ebpo_reach_bound *out, ebpo_error *error)
 {
     ebpo_reach_bound found;
     ebpo_bound_wish now = *wish;
@@ -213,11 +236,13 @@ ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound
         ebpo_cell_frame frame;
         ebpo_box box = b->whole->box;
         ebpo_cell_frame_make(&frame, &box, cell);
-        out->hi = ebpo_cell_frame_model_length(&frame, ebpo_cell_frame_diagonal(&frame, 0)); /* a gray node or leaf touches a face */
+        /* a gray node or leaf touches a face */
+        out->hi = ebpo_cell_frame_model_length(&frame, ebpo_cell_frame_diagonal(&frame, 0));
     }
     for (;;) {
         double good = fmax(wish->enough, wish->ratio * out->lo);
-        if (status != EBPO_OK || out->hi <= good || asked >= wish->questions || out->lo > wish->too_much)
+        if (status != EBPO_OK || out->hi <= good || asked >= wish->questions ||
+            out->lo > wish->too_much)
             return status;
         now.enough = fmax(out->hi / 2, good);
         now.questions = wish->questions - asked;

@@ -23,14 +23,17 @@ bool ebpo_cut_axis(const ebpo_polytope *p, int axis, int side, double at, ebpo_p
     double n[3] = { 0, 0, 0 };
     ebpo_extent e;
     ebpo_extent_of(p, &e);
-    /* Clipping gives up where next to nothing would be left, and a box around a thin part reaches far beyond it. So thin parts go with the thick ones. */
-    bool high_is_thin = e.max[axis] - at <= EBPO_CUT_THIN, low_is_thin = !high_is_thin && at - e.min[axis] <= EBPO_CUT_THIN;
+    /* Clipping gives up where next to nothing would be left, and a box around a thin part reaches
+     * far beyond it. So thin parts go with the thick ones. */
+    bool high_is_thin = e.max[axis] - at <= EBPO_CUT_THIN,
+         low_is_thin = !high_is_thin && at - e.min[axis] <= EBPO_CUT_THIN;
     if (side ? high_is_thin : low_is_thin)
         return false;
     ebpo_polytope_copy(out, p);
     n[axis] = side ? -1 : 1;
     if (!high_is_thin && !low_is_thin)
-        (void)ebpo_polytope_clip(out, n, (side ? -at : at) + EBPO_CUT_SLACK, CUT_TAG); /* where it gives up all the same, too much is kept */
+        /* where it gives up all the same, too much is kept */
+        (void)ebpo_polytope_clip(out, n, (side ? -at : at) + EBPO_CUT_SLACK, CUT_TAG);
     return true;
 }
 

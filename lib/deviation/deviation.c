@@ -1,4 +1,5 @@
-/* A level's bounds are those of its nodes. A short look at each gives bounds that dismiss most; the others are searched in the order of what they may reach. */
+/* A level's bounds are those of its nodes. A short look at each gives bounds that dismiss most; the
+ * others are searched in the order of what they may reach. */
 #include "geom/strict_fp.h"
 
 #include <ebpo/deviation.h>
@@ -15,7 +16,8 @@
 #include "deviation/samples.h"
 #include "query/model.h"
 
-enum { BLOCK_MOST = 512, QUESTIONS_MOST = 1 << 16 }; /* of one node: what is left to find then lies in flat places, close to the model */
+/* of one node: what is left to find then lies in flat places, close to the model */
+enum { BLOCK_MOST = 512, QUESTIONS_MOST = 1 << 16 };
 
 typedef struct level_node {
     ebpo_cell cell;
@@ -30,7 +32,7 @@ typedef struct survey {
     ebpo_bounder *bounders; /* [threads] */
     unsigned threads;
     ebpo_bound_wish wish;
-    uint64_t first;         /* of `order`, of the block at hand */
+    uint64_t first; /* of `order`, of the block at hand */
     const ebpo_progress *progress;
     ebpo_error *error;
 } survey;
@@ -72,10 +74,12 @@ static ebpo_status bound_node(survey *s, ebpo_bounder *b, level_node *node, ebpo
         status = ebpo_tree_derive(s->tree, &place, &b->scratch, &b->halves, error);
     if (status != EBPO_OK)
         return status;
-    return s->wish.ratio > 0 ? ebpo_bound_closely(b, node->cell, &s->wish, &node->bound, error) : ebpo_bound_envelope(b, node->cell, &s->wish, &node->bound, error);
+    return s->wish.ratio > 0 ? ebpo_bound_closely(b, node->cell, &s->wish, &node->bound, error)
+                             : ebpo_bound_envelope(b, node->cell, &s->wish, &node->bound, error);
 }
 
-static ebpo_status bound_some(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status bound_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
 {
     survey *s = context;
     ebpo_status status = EBPO_OK;
@@ -132,7 +136,8 @@ static uint64_t count_questions(const survey *s)
     return sum;
 }
 
-/* Blocks are what is decided together, for any number of threads: what one block finds is known to the next. */
+/* Blocks are what is decided together, for any number of threads: what one block finds is known to
+ * the next. */
 static ebpo_status search(survey *s, const ebpo_deviation_options *o, ebpo_deviation *out)
 {
     uint64_t done = 0, block = 4, asked = count_questions(s);
@@ -141,7 +146,8 @@ static ebpo_status search(survey *s, const ebpo_deviation_options *o, ebpo_devia
     while (done < s->count && status == EBPO_OK && (!o->questions || asked < o->questions)) {
         uint64_t size = 0;
         s->wish.enough = (1 + o->tolerance) * out->lo;
-        while (size < block && done + size < s->count && s->nodes[s->order[done + size]].bound.hi > s->wish.enough)
+        while (size < block && done + size < s->count &&
+               s->nodes[s->order[done + size]].bound.hi > s->wish.enough)
             size++;
         if (!size)
             break;
@@ -157,8 +163,10 @@ static ebpo_status search(survey *s, const ebpo_deviation_options *o, ebpo_devia
         gather(s, done, done + size, out);
         done += size;
         block = block < BLOCK_MOST ? 2 * block : block;
-        if (status == EBPO_OK && s->progress->report && !s->progress->report(s->progress->user, "bounding envelopes", done, s->count))
-            status = ebpo_fail(s->error, EBPO_E_CANCELLED, "stopped on request while envelopes were bounded");
+        if (status == EBPO_OK && s->progress->report &&
+            !s->progress->report(s->progress->user, "bounding envelopes", done, s->count))
+            status = ebpo_fail(s->error, EBPO_E_CANCELLED,
+                               "stopped on request while envelopes were bounded");
     }
     return status;
 }
@@ -174,7 +182,8 @@ static ebpo_status bound_level(survey *s, const ebpo_deviation_options *o, ebpo_
         s->order[i] = i;
     s->wish = (ebpo_bound_wish){ 0, INFINITY, 0, 1 };
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(s->threads, s->count, 16, bound_some, s, s->progress, "looking at envelopes", s->error);
+        status = ebpo_parallel_for(s->threads, s->count, 16, bound_some, s, s->progress,
+                                   "looking at envelopes", s->error);
     if (status == EBPO_OK)
         status = sort_nodes(s);
     if (status != EBPO_OK)
@@ -199,43 +208,66 @@ static ebpo_status make_bounders(survey *s, ebpo_model *model)
     return status;
 }
 
-/* What shows that the file is no subset of the model's; NULL: nothing. Digests cannot, as subsets of subsets name only the first file, or none when all nodes were kept. */
+/* What shows that the file is no subset of the model's; NULL: nothing. Digests cannot, as subsets
+ * of subsets name only the first file, or none when all nodes were kept. */
 static const char *find_difference(const ebpo_info *info, const ebpo_info *model)
 {
-    if (memcmp(info->box_origin, model->box_origin, sizeof info->box_origin) != 0 || memcmp(info->box_size, model->box_size, sizeof info->box_size) != 0)
+    if (memcmp(info->box_origin, model->box_origin, sizeof info->box_origin) != 0 ||
+        memcmp(info->box_size, model->box_size, sizeof info->box_size) != 0)
         return "root cells";
-    if (memcmp(info->content_sha256, model->content_sha256, sizeof info->content_sha256) == 0 || (info->pruned && memcmp(info->subset_of, model->content_sha256, sizeof info->subset_of) == 0))
+    if (memcmp(info->content_sha256, model->content_sha256, sizeof info->content_sha256) == 0 ||
+        (info->pruned &&
+         memcmp(info->subset_of, model->content_sha256, sizeof info->subset_of) == 0))
         return NULL;
-    if (memcmp(info->source_sha256, model->source_sha256, sizeof info->source_sha256) != 0 || info->source_vertex_count != model->source_vertex_count ||
+    if (memcmp(info->source_sha256, model->source_sha256, sizeof info->source_sha256) != 0 ||
+        info->source_vertex_count != model->source_vertex_count ||
         info->source_face_count != model->source_face_count)
         return "sources";
-    if (info->solid != model->solid || info->rule != model->rule || info->max_level != model->max_level || info->leaf_faces != model->leaf_faces || info->epsilon != model->epsilon ||
-        info->selection != model->selection || info->percent != model->percent || info->k_root != model->k_root || info->seed != model->seed)
+    if (info->solid != model->solid || info->rule != model->rule ||
+        info->max_level != model->max_level || info->leaf_faces != model->leaf_faces ||
+        info->epsilon != model->epsilon || info->selection != model->selection ||
+        info->percent != model->percent || info->k_root != model->k_root ||
+        info->seed != model->seed)
         return "ways of building";
     return NULL;
 }
 
-static ebpo_status check(const ebpo_info *info, const ebpo_info *model, int level, const ebpo_deviation_options *o, ebpo_error *error)
+static ebpo_status check(const ebpo_info *info, const ebpo_info *model, int level,
+                         const ebpo_deviation_options *o, ebpo_error *error)
 {
     if (level < 0 || level >= info->level_count)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "there is no level %d; this file has levels 0 to %d", level, info->level_count - 1);
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "there is no level %d; this file has levels 0 to %d", level,
+                         info->level_count - 1);
     if (!(o->tolerance > 0) || !(o->tolerance <= 1e6))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "tolerance %g: give a number above 0, such as 0.05", o->tolerance);
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "tolerance %g: give a number above 0, such as 0.05", o->tolerance);
     if (o->samples > UINT32_MAX)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "more than 4294967295 samples; a million tell the mean to three digits");
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "more than 4294967295 samples; a million tell the mean to three digits");
     const char *differ = find_difference(info, model);
     if (differ)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "the file is neither the model's nor a subset of it: their %s differ; open the model of the file it was taken from", differ);
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "the file is neither the model's nor a subset of it: their %s differ; "
+                         "open the model of the file it was taken from",
+                         differ);
     return EBPO_OK;
 }
 
-ebpo_status ebpo_deviation_level(ebpo_model *model, ebpo_file *file, int level, const ebpo_deviation_options *options, ebpo_deviation *out, ebpo_error *error)
+ebpo_status ebpo_deviation_level(ebpo_model *model, ebpo_file *file, int level,
+                                 const ebpo_deviation_options *options, ebpo_deviation *out,
+                                 ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     static const ebpo_deviation_options usual = EBPO_DEVIATION_OPTIONS_INIT;
     const ebpo_deviation_options *o = options ? options : &usual;
     ebpo_lod_model whole = { 0 }, own = { 0 };
-    survey s = { .level = level, .threads = ebpo_thread_count(o->threads), .progress = &o->progress, .error = error, .whole = &whole, .tree = &whole };
+    survey s = { .level = level,
+                 .threads = ebpo_thread_count(o->threads),
+                 .progress = &o->progress,
+                 .error = error,
+                 .whole = &whole,
+                 .tree = &whole };
     *out = (ebpo_deviation){ .mean = NAN, .rms = NAN };
     ebpo_status status = check(ebpo_file_info(file), model->info, level, o, error);
     if (status == EBPO_OK)

@@ -6,7 +6,8 @@
 
 #include "geom/distance.h"
 
-static const double up = 1 + 0x1p-40; /* outweighs the few roundings of a sum of squares and its root */
+/* outweighs the few roundings of a sum of squares and its root */
+static const double up = 1 + 0x1p-40;
 
 void ebpo_cell_frame_make(ebpo_cell_frame *out, const ebpo_box *box, ebpo_cell cell)
 {
@@ -25,13 +26,16 @@ void ebpo_cell_frame_make(ebpo_cell_frame *out, const ebpo_box *box, ebpo_cell c
     for (int k = 0; k < 3; k++)
         out->side[k] = out->size[k] * out->factor[0] * out->factor[1];
     /* A few ulp of the largest coordinate, and of the least number there is. */
-    out->grain = 0x1p-49 * ebpo_cell_frame_length(out, largest) + 0x1p-50 + ebpo_cell_frame_length(out, 0x1p-1070);
+    out->grain = 0x1p-49 * ebpo_cell_frame_length(out, largest) + 0x1p-50 +
+                 ebpo_cell_frame_length(out, 0x1p-1070);
 }
 
 void ebpo_cell_frame_point(const ebpo_cell_frame *f, const double xi[3], double out[3])
 {
     for (int k = 0; k < 3; k++) {
-        double x = xi[k] <= 0 ? f->low[k] : xi[k] >= 1 ? f->high[k] : f->low[k] + xi[k] * f->size[k];
+        double x = xi[k] <= 0   ? f->low[k]
+                   : xi[k] >= 1 ? f->high[k]
+                                : f->low[k] + xi[k] * f->size[k];
         out[k] = fmin(fmax(x, f->low[k]), f->high[k]);
     }
 }
@@ -65,7 +69,8 @@ double ebpo_cell_frame_diagonal(const ebpo_cell_frame *f, int levels)
     return sqrt(sum) * up * (1 + 1 / 128.0) * ebpo_half_power(levels) + f->grain;
 }
 
-double ebpo_cell_frame_distance(const ebpo_cell_frame *f, const double xi[3], const double triangle[3][3])
+double ebpo_cell_frame_distance(const ebpo_cell_frame *f, const double xi[3],
+                                const double triangle[3][3])
 {
     double p[3], t[3][3];
     ebpo_distance_bounds bounds;
@@ -75,11 +80,12 @@ double ebpo_cell_frame_distance(const ebpo_cell_frame *f, const double xi[3], co
         for (int i = 0; i < 3; i++)
             t[i][k] = ebpo_cell_frame_length(f, triangle[i][k]);
     }
-    ebpo_triangle_distance_bounds(p, (const double (*)[3])t, &bounds);
+    ebpo_triangle_distance_bounds(p, (const double(*)[3])t, &bounds);
     return bounds.hi + f->grain;
 }
 
-double ebpo_cell_frame_triangle(const ebpo_cell_frame *f, const double triangle[3][3], double out[3][3])
+double ebpo_cell_frame_triangle(const ebpo_cell_frame *f, const double triangle[3][3],
+                                double out[3][3])
 {
     double largest = 1, least = INFINITY;
     for (int k = 0; k < 3; k++) {

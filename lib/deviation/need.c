@@ -11,10 +11,13 @@
 #include "base/parallel.h"
 #include "deviation/bound.h"
 
-enum { QUESTIONS = 4096 }; /* a node that takes more is refined: its children's envelopes are smaller and closer */
+/* a node that takes more is refined: its children's envelopes are smaller and closer */
+enum { QUESTIONS = 4096 };
 
-/* The least max_error that was found to be enough, the largest one that was not, and a certain lower bound. A search for a larger max_error asks no more and settles at no more (bound.h), so
- * these tell what it would find; an upper bound from another search would not, as this one might run out of questions just above it. */
+/* The least max_error that was found to be enough, the largest one that was not, and a certain
+ * lower bound. A search for a larger max_error asks no more and settles at no more (bound.h), so
+ * these tell what it would find; an upper bound from another search would not, as this one might
+ * run out of questions just above it. */
 typedef struct memory {
     double enough, failed, lo;
 } memory;
@@ -39,7 +42,8 @@ static memory *new_memory(uint64_t count)
     return out;
 }
 
-ebpo_status ebpo_need_open(ebpo_need **out, ebpo_file *file, bool planes, unsigned threads, ebpo_progress progress, ebpo_error *error)
+ebpo_status ebpo_need_open(ebpo_need **out, ebpo_file *file, bool planes, unsigned threads,
+                           ebpo_progress progress, ebpo_error *error)
 {
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
     ebpo_need *n = *out = ebpo_alloc_zero(1, sizeof *n);
@@ -61,7 +65,9 @@ ebpo_status ebpo_need_open(ebpo_need **out, ebpo_file *file, bool planes, unsign
         n->gray[i] = new_memory(n->tree.level[i].gray_count);
         n->leaf[i] = new_memory(n->tree.level[i].leaf_count);
         if (!n->gray[i] || !n->leaf[i])
-            status = ebpo_fail_memory(error, (n->tree.level[i].gray_count + n->tree.level[i].leaf_count) * sizeof(memory));
+            status = ebpo_fail_memory(error,
+                                      (n->tree.level[i].gray_count + n->tree.level[i].leaf_count) *
+                                          sizeof(memory));
     }
     if (status != EBPO_OK) {
         ebpo_need_close(n);
@@ -94,13 +100,18 @@ static ebpo_status judge(ebpo_need *n, ebpo_bounder *b, ebpo_need_node *node, eb
     node->enough = false;
     if (!node->asked)
         return EBPO_OK;
-    if (!ebpo_tree_find(&n->tree, node->cell, false, false, &place, NULL) || (place.type != EBPO_GRAY && place.type != EBPO_LEAF))
-        return ebpo_fail(error, EBPO_E_FORMAT, "level %d: a node is missing in its tree; run ebpo verify", node->cell.level);
-    memory *m = place.type == EBPO_GRAY ? &n->gray[node->cell.level][place.rank] : &n->leaf[node->cell.level][place.rank];
+    if (!ebpo_tree_find(&n->tree, node->cell, false, false, &place, NULL) ||
+        (place.type != EBPO_GRAY && place.type != EBPO_LEAF))
+        return ebpo_fail(error, EBPO_E_FORMAT,
+                         "level %d: a node is missing in its tree; run ebpo verify",
+                         node->cell.level);
+    memory *m = place.type == EBPO_GRAY ? &n->gray[node->cell.level][place.rank]
+                                        : &n->leaf[node->cell.level][place.rank];
     node->enough = n->max_error >= m->enough;
     if (node->enough || n->max_error <= m->failed || n->max_error < m->lo)
         return EBPO_OK;
-    (void)ebpo_tree_find(&n->tree, node->cell, n->planes, place.type == EBPO_GRAY, &place, &b->halves);
+    (void)ebpo_tree_find(&n->tree, node->cell, n->planes, place.type == EBPO_GRAY, &place,
+                         &b->halves);
     ebpo_status status = ebpo_bound_envelope(b, node->cell, &wish, &found, error);
     if (status != EBPO_OK)
         return status;
@@ -113,7 +124,8 @@ static ebpo_status judge(ebpo_need *n, ebpo_bounder *b, ebpo_need_node *node, eb
     return EBPO_OK;
 }
 
-static ebpo_status judge_some(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status judge_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
 {
     ebpo_need *n = context;
     ebpo_status status = EBPO_OK;
@@ -122,11 +134,13 @@ static ebpo_status judge_some(void *context, uint64_t begin, uint64_t end, unsig
     return status;
 }
 
-ebpo_status ebpo_need_judge(ebpo_need *n, ebpo_need_node *nodes, uint64_t count, double max_error, ebpo_error *error)
+ebpo_status ebpo_need_judge(ebpo_need *n, ebpo_need_node *nodes, uint64_t count, double max_error,
+                            ebpo_error *error)
 {
     n->nodes = nodes;
     n->max_error = max_error;
-    return ebpo_parallel_for(n->threads, count, 8, judge_some, n, &n->progress, "judging envelopes", error);
+    return ebpo_parallel_for(n->threads, count, 8, judge_some, n, &n->progress, "judging envelopes",
+                             error);
 }
 
 ebpo_status ebpo_need_most(ebpo_need *n, double *out, ebpo_error *error)

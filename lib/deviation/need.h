@@ -1,4 +1,5 @@
-/* Which envelopes are close enough to the model, for choosing by need: what was found out is remembered for other limits. */
+/* Which envelopes are close enough to the model, for choosing by need: what was found out is
+ * remembered for other limits. */
 #ifndef EBPO_DEVIATION_NEED_H
 #define EBPO_DEVIATION_NEED_H
 
@@ -15,13 +16,18 @@ typedef struct ebpo_need_node {
     bool enough; /* the answer; false where none was asked for */
 } ebpo_need_node;
 
-/* EBPO_E_ABSENT for a file without mesh or a subset. Opens a model of all of the file. `planes` false: envelopes are cells. The file stays open as long. */
-EBPO_MUST_USE ebpo_status ebpo_need_open(ebpo_need **out, ebpo_file *file, bool planes, unsigned threads, ebpo_progress progress, ebpo_error *error);
+/* EBPO_E_ABSENT for a file without mesh or a subset. Opens a model of all of the file. `planes`
+ * false: envelopes are cells. The file stays open as long. */
+EBPO_MUST_USE ebpo_status ebpo_need_open(ebpo_need **out, ebpo_file *file, bool planes,
+                                         unsigned threads, ebpo_progress progress,
+                                         ebpo_error *error);
 void ebpo_need_close(ebpo_need *need);
 
-/* node[i].enough: its envelope certainly reaches at most max_error beyond the model. What is enough for one max_error is so for every larger one, and the answers do not depend on
- * what was asked before, nor on threads. */
-EBPO_MUST_USE ebpo_status ebpo_need_judge(ebpo_need *need, ebpo_need_node *nodes, uint64_t count, double max_error, ebpo_error *error);
+/* node[i].enough: its envelope certainly reaches at most max_error beyond the model. What is enough
+ * for one max_error is so for every larger one, and the answers do not depend on what was asked
+ * before, nor on threads. */
+EBPO_MUST_USE ebpo_status ebpo_need_judge(ebpo_need *need, ebpo_need_node *nodes, uint64_t count,
+                                          double max_error, ebpo_error *error);
 
 /* A max_error for which the root is enough. */
 EBPO_MUST_USE ebpo_status ebpo_need_most(ebpo_need *need, double *out, ebpo_error *error);

@@ -8,12 +8,16 @@
 #include "base/alloc.h"
 #include "base/error.h"
 
-enum { CUT_FACES = 64 };             /* so many faces are cut along; with more, halving makes them fewer */
-static const double side_least = 2e-7; /* a plane cuts a piece that reaches so far to both sides; in cells, above what ebpo_polytope_clip refuses */
+/* so many faces are cut along; with more, halving makes them fewer */
+enum { CUT_FACES = 64 };
+/* a plane cuts a piece that reaches so far to both sides; in cells, above what ebpo_polytope_clip
+ * refuses */
+static const double side_least = 2e-7;
 
 /* --- the stack --- */
 
-ebpo_status ebpo_piece_push(ebpo_bounder *b, ebpo_piece_kind kind, const ebpo_piece *parent, ebpo_piece **out)
+ebpo_status ebpo_piece_push(ebpo_bounder *b, ebpo_piece_kind kind, const ebpo_piece *parent,
+                            ebpo_piece **out)
 {
     double upper = parent ? parent->upper : INFINITY;
     int levels = parent ? parent->levels : 0;
@@ -32,7 +36,8 @@ ebpo_status ebpo_piece_push(ebpo_bounder *b, ebpo_piece_kind kind, const ebpo_pi
     return EBPO_OK;
 }
 
-static ebpo_status push_polytope(ebpo_bounder *b, ebpo_piece_kind kind, const ebpo_piece *parent, const ebpo_polytope *p, ebpo_piece **out)
+static ebpo_status push_polytope(ebpo_bounder *b, ebpo_piece_kind kind, const ebpo_piece *parent,
+                                 const ebpo_polytope *p, ebpo_piece **out)
 {
     ebpo_status status = ebpo_piece_push(b, kind, parent, out);
     if (status == EBPO_OK)
@@ -40,7 +45,8 @@ static ebpo_status push_polytope(ebpo_bounder *b, ebpo_piece_kind kind, const eb
     return status;
 }
 
-/* Gives the piece those of `count` triangles that may meet it; they may be at the beginning of the stack of faces. */
+/* Gives the piece those of `count` triangles that may meet it; they may be at the beginning of the
+ * stack of faces. */
 static ebpo_status give_faces(ebpo_bounder *b, ebpo_piece *piece, uint64_t first, uint64_t count)
 {
     ebpo_extent e;
@@ -49,10 +55,12 @@ static ebpo_status give_faces(ebpo_bounder *b, ebpo_piece *piece, uint64_t first
     if (!ebpo_grow(&b->faces, &b->face_room, b->face_count + count, sizeof *b->faces))
         return ebpo_fail_memory(b->error, (b->face_count + count) * sizeof *b->faces);
     for (uint64_t i = first; i < first + count; i++) {
-        double t[3][3], error = ebpo_cell_frame_triangle(&b->frame, (const double (*)[3])b->faces[i], t) + 1e-9;
+        double t[3][3],
+            error = ebpo_cell_frame_triangle(&b->frame, (const double(*)[3])b->faces[i], t) + 1e-9;
         bool meets = true;
         for (int k = 0; k < 3; k++)
-            meets = meets && fmin(fmin(t[0][k], t[1][k]), t[2][k]) <= e.max[k] + error && fmax(fmax(t[0][k], t[1][k]), t[2][k]) >= e.min[k] - error;
+            meets = meets && fmin(fmin(t[0][k], t[1][k]), t[2][k]) <= e.max[k] + error &&
+                    fmax(fmax(t[0][k], t[1][k]), t[2][k]) >= e.min[k] - error;
         if (meets)
             memcpy(b->faces[b->face_count++], b->faces[i], sizeof *b->faces);
     }
@@ -63,7 +71,8 @@ static ebpo_status give_faces(ebpo_bounder *b, ebpo_piece *piece, uint64_t first
 ebpo_status ebpo_piece_leaf_faces(ebpo_bounder *b, ebpo_piece *piece, const ebpo_tree_place *leaf)
 {
     uint64_t count = 0, first = b->face_count;
-    ebpo_status status = ebpo_lod_leaf_faces(b->whole, leaf->cell, leaf->rank, &b->scratch, &count, b->error);
+    ebpo_status status =
+        ebpo_lod_leaf_faces(b->whole, leaf->cell, leaf->rank, &b->scratch, &count, b->error);
     if (status == EBPO_OK && !ebpo_grow(&b->faces, &b->face_room, first + count, sizeof *b->faces))
         status = ebpo_fail_memory(b->error, (first + count) * sizeof *b->faces);
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
@@ -76,7 +85,8 @@ ebpo_status ebpo_piece_leaf_faces(ebpo_bounder *b, ebpo_piece *piece, const ebpo
 /* --- cutting --- */
 
 /* Walls of a cell `levels` below the node's, in cell coordinates. */
-static void find_walls(const ebpo_bounder *b, ebpo_cell cell, int levels, double low[3], double high[3])
+static void find_walls(const ebpo_bounder *b, ebpo_cell cell, int levels, double low[3],
+                       double high[3])
 {
     double side = ebpo_half_power(levels);
     for (int k = 0; k < 3; k++) {
@@ -86,8 +96,10 @@ static void find_walls(const ebpo_bounder *b, ebpo_cell cell, int levels, double
     }
 }
 
-/* A piece reaches up to EBPO_CUT_THIN, or the slack of a cut, beyond its cell, where a neighbour's part was thin and went with it. That is measured in the node's cells: far below, it is
- * not small beside the piece's own cell. What is known of the cell holds for the points beyond it, too, when their distance to it is added. */
+/* A piece reaches up to EBPO_CUT_THIN, or the slack of a cut, beyond its cell, where a neighbour's
+ * part was thin and went with it. That is measured in the node's cells: far below, it is not small
+ * beside the piece's own cell. What is known of the cell holds for the points beyond it, too, when
+ * their distance to it is added. */
 static double find_beyond(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_cell cell, int levels)
 {
     double low[3], high[3], origin[3] = { 0, 0, 0 }, apart[3];
@@ -99,7 +111,8 @@ static double find_beyond(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_ce
     return ebpo_cell_frame_apart(&b->frame, apart, origin);
 }
 
-/* Inside, but for what thin part of the neighbours went with it: more than the slack, by which neighbours overlap. */
+/* Inside, but for what thin part of the neighbours went with it: more than the slack, by which
+ * neighbours overlap. */
 static void settle_black(ebpo_bounder *b, const ebpo_polytope *p, ebpo_cell cell, int levels)
 {
     double low[3], high[3];
@@ -119,18 +132,24 @@ static ebpo_status cut_gray(ebpo_bounder *b, const ebpo_piece *piece)
     ebpo_status status = EBPO_OK;
     double low[3], half = .5 * ebpo_half_power(piece->levels);
     for (int k = 0; k < 3; k++)
-        low[k] = (double)(piece->place.cell.at[k] - (b->frame.cell.at[k] << piece->levels)) * 2 * half;
+        low[k] =
+            (double)(piece->place.cell.at[k] - (b->frame.cell.at[k] << piece->levels)) * 2 * half;
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
         ebpo_tree_place child = ebpo_tree_child(b->whole, &piece->place, octant);
         ebpo_piece *next = NULL;
-        if (!ebpo_cut_axis(&piece->p, 2, octant >> 2 & 1, low[2] + half, &z) || !ebpo_cut_axis(&z, 1, octant >> 1 & 1, low[1] + half, &y) ||
+        if (!ebpo_cut_axis(&piece->p, 2, octant >> 2 & 1, low[2] + half, &z) ||
+            !ebpo_cut_axis(&z, 1, octant >> 1 & 1, low[1] + half, &y) ||
             !ebpo_cut_axis(&y, 0, octant & 1, low[0] + half, &x))
             continue;
         if (child.type == EBPO_BLACK) {
             settle_black(b, &x, child.cell, piece->levels + 1);
             continue;
         }
-        status = push_polytope(b, child.type == EBPO_GRAY ? EBPO_PIECE_GRAY : child.type == EBPO_LEAF ? EBPO_PIECE_LEAF : EBPO_PIECE_OUT, piece, &x, &next);
+        status = push_polytope(b,
+                               child.type == EBPO_GRAY   ? EBPO_PIECE_GRAY
+                               : child.type == EBPO_LEAF ? EBPO_PIECE_LEAF
+                                                         : EBPO_PIECE_OUT,
+                               piece, &x, &next);
         if (status != EBPO_OK)
             break;
         next->levels++;
@@ -149,7 +168,8 @@ static ebpo_status cut_longest(ebpo_bounder *b, const ebpo_piece *piece, ebpo_pi
     ebpo_status status = EBPO_OK;
     ebpo_extent_of(&piece->p, &e);
     for (int k = 1; k < 3; k++)
-        if ((e.max[k] - e.min[k]) * b->frame.side[k] > (e.max[axis] - e.min[axis]) * b->frame.side[axis])
+        if ((e.max[k] - e.min[k]) * b->frame.side[k] >
+            (e.max[axis] - e.min[axis]) * b->frame.side[axis])
             axis = k;
     for (int side = 0; side < 2 && status == EBPO_OK; side++) {
         ebpo_polytope part;
@@ -163,10 +183,12 @@ static ebpo_status cut_longest(ebpo_bounder *b, const ebpo_piece *piece, ebpo_pi
     return status;
 }
 
-/* The plane of a face in cell coordinates, n of length 1; false when rounding leaves it too uncertain to rely on. */
+/* The plane of a face in cell coordinates, n of length 1; false when rounding leaves it too
+ * uncertain to rely on. */
 static bool find_plane(const ebpo_bounder *b, uint64_t face, double n[3], double *d)
 {
-    double t[3][3], u[3], v[3], error = ebpo_cell_frame_triangle(&b->frame, (const double (*)[3])b->faces[face], t);
+    double t[3][3], u[3], v[3],
+        error = ebpo_cell_frame_triangle(&b->frame, (const double(*)[3])b->faces[face], t);
     for (int k = 0; k < 3; k++) {
         u[k] = t[1][k] - t[0][k];
         v[k] = t[2][k] - t[0][k];
@@ -176,7 +198,8 @@ static bool find_plane(const ebpo_bounder *b, uint64_t face, double n[3], double
     double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]), edge = 0;
     for (int k = 0; k < 3; k++)
         edge += fabs(u[k]) + fabs(v[k]);
-    /* A corner off by the error tilts the plane by about error * edge / length, over distances of a cell or an edge. */
+    /* A corner off by the error tilts the plane by about error * edge / length, over distances of a
+     * cell or an edge. */
     if (!(length > 0) || !(error * edge / length * (1 + edge) < 1e-9))
         return false;
     for (int k = 0; k < 3; k++)
@@ -186,12 +209,14 @@ static bool find_plane(const ebpo_bounder *b, uint64_t face, double n[3], double
 }
 
 /* Both halves along a plane, |n| = 1; not `done` when clipping gives up. */
-static ebpo_status cut_along(ebpo_bounder *b, const ebpo_piece *piece, ebpo_piece_kind kind, const double n[3], double d, bool *done)
+static ebpo_status cut_along(ebpo_bounder *b, const ebpo_piece *piece, ebpo_piece_kind kind,
+                             const double n[3], double d, bool *done)
 {
     ebpo_polytope side[2];
     double back[3] = { -n[0], -n[1], -n[2] };
     ebpo_status status = EBPO_OK;
-    *done = ebpo_cut_plane(&piece->p, n, d, &side[0]) && ebpo_cut_plane(&piece->p, back, -d, &side[1]);
+    *done =
+        ebpo_cut_plane(&piece->p, n, d, &side[0]) && ebpo_cut_plane(&piece->p, back, -d, &side[1]);
     for (int i = 0; i < 2 && *done && status == EBPO_OK; i++) {
         ebpo_piece *next = NULL;
         status = push_polytope(b, kind, piece, &side[i], &next);
@@ -201,7 +226,8 @@ static ebpo_status cut_along(ebpo_bounder *b, const ebpo_piece *piece, ebpo_piec
     return status;
 }
 
-/* Over a face, its plane's distance is the face's: pieces of about its size are cut along the prism above it, so that flat places need no fine ones. */
+/* Over a face, its plane's distance is the face's: pieces of about its size are cut along the prism
+ * above it, so that flat places need no fine ones. */
 static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_piece *piece, const ebpo_look *l)
 {
     double t[3][3], edge[3][3], normal[3], longest = 0;
@@ -217,11 +243,14 @@ static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_piece *piece, const ebp
         longest = fmax(longest, sqrt(sum));
     }
     for (int k = 0; k < 3; k++)
-        normal[k] = edge[0][(k + 1) % 3] * edge[1][(k + 2) % 3] - edge[0][(k + 2) % 3] * edge[1][(k + 1) % 3];
+        normal[k] = edge[0][(k + 1) % 3] * edge[1][(k + 2) % 3] -
+                    edge[0][(k + 2) % 3] * edge[1][(k + 1) % 3];
     for (int i = 0; i < 3 && l->reach <= 2 * longest && !done && status == EBPO_OK; i++) {
         double n[3], d = 0, length = 0, most = -INFINITY, least = INFINITY;
         for (int k = 0; k < 3; k++) {
-            n[k] = (edge[i][(k + 1) % 3] * normal[(k + 2) % 3] - edge[i][(k + 2) % 3] * normal[(k + 1) % 3]) * b->frame.side[k];
+            n[k] = (edge[i][(k + 1) % 3] * normal[(k + 2) % 3] -
+                    edge[i][(k + 2) % 3] * normal[(k + 1) % 3]) *
+                   b->frame.side[k];
             length += n[k] * n[k];
         }
         length = sqrt(length);
@@ -230,7 +259,8 @@ static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_piece *piece, const ebp
             d += n[k] * t[i][k];
         }
         for (int v = 0; v < piece->p.vertex_count; v++) {
-            double e = n[0] * piece->p.vertex[v][0] + n[1] * piece->p.vertex[v][1] + n[2] * piece->p.vertex[v][2] - d;
+            double e = n[0] * piece->p.vertex[v][0] + n[1] * piece->p.vertex[v][1] +
+                       n[2] * piece->p.vertex[v][2] - d;
             most = fmax(most, e);
             least = fmin(least, e);
         }
@@ -240,8 +270,10 @@ static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_piece *piece, const ebp
     return status != EBPO_OK || done ? status : cut_longest(b, piece, EBPO_PIECE_OUT);
 }
 
-/* No face passes through the piece, but some may through its outermost bit: a segment from the centre to a point behind one ends so far behind it. So it is with the leaf's walls, where the
- * piece reaches beyond them by more than cuts overlap: faces there are in the neighbour's list, not in this one. */
+/* No face passes through the piece, but some may through its outermost bit: a segment from the
+ * centre to a point behind one ends so far behind it. So it is with the leaf's walls, where the
+ * piece reaches beyond them by more than cuts overlap: faces there are in the neighbour's list, not
+ * in this one. */
 static double behind_faces(const ebpo_bounder *b, const ebpo_piece *piece, const ebpo_look *l)
 {
     double share = 0, low[3], high[3];
@@ -250,7 +282,8 @@ static double behind_faces(const ebpo_bounder *b, const ebpo_piece *piece, const
     find_walls(b, piece->place.cell, piece->levels, low, high);
     for (int k = 0; k < 3; k++)
         for (int side = 0; side < 2; side++) {
-            double other = side ? all.max[k] - high[k] : low[k] - all.min[k], own = side ? high[k] - l->centre[k] : l->centre[k] - low[k];
+            double other = side ? all.max[k] - high[k] : low[k] - all.min[k],
+                   own = side ? high[k] - l->centre[k] : l->centre[k] - low[k];
             if (other > EBPO_CUT_SLACK && !(own > 0))
                 return INFINITY; /* the centre is beyond the wall: only its own distance is known */
             if (other > EBPO_CUT_SLACK)
@@ -262,7 +295,8 @@ static double behind_faces(const ebpo_bounder *b, const ebpo_piece *piece, const
             return INFINITY;
         double own = n[0] * l->centre[0] + n[1] * l->centre[1] + n[2] * l->centre[2] - d;
         for (int v = 0; v < piece->p.vertex_count; v++) {
-            double e = n[0] * piece->p.vertex[v][0] + n[1] * piece->p.vertex[v][1] + n[2] * piece->p.vertex[v][2] - d;
+            double e = n[0] * piece->p.vertex[v][0] + n[1] * piece->p.vertex[v][1] +
+                       n[2] * piece->p.vertex[v][2] - d;
             reach[e > 0] = fmax(reach[e > 0], fabs(e));
         }
         double other = reach[own < 0] + 2e-9;
@@ -286,7 +320,8 @@ static ebpo_status cut_leaf(ebpo_bounder *b, const ebpo_piece *piece, const ebpo
         double n[3], d, most = -INFINITY, least = INFINITY;
         known = find_plane(b, piece->face_first + i, n, &d);
         for (int v = 0; v < piece->p.vertex_count && known; v++) {
-            double e = n[0] * piece->p.vertex[v][0] + n[1] * piece->p.vertex[v][1] + n[2] * piece->p.vertex[v][2] - d;
+            double e = n[0] * piece->p.vertex[v][0] + n[1] * piece->p.vertex[v][1] +
+                       n[2] * piece->p.vertex[v][2] - d;
             most = fmax(most, e);
             least = fmin(least, e);
         }
@@ -314,7 +349,8 @@ ebpo_status ebpo_piece_cut(ebpo_bounder *b, const ebpo_piece *piece, const ebpo_
 {
     switch (piece->kind) {
     case EBPO_PIECE_GRAY: return cut_gray(b, piece);
-    case EBPO_PIECE_LEAF: return b->whole->info->solid ? cut_leaf(b, piece, l) : cut_prism(b, piece, l);
+    case EBPO_PIECE_LEAF:
+        return b->whole->info->solid ? cut_leaf(b, piece, l) : cut_prism(b, piece, l);
     case EBPO_PIECE_OUT: break;
     }
     return cut_prism(b, piece, l);

@@ -9,7 +9,8 @@
 typedef enum ebpo_piece_kind {
     EBPO_PIECE_GRAY, /* the part in a gray node's cell */
     EBPO_PIECE_LEAF, /* within a leaf's: its faces that may meet the piece are known */
-    EBPO_PIECE_OUT   /* in a white cell, or cut off from all faces, or of a surface, which has no inside */
+    /* in a white cell, or cut off from all faces, or of a surface, which has no inside */
+    EBPO_PIECE_OUT
 } ebpo_piece_kind;
 
 struct ebpo_piece {
@@ -17,7 +18,8 @@ struct ebpo_piece {
     double upper;
     ebpo_tree_place place; /* GRAY, LEAF */
     int levels;            /* GRAY, LEAF: of the cell below the node's */
-    double beyond;         /* GRAY, LEAF: every point of the piece is at most so far from that cell */
+    /* GRAY, LEAF: every point of the piece is at most so far from that cell */
+    double beyond;
     uint64_t face_first, face_count; /* LEAF */
     ebpo_polytope p;
 };
@@ -27,17 +29,20 @@ typedef struct ebpo_look {
     double centre[3], reach; /* all of the piece is within reach of the centre */
     double distance;         /* of the centre; negative inside */
     double upper;
-    double face[3][3];       /* the nearest one, in the model's unit */
+    double face[3][3]; /* the nearest one, in the model's unit */
 } ebpo_look;
 
 /* The new piece is valid until the next call. Its polytope is not set. */
-EBPO_MUST_USE ebpo_status ebpo_piece_push(ebpo_bounder *b, ebpo_piece_kind kind, const ebpo_piece *parent, ebpo_piece **out);
+EBPO_MUST_USE ebpo_status ebpo_piece_push(ebpo_bounder *b, ebpo_piece_kind kind,
+                                          const ebpo_piece *parent, ebpo_piece **out);
 
 /* A leaf's faces, as the first ones of its piece. */
-EBPO_MUST_USE ebpo_status ebpo_piece_leaf_faces(ebpo_bounder *b, ebpo_piece *piece, const ebpo_tree_place *leaf);
+EBPO_MUST_USE ebpo_status ebpo_piece_leaf_faces(ebpo_bounder *b, ebpo_piece *piece,
+                                                const ebpo_tree_place *leaf);
 
 /* Puts the parts of a piece, which is no longer on the stack, there, or settles them. */
-EBPO_MUST_USE ebpo_status ebpo_piece_cut(ebpo_bounder *b, const ebpo_piece *piece, const ebpo_look *l);
+EBPO_MUST_USE ebpo_status ebpo_piece_cut(ebpo_bounder *b, const ebpo_piece *piece,
+                                         const ebpo_look *l);
 
 /* Nothing of some piece reaches farther than `upper`. */
 static inline void ebpo_bound_settle(ebpo_bounder *b, double upper)

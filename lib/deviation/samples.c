@@ -1,4 +1,5 @@
-/* Points by area on the level's polygons. One counts if a point a little outside of its polygon is in no other envelope. */
+/* Points by area on the level's polygons. One counts if a point a little outside of its polygon is
+ * in no other envelope. */
 #include "geom/strict_fp.h"
 
 #include "deviation/samples.h"
@@ -21,7 +22,7 @@ typedef struct sampling {
     const ebpo_deviation_options *o;
     int level;
     ebpo_box box;
-    ebpo_cell_frame frame;         /* of the root cell: the unit of areas and distances */
+    ebpo_cell_frame frame; /* of the root cell: the unit of areas and distances */
     ebpo_mesh mesh;
     ebpo_lod_nodes nodes;
     uint64_t *first_triangle; /* [node_count + 1] */
@@ -49,8 +50,10 @@ static double area(const sampling *s, uint64_t triangle)
 {
     double u[3], v[3], n[3];
     for (int k = 0; k < 3; k++) {
-        u[k] = ebpo_cell_frame_length(&s->frame, corner(s, triangle, 1)[k] - corner(s, triangle, 0)[k]);
-        v[k] = ebpo_cell_frame_length(&s->frame, corner(s, triangle, 2)[k] - corner(s, triangle, 0)[k]);
+        u[k] = ebpo_cell_frame_length(&s->frame,
+                                      corner(s, triangle, 1)[k] - corner(s, triangle, 0)[k]);
+        v[k] = ebpo_cell_frame_length(&s->frame,
+                                      corner(s, triangle, 2)[k] - corner(s, triangle, 0)[k]);
     }
     for (int k = 0; k < 3; k++)
         n[k] = u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3];
@@ -93,9 +96,12 @@ static uint64_t find_node(const sampling *s, uint64_t octcode)
     uint64_t low = 0, high = s->nodes.node_count;
     while (low < high) {
         uint64_t middle = low + (high - low) / 2;
-        *(s->nodes.nodes[middle].octcode < octcode ? &low : &high) = s->nodes.nodes[middle].octcode < octcode ? middle + 1 : middle;
+        *(s->nodes.nodes[middle].octcode < octcode ? &low : &high) =
+            s->nodes.nodes[middle].octcode < octcode ? middle + 1 : middle;
     }
-    return low < s->nodes.node_count && s->nodes.nodes[low].octcode == octcode ? low : s->nodes.node_count;
+    return low < s->nodes.node_count && s->nodes.nodes[low].octcode == octcode
+               ? low
+               : s->nodes.node_count;
 }
 
 /* A triangle's normal in root cell coordinates, of length 1; false without area. */
@@ -152,14 +158,19 @@ static bool in_another(const sampling *s, uint64_t own, const double p[3])
 
 static ebpo_status sample(sampling *s, uint64_t i, ebpo_context *context, ebpo_error *error)
 {
-    double a = sqrt(random_unit(s->o->seed, 3 * i + 1)), b = random_unit(s->o->seed, 3 * i + 2), p[3], n[3], q[3];
+    double a = sqrt(random_unit(s->o->seed, 3 * i + 1)), b = random_unit(s->o->seed, 3 * i + 2),
+           p[3], n[3], q[3];
     uint64_t t = s->triangle[i];
     s->distance[i] = NAN;
     if (!unit_normal(s, t, n))
         return EBPO_OK;
     for (int k = 0; k < 3; k++) {
-        double step = fmax(1e-6 * ebpo_half_power(s->level) * s->box.size[k], 16 * DBL_EPSILON * fmax(fabs(s->box.origin[k]), fabs(s->box.origin[k] + s->box.size[k])));
-        p[k] = (1 - a) * corner(s, t, 0)[k] + a * ((1 - b) * corner(s, t, 1)[k] + b * corner(s, t, 2)[k]);
+        double step =
+            fmax(1e-6 * ebpo_half_power(s->level) * s->box.size[k],
+                 16 * DBL_EPSILON *
+                     fmax(fabs(s->box.origin[k]), fabs(s->box.origin[k] + s->box.size[k])));
+        p[k] = (1 - a) * corner(s, t, 0)[k] +
+               a * ((1 - b) * corner(s, t, 1)[k] + b * corner(s, t, 2)[k]);
         q[k] = p[k] + n[k] * step;
     }
     if (in_another(s, node_of_triangle(s, t), q))
@@ -170,7 +181,8 @@ static ebpo_status sample(sampling *s, uint64_t i, ebpo_context *context, ebpo_e
     return status;
 }
 
-static ebpo_status sample_some(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status sample_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
 {
     sampling *s = context;
     ebpo_status status = EBPO_OK;
@@ -215,9 +227,14 @@ static ebpo_status make_room(sampling *s, ebpo_model *model, ebpo_error *error)
     return status;
 }
 
-ebpo_status ebpo_deviation_sample(ebpo_model *model, ebpo_file *file, int level, const ebpo_deviation_options *options, ebpo_deviation *out, ebpo_error *error)
+ebpo_status ebpo_deviation_sample(ebpo_model *model, ebpo_file *file, int level,
+                                  const ebpo_deviation_options *options, ebpo_deviation *out,
+                                  ebpo_error *error)
 {
-    sampling s = { .o = options, .level = level, .box = ebpo_model_box(model), .threads = ebpo_thread_count(options->threads) };
+    sampling s = { .o = options,
+                   .level = level,
+                   .box = ebpo_model_box(model),
+                   .threads = ebpo_thread_count(options->threads) };
     ebpo_lod_options lod = EBPO_LOD_OPTIONS_INIT;
     lod.threads = options->threads;
     ebpo_cell_frame_make(&s.frame, &s.box, (ebpo_cell){ 0, { 0, 0, 0 } });
@@ -226,7 +243,8 @@ ebpo_status ebpo_deviation_sample(ebpo_model *model, ebpo_file *file, int level,
         status = make_room(&s, model, error);
     if (status == EBPO_OK && s.mesh.face_count) {
         share_out(&s);
-        status = ebpo_parallel_for(s.threads, options->samples, 64, sample_some, &s, &options->progress, "sampling the level's surface", error);
+        status = ebpo_parallel_for(s.threads, options->samples, 64, sample_some, &s,
+                                   &options->progress, "sampling the level's surface", error);
         if (status == EBPO_OK)
             sum_up(&s, out);
     }

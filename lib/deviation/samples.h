@@ -4,6 +4,8 @@
 #include <ebpo/deviation.h>
 
 /* Sets out->mean, rms and samples. */
-EBPO_MUST_USE ebpo_status ebpo_deviation_sample(ebpo_model *model, ebpo_file *file, int level, const ebpo_deviation_options *options, ebpo_deviation *out, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_deviation_sample(ebpo_model *model, ebpo_file *file, int level,
+                                                const ebpo_deviation_options *options,
+                                                ebpo_deviation *out, ebpo_error *error);
 
 #endif

@@ -6,14 +6,21 @@
 #include "container/reader.h"
 #include "geom/plane_code.h"
 
-ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, ebpo_file *file, unsigned threads, ebpo_error *error)
+ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, ebpo_file *file, unsigned threads,
+                                 ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(file);
     if (!(info->parts & EBPO_PART_MESH))
-        return ebpo_fail(error, EBPO_E_ABSENT, "%s: how far envelopes reach beyond the model is measured against its mesh, which the file does not hold; take a file with it "
-                         "(`ebpo convert`)", file->in.shown);
+        return ebpo_fail(error, EBPO_E_ABSENT,
+                         "%s: how far envelopes reach beyond the model is measured against its "
+                         "mesh, which the file does not hold; take a file with it "
+                         "(`ebpo convert`)",
+                         file->in.shown);
     if (info->pruned)
-        return ebpo_fail(error, EBPO_E_ABSENT, "%s: is a subset, and how far envelopes reach beyond the model is measured against all of its mesh; take the original", file->in.shown);
+        return ebpo_fail(error, EBPO_E_ABSENT,
+                         "%s: is a subset, and how far envelopes reach beyond the model is "
+                         "measured against all of its mesh; take the original",
+                         file->in.shown);
     ebpo_status status = ebpo_lod_model_read(out, file, info->level_count - 1, threads, error);
     if (status == EBPO_OK && !out->mesh.faces)
         status = ebpo_file_read_mesh(file, &out->mesh, threads, error);
@@ -69,10 +76,12 @@ void ebpo_halves_cut(const ebpo_halves *halves, double slack, ebpo_polytope *out
 
 bool ebpo_tree_is_pruned(const ebpo_lod_model *tree, const ebpo_tree_place *gray)
 {
-    return gray->cell.level >= tree->target || tree->level[gray->cell.level + 1].types[gray->rank] == 0;
+    return gray->cell.level >= tree->target ||
+           tree->level[gray->cell.level + 1].types[gray->rank] == 0;
 }
 
-static void find_in_group(const ebpo_lod_model *tree, uint64_t group, unsigned octant, ebpo_tree_place *out)
+static void find_in_group(const ebpo_lod_model *tree, uint64_t group, unsigned octant,
+                          ebpo_tree_place *out)
 {
     const ebpo_lod_index *index = &tree->index[out->cell.level];
     uint16_t types = tree->level[out->cell.level].types[group];
@@ -84,7 +93,8 @@ static void find_in_group(const ebpo_lod_model *tree, uint64_t group, unsigned o
         out->rank += index->leaf_before[group];
 }
 
-ebpo_tree_place ebpo_tree_child(const ebpo_lod_model *tree, const ebpo_tree_place *gray, unsigned octant)
+ebpo_tree_place ebpo_tree_child(const ebpo_lod_model *tree, const ebpo_tree_place *gray,
+                                unsigned octant)
 {
     ebpo_tree_place child = { { gray->cell.level + 1, { 0, 0, 0 } }, EBPO_WHITE, 0 };
     for (unsigned k = 0; k < 3; k++)
@@ -98,12 +108,16 @@ static void add_own(const ebpo_lod_model *tree, const ebpo_tree_place *place, eb
     const ebpo_level *level = &tree->level[place->cell.level];
     const ebpo_lod_index *index = &tree->index[place->cell.level];
     if (place->type == EBPO_GRAY && level->plane_counts)
-        add(halves, level->planes + index->plane_first[place->rank], level->plane_counts[place->rank]);
-    else if (place->type == EBPO_LEAF && tree->leaf_source == EBPO_LEAF_STORED && index->leaf_plane_first)
-        add(halves, level->leaf_planes + index->leaf_plane_first[place->rank], level->leaf_plane_counts[place->rank]);
+        add(halves, level->planes + index->plane_first[place->rank],
+            level->plane_counts[place->rank]);
+    else if (place->type == EBPO_LEAF && tree->leaf_source == EBPO_LEAF_STORED &&
+             index->leaf_plane_first)
+        add(halves, level->leaf_planes + index->leaf_plane_first[place->rank],
+            level->leaf_plane_counts[place->rank]);
 }
 
-bool ebpo_tree_find(const ebpo_lod_model *tree, ebpo_cell cell, bool planes, bool own, ebpo_tree_place *out, ebpo_halves *halves)
+bool ebpo_tree_find(const ebpo_lod_model *tree, ebpo_cell cell, bool planes, bool own,
+                    ebpo_tree_place *out, ebpo_halves *halves)
 {
     *out = (ebpo_tree_place){ { 0, { 0, 0, 0 } }, EBPO_WHITE, 0 };
     find_in_group(tree, 0, 0, out);
@@ -113,7 +127,8 @@ bool ebpo_tree_find(const ebpo_lod_model *tree, ebpo_cell cell, bool planes, boo
         if (out->type != EBPO_GRAY || ebpo_tree_is_pruned(tree, out))
             return false;
         int below = cell.level - out->cell.level - 1;
-        unsigned octant = (cell.at[0] >> below & 1) | (cell.at[1] >> below & 1) << 1 | (cell.at[2] >> below & 1) << 2;
+        unsigned octant = (cell.at[0] >> below & 1) | (cell.at[1] >> below & 1) << 1 |
+                          (cell.at[2] >> below & 1) << 2;
         if (halves && planes)
             add_own(tree, out, halves);
         if (halves)
@@ -125,13 +140,15 @@ bool ebpo_tree_find(const ebpo_lod_model *tree, ebpo_cell cell, bool planes, boo
     return true;
 }
 
-ebpo_status ebpo_tree_derive(const ebpo_lod_model *tree, const ebpo_tree_place *leaf, ebpo_leaf_scratch *scratch, ebpo_halves *halves, ebpo_error *error)
+ebpo_status ebpo_tree_derive(const ebpo_lod_model *tree, const ebpo_tree_place *leaf,
+                             ebpo_leaf_scratch *scratch, ebpo_halves *halves, ebpo_error *error)
 {
     ebpo_polytope inherited;
     uint32_t codes[EBPO_PLANES_MAX];
     int count = 0;
     ebpo_halves_cut(halves, 0, &inherited);
-    ebpo_status status = ebpo_lod_leaf_planes(tree, leaf->cell, leaf->rank, scratch, &inherited, codes, &count, error);
+    ebpo_status status = ebpo_lod_leaf_planes(tree, leaf->cell, leaf->rank, scratch, &inherited,
+                                              codes, &count, error);
     if (status == EBPO_OK)
         add(halves, codes, (uint64_t)count);
     return status;

@@ -27,10 +27,13 @@ int ebpo_block_count(const ebpo_export_options *o)
 
 int ebpo_block_level(const ebpo_export_options *o, int i)
 {
-    return o->first_level <= o->last_level && i <= o->last_level - o->first_level ? o->first_level + i : -1;
+    return o->first_level <= o->last_level && i <= o->last_level - o->first_level
+               ? o->first_level + i
+               : -1;
 }
 
-static ebpo_status read_mesh(ebpo_block *out, ebpo_file *file, ebpo_block_order order, unsigned threads, ebpo_error *error)
+static ebpo_status read_mesh(ebpo_block *out, ebpo_file *file, ebpo_block_order order,
+                             unsigned threads, ebpo_error *error)
 {
     bool ordered;
     snprintf(out->name, sizeof out->name, "mesh");
@@ -42,7 +45,8 @@ static ebpo_status read_mesh(ebpo_block *out, ebpo_file *file, ebpo_block_order 
     return status;
 }
 
-ebpo_status ebpo_block_read(ebpo_block *out, ebpo_file *file, int level, ebpo_block_order order, const ebpo_export_options *options, ebpo_error *error)
+ebpo_status ebpo_block_read(ebpo_block *out, ebpo_file *file, int level, ebpo_block_order order,
+                            const ebpo_export_options *options, ebpo_error *error)
 {
     *out = (ebpo_block){ .level = level };
     if (level < 0)
@@ -66,8 +70,13 @@ void ebpo_block_free(ebpo_block *block)
 void ebpo_block_tell(const ebpo_block *block, ebpo_export_report *report)
 {
     bool mesh = block->level < 0;
-    report->block[report->block_count++] = (ebpo_export_block){ block->level, block->nodes.node_count,
-        mesh ? block->mesh.face_count : block->nodes.polygon_count, block->mesh.face_count, block->mesh.vertex_count, block->volume };
+    report->block[report->block_count++] =
+        (ebpo_export_block){ block->level,
+                             block->nodes.node_count,
+                             mesh ? block->mesh.face_count : block->nodes.polygon_count,
+                             block->mesh.face_count,
+                             block->mesh.vertex_count,
+                             block->volume };
 }
 
 /* --- columns --- */
@@ -97,7 +106,8 @@ static int64_t value_of(const ebpo_block *block, const ebpo_lod_node *node, int 
 static int64_t value_of_face(const ebpo_block *block, uint64_t face, int column)
 {
     switch (column) {
-    case EBPO_COLUMN_SOURCE_FACE: return block->face_source ? (int64_t)block->face_source[face] : -1;
+    case EBPO_COLUMN_SOURCE_FACE:
+        return block->face_source ? (int64_t)block->face_source[face] : -1;
     case EBPO_COLUMN_LEVEL:
     case EBPO_COLUMN_TYPE:
     case EBPO_COLUMN_LOD: return -1;
@@ -110,7 +120,10 @@ void *ebpo_column_make(const ebpo_block *block, int column, bool polygons)
     const ebpo_lod_nodes *nodes = &block->nodes;
     ebpo_h5_number number = ebpo_columns[column].number;
     bool mesh = block->level < 0;
-    uint64_t count = mesh ? block->mesh.face_count : polygons ? nodes->polygon_count : nodes->node_count, at = 0;
+    uint64_t count = mesh       ? block->mesh.face_count
+                     : polygons ? nodes->polygon_count
+                                : nodes->node_count,
+             at = 0;
     void *values = ebpo_alloc(count, ebpo_h5_number_bytes(number));
     if (!values)
         return NULL;

@@ -10,8 +10,8 @@ typedef struct ebpo_block {
     int level; /* -1: the mesh */
     char name[24];
     ebpo_mesh mesh;
-    ebpo_lod_nodes nodes;                   /* levels */
-    uint32_t *vertex_source, *face_source;  /* the mesh of a file with maps */
+    ebpo_lod_nodes nodes;                  /* levels */
+    uint32_t *vertex_source, *face_source; /* the mesh of a file with maps */
     double volume;
 } ebpo_block;
 
@@ -19,10 +19,12 @@ typedef struct ebpo_block {
 int ebpo_block_count(const ebpo_export_options *options);
 int ebpo_block_level(const ebpo_export_options *options, int i);
 
-/* `level` -1: the mesh, in the file's order with the source's numbers, or in the source's order where the maps are there. Freed by ebpo_block_free, on failure too. */
+/* `level` -1: the mesh, in the file's order with the source's numbers, or in the source's order
+ * where the maps are there. Freed by ebpo_block_free, on failure too. */
 typedef enum ebpo_block_order { EBPO_FILE_ORDER, EBPO_SOURCE_ORDER } ebpo_block_order;
-EBPO_MUST_USE ebpo_status ebpo_block_read(ebpo_block *out, ebpo_file *file, int level, ebpo_block_order order, const ebpo_export_options *options,
-                                          ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_block_read(ebpo_block *out, ebpo_file *file, int level,
+                                          ebpo_block_order order,
+                                          const ebpo_export_options *options, ebpo_error *error);
 void ebpo_block_free(ebpo_block *block);
 void ebpo_block_tell(const ebpo_block *block, ebpo_export_report *report);
 
@@ -31,8 +33,17 @@ typedef struct ebpo_column {
     const char *name;
     ebpo_h5_number number;
 } ebpo_column;
-enum { EBPO_COLUMN_OCTCODE, EBPO_COLUMN_LEVEL, EBPO_COLUMN_TYPE, EBPO_COLUMN_WINDING, EBPO_COLUMN_VOLUME, EBPO_COLUMN_SOURCE_FACE, EBPO_COLUMN_LOD, EBPO_COLUMNS,
-       EBPO_COLUMNS_OF_NODES = EBPO_COLUMN_SOURCE_FACE };
+enum {
+    EBPO_COLUMN_OCTCODE,
+    EBPO_COLUMN_LEVEL,
+    EBPO_COLUMN_TYPE,
+    EBPO_COLUMN_WINDING,
+    EBPO_COLUMN_VOLUME,
+    EBPO_COLUMN_SOURCE_FACE,
+    EBPO_COLUMN_LOD,
+    EBPO_COLUMNS,
+    EBPO_COLUMNS_OF_NODES = EBPO_COLUMN_SOURCE_FACE
+};
 extern const ebpo_column ebpo_columns[EBPO_COLUMNS];
 
 /* Vertex numbers of a polygon whose fan begins with this triangle. */
@@ -43,7 +54,8 @@ static inline uint32_t ebpo_polygon_corner(const uint32_t *triangle, unsigned i)
 
 /* The values, to be freed; NULL when memory is short. */
 void *ebpo_column_make(const ebpo_block *block, int column, bool polygons);
-/* Numbers of the mesh's vertices in its source; levels: -1 each. I64, to be freed; NULL when memory is short. */
+/* Numbers of the mesh's vertices in its source; levels: -1 each. I64, to be freed; NULL when memory
+ * is short. */
 void *ebpo_column_of_vertices(const ebpo_block *block);
 
 #endif

@@ -23,10 +23,12 @@ bool ebpo_export_second_file(ebpo_export_format format, const char *path, char *
     int length = -1;
     if (room)
         *out = 0;
-    if (format == EBPO_EXPORT_XDMF) /* readers take what follows the first ":" for the place in the HDF5 file */
+    if (format == EBPO_EXPORT_XDMF) /* readers take what follows the first ":" for the place in the
+                                       HDF5 file */
         length = strchr(name, ':') ? -1 : snprintf(out, room, "%s.h5", path);
     else if (format == EBPO_EXPORT_GLTF)
-        length = snprintf(out, room, "%.*s.bin", (int)(dot && dot != name ? dot - path : (int)strlen(path)), path);
+        length = snprintf(out, room, "%.*s.bin",
+                          (int)(dot && dot != name ? dot - path : (int)strlen(path)), path);
     else
         return true;
     return length >= 0 && (size_t)length < room;
@@ -37,21 +39,30 @@ ebpo_status ebpo_export_check_glb(const char *path, uint64_t text, uint64_t bin,
     uint64_t total = EBPO_GLB_HEADS + (text + 3) / 4 * 4 + bin;
     if (total <= UINT32_MAX)
         return EBPO_OK;
-    return ebpo_fail(error, EBPO_E_LIMIT, "%s: would have %" PRIu64 " bytes or more, and a GLB file has less than 4 GiB; take gltf, or coarser levels", path, total);
+    return ebpo_fail(
+        error, EBPO_E_LIMIT,
+        "%s: would have %" PRIu64
+        " bytes or more, and a GLB file has less than 4 GiB; take gltf, or coarser levels",
+        path, total);
 }
 
-ebpo_status ebpo_export_check_scene(const char *path, uint64_t vertices, uint64_t faces, ebpo_error *error)
+ebpo_status ebpo_export_check_scene(const char *path, uint64_t vertices, uint64_t faces,
+                                    ebpo_error *error)
 {
     if (vertices <= UINT32_MAX && faces <= UINT32_MAX / 3)
         return EBPO_OK;
-    return ebpo_fail(error, EBPO_E_LIMIT, "%s: would have %" PRIu64 " vertices and %" PRIu64 " triangles, more corners than assimp can number; take another format, or a coarser level", path,
-                     vertices, faces);
+    return ebpo_fail(
+        error, EBPO_E_LIMIT,
+        "%s: would have %" PRIu64 " vertices and %" PRIu64
+        " triangles, more corners than assimp can number; take another format, or a coarser level",
+        path, vertices, faces);
 }
 
 bool ebpo_export_goes_on(const ebpo_export_job *job, int i)
 {
     const ebpo_progress *p = &job->options->progress;
-    return !p->report || p->report(p->user, "exporting", (uint64_t)i, (uint64_t)ebpo_block_count(job->options));
+    return !p->report ||
+           p->report(p->user, "exporting", (uint64_t)i, (uint64_t)ebpo_block_count(job->options));
 }
 
 ebpo_status ebpo_export_stopped(ebpo_error *error)
@@ -59,19 +70,27 @@ ebpo_status ebpo_export_stopped(ebpo_error *error)
     return ebpo_fail(error, EBPO_E_CANCELLED, "stopped as asked; nothing was written");
 }
 
-static ebpo_status check(const ebpo_info *info, ebpo_export_format format, const ebpo_export_options *o, ebpo_error *error)
+static ebpo_status check(const ebpo_info *info, ebpo_export_format format,
+                         const ebpo_export_options *o, ebpo_error *error)
 {
-    int blocks = ebpo_block_count(o), asked = o->first_level < 0 || o->first_level >= info->level_count ? o->first_level : o->last_level;
+    int blocks = ebpo_block_count(o),
+        asked = o->first_level < 0 || o->first_level >= info->level_count ? o->first_level
+                                                                          : o->last_level;
     if (blocks == 0)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "there is nothing to export: ask for a level or for the mesh");
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "there is nothing to export: ask for a level or for the mesh");
     if (o->first_level <= o->last_level && (asked < 0 || asked >= info->level_count))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "there is no level %d; this file has levels 0 to %d", asked, info->level_count - 1);
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "there is no level %d; this file has levels 0 to %d", asked,
+                         info->level_count - 1);
     if (format == EBPO_EXPORT_STL && blocks > 1)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "an STL file holds one thing: one level, or the mesh");
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "an STL file holds one thing: one level, or the mesh");
     return EBPO_OK;
 }
 
-ebpo_status ebpo_export(ebpo_file *file, const char *path, ebpo_export_format format, const ebpo_export_options *options, ebpo_export_report *report,
+ebpo_status ebpo_export(ebpo_file *file, const char *path, ebpo_export_format format,
+                        const ebpo_export_options *options, ebpo_export_report *report,
                         ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
@@ -87,7 +106,9 @@ ebpo_status ebpo_export(ebpo_file *file, const char *path, ebpo_export_format fo
     if (status != EBPO_OK)
         return status;
     if (!ebpo_export_second_file(format, path, second, sizeof second))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: is no name for this format: too long, or with a ':'; take another", path);
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "%s: is no name for this format: too long, or with a ':'; take another",
+                         path);
     if (options->first_level <= options->last_level)
         ebpo_file_expect_levels(file, 0, options->last_level);
     ebpo_export_job job = { file, path, second, format, options, report };

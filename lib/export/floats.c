@@ -8,7 +8,8 @@
 #include "base/alloc.h"
 #include "base/error.h"
 
-ebpo_status ebpo_mesh_floats(float **out, const ebpo_mesh *mesh, const double origin[3], double *largest_change, ebpo_error *error)
+ebpo_status ebpo_mesh_floats(float **out, const ebpo_mesh *mesh, const double origin[3],
+                             double *largest_change, ebpo_error *error)
 {
     float *xyz = *out = ebpo_alloc(mesh->vertex_count, 3 * sizeof *xyz);
     if (!xyz)
@@ -20,7 +21,10 @@ ebpo_status ebpo_mesh_floats(float **out, const ebpo_mesh *mesh, const double or
         if (!isfinite(xyz[i])) {
             free(xyz);
             *out = NULL;
-            return ebpo_fail(error, EBPO_E_LIMIT, "a coordinate of %g is beyond what a float32 holds; export XDMF or VTKHDF, or scale the model", at);
+            return ebpo_fail(error, EBPO_E_LIMIT,
+                             "a coordinate of %g is beyond what a float32 holds; export XDMF or "
+                             "VTKHDF, or scale the model",
+                             at);
         }
     }
     return EBPO_OK;

@@ -1,5 +1,6 @@
-/* glTF 2.0, as one file (GLB) or as a text with a .bin beside it. Not through assimp: its exporter joins vertices that are less than 1e-5 apart, whatever the model's size.
- * Source: Khronos, "glTF 2.0 specification", sections 3 and 4. */
+/* glTF 2.0, as one file (GLB) or as a text with a .bin beside it. Not through assimp: its exporter
+ * joins vertices that are less than 1e-5 apart, whatever the model's size. Source: Khronos,
+ * "glTF 2.0 specification", sections 3 and 4. */
 #include "geom/strict_fp.h"
 
 #include <float.h>
@@ -17,7 +18,14 @@
 #include "io/file.h"
 #include "io/publish.h"
 
-enum { PARTS_MAX = EBPO_LEVELS_MAX + 1, FLOAT32 = 5126, UINT32 = 5125, VERTICES = 34962, INDICES = 34963, BUFFER = 1 << 14 };
+enum {
+    PARTS_MAX = EBPO_LEVELS_MAX + 1,
+    FLOAT32 = 5126,
+    UINT32 = 5125,
+    VERTICES = 34962,
+    INDICES = 34963,
+    BUFFER = 1 << 14
+};
 
 typedef struct part {
     ebpo_block block; /* its positions are in xyz only */
@@ -33,16 +41,19 @@ typedef struct model {
 
 /* --- what is to be written --- */
 
-/* Far from zero a float32 has few digits left for the model: then vertices are told from the box's middle, which is the nodes' translation. */
+/* Far from zero a float32 has few digits left for the model: then vertices are told from the box's
+ * middle, which is the nodes' translation. */
 static void choose_origin(model *m, const ebpo_info *info)
 {
     double size = 0, far = 0;
     for (int k = 0; k < 3; k++) {
         size = fmax(size, info->box_size[k]);
-        far = fmax(far, fmax(fabs(info->box_origin[k]), fabs(info->box_origin[k] + info->box_size[k])));
+        far = fmax(far,
+                   fmax(fabs(info->box_origin[k]), fabs(info->box_origin[k] + info->box_size[k])));
     }
     for (int k = 0; k < 3 && far > 16 * size; k++) {
-        float middle = (float)(info->box_origin[k] + info->box_size[k] / 2); /* readers keep a translation as float32 */
+        /* readers keep a translation as float32 */
+        float middle = (float)(info->box_origin[k] + info->box_size[k] / 2);
         m->origin[k] = isfinite(middle) ? (double)middle : 0;
     }
 }
@@ -71,12 +82,14 @@ static ebpo_status gather(model *m, const ebpo_export_job *job, ebpo_error *erro
     const ebpo_info *info = ebpo_file_info(job->file);
     choose_origin(m, info);
     if (!m->bin_name && job->options->mesh) /* known before anything is read */
-        status = ebpo_export_check_glb(job->path, 0, 12 * (info->vertex_count + info->face_count), error);
+        status = ebpo_export_check_glb(job->path, 0, 12 * (info->vertex_count + info->face_count),
+                                       error);
     for (int i = 0; i < ebpo_block_count(job->options) && status == EBPO_OK; i++) {
         part *p = &m->parts[m->count];
         if (!ebpo_export_goes_on(job, i))
             return ebpo_export_stopped(error);
-        status = ebpo_block_read(&p->block, job->file, ebpo_block_level(job->options, i), EBPO_SOURCE_ORDER, job->options, error);
+        status = ebpo_block_read(&p->block, job->file, ebpo_block_level(job->options, i),
+                                 EBPO_SOURCE_ORDER, job->options, error);
         if (status == EBPO_OK)
             ebpo_block_tell(&p->block, job->report);
         if (status != EBPO_OK || p->block.mesh.face_count == 0) {
@@ -84,7 +97,8 @@ static ebpo_status gather(model *m, const ebpo_export_job *job, ebpo_error *erro
             continue;
         }
         m->count++;
-        status = m->bin_name ? EBPO_OK : ebpo_export_check_glb(job->path, 0, bin_bytes(m), error); /* before more is read */
+        /* before more is read */
+        status = m->bin_name ? EBPO_OK : ebpo_export_check_glb(job->path, 0, bin_bytes(m), error);
         if (status != EBPO_OK)
             return status;
         status = ebpo_mesh_floats(&p->xyz, &p->block.mesh, m->origin, &m->largest_change, error);
@@ -110,7 +124,8 @@ static void print_name(FILE *f, const char *name)
     static const char hex[] = "0123456789ABCDEF"; /* a URI: what is not plain is written as %XX */
     for (; *name; name++) {
         unsigned char c = (unsigned char)*name;
-        if ((c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || strchr("-._~", c))
+        if ((c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
+            strchr("-._~", c))
             fputc(c, f);
         else
             fprintf(f, "%%%c%c", hex[c >> 4], hex[c & 15]);
@@ -147,9 +162,13 @@ static void print_nodes(FILE *f, const model *m)
     }
     fprintf(f, "],\n\"meshes\":[");
     for (int i = 0; i < m->count; i++)
-        fprintf(f, "%s{\"name\":\"%s\",\"primitives\":[{\"attributes\":{\"POSITION\":%d},\"indices\":%d,\"material\":0}]}", i ? ",\n" : "", m->parts[i].block.name,
-                2 * i, 2 * i + 1);
-    fprintf(f, "],\n\"materials\":[{\"name\":\"plain\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[0.6,0.7,0.8,1],\"metallicFactor\":0,\"roughnessFactor\":0.8}}],\n");
+        fprintf(f,
+                "%s{\"name\":\"%s\",\"primitives\":[{\"attributes\":{\"POSITION\":%d},\"indices\":%"
+                "d,\"material\":0}]}",
+                i ? ",\n" : "", m->parts[i].block.name, 2 * i, 2 * i + 1);
+    fprintf(f,
+            "],\n\"materials\":[{\"name\":\"plain\",\"pbrMetallicRoughness\":{\"baseColorFactor\":["
+            "0.6,0.7,0.8,1],\"metallicFactor\":0,\"roughnessFactor\":0.8}}],\n");
 }
 
 static void print_data(FILE *f, const model *m)
@@ -158,18 +177,28 @@ static void print_data(FILE *f, const model *m)
     fprintf(f, "\"accessors\":[");
     for (int i = 0; i < m->count; i++) {
         const part *p = &m->parts[i];
-        const double low[3] = { (double)p->low[0], (double)p->low[1], (double)p->low[2] }, high[3] = { (double)p->high[0], (double)p->high[1], (double)p->high[2] };
-        fprintf(f, "%s{\"bufferView\":%d,\"componentType\":%d,\"count\":%" PRIu64 ",\"type\":\"VEC3\"", i ? ",\n" : "", 2 * i, FLOAT32, p->block.mesh.vertex_count);
+        const double low[3] = { (double)p->low[0], (double)p->low[1], (double)p->low[2] },
+                     high[3] = { (double)p->high[0], (double)p->high[1], (double)p->high[2] };
+        fprintf(f,
+                "%s{\"bufferView\":%d,\"componentType\":%d,\"count\":%" PRIu64 ",\"type\":\"VEC3\"",
+                i ? ",\n" : "", 2 * i, FLOAT32, p->block.mesh.vertex_count);
         print_three(f, ",\"min\":", low);
         print_three(f, ",\"max\":", high);
         fputs("},\n", f);
-        fprintf(f, "{\"bufferView\":%d,\"componentType\":%d,\"count\":%" PRIu64 ",\"type\":\"SCALAR\"}", 2 * i + 1, UINT32, 3 * p->block.mesh.face_count);
+        fprintf(f,
+                "{\"bufferView\":%d,\"componentType\":%d,\"count\":%" PRIu64
+                ",\"type\":\"SCALAR\"}",
+                2 * i + 1, UINT32, 3 * p->block.mesh.face_count);
     }
     fprintf(f, "],\n\"bufferViews\":[");
     for (int i = 0; i < m->count; i++) {
-        uint64_t size[2] = { 12 * m->parts[i].block.mesh.vertex_count, 12 * m->parts[i].block.mesh.face_count };
+        uint64_t size[2] = { 12 * m->parts[i].block.mesh.vertex_count,
+                             12 * m->parts[i].block.mesh.face_count };
         for (int k = 0; k < 2; k++, at += size[k - 1])
-            fprintf(f, "%s{\"buffer\":0,\"byteOffset\":%" PRIu64 ",\"byteLength\":%" PRIu64 ",\"target\":%d}", i || k ? ",\n" : "", at, size[k], k ? INDICES : VERTICES);
+            fprintf(f,
+                    "%s{\"buffer\":0,\"byteOffset\":%" PRIu64 ",\"byteLength\":%" PRIu64
+                    ",\"target\":%d}",
+                    i || k ? ",\n" : "", at, size[k], k ? INDICES : VERTICES);
     }
     fprintf(f, "],\n\"buffers\":[{\"byteLength\":%" PRIu64, at);
     if (m->bin_name) {
@@ -235,7 +264,8 @@ static ebpo_status write_glb(FILE *f, const model *m, const char *path, ebpo_err
         free(text);
         return status;
     }
-    const uint32_t head[5] = { 0x46546C67 /* glTF */, 2, (uint32_t)total, (uint32_t)(length + padding), 0x4E4F534A /* JSON */ };
+    const uint32_t head[5] = { 0x46546C67 /* glTF */, 2, (uint32_t)total,
+                               (uint32_t)(length + padding), 0x4E4F534A /* JSON */ };
     const uint32_t bin_head[2] = { (uint32_t)bin, 0x004E4942 /* BIN */ };
     write_words(f, head, 5);
     fwrite(text, 1, length, f);
@@ -246,7 +276,8 @@ static ebpo_status write_glb(FILE *f, const model *m, const char *path, ebpo_err
     return EBPO_OK;
 }
 
-static ebpo_status write_files(const model *m, const ebpo_export_job *job, ebpo_publish *light, ebpo_publish *heavy, ebpo_error *error)
+static ebpo_status write_files(const model *m, const ebpo_export_job *job, ebpo_publish *light,
+                               ebpo_publish *heavy, ebpo_error *error)
 {
     FILE *f = ebpo_publish_stream(light), *b = m->bin_name ? ebpo_publish_stream(heavy) : NULL;
     ebpo_status status = EBPO_OK;

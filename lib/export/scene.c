@@ -10,8 +10,10 @@
 
 ebpo_status ebpo_export_scene(const ebpo_export_job *job, ebpo_error *error)
 {
-    return ebpo_fail(error, EBPO_E_UNSUPPORTED, "%s: this build has no assimp, which writes %s; build it with libassimp-dev installed, or export XDMF or VTKHDF", job->path,
-                     ebpo_export_format_name(job->format));
+    return ebpo_fail(error, EBPO_E_UNSUPPORTED,
+                     "%s: this build has no assimp, which writes %s; build it with libassimp-dev "
+                     "installed, or export XDMF or VTKHDF",
+                     job->path, ebpo_export_format_name(job->format));
 }
 
 #else
@@ -50,7 +52,8 @@ static void set_name(struct aiString *to, const char *name)
 
 static const struct aiMatrix4x4 identity = { 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1 };
 
-static ebpo_status add_vertices(scene *s, struct aiMesh *to, const ebpo_mesh *from, ebpo_error *error)
+static ebpo_status add_vertices(scene *s, struct aiMesh *to, const ebpo_mesh *from,
+                                ebpo_error *error)
 {
     static const double origin[3] = { 0, 0, 0 };
     float *xyz = NULL;
@@ -127,15 +130,19 @@ static ebpo_status gather(scene *s, const ebpo_export_job *job, ebpo_error *erro
 {
     const ebpo_info *info = ebpo_file_info(job->file);
     /* Of the mesh known before anything is read. */
-    ebpo_status status = job->options->mesh ? ebpo_export_check_scene(job->path, info->vertex_count, info->face_count, error) : EBPO_OK;
+    ebpo_status status = job->options->mesh ? ebpo_export_check_scene(job->path, info->vertex_count,
+                                                                      info->face_count, error)
+                                            : EBPO_OK;
     uint64_t vertices = 0, faces = 0;
     for (int i = 0; i < ebpo_block_count(job->options) && status == EBPO_OK; i++) {
         ebpo_block block;
         if (!ebpo_export_goes_on(job, i))
             return ebpo_export_stopped(error);
-        status = ebpo_block_read(&block, job->file, ebpo_block_level(job->options, i), EBPO_SOURCE_ORDER, job->options, error);
+        status = ebpo_block_read(&block, job->file, ebpo_block_level(job->options, i),
+                                 EBPO_SOURCE_ORDER, job->options, error);
         if (status == EBPO_OK)
-            status = ebpo_export_check_scene(job->path, vertices += block.mesh.vertex_count, faces += block.mesh.face_count, error);
+            status = ebpo_export_check_scene(job->path, vertices += block.mesh.vertex_count,
+                                             faces += block.mesh.face_count, error);
         if (status == EBPO_OK)
             ebpo_block_tell(&block, job->report);
         if (status == EBPO_OK && block.mesh.face_count)
@@ -143,21 +150,26 @@ static ebpo_status gather(scene *s, const ebpo_export_job *job, ebpo_error *erro
         ebpo_block_free(&block);
     }
     if (status == EBPO_OK && s->count == 0)
-        status = ebpo_fail(error, EBPO_E_ARGUMENT, "%s: there would be no triangle in it", job->path);
+        status =
+            ebpo_fail(error, EBPO_E_ARGUMENT, "%s: there would be no triangle in it", job->path);
     finish_scene(s);
     job->report->largest_change = s->largest_change;
     return status;
 }
 
-static ebpo_status write_scene(const scene *s, const ebpo_export_job *job, ebpo_scene_file *file, ebpo_error *error)
+static ebpo_status write_scene(const scene *s, const ebpo_export_job *job, ebpo_scene_file *file,
+                               ebpo_error *error)
 {
     const char *id = job->format == EBPO_EXPORT_OBJ ? "objnomtl" : "stlb";
     struct aiFileIO io;
     ebpo_status status = EBPO_OK;
     ebpo_scene_file_offer(file, &io);
     ebpo_assimp_lock();
-    if (aiExportSceneEx(&s->root, id, ebpo_path_name(job->path), &io, 0) != aiReturn_SUCCESS && !file->failed)
-        status = ebpo_fail(error, EBPO_E_UNSUPPORTED, "%s: assimp cannot write it (%.200s); take another format", job->path, aiGetErrorString());
+    if (aiExportSceneEx(&s->root, id, ebpo_path_name(job->path), &io, 0) != aiReturn_SUCCESS &&
+        !file->failed)
+        status = ebpo_fail(error, EBPO_E_UNSUPPORTED,
+                           "%s: assimp cannot write it (%.200s); take another format", job->path,
+                           aiGetErrorString());
     ebpo_assimp_unlock();
     return status;
 }

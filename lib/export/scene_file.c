@@ -17,10 +17,7 @@ typedef struct cursor {
     FILE *stream;
 } cursor;
 
-static cursor *cursor_of(struct aiFile *file)
-{
-    return (cursor *)(void *)file->UserData;
-}
+static cursor *cursor_of(struct aiFile *file) { return (cursor *)(void *)file->UserData; }
 
 /* assimp does not look at what it is told here, so the failure is kept. */
 static void note_failure(ebpo_scene_file *target)
@@ -53,7 +50,8 @@ static size_t tell(struct aiFile *file)
 static enum aiReturn seek(struct aiFile *file, size_t offset, enum aiOrigin origin)
 {
     int whence = origin == aiOrigin_SET ? SEEK_SET : origin == aiOrigin_CUR ? SEEK_CUR : SEEK_END;
-    return fseeko(cursor_of(file)->stream, (off_t)offset, whence) == 0 ? aiReturn_SUCCESS : aiReturn_FAILURE;
+    return fseeko(cursor_of(file)->stream, (off_t)offset, whence) == 0 ? aiReturn_SUCCESS
+                                                                       : aiReturn_FAILURE;
 }
 
 static size_t file_size(struct aiFile *file)
@@ -91,7 +89,8 @@ static struct aiFile *open_file(struct aiFileIO *io, const char *name, const cha
     }
     target->stream = stream;
     *c = (cursor){ target, stream };
-    *file = (struct aiFile){ read_bytes, write_bytes, tell, file_size, seek, flush, (aiUserData)(void *)c };
+    *file = (struct aiFile){ read_bytes, write_bytes,          tell, file_size, seek,
+                             flush,      (aiUserData)(void *)c };
     return file;
 }
 
@@ -116,20 +115,20 @@ void ebpo_scene_file_offer(ebpo_scene_file *file, struct aiFileIO *io)
 ebpo_status ebpo_scene_file_commit(ebpo_scene_file *file, ebpo_error *error)
 {
     if (file->unknown[0])
-        return ebpo_fail(error, EBPO_E_UNSUPPORTED, "%s: this assimp wants to write a file '%s' too, which nobody knows of; take another format", file->path,
-                         file->unknown);
+        return ebpo_fail(error, EBPO_E_UNSUPPORTED,
+                         "%s: this assimp wants to write a file '%s' too, which nobody knows of; "
+                         "take another format",
+                         file->path, file->unknown);
     if (file->failed) {
         errno = file->why;
         return ebpo_fail_errno(error, file->path, "could not be written");
     }
     if (!file->stream)
-        return ebpo_fail(error, EBPO_E_UNSUPPORTED, "%s: this assimp has written nothing; take another format", file->path);
+        return ebpo_fail(error, EBPO_E_UNSUPPORTED,
+                         "%s: this assimp has written nothing; take another format", file->path);
     return ebpo_publish_commit(&file->publish, error);
 }
 
-void ebpo_scene_file_abort(ebpo_scene_file *file)
-{
-    ebpo_publish_abort(&file->publish);
-}
+void ebpo_scene_file_abort(ebpo_scene_file *file) { ebpo_publish_abort(&file->publish); }
 
 #endif

@@ -1,5 +1,6 @@
-/* VTKHDF 1.0: one unstructured grid of polygons. This version knows neither blocks (2.1 does) nor polyhedra (2.5), so levels are told apart by the cells' number `lod`, and by being
- * partitions. Source: VTK's documentation, "VTKHDF file format". */
+/* VTKHDF 1.0: one unstructured grid of polygons. This version knows neither blocks (2.1 does) nor
+ * polyhedra (2.5), so levels are told apart by the cells' number `lod`, and by being partitions.
+ * Source: VTK's documentation, "VTKHDF file format". */
 #include "geom/strict_fp.h"
 
 #include <stdlib.h>
@@ -13,16 +14,32 @@
 
 enum { VTK_TRIANGLE = 5, VTK_POLYGON = 7 };
 
-enum { POINTS, CONNECTIVITY, OFFSETS, TYPES, POINT_COUNT, CELL_COUNT, CORNER_COUNT, SOURCE_VERTEX, FIRST_COLUMN, TABLES = FIRST_COLUMN + EBPO_COLUMNS };
+enum {
+    POINTS,
+    CONNECTIVITY,
+    OFFSETS,
+    TYPES,
+    POINT_COUNT,
+    CELL_COUNT,
+    CORNER_COUNT,
+    SOURCE_VERTEX,
+    FIRST_COLUMN,
+    TABLES = FIRST_COLUMN + EBPO_COLUMNS
+};
 
 static const struct {
     const char *path;
     ebpo_h5_number number;
     uint32_t cols;
 } layout[FIRST_COLUMN] = {
-    { "/VTKHDF/Points", EBPO_H5_F64, 3 },          { "/VTKHDF/Connectivity", EBPO_H5_I64, 0 },  { "/VTKHDF/Offsets", EBPO_H5_I64, 0 },
-    { "/VTKHDF/Types", EBPO_H5_U8, 0 },            { "/VTKHDF/NumberOfPoints", EBPO_H5_I64, 0 }, { "/VTKHDF/NumberOfCells", EBPO_H5_I64, 0 },
-    { "/VTKHDF/NumberOfConnectivityIds", EBPO_H5_I64, 0 }, { "/VTKHDF/PointData/source_vertex", EBPO_H5_I64, 0 },
+    { "/VTKHDF/Points", EBPO_H5_F64, 3 },
+    { "/VTKHDF/Connectivity", EBPO_H5_I64, 0 },
+    { "/VTKHDF/Offsets", EBPO_H5_I64, 0 },
+    { "/VTKHDF/Types", EBPO_H5_U8, 0 },
+    { "/VTKHDF/NumberOfPoints", EBPO_H5_I64, 0 },
+    { "/VTKHDF/NumberOfCells", EBPO_H5_I64, 0 },
+    { "/VTKHDF/NumberOfConnectivityIds", EBPO_H5_I64, 0 },
+    { "/VTKHDF/PointData/source_vertex", EBPO_H5_I64, 0 },
 };
 
 typedef struct writer {
@@ -53,8 +70,11 @@ static ebpo_status make_tables(writer *w, bool floats, ebpo_error *error)
         char path[64];
         const ebpo_column *column = i < FIRST_COLUMN ? NULL : &ebpo_columns[i - FIRST_COLUMN];
         snprintf(path, sizeof path, "/VTKHDF/CellData/%s", column ? column->name : "");
-        ebpo_h5_number number = column ? column->number : i == POINTS && floats ? EBPO_H5_F32 : layout[i].number;
-        status = ebpo_h5_make_table(&w->out, column ? path : layout[i].path, number, column ? 0 : layout[i].cols, &w->table[i], error);
+        ebpo_h5_number number = column                  ? column->number
+                                : i == POINTS && floats ? EBPO_H5_F32
+                                                        : layout[i].number;
+        status = ebpo_h5_make_table(&w->out, column ? path : layout[i].path, number,
+                                    column ? 0 : layout[i].cols, &w->table[i], error);
     }
     return status;
 }
@@ -62,7 +82,8 @@ static ebpo_status make_tables(writer *w, bool floats, ebpo_error *error)
 /* Appends and frees. NULL: memory was short. */
 static ebpo_status append(writer *w, int table, void *values, uint64_t count, ebpo_error *error)
 {
-    ebpo_status status = values ? ebpo_h5_append(&w->out, &w->table[table], values, count, error) : ebpo_fail_memory(error, count * 8);
+    ebpo_status status = values ? ebpo_h5_append(&w->out, &w->table[table], values, count, error)
+                                : ebpo_fail_memory(error, count * 8);
     free(values);
     return status;
 }
@@ -75,13 +96,17 @@ static ebpo_status append_points(writer *w, const ebpo_mesh *mesh, ebpo_error *e
             wide[i] = (double)mesh->xyz32[i];
         return append(w, POINTS, wide, mesh->vertex_count, error);
     }
-    return ebpo_h5_append(&w->out, &w->table[POINTS], mesh->xyz32 ? (const void *)mesh->xyz32 : mesh->xyz64, mesh->vertex_count, error);
+    return ebpo_h5_append(&w->out, &w->table[POINTS],
+                          mesh->xyz32 ? (const void *)mesh->xyz32 : mesh->xyz64, mesh->vertex_count,
+                          error);
 }
 
-static ebpo_status append_cells(writer *w, const ebpo_block *block, uint64_t cells, uint64_t corners, ebpo_error *error)
+static ebpo_status append_cells(writer *w, const ebpo_block *block, uint64_t cells,
+                                uint64_t corners, ebpo_error *error)
 {
     bool mesh = block->level < 0;
-    int64_t *connectivity = ebpo_alloc(corners, sizeof *connectivity), *offsets = ebpo_alloc(cells + 1, sizeof *offsets);
+    int64_t *connectivity = ebpo_alloc(corners, sizeof *connectivity),
+            *offsets = ebpo_alloc(cells + 1, sizeof *offsets);
     uint8_t *types = ebpo_alloc(cells, 1);
     const uint32_t *triangle = block->mesh.faces;
     uint64_t at = 0;
@@ -119,7 +144,8 @@ static ebpo_status append_block(writer *w, const ebpo_block *block, ebpo_error *
     for (int i = 0; i < 3 && status == EBPO_OK; i++)
         status = ebpo_h5_append(&w->out, &w->table[POINT_COUNT + i], &count[i], 1, error);
     if (status == EBPO_OK)
-        status = append(w, SOURCE_VERTEX, ebpo_column_of_vertices(block), block->mesh.vertex_count, error);
+        status = append(w, SOURCE_VERTEX, ebpo_column_of_vertices(block), block->mesh.vertex_count,
+                        error);
     for (int i = 0; i < EBPO_COLUMNS && status == EBPO_OK; i++)
         status = append(w, FIRST_COLUMN + i, ebpo_column_make(block, i, true), cells, error);
     return status;
@@ -128,12 +154,14 @@ static ebpo_status append_block(writer *w, const ebpo_block *block, ebpo_error *
 static ebpo_status write_blocks(writer *w, const ebpo_export_job *job, ebpo_error *error)
 {
     bool levels = ebpo_block_level(job->options, 0) >= 0;
-    ebpo_status status = make_tables(w, !levels && !ebpo_file_info(job->file)->double_coordinates, error);
+    ebpo_status status =
+        make_tables(w, !levels && !ebpo_file_info(job->file)->double_coordinates, error);
     for (int i = 0; i < ebpo_block_count(job->options) && status == EBPO_OK; i++) {
         ebpo_block block;
         if (!ebpo_export_goes_on(job, i))
             return ebpo_export_stopped(error);
-        status = ebpo_block_read(&block, job->file, ebpo_block_level(job->options, i), EBPO_FILE_ORDER, job->options, error);
+        status = ebpo_block_read(&block, job->file, ebpo_block_level(job->options, i),
+                                 EBPO_FILE_ORDER, job->options, error);
         if (status == EBPO_OK)
             status = append_block(w, &block, error);
         if (status == EBPO_OK)

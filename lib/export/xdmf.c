@@ -1,4 +1,5 @@
-/* XDMF 3: a text that names arrays in an HDF5 file beside it. Levels are polyhedra, one for each node; VTK reads these with its Xdmf3 readers, not with the older XDMF reader. */
+/* XDMF 3: a text that names arrays in an HDF5 file beside it. Levels are polyhedra, one for each
+ * node; VTK reads these with its Xdmf3 readers, not with the older XDMF reader. */
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -29,15 +30,18 @@ static void print_escaped(FILE *f, const char *s)
 }
 
 /* Writes the array and names it in the text. NULL: memory was short. */
-static ebpo_status put(writer *w, const ebpo_block *block, const char *name, ebpo_h5_number number, uint32_t cols, const void *values, uint64_t rows,
-                       ebpo_error *error)
+static ebpo_status put(writer *w, const ebpo_block *block, const char *name, ebpo_h5_number number,
+                       uint32_t cols, const void *values, uint64_t rows, ebpo_error *error)
 {
     char path[64];
     snprintf(path, sizeof path, "/%s/%s", block->name, name);
-    ebpo_status status = values ? ebpo_h5_put_table(&w->out, path, number, cols, values, rows, error) : ebpo_fail_memory(error, rows * 8);
+    ebpo_status status = values
+                             ? ebpo_h5_put_table(&w->out, path, number, cols, values, rows, error)
+                             : ebpo_fail_memory(error, rows * 8);
     bool real = number == EBPO_H5_F32 || number == EBPO_H5_F64;
-    fprintf(w->text, "<DataItem Format=\"HDF\" NumberType=\"%s\" Precision=\"%zu\" Dimensions=\"%" PRIu64, real ? "Float" : "Int",
-            ebpo_h5_number_bytes(number), rows);
+    fprintf(w->text,
+            "<DataItem Format=\"HDF\" NumberType=\"%s\" Precision=\"%zu\" Dimensions=\"%" PRIu64,
+            real ? "Float" : "Int", ebpo_h5_number_bytes(number), rows);
     if (cols)
         fprintf(w->text, " %" PRIu32, cols);
     fprintf(w->text, "\">");
@@ -46,21 +50,26 @@ static ebpo_status put(writer *w, const ebpo_block *block, const char *name, ebp
     return status;
 }
 
-static ebpo_status put_attribute(writer *w, const ebpo_block *block, const char *name, const char *centre, ebpo_h5_number number, void *values,
+static ebpo_status put_attribute(writer *w, const ebpo_block *block, const char *name,
+                                 const char *centre, ebpo_h5_number number, void *values,
                                  uint64_t rows, ebpo_error *error)
 {
-    fprintf(w->text, "        <Attribute Name=\"%s\" AttributeType=\"Scalar\" Center=\"%s\">\n          ", name, centre);
+    fprintf(w->text,
+            "        <Attribute Name=\"%s\" AttributeType=\"Scalar\" Center=\"%s\">\n          ",
+            name, centre);
     ebpo_status status = put(w, block, name, number, 0, values, rows, error);
     fprintf(w->text, "        </Attribute>\n");
     free(values);
     return status;
 }
 
-/* For each polyhedron its kind, the number of its polygons, and for each of these the number of its corners and the corners. */
+/* For each polyhedron its kind, the number of its polygons, and for each of these the number of its
+ * corners and the corners. */
 static ebpo_status put_polyhedra(writer *w, const ebpo_block *block, ebpo_error *error)
 {
     const ebpo_lod_nodes *nodes = &block->nodes;
-    uint64_t size = 2 * nodes->node_count + 3 * nodes->polygon_count + block->mesh.face_count, at = 0, polygon = 0;
+    uint64_t size = 2 * nodes->node_count + 3 * nodes->polygon_count + block->mesh.face_count,
+             at = 0, polygon = 0;
     int64_t *cells = ebpo_alloc(size, sizeof *cells);
     const uint32_t *triangle = block->mesh.faces;
     for (uint64_t i = 0; cells && i < nodes->node_count; i++) {
@@ -74,7 +83,10 @@ static ebpo_status put_polyhedra(writer *w, const ebpo_block *block, ebpo_error 
             triangle += 3 * (n - 2);
         }
     }
-    fprintf(w->text, "        <Topology TopologyType=\"Mixed\" NumberOfElements=\"%" PRIu64 "\">\n          ", nodes->node_count);
+    fprintf(w->text,
+            "        <Topology TopologyType=\"Mixed\" NumberOfElements=\"%" PRIu64
+            "\">\n          ",
+            nodes->node_count);
     ebpo_status status = put(w, block, "cells", EBPO_H5_I64, 0, cells, size, error);
     free(cells);
     return status;
@@ -87,7 +99,10 @@ static ebpo_status put_triangles(writer *w, const ebpo_block *block, ebpo_error 
     int64_t *cells = ebpo_alloc(count, 3 * sizeof *cells);
     for (uint64_t i = 0; cells && i < 3 * count; i++)
         cells[i] = mesh->faces[i];
-    fprintf(w->text, "        <Topology TopologyType=\"Triangle\" NumberOfElements=\"%" PRIu64 "\">\n          ", count);
+    fprintf(w->text,
+            "        <Topology TopologyType=\"Triangle\" NumberOfElements=\"%" PRIu64
+            "\">\n          ",
+            count);
     ebpo_status status = put(w, block, "cells", EBPO_H5_I64, 3, cells, count, error);
     free(cells);
     return status;
@@ -99,13 +114,16 @@ static ebpo_status put_data(writer *w, const ebpo_block *block, ebpo_error *erro
     uint64_t rows = mesh ? block->mesh.face_count : block->nodes.node_count;
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < EBPO_COLUMNS_OF_NODES && !mesh && status == EBPO_OK; i++)
-        status = put_attribute(w, block, ebpo_columns[i].name, "Cell", ebpo_columns[i].number, ebpo_column_make(block, i, false), rows, error);
+        status = put_attribute(w, block, ebpo_columns[i].name, "Cell", ebpo_columns[i].number,
+                               ebpo_column_make(block, i, false), rows, error);
     if (!mesh || !block->face_source)
         return status;
     const ebpo_column *c = &ebpo_columns[EBPO_COLUMN_SOURCE_FACE];
-    status = put_attribute(w, block, c->name, "Cell", c->number, ebpo_column_make(block, EBPO_COLUMN_SOURCE_FACE, false), rows, error);
+    status = put_attribute(w, block, c->name, "Cell", c->number,
+                           ebpo_column_make(block, EBPO_COLUMN_SOURCE_FACE, false), rows, error);
     if (status == EBPO_OK)
-        status = put_attribute(w, block, "source_vertex", "Node", EBPO_H5_I64, ebpo_column_of_vertices(block), block->mesh.vertex_count, error);
+        status = put_attribute(w, block, "source_vertex", "Node", EBPO_H5_I64,
+                               ebpo_column_of_vertices(block), block->mesh.vertex_count, error);
     return status;
 }
 
@@ -123,8 +141,9 @@ static ebpo_status put_block(writer *w, const ebpo_block *block, ebpo_error *err
     status = block->level < 0 ? put_triangles(w, block, error) : put_polyhedra(w, block, error);
     fprintf(w->text, "        </Topology>\n        <Geometry GeometryType=\"XYZ\">\n          ");
     if (status == EBPO_OK)
-        status = put(w, block, "points", mesh->xyz32 ? EBPO_H5_F32 : EBPO_H5_F64, 3, mesh->xyz32 ? (const void *)mesh->xyz32 : mesh->xyz64,
-                     mesh->vertex_count, error);
+        status =
+            put(w, block, "points", mesh->xyz32 ? EBPO_H5_F32 : EBPO_H5_F64, 3,
+                mesh->xyz32 ? (const void *)mesh->xyz32 : mesh->xyz64, mesh->vertex_count, error);
     fprintf(w->text, "        </Geometry>\n");
     if (status == EBPO_OK)
         status = put_data(w, block, error);
@@ -135,14 +154,17 @@ static ebpo_status put_block(writer *w, const ebpo_block *block, ebpo_error *err
 static ebpo_status write_blocks(writer *w, const ebpo_export_job *job, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    fprintf(w->text, "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<Xdmf Version=\"3.0\">\n  <Domain>\n"
-                     "    <Grid Name=\"ebpo\" GridType=\"Collection\" CollectionType=\"Spatial\">\n");
+    fprintf(w->text,
+            "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<Xdmf Version=\"3.0\">\n  <Domain>\n"
+            "    <Grid Name=\"ebpo\" GridType=\"Collection\" CollectionType=\"Spatial\">\n");
     for (int i = 0; i < ebpo_block_count(job->options) && status == EBPO_OK; i++) {
         ebpo_block block;
         if (!ebpo_export_goes_on(job, i))
             return ebpo_export_stopped(error);
-        status = ebpo_block_read(&block, job->file, ebpo_block_level(job->options, i), EBPO_FILE_ORDER, job->options, error);
-        if (status == EBPO_OK && (block.level < 0 || block.nodes.node_count)) /* VTK gives up at a grid without cells */
+        status = ebpo_block_read(&block, job->file, ebpo_block_level(job->options, i),
+                                 EBPO_FILE_ORDER, job->options, error);
+        if (status == EBPO_OK &&
+            (block.level < 0 || block.nodes.node_count)) /* VTK gives up at a grid without cells */
             status = put_block(w, &block, error);
         if (status == EBPO_OK)
             ebpo_block_tell(&block, job->report);

@@ -1,7 +1,9 @@
-/* A triangle and a box are apart exactly when they are so along one of 13 axes: those of the box, the triangle's normal, the products of an axis of
- * the box with an edge of the triangle (separating axes; Gottschalk, Lin and Manocha 1996). The last nine are questions in the plane: along each axis of
- * the box the triangle becomes a triangle and the box a rectangle, and the rectangle lies beyond an edge. All signs come from the exact predicates, which begin
- * with filters. */
+/* A triangle and a box are apart exactly when they are so along one of 13 axes: those of the box,
+ * the triangle's normal, the products of an axis of the box with an edge of the triangle
+ * (separating axes; Gottschalk, Lin and Manocha 1996). The last nine are questions in the plane:
+ * along each axis of the box the triangle becomes a triangle and the box a rectangle, and the
+ * rectangle lies beyond an edge. All signs come from the exact predicates, which begin with
+ * filters. */
 #include "geom/strict_fp.h"
 
 #include "geom/ray.h"
@@ -14,9 +16,10 @@ typedef struct shadow {
     int turn; /* sign of the projected area */
 } shadow;
 
-static shadow shadow_along(int axis, const double triangle[3][3], const double min[3], const double max[3])
+static shadow shadow_along(int axis, const double triangle[3][3], const double min[3],
+                           const double max[3])
 {
-    const int to[2] = {axis == 2 ? 0 : axis + 1, axis == 0 ? 2 : axis - 1};
+    const int to[2] = { axis == 2 ? 0 : axis + 1, axis == 0 ? 2 : axis - 1 };
     shadow s;
     for (int k = 0; k < 2; k++) {
         s.min[k] = min[to[k]];
@@ -28,12 +31,13 @@ static shadow shadow_along(int axis, const double triangle[3][3], const double m
     return s;
 }
 
-/* True when the rectangle lies wholly to the side (1: left, -1: right) of the line from a to b, which it does not touch. */
+/* True when the rectangle lies wholly to the side (1: left, -1: right) of the line from a to b,
+ * which it does not touch. */
 static bool rectangle_on_side(const shadow *s, const double a[2], const double b[2], int side)
 {
     /* The corner that is farthest to the other side. */
     bool far_x = side > 0 ? b[1] < a[1] : b[1] > a[1], far_y = side > 0 ? b[0] > a[0] : b[0] < a[0];
-    const double corner[2] = {far_x ? s->min[0] : s->max[0], far_y ? s->min[1] : s->max[1]};
+    const double corner[2] = { far_x ? s->min[0] : s->max[0], far_y ? s->min[1] : s->max[1] };
     return ebpo_orient2d(a, b, corner) == side;
 }
 
@@ -50,20 +54,22 @@ static bool shadows_apart(const shadow *s)
 }
 
 /* `normal`: signs of the normal's components. */
-static bool apart_from_plane(const double triangle[3][3], const double min[3], const double max[3], const int normal[3])
+static bool apart_from_plane(const double triangle[3][3], const double min[3], const double max[3],
+                             const int normal[3])
 {
     double lowest[3], highest[3];
     for (int k = 0; k < 3; k++) {
         lowest[k] = normal[k] > 0 ? min[k] : max[k];
         highest[k] = normal[k] > 0 ? max[k] : min[k];
     }
-    return ebpo_orient3d(triangle[0], triangle[1], triangle[2], lowest) > 0 || ebpo_orient3d(triangle[0], triangle[1], triangle[2], highest) < 0;
+    return ebpo_orient3d(triangle[0], triangle[1], triangle[2], lowest) > 0 ||
+           ebpo_orient3d(triangle[0], triangle[1], triangle[2], highest) < 0;
 }
 
 bool ebpo_triangle_meets_box(const double triangle[3][3], const double min[3], const double max[3])
 {
-    int below[3] = {0}, above[3] = {0}, normal[3];
-    bool corner_within[3] = {true, true, true};
+    int below[3] = { 0 }, above[3] = { 0 }, normal[3];
+    bool corner_within[3] = { true, true, true };
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++) {
             below[k] += triangle[i][k] < min[k];

@@ -1,4 +1,5 @@
-/* The root box: for each axis a unit u = 2^e such that the walls of all levels are integers of at most 53 bits times u. */
+/* The root box: for each axis a unit u = 2^e such that the walls of all levels are integers of at
+ * most 53 bits times u. */
 #include "geom/strict_fp.h"
 
 #include "geom/cell.h"
@@ -7,15 +8,16 @@
 
 enum { MANTISSA_BITS = 53, LEAST_EXPONENT = -1074, LARGEST_EXPONENT = 1000 };
 
-/* Room around the model, for each side: a part of the axis' own extent, and at least a part of the largest one, so that flat models do not get
- * cells too thin to compute with. */
+/* Room around the model, for each side: a part of the axis' own extent, and at least a part of the
+ * largest one, so that flat models do not get cells too thin to compute with. */
 static const double own_margin = 0x1p-22, flat_margin = 0x1p-32;
 
 static bool extents_usable(const double min[3], const double max[3])
 {
     for (int k = 0; k < 3; k++)
         /* Written so that NaN fails. */
-        if (!(min[k] <= max[k] && min[k] >= -ldexp(1, LARGEST_EXPONENT) && max[k] <= ldexp(1, LARGEST_EXPONENT)))
+        if (!(min[k] <= max[k] && min[k] >= -ldexp(1, LARGEST_EXPONENT) &&
+              max[k] <= ldexp(1, LARGEST_EXPONENT)))
             return false;
     return true;
 }
@@ -33,8 +35,10 @@ static double model_size(const double min[3], const double max[3])
     return magnitude > 0 ? magnitude : 1;
 }
 
-/* One axis with unit 2^e; false when the unit is too fine. [low, high] holds [min, max], with margins. */
-static bool axis_with_unit(ebpo_box *box, int axis, double min, double max, double low, double high, int e)
+/* One axis with unit 2^e; false when the unit is too fine. [low, high] holds [min, max], with
+ * margins. */
+static bool axis_with_unit(ebpo_box *box, int axis, double min, double max, double low, double high,
+                           int e)
 {
     double limit = ldexp(1, MANTISSA_BITS);
     double unit = ldexp(1, e), first = floor(ldexp(low, -e));
@@ -55,7 +59,7 @@ static bool axis_with_unit(ebpo_box *box, int axis, double min, double max, doub
 
 bool ebpo_box_make(ebpo_box *out, const double min[3], const double max[3], int grid_level)
 {
-    ebpo_box box = {.grid_level = grid_level};
+    ebpo_box box = { .grid_level = grid_level };
     if (grid_level < 0 || grid_level > EBPO_MAX_LEVEL || !extents_usable(min, max))
         return false;
     double flat = flat_margin * model_size(min, max);

@@ -1,12 +1,17 @@
 /* Bounds of the distance to a triangle, in doubles.
  *
- * With corners a, b, c relative to p, the nearest feature is certain when the signs of a few products are: a corner when p lies behind it along both of its edges; an edge when p
- * projects between its ends and lies outside of it in the plane; the interior when p projects inside all edges (the features' Voronoi regions).
+ * With corners a, b, c relative to p, the nearest feature is certain when the signs of a few
+ * products are: a corner when p lies behind it along both of its edges; an edge when p projects
+ * between its ends and lies outside of it in the plane; the interior when p projects inside all
+ * edges (the features' Voronoi regions).
  *
- * Rounding (u = 2^-53; r: 1-norms of the relative corners at most; l: of the edges; s = l^2, at least the normal's length): relative corners are off by u of themselves, edges likewise. So products of
- * a corner and an edge are off by 8 u r l, the normal by 8 u l^2 on each axis, products of a corner with edge x normal by 64 u r l^3. Distances to points of corners and edges are off
- * by 16 u r. The distance to the plane is off by what tilting the normal by 16 u l^2 / |n| moves the plane within the triangle, and by 16 u r. Everything below doubles these at least.
- * Numbers whose fourth powers leave the doubles are scaled first. */
+ * Rounding (u = 2^-53; r: 1-norms of the relative corners at most; l: of the edges; s = l^2, at
+ * least the normal's length): relative corners are off by u of themselves, edges likewise. So
+ * products of a corner and an edge are off by 8 u r l, the normal by 8 u l^2 on each axis, products
+ * of a corner with edge x normal by 64 u r l^3. Distances to points of corners and edges are off by
+ * 16 u r. The distance to the plane is off by what tilting the normal by 16 u l^2 / |n| moves the
+ * plane within the triangle, and by 16 u r. Everything below doubles these at least. Numbers whose
+ * fourth powers leave the doubles are scaled first. */
 #include "geom/strict_fp.h"
 
 #include "geom/distance.h"
@@ -30,24 +35,19 @@ static inline void cross(const double a[3], const double b[3], double out[3])
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-static inline double size1(const double a[3])
-{
-    return fabs(a[0]) + fabs(a[1]) + fabs(a[2]);
-}
+static inline double size1(const double a[3]) { return fabs(a[0]) + fabs(a[1]) + fabs(a[2]); }
 
-static inline double greater(double a, double b)
-{
-    return a > b ? a : b;
-}
+static inline double greater(double a, double b) { return a > b ? a : b; }
 
 typedef struct relation {
     double corner[3][3]; /* relative to p */
     double edge[3][3];   /* corner k to k + 1 */
     double reach, size;  /* r and l */
-    double along[3];     /* corner k . edge k: how far p is behind corner k along its edge, times the edge's length */
-    double back[3];      /* corner k + 1 . edge k */
+    /* corner k . edge k: how far p is behind corner k along its edge, times the edge's length */
+    double along[3];
+    double back[3]; /* corner k + 1 . edge k */
     double normal[3];
-    double side[3];      /* positive where p is within edge k */
+    double side[3]; /* positive where p is within edge k */
 } relation;
 
 static void relate(const double p[3], const double triangle[3][3], relation *r)
@@ -76,10 +76,12 @@ static void multiply(relation *r)
     }
 }
 
-/* Distance to the line through edge i, p projecting between its ends: to corner plus a share of the edge. */
+/* Distance to the line through edge i, p projecting between its ends: to corner plus a share of the
+ * edge. */
 static double edge_distance(const relation *r, int i)
 {
-    double length2 = dot(r->edge[i], r->edge[i]), t = length2 > 0 ? -r->along[i] / length2 : 0, q[3];
+    double length2 = dot(r->edge[i], r->edge[i]), t = length2 > 0 ? -r->along[i] / length2 : 0,
+           q[3];
     t = t < 0 ? 0 : t > 1 ? 1 : t;
     for (int k = 0; k < 3; k++)
         q[k] = r->corner[i][k] + t * r->edge[i][k];
@@ -88,7 +90,8 @@ static double edge_distance(const relation *r, int i)
 
 static ebpo_feature certain_feature(const relation *r)
 {
-    double flat = 0x1p-48 * r->reach * r->size, solid = 0x1p-44 * r->reach * r->size * r->size * r->size;
+    double flat = 0x1p-48 * r->reach * r->size,
+           solid = 0x1p-44 * r->reach * r->size * r->size * r->size;
     bool inside = true;
     for (int i = 0; i < 3; i++) {
         int before = i == 0 ? 2 : i - 1;
@@ -109,7 +112,8 @@ static double plane_distance(const relation *r, double *error)
     return fabs(dot(r->normal, r->corner[0])) / length;
 }
 
-/* The plane is never farther than the triangle; a plane of unknown tilt tells nothing, but no point of the triangle is farther from its edges than its height. */
+/* The plane is never farther than the triangle; a plane of unknown tilt tells nothing, but no point
+ * of the triangle is farther from its edges than its height. */
 static void bound_by_edges(const relation *r, double plane, double error, ebpo_distance_bounds *out)
 {
     double edges = edge_distance(r, 0), length = sqrt(dot(r->normal, r->normal));
@@ -118,7 +122,8 @@ static void bound_by_edges(const relation *r, double plane, double error, ebpo_d
         edges = other < edges ? other : edges;
     }
     double height = length > 0 ? 2 * length / r->size + 0x1p-44 * r->size : 0x1p-44 * r->size;
-    double low = edges - error - 4 * height, tilted = 0x1p-47 * r->reach + 0x1p-46 * r->size * r->size / length * r->reach;
+    double low = edges - error - 4 * height,
+           tilted = 0x1p-47 * r->reach + 0x1p-46 * r->size * r->size / length * r->reach;
     if (tilted < 0x1p-20 * r->reach)
         low = greater(low, plane < edges ? plane - tilted : edges - tilted);
     out->lo = low > 0 ? low : 0;
@@ -153,10 +158,12 @@ static void bound_scaled(const double p[3], const double triangle[3][3], ebpo_di
     double q[3], t[3][3];
     int exponent = ebpo_distance_scale(p, triangle, q, t);
     relation r;
-    relate(q, (const double (*)[3])t, &r);
+    relate(q, (const double(*)[3])t, &r);
     if (!(r.reach > tiny_reach * 0x1p-100) || !(r.size > tiny_reach || r.size == 0)) {
         /* Next to a point: only that much is known. */
-        *out = (ebpo_distance_bounds){ 0, ldexp(r.reach + 0x1p-1000, exponent) * (1 + 0x1p-50) + 0x1p-1074, EBPO_NEAR_UNKNOWN };
+        *out = (ebpo_distance_bounds){
+            0, ldexp(r.reach + 0x1p-1000, exponent) * (1 + 0x1p-50) + 0x1p-1074, EBPO_NEAR_UNKNOWN
+        };
         return;
     }
     multiply(&r);
@@ -168,7 +175,8 @@ static void bound_scaled(const double p[3], const double triangle[3][3], ebpo_di
     out->hi = nextafter(ldexp(out->hi + 0x1p-1000, exponent), INFINITY);
 }
 
-void ebpo_triangle_distance_bounds(const double p[3], const double triangle[3][3], ebpo_distance_bounds *out)
+void ebpo_triangle_distance_bounds(const double p[3], const double triangle[3][3],
+                                   ebpo_distance_bounds *out)
 {
     relation r;
     relate(p, triangle, &r);

@@ -1,5 +1,6 @@
-/* Distance to a triangle, correctly rounded: double-double arithmetic while its error bound decides the rounding, integers of any size otherwise.
- * Source of the test: Ziv, "Fast evaluation of elementary mathematical functions with correctly rounded last bit", 1991. */
+/* Distance to a triangle, correctly rounded: double-double arithmetic while its error bound decides
+ * the rounding, integers of any size otherwise. Source of the test: Ziv, "Fast evaluation of
+ * elementary mathematical functions with correctly rounded last bit", 1991. */
 #include "geom/strict_fp.h"
 
 #include <math.h>
@@ -16,14 +17,16 @@ static bool ordinary(const double p[3], const double triangle[3][3])
     double reach = 0, size = 0;
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++) {
-            double r = fabs(triangle[i][k] - p[k]), l = fabs(triangle[i][k] - triangle[i == 2 ? 0 : i + 1][k]);
+            double r = fabs(triangle[i][k] - p[k]),
+                   l = fabs(triangle[i][k] - triangle[i == 2 ? 0 : i + 1][k]);
             reach = r > reach ? r : reach;
             size = l > size ? l : size;
         }
     return reach < most_reach && size > least_size;
 }
 
-void ebpo_triangle_nearest_exact(const double p[3], const double triangle[3][3], const ebpo_distance_bounds *bounds, ebpo_triangle_nearest *out)
+void ebpo_triangle_nearest_exact(const double p[3], const double triangle[3][3],
+                                 const ebpo_distance_bounds *bounds, ebpo_triangle_nearest *out)
 {
     ebpo_distance_bounds b;
     if (bounds)
@@ -34,7 +37,8 @@ void ebpo_triangle_nearest_exact(const double p[3], const double triangle[3][3],
         ebpo_measured m;
         ebpo_distance_pairs_best()->measure(p, triangle, b.feature, &m);
         double error = m.error * m.distance.head;
-        double least = m.distance.head + (m.distance.tail - error), most = m.distance.head + (m.distance.tail + error);
+        double least = m.distance.head + (m.distance.tail - error),
+               most = m.distance.head + (m.distance.tail + error);
         if (m.error < 0x1p-56 && least == most) {
             out->distance = least;
             out->feature = b.feature;

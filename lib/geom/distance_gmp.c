@@ -1,4 +1,5 @@
-/* Distance to a triangle without rounding: coordinates as integers in a common power of two, the squared distance as a fraction of integers. */
+/* Distance to a triangle without rounding: coordinates as integers in a common power of two, the
+ * squared distance as a fraction of integers. */
 #include "geom/strict_fp.h"
 
 #include <float.h>
@@ -84,7 +85,8 @@ typedef struct nearest {
 
 static void nearest_init(nearest *n)
 {
-    vector *all[] = { &n->p, &n->corner[0], &n->corner[1], &n->corner[2], &n->edge[0], &n->edge[1], &n->edge[2], &n->normal, &n->offset, &n->w };
+    vector *all[] = { &n->p,       &n->corner[0], &n->corner[1], &n->corner[2], &n->edge[0],
+                      &n->edge[1], &n->edge[2],   &n->normal,    &n->offset,    &n->w };
     for (size_t i = 0; i < sizeof all / sizeof all[0]; i++)
         vector_init(all[i]);
     mpz_inits(n->square, n->denominator, n->offset_denominator, n->t, n->u, NULL);
@@ -92,7 +94,8 @@ static void nearest_init(nearest *n)
 
 static void nearest_clear(nearest *n)
 {
-    vector *all[] = { &n->p, &n->corner[0], &n->corner[1], &n->corner[2], &n->edge[0], &n->edge[1], &n->edge[2], &n->normal, &n->offset, &n->w };
+    vector *all[] = { &n->p,       &n->corner[0], &n->corner[1], &n->corner[2], &n->edge[0],
+                      &n->edge[1], &n->edge[2],   &n->normal,    &n->offset,    &n->w };
     for (size_t i = 0; i < sizeof all / sizeof all[0]; i++)
         vector_clear(all[i]);
     mpz_clears(n->square, n->denominator, n->offset_denominator, n->t, n->u, NULL);
@@ -134,7 +137,8 @@ static bool try_interior(nearest *n)
 }
 
 /* Takes corner or edge when it is nearer than what was found (of equal ones: the corner). */
-static void offer(nearest *n, bool first, const mpz_t square, const mpz_t denominator, ebpo_feature feature, bool *taken)
+static void offer(nearest *n, bool first, const mpz_t square, const mpz_t denominator,
+                  ebpo_feature feature, bool *taken)
 {
     int sign = -1;
     *taken = false;
@@ -204,7 +208,8 @@ static void find(nearest *n)
         offer_edge(n, i);
 }
 
-/* The double nearest to m * 2^exponent, ties to even; the lowest bit of m may stand for whatever lies below it. */
+/* The double nearest to m * 2^exponent, ties to even; the lowest bit of m may stand for whatever
+ * lies below it. */
 static double round_integer(const mpz_t m, long exponent)
 {
     if (mpz_sgn(m) == 0)
@@ -222,7 +227,8 @@ static double round_integer(const mpz_t m, long exponent)
         return exact;
     }
     mpz_fdiv_q_2exp(q, m, (mp_bitcnt_t)drop);
-    bool half = mpz_tstbit(m, (mp_bitcnt_t)drop - 1), more = drop > 1 && mpz_scan1(m, 0) < (mp_bitcnt_t)drop - 1;
+    bool half = mpz_tstbit(m, (mp_bitcnt_t)drop - 1),
+         more = drop > 1 && mpz_scan1(m, 0) < (mp_bitcnt_t)drop - 1;
     if (half && (more || mpz_odd_p(q)))
         mpz_add_ui(q, q, 1);
     double value = exponent + drop > 2000 ? INFINITY : ldexp(mpz_get_d(q), (int)(exponent + drop));
@@ -278,7 +284,8 @@ static double fraction_value(const mpz_t numerator, const mpz_t denominator, int
     return sign < 0 ? -value : value;
 }
 
-void ebpo_triangle_nearest_gmp(const double p[3], const double triangle[3][3], ebpo_triangle_nearest *out)
+void ebpo_triangle_nearest_gmp(const double p[3], const double triangle[3][3],
+                               ebpo_triangle_nearest *out)
 {
     nearest n;
     nearest_init(&n);
@@ -295,7 +302,8 @@ void ebpo_triangle_nearest_gmp(const double p[3], const double triangle[3][3], e
     nearest_clear(&n);
 }
 
-int ebpo_triangle_distance_compare_gmp(const double p[3], const double a[3][3], const double b[3][3])
+int ebpo_triangle_distance_compare_gmp(const double p[3], const double a[3][3],
+                                       const double b[3][3])
 {
     nearest n, m;
     nearest_init(&n);
@@ -317,7 +325,9 @@ int ebpo_triangle_distance_compare_to_gmp(const double p[3], const double triang
 {
     nearest n;
     nearest_init(&n);
-    set_points(&n, p, triangle, common_unit(&triangle[0][0], 9, common_unit(p, 3, common_unit(&d, 1, INT_MAX - 64))));
+    set_points(&n, p, triangle,
+               common_unit(&triangle[0][0], 9,
+                           common_unit(p, 3, common_unit(&d, 1, INT_MAX - 64))));
     find(&n);
     set_integer(n.t, d, n.unit);
     mpz_mul(n.t, n.t, n.t);

@@ -1,5 +1,6 @@
-/* Double-double arithmetic for distances, compiled twice on x86-64: for any processor, and for those with FMA, whose one instruction gives a product's rounding error. Either is
- * exact where it has to be, and the results are the same. Pure functions. */
+/* Double-double arithmetic for distances, compiled twice on x86-64: for any processor, and for
+ * those with FMA, whose one instruction gives a product's rounding error. Either is exact where it
+ * has to be, and the results are the same. Pure functions. */
 #ifndef EBPO_GEOM_DISTANCE_PAIRS_H
 #define EBPO_GEOM_DISTANCE_PAIRS_H
 
@@ -14,8 +15,10 @@ typedef struct ebpo_measured {
 } ebpo_measured;
 
 typedef struct ebpo_distance_pairs {
-    /* The triangle's distance, its nearest feature being known. Coordinates whose products of four, and their rounding errors, stay within the doubles. */
-    void (*measure)(const double p[3], const double triangle[3][3], ebpo_feature feature, ebpo_measured *out);
+    /* The triangle's distance, its nearest feature being known. Coordinates whose products of four,
+     * and their rounding errors, stay within the doubles. */
+    void (*measure)(const double p[3], const double triangle[3][3], ebpo_feature feature,
+                    ebpo_measured *out);
     /* False when the arithmetic does not do: numbers beyond its range, or too much cancellation. */
     bool (*unit_normal)(const double triangle[3][3], double normal[3]);
 } ebpo_distance_pairs;

@@ -1,26 +1,24 @@
-/* Double-double arithmetic: a value is head + tail, |tail| at most about half an ulp of head. Errors of each operation are at most some 2^-104 of the sum of its
- * operands' absolute values (of the product of these), apart from overflow and underflow. Include strict_fp.h first.
- * Source: Dekker 1971, "A floating-point technique for extending the available precision". */
+/* Double-double arithmetic: a value is head + tail, |tail| at most about half an ulp of head.
+ * Errors of each operation are at most some 2^-104 of the sum of its operands' absolute values (of
+ * the product of these), apart from overflow and underflow. Include strict_fp.h first. Source:
+ * Dekker 1971, "A floating-point technique for extending the available precision". */
 #ifndef EBPO_GEOM_DOUBLE_DOUBLE_H
 #define EBPO_GEOM_DOUBLE_DOUBLE_H
 
 #include "geom/expansion.h"
 
-static inline ebpo_pair ebpo_pair_of(double x)
-{
-    return (ebpo_pair){x, 0};
-}
+static inline ebpo_pair ebpo_pair_of(double x) { return (ebpo_pair){ x, 0 }; }
 
 static inline ebpo_pair ebpo_pair_add(ebpo_pair a, ebpo_pair b)
 {
     ebpo_pair sum = ebpo_two_sum(a.head, b.head);
     double tail = sum.tail + (a.tail + b.tail), head = sum.head + tail;
-    return (ebpo_pair){head, tail - (head - sum.head)};
+    return (ebpo_pair){ head, tail - (head - sum.head) };
 }
 
 static inline ebpo_pair ebpo_pair_subtract(ebpo_pair a, ebpo_pair b)
 {
-    return ebpo_pair_add(a, (ebpo_pair){-b.head, -b.tail});
+    return ebpo_pair_add(a, (ebpo_pair){ -b.head, -b.tail });
 }
 
 /* Head and tail may overlap by some bits: fit for further additions and products. */

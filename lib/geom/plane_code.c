@@ -7,7 +7,8 @@
 
 bool ebpo_plane_code_decode(uint32_t code, int32_t n[3], int32_t *d)
 {
-    int32_t u = (int32_t)(code & 1023) - EBPO_NORMAL_NORM, v = (int32_t)(code >> 10 & 1023) - EBPO_NORMAL_NORM;
+    int32_t u = (int32_t)(code & 1023) - EBPO_NORMAL_NORM,
+            v = (int32_t)(code >> 10 & 1023) - EBPO_NORMAL_NORM;
     int32_t q = (int32_t)(code >> 20);
     if (u > EBPO_NORMAL_NORM || v > EBPO_NORMAL_NORM || q >= EBPO_OFFSET_STEPS - 1)
         return false;

@@ -10,7 +10,7 @@
 typedef struct outline {
     double (*flat)[2]; /* projected so that the polygon runs counter-clockwise */
     uint32_t *next, *previous;
-    uint32_t n, left;  /* corners in all, and not yet cut off */
+    uint32_t n, left; /* corners in all, and not yet cut off */
     uint64_t work;
 } outline;
 
@@ -79,7 +79,8 @@ static bool goes_up(const double a[2], const double b[2])
     return a[0] < b[0] || (a[0] == b[0] && a[1] < b[1]);
 }
 
-/* Left turns alone do not make a convex polygon (a pentagram has them too): it must also change its direction only twice. */
+/* Left turns alone do not make a convex polygon (a pentagram has them too): it must also change its
+ * direction only twice. */
 static ebpo_polygon_kind classify(const outline *o)
 {
     bool straight = false;
@@ -107,7 +108,8 @@ static double least(double a, double b, double c)
     return a < b ? (a < c ? a : c) : (b < c ? b : c);
 }
 
-/* Any other corner in the closed triangle, unless it shares a corner's place (outlines with a slit to a hole repeat corners). */
+/* Any other corner in the closed triangle, unless it shares a corner's place (outlines with a slit
+ * to a hole repeat corners). */
 static bool ear_holds_corner(outline *o, uint32_t a, uint32_t b, uint32_t c)
 {
     const double *pa = o->flat[a], *pb = o->flat[b], *pc = o->flat[c];
@@ -140,7 +142,8 @@ static void cut_off(outline *o, uint32_t b, uint32_t triangle[3])
     o->left--;
 }
 
-/* Goes round and cuts every ear it meets, stepping over one corner after each cut so that fans of slivers stay short. */
+/* Goes round and cuts every ear it meets, stepping over one corner after each cut so that fans of
+ * slivers stay short. */
 static ebpo_polygon_kind cut_ears(outline *o, uint32_t (*triangle)[3])
 {
     uint32_t done = 0, idle = 0, b = 0;
@@ -165,7 +168,8 @@ static ebpo_polygon_kind cut_ears(outline *o, uint32_t (*triangle)[3])
     return EBPO_POLYGON_CONCAVE;
 }
 
-ebpo_polygon_kind ebpo_polygon_triangulate(uint32_t (*triangle)[3], const double (*corner)[3], uint32_t n, void *scratch)
+ebpo_polygon_kind ebpo_polygon_triangulate(uint32_t (*triangle)[3], const double (*corner)[3],
+                                           uint32_t n, void *scratch)
 {
     outline o = { .flat = scratch, .n = n, .left = n };
     fan(triangle, n);

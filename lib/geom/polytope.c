@@ -23,7 +23,7 @@ void ebpo_polytope_cube(ebpo_polytope *p)
 {
     /* Vertex i has bit 0 x, bit 1 y, bit 2 z. */
     static const uint16_t loops[6][4] = { { 0, 4, 6, 2 }, { 1, 3, 7, 5 }, { 0, 1, 5, 4 },
-                                         { 2, 6, 7, 3 }, { 0, 2, 3, 1 }, { 4, 5, 7, 6 } };
+                                          { 2, 6, 7, 3 }, { 0, 2, 3, 1 }, { 4, 5, 7, 6 } };
     p->vertex_count = 8;
     p->face_count = 6;
     p->corner_count = 24;
@@ -78,18 +78,21 @@ static void minus(const double a[3], const double b[3], double out[3])
         out[k] = a[k] - b[k];
 }
 
-/* What lies beyond a plane, seen from its farthest vertex: faces that have this vertex add nothing, the others a fan each, and the cut is a polygon whose area follows from its edges in
- * any order. */
+/* What lies beyond a plane, seen from its farthest vertex: faces that have this vertex add nothing,
+ * the others a fan each, and the cut is a polygon whose area follows from its edges in any order.
+ */
 typedef struct beyond {
     const ebpo_polytope *p;
-    double dist[EBPO_POLYTOPE_VERTICES], fans, area[3], origin[3]; /* area: twice the cut's, as a vector; origin: a point of the plane */
+    /* area: twice the cut's, as a vector; origin: a point of the plane */
+    double dist[EBPO_POLYTOPE_VERTICES], fans, area[3], origin[3];
     int farthest;
     bool started;
 } beyond;
 
 static void point_between(const beyond *c, int out, int in, double x[3])
 {
-    between(c->p->vertex[out], c->dist[out], c->p->vertex[in], c->dist[in], x); /* always from the outer end, so that neighbours get the same point */
+    /* always from the outer end, so that neighbours get the same point */
+    between(c->p->vertex[out], c->dist[out], c->p->vertex[in], c->dist[in], x);
 }
 
 /* An edge of the cut. */
@@ -134,7 +137,8 @@ static void face_beyond(beyond *c, int f)
     }
     if (!outside)
         return;
-    double enter[3] = { 0, 0, 0 }, leave[3] = { 0, 0, 0 }, first[3] = { 0, 0, 0 }, last[3] = { 0, 0, 0 };
+    double enter[3] = { 0, 0, 0 }, leave[3] = { 0, 0, 0 }, first[3] = { 0, 0, 0 },
+           last[3] = { 0, 0, 0 };
     for (int i = 0, a = loop[count - 1]; i < count; a = loop[i++]) {
         int b = loop[i];
         bool a_out = c->dist[a] > 0, b_out = c->dist[b] > 0;
@@ -150,7 +154,8 @@ static void face_beyond(beyond *c, int f)
         add_edge(c, enter, leave);
 }
 
-double ebpo_polytope_removed(const ebpo_polytope *p, const double n[3], double d, double volume, double least)
+double ebpo_polytope_removed(const ebpo_polytope *p, const double n[3], double d, double volume,
+                             double least)
 {
     beyond c;
     double low = 1e300, high = -1e300;
@@ -180,10 +185,16 @@ typedef struct cut {
     ebpo_polytope *out;
     double dist[EBPO_POLYTOPE_VERTICES];
     uint16_t number[EBPO_POLYTOPE_VERTICES]; /* of kept vertices in `out` */
-    bool on[EBPO_POLYTOPE_VERTICES];        /* `out` vertex lies on the cutting plane */
-    struct { uint16_t in, out, number; } edge[EBPO_POLYTOPE_FACES]; /* cut edges and their new vertices */
+    bool on[EBPO_POLYTOPE_VERTICES];         /* `out` vertex lies on the cutting plane */
+    /* cut edges and their new vertices */
+    struct {
+        uint16_t in, out, number;
+    } edge[EBPO_POLYTOPE_FACES];
     int edges;
-    struct { uint16_t from, to; } rim[EBPO_POLYTOPE_CORNERS]; /* edges of kept loops that lie on the plane */
+    /* edges of kept loops that lie on the plane */
+    struct {
+        uint16_t from, to;
+    } rim[EBPO_POLYTOPE_CORNERS];
     int rims;
     bool full;
     bool touched; /* old vertices lie on the plane: rim edges may have kept faces on both sides */
@@ -238,8 +249,10 @@ static void close_face(cut *c, int start, int32_t tag)
     ebpo_polytope *o = c->out;
     while (o->corner_count > start + 1 && o->corner[o->corner_count - 1] == o->corner[start])
         o->corner_count--;
-    if (o->corner_count - start < 3 || o->corner_count - start > 255 || o->face_count == EBPO_POLYTOPE_FACES) {
-        c->full |= o->corner_count - start > 255 || o->face_count == EBPO_POLYTOPE_FACES; /* users count corners in bytes */
+    if (o->corner_count - start < 3 || o->corner_count - start > 255 ||
+        o->face_count == EBPO_POLYTOPE_FACES) {
+        /* users count corners in bytes */
+        c->full |= o->corner_count - start > 255 || o->face_count == EBPO_POLYTOPE_FACES;
         o->corner_count = start;
         return;
     }
@@ -268,7 +281,8 @@ static void clip_face(cut *c, int f)
     }
     close_face(c, start, p->tag[f]);
     for (int i = start; i < c->out->corner_count && !c->full; i++) {
-        uint16_t a = c->out->corner[i], b = c->out->corner[i + 1 < c->out->corner_count ? i + 1 : start];
+        uint16_t a = c->out->corner[i],
+                 b = c->out->corner[i + 1 < c->out->corner_count ? i + 1 : start];
         if (c->on[a] && c->on[b]) {
             c->rim[c->rims].from = a;
             c->rim[c->rims++].to = b;
@@ -276,7 +290,8 @@ static void clip_face(cut *c, int f)
     }
 }
 
-/* Rim edges used in both directions lie between two kept faces; the others, reversed, bound the cap. */
+/* Rim edges used in both directions lie between two kept faces; the others, reversed, bound the
+ * cap. */
 static bool close_cap(cut *c, int32_t tag)
 {
     int16_t next[EBPO_POLYTOPE_VERTICES];

@@ -1,8 +1,9 @@
-/* Each predicate goes through stages, cheapest first: signs of factors, a floating-point filter, exact arithmetic on doubles (expansions)
- * where exponents leave room for it, integers of any size.
+/* Each predicate goes through stages, cheapest first: signs of factors, a floating-point filter,
+ * exact arithmetic on doubles (expansions) where exponents leave room for it, integers of any size.
  *
- * Error bounds: eps = 2^-53. Each bound holds for the computed permanent (the sum of absolute values); the slack term covers
- * underflow in the products, and an overflow makes the bound infinite or not a number, so that no comparison succeeds. */
+ * Error bounds: eps = 2^-53. Each bound holds for the computed permanent (the sum of absolute
+ * values); the slack term covers underflow in the products, and an overflow makes the bound
+ * infinite or not a number, so that no comparison succeeds. */
 #include "geom/strict_fp.h"
 
 #include "geom/predicates.h"
@@ -16,10 +17,7 @@ static const double eps = 0x1p-53;
 /* Far above every underflow error (2^-1075 each), and normal: arithmetic on denormals is slow. */
 static const double slack = 0x1p-960;
 
-static inline int sign_of(double x)
-{
-    return (x > 0) - (x < 0);
-}
+static inline int sign_of(double x) { return (x > 0) - (x < 0); }
 
 static inline int filtered(double value, double bound)
 {

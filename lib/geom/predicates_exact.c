@@ -1,5 +1,5 @@
-/* A finite double is an integer times a power of two. Coordinates of one axis are brought to a common power, which scales the
- * determinant by a positive factor and leaves integers. */
+/* A finite double is an integer times a power of two. Coordinates of one axis are brought to a
+ * common power, which scales the determinant by a positive factor and leaves integers. */
 #include "geom/strict_fp.h"
 
 #include "geom/predicates_exact.h"
@@ -9,7 +9,8 @@
 
 #include <gmp.h>
 
-/* Largest e such that x is an integer multiple of 2^e with a 53-bit factor; INT_MAX for 0, which is a multiple of all. */
+/* Largest e such that x is an integer multiple of 2^e with a 53-bit factor; INT_MAX for 0, which is
+ * a multiple of all. */
 static int unit_exponent(double x)
 {
     int e;
@@ -80,7 +81,7 @@ int ebpo_orient2d_exact(const double a[2], const double b[2], const double c[2])
     mpz_t m[2][2], det;
     for (int k = 0; k < 2; k++) {
         init_all(m[k], 2);
-        set_differences(m[k], (double[]){a[k], b[k], c[k]}, 3);
+        set_differences(m[k], (double[]){ a[k], b[k], c[k] }, 3);
     }
     mpz_init(det);
     minor2(det, m[0][0], m[1][1], m[0][1], m[1][0]);
@@ -96,7 +97,7 @@ int ebpo_orient3d_exact(const double a[3], const double b[3], const double c[3],
     mpz_t m[3][3], minor, det;
     for (int k = 0; k < 3; k++) {
         init_all(m[k], 3);
-        set_differences(m[k], (double[]){a[k], b[k], c[k], d[k]}, 4);
+        set_differences(m[k], (double[]){ a[k], b[k], c[k], d[k] }, 4);
     }
     mpz_init(minor);
     mpz_init(det);

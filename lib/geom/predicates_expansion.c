@@ -1,5 +1,6 @@
-/* Ranges. A double x with 2^-247 <= |x| <= 2^300 is an integer multiple of 2^-300. So are differences of such numbers and their rounding
- * errors; products of three are multiples of 2^-900 and below 2^910: no operation here overflows or underflows. */
+/* Ranges. A double x with 2^-247 <= |x| <= 2^300 is an integer multiple of 2^-300. So are
+ * differences of such numbers and their rounding errors; products of three are multiples of 2^-900
+ * and below 2^910: no operation here overflows or underflows. */
 #include "geom/strict_fp.h"
 
 #include "geom/predicates_expansion.h"
@@ -10,7 +11,8 @@
 
 #include "geom/expansion.h"
 
-/* Sum of absolute products is within this factor of the error of taking rounded differences for exact ones: 3 eps and a margin. */
+/* Sum of absolute products is within this factor of the error of taking rounded differences for
+ * exact ones: 3 eps and a margin. */
 static const double heads_error = 4 * 0x1p-53;
 
 static bool in_range(const double *x, int n, double least, double largest)
@@ -47,7 +49,7 @@ typedef struct difference {
 
 static difference difference_of(ebpo_pair pair)
 {
-    difference d = {0};
+    difference d = { 0 };
     d.n = ebpo_expansion_of_pair(d.x, pair);
     return d;
 }
@@ -64,7 +66,7 @@ static int minor2(double *out, difference p, difference q, difference r, differe
 
 int ebpo_orient2d_expansion(const double a[2], const double b[2], const double c[2])
 {
-    const double all[6] = {a[0], a[1], b[0], b[1], c[0], c[1]};
+    const double all[6] = { a[0], a[1], b[0], b[1], c[0], c[1] };
     if (!coordinates_in_range(all, 6))
         return EBPO_SIGN_UNKNOWN;
     difference m[2][2];
@@ -99,15 +101,17 @@ static bool row_to_integers(int64_t out[3], const ebpo_pair row[3])
     bool exact = true;
     for (int i = 0; i < 3; i++) {
         double x = row[i].head * scale;
-        /* Adding 1.5 * 2^52 rounds to an integer. A cast forth and back is less safe: GCC 12 drops such pairs when it vectorises. */
+        /* Adding 1.5 * 2^52 rounds to an integer. A cast forth and back is less safe: GCC 12 drops
+         * such pairs when it vectorises. */
         exact &= (x + 0x1.8p52) - 0x1.8p52 == x;
         out[i] = (int64_t)x;
     }
     return exact;
 }
 
-/* The determinant of differences that are exact and have few bits, as those of single-precision or integer input. Each is below 2^41, so that
- * minors are below 2^83 and the determinant below 2^126. False when the differences are not like that. */
+/* The determinant of differences that are exact and have few bits, as those of single-precision or
+ * integer input. Each is below 2^41, so that minors are below 2^83 and the determinant below 2^126.
+ * False when the differences are not like that. */
 static bool integer_determinant(int *sign, ebpo_pair m[3][3])
 {
     int64_t z[3][3];
@@ -143,13 +147,14 @@ static double error_of_heads(ebpo_pair m[3][3])
     double permanent = 0;
     for (int k = 0; k < 3; k++) {
         int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
-        permanent += (fabs(m[u][0].head * m[v][1].head) + fabs(m[v][0].head * m[u][1].head)) * fabs(m[k][2].head);
+        permanent += (fabs(m[u][0].head * m[v][1].head) + fabs(m[v][0].head * m[u][1].head)) *
+                     fabs(m[k][2].head);
     }
     return heads_error * permanent;
 }
 
-/* A lower bound of |e| for n <= 24. Components do not overlap, so the sum of their sizes is below twice the last one, and adding
- * them up errs by less than n eps of that. */
+/* A lower bound of |e| for n <= 24. Components do not overlap, so the sum of their sizes is below
+ * twice the last one, and adding them up errs by less than n eps of that. */
 static double expansion_size(const double *e, int n)
 {
     double sum = 0;
@@ -164,7 +169,7 @@ static int expansion_determinant_sign(ebpo_pair m[3][3], bool heads_exact)
     double det[192];
     for (int k = 0; k < 3; k++)
         for (int i = 0; i < 3; i++)
-            d[k][i] = difference_of((ebpo_pair){m[k][i].head, 0});
+            d[k][i] = difference_of((ebpo_pair){ m[k][i].head, 0 });
     int n = expand_determinant(det, d);
     if (heads_exact || expansion_size(det, n) > error_of_heads(m))
         return ebpo_expansion_sign(det, n);
@@ -175,9 +180,11 @@ static int expansion_determinant_sign(ebpo_pair m[3][3], bool heads_exact)
     return ebpo_expansion_sign(det, n);
 }
 
-int ebpo_orient3d_expansion(const double a[3], const double b[3], const double c[3], const double d[3])
+int ebpo_orient3d_expansion(const double a[3], const double b[3], const double c[3],
+                            const double d[3])
 {
-    if (!coordinates_in_range(a, 3) || !coordinates_in_range(b, 3) || !coordinates_in_range(c, 3) || !coordinates_in_range(d, 3))
+    if (!coordinates_in_range(a, 3) || !coordinates_in_range(b, 3) || !coordinates_in_range(c, 3) ||
+        !coordinates_in_range(d, 3))
         return EBPO_SIGN_UNKNOWN;
     ebpo_pair m[3][3];
     bool heads_exact = true;
@@ -203,7 +210,8 @@ int ebpo_sign_of_products_expansion(const double *factor, int n)
     double sum[2][16], product[2];
     int length = 0, now = 0;
     for (int i = 0; i < n; i++) {
-        int product_n = ebpo_expansion_of_pair(product, ebpo_two_product(factor[2 * i], factor[2 * i + 1]));
+        int product_n =
+            ebpo_expansion_of_pair(product, ebpo_two_product(factor[2 * i], factor[2 * i + 1]));
         length = ebpo_expansion_sum(sum[!now], sum[now], length, product, product_n);
         now = !now;
     }

@@ -1,4 +1,5 @@
-/* The predicates in exact arithmetic on doubles: tens to hundreds of nanoseconds, without allocation. */
+/* The predicates in exact arithmetic on doubles: tens to hundreds of nanoseconds, without
+ * allocation. */
 #ifndef EBPO_GEOM_PREDICATES_EXPANSION_H
 #define EBPO_GEOM_PREDICATES_EXPANSION_H
 
@@ -7,7 +8,8 @@ enum { EBPO_SIGN_UNKNOWN = 2 };
 
 /* The same meaning as the functions of predicates.h without "_expansion"; -1, 0, 1 are exact. */
 int ebpo_orient2d_expansion(const double a[2], const double b[2], const double c[2]);
-int ebpo_orient3d_expansion(const double a[3], const double b[3], const double c[3], const double d[3]);
+int ebpo_orient3d_expansion(const double a[3], const double b[3], const double c[3],
+                            const double d[3]);
 int ebpo_sign_of_products_expansion(const double *factor, int n);
 
 #endif

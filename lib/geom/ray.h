@@ -1,5 +1,6 @@
-/* Rays and boxes against triangles, exact: the decisions are those of arithmetic without rounding, for every finite double. Filters in floating point first, integers of
- * any size (GMP) when they do not suffice. Pure functions, any thread; the same results with every compiler and its flags. */
+/* Rays and boxes against triangles, exact: the decisions are those of arithmetic without rounding,
+ * for every finite double. Filters in floating point first, integers of any size (GMP) when they do
+ * not suffice. Pure functions, any thread; the same results with every compiler and its flags. */
 #ifndef EBPO_GEOM_RAY_H
 #define EBPO_GEOM_RAY_H
 
@@ -12,16 +13,19 @@ typedef struct ebpo_segment {
 } ebpo_segment;
 
 typedef struct ebpo_ray_meeting {
-    bool meets;  /* the closed triangle and the ray have a common point with 0 <= t <= t_max */
-    int side;    /* 1: it goes against the normal through the triangle's interior (enters), -1: with it (leaves), 0: an edge, a corner, within the plane, or no area */
-    double t;    /* of the first common point, correctly rounded to 2 ulp or better */
+    bool meets; /* the closed triangle and the ray have a common point with 0 <= t <= t_max */
+    /* 1: it goes against the normal through the triangle's interior (enters), -1: with it (leaves),
+     * 0: an edge, a corner, within the plane, or no area */
+    int side;
+    double t; /* of the first common point, correctly rounded to 2 ulp or better */
 } ebpo_ray_meeting;
 void ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3], ebpo_ray_meeting *out);
 
 /* Sign of t(a) - t(b), exact, for two triangles that the ray meets (first common points). */
 int ebpo_ray_compare(const ebpo_segment *ray, const double a[3][3], const double b[3][3]);
 
-/* True when the closed triangle and the closed box [min, max] have a common point (min <= max on each axis; a box may be flat or a point). */
+/* True when the closed triangle and the closed box [min, max] have a common point (min <= max on
+ * each axis; a box may be flat or a point). */
 bool ebpo_triangle_meets_box(const double triangle[3][3], const double min[3], const double max[3]);
 
 #endif

@@ -1,7 +1,9 @@
-/* Corners relative to the origin become integers e_i in one unit, the direction integers d in another. With s_i = d . (e_j x e_k) for the edge
- * opposite corner i, the line meets the plane at t = e_0 . (e_1 x e_2) / (s_0 + s_1 + s_2), and it meets the triangle when no two of the s_i have
- * different signs. When the denominator is 0 the line is parallel to the triangle or the triangle has no area: then there is a common point only
- * where all s_i are 0, and line and triangle lie in one plane. */
+/* Corners relative to the origin become integers e_i in one unit, the direction integers d in
+ * another. With s_i = d . (e_j x e_k) for the edge opposite corner i, the line meets the plane at t
+ * = e_0 . (e_1 x e_2) / (s_0 + s_1 + s_2), and it meets the triangle when no two of the s_i have
+ * different signs. When the denominator is 0 the line is parallel to the triangle or the triangle
+ * has no area: then there is a common point only where all s_i are 0, and line and triangle lie in
+ * one plane. */
 #include "geom/strict_fp.h"
 
 #include "geom/ray_exact.h"
@@ -14,7 +16,7 @@
 typedef struct scene {
     mpz_t corner[3][3]; /* e_i */
     mpz_t direction[3];
-    int shift;          /* a parameter in these units times 2^shift is t */
+    int shift; /* a parameter in these units times 2^shift is t */
 } scene;
 
 /* What the line and the triangle have in common, in units of the scene. */
@@ -110,7 +112,8 @@ static void set_fraction(mpq_t out, const mpz_t numerator, const mpz_t denominat
 
 /* --- the line and the triangle --- */
 
-/* Axis with the direction's largest component: there, a multiple of the direction tells the factor. */
+/* Axis with the direction's largest component: there, a multiple of the direction tells the factor.
+ */
 static int main_axis(const scene *s)
 {
     int axis = 0;
@@ -133,7 +136,8 @@ static void stretch_add(stretch *st, const mpz_t numerator, const mpz_t denomina
     mpq_clear(t);
 }
 
-/* out[i]: signed distance of corner i from the line, up to a common factor, for corners in one plane with the line. */
+/* out[i]: signed distance of corner i from the line, up to a common factor, for corners in one
+ * plane with the line. */
 static void offsets_from_line(const scene *s, mpz_t out[3])
 {
     for (int k = 0; k < 3; k++) {
@@ -144,7 +148,8 @@ static void offsets_from_line(const scene *s, mpz_t out[3])
     }
 }
 
-/* The edge from corner i to corner j crosses the line at (e_i w_j - e_j w_i) / (w_j - w_i) = t d, w being the offsets. */
+/* The edge from corner i to corner j crosses the line at (e_i w_j - e_j w_i) / (w_j - w_i) = t d, w
+ * being the offsets. */
 static void add_crossing(stretch *st, const scene *s, int axis, mpz_t w[3], int i, int j)
 {
     mpz_t numerator, denominator;
@@ -238,12 +243,10 @@ static void meet(stretch *st, const ebpo_segment *ray, const double triangle[3][
     scene_clear(&s);
 }
 
-static void stretch_clear(stretch *st)
-{
-    mpq_clears(st->low, st->high, NULL);
-}
+static void stretch_clear(stretch *st) { mpq_clears(st->low, st->high, NULL); }
 
-void ebpo_ray_triangle_exact(const ebpo_segment *ray, const double triangle[3][3], ebpo_ray_meeting *out)
+void ebpo_ray_triangle_exact(const ebpo_segment *ray, const double triangle[3][3],
+                             ebpo_ray_meeting *out)
 {
     stretch st;
     meet(&st, ray, triangle);

@@ -8,8 +8,9 @@
 #include "h5/h5.h"
 
 enum {
-    HEAD_BYTES = 131072,  /* holds all headers */
-    WINDOW_BYTES = 131072 /* of what lies behind: indexes of chunks, and metadata of files that h5repack made */
+    HEAD_BYTES = 131072, /* holds all headers */
+    /* of what lies behind: indexes of chunks, and metadata of files that h5repack made */
+    WINDOW_BYTES = 131072
 };
 
 /* What libhdf5 sees of an open file; it begins with libhdf5's own part. */
@@ -29,8 +30,13 @@ ebpo_status ebpo_h5_driver_open(ebpo_h5_driver *driver, ebpo_input *input, ebpo_
     uint64_t bytes = input->source.size < HEAD_BYTES ? input->source.size : HEAD_BYTES;
     if (ebpo_input_is_far(input) && input->source.at_hand < bytes)
         bytes = input->source.at_hand;
-    *driver = (ebpo_h5_driver){ .input = input, .id = -1, .head = ebpo_alloc(bytes, 1), .head_bytes = bytes, .status = EBPO_OK };
-    ebpo_status status = driver->head ? ebpo_input_read(input, 0, bytes, driver->head, error) : ebpo_fail_memory(error, bytes);
+    *driver = (ebpo_h5_driver){ .input = input,
+                                .id = -1,
+                                .head = ebpo_alloc(bytes, 1),
+                                .head_bytes = bytes,
+                                .status = EBPO_OK };
+    ebpo_status status = driver->head ? ebpo_input_read(input, 0, bytes, driver->head, error)
+                                      : ebpo_fail_memory(error, bytes);
     return status;
 }
 
@@ -43,7 +49,8 @@ void ebpo_h5_driver_close(ebpo_h5_driver *driver)
     *driver = (ebpo_h5_driver){ .id = -1 };
 }
 
-static bool take(const uint8_t *buffer, uint64_t begin, uint64_t bytes, uint64_t at, uint64_t size, void *data)
+static bool take(const uint8_t *buffer, uint64_t begin, uint64_t bytes, uint64_t at, uint64_t size,
+                 void *data)
 {
     if (at < begin || at - begin > bytes || size > bytes - (at - begin))
         return false;
@@ -61,7 +68,9 @@ static ebpo_status fetch_table(ebpo_h5_driver *d, uint64_t at, uint64_t size, vo
     uint8_t *table = d->table ? d->table : ebpo_alloc(d->index.size, 1);
     if (!table)
         return ebpo_fail_memory(&d->error, d->index.size);
-    ebpo_status status = d->table ? EBPO_OK : ebpo_input_read(d->input, d->index.offset, d->index.size, table, &d->error);
+    ebpo_status status =
+        d->table ? EBPO_OK
+                 : ebpo_input_read(d->input, d->index.offset, d->index.size, table, &d->error);
     if (status != EBPO_OK) {
         free(table);
         return status;
@@ -71,7 +80,8 @@ static ebpo_status fetch_table(ebpo_h5_driver *d, uint64_t at, uint64_t size, vo
     return EBPO_OK;
 }
 
-/* Windows begin at multiples of half their size, so that reading to and fro around a place does not move them. They do not reach into the index, which comes as a whole. */
+/* Windows begin at multiples of half their size, so that reading to and fro around a place does not
+ * move them. They do not reach into the index, which comes as a whole. */
 static ebpo_range window_around(const ebpo_h5_driver *d, uint64_t at)
 {
     uint64_t begin = at / (WINDOW_BYTES / 2) * (WINDOW_BYTES / 2), end = d->input->source.size;
@@ -98,7 +108,8 @@ static ebpo_status move_window(ebpo_h5_driver *d, ebpo_range to)
 /* [at, at + size) lies within the file. */
 static ebpo_status fetch(ebpo_h5_driver *d, uint64_t at, uint64_t size, void *data)
 {
-    if (take(d->head, 0, d->head_bytes, at, size, data) || take(d->window, d->window_at, d->window_bytes, at, size, data))
+    if (take(d->head, 0, d->head_bytes, at, size, data) ||
+        take(d->window, d->window_at, d->window_bytes, at, size, data))
         return EBPO_OK;
     if (within(d->index, at, size))
         return fetch_table(d, at, size, data);
@@ -157,7 +168,8 @@ static haddr_t driver_get_eof(const H5FD_t *file, H5FD_mem_t type)
     return ((const driver_file *)file)->driver->input->source.size;
 }
 
-static herr_t driver_read(H5FD_t *file, H5FD_mem_t type, hid_t dxpl, haddr_t address, size_t size, void *buffer)
+static herr_t driver_read(H5FD_t *file, H5FD_mem_t type, hid_t dxpl, haddr_t address, size_t size,
+                          void *buffer)
 {
     (void)dxpl;
     ebpo_h5_driver *d = ((driver_file *)file)->driver;
@@ -167,8 +179,11 @@ static herr_t driver_read(H5FD_t *file, H5FD_mem_t type, hid_t dxpl, haddr_t add
         d->bytes = size;
         return 0;
     }
-    /* Like libhdf5's own drivers: what lies behind the end reads as zeros. It looks for its signature there. */
-    uint64_t end = d->input->source.size, there = address >= end ? 0 : end - address < size ? end - address : size;
+    /* Like libhdf5's own drivers: what lies behind the end reads as zeros. It looks for its
+     * signature there. */
+    uint64_t end = d->input->source.size, there = address >= end         ? 0
+                                                  : end - address < size ? end - address
+                                                                         : size;
     memset((uint8_t *)buffer + there, 0, (size_t)(size - there));
     if (there == 0)
         return 0;
@@ -177,7 +192,8 @@ static herr_t driver_read(H5FD_t *file, H5FD_mem_t type, hid_t dxpl, haddr_t add
     return status == EBPO_OK ? 0 : -1;
 }
 
-static herr_t driver_write(H5FD_t *file, H5FD_mem_t type, hid_t dxpl, haddr_t address, size_t size, const void *buffer)
+static herr_t driver_write(H5FD_t *file, H5FD_mem_t type, hid_t dxpl, haddr_t address, size_t size,
+                           const void *buffer)
 {
     (void)file;
     (void)type;
@@ -204,8 +220,9 @@ static const H5FD_class_t driver_class = {
     .fl_map = H5FD_FLMAP_DICHOTOMY,
 };
 
-/* Registered anew for each file: the caller may have closed and reopened libhdf5 since. Held until the file is closed, because libhdf5 calls
- * the driver's `close` through the registration after giving up its own hold on it. */
+/* Registered anew for each file: the caller may have closed and reopened libhdf5 since. Held until
+ * the file is closed, because libhdf5 calls the driver's `close` through the registration after
+ * giving up its own hold on it. */
 bool ebpo_h5_driver_use(ebpo_h5_driver *driver, hid_t fapl)
 {
     driver_choice choice = { driver };

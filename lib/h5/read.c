@@ -14,7 +14,8 @@
 static hid_t file_access(ebpo_h5_driver *driver)
 {
     hid_t fapl = H5Pcreate(H5P_FILE_ACCESS);
-    if (fapl >= 0 && (H5Pset_fclose_degree(fapl, H5F_CLOSE_STRONG) < 0 || H5Pset_file_locking(fapl, false, true) < 0 ||
+    if (fapl >= 0 && (H5Pset_fclose_degree(fapl, H5F_CLOSE_STRONG) < 0 ||
+                      H5Pset_file_locking(fapl, false, true) < 0 ||
                       H5Pset_cache(fapl, 0, 1, 0, 1.0) < 0 || !ebpo_h5_driver_use(driver, fapl))) {
         H5Pclose(fapl);
         return -1;
@@ -36,17 +37,16 @@ ebpo_status ebpo_h5_open(ebpo_h5_in *in, ebpo_input *input, ebpo_error *error)
     hid_t fapl = file_access(in->driver);
     in->file = fapl < 0 ? -1 : H5Fopen(in->shown, H5F_ACC_RDONLY, fapl);
     if (in->file < 0)
-        status = ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, "", "not a whole HDF5 file; was it cut off in copying, or is it something else?");
+        status = ebpo_h5_fail(
+            error, EBPO_E_FORMAT, in->shown, "",
+            "not a whole HDF5 file; was it cut off in copying, or is it something else?");
     if (fapl >= 0)
         H5Pclose(fapl);
     ebpo_h5_leave(&scope);
     return status;
 }
 
-void ebpo_h5_expect_index(ebpo_h5_in *in, ebpo_range index)
-{
-    in->driver->index = index;
-}
+void ebpo_h5_expect_index(ebpo_h5_in *in, ebpo_range index) { in->driver->index = index; }
 
 ebpo_status ebpo_h5_close(ebpo_h5_in *in, ebpo_status status, ebpo_error *error)
 {
@@ -70,9 +70,12 @@ ebpo_h5_kind ebpo_h5_look(ebpo_h5_in *in, const char *path)
     htri_t there = H5Lexists(in->file, path, H5P_DEFAULT);
     if (there != 0) {
         kind = EBPO_H5_OTHER;
-        if (there > 0 && H5Lget_info(in->file, path, &link, H5P_DEFAULT) >= 0 && link.type == H5L_TYPE_HARD &&
+        if (there > 0 && H5Lget_info(in->file, path, &link, H5P_DEFAULT) >= 0 &&
+            link.type == H5L_TYPE_HARD &&
             H5Oget_info_by_name2(in->file, path, &object, H5O_INFO_BASIC, H5P_DEFAULT) >= 0)
-            kind = object.type == H5O_TYPE_GROUP ? EBPO_H5_GROUP : object.type == H5O_TYPE_DATASET ? EBPO_H5_ARRAY : EBPO_H5_OTHER;
+            kind = object.type == H5O_TYPE_GROUP     ? EBPO_H5_GROUP
+                   : object.type == H5O_TYPE_DATASET ? EBPO_H5_ARRAY
+                                                     : EBPO_H5_OTHER;
     }
     ebpo_h5_leave(&scope);
     return kind;
@@ -82,25 +85,30 @@ ebpo_status ebpo_h5_open_group(ebpo_h5_in *in, const char *path, ebpo_h5_id *id,
 {
     *id = -1;
     if (strcmp(path, "/") != 0 && ebpo_h5_look(in, path) != EBPO_H5_GROUP)
-        return ebpo_fail(error, EBPO_E_FORMAT, "%s: %s: a group is expected here and there is none", in->shown, path);
+        return ebpo_fail(error, EBPO_E_FORMAT, "%s: %s: a group is expected here and there is none",
+                         in->shown, path);
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
     *id = H5Gopen2(in->file, path, H5P_DEFAULT);
-    ebpo_status status = *id >= 0 ? EBPO_OK : ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, path, "the group is damaged");
+    ebpo_status status =
+        *id >= 0 ? EBPO_OK
+                 : ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, path, "the group is damaged");
     ebpo_h5_leave(&scope);
     return status;
 }
 
-static ebpo_status attribute_fails(ebpo_h5_in *in, const char *object, const char *name, const char *what, ebpo_error *error)
+static ebpo_status attribute_fails(ebpo_h5_in *in, const char *object, const char *name,
+                                   const char *what, ebpo_error *error)
 {
     char place[160];
     snprintf(place, sizeof place, "%s: attribute %s", object, name);
     return ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, place, what);
 }
 
-/* Opens the attribute and its type; EBPO_E_ABSENT when there is none. `points`: how many values it must have. */
-static ebpo_status open_attribute(ebpo_h5_in *in, hid_t id, const char *object, const char *name, hssize_t points, hid_t *attribute,
-                                  hid_t *type, ebpo_error *error)
+/* Opens the attribute and its type; EBPO_E_ABSENT when there is none. `points`: how many values it
+ * must have. */
+static ebpo_status open_attribute(ebpo_h5_in *in, hid_t id, const char *object, const char *name,
+                                  hssize_t points, hid_t *attribute, hid_t *type, ebpo_error *error)
 {
     *attribute = *type = -1;
     htri_t there = H5Aexists(id, name);
@@ -118,7 +126,8 @@ static ebpo_status open_attribute(ebpo_h5_in *in, hid_t id, const char *object, 
         H5Sclose(space);
     if (ok)
         return EBPO_OK;
-    return attribute_fails(in, object, name, "it is damaged or has the wrong number of values", error);
+    return attribute_fails(in, object, name, "it is damaged or has the wrong number of values",
+                           error);
 }
 
 static void close_attribute(hid_t attribute, hid_t type)
@@ -133,10 +142,15 @@ bool ebpo_h5_text_ok(const char *text)
 {
     const uint8_t *p = (const uint8_t *)text;
     while (*p) {
-        unsigned more = *p < 0x80 ? 0 : *p >= 0xc2 && *p < 0xe0 ? 1 : *p >= 0xe0 && *p < 0xf0 ? 2 : *p >= 0xf0 && *p < 0xf5 ? 3 : 9;
+        unsigned more = *p < 0x80                 ? 0
+                        : *p >= 0xc2 && *p < 0xe0 ? 1
+                        : *p >= 0xe0 && *p < 0xf0 ? 2
+                        : *p >= 0xf0 && *p < 0xf5 ? 3
+                                                  : 9;
         if (more == 9 || *p < 0x20 || *p == 0x7f)
             return false;
-        if ((*p == 0xe0 && p[1] < 0xa0) || (*p == 0xed && p[1] >= 0xa0) || (*p == 0xf0 && p[1] < 0x90) || (*p == 0xf4 && p[1] >= 0x90) ||
+        if ((*p == 0xe0 && p[1] < 0xa0) || (*p == 0xed && p[1] >= 0xa0) ||
+            (*p == 0xf0 && p[1] < 0x90) || (*p == 0xf4 && p[1] >= 0x90) ||
             (*p == 0xc2 && p[1] < 0xa0))
             return false; /* overlong, surrogate, beyond Unicode, control */
         for (p++; more; more--, p++)
@@ -146,8 +160,8 @@ bool ebpo_h5_text_ok(const char *text)
     return true;
 }
 
-ebpo_status ebpo_h5_get_text(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const char *name, char *text, size_t size,
-                             ebpo_error *error)
+ebpo_status ebpo_h5_get_text(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const char *name,
+                             char *text, size_t size, ebpo_error *error)
 {
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
@@ -156,9 +170,11 @@ ebpo_status ebpo_h5_get_text(ebpo_h5_in *in, ebpo_h5_id id, const char *object, 
     memset(text, 0, size);
     if (status == EBPO_OK) {
         size_t length = H5Tget_size(type);
-        if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) != 0 || length == 0 || length >= size ||
-            H5Aread(attribute, type, text) < 0 || !ebpo_h5_text_ok(text))
-            status = attribute_fails(in, object, name, "it is not a fixed-length UTF-8 text of a sensible length", error);
+        if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) != 0 || length == 0 ||
+            length >= size || H5Aread(attribute, type, text) < 0 || !ebpo_h5_text_ok(text))
+            status =
+                attribute_fails(in, object, name,
+                                "it is not a fixed-length UTF-8 text of a sensible length", error);
     }
     if (status != EBPO_OK)
         text[0] = 0;
@@ -167,38 +183,46 @@ ebpo_status ebpo_h5_get_text(ebpo_h5_in *in, ebpo_h5_id id, const char *object, 
     return status;
 }
 
-static ebpo_status get_numbers(ebpo_h5_in *in, hid_t id, const char *object, const char *name, hid_t stored, hid_t memory, void *values,
-                               unsigned count, const char *what, ebpo_error *error)
+static ebpo_status get_numbers(ebpo_h5_in *in, hid_t id, const char *object, const char *name,
+                               hid_t stored, hid_t memory, void *values, unsigned count,
+                               const char *what, ebpo_error *error)
 {
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
     hid_t attribute, type;
-    ebpo_status status = open_attribute(in, id, object, name, count ? count : 1, &attribute, &type, error);
-    if (status == EBPO_OK && (H5Tequal(type, stored) <= 0 || H5Aread(attribute, memory, values) < 0))
+    ebpo_status status =
+        open_attribute(in, id, object, name, count ? count : 1, &attribute, &type, error);
+    if (status == EBPO_OK &&
+        (H5Tequal(type, stored) <= 0 || H5Aread(attribute, memory, values) < 0))
         status = attribute_fails(in, object, name, what, error);
     close_attribute(attribute, type);
     ebpo_h5_leave(&scope);
     return status;
 }
 
-ebpo_status ebpo_h5_get_int(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const char *name, int64_t *value, ebpo_error *error)
+ebpo_status ebpo_h5_get_int(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const char *name,
+                            int64_t *value, ebpo_error *error)
 {
-    return get_numbers(in, id, object, name, H5T_STD_I64LE, H5T_NATIVE_INT64, value, 0, "it is not an i64", error);
+    return get_numbers(in, id, object, name, H5T_STD_I64LE, H5T_NATIVE_INT64, value, 0,
+                       "it is not an i64", error);
 }
 
-ebpo_status ebpo_h5_get_count(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const char *name, uint64_t *value, ebpo_error *error)
+ebpo_status ebpo_h5_get_count(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const char *name,
+                              uint64_t *value, ebpo_error *error)
 {
-    return get_numbers(in, id, object, name, H5T_STD_U64LE, H5T_NATIVE_UINT64, value, 0, "it is not a u64", error);
+    return get_numbers(in, id, object, name, H5T_STD_U64LE, H5T_NATIVE_UINT64, value, 0,
+                       "it is not a u64", error);
 }
 
-ebpo_status ebpo_h5_get_real(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const char *name, double *values, unsigned count,
-                             ebpo_error *error)
+ebpo_status ebpo_h5_get_real(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const char *name,
+                             double *values, unsigned count, ebpo_error *error)
 {
-    return get_numbers(in, id, object, name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, values, count, "it is not of f64 numbers",
-                       error);
+    return get_numbers(in, id, object, name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, values, count,
+                       "it is not of f64 numbers", error);
 }
 
-/* Number of filters, with their ids; shuffle must have been set for our elements. -1 when there are more than three. */
+/* Number of filters, with their ids; shuffle must have been set for our elements. -1 when there are
+ * more than three. */
 static int list_filters(hid_t dcpl, unsigned element_size, int ids[3])
 {
     int count = H5Pget_nfilters(dcpl);
@@ -207,9 +231,11 @@ static int list_filters(hid_t dcpl, unsigned element_size, int ids[3])
     for (int i = 0; i < count; i++) {
         unsigned flags, values[4] = { 0 };
         size_t value_count = 4;
-        /* Neither name nor configuration: for those libhdf5 may want the filter registered, and says so in an error that is none of ours. */
+        /* Neither name nor configuration: for those libhdf5 may want the filter registered, and
+         * says so in an error that is none of ours. */
         ids[i] = H5Pget_filter2(dcpl, (unsigned)i, &flags, &value_count, values, 0, NULL, NULL);
-        if (ids[i] < 0 || (ids[i] == H5Z_FILTER_SHUFFLE && (value_count != 1 || values[0] != element_size)))
+        if (ids[i] < 0 ||
+            (ids[i] == H5Z_FILTER_SHUFFLE && (value_count != 1 || values[0] != element_size)))
             return -1;
     }
     return count;
@@ -217,7 +243,11 @@ static int list_filters(hid_t dcpl, unsigned element_size, int ids[3])
 
 static bool find_pipeline(hid_t dcpl, unsigned element_size, ebpo_pipeline *pipeline)
 {
-    static const struct { ebpo_pipeline pipeline; int count, ids[2]; bool shuffled; } known[] = {
+    static const struct {
+        ebpo_pipeline pipeline;
+        int count, ids[2];
+        bool shuffled;
+    } known[] = {
         { EBPO_PIPELINE_ZSTD, 1, { EBPO_ZSTD_FILTER_ID }, true },
         { EBPO_PIPELINE_DEFLATE, 2, { H5Z_FILTER_DEFLATE, H5Z_FILTER_FLETCHER32 }, true },
         { EBPO_PIPELINE_CHECKSUM, 1, { H5Z_FILTER_FLETCHER32 }, false },
@@ -266,7 +296,8 @@ static const char *find_shape(hid_t dataset, hid_t dcpl, ebpo_h5_shape *shape)
         H5Sclose(space);
     if (!find_type(dataset, shape))
         return "the array is not of little-endian integers";
-    if (!plain || dims[0] == 0 || most[0] != dims[0] || most[1] != dims[1] || dims[1] > 8 || (rank == 2 && dims[1] == 0))
+    if (!plain || dims[0] == 0 || most[0] != dims[0] || most[1] != dims[1] || dims[1] > 8 ||
+        (rank == 2 && dims[1] == 0))
         return "the array does not have one or two fixed dimensions";
     shape->rows = dims[0];
     shape->cols = rank == 2 ? (uint32_t)dims[1] : 0;
@@ -280,8 +311,10 @@ static const char *find_shape(hid_t dataset, hid_t dcpl, ebpo_h5_shape *shape)
     return NULL;
 }
 
-/* Address and size of one chunk, by reading it while the driver records. What is wrong with it, or NULL. */
-static const char *find_chunk(ebpo_h5_in *in, hid_t dataset, const ebpo_h5_shape *shape, uint64_t number, uint64_t bound, ebpo_h5_chunk *chunk)
+/* Address and size of one chunk, by reading it while the driver records. What is wrong with it, or
+ * NULL. */
+static const char *find_chunk(ebpo_h5_in *in, hid_t dataset, const ebpo_h5_shape *shape,
+                              uint64_t number, uint64_t bound, ebpo_h5_chunk *chunk)
 {
     uint8_t unused[1]; /* the driver writes nothing */
     uint32_t mask = 0;
@@ -304,15 +337,18 @@ static const char *find_chunk(ebpo_h5_in *in, hid_t dataset, const ebpo_h5_shape
 }
 
 /* A chunk takes some bytes, so a file cannot hold more of them than its size allows. */
-static ebpo_status find_chunks(ebpo_h5_in *in, hid_t dataset, const char *path, const ebpo_h5_shape *shape, ebpo_h5_chunk **chunks,
-                               uint64_t *stored, ebpo_error *error)
+static ebpo_status find_chunks(ebpo_h5_in *in, hid_t dataset, const char *path,
+                               const ebpo_h5_shape *shape, ebpo_h5_chunk **chunks, uint64_t *stored,
+                               ebpo_error *error)
 {
     enum { CHUNK_MIN = 4 };
     char place[160];
-    uint64_t count = ebpo_h5_chunk_count(shape), bound = ebpo_chunk_bound(shape->chunk_rows * ebpo_h5_row_bytes(shape));
+    uint64_t count = ebpo_h5_chunk_count(shape),
+             bound = ebpo_chunk_bound(shape->chunk_rows * ebpo_h5_row_bytes(shape));
     const char *wrong = NULL;
     if (count > 1 && count > in->file_bytes / CHUNK_MIN)
-        return ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, path, "the array has more chunks than the file can hold");
+        return ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, path,
+                            "the array has more chunks than the file can hold");
     *chunks = ebpo_alloc(count, sizeof **chunks);
     if (!*chunks)
         return ebpo_fail_memory(error, count * sizeof **chunks);
@@ -324,25 +360,31 @@ static ebpo_status find_chunks(ebpo_h5_in *in, hid_t dataset, const char *path, 
         }
         *stored += (*chunks)[i].bytes;
         if (*stored > in->file_bytes)
-            return ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, path, "the array's chunks do not fit the file");
+            return ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, path,
+                                "the array's chunks do not fit the file");
     }
     return EBPO_OK;
 }
 
-ebpo_status ebpo_h5_read_array(ebpo_h5_in *in, const char *path, uint64_t most, ebpo_h5_shape *shape, ebpo_h5_chunk **chunks,
-                               uint64_t *stored_bytes, ebpo_error *error)
+ebpo_status ebpo_h5_read_array(ebpo_h5_in *in, const char *path, uint64_t most,
+                               ebpo_h5_shape *shape, ebpo_h5_chunk **chunks, uint64_t *stored_bytes,
+                               ebpo_error *error)
 {
     *chunks = NULL;
     *stored_bytes = 0;
     ebpo_h5_kind kind = ebpo_h5_look(in, path);
     if (kind != EBPO_H5_ARRAY)
-        return ebpo_fail(error, EBPO_E_FORMAT, "%s: %s: %s; get a fresh copy of the file", in->shown, path,
+        return ebpo_fail(error, EBPO_E_FORMAT, "%s: %s: %s; get a fresh copy of the file",
+                         in->shown, path,
                          kind == EBPO_H5_ABSENT ? "the array is missing" : "this is not an array");
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
-    hid_t dataset = H5Dopen2(in->file, path, H5P_DEFAULT), dcpl = dataset >= 0 ? H5Dget_create_plist(dataset) : -1;
-    const char *wrong = dcpl < 0 ? "the array's description is damaged" : find_shape(dataset, dcpl, shape);
-    ebpo_status status = wrong ? ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, path, wrong) : EBPO_OK;
+    hid_t dataset = H5Dopen2(in->file, path, H5P_DEFAULT),
+          dcpl = dataset >= 0 ? H5Dget_create_plist(dataset) : -1;
+    const char *wrong =
+        dcpl < 0 ? "the array's description is damaged" : find_shape(dataset, dcpl, shape);
+    ebpo_status status =
+        wrong ? ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, path, wrong) : EBPO_OK;
     if (status == EBPO_OK && ebpo_h5_chunk_count(shape) <= most)
         status = find_chunks(in, dataset, path, shape, chunks, stored_bytes, error);
     if (dcpl >= 0)

@@ -25,7 +25,8 @@ void ebpo_h5_leave(ebpo_h5_scope *scope)
     pthread_mutex_unlock(&library);
 }
 
-enum { CAUSE_BYTES = 8192, CAUSE_SHOWN = 160 }; /* libhdf5 tells the path first, the number of the error behind it */
+/* libhdf5 tells the path first, the number of the error behind it */
+enum { CAUSE_BYTES = 8192, CAUSE_SHOWN = 160 };
 
 static herr_t take_first(unsigned depth, const H5E_error2_t *entry, void *data)
 {
@@ -35,16 +36,19 @@ static herr_t take_first(unsigned depth, const H5E_error2_t *entry, void *data)
     return 1; /* the innermost is enough */
 }
 
-ebpo_status ebpo_h5_fail(ebpo_error *error, ebpo_status status, const char *shown, const char *object, const char *what)
+ebpo_status ebpo_h5_fail(ebpo_error *error, ebpo_status status, const char *shown,
+                         const char *object, const char *what)
 {
     char cause[CAUSE_BYTES] = "";
     H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take_first, cause);
     H5Eclear2(H5E_DEFAULT);
     const char *colon = *object ? ": " : "", *number = strstr(cause, "errno = ");
     if (number && atoi(number + 8) > 0)
-        return ebpo_fail(error, status, "%s%s%s: %s: %s", shown, colon, object, what, strerror(atoi(number + 8)));
+        return ebpo_fail(error, status, "%s%s%s: %s: %s", shown, colon, object, what,
+                         strerror(atoi(number + 8)));
     if (*cause)
-        return ebpo_fail(error, status, "%s%s%s: %s (libhdf5: %.*s)", shown, colon, object, what, CAUSE_SHOWN, cause);
+        return ebpo_fail(error, status, "%s%s%s: %s (libhdf5: %.*s)", shown, colon, object, what,
+                         CAUSE_SHOWN, cause);
     return ebpo_fail(error, status, "%s%s%s: %s", shown, colon, object, what);
 }
 
@@ -65,7 +69,8 @@ ebpo_status ebpo_h5_register(ebpo_error *error)
     ebpo_h5_enter(&scope);
     ebpo_status status = EBPO_OK;
     if (H5Zregister(&ebpo_zstd_filter) < 0)
-        status = ebpo_h5_fail(error, EBPO_E_UNSUPPORTED, "HDF5", "", "the zstd filter could not be registered");
+        status = ebpo_h5_fail(error, EBPO_E_UNSUPPORTED, "HDF5", "",
+                              "the zstd filter could not be registered");
     ebpo_h5_leave(&scope);
     return status;
 }

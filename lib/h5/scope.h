@@ -1,5 +1,6 @@
-/* Inside lib/h5 only: every use of libhdf5 happens between enter and leave. Debian's serial build is not thread-safe, so one mutex of the library
- * serialises us; HDF5's printing of errors is switched off meanwhile and given back as it was. */
+/* Inside lib/h5 only: every use of libhdf5 happens between enter and leave. Debian's serial build
+ * is not thread-safe, so one mutex of the library serialises us; HDF5's printing of errors is
+ * switched off meanwhile and given back as it was. */
 #ifndef EBPO_H5_SCOPE_H
 #define EBPO_H5_SCOPE_H
 
@@ -15,8 +16,10 @@ typedef struct ebpo_h5_scope {
 void ebpo_h5_enter(ebpo_h5_scope *scope);
 void ebpo_h5_leave(ebpo_h5_scope *scope);
 
-/* "shown: object: what (libhdf5: innermost message)"; to be called inside the scope, right after the failing call. `object` may be "". */
-ebpo_status ebpo_h5_fail(ebpo_error *error, ebpo_status status, const char *shown, const char *object, const char *what);
+/* "shown: object: what (libhdf5: innermost message)"; to be called inside the scope, right after
+ * the failing call. `object` may be "". */
+ebpo_status ebpo_h5_fail(ebpo_error *error, ebpo_status status, const char *shown,
+                         const char *object, const char *what);
 
 /* The stored type for integers of `size` bytes, little-endian; -1 for another size. */
 hid_t ebpo_h5_integer_type(unsigned size, bool is_signed);

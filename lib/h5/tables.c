@@ -7,7 +7,8 @@
 
 static const char DISK[] = "libhdf5 could not write; is the disk full?";
 
-/* Deflate's fastest: these files are read once or twice, and numbers of nodes and corners shrink well even so. */
+/* Deflate's fastest: these files are read once or twice, and numbers of nodes and corners shrink
+ * well even so. */
 enum { ROWS_OF_A_CHUNK = 8192, DEFLATE = 1 };
 
 static hid_t stored_type(ebpo_h5_number number)
@@ -34,14 +35,17 @@ static hid_t memory_type(ebpo_h5_number number)
     return -1;
 }
 
-ebpo_status ebpo_h5_create_plain(ebpo_h5_out *out, const char *path, const char *shown, ebpo_error *error)
+ebpo_status ebpo_h5_create_plain(ebpo_h5_out *out, const char *path, const char *shown,
+                                 ebpo_error *error)
 {
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
     ebpo_status status = EBPO_OK;
     out->shown = shown;
     hid_t fapl = H5Pcreate(H5P_FILE_ACCESS), fcpl = H5Pcreate(H5P_FILE_CREATE);
-    if (fapl >= 0 && fcpl >= 0 && H5Pset_obj_track_times(fcpl, false) >= 0 && H5Pset_libver_bounds(fapl, H5F_LIBVER_V18, H5F_LIBVER_V18) >= 0 && H5Pset_fclose_degree(fapl, H5F_CLOSE_STRONG) >= 0 &&
+    if (fapl >= 0 && fcpl >= 0 && H5Pset_obj_track_times(fcpl, false) >= 0 &&
+        H5Pset_libver_bounds(fapl, H5F_LIBVER_V18, H5F_LIBVER_V18) >= 0 &&
+        H5Pset_fclose_degree(fapl, H5F_CLOSE_STRONG) >= 0 &&
         H5Pset_file_locking(fapl, false, true) >= 0)
         out->file = H5Fcreate(path, H5F_ACC_TRUNC, fcpl, fapl);
     if (out->file < 0)
@@ -54,13 +58,17 @@ ebpo_status ebpo_h5_create_plain(ebpo_h5_out *out, const char *path, const char 
     return status;
 }
 
-ebpo_status ebpo_h5_make_plain_group(ebpo_h5_out *out, const char *path, ebpo_h5_id *id, ebpo_error *error)
+ebpo_status ebpo_h5_make_plain_group(ebpo_h5_out *out, const char *path, ebpo_h5_id *id,
+                                     ebpo_error *error)
 {
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
     hid_t gcpl = H5Pcreate(H5P_GROUP_CREATE);
-    *id = gcpl >= 0 && H5Pset_obj_track_times(gcpl, false) >= 0 ? H5Gcreate2(out->file, path, H5P_DEFAULT, gcpl, H5P_DEFAULT) : -1;
-    ebpo_status status = *id >= 0 ? EBPO_OK : ebpo_h5_fail(error, EBPO_E_IO, out->shown, path, DISK);
+    *id = gcpl >= 0 && H5Pset_obj_track_times(gcpl, false) >= 0
+              ? H5Gcreate2(out->file, path, H5P_DEFAULT, gcpl, H5P_DEFAULT)
+              : -1;
+    ebpo_status status =
+        *id >= 0 ? EBPO_OK : ebpo_h5_fail(error, EBPO_E_IO, out->shown, path, DISK);
     if (gcpl >= 0)
         H5Pclose(gcpl);
     ebpo_h5_leave(&scope);
@@ -68,9 +76,12 @@ ebpo_status ebpo_h5_make_plain_group(ebpo_h5_out *out, const char *path, ebpo_h5
 }
 
 /* Takes over the space. */
-static ebpo_status put(ebpo_h5_out *out, hid_t object, const char *name, hid_t type, hid_t space, hid_t memory, const void *value, ebpo_error *error)
+static ebpo_status put(ebpo_h5_out *out, hid_t object, const char *name, hid_t type, hid_t space,
+                       hid_t memory, const void *value, ebpo_error *error)
 {
-    hid_t attribute = type >= 0 && space >= 0 ? H5Acreate2(object, name, type, space, H5P_DEFAULT, H5P_DEFAULT) : -1;
+    hid_t attribute = type >= 0 && space >= 0
+                          ? H5Acreate2(object, name, type, space, H5P_DEFAULT, H5P_DEFAULT)
+                          : -1;
     bool ok = attribute >= 0 && H5Awrite(attribute, memory, value) >= 0;
     ebpo_status status = ok ? EBPO_OK : ebpo_h5_fail(error, EBPO_E_IO, out->shown, name, DISK);
     if (attribute >= 0)
@@ -80,42 +91,52 @@ static ebpo_status put(ebpo_h5_out *out, hid_t object, const char *name, hid_t t
     return status;
 }
 
-ebpo_status ebpo_h5_put_ints(ebpo_h5_out *out, ebpo_h5_id id, const char *name, const int64_t *values, unsigned count, ebpo_error *error)
+ebpo_status ebpo_h5_put_ints(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
+                             const int64_t *values, unsigned count, ebpo_error *error)
 {
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
     hsize_t dims = count;
-    ebpo_status status = put(out, id, name, H5T_STD_I64LE, H5Screate_simple(1, &dims, NULL), H5T_NATIVE_INT64, values, error);
+    ebpo_status status = put(out, id, name, H5T_STD_I64LE, H5Screate_simple(1, &dims, NULL),
+                             H5T_NATIVE_INT64, values, error);
     ebpo_h5_leave(&scope);
     return status;
 }
 
-ebpo_status ebpo_h5_put_ascii(ebpo_h5_out *out, ebpo_h5_id id, const char *name, const char *text, ebpo_error *error)
+ebpo_status ebpo_h5_put_ascii(ebpo_h5_out *out, ebpo_h5_id id, const char *name, const char *text,
+                              ebpo_error *error)
 {
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
     hid_t type = H5Tcopy(H5T_C_S1);
-    bool ok = type >= 0 && H5Tset_size(type, strlen(text)) >= 0 && H5Tset_strpad(type, H5T_STR_NULLPAD) >= 0;
-    ebpo_status status = put(out, id, name, ok ? type : -1, H5Screate(H5S_SCALAR), type, text, error);
+    bool ok = type >= 0 && H5Tset_size(type, strlen(text)) >= 0 &&
+              H5Tset_strpad(type, H5T_STR_NULLPAD) >= 0;
+    ebpo_status status =
+        put(out, id, name, ok ? type : -1, H5Screate(H5S_SCALAR), type, text, error);
     if (type >= 0)
         H5Tclose(type);
     ebpo_h5_leave(&scope);
     return status;
 }
 
-ebpo_status ebpo_h5_make_table(ebpo_h5_out *out, const char *path, ebpo_h5_number number, uint32_t cols, ebpo_h5_table *table, ebpo_error *error)
+ebpo_status ebpo_h5_make_table(ebpo_h5_out *out, const char *path, ebpo_h5_number number,
+                               uint32_t cols, ebpo_h5_table *table, ebpo_error *error)
 {
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
     int rank = cols ? 2 : 1;
-    hsize_t dims[2] = { 0, cols }, most[2] = { H5S_UNLIMITED, cols }, chunk[2] = { ROWS_OF_A_CHUNK, cols };
+    hsize_t dims[2] = { 0, cols }, most[2] = { H5S_UNLIMITED, cols },
+            chunk[2] = { ROWS_OF_A_CHUNK, cols };
     hid_t space = H5Screate_simple(rank, dims, most), dcpl = H5Pcreate(H5P_DATASET_CREATE);
     *table = (ebpo_h5_table){ .id = -1, .number = number, .cols = cols };
     snprintf(table->path, sizeof table->path, "%s", path);
-    if (space >= 0 && dcpl >= 0 && H5Pset_chunk(dcpl, rank, chunk) >= 0 && H5Pset_obj_track_times(dcpl, false) >= 0 && H5Pset_shuffle(dcpl) >= 0 &&
+    if (space >= 0 && dcpl >= 0 && H5Pset_chunk(dcpl, rank, chunk) >= 0 &&
+        H5Pset_obj_track_times(dcpl, false) >= 0 && H5Pset_shuffle(dcpl) >= 0 &&
         H5Pset_deflate(dcpl, DEFLATE) >= 0)
-        table->id = H5Dcreate2(out->file, path, stored_type(number), space, H5P_DEFAULT, dcpl, H5P_DEFAULT);
-    ebpo_status status = table->id >= 0 ? EBPO_OK : ebpo_h5_fail(error, EBPO_E_IO, out->shown, path, DISK);
+        table->id =
+            H5Dcreate2(out->file, path, stored_type(number), space, H5P_DEFAULT, dcpl, H5P_DEFAULT);
+    ebpo_status status =
+        table->id >= 0 ? EBPO_OK : ebpo_h5_fail(error, EBPO_E_IO, out->shown, path, DISK);
     if (space >= 0)
         H5Sclose(space);
     if (dcpl >= 0)
@@ -127,12 +148,15 @@ ebpo_status ebpo_h5_make_table(ebpo_h5_out *out, const char *path, ebpo_h5_numbe
 static bool append(ebpo_h5_table *table, const void *data, uint64_t rows)
 {
     int rank = table->cols ? 2 : 1;
-    hsize_t start[2] = { table->rows, 0 }, count[2] = { rows, table->cols }, dims[2] = { table->rows + rows, table->cols };
+    hsize_t start[2] = { table->rows, 0 }, count[2] = { rows, table->cols },
+            dims[2] = { table->rows + rows, table->cols };
     if (H5Dset_extent(table->id, dims) < 0)
         return false;
     hid_t space = H5Dget_space(table->id), memory = H5Screate_simple(rank, count, NULL);
-    bool ok = space >= 0 && memory >= 0 && H5Sselect_hyperslab(space, H5S_SELECT_SET, start, NULL, count, NULL) >= 0 &&
-              H5Dwrite(table->id, memory_type(table->number), memory, space, H5P_DEFAULT, data) >= 0;
+    bool ok =
+        space >= 0 && memory >= 0 &&
+        H5Sselect_hyperslab(space, H5S_SELECT_SET, start, NULL, count, NULL) >= 0 &&
+        H5Dwrite(table->id, memory_type(table->number), memory, space, H5P_DEFAULT, data) >= 0;
     if (space >= 0)
         H5Sclose(space);
     if (memory >= 0)
@@ -140,7 +164,8 @@ static bool append(ebpo_h5_table *table, const void *data, uint64_t rows)
     return ok;
 }
 
-ebpo_status ebpo_h5_append(ebpo_h5_out *out, ebpo_h5_table *table, const void *data, uint64_t rows, ebpo_error *error)
+ebpo_status ebpo_h5_append(ebpo_h5_out *out, ebpo_h5_table *table, const void *data, uint64_t rows,
+                           ebpo_error *error)
 {
     if (rows == 0)
         return EBPO_OK;
@@ -161,7 +186,8 @@ void ebpo_h5_close_table(ebpo_h5_table *table)
     table->id = -1;
 }
 
-ebpo_status ebpo_h5_put_table(ebpo_h5_out *out, const char *path, ebpo_h5_number number, uint32_t cols, const void *data, uint64_t rows, ebpo_error *error)
+ebpo_status ebpo_h5_put_table(ebpo_h5_out *out, const char *path, ebpo_h5_number number,
+                              uint32_t cols, const void *data, uint64_t rows, ebpo_error *error)
 {
     ebpo_h5_table table = EBPO_H5_TABLE_INIT;
     ebpo_status status = ebpo_h5_make_table(out, path, number, cols, &table, error);

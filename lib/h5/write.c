@@ -35,9 +35,11 @@ static hid_t file_access(bool memory, uint64_t head_bytes)
 {
     hid_t fapl = H5Pcreate(H5P_FILE_ACCESS);
     bool ok = fapl >= 0 && H5Pset_libver_bounds(fapl, H5F_LIBVER_V110, H5F_LIBVER_V110) >= 0 &&
-              H5Pset_fclose_degree(fapl, H5F_CLOSE_STRONG) >= 0 && H5Pset_file_locking(fapl, false, true) >= 0 &&
-              H5Pset_meta_block_size(fapl, head_bytes) >= 0 && H5Pset_small_data_block_size(fapl, 0) >= 0 &&
-              H5Pset_sieve_buf_size(fapl, 0) >= 0 && H5Pset_cache(fapl, 0, 1, 0, 1.0) >= 0 &&
+              H5Pset_fclose_degree(fapl, H5F_CLOSE_STRONG) >= 0 &&
+              H5Pset_file_locking(fapl, false, true) >= 0 &&
+              H5Pset_meta_block_size(fapl, head_bytes) >= 0 &&
+              H5Pset_small_data_block_size(fapl, 0) >= 0 && H5Pset_sieve_buf_size(fapl, 0) >= 0 &&
+              H5Pset_cache(fapl, 0, 1, 0, 1.0) >= 0 &&
               (!memory || H5Pset_fapl_core(fapl, 1 << 20, false) >= 0);
     if (!ok && fapl >= 0)
         H5Pclose(fapl);
@@ -46,12 +48,14 @@ static hid_t file_access(bool memory, uint64_t head_bytes)
 
 static bool set_group(hid_t plist, unsigned links)
 {
-    return plist >= 0 && H5Pset_obj_track_times(plist, false) >= 0 && H5Pset_attr_phase_change(plist, COMPACT, 0) >= 0 &&
-           H5Pset_link_phase_change(plist, COMPACT, 0) >= 0 && H5Pset_est_link_info(plist, links, 12) >= 0;
+    return plist >= 0 && H5Pset_obj_track_times(plist, false) >= 0 &&
+           H5Pset_attr_phase_change(plist, COMPACT, 0) >= 0 &&
+           H5Pset_link_phase_change(plist, COMPACT, 0) >= 0 &&
+           H5Pset_est_link_info(plist, links, 12) >= 0;
 }
 
-ebpo_status ebpo_h5_create(ebpo_h5_out *out, const char *path, const char *shown, uint64_t head_bytes, unsigned links,
-                           ebpo_error *error)
+ebpo_status ebpo_h5_create(ebpo_h5_out *out, const char *path, const char *shown,
+                           uint64_t head_bytes, unsigned links, ebpo_error *error)
 {
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
@@ -70,7 +74,8 @@ ebpo_status ebpo_h5_create(ebpo_h5_out *out, const char *path, const char *shown
     return status;
 }
 
-ebpo_status ebpo_h5_reopen(ebpo_h5_out *out, const char *path, uint64_t metadata_bytes, ebpo_error *error)
+ebpo_status ebpo_h5_reopen(ebpo_h5_out *out, const char *path, uint64_t metadata_bytes,
+                           ebpo_error *error)
 {
     ebpo_status status = ebpo_h5_finish(out, error);
     if (status != EBPO_OK)
@@ -81,7 +86,8 @@ ebpo_status ebpo_h5_reopen(ebpo_h5_out *out, const char *path, uint64_t metadata
     if (fapl >= 0)
         out->file = H5Fopen(path, H5F_ACC_RDWR, fapl);
     if (out->file < 0)
-        status = ebpo_h5_fail(error, EBPO_E_IO, out->shown, "", "libhdf5 could not open again what it had written");
+        status = ebpo_h5_fail(error, EBPO_E_IO, out->shown, "",
+                              "libhdf5 could not open again what it had written");
     if (fapl >= 0)
         H5Pclose(fapl);
     ebpo_h5_leave(&scope);
@@ -98,13 +104,15 @@ ebpo_status ebpo_h5_root(ebpo_h5_out *out, ebpo_h5_id *id, ebpo_error *error)
     return status;
 }
 
-ebpo_status ebpo_h5_make_group(ebpo_h5_out *out, const char *path, unsigned links, ebpo_h5_id *id, ebpo_error *error)
+ebpo_status ebpo_h5_make_group(ebpo_h5_out *out, const char *path, unsigned links, ebpo_h5_id *id,
+                               ebpo_error *error)
 {
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
     hid_t gcpl = H5Pcreate(H5P_GROUP_CREATE);
     *id = set_group(gcpl, links) ? H5Gcreate2(out->file, path, H5P_DEFAULT, gcpl, H5P_DEFAULT) : -1;
-    ebpo_status status = *id >= 0 ? EBPO_OK : ebpo_h5_fail(error, EBPO_E_IO, out->shown, path, DISK);
+    ebpo_status status =
+        *id >= 0 ? EBPO_OK : ebpo_h5_fail(error, EBPO_E_IO, out->shown, path, DISK);
     if (gcpl >= 0)
         H5Pclose(gcpl);
     ebpo_h5_leave(&scope);
@@ -112,8 +120,8 @@ ebpo_status ebpo_h5_make_group(ebpo_h5_out *out, const char *path, unsigned link
 }
 
 /* Writes an attribute of the stored type `type`; takes over type and space. */
-static ebpo_status put(ebpo_h5_out *out, hid_t object, const char *name, hid_t type, hid_t space, hid_t memory, const void *value,
-                       ebpo_error *error)
+static ebpo_status put(ebpo_h5_out *out, hid_t object, const char *name, hid_t type, hid_t space,
+                       hid_t memory, const void *value, ebpo_error *error)
 {
     hid_t attribute = -1;
     if (type >= 0 && space >= 0) {
@@ -131,13 +139,15 @@ static ebpo_status put(ebpo_h5_out *out, hid_t object, const char *name, hid_t t
     return status;
 }
 
-ebpo_status ebpo_h5_put_text(ebpo_h5_out *out, ebpo_h5_id id, const char *name, const char *text, ebpo_error *error)
+ebpo_status ebpo_h5_put_text(ebpo_h5_out *out, ebpo_h5_id id, const char *name, const char *text,
+                             ebpo_error *error)
 {
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
     hid_t type = H5Tcopy(H5T_C_S1);
     size_t size = strlen(text);
-    if (H5Tset_size(type, size ? size : 1) < 0 || H5Tset_strpad(type, H5T_STR_NULLPAD) < 0 || H5Tset_cset(type, H5T_CSET_UTF8) < 0) {
+    if (H5Tset_size(type, size ? size : 1) < 0 || H5Tset_strpad(type, H5T_STR_NULLPAD) < 0 ||
+        H5Tset_cset(type, H5T_CSET_UTF8) < 0) {
         H5Tclose(type);
         type = -1;
     }
@@ -148,51 +158,59 @@ ebpo_status ebpo_h5_put_text(ebpo_h5_out *out, ebpo_h5_id id, const char *name, 
     return status;
 }
 
-ebpo_status ebpo_h5_put_int(ebpo_h5_out *out, ebpo_h5_id id, const char *name, int64_t value, ebpo_error *error)
+ebpo_status ebpo_h5_put_int(ebpo_h5_out *out, ebpo_h5_id id, const char *name, int64_t value,
+                            ebpo_error *error)
 {
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
-    ebpo_status status = put(out, id, name, H5T_STD_I64LE, H5Screate(H5S_SCALAR), H5T_NATIVE_INT64, &value, error);
+    ebpo_status status =
+        put(out, id, name, H5T_STD_I64LE, H5Screate(H5S_SCALAR), H5T_NATIVE_INT64, &value, error);
     ebpo_h5_leave(&scope);
     return status;
 }
 
-ebpo_status ebpo_h5_put_count(ebpo_h5_out *out, ebpo_h5_id id, const char *name, uint64_t value, ebpo_error *error)
+ebpo_status ebpo_h5_put_count(ebpo_h5_out *out, ebpo_h5_id id, const char *name, uint64_t value,
+                              ebpo_error *error)
 {
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
-    ebpo_status status = put(out, id, name, H5T_STD_U64LE, H5Screate(H5S_SCALAR), H5T_NATIVE_UINT64, &value, error);
+    ebpo_status status =
+        put(out, id, name, H5T_STD_U64LE, H5Screate(H5S_SCALAR), H5T_NATIVE_UINT64, &value, error);
     ebpo_h5_leave(&scope);
     return status;
 }
 
-ebpo_status ebpo_h5_put_real(ebpo_h5_out *out, ebpo_h5_id id, const char *name, const double *values, unsigned count,
-                             ebpo_error *error)
+ebpo_status ebpo_h5_put_real(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
+                             const double *values, unsigned count, ebpo_error *error)
 {
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
     hsize_t dims = count;
     hid_t space = count ? H5Screate_simple(1, &dims, NULL) : H5Screate(H5S_SCALAR);
-    ebpo_status status = put(out, id, name, H5T_IEEE_F64LE, space, H5T_NATIVE_DOUBLE, values, error);
+    ebpo_status status =
+        put(out, id, name, H5T_IEEE_F64LE, space, H5T_NATIVE_DOUBLE, values, error);
     ebpo_h5_leave(&scope);
     return status;
 }
 
 static bool set_filters(hid_t dcpl, const ebpo_h5_shape *shape, int level)
 {
-    bool compressed = shape->pipeline == EBPO_PIPELINE_ZSTD || shape->pipeline == EBPO_PIPELINE_DEFLATE;
+    bool compressed =
+        shape->pipeline == EBPO_PIPELINE_ZSTD || shape->pipeline == EBPO_PIPELINE_DEFLATE;
     if (compressed && shape->element_size > 1 && H5Pset_shuffle(dcpl) < 0)
         return false;
     if (shape->pipeline == EBPO_PIPELINE_ZSTD) {
         unsigned value = (unsigned)(level ? level : EBPO_ZSTD_LEVEL);
         return H5Pset_filter(dcpl, EBPO_ZSTD_FILTER_ID, H5Z_FLAG_MANDATORY, 1, &value) >= 0;
     }
-    if (shape->pipeline == EBPO_PIPELINE_DEFLATE && H5Pset_deflate(dcpl, (unsigned)(level ? level : EBPO_DEFLATE_LEVEL)) < 0)
+    if (shape->pipeline == EBPO_PIPELINE_DEFLATE &&
+        H5Pset_deflate(dcpl, (unsigned)(level ? level : EBPO_DEFLATE_LEVEL)) < 0)
         return false;
     return shape->pipeline == EBPO_PIPELINE_BARE || H5Pset_fletcher32(dcpl) >= 0;
 }
 
-ebpo_status ebpo_h5_make_array(ebpo_h5_out *out, const char *path, const ebpo_h5_shape *shape, ebpo_h5_id *id, ebpo_error *error)
+ebpo_status ebpo_h5_make_array(ebpo_h5_out *out, const char *path, const ebpo_h5_shape *shape,
+                               ebpo_h5_id *id, ebpo_error *error)
 {
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
@@ -200,12 +218,16 @@ ebpo_status ebpo_h5_make_array(ebpo_h5_out *out, const char *path, const ebpo_h5
     hsize_t dims[2] = { shape->rows, shape->cols }, chunk[2] = { shape->chunk_rows, shape->cols };
     hid_t space = H5Screate_simple(rank, dims, NULL), dcpl = H5Pcreate(H5P_DATASET_CREATE);
     *id = -1;
-    if (space >= 0 && dcpl >= 0 && H5Pset_chunk(dcpl, rank, chunk) >= 0 && H5Pset_obj_track_times(dcpl, false) >= 0 &&
-        H5Pset_attr_phase_change(dcpl, COMPACT, 0) >= 0 && H5Pset_fill_time(dcpl, H5D_FILL_TIME_NEVER) >= 0 &&
+    if (space >= 0 && dcpl >= 0 && H5Pset_chunk(dcpl, rank, chunk) >= 0 &&
+        H5Pset_obj_track_times(dcpl, false) >= 0 &&
+        H5Pset_attr_phase_change(dcpl, COMPACT, 0) >= 0 &&
+        H5Pset_fill_time(dcpl, H5D_FILL_TIME_NEVER) >= 0 &&
         set_filters(dcpl, shape, out->codec_level))
-        *id = H5Dcreate2(out->file, path, ebpo_h5_integer_type(shape->element_size, shape->is_signed), space, H5P_DEFAULT, dcpl,
-                         H5P_DEFAULT);
-    ebpo_status status = *id >= 0 ? EBPO_OK : ebpo_h5_fail(error, EBPO_E_IO, out->shown, path, DISK);
+        *id =
+            H5Dcreate2(out->file, path, ebpo_h5_integer_type(shape->element_size, shape->is_signed),
+                       space, H5P_DEFAULT, dcpl, H5P_DEFAULT);
+    ebpo_status status =
+        *id >= 0 ? EBPO_OK : ebpo_h5_fail(error, EBPO_E_IO, out->shown, path, DISK);
     if (space >= 0)
         H5Sclose(space);
     if (dcpl >= 0)
@@ -214,18 +236,21 @@ ebpo_status ebpo_h5_make_array(ebpo_h5_out *out, const char *path, const ebpo_h5
     return status;
 }
 
-ebpo_status ebpo_h5_open_array(ebpo_h5_out *out, const char *path, ebpo_h5_id *id, ebpo_error *error)
+ebpo_status ebpo_h5_open_array(ebpo_h5_out *out, const char *path, ebpo_h5_id *id,
+                               ebpo_error *error)
 {
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
     *id = H5Dopen2(out->file, path, H5P_DEFAULT);
-    ebpo_status status = *id >= 0 ? EBPO_OK : ebpo_h5_fail(error, EBPO_E_IO, out->shown, path, DISK);
+    ebpo_status status =
+        *id >= 0 ? EBPO_OK : ebpo_h5_fail(error, EBPO_E_IO, out->shown, path, DISK);
     ebpo_h5_leave(&scope);
     return status;
 }
 
-ebpo_status ebpo_h5_put_chunk(ebpo_h5_out *out, const char *path, ebpo_h5_id id, const ebpo_h5_shape *shape, uint64_t chunk,
-                              const void *data, size_t bytes, ebpo_error *error)
+ebpo_status ebpo_h5_put_chunk(ebpo_h5_out *out, const char *path, ebpo_h5_id id,
+                              const ebpo_h5_shape *shape, uint64_t chunk, const void *data,
+                              size_t bytes, ebpo_error *error)
 {
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
@@ -237,17 +262,21 @@ ebpo_status ebpo_h5_put_chunk(ebpo_h5_out *out, const char *path, ebpo_h5_id id,
     return status;
 }
 
-/* Metadata blocks end with a checksum, unused space is zero: the head ends at the last byte that is not zero, up to a few that happen to be. */
-ebpo_status ebpo_h5_head_used(ebpo_h5_out *out, uint64_t first_raw, uint64_t *bytes, ebpo_error *error)
+/* Metadata blocks end with a checksum, unused space is zero: the head ends at the last byte that is
+ * not zero, up to a few that happen to be. */
+ebpo_status ebpo_h5_head_used(ebpo_h5_out *out, uint64_t first_raw, uint64_t *bytes,
+                              ebpo_error *error)
 {
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
     ebpo_status status = EBPO_OK;
     void *image = NULL;
     hsize_t size = 0;
-    if (H5Fflush(out->file, H5F_SCOPE_LOCAL) < 0 || H5Fget_vfd_handle(out->file, H5P_DEFAULT, &image) < 0 ||
+    if (H5Fflush(out->file, H5F_SCOPE_LOCAL) < 0 ||
+        H5Fget_vfd_handle(out->file, H5P_DEFAULT, &image) < 0 ||
         H5Fget_filesize(out->file, &size) < 0 || first_raw > size) {
-        status = ebpo_h5_fail(error, EBPO_E_IO, out->shown, "", "libhdf5 could not lay out the head");
+        status =
+            ebpo_h5_fail(error, EBPO_E_IO, out->shown, "", "libhdf5 could not lay out the head");
     } else {
         const uint8_t *data = *(uint8_t **)image;
         while (first_raw && data[first_raw - 1] == 0)
@@ -273,8 +302,9 @@ ebpo_status ebpo_h5_finish(ebpo_h5_out *out, ebpo_error *error)
     return status;
 }
 
-/* When the disk is full, closing fails as well, and libhdf5 then keeps an id without a file and crashes at exit. Nobody wants these bytes any
- * more: what is still to be written (a few kilobytes of metadata) goes to memory. */
+/* When the disk is full, closing fails as well, and libhdf5 then keeps an id without a file and
+ * crashes at exit. Nobody wants these bytes any more: what is still to be written (a few kilobytes
+ * of metadata) goes to memory. */
 static void swallow_writes(hid_t file)
 {
     void *handle = NULL;

@@ -17,7 +17,8 @@ static size_t replace(void **buffer, size_t *buffer_size, void *block, size_t ca
     return used;
 }
 
-static size_t compress(size_t level_count, const unsigned level[], size_t bytes, size_t *buffer_size, void **buffer)
+static size_t compress(size_t level_count, const unsigned level[], size_t bytes,
+                       size_t *buffer_size, void **buffer)
 {
     size_t capacity = ZSTD_compressBound(bytes), used = 0;
     ZSTD_CCtx *context = ZSTD_createCCtx();
@@ -82,7 +83,8 @@ static size_t expand_unknown(size_t bytes, size_t *buffer_size, void **buffer)
     return 0;
 }
 
-static size_t filter(unsigned flags, size_t cd_count, const unsigned cd_values[], size_t bytes, size_t *buffer_size, void **buffer)
+static size_t filter(unsigned flags, size_t cd_count, const unsigned cd_values[], size_t bytes,
+                     size_t *buffer_size, void **buffer)
 {
     if (!(flags & H5Z_FLAG_REVERSE))
         return compress(cd_count, cd_values, bytes, buffer_size, buffer);

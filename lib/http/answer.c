@@ -11,7 +11,8 @@
 /* --- header lines --- */
 
 /* Text of a header field without the blanks around it; false when the line is another field. */
-static bool field(const char *line, size_t size, const char *name, const char **text, size_t *length)
+static bool field(const char *line, size_t size, const char *name, const char **text,
+                  size_t *length)
 {
     size_t at = strlen(name);
     if (size <= at || strncasecmp(line, name, at) != 0 || line[at] != ':')
@@ -61,9 +62,11 @@ static bool content_range(ebpo_answer *a, const char *at, const char *end)
     if (!token(&at, end, '/'))
         return false;
     bool sized = !token(&at, end, '*');
-    if ((sized && !number(&at, end, &total)) || at != end || begin > last || (range && sized && last >= total))
+    if ((sized && !number(&at, end, &total)) || at != end || begin > last ||
+        (range && sized && last >= total))
         return false;
-    if ((a->has_range || a->has_total) && (a->begin != begin || a->last != last || a->total != total))
+    if ((a->has_range || a->has_total) &&
+        (a->begin != begin || a->last != last || a->total != total))
         return false;
     a->has_range = range;
     a->has_total = sized;
@@ -152,42 +155,58 @@ static const char *changed(const ebpo_answer *a, const ebpo_http_version *pinned
     return NULL;
 }
 
-static ebpo_verdict judge_part(const ebpo_answer *a, const ebpo_asked *asked, char why[EBPO_WHY_BYTES])
+static ebpo_verdict judge_part(const ebpo_answer *a, const ebpo_asked *asked,
+                               char why[EBPO_WHY_BYTES])
 {
     if (a->bad_range || !a->has_range)
-        return say(EBPO_ANSWER_REFUSED, why, "the server sent a part without saying properly which one (Content-Range); this server or a proxy on the way is broken");
+        return say(EBPO_ANSWER_REFUSED, why,
+                   "the server sent a part without saying properly which one (Content-Range); this "
+                   "server or a proxy on the way is broken");
     if (!a->has_total)
-        return say(EBPO_ANSWER_REFUSED, why, "the server does not tell the file's size (Content-Range ends with /*); such files cannot be read by ranges");
+        return say(EBPO_ANSWER_REFUSED, why,
+                   "the server does not tell the file's size (Content-Range ends with /*); such "
+                   "files cannot be read by ranges");
     const char *change = asked->pinned ? changed(a, asked->pinned, a->total) : NULL;
     if (change)
         return say(EBPO_ANSWER_REFUSED, why, change);
     if (a->begin != asked->begin || a->last >= asked->end) {
-        snprintf(why, EBPO_WHY_BYTES, "the server sent bytes %" PRIu64 " to %" PRIu64 " when asked for %" PRIu64 " to %" PRIu64
-                 "; this server or a proxy on the way is broken", a->begin, a->last, asked->begin, asked->end - 1);
+        snprintf(why, EBPO_WHY_BYTES,
+                 "the server sent bytes %" PRIu64 " to %" PRIu64 " when asked for %" PRIu64
+                 " to %" PRIu64 "; this server or a proxy on the way is broken",
+                 a->begin, a->last, asked->begin, asked->end - 1);
         return EBPO_ANSWER_REFUSED;
     }
     return EBPO_ANSWER_PART;
 }
 
-static ebpo_verdict judge_whole(const ebpo_answer *a, const ebpo_asked *asked, ebpo_status *status, char why[EBPO_WHY_BYTES])
+static ebpo_verdict judge_whole(const ebpo_answer *a, const ebpo_asked *asked, ebpo_status *status,
+                                char why[EBPO_WHY_BYTES])
 {
-    const char *change = asked->pinned && a->has_length ? changed(a, asked->pinned, a->length) : NULL;
+    const char *change =
+        asked->pinned && a->has_length ? changed(a, asked->pinned, a->length) : NULL;
     if (change)
         return say(EBPO_ANSWER_REFUSED, why, change);
     if (asked->pinned)
-        return say(EBPO_ANSWER_REFUSED, why, "the server sent the whole file when asked for a part, after it had sent parts; try again later");
+        return say(EBPO_ANSWER_REFUSED, why,
+                   "the server sent the whole file when asked for a part, after it had sent parts; "
+                   "try again later");
     *status = EBPO_E_UNSUPPORTED;
     if (a->has_length && a->length > asked->whole_limit) {
-        snprintf(why, EBPO_WHY_BYTES, "the server has no byte ranges, and %" PRIu64 " bytes are more than the %" PRIu64
-                 " that would be read as a whole; download the file, or use a server with ranges", a->length, asked->whole_limit);
+        snprintf(why, EBPO_WHY_BYTES,
+                 "the server has no byte ranges, and %" PRIu64 " bytes are more than the %" PRIu64
+                 " that would be read as a whole; download the file, or use a server with ranges",
+                 a->length, asked->whole_limit);
         return EBPO_ANSWER_REFUSED;
     }
     if (!a->has_length && !a->chunked && !a->http2)
-        return say(EBPO_ANSWER_REFUSED, why, "the server has no byte ranges and does not tell where the file ends; download the file, or use a server with ranges");
+        return say(EBPO_ANSWER_REFUSED, why,
+                   "the server has no byte ranges and does not tell where the file ends; download "
+                   "the file, or use a server with ranges");
     return EBPO_ANSWER_WHOLE;
 }
 
-ebpo_verdict ebpo_answer_judge(const ebpo_answer *a, const ebpo_asked *asked, ebpo_status *status, char why[EBPO_WHY_BYTES])
+ebpo_verdict ebpo_answer_judge(const ebpo_answer *a, const ebpo_asked *asked, ebpo_status *status,
+                               char why[EBPO_WHY_BYTES])
 {
     *status = EBPO_E_IO;
     if (may_pass(a->code)) {
@@ -195,16 +214,25 @@ ebpo_verdict ebpo_answer_judge(const ebpo_answer *a, const ebpo_asked *asked, eb
         return EBPO_ANSWER_LATER;
     }
     if (a->code == 416 && asked->pinned)
-        return say(EBPO_ANSWER_REFUSED, why, "has changed on the server while it was open (it became shorter); open it again");
+        return say(
+            EBPO_ANSWER_REFUSED, why,
+            "has changed on the server while it was open (it became shorter); open it again");
     if (a->code == 416)
-        return say(EBPO_ANSWER_REFUSED, why, "the server has no such bytes (416): the file is empty, or this server is broken");
+        return say(
+            EBPO_ANSWER_REFUSED, why,
+            "the server has no such bytes (416): the file is empty, or this server is broken");
     if (a->code != 200 && a->code != 206) {
-        const char *hint = a->code == 404 || a->code == 410 ? ": there is no such file; check the address"
-                           : a->code == 401 || a->code == 403 || a->code == 407 ? ": not allowed; check name, password and rights" : "";
+        const char *hint = a->code == 404 || a->code == 410
+                               ? ": there is no such file; check the address"
+                           : a->code == 401 || a->code == 403 || a->code == 407
+                               ? ": not allowed; check name, password and rights"
+                               : "";
         snprintf(why, EBPO_WHY_BYTES, "the server answered %d%s", a->code, hint);
         return EBPO_ANSWER_REFUSED;
     }
     if (a->encoded)
-        return say(EBPO_ANSWER_REFUSED, why, "the server compressed what it was asked to send as it is (Content-Encoding); switch that off for this file");
+        return say(EBPO_ANSWER_REFUSED, why,
+                   "the server compressed what it was asked to send as it is (Content-Encoding); "
+                   "switch that off for this file");
     return a->code == 206 ? judge_part(a, asked, why) : judge_whole(a, asked, status, why);
 }

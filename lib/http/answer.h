@@ -1,4 +1,5 @@
-/* What a server's answer says of itself, and what that means: RFC 9110, sections 8.8, 14 and 15. Pure. */
+/* What a server's answer says of itself, and what that means: RFC 9110, sections 8.8, 14 and 15.
+ * Pure. */
 #ifndef EBPO_HTTP_ANSWER_H
 #define EBPO_HTTP_ANSWER_H
 
@@ -13,18 +14,20 @@ typedef struct ebpo_http_version {
 } ebpo_http_version;
 
 typedef struct ebpo_answer {
-    int code;                     /* 0: no status line yet */
-    bool http2;                   /* or later: the end of a body is certain */
-    bool has_range;               /* Content-Range with a range, [begin, last] of `total` */
-    bool has_total;               /* a size in it: also without a range, "bytes * / 123" without the blanks */
-    bool bad_range;               /* one that makes no sense, or two different ones */
+    int code;       /* 0: no status line yet */
+    bool http2;     /* or later: the end of a body is certain */
+    bool has_range; /* Content-Range with a range, [begin, last] of `total` */
+    /* a size in it: also without a range, "bytes * / 123" without the blanks */
+    bool has_total;
+    bool bad_range; /* one that makes no sense, or two different ones */
     bool has_length, chunked, encoded;
     uint64_t begin, last, total, length;
     char etag[EBPO_HTTP_TAG_BYTES], modified[EBPO_HTTP_TAG_BYTES];
     uint64_t header_bytes;
 } ebpo_answer;
 
-/* One line of the head, as it came. A status line begins anew: what came before was a redirect or an interim answer. */
+/* One line of the head, as it came. A status line begins anew: what came before was a redirect or
+ * an interim answer. */
 void ebpo_answer_line(ebpo_answer *answer, const char *line, size_t size);
 
 typedef enum ebpo_verdict {
@@ -35,14 +38,17 @@ typedef enum ebpo_verdict {
 } ebpo_verdict;
 
 typedef struct ebpo_asked {
-    uint64_t begin, end;               /* bytes [begin, end) */
-    const ebpo_http_version *pinned;   /* NULL: the first request, which learns the version; the file may end before `end` */
+    uint64_t begin, end; /* bytes [begin, end) */
+    /* NULL: the first request, which learns the version; the file may end before `end` */
+    const ebpo_http_version *pinned;
     uint64_t whole_limit;
 } ebpo_asked;
 
 enum { EBPO_WHY_BYTES = 240 };
 
-/* `why` is set for LATER and REFUSED: the rest of a sentence that begins with the file's name. *status: of REFUSED. */
-ebpo_verdict ebpo_answer_judge(const ebpo_answer *answer, const ebpo_asked *asked, ebpo_status *status, char why[EBPO_WHY_BYTES]);
+/* `why` is set for LATER and REFUSED: the rest of a sentence that begins with the file's name.
+ * *status: of REFUSED. */
+ebpo_verdict ebpo_answer_judge(const ebpo_answer *answer, const ebpo_asked *asked,
+                               ebpo_status *status, char why[EBPO_WHY_BYTES]);
 
 #endif

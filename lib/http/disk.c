@@ -19,7 +19,8 @@
 
 /* A block's file: magic, block number, size, SHA-256 of these three and the bytes, the bytes. */
 enum { MAGIC_BYTES = 8, DIGEST_AT = 24, HEAD_BYTES = 56, NAME_BYTES = 128 };
-static const char MAGIC[MAGIC_BYTES + 1] = "EBPOBLK2", SUFFIX[] = ".ebpo-block", TEMPORARY[] = ".ebpo-part-";
+static const char MAGIC[MAGIC_BYTES + 1] = "EBPOBLK2", SUFFIX[] = ".ebpo-block",
+                                      TEMPORARY[] = ".ebpo-part-";
 static const double STALE_SECONDS = 3600; /* a temporary file that old has lost its writer */
 
 struct ebpo_disk {
@@ -27,8 +28,8 @@ struct ebpo_disk {
     uint64_t limit;
     char key[65];
     pthread_mutex_t lock;
-    uint64_t written;  /* since the folder was last looked through */
-    uint64_t number;   /* for temporary names */
+    uint64_t written; /* since the folder was last looked through */
+    uint64_t number;  /* for temporary names */
     uint64_t held, others;
 };
 
@@ -89,8 +90,10 @@ static entry *list(const ebpo_disk *d, uint64_t *count, uint64_t *bytes)
         close(fd);
     for (struct dirent *f; folder && (f = readdir(folder)) != NULL;) {
         struct stat st;
-        bool block = ends_with(f->d_name, SUFFIX), part = strncmp(f->d_name, TEMPORARY, sizeof TEMPORARY - 1) == 0;
-        if ((!block && !part) || strlen(f->d_name) >= NAME_BYTES || fstatat(d->folder, f->d_name, &st, AT_SYMLINK_NOFOLLOW) != 0 || !S_ISREG(st.st_mode))
+        bool block = ends_with(f->d_name, SUFFIX),
+             part = strncmp(f->d_name, TEMPORARY, sizeof TEMPORARY - 1) == 0;
+        if ((!block && !part) || strlen(f->d_name) >= NAME_BYTES ||
+            fstatat(d->folder, f->d_name, &st, AT_SYMLINK_NOFOLLOW) != 0 || !S_ISREG(st.st_mode))
             continue;
         if (part) {
             if (difftime(time(NULL), st.st_mtime) > STALE_SECONDS)
@@ -155,12 +158,17 @@ static bool writable(int folder)
     return true;
 }
 
-ebpo_status ebpo_disk_open(ebpo_disk **out, const char *folder, uint64_t bytes, const char *url, const ebpo_http_version *version, ebpo_error *error)
+ebpo_status ebpo_disk_open(ebpo_disk **out, const char *folder, uint64_t bytes, const char *url,
+                           const ebpo_http_version *version, ebpo_error *error)
 {
     *out = NULL;
-    int fd = mkdir(folder, 0777) == 0 || errno == EEXIST ? open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1;
+    int fd = mkdir(folder, 0777) == 0 || errno == EEXIST
+                 ? open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC)
+                 : -1;
     if (fd < 0 || !writable(fd)) {
-        ebpo_fail(error, EBPO_E_ARGUMENT, "%s: cannot be used as a cache folder: %s; give another one", folder, strerror(errno));
+        ebpo_fail(error, EBPO_E_ARGUMENT,
+                  "%s: cannot be used as a cache folder: %s; give another one", folder,
+                  strerror(errno));
         if (fd >= 0)
             close(fd);
         return EBPO_E_ARGUMENT;
@@ -236,8 +244,9 @@ bool ebpo_disk_get(ebpo_disk *d, uint64_t block, void *data, size_t size)
     int fd = openat(d->folder, name, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
     if (fd < 0)
         return false;
-    bool good = read_fully(fd, head, sizeof head) && memcmp(head, MAGIC, MAGIC_BYTES) == 0 && ebpo_load64(head + 8) == block &&
-                ebpo_load64(head + 16) == size && read_fully(fd, data, size) && read(fd, &more, 1) == 0;
+    bool good = read_fully(fd, head, sizeof head) && memcmp(head, MAGIC, MAGIC_BYTES) == 0 &&
+                ebpo_load64(head + 8) == block && ebpo_load64(head + 16) == size &&
+                read_fully(fd, data, size) && read(fd, &more, 1) == 0;
     if (good) {
         digest(head, data, size, sum);
         good = memcmp(sum, head + DIGEST_AT, sizeof sum) == 0;
@@ -258,12 +267,14 @@ void ebpo_disk_put(ebpo_disk *d, uint64_t block, const void *data, size_t size)
     uint64_t number = d->number++;
     pthread_mutex_unlock(&d->lock);
     block_name(d, block, name);
-    snprintf(temporary, sizeof temporary, "%s%.16s-%ld-%p-%" PRIu64, TEMPORARY, d->key, (long)getpid(), (void *)d, number);
+    snprintf(temporary, sizeof temporary, "%s%.16s-%ld-%p-%" PRIu64, TEMPORARY, d->key,
+             (long)getpid(), (void *)d, number);
     memcpy(head, MAGIC, MAGIC_BYTES);
     ebpo_store64(head + 8, block);
     ebpo_store64(head + 16, size);
     digest(head, data, size, head + DIGEST_AT);
-    int fd = openat(d->folder, temporary, O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC | O_NOFOLLOW, 0666);
+    int fd =
+        openat(d->folder, temporary, O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC | O_NOFOLLOW, 0666);
     if (fd < 0)
         return;
     bool good = write_fully(fd, head, sizeof head) && write_fully(fd, data, size);

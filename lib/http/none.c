@@ -4,12 +4,15 @@
 #include "base/error.h"
 #include "http/http.h"
 
-ebpo_status ebpo_source_of_url(ebpo_source *out, const char *url, const ebpo_http_options *options, ebpo_error *error)
+ebpo_status ebpo_source_of_url(ebpo_source *out, const char *url, const ebpo_http_options *options,
+                               ebpo_error *error)
 {
     (void)options;
     *out = (ebpo_source){ .user = NULL };
     char shown[EBPO_SHOWN_BYTES];
-    return ebpo_fail(error, EBPO_E_UNSUPPORTED, "%s: this library was built without HTTP; install libcurl and build it again, or download the file",
+    return ebpo_fail(error, EBPO_E_UNSUPPORTED,
+                     "%s: this library was built without HTTP; install libcurl and build it again, "
+                     "or download the file",
                      ebpo_url_shown(url, shown, sizeof shown));
 }
 

@@ -12,25 +12,25 @@ enum {
 };
 
 typedef enum piece_state {
-    PIECE_NOTED,    /* nothing fetched */
-    PIECE_LOADING,  /* a thread looks for it on disk */
-    PIECE_COMING,   /* requested */
+    PIECE_NOTED,   /* nothing fetched */
+    PIECE_LOADING, /* a thread looks for it on disk */
+    PIECE_COMING,  /* requested */
     PIECE_THERE
 } piece_state;
 
 struct ebpo_piece {
     uint64_t begin, end;
-    uint64_t wanted;     /* bytes announced and not read yet */
-    uint64_t plan;       /* last announcement that named it */
-    uint64_t used;       /* when it was last read, by p->clock */
-    bool fresh;          /* made for the announcement under way */
+    uint64_t wanted; /* bytes announced and not read yet */
+    uint64_t plan;   /* last announcement that named it */
+    uint64_t used;   /* when it was last read, by p->clock */
+    bool fresh;      /* made for the announcement under way */
     piece_state state;
-    unsigned users;      /* threads that need it in its place */
-    bool demanded;       /* a reader asked for it: its failure is the reader's */
-    bool to_store;       /* fetched, not on disk yet */
+    unsigned users;                  /* threads that need it in its place */
+    bool demanded;                   /* a reader asked for it: its failure is the reader's */
+    bool to_store;                   /* fetched, not on disk yet */
     uint64_t fetch_begin, fetch_end; /* blocks at its ends may have come from disk */
     ebpo_request request;
-    uint8_t *data;       /* [end - begin] */
+    uint8_t *data; /* [end - begin] */
 };
 
 /* --- the list; lock held in all that follows but where it says otherwise --- */
@@ -49,10 +49,7 @@ static uint64_t find(const ebpo_pieces *p, uint64_t at)
     return low;
 }
 
-static uint64_t bytes_of(const ebpo_piece *piece)
-{
-    return piece->end - piece->begin;
-}
+static uint64_t bytes_of(const ebpo_piece *piece) { return piece->end - piece->begin; }
 
 static void drop_data(ebpo_pieces *p, ebpo_piece *piece)
 {
@@ -89,13 +86,16 @@ static bool insert(ebpo_pieces *p, uint64_t i, uint64_t begin, uint64_t end)
     return true;
 }
 
-/* [begin, end) in pieces of about equal size, at most EBPO_PIECE_BYTES, on the grid of the blocks. */
+/* [begin, end) in pieces of about equal size, at most EBPO_PIECE_BYTES, on the grid of the blocks.
+ */
 static bool insert_pieces(ebpo_pieces *p, uint64_t i, uint64_t begin, uint64_t end)
 {
     uint64_t number = (end - begin + EBPO_PIECE_BYTES - 1) / EBPO_PIECE_BYTES;
-    uint64_t each = ((end - begin + number - 1) / number + EBPO_DISK_BLOCK - 1) / EBPO_DISK_BLOCK * EBPO_DISK_BLOCK;
+    uint64_t each = ((end - begin + number - 1) / number + EBPO_DISK_BLOCK - 1) / EBPO_DISK_BLOCK *
+                    EBPO_DISK_BLOCK;
     for (; begin < end; i++) {
-        uint64_t stop = end - begin <= each ? end : (begin + each) / EBPO_DISK_BLOCK * EBPO_DISK_BLOCK;
+        uint64_t stop =
+            end - begin <= each ? end : (begin + each) / EBPO_DISK_BLOCK * EBPO_DISK_BLOCK;
         if (!insert(p, i, begin, stop))
             return false;
         begin = stop;
@@ -125,13 +125,15 @@ static bool cover(ebpo_pieces *p, uint64_t begin, uint64_t end)
 
 /* --- fetching --- */
 
-/* Whether a piece has all of the block at a place, or as much as the file has. Only such blocks go to disk and come from there. */
+/* Whether a piece has all of the block at a place, or as much as the file has. Only such blocks go
+ * to disk and come from there. */
 static bool has_block(const ebpo_pieces *p, uint64_t at, uint64_t end)
 {
     return at % EBPO_DISK_BLOCK == 0 && (end - at >= EBPO_DISK_BLOCK || end == p->size);
 }
 
-/* Blocks from disk, from both ends inwards; the lock is released meanwhile. What is left is to be requested. */
+/* Blocks from disk, from both ends inwards; the lock is released meanwhile. What is left is to be
+ * requested. */
 static void load_from_disk(ebpo_pieces *p, ebpo_piece *piece)
 {
     uint64_t begin = piece->begin, end = piece->end, got = 0;
@@ -139,14 +141,16 @@ static void load_from_disk(ebpo_pieces *p, ebpo_piece *piece)
     pthread_mutex_unlock(&p->lock);
     while (begin < end && has_block(p, begin, end)) {
         size_t size = (size_t)(end - begin < EBPO_DISK_BLOCK ? end - begin : EBPO_DISK_BLOCK);
-        if (!ebpo_disk_get(p->disk, begin / EBPO_DISK_BLOCK, piece->data + (begin - piece->begin), size))
+        if (!ebpo_disk_get(p->disk, begin / EBPO_DISK_BLOCK, piece->data + (begin - piece->begin),
+                           size))
             break;
         begin += size;
         got += size;
     }
     while (begin < end) {
         uint64_t block = (end - 1) / EBPO_DISK_BLOCK, at = block * EBPO_DISK_BLOCK;
-        if (at <= begin || (end % EBPO_DISK_BLOCK && end != p->size) || !ebpo_disk_get(p->disk, block, piece->data + (at - piece->begin), (size_t)(end - at)))
+        if (at <= begin || (end % EBPO_DISK_BLOCK && end != p->size) ||
+            !ebpo_disk_get(p->disk, block, piece->data + (at - piece->begin), (size_t)(end - at)))
             break;
         got += end - at;
         end = at;
@@ -161,10 +165,12 @@ static void load_from_disk(ebpo_pieces *p, ebpo_piece *piece)
 /* Nobody needs it in its place. */
 static bool is_idle(const ebpo_piece *piece)
 {
-    return piece->users == 0 && piece->data && (piece->state == PIECE_THERE || (piece->state == PIECE_COMING && piece->request.done));
+    return piece->users == 0 && piece->data &&
+           (piece->state == PIECE_THERE || (piece->state == PIECE_COMING && piece->request.done));
 }
 
-/* The least recently read of the pieces that were; else what was announced long ago and not wanted after all. */
+/* The least recently read of the pieces that were; else what was announced long ago and not wanted
+ * after all. */
 static bool forget_one(ebpo_pieces *p)
 {
     uint64_t read = p->count, stale = p->count;
@@ -174,7 +180,8 @@ static bool forget_one(ebpo_pieces *p)
             continue;
         if (piece->wanted == 0 && (read == p->count || piece->used < p->piece[read]->used))
             read = i;
-        if (piece->wanted && piece->plan + STALE_AFTER < p->plan && (stale == p->count || piece->plan < p->piece[stale]->plan))
+        if (piece->wanted && piece->plan + STALE_AFTER < p->plan &&
+            (stale == p->count || piece->plan < p->piece[stale]->plan))
             stale = i;
     }
     uint64_t which = read < p->count ? read : stale;
@@ -215,20 +222,23 @@ static bool start(ebpo_pieces *p, ebpo_piece *piece, bool urgent)
     }
     piece->state = PIECE_COMING;
     piece->demanded = urgent;
-    piece->request = (ebpo_request){ .offset = piece->fetch_begin, .size = piece->fetch_end - piece->fetch_begin,
+    piece->request = (ebpo_request){ .offset = piece->fetch_begin,
+                                     .size = piece->fetch_end - piece->fetch_begin,
                                      .data = piece->data + (piece->fetch_begin - piece->begin) };
     ebpo_transfers_add(p->transfers, &piece->request, urgent);
     return true;
 }
 
-/* This thread is through with a piece, of which it has read so much. What was fetched stays until the room is needed. */
+/* This thread is through with a piece, of which it has read so much. What was fetched stays until
+ * the room is needed. */
 static void release(ebpo_pieces *p, ebpo_piece *piece, uint64_t read)
 {
     piece->users--;
     piece->wanted -= read < piece->wanted ? read : piece->wanted;
     if (read)
         piece->used = ++p->clock;
-    bool failed = piece->state == PIECE_COMING && piece->request.done && piece->request.status != EBPO_OK;
+    bool failed =
+        piece->state == PIECE_COMING && piece->request.done && piece->request.status != EBPO_OK;
     if (piece->users)
         return;
     if (failed)
@@ -268,7 +278,8 @@ static void add_wanted(ebpo_pieces *p, const ebpo_range *range)
     uint64_t begin = range->offset, end = begin + range->size;
     for (uint64_t i = find(p, begin); i < p->count && p->piece[i]->begin < end; i++) {
         ebpo_piece *piece = p->piece[i];
-        uint64_t from = piece->begin > begin ? piece->begin : begin, to = piece->end < end ? piece->end : end;
+        uint64_t from = piece->begin > begin ? piece->begin : begin,
+                 to = piece->end < end ? piece->end : end;
         piece->plan = p->plan;
         if (piece->fresh)
             piece->wanted += to - from;
@@ -282,14 +293,16 @@ static void note(ebpo_pieces *p, const ebpo_range *sorted, size_t count)
     p->announcing = true;
     for (size_t i = 0; i < count;) {
         uint64_t begin = sorted[i].offset, end = begin + sorted[i].size;
-        for (i++; i < count && (sorted[i].offset <= end || sorted[i].offset - end <= GAP_BYTES); i++)
+        for (i++; i < count && (sorted[i].offset <= end || sorted[i].offset - end <= GAP_BYTES);
+             i++)
             end = sorted[i].offset + sorted[i].size > end ? sorted[i].offset + sorted[i].size : end;
         if (begin < end && !cover(p, begin, end))
             break;
     }
     p->announcing = false;
     p->plan += p->count > before;
-    uint64_t first = find(p, sorted[0].offset), end = sorted[count - 1].offset + sorted[count - 1].size;
+    uint64_t first = find(p, sorted[0].offset),
+             end = sorted[count - 1].offset + sorted[count - 1].size;
     for (uint64_t i = first; i < p->count && p->piece[i]->begin < end; i++)
         p->piece[i]->fresh |= p->piece[i]->wanted == 0; /* read before, and now again */
     for (size_t i = 0; i < count; i++)
@@ -324,17 +337,21 @@ static void store(ebpo_pieces *p, ebpo_piece *piece)
     for (uint64_t at = piece->fetch_begin; at < piece->fetch_end; at += EBPO_DISK_BLOCK) {
         uint64_t left = piece->fetch_end - at;
         if (has_block(p, at, piece->fetch_end))
-            ebpo_disk_put(p->disk, at / EBPO_DISK_BLOCK, piece->data + (at - piece->begin), (size_t)(left < EBPO_DISK_BLOCK ? left : EBPO_DISK_BLOCK));
+            ebpo_disk_put(p->disk, at / EBPO_DISK_BLOCK, piece->data + (at - piece->begin),
+                          (size_t)(left < EBPO_DISK_BLOCK ? left : EBPO_DISK_BLOCK));
     }
     pthread_mutex_lock(&p->lock);
 }
 
 static bool has_come(const ebpo_piece *piece)
 {
-    return piece->to_store && (piece->state == PIECE_THERE || (piece->state == PIECE_COMING && piece->request.done && piece->request.status == EBPO_OK));
+    return piece->to_store &&
+           (piece->state == PIECE_THERE || (piece->state == PIECE_COMING && piece->request.done &&
+                                            piece->request.status == EBPO_OK));
 }
 
-/* Stores one piece that has come and that nobody has read yet, so that it is not lost when the process ends; false when there is none. The lock is released meanwhile. */
+/* Stores one piece that has come and that nobody has read yet, so that it is not lost when the
+ * process ends; false when there is none. The lock is released meanwhile. */
 static bool store_one(ebpo_pieces *p)
 {
     for (uint64_t i = 0; p->disk && i < p->count; i++) {
@@ -349,7 +366,8 @@ static bool store_one(ebpo_pieces *p)
     return false;
 }
 
-/* Waits for a piece that this thread uses. One that failed while nobody wanted it is asked for again. */
+/* Waits for a piece that this thread uses. One that failed while nobody wanted it is asked for
+ * again. */
 static ebpo_status await(ebpo_pieces *p, ebpo_piece *piece, ebpo_error *error)
 {
     while (piece->state != PIECE_THERE) {
@@ -383,7 +401,8 @@ static ebpo_status await(ebpo_pieces *p, ebpo_piece *piece, ebpo_error *error)
 }
 
 /* Bytes [at, end) as far as one piece has them; *at moves on. */
-static ebpo_status read_piece(ebpo_pieces *p, uint64_t *at, uint64_t end, uint8_t *data, ebpo_error *error)
+static ebpo_status read_piece(ebpo_pieces *p, uint64_t *at, uint64_t end, uint8_t *data,
+                              ebpo_error *error)
 {
     uint64_t i = find(p, *at);
     if (i == p->count || p->piece[i]->begin > *at) { /* gone since it was covered */
@@ -409,7 +428,8 @@ static ebpo_status read_piece(ebpo_pieces *p, uint64_t *at, uint64_t end, uint8_
 /* All pieces of a long range come at the same time. */
 static void begin_read(ebpo_pieces *p, uint64_t begin, uint64_t end)
 {
-    for (uint64_t i = find(p, begin); i < p->count && p->piece[i]->begin < end; i = find(p, begin)) {
+    for (uint64_t i = find(p, begin); i < p->count && p->piece[i]->begin < end;
+         i = find(p, begin)) {
         ebpo_piece *piece = p->piece[i];
         begin = piece->end;
         piece->users++;
@@ -420,7 +440,8 @@ static void begin_read(ebpo_pieces *p, uint64_t begin, uint64_t end)
     }
 }
 
-ebpo_status ebpo_pieces_read(ebpo_pieces *p, uint64_t offset, uint64_t size, uint8_t *data, ebpo_error *error)
+ebpo_status ebpo_pieces_read(ebpo_pieces *p, uint64_t offset, uint64_t size, uint8_t *data,
+                             ebpo_error *error)
 {
     uint64_t at = offset, end = offset + size;
     ebpo_status status = EBPO_OK;
@@ -434,8 +455,10 @@ ebpo_status ebpo_pieces_read(ebpo_pieces *p, uint64_t offset, uint64_t size, uin
         uint64_t before = at;
         status = read_piece(p, &at, end, data + (before - offset), error);
     }
-    for (uint64_t i = find(p, at); status != EBPO_OK && i < p->count && p->piece[i]->begin < end; i++)
-        p->piece[i]->demanded = p->piece[i]->users > 0; /* what comes of these requests is not this reader's any more */
+    for (uint64_t i = find(p, at); status != EBPO_OK && i < p->count && p->piece[i]->begin < end;
+         i++)
+        /* what comes of these requests is not this reader's any more */
+        p->piece[i]->demanded = p->piece[i]->users > 0;
     p->wait_seconds += ebpo_http_now() - since;
     pthread_mutex_unlock(&p->lock);
     return status;

@@ -1,5 +1,5 @@
-/* Reading and reading ahead: a file's bytes in pieces, each fetched by one request, kept while there is room: first what is announced and not
- * read yet, then what was read last. */
+/* Reading and reading ahead: a file's bytes in pieces, each fetched by one request, kept while
+ * there is room: first what is announced and not read yet, then what was read last. */
 #ifndef EBPO_HTTP_PIECES_H
 #define EBPO_HTTP_PIECES_H
 
@@ -15,22 +15,25 @@ typedef struct ebpo_pieces {
     pthread_mutex_t lock;
     pthread_cond_t done;
     ebpo_transfers *transfers;
-    ebpo_disk *disk;        /* or NULL */
-    uint64_t begin, size;   /* pieces lie within [begin, size) */
-    uint64_t held_limit;    /* bytes of pieces; readers that wait may go above it */
-    ebpo_piece **piece;     /* [count] by offset, without overlaps */
+    ebpo_disk *disk;      /* or NULL */
+    uint64_t begin, size; /* pieces lie within [begin, size) */
+    uint64_t held_limit;  /* bytes of pieces; readers that wait may go above it */
+    ebpo_piece **piece;   /* [count] by offset, without overlaps */
     uint64_t count, room;
-    uint64_t held, plan;    /* bytes of fetched pieces and those under way; announcements that brought something new */
-    uint64_t clock;         /* of reads */
+    /* bytes of fetched pieces and those under way; announcements that brought something new */
+    uint64_t held, plan;
+    uint64_t clock; /* of reads */
     bool announcing;
     uint64_t disk_hits, disk_bytes;
     double wait_seconds;
 } ebpo_pieces;
 
-/* Announced ranges within [0, size), in any order. What cannot be noted for want of memory is read without it. */
+/* Announced ranges within [0, size), in any order. What cannot be noted for want of memory is read
+ * without it. */
 void ebpo_pieces_expect(ebpo_pieces *pieces, const ebpo_range *ranges, size_t count);
 /* Bytes [offset, offset + size) within [begin, size of the file). */
-EBPO_MUST_USE ebpo_status ebpo_pieces_read(ebpo_pieces *pieces, uint64_t offset, uint64_t size, uint8_t *data, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_pieces_read(ebpo_pieces *pieces, uint64_t offset, uint64_t size,
+                                           uint8_t *data, ebpo_error *error);
 /* After the transfers are gone. */
 void ebpo_pieces_clear(ebpo_pieces *pieces);
 

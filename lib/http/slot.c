@@ -8,14 +8,17 @@
 
 enum {
     REDIRECTS_MAX = 5,
-    STALL_BYTES = 100,  /* a second */
-    DRAIN_BYTES = 65536 /* of a body that is not wanted: reading it to its end keeps the connection */
+    STALL_BYTES = 100, /* a second */
+    /* of a body that is not wanted: reading it to its end keeps the connection */
+    DRAIN_BYTES = 65536
 };
 
 /* --- what libcurl calls --- */
 
-/* Some ten times a second while a request is under way. libcurl's own measure of speed is an average over several seconds. */
-static int look_for_stall(void *user, curl_off_t total, curl_off_t done, curl_off_t upload_total, curl_off_t uploaded)
+/* Some ten times a second while a request is under way. libcurl's own measure of speed is an
+ * average over several seconds. */
+static int look_for_stall(void *user, curl_off_t total, curl_off_t done, curl_off_t upload_total,
+                          curl_off_t uploaded)
 {
     ebpo_slot *s = user;
     curl_off_t connected = 0;
@@ -24,7 +27,9 @@ static int look_for_stall(void *user, curl_off_t total, curl_off_t done, curl_of
     (void)done;
     (void)upload_total;
     (void)uploaded;
-    if (!s->sent && curl_easy_getinfo(s->easy, CURLINFO_PRETRANSFER_TIME_T, &connected) == CURLE_OK && connected > 0) {
+    if (!s->sent &&
+        curl_easy_getinfo(s->easy, CURLINFO_PRETRANSFER_TIME_T, &connected) == CURLE_OK &&
+        connected > 0) {
         s->sent = true;
         s->moved = now;
     }
@@ -49,7 +54,8 @@ static size_t take_header(char *line, size_t size, size_t count, void *user)
 
 void ebpo_slot_judge(ebpo_slot *s)
 {
-    ebpo_asked asked = { s->begin, s->end, s->is_pinned ? &s->pinned : NULL, s->owner->options->whole_limit };
+    ebpo_asked asked = { s->begin, s->end, s->is_pinned ? &s->pinned : NULL,
+                         s->owner->options->whole_limit };
     if (!s->judged)
         s->verdict = ebpo_answer_judge(&s->answer, &asked, &s->status, s->why);
     s->judged = true;
@@ -68,7 +74,9 @@ static size_t take_part(ebpo_slot *s, const char *bytes, size_t size)
 {
     uint64_t room = s->answer.last + 1 - s->begin - s->taken;
     if (size > room)
-        return refuse(s, EBPO_E_IO, "the server sent more bytes than it was asked for and than it said; this server or a proxy on the way is broken");
+        return refuse(s, EBPO_E_IO,
+                      "the server sent more bytes than it was asked for and than it said; this "
+                      "server or a proxy on the way is broken");
     memcpy(s->request->data + (s->begin - s->request->offset) + s->taken, bytes, size);
     s->taken += size;
     return size;
@@ -78,7 +86,9 @@ static size_t take_whole(ebpo_slot *s, const char *bytes, size_t size)
 {
     ebpo_request *r = s->request;
     if (s->taken + size > s->owner->options->whole_limit)
-        return refuse(s, EBPO_E_UNSUPPORTED, "the server has no byte ranges, and the file is larger than what would be read as a whole; download the file, or use a server with ranges");
+        return refuse(s, EBPO_E_UNSUPPORTED,
+                      "the server has no byte ranges, and the file is larger than what would be "
+                      "read as a whole; download the file, or use a server with ranges");
     if (!ebpo_grow(&r->whole, &r->whole_room, s->taken + size, 1))
         return refuse(s, EBPO_E_MEMORY, "out of memory");
     memcpy(r->whole + s->taken, bytes, size);
@@ -104,23 +114,25 @@ static size_t take_body(char *bytes, size_t size, size_t count, void *user)
 
 /* --- setting up --- */
 
-static bool https(const char *url)
-{
-    return url[4] == 's' || url[4] == 'S';
-}
+static bool https(const char *url) { return url[4] == 's' || url[4] == 'S'; }
 
 bool ebpo_slot_set_up(ebpo_slot *s)
 {
     const ebpo_transfers *t = s->owner;
     const ebpo_http_options *o = t->options;
     CURL *e = s->easy;
-    bool good = curl_easy_setopt(e, CURLOPT_URL, t->url) == CURLE_OK && curl_easy_setopt(e, CURLOPT_HTTPHEADER, t->headers) == CURLE_OK;
+    bool good = curl_easy_setopt(e, CURLOPT_URL, t->url) == CURLE_OK &&
+                curl_easy_setopt(e, CURLOPT_HTTPHEADER, t->headers) == CURLE_OK;
 #if LIBCURL_VERSION_NUM >= 0x075500
     good = good && curl_easy_setopt(e, CURLOPT_PROTOCOLS_STR, "http,https") == CURLE_OK;
-    good = good && curl_easy_setopt(e, CURLOPT_REDIR_PROTOCOLS_STR, https(t->url) ? "https" : "http,https") == CURLE_OK;
+    good = good && curl_easy_setopt(e, CURLOPT_REDIR_PROTOCOLS_STR,
+                                    https(t->url) ? "https" : "http,https") == CURLE_OK;
 #else
-    good = good && curl_easy_setopt(e, CURLOPT_PROTOCOLS, CURLPROTO_HTTP | CURLPROTO_HTTPS) == CURLE_OK;
-    good = good && curl_easy_setopt(e, CURLOPT_REDIR_PROTOCOLS, https(t->url) ? CURLPROTO_HTTPS : CURLPROTO_HTTP | CURLPROTO_HTTPS) == CURLE_OK;
+    good = good &&
+           curl_easy_setopt(e, CURLOPT_PROTOCOLS, CURLPROTO_HTTP | CURLPROTO_HTTPS) == CURLE_OK;
+    good = good && curl_easy_setopt(e, CURLOPT_REDIR_PROTOCOLS,
+                                    https(t->url) ? CURLPROTO_HTTPS
+                                                  : CURLPROTO_HTTP | CURLPROTO_HTTPS) == CURLE_OK;
 #endif
     curl_easy_setopt(e, CURLOPT_FOLLOWLOCATION, 1L);
     curl_easy_setopt(e, CURLOPT_MAXREDIRS, (long)REDIRECTS_MAX);
@@ -133,7 +145,9 @@ bool ebpo_slot_set_up(ebpo_slot *s)
     curl_easy_setopt(e, CURLOPT_LOW_SPEED_LIMIT, (long)STALL_BYTES);
     curl_easy_setopt(e, CURLOPT_LOW_SPEED_TIME, (long)(o->stall_timeout + 0.999));
     curl_easy_setopt(e, CURLOPT_NETRC, (long)(o->netrc ? CURL_NETRC_OPTIONAL : CURL_NETRC_IGNORED));
-    good = good && curl_easy_setopt(e, CURLOPT_USERAGENT, o->user_agent ? o->user_agent : "libebpo/" EBPO_VERSION) == CURLE_OK;
+    good = good &&
+           curl_easy_setopt(e, CURLOPT_USERAGENT,
+                            o->user_agent ? o->user_agent : "libebpo/" EBPO_VERSION) == CURLE_OK;
     good = good && (!o->user || curl_easy_setopt(e, CURLOPT_USERPWD, o->user) == CURLE_OK);
     good = good && (!o->ca_file || curl_easy_setopt(e, CURLOPT_CAINFO, o->ca_file) == CURLE_OK);
     good = good && (!o->proxy || curl_easy_setopt(e, CURLOPT_PROXY, o->proxy) == CURLE_OK);

@@ -12,17 +12,17 @@ enum { EBPO_SLOTS_MAX = 32 };
 typedef struct ebpo_slot {
     ebpo_transfers *owner;
     CURL *easy;
-    ebpo_request *request;      /* NULL: free */
-    ebpo_http_version pinned;   /* a copy for this attempt */
+    ebpo_request *request;    /* NULL: free */
+    ebpo_http_version pinned; /* a copy for this attempt */
     bool is_pinned;
     ebpo_answer answer;
     bool judged, stopped, stalled; /* stopped, stalled: we ended the transfer ourselves */
-    bool sent;                  /* connected, and the request is out */
-    double moved;               /* time of the last bytes */
+    bool sent;                     /* connected, and the request is out */
+    double moved;                  /* time of the last bytes */
     ebpo_verdict verdict;
     ebpo_status status;
     char why[EBPO_WHY_BYTES];
-    uint64_t begin, end;        /* asked in this attempt */
+    uint64_t begin, end;                /* asked in this attempt */
     uint64_t received, taken, unwanted; /* bytes of its body */
     char trouble[CURL_ERROR_SIZE];
 } ebpo_slot;

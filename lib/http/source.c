@@ -9,10 +9,7 @@
 #include "http/http.h"
 #include "http/pieces.h"
 
-enum {
-    HEAD_BYTES = EBPO_HTTP_HEAD,
-    CONNECTIONS_MAX = 32
-};
+enum { HEAD_BYTES = EBPO_HTTP_HEAD, CONNECTIONS_MAX = 32 };
 
 typedef struct http_source {
     char *url, shown[EBPO_SHOWN_BYTES];
@@ -20,7 +17,7 @@ typedef struct http_source {
     ebpo_pieces pieces;        /* and the lock and the transfers */
     bool has_lock;
     ebpo_http_version version;
-    uint8_t *head;             /* the first bytes, or the whole file: kept */
+    uint8_t *head; /* the first bytes, or the whole file: kept */
     uint64_t head_bytes;
 } http_source;
 
@@ -89,20 +86,27 @@ static bool header_ok(const char *line)
 static ebpo_status check_options(const ebpo_http_options *o, const char *shown, ebpo_error *error)
 {
     static const double most = 1e6; /* seconds; libcurl counts milliseconds in a long */
-    if (!(o->connect_timeout > 0 && o->connect_timeout <= most) || !(o->stall_timeout >= 1 && o->stall_timeout <= most) ||
+    if (!(o->connect_timeout > 0 && o->connect_timeout <= most) ||
+        !(o->stall_timeout >= 1 && o->stall_timeout <= most) ||
         !(o->time_limit > 0 && o->time_limit <= most))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: a time-out is not above 0 (stalls: at least 1) and at most 1000000 seconds", shown);
+        return ebpo_fail(
+            error, EBPO_E_ARGUMENT,
+            "%s: a time-out is not above 0 (stalls: at least 1) and at most 1000000 seconds",
+            shown);
     if (o->connections < 1 || o->connections > CONNECTIONS_MAX)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: %u connections at a time; give 1 to %d", shown, o->connections, CONNECTIONS_MAX);
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: %u connections at a time; give 1 to %d",
+                         shown, o->connections, CONNECTIONS_MAX);
     for (const char *const *h = o->headers; h && *h; h++)
         if (!header_ok(*h))
-            return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: a header to send is not 'Name: value' on one line", shown);
+            return ebpo_fail(error, EBPO_E_ARGUMENT,
+                             "%s: a header to send is not 'Name: value' on one line", shown);
     return EBPO_OK;
 }
 
 /* --- reading --- */
 
-static ebpo_status source_read(void *user, uint64_t offset, uint64_t size, void *data, ebpo_error *error)
+static ebpo_status source_read(void *user, uint64_t offset, uint64_t size, void *data,
+                               ebpo_error *error)
 {
     http_source *s = user;
     uint8_t *to = data;
@@ -201,12 +205,16 @@ static ebpo_status read_head(http_source *s, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Without ETag and Last-Modified nobody could tell whether two answers belong to one version. One answer does. */
+/* Without ETag and Last-Modified nobody could tell whether two answers belong to one version. One
+ * answer does. */
 static ebpo_status read_whole(http_source *s, ebpo_error *error)
 {
     if (s->version.size > s->options.whole_limit)
-        return ebpo_fail(error, EBPO_E_UNSUPPORTED, "%s: the server sends neither ETag nor Last-Modified, so a change under way could not be noticed, and %llu bytes are more than "
-                         "would be read at once; download the file, or allow unversioned files", s->shown, (unsigned long long)s->version.size);
+        return ebpo_fail(error, EBPO_E_UNSUPPORTED,
+                         "%s: the server sends neither ETag nor Last-Modified, so a change under "
+                         "way could not be noticed, and %llu bytes are more than "
+                         "would be read at once; download the file, or allow unversioned files",
+                         s->shown, (unsigned long long)s->version.size);
     uint8_t *all = ebpo_alloc(s->version.size, 1);
     if (!all)
         return ebpo_fail_memory(error, s->version.size);
@@ -222,15 +230,18 @@ static ebpo_status open_source(http_source *s, ebpo_error *error)
     const ebpo_http_options *o = &s->options;
     ebpo_status status = check_options(o, s->shown, error);
     if (status == EBPO_OK)
-        status = ebpo_transfers_make(&s->pieces.transfers, s->url, s->shown, o, &s->pieces.lock, &s->pieces.done, error);
+        status = ebpo_transfers_make(&s->pieces.transfers, s->url, s->shown, o, &s->pieces.lock,
+                                     &s->pieces.done, error);
     if (status == EBPO_OK)
         status = read_head(s, error);
     bool versioned = *s->version.etag || *s->version.modified;
     if (status == EBPO_OK && s->head_bytes < s->version.size && !versioned && !o->unversioned)
         status = read_whole(s, error);
-    /* The folder last: it is named by the version. A broken one is said also where it is not needed. */
+    /* The folder last: it is named by the version. A broken one is said also where it is not
+     * needed. */
     if (status == EBPO_OK && o->cache_folder)
-        status = ebpo_disk_open(&s->pieces.disk, o->cache_folder, o->cache_bytes, s->url, &s->version, error);
+        status = ebpo_disk_open(&s->pieces.disk, o->cache_folder, o->cache_bytes, s->url,
+                                &s->version, error);
     if (status == EBPO_OK && !versioned) {
         ebpo_disk_close(s->pieces.disk);
         s->pieces.disk = NULL;
@@ -241,7 +252,8 @@ static ebpo_status open_source(http_source *s, ebpo_error *error)
     return status;
 }
 
-ebpo_status ebpo_source_of_url(ebpo_source *out, const char *url, const ebpo_http_options *options, ebpo_error *error)
+ebpo_status ebpo_source_of_url(ebpo_source *out, const char *url, const ebpo_http_options *options,
+                               ebpo_error *error)
 {
     static const ebpo_http_options usual = EBPO_HTTP_OPTIONS_INIT;
     *out = (ebpo_source){ .user = NULL };
@@ -259,10 +271,13 @@ ebpo_status ebpo_source_of_url(ebpo_source *out, const char *url, const ebpo_htt
         pthread_mutex_destroy(&s->pieces.lock);
         s->has_lock = false;
     }
-    ebpo_status status = copied && s->url && s->has_lock ? open_source(s, error) : ebpo_fail_memory(error, strlen(url));
+    ebpo_status status = copied && s->url && s->has_lock ? open_source(s, error)
+                                                         : ebpo_fail_memory(error, strlen(url));
     if (status != EBPO_OK)
         source_close(s);
     else
-        *out = (ebpo_source){ s, s->version.size, source_read, source_close, source_expect, s->head_bytes };
+        *out = (ebpo_source){
+            s, s->version.size, source_read, source_close, source_expect, s->head_bytes
+        };
     return status;
 }

@@ -17,10 +17,7 @@ static const double PAUSE_FIRST = 0.2, PAUSE_MOST = 8, PAUSE_ASKED_MOST = 60; /*
 static pthread_once_t curl_once = PTHREAD_ONCE_INIT;
 static CURLcode curl_state;
 
-static void start_curl(void)
-{
-    curl_state = curl_global_init(CURL_GLOBAL_DEFAULT);
-}
+static void start_curl(void) { curl_state = curl_global_init(CURL_GLOBAL_DEFAULT); }
 
 double ebpo_http_now(void)
 {
@@ -61,13 +58,15 @@ static bool set_up(ebpo_transfers *t)
     return t->running;
 }
 
-ebpo_status ebpo_transfers_make(ebpo_transfers **out, const char *url, const char *shown, const ebpo_http_options *options,
-                                pthread_mutex_t *lock, pthread_cond_t *done, ebpo_error *error)
+ebpo_status ebpo_transfers_make(ebpo_transfers **out, const char *url, const char *shown,
+                                const ebpo_http_options *options, pthread_mutex_t *lock,
+                                pthread_cond_t *done, ebpo_error *error)
 {
     *out = NULL;
     pthread_once(&curl_once, start_curl);
     if (curl_state != CURLE_OK)
-        return ebpo_fail(error, EBPO_E_IO, "%s: libcurl cannot be started: %s", shown, curl_easy_strerror(curl_state));
+        return ebpo_fail(error, EBPO_E_IO, "%s: libcurl cannot be started: %s", shown,
+                         curl_easy_strerror(curl_state));
     ebpo_transfers *t = ebpo_alloc_zero(1, sizeof *t);
     if (!t)
         return ebpo_fail_memory(error, sizeof *t);
@@ -83,7 +82,10 @@ ebpo_status ebpo_transfers_make(ebpo_transfers **out, const char *url, const cha
         return EBPO_OK;
     }
     ebpo_transfers_free(t);
-    return ebpo_fail(error, EBPO_E_IO, "%s: libcurl cannot be set up: no memory, no threads, or options that it does not take", shown);
+    return ebpo_fail(
+        error, EBPO_E_IO,
+        "%s: libcurl cannot be set up: no memory, no threads, or options that it does not take",
+        shown);
 }
 
 void ebpo_transfers_free(ebpo_transfers *t)
@@ -184,14 +186,16 @@ static uint64_t next_random(ebpo_transfers *t)
     return t->random;
 }
 
-/* Seconds until the next attempt: doubling, and jitter so that many readers do not come back at once. What the server asks for counts when it is more. */
+/* Seconds until the next attempt: doubling, and jitter so that many readers do not come back at
+ * once. What the server asks for counts when it is more. */
 static double pause_after(ebpo_transfers *t, const ebpo_slot *s, bool *asked_for)
 {
     curl_off_t asked = 0;
     double pause = PAUSE_FIRST;
     for (unsigned i = 1; i < s->request->failures && pause < PAUSE_MOST; i++)
         pause *= 2;
-    pause = (pause < PAUSE_MOST ? pause : PAUSE_MOST) * (0.5 + (double)(next_random(t) >> 11) * 0x1p-54);
+    pause = (pause < PAUSE_MOST ? pause : PAUSE_MOST) *
+            (0.5 + (double)(next_random(t) >> 11) * 0x1p-54);
     if (s->judged && s->verdict == EBPO_ANSWER_LATER)
         curl_easy_getinfo(s->easy, CURLINFO_RETRY_AFTER, &asked);
     *asked_for = (double)asked > pause;
@@ -276,12 +280,14 @@ static void describe(const ebpo_slot *s, CURLcode code, char *out, size_t room)
     else if (s->stalled)
         snprintf(out, room, "the server sent nothing for %g s", s->owner->options->stall_timeout);
     else if (code == CURLE_OK)
-        snprintf(out, room, "the server sent %" PRIu64 " bytes of %" PRIu64, s->taken, s->end - s->begin);
+        snprintf(out, room, "the server sent %" PRIu64 " bytes of %" PRIu64, s->taken,
+                 s->end - s->begin);
     else
         snprintf(out, room, "%s", trouble);
 }
 
-/* Whether the rest may come in another answer: not where nobody could tell that it is of another version. */
+/* Whether the rest may come in another answer: not where nobody could tell that it is of another
+ * version. */
 static bool may_join(const ebpo_transfers *t, const ebpo_request *r)
 {
     const ebpo_http_version *v = r->first ? &r->version : &t->pinned;
@@ -293,8 +299,8 @@ static void try_again(ebpo_transfers *t, ebpo_slot *s, CURLcode code, double now
 {
     ebpo_request *r = s->request;
     char what[CURL_ERROR_SIZE], why[CURL_ERROR_SIZE + 160];
-    if (code == CURLE_OK && s->judged && s->verdict == EBPO_ANSWER_PART && s->taken && s->taken == s->answer.last - s->answer.begin + 1 && may_join(t, r) &&
-        now < r->deadline) {
+    if (code == CURLE_OK && s->judged && s->verdict == EBPO_ANSWER_PART && s->taken &&
+        s->taken == s->answer.last - s->answer.begin + 1 && may_join(t, r) && now < r->deadline) {
         r->due = now; /* a server that answers in smaller parts: no failure */
         enqueue(t, r);
         return;
@@ -304,13 +310,21 @@ static void try_again(ebpo_transfers *t, ebpo_slot *s, CURLcode code, double now
     bool asked_for;
     double pause = pause_after(t, s, &asked_for);
     if (now >= r->deadline - 0.01 || (!asked_for && now + pause >= r->deadline))
-        snprintf(why, sizeof why, "bytes %" PRIu64 " to %" PRIu64 ": not read within %g s (%s); try again later, or with a longer time limit", r->offset,
-                 r->offset + r->size - 1, t->options->time_limit, what);
+        snprintf(why, sizeof why,
+                 "bytes %" PRIu64 " to %" PRIu64
+                 ": not read within %g s (%s); try again later, or with a longer time limit",
+                 r->offset, r->offset + r->size - 1, t->options->time_limit, what);
     else if (r->failures > t->options->retries)
-        snprintf(why, sizeof why, "bytes %" PRIu64 " to %" PRIu64 ": %s; given up after %u attempt%s, try again later", r->offset, r->offset + r->size - 1, what,
-                 r->failures, r->failures == 1 ? "" : "s");
+        snprintf(why, sizeof why,
+                 "bytes %" PRIu64 " to %" PRIu64
+                 ": %s; given up after %u attempt%s, try again later",
+                 r->offset, r->offset + r->size - 1, what, r->failures,
+                 r->failures == 1 ? "" : "s");
     else if (pause > PAUSE_ASKED_MOST || now + pause >= r->deadline)
-        snprintf(why, sizeof why, "bytes %" PRIu64 " to %" PRIu64 ": %s and is to be asked again in %.0f s; try again then", r->offset, r->offset + r->size - 1, what, pause);
+        snprintf(why, sizeof why,
+                 "bytes %" PRIu64 " to %" PRIu64
+                 ": %s and is to be asked again in %.0f s; try again then",
+                 r->offset, r->offset + r->size - 1, what, pause);
     else {
         if (!may_join(t, r))
             r->got = 0;
@@ -336,12 +350,14 @@ static void end_attempt(ebpo_transfers *t, ebpo_slot *s, CURLcode code)
     t->stats.bytes += s->received;
     t->stats.connections += (uint64_t)(connections > 0 ? connections : 0);
     t->stats.requests += (uint64_t)(redirects > 0 ? redirects : 0);
-    bool usable = s->judged && !s->stopped && (s->verdict == EBPO_ANSWER_PART || s->verdict == EBPO_ANSWER_WHOLE);
+    bool usable = s->judged && !s->stopped &&
+                  (s->verdict == EBPO_ANSWER_PART || s->verdict == EBPO_ANSWER_WHOLE);
     if (s->judged && s->verdict == EBPO_ANSWER_REFUSED)
         finish(t, r, s->status, s->why);
     else if (usable && keep(s, code))
         finish(t, r, EBPO_OK, NULL);
-    else if (code == CURLE_OK || s->stalled || passing(code) || (s->judged && s->verdict == EBPO_ANSWER_LATER))
+    else if (code == CURLE_OK || s->stalled || passing(code) ||
+             (s->judged && s->verdict == EBPO_ANSWER_LATER))
         try_again(t, s, code, now);
     else
         finish(t, r, EBPO_E_IO, *s->trouble ? s->trouble : curl_easy_strerror(code));
@@ -358,7 +374,8 @@ static void cancel_queue(ebpo_transfers *t)
     }
 }
 
-/* Locked. Requests that have waited for a place too long end; *wait: seconds until something is due. */
+/* Locked. Requests that have waited for a place too long end; *wait: seconds until something is
+ * due. */
 static ebpo_request *next_due(ebpo_transfers *t, double now, double *wait)
 {
     for (ebpo_request **at = &t->queue; *at;) {
@@ -366,8 +383,10 @@ static ebpo_request *next_due(ebpo_transfers *t, double now, double *wait)
         if (r->deadline > 0 && now >= r->deadline) {
             *at = r->next;
             char why[160];
-            snprintf(why, sizeof why, "bytes %" PRIu64 " to %" PRIu64 ": not read within %g s; try again later, or with a longer time limit", r->offset,
-                     r->offset + r->size - 1, t->options->time_limit);
+            snprintf(why, sizeof why,
+                     "bytes %" PRIu64 " to %" PRIu64
+                     ": not read within %g s; try again later, or with a longer time limit",
+                     r->offset, r->offset + r->size - 1, t->options->time_limit);
             finish(t, r, EBPO_E_IO, why);
             continue;
         }

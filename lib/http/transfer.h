@@ -14,26 +14,34 @@ typedef struct ebpo_transfers ebpo_transfers;
 typedef struct ebpo_request {
     uint64_t offset, size; /* size > 0 */
     uint8_t *data;         /* [size] */
-    bool first;            /* the file's size and version are not known yet: the file may turn out to be shorter, and may come as a whole */
+    /* the file's size and version are not known yet: the file may turn out to be shorter, and may
+     * come as a whole */
+    bool first;
     /* When done. */
     bool done;
     ebpo_status status;
     ebpo_error error;
-    uint64_t got;          /* bytes; fewer than `size` at the end of the file, when `first` */
-    uint8_t *whole;        /* `first`, from a server without ranges: the file, [version.size] bytes, the taker's to free; then `data` is unused */
+    uint64_t got; /* bytes; fewer than `size` at the end of the file, when `first` */
+    /* `first`, from a server without ranges: the file, [version.size] bytes, the taker's to free;
+     * then `data` is unused */
+    uint8_t *whole;
     ebpo_http_version version; /* `first` */
     /* The transfers' own. */
     struct ebpo_request *next;
     unsigned failures;
-    double due, deadline;  /* seconds; deadline 0: nobody waits and nothing was sent yet */
+    double due, deadline; /* seconds; deadline 0: nobody waits and nothing was sent yet */
     uint64_t whole_room;
 } ebpo_request;
 
-/* The texts of `options` must stay. Everything below that says so is called with `lock` held; whoever waits for a request waits on `done`, which is broadcast at each end.
- * `url`: with user and password, if they stand in it; `shown`: for messages. */
-EBPO_MUST_USE ebpo_status ebpo_transfers_make(ebpo_transfers **out, const char *url, const char *shown, const ebpo_http_options *options,
-                                              pthread_mutex_t *lock, pthread_cond_t *done, ebpo_error *error);
-/* Gives up what is under way, whose requests stay as they are. NULL is fine. Not with the lock held. */
+/* The texts of `options` must stay. Everything below that says so is called with `lock` held;
+ * whoever waits for a request waits on `done`, which is broadcast at each end. `url`: with user and
+ * password, if they stand in it; `shown`: for messages. */
+EBPO_MUST_USE ebpo_status ebpo_transfers_make(ebpo_transfers **out, const char *url,
+                                              const char *shown, const ebpo_http_options *options,
+                                              pthread_mutex_t *lock, pthread_cond_t *done,
+                                              ebpo_error *error);
+/* Gives up what is under way, whose requests stay as they are. NULL is fine. Not with the lock
+ * held. */
 void ebpo_transfers_free(ebpo_transfers *transfers);
 
 /* Lock held. Queues a request: `urgent` before all that are not. */

@@ -24,7 +24,8 @@ char *ebpo_url_shown(const char *name, char *out, size_t room)
         const char *host = strstr(name, "//") + 2;
         used = append(out, 0, room, name, (size_t)(host - name));
         for (size_t i = strcspn(host, "/?#"); i > 0; i--)
-            if (host[i - 1] == '@') { /* the last one: a password with another breaks the rules, but is a password */
+            if (host[i - 1] == '@') { /* the last one: a password with another breaks the rules, but
+                                         is a password */
                 host += i;
                 break;
             }

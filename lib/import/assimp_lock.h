@@ -1,4 +1,5 @@
-/* assimp's error text is one for the whole process: whoever calls it, to read or to write, holds this. */
+/* assimp's error text is one for the whole process: whoever calls it, to read or to write, holds
+ * this. */
 #ifndef EBPO_IMPORT_ASSIMP_LOCK_H
 #define EBPO_IMPORT_ASSIMP_LOCK_H
 

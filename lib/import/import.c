@@ -6,15 +6,18 @@
 
 #if !EBPO_HAVE_ASSIMP
 
-ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data, uint64_t size,
-                               const char *name, ebpo_workspace *workspace, ebpo_error *error)
+ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data,
+                               uint64_t size, const char *name, ebpo_workspace *workspace,
+                               ebpo_error *error)
 {
     (void)format;
     (void)data;
     (void)size;
     (void)workspace;
     *out = (ebpo_mesh){ 0 };
-    return ebpo_fail(error, EBPO_E_UNSUPPORTED, "%s: this build reads PLY only; build it with libassimp-dev installed, or convert the file to PLY",
+    return ebpo_fail(error, EBPO_E_UNSUPPORTED,
+                     "%s: this build reads PLY only; build it with libassimp-dev installed, or "
+                     "convert the file to PLY",
                      ebpo_path_name(name));
 }
 
@@ -43,31 +46,32 @@ ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const 
 
 static pthread_mutex_t assimp_mutex = PTHREAD_MUTEX_INITIALIZER;
 
-void ebpo_assimp_lock(void)
-{
-    pthread_mutex_lock(&assimp_mutex);
-}
+void ebpo_assimp_lock(void) { pthread_mutex_lock(&assimp_mutex); }
 
-void ebpo_assimp_unlock(void)
-{
-    pthread_mutex_unlock(&assimp_mutex);
-}
+void ebpo_assimp_unlock(void) { pthread_mutex_unlock(&assimp_mutex); }
 
 static const char *const pseudo_names[] = { "model.obj", "model.stl", "model.off" };
 static const char *const format_names[] = { "obj", "stl", "off" };
 
-/* Bytes that assimp and what is made of its scene take for a byte of the file, measured (assimp 5.2.4, 1.4 million triangles: 6.5 for OBJ of positions only, 4.0 for binary STL, 2.6 for OFF) and rounded up. */
+/* Bytes that assimp and what is made of its scene take for a byte of the file, measured
+ * (assimp 5.2.4, 1.4 million triangles: 6.5 for OBJ of positions only, 4.0 for binary STL, 2.6 for
+ * OFF) and rounded up. */
 static const uint64_t bytes_each[] = { 7, 5, 3 };
 
 /* assimp has all of a model in memory, several times over. */
-static ebpo_status check_budget(ebpo_import_format format, uint64_t size, const ebpo_workspace *workspace, const char *name, ebpo_error *error)
+static ebpo_status check_budget(ebpo_import_format format, uint64_t size,
+                                const ebpo_workspace *workspace, const char *name,
+                                ebpo_error *error)
 {
     ebpo_workspace_figures figures = { .memory = UINT64_MAX };
     uint64_t need;
     if (workspace)
         ebpo_workspace_tell(workspace, &figures);
     if (!ebpo_mul_ok(size, bytes_each[format], &need) || need > figures.memory)
-        return ebpo_fail(error, EBPO_E_LIMIT, "%s: reading it takes some %" PRIu64 " MiB, as assimp has all of it in memory, but %" PRIu64 " MiB are allowed; allow more, or convert it to PLY",
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "%s: reading it takes some %" PRIu64
+                         " MiB, as assimp has all of it in memory, but %" PRIu64
+                         " MiB are allowed; allow more, or convert it to PLY",
                          name, (need >> 20) + 1, figures.memory >> 20);
     return EBPO_OK;
 }
@@ -111,10 +115,7 @@ static size_t write_bytes(struct aiFile *file, const char *from, size_t size, si
     return 0;
 }
 
-static size_t tell(struct aiFile *file)
-{
-    return ((cursor *)(void *)file->UserData)->at;
-}
+static size_t tell(struct aiFile *file) { return ((cursor *)(void *)file->UserData)->at; }
 
 static size_t file_size(struct aiFile *file)
 {
@@ -132,12 +133,10 @@ static enum aiReturn seek(struct aiFile *file, size_t offset, enum aiOrigin orig
     return aiReturn_SUCCESS;
 }
 
-static void flush(struct aiFile *file)
-{
-    (void)file;
-}
+static void flush(struct aiFile *file) { (void)file; }
 
-/* Any other name (material libraries) does not exist: a model must not make us open what it likes. */
+/* Any other name (material libraries) does not exist: a model must not make us open what it likes.
+ */
 static struct aiFile *open_memory(struct aiFileIO *io, const char *name, const char *mode)
 {
     const memory_file *source = (const memory_file *)(void *)io->UserData;
@@ -153,7 +152,8 @@ static struct aiFile *open_memory(struct aiFileIO *io, const char *name, const c
         return NULL;
     }
     c->file = source;
-    *file = (struct aiFile){ read_bytes, write_bytes, tell, file_size, seek, flush, (aiUserData)(void *)c };
+    *file = (struct aiFile){ read_bytes, write_bytes,          tell, file_size, seek,
+                             flush,      (aiUserData)(void *)c };
     return file;
 }
 
@@ -169,31 +169,37 @@ typedef struct totals {
     uint64_t vertices, triangles, most_corners;
 } totals;
 
-static ebpo_status add_mesh_totals(totals *t, const struct aiMesh *m, const char *name, ebpo_error *error)
+static ebpo_status add_mesh_totals(totals *t, const struct aiMesh *m, const char *name,
+                                   ebpo_error *error)
 {
     t->vertices += m->mNumVertices;
     for (unsigned i = 0; i < m->mNumFaces; i++) {
         const struct aiFace *face = &m->mFaces[i];
         for (unsigned k = 0; k < face->mNumIndices; k++)
             if (face->mIndices[k] >= m->mNumVertices)
-                return ebpo_fail(error, EBPO_E_FORMAT, "%s: face %u names vertex %u, but there are %u vertices; repair the file",
-                                 name, i, face->mIndices[k], m->mNumVertices);
+                return ebpo_fail(
+                    error, EBPO_E_FORMAT,
+                    "%s: face %u names vertex %u, but there are %u vertices; repair the file", name,
+                    i, face->mIndices[k], m->mNumVertices);
         t->triangles += face->mNumIndices >= 3 ? face->mNumIndices - 2 : 0;
         if (t->most_corners < face->mNumIndices)
             t->most_corners = face->mNumIndices;
     }
     if (t->vertices > MOST || t->triangles > MOST)
-        return ebpo_fail(error, EBPO_E_LIMIT, "%s: more than 2^32 - 2 vertices or triangles; split the model", name);
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "%s: more than 2^32 - 2 vertices or triangles; split the model", name);
     return EBPO_OK;
 }
 
-static ebpo_status scene_totals(totals *t, const struct aiScene *scene, const char *name, ebpo_error *error)
+static ebpo_status scene_totals(totals *t, const struct aiScene *scene, const char *name,
+                                ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (unsigned i = 0; i < scene->mNumMeshes && status == EBPO_OK; i++)
         status = add_mesh_totals(t, scene->mMeshes[i], name, error);
     if (status == EBPO_OK && t->triangles == 0)
-        status = ebpo_fail(error, EBPO_E_FORMAT, "%s: has no faces; there is no mesh in this file", name);
+        status = ebpo_fail(error, EBPO_E_FORMAT, "%s: has no faces; there is no mesh in this file",
+                           name);
     return status;
 }
 
@@ -231,8 +237,8 @@ static void polygon_room_free(polygon_room *room)
 }
 
 /* `map`: from this assimp mesh's vertices to ours. */
-static ebpo_status add_face(ebpo_mesh *mesh, const struct aiFace *face, const uint32_t *map, const polygon_room *room,
-                            const char *name, ebpo_error *error)
+static ebpo_status add_face(ebpo_mesh *mesh, const struct aiFace *face, const uint32_t *map,
+                            const polygon_room *room, const char *name, ebpo_error *error)
 {
     uint32_t n = face->mNumIndices;
     if (n < 3) {
@@ -241,22 +247,29 @@ static ebpo_status add_face(ebpo_mesh *mesh, const struct aiFace *face, const ui
     }
     for (uint32_t i = 0; i < n; i++)
         for (int k = 0; k < 3; k++)
-            room->position[i][k] = (double)mesh->xyz32[3 * (uint64_t)map[face->mIndices[i]] + (uint64_t)k];
-    ebpo_polygon_kind kind = ebpo_polygon_triangulate(room->triangle, (const double (*)[3])room->position, n, room->scratch);
+            room->position[i][k] =
+                (double)mesh->xyz32[3 * (uint64_t)map[face->mIndices[i]] + (uint64_t)k];
+    ebpo_polygon_kind kind =
+        ebpo_polygon_triangulate(room->triangle, (const double(*)[3])room->position, n,
+                                 room->scratch);
     if (kind == EBPO_POLYGON_TOO_LARGE)
-        return ebpo_fail(error, EBPO_E_LIMIT, "%s: a concave polygon of %" PRIu32 " corners is too intricate to be cut into triangles here; triangulate it in the source",
-                         name, n);
+        return ebpo_fail(
+            error, EBPO_E_LIMIT,
+            "%s: a concave polygon of %" PRIu32
+            " corners is too intricate to be cut into triangles here; triangulate it in the source",
+            name, n);
     mesh->polygons_triangulated += n > 3;
     mesh->polygons_concave += kind == EBPO_POLYGON_CONCAVE;
     for (uint32_t i = 0; i < n - 2; i++)
         for (int k = 0; k < 3; k++)
-            mesh->faces[3 * (mesh->face_count + i) + (uint64_t)k] = map[face->mIndices[room->triangle[i][k]]];
+            mesh->faces[3 * (mesh->face_count + i) + (uint64_t)k] =
+                map[face->mIndices[room->triangle[i][k]]];
     mesh->face_count += n - 2;
     return EBPO_OK;
 }
 
-static ebpo_status add_faces(ebpo_mesh *mesh, const struct aiScene *scene, const uint32_t *map, const polygon_room *room,
-                             const char *name, ebpo_error *error)
+static ebpo_status add_faces(ebpo_mesh *mesh, const struct aiScene *scene, const uint32_t *map,
+                             const polygon_room *room, const char *name, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (unsigned i = 0; i < scene->mNumMeshes; i++) {
@@ -268,9 +281,11 @@ static ebpo_status add_faces(ebpo_mesh *mesh, const struct aiScene *scene, const
     return status;
 }
 
-/* assimp gives OBJ vertices once for each corner that uses them and STL has no shared vertices at all, so shared edges exist only after welding.
- * OFF keeps its vertices apart in the file; welding it too makes the three formats agree on what a shared vertex is. */
-static ebpo_status convert(ebpo_mesh *mesh, const struct aiScene *scene, const char *name, ebpo_error *error)
+/* assimp gives OBJ vertices once for each corner that uses them and STL has no shared vertices at
+ * all, so shared edges exist only after welding. OFF keeps its vertices apart in the file; welding
+ * it too makes the three formats agree on what a shared vertex is. */
+static ebpo_status convert(ebpo_mesh *mesh, const struct aiScene *scene, const char *name,
+                           ebpo_error *error)
 {
     totals t = { 0, 0, 3 };
     polygon_room room = { NULL, NULL, NULL };
@@ -291,7 +306,9 @@ static ebpo_status convert(ebpo_mesh *mesh, const struct aiScene *scene, const c
     if (status != EBPO_OK)
         goto done;
     status = add_faces(mesh, scene, map, &room, name, error);
-    smaller = mesh->workspace ? NULL : ebpo_realloc(mesh->xyz32, mesh->vertex_count, 3 * sizeof *mesh->xyz32);
+    smaller = mesh->workspace
+                  ? NULL
+                  : ebpo_realloc(mesh->xyz32, mesh->vertex_count, 3 * sizeof *mesh->xyz32);
     if (smaller)
         mesh->xyz32 = smaller;
 done:
@@ -300,7 +317,8 @@ done:
     return status;
 }
 
-static ebpo_status import_locked(ebpo_mesh *mesh, const memory_file *file, const char *name, ebpo_error *error)
+static ebpo_status import_locked(ebpo_mesh *mesh, const memory_file *file, const char *name,
+                                 ebpo_error *error)
 {
     struct aiFileIO io = { open_memory, close_memory, (aiUserData)(uintptr_t)file };
     /* No post-processing: nothing may move, join or reorder. */
@@ -311,22 +329,30 @@ static ebpo_status import_locked(ebpo_mesh *mesh, const memory_file *file, const
         for (char *s = reason; *s; s++)
             if (*s < ' ' || *s > '~')
                 *s = ' ';
-        return ebpo_fail(error, EBPO_E_FORMAT, "%s: assimp cannot read it (%s); repair the file or convert it to PLY", name, reason);
+        return ebpo_fail(error, EBPO_E_FORMAT,
+                         "%s: assimp cannot read it (%s); repair the file or convert it to PLY",
+                         name, reason);
     }
     ebpo_status status = convert(mesh, scene, name, error);
     aiReleaseImport(scene);
     return status;
 }
 
-ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data, uint64_t size,
-                               const char *name, ebpo_workspace *workspace, ebpo_error *error)
+ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data,
+                               uint64_t size, const char *name, ebpo_workspace *workspace,
+                               ebpo_error *error)
 {
     memory_file file = { data, (size_t)size, pseudo_names[format] };
     ebpo_mesh mesh = { .workspace = workspace };
     name = ebpo_path_name(name);
     ebpo_status status = check_budget(format, size, workspace, name, error);
-    if (status == EBPO_OK && size > UINT32_MAX) /* assimp keeps sizes, and counts of corners, in 32 bits */
-        status = ebpo_fail(error, EBPO_E_LIMIT, "%s: has %" PRIu64 " bytes, and files other than PLY are read up to 4 GiB; convert it to PLY", name, size);
+    if (status == EBPO_OK &&
+        size > UINT32_MAX) /* assimp keeps sizes, and counts of corners, in 32 bits */
+        status =
+            ebpo_fail(error, EBPO_E_LIMIT,
+                      "%s: has %" PRIu64
+                      " bytes, and files other than PLY are read up to 4 GiB; convert it to PLY",
+                      name, size);
     if (status == EBPO_OK && format == EBPO_IMPORT_OFF)
         status = ebpo_import_check_off(data, size, name, error);
     if (status == EBPO_OK) {

@@ -7,13 +7,15 @@
 static bool begins(const uint8_t *data, uint64_t size, const char *word)
 {
     size_t n = strlen(word);
-    return size > n && memcmp(data, word, n) == 0 && (data[n] == ' ' || (data[n] >= '\t' && data[n] <= '\r'));
+    return size > n && memcmp(data, word, n) == 0 &&
+           (data[n] == ' ' || (data[n] >= '\t' && data[n] <= '\r'));
 }
 
 /* "OFF", with letters before it for colours, normals and texture coordinates. */
 static bool is_off(const uint8_t *data, uint64_t size)
 {
-    static const char *const words[] = { "OFF", "COFF", "NOFF", "CNOFF", "STOFF", "STCOFF", "STNOFF", "STCNOFF" };
+    static const char *const words[] = { "OFF",   "COFF",   "NOFF",   "CNOFF",
+                                         "STOFF", "STCOFF", "STNOFF", "STCNOFF" };
     for (size_t i = 0; i < sizeof words / sizeof *words; i++)
         if (begins(data, size, words[i]))
             return true;
@@ -28,7 +30,8 @@ static bool is_stl(const uint8_t *data, uint64_t size)
     return begins(data, size, "solid");
 }
 
-bool ebpo_import_recognise(ebpo_import_format *format, const uint8_t *data, uint64_t size, const char *name)
+bool ebpo_import_recognise(ebpo_import_format *format, const uint8_t *data, uint64_t size,
+                           const char *name)
 {
     size_t n = strlen(name);
     const char *ending = n >= 4 ? name + n - 4 : "";

@@ -39,7 +39,8 @@ static uint64_t find(const uint32_t *table, uint64_t mask, const float *xyz, con
     return at;
 }
 
-ebpo_status ebpo_import_weld(float *xyz, uint64_t count, uint32_t *map, uint64_t *welded, ebpo_error *error)
+ebpo_status ebpo_import_weld(float *xyz, uint64_t count, uint32_t *map, uint64_t *welded,
+                             ebpo_error *error)
 {
     uint64_t slots = 16;
     while (slots < count + count / 2)

@@ -40,7 +40,8 @@ static void *hash_file(void *argument)
     ebpo_sha256 state;
     ebpo_sha256_begin(&state);
     for (uint64_t at = 0; at < h->file->size; at += HASH_STEP) {
-        ebpo_sha256_add(&state, h->file->data + at, h->file->size - at < HASH_STEP ? (size_t)(h->file->size - at) : HASH_STEP);
+        ebpo_sha256_add(&state, h->file->data + at,
+                        h->file->size - at < HASH_STEP ? (size_t)(h->file->size - at) : HASH_STEP);
         ebpo_workspace_settle(h->workspace);
     }
     ebpo_sha256_end(&state, h->digest);
@@ -61,21 +62,30 @@ static void hash_end(hashing *h)
         pthread_join(h->thread, NULL);
 }
 
-static ebpo_status parse(ebpo_mesh *out, const ebpo_whole_file *file, const char *path, ebpo_workspace *workspace, unsigned threads, const ebpo_progress *progress, ebpo_error *error)
+static ebpo_status parse(ebpo_mesh *out, const ebpo_whole_file *file, const char *path,
+                         ebpo_workspace *workspace, unsigned threads, const ebpo_progress *progress,
+                         ebpo_error *error)
 {
     const char *dot = strrchr(ebpo_path_name(path), '.');
     ebpo_import_format format;
     if (ebpo_ply_recognise(file->data, file->size))
-        return ebpo_ply_parse_memory(out, file->data, file->size, path, workspace, threads, progress, error);
+        return ebpo_ply_parse_memory(out, file->data, file->size, path, workspace, threads,
+                                     progress, error);
     if (ebpo_import_recognise(&format, file->data, file->size, path))
-        return !ebpo_stage(progress, "reading", error) ? EBPO_E_CANCELLED : ebpo_import_memory(out, format, file->data, file->size, path, workspace, error);
+        return !ebpo_stage(progress, "reading", error)
+                   ? EBPO_E_CANCELLED
+                   : ebpo_import_memory(out, format, file->data, file->size, path, workspace,
+                                        error);
     if (dot && strcasecmp(dot, ".ply") == 0) /* its reader says best what is wrong */
-        return ebpo_ply_parse_memory(out, file->data, file->size, path, workspace, threads, progress, error);
-    return ebpo_fail(error, EBPO_E_FORMAT, "%s: neither its first bytes nor its name tell a PLY, OBJ, STL or OFF file",
+        return ebpo_ply_parse_memory(out, file->data, file->size, path, workspace, threads,
+                                     progress, error);
+    return ebpo_fail(error, EBPO_E_FORMAT,
+                     "%s: neither its first bytes nor its name tell a PLY, OBJ, STL or OFF file",
                      ebpo_path_name(path));
 }
 
-ebpo_status ebpo_mesh_read(ebpo_mesh *out, const char *path, const ebpo_mesh_read_options *options, ebpo_error *error)
+ebpo_status ebpo_mesh_read(ebpo_mesh *out, const char *path, const ebpo_mesh_read_options *options,
+                           ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     static const ebpo_progress silent = { NULL, NULL };
@@ -88,7 +98,8 @@ ebpo_status ebpo_mesh_read(ebpo_mesh *out, const char *path, const ebpo_mesh_rea
         return status;
     ebpo_workspace_watch(workspace, file.mapped, (size_t)file.size);
     hash_begin(&hash);
-    status = parse(out, &file, path, workspace, options ? options->threads : 0, options ? &options->progress : &silent, error);
+    status = parse(out, &file, path, workspace, options ? options->threads : 0,
+                   options ? &options->progress : &silent, error);
     hash_end(&hash);
     out->workspace = workspace;
     if (status == EBPO_OK)

@@ -27,7 +27,8 @@ static ebpo_status read_whole(ebpo_whole_file *file, const char *path, ebpo_erro
         if (got < 0)
             return ebpo_fail_errno(error, path, "cannot be read");
         if (got == 0)
-            return ebpo_fail(error, EBPO_E_IO, "%s: became shorter while it was read; read it again", path);
+            return ebpo_fail(error, EBPO_E_IO,
+                             "%s: became shorter while it was read; read it again", path);
         at += (uint64_t)got;
     }
     return EBPO_OK;
@@ -55,7 +56,8 @@ ebpo_status ebpo_whole_file_open(ebpo_whole_file *out, const char *path, ebpo_er
     *out = file;
     ebpo_status status;
     struct stat st;
-    file.fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY); /* non-blocking: a pipe must not hang us */
+    /* non-blocking: a pipe must not hang us */
+    file.fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
     if (file.fd < 0)
         return ebpo_fail_errno(error, path, "cannot be opened for reading");
     if (fstat(file.fd, &st) != 0) {
@@ -78,14 +80,16 @@ done:
     return status;
 }
 
-ebpo_status ebpo_whole_file_unchanged(const ebpo_whole_file *file, const char *path, ebpo_error *error)
+ebpo_status ebpo_whole_file_unchanged(const ebpo_whole_file *file, const char *path,
+                                      ebpo_error *error)
 {
     struct stat st;
     if (fstat(file->fd, &st) != 0)
         return ebpo_fail_errno(error, path, "cannot be examined");
     if ((uint64_t)st.st_size != file->size || st.st_mtim.tv_sec != file->mtime_s ||
         st.st_mtim.tv_nsec != file->mtime_ns)
-        return ebpo_fail(error, EBPO_E_IO, "%s: was changed while it was read; read it again", path);
+        return ebpo_fail(error, EBPO_E_IO, "%s: was changed while it was read; read it again",
+                         path);
     return EBPO_OK;
 }
 

@@ -13,7 +13,8 @@
 #include "base/error.h"
 #include "io/file.h"
 
-/* Names of the temporary files in the making. Fixed storage and lock-free states, because a signal handler reads them. */
+/* Names of the temporary files in the making. Fixed storage and lock-free states, because a signal
+ * handler reads them. */
 enum { SLOT_FREE, SLOT_TAKEN, SLOT_LIVE };
 static struct slot {
     atomic_int state;
@@ -57,8 +58,12 @@ static ebpo_status check_target(const char *path, ebpo_error *error)
         return errno == ENOENT ? EBPO_OK : ebpo_fail_errno(error, path, "cannot be written");
     if (S_ISREG(st.st_mode))
         return EBPO_OK;
-    const char *what = S_ISDIR(st.st_mode) ? "is a folder" : S_ISLNK(st.st_mode) ? "is a symbolic link" : "is a pipe or device";
-    return ebpo_fail(error, EBPO_E_IO, "%s: %s, which cannot be replaced by an output file; name another file", path, what);
+    const char *what = S_ISDIR(st.st_mode)   ? "is a folder"
+                       : S_ISLNK(st.st_mode) ? "is a symbolic link"
+                                             : "is a pipe or device";
+    return ebpo_fail(error, EBPO_E_IO,
+                     "%s: %s, which cannot be replaced by an output file; name another file", path,
+                     what);
 }
 
 static ebpo_status resolve(ebpo_publish *publish, const char *path, ebpo_error *error)
@@ -81,29 +86,36 @@ static ebpo_status resolve(ebpo_publish *publish, const char *path, ebpo_error *
     return EBPO_OK;
 }
 
-/* 200 bytes of the target's name are enough to recognise it, and keep the sum below the usual limit of 255. */
+/* 200 bytes of the target's name are enough to recognise it, and keep the sum below the usual limit
+ * of 255. */
 static ebpo_status create_temporary(ebpo_publish *publish, ebpo_error *error)
 {
     for (int attempt = 0; attempt < 100; attempt++) {
         free(publish->temporary);
-        if (asprintf(&publish->temporary, "%s/.%.200s.%ld-%u.tmp", publish->folder, ebpo_path_name(publish->target),
-                     (long)getpid(), atomic_fetch_add(&name_counter, 1)) < 0) {
+        if (asprintf(&publish->temporary, "%s/.%.200s.%ld-%u.tmp", publish->folder,
+                     ebpo_path_name(publish->target), (long)getpid(),
+                     atomic_fetch_add(&name_counter, 1)) < 0) {
             publish->temporary = NULL;
             return ebpo_fail_memory(error, PATH_MAX);
         }
         if (strlen(publish->temporary) >= PATH_MAX)
-            return ebpo_fail(error, EBPO_E_IO, "%s: the path is too long; write to a folder with a shorter one", publish->shown);
-        /* Known to the signal handler before it exists, so that there is no moment in which it would be left behind. */
+            return ebpo_fail(error, EBPO_E_IO,
+                             "%s: the path is too long; write to a folder with a shorter one",
+                             publish->shown);
+        /* Known to the signal handler before it exists, so that there is no moment in which it
+         * would be left behind. */
         strcpy(slots[publish->slot].path, publish->temporary);
         atomic_store(&slots[publish->slot].state, SLOT_LIVE);
-        publish->fd = open(publish->temporary, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0666);
+        publish->fd =
+            open(publish->temporary, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0666);
         if (publish->fd >= 0)
             return EBPO_OK;
         atomic_store(&slots[publish->slot].state, SLOT_TAKEN);
         if (errno != EEXIST)
             break;
     }
-    ebpo_status status = ebpo_fail_errno(error, publish->shown, "no temporary file can be created beside it");
+    ebpo_status status =
+        ebpo_fail_errno(error, publish->shown, "no temporary file can be created beside it");
     free(publish->temporary);
     publish->temporary = NULL;
     return status;
@@ -117,7 +129,9 @@ ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path, ebpo_error *
     if (status == EBPO_OK)
         status = resolve(&publish, path, error);
     if (status == EBPO_OK && (publish.slot = take_slot()) < 0)
-        status = ebpo_fail(error, EBPO_E_LIMIT, "%s: more than %d files are being written at a time", path, EBPO_PUBLISH_SLOTS);
+        status =
+            ebpo_fail(error, EBPO_E_LIMIT, "%s: more than %d files are being written at a time",
+                      path, EBPO_PUBLISH_SLOTS);
     if (status == EBPO_OK)
         status = create_temporary(&publish, error);
     if (status != EBPO_OK) {
@@ -128,10 +142,7 @@ ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path, ebpo_error *
     return EBPO_OK;
 }
 
-const char *ebpo_publish_path(const ebpo_publish *publish)
-{
-    return publish->temporary;
-}
+const char *ebpo_publish_path(const ebpo_publish *publish) { return publish->temporary; }
 
 FILE *ebpo_publish_stream(ebpo_publish *publish)
 {
@@ -163,7 +174,8 @@ static bool sync_path(const char *path, int flags)
     int fd = open(path, O_RDONLY | O_CLOEXEC | flags);
     if (fd < 0)
         return false;
-    bool good = fsync(fd) == 0 || errno == EINVAL; /* EINVAL: a file system without sync of folders */
+    /* EINVAL: a file system without sync of folders */
+    bool good = fsync(fd) == 0 || errno == EINVAL;
     int saved = errno;
     close(fd);
     errno = saved;
@@ -175,16 +187,19 @@ ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error *error)
     ebpo_status status = EBPO_OK;
     errno = 0;
     if (!close_writer(publish))
-        status = ebpo_fail_errno(error, publish->shown, errno ? "could not be written" : "could not be written whole");
+        status = ebpo_fail_errno(error, publish->shown,
+                                 errno ? "could not be written" : "could not be written whole");
     else if (!sync_path(publish->temporary, O_NOFOLLOW))
         status = ebpo_fail_errno(error, publish->shown, "could not be synced to the disk");
     else if (rename(publish->temporary, publish->target) != 0)
-        status = ebpo_fail_errno(error, publish->shown, "the finished temporary file could not be renamed to it");
+        status = ebpo_fail_errno(error, publish->shown,
+                                 "the finished temporary file could not be renamed to it");
     if (status == EBPO_OK) {
         free(publish->temporary);
         publish->temporary = NULL;
         if (!sync_path(publish->folder, O_DIRECTORY))
-            status = ebpo_fail_errno(error, publish->shown, "is in place, but its folder could not be synced to the disk");
+            status = ebpo_fail_errno(error, publish->shown,
+                                     "is in place, but its folder could not be synced to the disk");
     }
     ebpo_publish_abort(publish);
     return status;

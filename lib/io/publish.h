@@ -1,11 +1,11 @@
-/* Output files that appear whole or not at all: temporary name in the same folder, fsync, rename, fsync of the folder.
+/* Output files that appear whole or not at all: temporary name in the same folder, fsync, rename,
+ * fsync of the folder.
  *
  *     ebpo_publish out = EBPO_PUBLISH_INIT;
  *     status = ebpo_publish_begin(&out, path, error);
- *     ... write through ebpo_publish_stream(&out), or let a library open ebpo_publish_path(&out) by name ...
- *     status = ebpo_publish_commit(&out, error);
- *  done:
- *     ebpo_publish_abort(&out);      (nothing is left to do after a commit)
+ *     ... write through ebpo_publish_stream(&out), or let a library open ebpo_publish_path(&out) by
+ * name ... status = ebpo_publish_commit(&out, error); done: ebpo_publish_abort(&out);      (nothing
+ * is left to do after a commit)
  */
 #ifndef EBPO_IO_PUBLISH_H
 #define EBPO_IO_PUBLISH_H
@@ -14,37 +14,46 @@
 #include <stdio.h>
 
 typedef struct ebpo_publish {
-    char *shown;      /* the target as the caller named it, for messages */
-    char *folder;     /* absolute, so that a change of the working folder does no harm */
+    char *shown;  /* the target as the caller named it, for messages */
+    char *folder; /* absolute, so that a change of the working folder does no harm */
     char *target;
     char *temporary;
-    FILE *stream;     /* NULL until asked for */
-    int fd;           /* of the temporary file */
-    int slot;         /* in the registry of temporary files */
+    FILE *stream; /* NULL until asked for */
+    int fd;       /* of the temporary file */
+    int slot;     /* in the registry of temporary files */
 } ebpo_publish;
 
-#define EBPO_PUBLISH_INIT { NULL, NULL, NULL, NULL, NULL, -1, -1 }
+#define EBPO_PUBLISH_INIT                    \
+    {                                        \
+        NULL, NULL, NULL, NULL, NULL, -1, -1 \
+    }
 
-/* Creates the temporary file (mode 0666 less the umask, exclusive). An existing regular file at `path` is replaced on commit;
- * a folder, device or symbolic link there is EBPO_E_IO, so is a folder that cannot be written. On failure nothing is left behind.
- * More than EBPO_PUBLISH_SLOTS at a time in one process: EBPO_E_LIMIT. */
-EBPO_MUST_USE ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path, ebpo_error *error);
+/* Creates the temporary file (mode 0666 less the umask, exclusive). An existing regular file at
+ * `path` is replaced on commit; a folder, device or symbolic link there is EBPO_E_IO, so is a
+ * folder that cannot be written. On failure nothing is left behind. More than EBPO_PUBLISH_SLOTS at
+ * a time in one process: EBPO_E_LIMIT. */
+EBPO_MUST_USE ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path,
+                                             ebpo_error *error);
 enum { EBPO_PUBLISH_SLOTS = 32 };
 
-/* Absolute name of the temporary file, for libraries that open by name (truncating is fine). Lent until commit or abort. */
+/* Absolute name of the temporary file, for libraries that open by name (truncating is fine). Lent
+ * until commit or abort. */
 const char *ebpo_publish_path(const ebpo_publish *publish);
 
-/* A stream on the temporary file, opened at the first call; NULL when memory is short. Commit and abort close it. */
+/* A stream on the temporary file, opened at the first call; NULL when memory is short. Commit and
+ * abort close it. */
 FILE *ebpo_publish_stream(ebpo_publish *publish);
 
-/* Flushes, syncs and renames. Whoever opened the file by name has closed it. On failure the temporary file is removed and the
- * target is as it was (but when only the last step failed, the sync of the folder: then the new file is in place). */
+/* Flushes, syncs and renames. Whoever opened the file by name has closed it. On failure the
+ * temporary file is removed and the target is as it was (but when only the last step failed, the
+ * sync of the folder: then the new file is in place). */
 EBPO_MUST_USE ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error *error);
 
 /* Closes and removes the temporary file. Harmless on EBPO_PUBLISH_INIT and after a commit. */
 void ebpo_publish_abort(ebpo_publish *publish);
 
-/* Removes every temporary file of this process that is neither committed nor aborted. Only calls unlink: allowed in a signal handler. */
+/* Removes every temporary file of this process that is neither committed nor aborted. Only calls
+ * unlink: allowed in a signal handler. */
 void ebpo_publish_abandon_all(void);
 
 #endif

@@ -1,13 +1,16 @@
-/* Where the bytes of a file come from: regular files and memory as ebpo_source, and an input, which is a source with a name and a count of its use. */
+/* Where the bytes of a file come from: regular files and memory as ebpo_source, and an input, which
+ * is a source with a name and a count of its use. */
 #ifndef EBPO_IO_SOURCE_H
 #define EBPO_IO_SOURCE_H
 
 #include <ebpo/file.h>
 #include <stdatomic.h>
 
-/* Opens a regular file, by pread: one that is shortened while it is open gives EBPO_E_IO, where a mapping would raise SIGBUS.
- * EBPO_E_IO when it is missing, may not be read, or is a folder, pipe or device. The caller (or whoever takes the source over) calls out->close. */
-EBPO_MUST_USE ebpo_status ebpo_source_of_path(ebpo_source *out, const char *path, ebpo_error *error);
+/* Opens a regular file, by pread: one that is shortened while it is open gives EBPO_E_IO, where a
+ * mapping would raise SIGBUS. EBPO_E_IO when it is missing, may not be read, or is a folder, pipe
+ * or device. The caller (or whoever takes the source over) calls out->close. */
+EBPO_MUST_USE ebpo_status ebpo_source_of_path(ebpo_source *out, const char *path,
+                                              ebpo_error *error);
 
 /* `size` bytes that stay the caller's and outlive the source. There is nothing to close. */
 ebpo_source ebpo_source_of_memory(const void *data, uint64_t size);
@@ -20,13 +23,16 @@ typedef struct ebpo_input {
 } ebpo_input;
 
 /* Takes the source over; on failure (EBPO_E_MEMORY) it is closed. `name` is copied. */
-EBPO_MUST_USE ebpo_status ebpo_input_open(ebpo_input *input, const ebpo_source *source, const char *name, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_input_open(ebpo_input *input, const ebpo_source *source,
+                                          const char *name, ebpo_error *error);
 /* Closes the source, once. Harmless on a zeroed input. */
 void ebpo_input_close(ebpo_input *input);
 
-/* Bytes [offset, offset + size) into `data`. Beyond the source's end: EBPO_E_FORMAT, because only the file itself can have named such a place.
- * What the source's own `read` returns is handed on, with a message if it gave none. */
-EBPO_MUST_USE ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size, void *data, ebpo_error *error);
+/* Bytes [offset, offset + size) into `data`. Beyond the source's end: EBPO_E_FORMAT, because only
+ * the file itself can have named such a place. What the source's own `read` returns is handed on,
+ * with a message if it gave none. */
+EBPO_MUST_USE ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size,
+                                          void *data, ebpo_error *error);
 
 /* True when announcing is of use. */
 static inline bool ebpo_input_expects(const ebpo_input *input)
@@ -36,9 +42,11 @@ static inline bool ebpo_input_expects(const ebpo_input *input)
 /* True when not everything is to be looked at in opening. */
 static inline bool ebpo_input_is_far(const ebpo_input *input)
 {
-    return input->source.expect && input->source.at_hand && input->source.at_hand < input->source.size;
+    return input->source.expect && input->source.at_hand &&
+           input->source.at_hand < input->source.size;
 }
-/* Announces what will be read. Ranges beyond the source's end are let pass: reading them will fail. */
+/* Announces what will be read. Ranges beyond the source's end are let pass: reading them will fail.
+ */
 void ebpo_input_expect(ebpo_input *input, const ebpo_range *ranges, size_t count);
 
 #endif

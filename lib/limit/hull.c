@@ -66,6 +66,7 @@ double ebpo_hull_volume(ebpo_hull *hull, double *points, uint64_t count)
     if (count < 4 || count > INT_MAX / 3)
         return 0;
     double volume = volume_by(hull, points, (int)count, merged, &failed);
-    /* Thin hulls whose facets merge into nothing: with points moved by some 1e-11 they have a volume; flat ones have next to none then. */
+    /* Thin hulls whose facets merge into nothing: with points moved by some 1e-11 they have a
+     * volume; flat ones have next to none then. */
     return failed ? volume_by(hull, points, (int)count, joggled, &failed) : volume;
 }

@@ -1,5 +1,5 @@
-/* The convex hull of the solid in each cell. Its extreme points are mesh vertices in the cell, corners of what faces leave on the cell's walls, and
- * the cell's corners that lie inside. */
+/* The convex hull of the solid in each cell. Its extreme points are mesh vertices in the cell,
+ * corners of what faces leave on the cell's walls, and the cell's corners that lie inside. */
 #include "geom/strict_fp.h"
 
 #include <ebpo/limit.h>
@@ -39,7 +39,8 @@ typedef struct job {
     wanted *nodes;
     uint64_t node_count, node_room;
     double *volume; /* [node_count] in cells */
-    uint64_t *empty_before[EBPO_LEVELS_MAX][2]; /* white, black: such nodes in the groups before; where their windings are stored */
+    /* white, black: such nodes in the groups before; where their windings are stored */
+    uint64_t *empty_before[EBPO_LEVELS_MAX][2];
     double black;
     scratch *scratch; /* [threads] */
 } job;
@@ -47,7 +48,8 @@ typedef struct job {
 static double cell_volume(const job *j, int level)
 {
     double side = (double)(1u << level);
-    return j->model.box.size[0] / side * (j->model.box.size[1] / side) * (j->model.box.size[2] / side);
+    return j->model.box.size[0] / side * (j->model.box.size[1] / side) *
+           (j->model.box.size[2] / side);
 }
 
 /* --- which nodes --- */
@@ -98,7 +100,8 @@ static bool take_leaf(const job *j, scratch *s, int number, uint64_t leaf)
     if (!ebpo_grow(&s->list, &s->list_room, s->list_count + refs + fresh, sizeof *s->list))
         return false;
     if (refs)
-        memcpy(s->list + s->list_count, level->leaf_refs + j->model.index[number].ref_first[leaf], refs * sizeof *s->list);
+        memcpy(s->list + s->list_count, level->leaf_refs + j->model.index[number].ref_first[leaf],
+               refs * sizeof *s->list);
     for (uint64_t i = 0; i < fresh; i++)
         s->list[s->list_count + refs + i] = (uint32_t)(level->leaf_first[leaf] + i);
     s->list_count += refs + fresh;
@@ -141,7 +144,8 @@ static bool take_faces(const job *j, scratch *s)
         for (uint64_t c = 0; c < 3; c++) {
             uint64_t v = m->faces[3 * (uint64_t)s->list[i] + c];
             for (uint64_t k = 0; k < 3; k++)
-                s->faces[i].corner[c][k] = m->xyz32 ? (double)m->xyz32[3 * v + k] : m->xyz64[3 * v + k];
+                s->faces[i].corner[c][k] =
+                    m->xyz32 ? (double)m->xyz32[3 * v + k] : m->xyz64[3 * v + k];
         }
     return true;
 }
@@ -158,7 +162,8 @@ static int32_t lowest_winding(const job *j, int number, uint64_t gray)
         switch (ebpo_type_of(level->types[gray], 0)) {
         case EBPO_GRAY: gray = index->gray_before[gray]; break;
         case EBPO_LEAF: return level->leaf_winding[index->leaf_before[gray]];
-        default: { /* only windings that are not 0 or 1 are stored; octant 0 is the first of its group */
+        default: { /* only windings that are not 0 or 1 are stored; octant 0 is the first of its
+                      group */
             bool black = ebpo_type_of(level->types[gray], 0) == EBPO_BLACK;
             const int32_t *stored = black ? level->black_winding : level->white_winding;
             return stored ? stored[j->empty_before[number + 1][black][gray]] : black;
@@ -172,7 +177,8 @@ static bool add_corners(const job *j, scratch *s, const wanted *w)
     const ebpo_lod_model *m = &j->model;
     if (!m->info->solid)
         return true;
-    int32_t delta[8], lowest = w->gray ? lowest_winding(j, w->cell.level, w->rank) : m->level[w->cell.level].leaf_winding[w->rank];
+    int32_t delta[8], lowest = w->gray ? lowest_winding(j, w->cell.level, w->rank)
+                                       : m->level[w->cell.level].leaf_winding[w->rank];
     ebpo_corner_windings(&m->box, w->cell, s->faces, s->list_count, delta);
     if (!ebpo_grow(&s->points, &s->points_room, s->point_count + 8, 3 * sizeof *s->points))
         return false;
@@ -186,7 +192,8 @@ static bool add_corners(const job *j, scratch *s, const wanted *w)
 
 static bool add_faces(const job *j, scratch *s, ebpo_cell cell)
 {
-    if (!ebpo_grow(&s->points, &s->points_room, s->point_count + 9 * s->list_count, 3 * sizeof *s->points))
+    if (!ebpo_grow(&s->points, &s->points_room, s->point_count + 9 * s->list_count,
+                   3 * sizeof *s->points))
         return false;
     for (uint64_t i = 0; i < s->list_count; i++) {
         double points[9][3], slack;
@@ -197,14 +204,16 @@ static bool add_faces(const job *j, scratch *s, ebpo_cell cell)
     return true;
 }
 
-static ebpo_status hulls(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status hulls(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                         ebpo_error *error)
 {
     job *j = context;
     scratch *s = &j->scratch[worker];
     for (uint64_t i = begin; i < end; i++) {
         const wanted *w = &j->nodes[i];
         s->list_count = s->point_count = 0;
-        bool good = w->gray ? take_group(j, s, w->cell.level + 1, w->rank) : take_leaf(j, s, w->cell.level, w->rank);
+        bool good = w->gray ? take_group(j, s, w->cell.level + 1, w->rank)
+                            : take_leaf(j, s, w->cell.level, w->rank);
         if (!good || !take_faces(j, s) || !add_corners(j, s, w) || !add_faces(j, s, w->cell))
             return ebpo_fail_memory(error, s->list_count * sizeof *s->faces);
         j->volume[i] = ebpo_hull_volume(s->hull, s->points, s->point_count);
@@ -218,9 +227,12 @@ static ebpo_status check(ebpo_file *file, int level, ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(file);
     if (level < 0 || level >= info->level_count)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "there is no level %d; this file has levels 0 to %d", level, info->level_count - 1);
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "there is no level %d; this file has levels 0 to %d", level,
+                         info->level_count - 1);
     if (!(info->parts & EBPO_PART_MESH) || info->pruned)
-        return ebpo_fail(error, EBPO_E_ABSENT, "hulls need the whole mesh, and this file has %s", info->pruned ? "a part of it" : "none");
+        return ebpo_fail(error, EBPO_E_ABSENT, "hulls need the whole mesh, and this file has %s",
+                         info->pruned ? "a part of it" : "none");
     return EBPO_OK;
 }
 
@@ -231,7 +243,8 @@ static bool count_empty(job *j)
             const ebpo_level *level = &j->model.level[i];
             if (!(black ? level->black_winding : level->white_winding))
                 continue;
-            uint64_t sum = 0, *before = j->empty_before[i][black] = ebpo_alloc(level->group_count, sizeof *before);
+            uint64_t sum = 0, *before = j->empty_before[i][black] =
+                                  ebpo_alloc(level->group_count, sizeof *before);
             for (uint64_t g = 0; before && g < level->group_count; g++) {
                 before[g] = sum;
                 sum += ebpo_count_type(level->types[g], black ? EBPO_BLACK : EBPO_WHITE, 8);
@@ -246,11 +259,13 @@ static ebpo_status prepare(job *j, ebpo_file *file, int level, unsigned threads,
 {
     const ebpo_info *info = ebpo_file_info(file);
     j->level = level;
-    ebpo_status status = ebpo_lod_model_read(&j->model, file, info->level_count - 1, threads, error);
+    ebpo_status status =
+        ebpo_lod_model_read(&j->model, file, info->level_count - 1, threads, error);
     if (status == EBPO_OK)
         status = ebpo_file_read_mesh(file, &j->mesh, threads, error);
     j->scratch = ebpo_alloc_zero(threads, sizeof *j->scratch);
-    if (status == EBPO_OK && (!j->scratch || !count_empty(j) || !list_node(j, 0, 0, (ebpo_cell){ 0, { 0, 0, 0 } })))
+    if (status == EBPO_OK &&
+        (!j->scratch || !count_empty(j) || !list_node(j, 0, 0, (ebpo_cell){ 0, { 0, 0, 0 } })))
         status = ebpo_fail_memory(error, j->node_count * sizeof *j->nodes);
     for (unsigned i = 0; i < threads && status == EBPO_OK; i++)
         status = ebpo_hull_new(&j->scratch[i].hull, error);
@@ -278,7 +293,8 @@ static void job_free(job *j, unsigned threads)
     ebpo_lod_model_free(&j->model);
 }
 
-ebpo_status ebpo_limit_level(ebpo_file *file, int level, unsigned threads, const ebpo_progress *progress, ebpo_limit *out, ebpo_error *error)
+ebpo_status ebpo_limit_level(ebpo_file *file, int level, unsigned threads,
+                             const ebpo_progress *progress, ebpo_limit *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     static const ebpo_progress silent;
@@ -290,9 +306,11 @@ ebpo_status ebpo_limit_level(ebpo_file *file, int level, unsigned threads, const
     threads = ebpo_thread_count(threads);
     status = prepare(&j, file, level, threads, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, j.node_count, 1, hulls, &j, progress ? progress : &silent, "convex hulls", error);
+        status = ebpo_parallel_for(threads, j.node_count, 1, hulls, &j,
+                                   progress ? progress : &silent, "convex hulls", error);
     for (uint64_t i = 0; i < j.node_count && status == EBPO_OK; i++) {
-        double volume = j.volume[i] > 0 ? j.volume[i] * cell_volume(&j, j.nodes[i].cell.level) : 0; /* not 0 times infinity */
+        /* not 0 times infinity */
+        double volume = j.volume[i] > 0 ? j.volume[i] * cell_volume(&j, j.nodes[i].cell.level) : 0;
         out->volume += volume;
         out->gray_volume += j.nodes[i].gray ? volume : 0;
         out->flat += j.volume[i] == 0;

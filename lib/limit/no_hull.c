@@ -6,13 +6,12 @@
 ebpo_status ebpo_hull_new(ebpo_hull **out, ebpo_error *error)
 {
     *out = NULL;
-    return ebpo_fail(error, EBPO_E_ABSENT, "this library was built without qhull, so convex hulls are not to be had; build it with -Dqhull=enabled");
+    return ebpo_fail(error, EBPO_E_ABSENT,
+                     "this library was built without qhull, so convex hulls are not to be had; "
+                     "build it with -Dqhull=enabled");
 }
 
-void ebpo_hull_free(ebpo_hull *hull)
-{
-    (void)hull;
-}
+void ebpo_hull_free(ebpo_hull *hull) { (void)hull; }
 
 double ebpo_hull_volume(ebpo_hull *hull, double *points, uint64_t count)
 {

@@ -16,7 +16,8 @@ void ebpo_lod_index_free(ebpo_lod_index *index)
     memset(index, 0, sizeof *index);
 }
 
-static ebpo_status make_ranks(ebpo_lod_index *out, const ebpo_level *level, int number, ebpo_error *error)
+static ebpo_status make_ranks(ebpo_lod_index *out, const ebpo_level *level, int number,
+                              ebpo_error *error)
 {
     out->gray_before = ebpo_alloc(level->group_count, sizeof *out->gray_before);
     out->leaf_before = ebpo_alloc(level->group_count, sizeof *out->leaf_before);
@@ -30,19 +31,20 @@ static ebpo_status make_ranks(ebpo_lod_index *out, const ebpo_level *level, int 
         leaf += ebpo_count_type(level->types[i], EBPO_LEAF, 8);
     }
     if (gray != level->gray_count || leaf != level->leaf_count)
-        return ebpo_fail(error, EBPO_E_FORMAT, "level %d: its types and its node counts disagree; run ebpo verify",
+        return ebpo_fail(error, EBPO_E_FORMAT,
+                         "level %d: its types and its node counts disagree; run ebpo verify",
                          number);
     return EBPO_OK;
 }
 
 static ebpo_status sums_disagree(int number, const char *what, ebpo_error *error)
 {
-    return ebpo_fail(error, EBPO_E_FORMAT, "level %d: the counts of its %s do not add up; run ebpo verify", number,
-                     what);
+    return ebpo_fail(error, EBPO_E_FORMAT,
+                     "level %d: the counts of its %s do not add up; run ebpo verify", number, what);
 }
 
-static ebpo_status sum8(uint64_t **out, const uint8_t *counts, uint64_t count, uint64_t total, int number,
-                        const char *what, ebpo_error *error)
+static ebpo_status sum8(uint64_t **out, const uint8_t *counts, uint64_t count, uint64_t total,
+                        int number, const char *what, ebpo_error *error)
 {
     if (!(*out = ebpo_alloc(count, sizeof **out)))
         return ebpo_fail_memory(error, count * sizeof **out);
@@ -54,8 +56,8 @@ static ebpo_status sum8(uint64_t **out, const uint8_t *counts, uint64_t count, u
     return sum == total ? EBPO_OK : sums_disagree(number, what, error);
 }
 
-static ebpo_status sum32(uint64_t **out, const uint32_t *counts, uint64_t count, uint64_t total, int number,
-                         const char *what, ebpo_error *error)
+static ebpo_status sum32(uint64_t **out, const uint32_t *counts, uint64_t count, uint64_t total,
+                         int number, const char *what, ebpo_error *error)
 {
     if (!(*out = ebpo_alloc(count, sizeof **out)))
         return ebpo_fail_memory(error, count * sizeof **out);
@@ -67,19 +69,20 @@ static ebpo_status sum32(uint64_t **out, const uint32_t *counts, uint64_t count,
     return sum == total ? EBPO_OK : sums_disagree(number, what, error);
 }
 
-ebpo_status ebpo_lod_index_make(ebpo_lod_index *out, const ebpo_level *level, int number, ebpo_error *error)
+ebpo_status ebpo_lod_index_make(ebpo_lod_index *out, const ebpo_level *level, int number,
+                                ebpo_error *error)
 {
     memset(out, 0, sizeof *out);
     ebpo_status status = make_ranks(out, level, number, error);
     if (status == EBPO_OK && level->plane_counts)
-        status = sum8(&out->plane_first, level->plane_counts, level->gray_count, level->plane_count, number, "planes",
-                      error);
+        status = sum8(&out->plane_first, level->plane_counts, level->gray_count, level->plane_count,
+                      number, "planes", error);
     if (status == EBPO_OK && level->leaf_plane_counts)
-        status = sum8(&out->leaf_plane_first, level->leaf_plane_counts, level->leaf_count, level->leaf_plane_count,
-                      number, "leaf planes", error);
+        status = sum8(&out->leaf_plane_first, level->leaf_plane_counts, level->leaf_count,
+                      level->leaf_plane_count, number, "leaf planes", error);
     if (status == EBPO_OK && level->leaf_ref_count)
-        status = sum32(&out->ref_first, level->leaf_ref_count, level->leaf_count, level->ref_count, number,
-                       "face lists", error);
+        status = sum32(&out->ref_first, level->leaf_ref_count, level->leaf_count, level->ref_count,
+                       number, "face lists", error);
     if (status != EBPO_OK)
         ebpo_lod_index_free(out);
     return status;

@@ -1,5 +1,5 @@
-/* Ranks of one level: where a group's nodes, a node's planes and a leaf's references start. Prefix sums, so that
- * subtrees can be walked independently of each other. */
+/* Ranks of one level: where a group's nodes, a node's planes and a leaf's references start. Prefix
+ * sums, so that subtrees can be walked independently of each other. */
 #ifndef EBPO_LOD_INDEX_H
 #define EBPO_LOD_INDEX_H
 
@@ -26,10 +26,10 @@ static inline unsigned ebpo_count_type(uint16_t types, ebpo_node_type type, unsi
     return count;
 }
 
-/* EBPO_E_FORMAT when the level's counts contradict each other. On failure nothing is left to free. `number` is for
- * messages. */
-EBPO_MUST_USE ebpo_status ebpo_lod_index_make(ebpo_lod_index *out, const ebpo_level *level, int number,
-                                              ebpo_error *error);
+/* EBPO_E_FORMAT when the level's counts contradict each other. On failure nothing is left to free.
+ * `number` is for messages. */
+EBPO_MUST_USE ebpo_status ebpo_lod_index_make(ebpo_lod_index *out, const ebpo_level *level,
+                                              int number, ebpo_error *error);
 void ebpo_lod_index_free(ebpo_lod_index *index);
 
 #endif

@@ -1,6 +1,6 @@
-/* A level's envelopes: from the root down, each cut from its parent's. The top of the tree is walked first; the
- * subtrees that hang from it are independent of each other. Where it is cut depends on the tree alone, so the result
- * does not depend on the number of threads. */
+/* A level's envelopes: from the root down, each cut from its parent's. The top of the tree is
+ * walked first; the subtrees that hang from it are independent of each other. Where it is cut
+ * depends on the tree alone, so the result does not depend on the number of threads. */
 #include "geom/strict_fp.h"
 
 #include <ebpo/lod.h>
@@ -59,9 +59,11 @@ static ebpo_status emit(walker *w, const ebpo_polytope *p, ebpo_cell cell, ebpo_
     return ebpo_lod_piece_add(piece, p, &w->j->model->box, cell, type, w->j->walls, w->error);
 }
 
-static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell, const ebpo_polytope *parent);
+static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell,
+                               const ebpo_polytope *parent);
 
-/* Nothing is known below it but its envelope, which therefore stands for it at all deeper levels. Only asked above the target. */
+/* Nothing is known below it but its envelope, which therefore stands for it at all deeper levels.
+ * Only asked above the target. */
 static bool is_pruned(const ebpo_lod_model *model, int level, uint64_t gray)
 {
     return model->info->pruned && level < model->target && model->level[level + 1].types[gray] == 0;
@@ -72,7 +74,7 @@ static ebpo_status visit_gray(walker *w, uint64_t gray, ebpo_cell cell, ebpo_pol
     const ebpo_level *level = &w->j->model->level[cell.level];
     if (level->plane_counts && level->plane_counts[gray])
         ebpo_planes_cut(envelope, level->planes + w->j->model->index[cell.level].plane_first[gray],
-                     level->plane_counts[gray]);
+                        level->plane_counts[gray]);
     if (cell.level == w->j->model->target)
         return emit(w, envelope, cell, EBPO_GRAY);
     if (cell.level == w->stop) {
@@ -87,7 +89,8 @@ static ebpo_status visit_gray(walker *w, uint64_t gray, ebpo_cell cell, ebpo_pol
 }
 
 /* One gray node or leaf; `envelope` is the parent's, cut to this cell. */
-static ebpo_status visit_node(walker *w, uint64_t group, unsigned octant, ebpo_cell cell, ebpo_polytope *envelope)
+static ebpo_status visit_node(walker *w, uint64_t group, unsigned octant, ebpo_cell cell,
+                              ebpo_polytope *envelope)
 {
     const ebpo_lod_model *model = w->j->model;
     const ebpo_lod_index *index = &model->index[cell.level];
@@ -96,7 +99,8 @@ static ebpo_status visit_node(walker *w, uint64_t group, unsigned octant, ebpo_c
     uint64_t rank = ebpo_count_type(types, type, octant);
     if (type == EBPO_GRAY)
         return visit_gray(w, rank + index->gray_before[group], cell, envelope);
-    ebpo_status status = ebpo_lod_leaf(model, cell, rank + index->leaf_before[group], w->scratch, envelope, w->error);
+    ebpo_status status = ebpo_lod_leaf(model, cell, rank + index->leaf_before[group], w->scratch,
+                                       envelope, w->error);
     return status == EBPO_OK ? emit(w, envelope, cell, EBPO_LEAF) : status;
 }
 
@@ -120,8 +124,10 @@ static ebpo_status visit_root(walker *w)
     }
 }
 
-/* In octant order; neighbours share the halves that their envelopes are cut from, as in the builder. */
-static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell, const ebpo_polytope *parent)
+/* In octant order; neighbours share the halves that their envelopes are cut from, as in the
+ * builder. */
+static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell,
+                               const ebpo_polytope *parent)
 {
     uint16_t types = w->j->model->level[parent_cell.level + 1].types[group];
     unsigned filled = types >> 1 & 0x5555; /* bit 2i: octant i is gray or a leaf */
@@ -145,14 +151,18 @@ static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell,
     return status;
 }
 
-static ebpo_status walk_seeds(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status walk_seeds(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
 {
     job *j = context;
     for (uint64_t i = begin; i < end; i++) {
         walker w = { j, j->pieces[1 + i], &j->scratch[worker], -1, error };
         seed *s = &j->seeds[i];
-        /* Seeds are in octcode order, and all gray nodes of their level: the i-th has the i-th group below it. */
-        ebpo_status status = is_pruned(j->model, s->cell.level, i) ? emit(&w, &s->envelope, s->cell, EBPO_GRAY) : visit_group(&w, i, s->cell, &s->envelope);
+        /* Seeds are in octcode order, and all gray nodes of their level: the i-th has the i-th
+         * group below it. */
+        ebpo_status status = is_pruned(j->model, s->cell.level, i)
+                                 ? emit(&w, &s->envelope, s->cell, EBPO_GRAY)
+                                 : visit_group(&w, i, s->cell, &s->envelope);
         if (status != EBPO_OK)
             return status;
     }
@@ -186,11 +196,13 @@ static ebpo_status walk(job *j, unsigned threads, const ebpo_progress *progress,
     ebpo_status status = visit_root(&top);
     if (status != EBPO_OK)
         return status;
-    return ebpo_parallel_for(threads, j->seed_count, 1, walk_seeds, j, progress, "clipping envelopes", error);
+    return ebpo_parallel_for(threads, j->seed_count, 1, walk_seeds, j, progress,
+                             "clipping envelopes", error);
 }
 
 /* Level after level, and within one level first the top's nodes or the seeds' in their order. */
-static ebpo_status join(job *j, ebpo_mesh *out, ebpo_lod_nodes *nodes, double *volume, ebpo_error *error)
+static ebpo_status join(job *j, ebpo_mesh *out, ebpo_lod_nodes *nodes, double *volume,
+                        ebpo_error *error)
 {
     uint64_t count = j->seed_count + 1, listed = 0;
     ebpo_lod_piece **list = ebpo_alloc(count * EBPO_LEVELS_MAX, sizeof *list);
@@ -230,7 +242,8 @@ void ebpo_lod_nodes_free(ebpo_lod_nodes *nodes)
     memset(nodes, 0, sizeof *nodes);
 }
 
-/* Joined nodes come level after level, each in octcode order, and every leaf and black node of a level is there: so running counts are their ranks. */
+/* Joined nodes come level after level, each in octcode order, and every leaf and black node of a
+ * level is there: so running counts are their ranks. */
 static void add_windings(ebpo_lod_nodes *nodes, const ebpo_lod_model *model)
 {
     uint64_t leaf = 0, black = 0;
@@ -249,14 +262,15 @@ static void add_windings(ebpo_lod_nodes *nodes, const ebpo_lod_model *model)
     }
 }
 
-ebpo_status ebpo_lod_level(ebpo_file *file, int level, const ebpo_lod_options *options, ebpo_mesh *out, double *volume,
-                           ebpo_error *error)
+ebpo_status ebpo_lod_level(ebpo_file *file, int level, const ebpo_lod_options *options,
+                           ebpo_mesh *out, double *volume, ebpo_error *error)
 {
     return ebpo_lod_level_nodes(file, level, options, out, NULL, volume, error);
 }
 
-ebpo_status ebpo_lod_level_nodes(ebpo_file *file, int level, const ebpo_lod_options *options, ebpo_mesh *out,
-                                 ebpo_lod_nodes *nodes, double *volume, ebpo_error *error)
+ebpo_status ebpo_lod_level_nodes(ebpo_file *file, int level, const ebpo_lod_options *options,
+                                 ebpo_mesh *out, ebpo_lod_nodes *nodes, double *volume,
+                                 ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     static const ebpo_lod_options defaults = EBPO_LOD_OPTIONS_INIT;
@@ -270,14 +284,17 @@ ebpo_status ebpo_lod_level_nodes(ebpo_file *file, int level, const ebpo_lod_opti
         return ebpo_fail(error, EBPO_E_ARGUMENT, "a level's nodes are told with its polygons only");
     const ebpo_info *info = ebpo_file_info(file);
     if (level < 0 || level >= info->level_count)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "there is no level %d; this file has levels 0 to %d", level,
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "there is no level %d; this file has levels 0 to %d", level,
                          info->level_count - 1);
     unsigned threads = ebpo_thread_count(options->threads);
     ebpo_lod_model model;
     ebpo_status status = ebpo_lod_model_read(&model, file, level, threads, error);
     if (status != EBPO_OK)
         return status;
-    job j = { .model = &model, .walls = options->walls, .polygons = out != NULL, .nodes = nodes != NULL };
+    job j = {
+        .model = &model, .walls = options->walls, .polygons = out != NULL, .nodes = nodes != NULL
+    };
     status = prepare(&j, threads, error);
     if (status == EBPO_OK)
         status = walk(&j, threads, &options->progress, error);

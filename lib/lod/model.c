@@ -16,7 +16,8 @@ void ebpo_lod_model_free(ebpo_lod_model *model)
     ebpo_mesh_free(&model->mesh);
 }
 
-static ebpo_status read_levels(ebpo_lod_model *out, ebpo_file *file, unsigned threads, ebpo_error *error)
+static ebpo_status read_levels(ebpo_lod_model *out, ebpo_file *file, unsigned threads,
+                               ebpo_error *error)
 {
     ebpo_file_expect_levels(file, 0, out->target);
     for (int i = 0; i <= out->target; i++) {
@@ -28,8 +29,9 @@ static ebpo_status read_levels(ebpo_lod_model *out, ebpo_file *file, unsigned th
         uint64_t expected = i == 0 ? 1 : out->level[i - 1].gray_count;
         if (out->level[i].group_count != expected)
             return ebpo_fail(error, EBPO_E_FORMAT,
-                             "level %d: %llu groups of siblings, but %llu parents; run ebpo verify", i,
-                             (unsigned long long)out->level[i].group_count, (unsigned long long)expected);
+                             "level %d: %llu groups of siblings, but %llu parents; run ebpo verify",
+                             i, (unsigned long long)out->level[i].group_count,
+                             (unsigned long long)expected);
     }
     return EBPO_OK;
 }
@@ -42,7 +44,8 @@ static bool has_leaves(const ebpo_lod_model *model)
     return false;
 }
 
-ebpo_status ebpo_lod_model_read(ebpo_lod_model *out, ebpo_file *file, int target, unsigned threads, ebpo_error *error)
+ebpo_status ebpo_lod_model_read(ebpo_lod_model *out, ebpo_file *file, int target, unsigned threads,
+                                ebpo_error *error)
 {
     memset(out, 0, sizeof *out);
     out->info = ebpo_file_info(file);

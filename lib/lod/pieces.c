@@ -25,8 +25,9 @@ void ebpo_lod_piece_free(ebpo_lod_piece *piece)
     piece->node_count = piece->node_room = piece->polygon_count = piece->polygon_room = 0;
 }
 
-/* `sides`: bit 2 * axis + side for each cell wall that the point lies on, whatever rounding made of it. Such points get
- * the wall's own coordinate, so that neighbouring cells agree to the last bit. */
+/* `sides`: bit 2 * axis + side for each cell wall that the point lies on, whatever rounding made of
+ * it. Such points get the wall's own coordinate, so that neighbouring cells agree to the last bit.
+ */
 static double to_model(const ebpo_box *box, ebpo_cell cell, int axis, double xi, unsigned sides)
 {
     double low = ebpo_wall(box, axis, cell.level, cell.at[axis]);
@@ -45,7 +46,8 @@ static void find_sides(const ebpo_polytope *p, uint8_t sides[EBPO_POLYTOPE_VERTI
             sides[p->corner[i]] |= (uint8_t)(1u << (-1 - p->tag[f]));
 }
 
-static void add_fan(ebpo_lod_piece *piece, const uint32_t *number, const uint16_t *loop, int corners)
+static void add_fan(ebpo_lod_piece *piece, const uint32_t *number, const uint16_t *loop,
+                    int corners)
 {
     for (int i = 1; i + 1 < corners; i++) {
         uint32_t *face = piece->faces + 3 * piece->face_count++;
@@ -56,17 +58,19 @@ static void add_fan(ebpo_lod_piece *piece, const uint32_t *number, const uint16_
 }
 
 /* Room for the node of a polytope, which is begun. */
-static bool begin_node(ebpo_lod_piece *piece, const ebpo_polytope *p, const ebpo_box *box, ebpo_cell cell,
-                       ebpo_node_type type)
+static bool begin_node(ebpo_lod_piece *piece, const ebpo_polytope *p, const ebpo_box *box,
+                       ebpo_cell cell, ebpo_node_type type)
 {
     if (!ebpo_grow(&piece->nodes, &piece->node_room, piece->node_count + 1, sizeof *piece->nodes) ||
-        !ebpo_grow(&piece->corners, &piece->polygon_room, piece->polygon_count + (uint64_t)p->face_count, 1))
+        !ebpo_grow(&piece->corners, &piece->polygon_room,
+                   piece->polygon_count + (uint64_t)p->face_count, 1))
         return false;
     double side = (double)(1u << cell.level);
     double cell_volume = box->size[0] / side * (box->size[1] / side) * (box->size[2] / side);
-    piece->nodes[piece->node_count++] = (ebpo_lod_node){
-        .octcode = ebpo_octcode_of_cell(cell), .volume = ebpo_polytope_volume(p) * cell_volume, .type = type
-    };
+    piece->nodes[piece->node_count++] =
+        (ebpo_lod_node){ .octcode = ebpo_octcode_of_cell(cell),
+                         .volume = ebpo_polytope_volume(p) * cell_volume,
+                         .type = type };
     return true;
 }
 
@@ -76,17 +80,19 @@ static void end_polygon(ebpo_lod_piece *piece, unsigned corners)
     piece->nodes[piece->node_count - 1].polygon_count++;
 }
 
-ebpo_status ebpo_lod_piece_add(ebpo_lod_piece *piece, const ebpo_polytope *p, const ebpo_box *box, ebpo_cell cell,
-                               ebpo_node_type type, bool walls, ebpo_error *error)
+ebpo_status ebpo_lod_piece_add(ebpo_lod_piece *piece, const ebpo_polytope *p, const ebpo_box *box,
+                               ebpo_cell cell, ebpo_node_type type, bool walls, ebpo_error *error)
 {
     if (piece->vertex_count + EBPO_POLYTOPE_VERTICES > count_limit)
-        return ebpo_fail(error, EBPO_E_LIMIT, "the level has more than 4294967294 vertices; take a coarser level");
-    if (!ebpo_grow(&piece->xyz, &piece->vertex_room, piece->vertex_count + (uint64_t)p->vertex_count,
-                   3 * sizeof(double)) ||
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "the level has more than 4294967294 vertices; take a coarser level");
+    if (!ebpo_grow(&piece->xyz, &piece->vertex_room,
+                   piece->vertex_count + (uint64_t)p->vertex_count, 3 * sizeof(double)) ||
         !ebpo_grow(&piece->faces, &piece->face_room, piece->face_count + (uint64_t)p->corner_count,
                    3 * sizeof(uint32_t)) ||
         (piece->wants_nodes && !begin_node(piece, p, box, cell, type)))
-        return ebpo_fail_memory(error, (piece->vertex_count + piece->face_count) * 3 * sizeof(double));
+        return ebpo_fail_memory(error,
+                                (piece->vertex_count + piece->face_count) * 3 * sizeof(double));
     uint32_t number[EBPO_POLYTOPE_VERTICES];
     uint8_t sides[EBPO_POLYTOPE_VERTICES];
     find_sides(p, sides);
@@ -100,7 +106,8 @@ ebpo_status ebpo_lod_piece_add(ebpo_lod_piece *piece, const ebpo_polytope *p, co
             if (number[v] != UINT32_MAX)
                 continue;
             for (int k = 0; k < 3; k++)
-                piece->xyz[3 * piece->vertex_count + (uint64_t)k] = to_model(box, cell, k, p->vertex[v][k], sides[v]);
+                piece->xyz[3 * piece->vertex_count + (uint64_t)k] =
+                    to_model(box, cell, k, p->vertex[v][k], sides[v]);
             number[v] = (uint32_t)piece->vertex_count++;
         }
         add_fan(piece, number, p->corner + p->first[f], p->first[f + 1] - p->first[f]);
@@ -108,14 +115,16 @@ ebpo_status ebpo_lod_piece_add(ebpo_lod_piece *piece, const ebpo_polytope *p, co
             end_polygon(piece, p->first[f + 1] - p->first[f]);
     }
     if (piece->wants_nodes)
-        piece->nodes[piece->node_count - 1].vertex_count = (uint32_t)(piece->vertex_count - first_vertex);
+        piece->nodes[piece->node_count - 1].vertex_count =
+            (uint32_t)(piece->vertex_count - first_vertex);
     return EBPO_OK;
 }
 
 static void append(ebpo_mesh *out, const ebpo_lod_piece *piece)
 {
     if (piece->vertex_count)
-        memcpy(out->xyz64 + 3 * out->vertex_count, piece->xyz, piece->vertex_count * 3 * sizeof(double));
+        memcpy(out->xyz64 + 3 * out->vertex_count, piece->xyz,
+               piece->vertex_count * 3 * sizeof(double));
     uint32_t *faces = out->faces + 3 * out->face_count, base = (uint32_t)out->vertex_count;
     for (uint64_t i = 0; i < 3 * piece->face_count; i++)
         faces[i] = piece->faces[i] + base;
@@ -133,7 +142,8 @@ static void append_nodes(ebpo_lod_nodes *out, const ebpo_lod_piece *piece)
     out->polygon_count += piece->polygon_count;
 }
 
-static ebpo_status make_nodes(ebpo_lod_nodes *out, ebpo_lod_piece *const *pieces, uint64_t count, ebpo_error *error)
+static ebpo_status make_nodes(ebpo_lod_nodes *out, ebpo_lod_piece *const *pieces, uint64_t count,
+                              ebpo_error *error)
 {
     uint64_t nodes = 0, polygons = 0;
     for (uint64_t i = 0; i < count; i++) {
@@ -142,11 +152,13 @@ static ebpo_status make_nodes(ebpo_lod_nodes *out, ebpo_lod_piece *const *pieces
     }
     out->nodes = ebpo_alloc(nodes, sizeof *out->nodes);
     out->corners = ebpo_alloc(polygons, 1);
-    return out->nodes && out->corners ? EBPO_OK : ebpo_fail_memory(error, nodes * sizeof *out->nodes + polygons);
+    return out->nodes && out->corners
+               ? EBPO_OK
+               : ebpo_fail_memory(error, nodes * sizeof *out->nodes + polygons);
 }
 
-ebpo_status ebpo_lod_join(ebpo_mesh *out, ebpo_lod_nodes *out_nodes, ebpo_lod_piece *const *pieces, uint64_t count,
-                          ebpo_error *error)
+ebpo_status ebpo_lod_join(ebpo_mesh *out, ebpo_lod_nodes *out_nodes, ebpo_lod_piece *const *pieces,
+                          uint64_t count, ebpo_error *error)
 {
     uint64_t vertices = 0, faces = 0;
     for (uint64_t i = 0; i < count; i++) {
@@ -154,14 +166,17 @@ ebpo_status ebpo_lod_join(ebpo_mesh *out, ebpo_lod_nodes *out_nodes, ebpo_lod_pi
         faces += pieces[i]->face_count;
     }
     if (vertices > count_limit || faces > count_limit)
-        return ebpo_fail(error, EBPO_E_LIMIT,
-                         "the level has more than 4294967294 vertices or faces; take a coarser level");
+        return ebpo_fail(
+            error, EBPO_E_LIMIT,
+            "the level has more than 4294967294 vertices or faces; take a coarser level");
     memset(out, 0, sizeof *out);
     out->xyz64 = ebpo_alloc(vertices, 3 * sizeof(double));
     out->faces = ebpo_alloc(faces, 3 * sizeof(uint32_t));
-    if (!out->xyz64 || !out->faces || (out_nodes && make_nodes(out_nodes, pieces, count, error) != EBPO_OK)) {
+    if (!out->xyz64 || !out->faces ||
+        (out_nodes && make_nodes(out_nodes, pieces, count, error) != EBPO_OK)) {
         ebpo_mesh_free(out);
-        return ebpo_fail_memory(error, vertices * 3 * sizeof(double) + faces * 3 * sizeof(uint32_t));
+        return ebpo_fail_memory(error,
+                                vertices * 3 * sizeof(double) + faces * 3 * sizeof(uint32_t));
     }
     for (uint64_t i = 0; i < count; i++) {
         append(out, pieces[i]);

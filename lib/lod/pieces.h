@@ -21,14 +21,17 @@ typedef struct ebpo_lod_piece {
 
 void ebpo_lod_piece_free(ebpo_lod_piece *piece);
 
-/* Appends the polytope (cell coordinates) of a cell's node as triangle fans; with `walls` false without the polygons on
- * the cell's walls. */
-EBPO_MUST_USE ebpo_status ebpo_lod_piece_add(ebpo_lod_piece *piece, const ebpo_polytope *p, const ebpo_box *box,
-                                             ebpo_cell cell, ebpo_node_type type, bool walls, ebpo_error *error);
+/* Appends the polytope (cell coordinates) of a cell's node as triangle fans; with `walls` false
+ * without the polygons on the cell's walls. */
+EBPO_MUST_USE ebpo_status ebpo_lod_piece_add(ebpo_lod_piece *piece, const ebpo_polytope *p,
+                                             const ebpo_box *box, ebpo_cell cell,
+                                             ebpo_node_type type, bool walls, ebpo_error *error);
 
-/* Joins `count` pieces, in order, to a mesh of double vertices; pieces are freed on the way. EBPO_E_LIMIT beyond 2^32 -
- * 2 vertices or faces. `nodes` may be NULL, else all pieces have kept theirs; windings are left 0. */
-EBPO_MUST_USE ebpo_status ebpo_lod_join(ebpo_mesh *out, ebpo_lod_nodes *nodes, ebpo_lod_piece *const *pieces,
-                                        uint64_t count, ebpo_error *error);
+/* Joins `count` pieces, in order, to a mesh of double vertices; pieces are freed on the way.
+ * EBPO_E_LIMIT beyond 2^32 - 2 vertices or faces. `nodes` may be NULL, else all pieces have kept
+ * theirs; windings are left 0. */
+EBPO_MUST_USE ebpo_status ebpo_lod_join(ebpo_mesh *out, ebpo_lod_nodes *nodes,
+                                        ebpo_lod_piece *const *pieces, uint64_t count,
+                                        ebpo_error *error);
 
 #endif

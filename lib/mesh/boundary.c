@@ -10,21 +10,28 @@
 
 #define NONE UINT64_MAX
 
-bool ebpo_boundary_add(ebpo_boundary *boundary, const ebpo_mesh *mesh, uint32_t from, uint32_t to, uint32_t face)
+bool ebpo_boundary_add(ebpo_boundary *boundary, const ebpo_mesh *mesh, uint32_t from, uint32_t to,
+                       uint32_t face)
 {
-    if (!ebpo_array_grow(mesh->workspace, &boundary->edges, &boundary->capacity, boundary->count + 1, sizeof *boundary->edges))
+    if (!ebpo_array_grow(mesh->workspace, &boundary->edges, &boundary->capacity,
+                         boundary->count + 1, sizeof *boundary->edges))
         return false;
     boundary->edges[boundary->count++] =
-        (ebpo_boundary_edge){ .key = (uint64_t)from << 32 | ebpo_mesh_source_vertex(mesh, to), .from = from, .to = to, .face = face };
+        (ebpo_boundary_edge){ .key = (uint64_t)from << 32 | ebpo_mesh_source_vertex(mesh, to),
+                              .from = from,
+                              .to = to,
+                              .face = face };
     return true;
 }
 
-ebpo_status ebpo_boundary_join(ebpo_boundary *boundary, ebpo_boundary *lists, unsigned count, const ebpo_mesh *mesh, ebpo_error *error)
+ebpo_status ebpo_boundary_join(ebpo_boundary *boundary, ebpo_boundary *lists, unsigned count,
+                               const ebpo_mesh *mesh, ebpo_error *error)
 {
     uint64_t total = 0;
     for (unsigned i = 0; i < count; i++)
         total += lists[i].count;
-    if (total && !ebpo_array_grow(mesh->workspace, &boundary->edges, &boundary->capacity, total, sizeof *boundary->edges))
+    if (total && !ebpo_array_grow(mesh->workspace, &boundary->edges, &boundary->capacity, total,
+                                  sizeof *boundary->edges))
         return ebpo_workspace_fail(mesh->workspace, total * sizeof *boundary->edges, error);
     for (unsigned i = 0; i < count; i++) {
         for (uint64_t k = 0; k < lists[i].count; k++) {
@@ -58,15 +65,15 @@ typedef struct arrival {
 typedef struct chaining {
     ebpo_boundary_edge *edges; /* sorted by key */
     uint64_t count;
-    arrival *arrivals;               /* sorted by key */
-    uint64_t *next;                  /* of each edge; NONE when nothing continues it */
-    uint8_t *continued;              /* the edge is some edge's next */
+    arrival *arrivals;  /* sorted by key */
+    uint64_t *next;     /* of each edge; NONE when nothing continues it */
+    uint8_t *continued; /* the edge is some edge's next */
     uint8_t *walked;
-    uint32_t *place;                 /* [vertex_count] place on the path, or EBPO_NO_INDEX */
+    uint32_t *place; /* [vertex_count] place on the path, or EBPO_NO_INDEX */
     uint32_t *path;
     uint64_t path_length;
-    uint64_t start;                  /* of the walk: for ebpo_loops.start */
-    uint64_t steps;                  /* of all walks */
+    uint64_t start; /* of the walk: for ebpo_loops.start */
+    uint64_t steps; /* of all walks */
     const ebpo_stars *stars;
     const ebpo_mesh *mesh;
     unsigned threads;
@@ -76,7 +83,8 @@ typedef struct chaining {
 
 /* --- sorting --- */
 
-static ebpo_status make_edges(void *context, uint64_t begin, uint64_t end, void *records, ebpo_error *error)
+static ebpo_status make_edges(void *context, uint64_t begin, uint64_t end, void *records,
+                              ebpo_error *error)
 {
     const chaining *c = context;
     (void)error;
@@ -97,12 +105,15 @@ static void take_edges(void *context, uint64_t place, const void *records, uint6
     memcpy(c->edges + place, records, (size_t)count * sizeof *c->edges);
 }
 
-static ebpo_status make_arrivals(void *context, uint64_t begin, uint64_t end, void *records, ebpo_error *error)
+static ebpo_status make_arrivals(void *context, uint64_t begin, uint64_t end, void *records,
+                                 ebpo_error *error)
 {
     const chaining *c = context;
     (void)error;
     for (uint64_t e = begin; e < end; e++)
-        ((arrival *)records)[e - begin] = (arrival){ (uint64_t)c->edges[e].to << 32 | ebpo_mesh_source_vertex(c->mesh, c->edges[e].from), e };
+        ((arrival *)records)[e - begin] = (arrival){
+            (uint64_t)c->edges[e].to << 32 | ebpo_mesh_source_vertex(c->mesh, c->edges[e].from), e
+        };
     return EBPO_OK;
 }
 
@@ -131,8 +142,17 @@ static unsigned leading(const ebpo_mesh *mesh)
 
 static ebpo_status sort_all(chaining *c, ebpo_error *error)
 {
-    ebpo_sort sort = { .workspace = c->mesh->workspace, .threads = c->threads, .progress = &silent, .stage = "", .count = c->count, .record = sizeof *c->edges, .shift = leading(c->mesh),
-                       .context = c, .make = make_edges, .compare = compare_edges, .take = take_edges };
+    ebpo_sort sort = { .workspace = c->mesh->workspace,
+                       .threads = c->threads,
+                       .progress = &silent,
+                       .stage = "",
+                       .count = c->count,
+                       .record = sizeof *c->edges,
+                       .shift = leading(c->mesh),
+                       .context = c,
+                       .make = make_edges,
+                       .compare = compare_edges,
+                       .take = take_edges };
     ebpo_status status = ebpo_sort_run(&sort, error);
     sort.record = sizeof *c->arrivals;
     sort.make = make_arrivals;
@@ -164,7 +184,8 @@ static uint32_t leaves_to(const chaining *c, uint32_t vertex, uint32_t face)
     return v[0] == vertex ? v[1] : v[1] == vertex ? v[2] : v[0];
 }
 
-/* Walks around c->star from the face of an arriving edge, over edges used twice, to the neighbour at which the fan ends. */
+/* Walks around c->star from the face of an arriving edge, over edges used twice, to the neighbour
+ * at which the fan ends. */
 static uint32_t fan_end(const chaining *c, uint32_t vertex, uint32_t face)
 {
     for (uint64_t steps = 0; steps <= c->star.faces; steps++) {
@@ -183,7 +204,8 @@ static uint32_t fan_end(const chaining *c, uint32_t vertex, uint32_t face)
     return EBPO_NO_INDEX;
 }
 
-/* The edge that leaves for `neighbour` (the source's number) among the sorted [begin, end); NONE when there is none. */
+/* The edge that leaves for `neighbour` (the source's number) among the sorted [begin, end); NONE
+ * when there is none. */
 static uint64_t departure(const chaining *c, uint64_t begin, uint64_t end, uint64_t neighbour)
 {
     while (begin < end) {
@@ -199,8 +221,10 @@ static uint64_t departure(const chaining *c, uint64_t begin, uint64_t end, uint6
     return NONE;
 }
 
-/* Arrivals [a, b) and departures [d, e) at one vertex: by fans first, what is left in ascending order. */
-static bool connect_vertex(chaining *c, uint32_t vertex, uint64_t a, uint64_t b, uint64_t d, uint64_t e)
+/* Arrivals [a, b) and departures [d, e) at one vertex: by fans first, what is left in ascending
+ * order. */
+static bool connect_vertex(chaining *c, uint32_t vertex, uint64_t a, uint64_t b, uint64_t d,
+                           uint64_t e)
 {
     if (b - a > 1 || e - d > 1) {
         if (!ebpo_star_gather(&c->star, c->stars, c->mesh, vertex))
@@ -208,7 +232,9 @@ static bool connect_vertex(chaining *c, uint32_t vertex, uint64_t a, uint64_t b,
         for (uint64_t i = a; i < b; i++) {
             uint64_t edge = c->arrivals[i].edge;
             uint32_t neighbour = fan_end(c, vertex, c->edges[edge].face);
-            uint64_t next = neighbour == EBPO_NO_INDEX ? NONE : departure(c, d, e, ebpo_mesh_source_vertex(c->mesh, neighbour));
+            uint64_t next = neighbour == EBPO_NO_INDEX
+                                ? NONE
+                                : departure(c, d, e, ebpo_mesh_source_vertex(c->mesh, neighbour));
             if (next != NONE && !c->continued[next])
                 connect(c, edge, next);
         }
@@ -274,10 +300,12 @@ static void visit(chaining *c, uint32_t vertex)
 /* The edge's key, were the mesh in the source's order. */
 static uint64_t source_key(const chaining *c, uint64_t edge)
 {
-    return ebpo_mesh_source_vertex(c->mesh, c->edges[edge].from) << 32 | (uint32_t)c->edges[edge].key;
+    return ebpo_mesh_source_vertex(c->mesh, c->edges[edge].from) << 32 |
+           (uint32_t)c->edges[edge].key;
 }
 
-/* Chains have no edges in common, so it does not matter which is walked first; but a closed one is walked from the edge that the source has first. */
+/* Chains have no edges in common, so it does not matter which is walked first; but a closed one is
+ * walked from the edge that the source has first. */
 static uint64_t first_of_cycle(chaining *c, uint64_t edge)
 {
     uint64_t first = edge, key = source_key(c, edge);
@@ -320,8 +348,8 @@ static bool allocate(chaining *c)
     c->out->first = ebpo_array_zero(w, n / 3 + 2, sizeof *c->out->first);
     c->out->vertex = ebpo_array_alloc(w, n, sizeof *c->out->vertex);
     c->out->start = ebpo_array_alloc(w, n / 3 + 1, sizeof *c->out->start);
-    if (!c->arrivals || !c->next || !c->continued || !c->walked || !c->place || !c->path || !c->out->first ||
-        !c->out->vertex || !c->out->start)
+    if (!c->arrivals || !c->next || !c->continued || !c->walked || !c->place || !c->path ||
+        !c->out->first || !c->out->vertex || !c->out->start)
         return false;
     ebpo_array_fill(w, c->next, 0xff, n * sizeof *c->next);
     ebpo_array_fill(w, c->place, 0xff, vertices * sizeof *c->place);
@@ -332,7 +360,8 @@ static ebpo_status chain(chaining *c, ebpo_error *error)
 {
     ebpo_workspace *w = c->mesh->workspace;
     if (!allocate(c))
-        return ebpo_workspace_fail(w, c->count * 56 + c->mesh->vertex_count * sizeof *c->place, error);
+        return ebpo_workspace_fail(w, c->count * 56 + c->mesh->vertex_count * sizeof *c->place,
+                                   error);
     ebpo_status status = sort_all(c, error);
     if (status != EBPO_OK)
         return status;
@@ -356,7 +385,12 @@ ebpo_status ebpo_boundary_loops(ebpo_loops *out, ebpo_boundary *boundary, const 
                                 const ebpo_mesh *mesh, unsigned threads, ebpo_error *error)
 {
     *out = (ebpo_loops){ .count = 0 };
-    chaining c = { .edges = boundary->edges, .count = boundary->count, .stars = stars, .mesh = mesh, .threads = threads, .out = out };
+    chaining c = { .edges = boundary->edges,
+                   .count = boundary->count,
+                   .stars = stars,
+                   .mesh = mesh,
+                   .threads = threads,
+                   .out = out };
     ebpo_status status = chain(&c, error);
     ebpo_star_free(&c.star);
     ebpo_array_free(c.arrivals);
@@ -383,13 +417,16 @@ typedef struct ranking {
     rank *sorted;
 } ranking;
 
-static ebpo_status make_ranks(void *context, uint64_t begin, uint64_t end, void *records, ebpo_error *error)
+static ebpo_status make_ranks(void *context, uint64_t begin, uint64_t end, void *records,
+                              ebpo_error *error)
 {
     const ranking *r = context;
     (void)error;
     for (uint64_t i = begin; i < end; i++) {
         uint64_t number = r->begin + i;
-        ((rank *)records)[i - begin] = (rank){ r->loops->start[number], (uint32_t)number, (uint32_t)(r->loops->first[number + 1] - r->loops->first[number] - 2) };
+        ((rank *)records)[i - begin] =
+            (rank){ r->loops->start[number], (uint32_t)number,
+                    (uint32_t)(r->loops->first[number + 1] - r->loops->first[number] - 2) };
     }
     return EBPO_OK;
 }
@@ -407,16 +444,29 @@ static void take_ranks(void *context, uint64_t place, const void *records, uint6
     memcpy(r->sorted + place, records, (size_t)count * sizeof *r->sorted);
 }
 
-ebpo_status ebpo_loops_rank(uint64_t **triangles, const ebpo_loops *loops, const ebpo_mesh *mesh, unsigned threads, ebpo_error *error)
+ebpo_status ebpo_loops_rank(uint64_t **triangles, const ebpo_loops *loops, const ebpo_mesh *mesh,
+                            unsigned threads, ebpo_error *error)
 {
-    ranking r = { .loops = loops, .sorted = ebpo_array_alloc(mesh->workspace, loops->count, sizeof *r.sorted) };
+    ranking r = { .loops = loops,
+                  .sorted = ebpo_array_alloc(mesh->workspace, loops->count, sizeof *r.sorted) };
     uint64_t *before = ebpo_array_alloc(mesh->workspace, loops->count, sizeof *before), sum = 0;
-    ebpo_status status = r.sorted && before ? EBPO_OK : ebpo_workspace_fail(mesh->workspace, loops->count * 24, error);
+    ebpo_status status = r.sorted && before
+                             ? EBPO_OK
+                             : ebpo_workspace_fail(mesh->workspace, loops->count * 24, error);
     for (int part = 0; part < 2 && status == EBPO_OK; part++) {
         uint64_t count = part ? loops->count - loops->on_paths : loops->on_paths;
         r.begin = part ? loops->on_paths : 0;
-        ebpo_sort sort = { .workspace = mesh->workspace, .threads = threads, .progress = &silent, .stage = "", .count = count, .record = sizeof *r.sorted, .shift = leading(mesh),
-                           .context = &r, .make = make_ranks, .compare = compare_ranks, .take = take_ranks };
+        ebpo_sort sort = { .workspace = mesh->workspace,
+                           .threads = threads,
+                           .progress = &silent,
+                           .stage = "",
+                           .count = count,
+                           .record = sizeof *r.sorted,
+                           .shift = leading(mesh),
+                           .context = &r,
+                           .make = make_ranks,
+                           .compare = compare_ranks,
+                           .take = take_ranks };
         status = ebpo_sort_run(&sort, error);
         for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
             before[r.sorted[i].number] = sum;

@@ -14,7 +14,8 @@
 
 enum { VERTEX_GRAIN = 1 << 15 };
 
-static ebpo_status coordinates(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status coordinates(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
 {
     (void)worker;
     const ebpo_check *c = context;
@@ -23,9 +24,14 @@ static ebpo_status coordinates(void *context, uint64_t begin, uint64_t end, unsi
         ebpo_mesh_position(c->mesh, v, p);
         for (int k = 0; k < 3; k++)
             if (!isfinite(p[k]))
-                return ebpo_fail(error, EBPO_E_FORMAT, "%s: vertex %llu has %c = %s; repair the coordinate or drop the "
-                                 "vertex and its faces", ebpo_mesh_label(c->mesh), (unsigned long long)ebpo_mesh_source_vertex(c->mesh, v), "xyz"[k],
-                                 isnan(p[k]) ? "nan" : p[k] > 0 ? "inf" : "-inf");
+                return ebpo_fail(error, EBPO_E_FORMAT,
+                                 "%s: vertex %llu has %c = %s; repair the coordinate or drop the "
+                                 "vertex and its faces",
+                                 ebpo_mesh_label(c->mesh),
+                                 (unsigned long long)ebpo_mesh_source_vertex(c->mesh, v), "xyz"[k],
+                                 isnan(p[k]) ? "nan"
+                                 : p[k] > 0  ? "inf"
+                                             : "-inf");
     }
     ebpo_workspace_settle(c->mesh->workspace);
     return EBPO_OK;
@@ -33,8 +39,8 @@ static ebpo_status coordinates(void *context, uint64_t begin, uint64_t end, unsi
 
 ebpo_status ebpo_check_coordinates(ebpo_check *check, ebpo_error *error)
 {
-    return ebpo_parallel_for(check->threads, check->mesh->vertex_count, VERTEX_GRAIN, coordinates, check,
-                             &check->progress, "checking coordinates", error);
+    return ebpo_parallel_for(check->threads, check->mesh->vertex_count, VERTEX_GRAIN, coordinates,
+                             check, &check->progress, "checking coordinates", error);
 }
 
 typedef struct vertex_block {
@@ -48,11 +54,13 @@ typedef struct vertex_pass {
     vertex_block *blocks;
 } vertex_pass;
 
-static ebpo_status vertices(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status vertices(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                            ebpo_error *error)
 {
     (void)worker, (void)error;
     const vertex_pass *pass = context;
-    vertex_block b = { .min = { INFINITY, INFINITY, INFINITY }, .max = { -INFINITY, -INFINITY, -INFINITY } };
+    vertex_block b = { .min = { INFINITY, INFINITY, INFINITY },
+                       .max = { -INFINITY, -INFINITY, -INFINITY } };
     for (uint64_t v = begin; v < end; v++) {
         if (ebpo_stars_degree(&pass->check->stars, (uint32_t)v) == 0) {
             ebpo_finding_add(&b.unreferenced, ebpo_mesh_source_vertex(pass->check->mesh, v));
@@ -98,8 +106,8 @@ ebpo_status ebpo_check_vertices(ebpo_check *check, ebpo_error *error)
     vertex_pass pass = { check, ebpo_alloc(blocks, sizeof *pass.blocks) };
     if (!pass.blocks)
         return ebpo_fail_memory(error, blocks * sizeof *pass.blocks);
-    ebpo_status status = ebpo_parallel_for(check->threads, count, VERTEX_GRAIN, vertices, &pass, &check->progress,
-                                           "checking vertices", error);
+    ebpo_status status = ebpo_parallel_for(check->threads, count, VERTEX_GRAIN, vertices, &pass,
+                                           &check->progress, "checking vertices", error);
     for (uint64_t i = 0; status == EBPO_OK && i < blocks; i++) {
         const vertex_block *b = &pass.blocks[i];
         for (int k = 0; k < 3; k++) {
@@ -120,7 +128,8 @@ typedef struct curve_run {
     uint64_t at, end;
 } curve_run;
 
-/* Which one's next vertex comes first along the curve, as arranging has it: less than 0 for `a`, 0 when they are at one position. */
+/* Which one's next vertex comes first along the curve, as arranging has it: less than 0 for `a`, 0
+ * when they are at one position. */
 static int compare_runs(const curve_run *a, const curve_run *b)
 {
     const uint64_t *key = a->mesh->arrangement->key;
@@ -137,7 +146,8 @@ static int compare_runs(const curve_run *a, const curve_run *b)
     return 0;
 }
 
-/* Steps over the vertices of a run's next position. All but the one that the source has first repeat that one. */
+/* Steps over the vertices of a run's next position. All but the one that the source has first
+ * repeat that one. */
 static void take_position(curve_run *r, uint64_t *lowest, ebpo_finding *finding)
 {
     double here[3], p[3];
@@ -155,7 +165,8 @@ static void take_position(curve_run *r, uint64_t *lowest, ebpo_finding *finding)
 /* Of an arranged mesh: those that faces name, and the others, are a run each, or all are one. */
 static void compare_along_curve(const ebpo_mesh *mesh, ebpo_finding *finding)
 {
-    uint64_t first = mesh->arrangement->grouped ? mesh->vertex_count : mesh->arrangement->referenced;
+    uint64_t first =
+        mesh->arrangement->grouped ? mesh->vertex_count : mesh->arrangement->referenced;
     curve_run a = { mesh, 0, first }, b = { mesh, first, mesh->vertex_count };
     for (uint64_t steps = 0; a.at < a.end || b.at < b.end; steps++) {
         uint64_t lowest = UINT64_MAX;
@@ -174,14 +185,18 @@ static ebpo_status compare_all(ebpo_check *check, ebpo_finding *finding, ebpo_er
     const ebpo_mesh *mesh = check->mesh;
     uint64_t count = mesh->vertex_count;
     ebpo_positions positions;
-    ebpo_status status = ebpo_positions_build(&positions, mesh, check->threads, &check->progress, error);
+    ebpo_status status =
+        ebpo_positions_build(&positions, mesh, check->threads, &check->progress, error);
     if (status != EBPO_OK)
         return status;
-    uint32_t *lowest = positions.repeated ? ebpo_array_alloc(mesh->workspace, count, sizeof *lowest) : NULL; /* of each first one's position */
+    /* of each first one's position */
+    uint32_t *lowest =
+        positions.repeated ? ebpo_array_alloc(mesh->workspace, count, sizeof *lowest) : NULL;
     if (positions.repeated && !lowest)
         status = ebpo_workspace_fail(mesh->workspace, count * sizeof *lowest, error);
     for (uint64_t v = 0; lowest && v < count; v++) {
-        uint32_t first = ebpo_positions_first(&positions, (uint32_t)v), source = (uint32_t)ebpo_mesh_source_vertex(mesh, v);
+        uint32_t first = ebpo_positions_first(&positions, (uint32_t)v),
+                 source = (uint32_t)ebpo_mesh_source_vertex(mesh, v);
         if (first == v || source < lowest[first])
             lowest[first] = source;
         ebpo_workspace_settle_often(mesh->workspace, v);
@@ -217,7 +232,8 @@ static void conclude(ebpo_check *c)
     if (!r->balanced)
         r->volume = 0;
     if (r->manifold) {
-        int64_t characteristic = (int64_t)c->referenced - (int64_t)r->edges + (int64_t)c->mesh->face_count;
+        int64_t characteristic =
+            (int64_t)c->referenced - (int64_t)r->edges + (int64_t)c->mesh->face_count;
         r->genus_known = true;
         r->genus = (int64_t)r->components - characteristic / 2;
     }
@@ -228,7 +244,8 @@ static ebpo_status boundary_loops(ebpo_check *c, ebpo_error *error)
     ebpo_loops loops;
     if (c->boundary.count == 0)
         return EBPO_OK;
-    ebpo_status status = ebpo_boundary_loops(&loops, &c->boundary, &c->stars, c->mesh, c->threads, error);
+    ebpo_status status =
+        ebpo_boundary_loops(&loops, &c->boundary, &c->stars, c->mesh, c->threads, error);
     if (status != EBPO_OK)
         return status;
     c->report->boundary_loops = loops.count;
@@ -268,8 +285,8 @@ static ebpo_status run(ebpo_check *c, ebpo_error *error)
     return status;
 }
 
-ebpo_status ebpo_mesh_check(ebpo_mesh_report *report, const ebpo_mesh *mesh, unsigned threads, ebpo_progress progress,
-                            ebpo_error *error)
+ebpo_status ebpo_mesh_check(ebpo_mesh_report *report, const ebpo_mesh *mesh, unsigned threads,
+                            ebpo_progress progress, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     memset(report, 0, sizeof *report);
@@ -277,9 +294,12 @@ ebpo_status ebpo_mesh_check(ebpo_mesh_report *report, const ebpo_mesh *mesh, uns
     if (status != EBPO_OK)
         return status;
     if (mesh->face_count == 0)
-        return ebpo_fail(error, EBPO_E_FORMAT, "%s: %llu vertices but no faces; give a triangle mesh, not a point cloud",
+        return ebpo_fail(error, EBPO_E_FORMAT,
+                         "%s: %llu vertices but no faces; give a triangle mesh, not a point cloud",
                          ebpo_mesh_label(mesh), (unsigned long long)mesh->vertex_count);
-    ebpo_check check = { .mesh = mesh, .threads = ebpo_thread_count(threads), .progress = progress, .report = report };
+    ebpo_check check = {
+        .mesh = mesh, .threads = ebpo_thread_count(threads), .progress = progress, .report = report
+    };
     status = run(&check, error);
     ebpo_stars_free(&check.stars);
     ebpo_boundary_free(&check.boundary);

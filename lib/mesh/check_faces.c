@@ -23,7 +23,8 @@ typedef struct face_pass {
     double centre[3];
 } face_pass;
 
-/* Root of v. Paths are halved on the way; any thread may do so, as a parent only ever moves towards the root. */
+/* Root of v. Paths are halved on the way; any thread may do so, as a parent only ever moves towards
+ * the root. */
 static uint32_t find_root(uint32_t *parents, uint32_t v)
 {
     for (;;) {
@@ -32,12 +33,14 @@ static uint32_t find_root(uint32_t *parents, uint32_t v)
             return v;
         uint32_t grand = __atomic_load_n(&parents[parent], __ATOMIC_RELAXED);
         if (grand != parent)
-            __atomic_compare_exchange_n(&parents[v], &parent, grand, true, __ATOMIC_RELAXED, __ATOMIC_RELAXED);
+            __atomic_compare_exchange_n(&parents[v], &parent, grand, true, __ATOMIC_RELAXED,
+                                        __ATOMIC_RELAXED);
         v = grand;
     }
 }
 
-/* The higher root goes below the lower one, so there are no cycles; the number of roots is the same in any order. */
+/* The higher root goes below the lower one, so there are no cycles; the number of roots is the same
+ * in any order. */
 static void join(uint32_t *parents, uint32_t a, uint32_t b)
 {
     for (;;) {
@@ -51,12 +54,14 @@ static void join(uint32_t *parents, uint32_t a, uint32_t b)
             b = t;
         }
         uint32_t expected = a;
-        if (__atomic_compare_exchange_n(&parents[a], &expected, b, false, __ATOMIC_RELAXED, __ATOMIC_RELAXED))
+        if (__atomic_compare_exchange_n(&parents[a], &expected, b, false, __ATOMIC_RELAXED,
+                                        __ATOMIC_RELAXED))
             return;
     }
 }
 
-/* True when rounding cannot hide a zero: |ad - bc| against its error bound (Shewchuk 1997, 3.33e-16), and no underflow or overflow. */
+/* True when rounding cannot hide a zero: |ad - bc| against its error bound (Shewchuk
+ * 1997, 3.33e-16), and no underflow or overflow. */
 static bool surely_nonzero(double a, double b, double c, double d)
 {
     double permanent = fabs(a * d) + fabs(b * c);
@@ -77,18 +82,21 @@ static double cross_length(const ebpo_units *u, const double cross[3])
 {
     if (!u->scaled)
         return sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]);
-    const int exponent[3] = { u->exponent[1] + u->exponent[2], u->exponent[2] + u->exponent[0], u->exponent[0] + u->exponent[1] };
+    const int exponent[3] = { u->exponent[1] + u->exponent[2], u->exponent[2] + u->exponent[0],
+                              u->exponent[0] + u->exponent[1] };
     return ebpo_scaled_length(cross, exponent, u->area);
 }
 
-static void measure(face_block *block, const ebpo_units *units, const double centre[3], const double a[3], const double cross[3])
+static void measure(face_block *block, const ebpo_units *units, const double centre[3],
+                    const double a[3], const double cross[3])
 {
     ebpo_sum_add(&block->area2, cross_length(units, cross));
     ebpo_sum_add(&block->volume6, (a[0] - centre[0]) * cross[0] + (a[1] - centre[1]) * cross[1] +
-                                  (a[2] - centre[2]) * cross[2]);
+                                      (a[2] - centre[2]) * cross[2]);
 }
 
-static ebpo_status faces(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                         ebpo_error *error)
 {
     (void)worker, (void)error;
     const face_pass *pass = context;
@@ -132,8 +140,8 @@ ebpo_status ebpo_check_faces(ebpo_check *check, ebpo_error *error)
         return ebpo_fail_memory(error, blocks * sizeof *pass.blocks);
     for (int k = 0; k < 3; k++)
         pass.centre[k] = ldexp(0.5 * r->min[k] + 0.5 * r->max[k], -check->units.exponent[k]);
-    ebpo_status status = ebpo_parallel_for(check->threads, count, FACE_GRAIN, faces, &pass, &check->progress,
-                                           "measuring faces", error);
+    ebpo_status status = ebpo_parallel_for(check->threads, count, FACE_GRAIN, faces, &pass,
+                                           &check->progress, "measuring faces", error);
     ebpo_sum area2 = { .adds = 0 }, volume6 = { .adds = 0 };
     for (uint64_t i = 0; status == EBPO_OK && i < blocks; i++) {
         ebpo_sum_merge(&area2, &pass.blocks[i].area2);

@@ -1,4 +1,5 @@
-/* The passes of ebpo_mesh_check. Each works on fixed blocks, whose results are joined in order: the report does not depend on the number of threads. */
+/* The passes of ebpo_mesh_check. Each works on fixed blocks, whose results are joined in order: the
+ * report does not depend on the number of threads. */
 #ifndef EBPO_MESH_CHECK_PARTS_H
 #define EBPO_MESH_CHECK_PARTS_H
 
@@ -8,7 +9,8 @@
 #include "mesh/stars.h"
 #include "mesh/sum.h"
 
-/* Along axis k, lengths are measured in units of 2^exponent[k], where squares and cubes could leave a double's range otherwise; 0 else. */
+/* Along axis k, lengths are measured in units of 2^exponent[k], where squares and cubes could leave
+ * a double's range otherwise; 0 else. */
 typedef struct ebpo_units {
     bool scaled;
     int exponent[3];
@@ -20,7 +22,7 @@ typedef struct ebpo_check {
     unsigned threads; /* resolved */
     ebpo_progress progress;
     ebpo_mesh_report *report;
-    uint32_t *parents;      /* [vertex_count] union-find forest over vertices */
+    uint32_t *parents; /* [vertex_count] union-find forest over vertices */
     ebpo_stars stars;
     ebpo_boundary boundary; /* all boundary edges, in no order */
     uint64_t referenced;    /* vertices that faces use */
@@ -74,7 +76,8 @@ static inline void ebpo_finding_merge(ebpo_finding *finding, const ebpo_finding 
 EBPO_MUST_USE ebpo_status ebpo_check_coordinates(ebpo_check *check, ebpo_error *error);
 /* Bounding box, unit for measuring, unreferenced vertices; needs stars. */
 EBPO_MUST_USE ebpo_status ebpo_check_vertices(ebpo_check *check, ebpo_error *error);
-/* Area, volume (about the box's centre), zero areas, repeated indices; joins components. Needs the bounding box. */
+/* Area, volume (about the box's centre), zero areas, repeated indices; joins components. Needs the
+ * bounding box. */
 EBPO_MUST_USE ebpo_status ebpo_check_faces(ebpo_check *check, ebpo_error *error);
 /* Edges, bow-ties, repeated faces, mean edge, number of components; needs the faces' pass. */
 EBPO_MUST_USE ebpo_status ebpo_check_stars(ebpo_check *check, ebpo_error *error);

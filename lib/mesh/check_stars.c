@@ -45,7 +45,8 @@ static uint32_t fan_root(uint32_t *fans, uint32_t i)
     return i;
 }
 
-/* The faces of an edge that is used twice belong to one fan; returns how many fans that joined. Where more faces meet, a fan ends. */
+/* The faces of an edge that is used twice belong to one fan; returns how many fans that joined.
+ * Where more faces meet, a fan ends. */
 static uint64_t join_fans(uint32_t *fans, const ebpo_link *links, uint64_t uses)
 {
     if (uses != 2 || links[0].entry == EBPO_NO_INDEX || links[1].entry == EBPO_NO_INDEX)
@@ -55,7 +56,8 @@ static uint64_t join_fans(uint32_t *fans, const ebpo_link *links, uint64_t uses)
     return a != b;
 }
 
-static bool classify_edge(const ebpo_mesh *mesh, star_block *block, scratch *s, uint32_t v, const ebpo_link *links, uint64_t uses)
+static bool classify_edge(const ebpo_mesh *mesh, star_block *block, scratch *s, uint32_t v,
+                          const ebpo_link *links, uint64_t uses)
 {
     uint64_t out = 0;
     uint32_t neighbour = ebpo_link_neighbour(&links[0]);
@@ -75,7 +77,8 @@ static bool classify_edge(const ebpo_mesh *mesh, star_block *block, scratch *s, 
     if (uses != 1)
         return true;
     ebpo_finding_add(&block->boundary, face);
-    return ebpo_boundary_add(s->boundary, mesh, out ? v : neighbour, out ? neighbour : v, ebpo_link_face(&links[0]));
+    return ebpo_boundary_add(s->boundary, mesh, out ? v : neighbour, out ? neighbour : v,
+                             ebpo_link_face(&links[0]));
 }
 
 static double edge_length(const ebpo_check *check, uint32_t a, uint32_t b)
@@ -93,7 +96,8 @@ static bool check_edges(const ebpo_check *check, star_block *block, scratch *s, 
 {
     const ebpo_star *star = &s->star;
     uint64_t fans = star->faces;
-    if (!ebpo_array_grow_late(check->mesh->workspace, &s->fans, &s->fan_capacity, star->faces, sizeof *s->fans))
+    if (!ebpo_array_grow_late(check->mesh->workspace, &s->fans, &s->fan_capacity, star->faces,
+                              sizeof *s->fans))
         return false;
     for (uint64_t i = 0; i < star->faces; i++)
         s->fans[i] = (uint32_t)i;
@@ -139,7 +143,8 @@ static void sort_opposites(opposite *o, uint64_t count)
 static bool check_repeated(const ebpo_check *check, star_block *block, scratch *s, uint32_t v)
 {
     uint64_t begin = check->stars.first[v], end = check->stars.first[v + (uint64_t)1], count = 0;
-    if (!ebpo_array_grow_late(check->mesh->workspace, &s->opposites, &s->opposite_capacity, end - begin, sizeof *s->opposites))
+    if (!ebpo_array_grow_late(check->mesh->workspace, &s->opposites, &s->opposite_capacity,
+                              end - begin, sizeof *s->opposites))
         return false;
     for (uint64_t i = begin; i < end; i++) {
         uint32_t f = check->stars.face[i];
@@ -147,7 +152,8 @@ static bool check_repeated(const ebpo_check *check, star_block *block, scratch *
         if (c[0] < v || c[1] < v || c[2] < v || ebpo_face_repeats_index(c))
             continue;
         uint32_t p = c[0] == v ? c[1] : c[0], q = c[2] == v ? c[1] : c[2];
-        s->opposites[count++] = (opposite){ p < q ? (uint64_t)p << 32 | q : (uint64_t)q << 32 | p, (uint32_t)ebpo_mesh_source_face(check->mesh, f) };
+        s->opposites[count++] = (opposite){ p < q ? (uint64_t)p << 32 | q : (uint64_t)q << 32 | p,
+                                            (uint32_t)ebpo_mesh_source_face(check->mesh, f) };
     }
     sort_opposites(s->opposites, count);
     for (uint64_t i = 1; i < count; i++)
@@ -156,7 +162,8 @@ static bool check_repeated(const ebpo_check *check, star_block *block, scratch *
     return true;
 }
 
-static ebpo_status stars(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status stars(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                         ebpo_error *error)
 {
     star_pass *pass = context;
     const ebpo_check *check = pass->check;
@@ -171,7 +178,8 @@ static ebpo_status stars(void *context, uint64_t begin, uint64_t end, unsigned w
         block.components += check->parents[v] == v;
         if (!ebpo_star_gather(&s->star, &check->stars, check->mesh, vertex) ||
             !check_edges(check, &block, s, vertex) || !check_repeated(check, &block, s, vertex))
-            return ebpo_workspace_fail(check->mesh->workspace, degree * 2 * sizeof *s->star.links, error);
+            return ebpo_workspace_fail(check->mesh->workspace, degree * 2 * sizeof *s->star.links,
+                                       error);
     }
     pass->blocks[begin / STAR_GRAIN] = block;
     return EBPO_OK;
@@ -193,7 +201,8 @@ static void join_blocks(const ebpo_check *check, const star_block *blocks, uint6
         r->edges += b->edges;
         r->components += b->components;
     }
-    r->mean_edge = r->edges ? ldexp(ebpo_sum_value(&length) / (double)r->edges, check->units.length) : 0;
+    r->mean_edge =
+        r->edges ? ldexp(ebpo_sum_value(&length) / (double)r->edges, check->units.length) : 0;
 }
 
 static void free_scratch(scratch *s)
@@ -206,7 +215,8 @@ static void free_scratch(scratch *s)
 ebpo_status ebpo_check_stars(ebpo_check *check, ebpo_error *error)
 {
     uint64_t count = check->mesh->vertex_count, blocks = (count + STAR_GRAIN - 1) / STAR_GRAIN;
-    star_pass pass = { .check = check, .blocks = ebpo_alloc(blocks, sizeof *pass.blocks),
+    star_pass pass = { .check = check,
+                       .blocks = ebpo_alloc(blocks, sizeof *pass.blocks),
                        .scratch = ebpo_alloc_zero(check->threads, sizeof *pass.scratch) };
     ebpo_boundary *boundaries = ebpo_alloc_zero(check->threads, sizeof *boundaries);
     ebpo_status status = EBPO_OK;
@@ -216,8 +226,8 @@ ebpo_status ebpo_check_stars(ebpo_check *check, ebpo_error *error)
     }
     for (unsigned t = 0; t < check->threads; t++)
         pass.scratch[t].boundary = &boundaries[t];
-    status = ebpo_parallel_for(check->threads, count, STAR_GRAIN, stars, &pass, &check->progress, "checking edges",
-                               error);
+    status = ebpo_parallel_for(check->threads, count, STAR_GRAIN, stars, &pass, &check->progress,
+                               "checking edges", error);
     if (status != EBPO_OK)
         goto done;
     join_blocks(check, pass.blocks, blocks);

@@ -13,7 +13,8 @@
 #include "mesh/stars.h"
 #include "mesh/triangulate.h"
 
-/* Vertices with more faces than this are not searched for existing edges: it keeps the work linear. */
+/* Vertices with more faces than this are not searched for existing edges: it keeps the work linear.
+ */
 enum { SEARCHED_DEGREE = 4096, VERTEX_GRAIN = 1 << 13, LOOP_GRAIN = 16 };
 
 typedef struct placed {
@@ -27,7 +28,8 @@ typedef struct scratch {
     double (*point)[3];
     uint32_t (*triangles)[3];
     uint64_t point_room, triangle_room;
-    placed sorted[EBPO_OPTIMAL_CHAIN];                   /* the loop's vertices, for looking them up */
+    /* the loop's vertices, for looking them up */
+    placed sorted[EBPO_OPTIMAL_CHAIN];
     uint8_t taken[EBPO_OPTIMAL_CHAIN * EBPO_OPTIMAL_CHAIN];
 } scratch;
 
@@ -42,7 +44,8 @@ typedef struct filling {
     uint64_t added;
 } filling;
 
-static ebpo_status collect(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status collect(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                           ebpo_error *error)
 {
     filling *f = context;
     scratch *s = &f->scratch[worker];
@@ -54,17 +57,20 @@ static ebpo_status collect(void *context, uint64_t begin, uint64_t end, unsigned
             uint32_t lower = (uint32_t)v, higher = ebpo_link_neighbour(link);
             next = ebpo_star_run_end(&s->star, i);
             if (next - i == 1 && higher > lower)
-                ok = ebpo_boundary_add(&s->boundary, f->mesh, link->out ? lower : higher, link->out ? higher : lower, ebpo_link_face(link));
+                ok = ebpo_boundary_add(&s->boundary, f->mesh, link->out ? lower : higher,
+                                       link->out ? higher : lower, ebpo_link_face(link));
         }
         if (!ok)
-            return ebpo_workspace_fail(f->mesh->workspace, s->boundary.count * sizeof *s->boundary.edges, error);
+            return ebpo_workspace_fail(f->mesh->workspace,
+                                       s->boundary.count * sizeof *s->boundary.edges, error);
     }
     return EBPO_OK;
 }
 
 static ebpo_status collect_boundary(filling *f, ebpo_error *error)
 {
-    ebpo_status status = ebpo_parallel_for(f->threads, f->mesh->vertex_count, VERTEX_GRAIN, collect, f, NULL, "", error);
+    ebpo_status status = ebpo_parallel_for(f->threads, f->mesh->vertex_count, VERTEX_GRAIN, collect,
+                                           f, NULL, "", error);
     ebpo_boundary *lists = ebpo_alloc(f->threads, sizeof *lists);
     if (!lists)
         return ebpo_fail_memory(error, f->threads * sizeof *lists);
@@ -102,7 +108,8 @@ static void mark_taken(const filling *f, scratch *s, const uint32_t *loop, uint3
                 placed wanted = { f->mesh->faces[3 * (uint64_t)f->stars.face[e] + (unsigned)k], 0 };
                 const placed *found = bsearch(&wanted, s->sorted, n, sizeof *s->sorted, by_vertex);
                 if (found)
-                    s->taken[(size_t)i * n + found->place] = s->taken[(size_t)found->place * n + i] = 1;
+                    s->taken[(size_t)i * n + found->place] =
+                        s->taken[(size_t)found->place * n + i] = 1;
             }
     }
 }
@@ -123,11 +130,15 @@ static bool fill_loop(filling *f, scratch *s, uint64_t number)
     bool search = n > 3 && n <= EBPO_OPTIMAL_CHAIN;
     if (search)
         mark_taken(f, s, loop, n);
-    ebpo_chain chain = { .n = n, .point = (const double (*)[3])s->point, .taken = search ? s->taken : NULL, .workspace = workspace };
+    ebpo_chain chain = { .n = n,
+                         .point = (const double(*)[3])s->point,
+                         .taken = search ? s->taken : NULL,
+                         .workspace = workspace };
     if (!ebpo_triangulate_chain(&chain, s->triangles))
         return false;
     uint32_t *face = f->mesh->faces + 3 * (f->mesh->face_count + f->before[number]);
-    for (uint32_t t = 0; t < n - 2; t++, face += 3) { /* against the chain, as the faces beside it run along it */
+    for (uint32_t t = 0; t < n - 2;
+         t++, face += 3) { /* against the chain, as the faces beside it run along it */
         for (int k = 0; k < 3; k++)
             face[k] = loop[s->triangles[t][2 - k]];
         ebpo_workspace_settle_often(workspace, t + (uint64_t)1);
@@ -135,12 +146,14 @@ static bool fill_loop(filling *f, scratch *s, uint64_t number)
     return true;
 }
 
-static ebpo_status fill_loops(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status fill_loops(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
 {
     filling *f = context;
     for (uint64_t i = begin; i < end; i++)
         if (!fill_loop(f, &f->scratch[worker], i))
-            return ebpo_workspace_fail(f->mesh->workspace, (f->loops.first[i + 1] - f->loops.first[i]) * 132, error);
+            return ebpo_workspace_fail(f->mesh->workspace,
+                                       (f->loops.first[i + 1] - f->loops.first[i]) * 132, error);
     ebpo_workspace_settle(f->mesh->workspace);
     return EBPO_OK;
 }
@@ -154,12 +167,15 @@ static ebpo_status make_room(filling *f, ebpo_error *error)
     struct ebpo_arrangement *order = mesh->arrangement;
     uint64_t count = mesh->face_count + f->added, capacity = mesh->face_count;
     if (count > UINT32_MAX - 1)
-        return ebpo_fail(error, EBPO_E_LIMIT, "%s: %llu faces with the filled holes, but 2^32 - 2 is the limit; "
-                         "split the mesh", ebpo_mesh_label(mesh), (unsigned long long)count);
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "%s: %llu faces with the filled holes, but 2^32 - 2 is the limit; "
+                         "split the mesh",
+                         ebpo_mesh_label(mesh), (unsigned long long)count);
     if (!ebpo_array_grow(mesh->workspace, &mesh->faces, &capacity, count, 3 * sizeof *mesh->faces))
         return ebpo_workspace_fail(mesh->workspace, count * 3 * sizeof *mesh->faces, error);
     capacity = mesh->face_count;
-    if (order && !ebpo_array_grow(mesh->workspace, &order->face_source, &capacity, count, sizeof *order->face_source))
+    if (order && !ebpo_array_grow(mesh->workspace, &order->face_source, &capacity, count,
+                                  sizeof *order->face_source))
         return ebpo_workspace_fail(mesh->workspace, count * sizeof *order->face_source, error);
     for (uint64_t i = mesh->face_count; order && i < count; i++) {
         order->face_source[i] = (uint32_t)i;
@@ -187,7 +203,8 @@ static ebpo_status run(filling *f, ebpo_error *error)
     if (status == EBPO_OK)
         status = make_room(f, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(f->threads, f->loops.count, LOOP_GRAIN, fill_loops, f, NULL, "", error);
+        status = ebpo_parallel_for(f->threads, f->loops.count, LOOP_GRAIN, fill_loops, f, NULL, "",
+                                   error);
     if (status != EBPO_OK)
         return status;
     mesh->face_count += f->added;

@@ -1,4 +1,5 @@
-/* Internals shared by the parts of the mesh module. Other modules take ebpo_mesh_position from here. */
+/* Internals shared by the parts of the mesh module. Other modules take ebpo_mesh_position from
+ * here. */
 #ifndef EBPO_MESH_MESH_H
 #define EBPO_MESH_MESH_H
 
@@ -10,10 +11,14 @@
 
 /* Of a mesh whose vertices and faces are in the order of a Morton curve (ebpo_mesh_arrange). */
 struct ebpo_arrangement {
-    ebpo_box box;            /* around the referenced vertices, with exact walls down to box.grid_level */
-    uint64_t referenced;     /* vertices that faces name come first, along the curve; the others after them, likewise */
-    uint64_t *key;           /* [vertex_count] octcode of the vertex's cell at box.grid_level, ascending among the referenced and among the others. NULL: arranged for mending, or mended since;
-                                neighbours in space are still neighbours in memory, but what builds has to arrange again */
+    /* around the referenced vertices, with exact walls down to box.grid_level */
+    ebpo_box box;
+    /* vertices that faces name come first, along the curve; the others after them, likewise */
+    uint64_t referenced;
+    /* [vertex_count] octcode of the vertex's cell at box.grid_level, ascending among the referenced
+     * and among the others. NULL: arranged for mending, or mended since; neighbours in space are
+     * still neighbours in memory, but what builds has to arrange again */
+    uint64_t *key;
     int level;               /* that was asked for: -1: as deep as is sensible */
     bool grouped;            /* vertices at one position are one run */
     uint32_t *vertex_source; /* [vertex_count] numbers in the source */
@@ -24,8 +29,14 @@ struct ebpo_arrangement {
 void ebpo_arrangement_free(struct ebpo_arrangement *arrangement);
 
 /* Numbers for messages and reports. */
-static inline uint64_t ebpo_mesh_source_vertex(const ebpo_mesh *mesh, uint64_t v) { return mesh->arrangement ? mesh->arrangement->vertex_source[v] : v; }
-static inline uint64_t ebpo_mesh_source_face(const ebpo_mesh *mesh, uint64_t f) { return mesh->arrangement ? mesh->arrangement->face_source[f] : f; }
+static inline uint64_t ebpo_mesh_source_vertex(const ebpo_mesh *mesh, uint64_t v)
+{
+    return mesh->arrangement ? mesh->arrangement->vertex_source[v] : v;
+}
+static inline uint64_t ebpo_mesh_source_face(const ebpo_mesh *mesh, uint64_t f)
+{
+    return mesh->arrangement ? mesh->arrangement->face_source[f] : f;
+}
 
 /* Position of vertex i (< vertex_count) as doubles; exact for both kinds of coordinates. */
 static inline void ebpo_mesh_position(const ebpo_mesh *mesh, uint64_t i, double out[3])
@@ -46,7 +57,8 @@ static inline bool ebpo_face_repeats_index(const uint32_t face[3])
 }
 
 /* (b - a) x (c - a), rounded. */
-static inline void ebpo_face_cross(const double a[3], const double b[3], const double c[3], double out[3])
+static inline void ebpo_face_cross(const double a[3], const double b[3], const double c[3],
+                                   double out[3])
 {
     double p[3] = { b[0] - a[0], b[1] - a[1], b[2] - a[2] };
     double q[3] = { c[0] - a[0], c[1] - a[1], c[2] - a[2] };
@@ -58,7 +70,8 @@ static inline void ebpo_face_cross(const double a[3], const double b[3], const d
 /* What messages call the mesh: its source's name, or "mesh". */
 const char *ebpo_mesh_label(const ebpo_mesh *mesh);
 
-/* EBPO_E_ARGUMENT unless the arrays that the counts promise are there, EBPO_E_LIMIT when a count is beyond 2^32 - 2. */
+/* EBPO_E_ARGUMENT unless the arrays that the counts promise are there, EBPO_E_LIMIT when a count is
+ * beyond 2^32 - 2. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_check_shape(const ebpo_mesh *mesh, ebpo_error *error);
 
 #endif

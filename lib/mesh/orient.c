@@ -20,21 +20,23 @@ enum { OPEN = 1, INCONSISTENT = 2, TWISTED = 4 };
 /* A patch, faces connected by edges that are used exactly twice, that is to be made consistent. */
 typedef struct patch {
     uint32_t root;
-    uint32_t seed;     /* its first face in the source, which decides when nothing else does */
-    bool closed;       /* every edge has a face on its other side */
-    bool seed_turned;  /* it runs against the root */
-    bool turn_others;  /* the faces that run as the seed does are the ones to turn */
+    uint32_t seed;          /* its first face in the source, which decides when nothing else does */
+    bool closed;            /* every edge has a face on its other side */
+    bool seed_turned;       /* it runs against the root */
+    bool turn_others;       /* the faces that run as the seed does are the ones to turn */
     uint64_t count, turned; /* faces; those that run against the root */
-    ebpo_sum volume;   /* six times, with all faces running as the root does */
+    ebpo_sum volume;        /* six times, with all faces running as the root does */
 } patch;
 
 typedef struct orienting {
     ebpo_mesh *mesh;
     ebpo_stars stars;
-    ebpo_star *star;  /* one for each thread */
-    uint64_t *above;  /* [face_count] a lower face of the patch, or itself: number << 1 | 1 when the two run against each other */
-    uint8_t *flags;   /* [face_count] */
-    patch *patches;   /* by root */
+    ebpo_star *star; /* one for each thread */
+    /* [face_count] a lower face of the patch, or itself: number << 1 | 1 when the two run against
+     * each other */
+    uint64_t *above;
+    uint8_t *flags; /* [face_count] */
+    patch *patches; /* by root */
     uint64_t patch_count, patch_capacity;
     uint64_t flipped, unorientable;
     pthread_mutex_t lock; /* of the patches' volumes */
@@ -51,13 +53,15 @@ static uint64_t find_root(uint64_t *above, uint32_t f)
             return (uint64_t)f << 1 | turned;
         uint64_t next = __atomic_load_n(&above[up >> 1], __ATOMIC_RELAXED), grand = next ^ (up & 1);
         if (next >> 1 != up >> 1)
-            __atomic_compare_exchange_n(&above[f], &up, grand, true, __ATOMIC_RELAXED, __ATOMIC_RELAXED);
+            __atomic_compare_exchange_n(&above[f], &up, grand, true, __ATOMIC_RELAXED,
+                                        __ATOMIC_RELAXED);
         turned ^= grand & 1;
         f = (uint32_t)(grand >> 1);
     }
 }
 
-/* The higher root goes below the lower one, so that the roots are the same in any order. False when the faces are in one patch already, the other way round. */
+/* The higher root goes below the lower one, so that the roots are the same in any order. False when
+ * the faces are in one patch already, the other way round. */
 static bool join(uint64_t *above, uint32_t a, uint32_t b, uint64_t turned)
 {
     for (;;) {
@@ -65,7 +69,9 @@ static bool join(uint64_t *above, uint32_t a, uint32_t b, uint64_t turned)
         if (ra >> 1 == rb >> 1)
             return ((ra ^ rb ^ turned) & 1) == 0;
         uint64_t low = ra < rb ? ra : rb, high = ra < rb ? rb : ra, expected = high & ~UINT64_C(1);
-        if (__atomic_compare_exchange_n(&above[high >> 1], &expected, (low & ~UINT64_C(1)) | ((ra ^ rb ^ turned) & 1), false, __ATOMIC_RELAXED, __ATOMIC_RELAXED))
+        if (__atomic_compare_exchange_n(&above[high >> 1], &expected,
+                                        (low & ~UINT64_C(1)) | ((ra ^ rb ^ turned) & 1), false,
+                                        __ATOMIC_RELAXED, __ATOMIC_RELAXED))
             return true;
     }
 }
@@ -91,7 +97,8 @@ static void look_at_edge(orienting *o, const ebpo_link *links, uint64_t uses)
         flag(o, a, TWISTED);
 }
 
-static ebpo_status begin_faces(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status begin_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
 {
     orienting *o = context;
     (void)worker, (void)error;
@@ -103,7 +110,8 @@ static ebpo_status begin_faces(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-static ebpo_status look_around(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status look_around(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
 {
     orienting *o = context;
     ebpo_star *star = &o->star[worker];
@@ -128,9 +136,11 @@ static ebpo_status join_faces(orienting *o, ebpo_error *error)
     if (status == EBPO_OK && !o->star)
         status = ebpo_fail_memory(error, threads * sizeof *o->star);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, o->mesh->face_count, FACE_GRAIN, begin_faces, o, NULL, "", error);
+        status = ebpo_parallel_for(threads, o->mesh->face_count, FACE_GRAIN, begin_faces, o, NULL,
+                                   "", error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, o->mesh->vertex_count, VERTEX_GRAIN, look_around, o, NULL, "", error);
+        status = ebpo_parallel_for(threads, o->mesh->vertex_count, VERTEX_GRAIN, look_around, o,
+                                   NULL, "", error);
     for (unsigned t = 0; o->star && t < threads; t++)
         ebpo_star_free(&o->star[t]);
     free(o->star);
@@ -138,7 +148,8 @@ static ebpo_status join_faces(orienting *o, ebpo_error *error)
     return status;
 }
 
-/* Each face is put below its root directly, which learns what was found at it. Roots come before what is below them. */
+/* Each face is put below its root directly, which learns what was found at it. Roots come before
+ * what is below them. */
 static void gather_flags(orienting *o)
 {
     for (uint64_t f = 0; f < o->mesh->face_count; f++) {
@@ -160,9 +171,11 @@ static bool list_patches(orienting *o)
         o->unorientable += (o->flags[f] & TWISTED) != 0;
         if ((o->flags[f] & (TWISTED | INCONSISTENT)) != INCONSISTENT)
             continue;
-        if (!ebpo_array_grow(o->mesh->workspace, &o->patches, &o->patch_capacity, o->patch_count + 1, sizeof *o->patches))
+        if (!ebpo_array_grow(o->mesh->workspace, &o->patches, &o->patch_capacity,
+                             o->patch_count + 1, sizeof *o->patches))
             return false;
-        o->patches[o->patch_count++] = (patch){ .root = (uint32_t)f, .seed = (uint32_t)f, .closed = !(o->flags[f] & OPEN) };
+        o->patches[o->patch_count++] =
+            (patch){ .root = (uint32_t)f, .seed = (uint32_t)f, .closed = !(o->flags[f] & OPEN) };
     }
     return true;
 }
@@ -211,7 +224,8 @@ static void add_volume(orienting *o, patch *p, const ebpo_sum *sum)
 }
 
 /* The sum is exact, so it does not matter which thread adds what. */
-static ebpo_status measure(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status measure(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                           ebpo_error *error)
 {
     orienting *o = context;
     const ebpo_mesh *mesh = o->mesh;
@@ -237,7 +251,8 @@ static ebpo_status measure(void *context, uint64_t begin, uint64_t end, unsigned
         ebpo_mesh_position(mesh, v[1], b);
         ebpo_mesh_position(mesh, v[2], c);
         ebpo_face_cross(a, b, c, cross);
-        double term = (a[0] - base[0]) * cross[0] + (a[1] - base[1]) * cross[1] + (a[2] - base[2]) * cross[2];
+        double term =
+            (a[0] - base[0]) * cross[0] + (a[1] - base[1]) * cross[1] + (a[2] - base[2]) * cross[2];
         ebpo_sum_add(&sum, o->above[f] & 1 ? -term : term);
     }
     if (last)
@@ -253,7 +268,8 @@ static void decide(patch *p)
     p->turn_others = volume < 0 || (!(volume > 0) && against_seed > p->count - against_seed);
 }
 
-static ebpo_status flip(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status flip(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                        ebpo_error *error)
 {
     orienting *o = context;
     (void)worker, (void)error;
@@ -293,7 +309,8 @@ static ebpo_status run(orienting *o, ebpo_error *error)
     status = ebpo_parallel_for(0, count, FACE_GRAIN, measure, o, NULL, "", error);
     for (uint64_t i = 0; i < o->patch_count; i++)
         decide(&o->patches[i]);
-    return status == EBPO_OK ? ebpo_parallel_for(0, count, FACE_GRAIN, flip, o, NULL, "", error) : status;
+    return status == EBPO_OK ? ebpo_parallel_for(0, count, FACE_GRAIN, flip, o, NULL, "", error)
+                             : status;
 }
 
 ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)

@@ -46,26 +46,29 @@ static inline uint64_t hash(const key *k)
     return mix(mix(mix(k->bits[0]) + k->bits[1]) + k->bits[2]);
 }
 
-/* True when the position was there already. Whoever comes first, the slot ends up with the lowest number. */
+/* True when the position was there already. Whoever comes first, the slot ends up with the lowest
+ * number. */
 static bool insert(ebpo_positions *t, uint32_t v)
 {
     key k = key_of(t->mesh, v);
     for (uint64_t h = hash(&k) & t->mask;; h = (h + 1) & t->mask) {
         uint32_t held = __atomic_load_n(&t->slots[h], __ATOMIC_RELAXED);
-        if (held == EBPO_NO_INDEX && __atomic_compare_exchange_n(&t->slots[h], &held, v, false, __ATOMIC_RELAXED,
-                                                                 __ATOMIC_RELAXED))
+        if (held == EBPO_NO_INDEX &&
+            __atomic_compare_exchange_n(&t->slots[h], &held, v, false, __ATOMIC_RELAXED,
+                                        __ATOMIC_RELAXED))
             return false;
         key other = key_of(t->mesh, held);
         if (!same_key(&k, &other))
             continue;
-        while (v < held && !__atomic_compare_exchange_n(&t->slots[h], &held, v, false, __ATOMIC_RELAXED,
-                                                        __ATOMIC_RELAXED))
+        while (v < held && !__atomic_compare_exchange_n(&t->slots[h], &held, v, false,
+                                                        __ATOMIC_RELAXED, __ATOMIC_RELAXED))
             ;
         return true;
     }
 }
 
-static ebpo_status insert_range(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status insert_range(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                ebpo_error *error)
 {
     (void)worker, (void)error;
     ebpo_positions *t = context;
@@ -89,8 +92,8 @@ ebpo_status ebpo_positions_build(ebpo_positions *out, const ebpo_mesh *mesh, uns
     if (!out->slots)
         return ebpo_workspace_fail(mesh->workspace, size * sizeof *out->slots, error);
     ebpo_array_fill(mesh->workspace, out->slots, 0xff, size * sizeof *out->slots);
-    ebpo_status status = ebpo_parallel_for(threads, mesh->vertex_count, VERTEX_GRAIN, insert_range, out, progress,
-                                           "comparing positions", error);
+    ebpo_status status = ebpo_parallel_for(threads, mesh->vertex_count, VERTEX_GRAIN, insert_range,
+                                           out, progress, "comparing positions", error);
     if (status != EBPO_OK)
         ebpo_positions_free(out);
     return status;

@@ -4,7 +4,8 @@
 
 #include "mesh/mesh.h"
 
-/* A hash table of all positions; each keeps the lowest vertex number that has it. 5.3 to 10.7 bytes a vertex. */
+/* A hash table of all positions; each keeps the lowest vertex number that has it. 5.3 to 10.7 bytes
+ * a vertex. */
 typedef struct ebpo_positions {
     const ebpo_mesh *mesh; /* borrowed */
     uint32_t *slots;
@@ -12,9 +13,11 @@ typedef struct ebpo_positions {
     uint64_t repeated; /* vertices whose position an earlier vertex has */
 } ebpo_positions;
 
-/* -0 equals 0; NaNs are compared by their bits. `out` is cleared on failure. The result is the same for any thread count. */
-EBPO_MUST_USE ebpo_status ebpo_positions_build(ebpo_positions *out, const ebpo_mesh *mesh, unsigned threads,
-                                               const ebpo_progress *progress, ebpo_error *error);
+/* -0 equals 0; NaNs are compared by their bits. `out` is cleared on failure. The result is the same
+ * for any thread count. */
+EBPO_MUST_USE ebpo_status ebpo_positions_build(ebpo_positions *out, const ebpo_mesh *mesh,
+                                               unsigned threads, const ebpo_progress *progress,
+                                               ebpo_error *error);
 void ebpo_positions_free(ebpo_positions *positions);
 
 /* The lowest vertex number with the position of v. */

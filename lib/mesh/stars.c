@@ -14,14 +14,18 @@ typedef struct build {
     ebpo_stars *stars;
 } build;
 
-static ebpo_status bad_index(const ebpo_mesh *mesh, uint64_t face, uint32_t vertex, ebpo_error *error)
+static ebpo_status bad_index(const ebpo_mesh *mesh, uint64_t face, uint32_t vertex,
+                             ebpo_error *error)
 {
-    return ebpo_fail(error, EBPO_E_FORMAT, "%s: face %llu names vertex %lu, but there are %llu vertices; "
-                     "repair the file or drop the face", ebpo_mesh_label(mesh), (unsigned long long)ebpo_mesh_source_face(mesh, face),
+    return ebpo_fail(error, EBPO_E_FORMAT,
+                     "%s: face %llu names vertex %lu, but there are %llu vertices; "
+                     "repair the file or drop the face",
+                     ebpo_mesh_label(mesh), (unsigned long long)ebpo_mesh_source_face(mesh, face),
                      (unsigned long)vertex, (unsigned long long)mesh->vertex_count);
 }
 
-static ebpo_status count_faces(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status count_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
 {
     (void)worker;
     build *b = context;
@@ -46,7 +50,8 @@ static inline void put(ebpo_stars *stars, uint32_t v, uint64_t f)
     stars->face[__atomic_fetch_sub(&stars->first[v], 1, __ATOMIC_RELAXED) - 1] = (uint32_t)f;
 }
 
-static ebpo_status place_faces(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status place_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
 {
     (void)worker, (void)error;
     build *b = context;
@@ -62,16 +67,17 @@ static ebpo_status place_faces(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-ebpo_status ebpo_stars_build(ebpo_stars *out, const ebpo_mesh *mesh, unsigned threads, const ebpo_progress *progress,
-                             ebpo_error *error)
+ebpo_status ebpo_stars_build(ebpo_stars *out, const ebpo_mesh *mesh, unsigned threads,
+                             const ebpo_progress *progress, ebpo_error *error)
 {
     *out = (ebpo_stars){ NULL, NULL };
     build b = { mesh, out };
     out->first = ebpo_array_zero(mesh->workspace, mesh->vertex_count + 1, sizeof *out->first);
     if (!out->first)
-        return ebpo_workspace_fail(mesh->workspace, (mesh->vertex_count + 1) * sizeof *out->first, error);
-    ebpo_status status = ebpo_parallel_for(threads, mesh->face_count, FACE_GRAIN, count_faces, &b, progress,
-                                           "counting faces at vertices", error);
+        return ebpo_workspace_fail(mesh->workspace, (mesh->vertex_count + 1) * sizeof *out->first,
+                                   error);
+    ebpo_status status = ebpo_parallel_for(threads, mesh->face_count, FACE_GRAIN, count_faces, &b,
+                                           progress, "counting faces at vertices", error);
     if (status != EBPO_OK)
         goto done;
     uint64_t total = 0;
@@ -123,17 +129,21 @@ static void sort_links(ebpo_link *links, uint64_t count)
     }
 }
 
-static inline void add_link(ebpo_star *star, uint32_t neighbour, uint32_t face, uint32_t entry, int out, int corner)
+static inline void add_link(ebpo_star *star, uint32_t neighbour, uint32_t face, uint32_t entry,
+                            int out, int corner)
 {
-    star->links[star->count++] = (ebpo_link){ .key = (uint64_t)neighbour << 32 | face, .entry = entry,
-                                              .out = (uint8_t)out, .corner = (uint8_t)corner };
+    star->links[star->count++] = (ebpo_link){ .key = (uint64_t)neighbour << 32 | face,
+                                              .entry = entry,
+                                              .out = (uint8_t)out,
+                                              .corner = (uint8_t)corner };
 }
 
 bool ebpo_star_gather(ebpo_star *star, const ebpo_stars *stars, const ebpo_mesh *mesh, uint32_t v)
 {
     uint64_t degree = ebpo_stars_degree(stars, v);
     star->count = star->faces = 0;
-    if (!ebpo_array_grow_late(mesh->workspace, &star->links, &star->capacity, 2 * degree, sizeof *star->links))
+    if (!ebpo_array_grow_late(mesh->workspace, &star->links, &star->capacity, 2 * degree,
+                              sizeof *star->links))
         return false;
     const uint32_t *faces = stars->face + stars->first[v];
     for (uint64_t i = 0; i < degree; i++) {
@@ -167,5 +177,6 @@ uint64_t ebpo_star_find(const ebpo_star *star, uint32_t neighbour)
         else
             high = middle;
     }
-    return low < star->count && ebpo_link_neighbour(&star->links[low]) == neighbour ? low : star->count;
+    return low < star->count && ebpo_link_neighbour(&star->links[low]) == neighbour ? low
+                                                                                    : star->count;
 }

@@ -1,4 +1,5 @@
-/* Exact summation of doubles: the sum of millions of terms, rounded once, in whatever order they come. A fixed-point number wide enough for all doubles, in limbs of 32 bits that carry late
+/* Exact summation of doubles: the sum of millions of terms, rounded once, in whatever order they
+ * come. A fixed-point number wide enough for all doubles, in limbs of 32 bits that carry late
  * (Kulisch's long accumulator). */
 #ifndef EBPO_MESH_SUM_H
 #define EBPO_MESH_SUM_H
@@ -84,7 +85,10 @@ static inline double ebpo_sum_value(const ebpo_sum *sum)
         rest |= s.limb[i] != 0;
     int unit = 32 * (top - 2) - 1074; /* head counts 2^unit */
     uint64_t high = (uint64_t)(head >> 64), low = (uint64_t)head;
-    int bits = high ? 128 - __builtin_clzll(high) : low ? 64 - __builtin_clzll(low) : 0, drop = bits - 53;
+    int bits = high  ? 128 - __builtin_clzll(high)
+               : low ? 64 - __builtin_clzll(low)
+                     : 0,
+        drop = bits - 53;
     if (unit + drop < -1074)
         drop = -1074 - unit; /* a denormal result */
     if (drop > 0) {

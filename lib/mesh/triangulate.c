@@ -58,7 +58,7 @@ static bool least_area(const ebpo_chain *c, uint32_t (*triangles)[3])
     uint64_t n = c->n, written = 0, open = 0;
     double *cost = ebpo_alloc(n * n, sizeof *cost);
     uint16_t *apex = ebpo_alloc(n * n, sizeof *apex);
-    uint32_t (*stack)[2] = ebpo_alloc(n, sizeof *stack);
+    uint32_t(*stack)[2] = ebpo_alloc(n, sizeof *stack);
     bool ok = cost && apex && stack;
     if (ok) {
         fill_tables(c, cost, apex);
@@ -109,9 +109,11 @@ static bool cut_sooner(const ear *a, const ear *b)
 static void push_ear(cutting *c, uint32_t tip)
 {
     double n[3];
-    const double (*p)[3] = c->chain->point;
+    const double(*p)[3] = c->chain->point;
     ebpo_face_cross(p[c->before[tip]], p[tip], p[c->after[tip]], n);
-    ear e = { .area = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]), .tip = tip, .version = ++c->version[tip],
+    ear e = { .area = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]),
+              .tip = tip,
+              .version = ++c->version[tip],
               .reflex = n[0] * c->normal[0] + n[1] * c->normal[1] + n[2] * c->normal[2] < 0 };
     uint64_t i = c->count++;
     for (; i > 0 && cut_sooner(&e, &c->heap[(i - 1) / 2]); i = (i - 1) / 2)
@@ -155,8 +157,11 @@ static bool cut_ears(const ebpo_chain *chain, uint32_t (*triangles)[3])
 {
     uint64_t n = chain->n, written = 0;
     ebpo_workspace *w = chain->workspace;
-    cutting c = { .chain = chain, .before = ebpo_array_alloc(w, n, sizeof *c.before), .after = ebpo_array_alloc(w, n, sizeof *c.after),
-                  .version = ebpo_array_zero(w, n, sizeof *c.version), .heap = ebpo_array_alloc(w, 3 * n, sizeof *c.heap) };
+    cutting c = { .chain = chain,
+                  .before = ebpo_array_alloc(w, n, sizeof *c.before),
+                  .after = ebpo_array_alloc(w, n, sizeof *c.after),
+                  .version = ebpo_array_zero(w, n, sizeof *c.version),
+                  .heap = ebpo_array_alloc(w, 3 * n, sizeof *c.heap) };
     bool ok = c.before && c.after && c.version && c.heap;
     if (ok)
         start_cutting(&c);
@@ -182,5 +187,6 @@ static bool cut_ears(const ebpo_chain *chain, uint32_t (*triangles)[3])
 
 bool ebpo_triangulate_chain(const ebpo_chain *chain, uint32_t (*triangles)[3])
 {
-    return chain->n <= EBPO_OPTIMAL_CHAIN ? least_area(chain, triangles) : cut_ears(chain, triangles);
+    return chain->n <= EBPO_OPTIMAL_CHAIN ? least_area(chain, triangles)
+                                          : cut_ears(chain, triangles);
 }

@@ -16,21 +16,27 @@ enum { GRAIN = 1 << 15, WORD = 64 };
 typedef struct welding {
     ebpo_mesh *mesh;
     uint64_t kept;
-    uint32_t *map;     /* [vertex_count] new number of each vertex */
-    uint32_t *from;    /* [kept] the vertex that stays, of those at one position */
-    uint64_t *heads;   /* of an arranged mesh: [blocks of GRAIN vertices + 1] positions that begin there; then before it */
-    uint64_t *stays;   /* of an arranged mesh: bit s: vertex s of the source stays */
-    uint64_t *before;  /* [words of `stays`] bits set before it */
+    uint32_t *map;  /* [vertex_count] new number of each vertex */
+    uint32_t *from; /* [kept] the vertex that stays, of those at one position */
+    /* of an arranged mesh: [blocks of GRAIN vertices + 1] positions that begin there; then before
+     * it */
+    uint64_t *heads;
+    uint64_t *stays;  /* of an arranged mesh: bit s: vertex s of the source stays */
+    uint64_t *before; /* [words of `stays`] bits set before it */
 } welding;
 
-static ebpo_status check_indices(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status check_indices(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
 {
     const ebpo_mesh *mesh = context;
     (void)worker;
     for (uint64_t i = 3 * begin; i < 3 * end; i++)
         if (mesh->faces[i] >= mesh->vertex_count)
-            return ebpo_fail(error, EBPO_E_FORMAT, "%s: face %llu names vertex %lu, but there are %llu vertices; "
-                             "repair the file or drop the face", ebpo_mesh_label(mesh), (unsigned long long)ebpo_mesh_source_face(mesh, i / 3),
+            return ebpo_fail(error, EBPO_E_FORMAT,
+                             "%s: face %llu names vertex %lu, but there are %llu vertices; "
+                             "repair the file or drop the face",
+                             ebpo_mesh_label(mesh),
+                             (unsigned long long)ebpo_mesh_source_face(mesh, i / 3),
                              (unsigned long)mesh->faces[i], (unsigned long long)mesh->vertex_count);
     ebpo_workspace_settle(mesh->workspace);
     return EBPO_OK;
@@ -66,7 +72,8 @@ static bool begins_group(const ebpo_mesh *mesh, uint64_t v)
     return p[0] != q[0] || p[1] != q[1] || p[2] != q[2];
 }
 
-static ebpo_status count_heads(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status count_heads(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
 {
     welding *w = context;
     (void)worker, (void)error;
@@ -78,7 +85,8 @@ static ebpo_status count_heads(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-static ebpo_status number_groups(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status number_groups(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
 {
     welding *w = context;
     (void)worker, (void)error;
@@ -103,12 +111,14 @@ static ebpo_status group_neighbours(welding *w, ebpo_error *error)
         w->heads[i] = w->kept;
         w->kept += count;
     }
-    return status == EBPO_OK ? ebpo_parallel_for(0, n, GRAIN, number_groups, w, NULL, "", error) : status;
+    return status == EBPO_OK ? ebpo_parallel_for(0, n, GRAIN, number_groups, w, NULL, "", error)
+                             : status;
 }
 
 /* --- what stays --- */
 
-/* Of each group the vertex that the source has first. Groups are numbered by their first vertices, so a new number is met first as the next one. */
+/* Of each group the vertex that the source has first. Groups are numbered by their first vertices,
+ * so a new number is met first as the next one. */
 static void choose(welding *w)
 {
     const ebpo_mesh *mesh = w->mesh;
@@ -123,7 +133,8 @@ static void choose(welding *w)
     }
 }
 
-static ebpo_status mark_sources(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status mark_sources(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                ebpo_error *error)
 {
     welding *w = context;
     (void)worker, (void)error;
@@ -155,7 +166,8 @@ static ebpo_status number_sources(welding *w, ebpo_error *error)
 
 /* --- putting it in place: nothing can fail from here on --- */
 
-static ebpo_status rename_corners(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status rename_corners(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                  ebpo_error *error)
 {
     const welding *w = context;
     (void)worker, (void)error;
@@ -167,7 +179,8 @@ static ebpo_status rename_corners(void *context, uint64_t begin, uint64_t end, u
     return EBPO_OK;
 }
 
-/* A group's new place never lies behind any of its vertices, so moving in ascending order overwrites nothing that is still needed. */
+/* A group's new place never lies behind any of its vertices, so moving in ascending order
+ * overwrites nothing that is still needed. */
 static void move_vertices(welding *w)
 {
     ebpo_mesh *mesh = w->mesh;
@@ -181,7 +194,10 @@ static void move_vertices(welding *w)
             memmove(base + i * size, base + from * size, size);
         if (order) {
             uint64_t s = order->vertex_source[from];
-            order->vertex_source[i] = (uint32_t)(w->before[s / WORD] + (uint64_t)__builtin_popcountll(w->stays[s / WORD] & ((UINT64_C(1) << s % WORD) - 1)));
+            order->vertex_source[i] =
+                (uint32_t)(w->before[s / WORD] +
+                           (uint64_t)__builtin_popcountll(w->stays[s / WORD] &
+                                                          ((UINT64_C(1) << s % WORD) - 1)));
         }
     }
     mesh->vertex_count = w->kept;
@@ -199,13 +215,15 @@ static void move_vertices(welding *w)
 static ebpo_status run(welding *w, ebpo_error *error)
 {
     ebpo_mesh *mesh = w->mesh;
-    ebpo_status status = ebpo_parallel_for(0, mesh->face_count, GRAIN, check_indices, mesh, NULL, "", error);
+    ebpo_status status =
+        ebpo_parallel_for(0, mesh->face_count, GRAIN, check_indices, mesh, NULL, "", error);
     if (status != EBPO_OK)
         return status;
     w->map = ebpo_array_alloc(mesh->workspace, mesh->vertex_count, sizeof *w->map);
     if (!w->map)
         return ebpo_workspace_fail(mesh->workspace, mesh->vertex_count * sizeof *w->map, error);
-    status = mesh->arrangement && mesh->arrangement->grouped ? group_neighbours(w, error) : group_by_table(w, error);
+    status = mesh->arrangement && mesh->arrangement->grouped ? group_neighbours(w, error)
+                                                             : group_by_table(w, error);
     if (status != EBPO_OK || w->kept == mesh->vertex_count)
         return status;
     w->from = ebpo_array_alloc(mesh->workspace, w->kept, sizeof *w->from);

@@ -26,12 +26,13 @@ static inline uint32_t gather(uint64_t x)
 
 ebpo_octcode ebpo_octcode_of_cell(ebpo_cell cell)
 {
-    return (uint64_t)1 << 3 * cell.level | spread(cell.at[0]) | spread(cell.at[1]) << 1 | spread(cell.at[2]) << 2;
+    return (uint64_t)1 << 3 * cell.level | spread(cell.at[0]) | spread(cell.at[1]) << 1 |
+           spread(cell.at[2]) << 2;
 }
 
 ebpo_cell ebpo_cell_of_octcode(ebpo_octcode code)
 {
     int level = ebpo_octcode_level(code);
     uint64_t path = code ^ (uint64_t)1 << 3 * level;
-    return (ebpo_cell){level, {gather(path), gather(path >> 1), gather(path >> 2)}};
+    return (ebpo_cell){ level, { gather(path), gather(path >> 1), gather(path >> 2) } };
 }

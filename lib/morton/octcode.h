@@ -1,6 +1,7 @@
-/* Octcodes: locational codes of octree nodes. 64 bits: a leading 1, then three bits for each level, the most significant first;
- * the root is 1. Numeric order is breadth-first order. Bit 0 of each triple is x, bit 1 y, bit 2 z.
- * Source: EBP 2017, section 3.3 (there with separate level bits and at most 20 levels). */
+/* Octcodes: locational codes of octree nodes. 64 bits: a leading 1, then three bits for each level,
+ * the most significant first; the root is 1. Numeric order is breadth-first order. Bit 0 of each
+ * triple is x, bit 1 y, bit 2 z. Source: EBP 2017, section 3.3 (there with separate level bits and
+ * at most 20 levels). */
 #ifndef EBPO_MORTON_OCTCODE_H
 #define EBPO_MORTON_OCTCODE_H
 
@@ -19,15 +20,9 @@ static inline bool ebpo_octcode_valid(ebpo_octcode code)
     return top % 3 == 0 && top / 3 <= EBPO_MAX_LEVEL;
 }
 
-static inline int ebpo_octcode_level(ebpo_octcode code)
-{
-    return (63 - __builtin_clzll(code)) / 3;
-}
+static inline int ebpo_octcode_level(ebpo_octcode code) { return (63 - __builtin_clzll(code)) / 3; }
 
-static inline ebpo_octcode ebpo_octcode_parent(ebpo_octcode code)
-{
-    return code >> 3;
-}
+static inline ebpo_octcode ebpo_octcode_parent(ebpo_octcode code) { return code >> 3; }
 
 static inline ebpo_octcode ebpo_octcode_child(ebpo_octcode code, unsigned octant)
 {

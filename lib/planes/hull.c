@@ -1,4 +1,5 @@
-/* Incremental: each point beyond the hull takes the place of the facets that it sees. Points that are extreme in some directions come first, so that most others never are. */
+/* Incremental: each point beyond the hull takes the place of the facets that it sees. Points that
+ * are extreme in some directions come first, so that most others never are. */
 #include "geom/strict_fp.h"
 
 #include "planes/hull.h"
@@ -19,7 +20,8 @@ enum { ROOM = EBPO_HULL_FACETS, WAYS = 14, VISIBLE = 192 };
 typedef struct hull {
     const ebpo_sweep *sweep;
     const double (*p)[3];
-    double nx[ROOM + 4], ny[ROOM + 4], nz[ROOM + 4], d[ROOM + 4]; /* behind the last one, up to a full four: planes that nothing sees */
+    /* behind the last one, up to a full four: planes that nothing sees */
+    double nx[ROOM + 4], ny[ROOM + 4], nz[ROOM + 4], d[ROOM + 4];
     double length[ROOM], beyond;
     uint16_t corner[ROOM][3];
     int count, room;
@@ -37,10 +39,7 @@ static void cross_of(const double (*p)[3], int a, int b, int c, double n[3])
     n[2] = u[0] * v[1] - u[1] * v[0];
 }
 
-static double square(const double n[3])
-{
-    return n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
-}
+static double square(const double n[3]) { return n[0] * n[0] + n[1] * n[1] + n[2] * n[2]; }
 
 static void set_plane(hull *h, int i, const double n[3], double d)
 {
@@ -93,7 +92,8 @@ static void extremes(const double (*p)[3], int count, int at[WAYS])
     for (int w = 0; w < WAYS; w++)
         best[w] = -INFINITY, at[w] = 0;
     for (int i = 0; i < count; i++) {
-        double x = p[i][0], y = p[i][1], z = p[i][2], v[WAYS / 2] = { x, y, z, x + y + z, x + y - z, x - y + z, x - y - z };
+        double x = p[i][0], y = p[i][1], z = p[i][2],
+               v[WAYS / 2] = { x, y, z, x + y + z, x + y - z, x - y + z, x - y - z };
         for (int w = 0; w < WAYS / 2; w++) {
             if (v[w] > best[2 * w])
                 best[2 * w] = v[w], at[2 * w] = i;
@@ -120,7 +120,8 @@ static bool first_four(const double (*p)[3], int count, const int ways[WAYS], in
     double best = -1, n[3];
     for (int w = 0; w < 6; w += 2)
         if (distance2(p[ways[w]], p[ways[w + 1]]) > best)
-            best = distance2(p[ways[w]], p[ways[w + 1]]), corner[0] = ways[w + 1], corner[1] = ways[w];
+            best = distance2(p[ways[w]], p[ways[w + 1]]), corner[0] = ways[w + 1],
+            corner[1] = ways[w];
     best = 0;
     corner[2] = corner[3] = 0;
     for (int i = 0; i < count; i++) {
@@ -158,7 +159,8 @@ static bool first_facets(hull *h, const int c[4])
 /* --- one more point --- */
 
 /* Edges as from << 16 | to, and turned around; to a multiple of four, with what is none. */
-static int edges_of(const hull *h, const uint16_t *visible, int seen, uint32_t *edges, uint32_t *twins)
+static int edges_of(const hull *h, const uint16_t *visible, int seen, uint32_t *edges,
+                    uint32_t *twins)
 {
     int listed = 0;
     for (int i = 0; i < seen; i++) {
@@ -192,13 +194,15 @@ static void close_gaps(hull *h, const uint16_t *place, int from, int to, int cou
     set_count(h, count);
 }
 
-/* False when no more points are to be added: too much in one step. (Then facets may overlap; what comes of them are directions all the same.) */
+/* False when no more points are to be added: too much in one step. (Then facets may overlap; what
+ * comes of them are directions all the same.) */
 static bool add_point(hull *h, int point)
 {
     uint16_t visible[VISIBLE];
     uint32_t edges[3 * VISIBLE], twins[3 * VISIBLE];
     const ebpo_sweep_planes planes = { h->nx, h->ny, h->nz, h->d, (h->count + 3) / 4 };
-    int seen = h->sweep->seen(&planes, h->p[point], h->beyond, flat, visible, VISIBLE), made = 0, count = h->count;
+    int seen = h->sweep->seen(&planes, h->p[point], h->beyond, flat, visible, VISIBLE), made = 0,
+        count = h->count;
     if (seen == 0)
         return true;
     if (seen > VISIBLE)
@@ -231,7 +235,8 @@ static void grow_hull(hull *h, int count, const int ways[WAYS])
             return;
 }
 
-int ebpo_hull_facets(const double (*points)[3], int count, double tolerance, ebpo_hull_facet *facets, int room)
+int ebpo_hull_facets(const double (*points)[3], int count, double tolerance,
+                     ebpo_hull_facet *facets, int room)
 {
     hull h;
     int corner[4], ways[WAYS];
@@ -248,7 +253,9 @@ int ebpo_hull_facets(const double (*points)[3], int count, double tolerance, ebp
     grow_hull(&h, count, ways);
     for (int i = 0; i < h.count; i++)
         facets[i] = (ebpo_hull_facet){ .corner = { h.corner[i][0], h.corner[i][1], h.corner[i][2] },
-                                       .n = { h.nx[i], h.ny[i], h.nz[i] }, .d = h.d[i], .area = h.length[i] / 2 };
+                                       .n = { h.nx[i], h.ny[i], h.nz[i] },
+                                       .d = h.d[i],
+                                       .area = h.length[i] / 2 };
     return h.count;
 }
 

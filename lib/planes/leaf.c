@@ -1,4 +1,5 @@
-/* The envelope of a leaf, from its faces: the directions of the hull of what they leave in the cell. */
+/* The envelope of a leaf, from its faces: the directions of the hull of what they leave in the
+ * cell. */
 #include "geom/strict_fp.h"
 
 #include <math.h>
@@ -15,7 +16,8 @@ enum { LEAF_CANDIDATES = 64, LEAF_POINTS = 192, LEAF_TABLE = 512 };
 typedef struct leaf_points {
     double at[LEAF_POINTS][3], slack[LEAF_POINTS];
     int count;
-    uint8_t number[LEAF_TABLE]; /* by hash: 1 + place of the point; most corners of faces come several times */
+    /* by hash: 1 + place of the point; most corners of faces come several times */
+    uint8_t number[LEAF_TABLE];
 } leaf_points;
 
 static bool add_candidate(uint32_t normal, ebpo_candidate *out, int *count)
@@ -34,7 +36,8 @@ static bool add_point(leaf_points *points, const double p[3], double slack)
 {
     uint64_t bits[3];
     memcpy(bits, p, sizeof bits);
-    uint64_t key = (bits[0] * 0x9e3779b97f4a7c15u ^ bits[1]) * 0xbf58476d1ce4e5b9u ^ bits[2] * 0x94d049bb133111ebu;
+    uint64_t key = (bits[0] * 0x9e3779b97f4a7c15u ^ bits[1]) * 0xbf58476d1ce4e5b9u ^
+                   bits[2] * 0x94d049bb133111ebu;
     unsigned place = (unsigned)(key >> 40) % LEAF_TABLE;
     for (; points->number[place]; place = (place + 1) % LEAF_TABLE) {
         int i = points->number[place] - 1;
@@ -53,7 +56,8 @@ static bool add_point(leaf_points *points, const double p[3], double slack)
 }
 
 /* False when there are more than fit. */
-static bool gather_points(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces, uint64_t count, unsigned inside, leaf_points *points)
+static bool gather_points(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces,
+                          uint64_t count, unsigned inside, leaf_points *points)
 {
     points->count = 0;
     memset(points->number, 0, sizeof points->number);
@@ -73,7 +77,9 @@ static bool gather_points(const ebpo_box *box, ebpo_cell cell, const ebpo_triang
 static int hull_normals(const leaf_points *points, ebpo_candidate *out)
 {
     ebpo_hull_facet facets[2 * LEAF_POINTS];
-    int count = ebpo_hull_facets((const double (*)[3])points->at, points->count, 1e-9, facets, 2 * LEAF_POINTS), kept = 0;
+    int count = ebpo_hull_facets((const double(*)[3])points->at, points->count, 1e-9, facets,
+                                 2 * LEAF_POINTS),
+        kept = 0;
     if (count > LEAF_CANDIDATES)
         qsort(facets, (size_t)count, sizeof *facets, ebpo_hull_by_area);
     for (int i = 0; i < count; i++) {
@@ -86,8 +92,10 @@ static int hull_normals(const leaf_points *points, ebpo_candidate *out)
 
 /* --- many points, or all of them in a plane: the faces' directions --- */
 
-/* Distinct normals of the faces, of many an even sample; and the opposite ones, for solids and surfaces without thickness. */
-static int face_normals(const ebpo_box *box, const ebpo_triangle *faces, uint64_t count, ebpo_candidate *out)
+/* Distinct normals of the faces, of many an even sample; and the opposite ones, for solids and
+ * surfaces without thickness. */
+static int face_normals(const ebpo_box *box, const ebpo_triangle *faces, uint64_t count,
+                        ebpo_candidate *out)
 {
     int kept = 0;
     uint64_t step = count / (LEAF_CANDIDATES / 2) + 1;
@@ -99,7 +107,8 @@ static int face_normals(const ebpo_box *box, const ebpo_triangle *faces, uint64_
         ebpo_plane_code_decode(normal, n, &d);
         if (!add_candidate(normal, out, &kept))
             break;
-        if (ebpo_plane_code_normal((const double[3]){ -n[0], -n[1], -n[2] }, &normal) && !add_candidate(normal, out, &kept))
+        if (ebpo_plane_code_normal((const double[3]){ -n[0], -n[1], -n[2] }, &normal) &&
+            !add_candidate(normal, out, &kept))
             break;
     }
     return kept;
@@ -107,7 +116,8 @@ static int face_normals(const ebpo_box *box, const ebpo_triangle *faces, uint64_
 
 /* --- offsets --- */
 
-static void raise_supports(ebpo_candidate *c, double (*n)[3], int count, const double p[3], double slack)
+static void raise_supports(ebpo_candidate *c, double (*n)[3], int count, const double p[3],
+                           double slack)
 {
     double rounding = EBPO_NORMAL_NORM * slack;
     for (int j = 0; j < count; j++) {
@@ -126,8 +136,9 @@ static void decode(const ebpo_candidate *c, int count, double (*n)[3])
     }
 }
 
-static void supports_of_faces(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces, uint64_t count, unsigned inside, ebpo_candidate *c,
-                              double (*n)[3], int kept)
+static void supports_of_faces(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces,
+                              uint64_t count, unsigned inside, ebpo_candidate *c, double (*n)[3],
+                              int kept)
 {
     for (uint64_t i = 0; i < count; i++) {
         double p[9][3], slack;
@@ -140,8 +151,9 @@ static void supports_of_faces(const ebpo_box *box, ebpo_cell cell, const ebpo_tr
             raise_supports(c, n, kept, (const double[3]){ i & 1, i >> 1 & 1, i >> 2 & 1 }, 0);
 }
 
-static int leaf_candidates(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces, uint64_t count, unsigned inside_corners,
-                         ebpo_candidate out[LEAF_CANDIDATES])
+static int leaf_candidates(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces,
+                           uint64_t count, unsigned inside_corners,
+                           ebpo_candidate out[LEAF_CANDIDATES])
 {
     leaf_points points;
     double n[LEAF_CANDIDATES][3];
@@ -157,12 +169,19 @@ static int leaf_candidates(const ebpo_box *box, ebpo_cell cell, const ebpo_trian
     return kept;
 }
 
-int ebpo_leaf_planes(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces, uint64_t count, unsigned inside_corners,
-                     double epsilon, ebpo_polytope *envelope, uint32_t codes[EBPO_PLANES_MAX])
+int ebpo_leaf_planes(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces,
+                     uint64_t count, unsigned inside_corners, double epsilon,
+                     ebpo_polytope *envelope, uint32_t codes[EBPO_PLANES_MAX])
 {
     ebpo_candidate candidates[LEAF_CANDIDATES];
     int kept = leaf_candidates(box, cell, faces, count, inside_corners, candidates);
     if (epsilon > 0)
-        return ebpo_select_greedy(envelope, &(ebpo_choice){ .candidates = candidates, .count = kept, .most = EBPO_PLANES_MAX, .epsilon = epsilon, .reach = ebpo_needle }, codes);
+        return ebpo_select_greedy(envelope,
+                                  &(ebpo_choice){ .candidates = candidates,
+                                                  .count = kept,
+                                                  .most = EBPO_PLANES_MAX,
+                                                  .epsilon = epsilon,
+                                                  .reach = ebpo_needle },
+                                  codes);
     return ebpo_select_all(envelope, candidates, kept, EBPO_PLANES_MAX, codes);
 }

@@ -1,5 +1,6 @@
-/* Greedy selection: the plane that removes most volume first. Gains only shrink while the envelope does, so a gain computed
- * earlier bounds today's and most candidates are never looked at again (lazy evaluation). */
+/* Greedy selection: the plane that removes most volume first. Gains only shrink while the envelope
+ * does, so a gain computed earlier bounds today's and most candidates are never looked at again
+ * (lazy evaluation). */
 #include "geom/strict_fp.h"
 
 #include <math.h>
@@ -15,13 +16,15 @@ typedef struct ranked {
     int round; /* -1: never evaluated */
 } ranked;
 
-/* Candidates that may still be worth a plane: by the volume that they remove (a heap), and by how far the envelope reaches beyond them. */
+/* Candidates that may still be worth a plane: by the volume that they remove (a heap), and by how
+ * far the envelope reaches beyond them. */
 typedef struct contest {
     ranked by_gain[EBPO_PLANES_CANDIDATES], by_reach[EBPO_PLANES_CANDIDATES];
     int gains, reaches;
 } contest;
 
-bool ebpo_candidate_plane(const ebpo_candidate *candidate, uint32_t *code, double n[3], double *offset)
+bool ebpo_candidate_plane(const ebpo_candidate *candidate, uint32_t *code, double n[3],
+                          double *offset)
 {
     int32_t v[3], d;
     if (!ebpo_plane_code_decode(ebpo_plane_code_make(candidate->normal, 0), v, &d))
@@ -48,12 +51,11 @@ static void extent(const ebpo_polytope *p, const double n[3], double *least, dou
     *most = high;
 }
 
-static double length_of(const double n[3])
-{
-    return sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-}
+static double length_of(const double n[3]) { return sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]); }
 
-static void rank_candidates(const ebpo_polytope *envelope, double volume, const ebpo_candidate *candidates, int count, double epsilon, double reach, contest *c)
+static void rank_candidates(const ebpo_polytope *envelope, double volume,
+                            const ebpo_candidate *candidates, int count, double epsilon,
+                            double reach, contest *c)
 {
     c->gains = c->reaches = 0;
     for (int i = 0; i < count && i < EBPO_PLANES_CANDIDATES; i++) {
@@ -103,8 +105,10 @@ static void drop_first(ranked *heap, int *count)
         sift_down(heap, *count, 0);
 }
 
-/* Volume alone leaves needles, which have next to none: cuts off what reaches far, farthest first. A plane that clipping refuses is left out, and the next one tried. */
-static int cut_needles(ebpo_polytope *envelope, contest *c, double reach, int most, int taken, uint32_t *codes)
+/* Volume alone leaves needles, which have next to none: cuts off what reaches far, farthest first.
+ * A plane that clipping refuses is left out, and the next one tried. */
+static int cut_needles(ebpo_polytope *envelope, contest *c, double reach, int most, int taken,
+                       uint32_t *codes)
 {
     while (taken < most && c->reaches > 0) {
         double deepest = reach;
@@ -124,7 +128,8 @@ static int cut_needles(ebpo_polytope *envelope, contest *c, double reach, int mo
         if (which < 0)
             break;
         ranked r = c->by_reach[which];
-        memmove(&c->by_reach[which], &c->by_reach[which + 1], (size_t)(--c->reaches - which) * sizeof r);
+        memmove(&c->by_reach[which], &c->by_reach[which + 1],
+                (size_t)(--c->reaches - which) * sizeof r);
         if (ebpo_polytope_clip(envelope, r.n, r.d, taken) == EBPO_CLIP_CUT)
             codes[taken++] = r.code;
     }
@@ -136,7 +141,8 @@ int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint3
     contest c;
     double epsilon = choice->epsilon, volume = ebpo_polytope_volume(envelope);
     int taken = 0, most = choice->most;
-    rank_candidates(envelope, volume, choice->candidates, choice->count, epsilon, choice->reach, &c);
+    rank_candidates(envelope, volume, choice->candidates, choice->count, epsilon, choice->reach,
+                    &c);
     make_heap(c.by_gain, c.gains);
     while (c.gains > 0 && taken < most && volume - choice->core >= epsilon) {
         ranked *r = &c.by_gain[0];
@@ -161,11 +167,13 @@ int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint3
 /* Share of the cell below which a derived plane is not worth the time of a clip. */
 static const double hardly_anything = 3e-4;
 
-int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, int most, uint32_t *codes)
+int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, int most,
+                    uint32_t *codes)
 {
     contest c;
     int taken = 0;
-    rank_candidates(envelope, ebpo_polytope_volume(envelope), candidates, count, hardly_anything, ebpo_needle, &c);
+    rank_candidates(envelope, ebpo_polytope_volume(envelope), candidates, count, hardly_anything,
+                    ebpo_needle, &c);
     make_heap(c.by_gain, c.gains);
     for (; c.gains > 0 && taken < most; drop_first(c.by_gain, &c.gains))
         if (ebpo_polytope_clip(envelope, c.by_gain[0].n, c.by_gain[0].d, taken) == EBPO_CLIP_CUT)

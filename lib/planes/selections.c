@@ -7,7 +7,10 @@
 
 static const ebpo_selection_method methods[] = {
     [EBPO_SELECT_INHERIT] = { .select = ebpo_select_greedy },
-    [EBPO_SELECT_KMEDOIDS] = { .select = ebpo_select_kmedoids, .from_leaves = true, .has_seed = true, .has_normals = true },
+    [EBPO_SELECT_KMEDOIDS] = { .select = ebpo_select_kmedoids,
+                               .from_leaves = true,
+                               .has_seed = true,
+                               .has_normals = true },
     [EBPO_SELECT_OFFSET] = { .select = ebpo_select_offset, .from_leaves = true },
     [EBPO_SELECT_RANDOM] = { .select = ebpo_select_random, .from_leaves = true, .has_seed = true },
 };

@@ -1,5 +1,6 @@
-/* The two inner loops of hulls and supports, four doubles at a time. They stand in sweep.inc and are compiled twice, for any processor and for those with AVX2; the same operations in the
- * same order, so results are the same. */
+/* The two inner loops of hulls and supports, four doubles at a time. They stand in sweep.inc and
+ * are compiled twice, for any processor and for those with AVX2; the same operations in the same
+ * order, so results are the same. */
 #ifndef EBPO_PLANES_SWEEP_H
 #define EBPO_PLANES_SWEEP_H
 
@@ -16,18 +17,25 @@ typedef struct ebpo_sweep_planes {
     int fours;
 } ebpo_sweep_planes;
 
-/* Points in fours, by coordinate: x, y, z, and what is added to n . x. What fills the last four is a copy. */
+/* Points in fours, by coordinate: x, y, z, and what is added to n . x. What fills the last four is
+ * a copy. */
 typedef struct ebpo_sweep_points {
     const double (*point)[4][4]; /* [fours] */
-    const double (*box)[7];      /* of each stretch: least and greatest coordinates, greatest addition */
+    /* of each stretch: least and greatest coordinates, greatest addition */
+    const double (*box)[7];
     uint64_t fours;
 } ebpo_sweep_points;
 
 typedef struct ebpo_sweep {
-    /* Planes that p lies above by more than `above`, if it is beyond any by more than `beyond` (else none): writes the first `room` numbers and returns how many there are. */
-    int (*seen)(const ebpo_sweep_planes *planes, const double p[3], double beyond, double above, uint16_t *list, int room);
-    /* Raises *best to the greatest value among the points; ends when it has reached `enough`. Returns the first point's number of the stretch that the value is from; UINT64_MAX: none is greater. */
-    uint64_t (*highest)(const ebpo_sweep_points *points, const double n[3], double enough, double *best);
+    /* Planes that p lies above by more than `above`, if it is beyond any by more than `beyond`
+     * (else none): writes the first `room` numbers and returns how many there are. */
+    int (*seen)(const ebpo_sweep_planes *planes, const double p[3], double beyond, double above,
+                uint16_t *list, int room);
+    /* Raises *best to the greatest value among the points; ends when it has reached `enough`.
+     * Returns the first point's number of the stretch that the value is from; UINT64_MAX: none is
+     * greater. */
+    uint64_t (*highest)(const ebpo_sweep_points *points, const double n[3], double enough,
+                        double *best);
 } ebpo_sweep;
 
 extern const ebpo_sweep ebpo_sweep_base, ebpo_sweep_avx2;

@@ -1,4 +1,5 @@
-/* The theses' selections (EBP 2017, 3.3.4.3; BP 2008, 3.4.2): which of the candidates, whatever they cut. */
+/* The theses' selections (EBP 2017, 3.3.4.3; BP 2008, 3.4.2): which of the candidates, whatever
+ * they cut. */
 #include "geom/strict_fp.h"
 
 #include <math.h>
@@ -18,8 +19,10 @@ static uint64_t next_random(uint64_t *state)
     return z ^ z >> 31;
 }
 
-/* Clips by the chosen candidates in ascending order of their numbers. Those that cut nothing when their turn comes are not kept. */
-static int take(ebpo_polytope *envelope, const ebpo_choice *choice, const bool *chosen, uint32_t *codes)
+/* Clips by the chosen candidates in ascending order of their numbers. Those that cut nothing when
+ * their turn comes are not kept. */
+static int take(ebpo_polytope *envelope, const ebpo_choice *choice, const bool *chosen,
+                uint32_t *codes)
 {
     int taken = 0;
     for (int i = 0; i < choice->count && taken < choice->most; i++) {
@@ -85,20 +88,22 @@ int ebpo_select_offset(ebpo_polytope *envelope, const ebpo_choice *choice, uint3
     return taken;
 }
 
-/* --- k-medoids: PAM, as the theses cite it after Ng and Han 1994. The swap of least cost is found for all medoids in one pass over the points (Schubert and Rousseeuw 2019), which
- * gives PAM's result in a k-th of the time. --- */
+/* --- k-medoids: PAM, as the theses cite it after Ng and Han 1994. The swap of least cost is found
+ * for all medoids in one pass over the points (Schubert and Rousseeuw 2019), which gives PAM's
+ * result in a k-th of the time. --- */
 
 typedef struct clustering {
     int count, wanted;
-    float *distance;            /* [count][count] */
-    int *medoid;                /* [wanted] */
-    bool *chosen;               /* [count] */
-    int *nearest;               /* [count] place in `medoid` */
-    float *first, *second;      /* [count] distance of the nearest medoid and of the next */
-    double *lost, *gain;        /* [wanted] */
+    float *distance;       /* [count][count] */
+    int *medoid;           /* [wanted] */
+    bool *chosen;          /* [count] */
+    int *nearest;          /* [count] place in `medoid` */
+    float *first, *second; /* [count] distance of the nearest medoid and of the next */
+    double *lost, *gain;   /* [wanted] */
 } clustering;
 
-/* The angle of (x, y) from the x axis, -pi .. pi, to about 1e-15, by operations that round alike everywhere: libm's own differ from one to the next, and choices must not. */
+/* The angle of (x, y) from the x axis, -pi .. pi, to about 1e-15, by operations that round alike
+ * everywhere: libm's own differ from one to the next, and choices must not. */
 static double angle_of(double y, double x)
 {
     double least = fmin(fabs(x), fabs(y)), most = fmax(fabs(x), fabs(y));
@@ -136,19 +141,27 @@ static void place_normal(const ebpo_choice *choice, uint32_t normal, double out[
         out[k] /= sqrt(length);
     if (choice->normals == EBPO_NORMALS_ANGLE)
         return;
-    double around = angle_of(out[1], out[0]), down = angle_of(sqrt(out[0] * out[0] + out[1] * out[1]), out[2]);
+    double around = angle_of(out[1], out[0]),
+           down = angle_of(sqrt(out[0] * out[0] + out[1] * out[1]), out[2]);
     out[0] = around, out[1] = down, out[2] = 0;
 }
 
 static bool clustering_make(clustering *c, const ebpo_choice *choice)
 {
     uint64_t n = (uint64_t)choice->count, k = (uint64_t)choice->wanted;
-    double (*at)[3] = ebpo_alloc(n, sizeof *at);
-    *c = (clustering){ .count = choice->count, .wanted = choice->wanted, .distance = ebpo_alloc(n * n, sizeof *c->distance),
-                       .medoid = ebpo_alloc(k, sizeof *c->medoid), .chosen = ebpo_alloc_zero(n, sizeof *c->chosen),
-                       .nearest = ebpo_alloc(n, sizeof *c->nearest), .first = ebpo_alloc(n, sizeof *c->first),
-                       .second = ebpo_alloc(n, sizeof *c->second), .lost = ebpo_alloc(k, sizeof *c->lost), .gain = ebpo_alloc(k, sizeof *c->gain) };
-    bool good = at && c->distance && c->medoid && c->chosen && c->nearest && c->first && c->second && c->lost && c->gain;
+    double(*at)[3] = ebpo_alloc(n, sizeof *at);
+    *c = (clustering){ .count = choice->count,
+                       .wanted = choice->wanted,
+                       .distance = ebpo_alloc(n * n, sizeof *c->distance),
+                       .medoid = ebpo_alloc(k, sizeof *c->medoid),
+                       .chosen = ebpo_alloc_zero(n, sizeof *c->chosen),
+                       .nearest = ebpo_alloc(n, sizeof *c->nearest),
+                       .first = ebpo_alloc(n, sizeof *c->first),
+                       .second = ebpo_alloc(n, sizeof *c->second),
+                       .lost = ebpo_alloc(k, sizeof *c->lost),
+                       .gain = ebpo_alloc(k, sizeof *c->gain) };
+    bool good = at && c->distance && c->medoid && c->chosen && c->nearest && c->first &&
+                c->second && c->lost && c->gain;
     for (uint64_t i = 0; i < n && good; i++)
         place_normal(choice, choice->candidates[i].normal, at[i]);
     for (uint64_t i = 0; i < n && good; i++)
@@ -201,7 +214,8 @@ static void assign(clustering *c)
     }
 }
 
-/* The change of the total cost when candidate `h` takes the place of each medoid; the best of them. */
+/* The change of the total cost when candidate `h` takes the place of each medoid; the best of them.
+ */
 static double best_swap_for(clustering *c, int h, int *which)
 {
     const float *row = c->distance + (size_t)h * (size_t)c->count;
@@ -263,7 +277,8 @@ static void single_medoid(clustering *c)
 
 int ebpo_select_kmedoids(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
 {
-    enum { SWAPS_MOST = 100000 }; /* each lowers the cost; this only guards against rounding in circles */
+    /* each lowers the cost; this only guards against rounding in circles */
+    enum { SWAPS_MOST = 100000 };
     ebpo_choice all = *choice;
     if (!choice->count || choice->wanted < 1)
         return 0;

@@ -1,5 +1,6 @@
-/* A face against a cell: which octants it may touch, and its part in the cell. Everything errs on the safe side by a bound on the
- * rounding, so that no exact arithmetic is needed: including a neighbour costs nothing, missing one is a bug. */
+/* A face against a cell: which octants it may touch, and its part in the cell. Everything errs on
+ * the safe side by a bound on the rounding, so that no exact arithmetic is needed: including a
+ * neighbour costs nothing, missing one is a bug. */
 #include "geom/strict_fp.h"
 
 #include <math.h>
@@ -8,8 +9,10 @@
 #include "planes/octants.h"
 #include "planes/planes.h"
 
-/* Cell coordinates: one rounding in the subtraction, one in the division; corners and sizes of cells are exact. */
-static double to_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face, double x[3][3])
+/* Cell coordinates: one rounding in the subtraction, one in the division; corners and sizes of
+ * cells are exact. */
+static double to_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face,
+                      double x[3][3])
 {
     double most = 1;
     for (int k = 0; k < 3; k++) {
@@ -24,14 +27,13 @@ static double to_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *
     return most;
 }
 
-/* With coordinates up to M: 2.01 u M from to_cell, and at most 8 u M for each of six clips; 128 u M covers their sum. One value for all faces that do not reach far: then the
- * points that two faces share come out the same from both. */
-static double slack_for(double most)
-{
-    return most <= 2 ? 0x1p-45 : most * 0x1p-46;
-}
+/* With coordinates up to M: 2.01 u M from to_cell, and at most 8 u M for each of six clips; 128 u M
+ * covers their sum. One value for all faces that do not reach far: then the points that two faces
+ * share come out the same from both. */
+static double slack_for(double most) { return most <= 2 ? 0x1p-45 : most * 0x1p-46; }
 
-static int clip_wall(double in[9][3], int count, int axis, double sign, double limit, double out[9][3])
+static int clip_wall(double in[9][3], int count, int axis, double sign, double limit,
+                     double out[9][3])
 {
     int kept = 0;
     for (int i = 0; i < count; i++) {
@@ -55,7 +57,8 @@ static int clip_wall(double in[9][3], int count, int axis, double sign, double l
     return kept;
 }
 
-int ebpo_clip_triangle(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face, double points[9][3], double *slack)
+int ebpo_clip_triangle(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face,
+                       double points[9][3], double *slack)
 {
     double x[3][3], other[9][3], e = slack_for(to_cell(box, cell, face, x));
     *slack = e;
@@ -64,7 +67,8 @@ int ebpo_clip_triangle(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle 
         for (int k = 0; k < 3; k++)
             points[i][k] = x[i][k];
     for (int k = 0; k < 3; k++) {
-        double low = fmin(x[0][k], fmin(x[1][k], x[2][k])), high = fmax(x[0][k], fmax(x[1][k], x[2][k]));
+        double low = fmin(x[0][k], fmin(x[1][k], x[2][k])),
+               high = fmax(x[0][k], fmax(x[1][k], x[2][k]));
         if (low > 1 + e || high < -e)
             return 0;
         if (high <= 1 + e && low >= -e)
@@ -91,8 +95,9 @@ static void prepare(separation *s)
     s->normal[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-/* True when the plane of the face or a cross product of one of its edges with an axis separates it from the cube around `centre`.
- * Errors: edges 4 u M; cross terms below 64 u M^2; the plane's below 512 u M^3 (u = 2^-53). */
+/* True when the plane of the face or a cross product of one of its edges with an axis separates it
+ * from the cube around `centre`. Errors: edges 4 u M; cross terms below 64 u M^2; the plane's below
+ * 512 u M^3 (u = 2^-53). */
 static bool separated(const separation *s, const double centre[3], double half)
 {
     double m = s->most, tolerance = 0x1p-44 * m * m * m;
@@ -124,7 +129,8 @@ static unsigned octants_of_bounds(const ebpo_box *box, ebpo_cell cell, const ebp
     static const unsigned low_side[3] = { 0x55, 0x33, 0x0f };
     unsigned mask = 255;
     for (int k = 0; k < 3; k++) {
-        double wall = ebpo_wall(box, k, cell.level + 1, 2 * cell.at[k] + 1), a = face->corner[0][k], b = face->corner[1][k], c = face->corner[2][k];
+        double wall = ebpo_wall(box, k, cell.level + 1, 2 * cell.at[k] + 1), a = face->corner[0][k],
+               b = face->corner[1][k], c = face->corner[2][k];
         if (a > wall && b > wall && c > wall)
             mask &= ~low_side[k];
         if (a < wall && b < wall && c < wall)
@@ -159,7 +165,8 @@ bool ebpo_triangle_misses_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_t
     s.most = to_cell(box, cell, face, s.x);
     double e = slack_for(s.most);
     for (int k = 0; k < 3; k++)
-        if (fmin(s.x[0][k], fmin(s.x[1][k], s.x[2][k])) > 1 + e || fmax(s.x[0][k], fmax(s.x[1][k], s.x[2][k])) < -e)
+        if (fmin(s.x[0][k], fmin(s.x[1][k], s.x[2][k])) > 1 + e ||
+            fmax(s.x[0][k], fmax(s.x[1][k], s.x[2][k])) < -e)
             return true;
     prepare(&s);
     return separated(&s, (const double[3]){ 0.5, 0.5, 0.5 }, 0.5);
@@ -167,7 +174,8 @@ bool ebpo_triangle_misses_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_t
 
 bool ebpo_face_normal_code(const ebpo_box *box, const ebpo_triangle *face, uint32_t *normal)
 {
-    /* In coordinates scaled by the root box, which has the same shape as every cell, the normal needs no further scaling. */
+    /* In coordinates scaled by the root box, which has the same shape as every cell, the normal
+     * needs no further scaling. */
     separation s;
     s.most = to_cell(box, (ebpo_cell){ 0, { 0, 0, 0 } }, face, s.x);
     prepare(&s);

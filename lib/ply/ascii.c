@@ -1,5 +1,6 @@
-/* The body of an ascii PLY file. Values are told apart by white space, so a long list may be broken into lines; but every row ends its line,
- * otherwise a value too many in one row would shift all that follow. */
+/* The body of an ascii PLY file. Values are told apart by white space, so a long list may be broken
+ * into lines; but every row ends its line, otherwise a value too many in one row would shift all
+ * that follow. */
 #include "geom/strict_fp.h"
 
 #include <inttypes.h>
@@ -15,10 +16,7 @@ typedef struct rows {
     bool store;
 } rows;
 
-static bool is_blank(uint8_t c)
-{
-    return c == ' ' || (c >= '\t' && c <= '\r');
-}
+static bool is_blank(uint8_t c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
 /* False at the end of the file. */
 static bool next_token(ply_parser *p, ply_word *token)
@@ -38,7 +36,8 @@ static ebpo_status fail_token(const rows *r, const char *what, ply_word token)
 {
     char text[PLY_WORD_TEXT];
     ebpo_ply_word_text(text, token);
-    return ebpo_ply_fail(r->p, "%s '%s' in %s %" PRIu64 "; repair the file", what, text, ebpo_ply_row_name(r->element), r->row);
+    return ebpo_ply_fail(r->p, "%s '%s' in %s %" PRIu64 "; repair the file", what, text,
+                         ebpo_ply_row_name(r->element), r->row);
 }
 
 static ebpo_status next_integer(rows *r, int64_t *value)
@@ -61,8 +60,9 @@ static bool parse_coordinate(const rows *r, const ply_property *property, ply_wo
         return ebpo_number_double(&p->mesh->xyz64[place], token.s, token.n, p->c_locale);
     float narrow = 0;
     int64_t whole = 0;
-    bool good = property->type == PLY_FLOAT32 ? ebpo_number_float(&narrow, token.s, token.n, p->c_locale)
-                                              : ebpo_number_integer(&whole, token.s, token.n);
+    bool good = property->type == PLY_FLOAT32
+                    ? ebpo_number_float(&narrow, token.s, token.n, p->c_locale)
+                    : ebpo_number_integer(&whole, token.s, token.n);
     p->mesh->xyz64[place] = property->type == PLY_FLOAT32 ? (double)narrow : (double)whole;
     return good;
 }
@@ -109,8 +109,11 @@ static ebpo_status read_list(rows *r, const ply_property *property)
         return ebpo_ply_fail(p, "%s %" PRIu64 " has a list of %" PRId64 " items; repair the file",
                              ebpo_ply_row_name(r->element), r->row, count);
     if ((uint64_t)count > (p->size - p->at) / 2) { /* a blank and a digit each */
-        return ebpo_ply_fail(p, "%s %" PRIu64 " has a list of %" PRId64 " items, more than the rest of the file can hold; it is cut short or damaged",
-                             ebpo_ply_row_name(r->element), r->row, count);
+        return ebpo_ply_fail(
+            p,
+            "%s %" PRIu64 " has a list of %" PRId64
+            " items, more than the rest of the file can hold; it is cut short or damaged",
+            ebpo_ply_row_name(r->element), r->row, count);
     }
     if (r->store && property->role == PLY_ROLE_CORNERS)
         return read_corners(r, (uint64_t)count);
@@ -125,14 +128,16 @@ static ebpo_status read_property(rows *r, const ply_property *property)
     if (!next_token(r->p, &token))
         return ebpo_ply_fail_end(r->p, r->element, r->row);
     if (r->store && property->role != PLY_ROLE_NONE && !parse_coordinate(r, property, token))
-        return fail_token(r, property->type < PLY_FLOAT32 ? "no whole number:" : "no number:", token);
+        return fail_token(r,
+                          property->type < PLY_FLOAT32 ? "no whole number:" : "no number:", token);
     return EBPO_OK;
 }
 
 static ebpo_status end_row(rows *r)
 {
     ply_parser *p = r->p;
-    while (p->at < p->size && is_blank(p->data[p->at]) && p->data[p->at] != '\n' && p->data[p->at] != '\r')
+    while (p->at < p->size && is_blank(p->data[p->at]) && p->data[p->at] != '\n' &&
+           p->data[p->at] != '\r')
         p->at++;
     if (p->at == p->size || is_blank(p->data[p->at]))
         return EBPO_OK;
@@ -160,7 +165,8 @@ ebpo_status ebpo_ply_ascii_element(ply_parser *p, const ply_element *element, bo
 {
     rows r = { .p = p, .element = element, .store = store && element->kind != PLY_KIND_OTHER };
     ebpo_status status = EBPO_OK;
-    if (!element->properties) /* rows without values: nothing is written for them that we need to see */
+    if (!element->properties) /* rows without values: nothing is written for them that we need to
+                                 see */
         return EBPO_OK;
     for (; r.row < element->count && status == EBPO_OK; r.row++) {
         status = read_row(&r);

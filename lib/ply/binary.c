@@ -42,7 +42,8 @@ static double load_number(const uint8_t *at, ply_type type, bool swap)
 }
 
 /* Floats go through as bits: not even the payload of a NaN changes. */
-void ebpo_ply_store_coordinate(ebpo_mesh *mesh, uint64_t row, const ply_property *property, const uint8_t *at, bool swap)
+void ebpo_ply_store_coordinate(ebpo_mesh *mesh, uint64_t row, const ply_property *property,
+                               const uint8_t *at, bool swap)
 {
     uint64_t place = 3 * row + (uint64_t)(property->role - PLY_ROLE_X);
     if (mesh->xyz64) {
@@ -80,14 +81,17 @@ static ebpo_status store_corners(rows *r, const ply_property *property, uint64_t
 static ebpo_status read_list(rows *r, const ply_property *property)
 {
     ply_parser *p = r->p;
-    unsigned count_bytes = ebpo_ply_type_bytes(property->count_type), bytes = ebpo_ply_type_bytes(property->type);
+    unsigned count_bytes = ebpo_ply_type_bytes(property->count_type),
+             bytes = ebpo_ply_type_bytes(property->type);
     if (p->size - p->at < count_bytes)
         return ebpo_ply_fail_end(p, r->element, r->row);
     int64_t count = ebpo_ply_load_integer(p->data + p->at, property->count_type, r->swap);
     if (count < 0)
-        return ebpo_ply_fail(p, "%s %" PRIu64 " has a list of %" PRId64 " items; the file is damaged",
+        return ebpo_ply_fail(p,
+                             "%s %" PRIu64 " has a list of %" PRId64 " items; the file is damaged",
                              ebpo_ply_row_name(r->element), r->row, count);
-    if ((uint64_t)count * bytes > p->size - p->at - count_bytes) /* no overflow: counts have 32 bits at most */
+    if ((uint64_t)count * bytes >
+        p->size - p->at - count_bytes) /* no overflow: counts have 32 bits at most */
         return ebpo_ply_fail_end(p, r->element, r->row);
     p->at += count_bytes;
     ebpo_status status = EBPO_OK;
@@ -138,7 +142,9 @@ static ebpo_status step_over(rows *r)
 
 ebpo_status ebpo_ply_binary_element(ply_parser *p, const ply_element *element, bool store)
 {
-    rows r = { .p = p, .element = element, .swap = (int)p->header.encoding == (int)FOREIGN,
+    rows r = { .p = p,
+               .element = element,
+               .swap = (int)p->header.encoding == (int)FOREIGN,
                .store = store && element->kind != PLY_KIND_OTHER };
     if (!r.store && !element->has_list)
         return step_over(&r);

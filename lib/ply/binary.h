@@ -32,11 +32,15 @@ static inline int64_t ebpo_ply_load_integer(const uint8_t *at, ply_type type, bo
 }
 
 /* The value of an x, y or z at `at` becomes that of vertex `row`. */
-void ebpo_ply_store_coordinate(ebpo_mesh *mesh, uint64_t row, const ply_property *property, const uint8_t *at, bool swap);
+void ebpo_ply_store_coordinate(ebpo_mesh *mesh, uint64_t row, const ply_property *property,
+                               const uint8_t *at, bool swap);
 
-/* Reads the rows from p->at on as far as all have one size, and says how many these were: all vertices or none; the faces before the first that is no triangle, or names a vertex that is not there.
- * The others, and what is wrong with them, are the row by row reader's. */
-ebpo_status ebpo_ply_plain_vertices(ply_parser *p, const ply_element *element, bool swap, uint64_t *done);
-ebpo_status ebpo_ply_plain_faces(ply_parser *p, const ply_element *element, bool swap, uint64_t *done);
+/* Reads the rows from p->at on as far as all have one size, and says how many these were: all
+ * vertices or none; the faces before the first that is no triangle, or names a vertex that is not
+ * there. The others, and what is wrong with them, are the row by row reader's. */
+ebpo_status ebpo_ply_plain_vertices(ply_parser *p, const ply_element *element, bool swap,
+                                    uint64_t *done);
+ebpo_status ebpo_ply_plain_faces(ply_parser *p, const ply_element *element, bool swap,
+                                 uint64_t *done);
 
 #endif

@@ -20,11 +20,16 @@ typedef struct reader {
     ebpo_error *error;
 } reader;
 
-static const struct { const char *word; ply_type type; } type_names[] = {
-    { "char", PLY_INT8 }, { "uchar", PLY_UINT8 }, { "short", PLY_INT16 }, { "ushort", PLY_UINT16 },
-    { "int", PLY_INT32 }, { "uint", PLY_UINT32 }, { "float", PLY_FLOAT32 }, { "double", PLY_FLOAT64 },
-    { "int8", PLY_INT8 }, { "uint8", PLY_UINT8 }, { "int16", PLY_INT16 }, { "uint16", PLY_UINT16 },
-    { "int32", PLY_INT32 }, { "uint32", PLY_UINT32 }, { "float32", PLY_FLOAT32 }, { "float64", PLY_FLOAT64 },
+static const struct {
+    const char *word;
+    ply_type type;
+} type_names[] = {
+    { "char", PLY_INT8 },       { "uchar", PLY_UINT8 },    { "short", PLY_INT16 },
+    { "ushort", PLY_UINT16 },   { "int", PLY_INT32 },      { "uint", PLY_UINT32 },
+    { "float", PLY_FLOAT32 },   { "double", PLY_FLOAT64 }, { "int8", PLY_INT8 },
+    { "uint8", PLY_UINT8 },     { "int16", PLY_INT16 },    { "uint16", PLY_UINT16 },
+    { "int32", PLY_INT32 },     { "uint32", PLY_UINT32 },  { "float32", PLY_FLOAT32 },
+    { "float64", PLY_FLOAT64 },
 };
 
 unsigned ebpo_ply_type_bytes(ply_type type)
@@ -50,11 +55,14 @@ static ebpo_status fail(const reader *r, const char *what, ply_word word)
 {
     char text[PLY_WORD_TEXT];
     ebpo_ply_word_text(text, word);
-    return ebpo_fail(r->error, EBPO_E_FORMAT, "%s: line %" PRIu64 ": %s '%s'; this is not a PLY header as the format describes it",
+    return ebpo_fail(r->error, EBPO_E_FORMAT,
+                     "%s: line %" PRIu64
+                     ": %s '%s'; this is not a PLY header as the format describes it",
                      r->name, r->line, what, text);
 }
 
-/* The next line without its end, and without the '\r' of a DOS file. False at the end of the data. */
+/* The next line without its end, and without the '\r' of a DOS file. False at the end of the data.
+ */
 static bool next_line(reader *r, ply_word *line)
 {
     if (r->at == r->end)
@@ -103,7 +111,8 @@ static bool parse_count(ply_word word, uint64_t *count)
     *count = 0;
     for (size_t i = 0; i < word.n; i++) {
         unsigned digit = (unsigned char)word.s[i] - (unsigned)'0';
-        if (digit > 9 || __builtin_mul_overflow(*count, 10, count) || __builtin_add_overflow(*count, digit, count))
+        if (digit > 9 || __builtin_mul_overflow(*count, 10, count) ||
+            __builtin_add_overflow(*count, digit, count))
             return false;
     }
     return word.n > 0;
@@ -173,10 +182,14 @@ static ply_role role_of(const ply_element *element, const ply_property *property
 {
     if (element->kind == PLY_KIND_VERTEX && !property->list && property->name.n == 1) {
         char c = property->name.s[0];
-        return c == 'x' ? PLY_ROLE_X : c == 'y' ? PLY_ROLE_Y : c == 'z' ? PLY_ROLE_Z : PLY_ROLE_NONE;
+        return c == 'x'   ? PLY_ROLE_X
+               : c == 'y' ? PLY_ROLE_Y
+               : c == 'z' ? PLY_ROLE_Z
+                          : PLY_ROLE_NONE;
     }
     bool corners = is(property->name, "vertex_indices") || is(property->name, "vertex_index");
-    if ((element->kind == PLY_KIND_FACE || element->kind == PLY_KIND_STRIPS) && property->list && corners)
+    if ((element->kind == PLY_KIND_FACE || element->kind == PLY_KIND_STRIPS) && property->list &&
+        corners)
         return PLY_ROLE_CORNERS;
     return PLY_ROLE_NONE;
 }
@@ -200,7 +213,8 @@ static ebpo_status property_statement(reader *r, const ply_word *words, int n)
         return fail(r, "too few or too many words in", words[0]);
     if (!parse_type(words[n - 2], &property.type))
         return fail(r, "unknown type", words[n - 2]);
-    if (property.list && (!parse_type(words[2], &property.count_type) || property.count_type >= PLY_FLOAT32))
+    if (property.list &&
+        (!parse_type(words[2], &property.count_type) || property.count_type >= PLY_FLOAT32))
         return fail(r, "no type for a list's length:", words[2]);
     property.name = words[n - 1];
     ply_element *element = &h->element[h->elements - 1];
@@ -234,7 +248,8 @@ static ebpo_status statement(reader *r, ply_word line, bool *ended)
         *ended = true;
         return EBPO_OK;
     }
-    /* Blender 2.47 left the word "comment" out of its first line. Later on, a line that is not understood could change what the body means. */
+    /* Blender 2.47 left the word "comment" out of its first line. Later on, a line that is not
+     * understood could change what the body means. */
     return r->header->elements ? fail(r, "unknown statement", words[0]) : EBPO_OK;
 }
 
@@ -244,7 +259,8 @@ static ebpo_status check_magic(reader *r, uint64_t size)
     if (size >= 5 && memcmp(r->at, "ply\r", 4) == 0 && r->at[4] != '\n')
         r->header->line_end = '\r';
     if (size < 4 || memcmp(r->at, "ply", 3) != 0 || !next_line(r, &line) || line.n != 3)
-        return ebpo_fail(r->error, EBPO_E_FORMAT, "%s: line 1: no PLY file, it does not begin with a line 'ply'", r->name);
+        return ebpo_fail(r->error, EBPO_E_FORMAT,
+                         "%s: line 1: no PLY file, it does not begin with a line 'ply'", r->name);
     return EBPO_OK;
 }
 
@@ -254,8 +270,11 @@ static ebpo_status statements(reader *r, bool whole)
     ply_word line = { "", 0 };
     while (!ended) {
         if (!next_line(r, &line))
-            return ebpo_fail(r->error, EBPO_E_FORMAT, "%s: line %" PRIu64 ": %s before 'end_header'; the file is cut short or no PLY file",
-                             r->name, r->line + 1, whole ? "the file ends" : "a megabyte of header");
+            return ebpo_fail(r->error, EBPO_E_FORMAT,
+                             "%s: line %" PRIu64
+                             ": %s before 'end_header'; the file is cut short or no PLY file",
+                             r->name, r->line + 1,
+                             whole ? "the file ends" : "a megabyte of header");
         ebpo_status status = statement(r, line, &ended);
         if (status != EBPO_OK)
             return status;
@@ -277,7 +296,9 @@ static ebpo_status check_roles(const reader *r)
 {
     const ply_header *h = r->header;
     if (h->vertex < 0)
-        return ebpo_fail(r->error, EBPO_E_FORMAT, "%s: line %" PRIu64 ": the header names no element 'vertex'; there is no mesh in this file",
+        return ebpo_fail(r->error, EBPO_E_FORMAT,
+                         "%s: line %" PRIu64
+                         ": the header names no element 'vertex'; there is no mesh in this file",
                          r->name, r->line);
     for (uint64_t i = 0; i < h->elements; i++) {
         const ply_element *e = &h->element[i];
@@ -286,17 +307,25 @@ static ebpo_status check_roles(const reader *r)
         ply_role to = e->kind == PLY_KIND_VERTEX ? PLY_ROLE_Z : PLY_ROLE_CORNERS;
         for (int role = (int)from; role <= (int)to && e->kind != PLY_KIND_OTHER; role++)
             if (!has_role(h, e, (ply_role)role))
-                return ebpo_fail(r->error, EBPO_E_FORMAT, "%s: line %" PRIu64 ": this element has no %s '%s'; the mesh cannot be read without",
-                                 r->name, e->line, role == PLY_ROLE_CORNERS ? "list" : "property", missing[role]);
+                return ebpo_fail(r->error, EBPO_E_FORMAT,
+                                 "%s: line %" PRIu64
+                                 ": this element has no %s '%s'; the mesh cannot be read without",
+                                 r->name, e->line, role == PLY_ROLE_CORNERS ? "list" : "property",
+                                 missing[role]);
     }
     return EBPO_OK;
 }
 
-ebpo_status ebpo_ply_header_parse(ply_header *out, const uint8_t *data, uint64_t size, const char *name, ebpo_error *error)
+ebpo_status ebpo_ply_header_parse(ply_header *out, const uint8_t *data, uint64_t size,
+                                  const char *name, ebpo_error *error)
 {
     *out = (ply_header){ .line_end = '\n', .vertex = -1, .face = -1, .strips = -1 };
     uint64_t visible = size < PLY_HEADER_LONGEST ? size : PLY_HEADER_LONGEST;
-    reader r = { .header = out, .at = (const char *)data, .end = (const char *)data + visible, .name = name, .error = error };
+    reader r = { .header = out,
+                 .at = (const char *)data,
+                 .end = (const char *)data + visible,
+                 .name = name,
+                 .error = error };
     ebpo_status status = check_magic(&r, size);
     if (status == EBPO_OK)
         status = statements(&r, visible == size);

@@ -1,4 +1,5 @@
-/* The head of a PLY file: what its elements are made of. Source: Greg Turk, "The PLY Polygon File Format", 1994. */
+/* The head of a PLY file: what its elements are made of. Source: Greg Turk, "The PLY Polygon File
+ * Format", 1994. */
 #ifndef EBPO_PLY_HEADER_H
 #define EBPO_PLY_HEADER_H
 
@@ -6,10 +7,23 @@
 
 typedef enum ply_encoding { PLY_ASCII, PLY_LITTLE, PLY_BIG } ply_encoding;
 typedef enum ply_type {
-    PLY_INT8, PLY_UINT8, PLY_INT16, PLY_UINT16, PLY_INT32, PLY_UINT32, PLY_FLOAT32, PLY_FLOAT64
+    PLY_INT8,
+    PLY_UINT8,
+    PLY_INT16,
+    PLY_UINT16,
+    PLY_INT32,
+    PLY_UINT32,
+    PLY_FLOAT32,
+    PLY_FLOAT64
 } ply_type;
 /* What a property is to us. */
-typedef enum ply_role { PLY_ROLE_NONE, PLY_ROLE_X, PLY_ROLE_Y, PLY_ROLE_Z, PLY_ROLE_CORNERS } ply_role;
+typedef enum ply_role {
+    PLY_ROLE_NONE,
+    PLY_ROLE_X,
+    PLY_ROLE_Y,
+    PLY_ROLE_Z,
+    PLY_ROLE_CORNERS
+} ply_role;
 typedef enum ply_kind { PLY_KIND_OTHER, PLY_KIND_VERTEX, PLY_KIND_FACE, PLY_KIND_STRIPS } ply_kind;
 
 /* A word of the header; points into the file's bytes. */
@@ -30,9 +44,9 @@ typedef struct ply_element {
     ply_word name;
     ply_kind kind;
     uint64_t count;
-    uint64_t line;            /* in the header, from 1 */
+    uint64_t line;              /* in the header, from 1 */
     uint64_t first, properties; /* in ply_header.property */
-    uint64_t row_bytes;       /* binary: least size of a row; its size when there is no list */
+    uint64_t row_bytes;         /* binary: least size of a row; its size when there is no list */
     bool has_list;
 } ply_element;
 
@@ -50,10 +64,11 @@ typedef struct ply_header {
 
 enum { PLY_HEADER_LONGEST = 1 << 20 };
 
-/* Parses the header at the start of `data`; `name` is for messages. The words point into `data`. On failure `out` is empty.
- * Says nothing about counts fitting the file: ebpo_ply_parse_memory checks that. */
-EBPO_MUST_USE ebpo_status ebpo_ply_header_parse(ply_header *out, const uint8_t *data, uint64_t size, const char *name,
-                                                ebpo_error *error);
+/* Parses the header at the start of `data`; `name` is for messages. The words point into `data`. On
+ * failure `out` is empty. Says nothing about counts fitting the file: ebpo_ply_parse_memory checks
+ * that. */
+EBPO_MUST_USE ebpo_status ebpo_ply_header_parse(ply_header *out, const uint8_t *data, uint64_t size,
+                                                const char *name, ebpo_error *error);
 void ebpo_ply_header_free(ply_header *header);
 
 /* A word for a message: at most 40 characters, what is not printable ASCII becomes '?'. */

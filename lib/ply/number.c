@@ -1,7 +1,9 @@
 /* Three ways, each exact where it applies, tried from cheap to dear:
- * 1. Digits below 2^53 times or over a power of ten up to 10^22: both are doubles, so one operation rounds once (Clinger, "How to read floating point
- *    numbers accurately", 1990). That double also settles the float, unless it lies exactly between two floats (then rounding twice may err).
- * 2. Up to 19 digits over a power of ten up to 10^27: a 128-bit quotient with its remainder, rounded by hand.
+ * 1. Digits below 2^53 times or over a power of ten up to 10^22: both are doubles, so one operation
+ * rounds once (Clinger, "How to read floating point numbers accurately", 1990). That double also
+ * settles the float, unless it lies exactly between two floats (then rounding twice may err).
+ * 2. Up to 19 digits over a power of ten up to 10^27: a 128-bit quotient with its remainder,
+ * rounded by hand.
  * 3. The C library.
  */
 #include "geom/strict_fp.h"
@@ -22,13 +24,11 @@ typedef struct decimal {
     bool short_form; /* no more than 19 digits: nothing was cut off */
 } decimal;
 
-static const double tens[] = { 1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11,
-                               1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22 };
+static const double tens[] = { 1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
+                               1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
+                               1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22 };
 
-static bool is_digit(char c)
-{
-    return c >= '0' && c <= '9';
-}
+static bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 static bool scan_exponent(decimal *d, const char *s, const char *end)
 {
@@ -82,7 +82,8 @@ static bool scan_word(double *out, const char *s, size_t n)
     double value;
     if (n == 3 && strncasecmp(s, "nan", 3) == 0)
         value = NAN;
-    else if ((n == 3 && strncasecmp(s, "inf", 3) == 0) || (n == 8 && strncasecmp(s, "infinity", 8) == 0))
+    else if ((n == 3 && strncasecmp(s, "inf", 3) == 0) ||
+             (n == 8 && strncasecmp(s, "infinity", 8) == 0))
         value = INFINITY;
     else
         return false;
@@ -94,11 +95,13 @@ static bool one_operation(double *out, const decimal *d)
 {
     if (!d->short_form || d->digits > (UINT64_C(1) << 53) || d->exponent < -22 || d->exponent > 22)
         return false;
-    *out = d->exponent < 0 ? (double)d->digits / tens[-d->exponent] : (double)d->digits * tens[d->exponent];
+    *out = d->exponent < 0 ? (double)d->digits / tens[-d->exponent]
+                           : (double)d->digits * tens[d->exponent];
     return true;
 }
 
-/* digits / 10^e to `bits` bits. The quotient has at least 65 bits, so what rounding needs to know is the bits below and the remainder. */
+/* digits / 10^e to `bits` bits. The quotient has at least 65 bits, so what rounding needs to know
+ * is the bits below and the remainder. */
 static bool long_quotient(double *out, const decimal *d, int bits)
 {
     if (!d->short_form || !d->digits || d->exponent > 0 || d->exponent < -27)

@@ -30,7 +30,8 @@ ebpo_status ebpo_ply_fail(const ply_parser *p, const char *format, ...)
     vsnprintf(text, sizeof text, format, args);
     va_end(args);
     if (p->header.encoding == PLY_ASCII)
-        return ebpo_fail(p->error, EBPO_E_FORMAT, "%s: line %" PRIu64 ": %s", p->name, p->line, text);
+        return ebpo_fail(p->error, EBPO_E_FORMAT, "%s: line %" PRIu64 ": %s", p->name, p->line,
+                         text);
     return ebpo_fail(p->error, EBPO_E_FORMAT, "%s: byte %" PRIu64 ": %s", p->name, p->at, text);
 }
 
@@ -44,8 +45,10 @@ ebpo_status ebpo_ply_fail_end(const ply_parser *p, const ply_element *element, u
 {
     char name[PLY_WORD_TEXT];
     ebpo_ply_word_text(name, element->name);
-    return ebpo_ply_fail(p, "the file ends after %" PRIu64 " bytes within row %" PRIu64 " of the %" PRIu64
-                         " of element '%s'; it is cut short, get it again", p->size, row, element->count, name);
+    return ebpo_ply_fail(p,
+                         "the file ends after %" PRIu64 " bytes within row %" PRIu64
+                         " of the %" PRIu64 " of element '%s'; it is cut short, get it again",
+                         p->size, row, element->count, name);
 }
 
 ebpo_status ebpo_ply_fail_stopped(const ply_parser *p)
@@ -57,7 +60,8 @@ ebpo_status ebpo_ply_report(ply_parser *p)
 {
     p->next_report = p->at + REPORT_BYTES;
     ebpo_workspace_settle(p->mesh->workspace);
-    if (!p->progress || !p->progress->report || p->progress->report(p->progress->user, "reading", p->at, p->size))
+    if (!p->progress || !p->progress->report ||
+        p->progress->report(p->progress->user, "reading", p->at, p->size))
         return EBPO_OK;
     return ebpo_ply_fail_stopped(p);
 }
@@ -66,7 +70,8 @@ ebpo_status ebpo_ply_report(ply_parser *p)
 static bool least_bytes(const ply_parser *p, const ply_element *element, uint64_t *bytes)
 {
     uint64_t row = element->row_bytes;
-    if (p->header.encoding == PLY_ASCII && !ebpo_mul_ok(element->properties, 2, &row)) /* a digit and a blank */
+    if (p->header.encoding == PLY_ASCII &&
+        !ebpo_mul_ok(element->properties, 2, &row)) /* a digit and a blank */
         return false;
     return ebpo_mul_ok(element->count, row, bytes);
 }
@@ -86,8 +91,11 @@ static ebpo_status check_counts(ply_parser *p)
         char name[PLY_WORD_TEXT];
         ebpo_ply_word_text(name, e->name);
         if (p->header.encoding == PLY_ASCII || e->has_list)
-            return ebpo_fail(p->error, EBPO_E_FORMAT, "%s: line %" PRIu64 ": %" PRIu64 " rows of element '%s' do not fit into the rest of the file, %"
-                             PRIu64 " bytes; it is cut short or damaged, get it again", p->name, e->line, e->count, name, left);
+            return ebpo_fail(p->error, EBPO_E_FORMAT,
+                             "%s: line %" PRIu64 ": %" PRIu64
+                             " rows of element '%s' do not fit into the rest of the file, %" PRIu64
+                             " bytes; it is cut short or damaged, get it again",
+                             p->name, e->line, e->count, name, left);
         p->at = p->size;
         return ebpo_ply_fail_end(p, e, left / e->row_bytes);
     }
@@ -97,12 +105,17 @@ static ebpo_status check_counts(ply_parser *p)
 static ebpo_status check_parts(const ply_parser *p)
 {
     const ply_header *h = &p->header;
-    uint64_t vertices = h->element[h->vertex].count, faces = h->face >= 0 ? h->element[h->face].count : 0;
+    uint64_t vertices = h->element[h->vertex].count,
+             faces = h->face >= 0 ? h->element[h->face].count : 0;
     if (vertices > MOST_VERTICES || faces > MOST_VERTICES)
-        return ebpo_fail(p->error, EBPO_E_LIMIT, "%s: %" PRIu64 " vertices and %" PRIu64 " faces, but no more than 2^32 - 2 of each can be read; split the model",
+        return ebpo_fail(p->error, EBPO_E_LIMIT,
+                         "%s: %" PRIu64 " vertices and %" PRIu64
+                         " faces, but no more than 2^32 - 2 of each can be read; split the model",
                          p->name, vertices, faces);
     if (!faces && (h->strips < 0 || !h->element[h->strips].count))
-        return ebpo_fail(p->error, EBPO_E_FORMAT, "%s: has %" PRIu64 " vertices but no faces: a point cloud; make a surface of it first",
+        return ebpo_fail(p->error, EBPO_E_FORMAT,
+                         "%s: has %" PRIu64
+                         " vertices but no faces: a point cloud; make a surface of it first",
                          p->name, vertices);
     return EBPO_OK;
 }
@@ -141,9 +154,11 @@ static ebpo_status allocate(ply_parser *p)
 {
     const ply_header *h = &p->header;
     p->face_capacity = h->face >= 0 ? h->element[h->face].count : 0;
-    p->mesh->faces = ebpo_array_alloc(p->mesh->workspace, p->face_capacity, 3 * sizeof *p->mesh->faces);
+    p->mesh->faces =
+        ebpo_array_alloc(p->mesh->workspace, p->face_capacity, 3 * sizeof *p->mesh->faces);
     if (!p->mesh->faces)
-        return ebpo_workspace_fail(p->mesh->workspace, p->face_capacity * 3 * sizeof *p->mesh->faces, p->error);
+        return ebpo_workspace_fail(p->mesh->workspace,
+                                   p->face_capacity * 3 * sizeof *p->mesh->faces, p->error);
     return allocate_vertices(p);
 }
 
@@ -153,7 +168,8 @@ static ebpo_status read_element(ply_parser *p, const ply_element *element, bool 
                                            : ebpo_ply_binary_element(p, element, store);
 }
 
-/* Faces that stand before the vertices are stepped over and read afterwards: to cut a polygon takes its positions. */
+/* Faces that stand before the vertices are stepped over and read afterwards: to cut a polygon takes
+ * its positions. */
 static ebpo_status read_early_faces(ply_parser *p)
 {
     uint64_t at = p->at, line = p->line;
@@ -179,7 +195,9 @@ static ebpo_status read_body(ply_parser *p)
             status = read_early_faces(p);
     }
     if (status == EBPO_OK && p->mesh->face_count == 0)
-        status = ebpo_fail(p->error, EBPO_E_FORMAT, "%s: none of its faces has three corners; there is no mesh in this file", p->name);
+        status = ebpo_fail(p->error, EBPO_E_FORMAT,
+                           "%s: none of its faces has three corners; there is no mesh in this file",
+                           p->name);
     return status;
 }
 
@@ -197,15 +215,23 @@ static void describe(ply_parser *p)
 {
     static const char *const formats[] = { "ply-ascii", "ply-le", "ply-be" };
     snprintf(p->mesh->source_name, sizeof p->mesh->source_name, "%s", p->name);
-    snprintf(p->mesh->source_format, sizeof p->mesh->source_format, "%s", formats[p->header.encoding]);
+    snprintf(p->mesh->source_format, sizeof p->mesh->source_format, "%s",
+             formats[p->header.encoding]);
     p->mesh->source_size = p->size;
 }
 
-ebpo_status ebpo_ply_parse_memory(ebpo_mesh *out, const uint8_t *data, uint64_t size, const char *name, ebpo_workspace *workspace, unsigned threads,
+ebpo_status ebpo_ply_parse_memory(ebpo_mesh *out, const uint8_t *data, uint64_t size,
+                                  const char *name, ebpo_workspace *workspace, unsigned threads,
                                   const ebpo_progress *progress, ebpo_error *error)
 {
     ebpo_mesh mesh = { .workspace = workspace };
-    ply_parser p = { .data = data, .size = size, .name = ebpo_path_name(name), .mesh = &mesh, .threads = threads, .progress = progress, .error = error };
+    ply_parser p = { .data = data,
+                     .size = size,
+                     .name = ebpo_path_name(name),
+                     .mesh = &mesh,
+                     .threads = threads,
+                     .progress = progress,
+                     .error = error };
     ebpo_status status = ebpo_ply_header_parse(&p.header, data, size, p.name, error);
     if (status == EBPO_OK)
         status = check_counts(&p);
@@ -250,11 +276,14 @@ static ebpo_status give_points(ply_parser *p, double **xyz, uint64_t *count)
     return EBPO_OK;
 }
 
-ebpo_status ebpo_points_parse_ply(double **xyz, uint64_t *count, const void *data, uint64_t size, const char *name, ebpo_error *error)
+ebpo_status ebpo_points_parse_ply(double **xyz, uint64_t *count, const void *data, uint64_t size,
+                                  const char *name, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_mesh mesh = { 0 };
-    ply_parser p = { .data = data, .size = size, .name = ebpo_path_name(name), .mesh = &mesh, .error = error };
+    ply_parser p = {
+        .data = data, .size = size, .name = ebpo_path_name(name), .mesh = &mesh, .error = error
+    };
     *xyz = NULL;
     *count = 0;
     ebpo_status status = ebpo_ply_header_parse(&p.header, p.data, size, p.name, error);
@@ -264,7 +293,8 @@ ebpo_status ebpo_points_parse_ply(double **xyz, uint64_t *count, const void *dat
         status = allocate_vertices(&p);
     p.at = p.header.body;
     p.line = p.header.body_line;
-    for (int64_t i = 0; status == EBPO_OK && i <= p.header.vertex; i++) /* what stands behind the vertices is not read */
+    for (int64_t i = 0; status == EBPO_OK && i <= p.header.vertex;
+         i++) /* what stands behind the vertices is not read */
         status = read_element(&p, &p.header.element[i], i == p.header.vertex);
     if (status == EBPO_OK)
         status = give_points(&p, xyz, count);

@@ -17,13 +17,18 @@ enum { BUFFER = 1 << 16, FACE_BYTES = 13 };
 static ebpo_status check(const ebpo_mesh *mesh, ebpo_error *error)
 {
     if (mesh->vertex_count > UINT32_MAX - 1 || mesh->face_count > UINT32_MAX - 1)
-        return ebpo_fail(error, EBPO_E_LIMIT, "the mesh to write has %" PRIu64 " vertices and %" PRIu64 " faces, but 2^32 - 2 of each is the limit; split it", mesh->vertex_count,
-                         mesh->face_count);
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "the mesh to write has %" PRIu64 " vertices and %" PRIu64
+                         " faces, but 2^32 - 2 of each is the limit; split it",
+                         mesh->vertex_count, mesh->face_count);
     if ((mesh->vertex_count && !mesh->xyz32 == !mesh->xyz64) || (mesh->face_count && !mesh->faces))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "the mesh to write has counts without arrays, or positions of both kinds");
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "the mesh to write has counts without arrays, or positions of both kinds");
     for (uint64_t i = 0; i < 3 * mesh->face_count; ebpo_settle_all_at(i++))
         if (mesh->faces[i] >= mesh->vertex_count)
-            return ebpo_fail(error, EBPO_E_ARGUMENT, "face %" PRIu64 " of the mesh to write names vertex %" PRIu32 ", but there are %" PRIu64 " vertices",
+            return ebpo_fail(error, EBPO_E_ARGUMENT,
+                             "face %" PRIu64 " of the mesh to write names vertex %" PRIu32
+                             ", but there are %" PRIu64 " vertices",
                              i / 3, mesh->faces[i], mesh->vertex_count);
     return EBPO_OK;
 }
@@ -31,10 +36,11 @@ static ebpo_status check(const ebpo_mesh *mesh, ebpo_error *error)
 static void write_header(FILE *f, const ebpo_mesh *mesh)
 {
     const char *type = mesh->xyz64 ? "double" : "float";
-    fprintf(f, "ply\nformat binary_little_endian 1.0\nelement vertex %" PRIu64 "\n", mesh->vertex_count);
+    fprintf(f, "ply\nformat binary_little_endian 1.0\nelement vertex %" PRIu64 "\n",
+            mesh->vertex_count);
     fprintf(f, "property %s x\nproperty %s y\nproperty %s z\n", type, type, type);
-    fprintf(f, "element face %" PRIu64 "\nproperty list uchar %s vertex_indices\nend_header\n", mesh->face_count,
-            mesh->vertex_count < UINT64_C(1) << 31 ? "int" : "uint");
+    fprintf(f, "element face %" PRIu64 "\nproperty list uchar %s vertex_indices\nend_header\n",
+            mesh->face_count, mesh->vertex_count < UINT64_C(1) << 31 ? "int" : "uint");
 }
 
 static bool write_vertices(FILE *f, const ebpo_mesh *mesh, uint8_t *buffer)

@@ -1,4 +1,5 @@
-/* What will be asked for next: the subtrees that queries about places around the last one may need. EBP 2017, 4.2.3, loads the 26 neighbours of the subtree that holds the position instead. */
+/* What will be asked for next: the subtrees that queries about places around the last one may need.
+ * EBP 2017, 4.2.3, loads the 26 neighbours of the subtree that holds the position instead. */
 #include "geom/strict_fp.h"
 
 #include "query/ahead.h"
@@ -47,7 +48,8 @@ static void look(looking *l, ebpo_spot spot, double lower)
         look(l, child[i].spot, child[i].lower);
 }
 
-unsigned ebpo_subtrees_near(const ebpo_model *m, const double p[3], double limit, uint64_t keys[EBPO_CACHE_AHEAD])
+unsigned ebpo_subtrees_near(const ebpo_model *m, const double p[3], double limit,
+                            uint64_t keys[EBPO_CACHE_AHEAD])
 {
     looking l = { .model = m, .box = ebpo_model_box(m), .p = p, .limit = limit };
     ebpo_spot root = ebpo_spot_root(m);
@@ -72,13 +74,15 @@ void ebpo_context_look_ahead(ebpo_context *c, const double p[3], double reach)
     const ebpo_model *m = c->model;
     ebpo_box box = ebpo_model_box(m);
     double side = longest_side(&box, m->top->cut_level);
-    if (c->looked_ahead && apart(p, c->looked_from) < side / 4 && fabs(reach) <= c->looked_reach + side / 4)
+    if (c->looked_ahead && apart(p, c->looked_from) < side / 4 &&
+        fabs(reach) <= c->looked_reach + side / 4)
         return;
     c->looked_ahead = true;
     c->looked_reach = fabs(reach);
     memcpy(c->looked_from, p, sizeof c->looked_from);
-    /* Over a way w distances and their bounds change by at most w each: what is needed until then is within the reach and 2 w. A cell's diagonal is 1.73 sides: where envelopes do not decide (other rules than
-     * nonzero), the cell that holds the place is needed. */
+    /* Over a way w distances and their bounds change by at most w each: what is needed until then
+     * is within the reach and 2 w. A cell's diagonal is 1.73 sides: where envelopes do not decide
+     * (other rules than nonzero), the cell that holds the place is needed. */
     uint64_t keys[EBPO_CACHE_AHEAD];
     ebpo_cache_prefetch(m->cache, keys, ebpo_subtrees_near(m, p, fabs(reach) + 2.25 * side, keys));
 }

@@ -4,12 +4,14 @@
 
 #include "query/model.h"
 
-/* Asks for the subtrees whose envelopes are within `reach` (of either sign) and 2.25 sides of a cell of the cut level of p, the nearest first, when p has moved on by a quarter of such a side. `reach`: how far
- * the query about p looked, 0 for point in solid. Models with a cache only. */
+/* Asks for the subtrees whose envelopes are within `reach` (of either sign) and 2.25 sides of a
+ * cell of the cut level of p, the nearest first, when p has moved on by a quarter of such a side.
+ * `reach`: how far the query about p looked, 0 for point in solid. Models with a cache only. */
 void ebpo_context_look_ahead(ebpo_context *context, const double p[3], double reach);
 
 /* The subtrees whose envelopes may be within `limit` of p, the nearest first; returns how many. */
-unsigned ebpo_subtrees_near(const ebpo_model *model, const double p[3], double limit, uint64_t keys[EBPO_CACHE_AHEAD]);
+unsigned ebpo_subtrees_near(const ebpo_model *model, const double p[3], double limit,
+                            uint64_t keys[EBPO_CACHE_AHEAD]);
 
 /* True when the model's options ask for it. */
 static inline bool ebpo_looks_ahead(const ebpo_model *m)

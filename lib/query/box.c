@@ -35,15 +35,17 @@ static void try_block(gathering *g, const ebpo_subtree *s, uint32_t block)
         if (local == EBPO_NO_SLOT)
             return;
         ebpo_subtree_triangle(s, slot, t);
-        if (!ebpo_triangle_meets_box((const double (*)[3])t, g->min, g->max))
+        if (!ebpo_triangle_meets_box((const double(*)[3])t, g->min, g->max))
             continue;
         g->no_memory = !ebpo_grow(&g->list, &g->room, g->count + 1, sizeof *g->list);
         if (!g->no_memory)
-            g->list[g->count++] = (pair){ ebpo_subtree_file_face(s, local), ebpo_subtree_told_face(s, local) };
+            g->list[g->count++] =
+                (pair){ ebpo_subtree_file_face(s, local), ebpo_subtree_told_face(s, local) };
     }
 }
 
-static void gather_bound(gathering *g, const ebpo_subtree *s, const double low[3], const double high[3], uint32_t child)
+static void gather_bound(gathering *g, const ebpo_subtree *s, const double low[3],
+                         const double high[3], uint32_t child)
 {
     if (child & EBPO_IS_BLOCK) {
         try_block(g, s, child & ~EBPO_IS_BLOCK);
@@ -53,7 +55,8 @@ static void gather_bound(gathering *g, const ebpo_subtree *s, const double low[3
     for (int lane = 0; lane < 8; lane++) {
         bool meets = b->child[lane] != EBPO_NO_CHILD;
         for (int k = 0; k < 3; k++)
-            meets = meets && (double)b->low[k][lane] <= high[k] && (double)b->high[k][lane] >= low[k];
+            meets =
+                meets && (double)b->low[k][lane] <= high[k] && (double)b->high[k][lane] >= low[k];
         if (meets)
             gather_bound(g, s, low, high, b->child[lane]);
     }
@@ -77,7 +80,8 @@ static bool box_matters(void *user, const ebpo_box *box, const ebpo_spot *spot)
 {
     const gathering *g = user;
     for (int k = 0; k < 3; k++)
-        if (ebpo_wall(box, k, spot->level, spot->at[k]) > g->max[k] || ebpo_wall(box, k, spot->level, spot->at[k] + 1) < g->min[k])
+        if (ebpo_wall(box, k, spot->level, spot->at[k]) > g->max[k] ||
+            ebpo_wall(box, k, spot->level, spot->at[k] + 1) < g->min[k])
             return false;
     return true;
 }
@@ -118,15 +122,16 @@ static ebpo_status finish(gathering *g, const uint64_t **faces, uint64_t *count,
     return EBPO_OK;
 }
 
-ebpo_status ebpo_faces_in_box(ebpo_context *context, const double min[3], const double max[3], const uint64_t **faces, uint64_t *count,
-                              ebpo_error *error)
+ebpo_status ebpo_faces_in_box(ebpo_context *context, const double min[3], const double max[3],
+                              const uint64_t **faces, uint64_t *count, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     *faces = NULL;
     *count = 0;
     for (int k = 0; k < 3; k++)
         if (!isfinite(min[k]) || !isfinite(max[k]) || !(min[k] <= max[k]))
-            return ebpo_fail(error, EBPO_E_ARGUMENT, "a box needs finite corners, the lower one first on each axis");
+            return ebpo_fail(error, EBPO_E_ARGUMENT,
+                             "a box needs finite corners, the lower one first on each axis");
     gathering g = { .context = context, .min = min, .max = max };
     ebpo_status status = ebpo_check_mesh(context->model, error);
     if (status == EBPO_OK && context->model->whole) {

@@ -21,11 +21,14 @@
 
 /* --- exact: every subtree that may hold something nearer --- */
 
-/* Loading can wait: what is in memory, or nearer, may tell that it is not needed. Not under a deadline, which might pass before anything is loaded, each time. */
+/* Loading can wait: what is in memory, or nearer, may tell that it is not needed. Not under a
+ * deadline, which might pass before anything is loaded, each time. */
 static bool put_off(ebpo_context *c, const ebpo_nearest *n, const ebpo_spot *spot, double lower)
 {
     uint64_t key = ebpo_entry_value(spot->entry);
-    if (n->deadline || (c->pinned && c->pinned_key == key) || ebpo_cache_has(c->model->cache, key) || !ebpo_grow(&c->later, &c->later_room, c->later_count + 1, sizeof *c->later))
+    if (n->deadline || (c->pinned && c->pinned_key == key) ||
+        ebpo_cache_has(c->model->cache, key) ||
+        !ebpo_grow(&c->later, &c->later_room, c->later_count + 1, sizeof *c->later))
         return false;
     c->later[c->later_count++] = (ebpo_ranked){ *spot, lower };
     return true;
@@ -48,12 +51,15 @@ static bool is_late(ebpo_nearest *n, double lower)
     return true;
 }
 
-static ebpo_status search_top(ebpo_context *c, ebpo_nearest *n, const ebpo_box *box, ebpo_spot spot, double lower, ebpo_error *error)
+static ebpo_status search_top(ebpo_context *c, ebpo_nearest *n, const ebpo_box *box, ebpo_spot spot,
+                              double lower, ebpo_error *error)
 {
-    if (lower > n->limit || ebpo_spot_is_settled(&spot) || is_late(n, lower) || ebpo_spot_is_pruned(c->model, &spot)) /* pruned: see look_at_pruned */
+    if (lower > n->limit || ebpo_spot_is_settled(&spot) || is_late(n, lower) ||
+        ebpo_spot_is_pruned(c->model, &spot)) /* pruned: see look_at_pruned */
         return EBPO_OK;
     if (ebpo_spot_is_below(&spot)) {
-        n->upper = fmin(n->upper, ebpo_cell_far(box, spot.level, spot.at, n->p)); /* it holds some face */
+        /* it holds some face */
+        n->upper = fmin(n->upper, ebpo_cell_far(box, spot.level, spot.at, n->p));
         n->limit = fmin(n->limit, n->upper);
         return put_off(c, n, &spot, lower) ? EBPO_OK : search_below(c, n, spot, error);
     }
@@ -98,7 +104,8 @@ static ebpo_status search_everything(ebpo_context *c, ebpo_nearest *n, ebpo_erro
 
 /* --- subsets: when a face that was left out may be nearer than what was found --- */
 
-static ebpo_status pruned_within(ebpo_context *c, const ebpo_nearest *n, const ebpo_box *box, ebpo_spot spot, double lower, double *nearest, ebpo_error *error)
+static ebpo_status pruned_within(ebpo_context *c, const ebpo_nearest *n, const ebpo_box *box,
+                                 ebpo_spot spot, double lower, double *nearest, ebpo_error *error)
 {
     const ebpo_model *m = c->model;
     ebpo_status status = EBPO_OK;
@@ -119,7 +126,8 @@ static ebpo_status pruned_within(ebpo_context *c, const ebpo_nearest *n, const e
     return status;
 }
 
-/* Fails when what was left out may matter; with a deadline that has passed it only widens what is certain. */
+/* Fails when what was left out may matter; with a deadline that has passed it only widens what is
+ * certain. */
 static ebpo_status look_at_pruned(ebpo_context *c, ebpo_nearest *n, ebpo_error *error)
 {
     ebpo_box box = ebpo_model_box(c->model);
@@ -127,18 +135,22 @@ static ebpo_status look_at_pruned(ebpo_context *c, ebpo_nearest *n, ebpo_error *
     double nearest = INFINITY;
     if (!c->model->info->pruned)
         return EBPO_OK;
-    ebpo_status status = pruned_within(c, n, &box, root, ebpo_spot_distance(c->model, &box, &root, 0, n->p), &nearest, error);
+    ebpo_status status =
+        pruned_within(c, n, &box, root, ebpo_spot_distance(c->model, &box, &root, 0, n->p),
+                      &nearest, error);
     n->passed_over = fmin(n->passed_over, nearest);
     return status;
 }
 
-ebpo_status ebpo_give_sign(ebpo_context *c, const double p[3], const ebpo_query_options *o, ebpo_distance_result *out, ebpo_error *error)
+ebpo_status ebpo_give_sign(ebpo_context *c, const double p[3], const ebpo_query_options *o,
+                           ebpo_distance_result *out, ebpo_error *error)
 {
     ebpo_inside_result where;
     ebpo_query_options plain = EBPO_QUERY_OPTIONS_INIT;
     if (!c->model->info->solid || o->unsigned_distance || out->face == EBPO_NO_FACE)
         return EBPO_OK;
-    ebpo_status status = c->model->whole ? ebpo_inside_whole(c, p, 1, &where, error) : ebpo_inside_walk(c, p, &plain, &where, error);
+    ebpo_status status = c->model->whole ? ebpo_inside_whole(c, p, 1, &where, error)
+                                         : ebpo_inside_walk(c, p, &plain, &where, error);
     if (status == EBPO_OK && where.where == EBPO_IN)
         out->distance = -out->distance;
     return status;
@@ -150,14 +162,16 @@ static void look_ahead(ebpo_context *c, const double p[3], double reach)
         ebpo_context_look_ahead(c, p, reach);
 }
 
-static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_query_options *o, ebpo_distance_result *out, ebpo_error *error)
+static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_query_options *o,
+                         ebpo_distance_result *out, ebpo_error *error)
 {
     ebpo_nearest n;
     ebpo_nearest_begin(&n, p, o->max_distance);
     if (o->deadline_ns)
         n.deadline = ebpo_clock() + o->deadline_ns;
     if (o->warm && c->warm)
-        ebpo_nearest_begin_with(&n, (const double (*)[3])c->warm_triangle, c->warm_face, c->warm_told);
+        ebpo_nearest_begin_with(&n, (const double(*)[3])c->warm_triangle, c->warm_face,
+                                c->warm_told);
     ebpo_status status = search_everything(c, &n, error);
     if (status == EBPO_OK)
         status = look_at_pruned(c, &n, error);
@@ -166,7 +180,8 @@ static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_query_op
     if (n.late && n.passed_over <= n.limit) {
         /* With hardly any time nothing may have been found; but some face is in the root cell. */
         ebpo_box box = ebpo_model_box(c->model);
-        double hi = fmin(n.upper, ebpo_cell_far(&box, 0, (const uint32_t[3]){ 0, 0, 0 }, p)), lo = fmin(fmin(n.passed_over, n.found ? n.bounds.lo : n.upper), hi);
+        double hi = fmin(n.upper, ebpo_cell_far(&box, 0, (const uint32_t[3]){ 0, 0, 0 }, p)),
+               lo = fmin(fmin(n.passed_over, n.found ? n.bounds.lo : n.upper), hi);
         *out = (ebpo_distance_result){ NAN, lo, hi, { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
         look_ahead(c, p, hi);
         return EBPO_OK;
@@ -199,7 +214,8 @@ static ebpo_status narrow(interval *v, ebpo_spot spot, double lower, ebpo_error 
     if (lower > v->hi || ebpo_spot_is_settled(&spot))
         return EBPO_OK;
     v->hi = fmin(v->hi, ebpo_cell_far(&v->box, spot.level, spot.at, v->p));
-    if (spot.level >= v->o->level || !ebpo_spot_is_gray(m, &spot) || ebpo_spot_is_pruned(m, &spot) || (v->deadline && ebpo_clock() > v->deadline)) {
+    if (spot.level >= v->o->level || !ebpo_spot_is_gray(m, &spot) ||
+        ebpo_spot_is_pruned(m, &spot) || (v->deadline && ebpo_clock() > v->deadline)) {
         v->lo = fmin(v->lo, lower);
         return EBPO_OK;
     }
@@ -216,20 +232,28 @@ static ebpo_status narrow(interval *v, ebpo_spot spot, double lower, ebpo_error 
     return status;
 }
 
-ebpo_status ebpo_distance_interval(ebpo_context *context, const double p[3], const ebpo_query_options *options, double *lo, double *hi,
+ebpo_status ebpo_distance_interval(ebpo_context *context, const double p[3],
+                                   const ebpo_query_options *options, double *lo, double *hi,
                                    ebpo_error *error)
 {
-    interval v = { .c = context, .o = options, .box = ebpo_model_box(context->model), .p = p, .lo = INFINITY, .hi = INFINITY };
+    interval v = { .c = context,
+                   .o = options,
+                   .box = ebpo_model_box(context->model),
+                   .p = p,
+                   .lo = INFINITY,
+                   .hi = INFINITY };
     if (options->deadline_ns)
         v.deadline = ebpo_clock() + options->deadline_ns;
     ebpo_spot root = ebpo_spot_root(context->model);
-    ebpo_status status = narrow(&v, root, ebpo_spot_distance(context->model, &v.box, &root, 0, p), error);
+    ebpo_status status =
+        narrow(&v, root, ebpo_spot_distance(context->model, &v.box, &root, 0, p), error);
     *lo = fmin(v.lo, v.hi);
     *hi = v.hi;
     return status;
 }
 
-static ebpo_status limited(ebpo_context *c, const double p[3], const ebpo_query_options *o, ebpo_distance_result *out, ebpo_error *error)
+static ebpo_status limited(ebpo_context *c, const double p[3], const ebpo_query_options *o,
+                           ebpo_distance_result *out, ebpo_error *error)
 {
     *out = (ebpo_distance_result){ NAN, 0, INFINITY, { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
     ebpo_status status = ebpo_distance_interval(c, p, o, &out->lo, &out->hi, error);
@@ -238,7 +262,8 @@ static ebpo_status limited(ebpo_context *c, const double p[3], const ebpo_query_
     return status;
 }
 
-static ebpo_status one(ebpo_context *c, const double p[3], const ebpo_query_options *o, ebpo_distance_result *out, ebpo_error *error)
+static ebpo_status one(ebpo_context *c, const double p[3], const ebpo_query_options *o,
+                       ebpo_distance_result *out, ebpo_error *error)
 {
     if (o->mode == EBPO_DISTANCE_ENVELOPE)
         return ebpo_distance_to_envelope(c, p, o, out, error);
@@ -252,14 +277,18 @@ static ebpo_status check_mode(const ebpo_query_options *o, ebpo_error *error)
 {
     bool around = o->mode == EBPO_DISTANCE_RECURSIVE || o->mode == EBPO_DISTANCE_LEAVES;
     if (around && (o->level >= 0 || o->deadline_ns))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "the recursive and leaves modes of distance know neither level nor deadline; leave these away, or take the exact mode");
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "the recursive and leaves modes of distance know neither level nor "
+                         "deadline; leave these away, or take the exact mode");
     if (o->mode == EBPO_DISTANCE_ENVELOPE && o->deadline_ns)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "the envelope mode of distance knows no deadline; give a level instead");
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "the envelope mode of distance knows no deadline; give a level instead");
     return EBPO_OK;
 }
 
-ebpo_status ebpo_distance_many(ebpo_context *context, const double *points, uint64_t count, const ebpo_query_options *options,
-                               ebpo_distance_result *out, ebpo_error *error)
+ebpo_status ebpo_distance_many(ebpo_context *context, const double *points, uint64_t count,
+                               const ebpo_query_options *options, ebpo_distance_result *out,
+                               ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     static const ebpo_query_options usual = EBPO_QUERY_OPTIONS_INIT;
@@ -276,7 +305,8 @@ ebpo_status ebpo_distance_many(ebpo_context *context, const double *points, uint
     return status;
 }
 
-ebpo_status ebpo_distance(ebpo_context *context, const double point[3], const ebpo_query_options *options, ebpo_distance_result *out,
+ebpo_status ebpo_distance(ebpo_context *context, const double point[3],
+                          const ebpo_query_options *options, ebpo_distance_result *out,
                           ebpo_error *error)
 {
     return ebpo_distance_many(context, point, 1, options, out, error);

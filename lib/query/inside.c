@@ -11,8 +11,8 @@
 #include "query/locate.h"
 
 /* Adds the crossings that the filter left open; true when the point lies on one of these faces. */
-static bool settle_open(const ebpo_subtree *s, const uint32_t *open, uint32_t count, const ebpo_axis_segment *g, const double *point,
-                        int32_t *sum)
+static bool settle_open(const ebpo_subtree *s, const uint32_t *open, uint32_t count,
+                        const ebpo_axis_segment *g, const double *point, int32_t *sum)
 {
     for (uint32_t i = 0; i < count; i++) {
         double t[3][3];
@@ -24,9 +24,10 @@ static bool settle_open(const ebpo_subtree *s, const uint32_t *open, uint32_t co
     return false;
 }
 
-/* Crossings along a segment; `point` (its end) is looked for on the faces, NULL: is not. False when it lies on one. */
-static bool cross(const ebpo_kernels *kernels, const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const ebpo_axis_segment *g,
-                  const double *point, uint32_t *open, int32_t *sum)
+/* Crossings along a segment; `point` (its end) is looked for on the faces, NULL: is not. False when
+ * it lies on one. */
+static bool cross(const ebpo_kernels *kernels, const ebpo_subtree *s, const ebpo_subtree_leaf *leaf,
+                  const ebpo_axis_segment *g, const double *point, uint32_t *open, int32_t *sum)
 {
     uint32_t count = 0;
     *sum = kernels->crossings(s, s->list + leaf->list, leaf->blocks, g, open, &count);
@@ -43,10 +44,12 @@ typedef struct in_leaf {
 static uint8_t listed_cell(double xi)
 {
     double cells = xi * EBPO_LISTED_CELLS;
-    return cells < 0 ? 0 : cells < 255 ? (uint8_t)cells : 255; /* no number, as cells of no size give: 255, which meets the boxes of such cells */
+    /* no number, as cells of no size give: 255, which meets the boxes of such cells */
+    return cells < 0 ? 0 : cells < 255 ? (uint8_t)cells : 255;
 }
 
-static void find_in_leaf(const ebpo_subtree *s, int level, const uint32_t at[3], const double p[3], in_leaf *out)
+static void find_in_leaf(const ebpo_subtree *s, int level, const uint32_t at[3], const double p[3],
+                         in_leaf *out)
 {
     for (int k = 0; k < 3; k++) {
         out->low[k] = ebpo_wall(&s->box, k, level, at[k]);
@@ -57,10 +60,15 @@ static void find_in_leaf(const ebpo_subtree *s, int level, const uint32_t at[3],
 }
 
 /* From the leaf's free wall to the point. */
-static ebpo_axis_segment wall_segment(const ebpo_subtree_leaf *leaf, const in_leaf *i, const double p[3])
+static ebpo_axis_segment wall_segment(const ebpo_subtree_leaf *leaf, const in_leaf *i,
+                                      const double p[3])
 {
     int axis = leaf->wall / 2;
-    ebpo_axis_segment g = { { p[0], p[1], p[2] }, p[axis], axis, { i->cell[0], i->cell[1], i->cell[2] }, { i->cell[0], i->cell[1], i->cell[2] } };
+    ebpo_axis_segment g = { { p[0], p[1], p[2] },
+                            p[axis],
+                            axis,
+                            { i->cell[0], i->cell[1], i->cell[2] },
+                            { i->cell[0], i->cell[1], i->cell[2] } };
     if (leaf->wall % 2) {
         g.to = i->high[axis];
         g.high[axis] = 255;
@@ -72,7 +80,8 @@ static ebpo_axis_segment wall_segment(const ebpo_subtree_leaf *leaf, const in_le
 }
 
 /* One segment from a wall that no face meets. */
-static bool from_wall(const ebpo_kernels *kernels, const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const in_leaf *i, const double p[3],
+static bool from_wall(const ebpo_kernels *kernels, const ebpo_subtree *s,
+                      const ebpo_subtree_leaf *leaf, const in_leaf *i, const double p[3],
                       uint32_t *open, int32_t *winding)
 {
     ebpo_axis_segment g = wall_segment(leaf, i, p);
@@ -83,8 +92,10 @@ static bool from_wall(const ebpo_kernels *kernels, const ebpo_subtree *s, const 
     return true;
 }
 
-/* Three segments from the lowest corner: format-spec, section 5. Faces that the point lies on come up in the last one. */
-static bool from_corner(const ebpo_kernels *kernels, const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const in_leaf *i, const double p[3],
+/* Three segments from the lowest corner: format-spec, section 5. Faces that the point lies on come
+ * up in the last one. */
+static bool from_corner(const ebpo_kernels *kernels, const ebpo_subtree *s,
+                        const ebpo_subtree_leaf *leaf, const in_leaf *i, const double p[3],
                         uint32_t *open, int32_t *winding)
 {
     ebpo_axis_segment g = { { i->low[0], i->low[1], i->low[2] }, 0, 0, { 0, 0, 0 }, { 0, 0, 0 } };
@@ -104,7 +115,8 @@ static bool from_corner(const ebpo_kernels *kernels, const ebpo_subtree *s, cons
 }
 
 /* Signs of the planes alone; false when one is too close to tell. */
-static bool from_planes(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const in_leaf *in, int32_t *winding)
+static bool from_planes(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const in_leaf *in,
+                        int32_t *winding)
 {
     float xi[3] = { (float)in->xi[0], (float)in->xi[1], (float)in->xi[2] }, most = -INFINITY;
     for (int i = 0; i < leaf->planes; i += 4) {
@@ -122,26 +134,31 @@ static bool from_planes(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, co
     return most < -EBPO_PLANE_ERROR;
 }
 
-static ebpo_status answer_in_leaf(ebpo_context *context, const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const in_leaf *i, const double p[3],
-                                  ebpo_inside_result *out, ebpo_error *error)
+static ebpo_status answer_in_leaf(ebpo_context *context, const ebpo_subtree *s,
+                                  const ebpo_subtree_leaf *leaf, const in_leaf *i,
+                                  const double p[3], ebpo_inside_result *out, ebpo_error *error)
 {
     const ebpo_model *m = context->model;
-    if (!ebpo_grow(&context->open, &context->open_room, (uint64_t)leaf->blocks * EBPO_BLOCK, sizeof *context->open))
+    if (!ebpo_grow(&context->open, &context->open_room, (uint64_t)leaf->blocks * EBPO_BLOCK,
+                   sizeof *context->open))
         return ebpo_fail_memory(error, (uint64_t)leaf->blocks * EBPO_BLOCK * sizeof *context->open);
     int32_t winding;
     bool off = leaf->kind != EBPO_LEAF_GENERAL && from_planes(s, leaf, i, &winding);
     if (!off)
-        off = leaf->wall != EBPO_NO_WALL ? from_wall(m->kernels, s, leaf, i, p, context->open, &winding)
-                                         : from_corner(m->kernels, s, leaf, i, p, context->open, &winding);
+        off = leaf->wall != EBPO_NO_WALL
+                  ? from_wall(m->kernels, s, leaf, i, p, context->open, &winding)
+                  : from_corner(m->kernels, s, leaf, i, p, context->open, &winding);
     if (!off) {
         *out = (ebpo_inside_result){ EBPO_ON, 0, 0 };
         return EBPO_OK;
     }
-    *out = (ebpo_inside_result){ ebpo_rule_inside(m->info->rule, winding) ? EBPO_IN : EBPO_OUT, winding, 0 };
+    *out = (ebpo_inside_result){ ebpo_rule_inside(m->info->rule, winding) ? EBPO_IN : EBPO_OUT,
+                                 winding, 0 };
     return EBPO_OK;
 }
 
-ebpo_status ebpo_inside_leaf(ebpo_context *context, const ebpo_subtree *s, uint32_t number, int level, const uint32_t at[3], const double p[3],
+ebpo_status ebpo_inside_leaf(ebpo_context *context, const ebpo_subtree *s, uint32_t number,
+                             int level, const uint32_t at[3], const double p[3],
                              ebpo_inside_result *out, ebpo_error *error)
 {
     in_leaf i;
@@ -152,18 +169,21 @@ ebpo_status ebpo_inside_leaf(ebpo_context *context, const ebpo_subtree *s, uint3
 void ebpo_inside_settled(const ebpo_context *context, uint32_t entry, ebpo_inside_result *out)
 {
     int32_t winding = ebpo_entry_winding(entry);
-    *out = (ebpo_inside_result){ ebpo_rule_inside(context->model->info->rule, winding) ? EBPO_IN : EBPO_OUT, winding, 0 };
+    *out = (ebpo_inside_result){ ebpo_rule_inside(context->model->info->rule, winding) ? EBPO_IN
+                                                                                       : EBPO_OUT,
+                                 winding, 0 };
 }
 
-static void find_in_entry(const ebpo_subtree *s, int fine_level, int level, const uint32_t at[3], const double p[3], in_leaf *out)
+static void find_in_entry(const ebpo_subtree *s, int fine_level, int level, const uint32_t at[3],
+                          const double p[3], in_leaf *out)
 {
     int shift = fine_level - level;
     uint32_t cell[3] = { at[0] >> shift, at[1] >> shift, at[2] >> shift };
     find_in_leaf(s, level, cell, p, out);
 }
 
-ebpo_status ebpo_inside_subtree(ebpo_context *context, const ebpo_subtree *s, const uint32_t at[3], const double p[3], ebpo_inside_result *out,
-                                ebpo_error *error)
+ebpo_status ebpo_inside_subtree(ebpo_context *context, const ebpo_subtree *s, const uint32_t at[3],
+                                const double p[3], ebpo_inside_result *out, ebpo_error *error)
 {
     int level, fine = context->model->info->level_count - 1;
     uint32_t entry = ebpo_descend(&s->nodes, fine, at, &level);
@@ -178,7 +198,8 @@ ebpo_status ebpo_inside_subtree(ebpo_context *context, const ebpo_subtree *s, co
     return answer_in_leaf(context, s, &s->leaf[ebpo_entry_value(entry)], &i, p, out, error);
 }
 
-/* Several points at a time, stage by stage, so that the memory that one stage needs is on its way while others are dealt with. */
+/* Several points at a time, stage by stage, so that the memory that one stage needs is on its way
+ * while others are dealt with. */
 enum { TOGETHER = 16 };
 
 typedef struct lane {
@@ -194,7 +215,8 @@ typedef struct waiting {
     in_leaf in;
 } waiting;
 
-static void start_lanes(const ebpo_subtree *s, int fine, const double *points, unsigned count, lane *l)
+static void start_lanes(const ebpo_subtree *s, int fine, const double *points, unsigned count,
+                        lane *l)
 {
     for (unsigned i = 0; i < count; i++) {
         l[i].within = ebpo_locate(&s->box, fine, points + 3 * i, l[i].at);
@@ -223,7 +245,8 @@ static void descend_together(const ebpo_subtree *s, int fine, unsigned count, la
         for (unsigned i = 0; i < count; i++)
             if (l[i].within && ebpo_entry_kind_of(l[i].entry) == EBPO_ENTRY_GRAY) {
                 l[i].level++;
-                l[i].entry = s->nodes.group[ebpo_entry_value(l[i].entry)][ebpo_octant_at(l[i].at, fine - l[i].level)];
+                l[i].entry = s->nodes.group[ebpo_entry_value(l[i].entry)]
+                                           [ebpo_octant_at(l[i].at, fine - l[i].level)];
                 if (ebpo_entry_kind_of(l[i].entry) == EBPO_ENTRY_GRAY) {
                     __builtin_prefetch(s->nodes.group[ebpo_entry_value(l[i].entry)]);
                     more = true;
@@ -249,8 +272,9 @@ static void prefetch_blocks(const ebpo_subtree *s, const waiting *w, const doubl
                 __builtin_prefetch(blocks + s->list[leaf->list + b].block * size + line);
 }
 
-static ebpo_status answer_waiting(ebpo_context *context, const ebpo_subtree *s, const waiting *w, unsigned count, const double *points,
-                                  ebpo_inside_result *out, ebpo_error *error)
+static ebpo_status answer_waiting(ebpo_context *context, const ebpo_subtree *s, const waiting *w,
+                                  unsigned count, const double *points, ebpo_inside_result *out,
+                                  ebpo_error *error)
 {
     for (unsigned i = 0; i < count; i++) {
         __builtin_prefetch(s->list + w[i].leaf->list);
@@ -261,11 +285,13 @@ static ebpo_status answer_waiting(ebpo_context *context, const ebpo_subtree *s, 
         prefetch_blocks(s, &w[i], points + 3 * w[i].point);
     ebpo_status status = EBPO_OK;
     for (unsigned i = 0; i < count && status == EBPO_OK; i++)
-        status = answer_in_leaf(context, s, w[i].leaf, &w[i].in, points + 3 * w[i].point, &out[w[i].point], error);
+        status = answer_in_leaf(context, s, w[i].leaf, &w[i].in, points + 3 * w[i].point,
+                                &out[w[i].point], error);
     return status;
 }
 
-static ebpo_status inside_together(ebpo_context *context, const ebpo_subtree *s, const double *points, unsigned count, ebpo_inside_result *out,
+static ebpo_status inside_together(ebpo_context *context, const ebpo_subtree *s,
+                                   const double *points, unsigned count, ebpo_inside_result *out,
                                    ebpo_error *error)
 {
     lane l[TOGETHER];
@@ -294,7 +320,8 @@ static ebpo_status inside_together(ebpo_context *context, const ebpo_subtree *s,
     return answer_waiting(context, s, w, leaves, points, out, error);
 }
 
-ebpo_status ebpo_inside_whole(ebpo_context *context, const double *points, uint64_t count, ebpo_inside_result *out, ebpo_error *error)
+ebpo_status ebpo_inside_whole(ebpo_context *context, const double *points, uint64_t count,
+                              ebpo_inside_result *out, ebpo_error *error)
 {
     const ebpo_subtree *s = context->model->whole;
     ebpo_status status = EBPO_OK;
@@ -306,6 +333,8 @@ ebpo_status ebpo_inside_whole(ebpo_context *context, const double *points, uint6
         return EBPO_OK;
     }
     for (uint64_t i = 0; i < count && status == EBPO_OK; i += TOGETHER)
-        status = inside_together(context, s, points + 3 * i, count - i < TOGETHER ? (unsigned)(count - i) : TOGETHER, out + i, error);
+        status = inside_together(context, s, points + 3 * i,
+                                 count - i < TOGETHER ? (unsigned)(count - i) : TOGETHER, out + i,
+                                 error);
     return status;
 }

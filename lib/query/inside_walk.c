@@ -11,11 +11,14 @@
 
 static bool uses_envelopes(const ebpo_context *c, const ebpo_query_options *o)
 {
-    /* An envelope tells that a point is outside, not its winding number: with rules other than nonzero that is no whole answer. */
-    bool whole_answer = c->model->info->rule == EBPO_RULE_NONZERO || o->level >= 0 || o->deadline_ns;
+    /* An envelope tells that a point is outside, not its winding number: with rules other than
+     * nonzero that is no whole answer. */
+    bool whole_answer =
+        c->model->info->rule == EBPO_RULE_NONZERO || o->level >= 0 || o->deadline_ns;
     if (o->envelopes == EBPO_ENVELOPES_SKIP || !whole_answer)
         return false;
-    return o->envelopes == EBPO_ENVELOPES_USE || !c->model->whole || o->level >= 0 || o->deadline_ns;
+    return o->envelopes == EBPO_ENVELOPES_USE || !c->model->whole || o->level >= 0 ||
+           o->deadline_ns;
 }
 
 static void maybe(const ebpo_model *m, const ebpo_spot *spot, ebpo_inside_result *out)
@@ -30,7 +33,7 @@ typedef struct asking {
     bool envelopes;
     uint64_t deadline; /* 0: none */
     const double *p;
-    uint32_t at[3];    /* p's cell at the deepest level */
+    uint32_t at[3]; /* p's cell at the deepest level */
 } asking;
 
 static bool outside_envelope(const asking *a, const ebpo_spot *spot)
@@ -43,7 +46,8 @@ static bool outside_envelope(const asking *a, const ebpo_spot *spot)
 static bool stops_here(const asking *a, const ebpo_spot *spot)
 {
     const ebpo_model *m = a->context->model;
-    if (a->options->level >= 0 && (spot->level >= a->options->level || !ebpo_spot_is_gray(m, spot) || ebpo_spot_is_pruned(m, spot)))
+    if (a->options->level >= 0 && (spot->level >= a->options->level ||
+                                   !ebpo_spot_is_gray(m, spot) || ebpo_spot_is_pruned(m, spot)))
         return true;
     return a->deadline && ebpo_clock() > a->deadline;
 }
@@ -74,14 +78,17 @@ static ebpo_status walk_down(asking *a, ebpo_inside_result *out, ebpo_error *err
                 return ebpo_inside_subtree(a->context, spot.subtree, a->at, a->p, out, error);
         }
         if (ebpo_entry_kind_of(spot.entry) == EBPO_ENTRY_LEAF)
-            return ebpo_inside_leaf(a->context, spot.subtree, ebpo_entry_value(spot.entry), spot.level, spot.at, a->p, out, error);
+            return ebpo_inside_leaf(a->context, spot.subtree, ebpo_entry_value(spot.entry),
+                                    spot.level, spot.at, a->p, out, error);
         spot = ebpo_spot_child(m, &spot, ebpo_octant_at(a->at, fine - spot.level - 1));
     }
 }
 
-/* --- node by node from the file: only what lies on the way is read, nothing is kept but decoded chunks --- */
+/* --- node by node from the file: only what lies on the way is read, nothing is kept but decoded
+ * chunks --- */
 
-static ebpo_status leaf_from_file(asking *a, const ebpo_place *place, ebpo_inside_result *out, ebpo_error *error)
+static ebpo_status leaf_from_file(asking *a, const ebpo_place *place, ebpo_inside_result *out,
+                                  ebpo_error *error)
 {
     ebpo_model *m = a->context->model;
     ebpo_slice slice;
@@ -92,18 +99,23 @@ static ebpo_status leaf_from_file(asking *a, const ebpo_place *place, ebpo_insid
     if (status == EBPO_OK)
         status = ebpo_subtree_make(&subtree, &slice, m->info, false, 1, error);
     if (status == EBPO_OK) {
-        status = ebpo_inside_leaf(a->context, subtree, ebpo_entry_value(subtree->nodes.root), place->level, place->at, a->p, out, error);
+        status = ebpo_inside_leaf(a->context, subtree, ebpo_entry_value(subtree->nodes.root),
+                                  place->level, place->at, a->p, out, error);
         ebpo_subtree_free(subtree);
     }
     return status;
 }
 
-static ebpo_status settled_from_file(asking *a, const ebpo_place *place, ebpo_inside_result *out, ebpo_error *error)
+static ebpo_status settled_from_file(asking *a, const ebpo_place *place, ebpo_inside_result *out,
+                                     ebpo_error *error)
 {
     int32_t winding;
     ebpo_status status = ebpo_place_winding(a->context->model->chunks, place, &winding, error);
     if (status == EBPO_OK)
-        *out = (ebpo_inside_result){ ebpo_rule_inside(a->context->model->info->rule, winding) ? EBPO_IN : EBPO_OUT, winding, 0 };
+        *out = (ebpo_inside_result){ ebpo_rule_inside(a->context->model->info->rule, winding)
+                                         ? EBPO_IN
+                                         : EBPO_OUT,
+                                     winding, 0 };
     return status;
 }
 
@@ -111,13 +123,15 @@ static ebpo_status step_down(const asking *a, ebpo_place *place, ebpo_error *err
 {
     uint16_t types;
     uint64_t ranks[4];
-    ebpo_status status = ebpo_place_children(a->context->model->chunks, place, &types, ranks, error);
+    ebpo_status status =
+        ebpo_place_children(a->context->model->chunks, place, &types, ranks, error);
     if (status != EBPO_OK)
         return status;
     place->pruned = a->context->model->info->pruned && types == 0;
     if (place->pruned)
         return EBPO_OK;
-    unsigned octant = ebpo_octant_at(a->at, a->context->model->info->level_count - 1 - place->level - 1);
+    unsigned octant =
+        ebpo_octant_at(a->at, a->context->model->info->level_count - 1 - place->level - 1);
     place->type = (ebpo_node_type)(types >> 2 * octant & 3);
     place->rank = ranks[place->type];
     for (unsigned i = 0; i < octant; i++)
@@ -129,7 +143,8 @@ static ebpo_status step_down(const asking *a, ebpo_place *place, ebpo_error *err
 }
 
 /* From a spot BELOW on. */
-static ebpo_status walk_file(asking *a, const ebpo_spot *spot, ebpo_inside_result *out, ebpo_error *error)
+static ebpo_status walk_file(asking *a, const ebpo_spot *spot, ebpo_inside_result *out,
+                             ebpo_error *error)
 {
     const ebpo_model *m = a->context->model;
     ebpo_place place = m->top->below[ebpo_entry_value(spot->entry)];
@@ -145,7 +160,8 @@ static ebpo_status walk_file(asking *a, const ebpo_spot *spot, ebpo_inside_resul
             return EBPO_OK;
         }
         ebpo_spot here = { NULL, 0, place.level, { place.at[0], place.at[1], place.at[2] } };
-        if ((a->options->level >= 0 && (place.level >= a->options->level || place.pruned)) || (a->deadline && ebpo_clock() > a->deadline)) {
+        if ((a->options->level >= 0 && (place.level >= a->options->level || place.pruned)) ||
+            (a->deadline && ebpo_clock() > a->deadline)) {
             maybe(m, &here, out);
             return EBPO_OK;
         }
@@ -156,11 +172,13 @@ static ebpo_status walk_file(asking *a, const ebpo_spot *spot, ebpo_inside_resul
             return status;
     }
     ebpo_spot here = { NULL, 0, place.level, { place.at[0], place.at[1], place.at[2] } };
-    if (place.type == EBPO_LEAF && (a->options->level >= 0 || (a->deadline && ebpo_clock() > a->deadline))) {
+    if (place.type == EBPO_LEAF &&
+        (a->options->level >= 0 || (a->deadline && ebpo_clock() > a->deadline))) {
         maybe(m, &here, out);
         return EBPO_OK;
     }
-    return place.type == EBPO_LEAF ? leaf_from_file(a, &place, out, error) : settled_from_file(a, &place, out, error);
+    return place.type == EBPO_LEAF ? leaf_from_file(a, &place, out, error)
+                                   : settled_from_file(a, &place, out, error);
 }
 
 static ebpo_status walk_nodes(asking *a, ebpo_inside_result *out, ebpo_error *error)
@@ -186,7 +204,8 @@ static ebpo_status walk_nodes(asking *a, ebpo_inside_result *out, ebpo_error *er
     return walk_file(a, &spot, out, error);
 }
 
-/* The subtree that is in the context's hands and holds p, or NULL; *entry: what the levels above say, when they settle it. */
+/* The subtree that is in the context's hands and holds p, or NULL; *entry: what the levels above
+ * say, when they settle it. */
 static const ebpo_subtree *held_around(const asking *a, uint32_t *entry)
 {
     const ebpo_context *c = a->context;
@@ -204,8 +223,10 @@ static const ebpo_subtree *held_around(const asking *a, uint32_t *entry)
     return below && c->pinned && c->pinned_key == ebpo_entry_value(*entry) ? c->pinned : NULL;
 }
 
-/* True when everything that p needs is in the context's hands: then envelopes save nothing, and only the faces of a leaf take time. */
-static bool answer_at_hand(asking *a, ebpo_inside_result *out, ebpo_status *status, ebpo_error *error)
+/* True when everything that p needs is in the context's hands: then envelopes save nothing, and
+ * only the faces of a leaf take time. */
+static bool answer_at_hand(asking *a, ebpo_inside_result *out, ebpo_status *status,
+                           ebpo_error *error)
 {
     const ebpo_model *m = a->context->model;
     uint32_t entry;
@@ -225,33 +246,48 @@ static bool answer_at_hand(asking *a, ebpo_inside_result *out, ebpo_status *stat
     entry = ebpo_descend(&held->nodes, fine, a->at, &level);
     if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW)
         return false; /* pruned: envelopes may tell */
-    ebpo_spot spot = { held, entry, level, { a->at[0] >> (fine - level), a->at[1] >> (fine - level), a->at[2] >> (fine - level) } };
+    ebpo_spot spot = { held,
+                       entry,
+                       level,
+                       { a->at[0] >> (fine - level), a->at[1] >> (fine - level),
+                         a->at[2] >> (fine - level) } };
     if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_SETTLED)
         ebpo_inside_settled(a->context, entry, out);
     else if (ebpo_clock() > a->deadline)
         maybe(m, &spot, out);
     else
-        *status = ebpo_inside_leaf(a->context, held, ebpo_entry_value(entry), level, spot.at, a->p, out, error);
+        *status = ebpo_inside_leaf(a->context, held, ebpo_entry_value(entry), level, spot.at, a->p,
+                                   out, error);
     return true;
 }
 
-ebpo_status ebpo_inside_pruned(ebpo_context *context, const double p[3], ebpo_inside_result *out, ebpo_error *error)
+ebpo_status ebpo_inside_pruned(ebpo_context *context, const double p[3], ebpo_inside_result *out,
+                               ebpo_error *error)
 {
     const ebpo_model *m = context->model;
     ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
-    asking a = { .context = context, .options = &options, .box = ebpo_model_box(m), .envelopes = true, .p = p };
+    asking a = {
+        .context = context, .options = &options, .box = ebpo_model_box(m), .envelopes = true, .p = p
+    };
     if (!ebpo_locate(&a.box, m->info->level_count - 1, p, a.at))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "a point outside the root cell has no node");
     ebpo_status status = walk_down(&a, out, error);
-    if (status == EBPO_OK && out->where == EBPO_OUT && m->info->rule != EBPO_RULE_NONZERO) /* outside, but the winding number is not known */
+    if (status == EBPO_OK && out->where == EBPO_OUT &&
+        m->info->rule != EBPO_RULE_NONZERO) /* outside, but the winding number is not known */
         return ebpo_fail_pruned(m, 0, (const uint32_t[3]){ 0, 0, 0 }, error);
     return status;
 }
 
-ebpo_status ebpo_inside_walk(ebpo_context *context, const double p[3], const ebpo_query_options *options, ebpo_inside_result *out, ebpo_error *error)
+ebpo_status ebpo_inside_walk(ebpo_context *context, const double p[3],
+                             const ebpo_query_options *options, ebpo_inside_result *out,
+                             ebpo_error *error)
 {
     const ebpo_model *m = context->model;
-    asking a = { .context = context, .options = options, .box = ebpo_model_box(m), .envelopes = uses_envelopes(context, options), .p = p };
+    asking a = { .context = context,
+                 .options = options,
+                 .box = ebpo_model_box(m),
+                 .envelopes = uses_envelopes(context, options),
+                 .p = p };
     if (options->deadline_ns)
         a.deadline = ebpo_clock() + options->deadline_ns;
     if (!ebpo_locate(&a.box, m->info->level_count - 1, p, a.at)) {
@@ -260,7 +296,9 @@ ebpo_status ebpo_inside_walk(ebpo_context *context, const double p[3], const ebp
     }
     ebpo_status status;
     bool plain = options->envelopes != EBPO_ENVELOPES_USE && options->level < 0;
-    if (plain && (m->whole || m->options.loading != EBPO_LOAD_NODES) && answer_at_hand(&a, out, &status, error))
+    if (plain && (m->whole || m->options.loading != EBPO_LOAD_NODES) &&
+        answer_at_hand(&a, out, &status, error))
         return status;
-    return !m->whole && m->options.loading == EBPO_LOAD_NODES ? walk_nodes(&a, out, error) : walk_down(&a, out, error);
+    return !m->whole && m->options.loading == EBPO_LOAD_NODES ? walk_nodes(&a, out, error)
+                                                              : walk_down(&a, out, error);
 }

@@ -21,7 +21,8 @@ static inline uint32_t ebpo_locate_on_axis(const ebpo_box *box, int level, int a
     return i;
 }
 
-/* The cell of the given level that holds p (walls belong to the upper cell); false outside the root cell. Exact: level <= grid_level. */
+/* The cell of the given level that holds p (walls belong to the upper cell); false outside the root
+ * cell. Exact: level <= grid_level. */
 static inline bool ebpo_locate(const ebpo_box *box, int level, const double p[3], uint32_t at[3])
 {
     for (int k = 0; k < 3; k++) {
@@ -45,8 +46,10 @@ static inline uint64_t ebpo_grid_cell(const ebpo_nodes *nodes, int fine_level, c
     return (z << nodes->grid_bits | y) << nodes->grid_bits | x;
 }
 
-/* The entry of the deepest node that holds cell `at` of `fine_level`; *level: its level. With a grid, not above the grid's nodes. */
-static inline uint32_t ebpo_descend(const ebpo_nodes *nodes, int fine_level, const uint32_t at[3], int *level)
+/* The entry of the deepest node that holds cell `at` of `fine_level`; *level: its level. With a
+ * grid, not above the grid's nodes. */
+static inline uint32_t ebpo_descend(const ebpo_nodes *nodes, int fine_level, const uint32_t at[3],
+                                    int *level)
 {
     uint32_t entry = nodes->root;
     *level = nodes->root_level;

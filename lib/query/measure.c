@@ -1,8 +1,10 @@
-/* Area, volume, centroid and inertia as integrals over the faces (divergence theorem): each face and the middle of the model span a tetrahedron, whose moments are
- * polynomials in its corners. With det = a . (b x c), s = a + b + c for corners a, b, c relative to the middle:
- *     volume det / 6,   first moments det s / 24,   second moments det (s s' + a a' + b b' + c c') / 120.
- * All of it in double-double arithmetic, on coordinates scaled by a power of two to about 1, in blocks of faces that do not depend on threads.
- * Source of the moments: Tonon 2004, "Explicit exact formulas for the 3-D tetrahedron inertia tensor in terms of its vertex coordinates". */
+/* Area, volume, centroid and inertia as integrals over the faces (divergence theorem): each face
+ * and the middle of the model span a tetrahedron, whose moments are polynomials in its corners.
+ * With det = a . (b x c), s = a + b + c for corners a, b, c relative to the middle: volume det / 6,
+ * first moments det s / 24,   second moments det (s s' + a a' + b b' + c c') / 120. All of it in
+ * double-double arithmetic, on coordinates scaled by a power of two to about 1, in blocks of faces
+ * that do not depend on threads. Source of the moments: Tonon 2004, "Explicit exact formulas for
+ * the 3-D tetrahedron inertia tensor in terms of its vertex coordinates". */
 #include "geom/strict_fp.h"
 
 #include <ebpo/query.h>
@@ -32,7 +34,8 @@ typedef struct frame {
 
 typedef struct moments {
     ebpo_pair area2, volume6, first24[3], second120[6]; /* second: xx, yy, zz, yz, zx, xy */
-    double absolute6;                                   /* the sum of absolute values behind volume6 */
+    /* the sum of absolute values behind volume6 */
+    double absolute6;
 } moments;
 
 typedef struct pass {
@@ -45,7 +48,8 @@ typedef struct pass {
 
 static void frame_of(frame *f, const ebpo_mesh *mesh)
 {
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, half = 0, largest = 0, p[3];
+    double low[3] = { INFINITY, INFINITY, INFINITY }, high[3] = { -INFINITY, -INFINITY, -INFINITY },
+           half = 0, largest = 0, p[3];
     for (uint64_t i = 0; i < 3 * mesh->face_count; i++) {
         ebpo_mesh_position(mesh, mesh->faces[i], p);
         for (int k = 0; k < 3; k++) {
@@ -64,7 +68,9 @@ static void frame_of(frame *f, const ebpo_mesh *mesh)
     f->factor[0] = ldexp(1, -f->exponent / 2);
     f->factor[1] = ldexp(1, -f->exponent - -f->exponent / 2);
     for (int k = 0; k < 3; k++)
-        f->middle[k] = mesh->face_count ? .5 * (low[k] * f->factor[0] * f->factor[1]) + .5 * (high[k] * f->factor[0] * f->factor[1]) : 0;
+        f->middle[k] = mesh->face_count ? .5 * (low[k] * f->factor[0] * f->factor[1]) +
+                                              .5 * (high[k] * f->factor[0] * f->factor[1])
+                                        : 0;
 }
 
 static void scaled_corners(const pass *p, uint64_t face, double out[3][3])
@@ -78,10 +84,7 @@ static void scaled_corners(const pass *p, uint64_t face, double out[3][3])
 
 /* --- moments --- */
 
-static void accumulate(ebpo_pair *sum, ebpo_pair x)
-{
-    *sum = ebpo_pair_add(*sum, x);
-}
+static void accumulate(ebpo_pair *sum, ebpo_pair x) { *sum = ebpo_pair_add(*sum, x); }
 
 static void merge(moments *sum, const moments *m)
 {
@@ -128,7 +131,7 @@ static ebpo_pair mixed_product(ebpo_pair r[3][3], const ebpo_pair s[3], int u, i
 
 static void add_face(moments *m, const double corner[3][3], const double middle[3])
 {
-    ebpo_pair n[3], r[3][3], s[3], det = {0, 0};
+    ebpo_pair n[3], r[3][3], s[3], det = { 0, 0 };
     normal_of(corner, n);
     accumulate(&m->area2, ebpo_pair_of(length(n)));
     for (int k = 0; k < 3; k++) {
@@ -143,22 +146,25 @@ static void add_face(moments *m, const double corner[3][3], const double middle[
     for (int k = 0; k < 3; k++) {
         accumulate(&m->first24[k], ebpo_pair_multiply(det, s[k]));
         accumulate(&m->second120[k], ebpo_pair_multiply(det, mixed_product(r, s, k, k)));
-        accumulate(&m->second120[3 + k], ebpo_pair_multiply(det, mixed_product(r, s, (k + 1) % 3, (k + 2) % 3)));
+        accumulate(&m->second120[3 + k],
+                   ebpo_pair_multiply(det, mixed_product(r, s, (k + 1) % 3, (k + 2) % 3)));
     }
 }
 
-static ebpo_status measure_blocks(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status measure_blocks(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                  ebpo_error *error)
 {
     pass *p = context;
     (void)worker;
     (void)error;
     for (uint64_t b = begin; b < end; b++) {
-        moments m = {.absolute6 = 0};
-        uint64_t last = (b + 1) * BLOCK_FACES < p->mesh->face_count ? (b + 1) * BLOCK_FACES : p->mesh->face_count;
+        moments m = { .absolute6 = 0 };
+        uint64_t last = (b + 1) * BLOCK_FACES < p->mesh->face_count ? (b + 1) * BLOCK_FACES
+                                                                    : p->mesh->face_count;
         for (uint64_t f = b * BLOCK_FACES; f < last; f++) {
             double corner[3][3];
             scaled_corners(p, f, corner);
-            add_face(&m, (const double (*)[3])corner, p->frame.middle);
+            add_face(&m, (const double(*)[3])corner, p->frame.middle);
         }
         p->blocks[b] = m;
     }
@@ -186,13 +192,16 @@ static void mass_of(ebpo_mass *out, const moments *m, const frame *f, bool solid
     ebpo_pair volume = ebpo_pair_divide(m->volume6, ebpo_pair_of(6)), centre[3], central[6];
     out->volume = ldexp(volume.head, 3 * f->exponent);
     for (int k = 0; k < 3; k++) {
-        centre[k] = ebpo_pair_divide(m->first24[k], ebpo_pair_multiply(m->volume6, ebpo_pair_of(4)));
-        out->centroid[k] = ldexp(ebpo_pair_add(ebpo_pair_of(f->middle[k]), centre[k]).head, f->exponent);
+        centre[k] =
+            ebpo_pair_divide(m->first24[k], ebpo_pair_multiply(m->volume6, ebpo_pair_of(4)));
+        out->centroid[k] =
+            ldexp(ebpo_pair_add(ebpo_pair_of(f->middle[k]), centre[k]).head, f->exponent);
     }
     for (int k = 0; k < 6; k++) {
         int u = k < 3 ? k : (k + 1) % 3, v = k < 3 ? k : (k + 2) % 3;
         ebpo_pair shift = ebpo_pair_multiply(volume, ebpo_pair_multiply(centre[u], centre[v]));
-        central[k] = ebpo_pair_subtract(ebpo_pair_divide(m->second120[k], ebpo_pair_of(120)), shift);
+        central[k] =
+            ebpo_pair_subtract(ebpo_pair_divide(m->second120[k], ebpo_pair_of(120)), shift);
     }
     inertia_of(out->inertia, central, f->exponent);
 }
@@ -200,12 +209,15 @@ static void mass_of(ebpo_mass *out, const moments *m, const frame *f, bool solid
 ebpo_status ebpo_measure(ebpo_file *file, unsigned threads, ebpo_mass *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_mesh mesh = {0};
-    pass p = {.mesh = &mesh};
-    moments sum = {.absolute6 = 0};
+    ebpo_mesh mesh = { 0 };
+    pass p = { .mesh = &mesh };
+    moments sum = { .absolute6 = 0 };
     uint64_t block_count = 0;
     if (ebpo_file_info(file)->pruned)
-        return ebpo_fail(error, EBPO_E_ABSENT, "%s: the file is a subset, of whose mesh a part was left out: it cannot be measured; measure the original", file->in.shown);
+        return ebpo_fail(error, EBPO_E_ABSENT,
+                         "%s: the file is a subset, of whose mesh a part was left out: it cannot "
+                         "be measured; measure the original",
+                         file->in.shown);
     ebpo_status status = ebpo_file_read_mesh(file, &mesh, threads, error);
     if (status != EBPO_OK)
         goto done;
@@ -216,7 +228,8 @@ ebpo_status ebpo_measure(ebpo_file *file, unsigned threads, ebpo_mass *out, ebpo
         goto done;
     }
     frame_of(&p.frame, &mesh);
-    status = ebpo_parallel_for(threads, block_count, 1, measure_blocks, &p, NULL, "measuring", error);
+    status =
+        ebpo_parallel_for(threads, block_count, 1, measure_blocks, &p, NULL, "measuring", error);
     if (status != EBPO_OK)
         goto done;
     for (uint64_t b = 0; b < block_count; b++)

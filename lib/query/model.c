@@ -21,7 +21,9 @@ enum { SUBTREES_WANTED = 64 };
 
 static uint64_t chunk_budget(uint64_t budget)
 {
-    return budget / 8 < CHUNKS_LEAST ? CHUNKS_LEAST : budget / 8 > CHUNKS_MOST ? CHUNKS_MOST : budget / 8;
+    return budget / 8 < CHUNKS_LEAST  ? CHUNKS_LEAST
+           : budget / 8 > CHUNKS_MOST ? CHUNKS_MOST
+                                      : budget / 8;
 }
 
 static ebpo_slice_size whole_size(const ebpo_info *info)
@@ -38,7 +40,8 @@ static ebpo_slice_size whole_size(const ebpo_info *info)
 
 /* --- subtrees for the cache --- */
 
-static ebpo_status estimate_subtree(void *user, uint64_t key, uint64_t *peak, uint64_t *keep, ebpo_error *error)
+static ebpo_status estimate_subtree(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
+                                    ebpo_error *error)
 {
     ebpo_model *m = user;
     ebpo_slice_size size;
@@ -57,7 +60,8 @@ static void count_leaves(ebpo_model *m, const ebpo_subtree *s, uint64_t sign)
         m->leaves_of_kind[k] += sign * s->kinds[k];
 }
 
-static ebpo_status load_subtree(void *user, uint64_t key, void **item, uint64_t *bytes, ebpo_error *error)
+static ebpo_status load_subtree(void *user, uint64_t key, void **item, uint64_t *bytes,
+                                ebpo_error *error)
 {
     ebpo_model *m = user;
     ebpo_slice slice;
@@ -85,18 +89,23 @@ ebpo_status ebpo_model_has_room(const ebpo_model *m, const ebpo_place *place, eb
 {
     ebpo_slice_size size;
     uint64_t keep, peak;
-    ebpo_status status = m->options.memory ? ebpo_slice_measure(m->chunks, place, &size, error) : EBPO_OK;
+    ebpo_status status =
+        m->options.memory ? ebpo_slice_measure(m->chunks, place, &size, error) : EBPO_OK;
     if (status != EBPO_OK || !m->options.memory)
         return status;
     ebpo_subtree_estimate(&size, m->info, &keep, &peak);
     uint64_t taken = m->top->bytes + chunk_budget(m->options.memory);
     if (taken + peak <= m->options.memory)
         return EBPO_OK;
-    return ebpo_fail(error, EBPO_E_LIMIT, "the memory budget of %" PRIu64 " bytes does not hold a leaf of level %d, which takes up to %" PRIu64 " more than the %" PRIu64
-                     " in use; give a larger budget", m->options.memory, place->level, peak, taken);
+    return ebpo_fail(error, EBPO_E_LIMIT,
+                     "the memory budget of %" PRIu64
+                     " bytes does not hold a leaf of level %d, which takes up to %" PRIu64
+                     " more than the %" PRIu64 " in use; give a larger budget",
+                     m->options.memory, place->level, peak, taken);
 }
 
-/* Half the budget for subtrees must hold so many of the average size; the top may take a quarter. */
+/* Half the budget for subtrees must hold so many of the average size; the top may take a quarter.
+ */
 static int choose_cut(const ebpo_info *info, uint64_t budget)
 {
     ebpo_slice_size size = whole_size(info);
@@ -142,8 +151,10 @@ static ebpo_status open_top(ebpo_model *m, int cut_level, ebpo_error *error)
     if (budget) {
         chunks = chunk_budget(budget);
         if (m->top->bytes + chunks + SUBTREES_LEAST > budget)
-            return ebpo_fail(error, EBPO_E_LIMIT, "levels 0 to %d and a cache take more than the budget of %" PRIu64 " bytes; give %" PRIu64
-                             " or a lower cut level", cut_level, budget, m->top->bytes + chunks + SUBTREES_LEAST);
+            return ebpo_fail(error, EBPO_E_LIMIT,
+                             "levels 0 to %d and a cache take more than the budget of %" PRIu64
+                             " bytes; give %" PRIu64 " or a lower cut level",
+                             cut_level, budget, m->top->bytes + chunks + SUBTREES_LEAST);
         cache = budget - m->top->bytes - chunks;
     }
     status = ebpo_chunks_make(&m->chunks, m->file, chunks, error);
@@ -170,13 +181,16 @@ static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
     int cut = choose_cut(m->info, o->memory);
     if (cut < 0) {
         uint64_t least = least_budget(m->info);
-        return ebpo_fail(error, EBPO_E_LIMIT, "a budget of %" PRIu64 " bytes is too small for this model; give at least %" PRIu64, o->memory,
-                         least < peak ? least : peak);
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "a budget of %" PRIu64
+                         " bytes is too small for this model; give at least %" PRIu64,
+                         o->memory, least < peak ? least : peak);
     }
     return open_top(m, cut, error);
 }
 
-ebpo_status ebpo_model_open(ebpo_model **out, ebpo_file *file, const ebpo_model_options *options, ebpo_error *error)
+ebpo_status ebpo_model_open(ebpo_model **out, ebpo_file *file, const ebpo_model_options *options,
+                            ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     static const ebpo_model_options usual = EBPO_MODEL_OPTIONS_INIT;
@@ -190,7 +204,9 @@ ebpo_status ebpo_model_open(ebpo_model **out, ebpo_file *file, const ebpo_model_
     m->options = options ? *options : usual;
     m->kernels = ebpo_kernels_best();
     ebpo_status status = m->options.loading > EBPO_LOAD_NODES
-                             ? ebpo_fail(error, EBPO_E_ARGUMENT, "model options: there is no way of loading number %d", (int)m->options.loading)
+                             ? ebpo_fail(error, EBPO_E_ARGUMENT,
+                                         "model options: there is no way of loading number %d",
+                                         (int)m->options.loading)
                              : open_parts(m, error);
     if (status != EBPO_OK) {
         ebpo_model_close(m);
@@ -214,7 +230,9 @@ void ebpo_model_close(ebpo_model *m)
 
 void ebpo_model_get_stats(const ebpo_model *m, ebpo_model_stats *out)
 {
-    *out = (ebpo_model_stats){ .resident = m->whole != NULL, .cut_level = m->top ? m->top->cut_level : 0, .budget = m->options.memory,
+    *out = (ebpo_model_stats){ .resident = m->whole != NULL,
+                               .cut_level = m->top ? m->top->cut_level : 0,
+                               .budget = m->options.memory,
                                .open_seconds = m->open_seconds };
     ebpo_file_traffic(m->file, &out->bytes_read, &out->reads);
     out->leaves = m->leaves;
@@ -277,11 +295,15 @@ static ebpo_status too_little(const ebpo_model *m, uint32_t below, ebpo_error *e
     least = m->top->bytes + peak;
     while (m->top->bytes + chunk_budget(least) + peak > least)
         least += least / 8 + 1;
-    return ebpo_fail(error, EBPO_E_LIMIT, "the memory budget of %" PRIu64 " bytes does not hold one subtree below level %d and what else is in use; a budget of %" PRIu64
-                     " would, or a higher cut level", m->options.memory, m->top->cut_level, least);
+    return ebpo_fail(error, EBPO_E_LIMIT,
+                     "the memory budget of %" PRIu64
+                     " bytes does not hold one subtree below level %d and what else is in use; a "
+                     "budget of %" PRIu64 " would, or a higher cut level",
+                     m->options.memory, m->top->cut_level, least);
 }
 
-ebpo_status ebpo_context_subtree(ebpo_context *c, uint32_t below, ebpo_subtree **out, ebpo_error *error)
+ebpo_status ebpo_context_subtree(ebpo_context *c, uint32_t below, ebpo_subtree **out,
+                                 ebpo_error *error)
 {
     const ebpo_model *m = c->model;
     void *item;

@@ -13,7 +13,8 @@
 #include "query/pruned.h"
 #include "query/walk.h"
 
-static const ebpo_distance_result nothing = { INFINITY, 0, INFINITY, { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
+static const ebpo_distance_result nothing = { INFINITY,          0,           INFINITY,
+                                              { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
 
 static ebpo_status all_leaves(ebpo_context *c, ebpo_nearest *n, ebpo_spot spot, ebpo_error *error)
 {
@@ -35,7 +36,8 @@ static ebpo_status all_leaves(ebpo_context *c, ebpo_nearest *n, ebpo_spot spot, 
     return status;
 }
 
-ebpo_status ebpo_distance_around(ebpo_context *c, const double p[3], const ebpo_query_options *o, ebpo_distance_result *out, ebpo_error *error)
+ebpo_status ebpo_distance_around(ebpo_context *c, const double p[3], const ebpo_query_options *o,
+                                 ebpo_distance_result *out, ebpo_error *error)
 {
     ebpo_box box = ebpo_model_box(c->model);
     uint32_t at[3];
@@ -73,7 +75,8 @@ static void corner_of(const ebpo_box *box, const ebpo_spot *spot, const double x
     }
 }
 
-static void nearest_polygon(const ebpo_polytope *e, const ebpo_box *box, const ebpo_spot *spot, const double p[3], ebpo_distance_result *out)
+static void nearest_polygon(const ebpo_polytope *e, const ebpo_box *box, const ebpo_spot *spot,
+                            const double p[3], ebpo_distance_result *out)
 {
     double best[3][3];
     for (int f = 0; f < e->face_count; f++)
@@ -83,7 +86,7 @@ static void nearest_polygon(const ebpo_polytope *e, const ebpo_box *box, const e
             corner_of(box, spot, e->vertex[e->corner[e->first[f]]], t[0]);
             corner_of(box, spot, e->vertex[e->corner[i]], t[1]);
             corner_of(box, spot, e->vertex[e->corner[i + 1]], t[2]);
-            ebpo_triangle_distance_bounds(p, (const double (*)[3])t, &b);
+            ebpo_triangle_distance_bounds(p, (const double(*)[3])t, &b);
             if (b.hi < out->distance) {
                 out->distance = b.hi;
                 for (int k = 0; k < 9; k++)
@@ -93,14 +96,16 @@ static void nearest_polygon(const ebpo_polytope *e, const ebpo_box *box, const e
     if (isinf(out->distance))
         return;
     ebpo_triangle_nearest exact;
-    ebpo_triangle_nearest_exact(p, (const double (*)[3])best, NULL, &exact);
-    ebpo_triangle_unit_normal((const double (*)[3])best, out->normal);
+    ebpo_triangle_nearest_exact(p, (const double(*)[3])best, NULL, &exact);
+    ebpo_triangle_unit_normal((const double(*)[3])best, out->normal);
     out->distance = exact.distance;
     for (int k = 0; k < 3; k++)
         out->point[k] = exact.point[k];
 }
 
-ebpo_status ebpo_distance_to_envelope(ebpo_context *c, const double p[3], const ebpo_query_options *o, ebpo_distance_result *out, ebpo_error *error)
+ebpo_status ebpo_distance_to_envelope(ebpo_context *c, const double p[3],
+                                      const ebpo_query_options *o, ebpo_distance_result *out,
+                                      ebpo_error *error)
 {
     ebpo_box box = ebpo_model_box(c->model);
     uint32_t at[3];
@@ -128,7 +133,8 @@ ebpo_status ebpo_distance_to_envelope(ebpo_context *c, const double p[3], const 
         ebpo_spot child = ebpo_spot_child(c->model, &spot, octant);
         if (!ebpo_spot_is_gray(c->model, &child))
             break;
-        if (c->model->info->boxed && ebpo_spot_is_pruned(c->model, &child)) /* leaves outside a subset's box look the same */
+        if (c->model->info->boxed &&
+            ebpo_spot_is_pruned(c->model, &child)) /* leaves outside a subset's box look the same */
             return ebpo_fail_pruned(c->model, child.level, child.at, error);
         if (!ebpo_polytope_child(&envelope[now], octant, &envelope[1 - now]))
             break;

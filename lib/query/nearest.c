@@ -1,5 +1,6 @@
-/* Depth first, nearest child first, with everything pruned that is certainly farther than something already seen. Bounds and triangles in single precision, with errors
- * bounded; what passes is judged with certain bounds in double precision, and what these cannot tell apart exactly. */
+/* Depth first, nearest child first, with everything pruned that is certainly farther than something
+ * already seen. Bounds and triangles in single precision, with errors bounded; what passes is
+ * judged with certain bounds in double precision, and what these cannot tell apart exactly. */
 #include "geom/strict_fp.h"
 
 #include "query/nearest.h"
@@ -16,7 +17,8 @@
 /* Beyond so many halves of the subtree's size, single precision tells nothing apart. */
 #define FAR 32.0
 
-/* A child to visit: the bits of its squared lower bound (not negative, so of the same order as integers), then its number. */
+/* A child to visit: the bits of its squared lower bound (not negative, so of the same order as
+ * integers), then its number. */
 typedef uint64_t visit;
 
 static inline visit make_visit(float lower2, uint32_t child)
@@ -43,7 +45,8 @@ void ebpo_nearest_begin(ebpo_nearest *n, const double p[3], double max_distance)
     n->passed_over = INFINITY;
 }
 
-static void take(ebpo_nearest *n, const double triangle[3][3], const ebpo_distance_bounds *bounds, uint64_t file_face, uint64_t told_face)
+static void take(ebpo_nearest *n, const double triangle[3][3], const ebpo_distance_bounds *bounds,
+                 uint64_t file_face, uint64_t told_face)
 {
     n->found = true;
     n->bounds = *bounds;
@@ -54,10 +57,11 @@ static void take(ebpo_nearest *n, const double triangle[3][3], const ebpo_distan
     n->limit = fmin(n->limit, bounds->hi);
 }
 
-void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint64_t file_face, uint64_t told_face)
+void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint64_t file_face,
+                             uint64_t told_face)
 {
     ebpo_distance_bounds b;
-    ebpo_triangle_distance_bounds(n->p, (const double (*)[3])triangle, &b);
+    ebpo_triangle_distance_bounds(n->p, (const double(*)[3])triangle, &b);
     if (b.lo <= n->limit)
         take(n, triangle, &b, file_face, told_face);
 }
@@ -67,22 +71,29 @@ static bool same_corner(const double a[3], const double b[3])
     return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
 }
 
-/* Sign of the new face's distance less the winner's, exact. Faces around one vertex or edge are the usual tie. */
-static int compare(const ebpo_nearest *n, const double triangle[3][3], const ebpo_distance_bounds *b)
+/* Sign of the new face's distance less the winner's, exact. Faces around one vertex or edge are the
+ * usual tie. */
+static int compare(const ebpo_nearest *n, const double triangle[3][3],
+                   const ebpo_distance_bounds *b)
 {
     if (b->hi < n->bounds.lo)
         return -1;
     if (b->lo > n->bounds.hi)
         return 1;
-    if (b->feature <= EBPO_NEAR_CORNER2 && n->bounds.feature <= EBPO_NEAR_CORNER2 && same_corner(triangle[b->feature], n->triangle[n->bounds.feature]))
+    if (b->feature <= EBPO_NEAR_CORNER2 && n->bounds.feature <= EBPO_NEAR_CORNER2 &&
+        same_corner(triangle[b->feature], n->triangle[n->bounds.feature]))
         return 0;
-    if (b->feature >= EBPO_NEAR_EDGE0 && b->feature <= EBPO_NEAR_EDGE2 && n->bounds.feature >= EBPO_NEAR_EDGE0 && n->bounds.feature <= EBPO_NEAR_EDGE2) {
-        const double *a0 = triangle[b->feature - EBPO_NEAR_EDGE0], *a1 = triangle[(b->feature - EBPO_NEAR_EDGE0 + 1) % 3];
-        const double *b0 = n->triangle[n->bounds.feature - EBPO_NEAR_EDGE0], *b1 = n->triangle[(n->bounds.feature - EBPO_NEAR_EDGE0 + 1) % 3];
-        if ((same_corner(a0, b1) && same_corner(a1, b0)) || (same_corner(a0, b0) && same_corner(a1, b1)))
+    if (b->feature >= EBPO_NEAR_EDGE0 && b->feature <= EBPO_NEAR_EDGE2 &&
+        n->bounds.feature >= EBPO_NEAR_EDGE0 && n->bounds.feature <= EBPO_NEAR_EDGE2) {
+        const double *a0 = triangle[b->feature - EBPO_NEAR_EDGE0],
+                     *a1 = triangle[(b->feature - EBPO_NEAR_EDGE0 + 1) % 3];
+        const double *b0 = n->triangle[n->bounds.feature - EBPO_NEAR_EDGE0],
+                     *b1 = n->triangle[(n->bounds.feature - EBPO_NEAR_EDGE0 + 1) % 3];
+        if ((same_corner(a0, b1) && same_corner(a1, b0)) ||
+            (same_corner(a0, b0) && same_corner(a1, b1)))
             return 0;
     }
-    return ebpo_triangle_distance_compare(n->p, triangle, (const double (*)[3])n->triangle);
+    return ebpo_triangle_distance_compare(n->p, triangle, (const double(*)[3])n->triangle);
 }
 
 static void look_at(ebpo_nearest *n, const ebpo_subtree *s, uint32_t slot)
@@ -96,22 +107,23 @@ static void look_at(ebpo_nearest *n, const ebpo_subtree *s, uint32_t slot)
     double triangle[3][3];
     ebpo_distance_bounds b;
     ebpo_subtree_triangle(s, slot, triangle);
-    ebpo_triangle_distance_bounds(n->p, (const double (*)[3])triangle, &b);
+    ebpo_triangle_distance_bounds(n->p, (const double(*)[3])triangle, &b);
     if (b.lo > n->limit)
         return;
     if (n->found) {
-        int sign = compare(n, (const double (*)[3])triangle, &b);
+        int sign = compare(n, (const double(*)[3])triangle, &b);
         if (sign > 0 || (sign == 0 && file_face > n->file_face))
             return;
     }
-    take(n, (const double (*)[3])triangle, &b, file_face, ebpo_subtree_told_face(s, local));
+    take(n, (const double(*)[3])triangle, &b, file_face, ebpo_subtree_told_face(s, local));
 }
 
 void ebpo_nearest_leaf(ebpo_nearest *n, const ebpo_subtree *s, const ebpo_subtree_leaf *leaf)
 {
     for (uint32_t b = 0; b < leaf->blocks; b++)
         for (unsigned lanes = s->list[leaf->list + b].lanes; lanes; lanes &= lanes - 1)
-            look_at(n, s, s->list[leaf->list + b].block * EBPO_BLOCK + (unsigned)__builtin_ctz(lanes));
+            look_at(n, s,
+                    s->list[leaf->list + b].block * EBPO_BLOCK + (unsigned)__builtin_ctz(lanes));
 }
 
 /* --- near: single precision --- */
@@ -131,11 +143,13 @@ static bool make_probe(const ebpo_subtree *s, const double p[3], ebpo_probe *out
     }
     out->scale = (float)s->scale;
     out->scale64 = s->scale;
-    out->error = (float)most * 0x1p-19f; /* three axes, three roundings each, of numbers up to `most` + 2 */
+    /* three axes, three roundings each, of numbers up to `most` + 2 */
+    out->error = (float)most * 0x1p-19f;
     return true;
 }
 
-/* A search under way. Faces that may be nearest wait as candidates until the end: by then nearly all are known to be farther. */
+/* A search under way. Faces that may be nearest wait as candidates until the end: by then nearly
+ * all are known to be farther. */
 enum { CANDIDATES = 64 };
 
 typedef struct candidate {
@@ -202,7 +216,8 @@ static void judge(searching *g)
 static void add_block(searching *g, uint32_t block)
 {
     float low[8], high[8], best = g->best;
-    for (unsigned lanes = g->kernels->faces(g->s, block, &g->probe, g->best, low, high); lanes; lanes &= lanes - 1) {
+    for (unsigned lanes = g->kernels->faces(g->s, block, &g->probe, g->best, low, high); lanes;
+         lanes &= lanes - 1) {
         unsigned lane = (unsigned)__builtin_ctz(lanes);
         if (g->count == CANDIDATES)
             drop_far(g);
@@ -216,7 +231,8 @@ static void add_block(searching *g, uint32_t block)
 }
 
 /* Children that matter, farthest first, so that the nearest is on top. */
-static uint32_t push_children(visit *stack, uint32_t top, const ebpo_bound *bound, unsigned lanes, const float lower2[8])
+static uint32_t push_children(visit *stack, uint32_t top, const ebpo_bound *bound, unsigned lanes,
+                              const float lower2[8])
 {
     uint32_t base = top;
     for (; lanes; lanes &= lanes - 1) {
@@ -236,7 +252,9 @@ static void give_up(searching *g, const visit *stack, uint32_t top)
     ebpo_nearest *n = g->n;
     n->late = true;
     for (uint32_t i = 0; i < top; i++) {
-        double lower = (sqrt((double)visit_lower2(stack[i])) * (1 - 0x1p-20) - (double)g->probe.error) / g->probe.scale64;
+        double lower =
+            (sqrt((double)visit_lower2(stack[i])) * (1 - 0x1p-20) - (double)g->probe.error) /
+            g->probe.scale64;
         n->passed_over = fmin(n->passed_over, fmax(lower, 0));
     }
 }
@@ -278,7 +296,8 @@ static double box_distance(const ebpo_subtree *s, const ebpo_bound *b, int lane,
 {
     double most = 0, sum = 0, d[3];
     for (int k = 0; k < 3; k++) {
-        double low = s->centre[k] + (double)b->low[k][lane] / s->scale, high = s->centre[k] + (double)b->high[k][lane] / s->scale;
+        double low = s->centre[k] + (double)b->low[k][lane] / s->scale,
+               high = s->centre[k] + (double)b->high[k][lane] / s->scale;
         d[k] = fmax(fmax(low - p[k], p[k] - high), 0);
         most = fmax(most, d[k]);
     }
@@ -286,7 +305,8 @@ static double box_distance(const ebpo_subtree *s, const ebpo_bound *b, int lane,
         return most;
     for (int k = 0; k < 3; k++)
         sum += d[k] / most * (d[k] / most);
-    /* p[k] is FAR away on the axis that matters, so the rounding of the walls is far below 2^-40 of it. */
+    /* p[k] is FAR away on the axis that matters, so the rounding of the walls is far below 2^-40 of
+     * it. */
     return most * sqrt(sum) * (1 - 0x1p-40);
 }
 
@@ -337,13 +357,16 @@ void ebpo_nearest_search(ebpo_nearest *n, const ebpo_context *context, const ebp
 
 void ebpo_nearest_end(const ebpo_nearest *n, double max_distance, ebpo_distance_result *out)
 {
-    *out = (ebpo_distance_result){ INFINITY, max_distance, INFINITY, { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
-    if (!n->found || (n->bounds.hi > max_distance && ebpo_triangle_distance_compare_to(n->p, (const double (*)[3])n->triangle, max_distance) > 0))
+    *out = (ebpo_distance_result){ INFINITY,          max_distance, INFINITY,
+                                   { NAN, NAN, NAN }, { 0, 0, 0 },  EBPO_NO_FACE };
+    if (!n->found || (n->bounds.hi > max_distance &&
+                      ebpo_triangle_distance_compare_to(n->p, (const double(*)[3])n->triangle,
+                                                        max_distance) > 0))
         return;
     ebpo_triangle_nearest exact;
-    ebpo_triangle_nearest_exact(n->p, (const double (*)[3])n->triangle, &n->bounds, &exact);
+    ebpo_triangle_nearest_exact(n->p, (const double(*)[3])n->triangle, &n->bounds, &exact);
     out->distance = out->lo = out->hi = exact.distance;
     memcpy(out->point, exact.point, sizeof out->point);
-    ebpo_triangle_unit_normal((const double (*)[3])n->triangle, out->normal);
+    ebpo_triangle_unit_normal((const double(*)[3])n->triangle, out->normal);
     out->face = n->told_face;
 }

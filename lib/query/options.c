@@ -15,11 +15,14 @@
 ebpo_status ebpo_check_options(const ebpo_query_options *o, ebpo_error *error)
 {
     if (o->level < -1 || o->level >= EBPO_LEVELS_MAX)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "level %d: give 0 to %d, or -1 for all", o->level, EBPO_LEVELS_MAX - 1);
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "level %d: give 0 to %d, or -1 for all", o->level,
+                         EBPO_LEVELS_MAX - 1);
     if (!(o->max_distance >= 0))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "maximum distance %g: give 0 or more", o->max_distance);
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "maximum distance %g: give 0 or more",
+                         o->max_distance);
     if (o->envelopes > EBPO_ENVELOPES_SKIP || o->mode > EBPO_DISTANCE_ENVELOPE)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "query options hold a value that is none of its kind");
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "query options hold a value that is none of its kind");
     return EBPO_OK;
 }
 
@@ -27,7 +30,8 @@ ebpo_status ebpo_check_points(const double *points, uint64_t count, ebpo_error *
 {
     for (uint64_t i = 0; i < 3 * count; i++)
         if (!isfinite(points[i]))
-            return ebpo_fail(error, EBPO_E_ARGUMENT, "point %" PRIu64 " has a coordinate that is no finite number", i / 3);
+            return ebpo_fail(error, EBPO_E_ARGUMENT,
+                             "point %" PRIu64 " has a coordinate that is no finite number", i / 3);
     return EBPO_OK;
 }
 
@@ -35,19 +39,25 @@ ebpo_status ebpo_check_mesh(const ebpo_model *model, ebpo_error *error)
 {
     if (model->info->parts & EBPO_PART_MESH)
         return EBPO_OK;
-    return ebpo_fail(error, EBPO_E_ABSENT, "%s: the file was written without its mesh: exact answers need it; ask with a level, or take a file with it (`ebpo subset`, `ebpo fetch` or "
-                     "`ebpo convert` with --profile collision or full)", model->file->in.shown);
+    return ebpo_fail(error, EBPO_E_ABSENT,
+                     "%s: the file was written without its mesh: exact answers need it; ask with a "
+                     "level, or take a file with it (`ebpo subset`, `ebpo fetch` or "
+                     "`ebpo convert` with --profile collision or full)",
+                     model->file->in.shown);
 }
 
 ebpo_status ebpo_check_solid(const ebpo_model *model, ebpo_error *error)
 {
     if (model->info->solid)
         return EBPO_OK;
-    return ebpo_fail(error, EBPO_E_NOT_SOLID, "the model is a surface: it has no inside; close it (convert --fill-holes) and build it again");
+    return ebpo_fail(error, EBPO_E_NOT_SOLID,
+                     "the model is a surface: it has no inside; close it (convert --fill-holes) "
+                     "and build it again");
 }
 
-ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64_t count, const ebpo_query_options *options,
-                             ebpo_inside_result *out, ebpo_error *error)
+ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64_t count,
+                             const ebpo_query_options *options, ebpo_inside_result *out,
+                             ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     static const ebpo_query_options usual = EBPO_QUERY_OPTIONS_INIT;
@@ -60,17 +70,20 @@ ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64
         status = ebpo_check_points(points, count, error);
     if (status == EBPO_OK && o->level < 0)
         status = ebpo_check_mesh(m, error);
-    if (status == EBPO_OK && m->whole && o->level < 0 && !o->deadline_ns && o->envelopes != EBPO_ENVELOPES_USE)
+    if (status == EBPO_OK && m->whole && o->level < 0 && !o->deadline_ns &&
+        o->envelopes != EBPO_ENVELOPES_USE)
         return ebpo_inside_whole(context, points, count, out, error);
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
         status = ebpo_inside_walk(context, points + 3 * i, o, &out[i], error);
-        if (status == EBPO_OK && ebpo_looks_ahead(m) && (o->level < 0 || o->level > m->top->cut_level))
+        if (status == EBPO_OK && ebpo_looks_ahead(m) &&
+            (o->level < 0 || o->level > m->top->cut_level))
             ebpo_context_look_ahead(context, points + 3 * i, 0);
     }
     return status;
 }
 
-ebpo_status ebpo_inside(ebpo_context *context, const double point[3], const ebpo_query_options *options, ebpo_inside_result *out,
+ebpo_status ebpo_inside(ebpo_context *context, const double point[3],
+                        const ebpo_query_options *options, ebpo_inside_result *out,
                         ebpo_error *error)
 {
     return ebpo_inside_many(context, point, 1, options, out, error);

@@ -17,22 +17,29 @@ static void describe(const ebpo_info *info, char *out, size_t room)
     if (info->cut_levels)
         used = (size_t)snprintf(out, room, "it was cut to levels 0 to %d", info->cut_levels - 1);
     if (info->boxed && used < room)
-        snprintf(out + used, room - used, "%s %.9g,%.9g,%.9g to %.9g,%.9g,%.9g", used ? " and to the box" : "it was cut to the box", b[0], b[1], b[2], b[3], b[4], b[5]);
+        snprintf(out + used, room - used, "%s %.9g,%.9g,%.9g to %.9g,%.9g,%.9g",
+                 used ? " and to the box" : "it was cut to the box", b[0], b[1], b[2], b[3], b[4],
+                 b[5]);
     used = strlen(out);
     if (info->kept_error > 0 && used < room)
-        snprintf(out + used, room - used, "%s %.9g", used ? " and to an error of" : "it was cut to an error of", info->kept_error);
+        snprintf(out + used, room - used, "%s %.9g",
+                 used ? " and to an error of" : "it was cut to an error of", info->kept_error);
     if (!out[0])
         snprintf(out, room, "it is a part of another file");
 }
 
-ebpo_status ebpo_fail_pruned(const ebpo_model *model, int level, const uint32_t at[3], ebpo_error *error)
+ebpo_status ebpo_fail_pruned(const ebpo_model *model, int level, const uint32_t at[3],
+                             ebpo_error *error)
 {
     char cut[200];
     ebpo_box box = ebpo_model_box(model);
     describe(model->info, cut, sizeof cut);
-    return ebpo_fail(error, EBPO_E_ABSENT, "%.120s: this needs nodes left out below level %d at %.6g %.6g %.6g (%s); ask with a level, or take a larger part of the original with "
-                     "`ebpo subset` or `ebpo fetch`", model->file->in.shown, level, ebpo_wall(&box, 0, level, at[0]), ebpo_wall(&box, 1, level, at[1]),
-                     ebpo_wall(&box, 2, level, at[2]), cut);
+    return ebpo_fail(error, EBPO_E_ABSENT,
+                     "%.120s: this needs nodes left out below level %d at %.6g %.6g %.6g (%s); ask "
+                     "with a level, or take a larger part of the original with "
+                     "`ebpo subset` or `ebpo fetch`",
+                     model->file->in.shown, level, ebpo_wall(&box, 0, level, at[0]),
+                     ebpo_wall(&box, 1, level, at[1]), ebpo_wall(&box, 2, level, at[2]), cut);
 }
 
 typedef struct checking {
@@ -45,7 +52,8 @@ typedef struct checking {
 static ebpo_status check(const checking *k, ebpo_spot spot, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    if (ebpo_spot_is_settled(&spot) || !ebpo_spot_is_gray(k->context->model, &spot) || !k->matters(k->user, &k->box, &spot))
+    if (ebpo_spot_is_settled(&spot) || !ebpo_spot_is_gray(k->context->model, &spot) ||
+        !k->matters(k->user, &k->box, &spot))
         return EBPO_OK;
     if (ebpo_spot_is_below(&spot)) /* fails for pruned ones */
         status = ebpo_spot_enter(k->context, &spot, error);
@@ -54,8 +62,10 @@ static ebpo_status check(const checking *k, ebpo_spot spot, ebpo_error *error)
     return status;
 }
 
-ebpo_status ebpo_check_pruned(ebpo_context *context, ebpo_matters_fn matters, void *user, ebpo_error *error)
+ebpo_status ebpo_check_pruned(ebpo_context *context, ebpo_matters_fn matters, void *user,
+                              ebpo_error *error)
 {
     checking k = { context, matters, user, ebpo_model_box(context->model) };
-    return context->model->info->pruned ? check(&k, ebpo_spot_root(context->model), error) : EBPO_OK;
+    return context->model->info->pruned ? check(&k, ebpo_spot_root(context->model), error)
+                                        : EBPO_OK;
 }

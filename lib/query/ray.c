@@ -24,16 +24,17 @@ typedef struct met {
 typedef struct casting {
     ebpo_context *context;
     ebpo_segment ray;
-    double limit;          /* t beyond which nothing matters, certain */
+    double limit; /* t beyond which nothing matters, certain */
     bool all;
-    met *list;             /* all hits; or the first one */
+    met *list; /* all hits; or the first one */
     uint64_t count, room;
     bool no_memory;
 } casting;
 
-/* Interval of t in which the ray is within [low, high] widened by `slack`, cut to 0 .. limit; false when it is empty. */
-static bool meets_slabs(const double origin[3], const double direction[3], double limit, const double low[3], const double high[3], double slack,
-                        double *enter)
+/* Interval of t in which the ray is within [low, high] widened by `slack`, cut to 0 .. limit; false
+ * when it is empty. */
+static bool meets_slabs(const double origin[3], const double direction[3], double limit,
+                        const double low[3], const double high[3], double slack, double *enter)
 {
     double from = 0, to = limit;
     for (int k = 0; k < 3; k++) {
@@ -60,7 +61,8 @@ static bool keep(casting *c, const met *m)
         return true;
     }
     if (c->count) {
-        int sign = ebpo_ray_compare(&c->ray, (const double (*)[3])m->triangle, (const double (*)[3])c->list[0].triangle);
+        int sign = ebpo_ray_compare(&c->ray, (const double(*)[3])m->triangle,
+                                    (const double(*)[3])c->list[0].triangle);
         if (sign > 0 || (sign == 0 && m->file_face >= c->list[0].file_face))
             return true;
     }
@@ -80,7 +82,7 @@ static void try_block(casting *c, const ebpo_subtree *s, uint32_t block)
         if (local == EBPO_NO_SLOT)
             return;
         ebpo_subtree_triangle(s, slot, m.triangle);
-        ebpo_ray_triangle(&c->ray, (const double (*)[3])m.triangle, &m.meeting);
+        ebpo_ray_triangle(&c->ray, (const double(*)[3])m.triangle, &m.meeting);
         if (!m.meeting.meets)
             continue;
         m.file_face = ebpo_subtree_file_face(s, local);
@@ -89,16 +91,21 @@ static void try_block(casting *c, const ebpo_subtree *s, uint32_t block)
     }
 }
 
-/* The ray in the subtree's frame, its direction scaled by a power of two to about 1. Widening covers the rounding of all. */
+/* The ray in the subtree's frame, its direction scaled by a power of two to about 1. Widening
+ * covers the rounding of all. */
 typedef struct framed {
     double origin[3], direction[3], slack;
-    double limit_scale; /* t in the frame for t = 1; 0 or infinite where that leaves the doubles, and then limits prune nothing */
+    /* t in the frame for t = 1; 0 or infinite where that leaves the doubles, and then limits prune
+     * nothing */
+    double limit_scale;
 } framed;
 
 static double frame_limit(const casting *c, const framed *f)
 {
     double limit = c->limit * f->limit_scale * (1 + 0x1p-40);
-    return f->limit_scale > 0 && limit > 0x1p-500 ? limit : c->limit > 0 || c->count ? INFINITY : 0x1p-40;
+    return f->limit_scale > 0 && limit > 0x1p-500 ? limit
+           : c->limit > 0 || c->count             ? INFINITY
+                                                  : 0x1p-40;
 }
 
 typedef struct entered {
@@ -118,7 +125,8 @@ static void cast_bound(casting *c, const ebpo_subtree *s, const framed *f, uint3
     for (int lane = 0; lane < 8; lane++) {
         if (b->child[lane] == EBPO_NO_CHILD)
             continue;
-        double low[3] = { b->low[0][lane], b->low[1][lane], b->low[2][lane] }, high[3] = { b->high[0][lane], b->high[1][lane], b->high[2][lane] };
+        double low[3] = { b->low[0][lane], b->low[1][lane], b->low[2][lane] },
+               high[3] = { b->high[0][lane], b->high[1][lane], b->high[2][lane] };
         entered e = { 0, b->child[lane] };
         if (!meets_slabs(f->origin, f->direction, frame_limit(c, f), low, high, f->slack, &e.enter))
             continue;
@@ -172,7 +180,8 @@ static bool ray_matters(void *user, const ebpo_box *box, const ebpo_spot *spot)
 static ebpo_status cast_spot(casting *c, const ebpo_box *box, ebpo_spot spot, ebpo_error *error)
 {
     const ebpo_model *m = c->context->model;
-    if (ebpo_spot_is_settled(&spot) || !meets_cell(c, box, &spot) || ebpo_spot_is_pruned(m, &spot)) /* pruned: see cast */
+    if (ebpo_spot_is_settled(&spot) || !meets_cell(c, box, &spot) ||
+        ebpo_spot_is_pruned(m, &spot)) /* pruned: see cast */
         return EBPO_OK;
     if (ebpo_spot_is_below(&spot)) {
         ebpo_status status = ebpo_spot_enter(c->context, &spot, error);
@@ -196,11 +205,14 @@ static ebpo_status cast(casting *c, ebpo_error *error)
     bool moves = false;
     for (int k = 0; k < 3; k++) {
         if (!isfinite(c->ray.origin[k]) || !isfinite(c->ray.direction[k]))
-            return ebpo_fail(error, EBPO_E_ARGUMENT, "the ray has a coordinate that is no finite number");
+            return ebpo_fail(error, EBPO_E_ARGUMENT,
+                             "the ray has a coordinate that is no finite number");
         moves = moves || c->ray.direction[k] != 0;
     }
     if (!moves || !(c->ray.t_max >= 0))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "a ray needs a direction other than (0, 0, 0), and t_max must be 0 or more");
+        return ebpo_fail(
+            error, EBPO_E_ARGUMENT,
+            "a ray needs a direction other than (0, 0, 0), and t_max must be 0 or more");
     if (status != EBPO_OK)
         return status;
     if (c->context->model->whole) {
@@ -216,7 +228,8 @@ static ebpo_status cast(casting *c, ebpo_error *error)
     return status;
 }
 
-static casting make_casting(ebpo_context *context, const double origin[3], const double direction[3], double t_max, bool all)
+static casting make_casting(ebpo_context *context, const double origin[3],
+                            const double direction[3], double t_max, bool all)
 {
     casting c = { .context = context, .limit = t_max, .all = all };
     memcpy(c.ray.origin, origin, sizeof c.ray.origin);
@@ -225,8 +238,8 @@ static casting make_casting(ebpo_context *context, const double origin[3], const
     return c;
 }
 
-ebpo_status ebpo_ray_first(ebpo_context *context, const double origin[3], const double direction[3], double t_max, ebpo_ray_hit *out, bool *hit,
-                           ebpo_error *error)
+ebpo_status ebpo_ray_first(ebpo_context *context, const double origin[3], const double direction[3],
+                           double t_max, ebpo_ray_hit *out, bool *hit, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     casting c = make_casting(context, origin, direction, t_max, false);
@@ -241,25 +254,30 @@ ebpo_status ebpo_ray_first(ebpo_context *context, const double origin[3], const 
 static int compare_met(const void *a, const void *b, void *ray)
 {
     const met *x = a, *y = b;
-    int sign = ebpo_ray_compare(ray, (const double (*)[3])x->triangle, (const double (*)[3])y->triangle);
+    int sign =
+        ebpo_ray_compare(ray, (const double(*)[3])x->triangle, (const double(*)[3])y->triangle);
     return sign ? sign : (x->file_face > y->file_face) - (x->file_face < y->file_face);
 }
 
-ebpo_status ebpo_ray_all(ebpo_context *context, const double origin[3], const double direction[3], double t_max, const ebpo_ray_hit **hits,
-                         uint64_t *count, ebpo_error *error)
+ebpo_status ebpo_ray_all(ebpo_context *context, const double origin[3], const double direction[3],
+                         double t_max, const ebpo_ray_hit **hits, uint64_t *count,
+                         ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     casting c = make_casting(context, origin, direction, t_max, true);
     *hits = NULL;
     *count = 0;
     ebpo_status status = cast(&c, error);
-    if (status == EBPO_OK && !ebpo_grow(&context->hits, &context->hit_room, c.count, sizeof *context->hits))
+    if (status == EBPO_OK &&
+        !ebpo_grow(&context->hits, &context->hit_room, c.count, sizeof *context->hits))
         status = ebpo_fail_memory(error, c.count * sizeof *context->hits);
     if (status == EBPO_OK && c.count) {
         qsort_r(c.list, c.count, sizeof *c.list, compare_met, &c.ray);
         for (uint64_t i = 0; i < c.count; i++)
             if (i == 0 || c.list[i].file_face != c.list[i - 1].file_face) /* subtrees share faces */
-                context->hits[(*count)++] = (ebpo_ray_hit){ c.list[i].meeting.t, c.list[i].told_face, c.list[i].meeting.side };
+                context->hits[(*count)++] =
+                    (ebpo_ray_hit){ c.list[i].meeting.t, c.list[i].told_face,
+                                    c.list[i].meeting.side };
         *hits = context->hits;
     }
     free(c.list);

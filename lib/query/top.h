@@ -1,4 +1,5 @@
-/* The top of a tree: levels 0 .. cut level without faces, and the places of what lies below. Immutable; any thread. */
+/* The top of a tree: levels 0 .. cut level without faces, and the places of what lies below.
+ * Immutable; any thread. */
 #ifndef EBPO_QUERY_TOP_H
 #define EBPO_QUERY_TOP_H
 
@@ -12,9 +13,11 @@ typedef struct ebpo_top_planes {
 
 typedef struct ebpo_top {
     int cut_level;
-    ebpo_nodes nodes;        /* entries SETTLED, GRAY (levels above the cut), BELOW (gray nodes of the cut level, leaves down to it, pruned nodes) */
-    uint32_t *planes;        /* codes */
-    ebpo_top_planes *gray;   /* which of them are the gray node's whose children are group g */
+    /* entries SETTLED, GRAY (levels above the cut), BELOW (gray nodes of the cut level, leaves down
+     * to it, pruned nodes) */
+    ebpo_nodes nodes;
+    uint32_t *planes;      /* codes */
+    ebpo_top_planes *gray; /* which of them are the gray node's whose children are group g */
 
     uint64_t below_count;
     ebpo_place *below;
@@ -22,7 +25,8 @@ typedef struct ebpo_top {
     uint64_t bytes;
 } ebpo_top;
 
-EBPO_MUST_USE ebpo_status ebpo_top_read(ebpo_top **out, ebpo_file *file, int cut_level, unsigned threads, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_top_read(ebpo_top **out, ebpo_file *file, int cut_level,
+                                        unsigned threads, ebpo_error *error);
 void ebpo_top_free(ebpo_top *top);
 
 /* Bytes that the top will take: from the head alone. */

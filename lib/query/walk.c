@@ -27,7 +27,8 @@ ebpo_status ebpo_spot_enter(ebpo_context *context, ebpo_spot *spot, ebpo_error *
     ebpo_subtree *subtree;
     if (ebpo_spot_is_pruned(context->model, spot))
         return ebpo_fail_pruned(context->model, spot->level, spot->at, error);
-    ebpo_status status = ebpo_context_subtree(context, ebpo_entry_value(spot->entry), &subtree, error);
+    ebpo_status status =
+        ebpo_context_subtree(context, ebpo_entry_value(spot->entry), &subtree, error);
     if (status != EBPO_OK)
         return status;
     spot->subtree = subtree;
@@ -40,7 +41,10 @@ ebpo_status ebpo_spot_enter(ebpo_context *context, ebpo_spot *spot, ebpo_error *
 ebpo_spot ebpo_spot_child(const ebpo_model *model, const ebpo_spot *gray, unsigned octant)
 {
     const ebpo_nodes *nodes = gray->subtree ? &gray->subtree->nodes : &model->top->nodes;
-    ebpo_spot child = { gray->subtree, nodes->group[ebpo_entry_value(gray->entry)][octant], gray->level + 1, { 0, 0, 0 } };
+    ebpo_spot child = { gray->subtree,
+                        nodes->group[ebpo_entry_value(gray->entry)][octant],
+                        gray->level + 1,
+                        { 0, 0, 0 } };
     for (int k = 0; k < 3; k++)
         child.at[k] = 2 * gray->at[k] + (octant >> k & 1);
     return child;
@@ -50,21 +54,26 @@ const uint32_t *ebpo_spot_planes(const ebpo_model *model, const ebpo_spot *spot,
 {
     uint32_t value = ebpo_entry_value(spot->entry);
     *count = 0;
-    if ((ebpo_spot_is_below(spot) && !spot->subtree) || (!spot->subtree && ebpo_entry_kind_of(spot->entry) == EBPO_ENTRY_GRAY)) {
-        ebpo_top_planes planes = ebpo_spot_is_below(spot) ? model->top->below_planes[value] : model->top->gray[value];
+    if ((ebpo_spot_is_below(spot) && !spot->subtree) ||
+        (!spot->subtree && ebpo_entry_kind_of(spot->entry) == EBPO_ENTRY_GRAY)) {
+        ebpo_top_planes planes =
+            ebpo_spot_is_below(spot) ? model->top->below_planes[value] : model->top->gray[value];
         *count = planes.count;
         return model->top->planes + planes.first;
     }
-    if (!(ebpo_entry_kind_of(spot->entry) & EBPO_ENTRY_GRAY) || !spot->subtree->gray_first) /* GRAY and BELOW */
+    if (!(ebpo_entry_kind_of(spot->entry) & EBPO_ENTRY_GRAY) ||
+        !spot->subtree->gray_first) /* GRAY and BELOW */
         return NULL;
     *count = spot->subtree->gray_first[value + 1] - spot->subtree->gray_first[value];
     return spot->subtree->gray_planes + spot->subtree->gray_first[value];
 }
 
-/* A node may list a face that only comes near, within 1/256 of the cell's size on each axis (format-spec, section 5); and some room for rounding. */
+/* A node may list a face that only comes near, within 1/256 of the cell's size on each axis
+ * (format-spec, section 5); and some room for rounding. */
 static const double near_share = 0x1.1p-8;
 
-static void cell_of(const ebpo_box *box, int level, const uint32_t at[3], double low[3], double size[3])
+static void cell_of(const ebpo_box *box, int level, const uint32_t at[3], double low[3],
+                    double size[3])
 {
     for (int k = 0; k < 3; k++) {
         low[k] = ebpo_wall(box, k, level, at[k]);
@@ -107,7 +116,8 @@ static double plane_value(const double xi[3], uint32_t code, int32_t n[3], doubl
     return sum - d;
 }
 
-bool ebpo_outside_planes(const ebpo_box *box, int level, const uint32_t at[3], const uint32_t *codes, uint32_t count, const double p[3])
+bool ebpo_outside_planes(const ebpo_box *box, int level, const uint32_t at[3],
+                         const uint32_t *codes, uint32_t count, const double p[3])
 {
     double low[3], size[3], xi[3], error;
     int32_t n[3];
@@ -120,7 +130,8 @@ bool ebpo_outside_planes(const ebpo_box *box, int level, const uint32_t at[3], c
     return false;
 }
 
-double ebpo_envelope_distance(const ebpo_box *box, int level, const uint32_t at[3], const uint32_t *codes, uint32_t count, const double p[3])
+double ebpo_envelope_distance(const ebpo_box *box, int level, const uint32_t at[3],
+                              const uint32_t *codes, uint32_t count, const double p[3])
 {
     double low[3], size[3], xi[3], d[3];
     cell_of(box, level, at, low, size);
@@ -134,7 +145,8 @@ double ebpo_envelope_distance(const ebpo_box *box, int level, const uint32_t at[
         double error, value = plane_value(xi, codes[i], n, &error);
         if (!(value > error))
             continue;
-        double gradient[3] = { 4096.0 * n[0] / size[0], 4096.0 * n[1] / size[1], 4096.0 * n[2] / size[2] };
+        double gradient[3] = { 4096.0 * n[0] / size[0], 4096.0 * n[1] / size[1],
+                               4096.0 * n[2] / size[2] };
         double length = length3(gradient), distance = (value - error) / length * (1 - 0x1p-48);
         if (length > 0 && isfinite(length) && distance > best)
             best = distance;
@@ -151,14 +163,16 @@ double ebpo_cell_far(const ebpo_box *box, int level, const uint32_t at[3], const
     return length3(d) * (1 + 0x1p-40) + length3(size) * near_share;
 }
 
-double ebpo_spot_distance(const ebpo_model *m, const ebpo_box *box, const ebpo_spot *spot, double parent, const double p[3])
+double ebpo_spot_distance(const ebpo_model *m, const ebpo_box *box, const ebpo_spot *spot,
+                          double parent, const double p[3])
 {
     uint32_t count;
     const uint32_t *codes = ebpo_spot_planes(m, spot, &count);
     return fmax(parent, ebpo_envelope_distance(box, spot->level, spot->at, codes, count, p));
 }
 
-int ebpo_rank_children(const ebpo_model *m, const ebpo_box *box, const ebpo_spot *gray, double parent, const double p[3], ebpo_ranked out[8])
+int ebpo_rank_children(const ebpo_model *m, const ebpo_box *box, const ebpo_spot *gray,
+                       double parent, const double p[3], ebpo_ranked out[8])
 {
     int count = 0;
     for (unsigned octant = 0; octant < 8; octant++) {

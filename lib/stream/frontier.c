@@ -21,7 +21,9 @@ void ebpo_frontier_free(ebpo_frontier *f)
 
 ebpo_status ebpo_frontier_reserve(ebpo_frontier *f, uint64_t more, ebpo_error *error)
 {
-    return ebpo_grow(&f->at, &f->room, f->count + more, sizeof *f->at) ? EBPO_OK : ebpo_fail_memory(error, (f->count + more) * sizeof *f->at);
+    return ebpo_grow(&f->at, &f->room, f->count + more, sizeof *f->at)
+               ? EBPO_OK
+               : ebpo_fail_memory(error, (f->count + more) * sizeof *f->at);
 }
 
 static void sink(ebpo_frontier *f, uint64_t i)
@@ -62,17 +64,21 @@ void ebpo_frontier_sort(ebpo_frontier *f)
 }
 
 /* A table of blocks by hash; those for which there is no room are left out. */
-unsigned ebpo_frontier_blocks(const ebpo_frontier *f, uint64_t span, uint64_t places[EBPO_FRONTIER_BLOCKS])
+unsigned ebpo_frontier_blocks(const ebpo_frontier *f, uint64_t span,
+                              uint64_t places[EBPO_FRONTIER_BLOCKS])
 {
     enum { SLOTS = 1024 };
-    struct { uint64_t block, place; } slot[SLOTS]; /* block 0: free */
+    struct {
+        uint64_t block, place;
+    } slot[SLOTS]; /* block 0: free */
     unsigned count = 0;
     memset(slot, 0, sizeof slot);
     for (uint64_t i = 0; i < f->count; i++) {
         const ebpo_waiting *w = &f->at[i];
         if (w->turn == EBPO_TURN_NEVER)
             continue;
-        uint64_t block = (w->below / span) << 6 | (uint64_t)(64 - __builtin_clzll(w->octcode)); /* with the level; not 0 */
+        /* with the level; not 0 */
+        uint64_t block = (w->below / span) << 6 | (uint64_t)(64 - __builtin_clzll(w->octcode));
         uint64_t at = block * UINT64_C(0x9e3779b97f4a7c15) >> 54;
         while (slot[at].block && slot[at].block != block)
             at = (at + 1) % SLOTS;

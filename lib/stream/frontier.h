@@ -21,15 +21,18 @@ typedef struct ebpo_frontier {
 
 void ebpo_frontier_free(ebpo_frontier *frontier);
 /* After this, so many pushes cannot fail. */
-EBPO_MUST_USE ebpo_status ebpo_frontier_reserve(ebpo_frontier *frontier, uint64_t more, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_frontier_reserve(ebpo_frontier *frontier, uint64_t more,
+                                                ebpo_error *error);
 void ebpo_frontier_push(ebpo_frontier *frontier, ebpo_waiting node);
 /* Takes the top away. */
 ebpo_waiting ebpo_frontier_pop(ebpo_frontier *frontier);
 /* After keys or turns have been changed. */
 void ebpo_frontier_sort(ebpo_frontier *frontier);
-/* Of the nodes whose turn comes, the first one of each block of `span` children's groups of a level: their places in `at`, in order. The top is the first. At most
- * EBPO_FRONTIER_BLOCKS; returns how many. */
+/* Of the nodes whose turn comes, the first one of each block of `span` children's groups of a
+ * level: their places in `at`, in order. The top is the first. At most EBPO_FRONTIER_BLOCKS;
+ * returns how many. */
 enum { EBPO_FRONTIER_BLOCKS = 256 };
-unsigned ebpo_frontier_blocks(const ebpo_frontier *frontier, uint64_t span, uint64_t places[EBPO_FRONTIER_BLOCKS]);
+unsigned ebpo_frontier_blocks(const ebpo_frontier *frontier, uint64_t span,
+                              uint64_t places[EBPO_FRONTIER_BLOCKS]);
 
 #endif

@@ -19,24 +19,37 @@ void ebpo_grown_free(ebpo_grown *grown)
 static ebpo_status make_room(ebpo_grown *g, unsigned codes, ebpo_error *error)
 {
     if (g->group_count >= UINT32_MAX)
-        return ebpo_fail(error, EBPO_E_LIMIT, "more nodes than a view can hold; give a deepest level or a budget");
-    if (!ebpo_grow(&g->group, &g->group_room, g->group_count + 1, sizeof *g->group) || !ebpo_grow(&g->codes, &g->code_room, g->code_count + codes, sizeof *g->codes) ||
-        (g->windings && !ebpo_grow(&g->winding, &g->winding_room, g->group_count + 1, sizeof *g->winding)))
-        return ebpo_fail_memory(error, (g->group_count + 1) * sizeof *g->group + (g->code_count + codes) * sizeof *g->codes);
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "more nodes than a view can hold; give a deepest level or a budget");
+    if (!ebpo_grow(&g->group, &g->group_room, g->group_count + 1, sizeof *g->group) ||
+        !ebpo_grow(&g->codes, &g->code_room, g->code_count + codes, sizeof *g->codes) ||
+        (g->windings &&
+         !ebpo_grow(&g->winding, &g->winding_room, g->group_count + 1, sizeof *g->winding)))
+        return ebpo_fail_memory(error, (g->group_count + 1) * sizeof *g->group +
+                                           (g->code_count + codes) * sizeof *g->codes);
     return EBPO_OK;
 }
 
-ebpo_status ebpo_grown_add(ebpo_grown *g, const ebpo_info *info, uint64_t parent, const ebpo_group *read, ebpo_error *error)
+ebpo_status ebpo_grown_add(ebpo_grown *g, const ebpo_info *info, uint64_t parent,
+                           const ebpo_group *read, ebpo_error *error)
 {
     int level = parent ? ebpo_octcode_level(parent) + 1 : 0;
     uint64_t grays = (unsigned)__builtin_popcount(read->types & read->types >> 1 & 0x5555);
-    if (grays > info->level[level].gray_count - g->grays[level]) /* else a damaged index could give one node to many parents, without end */
-        return ebpo_fail(error, EBPO_E_FORMAT, "level %d: its index gives more gray nodes than the head tells of; run ebpo verify", level);
+    if (grays >
+        info->level[level].gray_count - g->grays[level]) /* else a damaged index could give one node
+                                                            to many parents, without end */
+        return ebpo_fail(
+            error, EBPO_E_FORMAT,
+            "level %d: its index gives more gray nodes than the head tells of; run ebpo verify",
+            level);
     ebpo_status status = make_room(g, read->code_count, error);
     if (status != EBPO_OK)
         return status;
     ebpo_grown_group *out = &g->group[g->group_count];
-    *out = (ebpo_grown_group){ .parent = parent, .first_gray = read->rank[EBPO_GRAY], .first_code = g->code_count, .types = read->types };
+    *out = (ebpo_grown_group){ .parent = parent,
+                               .first_gray = read->rank[EBPO_GRAY],
+                               .first_code = g->code_count,
+                               .types = read->types };
     memcpy(out->plane_count, read->plane_count, sizeof out->plane_count);
     if (read->code_count)
         memcpy(g->codes + g->code_count, read->codes, read->code_count * sizeof *g->codes);
@@ -58,7 +71,8 @@ const uint32_t *ebpo_grown_codes(const ebpo_grown *g, ebpo_grown_node node, unsi
     return *count ? g->codes + first : NULL;
 }
 
-const ebpo_polytope *ebpo_grown_envelope(const ebpo_grown *g, ebpo_grown_node node, ebpo_walk_envelopes *e)
+const ebpo_polytope *ebpo_grown_envelope(const ebpo_grown *g, ebpo_grown_node node,
+                                         ebpo_walk_envelopes *e)
 {
     uint64_t octcode = ebpo_grown_octcode(g, node);
     int level = ebpo_octcode_level(octcode);

@@ -1,4 +1,5 @@
-/* The part of a tree that has been delivered: groups of siblings, each linked to its parent once it is complete. */
+/* The part of a tree that has been delivered: groups of siblings, each linked to its parent once it
+ * is complete. */
 #ifndef EBPO_STREAM_GROWN_H
 #define EBPO_STREAM_GROWN_H
 
@@ -7,10 +8,10 @@
 #include "stream/walk.h"
 
 typedef struct ebpo_grown_group {
-    uint64_t parent;        /* octcode; 0: the root's group */
-    uint64_t first_gray;    /* rank in its level of the group's first gray node */
-    uint64_t first_code;    /* into codes */
-    uint32_t child[8];      /* number of the children's group; 0: not there */
+    uint64_t parent;     /* octcode; 0: the root's group */
+    uint64_t first_gray; /* rank in its level of the group's first gray node */
+    uint64_t first_code; /* into codes */
+    uint32_t child[8];   /* number of the children's group; 0: not there */
     uint16_t types;
     uint8_t plane_count[8];
 } ebpo_grown_group;
@@ -18,10 +19,11 @@ typedef struct ebpo_grown_group {
 typedef struct ebpo_grown {
     ebpo_grown_group *group; /* group 0 is the root's */
     uint32_t *codes;
-    int32_t (*winding)[8];   /* NULL: not wanted */
+    int32_t (*winding)[8]; /* NULL: not wanted */
     uint64_t group_count, group_room, winding_room, code_count, code_room;
     bool windings;
-    uint64_t grays[EBPO_LEVELS_MAX]; /* gray nodes seen of each level; more than the head tells: the file is damaged */
+    /* gray nodes seen of each level; more than the head tells: the file is damaged */
+    uint64_t grays[EBPO_LEVELS_MAX];
 } ebpo_grown;
 
 void ebpo_grown_free(ebpo_grown *grown);
@@ -47,16 +49,20 @@ static inline uint64_t ebpo_grown_octcode(const ebpo_grown *g, ebpo_grown_node n
 static inline uint64_t ebpo_grown_children(const ebpo_grown *g, ebpo_grown_node gray)
 {
     unsigned before = g->group[gray.group].types & ((1u << 2 * gray.octant) - 1);
-    return g->group[gray.group].first_gray + (unsigned)__builtin_popcount(before & before >> 1 & 0x5555);
+    return g->group[gray.group].first_gray +
+           (unsigned)__builtin_popcount(before & before >> 1 & 0x5555);
 }
 
 /* Adds a group behind the last one; not linked yet. */
-EBPO_MUST_USE ebpo_status ebpo_grown_add(ebpo_grown *grown, const ebpo_info *info, uint64_t parent, const ebpo_group *read, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_grown_add(ebpo_grown *grown, const ebpo_info *info, uint64_t parent,
+                                         const ebpo_group *read, ebpo_error *error);
 
 /* A node's own plane codes. */
 const uint32_t *ebpo_grown_codes(const ebpo_grown *grown, ebpo_grown_node node, unsigned *count);
 
-/* Its envelope in coordinates of its cell; the nodes above it are linked. Lent until the next call with these envelopes. */
-const ebpo_polytope *ebpo_grown_envelope(const ebpo_grown *grown, ebpo_grown_node node, ebpo_walk_envelopes *envelopes);
+/* Its envelope in coordinates of its cell; the nodes above it are linked. Lent until the next call
+ * with these envelopes. */
+const ebpo_polytope *ebpo_grown_envelope(const ebpo_grown *grown, ebpo_grown_node node,
+                                         ebpo_walk_envelopes *envelopes);
 
 #endif

@@ -21,7 +21,8 @@ double ebpo_node_cell_volume(const ebpo_box *box, int level)
     return box->size[0] / sides * (box->size[1] / sides) * (box->size[2] / sides);
 }
 
-void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcode, ebpo_node_type type)
+void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcode,
+                     ebpo_node_type type)
 {
     ebpo_cell cell = ebpo_cell_of_octcode(octcode);
     *out = (ebpo_stream_node){ .octcode = octcode, .type = type };
@@ -33,7 +34,8 @@ void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcod
         out->volume = ebpo_node_cell_volume(box, cell.level);
 }
 
-void ebpo_node_add_planes(ebpo_stream_node *out, const ebpo_box *box, const uint32_t *codes, unsigned count, ebpo_node_room *room)
+void ebpo_node_add_planes(ebpo_stream_node *out, const ebpo_box *box, const uint32_t *codes,
+                          unsigned count, ebpo_node_room *room)
 {
     ebpo_cell cell = ebpo_cell_of_octcode(out->octcode);
     for (unsigned i = 0; i < count; i++) {
@@ -44,7 +46,8 @@ void ebpo_node_add_planes(ebpo_stream_node *out, const ebpo_box *box, const uint
     out->planes = (const double(*)[4])room->planes;
 }
 
-void ebpo_node_add_polygons(ebpo_stream_node *out, const ebpo_box *box, const ebpo_polytope *p, ebpo_node_room *room)
+void ebpo_node_add_polygons(ebpo_stream_node *out, const ebpo_box *box, const ebpo_polytope *p,
+                            ebpo_node_room *room)
 {
     ebpo_cell cell = ebpo_cell_of_octcode(out->octcode);
     ebpo_polytope_to_world(p, box, cell, room->vertices);

@@ -20,9 +20,12 @@ ebpo_box ebpo_node_box(const ebpo_info *info);
 double ebpo_node_cell_volume(const ebpo_box *box, int level);
 
 /* Octcode, type, cell; a black node's volume. */
-void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcode, ebpo_node_type type);
+void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcode,
+                     ebpo_node_type type);
 /* At most EBPO_NODE_CODES codes. */
-void ebpo_node_add_planes(ebpo_stream_node *out, const ebpo_box *box, const uint32_t *codes, unsigned count, ebpo_node_room *room);
-void ebpo_node_add_polygons(ebpo_stream_node *out, const ebpo_box *box, const ebpo_polytope *envelope, ebpo_node_room *room);
+void ebpo_node_add_planes(ebpo_stream_node *out, const ebpo_box *box, const uint32_t *codes,
+                          unsigned count, ebpo_node_room *room);
+void ebpo_node_add_polygons(ebpo_stream_node *out, const ebpo_box *box,
+                            const ebpo_polytope *envelope, ebpo_node_room *room);
 
 #endif

@@ -7,7 +7,8 @@
 
 #include "base/error.h"
 
-static const double SLACK = 1e-12; /* of a sum of three products, generously: what is hardly seen counts as seen */
+/* of a sum of three products, generously: what is hardly seen counts as seen */
+static const double SLACK = 1e-12;
 
 static double dot(const double a[3], const double b[3])
 {
@@ -42,16 +43,20 @@ static bool all_finite(const double v[3])
 static ebpo_status check(const ebpo_observer *o, ebpo_error *error)
 {
     if (!all_finite(o->eye) || !all_finite(o->direction) || !all_finite(o->up))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "the observer's eye, direction and up must be finite numbers");
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "the observer's eye, direction and up must be finite numbers");
     if (!(o->fov > 0 && o->fov < 180))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "the observer's angle of view must be above 0 and below 180 degrees; it is %g", o->fov);
+        return ebpo_fail(
+            error, EBPO_E_ARGUMENT,
+            "the observer's angle of view must be above 0 and below 180 degrees; it is %g", o->fov);
     if (o->width == 0 || o->height == 0)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "the observer's picture has no pixels");
     return EBPO_OK;
 }
 
 /* Side walls: inward normals t * forward +- right, where t is the tangent of half the angle. */
-static ebpo_status make_frustum(ebpo_sight *s, const ebpo_observer *o, double tangent, ebpo_error *error)
+static ebpo_status make_frustum(ebpo_sight *s, const ebpo_observer *o, double tangent,
+                                ebpo_error *error)
 {
     double forward[3], side[2][3], up[3];
     s->everywhere = !normalise(o->direction, forward);
@@ -61,7 +66,9 @@ static ebpo_status make_frustum(ebpo_sight *s, const ebpo_observer *o, double ta
         return ebpo_fail(error, EBPO_E_ARGUMENT, "the observer's upward direction is (0, 0, 0)");
     cross(forward, up, side[0]);
     if (dot(side[0], side[0]) < 1e-12 || !normalise(side[0], side[0]))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "the observer's upward direction lies along the direction of sight; give another one");
+        return ebpo_fail(
+            error, EBPO_E_ARGUMENT,
+            "the observer's upward direction lies along the direction of sight; give another one");
     cross(side[0], forward, side[1]);
     double tangents[2] = { tangent * ((double)o->width / o->height), tangent };
     for (int i = 0; i < 2; i++)
@@ -73,7 +80,8 @@ static ebpo_status make_frustum(ebpo_sight *s, const ebpo_observer *o, double ta
     return EBPO_OK;
 }
 
-ebpo_status ebpo_sight_make(ebpo_sight *out, const ebpo_box *box, const ebpo_observer *observer, ebpo_error *error)
+ebpo_status ebpo_sight_make(ebpo_sight *out, const ebpo_box *box, const ebpo_observer *observer,
+                            ebpo_error *error)
 {
     memset(out, 0, sizeof *out);
     if (!observer)
@@ -135,11 +143,13 @@ unsigned ebpo_sight_octant(const ebpo_sight *s, const ebpo_box *box, ebpo_cell c
 {
     unsigned octant = 0;
     for (int k = 0; k < 3 && s->given; k++)
-        octant |= (unsigned)(s->eye[k] >= ebpo_wall(box, k, cell.level + 1, 2 * cell.at[k] + 1)) << k;
+        octant |= (unsigned)(s->eye[k] >= ebpo_wall(box, k, cell.level + 1, 2 * cell.at[k] + 1))
+                  << k;
     return octant;
 }
 
-/* Octants from the root down, each as seen from the eye: reading them as one number gives the enumeration's order. */
+/* Octants from the root down, each as seen from the eye: reading them as one number gives the
+ * enumeration's order. */
 static uint64_t enumerate(const ebpo_sight *s, const ebpo_box *box, ebpo_octcode octcode)
 {
     int level = ebpo_octcode_level(octcode);
@@ -149,7 +159,8 @@ static uint64_t enumerate(const ebpo_sight *s, const ebpo_box *box, ebpo_octcode
         int below = level - i;
         ebpo_cell above = { i, { cell.at[0] >> below, cell.at[1] >> below, cell.at[2] >> below } };
         unsigned octant = octcode >> 3 * (below - 1) & 7;
-        key |= (uint64_t)(octant ^ ebpo_sight_octant(s, box, above)) << 3 * (EBPO_MAX_LEVEL - 1 - i);
+        key |= (uint64_t)(octant ^ ebpo_sight_octant(s, box, above))
+               << 3 * (EBPO_MAX_LEVEL - 1 - i);
     }
     return key;
 }
@@ -162,7 +173,8 @@ static uint64_t bits(double v)
     return out;
 }
 
-uint64_t ebpo_sight_key(const ebpo_sight *s, const ebpo_box *box, ebpo_priority priority, ebpo_octcode octcode, double distance2)
+uint64_t ebpo_sight_key(const ebpo_sight *s, const ebpo_box *box, ebpo_priority priority,
+                        ebpo_octcode octcode, double distance2)
 {
     switch (priority) {
     case EBPO_PRIORITY_DISTANCE: return bits(distance2);

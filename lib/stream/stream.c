@@ -1,4 +1,5 @@
-/* Levels one after the other. Of a level that has been passed only its types stay, and with polygons its planes: enough to walk down to the nodes of the next one. */
+/* Levels one after the other. Of a level that has been passed only its types stay, and with
+ * polygons its planes: enough to walk down to the nodes of the next one. */
 #include "geom/strict_fp.h"
 
 #include <ebpo/stream.h>
@@ -31,7 +32,8 @@ struct ebpo_stream {
     ebpo_node_room room;
 };
 
-ebpo_status ebpo_stream_new(ebpo_stream **out, ebpo_file *file, const ebpo_stream_options *options, ebpo_error *error)
+ebpo_status ebpo_stream_new(ebpo_stream **out, ebpo_file *file, const ebpo_stream_options *options,
+                            ebpo_error *error)
 {
     static const ebpo_stream_options usual = EBPO_STREAM_OPTIONS_INIT;
     *out = NULL;
@@ -96,21 +98,30 @@ static uint64_t sum_counts(const uint8_t *counts, uint64_t count)
 }
 
 /* What the walk relies on. */
-static ebpo_status check_level(const ebpo_level *level, int number, uint64_t parents, ebpo_error *error)
+static ebpo_status check_level(const ebpo_level *level, int number, uint64_t parents,
+                               ebpo_error *error)
 {
     uint64_t count[4] = { 0 };
     if (level->group_count != parents)
-        return ebpo_fail(error, EBPO_E_FORMAT, "level %d: %" PRIu64 " groups of siblings, but %" PRIu64 " parents; run ebpo verify", number, level->group_count,
-                         parents);
+        return ebpo_fail(error, EBPO_E_FORMAT,
+                         "level %d: %" PRIu64 " groups of siblings, but %" PRIu64
+                         " parents; run ebpo verify",
+                         number, level->group_count, parents);
     for (uint64_t i = 0; i < level->group_count; i++)
         for (unsigned k = 0; k < (number ? 8 : 1); k++)
             count[level->types[i] >> 2 * k & 3]++;
-    if (count[EBPO_GRAY] != level->gray_count || count[EBPO_LEAF] != level->leaf_count || count[EBPO_BLACK] != level->black_count ||
-        count[EBPO_WHITE] != level->white_count)
-        return ebpo_fail(error, EBPO_E_FORMAT, "level %d: its types and its node counts disagree; run ebpo verify", number);
-    if (sum_counts(level->plane_counts, level->gray_count) != (level->plane_counts ? level->plane_count : 0) ||
-        sum_counts(level->leaf_plane_counts, level->leaf_count) != (level->leaf_plane_counts ? level->leaf_plane_count : 0))
-        return ebpo_fail(error, EBPO_E_FORMAT, "level %d: the counts of its planes do not add up; run ebpo verify", number);
+    if (count[EBPO_GRAY] != level->gray_count || count[EBPO_LEAF] != level->leaf_count ||
+        count[EBPO_BLACK] != level->black_count || count[EBPO_WHITE] != level->white_count)
+        return ebpo_fail(error, EBPO_E_FORMAT,
+                         "level %d: its types and its node counts disagree; run ebpo verify",
+                         number);
+    if (sum_counts(level->plane_counts, level->gray_count) !=
+            (level->plane_counts ? level->plane_count : 0) ||
+        sum_counts(level->leaf_plane_counts, level->leaf_count) !=
+            (level->leaf_plane_counts ? level->leaf_plane_count : 0))
+        return ebpo_fail(error, EBPO_E_FORMAT,
+                         "level %d: the counts of its planes do not add up; run ebpo verify",
+                         number);
     return EBPO_OK;
 }
 
@@ -123,12 +134,13 @@ typedef struct volumes {
 typedef struct job {
     const ebpo_stream *stream;
     int target;
-    ebpo_walk *starts; /* [pieces] */
-    volumes *found;    /* [pieces] */
+    ebpo_walk *starts;              /* [pieces] */
+    volumes *found;                 /* [pieces] */
     ebpo_walk_envelopes *envelopes; /* [threads] */
 } job;
 
-static ebpo_status sum_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status sum_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
 {
     const job *j = context;
     double cell = ebpo_node_cell_volume(&j->stream->box, j->target);
@@ -139,12 +151,14 @@ static ebpo_status sum_pieces(void *context, uint64_t begin, uint64_t end, unsig
         for (int k = 0; k < PIECE && ebpo_walk_next(&walk, &node); k++)
             if (node.type != EBPO_WHITE)
                 *(node.type == EBPO_GRAY ? &j->found[i].gray : &j->found[i].settled) +=
-                    ebpo_polytope_volume(ebpo_walk_envelope(&walk, &node, &j->envelopes[worker])) * cell;
+                    ebpo_polytope_volume(ebpo_walk_envelope(&walk, &node, &j->envelopes[worker])) *
+                    cell;
     }
     return EBPO_OK;
 }
 
-/* A first walk, without envelopes, finds where each piece begins; pieces do not depend on the number of threads, so neither does the sum. */
+/* A first walk, without envelopes, finds where each piece begins; pieces do not depend on the
+ * number of threads, so neither does the sum. */
 static void find_starts(job *j)
 {
     ebpo_walk walk;
@@ -158,18 +172,23 @@ static void find_starts(job *j)
     } while (ebpo_walk_next(&walk, &node));
 }
 
-static ebpo_status cut_volumes(const ebpo_stream *s, int target, uint64_t nodes, volumes *out, ebpo_error *error)
+static ebpo_status cut_volumes(const ebpo_stream *s, int target, uint64_t nodes, volumes *out,
+                               ebpo_error *error)
 {
     unsigned threads = ebpo_thread_count(s->options.threads);
     uint64_t pieces = nodes / PIECE + 1;
-    job j = { s, target, ebpo_alloc(pieces, sizeof *j.starts), ebpo_alloc_zero(pieces, sizeof *j.found), ebpo_alloc_zero(threads, sizeof *j.envelopes) };
+    job j = { s, target, ebpo_alloc(pieces, sizeof *j.starts),
+              ebpo_alloc_zero(pieces, sizeof *j.found),
+              ebpo_alloc_zero(threads, sizeof *j.envelopes) };
     ebpo_status status = EBPO_OK;
     if (!j.starts || !j.found || !j.envelopes) {
-        status = ebpo_fail_memory(error, pieces * (sizeof *j.starts + sizeof *j.found) + threads * sizeof *j.envelopes);
+        status = ebpo_fail_memory(error, pieces * (sizeof *j.starts + sizeof *j.found) +
+                                             threads * sizeof *j.envelopes);
         goto done;
     }
     find_starts(&j);
-    status = ebpo_parallel_for(threads, pieces, 1, sum_pieces, &j, NULL, "cutting envelopes", error);
+    status =
+        ebpo_parallel_for(threads, pieces, 1, sum_pieces, &j, NULL, "cutting envelopes", error);
     for (uint64_t i = 0; i < pieces; i++) {
         out->gray += j.found[i].gray;
         out->settled += j.found[i].settled;
@@ -184,12 +203,15 @@ done:
 static volumes stated_volumes(const ebpo_stream *s, int level)
 {
     const ebpo_level_summary *summary = &s->info->level[level];
-    return (volumes){ summary->gray_volume, summary->leaf_volume + (double)summary->black_count * ebpo_node_cell_volume(&s->box, level) };
+    return (volumes){ summary->gray_volume,
+                      summary->leaf_volume +
+                          (double)summary->black_count * ebpo_node_cell_volume(&s->box, level) };
 }
 
 /* --- levels --- */
 
-ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool *more, ebpo_error *error)
+ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool *more,
+                                   ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     int next = s->level + 1;
@@ -203,7 +225,8 @@ ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool 
         return status;
     drop_faces(level);
     volumes v = stated_volumes(s, next);
-    uint64_t nodes = next ? 8 * (parents - s->info->level[next - 1].pruned_count) : 1; /* the head has been checked: at most all parents */
+    /* the head has been checked: at most all parents */
+    uint64_t nodes = next ? 8 * (parents - s->info->level[next - 1].pruned_count) : 1;
     status = check_level(level, next, parents, error);
     if (status == EBPO_OK && s->options.polygons) {
         v = (volumes){ 0, 0 };
@@ -218,7 +241,8 @@ ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool 
         drop_passed(&s->kept[next - 1], s->options.polygons);
     s->level = next;
     s->settled += v.settled;
-    s->bytes += s->info->level[next].stored_bytes + (next == s->info->index_level ? s->info->chunk_index_bytes : 0);
+    s->bytes += s->info->level[next].stored_bytes +
+                (next == s->info->index_level ? s->info->chunk_index_bytes : 0);
     ebpo_walk_begin(&s->walk, s->kept, next, s->info->pruned);
     *out = (ebpo_stream_level){ next, nodes, s->bytes, v.gray + s->settled };
     *more = true;
@@ -238,13 +262,15 @@ static int32_t winding_of(const ebpo_level *level, const ebpo_walk_node *node)
     }
 }
 
-ebpo_status ebpo_stream_next_node(ebpo_stream *s, ebpo_stream_node *out, bool *more, ebpo_error *error)
+ebpo_status ebpo_stream_next_node(ebpo_stream *s, ebpo_stream_node *out, bool *more,
+                                  ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_walk_node node;
     *more = false;
     if (s->level < 0)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "no level has been read yet; call ebpo_stream_next_level first");
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "no level has been read yet; call ebpo_stream_next_level first");
     if (!ebpo_walk_next(&s->walk, &node))
         return EBPO_OK;
     ebpo_node_begin(out, &s->box, node.octcode, node.type);
@@ -252,7 +278,8 @@ ebpo_status ebpo_stream_next_node(ebpo_stream *s, ebpo_stream_node *out, bool *m
     if (s->options.planes || s->options.polygons)
         ebpo_node_add_planes(out, &s->box, node.codes, node.code_count, &s->room);
     if (s->options.polygons && node.type != EBPO_WHITE)
-        ebpo_node_add_polygons(out, &s->box, ebpo_walk_envelope(&s->walk, &node, s->envelopes), &s->room);
+        ebpo_node_add_polygons(out, &s->box, ebpo_walk_envelope(&s->walk, &node, s->envelopes),
+                               &s->room);
     *more = true;
     return EBPO_OK;
 }

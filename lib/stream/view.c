@@ -16,19 +16,31 @@ enum { MEMORY_LEAST = 1 << 20 };
 static ebpo_status check_options(const ebpo_view_options *o, ebpo_error *error)
 {
     if (o->priority < EBPO_PRIORITY_LEVEL || o->priority > EBPO_PRIORITY_FRONT_TO_BACK)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "view options: there is no priority number %d", (int)o->priority);
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "view options: there is no priority number %d",
+                         (int)o->priority);
     if (o->unseen != EBPO_UNSEEN_LAST && o->unseen != EBPO_UNSEEN_NEVER)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "view options: there is no rule number %d for what is unseen", (int)o->unseen);
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "view options: there is no rule number %d for what is unseen",
+                         (int)o->unseen);
     if (!(o->pixels >= 0) || !(o->distance >= 0) || isinf(o->pixels))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "view options: pixels must be a finite number and distance a number, both at least 0");
-    if (o->memory && o->memory < MEMORY_LEAST) /* less than one group's chunks and their neighbours': every group would read all of them again */
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "view options: memory must be at least %d bytes, or 0", MEMORY_LEAST);
-    if (!o->observer && (o->priority != EBPO_PRIORITY_LEVEL || o->pixels > 0 || !isinf(o->distance)))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "view options: pixels, distance and all priorities but the level's need an observer");
+        return ebpo_fail(
+            error, EBPO_E_ARGUMENT,
+            "view options: pixels must be a finite number and distance a number, both at least 0");
+    if (o->memory &&
+        o->memory < MEMORY_LEAST) /* less than one group's chunks and their neighbours': every group
+                                     would read all of them again */
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "view options: memory must be at least %d bytes, or 0", MEMORY_LEAST);
+    if (!o->observer &&
+        (o->priority != EBPO_PRIORITY_LEVEL || o->pixels > 0 || !isinf(o->distance)))
+        return ebpo_fail(
+            error, EBPO_E_ARGUMENT,
+            "view options: pixels, distance and all priorities but the level's need an observer");
     return EBPO_OK;
 }
 
-static ebpo_status take_options(ebpo_view_stream *s, const ebpo_view_options *options, ebpo_error *error)
+static ebpo_status take_options(ebpo_view_stream *s, const ebpo_view_options *options,
+                                ebpo_error *error)
 {
     ebpo_sight sight;
     ebpo_status status = check_options(options, error);
@@ -44,7 +56,8 @@ static ebpo_status take_options(ebpo_view_stream *s, const ebpo_view_options *op
     return EBPO_OK;
 }
 
-ebpo_status ebpo_view_stream_new(ebpo_view_stream **out, ebpo_file *file, const ebpo_view_options *options, ebpo_error *error)
+ebpo_status ebpo_view_stream_new(ebpo_view_stream **out, ebpo_file *file,
+                                 const ebpo_view_options *options, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     static const ebpo_view_options usual = EBPO_VIEW_OPTIONS_INIT;
@@ -59,7 +72,8 @@ ebpo_status ebpo_view_stream_new(ebpo_view_stream **out, ebpo_file *file, const 
     if (status == EBPO_OK)
         status = ebpo_chunks_make_counted(&s->chunks, file, s->options.memory, error);
     s->grown.windings = s->options.windings;
-    if (status == EBPO_OK && s->options.polygons && !(s->envelopes = ebpo_alloc_zero(1, sizeof *s->envelopes)))
+    if (status == EBPO_OK && s->options.polygons &&
+        !(s->envelopes = ebpo_alloc_zero(1, sizeof *s->envelopes)))
         status = ebpo_fail_memory(error, sizeof *s->envelopes);
     if (status == EBPO_OK)
         *out = s;
@@ -84,7 +98,8 @@ void ebpo_view_stream_free(ebpo_view_stream *s)
 static ebpo_turn turn_of(const ebpo_view_stream *s, int level, ebpo_seen look)
 {
     const ebpo_view_options *o = &s->options;
-    if ((o->level >= 0 && level >= o->level) || (o->pixels > 0 && ebpo_sight_pixels(&s->sight, level, look.distance2) <= o->pixels) ||
+    if ((o->level >= 0 && level >= o->level) ||
+        (o->pixels > 0 && ebpo_sight_pixels(&s->sight, level, look.distance2) <= o->pixels) ||
         (!isinf(o->distance) && ebpo_sight_distance(&s->sight, look.distance2) > o->distance))
         return EBPO_TURN_NEVER;
     if (look.seen)
@@ -99,12 +114,16 @@ static void rank(const ebpo_view_stream *s, ebpo_waiting *w)
     w->turn = (uint8_t)turn_of(s, ebpo_octcode_level(w->octcode), look);
 }
 
-ebpo_status ebpo_view_stream_change(ebpo_view_stream *s, const ebpo_view_options *options, ebpo_error *error)
+ebpo_status ebpo_view_stream_change(ebpo_view_stream *s, const ebpo_view_options *options,
+                                    ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     const ebpo_view_options *now = &s->options;
-    if (options->planes != now->planes || options->polygons != now->polygons || options->windings != now->windings || options->memory != now->memory)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "view options: planes, polygons, windings and memory cannot be changed; make another stream");
+    if (options->planes != now->planes || options->polygons != now->polygons ||
+        options->windings != now->windings || options->memory != now->memory)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "view options: planes, polygons, windings and memory cannot be changed; "
+                         "make another stream");
     ebpo_status status = take_options(s, options, error);
     if (status != EBPO_OK)
         return status;
@@ -122,7 +141,8 @@ static ebpo_group_place place_of(const ebpo_waiting *w)
 /* Into s->read; of a file far away together with what comes soon. */
 static ebpo_status read_group(ebpo_view_stream *s, ebpo_group_place place, ebpo_error *error)
 {
-    unsigned wanted = (s->options.planes || s->options.polygons ? EBPO_GROUP_PLANES : 0u) | (s->options.windings ? EBPO_GROUP_WINDINGS : 0u);
+    unsigned wanted = (s->options.planes || s->options.polygons ? EBPO_GROUP_PLANES : 0u) |
+                      (s->options.windings ? EBPO_GROUP_WINDINGS : 0u);
     ebpo_status status = EBPO_OK;
     ebpo_chunks_limit(s->chunks, s->options.bytes ? s->options.bytes : UINT64_MAX);
     if (ebpo_group_is_far(s->chunks, &place, wanted)) {
@@ -133,10 +153,13 @@ static ebpo_status read_group(ebpo_view_stream *s, ebpo_group_place place, ebpo_
             places[i] = place_of(&s->frontier.at[best[i]]);
         status = ebpo_group_fetch(s->chunks, places, count ? count : 1, wanted, error);
     }
-    return status == EBPO_OK ? ebpo_group_read(s->chunks, place.level, place.group, wanted, &s->read, error) : status;
+    return status == EBPO_OK
+               ? ebpo_group_read(s->chunks, place.level, place.group, wanted, &s->read, error)
+               : status;
 }
 
-/* Begins with the children of the top of the frontier, or with the root. Of a pruned node there are none: it stays in the cut, and the call is to be made again. */
+/* Begins with the children of the top of the frontier, or with the root. Of a pruned node there are
+ * none: it stays in the cut, and the call is to be made again. */
 static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_error *error)
 {
     bool root = s->grown.group_count == 0;
@@ -145,7 +168,9 @@ static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_err
         *end = EBPO_VIEW_DONE;
         return EBPO_OK;
     }
-    if (s->options.nodes && (root ? 1 : 8) > s->options.nodes - (s->delivered < s->options.nodes ? s->delivered : s->options.nodes)) {
+    if (s->options.nodes &&
+        (root ? 1 : 8) > s->options.nodes -
+                             (s->delivered < s->options.nodes ? s->delivered : s->options.nodes)) {
         *end = EBPO_VIEW_NODES;
         return EBPO_OK;
     }
@@ -164,7 +189,8 @@ static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_err
     if (status == EBPO_OK)
         status = ebpo_frontier_reserve(&s->frontier, 8, &why);
     if (status == EBPO_OK)
-        status = ebpo_grown_add(&s->grown, s->info, root ? 0 : s->frontier.at[0].octcode, &s->read, &why);
+        status = ebpo_grown_add(&s->grown, s->info, root ? 0 : s->frontier.at[0].octcode, &s->read,
+                                &why);
     if (status != EBPO_OK) {
         if (error)
             *error = why;
@@ -174,7 +200,8 @@ static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_err
     if (!root) {
         s->parent = ebpo_frontier_pop(&s->frontier);
         if (s->options.priority == EBPO_PRIORITY_FRONT_TO_BACK)
-            s->flip = ebpo_sight_octant(&s->sight, &s->box, ebpo_cell_of_octcode(s->parent.octcode));
+            s->flip =
+                ebpo_sight_octant(&s->sight, &s->box, ebpo_cell_of_octcode(s->parent.octcode));
     }
     s->step = 0;
     s->delivering = true;
@@ -193,8 +220,12 @@ static void end_group(ebpo_view_stream *s)
         ebpo_grown_node node = { group, (uint8_t)octant };
         ebpo_node_type type = ebpo_grown_type(&s->grown, node);
         s->cut[type]++;
-        if (type == EBPO_GRAY && ebpo_octcode_level(ebpo_grown_octcode(&s->grown, node)) + 1 < s->info->level_count) { /* else pruned */
-            ebpo_waiting w = { .octcode = ebpo_grown_octcode(&s->grown, node), .below = ebpo_grown_children(&s->grown, node), .group = group, .octant = (uint8_t)octant };
+        if (type == EBPO_GRAY && ebpo_octcode_level(ebpo_grown_octcode(&s->grown, node)) + 1 <
+                                     s->info->level_count) { /* else pruned */
+            ebpo_waiting w = { .octcode = ebpo_grown_octcode(&s->grown, node),
+                               .below = ebpo_grown_children(&s->grown, node),
+                               .group = group,
+                               .octant = (uint8_t)octant };
             rank(s, &w);
             ebpo_frontier_push(&s->frontier, w);
         }
@@ -223,10 +254,12 @@ void ebpo_view_fill(ebpo_view_stream *s, ebpo_grown_node node, ebpo_view_node *o
         ebpo_node_add_planes(&out->node, &s->box, codes, count, &s->room);
     }
     if (s->options.polygons && type != EBPO_WHITE)
-        ebpo_node_add_polygons(&out->node, &s->box, ebpo_grown_envelope(&s->grown, node, s->envelopes), &s->room);
+        ebpo_node_add_polygons(&out->node, &s->box,
+                               ebpo_grown_envelope(&s->grown, node, s->envelopes), &s->room);
 }
 
-ebpo_status ebpo_view_stream_next(ebpo_view_stream *s, ebpo_view_node *out, ebpo_view_end *end, ebpo_error *error)
+ebpo_status ebpo_view_stream_next(ebpo_view_stream *s, ebpo_view_node *out, ebpo_view_end *end,
+                                  ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     *end = EBPO_VIEW_NODE;

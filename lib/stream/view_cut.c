@@ -21,7 +21,8 @@ static bool visit_node(visitor *v, ebpo_grown_node node)
         v->node.complete = true;
         return v->visit(v->user, &v->node);
     }
-    unsigned flip = ebpo_sight_octant(&v->stream->sight, &v->stream->box, ebpo_cell_of_octcode(ebpo_grown_octcode(grown, node)));
+    unsigned flip = ebpo_sight_octant(&v->stream->sight, &v->stream->box,
+                                      ebpo_cell_of_octcode(ebpo_grown_octcode(grown, node)));
     for (unsigned step = 0; step < 8; step++)
         if (!visit_node(v, (ebpo_grown_node){ below, (uint8_t)(step ^ flip) }))
             return false;

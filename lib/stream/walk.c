@@ -86,7 +86,8 @@ static const ebpo_polytope *ancestor(const ebpo_walk *w, int depth, ebpo_walk_en
     return &e->at[depth];
 }
 
-const ebpo_polytope *ebpo_walk_envelope(const ebpo_walk *w, const ebpo_walk_node *node, ebpo_walk_envelopes *e)
+const ebpo_polytope *ebpo_walk_envelope(const ebpo_walk *w, const ebpo_walk_node *node,
+                                        ebpo_walk_envelopes *e)
 {
     if (node->type == EBPO_BLACK) {
         ebpo_polytope_cube(&e->own);

@@ -1,5 +1,6 @@
-/* Walking the nodes of one level in octcode order, down from the root through the levels kept. Within a level, depth-first order visits groups, nodes of each type, and planes in
- * the order in which they are stored: so running counts do, and no table of sums is needed. */
+/* Walking the nodes of one level in octcode order, down from the root through the levels kept.
+ * Within a level, depth-first order visits groups, nodes of each type, and planes in the order in
+ * which they are stored: so running counts do, and no table of sums is needed. */
 #ifndef EBPO_STREAM_WALK_H
 #define EBPO_STREAM_WALK_H
 
@@ -17,13 +18,15 @@ typedef struct ebpo_walk_node {
 } ebpo_walk_node;
 
 typedef struct ebpo_walk {
-    const ebpo_level *level; /* [target + 1] lent; of those above the target only types, plane counts and planes are used */
+    /* [target + 1] lent; of those above the target only types, plane counts and planes are used */
+    const ebpo_level *level;
     int target, depth;
     bool pruned; /* the file is a subset: empty groups hold no nodes */
     struct {
         uint64_t group, rank[4], plane, leaf_plane; /* so many were passed in this level */
         unsigned octant;                            /* next one of the group */
-        ebpo_walk_node node;                        /* the node last passed: in levels above `depth` the ancestor */
+        /* the node last passed: in levels above `depth` the ancestor */
+        ebpo_walk_node node;
     } at[EBPO_LEVELS_MAX];
 } ebpo_walk;
 
@@ -31,18 +34,22 @@ void ebpo_walk_begin(ebpo_walk *walk, const ebpo_level *level, int target, bool 
 /* The next node of the target level; false after the last. */
 bool ebpo_walk_next(ebpo_walk *walk, ebpo_walk_node *out);
 
-/* The envelopes along one walk's way, so that neighbours share their ancestors'. About 170 KB; zeroed before first use. */
+/* The envelopes along one walk's way, so that neighbours share their ancestors'. About 170 KB;
+ * zeroed before first use. */
 typedef struct ebpo_walk_envelopes {
     uint64_t octcode[EBPO_LEVELS_MAX]; /* whose envelope it is; 0: nobody's */
     ebpo_polytope at[EBPO_LEVELS_MAX];
     ebpo_polytope own;
 } ebpo_walk_envelopes;
 
-/* One step on the way down: the parent's envelope in a child's cell (without a parent: the cube), which is then cut by the child's own planes (ebpo_planes_cut). */
+/* One step on the way down: the parent's envelope in a child's cell (without a parent: the cube),
+ * which is then cut by the child's own planes (ebpo_planes_cut). */
 void ebpo_envelope_begin(const ebpo_polytope *parent, uint64_t octcode, ebpo_polytope *envelope);
 
-/* Envelope of the node that ebpo_walk_next gave last, in coordinates of its cell; gray nodes and leaves: from the cube down, cut by the planes of all ancestors and its own. Black
- * nodes: the cube. Lent until the next call with these envelopes. */
-const ebpo_polytope *ebpo_walk_envelope(const ebpo_walk *walk, const ebpo_walk_node *node, ebpo_walk_envelopes *envelopes);
+/* Envelope of the node that ebpo_walk_next gave last, in coordinates of its cell; gray nodes and
+ * leaves: from the cube down, cut by the planes of all ancestors and its own. Black nodes: the
+ * cube. Lent until the next call with these envelopes. */
+const ebpo_polytope *ebpo_walk_envelope(const ebpo_walk *walk, const ebpo_walk_node *node,
+                                        ebpo_walk_envelopes *envelopes);
 
 #endif

@@ -1,5 +1,6 @@
-/* Depth first through what remains, as the specification numbers faces. Maps from old numbers to new ones are as long as the source's mesh, but pages that nothing is written to
- * take no memory, and what lies close together in space does so in numbers. */
+/* Depth first through what remains, as the specification numbers faces. Maps from old numbers to
+ * new ones are as long as the source's mesh, but pages that nothing is written to take no memory,
+ * and what lies close together in space does so in numbers. */
 #include "geom/strict_fp.h"
 
 #include <stdlib.h>
@@ -11,10 +12,12 @@
 
 typedef struct numbering {
     ebpo_cutting *c;
-    uint32_t *number;      /* [faces of the source] new number + 1; 0: none yet */
-    uint32_t *old;         /* [count] of each new face */
+    uint32_t *number; /* [faces of the source] new number + 1; 0: none yet */
+    uint32_t *old;    /* [count] of each new face */
     uint64_t count, room;
-    uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX], read[EBPO_LEVELS_MAX], written[EBPO_LEVELS_MAX]; /* references */
+    /* references */
+    uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX], read[EBPO_LEVELS_MAX],
+        written[EBPO_LEVELS_MAX];
 } numbering;
 
 static bool add_new(numbering *n, uint32_t face)
@@ -32,7 +35,8 @@ static int compare_numbers(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* References to faces whose first leaf is gone become new, in the order of their old numbers: before the leaf's own. The others stay, in place. */
+/* References to faces whose first leaf is gone become new, in the order of their old numbers:
+ * before the leaf's own. The others stay, in place. */
 static ebpo_status number_leaf(numbering *n, int level)
 {
     ebpo_level *l = &n->c->out->level[level];
@@ -51,7 +55,10 @@ static ebpo_status number_leaf(numbering *n, int level)
     for (uint64_t k = 0; k < l->leaf_new[i] && good; k++)
         good = n->number[l->leaf_first[i] + k] == 0 && add_new(n, (uint32_t)(l->leaf_first[i] + k));
     if (!good)
-        return ebpo_fail(n->c->error, EBPO_E_FORMAT, "level %d: a leaf lists a face twice or as new that an earlier leaf lists; run ebpo verify", level);
+        return ebpo_fail(n->c->error, EBPO_E_FORMAT,
+                         "level %d: a leaf lists a face twice or as new that an earlier leaf "
+                         "lists; run ebpo verify",
+                         level);
     if (!sorted)
         qsort(to, kept, sizeof *to, compare_numbers);
     n->read[level] += l->leaf_ref_count[i];
@@ -99,7 +106,8 @@ static ebpo_status number_vertices(ebpo_cutting *c, vertices *v)
         }
         mesh->faces[i] = v->number[vertex] - 1;
     }
-    for (uint64_t i = 0; i < c->from->vertex_count && good && !c->out->info.pruned; i++) /* those that no face uses belong to the whole */
+    for (uint64_t i = 0; i < c->from->vertex_count && good && !c->out->info.pruned;
+         i++) /* those that no face uses belong to the whole */
         if (v->number[i] == 0) {
             good = ebpo_grow(&v->old, &v->room, v->count + 1, sizeof *v->old);
             if (good)
@@ -120,12 +128,16 @@ static ebpo_status take_vertices(ebpo_cutting *c)
         out->info.vertex_count = out->mesh.vertex_count = v.count;
         out->mesh.xyz32 = c->from->double_coordinates ? NULL : xyz;
         out->mesh.xyz64 = c->from->double_coordinates ? xyz : NULL;
-        status = xyz ? ebpo_pick_rows(c->chunks, EBPO_A_VERTICES, v.old, v.count, c->options->write.threads, xyz, c->error) : ebpo_fail_memory(c->error, v.count * size);
+        status = xyz ? ebpo_pick_rows(c->chunks, EBPO_A_VERTICES, v.old, v.count,
+                                      c->options->write.threads, xyz, c->error)
+                     : ebpo_fail_memory(c->error, v.count * size);
     }
     if (status == EBPO_OK && c->parts & EBPO_PART_MAPS) {
         out->vertex_source = ebpo_alloc(v.count, sizeof *out->vertex_source);
-        status = out->vertex_source ? ebpo_pick_rows(c->chunks, EBPO_A_VERTEX_SOURCE, v.old, v.count, c->options->write.threads, out->vertex_source, c->error)
-                                    : ebpo_fail_memory(c->error, v.count * sizeof *out->vertex_source);
+        status = out->vertex_source
+                     ? ebpo_pick_rows(c->chunks, EBPO_A_VERTEX_SOURCE, v.old, v.count,
+                                      c->options->write.threads, out->vertex_source, c->error)
+                     : ebpo_fail_memory(c->error, v.count * sizeof *out->vertex_source);
     }
     free(v.old);
     return status;
@@ -136,12 +148,16 @@ static ebpo_status take_faces(ebpo_cutting *c, const numbering *n)
     ebpo_tree *out = c->out;
     out->info.face_count = out->mesh.face_count = n->count;
     out->mesh.faces = ebpo_alloc(n->count, 3 * sizeof *out->mesh.faces);
-    ebpo_status status = out->mesh.faces ? ebpo_pick_rows(c->chunks, EBPO_A_FACES, n->old, n->count, c->options->write.threads, out->mesh.faces, c->error)
-                                         : ebpo_fail_memory(c->error, n->count * 3 * sizeof *out->mesh.faces);
+    ebpo_status status = out->mesh.faces
+                             ? ebpo_pick_rows(c->chunks, EBPO_A_FACES, n->old, n->count,
+                                              c->options->write.threads, out->mesh.faces, c->error)
+                             : ebpo_fail_memory(c->error, n->count * 3 * sizeof *out->mesh.faces);
     if (status == EBPO_OK && c->parts & EBPO_PART_MAPS) {
         out->face_source = ebpo_alloc(n->count, sizeof *out->face_source);
-        status = out->face_source ? ebpo_pick_rows(c->chunks, EBPO_A_FACE_SOURCE, n->old, n->count, c->options->write.threads, out->face_source, c->error)
-                                  : ebpo_fail_memory(c->error, n->count * sizeof *out->face_source);
+        status = out->face_source
+                     ? ebpo_pick_rows(c->chunks, EBPO_A_FACE_SOURCE, n->old, n->count,
+                                      c->options->write.threads, out->face_source, c->error)
+                     : ebpo_fail_memory(c->error, n->count * sizeof *out->face_source);
     }
     return status == EBPO_OK ? take_vertices(c) : status;
 }
@@ -166,7 +182,9 @@ ebpo_status ebpo_cut_faces(ebpo_cutting *c)
 {
     numbering n = { .c = c };
     n.number = ebpo_alloc_zero(c->from->face_count, sizeof *n.number);
-    ebpo_status status = n.number ? number_group(&n, 0) : ebpo_fail_memory(c->error, c->from->face_count * sizeof *n.number);
+    ebpo_status status = n.number
+                             ? number_group(&n, 0)
+                             : ebpo_fail_memory(c->error, c->from->face_count * sizeof *n.number);
     free(n.number);
     for (int i = 0; i < c->out->info.level_count && status == EBPO_OK; i++) {
         ebpo_level *l = &c->out->level[i];

@@ -1,4 +1,5 @@
-/* From level to level: which groups are wanted is known from the level above, so only these are read. */
+/* From level to level: which groups are wanted is known from the level above, so only these are
+ * read. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -36,7 +37,8 @@ static bool meets_box(const ebpo_cutting *c, int level, const uint32_t at[3])
 {
     const ebpo_subset_options *o = c->options;
     for (int k = 0; k < 3 && o->boxed; k++)
-        if (ebpo_wall(&c->box, k, level, at[k]) > o->max[k] || ebpo_wall(&c->box, k, level, at[k] + 1) < o->min[k])
+        if (ebpo_wall(&c->box, k, level, at[k]) > o->max[k] ||
+            ebpo_wall(&c->box, k, level, at[k] + 1) < o->min[k])
             return false;
     return true;
 }
@@ -64,15 +66,19 @@ static ebpo_status pick(descent *d)
         else
             runs[count++] = (ebpo_run){ .group = group, .groups = 1 };
     }
-    ebpo_status status = ebpo_pick_level(d->c->chunks, d->level, runs, count, d->c->parts, &d->from, d->c->error);
-    /* Ranks of the picked gray nodes in the source are needed for their groups: one after the other through the runs. */
+    ebpo_status status =
+        ebpo_pick_level(d->c->chunks, d->level, runs, count, d->c->parts, &d->from, d->c->error);
+    /* Ranks of the picked gray nodes in the source are needed for their groups: one after the other
+     * through the runs. */
     uint64_t next = 0;
     if (status == EBPO_OK) {
         d->child = ebpo_alloc(d->from.gray_count + d->from.leaf_count, sizeof *d->child);
         if (!d->child)
-            status = ebpo_fail_memory(d->c->error, (d->from.gray_count + d->from.leaf_count) * sizeof *d->child);
+            status = ebpo_fail_memory(d->c->error,
+                                      (d->from.gray_count + d->from.leaf_count) * sizeof *d->child);
     }
-    /* Kept at the end of the room, which leaves that become pruned fill from the front: never overtaken, as each gray node takes one place at most. */
+    /* Kept at the end of the room, which leaves that become pruned fill from the front: never
+     * overtaken, as each gray node takes one place at most. */
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
         for (uint64_t k = 0; k < runs[i].count[EBPO_GRAY]; k++)
             d->child[d->from.leaf_count + next++].group = runs[i].rank[EBPO_GRAY] + k;
@@ -85,25 +91,34 @@ static ebpo_status make_room(descent *d)
     const ebpo_level *f = &d->from;
     ebpo_level *t = d->to;
     uint32_t parts = d->c->parts;
-    uint64_t grays = f->gray_count + f->leaf_count, planes = f->plane_count + f->leaf_plane_count, whites = f->white_count + 8 * d->parent_count;
+    uint64_t grays = f->gray_count + f->leaf_count, planes = f->plane_count + f->leaf_plane_count,
+             whites = f->white_count + 8 * d->parent_count;
     t->types = ebpo_alloc_zero(d->parent_count, sizeof *t->types);
     bool good = t->types;
     if (parts & EBPO_PART_PLANES && good)
-        good = (t->plane_counts = ebpo_alloc_zero(grays, 1)) && (t->planes = ebpo_alloc(planes, sizeof *t->planes));
+        good = (t->plane_counts = ebpo_alloc_zero(grays, 1)) &&
+               (t->planes = ebpo_alloc(planes, sizeof *t->planes));
     if (parts & EBPO_PART_LEAF_PLANES && good)
-        good = (t->leaf_plane_counts = ebpo_alloc(f->leaf_count, 1)) && (t->leaf_planes = ebpo_alloc(f->leaf_plane_count, sizeof *t->leaf_planes));
+        good = (t->leaf_plane_counts = ebpo_alloc(f->leaf_count, 1)) &&
+               (t->leaf_planes = ebpo_alloc(f->leaf_plane_count, sizeof *t->leaf_planes));
     if (d->c->from->solid && good)
-        good = (t->leaf_winding = ebpo_alloc(f->leaf_count, 4)) && (!f->black_winding || (t->black_winding = ebpo_alloc(f->black_count, 4))) &&
+        good = (t->leaf_winding = ebpo_alloc(f->leaf_count, 4)) &&
+               (!f->black_winding || (t->black_winding = ebpo_alloc(f->black_count, 4))) &&
                (!f->white_winding || (t->white_winding = ebpo_alloc_zero(whites, 4)));
     if (parts & EBPO_PART_MESH && good)
-        good = (t->leaf_first = ebpo_alloc(f->leaf_count, sizeof *t->leaf_first)) && (t->leaf_new = ebpo_alloc(f->leaf_count, 4)) &&
-               (t->leaf_ref_count = ebpo_alloc(f->leaf_count, 4)) && (t->leaf_refs = ebpo_alloc(f->ref_count, 4));
-    return good ? EBPO_OK : ebpo_fail_memory(d->c->error, f->leaf_count * 24 + (grays + f->ref_count + planes + whites) * 4);
+        good = (t->leaf_first = ebpo_alloc(f->leaf_count, sizeof *t->leaf_first)) &&
+               (t->leaf_new = ebpo_alloc(f->leaf_count, 4)) &&
+               (t->leaf_ref_count = ebpo_alloc(f->leaf_count, 4)) &&
+               (t->leaf_refs = ebpo_alloc(f->ref_count, 4));
+    return good ? EBPO_OK
+                : ebpo_fail_memory(d->c->error, f->leaf_count * 24 +
+                                                    (grays + f->ref_count + planes + whites) * 4);
 }
 
 /* --- nodes --- */
 
-static void add_gray(descent *d, const uint32_t at[3], uint64_t group, const uint32_t *codes, uint64_t count)
+static void add_gray(descent *d, const uint32_t at[3], uint64_t group, const uint32_t *codes,
+                     uint64_t count)
 {
     ebpo_level *t = d->to;
     if (t->plane_counts) {
@@ -117,15 +132,14 @@ static void add_gray(descent *d, const uint32_t at[3], uint64_t group, const uin
     d->goes_on = d->goes_on || group != NOTHING;
 }
 
-/* Whether the envelope is close enough to the model: asked once for each gray node and leaf, in their order. */
-static bool is_enough(descent *d)
-{
-    return d->judged && d->judged[d->next_judged++].enough;
-}
+/* Whether the envelope is close enough to the model: asked once for each gray node and leaf, in
+ * their order. */
+static bool is_enough(descent *d) { return d->judged && d->judged[d->next_judged++].enough; }
 
 static void take_gray(descent *d, const uint32_t at[3])
 {
-    uint64_t rank = d->read.of_type[EBPO_GRAY]++, group = d->child[d->from.leaf_count + rank].group, count = d->from.plane_counts ? d->from.plane_counts[rank] : 0;
+    uint64_t rank = d->read.of_type[EBPO_GRAY]++, group = d->child[d->from.leaf_count + rank].group,
+             count = d->from.plane_counts ? d->from.plane_counts[rank] : 0;
     bool enough = is_enough(d);
     if (enough || !may_go_on(d->c, d->level) || !meets_box(d->c, d->level, at))
         group = NOTHING;
@@ -143,7 +157,8 @@ static void add_leaf(descent *d, uint64_t rank)
     if (t->leaf_plane_counts) {
         uint64_t count = t->leaf_plane_counts[i] = f->leaf_plane_counts[rank];
         if (count)
-            memcpy(t->leaf_planes + t->leaf_plane_count, f->leaf_planes + d->read.leaf_planes, count * sizeof *t->leaf_planes);
+            memcpy(t->leaf_planes + t->leaf_plane_count, f->leaf_planes + d->read.leaf_planes,
+                   count * sizeof *t->leaf_planes);
         t->leaf_plane_count += count;
     }
     if (t->leaf_first) {
@@ -151,24 +166,28 @@ static void add_leaf(descent *d, uint64_t rank)
         t->leaf_first[i] = f->leaf_first[rank];
         t->leaf_new[i] = f->leaf_new[rank];
         if (count)
-            memcpy(t->leaf_refs + t->ref_count, f->leaf_refs + d->read.refs, count * sizeof *t->leaf_refs);
+            memcpy(t->leaf_refs + t->ref_count, f->leaf_refs + d->read.refs,
+                   count * sizeof *t->leaf_refs);
         t->ref_count += count;
         t->new_count += f->leaf_new[rank];
     }
 }
 
-/* Outside the box a leaf becomes a pruned node; its own planes bound what is in its cell as well as a gray node's do. Where its parent's do well enough, it needs none. */
+/* Outside the box a leaf becomes a pruned node; its own planes bound what is in its cell as well as
+ * a gray node's do. Where its parent's do well enough, it needs none. */
 static ebpo_node_type take_leaf(descent *d, const uint32_t at[3])
 {
     const ebpo_level *f = &d->from;
-    uint64_t rank = d->read.of_type[EBPO_LEAF]++, planes = f->leaf_plane_counts ? f->leaf_plane_counts[rank] : 0;
+    uint64_t rank = d->read.of_type[EBPO_LEAF]++,
+             planes = f->leaf_plane_counts ? f->leaf_plane_counts[rank] : 0;
     bool enough = is_enough(d), kept = !enough && meets_box(d->c, d->level, at);
     if (kept)
         add_leaf(d, rank);
     else if (enough)
         add_gray(d, at, NOTHING, NULL, 0);
     else
-        add_gray(d, at, NOTHING, f->leaf_planes ? f->leaf_planes + d->read.leaf_planes : NULL, d->to->plane_counts ? planes : 0);
+        add_gray(d, at, NOTHING, f->leaf_planes ? f->leaf_planes + d->read.leaf_planes : NULL,
+                 d->to->plane_counts ? planes : 0);
     d->read.leaf_planes += planes;
     d->read.refs += f->leaf_ref_count ? f->leaf_ref_count[rank] : 0;
     return kept ? EBPO_LEAF : EBPO_GRAY;
@@ -207,7 +226,8 @@ static void take_group(descent *d, uint64_t number, uint16_t types)
     for (unsigned octant = 0; octant < (d->level ? 8u : 1u); octant++) {
         uint32_t at[3];
         child_place(d, number, octant, at);
-        d->to->types[number] |= (uint16_t)(take_node(d, (ebpo_node_type)(types >> 2 * octant & 3), at) << 2 * octant);
+        d->to->types[number] |=
+            (uint16_t)(take_node(d, (ebpo_node_type)(types >> 2 * octant & 3), at) << 2 * octant);
     }
 }
 
@@ -220,7 +240,8 @@ static ebpo_status judge(descent *d)
     if (!d->c->need)
         return EBPO_OK;
     if (!(d->judged = ebpo_alloc_zero(d->from.gray_count + d->from.leaf_count, sizeof *d->judged)))
-        return ebpo_fail_memory(d->c->error, (d->from.gray_count + d->from.leaf_count) * sizeof *d->judged);
+        return ebpo_fail_memory(d->c->error,
+                                (d->from.gray_count + d->from.leaf_count) * sizeof *d->judged);
     for (uint64_t i = 0; i < d->parent_count; i++) {
         if (d->parent[i].group == NOTHING)
             continue;
@@ -232,7 +253,8 @@ static ebpo_status judge(descent *d)
             ebpo_need_node *node = &d->judged[count++];
             node->cell.level = d->level;
             child_place(d, i, octant, node->cell.at);
-            node->asked = meets_box(d->c, d->level, node->cell.at) && (type == EBPO_LEAF || may_go_on(d->c, d->level));
+            node->asked = meets_box(d->c, d->level, node->cell.at) &&
+                          (type == EBPO_LEAF || may_go_on(d->c, d->level));
         }
     }
     return ebpo_need_judge(d->c->need, d->judged, count, d->c->options->max_error, d->c->error);
@@ -269,13 +291,17 @@ static ebpo_status cut_level(descent *d)
 ebpo_status ebpo_cut_levels(ebpo_cutting *c)
 {
     ebpo_info *info = &c->out->info;
-    descent d = { .c = c, .goes_on = true, .parent_count = 1, .parent = ebpo_alloc_zero(1, sizeof *d.parent) };
+    descent d = {
+        .c = c, .goes_on = true, .parent_count = 1, .parent = ebpo_alloc_zero(1, sizeof *d.parent)
+    };
     ebpo_status status = d.parent ? EBPO_OK : ebpo_fail_memory(c->error, sizeof *d.parent);
     info->level_count = 0;
     for (; d.goes_on && status == EBPO_OK; d.level++) {
         const ebpo_progress *progress = &c->options->write.progress;
-        if (progress->report && !progress->report(progress->user, "reading levels", (uint64_t)d.level, (uint64_t)c->last_level + 1))
-            status = ebpo_fail(c->error, EBPO_E_CANCELLED, "stopped on request while levels were read");
+        if (progress->report && !progress->report(progress->user, "reading levels",
+                                                  (uint64_t)d.level, (uint64_t)c->last_level + 1))
+            status =
+                ebpo_fail(c->error, EBPO_E_CANCELLED, "stopped on request while levels were read");
         if (status != EBPO_OK)
             break;
         d.to = &c->out->level[d.level];
@@ -300,7 +326,8 @@ ebpo_status ebpo_cut_levels(ebpo_cutting *c)
     bool cut = false, empty = false;
     for (int i = 0; i < info->level_count; i++) {
         empty = empty || c->out->level[i].pruned_count;
-        cut = cut || c->out->level[i].gray_count != c->from->level[i].gray_count || c->out->level[i].leaf_count != c->from->level[i].leaf_count;
+        cut = cut || c->out->level[i].gray_count != c->from->level[i].gray_count ||
+              c->out->level[i].leaf_count != c->from->level[i].leaf_count;
     }
     cut = cut || info->level_count < c->from->level_count || c->from->pruned;
     info->pruned = cut && empty;

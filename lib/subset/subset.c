@@ -22,7 +22,8 @@ uint32_t ebpo_profile_parts(ebpo_profile profile)
     return EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES;
 }
 
-/* The box against the root cell and against one that was kept before: then nothing but their common part is here. */
+/* The box against the root cell and against one that was kept before: then nothing but their common
+ * part is here. */
 static ebpo_status settle_box(ebpo_cutting *c)
 {
     const ebpo_subset_options *o = c->options;
@@ -32,17 +33,30 @@ static ebpo_status settle_box(ebpo_cutting *c)
         return EBPO_OK;
     for (int k = 0; k < 3; k++) {
         if (!isfinite(o->min[k]) || !isfinite(o->max[k]) || !(o->min[k] <= o->max[k]))
-            return ebpo_fail(c->error, EBPO_E_ARGUMENT, "%s: a box needs finite corners, the lower one first on each axis", shown);
+            return ebpo_fail(c->error, EBPO_E_ARGUMENT,
+                             "%s: a box needs finite corners, the lower one first on each axis",
+                             shown);
         if (ebpo_wall(&c->box, k, 0, 0) > o->max[k] || ebpo_wall(&c->box, k, 0, 1) < o->min[k])
-            return ebpo_fail(c->error, EBPO_E_ARGUMENT, "%s: the box does not meet the model, which lies within %.17g %.17g %.17g and %.17g %.17g %.17g", shown, c->box.origin[0],
-                             c->box.origin[1], c->box.origin[2], ebpo_wall(&c->box, 0, 0, 1), ebpo_wall(&c->box, 1, 0, 1), ebpo_wall(&c->box, 2, 0, 1));
-        if (c->from->boxed && (c->from->kept_box[k] > o->max[k] || c->from->kept_box[3 + k] < o->min[k]))
-            return ebpo_fail(c->error, EBPO_E_ARGUMENT, "%s: the box does not meet the one that this file was cut to, %.17g %.17g %.17g to %.17g %.17g %.17g; take the subset of the "
-                             "original", shown, c->from->kept_box[0], c->from->kept_box[1], c->from->kept_box[2], c->from->kept_box[3], c->from->kept_box[4], c->from->kept_box[5]);
+            return ebpo_fail(c->error, EBPO_E_ARGUMENT,
+                             "%s: the box does not meet the model, which lies within %.17g %.17g "
+                             "%.17g and %.17g %.17g %.17g",
+                             shown, c->box.origin[0], c->box.origin[1], c->box.origin[2],
+                             ebpo_wall(&c->box, 0, 0, 1), ebpo_wall(&c->box, 1, 0, 1),
+                             ebpo_wall(&c->box, 2, 0, 1));
+        if (c->from->boxed &&
+            (c->from->kept_box[k] > o->max[k] || c->from->kept_box[3 + k] < o->min[k]))
+            return ebpo_fail(c->error, EBPO_E_ARGUMENT,
+                             "%s: the box does not meet the one that this file was cut to, %.17g "
+                             "%.17g %.17g to %.17g %.17g %.17g; take the subset of the "
+                             "original",
+                             shown, c->from->kept_box[0], c->from->kept_box[1],
+                             c->from->kept_box[2], c->from->kept_box[3], c->from->kept_box[4],
+                             c->from->kept_box[5]);
     }
     for (int k = 0; k < 3; k++) {
         info->kept_box[k] = c->from->boxed ? fmax(o->min[k], c->from->kept_box[k]) : o->min[k];
-        info->kept_box[3 + k] = c->from->boxed ? fmin(o->max[k], c->from->kept_box[3 + k]) : o->max[k];
+        info->kept_box[3 + k] =
+            c->from->boxed ? fmin(o->max[k], c->from->kept_box[3 + k]) : o->max[k];
     }
     info->boxed = true;
     return EBPO_OK;
@@ -53,10 +67,15 @@ static ebpo_status settle(ebpo_cutting *c)
     const ebpo_subset_options *o = c->options;
     ebpo_info *info = &c->out->info;
     int deepest = c->from->level_count - 1;
-    if (o->last_level < -1 || o->last_level >= EBPO_LEVELS_MAX || (o->last_level > deepest && !c->from->pruned))
-        return ebpo_fail(c->error, EBPO_E_ARGUMENT, "%s: there is no level %d; the file has levels 0 to %d", c->file->in.shown, o->last_level, deepest);
+    if (o->last_level < -1 || o->last_level >= EBPO_LEVELS_MAX ||
+        (o->last_level > deepest && !c->from->pruned))
+        return ebpo_fail(c->error, EBPO_E_ARGUMENT,
+                         "%s: there is no level %d; the file has levels 0 to %d", c->file->in.shown,
+                         o->last_level, deepest);
     if (!(o->max_error >= 0) || !isfinite(o->max_error))
-        return ebpo_fail(c->error, EBPO_E_ARGUMENT, "maximum error %g: give a length above 0, or 0 to keep everything", o->max_error);
+        return ebpo_fail(c->error, EBPO_E_ARGUMENT,
+                         "maximum error %g: give a length above 0, or 0 to keep everything",
+                         o->max_error);
     c->last_level = o->last_level < 0 || o->last_level > deepest ? deepest : o->last_level;
     c->parts = c->from->parts & o->parts;
     if (!(c->parts & EBPO_PART_MESH))
@@ -84,10 +103,16 @@ static void announce(const ebpo_cutting *c)
         return;
     for (int level = 0; level <= c->last_level; level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++) {
-            bool planes = id == EBPO_A_PLANE_COUNTS || id == EBPO_A_PLANES || id == EBPO_A_GRAY_INDEX, leaf_planes = id == EBPO_A_LEAF_PLANE_COUNTS || id == EBPO_A_LEAF_PLANES;
+            bool planes =
+                     id == EBPO_A_PLANE_COUNTS || id == EBPO_A_PLANES || id == EBPO_A_GRAY_INDEX,
+                 leaf_planes = id == EBPO_A_LEAF_PLANE_COUNTS || id == EBPO_A_LEAF_PLANES;
             bool lists = id >= EBPO_A_LEAF_SKIP && id <= EBPO_A_LEAF_REFS;
-            uint32_t needs = planes ? EBPO_PART_PLANES : leaf_planes ? EBPO_PART_LEAF_PLANES : lists ? EBPO_PART_MESH : 0;
-            if ((needs & ~c->parts) == 0 && id != EBPO_A_TYPES_INDEX && id != EBPO_A_GRAY_INDEX && id != EBPO_A_LEAF_INDEX)
+            uint32_t needs = planes        ? EBPO_PART_PLANES
+                             : leaf_planes ? EBPO_PART_LEAF_PLANES
+                             : lists       ? EBPO_PART_MESH
+                                           : 0;
+            if ((needs & ~c->parts) == 0 && id != EBPO_A_TYPES_INDEX && id != EBPO_A_GRAY_INDEX &&
+                id != EBPO_A_LEAF_INDEX)
                 ebpo_expect_array(&e, &c->file->level_array[level][id]);
         }
     if (c->parts & EBPO_PART_MESH && c->last_level == c->from->level_count - 1)
@@ -105,21 +130,30 @@ static void name_mesh(ebpo_tree *out)
     out->mesh.source_size = out->info.source_size;
 }
 
-ebpo_status ebpo_subset_tree(ebpo_tree *out, ebpo_file *file, const ebpo_subset_options *options, ebpo_error *error)
+ebpo_status ebpo_subset_tree(ebpo_tree *out, ebpo_file *file, const ebpo_subset_options *options,
+                             ebpo_error *error)
 {
     ebpo_need *need = NULL;
     ebpo_status status = EBPO_OK;
     if (options->max_error > 0)
-        status = ebpo_need_open(&need, file, options->parts & EBPO_PART_PLANES, options->write.threads, options->write.progress, error);
+        status = ebpo_need_open(&need, file, options->parts & EBPO_PART_PLANES,
+                                options->write.threads, options->write.progress, error);
     if (status == EBPO_OK)
         status = ebpo_subset_tree_needed(out, file, options, need, error);
     ebpo_need_close(need);
     return status;
 }
 
-ebpo_status ebpo_subset_tree_needed(ebpo_tree *out, ebpo_file *file, const ebpo_subset_options *options, ebpo_need *need, ebpo_error *error)
+ebpo_status ebpo_subset_tree_needed(ebpo_tree *out, ebpo_file *file,
+                                    const ebpo_subset_options *options, ebpo_need *need,
+                                    ebpo_error *error)
 {
-    ebpo_cutting c = { .file = file, .from = ebpo_file_info(file), .options = options, .out = out, .error = error, .need = options->max_error > 0 ? need : NULL };
+    ebpo_cutting c = { .file = file,
+                       .from = ebpo_file_info(file),
+                       .options = options,
+                       .out = out,
+                       .error = error,
+                       .need = options->max_error > 0 ? need : NULL };
     memset(out, 0, sizeof *out);
     ebpo_status status = settle(&c);
     if (status == EBPO_OK)
@@ -148,7 +182,8 @@ ebpo_status ebpo_subset_tree_needed(ebpo_tree *out, ebpo_file *file, const ebpo_
     return EBPO_OK;
 }
 
-ebpo_status ebpo_subset(ebpo_file *file, const char *path, const ebpo_subset_options *options, ebpo_error *error)
+ebpo_status ebpo_subset(ebpo_file *file, const char *path, const ebpo_subset_options *options,
+                        ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     static const ebpo_subset_options usual = EBPO_SUBSET_OPTIONS_INIT;
@@ -165,7 +200,8 @@ ebpo_status ebpo_subset(ebpo_file *file, const char *path, const ebpo_subset_opt
     return status;
 }
 
-ebpo_status ebpo_subset_of_tree(ebpo_tree *tree, const char *path, const ebpo_subset_options *options, ebpo_error *error)
+ebpo_status ebpo_subset_of_tree(ebpo_tree *tree, const char *path,
+                                const ebpo_subset_options *options, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     static const ebpo_subset_options usual = EBPO_SUBSET_OPTIONS_INIT;

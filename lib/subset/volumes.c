@@ -7,7 +7,8 @@
 
 typedef struct measuring {
     ebpo_cutting *c;
-    uint64_t group[EBPO_LEVELS_MAX], gray[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX], plane[EBPO_LEVELS_MAX], leaf_plane[EBPO_LEVELS_MAX];
+    uint64_t group[EBPO_LEVELS_MAX], gray[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX],
+        plane[EBPO_LEVELS_MAX], leaf_plane[EBPO_LEVELS_MAX];
 } measuring;
 
 static double cell_volume(const ebpo_box *box, int level)
@@ -17,7 +18,8 @@ static double cell_volume(const ebpo_box *box, int level)
 }
 
 /* Cuts the envelope by the node's own planes. */
-static void cut(ebpo_polytope *envelope, const uint8_t *counts, const uint32_t *planes, uint64_t *node, uint64_t *plane)
+static void cut(ebpo_polytope *envelope, const uint8_t *counts, const uint32_t *planes,
+                uint64_t *node, uint64_t *plane)
 {
     uint64_t count = counts ? counts[*node] : 0;
     if (count)
@@ -44,7 +46,8 @@ static void measure_group(measuring *m, int level, const ebpo_polytope *parent)
             cut(&own, l->plane_counts, l->planes, &m->gray[level], &m->plane[level]);
         else
             cut(&own, l->leaf_plane_counts, l->leaf_planes, &m->leaf[level], &m->leaf_plane[level]);
-        *(type == EBPO_GRAY ? &l->gray_volume : &l->leaf_volume) += ebpo_polytope_volume(&own) * cell_volume(&m->c->box, level);
+        *(type == EBPO_GRAY ? &l->gray_volume : &l->leaf_volume) +=
+            ebpo_polytope_volume(&own) * cell_volume(&m->c->box, level);
         if (type == EBPO_GRAY && level + 1 < tree->info.level_count)
             measure_group(m, level + 1, &own);
     }

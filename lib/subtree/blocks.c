@@ -18,7 +18,8 @@ typedef struct job {
 static void fill_lane32(float *block, unsigned lane, const ebpo_mesh *mesh, uint32_t face)
 {
     for (unsigned i = 0; i < 9; i++)
-        block[i * EBPO_BLOCK + lane] = mesh->xyz32[3 * (uint64_t)mesh->faces[3 * (uint64_t)face + i / 3] + i % 3];
+        block[i * EBPO_BLOCK + lane] =
+            mesh->xyz32[3 * (uint64_t)mesh->faces[3 * (uint64_t)face + i / 3] + i % 3];
 }
 
 static void fill_lane64(double *block, unsigned lane, const ebpo_mesh *mesh, uint32_t face)
@@ -29,7 +30,8 @@ static void fill_lane64(double *block, unsigned lane, const ebpo_mesh *mesh, uin
     }
 }
 
-static ebpo_status fill(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status fill(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                        ebpo_error *error)
 {
     (void)worker;
     (void)error;
@@ -55,9 +57,11 @@ static ebpo_status fill(void *context, uint64_t begin, uint64_t end, unsigned wo
     return EBPO_OK;
 }
 
-ebpo_status ebpo_subtree_fill_blocks(ebpo_subtree *s, const ebpo_slice *slice, const ebpo_layout *layout, unsigned threads, ebpo_error *error)
+ebpo_status ebpo_subtree_fill_blocks(ebpo_subtree *s, const ebpo_slice *slice,
+                                     const ebpo_layout *layout, unsigned threads, ebpo_error *error)
 {
-    uint64_t numbers = layout->block_count * EBPO_BLOCK_NUMBERS, size = s->wide ? sizeof(double) : sizeof(float);
+    uint64_t numbers = layout->block_count * EBPO_BLOCK_NUMBERS,
+             size = s->wide ? sizeof(double) : sizeof(float);
     s->block_count = (uint32_t)layout->block_count;
     void *blocks = aligned_alloc(64, (numbers * size + 127) / 64 * 64);
     if (s->wide)

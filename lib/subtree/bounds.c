@@ -1,4 +1,5 @@
-/* Boxes and round slabs around the blocks below each child. All in doubles, in the subtree's frame, then rounded outward to floats. */
+/* Boxes and round slabs around the blocks below each child. All in doubles, in the subtree's frame,
+ * then rounded outward to floats. */
 #include "geom/strict_fp.h"
 
 #include <math.h>
@@ -10,11 +11,14 @@
 #include "base/parallel.h"
 #include "subtree/parts.h"
 
-/* Above so many blocks the slab is left away (a ball takes its place): such patches curve too much for one. */
+/* Above so many blocks the slab is left away (a ball takes its place): such patches curve too much
+ * for one. */
 enum { SLAB_BLOCKS_MAX = 1024 };
-/* A subtree lists faces that reach beyond its cell. Where they reach beyond this, in units of the frame, floats cannot hold a slab closely enough and the box alone bounds. */
+/* A subtree lists faces that reach beyond its cell. Where they reach beyond this, in units of the
+ * frame, floats cannot hold a slab closely enough and the box alone bounds. */
 static const double slab_reach = 2;
-/* Widening, in units of the frame (1 is half the subtree's size), for the rounding of what is computed here and of the axis to floats. */
+/* Widening, in units of the frame (1 is half the subtree's size), for the rounding of what is
+ * computed here and of the axis to floats. */
 static const double slack = 0x1p-22;
 
 typedef struct job {
@@ -26,7 +30,8 @@ typedef struct extent {
     double low[3], high[3], normal[3];
 } extent;
 
-/* A block's corners in the frame, [corner][axis][lane]; lanes without a face repeat the first one. */
+/* A block's corners in the frame, [corner][axis][lane]; lanes without a face repeat the first one.
+ */
 typedef struct lanes {
     double x[3][3][EBPO_BLOCK];
 } lanes;
@@ -37,9 +42,12 @@ static void load_lanes(const ebpo_subtree *s, uint32_t block, lanes *out)
         uint64_t at = (uint64_t)block * EBPO_BLOCK_NUMBERS + (uint64_t)i * EBPO_BLOCK;
         double *x = out->x[i / 3][i % 3], centre = s->centre[i % 3];
         for (int lane = 0; lane < EBPO_BLOCK; lane++)
-            x[lane] = s->wide ? s->block64[at + (uint64_t)lane] : (double)s->block32[at + (uint64_t)lane];
+            x[lane] =
+                s->wide ? s->block64[at + (uint64_t)lane] : (double)s->block32[at + (uint64_t)lane];
         for (int lane = 0; lane < EBPO_BLOCK; lane++)
-            x[lane] = s->slot_face[block * EBPO_BLOCK + (uint32_t)lane] == EBPO_NO_SLOT ? x[0] : (x[lane] - centre) * s->scale;
+            x[lane] = s->slot_face[block * EBPO_BLOCK + (uint32_t)lane] == EBPO_NO_SLOT
+                          ? x[0]
+                          : (x[lane] - centre) * s->scale;
     }
 }
 
@@ -55,8 +63,9 @@ static void add_block(const lanes *l, extent *e)
                 high = x > high ? x : high;
             }
         for (int lane = 0; lane < EBPO_BLOCK; lane++)
-            normal += (l->x[1][u][lane] - l->x[0][u][lane]) * (l->x[2][v][lane] - l->x[0][v][lane]) -
-                      (l->x[1][v][lane] - l->x[0][v][lane]) * (l->x[2][u][lane] - l->x[0][u][lane]);
+            normal +=
+                (l->x[1][u][lane] - l->x[0][u][lane]) * (l->x[2][v][lane] - l->x[0][v][lane]) -
+                (l->x[1][v][lane] - l->x[0][v][lane]) * (l->x[2][u][lane] - l->x[0][u][lane]);
         e->low[k] = low;
         e->high[k] = high;
         e->normal[k] += normal;
@@ -66,7 +75,8 @@ static void add_block(const lanes *l, extent *e)
 /* The axis as the floats that readers will use; a zero axis makes the slab a ball. */
 static void choose_axis(const extent *e, float axis[3])
 {
-    double length = sqrt(e->normal[0] * e->normal[0] + e->normal[1] * e->normal[1] + e->normal[2] * e->normal[2]);
+    double length = sqrt(e->normal[0] * e->normal[0] + e->normal[1] * e->normal[1] +
+                         e->normal[2] * e->normal[2]);
     for (int k = 0; k < 3; k++)
         axis[k] = length > 0 ? (float)(e->normal[k] / length) : 0;
 }
@@ -86,7 +96,8 @@ static void add_to_slab(const lanes *l, const double middle[3], const float axis
                 square[lane] += d * d;
             }
         for (int lane = 0; lane < EBPO_BLOCK; lane++) {
-            double radius2 = square[lane] - along[lane] * along[lane] + square[lane] * 0x1p-22; /* the axis is a unit vector up to its rounding */
+            /* the axis is a unit vector up to its rounding */
+            double radius2 = square[lane] - along[lane] * along[lane] + square[lane] * 0x1p-22;
             out->from = along[lane] < out->from ? along[lane] : out->from;
             out->to = along[lane] > out->to ? along[lane] : out->to;
             out->radius2 = radius2 > out->radius2 ? radius2 : out->radius2;
@@ -94,17 +105,12 @@ static void add_to_slab(const lanes *l, const double middle[3], const float axis
     }
 }
 
-static float down(double x)
-{
-    return nextafterf((float)(x - slack), -INFINITY);
-}
+static float down(double x) { return nextafterf((float)(x - slack), -INFINITY); }
 
-static float up(double x)
-{
-    return nextafterf((float)(x + slack), INFINITY);
-}
+static float up(double x) { return nextafterf((float)(x + slack), INFINITY); }
 
-static void set_child(ebpo_bound *b, int lane, const extent *e, const float axis[3], const double middle[3], const slab *w)
+static void set_child(ebpo_bound *b, int lane, const extent *e, const float axis[3],
+                      const double middle[3], const slab *w)
 {
     double shift = (w->from + w->to) / 2;
     for (int k = 0; k < 3; k++) {
@@ -113,14 +119,18 @@ static void set_child(ebpo_bound *b, int lane, const extent *e, const float axis
         b->axis[k][lane] = axis[k];
         b->middle[k][lane] = (float)(middle[k] + shift * (double)axis[k]);
     }
-    /* The middle, less than slab_reach, is rounded to floats, which moves it by less than the slack. */
+    /* The middle, less than slab_reach, is rounded to floats, which moves it by less than the
+     * slack. */
     b->radius[lane] = up(sqrt(w->radius2 > 0 ? w->radius2 : 0) + slack);
     b->half[lane] = up((w->to - w->from) / 2 + slack);
 }
 
-static void bound_blocks(const ebpo_subtree *s, ebpo_bound *b, int lane, uint32_t first, uint32_t last)
+static void bound_blocks(const ebpo_subtree *s, ebpo_bound *b, int lane, uint32_t first,
+                         uint32_t last)
 {
-    extent e = { { INFINITY, INFINITY, INFINITY }, { -INFINITY, -INFINITY, -INFINITY }, { 0, 0, 0 } };
+    extent e = { { INFINITY, INFINITY, INFINITY },
+                 { -INFINITY, -INFINITY, -INFINITY },
+                 { 0, 0, 0 } };
     lanes l;
     for (uint32_t block = first; block < last; block++) {
         load_lanes(s, block, &l);
@@ -162,7 +172,8 @@ static void bound_nothing(ebpo_bound *b, int lane)
     b->radius[lane] = b->half[lane] = 0;
 }
 
-static ebpo_status bound_nodes(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status bound_nodes(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
 {
     (void)worker;
     (void)error;
@@ -176,13 +187,15 @@ static ebpo_status bound_nodes(void *context, uint64_t begin, uint64_t end, unsi
             else if (child & EBPO_IS_BLOCK)
                 bound_blocks(j->s, b, lane, child & ~EBPO_IS_BLOCK, (child & ~EBPO_IS_BLOCK) + 1);
             else
-                bound_blocks(j->s, b, lane, j->layout->first_block[child], j->layout->last_block[child]);
+                bound_blocks(j->s, b, lane, j->layout->first_block[child],
+                             j->layout->last_block[child]);
         }
     }
     return EBPO_OK;
 }
 
-ebpo_status ebpo_subtree_fill_bounds(ebpo_subtree *s, const ebpo_layout *layout, unsigned threads, ebpo_error *error)
+ebpo_status ebpo_subtree_fill_bounds(ebpo_subtree *s, const ebpo_layout *layout, unsigned threads,
+                                     ebpo_error *error)
 {
     s->bound_count = (uint32_t)layout->bound_count;
     s->top = layout->top;
@@ -190,5 +203,6 @@ ebpo_status ebpo_subtree_fill_bounds(ebpo_subtree *s, const ebpo_layout *layout,
     if (!s->bound)
         return ebpo_fail_memory(error, layout->bound_count * sizeof *s->bound);
     job j = { s, layout };
-    return ebpo_parallel_for(threads, layout->bound_count, 64, bound_nodes, &j, NULL, "open", error);
+    return ebpo_parallel_for(threads, layout->bound_count, 64, bound_nodes, &j, NULL, "open",
+                             error);
 }

@@ -1,5 +1,6 @@
-/* Which faces share a block, and how the blocks hang together. The octree is the hierarchy's skeleton: a node's new faces are one range of numbers, so
- * neighbouring children with few faces share a block, and nodes with few blocks are passed up until eight come together. */
+/* Which faces share a block, and how the blocks hang together. The octree is the hierarchy's
+ * skeleton: a node's new faces are one range of numbers, so neighbouring children with few faces
+ * share a block, and nodes with few blocks are passed up until eight come together. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -7,10 +8,11 @@
 #include "base/error.h"
 #include "subtree/parts.h"
 
-/* What a walk brings up from a node: either up to eight faces that are no block yet, or up to eight members of the hierarchy. */
+/* What a walk brings up from a node: either up to eight faces that are no block yet, or up to eight
+ * members of the hierarchy. */
 typedef struct bundle {
-    uint32_t begin, end;   /* faces */
-    int members;           /* 0: no block yet */
+    uint32_t begin, end; /* faces */
+    int members;         /* 0: no block yet */
     uint32_t member[8];
 } bundle;
 
@@ -18,14 +20,15 @@ typedef struct walk {
     ebpo_layout *out;
     const ebpo_slice *slice;
     uint64_t gray[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX]; /* of each level, seen so far */
-    uint64_t most;   /* blocks */
+    uint64_t most;                                         /* blocks */
     bool failed;
 } walk;
 
 static uint32_t add_block(walk *w, uint32_t begin, uint32_t end)
 {
     ebpo_layout *o = w->out;
-    if (o->block_count >= w->most || !ebpo_grow(&o->block_begin, &o->block_room, o->block_count + 1, sizeof *o->block_begin) ||
+    if (o->block_count >= w->most ||
+        !ebpo_grow(&o->block_begin, &o->block_room, o->block_count + 1, sizeof *o->block_begin) ||
         !ebpo_grow(&o->block_end, &o->block_room2, o->block_count + 1, sizeof *o->block_end)) {
         w->failed = true;
         return EBPO_NO_CHILD;
@@ -97,7 +100,8 @@ static bundle split_range(walk *w, uint32_t begin, uint32_t end)
     uint64_t pieces = (count + span - 1) / span;
     bundle part[8];
     for (uint64_t i = 0; i < pieces; i++)
-        part[i] = split_range(w, begin + (uint32_t)(count * i / pieces), begin + (uint32_t)(count * (i + 1) / pieces));
+        part[i] = split_range(w, begin + (uint32_t)(count * i / pieces),
+                              begin + (uint32_t)(count * (i + 1) / pieces));
     return join(w, part, (int)pieces);
 }
 
@@ -135,10 +139,12 @@ static bundle walk_node(walk *w, int depth, ebpo_node_type type, uint32_t begin)
     return (bundle){ begin, begin, 0, { 0 } };
 }
 
-/* Blocks are found in the order in which they are settled; numbers them by their faces instead, so that what lies below a node is one range of blocks. */
+/* Blocks are found in the order in which they are settled; numbers them by their faces instead, so
+ * that what lies below a node is one range of blocks. */
 static bool number_blocks(ebpo_layout *o, uint64_t faces)
 {
-    uint32_t *at_face = ebpo_alloc(faces + 1, sizeof *at_face), *end = ebpo_alloc(o->block_count, sizeof *end);
+    uint32_t *at_face = ebpo_alloc(faces + 1, sizeof *at_face),
+             *end = ebpo_alloc(o->block_count, sizeof *end);
     if (!at_face || !end) {
         free(at_face);
         free(end);
@@ -170,7 +176,8 @@ static bool number_blocks(ebpo_layout *o, uint64_t faces)
     return true;
 }
 
-ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, uint64_t most, ebpo_error *error)
+ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, uint64_t most,
+                             ebpo_error *error)
 {
     memset(out, 0, sizeof *out);
     walk w = { .out = out, .slice = slice, .most = most };
@@ -178,7 +185,8 @@ ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, uint64_t
     int parts = 0;
     if (slice->outer_count)
         part[parts++] = split_range(&w, 0, slice->outer_count);
-    part[parts] = walk_node(&w, 0, (ebpo_node_type)(slice->level[0].types[0] & 3), slice->outer_count);
+    part[parts] =
+        walk_node(&w, 0, (ebpo_node_type)(slice->level[0].types[0] & 3), slice->outer_count);
     if (part[parts].end > part[parts].begin)
         parts++;
     if (parts) {
@@ -191,7 +199,9 @@ ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, uint64_t
         return EBPO_OK;
     bool full = out->block_count >= most;
     ebpo_layout_free(out);
-    return full ? ebpo_fail(error, EBPO_E_LIMIT, "the model has too many faces to be held at once; give a memory budget") : ebpo_fail_memory(error, slice->mesh.face_count * 8);
+    return full ? ebpo_fail(error, EBPO_E_LIMIT,
+                            "the model has too many faces to be held at once; give a memory budget")
+                : ebpo_fail_memory(error, slice->mesh.face_count * 8);
 }
 
 void ebpo_layout_free(ebpo_layout *layout)

@@ -10,12 +10,14 @@
 #include "subtree/parts.h"
 #include "subtree/subtree.h"
 
-/* Single precision does for blocks while its squares and cubes stay far from its ends; coordinates beyond that, and doubles, take doubles. */
+/* Single precision does for blocks while its squares and cubes stay far from its ends; coordinates
+ * beyond that, and doubles, take doubles. */
 static bool needs_doubles(const ebpo_info *info)
 {
     double most = 0;
     for (int k = 0; k < 3; k++)
-        most = fmax(most, fmax(fabs(info->box_origin[k]), fabs(info->box_origin[k] + info->box_size[k])));
+        most = fmax(most,
+                    fmax(fabs(info->box_origin[k]), fabs(info->box_origin[k] + info->box_size[k])));
     double least = fmin(info->box_size[0], fmin(info->box_size[1], info->box_size[2]));
     return info->double_coordinates || !(most < 0x1p40) || !(least > 0x1p-40);
 }
@@ -24,7 +26,8 @@ static void make_frame(ebpo_subtree *s)
 {
     double most = 0;
     for (int k = 0; k < 3; k++) {
-        double low = ebpo_wall(&s->box, k, s->root.level, s->root.at[k]), high = ebpo_wall(&s->box, k, s->root.level, s->root.at[k] + 1);
+        double low = ebpo_wall(&s->box, k, s->root.level, s->root.at[k]),
+               high = ebpo_wall(&s->box, k, s->root.level, s->root.at[k] + 1);
         s->centre[k] = low / 2 + high / 2;
         most = fmax(most, high - low);
     }
@@ -41,7 +44,8 @@ static ebpo_status copy_planes(ebpo_subtree *s, const ebpo_slice *slice, ebpo_er
         planes += slice->level[i].plane_count;
     }
     if (planes > UINT32_MAX) /* what gray_first holds */
-        return ebpo_fail(error, EBPO_E_LIMIT, "the tree has too many planes to be held at once; give a memory budget");
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "the tree has too many planes to be held at once; give a memory budget");
     s->gray_planes = ebpo_alloc(planes, sizeof *s->gray_planes);
     s->gray_first = ebpo_alloc(grays + 1, sizeof *s->gray_first);
     if (!s->gray_planes || !s->gray_first)
@@ -55,7 +59,8 @@ static ebpo_status copy_planes(ebpo_subtree *s, const ebpo_slice *slice, ebpo_er
             at += level->plane_counts ? level->plane_counts[k] : 0;
         }
         if (level->plane_count)
-            memcpy(s->gray_planes + first, level->planes, level->plane_count * sizeof *s->gray_planes);
+            memcpy(s->gray_planes + first, level->planes,
+                   level->plane_count * sizeof *s->gray_planes);
     }
     s->gray_first[gray] = (uint32_t)at;
     s->gray_count = gray;
@@ -66,13 +71,17 @@ static uint64_t count_bytes(const ebpo_subtree *s)
 {
     uint64_t cells = s->nodes.grid_bits ? UINT64_C(1) << 3 * s->nodes.grid_bits : 0;
     uint64_t faces = s->face_source || s->outer ? (uint64_t)s->block_count * 8 : 0;
-    return sizeof *s + s->nodes.group_count * sizeof *s->nodes.group + cells * 5 + s->leaf_count * sizeof *s->leaf + s->list_count * sizeof *s->list +
-           s->plane_groups * sizeof *s->planes + (uint64_t)s->block_count * (EBPO_BLOCK_NUMBERS * (s->wide ? 8 : 4) + EBPO_BLOCK * 4) +
-           s->bound_count * sizeof *s->bound + (uint64_t)s->outer_count * 4 + (s->face_source ? faces * 4 : 0) +
+    return sizeof *s + s->nodes.group_count * sizeof *s->nodes.group + cells * 5 +
+           s->leaf_count * sizeof *s->leaf + s->list_count * sizeof *s->list +
+           s->plane_groups * sizeof *s->planes +
+           (uint64_t)s->block_count * (EBPO_BLOCK_NUMBERS * (s->wide ? 8 : 4) + EBPO_BLOCK * 4) +
+           s->bound_count * sizeof *s->bound + (uint64_t)s->outer_count * 4 +
+           (s->face_source ? faces * 4 : 0) +
            (s->gray_first ? (s->gray_count + s->gray_first[s->gray_count]) * 4 : 0);
 }
 
-static ebpo_status make(ebpo_subtree *s, ebpo_slice *slice, bool with_planes, unsigned threads, ebpo_error *error)
+static ebpo_status make(ebpo_subtree *s, ebpo_slice *slice, bool with_planes, unsigned threads,
+                        ebpo_error *error)
 {
     ebpo_layout layout;
     ebpo_leaf_place *places = NULL;
@@ -94,7 +103,8 @@ static ebpo_status make(ebpo_subtree *s, ebpo_slice *slice, bool with_planes, un
     return status;
 }
 
-ebpo_status ebpo_subtree_make(ebpo_subtree **out, ebpo_slice *slice, const ebpo_info *info, bool with_planes, unsigned threads, ebpo_error *error)
+ebpo_status ebpo_subtree_make(ebpo_subtree **out, ebpo_slice *slice, const ebpo_info *info,
+                              bool with_planes, unsigned threads, ebpo_error *error)
 {
     *out = NULL;
     ebpo_subtree *s = ebpo_alloc_zero(1, sizeof *s);
@@ -113,9 +123,11 @@ ebpo_status ebpo_subtree_make(ebpo_subtree **out, ebpo_slice *slice, const ebpo_
     s->outer_count = slice->outer_count;
     s->first_face = slice->first_face;
     make_frame(s);
-    ebpo_status status = slice->mesh.face_count >= EBPO_IS_BLOCK
-                             ? ebpo_fail(error, EBPO_E_LIMIT, "the model has too many faces to be held at once; give a memory budget")
-                             : make(s, slice, with_planes, threads, error);
+    ebpo_status status =
+        slice->mesh.face_count >= EBPO_IS_BLOCK
+            ? ebpo_fail(error, EBPO_E_LIMIT,
+                        "the model has too many faces to be held at once; give a memory budget")
+            : make(s, slice, with_planes, threads, error);
     s->outer = slice->outer;
     s->face_source = slice->face_source;
     slice->outer = slice->face_source = NULL;
@@ -150,12 +162,16 @@ void ebpo_subtree_free(ebpo_subtree *s)
     free(s);
 }
 
-/* Blocks are more than half full but for the last of each leaf or list; lists name at most one block for each listed face. */
-void ebpo_subtree_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep, uint64_t *peak)
+/* Blocks are more than half full but for the last of each leaf or list; lists name at most one
+ * block for each listed face. */
+void ebpo_subtree_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
+                           uint64_t *peak)
 {
     uint64_t wide = needs_doubles(info) ? 2 : 1, faces = size->new_faces + size->outer;
     uint64_t blocks = faces / 4 + 2, bounds = blocks / 3 + 2;
-    *keep = sizeof(ebpo_subtree) + size->groups * 64 + size->leaves * (sizeof(ebpo_subtree_leaf) + 64) + (size->refs + size->new_faces) * sizeof(ebpo_listed_block) +
+    *keep = sizeof(ebpo_subtree) + size->groups * 64 +
+            size->leaves * (sizeof(ebpo_subtree_leaf) + 64) +
+            (size->refs + size->new_faces) * sizeof(ebpo_listed_block) +
             blocks * (EBPO_BLOCK_NUMBERS * 4 * wide + 32) + bounds * sizeof(ebpo_bound) + faces * 8;
     *peak = *keep + size->groups * 128 + size->leaves * 64 + faces * (12 + 36 * wide + 24) + 65536;
 }

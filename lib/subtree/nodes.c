@@ -16,7 +16,8 @@ typedef struct walk {
     uint64_t group_begin[EBPO_LEVELS_MAX]; /* number of the first group of each level */
     uint64_t leaf_begin[EBPO_LEVELS_MAX];
     uint64_t list_room;
-    uint64_t *scratch;  /* blocks of one leaf, with the lanes that it lists: block << EBPO_BLOCK | lanes */
+    /* blocks of one leaf, with the lanes that it lists: block << EBPO_BLOCK | lanes */
+    uint64_t *scratch;
     uint64_t scratch_room;
     ebpo_status status;
     ebpo_error *error;
@@ -28,10 +29,7 @@ static int compare_numbers(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static bool same_block(uint64_t a, uint64_t b)
-{
-    return a >> EBPO_BLOCK == b >> EBPO_BLOCK;
-}
+static bool same_block(uint64_t a, uint64_t b) { return a >> EBPO_BLOCK == b >> EBPO_BLOCK; }
 
 static void put_list(walk *w, ebpo_subtree_leaf *leaf, uint64_t count)
 {
@@ -49,29 +47,38 @@ static void put_list(walk *w, ebpo_subtree_leaf *leaf, uint64_t count)
         return;
     }
     if (s->list_count + kept > UINT32_MAX) {
-        w->status = ebpo_fail(w->error, EBPO_E_LIMIT, "the leaves list too many faces to be held at once; give a memory budget");
+        w->status =
+            ebpo_fail(w->error, EBPO_E_LIMIT,
+                      "the leaves list too many faces to be held at once; give a memory budget");
         return;
     }
     for (uint64_t i = 0; i < kept; i++)
-        s->list[s->list_count + i] = (ebpo_listed_block){ (uint32_t)(w->scratch[i] >> EBPO_BLOCK), { 0, 0, 0 }, { 255, 255, 255 }, (uint8_t)w->scratch[i] };
+        s->list[s->list_count + i] = (ebpo_listed_block){ (uint32_t)(w->scratch[i] >> EBPO_BLOCK),
+                                                          { 0, 0, 0 },
+                                                          { 255, 255, 255 },
+                                                          (uint8_t)w->scratch[i] };
     leaf->list = (uint32_t)s->list_count;
     leaf->blocks = (uint32_t)kept;
     s->list_count += kept;
 }
 
-/* The new faces are a run of blocks; references are looked up one by one, runs within a block become one entry at once. */
+/* The new faces are a run of blocks; references are looked up one by one, runs within a block
+ * become one entry at once. */
 static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank, uint32_t number)
 {
     ebpo_subtree_leaf *leaf = &w->s->leaf[number];
     uint64_t refs = level->leaf_ref_count[rank], count = 0;
-    if (!ebpo_grow(&w->scratch, &w->scratch_room, refs + level->leaf_new[rank], sizeof *w->scratch)) {
+    if (!ebpo_grow(&w->scratch, &w->scratch_room, refs + level->leaf_new[rank],
+                   sizeof *w->scratch)) {
         w->status = ebpo_fail_memory(w->error, refs * sizeof *w->scratch);
         return;
     }
     for (uint64_t i = 0; i < refs + level->leaf_new[rank]; i++) {
-        uint64_t face = i < refs ? level->leaf_refs[w->refs[depth] + i] : level->leaf_first[rank] + (i - refs);
+        uint64_t face =
+            i < refs ? level->leaf_refs[w->refs[depth] + i] : level->leaf_first[rank] + (i - refs);
         uint32_t slot = w->slot_of[face];
-        uint64_t entry = (uint64_t)(slot / EBPO_BLOCK) << EBPO_BLOCK | UINT64_C(1) << slot % EBPO_BLOCK;
+        uint64_t entry = (uint64_t)(slot / EBPO_BLOCK) << EBPO_BLOCK | UINT64_C(1)
+                                                                           << slot % EBPO_BLOCK;
         if (count && same_block(w->scratch[count - 1], entry))
             w->scratch[count - 1] |= entry;
         else
@@ -87,7 +94,9 @@ static uint32_t settled(walk *w, const int32_t *windings, uint64_t rank, int32_t
 {
     int32_t winding = windings ? windings[rank] : usual;
     if (winding <= -EBPO_ENTRY_ZERO || winding >= EBPO_ENTRY_ZERO) {
-        w->status = ebpo_fail(w->error, EBPO_E_LIMIT, "a node's winding number is beyond 2^29: the solid has too many shells");
+        w->status =
+            ebpo_fail(w->error, EBPO_E_LIMIT,
+                      "a node's winding number is beyond 2^29: the solid has too many shells");
         return 0;
     }
     return ebpo_entry(EBPO_ENTRY_SETTLED, (uint32_t)(winding + EBPO_ENTRY_ZERO));
@@ -105,12 +114,14 @@ static uint32_t walk_node(walk *w, int depth, ebpo_node_type type, const uint32_
         return settled(w, level->black_winding, rank, 1);
     if (type == EBPO_LEAF) {
         uint32_t number = (uint32_t)(w->leaf_begin[depth] + rank);
-        w->places[number] = (ebpo_leaf_place){ { at[0], at[1], at[2] }, (uint8_t)(w->slice->root.level + depth) };
+        w->places[number] =
+            (ebpo_leaf_place){ { at[0], at[1], at[2] }, (uint8_t)(w->slice->root.level + depth) };
         fill_leaf(w, level, depth, rank, number);
         return ebpo_entry(EBPO_ENTRY_LEAF, number);
     }
     uint64_t group = w->group_begin[depth + 1] + rank;
-    if (w->slice->pruned && (depth + 1 == w->slice->level_count || w->slice->level[depth + 1].types[rank] == 0)) {
+    if (w->slice->pruned &&
+        (depth + 1 == w->slice->level_count || w->slice->level[depth + 1].types[rank] == 0)) {
         if (depth + 1 < w->slice->level_count) {
             w->rank[depth + 1][EBPO_WHITE] += 8; /* the places of its children */
             memset(w->s->nodes.group[group], 0xff, sizeof w->s->nodes.group[group]);
@@ -119,7 +130,8 @@ static uint32_t walk_node(walk *w, int depth, ebpo_node_type type, const uint32_
     }
     uint16_t types = w->slice->level[depth + 1].types[rank];
     for (unsigned octant = 0; octant < 8; octant++) {
-        uint32_t below[3] = { at[0] * 2 + (octant & 1), at[1] * 2 + (octant >> 1 & 1), at[2] * 2 + (octant >> 2) };
+        uint32_t below[3] = { at[0] * 2 + (octant & 1), at[1] * 2 + (octant >> 1 & 1),
+                              at[2] * 2 + (octant >> 2) };
         uint32_t entry = walk_node(w, depth + 1, (ebpo_node_type)(types >> 2 * octant & 3), below);
         w->s->nodes.group[group][octant] = entry;
     }
@@ -138,9 +150,11 @@ static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **slot
         leaves += slice->level[depth].leaf_count;
     }
     if (slice->level_count < EBPO_LEVELS_MAX)
-        w->group_begin[slice->level_count] = groups; /* gray nodes are numbered on where they have no groups */
+        /* gray nodes are numbered on where they have no groups */
+        w->group_begin[slice->level_count] = groups;
     if (groups >= EBPO_ENTRY_ZERO || leaves >= EBPO_ENTRY_ZERO)
-        return ebpo_fail(w->error, EBPO_E_LIMIT, "the tree has too many nodes to be held at once; give a memory budget");
+        return ebpo_fail(w->error, EBPO_E_LIMIT,
+                         "the tree has too many nodes to be held at once; give a memory budget");
     s->nodes.group = ebpo_alloc(groups, sizeof *s->nodes.group);
     s->nodes.group_count = (uint32_t)groups;
     s->leaf = ebpo_alloc_zero(leaves, sizeof *s->leaf);
@@ -156,7 +170,8 @@ static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **slot
     return EBPO_OK;
 }
 
-ebpo_status ebpo_subtree_fill_nodes(ebpo_subtree *s, const ebpo_slice *slice, const ebpo_layout *layout, ebpo_leaf_place **places,
+ebpo_status ebpo_subtree_fill_nodes(ebpo_subtree *s, const ebpo_slice *slice,
+                                    const ebpo_layout *layout, ebpo_leaf_place **places,
                                     ebpo_error *error)
 {
     walk w = { .s = s, .slice = slice, .status = EBPO_OK, .error = error };
@@ -165,7 +180,8 @@ ebpo_status ebpo_subtree_fill_nodes(ebpo_subtree *s, const ebpo_slice *slice, co
     if (status == EBPO_OK) {
         w.slot_of = slot_of;
         s->nodes.root_level = slice->root.level;
-        s->nodes.root = walk_node(&w, 0, (ebpo_node_type)(slice->level[0].types[0] & 3), slice->root.at);
+        s->nodes.root =
+            walk_node(&w, 0, (ebpo_node_type)(slice->level[0].types[0] & 3), slice->root.at);
         status = w.status;
     }
     free(slot_of);
@@ -185,7 +201,8 @@ static void paint(painter *p, uint32_t entry, int depth, uint32_t x, uint32_t y,
 {
     if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_GRAY && depth < p->bits) {
         for (unsigned octant = 0; octant < 8; octant++)
-            paint(p, p->nodes->group[ebpo_entry_value(entry)][octant], depth + 1, 2 * x + (octant & 1), 2 * y + (octant >> 1 & 1), 2 * z + (octant >> 2));
+            paint(p, p->nodes->group[ebpo_entry_value(entry)][octant], depth + 1,
+                  2 * x + (octant & 1), 2 * y + (octant >> 1 & 1), 2 * z + (octant >> 2));
         return;
     }
     int shift = p->bits - depth;

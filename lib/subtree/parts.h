@@ -4,35 +4,44 @@
 
 #include "subtree/subtree.h"
 
-/* Faces to blocks and blocks to a hierarchy: only which goes where; nothing is computed from coordinates. One walk through the tree. */
+/* Faces to blocks and blocks to a hierarchy: only which goes where; nothing is computed from
+ * coordinates. One walk through the tree. */
 typedef struct ebpo_layout {
-    uint32_t *block_begin;  /* [block_count] first local face of each block, and one past the last; all faces, in order */
+    /* [block_count] first local face of each block, and one past the last; all faces, in order */
+    uint32_t *block_begin;
     uint32_t *block_end;
     uint64_t block_count, block_room;
-    uint32_t (*child)[8];   /* [bound_count] as in ebpo_bound */
-    uint32_t *first_block;  /* [bound_count] blocks below a node are contiguous: first, and one past the last */
+    uint32_t (*child)[8]; /* [bound_count] as in ebpo_bound */
+    /* [bound_count] blocks below a node are contiguous: first, and one past the last */
+    uint32_t *first_block;
     uint32_t *last_block;
     uint64_t bound_count, bound_room, bound_room2, bound_room3, block_room2;
     uint32_t top;
 } ebpo_layout;
 
 /* EBPO_E_LIMIT for more than `most` blocks, which is EBPO_BLOCKS_MOST but in tests. */
-EBPO_MUST_USE ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, uint64_t most, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, uint64_t most,
+                                           ebpo_error *error);
 void ebpo_layout_free(ebpo_layout *layout);
 
 /* Fills blocks and slots (parallel). */
-EBPO_MUST_USE ebpo_status ebpo_subtree_fill_blocks(ebpo_subtree *s, const ebpo_slice *slice, const ebpo_layout *layout, unsigned threads,
+EBPO_MUST_USE ebpo_status ebpo_subtree_fill_blocks(ebpo_subtree *s, const ebpo_slice *slice,
+                                                   const ebpo_layout *layout, unsigned threads,
                                                    ebpo_error *error);
 /* Bounds of the hierarchy, from the blocks (parallel). */
-EBPO_MUST_USE ebpo_status ebpo_subtree_fill_bounds(ebpo_subtree *s, const ebpo_layout *layout, unsigned threads, ebpo_error *error);
-/* Child tables and leaf records with their lists of blocks (one walk). cells: [leaf_count], the position of each leaf at its level. */
+EBPO_MUST_USE ebpo_status ebpo_subtree_fill_bounds(ebpo_subtree *s, const ebpo_layout *layout,
+                                                   unsigned threads, ebpo_error *error);
+/* Child tables and leaf records with their lists of blocks (one walk). cells: [leaf_count], the
+ * position of each leaf at its level. */
 typedef struct ebpo_leaf_place {
     uint32_t at[3];
     uint8_t level;
 } ebpo_leaf_place;
-EBPO_MUST_USE ebpo_status ebpo_subtree_fill_nodes(ebpo_subtree *s, const ebpo_slice *slice, const ebpo_layout *layout, ebpo_leaf_place **places,
-                                                  ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_subtree_fill_nodes(ebpo_subtree *s, const ebpo_slice *slice,
+                                                  const ebpo_layout *layout,
+                                                  ebpo_leaf_place **places, ebpo_error *error);
 /* Free walls and kinds (parallel). */
-EBPO_MUST_USE ebpo_status ebpo_subtree_fill_kinds(ebpo_subtree *s, const ebpo_leaf_place *places, unsigned threads, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_subtree_fill_kinds(ebpo_subtree *s, const ebpo_leaf_place *places,
+                                                  unsigned threads, ebpo_error *error);
 
 #endif

@@ -1,5 +1,5 @@
-/* A subtree (or a whole tree) decoded into the form that questions are asked of: child tables, leaves with blocks of faces, and a bounding hierarchy.
- * Immutable once made; any thread. */
+/* A subtree (or a whole tree) decoded into the form that questions are asked of: child tables,
+ * leaves with blocks of faces, and a bounding hierarchy. Immutable once made; any thread. */
 #ifndef EBPO_SUBTREE_SUBTREE_H
 #define EBPO_SUBTREE_SUBTREE_H
 
@@ -15,32 +15,47 @@ typedef enum ebpo_entry_kind {
     EBPO_ENTRY_SETTLED = 0, /* white or black; value: winding number + EBPO_ENTRY_ZERO */
     EBPO_ENTRY_LEAF = 1,    /* value: number of the leaf */
     EBPO_ENTRY_GRAY = 2,    /* value: number of the group of its eight children */
-    EBPO_ENTRY_BELOW = 3    /* in the top of a tree: value: number of a subtree that is loaded on demand; in a subtree: a pruned node, of which value is the number among gray nodes */
+    /* in the top of a tree: value: number of a subtree that is loaded on demand; in a subtree: a
+       pruned node, of which value is the number among gray nodes */
+    EBPO_ENTRY_BELOW = 3
 } ebpo_entry_kind;
 enum { EBPO_ENTRY_ZERO = 1 << 29 };
 
-static inline uint32_t ebpo_entry(ebpo_entry_kind kind, uint32_t value) { return (uint32_t)kind << 30 | value; }
-static inline ebpo_entry_kind ebpo_entry_kind_of(uint32_t entry) { return (ebpo_entry_kind)(entry >> 30); }
+static inline uint32_t ebpo_entry(ebpo_entry_kind kind, uint32_t value)
+{
+    return (uint32_t)kind << 30 | value;
+}
+static inline ebpo_entry_kind ebpo_entry_kind_of(uint32_t entry)
+{
+    return (ebpo_entry_kind)(entry >> 30);
+}
 static inline uint32_t ebpo_entry_value(uint32_t entry) { return entry & 0x3fffffff; }
-static inline int32_t ebpo_entry_winding(uint32_t entry) { return (int32_t)ebpo_entry_value(entry) - EBPO_ENTRY_ZERO; }
+static inline int32_t ebpo_entry_winding(uint32_t entry)
+{
+    return (int32_t)ebpo_entry_value(entry) - EBPO_ENTRY_ZERO;
+}
 
 typedef struct ebpo_nodes {
     int root_level;       /* level of the node that `root` describes */
     uint32_t root;        /* its entry */
     uint32_t (*group)[8]; /* entries of the children, octant by octant */
     uint32_t group_count;
-    int grid_bits;        /* 0: no grid. The entry of the node that contains the cell at level root_level + grid_bits, or of this cell, */
-    uint32_t *grid;       /* at [z][y][x]; */
-    uint8_t *grid_depth;  /* and the depth of that node below the root */
+    /* 0: no grid. The entry of the node that contains the cell at level root_level + grid_bits, or
+     * of this cell, */
+    int grid_bits;
+    uint32_t *grid;      /* at [z][y][x]; */
+    uint8_t *grid_depth; /* and the depth of that node below the root */
 } ebpo_nodes;
 
-/* Makes the grid: fewer cells than about twice the groups. Optional; without memory there is none. */
+/* Makes the grid: fewer cells than about twice the groups. Optional; without memory there is none.
+ */
 void ebpo_nodes_make_grid(ebpo_nodes *nodes);
 void ebpo_nodes_free(ebpo_nodes *nodes);
 
 /* --- leaves --- */
 
-/* Kinds of leaves: extended octree (Brunet and Navazo 1990: face, edge nodes), SP-octree (Cano and Torres 2002: convex, concave). In all but general ones the planes' signs answer. */
+/* Kinds of leaves: extended octree (Brunet and Navazo 1990: face, edge nodes), SP-octree (Cano and
+ * Torres 2002: convex, concave). In all but general ones the planes' signs answer. */
 typedef enum ebpo_leaf_kind {
     EBPO_LEAF_GENERAL = 0,
     EBPO_LEAF_ONE_PLANE = 1,
@@ -50,8 +65,9 @@ typedef enum ebpo_leaf_kind {
 } ebpo_leaf_kind;
 enum { EBPO_NO_WALL = 6, EBPO_KIND_PLANES_MAX = 16 };
 
-/* A block in a leaf's list, and a box around what its faces may have in the leaf's cell: each axis from 0 to 254, rounded outward; low > high: nothing. Solids only.
- * Other faces may share the block; `lanes` tells the leaf's own. */
+/* A block in a leaf's list, and a box around what its faces may have in the leaf's cell: each axis
+ * from 0 to 254, rounded outward; low > high: nothing. Solids only. Other faces may share the
+ * block; `lanes` tells the leaf's own. */
 typedef struct ebpo_listed_block {
     uint32_t block;
     uint8_t low[3], high[3];
@@ -60,17 +76,24 @@ typedef struct ebpo_listed_block {
 enum { EBPO_LISTED_CELLS = 254 };
 
 typedef struct ebpo_subtree_leaf {
-    uint32_t list;        /* its blocks are list[list .. list + blocks - 1] of the subtree */
+    uint32_t list; /* its blocks are list[list .. list + blocks - 1] of the subtree */
     uint32_t blocks;
-    uint8_t kind;         /* ebpo_leaf_kind */
-    uint8_t wall;         /* 2 axis + side (1: upper) of a wall that no face meets, or EBPO_NO_WALL */
-    uint16_t planes;      /* of kinds other than general: number of planes, from `first_plane` on, filled up to a multiple of four */
-    int32_t winding;      /* on that wall; without one: at the lowest corner, shifted (format-spec, section 5) */
+    uint8_t kind; /* ebpo_leaf_kind */
+    /* 2 axis + side (1: upper) of a wall that no face meets, or EBPO_NO_WALL */
+    uint8_t wall;
+    /* of kinds other than general: number of planes, from `first_plane` on, filled up to a multiple
+     * of four */
+    uint16_t planes;
+    /* on that wall; without one: at the lowest corner, shifted (format-spec, section 5) */
+    int32_t winding;
     uint32_t first_plane; /* in groups of four */
-    int32_t inner, outer; /* of kinds other than general: winding number where all planes say "below", elsewhere in the cell */
+    /* of kinds other than general: winding number where all planes say "below", elsewhere in the
+     * cell */
+    int32_t inner, outer;
 } ebpo_subtree_leaf;
 
-/* Four planes n . xi - d in the cell's coordinates (0 .. 1 on each axis), |n0| + |n1| + |n2| = 1; beyond EBPO_PLANE_ERROR the sign is certain. */
+/* Four planes n . xi - d in the cell's coordinates (0 .. 1 on each axis), |n0| + |n1| + |n2| = 1;
+ * beyond EBPO_PLANE_ERROR the sign is certain. */
 typedef struct ebpo_four_planes {
     float n[3][4], d[4];
 } ebpo_four_planes;
@@ -78,18 +101,21 @@ typedef struct ebpo_four_planes {
 
 /* --- faces --- */
 
-/* Blocks of eight faces: [9][8] coordinates: x, y, z of corner 0, of corner 1, of corner 2, in the model's unit. Lanes without a face hold FLT_MAX (or DBL_MAX). */
+/* Blocks of eight faces: [9][8] coordinates: x, y, z of corner 0, of corner 1, of corner 2, in the
+ * model's unit. Lanes without a face hold FLT_MAX (or DBL_MAX). */
 enum { EBPO_BLOCK = 8, EBPO_BLOCK_NUMBERS = 72, EBPO_NO_SLOT = 0x7fffffff };
 /* At most: slots (block * EBPO_BLOCK + lane) have 32 bits. */
 enum { EBPO_BLOCKS_MOST = 1 << 29 };
 
 /* --- bounding hierarchy over the blocks --- */
 
-/* Eight children, each within a box and within a round slab (a cylinder): what a curved sheet needs for its distance to be told apart from its neighbours'.
- * In the subtree's own frame: (x - centre) * scale, about -1 .. 1; rounded outward. Children that are not there: empty boxes at infinity. */
+/* Eight children, each within a box and within a round slab (a cylinder): what a curved sheet needs
+ * for its distance to be told apart from its neighbours'. In the subtree's own frame: (x - centre)
+ * * scale, about -1 .. 1; rounded outward. Children that are not there: empty boxes at infinity. */
 typedef struct ebpo_bound {
     float low[3][8], high[3][8];
-    float axis[3][8], middle[3][8], radius[8], half[8]; /* |(x - middle) . axis| <= half, and at most radius away from the axis */
+    /* |(x - middle) . axis| <= half, and at most radius away from the axis */
+    float axis[3][8], middle[3][8], radius[8], half[8];
     uint32_t child[8]; /* number of a node, or of a block with EBPO_IS_BLOCK */
 } ebpo_bound;
 #define EBPO_IS_BLOCK UINT32_C(0x80000000)
@@ -97,8 +123,8 @@ typedef struct ebpo_bound {
 
 typedef struct ebpo_subtree {
     ebpo_place root;
-    ebpo_box box;          /* of the whole model */
-    int deepest;           /* level of its deepest nodes */
+    ebpo_box box; /* of the whole model */
+    int deepest;  /* level of its deepest nodes */
     bool solid, has_planes;
     ebpo_nodes nodes;
     ebpo_subtree_leaf *leaf;
@@ -107,40 +133,47 @@ typedef struct ebpo_subtree {
     uint64_t list_count;
     ebpo_four_planes *planes;
     uint64_t plane_groups;
-    bool wide;             /* blocks hold doubles */
-    float *block32;        /* [block_count][72], or NULL */
+    bool wide;      /* blocks hold doubles */
+    float *block32; /* [block_count][72], or NULL */
     double *block64;
     uint32_t block_count;
-    uint32_t *slot_face;   /* [block_count][8] local numbers; EBPO_NO_SLOT: no face */
+    uint32_t *slot_face; /* [block_count][8] local numbers; EBPO_NO_SLOT: no face */
     double centre[3], scale;
     ebpo_bound *bound;
     uint32_t bound_count;
-    uint32_t top;          /* the root of the hierarchy */
+    uint32_t top; /* the root of the hierarchy */
     uint32_t outer_count;
     uint32_t *outer;       /* numbers in the file of faces that are new elsewhere */
     uint64_t first_face;   /* the others: first_face + local - outer_count */
     uint32_t *face_source; /* [local] or NULL */
-    uint32_t *gray_planes; /* codes of gray nodes' planes, group numbers' order; only for subtrees loaded on demand */
-    uint32_t *gray_first;  /* [group_count + 1]: planes of the gray node whose children are group g */
+    /* codes of gray nodes' planes, group numbers' order; only for subtrees loaded on demand */
+    uint32_t *gray_planes;
+    /* [group_count + 1]: planes of the gray node whose children are group g */
+    uint32_t *gray_first;
     uint64_t gray_count;
     uint64_t kinds[5], one_wall;
-    uint64_t bytes;        /* of memory, all in all */
+    uint64_t bytes; /* of memory, all in all */
 } ebpo_subtree;
 
-/* Makes it from a slice, which is consumed (freed, also on failure). `with_planes`: keep gray nodes' planes. `threads` 0: all cores. */
-EBPO_MUST_USE ebpo_status ebpo_subtree_make(ebpo_subtree **out, ebpo_slice *slice, const ebpo_info *info, bool with_planes, unsigned threads,
-                                            ebpo_error *error);
+/* Makes it from a slice, which is consumed (freed, also on failure). `with_planes`: keep gray
+ * nodes' planes. `threads` 0: all cores. */
+EBPO_MUST_USE ebpo_status ebpo_subtree_make(ebpo_subtree **out, ebpo_slice *slice,
+                                            const ebpo_info *info, bool with_planes,
+                                            unsigned threads, ebpo_error *error);
 void ebpo_subtree_free(ebpo_subtree *subtree);
 
-/* Bytes that the subtree will take, and that making it will take at most (the slice included). Bounds from counts. */
-void ebpo_subtree_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep, uint64_t *peak);
+/* Bytes that the subtree will take, and that making it will take at most (the slice included).
+ * Bounds from counts. */
+void ebpo_subtree_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
+                           uint64_t *peak);
 
 /* A face's corners. */
 static inline void ebpo_subtree_triangle(const ebpo_subtree *s, uint32_t slot, double out[3][3])
 {
     uint64_t at = (uint64_t)(slot / EBPO_BLOCK) * EBPO_BLOCK_NUMBERS + slot % EBPO_BLOCK;
     for (int i = 0; i < 9; i++)
-        out[i / 3][i % 3] = s->wide ? s->block64[at + (uint64_t)i * EBPO_BLOCK] : (double)s->block32[at + (uint64_t)i * EBPO_BLOCK];
+        out[i / 3][i % 3] = s->wide ? s->block64[at + (uint64_t)i * EBPO_BLOCK]
+                                    : (double)s->block32[at + (uint64_t)i * EBPO_BLOCK];
 }
 
 static inline uint64_t ebpo_subtree_file_face(const ebpo_subtree *s, uint32_t local)

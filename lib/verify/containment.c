@@ -1,17 +1,18 @@
-/* How far the part of a face in its cell reaches in direction n is a linear program; by weak duality, for any vector m
- *     n . x <= max over the face's corners of (n - m) . v  +  max over the unit cube of m . x,
- * and some m makes it an equality: 0, or one that levels n on an edge of the face by one wall, or on the face by two walls. So rounded m still give
- * certain bounds, and nothing has to be clipped. What stays undecided is clipped in rationals. */
+/* How far the part of a face in its cell reaches in direction n is a linear program; by weak
+ * duality, for any vector m n . x <= max over the face's corners of (n - m) . v  +  max over the
+ * unit cube of m . x, and some m makes it an equality: 0, or one that levels n on an edge of the
+ * face by one wall, or on the face by two walls. So rounded m still give certain bounds, and
+ * nothing has to be clipped. What stays undecided is clipped in rationals. */
 #include "geom/strict_fp.h"
 
 #include "verify/containment.h"
 
 #include <math.h>
 
-
 static const double eps = 0x1p-53;
 
-void ebpo_half_spaces_of(ebpo_half_spaces *out, const ebpo_tree_view *view, const ebpo_tree_view_node *node)
+void ebpo_half_spaces_of(ebpo_half_spaces *out, const ebpo_tree_view *view,
+                         const ebpo_tree_view_node *node)
 {
     uint32_t count;
     const uint32_t *codes = ebpo_view_planes(view, node, &count);
@@ -56,10 +57,10 @@ static bool certified_by_wall(const ebpo_local *face, const double n[3], double 
 {
     for (int i = 0; i < 3; i++) {
         const double *a = face->at[i], *b = face->at[(i + 1) % 3];
-        double edge[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+        double edge[3] = { b[0] - a[0], b[1] - a[1], b[2] - a[2] };
         double rise = dot(n, edge);
         for (int k = 0; k < 3; k++) {
-            double m[3] = {0, 0, 0};
+            double m[3] = { 0, 0, 0 };
             m[k] = rise / edge[k];
             if (edge[k] != 0 && certified(face, n, m, bound))
                 return true;
@@ -97,11 +98,12 @@ static bool corner_beyond(const ebpo_local *face, const double n[3], double boun
     return false;
 }
 
-static bool face_keeps(ebpo_tally *tally, const ebpo_half_spaces *planes, int i, const ebpo_frame *frame,
-                       const ebpo_corners *face, const ebpo_local *local)
+static bool face_keeps(ebpo_tally *tally, const ebpo_half_spaces *planes, int i,
+                       const ebpo_frame *frame, const ebpo_corners *face, const ebpo_local *local)
 {
     const double *n = planes->n[i];
-    double bound = planes->bound[i], error = 16 * eps * 511 * fmax(local->reach[0], fmax(local->reach[1], local->reach[2]));
+    double bound = planes->bound[i],
+           error = 16 * eps * 511 * fmax(local->reach[0], fmax(local->reach[1], local->reach[2]));
     if (highest(local, n) <= bound - error)
         return true;
     if (corner_beyond(local, n, bound, error))
@@ -112,19 +114,22 @@ static bool face_keeps(ebpo_tally *tally, const ebpo_half_spaces *planes, int i,
     return ebpo_exact_half_space(frame->low, frame->high, face, planes->normal[i], planes->d[i]);
 }
 
-void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_half_spaces *planes, const ebpo_tree_view_node *node,
-                               const ebpo_frame *frame, const ebpo_corners *face, uint64_t number)
+void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_half_spaces *planes,
+                               const ebpo_tree_view_node *node, const ebpo_frame *frame,
+                               const ebpo_corners *face, uint64_t number)
 {
     ebpo_local local;
     ebpo_local_make(&local, frame, face);
     tally->checks[EBPO_VERIFY_CONTAINMENT] += (uint64_t)planes->count;
     for (int i = 0; i < planes->count; i++)
         if (!face_keeps(tally, planes, i, frame, face, &local))
-            ebpo_tally_violation(tally, EBPO_VERIFY_CONTAINMENT, &(ebpo_verify_place){node->code, number, planes->number[i]},
+            ebpo_tally_violation(tally, EBPO_VERIFY_CONTAINMENT,
+                                 &(ebpo_verify_place){ node->code, number, planes->number[i] },
                                  "the plane cuts off a part of the face in the cell");
 }
 
-void ebpo_check_corners_contained(ebpo_tally *tally, const ebpo_half_spaces *planes, const ebpo_tree_view_node *node, unsigned corners)
+void ebpo_check_corners_contained(ebpo_tally *tally, const ebpo_half_spaces *planes,
+                                  const ebpo_tree_view_node *node, unsigned corners)
 {
     for (int i = 0; i < planes->count; i++)
         for (unsigned corner = 0; corner < 8; corner++) {
@@ -136,7 +141,9 @@ void ebpo_check_corners_contained(ebpo_tally *tally, const ebpo_half_spaces *pla
                 value += corner >> k & 1 ? n[k] : 0;
             tally->checks[EBPO_VERIFY_CONTAINMENT]++;
             if (4096 * value > planes->d[i])
-                ebpo_tally_violation(tally, EBPO_VERIFY_CONTAINMENT, &(ebpo_verify_place){node->code, EBPO_NO_FACE, planes->number[i]},
-                                     "the plane cuts off corner %u of the cell, which lies in the solid", corner);
+                ebpo_tally_violation(
+                    tally, EBPO_VERIFY_CONTAINMENT,
+                    &(ebpo_verify_place){ node->code, EBPO_NO_FACE, planes->number[i] },
+                    "the plane cuts off corner %u of the cell, which lies in the solid", corner);
         }
 }

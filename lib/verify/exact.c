@@ -1,5 +1,6 @@
-/* A triangle is clipped by the six walls, one after the other (Sutherland and Hodgman, "Reentrant polygon clipping", 1974). With exact numbers and
- * closed half-spaces the corners that remain span the intersection, down to a single point of contact. */
+/* A triangle is clipped by the six walls, one after the other (Sutherland and Hodgman, "Reentrant
+ * polygon clipping", 1974). With exact numbers and closed half-spaces the corners that remain span
+ * the intersection, down to a single point of contact. */
 #include "geom/strict_fp.h"
 
 #include "verify/exact.h"
@@ -28,7 +29,8 @@ static void polygon_clear(polygon *g)
             mpq_clear(g->at[i][k]);
 }
 
-static void set_triangle(polygon *g, const double low[3], const double high[3], const ebpo_corners *face)
+static void set_triangle(polygon *g, const double low[3], const double high[3],
+                         const ebpo_corners *face)
 {
     mpq_t first, size;
     mpq_inits(first, size, NULL);
@@ -88,7 +90,8 @@ static void clip(polygon *out, polygon *in, int axis, int wall)
 }
 
 /* Leaves the intersection in *g. */
-static void clip_to_box(polygon *g, const double low[3], const double high[3], const ebpo_corners *face)
+static void clip_to_box(polygon *g, const double low[3], const double high[3],
+                        const ebpo_corners *face)
 {
     polygon other;
     polygon_init(&other);
@@ -124,7 +127,8 @@ static bool corner_satisfies(mpq_t at[3], const int32_t n[3], int32_t d)
     return holds;
 }
 
-bool ebpo_exact_half_space(const double low[3], const double high[3], const ebpo_corners *face, const int32_t n[3], int32_t d)
+bool ebpo_exact_half_space(const double low[3], const double high[3], const ebpo_corners *face,
+                           const int32_t n[3], int32_t d)
 {
     polygon g;
     polygon_init(&g);

@@ -16,7 +16,9 @@ __extension__ typedef unsigned __int128 wide;
 static uint64_t usual_samples(const ebpo_tree_view *view, uint64_t cells)
 {
     uint64_t samples = cells <= CELLS_ALL ? cells : SAMPLES_MANY;
-    return ebpo_rays_work(&view->tree->mesh, &view->box, samples) <= ray_work_affordable ? samples : SAMPLES_LEAST;
+    return ebpo_rays_work(&view->tree->mesh, &view->box, samples) <= ray_work_affordable
+               ? samples
+               : SAMPLES_LEAST;
 }
 
 void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_tree_view *view, uint64_t samples)
@@ -35,12 +37,16 @@ void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_tree_view *view, uin
     }
     if (samples == 0)
         samples = usual_samples(view, all);
-    /* Half of the samples go to the classes evenly, so that small levels are seen too; half by size. */
+    /* Half of the samples go to the classes evenly, so that small levels are seen too; half by
+     * size. */
     for (int l = 0; l < view->tree->info.level_count; l++)
         for (int type = 0; type <= EBPO_GRAY; type++) {
             uint64_t cells = plan->cells[l][type];
-            uint64_t share = cells == 0 ? 0
-                : samples / (2 * classes) + (uint64_t)((double)samples / 2 * ((double)cells / (double)all)) + 1;
+            uint64_t share =
+                cells == 0
+                    ? 0
+                    : samples / (2 * classes) +
+                          (uint64_t)((double)samples / 2 * ((double)cells / (double)all)) + 1;
             plan->take[l][type] = samples >= all || share > cells ? cells : share;
         }
 }
@@ -48,7 +54,8 @@ void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_tree_view *view, uin
 /* True for `take` of the `cells` ranks, evenly spread. */
 static bool planned(const ebpo_label_plan *plan, const ebpo_tree_view_node *node)
 {
-    uint64_t cells = plan->cells[node->cell.level][node->type], take = plan->take[node->cell.level][node->type];
+    uint64_t cells = plan->cells[node->cell.level][node->type],
+             take = plan->take[node->cell.level][node->type];
     if (take >= cells)
         return true;
     return (wide)(node->rank + 1) * take / cells != (wide)node->rank * take / cells;
@@ -60,9 +67,12 @@ static void corner_position(const ebpo_frame *frame, unsigned corner, double out
         out[k] = corner >> k & 1 ? frame->high[k] : frame->low[k];
 }
 
-/* Changes of the winding number that one face makes along seven cell edges: a tree that reaches all corners from corner 0. */
-static const struct { unsigned char from, to, axis; } edge_tree[7] = {
-    {0, 1, 0}, {0, 2, 1}, {0, 4, 2}, {2, 3, 0}, {4, 5, 0}, {4, 6, 1}, {6, 7, 0}};
+/* Changes of the winding number that one face makes along seven cell edges: a tree that reaches all
+ * corners from corner 0. */
+static const struct {
+    unsigned char from, to, axis;
+} edge_tree[7] = { { 0, 1, 0 }, { 0, 2, 1 }, { 0, 4, 2 }, { 2, 3, 0 },
+                   { 4, 5, 0 }, { 4, 6, 1 }, { 6, 7, 0 } };
 
 static void add_crossings(int64_t change[7], const ebpo_frame *frame, const ebpo_corners *face)
 {
@@ -70,14 +80,16 @@ static void add_crossings(int64_t change[7], const ebpo_frame *frame, const ebpo
         double from[3], to[3];
         corner_position(frame, edge_tree[e].from, from);
         corner_position(frame, edge_tree[e].to, to);
-        change[e] += ebpo_ray_hit(to, edge_tree[e].axis, face) - ebpo_ray_hit(from, edge_tree[e].axis, face);
+        change[e] +=
+            ebpo_ray_hit(to, edge_tree[e].axis, face) - ebpo_ray_hit(from, edge_tree[e].axis, face);
     }
 }
 
-void ebpo_terminal_windings(ebpo_corner_windings *out, const ebpo_tree_view *view, const ebpo_tree_view_node *node,
-                            const ebpo_frame *frame, const uint32_t *faces, uint64_t count)
+void ebpo_terminal_windings(ebpo_corner_windings *out, const ebpo_tree_view *view,
+                            const ebpo_tree_view_node *node, const ebpo_frame *frame,
+                            const uint32_t *faces, uint64_t count)
 {
-    int64_t first = ebpo_view_winding(view, node), change[7] = {0};
+    int64_t first = ebpo_view_winding(view, node), change[7] = { 0 };
     for (int i = 0; i < 8; i++)
         out->at[i] = first;
     out->known = node->type == EBPO_LEAF && !view->has_mesh ? 1 : 255;
@@ -92,24 +104,31 @@ void ebpo_terminal_windings(ebpo_corner_windings *out, const ebpo_tree_view *vie
         out->at[edge_tree[e].to] = out->at[edge_tree[e].from] + change[e];
 }
 
-void ebpo_check_terminal_label(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo_tree_view_node *node)
+void ebpo_check_terminal_label(ebpo_tally *tally, const ebpo_tree_view *view,
+                               const ebpo_tree_view_node *node)
 {
     if (node->type == EBPO_LEAF)
         return;
     int64_t told = ebpo_view_winding(view, node);
     tally->checks[EBPO_VERIFY_LABELS]++;
     if (ebpo_view_inside(view, told) != (node->type == EBPO_BLACK))
-        ebpo_tally_violation(tally, EBPO_VERIFY_LABELS, &(ebpo_verify_place){node->code, EBPO_NO_FACE, EBPO_NO_PLANE},
-                             "%s, but winding number %" PRId64 " lies %s by the file's rule", node->type == EBPO_BLACK ? "black" : "white",
-                             told, node->type == EBPO_BLACK ? "outside" : "inside");
+        ebpo_tally_violation(tally, EBPO_VERIFY_LABELS,
+                             &(ebpo_verify_place){ node->code, EBPO_NO_FACE, EBPO_NO_PLANE },
+                             "%s, but winding number %" PRId64 " lies %s by the file's rule",
+                             node->type == EBPO_BLACK ? "black" : "white", told,
+                             node->type == EBPO_BLACK ? "outside" : "inside");
 }
 
-bool ebpo_label_note(ebpo_ray_points *points, const ebpo_tree_view *view, const ebpo_tree_view_node *node, const ebpo_frame *frame,
+bool ebpo_label_note(ebpo_ray_points *points, const ebpo_tree_view *view,
+                     const ebpo_tree_view_node *node, const ebpo_frame *frame,
                      const ebpo_label_plan *plan)
 {
     if (!planned(plan, node))
         return true;
-    ebpo_ray_point p = {{frame->low[0], frame->low[1], frame->low[2]}, node->code, ebpo_view_winding(view, node), 0};
+    ebpo_ray_point p = { { frame->low[0], frame->low[1], frame->low[2] },
+                         node->code,
+                         ebpo_view_winding(view, node),
+                         0 };
     return ebpo_rays_add(points, &p);
 }
 
@@ -119,8 +138,11 @@ void ebpo_check_rays(ebpo_tally *tally, const ebpo_ray_points *points)
     for (uint64_t i = 0; i < points->count; ebpo_workspace_settle_at(points->workspace, i++)) {
         const ebpo_ray_point *p = &points->point[i];
         if (p->found != p->told)
-            ebpo_tally_violation(tally, EBPO_VERIFY_LABELS, &(ebpo_verify_place){p->octcode, EBPO_NO_FACE, EBPO_NO_PLANE},
-                                 "winding number %" PRId64 " is stored, a ray through the mesh finds %" PRId64, p->told, p->found);
+            ebpo_tally_violation(tally, EBPO_VERIFY_LABELS,
+                                 &(ebpo_verify_place){ p->octcode, EBPO_NO_FACE, EBPO_NO_PLANE },
+                                 "winding number %" PRId64
+                                 " is stored, a ray through the mesh finds %" PRId64,
+                                 p->told, p->found);
     }
 }
 
@@ -133,12 +155,12 @@ static int shared_point(unsigned octant, unsigned corner)
     return point;
 }
 
-void ebpo_check_links(ebpo_tally *tally, const ebpo_tree_view_node *node, const ebpo_corner_windings children[8],
-                      ebpo_corner_windings *out)
+void ebpo_check_links(ebpo_tally *tally, const ebpo_tree_view_node *node,
+                      const ebpo_corner_windings children[8], ebpo_corner_windings *out)
 {
     int64_t value[27];
-    bool known[27] = {false};
-    *out = (ebpo_corner_windings){{0}, 0};
+    bool known[27] = { false };
+    *out = (ebpo_corner_windings){ { 0 }, 0 };
     for (unsigned octant = 0; octant < 8; octant++)
         for (unsigned corner = 0; corner < 8; corner++) {
             int point = shared_point(octant, corner);
@@ -147,9 +169,13 @@ void ebpo_check_links(ebpo_tally *tally, const ebpo_tree_view_node *node, const 
             int64_t here = children[octant].at[corner];
             tally->checks[EBPO_VERIFY_LABELS] += known[point];
             if (known[point] && value[point] != here) {
-                ebpo_verify_place place = {ebpo_octcode_child(node->code, octant), EBPO_NO_FACE, EBPO_NO_PLANE};
-                ebpo_tally_violation(tally, EBPO_VERIFY_LABELS, &place, "winding number %" PRId64 " at corner %u, a neighbour gives %"
-                                     PRId64 " for the same point", here, corner, value[point]);
+                ebpo_verify_place place = { ebpo_octcode_child(node->code, octant), EBPO_NO_FACE,
+                                            EBPO_NO_PLANE };
+                ebpo_tally_violation(tally, EBPO_VERIFY_LABELS, &place,
+                                     "winding number %" PRId64
+                                     " at corner %u, a neighbour gives %" PRId64
+                                     " for the same point",
+                                     here, corner, value[point]);
             }
             if (!known[point])
                 value[point] = here;
@@ -169,8 +195,11 @@ void ebpo_check_root_corners(ebpo_tally *tally, const ebpo_corner_windings *root
             continue;
         tally->checks[EBPO_VERIFY_LABELS]++;
         if (root->at[i] != 0)
-            ebpo_tally_violation(tally, EBPO_VERIFY_LABELS, &(ebpo_verify_place){1, EBPO_NO_FACE, EBPO_NO_PLANE},
-                                 "corner %u of the root cell has winding number %" PRId64 ", but lies outside", i, root->at[i]);
+            ebpo_tally_violation(tally, EBPO_VERIFY_LABELS,
+                                 &(ebpo_verify_place){ 1, EBPO_NO_FACE, EBPO_NO_PLANE },
+                                 "corner %u of the root cell has winding number %" PRId64
+                                 ", but lies outside",
+                                 i, root->at[i]);
     }
 }
 
@@ -178,6 +207,7 @@ unsigned ebpo_windings_inside(const ebpo_tree_view *view, const ebpo_corner_wind
 {
     unsigned inside = 0;
     for (unsigned i = 0; i < 8; i++)
-        inside |= (unsigned)((corners->known >> i & 1) && ebpo_view_inside(view, corners->at[i])) << i;
+        inside |= (unsigned)((corners->known >> i & 1) && ebpo_view_inside(view, corners->at[i]))
+                  << i;
     return inside;
 }

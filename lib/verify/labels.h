@@ -1,9 +1,12 @@
 /* Labels: winding numbers of the cells' corners.
  *
- * Two proofs. (1) By links, for all cells: equal points must have equal winding numbers whichever cell tells them. A cell without faces has one number for
- * all its corners; a leaf gives one for its lowest corner and the others follow by signed crossings along its edges; the 64 corners of a gray node's
- * children are 27 points. The root's corners are outside. As every cell is linked to the root that way, all numbers are right when all links hold
- * (and the lists are complete, which is checked elsewhere). (2) By rays through the whole mesh, for all cells or a sample, without any of that.
+ * Two proofs. (1) By links, for all cells: equal points must have equal winding numbers whichever
+ * cell tells them. A cell without faces has one number for all its corners; a leaf gives one for
+ * its lowest corner and the others follow by signed crossings along its edges; the 64 corners of a
+ * gray node's children are 27 points. The root's corners are outside. As every cell is linked to
+ * the root that way, all numbers are right when all links hold (and the lists are complete, which
+ * is checked elsewhere). (2) By rays through the whole mesh, for all cells or a sample, without any
+ * of that.
  */
 #ifndef EBPO_VERIFY_LABELS_H
 #define EBPO_VERIFY_LABELS_H
@@ -28,21 +31,25 @@ typedef struct ebpo_label_plan {
 void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_tree_view *view, uint64_t samples);
 
 /* Corner windings of a leaf, white or black node; `faces`: the `count` faces that touch it. */
-void ebpo_terminal_windings(ebpo_corner_windings *out, const ebpo_tree_view *view, const ebpo_tree_view_node *node,
-                            const ebpo_frame *frame, const uint32_t *faces, uint64_t count);
+void ebpo_terminal_windings(ebpo_corner_windings *out, const ebpo_tree_view *view,
+                            const ebpo_tree_view_node *node, const ebpo_frame *frame,
+                            const uint32_t *faces, uint64_t count);
 
 /* White outside, black inside. */
-void ebpo_check_terminal_label(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo_tree_view_node *node);
+void ebpo_check_terminal_label(ebpo_tally *tally, const ebpo_tree_view *view,
+                               const ebpo_tree_view_node *node);
 
-/* Where the plan says so, puts the cell's lowest corner on the list of points to be checked by rays. False when memory is short. */
-EBPO_MUST_USE bool ebpo_label_note(ebpo_ray_points *points, const ebpo_tree_view *view, const ebpo_tree_view_node *node, const ebpo_frame *frame,
+/* Where the plan says so, puts the cell's lowest corner on the list of points to be checked by
+ * rays. False when memory is short. */
+EBPO_MUST_USE bool ebpo_label_note(ebpo_ray_points *points, const ebpo_tree_view *view,
+                                   const ebpo_tree_view_node *node, const ebpo_frame *frame,
                                    const ebpo_label_plan *plan);
 /* Compares what rays found with what the file says. */
 void ebpo_check_rays(ebpo_tally *tally, const ebpo_ray_points *points);
 
 /* Compares the children of a gray node with each other and gives the node's own corners. */
-void ebpo_check_links(ebpo_tally *tally, const ebpo_tree_view_node *node, const ebpo_corner_windings children[8],
-                      ebpo_corner_windings *out);
+void ebpo_check_links(ebpo_tally *tally, const ebpo_tree_view_node *node,
+                      const ebpo_corner_windings children[8], ebpo_corner_windings *out);
 
 /* The root's corners are outside. */
 void ebpo_check_root_corners(ebpo_tally *tally, const ebpo_corner_windings *root);

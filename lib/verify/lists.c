@@ -8,9 +8,11 @@
 #include "verify/touch.h"
 #include "verify/winding.h"
 
-static void unlisted(ebpo_tally *tally, const ebpo_tree_view_node *node, uint32_t face, const char *text)
+static void unlisted(ebpo_tally *tally, const ebpo_tree_view_node *node, uint32_t face,
+                     const char *text)
 {
-    ebpo_tally_violation(tally, EBPO_VERIFY_LISTS, &(ebpo_verify_place){node->code, face, EBPO_NO_PLANE}, "%s", text);
+    ebpo_tally_violation(tally, EBPO_VERIFY_LISTS,
+                         &(ebpo_verify_place){ node->code, face, EBPO_NO_PLANE }, "%s", text);
 }
 
 /* The list in ascending order: references, then the new range (the file's shape was checked). */
@@ -23,7 +25,8 @@ typedef struct face_list {
 static face_list list_of(const ebpo_tree_view *view, const ebpo_tree_view_node *leaf)
 {
     const ebpo_level *level = &view->tree->level[leaf->cell.level];
-    face_list list = {.first = level->leaf_first[leaf->rank], .new_count = level->leaf_new[leaf->rank]};
+    face_list list = { .first = level->leaf_first[leaf->rank],
+                       .new_count = level->leaf_new[leaf->rank] };
     list.refs = ebpo_view_refs(view, leaf, &list.ref_count);
     return list;
 }
@@ -36,8 +39,10 @@ static bool among(const uint32_t *faces, uint64_t count, uint32_t face)
     return false;
 }
 
-/* A listed face that does not touch the leaf must touch it widened by 1/256: level-limited distances rest on that. */
-static void check_near(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo_tree_view_node *leaf, uint32_t face)
+/* A listed face that does not touch the leaf must touch it widened by 1/256: level-limited
+ * distances rest on that. */
+static void check_near(ebpo_tally *tally, const ebpo_tree_view *view,
+                       const ebpo_tree_view_node *leaf, uint32_t face)
 {
     ebpo_frame frame = ebpo_frame_make(&view->box, leaf->cell);
     ebpo_corners corners;
@@ -52,8 +57,9 @@ static void check_near(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo
         unlisted(tally, leaf, face, "the leaf lists a face that does not come near it");
 }
 
-static void check_spare(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo_tree_view_node *leaf, const face_list *list, const uint32_t *faces,
-                        uint64_t count)
+static void check_spare(ebpo_tally *tally, const ebpo_tree_view *view,
+                        const ebpo_tree_view_node *leaf, const face_list *list,
+                        const uint32_t *faces, uint64_t count)
 {
     for (uint32_t i = 0; i < list->ref_count; i++)
         if (!among(faces, count, list->refs[i]))
@@ -63,7 +69,8 @@ static void check_spare(ebpo_tally *tally, const ebpo_tree_view *view, const ebp
             check_near(tally, view, leaf, (uint32_t)(list->first + i));
 }
 
-static void check_leaf(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo_tree_view_node *leaf, const uint32_t *faces, uint64_t count)
+static void check_leaf(ebpo_tally *tally, const ebpo_tree_view *view,
+                       const ebpo_tree_view_node *leaf, const uint32_t *faces, uint64_t count)
 {
     face_list list = list_of(view, leaf);
     uint64_t found = 0;
@@ -72,7 +79,8 @@ static void check_leaf(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo
         uint32_t face = faces[i];
         while (at < list.ref_count && list.refs[at] < face)
             at++;
-        bool listed = (at < list.ref_count && list.refs[at] == face) || (face >= list.first && face - list.first < list.new_count);
+        bool listed = (at < list.ref_count && list.refs[at] == face) ||
+                      (face >= list.first && face - list.first < list.new_count);
         found += listed;
         if (!listed)
             unlisted(tally, leaf, face, "the face touches the leaf, which does not list it");
@@ -81,7 +89,8 @@ static void check_leaf(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo
         if (list.refs[i] <= list.refs[i - 1])
             unlisted(tally, leaf, list.refs[i], "the list names the face twice or not in order");
     if (list.ref_count && list.refs[list.ref_count - 1] >= list.first)
-        unlisted(tally, leaf, list.refs[list.ref_count - 1], "the list refers to a face that is not below its first new face");
+        unlisted(tally, leaf, list.refs[list.ref_count - 1],
+                 "the list refers to a face that is not below its first new face");
     tally->checks[EBPO_VERIFY_LISTS] += count + list.ref_count + list.new_count;
     uint64_t spare = (uint64_t)list.ref_count + list.new_count - found;
     tally->spare_entries += spare;
@@ -89,8 +98,9 @@ static void check_leaf(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo
         check_spare(tally, view, leaf, &list, faces, count);
 }
 
-void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo_tree_view_node *node,
-                               const uint32_t *faces, uint64_t count)
+void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_tree_view *view,
+                               const ebpo_tree_view_node *node, const uint32_t *faces,
+                               uint64_t count)
 {
     if (node->type == EBPO_LEAF) {
         check_leaf(tally, view, node, faces, count);
@@ -98,7 +108,9 @@ void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_tree_view *view, co
     }
     tally->checks[EBPO_VERIFY_LISTS] += count ? count : 1;
     for (uint64_t i = 0; i < count; i++)
-        unlisted(tally, node, faces[i], node->type == EBPO_WHITE ? "the face touches a white cell" : "the face touches a black cell");
+        unlisted(tally, node, faces[i],
+                 node->type == EBPO_WHITE ? "the face touches a white cell"
+                                          : "the face touches a black cell");
 }
 
 /* Faces listed below a node, repeated as they come. */
@@ -113,7 +125,8 @@ static void gather(gathering *g, const ebpo_tree_view *view, const ebpo_tree_vie
     if (node->type == EBPO_LEAF) {
         face_list list = list_of(view, node);
         uint64_t more = (uint64_t)list.ref_count + list.new_count;
-        if (g->short_of_memory || !ebpo_grow(&g->faces, &g->capacity, g->count + more, sizeof *g->faces)) {
+        if (g->short_of_memory ||
+            !ebpo_grow(&g->faces, &g->capacity, g->count + more, sizeof *g->faces)) {
             g->short_of_memory = true;
             return;
         }
@@ -134,9 +147,10 @@ static int compare_numbers(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-bool ebpo_lists_more_faces(const ebpo_tree_view *view, const ebpo_tree_view_node *node, uint64_t limit)
+bool ebpo_lists_more_faces(const ebpo_tree_view *view, const ebpo_tree_view_node *node,
+                           uint64_t limit)
 {
-    gathering g = {0};
+    gathering g = { 0 };
     gather(&g, view, node);
     if (g.count)
         qsort(g.faces, g.count, sizeof *g.faces, compare_numbers);
@@ -144,5 +158,6 @@ bool ebpo_lists_more_faces(const ebpo_tree_view *view, const ebpo_tree_view_node
     for (uint64_t i = 1; i < g.count; i++)
         different += g.faces[i] != g.faces[i - 1];
     free(g.faces);
-    return different > limit || g.short_of_memory; /* memory that is short proves nothing against the file */
+    /* memory that is short proves nothing against the file */
+    return different > limit || g.short_of_memory;
 }

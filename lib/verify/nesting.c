@@ -10,7 +10,8 @@ enum { NODES_PER_LEVEL = 256, POINTS_PER_NODE = 8, POINT_BITS = 16 };
 
 __extension__ typedef __int128 wide;
 
-static void check_codes(ebpo_tally *tally, const ebpo_tree_view *view, int l, ebpo_node_type type, const uint8_t *counts)
+static void check_codes(ebpo_tally *tally, const ebpo_tree_view *view, int l, ebpo_node_type type,
+                        const uint8_t *counts)
 {
     const ebpo_level *level = &view->tree->level[l];
     for (uint64_t group = 0; group < level->group_count; ebpo_settle_all_at(group++))
@@ -20,15 +21,20 @@ static void check_codes(ebpo_tally *tally, const ebpo_tree_view *view, int l, eb
             uint64_t rank = view->groups[l][group].of_type[type];
             for (unsigned i = 0; i < octant; i++)
                 rank += ebpo_view_type(level, group, i) == type;
-            ebpo_tree_view_node node = {.group = group, .octant = octant, .type = type, .rank = rank, .cell.level = l};
+            ebpo_tree_view_node node = {
+                .group = group, .octant = octant, .type = type, .rank = rank, .cell.level = l
+            };
             uint32_t count;
             const uint32_t *codes = counts[rank] ? ebpo_view_planes(view, &node, &count) : NULL;
             for (uint32_t i = 0; i < counts[rank]; i++) {
                 int32_t n[3], d;
                 tally->checks[EBPO_VERIFY_NESTING]++;
                 if (!ebpo_plane_decode(codes[i], n, &d))
-                    ebpo_tally_violation(tally, EBPO_VERIFY_NESTING, &(ebpo_verify_place){ebpo_view_at(view, l, group, octant).code,
-                                         EBPO_NO_FACE, i}, "the code %08x stands for no plane", (unsigned)codes[i]);
+                    ebpo_tally_violation(tally, EBPO_VERIFY_NESTING,
+                                         &(ebpo_verify_place){
+                                             ebpo_view_at(view, l, group, octant).code,
+                                             EBPO_NO_FACE, i },
+                                         "the code %08x stands for no plane", (unsigned)codes[i]);
             }
         }
 }
@@ -44,11 +50,14 @@ static void chain_to(chain *out, const ebpo_tree_view *view, const ebpo_tree_vie
     out->depth = end->cell.level;
     out->node[0] = ebpo_view_root(view);
     for (int l = 1; l <= out->depth; l++)
-        out->node[l] = ebpo_view_child(view, &out->node[l - 1], (unsigned)(end->code >> 3 * (out->depth - l) & 7));
+        out->node[l] = ebpo_view_child(view, &out->node[l - 1],
+                                       (unsigned)(end->code >> 3 * (out->depth - l) & 7));
 }
 
-/* The point (in 2^-16 of the cell `at`) against a plane of the cell `above`, in the coordinates of `above`. */
-static bool keeps_above(const ebpo_cell *above, const ebpo_cell *at, const int64_t point[3], const int32_t n[3], int64_t d)
+/* The point (in 2^-16 of the cell `at`) against a plane of the cell `above`, in the coordinates of
+ * `above`. */
+static bool keeps_above(const ebpo_cell *above, const ebpo_cell *at, const int64_t point[3],
+                        const int32_t n[3], int64_t d)
 {
     int down = at->level - above->level;
     wide sum = 0;
@@ -60,7 +69,8 @@ static bool keeps_above(const ebpo_cell *above, const ebpo_cell *at, const int64
 }
 
 /* The same, with the plane taken down level by level as readers do. */
-static bool keeps_below(const chain *c, int from, int to, const int64_t point[3], const int32_t n[3], int64_t d)
+static bool keeps_below(const chain *c, int from, int to, const int64_t point[3],
+                        const int32_t n[3], int64_t d)
 {
     for (int l = from + 1; l <= to; l++)
         d = ebpo_plane_to_child(n, d, c->node[l].octant);
@@ -70,7 +80,8 @@ static bool keeps_below(const chain *c, int from, int to, const int64_t point[3]
     return 4096 * sum <= (wide)d * (1 << POINT_BITS);
 }
 
-static void check_point(ebpo_tally *tally, const ebpo_tree_view *view, const chain *c, const int64_t point[3])
+static void check_point(ebpo_tally *tally, const ebpo_tree_view *view, const chain *c,
+                        const int64_t point[3])
 {
     const ebpo_cell *at = &c->node[c->depth].cell;
     for (int l = 0; l < c->depth; l++) {
@@ -81,29 +92,38 @@ static void check_point(ebpo_tally *tally, const ebpo_tree_view *view, const cha
             if (!ebpo_plane_decode(codes[i], n, &d))
                 continue;
             tally->checks[EBPO_VERIFY_NESTING]++;
-            if (keeps_above(&c->node[l].cell, at, point, n, d) != keeps_below(c, l, c->depth, point, n, d))
-                ebpo_tally_violation(tally, EBPO_VERIFY_NESTING, &(ebpo_verify_place){c->node[c->depth].code, EBPO_NO_FACE, i},
-                                     "a point of the cell is on different sides of a plane of level %d in the coordinates of the "
-                                     "two cells", l);
+            if (keeps_above(&c->node[l].cell, at, point, n, d) !=
+                keeps_below(c, l, c->depth, point, n, d))
+                ebpo_tally_violation(tally, EBPO_VERIFY_NESTING,
+                                     &(ebpo_verify_place){ c->node[c->depth].code, EBPO_NO_FACE,
+                                                           i },
+                                     "a point of the cell is on different sides of a plane of "
+                                     "level %d in the coordinates of the "
+                                     "two cells",
+                                     l);
         }
     }
 }
 
 /* Walls of a cell are walls or the middle of its parent, as doubles too. */
-static void check_walls(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo_tree_view_node *node)
+static void check_walls(ebpo_tally *tally, const ebpo_tree_view *view,
+                        const ebpo_tree_view_node *node)
 {
     int level = node->cell.level;
     bool same = true;
     for (int k = 0; k < 3; k++) {
         uint32_t even = node->cell.at[k] & ~1u, at = node->cell.at[k];
-        same &= ebpo_wall(&view->box, k, level, even) == ebpo_wall(&view->box, k, level - 1, even / 2) &&
-                ebpo_wall(&view->box, k, level, even + 2) == ebpo_wall(&view->box, k, level - 1, even / 2 + 1) &&
+        same &= ebpo_wall(&view->box, k, level, even) ==
+                    ebpo_wall(&view->box, k, level - 1, even / 2) &&
+                ebpo_wall(&view->box, k, level, even + 2) ==
+                    ebpo_wall(&view->box, k, level - 1, even / 2 + 1) &&
                 ebpo_wall(&view->box, k, level, at + 1) - ebpo_wall(&view->box, k, level, at) ==
-                view->box.size[k] / (double)(1u << level);
+                    view->box.size[k] / (double)(1u << level);
     }
     tally->checks[EBPO_VERIFY_NESTING]++;
     if (!same)
-        ebpo_tally_violation(tally, EBPO_VERIFY_NESTING, &(ebpo_verify_place){node->code, EBPO_NO_FACE, EBPO_NO_PLANE},
+        ebpo_tally_violation(tally, EBPO_VERIFY_NESTING,
+                             &(ebpo_verify_place){ node->code, EBPO_NO_FACE, EBPO_NO_PLANE },
                              "the walls of the cell are not walls of its parent's grid");
 }
 
@@ -116,7 +136,8 @@ static uint64_t next_random(uint64_t *state)
 }
 
 /* Random points of the cell, and its corners. */
-static void check_node(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo_tree_view_node *node)
+static void check_node(ebpo_tally *tally, const ebpo_tree_view *view,
+                       const ebpo_tree_view_node *node)
 {
     chain c;
     chain_to(&c, view, node);
@@ -143,8 +164,11 @@ void ebpo_check_nesting(ebpo_tally *tally, const ebpo_tree_view *view)
             check_codes(tally, view, l, EBPO_LEAF, level->leaf_plane_counts);
         uint64_t cells = 8 * level->group_count;
         for (uint64_t i = 0; l > 0 && i < NODES_PER_LEVEL && i < cells; i++) {
-            uint64_t cell = cells <= NODES_PER_LEVEL ? i : (uint64_t)((wide)cells * i / NODES_PER_LEVEL) + i % 8;
-            ebpo_tree_view_node node = ebpo_view_at(view, l, (cell % cells) / 8, (unsigned)(cell % 8));
+            uint64_t cell = cells <= NODES_PER_LEVEL
+                                ? i
+                                : (uint64_t)((wide)cells * i / NODES_PER_LEVEL) + i % 8;
+            ebpo_tree_view_node node =
+                ebpo_view_at(view, l, (cell % cells) / 8, (unsigned)(cell % 8));
             check_node(tally, view, &node);
         }
     }

@@ -24,7 +24,8 @@ typedef struct columns {
 
 bool ebpo_rays_add(ebpo_ray_points *points, const ebpo_ray_point *point)
 {
-    if (!ebpo_array_grow(points->workspace, &points->point, &points->capacity, points->count + 1, sizeof *points->point))
+    if (!ebpo_array_grow(points->workspace, &points->point, &points->capacity, points->count + 1,
+                         sizeof *points->point))
         return false;
     points->point[points->count++] = *point;
     return true;
@@ -93,7 +94,8 @@ static ebpo_status sort_points(columns *c, ebpo_ray_points *points, ebpo_error *
     }
     for (uint64_t i = 0; i < points->count; ebpo_workspace_settle_often(points->workspace, i++))
         sorted[c->first[column_of_point(c, &points->point[i])]++] = points->point[i];
-    memmove(c->first + 1, c->first, cells * sizeof *c->first); /* each had moved on to the next one's beginning */
+    /* each had moved on to the next one's beginning */
+    memmove(c->first + 1, c->first, cells * sizeof *c->first);
     c->first[0] = 0;
     ebpo_array_free(points->point);
     points->point = c->point = sorted;
@@ -111,7 +113,8 @@ static void look(const columns *c, const ebpo_corners *face, uint64_t begin, uin
     }
 }
 
-static ebpo_status follow(void *context, uint64_t begin, uint64_t end, unsigned worker, ebpo_error *error)
+static ebpo_status follow(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                          ebpo_error *error)
 {
     const columns *c = context;
     (void)worker;
@@ -121,22 +124,26 @@ static ebpo_status follow(void *context, uint64_t begin, uint64_t end, unsigned 
         ebpo_corners face;
         ebpo_face_corners(c->mesh, f, &face);
         column_range r = columns_of_face(c, &face);
-        for (uint64_t z = r.from[1]; z <= r.to[1]; z++, ebpo_workspace_settle_often(c->mesh->workspace, ++rows)) /* the columns of a row stand side by side */
+        for (uint64_t z = r.from[1]; z <= r.to[1];
+             z++, ebpo_workspace_settle_often(c->mesh->workspace,
+                                              ++rows)) /* the columns of a row stand side by side */
             look(c, &face, c->first[z * c->side + r.from[0]], c->first[z * c->side + r.to[0] + 1]);
     }
     ebpo_workspace_settle(c->mesh->workspace);
     return EBPO_OK;
 }
 
-ebpo_status ebpo_rays_follow(ebpo_ray_points *points, const ebpo_mesh *mesh, const ebpo_box *box, unsigned threads,
-                             const ebpo_progress *progress, ebpo_error *error)
+ebpo_status ebpo_rays_follow(ebpo_ray_points *points, const ebpo_mesh *mesh, const ebpo_box *box,
+                             unsigned threads, const ebpo_progress *progress, ebpo_error *error)
 {
     columns c = grid_for(mesh, box, points->count);
     ebpo_status status = sort_points(&c, points, error);
-    for (uint64_t i = 0; i < points->count && status == EBPO_OK; ebpo_workspace_settle_at(points->workspace, i++))
+    for (uint64_t i = 0; i < points->count && status == EBPO_OK;
+         ebpo_workspace_settle_at(points->workspace, i++))
         c.point[i].found = 0;
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, mesh->face_count, FACE_GRAIN, follow, &c, progress, "following rays", error);
+        status = ebpo_parallel_for(threads, mesh->face_count, FACE_GRAIN, follow, &c, progress,
+                                   "following rays", error);
     free(c.first);
     return status;
 }

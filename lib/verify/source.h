@@ -4,9 +4,13 @@
 
 #include "verify/tally.h"
 
-/* Does the recorded mending again on a copy of `source` and compares bit for bit. `stored`: the file's mesh; `ordered`: it is in the source's order
- * (else vertices and faces are compared as multisets). NULL: the file is a subset; its faces and vertices are compared with those of their numbers in the source. */
-EBPO_MUST_USE ebpo_status ebpo_check_source(ebpo_tally *tally, ebpo_file *file, const ebpo_mesh *stored, bool ordered, const ebpo_mesh *source,
-                                            unsigned threads, ebpo_error *error);
+/* Does the recorded mending again on a copy of `source` and compares bit for bit. `stored`: the
+ * file's mesh; `ordered`: it is in the source's order (else vertices and faces are compared as
+ * multisets). NULL: the file is a subset; its faces and vertices are compared with those of their
+ * numbers in the source. */
+EBPO_MUST_USE ebpo_status ebpo_check_source(ebpo_tally *tally, ebpo_file *file,
+                                            const ebpo_mesh *stored, bool ordered,
+                                            const ebpo_mesh *source, unsigned threads,
+                                            ebpo_error *error);
 
 #endif

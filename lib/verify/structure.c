@@ -12,16 +12,18 @@
 
 static bool head_shape(ebpo_tally *tally, const ebpo_info *info)
 {
-    if (!CHECK(info->level_count >= 1 && info->level_count <= EBPO_LEVELS_MAX, "the file has %d levels; 1 to %d are possible",
-               info->level_count, EBPO_LEVELS_MAX))
+    if (!CHECK(info->level_count >= 1 && info->level_count <= EBPO_LEVELS_MAX,
+               "the file has %d levels; 1 to %d are possible", info->level_count, EBPO_LEVELS_MAX))
         return false;
-    ebpo_box box = {.grid_level = info->grid_level};
+    ebpo_box box = { .grid_level = info->grid_level };
     for (int k = 0; k < 3; k++) {
         box.origin[k] = info->box_origin[k];
         box.size[k] = info->box_size[k];
     }
-    return CHECK(ebpo_box_valid(&box), "the root box is not on a dyadic grid down to level %d", info->grid_level) &&
-           CHECK(info->level_count - 1 <= info->grid_level, "level %d lies below the grid level %d, where cells are not exact",
+    return CHECK(ebpo_box_valid(&box), "the root box is not on a dyadic grid down to level %d",
+                 info->grid_level) &&
+           CHECK(info->level_count - 1 <= info->grid_level,
+                 "level %d lies below the grid level %d, where cells are not exact",
                  info->level_count - 1, info->grid_level) &&
            CHECK((unsigned)info->rule <= EBPO_RULE_POSITIVE, "unknown rule %d", (int)info->rule);
 }
@@ -30,42 +32,49 @@ static bool types_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
 {
     const ebpo_level *level = &tree->level[l];
     uint64_t groups = l == 0 ? 1 : tree->level[l - 1].gray_count;
-    if (!CHECK(level->group_count == groups, "level %d has %" PRIu64 " groups of siblings for %" PRIu64 " gray nodes above", l,
+    if (!CHECK(level->group_count == groups,
+               "level %d has %" PRIu64 " groups of siblings for %" PRIu64 " gray nodes above", l,
                level->group_count, groups) ||
         !CHECK(level->types || groups == 0, "level %d has no types", l))
         return false;
-    uint64_t count[4] = {0};
+    uint64_t count[4] = { 0 };
     for (uint64_t group = 0; group < groups; ebpo_settle_all_at(group++))
         for (unsigned octant = 0; octant < (l == 0 ? 1u : 8u); octant++)
             count[ebpo_view_type(level, group, octant)]++;
     return CHECK(count[EBPO_GRAY] == level->gray_count && count[EBPO_LEAF] == level->leaf_count &&
-                 count[EBPO_WHITE] == level->white_count && count[EBPO_BLACK] == level->black_count,
+                     count[EBPO_WHITE] == level->white_count &&
+                     count[EBPO_BLACK] == level->black_count,
                  "level %d: the types do not add up to its counts of nodes", l) &&
-           CHECK(l + 1 < tree->info.level_count || level->gray_count == 0 || tree->info.pruned, "level %d, the last one, has gray nodes", l);
+           CHECK(l + 1 < tree->info.level_count || level->gray_count == 0 || tree->info.pruned,
+                 "level %d, the last one, has gray nodes", l);
 }
 
 /* Per-node counts and the array they share out. */
-static bool counted_shape(ebpo_tally *tally, int l, const char *what, uint64_t nodes, const uint8_t *counts, uint64_t total,
-                          const uint32_t *items)
+static bool counted_shape(ebpo_tally *tally, int l, const char *what, uint64_t nodes,
+                          const uint8_t *counts, uint64_t total, const uint32_t *items)
 {
-    if (!CHECK((counts || nodes == 0) && (items || total == 0), "level %d: %s are missing", l, what))
+    if (!CHECK((counts || nodes == 0) && (items || total == 0), "level %d: %s are missing", l,
+               what))
         return false;
     uint64_t sum = 0;
     for (uint64_t i = 0; i < nodes; ebpo_settle_all_at(i++))
         sum += counts[i];
-    return CHECK(sum == total, "level %d: counts of %s sum to %" PRIu64 ", but there are %" PRIu64, l, what, sum, total);
+    return CHECK(sum == total, "level %d: counts of %s sum to %" PRIu64 ", but there are %" PRIu64,
+                 l, what, sum, total);
 }
 
 static bool windings_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
 {
     const ebpo_level *level = &tree->level[l];
     if (tree->info.solid)
-        return CHECK(level->leaf_winding || level->leaf_count == 0, "level %d: winding numbers of leaves are missing", l);
+        return CHECK(level->leaf_winding || level->leaf_count == 0,
+                     "level %d: winding numbers of leaves are missing", l);
     return CHECK(!level->leaf_winding && !level->black_winding && !level->white_winding,
                  "level %d: a surface has no winding numbers", l);
 }
 
-static bool leaf_faces_in_range(const ebpo_level *level, uint64_t leaf, uint64_t first_ref, uint64_t face_count)
+static bool leaf_faces_in_range(const ebpo_level *level, uint64_t leaf, uint64_t first_ref,
+                                uint64_t face_count)
 {
     uint64_t first = level->leaf_first[leaf];
     if (first > face_count || level->leaf_new[leaf] > face_count - first)
@@ -80,24 +89,30 @@ static bool leaf_faces_in_range(const ebpo_level *level, uint64_t leaf, uint64_t
 static bool lists_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
 {
     const ebpo_level *level = &tree->level[l];
-    if (!CHECK((level->leaf_first && level->leaf_new && level->leaf_ref_count) || level->leaf_count == 0,
+    if (!CHECK((level->leaf_first && level->leaf_new && level->leaf_ref_count) ||
+                   level->leaf_count == 0,
                "level %d: face lists of leaves are missing", l) ||
-        !CHECK(level->leaf_refs || level->ref_count == 0, "level %d: back-references are missing", l))
+        !CHECK(level->leaf_refs || level->ref_count == 0, "level %d: back-references are missing",
+               l))
         return false;
     uint64_t refs = 0, fresh = 0;
     for (uint64_t leaf = 0; leaf < level->leaf_count; ebpo_settle_all_at(leaf++)) {
         refs += level->leaf_ref_count[leaf];
         fresh += level->leaf_new[leaf];
     }
-    if (!CHECK(refs == level->ref_count && fresh == level->new_count, "level %d: lists hold %" PRIu64 " new faces and %" PRIu64
-               " references, counts say %" PRIu64 " and %" PRIu64, l, fresh, refs, level->new_count, level->ref_count))
+    if (!CHECK(refs == level->ref_count && fresh == level->new_count,
+               "level %d: lists hold %" PRIu64 " new faces and %" PRIu64
+               " references, counts say %" PRIu64 " and %" PRIu64,
+               l, fresh, refs, level->new_count, level->ref_count))
         return false;
     refs = 0;
     bool ok = true;
     for (uint64_t leaf = 0; leaf < level->leaf_count; ebpo_settle_all_at(leaf++)) {
-        ok &= CHECK(leaf_faces_in_range(level, leaf, refs, tree->mesh.face_count),
-                    "level %d, leaf %" PRIu64 ": its list leaves the faces, or its references do not ascend below its first new face",
-                    l, leaf);
+        ok &= CHECK(
+            leaf_faces_in_range(level, leaf, refs, tree->mesh.face_count),
+            "level %d, leaf %" PRIu64
+            ": its list leaves the faces, or its references do not ascend below its first new face",
+            l, leaf);
         refs += level->leaf_ref_count[leaf];
     }
     return ok;
@@ -106,12 +121,17 @@ static bool lists_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
 static bool mesh_shape(ebpo_tally *tally, const ebpo_tree *tree)
 {
     const ebpo_mesh *mesh = &tree->mesh;
-    if (!CHECK(mesh->vertex_count == tree->info.vertex_count && mesh->face_count == tree->info.face_count,
-               "the mesh has %" PRIu64 " vertices and %" PRIu64 " faces, the head says %" PRIu64 " and %" PRIu64, mesh->vertex_count,
-               mesh->face_count, tree->info.vertex_count, tree->info.face_count) ||
-        !CHECK(!!mesh->xyz32 != !!mesh->xyz64 && mesh->faces && mesh->vertex_count < UINT32_MAX && mesh->face_count < UINT32_MAX,
+    if (!CHECK(mesh->vertex_count == tree->info.vertex_count &&
+                   mesh->face_count == tree->info.face_count,
+               "the mesh has %" PRIu64 " vertices and %" PRIu64 " faces, the head says %" PRIu64
+               " and %" PRIu64,
+               mesh->vertex_count, mesh->face_count, tree->info.vertex_count,
+               tree->info.face_count) ||
+        !CHECK(!!mesh->xyz32 != !!mesh->xyz64 && mesh->faces && mesh->vertex_count < UINT32_MAX &&
+                   mesh->face_count < UINT32_MAX,
                "the mesh has no vertices or no faces") ||
-        !CHECK(!!mesh->xyz64 == tree->info.double_coordinates, "the head and the mesh differ about the kind of coordinates"))
+        !CHECK(!!mesh->xyz64 == tree->info.double_coordinates,
+               "the head and the mesh differ about the kind of coordinates"))
         return false;
     uint64_t outside = 0, infinite = 0;
     for (uint64_t i = 0; i < 3 * mesh->face_count; ebpo_settle_all_at(i++))
@@ -121,7 +141,9 @@ static bool mesh_shape(ebpo_tally *tally, const ebpo_tree *tree)
         ebpo_mesh_position(mesh, i, p);
         infinite += !isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2]);
     }
-    bool corners_fine = CHECK(outside == 0, "%" PRIu64 " corners of faces name vertices that do not exist", outside);
+    bool corners_fine =
+        CHECK(outside == 0, "%" PRIu64 " corners of faces name vertices that do not exist",
+              outside);
     return CHECK(infinite == 0, "%" PRIu64 " vertices are not finite", infinite) && corners_fine;
 }
 
@@ -134,10 +156,12 @@ bool ebpo_check_shape(ebpo_tally *tally, const ebpo_tree *tree)
         const ebpo_level *level = &tree->level[l];
         if (!types_shape(tally, tree, l) || !windings_shape(tally, tree, l) ||
             ((parts & EBPO_PART_MESH) && !lists_shape(tally, tree, l)) ||
-            ((parts & EBPO_PART_PLANES) && !counted_shape(tally, l, "planes", level->gray_count, level->plane_counts,
-                                                          level->plane_count, level->planes)) ||
-            ((parts & EBPO_PART_LEAF_PLANES) && !counted_shape(tally, l, "leaf planes", level->leaf_count, level->leaf_plane_counts,
-                                                               level->leaf_plane_count, level->leaf_planes)))
+            ((parts & EBPO_PART_PLANES) &&
+             !counted_shape(tally, l, "planes", level->gray_count, level->plane_counts,
+                            level->plane_count, level->planes)) ||
+            ((parts & EBPO_PART_LEAF_PLANES) &&
+             !counted_shape(tally, l, "leaf planes", level->leaf_count, level->leaf_plane_counts,
+                            level->leaf_plane_count, level->leaf_planes)))
             return false;
     }
     return true;

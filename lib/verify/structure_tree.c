@@ -11,11 +11,13 @@
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
 
-/* A volume cannot be more than that of the cells it lies in; the slack is for the rounding of sums. Coordinates beyond about 1e102 or below 1e-102 have
- * volumes that no double holds: the format leaves those unspecified. */
+/* A volume cannot be more than that of the cells it lies in; the slack is for the rounding of sums.
+ * Coordinates beyond about 1e102 or below 1e-102 have volumes that no double holds: the format
+ * leaves those unspecified. */
 static bool volume_possible(double volume, uint64_t cells, int l, const ebpo_info *info)
 {
-    double cell = ldexp(info->box_size[0], -l) * ldexp(info->box_size[1], -l) * ldexp(info->box_size[2], -l);
+    double cell =
+        ldexp(info->box_size[0], -l) * ldexp(info->box_size[1], -l) * ldexp(info->box_size[2], -l);
     if (!isnormal(cell))
         return true;
     return volume >= 0 && volume <= (double)cells * cell * (1 + 1e-6);
@@ -26,17 +28,19 @@ static void check_summary(ebpo_tally *tally, const ebpo_tree *tree, int l)
     const ebpo_level *level = &tree->level[l];
     const ebpo_level_summary *told = &tree->info.level[l];
     CHECK(told->gray_count == level->gray_count && told->leaf_count == level->leaf_count &&
-          told->white_count == level->white_count && told->black_count == level->black_count,
+              told->white_count == level->white_count && told->black_count == level->black_count,
           "level %d: the head's counts of nodes differ from the level's", l);
-    CHECK(told->plane_count == level->plane_count && told->leaf_plane_count == level->leaf_plane_count,
+    CHECK(told->plane_count == level->plane_count &&
+              told->leaf_plane_count == level->leaf_plane_count,
           "level %d: the head's counts of planes differ from the level's", l);
     CHECK(told->new_count == level->new_count && told->ref_count == level->ref_count,
           "level %d: the head's counts of faces differ from the level's", l);
     CHECK(told->gray_volume == level->gray_volume && told->leaf_volume == level->leaf_volume,
           "level %d: the head's volumes differ from the level's", l);
     CHECK(volume_possible(level->gray_volume, level->gray_count, l, &tree->info) &&
-          volume_possible(level->leaf_volume, level->leaf_count, l, &tree->info),
-          "level %d: envelopes of volume %g and %g do not fit their cells", l, level->gray_volume, level->leaf_volume);
+              volume_possible(level->leaf_volume, level->leaf_count, l, &tree->info),
+          "level %d: envelopes of volume %g and %g do not fit their cells", l, level->gray_volume,
+          level->leaf_volume);
 }
 
 typedef struct descent {
@@ -51,7 +55,9 @@ static void node_check(descent *d, const ebpo_tree_view_node *node, bool holds, 
 {
     d->tally->checks[EBPO_VERIFY_STRUCTURE]++;
     if (!holds)
-        ebpo_tally_violation(d->tally, EBPO_VERIFY_STRUCTURE, &(ebpo_verify_place){node->code, EBPO_NO_FACE, EBPO_NO_PLANE}, "%s", text);
+        ebpo_tally_violation(d->tally, EBPO_VERIFY_STRUCTURE,
+                             &(ebpo_verify_place){ node->code, EBPO_NO_FACE, EBPO_NO_PLANE }, "%s",
+                             text);
 }
 
 static void check_leaf(descent *d, const ebpo_tree_view_node *leaf)
@@ -61,8 +67,9 @@ static void check_leaf(descent *d, const ebpo_tree_view_node *leaf)
     if (!d->view->has_mesh)
         return;
     uint64_t listed = (uint64_t)level->leaf_new[leaf->rank] + level->leaf_ref_count[leaf->rank];
-    node_check(d, leaf, level->leaf_first[leaf->rank] == d->next_face,
-               "the leaf's new faces do not follow those of the leaf before it in depth-first order");
+    node_check(
+        d, leaf, level->leaf_first[leaf->rank] == d->next_face,
+        "the leaf's new faces do not follow those of the leaf before it in depth-first order");
     node_check(d, leaf, listed > 0, "the leaf lists no face");
     node_check(d, leaf, leaf->cell.level >= info->max_level || listed <= info->leaf_faces,
                "the leaf lists more faces than a leaf above the maximum level may");
@@ -78,7 +85,8 @@ static void check_node(descent *d, const ebpo_tree_view_node *node)
     else if (node->type == EBPO_GRAY)
         check_gray(d, node);
     else if (node->type == EBPO_BLACK)
-        node_check(d, node, d->view->tree->info.solid, "a surface has no inside, but the node is black");
+        node_check(d, node, d->view->tree->info.solid,
+                   "a surface has no inside, but the node is black");
 }
 
 static void check_gray(descent *d, const ebpo_tree_view_node *node)
@@ -87,7 +95,8 @@ static void check_gray(descent *d, const ebpo_tree_view_node *node)
         d->pruned[node->cell.level]++;
         return;
     }
-    node_check(d, node, node->cell.level < d->view->tree->info.max_level, "a node at the maximum level is gray");
+    node_check(d, node, node->cell.level < d->view->tree->info.max_level,
+               "a node at the maximum level is gray");
     bool touched = false;
     ebpo_settle_all_at(d->grays++);
     for (unsigned octant = 0; octant < 8; octant++) {
@@ -112,7 +121,10 @@ static void check_vertices(ebpo_tally *tally, const ebpo_tree_view *view)
         outside += !within;
         first = within ? first : i;
     }
-    CHECK(outside == 0, "%" PRIu64 " corners of faces are not strictly inside the root box, face %" PRIu64 " first", outside, first / 3);
+    CHECK(outside == 0,
+          "%" PRIu64 " corners of faces are not strictly inside the root box, face %" PRIu64
+          " first",
+          outside, first / 3);
 }
 
 static uint64_t mix(uint64_t x)
@@ -122,13 +134,15 @@ static uint64_t mix(uint64_t x)
     return x ^ x >> 31;
 }
 
-/* A sum of signed random values, one for each undirected edge: it vanishes when directions cancel, and else but for one case in 2^64. */
+/* A sum of signed random values, one for each undirected edge: it vanishes when directions cancel,
+ * and else but for one case in 2^64. */
 static bool edges_balance(const ebpo_mesh *mesh)
 {
     uint64_t sum = 0;
     for (uint64_t f = 0; f < mesh->face_count; ebpo_settle_all_at(f++))
         for (int i = 0; i < 3; i++) {
-            uint64_t a = mesh->faces[3 * f + (uint64_t)i], b = mesh->faces[3 * f + (uint64_t)(i + 1) % 3];
+            uint64_t a = mesh->faces[3 * f + (uint64_t)i],
+                     b = mesh->faces[3 * f + (uint64_t)(i + 1) % 3];
             uint64_t value = a < b ? mix(a << 32 | b) : -mix(b << 32 | a);
             sum += a == b ? 0 : value;
         }
@@ -140,16 +154,19 @@ void ebpo_check_structure(ebpo_tally *tally, const ebpo_tree_view *view)
     const ebpo_tree *tree = view->tree;
     for (int l = 0; l < tree->info.level_count; l++)
         check_summary(tally, tree, l);
-    descent d = {.tally = tally, .view = view};
+    descent d = { .tally = tally, .view = view };
     ebpo_tree_view_node root = ebpo_view_root(view);
     check_node(&d, &root);
     for (int l = 0; l < tree->info.level_count; l++)
-        CHECK(d.pruned[l] == tree->info.level[l].pruned_count, "level %d: %" PRIu64 " nodes are pruned, the head says %" PRIu64, l, d.pruned[l],
+        CHECK(d.pruned[l] == tree->info.level[l].pruned_count,
+              "level %d: %" PRIu64 " nodes are pruned, the head says %" PRIu64, l, d.pruned[l],
               tree->info.level[l].pruned_count);
     if (!view->has_mesh)
         return;
-    CHECK(d.next_face == tree->mesh.face_count, "leaves list %" PRIu64 " of %" PRIu64 " faces", d.next_face, tree->mesh.face_count);
+    CHECK(d.next_face == tree->mesh.face_count, "leaves list %" PRIu64 " of %" PRIu64 " faces",
+          d.next_face, tree->mesh.face_count);
     check_vertices(tally, view);
     if (tree->info.solid && !tree->info.pruned) /* a part of a mesh need not balance */
-        CHECK(edges_balance(&tree->mesh), "the file says solid, but the directions of the mesh's edges do not cancel");
+        CHECK(edges_balance(&tree->mesh),
+              "the file says solid, but the directions of the mesh's edges do not cancel");
 }

@@ -7,10 +7,7 @@
 
 #include "morton/octcode.h"
 
-static int compare_u64(uint64_t a, uint64_t b)
-{
-    return (a > b) - (a < b);
-}
+static int compare_u64(uint64_t a, uint64_t b) { return (a > b) - (a < b); }
 
 static int compare_places(const ebpo_verify_place *a, const ebpo_verify_place *b)
 {
@@ -26,22 +23,27 @@ static int print_place(char *out, size_t size, const ebpo_verify_place *place)
     int length = 0;
     const char *comma = "";
     if (place->octcode) {
-        length += snprintf(out, size, "level %d, octcode 0o%" PRIo64, ebpo_octcode_level(place->octcode), place->octcode);
+        length += snprintf(out, size, "level %d, octcode 0o%" PRIo64,
+                           ebpo_octcode_level(place->octcode), place->octcode);
         comma = ", ";
     }
     if (place->face != EBPO_NO_FACE) {
-        length += snprintf(out + length, size - (size_t)length, "%sface %" PRIu64, comma, place->face);
+        length +=
+            snprintf(out + length, size - (size_t)length, "%sface %" PRIu64, comma, place->face);
         comma = ", ";
     }
     if (place->plane != EBPO_NO_PLANE)
-        length += snprintf(out + length, size - (size_t)length, "%splane %" PRIu32, comma, place->plane);
+        length +=
+            snprintf(out + length, size - (size_t)length, "%splane %" PRIu32, comma, place->plane);
     if (length)
         length += snprintf(out + length, size - (size_t)length, ": ");
     return length;
 }
 
-/* Equal places (two findings about one node) are told apart by their text, so that merging does not depend on order. */
-static void record(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verify_place *place, const char *text)
+/* Equal places (two findings about one node) are told apart by their text, so that merging does not
+ * depend on order. */
+static void record(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verify_place *place,
+                   const char *text)
 {
     int order = tally->violations[kind] ? compare_places(place, &tally->place[kind]) : -1;
     tally->violations[kind]++;
@@ -51,7 +53,8 @@ static void record(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verify_p
     }
 }
 
-static void record_va(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verify_place *place, const char *format, va_list args)
+static void record_va(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verify_place *place,
+                      const char *format, va_list args)
 {
     char text[sizeof tally->first[kind]];
     int length = print_place(text, sizeof text, place);
@@ -59,10 +62,12 @@ static void record_va(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verif
     record(tally, kind, place, text);
 }
 
-void ebpo_tally_violation(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verify_place *place, const char *format, ...)
+void ebpo_tally_violation(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verify_place *place,
+                          const char *format, ...)
 {
     if (tally->violations[kind] && compare_places(place, &tally->place[kind]) > 0) {
-        tally->violations[kind]++; /* damaged files have millions of these: no text for what is not kept */
+        /* damaged files have millions of these: no text for what is not kept */
+        tally->violations[kind]++;
         return;
     }
     va_list args;
@@ -78,7 +83,7 @@ bool ebpo_tally_check(ebpo_tally *tally, ebpo_verify_kind kind, bool holds, cons
         return true;
     va_list args;
     va_start(args, format);
-    record_va(tally, kind, &(ebpo_verify_place){0, EBPO_NO_FACE, EBPO_NO_PLANE}, format, args);
+    record_va(tally, kind, &(ebpo_verify_place){ 0, EBPO_NO_FACE, EBPO_NO_PLANE }, format, args);
     va_end(args);
     return false;
 }
@@ -99,9 +104,11 @@ void ebpo_tally_merge(ebpo_tally *into, const ebpo_tally *from)
 
 void ebpo_tally_report(const ebpo_tally *tally, ebpo_verify_report *report)
 {
-    *report = (ebpo_verify_report){0};
-    ebpo_verify_count *count[EBPO_VERIFY_KINDS] = {&report->structure, &report->content, &report->containment,
-                                                   &report->nesting, &report->labels, &report->lists, &report->source};
+    *report = (ebpo_verify_report){ 0 };
+    ebpo_verify_count *count[EBPO_VERIFY_KINDS] = { &report->structure,   &report->content,
+                                                    &report->containment, &report->nesting,
+                                                    &report->labels,      &report->lists,
+                                                    &report->source };
     for (int kind = 0; kind < EBPO_VERIFY_KINDS; kind++) {
         count[kind]->checks = tally->checks[kind];
         count[kind]->violations = tally->violations[kind];

@@ -1,4 +1,5 @@
-/* Counting checks and violations, and keeping the first violation of each kind in file order, whichever thread finds it. */
+/* Counting checks and violations, and keeping the first violation of each kind in file order,
+ * whichever thread finds it. */
 #ifndef EBPO_VERIFY_TALLY_H
 #define EBPO_VERIFY_TALLY_H
 
@@ -15,10 +16,11 @@ typedef enum ebpo_verify_kind {
     EBPO_VERIFY_KINDS
 } ebpo_verify_kind;
 
-#define EBPO_NO_FACE UINT64_MAX
+#define EBPO_NO_FACE  UINT64_MAX
 #define EBPO_NO_PLANE UINT32_MAX
 
-/* Where a violation is. Octcode 0: the file as a whole. File order is the order of these fields (octcodes order nodes breadth-first). */
+/* Where a violation is. Octcode 0: the file as a whole. File order is the order of these fields
+ * (octcodes order nodes breadth-first). */
 typedef struct ebpo_verify_place {
     uint64_t octcode;
     uint64_t face;  /* EBPO_NO_FACE: none */
@@ -30,7 +32,8 @@ typedef struct ebpo_tally {
     uint64_t checks[EBPO_VERIFY_KINDS], violations[EBPO_VERIFY_KINDS];
     ebpo_verify_place place[EBPO_VERIFY_KINDS]; /* of `first` */
     char first[EBPO_VERIFY_KINDS][240];
-    uint64_t spare_entries; /* listed faces that do not touch their leaf: allowed, since lists may be generous */
+    /* listed faces that do not touch their leaf: allowed, since lists may be generous */
+    uint64_t spare_entries;
     uint64_t exact_touches, exact_half_spaces; /* questions that went to rationals */
 } ebpo_tally;
 
@@ -38,8 +41,10 @@ typedef struct ebpo_tally {
 void ebpo_tally_violation(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verify_place *place,
                           const char *format, ...) EBPO_PRINTF(4, 5);
 
-/* Counts one check, and a violation unless `holds`; true when it holds. For places outside the tree. */
-bool ebpo_tally_check(ebpo_tally *tally, ebpo_verify_kind kind, bool holds, const char *format, ...) EBPO_PRINTF(4, 5);
+/* Counts one check, and a violation unless `holds`; true when it holds. For places outside the
+ * tree. */
+bool ebpo_tally_check(ebpo_tally *tally, ebpo_verify_kind kind, bool holds, const char *format, ...)
+    EBPO_PRINTF(4, 5);
 
 /* Adds the counts of `from`. The result does not depend on the order of merging. */
 void ebpo_tally_merge(ebpo_tally *into, const ebpo_tally *from);

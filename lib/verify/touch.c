@@ -1,5 +1,6 @@
-/* Separating axes (Gottschalk, Lin and Manocha, "OBBTree", 1996): the box' normals, the face's normal, and the products of their edges; for a box and a
- * triangle, also one without area, these are all that is needed. */
+/* Separating axes (Gottschalk, Lin and Manocha, "OBBTree", 1996): the box' normals, the face's
+ * normal, and the products of their edges; for a box and a triangle, also one without area, these
+ * are all that is needed. */
 #include "geom/strict_fp.h"
 
 #include "verify/touch.h"
@@ -37,7 +38,8 @@ void ebpo_local_make(ebpo_local *out, const ebpo_frame *frame, const ebpo_corner
     }
 }
 
-/* Intervals [a, b] of the face and [low, high] of the box on an axis; each end is off by at most `error`. Not-a-number compares false: unsure. */
+/* Intervals [a, b] of the face and [low, high] of the box on an axis; each end is off by at most
+ * `error`. Not-a-number compares false: unsure. */
 static verdict compare_intervals(double a, double b, double low, double high, double error)
 {
     if (a > high + error || b < low - error)
@@ -47,7 +49,8 @@ static verdict compare_intervals(double a, double b, double low, double high, do
     return UNSURE;
 }
 
-/* (b - a) * inverse, 0 only when a and b are equal; not a number (and so never sure) where it is too small to compute with. */
+/* (b - a) * inverse, 0 only when a and b are equal; not a number (and so never sure) where it is
+ * too small to compute with. */
 static double scaled_difference(double a, double b, double inverse)
 {
     double x = (b - a) * inverse;
@@ -63,7 +66,8 @@ static verdict edge_axis(const ebpo_local *p, const double edge[3], int i, int l
         return MEET; /* the edge runs along k: no axis */
     double a = ev * p->at[i][u] - eu * p->at[i][v];
     double b = ev * p->at[l][u] - eu * p->at[l][v];
-    double low = (ev < 0 ? ev : 0) - (eu > 0 ? eu : 0), high = (ev > 0 ? ev : 0) - (eu < 0 ? eu : 0);
+    double low = (ev < 0 ? ev : 0) - (eu > 0 ? eu : 0),
+           high = (ev > 0 ? ev : 0) - (eu < 0 ? eu : 0);
     double error = 32 * eps * (fabs(ev) * p->reach[u] + fabs(eu) * p->reach[v]) + slack;
     return compare_intervals(a < b ? a : b, a < b ? b : a, low, high, error);
 }
@@ -91,7 +95,8 @@ static verdict separating_axes(const ebpo_frame *frame, const ebpo_corners *face
     double edge[3][3];
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++)
-            edge[i][k] = scaled_difference(face->at[i][k], face->at[(i + 1) % 3][k], frame->inverse[k]);
+            edge[i][k] =
+                scaled_difference(face->at[i][k], face->at[(i + 1) % 3][k], frame->inverse[k]);
     verdict all = normal_axis(&p, edge);
     for (int i = 0; i < 3 && all != APART; i++)
         for (int k = 0; k < 3 && all != APART; k++) {

@@ -1,4 +1,5 @@
-/* Proves a file's promises. Of the builder's geometry only the exact predicates are used: cells, half-spaces and clipping are done here in another way. */
+/* Proves a file's promises. Of the builder's geometry only the exact predicates are used: cells,
+ * half-spaces and clipping are done here in another way. */
 #include "verify/verify.h"
 
 #include "base/error.h"
@@ -9,7 +10,8 @@
 #include "verify/structure.h"
 #include "verify/walk.h"
 
-ebpo_status ebpo_verify_tree(ebpo_tally *tally, const ebpo_tree *tree, const ebpo_verify_options *options, ebpo_error *error)
+ebpo_status ebpo_verify_tree(ebpo_tally *tally, const ebpo_tree *tree,
+                             const ebpo_verify_options *options, ebpo_error *error)
 {
     if (!ebpo_check_shape(tally, tree))
         return EBPO_OK;
@@ -30,7 +32,8 @@ static bool is_finding(ebpo_status status)
     return status == EBPO_E_FORMAT || status == EBPO_E_VERSION || status == EBPO_E_LIMIT;
 }
 
-static ebpo_status check_content(ebpo_file *file, const ebpo_verify_options *options, ebpo_tally *tally, ebpo_error *error)
+static ebpo_status check_content(ebpo_file *file, const ebpo_verify_options *options,
+                                 ebpo_tally *tally, ebpo_error *error)
 {
     ebpo_error own = EBPO_ERROR_INIT;
     ebpo_status status = ebpo_file_check_content(file, options->threads, &own);
@@ -41,10 +44,11 @@ static ebpo_status check_content(ebpo_file *file, const ebpo_verify_options *opt
     return ebpo_fail(error, status, "%s", own.message);
 }
 
-static ebpo_status check_tree(ebpo_file *file, const ebpo_verify_options *options, ebpo_tally *tally, ebpo_error *error)
+static ebpo_status check_tree(ebpo_file *file, const ebpo_verify_options *options,
+                              ebpo_tally *tally, ebpo_error *error)
 {
     ebpo_error own = EBPO_ERROR_INIT;
-    ebpo_tree tree = {0};
+    ebpo_tree tree = { 0 };
     ebpo_status status = ebpo_file_read_tree(file, &tree, options->threads, &own);
     if (status == EBPO_OK || is_finding(status))
         ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, status == EBPO_OK, "%s", own.message);
@@ -56,31 +60,36 @@ static ebpo_status check_tree(ebpo_file *file, const ebpo_verify_options *option
     return is_finding(status) ? EBPO_OK : ebpo_fail(error, status, "%s", own.message);
 }
 
-static ebpo_status check_source(ebpo_file *file, const ebpo_verify_options *options, ebpo_tally *tally, ebpo_error *error)
+static ebpo_status check_source(ebpo_file *file, const ebpo_verify_options *options,
+                                ebpo_tally *tally, ebpo_error *error)
 {
     ebpo_error own = EBPO_ERROR_INIT;
     ebpo_mesh stored;
     bool ordered = false;
     if (ebpo_file_info(file)->pruned)
-        return ebpo_check_source(tally, file, NULL, false, options->source, options->threads, error);
-    ebpo_status status = ebpo_file_read_source_mesh(file, &stored, &ordered, options->threads, &own);
+        return ebpo_check_source(tally, file, NULL, false, options->source, options->threads,
+                                 error);
+    ebpo_status status =
+        ebpo_file_read_source_mesh(file, &stored, &ordered, options->threads, &own);
     if (is_finding(status)) {
         ebpo_tally_check(tally, EBPO_VERIFY_SOURCE, false, "%s", own.message);
         return EBPO_OK;
     }
     if (status != EBPO_OK)
         return ebpo_fail(error, status, "%s", own.message);
-    status = ebpo_check_source(tally, file, &stored, ordered, options->source, options->threads, error);
+    status =
+        ebpo_check_source(tally, file, &stored, ordered, options->source, options->threads, error);
     ebpo_mesh_free(&stored);
     return status;
 }
 
-ebpo_status ebpo_verify(ebpo_file *file, const ebpo_verify_options *options, ebpo_verify_report *report, ebpo_error *error)
+ebpo_status ebpo_verify(ebpo_file *file, const ebpo_verify_options *options,
+                        ebpo_verify_report *report, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     static const ebpo_verify_options defaults = EBPO_VERIFY_OPTIONS_INIT;
     options = options ? options : &defaults;
-    *report = (ebpo_verify_report){0};
+    *report = (ebpo_verify_report){ 0 };
     if (!file)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "verify: no file; open one with ebpo_open");
     if (options->source) {
@@ -88,9 +97,11 @@ ebpo_status ebpo_verify(ebpo_file *file, const ebpo_verify_options *options, ebp
         if (shape != EBPO_OK)
             return shape;
         if (options->source->arrangement)
-            return ebpo_fail(error, EBPO_E_ARGUMENT, "verify: the source has been arranged (ebpo_mesh_arrange); give it as it was read");
+            return ebpo_fail(
+                error, EBPO_E_ARGUMENT,
+                "verify: the source has been arranged (ebpo_mesh_arrange); give it as it was read");
     }
-    ebpo_tally tally = {0};
+    ebpo_tally tally = { 0 };
     if (options->workspace)
         ebpo_file_set_workspace(file, options->workspace);
     ebpo_status status = check_content(file, options, &tally, error);

@@ -4,7 +4,8 @@
 #include "base/workspace.h"
 
 /* Adds what a group holds to the running counts. */
-static void add_group(ebpo_view_group *sum, const ebpo_tree_view *view, const ebpo_level *level, uint64_t group, unsigned octants)
+static void add_group(ebpo_view_group *sum, const ebpo_tree_view *view, const ebpo_level *level,
+                      uint64_t group, unsigned octants)
 {
     for (unsigned octant = 0; octant < octants; octant++) {
         ebpo_node_type type = ebpo_view_type(level, group, octant);
@@ -18,14 +19,12 @@ static void add_group(ebpo_view_group *sum, const ebpo_tree_view *view, const eb
     }
 }
 
-static unsigned octants_at(int level)
-{
-    return level == 0 ? 1 : 8;
-}
+static unsigned octants_at(int level) { return level == 0 ? 1 : 8; }
 
-ebpo_status ebpo_view_make(ebpo_tree_view *out, const ebpo_tree *tree, ebpo_workspace *workspace, ebpo_error *error)
+ebpo_status ebpo_view_make(ebpo_tree_view *out, const ebpo_tree *tree, ebpo_workspace *workspace,
+                           ebpo_error *error)
 {
-    *out = (ebpo_tree_view){.tree = tree, .box.grid_level = tree->info.grid_level};
+    *out = (ebpo_tree_view){ .tree = tree, .box.grid_level = tree->info.grid_level };
     for (int k = 0; k < 3; k++) {
         out->box.origin[k] = tree->info.box_origin[k];
         out->box.size[k] = tree->info.box_size[k];
@@ -38,10 +37,12 @@ ebpo_status ebpo_view_make(ebpo_tree_view *out, const ebpo_tree *tree, ebpo_work
         out->groups[l] = ebpo_array_alloc(workspace, level->group_count, sizeof *out->groups[l]);
         if (!out->groups[l]) {
             ebpo_view_free(out);
-            return ebpo_workspace_fail(workspace, level->group_count * sizeof *out->groups[l], error);
+            return ebpo_workspace_fail(workspace, level->group_count * sizeof *out->groups[l],
+                                       error);
         }
-        ebpo_view_group sum = {0};
-        for (uint64_t group = 0; group < level->group_count; ebpo_workspace_settle_at(workspace, group++)) {
+        ebpo_view_group sum = { 0 };
+        for (uint64_t group = 0; group < level->group_count;
+             ebpo_workspace_settle_at(workspace, group++)) {
             out->groups[l][group] = sum;
             add_group(&sum, out, level, group, octants_at(l));
         }
@@ -53,14 +54,17 @@ void ebpo_view_free(ebpo_tree_view *view)
 {
     for (int l = 0; l < EBPO_LEVELS_MAX; l++)
         ebpo_array_free(view->groups[l]);
-    *view = (ebpo_tree_view){0};
+    *view = (ebpo_tree_view){ 0 };
 }
 
 /* Fills in type and rank. */
-static ebpo_tree_view_node place(const ebpo_tree_view *view, ebpo_octcode code, ebpo_cell cell, uint64_t group, unsigned octant)
+static ebpo_tree_view_node place(const ebpo_tree_view *view, ebpo_octcode code, ebpo_cell cell,
+                                 uint64_t group, unsigned octant)
 {
     const ebpo_level *level = &view->tree->level[cell.level];
-    ebpo_tree_view_node node = {code, cell, group, octant, ebpo_view_type(level, group, octant), 0};
+    ebpo_tree_view_node node = {
+        code, cell, group, octant, ebpo_view_type(level, group, octant), 0
+    };
     node.rank = view->groups[cell.level][group].of_type[node.type];
     for (unsigned i = 0; i < octant; i++)
         node.rank += ebpo_view_type(level, group, i) == node.type;
@@ -69,7 +73,7 @@ static ebpo_tree_view_node place(const ebpo_tree_view *view, ebpo_octcode code, 
 
 ebpo_tree_view_node ebpo_view_root(const ebpo_tree_view *view)
 {
-    return place(view, 1, (ebpo_cell){0, {0, 0, 0}}, 0, 0);
+    return place(view, 1, (ebpo_cell){ 0, { 0, 0, 0 } }, 0, 0);
 }
 
 bool ebpo_view_is_pruned(const ebpo_tree_view *view, const ebpo_tree_view_node *node)
@@ -77,12 +81,14 @@ bool ebpo_view_is_pruned(const ebpo_tree_view *view, const ebpo_tree_view_node *
     const ebpo_tree *tree = view->tree;
     if (!tree->info.pruned || node->type != EBPO_GRAY)
         return false;
-    return node->cell.level + 1 >= tree->info.level_count || tree->level[node->cell.level + 1].types[node->rank] == 0;
+    return node->cell.level + 1 >= tree->info.level_count ||
+           tree->level[node->cell.level + 1].types[node->rank] == 0;
 }
 
-ebpo_tree_view_node ebpo_view_child(const ebpo_tree_view *view, const ebpo_tree_view_node *node, unsigned octant)
+ebpo_tree_view_node ebpo_view_child(const ebpo_tree_view *view, const ebpo_tree_view_node *node,
+                                    unsigned octant)
 {
-    ebpo_cell cell = {node->cell.level + 1, {0}};
+    ebpo_cell cell = { node->cell.level + 1, { 0 } };
     for (int k = 0; k < 3; k++)
         cell.at[k] = 2 * node->cell.at[k] + (octant >> k & 1);
     return place(view, ebpo_octcode_child(node->code, octant), cell, node->rank, octant);
@@ -102,7 +108,8 @@ static uint64_t group_of_gray(const ebpo_tree_view *view, int level, uint64_t ra
     return low;
 }
 
-ebpo_tree_view_node ebpo_view_at(const ebpo_tree_view *view, int level, uint64_t group, unsigned octant)
+ebpo_tree_view_node ebpo_view_at(const ebpo_tree_view *view, int level, uint64_t group,
+                                 unsigned octant)
 {
     unsigned path[EBPO_LEVELS_MAX];
     path[level] = octant;
@@ -111,7 +118,8 @@ ebpo_tree_view_node ebpo_view_at(const ebpo_tree_view *view, int level, uint64_t
         group = group_of_gray(view, l, rank);
         uint64_t before = view->groups[l][group].of_type[EBPO_GRAY];
         unsigned i = 0;
-        while (i < 7 && !(ebpo_view_type(&view->tree->level[l], group, i) == EBPO_GRAY && before++ == rank))
+        while (i < 7 &&
+               !(ebpo_view_type(&view->tree->level[l], group, i) == EBPO_GRAY && before++ == rank))
             i++;
         path[l] = i;
     }
@@ -121,7 +129,8 @@ ebpo_tree_view_node ebpo_view_at(const ebpo_tree_view *view, int level, uint64_t
     return node;
 }
 
-const uint32_t *ebpo_view_planes(const ebpo_tree_view *view, const ebpo_tree_view_node *node, uint32_t *count)
+const uint32_t *ebpo_view_planes(const ebpo_tree_view *view, const ebpo_tree_view_node *node,
+                                 uint32_t *count)
 {
     const ebpo_level *level = &view->tree->level[node->cell.level];
     const ebpo_view_group *group = &view->groups[node->cell.level][node->group];
@@ -137,7 +146,8 @@ const uint32_t *ebpo_view_planes(const ebpo_tree_view *view, const ebpo_tree_vie
     return *count ? (gray ? level->planes : level->leaf_planes) + first : NULL;
 }
 
-const uint32_t *ebpo_view_refs(const ebpo_tree_view *view, const ebpo_tree_view_node *leaf, uint32_t *count)
+const uint32_t *ebpo_view_refs(const ebpo_tree_view *view, const ebpo_tree_view_node *leaf,
+                               uint32_t *count)
 {
     const ebpo_level *level = &view->tree->level[leaf->cell.level];
     const ebpo_view_group *group = &view->groups[leaf->cell.level][leaf->group];
@@ -152,13 +162,9 @@ int64_t ebpo_view_winding(const ebpo_tree_view *view, const ebpo_tree_view_node 
 {
     const ebpo_level *level = &view->tree->level[node->cell.level];
     switch (node->type) {
-    case EBPO_WHITE:
-        return level->white_winding ? level->white_winding[node->rank] : 0;
-    case EBPO_BLACK:
-        return level->black_winding ? level->black_winding[node->rank] : 1;
-    case EBPO_LEAF:
-        return level->leaf_winding ? level->leaf_winding[node->rank] : 0;
-    default:
-        return 0;
+    case EBPO_WHITE: return level->white_winding ? level->white_winding[node->rank] : 0;
+    case EBPO_BLACK: return level->black_winding ? level->black_winding[node->rank] : 1;
+    case EBPO_LEAF: return level->leaf_winding ? level->leaf_winding[node->rank] : 0;
+    default: return 0;
     }
 }

@@ -1,5 +1,6 @@
-/* Nodes with many faces come first, one after the other, with their faces shared out to all threads; what remains below are many smaller subtrees,
- * each walked depth-first by one thread. Every face is tested exactly against every cell that it comes near. */
+/* Nodes with many faces come first, one after the other, with their faces shared out to all
+ * threads; what remains below are many smaller subtrees, each walked depth-first by one thread.
+ * Every face is tested exactly against every cell that it comes near. */
 #include "geom/strict_fp.h"
 
 #include "verify/walk.h"
@@ -16,9 +17,15 @@
 #include "verify/lists.h"
 #include "verify/winding.h"
 
-enum { FACE_GRAIN = 4096, SUBTREE_FACES = 1024, SUBTREE_FACES_MOST = 1 << 18, SUBTREES_WANTED = 64 };
+enum {
+    FACE_GRAIN = 4096,
+    SUBTREE_FACES = 1024,
+    SUBTREE_FACES_MOST = 1 << 18,
+    SUBTREES_WANTED = 64
+};
 
-/* Face numbers on a stack: a node's faces, then its child's, and so on down; and for each which children it touches. */
+/* Face numbers on a stack: a node's faces, then its child's, and so on down; and for each which
+ * children it touches. */
 typedef struct face_stack {
     uint32_t *faces;
     uint8_t *octants;
@@ -82,7 +89,7 @@ static void family_make(family *out, const ebpo_box *box, const ebpo_tree_view_n
 /* Octants that the face's bounding box meets, of those the half-spaces at the middle walls make. */
 static unsigned near_octants(const family *f, const ebpo_corners *face)
 {
-    static const uint8_t upper[3] = {0xaa, 0xcc, 0xf0};
+    static const uint8_t upper[3] = { 0xaa, 0xcc, 0xf0 };
     unsigned octants = 255;
     for (int k = 0; k < 3; k++) {
         double a = face->at[0][k], b = face->at[1][k], c = face->at[2][k], m = f->middle[k];
@@ -106,8 +113,8 @@ static unsigned touched_octants(const family *f, const ebpo_corners *face, ebpo_
 }
 
 /* What is done for each face at a gray node. */
-static void visit_faces(const walk *w, worker *self, const ebpo_tree_view_node *node, const family *f,
-                        const uint32_t *faces, uint8_t *octants, uint64_t count)
+static void visit_faces(const walk *w, worker *self, const ebpo_tree_view_node *node,
+                        const family *f, const uint32_t *faces, uint8_t *octants, uint64_t count)
 {
     for (uint64_t i = 0; i < count; i++) {
         ebpo_corners face;
@@ -124,20 +131,24 @@ static void visit_faces(const walk *w, worker *self, const ebpo_tree_view_node *
 }
 
 /* A gray node with so few faces that it ought to be a leaf. */
-static void check_worth(const walk *w, ebpo_tally *tally, const ebpo_tree_view_node *node, uint64_t touching)
+static void check_worth(const walk *w, ebpo_tally *tally, const ebpo_tree_view_node *node,
+                        uint64_t touching)
 {
     uint64_t limit = w->view->tree->info.leaf_faces;
-    if (limit == 0 || !w->view->has_mesh || w->view->tree->info.pruned) /* of a subset not all leaves are there */
+    if (limit == 0 || !w->view->has_mesh ||
+        w->view->tree->info.pruned) /* of a subset not all leaves are there */
         return;
     tally->checks[EBPO_VERIFY_STRUCTURE]++;
     if (touching <= limit && !ebpo_lists_more_faces(w->view, node, limit))
-        ebpo_tally_violation(tally, EBPO_VERIFY_STRUCTURE, &(ebpo_verify_place){node->code, EBPO_NO_FACE, EBPO_NO_PLANE},
-                             "the node is gray, but its leaves list no more faces than one leaf may");
+        ebpo_tally_violation(
+            tally, EBPO_VERIFY_STRUCTURE,
+            &(ebpo_verify_place){ node->code, EBPO_NO_FACE, EBPO_NO_PLANE },
+            "the node is gray, but its leaves list no more faces than one leaf may");
 }
 
 /* What is left to do at a gray node when its children are done. */
-static void finish_gray(const walk *w, worker *self, const ebpo_tree_view_node *node, const ebpo_corner_windings children[8],
-                        ebpo_corner_windings *corners)
+static void finish_gray(const walk *w, worker *self, const ebpo_tree_view_node *node,
+                        const ebpo_corner_windings children[8], ebpo_corner_windings *corners)
 {
     if (!w->view->tree->info.solid)
         return;
@@ -150,8 +161,8 @@ static void finish_gray(const walk *w, worker *self, const ebpo_tree_view_node *
 }
 
 /* False when memory is short. */
-static bool walk_terminal(const walk *w, worker *self, const ebpo_tree_view_node *node, const uint32_t *faces, uint64_t count,
-                          ebpo_corner_windings *corners)
+static bool walk_terminal(const walk *w, worker *self, const ebpo_tree_view_node *node,
+                          const uint32_t *faces, uint64_t count, ebpo_corner_windings *corners)
 {
     const ebpo_tree_view *view = w->view;
     ebpo_frame frame = ebpo_frame_make(&view->box, node->cell);
@@ -163,7 +174,7 @@ static bool walk_terminal(const walk *w, worker *self, const ebpo_tree_view_node
         ebpo_face_corners(&view->tree->mesh, faces[i], &face);
         ebpo_check_face_contained(&self->tally, &self->planes, node, &frame, &face, faces[i]);
     }
-    *corners = (ebpo_corner_windings){{0}, 0};
+    *corners = (ebpo_corner_windings){ { 0 }, 0 };
     if (!view->tree->info.solid || node->type == EBPO_GRAY)
         return true;
     ebpo_check_terminal_label(&self->tally, view, node);
@@ -171,7 +182,8 @@ static bool walk_terminal(const walk *w, worker *self, const ebpo_tree_view_node
         return false;
     ebpo_terminal_windings(corners, view, node, &frame, faces, count);
     if (self->planes.count)
-        ebpo_check_corners_contained(&self->tally, &self->planes, node, ebpo_windings_inside(view, corners));
+        ebpo_check_corners_contained(&self->tally, &self->planes, node,
+                                     ebpo_windings_inside(view, corners));
     return true;
 }
 
@@ -192,13 +204,15 @@ static bool stack_reserve(face_stack *s, uint64_t need)
 }
 
 /* The node's faces are [first, first + count) on the stack. */
-static ebpo_status walk_down(const walk *w, worker *self, const ebpo_tree_view_node *node, uint64_t first, uint64_t count,
-                             ebpo_corner_windings *corners, ebpo_error *error)
+static ebpo_status walk_down(const walk *w, worker *self, const ebpo_tree_view_node *node,
+                             uint64_t first, uint64_t count, ebpo_corner_windings *corners,
+                             ebpo_error *error)
 {
     face_stack *s = &self->stack;
     if (node->type != EBPO_GRAY || ebpo_view_is_pruned(w->view, node)) {
         if (!walk_terminal(w, self, node, s->faces + first, count, corners))
-            return ebpo_workspace_fail(w->options->workspace, self->points.count * sizeof *self->points.point, error);
+            return ebpo_workspace_fail(w->options->workspace,
+                                       self->points.count * sizeof *self->points.point, error);
         return EBPO_OK;
     }
     if (!stack_reserve(s, first + 2 * count))
@@ -215,7 +229,8 @@ static ebpo_status walk_down(const walk *w, worker *self, const ebpo_tree_view_n
             if (s->octants[first + i] >> octant & 1)
                 s->faces[first + count + own++] = s->faces[first + i];
         ebpo_tree_view_node child = ebpo_view_child(w->view, node, octant);
-        ebpo_status status = walk_down(w, self, &child, first + count, own, &children[octant], error);
+        ebpo_status status =
+            walk_down(w, self, &child, first + count, own, &children[octant], error);
         if (status != EBPO_OK)
             return status;
     }
@@ -223,7 +238,8 @@ static ebpo_status walk_down(const walk *w, worker *self, const ebpo_tree_view_n
     return EBPO_OK;
 }
 
-static ebpo_status shared_task(void *context, uint64_t begin, uint64_t end, unsigned number, ebpo_error *error)
+static ebpo_status shared_task(void *context, uint64_t begin, uint64_t end, unsigned number,
+                               ebpo_error *error)
 {
     (void)error;
     const walk *w = context;
@@ -231,7 +247,8 @@ static ebpo_status shared_task(void *context, uint64_t begin, uint64_t end, unsi
     family f;
     family_make(&f, &w->view->box, &w->shared->node);
     ebpo_half_spaces_of(&self->planes, w->view, &w->shared->node);
-    visit_faces(w, self, &w->shared->node, &f, w->shared->faces + begin, w->shared_octants + begin, end - begin);
+    visit_faces(w, self, &w->shared->node, &f, w->shared->faces + begin, w->shared_octants + begin,
+                end - begin);
     return EBPO_OK;
 }
 
@@ -240,12 +257,13 @@ static ebpo_status add_child(walk *w, uint64_t parent, unsigned octant, ebpo_err
 {
     const upper_node *from = &w->upper[parent];
     upper_node *to = &w->upper[w->upper_count];
-    *to = (upper_node){.node = ebpo_view_child(w->view, &from->node, octant)};
+    *to = (upper_node){ .node = ebpo_view_child(w->view, &from->node, octant) };
     for (uint64_t i = 0; i < from->face_count; i++)
         to->face_count += w->shared_octants[i] >> octant & 1;
     to->faces = ebpo_array_alloc(w->options->workspace, to->face_count, sizeof *to->faces);
     if (!to->faces)
-        return ebpo_workspace_fail(w->options->workspace, to->face_count * sizeof *to->faces, error);
+        return ebpo_workspace_fail(w->options->workspace, to->face_count * sizeof *to->faces,
+                                   error);
     uint64_t own = 0;
     for (uint64_t i = 0; i < from->face_count; i++)
         if (w->shared_octants[i] >> octant & 1)
@@ -264,8 +282,8 @@ static ebpo_status open_node(walk *w, uint64_t at, ebpo_error *error)
     w->shared_octants = ebpo_array_alloc(w->options->workspace, n->face_count, 1);
     if (!w->shared_octants)
         return ebpo_workspace_fail(w->options->workspace, n->face_count, error);
-    ebpo_status status = ebpo_parallel_for(w->threads, n->face_count, FACE_GRAIN, shared_task, w, &w->options->progress,
-                                           "verifying upper levels", error);
+    ebpo_status status = ebpo_parallel_for(w->threads, n->face_count, FACE_GRAIN, shared_task, w,
+                                           &w->options->progress, "verifying upper levels", error);
     check_worth(w, &w->workers[0].tally, &n->node, n->face_count);
     n->children = w->upper_count;
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)
@@ -282,7 +300,10 @@ static ebpo_status add_root(walk *w, ebpo_error *error)
     uint64_t count = w->view->has_mesh ? w->view->tree->mesh.face_count : 0;
     if (!ebpo_grow(&w->upper, &w->upper_capacity, 1, sizeof *w->upper))
         return ebpo_fail_memory(error, sizeof *w->upper);
-    upper_node root = {.node = ebpo_view_root(w->view), .face_count = count, .faces = ebpo_array_alloc(w->options->workspace, count, sizeof *root.faces)};
+    upper_node root = { .node = ebpo_view_root(w->view),
+                        .face_count = count,
+                        .faces =
+                            ebpo_array_alloc(w->options->workspace, count, sizeof *root.faces) };
     if (!root.faces)
         return ebpo_workspace_fail(w->options->workspace, count * sizeof *root.faces, error);
     for (uint64_t i = 0; i < count; ebpo_workspace_settle_at(w->options->workspace, i++))
@@ -297,7 +318,9 @@ static ebpo_status walk_upper(walk *w, ebpo_error *error)
 {
     ebpo_status status = add_root(w, error);
     for (uint64_t at = 0; at < w->upper_count && status == EBPO_OK; at++)
-        if (w->upper[at].node.type == EBPO_GRAY && !ebpo_view_is_pruned(w->view, &w->upper[at].node) && w->upper[at].face_count > w->subtree_limit)
+        if (w->upper[at].node.type == EBPO_GRAY &&
+            !ebpo_view_is_pruned(w->view, &w->upper[at].node) &&
+            w->upper[at].face_count > w->subtree_limit)
             status = open_node(w, at, error);
     if (status != EBPO_OK)
         return status;
@@ -310,7 +333,8 @@ static ebpo_status walk_upper(walk *w, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status subtree_task(void *context, uint64_t begin, uint64_t end, unsigned number, ebpo_error *error)
+static ebpo_status subtree_task(void *context, uint64_t begin, uint64_t end, unsigned number,
+                                ebpo_error *error)
 {
     const walk *w = context;
     worker *self = &w->workers[number];
@@ -351,9 +375,13 @@ static ebpo_status prepare(walk *w, ebpo_error *error)
     if (!w->workers)
         return ebpo_fail_memory(error, w->threads * sizeof *w->workers);
     uint64_t faces = w->view->has_mesh ? w->view->tree->mesh.face_count : 0;
-    uint64_t share = faces / SUBTREES_WANTED; /* each thread holds the faces on the way down: 15 B for each of a subtree */
-    w->subtree_limit = share < SUBTREE_FACES ? SUBTREE_FACES : share > SUBTREE_FACES_MOST ? SUBTREE_FACES_MOST : share;
-    w->rays = faces > 0 && w->view->tree->info.solid && !w->view->tree->info.pruned; /* rays need all faces */
+    /* each thread holds the faces on the way down: 15 B for each of a subtree */
+    uint64_t share = faces / SUBTREES_WANTED;
+    w->subtree_limit = share < SUBTREE_FACES        ? SUBTREE_FACES
+                       : share > SUBTREE_FACES_MOST ? SUBTREE_FACES_MOST
+                                                    : share;
+    /* rays need all faces */
+    w->rays = faces > 0 && w->view->tree->info.solid && !w->view->tree->info.pruned;
     for (unsigned i = 0; i < w->threads; i++)
         w->workers[i].points.workspace = w->options->workspace;
     if (w->rays)
@@ -371,9 +399,10 @@ static ebpo_status follow_rays(walk *w, ebpo_error *error)
             if (!ebpo_rays_add(all, &own->point[k]))
                 return ebpo_workspace_fail(all->workspace, all->count * sizeof *all->point, error);
         ebpo_array_free(own->point);
-        *own = (ebpo_ray_points){.workspace = all->workspace};
+        *own = (ebpo_ray_points){ .workspace = all->workspace };
     }
-    ebpo_status status = ebpo_rays_follow(all, &w->view->tree->mesh, &w->view->box, w->threads, &w->options->progress, error);
+    ebpo_status status = ebpo_rays_follow(all, &w->view->tree->mesh, &w->view->box, w->threads,
+                                          &w->options->progress, error);
     if (status == EBPO_OK)
         ebpo_check_rays(&w->workers[0].tally, all);
     return status;
@@ -394,14 +423,16 @@ static void release(walk *w)
     ebpo_array_free(w->shared_octants);
 }
 
-ebpo_status ebpo_walk(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo_verify_options *options, ebpo_error *error)
+ebpo_status ebpo_walk(ebpo_tally *tally, const ebpo_tree_view *view,
+                      const ebpo_verify_options *options, ebpo_error *error)
 {
-    walk w = {.view = view, .options = options, .threads = ebpo_thread_count(options->threads)};
+    walk w = { .view = view, .options = options, .threads = ebpo_thread_count(options->threads) };
     ebpo_status status = prepare(&w, error);
     if (status == EBPO_OK)
         status = walk_upper(&w, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(w.threads, w.subtree_count, 1, subtree_task, &w, &options->progress, "verifying subtrees", error);
+        status = ebpo_parallel_for(w.threads, w.subtree_count, 1, subtree_task, &w,
+                                   &options->progress, "verifying subtrees", error);
     if (status == EBPO_OK && w.rays)
         status = follow_rays(&w, error);
     if (status == EBPO_OK) {

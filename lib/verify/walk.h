@@ -6,6 +6,7 @@
 #include "verify/view.h"
 
 /* Adds to the tally. The result does not depend on the number of threads. */
-EBPO_MUST_USE ebpo_status ebpo_walk(ebpo_tally *tally, const ebpo_tree_view *view, const ebpo_verify_options *options, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_walk(ebpo_tally *tally, const ebpo_tree_view *view,
+                                    const ebpo_verify_options *options, ebpo_error *error);
 
 #endif

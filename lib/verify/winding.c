@@ -1,6 +1,7 @@
-/* Seen along the axis, a face winds around the ray once or not at all: the edges that cross a half-line beside the point are counted. The half-line
- * runs along the axis of the larger shift, so that the smaller shift decides which end of an edge lies where, and the larger one every tie
- * that is left. */
+/* Seen along the axis, a face winds around the ray once or not at all: the edges that cross a
+ * half-line beside the point are counted. The half-line runs along the axis of the larger shift, so
+ * that the smaller shift decides which end of an edge lies where, and the larger one every tie that
+ * is left. */
 #include "geom/strict_fp.h"
 
 #include "verify/winding.h"
@@ -16,7 +17,8 @@ void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, ebpo_corners *out)
 
 static int orient_in(int u, int v, const double a[3], const double b[3], const double c[3])
 {
-    return ebpo_orient2d((double[2]){a[u], a[v]}, (double[2]){b[u], b[v]}, (double[2]){c[u], c[v]});
+    return ebpo_orient2d((double[2]){ a[u], a[v] }, (double[2]){ b[u], b[v] },
+                         (double[2]){ c[u], c[v] });
 }
 
 /* Turns of the face around p seen in the plane (u, v), counter-clockwise positive. */
@@ -37,7 +39,8 @@ static int turns(const double p[3], int u, int v, const ebpo_corners *face)
     return sum;
 }
 
-/* Side of the shifted p of the face's plane: a tie goes to the first component of the normal that is not 0. */
+/* Side of the shifted p of the face's plane: a tie goes to the first component of the normal that
+ * is not 0. */
 static int shifted_side(const double p[3], const ebpo_corners *face)
 {
     const double *a = face->at[0], *b = face->at[1], *c = face->at[2];

@@ -1,8 +1,9 @@
 /* Winding numbers by rays, made of orientation signs only.
  *
- * A point stands for itself shifted by (d0, d1, d2), infinitely small and positive, d0 >> d1 >> d2: what the format says about the corners of
- * cells. The ray runs in direction +axis; far out the winding number is 0, so a point's is the sum over the faces that its ray meets, each
- * +1 when the ray leaves through it (along its normal) and -1 when it enters. */
+ * A point stands for itself shifted by (d0, d1, d2), infinitely small and positive, d0 >> d1 >> d2:
+ * what the format says about the corners of cells. The ray runs in direction +axis; far out the
+ * winding number is 0, so a point's is the sum over the faces that its ray meets, each +1 when the
+ * ray leaves through it (along its normal) and -1 when it enters. */
 #ifndef EBPO_VERIFY_WINDING_H
 #define EBPO_VERIFY_WINDING_H
 

@@ -1,4 +1,5 @@
-/* ebpo-generate: closed, scan-like models of any size for trials and benchmarks. One set of arguments gives one file, byte for byte. */
+/* ebpo-generate: closed, scan-like models of any size for trials and benchmarks. One set of
+ * arguments gives one file, byte for byte. */
 #include <getopt.h>
 #include <math.h>
 #include <stdio.h>
@@ -20,22 +21,28 @@ typedef struct settings {
 static const char usage[] =
     "usage: ebpo-generate [options] OUTPUT.ply\n"
     "Writes a closed scan-like triangle mesh as a binary PLY.\n"
-    "  --base sphere|torus|FILE  what to begin with; a file must hold a closed mesh (default sphere)\n"
+    "  --base sphere|torus|FILE  what to begin with; a file must hold a closed mesh (default "
+    "sphere)\n"
     "  --subdivide N             cut every face into four, N times\n"
-    "  --faces N                 instead: at least N faces (sphere, file: the next power of four; torus: about N)\n"
+    "  --faces N                 instead: at least N faces (sphere, file: the next power of four; "
+    "torus: about N)\n"
     "  --seed S                  another surface (default 1)\n"
-    "  --roughness R             height of the fine relief in local edge lengths, 0 to 0.5 (default 0.15)\n"
-    "  --relief H                height of the broad relief of sphere (radius 1) and torus (tube 0.4), 0 to 0.2 (default 0.08)\n"
-    "The output is a closed manifold where the base is one. Sphere and torus never meet themselves: that is proved for each file\n"
-    "before it is written. A file's shape may, where the base does or where its walls are closer than the roughness; tests/crossing_faces looks.\n";
+    "  --roughness R             height of the fine relief in local edge lengths, 0 to 0.5 "
+    "(default 0.15)\n"
+    "  --relief H                height of the broad relief of sphere (radius 1) and torus (tube "
+    "0.4), 0 to 0.2 (default 0.08)\n"
+    "The output is a closed manifold where the base is one. Sphere and torus never meet "
+    "themselves: that is proved for each file\n"
+    "before it is written. A file's shape may, where the base does or where its walls are closer "
+    "than the roughness; tests/crossing_faces looks.\n";
 
 static bool parse_count(const char *name, const char *text, uint64_t most, uint64_t *out)
 {
     char *end;
     unsigned long long value = strtoull(text, &end, 10);
     if (text[0] < '0' || text[0] > '9' || *end || value > most) {
-        fprintf(stderr, "ebpo-generate: --%s wants a whole number from 0 to %llu, not \"%s\"\n", name,
-                (unsigned long long)most, text);
+        fprintf(stderr, "ebpo-generate: --%s wants a whole number from 0 to %llu, not \"%s\"\n",
+                name, (unsigned long long)most, text);
         return false;
     }
     *out = value;
@@ -47,7 +54,8 @@ static bool parse_height(const char *name, const char *text, double most, double
     char *end;
     double value = strtod(text, &end);
     if (end == text || *end || !(value >= 0 && value <= most)) {
-        fprintf(stderr, "ebpo-generate: --%s wants a number from 0 to %g, not \"%s\"\n", name, most, text);
+        fprintf(stderr, "ebpo-generate: --%s wants a number from 0 to %g, not \"%s\"\n", name, most,
+                text);
         return false;
     }
     *out = value;
@@ -57,17 +65,22 @@ static bool parse_height(const char *name, const char *text, double most, double
 /* 0: go on, 1: stop with success, 2: wrong usage. */
 static int parse(int argc, char **argv, settings *s)
 {
-    static const struct option options[] = {
-        { "base", required_argument, NULL, 'b' }, { "subdivide", required_argument, NULL, 'n' },
-        { "faces", required_argument, NULL, 'f' }, { "seed", required_argument, NULL, 's' },
-        { "roughness", required_argument, NULL, 'r' }, { "relief", required_argument, NULL, 'l' },
-        { "help", no_argument, NULL, 'h' }, { NULL, 0, NULL, 0 } };
+    static const struct option options[] = { { "base", required_argument, NULL, 'b' },
+                                             { "subdivide", required_argument, NULL, 'n' },
+                                             { "faces", required_argument, NULL, 'f' },
+                                             { "seed", required_argument, NULL, 's' },
+                                             { "roughness", required_argument, NULL, 'r' },
+                                             { "relief", required_argument, NULL, 'l' },
+                                             { "help", no_argument, NULL, 'h' },
+                                             { NULL, 0, NULL, 0 } };
     *s = (settings){ .base = "sphere", .seed = 1, .roughness = 0.15, .relief = 0.08 };
     bool ok = true;
     for (int c; ok && (c = getopt_long(argc, argv, "h", options, NULL)) != -1;) {
         switch (c) {
         case 'b': s->base = optarg; break;
-        case 'n': s->subdivide_given = ok = parse_count("subdivide", optarg, 16, &s->subdivide); break;
+        case 'n':
+            s->subdivide_given = ok = parse_count("subdivide", optarg, 16, &s->subdivide);
+            break;
         case 'f': ok = parse_count("faces", optarg, UINT32_MAX - 1, &s->faces); break;
         case 's': ok = parse_count("seed", optarg, UINT64_MAX, &s->seed); break;
         case 'r': ok = parse_height("roughness", optarg, 0.5, &s->roughness); break;
@@ -77,7 +90,8 @@ static int parse(int argc, char **argv, settings *s)
         }
     }
     if (ok && (argc - optind != 1 || (s->subdivide_given && s->faces))) {
-        fprintf(stderr, "ebpo-generate: give one output file, and --subdivide or --faces, not both\n");
+        fprintf(stderr,
+                "ebpo-generate: give one output file, and --subdivide or --faces, not both\n");
         ok = false;
     }
     s->output = ok ? argv[optind] : NULL;
@@ -88,7 +102,8 @@ static int parse(int argc, char **argv, settings *s)
 
 static bool out_of_reach(void)
 {
-    fprintf(stderr, "ebpo-generate: not enough memory, or more than 2^32 - 2 faces; ask for fewer\n");
+    fprintf(stderr,
+            "ebpo-generate: not enough memory, or more than 2^32 - 2 faces; ask for fewer\n");
     return false;
 }
 
@@ -134,7 +149,8 @@ static bool read_base(ebpo_mesh *mesh, const settings *s)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_mesh_report report;
     if (s->relief_given) {
-        fprintf(stderr, "ebpo-generate: --relief is for the bases sphere and torus; leave it out\n");
+        fprintf(stderr,
+                "ebpo-generate: --relief is for the bases sphere and torus; leave it out\n");
         return false;
     }
     if (ebpo_mesh_read(mesh, s->base, NULL, &error) != EBPO_OK ||
@@ -152,7 +168,8 @@ static bool read_base(ebpo_mesh *mesh, const settings *s)
 static bool keeps_clear(bool proved)
 {
     if (!proved)
-        fprintf(stderr, "ebpo-generate: so few faces may meet each other with so high a relief; ask for more faces, or for less --relief or --roughness\n");
+        fprintf(stderr, "ebpo-generate: so few faces may meet each other with so high a relief; "
+                        "ask for more faces, or for less --relief or --roughness\n");
     return proved;
 }
 

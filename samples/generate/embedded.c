@@ -2,7 +2,8 @@
 
 #include <math.h>
 
-/* Far more than what a dozen roundings of products of such coordinates add up to, far less than what a face of a billion measures. */
+/* Far more than what a dozen roundings of products of such coordinates add up to, far less than
+ * what a face of a billion measures. */
 static const double slack = 1e-14;
 
 typedef struct corners {
@@ -14,7 +15,8 @@ static corners corners_of(const ebpo_mesh *mesh, uint64_t face)
     corners c;
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++)
-            c.p[i][k] = mesh->xyz32[3 * (uint64_t)mesh->faces[3 * face + (unsigned)i] + (unsigned)k];
+            c.p[i][k] =
+                mesh->xyz32[3 * (uint64_t)mesh->faces[3 * face + (unsigned)i] + (unsigned)k];
     return c;
 }
 
@@ -36,7 +38,8 @@ static double volume(const double *a, const double *b, const double *c)
     return dot(n, c);
 }
 
-/* How a face stands to a ray from `origin`: 1 crossed, 0 passed by, -1 too close to an edge to tell. Faces that the line crosses behind the origin are passed by. */
+/* How a face stands to a ray from `origin`: 1 crossed, 0 passed by, -1 too close to an edge to
+ * tell. Faces that the line crosses behind the origin are passed by. */
 static int crossed(const corners *c, const double origin[3], const double direction[3])
 {
     double q[3][3], sides[3];
@@ -51,7 +54,8 @@ static int crossed(const corners *c, const double origin[3], const double direct
     }
     if (left && right)
         return 0;
-    double ahead = volume(q[0], q[1], q[2]), sum = sides[0] + sides[1] + sides[2]; /* where along the ray: ahead / sum */
+    /* where along the ray: ahead / sum */
+    double ahead = volume(q[0], q[1], q[2]), sum = sides[0] + sides[1] + sides[2];
     if (left == 3 || right == 3)
         return fabs(ahead) <= slack ? -1 : (ahead > 0) == (sum > 0);
     return -1;
@@ -82,8 +86,10 @@ bool ebpo_embedded_sphere(const ebpo_mesh *mesh)
     return leaves_once(mesh, centre, oblique);
 }
 
-/* The points of the circle that are nearest to the face's points lie on an arc between those nearest to two of its corners; c^2 / 7 bounds how high an arc of chord c <= 1 stands above the chord.
- * So the support of the arc in the direction of the normal is known, and the plane must lie beyond that. */
+/* The points of the circle that are nearest to the face's points lie on an arc between those
+ * nearest to two of its corners; c^2 / 7 bounds how high an arc of chord c <= 1 stands above the
+ * chord. So the support of the arc in the direction of the normal is known, and the plane must lie
+ * beyond that. */
 static bool faces_outwards(const corners *c)
 {
     double centre[3][3], e[2][3], n[3], support = -INFINITY, longest = 0;
@@ -109,8 +115,10 @@ static bool faces_outwards(const corners *c)
 
 bool ebpo_embedded_torus(const ebpo_mesh *mesh)
 {
-    /* From the circle outwards and up, in the half plane through the axis, so that the ray stays there. */
-    const double x = 0.7431, y = sqrt(1 - x * x), origin[3] = { x, y, 0 }, oblique[3] = { 0.8 * x, 0.8 * y, 0.6 };
+    /* From the circle outwards and up, in the half plane through the axis, so that the ray stays
+     * there. */
+    const double x = 0.7431, y = sqrt(1 - x * x), origin[3] = { x, y, 0 },
+                 oblique[3] = { 0.8 * x, 0.8 * y, 0.6 };
     for (uint64_t f = 0; f < mesh->face_count; f++) {
         corners c = corners_of(mesh, f);
         if (!faces_outwards(&c))

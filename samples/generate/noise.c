@@ -9,27 +9,24 @@ static uint64_t mix(uint64_t z)
     return z ^ z >> 31;
 }
 
-/* Dot product of the lattice point's gradient (one of 12 edge directions) with the offset from it. */
-static double gradient(int64_t x, int64_t y, int64_t z, uint64_t seed, double dx, double dy, double dz)
+/* Dot product of the lattice point's gradient (one of 12 edge directions) with the offset from it.
+ */
+static double gradient(int64_t x, int64_t y, int64_t z, uint64_t seed, double dx, double dy,
+                       double dz)
 {
-    static const double directions[12][3] = { { 1, 1, 0 }, { -1, 1, 0 }, { 1, -1, 0 }, { -1, -1, 0 },
-                                              { 1, 0, 1 }, { -1, 0, 1 }, { 1, 0, -1 }, { -1, 0, -1 },
-                                              { 0, 1, 1 }, { 0, -1, 1 }, { 0, 1, -1 }, { 0, -1, -1 } };
+    static const double directions[12][3] = { { 1, 1, 0 },   { -1, 1, 0 },  { 1, -1, 0 },
+                                              { -1, -1, 0 }, { 1, 0, 1 },   { -1, 0, 1 },
+                                              { 1, 0, -1 },  { -1, 0, -1 }, { 0, 1, 1 },
+                                              { 0, -1, 1 },  { 0, 1, -1 },  { 0, -1, -1 } };
     uint64_t h = mix(seed + (uint64_t)x * 0x9e3779b97f4a7c15u + (uint64_t)y * 0xc2b2ae3d27d4eb4fu +
                      (uint64_t)z * 0x165667b19e3779f9u);
     const double *g = directions[h % 12];
     return g[0] * dx + g[1] * dy + g[2] * dz;
 }
 
-static double fade(double t)
-{
-    return t * t * t * (t * (t * 6 - 15) + 10);
-}
+static double fade(double t) { return t * t * t * (t * (t * 6 - 15) + 10); }
 
-static double blend(double a, double b, double t)
-{
-    return a + t * (b - a);
-}
+static double blend(double a, double b, double t) { return a + t * (b - a); }
 
 double ebpo_noise(const double p[3], uint64_t seed)
 {
@@ -83,7 +80,9 @@ void ebpo_circle(double turns, double *cosine, double *sine)
     int quarter = (int)floor(turns * 4 + 0.5);
     double c, s;
     small_angle(2 * pi * (turns - quarter / 4.0), &c, &s);
-    static const int turned[4][4] = { { 1, 0, 0, 1 }, { 0, -1, 1, 0 }, { -1, 0, 0, -1 }, { 0, 1, -1, 0 } };
+    static const int turned[4][4] = {
+        { 1, 0, 0, 1 }, { 0, -1, 1, 0 }, { -1, 0, 0, -1 }, { 0, 1, -1, 0 }
+    };
     const int *t = turned[quarter % 4];
     *cosine = t[0] * c + t[1] * s;
     *sine = t[2] * c + t[3] * s;

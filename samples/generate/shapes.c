@@ -28,11 +28,13 @@ static void set3(float *p, double x, double y, double z)
 
 bool ebpo_make_icosahedron(ebpo_mesh *out)
 {
-    static const uint32_t faces[20][3] = { /* 0 is the north pole, 11 the south pole, 1-5 and 6-10 two rings */
-        { 0, 1, 2 }, { 0, 2, 3 }, { 0, 3, 4 }, { 0, 4, 5 }, { 0, 5, 1 },
-        { 1, 6, 2 }, { 2, 6, 7 }, { 2, 7, 3 }, { 3, 7, 8 }, { 3, 8, 4 },
-        { 4, 8, 9 }, { 4, 9, 5 }, { 5, 9, 10 }, { 5, 10, 1 }, { 1, 10, 6 },
-        { 6, 11, 7 }, { 7, 11, 8 }, { 8, 11, 9 }, { 9, 11, 10 }, { 10, 11, 6 } };
+    static const uint32_t faces[20][3] = {
+        /* 0 is the north pole, 11 the south pole, 1-5 and 6-10 two rings */
+        { 0, 1, 2 },  { 0, 2, 3 },  { 0, 3, 4 },  { 0, 4, 5 },   { 0, 5, 1 },
+        { 1, 6, 2 },  { 2, 6, 7 },  { 2, 7, 3 },  { 3, 7, 8 },   { 3, 8, 4 },
+        { 4, 8, 9 },  { 4, 9, 5 },  { 5, 9, 10 }, { 5, 10, 1 },  { 1, 10, 6 },
+        { 6, 11, 7 }, { 7, 11, 8 }, { 8, 11, 9 }, { 9, 11, 10 }, { 10, 11, 6 }
+    };
     if (!allocate(out, 12, 20))
         return false;
     memcpy(out->faces, faces, sizeof faces);
@@ -80,15 +82,16 @@ typedef struct midpoints {
 
 static uint32_t midpoint(midpoints *t, ebpo_mesh *out, uint32_t a, uint32_t b)
 {
-    uint64_t key = a < b ? (uint64_t)a << 32 | b : (uint64_t)b << 32 | a, h = key * 0x9e3779b97f4a7c15u;
+    uint64_t key = a < b ? (uint64_t)a << 32 | b : (uint64_t)b << 32 | a,
+             h = key * 0x9e3779b97f4a7c15u;
     for (h = (h ^ h >> 32) & t->mask; t->keys[h] && t->keys[h] != key; h = (h + 1) & t->mask)
         ;
     if (!t->keys[h]) { /* no key is 0: the higher end is at least 1 */
         const float *p = out->xyz32 + 3 * (uint64_t)a, *q = out->xyz32 + 3 * (uint64_t)b;
         t->keys[h] = key;
         t->vertices[h] = (uint32_t)out->vertex_count;
-        set3(out->xyz32 + 3 * out->vertex_count++, ((double)p[0] + q[0]) / 2, ((double)p[1] + q[1]) / 2,
-             ((double)p[2] + q[2]) / 2);
+        set3(out->xyz32 + 3 * out->vertex_count++, ((double)p[0] + q[0]) / 2,
+             ((double)p[1] + q[1]) / 2, ((double)p[2] + q[2]) / 2);
     }
     return t->vertices[h];
 }
@@ -98,7 +101,8 @@ static void cut_faces(const ebpo_mesh *mesh, ebpo_mesh *out, midpoints *t)
     uint32_t *to = out->faces;
     for (uint64_t f = 0; f < mesh->face_count; f++, to += 12) {
         const uint32_t *v = mesh->faces + 3 * f;
-        uint32_t a = midpoint(t, out, v[0], v[1]), b = midpoint(t, out, v[1], v[2]), c = midpoint(t, out, v[2], v[0]);
+        uint32_t a = midpoint(t, out, v[0], v[1]), b = midpoint(t, out, v[1], v[2]),
+                 c = midpoint(t, out, v[2], v[0]);
         uint32_t four[12] = { v[0], a, c, a, v[1], b, c, b, v[2], a, b, c };
         memcpy(to, four, sizeof four);
     }
@@ -154,7 +158,8 @@ static void look_around(const ebpo_mesh *mesh, around *all)
         const uint32_t *v = mesh->faces + 3 * f;
         double e[3][3], n[3], length[3];
         for (int k = 0; k < 3; k++) {
-            const float *p = mesh->xyz32 + 3 * (uint64_t)v[k], *q = mesh->xyz32 + 3 * (uint64_t)v[(k + 1) % 3];
+            const float *p = mesh->xyz32 + 3 * (uint64_t)v[k],
+                        *q = mesh->xyz32 + 3 * (uint64_t)v[(k + 1) % 3];
             for (int i = 0; i < 3; i++)
                 e[k][i] = (double)q[i] - p[i];
             length[k] = sqrt(e[k][0] * e[k][0] + e[k][1] * e[k][1] + e[k][2] * e[k][2]);
@@ -175,7 +180,8 @@ static void look_around(const ebpo_mesh *mesh, around *all)
 
 static double extent(const ebpo_mesh *mesh)
 {
-    double low[3] = { INFINITY, INFINITY, INFINITY }, high[3] = { -INFINITY, -INFINITY, -INFINITY }, longest = 0;
+    double low[3] = { INFINITY, INFINITY, INFINITY }, high[3] = { -INFINITY, -INFINITY, -INFINITY },
+           longest = 0;
     for (uint64_t v = 0; v < mesh->vertex_count; v++)
         for (int k = 0; k < 3; k++) {
             double x = mesh->xyz32[3 * v + (unsigned)k];
@@ -216,8 +222,10 @@ bool ebpo_displace(ebpo_mesh *mesh, double relief, double roughness, uint64_t se
         if (relief > 0)
             move += relief * ebpo_noise_octaves(at, size / 4, size / 32, seed);
         if (roughness > 0)
-            move += roughness * a->length / a->edges * ebpo_noise_octaves(at, 4 * fine, fine, seed + 100);
-        set3(p, at[0] + move * n[0] / length, at[1] + move * n[1] / length, at[2] + move * n[2] / length);
+            move += roughness * a->length / a->edges *
+                    ebpo_noise_octaves(at, 4 * fine, fine, seed + 100);
+        set3(p, at[0] + move * n[0] / length, at[1] + move * n[1] / length,
+             at[2] + move * n[2] / length);
     }
     free(all);
     return true;

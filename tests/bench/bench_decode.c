@@ -1,5 +1,8 @@
-/* How fast a file decodes: bench_decode FILE.ebpo.h5 [--threads N] [--rounds R]. Reads all of it, checks included, as any reader does: the levels, the mesh, the maps, each freed before the next. The file is in the
- * system's memory (a first round is not counted). One line of JSON: medians of R rounds (default 3), and the decoded bytes: those of the arrays that a reader gets (file.h: ebpo_level, ebpo_mesh, maps). */
+/* How fast a file decodes: bench_decode FILE.ebpo.h5 [--threads N] [--rounds R]. Reads all of it,
+ * checks included, as any reader does: the levels, the mesh, the maps, each freed before the next.
+ * The file is in the system's memory (a first round is not counted). One line of JSON: medians of R
+ * rounds (default 3), and the decoded bytes: those of the arrays that a reader gets (file.h:
+ * ebpo_level, ebpo_mesh, maps). */
 #include <inttypes.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -34,13 +37,16 @@ static double now(clockid_t clock)
 
 static uint64_t level_bytes(const ebpo_level *l)
 {
-    uint64_t sum = l->group_count * sizeof *l->types + l->plane_count * sizeof *l->planes + l->ref_count * sizeof *l->leaf_refs +
+    uint64_t sum = l->group_count * sizeof *l->types + l->plane_count * sizeof *l->planes +
+                   l->ref_count * sizeof *l->leaf_refs +
                    l->leaf_plane_count * sizeof *l->leaf_planes;
     sum += l->plane_counts ? l->gray_count * sizeof *l->plane_counts : 0;
     sum += l->leaf_winding ? l->leaf_count * sizeof *l->leaf_winding : 0;
     sum += l->black_winding ? l->black_count * sizeof *l->black_winding : 0;
     sum += l->white_winding ? l->white_count * sizeof *l->white_winding : 0;
-    sum += l->leaf_first ? l->leaf_count * (sizeof *l->leaf_first + sizeof *l->leaf_new + sizeof *l->leaf_ref_count) : 0;
+    sum += l->leaf_first ? l->leaf_count * (sizeof *l->leaf_first + sizeof *l->leaf_new +
+                                            sizeof *l->leaf_ref_count)
+                         : 0;
     return sum + (l->leaf_plane_counts ? l->leaf_count * sizeof *l->leaf_plane_counts : 0);
 }
 
@@ -61,7 +67,8 @@ static bool read_mesh(ebpo_file *file, unsigned threads, uint64_t *bytes, ebpo_e
     ebpo_mesh mesh;
     if (ebpo_file_read_mesh(file, &mesh, threads, error) != EBPO_OK)
         return false;
-    *bytes = mesh.vertex_count * 3 * (mesh.xyz64 ? sizeof *mesh.xyz64 : sizeof *mesh.xyz32) + mesh.face_count * 3 * sizeof *mesh.faces;
+    *bytes = mesh.vertex_count * 3 * (mesh.xyz64 ? sizeof *mesh.xyz64 : sizeof *mesh.xyz32) +
+             mesh.face_count * 3 * sizeof *mesh.faces;
     ebpo_mesh_free(&mesh);
     return true;
 }
@@ -71,7 +78,8 @@ static bool read_maps(ebpo_file *file, unsigned threads, uint64_t *bytes, ebpo_e
     uint32_t *vertices, *faces;
     if (ebpo_file_read_maps(file, &vertices, &faces, threads, error) != EBPO_OK)
         return false;
-    *bytes = (ebpo_file_info(file)->vertex_count + ebpo_file_info(file)->face_count) * sizeof *vertices;
+    *bytes =
+        (ebpo_file_info(file)->vertex_count + ebpo_file_info(file)->face_count) * sizeof *vertices;
     free(vertices);
     free(faces);
     return true;
@@ -79,13 +87,15 @@ static bool read_maps(ebpo_file *file, unsigned threads, uint64_t *bytes, ebpo_e
 
 static bool read_all(ebpo_file *file, unsigned threads, round_figures *f, ebpo_error *error)
 {
-    static bool (*const readers[PARTS])(ebpo_file *, unsigned, uint64_t *, ebpo_error *) = { read_levels, read_mesh, read_maps };
+    static bool (*const readers[PARTS])(ebpo_file *, unsigned, uint64_t *,
+                                        ebpo_error *) = { read_levels, read_mesh, read_maps };
     static const uint32_t parts[PARTS] = { 0, EBPO_PART_MESH, EBPO_PART_MAPS };
     double cpu = now(CLOCK_PROCESS_CPUTIME_ID);
     memset(f, 0, sizeof *f);
     for (int i = 0; i < PARTS; i++) {
         double begin = now(CLOCK_MONOTONIC);
-        if ((ebpo_file_info(file)->parts & parts[i]) == parts[i] && !readers[i](file, threads, &f->bytes[i], error))
+        if ((ebpo_file_info(file)->parts & parts[i]) == parts[i] &&
+            !readers[i](file, threads, &f->bytes[i], error))
             return false;
         f->seconds[i] = now(CLOCK_MONOTONIC) - begin;
     }
@@ -106,12 +116,15 @@ static int by_seconds(const void *a, const void *b)
 
 static void print(const settings *s, const round_figures *f, uint64_t file_bytes)
 {
-    printf("{\"threads\": %u, \"rounds\": %d, \"file_bytes\": %" PRIu64 ", \"parts\": [", s->threads, s->rounds, file_bytes);
+    printf("{\"threads\": %u, \"rounds\": %d, \"file_bytes\": %" PRIu64 ", \"parts\": [",
+           s->threads, s->rounds, file_bytes);
     for (int i = 0; i < PARTS; i++)
-        printf("%s{\"part\": \"%s\", \"decoded_bytes\": %" PRIu64 ", \"seconds\": %.6f}", i ? ", " : "", names[i], f->bytes[i], f->seconds[i]);
+        printf("%s{\"part\": \"%s\", \"decoded_bytes\": %" PRIu64 ", \"seconds\": %.6f}",
+               i ? ", " : "", names[i], f->bytes[i], f->seconds[i]);
     uint64_t bytes = f->bytes[LEVELS] + f->bytes[MESH] + f->bytes[MAPS];
-    printf("], \"decoded_bytes\": %" PRIu64 ", \"seconds\": %.6f, \"cpu_seconds\": %.6f, \"decoded_bytes_per_second\": %.0f}\n", bytes, total(f), f->cpu,
-           (double)bytes / total(f));
+    printf("], \"decoded_bytes\": %" PRIu64
+           ", \"seconds\": %.6f, \"cpu_seconds\": %.6f, \"decoded_bytes_per_second\": %.0f}\n",
+           bytes, total(f), f->cpu, (double)bytes / total(f));
 }
 
 static bool parse(int argc, char **argv, settings *s)
@@ -140,7 +153,8 @@ int main(int argc, char **argv)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file;
     if (!parse(argc, argv, &s)) {
-        fprintf(stderr, "usage: bench_decode FILE.ebpo.h5 [--threads N] [--rounds 1..%d]\n", ROUNDS_MOST);
+        fprintf(stderr, "usage: bench_decode FILE.ebpo.h5 [--threads N] [--rounds 1..%d]\n",
+                ROUNDS_MOST);
         return 2;
     }
     if (ebpo_open(&file, s.path, &error) != EBPO_OK) {

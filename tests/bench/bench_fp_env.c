@@ -1,4 +1,5 @@
-/* What putting the floating-point environment aside costs a call: ns, in the default environment and in another one. */
+/* What putting the floating-point environment aside costs a call: ns, in the default environment
+ * and in another one. */
 #include <fenv.h>
 #include <stdio.h>
 #include <time.h>
@@ -20,10 +21,7 @@ __attribute__((noinline)) static void with(void)
     __asm__ volatile("" ::: "memory");
 }
 
-__attribute__((noinline)) static void without(void)
-{
-    __asm__ volatile("" ::: "memory");
-}
+__attribute__((noinline)) static void without(void) { __asm__ volatile("" ::: "memory"); }
 
 static double cost(void)
 {

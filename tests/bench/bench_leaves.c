@@ -1,5 +1,7 @@
-/* What the kinds of leaves gain: bench_leaves FILE.ebpo.h5 [--points N] [--json]. Uniform points of the model's box that fall into leaves, by the leaf's kind: nanoseconds for one, with
- * the kind's planes and with the same leaf taken as a general one. Both the best of seven passes, in turns, in one run. */
+/* What the kinds of leaves gain: bench_leaves FILE.ebpo.h5 [--points N] [--json]. Uniform points of
+ * the model's box that fall into leaves, by the leaf's kind: nanoseconds for one, with the kind's
+ * planes and with the same leaf taken as a general one. Both the best of seven passes, in turns, in
+ * one run. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,7 +13,8 @@
 
 enum { KINDS = 5, MOST = 20000, PASSES = 7 };
 
-static const char *const names[KINDS] = { "general", "one plane", "two planes", "convex set", "concave set" };
+static const char *const names[KINDS] = { "general", "one plane", "two planes", "convex set",
+                                          "concave set" };
 
 typedef struct bucket {
     double points[MOST][3];
@@ -48,7 +51,8 @@ static void sort_points(const ebpo_model *m, uint64_t points, bucket *buckets)
         uint32_t at[3];
         int level;
         for (int k = 0; k < 3; k++)
-            p[k] = m->info->report.min[k] + (m->info->report.max[k] - m->info->report.min[k]) * random_unit(&state);
+            p[k] = m->info->report.min[k] +
+                   (m->info->report.max[k] - m->info->report.min[k]) * random_unit(&state);
         if (!ebpo_locate(&s->box, fine, p, at))
             continue;
         uint32_t entry = ebpo_descend(&s->nodes, fine, at, &level);
@@ -116,22 +120,26 @@ int main(int argc, char **argv)
     ebpo_file *file;
     ebpo_model *model;
     ebpo_context *context;
-    if (ebpo_open(&file, argv[1], &error) != EBPO_OK || ebpo_model_open(&model, file, NULL, &error) != EBPO_OK ||
+    if (ebpo_open(&file, argv[1], &error) != EBPO_OK ||
+        ebpo_model_open(&model, file, NULL, &error) != EBPO_OK ||
         ebpo_context_new(&context, model, &error) != EBPO_OK)
         fail(&error);
     bucket *buckets = calloc(KINDS, sizeof *buckets);
     if (!buckets)
         return EXIT_FAILURE;
     sort_points(model, points, buckets);
-    printf(json ? "[" : "%-12s %10s %10s %10s %14s\n", "kind", "leaves", "points", "ns", "ns as general");
+    printf(json ? "[" : "%-12s %10s %10s %10s %14s\n", "kind", "leaves", "points", "ns",
+           "ns as general");
     for (int k = 0; k < KINDS; k++) {
         bucket *b = &buckets[k];
         measure(context, b);
         if (!b->count)
             b->ns = b->ns_as_general = 0;
-        printf(json ? "%s{\"kind\": \"%s\", \"leaves\": %" PRIu64 ", \"points\": %" PRIu64 ", \"ns\": %.1f, \"ns_as_general\": %.1f}"
+        printf(json ? "%s{\"kind\": \"%s\", \"leaves\": %" PRIu64 ", \"points\": %" PRIu64
+                      ", \"ns\": %.1f, \"ns_as_general\": %.1f}"
                     : "%s%-12s %10" PRIu64 " %10" PRIu64 " %10.1f %14.1f\n",
-               json && k ? ", " : "", names[k], model->whole->kinds[k], b->seen, b->ns, b->ns_as_general);
+               json && k ? ", " : "", names[k], model->whole->kinds[k], b->seen, b->ns,
+               b->ns_as_general);
     }
     if (json)
         printf("]\n");

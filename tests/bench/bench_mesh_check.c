@@ -33,7 +33,8 @@ int main(int argc, char **argv)
     double best = 1e30;
     for (int i = 0; i < 5; i++) {
         double start = now();
-        if (ebpo_mesh_check(&report, &mesh, threads, (ebpo_progress){ NULL, NULL }, &error) != EBPO_OK) {
+        if (ebpo_mesh_check(&report, &mesh, threads, (ebpo_progress){ NULL, NULL }, &error) !=
+            EBPO_OK) {
             fprintf(stderr, "bench_mesh_check: %s\n", error.message);
             return EXIT_FAILURE;
         }
@@ -41,9 +42,11 @@ int main(int argc, char **argv)
         best = time < best ? time : best;
     }
     printf("%llu faces, best of 5: %.3f s, %.2f million faces/s, peak %ld KiB with the mesh\n",
-           (unsigned long long)mesh.face_count, best, (double)mesh.face_count / best * 1e-6, peak_kib());
-    printf("balanced %d manifold %d genus %lld components %llu volume %.9g\n", report.balanced, report.manifold,
-           (long long)report.genus, (unsigned long long)report.components, report.volume);
+           (unsigned long long)mesh.face_count, best, (double)mesh.face_count / best * 1e-6,
+           peak_kib());
+    printf("balanced %d manifold %d genus %lld components %llu volume %.9g\n", report.balanced,
+           report.manifold, (long long)report.genus, (unsigned long long)report.components,
+           report.volume);
     ebpo_mesh_free(&mesh);
     return EXIT_SUCCESS;
 }

@@ -8,7 +8,8 @@
 
 enum { SETS = 4096, ROUNDS = 50 };
 
-typedef int orient3d_function(const double a[3], const double b[3], const double c[3], const double d[3]);
+typedef int orient3d_function(const double a[3], const double b[3], const double c[3],
+                              const double d[3]);
 
 static double p[SETS][12];
 
@@ -37,7 +38,8 @@ static void report(const char *name)
     int zeros;
     double fast = ns_per_call(ebpo_orient3d, ROUNDS, &zeros);
     double exact = ns_per_call(ebpo_orient3d_exact, 1, &zeros);
-    printf("%-42s %5.1f %% zero   orient3d %8.1f ns   integers only %8.1f ns\n", name, 100.0 * zeros / SETS, fast, exact);
+    printf("%-42s %5.1f %% zero   orient3d %8.1f ns   integers only %8.1f ns\n", name,
+           100.0 * zeros / SETS, fast, exact);
 }
 
 /* Single-precision points of one slanted plane, and of one axis-parallel plane. */

@@ -28,7 +28,9 @@ static void prepare(int aim, uint64_t *state)
                 triangles[n][i][k] = (float)twin_uniform(state);
             double middle = (triangles[n][0][k] + triangles[n][1][k] + triangles[n][2][k]) / 3;
             rays[n].origin[k] = 3 * twin_uniform(state);
-            rays[n].direction[k] = aim == 0 ? twin_uniform(state) : (aim == 1 ? middle : triangles[n][0][k]) - rays[n].origin[k];
+            rays[n].direction[k] =
+                aim == 0 ? twin_uniform(state)
+                         : (aim == 1 ? middle : triangles[n][0][k]) - rays[n].origin[k];
             box_min[n][k] = middle + .4 * twin_uniform(state);
             box_max[n][k] = box_min[n][k] + .1;
         }
@@ -45,7 +47,7 @@ static void time_rays(const char *name, int aim, int rounds, uint64_t *state)
         hits = 0;
         for (int n = 0; n < COUNT; n++) {
             ebpo_ray_meeting m;
-            ebpo_ray_triangle(&rays[n], (const double (*)[3])triangles[n], &m);
+            ebpo_ray_triangle(&rays[n], (const double(*)[3])triangles[n], &m);
             hits += m.meets;
         }
         best = fmin(best, (now() - begin) / COUNT);
@@ -62,7 +64,8 @@ static void time_boxes(int rounds, uint64_t *state)
         double begin = now();
         hits = 0;
         for (int n = 0; n < COUNT; n++)
-            hits += ebpo_triangle_meets_box((const double (*)[3])triangles[n], box_min[n], box_max[n]);
+            hits +=
+                ebpo_triangle_meets_box((const double(*)[3])triangles[n], box_min[n], box_max[n]);
         best = fmin(best, (now() - begin) / COUNT);
     }
     printf("%-18s %8.1f ns  %5.1f %% meet\n", "box", best, 100.0 * (double)hits / COUNT);

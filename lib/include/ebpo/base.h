@@ -4,8 +4,9 @@
  * ebpo_error that the caller owns; passing NULL for it is always allowed.
  * There is no global or thread-local error state.
  *
- * The caller's floating-point environment does not matter: rounding mode, flushing of denormals and traps are put
- * aside while a function computes, and are as they were when it returns. Callbacks run in the default environment.
+ * The caller's floating-point environment does not matter: rounding mode, flushing of denormals and
+ * traps are put aside while a function computes, and are as they were when it returns. Callbacks
+ * run in the default environment.
  */
 #ifndef EBPO_BASE_H
 #define EBPO_BASE_H
@@ -19,8 +20,8 @@ extern "C" {
 #endif
 
 #if defined(__GNUC__)
-#define EBPO_API __attribute__((visibility("default")))
-#define EBPO_MUST_USE __attribute__((warn_unused_result))
+#define EBPO_API               __attribute__((visibility("default")))
+#define EBPO_MUST_USE          __attribute__((warn_unused_result))
 #define EBPO_PRINTF(fmt, args) __attribute__((format(printf, fmt, args)))
 #else
 #define EBPO_API
@@ -49,7 +50,10 @@ typedef struct ebpo_error {
     char message[480];
 } ebpo_error;
 
-#define EBPO_ERROR_INIT { EBPO_OK, "" }
+#define EBPO_ERROR_INIT \
+    {                   \
+        EBPO_OK, ""     \
+    }
 
 /* Name of a status ("EBPO_E_FORMAT"); a static string, never NULL. */
 EBPO_API const char *ebpo_status_name(ebpo_status status);
@@ -57,9 +61,9 @@ EBPO_API const char *ebpo_status_name(ebpo_status status);
 /* Library version, "major.minor.patch"; a static string. */
 EBPO_API const char *ebpo_version(void);
 
-/* Called from the thread that called the library, when a stage begins and then some times a second at most.
- * `stage` is a static string; `total` is 0 when it is not known.
- * Return false to stop: the running call then ends with EBPO_E_CANCELLED and leaves no file behind. */
+/* Called from the thread that called the library, when a stage begins and then some times a second
+ * at most. `stage` is a static string; `total` is 0 when it is not known. Return false to stop: the
+ * running call then ends with EBPO_E_CANCELLED and leaves no file behind. */
 typedef bool (*ebpo_progress_fn)(void *user, const char *stage, uint64_t done, uint64_t total);
 
 typedef struct ebpo_progress {
@@ -67,14 +71,17 @@ typedef struct ebpo_progress {
     void *user;
 } ebpo_progress;
 
-/* Writes `size` bytes as one file, which appears whole or not at all (temporary name, fsync, rename); an existing regular file is replaced. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_write_file(const char *path, const void *data, size_t size, ebpo_error *error);
+/* Writes `size` bytes as one file, which appears whole or not at all (temporary name, fsync,
+ * rename); an existing regular file is replaced. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_write_file(const char *path, const void *data, size_t size,
+                                                   ebpo_error *error);
 
-/* EBPO_E_IO when an output could not even be begun at `path` now: a folder that is not there or cannot be written to, a path that is a folder or a device. For asking before hours of work. */
+/* EBPO_E_IO when an output could not even be begun at `path` now: a folder that is not there or
+ * cannot be written to, a path that is a folder or a device. For asking before hours of work. */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_check_output(const char *path, ebpo_error *error);
 
-/* Removes the temporary files of all outputs that this process is writing; they cannot be finished afterwards. Only calls unlink: made for
- * signal handlers, just before the process ends. */
+/* Removes the temporary files of all outputs that this process is writing; they cannot be finished
+ * afterwards. Only calls unlink: made for signal handlers, just before the process ends. */
 EBPO_API void ebpo_abandon_outputs(void);
 
 #ifdef __cplusplus

@@ -15,28 +15,41 @@ typedef struct ebpo_verify_count {
 } ebpo_verify_count;
 
 typedef struct ebpo_verify_report {
-    ebpo_verify_count structure;   /* head, shapes, counts, index arrays, order */
-    ebpo_verify_count content;     /* content checksum */
-    ebpo_verify_count containment; /* vertices, clipped faces and inside corners against every half-space on their path */
-    ebpo_verify_count nesting;     /* a child's envelope lies in its parent's; leaf planes included */
-    ebpo_verify_count labels;      /* white, black and corner winding numbers against an independent winding number */
-    ebpo_verify_count lists;       /* no face touches a cell that does not list it; no list names a face twice */
-    ebpo_verify_count source;      /* mesh equal to the source (--against), bit for bit */
-    uint64_t checks, violations;   /* sums */
+    ebpo_verify_count structure; /* head, shapes, counts, index arrays, order */
+    ebpo_verify_count content;   /* content checksum */
+    /* vertices, clipped faces and inside corners against every half-space on their path */
+    ebpo_verify_count containment;
+    /* a child's envelope lies in its parent's; leaf planes included */
+    ebpo_verify_count nesting;
+    /* white, black and corner winding numbers against an independent winding number */
+    ebpo_verify_count labels;
+    /* no face touches a cell that does not list it; no list names a face twice */
+    ebpo_verify_count lists;
+    ebpo_verify_count source;    /* mesh equal to the source (--against), bit for bit */
+    uint64_t checks, violations; /* sums */
 } ebpo_verify_report;
 
 typedef struct ebpo_verify_options {
-    const ebpo_mesh *source;  /* mesh as read (before mending and arranging), or NULL; mending recorded in the file is done again */
-    unsigned threads;         /* 0: all cores */
-    uint64_t label_samples;   /* cells whose labels are checked by an independent winding number; 0: all of up to 2^22, 2^20 of more, but 4096
-                               * where that would take more than some seconds (4e8 looks at a point); at least one of each level and type */
+    /* mesh as read (before mending and arranging), or NULL; mending recorded in the file is done
+     * again */
+    const ebpo_mesh *source;
+    unsigned threads; /* 0: all cores */
+    /* cells whose labels are checked by an independent winding number; 0: all of up to 2^22, 2^20
+     * of more, but 4096 where that would take more than some seconds (4e8 looks at a point); at
+     * least one of each level and type */
+    uint64_t label_samples;
     ebpo_progress progress;
-    ebpo_workspace *workspace; /* what the work keeps to, in memory and temporary files; NULL: as much memory as it takes. Freed after the last call that is given the file (ebpo_file_set_workspace) */
+    /* what the work keeps to, in memory and temporary files; NULL: as much memory as it takes.
+     * Freed after the last call that is given the file (ebpo_file_set_workspace) */
+    ebpo_workspace *workspace;
 } ebpo_verify_options;
-#define EBPO_VERIFY_OPTIONS_INIT { NULL, 0, 0, { NULL, NULL }, NULL }
+#define EBPO_VERIFY_OPTIONS_INIT         \
+    {                                    \
+        NULL, 0, 0, { NULL, NULL }, NULL \
+    }
 
-/* Verifies an open file. EBPO_OK when the work could be done, whatever it found: look at report->violations.
- * A file too damaged to be read counts as a structure violation. */
+/* Verifies an open file. EBPO_OK when the work could be done, whatever it found: look at
+ * report->violations. A file too damaged to be read counts as a structure violation. */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_verify(ebpo_file *file, const ebpo_verify_options *options,
                                                ebpo_verify_report *report, ebpo_error *error);
 

@@ -8,29 +8,40 @@
 extern "C" {
 #endif
 
-/* The arrays of models that are read, built or verified. They are in memory while they fit into half of what is allowed; what does not fit lies in files without a name in a folder for
- * temporary files (gone with the process, however it ends), mapped, and only so much of them is resident as the budget allows. Results never depend on it.
- * All functions may be called from any thread. */
+/* The arrays of models that are read, built or verified. They are in memory while they fit into
+ * half of what is allowed; what does not fit lies in files without a name in a folder for temporary
+ * files (gone with the process, however it ends), mapped, and only so much of them is resident as
+ * the budget allows. Results never depend on it. All functions may be called from any thread. */
 typedef struct ebpo_workspace ebpo_workspace;
 
 enum { EBPO_WORKSPACE_LEAST = 128 << 20 }; /* bytes: less is refused */
 
 typedef struct ebpo_workspace_options {
-    uint64_t memory;      /* bytes that the whole process may have resident; 0: half of the machine's, or of what its control group is allowed */
+    /* bytes that the whole process may have resident; 0: half of the machine's, or of what its
+     * control group is allowed */
+    uint64_t memory;
     const char *temp_dir; /* NULL: $TMPDIR, else /var/tmp; should lie on a disk, not in memory */
 } ebpo_workspace_options;
-#define EBPO_WORKSPACE_OPTIONS_INIT { 0, NULL }
+#define EBPO_WORKSPACE_OPTIONS_INIT \
+    {                               \
+        0, NULL                     \
+    }
 
-/* `options` may be NULL. EBPO_E_ARGUMENT for less memory than EBPO_WORKSPACE_LEAST; EBPO_E_IO for a folder that cannot be written to (looked at at once, so that it does not show after an hour). */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_workspace_make(ebpo_workspace **out, const ebpo_workspace_options *options, ebpo_error *error);
+/* `options` may be NULL. EBPO_E_ARGUMENT for less memory than EBPO_WORKSPACE_LEAST; EBPO_E_IO for a
+ * folder that cannot be written to (looked at at once, so that it does not show after an hour). */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_workspace_make(ebpo_workspace **out,
+                                                       const ebpo_workspace_options *options,
+                                                       ebpo_error *error);
 
-/* After the last call that is given a mesh or tree made with it (or a file that keeps to it); these themselves may be freed or closed later. NULL is fine. */
+/* After the last call that is given a mesh or tree made with it (or a file that keeps to it); these
+ * themselves may be freed or closed later. NULL is fine. */
 EBPO_API void ebpo_workspace_free(ebpo_workspace *workspace);
 
 typedef struct ebpo_workspace_figures {
     uint64_t memory;          /* the budget */
     uint64_t held, held_most; /* bytes of arrays in memory: now, at most */
-    uint64_t filed, filed_most, filed_total; /* bytes of arrays in files: now, at most at one time, ever */
+    /* bytes of arrays in files: now, at most at one time, ever */
+    uint64_t filed, filed_most, filed_total;
 } ebpo_workspace_figures;
 
 EBPO_API void ebpo_workspace_tell(const ebpo_workspace *workspace, ebpo_workspace_figures *out);

@@ -1,6 +1,7 @@
 // CGAL as a peer: one thread, EPICK (exact predicates, constructions in double).
 //
-// inside: Side_of_triangle_mesh. distance: closest_point_and_primitive with the accelerating point tree. ray: first_intersection.
+// inside: Side_of_triangle_mesh. distance: closest_point_and_primitive with the accelerating point
+// tree. ray: first_intersection.
 #include <CGAL/AABB_face_graph_triangle_primitive.h>
 #include <CGAL/AABB_traits.h>
 #include <CGAL/AABB_tree.h>
@@ -14,15 +15,17 @@
 
 #include "peer.hpp"
 
-namespace {
+namespace
+{
 
 using kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using point_3 = kernel::Point_3;
 
 // ---- inside ----
 
-class inside {
-public:
+class inside
+{
+  public:
     static constexpr const char *name = "cgal";
     static constexpr int doubles = 3;
     using answer_type = uint8_t;
@@ -37,7 +40,9 @@ public:
         for (size_t i = 0; i < vertices; i++)
             surface.add_vertex(point_3(mesh.xyz[3 * i], mesh.xyz[3 * i + 1], mesh.xyz[3 * i + 2]));
         for (size_t i = 0; i < faces; i++) {
-            auto vertex = [&](size_t corner) { return surface_mesh::Vertex_index(mesh.corners[3 * i + corner]); };
+            auto vertex = [&](size_t corner) {
+                return surface_mesh::Vertex_index(mesh.corners[3 * i + corner]);
+            };
             if (surface.add_face(vertex(0), vertex(1), vertex(2)) == surface_mesh::null_face())
                 throw std::runtime_error("CGAL's Surface_mesh wants a mesh that is a manifold");
         }
@@ -53,9 +58,12 @@ public:
     }
 
     // On the surface counts as inside.
-    uint8_t answer(const double *p) { return (*side)(point_3(p[0], p[1], p[2])) != CGAL::ON_UNBOUNDED_SIDE; }
+    uint8_t answer(const double *p)
+    {
+        return (*side)(point_3(p[0], p[1], p[2])) != CGAL::ON_UNBOUNDED_SIDE;
+    }
 
-private:
+  private:
     using surface_mesh = CGAL::Surface_mesh<point_3>;
     using primitive = CGAL::AABB_face_graph_triangle_primitive<surface_mesh>;
     surface_mesh surface;
@@ -63,7 +71,8 @@ private:
     std::unique_ptr<CGAL::Side_of_triangle_mesh<surface_mesh, kernel>> side;
 };
 
-// ---- distance and rays: over the triangles themselves, which is faster than through a mesh's connectivity ----
+// ---- distance and rays: over the triangles themselves, which is faster than through a mesh's
+// connectivity ----
 
 using triangle_list = std::vector<kernel::Triangle_3>;
 using triangle_primitive = CGAL::AABB_triangle_primitive<kernel, triangle_list::const_iterator>;
@@ -83,8 +92,9 @@ triangle_list read_triangles(const char *path)
     return out;
 }
 
-class distance {
-public:
+class distance
+{
+  public:
     static constexpr const char *name = "cgal";
     static constexpr int doubles = 3;
     using answer_type = bench::hit;
@@ -104,19 +114,22 @@ public:
     {
         point_3 query(p[0], p[1], p[2]);
         bool hint = warm && last.second != triangles.cend();
-        last = hint ? tree.closest_point_and_primitive(query, last) : tree.closest_point_and_primitive(query);
-        return { std::sqrt(CGAL::squared_distance(query, last.first)), last.second - triangles.cbegin() };
+        last = hint ? tree.closest_point_and_primitive(query, last)
+                    : tree.closest_point_and_primitive(query);
+        return { std::sqrt(CGAL::squared_distance(query, last.first)),
+                 last.second - triangles.cbegin() };
     }
 
-private:
+  private:
     bool warm;
     triangle_list triangles;
     triangle_tree tree;
     triangle_tree::Point_and_primitive_id last;
 };
 
-class first_hit {
-public:
+class first_hit
+{
+  public:
     static constexpr const char *name = "cgal";
     static constexpr int doubles = 6;
     using answer_type = bench::hit;
@@ -138,7 +151,9 @@ public:
         if (!found)
             return { INFINITY, -1 };
         double t = INFINITY;
-        auto along = [&](const point_3 &p) { return (p - origin) * direction / direction.squared_length(); };
+        auto along = [&](const point_3 &p) {
+            return (p - origin) * direction / direction.squared_length();
+        };
         if (const point_3 *point = boost::get<point_3>(&found->first))
             t = along(*point);
         else if (const kernel::Segment_3 *segment = boost::get<kernel::Segment_3>(&found->first))
@@ -146,14 +161,11 @@ public:
         return { t, found->second - triangles.cbegin() };
     }
 
-private:
+  private:
     triangle_list triangles;
     triangle_tree tree;
 };
 
 } // namespace
 
-int main(int argc, char **argv)
-{
-    return bench::main<inside, distance, first_hit>(argc, argv);
-}
+int main(int argc, char **argv) { return bench::main<inside, distance, first_hit>(argc, argv); }

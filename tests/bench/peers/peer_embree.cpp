@@ -1,18 +1,23 @@
 // Embree 3 as a peer: one thread (building: more, if told so), single precision.
 //
-// inside: parity of all hits of a ray in a fixed oblique direction, robust scene. distance: rtcPointQuery with a shrinking radius. ray: first hit.
+// inside: parity of all hits of a ray in a fixed oblique direction, robust scene. distance:
+// rtcPointQuery with a shrinking radius. ray: first hit.
 #include <embree3/rtcore.h>
 
 #include <cmath>
 
 #include "peer.hpp"
 
-namespace {
+namespace
+{
 
 // Embree's scene over a mesh whose buffers it shares.
-class scene {
-public:
-    scene(RTCSceneFlags flags, RTCBuildQuality quality) : device(rtcNewDevice(("threads=" + std::to_string(bench::threads)).c_str())), handle(rtcNewScene(device))
+class scene
+{
+  public:
+    scene(RTCSceneFlags flags, RTCBuildQuality quality)
+        : device(rtcNewDevice(("threads=" + std::to_string(bench::threads)).c_str())),
+          handle(rtcNewScene(device))
     {
         rtcSetSceneFlags(handle, flags);
         rtcSetSceneBuildQuality(handle, quality);
@@ -33,10 +38,10 @@ public:
     void build(RTCFilterFunctionN occluded_filter)
     {
         RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-        rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, triangles.xyz.data(), 0, 12,
-                                   triangles.xyz.size() / 3);
-        rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, triangles.corners.data(), 0, 12,
-                                   triangles.corners.size() / 3);
+        rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                   triangles.xyz.data(), 0, 12, triangles.xyz.size() / 3);
+        rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                   triangles.corners.data(), 0, 12, triangles.corners.size() / 3);
         if (occluded_filter)
             rtcSetGeometryOccludedFilterFunction(geometry, occluded_filter);
         rtcCommitGeometry(geometry);
@@ -65,13 +70,15 @@ void count_and_go_on(const RTCFilterFunctionNArguments *arguments)
     arguments->valid[0] = 0;
 }
 
-class inside {
-public:
+class inside
+{
+  public:
     static constexpr const char *name = "embree";
     static constexpr int doubles = 3;
     using answer_type = uint8_t;
 
-    // Splits in space would put a face into two leaves, and its hit would count twice: no build of high quality.
+    // Splits in space would put a face into two leaves, and its hit would count twice: no build of
+    // high quality.
     explicit inside(bool) : tree(RTC_SCENE_FLAG_ROBUST, RTC_BUILD_QUALITY_MEDIUM)
     {
         if (!rtcGetDeviceProperty(tree.device, RTC_DEVICE_PROPERTY_FILTER_FUNCTION_SUPPORTED))
@@ -94,7 +101,7 @@ public:
         return context.hits & 1;
     }
 
-private:
+  private:
     scene tree;
 };
 
@@ -108,7 +115,8 @@ inline vec operator*(float s, vec a) { return { s * a.x, s * a.y, s * a.z }; }
 inline vec operator+(vec a, vec b) { return { a.x + b.x, a.y + b.y, a.z + b.z }; }
 inline float dot(vec a, vec b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
-// Squared distance of p to triangle abc. Source: Ericson, Real-Time Collision Detection (2005), section 5.1.5 (by Voronoi regions).
+// Squared distance of p to triangle abc. Source: Ericson, Real-Time Collision Detection (2005),
+// section 5.1.5 (by Voronoi regions).
 inline float squared_distance(vec p, vec a, vec b, vec c)
 {
     vec ab = b - a, ac = c - a, ap = p - a;
@@ -154,7 +162,8 @@ bool visit(RTCPointQueryFunctionArguments *arguments)
         return vec{ v[0], v[1], v[2] };
     };
     RTCPointQuery *query = arguments->query;
-    float squared = squared_distance({ query->x, query->y, query->z }, vertex(0), vertex(1), vertex(2));
+    float squared =
+        squared_distance({ query->x, query->y, query->z }, vertex(0), vertex(1), vertex(2));
     if (!(squared < best.squared))
         return false;
     best.squared = squared;
@@ -163,14 +172,19 @@ bool visit(RTCPointQueryFunctionArguments *arguments)
     return true;
 }
 
-class distance {
-public:
+class distance
+{
+  public:
     static constexpr const char *name = "embree";
     static constexpr int doubles = 3;
     using answer_type = bench::hit;
 
-    // Compact: measured faster (5 to 25 %) and half the memory; a build of high quality takes three times as long and gains nothing here.
-    explicit distance(bool warm_) : tree(RTC_SCENE_FLAG_COMPACT, RTC_BUILD_QUALITY_MEDIUM), warm(warm_) {}
+    // Compact: measured faster (5 to 25 %) and half the memory; a build of high quality takes three
+    // times as long and gains nothing here.
+    explicit distance(bool warm_)
+        : tree(RTC_SCENE_FLAG_COMPACT, RTC_BUILD_QUALITY_MEDIUM), warm(warm_)
+    {
+    }
     void load(const char *path) { tree.load(path); }
     void build() { tree.build(nullptr); }
 
@@ -186,13 +200,14 @@ public:
         }
         RTCPointQueryContext context;
         rtcInitPointQueryContext(&context);
-        nearest best = { tree.triangles.xyz.data(), tree.triangles.corners.data(), INFINITY, UINT32_MAX };
+        nearest best = { tree.triangles.xyz.data(), tree.triangles.corners.data(), INFINITY,
+                         UINT32_MAX };
         rtcPointQuery(tree.handle, &query, &context, visit, &best);
         last_distance = std::sqrt(best.squared);
         return { last_distance, best.face == UINT32_MAX ? -1 : (int64_t)best.face };
     }
 
-private:
+  private:
     scene tree;
     bool warm;
     vec last_point = { 0, 0, 0 };
@@ -201,8 +216,9 @@ private:
 
 // ---- rays ----
 
-class first_hit {
-public:
+class first_hit
+{
+  public:
     static constexpr const char *name = "embree";
     static constexpr int doubles = 6;
     using answer_type = bench::hit;
@@ -225,13 +241,10 @@ public:
         return { r.ray.tfar, r.hit.geomID == RTC_INVALID_GEOMETRY_ID ? -1 : (int64_t)r.hit.primID };
     }
 
-private:
+  private:
     scene tree;
 };
 
 } // namespace
 
-int main(int argc, char **argv)
-{
-    return bench::main<inside, distance, first_hit>(argc, argv);
-}
+int main(int argc, char **argv) { return bench::main<inside, distance, first_hit>(argc, argv); }
