@@ -3,7 +3,7 @@
 #include <ebpo/query.h>
 #include <ebpo/view.h>
 
-#include "subset/parts.h"
+#include "subset/subset_parts.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 

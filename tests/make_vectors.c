@@ -11,7 +11,7 @@
 #include <ebpo/build.h>
 
 #include "random_tree.h"
-#include "subset/parts.h"
+#include "subset/subset_parts.h"
 #include "tree_json.h"
 #include "vector_read.h"
 

@@ -11,7 +11,7 @@
 #include "geom/predicates.h"
 #include "geom/predicates_expansion.h"
 #include "geom/distance.h"
-#include "geom/ray.h"
+#include "geom/ray_triangle.h"
 
 enum { ROUNDS = 3000 };
 

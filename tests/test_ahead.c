@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "query/ahead.h"
+#include "query/prefetch.h"
 #include "query_kit.h"
 
 static const struct {

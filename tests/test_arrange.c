@@ -9,8 +9,8 @@
 
 #include "arrange/arrange.h"
 #include "base/sort.h"
-#include "mesh/mesh.h"
-#include "morton/octcode.h"
+#include "mesh/mesh_parts.h"
+#include "octree/octcode.h"
 #include "solids.h"
 
 __attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
@@ -203,8 +203,8 @@ START_TEST(memory_does_not_change_the_order)
     ebpo_workspace *w = small.workspace;
     ck_assert(ebpo_mesh_arrange(&m, 2, silent, &error) == EBPO_OK);
     ck_assert_msg(ebpo_mesh_arrange(&small, 2, silent, &error) == EBPO_OK, "%s", error.message);
-    ebpo_workspace_figures f;
-    ebpo_workspace_tell(w, &f);
+    ebpo_workspace_stats f;
+    ebpo_workspace_get_stats(w, &f);
     ck_assert_uint_gt(f.filed_most, 20 << 20);
     ck_assert(memcmp(m.faces, small.faces, m.face_count * 12) == 0);
     ck_assert(memcmp(m.xyz64, small.xyz64, m.vertex_count * 24) == 0);

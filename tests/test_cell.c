@@ -7,7 +7,7 @@
 
 #include "exact_twin.h"
 #include "geom/cell.h"
-#include "morton/octcode.h"
+#include "octree/octcode.h"
 
 /* --- boxes --- */
 

@@ -10,12 +10,12 @@
 #include <sys/vfs.h>
 #include <unistd.h>
 
-#include "base/workspace.h"
+#include "base/arrays.h"
 #include "codec/coding.h"
 #include "container/plan.h"
 #include "container/reader.h"
 #include "import/import.h"
-#include "io/file.h"
+#include "io/file_source.h"
 #include "ply/ply.h"
 #include "tree_json.h"
 
@@ -378,11 +378,11 @@ START_TEST(workspaces_hold_arrays_beyond_4_gib_in_memory)
 {
     ebpo_workspace *w;
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_workspace_figures f;
+    ebpo_workspace_stats f;
     ck_assert_msg(ebpo_workspace_make_any(&w, 64 * FAR, folder, &error) == EBPO_OK, "%s",
                   error.message);
     touch_ends(w);
-    ebpo_workspace_tell(w, &f);
+    ebpo_workspace_get_stats(w, &f);
     ck_assert_uint_gt(f.held_most, FAR);
     ck_assert_uint_eq(f.filed_most, 0);
     ebpo_workspace_free(w);
@@ -406,13 +406,13 @@ START_TEST(workspaces_hold_arrays_beyond_4_gib_in_files)
 {
     ebpo_workspace *w;
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_workspace_figures f;
+    ebpo_workspace_stats f;
     if (!disk_lends(folder))
         return;
     ck_assert_msg(ebpo_workspace_make_any(&w, 1 << 20, folder, &error) == EBPO_OK, "%s",
                   error.message);
     touch_ends(w);
-    ebpo_workspace_tell(w, &f);
+    ebpo_workspace_get_stats(w, &f);
     ck_assert_uint_gt(f.filed_most, FAR);
     ebpo_workspace_free(w);
 }

@@ -16,7 +16,7 @@
 #include <ebpo/ebpo.h>
 
 #include "http/answer.h"
-#include "http/http.h"
+#include "http/http_source.h"
 #include "solids.h"
 #include "web.h"
 

@@ -8,10 +8,10 @@
 #include <ebpo/mesh.h>
 
 #include "base/endian.h"
-#include "base/workspace.h"
+#include "base/arrays.h"
 #include "ebpo_config.h"
 #include "import/import.h"
-#include "import/weld.h"
+#include "import/corner_weld.h"
 
 static ebpo_status import(ebpo_mesh *mesh, const char *name, const void *data, size_t size,
                           ebpo_error *error)

@@ -9,7 +9,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "io/file.h"
+#include "io/file_source.h"
 #include "io/publish.h"
 
 static char folder[] = "/tmp/ebpo-io-XXXXXX";

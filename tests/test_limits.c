@@ -7,20 +7,20 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include "build/builder.h"
+#include "construct/builder.h"
 #include "codec/coding.h"
-#include "container/facts.h"
+#include "container/head_facts.h"
 #include "container/plan.h"
 #include "container/slice_parts.h"
 #include "export/formats.h"
 #include "geom/strict_fp.h"
-#include "lod/pieces.h"
-#include "mesh/mesh.h"
-#include "morton/octcode.h"
+#include "lod/polyhedra.h"
+#include "mesh/mesh_parts.h"
+#include "octree/octcode.h"
 #include "random_tree.h"
 #include "stream/frontier.h"
-#include "stream/grown.h"
-#include "subtree/parts.h"
+#include "stream/partial_tree.h"
+#include "subtree/subtree_parts.h"
 
 static const uint64_t TWO32 = UINT64_C(1) << 32;
 static char path[] = "/tmp/ebpo-limits-XXXXXX";
@@ -374,18 +374,18 @@ END_TEST
 
 START_TEST(levels_of_too_many_vertices_are_refused_before_they_are_joined)
 {
-    ebpo_lod_piece half = { .vertex_count = UINT64_C(1) << 31, .face_count = 5 },
+    ebpo_polyhedra half = { .vertex_count = UINT64_C(1) << 31, .face_count = 5 },
                    faces = { .face_count = UINT64_C(1) << 31 };
-    ebpo_lod_piece *vertex_heavy[2] = { &half, &half }, *face_heavy[2] = { &faces, &faces };
+    ebpo_polyhedra *vertex_heavy[2] = { &half, &half }, *face_heavy[2] = { &faces, &faces };
     ebpo_mesh mesh;
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert_int_eq(ebpo_lod_join(&mesh, NULL, vertex_heavy, 2, &error), EBPO_E_LIMIT);
-    ck_assert_int_eq(ebpo_lod_join(&mesh, NULL, face_heavy, 2, &error), EBPO_E_LIMIT);
+    ck_assert_int_eq(ebpo_polyhedra_join(&mesh, NULL, vertex_heavy, 2, &error), EBPO_E_LIMIT);
+    ck_assert_int_eq(ebpo_polyhedra_join(&mesh, NULL, face_heavy, 2, &error), EBPO_E_LIMIT);
     ck_assert_msg(strstr(error.message, "coarser") != NULL, "%s", error.message);
     ebpo_polytope cube;
     ebpo_polytope_cube(&cube);
-    ebpo_lod_piece full = { .vertex_count = TWO32 - 8 };
-    ck_assert_int_eq(ebpo_lod_piece_add(&full, &cube, &(ebpo_box){ { 0, 0, 0 }, { 1, 1, 1 }, 0 },
+    ebpo_polyhedra full = { .vertex_count = TWO32 - 8 };
+    ck_assert_int_eq(ebpo_polyhedra_add(&full, &cube, &(ebpo_box){ { 0, 0, 0 }, { 1, 1, 1 }, 0 },
                                         (ebpo_cell){ 0, { 0, 0, 0 } }, EBPO_GRAY, true, &error),
                      EBPO_E_LIMIT);
 }
@@ -407,10 +407,10 @@ START_TEST(views_tell_groups_beyond_2_to_the_32_apart)
     ebpo_frontier_free(&frontier);
     ebpo_info *info = head_of(4, 4);
     info->level[0].gray_count = 1;
-    ebpo_grown grown = { .group_count = UINT32_MAX };
+    ebpo_partial grown = { .group_count = UINT32_MAX };
     ebpo_group *group = calloc(1, sizeof *group);
     group->types = EBPO_GRAY;
-    ck_assert_int_eq(ebpo_grown_add(&grown, info, 0, group, &error), EBPO_E_LIMIT);
+    ck_assert_int_eq(ebpo_partial_add(&grown, info, 0, group, &error), EBPO_E_LIMIT);
     ck_assert_msg(strstr(error.message, "budget") != NULL, "%s", error.message);
     free(group);
     free(info);

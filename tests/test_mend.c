@@ -7,8 +7,8 @@
 
 #include <ebpo/ebpo.h>
 
-#include "base/workspace.h"
-#include "mesh/mesh.h"
+#include "base/arrays.h"
+#include "mesh/mesh_parts.h"
 #include "solids.h"
 
 __attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
@@ -190,11 +190,11 @@ END_TEST
 START_TEST(memory_does_not_change_what_mending_makes)
 {
     ebpo_workspace *w;
-    ebpo_workspace_figures f;
+    ebpo_workspace_stats f;
     ebpo_error error = EBPO_ERROR_INIT;
     ck_assert(ebpo_workspace_make_any(&w, 2 << 20, NULL, &error) == EBPO_OK);
     mend_both(damaged(ebpo_test_solid_count + _i), ALL, w);
-    ebpo_workspace_tell(w, &f);
+    ebpo_workspace_get_stats(w, &f);
     ck_assert_uint_gt(f.filed_most, 8 << 20);
     ck_assert(f.held == 0 && f.filed == 0);
     ebpo_workspace_free(w);

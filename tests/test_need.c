@@ -11,7 +11,7 @@
 #include <ebpo/verify.h>
 
 #include "query_kit.h"
-#include "subset/parts.h"
+#include "subset/subset_parts.h"
 #include "twin_reach.h"
 
 __attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "ply/number.h"
+#include "ply/decimal.h"
 
 static uint64_t next(uint64_t *state)
 {

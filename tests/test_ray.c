@@ -9,7 +9,7 @@
 #include <gmp.h>
 
 #include "exact_twin.h"
-#include "geom/ray.h"
+#include "geom/ray_triangle.h"
 
 enum { ROUNDS = 11000, RAY_KINDS = 12, BOX_KINDS = 7 };
 

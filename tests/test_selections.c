@@ -12,9 +12,9 @@
 #include <ebpo/lod.h>
 #include <ebpo/verify.h>
 
-#include "base/workspace.h"
+#include "base/arrays.h"
 #include "geom/plane_code.h"
-#include "planes/hull.h"
+#include "planes/hull_directions.h"
 #include "planes/planes.h"
 #include "solids.h"
 
@@ -401,13 +401,13 @@ START_TEST(memory_does_not_change_what_is_selected)
         uint8_t a[32], b[32];
         ebpo_workspace *w;
         ebpo_error error = EBPO_ERROR_INIT;
-        ebpo_workspace_figures f;
+        ebpo_workspace_stats f;
         ck_assert_msg(ebpo_workspace_make_any(&w, 1 << 20, NULL, &error) == EBPO_OK, "%s",
                       error.message);
         digest_of(all[s], 5, 1, NULL, a);
         digest_of(all[s], 5, 2, w, b);
         ck_assert_mem_eq(a, b, 32);
-        ebpo_workspace_tell(w, &f);
+        ebpo_workspace_get_stats(w, &f);
         ck_assert(f.filed_total > 0 && f.filed == 0);
         ebpo_workspace_free(w);
     }

@@ -12,9 +12,9 @@
 #include <ebpo/stream.h>
 
 #include "geom/plane_code.h"
-#include "morton/octcode.h"
+#include "octree/octcode.h"
 #include "solids.h"
-#include "stream/world.h"
+#include "stream/cell_to_model.h"
 
 static char folder[] = "/tmp/ebpo-stream-XXXXXX", path[64];
 

@@ -15,7 +15,7 @@
 
 #include "container/reader.h"
 #include "query_kit.h"
-#include "subset/parts.h"
+#include "subset/subset_parts.h"
 
 __attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
 const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }

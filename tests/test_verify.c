@@ -9,7 +9,7 @@
 #include <ebpo/build.h>
 
 #include "solids.h"
-#include "verify/verify.h"
+#include "verify/verify_parts.h"
 
 static ebpo_tree tree; /* of the running test */
 static ebpo_tally tally;

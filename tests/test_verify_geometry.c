@@ -4,13 +4,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/workspace.h"
+#include "base/arrays.h"
 #include "geom/plane_code.h"
 #include "geom/predicates.h"
 #include "solids.h"
 #include "verify/containment.h"
 #include "verify/exact.h"
-#include "verify/rays.h"
+#include "verify/verify_rays.h"
 #include "verify/winding.h"
 
 enum { ROUNDS = 6000 };
@@ -103,8 +103,8 @@ START_TEST(half_space_certificates_agree_with_rationals)
             planes.n[0][k] = planes.normal[0][k];
         planes.bound[0] = planes.d[0] / 4096.0;
         uint64_t before = tally.violations[EBPO_VERIFY_CONTAINMENT];
-        ebpo_check_face_contained(&tally, &planes, &(ebpo_tree_view_node){ .code = 1 }, &frame,
-                                  &face, 0);
+        ebpo_check_face_contained(&tally, &planes, &(ebpo_twin_node){ .code = 1 }, &frame, &face,
+                                  0);
         bool exact =
             ebpo_exact_half_space(frame.low, frame.high, &face, planes.normal[0], planes.d[0]);
         ck_assert_int_eq(tally.violations[EBPO_VERIFY_CONTAINMENT] == before, exact);

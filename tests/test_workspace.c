@@ -9,7 +9,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/workspace.h"
+#include "base/arrays.h"
 
 static char folder[] = "/tmp/ebpo-workspace-XXXXXX";
 
@@ -45,11 +45,11 @@ START_TEST(what_does_not_fit_goes_to_files_without_names)
 {
     enum { MIB = 1 << 20 };
     ebpo_workspace *w = make(8 * MIB);
-    ebpo_workspace_figures f;
+    ebpo_workspace_stats f;
     char *small = ebpo_array_alloc(w, 1000, 1), *held = ebpo_array_alloc(w, 3 * MIB, 1),
          *filed = ebpo_array_zero(w, 5 * MIB, 1);
     ck_assert(small && held && filed);
-    ebpo_workspace_tell(w, &f);
+    ebpo_workspace_get_stats(w, &f);
     ck_assert_uint_eq(f.memory, 8 * MIB);
     ck_assert_uint_eq(f.held, 3 * MIB);
     ck_assert_uint_eq(f.filed, 5 * MIB);
@@ -78,8 +78,8 @@ START_TEST(growing_keeps_what_was_there)
         if (a[i] != i * 2654435761u)
             ck_abort_msg("number %lu changed", (unsigned long)i);
     ebpo_array_free(a);
-    ebpo_workspace_figures f;
-    ebpo_workspace_tell(w, &f);
+    ebpo_workspace_stats f;
+    ebpo_workspace_get_stats(w, &f);
     ck_assert(f.held == 0 && f.filed == 0 && f.filed_most > 0 && f.held_most > 0);
     ebpo_workspace_free(w);
 }
@@ -156,8 +156,8 @@ START_TEST(a_file_that_may_not_grow_is_an_error_that_names_the_folder)
     ck_assert_int_eq(ebpo_workspace_fail(w, 5 << 20, &error), EBPO_E_IO);
     ck_assert_msg(strstr(error.message, folder) && strstr(error.message, "5242880"), "%s",
                   error.message);
-    ebpo_workspace_figures f;
-    ebpo_workspace_tell(w, &f);
+    ebpo_workspace_stats f;
+    ebpo_workspace_get_stats(w, &f);
     ck_assert(f.held == 0 && f.filed == 0);
     ebpo_workspace_free(w);
 }

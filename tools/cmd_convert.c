@@ -229,11 +229,11 @@ static ebpo_status print_result(const values *v, const prepared *p, const char *
 static ebpo_status room_to_judge(const values *v, const prepared *p, const char *in,
                                  const ebpo_workspace *workspace, ebpo_error *error)
 {
-    ebpo_workspace_figures figures;
+    ebpo_workspace_stats figures;
     double leaves = 1800 / (double)v->leaf_faces,
            needed = (double)p->mesh.face_count * (130 + (leaves < 430 ? leaves : 430)) + (16 << 20);
     char bytes[32], budget[32];
-    ebpo_workspace_tell(workspace, &figures);
+    ebpo_workspace_get_stats(workspace, &figures);
     if (needed <= (double)figures.memory)
         return EBPO_OK;
     snprintf(error->message, sizeof error->message,

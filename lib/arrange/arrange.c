@@ -12,8 +12,8 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
-#include "mesh/mesh.h"
-#include "morton/octcode.h"
+#include "mesh/mesh_parts.h"
+#include "octree/octcode.h"
 
 enum { GRAIN = 1 << 15 };
 
@@ -313,9 +313,9 @@ static ebpo_status translate(void *context, uint64_t begin, uint64_t end, unsign
 static ebpo_status translate_faces(arranging *a, uint64_t *passes, ebpo_error *error)
 {
     ebpo_mesh *mesh = a->mesh;
-    ebpo_workspace_figures figures = { .memory = UINT64_MAX };
+    ebpo_workspace_stats figures = { .memory = UINT64_MAX };
     if (mesh->workspace)
-        ebpo_workspace_tell(mesh->workspace, &figures);
+        ebpo_workspace_get_stats(mesh->workspace, &figures);
     uint64_t window = figures.memory / 8 / sizeof *a->rank;
     a->rank_count = mesh->vertex_count < window ? mesh->vertex_count : window ? window : 1;
     a->rank = ebpo_alloc(a->rank_count, sizeof *a->rank);

@@ -89,8 +89,8 @@ static void *run_worker(void *argument)
     return NULL;
 }
 
-bool ebpo_tell(const ebpo_progress *progress, const char *stage, uint64_t done, uint64_t total,
-               ebpo_error *error)
+bool ebpo_progress_step(const ebpo_progress *progress, const char *stage, uint64_t done,
+                        uint64_t total, ebpo_error *error)
 {
     if (!progress || !progress->report || !*stage ||
         progress->report(progress->user, stage, done, total))
@@ -99,9 +99,9 @@ bool ebpo_tell(const ebpo_progress *progress, const char *stage, uint64_t done, 
     return false;
 }
 
-bool ebpo_stage(const ebpo_progress *progress, const char *stage, ebpo_error *error)
+bool ebpo_progress_stage(const ebpo_progress *progress, const char *stage, ebpo_error *error)
 {
-    return ebpo_tell(progress, stage, 0, 0, error);
+    return ebpo_progress_step(progress, stage, 0, 0, error);
 }
 
 static bool report_pass(void *user, const char *stage, uint64_t done, uint64_t total)
@@ -132,7 +132,7 @@ ebpo_status ebpo_parallel_for(unsigned threads, uint64_t count, uint64_t grain, 
               .lock = PTHREAD_MUTEX_INITIALIZER,
               .status = EBPO_OK };
     /* A stage is told when it begins, however short it will be: callers add up times by stages. */
-    if (!ebpo_tell(progress, stage, 0, count, error))
+    if (!ebpo_progress_step(progress, stage, 0, count, error))
         return EBPO_E_CANCELLED;
     threads = ebpo_thread_count(threads);
     uint64_t pieces = count / r.grain + 1;

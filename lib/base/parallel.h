@@ -23,18 +23,19 @@ ebpo_status ebpo_parallel_for(unsigned threads, uint64_t count, uint64_t grain, 
                               ebpo_error *error);
 
 /* A stage without pieces begins. False when it is to stop; `error` then says so. */
-bool ebpo_stage(const ebpo_progress *progress, const char *stage, ebpo_error *error);
+bool ebpo_progress_stage(const ebpo_progress *progress, const char *stage, ebpo_error *error);
 
 /* How far a stage without pieces is; false as above. Not more often than for each few thousand
  * steps. */
-bool ebpo_tell(const ebpo_progress *progress, const char *stage, uint64_t done, uint64_t total,
-               ebpo_error *error);
+bool ebpo_progress_step(const ebpo_progress *progress, const char *stage, uint64_t done,
+                        uint64_t total, ebpo_error *error);
 
 /* The same within a loop that goes through arrays in order. */
-static inline bool ebpo_tell_at(const ebpo_progress *progress, const char *stage, uint64_t i,
-                                uint64_t done, uint64_t total, ebpo_error *error)
+static inline bool ebpo_progress_step_at(const ebpo_progress *progress, const char *stage,
+                                         uint64_t i, uint64_t done, uint64_t total,
+                                         ebpo_error *error)
 {
-    return (i & 0xfffff) || ebpo_tell(progress, stage, done, total, error);
+    return (i & 0xfffff) || ebpo_progress_step(progress, stage, done, total, error);
 }
 
 /* One of several passes of a stage: what it tells of itself is told as a stretch, `begin` to `end`

@@ -213,7 +213,7 @@ static ebpo_status run_alone(sorting *t, ebpo_error *error)
 {
     const ebpo_sort *s = t->s;
     uint64_t whole[2] = { 0, s->count };
-    if (!ebpo_stage(s->progress, s->stage, error))
+    if (!ebpo_progress_stage(s->progress, s->stage, error))
         return EBPO_E_CANCELLED;
     t->dealt = ebpo_alloc(s->count, s->record);
     if (!t->dealt)
@@ -230,10 +230,10 @@ static ebpo_status run_alone(sorting *t, ebpo_error *error)
 static unsigned threads_for_groups(const sorting *t)
 {
     const ebpo_sort *s = t->s;
-    ebpo_workspace_figures figures = { .memory = UINT64_MAX };
+    ebpo_workspace_stats figures = { .memory = UINT64_MAX };
     uint64_t largest = 1;
     if (s->workspace)
-        ebpo_workspace_tell(s->workspace, &figures);
+        ebpo_workspace_get_stats(s->workspace, &figures);
     for (uint64_t g = 0; g < t->groups; g++)
         largest = t->first[g + 1] - t->first[g] > largest ? t->first[g + 1] - t->first[g] : largest;
     uint64_t fit =

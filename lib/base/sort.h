@@ -4,7 +4,7 @@
 #ifndef EBPO_BASE_SORT_H
 #define EBPO_BASE_SORT_H
 
-#include "base/workspace.h"
+#include "base/arrays.h"
 
 enum { EBPO_SORT_BINS = 1 << 18, EBPO_SORT_PASSES = 3, EBPO_SORT_RECORD_MOST = 64 };
 

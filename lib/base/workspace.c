@@ -1,4 +1,4 @@
-#include "base/workspace.h"
+#include "base/arrays.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -39,7 +39,7 @@ typedef struct block {
 struct ebpo_workspace {
     pthread_mutex_t lock; /* guards the figures */
     pthread_mutex_t pool_lock;
-    ebpo_workspace_figures figures;
+    ebpo_workspace_stats figures;
     uint64_t blocks;    /* and the owner is one */
     block *pool;        /* that the next part comes from; NULL: none */
     _Atomic int failed; /* errno of the last allocation in a file that failed, 0: memory */
@@ -295,7 +295,7 @@ void ebpo_workspace_free(ebpo_workspace *workspace)
         leave(workspace);
 }
 
-void ebpo_workspace_tell(const ebpo_workspace *workspace, ebpo_workspace_figures *out)
+void ebpo_workspace_get_stats(const ebpo_workspace *workspace, ebpo_workspace_stats *out)
 {
     ebpo_workspace *w = (ebpo_workspace *)workspace;
     pthread_mutex_lock(&w->lock);
@@ -308,7 +308,7 @@ void ebpo_workspace_tell(const ebpo_workspace *workspace, ebpo_workspace_figures
 /* Says where it goes, and counts it. */
 static bool admit(ebpo_workspace *w, size_t bytes)
 {
-    ebpo_workspace_figures *f = &w->figures;
+    ebpo_workspace_stats *f = &w->figures;
     pthread_mutex_lock(&w->lock);
     bool filed = f->held + bytes > f->memory / 2;
     if (filed) {

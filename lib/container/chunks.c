@@ -7,7 +7,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "base/workspace.h"
+#include "base/arrays.h"
 #include "codec/coding.h"
 #include "container/slice_parts.h"
 
@@ -17,16 +17,16 @@ enum { IDLE_MAX = 4, CHUNK_BITS = 48, AROUND = 4 };
 /* Announced for later: at most so much, and a share of what a limit leaves. */
 enum { AHEAD_MOST = 2 << 20, AHEAD_SHARE = 4 };
 
-struct ebpo_chunk_desk {
-    ebpo_chunk_desk *next;
+struct ebpo_chunk_scratch {
+    ebpo_chunk_scratch *next;
     ebpo_chunk_reader reader;
     uint8_t raw[EBPO_CHUNK_BYTES_MAX];
 };
 
-static ebpo_chunk_desk *take_desk(ebpo_chunks *c)
+static ebpo_chunk_scratch *take_scratch(ebpo_chunks *c)
 {
     pthread_mutex_lock(&c->lock);
-    ebpo_chunk_desk *desk = c->idle;
+    ebpo_chunk_scratch *desk = c->idle;
     if (desk) {
         c->idle = desk->next;
         c->idle_count--;
@@ -35,13 +35,13 @@ static ebpo_chunk_desk *take_desk(ebpo_chunks *c)
     return desk ? desk : ebpo_alloc_zero(1, sizeof *desk);
 }
 
-static void free_desk(ebpo_chunk_desk *desk)
+static void free_scratch(ebpo_chunk_scratch *desk)
 {
     ebpo_chunk_reader_clear(&desk->reader);
     free(desk);
 }
 
-static void give_desk(ebpo_chunks *c, ebpo_chunk_desk *desk)
+static void give_scratch(ebpo_chunks *c, ebpo_chunk_scratch *desk)
 {
     pthread_mutex_lock(&c->lock);
     bool keep = c->idle_count < IDLE_MAX;
@@ -52,7 +52,7 @@ static void give_desk(ebpo_chunks *c, ebpo_chunk_desk *desk)
     }
     pthread_mutex_unlock(&c->lock);
     if (!keep)
-        free_desk(desk);
+        free_scratch(desk);
 }
 
 static uint64_t key_of(const ebpo_array_in *array, uint64_t chunk)
@@ -252,7 +252,7 @@ void ebpo_chunks_announce(ebpo_chunks *c, const uint64_t *keys, unsigned now, un
         uint64_t left = c->limit > taken ? c->limit - taken : 0,
                  share = left / AHEAD_SHARE < AHEAD_MOST ? left / AHEAD_SHARE : AHEAD_MOST;
         if (is_ahead(c, keys[i]) || !fits(c, cost) || (i >= now && c->ahead_bytes + cost > share) ||
-            !ebpo_grow(&c->ahead, &c->ahead_room, c->ahead_count + 1, sizeof *c->ahead))
+            !ebpo_grow(&c->ahead, &c->ahead_capacity, c->ahead_count + 1, sizeof *c->ahead))
             continue;
         c->ahead[c->ahead_count++] = keys[i];
         c->ahead_bytes += cost;
@@ -299,7 +299,7 @@ static ebpo_status load(void *user, uint64_t key, void **item, uint64_t *bytes, 
         return allowed;
     uint64_t rows = chunk_rows(array, chunk_of(key));
     size_t row_bytes = ebpo_h5_row_bytes(&array->shape);
-    ebpo_chunk_desk *desk = take_desk(c);
+    ebpo_chunk_scratch *desk = take_scratch(c);
     void *made = desk ? ebpo_alloc(rows, row_bytes) : NULL;
     ebpo_status status = made ? EBPO_OK : ebpo_fail_memory(error, rows * row_bytes + sizeof *desk);
     if (!c->counted)
@@ -309,7 +309,7 @@ static ebpo_status load(void *user, uint64_t key, void **item, uint64_t *bytes, 
     if (status == EBPO_OK)
         status = decode(c, array, chunk_of(key), desk->raw, made, error);
     if (desk)
-        give_desk(c, desk);
+        give_scratch(c, desk);
     if (status == EBPO_OK) {
         *item = made;
         *bytes = rows * row_bytes;
@@ -366,9 +366,9 @@ void ebpo_chunks_free(ebpo_chunks *chunks)
         return;
     ebpo_cache_free(chunks->cache);
     while (chunks->idle) {
-        ebpo_chunk_desk *desk = chunks->idle;
+        ebpo_chunk_scratch *desk = chunks->idle;
         chunks->idle = desk->next;
-        free_desk(desk);
+        free_scratch(desk);
     }
     ebpo_array_free(chunks->seen);
     free(chunks->ahead);
@@ -388,8 +388,8 @@ void ebpo_held_chunk_release(ebpo_chunks *chunks, ebpo_held_chunk *view)
     *view = (ebpo_held_chunk){ .array = view->array };
 }
 
-ebpo_status ebpo_view_load(ebpo_chunks *chunks, ebpo_held_chunk *view, uint64_t row,
-                           ebpo_error *error)
+ebpo_status ebpo_held_chunk_load(ebpo_chunks *chunks, ebpo_held_chunk *view, uint64_t row,
+                                 ebpo_error *error)
 {
     uint64_t chunk = row / view->array->shape.chunk_rows;
     void *item;

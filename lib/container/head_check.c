@@ -3,7 +3,7 @@
 #include <math.h>
 
 #include "base/error.h"
-#include "container/facts.h"
+#include "container/head_facts.h"
 #include "container/schema.h"
 #include "geom/cell.h"
 

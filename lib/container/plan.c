@@ -7,10 +7,10 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "base/workspace.h"
+#include "base/arrays.h"
 #include "codec/coding.h"
-#include "container/check.h"
-#include "container/facts.h"
+#include "container/array_check.h"
+#include "container/head_facts.h"
 #include "ebpo_config.h"
 
 void ebpo_plan_free(ebpo_plan *plan)

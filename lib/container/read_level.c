@@ -6,7 +6,7 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
-#include "base/workspace.h"
+#include "base/arrays.h"
 #include "container/plan.h"
 #include "container/reader.h"
 

@@ -6,7 +6,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/fp_env.h"
-#include "base/workspace.h"
+#include "base/arrays.h"
 #include "codec/coding.h"
 #include "container/reader.h"
 

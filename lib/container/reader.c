@@ -7,7 +7,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "base/workspace.h"
+#include "base/arrays.h"
 #include "codec/coding.h"
 
 enum {

@@ -6,10 +6,10 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
-#include "container/check.h"
+#include "container/array_check.h"
 #include "container/schema.h"
 #include "h5/h5.h"
-#include "io/source.h"
+#include "io/byte_source.h"
 
 typedef struct ebpo_array_in {
     bool present;

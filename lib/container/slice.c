@@ -7,7 +7,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "base/workspace.h"
+#include "base/arrays.h"
 #include "container/slice_parts.h"
 #include "geom/plane_code.h"
 

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "base/error.h"
-#include "base/workspace.h"
+#include "base/arrays.h"
 #include "container/reader.h"
 #include "container/slice.h"
 

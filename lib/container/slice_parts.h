@@ -10,7 +10,7 @@
 
 /* --- chunks.c --- */
 
-typedef struct ebpo_chunk_desk ebpo_chunk_desk; /* what one loading thread needs */
+typedef struct ebpo_chunk_scratch ebpo_chunk_scratch; /* what one loading thread needs */
 
 struct ebpo_chunks {
     ebpo_file *file;
@@ -18,14 +18,14 @@ struct ebpo_chunks {
     /* [chunks of /mesh/faces] vertices seen before each; NULL: a single chunk, or no mesh */
     uint64_t *seen;
     pthread_mutex_t lock; /* of the desks that nobody uses */
-    ebpo_chunk_desk *idle;
+    ebpo_chunk_scratch *idle;
     unsigned idle_count;
     /* Of chunks made by ebpo_chunks_make_counted, which one thread uses at a time. */
     bool counted;
     bool refused;    /* a load has been refused because of the limit */
     uint64_t limit;  /* of the bytes that the file has read, announced ones included */
     uint64_t *ahead; /* [ahead_count] keys that have been announced and not been read yet */
-    uint64_t ahead_count, ahead_room, ahead_bytes;
+    uint64_t ahead_count, ahead_capacity, ahead_bytes;
 };
 
 /* A place in an array: at most one chunk, pinned while rows in it are wanted. Begin with { .array =
@@ -39,8 +39,8 @@ typedef struct ebpo_held_chunk {
     const uint8_t *rows;
 } ebpo_held_chunk;
 
-EBPO_MUST_USE ebpo_status ebpo_view_load(ebpo_chunks *chunks, ebpo_held_chunk *view, uint64_t row,
-                                         ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_held_chunk_load(ebpo_chunks *chunks, ebpo_held_chunk *view,
+                                               uint64_t row, ebpo_error *error);
 void ebpo_held_chunk_release(ebpo_chunks *chunks, ebpo_held_chunk *view);
 
 /* Pins the chunk that holds `row`, which the array has. Cheap while rows stay in one chunk. */
@@ -49,7 +49,7 @@ EBPO_MUST_USE static inline ebpo_status ebpo_held_chunk_move(ebpo_chunks *chunks
                                                              ebpo_error *error)
 {
     return row >= view->begin && row < view->end ? EBPO_OK
-                                                 : ebpo_view_load(chunks, view, row, error);
+                                                 : ebpo_held_chunk_load(chunks, view, row, error);
 }
 
 /* The same as ebpo_chunks_integers, in new memory; NULL for no rows. */

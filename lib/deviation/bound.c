@@ -1,6 +1,6 @@
 #include "geom/strict_fp.h"
 
-#include "deviation/pieces.h"
+#include "deviation/fragments.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -8,7 +8,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "query/model.h"
+#include "query/query_model.h"
 
 ebpo_status ebpo_bounder_make(ebpo_bounder *out, const ebpo_lod_model *whole, ebpo_model *model,
                               ebpo_error *error)
@@ -22,14 +22,14 @@ void ebpo_bounder_free(ebpo_bounder *b)
 {
     ebpo_context_free(b->context);
     free(b->scratch.faces);
-    free(b->pieces);
+    free(b->fragments);
     free(b->faces);
     memset(b, 0, sizeof *b);
 }
 
 /* --- what is known of a piece --- */
 
-static void find_centre(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_look *l)
+static void find_centre(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_fragment_measure *l)
 {
     ebpo_extent e;
     ebpo_extent_of(p, &e);
@@ -101,31 +101,31 @@ static void learn(ebpo_bounder *b, const double xi[3], double distance)
     b->target = fmax(b->target, b->ratio * b->lo);
 }
 
-static ebpo_status look_at(ebpo_bounder *b, const ebpo_piece *piece, ebpo_look *l)
+static ebpo_status look_at(ebpo_bounder *b, const ebpo_fragment *fragment, ebpo_fragment_measure *l)
 {
     double corner = 0;
     int farthest = 0;
-    find_centre(b, &piece->p, l);
+    find_centre(b, &fragment->p, l);
     ebpo_status status = ask(b, l->centre, &l->distance);
     if (status != EBPO_OK)
         return status;
     memcpy(l->face, b->context->warm_triangle, sizeof l->face);
     learn(b, l->centre, l->distance);
-    for (int i = 0; i < piece->p.vertex_count; i++) {
+    for (int i = 0; i < fragment->p.vertex_count; i++) {
         double d =
-            ebpo_cell_frame_distance(&b->frame, piece->p.vertex[i], (const double(*)[3])l->face);
+            ebpo_cell_frame_distance(&b->frame, fragment->p.vertex[i], (const double(*)[3])l->face);
         farthest = d > corner ? i : farthest;
         corner = fmax(corner, d);
     }
     l->upper =
-        fmin(fmin(piece->upper, corner), fmax(0, l->distance + l->reach)) + 4 * b->frame.grain;
+        fmin(fmin(fragment->upper, corner), fmax(0, l->distance + l->reach)) + 4 * b->frame.grain;
     if (l->upper <= b->target || (l->distance < 0 && corner <= -l->distance))
         return EBPO_OK;
     /* The likeliest place of the largest distance: that corner, moved off the rounded surface. */
     double xi[3], d;
     for (int k = 0; k < 3; k++)
-        xi[k] = fmin(fmax(piece->p.vertex[farthest][k] +
-                              1e-5 * (l->centre[k] - piece->p.vertex[farthest][k]),
+        xi[k] = fmin(fmax(fragment->p.vertex[farthest][k] +
+                              1e-5 * (l->centre[k] - fragment->p.vertex[farthest][k]),
                           0),
                      1);
     status = ask(b, xi, &d);
@@ -138,21 +138,21 @@ static ebpo_status look_at(ebpo_bounder *b, const ebpo_piece *piece, ebpo_look *
 
 static ebpo_status begin(ebpo_bounder *b)
 {
-    ebpo_tree_place place;
-    ebpo_piece *first = NULL;
+    ebpo_tree_node place;
+    ebpo_fragment *first = NULL;
     if (!ebpo_tree_find(b->whole, b->frame.cell, false, false, &place, NULL))
         return ebpo_fail(b->error, EBPO_E_ARGUMENT,
                          "the model has no node of level %d where the level has one: they are not "
                          "of the same file",
                          b->frame.cell.level);
-    b->piece_count = b->face_count = 0;
+    b->fragment_count = b->face_count = 0;
     if (place.type == EBPO_BLACK)
         return EBPO_OK;
-    ebpo_status status = ebpo_piece_push(b,
-                                         place.type == EBPO_GRAY   ? EBPO_PIECE_GRAY
-                                         : place.type == EBPO_LEAF ? EBPO_PIECE_LEAF
-                                                                   : EBPO_PIECE_OUT,
-                                         NULL, &first);
+    ebpo_status status = ebpo_fragment_push(b,
+                                            place.type == EBPO_GRAY   ? EBPO_FRAGMENT_GRAY
+                                            : place.type == EBPO_LEAF ? EBPO_FRAGMENT_LEAF
+                                                                      : EBPO_FRAGMENT_OUTSIDE,
+                                            NULL, &first);
     if (status != EBPO_OK)
         return status;
     ebpo_halves_cut(&b->halves, EBPO_CUT_SLACK, &first->p);
@@ -162,52 +162,52 @@ static ebpo_status begin(ebpo_bounder *b)
         for (int i = 0; i < first->p.vertex_count; i++)
             b->inner[k] += first->p.vertex[i][k] / first->p.vertex_count;
     }
-    return place.type == EBPO_LEAF ? ebpo_piece_leaf_faces(b, first, &place) : EBPO_OK;
+    return place.type == EBPO_LEAF ? ebpo_fragment_leaf_faces(b, first, &place) : EBPO_OK;
 }
 
 static ebpo_status step(ebpo_bounder *b)
 {
-    ebpo_piece piece;
-    ebpo_look l;
-    const ebpo_piece *top = &b->pieces[--b->piece_count];
-    memcpy(&piece, top, offsetof(ebpo_piece, p));
-    ebpo_polytope_copy(&piece.p, &top->p);
-    b->face_count = piece.face_first + piece.face_count;
-    if (piece.kind != EBPO_PIECE_OUT)
-        piece.upper =
-            fmin(piece.upper, ebpo_cell_frame_diagonal(&b->frame, piece.levels) + piece.beyond);
-    if (piece.upper <= b->target) {
-        ebpo_bound_settle(b, piece.upper);
+    ebpo_fragment fragment;
+    ebpo_fragment_measure l;
+    const ebpo_fragment *top = &b->fragments[--b->fragment_count];
+    memcpy(&fragment, top, offsetof(ebpo_fragment, p));
+    ebpo_polytope_copy(&fragment.p, &top->p);
+    b->face_count = fragment.face_first + fragment.face_count;
+    if (fragment.kind != EBPO_FRAGMENT_OUTSIDE)
+        fragment.upper = fmin(fragment.upper, ebpo_cell_frame_diagonal(&b->frame, fragment.levels) +
+                                                  fragment.beyond);
+    if (fragment.upper <= b->target) {
+        ebpo_bound_raise(b, fragment.upper);
         return EBPO_OK;
     }
-    ebpo_status status = look_at(b, &piece, &l);
+    ebpo_status status = look_at(b, &fragment, &l);
     if (status != EBPO_OK)
         return status;
-    piece.upper = l.upper;
-    if (l.upper <= b->target || l.reach < EBPO_PIECE_LEAST) {
-        ebpo_bound_settle(b, l.upper);
+    fragment.upper = l.upper;
+    if (l.upper <= b->target || l.reach < EBPO_FRAGMENT_LEAST) {
+        ebpo_bound_raise(b, l.upper);
         return EBPO_OK;
     }
-    return ebpo_piece_cut(b, &piece, &l);
+    return ebpo_fragment_cut(b, &fragment, &l);
 }
 
-ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound_wish *wish,
+ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound_goal *goal,
                                 ebpo_reach_bound *out, ebpo_error *error)
 {
     ebpo_box box = b->whole->box;
     ebpo_cell_frame_make(&b->frame, &box, cell);
     b->error = error;
-    b->target = ebpo_cell_frame_length(&b->frame, wish->enough) * (1 - 0x1p-40);
-    b->quit = ebpo_cell_frame_length(&b->frame, wish->too_much);
-    b->ratio = wish->ratio;
+    b->target = ebpo_cell_frame_length(&b->frame, goal->enough) * (1 - 0x1p-40);
+    b->quit = ebpo_cell_frame_length(&b->frame, goal->too_much);
+    b->ratio = goal->ratio;
     b->lo = b->hi = 0;
     b->questions = 0;
     ebpo_status status = begin(b);
-    while (status == EBPO_OK && b->piece_count && b->questions < wish->questions &&
+    while (status == EBPO_OK && b->fragment_count && b->questions < goal->questions &&
            b->lo <= b->quit)
         status = step(b);
-    for (uint64_t i = 0; i < b->piece_count; i++)
-        ebpo_bound_settle(b, b->pieces[i].upper);
+    for (uint64_t i = 0; i < b->fragment_count; i++)
+        ebpo_bound_raise(b, b->fragments[i].upper);
     *out = (ebpo_reach_bound){ b->lo > 0 ? ldexp(b->lo, b->frame.exponent) : 0,
                                ebpo_cell_frame_model_length(&b->frame, b->hi),
                                { b->place[0], b->place[1], b->place[2] },
@@ -225,11 +225,11 @@ static void merge(ebpo_reach_bound *known, const ebpo_reach_bound *found)
     memcpy(known->place, found->place, sizeof known->place);
 }
 
-ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound_wish *wish,
+ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound_goal *goal,
                                ebpo_reach_bound *out, ebpo_error *error)
 {
     ebpo_reach_bound found;
-    ebpo_bound_wish now = *wish;
+    ebpo_bound_goal now = *goal;
     uint64_t asked = 0;
     ebpo_status status = EBPO_OK;
     if (isinf(out->hi)) {
@@ -240,12 +240,12 @@ ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound
         out->hi = ebpo_cell_frame_model_length(&frame, ebpo_cell_frame_diagonal(&frame, 0));
     }
     for (;;) {
-        double good = fmax(wish->enough, wish->ratio * out->lo);
-        if (status != EBPO_OK || out->hi <= good || asked >= wish->questions ||
-            out->lo > wish->too_much)
+        double good = fmax(goal->enough, goal->ratio * out->lo);
+        if (status != EBPO_OK || out->hi <= good || asked >= goal->questions ||
+            out->lo > goal->too_much)
             return status;
         now.enough = fmax(out->hi / 2, good);
-        now.questions = wish->questions - asked;
+        now.questions = goal->questions - asked;
         status = ebpo_bound_envelope(b, cell, &now, &found, error);
         if (status != EBPO_OK)
             return status;

@@ -6,19 +6,19 @@
 #include "deviation/frame.h"
 #include "deviation/tree.h"
 
-typedef struct ebpo_piece ebpo_piece;
+typedef struct ebpo_fragment ebpo_fragment;
 
 /* What one thread works with. */
 typedef struct ebpo_bounder {
     const ebpo_lod_model *whole; /* the model's tree: what is solid */
     ebpo_context *context;       /* of the same file */
     ebpo_leaf_scratch scratch;
-    ebpo_halves halves; /* of the envelope */
-    ebpo_piece *pieces; /* a stack */
-    uint64_t piece_room, piece_count;
+    ebpo_halves halves;       /* of the envelope */
+    ebpo_fragment *fragments; /* a stack */
+    uint64_t fragment_capacity, fragment_count;
     /* faces of pieces within leaves, in the model's unit: a stack as well */
     double (*faces)[3][3];
-    uint64_t face_room, face_count;
+    uint64_t face_capacity, face_count;
     /* The node at hand: */
     ebpo_cell_frame frame;
     double target, quit, ratio, lo, hi, place[3];
@@ -28,13 +28,13 @@ typedef struct ebpo_bounder {
 } ebpo_bounder;
 
 /* What is wanted; lengths in the model's unit. */
-typedef struct ebpo_bound_wish {
+typedef struct ebpo_bound_goal {
     double enough;   /* an upper bound of so much is good enough; 0: none is */
     double too_much; /* stop once it certainly reaches farther; INFINITY: never */
     /* an upper bound of `ratio` times the lower one is good enough, > 1; 0: none is */
     double ratio;
     uint64_t questions; /* stop after about so many distances */
-} ebpo_bound_wish;
+} ebpo_bound_goal;
 
 typedef struct ebpo_reach_bound {
     double lo, hi;   /* the model's unit */
@@ -54,14 +54,14 @@ void ebpo_bounder_free(ebpo_bounder *b);
  * planes, until each is inside or outside. The order and the cuts depend on the envelope alone, so
  * with a larger `enough` no more is asked. */
 EBPO_MUST_USE ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell,
-                                              const ebpo_bound_wish *wish, ebpo_reach_bound *out,
+                                              const ebpo_bound_goal *goal, ebpo_reach_bound *out,
                                               ebpo_error *error);
 
 /* The same for a `ratio`, from what is known on entry in *out (0, INFINITY and 0 questions:
  * nothing): step by step with half the upper bound, so that far places are found before close ones
  * are looked at closely, and with what is certain when the questions are spent. */
 EBPO_MUST_USE ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell,
-                                             const ebpo_bound_wish *wish, ebpo_reach_bound *out,
+                                             const ebpo_bound_goal *goal, ebpo_reach_bound *out,
                                              ebpo_error *error);
 
 #endif

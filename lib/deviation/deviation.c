@@ -14,7 +14,7 @@
 #include "base/parallel.h"
 #include "deviation/bound.h"
 #include "deviation/samples.h"
-#include "query/model.h"
+#include "query/query_model.h"
 
 /* of one node: what is left to find then lies in flat places, close to the model */
 enum { BLOCK_MOST = 512, QUESTIONS_MOST = 1 << 16 };
@@ -31,7 +31,7 @@ typedef struct survey {
     uint64_t count, room, *order;
     ebpo_bounder *bounders; /* [threads] */
     unsigned threads;
-    ebpo_bound_wish wish;
+    ebpo_bound_goal goal;
     uint64_t first; /* of `order`, of the block at hand */
     const ebpo_progress *progress;
     ebpo_error *error;
@@ -39,7 +39,7 @@ typedef struct survey {
 
 /* --- the level's nodes --- */
 
-static ebpo_status add_node(survey *s, const ebpo_tree_place *place)
+static ebpo_status add_node(survey *s, const ebpo_tree_node *place)
 {
     if (!ebpo_grow(&s->nodes, &s->room, s->count + 1, sizeof *s->nodes))
         return ebpo_fail_memory(s->error, (s->count + 1) * sizeof *s->nodes);
@@ -47,7 +47,7 @@ static ebpo_status add_node(survey *s, const ebpo_tree_place *place)
     return EBPO_OK;
 }
 
-static ebpo_status list_nodes(survey *s, const ebpo_tree_place *place)
+static ebpo_status list_nodes(survey *s, const ebpo_tree_node *place)
 {
     if (place->type == EBPO_LEAF)
         return add_node(s, place);
@@ -57,7 +57,7 @@ static ebpo_status list_nodes(survey *s, const ebpo_tree_place *place)
         return add_node(s, place);
     ebpo_status status = EBPO_OK;
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
-        ebpo_tree_place child = ebpo_tree_child(s->tree, place, octant);
+        ebpo_tree_node child = ebpo_tree_child(s->tree, place, octant);
         status = list_nodes(s, &child);
     }
     return status;
@@ -67,15 +67,15 @@ static ebpo_status list_nodes(survey *s, const ebpo_tree_place *place)
 
 static ebpo_status bound_node(survey *s, ebpo_bounder *b, level_node *node, ebpo_error *error)
 {
-    ebpo_tree_place place;
+    ebpo_tree_node place;
     ebpo_status status = EBPO_OK;
     (void)ebpo_tree_find(s->tree, node->cell, true, true, &place, &b->halves);
     if (place.type == EBPO_LEAF && s->tree->leaf_source == EBPO_LEAF_DERIVED)
         status = ebpo_tree_derive(s->tree, &place, &b->scratch, &b->halves, error);
     if (status != EBPO_OK)
         return status;
-    return s->wish.ratio > 0 ? ebpo_bound_closely(b, node->cell, &s->wish, &node->bound, error)
-                             : ebpo_bound_envelope(b, node->cell, &s->wish, &node->bound, error);
+    return s->goal.ratio > 0 ? ebpo_bound_closely(b, node->cell, &s->goal, &node->bound, error)
+                             : ebpo_bound_envelope(b, node->cell, &s->goal, &node->bound, error);
 }
 
 static ebpo_status bound_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -142,16 +142,16 @@ static ebpo_status search(survey *s, const ebpo_deviation_options *o, ebpo_devia
 {
     uint64_t done = 0, block = 4, asked = count_questions(s);
     ebpo_status status = EBPO_OK;
-    s->wish.ratio = 1 + o->tolerance;
+    s->goal.ratio = 1 + o->tolerance;
     while (done < s->count && status == EBPO_OK && (!o->questions || asked < o->questions)) {
         uint64_t size = 0;
-        s->wish.enough = (1 + o->tolerance) * out->lo;
+        s->goal.enough = (1 + o->tolerance) * out->lo;
         while (size < block && done + size < s->count &&
-               s->nodes[s->order[done + size]].bound.hi > s->wish.enough)
+               s->nodes[s->order[done + size]].bound.hi > s->goal.enough)
             size++;
         if (!size)
             break;
-        s->wish.questions = o->questions ? (o->questions - asked) / size + 1 : QUESTIONS_MOST;
+        s->goal.questions = o->questions ? (o->questions - asked) / size + 1 : QUESTIONS_MOST;
         s->first = done;
         uint64_t before = 0, after = 0;
         for (uint64_t i = 0; i < size; i++)
@@ -173,14 +173,14 @@ static ebpo_status search(survey *s, const ebpo_deviation_options *o, ebpo_devia
 
 static ebpo_status bound_level(survey *s, const ebpo_deviation_options *o, ebpo_deviation *out)
 {
-    ebpo_tree_place root;
+    ebpo_tree_node root;
     (void)ebpo_tree_find(s->tree, (ebpo_cell){ 0, { 0, 0, 0 } }, false, false, &root, NULL);
     ebpo_status status = list_nodes(s, &root);
     if (status == EBPO_OK && !(s->order = ebpo_alloc(s->count, sizeof *s->order)))
         status = ebpo_fail_memory(s->error, s->count * sizeof *s->order);
     for (uint64_t i = 0; i < s->count && status == EBPO_OK; i++)
         s->order[i] = i;
-    s->wish = (ebpo_bound_wish){ 0, INFINITY, 0, 1 };
+    s->goal = (ebpo_bound_goal){ 0, INFINITY, 0, 1 };
     if (status == EBPO_OK)
         status = ebpo_parallel_for(s->threads, s->count, 16, bound_some, s, s->progress,
                                    "looking at envelopes", s->error);

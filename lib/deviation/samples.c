@@ -15,8 +15,8 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "deviation/frame.h"
-#include "morton/octcode.h"
-#include "query/model.h"
+#include "octree/octcode.h"
+#include "query/query_model.h"
 
 typedef struct sampling {
     const ebpo_deviation_options *o;

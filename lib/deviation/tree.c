@@ -74,14 +74,14 @@ void ebpo_halves_cut(const ebpo_halves *halves, double slack, ebpo_polytope *out
 
 /* --- places --- */
 
-bool ebpo_tree_is_pruned(const ebpo_lod_model *tree, const ebpo_tree_place *gray)
+bool ebpo_tree_is_pruned(const ebpo_lod_model *tree, const ebpo_tree_node *gray)
 {
     return gray->cell.level >= tree->target ||
            tree->level[gray->cell.level + 1].types[gray->rank] == 0;
 }
 
 static void find_in_group(const ebpo_lod_model *tree, uint64_t group, unsigned octant,
-                          ebpo_tree_place *out)
+                          ebpo_tree_node *out)
 {
     const ebpo_lod_index *index = &tree->index[out->cell.level];
     uint16_t types = tree->level[out->cell.level].types[group];
@@ -93,17 +93,17 @@ static void find_in_group(const ebpo_lod_model *tree, uint64_t group, unsigned o
         out->rank += index->leaf_before[group];
 }
 
-ebpo_tree_place ebpo_tree_child(const ebpo_lod_model *tree, const ebpo_tree_place *gray,
-                                unsigned octant)
+ebpo_tree_node ebpo_tree_child(const ebpo_lod_model *tree, const ebpo_tree_node *gray,
+                               unsigned octant)
 {
-    ebpo_tree_place child = { { gray->cell.level + 1, { 0, 0, 0 } }, EBPO_WHITE, 0 };
+    ebpo_tree_node child = { { gray->cell.level + 1, { 0, 0, 0 } }, EBPO_WHITE, 0 };
     for (unsigned k = 0; k < 3; k++)
         child.cell.at[k] = 2 * gray->cell.at[k] + (octant >> k & 1);
     find_in_group(tree, gray->rank, octant, &child);
     return child;
 }
 
-static void add_own(const ebpo_lod_model *tree, const ebpo_tree_place *place, ebpo_halves *halves)
+static void add_own(const ebpo_lod_model *tree, const ebpo_tree_node *place, ebpo_halves *halves)
 {
     const ebpo_level *level = &tree->level[place->cell.level];
     const ebpo_lod_index *index = &tree->index[place->cell.level];
@@ -117,9 +117,9 @@ static void add_own(const ebpo_lod_model *tree, const ebpo_tree_place *place, eb
 }
 
 bool ebpo_tree_find(const ebpo_lod_model *tree, ebpo_cell cell, bool planes, bool own,
-                    ebpo_tree_place *out, ebpo_halves *halves)
+                    ebpo_tree_node *out, ebpo_halves *halves)
 {
-    *out = (ebpo_tree_place){ { 0, { 0, 0, 0 } }, EBPO_WHITE, 0 };
+    *out = (ebpo_tree_node){ { 0, { 0, 0, 0 } }, EBPO_WHITE, 0 };
     find_in_group(tree, 0, 0, out);
     if (halves)
         halves->count = 0;
@@ -140,7 +140,7 @@ bool ebpo_tree_find(const ebpo_lod_model *tree, ebpo_cell cell, bool planes, boo
     return true;
 }
 
-ebpo_status ebpo_tree_derive(const ebpo_lod_model *tree, const ebpo_tree_place *leaf,
+ebpo_status ebpo_tree_derive(const ebpo_lod_model *tree, const ebpo_tree_node *leaf,
                              ebpo_leaf_scratch *scratch, ebpo_halves *halves, ebpo_error *error)
 {
     ebpo_polytope inherited;

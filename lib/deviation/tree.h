@@ -5,14 +5,14 @@
 
 #include <ebpo/query.h>
 
-#include "lod/model.h"
+#include "lod/lod_model.h"
 
 /* A node's place in its level. */
-typedef struct ebpo_tree_place {
+typedef struct ebpo_tree_node {
     ebpo_cell cell;
     ebpo_node_type type;
     uint64_t rank; /* among the level's nodes of its type */
-} ebpo_tree_place;
+} ebpo_tree_node;
 
 /* A half-space in the coordinates of a cell: 4096 (n . xi) <= d, exactly. */
 typedef struct ebpo_half {
@@ -39,17 +39,17 @@ EBPO_MUST_USE ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, ebpo_file *f
  * that the file stores for the node. `planes` false: as if there were none in the file. False:
  * there is no such node. */
 bool ebpo_tree_find(const ebpo_lod_model *tree, ebpo_cell cell, bool planes, bool own,
-                    ebpo_tree_place *out, ebpo_halves *halves);
+                    ebpo_tree_node *out, ebpo_halves *halves);
 
 /* Child of a gray node that has a next level. */
-ebpo_tree_place ebpo_tree_child(const ebpo_lod_model *tree, const ebpo_tree_place *gray,
-                                unsigned octant);
+ebpo_tree_node ebpo_tree_child(const ebpo_lod_model *tree, const ebpo_tree_node *gray,
+                               unsigned octant);
 
 /* True when the gray node has no children in its file. */
-bool ebpo_tree_is_pruned(const ebpo_lod_model *tree, const ebpo_tree_place *gray);
+bool ebpo_tree_is_pruned(const ebpo_lod_model *tree, const ebpo_tree_node *gray);
 
 /* Adds the half-spaces that ebpo_lod_level derives for a leaf of a file without stored ones. */
-EBPO_MUST_USE ebpo_status ebpo_tree_derive(const ebpo_lod_model *tree, const ebpo_tree_place *leaf,
+EBPO_MUST_USE ebpo_status ebpo_tree_derive(const ebpo_lod_model *tree, const ebpo_tree_node *leaf,
                                            ebpo_leaf_scratch *scratch, ebpo_halves *halves,
                                            ebpo_error *error);
 

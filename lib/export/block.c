@@ -8,7 +8,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "morton/octcode.h"
+#include "octree/octcode.h"
 
 const ebpo_column ebpo_columns[EBPO_COLUMNS] = {
     { "octcode", EBPO_H5_I64 },     /* of the node; mesh 0 */

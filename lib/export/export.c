@@ -9,7 +9,7 @@
 #include "base/fp_env.h"
 #include "export/block.h"
 #include "export/formats.h"
-#include "io/file.h"
+#include "io/file_source.h"
 
 const char *ebpo_export_format_name(ebpo_export_format format)
 {

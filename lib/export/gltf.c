@@ -15,7 +15,7 @@
 #include "export/block.h"
 #include "export/floats.h"
 #include "export/formats.h"
-#include "io/file.h"
+#include "io/file_source.h"
 #include "io/publish.h"
 
 enum {

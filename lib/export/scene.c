@@ -31,7 +31,7 @@ ebpo_status ebpo_export_scene(const ebpo_export_job *job, ebpo_error *error)
 #include "export/floats.h"
 #include "export/scene_file.h"
 #include "import/assimp_lock.h"
-#include "io/file.h"
+#include "io/file_source.h"
 
 enum { PARTS_MAX = EBPO_LEVELS_MAX + 1 };
 

@@ -10,7 +10,7 @@
 #include <string.h>
 
 #include "base/error.h"
-#include "io/file.h"
+#include "io/file_source.h"
 
 typedef struct cursor {
     ebpo_scene_file *target;

@@ -8,7 +8,7 @@
 #include "base/error.h"
 #include "export/block.h"
 #include "export/formats.h"
-#include "io/file.h"
+#include "io/file_source.h"
 #include "io/publish.h"
 
 enum { XDMF_POLYHEDRON = 16 };

@@ -6,7 +6,7 @@
  * filters. */
 #include "geom/strict_fp.h"
 
-#include "geom/ray.h"
+#include "geom/ray_triangle.h"
 
 #include "geom/predicates.h"
 

@@ -3,7 +3,7 @@
 #ifndef EBPO_GEOM_RAY_EXACT_H
 #define EBPO_GEOM_RAY_EXACT_H
 
-#include "geom/ray.h"
+#include "geom/ray_triangle.h"
 
 /* The same meaning and ranges as the functions of ray.h without "_exact". Each call allocates
  * through GMP, which ends the program when memory is out (a few kilobytes suffice). */

@@ -6,7 +6,7 @@
 
 #include <ebpo/base.h>
 
-#include "io/source.h"
+#include "io/byte_source.h"
 
 /* One file's bytes as libhdf5 gets them, buffered: our writer puts headers at the start of the
  * file, and the index of large arrays in one piece behind the first levels. */

@@ -7,7 +7,7 @@
 #include <ebpo/base.h>
 
 #include "codec/chunk.h"
-#include "io/source.h"
+#include "io/byte_source.h"
 
 typedef int64_t ebpo_h5_id; /* an open object; negative: none */
 

@@ -2,7 +2,7 @@
 #include <string.h>
 
 #include "base/error.h"
-#include "http/http.h"
+#include "http/http_source.h"
 
 ebpo_status ebpo_source_of_url(ebpo_source *out, const char *url, const ebpo_http_options *options,
                                ebpo_error *error)

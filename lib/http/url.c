@@ -1,7 +1,7 @@
 #include <string.h>
 #include <strings.h>
 
-#include "http/http.h"
+#include "http/http_source.h"
 
 bool ebpo_is_url(const char *name)
 {

@@ -2,7 +2,7 @@
 
 #include "base/error.h"
 #include "ebpo_config.h"
-#include "io/file.h"
+#include "io/file_source.h"
 
 #if !EBPO_HAVE_ASSIMP
 
@@ -36,11 +36,11 @@ ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const 
 #include <string.h>
 
 #include "base/alloc.h"
-#include "base/workspace.h"
+#include "base/arrays.h"
 #include "geom/polygon.h"
 #include "import/assimp_lock.h"
 #include "import/off_check.h"
-#include "import/weld.h"
+#include "import/corner_weld.h"
 
 #define MOST (UINT64_C(0xfffffffe))
 
@@ -63,10 +63,10 @@ static ebpo_status check_budget(ebpo_import_format format, uint64_t size,
                                 const ebpo_workspace *workspace, const char *name,
                                 ebpo_error *error)
 {
-    ebpo_workspace_figures figures = { .memory = UINT64_MAX };
+    ebpo_workspace_stats figures = { .memory = UINT64_MAX };
     uint64_t need;
     if (workspace)
-        ebpo_workspace_tell(workspace, &figures);
+        ebpo_workspace_get_stats(workspace, &figures);
     if (!ebpo_mul_ok(size, bytes_each[format], &need) || need > figures.memory)
         return ebpo_fail(error, EBPO_E_LIMIT,
                          "%s: reading it takes some %" PRIu64
@@ -215,13 +215,13 @@ static void copy_positions(float *xyz, const struct aiScene *scene)
     }
 }
 
-typedef struct polygon_room {
+typedef struct polygon_capacity {
     double (*position)[3];
     uint32_t (*triangle)[3];
     void *scratch;
-} polygon_room;
+} polygon_capacity;
 
-static bool polygon_room_get(polygon_room *room, uint64_t corners)
+static bool polygon_room_get(polygon_capacity *room, uint64_t corners)
 {
     room->position = ebpo_alloc(corners, sizeof *room->position);
     room->triangle = ebpo_alloc(corners, sizeof *room->triangle);
@@ -229,7 +229,7 @@ static bool polygon_room_get(polygon_room *room, uint64_t corners)
     return room->position && room->triangle && room->scratch;
 }
 
-static void polygon_room_free(polygon_room *room)
+static void polygon_room_free(polygon_capacity *room)
 {
     free(room->position);
     free(room->triangle);
@@ -238,7 +238,7 @@ static void polygon_room_free(polygon_room *room)
 
 /* `map`: from this assimp mesh's vertices to ours. */
 static ebpo_status add_face(ebpo_mesh *mesh, const struct aiFace *face, const uint32_t *map,
-                            const polygon_room *room, const char *name, ebpo_error *error)
+                            const polygon_capacity *room, const char *name, ebpo_error *error)
 {
     uint32_t n = face->mNumIndices;
     if (n < 3) {
@@ -269,7 +269,7 @@ static ebpo_status add_face(ebpo_mesh *mesh, const struct aiFace *face, const ui
 }
 
 static ebpo_status add_faces(ebpo_mesh *mesh, const struct aiScene *scene, const uint32_t *map,
-                             const polygon_room *room, const char *name, ebpo_error *error)
+                             const polygon_capacity *room, const char *name, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (unsigned i = 0; i < scene->mNumMeshes; i++) {
@@ -288,7 +288,7 @@ static ebpo_status convert(ebpo_mesh *mesh, const struct aiScene *scene, const c
                            ebpo_error *error)
 {
     totals t = { 0, 0, 3 };
-    polygon_room room = { NULL, NULL, NULL };
+    polygon_capacity room = { NULL, NULL, NULL };
     uint32_t *map = NULL;
     float *smaller;
     ebpo_status status = scene_totals(&t, scene, name, error);

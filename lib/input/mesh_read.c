@@ -7,10 +7,10 @@
 #include "base/fp_env.h"
 #include "base/parallel.h"
 #include "base/sha256.h"
-#include "base/workspace.h"
+#include "base/arrays.h"
 #include "import/import.h"
-#include "io/file.h"
-#include "mesh/mesh.h"
+#include "io/file_source.h"
+#include "mesh/mesh_parts.h"
 #include "ply/ply.h"
 
 void ebpo_mesh_free(ebpo_mesh *mesh)
@@ -72,7 +72,7 @@ static ebpo_status parse(ebpo_mesh *out, const ebpo_whole_file *file, const char
         return ebpo_ply_parse_memory(out, file->data, file->size, path, workspace, threads,
                                      progress, error);
     if (ebpo_import_recognise(&format, file->data, file->size, path))
-        return !ebpo_stage(progress, "reading", error)
+        return !ebpo_progress_stage(progress, "reading", error)
                    ? EBPO_E_CANCELLED
                    : ebpo_import_memory(out, format, file->data, file->size, path, workspace,
                                         error);

@@ -11,7 +11,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "io/file.h"
+#include "io/file_source.h"
 
 /* Names of the temporary files in the making. Fixed storage and lock-free states, because a signal
  * handler reads them. */

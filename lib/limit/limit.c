@@ -12,8 +12,8 @@
 #include "base/fp_env.h"
 #include "base/parallel.h"
 #include "container/rule.h"
-#include "limit/hull.h"
-#include "lod/model.h"
+#include "limit/qhull.h"
+#include "lod/lod_model.h"
 
 /* A node whose hull is wanted. */
 typedef struct wanted {
@@ -28,7 +28,7 @@ typedef struct scratch {
     uint32_t *list;
     ebpo_triangle *faces;
     double *points;
-    uint64_t list_count, list_room, faces_room, point_count, points_room;
+    uint64_t list_count, list_capacity, faces_room, point_count, points_room;
     ebpo_limit sum;
 } scratch;
 
@@ -37,7 +37,7 @@ typedef struct job {
     ebpo_mesh mesh;
     int level;
     wanted *nodes;
-    uint64_t node_count, node_room;
+    uint64_t node_count, node_capacity;
     double *volume; /* [node_count] in cells */
     /* white, black: such nodes in the groups before; where their windings are stored */
     uint64_t *empty_before[EBPO_LEVELS_MAX][2];
@@ -69,7 +69,7 @@ static bool list_node(job *j, uint64_t group, unsigned octant, ebpo_cell cell)
     rank += type == EBPO_GRAY ? index->gray_before[group] : index->leaf_before[group];
     if (type == EBPO_GRAY && cell.level < j->level)
         return list_group(j, rank, cell);
-    if (!ebpo_grow(&j->nodes, &j->node_room, j->node_count + 1, sizeof *j->nodes))
+    if (!ebpo_grow(&j->nodes, &j->node_capacity, j->node_count + 1, sizeof *j->nodes))
         return false;
     j->nodes[j->node_count++] = (wanted){ cell, rank, type == EBPO_GRAY };
     return true;
@@ -97,7 +97,7 @@ static bool take_leaf(const job *j, scratch *s, int number, uint64_t leaf)
 {
     const ebpo_level *level = &j->model.level[number];
     uint64_t refs = level->leaf_ref_count[leaf], fresh = level->leaf_new[leaf];
-    if (!ebpo_grow(&s->list, &s->list_room, s->list_count + refs + fresh, sizeof *s->list))
+    if (!ebpo_grow(&s->list, &s->list_capacity, s->list_count + refs + fresh, sizeof *s->list))
         return false;
     if (refs)
         memcpy(s->list + s->list_count, level->leaf_refs + j->model.index[number].ref_first[leaf],

@@ -1,7 +1,7 @@
 #include "geom/strict_fp.h"
 
 #include "base/error.h"
-#include "limit/hull.h"
+#include "limit/qhull.h"
 
 ebpo_status ebpo_hull_new(ebpo_hull **out, ebpo_error *error)
 {

@@ -12,9 +12,9 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
-#include "lod/model.h"
-#include "lod/pieces.h"
-#include "morton/octcode.h"
+#include "lod/lod_model.h"
+#include "lod/polyhedra.h"
+#include "octree/octcode.h"
 
 enum { SEEDS_WANTED = 128 };
 
@@ -31,13 +31,13 @@ typedef struct job {
     int split;            /* level at which the first walk leaves seeds */
     seed *seeds;
     uint64_t seed_count;
-    ebpo_lod_piece (*pieces)[EBPO_LEVELS_MAX]; /* [1 + seed_count]: of the top, then of each seed */
+    ebpo_polyhedra (*pieces)[EBPO_LEVELS_MAX]; /* [1 + seed_count]: of the top, then of each seed */
     ebpo_leaf_scratch *scratch;                /* [threads] */
 } job;
 
 typedef struct walker {
     job *j;
-    ebpo_lod_piece *out; /* [EBPO_LEVELS_MAX] */
+    ebpo_polyhedra *out; /* [EBPO_LEVELS_MAX] */
     ebpo_leaf_scratch *scratch;
     int stop; /* gray nodes of this level are not descended into */
     ebpo_error *error;
@@ -51,12 +51,12 @@ static double cell_volume(const ebpo_box *box, int level)
 
 static ebpo_status emit(walker *w, const ebpo_polytope *p, ebpo_cell cell, ebpo_node_type type)
 {
-    ebpo_lod_piece *piece = &w->out[cell.level];
+    ebpo_polyhedra *piece = &w->out[cell.level];
     piece->volume += ebpo_polytope_volume(p) * cell_volume(&w->j->model->box, cell.level);
     if (!w->j->polygons)
         return EBPO_OK;
     piece->wants_nodes = w->j->nodes;
-    return ebpo_lod_piece_add(piece, p, &w->j->model->box, cell, type, w->j->walls, w->error);
+    return ebpo_polyhedra_add(piece, p, &w->j->model->box, cell, type, w->j->walls, w->error);
 }
 
 static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell,
@@ -205,7 +205,7 @@ static ebpo_status join(job *j, ebpo_mesh *out, ebpo_lod_nodes *nodes, double *v
                         ebpo_error *error)
 {
     uint64_t count = j->seed_count + 1, listed = 0;
-    ebpo_lod_piece **list = ebpo_alloc(count * EBPO_LEVELS_MAX, sizeof *list);
+    ebpo_polyhedra **list = ebpo_alloc(count * EBPO_LEVELS_MAX, sizeof *list);
     if (!list)
         return ebpo_fail_memory(error, count * EBPO_LEVELS_MAX * sizeof *list);
     double sum = 0;
@@ -216,7 +216,7 @@ static ebpo_status join(job *j, ebpo_mesh *out, ebpo_lod_nodes *nodes, double *v
         }
     if (volume)
         *volume = sum;
-    ebpo_status status = out ? ebpo_lod_join(out, nodes, list, listed, error) : EBPO_OK;
+    ebpo_status status = out ? ebpo_polyhedra_join(out, nodes, list, listed, error) : EBPO_OK;
     free(list);
     return status;
 }
@@ -225,7 +225,7 @@ static void job_free(job *j, unsigned threads)
 {
     for (uint64_t i = 0; j->pieces && i <= j->seed_count; i++)
         for (int level = 0; level < EBPO_LEVELS_MAX; level++)
-            ebpo_lod_piece_free(&j->pieces[i][level]);
+            ebpo_polyhedra_free(&j->pieces[i][level]);
     for (unsigned i = 0; j->scratch && i < threads; i++)
         free(j->scratch[i].faces);
     free(j->pieces);

@@ -6,7 +6,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/sort.h"
-#include "base/workspace.h"
+#include "base/arrays.h"
 
 #define NONE UINT64_MAX
 

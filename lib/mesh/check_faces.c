@@ -6,9 +6,9 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "base/workspace.h"
+#include "base/arrays.h"
 #include "geom/predicates.h"
-#include "mesh/check_parts.h"
+#include "mesh/mesh_check_parts.h"
 
 enum { FACE_GRAIN = 1 << 14 };
 

@@ -6,8 +6,8 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "base/workspace.h"
-#include "mesh/check_parts.h"
+#include "base/arrays.h"
+#include "mesh/mesh_check_parts.h"
 
 enum { STAR_GRAIN = 1 << 13, INSERTION_LIMIT = 32 };
 

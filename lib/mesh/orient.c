@@ -7,8 +7,8 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
-#include "base/workspace.h"
-#include "mesh/mesh.h"
+#include "base/arrays.h"
+#include "mesh/mesh_parts.h"
 #include "mesh/stars.h"
 #include "mesh/sum.h"
 

@@ -8,7 +8,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "base/workspace.h"
+#include "base/arrays.h"
 
 enum { VERTEX_GRAIN = 1 << 14 };
 

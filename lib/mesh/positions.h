@@ -2,7 +2,7 @@
 #ifndef EBPO_MESH_POSITIONS_H
 #define EBPO_MESH_POSITIONS_H
 
-#include "mesh/mesh.h"
+#include "mesh/mesh_parts.h"
 
 /* A hash table of all positions; each keeps the lowest vertex number that has it. 5.3 to 10.7 bytes
  * a vertex. */

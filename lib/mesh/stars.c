@@ -5,7 +5,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "base/workspace.h"
+#include "base/arrays.h"
 
 enum { FACE_GRAIN = 1 << 15, INSERTION_LIMIT = 48 };
 

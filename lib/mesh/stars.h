@@ -2,7 +2,7 @@
 #ifndef EBPO_MESH_STARS_H
 #define EBPO_MESH_STARS_H
 
-#include "mesh/mesh.h"
+#include "mesh/mesh_parts.h"
 
 /* Compressed rows: the faces at vertex v are face[first[v] .. first[v + 1]), each once, in no
  * particular order. 12 bytes a face and 8 bytes a vertex. */

@@ -6,8 +6,8 @@
 #include <stdlib.h>
 
 #include "base/alloc.h"
-#include "base/workspace.h"
-#include "mesh/mesh.h"
+#include "base/arrays.h"
+#include "mesh/mesh_parts.h"
 
 static double triangle_area(const ebpo_chain *c, uint32_t i, uint32_t j, uint32_t k)
 {

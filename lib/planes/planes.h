@@ -44,8 +44,9 @@ typedef struct ebpo_choice {
 /* A selection: takes planes from the candidates, clips `envelope` by them and writes their codes;
  * returns how many, -1: out of memory. Adding a method means one function of this shape, a line in
  * selections.c, and its name in three lists: ebpo_selection (build.h), SELECTIONS
- * (container/facts.c), selection_words (the tool's words.c). Codes may come in any order; the count
- * of candidates is at most EBPO_PLANES_CANDIDATES from the root down, anything from the leaves up.
+ * (container/head_facts.c), selection_words (the tool's words.c). Codes may come in any order; the
+ * count of candidates is at most EBPO_PLANES_CANDIDATES from the root down, anything from the
+ * leaves up.
  */
 typedef int (*ebpo_select_fn)(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes);
 

@@ -8,7 +8,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/fp_env.h"
-#include "query/ahead.h"
+#include "query/prefetch.h"
 #include "query/clock.h"
 #include "query/inside.h"
 #include "query/limited.h"
@@ -17,7 +17,7 @@
 #include "query/nearest.h"
 #include "query/options.h"
 #include "query/pruned.h"
-#include "query/walk.h"
+#include "query/query_node.h"
 
 /* --- exact: every subtree that may hold something nearer --- */
 
@@ -28,7 +28,7 @@ static bool put_off(ebpo_context *c, const ebpo_nearest *n, const ebpo_spot *spo
     uint64_t key = ebpo_entry_value(spot->entry);
     if (n->deadline || (c->pinned && c->pinned_key == key) ||
         ebpo_cache_has(c->model->cache, key) ||
-        !ebpo_grow(&c->later, &c->later_room, c->later_count + 1, sizeof *c->later))
+        !ebpo_grow(&c->later, &c->later_capacity, c->later_count + 1, sizeof *c->later))
         return false;
     c->later[c->later_count++] = (ebpo_ranked){ *spot, lower };
     return true;
@@ -54,7 +54,7 @@ static bool is_late(ebpo_nearest *n, double lower)
 static ebpo_status search_top(ebpo_context *c, ebpo_nearest *n, const ebpo_box *box, ebpo_spot spot,
                               double lower, ebpo_error *error)
 {
-    if (lower > n->limit || ebpo_spot_is_settled(&spot) || is_late(n, lower) ||
+    if (lower > n->limit || ebpo_spot_is_uniform(&spot) || is_late(n, lower) ||
         ebpo_spot_is_pruned(c->model, &spot)) /* pruned: see look_at_pruned */
         return EBPO_OK;
     if (ebpo_spot_is_below(&spot)) {
@@ -109,7 +109,7 @@ static ebpo_status pruned_within(ebpo_context *c, const ebpo_nearest *n, const e
 {
     const ebpo_model *m = c->model;
     ebpo_status status = EBPO_OK;
-    if (lower > n->limit || ebpo_spot_is_settled(&spot) || !ebpo_spot_is_gray(m, &spot))
+    if (lower > n->limit || ebpo_spot_is_uniform(&spot) || !ebpo_spot_is_gray(m, &spot))
         return EBPO_OK;
     if (ebpo_spot_is_pruned(m, &spot) || (ebpo_spot_is_below(&spot) && n->late)) {
         *nearest = fmin(*nearest, lower);
@@ -158,8 +158,8 @@ ebpo_status ebpo_give_sign(ebpo_context *c, const double p[3], const ebpo_query_
 
 static void look_ahead(ebpo_context *c, const double p[3], double reach)
 {
-    if (ebpo_looks_ahead(c->model))
-        ebpo_context_look_ahead(c, p, reach);
+    if (ebpo_model_prefetches(c->model))
+        ebpo_context_prefetch(c, p, reach);
 }
 
 static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_query_options *o,
@@ -171,7 +171,7 @@ static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_query_op
         n.deadline = ebpo_clock() + o->deadline_ns;
     if (o->warm && c->warm)
         ebpo_nearest_begin_with(&n, (const double(*)[3])c->warm_triangle, c->warm_face,
-                                c->warm_told);
+                                c->warm_source_face);
     ebpo_status status = search_everything(c, &n, error);
     if (status == EBPO_OK)
         status = look_at_pruned(c, &n, error);
@@ -192,7 +192,7 @@ static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_query_op
         return EBPO_OK;
     c->warm = true;
     c->warm_face = n.file_face;
-    c->warm_told = n.told_face;
+    c->warm_source_face = n.source_face;
     memcpy(c->warm_triangle, n.triangle, sizeof n.triangle);
     return ebpo_give_sign(c, p, o, out, error);
 }
@@ -211,7 +211,7 @@ typedef struct interval {
 static ebpo_status narrow(interval *v, ebpo_spot spot, double lower, ebpo_error *error)
 {
     const ebpo_model *m = v->c->model;
-    if (lower > v->hi || ebpo_spot_is_settled(&spot))
+    if (lower > v->hi || ebpo_spot_is_uniform(&spot))
         return EBPO_OK;
     v->hi = fmin(v->hi, ebpo_cell_far(&v->box, spot.level, spot.at, v->p));
     if (spot.level >= v->o->level || !ebpo_spot_is_gray(m, &spot) ||

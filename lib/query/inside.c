@@ -139,7 +139,7 @@ static ebpo_status answer_in_leaf(ebpo_context *context, const ebpo_subtree *s,
                                   const double p[3], ebpo_inside_result *out, ebpo_error *error)
 {
     const ebpo_model *m = context->model;
-    if (!ebpo_grow(&context->open, &context->open_room, (uint64_t)leaf->blocks * EBPO_BLOCK,
+    if (!ebpo_grow(&context->open, &context->open_capacity, (uint64_t)leaf->blocks * EBPO_BLOCK,
                    sizeof *context->open))
         return ebpo_fail_memory(error, (uint64_t)leaf->blocks * EBPO_BLOCK * sizeof *context->open);
     int32_t winding;
@@ -166,7 +166,7 @@ ebpo_status ebpo_inside_leaf(ebpo_context *context, const ebpo_subtree *s, uint3
     return answer_in_leaf(context, s, &s->leaf[number], &i, p, out, error);
 }
 
-void ebpo_inside_settled(const ebpo_context *context, uint32_t entry, ebpo_inside_result *out)
+void ebpo_inside_uniform(const ebpo_context *context, uint32_t entry, ebpo_inside_result *out)
 {
     int32_t winding = ebpo_entry_winding(entry);
     *out = (ebpo_inside_result){ ebpo_rule_inside(context->model->info->rule, winding) ? EBPO_IN
@@ -187,8 +187,8 @@ ebpo_status ebpo_inside_subtree(ebpo_context *context, const ebpo_subtree *s, co
 {
     int level, fine = context->model->info->level_count - 1;
     uint32_t entry = ebpo_descend(&s->nodes, fine, at, &level);
-    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_SETTLED) {
-        ebpo_inside_settled(context, entry, out);
+    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_UNIFORM) {
+        ebpo_inside_uniform(context, entry, out);
         return EBPO_OK;
     }
     if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW)
@@ -303,8 +303,8 @@ static ebpo_status inside_together(ebpo_context *context, const ebpo_subtree *s,
     for (unsigned i = 0; i < count; i++) {
         if (!l[i].within) {
             out[i] = (ebpo_inside_result){ EBPO_OUT, 0, 0 };
-        } else if (ebpo_entry_kind_of(l[i].entry) == EBPO_ENTRY_SETTLED) {
-            ebpo_inside_settled(context, l[i].entry, &out[i]);
+        } else if (ebpo_entry_kind_of(l[i].entry) == EBPO_ENTRY_UNIFORM) {
+            ebpo_inside_uniform(context, l[i].entry, &out[i]);
         } else if (ebpo_entry_kind_of(l[i].entry) == EBPO_ENTRY_BELOW) {
             ebpo_status status = ebpo_inside_pruned(context, points + 3 * i, &out[i], error);
             if (status != EBPO_OK)

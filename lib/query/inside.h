@@ -2,7 +2,7 @@
 #ifndef EBPO_QUERY_INSIDE_H
 #define EBPO_QUERY_INSIDE_H
 
-#include "query/model.h"
+#include "query/query_model.h"
 
 /* In a leaf of a subtree: `at` is its cell at `level`, which holds p. */
 EBPO_MUST_USE ebpo_status ebpo_inside_leaf(ebpo_context *context, const ebpo_subtree *s,
@@ -15,7 +15,7 @@ EBPO_MUST_USE ebpo_status ebpo_inside_pruned(ebpo_context *context, const double
                                              ebpo_inside_result *out, ebpo_error *error);
 
 /* In a white or black node. */
-void ebpo_inside_settled(const ebpo_context *context, uint32_t entry, ebpo_inside_result *out);
+void ebpo_inside_uniform(const ebpo_context *context, uint32_t entry, ebpo_inside_result *out);
 
 /* In a subtree whose root holds p; `at` is p's cell at the file's deepest level. */
 EBPO_MUST_USE ebpo_status ebpo_inside_subtree(ebpo_context *context, const ebpo_subtree *s,

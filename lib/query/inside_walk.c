@@ -7,7 +7,7 @@
 #include "query/limited.h"
 #include "query/locate.h"
 #include "query/pruned.h"
-#include "query/walk.h"
+#include "query/query_node.h"
 
 static bool uses_envelopes(const ebpo_context *c, const ebpo_query_options *o)
 {
@@ -58,8 +58,8 @@ static ebpo_status walk_down(asking *a, ebpo_inside_result *out, ebpo_error *err
     int fine = m->info->level_count - 1;
     ebpo_spot spot = ebpo_spot_root(m);
     for (;;) {
-        if (ebpo_spot_is_settled(&spot)) {
-            ebpo_inside_settled(a->context, spot.entry, out);
+        if (ebpo_spot_is_uniform(&spot)) {
+            ebpo_inside_uniform(a->context, spot.entry, out);
             return EBPO_OK;
         }
         if (outside_envelope(a, &spot)) {
@@ -187,8 +187,8 @@ static ebpo_status walk_nodes(asking *a, ebpo_inside_result *out, ebpo_error *er
     int fine = m->info->level_count - 1;
     ebpo_spot spot = ebpo_spot_root(m);
     while (!ebpo_spot_is_below(&spot)) {
-        if (ebpo_spot_is_settled(&spot)) {
-            ebpo_inside_settled(a->context, spot.entry, out);
+        if (ebpo_spot_is_uniform(&spot)) {
+            ebpo_inside_uniform(a->context, spot.entry, out);
             return EBPO_OK;
         }
         if (outside_envelope(a, &spot)) {
@@ -232,8 +232,8 @@ static bool answer_at_hand(asking *a, ebpo_inside_result *out, ebpo_status *stat
     uint32_t entry;
     const ebpo_subtree *held = held_around(a, &entry);
     *status = EBPO_OK;
-    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_SETTLED) {
-        ebpo_inside_settled(a->context, entry, out);
+    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_UNIFORM) {
+        ebpo_inside_uniform(a->context, entry, out);
         return true;
     }
     if (!held)
@@ -251,8 +251,8 @@ static bool answer_at_hand(asking *a, ebpo_inside_result *out, ebpo_status *stat
                        level,
                        { a->at[0] >> (fine - level), a->at[1] >> (fine - level),
                          a->at[2] >> (fine - level) } };
-    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_SETTLED)
-        ebpo_inside_settled(a->context, entry, out);
+    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_UNIFORM)
+        ebpo_inside_uniform(a->context, entry, out);
     else if (ebpo_clock() > a->deadline)
         maybe(m, &spot, out);
     else

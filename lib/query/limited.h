@@ -2,7 +2,7 @@
 #ifndef EBPO_QUERY_LIMITED_H
 #define EBPO_QUERY_LIMITED_H
 
-#include "query/model.h"
+#include "query/query_model.h"
 
 /* Point in solid from node to node: with envelopes, to a level, against the clock, or because not
  * everything is in memory. */

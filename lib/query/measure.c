@@ -18,7 +18,7 @@
 #include "base/parallel.h"
 #include "container/reader.h"
 #include "geom/double_double.h"
-#include "mesh/mesh.h"
+#include "mesh/mesh_parts.h"
 
 enum { BLOCK_FACES = 16384 };
 

@@ -5,13 +5,13 @@
 #include <math.h>
 
 #include "geom/polytope.h"
-#include "lod/model.h"
+#include "lod/lod_model.h"
 #include "query/inside.h"
 #include "query/limited.h"
 #include "query/locate.h"
 #include "query/nearest.h"
 #include "query/pruned.h"
-#include "query/walk.h"
+#include "query/query_node.h"
 
 static const ebpo_distance_result nothing = { INFINITY,          0,           INFINITY,
                                               { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
@@ -19,7 +19,7 @@ static const ebpo_distance_result nothing = { INFINITY,          0,           IN
 static ebpo_status all_leaves(ebpo_context *c, ebpo_nearest *n, ebpo_spot spot, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    if (ebpo_spot_is_settled(&spot))
+    if (ebpo_spot_is_uniform(&spot))
         return EBPO_OK;
     if (ebpo_spot_is_below(&spot)) {
         status = ebpo_spot_enter(c, &spot, error);
@@ -47,7 +47,7 @@ ebpo_status ebpo_distance_around(ebpo_context *c, const double p[3], const ebpo_
         return EBPO_OK;
     ebpo_spot spot = ebpo_spot_root(c->model), gray = spot;
     ebpo_status status = EBPO_OK;
-    while (status == EBPO_OK && !ebpo_spot_is_settled(&spot)) {
+    while (status == EBPO_OK && !ebpo_spot_is_uniform(&spot)) {
         if (ebpo_spot_is_below(&spot))
             status = ebpo_spot_enter(c, &spot, error);
         if (status != EBPO_OK || ebpo_entry_kind_of(spot.entry) == EBPO_ENTRY_LEAF)
@@ -57,7 +57,7 @@ ebpo_status ebpo_distance_around(ebpo_context *c, const double p[3], const ebpo_
     }
     ebpo_nearest n;
     ebpo_nearest_begin(&n, p, o->max_distance);
-    if (status == EBPO_OK && !ebpo_spot_is_settled(&spot))
+    if (status == EBPO_OK && !ebpo_spot_is_uniform(&spot))
         ebpo_nearest_leaf(&n, spot.subtree, &spot.subtree->leaf[ebpo_entry_value(spot.entry)]);
     else if (status == EBPO_OK && o->mode == EBPO_DISTANCE_RECURSIVE)
         status = all_leaves(c, &n, gray, error);

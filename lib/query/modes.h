@@ -2,7 +2,7 @@
 #ifndef EBPO_QUERY_MODES_H
 #define EBPO_QUERY_MODES_H
 
-#include "query/model.h"
+#include "query/query_model.h"
 
 /* Makes an answer's distance negative inside: solids, unless unsigned. Shared with the exact
  * distance. */

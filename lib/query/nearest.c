@@ -46,24 +46,24 @@ void ebpo_nearest_begin(ebpo_nearest *n, const double p[3], double max_distance)
 }
 
 static void take(ebpo_nearest *n, const double triangle[3][3], const ebpo_distance_bounds *bounds,
-                 uint64_t file_face, uint64_t told_face)
+                 uint64_t file_face, uint64_t source_face)
 {
     n->found = true;
     n->bounds = *bounds;
     n->file_face = file_face;
-    n->told_face = told_face;
+    n->source_face = source_face;
     memcpy(n->triangle, triangle, sizeof n->triangle);
     n->upper = fmin(n->upper, bounds->hi);
     n->limit = fmin(n->limit, bounds->hi);
 }
 
 void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint64_t file_face,
-                             uint64_t told_face)
+                             uint64_t source_face)
 {
     ebpo_distance_bounds b;
     ebpo_triangle_distance_bounds(n->p, (const double(*)[3])triangle, &b);
     if (b.lo <= n->limit)
-        take(n, triangle, &b, file_face, told_face);
+        take(n, triangle, &b, file_face, source_face);
 }
 
 static bool same_corner(const double a[3], const double b[3])
@@ -115,7 +115,7 @@ static void look_at(ebpo_nearest *n, const ebpo_subtree *s, uint32_t slot)
         if (sign > 0 || (sign == 0 && file_face > n->file_face))
             return;
     }
-    take(n, (const double(*)[3])triangle, &b, file_face, ebpo_subtree_told_face(s, local));
+    take(n, (const double(*)[3])triangle, &b, file_face, ebpo_subtree_source_face(s, local));
 }
 
 void ebpo_nearest_leaf(ebpo_nearest *n, const ebpo_subtree *s, const ebpo_subtree_leaf *leaf)
@@ -368,5 +368,5 @@ void ebpo_nearest_end(const ebpo_nearest *n, double max_distance, ebpo_distance_
     out->distance = out->lo = out->hi = exact.distance;
     memcpy(out->point, exact.point, sizeof out->point);
     ebpo_triangle_unit_normal((const double(*)[3])n->triangle, out->normal);
-    out->face = n->told_face;
+    out->face = n->source_face;
 }

@@ -3,7 +3,7 @@
 #define EBPO_QUERY_NEAREST_H
 
 #include "geom/distance.h"
-#include "query/model.h"
+#include "query/query_model.h"
 
 typedef struct ebpo_nearest {
     double p[3];
@@ -12,7 +12,7 @@ typedef struct ebpo_nearest {
     bool found;
     ebpo_distance_bounds bounds; /* of the winner */
     double triangle[3][3];
-    uint64_t file_face, told_face;
+    uint64_t file_face, source_face;
     uint64_t deadline;  /* of ebpo_clock, or 0 */
     bool late;          /* it passed */
     double passed_over; /* lower bound of what was not looked at for want of time */
@@ -23,7 +23,7 @@ void ebpo_nearest_begin(ebpo_nearest *n, const double p[3], double max_distance)
 
 /* Begins with a face of the model that is known from before. */
 void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint64_t file_face,
-                             uint64_t told_face);
+                             uint64_t source_face);
 
 /* Searches all faces of a subtree. */
 void ebpo_nearest_search(ebpo_nearest *n, const ebpo_context *context, const ebpo_subtree *s);

@@ -8,7 +8,7 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "container/reader.h"
-#include "query/ahead.h"
+#include "query/prefetch.h"
 #include "query/inside.h"
 #include "query/limited.h"
 
@@ -75,9 +75,9 @@ ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64
         return ebpo_inside_whole(context, points, count, out, error);
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
         status = ebpo_inside_walk(context, points + 3 * i, o, &out[i], error);
-        if (status == EBPO_OK && ebpo_looks_ahead(m) &&
+        if (status == EBPO_OK && ebpo_model_prefetches(m) &&
             (o->level < 0 || o->level > m->top->cut_level))
-            ebpo_context_look_ahead(context, points + 3 * i, 0);
+            ebpo_context_prefetch(context, points + 3 * i, 0);
     }
     return status;
 }

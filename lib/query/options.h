@@ -2,7 +2,7 @@
 #ifndef EBPO_QUERY_OPTIONS_H
 #define EBPO_QUERY_OPTIONS_H
 
-#include "query/model.h"
+#include "query/query_model.h"
 
 EBPO_MUST_USE ebpo_status ebpo_check_options(const ebpo_query_options *options, ebpo_error *error);
 /* EBPO_E_ABSENT when the file has no mesh. */

@@ -52,7 +52,7 @@ typedef struct checking {
 static ebpo_status check(const checking *k, ebpo_spot spot, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    if (ebpo_spot_is_settled(&spot) || !ebpo_spot_is_gray(k->context->model, &spot) ||
+    if (ebpo_spot_is_uniform(&spot) || !ebpo_spot_is_gray(k->context->model, &spot) ||
         !k->matters(k->user, &k->box, &spot))
         return EBPO_OK;
     if (ebpo_spot_is_below(&spot)) /* fails for pruned ones */

@@ -2,7 +2,7 @@
 #ifndef EBPO_QUERY_PRUNED_H
 #define EBPO_QUERY_PRUNED_H
 
-#include "query/walk.h"
+#include "query/query_node.h"
 
 /* EBPO_E_ABSENT: the question needs what was left out below this node. Says which file, where, and
  * what it was cut to. */

@@ -55,7 +55,7 @@ static ebpo_status check(const ebpo_observer *o, ebpo_error *error)
 }
 
 /* Side walls: inward normals t * forward +- right, where t is the tangent of half the angle. */
-static ebpo_status make_frustum(ebpo_sight *s, const ebpo_observer *o, double tangent,
+static ebpo_status make_frustum(ebpo_viewpoint *s, const ebpo_observer *o, double tangent,
                                 ebpo_error *error)
 {
     double forward[3], side[2][3], up[3];
@@ -80,8 +80,8 @@ static ebpo_status make_frustum(ebpo_sight *s, const ebpo_observer *o, double ta
     return EBPO_OK;
 }
 
-ebpo_status ebpo_sight_make(ebpo_sight *out, const ebpo_box *box, const ebpo_observer *observer,
-                            ebpo_error *error)
+ebpo_status ebpo_viewpoint_make(ebpo_viewpoint *out, const ebpo_box *box,
+                                const ebpo_observer *observer, ebpo_error *error)
 {
     memset(out, 0, sizeof *out);
     if (!observer)
@@ -105,7 +105,7 @@ ebpo_status ebpo_sight_make(ebpo_sight *out, const ebpo_box *box, const ebpo_obs
     return make_frustum(out, observer, tangent, error);
 }
 
-ebpo_seen ebpo_sight_look(const ebpo_sight *s, const ebpo_box *box, ebpo_cell cell)
+ebpo_seen ebpo_viewpoint_see(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_cell cell)
 {
     ebpo_seen out = { 0, true };
     double low[3], high[3]; /* from the eye */
@@ -129,17 +129,17 @@ ebpo_seen ebpo_sight_look(const ebpo_sight *s, const ebpo_box *box, ebpo_cell ce
     return out;
 }
 
-double ebpo_sight_distance(const ebpo_sight *s, double distance2)
+double ebpo_viewpoint_distance(const ebpo_viewpoint *s, double distance2)
 {
     return s->given ? sqrt(distance2) * s->unit : NAN;
 }
 
-double ebpo_sight_pixels(const ebpo_sight *s, int level, double distance2)
+double ebpo_viewpoint_pixels(const ebpo_viewpoint *s, int level, double distance2)
 {
     return s->given ? s->focal * sqrt(s->diagonal2[level] / distance2) : NAN;
 }
 
-unsigned ebpo_sight_octant(const ebpo_sight *s, const ebpo_box *box, ebpo_cell cell)
+unsigned ebpo_viewpoint_octant(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_cell cell)
 {
     unsigned octant = 0;
     for (int k = 0; k < 3 && s->given; k++)
@@ -150,7 +150,7 @@ unsigned ebpo_sight_octant(const ebpo_sight *s, const ebpo_box *box, ebpo_cell c
 
 /* Octants from the root down, each as seen from the eye: reading them as one number gives the
  * enumeration's order. */
-static uint64_t enumerate(const ebpo_sight *s, const ebpo_box *box, ebpo_octcode octcode)
+static uint64_t enumerate(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_octcode octcode)
 {
     int level = ebpo_octcode_level(octcode);
     ebpo_cell cell = ebpo_cell_of_octcode(octcode);
@@ -159,7 +159,7 @@ static uint64_t enumerate(const ebpo_sight *s, const ebpo_box *box, ebpo_octcode
         int below = level - i;
         ebpo_cell above = { i, { cell.at[0] >> below, cell.at[1] >> below, cell.at[2] >> below } };
         unsigned octant = octcode >> 3 * (below - 1) & 7;
-        key |= (uint64_t)(octant ^ ebpo_sight_octant(s, box, above))
+        key |= (uint64_t)(octant ^ ebpo_viewpoint_octant(s, box, above))
                << 3 * (EBPO_MAX_LEVEL - 1 - i);
     }
     return key;
@@ -173,8 +173,8 @@ static uint64_t bits(double v)
     return out;
 }
 
-uint64_t ebpo_sight_key(const ebpo_sight *s, const ebpo_box *box, ebpo_priority priority,
-                        ebpo_octcode octcode, double distance2)
+uint64_t ebpo_viewpoint_key(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_priority priority,
+                            ebpo_octcode octcode, double distance2)
 {
     switch (priority) {
     case EBPO_PRIORITY_DISTANCE: return bits(distance2);

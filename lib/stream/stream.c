@@ -13,8 +13,8 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
-#include "stream/node.h"
-#include "stream/walk.h"
+#include "stream/stream_node.h"
+#include "stream/level_walk.h"
 
 enum { PIECE = 4096 };
 
@@ -27,9 +27,9 @@ struct ebpo_stream {
     ebpo_level kept[EBPO_LEVELS_MAX];
     uint64_t bytes;
     double settled; /* volume of the leaves and black nodes of all levels before the next one */
-    ebpo_walk walk;
-    ebpo_walk_envelopes *envelopes; /* with polygons */
-    ebpo_node_room room;
+    ebpo_level_walk walk;
+    ebpo_level_walk_envelopes *envelopes; /* with polygons */
+    ebpo_node_buffers room;
 };
 
 ebpo_status ebpo_stream_new(ebpo_stream **out, ebpo_file *file, const ebpo_stream_options *options,
@@ -134,9 +134,9 @@ typedef struct volumes {
 typedef struct job {
     const ebpo_stream *stream;
     int target;
-    ebpo_walk *starts;              /* [pieces] */
-    volumes *found;                 /* [pieces] */
-    ebpo_walk_envelopes *envelopes; /* [threads] */
+    ebpo_level_walk *starts;              /* [pieces] */
+    volumes *found;                       /* [pieces] */
+    ebpo_level_walk_envelopes *envelopes; /* [threads] */
 } job;
 
 static ebpo_status sum_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -146,12 +146,13 @@ static ebpo_status sum_pieces(void *context, uint64_t begin, uint64_t end, unsig
     double cell = ebpo_node_cell_volume(&j->stream->box, j->target);
     (void)error;
     for (uint64_t i = begin; i < end; i++) {
-        ebpo_walk walk = j->starts[i];
-        ebpo_walk_node node;
-        for (int k = 0; k < PIECE && ebpo_walk_next(&walk, &node); k++)
+        ebpo_level_walk walk = j->starts[i];
+        ebpo_level_walk_node node;
+        for (int k = 0; k < PIECE && ebpo_level_walk_next(&walk, &node); k++)
             if (node.type != EBPO_WHITE)
                 *(node.type == EBPO_GRAY ? &j->found[i].gray : &j->found[i].settled) +=
-                    ebpo_polytope_volume(ebpo_walk_envelope(&walk, &node, &j->envelopes[worker])) *
+                    ebpo_polytope_volume(
+                        ebpo_level_walk_envelope(&walk, &node, &j->envelopes[worker])) *
                     cell;
     }
     return EBPO_OK;
@@ -161,15 +162,15 @@ static ebpo_status sum_pieces(void *context, uint64_t begin, uint64_t end, unsig
  * number of threads, so neither does the sum. */
 static void find_starts(job *j)
 {
-    ebpo_walk walk;
-    ebpo_walk_node node;
-    ebpo_walk_begin(&walk, j->stream->kept, j->target, j->stream->info->pruned);
+    ebpo_level_walk walk;
+    ebpo_level_walk_node node;
+    ebpo_level_walk_begin(&walk, j->stream->kept, j->target, j->stream->info->pruned);
     uint64_t seen = 0;
     do {
         if (seen % PIECE == 0)
             j->starts[seen / PIECE] = walk;
         seen++;
-    } while (ebpo_walk_next(&walk, &node));
+    } while (ebpo_level_walk_next(&walk, &node));
 }
 
 static ebpo_status cut_volumes(const ebpo_stream *s, int target, uint64_t nodes, volumes *out,
@@ -243,7 +244,7 @@ ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool 
     s->settled += v.settled;
     s->bytes += s->info->level[next].stored_bytes +
                 (next == s->info->index_level ? s->info->chunk_index_bytes : 0);
-    ebpo_walk_begin(&s->walk, s->kept, next, s->info->pruned);
+    ebpo_level_walk_begin(&s->walk, s->kept, next, s->info->pruned);
     *out = (ebpo_stream_level){ next, nodes, s->bytes, v.gray + s->settled };
     *more = true;
     return EBPO_OK;
@@ -251,7 +252,7 @@ ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool 
 
 /* --- nodes --- */
 
-static int32_t winding_of(const ebpo_level *level, const ebpo_walk_node *node)
+static int32_t winding_of(const ebpo_level *level, const ebpo_level_walk_node *node)
 {
     switch (node->type) {
     case EBPO_WHITE: return level->white_winding ? level->white_winding[node->rank] : 0;
@@ -266,20 +267,20 @@ ebpo_status ebpo_stream_next_node(ebpo_stream *s, ebpo_stream_node *out, bool *m
                                   ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_walk_node node;
+    ebpo_level_walk_node node;
     *more = false;
     if (s->level < 0)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "no level has been read yet; call ebpo_stream_next_level first");
-    if (!ebpo_walk_next(&s->walk, &node))
+    if (!ebpo_level_walk_next(&s->walk, &node))
         return EBPO_OK;
     ebpo_node_begin(out, &s->box, node.octcode, node.type);
     out->winding = winding_of(&s->kept[s->level], &node);
     if (s->options.planes || s->options.polygons)
         ebpo_node_add_planes(out, &s->box, node.codes, node.code_count, &s->room);
     if (s->options.polygons && node.type != EBPO_WHITE)
-        ebpo_node_add_polygons(out, &s->box, ebpo_walk_envelope(&s->walk, &node, s->envelopes),
-                               &s->room);
+        ebpo_node_add_polygons(out, &s->box,
+                               ebpo_level_walk_envelope(&s->walk, &node, s->envelopes), &s->room);
     *more = true;
     return EBPO_OK;
 }

@@ -2,7 +2,7 @@
 #include <math.h>
 
 #include "base/fp_env.h"
-#include "stream/view.h"
+#include "stream/view_stream.h"
 
 typedef struct visitor {
     ebpo_view_stream *stream;
@@ -12,19 +12,20 @@ typedef struct visitor {
 } visitor;
 
 /* False: enough. */
-static bool visit_node(visitor *v, ebpo_grown_node node)
+static bool visit_node(visitor *v, ebpo_partial_node node)
 {
-    const ebpo_grown *grown = &v->stream->grown;
-    uint32_t below = grown->group[node.group].child[node.octant];
+    const ebpo_partial *partial = &v->stream->partial;
+    uint32_t below = partial->group[node.group].child[node.octant];
     if (below == 0) {
         ebpo_view_fill(v->stream, node, &v->node);
         v->node.complete = true;
         return v->visit(v->user, &v->node);
     }
-    unsigned flip = ebpo_sight_octant(&v->stream->sight, &v->stream->box,
-                                      ebpo_cell_of_octcode(ebpo_grown_octcode(grown, node)));
+    unsigned flip =
+        ebpo_viewpoint_octant(&v->stream->viewpoint, &v->stream->box,
+                              ebpo_cell_of_octcode(ebpo_partial_octcode(partial, node)));
     for (unsigned step = 0; step < 8; step++)
-        if (!visit_node(v, (ebpo_grown_node){ below, (uint8_t)(step ^ flip) }))
+        if (!visit_node(v, (ebpo_partial_node){ below, (uint8_t)(step ^ flip) }))
             return false;
     return true;
 }
@@ -34,27 +35,28 @@ void ebpo_view_stream_cut(ebpo_view_stream *s, ebpo_view_visit_fn visit, void *u
     EBPO_DEFAULT_FP;
     visitor v = { .stream = s, .visit = visit, .user = user };
     if (s->delivered)
-        (void)visit_node(&v, (ebpo_grown_node){ 0, 0 });
+        (void)visit_node(&v, (ebpo_partial_node){ 0, 0 });
 }
 
 static void look_at(const ebpo_view_stream *s, const ebpo_waiting *w, ebpo_view_stats *out)
 {
     ebpo_cell cell = ebpo_cell_of_octcode(w->octcode);
-    ebpo_seen look = ebpo_sight_look(&s->sight, &s->box, cell);
+    ebpo_seen look = ebpo_viewpoint_see(&s->viewpoint, &s->box, cell);
     if (look.seen)
-        out->pixels = fmax(out->pixels, ebpo_sight_pixels(&s->sight, cell.level, look.distance2));
+        out->pixels =
+            fmax(out->pixels, ebpo_viewpoint_pixels(&s->viewpoint, cell.level, look.distance2));
     out->waiting += w->turn != EBPO_TURN_NEVER;
 }
 
 void ebpo_view_stream_get_stats(const ebpo_view_stream *s, ebpo_view_stats *out)
 {
     uint64_t reads;
-    *out = (ebpo_view_stats){ .nodes = s->delivered, .pixels = s->sight.given ? 0 : NAN };
+    *out = (ebpo_view_stats){ .nodes = s->delivered, .pixels = s->viewpoint.given ? 0 : NAN };
     ebpo_file_traffic(s->file, &out->bytes_read, &reads);
     for (int i = 0; i < 4; i++)
         out->cut[i] = s->cut[i];
     for (uint64_t i = 0; i < s->frontier.count; i++)
         look_at(s, &s->frontier.at[i], out);
-    if (s->delivering && s->grown.group_count > 1)
+    if (s->delivering && s->partial.group_count > 1)
         look_at(s, &s->parent, out);
 }

@@ -6,9 +6,9 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "container/reader.h"
-#include "container/write.h"
+#include "container/container_write.h"
 #include "io/publish.h"
-#include "subset/parts.h"
+#include "subset/subset_parts.h"
 
 enum { CHUNK_BUDGET = 64 << 20 };
 
@@ -133,19 +133,19 @@ static void name_mesh(ebpo_tree *out)
 ebpo_status ebpo_subset_tree(ebpo_tree *out, ebpo_file *file, const ebpo_subset_options *options,
                              ebpo_error *error)
 {
-    ebpo_need *need = NULL;
+    ebpo_tolerance *need = NULL;
     ebpo_status status = EBPO_OK;
     if (options->max_error > 0)
-        status = ebpo_need_open(&need, file, options->parts & EBPO_PART_PLANES,
-                                options->write.threads, options->write.progress, error);
+        status = ebpo_tolerance_open(&need, file, options->parts & EBPO_PART_PLANES,
+                                     options->write.threads, options->write.progress, error);
     if (status == EBPO_OK)
-        status = ebpo_subset_tree_needed(out, file, options, need, error);
-    ebpo_need_close(need);
+        status = ebpo_subset_tree_within(out, file, options, need, error);
+    ebpo_tolerance_close(need);
     return status;
 }
 
-ebpo_status ebpo_subset_tree_needed(ebpo_tree *out, ebpo_file *file,
-                                    const ebpo_subset_options *options, ebpo_need *need,
+ebpo_status ebpo_subset_tree_within(ebpo_tree *out, ebpo_file *file,
+                                    const ebpo_subset_options *options, ebpo_tolerance *need,
                                     ebpo_error *error)
 {
     ebpo_cutting c = { .file = file,

@@ -7,7 +7,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "subtree/parts.h"
+#include "subtree/subtree_parts.h"
 
 typedef struct job {
     ebpo_subtree *s;

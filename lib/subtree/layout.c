@@ -6,7 +6,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "subtree/parts.h"
+#include "subtree/subtree_parts.h"
 
 /* What a walk brings up from a node: either up to eight faces that are no block yet, or up to eight
  * members of the hierarchy. */

@@ -7,7 +7,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "subtree/parts.h"
+#include "subtree/subtree_parts.h"
 #include "subtree/subtree.h"
 
 /* Single precision does for blocks while its squares and cubes stay far from its ends; coordinates

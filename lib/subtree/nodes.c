@@ -4,7 +4,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "subtree/parts.h"
+#include "subtree/subtree_parts.h"
 
 typedef struct walk {
     ebpo_subtree *s;
@@ -15,7 +15,7 @@ typedef struct walk {
     uint64_t refs[EBPO_LEVELS_MAX];
     uint64_t group_begin[EBPO_LEVELS_MAX]; /* number of the first group of each level */
     uint64_t leaf_begin[EBPO_LEVELS_MAX];
-    uint64_t list_room;
+    uint64_t list_capacity;
     /* blocks of one leaf, with the lanes that it lists: block << EBPO_BLOCK | lanes */
     uint64_t *scratch;
     uint64_t scratch_room;
@@ -42,7 +42,7 @@ static void put_list(walk *w, ebpo_subtree_leaf *leaf, uint64_t count)
             w->scratch[kept - 1] |= w->scratch[i];
         else
             w->scratch[kept++] = w->scratch[i];
-    if (!ebpo_grow(&s->list, &w->list_room, s->list_count + kept, sizeof *s->list)) {
+    if (!ebpo_grow(&s->list, &w->list_capacity, s->list_count + kept, sizeof *s->list)) {
         w->status = ebpo_fail_memory(w->error, (s->list_count + kept) * sizeof *s->list);
         return;
     }
@@ -99,7 +99,7 @@ static uint32_t settled(walk *w, const int32_t *windings, uint64_t rank, int32_t
                       "a node's winding number is beyond 2^29: the solid has too many shells");
         return 0;
     }
-    return ebpo_entry(EBPO_ENTRY_SETTLED, (uint32_t)(winding + EBPO_ENTRY_ZERO));
+    return ebpo_entry(EBPO_ENTRY_UNIFORM, (uint32_t)(winding + EBPO_ENTRY_ZERO));
 }
 
 static uint32_t walk_node(walk *w, int depth, ebpo_node_type type, const uint32_t at[3])

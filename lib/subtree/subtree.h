@@ -12,7 +12,7 @@
 
 /* An entry of a child table: two bits of kind, 30 of value. */
 typedef enum ebpo_entry_kind {
-    EBPO_ENTRY_SETTLED = 0, /* white or black; value: winding number + EBPO_ENTRY_ZERO */
+    EBPO_ENTRY_UNIFORM = 0, /* white or black; value: winding number + EBPO_ENTRY_ZERO */
     EBPO_ENTRY_LEAF = 1,    /* value: number of the leaf */
     EBPO_ENTRY_GRAY = 2,    /* value: number of the group of its eight children */
     /* in the top of a tree: value: number of a subtree that is loaded on demand; in a subtree: a
@@ -182,7 +182,7 @@ static inline uint64_t ebpo_subtree_file_face(const ebpo_subtree *s, uint32_t lo
 }
 
 /* Number that callers are told. */
-static inline uint64_t ebpo_subtree_told_face(const ebpo_subtree *s, uint32_t local)
+static inline uint64_t ebpo_subtree_source_face(const ebpo_subtree *s, uint32_t local)
 {
     return s->face_source ? s->face_source[local] : ebpo_subtree_file_face(s, local);
 }

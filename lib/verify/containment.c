@@ -11,11 +11,11 @@
 
 static const double eps = 0x1p-53;
 
-void ebpo_half_spaces_of(ebpo_half_spaces *out, const ebpo_tree_view *view,
-                         const ebpo_tree_view_node *node)
+void ebpo_half_spaces_of(ebpo_half_spaces *out, const ebpo_twin_tree *view,
+                         const ebpo_twin_node *node)
 {
     uint32_t count;
-    const uint32_t *codes = ebpo_view_planes(view, node, &count);
+    const uint32_t *codes = ebpo_twin_planes(view, node, &count);
     out->count = 0;
     for (uint32_t i = 0; i < count; i++) {
         int at = out->count;
@@ -115,7 +115,7 @@ static bool face_keeps(ebpo_tally *tally, const ebpo_half_spaces *planes, int i,
 }
 
 void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_half_spaces *planes,
-                               const ebpo_tree_view_node *node, const ebpo_frame *frame,
+                               const ebpo_twin_node *node, const ebpo_frame *frame,
                                const ebpo_corners *face, uint64_t number)
 {
     ebpo_local local;
@@ -129,7 +129,7 @@ void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_half_spaces *planes
 }
 
 void ebpo_check_corners_contained(ebpo_tally *tally, const ebpo_half_spaces *planes,
-                                  const ebpo_tree_view_node *node, unsigned corners)
+                                  const ebpo_twin_node *node, unsigned corners)
 {
     for (int i = 0; i < planes->count; i++)
         for (unsigned corner = 0; corner < 8; corner++) {

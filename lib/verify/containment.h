@@ -4,7 +4,7 @@
 #define EBPO_VERIFY_CONTAINMENT_H
 
 #include "verify/touch.h"
-#include "verify/view.h"
+#include "verify/twin_tree.h"
 
 enum { EBPO_HALF_SPACES_MAX = 255 }; /* counts are bytes */
 
@@ -17,16 +17,16 @@ typedef struct ebpo_half_spaces {
     uint32_t number[EBPO_HALF_SPACES_MAX]; /* place among the node's codes */
 } ebpo_half_spaces;
 
-void ebpo_half_spaces_of(ebpo_half_spaces *out, const ebpo_tree_view *view,
-                         const ebpo_tree_view_node *node);
+void ebpo_half_spaces_of(ebpo_half_spaces *out, const ebpo_twin_tree *view,
+                         const ebpo_twin_node *node);
 
 /* A face that touches the cell. */
 void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_half_spaces *planes,
-                               const ebpo_tree_view_node *node, const ebpo_frame *frame,
+                               const ebpo_twin_node *node, const ebpo_frame *frame,
                                const ebpo_corners *face, uint64_t number);
 
 /* Cell corners, bit i for corner i (bit 0 x, bit 1 y, bit 2 z). */
 void ebpo_check_corners_contained(ebpo_tally *tally, const ebpo_half_spaces *planes,
-                                  const ebpo_tree_view_node *node, unsigned corners);
+                                  const ebpo_twin_node *node, unsigned corners);
 
 #endif

@@ -8,8 +8,7 @@
 #include "verify/touch.h"
 #include "verify/winding.h"
 
-static void unlisted(ebpo_tally *tally, const ebpo_tree_view_node *node, uint32_t face,
-                     const char *text)
+static void unlisted(ebpo_tally *tally, const ebpo_twin_node *node, uint32_t face, const char *text)
 {
     ebpo_tally_violation(tally, EBPO_VERIFY_LISTS,
                          &(ebpo_verify_place){ node->code, face, EBPO_NO_PLANE }, "%s", text);
@@ -22,12 +21,12 @@ typedef struct face_list {
     uint64_t first;
 } face_list;
 
-static face_list list_of(const ebpo_tree_view *view, const ebpo_tree_view_node *leaf)
+static face_list list_of(const ebpo_twin_tree *view, const ebpo_twin_node *leaf)
 {
     const ebpo_level *level = &view->tree->level[leaf->cell.level];
     face_list list = { .first = level->leaf_first[leaf->rank],
                        .new_count = level->leaf_new[leaf->rank] };
-    list.refs = ebpo_view_refs(view, leaf, &list.ref_count);
+    list.refs = ebpo_twin_refs(view, leaf, &list.ref_count);
     return list;
 }
 
@@ -41,8 +40,8 @@ static bool among(const uint32_t *faces, uint64_t count, uint32_t face)
 
 /* A listed face that does not touch the leaf must touch it widened by 1/256: level-limited
  * distances rest on that. */
-static void check_near(ebpo_tally *tally, const ebpo_tree_view *view,
-                       const ebpo_tree_view_node *leaf, uint32_t face)
+static void check_near(ebpo_tally *tally, const ebpo_twin_tree *view, const ebpo_twin_node *leaf,
+                       uint32_t face)
 {
     ebpo_frame frame = ebpo_frame_make(&view->box, leaf->cell);
     ebpo_corners corners;
@@ -57,9 +56,8 @@ static void check_near(ebpo_tally *tally, const ebpo_tree_view *view,
         unlisted(tally, leaf, face, "the leaf lists a face that does not come near it");
 }
 
-static void check_spare(ebpo_tally *tally, const ebpo_tree_view *view,
-                        const ebpo_tree_view_node *leaf, const face_list *list,
-                        const uint32_t *faces, uint64_t count)
+static void check_spare(ebpo_tally *tally, const ebpo_twin_tree *view, const ebpo_twin_node *leaf,
+                        const face_list *list, const uint32_t *faces, uint64_t count)
 {
     for (uint32_t i = 0; i < list->ref_count; i++)
         if (!among(faces, count, list->refs[i]))
@@ -69,8 +67,8 @@ static void check_spare(ebpo_tally *tally, const ebpo_tree_view *view,
             check_near(tally, view, leaf, (uint32_t)(list->first + i));
 }
 
-static void check_leaf(ebpo_tally *tally, const ebpo_tree_view *view,
-                       const ebpo_tree_view_node *leaf, const uint32_t *faces, uint64_t count)
+static void check_leaf(ebpo_tally *tally, const ebpo_twin_tree *view, const ebpo_twin_node *leaf,
+                       const uint32_t *faces, uint64_t count)
 {
     face_list list = list_of(view, leaf);
     uint64_t found = 0;
@@ -98,9 +96,8 @@ static void check_leaf(ebpo_tally *tally, const ebpo_tree_view *view,
         check_spare(tally, view, leaf, &list, faces, count);
 }
 
-void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_tree_view *view,
-                               const ebpo_tree_view_node *node, const uint32_t *faces,
-                               uint64_t count)
+void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_twin_tree *view,
+                               const ebpo_twin_node *node, const uint32_t *faces, uint64_t count)
 {
     if (node->type == EBPO_LEAF) {
         check_leaf(tally, view, node, faces, count);
@@ -120,7 +117,7 @@ typedef struct gathering {
     bool short_of_memory;
 } gathering;
 
-static void gather(gathering *g, const ebpo_tree_view *view, const ebpo_tree_view_node *node)
+static void gather(gathering *g, const ebpo_twin_tree *view, const ebpo_twin_node *node)
 {
     if (node->type == EBPO_LEAF) {
         face_list list = list_of(view, node);
@@ -136,7 +133,7 @@ static void gather(gathering *g, const ebpo_tree_view *view, const ebpo_tree_vie
             g->faces[g->count++] = (uint32_t)(list.first + i);
     }
     for (unsigned octant = 0; node->type == EBPO_GRAY && octant < 8; octant++) {
-        ebpo_tree_view_node child = ebpo_view_child(view, node, octant);
+        ebpo_twin_node child = ebpo_twin_child(view, node, octant);
         gather(g, view, &child);
     }
 }
@@ -147,8 +144,7 @@ static int compare_numbers(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-bool ebpo_lists_more_faces(const ebpo_tree_view *view, const ebpo_tree_view_node *node,
-                           uint64_t limit)
+bool ebpo_lists_more_faces(const ebpo_twin_tree *view, const ebpo_twin_node *node, uint64_t limit)
 {
     gathering g = { 0 };
     gather(&g, view, node);

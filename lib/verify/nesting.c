@@ -2,7 +2,7 @@
 
 #include "verify/nesting.h"
 
-#include "base/workspace.h"
+#include "base/arrays.h"
 
 #include "geom/plane_code.h"
 
@@ -10,29 +10,29 @@ enum { NODES_PER_LEVEL = 256, POINTS_PER_NODE = 8, POINT_BITS = 16 };
 
 __extension__ typedef __int128 wide;
 
-static void check_codes(ebpo_tally *tally, const ebpo_tree_view *view, int l, ebpo_node_type type,
+static void check_codes(ebpo_tally *tally, const ebpo_twin_tree *view, int l, ebpo_node_type type,
                         const uint8_t *counts)
 {
     const ebpo_level *level = &view->tree->level[l];
     for (uint64_t group = 0; group < level->group_count; ebpo_settle_all_at(group++))
         for (unsigned octant = 0; octant < (l == 0 ? 1u : 8u); octant++) {
-            if (ebpo_view_type(level, group, octant) != type)
+            if (ebpo_twin_type(level, group, octant) != type)
                 continue;
             uint64_t rank = view->groups[l][group].of_type[type];
             for (unsigned i = 0; i < octant; i++)
-                rank += ebpo_view_type(level, group, i) == type;
-            ebpo_tree_view_node node = {
+                rank += ebpo_twin_type(level, group, i) == type;
+            ebpo_twin_node node = {
                 .group = group, .octant = octant, .type = type, .rank = rank, .cell.level = l
             };
             uint32_t count;
-            const uint32_t *codes = counts[rank] ? ebpo_view_planes(view, &node, &count) : NULL;
+            const uint32_t *codes = counts[rank] ? ebpo_twin_planes(view, &node, &count) : NULL;
             for (uint32_t i = 0; i < counts[rank]; i++) {
                 int32_t n[3], d;
                 tally->checks[EBPO_VERIFY_NESTING]++;
                 if (!ebpo_plane_decode(codes[i], n, &d))
                     ebpo_tally_violation(tally, EBPO_VERIFY_NESTING,
                                          &(ebpo_verify_place){
-                                             ebpo_view_at(view, l, group, octant).code,
+                                             ebpo_twin_at(view, l, group, octant).code,
                                              EBPO_NO_FACE, i },
                                          "the code %08x stands for no plane", (unsigned)codes[i]);
             }
@@ -42,15 +42,15 @@ static void check_codes(ebpo_tally *tally, const ebpo_tree_view *view, int l, eb
 /* A chain of nodes from the root down. */
 typedef struct chain {
     int depth;
-    ebpo_tree_view_node node[EBPO_LEVELS_MAX];
+    ebpo_twin_node node[EBPO_LEVELS_MAX];
 } chain;
 
-static void chain_to(chain *out, const ebpo_tree_view *view, const ebpo_tree_view_node *end)
+static void chain_to(chain *out, const ebpo_twin_tree *view, const ebpo_twin_node *end)
 {
     out->depth = end->cell.level;
-    out->node[0] = ebpo_view_root(view);
+    out->node[0] = ebpo_twin_root(view);
     for (int l = 1; l <= out->depth; l++)
-        out->node[l] = ebpo_view_child(view, &out->node[l - 1],
+        out->node[l] = ebpo_twin_child(view, &out->node[l - 1],
                                        (unsigned)(end->code >> 3 * (out->depth - l) & 7));
 }
 
@@ -80,13 +80,13 @@ static bool keeps_below(const chain *c, int from, int to, const int64_t point[3]
     return 4096 * sum <= (wide)d * (1 << POINT_BITS);
 }
 
-static void check_point(ebpo_tally *tally, const ebpo_tree_view *view, const chain *c,
+static void check_point(ebpo_tally *tally, const ebpo_twin_tree *view, const chain *c,
                         const int64_t point[3])
 {
     const ebpo_cell *at = &c->node[c->depth].cell;
     for (int l = 0; l < c->depth; l++) {
         uint32_t count;
-        const uint32_t *codes = ebpo_view_planes(view, &c->node[l], &count);
+        const uint32_t *codes = ebpo_twin_planes(view, &c->node[l], &count);
         for (uint32_t i = 0; i < count; i++) {
             int32_t n[3], d;
             if (!ebpo_plane_decode(codes[i], n, &d))
@@ -106,8 +106,7 @@ static void check_point(ebpo_tally *tally, const ebpo_tree_view *view, const cha
 }
 
 /* Walls of a cell are walls or the middle of its parent, as doubles too. */
-static void check_walls(ebpo_tally *tally, const ebpo_tree_view *view,
-                        const ebpo_tree_view_node *node)
+static void check_walls(ebpo_tally *tally, const ebpo_twin_tree *view, const ebpo_twin_node *node)
 {
     int level = node->cell.level;
     bool same = true;
@@ -136,8 +135,7 @@ static uint64_t next_random(uint64_t *state)
 }
 
 /* Random points of the cell, and its corners. */
-static void check_node(ebpo_tally *tally, const ebpo_tree_view *view,
-                       const ebpo_tree_view_node *node)
+static void check_node(ebpo_tally *tally, const ebpo_twin_tree *view, const ebpo_twin_node *node)
 {
     chain c;
     chain_to(&c, view, node);
@@ -154,7 +152,7 @@ static void check_node(ebpo_tally *tally, const ebpo_tree_view *view,
     }
 }
 
-void ebpo_check_nesting(ebpo_tally *tally, const ebpo_tree_view *view)
+void ebpo_check_nesting(ebpo_tally *tally, const ebpo_twin_tree *view)
 {
     for (int l = 0; l < view->tree->info.level_count; l++) {
         const ebpo_level *level = &view->tree->level[l];
@@ -167,8 +165,7 @@ void ebpo_check_nesting(ebpo_tally *tally, const ebpo_tree_view *view)
             uint64_t cell = cells <= NODES_PER_LEVEL
                                 ? i
                                 : (uint64_t)((wide)cells * i / NODES_PER_LEVEL) + i % 8;
-            ebpo_tree_view_node node =
-                ebpo_view_at(view, l, (cell % cells) / 8, (unsigned)(cell % 8));
+            ebpo_twin_node node = ebpo_twin_at(view, l, (cell % cells) / 8, (unsigned)(cell % 8));
             check_node(tally, view, &node);
         }
     }

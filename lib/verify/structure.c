@@ -5,8 +5,8 @@
 #include <inttypes.h>
 #include <math.h>
 
-#include "base/workspace.h"
-#include "mesh/mesh.h"
+#include "base/arrays.h"
+#include "mesh/mesh_parts.h"
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
 
@@ -40,7 +40,7 @@ static bool types_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
     uint64_t count[4] = { 0 };
     for (uint64_t group = 0; group < groups; ebpo_settle_all_at(group++))
         for (unsigned octant = 0; octant < (l == 0 ? 1u : 8u); octant++)
-            count[ebpo_view_type(level, group, octant)]++;
+            count[ebpo_twin_type(level, group, octant)]++;
     return CHECK(count[EBPO_GRAY] == level->gray_count && count[EBPO_LEAF] == level->leaf_count &&
                      count[EBPO_WHITE] == level->white_count &&
                      count[EBPO_BLACK] == level->black_count,

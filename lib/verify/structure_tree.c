@@ -6,8 +6,8 @@
 #include <inttypes.h>
 #include <math.h>
 
-#include "base/workspace.h"
-#include "mesh/mesh.h"
+#include "base/arrays.h"
+#include "mesh/mesh_parts.h"
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
 
@@ -45,13 +45,13 @@ static void check_summary(ebpo_tally *tally, const ebpo_tree *tree, int l)
 
 typedef struct descent {
     ebpo_tally *tally;
-    const ebpo_tree_view *view;
+    const ebpo_twin_tree *view;
     uint64_t next_face; /* first face that no leaf before has listed */
     uint64_t grays;
     uint64_t pruned[EBPO_LEVELS_MAX];
 } descent;
 
-static void node_check(descent *d, const ebpo_tree_view_node *node, bool holds, const char *text)
+static void node_check(descent *d, const ebpo_twin_node *node, bool holds, const char *text)
 {
     d->tally->checks[EBPO_VERIFY_STRUCTURE]++;
     if (!holds)
@@ -60,7 +60,7 @@ static void node_check(descent *d, const ebpo_tree_view_node *node, bool holds, 
                              text);
 }
 
-static void check_leaf(descent *d, const ebpo_tree_view_node *leaf)
+static void check_leaf(descent *d, const ebpo_twin_node *leaf)
 {
     const ebpo_info *info = &d->view->tree->info;
     const ebpo_level *level = &d->view->tree->level[leaf->cell.level];
@@ -76,9 +76,9 @@ static void check_leaf(descent *d, const ebpo_tree_view_node *leaf)
     d->next_face = level->leaf_first[leaf->rank] + level->leaf_new[leaf->rank];
 }
 
-static void check_gray(descent *d, const ebpo_tree_view_node *node);
+static void check_gray(descent *d, const ebpo_twin_node *node);
 
-static void check_node(descent *d, const ebpo_tree_view_node *node)
+static void check_node(descent *d, const ebpo_twin_node *node)
 {
     if (node->type == EBPO_LEAF)
         check_leaf(d, node);
@@ -89,9 +89,9 @@ static void check_node(descent *d, const ebpo_tree_view_node *node)
                    "a surface has no inside, but the node is black");
 }
 
-static void check_gray(descent *d, const ebpo_tree_view_node *node)
+static void check_gray(descent *d, const ebpo_twin_node *node)
 {
-    if (ebpo_view_is_pruned(d->view, node)) { /* may have been a leaf */
+    if (ebpo_twin_is_pruned(d->view, node)) { /* may have been a leaf */
         d->pruned[node->cell.level]++;
         return;
     }
@@ -100,14 +100,14 @@ static void check_gray(descent *d, const ebpo_tree_view_node *node)
     bool touched = false;
     ebpo_settle_all_at(d->grays++);
     for (unsigned octant = 0; octant < 8; octant++) {
-        ebpo_tree_view_node child = ebpo_view_child(d->view, node, octant);
+        ebpo_twin_node child = ebpo_twin_child(d->view, node, octant);
         touched |= child.type >= EBPO_LEAF;
         check_node(d, &child);
     }
     node_check(d, node, touched, "the node is gray, but no child of it is gray or a leaf");
 }
 
-static void check_vertices(ebpo_tally *tally, const ebpo_tree_view *view)
+static void check_vertices(ebpo_tally *tally, const ebpo_twin_tree *view)
 {
     const ebpo_mesh *mesh = &view->tree->mesh;
     uint64_t outside = 0, first = 0;
@@ -149,13 +149,13 @@ static bool edges_balance(const ebpo_mesh *mesh)
     return sum == 0;
 }
 
-void ebpo_check_structure(ebpo_tally *tally, const ebpo_tree_view *view)
+void ebpo_check_structure(ebpo_tally *tally, const ebpo_twin_tree *view)
 {
     const ebpo_tree *tree = view->tree;
     for (int l = 0; l < tree->info.level_count; l++)
         check_summary(tally, tree, l);
     descent d = { .tally = tally, .view = view };
-    ebpo_tree_view_node root = ebpo_view_root(view);
+    ebpo_twin_node root = ebpo_twin_root(view);
     check_node(&d, &root);
     for (int l = 0; l < tree->info.level_count; l++)
         CHECK(d.pruned[l] == tree->info.level[l].pruned_count,

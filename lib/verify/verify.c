@@ -1,28 +1,28 @@
 /* Proves a file's promises. Of the builder's geometry only the exact predicates are used: cells,
  * half-spaces and clipping are done here in another way. */
-#include "verify/verify.h"
+#include "verify/verify_parts.h"
 
 #include "base/error.h"
 #include "base/fp_env.h"
-#include "mesh/mesh.h"
+#include "mesh/mesh_parts.h"
 #include "verify/nesting.h"
-#include "verify/source.h"
+#include "verify/verify_source.h"
 #include "verify/structure.h"
-#include "verify/walk.h"
+#include "verify/verify_walk.h"
 
 ebpo_status ebpo_verify_tree(ebpo_tally *tally, const ebpo_tree *tree,
                              const ebpo_verify_options *options, ebpo_error *error)
 {
     if (!ebpo_check_shape(tally, tree))
         return EBPO_OK;
-    ebpo_tree_view view;
-    ebpo_status status = ebpo_view_make(&view, tree, options->workspace, error);
+    ebpo_twin_tree view;
+    ebpo_status status = ebpo_twin_make(&view, tree, options->workspace, error);
     if (status != EBPO_OK)
         return status;
     ebpo_check_structure(tally, &view);
     ebpo_check_nesting(tally, &view);
-    status = ebpo_walk(tally, &view, options, error);
-    ebpo_view_free(&view);
+    status = ebpo_verify_walk(tally, &view, options, error);
+    ebpo_twin_free(&view);
     return status;
 }
 

@@ -7,7 +7,7 @@
 #include "verify/winding.h"
 
 #include "geom/predicates.h"
-#include "mesh/mesh.h"
+#include "mesh/mesh_parts.h"
 
 void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, ebpo_corners *out)
 {

@@ -9,7 +9,7 @@
 #include <time.h>
 
 #include "query/locate.h"
-#include "query/model.h"
+#include "query/query_model.h"
 
 enum { KINDS = 5, MOST = 20000, PASSES = 7 };
 

@@ -4,7 +4,7 @@
 #include <time.h>
 
 #include "exact_twin.h"
-#include "geom/ray.h"
+#include "geom/ray_triangle.h"
 
 enum { COUNT = 4096, ROUNDS = 500 };
 

@@ -37,14 +37,14 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_workspace_make(ebpo_workspace **out,
  * themselves may be freed or closed later. NULL is fine. */
 EBPO_API void ebpo_workspace_free(ebpo_workspace *workspace);
 
-typedef struct ebpo_workspace_figures {
+typedef struct ebpo_workspace_stats {
     uint64_t memory;          /* the budget */
     uint64_t held, held_most; /* bytes of arrays in memory: now, at most */
     /* bytes of arrays in files: now, at most at one time, ever */
     uint64_t filed, filed_most, filed_total;
-} ebpo_workspace_figures;
+} ebpo_workspace_stats;
 
-EBPO_API void ebpo_workspace_tell(const ebpo_workspace *workspace, ebpo_workspace_figures *out);
+EBPO_API void ebpo_workspace_get_stats(const ebpo_workspace *workspace, ebpo_workspace_stats *out);
 
 #ifdef __cplusplus
 }

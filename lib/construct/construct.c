@@ -1,0 +1,307 @@
+/* From a mesh to a tree: the stages in their order. */
+#include "geom/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "arrange/arrange.h"
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/fp_env.h"
+#include "base/parallel.h"
+#include "construct/propose.h"
+#include "ebpo_config.h"
+
+/* EBP 2017, equation 3: the least i >= 1 with L / 2^i below the mean edge. */
+static int level_limit(const ebpo_mesh_report *report)
+{
+    double side = 0;
+    for (int k = 0; k < 3; k++)
+        side = fmax(side, report->max[k] - report->min[k]);
+    int level = 1;
+    for (side /= 2; level < EBPO_MAX_LEVEL && !(side < report->mean_edge); side /= 2)
+        level++;
+    return level;
+}
+
+static ebpo_status check_text(const char *name, const char *text, size_t room, ebpo_error *error)
+{
+    if (!text)
+        return EBPO_OK;
+    if (strlen(text) >= room)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s is longer than %zu bytes", name, room - 1);
+    for (const unsigned char *c = (const unsigned char *)text; *c; c++)
+        if (*c < 32 || *c == 127)
+            return ebpo_fail(error, EBPO_E_ARGUMENT, "%s holds a control character", name);
+    return EBPO_OK;
+}
+
+static ebpo_status check_options(const ebpo_build_options *o, const ebpo_info *info,
+                                 ebpo_error *error)
+{
+    if (o->max_level < -1 || o->max_level > EBPO_MAX_LEVEL)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "max_level %d is not in 0 .. %d", o->max_level,
+                         EBPO_MAX_LEVEL);
+    if (!(o->epsilon >= 0) || o->epsilon > 1)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "epsilon %g is not in 0 .. 1", o->epsilon);
+    if (o->rule > EBPO_RULE_POSITIVE)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown winding rule %d", (int)o->rule);
+    if (!ebpo_selection_of(o->select))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown selection %d", (int)o->select);
+    if (!(o->percent > 0 && o->percent <= 100))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "percent %g is not above 0 and at most 100",
+                         o->percent);
+    if (!(o->k_root == 0 || (o->k_root >= 1 && o->k_root <= 1e9)))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "k_root %g is neither 0 nor in 1 .. 1e9",
+                         o->k_root);
+    if ((unsigned)o->normals > EBPO_NORMALS_ANGLE)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown distance of normals %d", (int)o->normals);
+    ebpo_status status = check_text("unit", o->unit, sizeof info->unit, error);
+    if (status == EBPO_OK)
+        status = check_text("crs", o->crs, sizeof info->crs, error);
+    if (status == EBPO_OK)
+        status = check_text("date", o->date, sizeof info->date, error);
+    return status;
+}
+
+static void copy_text(char *to, const char *from)
+{
+    if (from)
+        strcpy(to, from); /* check_options saw to the length */
+}
+
+/* Names of files may be any bytes; the format wants text. What is neither printable ASCII nor part
+ * of a valid UTF-8 sequence becomes "_". */
+static void copy_name(char *to, const char *from)
+{
+    while (*from) {
+        const unsigned char *c = (const unsigned char *)from;
+        int length = c[0] < 0x80                   ? 1
+                     : c[0] >= 0xc2 && c[0] < 0xe0 ? 2
+                     : c[0] >= 0xe0 && c[0] < 0xf0 ? 3
+                     : c[0] >= 0xf0 && c[0] < 0xf5 ? 4
+                                                   : 0;
+        bool fine = length > 0 && c[0] >= 32 && c[0] != 127;
+        for (int i = 1; i < length && fine; i++)
+            fine = (c[i] & 0xc0) == 0x80;
+        /* Control characters of Latin 1, sequences longer than need be, surrogates, what lies
+         * beyond Unicode. */
+        if ((c[0] == 0xc2 && c[1] < 0xa0) || (c[0] == 0xe0 && c[1] < 0xa0) ||
+            (c[0] == 0xed && c[1] >= 0xa0) || (c[0] == 0xf0 && c[1] < 0x90) ||
+            (c[0] == 0xf4 && c[1] >= 0x90))
+            fine = false;
+        for (int i = 0; i < (fine ? length : 1); i++)
+            *to++ = fine ? from[i] : '_';
+        from += fine ? length : 1;
+    }
+    *to = 0;
+}
+
+static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *mesh,
+                      const ebpo_mesh_report *report, const ebpo_mend_record *mend)
+{
+    const ebpo_build_options *o = b->options;
+    info->version_major = EBPO_FORMAT_MAJOR;
+    info->version_minor = EBPO_FORMAT_MINOR;
+    copy_text(info->generator, "ebpo " EBPO_VERSION);
+    copy_text(info->unit, o->unit);
+    copy_text(info->crs, o->crs);
+    copy_text(info->date, o->date);
+    copy_name(info->source_name, mesh->source_name);
+    memcpy(info->source_format, mesh->source_format, sizeof info->source_format);
+    memcpy(info->source_sha256, mesh->source_sha256, sizeof info->source_sha256);
+    info->source_size = mesh->source_size;
+    info->solid = b->solid;
+    info->rule = o->rule;
+    info->double_coordinates = mesh->xyz64 != NULL;
+    info->vertex_count = mesh->vertex_count;
+    info->face_count = mesh->face_count;
+    info->source_vertex_count = mesh->vertex_count + (mend ? mend->welded_vertices : 0);
+    info->source_face_count = mesh->face_count - (mend ? mend->added_faces : 0);
+    memcpy(info->box_origin, b->box.origin, sizeof info->box_origin);
+    memcpy(info->box_size, b->box.size, sizeof info->box_size);
+    info->grid_level = b->box.grid_level;
+    info->max_level = b->max_level;
+    info->leaf_faces = o->leaf_faces;
+    info->epsilon = o->epsilon;
+    const ebpo_selection_method *method = ebpo_selection_of(o->select);
+    info->selection = o->select;
+    info->percent = method->from_leaves && !(o->k_root > 0) ? o->percent : 0;
+    info->k_root = method->from_leaves ? o->k_root : 0;
+    info->normals = method->has_normals ? o->normals : 0;
+    info->seed = method->has_seed ? o->seed : 0;
+    if (mend)
+        info->mend = *mend;
+    info->report = *report;
+    info->parts = o->parts;
+}
+
+/* A tree that is deeper than the order is good for needs another one. */
+static ebpo_status arrange(ebpo_builder *b, ebpo_mesh *mesh, ebpo_error *error)
+{
+    const ebpo_progress *progress = &b->options->progress;
+    ebpo_status status = mesh->arrangement && mesh->arrangement->key
+                             ? EBPO_OK
+                             : ebpo_arrange(mesh, -1, b->threads, progress, error);
+    if (status == EBPO_OK && mesh->arrangement->box.grid_level < b->max_level)
+        status = ebpo_arrange(mesh, b->max_level, b->threads, progress, error);
+    if (status != EBPO_OK)
+        return status;
+    b->mesh = mesh;
+    b->box = mesh->arrangement->box;
+    b->vertex_count = mesh->arrangement->referenced;
+    b->key = mesh->arrangement->key;
+    b->face_count = mesh->face_count;
+    b->face = (const uint32_t(*)[3])mesh->faces;
+    if (!ebpo_progress_stage(progress, "bounds", error))
+        return EBPO_E_CANCELLED;
+    return ebpo_bounds_make(b, error);
+}
+
+static ebpo_status prepare(ebpo_builder *b, ebpo_mesh *mesh, const ebpo_mesh_report *report,
+                           const ebpo_build_options *options, ebpo_error *error)
+{
+    b->options = options;
+    b->threads = ebpo_thread_count(options->threads);
+    b->solid = report->balanced;
+    if (!b->solid && options->require_solid)
+        return ebpo_fail(error, EBPO_E_NOT_SOLID,
+                         "%s does not balance (%llu edges are not used as often one way as the "
+                         "other), so it bounds no solid; "
+                         "try --fill-holes, --orient or --weld, or leave out --require-solid for a "
+                         "surface model",
+                         mesh->source_name[0] ? mesh->source_name : "the mesh",
+                         (unsigned long long)report->unbalanced_edges.count);
+    b->max_level = options->max_level >= 0 ? options->max_level : level_limit(report);
+    return arrange(b, mesh, error);
+}
+
+static void builder_free(ebpo_builder *b)
+{
+    ebpo_bounds_free(&b->bounds);
+    ebpo_array_free(b->number);
+    ebpo_branch_free(&b->top);
+    for (uint64_t i = 0; i < b->sub_count; i++)
+        ebpo_branch_free(&b->sub[i]);
+    free(b->sub);
+    free(b->top_envelope);
+    ebpo_store_free(b->store);
+}
+
+typedef struct piece_job {
+    ebpo_builder *b;
+    ebpo_emit_scratch **scratch;             /* [threads] */
+    _Atomic uint64_t cells_ns, envelopes_ns; /* of all threads */
+} piece_job;
+
+static uint64_t nanoseconds(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (uint64_t)t.tv_sec * UINT64_C(1000000000) + (uint64_t)t.tv_nsec;
+}
+
+static ebpo_status work_on_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                  ebpo_error *error)
+{
+    piece_job *job = context;
+    ebpo_builder *b = job->b;
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
+        ebpo_branch *s = &b->sub[i];
+        uint64_t begun = nanoseconds();
+        status = ebpo_build_partition(b, s, error);
+        if (status == EBPO_OK)
+            status = ebpo_build_number(b, s, error);
+        uint64_t cut = nanoseconds();
+        job->cells_ns += cut - begun;
+        if (status == EBPO_OK)
+            status = ebpo_emit_piece(b, job->scratch[worker], s, error);
+        ebpo_subtree_release(s);
+        if (status == EBPO_OK)
+            status = ebpo_build_pack(b, s->out, error);
+        ebpo_workspace_settle(b->workspace);
+        job->envelopes_ns += nanoseconds() - cut;
+    }
+    return status;
+}
+
+static ebpo_status build_pieces(ebpo_builder *b, ebpo_error *error)
+{
+    piece_job job = { .b = b, .scratch = ebpo_alloc_zero(b->threads, sizeof *job.scratch) };
+    ebpo_status status =
+        job.scratch ? EBPO_OK : ebpo_fail_memory(error, b->threads * sizeof *job.scratch);
+    for (unsigned i = 0; i < b->threads && status == EBPO_OK; i++)
+        status = ebpo_emit_scratch_make(&job.scratch[i], error);
+    if (status == EBPO_OK)
+        status = ebpo_parallel_for(b->threads, b->sub_count, 1, work_on_pieces, &job,
+                                   &b->options->progress, "envelopes", error);
+    for (unsigned i = 0; i < b->threads && job.scratch; i++)
+        ebpo_emit_scratch_free(job.scratch[i]);
+    free(job.scratch);
+    if (b->options->times) {
+        b->options->times->cells += 1e-9 * (double)job.cells_ns;
+        b->options->times->envelopes += 1e-9 * (double)job.envelopes_ns;
+    }
+    return status;
+}
+
+/* From the root down a piece is done in one go. From the leaves up the top needs all pieces first:
+ * their cells are made twice rather than kept. */
+static ebpo_status build_tree(ebpo_builder *b, ebpo_error *error)
+{
+    ebpo_status status = ebpo_build_labels(b, error);
+    if (status == EBPO_OK)
+        status = ebpo_build_propose(b, error);
+    if (status == EBPO_OK)
+        status = ebpo_build_top(b, error);
+    if (status == EBPO_OK)
+        status = build_pieces(b, error);
+    return status;
+}
+
+static ebpo_status run_stages(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, ebpo_error *error)
+{
+    ebpo_status status = ebpo_build_split(b, error);
+    if (status == EBPO_OK)
+        status = build_tree(b, error);
+    if (status == EBPO_OK && !ebpo_progress_stage(&b->options->progress, "joining levels", error))
+        status = EBPO_E_CANCELLED;
+    if (status == EBPO_OK)
+        status = ebpo_build_levels(b, out, error);
+    if (status == EBPO_OK &&
+        !ebpo_progress_stage(&b->options->progress, "numbering vertices", error))
+        status = EBPO_E_CANCELLED;
+    if (status == EBPO_OK && b->options->parts & EBPO_PART_MESH)
+        status = ebpo_build_mesh(b, mesh, out, error);
+    return status;
+}
+
+ebpo_status ebpo_build(ebpo_tree *out, ebpo_mesh *mesh, const ebpo_mesh_report *report,
+                       const ebpo_mend_record *mend, const ebpo_build_options *options,
+                       ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_build_options defaults = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_builder b = { .workspace = mesh->workspace };
+    memset(out, 0, sizeof *out);
+    out->mesh.workspace = mesh->workspace;
+    if (!options)
+        options = &defaults;
+    if (options->times)
+        *options->times = (ebpo_build_times){ 0, 0 };
+    ebpo_status status = check_options(options, &out->info, error);
+    if (status == EBPO_OK)
+        status = prepare(&b, mesh, report, options, error);
+    if (status == EBPO_OK)
+        fill_info(&out->info, &b, mesh, report, mend);
+    if (status == EBPO_OK)
+        status = run_stages(&b, mesh, out, error);
+    builder_free(&b);
+    ebpo_mesh_free(mesh);
+    if (status != EBPO_OK)
+        ebpo_tree_free(out);
+    return status;
+}

@@ -1,0 +1,13 @@
+/* What the top's gray nodes keep until the levels are joined. */
+#ifndef EBPO_BUILD_TOP_H
+#define EBPO_BUILD_TOP_H
+
+#include "construct/builder.h"
+
+typedef struct ebpo_top_envelope {
+    uint32_t codes[EBPO_PLANES_STORED];
+    int count;
+    double volume;
+} ebpo_top_envelope;
+
+#endif

@@ -1,0 +1,106 @@
+/* Winding numbers at cell corners. A subtree's corner differences come from its own leaves alone; a
+ * walk from corner to corner along the children's edges adds them up, and the root's lowest corner
+ * lies outside the model, where the winding number is 0. Replaces the special cases of BP
+ * 2008, 3.4.1.1. */
+#include <string.h>
+
+#include "base/error.h"
+#include "construct/builder.h"
+
+void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell,
+                         const uint32_t *places, uint64_t count, ebpo_triangle *room,
+                         int32_t delta[8])
+{
+    memset(delta, 0, 8 * sizeof *delta);
+    for (uint64_t first = 0; first < count; first += EBPO_CORNER_FACES) {
+        uint64_t part = count - first < EBPO_CORNER_FACES ? count - first : EBPO_CORNER_FACES;
+        int32_t own[8];
+        for (uint64_t i = 0; i < part; i++)
+            ebpo_branch_triangle(b, s, places ? places[first + i] : (uint32_t)(first + i),
+                                 &room[i]);
+        ebpo_corner_windings(&b->box, cell, room, part, own);
+        for (int i = 0; i < 8; i++)
+            delta[i] += own[i];
+        if (part == EBPO_CORNER_FACES)
+            ebpo_workspace_settle(b->workspace);
+    }
+}
+
+/* False when crossings along two ways to a corner do not agree. */
+static bool child_offsets(const int32_t *child_delta[8], int32_t offset[8])
+{
+    offset[0] = 0;
+    bool agree = true;
+    for (int i = 1; i < 8; i++) {
+        bool known = false;
+        for (int axis = 0; axis < 3; axis++) {
+            if (!(i >> axis & 1))
+                continue;
+            int before = i & ~(1 << axis);
+            int32_t way = offset[before] + child_delta[before][1 << axis];
+            agree = agree && (!known || way == offset[i]);
+            offset[i] = way;
+            known = true;
+        }
+    }
+    return agree;
+}
+
+/* The corner differences of the eight children; those of empty ones are zero. */
+static void child_deltas(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
+                         const int32_t *child_delta[8])
+{
+    static const int32_t none[8];
+    for (uint32_t o = 0; o < 8; o++) {
+        const ebpo_build_node *n = &s->nodes[child + o];
+        if (n->type == EBPO_WHITE)
+            child_delta[o] = none;
+        else if (s == &b->top && n->type == EBPO_LEAF)
+            child_delta[o] = b->sub[n->detail].root_delta;
+        else
+            child_delta[o] = s->details[n->detail].delta;
+    }
+}
+
+void ebpo_child_windings(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
+                         int32_t offset[8])
+{
+    const int32_t *child_delta[8];
+    child_deltas(b, s, child, child_delta);
+    child_offsets(child_delta, offset);
+}
+
+bool ebpo_gather_delta(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
+                       int32_t delta[8])
+{
+    const int32_t *child_delta[8];
+    int32_t offset[8];
+    child_deltas(b, s, child, child_delta);
+    bool agree = child_offsets(child_delta, offset);
+    for (int i = 0; i < 8; i++)
+        delta[i] = offset[i] + child_delta[i][i];
+    return agree;
+}
+
+static bool top_deltas(ebpo_builder *b, uint32_t index)
+{
+    ebpo_branch *s = &b->top;
+    ebpo_build_node *node = &s->nodes[index];
+    if (node->type != EBPO_GRAY)
+        return true;
+    bool agree = true;
+    for (uint32_t o = 0; o < 8; o++)
+        agree = top_deltas(b, node->child + o) && agree;
+    return ebpo_gather_delta(b, s, node->child, s->details[node->detail].delta) && agree;
+}
+
+ebpo_status ebpo_build_labels(ebpo_builder *b, ebpo_error *error)
+{
+    if (!b->solid)
+        return EBPO_OK;
+    if (!top_deltas(b, 0))
+        return ebpo_fail(
+            error, EBPO_E_NOT_SOLID,
+            "winding numbers disagree: the mesh does not balance; check it again before building");
+    return EBPO_OK;
+}

@@ -1,0 +1,275 @@
+/* Subtrees to stretches of level arrays: a depth-first walk meets the nodes of each level in
+ * octcode order. */
+#include "geom/strict_fp.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "construct/propose.h"
+
+struct ebpo_emit_scratch {
+    ebpo_envelope_scratch *envelope;
+    ebpo_triangle *faces; /* of one leaf */
+    uint64_t faces_capacity;
+};
+
+typedef struct emitter {
+    const ebpo_builder *b;
+    ebpo_branch *s;
+    ebpo_emit_scratch *scratch;
+} emitter;
+
+ebpo_status ebpo_emit_scratch_make(ebpo_emit_scratch **out, ebpo_error *error)
+{
+    *out = ebpo_alloc_zero(1, sizeof **out);
+    ebpo_status status =
+        *out ? ebpo_scratch_make(&(*out)->envelope, error) : ebpo_fail_memory(error, sizeof **out);
+    if (status != EBPO_OK) {
+        free(*out);
+        *out = NULL;
+    }
+    return status;
+}
+
+void ebpo_emit_scratch_free(ebpo_emit_scratch *scratch)
+{
+    if (!scratch)
+        return;
+    ebpo_scratch_free(scratch->envelope);
+    ebpo_array_free(scratch->faces);
+    free(scratch);
+}
+
+void ebpo_out_free(ebpo_out *out)
+{
+    for (int i = 0; out && i < EBPO_LEVELS_MAX; i++)
+        if (!out[i].packed)
+            ebpo_level_free(&out[i].level);
+    ebpo_array_free(out);
+}
+
+bool ebpo_emit_group(ebpo_out *out, uint16_t types)
+{
+    ebpo_level *l = &out->level;
+    if (!ebpo_array_grow_late(out->workspace, &l->types, &out->group_capacity, l->group_count + 1,
+                              sizeof *l->types))
+        return false;
+    l->types[l->group_count++] = types;
+    return true;
+}
+
+bool ebpo_emit_gray(ebpo_out *out, const uint32_t *codes, int count, double volume)
+{
+    ebpo_level *l = &out->level;
+    if (!ebpo_array_grow_late(out->workspace, &l->plane_counts, &out->gray_capacity,
+                              l->gray_count + 1, 1) ||
+        !ebpo_array_grow_late(out->workspace, &l->planes, &out->plane_capacity,
+                              l->plane_count + (uint64_t)count, sizeof *l->planes))
+        return false;
+    l->plane_counts[l->gray_count++] = (uint8_t)count;
+    if (count) /* the array may not be there yet */
+        memcpy(l->planes + l->plane_count, codes, (size_t)count * sizeof *codes);
+    l->plane_count += (uint64_t)count;
+    l->gray_volume += volume;
+    return true;
+}
+
+bool ebpo_emit_empty(ebpo_out *out, bool black, int32_t winding)
+{
+    ebpo_level *l = &out->level;
+    int32_t **array = black ? &l->black_winding : &l->white_winding;
+    uint64_t *count = black ? &l->black_count : &l->white_count;
+    if (!ebpo_array_grow_late(out->workspace, array,
+                              black ? &out->black_capacity : &out->white_capacity, *count + 1,
+                              sizeof **array))
+        return false;
+    (*array)[(*count)++] = winding;
+    return true;
+}
+
+static bool grow_leaf_arrays(ebpo_out *out, uint64_t refs)
+{
+    ebpo_level *l = &out->level;
+    uint64_t n = l->leaf_count + 1, *c = out->leaf_capacity;
+    return ebpo_array_grow_late(out->workspace, &l->leaf_winding, &c[0], n,
+                                sizeof *l->leaf_winding) &&
+           ebpo_array_grow_late(out->workspace, &l->leaf_first, &c[1], n, sizeof *l->leaf_first) &&
+           ebpo_array_grow_late(out->workspace, &l->leaf_new, &c[2], n, sizeof *l->leaf_new) &&
+           ebpo_array_grow_late(out->workspace, &l->leaf_ref_count, &c[3], n,
+                                sizeof *l->leaf_ref_count) &&
+           ebpo_array_grow_late(out->workspace, &l->leaf_plane_counts, &c[4], n,
+                                sizeof *l->leaf_plane_counts) &&
+           ebpo_array_grow_late(out->workspace, &l->leaf_refs, &out->ref_capacity,
+                                l->ref_count + refs, sizeof *l->leaf_refs);
+}
+
+static bool emit_list(const emitter *e, const ebpo_build_detail *d, ebpo_out *out, int32_t winding)
+{
+    ebpo_level *l = &out->level;
+    uint64_t refs = d->entry_end - d->entry_begin - d->new_count;
+    if (!grow_leaf_arrays(out, refs))
+        return false;
+    l->leaf_winding[l->leaf_count] = winding;
+    l->leaf_first[l->leaf_count] = d->first;
+    l->leaf_new[l->leaf_count] = d->new_count;
+    l->leaf_ref_count[l->leaf_count] = (uint32_t)refs;
+    for (uint64_t i = d->entry_begin, ref = l->ref_count; i < d->entry_end; i++) {
+        uint32_t place = e->s->entries[i], face = e->s->list[place];
+        if (!(e->s->fresh[place / 8] >> place % 8 & 1) || e->b->number[face] < d->first)
+            l->leaf_refs[ref++] = face;
+    }
+    l->ref_count += refs;
+    l->new_count += d->new_count;
+    return true;
+}
+
+static bool gather_faces(emitter *e, const ebpo_build_detail *d)
+{
+    ebpo_emit_scratch *scratch = e->scratch;
+    uint64_t count = d->entry_end - d->entry_begin;
+    if (!ebpo_array_grow_late(e->b->workspace, &scratch->faces, &scratch->faces_capacity, count,
+                              sizeof *scratch->faces))
+        return false;
+    for (uint64_t i = 0; i < count; i++)
+        ebpo_branch_triangle(e->b, e->s, e->s->entries[d->entry_begin + i], &scratch->faces[i]);
+    return true;
+}
+
+/* Planes that are to be stored: the selection's own. Else readers derive them. -1: out of memory.
+ */
+static int leaf_planes(emitter *e, uint32_t detail, ebpo_cell cell, int32_t winding,
+                       ebpo_polytope *envelope, uint32_t *codes)
+{
+    const ebpo_builder *b = e->b;
+    const ebpo_build_detail *d = &e->s->details[detail];
+    int count;
+    const uint32_t *proposed = ebpo_proposed(e->s, detail, &count);
+    if (!proposed && !gather_faces(e, d))
+        return -1;
+    if (!proposed)
+        return ebpo_leaf_planes(&b->box, cell, e->scratch->faces, d->entry_end - d->entry_begin,
+                                ebpo_inside_corners(b, winding, d->delta), b->options->epsilon,
+                                envelope, codes);
+    memcpy(codes, proposed, (size_t)count * sizeof *codes);
+    ebpo_planes_cut(envelope, codes, (uint64_t)count);
+    return count;
+}
+
+static bool emit_leaf(emitter *e, uint32_t detail, ebpo_cell cell, int32_t winding,
+                      ebpo_polytope *envelope)
+{
+    const ebpo_builder *b = e->b;
+    const ebpo_build_detail *d = &e->s->details[detail];
+    ebpo_out *out = &e->s->out[cell.level];
+    ebpo_level *l = &out->level;
+    if (!emit_list(e, d, out, winding))
+        return false;
+    uint32_t codes[EBPO_PLANES_STORED];
+    bool stored = b->options->parts & EBPO_PART_LEAF_PLANES;
+    int planes = stored ? leaf_planes(e, detail, cell, winding, envelope, codes) : 0;
+    if (planes < 0)
+        return false;
+    l->leaf_volume += ebpo_polytope_volume(envelope) * ebpo_cell_volume(b, cell.level);
+    l->leaf_plane_counts[l->leaf_count++] = (uint8_t)planes;
+    if (!stored)
+        return true;
+    if (!ebpo_array_grow_late(out->workspace, &l->leaf_planes, &out->leaf_plane_capacity,
+                              l->leaf_plane_count + (uint64_t)planes, sizeof *l->leaf_planes))
+        return false;
+    if (planes)
+        memcpy(l->leaf_planes + l->leaf_plane_count, codes, (size_t)planes * sizeof *codes);
+    l->leaf_plane_count += (uint64_t)planes;
+    return true;
+}
+
+static bool emit_empty(emitter *e, ebpo_cell cell, int32_t winding)
+{
+    bool black = e->b->solid && ebpo_rule_inside(e->b->options->rule, winding);
+    return ebpo_emit_empty(&e->s->out[cell.level], black, winding);
+}
+
+static bool emit(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding,
+                 ebpo_polytope *envelope);
+
+static unsigned filled_children(const ebpo_branch *s, uint32_t child)
+{
+    unsigned mask = 0;
+    for (uint32_t o = 0; o < 8; o++)
+        mask |= (unsigned)(s->nodes[child + o].type != EBPO_WHITE) << o;
+    return mask;
+}
+
+/* In octant order; neighbours share the halves that their envelopes are cut from. A half that
+ * rounding leaves nothing of stays the whole cube, and so do its parts: too large, never too small.
+ */
+static bool emit_children(emitter *e, uint32_t child, ebpo_cell cell, int32_t winding,
+                          const int32_t offset[8], const ebpo_polytope *envelope)
+{
+    unsigned filled = filled_children(e->s, child);
+    ebpo_polytope z, y, x;
+    for (unsigned o = 0; o < 8; o++) {
+        if (o % 4 == 0 && filled >> o & 15)
+            ebpo_polytope_half(envelope, 2, o >> 2 & 1, &z);
+        if (o % 2 == 0 && filled >> o & 3)
+            ebpo_polytope_half(&z, 1, o >> 1 & 1, &y);
+        if (filled >> o & 1)
+            ebpo_polytope_half(&y, 0, o & 1, &x);
+        if (!emit(e, child + o, ebpo_child_cell(cell, o), winding + offset[o], &x))
+            return false;
+    }
+    return true;
+}
+
+static bool emit_gray(emitter *e, const ebpo_build_node *node, ebpo_cell cell, int32_t winding,
+                      ebpo_polytope *envelope)
+{
+    const ebpo_builder *b = e->b;
+    uint32_t codes[EBPO_PLANES_STORED];
+    int planes = 0;
+    ebpo_workspace_settle_often(b->workspace, e->s->out[cell.level].level.gray_count);
+    if (b->options->parts & EBPO_PART_PLANES)
+        planes = ebpo_gray_planes(b, e->scratch->envelope, e->s, node->detail, cell, winding,
+                                  envelope, codes);
+    if (planes < 0 ||
+        !ebpo_emit_gray(&e->s->out[cell.level], codes, planes,
+                        ebpo_polytope_volume(envelope) * ebpo_cell_volume(b, cell.level)))
+        return false;
+    int32_t offset[8];
+    ebpo_child_windings(b, e->s, node->child, offset);
+    uint16_t types = 0;
+    for (uint32_t o = 0; o < 8; o++) {
+        unsigned type = e->s->nodes[node->child + o].type;
+        if (type == EBPO_WHITE && b->solid &&
+            ebpo_rule_inside(b->options->rule, winding + offset[o]))
+            type = EBPO_BLACK;
+        types |= (uint16_t)(type << 2 * o);
+    }
+    if (!ebpo_emit_group(&e->s->out[cell.level + 1], types))
+        return false;
+    return emit_children(e, node->child, cell, winding, offset, envelope);
+}
+
+static bool emit(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding,
+                 ebpo_polytope *envelope)
+{
+    ebpo_build_node node = e->s->nodes[index];
+    switch (node.type) {
+    case EBPO_LEAF: return emit_leaf(e, node.detail, cell, winding, envelope);
+    case EBPO_GRAY: return emit_gray(e, &node, cell, winding, envelope);
+    default: return emit_empty(e, cell, winding);
+    }
+}
+
+ebpo_status ebpo_emit_piece(const ebpo_builder *b, ebpo_emit_scratch *scratch, ebpo_branch *s,
+                            ebpo_error *error)
+{
+    emitter e = { b, s, scratch };
+    s->out = ebpo_array_zero(b->workspace, EBPO_LEVELS_MAX, sizeof *s->out);
+    for (int level = 0; s->out && level < EBPO_LEVELS_MAX; level++)
+        s->out[level].workspace = b->workspace;
+    if (!s->out || !emit(&e, 0, s->cell, s->winding, s->above))
+        return ebpo_workspace_fail_while(b->workspace, "while computing envelopes", error);
+    return EBPO_OK;
+}

@@ -1,0 +1,294 @@
+/* The planes of a gray node, from the root down: candidates are the directions of the solid's hull
+ * in the cell. Few points: their hull. Many, or none that span a volume: the hull of the extreme
+ * ones, found by asking in its own directions, and normals of faces. */
+#include "geom/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "construct/propose.h"
+#include "construct/supports.h"
+#include "geom/plane_code.h"
+#include "planes/hull_directions.h"
+
+enum {
+    TOP_LEVELS = 4,   /* nearly free of bytes */
+    MANY_LEVELS = 2,  /* round solids deserve more planes there: 73 nodes at most */
+    FACES_BELOW = 16, /* normals of faces that are tried below the top */
+    HULL_BELOW = 24,  /* and directions of the hull, in a round */
+    HULL_ROUNDS = 3,
+    HULL_DIRECTIONS = 160, /* at most, in a round */
+    TABLE = 1024           /* of normals */
+};
+
+struct ebpo_envelope_scratch {
+    ebpo_supports supports;
+    ebpo_candidate candidates[EBPO_PLANES_CANDIDATES];
+    int count;
+    /* normals, of candidates and of those that were dropped */
+    uint32_t tried[2 * EBPO_PLANES_CANDIDATES];
+    int tried_count;
+    uint32_t normals[TABLE];          /* 1 + normal, by hash */
+    double core[EBPO_HULL_POINTS][3]; /* extreme points of the solid in the cell */
+    int core_count;
+    ebpo_hull_facet facet[EBPO_HULL_FACETS];
+};
+
+ebpo_status ebpo_scratch_make(ebpo_envelope_scratch **out, ebpo_error *error)
+{
+    *out = ebpo_alloc_zero(1, sizeof **out);
+    return *out ? EBPO_OK : ebpo_fail_memory(error, sizeof **out);
+}
+
+void ebpo_scratch_free(ebpo_envelope_scratch *scratch)
+{
+    if (scratch)
+        ebpo_supports_free(&scratch->supports);
+    free(scratch);
+}
+
+double ebpo_cell_volume(const ebpo_builder *b, int level)
+{
+    double v = 1;
+    for (int k = 0; k < 3; k++)
+        v *= b->box.size[k] / (double)(1u << level);
+    return v;
+}
+
+unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32_t delta[8])
+{
+    unsigned mask = 0;
+    if (b->solid)
+        for (int i = 0; i < 8; i++)
+            if (ebpo_rule_inside(b->options->rule, winding + delta[i]))
+                mask |= 1u << i;
+    return mask;
+}
+
+/* A support from which on a plane cannot remove epsilon, nor a needle: a cap of height h of a body
+ * of width H and volume V has at most V (1 - (1 - h/H)^3) <= 3 V h / H. */
+static double hopeless(const ebpo_polytope *envelope, double volume, const int32_t n[3],
+                       double epsilon)
+{
+    double most = -1e300, least = 1e300;
+    for (int i = 0; i < envelope->vertex_count; i++) {
+        const double *v = envelope->vertex[i];
+        double e = n[0] * v[0] + n[1] * v[1] + n[2] * v[2];
+        most = e > most ? e : most;
+        least = e < least ? e : least;
+    }
+    double length = sqrt((double)n[0] * n[0] + (double)n[1] * n[1] + (double)n[2] * n[2]);
+    return most - fmin((most - least) * epsilon / (3 * volume), ebpo_needle * length);
+}
+
+/* Looks at one more direction. Those that cannot gain epsilon are dropped as soon as that shows.
+ * The extreme point is kept for the hull. */
+static void try_normal(ebpo_envelope_scratch *s, uint32_t normal, const ebpo_polytope *envelope,
+                       double volume, double epsilon, double where[3])
+{
+    int32_t n[3], d;
+    ebpo_plane_code_decode(normal, n, &d);
+    double enough = hopeless(envelope, volume, n, epsilon);
+    double support = ebpo_supports_find_from(&s->supports, n, enough, (const double(*)[3])s->core,
+                                             s->core_count, where);
+    if (support < enough && s->count < EBPO_PLANES_CANDIDATES)
+        s->candidates[s->count++] = (ebpo_candidate){ .normal = normal, .support = support };
+    if (s->tried_count < 2 * EBPO_PLANES_CANDIDATES)
+        s->tried[s->tried_count++] = normal;
+}
+
+/* --- directions of the hull --- */
+
+static void add_core(ebpo_envelope_scratch *s, const double where[3])
+{
+    static const double near = 1e-12;
+    for (int i = 0; i < s->core_count; i++) {
+        double square = 0;
+        for (int k = 0; k < 3; k++)
+            square += (s->core[i][k] - where[k]) * (s->core[i][k] - where[k]);
+        if (square < near)
+            return;
+    }
+    if (s->core_count == EBPO_HULL_POINTS)
+        return;
+    for (int k = 0; k < 3; k++)
+        s->core[s->core_count][k] = where[k];
+    s->core_count++;
+}
+
+/* The ways to the walls, edges and corners of a cell: whatever the faces look like, the hull is
+ * known from all sides then. */
+static void look_around(ebpo_envelope_scratch *s)
+{
+    for (int i = 0; i < 27; i++) {
+        double way[3] = { i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1 }, where[3];
+        uint32_t normal;
+        int32_t n[3], d;
+        if (!ebpo_plane_code_normal(way, &normal) || !ebpo_plane_code_decode(normal, n, &d))
+            continue;
+        if (ebpo_supports_find_from(&s->supports, n, 1e300, (const double(*)[3])s->core,
+                                    s->core_count, where) > -1e300)
+            add_core(s, where);
+    }
+}
+
+static bool was_tried(const ebpo_envelope_scratch *s, uint32_t normal)
+{
+    for (int i = 0; i < s->tried_count; i++)
+        if (s->tried[i] == normal)
+            return true;
+    return false;
+}
+
+/* One round: the hull of the points known so far proposes its facets, and what reaches beyond a
+ * facet is one more point. False when nothing was new. */
+static bool hull_round(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, double volume,
+                       double epsilon, int most)
+{
+    static const double worth = 1e-3; /* of the cell */
+    int facets = ebpo_hull_facets((const double(*)[3])s->core, s->core_count, 1e-9, s->facet,
+                                  EBPO_HULL_FACETS),
+        before = s->core_count;
+    qsort(s->facet, (size_t)facets, sizeof *s->facet, ebpo_hull_by_area);
+    for (int i = 0; i < facets && most > 0; i++) {
+        const ebpo_hull_facet *f = &s->facet[i];
+        uint32_t normal;
+        double where[3] = { 0, 0, 0 };
+        if (!ebpo_plane_code_normal(f->n, &normal) || was_tried(s, normal))
+            continue;
+        try_normal(s, normal, envelope, volume, epsilon, where);
+        most--;
+        if (f->n[0] * where[0] + f->n[1] * where[1] + f->n[2] * where[2] > f->d + worth)
+            add_core(s, where);
+    }
+    return s->core_count > before;
+}
+
+static void try_hull(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, double volume,
+                     double epsilon, int most)
+{
+    for (int round = 0; round < HULL_ROUNDS && hull_round(s, envelope, volume, epsilon, most);
+         round++)
+        ;
+}
+
+/* --- few points --- */
+
+/* Points so near to the hull give directions that are hardly different. */
+static const double hull_tolerance = 1e-3;
+
+/* All points of the node; false when they are too many, or some are known by their bounds only. */
+static bool take_points(ebpo_envelope_scratch *s)
+{
+    const ebpo_supports *from = &s->supports;
+    if (from->begin < from->end || from->count > EBPO_HULL_POINTS)
+        return false;
+    for (uint64_t i = 0; i < from->count; i++) {
+        for (int k = 0; k < 3; k++)
+            s->core[i][k] = from->point[i / 4][k][i % 4];
+    }
+    s->core_count = (int)from->count;
+    return true;
+}
+
+/* False when the table has it. */
+static bool new_normal(ebpo_envelope_scratch *s, uint32_t normal)
+{
+    uint32_t at = normal * 2654435761u >> 22;
+    for (; s->normals[at]; at = (at + 1) % TABLE)
+        if (s->normals[at] == 1 + normal)
+            return false;
+    s->normals[at] = 1 + normal;
+    return true;
+}
+
+/* The hull's facets as candidates; the volume of the hull, or -1 when there is none. */
+static double hull_candidates(ebpo_envelope_scratch *s, double tolerance)
+{
+    int facets = ebpo_hull_facets((const double(*)[3])s->core, s->core_count, tolerance, s->facet,
+                                  EBPO_HULL_FACETS);
+    if (facets == 0)
+        return -1;
+    if (facets > EBPO_PLANES_CANDIDATES)
+        qsort(s->facet, (size_t)facets, sizeof *s->facet, ebpo_hull_by_area);
+    memset(s->normals, 0, sizeof s->normals);
+    double volume = 0;
+    for (int i = 0; i < facets; i++) {
+        uint32_t normal;
+        int32_t n[3], d;
+        volume += s->facet[i].area * s->facet[i].d / 3;
+        if (s->count == EBPO_PLANES_CANDIDATES || !ebpo_plane_code_normal(s->facet[i].n, &normal) ||
+            !new_normal(s, normal))
+            continue;
+        double where[3];
+        ebpo_plane_code_decode(normal, n, &d);
+        s->candidates[s->count++] =
+            (ebpo_candidate){ .normal = normal,
+                              .support = ebpo_supports_find(&s->supports, n, 1e300, where) };
+    }
+    return fmax(0, volume);
+}
+
+/* --- the node --- */
+
+/* Top levels are nearly free of bytes, and a needle that fills a thousandth of its cell deserves
+ * planes all the same. */
+static double top_share(double volume) { return 0.1 * sqrt(fmax(0, volume)); }
+
+static void choose_directions(const ebpo_builder *b, ebpo_envelope_scratch *s,
+                              const ebpo_branch *branch, const ebpo_build_detail *detail, int level,
+                              const ebpo_polytope *envelope, double volume, double epsilon)
+{
+    bool top = level <= TOP_LEVELS;
+    ebpo_candidate faces[EBPO_PLANES_CANDIDATES];
+    int count = ebpo_build_candidates(b, branch, detail, FACES_BELOW, faces);
+    s->core_count = 0;
+    look_around(s);
+    for (int i = 0; i < count; i++) {
+        double where[3];
+        try_normal(s, faces[i].normal, envelope, volume, epsilon, where);
+        add_core(s, where);
+    }
+    try_hull(s, envelope, volume, epsilon, top ? HULL_DIRECTIONS : HULL_BELOW);
+}
+
+static int choose_now(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo_branch *branch,
+                      const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding,
+                      ebpo_polytope *envelope, uint32_t *codes)
+{
+    if (!ebpo_supports_gather(&s->supports, b, branch, detail, cell, winding))
+        return -1;
+    double volume = ebpo_polytope_volume(envelope),
+           epsilon = b->options->epsilon * (cell.level <= TOP_LEVELS ? top_share(volume) : 1);
+    ebpo_choice choice = { .candidates = s->candidates,
+                           .most =
+                               cell.level <= MANY_LEVELS ? 2 * EBPO_PLANES_MAX : EBPO_PLANES_MAX,
+                           .epsilon = epsilon,
+                           .reach = ebpo_needle };
+    s->count = s->tried_count = s->core_count = 0;
+    if (!(volume > 0))
+        return 0;
+    if (!take_points(s) ||
+        (choice.core = hull_candidates(s, cell.level <= TOP_LEVELS ? 1e-9 : hull_tolerance)) < 0) {
+        choose_directions(b, s, branch, detail, cell.level, envelope, volume, epsilon);
+        choice.core = 0;
+    }
+    choice.count = s->count;
+    return ebpo_select_greedy(envelope, &choice, codes);
+}
+
+int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo_branch *branch,
+                     uint32_t detail, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope,
+                     uint32_t codes[EBPO_PLANES_STORED])
+{
+    int count;
+    const uint32_t *proposed = ebpo_proposed(branch, detail, &count);
+    if (!proposed)
+        return choose_now(b, s, branch, &branch->details[detail], cell, winding, envelope, codes);
+    memcpy(codes, proposed, (size_t)count * sizeof *codes);
+    ebpo_planes_cut(envelope, codes, (uint64_t)count);
+    return count;
+}

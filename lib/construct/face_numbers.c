@@ -1,0 +1,175 @@
+/* Final numbers: faces by the first leaf, depth first, that they touch; vertices by first use. */
+#include "geom/strict_fp.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "construct/builder.h"
+
+static void number_leaf(ebpo_builder *b, const ebpo_branch *s, ebpo_build_detail *d, uint32_t *next)
+{
+    d->first = *next;
+    for (uint64_t i = d->entry_begin; i < d->entry_end; i++) {
+        uint32_t place = s->entries[i], f = s->list[place];
+        if (s->fresh[place / 8] >> place % 8 & 1 && b->number[f] == EBPO_NO_NUMBER)
+            b->number[f] = (*next)++;
+    }
+    d->new_count = *next - d->first;
+}
+
+static void number_node(ebpo_builder *b, ebpo_branch *s, uint32_t index, uint32_t *next)
+{
+    const ebpo_build_node *node = &s->nodes[index];
+    ebpo_workspace_settle_often(b->workspace, index);
+    if (node->type == EBPO_LEAF)
+        number_leaf(b, s, &s->details[node->detail], next);
+    else if (node->type == EBPO_GRAY)
+        for (uint32_t o = 0; o < 8; o++)
+            number_node(b, s, node->child + o, next);
+}
+
+ebpo_status ebpo_build_number(ebpo_builder *b, ebpo_branch *s, ebpo_error *error)
+{
+    uint32_t next = (uint32_t)s->first;
+    number_node(b, s, 0, &next);
+    uint64_t given = next - s->first;
+    if (given != s->fresh_count)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "internal: %llu faces of a piece are in none of its leaves",
+                         (unsigned long long)(s->fresh_count - given));
+    return EBPO_OK;
+}
+
+/* order[i]: mesh vertex that gets final number i. */
+static void order_vertices(const ebpo_builder *b, const ebpo_mesh *mesh, const uint32_t *face_at,
+                           uint32_t *order, uint32_t *final)
+{
+    ebpo_array_fill(b->workspace, final, 0xff, mesh->vertex_count * sizeof *final);
+    uint32_t next = 0;
+    for (uint64_t i = 0; i < mesh->face_count; i++) {
+        ebpo_workspace_settle_often(b->workspace, i);
+        const uint32_t *f = mesh->faces + 3 * (uint64_t)face_at[i];
+        for (int k = 0; k < 3; k++)
+            if (final[f[k]] == EBPO_NO_NUMBER) {
+                order[next] = f[k];
+                final[f[k]] = next++;
+            }
+    }
+    for (uint64_t v = 0; v < mesh->vertex_count; v++) {
+        ebpo_workspace_settle_often(b->workspace, v);
+        if (final[v] == EBPO_NO_NUMBER) {
+            order[next] = (uint32_t)v;
+            final[v] = next++;
+        }
+    }
+}
+
+/* What comes after the order is known: all of it is moving, on all cores. */
+typedef struct moving {
+    const ebpo_builder *b;
+    const ebpo_mesh *mesh;
+    const uint32_t *final;
+    uint32_t *face_at;
+    ebpo_tree *out;
+} moving;
+
+enum { MOVE_GRAIN = 1 << 14 };
+
+static ebpo_status turn_around(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
+{
+    moving *m = context;
+    (void)worker, (void)error;
+    for (uint64_t f = begin; f < end; f++) {
+        ebpo_workspace_settle_often(m->b->workspace, f);
+        m->face_at[m->b->number[f]] = (uint32_t)f;
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status move_vertices(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
+{
+    moving *m = context;
+    const ebpo_mesh *mesh = m->mesh;
+    ebpo_tree *out = m->out;
+    (void)worker, (void)error;
+    for (uint64_t i = begin; i < end; i++) {
+        ebpo_workspace_settle_often(m->b->workspace, i);
+        uint64_t v = out->vertex_source[i];
+        if (mesh->xyz64)
+            memcpy(out->mesh.xyz64 + 3 * i, mesh->xyz64 + 3 * v, 3 * sizeof(double));
+        else
+            memcpy(out->mesh.xyz32 + 3 * i, mesh->xyz32 + 3 * v, 3 * sizeof(float));
+        out->vertex_source[i] = mesh->arrangement->vertex_source[v];
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status move_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
+{
+    moving *m = context;
+    (void)worker, (void)error;
+    for (uint64_t i = begin; i < end; i++) {
+        ebpo_workspace_settle_often(m->b->workspace, i);
+        uint64_t f = m->face_at[i];
+        m->out->face_source[i] = m->mesh->arrangement->face_source[f];
+        for (uint64_t k = 0; k < 3; k++)
+            m->out->mesh.faces[3 * i + k] = m->final[m->mesh->faces[3 * f + k]];
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status move_all(moving *m, uint32_t *final, ebpo_error *error)
+{
+    const ebpo_builder *b = m->b;
+    static const char stage[] = "numbering vertices";
+    uint64_t faces = m->mesh->face_count, vertices = m->mesh->vertex_count,
+             all = 3 * faces + vertices;
+    ebpo_pass turn = { &b->options->progress, 0, faces, all },
+              place = { turn.to, 2 * faces, 2 * faces + vertices, all },
+              move = { turn.to, 2 * faces + vertices, all, all };
+    ebpo_progress progress = ebpo_pass_progress(&turn);
+    ebpo_status status =
+        ebpo_parallel_for(b->threads, faces, MOVE_GRAIN, turn_around, m, &progress, stage, error);
+    if (status != EBPO_OK)
+        return status;
+    order_vertices(b, m->mesh, m->face_at, m->out->vertex_source, final);
+    m->final = final;
+    progress = ebpo_pass_progress(&place);
+    status = ebpo_parallel_for(b->threads, vertices, MOVE_GRAIN, move_vertices, m, &progress, stage,
+                               error);
+    progress = ebpo_pass_progress(&move);
+    return status == EBPO_OK ? ebpo_parallel_for(b->threads, faces, MOVE_GRAIN, move_faces, m,
+                                                 &progress, stage, error)
+                             : status;
+}
+
+ebpo_status ebpo_build_mesh(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, ebpo_error *error)
+{
+    uint64_t nv = mesh->vertex_count, nf = mesh->face_count;
+    uint32_t *face_at = ebpo_array_alloc(b->workspace, nf, sizeof *face_at),
+             *final = ebpo_array_alloc(b->workspace, nv, sizeof *final);
+    ebpo_mesh *m = &out->mesh;
+    *m = *mesh;
+    m->arrangement = NULL;
+    m->xyz32 = mesh->xyz64 ? NULL : ebpo_array_alloc(b->workspace, nv, 3 * sizeof(float));
+    m->xyz64 = mesh->xyz64 ? ebpo_array_alloc(b->workspace, nv, 3 * sizeof(double)) : NULL;
+    m->faces = ebpo_array_alloc(b->workspace, nf, 3 * sizeof(uint32_t));
+    out->vertex_source = ebpo_array_alloc(b->workspace, nv, sizeof(uint32_t));
+    out->face_source = ebpo_array_alloc(b->workspace, nf, sizeof(uint32_t));
+    moving job = { .b = b, .mesh = mesh, .face_at = face_at, .out = out };
+    ebpo_status status;
+    if (!face_at || !final || (!m->xyz32 && !m->xyz64) || !m->faces || !out->vertex_source ||
+        !out->face_source)
+        status = ebpo_workspace_fail(b->workspace, nv * 16 + nf * 16, error);
+    else
+        status = move_all(&job, final, error);
+    ebpo_array_free(face_at);
+    ebpo_array_free(final);
+    return status;
+}

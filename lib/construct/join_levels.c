@@ -1,0 +1,319 @@
+/* All stretches of level arrays joined in depth-first order, which is octcode order in each level.
+ */
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "construct/builder.h"
+#include "construct/level_arrays.h"
+#include "construct/construct_top.h"
+
+typedef struct joiner {
+    ebpo_builder *b;
+    ebpo_out **stretch; /* depth first: pieces of the top and whole subtrees by turns */
+    uint64_t count, capacity;
+    ebpo_out *current;
+    ebpo_level *level; /* what comes out */
+} joiner;
+
+static const char stage[] = "joining levels";
+
+static ebpo_status no_memory(const ebpo_builder *b, ebpo_error *error)
+{
+    return ebpo_workspace_fail_while(b->workspace, "while joining levels", error);
+}
+
+static bool push(joiner *j, ebpo_out *out)
+{
+    if (!ebpo_grow(&j->stretch, &j->capacity, j->count + 1, sizeof *j->stretch))
+        return false;
+    j->stretch[j->count++] = out;
+    return true;
+}
+
+static ebpo_out *current(joiner *j)
+{
+    if (j->current)
+        return j->current;
+    ebpo_out *out = ebpo_alloc_zero(EBPO_LEVELS_MAX, sizeof *out);
+    if (!out || !push(j, out)) {
+        free(out);
+        return NULL;
+    }
+    for (int level = 0; level < EBPO_LEVELS_MAX; level++)
+        out[level].workspace = j->b->workspace;
+    return j->current = out;
+}
+
+static unsigned type_of(const ebpo_builder *b, const ebpo_build_node *n, int32_t winding)
+{
+    unsigned type = n->type == EBPO_LEAF ? b->sub[n->detail].root_type : n->type;
+    if (type == EBPO_WHITE && b->solid && ebpo_rule_inside(b->options->rule, winding))
+        return EBPO_BLACK;
+    return type;
+}
+
+static bool walk(joiner *j, uint32_t index, ebpo_cell cell, int32_t winding)
+{
+    ebpo_builder *b = j->b;
+    ebpo_build_node node = b->top.nodes[index];
+    if (node.type == EBPO_LEAF) {
+        ebpo_out *out = b->sub[node.detail].out;
+        b->sub[node.detail].out = NULL;
+        if (!push(j, out)) {
+            ebpo_out_free(out);
+            return false;
+        }
+        j->current = NULL;
+        return true;
+    }
+    ebpo_out *out = current(j);
+    if (!out)
+        return false;
+    if (node.type == EBPO_WHITE)
+        return ebpo_emit_empty(&out[cell.level],
+                               b->solid && ebpo_rule_inside(b->options->rule, winding), winding);
+    const ebpo_top_envelope *t = &b->top_envelope[node.detail];
+    int32_t offset[8];
+    ebpo_child_windings(b, &b->top, node.child, offset);
+    uint16_t types = 0;
+    for (uint32_t o = 0; o < 8; o++)
+        types |=
+            (uint16_t)(type_of(b, &b->top.nodes[node.child + o], winding + offset[o]) << 2 * o);
+    if (!ebpo_emit_gray(&out[cell.level], t->codes, t->count, t->volume) ||
+        !ebpo_emit_group(&out[cell.level + 1], types))
+        return false;
+    for (uint32_t o = 0; o < 8; o++)
+        if (!walk(j, node.child + o, ebpo_child_cell(cell, o), winding + offset[o]))
+            return false;
+    return true;
+}
+
+/* Arrays may share a count. */
+static void count_arrays(const joiner *j, int level)
+{
+    for (size_t s = 0; s < EBPO_LEVEL_ARRAYS; s++) {
+        uint64_t total = 0;
+        for (uint64_t i = 0; i < j->count; i++)
+            total += ebpo_count_of_level(&j->stretch[i][level].level, &ebpo_level_arrays[s]);
+        memcpy((char *)&j->level[level] + ebpo_level_arrays[s].count, &total, sizeof total);
+    }
+}
+
+static bool join_slice(const joiner *j, int level, const ebpo_level_array *s, ebpo_level *out)
+{
+    uint64_t total = ebpo_count_of_level(out, s);
+    if (!total)
+        return true;
+    char *to = ebpo_array_alloc(j->b->workspace, total, s->size);
+    if (!to)
+        return false;
+    memcpy((char *)out + s->array, &to, sizeof to);
+    for (uint64_t i = 0; i < j->count; i++) {
+        ebpo_level *from = &j->stretch[i][level].level;
+        void *array = ebpo_array_of_level(from, s), *none = NULL;
+        size_t bytes = (size_t)(ebpo_count_of_level(from, s) * s->size);
+        if (array)
+            ebpo_array_copy(j->b->workspace, to, array, bytes);
+        to += bytes;
+        if (!j->stretch[i][level].packed)
+            ebpo_array_free(array);
+        memcpy((char *)from + s->array, &none, sizeof none);
+        ebpo_workspace_settle(j->b->workspace);
+    }
+    return true;
+}
+
+static int compare_numbers(const void *a, const void *b)
+{
+    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
+}
+
+static void sort_numbers(uint32_t *a, uint64_t n)
+{
+    if (n > 32) {
+        qsort(a, n, sizeof *a, compare_numbers);
+        return;
+    }
+    for (uint64_t i = 1; i < n; i++) {
+        uint32_t v = a[i];
+        uint64_t j = i;
+        for (; j > 0 && a[j - 1] > v; j--)
+            a[j] = a[j - 1];
+        a[j] = v;
+    }
+}
+
+enum { LEAF_GRAIN = 1 << 13 };
+
+typedef struct numbering {
+    const ebpo_builder *b;
+    ebpo_level *level;
+    uint64_t *first; /* of each block of leaves: its place in leaf_refs */
+} numbering;
+
+/* Leaves refer to faces by their numbers along the curve, as other pieces' final ones were not
+ * known: now they are. */
+static ebpo_status number_block(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                ebpo_error *error)
+{
+    numbering *n = context;
+    ebpo_level *l = n->level;
+    uint32_t *refs = l->leaf_refs + n->first[begin / LEAF_GRAIN];
+    (void)worker, (void)error;
+    for (uint64_t i = begin; i < end; refs += l->leaf_ref_count[i++]) {
+        ebpo_workspace_settle_often(n->b->workspace, i);
+        for (uint32_t k = 0; k < l->leaf_ref_count[i]; k++)
+            refs[k] = n->b->number[refs[k]];
+        sort_numbers(refs, l->leaf_ref_count[i]);
+    }
+    return EBPO_OK;
+}
+
+/* `all`: references of all levels, of which `before` have been numbered. */
+static ebpo_status number_refs(const ebpo_builder *b, ebpo_level *l, uint64_t before, uint64_t all,
+                               ebpo_error *error)
+{
+    if (!l->ref_count)
+        return EBPO_OK;
+    numbering n = { b, l, ebpo_alloc(l->leaf_count / LEAF_GRAIN + 1, sizeof *n.first) };
+    if (!n.first)
+        return no_memory(b, error);
+    for (uint64_t i = 0, refs = 0; i < l->leaf_count; refs += l->leaf_ref_count[i++]) {
+        ebpo_workspace_settle_at(b->workspace, i);
+        if (i % LEAF_GRAIN == 0)
+            n.first[i / LEAF_GRAIN] = refs;
+    }
+    ebpo_pass pass = { &b->options->progress, all + before, all + before + l->ref_count, 2 * all };
+    ebpo_progress progress = ebpo_pass_progress(&pass);
+    ebpo_status status = ebpo_parallel_for(b->threads, l->leaf_count, LEAF_GRAIN, number_block, &n,
+                                           &progress, stage, error);
+    free(n.first);
+    return status;
+}
+
+/* Arrays that say only what is understood anyway are left out. */
+static void drop_if_all(const ebpo_builder *b, int32_t **array, uint64_t count, int32_t value)
+{
+    for (uint64_t i = 0; i < count; i++) {
+        ebpo_workspace_settle_at(b->workspace, i);
+        if ((*array)[i] != value)
+            return;
+    }
+    ebpo_array_free(*array);
+    *array = NULL;
+}
+
+static void drop(void *array)
+{
+    void *block, *none = NULL;
+    memcpy(&block, array, sizeof block);
+    ebpo_array_free(block);
+    memcpy(array, &none, sizeof none);
+}
+
+static void leave_out(const ebpo_builder *b, ebpo_level *l)
+{
+    uint32_t parts = b->options->parts;
+    drop_if_all(b, &l->black_winding, l->black_count, 1);
+    drop_if_all(b, &l->white_winding, l->white_count, 0);
+    if (!b->solid)
+        drop(&l->leaf_winding);
+    if (!(parts & EBPO_PART_LEAF_PLANES))
+        drop(&l->leaf_plane_counts);
+    if (!(parts & EBPO_PART_PLANES))
+        drop(&l->plane_counts);
+    if (parts & EBPO_PART_MESH)
+        return;
+    drop(&l->leaf_first);
+    drop(&l->leaf_new);
+    drop(&l->leaf_ref_count);
+    drop(&l->leaf_refs);
+    l->ref_count = l->new_count = 0;
+}
+
+static ebpo_status join_arrays(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
+{
+    joiner *j = context;
+    (void)worker;
+    for (uint64_t i = begin; i < end; i++)
+        if (!join_slice(j, (int)(i / EBPO_LEVEL_ARRAYS), &ebpo_level_arrays[i % EBPO_LEVEL_ARRAYS],
+                        &j->level[i / EBPO_LEVEL_ARRAYS]))
+            return no_memory(j->b, error);
+    return EBPO_OK;
+}
+
+/* Volumes are added in one order whatever the number of threads. */
+static ebpo_status finish_level(const joiner *j, int level, uint64_t before, uint64_t all,
+                                ebpo_error *error)
+{
+    ebpo_level *out = &j->level[level];
+    for (uint64_t i = 0; i < j->count; i++) {
+        const ebpo_level *l = &j->stretch[i][level].level;
+        out->gray_volume += l->gray_volume;
+        out->leaf_volume += l->leaf_volume;
+        out->new_count += l->new_count;
+    }
+    ebpo_status status = j->b->options->parts & EBPO_PART_MESH
+                             ? number_refs(j->b, out, before, all, error)
+                             : EBPO_OK;
+    leave_out(j->b, out);
+    return status;
+}
+
+static void summarise(ebpo_tree *out, int level)
+{
+    const ebpo_level *l = &out->level[level];
+    out->info.level[level] = (ebpo_level_summary){ .gray_count = l->gray_count,
+                                                   .leaf_count = l->leaf_count,
+                                                   .white_count = l->white_count,
+                                                   .black_count = l->black_count,
+                                                   .plane_count = l->plane_count,
+                                                   .leaf_plane_count = l->leaf_plane_count,
+                                                   .new_count = l->new_count,
+                                                   .ref_count = l->ref_count,
+                                                   .gray_volume = l->gray_volume,
+                                                   .leaf_volume = l->leaf_volume };
+}
+
+static bool root_group(joiner *j)
+{
+    ebpo_builder *b = j->b;
+    ebpo_out *first = current(j); /* never a piece's, whose arrays may be packed */
+    return first && ebpo_emit_group(&first[0], (uint16_t)type_of(b, &b->top.nodes[0], 0));
+}
+
+ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error)
+{
+    joiner j = { .b = b, .level = out->level };
+    ebpo_status status =
+        root_group(&j) && walk(&j, 0, b->top.cell, 0) ? EBPO_OK : no_memory(b, error);
+    uint64_t refs = 0, all = 0;
+    for (int level = 0; level < EBPO_LEVELS_MAX && status == EBPO_OK; level++) {
+        count_arrays(&j, level);
+        all += out->level[level].ref_count;
+    }
+    ebpo_pass pass = { &b->options->progress, 0, all, 2 * all };
+    ebpo_progress progress = ebpo_pass_progress(&pass);
+    if (status == EBPO_OK)
+        status = ebpo_parallel_for(b->threads, EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS, 1, join_arrays,
+                                   &j, &progress, stage, error);
+    for (int level = 0; level < EBPO_LEVELS_MAX && status == EBPO_OK; level++) {
+        uint64_t own = out->level[level].ref_count;
+        status = finish_level(&j, level, refs, all, error);
+        refs += own;
+        if (out->level[level].group_count)
+            out->info.level_count = level + 1;
+        summarise(out, level);
+    }
+    for (uint64_t i = 0; i < j.count; i++)
+        ebpo_out_free(j.stretch[i]);
+    free(j.stretch);
+    ebpo_store_free(b->store);
+    b->store = NULL;
+    return status;
+}

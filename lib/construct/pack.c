@@ -1,0 +1,106 @@
+/* Where pieces put what they made until the levels are joined. */
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "construct/level_arrays.h"
+
+enum { STORE_BYTES = 16 << 20, ALIGNMENT = 8 };
+
+/* Blocks of the workspace, filled one after the other. */
+struct ebpo_store {
+    pthread_mutex_t lock;
+    char **blocks;
+    uint64_t block_count, block_capacity;
+    size_t left; /* in the last one, at its end */
+    size_t last_bytes;
+};
+
+static size_t room_for(uint64_t count, size_t size)
+{
+    return (count * size + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
+}
+
+static char *take_room(ebpo_builder *b, struct ebpo_store *s, size_t bytes)
+{
+    if (!s->block_count || bytes > s->left) {
+        size_t block = bytes > STORE_BYTES ? bytes : STORE_BYTES;
+        char *made =
+            ebpo_grow(&s->blocks, &s->block_capacity, s->block_count + 1, sizeof *s->blocks)
+                ? ebpo_array_alloc(b->workspace, block, 1)
+                : NULL;
+        if (!made)
+            return NULL;
+        s->blocks[s->block_count++] = made;
+        s->left = s->last_bytes = block;
+    }
+    char *at = s->blocks[s->block_count - 1] + (s->last_bytes - s->left);
+    s->left -= bytes;
+    return at;
+}
+
+static bool make_store(ebpo_builder *b)
+{
+    static pthread_mutex_t making = PTHREAD_MUTEX_INITIALIZER;
+    pthread_mutex_lock(&making);
+    if (!b->store && (b->store = ebpo_alloc_zero(1, sizeof *b->store)))
+        pthread_mutex_init(&b->store->lock, NULL);
+    pthread_mutex_unlock(&making);
+    return b->store != NULL;
+}
+
+static char *reserve(ebpo_builder *b, size_t bytes)
+{
+    pthread_mutex_lock(&b->store->lock);
+    char *at = take_room(b, b->store, bytes);
+    pthread_mutex_unlock(&b->store->lock);
+    return at;
+}
+
+void *ebpo_store_reserve(ebpo_builder *b, uint64_t bytes)
+{
+    return make_store(b) ? reserve(b, room_for(bytes, 1)) : NULL;
+}
+
+ebpo_status ebpo_build_pack(ebpo_builder *b, ebpo_out *out, ebpo_error *error)
+{
+    size_t bytes = 0;
+    if (!b->workspace)
+        return EBPO_OK;
+    for (int level = 0; level < EBPO_LEVELS_MAX; level++)
+        for (int s = 0; s < EBPO_LEVEL_ARRAYS; s++)
+            bytes += room_for(ebpo_count_of_level(&out[level].level, &ebpo_level_arrays[s]),
+                              ebpo_level_arrays[s].size);
+    char *to = ebpo_store_reserve(b, bytes);
+    if (!to)
+        return ebpo_workspace_fail(b->workspace, bytes, error);
+    for (int level = 0; level < EBPO_LEVELS_MAX; level++) {
+        for (int s = 0; s < EBPO_LEVEL_ARRAYS; s++) {
+            ebpo_level *l = &out[level].level;
+            void *array = ebpo_array_of_level(l, &ebpo_level_arrays[s]), *here = to;
+            uint64_t count = ebpo_count_of_level(l, &ebpo_level_arrays[s]);
+            if (array && count)
+                ebpo_array_copy(b->workspace, to, array, count * ebpo_level_arrays[s].size);
+            ebpo_array_free(array);
+            if (!array || !count)
+                here = NULL;
+            memcpy((char *)l + ebpo_level_arrays[s].array, &here, sizeof here);
+            to += room_for(count, ebpo_level_arrays[s].size);
+        }
+        out[level].packed = true;
+    }
+    return EBPO_OK;
+}
+
+void ebpo_store_free(struct ebpo_store *store)
+{
+    if (!store)
+        return;
+    for (uint64_t i = 0; i < store->block_count; i++)
+        ebpo_array_free(store->blocks[i]);
+    free(store->blocks);
+    pthread_mutex_destroy(&store->lock);
+    free(store);
+}

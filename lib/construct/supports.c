@@ -1,0 +1,234 @@
+#include "geom/strict_fp.h"
+
+#include "construct/supports.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "geom/plane_code.h"
+
+enum { FEW_VERTICES = 4096, TABLE_MOST = 1 << 16, MANY_POINTS = 1 << 15 };
+
+static uint32_t hash_of(const double x[3])
+{
+    uint64_t bits[3];
+    memcpy(bits, x, sizeof bits);
+    return (uint32_t)(((bits[0] * 0x9e3779b97f4a7c15u ^ bits[1]) * 0xbf58476d1ce4e5b9u ^ bits[2]) *
+                          0x94d049bb133111ebu >>
+                      40);
+}
+
+/* True when the point is there already; its slack is then the greater of the two. */
+static bool known_point(ebpo_supports *s, const double x[3], double slack)
+{
+    uint64_t mask = s->place_count - 1, at = hash_of(x) & mask;
+    if (s->count >= s->place_count / 2)
+        return false;
+    for (; s->place[at]; at = (at + 1) & mask) {
+        unsigned i = s->place[at] - 1u, lane = i % 4;
+        double(*p)[4] = s->point[i / 4];
+        if (p[0][lane] != x[0] || p[1][lane] != x[1] || p[2][lane] != x[2])
+            continue;
+        p[3][lane] = slack > p[3][lane] ? slack : p[3][lane];
+        for (unsigned copy = lane ? 4 : (unsigned)(s->count - i); copy < 4; copy++)
+            p[3][copy] = p[3][0];
+        return true;
+    }
+    s->place[at] = (uint16_t)(s->count + 1);
+    return false;
+}
+
+static bool add_point(ebpo_supports *s, const double x[3], double slack)
+{
+    if (!ebpo_array_grow_late(s->b->workspace, &s->point, &s->capacity, s->count / 4 + 1,
+                              sizeof *s->point))
+        return false;
+    if (known_point(s, x, EBPO_NORMAL_NORM * slack))
+        return true;
+    double(*p)[4] = s->point[s->count / 4],
+    values[4] = { x[0], x[1], x[2], EBPO_NORMAL_NORM * slack };
+    unsigned own = s->count % 4;
+    for (int k = 0; k < 4; k++) /* the others of four are copies of the first until they come */
+        for (unsigned lane = own; lane < (own ? own + 1 : 4); lane++)
+            p[k][lane] = values[k];
+    s->count++;
+    return true;
+}
+
+static bool add_vertices(ebpo_supports *s, uint64_t begin, uint64_t end)
+{
+    const ebpo_builder *b = s->b;
+    double corner[3], size[3];
+    for (int k = 0; k < 3; k++) {
+        corner[k] = ebpo_wall(&b->box, k, s->cell.level, s->cell.at[k]);
+        size[k] = b->box.size[k] / (double)(1u << s->cell.level);
+    }
+    for (uint64_t i = begin; i < end; i++) {
+        double p[3];
+        ebpo_mesh_position(b->mesh, i, p);
+        /* Two roundings of values up to 1, far below the slack that ebpo_plane_code_offset adds. */
+        if (!add_point(s,
+                       (const double[3]){ (p[0] - corner[0]) / size[0],
+                                          (p[1] - corner[1]) / size[1],
+                                          (p[2] - corner[2]) / size[2] },
+                       0))
+            return false;
+    }
+    return true;
+}
+
+static bool add_crossings(ebpo_supports *s, const ebpo_branch *branch, const ebpo_build_detail *d)
+{
+    for (uint64_t i = d->cross_begin; i < d->cross_end; i++) {
+        ebpo_triangle face;
+        double points[9][3], slack;
+        if (i % (branch->list ? 1024 : 32) ==
+            0) /* of the top: each from another place of the files */
+            ebpo_workspace_settle(s->b->workspace);
+        ebpo_branch_triangle(s->b, branch, branch->crossing[i], &face);
+        int count = ebpo_clip_triangle(&s->b->box, s->cell, &face, points, &slack);
+        for (int p = 0; p < count; p++)
+            if (!add_point(s, points[p], slack))
+                return false;
+    }
+    return true;
+}
+
+/* For about so many points. */
+static bool clear_table(ebpo_supports *s, uint64_t points)
+{
+    uint64_t size = 16;
+    while (size < 2 * points && size < TABLE_MOST)
+        size *= 2;
+    s->place_count = size;
+    if (!ebpo_array_grow_late(s->b->workspace, &s->place, &s->place_capacity, size,
+                              sizeof *s->place))
+        return false;
+    memset(s->place, 0, size * sizeof *s->place);
+    return true;
+}
+
+static bool gather(ebpo_supports *s, const ebpo_builder *b, const ebpo_branch *branch,
+                   const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding)
+{
+    uint64_t begin, end;
+    ebpo_build_vertex_range(b, cell, &begin, &end);
+    s->b = b;
+    s->cell = cell;
+    s->sweep = ebpo_sweep_best();
+    s->count = 0;
+    bool few = end - begin <= FEW_VERTICES;
+    if (!clear_table(s,
+                     8 + (few ? end - begin : 0) + 2 * (detail->cross_end - detail->cross_begin)))
+        return false;
+    s->begin = few ? 0 : begin;
+    s->end = few ? 0 : end;
+    /* Corners first: they reach far and show soonest which directions are hopeless. */
+    unsigned corners = ebpo_inside_corners(b, winding, detail->delta);
+    for (int i = 0; i < 8; i++)
+        if (corners >> i & 1 &&
+            !add_point(s, (const double[3]){ i & 1, i >> 1 & 1, i >> 2 & 1 }, 0))
+            return false;
+    return (!few || add_vertices(s, begin, end)) && add_crossings(s, branch, detail);
+}
+
+/* Which of the points in a stretch has the value `best`. */
+static void locate(const ebpo_supports *s, uint64_t first, const double n[3], double best,
+                   double where[3])
+{
+    for (uint64_t i = first; i < s->count && i < first + 4 * EBPO_STRETCH; i++) {
+        double(*p)[4] = s->point[i / 4];
+        unsigned lane = i % 4;
+        if (n[0] * p[0][lane] + n[1] * p[1][lane] + n[2] * p[2][lane] + p[3][lane] == best) {
+            for (int k = 0; k < 3; k++)
+                where[k] = p[k][lane];
+            return;
+        }
+    }
+}
+
+/* Raises `support`. */
+static void among_points(const ebpo_supports *s, const double n[3], double enough, double *support,
+                         double where[3])
+{
+    if (s->count > MANY_POINTS)
+        ebpo_workspace_settle(s->b->workspace);
+    const ebpo_sweep_points points = { (const double(*)[4][4])s->point, (const double(*)[7])s->box,
+                                       (s->count + 3) / 4 };
+    uint64_t stretch = s->sweep->highest(&points, n, enough, support);
+    if (stretch != UINT64_MAX)
+        locate(s, stretch, n, *support, where);
+}
+
+static bool box_points(ebpo_supports *s)
+{
+    uint64_t fours = (s->count + 3) / 4;
+    if (!ebpo_array_grow_late(s->b->workspace, &s->box, &s->box_capacity, fours / EBPO_STRETCH + 1,
+                              sizeof *s->box))
+        return false;
+    for (uint64_t i = 0; i < fours; i++) {
+        double *box = s->box[i / EBPO_STRETCH];
+        for (int lane = 0; lane < 4; lane++) {
+            double(*p)[4] = s->point[i];
+            bool first = i % EBPO_STRETCH == 0 && lane == 0;
+            for (int k = 0; k < 3; k++) {
+                box[k] = first || p[k][lane] < box[k] ? p[k][lane] : box[k];
+                box[3 + k] = first || p[k][lane] > box[3 + k] ? p[k][lane] : box[3 + k];
+            }
+            box[6] = first || p[3][lane] > box[6] ? p[3][lane] : box[6];
+        }
+    }
+    return true;
+}
+
+bool ebpo_supports_gather(ebpo_supports *s, const ebpo_builder *b, const ebpo_branch *branch,
+                          const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding)
+{
+    return gather(s, b, branch, detail, cell, winding) && box_points(s);
+}
+
+double ebpo_supports_find(const ebpo_supports *s, const int32_t n[3], double enough,
+                          double where[3])
+{
+    return ebpo_supports_find_from(s, n, enough, NULL, 0, where);
+}
+
+double ebpo_supports_find_from(const ebpo_supports *s, const int32_t normal[3], double enough,
+                               const double (*known)[3], int known_count, double where[3])
+{
+    double n[3] = { normal[0], normal[1], normal[2] }, support = -1e300;
+    for (int i = 0; i < known_count; i++) {
+        double value = n[0] * known[i][0] + n[1] * known[i][1] + n[2] * known[i][2];
+        if (value > support) {
+            support = value;
+            memcpy(where, known[i], 3 * sizeof *where);
+        }
+    }
+    among_points(s, n, enough, &support, where);
+    if (s->begin >= s->end || support >= enough)
+        return support;
+    ebpo_workspace_settle(s->b->workspace); /* so many vertices lie all over the file */
+    uint64_t at;
+    double p[3] = { 0, 0, 0 };
+    support = ebpo_bounds_support(s->b, s->cell, n, s->begin, s->end, support, &at);
+    if (at != EBPO_NO_VERTEX)
+        ebpo_mesh_position(s->b->mesh, at, p);
+    if (at != EBPO_NO_VERTEX)
+        for (int k = 0; k < 3; k++)
+            where[k] = (p[k] - ebpo_wall(&s->b->box, k, s->cell.level, s->cell.at[k])) /
+                       (s->b->box.size[k] / (double)(1u << s->cell.level));
+    return support;
+}
+
+void ebpo_supports_free(ebpo_supports *s)
+{
+    ebpo_array_free(s->point);
+    ebpo_array_free(s->box);
+    ebpo_array_free(s->place);
+    s->point = NULL;
+    s->place = NULL;
+    s->box = NULL;
+    s->box_capacity = 0;
+    s->capacity = s->count = s->place_capacity = s->place_count = 0;
+}

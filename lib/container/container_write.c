@@ -1,0 +1,406 @@
+/* ebpo_tree_write: lays the file out once in memory to learn the sizes of its metadata, then writes
+ * headers, the chunks of the first levels, the index of large arrays' chunks, and all other chunks,
+ * in one go. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/fp_env.h"
+#include "base/parallel.h"
+#include "base/sha256.h"
+#include "base/arrays.h"
+#include "container/content.h"
+#include "container/head_facts.h"
+#include "container/plan.h"
+#include "container/container_write.h"
+#include "io/publish.h"
+
+/* Chunks that are in memory at a time: 8 MiB raw and as much encoded. */
+enum { WINDOW = 128 };
+
+/* HDF5 lets a header grow within its metadata block by a tenth of what is left there: room for that
+ * where no other header follows. */
+enum { ALONE_BYTES = 4096 };
+
+typedef struct slot {
+    const ebpo_array_out *array;
+    uint64_t chunk;
+    uint8_t *raw, *stored;
+    size_t raw_bytes, stored_bytes;
+    ebpo_status status;
+} slot;
+
+typedef struct writer {
+    ebpo_plan plan;
+    const ebpo_write_options *options;
+    unsigned threads;
+    ebpo_h5_out out;
+    ebpo_h5_id root;
+    slot slots[WINDOW];
+    unsigned used;            /* slots */
+    ebpo_chunk_coder *coders; /* one for each thread */
+    ebpo_content content;
+    uint64_t chunk_bytes, chunks_done, chunks;
+    /* headers; the index of arrays of several chunks, and where it begins (0: there is none, or not
+     * yet) */
+    uint64_t head_bytes, index_bytes, index_at;
+} writer;
+
+static ebpo_status make_level_groups(writer *w, ebpo_error *error)
+{
+    const ebpo_info *info = &w->plan.info;
+    ebpo_h5_id id;
+    ebpo_status status =
+        ebpo_h5_make_group(&w->out, "/levels", (unsigned)info->level_count, &id, error);
+    ebpo_h5_close_id(status == EBPO_OK ? id : -1);
+    for (int level = 0; level < info->level_count && status == EBPO_OK; level++) {
+        char path[EBPO_PATH_BYTES];
+        unsigned links = 0;
+        for (unsigned i = 0; i < w->plan.count; i++)
+            links += w->plan.array[i].id < EBPO_LEVEL_ARRAYS && w->plan.array[i].level == level;
+        snprintf(path, sizeof path, "/levels/%02d", level);
+        status = ebpo_h5_make_group(&w->out, path, links, &id, error);
+        if (status == EBPO_OK)
+            status = ebpo_facts_put_level(&w->out, id, &info->level[level], error);
+        ebpo_h5_close_id(id);
+    }
+    return status;
+}
+
+static ebpo_status make_mesh_groups(writer *w, ebpo_error *error)
+{
+    uint32_t parts = w->plan.info.parts;
+    ebpo_h5_id id = -1;
+    ebpo_status status = EBPO_OK;
+    if (parts & EBPO_PART_MESH)
+        status = ebpo_h5_make_group(&w->out, "/mesh", 3, &id, error);
+    ebpo_h5_close_id(id);
+    id = -1;
+    if (status == EBPO_OK && parts & EBPO_PART_MAPS)
+        status = ebpo_h5_make_group(&w->out, "/maps", 2, &id, error);
+    ebpo_h5_close_id(id);
+    return status;
+}
+
+/* The file's first chunk (of the root's type), as soon as it can be. */
+typedef struct first_chunk {
+    const void *data;
+    size_t bytes;
+} first_chunk;
+
+static ebpo_status make_array(writer *w, ebpo_array_out *a, const first_chunk *first,
+                              ebpo_error *error)
+{
+    ebpo_status status = ebpo_h5_make_array(&w->out, a->path, &a->shape, &a->handle, error);
+    if (status == EBPO_OK && first)
+        status = ebpo_h5_put_chunk(&w->out, a->path, a->handle, &a->shape, 0, first->data,
+                                   first->bytes, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_put_text(&w->out, a->handle, "coding", ebpo_schema[a->id].coding, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_put_text(&w->out, a->handle, "about", ebpo_schema[a->id].about, error);
+    return status;
+}
+
+/* Everything but the chunks, and the first of these, before the first header grows by attributes:
+ * HDF5 then cannot grow the metadata block at the end of the file, but only fill it. */
+static ebpo_status lay_out(writer *w, const char *path, const char *shown, uint64_t head_bytes,
+                           first_chunk first, ebpo_error *error)
+{
+    ebpo_plan *plan = &w->plan;
+    w->out.codec_level = w->options->codec_level;
+    ebpo_status status = ebpo_h5_create(&w->out, path, shown, head_bytes, 3, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_root(&w->out, &w->root, error);
+    if (status == EBPO_OK)
+        status = ebpo_facts_put(&w->out, w->root, &plan->info, error);
+    if (status == EBPO_OK)
+        status = make_level_groups(w, error);
+    if (status == EBPO_OK)
+        status = make_mesh_groups(w, error);
+    for (unsigned i = 0; i < plan->count && status == EBPO_OK; i++)
+        status = make_array(w, &plan->array[i], i == 0 ? &first : NULL, error);
+    return status;
+}
+
+static void close_handles(writer *w)
+{
+    for (unsigned i = 0; i < w->plan.count; i++) {
+        ebpo_h5_close_id(w->plan.array[i].handle);
+        w->plan.array[i].handle = -1;
+    }
+    ebpo_h5_close_id(w->root);
+    w->root = -1;
+}
+
+/* Sizes of headers and index: the same file in memory, with chunks of one byte. */
+static ebpo_status measure_metadata(writer *w, const char *shown, ebpo_error *error)
+{
+    ebpo_plan *plan = &w->plan;
+    uint64_t room = (256 << 10) + (4 << 10) * (uint64_t)plan->count + 32 * w->chunks, headers = 0,
+             all = 0;
+    bool indexed = false;
+    ebpo_status status = lay_out(w, NULL, shown, room, (first_chunk){ "", 1 }, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_head_used(&w->out, room, &headers, error);
+    for (unsigned i = 0; i < plan->count && status == EBPO_OK; i++) {
+        const ebpo_array_out *a = &plan->array[i];
+        indexed = indexed || ebpo_h5_chunk_count(&a->shape) > 1;
+        for (uint64_t k = i == 0; k < ebpo_h5_chunk_count(&a->shape) && status == EBPO_OK; k++)
+            status = ebpo_h5_put_chunk(&w->out, a->path, a->handle, &a->shape, k, "", 1, error);
+    }
+    close_handles(w);
+    if (status == EBPO_OK)
+        status = ebpo_h5_head_used(&w->out, room, &all, error);
+    ebpo_h5_discard(&w->out);
+    w->head_bytes = (headers + 8 + 7) / 8 * 8; /* the last checksum may end in zero bytes */
+    if (plan->count == 1)
+        w->head_bytes += ALONE_BYTES;
+    /* not by the sizes, which are too small where a checksum ends in zero bytes */
+    w->index_bytes = indexed ? (all - headers + 8 + 7) / 8 * 8 : 0;
+    return status;
+}
+
+/* What comes now is in a piece of its own, once the first array of several chunks calls for it. */
+static ebpo_status begin_index(writer *w, const char *path, ebpo_error *error)
+{
+    close_handles(w);
+    ebpo_status status = ebpo_h5_reopen(&w->out, path, w->index_bytes, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_root(&w->out, &w->root, error);
+    for (unsigned i = 0; i < w->plan.count && status == EBPO_OK; i++)
+        status =
+            ebpo_h5_open_array(&w->out, w->plan.array[i].path, &w->plan.array[i].handle, error);
+    return status;
+}
+
+static ebpo_status fill_slot(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                             ebpo_error *error)
+{
+    writer *w = context;
+    (void)worker;
+    (void)error;
+    for (uint64_t i = begin; i < end; i++) {
+        slot *s = &w->slots[i];
+        const ebpo_h5_shape *shape = &s->array->shape;
+        uint64_t row = s->chunk * shape->chunk_rows, rows = shape->rows - row < shape->chunk_rows
+                                                                ? shape->rows - row
+                                                                : shape->chunk_rows;
+        size_t bytes = rows * ebpo_h5_row_bytes(shape);
+        s->raw_bytes = shape->chunk_rows * ebpo_h5_row_bytes(shape);
+        ebpo_plan_encode(&w->plan, s->array, row, rows, s->raw);
+        memset(s->raw + bytes, 0, s->raw_bytes - bytes);
+    }
+    return EBPO_OK;
+}
+
+static void digest_slots(writer *w)
+{
+    for (unsigned i = 0; i < w->used; i++) {
+        const slot *s = &w->slots[i];
+        const ebpo_h5_shape *shape = &s->array->shape;
+        uint64_t left = shape->rows - s->chunk * shape->chunk_rows;
+        size_t rows = left < shape->chunk_rows ? (size_t)left : shape->chunk_rows;
+        ebpo_content_add(&w->content, s->raw, rows * ebpo_h5_row_bytes(shape));
+        if (left <= shape->chunk_rows)
+            ebpo_content_end_array(&w->content, s->array->path);
+    }
+}
+
+/* Item 0 digests the whole window, the others compress one slot each. */
+static ebpo_status compress_slot(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
+{
+    writer *w = context;
+    for (uint64_t i = begin; i < end; i++) {
+        if (i == 0) {
+            digest_slots(w);
+            continue;
+        }
+        slot *s = &w->slots[i - 1];
+        ebpo_status status =
+            ebpo_chunk_encode(&w->coders[worker], s->array->shape.pipeline, w->options->codec_level,
+                              s->array->shape.element_size, s->raw, s->raw_bytes, s->stored,
+                              &s->stored_bytes);
+        if (status != EBPO_OK)
+            return ebpo_fail(error, status, "%s: %s: a chunk could not be compressed", w->out.shown,
+                             s->array->path);
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status encode_window(writer *w, ebpo_error *error)
+{
+    unsigned threads = w->used > 4 ? w->threads : 1;
+    ebpo_status status = ebpo_parallel_for(threads, w->used, 1, fill_slot, w, NULL, "write", error);
+    if (status == EBPO_OK)
+        status =
+            ebpo_parallel_for(threads, w->used + 1u, 1, compress_slot, w, NULL, "write", error);
+    return status;
+}
+
+static ebpo_status flush_window(writer *w, ebpo_error *error)
+{
+    ebpo_status status = encode_window(w, error);
+    for (unsigned i = 0; i < w->used && status == EBPO_OK; i++) {
+        const slot *s = &w->slots[i];
+        if (w->index_at == 0 && ebpo_h5_chunk_count(&s->array->shape) > 1)
+            w->index_at = w->head_bytes + w->chunk_bytes;
+        w->chunk_bytes += s->stored_bytes;
+        if (w->chunks_done++ == 0)
+            continue; /* written by lay_out */
+        status = ebpo_h5_put_chunk(&w->out, s->array->path, s->array->handle, &s->array->shape,
+                                   s->chunk, s->stored, s->stored_bytes, error);
+    }
+    w->used = 0;
+    ebpo_workspace_settle(w->plan.tree->mesh.workspace);
+    const ebpo_progress *progress = &w->options->progress;
+    if (status == EBPO_OK &&
+        !ebpo_progress_step(progress, "writing", w->chunks_done, w->chunks, error))
+        status = EBPO_E_CANCELLED;
+    return status;
+}
+
+static ebpo_status write_chunks(writer *w, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (unsigned i = 0; i < w->plan.count && status == EBPO_OK; i++) {
+        const ebpo_array_out *a = &w->plan.array[i];
+        for (uint64_t k = 0; k < ebpo_h5_chunk_count(&a->shape) && status == EBPO_OK; k++) {
+            w->slots[w->used].array = a;
+            w->slots[w->used++].chunk = k;
+            if (w->used == WINDOW)
+                status = flush_window(w, error);
+        }
+    }
+    return status == EBPO_OK && w->used ? flush_window(w, error) : status;
+}
+
+static ebpo_status make_window(writer *w, ebpo_error *error)
+{
+    size_t bound = ebpo_chunk_bound(EBPO_CHUNK_BYTES_MAX),
+           slot_bytes = EBPO_CHUNK_BYTES_MAX + bound;
+    uint64_t wanted = w->chunks < WINDOW ? w->chunks : WINDOW;
+    w->threads = ebpo_thread_count(w->options->threads);
+    w->coders = ebpo_alloc_zero(w->threads, sizeof *w->coders);
+    uint8_t *block = ebpo_alloc(wanted, slot_bytes);
+    w->slots[0].raw = block;
+    if (!w->coders || !block)
+        return ebpo_fail_memory(error, wanted * slot_bytes);
+    for (unsigned i = 0; i < wanted; i++) {
+        w->slots[i].raw = block + i * slot_bytes;
+        w->slots[i].stored = w->slots[i].raw + EBPO_CHUNK_BYTES_MAX;
+    }
+    return EBPO_OK;
+}
+
+/* The root's types, encoded ahead of its turn. */
+static ebpo_status encode_first(writer *w, uint8_t *stored, size_t *bytes, ebpo_error *error)
+{
+    slot *s = &w->slots[0];
+    s->array = &w->plan.array[0];
+    s->chunk = 0;
+    (void)fill_slot(w, 0, 1, 0, NULL);
+    ebpo_status status = compress_slot(w, 1, 2, 0, error);
+    *bytes = s->stored_bytes;
+    memcpy(stored, s->stored, s->stored_bytes);
+    return status;
+}
+
+static ebpo_status write_file(writer *w, const char *path, const char *shown, ebpo_error *error)
+{
+    uint8_t first[256], digest[32]; /* the chunk is of two bytes */
+    size_t first_bytes = 0;
+    ebpo_status status = encode_first(w, first, &first_bytes, error);
+    if (status == EBPO_OK)
+        status = measure_metadata(w, shown, error);
+    if (status == EBPO_OK)
+        status = lay_out(w, path, shown, w->head_bytes, (first_chunk){ first, first_bytes }, error);
+    if (status == EBPO_OK && w->index_bytes)
+        status = begin_index(w, path, error);
+    if (status == EBPO_OK)
+        status = write_chunks(w, error);
+    if (status == EBPO_OK)
+        status = ebpo_content_end(&w->content, digest, error);
+    if (status == EBPO_OK)
+        status = ebpo_facts_put_digest(&w->out, w->root, digest, error);
+    if (status == EBPO_OK)
+        status = ebpo_facts_put_index(&w->out, w->root, w->index_at, w->index_bytes, error);
+    close_handles(w);
+    if (status == EBPO_OK)
+        /* another libhdf5 may have placed metadata otherwise: no reader relies on it, tests do */
+        status = ebpo_h5_finish(&w->out, error);
+    return status;
+}
+
+static ebpo_status check_options(const ebpo_write_options *options, const char *path,
+                                 ebpo_error *error)
+{
+    int most = options->codec == EBPO_CODEC_ZSTD      ? 22
+               : options->codec == EBPO_CODEC_DEFLATE ? 9
+                                                      : 0;
+    if ((unsigned)options->codec > EBPO_CODEC_NONE || options->codec_level < 0 ||
+        options->codec_level > most)
+        return ebpo_fail(
+            error, EBPO_E_ARGUMENT,
+            "%s: no such codec or codec level; zstd takes 1 to 22, deflate 1 to 9, none takes 0",
+            path);
+    return EBPO_OK;
+}
+
+/* Publishes the file under its name; without `publish` writes right into `path`. */
+static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const char *shown,
+                              ebpo_publish *publish, const ebpo_write_options *options,
+                              ebpo_error *error)
+{
+    static const ebpo_write_options usual = EBPO_WRITE_OPTIONS_INIT;
+    writer *w = ebpo_alloc_zero(1, sizeof *w);
+    if (!w)
+        return ebpo_fail_memory(error, sizeof *w);
+    w->options = options ? options : &usual;
+    w->out = (ebpo_h5_out)EBPO_H5_OUT_INIT;
+    w->root = -1;
+    ebpo_status status = check_options(w->options, shown, error);
+    if (status == EBPO_OK && !ebpo_progress_stage(&w->options->progress, "writing", error))
+        status = EBPO_E_CANCELLED;
+    if (status == EBPO_OK)
+        status = ebpo_plan_make(&w->plan, tree, w->options, shown, error);
+    for (unsigned i = 0; i < w->plan.count; i++)
+        w->chunks += ebpo_h5_chunk_count(&w->plan.array[i].shape);
+    if (status == EBPO_OK)
+        status = make_window(w, error);
+    if (status == EBPO_OK && publish)
+        status = ebpo_publish_begin(publish, path, error);
+    if (status == EBPO_OK)
+        status = write_file(w, publish ? ebpo_publish_path(publish) : path, shown, error);
+    close_handles(w);
+    ebpo_h5_discard(&w->out);
+    if (status == EBPO_OK && publish)
+        status = ebpo_publish_commit(publish, error);
+    for (unsigned i = 0; w->coders && i < w->threads; i++)
+        ebpo_chunk_coder_clear(&w->coders[i]);
+    free(w->coders);
+    free(w->slots[0].raw);
+    ebpo_plan_free(&w->plan);
+    ebpo_content_free(&w->content);
+    free(w);
+    return status;
+}
+
+ebpo_status ebpo_tree_write(const ebpo_tree *tree, const char *path,
+                            const ebpo_write_options *options, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_publish publish = EBPO_PUBLISH_INIT;
+    ebpo_status status = write_tree(tree, path, path, &publish, options, error);
+    ebpo_publish_abort(&publish);
+    return status;
+}
+
+ebpo_status ebpo_tree_write_into(const ebpo_tree *tree, const char *path, const char *shown,
+                                 const ebpo_write_options *options, ebpo_error *error)
+{
+    return write_tree(tree, path, shown, NULL, options, error);
+}

@@ -1,0 +1,283 @@
+/* A source by URL: opening, what is kept of the file, options. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "http/disk.h"
+#include "http/http_source.h"
+#include "http/range_cache.h"
+
+enum { HEAD_BYTES = EBPO_HTTP_HEAD, CONNECTIONS_MAX = 32 };
+
+typedef struct http_source {
+    char *url, shown[EBPO_SHOWN_BYTES];
+    ebpo_http_options options; /* its texts are ours */
+    ebpo_range_cache pieces;   /* and the lock and the transfers */
+    bool has_lock;
+    ebpo_http_version version;
+    uint8_t *head; /* the first bytes, or the whole file: kept */
+    uint64_t head_bytes;
+} http_source;
+
+/* --- options --- */
+
+static bool copy_text(const char **text)
+{
+    char *copy = *text ? strdup(*text) : NULL;
+    bool good = copy || !*text;
+    *text = copy;
+    return good;
+}
+
+static bool copy_headers(ebpo_http_options *o)
+{
+    const char *const *from = o->headers;
+    size_t count = 0;
+    o->headers = NULL;
+    if (!from)
+        return true;
+    while (from[count])
+        count++;
+    const char **to = ebpo_alloc_zero(count + 1, sizeof *to);
+    if (!to)
+        return false;
+    o->headers = to;
+    for (size_t i = 0; i < count; i++) {
+        to[i] = from[i];
+        if (!copy_text(&to[i]))
+            return false;
+    }
+    return true;
+}
+
+/* All of them, also after a failure, so that they can be freed. */
+static bool copy_options(ebpo_http_options *o)
+{
+    bool good = copy_text(&o->user);
+    good = copy_text(&o->ca_file) && good;
+    good = copy_text(&o->proxy) && good;
+    good = copy_text(&o->user_agent) && good;
+    good = copy_text(&o->cache_folder) && good;
+    return copy_headers(o) && good;
+}
+
+static void free_options(ebpo_http_options *o)
+{
+    const char *texts[] = { o->user, o->ca_file, o->proxy, o->user_agent, o->cache_folder };
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
+        free((char *)(uintptr_t)texts[i]);
+    for (const char *const *h = o->headers; h && *h; h++)
+        free((char *)(uintptr_t)*h);
+    free((void *)(uintptr_t)o->headers);
+}
+
+/* A line that could smuggle another one in is none. */
+static bool header_ok(const char *line)
+{
+    const char *colon = strchr(line, ':');
+    for (const char *c = line; *c; c++)
+        if ((unsigned char)*c < 0x20 && *c != '\t')
+            return false;
+    return colon && colon > line && !strchr(" \t", colon[-1]);
+}
+
+static ebpo_status check_options(const ebpo_http_options *o, const char *shown, ebpo_error *error)
+{
+    static const double most = 1e6; /* seconds; libcurl counts milliseconds in a long */
+    if (!(o->connect_timeout > 0 && o->connect_timeout <= most) ||
+        !(o->stall_timeout >= 1 && o->stall_timeout <= most) ||
+        !(o->time_limit > 0 && o->time_limit <= most))
+        return ebpo_fail(
+            error, EBPO_E_ARGUMENT,
+            "%s: a time-out is not above 0 (stalls: at least 1) and at most 1000000 seconds",
+            shown);
+    if (o->connections < 1 || o->connections > CONNECTIONS_MAX)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: %u connections at a time; give 1 to %d",
+                         shown, o->connections, CONNECTIONS_MAX);
+    for (const char *const *h = o->headers; h && *h; h++)
+        if (!header_ok(*h))
+            return ebpo_fail(error, EBPO_E_ARGUMENT,
+                             "%s: a header to send is not 'Name: value' on one line", shown);
+    return EBPO_OK;
+}
+
+/* --- reading --- */
+
+static ebpo_status source_read(void *user, uint64_t offset, uint64_t size, void *data,
+                               ebpo_error *error)
+{
+    http_source *s = user;
+    uint8_t *to = data;
+    if (offset < s->head_bytes) {
+        uint64_t here = s->head_bytes - offset < size ? s->head_bytes - offset : size;
+        memcpy(to, s->head + offset, (size_t)here);
+        to += here;
+        offset += here;
+        size -= here;
+    }
+    return size ? ebpo_range_cache_read(&s->pieces, offset, size, to, error) : EBPO_OK;
+}
+
+static void source_expect(void *user, const ebpo_range *ranges, size_t count)
+{
+    http_source *s = user;
+    if (s->head_bytes < s->version.size)
+        ebpo_range_cache_expect(&s->pieces, ranges, count);
+}
+
+static void source_close(void *user)
+{
+    http_source *s = user;
+    ebpo_transfers_free(s->pieces.transfers);
+    ebpo_range_cache_clear(&s->pieces);
+    ebpo_disk_close(s->pieces.disk);
+    if (s->has_lock) {
+        pthread_mutex_destroy(&s->pieces.lock);
+        pthread_cond_destroy(&s->pieces.done);
+    }
+    free_options(&s->options);
+    free(s->head);
+    free(s->url);
+    free(s);
+}
+
+bool ebpo_source_http_stats(const ebpo_source *source, ebpo_http_stats *out)
+{
+    memset(out, 0, sizeof *out);
+    if (source->read != source_read)
+        return false;
+    http_source *s = source->user;
+    pthread_mutex_lock(&s->pieces.lock);
+    ebpo_transfers_add_stats(s->pieces.transfers, out);
+    out->cache_hits = s->pieces.disk_hits;
+    out->cache_bytes = s->pieces.disk_bytes;
+    if (s->pieces.disk)
+        ebpo_disk_held(s->pieces.disk, &out->cache_held, &out->cache_others);
+    out->wait_seconds = s->pieces.wait_seconds;
+    pthread_mutex_unlock(&s->pieces.lock);
+    return true;
+}
+
+/* --- opening --- */
+
+static ebpo_status request(http_source *s, ebpo_request *r, ebpo_error *error)
+{
+    pthread_mutex_lock(&s->pieces.lock);
+    double since = ebpo_http_now();
+    ebpo_transfers_add(s->pieces.transfers, r, true);
+    while (!r->done)
+        pthread_cond_wait(&s->pieces.done, &s->pieces.lock);
+    s->pieces.wait_seconds += ebpo_http_now() - since;
+    pthread_mutex_unlock(&s->pieces.lock);
+    if (r->status != EBPO_OK && error)
+        *error = r->error;
+    return r->status;
+}
+
+static void pin(http_source *s)
+{
+    pthread_mutex_lock(&s->pieces.lock);
+    ebpo_transfers_pin(s->pieces.transfers, &s->version);
+    pthread_mutex_unlock(&s->pieces.lock);
+}
+
+/* The first bytes, the size and the version; from a server without ranges, everything. */
+static ebpo_status read_head(http_source *s, ebpo_error *error)
+{
+    s->head = ebpo_alloc(HEAD_BYTES, 1);
+    if (!s->head)
+        return ebpo_fail_memory(error, HEAD_BYTES);
+    ebpo_request r = { .size = HEAD_BYTES, .data = s->head, .first = true };
+    ebpo_status status = request(s, &r, error);
+    if (status != EBPO_OK) {
+        free(r.whole);
+        return status;
+    }
+    s->version = r.version;
+    s->head_bytes = r.got;
+    if (r.whole) {
+        free(s->head);
+        s->head = r.whole;
+    }
+    pin(s);
+    return EBPO_OK;
+}
+
+/* Without ETag and Last-Modified nobody could tell whether two answers belong to one version. One
+ * answer does. */
+static ebpo_status read_whole(http_source *s, ebpo_error *error)
+{
+    if (s->version.size > s->options.whole_limit)
+        return ebpo_fail(error, EBPO_E_UNSUPPORTED,
+                         "%s: the server sends neither ETag nor Last-Modified, so a change under "
+                         "way could not be noticed, and %llu bytes are more than "
+                         "would be read at once; download the file, or allow unversioned files",
+                         s->shown, (unsigned long long)s->version.size);
+    uint8_t *all = ebpo_alloc(s->version.size, 1);
+    if (!all)
+        return ebpo_fail_memory(error, s->version.size);
+    free(s->head);
+    s->head = all;
+    s->head_bytes = s->version.size;
+    ebpo_request r = { .size = s->version.size, .data = all };
+    return request(s, &r, error);
+}
+
+static ebpo_status open_source(http_source *s, ebpo_error *error)
+{
+    const ebpo_http_options *o = &s->options;
+    ebpo_status status = check_options(o, s->shown, error);
+    if (status == EBPO_OK)
+        status = ebpo_transfers_make(&s->pieces.transfers, s->url, s->shown, o, &s->pieces.lock,
+                                     &s->pieces.done, error);
+    if (status == EBPO_OK)
+        status = read_head(s, error);
+    bool versioned = *s->version.etag || *s->version.modified;
+    if (status == EBPO_OK && s->head_bytes < s->version.size && !versioned && !o->unversioned)
+        status = read_whole(s, error);
+    /* The folder last: it is named by the version. A broken one is said also where it is not
+     * needed. */
+    if (status == EBPO_OK && o->cache_folder)
+        status = ebpo_disk_open(&s->pieces.disk, o->cache_folder, o->cache_bytes, s->url,
+                                &s->version, error);
+    if (status == EBPO_OK && !versioned) {
+        ebpo_disk_close(s->pieces.disk);
+        s->pieces.disk = NULL;
+    }
+    s->pieces.begin = s->head_bytes;
+    s->pieces.size = s->version.size;
+    s->pieces.held_limit = o->memory;
+    return status;
+}
+
+ebpo_status ebpo_source_of_url(ebpo_source *out, const char *url, const ebpo_http_options *options,
+                               ebpo_error *error)
+{
+    static const ebpo_http_options usual = EBPO_HTTP_OPTIONS_INIT;
+    *out = (ebpo_source){ .user = NULL };
+    if (!ebpo_is_url(url))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: is not a URL with http:// or https://", url);
+    http_source *s = ebpo_alloc_zero(1, sizeof *s);
+    if (!s)
+        return ebpo_fail_memory(error, sizeof *s);
+    s->options = options ? *options : usual;
+    bool copied = copy_options(&s->options);
+    s->url = strdup(url);
+    ebpo_url_shown(url, s->shown, sizeof s->shown);
+    s->has_lock = pthread_mutex_init(&s->pieces.lock, NULL) == 0;
+    if (s->has_lock && pthread_cond_init(&s->pieces.done, NULL) != 0) {
+        pthread_mutex_destroy(&s->pieces.lock);
+        s->has_lock = false;
+    }
+    ebpo_status status = copied && s->url && s->has_lock ? open_source(s, error)
+                                                         : ebpo_fail_memory(error, strlen(url));
+    if (status != EBPO_OK)
+        source_close(s);
+    else
+        *out = (ebpo_source){
+            s, s->version.size, source_read, source_close, source_expect, s->head_bytes
+        };
+    return status;
+}

@@ -1,0 +1,170 @@
+#include "io/byte_source.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+
+/* No system reads more at once. */
+static const uint64_t PIECE_MAX = UINT64_C(1) << 30;
+
+typedef struct path_source {
+    int fd;
+    char path[];
+} path_source;
+
+static ebpo_status path_read(void *user, uint64_t offset, uint64_t size, void *data,
+                             ebpo_error *error)
+{
+    const path_source *s = user;
+    uint8_t *to = data;
+    while (size) {
+        ssize_t got =
+            pread(s->fd, to, (size_t)(size < PIECE_MAX ? size : PIECE_MAX), (off_t)offset);
+        if (got < 0 && errno == EINTR)
+            continue;
+        if (got < 0)
+            return ebpo_fail_errno(error, s->path, "cannot be read");
+        if (got == 0)
+            return ebpo_fail(
+                error, EBPO_E_IO,
+                "%s: byte %" PRIu64
+                " cannot be read: the file became shorter while it was open; open it again",
+                s->path, offset);
+        to += got;
+        offset += (uint64_t)got;
+        size -= (uint64_t)got;
+    }
+    return EBPO_OK;
+}
+
+static void path_close(void *user)
+{
+    path_source *s = user;
+    close(s->fd);
+    free(s);
+}
+
+/* Non-blocking: a pipe must not hang us. */
+static ebpo_status open_regular(const char *path, int *fd, uint64_t *size, ebpo_error *error)
+{
+    struct stat facts;
+    ebpo_status status = EBPO_OK;
+    *fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
+    if (*fd < 0)
+        return ebpo_fail_errno(error, path, "cannot be opened");
+    if (fstat(*fd, &facts) < 0)
+        status = ebpo_fail_errno(error, path, "cannot be examined");
+    else if (!S_ISREG(facts.st_mode))
+        status = ebpo_fail(error, EBPO_E_IO,
+                           "%s: not a regular file; give the name of an .ebpo.h5 file", path);
+    else
+        *size = (uint64_t)facts.st_size;
+    if (status != EBPO_OK)
+        close(*fd);
+    return status;
+}
+
+ebpo_status ebpo_source_of_path(ebpo_source *out, const char *path, ebpo_error *error)
+{
+    int fd;
+    uint64_t size = 0;
+    *out = (ebpo_source){ .user = NULL };
+    ebpo_status status = open_regular(path, &fd, &size, error);
+    if (status != EBPO_OK)
+        return status;
+    path_source *s = ebpo_alloc(sizeof *s + strlen(path) + 1, 1);
+    if (!s) {
+        close(fd);
+        return ebpo_fail_memory(error, sizeof *s + strlen(path) + 1);
+    }
+    s->fd = fd;
+    strcpy(s->path, path);
+    *out = (ebpo_source){ s, size, path_read, path_close, NULL, 0 };
+    return EBPO_OK;
+}
+
+static ebpo_status memory_read(void *user, uint64_t offset, uint64_t size, void *data,
+                               ebpo_error *error)
+{
+    (void)error;
+    memcpy(data, (const uint8_t *)user + offset, (size_t)size);
+    return EBPO_OK;
+}
+
+ebpo_source ebpo_source_of_memory(const void *data, uint64_t size)
+{
+    /* read only, whatever the type of `user` says */
+    return (ebpo_source){ (void *)(uintptr_t)data, size, memory_read, NULL, NULL, 0 };
+}
+
+/* What the source had to fetch before it could be opened: counted once, however often it is looked
+ * at. */
+static uint64_t at_hand(const ebpo_input *input)
+{
+    return input->source.at_hand < input->source.size ? input->source.at_hand : input->source.size;
+}
+
+ebpo_status ebpo_input_open(ebpo_input *input, const ebpo_source *source, const char *name,
+                            ebpo_error *error)
+{
+    input->source = *source;
+    input->shown = strdup(name);
+    atomic_init(&input->bytes, at_hand(input));
+    atomic_init(&input->reads, 0);
+    if (input->shown)
+        return EBPO_OK;
+    ebpo_input_close(input);
+    return ebpo_fail_memory(error, strlen(name) + 1);
+}
+
+void ebpo_input_close(ebpo_input *input)
+{
+    if (input->source.close)
+        input->source.close(input->source.user);
+    input->source = (ebpo_source){ .user = NULL };
+    free(input->shown);
+    input->shown = NULL;
+}
+
+ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size, void *data,
+                            ebpo_error *error)
+{
+    ebpo_error cause = EBPO_ERROR_INIT;
+    if (size == 0)
+        return EBPO_OK;
+    if (offset > input->source.size || size > input->source.size - offset)
+        return ebpo_fail(error, EBPO_E_FORMAT,
+                         "%s: bytes %" PRIu64 " to %" PRIu64
+                         " are named, but the file ends at %" PRIu64
+                         "; get a fresh copy of the file",
+                         input->shown, offset, offset + size - 1, input->source.size);
+    uint64_t begin = offset > at_hand(input) ? offset : at_hand(input);
+    atomic_fetch_add_explicit(&input->bytes, offset + size > begin ? offset + size - begin : 0,
+                              memory_order_relaxed);
+    atomic_fetch_add_explicit(&input->reads, 1, memory_order_relaxed);
+    ebpo_status status = input->source.read(input->source.user, offset, size, data, &cause);
+    if (status == EBPO_OK)
+        return EBPO_OK;
+    if (*cause.message)
+        return ebpo_fail(error, status, "%s", cause.message);
+    return ebpo_fail(error, status, "%s: bytes %" PRIu64 " to %" PRIu64 " could not be read",
+                     input->shown, offset, offset + size - 1);
+}
+
+void ebpo_input_expect(ebpo_input *input, const ebpo_range *ranges, size_t count)
+{
+    uint64_t size = input->source.size;
+    if (!input->source.expect || count == 0)
+        return;
+    for (size_t i = 0; i < count; i++)
+        if (ranges[i].offset > size || ranges[i].size > size - ranges[i].offset)
+            return; /* the reading will say so */
+    input->source.expect(input->source.user, ranges, count);
+}

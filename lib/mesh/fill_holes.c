@@ -1,0 +1,248 @@
+#include "geom/strict_fp.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/fp_env.h"
+#include "base/parallel.h"
+#include "base/arrays.h"
+#include "mesh/boundary.h"
+#include "mesh/mesh_parts.h"
+#include "mesh/stars.h"
+#include "mesh/triangulate.h"
+
+/* Vertices with more faces than this are not searched for existing edges: it keeps the work linear.
+ */
+enum { SEARCHED_DEGREE = 4096, VERTEX_GRAIN = 1 << 13, LOOP_GRAIN = 16 };
+
+typedef struct placed {
+    uint32_t vertex, place;
+} placed;
+
+/* Scratch of a thread. */
+typedef struct scratch {
+    ebpo_star star;
+    ebpo_boundary boundary;
+    double (*point)[3];
+    uint32_t (*triangles)[3];
+    uint64_t point_room, triangle_room;
+    /* the loop's vertices, for looking them up */
+    placed sorted[EBPO_OPTIMAL_CHAIN];
+    uint8_t taken[EBPO_OPTIMAL_CHAIN * EBPO_OPTIMAL_CHAIN];
+} scratch;
+
+typedef struct filling {
+    ebpo_mesh *mesh;
+    unsigned threads;
+    scratch *scratch; /* [threads] */
+    ebpo_stars stars;
+    ebpo_boundary boundary;
+    ebpo_loops loops;
+    uint64_t *before; /* [loops.count] triangles of the loops that the source has before it */
+    uint64_t added;
+} filling;
+
+static ebpo_status collect(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                           ebpo_error *error)
+{
+    filling *f = context;
+    scratch *s = &f->scratch[worker];
+    for (uint64_t v = begin; v < end; v++) {
+        ebpo_workspace_settle_often(f->mesh->workspace, v);
+        bool ok = ebpo_star_gather(&s->star, &f->stars, f->mesh, (uint32_t)v);
+        for (uint64_t i = 0, next; ok && i < s->star.count; i = next) {
+            const ebpo_link *link = &s->star.links[i];
+            uint32_t lower = (uint32_t)v, higher = ebpo_link_neighbour(link);
+            next = ebpo_star_run_end(&s->star, i);
+            if (next - i == 1 && higher > lower)
+                ok = ebpo_boundary_add(&s->boundary, f->mesh, link->out ? lower : higher,
+                                       link->out ? higher : lower, ebpo_link_face(link));
+        }
+        if (!ok)
+            return ebpo_workspace_fail(f->mesh->workspace,
+                                       s->boundary.count * sizeof *s->boundary.edges, error);
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status collect_boundary(filling *f, ebpo_error *error)
+{
+    ebpo_status status = ebpo_parallel_for(f->threads, f->mesh->vertex_count, VERTEX_GRAIN, collect,
+                                           f, NULL, "", error);
+    ebpo_boundary *lists = ebpo_alloc(f->threads, sizeof *lists);
+    if (!lists)
+        return ebpo_fail_memory(error, f->threads * sizeof *lists);
+    for (unsigned t = 0; t < f->threads; t++) {
+        lists[t] = f->scratch[t].boundary;
+        f->scratch[t].boundary = (ebpo_boundary){ .edges = NULL };
+    }
+    if (status == EBPO_OK)
+        status = ebpo_boundary_join(&f->boundary, lists, f->threads, f->mesh, error);
+    for (unsigned t = 0; t < f->threads; t++)
+        ebpo_boundary_free(&lists[t]);
+    free(lists);
+    return status;
+}
+
+/* --- one loop --- */
+
+static int by_vertex(const void *a, const void *b)
+{
+    const placed *x = a, *y = b;
+    return (x->vertex > y->vertex) - (x->vertex < y->vertex);
+}
+
+/* Marks pairs of loop vertices between which the mesh has an edge. */
+static void mark_taken(const filling *f, scratch *s, const uint32_t *loop, uint32_t n)
+{
+    memset(s->taken, 0, (size_t)n * n);
+    for (uint32_t i = 0; i < n; i++)
+        s->sorted[i] = (placed){ loop[i], i };
+    qsort(s->sorted, n, sizeof *s->sorted, by_vertex);
+    for (uint32_t i = 0; i < n; i++) {
+        uint64_t begin = f->stars.first[loop[i]], end = f->stars.first[loop[i] + (uint64_t)1];
+        for (uint64_t e = begin; e < end && end - begin <= SEARCHED_DEGREE; e++)
+            for (int k = 0; k < 3; k++) {
+                placed wanted = { f->mesh->faces[3 * (uint64_t)f->stars.face[e] + (unsigned)k], 0 };
+                const placed *found = bsearch(&wanted, s->sorted, n, sizeof *s->sorted, by_vertex);
+                if (found)
+                    s->taken[(size_t)i * n + found->place] =
+                        s->taken[(size_t)found->place * n + i] = 1;
+            }
+    }
+}
+
+/* Its triangles go where those of the loops end that the source has before it. */
+static bool fill_loop(filling *f, scratch *s, uint64_t number)
+{
+    const uint32_t *loop = f->loops.vertex + f->loops.first[number];
+    uint32_t n = (uint32_t)(f->loops.first[number + 1] - f->loops.first[number]);
+    ebpo_workspace *workspace = f->mesh->workspace;
+    if (!ebpo_array_grow(workspace, &s->point, &s->point_room, n, sizeof *s->point) ||
+        !ebpo_array_grow(workspace, &s->triangles, &s->triangle_room, n, sizeof *s->triangles))
+        return false;
+    for (uint32_t i = 0; i < n; i++) {
+        ebpo_mesh_position(f->mesh, loop[i], s->point[i]);
+        ebpo_workspace_settle_often(workspace, i + (uint64_t)1);
+    }
+    bool search = n > 3 && n <= EBPO_OPTIMAL_CHAIN;
+    if (search)
+        mark_taken(f, s, loop, n);
+    ebpo_chain chain = { .n = n,
+                         .point = (const double(*)[3])s->point,
+                         .taken = search ? s->taken : NULL,
+                         .workspace = workspace };
+    if (!ebpo_triangulate_chain(&chain, s->triangles))
+        return false;
+    uint32_t *face = f->mesh->faces + 3 * (f->mesh->face_count + f->before[number]);
+    for (uint32_t t = 0; t < n - 2;
+         t++, face += 3) { /* against the chain, as the faces beside it run along it */
+        for (int k = 0; k < 3; k++)
+            face[k] = loop[s->triangles[t][2 - k]];
+        ebpo_workspace_settle_often(workspace, t + (uint64_t)1);
+    }
+    return true;
+}
+
+static ebpo_status fill_loops(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
+{
+    filling *f = context;
+    for (uint64_t i = begin; i < end; i++)
+        if (!fill_loop(f, &f->scratch[worker], i))
+            return ebpo_workspace_fail(f->mesh->workspace,
+                                       (f->loops.first[i + 1] - f->loops.first[i]) * 132, error);
+    ebpo_workspace_settle(f->mesh->workspace);
+    return EBPO_OK;
+}
+
+/* --- all --- */
+
+/* Room behind the mesh's faces, which stay what they are. */
+static ebpo_status make_room(filling *f, ebpo_error *error)
+{
+    ebpo_mesh *mesh = f->mesh;
+    struct ebpo_arrangement *order = mesh->arrangement;
+    uint64_t count = mesh->face_count + f->added, capacity = mesh->face_count;
+    if (count > UINT32_MAX - 1)
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "%s: %llu faces with the filled holes, but 2^32 - 2 is the limit; "
+                         "split the mesh",
+                         ebpo_mesh_label(mesh), (unsigned long long)count);
+    if (!ebpo_array_grow(mesh->workspace, &mesh->faces, &capacity, count, 3 * sizeof *mesh->faces))
+        return ebpo_workspace_fail(mesh->workspace, count * 3 * sizeof *mesh->faces, error);
+    capacity = mesh->face_count;
+    if (order && !ebpo_array_grow(mesh->workspace, &order->face_source, &capacity, count,
+                                  sizeof *order->face_source))
+        return ebpo_workspace_fail(mesh->workspace, count * sizeof *order->face_source, error);
+    for (uint64_t i = mesh->face_count; order && i < count; i++) {
+        order->face_source[i] = (uint32_t)i;
+        ebpo_workspace_settle_at(mesh->workspace, i);
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status run(filling *f, ebpo_error *error)
+{
+    ebpo_mesh *mesh = f->mesh;
+    f->scratch = ebpo_alloc_zero(f->threads, sizeof *f->scratch);
+    if (!f->scratch)
+        return ebpo_fail_memory(error, f->threads * sizeof *f->scratch);
+    ebpo_status status = ebpo_stars_build(&f->stars, mesh, f->threads, NULL, error);
+    if (status == EBPO_OK)
+        status = collect_boundary(f, error);
+    if (status != EBPO_OK || f->boundary.count == 0)
+        return status;
+    status = ebpo_boundary_loops(&f->loops, &f->boundary, &f->stars, mesh, f->threads, error);
+    if (status != EBPO_OK || f->loops.count == 0)
+        return status;
+    f->added = f->loops.first[f->loops.count] - 2 * f->loops.count;
+    status = ebpo_loops_rank(&f->before, &f->loops, mesh, f->threads, error);
+    if (status == EBPO_OK)
+        status = make_room(f, error);
+    if (status == EBPO_OK)
+        status = ebpo_parallel_for(f->threads, f->loops.count, LOOP_GRAIN, fill_loops, f, NULL, "",
+                                   error);
+    if (status != EBPO_OK)
+        return status;
+    mesh->face_count += f->added;
+    if (mesh->arrangement) { /* the new faces stand at the end */
+        ebpo_array_free(mesh->arrangement->key);
+        mesh->arrangement->key = NULL;
+    }
+    return EBPO_OK;
+}
+
+static void free_scratch(scratch *s)
+{
+    ebpo_star_free(&s->star);
+    ebpo_boundary_free(&s->boundary);
+    ebpo_array_free(s->point);
+    ebpo_array_free(s->triangles);
+}
+
+ebpo_status ebpo_mesh_fill_holes(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    filling f = { .mesh = mesh, .threads = ebpo_thread_count(0) };
+    ebpo_status status = ebpo_mesh_check_shape(mesh, error);
+    if (status != EBPO_OK)
+        return status;
+    status = run(&f, error);
+    if (status == EBPO_OK && record) {
+        record->fill_holes = true;
+        record->filled_holes += f.loops.count;
+        record->added_faces += f.added;
+        record->unfilled_holes += f.loops.open_chains;
+    }
+    ebpo_stars_free(&f.stars);
+    ebpo_boundary_free(&f.boundary);
+    ebpo_loops_free(&f.loops);
+    ebpo_array_free(f.before);
+    for (unsigned t = 0; f.scratch && t < f.threads; t++)
+        free_scratch(&f.scratch[t]);
+    free(f.scratch);
+    return status;
+}

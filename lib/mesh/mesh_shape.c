@@ -1,0 +1,43 @@
+#include "mesh/mesh_parts.h"
+
+#include <stdlib.h>
+
+#include "base/error.h"
+#include "base/arrays.h"
+
+const char *ebpo_mesh_label(const ebpo_mesh *mesh)
+{
+    return mesh->source_name[0] ? mesh->source_name : "mesh";
+}
+
+ebpo_status ebpo_mesh_check_shape(const ebpo_mesh *mesh, ebpo_error *error)
+{
+    if (!mesh)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "no mesh was given; pass one that was read or filled in");
+    if (mesh->vertex_count > UINT32_MAX - 1 || mesh->face_count > UINT32_MAX - 1)
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "%s: %llu vertices and %llu faces, but 2^32 - 2 of each is the limit; "
+                         "split the mesh",
+                         ebpo_mesh_label(mesh), (unsigned long long)mesh->vertex_count,
+                         (unsigned long long)mesh->face_count);
+    if (mesh->xyz32 && mesh->xyz64)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "%s: xyz32 and xyz64 are both set; set exactly one",
+                         ebpo_mesh_label(mesh));
+    if ((mesh->vertex_count && !mesh->xyz32 && !mesh->xyz64) || (mesh->face_count && !mesh->faces))
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "%s: an array that the counts promise is NULL; allocate it",
+                         ebpo_mesh_label(mesh));
+    return EBPO_OK;
+}
+
+void ebpo_arrangement_free(struct ebpo_arrangement *arrangement)
+{
+    if (!arrangement)
+        return;
+    ebpo_array_free(arrangement->key);
+    ebpo_array_free(arrangement->vertex_source);
+    ebpo_array_free(arrangement->face_source);
+    free(arrangement);
+}

@@ -1,0 +1,261 @@
+#include "geom/strict_fp.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/fp_env.h"
+#include "base/parallel.h"
+#include "base/arrays.h"
+#include "mesh/mesh_parts.h"
+#include "mesh/positions.h"
+
+enum { GRAIN = 1 << 15, WORD = 64 };
+
+typedef struct welding {
+    ebpo_mesh *mesh;
+    uint64_t kept;
+    uint32_t *map;  /* [vertex_count] new number of each vertex */
+    uint32_t *from; /* [kept] the vertex that stays, of those at one position */
+    /* of an arranged mesh: [blocks of GRAIN vertices + 1] positions that begin there; then before
+     * it */
+    uint64_t *heads;
+    uint64_t *stays;  /* of an arranged mesh: bit s: vertex s of the source stays */
+    uint64_t *before; /* [words of `stays`] bits set before it */
+} welding;
+
+static ebpo_status check_indices(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
+{
+    const ebpo_mesh *mesh = context;
+    (void)worker;
+    for (uint64_t i = 3 * begin; i < 3 * end; i++)
+        if (mesh->faces[i] >= mesh->vertex_count)
+            return ebpo_fail(error, EBPO_E_FORMAT,
+                             "%s: face %llu names vertex %lu, but there are %llu vertices; "
+                             "repair the file or drop the face",
+                             ebpo_mesh_label(mesh),
+                             (unsigned long long)ebpo_mesh_source_face(mesh, i / 3),
+                             (unsigned long)mesh->faces[i], (unsigned long long)mesh->vertex_count);
+    ebpo_workspace_settle(mesh->workspace);
+    return EBPO_OK;
+}
+
+/* --- groups, of a mesh in any order: by a table of positions --- */
+
+static ebpo_status group_by_table(welding *w, ebpo_error *error)
+{
+    const ebpo_mesh *mesh = w->mesh;
+    ebpo_positions positions = { .mesh = NULL };
+    ebpo_status status = ebpo_positions_build(&positions, mesh, 0, NULL, error);
+    if (status != EBPO_OK)
+        return status;
+    for (uint64_t v = 0; v < mesh->vertex_count; v++) {
+        uint32_t first = ebpo_positions_first(&positions, (uint32_t)v);
+        w->map[v] = first == v ? (uint32_t)w->kept++ : w->map[first];
+        ebpo_workspace_settle_often(mesh->workspace, v);
+    }
+    ebpo_positions_free(&positions);
+    return EBPO_OK;
+}
+
+/* --- of an arranged one: neighbours are compared --- */
+
+static bool begins_group(const ebpo_mesh *mesh, uint64_t v)
+{
+    double p[3], q[3];
+    if (v == 0)
+        return true;
+    ebpo_mesh_position(mesh, v - 1, p);
+    ebpo_mesh_position(mesh, v, q);
+    return p[0] != q[0] || p[1] != q[1] || p[2] != q[2];
+}
+
+static ebpo_status count_heads(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
+{
+    welding *w = context;
+    (void)worker, (void)error;
+    uint64_t count = 0;
+    for (uint64_t v = begin; v < end; v++)
+        count += begins_group(w->mesh, v);
+    w->heads[begin / GRAIN] = count;
+    ebpo_workspace_settle(w->mesh->workspace);
+    return EBPO_OK;
+}
+
+static ebpo_status number_groups(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
+{
+    welding *w = context;
+    (void)worker, (void)error;
+    uint64_t next = w->heads[begin / GRAIN];
+    for (uint64_t v = begin; v < end; v++) {
+        next += begins_group(w->mesh, v);
+        w->map[v] = (uint32_t)(next - 1);
+    }
+    ebpo_workspace_settle(w->mesh->workspace);
+    return EBPO_OK;
+}
+
+static ebpo_status group_neighbours(welding *w, ebpo_error *error)
+{
+    uint64_t n = w->mesh->vertex_count, blocks = (n + GRAIN - 1) / GRAIN;
+    w->heads = ebpo_alloc(blocks, sizeof *w->heads);
+    if (!w->heads)
+        return ebpo_fail_memory(error, blocks * sizeof *w->heads);
+    ebpo_status status = ebpo_parallel_for(0, n, GRAIN, count_heads, w, NULL, "", error);
+    for (uint64_t i = 0; status == EBPO_OK && i < blocks; i++) {
+        uint64_t count = w->heads[i];
+        w->heads[i] = w->kept;
+        w->kept += count;
+    }
+    return status == EBPO_OK ? ebpo_parallel_for(0, n, GRAIN, number_groups, w, NULL, "", error)
+                             : status;
+}
+
+/* --- what stays --- */
+
+/* Of each group the vertex that the source has first. Groups are numbered by their first vertices,
+ * so a new number is met first as the next one. */
+static void choose(welding *w)
+{
+    const ebpo_mesh *mesh = w->mesh;
+    uint64_t met = 0;
+    for (uint64_t v = 0; v < mesh->vertex_count; v++) {
+        uint32_t group = w->map[v];
+        ebpo_workspace_settle_often(mesh->workspace, v);
+        if (group == met)
+            w->from[met++] = (uint32_t)v;
+        else if (ebpo_mesh_source_vertex(mesh, v) < ebpo_mesh_source_vertex(mesh, w->from[group]))
+            w->from[group] = (uint32_t)v;
+    }
+}
+
+static ebpo_status mark_sources(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                ebpo_error *error)
+{
+    welding *w = context;
+    (void)worker, (void)error;
+    for (uint64_t i = begin; i < end; i++) {
+        uint64_t s = ebpo_mesh_source_vertex(w->mesh, w->from[i]);
+        __atomic_fetch_or(&w->stays[s / WORD], UINT64_C(1) << s % WORD, __ATOMIC_RELAXED);
+        ebpo_workspace_settle_often(w->mesh->workspace, i);
+    }
+    return EBPO_OK;
+}
+
+/* The source's numbers, as if it had been welded in its own order. */
+static ebpo_status number_sources(welding *w, ebpo_error *error)
+{
+    ebpo_workspace *workspace = w->mesh->workspace;
+    uint64_t words = w->mesh->vertex_count / WORD + 1, sum = 0;
+    w->stays = ebpo_array_zero(workspace, words, sizeof *w->stays);
+    w->before = ebpo_array_alloc(workspace, words, sizeof *w->before);
+    if (!w->stays || !w->before)
+        return ebpo_workspace_fail(workspace, 2 * words * sizeof *w->stays, error);
+    ebpo_status status = ebpo_parallel_for(0, w->kept, GRAIN, mark_sources, w, NULL, "", error);
+    for (uint64_t i = 0; i < words; i++) {
+        w->before[i] = sum;
+        sum += (uint64_t)__builtin_popcountll(w->stays[i]);
+        ebpo_workspace_settle_at(workspace, i);
+    }
+    return status;
+}
+
+/* --- putting it in place: nothing can fail from here on --- */
+
+static ebpo_status rename_corners(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                  ebpo_error *error)
+{
+    const welding *w = context;
+    (void)worker, (void)error;
+    for (uint64_t f = begin; f < end; f++) {
+        for (uint64_t i = 3 * f; i < 3 * f + 3; i++)
+            w->mesh->faces[i] = w->map[w->mesh->faces[i]];
+        ebpo_workspace_settle_often(w->mesh->workspace, f);
+    }
+    return EBPO_OK;
+}
+
+/* A group's new place never lies behind any of its vertices, so moving in ascending order
+ * overwrites nothing that is still needed. */
+static void move_vertices(welding *w)
+{
+    ebpo_mesh *mesh = w->mesh;
+    struct ebpo_arrangement *order = mesh->arrangement;
+    size_t size = 3 * (mesh->xyz32 ? sizeof *mesh->xyz32 : sizeof *mesh->xyz64);
+    char *base = mesh->xyz32 ? (char *)mesh->xyz32 : (char *)mesh->xyz64;
+    for (uint64_t i = 0; i < w->kept; i++) {
+        uint64_t from = w->from[i];
+        ebpo_workspace_settle_often(mesh->workspace, i);
+        if (from != i)
+            memmove(base + i * size, base + from * size, size);
+        if (order) {
+            uint64_t s = order->vertex_source[from];
+            order->vertex_source[i] =
+                (uint32_t)(w->before[s / WORD] +
+                           (uint64_t)__builtin_popcountll(w->stays[s / WORD] &
+                                                          ((UINT64_C(1) << s % WORD) - 1)));
+        }
+    }
+    mesh->vertex_count = w->kept;
+    if (order) {
+        ebpo_array_free(order->key);
+        order->key = NULL;
+    }
+    void *smaller = mesh->workspace || order ? NULL : ebpo_realloc(base, 3 * w->kept, size / 3);
+    if (smaller && mesh->xyz32)
+        mesh->xyz32 = smaller;
+    else if (smaller)
+        mesh->xyz64 = smaller;
+}
+
+static ebpo_status run(welding *w, ebpo_error *error)
+{
+    ebpo_mesh *mesh = w->mesh;
+    ebpo_status status =
+        ebpo_parallel_for(0, mesh->face_count, GRAIN, check_indices, mesh, NULL, "", error);
+    if (status != EBPO_OK)
+        return status;
+    w->map = ebpo_array_alloc(mesh->workspace, mesh->vertex_count, sizeof *w->map);
+    if (!w->map)
+        return ebpo_workspace_fail(mesh->workspace, mesh->vertex_count * sizeof *w->map, error);
+    status = mesh->arrangement && mesh->arrangement->grouped ? group_neighbours(w, error)
+                                                             : group_by_table(w, error);
+    if (status != EBPO_OK || w->kept == mesh->vertex_count)
+        return status;
+    w->from = ebpo_array_alloc(mesh->workspace, w->kept, sizeof *w->from);
+    if (!w->from)
+        return ebpo_workspace_fail(mesh->workspace, w->kept * sizeof *w->from, error);
+    choose(w);
+    if (mesh->arrangement)
+        status = number_sources(w, error);
+    if (status == EBPO_OK)
+        status = ebpo_parallel_for(0, mesh->face_count, GRAIN, rename_corners, w, NULL, "", error);
+    if (status == EBPO_OK)
+        move_vertices(w);
+    return status;
+}
+
+ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    welding w = { .mesh = mesh };
+    ebpo_status status = ebpo_mesh_check_shape(mesh, error);
+    if (status != EBPO_OK)
+        return status;
+    uint64_t count = mesh->vertex_count;
+    status = run(&w, error);
+    if (status == EBPO_OK && record) {
+        record->weld = true;
+        record->welded_vertices += count - mesh->vertex_count;
+    }
+    ebpo_array_free(w.map);
+    ebpo_array_free(w.from);
+    ebpo_array_free(w.stays);
+    ebpo_array_free(w.before);
+    free(w.heads);
+    return status;
+}

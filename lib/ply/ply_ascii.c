@@ -1,0 +1,177 @@
+/* The body of an ascii PLY file. Values are told apart by white space, so a long list may be broken
+ * into lines; but every row ends its line, otherwise a value too many in one row would shift all
+ * that follow. */
+#include "geom/strict_fp.h"
+
+#include <inttypes.h>
+
+#include "base/error.h"
+#include "ply/decimal.h"
+#include "ply/ply_parser.h"
+
+typedef struct rows {
+    ply_parser *p;
+    const ply_element *element;
+    uint64_t row;
+    bool store;
+} rows;
+
+static bool is_blank(uint8_t c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
+
+/* False at the end of the file. */
+static bool next_token(ply_parser *p, ply_word *token)
+{
+    const uint8_t *at = p->data + p->at, *end = p->data + p->size;
+    for (; at < end && is_blank(*at); at++)
+        p->line += *at == (uint8_t)p->header.line_end;
+    token->s = (const char *)at;
+    while (at < end && !is_blank(*at))
+        at++;
+    token->n = (size_t)((const char *)at - token->s);
+    p->at = (uint64_t)(at - p->data);
+    return token->n > 0;
+}
+
+static ebpo_status fail_token(const rows *r, const char *what, ply_word token)
+{
+    char text[PLY_WORD_TEXT];
+    ebpo_ply_word_text(text, token);
+    return ebpo_ply_fail(r->p, "%s '%s' in %s %" PRIu64 "; repair the file", what, text,
+                         ebpo_ply_row_name(r->element), r->row);
+}
+
+static ebpo_status next_integer(rows *r, int64_t *value)
+{
+    ply_word token;
+    if (!next_token(r->p, &token))
+        return ebpo_ply_fail_end(r->p, r->element, r->row);
+    if (!ebpo_number_integer(value, token.s, token.n))
+        return fail_token(r, "no whole number:", token);
+    return EBPO_OK;
+}
+
+static bool parse_coordinate(const rows *r, const ply_property *property, ply_word token)
+{
+    ply_parser *p = r->p;
+    uint64_t place = 3 * r->row + (uint64_t)(property->role - PLY_ROLE_X);
+    if (p->mesh->xyz32)
+        return ebpo_number_float(&p->mesh->xyz32[place], token.s, token.n, p->c_locale);
+    if (property->type == PLY_FLOAT64)
+        return ebpo_number_double(&p->mesh->xyz64[place], token.s, token.n, p->c_locale);
+    float narrow = 0;
+    int64_t whole = 0;
+    bool good = property->type == PLY_FLOAT32
+                    ? ebpo_number_float(&narrow, token.s, token.n, p->c_locale)
+                    : ebpo_number_integer(&whole, token.s, token.n);
+    p->mesh->xyz64[place] = property->type == PLY_FLOAT32 ? (double)narrow : (double)whole;
+    return good;
+}
+
+static ebpo_status read_corners(rows *r, uint64_t count)
+{
+    ply_parser *p = r->p;
+    ebpo_status status = ebpo_ply_reserve_corners(p, count);
+    uint64_t vertices = p->header.element[p->header.vertex].count;
+    bool strips = r->element->kind == PLY_KIND_STRIPS;
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
+        int64_t index;
+        status = next_integer(r, &index);
+        if (status != EBPO_OK)
+            break;
+        if (strips && (index == -1 || index == UINT32_MAX))
+            p->corners[i] = PLY_RESTART;
+        else if ((uint64_t)index >= vertices)
+            status = ebpo_ply_fail_index(p, r->element, r->row, index);
+        else
+            p->corners[i] = (uint32_t)index;
+    }
+    p->corner_count = count;
+    return status;
+}
+
+static ebpo_status skip_tokens(rows *r, uint64_t count)
+{
+    ply_word token;
+    for (uint64_t i = 0; i < count; i++)
+        if (!next_token(r->p, &token))
+            return ebpo_ply_fail_end(r->p, r->element, r->row);
+    return EBPO_OK;
+}
+
+static ebpo_status read_list(rows *r, const ply_property *property)
+{
+    ply_parser *p = r->p;
+    int64_t count;
+    ebpo_status status = next_integer(r, &count);
+    if (status != EBPO_OK)
+        return status;
+    if (count < 0)
+        return ebpo_ply_fail(p, "%s %" PRIu64 " has a list of %" PRId64 " items; repair the file",
+                             ebpo_ply_row_name(r->element), r->row, count);
+    if ((uint64_t)count > (p->size - p->at) / 2) { /* a blank and a digit each */
+        return ebpo_ply_fail(
+            p,
+            "%s %" PRIu64 " has a list of %" PRId64
+            " items, more than the rest of the file can hold; it is cut short or damaged",
+            ebpo_ply_row_name(r->element), r->row, count);
+    }
+    if (r->store && property->role == PLY_ROLE_CORNERS)
+        return read_corners(r, (uint64_t)count);
+    return skip_tokens(r, (uint64_t)count);
+}
+
+static ebpo_status read_property(rows *r, const ply_property *property)
+{
+    if (property->list)
+        return read_list(r, property);
+    ply_word token;
+    if (!next_token(r->p, &token))
+        return ebpo_ply_fail_end(r->p, r->element, r->row);
+    if (r->store && property->role != PLY_ROLE_NONE && !parse_coordinate(r, property, token))
+        return fail_token(r,
+                          property->type < PLY_FLOAT32 ? "no whole number:" : "no number:", token);
+    return EBPO_OK;
+}
+
+static ebpo_status end_row(rows *r)
+{
+    ply_parser *p = r->p;
+    while (p->at < p->size && is_blank(p->data[p->at]) && p->data[p->at] != '\n' &&
+           p->data[p->at] != '\r')
+        p->at++;
+    if (p->at == p->size || is_blank(p->data[p->at]))
+        return EBPO_OK;
+    ply_word token;
+    next_token(p, &token);
+    return fail_token(r, "a value more than the header describes:", token);
+}
+
+static ebpo_status read_row(rows *r)
+{
+    const ply_property *property = r->p->header.property + r->element->first;
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < r->element->properties && status == EBPO_OK; i++)
+        status = read_property(r, property + i);
+    if (status == EBPO_OK)
+        status = end_row(r);
+    if (status == EBPO_OK && r->store && r->element->kind == PLY_KIND_FACE)
+        return ebpo_ply_add_polygon(r->p, r->row);
+    if (status == EBPO_OK && r->store && r->element->kind == PLY_KIND_STRIPS)
+        return ebpo_ply_add_strip(r->p, r->row);
+    return status;
+}
+
+ebpo_status ebpo_ply_ascii_element(ply_parser *p, const ply_element *element, bool store)
+{
+    rows r = { .p = p, .element = element, .store = store && element->kind != PLY_KIND_OTHER };
+    ebpo_status status = EBPO_OK;
+    if (!element->properties) /* rows without values: nothing is written for them that we need to
+                                 see */
+        return EBPO_OK;
+    for (; r.row < element->count && status == EBPO_OK; r.row++) {
+        status = read_row(&r);
+        if (status == EBPO_OK && ebpo_ply_report_due(p))
+            status = ebpo_ply_report(p);
+    }
+    return status;
+}

@@ -1,0 +1,309 @@
+#include "geom/strict_fp.h"
+
+#include <inttypes.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/fp_env.h"
+#include "base/arrays.h"
+#include "io/file_source.h"
+#include "ply/ply_parser.h"
+#include "ply/ply.h"
+
+#define MOST_VERTICES (UINT64_C(0xfffffffe))
+enum { REPORT_BYTES = 1 << 22 };
+
+bool ebpo_ply_recognise(const uint8_t *data, uint64_t size)
+{
+    return size >= 4 && memcmp(data, "ply", 3) == 0 && (data[3] == '\n' || data[3] == '\r');
+}
+
+ebpo_status ebpo_ply_fail(const ply_parser *p, const char *format, ...)
+{
+    char text[320];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    if (p->header.encoding == PLY_ASCII)
+        return ebpo_fail(p->error, EBPO_E_FORMAT, "%s: line %" PRIu64 ": %s", p->name, p->line,
+                         text);
+    return ebpo_fail(p->error, EBPO_E_FORMAT, "%s: byte %" PRIu64 ": %s", p->name, p->at, text);
+}
+
+const char *ebpo_ply_row_name(const ply_element *element)
+{
+    static const char *const names[] = { "element", "vertex", "face", "strip" };
+    return names[element->kind];
+}
+
+ebpo_status ebpo_ply_fail_end(const ply_parser *p, const ply_element *element, uint64_t row)
+{
+    char name[PLY_WORD_TEXT];
+    ebpo_ply_word_text(name, element->name);
+    return ebpo_ply_fail(p,
+                         "the file ends after %" PRIu64 " bytes within row %" PRIu64
+                         " of the %" PRIu64 " of element '%s'; it is cut short, get it again",
+                         p->size, row, element->count, name);
+}
+
+ebpo_status ebpo_ply_fail_stopped(const ply_parser *p)
+{
+    return ebpo_fail(p->error, EBPO_E_CANCELLED, "stopped on request while reading %s", p->name);
+}
+
+ebpo_status ebpo_ply_report(ply_parser *p)
+{
+    p->next_report = p->at + REPORT_BYTES;
+    ebpo_workspace_settle(p->mesh->workspace);
+    if (!p->progress || !p->progress->report ||
+        p->progress->report(p->progress->user, "reading", p->at, p->size))
+        return EBPO_OK;
+    return ebpo_ply_fail_stopped(p);
+}
+
+/* Least bytes of all rows; false when they exceed any file. */
+static bool least_bytes(const ply_parser *p, const ply_element *element, uint64_t *bytes)
+{
+    uint64_t row = element->row_bytes;
+    if (p->header.encoding == PLY_ASCII &&
+        !ebpo_mul_ok(element->properties, 2, &row)) /* a digit and a blank */
+        return false;
+    return ebpo_mul_ok(element->count, row, bytes);
+}
+
+/* Before anything is allocated: can the file hold what its header claims? */
+static ebpo_status check_counts(ply_parser *p)
+{
+    uint64_t left = p->size - p->header.body;
+    left += p->header.encoding == PLY_ASCII; /* the last blank may be missing */
+    for (uint64_t i = 0; i < p->header.elements; i++) {
+        const ply_element *e = &p->header.element[i];
+        uint64_t need;
+        if (least_bytes(p, e, &need) && need <= left) {
+            left -= need;
+            continue;
+        }
+        char name[PLY_WORD_TEXT];
+        ebpo_ply_word_text(name, e->name);
+        if (p->header.encoding == PLY_ASCII || e->has_list)
+            return ebpo_fail(p->error, EBPO_E_FORMAT,
+                             "%s: line %" PRIu64 ": %" PRIu64
+                             " rows of element '%s' do not fit into the rest of the file, %" PRIu64
+                             " bytes; it is cut short or damaged, get it again",
+                             p->name, e->line, e->count, name, left);
+        p->at = p->size;
+        return ebpo_ply_fail_end(p, e, left / e->row_bytes);
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status check_parts(const ply_parser *p)
+{
+    const ply_header *h = &p->header;
+    uint64_t vertices = h->element[h->vertex].count,
+             faces = h->face >= 0 ? h->element[h->face].count : 0;
+    if (vertices > MOST_VERTICES || faces > MOST_VERTICES)
+        return ebpo_fail(p->error, EBPO_E_LIMIT,
+                         "%s: %" PRIu64 " vertices and %" PRIu64
+                         " faces, but no more than 2^32 - 2 of each can be read; split the model",
+                         p->name, vertices, faces);
+    if (!faces && (h->strips < 0 || !h->element[h->strips].count))
+        return ebpo_fail(p->error, EBPO_E_FORMAT,
+                         "%s: has %" PRIu64
+                         " vertices but no faces: a point cloud; make a surface of it first",
+                         p->name, vertices);
+    return EBPO_OK;
+}
+
+/* Floats stay floats when all three coordinates are; doubles hold every other type exactly. */
+static bool all_float(const ply_header *h)
+{
+    const ply_element *vertex = &h->element[h->vertex];
+    for (uint64_t i = 0; i < vertex->properties; i++) {
+        const ply_property *property = &h->property[vertex->first + i];
+        if (property->role != PLY_ROLE_NONE && property->type != PLY_FLOAT32)
+            return false;
+    }
+    return true;
+}
+
+static ebpo_status allocate_vertices(ply_parser *p)
+{
+    const ply_header *h = &p->header;
+    ebpo_mesh *mesh = p->mesh;
+    mesh->vertex_count = h->element[h->vertex].count;
+    size_t width = all_float(h) ? sizeof(float) : sizeof(double);
+    void *coordinates = ebpo_array_alloc(mesh->workspace, mesh->vertex_count, 3 * width);
+    if (width == sizeof(float))
+        mesh->xyz32 = coordinates;
+    else
+        mesh->xyz64 = coordinates;
+    if (!coordinates)
+        return ebpo_workspace_fail(mesh->workspace, mesh->vertex_count * 3 * width, p->error);
+    if (h->encoding == PLY_ASCII && !(p->c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0)))
+        return ebpo_fail_memory(p->error, 0);
+    return EBPO_OK;
+}
+
+static ebpo_status allocate(ply_parser *p)
+{
+    const ply_header *h = &p->header;
+    p->face_capacity = h->face >= 0 ? h->element[h->face].count : 0;
+    p->mesh->faces =
+        ebpo_array_alloc(p->mesh->workspace, p->face_capacity, 3 * sizeof *p->mesh->faces);
+    if (!p->mesh->faces)
+        return ebpo_workspace_fail(p->mesh->workspace,
+                                   p->face_capacity * 3 * sizeof *p->mesh->faces, p->error);
+    return allocate_vertices(p);
+}
+
+static ebpo_status read_element(ply_parser *p, const ply_element *element, bool store)
+{
+    return p->header.encoding == PLY_ASCII ? ebpo_ply_ascii_element(p, element, store)
+                                           : ebpo_ply_binary_element(p, element, store);
+}
+
+/* Faces that stand before the vertices are stepped over and read afterwards: to cut a polygon takes
+ * its positions. */
+static ebpo_status read_early_faces(ply_parser *p)
+{
+    uint64_t at = p->at, line = p->line;
+    p->at = p->header.body;
+    p->line = p->header.body_line;
+    ebpo_status status = EBPO_OK;
+    for (int64_t i = 0; i < p->header.vertex && status == EBPO_OK; i++)
+        status = read_element(p, &p->header.element[i], true);
+    p->at = at;
+    p->line = line;
+    p->next_report = 0;
+    return status;
+}
+
+static ebpo_status read_body(ply_parser *p)
+{
+    ebpo_status status = EBPO_OK;
+    p->at = p->header.body;
+    p->line = p->header.body_line;
+    for (int64_t i = 0; i < (int64_t)p->header.elements && status == EBPO_OK; i++) {
+        status = read_element(p, &p->header.element[i], i >= p->header.vertex);
+        if (status == EBPO_OK && i == p->header.vertex)
+            status = read_early_faces(p);
+    }
+    if (status == EBPO_OK && p->mesh->face_count == 0)
+        status = ebpo_fail(p->error, EBPO_E_FORMAT,
+                           "%s: none of its faces has three corners; there is no mesh in this file",
+                           p->name);
+    return status;
+}
+
+/* The face array grew by halves; give back what is left over. */
+static void trim(ply_parser *p)
+{
+    if (p->face_capacity == p->mesh->face_count || p->mesh->workspace)
+        return;
+    uint32_t *faces = ebpo_realloc(p->mesh->faces, p->mesh->face_count, 3 * sizeof *faces);
+    if (faces)
+        p->mesh->faces = faces;
+}
+
+static void describe(ply_parser *p)
+{
+    static const char *const formats[] = { "ply-ascii", "ply-le", "ply-be" };
+    snprintf(p->mesh->source_name, sizeof p->mesh->source_name, "%s", p->name);
+    snprintf(p->mesh->source_format, sizeof p->mesh->source_format, "%s",
+             formats[p->header.encoding]);
+    p->mesh->source_size = p->size;
+}
+
+ebpo_status ebpo_ply_parse_memory(ebpo_mesh *out, const uint8_t *data, uint64_t size,
+                                  const char *name, ebpo_workspace *workspace, unsigned threads,
+                                  const ebpo_progress *progress, ebpo_error *error)
+{
+    ebpo_mesh mesh = { .workspace = workspace };
+    ply_parser p = { .data = data,
+                     .size = size,
+                     .name = ebpo_path_name(name),
+                     .mesh = &mesh,
+                     .threads = threads,
+                     .progress = progress,
+                     .error = error };
+    ebpo_status status = ebpo_ply_header_parse(&p.header, data, size, p.name, error);
+    if (status == EBPO_OK)
+        status = check_counts(&p);
+    if (status == EBPO_OK)
+        status = check_parts(&p);
+    if (status == EBPO_OK)
+        status = allocate(&p);
+    if (status == EBPO_OK)
+        status = read_body(&p);
+    if (status == EBPO_OK) {
+        trim(&p);
+        describe(&p);
+    } else {
+        ebpo_array_free(mesh.xyz32);
+        ebpo_array_free(mesh.xyz64);
+        ebpo_array_free(mesh.faces);
+        mesh = (ebpo_mesh){ 0 };
+    }
+    if (p.c_locale)
+        freelocale(p.c_locale);
+    free(p.corners);
+    free(p.scratch);
+    ebpo_ply_header_free(&p.header);
+    *out = mesh;
+    return status;
+}
+
+/* Gives the vertices away, widened. */
+static ebpo_status give_points(ply_parser *p, double **xyz, uint64_t *count)
+{
+    ebpo_mesh *mesh = p->mesh;
+    if (mesh->xyz32) {
+        mesh->xyz64 = ebpo_alloc(mesh->vertex_count, 3 * sizeof(double));
+        if (!mesh->xyz64)
+            return ebpo_fail_memory(p->error, mesh->vertex_count * 3 * sizeof(double));
+        for (uint64_t i = 0; i < 3 * mesh->vertex_count; i++)
+            mesh->xyz64[i] = (double)mesh->xyz32[i];
+    }
+    *xyz = mesh->xyz64;
+    *count = mesh->vertex_count;
+    mesh->xyz64 = NULL;
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_points_parse_ply(double **xyz, uint64_t *count, const void *data, uint64_t size,
+                                  const char *name, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_mesh mesh = { 0 };
+    ply_parser p = {
+        .data = data, .size = size, .name = ebpo_path_name(name), .mesh = &mesh, .error = error
+    };
+    *xyz = NULL;
+    *count = 0;
+    ebpo_status status = ebpo_ply_header_parse(&p.header, p.data, size, p.name, error);
+    if (status == EBPO_OK)
+        status = check_counts(&p);
+    if (status == EBPO_OK)
+        status = allocate_vertices(&p);
+    p.at = p.header.body;
+    p.line = p.header.body_line;
+    for (int64_t i = 0; status == EBPO_OK && i <= p.header.vertex;
+         i++) /* what stands behind the vertices is not read */
+        status = read_element(&p, &p.header.element[i], i == p.header.vertex);
+    if (status == EBPO_OK)
+        status = give_points(&p, xyz, count);
+    free(mesh.xyz32);
+    free(mesh.xyz64);
+    if (p.c_locale)
+        freelocale(p.c_locale);
+    free(p.corners);
+    free(p.scratch);
+    ebpo_ply_header_free(&p.header);
+    return status;
+}

@@ -1,0 +1,64 @@
+/* What the parts of the PLY reader share: the place in the file, the mesh under construction, and
+ * messages. */
+#ifndef EBPO_PLY_PARSER_H
+#define EBPO_PLY_PARSER_H
+
+#include <ebpo/mesh.h>
+#include <locale.h>
+
+#include "ply/ply_header.h"
+
+typedef struct ply_parser {
+    const uint8_t *data;
+    uint64_t size, at; /* bytes, and the next one to read */
+    uint64_t line;     /* ascii: line of that byte, from 1 */
+    const char *name;
+    ply_header header;
+    ebpo_mesh *mesh;
+    uint64_t face_capacity;
+    unsigned threads; /* 0: all cores */
+
+    uint32_t *corners; /* of the face or strip being read */
+    uint64_t corner_count, corner_capacity;
+    void *scratch; /* for triangulation */
+    uint64_t scratch_capacity;
+
+    locale_t c_locale; /* ascii only */
+    const ebpo_progress *progress;
+    uint64_t next_report; /* offset */
+    ebpo_error *error;
+} ply_parser;
+
+/* EBPO_E_FORMAT: "name: line 17: ..." or "name: byte 1234: ...", from the parser's place. */
+ebpo_status ebpo_ply_fail(const ply_parser *p, const char *format, ...) EBPO_PRINTF(2, 3);
+/* The file ends within row `row` of `element`. */
+ebpo_status ebpo_ply_fail_end(const ply_parser *p, const ply_element *element, uint64_t row);
+
+/* "vertex", "face", "strip" or "element" for messages. */
+const char *ebpo_ply_row_name(const ply_element *element);
+
+/* Reports progress now and then; EBPO_E_CANCELLED when asked to stop. Cheap: call it for each row.
+ */
+static inline bool ebpo_ply_report_due(const ply_parser *p) { return p->at >= p->next_report; }
+ebpo_status ebpo_ply_report(ply_parser *p);
+/* EBPO_E_CANCELLED. */
+ebpo_status ebpo_ply_fail_stopped(const ply_parser *p);
+
+/* Appends a vertex number of the row being read; room has been made by ebpo_ply_reserve_corners. */
+ebpo_status ebpo_ply_reserve_corners(ply_parser *p, uint64_t count);
+/* A vertex number that does not exist. `row` is the face's number. */
+ebpo_status ebpo_ply_fail_index(const ply_parser *p, const ply_element *element, uint64_t row,
+                                int64_t index);
+
+/* The corners read make a face or a strip: adds its triangles to the mesh. */
+ebpo_status ebpo_ply_add_polygon(ply_parser *p, uint64_t row);
+ebpo_status ebpo_ply_add_strip(ply_parser *p, uint64_t row);
+/* In the corners of a strip row: a new strip begins. No vertex has this number. */
+#define PLY_RESTART UINT32_MAX
+
+/* Bodies. Each function reads all rows of an element, from p->at to behind its last row; with
+ * `store` false it only steps over them. */
+ebpo_status ebpo_ply_ascii_element(ply_parser *p, const ply_element *element, bool store);
+ebpo_status ebpo_ply_binary_element(ply_parser *p, const ply_element *element, bool store);
+
+#endif

@@ -1,0 +1,88 @@
+/* What will be asked for next: the subtrees that queries about places around the last one may need.
+ * EBP 2017, 4.2.3, loads the 26 neighbours of the subtree that holds the position instead. */
+#include "geom/strict_fp.h"
+
+#include "query/prefetch.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "query/query_node.h"
+
+typedef struct wanted {
+    uint64_t key;
+    double lower; /* bound of the distance */
+} wanted;
+
+/* The nearest subtrees within `limit` of p. */
+typedef struct looking {
+    const ebpo_model *model;
+    ebpo_box box;
+    const double *p;
+    double limit;
+    unsigned count;
+    wanted list[EBPO_CACHE_AHEAD]; /* the nearest first */
+} looking;
+
+static void add(looking *l, uint64_t key, double lower)
+{
+    unsigned at = l->count < EBPO_CACHE_AHEAD ? l->count++ : EBPO_CACHE_AHEAD - 1;
+    for (; at > 0 && l->list[at - 1].lower > lower; at--)
+        l->list[at] = l->list[at - 1];
+    l->list[at] = (wanted){ key, lower };
+    if (l->count == EBPO_CACHE_AHEAD)
+        l->limit = fmin(l->limit, l->list[EBPO_CACHE_AHEAD - 1].lower);
+}
+
+static void look(looking *l, ebpo_spot spot, double lower)
+{
+    if (lower > l->limit || ebpo_spot_is_uniform(&spot) || ebpo_spot_is_pruned(l->model, &spot))
+        return;
+    if (ebpo_spot_is_below(&spot)) {
+        add(l, ebpo_entry_value(spot.entry), lower);
+        return;
+    }
+    ebpo_ranked child[8];
+    int count = ebpo_rank_children(l->model, &l->box, &spot, lower, l->p, child);
+    for (int i = 0; i < count; i++)
+        look(l, child[i].spot, child[i].lower);
+}
+
+unsigned ebpo_subtrees_near(const ebpo_model *m, const double p[3], double limit,
+                            uint64_t keys[EBPO_CACHE_AHEAD])
+{
+    looking l = { .model = m, .box = ebpo_model_box(m), .p = p, .limit = limit };
+    ebpo_spot root = ebpo_spot_root(m);
+    look(&l, root, ebpo_spot_distance(m, &l.box, &root, 0, p));
+    for (unsigned i = 0; i < l.count; i++)
+        keys[i] = l.list[i].key;
+    return l.count;
+}
+
+static double longest_side(const ebpo_box *box, int level)
+{
+    return ldexp(fmax(box->size[0], fmax(box->size[1], box->size[2])), -level);
+}
+
+static double apart(const double a[3], const double b[3])
+{
+    return fmax(fabs(a[0] - b[0]), fmax(fabs(a[1] - b[1]), fabs(a[2] - b[2])));
+}
+
+void ebpo_context_prefetch(ebpo_context *c, const double p[3], double reach)
+{
+    const ebpo_model *m = c->model;
+    ebpo_box box = ebpo_model_box(m);
+    double side = longest_side(&box, m->top->cut_level);
+    if (c->has_prefetched && apart(p, c->prefetched_from) < side / 4 &&
+        fabs(reach) <= c->prefetched_reach + side / 4)
+        return;
+    c->has_prefetched = true;
+    c->prefetched_reach = fabs(reach);
+    memcpy(c->prefetched_from, p, sizeof c->prefetched_from);
+    /* Over a way w distances and their bounds change by at most w each: what is needed until then
+     * is within the reach and 2 w. A cell's diagonal is 1.73 sides: where envelopes do not decide
+     * (other rules than nonzero), the cell that holds the place is needed. */
+    uint64_t keys[EBPO_CACHE_AHEAD];
+    ebpo_cache_prefetch(m->cache, keys, ebpo_subtrees_near(m, p, fabs(reach) + 2.25 * side, keys));
+}

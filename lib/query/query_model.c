@@ -1,0 +1,323 @@
+/* Opening a model: everything at once when that fits, else the top of the tree and a cache. */
+#include "geom/strict_fp.h"
+
+#include "query/query_model.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/fp_env.h"
+#include "query/clock.h"
+#include "query/locate.h"
+
+/* Decoded chunks: an eighth of the budget, within these. */
+enum { CHUNKS_LEAST = 2 << 20, CHUNKS_MOST = 128 << 20, SUBTREES_LEAST = 2 << 20 };
+/* Of a cache: a path needs the subtree where it is, those around, and room to load the next. */
+enum { SUBTREES_WANTED = 64 };
+
+static uint64_t chunk_budget(uint64_t budget)
+{
+    return budget / 8 < CHUNKS_LEAST  ? CHUNKS_LEAST
+           : budget / 8 > CHUNKS_MOST ? CHUNKS_MOST
+                                      : budget / 8;
+}
+
+static ebpo_slice_size whole_size(const ebpo_info *info)
+{
+    ebpo_slice_size size = { .new_faces = info->face_count };
+    for (int i = 0; i < info->level_count; i++) {
+        size.groups += info->level[i].gray_count;
+        size.leaves += info->level[i].leaf_count;
+        size.refs += info->level[i].ref_count;
+    }
+    size.outer = size.refs; /* of the subtrees of any level together */
+    return size;
+}
+
+/* --- subtrees for the cache --- */
+
+static ebpo_status estimate_subtree(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
+                                    ebpo_error *error)
+{
+    ebpo_model *m = user;
+    ebpo_slice_size size;
+    ebpo_status status = ebpo_slice_measure(m->chunks, &m->top->below[key], &size, error);
+    if (status == EBPO_OK)
+        ebpo_subtree_estimate(&size, m->info, keep, peak);
+    return status;
+}
+
+/* Adds a subtree's leaves to what is in memory, or (sign -1) takes them away. */
+static void count_leaves(ebpo_model *m, const ebpo_subtree *s, uint64_t sign)
+{
+    m->leaves += sign * s->leaf_count;
+    m->leaves_one_wall += sign * s->one_wall;
+    for (int k = 0; k < 5; k++)
+        m->leaves_of_kind[k] += sign * s->kinds[k];
+}
+
+static ebpo_status load_subtree(void *user, uint64_t key, void **item, uint64_t *bytes,
+                                ebpo_error *error)
+{
+    ebpo_model *m = user;
+    ebpo_slice slice;
+    ebpo_subtree *subtree = NULL;
+    ebpo_status status = ebpo_slice_read(&slice, m->chunks, &m->top->below[key], error);
+    if (status == EBPO_OK)
+        status = ebpo_subtree_make(&subtree, &slice, m->info, true, 1, error);
+    if (status == EBPO_OK)
+        count_leaves(m, subtree, 1);
+    *item = subtree;
+    *bytes = status == EBPO_OK ? subtree->bytes : 0;
+    return status;
+}
+
+static void release_subtree(void *user, void *item)
+{
+    if (item)
+        count_leaves(user, item, (uint64_t)-1);
+    ebpo_subtree_free(item);
+}
+
+/* --- how much, and where to cut --- */
+
+ebpo_status ebpo_model_has_room(const ebpo_model *m, const ebpo_place *place, ebpo_error *error)
+{
+    ebpo_slice_size size;
+    uint64_t keep, peak;
+    ebpo_status status =
+        m->options.memory ? ebpo_slice_measure(m->chunks, place, &size, error) : EBPO_OK;
+    if (status != EBPO_OK || !m->options.memory)
+        return status;
+    ebpo_subtree_estimate(&size, m->info, &keep, &peak);
+    uint64_t taken = m->top->bytes + chunk_budget(m->options.memory);
+    if (taken + peak <= m->options.memory)
+        return EBPO_OK;
+    return ebpo_fail(error, EBPO_E_LIMIT,
+                     "the memory budget of %" PRIu64
+                     " bytes does not hold a leaf of level %d, which takes up to %" PRIu64
+                     " more than the %" PRIu64 " in use; give a larger budget",
+                     m->options.memory, place->level, peak, taken);
+}
+
+/* Half the budget for subtrees must hold so many of the average size; the top may take a quarter.
+ */
+static int choose_cut(const ebpo_info *info, uint64_t budget)
+{
+    ebpo_slice_size size = whole_size(info);
+    uint64_t keep, peak;
+    ebpo_subtree_estimate(&size, info, &keep, &peak);
+    for (int level = 1; level < info->level_count; level++) {
+        uint64_t grays = info->level[level].gray_count;
+        uint64_t top = ebpo_top_estimate(info, level);
+        if (top > budget / 4 || top + chunk_budget(budget) + SUBTREES_LEAST > budget)
+            return -1;
+        if (grays == 0 || keep / grays * SUBTREES_WANTED <= budget / 2)
+            return level;
+    }
+    return budget < chunk_budget(budget) + 2 * SUBTREES_LEAST ? -1 : info->level_count - 1;
+}
+
+/* A budget that choose_cut accepts, not much more than the least. */
+static uint64_t least_budget(const ebpo_info *info)
+{
+    uint64_t budget = 4 << 20;
+    while (choose_cut(info, budget) < 0 && budget < UINT64_C(1) << 60)
+        budget += budget / 8;
+    return budget;
+}
+
+static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
+{
+    ebpo_slice slice;
+    ebpo_status status = ebpo_slice_read_all(&slice, m->file, m->options.threads, error);
+    if (status == EBPO_OK)
+        status = ebpo_subtree_make(&m->whole, &slice, m->info, true, m->options.threads, error);
+    if (m->whole)
+        count_leaves(m, m->whole, 1);
+    return status;
+}
+
+static ebpo_status open_top(ebpo_model *m, int cut_level, ebpo_error *error)
+{
+    uint64_t budget = m->options.memory, chunks = 0, cache = 0;
+    ebpo_status status = ebpo_top_read(&m->top, m->file, cut_level, m->options.threads, error);
+    if (status != EBPO_OK)
+        return status;
+    if (budget) {
+        chunks = chunk_budget(budget);
+        if (m->top->bytes + chunks + SUBTREES_LEAST > budget)
+            return ebpo_fail(error, EBPO_E_LIMIT,
+                             "levels 0 to %d and a cache take more than the budget of %" PRIu64
+                             " bytes; give %" PRIu64 " or a lower cut level",
+                             cut_level, budget, m->top->bytes + chunks + SUBTREES_LEAST);
+        cache = budget - m->top->bytes - chunks;
+    }
+    status = ebpo_chunks_make(&m->chunks, m->file, chunks, error);
+    ebpo_cache_source source = { m, estimate_subtree, load_subtree, release_subtree };
+    if (status == EBPO_OK)
+        status = ebpo_cache_make(&m->cache, &source, "subtree", cache, error);
+    return status;
+}
+
+static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
+{
+    const ebpo_model_options *o = &m->options;
+    ebpo_slice_size size = whole_size(m->info);
+    uint64_t keep, peak;
+    size.outer = 0;
+    ebpo_subtree_estimate(&size, m->info, &keep, &peak);
+    int deepest = m->info->level_count - 1;
+    if (!(m->info->parts & EBPO_PART_MESH)) /* nothing could be loaded from below a cut level */
+        return open_top(m, deepest, error);
+    if (o->cut_level >= 0)
+        return open_top(m, o->cut_level < deepest ? o->cut_level : deepest, error);
+    if (o->memory == 0 || peak <= o->memory)
+        return open_whole(m, error);
+    int cut = choose_cut(m->info, o->memory);
+    if (cut < 0) {
+        uint64_t least = least_budget(m->info);
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "a budget of %" PRIu64
+                         " bytes is too small for this model; give at least %" PRIu64,
+                         o->memory, least < peak ? least : peak);
+    }
+    return open_top(m, cut, error);
+}
+
+ebpo_status ebpo_model_open(ebpo_model **out, ebpo_file *file, const ebpo_model_options *options,
+                            ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    static const ebpo_model_options usual = EBPO_MODEL_OPTIONS_INIT;
+    *out = NULL;
+    ebpo_model *m = ebpo_alloc_zero(1, sizeof *m);
+    if (!m)
+        return ebpo_fail_memory(error, sizeof *m);
+    uint64_t begin = ebpo_clock();
+    m->file = file;
+    m->info = ebpo_file_info(file);
+    m->options = options ? *options : usual;
+    m->kernels = ebpo_kernels_best();
+    ebpo_status status = m->options.loading > EBPO_LOAD_NODES
+                             ? ebpo_fail(error, EBPO_E_ARGUMENT,
+                                         "model options: there is no way of loading number %d",
+                                         (int)m->options.loading)
+                             : open_parts(m, error);
+    if (status != EBPO_OK) {
+        ebpo_model_close(m);
+        return status;
+    }
+    m->open_seconds = (double)(ebpo_clock() - begin) * 1e-9;
+    *out = m;
+    return EBPO_OK;
+}
+
+void ebpo_model_close(ebpo_model *m)
+{
+    if (!m)
+        return;
+    ebpo_cache_free(m->cache);
+    ebpo_chunks_free(m->chunks);
+    ebpo_top_free(m->top);
+    ebpo_subtree_free(m->whole);
+    free(m);
+}
+
+void ebpo_model_get_stats(const ebpo_model *m, ebpo_model_stats *out)
+{
+    *out = (ebpo_model_stats){ .resident = m->whole != NULL,
+                               .cut_level = m->top ? m->top->cut_level : 0,
+                               .budget = m->options.memory,
+                               .open_seconds = m->open_seconds };
+    ebpo_file_traffic(m->file, &out->bytes_read, &out->reads);
+    out->leaves = m->leaves;
+    out->leaves_one_wall = m->leaves_one_wall;
+    for (int k = 0; k < 5; k++)
+        out->leaves_of_kind[k] = m->leaves_of_kind[k];
+    if (m->whole) {
+        out->memory = out->memory_peak = m->whole->bytes;
+        return;
+    }
+    ebpo_cache_stats subtrees, chunks;
+    ebpo_cache_get_stats(m->cache, &subtrees);
+    ebpo_chunks_get_stats(m->chunks, &chunks);
+    out->memory = m->top->bytes + subtrees.bytes + chunks.bytes;
+    out->memory_peak = m->top->bytes + subtrees.peak_bytes + chunks.peak_bytes;
+    out->hits = subtrees.hits;
+    out->loads = subtrees.loads;
+    out->prefetched = subtrees.prefetched;
+    out->evicted = subtrees.evicted;
+    out->load_seconds = subtrees.load_seconds;
+}
+
+/* --- contexts --- */
+
+ebpo_status ebpo_context_new(ebpo_context **out, ebpo_model *model, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    *out = ebpo_alloc_zero(1, sizeof **out);
+    if (!*out)
+        return ebpo_fail_memory(error, sizeof **out);
+    (*out)->model = model;
+    return EBPO_OK;
+}
+
+static void let_go(ebpo_context *c)
+{
+    if (c->pinned)
+        ebpo_cache_unpin(c->model->cache, c->pinned_key);
+    c->pinned = NULL;
+}
+
+void ebpo_context_free(ebpo_context *c)
+{
+    if (!c)
+        return;
+    let_go(c);
+    free(c->open);
+    free(c->hits);
+    free(c->later);
+    free(c->faces);
+    free(c);
+}
+
+/* Says what --memory would do instead of what the cache lacks. */
+static ebpo_status too_little(const ebpo_model *m, uint32_t below, ebpo_error *error)
+{
+    uint64_t peak, keep, least;
+    if (estimate_subtree((ebpo_model *)m, below, &peak, &keep, NULL) != EBPO_OK)
+        return EBPO_E_LIMIT;
+    least = m->top->bytes + peak;
+    while (m->top->bytes + chunk_budget(least) + peak > least)
+        least += least / 8 + 1;
+    return ebpo_fail(error, EBPO_E_LIMIT,
+                     "the memory budget of %" PRIu64
+                     " bytes does not hold one subtree below level %d and what else is in use; a "
+                     "budget of %" PRIu64 " would, or a higher cut level",
+                     m->options.memory, m->top->cut_level, least);
+}
+
+ebpo_status ebpo_context_subtree(ebpo_context *c, uint32_t below, ebpo_subtree **out,
+                                 ebpo_error *error)
+{
+    const ebpo_model *m = c->model;
+    void *item;
+    if (c->pinned && c->pinned_key == below) {
+        *out = c->pinned;
+        return EBPO_OK;
+    }
+    let_go(c);
+    if (m->options.loading != EBPO_LOAD_CACHE)
+        ebpo_cache_clear(m->cache);
+    ebpo_status status = ebpo_cache_get(m->cache, below, &item, NULL, error);
+    if (status != EBPO_OK)
+        return status == EBPO_E_LIMIT && m->options.memory ? too_little(m, below, error) : status;
+    *out = c->pinned = item;
+    c->pinned_key = below;
+    return EBPO_OK;
+}

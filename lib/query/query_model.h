@@ -1,0 +1,73 @@
+/* A model's parts, and a context's. */
+#ifndef EBPO_QUERY_MODEL_H
+#define EBPO_QUERY_MODEL_H
+
+#include <ebpo/query.h>
+#include <pthread.h>
+
+#include "cache/cache.h"
+#include "container/rule.h"
+#include "container/slice.h"
+#include "query/kernels.h"
+#include "query/query_top.h"
+#include "subtree/subtree.h"
+
+struct ebpo_model {
+    ebpo_file *file;
+    const ebpo_info *info;
+    ebpo_model_options options;
+    const ebpo_kernels *kernels;
+    ebpo_subtree *whole; /* everything, or NULL: */
+    ebpo_top *top;       /* levels 0 .. cut level */
+    ebpo_chunks *chunks;
+    ebpo_cache *cache; /* subtrees by their number in the top */
+    double open_seconds;
+    /* in the subtrees that are in memory */
+    _Atomic uint64_t leaves, leaves_of_kind[5], leaves_one_wall;
+};
+
+typedef struct ebpo_ranked ebpo_ranked; /* query/query_node.h */
+
+struct ebpo_context {
+    ebpo_model *model;
+    ebpo_subtree *pinned; /* the subtree last used, when it came from the cache */
+    uint64_t pinned_key;
+    uint32_t *open; /* slots that a filter left open */
+    uint64_t open_capacity;
+    ebpo_ray_hit *hits;
+    uint64_t hit_capacity;
+    uint64_t *faces;
+    uint64_t face_capacity;
+    ebpo_ranked *later; /* subtrees that a search has put off */
+    uint64_t later_count, later_capacity;
+    bool has_prefetched; /* from here, by a query that reached so far */
+    double prefetched_from[3], prefetched_reach;
+    /* The last nearest face: where ebpo_distance begins, if asked to. */
+    bool warm;
+    double warm_triangle[3][3];
+    uint64_t warm_face,
+        warm_source_face; /* its number in the file, and the one that callers are told */
+};
+
+static inline ebpo_box ebpo_model_box(const ebpo_model *m)
+{
+    const ebpo_info *i = m->info;
+    return (ebpo_box){ { i->box_origin[0], i->box_origin[1], i->box_origin[2] },
+                       { i->box_size[0], i->box_size[1], i->box_size[2] },
+                       i->grid_level };
+}
+
+/* EBPO_E_ARGUMENT for a point that is not finite; `number` is for the message. */
+EBPO_MUST_USE ebpo_status ebpo_check_points(const double *points, uint64_t count,
+                                            ebpo_error *error);
+
+/* EBPO_E_LIMIT when the budget does not hold the leaf at `place`, alone, for one context;
+ * EBPO_LOAD_NODES loads it past the cache. */
+EBPO_MUST_USE ebpo_status ebpo_model_has_room(const ebpo_model *model, const ebpo_place *place,
+                                              ebpo_error *error);
+
+/* The subtree with this number, in memory until the context asks for another one. */
+EBPO_MUST_USE ebpo_status ebpo_context_subtree(ebpo_context *context, uint32_t below,
+                                               ebpo_subtree **out, ebpo_error *error);
+
+#endif

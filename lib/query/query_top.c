@@ -1,0 +1,226 @@
+#include "query/query_top.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/arrays.h"
+#include "container/reader.h"
+
+/* Reading, level by level, with what the next level needs to know of the one before. */
+typedef struct reading {
+    ebpo_top *top;
+    const ebpo_info *info;
+    uint64_t group, plane, below; /* next free */
+    uint32_t (*at)[3];            /* positions of the last level's gray nodes */
+    /* of the level below the one that is read, where they are needed to know pruned nodes */
+    uint16_t *next_types;
+    uint64_t group_capacity, gray_room, plane_room, below_room, below_planes_room;
+    ebpo_error *error;
+} reading;
+
+static ebpo_status no_memory(const reading *r)
+{
+    return ebpo_fail_memory(r->error, ebpo_top_estimate(r->info, r->top->cut_level));
+}
+
+/* The planes of a node of the level, `count` more from its own place in the level's list on. */
+static ebpo_status add_planes(reading *r, const ebpo_level *level, uint32_t count,
+                              uint64_t *in_level, ebpo_top_planes *out)
+{
+    if (!ebpo_grow(&r->top->planes, &r->plane_room, r->plane + count + 1, sizeof *r->top->planes))
+        return no_memory(r);
+    if (r->plane + count > UINT32_MAX)
+        return ebpo_fail(r->error, EBPO_E_LIMIT,
+                         "too many planes down to cut level %d; give a lower one",
+                         r->top->cut_level);
+    if (count)
+        memcpy(r->top->planes + r->plane, level->planes + *in_level,
+               count * sizeof *r->top->planes);
+    *out = (ebpo_top_planes){ (uint32_t)r->plane, count };
+    *in_level += count;
+    r->plane += count;
+    return EBPO_OK;
+}
+
+typedef struct ranks {
+    uint64_t of[4], planes;
+} ranks;
+
+static ebpo_status settled(const reading *r, const int32_t *windings, uint64_t rank, int32_t usual,
+                           uint32_t *entry)
+{
+    int32_t winding = windings ? windings[rank] : usual;
+    if (winding <= -EBPO_ENTRY_ZERO || winding >= EBPO_ENTRY_ZERO)
+        return ebpo_fail(r->error, EBPO_E_LIMIT,
+                         "a node's winding number is beyond 2^29: the solid has too many shells");
+    *entry = ebpo_entry(EBPO_ENTRY_UNIFORM, (uint32_t)(winding + EBPO_ENTRY_ZERO));
+    return EBPO_OK;
+}
+
+static ebpo_status add_below(reading *r, const ebpo_level *level, const ebpo_place *place,
+                             uint64_t *in_level, uint32_t *entry)
+{
+    ebpo_top *t = r->top;
+    if (!ebpo_grow(&t->below, &r->below_room, r->below + 1, sizeof *t->below) ||
+        !ebpo_grow(&t->below_planes, &r->below_planes_room, r->below + 1, sizeof *t->below_planes))
+        return no_memory(r);
+    if (r->below >= EBPO_ENTRY_ZERO)
+        return ebpo_fail(r->error, EBPO_E_LIMIT, "too many nodes at cut level %d; give a lower one",
+                         t->cut_level);
+    t->below[r->below] = *place;
+    *entry = ebpo_entry(EBPO_ENTRY_BELOW, (uint32_t)r->below);
+    uint32_t count =
+        place->type == EBPO_GRAY && level->plane_counts ? level->plane_counts[place->rank] : 0;
+    return add_planes(r, level, count, in_level, &t->below_planes[r->below++]);
+}
+
+static ebpo_status add_gray(reading *r, const ebpo_level *level, uint64_t rank, uint64_t *in_level,
+                            uint32_t *entry)
+{
+    ebpo_top *t = r->top;
+    uint64_t group = r->group++;
+    if (!ebpo_grow(&t->nodes.group, &r->group_capacity, r->group, sizeof *t->nodes.group) ||
+        !ebpo_grow(&t->gray, &r->gray_room, r->group, sizeof *t->gray))
+        return no_memory(r);
+    if (r->group >= EBPO_ENTRY_ZERO)
+        return ebpo_fail(r->error, EBPO_E_LIMIT,
+                         "too many nodes above cut level %d; give a lower one", t->cut_level);
+    *entry = ebpo_entry(EBPO_ENTRY_GRAY, (uint32_t)group);
+    return add_planes(r, level, level->plane_counts ? level->plane_counts[rank] : 0, in_level,
+                      &t->gray[group]);
+}
+
+static bool is_pruned(const reading *r, int number, uint64_t rank)
+{
+    return r->info->pruned &&
+           (number + 1 == r->info->level_count || (r->next_types && r->next_types[rank] == 0));
+}
+
+/* Above the cut the next level has a group for it, which leads nowhere. */
+static ebpo_status add_pruned(reading *r, const ebpo_level *level, const ebpo_place *place,
+                              uint64_t *in_level, uint32_t *entry)
+{
+    if (place->level < r->top->cut_level && place->level + 1 < r->info->level_count) {
+        ebpo_level none = { .gray_count = 0 };
+        ebpo_status status = add_gray(r, &none, 0, &(uint64_t){ 0 }, entry);
+        if (status != EBPO_OK)
+            return status;
+    }
+    return add_below(r, level, place, in_level, entry);
+}
+
+static ebpo_status add_node(reading *r, int number, const ebpo_level *level, ebpo_node_type type,
+                            const uint32_t at[3], ranks *seen, uint32_t *entry)
+{
+    uint64_t rank = seen->of[type]++;
+    if (type == EBPO_WHITE)
+        return settled(r, level->white_winding, rank, 0, entry);
+    if (type == EBPO_BLACK)
+        return settled(r, level->black_winding, rank, 1, entry);
+    if (type == EBPO_GRAY && is_pruned(r, number, rank))
+        return add_pruned(r, level,
+                          &(ebpo_place){ number, { at[0], at[1], at[2] }, type, rank, true },
+                          &seen->planes, entry);
+    if (type == EBPO_GRAY && number < r->top->cut_level)
+        return add_gray(r, level, rank, &seen->planes, entry);
+    return add_below(r, level, &(ebpo_place){ number, { at[0], at[1], at[2] }, type, rank, false },
+                     &seen->planes, entry);
+}
+
+static ebpo_status add_level(reading *r, int number, const ebpo_level *level, uint64_t first_group)
+{
+    uint64_t grays = level->gray_count, gray = 0;
+    uint32_t(*at)[3] = ebpo_alloc(grays, sizeof *at);
+    if (!at)
+        return no_memory(r);
+    ranks seen = { { 0 }, 0 };
+    ebpo_status status = EBPO_OK;
+    for (uint64_t g = 0; g < level->group_count && status == EBPO_OK; g++)
+        for (unsigned octant = 0; octant < (number ? 8u : 1u) && status == EBPO_OK; octant++) {
+            ebpo_node_type type = (ebpo_node_type)(level->types[g] >> 2 * octant & 3);
+            uint32_t here[3] = { 0, 0, 0 }, entry = 0;
+            for (int k = 0; k < 3 && number; k++)
+                here[k] = 2 * r->at[g][k] + (octant >> k & 1);
+            if (type == EBPO_GRAY)
+                memcpy(at[gray++], here, sizeof here);
+            status = add_node(r, number, level, type, here, &seen, &entry);
+            if (number)
+                r->top->nodes.group[first_group + g][octant] = entry;
+            else
+                r->top->nodes.root = entry;
+        }
+    free(r->at);
+    r->at = at;
+    return status;
+}
+
+ebpo_status ebpo_top_read(ebpo_top **out, ebpo_file *file, int cut_level, unsigned threads,
+                          ebpo_error *error)
+{
+    *out = NULL;
+    ebpo_top *top = ebpo_alloc_zero(1, sizeof *top);
+    if (!top)
+        return ebpo_fail_memory(error, sizeof *top);
+    top->cut_level = cut_level;
+    reading r = { .top = top, .info = ebpo_file_info(file), .error = error };
+    ebpo_status status = EBPO_OK;
+    ebpo_file_expect_levels(file, 0, cut_level);
+    for (int number = 0; number <= cut_level && status == EBPO_OK; number++) {
+        ebpo_level level;
+        status = ebpo_file_read_level(file, number, &level, threads, error);
+        if (status != EBPO_OK)
+            break;
+        if (r.info->level[number].pruned_count && number + 1 < r.info->level_count)
+            status = ebpo_reader_make(file, EBPO_A_TYPES, number + 1, threads, sizeof *r.next_types,
+                                      &r.next_types, error);
+        if (status == EBPO_OK)
+            status = add_level(&r, number, &level, r.group - (number ? level.group_count : 0));
+        ebpo_array_free(r.next_types);
+        r.next_types = NULL;
+        ebpo_level_free(&level);
+    }
+    free(r.at);
+    if (status != EBPO_OK) {
+        ebpo_top_free(top);
+        return status;
+    }
+    top->nodes.group_count = (uint32_t)r.group;
+    top->below_count = r.below;
+    top->bytes = sizeof *top + r.group_capacity * sizeof *top->nodes.group +
+                 r.gray_room * sizeof *top->gray + r.plane_room * 4 +
+                 r.below_room * sizeof *top->below +
+                 r.below_planes_room * sizeof *top->below_planes;
+    *out = top;
+    return EBPO_OK;
+}
+
+void ebpo_top_free(ebpo_top *top)
+{
+    if (!top)
+        return;
+    ebpo_nodes_free(&top->nodes);
+    free(top->gray);
+    free(top->planes);
+    free(top->below);
+    free(top->below_planes);
+    free(top);
+}
+
+uint64_t ebpo_top_estimate(const ebpo_info *info, int cut_level)
+{
+    uint64_t bytes = sizeof(ebpo_top), largest = 0;
+    for (int i = 0; i <= cut_level && i < info->level_count; i++) {
+        const ebpo_level_summary *s = &info->level[i];
+        uint64_t below = s->leaf_count + (i == cut_level ? s->gray_count : 0);
+        /* What is kept, and the arrays of the level while it is read. */
+        bytes += (s->gray_count * (sizeof(uint32_t[8]) + sizeof(ebpo_top_planes)) +
+                  s->plane_count * 4 + below * (sizeof(ebpo_place) + sizeof(ebpo_top_planes))) *
+                 3 / 2;
+        uint64_t arrays = s->gray_count * 27 + s->plane_count * 4 + s->leaf_count * 28 +
+                          s->ref_count * 4 + (s->white_count + s->black_count) * 4;
+        largest = arrays > largest ? arrays : largest;
+    }
+    return bytes + largest;
+}

@@ -1,0 +1,64 @@
+#include "geom/strict_fp.h"
+
+#include "stream/stream_node.h"
+
+#include <string.h>
+
+#include "octree/octcode.h"
+#include "stream/cell_to_model.h"
+
+ebpo_box ebpo_node_box(const ebpo_info *info)
+{
+    ebpo_box box = { .grid_level = info->grid_level };
+    memcpy(box.origin, info->box_origin, sizeof box.origin);
+    memcpy(box.size, info->box_size, sizeof box.size);
+    return box;
+}
+
+double ebpo_node_cell_volume(const ebpo_box *box, int level)
+{
+    double sides = (double)(1u << level);
+    return box->size[0] / sides * (box->size[1] / sides) * (box->size[2] / sides);
+}
+
+void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcode,
+                     ebpo_node_type type)
+{
+    ebpo_cell cell = ebpo_cell_of_octcode(octcode);
+    *out = (ebpo_stream_node){ .octcode = octcode, .type = type };
+    for (int k = 0; k < 3; k++) {
+        out->min[k] = ebpo_wall(box, k, cell.level, cell.at[k]);
+        out->max[k] = ebpo_wall(box, k, cell.level, cell.at[k] + 1);
+    }
+    if (type == EBPO_BLACK)
+        out->volume = ebpo_node_cell_volume(box, cell.level);
+}
+
+void ebpo_node_add_planes(ebpo_stream_node *out, const ebpo_box *box, const uint32_t *codes,
+                          unsigned count, ebpo_node_buffers *room)
+{
+    ebpo_cell cell = ebpo_cell_of_octcode(out->octcode);
+    for (unsigned i = 0; i < count; i++) {
+        int32_t n[3], d;
+        if (ebpo_plane_decode(codes[i], n, &d))
+            ebpo_plane_to_world(box, cell, n, d, room->planes[out->plane_count++]);
+    }
+    out->planes = (const double(*)[4])room->planes;
+}
+
+void ebpo_node_add_polygons(ebpo_stream_node *out, const ebpo_box *box, const ebpo_polytope *p,
+                            ebpo_node_buffers *room)
+{
+    ebpo_cell cell = ebpo_cell_of_octcode(out->octcode);
+    ebpo_polytope_to_world(p, box, cell, room->vertices);
+    for (int f = 0; f <= p->face_count; f++)
+        room->polygon_first[f] = p->first[f];
+    for (int i = 0; i < p->corner_count; i++)
+        room->corners[i] = p->corner[i];
+    out->volume = ebpo_polytope_volume(p) * ebpo_node_cell_volume(box, cell.level);
+    out->vertex_count = (uint32_t)p->vertex_count;
+    out->polygon_count = (uint32_t)p->face_count;
+    out->vertices = (const double(*)[3])room->vertices;
+    out->polygon_first = room->polygon_first;
+    out->corners = room->corners;
+}

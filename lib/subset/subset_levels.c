@@ -1,0 +1,338 @@
+/* From level to level: which groups are wanted is known from the level above, so only these are
+ * read. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "subset/subset_parts.h"
+
+static const uint64_t NOTHING = UINT64_MAX;
+
+/* A gray node of the result. */
+typedef struct gray {
+    uint64_t group; /* of its children, in the source; NOTHING: they are left out */
+    uint32_t at[3];
+} gray;
+
+/* Places in the picked level, and in the result. */
+typedef struct place {
+    uint64_t of_type[4], planes, leaf_planes, refs;
+} place;
+
+typedef struct descent {
+    ebpo_cutting *c;
+    int level;
+    ebpo_level from, *to;
+    place read;
+    gray *parent, *child;
+    ebpo_tolerance_node *judged; /* gray nodes and leaves as they come, with max_error; else NULL */
+    uint64_t next_judged;
+    uint64_t parent_count, child_count;
+    uint64_t filled; /* groups of the result that are not empty */
+    bool goes_on;    /* some child has children */
+} descent;
+
+static bool meets_box(const ebpo_cutting *c, int level, const uint32_t at[3])
+{
+    const ebpo_subset_options *o = c->options;
+    for (int k = 0; k < 3 && o->boxed; k++)
+        if (ebpo_wall(&c->box, k, level, at[k]) > o->max[k] ||
+            ebpo_wall(&c->box, k, level, at[k] + 1) < o->min[k])
+            return false;
+    return true;
+}
+
+/* Gray nodes of this level may have children in the result. */
+static bool may_go_on(const ebpo_cutting *c, int level)
+{
+    return level < c->last_level && level + 1 < c->from->level_count;
+}
+
+/* --- runs of groups that are wanted --- */
+
+static ebpo_status pick(descent *d)
+{
+    uint64_t count = 0;
+    ebpo_run *runs = ebpo_alloc(d->parent_count, sizeof *runs);
+    if (!runs)
+        return ebpo_fail_memory(d->c->error, d->parent_count * sizeof *runs);
+    for (uint64_t i = 0; i < d->parent_count; i++) {
+        uint64_t group = d->parent[i].group;
+        if (group == NOTHING)
+            continue;
+        if (count && runs[count - 1].group + runs[count - 1].groups == group)
+            runs[count - 1].groups++;
+        else
+            runs[count++] = (ebpo_run){ .group = group, .groups = 1 };
+    }
+    ebpo_status status =
+        ebpo_pick_level(d->c->chunks, d->level, runs, count, d->c->parts, &d->from, d->c->error);
+    /* Ranks of the picked gray nodes in the source are needed for their groups: one after the other
+     * through the runs. */
+    uint64_t next = 0;
+    if (status == EBPO_OK) {
+        d->child = ebpo_alloc(d->from.gray_count + d->from.leaf_count, sizeof *d->child);
+        if (!d->child)
+            status = ebpo_fail_memory(d->c->error,
+                                      (d->from.gray_count + d->from.leaf_count) * sizeof *d->child);
+    }
+    /* Kept at the end of the room, which leaves that become pruned fill from the front: never
+     * overtaken, as each gray node takes one place at most. */
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
+        for (uint64_t k = 0; k < runs[i].count[EBPO_GRAY]; k++)
+            d->child[d->from.leaf_count + next++].group = runs[i].rank[EBPO_GRAY] + k;
+    free(runs);
+    return status;
+}
+
+static ebpo_status make_room(descent *d)
+{
+    const ebpo_level *f = &d->from;
+    ebpo_level *t = d->to;
+    uint32_t parts = d->c->parts;
+    uint64_t grays = f->gray_count + f->leaf_count, planes = f->plane_count + f->leaf_plane_count,
+             whites = f->white_count + 8 * d->parent_count;
+    t->types = ebpo_alloc_zero(d->parent_count, sizeof *t->types);
+    bool good = t->types;
+    if (parts & EBPO_PART_PLANES && good)
+        good = (t->plane_counts = ebpo_alloc_zero(grays, 1)) &&
+               (t->planes = ebpo_alloc(planes, sizeof *t->planes));
+    if (parts & EBPO_PART_LEAF_PLANES && good)
+        good = (t->leaf_plane_counts = ebpo_alloc(f->leaf_count, 1)) &&
+               (t->leaf_planes = ebpo_alloc(f->leaf_plane_count, sizeof *t->leaf_planes));
+    if (d->c->from->solid && good)
+        good = (t->leaf_winding = ebpo_alloc(f->leaf_count, 4)) &&
+               (!f->black_winding || (t->black_winding = ebpo_alloc(f->black_count, 4))) &&
+               (!f->white_winding || (t->white_winding = ebpo_alloc_zero(whites, 4)));
+    if (parts & EBPO_PART_MESH && good)
+        good = (t->leaf_first = ebpo_alloc(f->leaf_count, sizeof *t->leaf_first)) &&
+               (t->leaf_new = ebpo_alloc(f->leaf_count, 4)) &&
+               (t->leaf_ref_count = ebpo_alloc(f->leaf_count, 4)) &&
+               (t->leaf_refs = ebpo_alloc(f->ref_count, 4));
+    return good ? EBPO_OK
+                : ebpo_fail_memory(d->c->error, f->leaf_count * 24 +
+                                                    (grays + f->ref_count + planes + whites) * 4);
+}
+
+/* --- nodes --- */
+
+static void add_gray(descent *d, const uint32_t at[3], uint64_t group, const uint32_t *codes,
+                     uint64_t count)
+{
+    ebpo_level *t = d->to;
+    if (t->plane_counts) {
+        t->plane_counts[t->gray_count] = (uint8_t)count;
+        if (count)
+            memcpy(t->planes + t->plane_count, codes, count * sizeof *codes);
+        t->plane_count += count;
+    }
+    t->gray_count++;
+    d->child[d->child_count++] = (gray){ group, { at[0], at[1], at[2] } };
+    d->goes_on = d->goes_on || group != NOTHING;
+}
+
+/* Whether the envelope is close enough to the model: asked once for each gray node and leaf, in
+ * their order. */
+static bool is_enough(descent *d) { return d->judged && d->judged[d->next_judged++].enough; }
+
+static void take_gray(descent *d, const uint32_t at[3])
+{
+    uint64_t rank = d->read.of_type[EBPO_GRAY]++, group = d->child[d->from.leaf_count + rank].group,
+             count = d->from.plane_counts ? d->from.plane_counts[rank] : 0;
+    bool enough = is_enough(d);
+    if (enough || !may_go_on(d->c, d->level) || !meets_box(d->c, d->level, at))
+        group = NOTHING;
+    add_gray(d, at, group, d->from.planes ? d->from.planes + d->read.planes : NULL, count);
+    d->read.planes += count;
+}
+
+static void add_leaf(descent *d, uint64_t rank)
+{
+    const ebpo_level *f = &d->from;
+    ebpo_level *t = d->to;
+    uint64_t i = t->leaf_count++;
+    if (t->leaf_winding)
+        t->leaf_winding[i] = f->leaf_winding[rank];
+    if (t->leaf_plane_counts) {
+        uint64_t count = t->leaf_plane_counts[i] = f->leaf_plane_counts[rank];
+        if (count)
+            memcpy(t->leaf_planes + t->leaf_plane_count, f->leaf_planes + d->read.leaf_planes,
+                   count * sizeof *t->leaf_planes);
+        t->leaf_plane_count += count;
+    }
+    if (t->leaf_first) {
+        uint64_t count = t->leaf_ref_count[i] = f->leaf_ref_count[rank];
+        t->leaf_first[i] = f->leaf_first[rank];
+        t->leaf_new[i] = f->leaf_new[rank];
+        if (count)
+            memcpy(t->leaf_refs + t->ref_count, f->leaf_refs + d->read.refs,
+                   count * sizeof *t->leaf_refs);
+        t->ref_count += count;
+        t->new_count += f->leaf_new[rank];
+    }
+}
+
+/* Outside the box a leaf becomes a pruned node; its own planes bound what is in its cell as well as
+ * a gray node's do. Where its parent's do well enough, it needs none. */
+static ebpo_node_type take_leaf(descent *d, const uint32_t at[3])
+{
+    const ebpo_level *f = &d->from;
+    uint64_t rank = d->read.of_type[EBPO_LEAF]++,
+             planes = f->leaf_plane_counts ? f->leaf_plane_counts[rank] : 0;
+    bool enough = is_enough(d), kept = !enough && meets_box(d->c, d->level, at);
+    if (kept)
+        add_leaf(d, rank);
+    else if (enough)
+        add_gray(d, at, NOTHING, NULL, 0);
+    else
+        add_gray(d, at, NOTHING, f->leaf_planes ? f->leaf_planes + d->read.leaf_planes : NULL,
+                 d->to->plane_counts ? planes : 0);
+    d->read.leaf_planes += planes;
+    d->read.refs += f->leaf_ref_count ? f->leaf_ref_count[rank] : 0;
+    return kept ? EBPO_LEAF : EBPO_GRAY;
+}
+
+static ebpo_node_type take_node(descent *d, ebpo_node_type type, const uint32_t at[3])
+{
+    const ebpo_level *f = &d->from;
+    ebpo_level *t = d->to;
+    switch (type) {
+    case EBPO_GRAY: take_gray(d, at); return type;
+    case EBPO_LEAF: return take_leaf(d, at);
+    case EBPO_BLACK:
+        if (t->black_winding)
+            t->black_winding[t->black_count] = f->black_winding[d->read.of_type[type]];
+        t->black_count++;
+        break;
+    case EBPO_WHITE:
+        if (t->white_winding)
+            t->white_winding[t->white_count] = f->white_winding[d->read.of_type[type]];
+        t->white_count++;
+        break;
+    }
+    d->read.of_type[type]++;
+    return type;
+}
+
+static void child_place(const descent *d, uint64_t number, unsigned octant, uint32_t at[3])
+{
+    for (int k = 0; k < 3; k++)
+        at[k] = d->level ? 2 * d->parent[number].at[k] + (octant >> k & 1) : 0;
+}
+
+static void take_group(descent *d, uint64_t number, uint16_t types)
+{
+    for (unsigned octant = 0; octant < (d->level ? 8u : 1u); octant++) {
+        uint32_t at[3];
+        child_place(d, number, octant, at);
+        d->to->types[number] |=
+            (uint16_t)(take_node(d, (ebpo_node_type)(types >> 2 * octant & 3), at) << 2 * octant);
+    }
+}
+
+/* --- how close envelopes are, all of a level at once --- */
+
+static ebpo_status judge(descent *d)
+{
+    uint64_t next = 0, count = 0;
+    d->next_judged = 0;
+    if (!d->c->need)
+        return EBPO_OK;
+    if (!(d->judged = ebpo_alloc_zero(d->from.gray_count + d->from.leaf_count, sizeof *d->judged)))
+        return ebpo_fail_memory(d->c->error,
+                                (d->from.gray_count + d->from.leaf_count) * sizeof *d->judged);
+    for (uint64_t i = 0; i < d->parent_count; i++) {
+        if (d->parent[i].group == NOTHING)
+            continue;
+        uint16_t types = d->from.types[next++];
+        for (unsigned octant = 0; octant < (d->level ? 8u : 1u); octant++) {
+            unsigned type = types >> 2 * octant & 3;
+            if (type != EBPO_GRAY && type != EBPO_LEAF)
+                continue;
+            ebpo_tolerance_node *node = &d->judged[count++];
+            node->cell.level = d->level;
+            child_place(d, i, octant, node->cell.at);
+            node->asked = meets_box(d->c, d->level, node->cell.at) &&
+                          (type == EBPO_LEAF || may_go_on(d->c, d->level));
+        }
+    }
+    return ebpo_tolerance_judge(d->c->need, d->judged, count, d->c->options->max_error,
+                                d->c->error);
+}
+
+/* The parents are done for good after this. */
+static ebpo_status cut_level(descent *d)
+{
+    ebpo_status status = pick(d);
+    if (status == EBPO_OK)
+        status = make_room(d);
+    if (status == EBPO_OK)
+        status = judge(d);
+    uint64_t next = 0;
+    d->to->group_count = d->parent_count;
+    for (uint64_t i = 0; i < d->parent_count && status == EBPO_OK; i++) {
+        if (d->parent[i].group == NOTHING)
+            d->to->white_count += 8; /* the places of children that are not here */
+        else
+            take_group(d, i, d->from.types[next++]);
+        d->filled += d->to->types[i] != 0;
+    }
+    ebpo_level_free(&d->from);
+    free(d->judged);
+    d->judged = NULL;
+    free(d->parent);
+    d->parent = d->child;
+    d->parent_count = d->child_count;
+    d->child = NULL;
+    d->child_count = 0;
+    return status;
+}
+
+ebpo_status ebpo_cut_levels(ebpo_cutting *c)
+{
+    ebpo_info *info = &c->out->info;
+    descent d = {
+        .c = c, .goes_on = true, .parent_count = 1, .parent = ebpo_alloc_zero(1, sizeof *d.parent)
+    };
+    ebpo_status status = d.parent ? EBPO_OK : ebpo_fail_memory(c->error, sizeof *d.parent);
+    info->level_count = 0;
+    for (; d.goes_on && status == EBPO_OK; d.level++) {
+        const ebpo_progress *progress = &c->options->write.progress;
+        if (progress->report && !progress->report(progress->user, "reading levels",
+                                                  (uint64_t)d.level, (uint64_t)c->last_level + 1))
+            status =
+                ebpo_fail(c->error, EBPO_E_CANCELLED, "stopped on request while levels were read");
+        if (status != EBPO_OK)
+            break;
+        d.to = &c->out->level[d.level];
+        d.read = (place){ { 0 }, 0, 0, 0 };
+        d.filled = 0;
+        d.goes_on = false;
+        status = cut_level(&d);
+        if (status == EBPO_OK && d.level && d.filled == 0) {
+            ebpo_level_free(d.to); /* in a subset of a subset: nothing of this level lies in both */
+            break;
+        }
+        if (d.level)
+            d.to[-1].pruned_count = d.to->group_count - d.filled;
+        d.to->pruned_count = d.to->gray_count;
+        d.to->gray_volume = c->from->level[d.level].gray_volume;
+        d.to->leaf_volume = c->from->level[d.level].leaf_volume;
+        info->level_count = d.level + 1;
+    }
+    free(d.parent);
+    if (status != EBPO_OK)
+        return status;
+    bool cut = false, empty = false;
+    for (int i = 0; i < info->level_count; i++) {
+        empty = empty || c->out->level[i].pruned_count;
+        cut = cut || c->out->level[i].gray_count != c->from->level[i].gray_count ||
+              c->out->level[i].leaf_count != c->from->level[i].leaf_count;
+    }
+    cut = cut || info->level_count < c->from->level_count || c->from->pruned;
+    info->pruned = cut && empty;
+    for (int i = 0; i < info->level_count && !info->pruned; i++)
+        c->out->level[i].pruned_count = 0;
+    return EBPO_OK;
+}

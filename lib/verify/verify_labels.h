@@ -1,0 +1,60 @@
+/* Labels: winding numbers of the cells' corners.
+ *
+ * Two proofs. (1) By links, for all cells: equal points must have equal winding numbers whichever
+ * cell tells them. A cell without faces has one number for all its corners; a leaf gives one for
+ * its lowest corner and the others follow by signed crossings along its edges; the 64 corners of a
+ * gray node's children are 27 points. The root's corners are outside. As every cell is linked to
+ * the root that way, all numbers are right when all links hold (and the lists are complete, which
+ * is checked elsewhere). (2) By rays through the whole mesh, for all cells or a sample, without any
+ * of that.
+ */
+#ifndef EBPO_VERIFY_LABELS_H
+#define EBPO_VERIFY_LABELS_H
+
+#include "verify/twin_tree.h"
+#include "verify/verify_rays.h"
+#include "verify/tally.h"
+#include "verify/touch.h"
+
+/* Winding numbers of a cell's corners (bit 0 x, bit 1 y, bit 2 z). */
+typedef struct ebpo_corner_windings {
+    int64_t at[8];
+    unsigned known; /* bit i: at[i] is set; not all are in a file without mesh */
+} ebpo_corner_windings;
+
+/* Which cells are checked by rays: of each level and type, every n-th or so. */
+typedef struct ebpo_label_plan {
+    uint64_t cells[EBPO_LEVELS_MAX][4], take[EBPO_LEVELS_MAX][4];
+} ebpo_label_plan;
+
+/* samples 0: as many as ebpo_verify_options says. */
+void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_twin_tree *view, uint64_t samples);
+
+/* Corner windings of a leaf, white or black node; `faces`: the `count` faces that touch it. */
+void ebpo_terminal_windings(ebpo_corner_windings *out, const ebpo_twin_tree *view,
+                            const ebpo_twin_node *node, const ebpo_frame *frame,
+                            const uint32_t *faces, uint64_t count);
+
+/* White outside, black inside. */
+void ebpo_check_terminal_label(ebpo_tally *tally, const ebpo_twin_tree *view,
+                               const ebpo_twin_node *node);
+
+/* Where the plan says so, puts the cell's lowest corner on the list of points to be checked by
+ * rays. False when memory is short. */
+EBPO_MUST_USE bool ebpo_label_note(ebpo_ray_points *points, const ebpo_twin_tree *view,
+                                   const ebpo_twin_node *node, const ebpo_frame *frame,
+                                   const ebpo_label_plan *plan);
+/* Compares what rays found with what the file says. */
+void ebpo_check_rays(ebpo_tally *tally, const ebpo_ray_points *points);
+
+/* Compares the children of a gray node with each other and gives the node's own corners. */
+void ebpo_check_links(ebpo_tally *tally, const ebpo_twin_node *node,
+                      const ebpo_corner_windings children[8], ebpo_corner_windings *out);
+
+/* The root's corners are outside. */
+void ebpo_check_root_corners(ebpo_tally *tally, const ebpo_corner_windings *root);
+
+/* Bit i: corner i lies in the solid. */
+unsigned ebpo_windings_inside(const ebpo_twin_tree *view, const ebpo_corner_windings *corners);
+
+#endif

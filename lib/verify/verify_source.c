@@ -1,0 +1,257 @@
+#include "verify/verify_source.h"
+
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/arrays.h"
+#include "container/reader.h"
+#include "mesh/mesh_parts.h"
+
+#define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_SOURCE, condition, __VA_ARGS__)
+
+static size_t vertex_size(const ebpo_mesh *mesh)
+{
+    return mesh->xyz32 ? 3 * sizeof *mesh->xyz32 : 3 * sizeof *mesh->xyz64;
+}
+
+static const char *vertex_bytes(const ebpo_mesh *mesh, uint64_t i)
+{
+    return (mesh->xyz32 ? (const char *)mesh->xyz32 : (const char *)mesh->xyz64) +
+           i * vertex_size(mesh);
+}
+
+static ebpo_status copy_mesh(ebpo_mesh *out, const ebpo_mesh *mesh, ebpo_error *error)
+{
+    *out = *mesh;
+    out->xyz32 = NULL;
+    out->xyz64 = NULL;
+    out->faces = ebpo_array_alloc(mesh->workspace, mesh->face_count, 3 * sizeof *out->faces);
+    void *xyz = ebpo_array_alloc(mesh->workspace, mesh->vertex_count, vertex_size(mesh));
+    if (mesh->xyz32)
+        out->xyz32 = xyz;
+    else
+        out->xyz64 = xyz;
+    if (!out->faces || !xyz) {
+        ebpo_mesh_free(out);
+        return ebpo_workspace_fail(mesh->workspace,
+                                   mesh->vertex_count * vertex_size(mesh) + mesh->face_count * 12,
+                                   error);
+    }
+    for (uint64_t i = 0; i < mesh->face_count; ebpo_workspace_settle_at(mesh->workspace, i++))
+        memcpy(out->faces + 3 * i, mesh->faces + 3 * i, 3 * sizeof *out->faces);
+    for (uint64_t i = 0; i < mesh->vertex_count; ebpo_workspace_settle_at(mesh->workspace, i++))
+        memcpy((char *)xyz + i * vertex_size(mesh), vertex_bytes(mesh, i), vertex_size(mesh));
+    return EBPO_OK;
+}
+
+/* In the order of preparing a mesh: weld, orient, fill. */
+static ebpo_status mend_again(ebpo_mesh *mesh, const ebpo_mend_record *asked, ebpo_mend_record *did,
+                              ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    if (asked->weld)
+        status = ebpo_mesh_weld(mesh, did, error);
+    if (asked->orient && status == EBPO_OK)
+        status = ebpo_mesh_orient(mesh, did, error);
+    if (asked->fill_holes && status == EBPO_OK)
+        status = ebpo_mesh_fill_holes(mesh, did, error);
+    return status;
+}
+
+static void check_record(ebpo_tally *tally, const ebpo_mend_record *told,
+                         const ebpo_mend_record *did)
+{
+    CHECK(told->welded_vertices == did->welded_vertices,
+          "%" PRIu64 " welded vertices are recorded, doing it again welds %" PRIu64,
+          told->welded_vertices, did->welded_vertices);
+    CHECK(told->flipped_faces == did->flipped_faces &&
+              told->unorientable_components == did->unorientable_components,
+          "%" PRIu64 " flipped faces are recorded, doing it again flips %" PRIu64,
+          told->flipped_faces, did->flipped_faces);
+    CHECK(told->filled_holes == did->filled_holes && told->added_faces == did->added_faces &&
+              told->unfilled_holes == did->unfilled_holes,
+          "%" PRIu64 " faces filling holes are recorded, doing it again adds %" PRIu64,
+          told->added_faces, did->added_faces);
+}
+
+static void compare_in_order(ebpo_tally *tally, const ebpo_mesh *a, const ebpo_mesh *b)
+{
+    size_t size = vertex_size(a);
+    tally->checks[EBPO_VERIFY_SOURCE] += a->vertex_count + a->face_count;
+    for (uint64_t i = 0; i < a->vertex_count; ebpo_workspace_settle_at(a->workspace, i++))
+        if (memcmp(vertex_bytes(a, i), vertex_bytes(b, i), size) != 0)
+            ebpo_tally_violation(tally, EBPO_VERIFY_SOURCE,
+                                 &(ebpo_verify_place){ 0, EBPO_NO_FACE, EBPO_NO_PLANE },
+                                 "vertex %" PRIu64
+                                 " of the source has another position in the file",
+                                 i);
+    for (uint64_t i = 0; i < a->face_count; ebpo_workspace_settle_at(a->workspace, i++))
+        if (memcmp(a->faces + 3 * i, b->faces + 3 * i, 3 * sizeof *a->faces) != 0)
+            ebpo_tally_violation(tally, EBPO_VERIFY_SOURCE,
+                                 &(ebpo_verify_place){ 0, i, EBPO_NO_PLANE },
+                                 "the face (by its source number) has other corners in the file");
+}
+
+static int compare_vertices(const void *a, const void *b, void *mesh)
+{
+    return memcmp(vertex_bytes(mesh, *(const uint32_t *)a),
+                  vertex_bytes(mesh, *(const uint32_t *)b), vertex_size(mesh));
+}
+
+static int face_order(const ebpo_mesh *m, uint64_t i, const ebpo_mesh *n, uint64_t j)
+{
+    int order = 0;
+    for (uint64_t c = 0; c < 3 && order == 0; c++)
+        order = memcmp(vertex_bytes(m, m->faces[3 * i + c]), vertex_bytes(n, n->faces[3 * j + c]),
+                       vertex_size(m));
+    return order;
+}
+
+static int compare_faces(const void *a, const void *b, void *mesh)
+{
+    return face_order(mesh, *(const uint32_t *)a, mesh, *(const uint32_t *)b);
+}
+
+/* 0 .. count - 1, sorted; NULL when memory is short. */
+static uint32_t *sorted(const ebpo_mesh *mesh, uint64_t count,
+                        int (*compare)(const void *, const void *, void *))
+{
+    uint32_t *order = ebpo_array_alloc(mesh->workspace, count, sizeof *order);
+    if (!order)
+        return NULL;
+    for (uint64_t i = 0; i < count; ebpo_workspace_settle_at(mesh->workspace, i++))
+        order[i] = (uint32_t)i;
+    qsort_r(order, count, sizeof *order, compare, (void *)(uintptr_t)mesh);
+    return order;
+}
+
+static ebpo_status compare_as_sets(ebpo_tally *tally, const ebpo_mesh *a, const ebpo_mesh *b,
+                                   bool faces, ebpo_error *error)
+{
+    uint64_t count = faces ? a->face_count : a->vertex_count, differ = 0;
+    uint32_t *left = sorted(a, count, faces ? compare_faces : compare_vertices);
+    uint32_t *right = sorted(b, count, faces ? compare_faces : compare_vertices);
+    bool short_of_memory = !left || !right;
+    for (uint64_t i = 0; i < count && !short_of_memory;
+         ebpo_workspace_settle_often(a->workspace, i++))
+        differ += faces ? face_order(a, left[i], b, right[i]) != 0
+                        : memcmp(vertex_bytes(a, left[i]), vertex_bytes(b, right[i]),
+                                 vertex_size(a)) != 0;
+    ebpo_array_free(left);
+    ebpo_array_free(right);
+    if (short_of_memory)
+        return ebpo_workspace_fail(a->workspace, count * sizeof *left, error);
+    tally->checks[EBPO_VERIFY_SOURCE] += count - 1;
+    CHECK(differ == 0, "as sets, the %s of source and file differ", faces ? "faces" : "vertices");
+    return EBPO_OK;
+}
+
+/* A subset's mesh: each of its faces and vertices at its number in the source. */
+static ebpo_status compare_some(ebpo_tally *tally, ebpo_file *file, const ebpo_mesh *whole,
+                                unsigned threads, ebpo_error *error)
+{
+    ebpo_mesh part = { 0 };
+    uint32_t *vertex_source = NULL, *face_source = NULL;
+    ebpo_status status = ebpo_file_read_mesh(file, &part, threads, error);
+    if (status == EBPO_OK)
+        status = ebpo_reader_maps(file, &vertex_source, &face_source, threads, error);
+    if (status == EBPO_OK && CHECK(!whole->xyz32 == !part.xyz32,
+                                   "the source and the file hold different kinds of coordinates")) {
+        tally->checks[EBPO_VERIFY_SOURCE] += part.vertex_count + part.face_count;
+        for (uint64_t i = 0; i < part.vertex_count;
+             ebpo_workspace_settle_often(part.workspace, i++))
+            if (vertex_source[i] >= whole->vertex_count ||
+                memcmp(vertex_bytes(whole, vertex_source[i]), vertex_bytes(&part, i),
+                       vertex_size(&part)) != 0)
+                ebpo_tally_violation(tally, EBPO_VERIFY_SOURCE,
+                                     &(ebpo_verify_place){ 0, EBPO_NO_FACE, EBPO_NO_PLANE },
+                                     "vertex %" PRIu32
+                                     " of the source has another position in the file",
+                                     vertex_source[i]);
+        for (uint64_t i = 0; i < part.face_count;
+             ebpo_workspace_settle_often(part.workspace, i++)) {
+            bool equal = face_source[i] < whole->face_count;
+            for (uint64_t c = 0; c < 3 && equal; c++)
+                equal = whole->faces[3 * (uint64_t)face_source[i] + c] ==
+                        vertex_source[part.faces[3 * i + c]];
+            if (!equal)
+                ebpo_tally_violation(
+                    tally, EBPO_VERIFY_SOURCE,
+                    &(ebpo_verify_place){ 0, face_source[i], EBPO_NO_PLANE },
+                    "the face (by its source number) has other corners in the file");
+        }
+    }
+    ebpo_array_free(vertex_source);
+    ebpo_array_free(face_source);
+    ebpo_mesh_free(&part);
+    return status;
+}
+
+static void check_digest(ebpo_tally *tally, const ebpo_info *info, const ebpo_mesh *source)
+{
+    static const uint8_t none[32];
+    if (memcmp(source->source_sha256, none, 32) == 0)
+        return;
+    CHECK(memcmp(source->source_sha256, info->source_sha256, 32) == 0 &&
+              source->source_size == info->source_size,
+          "the source file's digest or size is not the recorded one");
+}
+
+static ebpo_status compare(ebpo_tally *tally, const ebpo_mesh *mended, const ebpo_mesh *stored,
+                           bool ordered, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    bool comparable =
+        CHECK(!mended->xyz32 == !stored->xyz32,
+              "the source and the file hold different kinds of coordinates") &&
+        CHECK(mended->vertex_count == stored->vertex_count &&
+                  mended->face_count == stored->face_count,
+              "the mended source has %" PRIu64 " vertices and %" PRIu64 " faces, the file %" PRIu64
+              " and %" PRIu64,
+              mended->vertex_count, mended->face_count, stored->vertex_count, stored->face_count);
+    if (comparable && ordered)
+        compare_in_order(tally, mended, stored);
+    if (comparable && !ordered)
+        status = compare_as_sets(tally, mended, stored, false, error);
+    if (comparable && !ordered && status == EBPO_OK)
+        status = compare_as_sets(tally, mended, stored, true, error);
+    return status;
+}
+
+ebpo_status ebpo_check_source(ebpo_tally *tally, ebpo_file *file, const ebpo_mesh *stored,
+                              bool ordered, const ebpo_mesh *source, unsigned threads,
+                              ebpo_error *error)
+{
+    const ebpo_info *info = ebpo_file_info(file);
+    check_digest(tally, info, source);
+    CHECK(info->source_vertex_count == source->vertex_count &&
+              info->source_face_count == source->face_count,
+          "the source has %" PRIu64 " vertices and %" PRIu64 " faces, recorded are %" PRIu64
+          " and %" PRIu64,
+          source->vertex_count, source->face_count, info->source_vertex_count,
+          info->source_face_count);
+    ebpo_mesh mended = { 0 };
+    const ebpo_mend_record *asked = &info->mend;
+    bool as_it_is = !asked->weld && !asked->orient && !asked->fill_holes;
+    ebpo_mend_record did = { .weld = info->mend.weld,
+                             .orient = info->mend.orient,
+                             .fill_holes = info->mend.fill_holes };
+    ebpo_status status = as_it_is ? EBPO_OK : copy_mesh(&mended, source, error);
+    if (status != EBPO_OK)
+        return status;
+    if (!as_it_is)
+        status = mend_again(&mended, asked, &did, error);
+    const ebpo_mesh *made = as_it_is ? source : &mended;
+    if (status == EBPO_OK)
+        check_record(tally, &info->mend, &did);
+    if (status == EBPO_OK && stored)
+        status = compare(tally, made, stored, ordered, error);
+    else if (status == EBPO_OK &&
+             info->parts & EBPO_PART_MAPS) /* without maps, nothing says which faces these are */
+        status = compare_some(tally, file, made, threads, error);
+    ebpo_mesh_free(&mended);
+    return status;
+}

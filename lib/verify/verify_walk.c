@@ -1,0 +1,445 @@
+/* Nodes with many faces come first, one after the other, with their faces shared out to all
+ * threads; what remains below are many smaller subtrees, each walked depth-first by one thread.
+ * Every face is tested exactly against every cell that it comes near. */
+#include "geom/strict_fp.h"
+
+#include "verify/verify_walk.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "base/arrays.h"
+#include "verify/containment.h"
+#include "verify/verify_labels.h"
+#include "verify/lists.h"
+#include "verify/winding.h"
+
+enum {
+    FACE_GRAIN = 4096,
+    SUBTREE_FACES = 1024,
+    SUBTREE_FACES_MOST = 1 << 18,
+    SUBTREES_WANTED = 64
+};
+
+/* Face numbers on a stack: a node's faces, then its child's, and so on down; and for each which
+ * children it touches. */
+typedef struct face_stack {
+    uint32_t *faces;
+    uint8_t *octants;
+    uint64_t capacity;
+} face_stack;
+
+typedef struct worker {
+    ebpo_tally tally;
+    face_stack stack;
+    ebpo_half_spaces planes;
+    ebpo_ray_points points;
+    uint64_t visited; /* faces */
+} worker;
+
+/* A node of the upper part. `children` 0: the root of a subtree that is walked by one thread. */
+typedef struct upper_node {
+    ebpo_twin_node node;
+    uint32_t *faces;
+    uint64_t face_count;
+    uint64_t children; /* the first of eight, in the same array */
+    ebpo_corner_windings corners;
+} upper_node;
+
+typedef struct walk {
+    const ebpo_twin_tree *view;
+    const ebpo_verify_options *options;
+    unsigned threads;
+    ebpo_label_plan plan;
+    bool rays;
+    worker *workers;
+    upper_node *upper;
+    uint64_t upper_count, upper_capacity;
+    uint64_t *subtrees; /* places in `upper` */
+    uint64_t subtree_count;
+    uint64_t subtree_limit;
+    /* The node that is being shared out. */
+    const upper_node *shared;
+    uint8_t *shared_octants;
+} walk;
+
+/* A gray node's cell and its children's. */
+typedef struct family {
+    ebpo_frame self, child[8];
+    double middle[3];
+} family;
+
+static void family_make(family *out, const ebpo_box *box, const ebpo_twin_node *node)
+{
+    out->self = ebpo_frame_make(box, node->cell);
+    for (int k = 0; k < 3; k++)
+        out->middle[k] = ebpo_wall(box, k, node->cell.level + 1, 2 * node->cell.at[k] + 1);
+    for (unsigned octant = 0; octant < 8; octant++)
+        for (int k = 0; k < 3; k++) {
+            bool upper = octant >> k & 1;
+            out->child[octant].low[k] = upper ? out->middle[k] : out->self.low[k];
+            out->child[octant].high[k] = upper ? out->self.high[k] : out->middle[k];
+            out->child[octant].inverse[k] = 2 * out->self.inverse[k];
+        }
+}
+
+/* Octants that the face's bounding box meets, of those the half-spaces at the middle walls make. */
+static unsigned near_octants(const family *f, const ebpo_corners *face)
+{
+    static const uint8_t upper[3] = { 0xaa, 0xcc, 0xf0 };
+    unsigned octants = 255;
+    for (int k = 0; k < 3; k++) {
+        double a = face->at[0][k], b = face->at[1][k], c = face->at[2][k], m = f->middle[k];
+        if (a < m && b < m && c < m)
+            octants &= ~upper[k];
+        else if (a > m && b > m && c > m)
+            octants &= upper[k];
+    }
+    return octants & 255;
+}
+
+static unsigned touched_octants(const family *f, const ebpo_corners *face, ebpo_tally *tally)
+{
+    unsigned near = near_octants(f, face), touched = 0;
+    if ((near & (near - 1)) == 0)
+        return near; /* it touches the node, so it touches its only choice */
+    for (unsigned octant = 0; octant < 8; octant++)
+        if (near >> octant & 1)
+            touched |= (unsigned)ebpo_face_touches(&f->child[octant], face, tally) << octant;
+    return touched;
+}
+
+/* What is done for each face at a gray node. */
+static void visit_faces(const walk *w, worker *self, const ebpo_twin_node *node, const family *f,
+                        const uint32_t *faces, uint8_t *octants, uint64_t count)
+{
+    for (uint64_t i = 0; i < count; i++) {
+        ebpo_corners face;
+        ebpo_face_corners(&w->view->tree->mesh, faces[i], &face);
+        if (self->planes.count)
+            ebpo_check_face_contained(&self->tally, &self->planes, node, &f->self, &face, faces[i]);
+        octants[i] = (uint8_t)touched_octants(f, &face, &self->tally);
+    }
+    /* Pages come in by faces looked at, but here and there a few for a node. */
+    if ((self->visited += count + 64) >= 1 << 15) {
+        self->visited = 0;
+        ebpo_workspace_settle(w->options->workspace);
+    }
+}
+
+/* A gray node with so few faces that it ought to be a leaf. */
+static void check_worth(const walk *w, ebpo_tally *tally, const ebpo_twin_node *node,
+                        uint64_t touching)
+{
+    uint64_t limit = w->view->tree->info.leaf_faces;
+    if (limit == 0 || !w->view->has_mesh ||
+        w->view->tree->info.pruned) /* of a subset not all leaves are there */
+        return;
+    tally->checks[EBPO_VERIFY_STRUCTURE]++;
+    if (touching <= limit && !ebpo_lists_more_faces(w->view, node, limit))
+        ebpo_tally_violation(
+            tally, EBPO_VERIFY_STRUCTURE,
+            &(ebpo_verify_place){ node->code, EBPO_NO_FACE, EBPO_NO_PLANE },
+            "the node is gray, but its leaves list no more faces than one leaf may");
+}
+
+/* What is left to do at a gray node when its children are done. */
+static void finish_gray(const walk *w, worker *self, const ebpo_twin_node *node,
+                        const ebpo_corner_windings children[8], ebpo_corner_windings *corners)
+{
+    if (!w->view->tree->info.solid)
+        return;
+    ebpo_check_links(&self->tally, node, children, corners);
+    unsigned inside = ebpo_windings_inside(w->view, corners);
+    if (inside == 0)
+        return;
+    ebpo_half_spaces_of(&self->planes, w->view, node);
+    ebpo_check_corners_contained(&self->tally, &self->planes, node, inside);
+}
+
+/* False when memory is short. */
+static bool walk_terminal(const walk *w, worker *self, const ebpo_twin_node *node,
+                          const uint32_t *faces, uint64_t count, ebpo_corner_windings *corners)
+{
+    const ebpo_twin_tree *view = w->view;
+    ebpo_frame frame = ebpo_frame_make(&view->box, node->cell);
+    if (view->has_mesh && node->type != EBPO_GRAY) /* pruned */
+        ebpo_check_terminal_lists(&self->tally, view, node, faces, count);
+    ebpo_half_spaces_of(&self->planes, view, node);
+    for (uint64_t i = 0; i < count && self->planes.count; i++) {
+        ebpo_corners face;
+        ebpo_face_corners(&view->tree->mesh, faces[i], &face);
+        ebpo_check_face_contained(&self->tally, &self->planes, node, &frame, &face, faces[i]);
+    }
+    *corners = (ebpo_corner_windings){ { 0 }, 0 };
+    if (!view->tree->info.solid || node->type == EBPO_GRAY)
+        return true;
+    ebpo_check_terminal_label(&self->tally, view, node);
+    if (w->rays && !ebpo_label_note(&self->points, view, node, &frame, &w->plan))
+        return false;
+    ebpo_terminal_windings(corners, view, node, &frame, faces, count);
+    if (self->planes.count)
+        ebpo_check_corners_contained(&self->tally, &self->planes, node,
+                                     ebpo_windings_inside(view, corners));
+    return true;
+}
+
+static bool stack_reserve(face_stack *s, uint64_t need)
+{
+    if (need <= s->capacity)
+        return true;
+    uint64_t capacity = need + need / 2 + 256;
+    uint32_t *faces = ebpo_realloc(s->faces, capacity, sizeof *faces);
+    if (faces)
+        s->faces = faces;
+    uint8_t *octants = faces ? ebpo_realloc(s->octants, capacity, 1) : NULL;
+    if (!octants)
+        return false;
+    s->octants = octants;
+    s->capacity = capacity;
+    return true;
+}
+
+/* The node's faces are [first, first + count) on the stack. */
+static ebpo_status walk_down(const walk *w, worker *self, const ebpo_twin_node *node,
+                             uint64_t first, uint64_t count, ebpo_corner_windings *corners,
+                             ebpo_error *error)
+{
+    face_stack *s = &self->stack;
+    if (node->type != EBPO_GRAY || ebpo_twin_is_pruned(w->view, node)) {
+        if (!walk_terminal(w, self, node, s->faces + first, count, corners))
+            return ebpo_workspace_fail(w->options->workspace,
+                                       self->points.count * sizeof *self->points.point, error);
+        return EBPO_OK;
+    }
+    if (!stack_reserve(s, first + 2 * count))
+        return ebpo_fail_memory(error, (first + 2 * count) * 5);
+    family f;
+    family_make(&f, &w->view->box, node);
+    ebpo_half_spaces_of(&self->planes, w->view, node);
+    visit_faces(w, self, node, &f, s->faces + first, s->octants + first, count);
+    check_worth(w, &self->tally, node, count);
+    ebpo_corner_windings children[8];
+    for (unsigned octant = 0; octant < 8; octant++) {
+        uint64_t own = 0;
+        for (uint64_t i = 0; i < count; i++)
+            if (s->octants[first + i] >> octant & 1)
+                s->faces[first + count + own++] = s->faces[first + i];
+        ebpo_twin_node child = ebpo_twin_child(w->view, node, octant);
+        ebpo_status status =
+            walk_down(w, self, &child, first + count, own, &children[octant], error);
+        if (status != EBPO_OK)
+            return status;
+    }
+    finish_gray(w, self, node, children, corners);
+    return EBPO_OK;
+}
+
+static ebpo_status shared_task(void *context, uint64_t begin, uint64_t end, unsigned number,
+                               ebpo_error *error)
+{
+    (void)error;
+    const walk *w = context;
+    worker *self = &w->workers[number];
+    family f;
+    family_make(&f, &w->view->box, &w->shared->node);
+    ebpo_half_spaces_of(&self->planes, w->view, &w->shared->node);
+    visit_faces(w, self, &w->shared->node, &f, w->shared->faces + begin, w->shared_octants + begin,
+                end - begin);
+    return EBPO_OK;
+}
+
+/* Appends a child with its share of the parent's faces. */
+static ebpo_status add_child(walk *w, uint64_t parent, unsigned octant, ebpo_error *error)
+{
+    const upper_node *from = &w->upper[parent];
+    upper_node *to = &w->upper[w->upper_count];
+    *to = (upper_node){ .node = ebpo_twin_child(w->view, &from->node, octant) };
+    for (uint64_t i = 0; i < from->face_count; i++)
+        to->face_count += w->shared_octants[i] >> octant & 1;
+    to->faces = ebpo_array_alloc(w->options->workspace, to->face_count, sizeof *to->faces);
+    if (!to->faces)
+        return ebpo_workspace_fail(w->options->workspace, to->face_count * sizeof *to->faces,
+                                   error);
+    uint64_t own = 0;
+    for (uint64_t i = 0; i < from->face_count; i++)
+        if (w->shared_octants[i] >> octant & 1)
+            to->faces[own++] = from->faces[i];
+    w->upper_count++;
+    return EBPO_OK;
+}
+
+/* Opens the upper node `at`: its faces are looked at by all threads, its children appended. */
+static ebpo_status open_node(walk *w, uint64_t at, ebpo_error *error)
+{
+    if (!ebpo_grow(&w->upper, &w->upper_capacity, w->upper_count + 8, sizeof *w->upper))
+        return ebpo_fail_memory(error, (w->upper_count + 8) * sizeof *w->upper);
+    upper_node *n = &w->upper[at];
+    w->shared = n;
+    w->shared_octants = ebpo_array_alloc(w->options->workspace, n->face_count, 1);
+    if (!w->shared_octants)
+        return ebpo_workspace_fail(w->options->workspace, n->face_count, error);
+    ebpo_status status = ebpo_parallel_for(w->threads, n->face_count, FACE_GRAIN, shared_task, w,
+                                           &w->options->progress, "verifying upper levels", error);
+    check_worth(w, &w->workers[0].tally, &n->node, n->face_count);
+    n->children = w->upper_count;
+    for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)
+        status = add_child(w, at, octant, error);
+    ebpo_array_free(w->shared_octants);
+    w->shared_octants = NULL;
+    ebpo_array_free(n->faces);
+    n->faces = NULL;
+    return status;
+}
+
+static ebpo_status add_root(walk *w, ebpo_error *error)
+{
+    uint64_t count = w->view->has_mesh ? w->view->tree->mesh.face_count : 0;
+    if (!ebpo_grow(&w->upper, &w->upper_capacity, 1, sizeof *w->upper))
+        return ebpo_fail_memory(error, sizeof *w->upper);
+    upper_node root = { .node = ebpo_twin_root(w->view),
+                        .face_count = count,
+                        .faces =
+                            ebpo_array_alloc(w->options->workspace, count, sizeof *root.faces) };
+    if (!root.faces)
+        return ebpo_workspace_fail(w->options->workspace, count * sizeof *root.faces, error);
+    for (uint64_t i = 0; i < count; ebpo_workspace_settle_at(w->options->workspace, i++))
+        root.faces[i] = (uint32_t)i;
+    w->upper[0] = root;
+    w->upper_count = 1;
+    return EBPO_OK;
+}
+
+/* Breadth-first, from the root down to nodes with few faces. */
+static ebpo_status walk_upper(walk *w, ebpo_error *error)
+{
+    ebpo_status status = add_root(w, error);
+    for (uint64_t at = 0; at < w->upper_count && status == EBPO_OK; at++)
+        if (w->upper[at].node.type == EBPO_GRAY &&
+            !ebpo_twin_is_pruned(w->view, &w->upper[at].node) &&
+            w->upper[at].face_count > w->subtree_limit)
+            status = open_node(w, at, error);
+    if (status != EBPO_OK)
+        return status;
+    w->subtrees = ebpo_alloc(w->upper_count, sizeof *w->subtrees);
+    if (!w->subtrees)
+        return ebpo_fail_memory(error, w->upper_count * sizeof *w->subtrees);
+    for (uint64_t at = 0; at < w->upper_count; at++)
+        if (w->upper[at].children == 0)
+            w->subtrees[w->subtree_count++] = at;
+    return EBPO_OK;
+}
+
+static ebpo_status subtree_task(void *context, uint64_t begin, uint64_t end, unsigned number,
+                                ebpo_error *error)
+{
+    const walk *w = context;
+    worker *self = &w->workers[number];
+    for (uint64_t i = begin; i < end; i++) {
+        upper_node *n = &w->upper[w->subtrees[i]];
+        if (!stack_reserve(&self->stack, n->face_count))
+            return ebpo_fail_memory(error, n->face_count * 5);
+        if (n->face_count)
+            memcpy(self->stack.faces, n->faces, n->face_count * sizeof *n->faces);
+        ebpo_status status = walk_down(w, self, &n->node, 0, n->face_count, &n->corners, error);
+        ebpo_array_free(n->faces);
+        n->faces = NULL;
+        if (status != EBPO_OK)
+            return status;
+    }
+    return EBPO_OK;
+}
+
+/* Children stand behind their parents, so going backwards finds them done. */
+static void finish_upper(walk *w)
+{
+    for (uint64_t at = w->upper_count; at-- > 0;) {
+        upper_node *n = &w->upper[at];
+        if (n->children == 0)
+            continue;
+        ebpo_corner_windings children[8];
+        for (unsigned octant = 0; octant < 8; octant++)
+            children[octant] = w->upper[n->children + octant].corners;
+        finish_gray(w, &w->workers[0], &n->node, children, &n->corners);
+    }
+    if (w->view->tree->info.solid)
+        ebpo_check_root_corners(&w->workers[0].tally, &w->upper[0].corners);
+}
+
+static ebpo_status prepare(walk *w, ebpo_error *error)
+{
+    w->workers = ebpo_alloc_zero(w->threads, sizeof *w->workers);
+    if (!w->workers)
+        return ebpo_fail_memory(error, w->threads * sizeof *w->workers);
+    uint64_t faces = w->view->has_mesh ? w->view->tree->mesh.face_count : 0;
+    /* each thread holds the faces on the way down: 15 B for each of a subtree */
+    uint64_t share = faces / SUBTREES_WANTED;
+    w->subtree_limit = share < SUBTREE_FACES        ? SUBTREE_FACES
+                       : share > SUBTREE_FACES_MOST ? SUBTREE_FACES_MOST
+                                                    : share;
+    /* rays need all faces */
+    w->rays = faces > 0 && w->view->tree->info.solid && !w->view->tree->info.pruned;
+    for (unsigned i = 0; i < w->threads; i++)
+        w->workers[i].points.workspace = w->options->workspace;
+    if (w->rays)
+        ebpo_label_plan_make(&w->plan, w->view, w->options->label_samples);
+    return EBPO_OK;
+}
+
+/* All workers' points become the first one's. */
+static ebpo_status follow_rays(walk *w, ebpo_error *error)
+{
+    ebpo_ray_points *all = &w->workers[0].points;
+    for (unsigned i = 1; i < w->threads; i++) {
+        ebpo_ray_points *own = &w->workers[i].points;
+        for (uint64_t k = 0; k < own->count; ebpo_workspace_settle_at(own->workspace, k++))
+            if (!ebpo_rays_add(all, &own->point[k]))
+                return ebpo_workspace_fail(all->workspace, all->count * sizeof *all->point, error);
+        ebpo_array_free(own->point);
+        *own = (ebpo_ray_points){ .workspace = all->workspace };
+    }
+    ebpo_status status = ebpo_rays_follow(all, &w->view->tree->mesh, &w->view->box, w->threads,
+                                          &w->options->progress, error);
+    if (status == EBPO_OK)
+        ebpo_check_rays(&w->workers[0].tally, all);
+    return status;
+}
+
+static void release(walk *w)
+{
+    for (unsigned i = 0; w->workers && i < w->threads; i++) {
+        free(w->workers[i].stack.faces);
+        free(w->workers[i].stack.octants);
+        ebpo_array_free(w->workers[i].points.point);
+    }
+    for (uint64_t at = 0; at < w->upper_count; at++)
+        ebpo_array_free(w->upper[at].faces);
+    free(w->workers);
+    free(w->upper);
+    free(w->subtrees);
+    ebpo_array_free(w->shared_octants);
+}
+
+ebpo_status ebpo_verify_walk(ebpo_tally *tally, const ebpo_twin_tree *view,
+                             const ebpo_verify_options *options, ebpo_error *error)
+{
+    walk w = { .view = view, .options = options, .threads = ebpo_thread_count(options->threads) };
+    ebpo_status status = prepare(&w, error);
+    if (status == EBPO_OK)
+        status = walk_upper(&w, error);
+    if (status == EBPO_OK)
+        status = ebpo_parallel_for(w.threads, w.subtree_count, 1, subtree_task, &w,
+                                   &options->progress, "verifying subtrees", error);
+    if (status == EBPO_OK && w.rays)
+        status = follow_rays(&w, error);
+    if (status == EBPO_OK) {
+        finish_upper(&w);
+        for (unsigned i = 0; i < w.threads; i++)
+            ebpo_tally_merge(tally, &w.workers[i].tally);
+    }
+    release(&w);
+    return status;
+}
