@@ -1,5 +1,5 @@
 /* The stiff and extreme cases: one line each in stiff_cases.c. test_stiff holds every case to its
- * limits, stiff_table prints what was measured (docs/stiff.md). */
+ * limits, stiff_table prints what was measured (docs/measured/stiff.md). */
 #ifndef EBPO_TESTS_STIFF_H
 #define EBPO_TESTS_STIFF_H
 

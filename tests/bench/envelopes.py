@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Makes docs/envelopes.md: each selection of planes against the limit, level by level.
+"""Makes docs/measured/envelopes.md: each selection of planes against the limit, level by level.
 
-    envelopes.py EBPO MODELS_DIR [-o docs/envelopes.md] [MODEL...]
+    envelopes.py EBPO MODELS_DIR [-o docs/measured/envelopes.md] [MODEL...]
 """
 import json
 import pathlib
@@ -69,11 +69,11 @@ def table(name, folder):
 
 document = f"""# Envelopes against the limit
 
-Made by `tests/bench/envelopes.py EBPO MODELS_DIR -o docs/envelopes.md`; nothing here was typed in but the theses' figures, which the script names.
+Made by `tests/bench/envelopes.py EBPO MODELS_DIR -o docs/measured/envelopes.md`; nothing here was typed in but the theses' figures, which the script names.
 
-The limit is the convex hull of the solid in each cell ([ebpo measure --limit](../tools/man/ebpo-measure.1), by qhull): no convex envelopes of the same cells are smaller. All files without coalescing (`--leaf-faces 0`) and with leaf planes
+The limit is the convex hull of the solid in each cell ([ebpo measure --limit](../../tools/man/ebpo-measure.1), by qhull): no convex envelopes of the same cells are smaller. All files without coalescing (`--leaf-faces 0`) and with leaf planes
 stored, so that each method's leaves are its own; each passed `ebpo verify` without a violation. `inherit` is the default, the others are the theses' ways at their 40 % (EBP-Octree), or with BP-Octree's K. Why `inherit` comes so close:
-[design.md](design.md), "Which planes". Time, error in other measures, and pictures: [report.md](report.md).
+[design.md](../develop/design.md), "Which planes". Time, error in other measures, and pictures: [report.md](../guide/report.md).
 """
 tables = ""
 with tempfile.TemporaryDirectory() as folder:

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Remakes docs/queries.md: questions to real models, beside Embree, CGAL and the figures of the two theses.
+"""Remakes docs/measured/queries.md: questions to real models, beside Embree, CGAL and the figures of the two theses.
 
-    tests/bench/query.py BUILD_DIR MODEL.ply... [--count N] [--faces-from-generator M [--base BASE.ply]] -o docs/queries.md
+    tests/bench/query.py BUILD_DIR MODEL.ply... [--count N] [--faces-from-generator M [--base BASE.ply]] -o docs/measured/queries.md
 
 BUILD_DIR: a release build configured with -Dpeers=enabled (tools/install-deps.sh --bench installs what that needs).
 Each model is converted once (kept in --work); every figure is the median of --rounds runs (a third of that above a million faces) in which the programs take turns, one thread each,
@@ -378,7 +378,7 @@ def command_line(options):
     if options.faces_from_generator:
         words += ["--faces-from-generator", str(options.faces_from_generator)]
         words += ["--base", pathlib.Path(options.base).name] if options.base else []
-    return shlex.join(words + ["-o", "docs/queries.md"])
+    return shlex.join(words + ["-o", "docs/measured/queries.md"])
 
 
 def parse():

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Remakes docs/remote-measured.md: requests, bytes and times of reading by URL, beside HDF5's ros3 driver and h5wasm.
+"""Remakes docs/measured/remote.md: requests, bytes and times of reading by URL, beside HDF5's ros3 driver and h5wasm.
 
-    tests/bench/remote.py BUILD_DIR MODEL.ebpo.h5... [--latency 0,50,200] [--rounds 3] -o docs/remote-measured.md
+    tests/bench/remote.py BUILD_DIR MODEL.ebpo.h5... [--latency 0,50,200] [--rounds 3] -o docs/measured/remote.md
 
 nginx serves the models; its log says what was asked for. For latencies a forwarder stands before it that holds back everything by half the round trip, in both directions, and each new connection by a
 whole one (the handshake). Needs nginx, chromium, python3-h5py, npm (h5wasm is installed below BUILD_DIR) and `sh tools/install-deps.sh --tests`.
@@ -195,7 +195,7 @@ def main():
     try:
         readers = Readers(o.build.resolve(), f"http://127.0.0.1:{server.port}", work)
         nginx = re.search(r"nginx/\S+", subprocess.run(["nginx", "-v"], capture_output=True, text=True).stderr)[0]
-        command = shlex.join(["tests/bench/remote.py", "BUILD_DIR"] + [m.name for m in o.models] + ["--latency", o.latency, "--rounds", str(o.rounds), "-o", "docs/remote-measured.md"])
+        command = shlex.join(["tests/bench/remote.py", "BUILD_DIR"] + [m.name for m in o.models] + ["--latency", o.latency, "--rounds", str(o.rounds), "-o", "docs/measured/remote.md"])
         page = ["# Files on web servers: measured", "", f"Made by `{command}`; {nginx}, h5wasm {version} with its zstd plugin, HDF5's ros3 driver through Debian's h5py with our plugin, all on one machine.", ""]
         requests_table(page, server, readers, o.models)
         latency_table(page, server, readers, o.models[-1], [int(x) for x in o.latency.split(",")], o.rounds)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Remakes docs/scale.md: generated scan-like models of growing size, built, verified, decoded, opened and asked within a budget of memory, beside Embree and CGAL.
+"""Remakes docs/measured/scale.md: generated scan-like models of growing size, built, verified, decoded, opened and asked within a budget of memory, beside Embree and CGAL.
 
-    tests/bench/scale.py BUILD_DIR [--sizes 0.1,1,8,28] [--memory 1G] [--rounds N] -o docs/scale.md [--json FILE]
+    tests/bench/scale.py BUILD_DIR [--sizes 0.1,1,8,28] [--memory 1G] [--rounds N] -o docs/measured/scale.md [--json FILE]
 
 BUILD_DIR: a release build configured with -Dtests=enabled -Dpeers=enabled (tools/install-deps.sh --tests --bench installs what that needs). Models are made by ebpo-generate and kept in --work (28 million
 faces: 1 GB with all that is made of it, and as much for temporary files meanwhile). Run it on a machine that does nothing else; figures are medians of the rounds, in which the programs take turns.
@@ -159,7 +159,7 @@ def growth(results):
 # ---- the page ----
 
 def section_models(page, results):
-    page.text("## Models", "", "Closed manifolds; that they meet themselves nowhere is proved for each before it is written ([how](../samples/generate/embedded.h)). *Plain PLY*: 12 B a vertex and 13 B a "
+    page.text("## Models", "", "Closed manifolds; that they meet themselves nowhere is proved for each before it is written ([how](../../samples/generate/embedded.h)). *Plain PLY*: 12 B a vertex and 13 B a "
               "face, binary, without its head of some 200 B.")
     page.table(["model", "faces", "vertices", "plain PLY MiB", "genus", "made by"],
                [[f"{r['millions']:g} M", f"{faces_of(r):,}", f"{r['sizes']['info']['vertices']:,}", mib(r["sizes"]["plain_ply"]), r["sizes"]["info"]["report"]["genus"], f"`{shlex.join(r['command'])}`"]
@@ -315,7 +315,7 @@ def section_goals(page, scale, results):
 def command_line(options):
     words = ["tests/bench/scale.py", "BUILD_DIR", "--sizes", options.sizes, "--memory", options.memory, "--rounds", str(options.rounds)]
     words += ["--base", options.base] if options.base != "torus" else []
-    return shlex.join(words + ["-o", "docs/scale.md"])
+    return shlex.join(words + ["-o", "docs/measured/scale.md"])
 
 
 def write(scale, results):

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Remakes docs/tables.md: sizes, levels and build rates of real models, beside the figures of the two theses.
+"""Remakes docs/measured/tables.md: sizes, levels and build rates of real models, beside the figures of the two theses.
 
-    tests/bench/tables.py EBPO MODELS_DIR [LARGE.ply] > docs/tables.md
+    tests/bench/tables.py EBPO MODELS_DIR [LARGE.ply] > docs/measured/tables.md
 
 EBPO: the tool; MODELS_DIR: a folder of PLY files with the names used below; LARGE.ply: a generated model of several million faces.
 Sizes and volumes are the same on every machine; seconds are not.
@@ -118,7 +118,7 @@ def peak_memory(*command):
 
 
 def main():
-    print("# Tables\n\nMade by `tests/bench/tables.py EBPO MODELS_DIR LARGE.ply > docs/tables.md` (a5: `ebpo-generate --base armadillo.ply --subdivide 3 a5.ply`); nothing here was typed in by hand but the "
+    print("# Tables\n\nMade by `tests/bench/tables.py EBPO MODELS_DIR LARGE.ply > docs/measured/tables.md` (a5: `ebpo-generate --base armadillo.ply --subdivide 3 a5.ply`); nothing here was typed in by hand but the "
           "two theses' and the prototype's figures, which the script names.\n")
     with tempfile.TemporaryDirectory() as folder:
         size_table(folder)

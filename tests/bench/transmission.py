@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Remakes docs/transmission.md: bytes to fetch until a level is good enough, against the compressed PLY whole, and beside the BP-Octree thesis.
+"""Remakes docs/measured/transmission.md: bytes to fetch until a level is good enough, against the compressed PLY whole, and beside the BP-Octree thesis.
 
-    /usr/bin/python3 tests/bench/transmission.py BUILD_DIR MODEL.ply... -o docs/transmission.md
+    /usr/bin/python3 tests/bench/transmission.py BUILD_DIR MODEL.ply... -o docs/measured/transmission.md
 
 Needs h5py and the zstd command. No figure depends on the machine.
 """

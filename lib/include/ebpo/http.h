@@ -11,7 +11,7 @@
  * first 128 KiB, which mostly bring levels 0 to 4 too. What is read later is announced by the
  * reader and fetched in requests of up to 4 MiB, several at once. Every answer is checked: its
  * range, its size, and that it is of the version that was opened (ETag, else Last-Modified, and
- * size). docs/remote.md. A library built without libcurl answers EBPO_E_UNSUPPORTED.
+ * size). docs/guide/remote.md. A library built without libcurl answers EBPO_E_UNSUPPORTED.
  */
 #ifndef EBPO_HTTP_H
 #define EBPO_HTTP_H
