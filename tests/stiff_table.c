@@ -1,4 +1,5 @@
-/* Prints docs/measured/stiff.md: what was measured of each stiff case, beside a tame model of as many faces.
+/* Prints docs/measured/stiff.md: what was measured of each stiff case, beside a tame model of as
+ * many faces.
  *
  *     stiff_table [TEXT] > docs/measured/stiff.md        TEXT: only the cases whose name holds it
  */
@@ -132,7 +133,8 @@ static void row(const stiff_case *c, bool *fine)
 
 static const char introduction[] =
     "# Stiff and extreme cases\n\n"
-    "Made by `ninja -C build tests/stiff_table && build/tests/stiff_table > docs/measured/stiff.md`; "
+    "Made by `ninja -C build tests/stiff_table && build/tests/stiff_table > "
+    "docs/measured/stiff.md`; "
     "nothing here was typed in. The cases are one line each in `tests/stiff_cases.c`; `meson test "
     "stiff` holds\n"
     "every one to its limits. A new case is a new line there.\n\n"
