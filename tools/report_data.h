@@ -6,9 +6,9 @@
 #include <ebpo/ebpo.h>
 #include <math.h>
 
-#include "args.h"
-#include "progress.h"
-#include "remote.h"
+#include "cli/args.h"
+#include "cli/progress.h"
+#include "cli/remote_args.h"
 
 enum {
     METHODS_MAX = ARGS_OPERANDS_MAX,

@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "bench_run.h"
+#include "bench/bench_run.h"
 #include "report_data.h"
 
 typedef struct timing {

@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "facts.h"
+#include "cli/file_facts.h"
 #include "report_data.h"
 
 static void from_head(const comparison *c, method *m)

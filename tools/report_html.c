@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "report_page.h"
-#include "words.h"
+#include "cli/words.h"
 
 void page_section(FILE *out, const char *id, const char *title, const char *text)
 {

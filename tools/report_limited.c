@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "bench_run.h"
-#include "bench_walk.h"
+#include "bench/bench_run.h"
+#include "bench/bench_walk.h"
 #include "report_data.h"
 
 static ebpo_status no_memory(ebpo_error *error)

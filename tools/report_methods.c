@@ -3,12 +3,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "command.h"
-#include "prepare.h"
-#include "report.h"
+#include "cli/command.h"
+#include "cli/prepare.h"
+#include "cli/mesh_findings.h"
 #include "report_data.h"
-#include "selection.h"
-#include "words.h"
+#include "cli/selection_args.h"
+#include "cli/words.h"
 
 static int told(const char *message, const char *what)
 {
@@ -113,7 +113,7 @@ static ebpo_status build_one(comparison *c, const char *mesh, int selection, con
     if (c->count == 0) {
         if (c->progress.user)
             progress_wipe(c->progress.user);
-        report_warn(stderr, "report", mesh, &p.report, &p.record);
+        findings_warn(stderr, "report", mesh, &p.report, &p.record);
     }
     build_options(c, selection, &build);
     status = selection_k_root(c->v->k_root, p.mesh.face_count, &build.k_root, error);

@@ -3,7 +3,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "bench_run.h"
+#include "bench/bench_run.h"
 #include "report_data.h"
 
 static const double errors[] = { 10, 3, 1, 0.3 }; /* percent of the diagonal */

@@ -8,8 +8,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "command.h"
-#include "signals.h"
+#include "cli/command.h"
+#include "cli/signals.h"
 
 static char being_made[4096]; /* for the signal handler */
 

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "words.h"
+#include "cli/words.h"
 
 enum { WIDTH = 560, HEIGHT = 350, LEFT = 62, RIGHT = 92, TOP = 34, BOTTOM = 46, LABEL_GAP = 14 };
 

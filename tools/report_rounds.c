@@ -2,7 +2,7 @@
  * level, questions with a deadline. */
 #include <stdio.h>
 
-#include "bench_run.h"
+#include "bench/bench_run.h"
 #include "report_data.h"
 
 /* --- having a level --- */

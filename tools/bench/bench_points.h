@@ -1,0 +1,28 @@
+/* What the benchmark asks about. */
+#ifndef EBPO_TOOLS_BENCH_POINTS_H
+#define EBPO_TOOLS_BENCH_POINTS_H
+
+#include <ebpo/file.h>
+
+#include "cli/points.h"
+#include "cli/remote_args.h"
+
+typedef struct bench_points {
+    points_kind kind;
+    double *rows; /* [count][points_width(kind)] */
+    uint64_t count;
+} bench_points;
+
+/* `what`: "uniform" (in the mesh's bounding box; rays with directions uniform over the sphere),
+ * "path" (along the surface; points only), or a file, of which at most `count` are taken (0: all;
+ * 100,000 of the others). Returns an exit code; what is wrong is said on stderr. bench_points_free
+ * in any case. */
+int bench_points_make(bench_points *out, points_kind kind, const char *model,
+                      const remote_values *remote, const char *what, bool raw, uint64_t count,
+                      uint64_t seed);
+void bench_points_free(bench_points *p);
+
+/* As little-endian doubles, 3 or 6 for each. */
+int bench_points_save(const bench_points *p, const char *path);
+
+#endif

@@ -1,0 +1,270 @@
+#include "cli/args.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const arg_option help_option = { "help", 'h', ARG_FLAG, 0, NULL, "print this and end",
+                                        0,      0,   NULL };
+
+__attribute__((format(printf, 2, 3))) static arg_result wrong(const arg_spec *spec,
+                                                              const char *format, ...)
+{
+    va_list list;
+    va_start(list, format);
+    fprintf(stderr, "ebpo %s: ", spec->command);
+    vfprintf(stderr, format, list);
+    fprintf(stderr, "; try 'ebpo %s --help'\n", spec->command);
+    va_end(list);
+    return ARGS_WRONG;
+}
+
+/* --- values --- */
+
+static arg_result set_int(const arg_spec *spec, const arg_option *o, const char *text, int64_t *out)
+{
+    char *end;
+    errno = 0;
+    long long v = strtoll(text, &end, 10);
+    if (end == text || *end || errno || (double)v < o->low || (double)v > o->high)
+        return wrong(spec, "--%s: '%s' is not a whole number from %.0f to %.0f", o->name, text,
+                     o->low, o->high);
+    *out = v;
+    return ARGS_RUN;
+}
+
+static arg_result set_real(const arg_spec *spec, const arg_option *o, const char *text, double *out)
+{
+    char *end;
+    double v = strtod(text, &end);
+    if (end == text || *end || !isfinite(v) || v < o->low || v > o->high)
+        return wrong(spec, "--%s: '%s' is not a number from %g to %g", o->name, text, o->low,
+                     o->high);
+    *out = v;
+    return ARGS_RUN;
+}
+
+static void join_words(const char *const *words, char *out, size_t room)
+{
+    size_t used = 0;
+    out[0] = 0;
+    for (int i = 0; words[i] && used < room; i++)
+        used += (size_t)snprintf(out + used, room - used, "%s%s", i ? ", " : "", words[i]);
+}
+
+static arg_result find_word(const arg_spec *spec, const arg_option *o, const char *text,
+                            size_t length, int *out)
+{
+    for (int i = 0; o->words[i]; i++)
+        if (strlen(o->words[i]) == length && memcmp(o->words[i], text, length) == 0) {
+            *out = i;
+            return ARGS_RUN;
+        }
+    char all[200];
+    join_words(o->words, all, sizeof all);
+    return wrong(spec, "--%s: '%.*s' is none of: %s", o->name, (int)length, text, all);
+}
+
+static arg_result set_bits(const arg_spec *spec, const arg_option *o, const char *text,
+                           uint32_t *out)
+{
+    for (const char *at = text;; at++) {
+        size_t length = strcspn(at, ",");
+        int word = 0;
+        arg_result result = find_word(spec, o, at, length, &word);
+        if (result != ARGS_RUN)
+            return result;
+        *out |= 1u << word;
+        at += length;
+        if (!*at)
+            return ARGS_RUN;
+    }
+}
+
+static arg_result add_to_list(const arg_spec *spec, const arg_option *o, const char *text,
+                              arg_list *out)
+{
+    if (out->count == ARG_LIST_MAX)
+        return wrong(spec, "--%s: is given more than %d times", o->name, ARG_LIST_MAX);
+    out->item[out->count++] = text;
+    return ARGS_RUN;
+}
+
+static arg_result set_value(const arg_spec *spec, const arg_option *o, const char *text,
+                            void *values)
+{
+    void *field = (char *)values + o->offset;
+    switch (o->kind) {
+    case ARG_FLAG: *(bool *)field = true; return ARGS_RUN;
+    case ARG_INT: return set_int(spec, o, text, field);
+    case ARG_REAL: return set_real(spec, o, text, field);
+    case ARG_WORD: return find_word(spec, o, text, strlen(text), field);
+    case ARG_SET: return set_bits(spec, o, text, field);
+    case ARG_LIST:
+    case ARG_TEXT: break;
+    }
+    if (!*text)
+        return wrong(spec, "--%s: the value is empty", o->name);
+    if (o->kind == ARG_LIST)
+        return add_to_list(spec, o, text, field);
+    *(const char **)field = text;
+    return ARGS_RUN;
+}
+
+/* --- finding options --- */
+
+static const arg_option *find_long(const arg_spec *spec, const char *name, size_t length)
+{
+    for (const arg_option *o = spec->options; o->name; o++)
+        if (strlen(o->name) == length && memcmp(o->name, name, length) == 0)
+            return o;
+    return length == 4 && memcmp(name, "help", 4) == 0 ? &help_option : NULL;
+}
+
+static const arg_option *find_letter(const arg_spec *spec, char letter)
+{
+    for (const arg_option *o = spec->options; o->name; o++)
+        if (o->letter == letter)
+            return o;
+    return letter == 'h' ? &help_option : NULL;
+}
+
+/* An option that shares a beginning of at least three letters, for "did you mean". */
+static const char *resembling(const arg_spec *spec, const char *name)
+{
+    const char *best = NULL;
+    size_t best_length = 2;
+    for (const arg_option *o = spec->options; o->name; o++) {
+        size_t same = 0;
+        while (name[same] && name[same] == o->name[same])
+            same++;
+        if (same > best_length) {
+            best = o->name;
+            best_length = same;
+        }
+    }
+    return best;
+}
+
+static arg_result unknown(const arg_spec *spec, const char *shown, const char *name)
+{
+    const char *near = resembling(spec, name);
+    if (near)
+        return wrong(spec, "unknown option '%s'; did you mean '--%s'?", shown, near);
+    return wrong(spec, "unknown option '%s'", shown);
+}
+
+/* --- parsing --- */
+
+typedef struct parser {
+    const arg_spec *spec;
+    int argc, at; /* at: the argument under the cursor */
+    char **argv;
+    void *values;
+} parser;
+
+static arg_result take(parser *p, const arg_option *o, const char *joined)
+{
+    if (o == &help_option) {
+        args_help(p->spec);
+        return ARGS_HELPED;
+    }
+    if (o->kind == ARG_FLAG)
+        return joined ? wrong(p->spec, "--%s takes no value", o->name)
+                      : set_value(p->spec, o, NULL, p->values);
+    if (!joined && p->at + 1 < p->argc)
+        joined = p->argv[++p->at];
+    if (!joined)
+        return wrong(p->spec, "--%s needs a value, %s", o->name, o->value);
+    return set_value(p->spec, o, joined, p->values);
+}
+
+static arg_result take_long(parser *p)
+{
+    const char *shown = p->argv[p->at], *name = shown + 2;
+    size_t length = strcspn(name, "=");
+    const arg_option *o = find_long(p->spec, name, length);
+    if (!o)
+        return unknown(p->spec, shown, name);
+    return take(p, o, name[length] ? name + length + 1 : NULL);
+}
+
+/* -qh is -q -h; the rest after a letter with a value is the value. */
+static arg_result take_letters(parser *p)
+{
+    const char *shown = p->argv[p->at];
+    for (const char *c = shown + 1; *c; c++) {
+        const arg_option *o = find_letter(p->spec, *c);
+        if (!o)
+            return unknown(p->spec, shown, c);
+        bool rest = o->kind != ARG_FLAG && c[1];
+        arg_result result = take(p, o, rest ? c + 1 : NULL);
+        if (result != ARGS_RUN || rest)
+            return result;
+    }
+    return ARGS_RUN;
+}
+
+arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values,
+                      const char *operands[ARGS_OPERANDS_MAX])
+{
+    parser p = { spec, argc, 1, argv, values };
+    int count = 0;
+    bool options = true;
+    memset(operands, 0, ARGS_OPERANDS_MAX * sizeof *operands);
+    for (; p.at < argc; p.at++) {
+        const char *a = argv[p.at];
+        arg_result result = ARGS_RUN;
+        if (options && strcmp(a, "--") == 0)
+            options = false;
+        else if (options && a[0] == '-' && a[1] == '-')
+            result = take_long(&p);
+        else if (options && a[0] == '-' && a[1])
+            result = take_letters(&p);
+        else if (count == spec->most)
+            result = wrong(spec, "'%s' is one operand too many; expected: %s", a, spec->operands);
+        else
+            operands[count++] = a;
+        if (result != ARGS_RUN)
+            return result;
+    }
+    if (count < spec->least)
+        return wrong(spec, "%s; expected: %s",
+                     count ? "an operand is missing" : "operands are missing", spec->operands);
+    return ARGS_RUN;
+}
+
+/* --- help --- */
+
+static void help_one(const arg_option *o)
+{
+    char head[80];
+    int length = o->letter ? snprintf(head, sizeof head, "-%c, --%s", o->letter, o->name)
+                           : snprintf(head, sizeof head, "--%s", o->name);
+    if (o->value)
+        snprintf(head + length, sizeof head - (size_t)length, " %s", o->value);
+    const char *at = o->help;
+    printf("  %-22s", head);
+    for (bool first = strlen(head) <= 21;; first = true) {
+        size_t line = strcspn(at, "\n");
+        printf("%s %.*s\n", first ? "" : "\n                        ", (int)line, at);
+        if (!at[line])
+            return;
+        at += line + 1;
+        printf("%24s", "");
+    }
+}
+
+void args_help(const arg_spec *spec)
+{
+    printf("usage: ebpo %s [options] %s\n\n%s\n", spec->command, spec->operands, spec->summary);
+    if (spec->text)
+        printf("%s\n", spec->text);
+    printf("\noptions:\n");
+    for (const arg_option *o = spec->options; o->name; o++)
+        help_one(o);
+    help_one(&help_option);
+}

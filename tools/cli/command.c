@@ -1,0 +1,72 @@
+#include "cli/command.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+
+int command_failed(const char *name, const ebpo_error *error)
+{
+    fprintf(stderr, "ebpo %s: %s\n", name,
+            error->message[0] ? error->message : ebpo_status_name(error->status));
+    if (error->status == EBPO_E_ARGUMENT)
+        return EXIT_USAGE;
+    return error->status == EBPO_E_NOT_SOLID ? EXIT_NOT_SOLID : EXIT_FAILED;
+}
+
+bool command_same_file(const char *a, const char *b)
+{
+    struct stat sa, sb;
+    return !ebpo_is_url(a) && stat(a, &sa) == 0 && stat(b, &sb) == 0 && sa.st_dev == sb.st_dev &&
+           sa.st_ino == sb.st_ino;
+}
+
+int command_is_hdf5(const char *name, const char *path)
+{
+    if (ebpo_is_url(path))
+        return 1; /* opening it will tell */
+    static const char signature[8] = "\211HDF\r\n\032\n";
+    char head[8] = "";
+    struct stat st;
+    FILE *f =
+        stat(path, &st) == 0 && S_ISDIR(st.st_mode) ? (errno = EISDIR, NULL) : fopen(path, "rb");
+    if (!f) {
+        fprintf(stderr, "ebpo %s: %s: cannot be opened: %s\n", name, path, strerror(errno));
+        return -1;
+    }
+    size_t got = fread(head, 1, sizeof head, f);
+    fclose(f);
+    return got == sizeof head && memcmp(head, signature, sizeof head) == 0;
+}
+
+bool command_wants_hdf5(const char *name, const char *path)
+{
+    int is_hdf5 = command_is_hdf5(name, path);
+    if (is_hdf5 == 0)
+        fprintf(stderr,
+                "ebpo %s: %s: is not an .ebpo.h5 file; make one of a mesh with 'ebpo convert'\n",
+                name, path);
+    return is_hdf5 > 0;
+}
+
+bool command_has_level(const char *name, const ebpo_info *info, int64_t level)
+{
+    if (level < info->level_count)
+        return true;
+    fprintf(stderr, "ebpo %s: there is no level %d; this file has levels 0 to %d\n", name,
+            (int)level, info->level_count - 1);
+    return false;
+}
+
+bool command_flush(const char *name)
+{
+    static bool said;
+    errno = 0;
+    if (fflush(stdout) == 0 && !ferror(stdout))
+        return true;
+    if (!said)
+        fprintf(stderr, "ebpo%s%s: standard output: %s\n", name ? " " : "", name ? name : "",
+                errno ? strerror(errno) : "could not be written");
+    said = true;
+    return false;
+}

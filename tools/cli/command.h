@@ -1,0 +1,31 @@
+/* What the commands share. */
+#ifndef EBPO_TOOLS_COMMAND_H
+#define EBPO_TOOLS_COMMAND_H
+
+#include <ebpo/ebpo.h>
+
+enum { EXIT_FINE = 0, EXIT_FAILED = 1, EXIT_USAGE = 2, EXIT_NOT_SOLID = 3 };
+
+/* Prints "ebpo convert: message" and returns the exit code that the status stands for. */
+int command_failed(const char *name, const ebpo_error *error);
+
+/* True when both paths lead to one existing file. */
+bool command_same_file(const char *a, const char *b);
+
+/* 1: the file begins as an HDF5 file does, or is a URL, 0: it does not, -1: it cannot be read (said
+ * on stderr). */
+int command_is_hdf5(const char *name, const char *path);
+
+/* False, said on stderr (exit with EXIT_FAILED): the file cannot be read, or is something else than
+ * HDF5. */
+bool command_wants_hdf5(const char *name, const char *path);
+
+/* False, said on stderr (exit with EXIT_USAGE): the file has no such level. Negative: none was
+ * given. */
+bool command_has_level(const char *name, const ebpo_info *info, int64_t level);
+
+/* What was printed counts only once it has arrived: a full disk shows here. False: it has not,
+ * which is said on stderr, once (exit with EXIT_FAILED). `name` NULL: no command's. */
+bool command_flush(const char *name);
+
+#endif

@@ -1,0 +1,337 @@
+#include "cli/file_facts.h"
+
+#include <math.h>
+#include <string.h>
+
+#include <ebpo/build.h>
+#include <ebpo/lod.h>
+
+#include "cli/mesh_findings.h"
+#include "cli/words.h"
+
+static double cell_volume(const ebpo_info *info, int level)
+{
+    return info->box_size[0] * info->box_size[1] * info->box_size[2] * ldexp(1, -3 * level);
+}
+
+double facts_volume(const ebpo_info *info, int level)
+{
+    double sum = info->level[level].gray_volume;
+    for (int i = 0; i <= level; i++)
+        sum +=
+            info->level[i].leaf_volume + (double)info->level[i].black_count * cell_volume(info, i);
+    return sum;
+}
+
+ebpo_status facts_derived(ebpo_file *file, int level, unsigned threads, ebpo_progress progress,
+                          double *volume, ebpo_error *error)
+{
+    ebpo_lod_options options = EBPO_LOD_OPTIONS_INIT;
+    options.threads = threads;
+    options.progress = progress;
+    return ebpo_lod_level(file, level, &options, NULL, volume, error);
+}
+
+double facts_share(const ebpo_info *info, double volume)
+{
+    double whole = info->solid ? fabs(info->report.volume) : cell_volume(info, 0);
+    double percent = 100 * volume / whole;
+    return isnan(percent) ? NAN : percent; /* without a sign that means nothing */
+}
+
+double facts_percent(const ebpo_info *info, int level)
+{
+    return facts_share(info, facts_volume(info, level));
+}
+
+double facts_excess(const ebpo_info *info, double volume)
+{
+    double solid = fabs(info->report.volume); /* negative: turned inside out */
+    return info->solid && solid > 0 ? 100 * (volume - solid) / solid : NAN;
+}
+
+double facts_excess_ratio(const ebpo_info *info, double volume, double limit)
+{
+    double least = facts_excess(info, limit);
+    /* 1e-9 of the volume: what rounding may do to it */
+    return least > 1e-7 ? facts_excess(info, volume) / least : NAN;
+}
+
+uint64_t facts_cumulative(const ebpo_info *info, int level)
+{
+    uint64_t sum = info->head_bytes;
+    for (int i = 0; i <= level; i++)
+        sum += info->level[i].stored_bytes;
+    return sum + (level >= info->index_level ? info->chunk_index_bytes : 0);
+}
+
+/* --- words --- */
+
+static void print_source(FILE *out, const ebpo_info *info)
+{
+    char bytes[32], hex[65];
+    words_hex(info->source_sha256, hex);
+    fprintf(out, "  source    %s", info->source_name[0] ? info->source_name : "(no file)");
+    if (info->source_format[0])
+        fprintf(out, ", %s, %s\n            SHA-256 %s", info->source_format,
+                words_bytes(bytes, sizeof bytes, info->source_size), hex);
+    fprintf(out, "\n            %llu vertices, %llu triangles\n",
+            (unsigned long long)info->source_vertex_count,
+            (unsigned long long)info->source_face_count);
+}
+
+static void print_model(FILE *out, const ebpo_info *info)
+{
+    fprintf(out, "  mesh      %llu vertices, %llu faces, %s coordinates",
+            (unsigned long long)info->vertex_count, (unsigned long long)info->face_count,
+            info->double_coordinates ? "double" : "float");
+    if (!(info->parts & EBPO_PART_MESH))
+        fputs(" (not in this file)", out);
+    if (info->solid)
+        fprintf(out, "\n  solid     volume %.6g, by winding number, rule %s", info->report.volume,
+                words_rule(info->rule));
+    fprintf(out, "\n  box       %.6g %.6g %.6g, size %.6g %.6g %.6g%s%s\n", info->box_origin[0],
+            info->box_origin[1], info->box_origin[2], info->box_size[0], info->box_size[1],
+            info->box_size[2], info->unit[0] ? " " : "", info->unit);
+    if (info->crs[0])
+        fprintf(out, "  crs       %s\n", info->crs);
+    if (info->date[0])
+        fprintf(out, "  date      %s\n", info->date);
+    fprintf(out, "  built by  %s: maximum level %d, leaf faces %u, ", info->generator,
+            info->max_level, info->leaf_faces);
+    if (info->selection == EBPO_SELECT_INHERIT)
+        fprintf(out, "epsilon %g\n", info->epsilon);
+    else if (info->selection < 0)
+        fputs("planes chosen in a way that this version does not know\n", out);
+    else if (info->k_root > 0)
+        fprintf(out, "selection %s, K %.10g at the root\n", selection_words[info->selection],
+                info->k_root);
+    else
+        fprintf(out, "selection %s, %.10g %%\n", selection_words[info->selection], info->percent);
+}
+
+uint64_t facts_white(const ebpo_info *info, int level)
+{
+    return info->level[level].white_count - (level ? 8 * info->level[level - 1].pruned_count : 0);
+}
+
+static uint64_t pruned_nodes(const ebpo_info *info)
+{
+    uint64_t sum = 0;
+    for (int i = 0; i < info->level_count; i++)
+        sum += info->level[i].pruned_count;
+    return sum;
+}
+
+static void print_subset(FILE *out, const ebpo_info *info)
+{
+    const double *b = info->kept_box;
+    char hex[65];
+    words_hex(info->subset_of, hex);
+    fputs("  subset   ", out);
+    if (info->cut_levels)
+        fprintf(out, " levels 0 to %d", info->cut_levels - 1);
+    if (info->boxed)
+        fprintf(out, "%s what meets %.9g,%.9g,%.9g,%.9g,%.9g,%.9g", info->cut_levels ? "," : "",
+                b[0], b[1], b[2], b[3], b[4], b[5]);
+    if (info->kept_error > 0)
+        fprintf(out, "%s pruned where envelopes reach at most %.9g beyond the model",
+                info->cut_levels || info->boxed ? "," : "", info->kept_error);
+    fprintf(out, "; nothing below %llu pruned nodes\n            of the file with content %s\n",
+            (unsigned long long)pruned_nodes(info), hex);
+}
+
+static uint64_t level_bytes(const ebpo_info *info)
+{
+    uint64_t sum = 0;
+    for (int i = 0; i < info->level_count; i++)
+        sum += info->level[i].stored_bytes;
+    return sum;
+}
+
+/* What the file holds besides: nothing, unless another program wrote it. */
+static uint64_t other_bytes(const ebpo_info *info)
+{
+    uint64_t sum = info->head_bytes + info->chunk_index_bytes + level_bytes(info) +
+                   info->mesh_vertex_bytes + info->mesh_face_bytes + info->map_bytes;
+    return info->file_bytes > sum ? info->file_bytes - sum : 0;
+}
+
+static void print_bytes(FILE *out, const char *label, const ebpo_info *info, uint64_t bytes)
+{
+    char text[32];
+    if (bytes == 0)
+        return;
+    fprintf(out, "            %-9s %9s %6.1f %%", label, words_bytes(text, sizeof text, bytes),
+            info->file_bytes ? 100 * (double)bytes / (double)info->file_bytes : 0);
+    if (info->face_count)
+        fprintf(out, " %8.3f B/face", (double)bytes / (double)info->face_count);
+    fputc('\n', out);
+}
+
+void facts_print(FILE *out, const char *path, const ebpo_info *info)
+{
+    char bytes[32], parts[64], version[32];
+    fprintf(out, "%s: EBP-Octree %s, %s, levels 0 to %d, %s\n", path,
+            words_format(version, sizeof version, info->version_major, info->version_minor),
+            info->solid ? "a solid" : "a surface", info->level_count - 1,
+            words_bytes(bytes, sizeof bytes, info->file_bytes));
+    print_source(out, info);
+    if (info->pruned)
+        print_subset(out, info);
+    findings_print_mending(out, &info->mend);
+    print_model(out, info);
+    fprintf(out, "  holds     %s; codec %s\n", words_parts(parts, sizeof parts, info->parts),
+            words_codec(info->codec));
+    print_bytes(out, "head", info, info->head_bytes);
+    print_bytes(out, "index", info, info->chunk_index_bytes);
+    print_bytes(out, "levels", info, level_bytes(info));
+    print_bytes(out, "vertices", info, info->mesh_vertex_bytes);
+    print_bytes(out, "faces", info, info->mesh_face_bytes);
+    print_bytes(out, "maps", info, info->map_bytes);
+    print_bytes(out, "other", info, other_bytes(info));
+    print_bytes(out, "file", info, info->file_bytes);
+}
+
+void facts_table(FILE *out, const ebpo_info *info)
+{
+    fprintf(out, "%5s %9s %9s %9s %9s %9s %10s %12s %9s %10s %9s\n", "level", "gray", "leaf",
+            "white", "black", "planes", "faces new", "faces again", "stored", "cumulative",
+            info->solid ? "% solid" : "% box");
+    for (int i = 0; i < info->level_count; i++) {
+        const ebpo_level_summary *l = &info->level[i];
+        char stored[32], sum[32];
+        fprintf(out, "%5d %9llu %9llu %9llu %9llu %9llu %10llu %12llu %9s %10s %9.2f\n", i,
+                (unsigned long long)l->gray_count, (unsigned long long)l->leaf_count,
+                (unsigned long long)facts_white(info, i), (unsigned long long)l->black_count,
+                (unsigned long long)(l->plane_count + l->leaf_plane_count),
+                (unsigned long long)l->new_count, (unsigned long long)l->ref_count,
+                words_bytes(stored, sizeof stored, l->stored_bytes),
+                words_bytes(sum, sizeof sum, facts_cumulative(info, i)), facts_percent(info, i));
+    }
+}
+
+/* --- JSON --- */
+
+static void json_level(json *j, const ebpo_info *info, int number)
+{
+    const ebpo_level_summary *l = &info->level[number];
+    json_object(j, NULL);
+    json_int(j, "level", number);
+    json_uint(j, "gray", l->gray_count);
+    json_uint(j, "leaf", l->leaf_count);
+    if (info->pruned)
+        json_uint(j, "pruned", l->pruned_count);
+    json_uint(j, "white", facts_white(info, number));
+    json_uint(j, "black", l->black_count);
+    json_uint(j, "planes", l->plane_count);
+    json_uint(j, "leaf_planes", l->leaf_plane_count);
+    json_uint(j, "faces_new", l->new_count);
+    json_uint(j, "faces_again", l->ref_count);
+    json_uint(j, "stored_bytes", l->stored_bytes);
+    json_uint(j, "cumulative_bytes", facts_cumulative(info, number));
+    json_real(j, "gray_volume", l->gray_volume);
+    json_real(j, "leaf_volume", l->leaf_volume);
+    json_real(j, "envelope_volume", facts_volume(info, number));
+    json_real(j, info->solid ? "percent_of_solid" : "percent_of_box", facts_percent(info, number));
+    json_end(j);
+}
+
+static void json_source(json *j, const ebpo_info *info)
+{
+    char hex[65];
+    words_hex(info->source_sha256, hex);
+    json_object(j, "source");
+    json_text(j, "name", info->source_name);
+    json_text(j, "format", info->source_format);
+    json_uint(j, "bytes", info->source_size);
+    json_text(j, "sha256", hex);
+    json_uint(j, "vertices", info->source_vertex_count);
+    json_uint(j, "faces", info->source_face_count);
+    json_end(j);
+}
+
+static void json_model(json *j, const ebpo_info *info)
+{
+    json_text(j, "kind", info->solid ? "solid" : "surface");
+    json_text(j, "rule", words_rule(info->rule));
+    json_uint(j, "vertices", info->vertex_count);
+    json_uint(j, "faces", info->face_count);
+    json_bool(j, "double_coordinates", info->double_coordinates);
+    json_text(j, "unit", info->unit);
+    json_text(j, "crs", info->crs);
+    json_text(j, "date", info->date);
+    json_reals(j, "box_origin", info->box_origin, 3);
+    json_reals(j, "box_size", info->box_size, 3);
+    json_int(j, "grid_level", info->grid_level);
+    json_int(j, "max_level", info->max_level);
+    json_uint(j, "leaf_faces", info->leaf_faces);
+    json_real(j, "epsilon", info->epsilon);
+    json_text(j, "selection", info->selection < 0 ? "unknown" : selection_words[info->selection]);
+    if (info->selection <= EBPO_SELECT_INHERIT)
+        return;
+    json_real(j, "percent", info->percent);
+    json_real(j, "k_root", info->k_root);
+    json_text(j, "normals", info->normals < 0 ? "unknown" : normals_words[info->normals]);
+    json_uint(j, "seed", info->seed);
+}
+
+static void json_subset(json *j, const ebpo_info *info)
+{
+    char hex[65];
+    if (!info->pruned)
+        return;
+    words_hex(info->subset_of, hex);
+    json_object(j, "subset");
+    json_text(j, "of_content_sha256", hex);
+    if (info->cut_levels)
+        json_int(j, "last_level", info->cut_levels - 1);
+    if (info->boxed)
+        json_reals(j, "box", info->kept_box, 6);
+    if (info->kept_error > 0)
+        json_real(j, "max_error", info->kept_error);
+    json_uint(j, "pruned_nodes", pruned_nodes(info));
+    json_end(j);
+}
+
+static void json_storage(json *j, const ebpo_info *info)
+{
+    char hex[65];
+    words_hex(info->content_sha256, hex);
+    json_array(j, "parts");
+    for (int i = 0; part_words[i]; i++)
+        if (info->parts >> i & 1)
+            json_text(j, NULL, part_words[i]);
+    json_end(j);
+    json_text(j, "codec", words_codec(info->codec));
+    json_subset(j, info);
+    json_text(j, "content_sha256", hex);
+    json_object(j, "bytes");
+    json_uint(j, "file", info->file_bytes);
+    json_uint(j, "head", info->head_bytes);
+    json_uint(j, "index", info->chunk_index_bytes);
+    json_uint(j, "levels", level_bytes(info));
+    json_uint(j, "vertices", info->mesh_vertex_bytes);
+    json_uint(j, "faces", info->mesh_face_bytes);
+    json_uint(j, "maps", info->map_bytes);
+    json_uint(j, "other", other_bytes(info));
+    json_end(j);
+}
+
+void facts_json(json *j, const char *path, const ebpo_info *info)
+{
+    char version[32];
+    json_text(j, "file", path);
+    json_text(j, "format",
+              words_format(version, sizeof version, info->version_major, info->version_minor));
+    json_text(j, "generator", info->generator);
+    json_source(j, info);
+    json_model(j, info);
+    findings_json_mending(j, "mend", &info->mend);
+    findings_json(j, "report", &info->report);
+    json_storage(j, info);
+    json_array(j, "levels");
+    for (int i = 0; i < info->level_count; i++)
+        json_level(j, info, i);
+    json_end(j);
+}

@@ -1,0 +1,152 @@
+#include "cli/json.h"
+
+#include <assert.h>
+#include <math.h>
+#include <string.h>
+
+static void newline(json *j)
+{
+    fputc('\n', j->out);
+    for (int i = 0; i < j->depth; i++)
+        fputs("  ", j->out);
+}
+
+/* Length of the UTF-8 sequence at `s` (no surrogates, nothing overlong, up to U+10FFFF), 0 if there
+ * is none. */
+static int sequence(const unsigned char *s)
+{
+    unsigned char a = s[0];
+    if (a < 0x80)
+        return 1;
+    int length = a >= 0xf0 ? 4 : a >= 0xe0 ? 3 : 2;
+    if (a < 0xc2 || a > 0xf4)
+        return 0;
+    for (int i = 1; i < length; i++)
+        if ((s[i] & 0xc0) != 0x80)
+            return 0;
+    bool bad = (a == 0xe0 && s[1] < 0xa0) || (a == 0xed && s[1] > 0x9f) ||
+               (a == 0xf0 && s[1] < 0x90) || (a == 0xf4 && s[1] > 0x8f);
+    return bad ? 0 : length;
+}
+
+static void quoted(json *j, const char *text)
+{
+    fputc('"', j->out);
+    for (const unsigned char *s = (const unsigned char *)text; *s;) {
+        int length = sequence(s);
+        if (length == 0)
+            fputs("\\ufffd", j->out);
+        else if (*s == '"' || *s == '\\')
+            fprintf(j->out, "\\%c", *s);
+        else if (*s < 0x20 || *s == 0x7f)
+            fprintf(j->out, "\\u%04x", *s);
+        else
+            fwrite(s, 1, (size_t)length, j->out);
+        s += length ? length : 1;
+    }
+    fputc('"', j->out);
+}
+
+/* Comma, new line and key before a value. */
+static void lead(json *j, const char *key)
+{
+    if (j->depth) {
+        if (j->filled[j->depth])
+            fputc(',', j->out);
+        j->filled[j->depth] = true;
+        newline(j);
+    }
+    if (key) {
+        quoted(j, key);
+        fputs(": ", j->out);
+    }
+}
+
+static void open_level(json *j, const char *key, char open, char close)
+{
+    lead(j, key);
+    assert(j->depth + 1 < JSON_DEPTH);
+    fputc(open, j->out);
+    j->depth++;
+    j->filled[j->depth] = false;
+    j->close[j->depth] = close;
+}
+
+void json_begin(json *j, FILE *out)
+{
+    memset(j, 0, sizeof *j);
+    j->out = out;
+}
+
+void json_object(json *j, const char *key) { open_level(j, key, '{', '}'); }
+
+void json_array(json *j, const char *key) { open_level(j, key, '[', ']'); }
+
+void json_end(json *j)
+{
+    assert(j->depth > 0);
+    char close = j->close[j->depth];
+    bool filled = j->filled[j->depth];
+    j->depth--;
+    if (filled)
+        newline(j);
+    fputc(close, j->out);
+}
+
+void json_finish(json *j)
+{
+    while (j->depth)
+        json_end(j);
+    fputc('\n', j->out);
+}
+
+void json_text(json *j, const char *key, const char *text)
+{
+    lead(j, key);
+    quoted(j, text);
+}
+
+void json_uint(json *j, const char *key, uint64_t v)
+{
+    lead(j, key);
+    fprintf(j->out, "%llu", (unsigned long long)v);
+}
+
+void json_int(json *j, const char *key, int64_t v)
+{
+    lead(j, key);
+    fprintf(j->out, "%lld", (long long)v);
+}
+
+void json_real(json *j, const char *key, double v)
+{
+    lead(j, key);
+    if (isfinite(v))
+        fprintf(j->out, "%.17g", v);
+    else
+        fputs("null", j->out);
+}
+
+void json_bool(json *j, const char *key, bool v)
+{
+    lead(j, key);
+    fputs(v ? "true" : "false", j->out);
+}
+
+void json_null(json *j, const char *key)
+{
+    lead(j, key);
+    fputs("null", j->out);
+}
+
+void json_reals(json *j, const char *key, const double *v, int count)
+{
+    lead(j, key);
+    fputc('[', j->out);
+    for (int i = 0; i < count; i++)
+        if (isfinite(v[i]))
+            fprintf(j->out, "%s%.17g", i ? ", " : "", v[i]);
+        else
+            fprintf(j->out, "%snull", i ? ", " : "");
+    fputc(']', j->out);
+}

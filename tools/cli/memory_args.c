@@ -1,0 +1,43 @@
+#include "cli/memory_args.h"
+
+#include <malloc.h>
+#include <stddef.h>
+#include <stdio.h>
+
+#include "cli/words.h"
+
+bool memory_good(const char *command, const memory_values *v)
+{
+    uint64_t bytes;
+    if (!v->memory)
+        return true;
+    if (!words_read_size(v->memory, &bytes)) {
+        fprintf(stderr, "ebpo %s: --memory: '%s' is not a size such as 2G; try 'ebpo %s --help'\n",
+                command, v->memory, command);
+        return false;
+    }
+    if (bytes < EBPO_WORKSPACE_LEAST)
+        fprintf(stderr, "ebpo %s: --memory %s is too little for any mesh; allow %dM at least\n",
+                command, v->memory, EBPO_WORKSPACE_LEAST >> 20);
+    return bytes >= EBPO_WORKSPACE_LEAST;
+}
+
+/* Memory that is free again goes back to the system instead of waiting in each thread's heap: it
+ * would count as resident. */
+static void return_memory(void)
+{
+#ifdef __GLIBC__
+    mallopt(M_MMAP_THRESHOLD, 1 << 20);
+    mallopt(M_TRIM_THRESHOLD, 1 << 20);
+#endif
+}
+
+ebpo_status memory_make(ebpo_workspace **out, const memory_values *v, ebpo_error *error)
+{
+    ebpo_workspace_options o = EBPO_WORKSPACE_OPTIONS_INIT;
+    return_memory();
+    o.temp_dir = v->temp_dir;
+    if (v->memory)
+        (void)words_read_size(v->memory, &o.memory); /* memory_good saw to it */
+    return ebpo_workspace_make(out, &o, error);
+}

@@ -1,0 +1,267 @@
+#include "cli/mesh_findings.h"
+
+#include <stddef.h>
+
+#include "cli/words.h"
+
+/* Findings in the order in which people want to read them. */
+static const struct finding_text {
+    size_t offset;
+    const char *key, *one, *many, *place;
+} findings[] = {
+    { offsetof(ebpo_mesh_report, boundary_edges), "boundary_edges",
+      "boundary edge (used by one face only)", "boundary edges (used by one face only)", "face" },
+    { offsetof(ebpo_mesh_report, nonmanifold_edges), "nonmanifold_edges",
+      "edge shared by more than two faces", "edges shared by more than two faces", "face" },
+    { offsetof(ebpo_mesh_report, misoriented_edges), "misoriented_edges",
+      "edge whose two faces disagree in orientation",
+      "edges whose two faces disagree in orientation", "face" },
+    { offsetof(ebpo_mesh_report, unbalanced_edges), "unbalanced_edges", "edge does not balance",
+      "edges do not balance", "face" },
+    { offsetof(ebpo_mesh_report, bowtie_vertices), "bowtie_vertices",
+      "vertex where several fans of faces meet", "vertices where several fans of faces meet",
+      "vertex" },
+    { offsetof(ebpo_mesh_report, zero_area_faces), "zero_area_faces", "face without area",
+      "faces without area", "face" },
+    { offsetof(ebpo_mesh_report, index_repeated_faces), "index_repeated_faces",
+      "face that names a vertex twice", "faces that name a vertex twice", "face" },
+    { offsetof(ebpo_mesh_report, repeated_faces), "repeated_faces", "repeated face",
+      "repeated faces", "face" },
+    { offsetof(ebpo_mesh_report, unreferenced_vertices), "unreferenced_vertices",
+      "vertex that no face uses", "vertices that no face uses", "vertex" },
+    { offsetof(ebpo_mesh_report, repeated_positions), "repeated_positions",
+      "vertex at an earlier vertex's position", "vertices at an earlier vertex's position",
+      "vertex" },
+};
+enum { FINDINGS = sizeof findings / sizeof *findings };
+
+static const ebpo_finding *finding_of(const ebpo_mesh_report *report, int i)
+{
+    return (const ebpo_finding *)(const void *)((const char *)report + findings[i].offset);
+}
+
+static int places_of(const ebpo_finding *f)
+{
+    return f->count < EBPO_FINDING_PLACES ? (int)f->count : EBPO_FINDING_PLACES;
+}
+
+static void print_places(FILE *out, const ebpo_finding *f, const char *place)
+{
+    int shown = places_of(f);
+    const char *many = place[0] == 'v' ? "vertices" : "faces";
+    fprintf(out, ": %s", shown == 1 ? place : many);
+    for (int i = 0; i < shown; i++)
+        fprintf(out, "%s %llu", i ? "," : "", (unsigned long long)f->place[i]);
+    fprintf(out, "%s\n", f->count > (uint64_t)shown ? ", ..." : "");
+}
+
+static void print_findings(FILE *out, const ebpo_mesh_report *report)
+{
+    bool any = false;
+    for (int i = 0; i < FINDINGS; i++) {
+        const ebpo_finding *f = finding_of(report, i);
+        if (f->count == 0)
+            continue;
+        any = true;
+        fprintf(out, "  %llu %s", (unsigned long long)f->count,
+                f->count == 1 ? findings[i].one : findings[i].many);
+        print_places(out, f, findings[i].place);
+    }
+    if (!any)
+        fputs("  nothing to complain about\n", out);
+}
+
+static void print_reading(FILE *out, const ebpo_mesh *mesh)
+{
+    char text[80];
+    if (mesh->polygons_triangulated) {
+        fprintf(out, "  %s cut into triangles",
+                words_plural(text, sizeof text, mesh->polygons_triangulated, "polygon",
+                             "polygons"));
+        if (mesh->polygons_concave)
+            fprintf(out, " (%llu concave)", (unsigned long long)mesh->polygons_concave);
+        fputc('\n', out);
+    }
+    if (mesh->strips)
+        fprintf(out, "  %s unrolled\n",
+                words_plural(text, sizeof text, mesh->strips, "triangle strip", "triangle strips"));
+    if (mesh->polygons_dropped)
+        fprintf(out, "  %s of fewer than three corners left out\n",
+                words_plural(text, sizeof text, mesh->polygons_dropped, "polygon", "polygons"));
+}
+
+static const char *kind(const ebpo_mesh_report *report)
+{
+    if (!report->balanced)
+        return "a surface: its edges do not balance, so there is no inside";
+    return report->manifold ? "a solid, closed 2-manifold"
+                            : "a solid: its edges balance, though it is no 2-manifold";
+}
+
+void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
+                    const ebpo_mesh_report *report)
+{
+    char bytes[32], parts[64];
+    fprintf(out, "%s: %llu vertices, %llu faces", path, (unsigned long long)mesh->vertex_count,
+            (unsigned long long)mesh->face_count);
+    if (mesh->source_format[0])
+        fprintf(out, " (%s, %s, %s)", mesh->source_format,
+                words_bytes(bytes, sizeof bytes, mesh->source_size),
+                mesh->xyz32 ? "float" : "double");
+    fprintf(out, "\n  %s\n", kind(report));
+    fprintf(out, "  %s",
+            words_plural(parts, sizeof parts, report->components, "component", "components"));
+    if (report->boundary_loops)
+        fprintf(out, ", %s",
+                words_plural(parts, sizeof parts, report->boundary_loops, "hole", "holes"));
+    if (report->genus_known)
+        fprintf(out, ", genus %lld", (long long)report->genus);
+    fprintf(out, ", area %.6g", report->area);
+    if (report->balanced)
+        fprintf(out, ", volume %.6g", report->volume);
+    fprintf(out, ", mean edge %.4g\n  box %.6g %.6g %.6g to %.6g %.6g %.6g\n", report->mean_edge,
+            report->min[0], report->min[1], report->min[2], report->max[0], report->max[1],
+            report->max[2]);
+    print_reading(out, mesh);
+    print_findings(out, report);
+}
+
+void findings_print_mending(FILE *out, const ebpo_mend_record *r)
+{
+    char text[80];
+    if (r->weld)
+        fprintf(out, "  welded: %s merged\n",
+                words_plural(text, sizeof text, r->welded_vertices, "vertex", "vertices"));
+    if (r->orient) {
+        fprintf(out, "  oriented: %s turned",
+                words_plural(text, sizeof text, r->flipped_faces, "face", "faces"));
+        if (r->unorientable_components)
+            fprintf(out, ", %s cannot be oriented",
+                    words_plural(text, sizeof text, r->unorientable_components, "component",
+                                 "components"));
+        fputc('\n', out);
+    }
+    if (r->fill_holes) {
+        fprintf(out, "  filled: %s",
+                words_plural(text, sizeof text, r->filled_holes, "hole", "holes"));
+        fprintf(out, " with %s", words_plural(text, sizeof text, r->added_faces, "face", "faces"));
+        if (r->unfilled_holes)
+            fprintf(out, ", %s left (not simple loops)",
+                    words_plural(text, sizeof text, r->unfilled_holes, "hole", "holes"));
+        fputc('\n', out);
+    }
+}
+
+/* --- the warning --- */
+
+static void advise(FILE *out, bool *any, uint64_t count, const char *what, const char *remedy)
+{
+    fprintf(out, "%s %llu %s: %s", *any ? ";" : "", (unsigned long long)count, what, remedy);
+    *any = true;
+}
+
+static void advise_boundary(FILE *out, bool *any, const ebpo_mesh_report *report,
+                            const ebpo_mend_record *record)
+{
+    uint64_t edges = report->boundary_edges.count;
+    if (!edges)
+        return;
+    if (report->repeated_positions.count && !record->weld)
+        advise(out, any, report->repeated_positions.count, "repeated positions",
+               "try --weld first");
+    advise(out, any, edges, "boundary edges",
+           record->fill_holes ? "holes that are no simple loops need a mesh editor"
+                              : "try --fill-holes");
+}
+
+void findings_warn(FILE *out, const char *command, const char *path, const ebpo_mesh_report *report,
+                   const ebpo_mend_record *record)
+{
+    if (report->balanced)
+        return;
+    bool any = false;
+    fprintf(
+        out,
+        "ebpo %s: %s: warning: this is a surface, not a solid, so what is inside stays unknown;",
+        command, path);
+    advise_boundary(out, &any, report, record);
+    if (report->misoriented_edges.count)
+        advise(out, &any, report->misoriented_edges.count, "misoriented edges",
+               record->orient ? "cannot be oriented; use a mesh editor" : "try --orient");
+    if (report->nonmanifold_edges.count)
+        advise(out, &any, report->nonmanifold_edges.count, "edges shared by more than two faces",
+               record->orient ? "remove the faces that are too many"
+                              : "try --orient, or remove the faces that are too many");
+    if (!any)
+        advise(out, &any, report->unbalanced_edges.count, "unbalanced edges", "see 'ebpo check'");
+    fputc('\n', out);
+}
+
+/* --- JSON --- */
+
+static void json_finding(json *j, const char *key, const ebpo_finding *f)
+{
+    json_object(j, key);
+    json_uint(j, "count", f->count);
+    json_array(j, "places");
+    for (int i = 0; i < places_of(f); i++)
+        json_uint(j, NULL, f->place[i]);
+    json_end(j);
+    json_end(j);
+}
+
+void findings_json(json *j, const char *key, const ebpo_mesh_report *report)
+{
+    json_object(j, key);
+    json_bool(j, "balanced", report->balanced);
+    json_bool(j, "manifold", report->manifold);
+    for (int i = 0; i < FINDINGS; i++)
+        json_finding(j, findings[i].key, finding_of(report, i));
+    json_uint(j, "edges", report->edges);
+    json_uint(j, "components", report->components);
+    json_uint(j, "boundary_loops", report->boundary_loops);
+    if (report->genus_known)
+        json_int(j, "genus", report->genus);
+    else
+        json_null(j, "genus");
+    json_real(j, "area", report->area);
+    json_real(j, "volume", report->volume);
+    json_real(j, "mean_edge", report->mean_edge);
+    json_reals(j, "min", report->min, 3);
+    json_reals(j, "max", report->max, 3);
+    json_end(j);
+}
+
+void findings_json_mending(json *j, const char *key, const ebpo_mend_record *r)
+{
+    json_object(j, key);
+    json_bool(j, "weld", r->weld);
+    json_uint(j, "welded_vertices", r->welded_vertices);
+    json_bool(j, "orient", r->orient);
+    json_uint(j, "flipped_faces", r->flipped_faces);
+    json_uint(j, "unorientable_components", r->unorientable_components);
+    json_bool(j, "fill_holes", r->fill_holes);
+    json_uint(j, "filled_holes", r->filled_holes);
+    json_uint(j, "added_faces", r->added_faces);
+    json_uint(j, "unfilled_holes", r->unfilled_holes);
+    json_end(j);
+}
+
+void findings_json_source(json *j, const char *key, const ebpo_mesh *mesh)
+{
+    char hex[65];
+    words_hex(mesh->source_sha256, hex);
+    json_object(j, key);
+    json_text(j, "name", mesh->source_name);
+    json_text(j, "format", mesh->source_format);
+    json_uint(j, "bytes", mesh->source_size);
+    json_text(j, "sha256", hex);
+    json_bool(j, "double_coordinates", mesh->xyz64 != NULL);
+    json_uint(j, "vertices", mesh->vertex_count);
+    json_uint(j, "faces", mesh->face_count);
+    json_uint(j, "polygons_triangulated", mesh->polygons_triangulated);
+    json_uint(j, "polygons_concave", mesh->polygons_concave);
+    json_uint(j, "polygons_dropped", mesh->polygons_dropped);
+    json_uint(j, "strips", mesh->strips);
+    json_end(j);
+}

@@ -1,0 +1,24 @@
+/* A mesh report in words and in JSON. */
+#ifndef EBPO_TOOLS_MESH_FINDINGS_H
+#define EBPO_TOOLS_MESH_FINDINGS_H
+
+#include <ebpo/mesh.h>
+#include <stdio.h>
+
+#include "cli/json.h"
+
+/* What the mesh is, then each finding with its first places. */
+void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
+                    const ebpo_mesh_report *report);
+/* What mending did; nothing when nothing was asked for. */
+void findings_print_mending(FILE *out, const ebpo_mend_record *record);
+/* For a mesh that does not balance: which finding to mend with which option. `record`: what was
+ * tried already. */
+void findings_warn(FILE *out, const char *command, const char *path, const ebpo_mesh_report *report,
+                   const ebpo_mend_record *record);
+
+void findings_json(json *j, const char *key, const ebpo_mesh_report *report);
+void findings_json_mending(json *j, const char *key, const ebpo_mend_record *record);
+void findings_json_source(json *j, const char *key, const ebpo_mesh *mesh);
+
+#endif

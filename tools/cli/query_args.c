@@ -1,0 +1,143 @@
+#include "cli/query_args.h"
+
+#include <stdio.h>
+
+#include "cli/command.h"
+#include "cli/words.h"
+
+const char *const inside_modes[] = { "fast",        "cache",       "nodes",         "subtree",
+                                     "cache-plain", "nodes-plain", "subtree-plain", NULL };
+const char *const distance_modes[] = { "exact", "recursive", "leaves", "envelope", NULL };
+
+static const struct {
+    ebpo_loading loading;
+    ebpo_envelopes envelopes;
+} inside_meanings[] = {
+    { EBPO_LOAD_CACHE, EBPO_ENVELOPES_AUTO },   { EBPO_LOAD_CACHE, EBPO_ENVELOPES_USE },
+    { EBPO_LOAD_NODES, EBPO_ENVELOPES_USE },    { EBPO_LOAD_SUBTREE, EBPO_ENVELOPES_USE },
+    { EBPO_LOAD_CACHE, EBPO_ENVELOPES_SKIP },   { EBPO_LOAD_NODES, EBPO_ENVELOPES_SKIP },
+    { EBPO_LOAD_SUBTREE, EBPO_ENVELOPES_SKIP },
+};
+
+/* --- options that have no effect beside others --- */
+
+bool query_accepts(const char *name, const query_values *v, unsigned idle, const char *with)
+{
+    const struct {
+        unsigned bit;
+        bool given;
+        const char *option;
+    } all[] = { { QUERY_LEVEL, v->level >= 0, "--level" },
+                { QUERY_DEADLINE, v->deadline != NULL, "--deadline" },
+                { QUERY_MAX_DISTANCE, isfinite(v->max_distance), "--max-distance" },
+                { QUERY_UNSIGNED, v->unsigned_distance, "--unsigned" },
+                { QUERY_NO_WARM, v->no_warm, "--no-warm" },
+                { QUERY_PREFETCH, v->prefetch, "--prefetch" } };
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
+        if (all[i].given && idle & all[i].bit) {
+            fprintf(stderr,
+                    "ebpo %s: %s has no effect with %s; leave one of them away, or try 'ebpo %s "
+                    "--help'\n",
+                    name, all[i].option, with, name);
+            return false;
+        }
+    return true;
+}
+
+bool query_inside_fits(const char *name, const query_values *v)
+{
+    char with[40];
+    snprintf(with, sizeof with, "--mode %s", inside_modes[v->inside_mode]);
+    return inside_meanings[v->inside_mode].loading == EBPO_LOAD_CACHE ||
+           query_accepts(name, v, QUERY_PREFETCH, with);
+}
+
+bool query_distance_fits(const char *name, const query_values *v)
+{
+    enum {
+        AROUND = QUERY_LEVEL | QUERY_DEADLINE | QUERY_NO_WARM | QUERY_PREFETCH,
+        ENVELOPE =
+            QUERY_DEADLINE | QUERY_MAX_DISTANCE | QUERY_UNSIGNED | QUERY_NO_WARM | QUERY_PREFETCH
+    };
+    static const unsigned idle[] = { 0, AROUND, AROUND, ENVELOPE };
+    char with[40];
+    snprintf(with, sizeof with, "--mode %s", distance_modes[v->distance_mode]);
+    if (!query_accepts(name, v, idle[v->distance_mode], with))
+        return false;
+    return v->level < 0 ||
+           query_accepts(name, v, QUERY_UNSIGNED | QUERY_NO_WARM | QUERY_PREFETCH, "--level");
+}
+
+/* --- values --- */
+
+static bool read_size(const char *name, const char *text, uint64_t *out)
+{
+    if (words_read_size(text, out))
+        return true;
+    fprintf(stderr,
+            "ebpo %s: --memory: '%s' is not a size such as 64M, 1G, 512K or 1000000; try 'ebpo %s "
+            "--help'\n",
+            name, text, name);
+    return false;
+}
+
+static bool read_time(const char *name, const char *text, uint64_t *out)
+{
+    static const char *const units[] = { "", "us", "ns", "ms", "s", NULL };
+    static const uint64_t factors[] = { 1000, 1000, 1, 1000000, 1000000000 };
+    if (words_read_unit(text, units, factors, out) && *out > 0 && *out < UINT64_C(1000000000000000))
+        return true;
+    fprintf(stderr,
+            "ebpo %s: --deadline: '%s' is not a time such as 50us, 500ns, 1ms or 20 "
+            "(microseconds); try 'ebpo %s --help'\n",
+            name, text, name);
+    return false;
+}
+
+bool query_options_from(const char *name, const query_values *v, ebpo_model_options *model,
+                        ebpo_query_options *query)
+{
+    *model = (ebpo_model_options)EBPO_MODEL_OPTIONS_INIT;
+    *query = (ebpo_query_options)EBPO_QUERY_OPTIONS_INIT;
+    /* What is below the level is not looked at, so it need not be in memory. */
+    model->cut_level =
+        v->cut_level < 0 && !v->memory && v->level >= 0 ? (int)v->level : (int)v->cut_level;
+    model->loading = inside_meanings[v->inside_mode].loading;
+    model->prefetch = v->prefetch;
+    model->threads = (unsigned)v->threads;
+    query->level = (int)v->level;
+    query->envelopes = inside_meanings[v->inside_mode].envelopes;
+    query->mode = (ebpo_distance_mode)v->distance_mode;
+    query->unsigned_distance = v->unsigned_distance;
+    query->warm = !v->no_warm;
+    query->max_distance = v->max_distance;
+    return (!v->memory || read_size(name, v->memory, &model->memory)) &&
+           (!v->deadline || read_time(name, v->deadline, &query->deadline_ns));
+}
+
+/* --- sessions --- */
+
+int query_open(query_session *s, const char *name, const char *path,
+               const ebpo_model_options *options, int level, const remote_values *remote)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    if (!command_wants_hdf5(name, path))
+        return EXIT_FAILED;
+    if (remote_open(&s->file, path, remote, &error) != EBPO_OK)
+        return command_failed(name, &error);
+    const ebpo_info *info = ebpo_file_info(s->file);
+    if (!command_has_level(name, info, level) || !command_has_level(name, info, options->cut_level))
+        return EXIT_USAGE;
+    ebpo_status status = ebpo_model_open(&s->model, s->file, options, &error);
+    if (status == EBPO_OK)
+        status = ebpo_context_new(&s->context, s->model, &error);
+    return status == EBPO_OK ? EXIT_FINE : command_failed(name, &error);
+}
+
+void query_close(query_session *s)
+{
+    ebpo_context_free(s->context);
+    ebpo_model_close(s->model);
+    ebpo_close(s->file);
+    *s = (query_session)QUERY_SESSION_INIT;
+}

@@ -1,0 +1,117 @@
+/* Options that the commands for questions share: how a model is held in memory, and how it is
+ * asked. */
+#ifndef EBPO_TOOLS_QUERY_ARGS_H
+#define EBPO_TOOLS_QUERY_ARGS_H
+
+#include <ebpo/query.h>
+#include <math.h>
+
+#include "cli/args.h"
+#include "cli/remote_args.h"
+
+typedef struct query_values {
+    const char *memory, *deadline;
+    int64_t cut_level, threads, level;
+    double max_distance, tmax;
+    int inside_mode, distance_mode; /* indices into the words below */
+    bool prefetch, raw, json, unsigned_distance, no_warm, all;
+    remote_values remote;
+} query_values;
+#define QUERY_VALUES_INIT                                                         \
+    {                                                                             \
+        .cut_level = -1, .level = -1, .max_distance = INFINITY, .tmax = INFINITY, \
+        .remote = REMOTE_VALUES_INIT                                              \
+    }
+
+/* Rows for the tables of options. In other structs query_values comes first. */
+#define QUERY_MODEL_OPTIONS                                                                      \
+    { "memory",                                                                                  \
+      0,                                                                                         \
+      ARG_TEXT,                                                                                  \
+      offsetof(query_values, memory),                                                            \
+      "SIZE",                                                                                    \
+      "bytes that the model may take: 64M, 1G, 512K (powers of 1024);\n0, the default: as much " \
+      "as it needs",                                                                             \
+      0,                                                                                         \
+      0,                                                                                         \
+      NULL },                                                                                    \
+        { "cut-level",                                                                           \
+          0,                                                                                     \
+          ARG_INT,                                                                               \
+          offsetof(query_values, cut_level),                                                     \
+          "C",                                                                                   \
+          "keep levels 0 to C in memory, load subtrees below on demand;\nthe default: all at "   \
+          "once where --memory allows",                                                          \
+          0,                                                                                     \
+          20,                                                                                    \
+          NULL },                                                                                \
+    {                                                                                            \
+        "threads", 0, ARG_INT, offsetof(query_values, threads), "N",                             \
+            "threads for opening; 0, the default: all cores", 0, 256, NULL                       \
+    }
+
+/* Rays and boxes look at many subtrees anyway: nothing is loaded ahead of them. */
+#define QUERY_PREFETCH_OPTION                         \
+    ARG_SWITCH("prefetch", 0, query_values, prefetch, \
+               "load subtrees around the last one in the background")
+
+#define QUERY_FORM_OPTIONS(raw_text)                                                    \
+    ARG_SWITCH("raw", 0, query_values, raw, raw_text),                                  \
+        ARG_SWITCH("json", 0, query_values, json, "a JSON object for each, on a line"), \
+        ARG_SWITCH("stats", 0, query_values, remote.stats,                              \
+                   "what it took, on standard error at the end"),                       \
+        REMOTE_HTTP_OPTIONS(query_values, remote)
+
+#define QUERY_LIMIT_OPTIONS(level_text)                                                           \
+    { "level", 0, ARG_INT, offsetof(query_values, level), "L", level_text, 0, 20, NULL },         \
+    {                                                                                             \
+        "deadline", 0, ARG_TEXT, offsetof(query_values, deadline), "TIME",                        \
+            "stop after about so long for each point and say what is certain;\nmicroseconds, or " \
+            "with unit: 500ns, 50us, 1ms",                                                        \
+            0, 0, NULL                                                                            \
+    }
+
+/* Words for --mode, NULL-terminated; EBP 2017, section 4.3. */
+extern const char *const inside_modes[];   /* fast, cache, nodes, ... */
+extern const char *const distance_modes[]; /* in the order of ebpo_distance_mode */
+
+/* Options as bits, to say which of them another one leaves without effect. */
+enum {
+    QUERY_LEVEL = 1,
+    QUERY_DEADLINE = 2,
+    QUERY_MAX_DISTANCE = 4,
+    QUERY_UNSIGNED = 8,
+    QUERY_NO_WARM = 16,
+    QUERY_PREFETCH = 32
+};
+
+/* False: one of the options `idle` was given, which has no effect with `with`, such as "--mode
+ * leaves"; said on stderr (exit with EXIT_USAGE). */
+bool query_accepts(const char *name, const query_values *v, unsigned idle, const char *with);
+/* The same for what the modes of each question, and --level for distances, leave without effect. */
+bool query_inside_fits(const char *name, const query_values *v);
+bool query_distance_fits(const char *name, const query_values *v);
+
+/* Both forms; `name` is the command's, for messages. False: the values do not fit, which has been
+ * said on stderr (exit with EXIT_USAGE). */
+bool query_options_from(const char *name, const query_values *v, ebpo_model_options *model,
+                        ebpo_query_options *query);
+
+/* A file, its model in memory, and a context. */
+typedef struct query_session {
+    ebpo_file *file;
+    ebpo_model *model;
+    ebpo_context *context;
+} query_session;
+#define QUERY_SESSION_INIT \
+    {                      \
+        NULL, NULL, NULL   \
+    }
+
+/* Returns an exit code; what is wrong has been said on stderr, also that the file has no such level
+ * (-1: none is asked for). query_close in any case. */
+int query_open(query_session *s, const char *name, const char *path,
+               const ebpo_model_options *options, int level, const remote_values *remote);
+void query_close(query_session *s);
+
+#endif

@@ -1,0 +1,94 @@
+#include "cli/remote_args.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+
+#include "cli/words.h"
+
+static bool options_from(const remote_values *v, ebpo_http_options *o, ebpo_error *error)
+{
+    *o = (ebpo_http_options)EBPO_HTTP_OPTIONS_INIT;
+    o->cache_folder = v->cache;
+    if (v->cache_size && !words_read_size(v->cache_size, &o->cache_bytes)) {
+        error->status = EBPO_E_ARGUMENT;
+        snprintf(error->message, sizeof error->message,
+                 "--http-cache-size: '%s' is not a size such as 512M or 4G", v->cache_size);
+        return false;
+    }
+    o->time_limit = v->timeout > 0 ? v->timeout : o->time_limit;
+    o->stall_timeout = v->stall > 0 ? v->stall : o->stall_timeout;
+    o->retries = v->retries >= 0 ? (unsigned)v->retries : o->retries;
+    o->connections = v->connections > 0 ? (unsigned)v->connections : o->connections;
+    o->headers = v->headers.count ? v->headers.item : NULL;
+    o->user = v->user;
+    o->ca_file = v->ca_file;
+    o->unversioned = v->unversioned;
+    o->stop = v->stop;
+    o->stop_user = v->stop_user;
+    return true;
+}
+
+ebpo_status remote_open(ebpo_file **out, const char *name, const remote_values *values,
+                        ebpo_error *error)
+{
+    ebpo_http_options options;
+    *out = NULL;
+    if (!options_from(values, &options, error))
+        return EBPO_E_ARGUMENT;
+    return ebpo_is_url(name) ? ebpo_open_url(out, name, &options, error)
+                             : ebpo_open(out, name, error);
+}
+
+const char *remote_shown(const char *name)
+{
+    static char shown[1024];
+    return ebpo_is_url(name) ? ebpo_url_shown(name, shown, sizeof shown) : name;
+}
+
+traffic traffic_of(const ebpo_file *file)
+{
+    traffic t;
+    ebpo_file_traffic(file, &t.bytes, &t.reads);
+    t.far = ebpo_file_http_stats(file, &t.http);
+    return t;
+}
+
+void remote_json(json *j, const traffic *t, const remote_values *values)
+{
+    if (!values->stats)
+        return;
+    json_object(j, "traffic");
+    json_uint(j, "reads", t->reads);
+    json_uint(j, "bytes_read", t->bytes);
+    if (t->far) {
+        json_uint(j, "requests", t->http.requests);
+        json_uint(j, "bytes", t->http.bytes);
+        json_uint(j, "retries", t->http.retries);
+        json_uint(j, "connections", t->http.connections);
+        json_real(j, "seconds_waited", t->http.wait_seconds);
+        json_uint(j, "cache_hits", t->http.cache_hits);
+        json_uint(j, "cache_bytes", t->http.cache_bytes);
+    }
+    json_end(j);
+}
+
+void remote_tell(const traffic *t, const remote_values *values, bool as_json)
+{
+    if (values->stats && as_json) {
+        json j;
+        json_begin(&j, stderr);
+        json_object(&j, NULL);
+        remote_json(&j, t, values);
+        json_finish(&j);
+    } else if (values->stats) {
+        fprintf(stderr, "reads %" PRIu64 ", bytes read %" PRIu64, t->reads, t->bytes);
+        if (t->far)
+            fprintf(stderr,
+                    ", requests %" PRIu64 ", bytes %" PRIu64 ", retries %" PRIu64
+                    ", connections %" PRIu64 ", seconds waited %.6f, cache hits %" PRIu64
+                    ", cache bytes %" PRIu64,
+                    t->http.requests, t->http.bytes, t->http.retries, t->http.connections,
+                    t->http.wait_seconds, t->http.cache_hits, t->http.cache_bytes);
+        fputc('\n', stderr);
+    }
+}

@@ -1,0 +1,135 @@
+/* Opening a FILE of a command, which may be a URL: options that all such commands share, and
+ * --stats. */
+#ifndef EBPO_TOOLS_REMOTE_ARGS_H
+#define EBPO_TOOLS_REMOTE_ARGS_H
+
+#include <ebpo/ebpo.h>
+
+#include "cli/args.h"
+#include "cli/json.h"
+
+typedef struct remote_values {
+    bool stats, unversioned;
+    const char *cache, *cache_size, *user, *ca_file;
+    double timeout, stall;
+    int64_t retries, connections;
+    arg_list headers;
+    bool (*stop)(void *user); /* not options: as in ebpo_http_options */
+    void *stop_user;
+} remote_values;
+#define REMOTE_VALUES_INIT                                           \
+    {                                                                \
+        .timeout = -1, .stall = -1, .retries = -1, .connections = -1 \
+    }
+
+/* Rows for the tables of options; `member` is the remote_values in the struct `type`. */
+#define REMOTE_OPTIONS(type, member)                                                      \
+    ARG_SWITCH("stats", 0, type, member.stats,                                            \
+               "what was read, on standard error at the end: reads and bytes, of a\nURL " \
+               "requests, bytes, retries, seconds"),                                      \
+        REMOTE_HTTP_OPTIONS(type, member)
+
+/* Without --stats, for commands that have their own. */
+#define REMOTE_HTTP_OPTIONS(type, member)                                       \
+    { "http-cache",                                                             \
+      0,                                                                        \
+      ARG_TEXT,                                                                 \
+      offsetof(type, member.cache),                                             \
+      "DIR",                                                                    \
+      "keep what is fetched from a URL in this folder",                         \
+      0,                                                                        \
+      0,                                                                        \
+      NULL },                                                                   \
+        { "http-cache-size",                                                    \
+          0,                                                                    \
+          ARG_TEXT,                                                             \
+          offsetof(type, member.cache_size),                                    \
+          "SIZE",                                                               \
+          "that the folder may hold: 512M, 4G; the default: 1G",                \
+          0,                                                                    \
+          0,                                                                    \
+          NULL },                                                               \
+        { "http-timeout",                                                       \
+          0,                                                                    \
+          ARG_REAL,                                                             \
+          offsetof(type, member.timeout),                                       \
+          "SECONDS",                                                            \
+          "for one request with its retries; the default: 120",                 \
+          0.001,                                                                \
+          1e6,                                                                  \
+          NULL },                                                               \
+        { "http-stall",                                                         \
+          0,                                                                    \
+          ARG_REAL,                                                             \
+          offsetof(type, member.stall),                                         \
+          "SECONDS",                                                            \
+          "give an answer up that brings nothing for so long; the default: 20", \
+          1,                                                                    \
+          1e6,                                                                  \
+          NULL },                                                               \
+        { "http-retries",                                                       \
+          0,                                                                    \
+          ARG_INT,                                                              \
+          offsetof(type, member.retries),                                       \
+          "N",                                                                  \
+          "of a request that failed; the default: 5",                           \
+          0,                                                                    \
+          1000,                                                                 \
+          NULL },                                                               \
+        { "http-connections",                                                   \
+          0,                                                                    \
+          ARG_INT,                                                              \
+          offsetof(type, member.connections),                                   \
+          "N",                                                                  \
+          "requests at a time; the default: 6",                                 \
+          1,                                                                    \
+          32,                                                                   \
+          NULL },                                                               \
+        { "http-header",                                                        \
+          0,                                                                    \
+          ARG_LIST,                                                             \
+          offsetof(type, member.headers),                                       \
+          "LINE",                                                               \
+          "send 'Name: value' too; may be repeated",                            \
+          0,                                                                    \
+          0,                                                                    \
+          NULL },                                                               \
+        { "http-user",                                                          \
+          0,                                                                    \
+          ARG_TEXT,                                                             \
+          offsetof(type, member.user),                                          \
+          "NAME:PASSWORD",                                                      \
+          "for servers that ask; better in ~/.netrc",                           \
+          0,                                                                    \
+          0,                                                                    \
+          NULL },                                                               \
+        { "http-ca", 0,                                                         \
+          ARG_TEXT,  offsetof(type, member.ca_file),                            \
+          "FILE",    "certificates to trust instead of the system's",           \
+          0,         0,                                                         \
+          NULL },                                                               \
+        ARG_SWITCH("http-unversioned", 0, type, member.unversioned,             \
+                   "read large files from servers that tell no version, too")
+
+/* ebpo_open, by path or by URL with these options. EBPO_E_ARGUMENT also for an option that makes no
+ * sense. */
+EBPO_MUST_USE ebpo_status remote_open(ebpo_file **out, const char *name,
+                                      const remote_values *values, ebpo_error *error);
+
+/* The name as output shows it: of a URL without password and query. Valid until the next call. */
+const char *remote_shown(const char *name);
+
+/* What was read of a file since it was opened. */
+typedef struct traffic {
+    uint64_t bytes, reads; /* asked of the source */
+    bool far;              /* the file is a URL */
+    ebpo_http_stats http;
+} traffic;
+traffic traffic_of(const ebpo_file *file);
+
+/* With --stats: a line on stderr, or JSON there; as a member "traffic" of a JSON object. Nothing
+ * without. */
+void remote_tell(const traffic *t, const remote_values *values, bool as_json);
+void remote_json(json *j, const traffic *t, const remote_values *values);
+
+#endif

@@ -1,0 +1,42 @@
+#include "cli/signals.h"
+
+#include <ebpo/base.h>
+#include <signal.h>
+#include <string.h>
+
+static void (*volatile also)(void);
+
+void signals_also(void (*clean_up)(void)) { also = clean_up; }
+
+static void give_up(int number)
+{
+    ebpo_abandon_outputs();
+    if (also)
+        also();
+    /* SA_RESETHAND brought the default back: the parent sees which signal it was. At once, and not
+     * when this handler returns: another thread may be about to open the output by its name again.
+     */
+    sigset_t only;
+    sigemptyset(&only);
+    sigaddset(&only, number);
+    pthread_sigmask(SIG_UNBLOCK, &only, NULL);
+    ebpo_abandon_outputs();
+    raise(number);
+}
+
+void signals_install(void)
+{
+    /* A limit on file size is an error like a full disk, not the end. */
+    signal(SIGXFSZ, SIG_IGN);
+    static const int numbers[] = { SIGINT, SIGTERM, SIGHUP };
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
+        struct sigaction action, before;
+        memset(&action, 0, sizeof action);
+        action.sa_handler = give_up;
+        action.sa_flags = (int)SA_RESETHAND;
+        sigfillset(&action.sa_mask);
+        /* Who started us with a signal ignored (nohup) wants it ignored. */
+        if (sigaction(numbers[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN)
+            sigaction(numbers[i], &action, NULL);
+    }
+}

@@ -1,0 +1,215 @@
+#include "cli/stages.h"
+
+#include <string.h>
+
+#include "cli/words.h"
+
+/* EBP 2017, 3.6.4 and tables 8 to 10 and 18: six stages, and their sum. */
+enum {
+    LEAVES = 1 << 0,
+    CORNERS = 1 << 1,
+    LEAF_PLANES = 1 << 2,
+    PATHS = 1 << 3,
+    CLIPPING = 1 << 4,
+    STORING = 1 << 5,
+    THESIS_STAGES = 6
+};
+
+static const char *const thesis_names[THESIS_STAGES + 1] = {
+    "leaf creation", "corner labels",           "leaf planes", "tree paths",
+    "leaf clipping", "storing and propagating", "total"
+};
+
+static const struct {
+    const char *name;
+    unsigned thesis;
+    const char *stages[8]; /* the library's */
+} rows[STAGE_ROWS] = {
+    [STAGE_READING] = { "reading", 0, { "reading" } },
+    [STAGE_MENDING] = { "mending", 0, { "mending" } },
+    [STAGE_ORDERING] = { "ordering",
+                         LEAVES,
+                         { "looking at faces", "measuring the box", "ordering vertices",
+                           "ordering faces", "bounds" } },
+    [STAGE_CHECKING] = { "checking",
+                         0,
+                         { "checking coordinates", "counting faces at vertices",
+                           "linking faces to vertices", "checking vertices", "measuring faces",
+                           "checking edges", "comparing positions" } },
+    [STAGE_CUTTING] = { "cutting", LEAVES | PATHS, { "cutting into pieces" } },
+    [STAGE_CORNERS] = { "corners", CORNERS, { "winding numbers" } },
+    [STAGE_CELLS] = { "cells", LEAVES | CORNERS | PATHS, { "cells" } },
+    [STAGE_CHOOSING] = { "choosing", LEAF_PLANES | CLIPPING | STORING, { "choosing planes" } },
+    [STAGE_TOP] = { "top", STORING, { "top envelopes" } },
+    [STAGE_ENVELOPES] = { "envelopes", STORING, { "envelopes" } },
+    [STAGE_JOINING] = { "joining", STORING, { "joining levels" } },
+    [STAGE_NUMBERING] = { "numbering", STORING, { "numbering vertices" } },
+    [STAGE_WRITING] = { "writing", STORING, { "writing" } },
+    [STAGE_JUDGING] = { "judging",
+                        0,
+                        { "reading levels", "looking at envelopes", "bounding envelopes",
+                          "judging envelopes" } },
+    [STAGE_OTHER] = { "other", 0, { NULL } },
+};
+
+stage_row stages_row(const char *library_stage)
+{
+    for (int r = 0; r < STAGE_OTHER; r++)
+        for (int i = 0; i < 8 && rows[r].stages[i]; i++)
+            if (strcmp(rows[r].stages[i], library_stage) == 0)
+                return (stage_row)r;
+    return STAGE_OTHER;
+}
+
+static unsigned thesis_of(stage_row row, const stage_facts *f)
+{
+    bool here = row == STAGE_ENVELOPES && f->leaf_planes && !f->from_leaves;
+    return rows[row].thesis | (here ? LEAF_PLANES | CLIPPING : 0);
+}
+
+int stages_plan(const stage_facts *f, int plan[STAGE_PLAN_MAX])
+{
+    int n = 0;
+    for (int r = 0; r < STAGE_OTHER; r++) {
+        bool left_out = (r == STAGE_MENDING && !f->mended) || (r == STAGE_CORNERS && !f->solid) ||
+                        r == STAGE_CELLS ||
+                        (r == STAGE_CHOOSING && !f->from_leaves) || /* cells are split off later */
+                        (r == STAGE_JUDGING && !f->judged);
+        if (r == STAGE_MENDING && f->mended) {
+            plan[n++] = STAGE_ORDERING;
+            plan[n++] = STAGE_CHECKING;
+        }
+        if (!left_out)
+            plan[n++] = r;
+    }
+    if (f->judged)
+        plan[n++] = STAGE_WRITING;
+    return n;
+}
+
+void stages_split(progress_line *line, const ebpo_build_times *times)
+{
+    int at = 0;
+    double both = times->cells + times->envelopes;
+    for (int i = 0; i < line->stage_count; i++) {
+        if (strcmp(line->stages[i].name, "envelopes") == 0)
+            at = i;
+    }
+    if (at == 0 || !(both > 0) || line->stage_count == PROGRESS_STAGES)
+        return;
+    memmove(&line->stages[at + 1], &line->stages[at],
+            (size_t)(line->stage_count - at) * sizeof *line->stages);
+    line->stage_count++;
+    line->stages[at].name = "cells";
+    line->stages[at].seconds *= times->cells / both;
+    line->stages[at + 1].seconds -= line->stages[at].seconds;
+}
+
+/* --- words --- */
+
+static void print_row(FILE *out, const char *name, double seconds, uint64_t faces)
+{
+    char rate[32] = "";
+    if (seconds >= 0.005)
+        words_count(rate, sizeof rate, (double)faces / seconds);
+    fprintf(out, "  %-10s%9.2f%10s  ", name, seconds, rate);
+}
+
+static void print_thesis(FILE *out, unsigned thesis)
+{
+    const char *between = "";
+    for (int i = 0; i < THESIS_STAGES; i++)
+        if (thesis >> i & 1) {
+            fprintf(out, "%s%d %s", between, i + 1, thesis_names[i]);
+            between = ", ";
+        }
+    fprintf(out, "%s\n", thesis ? "" : "-");
+}
+
+static unsigned of_thesis(const progress_line *line, const stage_facts *f,
+                          double seconds[STAGE_ROWS], bool began[STAGE_ROWS])
+{
+    unsigned all = 0;
+    for (int i = 0; i < line->stage_count; i++) {
+        stage_row row = stages_row(line->stages[i].name);
+        seconds[row] += line->stages[i].seconds;
+        began[row] = true;
+        all |= thesis_of(row, f);
+    }
+    return all;
+}
+
+void stages_print(FILE *out, const progress_line *line, const stage_facts *f, double seconds)
+{
+    double taken[STAGE_ROWS] = { 0 }, sum = 0;
+    bool began[STAGE_ROWS] = { false };
+    unsigned done = of_thesis(line, f, taken, began);
+    fprintf(out, "  %-10s%9s%10s  %s\n", "stage", "seconds", "faces/s",
+            "stages of the thesis (EBP-Octree 2017, 3.6.4)");
+    for (int r = 0; r < STAGE_ROWS; r++) {
+        if (!began[r])
+            continue;
+        print_row(out, rows[r].name, taken[r], f->faces);
+        print_thesis(out, thesis_of((stage_row)r, f));
+        sum += thesis_of((stage_row)r, f) ? taken[r] : 0;
+    }
+    print_row(out, "all", seconds, f->faces);
+    fprintf(out, "7 total: %.2f of it in 1 to 6\n", sum);
+    if (!(done & LEAF_PLANES))
+        fprintf(out, "  not made: 3 leaf planes, 5 leaf clipping; readers derive them from a "
+                     "leaf's faces ('--with leaf-planes' stores them)\n");
+}
+
+/* --- JSON --- */
+
+static void thesis_numbers(json *j, unsigned thesis)
+{
+    json_array(j, "thesis");
+    for (int i = 0; i < THESIS_STAGES; i++)
+        if (thesis >> i & 1)
+            json_int(j, NULL, i + 1);
+    json_end(j);
+}
+
+/* A stage of the thesis, and the rows that do its work; the last one is the sum. */
+static void thesis_stage(json *j, int number, const stage_facts *f, const bool began[STAGE_ROWS],
+                         const double taken[STAGE_ROWS])
+{
+    double sum = 0;
+    unsigned wanted = number == THESIS_STAGES ? (1u << THESIS_STAGES) - 1 : 1u << number;
+    json_object(j, NULL);
+    json_int(j, "number", number + 1);
+    json_text(j, "name", thesis_names[number]);
+    json_array(j, "in");
+    for (int r = 0; r < STAGE_ROWS; r++)
+        if (began[r] && thesis_of((stage_row)r, f) & wanted) {
+            json_text(j, NULL, rows[r].name);
+            sum += taken[r];
+        }
+    json_end(j);
+    if (number == THESIS_STAGES)
+        json_real(j, "seconds", sum);
+    json_end(j);
+}
+
+void stages_json(json *j, const progress_line *line, const stage_facts *f)
+{
+    double taken[STAGE_ROWS] = { 0 };
+    bool began[STAGE_ROWS] = { false };
+    of_thesis(line, f, taken, began);
+    json_array(j, "stages");
+    for (int i = 0; i < line->stage_count; i++) {
+        stage_row row = stages_row(line->stages[i].name);
+        json_object(j, NULL);
+        json_text(j, "stage", line->stages[i].name);
+        json_text(j, "name", rows[row].name);
+        json_real(j, "seconds", line->stages[i].seconds);
+        thesis_numbers(j, thesis_of(row, f));
+        json_end(j);
+    }
+    json_end(j);
+    json_array(j, "thesis_stages");
+    for (int i = 0; i <= THESIS_STAGES; i++)
+        thesis_stage(j, i, f, began, taken);
+    json_end(j);
+}

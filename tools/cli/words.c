@@ -1,0 +1,99 @@
+#include "cli/words.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+const char *const rule_words[] = { "nonzero", "evenodd", "positive", NULL };
+const char *const selection_words[] = { "inherit", "kmedoids", "offset", "random", NULL };
+const char *const normals_words[] = { "spherical", "angle", NULL };
+const char *const codec_words[] = { "zstd", "deflate", "none", NULL };
+const char *const part_words[] = { "planes", "mesh", "maps", "leaf-planes", NULL };
+
+static char *scaled(char *out, size_t room, double v, const char *unit)
+{
+    static const char prefix[] = " KMGTPE";
+    int i = 0;
+    while (v >= 999.5 && prefix[i + 1]) {
+        v /= 1000;
+        i++;
+    }
+    if (i == 0)
+        snprintf(out, room, "%.0f%s%s", v, *unit ? " " : "", unit);
+    else
+        snprintf(out, room, "%.*f %c%s", v < 9.995 ? 2 : v < 99.95 ? 1 : 0, v, prefix[i], unit);
+    return out;
+}
+
+char *words_count(char *out, size_t room, double v) { return scaled(out, room, v, ""); }
+
+char *words_bytes(char *out, size_t room, uint64_t bytes)
+{
+    return scaled(out, room, (double)bytes, "B");
+}
+
+char *words_plural(char *out, size_t room, uint64_t count, const char *one, const char *many)
+{
+    snprintf(out, room, "%llu %s", (unsigned long long)count, count == 1 ? one : many);
+    return out;
+}
+
+char *words_parts(char *out, size_t room, uint32_t parts)
+{
+    size_t used = 0;
+    out[0] = 0;
+    for (int i = 0; part_words[i]; i++)
+        if (parts >> i & 1 && used < room)
+            used +=
+                (size_t)snprintf(out + used, room - used, "%s%s", used ? ", " : "", part_words[i]);
+    return out;
+}
+
+char *words_format(char *out, size_t room, int major, int minor)
+{
+    snprintf(out, room, "%d.%d", major, minor);
+    return out;
+}
+
+const char *words_node_type(ebpo_node_type type)
+{
+    static const char *const words[] = { "white", "black", "leaf", "gray" };
+    return words[type];
+}
+
+const char *words_rule(ebpo_rule rule) { return (unsigned)rule < 3 ? rule_words[rule] : "unknown"; }
+
+const char *words_codec(ebpo_codec codec)
+{
+    return (unsigned)codec < 3 ? codec_words[codec] : "unknown";
+}
+
+void words_hex(const uint8_t digest[32], char out[65])
+{
+    for (int i = 0; i < 32; i++)
+        snprintf(out + 2 * i, 3, "%02x", digest[i]);
+}
+
+bool words_read_unit(const char *text, const char *const *units, const uint64_t *factors,
+                     uint64_t *out)
+{
+    char *end;
+    errno = 0;
+    unsigned long long v = strtoull(text, &end, 10);
+    if (end == text || errno || text[0] < '0' || text[0] > '9')
+        return false;
+    for (int i = 0; units[i]; i++)
+        if (strcmp(end, units[i]) == 0)
+            return !__builtin_mul_overflow((uint64_t)v, factors[i], out);
+    return false;
+}
+
+bool words_read_size(const char *text, uint64_t *out)
+{
+    static const char *const units[] = { "", "K", "M", "G", "T", "k", "m", "g", "t", NULL };
+    static const uint64_t factors[] = { 1,        1u << 10,          1u << 20,
+                                        1u << 30, UINT64_C(1) << 40, 1u << 10,
+                                        1u << 20, 1u << 30,          UINT64_C(1) << 40 };
+    return words_read_unit(text, units, factors, out);
+}

@@ -1,0 +1,479 @@
+/* ebpo bench: how long questions take, alone and together, warm and from a cold start. */
+#include <errno.h>
+#include <float.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bench/bench_points.h"
+#include "bench/bench_run.h"
+#include "cli/answers.h"
+#include "cli/command.h"
+#include "cli/query_args.h"
+#include "cli/words.h"
+#include "cmd/commands.h"
+
+typedef struct values {
+    query_values q; /* first: its rows of options are shared */
+    int query;
+    const char *points, *mode, *save_points, *save_answers;
+    int64_t count, seed, repeat;
+    double rate;
+} values;
+
+static const char *const query_words[] = { "inside", "distance", "ray", NULL };
+enum { REPEAT_MAX = 99 };
+/* What became of a question for a distance or a ray. Interval: level or deadline did not suffice.
+ */
+enum { NOTHING, FOUND, INTERVAL };
+
+static const arg_option options[] = {
+    { "query", 0, ARG_WORD, offsetof(values, query), "QUERY",
+      "inside (the default), distance or ray", 0, 0, query_words },
+    { "points", 0, ARG_TEXT, offsetof(values, points), "WHAT",
+      "uniform (the default): in the bounding box; path: a walk along\nthe surface; or a file of "
+      "points or rays",
+      0, 0, NULL },
+    ARG_SWITCH("raw", 0, query_values, raw, "the file of points holds little-endian doubles"),
+    { "count", 0, ARG_INT, offsetof(values, count), "N",
+      "how many; the default: 100000, or all of the file", 1, 1e9, NULL },
+    { "seed", 0, ARG_INT, offsetof(values, seed), "S",
+      "of uniform points and paths; the default: 1", 0, 1e15, NULL },
+    { "repeat", 0, ARG_INT, offsetof(values, repeat), "R",
+      "ask everything R times; the figures are those of the median mean", 1, REPEAT_MAX, NULL },
+    { "rate", 0, ARG_REAL, offsetof(values, rate), "HZ",
+      "ask so many single questions a second, and sleep in between", 0, 1e9, NULL },
+    { "mode", 'm', ARG_TEXT, offsetof(values, mode), "MODE",
+      "as for 'ebpo inside' or 'ebpo distance'", 0, 0, NULL },
+    { "max-distance", 0, ARG_REAL, offsetof(query_values, max_distance), "D",
+      "as for 'ebpo distance'", 0, DBL_MAX, NULL },
+    ARG_SWITCH("unsigned", 0, query_values, unsigned_distance, "as for 'ebpo distance'"),
+    ARG_SWITCH("no-warm", 0, query_values, no_warm, "as for 'ebpo distance'"),
+    QUERY_LIMIT_OPTIONS("look at levels 0 to L only"),
+    QUERY_MODEL_OPTIONS,
+    QUERY_PREFETCH_OPTION,
+    { "save-points", 0, ARG_TEXT, offsetof(values, save_points), "FILE",
+      "write what was asked about, as little-endian doubles", 0, 0, NULL },
+    { "save-answers", 0, ARG_TEXT, offsetof(values, save_answers), "FILE",
+      "write the answers: inside a byte each, as in 'where';\nelse a double (distance or t) and an "
+      "int64 (face or -1)",
+      0, 0, NULL },
+    ARG_SWITCH("json", 0, query_values, json, "print all of it as JSON"),
+    REMOTE_OPTIONS(query_values, remote),
+    { 0 },
+};
+
+static const arg_spec spec = {
+    .command = "bench",
+    .operands = "MODEL",
+    .least = 1,
+    .most = 1,
+    .summary = "how long questions to a file take",
+    .text = "MODEL is an .ebpo.h5 file or its URL. One thread asks. First a cold start (the system "
+            "is asked to forget the file), then each question by\n"
+            "itself, then all of them at once.",
+    .options = options,
+};
+
+/* Everything measured. */
+typedef struct results {
+    uint64_t clock_ns;
+    double cold_pages, cold_open_seconds, cold_seconds, open_seconds;
+    uint64_t cold_bytes, cold_reads, peak;
+    bench_figures figures;
+    ebpo_model_stats model, model_end; /* after the first pass, and after all */
+    traffic traffic;                   /* of the warm session */
+    uint64_t answered[4];              /* inside: by ebpo_where; else NOTHING, FOUND or INTERVAL */
+} results;
+
+/* The words of --mode belong to the question. */
+static bool set_mode(values *v)
+{
+    const char *const *words = v->query == BENCH_INSIDE ? inside_modes : distance_modes;
+    if (!v->mode)
+        return true;
+    for (int i = 0; words[i] && v->query != BENCH_RAY; i++)
+        if (strcmp(words[i], v->mode) == 0) {
+            *(v->query == BENCH_INSIDE ? &v->q.inside_mode : &v->q.distance_mode) = i;
+            return true;
+        }
+    fprintf(stderr, "ebpo bench: --mode: '%s' is no mode of %s; 'ebpo %s --help' %s\n", v->mode,
+            query_words[v->query], query_words[v->query],
+            v->query == BENCH_RAY ? "has no modes" : "names them");
+    return false;
+}
+
+/* --- measuring --- */
+
+/* From a file that the system has forgotten to the first answer. */
+static int cold_start(const bench_job *job, const char *path, const ebpo_model_options *holding,
+                      const remote_values *remote, results *r)
+{
+    query_session s = QUERY_SESSION_INIT;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_model_stats stats;
+    r->cold_pages = bench_drop_file(path);
+    uint64_t begin = bench_clock();
+    int code = query_open(&s, "bench", path, holding, job->options.level, remote);
+    r->cold_open_seconds = (double)(bench_clock() - begin) * 1e-9;
+    if (code == EXIT_FINE && bench_ask(job, s.context, 0, &error) != EBPO_OK)
+        code = command_failed("bench", &error);
+    r->cold_seconds = (double)(bench_clock() - begin) * 1e-9;
+    if (code == EXIT_FINE) {
+        ebpo_model_get_stats(s.model, &stats);
+        r->cold_bytes = stats.bytes_read;
+        r->cold_reads = stats.reads;
+    }
+    query_close(&s);
+    return code;
+}
+
+static bench_figures median_by_mean(const bench_figures *f, int count)
+{
+    for (int i = 0; i < count; i++) {
+        int below = 0;
+        for (int k = 0; k < count; k++)
+            below += f[k].mean < f[i].mean || (!(f[i].mean < f[k].mean) && k < i);
+        if (below == (count - 1) / 2)
+            return f[i];
+    }
+    return f[0];
+}
+
+static double median_batch(const bench_figures *f, int count)
+{
+    bench_figures by_batch[REPEAT_MAX];
+    for (int i = 0; i < count; i++)
+        by_batch[i] = (bench_figures){ .mean = f[i].batch };
+    return median_by_mean(by_batch, count).mean;
+}
+
+/* Every file but the two words. */
+static bool is_generated(const char *what)
+{
+    return strcmp(what, "uniform") == 0 || strcmp(what, "path") == 0;
+}
+
+/* Options without effect are refused, or figures would be taken for something that they are not. */
+static bool options_fit(const values *v)
+{
+    char with[40];
+    unsigned idle = QUERY_UNSIGNED | QUERY_MAX_DISTANCE | QUERY_NO_WARM;
+    if (v->query == BENCH_RAY)
+        idle |= QUERY_LEVEL | QUERY_DEADLINE | QUERY_PREFETCH;
+    snprintf(with, sizeof with, "--query %s", query_words[v->query]);
+    if (v->q.raw && is_generated(v->points)) {
+        fprintf(stderr,
+                "ebpo bench: --raw has no effect with --points %s; leave one of them away, or try "
+                "'ebpo bench --help'\n",
+                v->points);
+        return false;
+    }
+    if (v->seed >= 0 && !is_generated(v->points)) {
+        fprintf(stderr,
+                "ebpo bench: --seed has no effect with --points %s; leave one of them away, or try "
+                "'ebpo bench --help'\n",
+                v->points);
+        return false;
+    }
+    if (v->query == BENCH_DISTANCE)
+        return query_distance_fits("bench", &v->q);
+    return query_accepts("bench", &v->q, idle, with) && query_inside_fits("bench", &v->q);
+}
+
+/* Bit by bit: NAN stands for what was not found. */
+static bool same_reals(const double *a, const double *b, int count)
+{
+    return memcmp(a, b, (size_t)count * sizeof *a) == 0;
+}
+
+static bool same_answer(bench_query query, const void *one, const void *other, uint64_t i)
+{
+    if (query == BENCH_INSIDE) {
+        const ebpo_inside_result *a = (const ebpo_inside_result *)one + i,
+                                 *b = (const ebpo_inside_result *)other + i;
+        return a->where == b->where && a->winding == b->winding &&
+               same_reals(&a->doubt, &b->doubt, 1);
+    }
+    if (query == BENCH_DISTANCE) {
+        const ebpo_distance_result *a = (const ebpo_distance_result *)one + i,
+                                   *b = (const ebpo_distance_result *)other + i;
+        return same_reals(&a->distance, &b->distance, 1) && same_reals(&a->lo, &b->lo, 1) &&
+               same_reals(&a->hi, &b->hi, 1) && same_reals(a->point, b->point, 3) &&
+               same_reals(a->normal, b->normal, 3) && a->face == b->face;
+    }
+    const ebpo_ray_hit *a = (const ebpo_ray_hit *)one + i, *b = (const ebpo_ray_hit *)other + i;
+    return same_reals(&a->t, &b->t, 1) && a->face == b->face && a->side == b->side;
+}
+
+/* The batch must say what single questions said, unless time decides. */
+static int compare_answers(const bench_job *job, const void *batch)
+{
+    if (job->options.deadline_ns)
+        return EXIT_FINE;
+    for (uint64_t i = 0; i < job->count; i++)
+        if (!same_answer(job->query, job->answers, batch, i)) {
+            fprintf(stderr,
+                    "ebpo bench: question %" PRIu64
+                    " has one answer alone and another one in a batch: please report this\n",
+                    i);
+            return EXIT_FAILED;
+        }
+    return EXIT_FINE;
+}
+
+static int measure(const bench_job *job, query_session *s, int repeat, void *batch, results *r)
+{
+    bench_figures f[REPEAT_MAX] = { { 0 } };
+    ebpo_error error = EBPO_ERROR_INIT;
+    for (int i = 0; i < repeat; i++) {
+        ebpo_status status = bench_singly(job, s->context, r->clock_ns, &f[i], &error);
+        if (status == EBPO_OK && i == 0)
+            ebpo_model_get_stats(s->model, &r->model);
+        if (status == EBPO_OK)
+            status = bench_batch(job, s->context, batch, &f[i], &error);
+        if (status != EBPO_OK)
+            return command_failed("bench", &error);
+    }
+    ebpo_model_get_stats(s->model, &r->model_end);
+    r->peak = bench_peak_memory();
+    r->figures = median_by_mean(f, repeat);
+    r->figures.batch = median_batch(f, repeat);
+    return compare_answers(job, batch);
+}
+
+static void count_answers(const bench_job *job, results *r)
+{
+    const ebpo_inside_result *inside = job->answers;
+    const ebpo_distance_result *distance = job->answers;
+    const ebpo_ray_hit *hit = job->answers;
+    for (uint64_t i = 0; i < job->count; i++)
+        if (job->query == BENCH_INSIDE)
+            r->answered[inside[i].where & 3]++;
+        else if (job->query == BENCH_DISTANCE)
+            r->answered[isnan(distance[i].distance)   ? INTERVAL
+                        : isinf(distance[i].distance) ? NOTHING
+                                                      : FOUND]++;
+        else
+            r->answered[hit[i].face != EBPO_NO_FACE ? FOUND : NOTHING]++;
+}
+
+static int save_answers(const bench_job *job, const char *path)
+{
+    FILE *f = fopen(path, "wb");
+    for (uint64_t i = 0; f && i < job->count; i++) {
+        if (job->query == BENCH_INSIDE) {
+            putc(((const ebpo_inside_result *)job->answers)[i].where, f);
+            continue;
+        }
+        const ebpo_distance_result *d = (const ebpo_distance_result *)job->answers + i;
+        const ebpo_ray_hit *h = (const ebpo_ray_hit *)job->answers + i;
+        raw_double(f, job->query == BENCH_DISTANCE ? d->distance : h->t);
+        raw_u64(f, job->query == BENCH_DISTANCE ? d->face : h->face); /* EBPO_NO_FACE is -1 */
+    }
+    bool good = f && !ferror(f);
+    if (f && fclose(f) != 0)
+        good = false;
+    if (!good)
+        fprintf(stderr, "ebpo bench: %s: cannot be written: %s\n", path, strerror(errno));
+    return good ? EXIT_FINE : EXIT_FAILED;
+}
+
+/* --- telling --- */
+
+static void print_answers(const values *v, const results *r)
+{
+    if (v->query == BENCH_INSIDE)
+        printf("answers        %" PRIu64 " IN, %" PRIu64 " OUT, %" PRIu64 " ON, %" PRIu64
+               " MAYBE\n",
+               r->answered[EBPO_IN], r->answered[EBPO_OUT], r->answered[EBPO_ON],
+               r->answered[EBPO_MAYBE]);
+    else if (v->query == BENCH_DISTANCE)
+        printf("answers        %" PRIu64 " %s, %" PRIu64 " an interval, %" PRIu64
+               " nothing found\n",
+               r->answered[FOUND], v->q.distance_mode == EBPO_DISTANCE_EXACT ? "exact" : "found",
+               r->answered[INTERVAL], r->answered[NOTHING]);
+    else
+        printf("answers        %" PRIu64 " found, %" PRIu64 " nothing found\n", r->answered[FOUND],
+               r->answered[NOTHING]);
+}
+
+static void print_results(const values *v, const char *path, uint64_t count, const results *r)
+{
+    const bench_figures *f = &r->figures;
+    char bytes[40], peak[40], memory[40];
+    printf("%s: %s, %s, %" PRIu64 " of them\n", path, query_words[v->query], v->points, count);
+    printf("single         mean %.1f ns, p50 %" PRIu64 ", p99 %" PRIu64 ", p99.9 %" PRIu64
+           ", max %" PRIu64 "\n",
+           f->mean, f->p50, f->p99, f->p999, f->max);
+    printf("               (the clock's %" PRIu64 " ns are subtracted)\n", r->clock_ns);
+    printf("batch          %.1f ns a query\n", f->batch);
+    printf("open           %.6f s\n", r->open_seconds);
+    printf("cold start     %.6f s to the first answer, of which %.6f s to open; %s in %" PRIu64
+           " reads",
+           r->cold_seconds, r->cold_open_seconds, words_bytes(bytes, sizeof bytes, r->cold_bytes),
+           r->cold_reads);
+    if (r->cold_pages >= 0)
+        printf("; the system still held %.0f %% of the file", 100 * r->cold_pages);
+    printf("\nread           %s in %" PRIu64 " reads\n",
+           words_bytes(bytes, sizeof bytes, r->model.bytes_read), r->model.reads);
+    printf("peak memory    %s of the process, %s of the model\n",
+           r->peak ? words_bytes(peak, sizeof peak, r->peak) : "unknown",
+           words_bytes(memory, sizeof memory, r->model_end.memory_peak));
+    print_answers(v, r);
+    printf("model          ");
+    stats_print(stdout, false, &r->model);
+    remote_tell(&r->traffic, &v->q.remote, false);
+}
+
+static void json_answers(json *j, const values *v, const results *r)
+{
+    static const char *const inside_names[] = { "out", "in", "on", "maybe" },
+                             *const other_names[] = { "not_found", "found", "interval" };
+    int count = v->query == BENCH_INSIDE ? 4 : v->query == BENCH_DISTANCE ? 3 : 2;
+    json_object(j, "answers");
+    for (int i = 0; i < count; i++)
+        json_uint(j, v->query == BENCH_INSIDE ? inside_names[i] : other_names[i], r->answered[i]);
+    json_end(j);
+}
+
+static void json_figures(json *j, const results *r)
+{
+    json_object(j, "ns");
+    json_real(j, "mean", r->figures.mean);
+    json_uint(j, "p50", r->figures.p50);
+    json_uint(j, "p99", r->figures.p99);
+    json_uint(j, "p999", r->figures.p999);
+    json_uint(j, "max", r->figures.max);
+    json_end(j);
+    json_real(j, "batch_ns", r->figures.batch);
+    json_uint(j, "clock_ns", r->clock_ns);
+    json_real(j, "open_seconds", r->open_seconds);
+    json_real(j, "cold_open_seconds", r->cold_open_seconds);
+    json_real(j, "cold_first_answer_seconds", r->cold_seconds);
+    json_uint(j, "cold_bytes_read", r->cold_bytes);
+    json_uint(j, "cold_reads", r->cold_reads);
+    if (r->cold_pages >= 0)
+        json_real(j, "cold_share_still_held", r->cold_pages);
+    else
+        json_null(j, "cold_share_still_held");
+    json_uint(j, "bytes_read", r->model.bytes_read);
+    if (r->peak)
+        json_uint(j, "peak_memory_bytes", r->peak);
+    else
+        json_null(j, "peak_memory_bytes");
+}
+
+static void print_json(const values *v, const char *path, uint64_t count, const results *r)
+{
+    json j;
+    json_begin(&j, stdout);
+    json_object(&j, NULL);
+    json_text(&j, "file", path);
+    json_text(&j, "query", query_words[v->query]);
+    if (v->query == BENCH_RAY)
+        json_null(&j, "mode");
+    else
+        json_text(&j, "mode",
+                  v->query == BENCH_INSIDE ? inside_modes[v->q.inside_mode]
+                                           : distance_modes[v->q.distance_mode]);
+    json_int(&j, "level", v->q.level);
+    json_text(&j, "points", v->points);
+    json_uint(&j, "count", count);
+    if (is_generated(v->points))
+        json_int(&j, "seed", v->seed);
+    else
+        json_null(&j, "seed");
+    json_int(&j, "repeat", v->repeat);
+    if (v->rate > 0)
+        json_real(&j, "rate", v->rate);
+    json_figures(&j, r);
+    json_answers(&j, v, r);
+    stats_json(&j, "model", &r->model);
+    stats_json(&j, "model_at_end", &r->model_end);
+    remote_json(&j, &r->traffic, &v->q.remote);
+    json_finish(&j);
+}
+
+/* --- the command --- */
+
+static int bench(bench_job *job, const values *v, const char *path,
+                 const ebpo_model_options *holding, void *batch)
+{
+    results r = { .clock_ns = bench_clock_cost() };
+    query_session s = QUERY_SESSION_INIT;
+    bench_reset_peak();
+    int code = cold_start(job, path, holding, &v->q.remote, &r);
+    uint64_t begin = bench_clock();
+    if (code == EXIT_FINE)
+        code = query_open(&s, "bench", path, holding, job->options.level, &v->q.remote);
+    r.open_seconds = (double)(bench_clock() - begin) * 1e-9;
+    if (code == EXIT_FINE)
+        code = measure(job, &s, (int)v->repeat, batch, &r);
+    if (s.file)
+        r.traffic = traffic_of(s.file);
+    query_close(&s);
+    if (code == EXIT_FINE && v->save_answers)
+        code = save_answers(job, v->save_answers);
+    if (code != EXIT_FINE)
+        return code;
+    count_answers(job, &r);
+    (v->q.json ? print_json : print_results)(v, remote_shown(path), job->count, &r);
+    return EXIT_FINE;
+}
+
+static int prepare(const values *v, const char *path, bench_points *p)
+{
+    points_kind kind = v->query == BENCH_RAY ? POINTS_RAYS : POINTS;
+    *p = (bench_points){ .rows = NULL };
+    if (!command_wants_hdf5("bench", path))
+        return EXIT_FAILED;
+    int code = bench_points_make(p, kind, path, &v->q.remote, v->points, v->q.raw,
+                                 (uint64_t)v->count, (uint64_t)v->seed);
+    if (code == EXIT_FINE && v->save_points)
+        code = bench_points_save(p, v->save_points);
+    return code;
+}
+
+static int run(int argc, char **argv)
+{
+    values v = { .q = QUERY_VALUES_INIT, .points = "uniform", .seed = -1, .repeat = 1 };
+    const char *operand[ARGS_OPERANDS_MAX];
+    ebpo_model_options holding;
+    bench_job job = { .answers = NULL };
+    bench_points p;
+    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
+    if (parsed != ARGS_RUN)
+        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    if (!set_mode(&v) || !options_fit(&v) ||
+        !query_options_from("bench", &v.q, &holding, &job.options))
+        return EXIT_USAGE;
+    if (v.seed < 0)
+        v.seed = 1;
+    int code = prepare(&v, operand[0], &p);
+    job.query = (bench_query)v.query;
+    job.rows = p.rows;
+    job.width = points_width(p.kind);
+    job.count = p.count;
+    job.rate = v.rate;
+    size_t bytes = bench_answer_bytes(job.query);
+    void *batch = calloc(p.count + 1, bytes);
+    job.answers = calloc(p.count + 1, bytes);
+    job.ns = calloc(p.count + 1, sizeof *job.ns);
+    if (code == EXIT_FINE && (!batch || !job.answers || !job.ns)) {
+        fprintf(stderr, "ebpo bench: not enough memory\n");
+        code = EXIT_FAILED;
+    }
+    if (code == EXIT_FINE)
+        code = bench(&job, &v, operand[0], &holding, batch);
+    free(batch);
+    free(job.answers);
+    free(job.ns);
+    bench_points_free(&p);
+    return code;
+}
+
+const command command_bench = { &spec, run };

@@ -1,0 +1,52 @@
+/* ebpo box: which faces meet boxes. */
+#include <stddef.h>
+
+#include "cli/command.h"
+#include "cmd/commands.h"
+#include "cmd/query_run.h"
+
+static const arg_option options[] = {
+    QUERY_MODEL_OPTIONS,
+    QUERY_FORM_OPTIONS(
+        "boxes are six doubles each, answers a uint64 count and as many\nuint64 (little-endian)"),
+    { 0 },
+};
+
+static const arg_spec spec = {
+    .command = "box",
+    .operands = "MODEL [BOXES]",
+    .least = 1,
+    .most = 2,
+    .summary = "which faces meet boxes: how many, and their numbers",
+    .text = "MODEL is an .ebpo.h5 file. BOXES: lines 'x0 y0 z0 x1 y1 z1', the lower corner first; "
+            "absent or '-': standard input. Faces and\n"
+            "boxes are closed: touching counts.",
+    .options = options,
+};
+
+static ebpo_status answer(const query_job *job, ebpo_context *context, const double *rows,
+                          uint64_t count, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
+        const uint64_t *faces;
+        uint64_t found;
+        status = ebpo_faces_in_box(context, rows + 6 * i, rows + 6 * i + 3, &faces, &found, error);
+        if (status == EBPO_OK)
+            answers_box(job->form, faces, found);
+    }
+    return status;
+}
+
+static int run(int argc, char **argv)
+{
+    query_values v = QUERY_VALUES_INIT;
+    const char *operand[ARGS_OPERANDS_MAX];
+    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
+    if (parsed != ARGS_RUN)
+        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    query_job job = { .command = "box", .values = &v, .kind = POINTS_BOXES, .answer = answer };
+    return query_run(&job, operand[0], operand[1]);
+}
+
+const command command_box = { &spec, run };

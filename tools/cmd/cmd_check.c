@@ -1,0 +1,102 @@
+/* ebpo check: what a mesh is, before anything is built from it. */
+#include <stddef.h>
+#include <stdio.h>
+
+#include "cli/command.h"
+#include "cli/memory_args.h"
+#include "cli/mesh_findings.h"
+#include "cli/prepare.h"
+#include "cli/progress.h"
+#include "cmd/commands.h"
+
+typedef struct values {
+    mending mend;
+    bool require_solid, json, quiet;
+    int64_t threads;
+    memory_values memory;
+} values;
+
+static const arg_option options[] = {
+    ARG_SWITCH("weld", 0, values, mend.weld, "first merge vertices at one position (STL: always)"),
+    ARG_SWITCH("orient", 0, values, mend.orient,
+               "then make neighbouring faces agree in orientation"),
+    ARG_SWITCH("fill-holes", 0, values, mend.fill_holes, "then close simple boundary loops"),
+    ARG_SWITCH("require-solid", 0, values, require_solid,
+               "end with code 3 if the mesh is not a solid"),
+    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores",
+      0, 256, NULL },
+    MEMORY_OPTIONS(values, memory),
+    ARG_SWITCH("json", 0, values, json, "print the report as JSON"),
+    ARG_SWITCH("quiet", 'q', values, quiet, "no report, no progress: errors and warnings only"),
+    { 0 },
+};
+
+static const arg_spec spec = {
+    .command = "check",
+    .operands = "IN.ply",
+    .least = 1,
+    .most = 1,
+    .summary = "what a mesh is: solid or surface, and each finding with its places",
+    .text = "With mending options: what it would be after mending. Nothing is written.",
+    .options = options,
+};
+
+static void print_json(const prepared *p, const char *path)
+{
+    json j;
+    json_begin(&j, stdout);
+    json_object(&j, NULL);
+    json_text(&j, "file", path);
+    findings_json_source(&j, "source", &p->as_read);
+    findings_json(&j, "report", &p->before);
+    if (p->mended) {
+        findings_json_mending(&j, "mend", &p->record);
+        findings_json(&j, "report_after_mending", &p->report);
+    }
+    json_finish(&j);
+}
+
+static void print_words(const prepared *p, const char *path)
+{
+    findings_print(stdout, path, &p->as_read, &p->before);
+    if (!p->mended)
+        return;
+    findings_print_mending(stdout, &p->record);
+    findings_print(stdout, "after mending", &p->mesh, &p->report);
+}
+
+static int run(int argc, char **argv)
+{
+    values v = { 0 };
+    const char *operand[ARGS_OPERANDS_MAX];
+    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
+    if (parsed != ARGS_RUN)
+        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    if (!memory_good("check", &v.memory))
+        return EXIT_USAGE;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_workspace *workspace = NULL;
+    ebpo_status status = memory_make(&workspace, &v.memory, &error);
+    if (status != EBPO_OK)
+        return command_failed("check", &error);
+    progress_line line;
+    ebpo_progress progress = progress_start(&line, "check", v.quiet);
+    prepared p;
+    status = prepare_mesh(&p, operand[0], v.mend, workspace, (unsigned)v.threads, progress, &error);
+    progress_wipe(&line);
+    if (status != EBPO_OK) {
+        ebpo_workspace_free(workspace);
+        return command_failed("check", &error);
+    }
+    if (v.json)
+        print_json(&p, operand[0]);
+    else if (!v.quiet)
+        print_words(&p, operand[0]);
+    command_flush("check");
+    findings_warn(stderr, "check", operand[0], &p.report, &p.record);
+    ebpo_mesh_free(&p.mesh);
+    ebpo_workspace_free(workspace);
+    return v.require_solid && !p.report.balanced ? EXIT_NOT_SOLID : EXIT_FINE;
+}
+
+const command command_check = { &spec, run };

@@ -1,0 +1,379 @@
+/* ebpo convert: from a mesh to an .ebpo.h5 file. */
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "cli/command.h"
+#include "cli/file_facts.h"
+#include "cli/memory_args.h"
+#include "cli/mesh_findings.h"
+#include "cli/prepare.h"
+#include "cli/progress.h"
+#include "cli/selection_args.h"
+#include "cli/stages.h"
+#include "cli/words.h"
+#include "cmd/commands.h"
+#include "cmd/subset_run.h"
+
+typedef struct values {
+    int64_t max_level, leaf_faces, zstd_level, threads;
+    double epsilon, percent, max_error;
+    int select, normals;
+    int64_t seed;
+    const char *k_root, *target_size;
+    memory_values memory;
+    uint32_t with, without;
+    int codec, rule, profile;
+    mending mend;
+    bool require_solid, json, quiet;
+    const char *unit, *crs, *date;
+} values;
+
+static const char *const with_words[] = { "leaf-planes", NULL };
+static const char *const without_words[] = { "planes", "mesh", "maps",
+                                             NULL }; /* word i is ebpo_part bit i */
+
+static const arg_option options[] = {
+    { "max-level", 0, ARG_INT, offsetof(values, max_level), "N",
+      "deepest level, 0 to 20; default: until cells are as short as\nthe mean edge", 0, 20, NULL },
+    { "leaf-faces", 0, ARG_INT, offsetof(values, leaf_faces), "N",
+      "a node with at most N faces becomes a leaf; 0: only the\ndeepest level stops; default 16", 0,
+      4294967295.0, NULL },
+    { "epsilon", 0, ARG_REAL, offsetof(values, epsilon), "E",
+      "a plane is kept while it removes at least this share of\nits cell; default 0.003", 0, 1,
+      NULL },
+    { "select", 0, ARG_WORD, offsetof(values, select), "NAME",
+      "how planes are chosen: inherit (the default), or as in the\ntheses: kmedoids, offset "
+      "(least), random",
+      0, 0, selection_words },
+    { "percent", 0, ARG_REAL, offsetof(values, percent), "P",
+      "the theses' ways: share of the candidates that is taken;\ndefault 40", 0, 100, NULL },
+    { "k-root", 0, ARG_TEXT, offsetof(values, k_root), "K",
+      "instead: K planes at the root, or 'K%' of the faces, half as\nmany at each next level "
+      "(BP-Octree)",
+      0, 0, NULL },
+    { "normals", 0, ARG_WORD, offsetof(values, normals), "NAME",
+      "kmedoids' distance of normals: spherical (the default, the\ntheses') or angle (without "
+      "their poles)",
+      0, 0, normals_words },
+    { "seed", 0, ARG_INT, offsetof(values, seed), "N", "of kmedoids and random; default 1", 0,
+      9007199254740992.0, NULL },
+    { "with", 0, ARG_SET, offsetof(values, with), "LIST", "also store: leaf-planes", 0, 0,
+      with_words },
+    { "without", 0, ARG_SET, offsetof(values, without), "LIST",
+      "leave out: maps, mesh (and with it maps), planes;\ncommas between, may be repeated", 0, 0,
+      without_words },
+    { "profile", 0, ARG_WORD, offsetof(values, profile), "NAME",
+      "instead of --with and --without: full (all parts), lod (for\nviewers: no mesh), collision "
+      "(for exact questions: mesh, no\nmaps); as 'ebpo subset --profile' makes it of a full file",
+      0, 0, profile_words },
+    NEED_OPTIONS(values),
+    { "codec", 0, ARG_WORD, offsetof(values, codec), "NAME", "zstd (the default), deflate or none",
+      0, 0, codec_words },
+    { "zstd-level", 0, ARG_INT, offsetof(values, zstd_level), "N",
+      "effort of zstd, 1 to 22; default 3", 1, 22, NULL },
+    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores",
+      0, 256, NULL },
+    MEMORY_OPTIONS(values, memory),
+    ARG_SWITCH("weld", 0, values, mend.weld, "first merge vertices at one position (STL: always)"),
+    ARG_SWITCH("orient", 0, values, mend.orient,
+               "then make neighbouring faces agree in orientation"),
+    ARG_SWITCH("fill-holes", 0, values, mend.fill_holes, "then close simple boundary loops"),
+    { "rule", 0, ARG_WORD, offsetof(values, rule), "NAME",
+      "inside is where the winding number is nonzero (the default),\nodd (evenodd) or positive", 0,
+      0, rule_words },
+    ARG_SWITCH("require-solid", 0, values, require_solid,
+               "end with code 3 if the mesh is not a solid"),
+    { "unit", 0, ARG_TEXT, offsetof(values, unit), "U", "unit of length to record, such as mm", 0,
+      0, NULL },
+    { "crs", 0, ARG_TEXT, offsetof(values, crs), "C",
+      "coordinate reference system to record, such as EPSG:25832", 0, 0, NULL },
+    { "date", 0, ARG_TEXT, offsetof(values, date), "D",
+      "date to record, such as 2026-03-01; none by default, so that\nequal input gives an equal "
+      "file",
+      0, 0, NULL },
+    ARG_SWITCH("json", 0, values, json, "print reports and facts as JSON"),
+    ARG_SWITCH("quiet", 'q', values, quiet, "no report, no progress: errors and warnings only"),
+    { 0 },
+};
+
+static const arg_spec spec = {
+    .command = "convert",
+    .operands = "IN.ply OUT.ebpo.h5",
+    .least = 2,
+    .most = 2,
+    .summary = "a closed triangle mesh to an .ebpo.h5 file",
+    .text = "IN is PLY, or OBJ, STL or OFF where the library was built with assimp. OUT appears "
+            "whole or not at all;\n"
+            "an older OUT is replaced. Mending is done in the order weld, orient, fill holes.",
+    .options = options,
+};
+
+static int usage_error(const char *message)
+{
+    fprintf(stderr, "ebpo convert: %s; try 'ebpo convert --help'\n", message);
+    return EXIT_USAGE;
+}
+
+static int check_values(const values *v, const char *in, const char *out)
+{
+    selection_options chosen = { 1u << v->select, v->percent, v->epsilon,
+                                 v->k_root,       v->normals, v->seed };
+    int code = selection_check("convert", &chosen);
+    if (code != EXIT_FINE)
+        return code;
+    if (!memory_good("convert", &v->memory))
+        return EXIT_USAGE;
+    if (v->zstd_level && v->codec != EBPO_CODEC_ZSTD)
+        return usage_error("--zstd-level says nothing about --codec deflate or none");
+    if (v->profile >= 0 && (v->with || v->without))
+        return usage_error(
+            "--profile says which parts are stored; leave --with and --without away");
+    if (strcmp(in, out) == 0 || command_same_file(in, out)) {
+        fprintf(stderr,
+                "ebpo convert: %s: is input and output at once; give the output another name\n",
+                out);
+        return EXIT_USAGE;
+    }
+    return EXIT_FINE;
+}
+
+static bool chooses_parts(const values *v)
+{
+    return v->target_size && v->profile < 0 && !v->with && !v->without;
+}
+
+static uint32_t parts_of(const values *v)
+{
+    uint32_t without = v->without;
+    if (v->profile >= 0 ||
+        chooses_parts(
+            v)) /* all are built, so that the file is the one that a subset of the full one is */
+        return ebpo_profile_parts(EBPO_PROFILE_FULL);
+    if (without & EBPO_PART_MESH)
+        without |= EBPO_PART_MAPS;
+    uint32_t parts = (EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS) & ~without;
+    return v->with ? parts | EBPO_PART_LEAF_PLANES : parts;
+}
+
+/* --- output --- */
+
+static void print_reports(const values *v, const prepared *p, const char *in)
+{
+    if (!v->json && !v->quiet) {
+        findings_print(stdout, in, &p->as_read, &p->before);
+        findings_print_mending(stdout, &p->record);
+        if (p->mended)
+            findings_print(stdout, "after mending", &p->mesh, &p->report);
+    }
+    command_flush("convert");
+    findings_warn(stderr, "convert", in, &p->report, &p->record);
+}
+
+static void print_summary(const values *v, const ebpo_info *info, const char *out, double seconds)
+{
+    char bytes[32];
+    int last = info->level_count - 1;
+    printf("%s: %s, levels 0 to %d, %s, %.2f B/face", out, info->solid ? "a solid" : "a surface",
+           last, words_bytes(bytes, sizeof bytes, info->file_bytes),
+           info->face_count ? (double)info->file_bytes / (double)info->face_count : 0);
+    if (info->source_size)
+        printf(", %.0f %% of the source",
+               100 * (double)info->file_bytes / (double)info->source_size);
+    subset_print_need(info, chooses_parts(v));
+    printf(", in %.1f s\n", seconds);
+}
+
+static void print_json(const prepared *p, const ebpo_info *info, const char *out,
+                       const progress_line *line, const stage_facts *stages, double seconds)
+{
+    json j;
+    json_begin(&j, stdout);
+    json_object(&j, NULL);
+    facts_json(&j, out, info);
+    json_object(&j, "input");
+    findings_json_source(&j, "mesh", &p->as_read);
+    findings_json(&j, "report", &p->before);
+    json_end(&j);
+    json_real(&j, "seconds", seconds);
+    stages_json(&j, line, stages);
+    json_finish(&j);
+}
+
+/* What is on the disk, as a reader sees it. */
+static ebpo_status print_result(const values *v, const prepared *p, const char *out,
+                                const progress_line *line, const stage_facts *stages,
+                                double seconds, ebpo_error *error)
+{
+    if (v->quiet && !v->json)
+        return EBPO_OK;
+    ebpo_file *file = NULL;
+    ebpo_status status = ebpo_open(&file, out, error);
+    if (status != EBPO_OK)
+        return status;
+    if (v->json)
+        print_json(p, ebpo_file_info(file), out, line, stages, seconds);
+    else {
+        print_summary(v, ebpo_file_info(file), out, seconds);
+        stages_print(stdout, line, stages, seconds);
+    }
+    ebpo_close(file);
+    return EBPO_OK;
+}
+
+/* --- work --- */
+
+/* Judging what is needed opens the whole model: bytes a face, measured. Told before the hours of
+ * building that it would be too much. */
+static ebpo_status room_to_judge(const values *v, const prepared *p, const char *in,
+                                 const ebpo_workspace *workspace, ebpo_error *error)
+{
+    ebpo_workspace_stats figures;
+    double leaves = 1800 / (double)v->leaf_faces,
+           needed = (double)p->mesh.face_count * (130 + (leaves < 430 ? leaves : 430)) + (16 << 20);
+    char bytes[32], budget[32];
+    ebpo_workspace_get_stats(workspace, &figures);
+    if (needed <= (double)figures.memory)
+        return EBPO_OK;
+    snprintf(error->message, sizeof error->message,
+             "%s: --max-error and --target-size measure with the whole model in memory, some %s of "
+             "it, and the budget is %s; allow more (--memory), or leave them out here and use "
+             "'ebpo subset' where there is more",
+             in, words_bytes(bytes, sizeof bytes, (uint64_t)needed),
+             words_bytes(budget, sizeof budget, figures.memory));
+    return EBPO_E_LIMIT;
+}
+
+/* `need`: the error or size that was asked for. */
+static ebpo_status build_and_write(const values *v, prepared *p, const char *out,
+                                   const ebpo_subset_options *need, ebpo_progress progress,
+                                   ebpo_build_times *times, ebpo_error *error)
+{
+    ebpo_build_options build = EBPO_BUILD_OPTIONS_INIT;
+    build.max_level = (int)v->max_level;
+    build.leaf_faces = (uint32_t)v->leaf_faces;
+    build.epsilon = v->epsilon >= 0 ? v->epsilon : build.epsilon;
+    build.select = (ebpo_selection)v->select;
+    build.percent = v->percent >= 0 ? v->percent : build.percent;
+    build.normals = v->normals >= 0 ? (ebpo_normal_distance)v->normals : build.normals;
+    build.seed = v->seed >= 0 ? (uint64_t)v->seed : build.seed;
+    build.parts = parts_of(v);
+    build.rule = (ebpo_rule)v->rule;
+    build.require_solid = v->require_solid;
+    build.threads = (unsigned)v->threads;
+    build.unit = v->unit;
+    build.crs = v->crs;
+    build.date = v->date;
+    build.progress = progress;
+    build.times = times;
+    ebpo_tree tree;
+    ebpo_status status = selection_k_root(v->k_root, p->mesh.face_count, &build.k_root, error);
+    if (status != EBPO_OK) {
+        ebpo_mesh_free(&p->mesh);
+        return status;
+    }
+    status = ebpo_build(&tree, &p->mesh, &p->report, &p->record, &build, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
+    write.codec = (ebpo_codec)v->codec;
+    write.codec_level = (int)v->zstd_level;
+    write.threads = (unsigned)v->threads;
+    write.progress = progress;
+    if (need->max_error > 0 || need->target_bytes) {
+        ebpo_subset_options subset = *need;
+        subset.write = write;
+        subset.choose_parts = chooses_parts(v);
+        if (v->profile >= 0)
+            subset.parts = ebpo_profile_parts((ebpo_profile)v->profile);
+        return ebpo_subset_of_tree(&tree, out, &subset, error);
+    }
+    if (v->profile >= 0)
+        write.parts = ebpo_profile_parts((ebpo_profile)v->profile);
+    status = ebpo_tree_write(&tree, out, &write, error);
+    ebpo_tree_free(&tree);
+    return status;
+}
+
+/* What is known before the mesh is read; the rest afterwards. */
+static stage_facts plan_stages(const values *v, const char *in)
+{
+    const char *dot = strrchr(in, '.');
+    return (stage_facts){ .mended = v->mend.weld || v->mend.orient || v->mend.fill_holes ||
+                                    (dot && strcasecmp(dot, ".stl") == 0),
+                          .solid = true,
+                          .from_leaves = v->select != EBPO_SELECT_INHERIT,
+                          .judged = v->max_error > 0 || v->target_size,
+                          .leaf_planes = parts_of(v) & EBPO_PART_LEAF_PLANES };
+}
+
+static int run(int argc, char **argv)
+{
+    const ebpo_build_options defaults = EBPO_BUILD_OPTIONS_INIT;
+    values v = { .max_level = -1,
+                 .profile = -1,
+                 .leaf_faces = defaults.leaf_faces,
+                 .epsilon = -1,
+                 .percent = -1,
+                 .normals = -1,
+                 .seed = -1 };
+    const char *operand[ARGS_OPERANDS_MAX];
+    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
+    if (parsed != ARGS_RUN)
+        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    const char *in = operand[0], *out = operand[1];
+    int code = check_values(&v, in, out);
+    if (code != EXIT_FINE)
+        return code;
+    ebpo_subset_options need = EBPO_SUBSET_OPTIONS_INIT;
+    if ((code = subset_need("convert", v.max_error, v.target_size, &need)) != EXIT_FINE)
+        return code;
+    if ((v.max_error > 0 || v.target_size) && v.without & EBPO_PART_MESH)
+        return usage_error("--max-error and --target-size measure against the mesh; leave it out "
+                           "with --profile lod instead of --without mesh");
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_workspace *workspace = NULL;
+    ebpo_status status = ebpo_check_output(out, &error);
+    if (status == EBPO_OK)
+        status = memory_make(&workspace, &v.memory, &error);
+    if (status != EBPO_OK)
+        return command_failed("convert", &error);
+    progress_line line;
+    ebpo_progress progress = progress_start(&line, "convert", v.quiet);
+    stage_facts stages = plan_stages(&v, in);
+    int plan[STAGE_PLAN_MAX];
+    prepared p = { .mended = false };
+    progress_plan(&line, plan, stages_plan(&stages, plan), &p.as_read.face_count);
+    double begun = progress_now();
+    status = prepare_mesh(&p, in, v.mend, workspace, (unsigned)v.threads, progress, &error);
+    progress_wipe(&line);
+    if (status == EBPO_OK) {
+        print_reports(&v, &p, in);
+        if (v.require_solid && !p.report.balanced) {
+            ebpo_mesh_free(&p.mesh);
+            ebpo_workspace_free(workspace);
+            fprintf(stderr,
+                    "ebpo convert: %s: is not a solid, and --require-solid was given; nothing was "
+                    "written\n",
+                    in);
+            return EXIT_NOT_SOLID;
+        }
+        status = stages.judged ? room_to_judge(&v, &p, in, workspace, &error) : EBPO_OK;
+        if (status == EBPO_OK)
+            status = build_and_write(&v, &p, out, &need, progress, &stages.times, &error);
+        else
+            ebpo_mesh_free(&p.mesh);
+        progress_wipe(&line);
+    }
+    progress_end_stage(&line);
+    stages_split(&line, &stages.times);
+    stages.faces = p.as_read.face_count;
+    if (status == EBPO_OK)
+        status = print_result(&v, &p, out, &line, &stages, progress_now() - begun, &error);
+    ebpo_workspace_free(workspace);
+    return status == EBPO_OK ? EXIT_FINE : command_failed("convert", &error);
+}
+
+const command command_convert = { &spec, run };

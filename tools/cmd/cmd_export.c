@@ -1,0 +1,228 @@
+/* ebpo export: levels and the model in other programs' formats. PLY is ebpo extract's. */
+#include <inttypes.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+
+#include "cli/command.h"
+#include "cli/json.h"
+#include "cli/progress.h"
+#include "cli/remote_args.h"
+#include "cli/words.h"
+#include "cmd/commands.h"
+
+typedef struct values {
+    int format;
+    int64_t level, threads;
+    const char *levels;
+    bool mesh, json, quiet;
+    remote_values remote;
+} values;
+
+static const char *const format_words[] = {
+    "xdmf", "vtkhdf", "gltf", "glb", "obj", "stl", NULL
+}; /* as in ebpo_export_format */
+
+static const arg_option options[] = {
+    { "format", 0, ARG_WORD, offsetof(values, format), "FORMAT",
+      "xdmf, vtkhdf, gltf, glb, obj or stl; the default: as OUT ends.\nxdmf comes with a second "
+      "file OUT.h5, gltf with one that ends in .bin",
+      0, 0, format_words },
+    { "level", 0, ARG_INT, offsetof(values, level), "N",
+      "the envelopes of level N, and leaves and black nodes above it", 0, 20, NULL },
+    { "levels", 0, ARG_TEXT, offsetof(values, levels), "A-B",
+      "levels A to B, each a block of its own; not for stl", 0, 0, NULL },
+    ARG_SWITCH("mesh", 0, values, mesh,
+               "the model itself; beside levels a block of its own. xdmf and\nvtkhdf tell its "
+               "source's numbers, the others have its order"),
+    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores",
+      0, 256, NULL },
+    ARG_SWITCH("json", 0, values, json, "print what was written as JSON"),
+    ARG_SWITCH("quiet", 'q', values, quiet, "no summary, no progress: errors and warnings only"),
+    REMOTE_OPTIONS(values, remote),
+    { 0 },
+};
+
+static const arg_spec spec = {
+    .command = "export",
+    .operands = "FILE OUT",
+    .least = 2,
+    .most = 2,
+    .summary = "levels and the model for ParaView (XDMF, VTKHDF), as glTF, OBJ or STL",
+    .text = "FILE is an .ebpo.h5 file or its URL. --level, --levels or --mesh is needed. XDMF and "
+            "VTKHDF keep double\n"
+            "coordinates and the nodes' data; glTF, OBJ and STL hold float32.",
+    .options = options,
+};
+
+static int usage_error(const char *message)
+{
+    fprintf(stderr, "ebpo export: %s; try 'ebpo export --help'\n", message);
+    return EXIT_USAGE;
+}
+
+static int choose_format(values *v, const char *out)
+{
+    const char *dot = strrchr(out, '.');
+    if (dot && strcasecmp(dot, ".ply") == 0 && v->format < 0)
+        return usage_error("PLY is written by 'ebpo extract'");
+    for (int i = 0; dot && v->format < 0 && format_words[i]; i++)
+        if (strcasecmp(dot + 1, format_words[i]) == 0)
+            v->format = i;
+    return v->format >= 0
+               ? EXIT_FINE
+               : usage_error("the format is not told by the output's ending; give --format");
+}
+
+static int choose_levels(const values *v, ebpo_export_options *o)
+{
+    int first, last;
+    char rest;
+    *o = (ebpo_export_options)EBPO_EXPORT_OPTIONS_INIT;
+    o->mesh = v->mesh;
+    if (v->level < 0 && !v->levels && !v->mesh)
+        return usage_error("what shall be exported? give --level N, --levels A-B or --mesh");
+    if (v->level >= 0 && v->levels)
+        return usage_error("--level and --levels exclude each other");
+    if (v->level >= 0)
+        o->first_level = o->last_level = (int)v->level;
+    if (!v->levels)
+        return EXIT_FINE;
+    if (sscanf(v->levels, "%2d-%2d%c", &first, &last, &rest) != 2 || first < 0 || last < first ||
+        last >= EBPO_LEVELS_MAX)
+        return usage_error(
+            "--levels wants the first level, a hyphen and the last one, such as 0-6");
+    o->first_level = first;
+    o->last_level = last;
+    return EXIT_FINE;
+}
+
+static int check_names(const char *in, const char *out, const char *second)
+{
+    const char *names[] = { out, second };
+    for (int i = 0; i < 2; i++)
+        if (*names[i] && (strcmp(in, names[i]) == 0 || command_same_file(in, names[i]))) {
+            fprintf(stderr,
+                    "ebpo export: %s: is input and output at once; give the output another name\n",
+                    names[i]);
+            return EXIT_USAGE;
+        }
+    return EXIT_FINE;
+}
+
+/* --- what was written --- */
+
+static void print_report(const char *out, const char *second, const ebpo_export_report *r)
+{
+    char count[2][40];
+    printf("%s%s%s\n", out, *second ? ", " : "", second);
+    for (int i = 0; i < r->block_count; i++) {
+        const ebpo_export_block *b = &r->block[i];
+        words_plural(count[0], sizeof count[0], b->vertices, "vertex", "vertices");
+        words_plural(count[1], sizeof count[1], b->triangles, "triangle", "triangles");
+        if (b->level < 0)
+            printf("mesh: %s, %s\n", count[0], count[1]);
+        else
+            printf("level %d: %" PRIu64 " envelopes, %s, %s, volume %.9g\n", b->level, b->nodes,
+                   count[0], count[1], b->volume);
+    }
+    if (r->origin[0] != 0 || r->origin[1] != 0 || r->origin[2] != 0)
+        printf("vertices are relative to %.9g %.9g %.9g, the nodes' translation\n", r->origin[0],
+               r->origin[1], r->origin[2]);
+    if (r->largest_change > 0)
+        printf("float32: coordinates are rounded by up to %.3g\n", r->largest_change);
+}
+
+static void json_block(json *j, const ebpo_export_block *b)
+{
+    json_object(j, NULL);
+    if (b->level < 0) {
+        json_text(j, "block", "mesh");
+    } else {
+        json_text(j, "block", "level");
+        json_int(j, "level", b->level);
+        json_uint(j, "envelopes", b->nodes);
+        json_real(j, "volume", b->volume);
+    }
+    json_uint(j, "polygons", b->polygons);
+    json_uint(j, "triangles", b->triangles);
+    json_uint(j, "vertices", b->vertices);
+    json_end(j);
+}
+
+static void print_json(const values *v, const char *out, const char *second,
+                       const ebpo_export_report *r, const traffic *t)
+{
+    json j;
+    json_begin(&j, stdout);
+    json_object(&j, NULL);
+    json_text(&j, "format", format_words[v->format]);
+    json_array(&j, "files");
+    json_text(&j, NULL, out);
+    if (*second)
+        json_text(&j, NULL, second);
+    json_end(&j);
+    json_array(&j, "blocks");
+    for (int i = 0; i < r->block_count; i++)
+        json_block(&j, &r->block[i]);
+    json_end(&j);
+    json_reals(&j, "origin", r->origin, 3);
+    json_real(&j, "largest_change", r->largest_change);
+    remote_json(&j, t, &v->remote);
+    json_finish(&j);
+}
+
+/* --- the command --- */
+
+static int write_out(const values *v, const char *in, const char *out, const char *second,
+                     ebpo_export_options *o)
+{
+    progress_line line;
+    o->progress = progress_start(&line, "export", v->quiet);
+    o->threads = (unsigned)v->threads;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_export_report report = { 0 };
+    ebpo_file *file = NULL;
+    ebpo_status status = remote_open(&file, in, &v->remote, &error);
+    if (status == EBPO_OK)
+        status = ebpo_export(file, out, (ebpo_export_format)v->format, o, &report, &error);
+    progress_wipe(&line);
+    if (status == EBPO_OK) {
+        traffic t = traffic_of(file);
+        if (v->json)
+            print_json(v, out, second, &report, &t);
+        else if (!v->quiet)
+            print_report(out, second, &report);
+        if (!v->json)
+            remote_tell(&t, &v->remote, false);
+    }
+    ebpo_close(file);
+    return status == EBPO_OK ? EXIT_FINE : command_failed("export", &error);
+}
+
+static int run(int argc, char **argv)
+{
+    values v = { .format = -1, .level = -1, .remote = REMOTE_VALUES_INIT };
+    const char *operand[ARGS_OPERANDS_MAX];
+    char second[4096];
+    ebpo_export_options o;
+    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
+    if (parsed != ARGS_RUN)
+        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    int code = choose_format(&v, operand[1]);
+    if (code == EXIT_FINE)
+        code = choose_levels(&v, &o);
+    if (code != EXIT_FINE)
+        return code;
+    if (!ebpo_export_second_file((ebpo_export_format)v.format, operand[1], second, sizeof second))
+        return usage_error("the output's name is too long, or has a ':', which XDMF cannot take");
+    code = check_names(operand[0], operand[1], second);
+    if (code != EXIT_FINE)
+        return code;
+    if (!command_wants_hdf5("export", operand[0]))
+        return EXIT_FAILED;
+    return write_out(&v, operand[0], operand[1], second, &o);
+}
+
+const command command_export = { &spec, run };

@@ -1,0 +1,210 @@
+/* ebpo fetch: a file, or a part of it, from a web server; what has come stays when it is
+ * interrupted. */
+#include <dirent.h>
+#include <errno.h>
+#include <inttypes.h>
+#include <stdatomic.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "cli/command.h"
+#include "cli/progress.h"
+#include "cli/words.h"
+#include "cmd/commands.h"
+#include "cmd/subset_run.h"
+
+static const arg_option options[] = { SUBSET_OPTIONS, { 0 } };
+
+static const arg_spec spec = {
+    .command = "fetch",
+    .operands = "URL OUT.ebpo.h5",
+    .least = 2,
+    .most = 2,
+    .summary = "a file by its URL, or levels, a box, parts of it; goes on where it was interrupted",
+    .text = "Only what is kept is fetched. OUT appears whole or not at all; until then what has "
+            "come lies in the folder\n"
+            "OUT.part, from which the same command goes on. Without options the whole content is "
+            "fetched.",
+    .options = options,
+};
+
+/* --- the folder OUT.part: blocks as the library keeps them (--http-cache) --- */
+
+static const char BLOCK[] = ".ebpo-block", TEMPORARY[] = ".ebpo-part-";
+
+static bool is_ours(const char *name)
+{
+    size_t length = strlen(name), end = sizeof BLOCK - 1;
+    return (length > end && strcmp(name + length - end, BLOCK) == 0) ||
+           strncmp(name, TEMPORARY, sizeof TEMPORARY - 1) == 0;
+}
+
+/* Takes the blocks away, and the folder when nothing else is in it. */
+static void remove_part(const char *folder)
+{
+    DIR *d = opendir(folder);
+    if (!d)
+        return;
+    for (struct dirent *f; (f = readdir(d)) != NULL;)
+        if (is_ours(f->d_name))
+            unlinkat(dirfd(d), f->d_name, 0);
+    closedir(d);
+    rmdir(folder);
+}
+
+/* --- progress: the transfers' own thread draws, as this one waits for them --- */
+
+typedef struct ticker {
+    bool active;
+    _Atomic bool shown; /* the transfers' thread ticks */
+    _Atomic(ebpo_file *) file;
+    double last;
+} ticker;
+
+static bool tick(void *user)
+{
+    ticker *t = user;
+    ebpo_http_stats s;
+    ebpo_file *file = atomic_load(&t->file);
+    double now = progress_now();
+    char bytes[32], before[32];
+    if (!t->active || !file || now - t->last < 0.2 || !ebpo_file_http_stats(file, &s))
+        return false;
+    t->last = now;
+    fprintf(stderr, "\r\033[Kfetch: %s in %" PRIu64 " requests",
+            words_bytes(bytes, sizeof bytes, s.bytes), s.requests);
+    if (s.cache_bytes)
+        fprintf(stderr, ", %s had come before", words_bytes(before, sizeof before, s.cache_bytes));
+    fflush(stderr);
+    t->shown = true;
+    return false;
+}
+
+static void wipe(ticker *t)
+{
+    atomic_store(&t->file, NULL);
+    if (t->shown)
+        fputs("\r\033[K", stderr);
+    t->shown = false;
+}
+
+/* --- work --- */
+
+/* What the folder held when the file was opened; true when that is of use. */
+static bool tell_resuming(const subset_values *v, ebpo_file *file, const char *url,
+                          const char *part)
+{
+    ebpo_http_stats s;
+    char bytes[32];
+    if (!ebpo_file_http_stats(file, &s))
+        return false;
+    if (s.cache_others && !s.cache_held)
+        fprintf(stderr,
+                "ebpo fetch: %s: has changed on the server, or is another file than the one in %s; "
+                "fetching it from the beginning\n",
+                remote_shown(url), part);
+    else if (s.cache_held && !v->quiet)
+        fprintf(stderr, "ebpo fetch: %s: going on with %s from %s\n", remote_shown(url),
+                words_bytes(bytes, sizeof bytes, s.cache_held), part);
+    return s.cache_held > 0;
+}
+
+static int fetch(subset_values *v, const char *url, const char *out, const char *part,
+                 ebpo_subset_options *subset)
+{
+    double begun = progress_now();
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file = NULL;
+    ticker t = { .active = !v->quiet && isatty(STDERR_FILENO) };
+    atomic_init(&t.file, NULL);
+    v->remote.stop = tick;
+    v->remote.stop_user = &t;
+    if (part) {
+        v->remote.cache = part;
+        v->remote.cache_size = "1048576T";
+    }
+    ebpo_status status = remote_open(&file, url, &v->remote, &error);
+    bool held = status == EBPO_OK && part && tell_resuming(v, file, url, part);
+    atomic_store(&t.file, file);
+    if (status == EBPO_OK)
+        status = subset_settle(v, ebpo_file_info(file), remote_shown(url), subset, &error);
+    if (status == EBPO_OK)
+        status = ebpo_subset(file, out, subset, &error);
+    bool usage = status == EBPO_E_ARGUMENT;
+    wipe(&t);
+    if (status == EBPO_OK) {
+        traffic seen = traffic_of(file);
+        status = subset_tell(v, out, ebpo_file_info(file), &seen, progress_now() - begun, &error);
+        if (status == EBPO_OK && !v->json)
+            remote_tell(&seen, &v->remote, false);
+    }
+    ebpo_close(file);
+    if (part && status == EBPO_E_FORMAT &&
+        access(part, F_OK) == 0) { /* kept blocks would be damaged the next time as well */
+        remove_part(part);
+        int code = command_failed("fetch", &error);
+        fprintf(stderr, "ebpo fetch: what had come was removed, as it may have been damaged on the "
+                        "way; the same command begins anew\n");
+        return code;
+    }
+    if (part && (status == EBPO_OK ||
+                 (usage && !held))) /* a slip in an option takes nothing away that came before */
+        remove_part(part);
+    if (part && status != EBPO_OK && !usage && access(part, F_OK) == 0 &&
+        rmdir(part) != 0) { /* an empty one is of no use */
+        int code = command_failed("fetch", &error);
+        fprintf(stderr,
+                "ebpo fetch: what has come is kept in %s; the same command goes on from there\n",
+                part);
+        return code;
+    }
+    return status == EBPO_OK ? EXIT_FINE : command_failed("fetch", &error);
+}
+
+/* Before anything is fetched: false when it could not be put in its place. */
+static bool out_fits(const char *out, const char *part)
+{
+    struct stat s;
+    if (stat(out, &s) == 0 && S_ISDIR(s.st_mode)) {
+        fprintf(stderr, "ebpo fetch: %s: is a folder; name a file in it\n", out);
+        return false;
+    }
+    if (part && lstat(part, &s) == 0 && !S_ISDIR(s.st_mode)) {
+        fprintf(stderr,
+                "ebpo fetch: %s: stands where what has come would be kept, and is no folder; move "
+                "it away\n",
+                part);
+        return false;
+    }
+    return true;
+}
+
+static int run(int argc, char **argv)
+{
+    subset_values v = SUBSET_VALUES_INIT;
+    const char *operand[ARGS_OPERANDS_MAX];
+    ebpo_subset_options subset;
+    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
+    if (parsed != ARGS_RUN)
+        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    int code = subset_options("fetch", &v, operand[0], operand[1], &subset);
+    if (code != EXIT_FINE)
+        return code;
+    if (!command_wants_hdf5("fetch", operand[0]))
+        return EXIT_FAILED;
+    char *part = NULL; /* with a folder of the user's, that one does */
+    if (ebpo_is_url(operand[0]) && !v.remote.cache && asprintf(&part, "%s.part", operand[1]) < 0) {
+        fprintf(stderr, "ebpo fetch: out of memory\n");
+        return EXIT_FAILED;
+    }
+    code =
+        out_fits(operand[1], part) ? fetch(&v, operand[0], operand[1], part, &subset) : EXIT_FAILED;
+    free(part);
+    return code;
+}
+
+const command command_fetch = { &spec, run };

@@ -1,0 +1,69 @@
+/* ebpo info: what a file is and holds. Reads the head only. */
+#include <stddef.h>
+#include <stdio.h>
+
+#include "cli/command.h"
+#include "cli/file_facts.h"
+#include "cli/remote_args.h"
+#include "cmd/commands.h"
+
+typedef struct values {
+    bool json;
+    remote_values remote;
+} values;
+
+static const arg_option options[] = {
+    ARG_SWITCH("json", 0, values, json, "print the facts as JSON"),
+    REMOTE_OPTIONS(values, remote),
+    { 0 },
+};
+
+static const arg_spec spec = {
+    .command = "info",
+    .operands = "FILE",
+    .least = 1,
+    .most = 1,
+    .summary = "what a file is, what it holds, bytes by part, and a table by level",
+    .text = "Only the head of the file is read. FILE is an .ebpo.h5 file or its URL; for meshes "
+            "there is 'ebpo check'.",
+    .options = options,
+};
+
+static int run(int argc, char **argv)
+{
+    values v = { .remote = REMOTE_VALUES_INIT };
+    const char *operand[ARGS_OPERANDS_MAX];
+    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
+    if (parsed != ARGS_RUN)
+        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    if (!command_wants_hdf5("info", operand[0]))
+        return EXIT_FAILED;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file = NULL;
+    ebpo_status status = remote_open(&file, operand[0], &v.remote, &error);
+    if (status == EBPO_OK)
+        status = ebpo_file_locate(file, &error);
+    if (status != EBPO_OK) {
+        ebpo_close(file);
+        return command_failed("info", &error);
+    }
+    const ebpo_info *info = ebpo_file_info(file);
+    traffic t = traffic_of(file);
+    if (v.json) {
+        json j;
+        json_begin(&j, stdout);
+        json_object(&j, NULL);
+        facts_json(&j, remote_shown(operand[0]), info);
+        remote_json(&j, &t, &v.remote);
+        json_finish(&j);
+    } else {
+        facts_print(stdout, remote_shown(operand[0]), info);
+        putchar('\n');
+        facts_table(stdout, info);
+        remote_tell(&t, &v.remote, false);
+    }
+    ebpo_close(file);
+    return EXIT_FINE;
+}
+
+const command command_info = { &spec, run };

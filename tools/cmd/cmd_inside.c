@@ -1,0 +1,57 @@
+/* ebpo inside: which points are in the solid. */
+#include <stddef.h>
+
+#include "cli/command.h"
+#include "cmd/commands.h"
+#include "cmd/query_run.h"
+
+static const arg_option options[] = {
+    { "mode", 'm', ARG_WORD, offsetof(query_values, inside_mode), "MODE",
+      "how to get there; the answers are the same. fast, the default,\nor one of EBP 2017: cache, "
+      "nodes, subtree, each also with -plain\n(without envelopes)",
+      0, 0, inside_modes },
+    QUERY_LIMIT_OPTIONS("look at levels 0 to L only: IN and OUT are certain, else MAYBE"),
+    QUERY_MODEL_OPTIONS,
+    QUERY_PREFETCH_OPTION,
+    QUERY_FORM_OPTIONS("points are three doubles each, answers two int32 (little-endian)"),
+    { 0 },
+};
+
+static const arg_spec spec = {
+    .command = "inside",
+    .operands = "MODEL [POINTS]",
+    .least = 1,
+    .most = 2,
+    .summary = "which points are in the solid: IN, OUT or ON, and the winding number",
+    .text = "MODEL is an .ebpo.h5 file of a solid. POINTS: lines 'x y z', or a PLY; absent or '-': "
+            "standard input. The answers are exact.",
+    .options = options,
+};
+
+static ebpo_status answer(const query_job *job, ebpo_context *context, const double *rows,
+                          uint64_t count, ebpo_error *error)
+{
+    ebpo_inside_result *results = job->results;
+    ebpo_status status = ebpo_inside_many(context, rows, count, &job->options, results, error);
+    if (status == EBPO_OK)
+        answers_inside(job->form, results, count);
+    return status;
+}
+
+static int run(int argc, char **argv)
+{
+    query_values v = QUERY_VALUES_INIT;
+    const char *operand[ARGS_OPERANDS_MAX];
+    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
+    if (parsed != ARGS_RUN)
+        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    if (!query_inside_fits("inside", &v))
+        return EXIT_USAGE;
+    static ebpo_inside_result results[POINTS_BATCH];
+    query_job job = {
+        .command = "inside", .values = &v, .kind = POINTS, .answer = answer, .results = results
+    };
+    return query_run(&job, operand[0], operand[1]);
+}
+
+const command command_inside = { &spec, run };

@@ -1,0 +1,337 @@
+/* ebpo render: a shaded picture of a level, of the model, or of several side by side. */
+#include "ebpo_config.h"
+
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "cli/command.h"
+#include "cli/file_facts.h"
+#include "cli/progress.h"
+#include "cli/remote_args.h"
+#include "cmd/commands.h"
+#include "picture.h"
+#include "raster.h"
+
+enum { TILES_MAX = 24, MESH = -1, SIDE_MAX = 8192 };
+
+typedef struct values {
+    int64_t level, threads;
+    const char *levels, *view, *size;
+    int up;
+    bool mesh, edges, quiet;
+    remote_values remote;
+} values;
+
+static const char *const up_words[] = { "x", "y", "z", NULL };
+
+static const arg_option options[] = {
+    { "level", 0, ARG_INT, offsetof(values, level), "N", "the envelopes of level N", 0, 20, NULL },
+    ARG_SWITCH("mesh", 0, values, mesh, "the model itself; the default"),
+    { "levels", 0, ARG_TEXT, offsetof(values, levels), "LIST",
+      "several side by side, with captions: levels and 'mesh',\nfor example 0,2,4,mesh", 0, 0,
+      NULL },
+    { "view", 0, ARG_TEXT, offsetof(values, view), "AZ,EL",
+      "from where: azimuth and elevation in degrees; default 30,20", 0, 0, NULL },
+    { "up", 0, ARG_WORD, offsetof(values, up), "AXIS",
+      "the axis that points upwards: x, y (the default) or z", 0, 0, up_words },
+    { "size", 0, ARG_TEXT, offsetof(values, size), "WxH",
+      "pixels, 16 to 8192 each; default 1200x900", 0, 0, NULL },
+    ARG_SWITCH("edges", 0, values, edges, "draw the outlines of the polygons"),
+    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores",
+      0, 256, NULL },
+    ARG_SWITCH("quiet", 'q', values, quiet, "no progress: errors and warnings only"),
+    REMOTE_OPTIONS(values, remote),
+    { 0 },
+};
+
+static const arg_spec spec = {
+    .command = "render",
+    .operands = "FILE OUT.png",
+    .least = 2,
+    .most = 2,
+    .summary = "a shaded picture of a level or of the model, without a display",
+    .text = "FILE is an .ebpo.h5 file or its URL, or a mesh.",
+    .options = options,
+};
+
+#if EBPO_HAVE_PNG
+
+typedef struct tile {
+    int level; /* or MESH */
+    ebpo_mesh mesh;
+    bool closed;
+    char caption[64];
+} tile;
+
+typedef struct job {
+    values v;
+    const char *in, *out;
+    double azimuth, elevation;
+    int width, height;
+    tile tiles[TILES_MAX];
+    int tile_count;
+} job;
+
+/* --- arguments --- */
+
+static int usage_error(const char *what, const char *value, const char *expected)
+{
+    fprintf(stderr, "ebpo render: %s: '%s' is not %s; try 'ebpo render --help'\n", what, value,
+            expected);
+    return EXIT_USAGE;
+}
+
+static bool parse_levels(job *j)
+{
+    for (const char *at = j->v.levels;; at++) {
+        char *end;
+        if (j->tile_count == TILES_MAX)
+            return false;
+        tile *t = &j->tiles[j->tile_count++];
+        if (strncmp(at, "mesh", 4) == 0) {
+            t->level = MESH;
+            end = (char *)(uintptr_t)at + 4;
+        } else {
+            long level = *at >= '0' && *at <= '9' ? strtol(at, &end, 10) : -1;
+            if (level < 0 || level >= EBPO_LEVELS_MAX)
+                return false;
+            t->level = (int)level;
+        }
+        if (!*end)
+            return true;
+        if (*end != ',')
+            return false;
+        at = end;
+    }
+}
+
+static int parse(job *j)
+{
+    char rest;
+    const values *v = &j->v;
+    if ((v->level >= 0) + v->mesh + (v->levels != NULL) > 1) {
+        fprintf(stderr, "ebpo render: --level, --levels and --mesh exclude each other; try 'ebpo "
+                        "render --help'\n");
+        return EXIT_USAGE;
+    }
+    if (sscanf(v->view, "%lf,%lf%c", &j->azimuth, &j->elevation, &rest) != 2 ||
+        !(j->azimuth >= -360 && j->azimuth <= 360) || !(j->elevation >= -90 && j->elevation <= 90))
+        return usage_error("--view", v->view,
+                           "an azimuth from -360 to 360, a comma, and an elevation from -90 to 90");
+    if (sscanf(v->size, "%5dx%5d%c", &j->width, &j->height, &rest) != 2 || j->width < 16 ||
+        j->width > SIDE_MAX || j->height < 16 || j->height > SIDE_MAX)
+        return usage_error("--size", v->size, "a width, an x, and a height, each from 16 to 8192");
+    if (v->levels && !parse_levels(j))
+        return usage_error("--levels", v->levels,
+                           "a list of at most 24 levels (0 to 20) and 'mesh' with commas between");
+    if (!v->levels)
+        j->tiles[j->tile_count++].level = v->level >= 0 ? (int)v->level : MESH;
+    return EXIT_FINE;
+}
+
+/* --- what to draw --- */
+
+static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress progress,
+                             ebpo_error *error)
+{
+    const ebpo_info *info = ebpo_file_info(file);
+    unsigned threads = (unsigned)j->v.threads;
+    if (t->level == MESH) {
+        snprintf(t->caption, sizeof t->caption, "mesh, %llu faces",
+                 (unsigned long long)info->face_count);
+        t->closed = info->solid && info->report.manifold;
+        return ebpo_file_read_mesh(file, &t->mesh, threads, error);
+    }
+    ebpo_lod_options lod =
+        /* walls too: they close the envelopes, and inner ones cannot be seen */
+        EBPO_LOD_OPTIONS_INIT;
+    lod.threads = threads;
+    lod.progress = progress;
+    t->closed = true;
+    ebpo_status status = ebpo_lod_level(file, t->level, &lod, &t->mesh, NULL, error);
+    if (status == EBPO_OK)
+        snprintf(t->caption, sizeof t->caption,
+                 info->solid ? "level %d: %.1f %%" : "level %d: %.1f %% of box", t->level,
+                 facts_percent(info, t->level));
+    return status;
+}
+
+static ebpo_status load_file(job *j, ebpo_progress progress, ebpo_error *error)
+{
+    ebpo_file *file = NULL;
+    ebpo_status status = remote_open(&file, j->in, &j->v.remote, error);
+    for (int i = 0; i < j->tile_count && status == EBPO_OK; i++)
+        status = load_tile(j, &j->tiles[i], file, progress, error);
+    if (status == EBPO_OK) {
+        traffic t = traffic_of(file);
+        remote_tell(&t, &j->v.remote, false);
+    }
+    ebpo_close(file);
+    return status;
+}
+
+static ebpo_status load_mesh(job *j, ebpo_progress progress, ebpo_error *error)
+{
+    ebpo_mesh_read_options read = EBPO_MESH_READ_OPTIONS_INIT;
+    read.progress = progress;
+    ebpo_mesh_report report;
+    tile *t = &j->tiles[0];
+    if (t->level != MESH || j->tile_count > 1) {
+        snprintf(error->message, sizeof error->message,
+                 "%s: is a mesh, which has no levels; convert it first", j->in);
+        return error->status = EBPO_E_ARGUMENT;
+    }
+    ebpo_status status = ebpo_mesh_read(&t->mesh, j->in, &read, error);
+    /* The check makes sure that every index and coordinate can be drawn. */
+    if (status == EBPO_OK)
+        status = ebpo_mesh_check(&report, &t->mesh, (unsigned)j->v.threads, progress, error);
+    return status;
+}
+
+/* --- the picture --- */
+
+static void paint_background(picture *p)
+{
+    static const double top[3] = { 252, 253, 254 }, bottom[3] = { 222, 227, 233 };
+    for (int y = 0; y < p->height; y++) {
+        double share = (double)y / p->height;
+        uint8_t *row = p->rgb + 3 * (size_t)y * (size_t)p->width;
+        for (int x = 0; x < 3 * p->width; x++)
+            row[x] = (uint8_t)(top[x % 3] + share * (bottom[x % 3] - top[x % 3]) + 0.5);
+    }
+}
+
+/* All tiles show the model from one place: that from which the coarsest fits. */
+static const tile *coarsest(const job *j)
+{
+    const tile *best = &j->tiles[0];
+    for (int i = 1; i < j->tile_count; i++)
+        if ((unsigned)j->tiles[i].level < (unsigned)best->level)
+            best = &j->tiles[i];
+    return best;
+}
+
+static unsigned thread_count(const job *j)
+{
+    long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    return j->v.threads ? (unsigned)j->v.threads : cores > 0 ? (unsigned)cores : 1;
+}
+
+static ebpo_status draw_tile(const job *j, const tile *t, picture *p, const camera *view,
+                             const int at[4], ebpo_error *error)
+{
+    static const uint8_t ink[3] = { 60, 66, 76 };
+    raster_style style = { { 0.30, 0.48, 0.66 }, t->closed, j->v.edges };
+    if (t->level == MESH)
+        memcpy(style.colour, (const double[3]){ 0.66, 0.54, 0.40 }, sizeof style.colour);
+    int caption = j->v.levels ? 1 + at[2] / 240 : 0;
+    ebpo_status status = raster_draw(p, at[0], at[1], at[2], at[3] - 14 * caption, view, &t->mesh,
+                                     &style, thread_count(j), error);
+    if (status == EBPO_OK && caption)
+        picture_text(p, at[0] + (at[2] - picture_text_width(caption, t->caption)) / 2,
+                     at[1] + at[3] - 12 * caption, caption, ink, t->caption);
+    return status;
+}
+
+static ebpo_status draw(const job *j, picture *p, ebpo_error *error)
+{
+    int columns = j->tile_count <= 5             ? j->tile_count
+                  : (j->tile_count + 1) / 2 <= 6 ? (j->tile_count + 1) / 2
+                                                 : 6;
+    int rows = (j->tile_count + columns - 1) / columns;
+    int width = j->width / columns, height = j->height / rows;
+    int caption = j->v.levels ? 14 * (1 + width / 240) : 0;
+    ebpo_status status = EBPO_OK;
+    camera view;
+    const tile *first = coarsest(j);
+    if (height <= caption) {
+        snprintf(error->message, sizeof error->message,
+                 "--size %s has no room for %d tiles; take a larger one", j->v.size, j->tile_count);
+        return error->status = EBPO_E_ARGUMENT;
+    }
+    paint_background(p);
+    if (first->mesh.face_count)
+        camera_fit(&view, &first->mesh, j->azimuth, j->elevation, j->v.up, width, height - caption);
+    for (int i = 0; i < j->tile_count && status == EBPO_OK; i++) {
+        int at[4] = { i % columns * width, i / columns * height, width, height };
+        if (j->tiles[i].mesh.face_count)
+            status = draw_tile(j, &j->tiles[i], p, &view, at, error);
+    }
+    return status;
+}
+
+static ebpo_status render(job *j, bool is_file, ebpo_progress progress, ebpo_error *error)
+{
+    static const uint8_t white[3] = { 255, 255, 255 };
+    picture p = { 0 };
+    ebpo_status status = is_file ? load_file(j, progress, error) : load_mesh(j, progress, error);
+    if (status == EBPO_OK && !picture_make(&p, j->width, j->height, white)) {
+        snprintf(error->message, sizeof error->message,
+                 "no memory for a picture of %s; take a smaller --size", j->v.size);
+        status = error->status = EBPO_E_MEMORY;
+    }
+    if (status == EBPO_OK)
+        status = draw(j, &p, error);
+    if (status == EBPO_OK)
+        status = picture_write_png(&p, j->out, error);
+    picture_free(&p);
+    for (int i = 0; i < j->tile_count; i++)
+        ebpo_mesh_free(&j->tiles[i].mesh);
+    return status;
+}
+
+static int run_job(job *j)
+{
+    int code = parse(j);
+    if (code != EXIT_FINE)
+        return code;
+    if (strcmp(j->in, j->out) == 0 || command_same_file(j->in, j->out)) {
+        fprintf(stderr,
+                "ebpo render: %s: is input and output at once; give the output another name\n",
+                j->out);
+        return EXIT_USAGE;
+    }
+    int is_file = command_is_hdf5("render", j->in);
+    if (is_file < 0)
+        return EXIT_FAILED;
+    progress_line line;
+    ebpo_progress progress = progress_start(&line, "render", j->v.quiet);
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_status status = render(j, is_file, progress, &error);
+    progress_wipe(&line);
+    return status == EBPO_OK ? EXIT_FINE : command_failed("render", &error);
+}
+
+#endif
+
+static int run(int argc, char **argv)
+{
+    values v = {
+        .level = -1, .view = "30,20", .size = "1200x900", .up = 1, .remote = REMOTE_VALUES_INIT
+    };
+    const char *operand[ARGS_OPERANDS_MAX];
+    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
+    if (parsed != ARGS_RUN)
+        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+#if EBPO_HAVE_PNG
+    job *j = calloc(1, sizeof *j);
+    if (!j) {
+        fprintf(stderr, "ebpo render: no memory\n");
+        return EXIT_FAILED;
+    }
+    j->v = v;
+    j->in = operand[0];
+    j->out = operand[1];
+    int code = run_job(j);
+    free(j);
+    return code;
+#else
+    fprintf(stderr, "ebpo render: this build has no libpng; install libpng and build ebpo again\n");
+    return EXIT_USAGE;
+#endif
+}
+
+const command command_render = { &spec, run };

@@ -1,0 +1,269 @@
+/* ebpo report: methods compared level by level: bytes, error, run time. */
+#include <errno.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli/command.h"
+#include "cli/selection_args.h"
+#include "cli/words.h"
+#include "cmd/commands.h"
+#include "report_data.h"
+#include "report_output.h"
+
+static const char *const up_words[] = { "x", "y", "z", NULL };
+
+static const arg_option options[] = {
+    { "out", 'o', ARG_TEXT, offsetof(report_values, out), "DIR",
+      "the folder to make; default: report-NAME, here", 0, 0, NULL },
+    { "name", 0, ARG_LIST, offsetof(report_values, names), "NAME",
+      "of a FILE's method, in their order; default: the file's name", 0, 0, NULL },
+    { "select", 0, ARG_SET, offsetof(report_values, select), "LIST",
+      "of a mesh: make a file with each of these selections of planes,\ninherit, kmedoids, offset, "
+      "random; default: inherit",
+      0, 0, selection_words },
+    { "percent", 0, ARG_REAL, offsetof(report_values, percent), "P",
+      "of the theses' selections: share of the candidates; default 40", 0, 100, NULL },
+    { "k-root", 0, ARG_TEXT, offsetof(report_values, k_root), "K",
+      "instead: K planes at the root, or 'K%' of the faces, half as\nmany at each next level "
+      "(BP-Octree)",
+      0, 0, NULL },
+    { "normals", 0, ARG_WORD, offsetof(report_values, normals), "NAME",
+      "distance of normals for k-medoids: spherical (the default)\nor angle", 0, 0, normals_words },
+    { "max-level", 0, ARG_INT, offsetof(report_values, max_level), "N",
+      "of a mesh: as for 'ebpo convert'", 0, 20, NULL },
+    { "leaf-faces", 0, ARG_INT, offsetof(report_values, leaf_faces), "N",
+      "of a mesh: as for 'ebpo convert'", 0, 4294967295.0, NULL },
+    { "epsilon", 0, ARG_REAL, offsetof(report_values, epsilon), "E",
+      "of a mesh: as for 'ebpo convert'", 0, 1, NULL },
+    ARG_SWITCH("keep", 0, report_values, keep, "keep the files that were made of a mesh in DIR"),
+    { "levels", 0, ARG_TEXT, offsetof(report_values, levels), "A-B", "measure these levels only", 0,
+      0, NULL },
+    { "points", 0, ARG_INT, offsetof(report_values, points), "N",
+      "questions of each kind; default 5000", 1, 1e8, NULL },
+    { "seed", 0, ARG_INT, offsetof(report_values, seed), "S",
+      "of all that is drawn at random; default 1", 0, 1e15, NULL },
+    ARG_SWITCH("need", 0, report_values, need,
+               "also cut files to errors and to sizes, and see how well they\nkeep to them"),
+    ARG_SWITCH("no-pictures", 0, report_values, no_pictures, "no pictures of the levels"),
+    { "view", 0, ARG_TEXT, offsetof(report_values, view), "AZ,EL",
+      "of the pictures: azimuth and elevation in degrees; default 30,20", 0, 0, NULL },
+    { "up", 0, ARG_WORD, offsetof(report_values, up), "AXIS",
+      "of the pictures: the axis that points upwards, x, y (the\ndefault) or z", 0, 0, up_words },
+    { "threads", 0, ARG_INT, offsetof(report_values, threads), "N",
+      "threads, but questions are timed on one; 0, the default: all\ncores", 0, 256, NULL },
+    ARG_SWITCH("json", 0, report_values, json, "print the JSON on standard output too"),
+    ARG_SWITCH("quiet", 'q', report_values, quiet,
+               "no summary, no progress: errors and warnings only"),
+    REMOTE_HTTP_OPTIONS(report_values, remote),
+    { 0 },
+};
+
+static const arg_spec spec = {
+    .command = "report",
+    .operands = "FILE...",
+    .least = 1,
+    .most = ARGS_OPERANDS_MAX - 1,
+    .summary = "methods compared level by level: bytes, error, run time; a page with plots",
+    .text = "FILEs are .ebpo.h5 files of one model (or their URLs), each a method; or one mesh, "
+            "from which a file is made\n"
+            "with each selection. DIR appears whole, with report.html, report.csv and report.json; "
+            "an older report there\n"
+            "is replaced.",
+    .options = options,
+};
+
+static int wrong(const char *option, const char *value, const char *expected)
+{
+    fprintf(stderr, "ebpo report: %s: '%s' is not %s; try 'ebpo report --help'\n", option, value,
+            expected);
+    return EXIT_USAGE;
+}
+
+/* --- options --- */
+
+static int read_options(comparison *c, report_values *v, bool mesh)
+{
+    char rest;
+    c->first = 0;
+    c->last = EBPO_LEVELS_MAX - 1;
+    if (v->levels && (sscanf(v->levels, "%2d-%2d%c", &c->first, &c->last, &rest) != 2 ||
+                      c->first < 0 || c->last < c->first || c->last >= EBPO_LEVELS_MAX))
+        return wrong("--levels", v->levels,
+                     "the first level, a hyphen and the last one, such as 0-6");
+    if (sscanf(v->view, "%lf,%lf%c", &c->azimuth, &c->elevation, &rest) != 2 ||
+        !(fabs(c->azimuth) <= 360) || !(fabs(c->elevation) <= 90))
+        return wrong("--view", v->view,
+                     "an azimuth from -360 to 360, a comma, and an elevation from -90 to 90");
+    bool building = v->select || v->percent >= 0 || v->k_root || v->normals >= 0 ||
+                    v->max_level >= 0 || v->leaf_faces >= 0 || v->epsilon >= 0 || v->keep;
+    if (!mesh && building) {
+        fprintf(stderr,
+                "ebpo report: --select, --percent, --k-root, --normals, --max-level, --leaf-faces, "
+                "--epsilon and --keep are for a mesh, from which files are made; try 'ebpo "
+                "report --help'\n");
+        return EXIT_USAGE;
+    }
+    const ebpo_build_options usual = EBPO_BUILD_OPTIONS_INIT;
+    v->select = v->select ? v->select : 1u << EBPO_SELECT_INHERIT;
+    /* the seed is of the points, too */
+    selection_options chosen = { v->select, v->percent, v->epsilon, v->k_root, v->normals, -1 };
+    int code = selection_check("report", &chosen);
+    if (code != EXIT_FINE)
+        return code;
+    v->percent = v->percent >= 0 ? v->percent : usual.percent;
+    v->normals = v->normals >= 0 ? v->normals : (int)usual.normals;
+    v->leaf_faces = v->leaf_faces >= 0 ? v->leaf_faces : usual.leaf_faces;
+    v->epsilon = v->epsilon >= 0 ? v->epsilon : usual.epsilon;
+    return EXIT_FINE;
+}
+
+/* --- output --- */
+
+static ebpo_status write_one(const comparison *c, const char *name,
+                             void (*write)(FILE *, const comparison *), ebpo_error *error)
+{
+    char path[sizeof c->folder + 32], *text = NULL;
+    size_t size = 0;
+    snprintf(path, sizeof path, "%s/%s", c->folder, name);
+    FILE *f = open_memstream(&text, &size);
+    if (f)
+        write(f, c);
+    bool good = f && !ferror(f);
+    if (f && fclose(f) != 0)
+        good = false;
+    ebpo_status status = EBPO_E_MEMORY;
+    if (good)
+        status = ebpo_write_file(path, text, size, error);
+    else
+        snprintf(error->message, sizeof error->message,
+                 "%s: not enough memory; fewer --levels or --no-pictures need less", name);
+    free(text);
+    return error->status = status;
+}
+
+static ebpo_status write_all(const comparison *c, ebpo_error *error)
+{
+    ebpo_status status = write_one(c, "report.csv", report_csv, error);
+    if (status == EBPO_OK)
+        status = write_one(c, "report.json", report_to_json, error);
+    if (status == EBPO_OK)
+        status = write_one(c, "report.html", report_page, error);
+    return status;
+}
+
+static void drop_built(const comparison *c)
+{
+    for (int i = 0; i < c->count && !c->v->keep; i++)
+        if (strncmp(c->methods[i].path, c->folder, strlen(c->folder)) == 0)
+            remove(c->methods[i].path);
+}
+
+static void summary(const comparison *c, const char *place)
+{
+    printf("%s: ", place);
+    for (int i = 0; i < c->count; i++)
+        printf("%s%s", i ? ", " : "", c->methods[i].name);
+    printf("; levels %d to %d; %s/report.html, report.csv, report.json in %.0f s\n", c->first,
+           comparison_last(c), place, c->seconds);
+    for (int i = 0; i < c->count; i++)
+        for (int k = 0; k < c->methods[i].note_count; k++)
+            printf("  %s: %s\n", c->methods[i].name, c->methods[i].note[k]);
+}
+
+/* --- the work --- */
+
+static ebpo_status measure(comparison *c, ebpo_error *error)
+{
+    ebpo_status status = report_make_points(c, error);
+    for (int i = 0; i < c->count && status == EBPO_OK; i++)
+        status = report_gather(c, &c->methods[i], error);
+    for (int round = 0; round < ROUNDS; round++)
+        for (int i = 0; i < c->count && status == EBPO_OK; i++)
+            status = report_round(c, &c->methods[i], round, error);
+    for (int i = 0; i < c->count; i++)
+        report_settle(c, &c->methods[i]);
+    if (c->v->no_pictures)
+        c->without_pictures = "--no-pictures was given";
+    else if (status == EBPO_OK)
+        status = report_pictures(c, error);
+    return status;
+}
+
+static int work(comparison *c, const char *const *operand, const char *place, progress_line *line)
+{
+    double begun = progress_now();
+    ebpo_error error = EBPO_ERROR_INIT;
+    int code = report_find_methods(c, operand);
+    if (code != EXIT_FINE)
+        return code;
+    ebpo_status status = measure(c, &error);
+    c->seconds = progress_now() - begun;
+    if (status == EBPO_OK)
+        status = write_all(c, &error);
+    progress_wipe(line);
+    if (status != EBPO_OK)
+        return command_failed("report", &error);
+    drop_built(c);
+    if (!output_commit(place, c->folder))
+        return EXIT_FAILED;
+    c->folder[0] = 0;
+    if (c->v->json)
+        report_to_json(stdout, c);
+    else if (!c->v->quiet)
+        summary(c, place);
+    return EXIT_FINE;
+}
+
+/* Of "dir/bunny.ply" report-bunny. */
+static void default_place(const char *operand, char *out, size_t room)
+{
+    char stem[201];
+    report_stem(operand, stem, sizeof stem);
+    snprintf(out, room, "report-%s", stem);
+}
+
+static int run(int argc, char **argv)
+{
+    report_values v = { .percent = -1,
+                        .normals = -1,
+                        .max_level = -1,
+                        .leaf_faces = -1,
+                        .epsilon = -1,
+                        .points = 5000,
+                        .seed = 1,
+                        .up = 1,
+                        .view = "30,20",
+                        .remote = REMOTE_VALUES_INIT };
+    const char *operand[ARGS_OPERANDS_MAX];
+    char usual[256];
+    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
+    if (parsed != ARGS_RUN)
+        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    comparison c = { .v = &v };
+    int is_hdf5 = command_is_hdf5("report", operand[0]);
+    int code = is_hdf5 < 0 ? EXIT_FAILED : read_options(&c, &v, !is_hdf5);
+    if (code != EXIT_FINE)
+        return code;
+    default_place(operand[0], usual, sizeof usual);
+    const char *place = v.out ? v.out : usual;
+    code = output_begin(place, operand, c.folder, sizeof c.folder);
+    if (code != EXIT_FINE)
+        return code;
+    progress_line line;
+    c.progress = progress_start(&line, "report", v.quiet);
+    c.methods = calloc(METHODS_MAX, sizeof *c.methods);
+    if (c.methods) {
+        code = work(&c, operand, place, &line);
+    } else {
+        fprintf(stderr, "ebpo report: not enough memory\n");
+        code = EXIT_FAILED;
+    }
+    progress_wipe(&line);
+    output_drop(c.folder);
+    comparison_free(&c);
+    return code;
+}
+
+const command command_report = { &spec, run };

@@ -1,0 +1,182 @@
+/* ebpo verify: proves that a file keeps its promises, or shows where it does not. */
+#include <stddef.h>
+#include <stdio.h>
+
+#include "cli/command.h"
+#include "cli/json.h"
+#include "cli/memory_args.h"
+#include "cli/progress.h"
+#include "cli/remote_args.h"
+#include "cli/words.h"
+#include "cmd/commands.h"
+
+typedef struct values {
+    const char *against;
+    int64_t samples, threads;
+    memory_values memory;
+    bool json, quiet;
+    remote_values remote;
+} values;
+
+static const arg_option options[] = {
+    { "against", 0, ARG_TEXT, offsetof(values, against), "IN.ply",
+      "also compare the model with its source, bit for bit", 0, 0, NULL },
+    { "samples", 0, ARG_INT, offsetof(values, samples), "N",
+      "cells whose labels are checked by an independent winding\nnumber; 0, the default: all of up "
+      "to four million, a million of more",
+      0, 9007199254740992.0, NULL },
+    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores",
+      0, 256, NULL },
+    MEMORY_OPTIONS(values, memory),
+    ARG_SWITCH("json", 0, values, json, "print the counts as JSON"),
+    ARG_SWITCH("quiet", 'q', values, quiet, "print violations and errors only"),
+    REMOTE_OPTIONS(values, remote),
+    { 0 },
+};
+
+static const arg_spec spec = {
+    .command = "verify",
+    .operands = "FILE",
+    .least = 1,
+    .most = 1,
+    .summary = "checks every promise of a file; ends with code 1 if one is broken",
+    .text = "FILE is an .ebpo.h5 file or its URL. Containment is checked with the decoded "
+            "half-spaces, exactly, not with rounded polyhedra.",
+    .options = options,
+};
+
+static const struct kind {
+    size_t offset;
+    const char *name, *what;
+} kinds[] = {
+    { offsetof(ebpo_verify_report, structure), "structure", "head, shapes, counts, order" },
+    { offsetof(ebpo_verify_report, content), "content", "checksum of all arrays" },
+    { offsetof(ebpo_verify_report, containment), "containment",
+      "the solid lies in every half-space" },
+    { offsetof(ebpo_verify_report, nesting), "nesting", "envelopes lie in their parents'" },
+    { offsetof(ebpo_verify_report, labels), "labels", "white, black, winding numbers" },
+    { offsetof(ebpo_verify_report, lists), "lists", "faces are listed where they touch" },
+    { offsetof(ebpo_verify_report, source), "source", "the model equals its source" },
+};
+enum { KINDS = sizeof kinds / sizeof *kinds };
+
+static const ebpo_verify_count *count_of(const ebpo_verify_report *report, int i)
+{
+    return (const ebpo_verify_count *)(const void *)((const char *)report + kinds[i].offset);
+}
+
+static void print_words(const ebpo_verify_report *report, const char *path)
+{
+    printf("%-12s %14s %11s\n", "kind", "checks", "violations");
+    for (int i = 0; i < KINDS; i++) {
+        const ebpo_verify_count *c = count_of(report, i);
+        if (c->checks || c->violations)
+            printf("%-12s %14llu %11llu   %s\n", kinds[i].name, (unsigned long long)c->checks,
+                   (unsigned long long)c->violations, kinds[i].what);
+        else
+            printf("%-12s %14s %11s   %s\n", kinds[i].name, "not made", "-", kinds[i].what);
+    }
+    if (!report->violations)
+        printf("%s: fine: %llu checks, no violation\n", path, (unsigned long long)report->checks);
+}
+
+static void print_violations(const ebpo_verify_report *report, const char *path)
+{
+    for (int i = 0; i < KINDS; i++) {
+        const ebpo_verify_count *c = count_of(report, i);
+        if (c->violations)
+            fprintf(stderr, "ebpo verify: %s: %s: %llu of %llu checks failed; first: %s\n", path,
+                    kinds[i].name, (unsigned long long)c->violations, (unsigned long long)c->checks,
+                    c->first);
+    }
+}
+
+static void print_json(const ebpo_verify_report *report, const char *path, const traffic *t,
+                       const remote_values *remote)
+{
+    json j;
+    json_begin(&j, stdout);
+    json_object(&j, NULL);
+    json_text(&j, "file", remote_shown(path));
+    json_bool(&j, "fine", report->violations == 0);
+    json_uint(&j, "checks", report->checks);
+    json_uint(&j, "violations", report->violations);
+    json_object(&j, "kinds");
+    for (int i = 0; i < KINDS; i++) {
+        const ebpo_verify_count *c = count_of(report, i);
+        json_object(&j, kinds[i].name);
+        json_uint(&j, "checks", c->checks);
+        json_uint(&j, "violations", c->violations);
+        if (c->violations)
+            json_text(&j, "first", c->first);
+        json_end(&j);
+    }
+    json_end(&j);
+    remote_json(&j, t, remote);
+    json_finish(&j);
+}
+
+static ebpo_status verify(const values *v, const char *path, ebpo_progress progress,
+                          ebpo_verify_report *report, traffic *t, ebpo_error *error)
+{
+    ebpo_mesh source = { 0 };
+    ebpo_file *file = NULL;
+    ebpo_workspace *workspace = NULL;
+    ebpo_status status = memory_make(&workspace, &v->memory, error);
+    ebpo_mesh_read_options read = EBPO_MESH_READ_OPTIONS_INIT;
+    read.progress = progress;
+    read.workspace = workspace;
+    read.threads = (unsigned)v->threads;
+    if (status == EBPO_OK)
+        status = remote_open(&file, path, &v->remote, error);
+    if (status == EBPO_OK && v->against)
+        status = ebpo_mesh_read(&source, v->against, &read, error);
+    if (status == EBPO_OK) {
+        ebpo_verify_options verify_options = EBPO_VERIFY_OPTIONS_INIT;
+        verify_options.source = v->against ? &source : NULL;
+        verify_options.threads = (unsigned)v->threads;
+        verify_options.label_samples = (uint64_t)v->samples;
+        verify_options.progress = progress;
+        verify_options.workspace = workspace;
+        status = ebpo_verify(file, &verify_options, report, error);
+    }
+    if (status == EBPO_OK)
+        *t = traffic_of(file);
+    ebpo_mesh_free(&source);
+    ebpo_close(file);
+    ebpo_workspace_free(workspace);
+    return status;
+}
+
+static int run(int argc, char **argv)
+{
+    values v = { .remote = REMOTE_VALUES_INIT };
+    const char *operand[ARGS_OPERANDS_MAX];
+    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
+    if (parsed != ARGS_RUN)
+        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    if (!memory_good("verify", &v.memory))
+        return EXIT_USAGE;
+    if (!command_wants_hdf5("verify", operand[0]))
+        return EXIT_FAILED;
+    progress_line line;
+    ebpo_progress progress = progress_start(&line, "verify", v.quiet);
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_verify_report report;
+    traffic t;
+    ebpo_status status = verify(&v, operand[0], progress, &report, &t, &error);
+    progress_wipe(&line);
+    if (status != EBPO_OK)
+        return command_failed("verify", &error);
+    if (v.json)
+        print_json(&report, operand[0], &t, &v.remote);
+    else if (!v.quiet)
+        print_words(&report, remote_shown(operand[0]));
+    command_flush("verify");
+    print_violations(&report, remote_shown(operand[0]));
+    if (!v.json)
+        remote_tell(&t, &v.remote, false);
+    return report.violations ? EXIT_FAILED : EXIT_FINE;
+}
+
+const command command_verify = { &spec, run };

@@ -1,0 +1,341 @@
+/* ebpo view: nodes in the order in which they matter to an observer, under a budget. */
+#include <inttypes.h>
+#include <math.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include <ebpo/view.h>
+
+#include "cli/command.h"
+#include "cli/json.h"
+#include "cli/progress.h"
+#include "cli/remote_args.h"
+#include "cli/words.h"
+#include "cmd/commands.h"
+#include "cut_mesh.h"
+
+typedef struct values {
+    int order;
+    const char *eye, *look, *up, *size, *bytes, *memory, *out;
+    double fov, pixels, distance;
+    int64_t to, count;
+    bool seen_only, nodes, json;
+    remote_values remote;
+} values;
+
+static const char *const order_words[] = { "level", "distance", "pixels", "front-to-back", NULL };
+
+static const arg_option options[] = {
+    { "order", 0, ARG_WORD, offsetof(values, order), "ORDER",
+      "what comes first: level, distance, pixels (the largest) or\nfront-to-back; the default: "
+      "pixels with --eye, else level",
+      0, 0, order_words },
+    { "eye", 0, ARG_TEXT, offsetof(values, eye), "X,Y,Z",
+      "where the observer is, in the model's unit", 0, 0, NULL },
+    { "look", 0, ARG_TEXT, offsetof(values, look), "X,Y,Z",
+      "the point looked at; the default: all around", 0, 0, NULL },
+    { "up", 0, ARG_TEXT, offsetof(values, up), "X,Y,Z", "the direction upwards; the default: 0,1,0",
+      0, 0, NULL },
+    { "fov", 0, ARG_REAL, offsetof(values, fov), "DEGREES",
+      "vertical angle of view; the default: 45", 0.001, 179.999, NULL },
+    { "size", 0, ARG_TEXT, offsetof(values, size), "WxH",
+      "of the picture, in pixels; the default: 1280x720", 0, 0, NULL },
+    { "pixels", 0, ARG_REAL, offsetof(values, pixels), "P",
+      "do not refine nodes that are no larger on the picture", 1e-9, 1e9, NULL },
+    { "distance", 0, ARG_REAL, offsetof(values, distance), "D",
+      "do not refine nodes that are farther away", 0, 1e300, NULL },
+    { "to", 0, ARG_INT, offsetof(values, to), "L", "end with level L", 0, 20, NULL },
+    ARG_SWITCH("seen-only", 0, values, seen_only,
+               "do not refine what is outside the picture; else that comes last"),
+    { "bytes", 0, ARG_TEXT, offsetof(values, bytes), "SIZE",
+      "stop before more of the file is read than this: 512K, 4M", 0, 0, NULL },
+    { "count", 0, ARG_INT, offsetof(values, count), "N",
+      "stop before more nodes than this have come", 1, 1e15, NULL },
+    { "memory", 0, ARG_TEXT, offsetof(values, memory), "SIZE",
+      "for decoded chunks; the default: no limit", 0, 0, NULL },
+    { "out", 'o', ARG_TEXT, offsetof(values, out), "CUT.ply",
+      "write the envelopes of the cut as closed polygons", 0, 0, NULL },
+    ARG_SWITCH("nodes", 0, values, nodes, "a line for each node as well, in the order of arrival"),
+    ARG_SWITCH("json", 0, values, json, "print all of it as JSON"),
+    REMOTE_OPTIONS(values, remote),
+    { 0 },
+};
+
+static const arg_spec spec = {
+    .command = "view",
+    .operands = "FILE",
+    .least = 1,
+    .most = 1,
+    .summary = "reads the nodes first that matter to an observer, under a budget",
+    .text = "FILE is an .ebpo.h5 file or its URL. A line tells what is there each time that the "
+            "number of nodes has doubled, and at the end.",
+    .options = options,
+};
+
+static const char *const end_names[] = { "", "done", "bytes", "nodes" };
+
+typedef struct printer {
+    const values *v;
+    double begin;
+    json j;
+} printer;
+
+/* --- options --- */
+
+static int usage(const char *what)
+{
+    fprintf(stderr, "ebpo view: %s; try 'ebpo view --help'\n", what);
+    return EXIT_USAGE;
+}
+
+static int check_values(const values *v)
+{
+    if (!v->eye && (v->order > EBPO_PRIORITY_LEVEL || v->look || v->fov > 0 || v->size ||
+                    v->pixels > 0 || v->distance >= 0))
+        return usage("--order distance, pixels and front-to-back, --look, --fov, --size, --pixels "
+                     "and --distance need --eye X,Y,Z");
+    if (!v->look && (v->up || v->seen_only))
+        return usage(
+            "--up and --seen-only need --look X,Y,Z: without it the observer looks all around");
+    return EXIT_FINE;
+}
+
+static bool read_triple(const char *name, const char *text, double out[3])
+{
+    char rest;
+    if (sscanf(text, "%lf,%lf,%lf%c", &out[0], &out[1], &out[2], &rest) == 3 && isfinite(out[0]) &&
+        isfinite(out[1]) && isfinite(out[2]))
+        return true;
+    fprintf(
+        stderr,
+        "ebpo view: --%s: '%s' is not three numbers with commas between; try 'ebpo view --help'\n",
+        name, text);
+    return false;
+}
+
+static bool read_budget(const char *name, const char *text, uint64_t *out)
+{
+    if (!text || (words_read_size(text, out) && *out))
+        return true;
+    fprintf(stderr,
+            "ebpo view: --%s: '%s' is not a size such as 512K or 4M; try 'ebpo view --help'\n",
+            name, text);
+    return false;
+}
+
+static bool read_observer(const values *v, ebpo_observer *o)
+{
+    double look[3];
+    char rest;
+    if (!read_triple("eye", v->eye, o->eye) || (v->look && !read_triple("look", v->look, look)) ||
+        (v->up && !read_triple("up", v->up, o->up)))
+        return false;
+    for (int k = 0; k < 3 && v->look; k++)
+        o->direction[k] = look[k] - o->eye[k];
+    if (v->look && o->direction[0] == 0 && o->direction[1] == 0 && o->direction[2] == 0) {
+        fprintf(stderr, "ebpo view: --look and --eye are the same point; look at another one\n");
+        return false;
+    }
+    if (v->fov > 0)
+        o->fov = v->fov;
+    if (v->size &&
+        (sscanf(v->size, "%9" SCNu32 "x%9" SCNu32 "%c", &o->width, &o->height, &rest) != 2 ||
+         !o->width || !o->height)) {
+        fprintf(stderr,
+                "ebpo view: --size: '%s' is not a width, an x, and a height, each from 1; try "
+                "'ebpo view --help'\n",
+                v->size);
+        return false;
+    }
+    return true;
+}
+
+static bool read_options(const values *v, ebpo_view_options *o, ebpo_observer *observer)
+{
+    o->priority = v->order >= 0 ? (ebpo_priority)v->order
+                  : v->eye      ? EBPO_PRIORITY_PIXELS
+                                : EBPO_PRIORITY_LEVEL;
+    o->observer = v->eye ? observer : NULL;
+    o->unseen = v->seen_only ? EBPO_UNSEEN_NEVER : EBPO_UNSEEN_LAST;
+    o->pixels = v->pixels > 0 ? v->pixels : 0;
+    o->distance = v->distance >= 0 ? v->distance : INFINITY;
+    o->level = (int)v->to;
+    o->nodes = v->count > 0 ? (uint64_t)v->count : 0;
+    o->polygons = v->out != NULL;
+    o->windings = v->nodes;
+    return read_budget("bytes", v->bytes, &o->bytes) &&
+           read_budget("memory", v->memory, &o->memory) && (!v->eye || read_observer(v, observer));
+}
+
+/* --- printing --- */
+
+static void print_row(printer *p, const ebpo_view_stream *stream, const char *key)
+{
+    ebpo_view_stats s;
+    ebpo_view_stream_get_stats(stream, &s);
+    double ms = (progress_now() - p->begin) * 1e3;
+    if (!p->v->json) {
+        printf("%12" PRIu64 " %10" PRIu64 " %9" PRIu64 " %9" PRIu64 " %9" PRIu64 " %9" PRIu64
+               " %9" PRIu64 " %10.5g %9.2f\n",
+               s.bytes_read, s.nodes, s.cut[EBPO_GRAY], s.cut[EBPO_LEAF], s.cut[EBPO_WHITE],
+               s.cut[EBPO_BLACK], s.waiting, s.pixels, ms);
+        return;
+    }
+    json_object(&p->j, key);
+    json_uint(&p->j, "bytes_read", s.bytes_read);
+    json_uint(&p->j, "nodes", s.nodes);
+    json_uint(&p->j, "gray", s.cut[EBPO_GRAY]);
+    json_uint(&p->j, "leaf", s.cut[EBPO_LEAF]);
+    json_uint(&p->j, "white", s.cut[EBPO_WHITE]);
+    json_uint(&p->j, "black", s.cut[EBPO_BLACK]);
+    json_uint(&p->j, "waiting", s.waiting);
+    json_real(&p->j, "pixels", s.pixels);
+    json_real(&p->j, "ms", ms);
+    json_end(&p->j);
+}
+
+static void print_node(printer *p, const ebpo_view_node *v)
+{
+    const ebpo_stream_node *n = &v->node;
+    if (!p->v->json) {
+        printf("%" PRIu64 " %s %.17g %.17g %.17g %.17g %.17g %.17g %d %.17g %.17g %d %d %" PRIu32,
+               n->octcode, words_node_type(n->type), n->min[0], n->min[1], n->min[2], n->max[0],
+               n->max[1], n->max[2], (int)n->winding, v->distance, v->pixels, v->seen, v->complete,
+               n->plane_count);
+        for (uint32_t i = 0; i < n->plane_count; i++)
+            printf(" %.17g %.17g %.17g %.17g", n->planes[i][0], n->planes[i][1], n->planes[i][2],
+                   n->planes[i][3]);
+        putchar('\n');
+        return;
+    }
+    json_object(&p->j, NULL);
+    json_uint(&p->j, "octcode", n->octcode);
+    json_text(&p->j, "type", words_node_type(n->type));
+    json_reals(&p->j, "min", n->min, 3);
+    json_reals(&p->j, "max", n->max, 3);
+    json_int(&p->j, "winding", n->winding);
+    json_real(&p->j, "distance", v->distance);
+    json_real(&p->j, "pixels", v->pixels);
+    json_bool(&p->j, "seen", v->seen);
+    json_bool(&p->j, "complete", v->complete);
+    json_array(&p->j, "planes");
+    for (uint32_t i = 0; i < n->plane_count; i++)
+        json_reals(&p->j, NULL, n->planes[i], 4);
+    json_end(&p->j);
+    json_end(&p->j);
+}
+
+/* --- streaming --- */
+
+static ebpo_status tell_nodes(printer *p, ebpo_view_stream *stream, ebpo_view_end *end,
+                              bool *arrived, ebpo_error *error)
+{
+    ebpo_view_node node;
+    ebpo_status status;
+    uint64_t count = 0, next = 1;
+    while (*arrived && (status = ebpo_view_stream_next(stream, &node, end, error)) == EBPO_OK &&
+           *end == EBPO_VIEW_NODE) {
+        count++;
+        if (p->v->nodes)
+            print_node(p, &node);
+        if (!node.complete || count < next)
+            continue;
+        if (!p->v->nodes)
+            print_row(p, stream, NULL);
+        next = 2 * count;
+        *arrived = command_flush("view");
+    }
+    return *arrived ? status : EBPO_OK;
+}
+
+static ebpo_status tell(printer *p, ebpo_file *file, const char *path,
+                        const ebpo_view_options *wanted, bool *arrived, ebpo_error *error)
+{
+    ebpo_view_stream *stream = NULL;
+    ebpo_view_end end = EBPO_VIEW_NODE;
+    const char *order = order_words[wanted->priority];
+    ebpo_status status = ebpo_view_stream_new(&stream, file, wanted, error);
+    if (status != EBPO_OK)
+        return status;
+    if (p->v->json) {
+        json_begin(&p->j, stdout);
+        json_object(&p->j, NULL);
+        json_text(&p->j, "file", remote_shown(path));
+        json_text(&p->j, "order", order);
+        json_array(&p->j, p->v->nodes ? "nodes" : "progress");
+    } else {
+        printf("%s: by %s\n%12s %10s %9s %9s %9s %9s %9s %10s %9s\n", remote_shown(path), order,
+               "bytes", "nodes", "gray", "leaf", "white", "black", "waiting", "pixels", "ms");
+    }
+    status = tell_nodes(p, stream, &end, arrived, error);
+    if (p->v->json)
+        json_end(&p->j);
+    print_row(p, stream, "last");
+    traffic t = traffic_of(file);
+    if (p->v->json) {
+        json_text(&p->j, "end", status == EBPO_OK ? end_names[end] : "failed");
+        remote_json(&p->j, &t, &p->v->remote);
+        json_finish(&p->j);
+    } else {
+        if (status == EBPO_OK && *arrived)
+            printf("%s\n", end == EBPO_VIEW_DONE    ? "all that was asked for is there"
+                           : end == EBPO_VIEW_BYTES ? "stopped by --bytes"
+                                                    : "stopped by --count");
+        (void)command_flush("view");
+        remote_tell(&t, &p->v->remote, false);
+    }
+    ebpo_view_stats stats;
+    ebpo_view_stream_get_stats(stream, &stats);
+    if (status == EBPO_OK && *arrived && p->v->out && stats.nodes == 0) {
+        fprintf(stderr,
+                "ebpo view: %s: not written: the budget does not hold even the root, and no node "
+                "at all contains nothing; give --bytes more\n",
+                p->v->out);
+        *arrived = false;
+    } else if (status == EBPO_OK && *arrived && p->v->out)
+        status = cut_mesh_write(stream, p->v->out, error);
+    ebpo_view_stream_free(stream);
+    return status;
+}
+
+static int run(int argc, char **argv)
+{
+    values v = { .order = -1,
+                 .fov = -1,
+                 .pixels = -1,
+                 .distance = -1,
+                 .to = -1,
+                 .count = -1,
+                 .remote = REMOTE_VALUES_INIT };
+    const char *operand[ARGS_OPERANDS_MAX];
+    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
+    if (parsed != ARGS_RUN)
+        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file = NULL;
+    ebpo_observer observer = EBPO_OBSERVER_INIT;
+    ebpo_view_options wanted = EBPO_VIEW_OPTIONS_INIT;
+    printer p = { .v = &v, .begin = progress_now() };
+    int code = check_values(&v);
+    if (code != EXIT_FINE)
+        return code;
+    if (!read_options(&v, &wanted, &observer))
+        return EXIT_USAGE;
+    if (v.out && command_same_file(operand[0], v.out))
+        return usage("FILE is input and output at once; give --out another name");
+    if (!command_wants_hdf5("view", operand[0]))
+        return EXIT_FAILED;
+    if (remote_open(&file, operand[0], &v.remote, &error) != EBPO_OK)
+        return command_failed("view", &error);
+    bool there = command_has_level("view", ebpo_file_info(file), v.to), arrived = true;
+    ebpo_status status = there ? tell(&p, file, operand[0], &wanted, &arrived, &error) : EBPO_OK;
+    ebpo_close(file);
+    if (!there)
+        return EXIT_USAGE;
+    if (!arrived)
+        return EXIT_FAILED;
+    return status == EBPO_OK ? EXIT_FINE : command_failed("view", &error);
+}
+
+const command command_view = { &spec, run };

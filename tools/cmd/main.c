@@ -1,0 +1,100 @@
+/* The command line: `ebpo COMMAND ...`. One table of commands, one cmd_*.c for each. */
+#include <fenv.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "cli/command.h"
+#include "cli/signals.h"
+#include "cli/words.h"
+#include "cmd/commands.h"
+
+static const command *const commands[] = { &command_convert, &command_check,    &command_info,
+                                           &command_levels,  &command_view,     &command_extract,
+                                           &command_export,  &command_subset,   &command_fetch,
+                                           &command_measure, &command_render,   &command_verify,
+                                           &command_inside,  &command_distance, &command_ray,
+                                           &command_box,     &command_bench,    &command_report };
+enum { COMMANDS = sizeof commands / sizeof *commands };
+
+static const command *find(const char *name)
+{
+    for (int i = 0; i < COMMANDS; i++)
+        if (strcmp(commands[i]->spec->command, name) == 0)
+            return commands[i];
+    return NULL;
+}
+
+static void usage(FILE *out)
+{
+    fprintf(out, "usage: ebpo COMMAND [options] ...\n\nEBP-Octree in HDF5: closed triangle meshes "
+                 "as trees of convex "
+                 "envelopes.\n\n"
+                 "commands:\n");
+    for (int i = 0; i < COMMANDS; i++)
+        fprintf(out, "  %-10s %s\n", commands[i]->spec->command, commands[i]->spec->summary);
+    fprintf(out, "  %-10s %s\n", "help", "what a command does and its options: ebpo help COMMAND");
+    fprintf(out, "\n  --version  the version, and end\n"
+                 "\nexit codes: 0 fine, 1 data or input/output, 2 usage, 3 not a solid where one "
+                 "is required\n");
+}
+
+static int unknown_command(const char *name)
+{
+    fprintf(stderr, "ebpo: unknown command '%s'; try 'ebpo help'\n", name);
+    return EXIT_USAGE;
+}
+
+static int help(int argc, char **argv)
+{
+    if (argc > 3) {
+        fprintf(stderr,
+                "ebpo help: '%s' is one operand too many; expected: [COMMAND]; try 'ebpo help'\n",
+                argv[3]);
+        return EXIT_USAGE;
+    }
+    if (argc < 3) {
+        usage(stdout);
+        return EXIT_FINE;
+    }
+    const command *c = find(argv[2]);
+    if (!c)
+        return unknown_command(argv[2]);
+    args_help(c->spec);
+    return EXIT_FINE;
+}
+
+static int dispatch(int argc, char **argv)
+{
+    if (argc < 2) {
+        usage(stderr);
+        return EXIT_USAGE;
+    }
+    const char *name = argv[1];
+    if (strcmp(name, "--version") == 0 || strcmp(name, "-V") == 0) {
+        char format[32];
+        printf("ebpo %s, format %s\n", ebpo_version(),
+               words_format(format, sizeof format, EBPO_FORMAT_MAJOR, EBPO_FORMAT_MINOR));
+        return EXIT_FINE;
+    }
+    if (strcmp(name, "help") == 0 || strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0)
+        return help(argc, argv);
+    const command *c = find(name);
+    return c ? c->run(argc - 1, argv + 1) : unknown_command(name);
+}
+
+int main(int argc, char **argv)
+{
+    /* whatever a preloaded library has set: numbers are parsed and printed here, too */
+    fesetenv(FE_DFL_ENV);
+    signals_install();
+    int code = dispatch(argc, argv);
+    const command *c = argc > 1 ? find(argv[1]) : NULL;
+    if (!command_flush(c ? c->spec->command : NULL) && code == EXIT_FINE)
+        code = EXIT_FAILED;
+    /* libhdf5 1.10 crashes in its exit handler after a file that could not be written; nothing is
+     * left for it to do. */
+    if (code == EXIT_FAILED)
+        _exit(code);
+    return code;
+}
