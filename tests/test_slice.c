@@ -8,6 +8,7 @@
 #include <ebpo/build.h>
 
 #include "container/slice_parts.h"
+#include "octree/node_types.h"
 #include "random_tree.h"
 #include "solids.h"
 
@@ -43,7 +44,7 @@ typedef struct whole {
 
 static unsigned type_at(const ebpo_level *level, uint64_t group, int octant)
 {
-    return level->types[group] >> 2 * octant & 3;
+    return ebpo_group_type(level->types[group], octant);
 }
 
 static void count_level(whole *w, int i)

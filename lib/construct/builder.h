@@ -13,9 +13,10 @@
 #include <ebpo/build.h>
 
 #include "base/arrays.h"
-#include "container/rule.h"
 #include "geom/cell.h"
 #include "mesh/mesh_parts.h"
+#include "octree/cells.h"
+#include "octree/rule.h"
 #include "planes/planes.h"
 
 #define EBPO_NO_NUMBER UINT32_MAX
@@ -173,7 +174,6 @@ int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, cons
                      uint32_t detail, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope,
                      uint32_t codes[EBPO_PLANES_STORED]);
 unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32_t delta[8]);
-double ebpo_cell_volume(const ebpo_builder *b, int level);
 
 /* emit.c: a piece to stretches of level arrays. What leaves refer to (leaf_refs) is still told by
  * the faces' numbers along the curve. */
@@ -217,14 +217,6 @@ static inline void ebpo_branch_triangle(const ebpo_builder *b, const ebpo_branch
                                         ebpo_triangle *out)
 {
     ebpo_build_triangle(b, ebpo_branch_face(s, entry), out);
-}
-
-static inline ebpo_cell ebpo_child_cell(ebpo_cell cell, unsigned octant)
-{
-    ebpo_cell c = { cell.level + 1, { 0, 0, 0 } };
-    for (unsigned k = 0; k < 3; k++)
-        c.at[k] = cell.at[k] * 2 + (octant >> k & 1);
-    return c;
 }
 
 #endif

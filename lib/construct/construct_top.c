@@ -42,7 +42,7 @@ static ebpo_status wave_envelopes(void *context, uint64_t begin, uint64_t end, u
         if (b->options->parts & EBPO_PART_PLANES)
             t->count = ebpo_gray_planes(b, scratch, &b->top, detail, p->cell, p->winding,
                                         p->envelope, t->codes);
-        t->volume = ebpo_polytope_volume(p->envelope) * ebpo_cell_volume(b, p->cell.level);
+        t->volume = ebpo_polytope_volume(p->envelope) * ebpo_cell_volume(&b->box, p->cell.level);
         if (t->count < 0)
             status = no_memory(b, error);
     }
@@ -74,7 +74,7 @@ static bool hand_down(ebpo_builder *b, const pending *p, wave *next)
             ebpo_array_free(envelope);
             return false;
         }
-        next->nodes[next->count++] = (pending){ node->child + o, ebpo_child_cell(p->cell, o),
+        next->nodes[next->count++] = (pending){ node->child + o, ebpo_cell_child(p->cell, o),
                                                 p->winding + offset[o], envelope };
     }
     return true;

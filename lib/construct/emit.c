@@ -8,6 +8,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "construct/propose.h"
+#include "octree/node_types.h"
 
 struct ebpo_emit_scratch {
     ebpo_envelope_scratch *envelope;
@@ -171,7 +172,7 @@ static bool emit_leaf(emitter *e, uint32_t detail, ebpo_cell cell, int32_t windi
     int planes = stored ? leaf_planes(e, detail, cell, winding, envelope, codes) : 0;
     if (planes < 0)
         return false;
-    l->leaf_volume += ebpo_polytope_volume(envelope) * ebpo_cell_volume(b, cell.level);
+    l->leaf_volume += ebpo_polytope_volume(envelope) * ebpo_cell_volume(&b->box, cell.level);
     l->leaf_plane_counts[l->leaf_count++] = (uint8_t)planes;
     if (!stored)
         return true;
@@ -216,7 +217,7 @@ static bool emit_children(emitter *e, uint32_t child, ebpo_cell cell, int32_t wi
             ebpo_polytope_half(&z, 1, o >> 1 & 1, &y);
         if (filled >> o & 1)
             ebpo_polytope_half(&y, 0, o & 1, &x);
-        if (!emit(e, child + o, ebpo_child_cell(cell, o), winding + offset[o], &x))
+        if (!emit(e, child + o, ebpo_cell_child(cell, o), winding + offset[o], &x))
             return false;
     }
     return true;
@@ -234,17 +235,17 @@ static bool emit_gray(emitter *e, const ebpo_build_node *node, ebpo_cell cell, i
                                   envelope, codes);
     if (planes < 0 ||
         !ebpo_emit_gray(&e->s->out[cell.level], codes, planes,
-                        ebpo_polytope_volume(envelope) * ebpo_cell_volume(b, cell.level)))
+                        ebpo_polytope_volume(envelope) * ebpo_cell_volume(&b->box, cell.level)))
         return false;
     int32_t offset[8];
     ebpo_child_windings(b, e->s, node->child, offset);
     uint16_t types = 0;
     for (uint32_t o = 0; o < 8; o++) {
-        unsigned type = e->s->nodes[node->child + o].type;
+        ebpo_node_type type = e->s->nodes[node->child + o].type;
         if (type == EBPO_WHITE && b->solid &&
             ebpo_rule_inside(b->options->rule, winding + offset[o]))
             type = EBPO_BLACK;
-        types |= (uint16_t)(type << 2 * o);
+        types |= ebpo_group_of(type, o);
     }
     if (!ebpo_emit_group(&e->s->out[cell.level + 1], types))
         return false;

@@ -50,14 +50,6 @@ void ebpo_scratch_free(ebpo_envelope_scratch *scratch)
     free(scratch);
 }
 
-double ebpo_cell_volume(const ebpo_builder *b, int level)
-{
-    double v = 1;
-    for (int k = 0; k < 3; k++)
-        v *= b->box.size[k] / (double)(1u << level);
-    return v;
-}
-
 unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32_t delta[8])
 {
     unsigned mask = 0;

@@ -9,6 +9,7 @@
 #include "construct/builder.h"
 #include "construct/level_arrays.h"
 #include "construct/construct_top.h"
+#include "octree/node_types.h"
 
 typedef struct joiner {
     ebpo_builder *b;
@@ -47,9 +48,9 @@ static ebpo_out *current(joiner *j)
     return j->current = out;
 }
 
-static unsigned type_of(const ebpo_builder *b, const ebpo_build_node *n, int32_t winding)
+static ebpo_node_type type_of(const ebpo_builder *b, const ebpo_build_node *n, int32_t winding)
 {
-    unsigned type = n->type == EBPO_LEAF ? b->sub[n->detail].root_type : n->type;
+    ebpo_node_type type = n->type == EBPO_LEAF ? b->sub[n->detail].root_type : n->type;
     if (type == EBPO_WHITE && b->solid && ebpo_rule_inside(b->options->rule, winding))
         return EBPO_BLACK;
     return type;
@@ -80,13 +81,12 @@ static bool walk(joiner *j, uint32_t index, ebpo_cell cell, int32_t winding)
     ebpo_child_windings(b, &b->top, node.child, offset);
     uint16_t types = 0;
     for (uint32_t o = 0; o < 8; o++)
-        types |=
-            (uint16_t)(type_of(b, &b->top.nodes[node.child + o], winding + offset[o]) << 2 * o);
+        types |= ebpo_group_of(type_of(b, &b->top.nodes[node.child + o], winding + offset[o]), o);
     if (!ebpo_emit_gray(&out[cell.level], t->codes, t->count, t->volume) ||
         !ebpo_emit_group(&out[cell.level + 1], types))
         return false;
     for (uint32_t o = 0; o < 8; o++)
-        if (!walk(j, node.child + o, ebpo_child_cell(cell, o), winding + offset[o]))
+        if (!walk(j, node.child + o, ebpo_cell_child(cell, o), winding + offset[o]))
             return false;
     return true;
 }

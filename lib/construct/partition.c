@@ -302,7 +302,7 @@ static ebpo_status grow(grower *g, uint32_t index, ebpo_cell cell, uint64_t at, 
     if (!ebpo_build_crossing(g->b, s, cell, g->stack + at, count, &d))
         status = no_memory(g->error);
     for (unsigned o = 0; o < 8 && status == EBPO_OK; o++)
-        status = grow(g, child + o, ebpo_child_cell(cell, o), begin[o], begin[o + 1] - begin[o],
+        status = grow(g, child + o, ebpo_cell_child(cell, o), begin[o], begin[o + 1] - begin[o],
                       begin[8]);
     if (status != EBPO_OK)
         return status;

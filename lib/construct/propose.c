@@ -298,7 +298,7 @@ static bool propose(proposer *p, uint32_t index, ebpo_cell cell, int32_t winding
     ebpo_child_windings(p->b, p->s, node.child, offset);
     for (unsigned o = 0; o < 8 && good; o++) {
         ebpo_handover child = { 0 };
-        good = propose(p, node.child + o, ebpo_child_cell(cell, o), winding + offset[o], &child) &&
+        good = propose(p, node.child + o, ebpo_cell_child(cell, o), winding + offset[o], &child) &&
                gather(&given, &child, o);
         handover_free(&child);
     }
@@ -420,7 +420,7 @@ static bool list_top(top_list *t)
             if (!ebpo_grow(&t->nodes, &t->room, t->count + 1, sizeof *t->nodes))
                 return false;
             t->nodes[t->count++] = (top_node){ .node = node->child + o,
-                                               .cell = ebpo_child_cell(t->nodes[i].cell, o),
+                                               .cell = ebpo_cell_child(t->nodes[i].cell, o),
                                                .winding = winding,
                                                .parent = i,
                                                .octant = o };

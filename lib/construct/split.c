@@ -44,7 +44,7 @@ static unsigned octants_exactly(const ebpo_builder *b, ebpo_cell cell, const ebp
         if (!(mask >> octant & 1))
             continue;
         double low[3], high[3];
-        ebpo_cell child = ebpo_child_cell(cell, octant);
+        ebpo_cell child = ebpo_cell_child(cell, octant);
         for (int k = 0; k < 3; k++) {
             low[k] = ebpo_wall(&b->box, k, child.level, child.at[k]);
             high[k] = ebpo_wall(&b->box, k, child.level, child.at[k] + 1);
@@ -238,7 +238,7 @@ static ebpo_status grow_top(cutting *c, uint32_t index, ebpo_cell cell, uint32_t
     ebpo_array_free(list);
     for (unsigned o = 0; o < 8; o++) {
         if (status == EBPO_OK && sizes[o])
-            status = grow_top(c, child + o, ebpo_child_cell(cell, o), lists[o], sizes[o]);
+            status = grow_top(c, child + o, ebpo_cell_child(cell, o), lists[o], sizes[o]);
         else
             ebpo_array_free(lists[o]);
     }

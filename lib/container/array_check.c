@@ -10,6 +10,8 @@
 #include "base/arrays.h"
 #include "container/schema.h"
 #include "geom/plane_code.h"
+#include "octree/node_types.h"
+#include "octree/rule.h"
 
 static const char *next_step(const ebpo_check *check)
 {
@@ -39,8 +41,8 @@ static ebpo_status check_types(const ebpo_check *check, const ebpo_info *info, i
         return ebpo_check_fail(check, level, "types", "the root has siblings", error);
     for (uint64_t i = 0; i < groups; i++) {
         ebpo_settle_all_at(i);
-        for (int octant = 0; octant < (level ? 8 : 1); octant++)
-            counts[arrays->types[i] >> 2 * octant & 3]++;
+        for (unsigned octant = 0; octant < ebpo_group_octants(level); octant++)
+            counts[ebpo_group_type(arrays->types[i], octant)]++;
     }
     if (info->pruned && level) {
         uint64_t empty = 0;
@@ -80,13 +82,6 @@ static ebpo_status check_planes(const ebpo_check *check, int level, const char *
     return EBPO_OK;
 }
 
-bool ebpo_check_inside(ebpo_rule rule, int32_t winding)
-{
-    return rule == EBPO_RULE_NONZERO   ? winding != 0
-           : rule == EBPO_RULE_EVENODD ? winding % 2 != 0
-                                       : winding > 0;
-}
-
 static ebpo_status check_windings(const ebpo_check *check, const ebpo_info *info, int level,
                                   const ebpo_level *arrays, ebpo_error *error)
 {
@@ -100,12 +95,12 @@ static ebpo_status check_windings(const ebpo_check *check, const ebpo_info *info
         return ebpo_check_fail(check, level, "leaf_winding", "the array is missing", error);
     if (arrays->black_winding)
         for (uint64_t i = 0; i < arrays->black_count; ebpo_settle_all_at(i++))
-            if (!ebpo_check_inside(info->rule, arrays->black_winding[i]))
+            if (!ebpo_rule_inside(info->rule, arrays->black_winding[i]))
                 return ebpo_check_fail(check, level, "black_winding",
                                        "a black node lies outside by the winding rule", error);
     if (arrays->white_winding)
         for (uint64_t i = 0; i < arrays->white_count; ebpo_settle_all_at(i++))
-            if (ebpo_check_inside(info->rule, arrays->white_winding[i]))
+            if (ebpo_rule_inside(info->rule, arrays->white_winding[i]))
                 return ebpo_check_fail(check, level, "white_winding",
                                        "a white node lies inside by the winding rule", error);
     return EBPO_OK;
@@ -189,9 +184,9 @@ typedef struct walk {
 static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
 {
     const ebpo_level *arrays = &w->tree->level[level];
-    unsigned types = arrays->types[w->group[level]++];
-    for (int octant = 0; octant < (level ? 8 : 1); octant++) {
-        unsigned type = types >> 2 * octant & 3;
+    uint16_t types = arrays->types[w->group[level]++];
+    for (unsigned octant = 0; octant < ebpo_group_octants(level); octant++) {
+        ebpo_node_type type = ebpo_group_type(types, octant);
         if (type == EBPO_GRAY && level + 1 < w->tree->info.level_count) {
             ebpo_status status = walk_group(w, level + 1, error);
             if (status != EBPO_OK)

@@ -15,9 +15,6 @@ typedef struct ebpo_check {
 ebpo_status ebpo_check_fail(const ebpo_check *check, int level, const char *array, const char *what,
                             ebpo_error *error);
 
-/* Whether the rule takes a winding number as inside. */
-bool ebpo_check_inside(ebpo_rule rule, int32_t winding);
-
 /* A level's arrays against the head's counts, and against themselves. */
 EBPO_MUST_USE ebpo_status ebpo_check_level(const ebpo_check *check, const ebpo_info *info,
                                            int level, const ebpo_level *arrays, ebpo_error *error);

@@ -6,10 +6,10 @@
 #include "base/error.h"
 #include "container/slice_parts.h"
 #include "geom/plane_code.h"
+#include "octree/node_types.h"
+#include "octree/rule.h"
 
 static uint64_t block_of(uint64_t item) { return item / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS; }
-
-static unsigned type_of(uint16_t types, unsigned octant) { return types >> 2 * octant & 3; }
 
 static ebpo_status read_types(ebpo_chunks *chunks, int level, uint64_t group, ebpo_group *out,
                               uint64_t counts[4], ebpo_error *error)
@@ -20,9 +20,10 @@ static ebpo_status read_types(ebpo_chunks *chunks, int level, uint64_t group, eb
                                       sizeof out->types, error);
     if (status != EBPO_OK)
         return status;
-    ebpo_ranks_count(&out->types, 1, counts);
+    ebpo_groups_count(&out->types, 1, counts);
     if (level == 0)
-        counts[EBPO_WHITE] = type_of(out->types, 0) == EBPO_WHITE; /* octants 1 to 7 do not exist */
+        counts[EBPO_WHITE] =
+            ebpo_group_type(out->types, 0) == EBPO_WHITE; /* octants 1 to 7 do not exist */
     return ebpo_ranks_check(chunks, level, out->rank, counts, error);
 }
 
@@ -48,7 +49,7 @@ static ebpo_status take_codes(ebpo_chunks *chunks, ebpo_array_id id, int level, 
             status = ebpo_chunks_fail(chunks, level, id, "a code stands for no plane", error);
     }
     for (unsigned octant = 0, i = 0; octant < 8 && status == EBPO_OK; octant++)
-        if (type_of(out->types, octant) == type && (level || octant == 0))
+        if (ebpo_group_type(out->types, octant) == type && (level || octant == 0))
             out->plane_count[octant] = counts[i++];
     if (status == EBPO_OK)
         memcpy(out->codes + out->code_count, codes, sum * sizeof *codes);
@@ -117,7 +118,8 @@ static void sort_codes(ebpo_group *group, unsigned gray_codes)
     uint32_t sorted[EBPO_GROUP_CODES];
     unsigned at = 0, next[4] = { [EBPO_GRAY] = 0, [EBPO_LEAF] = gray_codes };
     for (unsigned octant = 0; octant < 8; octant++) {
-        unsigned count = group->plane_count[octant], *from = &next[type_of(group->types, octant)];
+        unsigned count = group->plane_count[octant],
+                 *from = &next[ebpo_group_type(group->types, octant)];
         memcpy(sorted + at, group->codes + *from, count * sizeof *sorted);
         *from += count;
         at += count;
@@ -145,13 +147,13 @@ static ebpo_status read_windings(ebpo_chunks *chunks, int level, const uint64_t 
                                           counts[type], of_type[type], sizeof **of_type, error);
         for (uint64_t i = 0;
              i < counts[type] && status == EBPO_OK && info->solid && type != EBPO_LEAF; i++)
-            if (ebpo_check_inside(info->rule, of_type[type][i]) != (type == EBPO_BLACK))
+            if (ebpo_rule_inside(info->rule, of_type[type][i]) != (type == EBPO_BLACK))
                 status = ebpo_chunks_fail(chunks, level, windings[type],
                                           "a node's winding number contradicts its type", error);
     }
     unsigned next[3] = { 0, 0, 0 };
-    for (unsigned octant = 0; octant < (level ? 8u : 1u) && status == EBPO_OK; octant++) {
-        unsigned type = type_of(out->types, octant);
+    for (unsigned octant = 0; octant < ebpo_group_octants(level) && status == EBPO_OK; octant++) {
+        unsigned type = ebpo_group_type(out->types, octant);
         out->winding[octant] = type == EBPO_GRAY ? 0 : of_type[type][next[type]++];
     }
     return status;

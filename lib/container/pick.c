@@ -8,6 +8,8 @@
 #include "base/parallel.h"
 #include "container/slice_parts.h"
 #include "geom/plane_code.h"
+#include "octree/node_types.h"
+#include "octree/rule.h"
 
 typedef struct picking {
     ebpo_chunks *chunks;
@@ -52,11 +54,7 @@ static ebpo_status pick_types(const picking *p)
                                           types, sizeof *types, p->error);
         if (status != EBPO_OK)
             break;
-        memset(r->count, 0, sizeof r->count);
-        if (p->level)
-            ebpo_ranks_count(types, r->groups, r->count);
-        else
-            r->count[types[0] & 3] = 1;
+        ebpo_groups_count_at(p->level, types, r->groups, r->count);
         status = ebpo_ranks_check(p->chunks, p->level, r->rank, r->count, p->error);
         p->out->white_count += r->count[EBPO_WHITE];
         p->out->black_count += r->count[EBPO_BLACK];
@@ -145,11 +143,11 @@ static ebpo_status pick_windings(const picking *p)
     if (status == EBPO_OK)
         status = pick_column(p, EBPO_A_WHITE_WINDING, EBPO_WHITE, 4, &out->white_winding);
     for (uint64_t i = 0; out->black_winding && i < out->black_count && status == EBPO_OK; i++)
-        if (!ebpo_check_inside(info->rule, out->black_winding[i]))
+        if (!ebpo_rule_inside(info->rule, out->black_winding[i]))
             status = ebpo_chunks_fail(p->chunks, p->level, EBPO_A_BLACK_WINDING,
                                       "a black node lies outside by the winding rule", p->error);
     for (uint64_t i = 0; out->white_winding && i < out->white_count && status == EBPO_OK; i++)
-        if (ebpo_check_inside(info->rule, out->white_winding[i]))
+        if (ebpo_rule_inside(info->rule, out->white_winding[i]))
             status = ebpo_chunks_fail(p->chunks, p->level, EBPO_A_WHITE_WINDING,
                                       "a white node lies inside by the winding rule", p->error);
     return status;

@@ -5,6 +5,8 @@
 #include "base/error.h"
 #include "container/slice_parts.h"
 #include "geom/plane_code.h"
+#include "octree/node_types.h"
+#include "octree/rule.h"
 
 ebpo_status ebpo_place_check(const ebpo_chunks *chunks, const ebpo_place *place, ebpo_error *error)
 {
@@ -52,7 +54,7 @@ ebpo_status ebpo_place_children(ebpo_chunks *chunks, const ebpo_place *gray, uin
                                       sizeof *types, error);
     if (status != EBPO_OK)
         return status;
-    ebpo_ranks_count(types, 1, counts);
+    ebpo_groups_count(types, 1, counts);
     return ebpo_ranks_check(chunks, gray->level + 1, ranks, counts, error);
 }
 
@@ -113,7 +115,7 @@ ebpo_status ebpo_place_winding(ebpo_chunks *chunks, const ebpo_place *place, int
     status = ebpo_chunks_integers(chunks, id, place->level, place->rank, 1, winding,
                                   sizeof *winding, error);
     if (status == EBPO_OK && place->type != EBPO_LEAF &&
-        ebpo_check_inside(info->rule, *winding) != (place->type == EBPO_BLACK))
+        ebpo_rule_inside(info->rule, *winding) != (place->type == EBPO_BLACK))
         status = ebpo_chunks_fail(chunks, place->level, id,
                                   "a node's winding number contradicts its type", error);
     return status;

@@ -3,6 +3,7 @@
 #include "base/alloc.h"
 #include "base/arrays.h"
 #include "container/plan.h"
+#include "octree/node_types.h"
 
 static uint64_t *make(uint64_t count, unsigned cols)
 {
@@ -18,8 +19,8 @@ uint64_t *ebpo_index_types(const ebpo_level *level, bool root)
         if (i % EBPO_INDEX_ROWS == 0)
             for (int k = 0; k < 4; k++)
                 index[i / EBPO_INDEX_ROWS * 4 + k] = before[k];
-        for (int octant = 0; octant < (root ? 1 : 8); octant++)
-            before[level->types[i] >> 2 * octant & 3]++;
+        for (unsigned octant = 0; octant < ebpo_group_octants(!root); octant++)
+            before[ebpo_group_type(level->types[i], octant)]++;
     }
     return index;
 }

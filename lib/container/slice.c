@@ -10,6 +10,8 @@
 #include "base/arrays.h"
 #include "container/slice_parts.h"
 #include "geom/plane_code.h"
+#include "octree/node_types.h"
+#include "octree/rule.h"
 
 void ebpo_slice_free(ebpo_slice *slice)
 {
@@ -58,7 +60,7 @@ static ebpo_status next_range(ebpo_chunks *chunks, range *r, uint16_t **types, e
         status = ebpo_chunks_take(chunks, EBPO_A_TYPES, r->level, group, groups, sizeof **types,
                                   types, error);
     if (status == EBPO_OK && types)
-        ebpo_ranks_count(*types, groups, r->count);
+        ebpo_groups_count(*types, groups, r->count);
     else if (status == EBPO_OK)
         status = ebpo_ranks_count_file(chunks, r->level, group, groups, r->count, error);
     return status == EBPO_OK ? ebpo_ranks_check(chunks, r->level, r->rank, r->count, error)
@@ -103,7 +105,7 @@ static ebpo_status read_winding(ebpo_chunks *chunks, const range *r, ebpo_array_
     ebpo_status status = ebpo_chunks_take(chunks, id, r->level, r->rank[type], r->count[type],
                                           sizeof **out, out, error);
     for (uint64_t i = 0; i < r->count[type] && status == EBPO_OK && type != EBPO_LEAF; i++)
-        if (ebpo_check_inside(info->rule, (*out)[i]) != (type == EBPO_BLACK))
+        if (ebpo_rule_inside(info->rule, (*out)[i]) != (type == EBPO_BLACK))
             status = ebpo_chunks_fail(chunks, r->level, id,
                                       "a node's winding number contradicts its type", error);
     return status;
@@ -257,9 +259,9 @@ typedef struct walk {
 static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
 {
     const ebpo_level *arrays = &w->slice->level[level];
-    unsigned types = arrays->types[w->group[level]++];
-    for (int octant = 0; octant < (level ? 8 : 1); octant++) {
-        unsigned type = types >> 2 * octant & 3;
+    uint16_t types = arrays->types[w->group[level]++];
+    for (unsigned octant = 0; octant < ebpo_group_octants(level); octant++) {
+        ebpo_node_type type = ebpo_group_type(types, octant);
         if (type == EBPO_GRAY && level + 1 < w->slice->level_count) {
             ebpo_status status = walk_group(w, level + 1, error);
             if (status != EBPO_OK)

@@ -93,9 +93,7 @@ static inline ebpo_status ebpo_chunks_fail(const ebpo_chunks *chunks, int level,
 
 /* --- ranks.c: from the nearest row of an index, and counting from there --- */
 
-/* Nodes of each type in groups of eight. */
-void ebpo_ranks_count(const void *types, uint64_t groups, uint64_t counts[4]);
-/* The same for groups [group, group + groups) of the file. */
+/* ebpo_groups_count for groups [group, group + groups) of the file. */
 EBPO_MUST_USE ebpo_status ebpo_ranks_count_file(ebpo_chunks *chunks, int level, uint64_t group,
                                                 uint64_t groups, uint64_t counts[4],
                                                 ebpo_error *error);

@@ -5,6 +5,8 @@
 #include "base/error.h"
 #include "container/reader.h"
 #include "geom/plane_code.h"
+#include "octree/cells.h"
+#include "octree/node_types.h"
 
 ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, ebpo_file *file, unsigned threads,
                                  ebpo_error *error)
@@ -85,8 +87,8 @@ static void find_in_group(const ebpo_lod_model *tree, uint64_t group, unsigned o
 {
     const ebpo_lod_index *index = &tree->index[out->cell.level];
     uint16_t types = tree->level[out->cell.level].types[group];
-    out->type = ebpo_type_of(types, octant);
-    out->rank = ebpo_count_type(types, out->type, octant);
+    out->type = ebpo_group_type(types, octant);
+    out->rank = ebpo_group_count(types, out->type, octant);
     if (out->type == EBPO_GRAY)
         out->rank += index->gray_before[group];
     else if (out->type == EBPO_LEAF)
@@ -96,9 +98,7 @@ static void find_in_group(const ebpo_lod_model *tree, uint64_t group, unsigned o
 ebpo_tree_node ebpo_tree_child(const ebpo_lod_model *tree, const ebpo_tree_node *gray,
                                unsigned octant)
 {
-    ebpo_tree_node child = { { gray->cell.level + 1, { 0, 0, 0 } }, EBPO_WHITE, 0 };
-    for (unsigned k = 0; k < 3; k++)
-        child.cell.at[k] = 2 * gray->cell.at[k] + (octant >> k & 1);
+    ebpo_tree_node child = { ebpo_cell_child(gray->cell, octant), EBPO_WHITE, 0 };
     find_in_group(tree, gray->rank, octant, &child);
     return child;
 }
@@ -126,9 +126,7 @@ bool ebpo_tree_find(const ebpo_lod_model *tree, ebpo_cell cell, bool planes, boo
     while (out->cell.level < cell.level) {
         if (out->type != EBPO_GRAY || ebpo_tree_is_pruned(tree, out))
             return false;
-        int below = cell.level - out->cell.level - 1;
-        unsigned octant = (cell.at[0] >> below & 1) | (cell.at[1] >> below & 1) << 1 |
-                          (cell.at[2] >> below & 1) << 2;
+        unsigned octant = ebpo_cell_octant(cell, out->cell.level);
         if (halves && planes)
             add_own(tree, out, halves);
         if (halves)

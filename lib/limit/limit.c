@@ -11,9 +11,11 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
-#include "container/rule.h"
 #include "limit/qhull.h"
 #include "lod/lod_model.h"
+#include "octree/cells.h"
+#include "octree/node_types.h"
+#include "octree/rule.h"
 
 /* A node whose hull is wanted. */
 typedef struct wanted {
@@ -45,13 +47,6 @@ typedef struct job {
     scratch *scratch; /* [threads] */
 } job;
 
-static double cell_volume(const job *j, int level)
-{
-    double side = (double)(1u << level);
-    return j->model.box.size[0] / side * (j->model.box.size[1] / side) *
-           (j->model.box.size[2] / side);
-}
-
 /* --- which nodes --- */
 
 static bool list_group(job *j, uint64_t group, ebpo_cell parent);
@@ -60,10 +55,10 @@ static bool list_node(job *j, uint64_t group, unsigned octant, ebpo_cell cell)
 {
     const ebpo_level *level = &j->model.level[cell.level];
     const ebpo_lod_index *index = &j->model.index[cell.level];
-    ebpo_node_type type = ebpo_type_of(level->types[group], octant);
-    uint64_t rank = ebpo_count_type(level->types[group], type, octant);
+    ebpo_node_type type = ebpo_group_type(level->types[group], octant);
+    uint64_t rank = ebpo_group_count(level->types[group], type, octant);
     if (type == EBPO_BLACK)
-        j->black += cell_volume(j, cell.level);
+        j->black += ebpo_cell_volume(&j->model.box, cell.level);
     if (type == EBPO_WHITE || type == EBPO_BLACK)
         return true;
     rank += type == EBPO_GRAY ? index->gray_before[group] : index->leaf_before[group];
@@ -75,18 +70,10 @@ static bool list_node(job *j, uint64_t group, unsigned octant, ebpo_cell cell)
     return true;
 }
 
-static ebpo_cell child_cell(ebpo_cell cell, unsigned octant)
-{
-    ebpo_cell c = { cell.level + 1, { 0, 0, 0 } };
-    for (unsigned k = 0; k < 3; k++)
-        c.at[k] = 2 * cell.at[k] + (octant >> k & 1);
-    return c;
-}
-
 static bool list_group(job *j, uint64_t group, ebpo_cell parent)
 {
     for (unsigned octant = 0; octant < 8; octant++)
-        if (!list_node(j, group, octant, child_cell(parent, octant)))
+        if (!list_node(j, group, octant, ebpo_cell_child(parent, octant)))
             return false;
     return true;
 }
@@ -115,7 +102,7 @@ static bool take_group(const job *j, scratch *s, int number, uint64_t group)
     uint64_t gray = index->gray_before[group], leaf = index->leaf_before[group];
     bool good = true;
     for (unsigned octant = 0; octant < 8 && good; octant++)
-        switch (ebpo_type_of(level->types[group], octant)) {
+        switch (ebpo_group_type(level->types[group], octant)) {
         case EBPO_GRAY: good = take_group(j, s, number + 1, gray++); break;
         case EBPO_LEAF: good = take_leaf(j, s, number, leaf++); break;
         default: break;
@@ -159,12 +146,12 @@ static int32_t lowest_winding(const job *j, int number, uint64_t gray)
     for (;; number++) {
         const ebpo_level *level = &m->level[number + 1];
         const ebpo_lod_index *index = &m->index[number + 1];
-        switch (ebpo_type_of(level->types[gray], 0)) {
+        switch (ebpo_group_type(level->types[gray], 0)) {
         case EBPO_GRAY: gray = index->gray_before[gray]; break;
         case EBPO_LEAF: return level->leaf_winding[index->leaf_before[gray]];
         default: { /* only windings that are not 0 or 1 are stored; octant 0 is the first of its
                       group */
-            bool black = ebpo_type_of(level->types[gray], 0) == EBPO_BLACK;
+            bool black = ebpo_group_type(level->types[gray], 0) == EBPO_BLACK;
             const int32_t *stored = black ? level->black_winding : level->white_winding;
             return stored ? stored[j->empty_before[number + 1][black][gray]] : black;
         }
@@ -247,7 +234,7 @@ static bool count_empty(job *j)
                                   ebpo_alloc(level->group_count, sizeof *before);
             for (uint64_t g = 0; before && g < level->group_count; g++) {
                 before[g] = sum;
-                sum += ebpo_count_type(level->types[g], black ? EBPO_BLACK : EBPO_WHITE, 8);
+                sum += ebpo_group_count(level->types[g], black ? EBPO_BLACK : EBPO_WHITE, 8);
             }
             if (!before)
                 return false;
@@ -310,7 +297,9 @@ ebpo_status ebpo_limit_level(ebpo_file *file, int level, unsigned threads,
                                    progress ? progress : &silent, "convex hulls", error);
     for (uint64_t i = 0; i < j.node_count && status == EBPO_OK; i++) {
         /* not 0 times infinity */
-        double volume = j.volume[i] > 0 ? j.volume[i] * cell_volume(&j, j.nodes[i].cell.level) : 0;
+        double volume = j.volume[i] > 0
+                            ? j.volume[i] * ebpo_cell_volume(&j.model.box, j.nodes[i].cell.level)
+                            : 0;
         out->volume += volume;
         out->gray_volume += j.nodes[i].gray ? volume : 0;
         out->flat += j.volume[i] == 0;

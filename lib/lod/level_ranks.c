@@ -5,6 +5,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "octree/node_types.h"
 
 void ebpo_lod_index_free(ebpo_lod_index *index)
 {
@@ -27,8 +28,8 @@ static ebpo_status make_ranks(ebpo_lod_index *out, const ebpo_level *level, int 
     for (uint64_t i = 0; i < level->group_count; i++) {
         out->gray_before[i] = gray;
         out->leaf_before[i] = leaf;
-        gray += ebpo_count_type(level->types[i], EBPO_GRAY, 8);
-        leaf += ebpo_count_type(level->types[i], EBPO_LEAF, 8);
+        gray += ebpo_group_count(level->types[i], EBPO_GRAY, 8);
+        leaf += ebpo_group_count(level->types[i], EBPO_LEAF, 8);
     }
     if (gray != level->gray_count || leaf != level->leaf_count)
         return ebpo_fail(error, EBPO_E_FORMAT,

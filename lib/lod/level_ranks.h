@@ -12,20 +12,6 @@ typedef struct ebpo_lod_index {
     uint64_t *ref_first;                 /* [leaf_count], NULL without face lists */
 } ebpo_lod_index;
 
-static inline ebpo_node_type ebpo_type_of(uint16_t types, unsigned octant)
-{
-    return (ebpo_node_type)(types >> 2 * octant & 3);
-}
-
-/* Nodes of one type among the first `octants` of a group. */
-static inline unsigned ebpo_count_type(uint16_t types, ebpo_node_type type, unsigned octants)
-{
-    unsigned count = 0;
-    for (unsigned i = 0; i < octants; i++)
-        count += ebpo_type_of(types, i) == type;
-    return count;
-}
-
 /* EBPO_E_FORMAT when the level's counts contradict each other. On failure nothing is left to free.
  * `number` is for messages. */
 EBPO_MUST_USE ebpo_status ebpo_lod_index_make(ebpo_lod_index *out, const ebpo_level *level,

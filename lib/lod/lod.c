@@ -14,6 +14,8 @@
 #include "base/parallel.h"
 #include "lod/lod_model.h"
 #include "lod/polyhedra.h"
+#include "octree/cells.h"
+#include "octree/node_types.h"
 #include "octree/octcode.h"
 
 enum { SEEDS_WANTED = 128 };
@@ -43,16 +45,10 @@ typedef struct walker {
     ebpo_error *error;
 } walker;
 
-static double cell_volume(const ebpo_box *box, int level)
-{
-    double side = (double)(1u << level);
-    return box->size[0] / side * (box->size[1] / side) * (box->size[2] / side);
-}
-
 static ebpo_status emit(walker *w, const ebpo_polytope *p, ebpo_cell cell, ebpo_node_type type)
 {
     ebpo_polyhedra *piece = &w->out[cell.level];
-    piece->volume += ebpo_polytope_volume(p) * cell_volume(&w->j->model->box, cell.level);
+    piece->volume += ebpo_polytope_volume(p) * ebpo_cell_volume(&w->j->model->box, cell.level);
     if (!w->j->polygons)
         return EBPO_OK;
     piece->wants_nodes = w->j->nodes;
@@ -95,8 +91,8 @@ static ebpo_status visit_node(walker *w, uint64_t group, unsigned octant, ebpo_c
     const ebpo_lod_model *model = w->j->model;
     const ebpo_lod_index *index = &model->index[cell.level];
     uint16_t types = model->level[cell.level].types[group];
-    ebpo_node_type type = ebpo_type_of(types, octant);
-    uint64_t rank = ebpo_count_type(types, type, octant);
+    ebpo_node_type type = ebpo_group_type(types, octant);
+    uint64_t rank = ebpo_group_count(types, type, octant);
     if (type == EBPO_GRAY)
         return visit_gray(w, rank + index->gray_before[group], cell, envelope);
     ebpo_status status = ebpo_lod_leaf(model, cell, rank + index->leaf_before[group], w->scratch,
@@ -117,7 +113,7 @@ static ebpo_status visit_root(walker *w)
     ebpo_cell root = { 0, { 0, 0, 0 } };
     ebpo_polytope cube;
     ebpo_polytope_cube(&cube);
-    switch (ebpo_type_of(w->j->model->level[0].types[0], 0)) {
+    switch (ebpo_group_type(w->j->model->level[0].types[0], 0)) {
     case EBPO_WHITE: return EBPO_OK;
     case EBPO_BLACK: return visit_black(w, root);
     default: return visit_node(w, 0, 0, root, &cube);
@@ -130,13 +126,11 @@ static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell,
                                const ebpo_polytope *parent)
 {
     uint16_t types = w->j->model->level[parent_cell.level + 1].types[group];
-    unsigned filled = types >> 1 & 0x5555; /* bit 2i: octant i is gray or a leaf */
+    unsigned filled = ebpo_group_filled(types);
     ebpo_polytope z, y, x;
     ebpo_status status = EBPO_OK;
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
-        ebpo_cell cell = { parent_cell.level + 1, { 0, 0, 0 } };
-        for (unsigned k = 0; k < 3; k++)
-            cell.at[k] = 2 * parent_cell.at[k] + (octant >> k & 1);
+        ebpo_cell cell = ebpo_cell_child(parent_cell, octant);
         if (octant % 4 == 0 && filled >> 2 * octant & 0xff)
             (void)ebpo_polytope_half(parent, 2, octant >> 2 & 1, &z);
         if (octant % 2 == 0 && filled >> 2 * octant & 0xf)
@@ -144,7 +138,7 @@ static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell,
         if (filled >> 2 * octant & 1) {
             (void)ebpo_polytope_half(&y, 0, octant & 1, &x);
             status = visit_node(w, group, octant, cell, &x);
-        } else if (ebpo_type_of(types, octant) == EBPO_BLACK) {
+        } else if (ebpo_group_type(types, octant) == EBPO_BLACK) {
             status = visit_black(w, cell);
         }
     }

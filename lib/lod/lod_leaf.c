@@ -3,8 +3,8 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "container/rule.h"
 #include "lod/lod_model.h"
+#include "octree/rule.h"
 
 static bool take_face(const ebpo_mesh *mesh, uint64_t face, ebpo_triangle *out)
 {

@@ -7,6 +7,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "octree/cells.h"
 #include "octree/octcode.h"
 
 static const uint64_t count_limit = UINT32_MAX - 1;
@@ -66,11 +67,9 @@ static bool begin_node(ebpo_polyhedra *piece, const ebpo_polytope *p, const ebpo
         !ebpo_grow(&piece->corners, &piece->polygon_capacity,
                    piece->polygon_count + (uint64_t)p->face_count, 1))
         return false;
-    double side = (double)(1u << cell.level);
-    double cell_volume = box->size[0] / side * (box->size[1] / side) * (box->size[2] / side);
     piece->nodes[piece->node_count++] =
         (ebpo_lod_node){ .octcode = ebpo_octcode_of_cell(cell),
-                         .volume = ebpo_polytope_volume(p) * cell_volume,
+                         .volume = ebpo_polytope_volume(p) * ebpo_cell_volume(box, cell.level),
                          .type = type };
     return true;
 }

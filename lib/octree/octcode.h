@@ -2,8 +2,8 @@
  * the most significant first; the root is 1. Numeric order is breadth-first order. Bit 0 of each
  * triple is x, bit 1 y, bit 2 z. Source: EBP 2017, section 3.3 (there with separate level bits and
  * at most 20 levels). */
-#ifndef EBPO_MORTON_OCTCODE_H
-#define EBPO_MORTON_OCTCODE_H
+#ifndef EBPO_OCTREE_OCTCODE_H
+#define EBPO_OCTREE_OCTCODE_H
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -2,6 +2,7 @@
 #include "geom/strict_fp.h"
 
 #include "base/error.h"
+#include "octree/node_types.h"
 #include "query/clock.h"
 #include "query/inside.h"
 #include "query/limited.h"
@@ -132,10 +133,8 @@ static ebpo_status step_down(const asking *a, ebpo_place *place, ebpo_error *err
         return EBPO_OK;
     unsigned octant =
         ebpo_octant_at(a->at, a->context->model->info->level_count - 1 - place->level - 1);
-    place->type = (ebpo_node_type)(types >> 2 * octant & 3);
-    place->rank = ranks[place->type];
-    for (unsigned i = 0; i < octant; i++)
-        place->rank += (types >> 2 * i & 3) == place->type;
+    place->type = ebpo_group_type(types, octant);
+    place->rank = ranks[place->type] + ebpo_group_count(types, place->type, octant);
     place->level++;
     for (int k = 0; k < 3; k++)
         place->at[k] = 2 * place->at[k] + (octant >> k & 1);

@@ -4,39 +4,8 @@
 
 #include <stdbool.h>
 
+#include "octree/cells.h"
 #include "subtree/subtree.h"
-
-static inline uint32_t ebpo_locate_on_axis(const ebpo_box *box, int level, int axis, double p)
-{
-    double cells = (double)(1u << level), guess = (p - box->origin[axis]) / box->size[axis] * cells;
-    /* The guess is right to 2^-30 of a cell: three roundings, of at most 2^20 cells. */
-    uint32_t i = guess >= cells ? (1u << level) - 1 : (uint32_t)guess;
-    double part = guess - (double)i;
-    if (part > 0x1p-30 && part < 1 - 0x1p-30)
-        return i;
-    while (ebpo_wall(box, axis, level, i) > p)
-        i--;
-    while (ebpo_wall(box, axis, level, i + 1) <= p)
-        i++;
-    return i;
-}
-
-/* The cell of the given level that holds p (walls belong to the upper cell); false outside the root
- * cell. Exact: level <= grid_level. */
-static inline bool ebpo_locate(const ebpo_box *box, int level, const double p[3], uint32_t at[3])
-{
-    for (int k = 0; k < 3; k++) {
-        if (!(p[k] >= box->origin[k]) || !(p[k] < ebpo_wall(box, k, level, 1u << level)))
-            return false;
-        at[k] = ebpo_locate_on_axis(box, level, k, p[k]);
-    }
-    return true;
-}
-
-static inline unsigned ebpo_octant_at(const uint32_t at[3], int bit)
-{
-    return (at[0] >> bit & 1) | (at[1] >> bit & 1) << 1 | (at[2] >> bit & 1) << 2;
-}
 
 static inline uint64_t ebpo_grid_cell(const ebpo_nodes *nodes, int fine_level, const uint32_t at[3])
 {

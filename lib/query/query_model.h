@@ -6,8 +6,8 @@
 #include <pthread.h>
 
 #include "cache/cache.h"
-#include "container/rule.h"
 #include "container/slice.h"
+#include "octree/rule.h"
 #include "query/kernels.h"
 #include "query/query_top.h"
 #include "subtree/subtree.h"

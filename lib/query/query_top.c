@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/arrays.h"
 #include "container/reader.h"
+#include "octree/node_types.h"
 
 /* Reading, level by level, with what the next level needs to know of the one before. */
 typedef struct reading {
@@ -138,8 +139,9 @@ static ebpo_status add_level(reading *r, int number, const ebpo_level *level, ui
     ranks seen = { { 0 }, 0 };
     ebpo_status status = EBPO_OK;
     for (uint64_t g = 0; g < level->group_count && status == EBPO_OK; g++)
-        for (unsigned octant = 0; octant < (number ? 8u : 1u) && status == EBPO_OK; octant++) {
-            ebpo_node_type type = (ebpo_node_type)(level->types[g] >> 2 * octant & 3);
+        for (unsigned octant = 0; octant < ebpo_group_octants(number) && status == EBPO_OK;
+             octant++) {
+            ebpo_node_type type = ebpo_group_type(level->types[g], octant);
             uint32_t here[3] = { 0, 0, 0 }, entry = 0;
             for (int k = 0; k < 3 && number; k++)
                 here[k] = 2 * r->at[g][k] + (octant >> k & 1);

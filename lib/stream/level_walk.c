@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "octree/node_types.h"
 #include "planes/planes.h"
 
 void ebpo_level_walk_begin(ebpo_level_walk *walk, const ebpo_level *level, int target, bool pruned)
@@ -21,7 +22,7 @@ static ebpo_level_walk_node *pass(ebpo_level_walk *w, int depth)
     unsigned octant = w->at[depth].octant++;
     ebpo_level_walk_node *node = &w->at[depth].node;
     node->octcode = depth ? w->at[depth - 1].node.octcode << 3 | octant : 1;
-    node->type = (ebpo_node_type)(level->types[w->at[depth].group] >> 2 * octant & 3);
+    node->type = ebpo_group_type(level->types[w->at[depth].group], octant);
     node->rank = w->at[depth].rank[node->type]++;
     node->codes = NULL;
     node->code_count = 0;
@@ -41,7 +42,7 @@ bool ebpo_level_walk_next(ebpo_level_walk *w, ebpo_level_walk_node *out)
 {
     for (;;) {
         int depth = w->depth;
-        if (w->at[depth].octant == (depth ? 8 : 1)) { /* level 0 has one node */
+        if (w->at[depth].octant == ebpo_group_octants(depth)) { /* level 0 has one node */
             if (depth == 0)
                 return false;
             w->at[depth].group++;

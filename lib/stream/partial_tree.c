@@ -34,7 +34,7 @@ ebpo_status ebpo_partial_add(ebpo_partial *g, const ebpo_info *info, uint64_t pa
                              const ebpo_group *read, ebpo_error *error)
 {
     int level = parent ? ebpo_octcode_level(parent) + 1 : 0;
-    uint64_t grays = (unsigned)__builtin_popcount(read->types & read->types >> 1 & 0x5555);
+    uint64_t grays = ebpo_group_count(read->types, EBPO_GRAY, 8);
     if (grays >
         info->level[level].gray_count - g->grays[level]) /* else a damaged index could give one node
                                                             to many parents, without end */

@@ -4,6 +4,7 @@
 #define EBPO_STREAM_GROWN_H
 
 #include "container/group.h"
+#include "octree/node_types.h"
 #include "stream/stream_node.h"
 #include "stream/level_walk.h"
 
@@ -36,7 +37,7 @@ typedef struct ebpo_partial_node {
 
 static inline ebpo_node_type ebpo_partial_type(const ebpo_partial *g, ebpo_partial_node node)
 {
-    return (ebpo_node_type)(g->group[node.group].types >> 2 * node.octant & 3);
+    return ebpo_group_type(g->group[node.group].types, node.octant);
 }
 
 static inline uint64_t ebpo_partial_octcode(const ebpo_partial *g, ebpo_partial_node node)
@@ -48,9 +49,8 @@ static inline uint64_t ebpo_partial_octcode(const ebpo_partial *g, ebpo_partial_
 /* The group in which a gray node's children stand, in the next level of the file. */
 static inline uint64_t ebpo_partial_children(const ebpo_partial *g, ebpo_partial_node gray)
 {
-    unsigned before = g->group[gray.group].types & ((1u << 2 * gray.octant) - 1);
     return g->group[gray.group].first_gray +
-           (unsigned)__builtin_popcount(before & before >> 1 & 0x5555);
+           ebpo_group_count(g->group[gray.group].types, EBPO_GRAY, gray.octant);
 }
 
 /* Adds a group behind the last one; not linked yet. */

@@ -13,6 +13,8 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
+#include "octree/cells.h"
+#include "octree/node_types.h"
 #include "stream/stream_node.h"
 #include "stream/level_walk.h"
 
@@ -101,15 +103,13 @@ static uint64_t sum_counts(const uint8_t *counts, uint64_t count)
 static ebpo_status check_level(const ebpo_level *level, int number, uint64_t parents,
                                ebpo_error *error)
 {
-    uint64_t count[4] = { 0 };
+    uint64_t count[4];
     if (level->group_count != parents)
         return ebpo_fail(error, EBPO_E_FORMAT,
                          "level %d: %" PRIu64 " groups of siblings, but %" PRIu64
                          " parents; run ebpo verify",
                          number, level->group_count, parents);
-    for (uint64_t i = 0; i < level->group_count; i++)
-        for (unsigned k = 0; k < (number ? 8 : 1); k++)
-            count[level->types[i] >> 2 * k & 3]++;
+    ebpo_groups_count_at(number, level->types, level->group_count, count);
     if (count[EBPO_GRAY] != level->gray_count || count[EBPO_LEAF] != level->leaf_count ||
         count[EBPO_BLACK] != level->black_count || count[EBPO_WHITE] != level->white_count)
         return ebpo_fail(error, EBPO_E_FORMAT,
@@ -143,7 +143,7 @@ static ebpo_status sum_pieces(void *context, uint64_t begin, uint64_t end, unsig
                               ebpo_error *error)
 {
     const job *j = context;
-    double cell = ebpo_node_cell_volume(&j->stream->box, j->target);
+    double cell = ebpo_cell_volume(&j->stream->box, j->target);
     (void)error;
     for (uint64_t i = begin; i < end; i++) {
         ebpo_level_walk walk = j->starts[i];
@@ -206,7 +206,7 @@ static volumes stated_volumes(const ebpo_stream *s, int level)
     const ebpo_level_summary *summary = &s->info->level[level];
     return (volumes){ summary->gray_volume,
                       summary->leaf_volume +
-                          (double)summary->black_count * ebpo_node_cell_volume(&s->box, level) };
+                          (double)summary->black_count * ebpo_cell_volume(&s->box, level) };
 }
 
 /* --- levels --- */

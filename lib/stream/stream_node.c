@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "octree/cells.h"
 #include "octree/octcode.h"
 #include "stream/cell_to_model.h"
 
@@ -15,23 +16,14 @@ ebpo_box ebpo_node_box(const ebpo_info *info)
     return box;
 }
 
-double ebpo_node_cell_volume(const ebpo_box *box, int level)
-{
-    double sides = (double)(1u << level);
-    return box->size[0] / sides * (box->size[1] / sides) * (box->size[2] / sides);
-}
-
 void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcode,
                      ebpo_node_type type)
 {
     ebpo_cell cell = ebpo_cell_of_octcode(octcode);
     *out = (ebpo_stream_node){ .octcode = octcode, .type = type };
-    for (int k = 0; k < 3; k++) {
-        out->min[k] = ebpo_wall(box, k, cell.level, cell.at[k]);
-        out->max[k] = ebpo_wall(box, k, cell.level, cell.at[k] + 1);
-    }
+    ebpo_cell_bounds(box, cell, out->min, out->max);
     if (type == EBPO_BLACK)
-        out->volume = ebpo_node_cell_volume(box, cell.level);
+        out->volume = ebpo_cell_volume(box, cell.level);
 }
 
 void ebpo_node_add_planes(ebpo_stream_node *out, const ebpo_box *box, const uint32_t *codes,
@@ -55,7 +47,7 @@ void ebpo_node_add_polygons(ebpo_stream_node *out, const ebpo_box *box, const eb
         room->polygon_first[f] = p->first[f];
     for (int i = 0; i < p->corner_count; i++)
         room->corners[i] = p->corner[i];
-    out->volume = ebpo_polytope_volume(p) * ebpo_node_cell_volume(box, cell.level);
+    out->volume = ebpo_polytope_volume(p) * ebpo_cell_volume(box, cell.level);
     out->vertex_count = (uint32_t)p->vertex_count;
     out->polygon_count = (uint32_t)p->face_count;
     out->vertices = (const double(*)[3])room->vertices;

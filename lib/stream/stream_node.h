@@ -17,7 +17,6 @@ typedef struct ebpo_node_buffers {
 } ebpo_node_buffers;
 
 ebpo_box ebpo_node_box(const ebpo_info *info);
-double ebpo_node_cell_volume(const ebpo_box *box, int level);
 
 /* Octcode, type, cell; a black node's volume. */
 void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcode,

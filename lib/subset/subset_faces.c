@@ -8,6 +8,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "octree/node_types.h"
 #include "subset/subset_parts.h"
 
 typedef struct numbering {
@@ -72,10 +73,10 @@ static ebpo_status number_leaf(numbering *n, int level)
 static ebpo_status number_group(numbering *n, int level)
 {
     const ebpo_tree *tree = n->c->out;
-    unsigned types = tree->level[level].types[n->group[level]++];
+    uint16_t types = tree->level[level].types[n->group[level]++];
     ebpo_status status = EBPO_OK;
-    for (unsigned octant = 0; octant < (level ? 8u : 1u) && status == EBPO_OK; octant++) {
-        unsigned type = types >> 2 * octant & 3;
+    for (unsigned octant = 0; octant < ebpo_group_octants(level) && status == EBPO_OK; octant++) {
+        ebpo_node_type type = ebpo_group_type(types, octant);
         if (type == EBPO_GRAY && level + 1 < tree->info.level_count)
             status = number_group(n, level + 1);
         else if (type == EBPO_LEAF)

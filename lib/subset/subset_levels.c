@@ -5,6 +5,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "octree/node_types.h"
 #include "subset/subset_parts.h"
 
 static const uint64_t NOTHING = UINT64_MAX;
@@ -223,11 +224,11 @@ static void child_place(const descent *d, uint64_t number, unsigned octant, uint
 
 static void take_group(descent *d, uint64_t number, uint16_t types)
 {
-    for (unsigned octant = 0; octant < (d->level ? 8u : 1u); octant++) {
+    for (unsigned octant = 0; octant < ebpo_group_octants(d->level); octant++) {
         uint32_t at[3];
         child_place(d, number, octant, at);
         d->to->types[number] |=
-            (uint16_t)(take_node(d, (ebpo_node_type)(types >> 2 * octant & 3), at) << 2 * octant);
+            ebpo_group_of(take_node(d, ebpo_group_type(types, octant), at), octant);
     }
 }
 
@@ -246,8 +247,8 @@ static ebpo_status judge(descent *d)
         if (d->parent[i].group == NOTHING)
             continue;
         uint16_t types = d->from.types[next++];
-        for (unsigned octant = 0; octant < (d->level ? 8u : 1u); octant++) {
-            unsigned type = types >> 2 * octant & 3;
+        for (unsigned octant = 0; octant < ebpo_group_octants(d->level); octant++) {
+            ebpo_node_type type = ebpo_group_type(types, octant);
             if (type != EBPO_GRAY && type != EBPO_LEAF)
                 continue;
             ebpo_tolerance_node *node = &d->judged[count++];

@@ -1,6 +1,8 @@
 /* Envelopes are cut as a reader of levels cuts them: leaves by stored planes or not at all. */
 #include "geom/strict_fp.h"
 
+#include "octree/cells.h"
+#include "octree/node_types.h"
 #include "subset/subset_parts.h"
 
 #include "lod/lod_model.h"
@@ -10,12 +12,6 @@ typedef struct measuring {
     uint64_t group[EBPO_LEVELS_MAX], gray[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX],
         plane[EBPO_LEVELS_MAX], leaf_plane[EBPO_LEVELS_MAX];
 } measuring;
-
-static double cell_volume(const ebpo_box *box, int level)
-{
-    double side = (double)(1u << level);
-    return box->size[0] / side * (box->size[1] / side) * (box->size[2] / side);
-}
 
 /* Cuts the envelope by the node's own planes. */
 static void cut(ebpo_polytope *envelope, const uint8_t *counts, const uint32_t *planes,
@@ -32,9 +28,9 @@ static void measure_group(measuring *m, int level, const ebpo_polytope *parent)
 {
     ebpo_tree *tree = m->c->out;
     ebpo_level *l = &tree->level[level];
-    unsigned types = l->types[m->group[level]++];
-    for (unsigned octant = 0; octant < (level ? 8u : 1u); octant++) {
-        unsigned type = types >> 2 * octant & 3;
+    uint16_t types = l->types[m->group[level]++];
+    for (unsigned octant = 0; octant < ebpo_group_octants(level); octant++) {
+        ebpo_node_type type = ebpo_group_type(types, octant);
         ebpo_polytope own;
         if (type != EBPO_GRAY && type != EBPO_LEAF)
             continue;
@@ -47,7 +43,7 @@ static void measure_group(measuring *m, int level, const ebpo_polytope *parent)
         else
             cut(&own, l->leaf_plane_counts, l->leaf_planes, &m->leaf[level], &m->leaf_plane[level]);
         *(type == EBPO_GRAY ? &l->gray_volume : &l->leaf_volume) +=
-            ebpo_polytope_volume(&own) * cell_volume(&m->c->box, level);
+            ebpo_polytope_volume(&own) * ebpo_cell_volume(&m->c->box, level);
         if (type == EBPO_GRAY && level + 1 < tree->info.level_count)
             measure_group(m, level + 1, &own);
     }

@@ -6,6 +6,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "octree/node_types.h"
 #include "subtree/subtree_parts.h"
 
 /* What a walk brings up from a node: either up to eight faces that are no block yet, or up to eight
@@ -115,7 +116,7 @@ static bundle walk_gray(walk *w, int depth, uint32_t begin)
     int parts = 0;
     uint32_t at = begin;
     for (unsigned octant = 0; octant < 8 && !w->failed; octant++) {
-        bundle b = walk_node(w, depth + 1, (ebpo_node_type)(types >> 2 * octant & 3), at);
+        bundle b = walk_node(w, depth + 1, ebpo_group_type(types, octant), at);
         at = b.end;
         if (b.end == b.begin)
             continue;
@@ -186,7 +187,7 @@ ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, uint64_t
     if (slice->outer_count)
         part[parts++] = split_range(&w, 0, slice->outer_count);
     part[parts] =
-        walk_node(&w, 0, (ebpo_node_type)(slice->level[0].types[0] & 3), slice->outer_count);
+        walk_node(&w, 0, ebpo_group_type(slice->level[0].types[0], 0), slice->outer_count);
     if (part[parts].end > part[parts].begin)
         parts++;
     if (parts) {

@@ -4,6 +4,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "octree/node_types.h"
 #include "subtree/subtree_parts.h"
 
 typedef struct walk {
@@ -132,7 +133,7 @@ static uint32_t walk_node(walk *w, int depth, ebpo_node_type type, const uint32_
     for (unsigned octant = 0; octant < 8; octant++) {
         uint32_t below[3] = { at[0] * 2 + (octant & 1), at[1] * 2 + (octant >> 1 & 1),
                               at[2] * 2 + (octant >> 2) };
-        uint32_t entry = walk_node(w, depth + 1, (ebpo_node_type)(types >> 2 * octant & 3), below);
+        uint32_t entry = walk_node(w, depth + 1, ebpo_group_type(types, octant), below);
         w->s->nodes.group[group][octant] = entry;
     }
     return ebpo_entry(EBPO_ENTRY_GRAY, (uint32_t)group);
@@ -181,7 +182,7 @@ ebpo_status ebpo_subtree_fill_nodes(ebpo_subtree *s, const ebpo_slice *slice,
         w.slot_of = slot_of;
         s->nodes.root_level = slice->root.level;
         s->nodes.root =
-            walk_node(&w, 0, (ebpo_node_type)(slice->level[0].types[0] & 3), slice->root.at);
+            walk_node(&w, 0, ebpo_group_type(slice->level[0].types[0], 0), slice->root.at);
         status = w.status;
     }
     free(slot_of);

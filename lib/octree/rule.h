@@ -1,6 +1,6 @@
 /* What a winding number means. */
-#ifndef EBPO_CONTAINER_RULE_H
-#define EBPO_CONTAINER_RULE_H
+#ifndef EBPO_OCTREE_RULE_H
+#define EBPO_OCTREE_RULE_H
 
 #include <ebpo/file.h>
 
