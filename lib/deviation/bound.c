@@ -1,5 +1,6 @@
 #include "geom/strict_fp.h"
 
+#include "deviation/bound.h"
 #include "deviation/fragments.h"
 
 #include <math.h>

@@ -1,8 +1,8 @@
 /* The pieces that bound.c searches: a stack, and how a piece is cut. */
-#ifndef EBPO_DEVIATION_PIECES_H
-#define EBPO_DEVIATION_PIECES_H
+#ifndef EBPO_DEVIATION_FRAGMENTS_H
+#define EBPO_DEVIATION_FRAGMENTS_H
 
-#include "deviation/bound.h"
+#include "deviation/bounder.h"
 
 #define EBPO_FRAGMENT_LEAST 1e-6 /* pieces are not cut below this, in sides of the cell */
 

@@ -1,13 +1,11 @@
 /* Levels and the mesh in other programs' formats: what is the same for all. */
 #include <ebpo/export.h>
 
-#include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "base/error.h"
 #include "base/fp_env.h"
-#include "export/block.h"
 #include "export/formats.h"
 #include "io/file_source.h"
 
@@ -32,42 +30,6 @@ bool ebpo_export_second_file(ebpo_export_format format, const char *path, char *
     else
         return true;
     return length >= 0 && (size_t)length < room;
-}
-
-ebpo_status ebpo_export_check_glb(const char *path, uint64_t text, uint64_t bin, ebpo_error *error)
-{
-    uint64_t total = EBPO_GLB_HEADS + (text + 3) / 4 * 4 + bin;
-    if (total <= UINT32_MAX)
-        return EBPO_OK;
-    return ebpo_fail(
-        error, EBPO_E_LIMIT,
-        "%s: would have %" PRIu64
-        " bytes or more, and a GLB file has less than 4 GiB; take gltf, or coarser levels",
-        path, total);
-}
-
-ebpo_status ebpo_export_check_scene(const char *path, uint64_t vertices, uint64_t faces,
-                                    ebpo_error *error)
-{
-    if (vertices <= UINT32_MAX && faces <= UINT32_MAX / 3)
-        return EBPO_OK;
-    return ebpo_fail(
-        error, EBPO_E_LIMIT,
-        "%s: would have %" PRIu64 " vertices and %" PRIu64
-        " triangles, more corners than assimp can number; take another format, or a coarser level",
-        path, vertices, faces);
-}
-
-bool ebpo_export_goes_on(const ebpo_export_job *job, int i)
-{
-    const ebpo_progress *p = &job->options->progress;
-    return !p->report ||
-           p->report(p->user, "exporting", (uint64_t)i, (uint64_t)ebpo_block_count(job->options));
-}
-
-ebpo_status ebpo_export_stopped(ebpo_error *error)
-{
-    return ebpo_fail(error, EBPO_E_CANCELLED, "stopped as asked; nothing was written");
 }
 
 static ebpo_status check(const ebpo_info *info, ebpo_export_format format,

@@ -12,7 +12,6 @@
 #include "base/alloc.h"
 #include "base/endian.h"
 #include "base/error.h"
-#include "export/block.h"
 #include "export/floats.h"
 #include "export/formats.h"
 #include "io/file_source.h"
@@ -86,12 +85,7 @@ static ebpo_status gather(model *m, const ebpo_export_job *job, ebpo_error *erro
                                        error);
     for (int i = 0; i < ebpo_block_count(job->options) && status == EBPO_OK; i++) {
         part *p = &m->parts[m->count];
-        if (!ebpo_export_goes_on(job, i))
-            return ebpo_export_stopped(error);
-        status = ebpo_block_read(&p->block, job->file, ebpo_block_level(job->options, i),
-                                 EBPO_SOURCE_ORDER, job->options, error);
-        if (status == EBPO_OK)
-            ebpo_block_tell(&p->block, job->report);
+        status = ebpo_export_read_block(job, i, EBPO_SOURCE_ORDER, &p->block, error);
         if (status != EBPO_OK || p->block.mesh.face_count == 0) {
             ebpo_block_free(&p->block);
             continue;

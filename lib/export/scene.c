@@ -27,7 +27,6 @@ ebpo_status ebpo_export_scene(const ebpo_export_job *job, ebpo_error *error)
 #include <stdlib.h>
 
 #include "base/alloc.h"
-#include "export/block.h"
 #include "export/floats.h"
 #include "export/scene_file.h"
 #include "import/assimp_lock.h"
@@ -136,15 +135,10 @@ static ebpo_status gather(scene *s, const ebpo_export_job *job, ebpo_error *erro
     uint64_t vertices = 0, faces = 0;
     for (int i = 0; i < ebpo_block_count(job->options) && status == EBPO_OK; i++) {
         ebpo_block block;
-        if (!ebpo_export_goes_on(job, i))
-            return ebpo_export_stopped(error);
-        status = ebpo_block_read(&block, job->file, ebpo_block_level(job->options, i),
-                                 EBPO_SOURCE_ORDER, job->options, error);
+        status = ebpo_export_read_block(job, i, EBPO_SOURCE_ORDER, &block, error);
         if (status == EBPO_OK)
             status = ebpo_export_check_scene(job->path, vertices += block.mesh.vertex_count,
                                              faces += block.mesh.face_count, error);
-        if (status == EBPO_OK)
-            ebpo_block_tell(&block, job->report);
         if (status == EBPO_OK && block.mesh.face_count)
             status = add_block(s, &block, error);
         ebpo_block_free(&block);

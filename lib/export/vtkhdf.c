@@ -8,7 +8,6 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "export/block.h"
 #include "export/formats.h"
 #include "io/publish.h"
 
@@ -158,14 +157,9 @@ static ebpo_status write_blocks(writer *w, const ebpo_export_job *job, ebpo_erro
         make_tables(w, !levels && !ebpo_file_info(job->file)->double_coordinates, error);
     for (int i = 0; i < ebpo_block_count(job->options) && status == EBPO_OK; i++) {
         ebpo_block block;
-        if (!ebpo_export_goes_on(job, i))
-            return ebpo_export_stopped(error);
-        status = ebpo_block_read(&block, job->file, ebpo_block_level(job->options, i),
-                                 EBPO_FILE_ORDER, job->options, error);
+        status = ebpo_export_read_block(job, i, EBPO_FILE_ORDER, &block, error);
         if (status == EBPO_OK)
             status = append_block(w, &block, error);
-        if (status == EBPO_OK)
-            ebpo_block_tell(&block, job->report);
         ebpo_block_free(&block);
     }
     return status;

@@ -6,7 +6,6 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "export/block.h"
 #include "export/formats.h"
 #include "io/file_source.h"
 #include "io/publish.h"
@@ -159,15 +158,10 @@ static ebpo_status write_blocks(writer *w, const ebpo_export_job *job, ebpo_erro
             "    <Grid Name=\"ebpo\" GridType=\"Collection\" CollectionType=\"Spatial\">\n");
     for (int i = 0; i < ebpo_block_count(job->options) && status == EBPO_OK; i++) {
         ebpo_block block;
-        if (!ebpo_export_goes_on(job, i))
-            return ebpo_export_stopped(error);
-        status = ebpo_block_read(&block, job->file, ebpo_block_level(job->options, i),
-                                 EBPO_FILE_ORDER, job->options, error);
+        status = ebpo_export_read_block(job, i, EBPO_FILE_ORDER, &block, error);
         if (status == EBPO_OK &&
             (block.level < 0 || block.nodes.node_count)) /* VTK gives up at a grid without cells */
             status = put_block(w, &block, error);
-        if (status == EBPO_OK)
-            ebpo_block_tell(&block, job->report);
         ebpo_block_free(&block);
     }
     fprintf(w->text, "    </Grid>\n  </Domain>\n</Xdmf>\n");

@@ -1,24 +1,11 @@
 /* Rays and boxes against triangles, exact: the decisions are those of arithmetic without rounding,
  * for every finite double. Filters in floating point first, integers of any size (GMP) when they do
  * not suffice. Pure functions, any thread; the same results with every compiler and its flags. */
-#ifndef EBPO_GEOM_RAY_H
-#define EBPO_GEOM_RAY_H
+#ifndef EBPO_GEOM_RAY_TRIANGLE_H
+#define EBPO_GEOM_RAY_TRIANGLE_H
 
-#include <stdbool.h>
+#include "geom/ray.h"
 
-/* origin + t direction, 0 <= t <= t_max; direction is not zero; t_max >= 0 or INFINITY. */
-typedef struct ebpo_segment {
-    double origin[3], direction[3];
-    double t_max;
-} ebpo_segment;
-
-typedef struct ebpo_ray_meeting {
-    bool meets; /* the closed triangle and the ray have a common point with 0 <= t <= t_max */
-    /* 1: it goes against the normal through the triangle's interior (enters), -1: with it (leaves),
-     * 0: an edge, a corner, within the plane, or no area */
-    int side;
-    double t; /* of the first common point, correctly rounded to 2 ulp or better */
-} ebpo_ray_meeting;
 void ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3], ebpo_ray_meeting *out);
 
 /* Sign of t(a) - t(b), exact, for two triangles that the ray meets (first common points). */

@@ -1,12 +1,16 @@
-/* Inside transfer.c and slot.c: places for requests under way. */
+/* Inside lib/http: places for requests under way. */
 #ifndef EBPO_HTTP_SLOT_H
 #define EBPO_HTTP_SLOT_H
 
 #include <curl/curl.h>
 
-#include "http/transfer.h"
+#include <pthread.h>
+
+#include "http/request.h"
 
 enum { EBPO_SLOTS_MAX = 32 };
+
+typedef struct ebpo_transfers ebpo_transfers;
 
 /* One of the places for requests under way, with a handle that is used again and again. */
 typedef struct ebpo_slot {

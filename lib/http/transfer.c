@@ -1,12 +1,12 @@
-#include "http/slot.h"
+#include "http/transfer.h"
 
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "http/slot.h"
 
 enum {
     LOOK_MS = 100, /* between looks at `stop` and for stalls */
@@ -18,13 +18,6 @@ static pthread_once_t curl_once = PTHREAD_ONCE_INIT;
 static CURLcode curl_state;
 
 static void start_curl(void) { curl_state = curl_global_init(CURL_GLOBAL_DEFAULT); }
-
-double ebpo_http_now(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 /* --- setting up --- */
 

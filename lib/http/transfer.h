@@ -2,36 +2,11 @@
 #ifndef EBPO_HTTP_TRANSFER_H
 #define EBPO_HTTP_TRANSFER_H
 
-#include <ebpo/http.h>
-
 #include <pthread.h>
 
-#include "http/answer.h"
+#include "http/request.h"
 
 typedef struct ebpo_transfers ebpo_transfers;
-
-/* A range that is wanted. Zero-initialise, fill in the first part, keep in place until done. */
-typedef struct ebpo_request {
-    uint64_t offset, size; /* size > 0 */
-    uint8_t *data;         /* [size] */
-    /* the file's size and version are not known yet: the file may turn out to be shorter, and may
-     * come as a whole */
-    bool first;
-    /* When done. */
-    bool done;
-    ebpo_status status;
-    ebpo_error error;
-    uint64_t got; /* bytes; fewer than `size` at the end of the file, when `first` */
-    /* `first`, from a server without ranges: the file, [version.size] bytes, the taker's to free;
-     * then `data` is unused */
-    uint8_t *whole;
-    ebpo_http_version version; /* `first` */
-    /* The transfers' own. */
-    struct ebpo_request *next;
-    unsigned failures;
-    double due, deadline; /* seconds; deadline 0: nobody waits and nothing was sent yet */
-    uint64_t whole_room;
-} ebpo_request;
 
 /* The texts of `options` must stay. Everything below that says so is called with `lock` held;
  * whoever waits for a request waits on `done`, which is broadcast at each end. `url`: with user and
@@ -52,8 +27,5 @@ void ebpo_transfers_urge(ebpo_transfers *transfers, ebpo_request *request);
 void ebpo_transfers_pin(ebpo_transfers *transfers, const ebpo_http_version *version);
 /* Lock held. requests, retries, connections, bytes. */
 void ebpo_transfers_add_stats(const ebpo_transfers *transfers, ebpo_http_stats *stats);
-
-/* Monotonic, in seconds. */
-double ebpo_http_now(void);
 
 #endif

@@ -1,7 +1,7 @@
+#include <ebpo/http.h>
+
 #include <string.h>
 #include <strings.h>
-
-#include "http/http_source.h"
 
 bool ebpo_is_url(const char *name)
 {

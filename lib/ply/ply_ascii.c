@@ -7,7 +7,8 @@
 
 #include "base/error.h"
 #include "ply/decimal.h"
-#include "ply/ply_parser.h"
+#include "ply/ply_ascii.h"
+#include "ply/ply_faces.h"
 
 typedef struct rows {
     ply_parser *p;

@@ -1,46 +1,10 @@
-/* What the readers of binary bodies share: row by row, and on all cores. */
+/* The body of a binary PLY file, of either byte order. */
 #ifndef EBPO_PLY_BINARY_H
 #define EBPO_PLY_BINARY_H
 
-#include <string.h>
+#include "ply/ply_state.h"
 
-#include "ply/ply_parser.h"
-
-static inline uint64_t ebpo_ply_load(const uint8_t *at, unsigned bytes, bool swap)
-{
-    uint8_t b1;
-    uint16_t b2;
-    uint32_t b4;
-    uint64_t b8;
-    switch (bytes) {
-    case 1: memcpy(&b1, at, 1); return b1;
-    case 2: memcpy(&b2, at, 2); return swap ? __builtin_bswap16(b2) : b2;
-    case 4: memcpy(&b4, at, 4); return swap ? __builtin_bswap32(b4) : b4;
-    default: memcpy(&b8, at, 8); return swap ? __builtin_bswap64(b8) : b8;
-    }
-}
-
-static inline int64_t ebpo_ply_load_integer(const uint8_t *at, ply_type type, bool swap)
-{
-    uint64_t raw = ebpo_ply_load(at, ebpo_ply_type_bytes(type), swap);
-    switch (type) {
-    case PLY_INT8: return (int8_t)raw;
-    case PLY_INT16: return (int16_t)raw;
-    case PLY_INT32: return (int32_t)raw;
-    default: return (int64_t)raw;
-    }
-}
-
-/* The value of an x, y or z at `at` becomes that of vertex `row`. */
-void ebpo_ply_store_coordinate(ebpo_mesh *mesh, uint64_t row, const ply_property *property,
-                               const uint8_t *at, bool swap);
-
-/* Reads the rows from p->at on as far as all have one size, and says how many these were: all
- * vertices or none; the faces before the first that is no triangle, or names a vertex that is not
- * there. The others, and what is wrong with them, are the row by row reader's. */
-ebpo_status ebpo_ply_plain_vertices(ply_parser *p, const ply_element *element, bool swap,
-                                    uint64_t *done);
-ebpo_status ebpo_ply_plain_faces(ply_parser *p, const ply_element *element, bool swap,
-                                 uint64_t *done);
+/* As ebpo_ply_ascii_element. */
+ebpo_status ebpo_ply_binary_element(ply_parser *p, const ply_element *element, bool store);
 
 #endif

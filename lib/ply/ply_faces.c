@@ -8,7 +8,7 @@
 #include "base/error.h"
 #include "base/arrays.h"
 #include "geom/polygon.h"
-#include "ply/ply_parser.h"
+#include "ply/ply_faces.h"
 
 #define MOST_FACES (UINT64_C(0xfffffffe))
 

@@ -1,7 +1,6 @@
 #include "geom/strict_fp.h"
 
 #include <inttypes.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,59 +10,16 @@
 #include "base/fp_env.h"
 #include "base/arrays.h"
 #include "io/file_source.h"
-#include "ply/ply_parser.h"
 #include "ply/ply.h"
+#include "ply/ply_ascii.h"
+#include "ply/ply_binary.h"
+#include "ply/ply_state.h"
 
 #define MOST_VERTICES (UINT64_C(0xfffffffe))
-enum { REPORT_BYTES = 1 << 22 };
 
 bool ebpo_ply_recognise(const uint8_t *data, uint64_t size)
 {
     return size >= 4 && memcmp(data, "ply", 3) == 0 && (data[3] == '\n' || data[3] == '\r');
-}
-
-ebpo_status ebpo_ply_fail(const ply_parser *p, const char *format, ...)
-{
-    char text[320];
-    va_list args;
-    va_start(args, format);
-    vsnprintf(text, sizeof text, format, args);
-    va_end(args);
-    if (p->header.encoding == PLY_ASCII)
-        return ebpo_fail(p->error, EBPO_E_FORMAT, "%s: line %" PRIu64 ": %s", p->name, p->line,
-                         text);
-    return ebpo_fail(p->error, EBPO_E_FORMAT, "%s: byte %" PRIu64 ": %s", p->name, p->at, text);
-}
-
-const char *ebpo_ply_row_name(const ply_element *element)
-{
-    static const char *const names[] = { "element", "vertex", "face", "strip" };
-    return names[element->kind];
-}
-
-ebpo_status ebpo_ply_fail_end(const ply_parser *p, const ply_element *element, uint64_t row)
-{
-    char name[PLY_WORD_TEXT];
-    ebpo_ply_word_text(name, element->name);
-    return ebpo_ply_fail(p,
-                         "the file ends after %" PRIu64 " bytes within row %" PRIu64
-                         " of the %" PRIu64 " of element '%s'; it is cut short, get it again",
-                         p->size, row, element->count, name);
-}
-
-ebpo_status ebpo_ply_fail_stopped(const ply_parser *p)
-{
-    return ebpo_fail(p->error, EBPO_E_CANCELLED, "stopped on request while reading %s", p->name);
-}
-
-ebpo_status ebpo_ply_report(ply_parser *p)
-{
-    p->next_report = p->at + REPORT_BYTES;
-    ebpo_workspace_settle(p->mesh->workspace);
-    if (!p->progress || !p->progress->report ||
-        p->progress->report(p->progress->user, "reading", p->at, p->size))
-        return EBPO_OK;
-    return ebpo_ply_fail_stopped(p);
 }
 
 /* Least bytes of all rows; false when they exceed any file. */
@@ -220,6 +176,16 @@ static void describe(ply_parser *p)
     p->mesh->source_size = p->size;
 }
 
+/* All but the mesh. */
+static void release(ply_parser *p)
+{
+    if (p->c_locale)
+        freelocale(p->c_locale);
+    free(p->corners);
+    free(p->scratch);
+    ebpo_ply_header_free(&p->header);
+}
+
 ebpo_status ebpo_ply_parse_memory(ebpo_mesh *out, const uint8_t *data, uint64_t size,
                                   const char *name, ebpo_workspace *workspace, unsigned threads,
                                   const ebpo_progress *progress, ebpo_error *error)
@@ -250,11 +216,7 @@ ebpo_status ebpo_ply_parse_memory(ebpo_mesh *out, const uint8_t *data, uint64_t 
         ebpo_array_free(mesh.faces);
         mesh = (ebpo_mesh){ 0 };
     }
-    if (p.c_locale)
-        freelocale(p.c_locale);
-    free(p.corners);
-    free(p.scratch);
-    ebpo_ply_header_free(&p.header);
+    release(&p);
     *out = mesh;
     return status;
 }
@@ -300,10 +262,6 @@ ebpo_status ebpo_points_parse_ply(double **xyz, uint64_t *count, const void *dat
         status = give_points(&p, xyz, count);
     free(mesh.xyz32);
     free(mesh.xyz64);
-    if (p.c_locale)
-        freelocale(p.c_locale);
-    free(p.corners);
-    free(p.scratch);
-    ebpo_ply_header_free(&p.header);
+    release(&p);
     return status;
 }

@@ -4,7 +4,8 @@
 
 #include "base/parallel.h"
 #include "base/arrays.h"
-#include "ply/ply_binary.h"
+#include "ply/ply_number.h"
+#include "ply/ply_plain.h"
 
 enum { GRAIN = 1 << 14 };
 

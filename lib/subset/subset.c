@@ -4,10 +4,7 @@
 #include <string.h>
 
 #include "base/error.h"
-#include "base/fp_env.h"
 #include "container/reader.h"
-#include "container/container_write.h"
-#include "io/publish.h"
 #include "subset/subset_parts.h"
 
 enum { CHUNK_BUDGET = 64 << 20 };
@@ -180,45 +177,4 @@ ebpo_status ebpo_subset_tree_within(ebpo_tree *out, ebpo_file *file,
     }
     name_mesh(out);
     return EBPO_OK;
-}
-
-ebpo_status ebpo_subset(ebpo_file *file, const char *path, const ebpo_subset_options *options,
-                        ebpo_error *error)
-{
-    EBPO_DEFAULT_FP;
-    static const ebpo_subset_options usual = EBPO_SUBSET_OPTIONS_INIT;
-    ebpo_subset_options wanted = options ? *options : usual;
-    ebpo_tree tree;
-    if (wanted.target_bytes)
-        return ebpo_subset_fit(file, path, &wanted, error);
-    ebpo_status status = ebpo_subset_tree(&tree, file, &wanted, error);
-    if (status != EBPO_OK)
-        return status;
-    wanted.write.parts = ~0u;
-    status = ebpo_tree_write(&tree, path, &wanted.write, error);
-    ebpo_tree_free(&tree);
-    return status;
-}
-
-ebpo_status ebpo_subset_of_tree(ebpo_tree *tree, const char *path,
-                                const ebpo_subset_options *options, ebpo_error *error)
-{
-    EBPO_DEFAULT_FP;
-    static const ebpo_subset_options usual = EBPO_SUBSET_OPTIONS_INIT;
-    const ebpo_subset_options *o = options ? options : &usual;
-    ebpo_publish whole = EBPO_PUBLISH_INIT;
-    ebpo_write_options write = o->write;
-    ebpo_file *file = NULL;
-    write.parts = ~0u;
-    ebpo_status status = ebpo_publish_begin(&whole, path, error);
-    if (status == EBPO_OK)
-        status = ebpo_tree_write_into(tree, ebpo_publish_path(&whole), path, &write, error);
-    ebpo_tree_free(tree);
-    if (status == EBPO_OK)
-        status = ebpo_open(&file, ebpo_publish_path(&whole), error);
-    if (status == EBPO_OK)
-        status = ebpo_subset(file, path, o, error);
-    ebpo_close(file);
-    ebpo_publish_abort(&whole);
-    return status;
 }

@@ -1,7 +1,7 @@
 /* What the parts of the PLY reader share: the place in the file, the mesh under construction, and
  * messages. */
-#ifndef EBPO_PLY_PARSER_H
-#define EBPO_PLY_PARSER_H
+#ifndef EBPO_PLY_STATE_H
+#define EBPO_PLY_STATE_H
 
 #include <ebpo/mesh.h>
 #include <locale.h>
@@ -43,22 +43,5 @@ static inline bool ebpo_ply_report_due(const ply_parser *p) { return p->at >= p-
 ebpo_status ebpo_ply_report(ply_parser *p);
 /* EBPO_E_CANCELLED. */
 ebpo_status ebpo_ply_fail_stopped(const ply_parser *p);
-
-/* Appends a vertex number of the row being read; room has been made by ebpo_ply_reserve_corners. */
-ebpo_status ebpo_ply_reserve_corners(ply_parser *p, uint64_t count);
-/* A vertex number that does not exist. `row` is the face's number. */
-ebpo_status ebpo_ply_fail_index(const ply_parser *p, const ply_element *element, uint64_t row,
-                                int64_t index);
-
-/* The corners read make a face or a strip: adds its triangles to the mesh. */
-ebpo_status ebpo_ply_add_polygon(ply_parser *p, uint64_t row);
-ebpo_status ebpo_ply_add_strip(ply_parser *p, uint64_t row);
-/* In the corners of a strip row: a new strip begins. No vertex has this number. */
-#define PLY_RESTART UINT32_MAX
-
-/* Bodies. Each function reads all rows of an element, from p->at to behind its last row; with
- * `store` false it only steps over them. */
-ebpo_status ebpo_ply_ascii_element(ply_parser *p, const ply_element *element, bool store);
-ebpo_status ebpo_ply_binary_element(ply_parser *p, const ply_element *element, bool store);
 
 #endif

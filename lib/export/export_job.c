@@ -1,0 +1,49 @@
+#include "export/export_job.h"
+
+#include <inttypes.h>
+
+#include "base/error.h"
+
+static bool goes_on(const ebpo_export_job *job, int i)
+{
+    const ebpo_progress *p = &job->options->progress;
+    return !p->report ||
+           p->report(p->user, "exporting", (uint64_t)i, (uint64_t)ebpo_block_count(job->options));
+}
+
+ebpo_status ebpo_export_read_block(const ebpo_export_job *job, int i, ebpo_block_order order,
+                                   ebpo_block *out, ebpo_error *error)
+{
+    *out = (ebpo_block){ 0 };
+    if (!goes_on(job, i))
+        return ebpo_fail(error, EBPO_E_CANCELLED, "stopped as asked; nothing was written");
+    ebpo_status status = ebpo_block_read(out, job->file, ebpo_block_level(job->options, i), order,
+                                         job->options, error);
+    if (status == EBPO_OK)
+        ebpo_block_tell(out, job->report);
+    return status;
+}
+
+ebpo_status ebpo_export_check_glb(const char *path, uint64_t text, uint64_t bin, ebpo_error *error)
+{
+    uint64_t total = EBPO_GLB_HEADS + (text + 3) / 4 * 4 + bin;
+    if (total <= UINT32_MAX)
+        return EBPO_OK;
+    return ebpo_fail(
+        error, EBPO_E_LIMIT,
+        "%s: would have %" PRIu64
+        " bytes or more, and a GLB file has less than 4 GiB; take gltf, or coarser levels",
+        path, total);
+}
+
+ebpo_status ebpo_export_check_scene(const char *path, uint64_t vertices, uint64_t faces,
+                                    ebpo_error *error)
+{
+    if (vertices <= UINT32_MAX && faces <= UINT32_MAX / 3)
+        return EBPO_OK;
+    return ebpo_fail(
+        error, EBPO_E_LIMIT,
+        "%s: would have %" PRIu64 " vertices and %" PRIu64
+        " triangles, more corners than assimp can number; take another format, or a coarser level",
+        path, vertices, faces);
+}

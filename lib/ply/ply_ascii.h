@@ -1,0 +1,11 @@
+/* The body of an ascii PLY file. */
+#ifndef EBPO_PLY_ASCII_H
+#define EBPO_PLY_ASCII_H
+
+#include "ply/ply_state.h"
+
+/* Reads all rows of an element, from p->at to behind its last row; with `store` false it only steps
+ * over them. */
+ebpo_status ebpo_ply_ascii_element(ply_parser *p, const ply_element *element, bool store);
+
+#endif
