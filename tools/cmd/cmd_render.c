@@ -12,8 +12,8 @@
 #include "cli/progress.h"
 #include "cli/remote_args.h"
 #include "cmd/commands.h"
-#include "picture.h"
-#include "raster.h"
+#include "render/picture.h"
+#include "render/raster.h"
 
 enum { TILES_MAX = 24, MESH = -1, SIDE_MAX = 8192 };
 

@@ -9,8 +9,8 @@
 #include "cli/selection_args.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
-#include "report_data.h"
-#include "report_output.h"
+#include "report/report_data.h"
+#include "report/report_output.h"
 
 static const char *const up_words[] = { "x", "y", "z", NULL };
 

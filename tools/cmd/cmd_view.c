@@ -13,7 +13,7 @@
 #include "cli/remote_args.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
-#include "cut_mesh.h"
+#include "render/cut_mesh.h"
 
 typedef struct values {
     int order;

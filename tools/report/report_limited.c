@@ -6,7 +6,7 @@
 
 #include "bench/bench_run.h"
 #include "bench/bench_walk.h"
-#include "report_data.h"
+#include "report/report_data.h"
 
 static ebpo_status no_memory(ebpo_error *error)
 {

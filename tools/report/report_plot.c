@@ -1,4 +1,4 @@
-#include "report_plot.h"
+#include "report/report_plot.h"
 
 #include <math.h>
 #include <stdlib.h>

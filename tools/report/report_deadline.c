@@ -4,7 +4,7 @@
 #include <stdlib.h>
 
 #include "bench/bench_run.h"
-#include "report_data.h"
+#include "report/report_data.h"
 
 typedef struct timing {
     double *width, *took; /* [points] */

@@ -3,7 +3,7 @@
 #include <stdio.h>
 
 #include "bench/bench_run.h"
-#include "report_data.h"
+#include "report/report_data.h"
 
 /* --- having a level --- */
 

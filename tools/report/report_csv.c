@@ -1,7 +1,7 @@
 /* report.csv: a line for each figure. */
 #include <stdio.h>
 
-#include "report_data.h"
+#include "report/report_data.h"
 
 /* Names have no commas; the empty value stands for what could not be had. */
 static void line(FILE *out, const char *name, int level, const char *parameter,

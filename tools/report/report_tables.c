@@ -1,5 +1,5 @@
 /* The tables of the page. */
-#include "report_page.h"
+#include "report/report_page.h"
 
 #include <string.h>
 

@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "report_page.h"
+#include "report/report_page.h"
 #include "cli/words.h"
 
 void page_section(FILE *out, const char *id, const char *title, const char *text)

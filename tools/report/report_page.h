@@ -2,8 +2,8 @@
 #ifndef EBPO_TOOLS_REPORT_PAGE_H
 #define EBPO_TOOLS_REPORT_PAGE_H
 
-#include "report_data.h"
-#include "report_plot.h"
+#include "report/report_data.h"
+#include "report/report_plot.h"
 
 extern const char report_style[]; /* the style sheet */
 

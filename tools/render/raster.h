@@ -6,7 +6,7 @@
 
 #include <ebpo/mesh.h>
 
-#include "picture.h"
+#include "render/picture.h"
 
 typedef struct camera {
     double right[3], up[3], back[3]; /* orthonormal; back points from the model to the eye */

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "cli/file_facts.h"
-#include "report_data.h"
+#include "report/report_data.h"
 
 static void from_head(const comparison *c, method *m)
 {

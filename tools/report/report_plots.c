@@ -1,5 +1,5 @@
 /* Which plots the page has. */
-#include "report_page.h"
+#include "report/report_page.h"
 
 #include <string.h>
 

@@ -1,6 +1,6 @@
 /* Letters of 5 x 9 pixels, drawn for this program. Each row is five bits, the leftmost pixel the
  * highest; rows from the top, the last two for descenders. */
-#include "picture.h"
+#include "render/picture.h"
 
 #include <ctype.h>
 #include <string.h>

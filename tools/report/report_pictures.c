@@ -6,12 +6,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "report_data.h"
+#include "report/report_data.h"
 
 #if EBPO_HAVE_PNG
 
-#include "picture.h"
-#include "raster.h"
+#include "render/picture.h"
+#include "render/raster.h"
 
 enum {
     TILE_WIDTH = 320,

@@ -1,6 +1,6 @@
 /* Two steps: each sample gets the nearest triangle (z-buffer on 1/depth, which is linear on the
  * screen); then pixels are shaded from their samples. */
-#include "raster.h"
+#include "render/raster.h"
 
 #include <math.h>
 #include <pthread.h>

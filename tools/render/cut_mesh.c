@@ -1,4 +1,4 @@
-#include "cut_mesh.h"
+#include "render/cut_mesh.h"
 
 #include <inttypes.h>
 #include <stdio.h>

@@ -4,7 +4,7 @@
 #include <unistd.h>
 
 #include "bench/bench_run.h"
-#include "report_data.h"
+#include "report/report_data.h"
 
 static const double errors[] = { 10, 3, 1, 0.3 }; /* percent of the diagonal */
 static const double sizes[] = { 3, 5, 10, 50 };   /* percent of the first file */

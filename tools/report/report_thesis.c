@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "report_data.h"
+#include "report/report_data.h"
 
 enum { NORMAL_SPAN = 1023 }; /* -511 .. 511 */
 

@@ -1,7 +1,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "raster.h"
+#include "render/raster.h"
 
 static const double margin = 0.94; /* share of the picture that the model may fill */
 

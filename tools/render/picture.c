@@ -1,4 +1,4 @@
-#include "picture.h"
+#include "render/picture.h"
 
 #include <png.h>
 #include <stdio.h>

@@ -6,7 +6,7 @@
 #include "cli/command.h"
 #include "cli/prepare.h"
 #include "cli/mesh_findings.h"
-#include "report_data.h"
+#include "report/report_data.h"
 #include "cli/selection_args.h"
 #include "cli/words.h"
 

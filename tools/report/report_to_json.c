@@ -1,7 +1,7 @@
 /* report.json: the same figures as report.csv, with what the quantities are, the model and the
  * machine. */
 #include "cli/json.h"
-#include "report_data.h"
+#include "report/report_data.h"
 #include "cli/words.h"
 
 static void names(json *j, const char *scope, const figure_name *q, int count)
