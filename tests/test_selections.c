@@ -390,7 +390,7 @@ START_TEST(equal_seeds_give_equal_files_for_any_number_of_threads)
         digest_of(all[s], 5, 3, NULL, b);
         digest_of(all[s], 6, 2, NULL, c);
         ck_assert_mem_eq(a, b, 32);
-        ck_assert(!memcmp(a, c, 32) == !ebpo_selection_of(all[s])->has_seed);
+        ck_assert(!memcmp(a, c, 32) == !ebpo_selection_of(all[s])->traits.takes_seed);
     }
 }
 END_TEST

@@ -128,10 +128,10 @@ static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *m
     info->epsilon = o->epsilon;
     const ebpo_selection_method *method = ebpo_selection_of(o->select);
     info->selection = o->select;
-    info->percent = method->from_leaves && !(o->k_root > 0) ? o->percent : 0;
-    info->k_root = method->from_leaves ? o->k_root : 0;
-    info->normals = method->has_normals ? o->normals : 0;
-    info->seed = method->has_seed ? o->seed : 0;
+    info->percent = method->traits.from_leaves && !(o->k_root > 0) ? o->percent : 0;
+    info->k_root = method->traits.from_leaves ? o->k_root : 0;
+    info->normals = method->traits.takes_normals ? o->normals : 0;
+    info->seed = method->traits.takes_seed ? o->seed : 0;
     if (mend)
         info->mend = *mend;
     info->report = *report;

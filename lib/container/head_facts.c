@@ -1,5 +1,6 @@
 #include "container/head_facts.h"
 
+#include <ebpo/build.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stddef.h>
@@ -197,7 +198,6 @@ static ebpo_status put_parts(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info 
 }
 
 /* How planes were chosen, where that was not the usual way: told, and needed by no reader. */
-static const char *const SELECTIONS[] = { "inherit", "kmedoids", "offset", "random", NULL };
 static const char *const NORMALS[] = { "spherical", "angle", NULL };
 static const fact selection_facts[] = {
     { "selection_percent", REAL, AT(percent) },
@@ -209,11 +209,10 @@ enum { SELECTION_FACTS = sizeof selection_facts / sizeof selection_facts[0] };
 static ebpo_status put_selection(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info,
                                  ebpo_error *error)
 {
-    int known = sizeof SELECTIONS / sizeof *SELECTIONS - 1;
-    if (info->selection <= 0 || info->selection >= known || info->normals < 0 || info->normals > 1)
+    const ebpo_selection_traits *traits = ebpo_selection_describe((ebpo_selection)info->selection);
+    if (info->selection == EBPO_SELECT_INHERIT || !traits || info->normals < 0 || info->normals > 1)
         return EBPO_OK;
-    ebpo_status status =
-        ebpo_h5_put_text(out, root, "selection", SELECTIONS[info->selection], error);
+    ebpo_status status = ebpo_h5_put_text(out, root, "selection", traits->name, error);
     if (status == EBPO_OK)
         status = ebpo_h5_put_text(out, root, "selection_normals", NORMALS[info->normals], error);
     for (int i = 0; i < SELECTION_FACTS && status == EBPO_OK; i++)
@@ -494,25 +493,33 @@ static ebpo_status get_subset(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, 
 /* Place of the attribute's word in `words`; -1: another one, of a newer library. Without the
  * attribute *out stays. */
 static ebpo_status get_known(ebpo_h5_in *in, ebpo_h5_id root, const char *name,
-                             const char *const *words, int *out, ebpo_error *error)
+                             const char *(*word_of)(int value), int *out, ebpo_error *error)
 {
     char word[64];
     ebpo_status status = ebpo_h5_get_text(in, root, "/", name, word, sizeof word, error);
     if (status == EBPO_E_ABSENT)
         return EBPO_OK;
     *out = -1;
-    for (int i = 0; words[i] && status == EBPO_OK; i++)
-        if (strcmp(words[i], word) == 0)
+    for (int i = 0; word_of(i) && status == EBPO_OK; i++)
+        if (strcmp(word_of(i), word) == 0)
             *out = i;
     return status;
 }
 
+static const char *selection_word(int selection)
+{
+    const ebpo_selection_traits *traits = ebpo_selection_describe((ebpo_selection)selection);
+    return traits ? traits->name : NULL;
+}
+
+static const char *normals_word(int normals) { return NORMALS[normals]; }
+
 static ebpo_status get_selection(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info,
                                  ebpo_error *error)
 {
-    ebpo_status status = get_known(in, root, "selection", SELECTIONS, &info->selection, error);
+    ebpo_status status = get_known(in, root, "selection", selection_word, &info->selection, error);
     if (status == EBPO_OK)
-        status = get_known(in, root, "selection_normals", NORMALS, &info->normals, error);
+        status = get_known(in, root, "selection_normals", normals_word, &info->normals, error);
     for (int i = 0; i < SELECTION_FACTS && status == EBPO_OK && info->selection > 0; i++)
         status = get_fact(in, root, "/", &selection_facts[i], info, error);
     return status;

@@ -42,20 +42,16 @@ typedef struct ebpo_choice {
 } ebpo_choice;
 
 /* A selection: takes planes from the candidates, clips `envelope` by them and writes their codes;
- * returns how many, -1: out of memory. Adding a method means one function of this shape, a line in
- * selections.c, and its name in three lists: ebpo_selection (build.h), SELECTIONS
- * (container/head_facts.c), selection_words (the tool's words.c). Codes may come in any order; the
- * count of candidates is at most EBPO_PLANES_CANDIDATES from the root down, anything from the
- * leaves up.
- */
+ * returns how many, -1: out of memory. Adding one: CONTRIBUTING.md, "A new plane selection". Codes
+ * may come in any order; the count of candidates is at most EBPO_PLANES_CANDIDATES from the root
+ * down, anything from the leaves up. */
 typedef int (*ebpo_select_fn)(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes);
 
+/* With traits.from_leaves nodes come after their children, each from its cell alone (EBP 2017,
+ * 3.4.1); else from the root down, each from its parent's envelope. */
 typedef struct ebpo_selection_method {
+    ebpo_selection_traits traits;
     ebpo_select_fn select;
-    /* nodes after their children, each from its cell alone (EBP 2017, 3.4.1); else from the root
-     * down, each from its parent's envelope */
-    bool from_leaves;
-    bool has_seed, has_normals;
 } ebpo_selection_method;
 
 /* NULL for what is none. */

@@ -6,18 +6,28 @@
 #include "planes/planes.h"
 
 static const ebpo_selection_method methods[] = {
-    [EBPO_SELECT_INHERIT] = { .select = ebpo_select_greedy },
-    [EBPO_SELECT_KMEDOIDS] = { .select = ebpo_select_kmedoids,
-                               .from_leaves = true,
-                               .has_seed = true,
-                               .has_normals = true },
-    [EBPO_SELECT_OFFSET] = { .select = ebpo_select_offset, .from_leaves = true },
-    [EBPO_SELECT_RANDOM] = { .select = ebpo_select_random, .from_leaves = true, .has_seed = true },
+    [EBPO_SELECT_INHERIT] = { { .name = "inherit" }, ebpo_select_greedy },
+    [EBPO_SELECT_KMEDOIDS] = { { .name = "kmedoids",
+                                 .from_leaves = true,
+                                 .takes_normals = true,
+                                 .takes_seed = true },
+                               ebpo_select_kmedoids },
+    [EBPO_SELECT_OFFSET] = { { .name = "offset", .from_leaves = true }, ebpo_select_offset },
+    [EBPO_SELECT_RANDOM] = { { .name = "random", .from_leaves = true, .takes_seed = true },
+                             ebpo_select_random },
 };
+_Static_assert(sizeof methods / sizeof *methods == EBPO_SELECTION_COUNT,
+               "each selection of ebpo/build.h needs a line in this table");
 
 const ebpo_selection_method *ebpo_selection_of(ebpo_selection selection)
 {
-    return (unsigned)selection < sizeof methods / sizeof *methods ? &methods[selection] : NULL;
+    return (unsigned)selection < EBPO_SELECTION_COUNT ? &methods[selection] : NULL;
+}
+
+const ebpo_selection_traits *ebpo_selection_describe(ebpo_selection selection)
+{
+    const ebpo_selection_method *method = ebpo_selection_of(selection);
+    return method ? &method->traits : NULL;
 }
 
 int ebpo_selection_wanted(int count, int level, double percent, double k_root)

@@ -39,19 +39,55 @@ static int check_k_root(const char *name, const char *text)
     return EXIT_USAGE;
 }
 
+typedef bool (*trait_fn)(const ebpo_selection_traits *traits);
+
+static bool from_leaves(const ebpo_selection_traits *t) { return t->from_leaves; }
+static bool from_root(const ebpo_selection_traits *t) { return !t->from_leaves; }
+static bool takes_normals(const ebpo_selection_traits *t) { return t->takes_normals; }
+static bool takes_seed(const ebpo_selection_traits *t) { return t->takes_seed; }
+
+/* The selections of a trait, as bits; their names, "kmedoids, offset or random", into `names`. */
+static uint32_t of_trait(trait_fn has, char *names, size_t size)
+{
+    uint32_t bits = 0;
+    names[0] = 0;
+    for (int i = EBPO_SELECTION_COUNT - 1; i >= 0; i--) {
+        const ebpo_selection_traits *t = ebpo_selection_describe((ebpo_selection)i);
+        if (!has(t))
+            continue;
+        char rest[200];
+        snprintf(rest, sizeof rest, "%s", names);
+        const char *between = !bits ? "" : bits & (bits - 1) ? ", " : " or ";
+        snprintf(names, size, "%s%s%.150s", t->name, between, rest);
+        bits |= 1u << i;
+    }
+    return bits;
+}
+
+/* Refuses options that say nothing about any of the selections that were chosen. */
+static int check_effect(const char *name, const selection_options *o, bool given,
+                        const char *options, trait_fn has)
+{
+    char names[200], message[300];
+    uint32_t taking = of_trait(has, names, sizeof names);
+    if (!given || o->chosen & taking)
+        return EXIT_FINE;
+    snprintf(message, sizeof message, "%s for --select %s", options, names);
+    return refused(name, message);
+}
+
 int selection_check(const char *name, const selection_options *o)
 {
-    const uint32_t inherit = 1u << EBPO_SELECT_INHERIT, kmedoids = 1u << EBPO_SELECT_KMEDOIDS,
-                   random = 1u << EBPO_SELECT_RANDOM;
-    if (!(o->chosen & ~inherit) && (o->percent >= 0 || o->k_root || o->normals >= 0))
-        return refused(
-            name, "--percent, --k-root and --normals are for --select kmedoids, offset or random");
-    if (!(o->chosen & inherit) && o->epsilon >= 0)
-        return refused(name, "--epsilon is for --select inherit");
-    if (o->normals >= 0 && !(o->chosen & kmedoids))
-        return refused(name, "--normals is for --select kmedoids");
-    if (o->seed >= 0 && !(o->chosen & (kmedoids | random)))
-        return refused(name, "--seed is for --select kmedoids or random");
+    int code = check_effect(name, o, o->percent >= 0 || o->k_root || o->normals >= 0,
+                            "--percent, --k-root and --normals are", from_leaves);
+    if (code == EXIT_FINE)
+        code = check_effect(name, o, o->epsilon >= 0, "--epsilon is", from_root);
+    if (code == EXIT_FINE)
+        code = check_effect(name, o, o->normals >= 0, "--normals is", takes_normals);
+    if (code == EXIT_FINE)
+        code = check_effect(name, o, o->seed >= 0, "--seed is", takes_seed);
+    if (code != EXIT_FINE)
+        return code;
     if (o->percent >= 0 && o->k_root)
         return refused(name, "--percent and --k-root exclude each other; give one");
     if (o->percent == 0)

@@ -6,10 +6,16 @@
 #include <string.h>
 
 const char *const rule_words[] = { "nonzero", "evenodd", "positive", NULL };
-const char *const selection_words[] = { "inherit", "kmedoids", "offset", "random", NULL };
+const char *selection_words[EBPO_SELECTION_COUNT + 1];
 const char *const normals_words[] = { "spherical", "angle", NULL };
 const char *const codec_words[] = { "zstd", "deflate", "none", NULL };
 const char *const part_words[] = { "planes", "mesh", "maps", "leaf-planes", NULL };
+
+void words_init(void)
+{
+    for (int i = 0; i < EBPO_SELECTION_COUNT; i++)
+        selection_words[i] = ebpo_selection_describe((ebpo_selection)i)->name;
+}
 
 static char *scaled(char *out, size_t room, double v, const char *unit)
 {

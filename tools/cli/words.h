@@ -5,7 +5,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include <ebpo/file.h>
+#include <ebpo/build.h>
+
+/* Before all else in main: words that the library tells. */
+void words_init(void);
 
 /* 999, 12.3 K, 4.56 M. */
 char *words_count(char *out, size_t room, double v);
@@ -29,8 +32,8 @@ void words_hex(const uint8_t digest[32], char out[65]);
 
 /* NULL-terminated, in the order of the enums; for option tables. */
 extern const char *const rule_words[];
-extern const char *const selection_words[]; /* by ebpo_selection */
-extern const char *const normals_words[];   /* by ebpo_normal_distance */
+extern const char *selection_words[];     /* by ebpo_selection; words_init fills it in */
+extern const char *const normals_words[]; /* by ebpo_normal_distance */
 extern const char *const codec_words[];
 extern const char *const part_words[]; /* word i is bit i */
 

@@ -88,6 +88,7 @@ int main(int argc, char **argv)
     /* whatever a preloaded library has set: numbers are parsed and printed here, too */
     fesetenv(FE_DFL_ENV);
     signals_install();
+    words_init();
     int code = dispatch(argc, argv);
     const command *c = argc > 1 ? find(argv[1]) : NULL;
     if (!command_flush(c ? c->spec->command : NULL) && code == EXIT_FINE)

@@ -20,8 +20,20 @@ typedef enum ebpo_selection {
        of normals */
     EBPO_SELECT_KMEDOIDS = 1,
     EBPO_SELECT_OFFSET = 2, /* those that had to move least from their faces */
-    EBPO_SELECT_RANDOM = 3  /* consecutive ones from a random place on */
+    EBPO_SELECT_RANDOM = 3, /* consecutive ones from a random place on */
+    EBPO_SELECTION_COUNT    /* no selection: how many this version knows */
 } ebpo_selection;
+
+/* What is known of a selection. */
+typedef struct ebpo_selection_traits {
+    const char *name;   /* as files and commands call it: "inherit" */
+    bool from_leaves;   /* from the leaves up: takes percent or k_root, not epsilon */
+    bool takes_normals; /* the distance of normals matters to it */
+    bool takes_seed;
+} ebpo_selection_traits;
+
+/* Static, of this library; NULL for what is no selection. Any thread. */
+EBPO_API const ebpo_selection_traits *ebpo_selection_describe(ebpo_selection selection);
 
 /* What k-medoids takes for the distance of two normals. */
 typedef enum ebpo_normal_distance {
