@@ -7,6 +7,7 @@
 
 #include <ebpo/ebpo.h>
 
+#include "arrange/arrange.h"
 #include "base/arrays.h"
 #include "mesh/mesh_parts.h"
 #include "solids.h"
@@ -73,17 +74,22 @@ static void expect_same(const ebpo_mesh *arranged, const ebpo_mesh *plain)
     free(seen);
 }
 
+static void expect_equal_reports(ebpo_mesh_report a, ebpo_mesh_report b)
+{
+    for (int k = 0; k < 3; k++) { /* which of two zeros it is */
+        a.min[k] += 0.0, a.max[k] += 0.0;
+        b.min[k] += 0.0, b.max[k] += 0.0;
+    }
+    ck_assert(memcmp(&a, &b, sizeof a) == 0);
+}
+
 static void expect_same_report(const ebpo_mesh *plain, const ebpo_mesh *m)
 {
     ebpo_mesh_report a, b;
     ebpo_error error = EBPO_ERROR_INIT;
     ck_assert(ebpo_mesh_check(&a, plain, 1, silent, &error) == EBPO_OK);
     ck_assert(ebpo_mesh_check(&b, m, 2, silent, &error) == EBPO_OK);
-    for (int k = 0; k < 3; k++) { /* which of two zeros it is */
-        a.min[k] += 0.0, a.max[k] += 0.0;
-        b.min[k] += 0.0, b.max[k] += 0.0;
-    }
-    ck_assert(memcmp(&a, &b, sizeof a) == 0);
+    expect_equal_reports(a, b);
 }
 
 /* Mends `plain` as it is, and a copy that is arranged and in the workspace; both are arranged in
@@ -94,7 +100,7 @@ static void mend_both(ebpo_mesh plain, int steps, ebpo_workspace *workspace)
     ebpo_mend_record record, other;
     ebpo_error error = EBPO_ERROR_INIT;
     m.workspace = workspace;
-    ck_assert_msg(ebpo_mesh_arrange_to_mend(&m, 3, silent, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_arrange_to_mend(&m, 3, &silent, &error) == EBPO_OK, "%s", error.message);
     expect_same_report(&plain, &m);
     mend(&plain, steps, &record);
     mend(&m, steps, &other);
@@ -218,6 +224,74 @@ START_TEST(a_mesh_that_is_arranged_for_building_is_welded_alike)
 }
 END_TEST
 
+/* ebpo_mesh_prepare against the single calls in the order that it promises. Frees `plain`. */
+static void prepare_and_compare(ebpo_mesh plain, const ebpo_prepare_options *options)
+{
+    ebpo_mesh m = copy_of(&plain);
+    ebpo_prepared p;
+    ebpo_mend_record record;
+    ebpo_mesh_report before, after;
+    ebpo_error error = EBPO_ERROR_INIT;
+    bool stl = strncmp(plain.source_format, "stl", 3) == 0;
+    int steps = (options->weld || stl ? WELD : 0) | (options->orient ? ORIENT : 0) |
+                (options->fill_holes ? FILL : 0);
+    ck_assert_msg(ebpo_mesh_prepare(&p, &m, options, &error) == EBPO_OK, "%s", error.message);
+    ck_assert(ebpo_mesh_check(&before, &plain, 1, silent, &error) == EBPO_OK);
+    mend(&plain, steps, &record);
+    ck_assert(ebpo_mesh_check(&after, &plain, 1, silent, &error) == EBPO_OK);
+    ck_assert(p.mended == (steps != 0) && memcmp(&p.record, &record, sizeof record) == 0);
+    expect_equal_reports(p.before, before);
+    expect_equal_reports(p.report, after);
+    expect_same(&m, &plain);
+    ebpo_mesh_free(&m);
+    ebpo_mesh_free(&plain);
+}
+
+START_TEST(preparing_mends_in_its_order_and_reports_before_and_after)
+{
+    for (int steps = 0; steps <= ALL; steps++) {
+        ebpo_prepare_options o = EBPO_PREPARE_OPTIONS_INIT;
+        o.weld = steps & WELD;
+        o.orient = steps & ORIENT;
+        o.fill_holes = steps & FILL;
+        prepare_and_compare(damaged(_i), &o);
+        ebpo_mesh stl = damaged(_i);
+        snprintf(stl.source_format, sizeof stl.source_format, "stl");
+        prepare_and_compare(stl, &o);
+    }
+}
+END_TEST
+
+/* Refuses the stage that `user` names. */
+static bool stop_at(void *user, const char *stage, uint64_t done, uint64_t total)
+{
+    (void)done;
+    (void)total;
+    return strcmp(stage, user) != 0;
+}
+
+START_TEST(preparing_may_be_stopped_and_checks_what_is_too_large_to_build)
+{
+    ebpo_mesh m = damaged(0);
+    ebpo_prepared p;
+    ebpo_prepare_options o = EBPO_PREPARE_OPTIONS_INIT;
+    ebpo_error error = EBPO_ERROR_INIT;
+    char mending[] = "mending";
+    o.weld = true;
+    o.progress = (ebpo_progress){ stop_at, mending };
+    ck_assert_int_eq(ebpo_mesh_prepare(&p, &m, &o, &error), EBPO_E_CANCELLED);
+    ck_assert(!p.mended && p.before.edges == 0);
+    m.faces[0] = (uint32_t)m.vertex_count;
+    ck_assert_int_eq(ebpo_mesh_prepare(&p, &m, NULL, &error), EBPO_E_FORMAT);
+    m.faces[0] = 0;
+    m.xyz64[3ul * m.faces[1]] = 1e302;
+    ck_assert_int_eq(ebpo_mesh_arrange(&m, 1, silent, &error), EBPO_E_LIMIT);
+    ck_assert_msg(ebpo_mesh_prepare(&p, &m, NULL, &error) == EBPO_OK, "%s", error.message);
+    ck_assert(p.report.max[0] == 1e302);
+    ebpo_mesh_free(&m);
+}
+END_TEST
+
 START_TEST(what_was_mended_is_arranged_again_by_building)
 {
     ebpo_mesh m = damaged(ebpo_test_solid_count + 1);
@@ -225,7 +299,7 @@ START_TEST(what_was_mended_is_arranged_again_by_building)
     ebpo_mesh_report report;
     ebpo_tree tree;
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert(ebpo_mesh_arrange_to_mend(&m, 0, silent, &error) == EBPO_OK);
+    ck_assert(ebpo_arrange_to_mend(&m, 0, &silent, &error) == EBPO_OK);
     mend(&m, ALL, &record);
     ck_assert(ebpo_mesh_check(&report, &m, 0, silent, &error) == EBPO_OK && report.balanced);
     ck_assert_msg(ebpo_build(&tree, &m, &report, &record, NULL, &error) == EBPO_OK, "%s",
@@ -244,6 +318,9 @@ int main(void)
                         ebpo_test_solid_count + 2);
     tcase_add_loop_test(tests, memory_does_not_change_what_mending_makes, 0, 2);
     tcase_add_test(tests, a_mesh_that_is_arranged_for_building_is_welded_alike);
+    tcase_add_loop_test(tests, preparing_mends_in_its_order_and_reports_before_and_after, 0,
+                        ebpo_test_solid_count);
+    tcase_add_test(tests, preparing_may_be_stopped_and_checks_what_is_too_large_to_build);
     tcase_add_test(tests, what_was_mended_is_arranged_again_by_building);
     suite_add_tcase(suite, tests);
     SRunner *runner = srunner_create(suite);

@@ -484,13 +484,12 @@ ebpo_status ebpo_mesh_arrange(ebpo_mesh *mesh, unsigned threads, ebpo_progress p
     return ebpo_arrange(mesh, -1, threads, &progress, error);
 }
 
-ebpo_status ebpo_mesh_arrange_to_mend(ebpo_mesh *mesh, unsigned threads, ebpo_progress progress,
-                                      ebpo_error *error)
+ebpo_status ebpo_arrange_to_mend(ebpo_mesh *mesh, unsigned threads, const ebpo_progress *progress,
+                                 ebpo_error *error)
 {
-    EBPO_DEFAULT_FP;
     return run((arranging){ .mesh = mesh,
                             .threads = ebpo_thread_count(threads),
-                            .progress = &progress,
+                            .progress = progress,
                             .together = true },
                -1, error);
 }

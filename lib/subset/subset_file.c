@@ -4,6 +4,17 @@
 #include "io/publish.h"
 #include "subset/subset_parts.h"
 
+uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces)
+{
+    /* bytes a face, measured: the mesh and what is known of it, and that of leaves, the more of
+     * them the smaller they are */
+    enum { OF_MESH = 130, OF_LEAVES = 1800, OF_LEAVES_MOST = 430, ANYHOW = 16 << 20 };
+    double leaves = OF_LEAVES / (double)leaf_faces;
+    return (uint64_t)((double)face_count *
+                          (OF_MESH + (leaves < OF_LEAVES_MOST ? leaves : OF_LEAVES_MOST)) +
+                      ANYHOW);
+}
+
 ebpo_status ebpo_subset(ebpo_file *file, const char *path, const ebpo_subset_options *options,
                         ebpo_error *error)
 {

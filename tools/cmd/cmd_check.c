@@ -5,7 +5,7 @@
 #include "cli/command.h"
 #include "cli/memory_args.h"
 #include "cli/mesh_findings.h"
-#include "cli/prepare.h"
+#include "cli/mesh_input.h"
 #include "cli/progress.h"
 #include "cmd/commands.h"
 
@@ -17,10 +17,7 @@ typedef struct values {
 } values;
 
 static const arg_option options[] = {
-    ARG_SWITCH("weld", 0, values, mend.weld, "first merge vertices at one position (STL: always)"),
-    ARG_SWITCH("orient", 0, values, mend.orient,
-               "then make neighbouring faces agree in orientation"),
-    ARG_SWITCH("fill-holes", 0, values, mend.fill_holes, "then close simple boundary loops"),
+    MENDING_OPTIONS(values, mend),
     ARG_SWITCH("require-solid", 0, values, require_solid,
                "end with code 3 if the mesh is not a solid"),
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores",
@@ -41,28 +38,28 @@ static const arg_spec spec = {
     .options = options,
 };
 
-static void print_json(const prepared *p, const char *path)
+static void print_json(const mesh_input *p, const char *path)
 {
     json j;
     json_begin(&j, stdout);
     json_object(&j, NULL);
     json_text(&j, "file", path);
     findings_json_source(&j, "source", &p->as_read);
-    findings_json(&j, "report", &p->before);
-    if (p->mended) {
-        findings_json_mending(&j, "mend", &p->record);
-        findings_json(&j, "report_after_mending", &p->report);
+    findings_json(&j, "report", &p->prepared.before);
+    if (p->prepared.mended) {
+        findings_json_mending(&j, "mend", &p->prepared.record);
+        findings_json(&j, "report_after_mending", &p->prepared.report);
     }
     json_finish(&j);
 }
 
-static void print_words(const prepared *p, const char *path)
+static void print_words(const mesh_input *p, const char *path)
 {
-    findings_print(stdout, path, &p->as_read, &p->before);
-    if (!p->mended)
+    findings_print(stdout, path, &p->as_read, &p->prepared.before);
+    if (!p->prepared.mended)
         return;
-    findings_print_mending(stdout, &p->record);
-    findings_print(stdout, "after mending", &p->mesh, &p->report);
+    findings_print_mending(stdout, &p->prepared.record);
+    findings_print(stdout, "after mending", &p->mesh, &p->prepared.report);
 }
 
 static int run(int argc, char **argv)
@@ -81,8 +78,9 @@ static int run(int argc, char **argv)
         return command_failed("check", &error);
     progress_line line;
     ebpo_progress progress = progress_start(&line, "check", v.quiet);
-    prepared p;
-    status = prepare_mesh(&p, operand[0], v.mend, workspace, (unsigned)v.threads, progress, &error);
+    mesh_input p;
+    status =
+        mesh_input_read(&p, operand[0], v.mend, workspace, (unsigned)v.threads, progress, &error);
     progress_wipe(&line);
     if (status != EBPO_OK) {
         ebpo_workspace_free(workspace);
@@ -93,10 +91,10 @@ static int run(int argc, char **argv)
     else if (!v.quiet)
         print_words(&p, operand[0]);
     command_flush("check");
-    findings_warn(stderr, "check", operand[0], &p.report, &p.record);
+    findings_warn(stderr, "check", operand[0], &p.prepared.report, &p.prepared.record);
     ebpo_mesh_free(&p.mesh);
     ebpo_workspace_free(workspace);
-    return v.require_solid && !p.report.balanced ? EXIT_NOT_SOLID : EXIT_FINE;
+    return v.require_solid && !p.prepared.report.balanced ? EXIT_NOT_SOLID : EXIT_FINE;
 }
 
 const command command_check = { &spec, run };

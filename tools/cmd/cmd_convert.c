@@ -9,7 +9,7 @@
 #include "cli/file_facts.h"
 #include "cli/memory_args.h"
 #include "cli/mesh_findings.h"
-#include "cli/prepare.h"
+#include "cli/mesh_input.h"
 #include "cli/progress.h"
 #include "cli/selection_args.h"
 #include "cli/stages.h"
@@ -77,10 +77,7 @@ static const arg_option options[] = {
     { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores",
       0, 256, NULL },
     MEMORY_OPTIONS(values, memory),
-    ARG_SWITCH("weld", 0, values, mend.weld, "first merge vertices at one position (STL: always)"),
-    ARG_SWITCH("orient", 0, values, mend.orient,
-               "then make neighbouring faces agree in orientation"),
-    ARG_SWITCH("fill-holes", 0, values, mend.fill_holes, "then close simple boundary loops"),
+    MENDING_OPTIONS(values, mend),
     { "rule", 0, ARG_WORD, offsetof(values, rule), "NAME",
       "inside is where the winding number is nonzero (the default),\nodd (evenodd) or positive", 0,
       0, rule_words },
@@ -160,16 +157,16 @@ static uint32_t parts_of(const values *v)
 
 /* --- output --- */
 
-static void print_reports(const values *v, const prepared *p, const char *in)
+static void print_reports(const values *v, const mesh_input *p, const char *in)
 {
     if (!v->json && !v->quiet) {
-        findings_print(stdout, in, &p->as_read, &p->before);
-        findings_print_mending(stdout, &p->record);
-        if (p->mended)
-            findings_print(stdout, "after mending", &p->mesh, &p->report);
+        findings_print(stdout, in, &p->as_read, &p->prepared.before);
+        findings_print_mending(stdout, &p->prepared.record);
+        if (p->prepared.mended)
+            findings_print(stdout, "after mending", &p->mesh, &p->prepared.report);
     }
     command_flush("convert");
-    findings_warn(stderr, "convert", in, &p->report, &p->record);
+    findings_warn(stderr, "convert", in, &p->prepared.report, &p->prepared.record);
 }
 
 static void print_summary(const values *v, const ebpo_info *info, const char *out, double seconds)
@@ -186,7 +183,7 @@ static void print_summary(const values *v, const ebpo_info *info, const char *ou
     printf(", in %.1f s\n", seconds);
 }
 
-static void print_json(const prepared *p, const ebpo_info *info, const char *out,
+static void print_json(const mesh_input *p, const ebpo_info *info, const char *out,
                        const progress_line *line, const stage_facts *stages, double seconds)
 {
     json j;
@@ -195,7 +192,7 @@ static void print_json(const prepared *p, const ebpo_info *info, const char *out
     facts_json(&j, out, info);
     json_object(&j, "input");
     findings_json_source(&j, "mesh", &p->as_read);
-    findings_json(&j, "report", &p->before);
+    findings_json(&j, "report", &p->prepared.before);
     json_end(&j);
     json_real(&j, "seconds", seconds);
     stages_json(&j, line, stages);
@@ -203,7 +200,7 @@ static void print_json(const prepared *p, const ebpo_info *info, const char *out
 }
 
 /* What is on the disk, as a reader sees it. */
-static ebpo_status print_result(const values *v, const prepared *p, const char *out,
+static ebpo_status print_result(const values *v, const mesh_input *p, const char *out,
                                 const progress_line *line, const stage_facts *stages,
                                 double seconds, ebpo_error *error)
 {
@@ -225,29 +222,27 @@ static ebpo_status print_result(const values *v, const prepared *p, const char *
 
 /* --- work --- */
 
-/* Judging what is needed opens the whole model: bytes a face, measured. Told before the hours of
- * building that it would be too much. */
-static ebpo_status room_to_judge(const values *v, const prepared *p, const char *in,
+/* Said before the hours of building that judging afterwards would be too much. */
+static ebpo_status room_to_judge(const values *v, const mesh_input *p, const char *in,
                                  const ebpo_workspace *workspace, ebpo_error *error)
 {
     ebpo_workspace_stats figures;
-    double leaves = 1800 / (double)v->leaf_faces,
-           needed = (double)p->mesh.face_count * (130 + (leaves < 430 ? leaves : 430)) + (16 << 20);
+    uint64_t needed = ebpo_subset_memory(p->mesh.face_count, (uint32_t)v->leaf_faces);
     char bytes[32], budget[32];
     ebpo_workspace_get_stats(workspace, &figures);
-    if (needed <= (double)figures.memory)
+    if (needed <= figures.memory)
         return EBPO_OK;
     snprintf(error->message, sizeof error->message,
              "%s: --max-error and --target-size measure with the whole model in memory, some %s of "
              "it, and the budget is %s; allow more (--memory), or leave them out here and use "
              "'ebpo subset' where there is more",
-             in, words_bytes(bytes, sizeof bytes, (uint64_t)needed),
+             in, words_bytes(bytes, sizeof bytes, needed),
              words_bytes(budget, sizeof budget, figures.memory));
     return EBPO_E_LIMIT;
 }
 
 /* `need`: the error or size that was asked for. */
-static ebpo_status build_and_write(const values *v, prepared *p, const char *out,
+static ebpo_status build_and_write(const values *v, mesh_input *p, const char *out,
                                    const ebpo_subset_options *need, ebpo_progress progress,
                                    ebpo_build_times *times, ebpo_error *error)
 {
@@ -274,7 +269,7 @@ static ebpo_status build_and_write(const values *v, prepared *p, const char *out
         ebpo_mesh_free(&p->mesh);
         return status;
     }
-    status = ebpo_build(&tree, &p->mesh, &p->report, &p->record, &build, error);
+    status = ebpo_build(&tree, &p->mesh, &p->prepared.report, &p->prepared.record, &build, error);
     if (status != EBPO_OK)
         return status;
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
@@ -344,14 +339,14 @@ static int run(int argc, char **argv)
     ebpo_progress progress = progress_start(&line, "convert", v.quiet);
     stage_facts stages = plan_stages(&v, in);
     int plan[STAGE_PLAN_MAX];
-    prepared p = { .mended = false };
+    mesh_input p = { .mesh = { 0 } };
     progress_plan(&line, plan, stages_plan(&stages, plan), &p.as_read.face_count);
     double begun = progress_now();
-    status = prepare_mesh(&p, in, v.mend, workspace, (unsigned)v.threads, progress, &error);
+    status = mesh_input_read(&p, in, v.mend, workspace, (unsigned)v.threads, progress, &error);
     progress_wipe(&line);
     if (status == EBPO_OK) {
         print_reports(&v, &p, in);
-        if (v.require_solid && !p.report.balanced) {
+        if (v.require_solid && !p.prepared.report.balanced) {
             ebpo_mesh_free(&p.mesh);
             ebpo_workspace_free(workspace);
             fprintf(stderr,

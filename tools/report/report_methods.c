@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "cli/command.h"
-#include "cli/prepare.h"
+#include "cli/mesh_input.h"
 #include "cli/mesh_findings.h"
 #include "report/report_data.h"
 #include "cli/selection_args.h"
@@ -105,15 +105,15 @@ static ebpo_status build_one(comparison *c, const char *mesh, int selection, con
     ebpo_build_options build;
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
     ebpo_tree tree;
-    prepared p;
-    ebpo_status status = prepare_mesh(&p, mesh, (mending){ false, false, false }, NULL,
-                                      (unsigned)c->v->threads, c->progress, error);
+    mesh_input p;
+    ebpo_status status = mesh_input_read(&p, mesh, (mending){ false, false, false }, NULL,
+                                         (unsigned)c->v->threads, c->progress, error);
     if (status != EBPO_OK)
         return status;
     if (c->count == 0) {
         if (c->progress.user)
             progress_wipe(c->progress.user);
-        findings_warn(stderr, "report", mesh, &p.report, &p.record);
+        findings_warn(stderr, "report", mesh, &p.prepared.report, &p.prepared.record);
     }
     build_options(c, selection, &build);
     status = selection_k_root(c->v->k_root, p.mesh.face_count, &build.k_root, error);
@@ -122,7 +122,7 @@ static ebpo_status build_one(comparison *c, const char *mesh, int selection, con
         return status;
     }
     double begin = progress_now();
-    status = ebpo_build(&tree, &p.mesh, &p.report, &p.record, &build, error);
+    status = ebpo_build(&tree, &p.mesh, &p.prepared.report, &p.prepared.record, &build, error);
     *seconds = progress_now() - begin;
     if (status != EBPO_OK)
         return status;

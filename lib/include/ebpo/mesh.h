@@ -128,15 +128,6 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_check(ebpo_mesh_report *report, con
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_arrange(ebpo_mesh *mesh, unsigned threads,
                                                      ebpo_progress progress, ebpo_error *error);
 
-/* The same for what is to be mended: vertices that no face names stand among the others, so that
- * those at one position are neighbours. Mending, and checking before it, then go through memory in
- * order too; afterwards ebpo_mesh_arrange puts in order what mending changed (ebpo_build does so
- * itself). The source's numbers are those of the mended mesh in the source's order: the result is
- * the same as without it. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_arrange_to_mend(ebpo_mesh *mesh, unsigned threads,
-                                                             ebpo_progress progress,
-                                                             ebpo_error *error);
-
 /* What mending did; recorded in the file. */
 typedef struct ebpo_mend_record {
     bool weld, orient, fill_holes; /* what was asked for */
@@ -169,6 +160,38 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_mend_r
  * not close (orientations that do not agree: see ebpo_mesh_orient) stay and are counted. */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_fill_holes(ebpo_mesh *mesh, ebpo_mend_record *record,
                                                         ebpo_error *error);
+
+/* What is done to a mesh before it is built or judged. */
+typedef struct ebpo_prepare_options {
+    bool weld;        /* ebpo_mesh_weld; done to every STL, whose faces share no vertices */
+    bool orient;      /* then ebpo_mesh_orient */
+    bool fill_holes;  /* then ebpo_mesh_fill_holes */
+    unsigned threads; /* 0: all cores; the result does not depend on it */
+    ebpo_progress progress;
+} ebpo_prepare_options;
+#define EBPO_PREPARE_OPTIONS_INIT              \
+    {                                          \
+        false, false, false, 0, { NULL, NULL } \
+    }
+
+typedef struct ebpo_prepared {
+    bool mended;             /* a mending step ran: the two reports may differ */
+    ebpo_mend_record record; /* what it did */
+    ebpo_mesh_report before; /* of the mesh as it was given */
+    ebpo_mesh_report report; /* of the mesh as it is now; for ebpo_build */
+} ebpo_prepared;
+
+/* Makes a mesh ready for ebpo_build, in one call: arranges it, mends it as asked, in the order
+ * weld, orient, fill holes, and checks it before and after. All steps keep to the mesh's workspace;
+ * mending and checking by single calls gives the same mesh and the same reports, but may need more
+ * memory. A mesh too large for an exact grid is checked, too; ebpo_build refuses it.
+ *
+ * `options` may be NULL: no mending but that of STL. The mesh stays the caller's. Errors are those
+ * of ebpo_mesh_check and the mending functions, and EBPO_E_CANCELLED; `out` is cleared then, and
+ * the mesh is valid, with the steps that were done. Any thread; one call at a time for one mesh. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_prepare(ebpo_prepared *out, ebpo_mesh *mesh,
+                                                     const ebpo_prepare_options *options,
+                                                     ebpo_error *error);
 
 #ifdef __cplusplus
 }

@@ -66,6 +66,11 @@ typedef struct ebpo_subset_options {
  * opened in memory: the file must have its mesh and be no subset, else EBPO_E_ABSENT. target_bytes:
  * EBPO_E_ARGUMENT tells the least size that can be reached, when that is larger. */
 
+/* How many bytes of memory choosing by max_error or target_bytes takes, about (as measured, and
+ * rather too many), for a model of `face_count` faces built with `leaf_faces`: for asking before
+ * hours of building. Cannot fail; any thread. */
+EBPO_API uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces);
+
 /* Writes the subset: whole or not at all. The result does not depend on threads; with everything
  * kept its content (content_sha256) is the source's. Reads what it needs and holds the result in
  * memory, and of the source up to 64 MiB beside it. `options` may be NULL: everything is kept. Any

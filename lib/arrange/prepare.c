@@ -1,0 +1,76 @@
+/* A mesh made ready for building: mended as asked, in the order of the curve, checked. */
+#include <string.h>
+
+#include "arrange/arrange.h"
+#include "base/fp_env.h"
+#include "base/parallel.h"
+
+typedef struct preparation {
+    ebpo_mesh *mesh;
+    const ebpo_prepare_options *options;
+    ebpo_prepared *out;
+} preparation;
+
+/* What is too large for an exact grid can be checked all the same; building says so again. */
+static ebpo_status unless_too_large(ebpo_status status)
+{
+    return status == EBPO_E_LIMIT ? EBPO_OK : status;
+}
+
+static ebpo_status mend(const preparation *p, bool weld, ebpo_error *error)
+{
+    const ebpo_prepare_options *o = p->options;
+    ebpo_status status = EBPO_OK;
+    if (!ebpo_progress_stage(&o->progress, "mending", error))
+        return EBPO_E_CANCELLED;
+    if (weld)
+        status = ebpo_mesh_weld(p->mesh, &p->out->record, error);
+    if (status == EBPO_OK && o->orient)
+        status = ebpo_mesh_orient(p->mesh, &p->out->record, error);
+    if (status == EBPO_OK && o->fill_holes)
+        status = ebpo_mesh_fill_holes(p->mesh, &p->out->record, error);
+    return status;
+}
+
+/* In the order of the curve before anything else, so that each step goes through memory in order,
+ * however little of it there is. */
+static ebpo_status arrange_and_mend(const preparation *p, bool weld, ebpo_error *error)
+{
+    const ebpo_prepare_options *o = p->options;
+    ebpo_status status =
+        unless_too_large(ebpo_arrange_to_mend(p->mesh, o->threads, &o->progress, error));
+    if (status == EBPO_OK)
+        status = ebpo_mesh_check(&p->out->before, p->mesh, o->threads, o->progress, error);
+    return status == EBPO_OK ? mend(p, weld, error) : status;
+}
+
+static ebpo_status prepare(const preparation *p, ebpo_error *error)
+{
+    const ebpo_prepare_options *o = p->options;
+    /* STL has no shared vertices */
+    bool weld = o->weld || strncmp(p->mesh->source_format, "stl", 3) == 0;
+    ebpo_status status = EBPO_OK;
+    p->out->mended = weld || o->orient || o->fill_holes;
+    if (p->out->mended)
+        status = arrange_and_mend(p, weld, error);
+    if (status == EBPO_OK)
+        status = unless_too_large(ebpo_arrange(p->mesh, -1, o->threads, &o->progress, error));
+    if (status == EBPO_OK)
+        status = ebpo_mesh_check(&p->out->report, p->mesh, o->threads, o->progress, error);
+    if (status == EBPO_OK && !p->out->mended)
+        p->out->before = p->out->report;
+    return status;
+}
+
+ebpo_status ebpo_mesh_prepare(ebpo_prepared *out, ebpo_mesh *mesh,
+                              const ebpo_prepare_options *options, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    static const ebpo_prepare_options usual = EBPO_PREPARE_OPTIONS_INIT;
+    memset(out, 0, sizeof *out);
+    preparation p = { mesh, options ? options : &usual, out };
+    ebpo_status status = prepare(&p, error);
+    if (status != EBPO_OK)
+        memset(out, 0, sizeof *out);
+    return status;
+}

@@ -1,0 +1,27 @@
+#include "cli/mesh_input.h"
+
+#include <string.h>
+
+ebpo_status mesh_input_read(mesh_input *out, const char *path, mending asked,
+                            ebpo_workspace *workspace, unsigned threads, ebpo_progress progress,
+                            ebpo_error *error)
+{
+    ebpo_mesh_read_options how = EBPO_MESH_READ_OPTIONS_INIT;
+    ebpo_prepare_options wanted = EBPO_PREPARE_OPTIONS_INIT;
+    how.progress = wanted.progress = progress;
+    how.threads = wanted.threads = threads;
+    how.workspace = workspace;
+    wanted.weld = asked.weld;
+    wanted.orient = asked.orient;
+    wanted.fill_holes = asked.fill_holes;
+    memset(out, 0, sizeof *out);
+    ebpo_status status = ebpo_mesh_read(&out->mesh, path, &how, error);
+    if (status != EBPO_OK)
+        return status;
+    out->as_read = out->mesh;
+    out->as_read.faces = NULL;
+    status = ebpo_mesh_prepare(&out->prepared, &out->mesh, &wanted, error);
+    if (status != EBPO_OK)
+        ebpo_mesh_free(&out->mesh);
+    return status;
+}

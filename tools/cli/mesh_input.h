@@ -1,0 +1,31 @@
+/* The mesh that a command is given: read, mended as asked, checked; and the options for that. */
+#ifndef EBPO_TOOLS_MESH_INPUT_H
+#define EBPO_TOOLS_MESH_INPUT_H
+
+#include <ebpo/mesh.h>
+
+#include "cli/args.h"
+
+typedef struct mending {
+    bool weld, orient, fill_holes;
+} mending;
+
+#define MENDING_OPTIONS(type, member)                                    \
+    ARG_SWITCH("weld", 0, type, member.weld,                             \
+               "first merge vertices at one position (STL: always)"),    \
+        ARG_SWITCH("orient", 0, type, member.orient,                     \
+                   "then make neighbouring faces agree in orientation"), \
+        ARG_SWITCH("fill-holes", 0, type, member.fill_holes, "then close simple boundary loops")
+
+typedef struct mesh_input {
+    ebpo_mesh mesh;         /* as mended */
+    ebpo_mesh as_read;      /* facts only; its array pointers tell which there were, no more */
+    ebpo_prepared prepared; /* what was found and mended */
+} mesh_input;
+
+/* On failure nothing is left to free; else ebpo_mesh_free(&out->mesh). */
+EBPO_MUST_USE ebpo_status mesh_input_read(mesh_input *out, const char *path, mending asked,
+                                          ebpo_workspace *workspace, unsigned threads,
+                                          ebpo_progress progress, ebpo_error *error);
+
+#endif
