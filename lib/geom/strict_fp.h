@@ -1,8 +1,8 @@
 /* Included first by the files whose results rest on IEEE double arithmetic, one rounding for each
  * operation, to nearest. Refuses compilers and flags that do not promise that; turns contraction
  * into FMA off even where the flags forgot to or ask for it, and with gcc the SLP vectoriser, which
- * drops the rounding of neighbouring (double)(float) casts (gcc 12). tests/test_strict_fp.py holds
- * the sources and this file to it. */
+ * drops the rounding of neighbouring (double)(float) casts (gcc 12). tests/flags/test_strict_fp.py
+ * holds the sources and this file to it. */
 #ifndef EBPO_GEOM_STRICT_FP_H
 #define EBPO_GEOM_STRICT_FP_H
 
@@ -26,7 +26,7 @@ _Static_assert(FLT_RADIX == 2 && DBL_MANT_DIG == 53 && DBL_MAX_EXP == 1024,
 
 #if defined(__clang__)
 /* Its unsafe-math flags define no macro, but give way to this. -ffp-contract=fast does not, and
- * cannot be seen either: tests/fp_flags.py finds it out. */
+ * cannot be seen either: tests/flags/fp_flags.py finds it out. */
 #pragma float_control(precise, on)
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__GNUC__)

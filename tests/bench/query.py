@@ -346,14 +346,14 @@ def section_out_of_core(bench, page, models):
 def section_leaves(bench, page, models):
     page.text("## Leaves by kind", "", "Percent of the leaves. All kinds but *general* answer by the signs of planes; a general leaf with "
               "a wall that no face meets by one segment. *Gain*: uniform points that fall into leaves of the kind, ns for one, as the same leaves "
-              "taken as general ones and by the planes (`tests/bench_leaves MODEL.ebpo.h5`).")
+              "taken as general ones and by the planes (`tests/bench/bench_leaves MODEL.ebpo.h5`).")
     rows, gains = [], []
     for model in models:
         report = bench.ours(model, "inside", "--count", 100)
         leaves = at(report, "leaves")
         rows.append([model.name, f"{model.faces:,}", f"{leaves:,}"]
                     + [figure(100 * n / max(1, leaves)) for n in at(report, "kinds") + [at(report, "one_wall")]])
-        for kind in json.loads(bench.run(bench.build / "tests" / "bench_leaves", model.file, "--json"))[1:]:
+        for kind in json.loads(bench.run(bench.build / "tests" / "bench" / "bench_leaves", model.file, "--json"))[1:]:
             if kind["points"]:
                 gains.append([model.name, kind["kind"], f"{kind['points']:,}", figure(kind["ns_as_general"]), figure(kind["ns"]),
                               figure(kind["ns_as_general"] / kind["ns"])])

@@ -110,7 +110,7 @@ def study(scale, millions):
     if not result["builds"]["ebpo"]:
         return result
     result["sizes"] = sizes_of(scale, file, *others)
-    result["decode"] = scale.run(scale.build / "tests" / "bench_decode", file, "--rounds", scale.options.rounds)
+    result["decode"] = scale.run(scale.build / "tests" / "bench" / "bench_decode", file, "--rounds", scale.options.rounds)
     verified = [scale.run(scale.ebpo, "verify", "--json", *scale.verify_options, file, cold=file, accept=(0, 1)) for _ in range(scale.rounds(faces))]  # 1: with violations, which are told
     result["verify"] = [v for v in verified if v]
     result["questions"] = questions_of(scale, file)
@@ -223,7 +223,7 @@ def section_size(page, results):
 
 
 def section_decode(page, results):
-    page.text("### Decoding", "", "All of a file, checks included, on one core, from the system's memory: `tests/bench_decode FILE` of BUILD_DIR. Bytes are those of the arrays that a reader gets.")
+    page.text("### Decoding", "", "All of a file, checks included, on one core, from the system's memory: `tests/bench/bench_decode FILE` of BUILD_DIR. Bytes are those of the arrays that a reader gets.")
     rows = []
     for r in results:
         if r["decode"]:

@@ -487,7 +487,7 @@ static void ask_in_threads(asked *a, const ebpo_model_options *how)
 }
 
 /* With ThreadSanitizer (meson setup build-tsan -Db_sanitize=thread; CK_RUN_CASE=threads
- * build-tsan/tests/test_query_modes) these two look for races. */
+ * build-tsan/tests/answers/test_query_modes) these two look for races. */
 START_TEST(four_threads_get_the_answers_of_one)
 {
     if (!ebpo_test_wanted(_i + 12))

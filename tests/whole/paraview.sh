@@ -20,6 +20,6 @@ last=$("$ebpo" info --json model.ebpo.h5 | python3 -c 'import json, sys; print(l
 "$ebpo" export --json --levels "0-$last" --mesh model.ebpo.h5 model.xdmf >xdmf.json
 "$ebpo" export --json --levels "0-$last" --mesh model.ebpo.h5 model.vtkhdf >vtkhdf.json
 "$ebpo" export --json --level "$last" model.ebpo.h5 model.glb >glb.json
-$display pvpython "$tests/paraview_opens.py" "$folder"
+$display pvpython "$tests/whole/paraview_opens.py" "$folder"
 $display pvpython "$root/samples/paraview_levels.py" model.xdmf levels.png 1 "$last"
-$display pvpython "$tests/paraview_opens.py" "$folder" levels.png
+$display pvpython "$tests/whole/paraview_opens.py" "$folder" levels.png

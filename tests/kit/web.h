@@ -1,4 +1,4 @@
-/* A faulty web server for a test program: tests/faulty_server.py, started once, ended with the
+/* A faulty web server for a test program: tests/kit/faulty_server.py, started once, ended with the
  * program whatever happens. */
 #ifndef EBPO_TESTS_WEB_H
 #define EBPO_TESTS_WEB_H

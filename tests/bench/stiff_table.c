@@ -133,9 +133,10 @@ static void row(const stiff_case *c, bool *fine)
 
 static const char introduction[] =
     "# Stiff and extreme cases\n\n"
-    "Made by `ninja -C build tests/stiff_table && build/tests/stiff_table > "
+    "Made by `ninja -C build tests/bench/stiff_table && build/tests/bench/stiff_table > "
     "docs/measured/stiff.md`; "
-    "nothing here was typed in. The cases are one line each in `tests/stiff_cases.c`; `meson test "
+    "nothing here was typed in. The cases are one line each in `tests/kit/stiff_cases.c`; `meson "
+    "test "
     "stiff` holds\n"
     "every one to its limits. A new case is a new line there.\n\n"
     "*Stable* means, for each case: it converts; `ebpo verify` (with the source to compare with) "
@@ -144,7 +145,7 @@ static const char introduction[] =
     "Asked are inside, signed distance with nearest face, nearest point and normal, and rays; the "
     "points lie on vertices, edges, faces and cell walls, next to them, between them and far away; "
     "the judge is brute force in rational\n"
-    "arithmetic (`tests/oracle.h`). Besides:\n\n"
+    "arithmetic (`tests/kit/oracle.h`). Besides:\n\n"
     "- *volume error*: of `ebpo measure` against the exact volume of the mesh, relative; at most "
     "1e-15 where a line does not say otherwise. Empty where there is no volume, or none that is a "
     "normal double. Where a formula gives the volume, the mesh must have\n"

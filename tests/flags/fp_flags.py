@@ -5,7 +5,7 @@
 
 GOLDEN holds what all builds on all machines must print. After a change that is meant to change the contents of files (a selection of planes, an order) redo it with `--update`:
 
-    tests/fp_flags.py tests/fp_golden.txt --update build/tests/fp_hash_usual
+    tests/flags/fp_flags.py tests/flags/fp_golden.txt --update build/tests/flags/fp_hash_usual
 """
 import os
 import pathlib

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Commands on URLs do what they do on files: http_files.py TOOL GENERATE [POINTS]
+"""Commands on URLs do what they do on files: http_files.py SERVER TOOL GENERATE [POINTS]
 
-Makes a model, serves it with faulty_server.py, well and badly, and compares what the commands print, byte by byte. POINTS (default 2000) are asked about;
-http_files.py build/tools/ebpo build/samples/ebpo-generate 100000 is the full number.
+Makes a model, serves it with SERVER (kit/faulty_server.py), well and badly, and compares what the
+commands print, byte by byte. POINTS (default 2000) are asked about; 100000 is the full number.
 """
 import json
 import os
@@ -10,7 +10,6 @@ import subprocess
 import sys
 import tempfile
 
-HERE = os.path.dirname(os.path.abspath(__file__))
 failures = []
 
 
@@ -37,8 +36,8 @@ def traffic(tool, *arguments):
 
 
 def main():
-    tool, generate = sys.argv[1:3]
-    points = sys.argv[3] if len(sys.argv) > 3 else "2000"
+    faulty_server, tool, generate = sys.argv[1:4]
+    points = sys.argv[4] if len(sys.argv) > 4 else "2000"
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "m.ebpo.h5")
         ply, asked, rays = (os.path.join(folder, name) for name in ("m.ply", "points", "rays"))
@@ -47,7 +46,8 @@ def main():
         subprocess.run([tool, "convert", "-q", ply, path], check=True)
         subprocess.run([tool, "bench", "--count", points, "--save-points", asked, path], check=True, capture_output=True)
         subprocess.run([tool, "bench", "--query", "ray", "--count", "500", "--save-points", rays, path], check=True, capture_output=True)
-        server = subprocess.Popen([sys.executable, os.path.join(HERE, "faulty_server.py"), path], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        server = subprocess.Popen([sys.executable, faulty_server, path],
+                                  stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         try:
             check(tool, folder, path, ply, asked, rays, f"http://127.0.0.1:{int(server.stdout.readline())}")
         finally:

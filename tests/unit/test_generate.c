@@ -3,8 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "../samples/generate/embedded.h"
-#include "../samples/generate/shapes.h"
+#include "samples/generate/embedded.h"
+#include "samples/generate/shapes.h"
 #include "crossing_faces.h"
 #include "solids.h"
 
