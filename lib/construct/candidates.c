@@ -1,9 +1,9 @@
 /* Candidate normals of a gray node: those of the faces below it; where there are many, the mean of
  * each occupied bin of the octahedral map, with bins no finer than needed. */
+#include "construct/candidates.h"
+
 #include <stdlib.h>
 #include <string.h>
-
-#include "construct/builder.h"
 
 enum { SAMPLE_MOST = 4096, TABLE = 16384 };
 

@@ -11,7 +11,17 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
+#include "construct/branch.h"
+#include "construct/construct_top.h"
+#include "construct/corner_windings.h"
+#include "construct/emit.h"
+#include "construct/face_numbers.h"
+#include "construct/join_levels.h"
+#include "construct/pack.h"
+#include "construct/partition.h"
 #include "construct/propose.h"
+#include "construct/split.h"
+#include "construct/vertex_bounds.h"
 #include "ebpo_config.h"
 
 /* EBP 2017, equation 3: the least i >= 1 with L / 2^i below the mean edge. */
@@ -252,7 +262,7 @@ static ebpo_status build_pieces(ebpo_builder *b, ebpo_error *error)
  * their cells are made twice rather than kept. */
 static ebpo_status build_tree(ebpo_builder *b, ebpo_error *error)
 {
-    ebpo_status status = ebpo_build_labels(b, error);
+    ebpo_status status = ebpo_build_corner_windings(b, error);
     if (status == EBPO_OK)
         status = ebpo_build_propose(b, error);
     if (status == EBPO_OK)

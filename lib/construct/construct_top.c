@@ -1,13 +1,15 @@
 /* The nodes above the subtrees: their envelopes level by level, so that every subtree knows its
  * parent's. */
+#include "construct/construct_top.h"
+
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "construct/builder.h"
-#include "construct/construct_top.h"
+#include "construct/corner_windings.h"
+#include "construct/envelopes.h"
 
 typedef struct pending {
     uint32_t node; /* gray, in the top */

@@ -1,6 +1,6 @@
 /* What the top's gray nodes keep until the levels are joined. */
-#ifndef EBPO_BUILD_TOP_H
-#define EBPO_BUILD_TOP_H
+#ifndef EBPO_CONSTRUCT_CONSTRUCT_TOP_H
+#define EBPO_CONSTRUCT_CONSTRUCT_TOP_H
 
 #include "construct/builder.h"
 
@@ -9,5 +9,8 @@ typedef struct ebpo_top_envelope {
     int count;
     double volume;
 } ebpo_top_envelope;
+
+/* The nodes above the subtrees. */
+ebpo_status ebpo_build_top(ebpo_builder *b, ebpo_error *error);
 
 #endif

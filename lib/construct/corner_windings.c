@@ -2,10 +2,11 @@
  * walk from corner to corner along the children's edges adds them up, and the root's lowest corner
  * lies outside the model, where the winding number is 0. Replaces the special cases of BP
  * 2008, 3.4.1.1. */
+#include "construct/corner_windings.h"
+
 #include <string.h>
 
 #include "base/error.h"
-#include "construct/builder.h"
 
 void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell,
                          const uint32_t *places, uint64_t count, ebpo_triangle *room,
@@ -94,7 +95,7 @@ static bool top_deltas(ebpo_builder *b, uint32_t index)
     return ebpo_gather_delta(b, s, node->child, s->details[node->detail].delta) && agree;
 }
 
-ebpo_status ebpo_build_labels(ebpo_builder *b, ebpo_error *error)
+ebpo_status ebpo_build_corner_windings(ebpo_builder *b, ebpo_error *error)
 {
     if (!b->solid)
         return EBPO_OK;
@@ -103,4 +104,14 @@ ebpo_status ebpo_build_labels(ebpo_builder *b, ebpo_error *error)
             error, EBPO_E_NOT_SOLID,
             "winding numbers disagree: the mesh does not balance; check it again before building");
     return EBPO_OK;
+}
+
+unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32_t delta[8])
+{
+    unsigned mask = 0;
+    if (b->solid)
+        for (int i = 0; i < 8; i++)
+            if (ebpo_rule_inside(b->options->rule, winding + delta[i]))
+                mask |= 1u << i;
+    return mask;
 }

@@ -2,12 +2,17 @@
  * octcode order. */
 #include "geom/strict_fp.h"
 
+#include "construct/emit.h"
+
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "construct/propose.h"
+#include "construct/corner_windings.h"
+#include "construct/envelopes.h"
+#include "construct/piece_levels.h"
+#include "construct/proposals.h"
 #include "octree/node_types.h"
 
 struct ebpo_emit_scratch {
@@ -43,54 +48,7 @@ void ebpo_emit_scratch_free(ebpo_emit_scratch *scratch)
     free(scratch);
 }
 
-void ebpo_out_free(ebpo_out *out)
-{
-    for (int i = 0; out && i < EBPO_LEVELS_MAX; i++)
-        if (!out[i].packed)
-            ebpo_level_free(&out[i].level);
-    ebpo_array_free(out);
-}
-
-bool ebpo_emit_group(ebpo_out *out, uint16_t types)
-{
-    ebpo_level *l = &out->level;
-    if (!ebpo_array_grow_late(out->workspace, &l->types, &out->group_capacity, l->group_count + 1,
-                              sizeof *l->types))
-        return false;
-    l->types[l->group_count++] = types;
-    return true;
-}
-
-bool ebpo_emit_gray(ebpo_out *out, const uint32_t *codes, int count, double volume)
-{
-    ebpo_level *l = &out->level;
-    if (!ebpo_array_grow_late(out->workspace, &l->plane_counts, &out->gray_capacity,
-                              l->gray_count + 1, 1) ||
-        !ebpo_array_grow_late(out->workspace, &l->planes, &out->plane_capacity,
-                              l->plane_count + (uint64_t)count, sizeof *l->planes))
-        return false;
-    l->plane_counts[l->gray_count++] = (uint8_t)count;
-    if (count) /* the array may not be there yet */
-        memcpy(l->planes + l->plane_count, codes, (size_t)count * sizeof *codes);
-    l->plane_count += (uint64_t)count;
-    l->gray_volume += volume;
-    return true;
-}
-
-bool ebpo_emit_empty(ebpo_out *out, bool black, int32_t winding)
-{
-    ebpo_level *l = &out->level;
-    int32_t **array = black ? &l->black_winding : &l->white_winding;
-    uint64_t *count = black ? &l->black_count : &l->white_count;
-    if (!ebpo_array_grow_late(out->workspace, array,
-                              black ? &out->black_capacity : &out->white_capacity, *count + 1,
-                              sizeof **array))
-        return false;
-    (*array)[(*count)++] = winding;
-    return true;
-}
-
-static bool grow_leaf_arrays(ebpo_out *out, uint64_t refs)
+static bool grow_leaf_arrays(ebpo_piece_level *out, uint64_t refs)
 {
     ebpo_level *l = &out->level;
     uint64_t n = l->leaf_count + 1, *c = out->leaf_capacity;
@@ -106,7 +64,8 @@ static bool grow_leaf_arrays(ebpo_out *out, uint64_t refs)
                                 l->ref_count + refs, sizeof *l->leaf_refs);
 }
 
-static bool emit_list(const emitter *e, const ebpo_build_detail *d, ebpo_out *out, int32_t winding)
+static bool emit_list(const emitter *e, const ebpo_build_detail *d, ebpo_piece_level *out,
+                      int32_t winding)
 {
     ebpo_level *l = &out->level;
     uint64_t refs = d->entry_end - d->entry_begin - d->new_count;
@@ -163,7 +122,7 @@ static bool emit_leaf(emitter *e, uint32_t detail, ebpo_cell cell, int32_t windi
 {
     const ebpo_builder *b = e->b;
     const ebpo_build_detail *d = &e->s->details[detail];
-    ebpo_out *out = &e->s->out[cell.level];
+    ebpo_piece_level *out = &e->s->out[cell.level];
     ebpo_level *l = &out->level;
     if (!emit_list(e, d, out, winding))
         return false;
@@ -188,7 +147,7 @@ static bool emit_leaf(emitter *e, uint32_t detail, ebpo_cell cell, int32_t windi
 static bool emit_empty(emitter *e, ebpo_cell cell, int32_t winding)
 {
     bool black = e->b->solid && ebpo_rule_inside(e->b->options->rule, winding);
-    return ebpo_emit_empty(&e->s->out[cell.level], black, winding);
+    return ebpo_piece_level_add_empty(&e->s->out[cell.level], black, winding);
 }
 
 static bool emit(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding,
@@ -233,9 +192,9 @@ static bool emit_gray(emitter *e, const ebpo_build_node *node, ebpo_cell cell, i
     if (b->options->parts & EBPO_PART_PLANES)
         planes = ebpo_gray_planes(b, e->scratch->envelope, e->s, node->detail, cell, winding,
                                   envelope, codes);
-    if (planes < 0 ||
-        !ebpo_emit_gray(&e->s->out[cell.level], codes, planes,
-                        ebpo_polytope_volume(envelope) * ebpo_cell_volume(&b->box, cell.level)))
+    if (planes < 0 || !ebpo_piece_level_add_gray(&e->s->out[cell.level], codes, planes,
+                                                 ebpo_polytope_volume(envelope) *
+                                                     ebpo_cell_volume(&b->box, cell.level)))
         return false;
     int32_t offset[8];
     ebpo_child_windings(b, e->s, node->child, offset);
@@ -247,7 +206,7 @@ static bool emit_gray(emitter *e, const ebpo_build_node *node, ebpo_cell cell, i
             type = EBPO_BLACK;
         types |= ebpo_group_of(type, o);
     }
-    if (!ebpo_emit_group(&e->s->out[cell.level + 1], types))
+    if (!ebpo_piece_level_add_group(&e->s->out[cell.level + 1], types))
         return false;
     return emit_children(e, node->child, cell, winding, offset, envelope);
 }

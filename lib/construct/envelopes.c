@@ -3,13 +3,16 @@
  * ones, found by asking in its own directions, and normals of faces. */
 #include "geom/strict_fp.h"
 
+#include "construct/envelopes.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "construct/propose.h"
+#include "construct/candidates.h"
+#include "construct/proposals.h"
 #include "construct/supports.h"
 #include "geom/plane_code.h"
 #include "planes/hull_directions.h"
@@ -48,16 +51,6 @@ void ebpo_scratch_free(ebpo_envelope_scratch *scratch)
     if (scratch)
         ebpo_supports_free(&scratch->supports);
     free(scratch);
-}
-
-unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32_t delta[8])
-{
-    unsigned mask = 0;
-    if (b->solid)
-        for (int i = 0; i < 8; i++)
-            if (ebpo_rule_inside(b->options->rule, winding + delta[i]))
-                mask |= 1u << i;
-    return mask;
 }
 
 /* A support from which on a plane cannot remove epsilon, nor a needle: a cap of height h of a body

@@ -1,13 +1,14 @@
 /* Final numbers: faces by the first leaf, depth first, that they touch; vertices by first use. */
 #include "geom/strict_fp.h"
 
+#include "construct/face_numbers.h"
+
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "construct/builder.h"
 
 static void number_leaf(ebpo_builder *b, const ebpo_branch *s, ebpo_build_detail *d, uint32_t *next)
 {

@@ -1,21 +1,25 @@
 /* All stretches of level arrays joined in depth-first order, which is octcode order in each level.
  */
+#include "construct/join_levels.h"
+
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "construct/builder.h"
-#include "construct/level_arrays.h"
 #include "construct/construct_top.h"
+#include "construct/corner_windings.h"
+#include "construct/level_arrays.h"
+#include "construct/pack.h"
+#include "construct/piece_levels.h"
 #include "octree/node_types.h"
 
 typedef struct joiner {
     ebpo_builder *b;
-    ebpo_out **stretch; /* depth first: pieces of the top and whole subtrees by turns */
+    ebpo_piece_level **stretch; /* depth first: pieces of the top and whole subtrees by turns */
     uint64_t count, capacity;
-    ebpo_out *current;
+    ebpo_piece_level *current;
     ebpo_level *level; /* what comes out */
 } joiner;
 
@@ -26,7 +30,7 @@ static ebpo_status no_memory(const ebpo_builder *b, ebpo_error *error)
     return ebpo_workspace_fail_while(b->workspace, "while joining levels", error);
 }
 
-static bool push(joiner *j, ebpo_out *out)
+static bool push(joiner *j, ebpo_piece_level *out)
 {
     if (!ebpo_grow(&j->stretch, &j->capacity, j->count + 1, sizeof *j->stretch))
         return false;
@@ -34,11 +38,11 @@ static bool push(joiner *j, ebpo_out *out)
     return true;
 }
 
-static ebpo_out *current(joiner *j)
+static ebpo_piece_level *current(joiner *j)
 {
     if (j->current)
         return j->current;
-    ebpo_out *out = ebpo_alloc_zero(EBPO_LEVELS_MAX, sizeof *out);
+    ebpo_piece_level *out = ebpo_alloc_zero(EBPO_LEVELS_MAX, sizeof *out);
     if (!out || !push(j, out)) {
         free(out);
         return NULL;
@@ -61,29 +65,30 @@ static bool walk(joiner *j, uint32_t index, ebpo_cell cell, int32_t winding)
     ebpo_builder *b = j->b;
     ebpo_build_node node = b->top.nodes[index];
     if (node.type == EBPO_LEAF) {
-        ebpo_out *out = b->sub[node.detail].out;
+        ebpo_piece_level *out = b->sub[node.detail].out;
         b->sub[node.detail].out = NULL;
         if (!push(j, out)) {
-            ebpo_out_free(out);
+            ebpo_piece_levels_free(out);
             return false;
         }
         j->current = NULL;
         return true;
     }
-    ebpo_out *out = current(j);
+    ebpo_piece_level *out = current(j);
     if (!out)
         return false;
     if (node.type == EBPO_WHITE)
-        return ebpo_emit_empty(&out[cell.level],
-                               b->solid && ebpo_rule_inside(b->options->rule, winding), winding);
+        return ebpo_piece_level_add_empty(&out[cell.level],
+                                          b->solid && ebpo_rule_inside(b->options->rule, winding),
+                                          winding);
     const ebpo_top_envelope *t = &b->top_envelope[node.detail];
     int32_t offset[8];
     ebpo_child_windings(b, &b->top, node.child, offset);
     uint16_t types = 0;
     for (uint32_t o = 0; o < 8; o++)
         types |= ebpo_group_of(type_of(b, &b->top.nodes[node.child + o], winding + offset[o]), o);
-    if (!ebpo_emit_gray(&out[cell.level], t->codes, t->count, t->volume) ||
-        !ebpo_emit_group(&out[cell.level + 1], types))
+    if (!ebpo_piece_level_add_gray(&out[cell.level], t->codes, t->count, t->volume) ||
+        !ebpo_piece_level_add_group(&out[cell.level + 1], types))
         return false;
     for (uint32_t o = 0; o < 8; o++)
         if (!walk(j, node.child + o, ebpo_cell_child(cell, o), winding + offset[o]))
@@ -283,8 +288,9 @@ static void summarise(ebpo_tree *out, int level)
 static bool root_group(joiner *j)
 {
     ebpo_builder *b = j->b;
-    ebpo_out *first = current(j); /* never a piece's, whose arrays may be packed */
-    return first && ebpo_emit_group(&first[0], (uint16_t)type_of(b, &b->top.nodes[0], 0));
+    ebpo_piece_level *first = current(j); /* never a piece's, whose arrays may be packed */
+    return first &&
+           ebpo_piece_level_add_group(&first[0], (uint16_t)type_of(b, &b->top.nodes[0], 0));
 }
 
 ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error)
@@ -311,7 +317,7 @@ ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error
         summarise(out, level);
     }
     for (uint64_t i = 0; i < j.count; i++)
-        ebpo_out_free(j.stretch[i]);
+        ebpo_piece_levels_free(j.stretch[i]);
     free(j.stretch);
     ebpo_store_free(b->store);
     b->store = NULL;

@@ -1,4 +1,6 @@
 /* Where pieces put what they made until the levels are joined. */
+#include "construct/pack.h"
+
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
@@ -6,6 +8,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "construct/level_arrays.h"
+#include "construct/piece_levels.h"
 
 enum { STORE_BYTES = 16 << 20, ALIGNMENT = 8 };
 
@@ -64,7 +67,7 @@ void *ebpo_store_reserve(ebpo_builder *b, uint64_t bytes)
     return make_store(b) ? reserve(b, room_for(bytes, 1)) : NULL;
 }
 
-ebpo_status ebpo_build_pack(ebpo_builder *b, ebpo_out *out, ebpo_error *error)
+ebpo_status ebpo_build_pack(ebpo_builder *b, ebpo_piece_level *out, ebpo_error *error)
 {
     size_t bytes = 0;
     if (!b->workspace)

@@ -1,12 +1,16 @@
 /* Faces to cells: a piece becomes a subtree, depth first. What a node is depends on its cell and
  * its faces alone, so neither the pieces nor the threads show in the result. Source: EBP 2017, 3.3
  * (assignment of faces to leaves); BP 2008, 3.3.1 (coalescing). */
+#include "construct/partition.h"
+
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "construct/propose.h"
+#include "construct/branch.h"
+#include "construct/corner_windings.h"
+#include "construct/vertex_bounds.h"
 #include "planes/octants.h"
 
 enum { SETTLE_FACES = 1 << 13 };
@@ -37,39 +41,6 @@ typedef struct grower {
     ebpo_error *error;
 } grower;
 
-void ebpo_branch_forget(ebpo_branch *s)
-{
-    ebpo_array_free(s->nodes);
-    ebpo_array_free(s->details);
-    ebpo_array_free(s->entries);
-    ebpo_array_free(s->crossing);
-    s->nodes = NULL;
-    s->details = NULL;
-    s->entries = s->crossing = NULL;
-    s->node_count = s->node_capacity = s->detail_count = s->detail_capacity = 0;
-    s->entry_count = s->entry_capacity = s->cross_count = s->cross_capacity = 0;
-}
-
-void ebpo_subtree_release(ebpo_branch *s)
-{
-    ebpo_branch_forget(s);
-    ebpo_array_free(s->list);
-    free(s->fresh);
-    ebpo_array_free(s->above);
-    ebpo_proposals_free(s->proposals);
-    s->proposals = NULL;
-    s->list = NULL;
-    s->fresh = NULL;
-    s->above = NULL;
-}
-
-void ebpo_branch_free(ebpo_branch *s)
-{
-    ebpo_subtree_release(s);
-    ebpo_out_free(s->out);
-    memset(s, 0, sizeof *s);
-}
-
 bool ebpo_build_is_leaf(const ebpo_builder *b, int level, uint64_t count)
 {
     return level == b->max_level || count <= b->options->leaf_faces;
@@ -88,39 +59,9 @@ ebpo_status ebpo_build_check_lists(uint64_t face_count, uint64_t leaves, uint64_
                      (unsigned long long)most_leaves, (unsigned long long)most_entries);
 }
 
-ebpo_status ebpo_build_check_branch(const ebpo_branch *s, ebpo_error *error)
-{
-    if (s->node_count <= UINT32_MAX - 8 && s->detail_count < UINT32_MAX)
-        return EBPO_OK;
-    return ebpo_fail(
-        error, EBPO_E_LIMIT,
-        "more than 2^32 nodes in one piece of the tree: lower --max-level or raise --leaf-faces");
-}
-
 static ebpo_status no_memory(ebpo_error *error)
 {
     return ebpo_fail(error, EBPO_E_MEMORY, "out of memory while assigning faces to cells");
-}
-
-bool ebpo_branch_detail(const ebpo_builder *b, ebpo_branch *s, uint32_t *index)
-{
-    if (!ebpo_array_grow_late(b->workspace, &s->details, &s->detail_capacity, s->detail_count + 1,
-                              sizeof *s->details))
-        return false;
-    memset(&s->details[s->detail_count], 0, sizeof s->details[0]);
-    *index = (uint32_t)s->detail_count++;
-    return true;
-}
-
-bool ebpo_branch_children(const ebpo_builder *b, ebpo_branch *s, uint32_t *first)
-{
-    if (!ebpo_array_grow_late(b->workspace, &s->nodes, &s->node_capacity, s->node_count + 8,
-                              sizeof *s->nodes))
-        return false;
-    *first = (uint32_t)s->node_count;
-    memset(&s->nodes[s->node_count], 0, 8 * sizeof s->nodes[0]);
-    s->node_count += 8;
-    return true;
 }
 
 /* Faces with a vertex outside the cell's run of vertices reach over its walls (or touch an upper

@@ -3,13 +3,18 @@
  * which of its faces no piece before it lists, and the winding numbers at its corners. */
 #include "geom/strict_fp.h"
 
+#include "construct/split.h"
+
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "construct/builder.h"
+#include "construct/branch.h"
+#include "construct/corner_windings.h"
+#include "construct/partition.h"
+#include "construct/vertex_bounds.h"
 #include "geom/ray_triangle.h"
 #include "planes/octants.h"
 

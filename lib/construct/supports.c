@@ -6,6 +6,8 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "construct/corner_windings.h"
+#include "construct/vertex_bounds.h"
 #include "geom/plane_code.h"
 
 enum { FEW_VERTICES = 4096, TABLE_MOST = 1 << 16, MANY_POINTS = 1 << 15 };

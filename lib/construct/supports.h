@@ -1,7 +1,7 @@
 /* The support of the solid in a gray node's cell: the greatest n . xi over mesh vertices in the
  * cell, points where faces cross its walls, and its corners inside. */
-#ifndef EBPO_BUILD_SUPPORTS_H
-#define EBPO_BUILD_SUPPORTS_H
+#ifndef EBPO_CONSTRUCT_SUPPORTS_H
+#define EBPO_CONSTRUCT_SUPPORTS_H
 
 #include "construct/builder.h"
 #include "planes/sweep.h"

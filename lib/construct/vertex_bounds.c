@@ -3,12 +3,13 @@
  * greatest point. */
 #include "geom/strict_fp.h"
 
+#include "construct/vertex_bounds.h"
+
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "construct/builder.h"
 #include "octree/octcode.h"
 
 static void join(double (*box)[3], const double low[3], const double high[3])

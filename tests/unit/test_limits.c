@@ -7,7 +7,8 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include "construct/builder.h"
+#include "construct/branch.h"
+#include "construct/partition.h"
 #include "codec/coding.h"
 #include "container/head_facts.h"
 #include "container/plan.h"

@@ -1,0 +1,15 @@
+/* A piece to its part of the levels' arrays. */
+#ifndef EBPO_CONSTRUCT_EMIT_H
+#define EBPO_CONSTRUCT_EMIT_H
+
+#include "construct/builder.h"
+
+typedef struct ebpo_emit_scratch ebpo_emit_scratch;
+ebpo_status ebpo_emit_scratch_make(ebpo_emit_scratch **out, ebpo_error *error);
+void ebpo_emit_scratch_free(ebpo_emit_scratch *scratch);
+
+/* What leaves refer to (leaf_refs) is still told by the faces' numbers along the curve. */
+ebpo_status ebpo_emit_piece(const ebpo_builder *b, ebpo_emit_scratch *scratch, ebpo_branch *s,
+                            ebpo_error *error);
+
+#endif

@@ -1,0 +1,23 @@
+/* What a piece adds to the levels' arrays, while it is made. */
+#ifndef EBPO_CONSTRUCT_PIECE_LEVELS_H
+#define EBPO_CONSTRUCT_PIECE_LEVELS_H
+
+#include <ebpo/build.h>
+
+/* Of one level. */
+typedef struct ebpo_piece_level {
+    ebpo_level level;
+    ebpo_workspace *workspace; /* for large arrays */
+    bool packed;               /* its arrays are in the builder's store */
+    uint64_t group_capacity, gray_capacity, plane_capacity, leaf_capacity[6], ref_capacity,
+        black_capacity, white_capacity, leaf_plane_capacity;
+} ebpo_piece_level;
+
+bool ebpo_piece_level_add_group(ebpo_piece_level *out, uint16_t types);
+bool ebpo_piece_level_add_gray(ebpo_piece_level *out, const uint32_t *codes, int count,
+                               double volume);
+bool ebpo_piece_level_add_empty(ebpo_piece_level *out, bool black, int32_t winding);
+/* All levels of a piece. */
+void ebpo_piece_levels_free(ebpo_piece_level *out);
+
+#endif
