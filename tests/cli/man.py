@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""man.py TOOL FOLDER: --help and the man page of each command name the same options, and mandoc finds no error."""
+"""man.py TOOL FOLDER: --help and the man page of each command name the same options, --help fits on 80 columns, and mandoc finds no error."""
 import os
 import re
 import shutil
@@ -34,6 +34,10 @@ def main():
         if in_help != in_page or "help" not in in_help:
             bad += 1
             print(f"{page}: missing {sorted(in_help - in_page)}, too many {sorted(in_page - in_help)}")
+        wide = [line for line in help_of(tool, command, "--help").splitlines()[1:] if len(line) > 80]
+        if wide:
+            bad += 1
+            print(f"ebpo {command} --help: wider than 80 columns: {wide[0]}")
         if help_of(tool, "help", command) != help_of(tool, command, "--help"):
             bad += 1
             print(f"ebpo help {command} and ebpo {command} --help differ")

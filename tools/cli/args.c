@@ -239,30 +239,47 @@ arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values,
 
 /* --- help --- */
 
+enum { HELP_WIDTH = 80, HELP_INDENT = 25 };
+
+/* Words in lines of HELP_WIDTH, those after the first one begun at `indent`. */
+static void print_wrapped(const char *text, int indent)
+{
+    int column = indent;
+    for (const char *at = text; *at;) {
+        int length = (int)strcspn(at, " ");
+        if (column > indent && column + 1 + length > HELP_WIDTH) {
+            printf("\n%*s", indent, "");
+            column = indent;
+        } else if (column > indent) {
+            putchar(' ');
+            column++;
+        }
+        printf("%.*s", length, at);
+        column += length;
+        at += length + (at[length] == ' ');
+    }
+    putchar('\n');
+}
+
 static void help_one(const arg_option *o)
 {
     char head[80];
     int length = o->letter ? snprintf(head, sizeof head, "-%c, --%s", o->letter, o->name)
                            : snprintf(head, sizeof head, "--%s", o->name);
     if (o->value)
-        snprintf(head + length, sizeof head - (size_t)length, " %s", o->value);
-    const char *at = o->help;
-    printf("  %-22s", head);
-    for (bool first = strlen(head) <= 21;; first = true) {
-        size_t line = strcspn(at, "\n");
-        printf("%s %.*s\n", first ? "" : "\n                        ", (int)line, at);
-        if (!at[line])
-            return;
-        at += line + 1;
-        printf("%24s", "");
-    }
+        length += snprintf(head + length, sizeof head - (size_t)length, " %s", o->value);
+    printf("  %-22s ", head);
+    if (length >= HELP_INDENT - 3)
+        printf("\n%*s", HELP_INDENT, "");
+    print_wrapped(o->help, HELP_INDENT);
 }
 
 void args_help(const arg_spec *spec)
 {
-    printf("usage: ebpo %s [options] %s\n\n%s\n", spec->command, spec->operands, spec->summary);
+    printf("usage: ebpo %s [options] %s\n\n", spec->command, spec->operands);
+    print_wrapped(spec->summary, 0);
     if (spec->text)
-        printf("%s\n", spec->text);
+        print_wrapped(spec->text, 0);
     printf("\noptions:\n");
     for (const arg_option *o = spec->options; o->name; o++)
         help_one(o);

@@ -22,7 +22,7 @@ typedef struct arg_option {
     arg_kind kind;
     size_t offset;     /* of the field in the values struct */
     const char *value; /* "N", for --help; NULL for flags */
-    const char *help;  /* may have several lines */
+    const char *help;
     double low, high;
     const char *const *words; /* NULL-terminated */
 } arg_option;
@@ -34,18 +34,38 @@ typedef struct arg_list {
     int count;
 } arg_list;
 
-/* An option without a value: its field is a bool of the struct `type`. */
-#define ARG_SWITCH(name, letter, type, field, help)                           \
-    {                                                                         \
-        name, letter, ARG_FLAG, offsetof(type, field), NULL, help, 0, 0, NULL \
+/* Rows of option tables, which { 0 } ends; the field is one of the struct `type`. */
+#define OPTION_ROW(name, letter, kind, type, field, value, help, low, high, words) \
+    {                                                                              \
+        name, letter, kind, offsetof(type, field), value, help, low, high, words   \
     }
+#define OPTION_FLAG(name, letter, type, field, help) \
+    OPTION_ROW(name, letter, ARG_FLAG, type, field, NULL, help, 0, 0, NULL)
+#define OPTION_INT(name, letter, type, field, value, low, high, help) \
+    OPTION_ROW(name, letter, ARG_INT, type, field, value, help, low, high, NULL)
+#define OPTION_REAL(name, letter, type, field, value, low, high, help) \
+    OPTION_ROW(name, letter, ARG_REAL, type, field, value, help, low, high, NULL)
+#define OPTION_TEXT(name, letter, type, field, value, help) \
+    OPTION_ROW(name, letter, ARG_TEXT, type, field, value, help, 0, 0, NULL)
+#define OPTION_LIST(name, letter, type, field, value, help) \
+    OPTION_ROW(name, letter, ARG_LIST, type, field, value, help, 0, 0, NULL)
+#define OPTION_WORD(name, letter, type, field, value, words, help) \
+    OPTION_ROW(name, letter, ARG_WORD, type, field, value, help, 0, 0, words)
+#define OPTION_SET(name, letter, type, field, value, words, help) \
+    OPTION_ROW(name, letter, ARG_SET, type, field, value, help, 0, 0, words)
+
+/* Those that many commands have. */
+#define OPTION_THREADS(type, field) \
+    OPTION_INT("threads", 0, type, field, "N", 0, 256, "threads; 0, the default: all cores")
+#define OPTION_QUIET(type, field) \
+    OPTION_FLAG("quiet", 'q', type, field, "no summary, no progress: errors and warnings only")
 
 typedef struct arg_spec {
     const char *command;  /* "convert" */
     const char *operands; /* "IN.ply OUT.ebpo.h5" */
     int least, most;      /* number of operands */
     const char *summary;  /* one line */
-    const char *text;     /* more lines for --help, or NULL */
+    const char *text;     /* more for --help, or NULL */
     const arg_option *options;
 } arg_spec;
 

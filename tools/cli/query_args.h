@@ -24,52 +24,36 @@ typedef struct query_values {
     }
 
 /* Rows for the tables of options. In other structs query_values comes first. */
-#define QUERY_MODEL_OPTIONS                                                                      \
-    { "memory",                                                                                  \
-      0,                                                                                         \
-      ARG_TEXT,                                                                                  \
-      offsetof(query_values, memory),                                                            \
-      "SIZE",                                                                                    \
-      "bytes that the model may take: 64M, 1G, 512K (powers of 1024);\n0, the default: as much " \
-      "as it needs",                                                                             \
-      0,                                                                                         \
-      0,                                                                                         \
-      NULL },                                                                                    \
-        { "cut-level",                                                                           \
-          0,                                                                                     \
-          ARG_INT,                                                                               \
-          offsetof(query_values, cut_level),                                                     \
-          "C",                                                                                   \
-          "keep levels 0 to C in memory, load subtrees below on demand;\nthe default: all at "   \
-          "once where --memory allows",                                                          \
-          0,                                                                                     \
-          20,                                                                                    \
-          NULL },                                                                                \
-    {                                                                                            \
-        "threads", 0, ARG_INT, offsetof(query_values, threads), "N",                             \
-            "threads for opening; 0, the default: all cores", 0, 256, NULL                       \
-    }
+#define QUERY_MODEL_OPTIONS                                                                       \
+    OPTION_TEXT(                                                                                  \
+        "memory", 0, query_values, memory, "SIZE",                                                \
+        "bytes that the model may take: 64M, 1G, 512K (powers of 1024); 0, the default: as much " \
+        "as it needs"),                                                                           \
+        OPTION_INT(                                                                               \
+            "cut-level", 0, query_values, cut_level, "C", 0, 20,                                  \
+            "keep levels 0 to C in memory, load subtrees below on demand; the default: all at "   \
+            "once where --memory allows"),                                                        \
+        OPTION_INT("threads", 0, query_values, threads, "N", 0, 256,                              \
+                   "threads for opening; 0, the default: all cores")
 
 /* Rays and boxes look at many subtrees anyway: nothing is loaded ahead of them. */
-#define QUERY_PREFETCH_OPTION                         \
-    ARG_SWITCH("prefetch", 0, query_values, prefetch, \
-               "load subtrees around the last one in the background")
+#define QUERY_PREFETCH_OPTION                          \
+    OPTION_FLAG("prefetch", 0, query_values, prefetch, \
+                "load subtrees around the last one in the background")
 
-#define QUERY_FORM_OPTIONS(raw_text)                                                    \
-    ARG_SWITCH("raw", 0, query_values, raw, raw_text),                                  \
-        ARG_SWITCH("json", 0, query_values, json, "a JSON object for each, on a line"), \
-        ARG_SWITCH("stats", 0, query_values, remote.stats,                              \
-                   "what it took, on standard error at the end"),                       \
+#define QUERY_FORM_OPTIONS(raw_text)                                                     \
+    OPTION_FLAG("raw", 0, query_values, raw, raw_text),                                  \
+        OPTION_FLAG("json", 0, query_values, json, "a JSON object for each, on a line"), \
+        OPTION_FLAG("stats", 0, query_values, remote.stats,                              \
+                    "what it took, on standard error at the end"),                       \
         REMOTE_HTTP_OPTIONS(query_values, remote)
 
-#define QUERY_LIMIT_OPTIONS(level_text)                                                           \
-    { "level", 0, ARG_INT, offsetof(query_values, level), "L", level_text, 0, 20, NULL },         \
-    {                                                                                             \
-        "deadline", 0, ARG_TEXT, offsetof(query_values, deadline), "TIME",                        \
-            "stop after about so long for each point and say what is certain;\nmicroseconds, or " \
-            "with unit: 500ns, 50us, 1ms",                                                        \
-            0, 0, NULL                                                                            \
-    }
+#define QUERY_LIMIT_OPTIONS(level_text)                                                          \
+    OPTION_INT("level", 0, query_values, level, "L", 0, 20, level_text),                         \
+        OPTION_TEXT(                                                                             \
+            "deadline", 0, query_values, deadline, "TIME",                                       \
+            "stop after about so long for each point and say what is certain; microseconds, or " \
+            "with unit: 500ns, 50us, 1ms")
 
 /* Words for --mode, NULL-terminated; EBP 2017, section 4.3. */
 extern const char *const inside_modes[];   /* fast, cache, nodes, ... */

@@ -24,92 +24,33 @@ typedef struct remote_values {
 
 /* Rows for the tables of options; `member` is the remote_values in the struct `type`. */
 #define REMOTE_OPTIONS(type, member)                                                      \
-    ARG_SWITCH("stats", 0, type, member.stats,                                            \
-               "what was read, on standard error at the end: reads and bytes, of a\nURL " \
-               "requests, bytes, retries, seconds"),                                      \
+    OPTION_FLAG("stats", 0, type, member.stats,                                           \
+                "what was read, on standard error at the end: reads and bytes, of a URL " \
+                "requests, bytes, retries, seconds"),                                     \
         REMOTE_HTTP_OPTIONS(type, member)
 
 /* Without --stats, for commands that have their own. */
-#define REMOTE_HTTP_OPTIONS(type, member)                                       \
-    { "http-cache",                                                             \
-      0,                                                                        \
-      ARG_TEXT,                                                                 \
-      offsetof(type, member.cache),                                             \
-      "DIR",                                                                    \
-      "keep what is fetched from a URL in this folder",                         \
-      0,                                                                        \
-      0,                                                                        \
-      NULL },                                                                   \
-        { "http-cache-size",                                                    \
-          0,                                                                    \
-          ARG_TEXT,                                                             \
-          offsetof(type, member.cache_size),                                    \
-          "SIZE",                                                               \
-          "that the folder may hold: 512M, 4G; the default: 1G",                \
-          0,                                                                    \
-          0,                                                                    \
-          NULL },                                                               \
-        { "http-timeout",                                                       \
-          0,                                                                    \
-          ARG_REAL,                                                             \
-          offsetof(type, member.timeout),                                       \
-          "SECONDS",                                                            \
-          "for one request with its retries; the default: 120",                 \
-          0.001,                                                                \
-          1e6,                                                                  \
-          NULL },                                                               \
-        { "http-stall",                                                         \
-          0,                                                                    \
-          ARG_REAL,                                                             \
-          offsetof(type, member.stall),                                         \
-          "SECONDS",                                                            \
-          "give an answer up that brings nothing for so long; the default: 20", \
-          1,                                                                    \
-          1e6,                                                                  \
-          NULL },                                                               \
-        { "http-retries",                                                       \
-          0,                                                                    \
-          ARG_INT,                                                              \
-          offsetof(type, member.retries),                                       \
-          "N",                                                                  \
-          "of a request that failed; the default: 5",                           \
-          0,                                                                    \
-          1000,                                                                 \
-          NULL },                                                               \
-        { "http-connections",                                                   \
-          0,                                                                    \
-          ARG_INT,                                                              \
-          offsetof(type, member.connections),                                   \
-          "N",                                                                  \
-          "requests at a time; the default: 6",                                 \
-          1,                                                                    \
-          32,                                                                   \
-          NULL },                                                               \
-        { "http-header",                                                        \
-          0,                                                                    \
-          ARG_LIST,                                                             \
-          offsetof(type, member.headers),                                       \
-          "LINE",                                                               \
-          "send 'Name: value' too; may be repeated",                            \
-          0,                                                                    \
-          0,                                                                    \
-          NULL },                                                               \
-        { "http-user",                                                          \
-          0,                                                                    \
-          ARG_TEXT,                                                             \
-          offsetof(type, member.user),                                          \
-          "NAME:PASSWORD",                                                      \
-          "for servers that ask; better in ~/.netrc",                           \
-          0,                                                                    \
-          0,                                                                    \
-          NULL },                                                               \
-        { "http-ca", 0,                                                         \
-          ARG_TEXT,  offsetof(type, member.ca_file),                            \
-          "FILE",    "certificates to trust instead of the system's",           \
-          0,         0,                                                         \
-          NULL },                                                               \
-        ARG_SWITCH("http-unversioned", 0, type, member.unversioned,             \
-                   "read large files from servers that tell no version, too")
+#define REMOTE_HTTP_OPTIONS(type, member)                                                  \
+    OPTION_TEXT("http-cache", 0, type, member.cache, "DIR",                                \
+                "keep what is fetched from a URL in this folder"),                         \
+        OPTION_TEXT("http-cache-size", 0, type, member.cache_size, "SIZE",                 \
+                    "that the folder may hold: 512M, 4G; the default: 1G"),                \
+        OPTION_REAL("http-timeout", 0, type, member.timeout, "SECONDS", 0.001, 1e6,        \
+                    "for one request with its retries; the default: 120"),                 \
+        OPTION_REAL("http-stall", 0, type, member.stall, "SECONDS", 1, 1e6,                \
+                    "give an answer up that brings nothing for so long; the default: 20"), \
+        OPTION_INT("http-retries", 0, type, member.retries, "N", 0, 1000,                  \
+                   "of a request that failed; the default: 5"),                            \
+        OPTION_INT("http-connections", 0, type, member.connections, "N", 1, 32,            \
+                   "requests at a time; the default: 6"),                                  \
+        OPTION_LIST("http-header", 0, type, member.headers, "LINE",                        \
+                    "send 'Name: value' too; may be repeated"),                            \
+        OPTION_TEXT("http-user", 0, type, member.user, "NAME:PASSWORD",                    \
+                    "for servers that ask; better in ~/.netrc"),                           \
+        OPTION_TEXT("http-ca", 0, type, member.ca_file, "FILE",                            \
+                    "certificates to trust instead of the system's"),                      \
+        OPTION_FLAG("http-unversioned", 0, type, member.unversioned,                       \
+                    "read large files from servers that tell no version, too")
 
 /* ebpo_open, by path or by URL with these options. EBPO_E_ARGUMENT also for an option that makes no
  * sense. */

@@ -31,37 +31,36 @@ enum { REPEAT_MAX = 99 };
 enum { NOTHING, FOUND, INTERVAL };
 
 static const arg_option options[] = {
-    { "query", 0, ARG_WORD, offsetof(values, query), "QUERY",
-      "inside (the default), distance or ray", 0, 0, query_words },
-    { "points", 0, ARG_TEXT, offsetof(values, points), "WHAT",
-      "uniform (the default): in the bounding box; path: a walk along\nthe surface; or a file of "
-      "points or rays",
-      0, 0, NULL },
-    ARG_SWITCH("raw", 0, query_values, raw, "the file of points holds little-endian doubles"),
-    { "count", 0, ARG_INT, offsetof(values, count), "N",
-      "how many; the default: 100000, or all of the file", 1, 1e9, NULL },
-    { "seed", 0, ARG_INT, offsetof(values, seed), "S",
-      "of uniform points and paths; the default: 1", 0, 1e15, NULL },
-    { "repeat", 0, ARG_INT, offsetof(values, repeat), "R",
-      "ask everything R times; the figures are those of the median mean", 1, REPEAT_MAX, NULL },
-    { "rate", 0, ARG_REAL, offsetof(values, rate), "HZ",
-      "ask so many single questions a second, and sleep in between", 0, 1e9, NULL },
-    { "mode", 'm', ARG_TEXT, offsetof(values, mode), "MODE",
-      "as for 'ebpo inside' or 'ebpo distance'", 0, 0, NULL },
-    { "max-distance", 0, ARG_REAL, offsetof(query_values, max_distance), "D",
-      "as for 'ebpo distance'", 0, DBL_MAX, NULL },
-    ARG_SWITCH("unsigned", 0, query_values, unsigned_distance, "as for 'ebpo distance'"),
-    ARG_SWITCH("no-warm", 0, query_values, no_warm, "as for 'ebpo distance'"),
+    OPTION_WORD("query", 0, values, query, "QUERY", query_words,
+                "inside (the default), distance or ray"),
+    OPTION_TEXT(
+        "points", 0, values, points, "WHAT",
+        "uniform (the default): in the bounding box; path: a walk along the surface; or a file of "
+        "points or rays"),
+    OPTION_FLAG("raw", 0, query_values, raw, "the file of points holds little-endian doubles"),
+    OPTION_INT("count", 0, values, count, "N", 1, 1e9,
+               "how many; the default: 100000, or all of the file"),
+    OPTION_INT("seed", 0, values, seed, "S", 0, 1e15,
+               "of uniform points and paths; the default: 1"),
+    OPTION_INT("repeat", 0, values, repeat, "R", 1, REPEAT_MAX,
+               "ask everything R times; the figures are those of the median mean"),
+    OPTION_REAL("rate", 0, values, rate, "HZ", 0, 1e9,
+                "ask so many single questions a second, and sleep in between"),
+    OPTION_TEXT("mode", 'm', values, mode, "MODE", "as for 'ebpo inside' or 'ebpo distance'"),
+    OPTION_REAL("max-distance", 0, query_values, max_distance, "D", 0, DBL_MAX,
+                "as for 'ebpo distance'"),
+    OPTION_FLAG("unsigned", 0, query_values, unsigned_distance, "as for 'ebpo distance'"),
+    OPTION_FLAG("no-warm", 0, query_values, no_warm, "as for 'ebpo distance'"),
     QUERY_LIMIT_OPTIONS("look at levels 0 to L only"),
     QUERY_MODEL_OPTIONS,
     QUERY_PREFETCH_OPTION,
-    { "save-points", 0, ARG_TEXT, offsetof(values, save_points), "FILE",
-      "write what was asked about, as little-endian doubles", 0, 0, NULL },
-    { "save-answers", 0, ARG_TEXT, offsetof(values, save_answers), "FILE",
-      "write the answers: inside a byte each, as in 'where';\nelse a double (distance or t) and an "
-      "int64 (face or -1)",
-      0, 0, NULL },
-    ARG_SWITCH("json", 0, query_values, json, "print all of it as JSON"),
+    OPTION_TEXT("save-points", 0, values, save_points, "FILE",
+                "write what was asked about, as little-endian doubles"),
+    OPTION_TEXT("save-answers", 0, values, save_answers, "FILE",
+                "write the answers: inside a byte each, as in 'where'; else a double (distance or "
+                "t) and an "
+                "int64 (face or -1)"),
+    OPTION_FLAG("json", 0, query_values, json, "print all of it as JSON"),
     REMOTE_OPTIONS(query_values, remote),
     { 0 },
 };
@@ -73,7 +72,7 @@ static const arg_spec spec = {
     .most = 1,
     .summary = "how long questions to a file take",
     .text = "MODEL is an .ebpo.h5 file or its URL. One thread asks. First a cold start (the system "
-            "is asked to forget the file), then each question by\n"
+            "is asked to forget the file), then each question by "
             "itself, then all of them at once.",
     .options = options,
 };
@@ -438,27 +437,27 @@ static int prepare(const values *v, const char *path, bench_points *p)
     return code;
 }
 
-static int run(int argc, char **argv)
+static const values usual = {
+    .q = QUERY_VALUES_INIT, .points = "uniform", .seed = -1, .repeat = 1
+};
+
+static int run(void *given, const char **operand)
 {
-    values v = { .q = QUERY_VALUES_INIT, .points = "uniform", .seed = -1, .repeat = 1 };
-    const char *operand[ARGS_OPERANDS_MAX];
+    values *v = given;
     ebpo_model_options holding;
     bench_job job = { .answers = NULL };
     bench_points p;
-    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
-    if (parsed != ARGS_RUN)
-        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
-    if (!set_mode(&v) || !options_fit(&v) ||
-        !query_options_from("bench", &v.q, &holding, &job.options))
+    if (!set_mode(v) || !options_fit(v) ||
+        !query_options_from("bench", &v->q, &holding, &job.options))
         return EXIT_USAGE;
-    if (v.seed < 0)
-        v.seed = 1;
-    int code = prepare(&v, operand[0], &p);
-    job.query = (bench_query)v.query;
+    if (v->seed < 0)
+        v->seed = 1;
+    int code = prepare(v, operand[0], &p);
+    job.query = (bench_query)v->query;
     job.rows = p.rows;
     job.width = points_width(p.kind);
     job.count = p.count;
-    job.rate = v.rate;
+    job.rate = v->rate;
     size_t bytes = bench_answer_bytes(job.query);
     void *batch = calloc(p.count + 1, bytes);
     job.answers = calloc(p.count + 1, bytes);
@@ -468,7 +467,7 @@ static int run(int argc, char **argv)
         code = EXIT_FAILED;
     }
     if (code == EXIT_FINE)
-        code = bench(&job, &v, operand[0], &holding, batch);
+        code = bench(&job, v, operand[0], &holding, batch);
     free(batch);
     free(job.answers);
     free(job.ns);
@@ -476,4 +475,4 @@ static int run(int argc, char **argv)
     return code;
 }
 
-const command command_bench = { &spec, run };
+const command command_bench = { &spec, sizeof usual, &usual, run };

@@ -8,7 +8,7 @@
 static const arg_option options[] = {
     QUERY_MODEL_OPTIONS,
     QUERY_FORM_OPTIONS(
-        "boxes are six doubles each, answers a uint64 count and as many\nuint64 (little-endian)"),
+        "boxes are six doubles each, answers a uint64 count and as many uint64 (little-endian)"),
     { 0 },
 };
 
@@ -19,7 +19,7 @@ static const arg_spec spec = {
     .most = 2,
     .summary = "which faces meet boxes: how many, and their numbers",
     .text = "MODEL is an .ebpo.h5 file. BOXES: lines 'x0 y0 z0 x1 y1 z1', the lower corner first; "
-            "absent or '-': standard input. Faces and\n"
+            "absent or '-': standard input. Faces and "
             "boxes are closed: touching counts.",
     .options = options,
 };
@@ -38,15 +38,13 @@ static ebpo_status answer(const query_job *job, ebpo_context *context, const dou
     return status;
 }
 
-static int run(int argc, char **argv)
+static const query_values usual = QUERY_VALUES_INIT;
+
+static int run(void *given, const char **operand)
 {
-    query_values v = QUERY_VALUES_INIT;
-    const char *operand[ARGS_OPERANDS_MAX];
-    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
-    if (parsed != ARGS_RUN)
-        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
-    query_job job = { .command = "box", .values = &v, .kind = POINTS_BOXES, .answer = answer };
+    query_values *v = given;
+    query_job job = { .command = "box", .values = v, .kind = POINTS_BOXES, .answer = answer };
     return query_run(&job, operand[0], operand[1]);
 }
 
-const command command_box = { &spec, run };
+const command command_box = { &spec, sizeof usual, &usual, run };

@@ -18,13 +18,12 @@ typedef struct values {
 
 static const arg_option options[] = {
     MENDING_OPTIONS(values, mend),
-    ARG_SWITCH("require-solid", 0, values, require_solid,
-               "end with code 3 if the mesh is not a solid"),
-    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores",
-      0, 256, NULL },
+    OPTION_FLAG("require-solid", 0, values, require_solid,
+                "end with code 3 if the mesh is not a solid"),
+    OPTION_THREADS(values, threads),
     MEMORY_OPTIONS(values, memory),
-    ARG_SWITCH("json", 0, values, json, "print the report as JSON"),
-    ARG_SWITCH("quiet", 'q', values, quiet, "no report, no progress: errors and warnings only"),
+    OPTION_FLAG("json", 0, values, json, "print the report as JSON"),
+    OPTION_FLAG("quiet", 'q', values, quiet, "no report, no progress: errors and warnings only"),
     { 0 },
 };
 
@@ -62,39 +61,37 @@ static void print_words(const mesh_input *p, const char *path)
     findings_print(stdout, "after mending", &p->mesh, &p->prepared.report);
 }
 
-static int run(int argc, char **argv)
+static const values usual = { 0 };
+
+static int run(void *given, const char **operand)
 {
-    values v = { 0 };
-    const char *operand[ARGS_OPERANDS_MAX];
-    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
-    if (parsed != ARGS_RUN)
-        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
-    if (!memory_good("check", &v.memory))
+    values *v = given;
+    if (!memory_good("check", &v->memory))
         return EXIT_USAGE;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_workspace *workspace = NULL;
-    ebpo_status status = memory_make(&workspace, &v.memory, &error);
+    ebpo_status status = memory_make(&workspace, &v->memory, &error);
     if (status != EBPO_OK)
         return command_failed("check", &error);
     progress_line line;
-    ebpo_progress progress = progress_start(&line, "check", v.quiet);
+    ebpo_progress progress = progress_start(&line, "check", v->quiet);
     mesh_input p;
     status =
-        mesh_input_read(&p, operand[0], v.mend, workspace, (unsigned)v.threads, progress, &error);
+        mesh_input_read(&p, operand[0], v->mend, workspace, (unsigned)v->threads, progress, &error);
     progress_wipe(&line);
     if (status != EBPO_OK) {
         ebpo_workspace_free(workspace);
         return command_failed("check", &error);
     }
-    if (v.json)
+    if (v->json)
         print_json(&p, operand[0]);
-    else if (!v.quiet)
+    else if (!v->quiet)
         print_words(&p, operand[0]);
     command_flush("check");
     findings_warn(stderr, "check", operand[0], &p.prepared.report, &p.prepared.record);
     ebpo_mesh_free(&p.mesh);
     ebpo_workspace_free(workspace);
-    return v.require_solid && !p.prepared.report.balanced ? EXIT_NOT_SOLID : EXIT_FINE;
+    return v->require_solid && !p.prepared.report.balanced ? EXIT_NOT_SOLID : EXIT_FINE;
 }
 
-const command command_check = { &spec, run };
+const command command_check = { &spec, sizeof usual, &usual, run };

@@ -36,63 +36,59 @@ static const char *const without_words[] = { "planes", "mesh", "maps",
                                              NULL }; /* word i is ebpo_part bit i */
 
 static const arg_option options[] = {
-    { "max-level", 0, ARG_INT, offsetof(values, max_level), "N",
-      "deepest level, 0 to 20; default: until cells are as short as\nthe mean edge", 0, 20, NULL },
-    { "leaf-faces", 0, ARG_INT, offsetof(values, leaf_faces), "N",
-      "a node with at most N faces becomes a leaf; 0: only the\ndeepest level stops; default 16", 0,
-      4294967295.0, NULL },
-    { "epsilon", 0, ARG_REAL, offsetof(values, epsilon), "E",
-      "a plane is kept while it removes at least this share of\nits cell; default 0.003", 0, 1,
-      NULL },
-    { "select", 0, ARG_WORD, offsetof(values, select), "NAME",
-      "how planes are chosen: inherit (the default), or as in the\ntheses: kmedoids, offset "
-      "(least), random",
-      0, 0, selection_words },
-    { "percent", 0, ARG_REAL, offsetof(values, percent), "P",
-      "the theses' ways: share of the candidates that is taken;\ndefault 40", 0, 100, NULL },
-    { "k-root", 0, ARG_TEXT, offsetof(values, k_root), "K",
-      "instead: K planes at the root, or 'K%' of the faces, half as\nmany at each next level "
-      "(BP-Octree)",
-      0, 0, NULL },
-    { "normals", 0, ARG_WORD, offsetof(values, normals), "NAME",
-      "kmedoids' distance of normals: spherical (the default, the\ntheses') or angle (without "
-      "their poles)",
-      0, 0, normals_words },
-    { "seed", 0, ARG_INT, offsetof(values, seed), "N", "of kmedoids and random; default 1", 0,
-      9007199254740992.0, NULL },
-    { "with", 0, ARG_SET, offsetof(values, with), "LIST", "also store: leaf-planes", 0, 0,
-      with_words },
-    { "without", 0, ARG_SET, offsetof(values, without), "LIST",
-      "leave out: maps, mesh (and with it maps), planes;\ncommas between, may be repeated", 0, 0,
-      without_words },
-    { "profile", 0, ARG_WORD, offsetof(values, profile), "NAME",
-      "instead of --with and --without: full (all parts), lod (for\nviewers: no mesh), collision "
-      "(for exact questions: mesh, no\nmaps); as 'ebpo subset --profile' makes it of a full file",
-      0, 0, profile_words },
+    OPTION_INT("max-level", 0, values, max_level, "N", 0, 20,
+               "deepest level, 0 to 20; default: until cells are as short as the mean edge"),
+    OPTION_INT(
+        "leaf-faces", 0, values, leaf_faces, "N", 0, 4294967295.0,
+        "a node with at most N faces becomes a leaf; 0: only the deepest level stops; default 16"),
+    OPTION_REAL("epsilon", 0, values, epsilon, "E", 0, 1,
+                "a plane is kept while it removes at least this share of its cell; default 0.003"),
+    OPTION_WORD(
+        "select", 0, values, select, "NAME", selection_words,
+        "how planes are chosen: inherit (the default), or as in the theses: kmedoids, offset "
+        "(least), random"),
+    OPTION_REAL("percent", 0, values, percent, "P", 0, 100,
+                "the theses' ways: share of the candidates that is taken; default 40"),
+    OPTION_TEXT(
+        "k-root", 0, values, k_root, "K",
+        "instead: K planes at the root, or 'K%' of the faces, half as many at each next level "
+        "(BP-Octree)"),
+    OPTION_WORD(
+        "normals", 0, values, normals, "NAME", normals_words,
+        "kmedoids' distance of normals: spherical (the default, the theses') or angle (without "
+        "their poles)"),
+    OPTION_INT("seed", 0, values, seed, "N", 0, 9007199254740992.0,
+               "of kmedoids and random; default 1"),
+    OPTION_SET("with", 0, values, with, "LIST", with_words, "also store: leaf-planes"),
+    OPTION_SET("without", 0, values, without, "LIST", without_words,
+               "leave out: maps, mesh (and with it maps), planes; commas between, may be repeated"),
+    OPTION_WORD(
+        "profile", 0, values, profile, "NAME", profile_words,
+        "instead of --with and --without: full (all parts), lod (for viewers: no mesh), collision "
+        "(for exact questions: mesh, no maps); as 'ebpo subset --profile' makes it of a full "
+        "file"),
     NEED_OPTIONS(values),
-    { "codec", 0, ARG_WORD, offsetof(values, codec), "NAME", "zstd (the default), deflate or none",
-      0, 0, codec_words },
-    { "zstd-level", 0, ARG_INT, offsetof(values, zstd_level), "N",
-      "effort of zstd, 1 to 22; default 3", 1, 22, NULL },
-    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores",
-      0, 256, NULL },
+    OPTION_WORD("codec", 0, values, codec, "NAME", codec_words,
+                "zstd (the default), deflate or none"),
+    OPTION_INT("zstd-level", 0, values, zstd_level, "N", 1, 22,
+               "effort of zstd, 1 to 22; default 3"),
+    OPTION_THREADS(values, threads),
     MEMORY_OPTIONS(values, memory),
     MENDING_OPTIONS(values, mend),
-    { "rule", 0, ARG_WORD, offsetof(values, rule), "NAME",
-      "inside is where the winding number is nonzero (the default),\nodd (evenodd) or positive", 0,
-      0, rule_words },
-    ARG_SWITCH("require-solid", 0, values, require_solid,
-               "end with code 3 if the mesh is not a solid"),
-    { "unit", 0, ARG_TEXT, offsetof(values, unit), "U", "unit of length to record, such as mm", 0,
-      0, NULL },
-    { "crs", 0, ARG_TEXT, offsetof(values, crs), "C",
-      "coordinate reference system to record, such as EPSG:25832", 0, 0, NULL },
-    { "date", 0, ARG_TEXT, offsetof(values, date), "D",
-      "date to record, such as 2026-03-01; none by default, so that\nequal input gives an equal "
-      "file",
-      0, 0, NULL },
-    ARG_SWITCH("json", 0, values, json, "print reports and facts as JSON"),
-    ARG_SWITCH("quiet", 'q', values, quiet, "no report, no progress: errors and warnings only"),
+    OPTION_WORD(
+        "rule", 0, values, rule, "NAME", rule_words,
+        "inside is where the winding number is nonzero (the default), odd (evenodd) or positive"),
+    OPTION_FLAG("require-solid", 0, values, require_solid,
+                "end with code 3 if the mesh is not a solid"),
+    OPTION_TEXT("unit", 0, values, unit, "U", "unit of length to record, such as mm"),
+    OPTION_TEXT("crs", 0, values, crs, "C",
+                "coordinate reference system to record, such as EPSG:25832"),
+    OPTION_TEXT(
+        "date", 0, values, date, "D",
+        "date to record, such as 2026-03-01; none by default, so that equal input gives an equal "
+        "file"),
+    OPTION_FLAG("json", 0, values, json, "print reports and facts as JSON"),
+    OPTION_FLAG("quiet", 'q', values, quiet, "no report, no progress: errors and warnings only"),
     { 0 },
 };
 
@@ -103,7 +99,7 @@ static const arg_spec spec = {
     .most = 2,
     .summary = "a closed triangle mesh to an .ebpo.h5 file",
     .text = "IN is PLY, or OBJ, STL or OFF where the library was built with assimp. OUT appears "
-            "whole or not at all;\n"
+            "whole or not at all; "
             "an older OUT is replaced. Mending is done in the order weld, orient, fill holes.",
     .options = options,
 };
@@ -304,49 +300,49 @@ static stage_facts plan_stages(const values *v, const char *in)
                           .leaf_planes = parts_of(v) & EBPO_PART_LEAF_PLANES };
 }
 
-static int run(int argc, char **argv)
+static const values usual = { .max_level = -1,
+                              .profile = -1,
+                              .leaf_faces = -1,
+                              .epsilon = -1,
+                              .percent = -1,
+                              .normals = -1,
+                              .seed = -1 };
+
+static int run(void *given, const char **operand)
 {
     const ebpo_build_options defaults = EBPO_BUILD_OPTIONS_INIT;
-    values v = { .max_level = -1,
-                 .profile = -1,
-                 .leaf_faces = defaults.leaf_faces,
-                 .epsilon = -1,
-                 .percent = -1,
-                 .normals = -1,
-                 .seed = -1 };
-    const char *operand[ARGS_OPERANDS_MAX];
-    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
-    if (parsed != ARGS_RUN)
-        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    values *v = given;
+    if (v->leaf_faces < 0)
+        v->leaf_faces = defaults.leaf_faces;
     const char *in = operand[0], *out = operand[1];
-    int code = check_values(&v, in, out);
+    int code = check_values(v, in, out);
     if (code != EXIT_FINE)
         return code;
     ebpo_subset_options need = EBPO_SUBSET_OPTIONS_INIT;
-    if ((code = subset_need("convert", v.max_error, v.target_size, &need)) != EXIT_FINE)
+    if ((code = subset_need("convert", v->max_error, v->target_size, &need)) != EXIT_FINE)
         return code;
-    if ((v.max_error > 0 || v.target_size) && v.without & EBPO_PART_MESH)
+    if ((v->max_error > 0 || v->target_size) && v->without & EBPO_PART_MESH)
         return usage_error("--max-error and --target-size measure against the mesh; leave it out "
                            "with --profile lod instead of --without mesh");
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_workspace *workspace = NULL;
     ebpo_status status = ebpo_check_output(out, &error);
     if (status == EBPO_OK)
-        status = memory_make(&workspace, &v.memory, &error);
+        status = memory_make(&workspace, &v->memory, &error);
     if (status != EBPO_OK)
         return command_failed("convert", &error);
     progress_line line;
-    ebpo_progress progress = progress_start(&line, "convert", v.quiet);
-    stage_facts stages = plan_stages(&v, in);
+    ebpo_progress progress = progress_start(&line, "convert", v->quiet);
+    stage_facts stages = plan_stages(v, in);
     int plan[STAGE_PLAN_MAX];
     mesh_input p = { .mesh = { 0 } };
     progress_plan(&line, plan, stages_plan(&stages, plan), &p.as_read.face_count);
     double begun = progress_now();
-    status = mesh_input_read(&p, in, v.mend, workspace, (unsigned)v.threads, progress, &error);
+    status = mesh_input_read(&p, in, v->mend, workspace, (unsigned)v->threads, progress, &error);
     progress_wipe(&line);
     if (status == EBPO_OK) {
-        print_reports(&v, &p, in);
-        if (v.require_solid && !p.prepared.report.balanced) {
+        print_reports(v, &p, in);
+        if (v->require_solid && !p.prepared.report.balanced) {
             ebpo_mesh_free(&p.mesh);
             ebpo_workspace_free(workspace);
             fprintf(stderr,
@@ -355,9 +351,9 @@ static int run(int argc, char **argv)
                     in);
             return EXIT_NOT_SOLID;
         }
-        status = stages.judged ? room_to_judge(&v, &p, in, workspace, &error) : EBPO_OK;
+        status = stages.judged ? room_to_judge(v, &p, in, workspace, &error) : EBPO_OK;
         if (status == EBPO_OK)
-            status = build_and_write(&v, &p, out, &need, progress, &stages.times, &error);
+            status = build_and_write(v, &p, out, &need, progress, &stages.times, &error);
         else
             ebpo_mesh_free(&p.mesh);
         progress_wipe(&line);
@@ -366,9 +362,9 @@ static int run(int argc, char **argv)
     stages_split(&line, &stages.times);
     stages.faces = p.as_read.face_count;
     if (status == EBPO_OK)
-        status = print_result(&v, &p, out, &line, &stages, progress_now() - begun, &error);
+        status = print_result(v, &p, out, &line, &stages, progress_now() - begun, &error);
     ebpo_workspace_free(workspace);
     return status == EBPO_OK ? EXIT_FINE : command_failed("convert", &error);
 }
 
-const command command_convert = { &spec, run };
+const command command_convert = { &spec, sizeof usual, &usual, run };

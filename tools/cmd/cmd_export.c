@@ -25,21 +25,20 @@ static const char *const format_words[] = {
 }; /* as in ebpo_export_format */
 
 static const arg_option options[] = {
-    { "format", 0, ARG_WORD, offsetof(values, format), "FORMAT",
-      "xdmf, vtkhdf, gltf, glb, obj or stl; the default: as OUT ends.\nxdmf comes with a second "
-      "file OUT.h5, gltf with one that ends in .bin",
-      0, 0, format_words },
-    { "level", 0, ARG_INT, offsetof(values, level), "N",
-      "the envelopes of level N, and leaves and black nodes above it", 0, 20, NULL },
-    { "levels", 0, ARG_TEXT, offsetof(values, levels), "A-B",
-      "levels A to B, each a block of its own; not for stl", 0, 0, NULL },
-    ARG_SWITCH("mesh", 0, values, mesh,
-               "the model itself; beside levels a block of its own. xdmf and\nvtkhdf tell its "
-               "source's numbers, the others have its order"),
-    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores",
-      0, 256, NULL },
-    ARG_SWITCH("json", 0, values, json, "print what was written as JSON"),
-    ARG_SWITCH("quiet", 'q', values, quiet, "no summary, no progress: errors and warnings only"),
+    OPTION_WORD(
+        "format", 0, values, format, "FORMAT", format_words,
+        "xdmf, vtkhdf, gltf, glb, obj or stl; the default: as OUT ends. xdmf comes with a second "
+        "file OUT.h5, gltf with one that ends in .bin"),
+    OPTION_INT("level", 0, values, level, "N", 0, 20,
+               "the envelopes of level N, and leaves and black nodes above it"),
+    OPTION_TEXT("levels", 0, values, levels, "A-B",
+                "levels A to B, each a block of its own; not for stl"),
+    OPTION_FLAG("mesh", 0, values, mesh,
+                "the model itself; beside levels a block of its own. xdmf and vtkhdf tell its "
+                "source's numbers, the others have its order"),
+    OPTION_THREADS(values, threads),
+    OPTION_FLAG("json", 0, values, json, "print what was written as JSON"),
+    OPTION_QUIET(values, quiet),
     REMOTE_OPTIONS(values, remote),
     { 0 },
 };
@@ -51,7 +50,7 @@ static const arg_spec spec = {
     .most = 2,
     .summary = "levels and the model for ParaView (XDMF, VTKHDF), as glTF, OBJ or STL",
     .text = "FILE is an .ebpo.h5 file or its URL. --level, --levels or --mesh is needed. XDMF and "
-            "VTKHDF keep double\n"
+            "VTKHDF keep double "
             "coordinates and the nodes' data; glTF, OBJ and STL hold float32.",
     .options = options,
 };
@@ -201,28 +200,26 @@ static int write_out(const values *v, const char *in, const char *out, const cha
     return status == EBPO_OK ? EXIT_FINE : command_failed("export", &error);
 }
 
-static int run(int argc, char **argv)
+static const values usual = { .format = -1, .level = -1, .remote = REMOTE_VALUES_INIT };
+
+static int run(void *given, const char **operand)
 {
-    values v = { .format = -1, .level = -1, .remote = REMOTE_VALUES_INIT };
-    const char *operand[ARGS_OPERANDS_MAX];
+    values *v = given;
     char second[4096];
     ebpo_export_options o;
-    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
-    if (parsed != ARGS_RUN)
-        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
-    int code = choose_format(&v, operand[1]);
+    int code = choose_format(v, operand[1]);
     if (code == EXIT_FINE)
-        code = choose_levels(&v, &o);
+        code = choose_levels(v, &o);
     if (code != EXIT_FINE)
         return code;
-    if (!ebpo_export_second_file((ebpo_export_format)v.format, operand[1], second, sizeof second))
+    if (!ebpo_export_second_file((ebpo_export_format)v->format, operand[1], second, sizeof second))
         return usage_error("the output's name is too long, or has a ':', which XDMF cannot take");
     code = check_names(operand[0], operand[1], second);
     if (code != EXIT_FINE)
         return code;
     if (!command_wants_hdf5("export", operand[0]))
         return EXIT_FAILED;
-    return write_out(&v, operand[0], operand[1], second, &o);
+    return write_out(v, operand[0], operand[1], second, &o);
 }
 
-const command command_export = { &spec, run };
+const command command_export = { &spec, sizeof usual, &usual, run };

@@ -18,16 +18,15 @@ typedef struct values {
 } values;
 
 static const arg_option options[] = {
-    { "level", 0, ARG_INT, offsetof(values, level), "N",
-      "the envelopes of level N, and leaves and black nodes above it", 0, 20, NULL },
-    ARG_SWITCH("mesh", 0, values, mesh,
-               "the model itself, bit for bit; in the source's order where\nthe maps are stored"),
-    ARG_SWITCH("no-walls", 0, values, no_walls,
-               "with --level: leave out polygons that lie on cell walls"),
-    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores",
-      0, 256, NULL },
+    OPTION_INT("level", 0, values, level, "N", 0, 20,
+               "the envelopes of level N, and leaves and black nodes above it"),
+    OPTION_FLAG("mesh", 0, values, mesh,
+                "the model itself, bit for bit; in the source's order where the maps are stored"),
+    OPTION_FLAG("no-walls", 0, values, no_walls,
+                "with --level: leave out polygons that lie on cell walls"),
+    OPTION_THREADS(values, threads),
     MEMORY_OPTIONS(values, memory),
-    ARG_SWITCH("quiet", 'q', values, quiet, "no summary, no progress: errors and warnings only"),
+    OPTION_QUIET(values, quiet),
     REMOTE_OPTIONS(values, remote),
     { 0 },
 };
@@ -100,42 +99,40 @@ static void summarise(const values *v, const char *out, const ebpo_mesh *mesh, d
     putchar('\n');
 }
 
-static int run(int argc, char **argv)
+static const values usual = { .level = -1, .remote = REMOTE_VALUES_INIT };
+
+static int run(void *given, const char **operand)
 {
-    values v = { .level = -1, .remote = REMOTE_VALUES_INIT };
-    const char *operand[ARGS_OPERANDS_MAX];
-    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
-    if (parsed != ARGS_RUN)
-        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
-    int code = check_values(&v, operand[0], operand[1]);
+    values *v = given;
+    int code = check_values(v, operand[0], operand[1]);
     if (code != EXIT_FINE)
         return code;
-    if (!memory_good("extract", &v.memory))
+    if (!memory_good("extract", &v->memory))
         return EXIT_USAGE;
     if (!command_wants_hdf5("extract", operand[0]))
         return EXIT_FAILED;
     progress_line line;
-    ebpo_progress progress = progress_start(&line, "extract", v.quiet);
+    ebpo_progress progress = progress_start(&line, "extract", v->quiet);
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
     ebpo_mesh mesh = { 0 };
     double volume = 0;
     ebpo_workspace *workspace = NULL;
-    ebpo_status status = memory_make(&workspace, &v.memory, &error);
+    ebpo_status status = memory_make(&workspace, &v->memory, &error);
     if (status == EBPO_OK)
-        status = remote_open(&file, operand[0], &v.remote, &error);
+        status = remote_open(&file, operand[0], &v->remote, &error);
     if (status == EBPO_OK)
         ebpo_file_set_workspace(file, workspace);
     if (status == EBPO_OK)
-        status = take(file, &v, operand[0], progress, &mesh, &volume, &error);
+        status = take(file, v, operand[0], progress, &mesh, &volume, &error);
     if (status == EBPO_OK)
         status = ebpo_mesh_write_ply(&mesh, operand[1], &error);
     progress_wipe(&line);
-    if (status == EBPO_OK && !v.quiet)
-        summarise(&v, operand[1], &mesh, volume);
+    if (status == EBPO_OK && !v->quiet)
+        summarise(v, operand[1], &mesh, volume);
     if (status == EBPO_OK) {
         traffic t = traffic_of(file);
-        remote_tell(&t, &v.remote, false);
+        remote_tell(&t, &v->remote, false);
     }
     ebpo_mesh_free(&mesh);
     ebpo_close(file);
@@ -143,4 +140,4 @@ static int run(int argc, char **argv)
     return status == EBPO_OK ? EXIT_FINE : command_failed("extract", &error);
 }
 
-const command command_extract = { &spec, run };
+const command command_extract = { &spec, sizeof usual, &usual, run };

@@ -26,7 +26,7 @@ static const arg_spec spec = {
     .most = 2,
     .summary = "a file by its URL, or levels, a box, parts of it; goes on where it was interrupted",
     .text = "Only what is kept is fetched. OUT appears whole or not at all; until then what has "
-            "come lies in the folder\n"
+            "come lies in the folder "
             "OUT.part, from which the same command goes on. Without options the whole content is "
             "fetched.",
     .options = options,
@@ -183,28 +183,26 @@ static bool out_fits(const char *out, const char *part)
     return true;
 }
 
-static int run(int argc, char **argv)
+static const subset_values usual = SUBSET_VALUES_INIT;
+
+static int run(void *given, const char **operand)
 {
-    subset_values v = SUBSET_VALUES_INIT;
-    const char *operand[ARGS_OPERANDS_MAX];
+    subset_values *v = given;
     ebpo_subset_options subset;
-    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
-    if (parsed != ARGS_RUN)
-        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
-    int code = subset_options("fetch", &v, operand[0], operand[1], &subset);
+    int code = subset_options("fetch", v, operand[0], operand[1], &subset);
     if (code != EXIT_FINE)
         return code;
     if (!command_wants_hdf5("fetch", operand[0]))
         return EXIT_FAILED;
     char *part = NULL; /* with a folder of the user's, that one does */
-    if (ebpo_is_url(operand[0]) && !v.remote.cache && asprintf(&part, "%s.part", operand[1]) < 0) {
+    if (ebpo_is_url(operand[0]) && !v->remote.cache && asprintf(&part, "%s.part", operand[1]) < 0) {
         fprintf(stderr, "ebpo fetch: out of memory\n");
         return EXIT_FAILED;
     }
     code =
-        out_fits(operand[1], part) ? fetch(&v, operand[0], operand[1], part, &subset) : EXIT_FAILED;
+        out_fits(operand[1], part) ? fetch(v, operand[0], operand[1], part, &subset) : EXIT_FAILED;
     free(part);
     return code;
 }
 
-const command command_fetch = { &spec, run };
+const command command_fetch = { &spec, sizeof usual, &usual, run };

@@ -13,7 +13,7 @@ typedef struct values {
 } values;
 
 static const arg_option options[] = {
-    ARG_SWITCH("json", 0, values, json, "print the facts as JSON"),
+    OPTION_FLAG("json", 0, values, json, "print the facts as JSON"),
     REMOTE_OPTIONS(values, remote),
     { 0 },
 };
@@ -29,18 +29,16 @@ static const arg_spec spec = {
     .options = options,
 };
 
-static int run(int argc, char **argv)
+static const values usual = { .remote = REMOTE_VALUES_INIT };
+
+static int run(void *given, const char **operand)
 {
-    values v = { .remote = REMOTE_VALUES_INIT };
-    const char *operand[ARGS_OPERANDS_MAX];
-    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
-    if (parsed != ARGS_RUN)
-        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    values *v = given;
     if (!command_wants_hdf5("info", operand[0]))
         return EXIT_FAILED;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
-    ebpo_status status = remote_open(&file, operand[0], &v.remote, &error);
+    ebpo_status status = remote_open(&file, operand[0], &v->remote, &error);
     if (status == EBPO_OK)
         status = ebpo_file_locate(file, &error);
     if (status != EBPO_OK) {
@@ -49,21 +47,21 @@ static int run(int argc, char **argv)
     }
     const ebpo_info *info = ebpo_file_info(file);
     traffic t = traffic_of(file);
-    if (v.json) {
+    if (v->json) {
         json j;
         json_begin(&j, stdout);
         json_object(&j, NULL);
         facts_json(&j, remote_shown(operand[0]), info);
-        remote_json(&j, &t, &v.remote);
+        remote_json(&j, &t, &v->remote);
         json_finish(&j);
     } else {
         facts_print(stdout, remote_shown(operand[0]), info);
         putchar('\n');
         facts_table(stdout, info);
-        remote_tell(&t, &v.remote, false);
+        remote_tell(&t, &v->remote, false);
     }
     ebpo_close(file);
     return EXIT_FINE;
 }
 
-const command command_info = { &spec, run };
+const command command_info = { &spec, sizeof usual, &usual, run };

@@ -6,10 +6,10 @@
 #include "cmd/query_run.h"
 
 static const arg_option options[] = {
-    { "mode", 'm', ARG_WORD, offsetof(query_values, inside_mode), "MODE",
-      "how to get there; the answers are the same. fast, the default,\nor one of EBP 2017: cache, "
-      "nodes, subtree, each also with -plain\n(without envelopes)",
-      0, 0, inside_modes },
+    OPTION_WORD("mode", 'm', query_values, inside_mode, "MODE", inside_modes,
+                "how to get there; the answers are the same. fast, the default, or one of EBP "
+                "2017: cache, "
+                "nodes, subtree, each also with -plain (without envelopes)"),
     QUERY_LIMIT_OPTIONS("look at levels 0 to L only: IN and OUT are certain, else MAYBE"),
     QUERY_MODEL_OPTIONS,
     QUERY_PREFETCH_OPTION,
@@ -38,20 +38,18 @@ static ebpo_status answer(const query_job *job, ebpo_context *context, const dou
     return status;
 }
 
-static int run(int argc, char **argv)
+static const query_values usual = QUERY_VALUES_INIT;
+
+static int run(void *given, const char **operand)
 {
-    query_values v = QUERY_VALUES_INIT;
-    const char *operand[ARGS_OPERANDS_MAX];
-    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
-    if (parsed != ARGS_RUN)
-        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
-    if (!query_inside_fits("inside", &v))
+    query_values *v = given;
+    if (!query_inside_fits("inside", v))
         return EXIT_USAGE;
     static ebpo_inside_result results[POINTS_BATCH];
     query_job job = {
-        .command = "inside", .values = &v, .kind = POINTS, .answer = answer, .results = results
+        .command = "inside", .values = v, .kind = POINTS, .answer = answer, .results = results
     };
     return query_run(&job, operand[0], operand[1]);
 }
 
-const command command_inside = { &spec, run };
+const command command_inside = { &spec, sizeof usual, &usual, run };

@@ -20,13 +20,11 @@ typedef struct values {
 } values;
 
 static const arg_option options[] = {
-    { "to", 0, ARG_INT, offsetof(values, to), "L", "end with level L; deeper ones are not read", 0,
-      20, NULL },
-    ARG_SWITCH("nodes", 0, values, nodes,
-               "a line for each node as well: octcode, type, cell, planes"),
-    ARG_SWITCH("json", 0, values, json, "print all of it as JSON"),
-    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores",
-      0, 256, NULL },
+    OPTION_INT("to", 0, values, to, "L", 0, 20, "end with level L; deeper ones are not read"),
+    OPTION_FLAG("nodes", 0, values, nodes,
+                "a line for each node as well: octcode, type, cell, planes"),
+    OPTION_FLAG("json", 0, values, json, "print all of it as JSON"),
+    OPTION_THREADS(values, threads),
     REMOTE_OPTIONS(values, remote),
     { 0 },
 };
@@ -200,22 +198,20 @@ static ebpo_status tell(printer *p, ebpo_file *file, const char *path, bool *arr
     return status;
 }
 
-static int run(int argc, char **argv)
+static const values usual = { .to = -1, .remote = REMOTE_VALUES_INIT };
+
+static int run(void *given, const char **operand)
 {
-    values v = { .to = -1, .remote = REMOTE_VALUES_INIT };
-    const char *operand[ARGS_OPERANDS_MAX];
-    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
-    if (parsed != ARGS_RUN)
-        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    values *v = given;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
-    printer p = { .v = &v, .begin = progress_now() };
+    printer p = { .v = v, .begin = progress_now() };
     if (!command_wants_hdf5("levels", operand[0]))
         return EXIT_FAILED;
-    if (remote_open(&file, operand[0], &v.remote, &error) != EBPO_OK)
+    if (remote_open(&file, operand[0], &v->remote, &error) != EBPO_OK)
         return command_failed("levels", &error);
     p.info = ebpo_file_info(file);
-    bool there = command_has_level("levels", p.info, v.to), arrived = true;
+    bool there = command_has_level("levels", p.info, v->to), arrived = true;
     ebpo_status status = there ? tell(&p, file, operand[0], &arrived, &error) : EBPO_OK;
     ebpo_close(file);
     if (!there)
@@ -225,4 +221,4 @@ static int run(int argc, char **argv)
     return status == EBPO_OK ? EXIT_FINE : command_failed("levels", &error);
 }
 
-const command command_levels = { &spec, run };
+const command command_levels = { &spec, sizeof usual, &usual, run };

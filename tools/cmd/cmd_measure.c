@@ -19,25 +19,24 @@ typedef struct values {
 } values;
 
 static const arg_option options[] = {
-    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores",
-      0, 256, NULL },
-    ARG_SWITCH("deviation", 0, values, deviation,
-               "also how far each level reaches beyond the model: certain\nbounds of the farthest "
-               "point, mean and rms over its surface"),
-    { "tolerance", 0, ARG_REAL, offsetof(values, tolerance), "T",
-      "with --deviation: bounds are refined until the upper one is\nat most 1 + T times the lower "
-      "one; default 0.05",
-      1e-6, 1000, NULL },
-    { "questions", 0, ARG_INT, offsetof(values, questions), "N",
-      "with --deviation: stop after about N distances for each level\nand tell what is certain "
-      "then; default 200000; 0: no limit",
-      0, 9007199254740992.0, NULL },
-    ARG_SWITCH("derived", 0, values, derived,
-               "also the volume of each level with leaves cut by planes derived\nfrom their faces"),
-    ARG_SWITCH("limit", 0, values, limit,
-               "that too, and the volume of the solid's convex hull in each cell, summed:\nno "
-               "convex envelopes of these cells are smaller"),
-    ARG_SWITCH("json", 0, values, json, "print the numbers as JSON"),
+    OPTION_THREADS(values, threads),
+    OPTION_FLAG("deviation", 0, values, deviation,
+                "also how far each level reaches beyond the model: certain bounds of the farthest "
+                "point, mean and rms over its surface"),
+    OPTION_REAL("tolerance", 0, values, tolerance, "T", 1e-6, 1000,
+                "with --deviation: bounds are refined until the upper one is at most 1 + T times "
+                "the lower "
+                "one; default 0.05"),
+    OPTION_INT(
+        "questions", 0, values, questions, "N", 0, 9007199254740992.0,
+        "with --deviation: stop after about N distances for each level and tell what is certain "
+        "then; default 200000; 0: no limit"),
+    OPTION_FLAG("derived", 0, values, derived,
+                "also the volume of each level with leaves cut by planes derived from their faces"),
+    OPTION_FLAG("limit", 0, values, limit,
+                "that too, and the volume of the solid's convex hull in each cell, summed: no "
+                "convex envelopes of these cells are smaller"),
+    OPTION_FLAG("json", 0, values, json, "print the numbers as JSON"),
     REMOTE_OPTIONS(values, remote),
     { 0 },
 };
@@ -50,7 +49,7 @@ static const arg_spec spec = {
     .summary =
         "area, volume, centroid and inertia, and the volume of each level or how far it reaches",
     .text = "FILE is an .ebpo.h5 file with its mesh, or its URL. Volume, centroid and inertia are "
-            "those of the winding number's integral\n"
+            "those of the winding number's integral "
             "(density 1); a surface has an area only.",
     .options = options,
 };
@@ -254,14 +253,14 @@ static int measure(const char *path, const values *v)
     return status == EBPO_OK ? EXIT_FINE : command_failed("measure", &error);
 }
 
-static int run(int argc, char **argv)
+static const values usual = { .tolerance = 0.05,
+                              .questions = 200000,
+                              .remote = REMOTE_VALUES_INIT };
+
+static int run(void *given, const char **operand)
 {
-    values v = { .tolerance = 0.05, .questions = 200000, .remote = REMOTE_VALUES_INIT };
-    const char *operand[ARGS_OPERANDS_MAX];
-    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
-    if (parsed != ARGS_RUN)
-        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
-    return command_wants_hdf5("measure", operand[0]) ? measure(operand[0], &v) : EXIT_FAILED;
+    values *v = given;
+    return command_wants_hdf5("measure", operand[0]) ? measure(operand[0], v) : EXIT_FAILED;
 }
 
-const command command_measure = { &spec, run };
+const command command_measure = { &spec, sizeof usual, &usual, run };

@@ -7,13 +7,13 @@
 #include "cmd/query_run.h"
 
 static const arg_option options[] = {
-    ARG_SWITCH("all", 'a', query_values, all,
-               "all hits: their number, then t, face and side of each"),
-    { "tmax", 0, ARG_REAL, offsetof(query_values, tmax), "T",
-      "of rays that tell none: they end at origin + T direction", 0, DBL_MAX, NULL },
+    OPTION_FLAG("all", 'a', query_values, all,
+                "all hits: their number, then t, face and side of each"),
+    OPTION_REAL("tmax", 0, query_values, tmax, "T", 0, DBL_MAX,
+                "of rays that tell none: they end at origin + T direction"),
     QUERY_MODEL_OPTIONS,
     QUERY_FORM_OPTIONS(
-        "rays are six doubles each, answers a double, a uint64 and an int64\n(little-endian)"),
+        "rays are six doubles each, answers a double, a uint64 and an int64 (little-endian)"),
     { 0 },
 };
 
@@ -24,7 +24,7 @@ static const arg_spec spec = {
     .most = 2,
     .summary = "what rays hit: t, face and side of the first face",
     .text = "MODEL is an .ebpo.h5 file. RAYS: lines 'ox oy oz dx dy dz [tmax]'; absent or '-': "
-            "standard input. What is hit, and in which order,\n"
+            "standard input. What is hit, and in which order, "
             "is exact; '-' stands for nothing.",
     .options = options,
 };
@@ -58,15 +58,13 @@ static ebpo_status answer(const query_job *job, ebpo_context *context, const dou
     return status;
 }
 
-static int run(int argc, char **argv)
+static const query_values usual = QUERY_VALUES_INIT;
+
+static int run(void *given, const char **operand)
 {
-    query_values v = QUERY_VALUES_INIT;
-    const char *operand[ARGS_OPERANDS_MAX];
-    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
-    if (parsed != ARGS_RUN)
-        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
-    query_job job = { .command = "ray", .values = &v, .kind = POINTS_RAYS, .answer = answer };
+    query_values *v = given;
+    query_job job = { .command = "ray", .values = v, .kind = POINTS_RAYS, .answer = answer };
     return query_run(&job, operand[0], operand[1]);
 }
 
-const command command_ray = { &spec, run };
+const command command_ray = { &spec, sizeof usual, &usual, run };

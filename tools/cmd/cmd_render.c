@@ -28,21 +28,18 @@ typedef struct values {
 static const char *const up_words[] = { "x", "y", "z", NULL };
 
 static const arg_option options[] = {
-    { "level", 0, ARG_INT, offsetof(values, level), "N", "the envelopes of level N", 0, 20, NULL },
-    ARG_SWITCH("mesh", 0, values, mesh, "the model itself; the default"),
-    { "levels", 0, ARG_TEXT, offsetof(values, levels), "LIST",
-      "several side by side, with captions: levels and 'mesh',\nfor example 0,2,4,mesh", 0, 0,
-      NULL },
-    { "view", 0, ARG_TEXT, offsetof(values, view), "AZ,EL",
-      "from where: azimuth and elevation in degrees; default 30,20", 0, 0, NULL },
-    { "up", 0, ARG_WORD, offsetof(values, up), "AXIS",
-      "the axis that points upwards: x, y (the default) or z", 0, 0, up_words },
-    { "size", 0, ARG_TEXT, offsetof(values, size), "WxH",
-      "pixels, 16 to 8192 each; default 1200x900", 0, 0, NULL },
-    ARG_SWITCH("edges", 0, values, edges, "draw the outlines of the polygons"),
-    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores",
-      0, 256, NULL },
-    ARG_SWITCH("quiet", 'q', values, quiet, "no progress: errors and warnings only"),
+    OPTION_INT("level", 0, values, level, "N", 0, 20, "the envelopes of level N"),
+    OPTION_FLAG("mesh", 0, values, mesh, "the model itself; the default"),
+    OPTION_TEXT("levels", 0, values, levels, "LIST",
+                "several side by side, with captions: levels and 'mesh', for example 0,2,4,mesh"),
+    OPTION_TEXT("view", 0, values, view, "AZ,EL",
+                "from where: azimuth and elevation in degrees; default 30,20"),
+    OPTION_WORD("up", 0, values, up, "AXIS", up_words,
+                "the axis that points upwards: x, y (the default) or z"),
+    OPTION_TEXT("size", 0, values, size, "WxH", "pixels, 16 to 8192 each; default 1200x900"),
+    OPTION_FLAG("edges", 0, values, edges, "draw the outlines of the polygons"),
+    OPTION_THREADS(values, threads),
+    OPTION_FLAG("quiet", 'q', values, quiet, "no progress: errors and warnings only"),
     REMOTE_OPTIONS(values, remote),
     { 0 },
 };
@@ -307,22 +304,20 @@ static int run_job(job *j)
 
 #endif
 
-static int run(int argc, char **argv)
+static const values usual = {
+    .level = -1, .view = "30,20", .size = "1200x900", .up = 1, .remote = REMOTE_VALUES_INIT
+};
+
+static int run(void *given, const char **operand)
 {
-    values v = {
-        .level = -1, .view = "30,20", .size = "1200x900", .up = 1, .remote = REMOTE_VALUES_INIT
-    };
-    const char *operand[ARGS_OPERANDS_MAX];
-    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
-    if (parsed != ARGS_RUN)
-        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    values *v = given;
 #if EBPO_HAVE_PNG
     job *j = calloc(1, sizeof *j);
     if (!j) {
         fprintf(stderr, "ebpo render: no memory\n");
         return EXIT_FAILED;
     }
-    j->v = v;
+    j->v = *v;
     j->in = operand[0];
     j->out = operand[1];
     int code = run_job(j);
@@ -334,4 +329,4 @@ static int run(int argc, char **argv)
 #endif
 }
 
-const command command_render = { &spec, run };
+const command command_render = { &spec, sizeof usual, &usual, run };

@@ -15,47 +15,45 @@
 static const char *const up_words[] = { "x", "y", "z", NULL };
 
 static const arg_option options[] = {
-    { "out", 'o', ARG_TEXT, offsetof(report_values, out), "DIR",
-      "the folder to make; default: report-NAME, here", 0, 0, NULL },
-    { "name", 0, ARG_LIST, offsetof(report_values, names), "NAME",
-      "of a FILE's method, in their order; default: the file's name", 0, 0, NULL },
-    { "select", 0, ARG_SET, offsetof(report_values, select), "LIST",
-      "of a mesh: make a file with each of these selections of planes,\ninherit, kmedoids, offset, "
-      "random; default: inherit",
-      0, 0, selection_words },
-    { "percent", 0, ARG_REAL, offsetof(report_values, percent), "P",
-      "of the theses' selections: share of the candidates; default 40", 0, 100, NULL },
-    { "k-root", 0, ARG_TEXT, offsetof(report_values, k_root), "K",
-      "instead: K planes at the root, or 'K%' of the faces, half as\nmany at each next level "
-      "(BP-Octree)",
-      0, 0, NULL },
-    { "normals", 0, ARG_WORD, offsetof(report_values, normals), "NAME",
-      "distance of normals for k-medoids: spherical (the default)\nor angle", 0, 0, normals_words },
-    { "max-level", 0, ARG_INT, offsetof(report_values, max_level), "N",
-      "of a mesh: as for 'ebpo convert'", 0, 20, NULL },
-    { "leaf-faces", 0, ARG_INT, offsetof(report_values, leaf_faces), "N",
-      "of a mesh: as for 'ebpo convert'", 0, 4294967295.0, NULL },
-    { "epsilon", 0, ARG_REAL, offsetof(report_values, epsilon), "E",
-      "of a mesh: as for 'ebpo convert'", 0, 1, NULL },
-    ARG_SWITCH("keep", 0, report_values, keep, "keep the files that were made of a mesh in DIR"),
-    { "levels", 0, ARG_TEXT, offsetof(report_values, levels), "A-B", "measure these levels only", 0,
-      0, NULL },
-    { "points", 0, ARG_INT, offsetof(report_values, points), "N",
-      "questions of each kind; default 5000", 1, 1e8, NULL },
-    { "seed", 0, ARG_INT, offsetof(report_values, seed), "S",
-      "of all that is drawn at random; default 1", 0, 1e15, NULL },
-    ARG_SWITCH("need", 0, report_values, need,
-               "also cut files to errors and to sizes, and see how well they\nkeep to them"),
-    ARG_SWITCH("no-pictures", 0, report_values, no_pictures, "no pictures of the levels"),
-    { "view", 0, ARG_TEXT, offsetof(report_values, view), "AZ,EL",
-      "of the pictures: azimuth and elevation in degrees; default 30,20", 0, 0, NULL },
-    { "up", 0, ARG_WORD, offsetof(report_values, up), "AXIS",
-      "of the pictures: the axis that points upwards, x, y (the\ndefault) or z", 0, 0, up_words },
-    { "threads", 0, ARG_INT, offsetof(report_values, threads), "N",
-      "threads, but questions are timed on one; 0, the default: all\ncores", 0, 256, NULL },
-    ARG_SWITCH("json", 0, report_values, json, "print the JSON on standard output too"),
-    ARG_SWITCH("quiet", 'q', report_values, quiet,
-               "no summary, no progress: errors and warnings only"),
+    OPTION_TEXT("out", 'o', report_values, out, "DIR",
+                "the folder to make; default: report-NAME, here"),
+    OPTION_LIST("name", 0, report_values, names, "NAME",
+                "of a FILE's method, in their order; default: the file's name"),
+    OPTION_SET("select", 0, report_values, select, "LIST", selection_words,
+               "of a mesh: make a file with each of these selections of planes, inherit, "
+               "kmedoids, offset, "
+               "random; default: inherit"),
+    OPTION_REAL("percent", 0, report_values, percent, "P", 0, 100,
+                "of the theses' selections: share of the candidates; default 40"),
+    OPTION_TEXT(
+        "k-root", 0, report_values, k_root, "K",
+        "instead: K planes at the root, or 'K%' of the faces, half as many at each next level "
+        "(BP-Octree)"),
+    OPTION_WORD("normals", 0, report_values, normals, "NAME", normals_words,
+                "distance of normals for k-medoids: spherical (the default) or angle"),
+    OPTION_INT("max-level", 0, report_values, max_level, "N", 0, 20,
+               "of a mesh: as for 'ebpo convert'"),
+    OPTION_INT("leaf-faces", 0, report_values, leaf_faces, "N", 0, 4294967295.0,
+               "of a mesh: as for 'ebpo convert'"),
+    OPTION_REAL("epsilon", 0, report_values, epsilon, "E", 0, 1,
+                "of a mesh: as for 'ebpo convert'"),
+    OPTION_FLAG("keep", 0, report_values, keep, "keep the files that were made of a mesh in DIR"),
+    OPTION_TEXT("levels", 0, report_values, levels, "A-B", "measure these levels only"),
+    OPTION_INT("points", 0, report_values, points, "N", 1, 1e8,
+               "questions of each kind; default 5000"),
+    OPTION_INT("seed", 0, report_values, seed, "S", 0, 1e15,
+               "of all that is drawn at random; default 1"),
+    OPTION_FLAG("need", 0, report_values, need,
+                "also cut files to errors and to sizes, and see how well they keep to them"),
+    OPTION_FLAG("no-pictures", 0, report_values, no_pictures, "no pictures of the levels"),
+    OPTION_TEXT("view", 0, report_values, view, "AZ,EL",
+                "of the pictures: azimuth and elevation in degrees; default 30,20"),
+    OPTION_WORD("up", 0, report_values, up, "AXIS", up_words,
+                "of the pictures: the axis that points upwards, x, y (the default) or z"),
+    OPTION_INT("threads", 0, report_values, threads, "N", 0, 256,
+               "threads, but questions are timed on one; 0, the default: all cores"),
+    OPTION_FLAG("json", 0, report_values, json, "print the JSON on standard output too"),
+    OPTION_QUIET(report_values, quiet),
     REMOTE_HTTP_OPTIONS(report_values, remote),
     { 0 },
 };
@@ -67,9 +65,9 @@ static const arg_spec spec = {
     .most = ARGS_OPERANDS_MAX - 1,
     .summary = "methods compared level by level: bytes, error, run time; a page with plots",
     .text = "FILEs are .ebpo.h5 files of one model (or their URLs), each a method; or one mesh, "
-            "from which a file is made\n"
+            "from which a file is made "
             "with each selection. DIR appears whole, with report.html, report.csv and report.json; "
-            "an older report there\n"
+            "an older report there "
             "is replaced.",
     .options = options,
 };
@@ -224,35 +222,33 @@ static void default_place(const char *operand, char *out, size_t room)
     snprintf(out, room, "report-%s", stem);
 }
 
-static int run(int argc, char **argv)
+static const report_values usual = { .percent = -1,
+                                     .normals = -1,
+                                     .max_level = -1,
+                                     .leaf_faces = -1,
+                                     .epsilon = -1,
+                                     .points = 5000,
+                                     .seed = 1,
+                                     .up = 1,
+                                     .view = "30,20",
+                                     .remote = REMOTE_VALUES_INIT };
+
+static int run(void *given, const char **operand)
 {
-    report_values v = { .percent = -1,
-                        .normals = -1,
-                        .max_level = -1,
-                        .leaf_faces = -1,
-                        .epsilon = -1,
-                        .points = 5000,
-                        .seed = 1,
-                        .up = 1,
-                        .view = "30,20",
-                        .remote = REMOTE_VALUES_INIT };
-    const char *operand[ARGS_OPERANDS_MAX];
-    char usual[256];
-    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
-    if (parsed != ARGS_RUN)
-        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
-    comparison c = { .v = &v };
+    report_values *v = given;
+    char named_after_input[256];
+    comparison c = { .v = v };
     int is_hdf5 = command_is_hdf5("report", operand[0]);
-    int code = is_hdf5 < 0 ? EXIT_FAILED : read_options(&c, &v, !is_hdf5);
+    int code = is_hdf5 < 0 ? EXIT_FAILED : read_options(&c, v, !is_hdf5);
     if (code != EXIT_FINE)
         return code;
-    default_place(operand[0], usual, sizeof usual);
-    const char *place = v.out ? v.out : usual;
+    default_place(operand[0], named_after_input, sizeof named_after_input);
+    const char *place = v->out ? v->out : named_after_input;
     code = output_begin(place, operand, c.folder, sizeof c.folder);
     if (code != EXIT_FINE)
         return code;
     progress_line line;
-    c.progress = progress_start(&line, "report", v.quiet);
+    c.progress = progress_start(&line, "report", v->quiet);
     c.methods = calloc(METHODS_MAX, sizeof *c.methods);
     if (c.methods) {
         code = work(&c, operand, place, &line);
@@ -266,4 +262,4 @@ static int run(int argc, char **argv)
     return code;
 }
 
-const command command_report = { &spec, run };
+const command command_report = { &spec, sizeof usual, &usual, run };

@@ -17,21 +17,19 @@ static const arg_spec spec = {
     .most = 2,
     .summary = "a smaller .ebpo.h5 file of a file: levels, a box, parts, an error or a size",
     .text = "FILE is an .ebpo.h5 file or its URL (what is interrupted begins anew; 'ebpo fetch' "
-            "goes on). OUT appears\n"
+            "goes on). OUT appears "
             "whole or not at all. Questions to it are answered as by FILE, or refused where what "
             "was left out matters.",
     .options = options,
 };
 
-static int run(int argc, char **argv)
+static const subset_values usual = SUBSET_VALUES_INIT;
+
+static int run(void *given, const char **operand)
 {
-    subset_values v = SUBSET_VALUES_INIT;
-    const char *operand[ARGS_OPERANDS_MAX];
+    subset_values *v = given;
     ebpo_subset_options subset;
-    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
-    if (parsed != ARGS_RUN)
-        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
-    int code = subset_options("subset", &v, operand[0], operand[1], &subset);
+    int code = subset_options("subset", v, operand[0], operand[1], &subset);
     if (code != EXIT_FINE)
         return code;
     if (!command_wants_hdf5("subset", operand[0]))
@@ -40,22 +38,22 @@ static int run(int argc, char **argv)
     double begun = progress_now();
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
-    subset.write.progress = progress_start(&line, "subset", v.quiet);
-    ebpo_status status = remote_open(&file, operand[0], &v.remote, &error);
+    subset.write.progress = progress_start(&line, "subset", v->quiet);
+    ebpo_status status = remote_open(&file, operand[0], &v->remote, &error);
     if (status == EBPO_OK)
-        status = subset_settle(&v, ebpo_file_info(file), remote_shown(operand[0]), &subset, &error);
+        status = subset_settle(v, ebpo_file_info(file), remote_shown(operand[0]), &subset, &error);
     if (status == EBPO_OK)
         status = ebpo_subset(file, operand[1], &subset, &error);
     progress_wipe(&line);
     if (status == EBPO_OK) {
         traffic t = traffic_of(file);
         status =
-            subset_tell(&v, operand[1], ebpo_file_info(file), &t, progress_now() - begun, &error);
-        if (status == EBPO_OK && !v.json)
-            remote_tell(&t, &v.remote, false);
+            subset_tell(v, operand[1], ebpo_file_info(file), &t, progress_now() - begun, &error);
+        if (status == EBPO_OK && !v->json)
+            remote_tell(&t, &v->remote, false);
     }
     ebpo_close(file);
     return status == EBPO_OK ? EXIT_FINE : command_failed("subset", &error);
 }
 
-const command command_subset = { &spec, run };
+const command command_subset = { &spec, sizeof usual, &usual, run };

@@ -19,17 +19,16 @@ typedef struct values {
 } values;
 
 static const arg_option options[] = {
-    { "against", 0, ARG_TEXT, offsetof(values, against), "IN.ply",
-      "also compare the model with its source, bit for bit", 0, 0, NULL },
-    { "samples", 0, ARG_INT, offsetof(values, samples), "N",
-      "cells whose labels are checked by an independent winding\nnumber; 0, the default: all of up "
-      "to four million, a million of more",
-      0, 9007199254740992.0, NULL },
-    { "threads", 0, ARG_INT, offsetof(values, threads), "N", "threads; 0, the default: all cores",
-      0, 256, NULL },
+    OPTION_TEXT("against", 0, values, against, "IN.ply",
+                "also compare the model with its source, bit for bit"),
+    OPTION_INT("samples", 0, values, samples, "N", 0, 9007199254740992.0,
+               "cells whose labels are checked by an independent winding number; 0, the default: "
+               "all of up "
+               "to four million, a million of more"),
+    OPTION_THREADS(values, threads),
     MEMORY_OPTIONS(values, memory),
-    ARG_SWITCH("json", 0, values, json, "print the counts as JSON"),
-    ARG_SWITCH("quiet", 'q', values, quiet, "print violations and errors only"),
+    OPTION_FLAG("json", 0, values, json, "print the counts as JSON"),
+    OPTION_FLAG("quiet", 'q', values, quiet, "print violations and errors only"),
     REMOTE_OPTIONS(values, remote),
     { 0 },
 };
@@ -148,35 +147,33 @@ static ebpo_status verify(const values *v, const char *path, ebpo_progress progr
     return status;
 }
 
-static int run(int argc, char **argv)
+static const values usual = { .remote = REMOTE_VALUES_INIT };
+
+static int run(void *given, const char **operand)
 {
-    values v = { .remote = REMOTE_VALUES_INIT };
-    const char *operand[ARGS_OPERANDS_MAX];
-    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
-    if (parsed != ARGS_RUN)
-        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
-    if (!memory_good("verify", &v.memory))
+    values *v = given;
+    if (!memory_good("verify", &v->memory))
         return EXIT_USAGE;
     if (!command_wants_hdf5("verify", operand[0]))
         return EXIT_FAILED;
     progress_line line;
-    ebpo_progress progress = progress_start(&line, "verify", v.quiet);
+    ebpo_progress progress = progress_start(&line, "verify", v->quiet);
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_verify_report report;
     traffic t;
-    ebpo_status status = verify(&v, operand[0], progress, &report, &t, &error);
+    ebpo_status status = verify(v, operand[0], progress, &report, &t, &error);
     progress_wipe(&line);
     if (status != EBPO_OK)
         return command_failed("verify", &error);
-    if (v.json)
-        print_json(&report, operand[0], &t, &v.remote);
-    else if (!v.quiet)
+    if (v->json)
+        print_json(&report, operand[0], &t, &v->remote);
+    else if (!v->quiet)
         print_words(&report, remote_shown(operand[0]));
     command_flush("verify");
     print_violations(&report, remote_shown(operand[0]));
-    if (!v.json)
-        remote_tell(&t, &v.remote, false);
+    if (!v->json)
+        remote_tell(&t, &v->remote, false);
     return report.violations ? EXIT_FAILED : EXIT_FINE;
 }
 
-const command command_verify = { &spec, run };
+const command command_verify = { &spec, sizeof usual, &usual, run };

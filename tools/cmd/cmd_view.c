@@ -27,37 +27,32 @@ typedef struct values {
 static const char *const order_words[] = { "level", "distance", "pixels", "front-to-back", NULL };
 
 static const arg_option options[] = {
-    { "order", 0, ARG_WORD, offsetof(values, order), "ORDER",
-      "what comes first: level, distance, pixels (the largest) or\nfront-to-back; the default: "
-      "pixels with --eye, else level",
-      0, 0, order_words },
-    { "eye", 0, ARG_TEXT, offsetof(values, eye), "X,Y,Z",
-      "where the observer is, in the model's unit", 0, 0, NULL },
-    { "look", 0, ARG_TEXT, offsetof(values, look), "X,Y,Z",
-      "the point looked at; the default: all around", 0, 0, NULL },
-    { "up", 0, ARG_TEXT, offsetof(values, up), "X,Y,Z", "the direction upwards; the default: 0,1,0",
-      0, 0, NULL },
-    { "fov", 0, ARG_REAL, offsetof(values, fov), "DEGREES",
-      "vertical angle of view; the default: 45", 0.001, 179.999, NULL },
-    { "size", 0, ARG_TEXT, offsetof(values, size), "WxH",
-      "of the picture, in pixels; the default: 1280x720", 0, 0, NULL },
-    { "pixels", 0, ARG_REAL, offsetof(values, pixels), "P",
-      "do not refine nodes that are no larger on the picture", 1e-9, 1e9, NULL },
-    { "distance", 0, ARG_REAL, offsetof(values, distance), "D",
-      "do not refine nodes that are farther away", 0, 1e300, NULL },
-    { "to", 0, ARG_INT, offsetof(values, to), "L", "end with level L", 0, 20, NULL },
-    ARG_SWITCH("seen-only", 0, values, seen_only,
-               "do not refine what is outside the picture; else that comes last"),
-    { "bytes", 0, ARG_TEXT, offsetof(values, bytes), "SIZE",
-      "stop before more of the file is read than this: 512K, 4M", 0, 0, NULL },
-    { "count", 0, ARG_INT, offsetof(values, count), "N",
-      "stop before more nodes than this have come", 1, 1e15, NULL },
-    { "memory", 0, ARG_TEXT, offsetof(values, memory), "SIZE",
-      "for decoded chunks; the default: no limit", 0, 0, NULL },
-    { "out", 'o', ARG_TEXT, offsetof(values, out), "CUT.ply",
-      "write the envelopes of the cut as closed polygons", 0, 0, NULL },
-    ARG_SWITCH("nodes", 0, values, nodes, "a line for each node as well, in the order of arrival"),
-    ARG_SWITCH("json", 0, values, json, "print all of it as JSON"),
+    OPTION_WORD(
+        "order", 0, values, order, "ORDER", order_words,
+        "what comes first: level, distance, pixels (the largest) or front-to-back; the default: "
+        "pixels with --eye, else level"),
+    OPTION_TEXT("eye", 0, values, eye, "X,Y,Z", "where the observer is, in the model's unit"),
+    OPTION_TEXT("look", 0, values, look, "X,Y,Z", "the point looked at; the default: all around"),
+    OPTION_TEXT("up", 0, values, up, "X,Y,Z", "the direction upwards; the default: 0,1,0"),
+    OPTION_REAL("fov", 0, values, fov, "DEGREES", 0.001, 179.999,
+                "vertical angle of view; the default: 45"),
+    OPTION_TEXT("size", 0, values, size, "WxH", "of the picture, in pixels; the default: 1280x720"),
+    OPTION_REAL("pixels", 0, values, pixels, "P", 1e-9, 1e9,
+                "do not refine nodes that are no larger on the picture"),
+    OPTION_REAL("distance", 0, values, distance, "D", 0, 1e300,
+                "do not refine nodes that are farther away"),
+    OPTION_INT("to", 0, values, to, "L", 0, 20, "end with level L"),
+    OPTION_FLAG("seen-only", 0, values, seen_only,
+                "do not refine what is outside the picture; else that comes last"),
+    OPTION_TEXT("bytes", 0, values, bytes, "SIZE",
+                "stop before more of the file is read than this: 512K, 4M"),
+    OPTION_INT("count", 0, values, count, "N", 1, 1e15,
+               "stop before more nodes than this have come"),
+    OPTION_TEXT("memory", 0, values, memory, "SIZE", "for decoded chunks; the default: no limit"),
+    OPTION_TEXT("out", 'o', values, out, "CUT.ply",
+                "write the envelopes of the cut as closed polygons"),
+    OPTION_FLAG("nodes", 0, values, nodes, "a line for each node as well, in the order of arrival"),
+    OPTION_FLAG("json", 0, values, json, "print all of it as JSON"),
     REMOTE_OPTIONS(values, remote),
     { 0 },
 };
@@ -299,36 +294,34 @@ static ebpo_status tell(printer *p, ebpo_file *file, const char *path,
     return status;
 }
 
-static int run(int argc, char **argv)
+static const values usual = { .order = -1,
+                              .fov = -1,
+                              .pixels = -1,
+                              .distance = -1,
+                              .to = -1,
+                              .count = -1,
+                              .remote = REMOTE_VALUES_INIT };
+
+static int run(void *given, const char **operand)
 {
-    values v = { .order = -1,
-                 .fov = -1,
-                 .pixels = -1,
-                 .distance = -1,
-                 .to = -1,
-                 .count = -1,
-                 .remote = REMOTE_VALUES_INIT };
-    const char *operand[ARGS_OPERANDS_MAX];
-    arg_result parsed = args_parse(&spec, argc, argv, &v, operand);
-    if (parsed != ARGS_RUN)
-        return parsed == ARGS_HELPED ? EXIT_FINE : EXIT_USAGE;
+    values *v = given;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
     ebpo_observer observer = EBPO_OBSERVER_INIT;
     ebpo_view_options wanted = EBPO_VIEW_OPTIONS_INIT;
-    printer p = { .v = &v, .begin = progress_now() };
-    int code = check_values(&v);
+    printer p = { .v = v, .begin = progress_now() };
+    int code = check_values(v);
     if (code != EXIT_FINE)
         return code;
-    if (!read_options(&v, &wanted, &observer))
+    if (!read_options(v, &wanted, &observer))
         return EXIT_USAGE;
-    if (v.out && command_same_file(operand[0], v.out))
+    if (v->out && command_same_file(operand[0], v->out))
         return usage("FILE is input and output at once; give --out another name");
     if (!command_wants_hdf5("view", operand[0]))
         return EXIT_FAILED;
-    if (remote_open(&file, operand[0], &v.remote, &error) != EBPO_OK)
+    if (remote_open(&file, operand[0], &v->remote, &error) != EBPO_OK)
         return command_failed("view", &error);
-    bool there = command_has_level("view", ebpo_file_info(file), v.to), arrived = true;
+    bool there = command_has_level("view", ebpo_file_info(file), v->to), arrived = true;
     ebpo_status status = there ? tell(&p, file, operand[0], &wanted, &arrived, &error) : EBPO_OK;
     ebpo_close(file);
     if (!there)
@@ -338,4 +331,4 @@ static int run(int argc, char **argv)
     return status == EBPO_OK ? EXIT_FINE : command_failed("view", &error);
 }
 
-const command command_view = { &spec, run };
+const command command_view = { &spec, sizeof usual, &usual, run };

@@ -6,7 +6,10 @@
 
 typedef struct command {
     const arg_spec *spec;
-    int (*run)(int argc, char **argv); /* argv[0] is the command's name; returns the exit code */
+    size_t size;       /* of the struct that spec->options fills */
+    const void *usual; /* what is in it before */
+    /* operand[ARGS_OPERANDS_MAX], NULL where none was given; returns the exit code */
+    int (*run)(void *values, const char **operand);
 } command;
 
 extern const command command_convert, command_check, command_info, command_levels, command_extract,

@@ -1,6 +1,7 @@
 /* The command line: `ebpo COMMAND ...`. One table of commands, one cmd_*.c for each. */
 #include <fenv.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -64,6 +65,23 @@ static int help(int argc, char **argv)
     return EXIT_FINE;
 }
 
+static int run(const command *c, int argc, char **argv)
+{
+    const char *operand[ARGS_OPERANDS_MAX];
+    void *values = malloc(c->size);
+    if (!values) {
+        fprintf(stderr, "ebpo %s: not enough memory\n", c->spec->command);
+        return EXIT_FAILED;
+    }
+    memcpy(values, c->usual, c->size);
+    arg_result parsed = args_parse(c->spec, argc, argv, values, operand);
+    int code = parsed == ARGS_RUN      ? c->run(values, operand)
+               : parsed == ARGS_HELPED ? EXIT_FINE
+                                       : EXIT_USAGE;
+    free(values);
+    return code;
+}
+
 static int dispatch(int argc, char **argv)
 {
     if (argc < 2) {
@@ -80,7 +98,7 @@ static int dispatch(int argc, char **argv)
     if (strcmp(name, "help") == 0 || strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0)
         return help(argc, argv);
     const command *c = find(name);
-    return c ? c->run(argc - 1, argv + 1) : unknown_command(name);
+    return c ? run(c, argc - 1, argv + 1) : unknown_command(name);
 }
 
 int main(int argc, char **argv)

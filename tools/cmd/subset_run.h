@@ -24,82 +24,35 @@ extern const char *const profile_words[];
 
 /* Rows for the tables of options of a command whose values are a subset_values. */
 #define SUBSET_OPTIONS                                                                             \
-    { "levels", 0,                                                                                 \
-      ARG_TEXT, offsetof(subset_values, levels),                                                   \
-      "0-N",    "keep levels 0 to N only; without mesh, unless --parts or\n--profile asks for it", \
-      0,        0,                                                                                 \
-      NULL },                                                                                      \
-        { "box",                                                                                   \
-          0,                                                                                       \
-          ARG_TEXT,                                                                                \
-          offsetof(subset_values, box),                                                            \
-          "X0,Y0,Z0,X1,Y1,Z1",                                                                     \
-          "keep what meets this box only",                                                         \
-          0,                                                                                       \
-          0,                                                                                       \
-          NULL },                                                                                  \
-        { "parts",                                                                                 \
-          0,                                                                                       \
-          ARG_TEXT,                                                                                \
-          offsetof(subset_values, parts),                                                          \
-          "LIST",                                                                                  \
-          "keep these of mesh, maps, envelopes, leaf-planes; with a\nminus sign before each: all " \
-          "but these",                                                                             \
-          0,                                                                                       \
-          0,                                                                                       \
-          NULL },                                                                                  \
-        { "profile",                                                                               \
-          0,                                                                                       \
-          ARG_WORD,                                                                                \
-          offsetof(subset_values, profile),                                                        \
-          "NAME",                                                                                  \
-          "full: all parts; lod: envelopes, leaf-planes, for viewers;\ncollision: mesh, "          \
-          "envelopes, for exact questions",                                                        \
-          0,                                                                                       \
-          0,                                                                                       \
-          profile_words },                                                                         \
-        { "codec",    0,                                                                           \
-          ARG_WORD,   offsetof(subset_values, codec),                                              \
-          "NAME",     "zstd, deflate or none; default: as in the input",                           \
-          0,          0,                                                                           \
-          codec_words },                                                                           \
-        { "zstd-level",                                                                            \
-          0,                                                                                       \
-          ARG_INT,                                                                                 \
-          offsetof(subset_values, zstd_level),                                                     \
-          "N",                                                                                     \
-          "effort of zstd, 1 to 22; default 3",                                                    \
-          1,                                                                                       \
-          22,                                                                                      \
-          NULL },                                                                                  \
-        { "threads", 0,                                                                            \
-          ARG_INT,   offsetof(subset_values, threads),                                             \
-          "N",       "threads; 0, the default: all cores",                                         \
-          0,         256,                                                                          \
-          NULL },                                                                                  \
-        ARG_SWITCH("json", 0, subset_values, json, "print the facts of the result as JSON"),       \
-        ARG_SWITCH("quiet", 'q', subset_values, quiet,                                             \
-                   "no summary, no progress: errors and warnings only"),                           \
-        REMOTE_OPTIONS(subset_values, remote)
+    OPTION_TEXT("levels", 0, subset_values, levels, "0-N",                                         \
+                "keep levels 0 to N only; without mesh, unless --parts or --profile asks for it"), \
+        OPTION_TEXT("box", 0, subset_values, box, "X0,Y0,Z0,X1,Y1,Z1",                             \
+                    "keep what meets this box only"),                                              \
+        OPTION_TEXT("parts", 0, subset_values, parts, "LIST",                                      \
+                    "keep these of mesh, maps, envelopes, leaf-planes; with a minus sign before "  \
+                    "each: all "                                                                   \
+                    "but these"),                                                                  \
+        OPTION_WORD("profile", 0, subset_values, profile, "NAME", profile_words,                   \
+                    "full: all parts; lod: envelopes, leaf-planes, for viewers; collision: mesh, " \
+                    "envelopes, for exact questions"),                                             \
+        OPTION_WORD("codec", 0, subset_values, codec, "NAME", codec_words,                         \
+                    "zstd, deflate or none; default: as in the input"),                            \
+        OPTION_INT("zstd-level", 0, subset_values, zstd_level, "N", 1, 22,                         \
+                   "effort of zstd, 1 to 22; default 3"),                                          \
+        OPTION_THREADS(subset_values, threads),                                                    \
+        OPTION_FLAG("json", 0, subset_values, json, "print the facts of the result as JSON"),      \
+        OPTION_QUIET(subset_values, quiet), REMOTE_OPTIONS(subset_values, remote)
 
 /* The same for choosing by need, which takes the whole model: `ebpo subset` only. */
-#define NEED_OPTIONS(type)                                                                       \
-    { "max-error",                                                                               \
-      0,                                                                                         \
-      ARG_REAL,                                                                                  \
-      offsetof(type, max_error),                                                                 \
-      "E",                                                                                       \
-      "refine only where envelopes may reach more than E beyond the\nmodel (in its unit): what " \
-      "is left out is certainly closer",                                                         \
-      0,                                                                                         \
-      1.7976931348623157e308,                                                                    \
-      NULL },                                                                                    \
-    {                                                                                            \
-        "target-size", 0, ARG_TEXT, offsetof(type, target_size), "S",                            \
-            "at most so many bytes (k, M, G: powers of 1024), with the least\n--max-error for "  \
-            "which that holds; which parts are kept is\nchosen too, unless said",                \
-            0, 0, NULL                                                                           \
-    }
+#define NEED_OPTIONS(type)                                                                        \
+    OPTION_REAL(                                                                                  \
+        "max-error", 0, type, max_error, "E", 0, 1.7976931348623157e308,                          \
+        "refine only where envelopes may reach more than E beyond the model (in its unit): what " \
+        "is left out is certainly closer"),                                                       \
+        OPTION_TEXT(                                                                              \
+            "target-size", 0, type, target_size, "S",                                             \
+            "at most so many bytes (k, M, G: powers of 1024), with the least --max-error for "    \
+            "which that holds; which parts are kept is chosen too, unless said")
 
 /* The two, read; the exit code. */
 int subset_need(const char *name, double max_error, const char *target_size,
