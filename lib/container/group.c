@@ -240,18 +240,18 @@ static uint64_t add_small(ebpo_chunks *chunks, int level, unsigned wanted, ebpo_
 
 /* Adds the chunks for which reading the group would wait next; false: for none. Reads from memory
  * only, and leaves errors to the reading. */
-static bool missing(ebpo_chunks *chunks, const ebpo_group_place *place, unsigned wanted,
+static bool missing(ebpo_chunks *chunks, const ebpo_group_number *number, unsigned wanted,
                     ebpo_chunk_keys *keys)
 {
     uint32_t parts = chunks->file->info.parts;
-    int level = place->level;
+    int level = number->level;
     uint64_t counts[4], first;
     ebpo_group group;
-    if (missing_counted(chunks, EBPO_A_TYPES_INDEX, EBPO_A_TYPES, level, place->group, 1, keys)) {
+    if (missing_counted(chunks, EBPO_A_TYPES_INDEX, EBPO_A_TYPES, level, number->group, 1, keys)) {
         (void)add_small(chunks, level, wanted, keys);
         return true;
     }
-    if (read_types(chunks, level, place->group, &group, counts, NULL) != EBPO_OK)
+    if (read_types(chunks, level, number->group, &group, counts, NULL) != EBPO_OK)
         return false;
     bool gray = wanted & EBPO_GROUP_PLANES && parts & EBPO_PART_PLANES && counts[EBPO_GRAY];
     bool leaf = wanted & EBPO_GROUP_PLANES && parts & EBPO_PART_LEAF_PLANES && counts[EBPO_LEAF],
@@ -276,13 +276,13 @@ static bool missing(ebpo_chunks *chunks, const ebpo_group_place *place, unsigned
     return any;
 }
 
-bool ebpo_group_is_far(ebpo_chunks *chunks, const ebpo_group_place *place, unsigned wanted)
+bool ebpo_group_is_far(ebpo_chunks *chunks, const ebpo_group_number *number, unsigned wanted)
 {
     ebpo_chunk_keys keys = { .count = 0 };
-    return ebpo_input_expects(&chunks->file->in) && missing(chunks, place, wanted, &keys);
+    return ebpo_input_expects(&chunks->file->in) && missing(chunks, number, wanted, &keys);
 }
 
-ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_place *places, unsigned count,
+ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_number *groups, unsigned count,
                              unsigned wanted, ebpo_error *error)
 {
     enum {
@@ -292,16 +292,16 @@ ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_place *places
     ebpo_status status = EBPO_OK;
     for (int stage = 0; stage < STAGES && status == EBPO_OK; stage++) {
         ebpo_chunk_keys keys = { .count = 0 };
-        if (!missing(chunks, &places[0], wanted, &keys))
+        if (!missing(chunks, &groups[0], wanted, &keys))
             break;
         unsigned own = keys.count;
         uint64_t small = 0;
         for (int level = 1;
-             places[0].level == 0 && level < chunks->file->info.level_count && small < FIRST_BYTES;
+             groups[0].level == 0 && level < chunks->file->info.level_count && small < FIRST_BYTES;
              level++)
             small += add_small(chunks, level, wanted, &keys);
         for (unsigned i = 1; i < count; i++)
-            (void)missing(chunks, &places[i], wanted, &keys);
+            (void)missing(chunks, &groups[i], wanted, &keys);
         ebpo_chunks_announce(chunks, keys.key, own, keys.count);
         for (unsigned i = 0; i < own && status == EBPO_OK; i++) {
             void *item;

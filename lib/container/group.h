@@ -23,24 +23,24 @@ typedef struct ebpo_group {
 /* Group number `group` of a level, that is, of the gray node with that rank in the level before;
  * level 0 has group 0, of which only octant 0 exists. `chunks` are counted ones
  * (ebpo_chunks_make_counted): EBPO_E_LIMIT when that stops the reading; what was read until then
- * stays in memory for another try. Checked as ebpo_place_children and ebpo_place_planes do. */
+ * stays in memory for another try. Checked as ebpo_chunks_children and ebpo_chunks_planes do. */
 EBPO_MUST_USE ebpo_status ebpo_group_read(ebpo_chunks *chunks, int level, uint64_t group,
                                           unsigned wanted, ebpo_group *out, ebpo_error *error);
 
-/* Where reading on would begin to wait for the file. */
-typedef struct ebpo_group_place {
+/* A group of a level, by its number. */
+typedef struct ebpo_group_number {
     int level;
     uint64_t group;
-} ebpo_group_place;
+} ebpo_group_number;
 
 /* True when the file is far away (its source wants to know what will be read) and the group is not
  * in memory as a whole. */
-bool ebpo_group_is_far(ebpo_chunks *chunks, const ebpo_group_place *place, unsigned wanted);
+bool ebpo_group_is_far(ebpo_chunks *chunks, const ebpo_group_number *group, unsigned wanted);
 
 /* For files far away: fetches what the first of these groups takes and is not in memory, and
  * announces with it what the others take, as far as that can be told. Of groups that stand close
  * together (in one block of EBPO_GROUP_BLOCK) one is enough. EBPO_E_LIMIT as ebpo_group_read. */
-EBPO_MUST_USE ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_place *places,
+EBPO_MUST_USE ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_number *groups,
                                            unsigned count, unsigned wanted, ebpo_error *error);
 
 #endif

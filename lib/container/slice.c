@@ -31,17 +31,17 @@ typedef struct range {
     uint64_t rank[4], count[4];
 } range;
 
-static ebpo_status root_range(const ebpo_chunks *chunks, const ebpo_place *root, range *out,
+static ebpo_status root_range(const ebpo_chunks *chunks, const ebpo_node *root, range *out,
                               ebpo_error *error)
 {
     if (root->type != EBPO_GRAY && root->type != EBPO_LEAF)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "%s: the subtree of a white or black node is asked for; it has none",
                          chunks->file->in.shown);
-    *out = (range){ .level = root->level };
+    *out = (range){ .level = root->cell.level };
     out->rank[root->type] = root->rank;
     out->count[root->type] = 1;
-    return ebpo_place_check(chunks, root, error);
+    return ebpo_chunks_check_node(chunks, root, error);
 }
 
 /* Whether the range has a next level: the gray nodes of the last one are pruned. */
@@ -224,7 +224,7 @@ static ebpo_status read_nodes(ebpo_chunks *chunks, const range *r, ebpo_level *o
     return status == EBPO_OK ? read_leaves(chunks, r, out, error) : status;
 }
 
-static ebpo_status read_levels(ebpo_slice *slice, ebpo_chunks *chunks, const ebpo_place *root,
+static ebpo_status read_levels(ebpo_slice *slice, ebpo_chunks *chunks, const ebpo_node *root,
                                ebpo_error *error)
 {
     range r;
@@ -272,7 +272,8 @@ static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
                 w->slice->first_face = arrays->leaf_first[i];
             w->begun = true;
             if (arrays->leaf_first[i] != w->slice->first_face + w->slice->face_count)
-                return ebpo_chunks_fail(w->chunks, w->slice->root.level + level, EBPO_A_LEAF_SKIP,
+                return ebpo_chunks_fail(w->chunks, w->slice->root.cell.level + level,
+                                        EBPO_A_LEAF_SKIP,
                                         "the leaves' new faces are not in depth-first order",
                                         error);
             w->slice->face_count += arrays->leaf_new[i];
@@ -281,7 +282,7 @@ static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
     return EBPO_OK;
 }
 
-ebpo_status ebpo_slice_read(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_place *root,
+ebpo_status ebpo_slice_read(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_node *root,
                             ebpo_error *error)
 {
     memset(out, 0, sizeof *out);
@@ -322,7 +323,7 @@ static ebpo_status measure_leaves(ebpo_chunks *chunks, const range *r, ebpo_slic
     return status;
 }
 
-ebpo_status ebpo_slice_measure(ebpo_chunks *chunks, const ebpo_place *root, ebpo_slice_size *out,
+ebpo_status ebpo_slice_measure(ebpo_chunks *chunks, const ebpo_node *root, ebpo_slice_size *out,
                                ebpo_error *error)
 {
     range r;
@@ -336,6 +337,6 @@ ebpo_status ebpo_slice_measure(ebpo_chunks *chunks, const ebpo_place *root, ebpo
         if (status == EBPO_OK)
             status = measure_leaves(chunks, &r, out, error);
     }
-    out->outer = root->level == 0 ? 0 : out->refs;
+    out->outer = root->cell.level == 0 ? 0 : out->refs;
     return status;
 }

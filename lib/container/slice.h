@@ -1,4 +1,4 @@
-/* Parts of a file: ranges of arrays through a cache of decoded chunks, nodes by place, and whole
+/* Parts of a file: ranges of arrays through a cache of decoded chunks, nodes, and whole
  * subtrees as one piece. Everything that comes out has been checked: a hostile file gives
  * EBPO_E_FORMAT, never an index out of range. Any thread. */
 #ifndef EBPO_CONTAINER_SLICE_H
@@ -8,6 +8,7 @@
 
 #include "cache/cache.h"
 #include "container/schema.h"
+#include "octree/node.h"
 
 /* Decoded chunks under a budget (0: no limit; the smallest that works is a few MiB). */
 typedef struct ebpo_chunks ebpo_chunks;
@@ -29,33 +30,22 @@ EBPO_MUST_USE ebpo_status ebpo_chunks_integers(ebpo_chunks *chunks, ebpo_array_i
                                                uint64_t row, uint64_t rows, void *values,
                                                size_t size, ebpo_error *error);
 
-/* A node by level, position and rank among the nodes of its type in its level. */
-typedef struct ebpo_place {
-    int level;
-    uint32_t at[3];
-    ebpo_node_type type;
-    uint64_t rank;
-    /* gray, and known to have no children in the file; callers find out: nothing in slice.h looks
-     * at it */
-    bool pruned;
-} ebpo_place;
-
 /* The children of a gray node: the group's types, and the rank of the group's first node of each
  * type (indexed by ebpo_node_type) in level + 1. Of a pruned node the types are 0 (and the file's
  * info says `pruned`). */
-EBPO_MUST_USE ebpo_status ebpo_place_children(ebpo_chunks *chunks, const ebpo_place *gray,
-                                              uint16_t *types, uint64_t ranks[4],
-                                              ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_chunks_children(ebpo_chunks *chunks, const ebpo_node *gray,
+                                               uint16_t *types, uint64_t ranks[4],
+                                               ebpo_error *error);
 
 /* Plane codes that a gray node adds; at most 255 into `codes`. *count is 0 without the part. */
-EBPO_MUST_USE ebpo_status ebpo_place_planes(ebpo_chunks *chunks, const ebpo_place *gray,
-                                            uint32_t codes[255], uint32_t *count,
-                                            ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_chunks_planes(ebpo_chunks *chunks, const ebpo_node *gray,
+                                             uint32_t codes[255], uint32_t *count,
+                                             ebpo_error *error);
 
 /* Winding number that the file gives for a white, black or leaf node (leaf: lowest corner). Solids
  * only. */
-EBPO_MUST_USE ebpo_status ebpo_place_winding(ebpo_chunks *chunks, const ebpo_place *place,
-                                             int32_t *winding, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_chunks_winding(ebpo_chunks *chunks, const ebpo_node *node,
+                                              int32_t *winding, ebpo_error *error);
 
 /* A subtree (or the whole tree) with everything that its leaves list. Levels are counted from its
  * root: level[0] has one group, of which only octant 0 exists and is the root. Faces have local
@@ -64,7 +54,7 @@ EBPO_MUST_USE ebpo_status ebpo_place_winding(ebpo_chunks *chunks, const ebpo_pla
  * face_count - 1 in the file. leaf_first and leaf_refs of the levels hold local numbers. No planes
  * of leaves. */
 typedef struct ebpo_slice {
-    ebpo_place root;
+    ebpo_node root;
     /* the file is a subset: empty groups are those of pruned nodes, as are gray nodes on the last
      * level */
     bool pruned;
@@ -83,19 +73,19 @@ void ebpo_slice_free(ebpo_slice *slice);
 
 /* Reads the subtree of a gray node, or a single leaf. EBPO_E_ABSENT without mesh. */
 EBPO_MUST_USE ebpo_status ebpo_slice_read(ebpo_slice *out, ebpo_chunks *chunks,
-                                          const ebpo_place *root, ebpo_error *error);
+                                          const ebpo_node *root, ebpo_error *error);
 
 /* The whole tree, on `threads` threads (0: all cores), without a cache of chunks. */
 EBPO_MUST_USE ebpo_status ebpo_slice_read_all(ebpo_slice *out, ebpo_file *file, unsigned threads,
                                               ebpo_error *error);
 
-/* What ebpo_slice_read of this place will need, without reading its faces: nodes, leaves, listed
+/* What ebpo_slice_read of this node will need, without reading its faces: nodes, leaves, listed
  * and new faces. */
 typedef struct ebpo_slice_size {
     uint64_t groups, leaves, refs, new_faces;
     uint64_t outer; /* of the faces that are new elsewhere there are at most so many */
 } ebpo_slice_size;
-EBPO_MUST_USE ebpo_status ebpo_slice_measure(ebpo_chunks *chunks, const ebpo_place *root,
+EBPO_MUST_USE ebpo_status ebpo_slice_measure(ebpo_chunks *chunks, const ebpo_node *root,
                                              ebpo_slice_size *out, ebpo_error *error);
 
 /* Which file number a local face has. */

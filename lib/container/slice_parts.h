@@ -115,9 +115,9 @@ EBPO_MUST_USE ebpo_status ebpo_ranks_leaf(ebpo_chunks *chunks, int level, uint64
 EBPO_MUST_USE ebpo_status ebpo_ranks_leaf_planes(ebpo_chunks *chunks, int level, uint64_t leaf,
                                                  uint64_t *planes, ebpo_error *error);
 
-/* A place that the file has, as far as the head tells; else EBPO_E_ARGUMENT. */
-EBPO_MUST_USE ebpo_status ebpo_place_check(const ebpo_chunks *chunks, const ebpo_place *place,
-                                           ebpo_error *error);
+/* A node that the file has, as far as the head tells; else EBPO_E_ARGUMENT. */
+EBPO_MUST_USE ebpo_status ebpo_chunks_check_node(const ebpo_chunks *chunks, const ebpo_node *node,
+                                                 ebpo_error *error);
 
 /* --- compact.c: different numbers, sorted, and the place of each --- */
 

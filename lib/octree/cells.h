@@ -57,6 +57,17 @@ static inline bool ebpo_cell_neighbour(ebpo_cell cell, const int step[3], ebpo_c
 /* Two cells, of any levels and closed, have a point in common. */
 bool ebpo_cells_touch(ebpo_cell a, ebpo_cell b);
 
+/* The closed cell has a point in common with the box [min, max]. */
+static inline bool ebpo_cell_meets(const ebpo_box *box, ebpo_cell cell, const double min[3],
+                                   const double max[3])
+{
+    for (int k = 0; k < 3; k++)
+        if (ebpo_wall(box, k, cell.level, cell.at[k]) > max[k] ||
+            ebpo_wall(box, k, cell.level, cell.at[k] + 1) < min[k])
+            return false;
+    return true;
+}
+
 /* Volume of each cell of a level, in the model's unit cubed. */
 double ebpo_cell_volume(const ebpo_box *box, int level);
 

@@ -12,7 +12,6 @@
 #include "query/clock.h"
 #include "query/inside.h"
 #include "query/limited.h"
-#include "query/locate.h"
 #include "query/modes.h"
 #include "query/nearest.h"
 #include "query/options.h"
@@ -23,22 +22,22 @@
 
 /* Loading can wait: what is in memory, or nearer, may tell that it is not needed. Not under a
  * deadline, which might pass before anything is loaded, each time. */
-static bool put_off(ebpo_context *c, const ebpo_nearest *n, const ebpo_spot *spot, double lower)
+static bool put_off(ebpo_context *c, const ebpo_nearest *n, const ebpo_node *node, double lower)
 {
-    uint64_t key = ebpo_entry_value(spot->entry);
+    uint64_t key = ebpo_entry_value(node->entry);
     if (n->deadline || (c->pinned && c->pinned_key == key) ||
         ebpo_cache_has(c->model->cache, key) ||
         !ebpo_grow(&c->later, &c->later_capacity, c->later_count + 1, sizeof *c->later))
         return false;
-    c->later[c->later_count++] = (ebpo_ranked){ *spot, lower };
+    c->later[c->later_count++] = (ebpo_ranked){ *node, lower };
     return true;
 }
 
-static ebpo_status search_below(ebpo_context *c, ebpo_nearest *n, ebpo_spot spot, ebpo_error *error)
+static ebpo_status search_below(ebpo_context *c, ebpo_nearest *n, ebpo_node node, ebpo_error *error)
 {
-    ebpo_status status = ebpo_spot_enter(c, &spot, error);
+    ebpo_status status = ebpo_model_enter(c, &node, error);
     if (status == EBPO_OK)
-        ebpo_nearest_search(n, c, spot.subtree);
+        ebpo_nearest_search(n, c, node.subtree);
     return status;
 }
 
@@ -51,23 +50,23 @@ static bool is_late(ebpo_nearest *n, double lower)
     return true;
 }
 
-static ebpo_status search_top(ebpo_context *c, ebpo_nearest *n, const ebpo_box *box, ebpo_spot spot,
+static ebpo_status search_top(ebpo_context *c, ebpo_nearest *n, const ebpo_box *box, ebpo_node node,
                               double lower, ebpo_error *error)
 {
-    if (lower > n->limit || ebpo_spot_is_uniform(&spot) || is_late(n, lower) ||
-        ebpo_spot_is_pruned(c->model, &spot)) /* pruned: see look_at_pruned */
+    if (lower > n->limit || ebpo_node_is_uniform(&node) || is_late(n, lower) ||
+        node.pruned) /* pruned: see look_at_pruned */
         return EBPO_OK;
-    if (ebpo_spot_is_below(&spot)) {
+    if (ebpo_node_is_below(&node)) {
         /* it holds some face */
-        n->upper = fmin(n->upper, ebpo_cell_far(box, spot.level, spot.at, n->p));
+        n->upper = fmin(n->upper, ebpo_cell_far(box, node.cell, n->p));
         n->limit = fmin(n->limit, n->upper);
-        return put_off(c, n, &spot, lower) ? EBPO_OK : search_below(c, n, spot, error);
+        return put_off(c, n, &node, lower) ? EBPO_OK : search_below(c, n, node, error);
     }
     ebpo_ranked child[8];
-    int count = ebpo_rank_children(c->model, box, &spot, lower, n->p, child);
+    int count = ebpo_rank_children(c->model, box, &node, lower, n->p, child);
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < count && status == EBPO_OK; i++)
-        status = search_top(c, n, box, child[i].spot, child[i].lower, error);
+        status = search_top(c, n, box, child[i].node, child[i].lower, error);
     return status;
 }
 
@@ -76,7 +75,7 @@ static int compare_ranked(const void *x, const void *y)
     const ebpo_ranked *a = x, *b = y;
     if (a->lower != b->lower)
         return a->lower < b->lower ? -1 : 1;
-    return (a->spot.entry > b->spot.entry) - (a->spot.entry < b->spot.entry);
+    return (a->node.entry > b->node.entry) - (a->node.entry < b->node.entry);
 }
 
 /* The nearest first: then none is loaded that a nearer one makes needless. */
@@ -86,7 +85,7 @@ static ebpo_status search_later(ebpo_context *c, ebpo_nearest *n, ebpo_error *er
     qsort(c->later, c->later_count, sizeof *c->later, compare_ranked);
     for (uint64_t i = 0; i < c->later_count && status == EBPO_OK; i++)
         if (c->later[i].lower <= n->limit)
-            status = search_below(c, n, c->later[i].spot, error);
+            status = search_below(c, n, c->later[i].node, error);
     return status;
 }
 
@@ -98,31 +97,31 @@ static ebpo_status search_everything(ebpo_context *c, ebpo_nearest *n, ebpo_erro
     }
     ebpo_box box = ebpo_model_box(c->model);
     c->later_count = 0;
-    ebpo_status status = search_top(c, n, &box, ebpo_spot_root(c->model), 0, error);
+    ebpo_status status = search_top(c, n, &box, ebpo_model_root(c->model), 0, error);
     return status == EBPO_OK && c->later_count ? search_later(c, n, error) : status;
 }
 
 /* --- subsets: when a face that was left out may be nearer than what was found --- */
 
 static ebpo_status pruned_within(ebpo_context *c, const ebpo_nearest *n, const ebpo_box *box,
-                                 ebpo_spot spot, double lower, double *nearest, ebpo_error *error)
+                                 ebpo_node node, double lower, double *nearest, ebpo_error *error)
 {
     const ebpo_model *m = c->model;
     ebpo_status status = EBPO_OK;
-    if (lower > n->limit || ebpo_spot_is_uniform(&spot) || !ebpo_spot_is_gray(m, &spot))
+    if (lower > n->limit || ebpo_node_is_uniform(&node) || node.type != EBPO_GRAY)
         return EBPO_OK;
-    if (ebpo_spot_is_pruned(m, &spot) || (ebpo_spot_is_below(&spot) && n->late)) {
+    if (node.pruned || (ebpo_node_is_below(&node) && n->late)) {
         *nearest = fmin(*nearest, lower);
-        return n->late ? EBPO_OK : ebpo_fail_pruned(m, spot.level, spot.at, error);
+        return n->late ? EBPO_OK : ebpo_fail_pruned(m, node.cell, error);
     }
-    if (ebpo_spot_is_below(&spot))
-        status = ebpo_spot_enter(c, &spot, error);
+    if (ebpo_node_is_below(&node))
+        status = ebpo_model_enter(c, &node, error);
     if (status != EBPO_OK)
         return status;
     ebpo_ranked child[8];
-    int count = ebpo_rank_children(m, box, &spot, lower, n->p, child);
+    int count = ebpo_rank_children(m, box, &node, lower, n->p, child);
     for (int i = 0; i < count && status == EBPO_OK; i++)
-        status = pruned_within(c, n, box, child[i].spot, child[i].lower, nearest, error);
+        status = pruned_within(c, n, box, child[i].node, child[i].lower, nearest, error);
     return status;
 }
 
@@ -131,12 +130,12 @@ static ebpo_status pruned_within(ebpo_context *c, const ebpo_nearest *n, const e
 static ebpo_status look_at_pruned(ebpo_context *c, ebpo_nearest *n, ebpo_error *error)
 {
     ebpo_box box = ebpo_model_box(c->model);
-    ebpo_spot root = ebpo_spot_root(c->model);
+    ebpo_node root = ebpo_model_root(c->model);
     double nearest = INFINITY;
     if (!c->model->info->pruned)
         return EBPO_OK;
     ebpo_status status =
-        pruned_within(c, n, &box, root, ebpo_spot_distance(c->model, &box, &root, 0, n->p),
+        pruned_within(c, n, &box, root, ebpo_model_lower_bound(c->model, &box, &root, 0, n->p),
                       &nearest, error);
     n->passed_over = fmin(n->passed_over, nearest);
     return status;
@@ -180,7 +179,7 @@ static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_query_op
     if (n.late && n.passed_over <= n.limit) {
         /* With hardly any time nothing may have been found; but some face is in the root cell. */
         ebpo_box box = ebpo_model_box(c->model);
-        double hi = fmin(n.upper, ebpo_cell_far(&box, 0, (const uint32_t[3]){ 0, 0, 0 }, p)),
+        double hi = fmin(n.upper, ebpo_cell_far(&box, (ebpo_cell){ 0, { 0, 0, 0 } }, p)),
                lo = fmin(fmin(n.passed_over, n.found ? n.bounds.lo : n.upper), hi);
         *out = (ebpo_distance_result){ NAN, lo, hi, { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
         look_ahead(c, p, hi);
@@ -208,27 +207,27 @@ typedef struct interval {
     double lo, hi;
 } interval;
 
-static ebpo_status narrow(interval *v, ebpo_spot spot, double lower, ebpo_error *error)
+static ebpo_status narrow(interval *v, ebpo_node node, double lower, ebpo_error *error)
 {
     const ebpo_model *m = v->c->model;
-    if (lower > v->hi || ebpo_spot_is_uniform(&spot))
+    if (lower > v->hi || ebpo_node_is_uniform(&node))
         return EBPO_OK;
-    v->hi = fmin(v->hi, ebpo_cell_far(&v->box, spot.level, spot.at, v->p));
-    if (spot.level >= v->o->level || !ebpo_spot_is_gray(m, &spot) ||
-        ebpo_spot_is_pruned(m, &spot) || (v->deadline && ebpo_clock() > v->deadline)) {
+    v->hi = fmin(v->hi, ebpo_cell_far(&v->box, node.cell, v->p));
+    if (node.cell.level >= v->o->level || node.type != EBPO_GRAY || node.pruned ||
+        (v->deadline && ebpo_clock() > v->deadline)) {
         v->lo = fmin(v->lo, lower);
         return EBPO_OK;
     }
-    if (ebpo_spot_is_below(&spot)) {
-        ebpo_status status = ebpo_spot_enter(v->c, &spot, error);
+    if (ebpo_node_is_below(&node)) {
+        ebpo_status status = ebpo_model_enter(v->c, &node, error);
         if (status != EBPO_OK)
             return status;
     }
     ebpo_ranked child[8];
-    int count = ebpo_rank_children(m, &v->box, &spot, lower, v->p, child);
+    int count = ebpo_rank_children(m, &v->box, &node, lower, v->p, child);
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < count && status == EBPO_OK; i++)
-        status = narrow(v, child[i].spot, child[i].lower, error);
+        status = narrow(v, child[i].node, child[i].lower, error);
     return status;
 }
 
@@ -244,9 +243,9 @@ ebpo_status ebpo_distance_interval(ebpo_context *context, const double p[3],
                    .hi = INFINITY };
     if (options->deadline_ns)
         v.deadline = ebpo_clock() + options->deadline_ns;
-    ebpo_spot root = ebpo_spot_root(context->model);
+    ebpo_node root = ebpo_model_root(context->model);
     ebpo_status status =
-        narrow(&v, root, ebpo_spot_distance(context->model, &v.box, &root, 0, p), error);
+        narrow(&v, root, ebpo_model_lower_bound(context->model, &v.box, &root, 0, p), error);
     *lo = fmin(v.lo, v.hi);
     *hi = v.hi;
     return status;

@@ -8,7 +8,6 @@
 #include "base/error.h"
 #include "geom/predicates.h"
 #include "query/inside.h"
-#include "query/locate.h"
 
 /* Adds the crossings that the filter left open; true when the point lies on one of these faces. */
 static bool settle_open(const ebpo_subtree *s, const uint32_t *open, uint32_t count,
@@ -48,12 +47,10 @@ static uint8_t listed_cell(double xi)
     return cells < 0 ? 0 : cells < 255 ? (uint8_t)cells : 255;
 }
 
-static void find_in_leaf(const ebpo_subtree *s, int level, const uint32_t at[3], const double p[3],
-                         in_leaf *out)
+static void find_in_leaf(const ebpo_subtree *s, ebpo_cell cell, const double p[3], in_leaf *out)
 {
+    ebpo_cell_bounds(&s->box, cell, out->low, out->high);
     for (int k = 0; k < 3; k++) {
-        out->low[k] = ebpo_wall(&s->box, k, level, at[k]);
-        out->high[k] = ebpo_wall(&s->box, k, level, at[k] + 1);
         out->xi[k] = (p[k] - out->low[k]) * (1 / (out->high[k] - out->low[k]));
         out->cell[k] = listed_cell(out->xi[k]);
     }
@@ -158,11 +155,11 @@ static ebpo_status answer_in_leaf(ebpo_context *context, const ebpo_subtree *s,
 }
 
 ebpo_status ebpo_inside_leaf(ebpo_context *context, const ebpo_subtree *s, uint32_t number,
-                             int level, const uint32_t at[3], const double p[3],
-                             ebpo_inside_result *out, ebpo_error *error)
+                             ebpo_cell cell, const double p[3], ebpo_inside_result *out,
+                             ebpo_error *error)
 {
     in_leaf i;
-    find_in_leaf(s, level, at, p, &i);
+    find_in_leaf(s, cell, p, &i);
     return answer_in_leaf(context, s, &s->leaf[number], &i, p, out, error);
 }
 
@@ -174,28 +171,19 @@ void ebpo_inside_uniform(const ebpo_context *context, uint32_t entry, ebpo_insid
                                  winding, 0 };
 }
 
-static void find_in_entry(const ebpo_subtree *s, int fine_level, int level, const uint32_t at[3],
-                          const double p[3], in_leaf *out)
-{
-    int shift = fine_level - level;
-    uint32_t cell[3] = { at[0] >> shift, at[1] >> shift, at[2] >> shift };
-    find_in_leaf(s, level, cell, p, out);
-}
-
 ebpo_status ebpo_inside_subtree(ebpo_context *context, const ebpo_subtree *s, const uint32_t at[3],
                                 const double p[3], ebpo_inside_result *out, ebpo_error *error)
 {
-    int level, fine = context->model->info->level_count - 1;
-    uint32_t entry = ebpo_descend(&s->nodes, fine, at, &level);
-    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_UNIFORM) {
-        ebpo_inside_uniform(context, entry, out);
+    int fine = context->model->info->level_count - 1;
+    ebpo_descent d = ebpo_descend(&s->nodes, fine, at);
+    if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_UNIFORM) {
+        ebpo_inside_uniform(context, d.entry, out);
         return EBPO_OK;
     }
-    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW)
+    if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_BELOW)
         return ebpo_inside_pruned(context, p, out, error);
-    in_leaf i;
-    find_in_entry(s, fine, level, at, p, &i);
-    return answer_in_leaf(context, s, &s->leaf[ebpo_entry_value(entry)], &i, p, out, error);
+    return ebpo_inside_leaf(context, s, ebpo_entry_value(d.entry), ebpo_descent_cell(&d, fine, at),
+                            p, out, error);
 }
 
 /* Several points at a time, stage by stage, so that the memory that one stage needs is on its way
@@ -203,9 +191,9 @@ ebpo_status ebpo_inside_subtree(ebpo_context *context, const ebpo_subtree *s, co
 enum { TOGETHER = 16 };
 
 typedef struct lane {
-    uint32_t at[3], entry;
-    int level;
+    uint32_t at[3];
     bool within;
+    ebpo_descent d;
 } lane;
 
 /* A point that ended in a leaf. */
@@ -220,21 +208,16 @@ static void start_lanes(const ebpo_subtree *s, int fine, const double *points, u
 {
     for (unsigned i = 0; i < count; i++) {
         l[i].within = ebpo_locate(&s->box, fine, points + 3 * i, l[i].at);
-        l[i].entry = s->nodes.root;
-        l[i].level = s->nodes.root_level;
         if (l[i].within && s->nodes.grid) {
             uint64_t cell = ebpo_grid_cell(&s->nodes, fine, l[i].at);
             __builtin_prefetch(&s->nodes.grid[cell]);
             __builtin_prefetch(&s->nodes.grid_depth[cell]);
         }
     }
-    for (unsigned i = 0; i < count && s->nodes.grid; i++)
+    for (unsigned i = 0; i < count; i++)
         if (l[i].within) {
-            uint64_t cell = ebpo_grid_cell(&s->nodes, fine, l[i].at);
-            l[i].entry = s->nodes.grid[cell];
-            l[i].level += s->nodes.grid_depth[cell];
-            if (ebpo_entry_kind_of(l[i].entry) == EBPO_ENTRY_GRAY)
-                __builtin_prefetch(s->nodes.group[ebpo_entry_value(l[i].entry)]);
+            l[i].d = ebpo_descent_begin(&s->nodes, fine, l[i].at);
+            ebpo_descent_prefetch(&l[i].d, &s->nodes);
         }
 }
 
@@ -243,15 +226,8 @@ static void descend_together(const ebpo_subtree *s, int fine, unsigned count, la
     for (bool more = true; more;) {
         more = false;
         for (unsigned i = 0; i < count; i++)
-            if (l[i].within && ebpo_entry_kind_of(l[i].entry) == EBPO_ENTRY_GRAY) {
-                l[i].level++;
-                l[i].entry = s->nodes.group[ebpo_entry_value(l[i].entry)]
-                                           [ebpo_octant_at(l[i].at, fine - l[i].level)];
-                if (ebpo_entry_kind_of(l[i].entry) == EBPO_ENTRY_GRAY) {
-                    __builtin_prefetch(s->nodes.group[ebpo_entry_value(l[i].entry)]);
-                    more = true;
-                }
-            }
+            if (l[i].within && ebpo_descent_step(&l[i].d, &s->nodes, fine, l[i].at))
+                more |= ebpo_descent_prefetch(&l[i].d, &s->nodes);
     }
 }
 
@@ -303,17 +279,18 @@ static ebpo_status inside_together(ebpo_context *context, const ebpo_subtree *s,
     for (unsigned i = 0; i < count; i++) {
         if (!l[i].within) {
             out[i] = (ebpo_inside_result){ EBPO_OUT, 0, 0 };
-        } else if (ebpo_entry_kind_of(l[i].entry) == EBPO_ENTRY_UNIFORM) {
-            ebpo_inside_uniform(context, l[i].entry, &out[i]);
-        } else if (ebpo_entry_kind_of(l[i].entry) == EBPO_ENTRY_BELOW) {
+        } else if (ebpo_entry_kind_of(l[i].d.entry) == EBPO_ENTRY_UNIFORM) {
+            ebpo_inside_uniform(context, l[i].d.entry, &out[i]);
+        } else if (ebpo_entry_kind_of(l[i].d.entry) == EBPO_ENTRY_BELOW) {
             ebpo_status status = ebpo_inside_pruned(context, points + 3 * i, &out[i], error);
             if (status != EBPO_OK)
                 return status;
         } else {
-            w[leaves].leaf = &s->leaf[ebpo_entry_value(l[i].entry)];
+            w[leaves].leaf = &s->leaf[ebpo_entry_value(l[i].d.entry)];
             w[leaves].point = i;
             __builtin_prefetch(w[leaves].leaf);
-            find_in_entry(s, fine, l[i].level, l[i].at, points + 3 * i, &w[leaves].in);
+            find_in_leaf(s, ebpo_descent_cell(&l[i].d, fine, l[i].at), points + 3 * i,
+                         &w[leaves].in);
             leaves++;
         }
     }

@@ -4,11 +4,10 @@
 
 #include "query/query_model.h"
 
-/* In a leaf of a subtree: `at` is its cell at `level`, which holds p. */
+/* In a leaf of a subtree, whose cell holds p. */
 EBPO_MUST_USE ebpo_status ebpo_inside_leaf(ebpo_context *context, const ebpo_subtree *s,
-                                           uint32_t number, int level, const uint32_t at[3],
-                                           const double p[3], ebpo_inside_result *out,
-                                           ebpo_error *error);
+                                           uint32_t number, ebpo_cell cell, const double p[3],
+                                           ebpo_inside_result *out, ebpo_error *error);
 
 /* Below a pruned node of the whole tree or of a subtree: an envelope decides, or EBPO_E_ABSENT. */
 EBPO_MUST_USE ebpo_status ebpo_inside_pruned(ebpo_context *context, const double p[3],

@@ -8,7 +8,6 @@
 #include "lod/lod_model.h"
 #include "query/inside.h"
 #include "query/limited.h"
-#include "query/locate.h"
 #include "query/nearest.h"
 #include "query/pruned.h"
 #include "query/query_node.h"
@@ -16,23 +15,23 @@
 static const ebpo_distance_result nothing = { INFINITY,          0,           INFINITY,
                                               { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
 
-static ebpo_status all_leaves(ebpo_context *c, ebpo_nearest *n, ebpo_spot spot, ebpo_error *error)
+static ebpo_status all_leaves(ebpo_context *c, ebpo_nearest *n, ebpo_node node, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    if (ebpo_spot_is_uniform(&spot))
+    if (ebpo_node_is_uniform(&node))
         return EBPO_OK;
-    if (ebpo_spot_is_below(&spot)) {
-        status = ebpo_spot_enter(c, &spot, error);
+    if (ebpo_node_is_below(&node)) {
+        status = ebpo_model_enter(c, &node, error);
         if (status == EBPO_OK)
-            ebpo_nearest_search(n, c, spot.subtree);
+            ebpo_nearest_search(n, c, node.subtree);
         return status;
     }
-    if (ebpo_entry_kind_of(spot.entry) == EBPO_ENTRY_LEAF) {
-        ebpo_nearest_leaf(n, spot.subtree, &spot.subtree->leaf[ebpo_entry_value(spot.entry)]);
+    if (ebpo_entry_kind_of(node.entry) == EBPO_ENTRY_LEAF) {
+        ebpo_nearest_leaf(n, node.subtree, &node.subtree->leaf[ebpo_entry_value(node.entry)]);
         return EBPO_OK;
     }
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)
-        status = all_leaves(c, n, ebpo_spot_child(c->model, &spot, octant), error);
+        status = all_leaves(c, n, ebpo_model_child(c->model, &node, octant), error);
     return status;
 }
 
@@ -45,20 +44,20 @@ ebpo_status ebpo_distance_around(ebpo_context *c, const double p[3], const ebpo_
     *out = nothing;
     if (!ebpo_locate(&box, fine, p, at))
         return EBPO_OK;
-    ebpo_spot spot = ebpo_spot_root(c->model), gray = spot;
+    ebpo_node node = ebpo_model_root(c->model), gray = node;
     ebpo_status status = EBPO_OK;
-    while (status == EBPO_OK && !ebpo_spot_is_uniform(&spot)) {
-        if (ebpo_spot_is_below(&spot))
-            status = ebpo_spot_enter(c, &spot, error);
-        if (status != EBPO_OK || ebpo_entry_kind_of(spot.entry) == EBPO_ENTRY_LEAF)
+    while (status == EBPO_OK && !ebpo_node_is_uniform(&node)) {
+        if (ebpo_node_is_below(&node))
+            status = ebpo_model_enter(c, &node, error);
+        if (status != EBPO_OK || ebpo_entry_kind_of(node.entry) == EBPO_ENTRY_LEAF)
             break;
-        gray = spot;
-        spot = ebpo_spot_child(c->model, &spot, ebpo_octant_at(at, fine - spot.level - 1));
+        gray = node;
+        node = ebpo_model_child(c->model, &node, ebpo_octant_at(at, fine - node.cell.level - 1));
     }
     ebpo_nearest n;
     ebpo_nearest_begin(&n, p, o->max_distance);
-    if (status == EBPO_OK && !ebpo_spot_is_uniform(&spot))
-        ebpo_nearest_leaf(&n, spot.subtree, &spot.subtree->leaf[ebpo_entry_value(spot.entry)]);
+    if (status == EBPO_OK && !ebpo_node_is_uniform(&node))
+        ebpo_nearest_leaf(&n, node.subtree, &node.subtree->leaf[ebpo_entry_value(node.entry)]);
     else if (status == EBPO_OK && o->mode == EBPO_DISTANCE_RECURSIVE)
         status = all_leaves(c, &n, gray, error);
     if (status == EBPO_OK)
@@ -67,15 +66,15 @@ ebpo_status ebpo_distance_around(ebpo_context *c, const double p[3], const ebpo_
     return status == EBPO_OK ? ebpo_give_sign(c, p, o, out, error) : status;
 }
 
-static void corner_of(const ebpo_box *box, const ebpo_spot *spot, const double xi[3], double out[3])
+static void corner_of(const ebpo_box *box, ebpo_cell cell, const double xi[3], double out[3])
 {
     for (int k = 0; k < 3; k++) {
-        double low = ebpo_wall(box, k, spot->level, spot->at[k]);
-        out[k] = low + xi[k] * (box->size[k] / (double)(1u << spot->level));
+        double low = ebpo_wall(box, k, cell.level, cell.at[k]);
+        out[k] = low + xi[k] * (box->size[k] / (double)(1u << cell.level));
     }
 }
 
-static void nearest_polygon(const ebpo_polytope *e, const ebpo_box *box, const ebpo_spot *spot,
+static void nearest_polygon(const ebpo_polytope *e, const ebpo_box *box, ebpo_cell cell,
                             const double p[3], ebpo_distance_result *out)
 {
     double best[3][3];
@@ -83,9 +82,9 @@ static void nearest_polygon(const ebpo_polytope *e, const ebpo_box *box, const e
         for (int i = e->first[f] + 1; i + 1 < e->first[f + 1]; i++) {
             double t[3][3];
             ebpo_distance_bounds b;
-            corner_of(box, spot, e->vertex[e->corner[e->first[f]]], t[0]);
-            corner_of(box, spot, e->vertex[e->corner[i]], t[1]);
-            corner_of(box, spot, e->vertex[e->corner[i + 1]], t[2]);
+            corner_of(box, cell, e->vertex[e->corner[e->first[f]]], t[0]);
+            corner_of(box, cell, e->vertex[e->corner[i]], t[1]);
+            corner_of(box, cell, e->vertex[e->corner[i + 1]], t[2]);
             ebpo_triangle_distance_bounds(p, (const double(*)[3])t, &b);
             if (b.hi < out->distance) {
                 out->distance = b.hi;
@@ -113,35 +112,34 @@ ebpo_status ebpo_distance_to_envelope(ebpo_context *c, const double p[3],
     *out = nothing;
     if (!ebpo_locate(&box, fine, p, at))
         return EBPO_OK;
-    ebpo_spot spot = ebpo_spot_root(c->model), gray = spot;
+    ebpo_node node = ebpo_model_root(c->model), gray = node;
     ebpo_polytope envelope[2];
     int now = 0;
     ebpo_polytope_cube(&envelope[0]);
     for (;;) {
         uint32_t count;
-        const uint32_t *codes = ebpo_spot_planes(c->model, &spot, &count);
+        const uint32_t *codes = ebpo_model_planes(c->model, &node, &count);
         ebpo_planes_cut(&envelope[now], codes, count);
-        gray = spot;
-        if ((o->level >= 0 && spot.level >= o->level) || !ebpo_spot_is_gray(c->model, &spot))
+        gray = node;
+        if ((o->level >= 0 && node.cell.level >= o->level) || node.type != EBPO_GRAY)
             break;
-        if (ebpo_spot_is_below(&spot)) {
-            ebpo_status status = ebpo_spot_enter(c, &spot, error);
+        if (ebpo_node_is_below(&node)) {
+            ebpo_status status = ebpo_model_enter(c, &node, error);
             if (status != EBPO_OK)
                 return status;
         }
-        unsigned octant = ebpo_octant_at(at, fine - spot.level - 1);
-        ebpo_spot child = ebpo_spot_child(c->model, &spot, octant);
-        if (!ebpo_spot_is_gray(c->model, &child))
+        unsigned octant = ebpo_octant_at(at, fine - node.cell.level - 1);
+        ebpo_node child = ebpo_model_child(c->model, &node, octant);
+        if (child.type != EBPO_GRAY)
             break;
-        if (c->model->info->boxed &&
-            ebpo_spot_is_pruned(c->model, &child)) /* leaves outside a subset's box look the same */
-            return ebpo_fail_pruned(c->model, child.level, child.at, error);
+        if (c->model->info->boxed && child.pruned) /* leaves outside a subset's box look the same */
+            return ebpo_fail_pruned(c->model, child.cell, error);
         if (!ebpo_polytope_child(&envelope[now], octant, &envelope[1 - now]))
             break;
         now = 1 - now;
-        spot = child;
+        node = child;
     }
-    nearest_polygon(&envelope[now], &box, &gray, p, out);
+    nearest_polygon(&envelope[now], &box, gray.cell, p, out);
     out->lo = 0;
     out->hi = INFINITY;
     return EBPO_OK;

@@ -34,26 +34,26 @@ static void add(looking *l, uint64_t key, double lower)
         l->limit = fmin(l->limit, l->list[EBPO_CACHE_AHEAD - 1].lower);
 }
 
-static void look(looking *l, ebpo_spot spot, double lower)
+static void look(looking *l, ebpo_node node, double lower)
 {
-    if (lower > l->limit || ebpo_spot_is_uniform(&spot) || ebpo_spot_is_pruned(l->model, &spot))
+    if (lower > l->limit || ebpo_node_is_uniform(&node) || node.pruned)
         return;
-    if (ebpo_spot_is_below(&spot)) {
-        add(l, ebpo_entry_value(spot.entry), lower);
+    if (ebpo_node_is_below(&node)) {
+        add(l, ebpo_entry_value(node.entry), lower);
         return;
     }
     ebpo_ranked child[8];
-    int count = ebpo_rank_children(l->model, &l->box, &spot, lower, l->p, child);
+    int count = ebpo_rank_children(l->model, &l->box, &node, lower, l->p, child);
     for (int i = 0; i < count; i++)
-        look(l, child[i].spot, child[i].lower);
+        look(l, child[i].node, child[i].lower);
 }
 
 unsigned ebpo_subtrees_near(const ebpo_model *m, const double p[3], double limit,
                             uint64_t keys[EBPO_CACHE_AHEAD])
 {
     looking l = { .model = m, .box = ebpo_model_box(m), .p = p, .limit = limit };
-    ebpo_spot root = ebpo_spot_root(m);
-    look(&l, root, ebpo_spot_distance(m, &l.box, &root, 0, p));
+    ebpo_node root = ebpo_model_root(m);
+    look(&l, root, ebpo_model_lower_bound(m, &l.box, &root, 0, p));
     for (unsigned i = 0; i < l.count; i++)
         keys[i] = l.list[i].key;
     return l.count;

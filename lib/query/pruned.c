@@ -28,8 +28,7 @@ static void describe(const ebpo_info *info, char *out, size_t room)
         snprintf(out, room, "it is a part of another file");
 }
 
-ebpo_status ebpo_fail_pruned(const ebpo_model *model, int level, const uint32_t at[3],
-                             ebpo_error *error)
+ebpo_status ebpo_fail_pruned(const ebpo_model *model, ebpo_cell cell, ebpo_error *error)
 {
     char cut[200];
     ebpo_box box = ebpo_model_box(model);
@@ -38,8 +37,9 @@ ebpo_status ebpo_fail_pruned(const ebpo_model *model, int level, const uint32_t 
                      "%.120s: this needs nodes left out below level %d at %.6g %.6g %.6g (%s); ask "
                      "with a level, or take a larger part of the original with "
                      "`ebpo subset` or `ebpo fetch`",
-                     model->file->in.shown, level, ebpo_wall(&box, 0, level, at[0]),
-                     ebpo_wall(&box, 1, level, at[1]), ebpo_wall(&box, 2, level, at[2]), cut);
+                     model->file->in.shown, cell.level, ebpo_wall(&box, 0, cell.level, cell.at[0]),
+                     ebpo_wall(&box, 1, cell.level, cell.at[1]),
+                     ebpo_wall(&box, 2, cell.level, cell.at[2]), cut);
 }
 
 typedef struct checking {
@@ -49,16 +49,16 @@ typedef struct checking {
     ebpo_box box;
 } checking;
 
-static ebpo_status check(const checking *k, ebpo_spot spot, ebpo_error *error)
+static ebpo_status check(const checking *k, ebpo_node node, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    if (ebpo_spot_is_uniform(&spot) || !ebpo_spot_is_gray(k->context->model, &spot) ||
-        !k->matters(k->user, &k->box, &spot))
+    if (ebpo_node_is_uniform(&node) || node.type != EBPO_GRAY ||
+        !k->matters(k->user, &k->box, &node))
         return EBPO_OK;
-    if (ebpo_spot_is_below(&spot)) /* fails for pruned ones */
-        status = ebpo_spot_enter(k->context, &spot, error);
+    if (ebpo_node_is_below(&node)) /* fails for pruned ones */
+        status = ebpo_model_enter(k->context, &node, error);
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)
-        status = check(k, ebpo_spot_child(k->context->model, &spot, octant), error);
+        status = check(k, ebpo_model_child(k->context->model, &node, octant), error);
     return status;
 }
 
@@ -66,6 +66,6 @@ ebpo_status ebpo_check_pruned(ebpo_context *context, ebpo_matters_fn matters, vo
                               ebpo_error *error)
 {
     checking k = { context, matters, user, ebpo_model_box(context->model) };
-    return context->model->info->pruned ? check(&k, ebpo_spot_root(context->model), error)
+    return context->model->info->pruned ? check(&k, ebpo_model_root(context->model), error)
                                         : EBPO_OK;
 }

@@ -6,11 +6,10 @@
 
 /* EBPO_E_ABSENT: the question needs what was left out below this node. Says which file, where, and
  * what it was cut to. */
-ebpo_status ebpo_fail_pruned(const ebpo_model *model, int level, const uint32_t at[3],
-                             ebpo_error *error);
+ebpo_status ebpo_fail_pruned(const ebpo_model *model, ebpo_cell cell, ebpo_error *error);
 
 /* Whether something in the node's cell matters to the question. */
-typedef bool (*ebpo_matters_fn)(void *user, const ebpo_box *box, const ebpo_spot *spot);
+typedef bool (*ebpo_matters_fn)(void *user, const ebpo_box *box, const ebpo_node *node);
 
 /* EBPO_OK when no pruned node matters. `matters` holds for a node when it does for one below it. */
 EBPO_MUST_USE ebpo_status ebpo_check_pruned(ebpo_context *context, ebpo_matters_fn matters,

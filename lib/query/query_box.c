@@ -76,29 +76,25 @@ static void gather_subtree(gathering *g, const ebpo_subtree *s)
     gather_bound(g, s, low, high, s->top);
 }
 
-static bool box_matters(void *user, const ebpo_box *box, const ebpo_spot *spot)
+static bool box_matters(void *user, const ebpo_box *box, const ebpo_node *node)
 {
     const gathering *g = user;
-    for (int k = 0; k < 3; k++)
-        if (ebpo_wall(box, k, spot->level, spot->at[k]) > g->max[k] ||
-            ebpo_wall(box, k, spot->level, spot->at[k] + 1) < g->min[k])
-            return false;
-    return true;
+    return ebpo_cell_meets(box, node->cell, g->min, g->max);
 }
 
-static ebpo_status gather_spot(gathering *g, const ebpo_box *box, ebpo_spot spot, ebpo_error *error)
+static ebpo_status gather_node(gathering *g, const ebpo_box *box, ebpo_node node, ebpo_error *error)
 {
-    if (ebpo_spot_is_uniform(&spot) || !box_matters(g, box, &spot))
+    if (ebpo_node_is_uniform(&node) || !box_matters(g, box, &node))
         return EBPO_OK;
     ebpo_status status = EBPO_OK;
-    if (ebpo_spot_is_below(&spot)) {
-        status = ebpo_spot_enter(g->context, &spot, error);
+    if (ebpo_node_is_below(&node)) {
+        status = ebpo_model_enter(g->context, &node, error);
         if (status == EBPO_OK)
-            gather_subtree(g, spot.subtree);
+            gather_subtree(g, node.subtree);
         return status;
     }
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)
-        status = gather_spot(g, box, ebpo_spot_child(g->context->model, &spot, octant), error);
+        status = gather_node(g, box, ebpo_model_child(g->context->model, &node, octant), error);
     return status;
 }
 
@@ -138,7 +134,7 @@ ebpo_status ebpo_faces_in_box(ebpo_context *context, const double min[3], const 
         gather_subtree(&g, context->model->whole);
     } else if (status == EBPO_OK) {
         ebpo_box box = ebpo_model_box(context->model);
-        status = gather_spot(&g, &box, ebpo_spot_root(context->model), error);
+        status = gather_node(&g, &box, ebpo_model_root(context->model), error);
     }
     if (status == EBPO_OK && !g.no_memory)
         status = ebpo_check_pruned(context, box_matters, &g, error);

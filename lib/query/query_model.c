@@ -12,7 +12,6 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "query/clock.h"
-#include "query/locate.h"
 
 /* Decoded chunks: an eighth of the budget, within these. */
 enum { CHUNKS_LEAST = 2 << 20, CHUNKS_MOST = 128 << 20, SUBTREES_LEAST = 2 << 20 };
@@ -85,12 +84,12 @@ static void release_subtree(void *user, void *item)
 
 /* --- how much, and where to cut --- */
 
-ebpo_status ebpo_model_has_room(const ebpo_model *m, const ebpo_place *place, ebpo_error *error)
+ebpo_status ebpo_model_has_room(const ebpo_model *m, const ebpo_node *leaf, ebpo_error *error)
 {
     ebpo_slice_size size;
     uint64_t keep, peak;
     ebpo_status status =
-        m->options.memory ? ebpo_slice_measure(m->chunks, place, &size, error) : EBPO_OK;
+        m->options.memory ? ebpo_slice_measure(m->chunks, leaf, &size, error) : EBPO_OK;
     if (status != EBPO_OK || !m->options.memory)
         return status;
     ebpo_subtree_estimate(&size, m->info, &keep, &peak);
@@ -101,7 +100,7 @@ ebpo_status ebpo_model_has_room(const ebpo_model *m, const ebpo_place *place, eb
                      "the memory budget of %" PRIu64
                      " bytes does not hold a leaf of level %d, which takes up to %" PRIu64
                      " more than the %" PRIu64 " in use; give a larger budget",
-                     m->options.memory, place->level, peak, taken);
+                     m->options.memory, leaf->cell.level, peak, taken);
 }
 
 /* Half the budget for subtrees must hold so many of the average size; the top may take a quarter.

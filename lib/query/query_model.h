@@ -61,9 +61,9 @@ static inline ebpo_box ebpo_model_box(const ebpo_model *m)
 EBPO_MUST_USE ebpo_status ebpo_check_points(const double *points, uint64_t count,
                                             ebpo_error *error);
 
-/* EBPO_E_LIMIT when the budget does not hold the leaf at `place`, alone, for one context;
+/* EBPO_E_LIMIT when the budget does not hold the leaf alone, for one context;
  * EBPO_LOAD_NODES loads it past the cache. */
-EBPO_MUST_USE ebpo_status ebpo_model_has_room(const ebpo_model *model, const ebpo_place *place,
+EBPO_MUST_USE ebpo_status ebpo_model_has_room(const ebpo_model *model, const ebpo_node *leaf,
                                               ebpo_error *error);
 
 /* The subtree with this number, in memory until the context asks for another one. */

@@ -161,32 +161,30 @@ static void cast_subtree(casting *c, const ebpo_subtree *s)
 }
 
 /* Whether the ray comes to the node's cell before its limit; rather yes than no. */
-static bool meets_cell(const casting *c, const ebpo_box *box, const ebpo_spot *spot)
+static bool meets_cell(const casting *c, const ebpo_box *box, const ebpo_node *node)
 {
     double low[3], high[3], slack = 0, enter;
-    for (int k = 0; k < 3; k++) {
-        low[k] = ebpo_wall(box, k, spot->level, spot->at[k]);
-        high[k] = ebpo_wall(box, k, spot->level, spot->at[k] + 1);
+    ebpo_cell_bounds(box, node->cell, low, high);
+    for (int k = 0; k < 3; k++)
         slack = fmax(slack, (fabs(low[k]) + fabs(high[k]) + fabs(c->ray.origin[k])) * 0x1p-48);
-    }
     return meets_slabs(c->ray.origin, c->ray.direction, c->limit, low, high, slack, &enter);
 }
 
-static bool ray_matters(void *user, const ebpo_box *box, const ebpo_spot *spot)
+static bool ray_matters(void *user, const ebpo_box *box, const ebpo_node *node)
 {
-    return meets_cell(user, box, spot);
+    return meets_cell(user, box, node);
 }
 
-static ebpo_status cast_spot(casting *c, const ebpo_box *box, ebpo_spot spot, ebpo_error *error)
+static ebpo_status cast_node(casting *c, const ebpo_box *box, ebpo_node node, ebpo_error *error)
 {
     const ebpo_model *m = c->context->model;
-    if (ebpo_spot_is_uniform(&spot) || !meets_cell(c, box, &spot) ||
-        ebpo_spot_is_pruned(m, &spot)) /* pruned: see cast */
+    if (ebpo_node_is_uniform(&node) || !meets_cell(c, box, &node) ||
+        node.pruned) /* pruned: see cast */
         return EBPO_OK;
-    if (ebpo_spot_is_below(&spot)) {
-        ebpo_status status = ebpo_spot_enter(c->context, &spot, error);
+    if (ebpo_node_is_below(&node)) {
+        ebpo_status status = ebpo_model_enter(c->context, &node, error);
         if (status == EBPO_OK)
-            cast_subtree(c, spot.subtree);
+            cast_subtree(c, node.subtree);
         return status;
     }
     /* Children in the order in which the ray meets their cells. */
@@ -195,7 +193,7 @@ static ebpo_status cast_spot(casting *c, const ebpo_box *box, ebpo_spot spot, eb
         turn |= (unsigned)(c->ray.direction[k] < 0) << k;
     ebpo_status status = EBPO_OK;
     for (unsigned i = 0; i < 8 && status == EBPO_OK; i++)
-        status = cast_spot(c, box, ebpo_spot_child(m, &spot, i ^ turn), error);
+        status = cast_node(c, box, ebpo_model_child(m, &node, i ^ turn), error);
     return status;
 }
 
@@ -219,7 +217,7 @@ static ebpo_status cast(casting *c, ebpo_error *error)
         cast_subtree(c, c->context->model->whole);
     } else {
         ebpo_box box = ebpo_model_box(c->context->model);
-        status = cast_spot(c, &box, ebpo_spot_root(c->context->model), error);
+        status = cast_node(c, &box, ebpo_model_root(c->context->model), error);
     }
     if (status == EBPO_OK && !c->no_memory)
         status = ebpo_check_pruned(c->context, ray_matters, c, error);

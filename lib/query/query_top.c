@@ -14,7 +14,7 @@ typedef struct reading {
     ebpo_top *top;
     const ebpo_info *info;
     uint64_t group, plane, below; /* next free */
-    uint32_t (*at)[3];            /* positions of the last level's gray nodes */
+    ebpo_cell *gray;              /* cells of the last level's gray nodes */
     /* of the level below the one that is read, where they are needed to know pruned nodes */
     uint16_t *next_types;
     uint64_t group_capacity, gray_room, plane_room, below_room, below_planes_room;
@@ -26,7 +26,7 @@ static ebpo_status no_memory(const reading *r)
     return ebpo_fail_memory(r->error, ebpo_top_estimate(r->info, r->top->cut_level));
 }
 
-/* The planes of a node of the level, `count` more from its own place in the level's list on. */
+/* The planes of a node of the level, `count` more from where its own begin in the level's list. */
 static ebpo_status add_planes(reading *r, const ebpo_level *level, uint32_t count,
                               uint64_t *in_level, ebpo_top_planes *out)
 {
@@ -49,18 +49,16 @@ typedef struct ranks {
     uint64_t of[4], planes;
 } ranks;
 
-static ebpo_status settled(const reading *r, const int32_t *windings, uint64_t rank, int32_t usual,
+static ebpo_status uniform(const reading *r, const int32_t *windings, uint64_t rank, int32_t usual,
                            uint32_t *entry)
 {
-    int32_t winding = windings ? windings[rank] : usual;
-    if (winding <= -EBPO_ENTRY_ZERO || winding >= EBPO_ENTRY_ZERO)
-        return ebpo_fail(r->error, EBPO_E_LIMIT,
-                         "a node's winding number is beyond 2^29: the solid has too many shells");
-    *entry = ebpo_entry(EBPO_ENTRY_UNIFORM, (uint32_t)(winding + EBPO_ENTRY_ZERO));
-    return EBPO_OK;
+    return ebpo_entry_uniform(windings ? windings[rank] : usual, entry)
+               ? EBPO_OK
+               : ebpo_fail(r->error, EBPO_E_LIMIT,
+                           "a node's winding number is beyond 2^29: the solid has too many shells");
 }
 
-static ebpo_status add_below(reading *r, const ebpo_level *level, const ebpo_place *place,
+static ebpo_status add_below(reading *r, const ebpo_level *level, const ebpo_node *node,
                              uint64_t *in_level, uint32_t *entry)
 {
     ebpo_top *t = r->top;
@@ -70,10 +68,10 @@ static ebpo_status add_below(reading *r, const ebpo_level *level, const ebpo_pla
     if (r->below >= EBPO_ENTRY_ZERO)
         return ebpo_fail(r->error, EBPO_E_LIMIT, "too many nodes at cut level %d; give a lower one",
                          t->cut_level);
-    t->below[r->below] = *place;
+    t->below[r->below] = *node;
     *entry = ebpo_entry(EBPO_ENTRY_BELOW, (uint32_t)r->below);
     uint32_t count =
-        place->type == EBPO_GRAY && level->plane_counts ? level->plane_counts[place->rank] : 0;
+        node->type == EBPO_GRAY && level->plane_counts ? level->plane_counts[node->rank] : 0;
     return add_planes(r, level, count, in_level, &t->below_planes[r->below++]);
 }
 
@@ -100,41 +98,42 @@ static bool is_pruned(const reading *r, int number, uint64_t rank)
 }
 
 /* Above the cut the next level has a group for it, which leads nowhere. */
-static ebpo_status add_pruned(reading *r, const ebpo_level *level, const ebpo_place *place,
+static ebpo_status add_pruned(reading *r, const ebpo_level *level, const ebpo_node *node,
                               uint64_t *in_level, uint32_t *entry)
 {
-    if (place->level < r->top->cut_level && place->level + 1 < r->info->level_count) {
+    if (node->cell.level < r->top->cut_level && node->cell.level + 1 < r->info->level_count) {
         ebpo_level none = { .gray_count = 0 };
         ebpo_status status = add_gray(r, &none, 0, &(uint64_t){ 0 }, entry);
         if (status != EBPO_OK)
             return status;
     }
-    return add_below(r, level, place, in_level, entry);
+    return add_below(r, level, node, in_level, entry);
 }
 
-static ebpo_status add_node(reading *r, int number, const ebpo_level *level, ebpo_node_type type,
-                            const uint32_t at[3], ranks *seen, uint32_t *entry)
+static ebpo_status add_node(reading *r, const ebpo_level *level, ebpo_node_type type,
+                            ebpo_cell cell, ranks *seen, uint32_t *entry)
 {
     uint64_t rank = seen->of[type]++;
     if (type == EBPO_WHITE)
-        return settled(r, level->white_winding, rank, 0, entry);
+        return uniform(r, level->white_winding, rank, 0, entry);
     if (type == EBPO_BLACK)
-        return settled(r, level->black_winding, rank, 1, entry);
-    if (type == EBPO_GRAY && is_pruned(r, number, rank))
-        return add_pruned(r, level,
-                          &(ebpo_place){ number, { at[0], at[1], at[2] }, type, rank, true },
-                          &seen->planes, entry);
-    if (type == EBPO_GRAY && number < r->top->cut_level)
+        return uniform(r, level->black_winding, rank, 1, entry);
+    ebpo_node node = { .cell = cell,
+                       .type = type,
+                       .pruned = type == EBPO_GRAY && is_pruned(r, cell.level, rank),
+                       .rank = rank };
+    if (node.pruned)
+        return add_pruned(r, level, &node, &seen->planes, entry);
+    if (type == EBPO_GRAY && cell.level < r->top->cut_level)
         return add_gray(r, level, rank, &seen->planes, entry);
-    return add_below(r, level, &(ebpo_place){ number, { at[0], at[1], at[2] }, type, rank, false },
-                     &seen->planes, entry);
+    return add_below(r, level, &node, &seen->planes, entry);
 }
 
 static ebpo_status add_level(reading *r, int number, const ebpo_level *level, uint64_t first_group)
 {
-    uint64_t grays = level->gray_count, gray = 0;
-    uint32_t(*at)[3] = ebpo_alloc(grays, sizeof *at);
-    if (!at)
+    uint64_t grays = 0;
+    ebpo_cell *gray = ebpo_alloc(level->gray_count, sizeof *gray);
+    if (!gray)
         return no_memory(r);
     ranks seen = { { 0 }, 0 };
     ebpo_status status = EBPO_OK;
@@ -142,19 +141,19 @@ static ebpo_status add_level(reading *r, int number, const ebpo_level *level, ui
         for (unsigned octant = 0; octant < ebpo_group_octants(number) && status == EBPO_OK;
              octant++) {
             ebpo_node_type type = ebpo_group_type(level->types[g], octant);
-            uint32_t here[3] = { 0, 0, 0 }, entry = 0;
-            for (int k = 0; k < 3 && number; k++)
-                here[k] = 2 * r->at[g][k] + (octant >> k & 1);
+            ebpo_cell cell =
+                number ? ebpo_cell_child(r->gray[g], octant) : (ebpo_cell){ 0, { 0, 0, 0 } };
+            uint32_t entry = 0;
             if (type == EBPO_GRAY)
-                memcpy(at[gray++], here, sizeof here);
-            status = add_node(r, number, level, type, here, &seen, &entry);
+                gray[grays++] = cell;
+            status = add_node(r, level, type, cell, &seen, &entry);
             if (number)
                 r->top->nodes.group[first_group + g][octant] = entry;
             else
                 r->top->nodes.root = entry;
         }
-    free(r->at);
-    r->at = at;
+    free(r->gray);
+    r->gray = gray;
     return status;
 }
 
@@ -183,7 +182,7 @@ ebpo_status ebpo_top_read(ebpo_top **out, ebpo_file *file, int cut_level, unsign
         r.next_types = NULL;
         ebpo_level_free(&level);
     }
-    free(r.at);
+    free(r.gray);
     if (status != EBPO_OK) {
         ebpo_top_free(top);
         return status;
@@ -202,7 +201,7 @@ void ebpo_top_free(ebpo_top *top)
 {
     if (!top)
         return;
-    ebpo_nodes_free(&top->nodes);
+    ebpo_node_table_free(&top->nodes);
     free(top->gray);
     free(top->planes);
     free(top->below);
@@ -218,7 +217,7 @@ uint64_t ebpo_top_estimate(const ebpo_info *info, int cut_level)
         uint64_t below = s->leaf_count + (i == cut_level ? s->gray_count : 0);
         /* What is kept, and the arrays of the level while it is read. */
         bytes += (s->gray_count * (sizeof(uint32_t[8]) + sizeof(ebpo_top_planes)) +
-                  s->plane_count * 4 + below * (sizeof(ebpo_place) + sizeof(ebpo_top_planes))) *
+                  s->plane_count * 4 + below * (sizeof(ebpo_node) + sizeof(ebpo_top_planes))) *
                  3 / 2;
         uint64_t arrays = s->gray_count * 27 + s->plane_count * 4 + s->leaf_count * 28 +
                           s->ref_count * 4 + (s->white_count + s->black_count) * 4;

@@ -1,4 +1,4 @@
-/* The top of a tree: levels 0 .. cut level without faces, and the places of what lies below.
+/* The top of a tree: levels 0 .. cut level without faces, and which nodes lie below.
  * Immutable; any thread. */
 #ifndef EBPO_QUERY_TOP_H
 #define EBPO_QUERY_TOP_H
@@ -13,14 +13,14 @@ typedef struct ebpo_top_planes {
 
 typedef struct ebpo_top {
     int cut_level;
-    /* entries SETTLED, GRAY (levels above the cut), BELOW (gray nodes of the cut level, leaves down
+    /* entries UNIFORM, GRAY (levels above the cut), BELOW (gray nodes of the cut level, leaves down
      * to it, pruned nodes) */
-    ebpo_nodes nodes;
+    ebpo_node_table nodes;
     uint32_t *planes;      /* codes */
     ebpo_top_planes *gray; /* which of them are the gray node's whose children are group g */
 
     uint64_t below_count;
-    ebpo_place *below;
+    ebpo_node *below;
     ebpo_top_planes *below_planes; /* [below_count]; leaves have none */
     uint64_t bytes;
 } ebpo_top;

@@ -136,28 +136,28 @@ ebpo_status ebpo_view_stream_change(ebpo_view_stream *s, const ebpo_view_options
     return EBPO_OK;
 }
 
-static ebpo_group_place place_of(const ebpo_waiting *w)
+static ebpo_group_number children_of(const ebpo_waiting *w)
 {
-    return (ebpo_group_place){ ebpo_octcode_level(w->octcode) + 1, w->below };
+    return (ebpo_group_number){ ebpo_octcode_level(w->octcode) + 1, w->below };
 }
 
 /* Into s->read; of a file far away together with what comes soon. */
-static ebpo_status read_group(ebpo_view_stream *s, ebpo_group_place place, ebpo_error *error)
+static ebpo_status read_group(ebpo_view_stream *s, ebpo_group_number group, ebpo_error *error)
 {
     unsigned wanted = (s->options.planes || s->options.polygons ? EBPO_GROUP_PLANES : 0u) |
                       (s->options.windings ? EBPO_GROUP_WINDINGS : 0u);
     ebpo_status status = EBPO_OK;
     ebpo_chunks_limit(s->chunks, s->options.bytes ? s->options.bytes : UINT64_MAX);
-    if (ebpo_group_is_far(s->chunks, &place, wanted)) {
+    if (ebpo_group_is_far(s->chunks, &group, wanted)) {
         uint64_t best[EBPO_FRONTIER_BLOCKS];
-        ebpo_group_place places[EBPO_FRONTIER_BLOCKS] = { place };
+        ebpo_group_number groups[EBPO_FRONTIER_BLOCKS] = { group };
         unsigned count = ebpo_frontier_blocks(&s->frontier, EBPO_GROUP_BLOCK, best);
         for (unsigned i = 0; i < count; i++) /* the first is the one at hand */
-            places[i] = place_of(&s->frontier.at[best[i]]);
-        status = ebpo_group_fetch(s->chunks, places, count ? count : 1, wanted, error);
+            groups[i] = children_of(&s->frontier.at[best[i]]);
+        status = ebpo_group_fetch(s->chunks, groups, count ? count : 1, wanted, error);
     }
     return status == EBPO_OK
-               ? ebpo_group_read(s->chunks, place.level, place.group, wanted, &s->read, error)
+               ? ebpo_group_read(s->chunks, group.level, group.group, wanted, &s->read, error)
                : status;
 }
 
@@ -166,7 +166,7 @@ static ebpo_status read_group(ebpo_view_stream *s, ebpo_group_place place, ebpo_
 static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_error *error)
 {
     bool root = s->partial.group_count == 0;
-    ebpo_group_place place = { 0, 0 };
+    ebpo_group_number group = { 0, 0 };
     if (!root && (s->frontier.count == 0 || s->frontier.at[0].turn == EBPO_TURN_NEVER)) {
         *end = EBPO_VIEW_DONE;
         return EBPO_OK;
@@ -178,9 +178,9 @@ static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_err
         return EBPO_OK;
     }
     if (!root)
-        place = place_of(&s->frontier.at[0]);
+        group = children_of(&s->frontier.at[0]);
     ebpo_error why = EBPO_ERROR_INIT;
-    ebpo_status status = read_group(s, place, &why);
+    ebpo_status status = read_group(s, group, &why);
     if (status == EBPO_E_LIMIT && ebpo_chunks_refused(s->chunks)) {
         *end = EBPO_VIEW_BYTES;
         return EBPO_OK;

@@ -5,6 +5,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "octree/cells.h"
 #include "octree/node_types.h"
 #include "subset/subset_parts.h"
 
@@ -13,19 +14,19 @@ static const uint64_t NOTHING = UINT64_MAX;
 /* A gray node of the result. */
 typedef struct gray {
     uint64_t group; /* of its children, in the source; NOTHING: they are left out */
-    uint32_t at[3];
+    ebpo_cell cell;
 } gray;
 
-/* Places in the picked level, and in the result. */
-typedef struct place {
+/* So much of the picked level has been passed. */
+typedef struct passed {
     uint64_t of_type[4], planes, leaf_planes, refs;
-} place;
+} passed;
 
 typedef struct descent {
     ebpo_cutting *c;
     int level;
     ebpo_level from, *to;
-    place read;
+    passed read;
     gray *parent, *child;
     ebpo_tolerance_node *judged; /* gray nodes and leaves as they come, with max_error; else NULL */
     uint64_t next_judged;
@@ -34,14 +35,9 @@ typedef struct descent {
     bool goes_on;    /* some child has children */
 } descent;
 
-static bool meets_box(const ebpo_cutting *c, int level, const uint32_t at[3])
+static bool meets_box(const ebpo_cutting *c, ebpo_cell cell)
 {
-    const ebpo_subset_options *o = c->options;
-    for (int k = 0; k < 3 && o->boxed; k++)
-        if (ebpo_wall(&c->box, k, level, at[k]) > o->max[k] ||
-            ebpo_wall(&c->box, k, level, at[k] + 1) < o->min[k])
-            return false;
-    return true;
+    return !c->options->boxed || ebpo_cell_meets(&c->box, cell, c->options->min, c->options->max);
 }
 
 /* Gray nodes of this level may have children in the result. */
@@ -118,7 +114,7 @@ static ebpo_status make_room(descent *d)
 
 /* --- nodes --- */
 
-static void add_gray(descent *d, const uint32_t at[3], uint64_t group, const uint32_t *codes,
+static void add_gray(descent *d, ebpo_cell cell, uint64_t group, const uint32_t *codes,
                      uint64_t count)
 {
     ebpo_level *t = d->to;
@@ -129,7 +125,7 @@ static void add_gray(descent *d, const uint32_t at[3], uint64_t group, const uin
         t->plane_count += count;
     }
     t->gray_count++;
-    d->child[d->child_count++] = (gray){ group, { at[0], at[1], at[2] } };
+    d->child[d->child_count++] = (gray){ group, cell };
     d->goes_on = d->goes_on || group != NOTHING;
 }
 
@@ -137,14 +133,14 @@ static void add_gray(descent *d, const uint32_t at[3], uint64_t group, const uin
  * their order. */
 static bool is_enough(descent *d) { return d->judged && d->judged[d->next_judged++].enough; }
 
-static void take_gray(descent *d, const uint32_t at[3])
+static void take_gray(descent *d, ebpo_cell cell)
 {
     uint64_t rank = d->read.of_type[EBPO_GRAY]++, group = d->child[d->from.leaf_count + rank].group,
              count = d->from.plane_counts ? d->from.plane_counts[rank] : 0;
     bool enough = is_enough(d);
-    if (enough || !may_go_on(d->c, d->level) || !meets_box(d->c, d->level, at))
+    if (enough || !may_go_on(d->c, d->level) || !meets_box(d->c, cell))
         group = NOTHING;
-    add_gray(d, at, group, d->from.planes ? d->from.planes + d->read.planes : NULL, count);
+    add_gray(d, cell, group, d->from.planes ? d->from.planes + d->read.planes : NULL, count);
     d->read.planes += count;
 }
 
@@ -176,31 +172,31 @@ static void add_leaf(descent *d, uint64_t rank)
 
 /* Outside the box a leaf becomes a pruned node; its own planes bound what is in its cell as well as
  * a gray node's do. Where its parent's do well enough, it needs none. */
-static ebpo_node_type take_leaf(descent *d, const uint32_t at[3])
+static ebpo_node_type take_leaf(descent *d, ebpo_cell cell)
 {
     const ebpo_level *f = &d->from;
     uint64_t rank = d->read.of_type[EBPO_LEAF]++,
              planes = f->leaf_plane_counts ? f->leaf_plane_counts[rank] : 0;
-    bool enough = is_enough(d), kept = !enough && meets_box(d->c, d->level, at);
+    bool enough = is_enough(d), kept = !enough && meets_box(d->c, cell);
     if (kept)
         add_leaf(d, rank);
     else if (enough)
-        add_gray(d, at, NOTHING, NULL, 0);
+        add_gray(d, cell, NOTHING, NULL, 0);
     else
-        add_gray(d, at, NOTHING, f->leaf_planes ? f->leaf_planes + d->read.leaf_planes : NULL,
+        add_gray(d, cell, NOTHING, f->leaf_planes ? f->leaf_planes + d->read.leaf_planes : NULL,
                  d->to->plane_counts ? planes : 0);
     d->read.leaf_planes += planes;
     d->read.refs += f->leaf_ref_count ? f->leaf_ref_count[rank] : 0;
     return kept ? EBPO_LEAF : EBPO_GRAY;
 }
 
-static ebpo_node_type take_node(descent *d, ebpo_node_type type, const uint32_t at[3])
+static ebpo_node_type take_node(descent *d, ebpo_node_type type, ebpo_cell cell)
 {
     const ebpo_level *f = &d->from;
     ebpo_level *t = d->to;
     switch (type) {
-    case EBPO_GRAY: take_gray(d, at); return type;
-    case EBPO_LEAF: return take_leaf(d, at);
+    case EBPO_GRAY: take_gray(d, cell); return type;
+    case EBPO_LEAF: return take_leaf(d, cell);
     case EBPO_BLACK:
         if (t->black_winding)
             t->black_winding[t->black_count] = f->black_winding[d->read.of_type[type]];
@@ -216,19 +212,19 @@ static ebpo_node_type take_node(descent *d, ebpo_node_type type, const uint32_t 
     return type;
 }
 
-static void child_place(const descent *d, uint64_t number, unsigned octant, uint32_t at[3])
+/* Cell of an octant of a group of the result. */
+static ebpo_cell child_cell(const descent *d, uint64_t number, unsigned octant)
 {
-    for (int k = 0; k < 3; k++)
-        at[k] = d->level ? 2 * d->parent[number].at[k] + (octant >> k & 1) : 0;
+    return d->level ? ebpo_cell_child(d->parent[number].cell, octant)
+                    : (ebpo_cell){ 0, { 0, 0, 0 } };
 }
 
 static void take_group(descent *d, uint64_t number, uint16_t types)
 {
     for (unsigned octant = 0; octant < ebpo_group_octants(d->level); octant++) {
-        uint32_t at[3];
-        child_place(d, number, octant, at);
-        d->to->types[number] |=
-            ebpo_group_of(take_node(d, ebpo_group_type(types, octant), at), octant);
+        ebpo_node_type type =
+            take_node(d, ebpo_group_type(types, octant), child_cell(d, number, octant));
+        d->to->types[number] |= ebpo_group_of(type, octant);
     }
 }
 
@@ -252,10 +248,9 @@ static ebpo_status judge(descent *d)
             if (type != EBPO_GRAY && type != EBPO_LEAF)
                 continue;
             ebpo_tolerance_node *node = &d->judged[count++];
-            node->cell.level = d->level;
-            child_place(d, i, octant, node->cell.at);
-            node->asked = meets_box(d->c, d->level, node->cell.at) &&
-                          (type == EBPO_LEAF || may_go_on(d->c, d->level));
+            node->cell = child_cell(d, i, octant);
+            node->asked =
+                meets_box(d->c, node->cell) && (type == EBPO_LEAF || may_go_on(d->c, d->level));
         }
     }
     return ebpo_tolerance_judge(d->c->need, d->judged, count, d->c->options->max_error,
@@ -307,7 +302,7 @@ ebpo_status ebpo_cut_levels(ebpo_cutting *c)
         if (status != EBPO_OK)
             break;
         d.to = &c->out->level[d.level];
-        d.read = (place){ { 0 }, 0, 0, 0 };
+        d.read = (passed){ { 0 }, 0, 0, 0 };
         d.filled = 0;
         d.goes_on = false;
         status = cut_level(&d);

@@ -38,20 +38,11 @@ typedef struct piece {
 
 typedef struct job {
     ebpo_subtree *s;
-    const ebpo_leaf_place *places;
+    const ebpo_cell *cells;
     piece *piece;
 } job;
 
 enum { LEAVES_A_PIECE = 2048 };
-
-static void leaf_cell(const ebpo_subtree *s, const ebpo_leaf_place *place, double low[3],
-                      double high[3])
-{
-    for (int k = 0; k < 3; k++) {
-        low[k] = ebpo_wall(&s->box, k, place->level, place->at[k]);
-        high[k] = ebpo_wall(&s->box, k, place->level, place->at[k] + 1);
-    }
-}
 
 static inline double least3(double a, double b, double c)
 {
@@ -388,15 +379,14 @@ static uint8_t choose_wall(unsigned walls)
     return open ? (uint8_t)__builtin_ctz(open) : EBPO_NO_WALL;
 }
 
-static bool classify(ebpo_subtree *s, ebpo_subtree_leaf *leaf, const ebpo_leaf_place *place,
-                     piece *out)
+static bool classify(ebpo_subtree *s, ebpo_subtree_leaf *leaf, const ebpo_cell *cell, piece *out)
 {
     double low[3], high[3];
     leaf_faces f;
     plane planes[EBPO_KIND_PLANES_MAX];
     int flip = 1, count = 0;
     int32_t at_corner = leaf->winding;
-    leaf_cell(s, place, low, high);
+    ebpo_cell_bounds(&s->box, *cell, low, high);
     unsigned walls;
     bool few = gather(s, leaf, low, high, &f, &walls);
     leaf->wall = choose_wall(walls);
@@ -422,7 +412,7 @@ static ebpo_status classify_leaves(void *context, uint64_t begin, uint64_t end, 
     job *j = context;
     piece *out = &j->piece[begin / LEAVES_A_PIECE];
     for (uint64_t i = begin; i < end; i++)
-        if (!classify(j->s, &j->s->leaf[i], &j->places[i], out))
+        if (!classify(j->s, &j->s->leaf[i], &j->cells[i], out))
             return ebpo_fail_memory(error, out->count * sizeof *out->planes);
     return EBPO_OK;
 }
@@ -450,13 +440,13 @@ static ebpo_status join_pieces(ebpo_subtree *s, const job *j, uint64_t pieces, e
     return EBPO_OK;
 }
 
-ebpo_status ebpo_subtree_fill_kinds(ebpo_subtree *s, const ebpo_leaf_place *places,
-                                    unsigned threads, ebpo_error *error)
+ebpo_status ebpo_subtree_fill_kinds(ebpo_subtree *s, const ebpo_cell *cells, unsigned threads,
+                                    ebpo_error *error)
 {
     if (!s->solid || s->leaf_count == 0)
         return EBPO_OK;
     uint64_t pieces = (s->leaf_count + LEAVES_A_PIECE - 1) / LEAVES_A_PIECE;
-    job j = { s, places, ebpo_alloc_zero(pieces, sizeof(piece)) };
+    job j = { s, cells, ebpo_alloc_zero(pieces, sizeof(piece)) };
     if (!j.piece)
         return ebpo_fail_memory(error, pieces * sizeof(piece));
     ebpo_status status = ebpo_parallel_for(threads, s->leaf_count, LEAVES_A_PIECE, classify_leaves,

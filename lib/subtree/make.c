@@ -24,12 +24,11 @@ static bool needs_doubles(const ebpo_info *info)
 
 static void make_frame(ebpo_subtree *s)
 {
-    double most = 0;
+    double most = 0, low[3], high[3];
+    ebpo_cell_bounds(&s->box, s->root.cell, low, high);
     for (int k = 0; k < 3; k++) {
-        double low = ebpo_wall(&s->box, k, s->root.level, s->root.at[k]),
-               high = ebpo_wall(&s->box, k, s->root.level, s->root.at[k] + 1);
-        s->centre[k] = low / 2 + high / 2;
-        most = fmax(most, high - low);
+        s->centre[k] = low[k] / 2 + high[k] / 2;
+        most = fmax(most, high[k] - low[k]);
     }
     int exponent;
     frexp(most, &exponent);
@@ -84,7 +83,7 @@ static ebpo_status make(ebpo_subtree *s, ebpo_slice *slice, bool with_planes, un
                         ebpo_error *error)
 {
     ebpo_layout layout;
-    ebpo_leaf_place *places = NULL;
+    ebpo_cell *cells = NULL;
     ebpo_status status = ebpo_layout_make(&layout, slice, EBPO_BLOCKS_MOST, error);
     if (status != EBPO_OK)
         return status;
@@ -93,13 +92,13 @@ static ebpo_status make(ebpo_subtree *s, ebpo_slice *slice, bool with_planes, un
     if (status == EBPO_OK)
         status = ebpo_subtree_fill_bounds(s, &layout, threads, error);
     if (status == EBPO_OK)
-        status = ebpo_subtree_fill_nodes(s, slice, &layout, &places, error);
+        status = ebpo_subtree_fill_nodes(s, slice, &layout, &cells, error);
     ebpo_layout_free(&layout);
     if (status == EBPO_OK)
-        status = ebpo_subtree_fill_kinds(s, places, threads, error);
+        status = ebpo_subtree_fill_kinds(s, cells, threads, error);
     if (status == EBPO_OK && with_planes)
         status = copy_planes(s, slice, error);
-    free(places);
+    free(cells);
     return status;
 }
 
@@ -116,7 +115,7 @@ ebpo_status ebpo_subtree_make(ebpo_subtree **out, ebpo_slice *slice, const ebpo_
     memcpy(s->box.size, info->box_size, sizeof s->box.size);
     s->box.grid_level = info->grid_level;
     s->root = slice->root;
-    s->deepest = slice->root.level + slice->level_count - 1;
+    s->deepest = slice->root.cell.level + slice->level_count - 1;
     s->solid = info->solid;
     s->has_planes = with_planes;
     s->wide = needs_doubles(info);
@@ -136,8 +135,8 @@ ebpo_status ebpo_subtree_make(ebpo_subtree **out, ebpo_slice *slice, const ebpo_
         ebpo_subtree_free(s);
         return status;
     }
-    if (s->root.level == 0)
-        ebpo_nodes_make_grid(&s->nodes);
+    if (s->root.cell.level == 0)
+        ebpo_node_table_make_grid(&s->nodes);
     s->bytes = count_bytes(s);
     *out = s;
     return EBPO_OK;
@@ -147,7 +146,7 @@ void ebpo_subtree_free(ebpo_subtree *s)
 {
     if (!s)
         return;
-    ebpo_nodes_free(&s->nodes);
+    ebpo_node_table_free(&s->nodes);
     free(s->leaf);
     free(s->list);
     free(s->planes);

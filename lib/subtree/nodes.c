@@ -1,4 +1,4 @@
-/* Child tables, leaf records, and the grid that spares the way down. */
+/* Child tables and leaf records. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -11,7 +11,7 @@ typedef struct walk {
     ebpo_subtree *s;
     const ebpo_slice *slice;
     const uint32_t *slot_of; /* [local face] */
-    ebpo_leaf_place *places;
+    ebpo_cell *cells;
     uint64_t rank[EBPO_LEVELS_MAX][4]; /* nodes of each type of each level, seen so far */
     uint64_t refs[EBPO_LEVELS_MAX];
     uint64_t group_begin[EBPO_LEVELS_MAX]; /* number of the first group of each level */
@@ -91,32 +91,29 @@ static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank
     put_list(w, leaf, count);
 }
 
-static uint32_t settled(walk *w, const int32_t *windings, uint64_t rank, int32_t usual)
+static uint32_t uniform(walk *w, const int32_t *windings, uint64_t rank, int32_t usual)
 {
-    int32_t winding = windings ? windings[rank] : usual;
-    if (winding <= -EBPO_ENTRY_ZERO || winding >= EBPO_ENTRY_ZERO) {
+    uint32_t entry = 0;
+    if (!ebpo_entry_uniform(windings ? windings[rank] : usual, &entry))
         w->status =
             ebpo_fail(w->error, EBPO_E_LIMIT,
                       "a node's winding number is beyond 2^29: the solid has too many shells");
-        return 0;
-    }
-    return ebpo_entry(EBPO_ENTRY_UNIFORM, (uint32_t)(winding + EBPO_ENTRY_ZERO));
+    return entry;
 }
 
-static uint32_t walk_node(walk *w, int depth, ebpo_node_type type, const uint32_t at[3])
+static uint32_t walk_node(walk *w, int depth, ebpo_node_type type, ebpo_cell cell)
 {
     const ebpo_level *level = &w->slice->level[depth];
     uint64_t rank = w->rank[depth][type]++;
     if (w->status != EBPO_OK)
         return 0;
     if (type == EBPO_WHITE)
-        return settled(w, level->white_winding, rank, 0);
+        return uniform(w, level->white_winding, rank, 0);
     if (type == EBPO_BLACK)
-        return settled(w, level->black_winding, rank, 1);
+        return uniform(w, level->black_winding, rank, 1);
     if (type == EBPO_LEAF) {
         uint32_t number = (uint32_t)(w->leaf_begin[depth] + rank);
-        w->places[number] =
-            (ebpo_leaf_place){ { at[0], at[1], at[2] }, (uint8_t)(w->slice->root.level + depth) };
+        w->cells[number] = cell;
         fill_leaf(w, level, depth, rank, number);
         return ebpo_entry(EBPO_ENTRY_LEAF, number);
     }
@@ -124,18 +121,15 @@ static uint32_t walk_node(walk *w, int depth, ebpo_node_type type, const uint32_
     if (w->slice->pruned &&
         (depth + 1 == w->slice->level_count || w->slice->level[depth + 1].types[rank] == 0)) {
         if (depth + 1 < w->slice->level_count) {
-            w->rank[depth + 1][EBPO_WHITE] += 8; /* the places of its children */
+            w->rank[depth + 1][EBPO_WHITE] += 8; /* where its children would be */
             memset(w->s->nodes.group[group], 0xff, sizeof w->s->nodes.group[group]);
         }
         return ebpo_entry(EBPO_ENTRY_BELOW, (uint32_t)group);
     }
     uint16_t types = w->slice->level[depth + 1].types[rank];
-    for (unsigned octant = 0; octant < 8; octant++) {
-        uint32_t below[3] = { at[0] * 2 + (octant & 1), at[1] * 2 + (octant >> 1 & 1),
-                              at[2] * 2 + (octant >> 2) };
-        uint32_t entry = walk_node(w, depth + 1, ebpo_group_type(types, octant), below);
-        w->s->nodes.group[group][octant] = entry;
-    }
+    for (unsigned octant = 0; octant < 8; octant++)
+        w->s->nodes.group[group][octant] =
+            walk_node(w, depth + 1, ebpo_group_type(types, octant), ebpo_cell_child(cell, octant));
     return ebpo_entry(EBPO_ENTRY_GRAY, (uint32_t)group);
 }
 
@@ -160,10 +154,10 @@ static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **slot
     s->nodes.group_count = (uint32_t)groups;
     s->leaf = ebpo_alloc_zero(leaves, sizeof *s->leaf);
     s->leaf_count = (uint32_t)leaves;
-    w->places = ebpo_alloc(leaves, sizeof *w->places);
+    w->cells = ebpo_alloc(leaves, sizeof *w->cells);
     uint64_t faces = layout->block_count ? layout->block_end[layout->block_count - 1] : 0;
     uint32_t *map = *slot_of = ebpo_alloc(faces, sizeof *map);
-    if (!s->nodes.group || !s->leaf || !w->places || !map)
+    if (!s->nodes.group || !s->leaf || !w->cells || !map)
         return ebpo_fail_memory(w->error, groups * 32 + leaves * sizeof *s->leaf + faces * 4);
     for (uint64_t b = 0; b < layout->block_count; b++)
         for (uint32_t face = layout->block_begin[b]; face < layout->block_end[b]; face++)
@@ -172,76 +166,20 @@ static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **slot
 }
 
 ebpo_status ebpo_subtree_fill_nodes(ebpo_subtree *s, const ebpo_slice *slice,
-                                    const ebpo_layout *layout, ebpo_leaf_place **places,
-                                    ebpo_error *error)
+                                    const ebpo_layout *layout, ebpo_cell **cells, ebpo_error *error)
 {
     walk w = { .s = s, .slice = slice, .status = EBPO_OK, .error = error };
     uint32_t *slot_of = NULL;
     ebpo_status status = make_room(&w, layout, &slot_of);
     if (status == EBPO_OK) {
         w.slot_of = slot_of;
-        s->nodes.root_level = slice->root.level;
+        s->nodes.root_level = slice->root.cell.level;
         s->nodes.root =
-            walk_node(&w, 0, ebpo_group_type(slice->level[0].types[0], 0), slice->root.at);
+            walk_node(&w, 0, ebpo_group_type(slice->level[0].types[0], 0), slice->root.cell);
         status = w.status;
     }
     free(slot_of);
     free(w.scratch);
-    *places = w.places;
+    *cells = w.cells;
     return status;
-}
-
-/* --- the grid --- */
-
-typedef struct painter {
-    ebpo_nodes *nodes;
-    int bits;
-} painter;
-
-static void paint(painter *p, uint32_t entry, int depth, uint32_t x, uint32_t y, uint32_t z)
-{
-    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_GRAY && depth < p->bits) {
-        for (unsigned octant = 0; octant < 8; octant++)
-            paint(p, p->nodes->group[ebpo_entry_value(entry)][octant], depth + 1,
-                  2 * x + (octant & 1), 2 * y + (octant >> 1 & 1), 2 * z + (octant >> 2));
-        return;
-    }
-    int shift = p->bits - depth;
-    uint32_t span = 1u << shift;
-    for (uint32_t k = z << shift; k < (z << shift) + span; k++)
-        for (uint32_t j = y << shift; j < (y << shift) + span; j++)
-            for (uint32_t i = x << shift; i < (x << shift) + span; i++) {
-                uint64_t cell = ((uint64_t)k << p->bits | j) << p->bits | i;
-                p->nodes->grid[cell] = entry;
-                p->nodes->grid_depth[cell] = (uint8_t)depth;
-            }
-}
-
-void ebpo_nodes_make_grid(ebpo_nodes *nodes)
-{
-    int bits = 0;
-    while (bits < 8 && UINT64_C(1) << 3 * (bits + 1) <= 8 * (uint64_t)nodes->group_count)
-        bits++;
-    if (bits < 2)
-        return;
-    uint64_t cells = UINT64_C(1) << 3 * bits;
-    nodes->grid = ebpo_alloc(cells, sizeof *nodes->grid);
-    nodes->grid_depth = ebpo_alloc(cells, 1);
-    if (!nodes->grid || !nodes->grid_depth) {
-        free(nodes->grid);
-        free(nodes->grid_depth);
-        nodes->grid = NULL;
-        nodes->grid_depth = NULL;
-        return;
-    }
-    nodes->grid_bits = bits;
-    paint(&(painter){ nodes, bits }, nodes->root, 0, 0, 0, 0);
-}
-
-void ebpo_nodes_free(ebpo_nodes *nodes)
-{
-    free(nodes->group);
-    free(nodes->grid);
-    free(nodes->grid_depth);
-    memset(nodes, 0, sizeof *nodes);
 }

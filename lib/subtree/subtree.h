@@ -7,50 +7,7 @@
 
 #include "container/slice.h"
 #include "geom/cell.h"
-
-/* --- nodes: what a point is in --- */
-
-/* An entry of a child table: two bits of kind, 30 of value. */
-typedef enum ebpo_entry_kind {
-    EBPO_ENTRY_UNIFORM = 0, /* white or black; value: winding number + EBPO_ENTRY_ZERO */
-    EBPO_ENTRY_LEAF = 1,    /* value: number of the leaf */
-    EBPO_ENTRY_GRAY = 2,    /* value: number of the group of its eight children */
-    /* in the top of a tree: value: number of a subtree that is loaded on demand; in a subtree: a
-       pruned node, of which value is the number among gray nodes */
-    EBPO_ENTRY_BELOW = 3
-} ebpo_entry_kind;
-enum { EBPO_ENTRY_ZERO = 1 << 29 };
-
-static inline uint32_t ebpo_entry(ebpo_entry_kind kind, uint32_t value)
-{
-    return (uint32_t)kind << 30 | value;
-}
-static inline ebpo_entry_kind ebpo_entry_kind_of(uint32_t entry)
-{
-    return (ebpo_entry_kind)(entry >> 30);
-}
-static inline uint32_t ebpo_entry_value(uint32_t entry) { return entry & 0x3fffffff; }
-static inline int32_t ebpo_entry_winding(uint32_t entry)
-{
-    return (int32_t)ebpo_entry_value(entry) - EBPO_ENTRY_ZERO;
-}
-
-typedef struct ebpo_nodes {
-    int root_level;       /* level of the node that `root` describes */
-    uint32_t root;        /* its entry */
-    uint32_t (*group)[8]; /* entries of the children, octant by octant */
-    uint32_t group_count;
-    /* 0: no grid. The entry of the node that contains the cell at level root_level + grid_bits, or
-     * of this cell, */
-    int grid_bits;
-    uint32_t *grid;      /* at [z][y][x]; */
-    uint8_t *grid_depth; /* and the depth of that node below the root */
-} ebpo_nodes;
-
-/* Makes the grid: fewer cells than about twice the groups. Optional; without memory there is none.
- */
-void ebpo_nodes_make_grid(ebpo_nodes *nodes);
-void ebpo_nodes_free(ebpo_nodes *nodes);
+#include "octree/node_table.h"
 
 /* --- leaves --- */
 
@@ -122,11 +79,11 @@ typedef struct ebpo_bound {
 #define EBPO_NO_CHILD UINT32_MAX
 
 typedef struct ebpo_subtree {
-    ebpo_place root;
+    ebpo_node root;
     ebpo_box box; /* of the whole model */
     int deepest;  /* level of its deepest nodes */
     bool solid, has_planes;
-    ebpo_nodes nodes;
+    ebpo_node_table nodes;
     ebpo_subtree_leaf *leaf;
     uint32_t leaf_count;
     ebpo_listed_block *list; /* blocks of leaves */

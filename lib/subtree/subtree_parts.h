@@ -31,17 +31,13 @@ EBPO_MUST_USE ebpo_status ebpo_subtree_fill_blocks(ebpo_subtree *s, const ebpo_s
 /* Bounds of the hierarchy, from the blocks (parallel). */
 EBPO_MUST_USE ebpo_status ebpo_subtree_fill_bounds(ebpo_subtree *s, const ebpo_layout *layout,
                                                    unsigned threads, ebpo_error *error);
-/* Child tables and leaf records with their lists of blocks (one walk). cells: [leaf_count], the
- * position of each leaf at its level. */
-typedef struct ebpo_leaf_place {
-    uint32_t at[3];
-    uint8_t level;
-} ebpo_leaf_place;
+/* Child tables and leaf records with their lists of blocks (one walk); cells: [leaf_count] the
+ * leaves' cells. */
 EBPO_MUST_USE ebpo_status ebpo_subtree_fill_nodes(ebpo_subtree *s, const ebpo_slice *slice,
-                                                  const ebpo_layout *layout,
-                                                  ebpo_leaf_place **places, ebpo_error *error);
+                                                  const ebpo_layout *layout, ebpo_cell **cells,
+                                                  ebpo_error *error);
 /* Free walls and kinds (parallel). */
-EBPO_MUST_USE ebpo_status ebpo_subtree_fill_kinds(ebpo_subtree *s, const ebpo_leaf_place *places,
+EBPO_MUST_USE ebpo_status ebpo_subtree_fill_kinds(ebpo_subtree *s, const ebpo_cell *cells,
                                                   unsigned threads, ebpo_error *error);
 
 #endif

@@ -8,7 +8,6 @@
 #include <string.h>
 #include <time.h>
 
-#include "query/locate.h"
 #include "query/query_model.h"
 
 enum { KINDS = 5, MOST = 20000, PASSES = 7 };
@@ -49,13 +48,12 @@ static void sort_points(const ebpo_model *m, uint64_t points, bucket *buckets)
     for (uint64_t i = 0; i < points; i++) {
         double p[3];
         uint32_t at[3];
-        int level;
         for (int k = 0; k < 3; k++)
             p[k] = m->info->report.min[k] +
                    (m->info->report.max[k] - m->info->report.min[k]) * random_unit(&state);
         if (!ebpo_locate(&s->box, fine, p, at))
             continue;
-        uint32_t entry = ebpo_descend(&s->nodes, fine, at, &level);
+        uint32_t entry = ebpo_descend(&s->nodes, fine, at).entry;
         if (ebpo_entry_kind_of(entry) != EBPO_ENTRY_LEAF)
             continue;
         bucket *b = &buckets[s->leaf[ebpo_entry_value(entry)].kind];

@@ -1,4 +1,4 @@
-/* Parts of a file against the whole file: ranges, nodes by place, subtrees as one piece. */
+/* Parts of a file against the whole file: ranges, nodes, subtrees as one piece. */
 #include <check.h>
 #include <dirent.h>
 #include <pthread.h>
@@ -152,7 +152,7 @@ static void compare_leaf(compare *c, int i, uint64_t at, int level, uint64_t ran
 
 static void compare_node(compare *c, int i, unsigned type, uint64_t rank)
 {
-    int level = c->slice->root.level + i;
+    int level = c->slice->root.cell.level + i;
     const ebpo_level *a = &c->slice->level[i], *b = &c->w->tree.level[level];
     uint64_t at = c->next[i][type]++;
     if (type == EBPO_LEAF) {
@@ -228,7 +228,7 @@ static void compare_counts(const compare *c, const ebpo_slice_size *size)
         sum.refs += l->ref_count;
         sum.new_faces += l->new_count;
     }
-    sum.outer = c->slice->root.level == 0 ? 0 : sum.refs;
+    sum.outer = c->slice->root.cell.level == 0 ? 0 : sum.refs;
     ck_assert_uint_le(c->slice->outer_count, sum.outer);
     ck_assert_uint_eq(sum.new_faces, c->slice->face_count);
     ck_assert_mem_eq(&sum, size, sizeof sum);
@@ -249,7 +249,7 @@ static void compare_slice(const whole *w, const ebpo_slice *slice, const ebpo_sl
     free(c.listed);
 }
 
-static void check_slice(const whole *w, const ebpo_place *root)
+static void check_slice(const whole *w, const ebpo_node *root)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_slice slice;
@@ -262,39 +262,40 @@ static void check_slice(const whole *w, const ebpo_place *root)
     ebpo_slice_free(&slice);
 }
 
-static void check_place(const whole *w, const ebpo_place *place)
+static void check_node(const whole *w, const ebpo_node *node)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    const ebpo_level *l = &w->tree.level[place->level];
+    const ebpo_level *l = &w->tree.level[node->cell.level];
     uint64_t ranks[4];
     uint32_t codes[255], count;
     uint16_t types;
     int32_t winding;
-    if (place->type == EBPO_GRAY) {
-        ck_assert_msg(ebpo_place_children(w->chunks, place, &types, ranks, &error) == EBPO_OK, "%s",
+    if (node->type == EBPO_GRAY) {
+        ck_assert_msg(ebpo_chunks_children(w->chunks, node, &types, ranks, &error) == EBPO_OK, "%s",
                       error.message);
-        ck_assert_uint_eq(types, w->tree.level[place->level + 1].types[place->rank]);
-        ck_assert_mem_eq(ranks, w->before[place->level + 1][place->rank], sizeof ranks);
-        ck_assert_msg(ebpo_place_planes(w->chunks, place, codes, &count, &error) == EBPO_OK, "%s",
+        ck_assert_uint_eq(types, w->tree.level[node->cell.level + 1].types[node->rank]);
+        ck_assert_mem_eq(ranks, w->before[node->cell.level + 1][node->rank], sizeof ranks);
+        ck_assert_msg(ebpo_chunks_planes(w->chunks, node, codes, &count, &error) == EBPO_OK, "%s",
                       error.message);
-        ck_assert_uint_eq(count, l->plane_counts ? l->plane_counts[place->rank] : 0);
+        ck_assert_uint_eq(count, l->plane_counts ? l->plane_counts[node->rank] : 0);
         for (uint32_t k = 0; k < count; k++)
-            ck_assert_uint_eq(codes[k], l->planes[w->planes_before[place->level][place->rank] + k]);
-        ck_assert_int_eq(ebpo_place_winding(w->chunks, place, &winding, NULL),
+            ck_assert_uint_eq(codes[k],
+                              l->planes[w->planes_before[node->cell.level][node->rank] + k]);
+        ck_assert_int_eq(ebpo_chunks_winding(w->chunks, node, &winding, NULL),
                          w->tree.info.solid ? EBPO_E_ARGUMENT : EBPO_E_NOT_SOLID);
     } else if (w->tree.info.solid) {
-        const int32_t *windings = place->type == EBPO_LEAF    ? l->leaf_winding
-                                  : place->type == EBPO_BLACK ? l->black_winding
-                                                              : l->white_winding;
-        ck_assert_msg(ebpo_place_winding(w->chunks, place, &winding, &error) == EBPO_OK, "%s",
+        const int32_t *windings = node->type == EBPO_LEAF    ? l->leaf_winding
+                                  : node->type == EBPO_BLACK ? l->black_winding
+                                                             : l->white_winding;
+        ck_assert_msg(ebpo_chunks_winding(w->chunks, node, &winding, &error) == EBPO_OK, "%s",
                       error.message);
-        ck_assert_int_eq(winding, windings ? windings[place->rank] : place->type == EBPO_BLACK);
+        ck_assert_int_eq(winding, windings ? windings[node->rank] : node->type == EBPO_BLACK);
     } else {
-        ck_assert_int_eq(ebpo_place_winding(w->chunks, place, &winding, NULL), EBPO_E_NOT_SOLID);
+        ck_assert_int_eq(ebpo_chunks_winding(w->chunks, node, &winding, NULL), EBPO_E_NOT_SOLID);
     }
 }
 
-/* Every node by place; the subtrees of each `step`th of them. */
+/* Every node; the subtrees of each `step`th of them. */
 static void check_all(const whole *w, uint64_t step)
 {
     uint64_t turn = 0;
@@ -303,11 +304,13 @@ static void check_all(const whole *w, uint64_t step)
         const uint64_t counts[4] = { s->white_count, s->black_count, s->leaf_count, s->gray_count };
         for (int type = 0; type < 4; type++)
             for (uint64_t rank = 0; rank < counts[type]; rank++, turn++) {
-                ebpo_place place = { .level = level, .type = (ebpo_node_type)type, .rank = rank };
+                ebpo_node node = { .cell.level = level,
+                                   .type = (ebpo_node_type)type,
+                                   .rank = rank };
                 if (turn % 5 == 0 || counts[type] < 5000)
-                    check_place(w, &place);
+                    check_node(w, &node);
                 if (type >= EBPO_LEAF && (turn % step == 0 || level == 0))
-                    check_slice(w, &place);
+                    check_slice(w, &node);
             }
     }
 }
@@ -433,7 +436,7 @@ START_TEST(files_without_mesh_have_places_but_no_slices)
     ebpo_tree tree;
     whole w;
     ebpo_slice slice;
-    ebpo_place root = { .type = EBPO_GRAY };
+    ebpo_node root = { .type = EBPO_GRAY };
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_slice_size size;
     random_tree_make(&tree, &options);
@@ -447,12 +450,12 @@ START_TEST(files_without_mesh_have_places_but_no_slices)
     ck_assert(size.leaves > 0 && size.refs == 0 && size.new_faces == 0);
     for (int level = 0; level < w.tree.info.level_count; level++)
         for (uint64_t rank = 0; rank < w.tree.level[level].gray_count; rank++)
-            check_place(&w, &(ebpo_place){ .level = level, .type = EBPO_GRAY, .rank = rank });
+            check_node(&w, &(ebpo_node){ .cell.level = level, .type = EBPO_GRAY, .rank = rank });
     whole_close(&w);
 }
 END_TEST
 
-START_TEST(places_that_the_file_does_not_have_are_refused)
+START_TEST(nodes_that_the_file_does_not_have_are_refused)
 {
     random_tree_options options = { 9, 3, 6, 4, true, false, true, false };
     ebpo_tree tree;
@@ -462,13 +465,13 @@ START_TEST(places_that_the_file_does_not_have_are_refused)
     random_tree_make(&tree, &options);
     write_tree(&tree, ~0u);
     whole_open(&w, path, 0);
-    const ebpo_place wrong[] = {
-        { .level = -1, .type = EBPO_GRAY },
-        { .level = 3, .type = EBPO_LEAF },
-        { .level = 1, .type = EBPO_GRAY, .rank = w.tree.level[1].gray_count },
-        { .level = 2, .type = EBPO_LEAF, .rank = UINT64_MAX },
-        { .level = 2, .type = EBPO_WHITE },
-        { .level = 0, .type = EBPO_LEAF },
+    const ebpo_node wrong[] = {
+        { .cell.level = -1, .type = EBPO_GRAY },
+        { .cell.level = 3, .type = EBPO_LEAF },
+        { .cell.level = 1, .type = EBPO_GRAY, .rank = w.tree.level[1].gray_count },
+        { .cell.level = 2, .type = EBPO_LEAF, .rank = UINT64_MAX },
+        { .cell.level = 2, .type = EBPO_WHITE },
+        { .cell.level = 0, .type = EBPO_LEAF },
     };
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         uint16_t types;
@@ -477,9 +480,9 @@ START_TEST(places_that_the_file_does_not_have_are_refused)
         ebpo_slice_size size;
         ck_assert_int_eq(ebpo_slice_read(&slice, w.chunks, &wrong[i], &error), EBPO_E_ARGUMENT);
         ck_assert_int_eq(ebpo_slice_measure(w.chunks, &wrong[i], &size, &error), EBPO_E_ARGUMENT);
-        ck_assert_int_eq(ebpo_place_children(w.chunks, &wrong[i], &types, ranks, &error),
+        ck_assert_int_eq(ebpo_chunks_children(w.chunks, &wrong[i], &types, ranks, &error),
                          EBPO_E_ARGUMENT);
-        ck_assert_int_eq(ebpo_place_planes(w.chunks, &wrong[i], codes, &count, &error),
+        ck_assert_int_eq(ebpo_chunks_planes(w.chunks, &wrong[i], codes, &count, &error),
                          EBPO_E_ARGUMENT);
     }
     whole_close(&w);
@@ -551,14 +554,13 @@ static bool try_all(const ebpo_file *file, ebpo_chunks *chunks, uint64_t *state)
     for (int n = 0; n < 12; n++) {
         /* of large trees, small parts */
         int level = info->level_count > 5 ? 2 + n % (info->level_count - 2) : n % info->level_count;
-        ebpo_place place = { .level = level,
-                             .type =
-                                 info->level[level].gray_count && n % 3 ? EBPO_GRAY : EBPO_LEAF };
+        ebpo_node node = { .cell.level = level,
+                           .type = info->level[level].gray_count && n % 3 ? EBPO_GRAY : EBPO_LEAF };
         uint64_t count =
-            place.type == EBPO_GRAY ? info->level[level].gray_count : info->level[level].leaf_count;
+            node.type == EBPO_GRAY ? info->level[level].gray_count : info->level[level].leaf_count;
         if (count == 0)
             continue;
-        place.rank = n < 3 ? 0 : ebpo_test_random(state) % count;
+        node.rank = n < 3 ? 0 : ebpo_test_random(state) % count;
         ebpo_slice slice;
         ebpo_slice_size size;
         ebpo_error error = EBPO_ERROR_INIT;
@@ -566,14 +568,14 @@ static bool try_all(const ebpo_file *file, ebpo_chunks *chunks, uint64_t *state)
         uint64_t ranks[4];
         uint32_t codes[255], planes;
         int32_t winding;
-        ebpo_status status[5] = { ebpo_slice_measure(chunks, &place, &size, NULL),
-                                  ebpo_slice_read(&slice, chunks, &place, &error), EBPO_OK, EBPO_OK,
+        ebpo_status status[5] = { ebpo_slice_measure(chunks, &node, &size, NULL),
+                                  ebpo_slice_read(&slice, chunks, &node, &error), EBPO_OK, EBPO_OK,
                                   EBPO_OK };
-        if (place.type == EBPO_GRAY) {
-            status[2] = ebpo_place_children(chunks, &place, &types, ranks, NULL);
-            status[3] = ebpo_place_planes(chunks, &place, codes, &planes, NULL);
+        if (node.type == EBPO_GRAY) {
+            status[2] = ebpo_chunks_children(chunks, &node, &types, ranks, NULL);
+            status[3] = ebpo_chunks_planes(chunks, &node, codes, &planes, NULL);
         } else if (info->solid) {
-            status[4] = ebpo_place_winding(chunks, &place, &winding, NULL);
+            status[4] = ebpo_chunks_winding(chunks, &node, &winding, NULL);
         }
         if (status[1] == EBPO_OK)
             check_bounds(&slice);
@@ -645,7 +647,7 @@ START_TEST(counts_that_do_not_fit_the_types_are_refused)
     ebpo_held_chunk view = { .array = ebpo_reader_array(w.file, EBPO_A_TYPES, 3) };
     ck_assert_int_eq(ebpo_held_chunk_move(w.chunks, &view, 0, NULL), EBPO_OK);
     ((uint8_t *)(uintptr_t)view.rows)[0] |= 3; /* gray at the deepest level */
-    ck_assert_int_eq(ebpo_slice_read(&slice, w.chunks, &(ebpo_place){ .type = EBPO_GRAY }, &error),
+    ck_assert_int_eq(ebpo_slice_read(&slice, w.chunks, &(ebpo_node){ .type = EBPO_GRAY }, &error),
                      EBPO_E_FORMAT);
     ck_assert_ptr_nonnull(
         strstr(error.message, "/levels/03/types: the types contradict the counts"));
@@ -732,18 +734,18 @@ static void *read_random(void *context)
     reader *r = context;
     uint64_t count = r->w->tree.level[r->level].gray_count;
     for (uint64_t n = 0; n < (r->fill ? count : 60); n++) {
-        ebpo_place place = { .level = r->level,
-                             .type = EBPO_GRAY,
-                             .rank = r->fill ? n : ebpo_test_random(&r->state) % count };
+        ebpo_node node = { .cell.level = r->level,
+                           .type = EBPO_GRAY,
+                           .rank = r->fill ? n : ebpo_test_random(&r->state) % count };
         ebpo_slice slice;
-        if (ebpo_slice_read(&slice, r->w->chunks, &place, NULL) != EBPO_OK) {
+        if (ebpo_slice_read(&slice, r->w->chunks, &node, NULL) != EBPO_OK) {
             r->wrong++;
             continue;
         }
         uint64_t hash = slice_hash(&slice);
         if (r->fill)
             r->hash[n] = hash;
-        r->wrong += hash != r->hash[place.rank];
+        r->wrong += hash != r->hash[node.rank];
         ebpo_slice_free(&slice);
     }
     return NULL;
@@ -794,10 +796,12 @@ START_TEST(subtrees_of_a_real_model_add_up)
             for (uint64_t rank = 0; rank < (type == EBPO_GRAY ? w.tree.level[level].gray_count
                                                               : w.tree.level[level].leaf_count);
                  rank++) {
-                ebpo_place place = { .level = level, .type = (ebpo_node_type)type, .rank = rank };
+                ebpo_node node = { .cell.level = level,
+                                   .type = (ebpo_node_type)type,
+                                   .rank = rank };
                 ebpo_slice_size size;
-                check_slice(&w, &place);
-                ck_assert_int_eq(ebpo_slice_measure(w.chunks, &place, &size, NULL), EBPO_OK);
+                check_slice(&w, &node);
+                ck_assert_int_eq(ebpo_slice_measure(w.chunks, &node, &size, NULL), EBPO_OK);
                 faces += size.new_faces;
                 leaves += size.leaves;
             }
@@ -822,7 +826,7 @@ int main(void)
     tcase_add_loop_test(cases, slices_of_a_mesh_of_many_chunks_agree, 0, 2);
     tcase_add_loop_test(cases, the_slice_of_the_root_is_the_whole_tree, 0, 5);
     tcase_add_test(cases, files_without_mesh_have_places_but_no_slices);
-    tcase_add_test(cases, places_that_the_file_does_not_have_are_refused);
+    tcase_add_test(cases, nodes_that_the_file_does_not_have_are_refused);
     tcase_add_test(cases, ranges_of_integers_are_widened_and_checked);
     tcase_add_loop_test(cases, changed_numbers_never_lead_outside, 0, 2);
     tcase_add_test(cases, counts_that_do_not_fit_the_types_are_refused);

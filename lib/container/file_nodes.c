@@ -1,4 +1,4 @@
-/* Nodes by place: children, planes, winding number. */
+/* Nodes of a file: children, planes, winding number. */
 #include <inttypes.h>
 #include <string.h>
 
@@ -8,58 +8,61 @@
 #include "octree/node_types.h"
 #include "octree/rule.h"
 
-ebpo_status ebpo_place_check(const ebpo_chunks *chunks, const ebpo_place *place, ebpo_error *error)
+ebpo_status ebpo_chunks_check_node(const ebpo_chunks *chunks, const ebpo_node *node,
+                                   ebpo_error *error)
 {
     const ebpo_info *info = &chunks->file->info;
     const char *shown = chunks->file->in.shown;
-    if (place->level < 0 || place->level >= info->level_count || (unsigned)place->type > EBPO_GRAY)
+    if (node->cell.level < 0 || node->cell.level >= info->level_count ||
+        (unsigned)node->type > EBPO_GRAY)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "%s: there is no level %d; the file has levels 0 to %d", shown,
-                         place->level, info->level_count - 1);
-    const ebpo_level_summary *s = &info->level[place->level];
+                         node->cell.level, info->level_count - 1);
+    const ebpo_level_summary *s = &info->level[node->cell.level];
     const uint64_t all[4] = { s->white_count, s->black_count, s->leaf_count, s->gray_count };
-    if (place->rank >= all[place->type])
+    if (node->rank >= all[node->type])
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "%s: level %d has %" PRIu64 " nodes of type %d; number %" PRIu64
                          " was asked for",
-                         shown, place->level, all[place->type], (int)place->type, place->rank);
+                         shown, node->cell.level, all[node->type], (int)node->type, node->rank);
     return EBPO_OK;
 }
 
-static ebpo_status check_type(const ebpo_chunks *chunks, const ebpo_place *place,
-                              ebpo_node_type type, const char *what, ebpo_error *error)
+static ebpo_status check_type(const ebpo_chunks *chunks, const ebpo_node *node, ebpo_node_type type,
+                              const char *what, ebpo_error *error)
 {
-    if (place->type != type)
+    if (node->type != type)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "%s: %s of a node of type %d are asked for; only gray nodes have them",
-                         chunks->file->in.shown, what, (int)place->type);
-    return ebpo_place_check(chunks, place, error);
+                         chunks->file->in.shown, what, (int)node->type);
+    return ebpo_chunks_check_node(chunks, node, error);
 }
 
-ebpo_status ebpo_place_children(ebpo_chunks *chunks, const ebpo_place *gray, uint16_t *types,
-                                uint64_t ranks[4], ebpo_error *error)
+ebpo_status ebpo_chunks_children(ebpo_chunks *chunks, const ebpo_node *gray, uint16_t *types,
+                                 uint64_t ranks[4], ebpo_error *error)
 {
     uint64_t counts[4];
     ebpo_status status = check_type(chunks, gray, EBPO_GRAY, "children", error);
     if (status == EBPO_OK &&
-        gray->level + 1 == chunks->file->info.level_count) { /* pruned: the head has been checked */
+        gray->cell.level + 1 ==
+            chunks->file->info.level_count) { /* pruned: the head has been checked */
         *types = 0;
         memset(ranks, 0, 4 * sizeof *ranks);
         return EBPO_OK;
     }
     if (status == EBPO_OK)
-        status = ebpo_ranks_before(chunks, gray->level + 1, gray->rank, ranks, error);
+        status = ebpo_ranks_before(chunks, gray->cell.level + 1, gray->rank, ranks, error);
     if (status == EBPO_OK)
-        status = ebpo_chunks_integers(chunks, EBPO_A_TYPES, gray->level + 1, gray->rank, 1, types,
-                                      sizeof *types, error);
+        status = ebpo_chunks_integers(chunks, EBPO_A_TYPES, gray->cell.level + 1, gray->rank, 1,
+                                      types, sizeof *types, error);
     if (status != EBPO_OK)
         return status;
     ebpo_groups_count(types, 1, counts);
-    return ebpo_ranks_check(chunks, gray->level + 1, ranks, counts, error);
+    return ebpo_ranks_check(chunks, gray->cell.level + 1, ranks, counts, error);
 }
 
-ebpo_status ebpo_place_planes(ebpo_chunks *chunks, const ebpo_place *gray, uint32_t codes[255],
-                              uint32_t *count, ebpo_error *error)
+ebpo_status ebpo_chunks_planes(ebpo_chunks *chunks, const ebpo_node *gray, uint32_t codes[255],
+                               uint32_t *count, ebpo_error *error)
 {
     uint64_t first, planes;
     uint8_t own;
@@ -67,22 +70,22 @@ ebpo_status ebpo_place_planes(ebpo_chunks *chunks, const ebpo_place *gray, uint3
     ebpo_status status = check_type(chunks, gray, EBPO_GRAY, "planes", error);
     if (status != EBPO_OK || !(chunks->file->info.parts & EBPO_PART_PLANES))
         return status;
-    status = ebpo_ranks_planes(chunks, gray->level, gray->rank, &first, error);
+    status = ebpo_ranks_planes(chunks, gray->cell.level, gray->rank, &first, error);
     if (status == EBPO_OK)
-        status = ebpo_chunks_integers(chunks, EBPO_A_PLANE_COUNTS, gray->level, gray->rank, 1, &own,
-                                      sizeof own, error);
+        status = ebpo_chunks_integers(chunks, EBPO_A_PLANE_COUNTS, gray->cell.level, gray->rank, 1,
+                                      &own, sizeof own, error);
     if (status != EBPO_OK || own == 0)
         return status;
-    planes = chunks->file->info.level[gray->level].plane_count;
+    planes = chunks->file->info.level[gray->cell.level].plane_count;
     if (own > planes - first)
-        return ebpo_chunks_fail(chunks, gray->level, EBPO_A_PLANE_COUNTS,
+        return ebpo_chunks_fail(chunks, gray->cell.level, EBPO_A_PLANE_COUNTS,
                                 "the counts do not add up to the number of planes", error);
-    status = ebpo_chunks_integers(chunks, EBPO_A_PLANES, gray->level, first, own, codes,
+    status = ebpo_chunks_integers(chunks, EBPO_A_PLANES, gray->cell.level, first, own, codes,
                                   sizeof *codes, error);
     for (unsigned i = 0; i < own && status == EBPO_OK; i++) {
         int32_t n[3], d;
         if (!ebpo_plane_code_decode(codes[i], n, &d))
-            status = ebpo_chunks_fail(chunks, gray->level, EBPO_A_PLANES,
+            status = ebpo_chunks_fail(chunks, gray->cell.level, EBPO_A_PLANES,
                                       "a code stands for no plane", error);
     }
     if (status == EBPO_OK)
@@ -90,14 +93,14 @@ ebpo_status ebpo_place_planes(ebpo_chunks *chunks, const ebpo_place *gray, uint3
     return status;
 }
 
-ebpo_status ebpo_place_winding(ebpo_chunks *chunks, const ebpo_place *place, int32_t *winding,
-                               ebpo_error *error)
+ebpo_status ebpo_chunks_winding(ebpo_chunks *chunks, const ebpo_node *node, int32_t *winding,
+                                ebpo_error *error)
 {
     static const ebpo_array_id arrays[] = { EBPO_A_WHITE_WINDING, EBPO_A_BLACK_WINDING,
                                             EBPO_A_LEAF_WINDING };
     const ebpo_info *info = &chunks->file->info;
-    *winding = place->type == EBPO_BLACK;
-    ebpo_status status = ebpo_place_check(chunks, place, error);
+    *winding = node->type == EBPO_BLACK;
+    ebpo_status status = ebpo_chunks_check_node(chunks, node, error);
     if (status != EBPO_OK)
         return status;
     if (!info->solid)
@@ -105,18 +108,18 @@ ebpo_status ebpo_place_winding(ebpo_chunks *chunks, const ebpo_place *place, int
                          "%s: winding numbers are asked for, and the model is a surface; mend the "
                          "mesh and build again",
                          chunks->file->in.shown);
-    if (place->type == EBPO_GRAY)
+    if (node->type == EBPO_GRAY)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "%s: the winding number of a gray node is asked for; ask its children",
                          chunks->file->in.shown);
-    ebpo_array_id id = arrays[place->type];
-    if (!ebpo_reader_array(chunks->file, id, place->level)->present)
+    ebpo_array_id id = arrays[node->type];
+    if (!ebpo_reader_array(chunks->file, id, node->cell.level)->present)
         return EBPO_OK; /* the usual one; leaves always have the array */
-    status = ebpo_chunks_integers(chunks, id, place->level, place->rank, 1, winding,
+    status = ebpo_chunks_integers(chunks, id, node->cell.level, node->rank, 1, winding,
                                   sizeof *winding, error);
-    if (status == EBPO_OK && place->type != EBPO_LEAF &&
-        ebpo_rule_inside(info->rule, *winding) != (place->type == EBPO_BLACK))
-        status = ebpo_chunks_fail(chunks, place->level, id,
+    if (status == EBPO_OK && node->type != EBPO_LEAF &&
+        ebpo_rule_inside(info->rule, *winding) != (node->type == EBPO_BLACK))
+        status = ebpo_chunks_fail(chunks, node->cell.level, id,
                                   "a node's winding number contradicts its type", error);
     return status;
 }
