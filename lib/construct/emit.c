@@ -51,17 +51,14 @@ void ebpo_emit_scratch_free(ebpo_emit_scratch *scratch)
 static bool grow_leaf_arrays(ebpo_piece_level *out, uint64_t refs)
 {
     ebpo_level *l = &out->level;
-    uint64_t n = l->leaf_count + 1, *c = out->leaf_capacity;
-    return ebpo_array_grow_late(out->workspace, &l->leaf_winding, &c[0], n,
-                                sizeof *l->leaf_winding) &&
-           ebpo_array_grow_late(out->workspace, &l->leaf_first, &c[1], n, sizeof *l->leaf_first) &&
-           ebpo_array_grow_late(out->workspace, &l->leaf_new, &c[2], n, sizeof *l->leaf_new) &&
-           ebpo_array_grow_late(out->workspace, &l->leaf_ref_count, &c[3], n,
-                                sizeof *l->leaf_ref_count) &&
-           ebpo_array_grow_late(out->workspace, &l->leaf_plane_counts, &c[4], n,
-                                sizeof *l->leaf_plane_counts) &&
-           ebpo_array_grow_late(out->workspace, &l->leaf_refs, &out->ref_capacity,
-                                l->ref_count + refs, sizeof *l->leaf_refs);
+    uint64_t n = l->leaf_count + 1, *c = out->capacity;
+#define GROW(array, ID, need) \
+    ebpo_array_grow_late(out->workspace, &l->array, &c[EBPO_A_##ID], need, sizeof *l->array)
+    return GROW(leaf_winding, LEAF_WINDING, n) && GROW(leaf_first, LEAF_SKIP, n) &&
+           GROW(leaf_new, LEAF_NEW, n) && GROW(leaf_ref_count, LEAF_REF_COUNT, n) &&
+           GROW(leaf_plane_counts, LEAF_PLANE_COUNTS, n) &&
+           GROW(leaf_refs, LEAF_REFS, l->ref_count + refs);
+#undef GROW
 }
 
 static bool emit_list(const emitter *e, const ebpo_build_detail *d, ebpo_piece_level *out,
@@ -135,7 +132,7 @@ static bool emit_leaf(emitter *e, uint32_t detail, ebpo_cell cell, int32_t windi
     l->leaf_plane_counts[l->leaf_count++] = (uint8_t)planes;
     if (!stored)
         return true;
-    if (!ebpo_array_grow_late(out->workspace, &l->leaf_planes, &out->leaf_plane_capacity,
+    if (!ebpo_array_grow_late(out->workspace, &l->leaf_planes, &out->capacity[EBPO_A_LEAF_PLANES],
                               l->leaf_plane_count + (uint64_t)planes, sizeof *l->leaf_planes))
         return false;
     if (planes)

@@ -10,7 +10,6 @@
 #include "base/parallel.h"
 #include "construct/construct_top.h"
 #include "construct/corner_windings.h"
-#include "construct/level_arrays.h"
 #include "construct/pack.h"
 #include "construct/piece_levels.h"
 #include "octree/node_types.h"
@@ -96,36 +95,42 @@ static bool walk(joiner *j, uint32_t index, ebpo_cell cell, int32_t winding)
     return true;
 }
 
-/* Arrays may share a count. */
-static void count_arrays(const joiner *j, int level)
+static void add_counts(const joiner *j, int level, int per)
 {
-    for (size_t s = 0; s < EBPO_LEVEL_ARRAYS; s++) {
-        uint64_t total = 0;
-        for (uint64_t i = 0; i < j->count; i++)
-            total += ebpo_count_of_level(&j->stretch[i][level].level, &ebpo_level_arrays[s]);
-        memcpy((char *)&j->level[level] + ebpo_level_arrays[s].count, &total, sizeof total);
-    }
+    uint64_t total = 0;
+    for (uint64_t i = 0; i < j->count; i++)
+        total += ebpo_level_count(&j->stretch[i][level].level, (ebpo_per)per);
+    ebpo_level_set_count(&j->level[level], (ebpo_per)per, total);
 }
 
-static bool join_slice(const joiner *j, int level, const ebpo_level_array *s, ebpo_level *out)
+static bool any_has(const joiner *j, int level, int id)
 {
-    uint64_t total = ebpo_count_of_level(out, s);
-    if (!total)
+    for (uint64_t i = 0; i < j->count; i++)
+        if (ebpo_level_array(&j->stretch[i][level].level, id))
+            return true;
+    return false;
+}
+
+/* An array that none of the stretches has stays away. */
+static bool join_array(const joiner *j, int level, int id, ebpo_level *out)
+{
+    uint64_t total = ebpo_level_rows(out, id), size = ebpo_schema[id].held_size;
+    if (!total || !any_has(j, level, id))
         return true;
-    char *to = ebpo_array_alloc(j->b->workspace, total, s->size);
+    char *to = ebpo_array_alloc(j->b->workspace, total, size);
     if (!to)
         return false;
-    memcpy((char *)out + s->array, &to, sizeof to);
+    ebpo_level_set_array(out, id, to);
     for (uint64_t i = 0; i < j->count; i++) {
         ebpo_level *from = &j->stretch[i][level].level;
-        void *array = ebpo_array_of_level(from, s), *none = NULL;
-        size_t bytes = (size_t)(ebpo_count_of_level(from, s) * s->size);
+        void *array = ebpo_level_array(from, id);
+        size_t bytes = (size_t)(ebpo_level_rows(from, id) * size);
         if (array)
             ebpo_array_copy(j->b->workspace, to, array, bytes);
         to += bytes;
         if (!j->stretch[i][level].packed)
             ebpo_array_free(array);
-        memcpy((char *)from + s->array, &none, sizeof none);
+        ebpo_level_set_array(from, id, NULL);
         ebpo_workspace_settle(j->b->workspace);
     }
     return true;
@@ -200,44 +205,19 @@ static ebpo_status number_refs(const ebpo_builder *b, ebpo_level *l, uint64_t be
     return status;
 }
 
-/* Arrays that say only what is understood anyway are left out. */
-static void drop_if_all(const ebpo_builder *b, int32_t **array, uint64_t count, int32_t value)
-{
-    for (uint64_t i = 0; i < count; i++) {
-        ebpo_workspace_settle_at(b->workspace, i);
-        if ((*array)[i] != value)
-            return;
-    }
-    ebpo_array_free(*array);
-    *array = NULL;
-}
-
-static void drop(void *array)
-{
-    void *block, *none = NULL;
-    memcpy(&block, array, sizeof block);
-    ebpo_array_free(block);
-    memcpy(array, &none, sizeof none);
-}
-
+/* Arrays that say only what is understood anyway, or that belong to parts that are not wanted, are
+ * left out. */
 static void leave_out(const ebpo_builder *b, ebpo_level *l)
 {
     uint32_t parts = b->options->parts;
-    drop_if_all(b, &l->black_winding, l->black_count, 1);
-    drop_if_all(b, &l->white_winding, l->white_count, 0);
-    if (!b->solid)
-        drop(&l->leaf_winding);
-    if (!(parts & EBPO_PART_LEAF_PLANES))
-        drop(&l->leaf_plane_counts);
-    if (!(parts & EBPO_PART_PLANES))
-        drop(&l->plane_counts);
-    if (parts & EBPO_PART_MESH)
-        return;
-    drop(&l->leaf_first);
-    drop(&l->leaf_new);
-    drop(&l->leaf_ref_count);
-    drop(&l->leaf_refs);
-    l->ref_count = l->new_count = 0;
+    ebpo_level_drop(l, ~(parts | (b->solid ? EBPO_NEEDS_SOLID : 0) | EBPO_NEEDS_ALWAYS));
+    for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
+        if (ebpo_schema[id].if_needed && ebpo_level_is_usual(l, id)) {
+            ebpo_array_free(ebpo_level_array(l, id));
+            ebpo_level_set_array(l, id, NULL);
+        }
+    if (!(parts & EBPO_PART_MESH))
+        l->ref_count = l->new_count = 0;
 }
 
 static ebpo_status join_arrays(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -245,10 +225,11 @@ static ebpo_status join_arrays(void *context, uint64_t begin, uint64_t end, unsi
 {
     joiner *j = context;
     (void)worker;
-    for (uint64_t i = begin; i < end; i++)
-        if (!join_slice(j, (int)(i / EBPO_LEVEL_ARRAYS), &ebpo_level_arrays[i % EBPO_LEVEL_ARRAYS],
-                        &j->level[i / EBPO_LEVEL_ARRAYS]))
+    for (uint64_t i = begin; i < end; i++) {
+        int level = (int)(i / EBPO_LEVEL_ARRAYS), id = (int)(i % EBPO_LEVEL_ARRAYS);
+        if (ebpo_schema_is_held(id) && !join_array(j, level, id, &j->level[level]))
             return no_memory(j->b, error);
+    }
     return EBPO_OK;
 }
 
@@ -261,28 +242,12 @@ static ebpo_status finish_level(const joiner *j, int level, uint64_t before, uin
         const ebpo_level *l = &j->stretch[i][level].level;
         out->gray_volume += l->gray_volume;
         out->leaf_volume += l->leaf_volume;
-        out->new_count += l->new_count;
     }
     ebpo_status status = j->b->options->parts & EBPO_PART_MESH
                              ? number_refs(j->b, out, before, all, error)
                              : EBPO_OK;
     leave_out(j->b, out);
     return status;
-}
-
-static void summarise(ebpo_tree *out, int level)
-{
-    const ebpo_level *l = &out->level[level];
-    out->info.level[level] = (ebpo_level_summary){ .gray_count = l->gray_count,
-                                                   .leaf_count = l->leaf_count,
-                                                   .white_count = l->white_count,
-                                                   .black_count = l->black_count,
-                                                   .plane_count = l->plane_count,
-                                                   .leaf_plane_count = l->leaf_plane_count,
-                                                   .new_count = l->new_count,
-                                                   .ref_count = l->ref_count,
-                                                   .gray_volume = l->gray_volume,
-                                                   .leaf_volume = l->leaf_volume };
 }
 
 static bool root_group(joiner *j)
@@ -300,7 +265,8 @@ ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error
         root_group(&j) && walk(&j, 0, b->top.cell, 0) ? EBPO_OK : no_memory(b, error);
     uint64_t refs = 0, all = 0;
     for (int level = 0; level < EBPO_LEVELS_MAX && status == EBPO_OK; level++) {
-        count_arrays(&j, level);
+        for (int per = 0; per <= EBPO_PER_GROUP; per++)
+            add_counts(&j, level, per);
         all += out->level[level].ref_count;
     }
     ebpo_pass pass = { &b->options->progress, 0, all, 2 * all };
@@ -314,7 +280,7 @@ ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error
         refs += own;
         if (out->level[level].group_count)
             out->info.level_count = level + 1;
-        summarise(out, level);
+        out->info.level[level] = ebpo_level_summarise(&out->level[level], ~0u);
     }
     for (uint64_t i = 0; i < j.count; i++)
         ebpo_piece_levels_free(j.stretch[i]);

@@ -7,7 +7,6 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "construct/level_arrays.h"
 #include "construct/piece_levels.h"
 
 enum { STORE_BYTES = 16 << 20, ALIGNMENT = 8 };
@@ -67,31 +66,39 @@ void *ebpo_store_reserve(ebpo_builder *b, uint64_t bytes)
     return make_store(b) ? reserve(b, room_for(bytes, 1)) : NULL;
 }
 
+static size_t room_of(const ebpo_level *level, int id)
+{
+    return ebpo_schema_is_held(id) ? room_for(ebpo_level_rows(level, id), ebpo_schema[id].held_size)
+                                   : 0;
+}
+
+static void pack_array(const ebpo_builder *b, ebpo_level *level, int id, char *to)
+{
+    void *array = ebpo_level_array(level, id);
+    uint64_t bytes = ebpo_level_rows(level, id) * ebpo_schema[id].held_size;
+    if (array && bytes)
+        ebpo_array_copy(b->workspace, to, array, bytes);
+    ebpo_array_free(array);
+    ebpo_level_set_array(level, id, array && bytes ? to : NULL);
+}
+
 ebpo_status ebpo_build_pack(ebpo_builder *b, ebpo_piece_level *out, ebpo_error *error)
 {
     size_t bytes = 0;
     if (!b->workspace)
         return EBPO_OK;
     for (int level = 0; level < EBPO_LEVELS_MAX; level++)
-        for (int s = 0; s < EBPO_LEVEL_ARRAYS; s++)
-            bytes += room_for(ebpo_count_of_level(&out[level].level, &ebpo_level_arrays[s]),
-                              ebpo_level_arrays[s].size);
+        for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
+            bytes += room_of(&out[level].level, id);
     char *to = ebpo_store_reserve(b, bytes);
     if (!to)
         return ebpo_workspace_fail(b->workspace, bytes, error);
     for (int level = 0; level < EBPO_LEVELS_MAX; level++) {
-        for (int s = 0; s < EBPO_LEVEL_ARRAYS; s++) {
-            ebpo_level *l = &out[level].level;
-            void *array = ebpo_array_of_level(l, &ebpo_level_arrays[s]), *here = to;
-            uint64_t count = ebpo_count_of_level(l, &ebpo_level_arrays[s]);
-            if (array && count)
-                ebpo_array_copy(b->workspace, to, array, count * ebpo_level_arrays[s].size);
-            ebpo_array_free(array);
-            if (!array || !count)
-                here = NULL;
-            memcpy((char *)l + ebpo_level_arrays[s].array, &here, sizeof here);
-            to += room_for(count, ebpo_level_arrays[s].size);
-        }
+        for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
+            if (ebpo_schema_is_held(id)) {
+                pack_array(b, &out[level].level, id, to);
+                to += room_of(&out[level].level, id);
+            }
         out[level].packed = true;
     }
     return EBPO_OK;

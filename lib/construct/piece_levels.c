@@ -16,8 +16,8 @@ void ebpo_piece_levels_free(ebpo_piece_level *out)
 bool ebpo_piece_level_add_group(ebpo_piece_level *out, uint16_t types)
 {
     ebpo_level *l = &out->level;
-    if (!ebpo_array_grow_late(out->workspace, &l->types, &out->group_capacity, l->group_count + 1,
-                              sizeof *l->types))
+    if (!ebpo_array_grow_late(out->workspace, &l->types, &out->capacity[EBPO_A_TYPES],
+                              l->group_count + 1, sizeof *l->types))
         return false;
     l->types[l->group_count++] = types;
     return true;
@@ -27,9 +27,9 @@ bool ebpo_piece_level_add_gray(ebpo_piece_level *out, const uint32_t *codes, int
                                double volume)
 {
     ebpo_level *l = &out->level;
-    if (!ebpo_array_grow_late(out->workspace, &l->plane_counts, &out->gray_capacity,
+    if (!ebpo_array_grow_late(out->workspace, &l->plane_counts, &out->capacity[EBPO_A_PLANE_COUNTS],
                               l->gray_count + 1, 1) ||
-        !ebpo_array_grow_late(out->workspace, &l->planes, &out->plane_capacity,
+        !ebpo_array_grow_late(out->workspace, &l->planes, &out->capacity[EBPO_A_PLANES],
                               l->plane_count + (uint64_t)count, sizeof *l->planes))
         return false;
     l->plane_counts[l->gray_count++] = (uint8_t)count;
@@ -46,8 +46,8 @@ bool ebpo_piece_level_add_empty(ebpo_piece_level *out, bool black, int32_t windi
     int32_t **array = black ? &l->black_winding : &l->white_winding;
     uint64_t *count = black ? &l->black_count : &l->white_count;
     if (!ebpo_array_grow_late(out->workspace, array,
-                              black ? &out->black_capacity : &out->white_capacity, *count + 1,
-                              sizeof **array))
+                              &out->capacity[black ? EBPO_A_BLACK_WINDING : EBPO_A_WHITE_WINDING],
+                              *count + 1, sizeof **array))
         return false;
     (*array)[(*count)++] = winding;
     return true;

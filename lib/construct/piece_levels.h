@@ -4,13 +4,14 @@
 
 #include <ebpo/build.h>
 
+#include "container/schema.h"
+
 /* Of one level. */
 typedef struct ebpo_piece_level {
     ebpo_level level;
-    ebpo_workspace *workspace; /* for large arrays */
-    bool packed;               /* its arrays are in the builder's store */
-    uint64_t group_capacity, gray_capacity, plane_capacity, leaf_capacity[6], ref_capacity,
-        black_capacity, white_capacity, leaf_plane_capacity;
+    ebpo_workspace *workspace;            /* for large arrays */
+    bool packed;                          /* its arrays are in the builder's store */
+    uint64_t capacity[EBPO_LEVEL_ARRAYS]; /* by ebpo_array_id */
 } ebpo_piece_level;
 
 bool ebpo_piece_level_add_group(ebpo_piece_level *out, uint16_t types);

@@ -69,17 +69,16 @@ static ebpo_status make_level_groups(writer *w, ebpo_error *error)
     return status;
 }
 
-static ebpo_status make_mesh_groups(writer *w, ebpo_error *error)
+/* A group of the root, if the part is there, with room for all arrays that it may have. */
+static ebpo_status make_root_group(writer *w, const char *path, ebpo_part part, ebpo_error *error)
 {
-    uint32_t parts = w->plan.info.parts;
+    unsigned links = 0;
     ebpo_h5_id id = -1;
-    ebpo_status status = EBPO_OK;
-    if (parts & EBPO_PART_MESH)
-        status = ebpo_h5_make_group(&w->out, "/mesh", 3, &id, error);
-    ebpo_h5_close_id(id);
-    id = -1;
-    if (status == EBPO_OK && parts & EBPO_PART_MAPS)
-        status = ebpo_h5_make_group(&w->out, "/maps", 2, &id, error);
+    if (!(w->plan.info.parts & part))
+        return EBPO_OK;
+    for (int k = EBPO_LEVEL_ARRAYS; k < EBPO_ARRAYS; k++)
+        links += (ebpo_schema[k].needs & part) != 0;
+    ebpo_status status = ebpo_h5_make_group(&w->out, path, links, &id, error);
     ebpo_h5_close_id(id);
     return status;
 }
@@ -119,7 +118,9 @@ static ebpo_status lay_out(writer *w, const char *path, const char *shown, uint6
     if (status == EBPO_OK)
         status = make_level_groups(w, error);
     if (status == EBPO_OK)
-        status = make_mesh_groups(w, error);
+        status = make_root_group(w, "/mesh", EBPO_PART_MESH, error);
+    if (status == EBPO_OK)
+        status = make_root_group(w, "/maps", EBPO_PART_MAPS, error);
     for (unsigned i = 0; i < plan->count && status == EBPO_OK; i++)
         status = make_array(w, &plan->array[i], i == 0 ? &first : NULL, error);
     return status;

@@ -54,7 +54,7 @@ void ebpo_plan_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64
     switch (array->id) {
     case EBPO_A_LEAF_SKIP: encode_skips(level, &array->shape, row, rows, file); break;
     case EBPO_A_LEAF_REFS:
-        encode_refs(level, plan->leaf_index[array->level], row, rows, file);
+        encode_refs(level, plan->index[array->level][EBPO_INDEX_LEAVES], row, rows, file);
         break;
     case EBPO_A_VERTICES:
         if (tree->mesh.xyz32)

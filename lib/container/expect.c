@@ -38,17 +38,11 @@ void ebpo_expect_level(ebpo_expected *e, int level)
         ebpo_expect_array(e, &e->file->level_array[level][id]);
 }
 
-void ebpo_expect_mesh(ebpo_expected *e)
+void ebpo_expect_root(ebpo_expected *e, uint32_t needs)
 {
-    ebpo_expect_array(e, &e->file->root_array[EBPO_A_VERTICES]);
-    ebpo_expect_array(e, &e->file->root_array[EBPO_A_FACES]);
-    ebpo_expect_array(e, &e->file->root_array[EBPO_A_FACES_INDEX]);
-}
-
-void ebpo_expect_maps(ebpo_expected *e)
-{
-    ebpo_expect_array(e, &e->file->root_array[EBPO_A_VERTEX_SOURCE]);
-    ebpo_expect_array(e, &e->file->root_array[EBPO_A_FACE_SOURCE]);
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS; id++)
+        if (ebpo_schema[id].needs & needs)
+            ebpo_expect_array(e, &e->file->root_array[id]);
 }
 
 void ebpo_expect_all(ebpo_expected *e)
@@ -72,7 +66,6 @@ void ebpo_expect_tree(ebpo_file *file)
     ebpo_expected e = EBPO_EXPECTED_INIT(file);
     for (int level = 0; level < file->info.level_count; level++)
         ebpo_expect_level(&e, level);
-    ebpo_expect_mesh(&e);
-    ebpo_expect_maps(&e);
+    ebpo_expect_root(&e, ~0u);
     ebpo_expect_all(&e);
 }

@@ -113,14 +113,8 @@ enum { FACTS = sizeof facts / sizeof facts[0] };
 #define LEVEL_AT(field) \
     offsetof(ebpo_level_summary, field), sizeof(((ebpo_level_summary *)0)->field), NULL
 static const fact level_facts[] = {
-    { "gray", COUNT, LEVEL_AT(gray_count) },
-    { "leaf", COUNT, LEVEL_AT(leaf_count) },
-    { "white", COUNT, LEVEL_AT(white_count) },
-    { "black", COUNT, LEVEL_AT(black_count) },
-    { "planes", COUNT, LEVEL_AT(plane_count) },
-    { "leaf_planes", COUNT, LEVEL_AT(leaf_plane_count) },
-    { "faces_new", COUNT, LEVEL_AT(new_count) },
-    { "faces_referenced", COUNT, LEVEL_AT(ref_count) },
+#define LEVEL_COUNT(ID, attribute, field, needs) { #attribute, COUNT, LEVEL_AT(field) },
+#include "container/array_table.inc"
     { "gray_volume", REAL, LEVEL_AT(gray_volume) },
     { "leaf_volume", REAL, LEVEL_AT(leaf_volume) },
 };

@@ -84,11 +84,10 @@ static ebpo_status sum_stored(ebpo_file *file, ebpo_error *error)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
             info->level[level].stored_bytes += file->level_array[level][id].stored_bytes;
     }
-    info->mesh_vertex_bytes = file->root_array[EBPO_A_VERTICES].stored_bytes;
-    info->mesh_face_bytes = file->root_array[EBPO_A_FACES].stored_bytes +
-                            file->root_array[EBPO_A_FACES_INDEX].stored_bytes;
-    info->map_bytes = file->root_array[EBPO_A_VERTEX_SOURCE].stored_bytes +
-                      file->root_array[EBPO_A_FACE_SOURCE].stored_bytes;
+    info->mesh_vertex_bytes = info->mesh_face_bytes = info->map_bytes = 0;
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS; id++)
+        *(uint64_t *)(void *)((char *)info + ebpo_schema[id].bytes) +=
+            file->root_array[id].stored_bytes;
     for (int level = 0; level < info->level_count; level++)
         stored += info->level[level].stored_bytes;
     stored += info->mesh_vertex_bytes + info->mesh_face_bytes + info->map_bytes;

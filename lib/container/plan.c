@@ -18,11 +18,9 @@ void ebpo_plan_free(ebpo_plan *plan)
     for (unsigned i = 0; i < plan->count; i++)
         ebpo_h5_close_id(plan->array[i].handle);
     free(plan->array);
-    for (int level = 0; level < EBPO_LEVELS_MAX; level++) {
-        free(plan->types_index[level]);
-        free(plan->gray_index[level]);
-        free(plan->leaf_index[level]);
-    }
+    for (int level = 0; level < EBPO_LEVELS_MAX; level++)
+        for (int i = 0; i < EBPO_INDEXES; i++)
+            free(plan->index[level][i]);
     free(plan->faces_index);
     memset(plan, 0, sizeof *plan);
 }
@@ -30,20 +28,8 @@ void ebpo_plan_free(ebpo_plan *plan)
 static void summarise(ebpo_info *info, const ebpo_tree *tree)
 {
     for (int i = 0; i < info->level_count; i++) {
-        const ebpo_level *l = &tree->level[i];
-        ebpo_level_summary *s = &info->level[i];
-        bool mesh = info->parts & EBPO_PART_MESH;
-        *s = (ebpo_level_summary){ .gray_count = l->gray_count,
-                                   .leaf_count = l->leaf_count,
-                                   .white_count = l->white_count,
-                                   .black_count = l->black_count,
-                                   .gray_volume = l->gray_volume,
-                                   .leaf_volume = l->leaf_volume,
-                                   .pruned_count = info->pruned ? l->pruned_count : 0 };
-        s->plane_count = info->parts & EBPO_PART_PLANES ? l->plane_count : 0;
-        s->leaf_plane_count = info->parts & EBPO_PART_LEAF_PLANES ? l->leaf_plane_count : 0;
-        s->new_count = mesh ? l->new_count : 0;
-        s->ref_count = mesh ? l->ref_count : 0;
+        info->level[i] = ebpo_level_summarise(&tree->level[i], info->parts);
+        info->level[i].pruned_count = info->pruned ? tree->level[i].pruned_count : 0;
     }
 }
 
@@ -134,11 +120,13 @@ static ebpo_status index_levels(ebpo_plan *plan, ebpo_error *error)
             stored.leaf_first = NULL;
         if (!(plan->info.parts & EBPO_PART_LEAF_PLANES))
             stored.leaf_plane_counts = NULL;
-        plan->types_index[i] = ebpo_index_types(level, i == 0);
-        plan->gray_index[i] = ebpo_index_gray(level);
-        plan->leaf_index[i] = ebpo_index_leaves(&stored);
-        if (!plan->types_index[i] || !plan->gray_index[i] || !plan->leaf_index[i])
-            return ebpo_fail_memory(error, level->leaf_count / EBPO_INDEX_ROWS * 24);
+        uint64_t **index = plan->index[i];
+        index[EBPO_INDEX_TYPES] = ebpo_index_types(level, i == 0);
+        index[EBPO_INDEX_GRAY] = ebpo_index_gray(level);
+        index[EBPO_INDEX_LEAVES] = ebpo_index_leaves(&stored);
+        for (int k = 0; k < EBPO_INDEXES; k++)
+            if (!index[k])
+                return ebpo_fail_memory(error, level->leaf_count / EBPO_INDEX_ROWS * 24);
     }
     return EBPO_OK;
 }
@@ -195,52 +183,32 @@ static uint8_t narrow_skips(const ebpo_level *level)
     return all <= UINT32_MAX ? 4 : 8;
 }
 
-static bool all_are(const int32_t *values, uint64_t count, int32_t usual)
+/* Bytes of an element in the file. schema.c: where there is a choice, values are of 32 bits. */
+static uint8_t stored_size(const ebpo_plan *plan, const ebpo_array_out *a, const void *values)
 {
-    for (uint64_t i = 0; values && i < count; ebpo_settle_all_at(i++))
-        if (values[i] != usual)
-            return false;
-    return true;
+    const ebpo_array_spec *spec = &ebpo_schema[a->id];
+    if (a->id == EBPO_A_LEAF_SKIP)
+        return narrow_skips(&plan->tree->level[a->level]);
+    if (a->id == EBPO_A_VERTICES)
+        return plan->info.double_coordinates ? 8 : 4;
+    if (!(spec->sizes & (spec->sizes - 1)))
+        return spec->sizes;
+    uint64_t count = ebpo_level_rows(&plan->tree->level[a->level], a->id);
+    return spec->is_signed ? narrow_signed(values, count) : narrow_unsigned(values, count);
 }
 
 /* Where the values are and how wide they get. */
 static void find_values(const ebpo_plan *plan, ebpo_array_out *a)
 {
-    const ebpo_level *l = &plan->tree->level[a->level];
-    const void *values = NULL;
-    uint8_t native = 4, stored = 4;
-    switch (a->id) {
-    case EBPO_A_TYPES: values = l->types, native = stored = 2; break;
-    case EBPO_A_PLANE_COUNTS: values = l->plane_counts, native = stored = 1; break;
-    case EBPO_A_PLANES: values = l->planes; break;
-    case EBPO_A_LEAF_WINDING:
-        values = l->leaf_winding, stored = narrow_signed(values, l->leaf_count);
-        break;
-    case EBPO_A_BLACK_WINDING:
-        values = l->black_winding, stored = narrow_signed(values, l->black_count);
-        break;
-    case EBPO_A_WHITE_WINDING:
-        values = l->white_winding, stored = narrow_signed(values, l->white_count);
-        break;
-    case EBPO_A_LEAF_SKIP: stored = narrow_skips(l); break;
-    case EBPO_A_LEAF_NEW:
-        values = l->leaf_new, stored = narrow_unsigned(values, l->leaf_count);
-        break;
-    case EBPO_A_LEAF_REF_COUNT:
-        values = l->leaf_ref_count, stored = narrow_unsigned(values, l->leaf_count);
-        break;
-    case EBPO_A_TYPES_INDEX: values = plan->types_index[a->level], native = stored = 8; break;
-    case EBPO_A_GRAY_INDEX: values = plan->gray_index[a->level], native = stored = 8; break;
-    case EBPO_A_LEAF_INDEX: values = plan->leaf_index[a->level], native = stored = 8; break;
-    case EBPO_A_LEAF_PLANE_COUNTS: values = l->leaf_plane_counts, native = stored = 1; break;
-    case EBPO_A_LEAF_PLANES: values = l->leaf_planes; break;
-    case EBPO_A_VERTICES: stored = plan->info.double_coordinates ? 8 : 4; break;
-    case EBPO_A_FACES_INDEX: values = plan->faces_index, native = stored = 8; break;
-    default: break; /* 4 bytes, a coding of its own */
-    }
-    a->values = values;
-    a->value_size = native;
-    a->shape.element_size = stored;
+    const ebpo_array_spec *spec = &ebpo_schema[a->id];
+    if (a->id == EBPO_A_FACES_INDEX)
+        a->values = plan->faces_index;
+    else if (ebpo_schema_is_held(a->id))
+        a->values = ebpo_level_array(&plan->tree->level[a->level], a->id);
+    else if (spec->per >= EBPO_PER_GROUP_BLOCK && spec->per <= EBPO_PER_LEAF_BLOCK)
+        a->values = plan->index[a->level][spec->per - EBPO_PER_GROUP_BLOCK];
+    a->value_size = spec->held_size ? spec->held_size : spec->sizes;
+    a->shape.element_size = stored_size(plan, a, a->values);
 }
 
 static ebpo_pipeline pipeline_of(ebpo_codec codec)
@@ -252,10 +220,9 @@ static ebpo_pipeline pipeline_of(ebpo_codec codec)
 
 static void add_array(ebpo_plan *plan, ebpo_array_id id, int level)
 {
-    const ebpo_level *l = &plan->tree->level[level];
     uint64_t rows = ebpo_schema_rows(&plan->info, id, level);
-    if (rows == 0 || (id == EBPO_A_BLACK_WINDING && all_are(l->black_winding, l->black_count, 1)) ||
-        (id == EBPO_A_WHITE_WINDING && all_are(l->white_winding, l->white_count, 0)))
+    if (rows == 0 ||
+        (ebpo_schema[id].if_needed && ebpo_level_is_usual(&plan->tree->level[level], id)))
         return;
     ebpo_array_out *a = &plan->array[plan->count++];
     *a = (ebpo_array_out){ .id = id, .level = level, .handle = -1 };

@@ -23,8 +23,7 @@ typedef struct ebpo_plan {
     ebpo_info info; /* as it will be in the file */
     ebpo_array_out *array;
     unsigned count;
-    uint64_t *types_index[EBPO_LEVELS_MAX], *gray_index[EBPO_LEVELS_MAX],
-        *leaf_index[EBPO_LEVELS_MAX];
+    uint64_t *index[EBPO_LEVELS_MAX][EBPO_INDEXES];
     uint64_t *faces_index; /* vertices seen before each chunk of faces */
 } ebpo_plan;
 

@@ -10,25 +10,6 @@
 #include "container/plan.h"
 #include "container/reader.h"
 
-void ebpo_level_free(ebpo_level *level)
-{
-    if (!level)
-        return;
-    ebpo_array_free(level->types);
-    ebpo_array_free(level->plane_counts);
-    ebpo_array_free(level->planes);
-    ebpo_array_free(level->leaf_winding);
-    ebpo_array_free(level->black_winding);
-    ebpo_array_free(level->white_winding);
-    ebpo_array_free(level->leaf_first);
-    ebpo_array_free(level->leaf_new);
-    ebpo_array_free(level->leaf_ref_count);
-    ebpo_array_free(level->leaf_refs);
-    ebpo_array_free(level->leaf_plane_counts);
-    ebpo_array_free(level->leaf_planes);
-    memset(level, 0, sizeof *level);
-}
-
 /* leaf_first holds skips; each leaf's new faces end before the next one's begin. */
 static ebpo_status add_up_skips(ebpo_file *file, int number, ebpo_level *level, ebpo_error *error)
 {
@@ -108,23 +89,12 @@ static ebpo_status check_index(ebpo_file *file, ebpo_array_id id, int number, co
     return status;
 }
 
-static ebpo_status read_faces(ebpo_file *file, int number, ebpo_level *level, unsigned threads,
-                              ebpo_error *error)
+/* Counts of references, and skips. */
+static ebpo_status finish_lists(ebpo_file *file, int number, ebpo_level *level, ebpo_error *error)
 {
-    ebpo_status status =
-        ebpo_reader_make(file, EBPO_A_LEAF_SKIP, number, threads, 8, &level->leaf_first, error);
-    if (status == EBPO_OK)
-        status =
-            ebpo_reader_make(file, EBPO_A_LEAF_NEW, number, threads, 4, &level->leaf_new, error);
-    if (status == EBPO_OK)
-        status = ebpo_reader_make(file, EBPO_A_LEAF_REF_COUNT, number, threads, 4,
-                                  &level->leaf_ref_count, error);
-    if (status == EBPO_OK)
-        status =
-            ebpo_reader_make(file, EBPO_A_LEAF_REFS, number, threads, 4, &level->leaf_refs, error);
-    if (status != EBPO_OK || !level->leaf_first)
-        return status;
     uint64_t refs = 0;
+    if (!level->leaf_first)
+        return EBPO_OK;
     for (uint64_t i = 0; i < level->leaf_count; ebpo_workspace_settle_at(file->workspace, i++))
         refs += level->leaf_ref_count[i];
     ebpo_check check = ebpo_reader_check(file);
@@ -172,27 +142,16 @@ static ebpo_status check_indexes(ebpo_file *file, int number, const ebpo_level *
 static ebpo_status read_arrays(ebpo_file *file, int number, ebpo_level *level, unsigned threads,
                                ebpo_error *error)
 {
-    const struct {
-        ebpo_array_id id;
-        size_t size;
-        void *values;
-    } plain[] = {
-        { EBPO_A_TYPES, 2, &level->types },
-        { EBPO_A_PLANE_COUNTS, 1, &level->plane_counts },
-        { EBPO_A_PLANES, 4, &level->planes },
-        { EBPO_A_LEAF_WINDING, 4, &level->leaf_winding },
-        { EBPO_A_BLACK_WINDING, 4, &level->black_winding },
-        { EBPO_A_WHITE_WINDING, 4, &level->white_winding },
-        { EBPO_A_LEAF_PLANE_COUNTS, 1, &level->leaf_plane_counts },
-        { EBPO_A_LEAF_PLANES, 4, &level->leaf_planes },
-    };
     ebpo_status status = EBPO_OK;
-    for (size_t i = 0; i < sizeof plain / sizeof plain[0] && status == EBPO_OK; i++)
-        status = ebpo_reader_make(file, plain[i].id, number, threads, plain[i].size,
-                                  plain[i].values, error);
-    if (status == EBPO_OK)
-        status = read_faces(file, number, level, threads, error);
-    return status;
+    for (int id = 0; id < EBPO_LEVEL_ARRAYS && status == EBPO_OK; id++) {
+        void *array;
+        if (!ebpo_schema_is_held(id))
+            continue;
+        status = ebpo_reader_make(file, (ebpo_array_id)id, number, threads,
+                                  ebpo_schema[id].held_size, &array, error);
+        ebpo_level_set_array(level, id, array);
+    }
+    return status == EBPO_OK ? finish_lists(file, number, level, error) : status;
 }
 
 ebpo_status ebpo_file_read_level(ebpo_file *file, int level, ebpo_level *out, unsigned threads,
@@ -205,19 +164,7 @@ ebpo_status ebpo_file_read_level(ebpo_file *file, int level, ebpo_level *out, un
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "%s: there is no level %d; the file has levels 0 to %d", file->in.shown,
                          level, info->level_count - 1);
-    const ebpo_level_summary *s = &info->level[level];
-    *out = (ebpo_level){ .group_count = ebpo_schema_groups(info, level),
-                         .gray_count = s->gray_count,
-                         .leaf_count = s->leaf_count,
-                         .white_count = s->white_count,
-                         .black_count = s->black_count,
-                         .plane_count = s->plane_count,
-                         .ref_count = s->ref_count,
-                         .new_count = s->new_count,
-                         .leaf_plane_count = s->leaf_plane_count,
-                         .gray_volume = s->gray_volume,
-                         .leaf_volume = s->leaf_volume,
-                         .pruned_count = s->pruned_count };
+    *out = ebpo_level_of_summary(info, level);
     ebpo_file_expect_levels(file, level, level);
     ebpo_status status = read_arrays(file, level, out, threads, error);
     if (status == EBPO_OK && out->leaf_count)

@@ -100,7 +100,7 @@ ebpo_status ebpo_file_read_mesh(ebpo_file *file, ebpo_mesh *out, unsigned thread
     if (!(file->info.parts & EBPO_PART_MESH))
         return absent(file, "mesh", error);
     ebpo_expected expected = EBPO_EXPECTED_INIT(file);
-    ebpo_expect_mesh(&expected);
+    ebpo_expect_root(&expected, EBPO_NEEDS_MESH);
     ebpo_expect_all(&expected);
     mesh_job j = { .file = file, .mesh = out };
     ebpo_check check = ebpo_reader_check(file);
@@ -162,7 +162,7 @@ static ebpo_status read_maps(ebpo_file *file, ebpo_workspace *workspace, uint32_
     if (!(file->info.parts & EBPO_PART_MAPS))
         return absent(file, "maps to the source's numbers", error);
     ebpo_expected expected = EBPO_EXPECTED_INIT(file);
-    ebpo_expect_maps(&expected);
+    ebpo_expect_root(&expected, EBPO_NEEDS_MAPS);
     ebpo_expect_all(&expected);
     ebpo_status status = read_map(file, workspace, EBPO_A_VERTEX_SOURCE,
                                   file->info.source_vertex_count, threads, vertex_source, error);
@@ -312,8 +312,7 @@ ebpo_status ebpo_file_read_source_mesh(ebpo_file *file, ebpo_mesh *out, bool *so
     EBPO_DEFAULT_FP;
     bool maps = file->info.parts & EBPO_PART_MAPS;
     ebpo_expected expected = EBPO_EXPECTED_INIT(file);
-    ebpo_expect_mesh(&expected);
-    ebpo_expect_maps(&expected);
+    ebpo_expect_root(&expected, EBPO_NEEDS_MESH | EBPO_NEEDS_MAPS);
     ebpo_expect_all(&expected);
     ebpo_status status = ebpo_file_read_mesh(file, out, threads, error);
     if (status == EBPO_OK && maps)

@@ -60,8 +60,8 @@ void ebpo_expect_chunks(ebpo_expected *expected, const ebpo_array_in *array, uin
                         uint64_t end);
 void ebpo_expect_array(ebpo_expected *expected, const ebpo_array_in *array);
 void ebpo_expect_level(ebpo_expected *expected, int level);
-void ebpo_expect_mesh(ebpo_expected *expected);
-void ebpo_expect_maps(ebpo_expected *expected);
+/* The arrays of the root that are there for any of these needs. */
+void ebpo_expect_root(ebpo_expected *expected, uint32_t needs);
 /* Announces the whole file. */
 void ebpo_expect_tree(ebpo_file *file);
 /* Announces what was collected, and frees it. */

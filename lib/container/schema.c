@@ -1,43 +1,80 @@
 #include "container/schema.h"
 
+#include <stddef.h>
 #include <stdio.h>
 
+#include "base/arrays.h"
 #include "h5/h5.h"
 
+#define REQUIRED       .if_needed = false
+#define USUALLY(value) .if_needed = true, .usual = (value)
+#define OF_LEVEL(type, field)                                                          \
+    .is_signed = _Generic((type)0, int8_t : 1, int16_t : 1, int32_t : 1, default : 0), \
+    .held_size = sizeof(type), .held = offsetof(ebpo_level, field)
+
 const ebpo_array_spec ebpo_schema[EBPO_ARRAYS] = {
-    [EBPO_A_TYPES] = { "types", 0, 2, false, false, "plain", "child types, 2 bits each" },
-    [EBPO_A_PLANE_COUNTS] = { "plane_counts", 0, 1, false, false, "plain",
-                              "planes of each gray node" },
-    [EBPO_A_PLANES] = { "planes", 0, 4, false, false, "plain", "plane codes" },
-    [EBPO_A_LEAF_WINDING] = { "leaf_winding", 0, 1 + 2 + 4, true, false, "plain",
-                              "winding at lowest corner" },
-    [EBPO_A_BLACK_WINDING] = { "black_winding", 0, 1 + 2 + 4, true, true, "plain",
-                               "winding (absent: 1)" },
-    [EBPO_A_WHITE_WINDING] = { "white_winding", 0, 1 + 2 + 4, true, true, "plain",
-                               "winding (absent: 0)" },
-    [EBPO_A_LEAF_SKIP] = { "leaf_skip", 0, 4 + 8, false, false, "delta", "new faces in between" },
-    [EBPO_A_LEAF_NEW] = { "leaf_new", 0, 1 + 2 + 4, false, false, "plain", "new faces" },
-    [EBPO_A_LEAF_REF_COUNT] = { "leaf_ref_count", 0, 1 + 2 + 4, false, false, "plain",
-                                "earlier faces" },
-    [EBPO_A_LEAF_REFS] = { "leaf_refs", 0, 4, false, false, "gap", "earlier faces, descending" },
-    [EBPO_A_TYPES_INDEX] = { "types_index", 4, 8, false, false, "plain",
-                             "white black leaf gray before" },
-    [EBPO_A_GRAY_INDEX] = { "gray_index", 1, 8, false, false, "plain", "planes before" },
-    [EBPO_A_LEAF_INDEX] = { "leaf_index", 3, 8, false, false, "plain", "face refs planes before" },
-    [EBPO_A_LEAF_PLANE_COUNTS] = { "leaf_plane_counts", 0, 1, false, false, "plain",
-                                   "planes of each leaf" },
-    [EBPO_A_LEAF_PLANES] = { "leaf_planes", 0, 4, false, false, "plain", "plane codes" },
-    [EBPO_A_VERTICES] = { "/mesh/vertices", 3, 4 + 8, false, false, "delta",
-                          "x y z in the root attribute unit" },
-    [EBPO_A_FACES] = { "/mesh/faces", 3, 4, false, false, "high-water",
-                       "vertices of each face, counter-clockwise" },
-    [EBPO_A_FACES_INDEX] = { "/mesh/faces_index", 1, 8, false, false, "plain",
-                             "vertices seen before each chunk of faces" },
-    [EBPO_A_VERTEX_SOURCE] = { "/maps/vertex_source", 0, 4, false, false, "delta",
-                               "vertex number in the source" },
-    [EBPO_A_FACE_SOURCE] = { "/maps/face_source", 0, 4, false, false, "delta",
-                             "face number in the source" },
+#define LEVEL_ARRAY(ID, name_, field, type, stored, per_, needs_, coding_, absent, since_, about_) \
+    [EBPO_A_##ID] = { .name = #name_,                                                              \
+                      .per = EBPO_PER_##per_,                                                      \
+                      .needs = EBPO_NEEDS_##needs_,                                                \
+                      .sizes = stored,                                                             \
+                      .coding = coding_,                                                           \
+                      .since = since_,                                                             \
+                      .about = about_,                                                             \
+                      absent,                                                                      \
+                      OF_LEVEL(type, field) },
+#define LEVEL_INDEX(ID, name_, cols_, of, needs_, since_, about_) \
+    [EBPO_A_##ID] = { .name = #name_,                             \
+                      .per = EBPO_PER_##of##_BLOCK,               \
+                      .needs = EBPO_NEEDS_##needs_,               \
+                      .cols = cols_,                              \
+                      .sizes = 8,                                 \
+                      .since = since_,                            \
+                      .coding = "plain",                          \
+                      .about = about_ },
+#define ROOT_ARRAY(ID, path, cols_, stored, per_, needs_, coding_, bytes_, since_, about_) \
+    [EBPO_A_##ID] = { .name = path,                                                        \
+                      .per = EBPO_PER_##per_,                                              \
+                      .needs = EBPO_NEEDS_##needs_,                                        \
+                      .cols = cols_,                                                       \
+                      .sizes = stored,                                                     \
+                      .since = since_,                                                     \
+                      .bytes = offsetof(ebpo_info, bytes_),                                \
+                      .coding = coding_,                                                   \
+                      .about = about_ },
+#include "container/array_table.inc"
 };
+
+const ebpo_count_spec ebpo_counts[EBPO_COUNTS] = {
+#define LEVEL_COUNT(ID, attribute, field, needs)                                     \
+    [EBPO_PER_##ID] = { #attribute, EBPO_NEEDS_##needs, offsetof(ebpo_level, field), \
+                        offsetof(ebpo_level_summary, field) },
+#include "container/array_table.inc"
+};
+
+/* Rows and fields cannot disagree. */
+#define LEVEL_ARRAY(ID, name, field, type, ...)                                 \
+    _Static_assert(_Generic(((ebpo_level *)0)->field, type * : 1, default : 0), \
+                   "ebpo_level." #field ": another type than in its row of array_table.inc");
+#include "container/array_table.inc"
+
+/* Values are narrowed from 32 bits, or have one size. */
+#define LEVEL_ARRAY(ID, name, field, type, stored, ...)                                           \
+    _Static_assert((stored) & ((stored)-1) ? sizeof(type) == 4 || EBPO_A_##ID == EBPO_A_LEAF_SKIP \
+                                           : sizeof(type) == (stored),                            \
+                   #name ": its sizes in the file do not go with its type in memory");
+#include "container/array_table.inc"
+
+/* What ebpo_level is made of: the rows' pointers and counts, and what is named here. */
+struct all_of_level {
+#define LEVEL_ARRAY(ID, name, field, type, ...) type *field;
+#define LEVEL_COUNT(ID, attribute, field, ...)  uint64_t field;
+#include "container/array_table.inc"
+    uint64_t group_count, pruned_count;
+    double gray_volume, leaf_volume;
+};
+_Static_assert(sizeof(struct all_of_level) == sizeof(ebpo_level),
+               "ebpo_level has an array or a count without a row in array_table.inc");
 
 void ebpo_schema_path(ebpo_array_id id, int level, char path[EBPO_PATH_BYTES])
 {
@@ -58,34 +95,125 @@ static uint64_t face_chunks(uint64_t faces)
     return faces > rows ? (faces - 1) / rows + 1 : 0;
 }
 
+static uint64_t load(const void *record, size_t offset)
+{
+    uint64_t value;
+    memcpy(&value, (const char *)record + offset, sizeof value);
+    return value;
+}
+
+static void store(void *record, size_t offset, uint64_t value)
+{
+    memcpy((char *)record + offset, &value, sizeof value);
+}
+
 uint64_t ebpo_schema_rows(const ebpo_info *info, ebpo_array_id id, int level)
 {
     const ebpo_level_summary *l = &info->level[level];
-    bool planes = info->parts & EBPO_PART_PLANES, mesh = info->parts & EBPO_PART_MESH,
-         maps = info->parts & EBPO_PART_MAPS;
-    bool leaf_planes = info->parts & EBPO_PART_LEAF_PLANES;
-    switch (id) {
-    case EBPO_A_TYPES: return ebpo_schema_groups(info, level);
-    case EBPO_A_PLANE_COUNTS: return planes ? l->gray_count : 0;
-    case EBPO_A_PLANES: return planes ? l->plane_count : 0;
-    case EBPO_A_LEAF_WINDING: return info->solid ? l->leaf_count : 0;
-    case EBPO_A_BLACK_WINDING: return info->solid ? l->black_count : 0;
-    case EBPO_A_WHITE_WINDING: return info->solid ? l->white_count : 0;
-    case EBPO_A_LEAF_SKIP:
-    case EBPO_A_LEAF_NEW:
-    case EBPO_A_LEAF_REF_COUNT: return mesh ? l->leaf_count : 0;
-    case EBPO_A_LEAF_REFS: return mesh ? l->ref_count : 0;
-    case EBPO_A_TYPES_INDEX: return ebpo_schema_index_rows(ebpo_schema_groups(info, level));
-    case EBPO_A_GRAY_INDEX: return planes ? ebpo_schema_index_rows(l->gray_count) : 0;
-    case EBPO_A_LEAF_INDEX: return mesh || leaf_planes ? ebpo_schema_index_rows(l->leaf_count) : 0;
-    case EBPO_A_LEAF_PLANE_COUNTS: return leaf_planes ? l->leaf_count : 0;
-    case EBPO_A_LEAF_PLANES: return leaf_planes ? l->leaf_plane_count : 0;
-    case EBPO_A_VERTICES: return mesh ? info->vertex_count : 0;
-    case EBPO_A_FACES: return mesh ? info->face_count : 0;
-    case EBPO_A_FACES_INDEX: return mesh ? face_chunks(info->face_count) : 0;
-    case EBPO_A_VERTEX_SOURCE: return maps ? info->vertex_count : 0;
-    case EBPO_A_FACE_SOURCE: return maps ? info->face_count : 0;
-    case EBPO_ARRAYS: break;
+    ebpo_per per = ebpo_schema[id].per;
+    if (!(ebpo_schema[id].needs & ebpo_schema_has(info)))
+        return 0;
+    switch (per) {
+    case EBPO_PER_GROUP: return ebpo_schema_groups(info, level);
+    case EBPO_PER_GROUP_BLOCK: return ebpo_schema_index_rows(ebpo_schema_groups(info, level));
+    case EBPO_PER_GRAY_BLOCK: return ebpo_schema_index_rows(l->gray_count);
+    case EBPO_PER_LEAF_BLOCK: return ebpo_schema_index_rows(l->leaf_count);
+    case EBPO_PER_VERTEX: return info->vertex_count;
+    case EBPO_PER_FACE: return info->face_count;
+    case EBPO_PER_FACE_CHUNK: return face_chunks(info->face_count);
+    default: return load(l, ebpo_counts[per].in_summary);
     }
-    return 0;
+}
+
+const ebpo_list_spec *ebpo_schema_list(ebpo_per per)
+{
+    static const ebpo_list_spec planes = { EBPO_A_PLANE_COUNTS, EBPO_PER_GRAY },
+                                leaf_planes = { EBPO_A_LEAF_PLANE_COUNTS, EBPO_PER_LEAF },
+                                refs = { EBPO_A_LEAF_REF_COUNT, EBPO_PER_LEAF };
+    return per == EBPO_PER_PLANE        ? &planes
+           : per == EBPO_PER_LEAF_PLANE ? &leaf_planes
+           : per == EBPO_PER_REF        ? &refs
+                                        : NULL;
+}
+
+int ebpo_schema_node_type(ebpo_per per)
+{
+    return per == EBPO_PER_GRAY    ? EBPO_GRAY
+           : per == EBPO_PER_LEAF  ? EBPO_LEAF
+           : per == EBPO_PER_WHITE ? EBPO_WHITE
+           : per == EBPO_PER_BLACK ? EBPO_BLACK
+                                   : -1;
+}
+
+uint64_t ebpo_level_count(const ebpo_level *level, ebpo_per per)
+{
+    return per < EBPO_COUNTS ? load(level, ebpo_counts[per].in_level) : level->group_count;
+}
+
+void ebpo_level_set_count(ebpo_level *level, ebpo_per per, uint64_t count)
+{
+    if (per < EBPO_COUNTS)
+        store(level, ebpo_counts[per].in_level, count);
+    else
+        level->group_count = count;
+}
+
+static bool is_value(const void *element, size_t size, int8_t value)
+{
+    switch (size) {
+    case 1: return *(const int8_t *)element == value;
+    case 2: return *(const int16_t *)element == value;
+    case 4: return *(const int32_t *)element == value;
+    default: return *(const int64_t *)element == value;
+    }
+}
+
+bool ebpo_level_is_usual(const ebpo_level *level, int id)
+{
+    const ebpo_array_spec *spec = &ebpo_schema[id];
+    const char *values = ebpo_level_array(level, id);
+    uint64_t count = values ? ebpo_level_rows(level, id) : 0;
+    for (uint64_t i = 0; i < count; ebpo_settle_all_at(i++))
+        if (!is_value(values + i * spec->held_size, spec->held_size, spec->usual))
+            return false;
+    return true;
+}
+
+void ebpo_level_drop(ebpo_level *level, uint32_t needs)
+{
+    for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
+        if (ebpo_schema_is_held(id) && !(ebpo_schema[id].needs & ~needs)) {
+            ebpo_array_free(ebpo_level_array(level, id));
+            ebpo_level_set_array(level, id, NULL);
+        }
+}
+
+void ebpo_level_free(ebpo_level *level)
+{
+    if (!level)
+        return;
+    ebpo_level_drop(level, ~0u);
+    memset(level, 0, sizeof *level);
+}
+
+ebpo_level_summary ebpo_level_summarise(const ebpo_level *level, uint32_t parts)
+{
+    ebpo_level_summary out = { .gray_volume = level->gray_volume,
+                               .leaf_volume = level->leaf_volume };
+    for (int i = 0; i < EBPO_COUNTS; i++)
+        if (ebpo_counts[i].needs & (parts | EBPO_NEEDS_ALWAYS))
+            store(&out, ebpo_counts[i].in_summary, load(level, ebpo_counts[i].in_level));
+    return out;
+}
+
+ebpo_level ebpo_level_of_summary(const ebpo_info *info, int level)
+{
+    const ebpo_level_summary *s = &info->level[level];
+    ebpo_level out = { .group_count = ebpo_schema_groups(info, level),
+                       .gray_volume = s->gray_volume,
+                       .leaf_volume = s->leaf_volume,
+                       .pruned_count = s->pruned_count };
+    for (int i = 0; i < EBPO_COUNTS; i++)
+        store(&out, ebpo_counts[i].in_level, load(s, ebpo_counts[i].in_summary));
+    return out;
 }

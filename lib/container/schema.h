@@ -1,51 +1,83 @@
-/* The objects of a file, one table for writer and reader: format-spec/README.md, "Arrays". */
+/* The arrays of a file, for all who carry them: the rows of array_table.inc as an enumeration and a
+ * table. format-spec/README.md, "Arrays". */
 #ifndef EBPO_CONTAINER_SCHEMA_H
 #define EBPO_CONTAINER_SCHEMA_H
 
+#include <string.h>
+
 #include <ebpo/file.h>
 
-/* In the order in which they lie in the file. Up to EBPO_A_LEAF_PLANES once for each level. */
+/* In the order in which they lie in the file. Up to EBPO_LEVEL_ARRAYS once for each level. */
 typedef enum ebpo_array_id {
-    EBPO_A_TYPES,
-    EBPO_A_PLANE_COUNTS,
-    EBPO_A_PLANES,
-    EBPO_A_LEAF_WINDING,
-    EBPO_A_BLACK_WINDING,
-    EBPO_A_WHITE_WINDING,
-    EBPO_A_LEAF_SKIP,
-    EBPO_A_LEAF_NEW,
-    EBPO_A_LEAF_REF_COUNT,
-    EBPO_A_LEAF_REFS,
-    EBPO_A_TYPES_INDEX,
-    EBPO_A_GRAY_INDEX,
-    EBPO_A_LEAF_INDEX,
-    EBPO_A_LEAF_PLANE_COUNTS,
-    EBPO_A_LEAF_PLANES,
+#define LEVEL_ARRAY(ID, ...) EBPO_A_##ID,
+#define LEVEL_INDEX(ID, ...) EBPO_A_##ID,
+#include "container/array_table.inc"
     EBPO_LEVEL_ARRAYS,
-    EBPO_A_VERTICES = EBPO_LEVEL_ARRAYS,
-    EBPO_A_FACES,
-    EBPO_A_FACES_INDEX,
-    EBPO_A_VERTEX_SOURCE,
-    EBPO_A_FACE_SOURCE,
+    EBPO_BEFORE_ROOT = EBPO_LEVEL_ARRAYS - 1,
+#define ROOT_ARRAY(ID, ...) EBPO_A_##ID,
+#include "container/array_table.inc"
     EBPO_ARRAYS
 } ebpo_array_id;
+
+/* One row for each what. The first ones are counted in the attributes of a level. */
+typedef enum ebpo_per {
+#define LEVEL_COUNT(ID, ...) EBPO_PER_##ID,
+#include "container/array_table.inc"
+    EBPO_COUNTS,
+    EBPO_PER_GROUP = EBPO_COUNTS,
+    EBPO_PER_GROUP_BLOCK, /* of EBPO_INDEX_ROWS groups, and so on */
+    EBPO_PER_GRAY_BLOCK,
+    EBPO_PER_LEAF_BLOCK,
+    EBPO_PER_VERTEX,
+    EBPO_PER_FACE,
+    EBPO_PER_FACE_CHUNK
+} ebpo_per;
+
+/* What an array is there for, as bits: parts, and whether winding numbers are defined. */
+enum {
+    EBPO_NEEDS_PLANES = EBPO_PART_PLANES,
+    EBPO_NEEDS_MESH = EBPO_PART_MESH,
+    EBPO_NEEDS_MAPS = EBPO_PART_MAPS,
+    EBPO_NEEDS_LEAF_PLANES = EBPO_PART_LEAF_PLANES,
+    EBPO_NEEDS_MESH_OR_LEAF_PLANES = EBPO_PART_MESH | EBPO_PART_LEAF_PLANES,
+    EBPO_NEEDS_SOLID = 1 << 29,
+    EBPO_NEEDS_ALWAYS = 1 << 30
+};
 
 enum {
     EBPO_INDEX_ROWS = 4096, /* items between two rows of an index array */
     EBPO_PATH_BYTES = 48
 };
 
+/* The index arrays of a level, in the order of what they count. */
+enum { EBPO_INDEX_TYPES, EBPO_INDEX_GRAY, EBPO_INDEX_LEAVES, EBPO_INDEXES };
+
 typedef struct ebpo_array_spec {
     const char *name; /* within /levels/NN, or the whole path */
-    uint8_t cols;     /* 0: one dimension */
-    uint8_t sizes;    /* allowed element sizes, summed: 1 + 2 + 4 + 8 */
+    ebpo_per per;
+    uint32_t needs; /* any of these bits */
+    uint8_t cols;   /* 0: one dimension */
+    uint8_t sizes;  /* allowed element sizes, summed: 1 + 2 + 4 + 8 */
     bool is_signed;
-    bool if_needed;     /* may be absent where its rows exist: then every value is the usual one */
+    bool if_needed; /* may be absent where its rows exist: then every value is the usual one */
+    int8_t usual;
+    uint8_t since;      /* minor version of the format */
+    uint8_t held_size;  /* of an element in ebpo_level; 0: the array is not held there */
+    uint16_t held;      /* offset of the pointer in ebpo_level */
+    uint16_t bytes;     /* arrays of the root: offset in ebpo_info of the bytes of their kind */
     const char *coding; /* attribute */
     const char *about;  /* attribute */
 } ebpo_array_spec;
 
 extern const ebpo_array_spec ebpo_schema[EBPO_ARRAYS];
+
+typedef struct ebpo_count_spec {
+    const char *name; /* attribute */
+    uint32_t needs;
+    uint16_t in_level, in_summary; /* offsets */
+} ebpo_count_spec;
+
+extern const ebpo_count_spec ebpo_counts[EBPO_COUNTS];
 
 /* Absolute path of an array; `level` matters for level arrays only. */
 void ebpo_schema_path(ebpo_array_id id, int level, char path[EBPO_PATH_BYTES]);
@@ -62,5 +94,59 @@ static inline uint64_t ebpo_schema_groups(const ebpo_info *info, int level)
 {
     return level == 0 ? 1 : info->level[level - 1].gray_count;
 }
+
+/* The needs that a file, or a tree, fulfils. */
+static inline uint32_t ebpo_schema_has(const ebpo_info *info)
+{
+    return info->parts | (info->solid ? EBPO_NEEDS_SOLID : 0) | EBPO_NEEDS_ALWAYS;
+}
+
+/* Lists are behind counts: of planes, leaf planes and references each node of one type has a
+ * number of its own. */
+typedef struct ebpo_list_spec {
+    ebpo_array_id counts;
+    ebpo_per of;
+} ebpo_list_spec;
+/* NULL: not a list. */
+const ebpo_list_spec *ebpo_schema_list(ebpo_per per);
+
+/* The type of the nodes that have a row each; -1: not nodes of one type. */
+int ebpo_schema_node_type(ebpo_per per);
+
+/* --- a level in memory --- */
+
+static inline bool ebpo_schema_is_held(int id) { return ebpo_schema[id].held_size != 0; }
+
+static inline void *ebpo_level_array(const ebpo_level *level, int id)
+{
+    void *array;
+    memcpy(&array, (const char *)level + ebpo_schema[id].held, sizeof array);
+    return array;
+}
+
+static inline void ebpo_level_set_array(ebpo_level *level, int id, const void *array)
+{
+    memcpy((char *)level + ebpo_schema[id].held, &array, sizeof array);
+}
+
+/* Items of a level: not of index rows. */
+uint64_t ebpo_level_count(const ebpo_level *level, ebpo_per per);
+void ebpo_level_set_count(ebpo_level *level, ebpo_per per, uint64_t count);
+
+static inline uint64_t ebpo_level_rows(const ebpo_level *level, int id)
+{
+    return ebpo_level_count(level, ebpo_schema[id].per);
+}
+
+/* Whether all values are the usual one, which an array that is not there says as well. */
+bool ebpo_level_is_usual(const ebpo_level *level, int id);
+
+/* Frees the arrays that are there for some of `needs` only. Counts stay. */
+void ebpo_level_drop(ebpo_level *level, uint32_t needs);
+
+/* Counts and volumes of a level as the head states them, of what the parts let be there; and a
+ * level without arrays that is what the head states. */
+ebpo_level_summary ebpo_level_summarise(const ebpo_level *level, uint32_t parts);
+ebpo_level ebpo_level_of_summary(const ebpo_info *info, int level);
 
 #endif

@@ -10,10 +10,7 @@
 /* What a slice does not have. */
 static void drop(ebpo_level *level)
 {
-    ebpo_array_free(level->leaf_plane_counts);
-    ebpo_array_free(level->leaf_planes);
-    level->leaf_plane_counts = NULL;
-    level->leaf_planes = NULL;
+    ebpo_level_drop(level, EBPO_NEEDS_LEAF_PLANES);
     level->leaf_plane_count = 0;
     level->gray_volume = level->leaf_volume = 0;
 }

@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
+#include "container/schema.h"
 #include "octree/cells.h"
 #include "octree/node_types.h"
 #include "stream/stream_node.h"
@@ -68,27 +69,9 @@ void ebpo_stream_free(ebpo_stream *s)
 
 /* --- reading a level --- */
 
-#define DROP(array) (free(array), (array) = NULL)
-
-static void drop_faces(ebpo_level *level)
-{
-    DROP(level->leaf_first);
-    DROP(level->leaf_new);
-    DROP(level->leaf_ref_count);
-    DROP(level->leaf_refs);
-}
-
 static void drop_passed(ebpo_level *level, bool planes)
 {
-    DROP(level->leaf_winding);
-    DROP(level->black_winding);
-    DROP(level->white_winding);
-    DROP(level->leaf_plane_counts);
-    DROP(level->leaf_planes);
-    if (!planes) {
-        DROP(level->plane_counts);
-        DROP(level->planes);
-    }
+    ebpo_level_drop(level, ~(uint32_t)(EBPO_NEEDS_ALWAYS | (planes ? EBPO_NEEDS_PLANES : 0)));
 }
 
 static uint64_t sum_counts(const uint8_t *counts, uint64_t count)
@@ -224,7 +207,7 @@ ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool 
     ebpo_status status = ebpo_file_read_level(s->file, next, level, s->options.threads, error);
     if (status != EBPO_OK)
         return status;
-    drop_faces(level);
+    ebpo_level_drop(level, EBPO_NEEDS_MESH);
     volumes v = stated_volumes(s, next);
     /* the head has been checked: at most all parents */
     uint64_t nodes = next ? 8 * (parents - s->info->level[next - 1].pruned_count) : 1;

@@ -99,23 +99,12 @@ static void announce(const ebpo_cutting *c)
     if (c->options->boxed || c->need || !ebpo_input_expects(&c->file->in))
         return;
     for (int level = 0; level <= c->last_level; level++)
-        for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++) {
-            bool planes =
-                     id == EBPO_A_PLANE_COUNTS || id == EBPO_A_PLANES || id == EBPO_A_GRAY_INDEX,
-                 leaf_planes = id == EBPO_A_LEAF_PLANE_COUNTS || id == EBPO_A_LEAF_PLANES;
-            bool lists = id >= EBPO_A_LEAF_SKIP && id <= EBPO_A_LEAF_REFS;
-            uint32_t needs = planes        ? EBPO_PART_PLANES
-                             : leaf_planes ? EBPO_PART_LEAF_PLANES
-                             : lists       ? EBPO_PART_MESH
-                                           : 0;
-            if ((needs & ~c->parts) == 0 && id != EBPO_A_TYPES_INDEX && id != EBPO_A_GRAY_INDEX &&
-                id != EBPO_A_LEAF_INDEX)
+        for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
+            if (ebpo_schema_is_held(id) &&
+                ebpo_schema[id].needs & (c->parts | EBPO_NEEDS_SOLID | EBPO_NEEDS_ALWAYS))
                 ebpo_expect_array(&e, &c->file->level_array[level][id]);
-        }
-    if (c->parts & EBPO_PART_MESH && c->last_level == c->from->level_count - 1)
-        ebpo_expect_mesh(&e);
-    if (c->parts & EBPO_PART_MAPS && c->last_level == c->from->level_count - 1)
-        ebpo_expect_maps(&e);
+    if (c->last_level == c->from->level_count - 1)
+        ebpo_expect_root(&e, c->parts);
     ebpo_expect_all(&e);
 }
 

@@ -169,12 +169,7 @@ static void drop_lists(ebpo_cutting *c)
     c->parts &= ~(uint32_t)(EBPO_PART_MESH | EBPO_PART_MAPS);
     for (int i = 0; i < c->out->info.level_count; i++) {
         ebpo_level *l = &c->out->level[i];
-        free(l->leaf_first);
-        free(l->leaf_new);
-        free(l->leaf_ref_count);
-        free(l->leaf_refs);
-        l->leaf_first = NULL;
-        l->leaf_new = l->leaf_ref_count = l->leaf_refs = NULL;
+        ebpo_level_drop(l, EBPO_NEEDS_MESH);
         l->new_count = l->ref_count = 0;
     }
 }

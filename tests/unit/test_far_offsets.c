@@ -333,7 +333,7 @@ START_TEST(references_beyond_2_to_the_32_are_encoded_where_they_are)
                                    .leaf_ref_count = counts,
                                    .leaf_refs = refs,
                                    .ref_count = before + ROWS };
-    plan.leaf_index[5] = ebpo_index_leaves(&tree->level[5]);
+    plan.index[5][EBPO_INDEX_LEAVES] = ebpo_index_leaves(&tree->level[5]);
     ebpo_array_out array = { .id = EBPO_A_LEAF_REFS,
                              .level = 5,
                              .shape = {
@@ -348,7 +348,7 @@ START_TEST(references_beyond_2_to_the_32_are_encoded_where_they_are)
     ck_assert_uint_eq(rows[0], UINT32_MAX);
     ck_assert_uint_eq(rows[ROWS - 1], UINT32_MAX);
     free(rows);
-    free(plan.leaf_index[5]);
+    free(plan.index[5][EBPO_INDEX_LEAVES]);
     free(tree);
     free(first);
     free(news);
