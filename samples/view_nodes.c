@@ -47,7 +47,7 @@ int main(int argc, char **argv)
         while (ebpo_view_stream_next(stream, &node, &end, &error) == EBPO_OK &&
                end == EBPO_VIEW_NODE)
             arrived++; /* children replace their parent when node.complete */
-        ebpo_view_stats stats;
+        ebpo_view_stats stats = EBPO_VIEW_STATS_INIT;
         ebpo_view_stream_get_stats(stream, &stats);
         ebpo_view_stream_cut(stream, draw, &polygons);
         printf("%" PRIu64 " nodes more, %" PRIu64 " bytes read: %" PRIu64

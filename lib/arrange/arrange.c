@@ -313,7 +313,8 @@ static ebpo_status translate(void *context, uint64_t begin, uint64_t end, unsign
 static ebpo_status translate_faces(arranging *a, uint64_t *passes, ebpo_error *error)
 {
     ebpo_mesh *mesh = a->mesh;
-    ebpo_workspace_stats figures = { .memory = UINT64_MAX };
+    ebpo_workspace_stats figures = EBPO_WORKSPACE_STATS_INIT;
+    figures.memory = UINT64_MAX;
     if (mesh->workspace)
         ebpo_workspace_get_stats(mesh->workspace, &figures);
     uint64_t window = figures.memory / 8 / sizeof *a->rank;

@@ -4,6 +4,7 @@
 #include "arrange/arrange.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
+#include "base/sized.h"
 
 typedef struct preparation {
     ebpo_mesh *mesh;
@@ -66,11 +67,15 @@ ebpo_status ebpo_mesh_prepare(ebpo_prepared *out, ebpo_mesh *mesh,
                               const ebpo_prepare_options *options, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    static const ebpo_prepare_options usual = EBPO_PREPARE_OPTIONS_INIT;
-    memset(out, 0, sizeof *out);
-    preparation p = { mesh, options ? options : &usual, out };
-    ebpo_status status = prepare(&p, error);
-    if (status != EBPO_OK)
-        memset(out, 0, sizeof *out);
+    static const ebpo_prepared nothing = EBPO_PREPARED_INIT;
+    ebpo_prepare_options wanted = EBPO_PREPARE_OPTIONS_INIT;
+    ebpo_prepared made = EBPO_PREPARED_INIT;
+    preparation p = { mesh, &wanted, &made };
+    ebpo_status status = EBPO_CHECK_SIZED(ebpo_prepared, out, error);
+    if (status == EBPO_OK)
+        status = EBPO_TAKE(ebpo_prepare_options, &wanted, options, error);
+    if (status == EBPO_OK)
+        status = prepare(&p, error);
+    EBPO_GIVE(ebpo_prepared, out, status == EBPO_OK ? &made : &nothing);
     return status;
 }

@@ -230,7 +230,8 @@ static ebpo_status run_alone(sorting *t, ebpo_error *error)
 static unsigned threads_for_groups(const sorting *t)
 {
     const ebpo_sort *s = t->s;
-    ebpo_workspace_stats figures = { .memory = UINT64_MAX };
+    ebpo_workspace_stats figures = EBPO_WORKSPACE_STATS_INIT;
+    figures.memory = UINT64_MAX;
     uint64_t largest = 1;
     if (s->workspace)
         ebpo_workspace_get_stats(s->workspace, &figures);

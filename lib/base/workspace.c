@@ -12,6 +12,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/sized.h"
 
 /* Arrays smaller than a page are malloc's; those smaller than a block are parts of a pool, which is
  * a block: a build has thousands of them. */
@@ -224,17 +225,19 @@ static ebpo_status choose_folder(ebpo_workspace *w, const char *wanted, ebpo_err
 ebpo_status ebpo_workspace_make(ebpo_workspace **out, const ebpo_workspace_options *options,
                                 ebpo_error *error)
 {
-    static const ebpo_workspace_options usual = EBPO_WORKSPACE_OPTIONS_INIT;
-    options = options ? options : &usual;
+    ebpo_workspace_options wanted = EBPO_WORKSPACE_OPTIONS_INIT;
     *out = NULL;
-    uint64_t memory = options->memory ? options->memory : machine_memory() / 2;
-    if (memory < EBPO_WORKSPACE_LEAST && options->memory)
+    ebpo_status status = EBPO_TAKE(ebpo_workspace_options, &wanted, options, error);
+    if (status != EBPO_OK)
+        return status;
+    uint64_t memory = wanted.memory ? wanted.memory : machine_memory() / 2;
+    if (memory < EBPO_WORKSPACE_LEAST && wanted.memory)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "%llu bytes of memory are too few; %d MiB are the least",
                          (unsigned long long)memory, EBPO_WORKSPACE_LEAST >> 20);
     if (memory < EBPO_WORKSPACE_LEAST)
         memory = EBPO_WORKSPACE_LEAST;
-    return ebpo_workspace_make_any(out, memory, options->temp_dir, error);
+    return ebpo_workspace_make_any(out, memory, wanted.temp_dir, error);
 }
 
 ebpo_status ebpo_workspace_make_any(ebpo_workspace **out, uint64_t memory, const char *temp_dir,
@@ -295,12 +298,13 @@ void ebpo_workspace_free(ebpo_workspace *workspace)
         leave(workspace);
 }
 
-void ebpo_workspace_get_stats(const ebpo_workspace *workspace, ebpo_workspace_stats *out)
+ebpo_status ebpo_workspace_get_stats(const ebpo_workspace *workspace, ebpo_workspace_stats *out)
 {
     ebpo_workspace *w = (ebpo_workspace *)workspace;
     pthread_mutex_lock(&w->lock);
-    *out = w->figures;
+    ebpo_workspace_stats figures = w->figures;
     pthread_mutex_unlock(&w->lock);
+    return EBPO_GIVE(ebpo_workspace_stats, out, &figures);
 }
 
 /* --- blocks --- */

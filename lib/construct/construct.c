@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
+#include "base/sized.h"
 #include "construct/branch.h"
 #include "construct/construct_top.h"
 #include "construct/corner_windings.h"
@@ -251,10 +252,8 @@ static ebpo_status build_pieces(ebpo_builder *b, ebpo_error *error)
     for (unsigned i = 0; i < b->threads && job.scratch; i++)
         ebpo_emit_scratch_free(job.scratch[i]);
     free(job.scratch);
-    if (b->options->times) {
-        b->options->times->cells += 1e-9 * (double)job.cells_ns;
-        b->options->times->envelopes += 1e-9 * (double)job.envelopes_ns;
-    }
+    b->options->times->cells += 1e-9 * (double)job.cells_ns;
+    b->options->times->envelopes += 1e-9 * (double)job.envelopes_ns;
     return status;
 }
 
@@ -294,21 +293,27 @@ ebpo_status ebpo_build(ebpo_tree *out, ebpo_mesh *mesh, const ebpo_mesh_report *
                        ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_build_options defaults = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_build_options wanted = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_build_times times = EBPO_BUILD_TIMES_INIT, *asked = NULL;
     ebpo_builder b = { .workspace = mesh->workspace };
     memset(out, 0, sizeof *out);
     out->mesh.workspace = mesh->workspace;
-    if (!options)
-        options = &defaults;
-    if (options->times)
-        *options->times = (ebpo_build_times){ 0, 0 };
-    ebpo_status status = check_options(options, &out->info, error);
+    ebpo_status status = EBPO_TAKE(ebpo_build_options, &wanted, options, error);
+    if (status == EBPO_OK && wanted.times)
+        status = EBPO_CHECK_SIZED(ebpo_build_times, wanted.times, error);
+    if (status == EBPO_OK) {
+        asked = wanted.times;
+        wanted.times = &times;
+        status = check_options(&wanted, &out->info, error);
+    }
     if (status == EBPO_OK)
-        status = prepare(&b, mesh, report, options, error);
+        status = prepare(&b, mesh, report, &wanted, error);
     if (status == EBPO_OK)
         fill_info(&out->info, &b, mesh, report, mend);
     if (status == EBPO_OK)
         status = run_stages(&b, mesh, out, error);
+    if (asked)
+        EBPO_GIVE(ebpo_build_times, asked, &times);
     builder_free(&b);
     ebpo_mesh_free(mesh);
     if (status != EBPO_OK)

@@ -306,7 +306,8 @@ static ebpo_status fit_largest_piece(ebpo_builder *b, ebpo_error *error)
 {
     /* points that a hull is made of; measured: a million faces at one vertex */
     enum { BYTES_A_FACE = 160 };
-    ebpo_workspace_stats figures = { .memory = 0 };
+    ebpo_workspace_stats figures = EBPO_WORKSPACE_STATS_INIT;
+    figures.memory = 0;
     uint64_t most = 1;
     if (b->workspace)
         ebpo_workspace_get_stats(b->workspace, &figures);

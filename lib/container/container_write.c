@@ -11,6 +11,7 @@
 #include "base/parallel.h"
 #include "base/sha256.h"
 #include "base/arrays.h"
+#include "base/sized.h"
 #include "container/content.h"
 #include "container/head_facts.h"
 #include "container/plan.h"
@@ -356,14 +357,17 @@ static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const cha
                               ebpo_publish *publish, const ebpo_write_options *options,
                               ebpo_error *error)
 {
-    static const ebpo_write_options usual = EBPO_WRITE_OPTIONS_INIT;
+    ebpo_write_options wanted = EBPO_WRITE_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_write_options, &wanted, options, error);
+    if (status != EBPO_OK)
+        return status;
     writer *w = ebpo_alloc_zero(1, sizeof *w);
     if (!w)
         return ebpo_fail_memory(error, sizeof *w);
-    w->options = options ? options : &usual;
+    w->options = &wanted;
     w->out = (ebpo_h5_out)EBPO_H5_OUT_INIT;
     w->root = -1;
-    ebpo_status status = check_options(w->options, shown, error);
+    status = check_options(w->options, shown, error);
     if (status == EBPO_OK && !ebpo_progress_stage(&w->options->progress, "writing", error))
         status = EBPO_E_CANCELLED;
     if (status == EBPO_OK)

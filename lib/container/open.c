@@ -7,6 +7,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/fp_env.h"
+#include "base/sized.h"
 #include "container/head_facts.h"
 #include "container/reader.h"
 #include "http/http_source.h"
@@ -250,7 +251,7 @@ ebpo_status ebpo_reader_locate(ebpo_file *file, const ebpo_array_in *array, ebpo
 ebpo_status ebpo_open(ebpo_file **out, const char *path, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_source source;
+    ebpo_source source = EBPO_SOURCE_INIT;
     *out = NULL;
     if (ebpo_is_url(path))
         return ebpo_open_url(out, path, NULL, error);
@@ -261,7 +262,7 @@ ebpo_status ebpo_open(ebpo_file **out, const char *path, ebpo_error *error)
 ebpo_status ebpo_open_url(ebpo_file **out, const char *url, const ebpo_http_options *options,
                           ebpo_error *error)
 {
-    ebpo_source source;
+    ebpo_source source = EBPO_SOURCE_INIT;
     *out = NULL;
     ebpo_status status = ebpo_source_of_url(&source, url, options, error);
     if (status != EBPO_OK)
@@ -287,11 +288,15 @@ ebpo_status ebpo_open_source(ebpo_file **out, const ebpo_source *source, const c
                              ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
+    ebpo_source own = EBPO_SOURCE_INIT;
     *out = NULL;
-    if (source->read)
-        return open_source(out, source, name ? name : "source", error);
-    if (source->close)
-        source->close(source->user);
+    ebpo_status status = EBPO_TAKE(ebpo_source, &own, source, error);
+    if (status != EBPO_OK)
+        return status;
+    if (own.read)
+        return open_source(out, &own, name ? name : "source", error);
+    if (own.close)
+        own.close(own.user);
     return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: a source without a read function; set one",
                      name ? name : "source");
 }
@@ -315,9 +320,12 @@ void ebpo_file_traffic(const ebpo_file *file, uint64_t *bytes, uint64_t *reads)
     *reads = atomic_load(&file->in.reads);
 }
 
-bool ebpo_file_http_stats(const ebpo_file *file, ebpo_http_stats *out)
+ebpo_status ebpo_file_get_http_stats(const ebpo_file *file, ebpo_http_stats *out)
 {
-    return ebpo_source_http_stats(&file->in.source, out);
+    ebpo_http_stats stats = EBPO_HTTP_STATS_INIT;
+    bool told = ebpo_source_http_stats(&file->in.source, &stats);
+    ebpo_status status = EBPO_GIVE(ebpo_http_stats, out, &stats);
+    return status == EBPO_OK && !told ? EBPO_E_ABSENT : status;
 }
 
 void ebpo_file_set_workspace(ebpo_file *file, ebpo_workspace *workspace)

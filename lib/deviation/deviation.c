@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
+#include "base/sized.h"
 #include "deviation/bound.h"
 #include "deviation/samples.h"
 #include "query/query_model.h"
@@ -259,8 +260,15 @@ ebpo_status ebpo_deviation_level(ebpo_model *model, ebpo_file *file, int level,
                                  ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    static const ebpo_deviation_options usual = EBPO_DEVIATION_OPTIONS_INIT;
-    const ebpo_deviation_options *o = options ? options : &usual;
+    ebpo_deviation_options wanted = EBPO_DEVIATION_OPTIONS_INIT;
+    const ebpo_deviation_options *o = &wanted;
+    ebpo_deviation found = EBPO_DEVIATION_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_deviation_options, &wanted, options, error);
+    if (status == EBPO_OK)
+        status = EBPO_CHECK_SIZED(ebpo_deviation, out, error);
+    if (status != EBPO_OK)
+        return status;
+    found.mean = found.rms = NAN;
     ebpo_lod_model whole = { 0 }, own = { 0 };
     survey s = { .level = level,
                  .threads = ebpo_thread_count(o->threads),
@@ -268,8 +276,7 @@ ebpo_status ebpo_deviation_level(ebpo_model *model, ebpo_file *file, int level,
                  .error = error,
                  .whole = &whole,
                  .tree = &whole };
-    *out = (ebpo_deviation){ .mean = NAN, .rms = NAN };
-    ebpo_status status = check(ebpo_file_info(file), model->info, level, o, error);
+    status = check(ebpo_file_info(file), model->info, level, o, error);
     if (status == EBPO_OK)
         status = ebpo_tree_read_whole(&whole, model->file, s.threads, error);
     if (status == EBPO_OK && file != model->file) {
@@ -279,14 +286,15 @@ ebpo_status ebpo_deviation_level(ebpo_model *model, ebpo_file *file, int level,
     if (status == EBPO_OK)
         status = make_bounders(&s, model);
     if (status == EBPO_OK)
-        status = bound_level(&s, o, out);
+        status = bound_level(&s, o, &found);
     for (unsigned i = 0; s.bounders && i < s.threads; i++)
         ebpo_bounder_free(&s.bounders[i]);
     free(s.bounders);
     free(s.nodes);
     free(s.order);
     if (status == EBPO_OK && o->samples)
-        status = ebpo_deviation_sample(model, file, level, o, out, error);
+        status = ebpo_deviation_sample(model, file, level, o, &found, error);
+    EBPO_GIVE(ebpo_deviation, out, &found);
     ebpo_lod_model_free(&own);
     ebpo_lod_model_free(&whole);
     return status;

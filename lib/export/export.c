@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/fp_env.h"
+#include "base/sized.h"
 #include "export/formats.h"
 #include "io/file_source.h"
 
@@ -51,36 +52,42 @@ static ebpo_status check(const ebpo_info *info, ebpo_export_format format,
     return EBPO_OK;
 }
 
+static ebpo_status write_format(ebpo_export_job *job, ebpo_error *error)
+{
+    switch (job->format) {
+    case EBPO_EXPORT_XDMF: return ebpo_export_xdmf(job, error);
+    case EBPO_EXPORT_VTKHDF: return ebpo_export_vtkhdf(job, error);
+    case EBPO_EXPORT_GLTF:
+    case EBPO_EXPORT_GLB: return ebpo_export_gltf(job, error);
+    case EBPO_EXPORT_OBJ:
+    case EBPO_EXPORT_STL: return ebpo_export_scene(job, error);
+    }
+    return ebpo_fail(error, EBPO_E_ARGUMENT, "%d is no export format", (int)job->format);
+}
+
 ebpo_status ebpo_export(ebpo_file *file, const char *path, ebpo_export_format format,
                         const ebpo_export_options *options, ebpo_export_report *report,
                         ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    static const ebpo_export_options usual = EBPO_EXPORT_OPTIONS_INIT;
-    ebpo_export_report own;
+    ebpo_export_options wanted = EBPO_EXPORT_OPTIONS_INIT;
+    ebpo_export_report own = EBPO_EXPORT_REPORT_INIT;
     char second[4096];
-    if (!options)
-        options = &usual;
-    if (!report)
-        report = &own;
-    memset(report, 0, sizeof *report);
-    ebpo_status status = check(ebpo_file_info(file), format, options, error);
+    ebpo_status status = EBPO_TAKE(ebpo_export_options, &wanted, options, error);
+    if (status == EBPO_OK && report)
+        status = EBPO_CHECK_SIZED(ebpo_export_report, report, error);
+    if (status == EBPO_OK)
+        status = check(ebpo_file_info(file), format, &wanted, error);
     if (status != EBPO_OK)
         return status;
     if (!ebpo_export_second_file(format, path, second, sizeof second))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "%s: is no name for this format: too long, or with a ':'; take another",
                          path);
-    if (options->first_level <= options->last_level)
-        ebpo_file_expect_levels(file, 0, options->last_level);
-    ebpo_export_job job = { file, path, second, format, options, report };
-    switch (format) {
-    case EBPO_EXPORT_XDMF: return ebpo_export_xdmf(&job, error);
-    case EBPO_EXPORT_VTKHDF: return ebpo_export_vtkhdf(&job, error);
-    case EBPO_EXPORT_GLTF:
-    case EBPO_EXPORT_GLB: return ebpo_export_gltf(&job, error);
-    case EBPO_EXPORT_OBJ:
-    case EBPO_EXPORT_STL: return ebpo_export_scene(&job, error);
-    }
-    return ebpo_fail(error, EBPO_E_ARGUMENT, "%d is no export format", (int)format);
+    if (wanted.first_level <= wanted.last_level)
+        ebpo_file_expect_levels(file, 0, wanted.last_level);
+    status = write_format(&(ebpo_export_job){ file, path, second, format, &wanted, &own }, error);
+    if (report)
+        EBPO_GIVE(ebpo_export_report, report, &own);
+    return status;
 }

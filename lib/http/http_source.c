@@ -5,6 +5,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/sized.h"
 #include "http/disk.h"
 #include "http/http_source.h"
 #include "http/range_cache.h"
@@ -145,7 +146,7 @@ static void source_close(void *user)
 
 bool ebpo_source_http_stats(const ebpo_source *source, ebpo_http_stats *out)
 {
-    memset(out, 0, sizeof *out);
+    *out = (ebpo_http_stats)EBPO_HTTP_STATS_INIT;
     if (source->read != source_read)
         return false;
     http_source *s = source->user;
@@ -255,14 +256,20 @@ static ebpo_status open_source(http_source *s, ebpo_error *error)
 ebpo_status ebpo_source_of_url(ebpo_source *out, const char *url, const ebpo_http_options *options,
                                ebpo_error *error)
 {
-    static const ebpo_http_options usual = EBPO_HTTP_OPTIONS_INIT;
-    *out = (ebpo_source){ .user = NULL };
+    ebpo_http_options wanted = EBPO_HTTP_OPTIONS_INIT;
+    ebpo_source made = EBPO_SOURCE_INIT;
+    ebpo_status status = EBPO_CHECK_SIZED(ebpo_source, out, error);
+    if (status == EBPO_OK)
+        status = EBPO_TAKE(ebpo_http_options, &wanted, options, error);
+    if (status != EBPO_OK)
+        return status;
+    EBPO_GIVE(ebpo_source, out, &made);
     if (!ebpo_is_url(url))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: is not a URL with http:// or https://", url);
     http_source *s = ebpo_alloc_zero(1, sizeof *s);
     if (!s)
         return ebpo_fail_memory(error, sizeof *s);
-    s->options = options ? *options : usual;
+    s->options = wanted;
     bool copied = copy_options(&s->options);
     s->url = strdup(url);
     ebpo_url_shown(url, s->shown, sizeof s->shown);
@@ -271,13 +278,17 @@ ebpo_status ebpo_source_of_url(ebpo_source *out, const char *url, const ebpo_htt
         pthread_mutex_destroy(&s->pieces.lock);
         s->has_lock = false;
     }
-    ebpo_status status = copied && s->url && s->has_lock ? open_source(s, error)
-                                                         : ebpo_fail_memory(error, strlen(url));
-    if (status != EBPO_OK)
+    status = copied && s->url && s->has_lock ? open_source(s, error)
+                                             : ebpo_fail_memory(error, strlen(url));
+    if (status != EBPO_OK) {
         source_close(s);
-    else
-        *out = (ebpo_source){
-            s, s->version.size, source_read, source_close, source_expect, s->head_bytes
-        };
-    return status;
+        return status;
+    }
+    made.user = s;
+    made.size = s->version.size;
+    made.read = source_read;
+    made.close = source_close;
+    made.expect = source_expect;
+    made.at_hand = s->head_bytes;
+    return EBPO_GIVE(ebpo_source, out, &made);
 }

@@ -1,6 +1,4 @@
 /* Instead of the rest, in a library built without libcurl. */
-#include <string.h>
-
 #include "base/error.h"
 #include "http/http_source.h"
 
@@ -8,7 +6,7 @@ ebpo_status ebpo_source_of_url(ebpo_source *out, const char *url, const ebpo_htt
                                ebpo_error *error)
 {
     (void)options;
-    *out = (ebpo_source){ .user = NULL };
+    *out = (ebpo_source)EBPO_SOURCE_INIT;
     char shown[EBPO_SHOWN_BYTES];
     return ebpo_fail(error, EBPO_E_UNSUPPORTED,
                      "%s: this library was built without HTTP; install libcurl and build it again, "
@@ -19,6 +17,6 @@ ebpo_status ebpo_source_of_url(ebpo_source *out, const char *url, const ebpo_htt
 bool ebpo_source_http_stats(const ebpo_source *source, ebpo_http_stats *out)
 {
     (void)source;
-    memset(out, 0, sizeof *out);
+    *out = (ebpo_http_stats)EBPO_HTTP_STATS_INIT;
     return false;
 }

@@ -63,7 +63,8 @@ static ebpo_status check_budget(ebpo_import_format format, uint64_t size,
                                 const ebpo_workspace *workspace, const char *name,
                                 ebpo_error *error)
 {
-    ebpo_workspace_stats figures = { .memory = UINT64_MAX };
+    ebpo_workspace_stats figures = EBPO_WORKSPACE_STATS_INIT;
+    figures.memory = UINT64_MAX;
     uint64_t need;
     if (workspace)
         ebpo_workspace_get_stats(workspace, &figures);

@@ -8,6 +8,7 @@
 #include "base/parallel.h"
 #include "base/sha256.h"
 #include "base/arrays.h"
+#include "base/sized.h"
 #include "import/import.h"
 #include "io/file_source.h"
 #include "mesh/mesh_parts.h"
@@ -88,18 +89,19 @@ ebpo_status ebpo_mesh_read(ebpo_mesh *out, const char *path, const ebpo_mesh_rea
                            ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    static const ebpo_progress silent = { NULL, NULL };
+    ebpo_mesh_read_options wanted = EBPO_MESH_READ_OPTIONS_INIT;
     ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
-    ebpo_workspace *workspace = options ? options->workspace : NULL;
+    ebpo_status status = EBPO_TAKE(ebpo_mesh_read_options, &wanted, options, error);
+    ebpo_workspace *workspace = wanted.workspace;
     hashing hash = { .file = &file, .workspace = workspace };
     memset(out, 0, sizeof *out);
-    ebpo_status status = ebpo_whole_file_open(&file, path, error);
+    if (status == EBPO_OK)
+        status = ebpo_whole_file_open(&file, path, error);
     if (status != EBPO_OK)
         return status;
     ebpo_workspace_watch(workspace, file.mapped, (size_t)file.size);
     hash_begin(&hash);
-    status = parse(out, &file, path, workspace, options ? options->threads : 0,
-                   options ? &options->progress : &silent, error);
+    status = parse(out, &file, path, workspace, wanted.threads, &wanted.progress, error);
     hash_end(&hash);
     out->workspace = workspace;
     if (status == EBPO_OK)

@@ -75,7 +75,7 @@ ebpo_status ebpo_source_of_path(ebpo_source *out, const char *path, ebpo_error *
 {
     int fd;
     uint64_t size = 0;
-    *out = (ebpo_source){ .user = NULL };
+    *out = (ebpo_source)EBPO_SOURCE_INIT;
     ebpo_status status = open_regular(path, &fd, &size, error);
     if (status != EBPO_OK)
         return status;
@@ -86,7 +86,7 @@ ebpo_status ebpo_source_of_path(ebpo_source *out, const char *path, ebpo_error *
     }
     s->fd = fd;
     strcpy(s->path, path);
-    *out = (ebpo_source){ s, size, path_read, path_close, NULL, 0 };
+    *out = (ebpo_source){ sizeof *out, s, size, path_read, path_close, NULL, 0 };
     return EBPO_OK;
 }
 
@@ -101,7 +101,9 @@ static ebpo_status memory_read(void *user, uint64_t offset, uint64_t size, void 
 ebpo_source ebpo_source_of_memory(const void *data, uint64_t size)
 {
     /* read only, whatever the type of `user` says */
-    return (ebpo_source){ (void *)(uintptr_t)data, size, memory_read, NULL, NULL, 0 };
+    return (ebpo_source){
+        sizeof(ebpo_source), (void *)(uintptr_t)data, size, memory_read, NULL, NULL, 0
+    };
 }
 
 /* What the source had to fetch before it could be opened: counted once, however often it is looked
@@ -128,7 +130,7 @@ void ebpo_input_close(ebpo_input *input)
 {
     if (input->source.close)
         input->source.close(input->source.user);
-    input->source = (ebpo_source){ .user = NULL };
+    input->source = (ebpo_source)EBPO_SOURCE_INIT;
     free(input->shown);
     input->shown = NULL;
 }

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
+#include "base/sized.h"
 #include "limit/qhull.h"
 #include "lod/lod_model.h"
 #include "octree/cells.h"
@@ -286,8 +287,10 @@ ebpo_status ebpo_limit_level(ebpo_file *file, int level, unsigned threads,
     EBPO_DEFAULT_FP;
     static const ebpo_progress silent;
     job j = { 0 };
-    memset(out, 0, sizeof *out);
-    ebpo_status status = check(file, level, error);
+    ebpo_limit found = EBPO_LIMIT_INIT;
+    ebpo_status status = EBPO_CHECK_SIZED(ebpo_limit, out, error);
+    if (status == EBPO_OK)
+        status = check(file, level, error);
     if (status != EBPO_OK)
         return status;
     threads = ebpo_thread_count(threads);
@@ -300,12 +303,13 @@ ebpo_status ebpo_limit_level(ebpo_file *file, int level, unsigned threads,
         double volume = j.volume[i] > 0
                             ? j.volume[i] * ebpo_cell_volume(&j.model.box, j.nodes[i].cell.level)
                             : 0;
-        out->volume += volume;
-        out->gray_volume += j.nodes[i].gray ? volume : 0;
-        out->flat += j.volume[i] == 0;
-        out->hulls++;
+        found.volume += volume;
+        found.gray_volume += j.nodes[i].gray ? volume : 0;
+        found.flat += j.volume[i] == 0;
+        found.hulls++;
     }
-    out->volume += j.black;
+    found.volume += j.black;
+    EBPO_GIVE(ebpo_limit, out, &found);
     job_free(&j, threads);
     return status;
 }

@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
+#include "base/sized.h"
 #include "lod/lod_model.h"
 #include "lod/polyhedra.h"
 #include "octree/cells.h"
@@ -267,13 +268,14 @@ ebpo_status ebpo_lod_level_nodes(ebpo_file *file, int level, const ebpo_lod_opti
                                  ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    static const ebpo_lod_options defaults = EBPO_LOD_OPTIONS_INIT;
-    if (!options)
-        options = &defaults;
+    ebpo_lod_options wanted = EBPO_LOD_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_lod_options, &wanted, options, error);
     if (out)
         memset(out, 0, sizeof *out);
     if (nodes)
         memset(nodes, 0, sizeof *nodes);
+    if (status != EBPO_OK)
+        return status;
     if (nodes && !out)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "a level's nodes are told with its polygons only");
     const ebpo_info *info = ebpo_file_info(file);
@@ -281,17 +283,17 @@ ebpo_status ebpo_lod_level_nodes(ebpo_file *file, int level, const ebpo_lod_opti
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "there is no level %d; this file has levels 0 to %d", level,
                          info->level_count - 1);
-    unsigned threads = ebpo_thread_count(options->threads);
+    unsigned threads = ebpo_thread_count(wanted.threads);
     ebpo_lod_model model;
-    ebpo_status status = ebpo_lod_model_read(&model, file, level, threads, error);
+    status = ebpo_lod_model_read(&model, file, level, threads, error);
     if (status != EBPO_OK)
         return status;
     job j = {
-        .model = &model, .walls = options->walls, .polygons = out != NULL, .nodes = nodes != NULL
+        .model = &model, .walls = wanted.walls, .polygons = out != NULL, .nodes = nodes != NULL
     };
     status = prepare(&j, threads, error);
     if (status == EBPO_OK)
-        status = walk(&j, threads, &options->progress, error);
+        status = walk(&j, threads, &wanted.progress, error);
     if (status == EBPO_OK)
         status = join(&j, out, nodes, volume, error);
     if (status == EBPO_OK && nodes)

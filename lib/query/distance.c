@@ -8,6 +8,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/fp_env.h"
+#include "base/sized.h"
 #include "query/prefetch.h"
 #include "query/clock.h"
 #include "query/inside.h"
@@ -290,9 +291,11 @@ ebpo_status ebpo_distance_many(ebpo_context *context, const double *points, uint
                                ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    static const ebpo_query_options usual = EBPO_QUERY_OPTIONS_INIT;
-    const ebpo_query_options *o = options ? options : &usual;
-    ebpo_status status = ebpo_check_options(o, error);
+    ebpo_query_options wanted = EBPO_QUERY_OPTIONS_INIT;
+    const ebpo_query_options *o = &wanted;
+    ebpo_status status = EBPO_TAKE(ebpo_query_options, &wanted, options, error);
+    if (status == EBPO_OK)
+        status = ebpo_check_options(o, error);
     if (status == EBPO_OK)
         status = check_mode(o, error);
     if (status == EBPO_OK)

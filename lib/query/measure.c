@@ -16,6 +16,7 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
+#include "base/sized.h"
 #include "container/reader.h"
 #include "geom/double_double.h"
 #include "mesh/mesh_parts.h"
@@ -213,12 +214,16 @@ ebpo_status ebpo_measure(ebpo_file *file, unsigned threads, ebpo_mass *out, ebpo
     pass p = { .mesh = &mesh };
     moments sum = { .absolute6 = 0 };
     uint64_t block_count = 0;
+    ebpo_mass mass = EBPO_MASS_INIT;
+    ebpo_status status = EBPO_CHECK_SIZED(ebpo_mass, out, error);
+    if (status != EBPO_OK)
+        return status;
     if (ebpo_file_info(file)->pruned)
         return ebpo_fail(error, EBPO_E_ABSENT,
                          "%s: the file is a subset, of whose mesh a part was left out: it cannot "
                          "be measured; measure the original",
                          file->in.shown);
-    ebpo_status status = ebpo_file_read_mesh(file, &mesh, threads, error);
+    status = ebpo_file_read_mesh(file, &mesh, threads, error);
     if (status != EBPO_OK)
         goto done;
     block_count = mesh.face_count / BLOCK_FACES + (mesh.face_count % BLOCK_FACES != 0);
@@ -234,7 +239,8 @@ ebpo_status ebpo_measure(ebpo_file *file, unsigned threads, ebpo_mass *out, ebpo
         goto done;
     for (uint64_t b = 0; b < block_count; b++)
         merge(&sum, &p.blocks[b]);
-    mass_of(out, &sum, &p.frame, ebpo_file_info(file)->solid);
+    mass_of(&mass, &sum, &p.frame, ebpo_file_info(file)->solid);
+    EBPO_GIVE(ebpo_mass, out, &mass);
 done:
     free(p.blocks);
     ebpo_mesh_free(&mesh);

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/fp_env.h"
+#include "base/sized.h"
 #include "container/reader.h"
 #include "query/prefetch.h"
 #include "query/inside.h"
@@ -60,10 +61,12 @@ ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64
                              ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    static const ebpo_query_options usual = EBPO_QUERY_OPTIONS_INIT;
-    const ebpo_query_options *o = options ? options : &usual;
+    ebpo_query_options wanted = EBPO_QUERY_OPTIONS_INIT;
+    const ebpo_query_options *o = &wanted;
     const ebpo_model *m = context->model;
-    ebpo_status status = ebpo_check_options(o, error);
+    ebpo_status status = EBPO_TAKE(ebpo_query_options, &wanted, options, error);
+    if (status == EBPO_OK)
+        status = ebpo_check_options(o, error);
     if (status == EBPO_OK)
         status = ebpo_check_solid(m, error);
     if (status == EBPO_OK)

@@ -11,6 +11,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/fp_env.h"
+#include "base/sized.h"
 #include "query/clock.h"
 
 /* Decoded chunks: an eighth of the budget, within these. */
@@ -192,21 +193,24 @@ ebpo_status ebpo_model_open(ebpo_model **out, ebpo_file *file, const ebpo_model_
                             ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    static const ebpo_model_options usual = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model_options wanted = EBPO_MODEL_OPTIONS_INIT;
     *out = NULL;
+    ebpo_status status = EBPO_TAKE(ebpo_model_options, &wanted, options, error);
+    if (status != EBPO_OK)
+        return status;
     ebpo_model *m = ebpo_alloc_zero(1, sizeof *m);
     if (!m)
         return ebpo_fail_memory(error, sizeof *m);
     uint64_t begin = ebpo_clock();
     m->file = file;
     m->info = ebpo_file_info(file);
-    m->options = options ? *options : usual;
+    m->options = wanted;
     m->kernels = ebpo_kernels_best();
-    ebpo_status status = m->options.loading > EBPO_LOAD_NODES
-                             ? ebpo_fail(error, EBPO_E_ARGUMENT,
-                                         "model options: there is no way of loading number %d",
-                                         (int)m->options.loading)
-                             : open_parts(m, error);
+    status = m->options.loading > EBPO_LOAD_NODES
+                 ? ebpo_fail(error, EBPO_E_ARGUMENT,
+                             "model options: there is no way of loading number %d",
+                             (int)m->options.loading)
+                 : open_parts(m, error);
     if (status != EBPO_OK) {
         ebpo_model_close(m);
         return status;
@@ -227,12 +231,12 @@ void ebpo_model_close(ebpo_model *m)
     free(m);
 }
 
-void ebpo_model_get_stats(const ebpo_model *m, ebpo_model_stats *out)
+static void gather_stats(const ebpo_model *m, ebpo_model_stats *out)
 {
-    *out = (ebpo_model_stats){ .resident = m->whole != NULL,
-                               .cut_level = m->top ? m->top->cut_level : 0,
-                               .budget = m->options.memory,
-                               .open_seconds = m->open_seconds };
+    out->resident = m->whole != NULL;
+    out->cut_level = m->top ? m->top->cut_level : 0;
+    out->budget = m->options.memory;
+    out->open_seconds = m->open_seconds;
     ebpo_file_traffic(m->file, &out->bytes_read, &out->reads);
     out->leaves = m->leaves;
     out->leaves_one_wall = m->leaves_one_wall;
@@ -252,6 +256,13 @@ void ebpo_model_get_stats(const ebpo_model *m, ebpo_model_stats *out)
     out->prefetched = subtrees.prefetched;
     out->evicted = subtrees.evicted;
     out->load_seconds = subtrees.load_seconds;
+}
+
+ebpo_status ebpo_model_get_stats(const ebpo_model *m, ebpo_model_stats *out)
+{
+    ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
+    gather_stats(m, &stats);
+    return EBPO_GIVE(ebpo_model_stats, out, &stats);
 }
 
 /* --- contexts --- */

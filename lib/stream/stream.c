@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
+#include "base/sized.h"
 #include "container/schema.h"
 #include "octree/cells.h"
 #include "octree/node_types.h"
@@ -38,14 +39,17 @@ struct ebpo_stream {
 ebpo_status ebpo_stream_new(ebpo_stream **out, ebpo_file *file, const ebpo_stream_options *options,
                             ebpo_error *error)
 {
-    static const ebpo_stream_options usual = EBPO_STREAM_OPTIONS_INIT;
+    ebpo_stream_options wanted = EBPO_STREAM_OPTIONS_INIT;
     *out = NULL;
+    ebpo_status status = EBPO_TAKE(ebpo_stream_options, &wanted, options, error);
+    if (status != EBPO_OK)
+        return status;
     ebpo_stream *s = ebpo_alloc_zero(1, sizeof *s);
     if (!s)
         return ebpo_fail_memory(error, sizeof *s);
     s->file = file;
     s->info = ebpo_file_info(file);
-    s->options = options ? *options : usual;
+    s->options = wanted;
     s->level = -1;
     s->box = ebpo_node_box(s->info);
     s->bytes = s->info->head_bytes;

@@ -2,6 +2,7 @@
 #include <math.h>
 
 #include "base/fp_env.h"
+#include "base/sized.h"
 #include "stream/view_stream.h"
 
 typedef struct visitor {
@@ -48,15 +49,18 @@ static void look_at(const ebpo_view_stream *s, const ebpo_waiting *w, ebpo_view_
     out->waiting += w->turn != EBPO_TURN_NEVER;
 }
 
-void ebpo_view_stream_get_stats(const ebpo_view_stream *s, ebpo_view_stats *out)
+ebpo_status ebpo_view_stream_get_stats(const ebpo_view_stream *s, ebpo_view_stats *out)
 {
     uint64_t reads;
-    *out = (ebpo_view_stats){ .nodes = s->delivered, .pixels = s->viewpoint.given ? 0 : NAN };
-    ebpo_file_traffic(s->file, &out->bytes_read, &reads);
+    ebpo_view_stats stats = EBPO_VIEW_STATS_INIT;
+    stats.nodes = s->delivered;
+    stats.pixels = s->viewpoint.given ? 0 : NAN;
+    ebpo_file_traffic(s->file, &stats.bytes_read, &reads);
     for (int i = 0; i < 4; i++)
-        out->cut[i] = s->cut[i];
+        stats.cut[i] = s->cut[i];
     for (uint64_t i = 0; i < s->frontier.count; i++)
-        look_at(s, &s->frontier.at[i], out);
+        look_at(s, &s->frontier.at[i], &stats);
     if (s->delivering && s->partial.group_count > 1)
-        look_at(s, &s->parent, out);
+        look_at(s, &s->parent, &stats);
+    return EBPO_GIVE(ebpo_view_stats, out, &stats);
 }

@@ -8,6 +8,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/fp_env.h"
+#include "base/sized.h"
 
 enum { MEMORY_LEAST = 1 << 20 };
 
@@ -43,13 +44,16 @@ static ebpo_status take_options(ebpo_view_stream *s, const ebpo_view_options *op
                                 ebpo_error *error)
 {
     ebpo_viewpoint viewpoint;
+    ebpo_observer observer = EBPO_OBSERVER_INIT;
     ebpo_status status = check_options(options, error);
     if (status == EBPO_OK)
-        status = ebpo_viewpoint_make(&viewpoint, &s->box, options->observer, error);
+        status = EBPO_TAKE(ebpo_observer, &observer, options->observer, error);
+    if (status == EBPO_OK)
+        status =
+            ebpo_viewpoint_make(&viewpoint, &s->box, options->observer ? &observer : NULL, error);
     if (status != EBPO_OK)
         return status;
-    if (options->observer)
-        s->observer = *options->observer;
+    s->observer = observer;
     s->viewpoint = viewpoint;
     s->options = *options;
     s->options.observer = options->observer ? &s->observer : NULL;
@@ -60,15 +64,18 @@ ebpo_status ebpo_view_stream_new(ebpo_view_stream **out, ebpo_file *file,
                                  const ebpo_view_options *options, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    static const ebpo_view_options usual = EBPO_VIEW_OPTIONS_INIT;
+    ebpo_view_options wanted = EBPO_VIEW_OPTIONS_INIT;
     *out = NULL;
+    ebpo_status status = EBPO_TAKE(ebpo_view_options, &wanted, options, error);
+    if (status != EBPO_OK)
+        return status;
     ebpo_view_stream *s = ebpo_alloc_zero(1, sizeof *s);
     if (!s)
         return ebpo_fail_memory(error, sizeof *s);
     s->file = file;
     s->info = ebpo_file_info(file);
     s->box = ebpo_node_box(s->info);
-    ebpo_status status = take_options(s, options ? options : &usual, error);
+    status = take_options(s, &wanted, error);
     if (status == EBPO_OK)
         status = ebpo_chunks_make_counted(&s->chunks, file, s->options.memory, error);
     s->partial.windings = s->options.windings;
@@ -122,12 +129,16 @@ ebpo_status ebpo_view_stream_change(ebpo_view_stream *s, const ebpo_view_options
 {
     EBPO_DEFAULT_FP;
     const ebpo_view_options *now = &s->options;
-    if (options->planes != now->planes || options->polygons != now->polygons ||
-        options->windings != now->windings || options->memory != now->memory)
+    ebpo_view_options wanted = EBPO_VIEW_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_view_options, &wanted, options, error);
+    if (status != EBPO_OK)
+        return status;
+    if (wanted.planes != now->planes || wanted.polygons != now->polygons ||
+        wanted.windings != now->windings || wanted.memory != now->memory)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "view options: planes, polygons, windings and memory cannot be changed; "
                          "make another stream");
-    ebpo_status status = take_options(s, options, error);
+    status = take_options(s, &wanted, error);
     if (status != EBPO_OK)
         return status;
     for (uint64_t i = 0; i < s->frontier.count; i++)

@@ -123,7 +123,7 @@ ebpo_status ebpo_subset_tree(ebpo_tree *out, ebpo_file *file, const ebpo_subset_
     ebpo_status status = EBPO_OK;
     if (options->max_error > 0)
         status = ebpo_tolerance_open(&need, file, options->parts & EBPO_PART_PLANES,
-                                     options->write.threads, options->write.progress, error);
+                                     options->threads, options->progress, error);
     if (status == EBPO_OK)
         status = ebpo_subset_tree_within(out, file, options, need, error);
     ebpo_tolerance_close(need);

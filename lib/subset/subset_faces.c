@@ -130,14 +130,14 @@ static ebpo_status take_vertices(ebpo_cutting *c)
         out->mesh.xyz32 = c->from->double_coordinates ? NULL : xyz;
         out->mesh.xyz64 = c->from->double_coordinates ? xyz : NULL;
         status = xyz ? ebpo_pick_rows(c->chunks, EBPO_A_VERTICES, v.old, v.count,
-                                      c->options->write.threads, xyz, c->error)
+                                      c->options->threads, xyz, c->error)
                      : ebpo_fail_memory(c->error, v.count * size);
     }
     if (status == EBPO_OK && c->parts & EBPO_PART_MAPS) {
         out->vertex_source = ebpo_alloc(v.count, sizeof *out->vertex_source);
         status = out->vertex_source
                      ? ebpo_pick_rows(c->chunks, EBPO_A_VERTEX_SOURCE, v.old, v.count,
-                                      c->options->write.threads, out->vertex_source, c->error)
+                                      c->options->threads, out->vertex_source, c->error)
                      : ebpo_fail_memory(c->error, v.count * sizeof *out->vertex_source);
     }
     free(v.old);
@@ -151,14 +151,13 @@ static ebpo_status take_faces(ebpo_cutting *c, const numbering *n)
     out->mesh.faces = ebpo_alloc(n->count, 3 * sizeof *out->mesh.faces);
     ebpo_status status = out->mesh.faces
                              ? ebpo_pick_rows(c->chunks, EBPO_A_FACES, n->old, n->count,
-                                              c->options->write.threads, out->mesh.faces, c->error)
+                                              c->options->threads, out->mesh.faces, c->error)
                              : ebpo_fail_memory(c->error, n->count * 3 * sizeof *out->mesh.faces);
     if (status == EBPO_OK && c->parts & EBPO_PART_MAPS) {
         out->face_source = ebpo_alloc(n->count, sizeof *out->face_source);
-        status = out->face_source
-                     ? ebpo_pick_rows(c->chunks, EBPO_A_FACE_SOURCE, n->old, n->count,
-                                      c->options->write.threads, out->face_source, c->error)
-                     : ebpo_fail_memory(c->error, n->count * sizeof *out->face_source);
+        status = out->face_source ? ebpo_pick_rows(c->chunks, EBPO_A_FACE_SOURCE, n->old, n->count,
+                                                   c->options->threads, out->face_source, c->error)
+                                  : ebpo_fail_memory(c->error, n->count * sizeof *out->face_source);
     }
     return status == EBPO_OK ? take_vertices(c) : status;
 }

@@ -1,5 +1,6 @@
 /* A subset becomes a file. */
 #include "base/fp_env.h"
+#include "base/sized.h"
 #include "container/container_write.h"
 #include "io/publish.h"
 #include "subset/subset_parts.h"
@@ -15,20 +16,32 @@ uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces)
                       ANYHOW);
 }
 
+ebpo_write_options ebpo_subset_write_options(const ebpo_subset_options *options)
+{
+    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
+    write.codec = options->codec;
+    write.codec_level = options->codec_level;
+    write.threads = options->threads;
+    write.progress = options->progress;
+    return write;
+}
+
 ebpo_status ebpo_subset(ebpo_file *file, const char *path, const ebpo_subset_options *options,
                         ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    static const ebpo_subset_options usual = EBPO_SUBSET_OPTIONS_INIT;
-    ebpo_subset_options wanted = options ? *options : usual;
+    ebpo_subset_options wanted = EBPO_SUBSET_OPTIONS_INIT;
     ebpo_tree tree;
-    if (wanted.target_bytes)
-        return ebpo_subset_fit(file, path, &wanted, error);
-    ebpo_status status = ebpo_subset_tree(&tree, file, &wanted, error);
+    ebpo_status status = EBPO_TAKE(ebpo_subset_options, &wanted, options, error);
     if (status != EBPO_OK)
         return status;
-    wanted.write.parts = ~0u;
-    status = ebpo_tree_write(&tree, path, &wanted.write, error);
+    if (wanted.target_bytes)
+        return ebpo_subset_fit(file, path, &wanted, error);
+    status = ebpo_subset_tree(&tree, file, &wanted, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_write_options write = ebpo_subset_write_options(&wanted);
+    status = ebpo_tree_write(&tree, path, &write, error);
     ebpo_tree_free(&tree);
     return status;
 }
@@ -37,20 +50,20 @@ ebpo_status ebpo_subset_of_tree(ebpo_tree *tree, const char *path,
                                 const ebpo_subset_options *options, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    static const ebpo_subset_options usual = EBPO_SUBSET_OPTIONS_INIT;
-    const ebpo_subset_options *o = options ? options : &usual;
+    ebpo_subset_options wanted = EBPO_SUBSET_OPTIONS_INIT;
     ebpo_publish whole = EBPO_PUBLISH_INIT;
-    ebpo_write_options write = o->write;
     ebpo_file *file = NULL;
-    write.parts = ~0u;
-    ebpo_status status = ebpo_publish_begin(&whole, path, error);
+    ebpo_status status = EBPO_TAKE(ebpo_subset_options, &wanted, options, error);
+    ebpo_write_options write = ebpo_subset_write_options(&wanted);
+    if (status == EBPO_OK)
+        status = ebpo_publish_begin(&whole, path, error);
     if (status == EBPO_OK)
         status = ebpo_tree_write_into(tree, ebpo_publish_path(&whole), path, &write, error);
     ebpo_tree_free(tree);
     if (status == EBPO_OK)
         status = ebpo_open(&file, ebpo_publish_path(&whole), error);
     if (status == EBPO_OK)
-        status = ebpo_subset(file, path, o, error);
+        status = ebpo_subset(file, path, &wanted, error);
     ebpo_close(file);
     ebpo_publish_abort(&whole);
     return status;

@@ -294,7 +294,7 @@ ebpo_status ebpo_cut_levels(ebpo_cutting *c)
     ebpo_status status = d.parent ? EBPO_OK : ebpo_fail_memory(c->error, sizeof *d.parent);
     info->level_count = 0;
     for (; d.goes_on && status == EBPO_OK; d.level++) {
-        const ebpo_progress *progress = &c->options->write.progress;
+        const ebpo_progress *progress = &c->options->progress;
         if (progress->report && !progress->report(progress->user, "reading levels",
                                                   (uint64_t)d.level, (uint64_t)c->last_level + 1))
             status =

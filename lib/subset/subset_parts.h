@@ -42,8 +42,10 @@ EBPO_MUST_USE ebpo_status ebpo_subset_tree_within(ebpo_tree *out, ebpo_file *fil
 EBPO_MUST_USE ebpo_status ebpo_subset_fit(ebpo_file *file, const char *path,
                                           ebpo_subset_options *options, ebpo_error *error);
 
-/* The tree that would be written; for tests too. `options->write` only for its threads and
- * progress. */
+/* How the subset is written: all parts that its tree has. */
+ebpo_write_options ebpo_subset_write_options(const ebpo_subset_options *options);
+
+/* The tree that would be written; for tests too. */
 EBPO_MUST_USE ebpo_status ebpo_subset_tree(ebpo_tree *out, ebpo_file *file,
                                            const ebpo_subset_options *options, ebpo_error *error);
 

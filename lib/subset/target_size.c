@@ -38,9 +38,9 @@ static ebpo_status try_error(fitting *f, double max_error, uint64_t *bytes, bool
     if (status != EBPO_OK)
         return status;
     *pruned = tree.info.pruned;
-    o.write.parts = ~0u;
-    status = ebpo_tree_write_into(&tree, ebpo_publish_path(&f->trial), f->trial.shown, &o.write,
-                                  f->error);
+    ebpo_write_options write = ebpo_subset_write_options(&o);
+    status =
+        ebpo_tree_write_into(&tree, ebpo_publish_path(&f->trial), f->trial.shown, &write, f->error);
     ebpo_tree_free(&tree);
     if (status == EBPO_OK && stat(ebpo_publish_path(&f->trial), &st) != 0)
         status =
@@ -161,7 +161,7 @@ ebpo_status ebpo_subset_fit(ebpo_file *file, const char *path, ebpo_subset_optio
         status = choose_parts(&f, &done);
     if (status == EBPO_OK && !done)
         status = ebpo_tolerance_open(&f.need, file, options->parts & EBPO_PART_PLANES,
-                                     options->write.threads, options->write.progress, error);
+                                     options->threads, options->progress, error);
     if (status == EBPO_OK && !done)
         status = find_error(&f);
     ebpo_tolerance_close(f.need);

@@ -104,7 +104,6 @@ void ebpo_tally_merge(ebpo_tally *into, const ebpo_tally *from)
 
 void ebpo_tally_report(const ebpo_tally *tally, ebpo_verify_report *report)
 {
-    *report = (ebpo_verify_report){ 0 };
     ebpo_verify_count *count[EBPO_VERIFY_KINDS] = { &report->structure,   &report->content,
                                                     &report->containment, &report->nesting,
                                                     &report->labels,      &report->lists,

@@ -4,6 +4,7 @@
 
 #include "base/error.h"
 #include "base/fp_env.h"
+#include "base/sized.h"
 #include "mesh/mesh_parts.h"
 #include "verify/nesting.h"
 #include "verify/verify_source.h"
@@ -87,9 +88,15 @@ ebpo_status ebpo_verify(ebpo_file *file, const ebpo_verify_options *options,
                         ebpo_verify_report *report, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    static const ebpo_verify_options defaults = EBPO_VERIFY_OPTIONS_INIT;
-    options = options ? options : &defaults;
-    *report = (ebpo_verify_report){ 0 };
+    ebpo_verify_options wanted = EBPO_VERIFY_OPTIONS_INIT;
+    ebpo_verify_report found = EBPO_VERIFY_REPORT_INIT;
+    ebpo_status status = EBPO_CHECK_SIZED(ebpo_verify_report, report, error);
+    if (status == EBPO_OK)
+        status = EBPO_TAKE(ebpo_verify_options, &wanted, options, error);
+    if (status != EBPO_OK)
+        return status;
+    EBPO_GIVE(ebpo_verify_report, report, &found);
+    options = &wanted;
     if (!file)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "verify: no file; open one with ebpo_open");
     if (options->source) {
@@ -104,12 +111,13 @@ ebpo_status ebpo_verify(ebpo_file *file, const ebpo_verify_options *options,
     ebpo_tally tally = { 0 };
     if (options->workspace)
         ebpo_file_set_workspace(file, options->workspace);
-    ebpo_status status = check_content(file, options, &tally, error);
+    status = check_content(file, options, &tally, error);
     if (status == EBPO_OK)
         status = check_tree(file, options, &tally, error);
     if (status == EBPO_OK && options->source)
         status = check_source(file, options, &tally, error);
     if (status == EBPO_OK)
-        ebpo_tally_report(&tally, report);
+        ebpo_tally_report(&tally, &found);
+    EBPO_GIVE(ebpo_verify_report, report, &found);
     return status;
 }

@@ -28,7 +28,7 @@ static ebpo_deviation deviation(query_model *m, int level, double tolerance, uin
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_deviation_options o = EBPO_DEVIATION_OPTIONS_INIT;
-    ebpo_deviation out;
+    ebpo_deviation out = EBPO_DEVIATION_INIT;
     o.tolerance = tolerance;
     o.samples = samples;
     o.threads = threads;
@@ -141,7 +141,7 @@ START_TEST(a_limit_of_questions_leaves_wider_bounds_that_hold)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_deviation_options o = EBPO_DEVIATION_OPTIONS_INIT;
-    ebpo_deviation exact, limited;
+    ebpo_deviation exact = EBPO_DEVIATION_INIT, limited = EBPO_DEVIATION_INIT;
     query_model m;
     query_model_make(&m, "torus", ebpo_test_torus(3, 1, rings(), rings() / 2), &stored);
     exact = deviation(&m, 2, 0.001, 0, 1);
@@ -199,7 +199,7 @@ static void refused(ebpo_model *model, ebpo_file *file, int level, double tolera
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_deviation_options o = EBPO_DEVIATION_OPTIONS_INIT;
-    ebpo_deviation out;
+    ebpo_deviation out = EBPO_DEVIATION_INIT;
     o.tolerance = tolerance;
     ck_assert_int_eq(ebpo_deviation_level(model, file, level, &o, &out, &error), status);
     ck_assert_msg(strstr(error.message, says) != NULL, "%s", error.message);
@@ -249,7 +249,7 @@ START_TEST(what_cannot_be_measured_is_refused)
         unlink(path);
     }
     ebpo_deviation_options canceled = EBPO_DEVIATION_OPTIONS_INIT;
-    ebpo_deviation out;
+    ebpo_deviation out = EBPO_DEVIATION_INIT;
     canceled.progress.report = cancel;
     ck_assert_int_eq(ebpo_deviation_level(m.model, m.file, 2, &canceled, &out, &error),
                      EBPO_E_CANCELLED);

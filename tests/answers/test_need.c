@@ -51,7 +51,7 @@ static double reach(query_model *m, ebpo_file *file, int level)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_deviation_options o = EBPO_DEVIATION_OPTIONS_INIT;
-    ebpo_deviation d;
+    ebpo_deviation d = EBPO_DEVIATION_INIT;
     o.samples = 0;
     fine(ebpo_deviation_level(m->model, file, level, &o, &d, &error), &error);
     return d.hi;
@@ -61,7 +61,7 @@ static void verify(const result *r)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_verify_options o = EBPO_VERIFY_OPTIONS_INIT;
-    ebpo_verify_report report;
+    ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
     fine(ebpo_verify(r->file, &o, &report, &error), &error);
     ck_assert_msg(report.violations == 0, "%s %s %s %s %s %s", report.structure.first,
                   report.content.first, report.containment.first, report.nesting.first,
@@ -355,7 +355,7 @@ START_TEST(threads_and_a_detour_by_a_tree_do_not_change_the_bytes)
         o.target_bytes = i ? ebpo_file_info(m.file)->file_bytes / 2 : 0;
         for (int way = 0; way < 3; way++) {
             snprintf(path[way], sizeof path[way], "%s/%d.ebpo.h5", m.folder, way);
-            o.write.threads = way == 1 ? 3 : 1;
+            o.threads = way == 1 ? 3 : 1;
             if (way < 2) {
                 fine(ebpo_subset(m.file, path[way], &o, &error), &error);
             } else {

@@ -108,7 +108,7 @@ static bool ask_within(asked *a, uint64_t budget, bool *resident)
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
     ebpo_model *model = NULL;
     ebpo_context *context = NULL;
-    ebpo_model_stats stats;
+    ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
     how.memory = budget;
     ebpo_status status = ebpo_model_open(&model, a->m.file, &how, &error);

@@ -9,6 +9,7 @@ library, root = sys.argv[1], pathlib.Path(sys.argv[2])
 declared = set()
 for header in (root / "lib/include/ebpo").glob("*.h"):
     text = re.sub(r"/\*.*?\*/", "", header.read_text(), flags=re.S)
+    text = re.sub(r"^#(.*\\\n)*.*$", "", text, flags=re.M)
     declared |= set(re.findall(r"EBPO_API\b[^;]*?\b(ebpo_\w+)\s*\(", text))
 output = subprocess.run(["nm", "-D", "--defined-only", library], check=True, capture_output=True, text=True).stdout
 exported = {line.split()[2] for line in output.splitlines() if len(line.split()) == 3}

@@ -94,7 +94,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     part.last_level = 2;
     part.boxed = true;
     part.max[0] = part.max[1] = part.max[2] = 0.3;
-    part.write.threads = 1;
+    part.threads = 1;
     if (ebpo_subset_tree(&tree, file, &part, NULL) == EBPO_OK)
         ebpo_tree_free(&tree);
     cut_level(file);

@@ -145,8 +145,8 @@ static void hash_measures(hashing *h, const stiff_case *c, ebpo_file *file)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status;
-    ebpo_mass mass;
-    ebpo_verify_report report;
+    ebpo_mass mass = EBPO_MASS_INIT;
+    ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
     CALL(status, ebpo_measure(file, 2, &mass, &error));
     if (status != EBPO_OK)
         fail(c, "measure", &error);
@@ -222,7 +222,7 @@ static void hash_reach(hashing *h, const stiff_case *c, query_model *m)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status = EBPO_OK;
-    ebpo_deviation d = { 0 };
+    ebpo_deviation d = EBPO_DEVIATION_INIT;
     if (m->mesh.face_count > FEW_FACES)
         return;
     for (int level = 0; level < m->info.level_count && level < 4 && status == EBPO_OK; level++) {

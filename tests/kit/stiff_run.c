@@ -50,7 +50,7 @@ static void run_refused(const stiff_case *c, stiff_result *r)
 static void run_verify(const query_model *m, const ebpo_mesh *source, stiff_result *r)
 {
     ebpo_verify_options options = EBPO_VERIFY_OPTIONS_INIT;
-    ebpo_verify_report report;
+    ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
     options.source = source;
     options.threads = 1;
@@ -154,7 +154,7 @@ static void run_levels(const stiff_case *c, query_model *m, stiff_result *r)
 
 static void run_volumes(const stiff_case *c, query_model *m, stiff_result *r)
 {
-    ebpo_mass mass;
+    ebpo_mass mass = EBPO_MASS_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
     if (ebpo_measure(m->file, 1, &mass, &error) != EBPO_OK) {
         fault(r, "cannot be measured: %s", error.message);

@@ -252,7 +252,8 @@ START_TEST(containers_are_read_from_beyond_8_gib)
         shifted s = vector_of(names[i % (sizeof names / sizeof *names)]);
         ebpo_error error = EBPO_ERROR_INIT;
         ebpo_file *near, *far;
-        ebpo_source source = { .user = &s,
+        ebpo_source source = { .struct_size = sizeof(ebpo_source),
+                               .user = &s,
                                .size = s.by + s.size,
                                .read = read_shifted,
                                .expect = away ? expect_shifted : NULL };
@@ -378,7 +379,7 @@ START_TEST(workspaces_hold_arrays_beyond_4_gib_in_memory)
 {
     ebpo_workspace *w;
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_workspace_stats f;
+    ebpo_workspace_stats f = EBPO_WORKSPACE_STATS_INIT;
     ck_assert_msg(ebpo_workspace_make_any(&w, 64 * FAR, folder, &error) == EBPO_OK, "%s",
                   error.message);
     touch_ends(w);
@@ -406,7 +407,7 @@ START_TEST(workspaces_hold_arrays_beyond_4_gib_in_files)
 {
     ebpo_workspace *w;
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_workspace_stats f;
+    ebpo_workspace_stats f = EBPO_WORKSPACE_STATS_INIT;
     if (!disk_lends(folder))
         return;
     ck_assert_msg(ebpo_workspace_make_any(&w, 1 << 20, folder, &error) == EBPO_OK, "%s",

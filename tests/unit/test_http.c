@@ -45,7 +45,7 @@ static ebpo_http_options quick(void)
 
 static ebpo_http_stats stats_of(const ebpo_source *source)
 {
-    ebpo_http_stats stats;
+    ebpo_http_stats stats = EBPO_HTTP_STATS_INIT;
     ck_assert(ebpo_source_http_stats(source, &stats));
     return stats;
 }
@@ -84,7 +84,7 @@ static ebpo_status read_all(const ebpo_source *s, ebpo_error *error)
 static ebpo_status visit(const char *fault, const ebpo_http_options *options,
                          ebpo_http_stats *stats, ebpo_error *error)
 {
-    ebpo_source s;
+    ebpo_source s = EBPO_SOURCE_INIT;
     ebpo_status status = ebpo_source_of_url(&s, web_url(fault), options, error);
     if (status != EBPO_OK)
         return status;
@@ -132,7 +132,7 @@ START_TEST(what_passes_or_does_no_harm_gives_the_same_bytes)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
-    ebpo_http_stats stats;
+    ebpo_http_stats stats = EBPO_HTTP_STATS_INIT;
     ebpo_status status = visit(readable[_i].fault, &o, &stats, &error);
     ck_assert_msg(status == EBPO_OK, "%s: %s", readable[_i].fault, error.message);
     ck_assert_msg(stats.retries >= readable[_i].retries, "%s: %d retries", readable[_i].fault,
@@ -146,7 +146,7 @@ START_TEST(answers_without_a_version_are_not_joined)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
-    ebpo_source s;
+    ebpo_source s = EBPO_SOURCE_INIT;
     uint8_t *got = malloc(DATA_BYTES);
     ck_assert_msg(ebpo_source_of_url(&s, web_url("bare_replaced"), &o, &error) == EBPO_OK, "%s",
                   error.message);
@@ -166,7 +166,7 @@ START_TEST(a_server_that_sends_less_each_time_is_asked_for_the_rest)
     ebpo_http_options o = quick();
     o.retries = 60;
     o.time_limit = 60;
-    ebpo_source s;
+    ebpo_source s = EBPO_SOURCE_INIT;
     ck_assert_int_eq(ebpo_source_of_url(&s, web_url("less"), &o, &error), EBPO_OK);
     ck_assert_msg(read_one(&s, 100000, 300000, &error) == EBPO_OK, "%s", error.message);
     s.close(s.user);
@@ -244,7 +244,7 @@ START_TEST(final_codes_are_asked_for_once)
     static const char *const faults[] = { "code-404", "code-403", "code-401" };
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
-    ebpo_source s;
+    ebpo_source s = EBPO_SOURCE_INIT;
     ck_assert_int_eq(ebpo_source_of_url(&s, web_url("code_later-404-1-1"), &o, &error), EBPO_OK);
     ck_assert_int_eq(read_one(&s, 200000, 10, &error), EBPO_E_IO);
     ck_assert_uint_eq(stats_of(&s).requests, 2);
@@ -272,7 +272,7 @@ START_TEST(without_ranges_or_version_only_small_files_are_read)
     static const char *const faults[] = { "whole", "whole_chunked", "whole_bare", "bare" };
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
-    ebpo_source s;
+    ebpo_source s = EBPO_SOURCE_INIT;
     o.whole_limit = DATA_BYTES - 1;
     for (size_t i = 0; i < sizeof faults / sizeof *faults; i++) {
         ck_assert_int_eq(ebpo_source_of_url(&s, web_url(faults[i]), &o, &error),
@@ -288,7 +288,7 @@ START_TEST(a_file_without_a_version_is_one_answer_or_none)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
-    ebpo_source s;
+    ebpo_source s = EBPO_SOURCE_INIT;
     ck_assert_int_eq(ebpo_source_of_url(&s, web_url("change_bare-1"), &o, &error), EBPO_OK);
     uint8_t *got = malloc(DATA_BYTES);
     ck_assert_int_eq(s.read(s.user, 0, DATA_BYTES, got, &error), EBPO_OK);
@@ -305,7 +305,7 @@ START_TEST(opening_is_one_request_and_what_was_announced_comes_in_few)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
-    ebpo_source s;
+    ebpo_source s = EBPO_SOURCE_INIT;
     ck_assert_int_eq(ebpo_source_of_url(&s, web_url("good"), &o, &error), EBPO_OK);
     ck_assert_int_eq(read_one(&s, 0, HEAD_BYTES, &error), EBPO_OK);
     ck_assert_uint_eq(stats_of(&s).requests, 1);
@@ -327,7 +327,7 @@ START_TEST(what_was_announced_and_not_read_does_no_harm)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
-    ebpo_source s;
+    ebpo_source s = EBPO_SOURCE_INIT;
     uint64_t random = 7;
     ck_assert_int_eq(ebpo_source_of_url(&s, web_url("good"), &o, &error), EBPO_OK);
     for (int i = 0; i < 300; i++) {
@@ -388,7 +388,7 @@ START_TEST(threads_read_at_once)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
-    ebpo_source s;
+    ebpo_source s = EBPO_SOURCE_INIT;
     ck_assert_int_eq(ebpo_source_of_url(&s, web_url("good"), &o, &error), EBPO_OK);
     ck_assert_int_eq(read_by_threads(&s, 1), 0);
     s.close(s.user);
@@ -410,7 +410,7 @@ START_TEST(whatever_happens_the_bytes_are_right_or_there_is_an_error)
     o.time_limit = 60;
     int opened = 0, failures = 0;
     for (int seed = 0; seed < schedules(); seed++) {
-        ebpo_source s;
+        ebpo_source s = EBPO_SOURCE_INIT;
         snprintf(fault, sizeof fault, "random-%d-%d", seed, 10 + seed % 4 * 10);
         if (ebpo_source_of_url(&s, web_url(fault), &o, &error) != EBPO_OK)
             continue;
@@ -444,7 +444,7 @@ START_TEST(a_read_is_stopped_on_request)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = EBPO_HTTP_OPTIONS_INIT;
     pthread_t thread;
-    ebpo_source s;
+    ebpo_source s = EBPO_SOURCE_INIT;
     o.stop = stop;
     o.proxy = "";
     pthread_create(&thread, NULL, stop_soon, NULL);
@@ -458,7 +458,7 @@ START_TEST(a_source_is_closed_while_it_reads_ahead)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
-    ebpo_source s;
+    ebpo_source s = EBPO_SOURCE_INIT;
     ck_assert_int_eq(ebpo_source_of_url(&s, web_url("good"), &o, &error), EBPO_OK);
     s.expect(s.user, &(ebpo_range){ 0, DATA_BYTES }, 1);
     s.close(s.user);
@@ -472,7 +472,7 @@ START_TEST(name_password_and_headers_are_sent_and_not_shown)
     static const char *const headers[] = { "X-Key: 7", NULL };
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
-    ebpo_source s;
+    ebpo_source s = EBPO_SOURCE_INIT;
     o.user = "name:secret";
     o.headers = headers;
     ck_assert_msg(visit("private", &o, NULL, &error) == EBPO_OK, "%s", error.message);
@@ -494,7 +494,7 @@ START_TEST(options_out_of_range_are_refused)
 {
     static const char *const smuggled[] = { "X: 1\r\nY: 2", NULL };
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_source s;
+    ebpo_source s = EBPO_SOURCE_INIT;
     for (int i = 0; i < 6; i++) {
         ebpo_http_options o = quick();
         if (i == 0)
@@ -520,7 +520,7 @@ START_TEST(a_server_that_is_not_there_is_an_error)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
-    ebpo_source s;
+    ebpo_source s = EBPO_SOURCE_INIT;
     o.retries = 1;
     ck_assert_int_eq(ebpo_source_of_url(&s, "http://127.0.0.1:1/a", &o, &error), EBPO_E_IO);
     ck_assert_int_eq(ebpo_source_of_url(&s, "http://", &o, &error), EBPO_E_IO);
@@ -579,7 +579,7 @@ static ebpo_http_stats visit_cached(const char *url, uint64_t bytes)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
-    ebpo_source s;
+    ebpo_source s = EBPO_SOURCE_INIT;
     o.cache_folder = cache;
     o.cache_bytes = bytes;
     ck_assert_msg(ebpo_source_of_url(&s, url, &o, &error) == EBPO_OK, "%s", error.message);
@@ -615,7 +615,7 @@ START_TEST(the_folder_serves_other_ranges_than_those_it_was_filled_with)
     snprintf(url, sizeof url, "%s", web_url("good"));
     for (int session = 0; session < 12; session++) {
         ebpo_http_options o = quick();
-        ebpo_source s;
+        ebpo_source s = EBPO_SOURCE_INIT;
         o.cache_folder = cache;
         o.cache_bytes = 1 << 30;
         o.memory = session % 2 ? 300000 : o.memory;
@@ -653,7 +653,7 @@ START_TEST(another_version_is_not_taken_from_the_folder)
     char url[300];
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
-    ebpo_source s;
+    ebpo_source s = EBPO_SOURCE_INIT;
     o.cache_folder = cache;
     snprintf(url, sizeof url, "%s", web_url("change_etag-2"));
     ck_assert_int_eq(ebpo_source_of_url(&s, url, &o, &error), EBPO_OK);
@@ -679,7 +679,7 @@ START_TEST(processes_share_the_folder)
         if (child[i] == 0) {
             ebpo_error error = EBPO_ERROR_INIT;
             ebpo_http_options o = quick();
-            ebpo_source s;
+            ebpo_source s = EBPO_SOURCE_INIT;
             o.cache_folder = cache;
             o.cache_bytes = 1500000;
             bool good = ebpo_source_of_url(&s, url, &o, &error) == EBPO_OK &&

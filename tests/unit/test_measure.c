@@ -67,7 +67,7 @@ static ebpo_file *file_of(const ebpo_mesh *mesh, uint32_t parts)
 static ebpo_mass mass_on(const ebpo_mesh *mesh, unsigned threads)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_mass mass;
+    ebpo_mass mass = EBPO_MASS_INIT;
     ebpo_file *file = file_of(mesh, EBPO_PART_PLANES | EBPO_PART_MESH);
     ck_assert_msg(ebpo_measure(file, threads, &mass, &error) == EBPO_OK, "%s", error.message);
     ebpo_close(file);
@@ -235,7 +235,7 @@ static void move_to_centroid(exact_moments *m, ebpo_mass *out)
 static ebpo_mass twin_of(const ebpo_mesh *mesh)
 {
     exact_moments m;
-    ebpo_mass out;
+    ebpo_mass out = EBPO_MASS_INIT;
     mpq_t p[3][3];
     exact_init(&m);
     for (int i = 0; i < 9; i++)
@@ -264,7 +264,7 @@ static ebpo_mass twin_of(const ebpo_mesh *mesh)
 static ebpo_mass box_mass(const double low[3], const double high[3])
 {
     double s[3];
-    ebpo_mass m = { 0 };
+    ebpo_mass m = EBPO_MASS_INIT;
     for (int k = 0; k < 3; k++)
         s[k] = high[k] - low[k];
     m.volume = s[0] * s[1] * s[2];
@@ -319,7 +319,8 @@ START_TEST(a_tetrahedron_has_the_mass_of_a_tetrahedron)
     ebpo_test_append_face(&mesh, 0, 3, 2);
     ebpo_test_append_face(&mesh, 1, 2, 3);
     double v = 4.5, c = .75, xx = 243 / 60. - v * c * c, xy = 243 / 120. - v * c * c;
-    ebpo_mass expected = { 13.5 + 4.5 * sqrt(3),
+    ebpo_mass expected = { sizeof(ebpo_mass),
+                           13.5 + 4.5 * sqrt(3),
                            v,
                            { c, c, c },
                            { { 2 * xx, -xy, -xy }, { -xy, 2 * xx, -xy }, { -xy, -xy, 2 * xx } } },
@@ -492,7 +493,7 @@ END_TEST
 START_TEST(files_without_mesh_cannot_be_measured)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_mass m;
+    ebpo_mass m = EBPO_MASS_INIT;
     ebpo_mesh mesh = ebpo_test_make("cube");
     ebpo_file *file = file_of(&mesh, EBPO_PART_PLANES);
     ck_assert_int_eq(ebpo_measure(file, 0, &m, &error), EBPO_E_ABSENT);

@@ -196,7 +196,7 @@ END_TEST
 START_TEST(memory_does_not_change_what_mending_makes)
 {
     ebpo_workspace *w;
-    ebpo_workspace_stats f;
+    ebpo_workspace_stats f = EBPO_WORKSPACE_STATS_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
     ck_assert(ebpo_workspace_make_any(&w, 2 << 20, NULL, &error) == EBPO_OK);
     mend_both(damaged(ebpo_test_solid_count + _i), ALL, w);
@@ -228,7 +228,7 @@ END_TEST
 static void prepare_and_compare(ebpo_mesh plain, const ebpo_prepare_options *options)
 {
     ebpo_mesh m = copy_of(&plain);
-    ebpo_prepared p;
+    ebpo_prepared p = EBPO_PREPARED_INIT;
     ebpo_mend_record record;
     ebpo_mesh_report before, after;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -273,7 +273,7 @@ static bool stop_at(void *user, const char *stage, uint64_t done, uint64_t total
 START_TEST(preparing_may_be_stopped_and_checks_what_is_too_large_to_build)
 {
     ebpo_mesh m = damaged(0);
-    ebpo_prepared p;
+    ebpo_prepared p = EBPO_PREPARED_INIT;
     ebpo_prepare_options o = EBPO_PREPARE_OPTIONS_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
     char mending[] = "mending";

@@ -343,7 +343,7 @@ START_TEST(every_selection_makes_files_without_violations)
          s += 2) { /* each solid with every second way, so that it takes half the time */
         ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
         ebpo_error error = EBPO_ERROR_INIT;
-        ebpo_verify_report report;
+        ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
         ebpo_mesh mesh = solid->make();
         if (mesh.face_count > 20000) {
             ebpo_mesh_free(&mesh);
@@ -401,7 +401,7 @@ START_TEST(memory_does_not_change_what_is_selected)
         uint8_t a[32], b[32];
         ebpo_workspace *w;
         ebpo_error error = EBPO_ERROR_INIT;
-        ebpo_workspace_stats f;
+        ebpo_workspace_stats f = EBPO_WORKSPACE_STATS_INIT;
         ck_assert_msg(ebpo_workspace_make_any(&w, 1 << 20, NULL, &error) == EBPO_OK, "%s",
                       error.message);
         digest_of(all[s], 5, 1, NULL, a);
@@ -444,7 +444,7 @@ END_TEST
 
 static bool has_hulls(ebpo_file *file)
 {
-    ebpo_limit limit;
+    ebpo_limit limit = EBPO_LIMIT_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status = ebpo_limit_level(file, 0, 1, NULL, &limit, &error);
     ck_assert(status == EBPO_OK || status == EBPO_E_ABSENT);
@@ -465,7 +465,7 @@ START_TEST(hulls_of_a_convex_solid_fill_it_at_every_level)
         ebpo_file *file = open_file();
         const ebpo_info *info = ebpo_file_info(file);
         for (int level = 0; level < info->level_count && has_hulls(file); level++) {
-            ebpo_limit limit;
+            ebpo_limit limit = EBPO_LIMIT_INIT;
             ebpo_error error = EBPO_ERROR_INIT;
             ck_assert(ebpo_limit_level(file, level, 2, NULL, &limit, &error) == EBPO_OK);
             ck_assert_msg(fabs(limit.volume / info->report.volume - 1) < 1e-7,
@@ -497,7 +497,7 @@ START_TEST(no_envelope_is_smaller_than_the_limit_and_inherited_ones_come_close)
         const ebpo_info *info = ebpo_file_info(file);
         double before = INFINITY, root = info->box_size[0] * info->box_size[1] * info->box_size[2];
         for (int level = 0; level < info->level_count && has_hulls(file); level++) {
-            ebpo_limit limit;
+            ebpo_limit limit = EBPO_LIMIT_INIT;
             ebpo_error error = EBPO_ERROR_INIT;
             double volume;
             ck_assert(ebpo_limit_level(file, level, 2, NULL, &limit, &error) == EBPO_OK);

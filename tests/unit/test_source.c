@@ -137,7 +137,7 @@ static void probe_close(void *user)
 
 static ebpo_status open_probe(ebpo_file **file, probe *p, ebpo_error *error)
 {
-    ebpo_source source = { p, size, probe_read, probe_close, NULL, 0 };
+    ebpo_source source = { sizeof(ebpo_source), p, size, probe_read, probe_close, NULL, 0 };
     return ebpo_open_source(file, &source, "afar", error);
 }
 
@@ -290,7 +290,8 @@ START_TEST(the_index_is_found_whatever_the_head_says_of_its_place)
     for (int lie = 0; lie < 6; lie++) {
         probe p = { .fail_at = UINT_MAX };
         ebpo_file *file;
-        ebpo_source source = { .user = &p,
+        ebpo_source source = { .struct_size = sizeof(ebpo_source),
+                               .user = &p,
                                .size = size,
                                .read = probe_read,
                                .close = probe_close,
@@ -499,7 +500,7 @@ END_TEST
 START_TEST(missing_arguments_are_refused_and_the_source_closed)
 {
     probe p = { .fail_at = 0 };
-    ebpo_source source = { &p, 5, NULL, probe_close, NULL, 0 };
+    ebpo_source source = { sizeof(ebpo_source), &p, 5, NULL, probe_close, NULL, 0 };
     ebpo_file *file;
     ck_assert_int_eq(ebpo_open_source(&file, &source, "x", NULL), EBPO_E_ARGUMENT);
     ck_assert_uint_eq(p.closes, 1);

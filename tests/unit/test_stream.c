@@ -62,7 +62,7 @@ static ebpo_file *build(ebpo_mesh mesh, uint32_t parts, uint32_t leaf_faces)
 
 static ebpo_stream *new_stream(ebpo_file *file, bool planes, bool polygons, unsigned threads)
 {
-    ebpo_stream_options options = { planes, polygons, threads };
+    ebpo_stream_options options = { sizeof(ebpo_stream_options), planes, polygons, threads };
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_stream *stream = NULL;
     ck_assert_msg(ebpo_stream_new(&stream, file, &options, &error) == EBPO_OK, "%s", error.message);
@@ -252,7 +252,9 @@ static ebpo_file *open_memory(memory *m)
     m->data = malloc(size);
     ck_assert_uint_eq(fread(m->data, 1, size, f), size);
     fclose(f);
-    ebpo_source source = { .user = m, .size = size, .read = read_memory };
+    ebpo_source source = {
+        .struct_size = sizeof(ebpo_source), .user = m, .size = size, .read = read_memory
+    };
     ck_assert_msg(ebpo_open_source(&file, &source, "memory", &error) == EBPO_OK, "%s",
                   error.message);
     return file;

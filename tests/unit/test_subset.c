@@ -73,7 +73,7 @@ static void part_verify(part *p)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_verify_options o = EBPO_VERIFY_OPTIONS_INIT;
-    ebpo_verify_report report;
+    ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
     o.threads = 1;
     fine(ebpo_verify(p->file, &o, &report, &error), &error);
     ck_assert_msg(report.violations == 0, "%s %s %s %s %s %s", report.structure.first,
@@ -229,7 +229,7 @@ static void stream_levels(part *p)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_stream *stream;
-    ebpo_stream_options o = { true, true, 1 };
+    ebpo_stream_options o = { sizeof(ebpo_stream_options), true, true, 1 };
     ebpo_stream_level level;
     bool more = true;
     fine(ebpo_stream_new(&stream, p->file, &o, &error), &error);
@@ -271,7 +271,7 @@ static void random_cut(query_model *m, uint64_t *state, ebpo_subset_options *o)
                                       EBPO_PART_PLANES | EBPO_PART_MESH,
                                       EBPO_PART_MESH | EBPO_PART_MAPS };
     *o = (ebpo_subset_options)EBPO_SUBSET_OPTIONS_INIT;
-    o->write.threads = 1;
+    o->threads = 1;
     o->parts = parts[ebpo_test_random(state) % 5];
     if (ebpo_test_random(state) % 3)
         random_box(m, state, o);
@@ -439,6 +439,16 @@ START_TEST(a_subset_of_a_subset_is_the_subset)
 }
 END_TEST
 
+static ebpo_subset_options box_of(int last_level, const double min[3], const double max[3])
+{
+    ebpo_subset_options o = EBPO_SUBSET_OPTIONS_INIT;
+    o.last_level = last_level;
+    o.boxed = true;
+    memcpy(o.min, min, sizeof o.min);
+    memcpy(o.max, max, sizeof o.max);
+    return o;
+}
+
 START_TEST(threads_do_not_change_the_bytes)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -447,11 +457,10 @@ START_TEST(threads_do_not_change_the_bytes)
     char one[120], four[120], command[400];
     snprintf(one, sizeof one, "%s/one.ebpo.h5", m.folder);
     snprintf(four, sizeof four, "%s/four.ebpo.h5", m.folder);
-    ebpo_subset_options o = { -1, true, { 0, 0, -1 }, { 4, 4, 1 }, ~0u, EBPO_WRITE_OPTIONS_INIT,
-                              0,  0,    false };
-    o.write.threads = 1;
+    ebpo_subset_options o = box_of(-1, (double[3]){ 0, 0, -1 }, (double[3]){ 4, 4, 1 });
+    o.threads = 1;
     fine(ebpo_subset(m.file, one, &o, &error), &error);
-    o.write.threads = 4;
+    o.threads = 4;
     fine(ebpo_subset(m.file, four, &o, &error), &error);
     snprintf(command, sizeof command, "cmp '%s' '%s'", one, four);
     ck_assert_int_eq(system(command), 0);
@@ -468,8 +477,7 @@ START_TEST(boxes_that_keep_nothing_are_refused)
     query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), &usual);
     char path[120];
     snprintf(path, sizeof path, "%s/never.ebpo.h5", m.folder);
-    ebpo_subset_options o = { -1, true, { 5, 5, 5 }, { 6, 6, 6 }, ~0u, EBPO_WRITE_OPTIONS_INIT,
-                              0,  0,    false };
+    ebpo_subset_options o = box_of(-1, (double[3]){ 5, 5, 5 }, (double[3]){ 6, 6, 6 });
     ck_assert_int_eq(ebpo_subset(m.file, path, &o, &error), EBPO_E_ARGUMENT);
     o.max[1] = 4;
     ck_assert_int_eq(ebpo_subset(m.file, path, &o, &error), EBPO_E_ARGUMENT);
@@ -490,14 +498,12 @@ START_TEST(a_subset_cannot_be_measured)
     query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 3), &usual);
     char path[120];
     snprintf(path, sizeof path, "%s/part.ebpo.h5", m.folder);
-    ebpo_subset_options o = { -1,          true, { 0.5, 0.5, 0.5 },
-                              { 1, 1, 1 }, ~0u,  EBPO_WRITE_OPTIONS_INIT,
-                              0,           0,    false };
+    ebpo_subset_options o = box_of(-1, (double[3]){ 0.5, 0.5, 0.5 }, (double[3]){ 1, 1, 1 });
     part p;
     part_open(&p, m.file, path, &o);
     ck_assert_msg(p.info->pruned && p.info->boxed && p.info->face_count < m.info.face_count,
                   "nothing was left out");
-    ebpo_mass mass;
+    ebpo_mass mass = EBPO_MASS_INIT;
     ck_assert_int_eq(ebpo_measure(p.file, 1, &mass, &error), EBPO_E_ABSENT);
     part_close(&p);
     query_model_free(&m);
@@ -513,10 +519,8 @@ START_TEST(damaged_subsets_do_no_harm)
     query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 3), &usual);
     char path[120];
     snprintf(path, sizeof path, "%s/part.ebpo.h5", m.folder);
-    ebpo_subset_options o = { 3,           true, { 0.2, 0.2, 0.2 },
-                              { 1, 1, 1 }, ~0u,  EBPO_WRITE_OPTIONS_INIT,
-                              0,           0,    false };
-    o.write.codec = EBPO_CODEC_NONE;
+    ebpo_subset_options o = box_of(3, (double[3]){ 0.2, 0.2, 0.2 }, (double[3]){ 1, 1, 1 });
+    o.codec = EBPO_CODEC_NONE;
     fine(ebpo_subset(m.file, path, &o, &error), &error);
     FILE *f = fopen(path, "rb");
     static uint8_t bytes[1 << 20], damaged[1 << 20];
@@ -573,7 +577,7 @@ static void lie(ebpo_file *file, uint8_t *bytes, uint64_t *state)
 static void use_all(ebpo_file *file, const ebpo_subset_options *o)
 {
     ebpo_tree tree;
-    ebpo_verify_report report;
+    ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
     ebpo_verify_options verify = EBPO_VERIFY_OPTIONS_INIT;
     ebpo_stream *stream;
     ebpo_stream_level level;
@@ -637,19 +641,14 @@ START_TEST(subsets_that_lie_do_no_harm)
     query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), &usual);
     static uint8_t bytes[1 << 20], lying[1 << 20];
     for (int kind = 0; kind < 3; kind++) {
-        ebpo_subset_options o = { kind == 1 ? 2 : -1,
-                                  kind != 1,
-                                  { 0.2, 0.2, 0.2 },
-                                  { 1, 1, 1 },
-                                  kind == 2 ? EBPO_PART_PLANES : ~0u,
-                                  EBPO_WRITE_OPTIONS_INIT,
-                                  0,
-                                  0,
-                                  false };
+        ebpo_subset_options o =
+            box_of(kind == 1 ? 2 : -1, (double[3]){ 0.2, 0.2, 0.2 }, (double[3]){ 1, 1, 1 });
+        o.boxed = kind != 1;
+        o.parts = kind == 2 ? EBPO_PART_PLANES : ~0u;
         ebpo_file *file;
         char path[120];
-        o.write.codec = EBPO_CODEC_NONE;
-        o.write.threads = 1;
+        o.codec = EBPO_CODEC_NONE;
+        o.threads = 1;
         snprintf(path, sizeof path, "%s/part.ebpo.h5", m.folder);
         fine(ebpo_subset(m.file, path, &o, &error), &error);
         FILE *f = fopen(path, "rb");

@@ -57,7 +57,7 @@ static void expect_fine(const char *what)
  * tree is gone. */
 static void expect_caught(ebpo_verify_kind kind, const char *text)
 {
-    static ebpo_verify_report one, three;
+    static ebpo_verify_report one = EBPO_VERIFY_REPORT_INIT, three = EBPO_VERIFY_REPORT_INIT;
     verify_with(1);
     ebpo_tally_report(&tally, &one);
     verify_with(3);

@@ -12,7 +12,7 @@
 #include "solids.h"
 
 static char folder[32], path[64];
-static ebpo_verify_report report;
+static ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
 
 static void enter(void)
 {

@@ -136,7 +136,9 @@ static ebpo_file *open_counted(counted *c, bool far)
     c->touched = calloc(c->size, 1);
     ck_assert_uint_eq(fread(c->data, 1, c->size, f), c->size);
     fclose(f);
-    ebpo_source source = { .user = c, .size = c->size, .read = read_counted };
+    ebpo_source source = {
+        .struct_size = sizeof(ebpo_source), .user = c, .size = c->size, .read = read_counted
+    };
     if (far) {
         source.expect = expect_counted;
         source.at_hand = c->size < 4096 ? c->size : 4096;
@@ -198,7 +200,7 @@ static bool same(const record *a, const record *b)
 
 static records read_records(ebpo_file *file, bool polygons)
 {
-    ebpo_stream_options options = { true, polygons, 1 };
+    ebpo_stream_options options = { sizeof(ebpo_stream_options), true, polygons, 1 };
     ebpo_stream *stream = NULL;
     ebpo_stream_level level;
     ebpo_stream_node node;
@@ -505,7 +507,7 @@ static void expect_cut(const viewer *v, ebpo_view_stream *stream, uint64_t *rand
     random_ray(random, ray);
     cutter c = { .v = v, .met = calloc(v->all->count, 1), .ray = v->observer ? ray : NULL };
     uint64_t kept = 0;
-    ebpo_view_stats stats;
+    ebpo_view_stats stats = EBPO_VIEW_STATS_INIT;
     ebpo_view_stream_cut(stream, visit, &c);
     for (uint64_t i = 0; i < v->all->count; i++)
         kept += v->in_cut[i];
@@ -631,7 +633,7 @@ START_TEST(pruned_nodes_of_subsets_stay_in_the_cut)
         view.polygons = true;
         viewer v = viewer_new(&all, &view);
         ebpo_view_stream *stream = new_view(file, &view);
-        ebpo_view_stats stats;
+        ebpo_view_stats stats = EBPO_VIEW_STATS_INIT;
         ebpo_view_node node;
         double share = 0;
         while (next(stream, &node) == EBPO_VIEW_NODE)

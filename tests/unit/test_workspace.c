@@ -45,7 +45,7 @@ START_TEST(what_does_not_fit_goes_to_files_without_names)
 {
     enum { MIB = 1 << 20 };
     ebpo_workspace *w = make(8 * MIB);
-    ebpo_workspace_stats f;
+    ebpo_workspace_stats f = EBPO_WORKSPACE_STATS_INIT;
     char *small = ebpo_array_alloc(w, 1000, 1), *held = ebpo_array_alloc(w, 3 * MIB, 1),
          *filed = ebpo_array_zero(w, 5 * MIB, 1);
     ck_assert(small && held && filed);
@@ -78,7 +78,7 @@ START_TEST(growing_keeps_what_was_there)
         if (a[i] != i * 2654435761u)
             ck_abort_msg("number %lu changed", (unsigned long)i);
     ebpo_array_free(a);
-    ebpo_workspace_stats f;
+    ebpo_workspace_stats f = EBPO_WORKSPACE_STATS_INIT;
     ebpo_workspace_get_stats(w, &f);
     ck_assert(f.held == 0 && f.filed == 0 && f.filed_most > 0 && f.held_most > 0);
     ebpo_workspace_free(w);
@@ -132,13 +132,13 @@ START_TEST(bad_wishes_are_refused)
 {
     ebpo_workspace *w;
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_workspace_options o = { 1000000, NULL };
+    ebpo_workspace_options o = { sizeof(ebpo_workspace_options), 1000000, NULL };
     ck_assert_int_eq(ebpo_workspace_make(&w, &o, &error), EBPO_E_ARGUMENT);
     ck_assert(w == NULL && strstr(error.message, "128 MiB") != NULL);
-    o = (ebpo_workspace_options){ 0, "/no/such/folder" };
+    o = (ebpo_workspace_options){ sizeof(ebpo_workspace_options), 0, "/no/such/folder" };
     ck_assert_int_eq(ebpo_workspace_make(&w, &o, &error), EBPO_E_IO);
     ck_assert(strstr(error.message, "/no/such/folder") != NULL);
-    o = (ebpo_workspace_options){ 0, "/proc" };
+    o = (ebpo_workspace_options){ sizeof(ebpo_workspace_options), 0, "/proc" };
     ck_assert_int_eq(ebpo_workspace_make(&w, &o, &error), EBPO_E_IO);
     ck_assert_int_eq(ebpo_workspace_make(&w, NULL, &error), EBPO_OK);
     ebpo_workspace_free(w);
@@ -156,7 +156,7 @@ START_TEST(a_file_that_may_not_grow_is_an_error_that_names_the_folder)
     ck_assert_int_eq(ebpo_workspace_fail(w, 5 << 20, &error), EBPO_E_IO);
     ck_assert_msg(strstr(error.message, folder) && strstr(error.message, "5242880"), "%s",
                   error.message);
-    ebpo_workspace_stats f;
+    ebpo_workspace_stats f = EBPO_WORKSPACE_STATS_INIT;
     ebpo_workspace_get_stats(w, &f);
     ck_assert(f.held == 0 && f.filed == 0);
     ebpo_workspace_free(w);

@@ -15,6 +15,7 @@ ebpo_status mesh_input_read(mesh_input *out, const char *path, mending asked,
     wanted.orient = asked.orient;
     wanted.fill_holes = asked.fill_holes;
     memset(out, 0, sizeof *out);
+    out->prepared = (ebpo_prepared)EBPO_PREPARED_INIT;
     ebpo_status status = ebpo_mesh_read(&out->mesh, path, &how, error);
     if (status != EBPO_OK)
         return status;

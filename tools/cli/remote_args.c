@@ -47,9 +47,9 @@ const char *remote_shown(const char *name)
 
 traffic traffic_of(const ebpo_file *file)
 {
-    traffic t;
+    traffic t = { .http = EBPO_HTTP_STATS_INIT };
     ebpo_file_traffic(file, &t.bytes, &t.reads);
-    t.far = ebpo_file_http_stats(file, &t.http);
+    t.far = ebpo_file_get_http_stats(file, &t.http) == EBPO_OK;
     return t;
 }
 

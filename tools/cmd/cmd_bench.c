@@ -113,7 +113,7 @@ static int cold_start(const bench_job *job, const char *path, const ebpo_model_o
 {
     query_session s = QUERY_SESSION_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_model_stats stats;
+    ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     r->cold_pages = bench_drop_file(path);
     uint64_t begin = bench_clock();
     int code = query_open(&s, "bench", path, holding, job->options.level, remote);
@@ -402,7 +402,9 @@ static void print_json(const values *v, const char *path, uint64_t count, const 
 static int bench(bench_job *job, const values *v, const char *path,
                  const ebpo_model_options *holding, void *batch)
 {
-    results r = { .clock_ns = bench_clock_cost() };
+    results r = { .clock_ns = bench_clock_cost(),
+                  .model = EBPO_MODEL_STATS_INIT,
+                  .model_end = EBPO_MODEL_STATS_INIT };
     query_session s = QUERY_SESSION_INIT;
     bench_reset_peak();
     int code = cold_start(job, path, holding, &v->q.remote, &r);

@@ -222,7 +222,7 @@ static ebpo_status print_result(const values *v, const mesh_input *p, const char
 static ebpo_status room_to_judge(const values *v, const mesh_input *p, const char *in,
                                  const ebpo_workspace *workspace, ebpo_error *error)
 {
-    ebpo_workspace_stats figures;
+    ebpo_workspace_stats figures = EBPO_WORKSPACE_STATS_INIT;
     uint64_t needed = ebpo_subset_memory(p->mesh.face_count, (uint32_t)v->leaf_faces);
     char bytes[32], budget[32];
     ebpo_workspace_get_stats(workspace, &figures);
@@ -275,7 +275,10 @@ static ebpo_status build_and_write(const values *v, mesh_input *p, const char *o
     write.progress = progress;
     if (need->max_error > 0 || need->target_bytes) {
         ebpo_subset_options subset = *need;
-        subset.write = write;
+        subset.codec = write.codec;
+        subset.codec_level = write.codec_level;
+        subset.threads = write.threads;
+        subset.progress = progress;
         subset.choose_parts = chooses_parts(v);
         if (v->profile >= 0)
             subset.parts = ebpo_profile_parts((ebpo_profile)v->profile);
@@ -297,7 +300,8 @@ static stage_facts plan_stages(const values *v, const char *in)
                           .solid = true,
                           .from_leaves = v->select != EBPO_SELECT_INHERIT,
                           .judged = v->max_error > 0 || v->target_size,
-                          .leaf_planes = parts_of(v) & EBPO_PART_LEAF_PLANES };
+                          .leaf_planes = parts_of(v) & EBPO_PART_LEAF_PLANES,
+                          .times = EBPO_BUILD_TIMES_INIT };
 }
 
 static const values usual = { .max_level = -1,

@@ -181,7 +181,7 @@ static int write_out(const values *v, const char *in, const char *out, const cha
     o->progress = progress_start(&line, "export", v->quiet);
     o->threads = (unsigned)v->threads;
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_export_report report = { 0 };
+    ebpo_export_report report = EBPO_EXPORT_REPORT_INIT;
     ebpo_file *file = NULL;
     ebpo_status status = remote_open(&file, in, &v->remote, &error);
     if (status == EBPO_OK)

@@ -68,11 +68,11 @@ typedef struct ticker {
 static bool tick(void *user)
 {
     ticker *t = user;
-    ebpo_http_stats s;
+    ebpo_http_stats s = EBPO_HTTP_STATS_INIT;
     ebpo_file *file = atomic_load(&t->file);
     double now = progress_now();
     char bytes[32], before[32];
-    if (!t->active || !file || now - t->last < 0.2 || !ebpo_file_http_stats(file, &s))
+    if (!t->active || !file || now - t->last < 0.2 || ebpo_file_get_http_stats(file, &s) != EBPO_OK)
         return false;
     t->last = now;
     fprintf(stderr, "\r\033[Kfetch: %s in %" PRIu64 " requests",
@@ -98,9 +98,9 @@ static void wipe(ticker *t)
 static bool tell_resuming(const subset_values *v, ebpo_file *file, const char *url,
                           const char *part)
 {
-    ebpo_http_stats s;
+    ebpo_http_stats s = EBPO_HTTP_STATS_INIT;
     char bytes[32];
-    if (!ebpo_file_http_stats(file, &s))
+    if (ebpo_file_get_http_stats(file, &s) != EBPO_OK)
         return false;
     if (s.cache_others && !s.cache_held)
         fprintf(stderr,

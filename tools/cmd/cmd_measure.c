@@ -182,8 +182,10 @@ static ebpo_status measure_levels(ebpo_file *file, const values *v, ebpo_progres
     wanted.questions = (uint64_t)v->questions;
     wanted.progress = opening.progress = progress;
     ebpo_status status = ebpo_model_open(&model, file, &opening, error);
-    for (int i = 0; i < ebpo_file_info(file)->level_count && status == EBPO_OK; i++)
+    for (int i = 0; i < ebpo_file_info(file)->level_count && status == EBPO_OK; i++) {
+        out[i] = (ebpo_deviation)EBPO_DEVIATION_INIT;
         status = ebpo_deviation_level(model, file, i, &wanted, &out[i], error);
+    }
     ebpo_model_close(model);
     return status;
 }
@@ -192,8 +194,10 @@ static ebpo_status limit_levels(ebpo_file *file, const values *v, ebpo_progress 
                                 ebpo_limit *out, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    for (int i = 0; i < ebpo_file_info(file)->level_count && status == EBPO_OK; i++)
+    for (int i = 0; i < ebpo_file_info(file)->level_count && status == EBPO_OK; i++) {
+        out[i] = (ebpo_limit)EBPO_LIMIT_INIT;
         status = ebpo_limit_level(file, i, (unsigned)v->threads, &progress, &out[i], error);
+    }
     return status;
 }
 
@@ -217,7 +221,7 @@ static int measure(const char *path, const values *v)
     progress_line line;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
-    ebpo_mass mass;
+    ebpo_mass mass = EBPO_MASS_INIT;
     if (remote_open(&file, path, &v->remote, &error) != EBPO_OK)
         return command_failed("measure", &error);
     if (!(ebpo_file_info(file)->parts & EBPO_PART_MESH)) {

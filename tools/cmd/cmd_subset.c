@@ -38,7 +38,7 @@ static int run(void *given, const char **operand)
     double begun = progress_now();
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
-    subset.write.progress = progress_start(&line, "subset", v->quiet);
+    subset.progress = progress_start(&line, "subset", v->quiet);
     ebpo_status status = remote_open(&file, operand[0], &v->remote, &error);
     if (status == EBPO_OK)
         status = subset_settle(v, ebpo_file_info(file), remote_shown(operand[0]), &subset, &error);

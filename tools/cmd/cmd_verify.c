@@ -159,7 +159,7 @@ static int run(void *given, const char **operand)
     progress_line line;
     ebpo_progress progress = progress_start(&line, "verify", v->quiet);
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_verify_report report;
+    ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
     traffic t;
     ebpo_status status = verify(v, operand[0], progress, &report, &t, &error);
     progress_wipe(&line);

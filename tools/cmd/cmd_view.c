@@ -167,7 +167,7 @@ static bool read_options(const values *v, ebpo_view_options *o, ebpo_observer *o
 
 static void print_row(printer *p, const ebpo_view_stream *stream, const char *key)
 {
-    ebpo_view_stats s;
+    ebpo_view_stats s = EBPO_VIEW_STATS_INIT;
     ebpo_view_stream_get_stats(stream, &s);
     double ms = (progress_now() - p->begin) * 1e3;
     if (!p->v->json) {
@@ -280,7 +280,7 @@ static ebpo_status tell(printer *p, ebpo_file *file, const char *path,
         (void)command_flush("view");
         remote_tell(&t, &p->v->remote, false);
     }
-    ebpo_view_stats stats;
+    ebpo_view_stats stats = EBPO_VIEW_STATS_INIT;
     ebpo_view_stream_get_stats(stream, &stats);
     if (status == EBPO_OK && *arrived && p->v->out && stats.nodes == 0) {
         fprintf(stderr,

@@ -22,7 +22,7 @@ static int answer_all(const query_job *job, ebpo_context *context, points *in, d
 
 static void tell_stats(const query_job *job, const query_session *session)
 {
-    ebpo_model_stats stats;
+    ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     traffic t = traffic_of(session->file);
     ebpo_model_get_stats(session->model, &stats);
     stats_print(stderr, job->values->json, &stats);

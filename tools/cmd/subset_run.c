@@ -140,7 +140,7 @@ int subset_options(const char *name, const subset_values *v, const char *in, con
     }
     if (v->profile >= 0)
         out->parts = ebpo_profile_parts((ebpo_profile)v->profile);
-    out->write.threads = (unsigned)v->threads;
+    out->threads = (unsigned)v->threads;
     out->choose_parts = v->target_size && !v->parts && v->profile < 0 && !v->levels;
     return subset_need(name, v->max_error, v->target_size, out);
 }
@@ -179,9 +179,9 @@ ebpo_status subset_settle(const subset_values *v, const ebpo_info *info, const c
                 "note: %s stores no leaf planes, so leaves will have their parents' envelopes; "
                 "'ebpo convert --profile lod' stores them\n",
                 shown);
-    out->write.codec = v->codec >= 0 ? (ebpo_codec)v->codec : info->codec;
-    out->write.codec_level = (int)v->zstd_level;
-    if (v->zstd_level && out->write.codec != EBPO_CODEC_ZSTD)
+    out->codec = v->codec >= 0 ? (ebpo_codec)v->codec : info->codec;
+    out->codec_level = (int)v->zstd_level;
+    if (v->zstd_level && out->codec != EBPO_CODEC_ZSTD)
         return wrong(error, shown,
                      "--zstd-level says nothing about the codec of this file; add --codec zstd");
     return EBPO_OK;

@@ -44,7 +44,8 @@ static ebpo_status volumes(comparison *c, method *m, ebpo_file *file, ebpo_error
 /* Volumes from the levels alone. */
 static ebpo_status levels_alone(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
-    ebpo_stream_options wanted = { true, true, (unsigned)c->v->threads };
+    ebpo_stream_options wanted = { sizeof(ebpo_stream_options), true, true,
+                                   (unsigned)c->v->threads };
     ebpo_stream *stream = NULL;
     bool more = true;
     ebpo_status status = ebpo_stream_new(&stream, file, &wanted, error);
@@ -65,7 +66,7 @@ static ebpo_status levels_alone(comparison *c, method *m, ebpo_file *file, ebpo_
 static ebpo_status limits(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
     for (int i = c->first; i <= method_last(c, m); i++) {
-        ebpo_limit limit = { 0 };
+        ebpo_limit limit = EBPO_LIMIT_INIT;
         double *f = m->level[i];
         ebpo_status status =
             ebpo_limit_level(file, i, (unsigned)c->v->threads, &c->progress, &limit, error);
@@ -87,7 +88,7 @@ static ebpo_status deviations(comparison *c, method *m, ebpo_file *file, ebpo_mo
     options.threads = (unsigned)c->v->threads;
     options.progress = c->progress;
     for (int i = c->first; i <= method_last(c, m); i++) {
-        ebpo_deviation far = { 0 };
+        ebpo_deviation far = EBPO_DEVIATION_INIT;
         double *f = m->level[i];
         ebpo_status status = ebpo_deviation_level(model, file, i, &options, &far, error);
         if (status != EBPO_OK)
@@ -105,7 +106,7 @@ static ebpo_status deviations(comparison *c, method *m, ebpo_file *file, ebpo_mo
 static ebpo_status with_model(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
-    ebpo_model_stats stats;
+    ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     ebpo_model *model = NULL;
     options.threads = (unsigned)c->v->threads;
     ebpo_status status = ebpo_model_open(&model, file, &options, error);

@@ -15,8 +15,8 @@ static ebpo_status cut(const comparison *c, ebpo_file *file, const need_result *
 {
     ebpo_subset_options options = EBPO_SUBSET_OPTIONS_INIT;
     options.parts = ebpo_profile_parts(EBPO_PROFILE_LOD);
-    options.write.threads = (unsigned)c->v->threads;
-    options.write.progress = c->progress;
+    options.threads = (unsigned)c->v->threads;
+    options.progress = c->progress;
     if (n->kind == NEED_ERROR)
         options.max_error = n->asked;
     else
@@ -29,7 +29,7 @@ static ebpo_status reach(const comparison *c, ebpo_model *model, const char *pat
 {
     ebpo_deviation_options options = EBPO_DEVIATION_OPTIONS_INIT;
     options.questions = REPORT_QUESTIONS;
-    ebpo_deviation far = { 0 };
+    ebpo_deviation far = EBPO_DEVIATION_INIT;
     ebpo_file *file = NULL;
     options.samples = 0;
     options.tolerance = 0.01; /* or a word that is kept would seem broken */
@@ -56,7 +56,7 @@ static ebpo_status own_reach(const comparison *c, method *m, ebpo_file *file, eb
 {
     ebpo_deviation_options options = EBPO_DEVIATION_OPTIONS_INIT;
     options.questions = REPORT_QUESTIONS;
-    ebpo_deviation far = { 0 };
+    ebpo_deviation far = EBPO_DEVIATION_INIT;
     *reach = m->level[m->levels - 1][OF_FAR_HI];
     if (!isnan(*reach))
         return EBPO_OK;

@@ -52,7 +52,7 @@ static ebpo_status having(comparison *c, method *m, int round, ebpo_error *error
 ebpo_status report_round(comparison *c, method *m, int round, ebpo_error *error)
 {
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
-    ebpo_model_stats stats;
+    ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     ebpo_file *file = NULL;
     ebpo_model *model = NULL;
     ebpo_status status = having(c, m, round, error);

@@ -29,6 +29,34 @@ extern "C" {
 #define EBPO_PRINTF(fmt, args)
 #endif
 
+/* Structs that may grow in later versions begin with their own size: options, and what the library
+ * fills in for its caller. Begin them with their macro (EBPO_BUILD_OPTIONS_INIT), which sets the
+ * size and the usual values:
+ *
+ *     ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+ *     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
+ *
+ * A program then runs with every later library of the same major version: what its structs do not
+ * have yet keeps the usual values, or is not filled in. With an earlier library it runs too, as
+ * long as it sets nothing that this one does not know (EBPO_E_UNSUPPORTED). A struct_size that was
+ * never set is EBPO_E_ARGUMENT. */
+#ifdef __cplusplus
+extern "C++" {
+template <class T> inline T ebpo_sized()
+{
+    T it = T();
+    it.struct_size = sizeof(T);
+    return it;
+}
+}
+#define EBPO_SIZED(type) ebpo_sized<type>()
+#else
+#define EBPO_SIZED(type)            \
+    {                               \
+        .struct_size = sizeof(type) \
+    }
+#endif
+
 /* Stable: numbers are never reused. */
 typedef enum ebpo_status {
     EBPO_OK = 0,

@@ -46,12 +46,15 @@ typedef enum ebpo_normal_distance {
 /* What the pieces of a tree took, on all threads together, in seconds: they are done in one go, so
  * no stage of their progress tells these apart. */
 typedef struct ebpo_build_times {
-    double cells;     /* faces to cells, the corners' winding numbers, the faces' numbers */
-    double envelopes; /* planes and envelopes */
+    size_t struct_size; /* EBPO_BUILD_TIMES_INIT sets it */
+    double cells;       /* faces to cells, the corners' winding numbers, the faces' numbers */
+    double envelopes;   /* planes and envelopes */
 } ebpo_build_times;
+#define EBPO_BUILD_TIMES_INIT EBPO_SIZED(ebpo_build_times)
 
 typedef struct ebpo_build_options {
-    int max_level; /* 0 .. 20, or -1: EBP 2017, equation 3 */
+    size_t struct_size; /* EBPO_BUILD_OPTIONS_INIT sets it */
+    int max_level;      /* 0 .. 20, or -1: EBP 2017, equation 3 */
     /* a node with at most so many faces becomes a leaf (BP 2008, 3.3.1); 0: only the maximum level
      * stops */
     uint32_t leaf_faces;
@@ -76,11 +79,12 @@ typedef struct ebpo_build_options {
     ebpo_progress progress;
     ebpo_build_times *times; /* filled in, if not NULL */
 } ebpo_build_options;
-#define EBPO_BUILD_OPTIONS_INIT                                                                \
-    {                                                                                          \
-        -1, 16, 0.003, EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS, EBPO_RULE_NONZERO,  \
-            false, 0, EBPO_SELECT_INHERIT, 40, 0, EBPO_NORMALS_SPHERICAL, 1, NULL, NULL, NULL, \
-            { NULL, NULL }, NULL                                                               \
+#define EBPO_BUILD_OPTIONS_INIT                                                              \
+    {                                                                                        \
+        sizeof(ebpo_build_options), -1, 16, 0.003,                                           \
+            EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS, EBPO_RULE_NONZERO, false, 0, \
+            EBPO_SELECT_INHERIT, 40, 0, EBPO_NORMALS_SPHERICAL, 1, NULL, NULL, NULL,         \
+            { NULL, NULL }, NULL                                                             \
     }
 
 /* Builds the tree of a checked and perhaps mended mesh; `report` and `mend` are copied into the

@@ -9,6 +9,7 @@ extern "C" {
 #endif
 
 typedef struct ebpo_deviation_options {
+    size_t struct_size; /* EBPO_DEVIATION_OPTIONS_INIT sets it */
     /* the bounds are refined until hi <= (1 + tolerance) lo, or no node that stands in the way has
      * questions left (see below); > 0 */
     double tolerance;
@@ -20,12 +21,13 @@ typedef struct ebpo_deviation_options {
     unsigned threads; /* 0: all cores; the result does not depend on it */
     ebpo_progress progress;
 } ebpo_deviation_options;
-#define EBPO_DEVIATION_OPTIONS_INIT          \
-    {                                        \
-        0.05, 20000, 1, 0, 0, { NULL, NULL } \
+#define EBPO_DEVIATION_OPTIONS_INIT                                          \
+    {                                                                        \
+        sizeof(ebpo_deviation_options), 0.05, 20000, 1, 0, 0, { NULL, NULL } \
     }
 
 typedef struct ebpo_deviation {
+    size_t struct_size; /* EBPO_DEVIATION_INIT sets it */
     /* the one-sided Hausdorff distance, from the level's envelopes to the model, is certainly
      * within; model's unit. 0 and hi: perhaps none reaches beyond it */
     double lo, hi;
@@ -37,6 +39,7 @@ typedef struct ebpo_deviation {
     uint64_t samples;
     uint64_t questions; /* distances that were asked for the bounds */
 } ebpo_deviation;
+#define EBPO_DEVIATION_INIT EBPO_SIZED(ebpo_deviation)
 
 /* The greatest distance from the model of a point of the level's envelopes (those of
  * ebpo_lod_level), their insides included: a cavity that an envelope covers counts. The model is

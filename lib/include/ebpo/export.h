@@ -29,6 +29,7 @@ typedef enum ebpo_export_format {
 EBPO_API const char *ebpo_export_format_name(ebpo_export_format format);
 
 typedef struct ebpo_export_options {
+    size_t struct_size; /* EBPO_EXPORT_OPTIONS_INIT sets it */
     /* each level is what ebpo_lod_level gives: closed polyhedra; first > last: no level */
     int first_level, last_level;
     /* the model as well: XDMF and VTKHDF in the file's order, with the source's numbers; the others
@@ -37,9 +38,9 @@ typedef struct ebpo_export_options {
     unsigned threads; /* 0: all cores */
     ebpo_progress progress;
 } ebpo_export_options;
-#define EBPO_EXPORT_OPTIONS_INIT       \
-    {                                  \
-        0, -1, true, 0, { NULL, NULL } \
+#define EBPO_EXPORT_OPTIONS_INIT                                    \
+    {                                                               \
+        sizeof(ebpo_export_options), 0, -1, true, 0, { NULL, NULL } \
     }
 
 /* A level, or the mesh, as it was written. */
@@ -52,6 +53,7 @@ typedef struct ebpo_export_block {
 } ebpo_export_block;
 
 typedef struct ebpo_export_report {
+    size_t struct_size; /* EBPO_EXPORT_REPORT_INIT sets it */
     int block_count;
     ebpo_export_block block[EBPO_LEVELS_MAX + 1];
     /* glTF: vertices are relative to this point, which is the translation of the nodes; else 0 */
@@ -59,6 +61,7 @@ typedef struct ebpo_export_report {
     /* of a coordinate, by rounding it to the format's: 0 when every bit was kept */
     double largest_change;
 } ebpo_export_report;
+#define EBPO_EXPORT_REPORT_INIT EBPO_SIZED(ebpo_export_report)
 
 /* Name of the second file that comes with `path`, in room bytes at `out`; "" when there is none.
  * False: there is no room for it, or the format does not take this name (":" in an XDMF's). */

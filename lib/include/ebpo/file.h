@@ -171,15 +171,16 @@ typedef struct ebpo_tree {
 EBPO_API void ebpo_tree_free(ebpo_tree *tree);
 
 typedef struct ebpo_write_options {
+    size_t struct_size; /* EBPO_WRITE_OPTIONS_INIT sets it */
     ebpo_codec codec;
     int codec_level;  /* 0: the default (zstd 3, deflate 6) */
     unsigned threads; /* 0: all cores */
     uint32_t parts;   /* which parts to write, of those the tree has */
     ebpo_progress progress;
 } ebpo_write_options;
-#define EBPO_WRITE_OPTIONS_INIT                    \
-    {                                              \
-        EBPO_CODEC_ZSTD, 0, 0, ~0u, { NULL, NULL } \
+#define EBPO_WRITE_OPTIONS_INIT                                                \
+    {                                                                          \
+        sizeof(ebpo_write_options), EBPO_CODEC_ZSTD, 0, 0, ~0u, { NULL, NULL } \
     }
 
 /* Writes the file: whole or not at all (temporary name, fsync, rename, fsync of the folder). Equal
@@ -198,6 +199,7 @@ typedef struct ebpo_range {
  * called once, when the file is closed or when opening fails. While a file is being opened, `read`
  * is called from inside libhdf5: it must then neither use libhdf5 nor open another file. */
 typedef struct ebpo_source {
+    size_t struct_size; /* EBPO_SOURCE_INIT sets it */
     void *user;
     uint64_t size; /* bytes */
     ebpo_status (*read)(void *user, uint64_t offset, uint64_t size, void *data, ebpo_error *error);
@@ -211,6 +213,7 @@ typedef struct ebpo_source {
      * one chunk lie is read when the first of these arrays is (or ebpo_file_locate called). */
     uint64_t at_hand;
 } ebpo_source;
+#define EBPO_SOURCE_INIT EBPO_SIZED(ebpo_source)
 
 /* An open file. Immutable: any number of threads may use it at once. */
 typedef struct ebpo_file ebpo_file;

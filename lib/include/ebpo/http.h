@@ -23,6 +23,7 @@ extern "C" {
 #endif
 
 typedef struct ebpo_http_options {
+    size_t struct_size;     /* EBPO_HTTP_OPTIONS_INIT sets it */
     double connect_timeout; /* seconds for name, connection and TLS together; > 0 */
     /* an answer that brings fewer than 100 bytes a second for so many seconds is given up and asked
      * for again; >= 1 */
@@ -61,14 +62,15 @@ typedef struct ebpo_http_options {
     bool (*stop)(void *user);
     void *stop_user;
 } ebpo_http_options;
-#define EBPO_HTTP_OPTIONS_INIT                                                                    \
-    {                                                                                             \
-        15, 20, 120, 5, 6, UINT64_C(48) << 20, UINT64_C(64) << 20, false, true, NULL, NULL, NULL, \
-            NULL, NULL, NULL, UINT64_C(1) << 30, NULL, NULL                                       \
+#define EBPO_HTTP_OPTIONS_INIT                                                                \
+    {                                                                                         \
+        sizeof(ebpo_http_options), 15, 20, 120, 5, 6, UINT64_C(48) << 20, UINT64_C(64) << 20, \
+            false, true, NULL, NULL, NULL, NULL, NULL, NULL, UINT64_C(1) << 30, NULL, NULL    \
     }
 
 /* Sums since opening. */
 typedef struct ebpo_http_stats {
+    size_t struct_size;               /* EBPO_HTTP_STATS_INIT sets it */
     uint64_t requests;                /* sent, with retries and redirects */
     uint64_t retries;                 /* of these, repeated after a failure */
     uint64_t connections;             /* made */
@@ -79,6 +81,7 @@ typedef struct ebpo_http_stats {
     uint64_t cache_held, cache_others;
     double wait_seconds; /* that readers waited, summed over threads */
 } ebpo_http_stats;
+#define EBPO_HTTP_STATS_INIT EBPO_SIZED(ebpo_http_stats)
 
 /* A URL as messages show it, without user and password and without what follows "?"; any other name
  * as it is. Into out[room], cut off if need be; returns out. */
@@ -103,8 +106,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_url(ebpo_file **out, const char *ur
                                                  const ebpo_http_options *options,
                                                  ebpo_error *error);
 
-/* False, with zeros, when the file was not opened by its URL. Any time, any thread. */
-EBPO_API bool ebpo_file_http_stats(const ebpo_file *file, ebpo_http_stats *out);
+/* EBPO_E_ABSENT, with zeros, when the file was not opened by its URL. Any time, any thread. */
+EBPO_API ebpo_status ebpo_file_get_http_stats(const ebpo_file *file, ebpo_http_stats *out);
 
 #ifdef __cplusplus
 }

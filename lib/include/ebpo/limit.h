@@ -9,6 +9,7 @@ extern "C" {
 #endif
 
 typedef struct ebpo_limit {
+    size_t struct_size; /* EBPO_LIMIT_INIT sets it */
     /* of the level: hulls of gray nodes and leaves, cells of black nodes (levels 0 .. level, as in
      * ebpo_lod_level); model's unit cubed */
     double volume;
@@ -16,6 +17,7 @@ typedef struct ebpo_limit {
     uint64_t hulls;     /* computed */
     uint64_t flat;      /* of them without volume: their points lie in a plane, or nearly so */
 } ebpo_limit;
+#define EBPO_LIMIT_INIT EBPO_SIZED(ebpo_limit)
 
 /* The volume of the convex hull of the solid in each cell (of a surface: of its faces there),
  * computed by qhull from the parts of faces in the cell and from its corners inside. Rounded, not

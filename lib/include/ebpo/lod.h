@@ -9,13 +9,14 @@ extern "C" {
 #endif
 
 typedef struct ebpo_lod_options {
-    bool walls;       /* keep polygons that lie on cell walls, so that each envelope is closed */
-    unsigned threads; /* 0: all cores */
+    size_t struct_size; /* EBPO_LOD_OPTIONS_INIT sets it */
+    bool walls;         /* keep polygons that lie on cell walls, so that each envelope is closed */
+    unsigned threads;   /* 0: all cores */
     ebpo_progress progress;
 } ebpo_lod_options;
-#define EBPO_LOD_OPTIONS_INIT   \
-    {                           \
-        true, 0, { NULL, NULL } \
+#define EBPO_LOD_OPTIONS_INIT                             \
+    {                                                     \
+        sizeof(ebpo_lod_options), true, 0, { NULL, NULL } \
     }
 
 /* The envelopes of `level`: its gray nodes, and the leaves and black nodes of levels 0 .. level,

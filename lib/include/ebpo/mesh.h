@@ -37,15 +37,16 @@ typedef struct ebpo_mesh {
 EBPO_API void ebpo_mesh_free(ebpo_mesh *mesh);
 
 typedef struct ebpo_mesh_read_options {
+    size_t struct_size; /* EBPO_MESH_READ_OPTIONS_INIT sets it */
+    unsigned threads;   /* 0: all cores; the result does not depend on it */
     ebpo_progress progress;
     /* the mesh keeps to it, and so does what is done with it; freed after the last of that. NULL:
      * none */
     ebpo_workspace *workspace;
-    unsigned threads; /* 0: all cores; the result does not depend on it */
 } ebpo_mesh_read_options;
-#define EBPO_MESH_READ_OPTIONS_INIT \
-    {                               \
-        { NULL, NULL }, NULL, 0     \
+#define EBPO_MESH_READ_OPTIONS_INIT                             \
+    {                                                           \
+        sizeof(ebpo_mesh_read_options), 0, { NULL, NULL }, NULL \
     }
 
 /* Reads a mesh; the format is told from the file's first bytes, then from its name.
@@ -163,23 +164,26 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_fill_holes(ebpo_mesh *mesh, ebpo_me
 
 /* What is done to a mesh before it is built or judged. */
 typedef struct ebpo_prepare_options {
-    bool weld;        /* ebpo_mesh_weld; done to every STL, whose faces share no vertices */
-    bool orient;      /* then ebpo_mesh_orient */
-    bool fill_holes;  /* then ebpo_mesh_fill_holes */
-    unsigned threads; /* 0: all cores; the result does not depend on it */
+    size_t struct_size; /* EBPO_PREPARE_OPTIONS_INIT sets it */
+    bool weld;          /* ebpo_mesh_weld; done to every STL, whose faces share no vertices */
+    bool orient;        /* then ebpo_mesh_orient */
+    bool fill_holes;    /* then ebpo_mesh_fill_holes */
+    unsigned threads;   /* 0: all cores; the result does not depend on it */
     ebpo_progress progress;
 } ebpo_prepare_options;
-#define EBPO_PREPARE_OPTIONS_INIT              \
-    {                                          \
-        false, false, false, 0, { NULL, NULL } \
+#define EBPO_PREPARE_OPTIONS_INIT                                            \
+    {                                                                        \
+        sizeof(ebpo_prepare_options), false, false, false, 0, { NULL, NULL } \
     }
 
 typedef struct ebpo_prepared {
+    size_t struct_size;      /* EBPO_PREPARED_INIT sets it */
     bool mended;             /* a mending step ran: the two reports may differ */
     ebpo_mend_record record; /* what it did */
     ebpo_mesh_report before; /* of the mesh as it was given */
     ebpo_mesh_report report; /* of the mesh as it is now; for ebpo_build */
 } ebpo_prepared;
+#define EBPO_PREPARED_INIT EBPO_SIZED(ebpo_prepared)
 
 /* Makes a mesh ready for ebpo_build, in one call: arranges it, mends it as asked, in the order
  * weld, orient, fill holes, and checks it before and after. All steps keep to the mesh's workspace;

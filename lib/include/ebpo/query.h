@@ -31,6 +31,7 @@ typedef enum ebpo_loading {
 } ebpo_loading;
 
 typedef struct ebpo_model_options {
+    size_t struct_size; /* EBPO_MODEL_OPTIONS_INIT sets it */
     /* bytes that the model may take, with its caches and what loading needs on the way; 0: as much
      * as it needs. Beside it: the file's table of chunks (24 bytes a chunk) and what contexts
      * gather of answers (hits, faces) */
@@ -45,9 +46,9 @@ typedef struct ebpo_model_options {
     unsigned threads; /* for opening; 0: all cores */
     ebpo_progress progress;
 } ebpo_model_options;
-#define EBPO_MODEL_OPTIONS_INIT                          \
-    {                                                    \
-        0, -1, EBPO_LOAD_CACHE, false, 0, { NULL, NULL } \
+#define EBPO_MODEL_OPTIONS_INIT                                                      \
+    {                                                                                \
+        sizeof(ebpo_model_options), 0, -1, EBPO_LOAD_CACHE, false, 0, { NULL, NULL } \
     }
 
 /* What is in memory of a file, made for speed. Immutable for its users; shared by threads. */
@@ -66,8 +67,9 @@ EBPO_API void ebpo_model_close(ebpo_model *model);
 
 /* Sums since opening, over all contexts. */
 typedef struct ebpo_model_stats {
-    bool resident; /* everything is in memory */
-    int cut_level; /* 0 when resident */
+    size_t struct_size; /* EBPO_MODEL_STATS_INIT sets it */
+    bool resident;      /* everything is in memory */
+    int cut_level;      /* 0 when resident */
     /* bytes now and at most: tree, caches, what loading needs on the way */
     uint64_t memory, memory_peak;
     uint64_t budget; /* 0: none */
@@ -83,7 +85,8 @@ typedef struct ebpo_model_stats {
     /* general leaves with a wall that no face meets: a single segment answers there */
     uint64_t leaves_one_wall;
 } ebpo_model_stats;
-EBPO_API void ebpo_model_get_stats(const ebpo_model *model, ebpo_model_stats *out);
+#define EBPO_MODEL_STATS_INIT EBPO_SIZED(ebpo_model_stats)
+EBPO_API ebpo_status ebpo_model_get_stats(const ebpo_model *model, ebpo_model_stats *out);
 
 /* One thread's place in a model: position, scratch, what it holds in memory. */
 typedef struct ebpo_context ebpo_context;
@@ -112,6 +115,7 @@ typedef enum ebpo_distance_mode {
 } ebpo_distance_mode;
 
 typedef struct ebpo_query_options {
+    size_t struct_size; /* EBPO_QUERY_OPTIONS_INIT sets it */
     /* look at levels 0 .. level only, with the certainty that these allow; EBPO_LEVEL_ALL: exact
      * answers */
     int level;
@@ -127,9 +131,10 @@ typedef struct ebpo_query_options {
     /* ebpo_distance: what is farther does not matter; >= 0, INFINITY: everything */
     double max_distance;
 } ebpo_query_options;
-#define EBPO_QUERY_OPTIONS_INIT                                                       \
-    {                                                                                 \
-        -1, 0, EBPO_ENVELOPES_AUTO, EBPO_DISTANCE_EXACT, false, true, __builtin_inf() \
+#define EBPO_QUERY_OPTIONS_INIT                                                                   \
+    {                                                                                             \
+        sizeof(ebpo_query_options), -1, 0, EBPO_ENVELOPES_AUTO, EBPO_DISTANCE_EXACT, false, true, \
+            __builtin_inf()                                                                       \
     }
 
 /* Points are three finite doubles in the model's unit; others are EBPO_E_ARGUMENT with the point's
@@ -227,6 +232,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_faces_in_box(ebpo_context *context, cons
 /* ---- mass ---- */
 
 typedef struct ebpo_mass {
+    size_t struct_size; /* EBPO_MASS_INIT sets it */
     double area;
     /* the integral of the winding number: the solid's volume where that is 0 and 1 only; 0 for a
      * surface. Where it is 0 so is all below */
@@ -234,6 +240,7 @@ typedef struct ebpo_mass {
     double centroid[3];
     double inertia[3][3]; /* about the centroid, of density 1 */
 } ebpo_mass;
+#define EBPO_MASS_INIT EBPO_SIZED(ebpo_mass)
 
 /* From the file's mesh, with compensated sums; does not depend on threads. EBPO_E_ABSENT without
  * mesh. */

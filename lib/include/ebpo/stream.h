@@ -9,13 +9,14 @@ extern "C" {
 #endif
 
 typedef struct ebpo_stream_options {
-    bool planes;   /* give the envelopes' own half-spaces; else plane_count is 0 */
-    bool polygons; /* cut the envelopes' polygons, and their volumes; implies planes */
+    size_t struct_size; /* EBPO_STREAM_OPTIONS_INIT sets it */
+    bool planes;        /* give the envelopes' own half-spaces; else plane_count is 0 */
+    bool polygons;      /* cut the envelopes' polygons, and their volumes; implies planes */
     unsigned threads;
 } ebpo_stream_options;
-#define EBPO_STREAM_OPTIONS_INIT \
-    {                            \
-        true, false, 0           \
+#define EBPO_STREAM_OPTIONS_INIT                    \
+    {                                               \
+        sizeof(ebpo_stream_options), true, false, 0 \
     }
 
 /* One node. Lent until the next call on the stream. The mesh is never read: a leaf of a file

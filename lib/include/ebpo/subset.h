@@ -34,28 +34,36 @@ typedef enum ebpo_profile {
 EBPO_API uint32_t ebpo_profile_parts(ebpo_profile profile);
 
 typedef struct ebpo_subset_options {
+    size_t struct_size; /* EBPO_SUBSET_OPTIONS_INIT sets it */
     /* levels 0 .. last_level are kept; -1: all. Of a subset also a level that the whole file may
      * have had: all that is there */
     int last_level;
+    /* with target_bytes, instead of `parts`: the first of the profiles full, collision, lod of
+     * which all fits; else lod with a max_error */
+    bool choose_parts;
     bool boxed;            /* what does not meet the closed box below is left out: */
     double min[3], max[3]; /* finite, min <= max on each axis; in the model's unit */
     /* ebpo_part bits that are kept, of those the file has. Of the mesh, what the leaves that are
      * kept list. No maps without mesh */
     uint32_t parts;
-    ebpo_write_options write; /* `parts` of it does not matter */
+    ebpo_codec codec;
+    int codec_level; /* as in ebpo_write_options */
     /* refine no further where the envelope certainly reaches at most so far beyond the model
      * (model's unit; see below): the node is pruned; 0: refine everywhere */
     double max_error;
     /* the least max_error (to 1 %) with which the file has at most so many bytes is found and used,
      * none if all fits; 0: not wanted. Not together with max_error */
     uint64_t target_bytes;
-    /* with target_bytes, instead of `parts`: the first of the profiles full, collision, lod of
-     * which all fits; else lod with a max_error */
-    bool choose_parts;
+    unsigned threads; /* 0: all cores; the result does not depend on it */
+    ebpo_progress progress;
 } ebpo_subset_options;
-#define EBPO_SUBSET_OPTIONS_INIT                                                       \
-    {                                                                                  \
-        -1, false, { 0, 0, 0 }, { 0, 0, 0 }, ~0u, EBPO_WRITE_OPTIONS_INIT, 0, 0, false \
+#define EBPO_SUBSET_OPTIONS_INIT                                                      \
+    {                                                                                 \
+        sizeof(ebpo_subset_options), -1, false, false, { 0, 0, 0 }, { 0, 0, 0 }, ~0u, \
+            EBPO_CODEC_ZSTD, 0, 0, 0, 0,                                              \
+        {                                                                             \
+            NULL, NULL                                                                \
+        }                                                                             \
     }
 
 /* max_error: the promise is that of every node pruned for it, and `info.kept_error` of the result

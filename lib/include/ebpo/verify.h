@@ -15,6 +15,7 @@ typedef struct ebpo_verify_count {
 } ebpo_verify_count;
 
 typedef struct ebpo_verify_report {
+    size_t struct_size;          /* EBPO_VERIFY_REPORT_INIT sets it */
     ebpo_verify_count structure; /* head, shapes, counts, index arrays, order */
     ebpo_verify_count content;   /* content checksum */
     /* vertices, clipped faces and inside corners against every half-space on their path */
@@ -28,8 +29,10 @@ typedef struct ebpo_verify_report {
     ebpo_verify_count source;    /* mesh equal to the source (--against), bit for bit */
     uint64_t checks, violations; /* sums */
 } ebpo_verify_report;
+#define EBPO_VERIFY_REPORT_INIT EBPO_SIZED(ebpo_verify_report)
 
 typedef struct ebpo_verify_options {
+    size_t struct_size; /* EBPO_VERIFY_OPTIONS_INIT sets it */
     /* mesh as read (before mending and arranging), or NULL; mending recorded in the file is done
      * again */
     const ebpo_mesh *source;
@@ -43,9 +46,9 @@ typedef struct ebpo_verify_options {
      * Freed after the last call that is given the file (ebpo_file_set_workspace) */
     ebpo_workspace *workspace;
 } ebpo_verify_options;
-#define EBPO_VERIFY_OPTIONS_INIT         \
-    {                                    \
-        NULL, 0, 0, { NULL, NULL }, NULL \
+#define EBPO_VERIFY_OPTIONS_INIT                                      \
+    {                                                                 \
+        sizeof(ebpo_verify_options), NULL, 0, 0, { NULL, NULL }, NULL \
     }
 
 /* Verifies an open file. EBPO_OK when the work could be done, whatever it found: look at

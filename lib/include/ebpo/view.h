@@ -42,7 +42,8 @@ typedef enum ebpo_priority {
 
 /* A perspective camera. */
 typedef struct ebpo_observer {
-    double eye[3]; /* in the model's unit */
+    size_t struct_size; /* EBPO_OBSERVER_INIT sets it */
+    double eye[3];      /* in the model's unit */
     /* of sight, of any length; (0, 0, 0): looks everywhere, and all nodes are seen */
     double direction[3];
     /* points upwards on the picture; of any length, not along `direction`. Means nothing to one who
@@ -51,9 +52,9 @@ typedef struct ebpo_observer {
     double fov;             /* vertical angle of view, degrees, above 0 and below 180 */
     uint32_t width, height; /* of the picture, in pixels; from 1 */
 } ebpo_observer;
-#define EBPO_OBSERVER_INIT                                   \
-    {                                                        \
-        { 0, 0, 0 }, { 0, 0, 0 }, { 0, 1, 0 }, 45, 1280, 720 \
+#define EBPO_OBSERVER_INIT                                                          \
+    {                                                                               \
+        sizeof(ebpo_observer), { 0, 0, 0 }, { 0, 0, 0 }, { 0, 1, 0 }, 45, 1280, 720 \
     }
 
 /* Gray nodes whose cells lie outside the picture. */
@@ -63,6 +64,7 @@ typedef enum ebpo_unseen {
 } ebpo_unseen;
 
 typedef struct ebpo_view_options {
+    size_t struct_size; /* EBPO_VIEW_OPTIONS_INIT sets it */
     /* May be changed while the stream is going on: ebpo_view_stream_change. */
     ebpo_priority priority;
     const ebpo_observer *observer; /* copied; NULL: none, for EBPO_PRIORITY_LEVEL only */
@@ -84,10 +86,10 @@ typedef struct ebpo_view_options {
      * winding numbers, 32 for each gray node of the cut, and the plane codes */
     uint64_t memory;
 } ebpo_view_options;
-#define EBPO_VIEW_OPTIONS_INIT                                                                  \
-    {                                                                                           \
-        EBPO_PRIORITY_LEVEL, NULL, EBPO_UNSEEN_LAST, 0, __builtin_inf(), -1, 0, 0, true, false, \
-            false, 0                                                                            \
+#define EBPO_VIEW_OPTIONS_INIT                                                     \
+    {                                                                              \
+        sizeof(ebpo_view_options), EBPO_PRIORITY_LEVEL, NULL, EBPO_UNSEEN_LAST, 0, \
+            __builtin_inf(), -1, 0, 0, true, false, false, 0                       \
     }
 
 typedef struct ebpo_view_node {
@@ -149,16 +151,19 @@ typedef bool (*ebpo_view_visit_fn)(void *user, const ebpo_view_node *node);
 EBPO_API void ebpo_view_stream_cut(ebpo_view_stream *stream, ebpo_view_visit_fn visit, void *user);
 
 typedef struct ebpo_view_stats {
-    uint64_t nodes;   /* delivered */
-    uint64_t cut[4];  /* nodes of the cut, by ebpo_node_type */
-    uint64_t waiting; /* gray nodes of the cut that are to be refined */
+    size_t struct_size; /* EBPO_VIEW_STATS_INIT sets it */
+    uint64_t nodes;     /* delivered */
+    uint64_t cut[4];    /* nodes of the cut, by ebpo_node_type */
+    uint64_t waiting;   /* gray nodes of the cut that are to be refined */
     /* size of the largest gray node of the cut that is seen, which bounds how coarse the picture
      * is; 0: none is; NAN without an observer */
     double pixels;
     uint64_t bytes_read; /* of the file since it was opened */
 } ebpo_view_stats;
+#define EBPO_VIEW_STATS_INIT EBPO_SIZED(ebpo_view_stats)
 /* Looks at all gray nodes of the cut. */
-EBPO_API void ebpo_view_stream_get_stats(const ebpo_view_stream *stream, ebpo_view_stats *out);
+EBPO_API ebpo_status ebpo_view_stream_get_stats(const ebpo_view_stream *stream,
+                                                ebpo_view_stats *out);
 
 #ifdef __cplusplus
 }

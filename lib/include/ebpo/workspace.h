@@ -17,14 +17,15 @@ typedef struct ebpo_workspace ebpo_workspace;
 enum { EBPO_WORKSPACE_LEAST = 128 << 20 }; /* bytes: less is refused */
 
 typedef struct ebpo_workspace_options {
+    size_t struct_size; /* EBPO_WORKSPACE_OPTIONS_INIT sets it */
     /* bytes that the whole process may have resident; 0: half of the machine's, or of what its
      * control group is allowed */
     uint64_t memory;
     const char *temp_dir; /* NULL: $TMPDIR, else /var/tmp; should lie on a disk, not in memory */
 } ebpo_workspace_options;
-#define EBPO_WORKSPACE_OPTIONS_INIT \
-    {                               \
-        0, NULL                     \
+#define EBPO_WORKSPACE_OPTIONS_INIT             \
+    {                                           \
+        sizeof(ebpo_workspace_options), 0, NULL \
     }
 
 /* `options` may be NULL. EBPO_E_ARGUMENT for less memory than EBPO_WORKSPACE_LEAST; EBPO_E_IO for a
@@ -38,13 +39,16 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_workspace_make(ebpo_workspace **out,
 EBPO_API void ebpo_workspace_free(ebpo_workspace *workspace);
 
 typedef struct ebpo_workspace_stats {
+    size_t struct_size;       /* EBPO_WORKSPACE_STATS_INIT sets it */
     uint64_t memory;          /* the budget */
     uint64_t held, held_most; /* bytes of arrays in memory: now, at most */
     /* bytes of arrays in files: now, at most at one time, ever */
     uint64_t filed, filed_most, filed_total;
 } ebpo_workspace_stats;
+#define EBPO_WORKSPACE_STATS_INIT EBPO_SIZED(ebpo_workspace_stats)
 
-EBPO_API void ebpo_workspace_get_stats(const ebpo_workspace *workspace, ebpo_workspace_stats *out);
+EBPO_API ebpo_status ebpo_workspace_get_stats(const ebpo_workspace *workspace,
+                                              ebpo_workspace_stats *out);
 
 #ifdef __cplusplus
 }

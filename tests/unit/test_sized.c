@@ -1,0 +1,173 @@
+/* Structs that begin with their size: callers of other versions, and callers who forgot it. */
+#include <check.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/ebpo.h>
+
+#include "base/sized.h"
+#include "query_kit.h"
+
+__attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
+const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
+
+/* What a caller of a later version would hand over. */
+typedef struct later_options {
+    ebpo_workspace_options now;
+    uint64_t later;
+} later_options;
+
+typedef struct later_stats {
+    ebpo_workspace_stats now;
+    uint64_t later;
+} later_stats;
+
+static ebpo_workspace *made_with(const void *options, ebpo_status expected)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_workspace *workspace = NULL;
+    ck_assert_int_eq(ebpo_workspace_make(&workspace, options, &error), expected);
+    if (expected != EBPO_OK)
+        ck_assert_ptr_nonnull(strstr(error.message, "ebpo_workspace_options"));
+    return workspace;
+}
+
+START_TEST(options_of_other_versions)
+{
+    later_options later = { EBPO_WORKSPACE_OPTIONS_INIT, 0 };
+    ebpo_workspace_stats stats = EBPO_WORKSPACE_STATS_INIT;
+    later.now.memory = 256 << 20;
+    later.now.temp_dir = "/no/such/folder";
+    later.now.struct_size = offsetof(ebpo_workspace_options, temp_dir); /* an earlier one */
+    ebpo_workspace *workspace = made_with(&later, EBPO_OK);
+    ck_assert_int_eq(ebpo_workspace_get_stats(workspace, &stats), EBPO_OK);
+    ck_assert_uint_eq(stats.memory, 256 << 20);
+    ebpo_workspace_free(workspace);
+    later.now.temp_dir = NULL;
+    later.now.struct_size = sizeof later;
+    ebpo_workspace_free(made_with(&later, EBPO_OK));
+    later.later = 1;
+    made_with(&later, EBPO_E_UNSUPPORTED);
+}
+END_TEST
+
+START_TEST(sizes_that_no_version_has)
+{
+    static const size_t sizes[] = { 0, 1, sizeof(size_t), 17, 4104, SIZE_MAX };
+    ebpo_workspace_options options = EBPO_WORKSPACE_OPTIONS_INIT;
+    options.struct_size = sizes[_i];
+    made_with(&options, EBPO_E_ARGUMENT);
+}
+END_TEST
+
+START_TEST(what_is_filled_in)
+{
+    later_stats stats;
+    ebpo_workspace *workspace = made_with(NULL, EBPO_OK);
+    memset(&stats, 0xa5, sizeof stats);
+    later_stats untouched = stats;
+    stats.now.struct_size = untouched.now.struct_size = 0;
+    ck_assert_int_eq(ebpo_workspace_get_stats(workspace, &stats.now), EBPO_E_ARGUMENT);
+    ck_assert_int_eq(memcmp(&stats, &untouched, sizeof stats), 0);
+    stats.now.struct_size = sizeof stats;
+    ck_assert_int_eq(ebpo_workspace_get_stats(workspace, &stats.now), EBPO_OK);
+    ck_assert_uint_eq(stats.now.struct_size, sizeof stats);
+    ck_assert_uint_eq(stats.now.held, 0);
+    ck_assert_uint_eq(stats.later, 0);
+    memset(&stats.now.held, 0xa5, sizeof stats.now.held);
+    stats.now.struct_size = offsetof(ebpo_workspace_stats, held);
+    ck_assert_int_eq(ebpo_workspace_get_stats(workspace, &stats.now), EBPO_OK);
+    ck_assert_uint_eq(stats.now.held, 0xa5a5a5a5a5a5a5a5u);
+    ebpo_workspace_free(workspace);
+}
+END_TEST
+
+/* Each public call with a struct that nobody has begun: refused by its name, nothing made. */
+#define REFUSED(type, call)                                                               \
+    do {                                                                                  \
+        ebpo_error error_ = EBPO_ERROR_INIT, *error = &error_;                            \
+        ck_assert_int_eq((call), EBPO_E_ARGUMENT);                                        \
+        ck_assert_msg(strstr(error_.message, #type ": its struct_size"), "%s: %s", #call, \
+                      error_.message);                                                    \
+    } while (0)
+
+/* Zeros of any type. */
+static void *zeros(void)
+{
+    static uint64_t block[4096];
+    memset(block, 0, sizeof block);
+    return block;
+}
+
+START_TEST(structs_that_were_not_begun)
+{
+    static const query_variant usual = { "usual", 4, 4, EBPO_RULE_NONZERO, 0 };
+    query_model m;
+    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 1), &usual);
+    const char *path = "/no/such/folder/file";
+    static const double p[3];
+    void *made = NULL;
+    ebpo_mesh mesh = { 0 };
+    ebpo_tree tree;
+    ebpo_inside_result inside;
+    ebpo_distance_result distance;
+    ebpo_source source = EBPO_SOURCE_INIT;
+    ebpo_export_options one = EBPO_EXPORT_OPTIONS_INIT;
+    ebpo_build_options build = EBPO_BUILD_OPTIONS_INIT;
+    REFUSED(ebpo_mesh_read_options, ebpo_mesh_read(&mesh, path, zeros(), error));
+    ebpo_prepared prepared = EBPO_PREPARED_INIT;
+    REFUSED(ebpo_prepare_options, ebpo_mesh_prepare(&prepared, &mesh, zeros(), error));
+    REFUSED(ebpo_prepared, ebpo_mesh_prepare(zeros(), &mesh, NULL, error));
+    REFUSED(ebpo_build_options, ebpo_build(&tree, &mesh, zeros(), NULL, zeros(), error));
+    build.times = zeros();
+    REFUSED(ebpo_build_times, ebpo_build(&tree, &mesh, NULL, NULL, &build, error));
+    REFUSED(ebpo_write_options, ebpo_tree_write(&tree, path, zeros(), error));
+    REFUSED(ebpo_source, ebpo_open_source((ebpo_file **)&made, zeros(), "zeros", error));
+    REFUSED(ebpo_http_options, ebpo_source_of_url(&source, "http://a/b", zeros(), error));
+    REFUSED(ebpo_source, ebpo_source_of_url(zeros(), "http://a/b", NULL, error));
+    REFUSED(ebpo_http_options, ebpo_open_url((ebpo_file **)&made, "http://a/b", zeros(), error));
+    REFUSED(ebpo_verify_options,
+            ebpo_verify(m.file, zeros(), &(ebpo_verify_report)EBPO_VERIFY_REPORT_INIT, error));
+    REFUSED(ebpo_verify_report, ebpo_verify(m.file, NULL, zeros(), error));
+    REFUSED(ebpo_lod_options, ebpo_lod_level(m.file, 0, zeros(), &mesh, NULL, error));
+    REFUSED(ebpo_export_options, ebpo_export(m.file, path, EBPO_EXPORT_STL, zeros(), NULL, error));
+    REFUSED(ebpo_export_report, ebpo_export(m.file, path, EBPO_EXPORT_STL, &one, zeros(), error));
+    REFUSED(ebpo_subset_options, ebpo_subset(m.file, path, zeros(), error));
+    REFUSED(ebpo_limit, ebpo_limit_level(m.file, 0, 1, NULL, zeros(), error));
+    REFUSED(ebpo_mass, ebpo_measure(m.file, 1, zeros(), error));
+    REFUSED(ebpo_deviation, ebpo_deviation_level(m.model, m.file, 0, NULL, zeros(), error));
+    REFUSED(ebpo_deviation_options,
+            ebpo_deviation_level(m.model, m.file, 0, zeros(), &(ebpo_deviation)EBPO_DEVIATION_INIT,
+                                 error));
+    REFUSED(ebpo_model_options, ebpo_model_open((ebpo_model **)&made, m.file, zeros(), error));
+    REFUSED(ebpo_query_options, ebpo_inside(m.context, p, zeros(), &inside, error));
+    REFUSED(ebpo_query_options, ebpo_distance(m.context, p, zeros(), &distance, error));
+    REFUSED(ebpo_stream_options, ebpo_stream_new((ebpo_stream **)&made, m.file, zeros(), error));
+    REFUSED(ebpo_view_options,
+            ebpo_view_stream_new((ebpo_view_stream **)&made, m.file, zeros(), error));
+    ebpo_view_options view = EBPO_VIEW_OPTIONS_INIT;
+    view.observer = zeros();
+    REFUSED(ebpo_observer, ebpo_view_stream_new((ebpo_view_stream **)&made, m.file, &view, error));
+    ck_assert_int_eq(ebpo_model_get_stats(m.model, zeros()), EBPO_E_ARGUMENT);
+    ck_assert_int_eq(ebpo_file_get_http_stats(m.file, zeros()), EBPO_E_ARGUMENT);
+    ck_assert_ptr_null(made);
+    query_model_free(&m);
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("sized");
+    TCase *tests = tcase_create("sized");
+    tcase_set_timeout(tests, 120);
+    tcase_add_test(tests, options_of_other_versions);
+    tcase_add_loop_test(tests, sizes_that_no_version_has, 0, 6);
+    tcase_add_test(tests, what_is_filled_in);
+    tcase_add_test(tests, structs_that_were_not_begun);
+    suite_add_tcase(suite, tests);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_NORMAL);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+}
