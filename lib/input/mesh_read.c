@@ -14,17 +14,6 @@
 #include "mesh/mesh_parts.h"
 #include "ply/ply.h"
 
-void ebpo_mesh_free(ebpo_mesh *mesh)
-{
-    if (!mesh)
-        return;
-    ebpo_array_free(mesh->xyz32);
-    ebpo_array_free(mesh->xyz64);
-    ebpo_array_free(mesh->faces);
-    ebpo_arrangement_free(mesh->arrangement);
-    memset(mesh, 0, sizeof *mesh);
-}
-
 enum { HASH_STEP = 1 << 22 };
 
 typedef struct hashing {

@@ -31,13 +31,3 @@ ebpo_status ebpo_mesh_check_shape(const ebpo_mesh *mesh, ebpo_error *error)
                          ebpo_mesh_label(mesh));
     return EBPO_OK;
 }
-
-void ebpo_arrangement_free(struct ebpo_arrangement *arrangement)
-{
-    if (!arrangement)
-        return;
-    ebpo_array_free(arrangement->key);
-    ebpo_array_free(arrangement->vertex_source);
-    ebpo_array_free(arrangement->face_source);
-    free(arrangement);
-}

@@ -5,7 +5,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "cli/stages.h"
+#include "cli/stage_rows.h"
 #include "cli/words.h"
 
 double progress_now(void)

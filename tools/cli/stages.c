@@ -4,67 +4,15 @@
 
 #include "cli/words.h"
 
-/* EBP 2017, 3.6.4 and tables 8 to 10 and 18: six stages, and their sum. */
-enum {
-    LEAVES = 1 << 0,
-    CORNERS = 1 << 1,
-    LEAF_PLANES = 1 << 2,
-    PATHS = 1 << 3,
-    CLIPPING = 1 << 4,
-    STORING = 1 << 5,
-    THESIS_STAGES = 6
-};
-
 static const char *const thesis_names[THESIS_STAGES + 1] = {
     "leaf creation", "corner labels",           "leaf planes", "tree paths",
     "leaf clipping", "storing and propagating", "total"
 };
 
-static const struct {
-    const char *name;
-    unsigned thesis;
-    const char *stages[8]; /* the library's */
-} rows[STAGE_ROWS] = {
-    [STAGE_READING] = { "reading", 0, { "reading" } },
-    [STAGE_MENDING] = { "mending", 0, { "mending" } },
-    [STAGE_ORDERING] = { "ordering",
-                         LEAVES,
-                         { "looking at faces", "measuring the box", "ordering vertices",
-                           "ordering faces", "bounds" } },
-    [STAGE_CHECKING] = { "checking",
-                         0,
-                         { "checking coordinates", "counting faces at vertices",
-                           "linking faces to vertices", "checking vertices", "measuring faces",
-                           "checking edges", "comparing positions" } },
-    [STAGE_CUTTING] = { "cutting", LEAVES | PATHS, { "cutting into pieces" } },
-    [STAGE_CORNERS] = { "corners", CORNERS, { "winding numbers" } },
-    [STAGE_CELLS] = { "cells", LEAVES | CORNERS | PATHS, { "cells" } },
-    [STAGE_CHOOSING] = { "choosing", LEAF_PLANES | CLIPPING | STORING, { "choosing planes" } },
-    [STAGE_TOP] = { "top", STORING, { "top envelopes" } },
-    [STAGE_ENVELOPES] = { "envelopes", STORING, { "envelopes" } },
-    [STAGE_JOINING] = { "joining", STORING, { "joining levels" } },
-    [STAGE_NUMBERING] = { "numbering", STORING, { "numbering vertices" } },
-    [STAGE_WRITING] = { "writing", STORING, { "writing" } },
-    [STAGE_JUDGING] = { "judging",
-                        0,
-                        { "reading levels", "looking at envelopes", "bounding envelopes",
-                          "judging envelopes" } },
-    [STAGE_OTHER] = { "other", 0, { NULL } },
-};
-
-stage_row stages_row(const char *library_stage)
-{
-    for (int r = 0; r < STAGE_OTHER; r++)
-        for (int i = 0; i < 8 && rows[r].stages[i]; i++)
-            if (strcmp(rows[r].stages[i], library_stage) == 0)
-                return (stage_row)r;
-    return STAGE_OTHER;
-}
-
 static unsigned thesis_of(stage_row row, const stage_facts *f)
 {
     bool here = row == STAGE_ENVELOPES && f->leaf_planes && !f->from_leaves;
-    return rows[row].thesis | (here ? LEAF_PLANES | CLIPPING : 0);
+    return stage_names[row].thesis | (here ? THESIS_LEAF_PLANES | THESIS_CLIPPING : 0);
 }
 
 int stages_plan(const stage_facts *f, int plan[STAGE_PLAN_MAX])
@@ -149,13 +97,13 @@ void stages_print(FILE *out, const progress_line *line, const stage_facts *f, do
     for (int r = 0; r < STAGE_ROWS; r++) {
         if (!began[r])
             continue;
-        print_row(out, rows[r].name, taken[r], f->faces);
+        print_row(out, stage_names[r].name, taken[r], f->faces);
         print_thesis(out, thesis_of((stage_row)r, f));
         sum += thesis_of((stage_row)r, f) ? taken[r] : 0;
     }
     print_row(out, "all", seconds, f->faces);
     fprintf(out, "7 total: %.2f of it in 1 to 6\n", sum);
-    if (!(done & LEAF_PLANES))
+    if (!(done & THESIS_LEAF_PLANES))
         fprintf(out, "  not made: 3 leaf planes, 5 leaf clipping; readers derive them from a "
                      "leaf's faces ('--with leaf-planes' stores them)\n");
 }
@@ -183,7 +131,7 @@ static void thesis_stage(json *j, int number, const stage_facts *f, const bool b
     json_array(j, "in");
     for (int r = 0; r < STAGE_ROWS; r++)
         if (began[r] && thesis_of((stage_row)r, f) & wanted) {
-            json_text(j, NULL, rows[r].name);
+            json_text(j, NULL, stage_names[r].name);
             sum += taken[r];
         }
     json_end(j);
@@ -202,7 +150,7 @@ void stages_json(json *j, const progress_line *line, const stage_facts *f)
         stage_row row = stages_row(line->stages[i].name);
         json_object(j, NULL);
         json_text(j, "stage", line->stages[i].name);
-        json_text(j, "name", rows[row].name);
+        json_text(j, "name", stage_names[row].name);
         json_real(j, "seconds", line->stages[i].seconds);
         thesis_numbers(j, thesis_of(row, f));
         json_end(j);

@@ -8,30 +8,7 @@
 
 #include "cli/json.h"
 #include "cli/progress.h"
-
-/* In the order in which they begin, but for ordering and checking, which come before mending as
- * well. */
-typedef enum stage_row {
-    STAGE_READING,
-    STAGE_MENDING,
-    STAGE_ORDERING,
-    STAGE_CHECKING,
-    STAGE_CUTTING,
-    STAGE_CORNERS,
-    STAGE_CELLS,
-    STAGE_CHOOSING,
-    STAGE_TOP,
-    STAGE_ENVELOPES,
-    STAGE_JOINING,
-    STAGE_NUMBERING,
-    STAGE_WRITING,
-    STAGE_JUDGING,
-    STAGE_OTHER,
-    STAGE_ROWS
-} stage_row;
-
-/* Which of them the library's stage belongs to. */
-stage_row stages_row(const char *library_stage);
+#include "cli/stage_rows.h"
 
 typedef struct stage_facts {
     bool mended, solid, from_leaves, judged; /* from_leaves: the theses' selections */

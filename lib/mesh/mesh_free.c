@@ -1,0 +1,26 @@
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/arrays.h"
+#include "mesh/mesh_parts.h"
+
+void ebpo_arrangement_free(struct ebpo_arrangement *arrangement)
+{
+    if (!arrangement)
+        return;
+    ebpo_array_free(arrangement->key);
+    ebpo_array_free(arrangement->vertex_source);
+    ebpo_array_free(arrangement->face_source);
+    free(arrangement);
+}
+
+void ebpo_mesh_free(ebpo_mesh *mesh)
+{
+    if (!mesh)
+        return;
+    ebpo_array_free(mesh->xyz32);
+    ebpo_array_free(mesh->xyz64);
+    ebpo_array_free(mesh->faces);
+    ebpo_arrangement_free(mesh->arrangement);
+    memset(mesh, 0, sizeof *mesh);
+}

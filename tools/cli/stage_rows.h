@@ -1,0 +1,47 @@
+/* The stages of a build as people see them: which of the library's each is made of. */
+#ifndef EBPO_TOOLS_STAGE_ROWS_H
+#define EBPO_TOOLS_STAGE_ROWS_H
+
+/* In the order in which they begin, but for ordering and checking, which come before mending as
+ * well. */
+typedef enum stage_row {
+    STAGE_READING,
+    STAGE_MENDING,
+    STAGE_ORDERING,
+    STAGE_CHECKING,
+    STAGE_CUTTING,
+    STAGE_CORNERS,
+    STAGE_CELLS,
+    STAGE_CHOOSING,
+    STAGE_TOP,
+    STAGE_ENVELOPES,
+    STAGE_JOINING,
+    STAGE_NUMBERING,
+    STAGE_WRITING,
+    STAGE_JUDGING,
+    STAGE_OTHER,
+    STAGE_ROWS
+} stage_row;
+
+/* EBP 2017, 3.6.4 and tables 8 to 10 and 18: six stages, and their sum. */
+enum {
+    THESIS_LEAVES = 1 << 0,
+    THESIS_CORNERS = 1 << 1,
+    THESIS_LEAF_PLANES = 1 << 2,
+    THESIS_PATHS = 1 << 3,
+    THESIS_CLIPPING = 1 << 4,
+    THESIS_STORING = 1 << 5,
+    THESIS_STAGES = 6
+};
+
+typedef struct stage_name {
+    const char *name;
+    unsigned thesis;       /* the thesis' stages with the same work */
+    const char *stages[8]; /* the library's */
+} stage_name;
+extern const stage_name stage_names[STAGE_ROWS];
+
+/* Which of them the library's stage belongs to. */
+stage_row stages_row(const char *library_stage);
+
+#endif
