@@ -12,20 +12,14 @@
 
 enum { USUAL_COUNT = 100000 };
 
-static int no_memory(void)
-{
-    fprintf(stderr, "ebpo bench: not enough memory\n");
-    return EXIT_FAILED;
-}
-
 static int make_room(bench_points *out, uint64_t count)
 {
     uint64_t bytes;
     if (__builtin_mul_overflow(count, sizeof(double) * (unsigned)points_width(out->kind), &bytes))
-        return no_memory();
+        return command_no_memory("bench");
     double *rows = realloc(out->rows, bytes ? bytes : 1);
     if (!rows)
-        return no_memory();
+        return command_no_memory("bench");
     out->rows = rows;
     return EXIT_FINE;
 }
@@ -74,7 +68,7 @@ static int fill_path(bench_points *out, ebpo_file *file, uint64_t seed)
         square += (report->max[k] - report->min[k]) * (report->max[k] - report->min[k]);
     bool good = bench_walk(&mesh, report->mean_edge, sqrt(square), seed, out->count, out->rows);
     ebpo_mesh_free(&mesh);
-    return good ? EXIT_FINE : no_memory();
+    return good ? EXIT_FINE : command_no_memory("bench");
 }
 
 static int generate(bench_points *out, const char *model, const remote_values *remote, bool path,
@@ -120,11 +114,9 @@ int bench_points_make(bench_points *out, points_kind kind, const char *model,
 {
     bool path = strcmp(what, "path") == 0;
     *out = (bench_points){ .kind = kind, .count = count ? count : USUAL_COUNT };
-    if (path && kind == POINTS_RAYS) {
-        fprintf(stderr, "ebpo bench: a path has points; for rays give --points uniform or a file; "
-                        "try 'ebpo bench --help'\n");
-        return EXIT_USAGE;
-    }
+    if (path && kind == POINTS_RAYS)
+        return command_usage("bench",
+                             "a path has points; for rays give --points uniform or a file");
     if (path || strcmp(what, "uniform") == 0)
         return generate(out, model, remote, path, seed);
     points in;

@@ -203,7 +203,8 @@ void answers_ray_first(answer_form form, const ebpo_ray_hit *hit)
     leave_whole();
 }
 
-void answers_ray_all(answer_form form, const ebpo_ray_hit *hits, uint64_t count)
+/* Of an answer that is a list: what is before it, and after it. */
+static void begin_list(answer_form form, uint64_t count)
 {
     if (form == ANSWERS_RAW)
         raw_u64(stdout, count);
@@ -211,6 +212,18 @@ void answers_ray_all(answer_form form, const ebpo_ray_hit *hits, uint64_t count)
         putchar('[');
     else
         printf("%" PRIu64, count);
+}
+
+static void end_list(answer_form form)
+{
+    if (form != ANSWERS_RAW)
+        puts(form == ANSWERS_JSON ? "]" : "");
+    leave_whole();
+}
+
+void answers_ray_all(answer_form form, const ebpo_ray_hit *hits, uint64_t count)
+{
+    begin_list(form, count);
     for (uint64_t i = 0; i < count; i++)
         if (form == ANSWERS_RAW)
             hit_raw(&hits[i]);
@@ -218,27 +231,18 @@ void answers_ray_all(answer_form form, const ebpo_ray_hit *hits, uint64_t count)
             hit_json(i ? ", " : "", &hits[i]);
         else
             printf(" %.17g %" PRIu64 " %" PRId32, hits[i].t, hits[i].face, hits[i].side);
-    if (form != ANSWERS_RAW)
-        puts(form == ANSWERS_JSON ? "]" : "");
-    leave_whole();
+    end_list(form);
 }
 
 void answers_box(answer_form form, const uint64_t *faces, uint64_t count)
 {
-    if (form == ANSWERS_RAW)
-        raw_u64(stdout, count);
-    else if (form == ANSWERS_JSON)
-        putchar('[');
-    else
-        printf("%" PRIu64, count);
+    begin_list(form, count);
     for (uint64_t i = 0; i < count; i++)
         if (form == ANSWERS_RAW)
             raw_u64(stdout, faces[i]);
         else
             printf("%s%" PRIu64, form == ANSWERS_JSON ? (i ? ", " : "") : " ", faces[i]);
-    if (form != ANSWERS_RAW)
-        puts(form == ANSWERS_JSON ? "]" : "");
-    leave_whole();
+    end_list(form);
 }
 
 /* --- sums --- */

@@ -2,25 +2,17 @@
 
 #include <errno.h>
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "cli/command.h"
+
 static const arg_option help_option = { "help", 'h', ARG_FLAG, 0, NULL, "print this and end",
                                         0,      0,   NULL };
 
-__attribute__((format(printf, 2, 3))) static arg_result wrong(const arg_spec *spec,
-                                                              const char *format, ...)
-{
-    va_list list;
-    va_start(list, format);
-    fprintf(stderr, "ebpo %s: ", spec->command);
-    vfprintf(stderr, format, list);
-    fprintf(stderr, "; try 'ebpo %s --help'\n", spec->command);
-    va_end(list);
-    return ARGS_WRONG;
-}
+/* Says what is wrong; the result to return. */
+#define wrong(spec, ...) (command_usage((spec)->command, __VA_ARGS__), ARGS_WRONG)
 
 /* --- values --- */
 

@@ -1,6 +1,7 @@
 #include "cli/command.h"
 
 #include <errno.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -14,11 +15,36 @@ int command_failed(const char *name, const ebpo_error *error)
     return error->status == EBPO_E_NOT_SOLID ? EXIT_NOT_SOLID : EXIT_FAILED;
 }
 
+int command_usage(const char *name, const char *format, ...)
+{
+    va_list list;
+    va_start(list, format);
+    fprintf(stderr, "ebpo %s: ", name);
+    vfprintf(stderr, format, list);
+    fprintf(stderr, "; try 'ebpo %s --help'\n", name);
+    va_end(list);
+    return EXIT_USAGE;
+}
+
+int command_no_memory(const char *name)
+{
+    fprintf(stderr, "ebpo %s: not enough memory\n", name);
+    return EXIT_FAILED;
+}
+
 bool command_same_file(const char *a, const char *b)
 {
     struct stat sa, sb;
     return !ebpo_is_url(a) && stat(a, &sa) == 0 && stat(b, &sb) == 0 && sa.st_dev == sb.st_dev &&
            sa.st_ino == sb.st_ino;
+}
+
+bool command_overwrites(const char *name, const char *in, const char *out)
+{
+    if (strcmp(in, out) != 0 && !command_same_file(in, out))
+        return false;
+    fprintf(stderr, "ebpo %s: %s: is both input and output; choose another output\n", name, out);
+    return true;
 }
 
 int command_is_hdf5(const char *name, const char *path)

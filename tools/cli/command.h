@@ -9,8 +9,17 @@ enum { EXIT_FINE = 0, EXIT_FAILED = 1, EXIT_USAGE = 2, EXIT_NOT_SOLID = 3 };
 /* Prints "ebpo convert: message" and returns the exit code that the status stands for. */
 int command_failed(const char *name, const ebpo_error *error);
 
+/* Says on stderr what is wrong with the command line, and where help is; EXIT_USAGE. */
+int command_usage(const char *name, const char *format, ...) EBPO_PRINTF(2, 3);
+
+/* Says that there was not enough memory; EXIT_FAILED. */
+int command_no_memory(const char *name);
+
 /* True when both paths lead to one existing file. */
 bool command_same_file(const char *a, const char *b);
+
+/* True, said on stderr (exit with EXIT_USAGE): writing `out` would overwrite `in`. */
+bool command_overwrites(const char *name, const char *in, const char *out);
 
 /* 1: the file begins as an HDF5 file does, or is a URL, 0: it does not, -1: it cannot be read (said
  * on stderr). */

@@ -4,6 +4,7 @@
 #include <stddef.h>
 #include <stdio.h>
 
+#include "cli/command.h"
 #include "cli/words.h"
 
 bool memory_good(const char *command, const memory_values *v)
@@ -12,8 +13,7 @@ bool memory_good(const char *command, const memory_values *v)
     if (!v->memory)
         return true;
     if (!words_read_size(v->memory, &bytes)) {
-        fprintf(stderr, "ebpo %s: --memory: '%s' is not a size such as 2G; try 'ebpo %s --help'\n",
-                command, v->memory, command);
+        command_usage(command, "--memory: '%s' is not a size such as 2G", v->memory);
         return false;
     }
     if (bytes < EBPO_WORKSPACE_LEAST)

@@ -35,10 +35,8 @@ bool query_accepts(const char *name, const query_values *v, unsigned idle, const
                 { QUERY_PREFETCH, v->prefetch, "--prefetch" } };
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         if (all[i].given && idle & all[i].bit) {
-            fprintf(stderr,
-                    "ebpo %s: %s has no effect with %s; leave one of them away, or try 'ebpo %s "
-                    "--help'\n",
-                    name, all[i].option, with, name);
+            command_usage(name, "%s has no effect with %s; leave one of them away", all[i].option,
+                          with);
             return false;
         }
     return true;
@@ -74,10 +72,7 @@ static bool read_size(const char *name, const char *text, uint64_t *out)
 {
     if (words_read_size(text, out))
         return true;
-    fprintf(stderr,
-            "ebpo %s: --memory: '%s' is not a size such as 64M, 1G, 512K or 1000000; try 'ebpo %s "
-            "--help'\n",
-            name, text, name);
+    command_usage(name, "--memory: '%s' is not a size such as 64M, 1G, 512K or 1000000", text);
     return false;
 }
 
@@ -87,10 +82,9 @@ static bool read_time(const char *name, const char *text, uint64_t *out)
     static const uint64_t factors[] = { 1000, 1000, 1, 1000000, 1000000000 };
     if (words_read_unit(text, units, factors, out) && *out > 0 && *out < UINT64_C(1000000000000000))
         return true;
-    fprintf(stderr,
-            "ebpo %s: --deadline: '%s' is not a time such as 50us, 500ns, 1ms or 20 "
-            "(microseconds); try 'ebpo %s --help'\n",
-            name, text, name);
+    command_usage(name,
+                  "--deadline: '%s' is not a time such as 50us, 500ns, 1ms or 20 (microseconds)",
+                  text);
     return false;
 }
 

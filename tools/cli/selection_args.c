@@ -9,12 +9,6 @@
 
 static const double most_planes = 1e9; /* as ebpo_build has it */
 
-static int refused(const char *name, const char *message)
-{
-    fprintf(stderr, "ebpo %s: %s; try 'ebpo %s --help'\n", name, message, name);
-    return EXIT_USAGE;
-}
-
 /* "500", or "1%", which is a share. */
 static bool read_k_root(const char *text, double *k, bool *share)
 {
@@ -32,11 +26,10 @@ static int check_k_root(const char *name, const char *text)
     bool share;
     if (read_k_root(text, &k, &share))
         return EXIT_FINE;
-    fprintf(stderr,
-            "ebpo %s: --k-root: '%s' is not a number of planes from 1 to 1e9, such as 500, or a "
-            "share of the faces, such as 1%%; try 'ebpo %s --help'\n",
-            name, text, name);
-    return EXIT_USAGE;
+    return command_usage(name,
+                         "--k-root: '%s' is not a number of planes from 1 to 1e9, such as 500, or "
+                         "a share of the faces, such as 1%%",
+                         text);
 }
 
 typedef bool (*trait_fn)(const ebpo_selection_traits *traits);
@@ -73,7 +66,7 @@ static int check_effect(const char *name, const selection_options *o, bool given
     if (!given || o->chosen & taking)
         return EXIT_FINE;
     snprintf(message, sizeof message, "%s for --select %s", options, names);
-    return refused(name, message);
+    return command_usage(name, "%s", message);
 }
 
 int selection_check(const char *name, const selection_options *o)
@@ -89,9 +82,9 @@ int selection_check(const char *name, const selection_options *o)
     if (code != EXIT_FINE)
         return code;
     if (o->percent >= 0 && o->k_root)
-        return refused(name, "--percent and --k-root exclude each other; give one");
+        return command_usage(name, "--percent and --k-root exclude each other; give one");
     if (o->percent == 0)
-        return refused(name, "--percent 0 leaves no planes; give more");
+        return command_usage(name, "--percent 0 leaves no planes; give more");
     return o->k_root ? check_k_root(name, o->k_root) : EXIT_FINE;
 }
 

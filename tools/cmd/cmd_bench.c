@@ -33,10 +33,9 @@ enum { NOTHING, FOUND, INTERVAL };
 static const arg_option options[] = {
     OPTION_WORD("query", 0, values, query, "QUERY", query_words,
                 "inside (the default), distance or ray"),
-    OPTION_TEXT(
-        "points", 0, values, points, "WHAT",
-        "uniform (the default): in the bounding box; path: a walk along the surface; or a file of "
-        "points or rays"),
+    OPTION_TEXT("points", 0, values, points, "WHAT",
+                "uniform (the default): in the bounding box; path: a walk along the surface; or a "
+                "file of points or rays"),
     OPTION_FLAG("raw", 0, query_values, raw, "the file of points holds little-endian doubles"),
     OPTION_INT("count", 0, values, count, "N", 1, 1e9,
                "how many; the default: 100000, or all of the file"),
@@ -58,8 +57,7 @@ static const arg_option options[] = {
                 "write what was asked about, as little-endian doubles"),
     OPTION_TEXT("save-answers", 0, values, save_answers, "FILE",
                 "write the answers: inside a byte each, as in 'where'; else a double (distance or "
-                "t) and an "
-                "int64 (face or -1)"),
+                "t) and an int64 (face or -1)"),
     OPTION_FLAG("json", 0, query_values, json, "print all of it as JSON"),
     REMOTE_OPTIONS(query_values, remote),
     { 0 },
@@ -72,8 +70,7 @@ static const arg_spec spec = {
     .most = 1,
     .summary = "how long questions to a file take",
     .text = "MODEL is an .ebpo.h5 file or its URL. One thread asks. First a cold start (the system "
-            "is asked to forget the file), then each question by "
-            "itself, then all of them at once.",
+            "is asked to forget the file), then each question by itself, then all of them at once.",
     .options = options,
 };
 
@@ -465,8 +462,7 @@ static int run(void *given, const char **operand)
     job.answers = calloc(p.count + 1, bytes);
     job.ns = calloc(p.count + 1, sizeof *job.ns);
     if (code == EXIT_FINE && (!batch || !job.answers || !job.ns)) {
-        fprintf(stderr, "ebpo bench: not enough memory\n");
-        code = EXIT_FAILED;
+        code = command_no_memory("bench");
     }
     if (code == EXIT_FINE)
         code = bench(&job, v, operand[0], &holding, batch);

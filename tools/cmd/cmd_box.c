@@ -19,8 +19,7 @@ static const arg_spec spec = {
     .most = 2,
     .summary = "which faces meet boxes: how many, and their numbers",
     .text = "MODEL is an .ebpo.h5 file. BOXES: lines 'x0 y0 z0 x1 y1 z1', the lower corner first; "
-            "absent or '-': standard input. Faces and "
-            "boxes are closed: touching counts.",
+            "absent or '-': standard input. Faces and boxes are closed: touching counts.",
     .options = options,
 };
 

@@ -43,20 +43,17 @@ static const arg_option options[] = {
         "a node with at most N faces becomes a leaf; 0: only the deepest level stops; default 16"),
     OPTION_REAL("epsilon", 0, values, epsilon, "E", 0, 1,
                 "a plane is kept while it removes at least this share of its cell; default 0.003"),
-    OPTION_WORD(
-        "select", 0, values, select, "NAME", selection_words,
-        "how planes are chosen: inherit (the default), or as in the theses: kmedoids, offset "
-        "(least), random"),
+    OPTION_WORD("select", 0, values, select, "NAME", selection_words,
+                "how planes are chosen: inherit (the default), or as in the theses: kmedoids, "
+                "offset (least), random"),
     OPTION_REAL("percent", 0, values, percent, "P", 0, 100,
                 "the theses' ways: share of the candidates that is taken; default 40"),
-    OPTION_TEXT(
-        "k-root", 0, values, k_root, "K",
-        "instead: K planes at the root, or 'K%' of the faces, half as many at each next level "
-        "(BP-Octree)"),
-    OPTION_WORD(
-        "normals", 0, values, normals, "NAME", normals_words,
-        "kmedoids' distance of normals: spherical (the default, the theses') or angle (without "
-        "their poles)"),
+    OPTION_TEXT("k-root", 0, values, k_root, "K",
+                "instead: K planes at the root, or 'K%' of the faces, half as many at each next "
+                "level (BP-Octree)"),
+    OPTION_WORD("normals", 0, values, normals, "NAME", normals_words,
+                "kmedoids' distance of normals: spherical (the default, the theses') or angle "
+                "(without their poles)"),
     OPTION_INT("seed", 0, values, seed, "N", 0, 9007199254740992.0,
                "of kmedoids and random; default 1"),
     OPTION_SET("with", 0, values, with, "LIST", with_words, "also store: leaf-planes"),
@@ -65,8 +62,7 @@ static const arg_option options[] = {
     OPTION_WORD(
         "profile", 0, values, profile, "NAME", profile_words,
         "instead of --with and --without: full (all parts), lod (for viewers: no mesh), collision "
-        "(for exact questions: mesh, no maps); as 'ebpo subset --profile' makes it of a full "
-        "file"),
+        "(for exact questions: mesh, no maps); as 'ebpo subset --profile' makes it of a full file"),
     NEED_OPTIONS(values),
     OPTION_WORD("codec", 0, values, codec, "NAME", codec_words,
                 "zstd (the default), deflate or none"),
@@ -83,10 +79,9 @@ static const arg_option options[] = {
     OPTION_TEXT("unit", 0, values, unit, "U", "unit of length to record, such as mm"),
     OPTION_TEXT("crs", 0, values, crs, "C",
                 "coordinate reference system to record, such as EPSG:25832"),
-    OPTION_TEXT(
-        "date", 0, values, date, "D",
-        "date to record, such as 2026-03-01; none by default, so that equal input gives an equal "
-        "file"),
+    OPTION_TEXT("date", 0, values, date, "D",
+                "date to record, such as 2026-03-01; none by default, so that equal input gives an "
+                "equal file"),
     OPTION_FLAG("json", 0, values, json, "print reports and facts as JSON"),
     OPTION_FLAG("quiet", 'q', values, quiet, "no report, no progress: errors and warnings only"),
     { 0 },
@@ -99,16 +94,10 @@ static const arg_spec spec = {
     .most = 2,
     .summary = "a closed triangle mesh to an .ebpo.h5 file",
     .text = "IN is PLY, or OBJ, STL or OFF where the library was built with assimp. OUT appears "
-            "whole or not at all; "
-            "an older OUT is replaced. Mending is done in the order weld, orient, fill holes.",
+            "whole or not at all; an older OUT is replaced. Mending is done in the order weld, "
+            "orient, fill holes.",
     .options = options,
 };
-
-static int usage_error(const char *message)
-{
-    fprintf(stderr, "ebpo convert: %s; try 'ebpo convert --help'\n", message);
-    return EXIT_USAGE;
-}
 
 static int check_values(const values *v, const char *in, const char *out)
 {
@@ -120,17 +109,25 @@ static int check_values(const values *v, const char *in, const char *out)
     if (!memory_good("convert", &v->memory))
         return EXIT_USAGE;
     if (v->zstd_level && v->codec != EBPO_CODEC_ZSTD)
-        return usage_error("--zstd-level says nothing about --codec deflate or none");
+        return command_usage("convert", "--zstd-level says nothing about --codec deflate or none");
     if (v->profile >= 0 && (v->with || v->without))
-        return usage_error(
-            "--profile says which parts are stored; leave --with and --without away");
-    if (strcmp(in, out) == 0 || command_same_file(in, out)) {
-        fprintf(stderr,
-                "ebpo convert: %s: is input and output at once; give the output another name\n",
-                out);
+        return command_usage(
+            "convert", "--profile says which parts are stored; leave --with and --without away");
+    if (command_overwrites("convert", in, out))
         return EXIT_USAGE;
-    }
     return EXIT_FINE;
+}
+
+static bool judges(const values *v) { return v->max_error > 0 || v->target_size; }
+
+static int check_need(const values *v, ebpo_subset_options *need)
+{
+    int code = subset_need("convert", v->max_error, v->target_size, need);
+    if (code == EXIT_FINE && judges(v) && v->without & EBPO_PART_MESH)
+        return command_usage("convert",
+                             "--max-error and --target-size measure against the mesh; leave it out "
+                             "with --profile lod instead of --without mesh");
+    return code;
 }
 
 static bool chooses_parts(const values *v)
@@ -299,7 +296,7 @@ static stage_facts plan_stages(const values *v, const char *in)
                                     (dot && strcasecmp(dot, ".stl") == 0),
                           .solid = true,
                           .from_leaves = v->select != EBPO_SELECT_INHERIT,
-                          .judged = v->max_error > 0 || v->target_size,
+                          .judged = judges(v),
                           .leaf_planes = parts_of(v) & EBPO_PART_LEAF_PLANES,
                           .times = EBPO_BUILD_TIMES_INIT };
 }
@@ -312,29 +309,22 @@ static const values usual = { .max_level = -1,
                               .normals = -1,
                               .seed = -1 };
 
-static int run(void *given, const char **operand)
+/* What was read is not what may be built. */
+static ebpo_status refuse(const values *v, const mesh_input *p, const char *in,
+                          const ebpo_workspace *workspace, ebpo_error *error)
 {
-    const ebpo_build_options defaults = EBPO_BUILD_OPTIONS_INIT;
-    values *v = given;
-    if (v->leaf_faces < 0)
-        v->leaf_faces = defaults.leaf_faces;
-    const char *in = operand[0], *out = operand[1];
-    int code = check_values(v, in, out);
-    if (code != EXIT_FINE)
-        return code;
-    ebpo_subset_options need = EBPO_SUBSET_OPTIONS_INIT;
-    if ((code = subset_need("convert", v->max_error, v->target_size, &need)) != EXIT_FINE)
-        return code;
-    if ((v->max_error > 0 || v->target_size) && v->without & EBPO_PART_MESH)
-        return usage_error("--max-error and --target-size measure against the mesh; leave it out "
-                           "with --profile lod instead of --without mesh");
-    ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_workspace *workspace = NULL;
-    ebpo_status status = ebpo_check_output(out, &error);
-    if (status == EBPO_OK)
-        status = memory_make(&workspace, &v->memory, &error);
-    if (status != EBPO_OK)
-        return command_failed("convert", &error);
+    if (v->require_solid && !p->prepared.report.balanced) {
+        snprintf(error->message, sizeof error->message,
+                 "%s: is not a solid, and --require-solid was given; nothing was written", in);
+        return error->status = EBPO_E_NOT_SOLID;
+    }
+    return judges(v) ? room_to_judge(v, p, in, workspace, error) : EBPO_OK;
+}
+
+static ebpo_status convert(const values *v, const char *in, const char *out,
+                           const ebpo_subset_options *need, ebpo_workspace *workspace,
+                           ebpo_error *error)
+{
     progress_line line;
     ebpo_progress progress = progress_start(&line, "convert", v->quiet);
     stage_facts stages = plan_stages(v, in);
@@ -342,31 +332,45 @@ static int run(void *given, const char **operand)
     mesh_input p = { .mesh = { 0 } };
     progress_plan(&line, plan, stages_plan(&stages, plan), &p.as_read.face_count);
     double begun = progress_now();
-    status = mesh_input_read(&p, in, v->mend, workspace, (unsigned)v->threads, progress, &error);
+    ebpo_status status =
+        mesh_input_read(&p, in, v->mend, workspace, (unsigned)v->threads, progress, error);
     progress_wipe(&line);
-    if (status == EBPO_OK) {
-        print_reports(v, &p, in);
-        if (v->require_solid && !p.prepared.report.balanced) {
-            ebpo_mesh_free(&p.mesh);
-            ebpo_workspace_free(workspace);
-            fprintf(stderr,
-                    "ebpo convert: %s: is not a solid, and --require-solid was given; nothing was "
-                    "written\n",
-                    in);
-            return EXIT_NOT_SOLID;
-        }
-        status = stages.judged ? room_to_judge(v, &p, in, workspace, &error) : EBPO_OK;
-        if (status == EBPO_OK)
-            status = build_and_write(v, &p, out, &need, progress, &stages.times, &error);
-        else
-            ebpo_mesh_free(&p.mesh);
-        progress_wipe(&line);
-    }
+    if (status != EBPO_OK)
+        return status;
+    print_reports(v, &p, in);
+    status = refuse(v, &p, in, workspace, error);
+    if (status == EBPO_OK)
+        status = build_and_write(v, &p, out, need, progress, &stages.times, error);
+    else
+        ebpo_mesh_free(&p.mesh);
+    progress_wipe(&line);
     progress_end_stage(&line);
     stages_split(&line, &stages.times);
     stages.faces = p.as_read.face_count;
+    return status == EBPO_OK
+               ? print_result(v, &p, out, &line, &stages, progress_now() - begun, error)
+               : status;
+}
+
+static int run(void *given, const char **operand)
+{
+    const ebpo_build_options defaults = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_subset_options need = EBPO_SUBSET_OPTIONS_INIT;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_workspace *workspace = NULL;
+    values *v = given;
+    if (v->leaf_faces < 0)
+        v->leaf_faces = defaults.leaf_faces;
+    int code = check_values(v, operand[0], operand[1]);
+    if (code == EXIT_FINE)
+        code = check_need(v, &need);
+    if (code != EXIT_FINE)
+        return code;
+    ebpo_status status = ebpo_check_output(operand[1], &error);
     if (status == EBPO_OK)
-        status = print_result(v, &p, out, &line, &stages, progress_now() - begun, &error);
+        status = memory_make(&workspace, &v->memory, &error);
+    if (status == EBPO_OK)
+        status = convert(v, operand[0], operand[1], &need, workspace, &error);
     ebpo_workspace_free(workspace);
     return status == EBPO_OK ? EXIT_FINE : command_failed("convert", &error);
 }

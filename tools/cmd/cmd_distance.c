@@ -7,10 +7,9 @@
 #include "cmd/query_run.h"
 
 static const arg_option options[] = {
-    OPTION_WORD(
-        "mode", 'm', query_values, distance_mode, "MODE", distance_modes,
-        "exact, the default, or one of EBP 2017, which do not promise the minimum: recursive, "
-        "leaves, envelope"),
+    OPTION_WORD("mode", 'm', query_values, distance_mode, "MODE", distance_modes,
+                "exact, the default, or one of EBP 2017, which do not promise the minimum: "
+                "recursive, leaves, envelope"),
     OPTION_REAL("max-distance", 0, query_values, max_distance, "D", 0, DBL_MAX,
                 "what is farther than D does not matter: inf"),
     OPTION_FLAG("unsigned", 0, query_values, unsigned_distance,
@@ -33,8 +32,7 @@ static const arg_spec spec = {
     .most = 2,
     .summary = "how far points are from the model: distance, nearest point, normal, face",
     .text = "MODEL is an .ebpo.h5 file. POINTS: lines 'x y z', or a PLY; absent or '-': standard "
-            "input. Distances are correctly rounded, "
-            "negative inside a solid.",
+            "input. Distances are correctly rounded, negative inside a solid.",
     .options = options,
 };
 

@@ -25,10 +25,9 @@ static const char *const format_words[] = {
 }; /* as in ebpo_export_format */
 
 static const arg_option options[] = {
-    OPTION_WORD(
-        "format", 0, values, format, "FORMAT", format_words,
-        "xdmf, vtkhdf, gltf, glb, obj or stl; the default: as OUT ends. xdmf comes with a second "
-        "file OUT.h5, gltf with one that ends in .bin"),
+    OPTION_WORD("format", 0, values, format, "FORMAT", format_words,
+                "xdmf, vtkhdf, gltf, glb, obj or stl; the default: as OUT ends. xdmf comes with a "
+                "second file OUT.h5, gltf with one that ends in .bin"),
     OPTION_INT("level", 0, values, level, "N", 0, 20,
                "the envelopes of level N, and leaves and black nodes above it"),
     OPTION_TEXT("levels", 0, values, levels, "A-B",
@@ -50,28 +49,22 @@ static const arg_spec spec = {
     .most = 2,
     .summary = "levels and the model for ParaView (XDMF, VTKHDF), as glTF, OBJ or STL",
     .text = "FILE is an .ebpo.h5 file or its URL. --level, --levels or --mesh is needed. XDMF and "
-            "VTKHDF keep double "
-            "coordinates and the nodes' data; glTF, OBJ and STL hold float32.",
+            "VTKHDF keep double coordinates and the nodes' data; glTF, OBJ and STL hold float32.",
     .options = options,
 };
-
-static int usage_error(const char *message)
-{
-    fprintf(stderr, "ebpo export: %s; try 'ebpo export --help'\n", message);
-    return EXIT_USAGE;
-}
 
 static int choose_format(values *v, const char *out)
 {
     const char *dot = strrchr(out, '.');
     if (dot && strcasecmp(dot, ".ply") == 0 && v->format < 0)
-        return usage_error("PLY is written by 'ebpo extract'");
+        return command_usage("export", "PLY is written by 'ebpo extract'");
     for (int i = 0; dot && v->format < 0 && format_words[i]; i++)
         if (strcasecmp(dot + 1, format_words[i]) == 0)
             v->format = i;
     return v->format >= 0
                ? EXIT_FINE
-               : usage_error("the format is not told by the output's ending; give --format");
+               : command_usage("export",
+                               "the format is not told by the output's ending; give --format");
 }
 
 static int choose_levels(const values *v, ebpo_export_options *o)
@@ -81,17 +74,18 @@ static int choose_levels(const values *v, ebpo_export_options *o)
     *o = (ebpo_export_options)EBPO_EXPORT_OPTIONS_INIT;
     o->mesh = v->mesh;
     if (v->level < 0 && !v->levels && !v->mesh)
-        return usage_error("what shall be exported? give --level N, --levels A-B or --mesh");
+        return command_usage("export",
+                             "what shall be exported? give --level N, --levels A-B or --mesh");
     if (v->level >= 0 && v->levels)
-        return usage_error("--level and --levels exclude each other");
+        return command_usage("export", "--level and --levels exclude each other");
     if (v->level >= 0)
         o->first_level = o->last_level = (int)v->level;
     if (!v->levels)
         return EXIT_FINE;
     if (sscanf(v->levels, "%2d-%2d%c", &first, &last, &rest) != 2 || first < 0 || last < first ||
         last >= EBPO_LEVELS_MAX)
-        return usage_error(
-            "--levels wants the first level, a hyphen and the last one, such as 0-6");
+        return command_usage(
+            "export", "--levels wants the first level, a hyphen and the last one, such as 0-6");
     o->first_level = first;
     o->last_level = last;
     return EXIT_FINE;
@@ -101,12 +95,8 @@ static int check_names(const char *in, const char *out, const char *second)
 {
     const char *names[] = { out, second };
     for (int i = 0; i < 2; i++)
-        if (*names[i] && (strcmp(in, names[i]) == 0 || command_same_file(in, names[i]))) {
-            fprintf(stderr,
-                    "ebpo export: %s: is input and output at once; give the output another name\n",
-                    names[i]);
+        if (*names[i] && command_overwrites("export", in, names[i]))
             return EXIT_USAGE;
-        }
     return EXIT_FINE;
 }
 
@@ -213,7 +203,8 @@ static int run(void *given, const char **operand)
     if (code != EXIT_FINE)
         return code;
     if (!ebpo_export_second_file((ebpo_export_format)v->format, operand[1], second, sizeof second))
-        return usage_error("the output's name is too long, or has a ':', which XDMF cannot take");
+        return command_usage("export",
+                             "the output's name is too long, or has a ':', which XDMF cannot take");
     code = check_names(operand[0], operand[1], second);
     if (code != EXIT_FINE)
         return code;

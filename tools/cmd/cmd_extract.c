@@ -44,22 +44,15 @@ static const arg_spec spec = {
 
 static int check_values(const values *v, const char *in, const char *out)
 {
-    const char *message = NULL;
-    if ((v->level >= 0) == v->mesh)
-        message = v->mesh ? "--level and --mesh exclude each other"
-                          : "what shall be extracted? give --level N or --mesh";
-    else if (v->mesh && v->no_walls)
-        message = "--no-walls belongs to --level; the model has no cell walls";
-    if (message) {
-        fprintf(stderr, "ebpo extract: %s; try 'ebpo extract --help'\n", message);
+    if (v->level < 0 && !v->mesh)
+        return command_usage("extract", "what shall be extracted? give --level N or --mesh");
+    if (v->level >= 0 && v->mesh)
+        return command_usage("extract", "--level and --mesh exclude each other");
+    if (v->mesh && v->no_walls)
+        return command_usage("extract",
+                             "--no-walls belongs to --level; the model has no cell walls");
+    if (command_overwrites("extract", in, out))
         return EXIT_USAGE;
-    }
-    if (strcmp(in, out) == 0 || command_same_file(in, out)) {
-        fprintf(stderr,
-                "ebpo extract: %s: is input and output at once; give the output another name\n",
-                out);
-        return EXIT_USAGE;
-    }
     return EXIT_FINE;
 }
 

@@ -26,9 +26,8 @@ static const arg_spec spec = {
     .most = 2,
     .summary = "a file by its URL, or levels, a box, parts of it; goes on where it was interrupted",
     .text = "Only what is kept is fetched. OUT appears whole or not at all; until then what has "
-            "come lies in the folder "
-            "OUT.part, from which the same command goes on. Without options the whole content is "
-            "fetched.",
+            "come lies in the folder OUT.part, from which the same command goes on. Without "
+            "options the whole content is fetched.",
     .options = options,
 };
 
@@ -195,10 +194,8 @@ static int run(void *given, const char **operand)
     if (!command_wants_hdf5("fetch", operand[0]))
         return EXIT_FAILED;
     char *part = NULL; /* with a folder of the user's, that one does */
-    if (ebpo_is_url(operand[0]) && !v->remote.cache && asprintf(&part, "%s.part", operand[1]) < 0) {
-        fprintf(stderr, "ebpo fetch: out of memory\n");
-        return EXIT_FAILED;
-    }
+    if (ebpo_is_url(operand[0]) && !v->remote.cache && asprintf(&part, "%s.part", operand[1]) < 0)
+        return command_no_memory("fetch");
     code =
         out_fits(operand[1], part) ? fetch(v, operand[0], operand[1], part, &subset) : EXIT_FAILED;
     free(part);

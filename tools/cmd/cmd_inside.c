@@ -8,8 +8,7 @@
 static const arg_option options[] = {
     OPTION_WORD("mode", 'm', query_values, inside_mode, "MODE", inside_modes,
                 "how to get there; the answers are the same. fast, the default, or one of EBP "
-                "2017: cache, "
-                "nodes, subtree, each also with -plain (without envelopes)"),
+                "2017: cache, nodes, subtree, each also with -plain (without envelopes)"),
     QUERY_LIMIT_OPTIONS("look at levels 0 to L only: IN and OUT are certain, else MAYBE"),
     QUERY_MODEL_OPTIONS,
     QUERY_PREFETCH_OPTION,

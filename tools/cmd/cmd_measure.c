@@ -25,12 +25,10 @@ static const arg_option options[] = {
                 "point, mean and rms over its surface"),
     OPTION_REAL("tolerance", 0, values, tolerance, "T", 1e-6, 1000,
                 "with --deviation: bounds are refined until the upper one is at most 1 + T times "
-                "the lower "
-                "one; default 0.05"),
-    OPTION_INT(
-        "questions", 0, values, questions, "N", 0, 9007199254740992.0,
-        "with --deviation: stop after about N distances for each level and tell what is certain "
-        "then; default 200000; 0: no limit"),
+                "the lower one; default 0.05"),
+    OPTION_INT("questions", 0, values, questions, "N", 0, 9007199254740992.0,
+               "with --deviation: stop after about N distances for each level and tell what is "
+               "certain then; default 200000; 0: no limit"),
     OPTION_FLAG("derived", 0, values, derived,
                 "also the volume of each level with leaves cut by planes derived from their faces"),
     OPTION_FLAG("limit", 0, values, limit,
@@ -49,8 +47,7 @@ static const arg_spec spec = {
     .summary =
         "area, volume, centroid and inertia, and the volume of each level or how far it reaches",
     .text = "FILE is an .ebpo.h5 file with its mesh, or its URL. Volume, centroid and inertia are "
-            "those of the winding number's integral "
-            "(density 1); a surface has an area only.",
+            "those of the winding number's integral (density 1); a surface has an area only.",
     .options = options,
 };
 

@@ -24,8 +24,7 @@ static const arg_spec spec = {
     .most = 2,
     .summary = "what rays hit: t, face and side of the first face",
     .text = "MODEL is an .ebpo.h5 file. RAYS: lines 'ox oy oz dx dy dz [tmax]'; absent or '-': "
-            "standard input. What is hit, and in which order, "
-            "is exact; '-' stands for nothing.",
+            "standard input. What is hit, and in which order, is exact; '-' stands for nothing.",
     .options = options,
 };
 

@@ -76,9 +76,7 @@ typedef struct job {
 
 static int usage_error(const char *what, const char *value, const char *expected)
 {
-    fprintf(stderr, "ebpo render: %s: '%s' is not %s; try 'ebpo render --help'\n", what, value,
-            expected);
-    return EXIT_USAGE;
+    return command_usage("render", "%s: '%s' is not %s", what, value, expected);
 }
 
 static bool parse_levels(job *j)
@@ -109,11 +107,8 @@ static int parse(job *j)
 {
     char rest;
     const values *v = &j->v;
-    if ((v->level >= 0) + v->mesh + (v->levels != NULL) > 1) {
-        fprintf(stderr, "ebpo render: --level, --levels and --mesh exclude each other; try 'ebpo "
-                        "render --help'\n");
-        return EXIT_USAGE;
-    }
+    if ((v->level >= 0) + v->mesh + (v->levels != NULL) > 1)
+        return command_usage("render", "--level, --levels and --mesh exclude each other");
     if (sscanf(v->view, "%lf,%lf%c", &j->azimuth, &j->elevation, &rest) != 2 ||
         !(j->azimuth >= -360 && j->azimuth <= 360) || !(j->elevation >= -90 && j->elevation <= 90))
         return usage_error("--view", v->view,
@@ -285,12 +280,8 @@ static int run_job(job *j)
     int code = parse(j);
     if (code != EXIT_FINE)
         return code;
-    if (strcmp(j->in, j->out) == 0 || command_same_file(j->in, j->out)) {
-        fprintf(stderr,
-                "ebpo render: %s: is input and output at once; give the output another name\n",
-                j->out);
+    if (command_overwrites("render", j->in, j->out))
         return EXIT_USAGE;
-    }
     int is_file = command_is_hdf5("render", j->in);
     if (is_file < 0)
         return EXIT_FAILED;
@@ -313,10 +304,8 @@ static int run(void *given, const char **operand)
     values *v = given;
 #if EBPO_HAVE_PNG
     job *j = calloc(1, sizeof *j);
-    if (!j) {
-        fprintf(stderr, "ebpo render: no memory\n");
-        return EXIT_FAILED;
-    }
+    if (!j)
+        return command_no_memory("render");
     j->v = *v;
     j->in = operand[0];
     j->out = operand[1];

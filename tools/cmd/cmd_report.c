@@ -20,15 +20,13 @@ static const arg_option options[] = {
     OPTION_LIST("name", 0, report_values, names, "NAME",
                 "of a FILE's method, in their order; default: the file's name"),
     OPTION_SET("select", 0, report_values, select, "LIST", selection_words,
-               "of a mesh: make a file with each of these selections of planes, inherit, "
-               "kmedoids, offset, "
-               "random; default: inherit"),
+               "of a mesh: make a file with each of these selections of planes, inherit, kmedoids, "
+               "offset, random; default: inherit"),
     OPTION_REAL("percent", 0, report_values, percent, "P", 0, 100,
                 "of the theses' selections: share of the candidates; default 40"),
-    OPTION_TEXT(
-        "k-root", 0, report_values, k_root, "K",
-        "instead: K planes at the root, or 'K%' of the faces, half as many at each next level "
-        "(BP-Octree)"),
+    OPTION_TEXT("k-root", 0, report_values, k_root, "K",
+                "instead: K planes at the root, or 'K%' of the faces, half as many at each next "
+                "level (BP-Octree)"),
     OPTION_WORD("normals", 0, report_values, normals, "NAME", normals_words,
                 "distance of normals for k-medoids: spherical (the default) or angle"),
     OPTION_INT("max-level", 0, report_values, max_level, "N", 0, 20,
@@ -65,18 +63,14 @@ static const arg_spec spec = {
     .most = ARGS_OPERANDS_MAX - 1,
     .summary = "methods compared level by level: bytes, error, run time; a page with plots",
     .text = "FILEs are .ebpo.h5 files of one model (or their URLs), each a method; or one mesh, "
-            "from which a file is made "
-            "with each selection. DIR appears whole, with report.html, report.csv and report.json; "
-            "an older report there "
-            "is replaced.",
+            "from which a file is made with each selection. DIR appears whole, with report.html, "
+            "report.csv and report.json; an older report there is replaced.",
     .options = options,
 };
 
 static int wrong(const char *option, const char *value, const char *expected)
 {
-    fprintf(stderr, "ebpo report: %s: '%s' is not %s; try 'ebpo report --help'\n", option, value,
-            expected);
-    return EXIT_USAGE;
+    return command_usage("report", "%s: '%s' is not %s", option, value, expected);
 }
 
 /* --- options --- */
@@ -96,13 +90,10 @@ static int read_options(comparison *c, report_values *v, bool mesh)
                      "an azimuth from -360 to 360, a comma, and an elevation from -90 to 90");
     bool building = v->select || v->percent >= 0 || v->k_root || v->normals >= 0 ||
                     v->max_level >= 0 || v->leaf_faces >= 0 || v->epsilon >= 0 || v->keep;
-    if (!mesh && building) {
-        fprintf(stderr,
-                "ebpo report: --select, --percent, --k-root, --normals, --max-level, --leaf-faces, "
-                "--epsilon and --keep are for a mesh, from which files are made; try 'ebpo "
-                "report --help'\n");
-        return EXIT_USAGE;
-    }
+    if (!mesh && building)
+        return command_usage("report",
+                             "--select, --percent, --k-root, --normals, --max-level, --leaf-faces, "
+                             "--epsilon and --keep are for a mesh, from which files are made");
     const ebpo_build_options usual = EBPO_BUILD_OPTIONS_INIT;
     v->select = v->select ? v->select : 1u << EBPO_SELECT_INHERIT;
     /* the seed is of the points, too */
@@ -253,8 +244,7 @@ static int run(void *given, const char **operand)
     if (c.methods) {
         code = work(&c, operand, place, &line);
     } else {
-        fprintf(stderr, "ebpo report: not enough memory\n");
-        code = EXIT_FAILED;
+        code = command_no_memory("report");
     }
     progress_wipe(&line);
     output_drop(c.folder);

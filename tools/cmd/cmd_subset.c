@@ -17,9 +17,8 @@ static const arg_spec spec = {
     .most = 2,
     .summary = "a smaller .ebpo.h5 file of a file: levels, a box, parts, an error or a size",
     .text = "FILE is an .ebpo.h5 file or its URL (what is interrupted begins anew; 'ebpo fetch' "
-            "goes on). OUT appears "
-            "whole or not at all. Questions to it are answered as by FILE, or refused where what "
-            "was left out matters.",
+            "goes on). OUT appears whole or not at all. Questions to it are answered as by FILE, "
+            "or refused where what was left out matters.",
     .options = options,
 };
 

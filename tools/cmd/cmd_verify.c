@@ -23,8 +23,7 @@ static const arg_option options[] = {
                 "also compare the model with its source, bit for bit"),
     OPTION_INT("samples", 0, values, samples, "N", 0, 9007199254740992.0,
                "cells whose labels are checked by an independent winding number; 0, the default: "
-               "all of up "
-               "to four million, a million of more"),
+               "all of up to four million, a million of more"),
     OPTION_THREADS(values, threads),
     MEMORY_OPTIONS(values, memory),
     OPTION_FLAG("json", 0, values, json, "print the counts as JSON"),

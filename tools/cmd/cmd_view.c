@@ -27,10 +27,9 @@ typedef struct values {
 static const char *const order_words[] = { "level", "distance", "pixels", "front-to-back", NULL };
 
 static const arg_option options[] = {
-    OPTION_WORD(
-        "order", 0, values, order, "ORDER", order_words,
-        "what comes first: level, distance, pixels (the largest) or front-to-back; the default: "
-        "pixels with --eye, else level"),
+    OPTION_WORD("order", 0, values, order, "ORDER", order_words,
+                "what comes first: level, distance, pixels (the largest) or front-to-back; the "
+                "default: pixels with --eye, else level"),
     OPTION_TEXT("eye", 0, values, eye, "X,Y,Z", "where the observer is, in the model's unit"),
     OPTION_TEXT("look", 0, values, look, "X,Y,Z", "the point looked at; the default: all around"),
     OPTION_TEXT("up", 0, values, up, "X,Y,Z", "the direction upwards; the default: 0,1,0"),
@@ -78,20 +77,16 @@ typedef struct printer {
 
 /* --- options --- */
 
-static int usage(const char *what)
-{
-    fprintf(stderr, "ebpo view: %s; try 'ebpo view --help'\n", what);
-    return EXIT_USAGE;
-}
-
 static int check_values(const values *v)
 {
     if (!v->eye && (v->order > EBPO_PRIORITY_LEVEL || v->look || v->fov > 0 || v->size ||
                     v->pixels > 0 || v->distance >= 0))
-        return usage("--order distance, pixels and front-to-back, --look, --fov, --size, --pixels "
-                     "and --distance need --eye X,Y,Z");
+        return command_usage(
+            "view", "--order distance, pixels and front-to-back, --look, --fov, --size, --pixels "
+                    "and --distance need --eye X,Y,Z");
     if (!v->look && (v->up || v->seen_only))
-        return usage(
+        return command_usage(
+            "view",
             "--up and --seen-only need --look X,Y,Z: without it the observer looks all around");
     return EXIT_FINE;
 }
@@ -102,10 +97,7 @@ static bool read_triple(const char *name, const char *text, double out[3])
     if (sscanf(text, "%lf,%lf,%lf%c", &out[0], &out[1], &out[2], &rest) == 3 && isfinite(out[0]) &&
         isfinite(out[1]) && isfinite(out[2]))
         return true;
-    fprintf(
-        stderr,
-        "ebpo view: --%s: '%s' is not three numbers with commas between; try 'ebpo view --help'\n",
-        name, text);
+    command_usage("view", "--%s: '%s' is not three numbers with commas between", name, text);
     return false;
 }
 
@@ -113,9 +105,7 @@ static bool read_budget(const char *name, const char *text, uint64_t *out)
 {
     if (!text || (words_read_size(text, out) && *out))
         return true;
-    fprintf(stderr,
-            "ebpo view: --%s: '%s' is not a size such as 512K or 4M; try 'ebpo view --help'\n",
-            name, text);
+    command_usage("view", "--%s: '%s' is not a size such as 512K or 4M", name, text);
     return false;
 }
 
@@ -137,10 +127,8 @@ static bool read_observer(const values *v, ebpo_observer *o)
     if (v->size &&
         (sscanf(v->size, "%9" SCNu32 "x%9" SCNu32 "%c", &o->width, &o->height, &rest) != 2 ||
          !o->width || !o->height)) {
-        fprintf(stderr,
-                "ebpo view: --size: '%s' is not a width, an x, and a height, each from 1; try "
-                "'ebpo view --help'\n",
-                v->size);
+        command_usage("view", "--size: '%s' is not a width, an x, and a height, each from 1",
+                      v->size);
         return false;
     }
     return true;
@@ -315,8 +303,8 @@ static int run(void *given, const char **operand)
         return code;
     if (!read_options(v, &wanted, &observer))
         return EXIT_USAGE;
-    if (v->out && command_same_file(operand[0], v->out))
-        return usage("FILE is input and output at once; give --out another name");
+    if (v->out && command_overwrites("view", operand[0], v->out))
+        return EXIT_USAGE;
     if (!command_wants_hdf5("view", operand[0]))
         return EXIT_FAILED;
     if (remote_open(&file, operand[0], &v->remote, &error) != EBPO_OK)

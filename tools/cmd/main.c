@@ -29,15 +29,12 @@ static const command *find(const char *name)
 static void usage(FILE *out)
 {
     fprintf(out, "usage: ebpo COMMAND [options] ...\n\nEBP-Octree in HDF5: closed triangle meshes "
-                 "as trees of convex "
-                 "envelopes.\n\n"
-                 "commands:\n");
+                 "as trees of convex envelopes.\n\ncommands:\n");
     for (int i = 0; i < COMMANDS; i++)
         fprintf(out, "  %-10s %s\n", commands[i]->spec->command, commands[i]->spec->summary);
     fprintf(out, "  %-10s %s\n", "help", "what a command does and its options: ebpo help COMMAND");
-    fprintf(out, "\n  --version  the version, and end\n"
-                 "\nexit codes: 0 fine, 1 data or input/output, 2 usage, 3 not a solid where one "
-                 "is required\n");
+    fprintf(out, "\n  --version  the version, and end\n\nexit codes: 0 fine, 1 data or "
+                 "input/output, 2 usage, 3 not a solid where one is required\n");
 }
 
 static int unknown_command(const char *name)
@@ -69,10 +66,8 @@ static int run(const command *c, int argc, char **argv)
 {
     const char *operand[ARGS_OPERANDS_MAX];
     void *values = malloc(c->size);
-    if (!values) {
-        fprintf(stderr, "ebpo %s: not enough memory\n", c->spec->command);
-        return EXIT_FAILED;
-    }
+    if (!values)
+        return command_no_memory(c->spec->command);
     memcpy(values, c->usual, c->size);
     arg_result parsed = args_parse(c->spec, argc, argv, values, operand);
     int code = parsed == ARGS_RUN      ? c->run(values, operand)

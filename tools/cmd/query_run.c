@@ -43,7 +43,7 @@ int query_run(query_job *job, const char *model, const char *path)
     double *rows = malloc(sizeof *rows * POINTS_BATCH * POINTS_WIDEST);
     bool opened = points_open(&in, job->command, path, job->kind, v->raw, v->tmax);
     if (!rows)
-        fprintf(stderr, "ebpo %s: not enough memory\n", job->command);
+        (void)command_no_memory(job->command);
     else if (opened)
         code = query_open(&session, job->command, model, &holding, (int)v->level, &v->remote);
     if (session.context)

@@ -12,14 +12,6 @@
 
 const char *const profile_words[] = { "full", "lod", "collision", NULL }; /* by ebpo_profile */
 
-static int usage(const char *name, const char *message, const char *text)
-{
-    fprintf(stderr, "ebpo %s: ", name);
-    fprintf(stderr, message, text);
-    fprintf(stderr, "; try 'ebpo %s --help'\n", name);
-    return EXIT_USAGE;
-}
-
 /* "0-N" or "N". */
 static bool read_levels(const char *text, int *last)
 {
@@ -93,10 +85,11 @@ int subset_need(const char *name, double max_error, const char *target_size,
                 ebpo_subset_options *out)
 {
     if (target_size && (!words_read_size(target_size, &out->target_bytes) || !out->target_bytes))
-        return usage(name, "--target-size: '%s' is not a number of bytes such as 500K or 20M",
-                     target_size);
+        return command_usage(name,
+                             "--target-size: '%s' is not a number of bytes such as 500K or 20M",
+                             target_size);
     if (target_size && max_error > 0)
-        return usage(name, "--max-error and --target-size exclude each other%s", "");
+        return command_usage(name, "--max-error and --target-size exclude each other");
     out->max_error = max_error;
     return EXIT_FINE;
 }
@@ -116,28 +109,27 @@ int subset_options(const char *name, const subset_values *v, const char *in, con
 {
     *out = (ebpo_subset_options)EBPO_SUBSET_OPTIONS_INIT;
     if (v->levels && !read_levels(v->levels, &out->last_level))
-        return usage(name,
-                     "--levels: '%s' is not 0-N with N up to 20; levels begin at 0, as each one "
-                     "rests on those above",
-                     v->levels);
+        return command_usage(
+            name,
+            "--levels: '%s' is not 0-N with N up to 20; levels begin at 0, as each one "
+            "rests on those above",
+            v->levels);
     if (v->box && !read_box(v->box, out))
-        return usage(name,
-                     "--box: '%s' is not six numbers with commas between, the lower corner first",
-                     v->box);
+        return command_usage(
+            name, "--box: '%s' is not six numbers with commas between, the lower corner first",
+            v->box);
     if (v->parts && !read_parts(v->parts, &out->parts))
-        return usage(name,
-                     "--parts: '%s' is not a list of mesh, maps, envelopes, leaf-planes, or of "
-                     "these with a minus sign before each",
-                     v->parts);
+        return command_usage(
+            name,
+            "--parts: '%s' is not a list of mesh, maps, envelopes, leaf-planes, or of "
+            "these with a minus sign before each",
+            v->parts);
     if (v->parts && v->profile >= 0)
-        return usage(name, "--parts and --profile exclude each other%s", "");
+        return command_usage(name, "--parts and --profile exclude each other");
     if (v->zstd_level && v->codec > EBPO_CODEC_ZSTD)
-        return usage(name, "--zstd-level says nothing about --codec deflate or none%s", "");
-    if (strcmp(in, out_path) == 0 || command_same_file(in, out_path)) {
-        fprintf(stderr, "ebpo %s: %s: is input and output at once; give the output another name\n",
-                name, out_path);
+        return command_usage(name, "--zstd-level says nothing about --codec deflate or none");
+    if (command_overwrites(name, in, out_path))
         return EXIT_USAGE;
-    }
     if (v->profile >= 0)
         out->parts = ebpo_profile_parts((ebpo_profile)v->profile);
     out->threads = (unsigned)v->threads;

@@ -30,8 +30,7 @@ extern const char *const profile_words[];
                     "keep what meets this box only"),                                              \
         OPTION_TEXT("parts", 0, subset_values, parts, "LIST",                                      \
                     "keep these of mesh, maps, envelopes, leaf-planes; with a minus sign before "  \
-                    "each: all "                                                                   \
-                    "but these"),                                                                  \
+                    "each: all but these"),                                                        \
         OPTION_WORD("profile", 0, subset_values, profile, "NAME", profile_words,                   \
                     "full: all parts; lod: envelopes, leaf-planes, for viewers; collision: mesh, " \
                     "envelopes, for exact questions"),                                             \
@@ -44,15 +43,13 @@ extern const char *const profile_words[];
         OPTION_QUIET(subset_values, quiet), REMOTE_OPTIONS(subset_values, remote)
 
 /* The same for choosing by need, which takes the whole model: `ebpo subset` only. */
-#define NEED_OPTIONS(type)                                                                        \
-    OPTION_REAL(                                                                                  \
-        "max-error", 0, type, max_error, "E", 0, 1.7976931348623157e308,                          \
-        "refine only where envelopes may reach more than E beyond the model (in its unit): what " \
-        "is left out is certainly closer"),                                                       \
-        OPTION_TEXT(                                                                              \
-            "target-size", 0, type, target_size, "S",                                             \
-            "at most so many bytes (k, M, G: powers of 1024), with the least --max-error for "    \
-            "which that holds; which parts are kept is chosen too, unless said")
+#define NEED_OPTIONS(type)                                                                         \
+    OPTION_REAL("max-error", 0, type, max_error, "E", 0, 1.7976931348623157e308,                   \
+                "refine only where envelopes may reach more than E beyond the model (in its "      \
+                "unit): what is left out is certainly closer"),                                    \
+        OPTION_TEXT("target-size", 0, type, target_size, "S",                                      \
+                    "at most so many bytes (k, M, G: powers of 1024), with the least --max-error " \
+                    "for which that holds; which parts are kept is chosen too, unless said")
 
 /* The two, read; the exit code. */
 int subset_need(const char *name, double max_error, const char *target_size,
