@@ -167,3 +167,13 @@ ebpo_status ebpo_subset_tree_within(ebpo_tree *out, ebpo_file *file,
     name_mesh(out);
     return EBPO_OK;
 }
+
+ebpo_write_options ebpo_subset_write_options(const ebpo_subset_options *options)
+{
+    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
+    write.codec = options->codec;
+    write.codec_level = options->codec_level;
+    write.threads = options->threads;
+    write.progress = options->progress;
+    return write;
+}

@@ -16,16 +16,6 @@ uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces)
                       ANYHOW);
 }
 
-ebpo_write_options ebpo_subset_write_options(const ebpo_subset_options *options)
-{
-    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
-    write.codec = options->codec;
-    write.codec_level = options->codec_level;
-    write.threads = options->threads;
-    write.progress = options->progress;
-    return write;
-}
-
 ebpo_status ebpo_subset(ebpo_file *file, const char *path, const ebpo_subset_options *options,
                         ebpo_error *error)
 {
