@@ -9,6 +9,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/hash.h"
 
 typedef enum slot_state { LOADING, READY, FAILED } slot_state;
 
@@ -68,8 +69,7 @@ static double now(void)
 
 static slot **bucket_of(slot **bucket, uint64_t bucket_count, uint64_t key)
 {
-    key = (key ^ key >> 31) * UINT64_C(0x9e3779b97f4a7c15);
-    return &bucket[(key ^ key >> 32) & (bucket_count - 1)];
+    return &bucket[ebpo_hash_number(key) & (bucket_count - 1)];
 }
 
 static slot *find(const ebpo_cache *c, uint64_t key)

@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/hash.h"
+
 enum { SAMPLE_MOST = 4096, TABLE = 16384 };
 
 typedef struct bin {
@@ -59,9 +61,9 @@ static bool fill_bins(bin *table, int *used, int *slots, const uint32_t *sample,
     for (int i = 0; i < count; i++) {
         uint32_t u = sample[i] & 1023, v = sample[i] >> 10 & 1023,
                  key = 1 + u / width + (v / width << 10);
-        uint32_t at = (key * 2654435761u) >> 18;
-        while (table[at].key && table[at].key != key)
-            at = (at + 1) % TABLE;
+        uint64_t at;
+        EBPO_HASH_FIND(at, ebpo_hash_number(key), TABLE - 1,
+                       !table[at].key || table[at].key == key);
         if (!table[at].key) {
             if (*used == most)
                 return false;

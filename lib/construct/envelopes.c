@@ -11,6 +11,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/hash.h"
 #include "construct/candidates.h"
 #include "construct/proposals.h"
 #include "construct/supports.h"
@@ -182,10 +183,11 @@ static bool take_points(ebpo_envelope_scratch *s)
 /* False when the table has it. */
 static bool new_normal(ebpo_envelope_scratch *s, uint32_t normal)
 {
-    uint32_t at = normal * 2654435761u >> 22;
-    for (; s->normals[at]; at = (at + 1) % TABLE)
-        if (s->normals[at] == 1 + normal)
-            return false;
+    uint64_t at;
+    EBPO_HASH_FIND(at, ebpo_hash_number(normal), TABLE - 1,
+                   !s->normals[at] || s->normals[at] == 1 + normal);
+    if (s->normals[at])
+        return false;
     s->normals[at] = 1 + normal;
     return true;
 }

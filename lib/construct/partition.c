@@ -8,6 +8,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/hash.h"
 #include "construct/branch.h"
 #include "construct/corner_windings.h"
 #include "construct/vertex_bounds.h"
@@ -153,10 +154,10 @@ static ebpo_status split(grower *g, ebpo_cell cell, uint64_t at, uint64_t count,
 
 static uint64_t set_slot(const face_set *set, uint32_t face)
 {
-    uint64_t slot = (face * UINT64_C(0x9e3779b97f4a7c15)) >> 32 & set->mask;
-    while (set->slots[slot].round == set->round && set->slots[slot].face != face)
-        slot = (slot + 1) & set->mask;
-    return slot;
+    uint64_t at;
+    EBPO_HASH_FIND(at, ebpo_hash_number(face), set->mask,
+                   set->slots[at].round != set->round || set->slots[at].face == face);
+    return at;
 }
 
 static bool set_has(const face_set *set, uint32_t face)
@@ -168,9 +169,7 @@ static bool set_has(const face_set *set, uint32_t face)
 static bool set_start(face_set *set, uint64_t most)
 {
     if (!set->slots) {
-        uint64_t size = 8;
-        while (size < 2 * (most + 2))
-            size *= 2;
+        uint64_t size = ebpo_hash_slots(2 * (most + 2));
         set->slots = ebpo_alloc_zero(size, sizeof *set->slots);
         set->mask = size - 1;
     }

@@ -6,39 +6,38 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/hash.h"
 #include "construct/corner_windings.h"
 #include "construct/vertex_bounds.h"
 #include "geom/plane_code.h"
 
 enum { FEW_VERTICES = 4096, TABLE_MOST = 1 << 16, MANY_POINTS = 1 << 15 };
 
-static uint32_t hash_of(const double x[3])
+static bool is_point(const ebpo_supports *s, unsigned i, const double x[3])
 {
-    uint64_t bits[3];
-    memcpy(bits, x, sizeof bits);
-    return (uint32_t)(((bits[0] * 0x9e3779b97f4a7c15u ^ bits[1]) * 0xbf58476d1ce4e5b9u ^ bits[2]) *
-                          0x94d049bb133111ebu >>
-                      40);
+    const double(*p)[4] = (const double(*)[4])s->point[i / 4];
+    return p[0][i % 4] == x[0] && p[1][i % 4] == x[1] && p[2][i % 4] == x[2];
 }
 
 /* True when the point is there already; its slack is then the greater of the two. */
 static bool known_point(ebpo_supports *s, const double x[3], double slack)
 {
-    uint64_t mask = s->place_count - 1, at = hash_of(x) & mask;
+    uint64_t bits[3], at;
     if (s->count >= s->place_count / 2)
         return false;
-    for (; s->place[at]; at = (at + 1) & mask) {
-        unsigned i = s->place[at] - 1u, lane = i % 4;
-        double(*p)[4] = s->point[i / 4];
-        if (p[0][lane] != x[0] || p[1][lane] != x[1] || p[2][lane] != x[2])
-            continue;
-        p[3][lane] = slack > p[3][lane] ? slack : p[3][lane];
-        for (unsigned copy = lane ? 4 : (unsigned)(s->count - i); copy < 4; copy++)
-            p[3][copy] = p[3][0];
-        return true;
+    memcpy(bits, x, sizeof bits);
+    EBPO_HASH_FIND(at, ebpo_hash_three(bits), s->place_count - 1,
+                   !s->place[at] || is_point(s, s->place[at] - 1u, x));
+    if (!s->place[at]) {
+        s->place[at] = (uint16_t)(s->count + 1);
+        return false;
     }
-    s->place[at] = (uint16_t)(s->count + 1);
-    return false;
+    unsigned i = s->place[at] - 1u, lane = i % 4;
+    double(*p)[4] = s->point[i / 4];
+    p[3][lane] = slack > p[3][lane] ? slack : p[3][lane];
+    for (unsigned copy = lane ? 4 : (unsigned)(s->count - i); copy < 4; copy++)
+        p[3][copy] = p[3][0];
+    return true;
 }
 
 static bool add_point(ebpo_supports *s, const double x[3], double slack)
@@ -100,9 +99,7 @@ static bool add_crossings(ebpo_supports *s, const ebpo_branch *branch, const ebp
 /* For about so many points. */
 static bool clear_table(ebpo_supports *s, uint64_t points)
 {
-    uint64_t size = 16;
-    while (size < 2 * points && size < TABLE_MOST)
-        size *= 2;
+    uint64_t size = ebpo_hash_slots(2 * points < TABLE_MOST ? 2 * points : TABLE_MOST);
     s->place_count = size;
     if (!ebpo_array_grow_late(s->b->workspace, &s->place, &s->place_capacity, size,
                               sizeof *s->place))

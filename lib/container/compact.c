@@ -4,29 +4,28 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/hash.h"
 #include "container/slice_parts.h"
 
 static const uint32_t FREE = UINT32_MAX;
 
 ebpo_status ebpo_compact_make(ebpo_compact *out, uint64_t room, ebpo_error *error)
 {
-    unsigned bits = 4;
-    while (UINT64_C(1) << bits < 2 * room && bits < 32)
-        bits++;
-    *out = (ebpo_compact){ .shift = 32 - bits };
+    *out = (ebpo_compact){ .mask = 0 };
     if (room > UINT64_C(1) << 31)
         return ebpo_fail(
             error, EBPO_E_LIMIT,
             "%llu references in one subtree are more than can be numbered; choose a deeper level",
             (unsigned long long)room);
-    out->slot = ebpo_alloc(UINT64_C(1) << bits, sizeof *out->slot);
+    uint64_t slots = ebpo_hash_slots(2 * room);
+    out->mask = slots - 1;
+    out->slot = ebpo_alloc(slots, sizeof *out->slot);
     out->sorted = ebpo_alloc(room, sizeof *out->sorted);
     if (!out->slot || !out->sorted) {
         ebpo_compact_free(out);
-        return ebpo_fail_memory(error, (UINT64_C(1) << bits) * sizeof *out->slot +
-                                           room * sizeof *out->sorted);
+        return ebpo_fail_memory(error, slots * sizeof *out->slot + room * sizeof *out->sorted);
     }
-    memset(out->slot, 0xff, (UINT64_C(1) << bits) * sizeof *out->slot);
+    memset(out->slot, 0xff, slots * sizeof *out->slot);
     return EBPO_OK;
 }
 
@@ -37,18 +36,18 @@ void ebpo_compact_free(ebpo_compact *compact)
     *compact = (ebpo_compact){ .slot = NULL };
 }
 
-/* Where a number is, or would be: multiplication spreads neighbours. */
-static uint32_t slot_of(const ebpo_compact *c, uint32_t number)
+/* Where a number is, or would be. */
+static uint64_t slot_of(const ebpo_compact *c, uint32_t number)
 {
-    uint32_t mask = UINT32_MAX >> c->shift, at = number * UINT32_C(0x9e3779b1) >> c->shift;
-    while (c->slot[at].number != number && c->slot[at].number != FREE)
-        at = (at + 1) & mask;
+    uint64_t at;
+    EBPO_HASH_FIND(at, ebpo_hash_number(number), c->mask,
+                   c->slot[at].number == number || c->slot[at].number == FREE);
     return at;
 }
 
 void ebpo_compact_add(ebpo_compact *compact, uint32_t number)
 {
-    uint32_t at = slot_of(compact, number);
+    uint64_t at = slot_of(compact, number);
     if (compact->slot[at].number == number)
         return;
     compact->slot[at].number = number;

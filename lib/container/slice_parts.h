@@ -126,7 +126,7 @@ typedef struct ebpo_compact {
     struct {
         uint32_t number, place;
     } * slot;
-    unsigned shift;
+    uint64_t mask;
     uint32_t *sorted; /* [count] */
     uint64_t count;
 } ebpo_compact;

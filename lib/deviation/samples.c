@@ -14,6 +14,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/random.h"
 #include "deviation/frame.h"
 #include "octree/octcode.h"
 #include "query/query_model.h"
@@ -32,13 +33,11 @@ typedef struct sampling {
     unsigned threads;
 } sampling;
 
-/* Steele, Lea, Flood 2014: every number of the stream from its place. In [0, 1). */
+/* Every number of the stream from its place. */
 static double random_unit(uint64_t seed, uint64_t place)
 {
-    uint64_t z = (seed * UINT64_C(0xd1342543de82ef95) + place + 1) * UINT64_C(0x9e3779b97f4a7c15);
-    z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
-    return (double)((z ^ z >> 31) >> 11) * 0x1p-53;
+    uint64_t number = seed * UINT64_C(0xd1342543de82ef95) + place + 1;
+    return ebpo_random_unit(ebpo_random_mix(number * EBPO_RANDOM_STEP));
 }
 
 static const double *corner(const sampling *s, uint64_t triangle, int i)

@@ -6,6 +6,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/random.h"
 #include "http/slot.h"
 
 enum {
@@ -171,14 +172,6 @@ static void finish(ebpo_transfers *t, ebpo_request *r, ebpo_status status, const
 
 /* --- attempts, by the thread --- */
 
-static uint64_t next_random(ebpo_transfers *t)
-{
-    t->random ^= t->random << 13;
-    t->random ^= t->random >> 7;
-    t->random ^= t->random << 17;
-    return t->random;
-}
-
 /* Seconds until the next attempt: doubling, and jitter so that many readers do not come back at
  * once. What the server asks for counts when it is more. */
 static double pause_after(ebpo_transfers *t, const ebpo_slot *s, bool *asked_for)
@@ -188,7 +181,7 @@ static double pause_after(ebpo_transfers *t, const ebpo_slot *s, bool *asked_for
     for (unsigned i = 1; i < s->request->failures && pause < PAUSE_MOST; i++)
         pause *= 2;
     pause = (pause < PAUSE_MOST ? pause : PAUSE_MOST) *
-            (0.5 + (double)(next_random(t) >> 11) * 0x1p-54);
+            (0.5 + 0.5 * ebpo_random_unit(ebpo_random_next(&t->random)));
     if (s->judged && s->verdict == EBPO_ANSWER_LATER)
         curl_easy_getinfo(s->easy, CURLINFO_RETRY_AFTER, &asked);
     *asked_for = (double)asked > pause;

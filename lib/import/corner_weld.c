@@ -5,6 +5,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/hash.h"
 
 #define EMPTY UINT32_MAX
 
@@ -16,35 +17,27 @@ static void key_of(const float xyz[3], uint32_t key[3])
             key[k] = 0;
 }
 
-static uint64_t hash(const uint32_t key[3])
+static bool has_key(const float xyz[3], const uint32_t key[3])
 {
-    uint64_t h = UINT64_C(0x9e3779b97f4a7c15);
-    for (int k = 0; k < 3; k++) {
-        h = (h ^ key[k]) * UINT64_C(0xbf58476d1ce4e5b9);
-        h ^= h >> 29;
-    }
-    return h;
+    uint32_t own[3];
+    key_of(xyz, own);
+    return memcmp(key, own, sizeof own) == 0;
 }
 
 /* Place of the key in the table: where an equal vertex is, or would go. */
 static uint64_t find(const uint32_t *table, uint64_t mask, const float *xyz, const uint32_t key[3])
 {
-    uint64_t at = hash(key) & mask;
-    for (; table[at] != EMPTY; at = (at + 1) & mask) {
-        uint32_t other[3];
-        key_of(xyz + 3 * (uint64_t)table[at], other);
-        if (memcmp(key, other, sizeof other) == 0)
-            break;
-    }
+    const uint64_t wide[3] = { key[0], key[1], key[2] };
+    uint64_t at;
+    EBPO_HASH_FIND(at, ebpo_hash_three(wide), mask,
+                   table[at] == EMPTY || has_key(xyz + 3 * (uint64_t)table[at], key));
     return at;
 }
 
 ebpo_status ebpo_import_weld(float *xyz, uint64_t count, uint32_t *map, uint64_t *welded,
                              ebpo_error *error)
 {
-    uint64_t slots = 16;
-    while (slots < count + count / 2)
-        slots *= 2;
+    uint64_t slots = ebpo_hash_slots(count + count / 2);
     uint32_t *table = ebpo_alloc(slots, sizeof *table);
     if (!table)
         return ebpo_fail_memory(error, slots * sizeof *table);

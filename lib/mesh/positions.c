@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/arrays.h"
+#include "base/hash.h"
 
 enum { VERTEX_GRAIN = 1 << 14 };
 
@@ -32,26 +33,12 @@ static inline bool same_key(const key *a, const key *b)
     return a->bits[0] == b->bits[0] && a->bits[1] == b->bits[1] && a->bits[2] == b->bits[2];
 }
 
-static inline uint64_t mix(uint64_t x)
-{
-    x ^= x >> 32;
-    x *= 0xd6e8feb86659fd93u;
-    x ^= x >> 32;
-    x *= 0xd6e8feb86659fd93u;
-    return x ^ x >> 32;
-}
-
-static inline uint64_t hash(const key *k)
-{
-    return mix(mix(mix(k->bits[0]) + k->bits[1]) + k->bits[2]);
-}
-
 /* True when the position was there already. Whoever comes first, the slot ends up with the lowest
  * number. */
 static bool insert(ebpo_positions *t, uint32_t v)
 {
     key k = key_of(t->mesh, v);
-    for (uint64_t h = hash(&k) & t->mask;; h = (h + 1) & t->mask) {
+    for (uint64_t h = ebpo_hash_three(k.bits) & t->mask;; h = (h + 1) & t->mask) {
         uint32_t held = __atomic_load_n(&t->slots[h], __ATOMIC_RELAXED);
         if (held == EBPO_NO_INDEX &&
             __atomic_compare_exchange_n(&t->slots[h], &held, v, false, __ATOMIC_RELAXED,
@@ -84,9 +71,7 @@ static ebpo_status insert_range(void *context, uint64_t begin, uint64_t end, uns
 ebpo_status ebpo_positions_build(ebpo_positions *out, const ebpo_mesh *mesh, unsigned threads,
                                  const ebpo_progress *progress, ebpo_error *error)
 {
-    uint64_t size = 16;
-    while (size < mesh->vertex_count + mesh->vertex_count / 3)
-        size *= 2;
+    uint64_t size = ebpo_hash_slots(mesh->vertex_count + mesh->vertex_count / 3);
     *out = (ebpo_positions){ .mesh = mesh, .mask = size - 1 };
     out->slots = ebpo_array_alloc(mesh->workspace, size, sizeof *out->slots);
     if (!out->slots)
@@ -105,15 +90,18 @@ void ebpo_positions_free(ebpo_positions *positions)
     *positions = (ebpo_positions){ .mesh = NULL };
 }
 
+static inline bool has_key(const ebpo_positions *t, uint32_t held, uint32_t v, const key *k)
+{
+    if (held == v)
+        return true;
+    key other = key_of(t->mesh, held);
+    return same_key(k, &other);
+}
+
 uint32_t ebpo_positions_first(const ebpo_positions *t, uint32_t v)
 {
     key k = key_of(t->mesh, v);
-    for (uint64_t h = hash(&k) & t->mask;; h = (h + 1) & t->mask) {
-        uint32_t held = t->slots[h];
-        if (held == v)
-            return v;
-        key other = key_of(t->mesh, held);
-        if (same_key(&k, &other))
-            return held;
-    }
+    uint64_t at;
+    EBPO_HASH_FIND(at, ebpo_hash_three(k.bits), t->mask, has_key(t, t->slots[at], v, &k));
+    return t->slots[at];
 }

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/hash.h"
 #include "geom/plane_code.h"
 #include "planes/hull_directions.h"
 #include "planes/planes.h"
@@ -32,19 +33,21 @@ static bool add_candidate(uint32_t normal, ebpo_candidate *out, int *count)
 
 /* --- few points: their hull --- */
 
+static bool is_point(const double a[3], const double b[3])
+{
+    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+}
+
 static bool add_point(leaf_points *points, const double p[3], double slack)
 {
-    uint64_t bits[3];
+    uint64_t bits[3], place;
     memcpy(bits, p, sizeof bits);
-    uint64_t key = (bits[0] * 0x9e3779b97f4a7c15u ^ bits[1]) * 0xbf58476d1ce4e5b9u ^
-                   bits[2] * 0x94d049bb133111ebu;
-    unsigned place = (unsigned)(key >> 40) % LEAF_TABLE;
-    for (; points->number[place]; place = (place + 1) % LEAF_TABLE) {
+    EBPO_HASH_FIND(place, ebpo_hash_three(bits), LEAF_TABLE - 1,
+                   !points->number[place] || is_point(points->at[points->number[place] - 1], p));
+    if (points->number[place]) {
         int i = points->number[place] - 1;
-        if (points->at[i][0] == p[0] && points->at[i][1] == p[1] && points->at[i][2] == p[2]) {
-            points->slack[i] = fmax(points->slack[i], slack);
-            return true;
-        }
+        points->slack[i] = fmax(points->slack[i], slack);
+        return true;
     }
     if (points->count == LEAF_POINTS)
         return false;

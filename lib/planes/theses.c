@@ -7,17 +7,9 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/random.h"
 #include "geom/plane_code.h"
 #include "planes/planes.h"
-
-/* SplitMix64: good enough to choose places, and the same everywhere. */
-static uint64_t next_random(uint64_t *state)
-{
-    uint64_t z = *state += 0x9e3779b97f4a7c15u;
-    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ z >> 27) * 0x94d049bb133111ebu;
-    return z ^ z >> 31;
-}
 
 /* Clips by the chosen candidates in ascending order of their numbers. Those that cut nothing when
  * their turn comes are not kept. */
@@ -45,7 +37,7 @@ int ebpo_select_random(ebpo_polytope *envelope, const ebpo_choice *choice, uint3
     bool *chosen = ebpo_alloc_zero((uint64_t)choice->count, sizeof *chosen);
     if (!chosen)
         return -1;
-    uint64_t state = choice->seed, first = next_random(&state) % (uint64_t)choice->count;
+    uint64_t state = choice->seed, first = ebpo_random_next(&state) % (uint64_t)choice->count;
     for (int i = 0; i < choice->wanted && i < choice->count; i++)
         chosen[(first + (uint64_t)i) % (uint64_t)choice->count] = true;
     int taken = take(envelope, choice, chosen, codes);
@@ -188,7 +180,7 @@ static void clustering_free(clustering *c)
 static void choose_at_random(clustering *c, uint64_t seed)
 {
     for (int i = 0; i < c->wanted; i++) {
-        int at = (int)(next_random(&seed) % (uint64_t)c->count);
+        int at = (int)(ebpo_random_next(&seed) % (uint64_t)c->count);
         while (c->chosen[at])
             at = at + 1 < c->count ? at + 1 : 0;
         c->chosen[at] = true;

@@ -5,6 +5,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/hash.h"
 
 static bool before(const ebpo_waiting *a, const ebpo_waiting *b)
 {
@@ -79,9 +80,9 @@ unsigned ebpo_frontier_blocks(const ebpo_frontier *f, uint64_t span,
             continue;
         /* with the level; not 0 */
         uint64_t block = (w->below / span) << 6 | (uint64_t)(64 - __builtin_clzll(w->octcode));
-        uint64_t at = block * UINT64_C(0x9e3779b97f4a7c15) >> 54;
-        while (slot[at].block && slot[at].block != block)
-            at = (at + 1) % SLOTS;
+        uint64_t at;
+        EBPO_HASH_FIND(at, ebpo_hash_number(block), SLOTS - 1,
+                       !slot[at].block || slot[at].block == block);
         if (!slot[at].block && count == EBPO_FRONTIER_BLOCKS)
             continue;
         count += !slot[at].block;

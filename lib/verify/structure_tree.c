@@ -7,6 +7,7 @@
 #include <math.h>
 
 #include "base/arrays.h"
+#include "base/random.h"
 #include "mesh/mesh_parts.h"
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
@@ -127,13 +128,6 @@ static void check_vertices(ebpo_tally *tally, const ebpo_twin_tree *view)
           outside, first / 3);
 }
 
-static uint64_t mix(uint64_t x)
-{
-    x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9;
-    x = (x ^ x >> 27) * 0x94d049bb133111eb;
-    return x ^ x >> 31;
-}
-
 /* A sum of signed random values, one for each undirected edge: it vanishes when directions cancel,
  * and else but for one case in 2^64. */
 static bool edges_balance(const ebpo_mesh *mesh)
@@ -143,7 +137,7 @@ static bool edges_balance(const ebpo_mesh *mesh)
         for (int i = 0; i < 3; i++) {
             uint64_t a = mesh->faces[3 * f + (uint64_t)i],
                      b = mesh->faces[3 * f + (uint64_t)(i + 1) % 3];
-            uint64_t value = a < b ? mix(a << 32 | b) : -mix(b << 32 | a);
+            uint64_t value = a < b ? ebpo_random_mix(a << 32 | b) : -ebpo_random_mix(b << 32 | a);
             sum += a == b ? 0 : value;
         }
     return sum == 0;
