@@ -13,6 +13,7 @@
 #include "construct/envelopes.h"
 #include "construct/piece_levels.h"
 #include "construct/proposals.h"
+#include "geom/plane_clip.h"
 #include "octree/node_types.h"
 
 struct ebpo_emit_scratch {

@@ -15,6 +15,7 @@
 #include "construct/candidates.h"
 #include "construct/proposals.h"
 #include "construct/supports.h"
+#include "geom/plane_clip.h"
 #include "geom/plane_code.h"
 #include "planes/hull_directions.h"
 

@@ -9,6 +9,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "geom/plane_clip.h"
 #include "query/query_model.h"
 
 ebpo_status ebpo_bounder_make(ebpo_bounder *out, const ebpo_lod_model *whole, ebpo_model *model,
@@ -61,7 +62,7 @@ static ebpo_status ask(ebpo_bounder *b, const double xi[3], double *distance)
 static bool is_in_envelope(const ebpo_bounder *b, const double xi[3])
 {
     for (int i = 0; i < b->halves.count; i++) {
-        double n[3], d = ebpo_plane_as_double(b->halves.half[i].n, b->halves.half[i].d, n);
+        double n[3], d = ebpo_plane_as_double(b->halves.at[i].n, b->halves.at[i].d, n);
         if (n[0] * xi[0] + n[1] * xi[1] + n[2] * xi[2] > d - 1e-12)
             return false;
     }
@@ -75,7 +76,7 @@ static void pull_in(const ebpo_bounder *b, const double xi[3], double out[3])
 {
     double share = 0;
     for (int i = 0; i < b->halves.count; i++) {
-        double n[3], d = ebpo_plane_as_double(b->halves.half[i].n, b->halves.half[i].d, n) - 2e-12,
+        double n[3], d = ebpo_plane_as_double(b->halves.at[i].n, b->halves.at[i].d, n) - 2e-12,
                      at = -d, middle = -d;
         for (int k = 0; k < 3; k++) {
             at += n[k] * xi[k];
@@ -139,31 +140,31 @@ static ebpo_status look_at(ebpo_bounder *b, const ebpo_fragment *fragment, ebpo_
 
 static ebpo_status begin(ebpo_bounder *b)
 {
-    ebpo_tree_node place;
+    ebpo_node node;
     ebpo_fragment *first = NULL;
-    if (!ebpo_tree_find(b->whole, b->frame.cell, false, false, &place, NULL))
+    if (!ebpo_tree_find(b->whole, b->frame.cell, &node))
         return ebpo_fail(b->error, EBPO_E_ARGUMENT,
                          "the model has no node of level %d where the level has one: they are not "
                          "of the same file",
                          b->frame.cell.level);
     b->fragment_count = b->face_count = 0;
-    if (place.type == EBPO_BLACK)
+    if (node.type == EBPO_BLACK)
         return EBPO_OK;
     ebpo_status status = ebpo_fragment_push(b,
-                                            place.type == EBPO_GRAY   ? EBPO_FRAGMENT_GRAY
-                                            : place.type == EBPO_LEAF ? EBPO_FRAGMENT_LEAF
-                                                                      : EBPO_FRAGMENT_OUTSIDE,
+                                            node.type == EBPO_GRAY   ? EBPO_FRAGMENT_GRAY
+                                            : node.type == EBPO_LEAF ? EBPO_FRAGMENT_LEAF
+                                                                     : EBPO_FRAGMENT_OUTSIDE,
                                             NULL, &first);
     if (status != EBPO_OK)
         return status;
-    ebpo_halves_cut(&b->halves, EBPO_CUT_SLACK, &first->p);
-    first->place = place;
+    ebpo_half_spaces_cut(&b->halves, EBPO_CUT_SLACK, &first->p);
+    first->node = node;
     for (int k = 0; k < 3; k++) {
         b->inner[k] = 0;
         for (int i = 0; i < first->p.vertex_count; i++)
             b->inner[k] += first->p.vertex[i][k] / first->p.vertex_count;
     }
-    return place.type == EBPO_LEAF ? ebpo_fragment_leaf_faces(b, first, &place) : EBPO_OK;
+    return node.type == EBPO_LEAF ? ebpo_fragment_leaf_faces(b, first, &node) : EBPO_OK;
 }
 
 static ebpo_status step(ebpo_bounder *b)

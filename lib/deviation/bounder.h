@@ -12,7 +12,7 @@ typedef struct ebpo_bounder {
     const ebpo_lod_model *whole; /* the model's tree: what is solid */
     ebpo_context *context;       /* of the same file */
     ebpo_leaf_scratch scratch;
-    ebpo_halves halves;       /* of the envelope */
+    ebpo_half_spaces halves;  /* of the envelope */
     ebpo_fragment *fragments; /* a stack */
     uint64_t fragment_capacity, fragment_count;
     /* faces of pieces within leaves, in the model's unit: a stack as well */

@@ -40,26 +40,26 @@ typedef struct survey {
 
 /* --- the level's nodes --- */
 
-static ebpo_status add_node(survey *s, const ebpo_tree_node *place)
+static ebpo_status add_node(survey *s, const ebpo_node *node)
 {
     if (!ebpo_grow(&s->nodes, &s->room, s->count + 1, sizeof *s->nodes))
         return ebpo_fail_memory(s->error, (s->count + 1) * sizeof *s->nodes);
-    s->nodes[s->count++] = (level_node){ place->cell, { 0, INFINITY, { 0, 0, 0 }, 0 } };
+    s->nodes[s->count++] = (level_node){ node->cell, { 0, INFINITY, { 0, 0, 0 }, 0 } };
     return EBPO_OK;
 }
 
-static ebpo_status list_nodes(survey *s, const ebpo_tree_node *place)
+static ebpo_status list_nodes(survey *s, const ebpo_level_nodes *tree, const ebpo_node *node)
 {
-    if (place->type == EBPO_LEAF)
-        return add_node(s, place);
-    if (place->type != EBPO_GRAY)
+    if (node->type == EBPO_LEAF)
+        return add_node(s, node);
+    if (node->type != EBPO_GRAY)
         return EBPO_OK;
-    if (place->cell.level == s->level || ebpo_tree_is_pruned(s->tree, place))
-        return add_node(s, place);
+    if (node->cell.level == s->level || node->pruned)
+        return add_node(s, node);
     ebpo_status status = EBPO_OK;
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
-        ebpo_tree_node child = ebpo_tree_child(s->tree, place, octant);
-        status = list_nodes(s, &child);
+        ebpo_node child = ebpo_level_child(tree, node, octant);
+        status = list_nodes(s, tree, &child);
     }
     return status;
 }
@@ -68,11 +68,11 @@ static ebpo_status list_nodes(survey *s, const ebpo_tree_node *place)
 
 static ebpo_status bound_node(survey *s, ebpo_bounder *b, level_node *node, ebpo_error *error)
 {
-    ebpo_tree_node place;
+    ebpo_node own;
     ebpo_status status = EBPO_OK;
-    (void)ebpo_tree_find(s->tree, node->cell, true, true, &place, &b->halves);
-    if (place.type == EBPO_LEAF && s->tree->leaf_source == EBPO_LEAF_DERIVED)
-        status = ebpo_tree_derive(s->tree, &place, &b->scratch, &b->halves, error);
+    (void)ebpo_tree_bounds(s->tree, node->cell, true, &own, &b->halves);
+    if (own.type == EBPO_LEAF && s->tree->leaf_source == EBPO_LEAF_DERIVED)
+        status = ebpo_tree_derive(s->tree, &own, &b->scratch, &b->halves, error);
     if (status != EBPO_OK)
         return status;
     return s->goal.ratio > 0 ? ebpo_bound_closely(b, node->cell, &s->goal, &node->bound, error)
@@ -174,9 +174,9 @@ static ebpo_status search(survey *s, const ebpo_deviation_options *o, ebpo_devia
 
 static ebpo_status bound_level(survey *s, const ebpo_deviation_options *o, ebpo_deviation *out)
 {
-    ebpo_tree_node root;
-    (void)ebpo_tree_find(s->tree, (ebpo_cell){ 0, { 0, 0, 0 } }, false, false, &root, NULL);
-    ebpo_status status = list_nodes(s, &root);
+    ebpo_level_nodes tree = ebpo_lod_model_nodes(s->tree);
+    ebpo_node root = ebpo_level_root(&tree);
+    ebpo_status status = list_nodes(s, &tree, &root);
     if (status == EBPO_OK && !(s->order = ebpo_alloc(s->count, sizeof *s->order)))
         status = ebpo_fail_memory(s->error, s->count * sizeof *s->order);
     for (uint64_t i = 0; i < s->count && status == EBPO_OK; i++)

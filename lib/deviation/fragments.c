@@ -22,7 +22,7 @@ ebpo_status ebpo_fragment_push(ebpo_bounder *b, ebpo_fragment_kind kind,
     double upper = parent ? parent->upper : INFINITY;
     int levels = parent ? parent->levels : 0;
     double beyond = parent ? parent->beyond : 0;
-    ebpo_tree_node place = parent ? parent->place : (ebpo_tree_node){ .rank = 0 };
+    ebpo_node node = parent ? parent->node : (ebpo_node){ .rank = 0 };
     if (!ebpo_grow(&b->fragments, &b->fragment_capacity, b->fragment_count + 1,
                    sizeof *b->fragments))
         return ebpo_fail_memory(b->error, (b->fragment_count + 1) * sizeof *b->fragments);
@@ -31,7 +31,7 @@ ebpo_status ebpo_fragment_push(ebpo_bounder *b, ebpo_fragment_kind kind,
     (*out)->upper = upper;
     (*out)->levels = levels;
     (*out)->beyond = beyond;
-    (*out)->place = place;
+    (*out)->node = node;
     (*out)->face_first = b->face_count;
     (*out)->face_count = 0;
     return EBPO_OK;
@@ -72,7 +72,7 @@ static ebpo_status give_faces(ebpo_bounder *b, ebpo_fragment *fragment, uint64_t
 }
 
 ebpo_status ebpo_fragment_leaf_faces(ebpo_bounder *b, ebpo_fragment *fragment,
-                                     const ebpo_tree_node *leaf)
+                                     const ebpo_node *leaf)
 {
     uint64_t count = 0, first = b->face_count;
     ebpo_status status =
@@ -135,12 +135,13 @@ static ebpo_status cut_gray(ebpo_bounder *b, const ebpo_fragment *fragment)
 {
     ebpo_polytope z, y, x;
     ebpo_status status = EBPO_OK;
+    ebpo_level_nodes nodes = ebpo_lod_model_nodes(b->whole);
     double low[3], half = .5 * ebpo_half_power(fragment->levels);
     for (int k = 0; k < 3; k++)
-        low[k] = (double)(fragment->place.cell.at[k] - (b->frame.cell.at[k] << fragment->levels)) *
+        low[k] = (double)(fragment->node.cell.at[k] - (b->frame.cell.at[k] << fragment->levels)) *
                  2 * half;
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
-        ebpo_tree_node child = ebpo_tree_child(b->whole, &fragment->place, octant);
+        ebpo_node child = ebpo_level_child(&nodes, &fragment->node, octant);
         ebpo_fragment *next = NULL;
         if (!ebpo_cut_axis(&fragment->p, 2, octant >> 2 & 1, low[2] + half, &z) ||
             !ebpo_cut_axis(&z, 1, octant >> 1 & 1, low[1] + half, &y) ||
@@ -158,7 +159,7 @@ static ebpo_status cut_gray(ebpo_bounder *b, const ebpo_fragment *fragment)
         if (status != EBPO_OK)
             break;
         next->levels++;
-        next->place = child;
+        next->node = child;
         next->beyond = find_beyond(b, &next->p, child.cell, next->levels);
         if (child.type == EBPO_LEAF)
             status = ebpo_fragment_leaf_faces(b, next, &child);
@@ -287,7 +288,7 @@ static double behind_faces(const ebpo_bounder *b, const ebpo_fragment *fragment,
     double share = 0, low[3], high[3];
     ebpo_extent all;
     ebpo_extent_of(&fragment->p, &all);
-    find_walls(b, fragment->place.cell, fragment->levels, low, high);
+    find_walls(b, fragment->node.cell, fragment->levels, low, high);
     for (int k = 0; k < 3; k++)
         for (int side = 0; side < 2; side++) {
             double other = side ? all.max[k] - high[k] : low[k] - all.min[k],

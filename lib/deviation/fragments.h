@@ -16,8 +16,8 @@ typedef enum ebpo_fragment_kind {
 struct ebpo_fragment {
     ebpo_fragment_kind kind;
     double upper;
-    ebpo_tree_node place; /* GRAY, LEAF */
-    int levels;           /* GRAY, LEAF: of the cell below the node's */
+    ebpo_node node; /* GRAY, LEAF */
+    int levels;     /* GRAY, LEAF: of the cell below the node's */
     /* GRAY, LEAF: every point of the piece is at most so far from that cell */
     double beyond;
     uint64_t face_first, face_count; /* LEAF */
@@ -38,7 +38,7 @@ EBPO_MUST_USE ebpo_status ebpo_fragment_push(ebpo_bounder *b, ebpo_fragment_kind
 
 /* A leaf's faces, as the first ones of its piece. */
 EBPO_MUST_USE ebpo_status ebpo_fragment_leaf_faces(ebpo_bounder *b, ebpo_fragment *fragment,
-                                                   const ebpo_tree_node *leaf);
+                                                   const ebpo_node *leaf);
 
 /* Puts the parts of a piece, which is no longer on the stack, there, or settles them. */
 EBPO_MUST_USE ebpo_status ebpo_fragment_cut(ebpo_bounder *b, const ebpo_fragment *fragment,

@@ -95,24 +95,26 @@ void ebpo_tolerance_close(ebpo_tolerance *n)
 static ebpo_status judge(ebpo_tolerance *n, ebpo_bounder *b, ebpo_tolerance_node *node,
                          ebpo_error *error)
 {
-    ebpo_tree_node place;
+    ebpo_node own;
     ebpo_reach_bound found;
     ebpo_bound_goal goal = { n->max_error, n->max_error, 0, QUESTIONS };
     node->enough = false;
     if (!node->asked)
         return EBPO_OK;
-    if (!ebpo_tree_find(&n->tree, node->cell, false, false, &place, NULL) ||
-        (place.type != EBPO_GRAY && place.type != EBPO_LEAF))
+    if (!ebpo_tree_find(&n->tree, node->cell, &own) ||
+        (own.type != EBPO_GRAY && own.type != EBPO_LEAF))
         return ebpo_fail(error, EBPO_E_FORMAT,
                          "level %d: a node is missing in its tree; run ebpo verify",
                          node->cell.level);
-    memory *m = place.type == EBPO_GRAY ? &n->gray[node->cell.level][place.rank]
-                                        : &n->leaf[node->cell.level][place.rank];
+    memory *m = own.type == EBPO_GRAY ? &n->gray[node->cell.level][own.rank]
+                                      : &n->leaf[node->cell.level][own.rank];
     node->enough = n->max_error >= m->enough;
     if (node->enough || n->max_error <= m->failed || n->max_error < m->lo)
         return EBPO_OK;
-    (void)ebpo_tree_find(&n->tree, node->cell, n->planes, place.type == EBPO_GRAY, &place,
-                         &b->halves);
+    if (n->planes)
+        (void)ebpo_tree_bounds(&n->tree, node->cell, own.type == EBPO_GRAY, &own, &b->halves);
+    else
+        b->halves.count = 0;
     ebpo_status status = ebpo_bound_envelope(b, node->cell, &goal, &found, error);
     if (status != EBPO_OK)
         return status;
@@ -146,12 +148,12 @@ ebpo_status ebpo_tolerance_judge(ebpo_tolerance *n, ebpo_tolerance_node *nodes, 
 
 ebpo_status ebpo_tolerance_most(ebpo_tolerance *n, double *out, ebpo_error *error)
 {
-    ebpo_tree_node place;
+    ebpo_node own;
     ebpo_reach_bound found = { 0, INFINITY, { 0, 0, 0 }, 0 };
     ebpo_cell root = { 0, { 0, 0, 0 } };
     ebpo_bound_goal goal = { 0, INFINITY, 1.02, QUESTIONS };
-    (void)ebpo_tree_find(&n->tree, root, n->planes, true, &place, &n->bounders[0].halves);
-    if (place.type == EBPO_LEAF)
+    (void)ebpo_tree_bounds(&n->tree, root, true, &own, &n->bounders[0].halves);
+    if (own.type == EBPO_LEAF || !n->planes)
         n->bounders[0].halves.count = 0;
     ebpo_status status = ebpo_bound_closely(&n->bounders[0], root, &goal, &found, error);
     /* A search of its own may need a little more; with the root cell's diagonal none is left. */

@@ -4,9 +4,6 @@
 
 #include "base/error.h"
 #include "container/reader.h"
-#include "geom/plane_code.h"
-#include "octree/cells.h"
-#include "octree/node_types.h"
 
 ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, ebpo_file *file, unsigned threads,
                                  ebpo_error *error)
@@ -31,123 +28,41 @@ ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, ebpo_file *file, unsigned 
     return status;
 }
 
-/* --- half-spaces --- */
-
-static void add(ebpo_halves *h, const uint32_t *codes, uint64_t count)
+static bool go_to(ebpo_cursor *c, ebpo_level_nodes *nodes, ebpo_cell cell, ebpo_node *out)
 {
-    for (uint64_t i = 0; i < count && h->count < EBPO_HALVES_MAX; i++) {
-        int32_t d;
-        ebpo_half *next = &h->half[h->count];
-        if (!ebpo_plane_decode(codes[i], next->n, &d))
-            continue;
-        next->d = d;
-        h->count++;
-    }
+    ebpo_cursor_begin(c, &ebpo_level_source, nodes, ebpo_level_root(nodes));
+    bool good = ebpo_cursor_to_cell(c, cell, NULL) == EBPO_OK;
+    *out = *ebpo_cursor_node(c);
+    return good && out->cell.level == cell.level;
 }
 
-static bool keeps_cell(const ebpo_half *h)
+bool ebpo_tree_find(const ebpo_lod_model *tree, ebpo_cell cell, ebpo_node *out)
 {
-    int64_t most = 0;
-    for (int k = 0; k < 3; k++)
-        most += h->n[k] > 0 ? h->n[k] : 0;
-    return EBPO_OFFSET_STEPS * most <= h->d;
+    ebpo_level_nodes nodes = ebpo_lod_model_nodes(tree);
+    ebpo_cursor c;
+    return go_to(&c, &nodes, cell, out);
 }
 
-static void to_child(ebpo_halves *h, unsigned octant)
+bool ebpo_tree_bounds(const ebpo_lod_model *tree, ebpo_cell cell, bool own, ebpo_node *out,
+                      ebpo_half_spaces *halves)
 {
-    int kept = 0;
-    for (int i = 0; i < h->count; i++) {
-        ebpo_half half = h->half[i];
-        half.d = ebpo_plane_to_child(half.n, half.d, octant);
-        if (!keeps_cell(&half))
-            h->half[kept++] = half;
-    }
-    h->count = kept;
+    ebpo_level_nodes nodes = ebpo_lod_model_nodes(tree);
+    ebpo_cursor c;
+    return go_to(&c, &nodes, cell, out) &&
+           ebpo_cursor_half_spaces(&c, own, halves, NULL) == EBPO_OK;
 }
 
-void ebpo_halves_cut(const ebpo_halves *halves, double slack, ebpo_polytope *out)
-{
-    ebpo_polytope_cube(out);
-    for (int i = 0; i < halves->count; i++) {
-        double n[3], d = ebpo_plane_as_double(halves->half[i].n, halves->half[i].d, n);
-        (void)ebpo_polytope_clip(out, n, d + slack, i);
-    }
-}
-
-/* --- places --- */
-
-bool ebpo_tree_is_pruned(const ebpo_lod_model *tree, const ebpo_tree_node *gray)
-{
-    return gray->cell.level >= tree->target ||
-           tree->level[gray->cell.level + 1].types[gray->rank] == 0;
-}
-
-static void find_in_group(const ebpo_lod_model *tree, uint64_t group, unsigned octant,
-                          ebpo_tree_node *out)
-{
-    const ebpo_lod_index *index = &tree->index[out->cell.level];
-    uint16_t types = tree->level[out->cell.level].types[group];
-    out->type = ebpo_group_type(types, octant);
-    out->rank = ebpo_group_count(types, out->type, octant);
-    if (out->type == EBPO_GRAY)
-        out->rank += index->gray_before[group];
-    else if (out->type == EBPO_LEAF)
-        out->rank += index->leaf_before[group];
-}
-
-ebpo_tree_node ebpo_tree_child(const ebpo_lod_model *tree, const ebpo_tree_node *gray,
-                               unsigned octant)
-{
-    ebpo_tree_node child = { ebpo_cell_child(gray->cell, octant), EBPO_WHITE, 0 };
-    find_in_group(tree, gray->rank, octant, &child);
-    return child;
-}
-
-static void add_own(const ebpo_lod_model *tree, const ebpo_tree_node *place, ebpo_halves *halves)
-{
-    const ebpo_level *level = &tree->level[place->cell.level];
-    const ebpo_lod_index *index = &tree->index[place->cell.level];
-    if (place->type == EBPO_GRAY && level->plane_counts)
-        add(halves, level->planes + index->plane_first[place->rank],
-            level->plane_counts[place->rank]);
-    else if (place->type == EBPO_LEAF && tree->leaf_source == EBPO_LEAF_STORED &&
-             index->leaf_plane_first)
-        add(halves, level->leaf_planes + index->leaf_plane_first[place->rank],
-            level->leaf_plane_counts[place->rank]);
-}
-
-bool ebpo_tree_find(const ebpo_lod_model *tree, ebpo_cell cell, bool planes, bool own,
-                    ebpo_tree_node *out, ebpo_halves *halves)
-{
-    *out = (ebpo_tree_node){ { 0, { 0, 0, 0 } }, EBPO_WHITE, 0 };
-    find_in_group(tree, 0, 0, out);
-    if (halves)
-        halves->count = 0;
-    while (out->cell.level < cell.level) {
-        if (out->type != EBPO_GRAY || ebpo_tree_is_pruned(tree, out))
-            return false;
-        unsigned octant = ebpo_cell_octant(cell, out->cell.level);
-        if (halves && planes)
-            add_own(tree, out, halves);
-        if (halves)
-            to_child(halves, octant);
-        *out = ebpo_tree_child(tree, out, octant);
-    }
-    if (halves && planes && own)
-        add_own(tree, out, halves);
-    return true;
-}
-
-ebpo_status ebpo_tree_derive(const ebpo_lod_model *tree, const ebpo_tree_node *leaf,
-                             ebpo_leaf_scratch *scratch, ebpo_halves *halves, ebpo_error *error)
+ebpo_status ebpo_tree_derive(const ebpo_lod_model *tree, const ebpo_node *leaf,
+                             ebpo_leaf_scratch *scratch, ebpo_half_spaces *halves,
+                             ebpo_error *error)
 {
     ebpo_polytope inherited;
     uint32_t codes[EBPO_PLANES_MAX];
     int count = 0;
-    ebpo_halves_cut(halves, 0, &inherited);
+    ebpo_half_spaces_cut(halves, 0, &inherited);
     ebpo_status status = ebpo_lod_leaf_planes(tree, leaf->cell, leaf->rank, scratch, &inherited,
                                               codes, &count, error);
     if (status == EBPO_OK)
-        add(halves, codes, (uint64_t)count);
+        ebpo_half_spaces_add(halves, codes, (uint64_t)count);
     return status;
 }

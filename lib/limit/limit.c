@@ -18,13 +18,6 @@
 #include "octree/node_types.h"
 #include "octree/rule.h"
 
-/* A node whose hull is wanted. */
-typedef struct wanted {
-    ebpo_cell cell;
-    uint64_t rank; /* among the gray nodes or leaves of its level */
-    bool gray;
-} wanted;
-
 /* One for each thread. */
 typedef struct scratch {
     ebpo_hull *hull;
@@ -39,43 +32,33 @@ typedef struct job {
     ebpo_lod_model model;
     ebpo_mesh mesh;
     int level;
-    wanted *nodes;
+    ebpo_level_nodes tree;
+    ebpo_node *nodes; /* whose hulls are wanted */
     uint64_t node_count, node_capacity;
     double *volume; /* [node_count] in cells */
-    /* white, black: such nodes in the groups before; where their windings are stored */
-    uint64_t *empty_before[EBPO_LEVELS_MAX][2];
     double black;
     scratch *scratch; /* [threads] */
 } job;
 
 /* --- which nodes --- */
 
-static bool list_group(job *j, uint64_t group, ebpo_cell parent);
-
-static bool list_node(job *j, uint64_t group, unsigned octant, ebpo_cell cell)
+static bool list_nodes(job *j, const ebpo_node *node)
 {
-    const ebpo_level *level = &j->model.level[cell.level];
-    const ebpo_lod_index *index = &j->model.index[cell.level];
-    ebpo_node_type type = ebpo_group_type(level->types[group], octant);
-    uint64_t rank = ebpo_group_count(level->types[group], type, octant);
-    if (type == EBPO_BLACK)
-        j->black += ebpo_cell_volume(&j->model.box, cell.level);
-    if (type == EBPO_WHITE || type == EBPO_BLACK)
+    if (node->type == EBPO_BLACK)
+        j->black += ebpo_cell_volume(&j->model.box, node->cell.level);
+    if (ebpo_node_is_uniform(node))
         return true;
-    rank += type == EBPO_GRAY ? index->gray_before[group] : index->leaf_before[group];
-    if (type == EBPO_GRAY && cell.level < j->level)
-        return list_group(j, rank, cell);
+    if (node->type == EBPO_GRAY && node->cell.level < j->level) {
+        bool good = true;
+        for (unsigned octant = 0; octant < 8 && good; octant++) {
+            ebpo_node child = ebpo_level_child(&j->tree, node, octant);
+            good = list_nodes(j, &child);
+        }
+        return good;
+    }
     if (!ebpo_grow(&j->nodes, &j->node_capacity, j->node_count + 1, sizeof *j->nodes))
         return false;
-    j->nodes[j->node_count++] = (wanted){ cell, rank, type == EBPO_GRAY };
-    return true;
-}
-
-static bool list_group(job *j, uint64_t group, ebpo_cell parent)
-{
-    for (unsigned octant = 0; octant < 8; octant++)
-        if (!list_node(j, group, octant, ebpo_cell_child(parent, octant)))
-            return false;
+    j->nodes[j->node_count++] = *node;
     return true;
 }
 
@@ -88,7 +71,7 @@ static bool take_leaf(const job *j, scratch *s, int number, uint64_t leaf)
     if (!ebpo_grow(&s->list, &s->list_capacity, s->list_count + refs + fresh, sizeof *s->list))
         return false;
     if (refs)
-        memcpy(s->list + s->list_count, level->leaf_refs + j->model.index[number].ref_first[leaf],
+        memcpy(s->list + s->list_count, level->leaf_refs + j->model.ranks[number].ref_first[leaf],
                refs * sizeof *s->list);
     for (uint64_t i = 0; i < fresh; i++)
         s->list[s->list_count + refs + i] = (uint32_t)(level->leaf_first[leaf] + i);
@@ -96,18 +79,15 @@ static bool take_leaf(const job *j, scratch *s, int number, uint64_t leaf)
     return true;
 }
 
-static bool take_group(const job *j, scratch *s, int number, uint64_t group)
+static bool take_node(const job *j, scratch *s, const ebpo_node *node)
 {
-    const ebpo_level *level = &j->model.level[number];
-    const ebpo_lod_index *index = &j->model.index[number];
-    uint64_t gray = index->gray_before[group], leaf = index->leaf_before[group];
     bool good = true;
-    for (unsigned octant = 0; octant < 8 && good; octant++)
-        switch (ebpo_group_type(level->types[group], octant)) {
-        case EBPO_GRAY: good = take_group(j, s, number + 1, gray++); break;
-        case EBPO_LEAF: good = take_leaf(j, s, number, leaf++); break;
-        default: break;
-        }
+    if (node->type == EBPO_LEAF)
+        return take_leaf(j, s, node->cell.level, node->rank);
+    for (unsigned octant = 0; octant < 8 && good && node->type == EBPO_GRAY; octant++) {
+        ebpo_node child = ebpo_level_child(&j->tree, node, octant);
+        good = take_node(j, s, &child);
+    }
     return good;
 }
 
@@ -140,33 +120,20 @@ static bool take_faces(const job *j, scratch *s)
 
 /* --- its corners --- */
 
-/* Winding number at a gray node's lowest corner: that of the node in its lowest corner. */
-static int32_t lowest_winding(const job *j, int number, uint64_t gray)
+/* Winding number at a node's lowest corner: of a gray one, that of the node in that corner. */
+static int32_t lowest_winding(const job *j, ebpo_node node)
 {
-    const ebpo_lod_model *m = &j->model;
-    for (;; number++) {
-        const ebpo_level *level = &m->level[number + 1];
-        const ebpo_lod_index *index = &m->index[number + 1];
-        switch (ebpo_group_type(level->types[gray], 0)) {
-        case EBPO_GRAY: gray = index->gray_before[gray]; break;
-        case EBPO_LEAF: return level->leaf_winding[index->leaf_before[gray]];
-        default: { /* only windings that are not 0 or 1 are stored; octant 0 is the first of its
-                      group */
-            bool black = ebpo_group_type(level->types[gray], 0) == EBPO_BLACK;
-            const int32_t *stored = black ? level->black_winding : level->white_winding;
-            return stored ? stored[j->empty_before[number + 1][black][gray]] : black;
-        }
-        }
-    }
+    while (node.type == EBPO_GRAY)
+        node = ebpo_level_child(&j->tree, &node, 0);
+    return ebpo_level_winding(&j->tree, &node);
 }
 
-static bool add_corners(const job *j, scratch *s, const wanted *w)
+static bool add_corners(const job *j, scratch *s, const ebpo_node *w)
 {
     const ebpo_lod_model *m = &j->model;
     if (!m->info->solid)
         return true;
-    int32_t delta[8], lowest = w->gray ? lowest_winding(j, w->cell.level, w->rank)
-                                       : m->level[w->cell.level].leaf_winding[w->rank];
+    int32_t delta[8], lowest = lowest_winding(j, *w);
     ebpo_corner_windings(&m->box, w->cell, s->faces, s->list_count, delta);
     if (!ebpo_grow(&s->points, &s->points_room, s->point_count + 8, 3 * sizeof *s->points))
         return false;
@@ -198,11 +165,10 @@ static ebpo_status hulls(void *context, uint64_t begin, uint64_t end, unsigned w
     job *j = context;
     scratch *s = &j->scratch[worker];
     for (uint64_t i = begin; i < end; i++) {
-        const wanted *w = &j->nodes[i];
+        const ebpo_node *w = &j->nodes[i];
         s->list_count = s->point_count = 0;
-        bool good = w->gray ? take_group(j, s, w->cell.level + 1, w->rank)
-                            : take_leaf(j, s, w->cell.level, w->rank);
-        if (!good || !take_faces(j, s) || !add_corners(j, s, w) || !add_faces(j, s, w->cell))
+        if (!take_node(j, s, w) || !take_faces(j, s) || !add_corners(j, s, w) ||
+            !add_faces(j, s, w->cell))
             return ebpo_fail_memory(error, s->list_count * sizeof *s->faces);
         j->volume[i] = ebpo_hull_volume(s->hull, s->points, s->point_count);
     }
@@ -224,25 +190,6 @@ static ebpo_status check(ebpo_file *file, int level, ebpo_error *error)
     return EBPO_OK;
 }
 
-static bool count_empty(job *j)
-{
-    for (int i = 0; i <= j->model.target; i++)
-        for (int black = 0; black < 2; black++) {
-            const ebpo_level *level = &j->model.level[i];
-            if (!(black ? level->black_winding : level->white_winding))
-                continue;
-            uint64_t sum = 0, *before = j->empty_before[i][black] =
-                                  ebpo_alloc(level->group_count, sizeof *before);
-            for (uint64_t g = 0; before && g < level->group_count; g++) {
-                before[g] = sum;
-                sum += ebpo_group_count(level->types[g], black ? EBPO_BLACK : EBPO_WHITE, 8);
-            }
-            if (!before)
-                return false;
-        }
-    return true;
-}
-
 static ebpo_status prepare(job *j, ebpo_file *file, int level, unsigned threads, ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(file);
@@ -252,9 +199,12 @@ static ebpo_status prepare(job *j, ebpo_file *file, int level, unsigned threads,
     if (status == EBPO_OK)
         status = ebpo_file_read_mesh(file, &j->mesh, threads, error);
     j->scratch = ebpo_alloc_zero(threads, sizeof *j->scratch);
-    if (status == EBPO_OK &&
-        (!j->scratch || !count_empty(j) || !list_node(j, 0, 0, (ebpo_cell){ 0, { 0, 0, 0 } })))
-        status = ebpo_fail_memory(error, j->node_count * sizeof *j->nodes);
+    if (status == EBPO_OK) {
+        j->tree = ebpo_lod_model_nodes(&j->model);
+        ebpo_node root = ebpo_level_root(&j->tree);
+        if (!j->scratch || !list_nodes(j, &root))
+            status = ebpo_fail_memory(error, j->node_count * sizeof *j->nodes);
+    }
     for (unsigned i = 0; i < threads && status == EBPO_OK; i++)
         status = ebpo_hull_new(&j->scratch[i].hull, error);
     if (status == EBPO_OK && !(j->volume = ebpo_alloc(j->node_count, sizeof *j->volume)))
@@ -269,10 +219,6 @@ static void job_free(job *j, unsigned threads)
         free(j->scratch[i].list);
         free(j->scratch[i].faces);
         free(j->scratch[i].points);
-    }
-    for (int i = 0; i < EBPO_LEVELS_MAX; i++) {
-        free(j->empty_before[i][0]);
-        free(j->empty_before[i][1]);
     }
     free(j->scratch);
     free(j->nodes);
@@ -304,7 +250,7 @@ ebpo_status ebpo_limit_level(ebpo_file *file, int level, unsigned threads,
                             ? j.volume[i] * ebpo_cell_volume(&j.model.box, j.nodes[i].cell.level)
                             : 0;
         found.volume += volume;
-        found.gray_volume += j.nodes[i].gray ? volume : 0;
+        found.gray_volume += j.nodes[i].type == EBPO_GRAY ? volume : 0;
         found.flat += j.volume[i] == 0;
         found.hulls++;
     }

@@ -13,6 +13,7 @@
 #include "base/fp_env.h"
 #include "base/parallel.h"
 #include "base/sized.h"
+#include "geom/plane_clip.h"
 #include "lod/lod_model.h"
 #include "lod/polyhedra.h"
 #include "octree/cells.h"
@@ -70,7 +71,7 @@ static ebpo_status visit_gray(walker *w, uint64_t gray, ebpo_cell cell, ebpo_pol
 {
     const ebpo_level *level = &w->j->model->level[cell.level];
     if (level->plane_counts && level->plane_counts[gray])
-        ebpo_planes_cut(envelope, level->planes + w->j->model->index[cell.level].plane_first[gray],
+        ebpo_planes_cut(envelope, level->planes + w->j->model->ranks[cell.level].plane_first[gray],
                         level->plane_counts[gray]);
     if (cell.level == w->j->model->target)
         return emit(w, envelope, cell, EBPO_GRAY);
@@ -90,14 +91,13 @@ static ebpo_status visit_node(walker *w, uint64_t group, unsigned octant, ebpo_c
                               ebpo_polytope *envelope)
 {
     const ebpo_lod_model *model = w->j->model;
-    const ebpo_lod_index *index = &model->index[cell.level];
+    const ebpo_level_ranks *ranks = &model->ranks[cell.level];
     uint16_t types = model->level[cell.level].types[group];
     ebpo_node_type type = ebpo_group_type(types, octant);
-    uint64_t rank = ebpo_group_count(types, type, octant);
+    uint64_t rank = ranks->before[type][group] + ebpo_group_count(types, type, octant);
     if (type == EBPO_GRAY)
-        return visit_gray(w, rank + index->gray_before[group], cell, envelope);
-    ebpo_status status = ebpo_lod_leaf(model, cell, rank + index->leaf_before[group], w->scratch,
-                                       envelope, w->error);
+        return visit_gray(w, rank, cell, envelope);
+    ebpo_status status = ebpo_lod_leaf(model, cell, rank, w->scratch, envelope, w->error);
     return status == EBPO_OK ? emit(w, envelope, cell, EBPO_LEAF) : status;
 }
 

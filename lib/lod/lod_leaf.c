@@ -3,6 +3,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "geom/plane_clip.h"
 #include "lod/lod_model.h"
 #include "octree/rule.h"
 
@@ -27,14 +28,14 @@ ebpo_status ebpo_lod_leaf_faces(const ebpo_lod_model *model, ebpo_cell cell, uin
                                 ebpo_leaf_scratch *scratch, uint64_t *count, ebpo_error *error)
 {
     const ebpo_level *level = &model->level[cell.level];
-    if (!level->leaf_first || !level->leaf_new || !model->index[cell.level].ref_first)
+    if (!level->leaf_first || !level->leaf_new || !model->ranks[cell.level].ref_first)
         return ebpo_fail(error, EBPO_E_FORMAT,
                          "level %d: its leaves have no face lists; run ebpo verify", cell.level);
     uint64_t refs = level->leaf_ref_count[leaf], fresh = level->leaf_new[leaf];
     if (!ebpo_grow(&scratch->faces, &scratch->room, refs + fresh, sizeof *scratch->faces))
         return ebpo_fail_memory(error, (refs + fresh) * sizeof *scratch->faces);
     const uint32_t *ref =
-        level->leaf_refs ? level->leaf_refs + model->index[cell.level].ref_first[leaf] : NULL;
+        level->leaf_refs ? level->leaf_refs + model->ranks[cell.level].ref_first[leaf] : NULL;
     bool fine = true;
     for (uint64_t i = 0; i < refs && fine; i++)
         fine = take_face(&model->mesh, ref[i], &scratch->faces[i]);
@@ -84,10 +85,10 @@ ebpo_status ebpo_lod_leaf(const ebpo_lod_model *model, ebpo_cell cell, uint64_t 
                           ebpo_leaf_scratch *scratch, ebpo_polytope *envelope, ebpo_error *error)
 {
     const ebpo_level *level = &model->level[cell.level];
-    const ebpo_lod_index *index = &model->index[cell.level];
-    if (model->leaf_source == EBPO_LEAF_STORED && index->leaf_plane_first &&
+    const ebpo_level_ranks *ranks = &model->ranks[cell.level];
+    if (model->leaf_source == EBPO_LEAF_STORED && ranks->leaf_plane_first &&
         level->leaf_plane_counts[leaf])
-        ebpo_planes_cut(envelope, level->leaf_planes + index->leaf_plane_first[leaf],
+        ebpo_planes_cut(envelope, level->leaf_planes + ranks->leaf_plane_first[leaf],
                         level->leaf_plane_counts[leaf]);
     uint32_t codes[EBPO_PLANES_MAX];
     int count;

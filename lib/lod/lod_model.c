@@ -11,7 +11,7 @@ void ebpo_lod_model_free(ebpo_lod_model *model)
 {
     for (int i = 0; i < EBPO_LEVELS_MAX; i++) {
         ebpo_level_free(&model->level[i]);
-        ebpo_lod_index_free(&model->index[i]);
+        ebpo_level_ranks_free(&model->ranks[i]);
     }
     ebpo_mesh_free(&model->mesh);
 }
@@ -23,7 +23,7 @@ static ebpo_status read_levels(ebpo_lod_model *out, ebpo_file *file, unsigned th
     for (int i = 0; i <= out->target; i++) {
         ebpo_status status = ebpo_file_read_level(file, i, &out->level[i], threads, error);
         if (status == EBPO_OK)
-            status = ebpo_lod_index_make(&out->index[i], &out->level[i], i, error);
+            status = ebpo_level_ranks_make(&out->ranks[i], &out->level[i], i, error);
         if (status != EBPO_OK)
             return status;
         uint64_t expected = i == 0 ? 1 : out->level[i - 1].gray_count;

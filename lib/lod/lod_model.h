@@ -7,7 +7,7 @@
 
 #include "geom/cell.h"
 #include "geom/polytope.h"
-#include "lod/level_ranks.h"
+#include "octree/level_nodes.h"
 #include "planes/planes.h"
 
 typedef enum ebpo_leaf_source {
@@ -22,7 +22,7 @@ typedef struct ebpo_lod_model {
     int target; /* deepest level read */
     ebpo_leaf_source leaf_source;
     ebpo_level level[EBPO_LEVELS_MAX];
-    ebpo_lod_index index[EBPO_LEVELS_MAX];
+    ebpo_level_ranks ranks[EBPO_LEVELS_MAX];
     ebpo_mesh mesh; /* for EBPO_LEAF_DERIVED */
 } ebpo_lod_model;
 
@@ -30,6 +30,12 @@ typedef struct ebpo_lod_model {
 EBPO_MUST_USE ebpo_status ebpo_lod_model_read(ebpo_lod_model *out, ebpo_file *file, int target,
                                               unsigned threads, ebpo_error *error);
 void ebpo_lod_model_free(ebpo_lod_model *model);
+
+/* Its nodes. */
+static inline ebpo_level_nodes ebpo_lod_model_nodes(const ebpo_lod_model *model)
+{
+    return (ebpo_level_nodes){ model->level, model->ranks, model->target + 1 };
+}
 
 /* Room for the faces of one leaf; one for each thread, zero-initialised, freed with free(faces). */
 typedef struct ebpo_leaf_scratch {
@@ -54,7 +60,5 @@ EBPO_MUST_USE ebpo_status ebpo_lod_leaf_planes(const ebpo_lod_model *model, ebpo
                                                ebpo_polytope *envelope,
                                                uint32_t codes[EBPO_PLANES_MAX], int *plane_count,
                                                ebpo_error *error);
-
-/* Whether points of this winding number are in the solid. */
 
 #endif

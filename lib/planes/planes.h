@@ -110,20 +110,9 @@ int ebpo_leaf_planes(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *f
                      uint64_t count, unsigned inside_corners, double epsilon,
                      ebpo_polytope *envelope, uint32_t codes[EBPO_PLANES_MAX]);
 
-/* n as a direction of length about 1 and the matching offset, for ebpo_polytope_clip. */
-static inline double ebpo_plane_as_double(const int32_t n[3], int64_t d, double out[3])
-{
-    for (int k = 0; k < 3; k++)
-        out[k] = (double)n[k] * (1.0 / 511);
-    return (double)d * (1.0 / (511.0 * 4096));
-}
-
 /* The plane that a candidate would be, for ebpo_polytope_clip; false when only the whole cell would
  * do. */
 bool ebpo_candidate_plane(const ebpo_candidate *candidate, uint32_t *code, double n[3],
                           double *offset);
-
-/* Cuts the envelope by plane codes of its own cell; a face's tag is the place of its code. */
-void ebpo_planes_cut(ebpo_polytope *envelope, const uint32_t *codes, uint64_t count);
 
 #endif

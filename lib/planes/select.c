@@ -6,6 +6,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "geom/plane_clip.h"
 #include "geom/plane_code.h"
 #include "planes/planes.h"
 
@@ -179,16 +180,4 @@ int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, i
         if (ebpo_polytope_clip(envelope, c.by_gain[0].n, c.by_gain[0].d, taken) == EBPO_CLIP_CUT)
             codes[taken++] = c.by_gain[0].code;
     return cut_needles(envelope, &c, ebpo_needle, most, taken, codes);
-}
-
-void ebpo_planes_cut(ebpo_polytope *envelope, const uint32_t *codes, uint64_t count)
-{
-    for (uint64_t i = 0; i < count; i++) {
-        int32_t v[3], d;
-        double n[3];
-        if (!ebpo_plane_code_decode(codes[i], v, &d))
-            continue;
-        double offset = ebpo_plane_as_double(v, d, n);
-        (void)ebpo_polytope_clip(envelope, n, offset, (int32_t)i);
-    }
 }

@@ -4,6 +4,7 @@
 
 #include <math.h>
 
+#include "geom/plane_clip.h"
 #include "geom/polytope.h"
 #include "lod/lod_model.h"
 #include "query/inside.h"

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "octree/node_types.h"
-#include "planes/planes.h"
 
 void ebpo_level_walk_begin(ebpo_level_walk *walk, const ebpo_level *level, int target, bool pruned)
 {
@@ -21,7 +20,7 @@ static ebpo_level_walk_node *pass(ebpo_level_walk *w, int depth)
     const ebpo_level *level = &w->level[depth];
     unsigned octant = w->at[depth].octant++;
     ebpo_level_walk_node *node = &w->at[depth].node;
-    node->octcode = depth ? w->at[depth - 1].node.octcode << 3 | octant : 1;
+    node->octcode = depth ? ebpo_octcode_child(w->at[depth - 1].node.octcode, octant) : 1;
     node->type = ebpo_group_type(level->types[w->at[depth].group], octant);
     node->rank = w->at[depth].rank[node->type]++;
     node->codes = NULL;
@@ -65,38 +64,22 @@ bool ebpo_level_walk_next(ebpo_level_walk *w, ebpo_level_walk_node *out)
     }
 }
 
-void ebpo_envelope_begin(const ebpo_polytope *parent, uint64_t octcode, ebpo_polytope *envelope)
+/* Of the ancestor at `depth`, and those above it. */
+static const ebpo_polytope *ancestor(const ebpo_level_walk *w, int depth, ebpo_envelope_stack *e)
 {
-    if (parent)
-        (void)ebpo_polytope_child(parent, octcode & 7, envelope);
-    else
-        ebpo_polytope_cube(envelope);
-}
-
-/* Of the ancestor at `depth`. */
-static const ebpo_polytope *ancestor(const ebpo_level_walk *w, int depth,
-                                     ebpo_level_walk_envelopes *e)
-{
-    if (depth < 0)
-        return NULL;
     const ebpo_level_walk_node *node = &w->at[depth].node;
-    if (e->octcode[depth] != node->octcode) {
-        ebpo_envelope_begin(ancestor(w, depth - 1, e), node->octcode, &e->at[depth]);
-        ebpo_planes_cut(&e->at[depth], node->codes, node->code_count);
-        e->octcode[depth] = node->octcode;
-    }
-    return &e->at[depth];
+    const ebpo_polytope *held = ebpo_envelope_held(e, node->octcode);
+    if (held)
+        return held;
+    if (depth)
+        (void)ancestor(w, depth - 1, e);
+    return ebpo_envelope_put(e, node->octcode, node->codes, node->code_count);
 }
 
 const ebpo_polytope *ebpo_level_walk_envelope(const ebpo_level_walk *w,
                                               const ebpo_level_walk_node *node,
-                                              ebpo_level_walk_envelopes *e)
+                                              ebpo_envelope_stack *e)
 {
-    if (node->type == EBPO_BLACK) {
-        ebpo_polytope_cube(&e->own);
-    } else {
-        ebpo_envelope_begin(ancestor(w, w->target - 1, e), node->octcode, &e->own);
-        ebpo_planes_cut(&e->own, node->codes, node->code_count);
-    }
-    return &e->own;
+    return node->type == EBPO_BLACK ? ebpo_envelope_put_cube(e, node->octcode)
+                                    : ancestor(w, w->target, e);
 }

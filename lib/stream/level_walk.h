@@ -6,11 +6,10 @@
 
 #include <ebpo/file.h>
 
-#include "geom/cell.h"
-#include "geom/polytope.h"
+#include "octree/envelope_stack.h"
 
 typedef struct ebpo_level_walk_node {
-    uint64_t octcode;
+    ebpo_octcode octcode;
     ebpo_node_type type;
     uint64_t rank;         /* among the nodes of its type in the level */
     const uint32_t *codes; /* its own planes */
@@ -34,23 +33,11 @@ void ebpo_level_walk_begin(ebpo_level_walk *walk, const ebpo_level *level, int t
 /* The next node of the target level; false after the last. */
 bool ebpo_level_walk_next(ebpo_level_walk *walk, ebpo_level_walk_node *out);
 
-/* The envelopes along one walk's way, so that neighbours share their ancestors'. About 170 KB;
- * zeroed before first use. */
-typedef struct ebpo_level_walk_envelopes {
-    uint64_t octcode[EBPO_LEVELS_MAX]; /* whose envelope it is; 0: nobody's */
-    ebpo_polytope at[EBPO_LEVELS_MAX];
-    ebpo_polytope own;
-} ebpo_level_walk_envelopes;
-
-/* One step on the way down: the parent's envelope in a child's cell (without a parent: the cube),
- * which is then cut by the child's own planes (ebpo_planes_cut). */
-void ebpo_envelope_begin(const ebpo_polytope *parent, uint64_t octcode, ebpo_polytope *envelope);
-
 /* Envelope of the node that ebpo_level_walk_next gave last, in coordinates of its cell; gray nodes
  * and leaves: from the cube down, cut by the planes of all ancestors and its own. Black nodes: the
  * cube. Lent until the next call with these envelopes. */
 const ebpo_polytope *ebpo_level_walk_envelope(const ebpo_level_walk *walk,
                                               const ebpo_level_walk_node *node,
-                                              ebpo_level_walk_envelopes *envelopes);
+                                              ebpo_envelope_stack *envelopes);
 
 #endif

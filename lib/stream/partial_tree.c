@@ -6,7 +6,6 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "octree/octcode.h"
-#include "planes/planes.h"
 
 void ebpo_partial_free(ebpo_partial *partial)
 {
@@ -72,32 +71,26 @@ const uint32_t *ebpo_partial_codes(const ebpo_partial *g, ebpo_partial_node node
 }
 
 const ebpo_polytope *ebpo_partial_envelope(const ebpo_partial *g, ebpo_partial_node node,
-                                           ebpo_level_walk_envelopes *e)
+                                           ebpo_envelope_stack *e)
 {
-    uint64_t octcode = ebpo_partial_octcode(g, node);
+    ebpo_octcode octcode = ebpo_partial_octcode(g, node);
     int level = ebpo_octcode_level(octcode);
-    const ebpo_polytope *above = NULL;
-    const uint32_t *codes;
+    const ebpo_polytope *envelope = NULL;
     ebpo_partial_node at = { 0, 0 };
-    unsigned count;
-    if (ebpo_partial_type(g, node) == EBPO_BLACK) {
-        ebpo_polytope_cube(&e->own);
-        return &e->own;
-    }
-    for (int depth = 0; depth < level; depth++) {
-        uint64_t own = octcode >> 3 * (level - depth);
-        if (depth)
+    if (ebpo_partial_type(g, node) == EBPO_BLACK)
+        return ebpo_envelope_put_cube(e, octcode);
+    for (int depth = 0; depth <= level; depth++) {
+        ebpo_octcode own = octcode >> 3 * (level - depth);
+        if (depth == level)
+            at = node; /* its group may not be linked yet */
+        else if (depth)
             at = (ebpo_partial_node){ g->group[at.group].child[at.octant], (uint8_t)(own & 7) };
-        if (e->octcode[depth] != own) {
-            ebpo_envelope_begin(above, own, &e->at[depth]);
-            codes = ebpo_partial_codes(g, at, &count);
-            ebpo_planes_cut(&e->at[depth], codes, count);
-            e->octcode[depth] = own;
+        envelope = ebpo_envelope_held(e, own);
+        if (!envelope) {
+            unsigned count;
+            const uint32_t *codes = ebpo_partial_codes(g, at, &count);
+            envelope = ebpo_envelope_put(e, own, codes, count);
         }
-        above = &e->at[depth];
     }
-    ebpo_envelope_begin(above, octcode, &e->own);
-    codes = ebpo_partial_codes(g, node, &count);
-    ebpo_planes_cut(&e->own, codes, count);
-    return &e->own;
+    return envelope;
 }

@@ -43,7 +43,7 @@ static inline ebpo_node_type ebpo_partial_type(const ebpo_partial *g, ebpo_parti
 static inline uint64_t ebpo_partial_octcode(const ebpo_partial *g, ebpo_partial_node node)
 {
     uint64_t parent = g->group[node.group].parent;
-    return parent ? parent << 3 | node.octant : 1;
+    return parent ? ebpo_octcode_child(parent, node.octant) : 1;
 }
 
 /* The group in which a gray node's children stand, in the next level of the file. */
@@ -65,6 +65,6 @@ const uint32_t *ebpo_partial_codes(const ebpo_partial *partial, ebpo_partial_nod
 /* Its envelope in coordinates of its cell; the nodes above it are linked. Lent until the next call
  * with these envelopes. */
 const ebpo_polytope *ebpo_partial_envelope(const ebpo_partial *partial, ebpo_partial_node node,
-                                           ebpo_level_walk_envelopes *envelopes);
+                                           ebpo_envelope_stack *envelopes);
 
 #endif

@@ -32,7 +32,7 @@ struct ebpo_stream {
     uint64_t bytes;
     double settled; /* volume of the leaves and black nodes of all levels before the next one */
     ebpo_level_walk walk;
-    ebpo_level_walk_envelopes *envelopes; /* with polygons */
+    ebpo_envelope_stack *envelopes; /* with polygons */
     ebpo_node_buffers room;
 };
 
@@ -121,9 +121,9 @@ typedef struct volumes {
 typedef struct job {
     const ebpo_stream *stream;
     int target;
-    ebpo_level_walk *starts;              /* [pieces] */
-    volumes *found;                       /* [pieces] */
-    ebpo_level_walk_envelopes *envelopes; /* [threads] */
+    ebpo_level_walk *starts;        /* [pieces] */
+    volumes *found;                 /* [pieces] */
+    ebpo_envelope_stack *envelopes; /* [threads] */
 } job;
 
 static ebpo_status sum_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker,

@@ -24,7 +24,7 @@ struct ebpo_view_stream {
     unsigned step, flip; /* the next one is octant step ^ flip */
     uint64_t delivered, cut[4];
     ebpo_group read;
-    ebpo_level_walk_envelopes *envelopes; /* with polygons */
+    ebpo_envelope_stack *envelopes; /* with polygons */
     ebpo_node_buffers room;
 };
 

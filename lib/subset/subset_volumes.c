@@ -1,6 +1,7 @@
 /* Envelopes are cut as a reader of levels cuts them: leaves by stored planes or not at all. */
 #include "geom/strict_fp.h"
 
+#include "geom/plane_clip.h"
 #include "octree/cells.h"
 #include "octree/node_types.h"
 #include "subset/subset_parts.h"

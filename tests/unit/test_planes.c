@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "geom/plane_clip.h"
 #include "geom/plane_code.h"
 #include "planes/octants.h"
 #include "planes/planes.h"

@@ -1,4 +1,4 @@
-#include "lod/level_ranks.h"
+#include "octree/level_ranks.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -7,31 +7,49 @@
 #include "base/error.h"
 #include "octree/node_types.h"
 
-void ebpo_lod_index_free(ebpo_lod_index *index)
+void ebpo_level_ranks_free(ebpo_level_ranks *ranks)
 {
-    free(index->gray_before);
-    free(index->leaf_before);
-    free(index->plane_first);
-    free(index->leaf_plane_first);
-    free(index->ref_first);
-    memset(index, 0, sizeof *index);
+    for (int type = 0; type < 4; type++)
+        free(ranks->before[type]);
+    free(ranks->plane_first);
+    free(ranks->leaf_plane_first);
+    free(ranks->ref_first);
+    memset(ranks, 0, sizeof *ranks);
 }
 
-static ebpo_status make_ranks(ebpo_lod_index *out, const ebpo_level *level, int number,
+/* Nodes of a type in the groups before each, and in all of them. */
+static ebpo_status count_before(uint64_t **out, const ebpo_level *level, ebpo_node_type type,
+                                uint64_t *count, ebpo_error *error)
+{
+    *count = 0;
+    if (!(*out = ebpo_alloc(level->group_count, sizeof **out)))
+        return ebpo_fail_memory(error, level->group_count * sizeof **out);
+    for (uint64_t i = 0; i < level->group_count; i++) {
+        (*out)[i] = *count;
+        *count += ebpo_group_count(level->types[i], type, 8);
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status make_ranks(ebpo_level_ranks *out, const ebpo_level *level, int number,
                               ebpo_error *error)
 {
-    out->gray_before = ebpo_alloc(level->group_count, sizeof *out->gray_before);
-    out->leaf_before = ebpo_alloc(level->group_count, sizeof *out->leaf_before);
-    if (!out->gray_before || !out->leaf_before)
-        return ebpo_fail_memory(error, level->group_count * sizeof *out->gray_before);
-    uint64_t gray = 0, leaf = 0;
-    for (uint64_t i = 0; i < level->group_count; i++) {
-        out->gray_before[i] = gray;
-        out->leaf_before[i] = leaf;
-        gray += ebpo_group_count(level->types[i], EBPO_GRAY, 8);
-        leaf += ebpo_group_count(level->types[i], EBPO_LEAF, 8);
-    }
-    if (gray != level->gray_count || leaf != level->leaf_count)
+    const bool wanted[4] = { [EBPO_WHITE] = level->white_winding,
+                             [EBPO_BLACK] = level->black_winding,
+                             [EBPO_LEAF] = true,
+                             [EBPO_GRAY] = true };
+    uint64_t count[4] = { level->white_count, level->black_count, 0, 0 };
+    ebpo_status status = EBPO_OK;
+    for (int type = 0; type < 4 && status == EBPO_OK; type++)
+        if (wanted[type])
+            status =
+                count_before(&out->before[type], level, (ebpo_node_type)type, &count[type], error);
+    if (status != EBPO_OK)
+        return status;
+    if (number == 0 && wanted[EBPO_WHITE])
+        count[EBPO_WHITE] -= 7; /* octants that the root's group does not have */
+    if (count[EBPO_GRAY] != level->gray_count || count[EBPO_LEAF] != level->leaf_count ||
+        count[EBPO_BLACK] != level->black_count || count[EBPO_WHITE] != level->white_count)
         return ebpo_fail(error, EBPO_E_FORMAT,
                          "level %d: its types and its node counts disagree; run ebpo verify",
                          number);
@@ -70,8 +88,8 @@ static ebpo_status sum32(uint64_t **out, const uint32_t *counts, uint64_t count,
     return sum == total ? EBPO_OK : sums_disagree(number, what, error);
 }
 
-ebpo_status ebpo_lod_index_make(ebpo_lod_index *out, const ebpo_level *level, int number,
-                                ebpo_error *error)
+ebpo_status ebpo_level_ranks_make(ebpo_level_ranks *out, const ebpo_level *level, int number,
+                                  ebpo_error *error)
 {
     memset(out, 0, sizeof *out);
     ebpo_status status = make_ranks(out, level, number, error);
@@ -85,6 +103,6 @@ ebpo_status ebpo_lod_index_make(ebpo_lod_index *out, const ebpo_level *level, in
         status = sum32(&out->ref_first, level->leaf_ref_count, level->leaf_count, level->ref_count,
                        number, "face lists", error);
     if (status != EBPO_OK)
-        ebpo_lod_index_free(out);
+        ebpo_level_ranks_free(out);
     return status;
 }
