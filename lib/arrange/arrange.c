@@ -49,12 +49,11 @@ static ebpo_status mark_vertices(void *context, uint64_t begin, uint64_t end, un
     for (uint64_t i = 3 * begin; i < 3 * end; i++) {
         uint32_t v = a->mesh->faces[i];
         if (v >= a->mesh->vertex_count)
-            return ebpo_fail(error, EBPO_E_FORMAT,
-                             "%s: face %llu names vertex %lu, but there are %llu vertices; repair "
-                             "the file or drop the face",
-                             ebpo_mesh_label(a->mesh),
-                             (unsigned long long)ebpo_mesh_source_face(a->mesh, i / 3),
-                             (unsigned long)v, (unsigned long long)a->mesh->vertex_count);
+            return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_mesh_label(a->mesh),
+                                  "face %llu names vertex %lu, but there are %llu vertices; repair "
+                                  "the file or drop the face",
+                                  (unsigned long long)ebpo_mesh_source_face(a->mesh, i / 3),
+                                  (unsigned long)v, (unsigned long long)a->mesh->vertex_count);
         uint8_t bit = (uint8_t)(1u << v % 8);
         if (!(__atomic_load_n(&a->referenced[v / 8], __ATOMIC_RELAXED) & bit))
             __atomic_fetch_or(&a->referenced[v / 8], bit, __ATOMIC_RELAXED);
@@ -76,14 +75,14 @@ static ebpo_status find_bounds(void *context, uint64_t begin, uint64_t end, unsi
         ebpo_mesh_position(a->mesh, v, p);
         for (int k = 0; k < 3; k++)
             if (!isfinite(p[k]))
-                return ebpo_fail(error, EBPO_E_FORMAT,
-                                 "%s: vertex %llu has %c = %s; repair the coordinate or drop the "
-                                 "vertex and its faces",
-                                 ebpo_mesh_label(a->mesh),
-                                 (unsigned long long)ebpo_mesh_source_vertex(a->mesh, v), "xyz"[k],
-                                 isnan(p[k]) ? "nan"
-                                 : p[k] > 0  ? "inf"
-                                             : "-inf");
+                return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_mesh_label(a->mesh),
+                                      "vertex %llu has %c = %s; repair the coordinate or drop the "
+                                      "vertex and its faces",
+                                      (unsigned long long)ebpo_mesh_source_vertex(a->mesh, v),
+                                      "xyz"[k],
+                                      isnan(p[k]) ? "nan"
+                                      : p[k] > 0  ? "inf"
+                                                  : "-inf");
         for (int k = 0; k < 3 && is_referenced(a, v); k++) {
             b[0][k] = p[k] < b[0][k] ? p[k] : b[0][k];
             b[1][k] = p[k] > b[1][k] ? p[k] : b[1][k];
@@ -137,10 +136,9 @@ static ebpo_status look_at_all(arranging *a, int level, ebpo_error *error)
     for (int k = 0; k < 3; k++)
         most = fmax(most, fmax(fabs(min[k]), fabs(max[k])));
     if (!choose_box(&a->to->box, min, max, level))
-        return ebpo_fail(
-            error, EBPO_E_LIMIT,
-            "%s: coordinates up to %g are too large for an exact grid; scale the model",
-            ebpo_mesh_label(mesh), most);
+        return ebpo_fail_file(
+            error, EBPO_E_LIMIT, ebpo_mesh_label(mesh),
+            "coordinates up to %g are too large for an exact grid; scale the model", most);
     return EBPO_OK;
 }
 
@@ -451,9 +449,9 @@ static ebpo_status run(arranging a, int level, ebpo_error *error)
     ebpo_mesh *mesh = a.mesh;
     ebpo_status status = ebpo_mesh_check_shape(mesh, error);
     if (status == EBPO_OK && mesh->face_count == 0)
-        return ebpo_fail(error, EBPO_E_FORMAT,
-                         "%s: %llu vertices but no faces; give a triangle mesh, not a point cloud",
-                         ebpo_mesh_label(mesh), (unsigned long long)mesh->vertex_count);
+        return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_mesh_label(mesh),
+                              "%llu vertices but no faces; give a triangle mesh, not a point cloud",
+                              (unsigned long long)mesh->vertex_count);
     if (status != EBPO_OK)
         return status;
     if (mesh->arrangement && mesh->arrangement->key && mesh->arrangement->level == level)

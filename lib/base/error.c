@@ -28,20 +28,68 @@ const char *ebpo_status_name(ebpo_status status)
     return "unknown status";
 }
 
+/* One line, whatever a file name or another library's message brings along. */
+static void keep_to_one_line(char *text)
+{
+    for (; *text; text++)
+        if ((unsigned char)*text < 0x20 || *text == 0x7f)
+            *text = ' ';
+}
+
+static ebpo_status fail(ebpo_error *error, ebpo_status status, const char *file, const char *object,
+                        int64_t offset, const char *format, va_list args)
+{
+    int begin = 0;
+    if (!error)
+        return status;
+    *error = (ebpo_error){ .status = status, .offset = offset };
+    if (*file)
+        begin = snprintf(error->message, sizeof error->message, "%s: %s%s", file, object,
+                         *object ? ": " : "");
+    if (begin < (int)sizeof error->message)
+        vsnprintf(error->message + begin, sizeof error->message - (size_t)begin, format, args);
+    snprintf(error->file, sizeof error->file, "%s", file);
+    snprintf(error->object, sizeof error->object, "%s", object);
+    keep_to_one_line(error->message);
+    keep_to_one_line(error->file);
+    keep_to_one_line(error->object);
+    return status;
+}
+
 ebpo_status ebpo_fail(ebpo_error *error, ebpo_status status, const char *format, ...)
 {
-    if (error) {
-        error->status = status;
-        va_list args;
-        va_start(args, format);
-        vsnprintf(error->message, sizeof error->message, format, args);
-        va_end(args);
-        /* One line, whatever a file name or another library's message brings along. */
-        for (char *c = error->message; *c; c++)
-            if ((unsigned char)*c < 0x20 || *c == 0x7f)
-                *c = ' ';
-    }
+    va_list args;
+    va_start(args, format);
+    fail(error, status, "", "", -1, format, args);
+    va_end(args);
     return status;
+}
+
+ebpo_status ebpo_fail_file(ebpo_error *error, ebpo_status status, const char *file,
+                           const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    fail(error, status, file, "", -1, format, args);
+    va_end(args);
+    return status;
+}
+
+ebpo_status ebpo_fail_at(ebpo_error *error, ebpo_status status, const char *file,
+                         const char *object, int64_t offset, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    fail(error, status, file, object, offset, format, args);
+    va_end(args);
+    return status;
+}
+
+ebpo_status ebpo_fail_with(ebpo_error *error, const ebpo_error *cause)
+{
+    if (error)
+        *error = *cause;
+    return cause->status;
 }
 
 ebpo_status ebpo_fail_memory(ebpo_error *error, uint64_t bytes)
@@ -52,5 +100,5 @@ ebpo_status ebpo_fail_memory(ebpo_error *error, uint64_t bytes)
 
 ebpo_status ebpo_fail_errno(ebpo_error *error, const char *path, const char *what)
 {
-    return ebpo_fail(error, EBPO_E_IO, "%s: %s: %s", path, what, strerror(errno));
+    return ebpo_fail_file(error, EBPO_E_IO, path, "%s: %s", what, strerror(errno));
 }

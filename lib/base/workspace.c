@@ -215,9 +215,9 @@ static ebpo_status choose_folder(ebpo_workspace *w, const char *wanted, ebpo_err
     strcpy(w->folder, folder);
     int fd = open_unnamed(folder);
     if (fd < 0)
-        return ebpo_fail(error, EBPO_E_IO,
-                         "%s: cannot hold temporary files: %s; name another folder for them",
-                         folder, strerror(errno));
+        return ebpo_fail_file(error, EBPO_E_IO, folder,
+                              "cannot hold temporary files: %s; name another folder for them",
+                              strerror(errno));
     close(fd);
     return EBPO_OK;
 }
@@ -540,10 +540,10 @@ ebpo_status ebpo_workspace_fail(const ebpo_workspace *workspace, uint64_t bytes,
     int fault = workspace ? workspace->failed : 0;
     if (!fault)
         return ebpo_fail_memory(error, bytes);
-    return ebpo_fail(error, EBPO_E_IO,
-                     "%s: cannot hold %llu bytes of temporary files: %s; name another folder, or "
-                     "allow more memory",
-                     workspace->folder, (unsigned long long)bytes, strerror(fault));
+    return ebpo_fail_file(error, EBPO_E_IO, workspace->folder,
+                          "cannot hold %llu bytes of temporary files: %s; name another folder, or "
+                          "allow more memory",
+                          (unsigned long long)bytes, strerror(fault));
 }
 
 ebpo_status ebpo_workspace_fail_while(const ebpo_workspace *workspace, const char *what,
@@ -552,10 +552,10 @@ ebpo_status ebpo_workspace_fail_while(const ebpo_workspace *workspace, const cha
     int fault = workspace ? workspace->failed : 0;
     if (!fault)
         return ebpo_fail(error, EBPO_E_MEMORY, "out of memory %s", what);
-    return ebpo_fail(
-        error, EBPO_E_IO,
-        "%s: cannot hold the temporary files %s: %s; name another folder, or allow more memory",
-        workspace->folder, what, strerror(fault));
+    return ebpo_fail_file(
+        error, EBPO_E_IO, workspace->folder,
+        "cannot hold the temporary files %s: %s; name another folder, or allow more memory", what,
+        strerror(fault));
 }
 
 /* --- residency --- */

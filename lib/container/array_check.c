@@ -21,11 +21,12 @@ static const char *next_step(const ebpo_check *check)
 ebpo_status ebpo_check_fail(const ebpo_check *check, int level, const char *array, const char *what,
                             ebpo_error *error)
 {
-    char folder[24] = "";
+    char path[64];
     if (level >= 0)
-        snprintf(folder, sizeof folder, "/levels/%02d/", level);
-    return ebpo_fail(error, check->as, "%s: %s%s: %s; %s", check->shown, folder, array, what,
-                     next_step(check));
+        snprintf(path, sizeof path, "/levels/%02d/%s", level, array);
+    else
+        snprintf(path, sizeof path, "%s", array);
+    return ebpo_fail_at(error, check->as, check->shown, path, -1, "%s; %s", what, next_step(check));
 }
 
 static ebpo_status check_types(const ebpo_check *check, const ebpo_info *info, int level,

@@ -48,10 +48,10 @@ static ebpo_status compare(content_job *j, ebpo_error *error)
     ebpo_status status = ebpo_content_end(&content, digest, error);
     ebpo_content_free(&content);
     if (status == EBPO_OK && memcmp(digest, j->file->info.content_sha256, 32) != 0)
-        status = ebpo_fail(error, EBPO_E_FORMAT,
-                           "%s: the content is not what content_sha256 says: the file was changed; "
-                           "get a fresh copy",
-                           j->file->in.shown);
+        status =
+            ebpo_fail_file(error, EBPO_E_FORMAT, j->file->in.shown,
+                           "the content is not what content_sha256 says: the file was changed; "
+                           "get a fresh copy");
     return status;
 }
 

@@ -227,9 +227,8 @@ static ebpo_status admit(ebpo_chunks *c, const ebpo_array_in *array, uint64_t ke
     if (fits(c, cost))
         return EBPO_OK;
     c->refused = true;
-    return ebpo_fail(error, EBPO_E_LIMIT,
-                     "%s: %s: reading on would take more than the %" PRIu64 " bytes allowed",
-                     c->file->in.shown, array->path, c->limit);
+    return ebpo_fail_at(error, EBPO_E_LIMIT, c->file->in.shown, array->path, -1,
+                        "reading on would take more than the %" PRIu64 " bytes allowed", c->limit);
 }
 
 static bool is_ahead(const ebpo_chunks *c, uint64_t key)
@@ -419,16 +418,15 @@ static ebpo_status check_rows(const ebpo_chunks *chunks, ebpo_array_id id, int l
 {
     const char *shown = chunks->file->in.shown;
     if (id >= EBPO_LEVEL_ARRAYS || level < 0 || level >= chunks->file->info.level_count)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: level %d has no array number %d of integers",
-                         shown, level, (int)id);
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
+                              "level %d has no array number %d of integers", level, (int)id);
     const ebpo_array_in *array = ebpo_reader_array(chunks->file, id, level);
     if (!array->present || row > array->shape.rows || rows > array->shape.rows - row ||
         size < array->shape.element_size)
-        return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "%s: %s: rows %" PRIu64 " to %" PRIu64
-                         " of %zu bytes are asked for, and the array has %" PRIu64 " of %d",
-                         shown, array->path, row, row + rows, size, array->shape.rows,
-                         array->shape.element_size);
+        return ebpo_fail_at(error, EBPO_E_ARGUMENT, shown, array->path, -1,
+                            "rows %" PRIu64 " to %" PRIu64
+                            " of %zu bytes are asked for, and the array has %" PRIu64 " of %d",
+                            row, row + rows, size, array->shape.rows, array->shape.element_size);
     return EBPO_OK;
 }
 

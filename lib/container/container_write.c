@@ -227,8 +227,8 @@ static ebpo_status compress_slot(void *context, uint64_t begin, uint64_t end, un
                               s->array->shape.element_size, s->raw, s->raw_bytes, s->stored,
                               &s->stored_bytes);
         if (status != EBPO_OK)
-            return ebpo_fail(error, status, "%s: %s: a chunk could not be compressed", w->out.shown,
-                             s->array->path);
+            return ebpo_fail_at(error, status, w->out.shown, s->array->path, -1,
+                                "a chunk could not be compressed");
     }
     return EBPO_OK;
 }
@@ -345,10 +345,9 @@ static ebpo_status check_options(const ebpo_write_options *options, const char *
                                                       : 0;
     if ((unsigned)options->codec > EBPO_CODEC_NONE || options->codec_level < 0 ||
         options->codec_level > most)
-        return ebpo_fail(
-            error, EBPO_E_ARGUMENT,
-            "%s: no such codec or codec level; zstd takes 1 to 22, deflate 1 to 9, none takes 0",
-            path);
+        return ebpo_fail_file(
+            error, EBPO_E_ARGUMENT, path,
+            "no such codec or codec level; zstd takes 1 to 22, deflate 1 to 9, none takes 0");
     return EBPO_OK;
 }
 

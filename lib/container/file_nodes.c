@@ -15,16 +15,16 @@ ebpo_status ebpo_chunks_check_node(const ebpo_chunks *chunks, const ebpo_node *n
     const char *shown = chunks->file->in.shown;
     if (node->cell.level < 0 || node->cell.level >= info->level_count ||
         (unsigned)node->type > EBPO_GRAY)
-        return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "%s: there is no level %d; the file has levels 0 to %d", shown,
-                         node->cell.level, info->level_count - 1);
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
+                              "there is no level %d; the file has levels 0 to %d", node->cell.level,
+                              info->level_count - 1);
     const ebpo_level_summary *s = &info->level[node->cell.level];
     const uint64_t all[4] = { s->white_count, s->black_count, s->leaf_count, s->gray_count };
     if (node->rank >= all[node->type])
-        return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "%s: level %d has %" PRIu64 " nodes of type %d; number %" PRIu64
-                         " was asked for",
-                         shown, node->cell.level, all[node->type], (int)node->type, node->rank);
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
+                              "level %d has %" PRIu64 " nodes of type %d; number %" PRIu64
+                              " was asked for",
+                              node->cell.level, all[node->type], (int)node->type, node->rank);
     return EBPO_OK;
 }
 
@@ -32,9 +32,9 @@ static ebpo_status check_type(const ebpo_chunks *chunks, const ebpo_node *node, 
                               const char *what, ebpo_error *error)
 {
     if (node->type != type)
-        return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "%s: %s of a node of type %d are asked for; only gray nodes have them",
-                         chunks->file->in.shown, what, (int)node->type);
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, chunks->file->in.shown,
+                              "%s of a node of type %d are asked for; only gray nodes have them",
+                              what, (int)node->type);
     return ebpo_chunks_check_node(chunks, node, error);
 }
 
@@ -104,14 +104,12 @@ ebpo_status ebpo_chunks_winding(ebpo_chunks *chunks, const ebpo_node *node, int3
     if (status != EBPO_OK)
         return status;
     if (!info->solid)
-        return ebpo_fail(error, EBPO_E_NOT_SOLID,
-                         "%s: winding numbers are asked for, and the model is a surface; mend the "
-                         "mesh and build again",
-                         chunks->file->in.shown);
+        return ebpo_fail_file(error, EBPO_E_NOT_SOLID, chunks->file->in.shown,
+                              "winding numbers are asked for, and the model is a surface; mend the "
+                              "mesh and build again");
     if (node->type == EBPO_GRAY)
-        return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "%s: the winding number of a gray node is asked for; ask its children",
-                         chunks->file->in.shown);
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, chunks->file->in.shown,
+                              "the winding number of a gray node is asked for; ask its children");
     ebpo_array_id id = arrays[node->type];
     if (!ebpo_reader_array(chunks->file, id, node->cell.level)->present)
         return EBPO_OK; /* the usual one; leaves always have the array */

@@ -98,7 +98,7 @@ ebpo_status ebpo_facts_check(const ebpo_info *info, const char *shown, ebpo_stat
         wrong = "the levels' new faces do not add up to face_count";
     if (!wrong)
         return EBPO_OK;
-    return ebpo_fail(error, as, "%s: %s: %s; %s", shown, level >= 0 ? "/levels" : "/", wrong,
-                     as == EBPO_E_FORMAT ? "get a fresh copy of the file"
-                                         : "the tree was not written");
+    return ebpo_fail_at(error, as, shown, level >= 0 ? "/levels" : "/", -1, "%s; %s", wrong,
+                        as == EBPO_E_FORMAT ? "get a fresh copy of the file"
+                                            : "the tree was not written");
 }

@@ -281,10 +281,10 @@ ebpo_status ebpo_facts_put_level(ebpo_h5_out *out, ebpo_h5_id group,
 static ebpo_status wrong_value(ebpo_h5_in *in, const char *object, const char *name,
                                ebpo_error *error)
 {
-    return ebpo_fail(error, EBPO_E_FORMAT,
-                     "%s: %s: attribute %s has a value that the format does not allow; get a fresh "
-                     "copy of the file",
-                     in->shown, object, name);
+    return ebpo_fail_at(error, EBPO_E_FORMAT, in->shown, object, -1,
+                        "attribute %s has a value that the format does not allow; get a fresh "
+                        "copy of the file",
+                        name);
 }
 
 static ebpo_status get_word(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const fact *f,
@@ -374,9 +374,8 @@ static ebpo_status get_fact(ebpo_h5_in *in, ebpo_h5_id id, const char *object, c
         return status;
     if (f->kind == NOTE || f->kind == HINT)
         return EBPO_OK;
-    return ebpo_fail(error, EBPO_E_FORMAT,
-                     "%s: %s: attribute %s is missing; get a fresh copy of the file", in->shown,
-                     object, f->name);
+    return ebpo_fail_at(error, EBPO_E_FORMAT, in->shown, object, -1,
+                        "attribute %s is missing; get a fresh copy of the file", f->name);
 }
 
 static ebpo_status get_version(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebpo_error *error)
@@ -386,27 +385,26 @@ static ebpo_status get_version(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info,
     char format[32];
     ebpo_status status = ebpo_h5_get_text(in, root, "/", "format", format, sizeof format, NULL);
     if (status != EBPO_OK || strcmp(format, FORMAT) != 0)
-        return ebpo_fail(error, EBPO_E_FORMAT,
-                         "%s: an HDF5 file, but not an EBP-Octree (its root attribute format does "
-                         "not say \"%s\"); "
-                         "make one with `ebpo convert`",
-                         in->shown, FORMAT);
+        return ebpo_fail_file(error, EBPO_E_FORMAT, in->shown,
+                              "an HDF5 file, but not an EBP-Octree (its root attribute format does "
+                              "not say \"%s\"); "
+                              "make one with `ebpo convert`",
+                              FORMAT);
     status = get_fact(in, root, "/", &major, info, error);
     if (status == EBPO_OK)
         status = get_fact(in, root, "/", &minor, info, error);
     if (status == EBPO_OK && info->version_major != EBPO_FORMAT_MAJOR)
-        status = ebpo_fail(
-            error, EBPO_E_VERSION,
-            "%s: format version %d.%d, and this library reads version %d; use a newer one",
-            in->shown, info->version_major, info->version_minor, EBPO_FORMAT_MAJOR);
+        status = ebpo_fail_file(
+            error, EBPO_E_VERSION, in->shown,
+            "format version %d.%d, and this library reads version %d; use a newer one",
+            info->version_major, info->version_minor, EBPO_FORMAT_MAJOR);
     char words[32]; /* they are for people, but files of the draft have the same numbers */
     if (status == EBPO_OK &&
         ebpo_h5_get_text(in, root, "/", "format_version", words, sizeof words, NULL) == EBPO_OK &&
         strcmp(words, DRAFT) == 0)
-        status = ebpo_fail(error, EBPO_E_VERSION,
-                           "%s: was written while the format was a draft, which is not read any "
-                           "more; convert the model again",
-                           in->shown);
+        status = ebpo_fail_file(error, EBPO_E_VERSION, in->shown,
+                                "was written while the format was a draft, which is not read any "
+                                "more; convert the model again");
     return status;
 }
 
@@ -418,18 +416,17 @@ static ebpo_status take_part(ebpo_h5_in *in, const char *word, bool required, un
         if (strcmp(word, parts[i].word) != 0)
             continue;
         if (*seen >> i & 1)
-            return ebpo_fail(error, EBPO_E_FORMAT,
-                             "%s: part \"%s\" is listed twice; get a fresh copy of the file",
-                             in->shown, word);
+            return ebpo_fail_file(error, EBPO_E_FORMAT, in->shown,
+                                  "part \"%s\" is listed twice; get a fresh copy of the file",
+                                  word);
         *seen |= 1u << i;
         return EBPO_OK;
     }
     if (!required)
         return EBPO_OK;
-    return ebpo_fail(
-        error, EBPO_E_VERSION,
-        "%s: the file needs part \"%s\", which this library does not know; use a newer one",
-        in->shown, word);
+    return ebpo_fail_file(
+        error, EBPO_E_VERSION, in->shown,
+        "the file needs part \"%s\", which this library does not know; use a newer one", word);
 }
 
 static ebpo_status get_parts(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebpo_error *error)
@@ -440,9 +437,8 @@ static ebpo_status get_parts(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, e
         char words[1024], *rest = words, *word;
         ebpo_status status = ebpo_h5_get_text(in, root, "/", name, words, sizeof words, error);
         if (status == EBPO_E_ABSENT)
-            return ebpo_fail(error, EBPO_E_FORMAT,
-                             "%s: /: attribute %s is missing; get a fresh copy of the file",
-                             in->shown, name);
+            return ebpo_fail_at(error, EBPO_E_FORMAT, in->shown, "/", -1,
+                                "attribute %s is missing; get a fresh copy of the file", name);
         while (status == EBPO_OK && (word = strsep(&rest, " ")) != NULL)
             if (*word)
                 status = take_part(in, word, required, &seen, error);
@@ -462,9 +458,8 @@ static ebpo_status get_subset(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, 
     int64_t levels = 0;
     ebpo_status status = get_digest(in, root, "/", "subset_of", info->subset_of, error);
     if (status == EBPO_E_ABSENT)
-        return ebpo_fail(error, EBPO_E_FORMAT,
-                         "%s: /: attribute subset_of is missing; get a fresh copy of the file",
-                         in->shown);
+        return ebpo_fail_at(error, EBPO_E_FORMAT, in->shown, "/", -1,
+                            "attribute subset_of is missing; get a fresh copy of the file");
     if (status == EBPO_OK)
         status = ebpo_h5_get_int(in, root, "/", "subset_levels", &levels, error);
     if (status == EBPO_OK && (levels < 1 || levels > EBPO_LEVELS_MAX))

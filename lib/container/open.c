@@ -93,10 +93,9 @@ static ebpo_status sum_stored(ebpo_file *file, ebpo_error *error)
         stored += info->level[level].stored_bytes;
     stored += info->mesh_vertex_bytes + info->mesh_face_bytes + info->map_bytes;
     if (stored > info->file_bytes)
-        return ebpo_fail(
-            error, EBPO_E_FORMAT,
-            "%s: the arrays' chunks take more room than the file has; get a fresh copy of the file",
-            file->in.shown);
+        return ebpo_fail_file(
+            error, EBPO_E_FORMAT, file->in.shown,
+            "the arrays' chunks take more room than the file has; get a fresh copy of the file");
     return EBPO_OK;
 }
 
@@ -146,9 +145,9 @@ static ebpo_status read_head(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
                                            file->info.chunk_index_bytes });
     if (status == EBPO_OK &&
         (file->info.level_count < 1 || file->info.level_count > EBPO_LEVELS_MAX))
-        status = ebpo_fail(error, EBPO_E_FORMAT,
-                           "%s: /: level_count is not 1 to %d; get a fresh copy of the file",
-                           file->in.shown, EBPO_LEVELS_MAX);
+        status = ebpo_fail_at(error, EBPO_E_FORMAT, file->in.shown, "/", -1,
+                              "level_count is not 1 to %d; get a fresh copy of the file",
+                              EBPO_LEVELS_MAX);
     if (status == EBPO_OK)
         status = open_levels(file, h5, error);
     if (status == EBPO_OK)
@@ -199,9 +198,8 @@ static ebpo_status locate_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_in *
     if (shape.rows != a->shape.rows || shape.cols != a->shape.cols ||
         shape.element_size != a->shape.element_size || shape.pipeline != a->shape.pipeline) {
         free(chunks);
-        return ebpo_fail(error, EBPO_E_IO,
-                         "%s: %s: the file has changed while it was open; open it again",
-                         file->in.shown, a->path);
+        return ebpo_fail_at(error, EBPO_E_IO, file->in.shown, a->path, -1,
+                            "the file has changed while it was open; open it again");
     }
     a->chunks = chunks;
     a->stored_bytes = stored;
@@ -277,9 +275,8 @@ ebpo_status ebpo_open_memory(ebpo_file **out, const void *data, uint64_t size, c
     EBPO_DEFAULT_FP;
     *out = NULL;
     if (!data && size)
-        return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "%s: no bytes; give the file's bytes with their count",
-                         name ? name : "memory");
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, name ? name : "memory",
+                              "no bytes; give the file's bytes with their count");
     ebpo_source source = ebpo_source_of_memory(data, size);
     return open_source(out, &source, name ? name : "memory", error);
 }
@@ -297,8 +294,8 @@ ebpo_status ebpo_open_source(ebpo_file **out, const ebpo_source *source, const c
         return open_source(out, &own, name ? name : "source", error);
     if (own.close)
         own.close(own.user);
-    return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: a source without a read function; set one",
-                     name ? name : "source");
+    return ebpo_fail_file(error, EBPO_E_ARGUMENT, name ? name : "source",
+                          "a source without a read function; set one");
 }
 
 void ebpo_close(ebpo_file *file)

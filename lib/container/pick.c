@@ -402,8 +402,8 @@ ebpo_status ebpo_pick_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t
                   : id == EBPO_A_FACES ? 3 * sizeof(uint32_t)
                                        : sizeof(uint32_t);
     if (!array->present)
-        return ebpo_fail(error, EBPO_E_ABSENT, "%s: %s: the file does not hold this array",
-                         chunks->file->in.shown, array->path);
+        return ebpo_fail_at(error, EBPO_E_ABSENT, chunks->file->in.shown, array->path, -1,
+                            "the file does not hold this array");
     uint64_t number = ebpo_h5_chunk_count(&array->shape);
     uint64_t *begin = ebpo_alloc(number + 2, sizeof *begin);
     uint32_t *order = ebpo_alloc(count, sizeof *order);

@@ -161,9 +161,9 @@ ebpo_status ebpo_file_read_level(ebpo_file *file, int level, ebpo_level *out, un
     memset(out, 0, sizeof *out);
     const ebpo_info *info = &file->info;
     if (level < 0 || level >= info->level_count)
-        return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "%s: there is no level %d; the file has levels 0 to %d", file->in.shown,
-                         level, info->level_count - 1);
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, file->in.shown,
+                              "there is no level %d; the file has levels 0 to %d", level,
+                              info->level_count - 1);
     *out = ebpo_level_of_summary(info, level);
     ebpo_file_expect_levels(file, level, level);
     ebpo_status status = read_arrays(file, level, out, threads, error);

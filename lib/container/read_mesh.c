@@ -24,9 +24,9 @@ void ebpo_tree_free(ebpo_tree *tree)
 
 static ebpo_status absent(const ebpo_file *file, const char *part, ebpo_error *error)
 {
-    return ebpo_fail(error, EBPO_E_ABSENT,
-                     "%s: the file was written without its %s; build it again with that part",
-                     file->in.shown, part);
+    return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
+                          "the file was written without its %s; build it again with that part",
+                          part);
 }
 
 typedef struct mesh_job {

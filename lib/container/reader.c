@@ -64,9 +64,9 @@ static ebpo_status decode(ebpo_file *file, const ebpo_array_in *array, uint64_t 
     if (status == EBPO_E_MEMORY)
         return ebpo_fail_memory(error, raw);
     if (status != EBPO_OK)
-        return ebpo_fail(error, status,
-                         "%s: %s: chunk %" PRIu64 " is damaged: %s; get a fresh copy of the file",
-                         file->in.shown, array->path, chunk, why);
+        return ebpo_fail_at(error, status, file->in.shown, array->path, -1,
+                            "chunk %" PRIu64 " is damaged: %s; get a fresh copy of the file", chunk,
+                            why);
     return EBPO_OK;
 }
 

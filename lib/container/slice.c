@@ -35,9 +35,8 @@ static ebpo_status root_range(const ebpo_chunks *chunks, const ebpo_node *root, 
                               ebpo_error *error)
 {
     if (root->type != EBPO_GRAY && root->type != EBPO_LEAF)
-        return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "%s: the subtree of a white or black node is asked for; it has none",
-                         chunks->file->in.shown);
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, chunks->file->in.shown,
+                              "the subtree of a white or black node is asked for; it has none");
     *out = (range){ .level = root->cell.level };
     out->rank[root->type] = root->rank;
     out->count[root->type] = 1;
@@ -289,9 +288,8 @@ ebpo_status ebpo_slice_read(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_nod
     out->root = *root;
     out->pruned = chunks->file->info.pruned;
     if (!(chunks->file->info.parts & EBPO_PART_MESH))
-        return ebpo_fail(error, EBPO_E_ABSENT,
-                         "%s: the file was written without its mesh; build it again with it",
-                         chunks->file->in.shown);
+        return ebpo_fail_file(error, EBPO_E_ABSENT, chunks->file->in.shown,
+                              "the file was written without its mesh; build it again with it");
     walk w = { .chunks = chunks, .slice = out };
     ebpo_status status = read_levels(out, chunks, root, error);
     if (status == EBPO_OK)

@@ -20,9 +20,8 @@ ebpo_status ebpo_slice_read_all(ebpo_slice *out, ebpo_file *file, unsigned threa
 {
     memset(out, 0, sizeof *out);
     if (!(file->info.parts & EBPO_PART_MESH))
-        return ebpo_fail(error, EBPO_E_ABSENT,
-                         "%s: the file was written without its mesh; build it again with it",
-                         file->in.shown);
+        return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
+                              "the file was written without its mesh; build it again with it");
     ebpo_tree tree;
     ebpo_status status = ebpo_file_read_tree(file, &tree, threads, error);
     if (status != EBPO_OK)

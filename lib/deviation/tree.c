@@ -10,16 +10,14 @@ ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, ebpo_file *file, unsigned 
 {
     const ebpo_info *info = ebpo_file_info(file);
     if (!(info->parts & EBPO_PART_MESH))
-        return ebpo_fail(error, EBPO_E_ABSENT,
-                         "%s: how far envelopes reach beyond the model is measured against its "
-                         "mesh, which the file does not hold; take a file with it "
-                         "(`ebpo convert`)",
-                         file->in.shown);
+        return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
+                              "how far envelopes reach beyond the model is measured against its "
+                              "mesh, which the file does not hold; take a file with it "
+                              "(`ebpo convert`)");
     if (info->pruned)
-        return ebpo_fail(error, EBPO_E_ABSENT,
-                         "%s: is a subset, and how far envelopes reach beyond the model is "
-                         "measured against all of its mesh; take the original",
-                         file->in.shown);
+        return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
+                              "is a subset, and how far envelopes reach beyond the model is "
+                              "measured against all of its mesh; take the original");
     ebpo_status status = ebpo_lod_model_read(out, file, info->level_count - 1, threads, error);
     if (status == EBPO_OK && !out->mesh.faces)
         status = ebpo_file_read_mesh(file, &out->mesh, threads, error);

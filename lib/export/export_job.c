@@ -29,11 +29,11 @@ ebpo_status ebpo_export_check_glb(const char *path, uint64_t text, uint64_t bin,
     uint64_t total = EBPO_GLB_HEADS + (text + 3) / 4 * 4 + bin;
     if (total <= UINT32_MAX)
         return EBPO_OK;
-    return ebpo_fail(
-        error, EBPO_E_LIMIT,
-        "%s: would have %" PRIu64
+    return ebpo_fail_file(
+        error, EBPO_E_LIMIT, path,
+        "would have %" PRIu64
         " bytes or more, and a GLB file has less than 4 GiB; take gltf, or coarser levels",
-        path, total);
+        total);
 }
 
 ebpo_status ebpo_export_check_scene(const char *path, uint64_t vertices, uint64_t faces,
@@ -41,9 +41,9 @@ ebpo_status ebpo_export_check_scene(const char *path, uint64_t vertices, uint64_
 {
     if (vertices <= UINT32_MAX && faces <= UINT32_MAX / 3)
         return EBPO_OK;
-    return ebpo_fail(
-        error, EBPO_E_LIMIT,
-        "%s: would have %" PRIu64 " vertices and %" PRIu64
+    return ebpo_fail_file(
+        error, EBPO_E_LIMIT, path,
+        "would have %" PRIu64 " vertices and %" PRIu64
         " triangles, more corners than assimp can number; take another format, or a coarser level",
-        path, vertices, faces);
+        vertices, faces);
 }

@@ -107,7 +107,8 @@ static ebpo_status gather(model *m, const ebpo_export_job *job, ebpo_error *erro
     memcpy(job->report->origin, m->origin, sizeof m->origin);
     job->report->largest_change = m->largest_change;
     if (status == EBPO_OK && m->count == 0)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: there would be no triangle in it", job->path);
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, job->path,
+                              "there would be no triangle in it");
     return status;
 }
 

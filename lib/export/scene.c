@@ -10,10 +10,10 @@
 
 ebpo_status ebpo_export_scene(const ebpo_export_job *job, ebpo_error *error)
 {
-    return ebpo_fail(error, EBPO_E_UNSUPPORTED,
-                     "%s: this build has no assimp, which writes %s; build it with libassimp-dev "
-                     "installed, or export XDMF or VTKHDF",
-                     job->path, ebpo_export_format_name(job->format));
+    return ebpo_fail_file(error, EBPO_E_UNSUPPORTED, job->path,
+                          "this build has no assimp, which writes %s; build it with libassimp-dev "
+                          "installed, or export XDMF or VTKHDF",
+                          ebpo_export_format_name(job->format));
 }
 
 #else
@@ -145,7 +145,7 @@ static ebpo_status gather(scene *s, const ebpo_export_job *job, ebpo_error *erro
     }
     if (status == EBPO_OK && s->count == 0)
         status =
-            ebpo_fail(error, EBPO_E_ARGUMENT, "%s: there would be no triangle in it", job->path);
+            ebpo_fail_file(error, EBPO_E_ARGUMENT, job->path, "there would be no triangle in it");
     finish_scene(s);
     job->report->largest_change = s->largest_change;
     return status;
@@ -161,9 +161,9 @@ static ebpo_status write_scene(const scene *s, const ebpo_export_job *job, ebpo_
     ebpo_assimp_lock();
     if (aiExportSceneEx(&s->root, id, ebpo_path_name(job->path), &io, 0) != aiReturn_SUCCESS &&
         !file->failed)
-        status = ebpo_fail(error, EBPO_E_UNSUPPORTED,
-                           "%s: assimp cannot write it (%.200s); take another format", job->path,
-                           aiGetErrorString());
+        status = ebpo_fail_file(error, EBPO_E_UNSUPPORTED, job->path,
+                                "assimp cannot write it (%.200s); take another format",
+                                aiGetErrorString());
     ebpo_assimp_unlock();
     return status;
 }

@@ -115,17 +115,17 @@ void ebpo_scene_file_offer(ebpo_scene_file *file, struct aiFileIO *io)
 ebpo_status ebpo_scene_file_commit(ebpo_scene_file *file, ebpo_error *error)
 {
     if (file->unknown[0])
-        return ebpo_fail(error, EBPO_E_UNSUPPORTED,
-                         "%s: this assimp wants to write a file '%s' too, which nobody knows of; "
-                         "take another format",
-                         file->path, file->unknown);
+        return ebpo_fail_file(error, EBPO_E_UNSUPPORTED, file->path,
+                              "this assimp wants to write a file '%s' too, which nobody knows of; "
+                              "take another format",
+                              file->unknown);
     if (file->failed) {
         errno = file->why;
         return ebpo_fail_errno(error, file->path, "could not be written");
     }
     if (!file->stream)
-        return ebpo_fail(error, EBPO_E_UNSUPPORTED,
-                         "%s: this assimp has written nothing; take another format", file->path);
+        return ebpo_fail_file(error, EBPO_E_UNSUPPORTED, file->path,
+                              "this assimp has written nothing; take another format");
     return ebpo_publish_commit(&file->publish, error);
 }
 

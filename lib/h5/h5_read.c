@@ -52,7 +52,7 @@ ebpo_status ebpo_h5_close(ebpo_h5_in *in, ebpo_status status, ebpo_error *error)
 {
     ebpo_h5_close_id(in->file);
     if (in->driver && in->driver->status != EBPO_OK)
-        status = ebpo_fail(error, in->driver->status, "%s", in->driver->error.message);
+        status = ebpo_fail_with(error, &in->driver->error);
     if (in->driver)
         ebpo_h5_driver_close(in->driver);
     free(in->driver);
@@ -85,8 +85,8 @@ ebpo_status ebpo_h5_open_group(ebpo_h5_in *in, const char *path, ebpo_h5_id *id,
 {
     *id = -1;
     if (strcmp(path, "/") != 0 && ebpo_h5_look(in, path) != EBPO_H5_GROUP)
-        return ebpo_fail(error, EBPO_E_FORMAT, "%s: %s: a group is expected here and there is none",
-                         in->shown, path);
+        return ebpo_fail_at(error, EBPO_E_FORMAT, in->shown, path, -1,
+                            "a group is expected here and there is none");
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
     *id = H5Gopen2(in->file, path, H5P_DEFAULT);
@@ -374,9 +374,10 @@ ebpo_status ebpo_h5_read_array(ebpo_h5_in *in, const char *path, uint64_t most,
     *stored_bytes = 0;
     ebpo_h5_kind kind = ebpo_h5_look(in, path);
     if (kind != EBPO_H5_ARRAY)
-        return ebpo_fail(error, EBPO_E_FORMAT, "%s: %s: %s; get a fresh copy of the file",
-                         in->shown, path,
-                         kind == EBPO_H5_ABSENT ? "the array is missing" : "this is not an array");
+        return ebpo_fail_at(error, EBPO_E_FORMAT, in->shown, path, -1,
+                            "%s; get a fresh copy of the file",
+                            kind == EBPO_H5_ABSENT ? "the array is missing"
+                                                   : "this is not an array");
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
     hid_t dataset = H5Dopen2(in->file, path, H5P_DEFAULT),

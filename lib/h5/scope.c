@@ -42,14 +42,14 @@ ebpo_status ebpo_h5_fail(ebpo_error *error, ebpo_status status, const char *show
     char cause[CAUSE_BYTES] = "";
     H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take_first, cause);
     H5Eclear2(H5E_DEFAULT);
-    const char *colon = *object ? ": " : "", *number = strstr(cause, "errno = ");
+    const char *number = strstr(cause, "errno = ");
     if (number && atoi(number + 8) > 0)
-        return ebpo_fail(error, status, "%s%s%s: %s: %s", shown, colon, object, what,
-                         strerror(atoi(number + 8)));
+        return ebpo_fail_at(error, status, shown, object, -1, "%s: %s", what,
+                            strerror(atoi(number + 8)));
     if (*cause)
-        return ebpo_fail(error, status, "%s%s%s: %s (libhdf5: %.*s)", shown, colon, object, what,
-                         CAUSE_SHOWN, cause);
-    return ebpo_fail(error, status, "%s%s%s: %s", shown, colon, object, what);
+        return ebpo_fail_at(error, status, shown, object, -1, "%s (libhdf5: %.*s)", what,
+                            CAUSE_SHOWN, cause);
+    return ebpo_fail_at(error, status, shown, object, -1, "%s", what);
 }
 
 hid_t ebpo_h5_integer_type(unsigned size, bool is_signed)

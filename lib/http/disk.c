@@ -166,9 +166,8 @@ ebpo_status ebpo_disk_open(ebpo_disk **out, const char *folder, uint64_t bytes, 
                  ? open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC)
                  : -1;
     if (fd < 0 || !writable(fd)) {
-        ebpo_fail(error, EBPO_E_ARGUMENT,
-                  "%s: cannot be used as a cache folder: %s; give another one", folder,
-                  strerror(errno));
+        ebpo_fail_file(error, EBPO_E_ARGUMENT, folder,
+                       "cannot be used as a cache folder: %s; give another one", strerror(errno));
         if (fd >= 0)
             close(fd);
         return EBPO_E_ARGUMENT;

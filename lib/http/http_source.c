@@ -90,17 +90,17 @@ static ebpo_status check_options(const ebpo_http_options *o, const char *shown, 
     if (!(o->connect_timeout > 0 && o->connect_timeout <= most) ||
         !(o->stall_timeout >= 1 && o->stall_timeout <= most) ||
         !(o->time_limit > 0 && o->time_limit <= most))
-        return ebpo_fail(
-            error, EBPO_E_ARGUMENT,
-            "%s: a time-out is not above 0 (stalls: at least 1) and at most 1000000 seconds",
-            shown);
+        return ebpo_fail_file(
+            error, EBPO_E_ARGUMENT, shown,
+            "a time-out is not above 0 (stalls: at least 1) and at most 1000000 seconds");
     if (o->connections < 1 || o->connections > CONNECTIONS_MAX)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: %u connections at a time; give 1 to %d",
-                         shown, o->connections, CONNECTIONS_MAX);
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
+                              "%u connections at a time; give 1 to %d", o->connections,
+                              CONNECTIONS_MAX);
     for (const char *const *h = o->headers; h && *h; h++)
         if (!header_ok(*h))
-            return ebpo_fail(error, EBPO_E_ARGUMENT,
-                             "%s: a header to send is not 'Name: value' on one line", shown);
+            return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
+                                  "a header to send is not 'Name: value' on one line");
     return EBPO_OK;
 }
 
@@ -211,11 +211,12 @@ static ebpo_status read_head(http_source *s, ebpo_error *error)
 static ebpo_status read_whole(http_source *s, ebpo_error *error)
 {
     if (s->version.size > s->options.whole_limit)
-        return ebpo_fail(error, EBPO_E_UNSUPPORTED,
-                         "%s: the server sends neither ETag nor Last-Modified, so a change under "
-                         "way could not be noticed, and %llu bytes are more than "
-                         "would be read at once; download the file, or allow unversioned files",
-                         s->shown, (unsigned long long)s->version.size);
+        return ebpo_fail_file(
+            error, EBPO_E_UNSUPPORTED, s->shown,
+            "the server sends neither ETag nor Last-Modified, so a change under "
+            "way could not be noticed, and %llu bytes are more than "
+            "would be read at once; download the file, or allow unversioned files",
+            (unsigned long long)s->version.size);
     uint8_t *all = ebpo_alloc(s->version.size, 1);
     if (!all)
         return ebpo_fail_memory(error, s->version.size);
@@ -265,7 +266,7 @@ ebpo_status ebpo_source_of_url(ebpo_source *out, const char *url, const ebpo_htt
         return status;
     EBPO_GIVE(ebpo_source, out, &made);
     if (!ebpo_is_url(url))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: is not a URL with http:// or https://", url);
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, url, "is not a URL with http:// or https://");
     http_source *s = ebpo_alloc_zero(1, sizeof *s);
     if (!s)
         return ebpo_fail_memory(error, sizeof *s);

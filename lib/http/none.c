@@ -8,10 +8,10 @@ ebpo_status ebpo_source_of_url(ebpo_source *out, const char *url, const ebpo_htt
     (void)options;
     *out = (ebpo_source)EBPO_SOURCE_INIT;
     char shown[EBPO_SHOWN_BYTES];
-    return ebpo_fail(error, EBPO_E_UNSUPPORTED,
-                     "%s: this library was built without HTTP; install libcurl and build it again, "
-                     "or download the file",
-                     ebpo_url_shown(url, shown, sizeof shown));
+    return ebpo_fail_file(
+        error, EBPO_E_UNSUPPORTED, ebpo_url_shown(url, shown, sizeof shown),
+        "this library was built without HTTP; install libcurl and build it again, "
+        "or download the file");
 }
 
 bool ebpo_source_http_stats(const ebpo_source *source, ebpo_http_stats *out)

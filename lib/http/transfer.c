@@ -59,8 +59,8 @@ ebpo_status ebpo_transfers_make(ebpo_transfers **out, const char *url, const cha
     *out = NULL;
     pthread_once(&curl_once, start_curl);
     if (curl_state != CURLE_OK)
-        return ebpo_fail(error, EBPO_E_IO, "%s: libcurl cannot be started: %s", shown,
-                         curl_easy_strerror(curl_state));
+        return ebpo_fail_file(error, EBPO_E_IO, shown, "libcurl cannot be started: %s",
+                              curl_easy_strerror(curl_state));
     ebpo_transfers *t = ebpo_alloc_zero(1, sizeof *t);
     if (!t)
         return ebpo_fail_memory(error, sizeof *t);
@@ -76,10 +76,9 @@ ebpo_status ebpo_transfers_make(ebpo_transfers **out, const char *url, const cha
         return EBPO_OK;
     }
     ebpo_transfers_free(t);
-    return ebpo_fail(
-        error, EBPO_E_IO,
-        "%s: libcurl cannot be set up: no memory, no threads, or options that it does not take",
-        shown);
+    return ebpo_fail_file(
+        error, EBPO_E_IO, shown,
+        "libcurl cannot be set up: no memory, no threads, or options that it does not take");
 }
 
 void ebpo_transfers_free(ebpo_transfers *t)
@@ -165,7 +164,7 @@ static void finish(ebpo_transfers *t, ebpo_request *r, ebpo_status status, const
 {
     r->status = status;
     if (status != EBPO_OK)
-        ebpo_fail(&r->error, status, "%s: %s", t->shown, why);
+        ebpo_fail_file(&r->error, status, t->shown, "%s", why);
     r->done = true;
     pthread_cond_broadcast(t->done);
 }

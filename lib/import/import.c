@@ -15,10 +15,9 @@ ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const 
     (void)size;
     (void)workspace;
     *out = (ebpo_mesh){ 0 };
-    return ebpo_fail(error, EBPO_E_UNSUPPORTED,
-                     "%s: this build reads PLY only; build it with libassimp-dev installed, or "
-                     "convert the file to PLY",
-                     ebpo_path_name(name));
+    return ebpo_fail_file(error, EBPO_E_UNSUPPORTED, ebpo_path_name(name),
+                          "this build reads PLY only; build it with libassimp-dev installed, or "
+                          "convert the file to PLY");
 }
 
 #else
@@ -69,11 +68,11 @@ static ebpo_status check_budget(ebpo_import_format format, uint64_t size,
     if (workspace)
         ebpo_workspace_get_stats(workspace, &figures);
     if (!ebpo_mul_ok(size, bytes_each[format], &need) || need > figures.memory)
-        return ebpo_fail(error, EBPO_E_LIMIT,
-                         "%s: reading it takes some %" PRIu64
-                         " MiB, as assimp has all of it in memory, but %" PRIu64
-                         " MiB are allowed; allow more, or convert it to PLY",
-                         name, (need >> 20) + 1, figures.memory >> 20);
+        return ebpo_fail_file(error, EBPO_E_LIMIT, name,
+                              "reading it takes some %" PRIu64
+                              " MiB, as assimp has all of it in memory, but %" PRIu64
+                              " MiB are allowed; allow more, or convert it to PLY",
+                              (need >> 20) + 1, figures.memory >> 20);
     return EBPO_OK;
 }
 
@@ -178,17 +177,17 @@ static ebpo_status add_mesh_totals(totals *t, const struct aiMesh *m, const char
         const struct aiFace *face = &m->mFaces[i];
         for (unsigned k = 0; k < face->mNumIndices; k++)
             if (face->mIndices[k] >= m->mNumVertices)
-                return ebpo_fail(
-                    error, EBPO_E_FORMAT,
-                    "%s: face %u names vertex %u, but there are %u vertices; repair the file", name,
-                    i, face->mIndices[k], m->mNumVertices);
+                return ebpo_fail_file(
+                    error, EBPO_E_FORMAT, name,
+                    "face %u names vertex %u, but there are %u vertices; repair the file", i,
+                    face->mIndices[k], m->mNumVertices);
         t->triangles += face->mNumIndices >= 3 ? face->mNumIndices - 2 : 0;
         if (t->most_corners < face->mNumIndices)
             t->most_corners = face->mNumIndices;
     }
     if (t->vertices > MOST || t->triangles > MOST)
-        return ebpo_fail(error, EBPO_E_LIMIT,
-                         "%s: more than 2^32 - 2 vertices or triangles; split the model", name);
+        return ebpo_fail_file(error, EBPO_E_LIMIT, name,
+                              "more than 2^32 - 2 vertices or triangles; split the model");
     return EBPO_OK;
 }
 
@@ -199,8 +198,8 @@ static ebpo_status scene_totals(totals *t, const struct aiScene *scene, const ch
     for (unsigned i = 0; i < scene->mNumMeshes && status == EBPO_OK; i++)
         status = add_mesh_totals(t, scene->mMeshes[i], name, error);
     if (status == EBPO_OK && t->triangles == 0)
-        status = ebpo_fail(error, EBPO_E_FORMAT, "%s: has no faces; there is no mesh in this file",
-                           name);
+        status = ebpo_fail_file(error, EBPO_E_FORMAT, name,
+                                "has no faces; there is no mesh in this file");
     return status;
 }
 
@@ -254,11 +253,11 @@ static ebpo_status add_face(ebpo_mesh *mesh, const struct aiFace *face, const ui
         ebpo_polygon_triangulate(room->triangle, (const double(*)[3])room->position, n,
                                  room->scratch);
     if (kind == EBPO_POLYGON_TOO_LARGE)
-        return ebpo_fail(
-            error, EBPO_E_LIMIT,
-            "%s: a concave polygon of %" PRIu32
+        return ebpo_fail_file(
+            error, EBPO_E_LIMIT, name,
+            "a concave polygon of %" PRIu32
             " corners is too intricate to be cut into triangles here; triangulate it in the source",
-            name, n);
+            n);
     mesh->polygons_triangulated += n > 3;
     mesh->polygons_concave += kind == EBPO_POLYGON_CONCAVE;
     for (uint32_t i = 0; i < n - 2; i++)
@@ -330,9 +329,9 @@ static ebpo_status import_locked(ebpo_mesh *mesh, const memory_file *file, const
         for (char *s = reason; *s; s++)
             if (*s < ' ' || *s > '~')
                 *s = ' ';
-        return ebpo_fail(error, EBPO_E_FORMAT,
-                         "%s: assimp cannot read it (%s); repair the file or convert it to PLY",
-                         name, reason);
+        return ebpo_fail_file(error, EBPO_E_FORMAT, name,
+                              "assimp cannot read it (%s); repair the file or convert it to PLY",
+                              reason);
     }
     ebpo_status status = convert(mesh, scene, name, error);
     aiReleaseImport(scene);
@@ -349,11 +348,11 @@ ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const 
     ebpo_status status = check_budget(format, size, workspace, name, error);
     if (status == EBPO_OK &&
         size > UINT32_MAX) /* assimp keeps sizes, and counts of corners, in 32 bits */
-        status =
-            ebpo_fail(error, EBPO_E_LIMIT,
-                      "%s: has %" PRIu64
-                      " bytes, and files other than PLY are read up to 4 GiB; convert it to PLY",
-                      name, size);
+        status = ebpo_fail_file(
+            error, EBPO_E_LIMIT, name,
+            "has %" PRIu64
+            " bytes, and files other than PLY are read up to 4 GiB; convert it to PLY",
+            size);
     if (status == EBPO_OK && format == EBPO_IMPORT_OFF)
         status = ebpo_import_check_off(data, size, name, error);
     if (status == EBPO_OK) {

@@ -74,38 +74,38 @@ static ebpo_status check_counts(lines *l, uint64_t count[2], uint64_t size, cons
     uint64_t edges;
     size_t n = next_line(l) ? next_word(l, &word) : 0;
     if (n < 3 || memcmp(word + n - 3, "OFF", 3) != 0 || next_word(l, &word))
-        return ebpo_fail(
-            error, EBPO_E_FORMAT,
-            "%s: line %" PRIu64
+        return ebpo_fail_file(
+            error, EBPO_E_FORMAT, name,
+            "line %" PRIu64
             ": the word OFF does not stand there alone; this is no OFF file that can be read",
-            name, l->number);
+            l->number);
     if (!next_line(l) || !next_count(l, &count[0]) || !next_count(l, &count[1]) ||
         !next_count(l, &edges) || next_word(l, &word))
-        return ebpo_fail(
-            error, EBPO_E_FORMAT,
-            "%s: line %" PRIu64
+        return ebpo_fail_file(
+            error, EBPO_E_FORMAT, name,
+            "line %" PRIu64
             ": no counts of vertices, faces and edges follow the word OFF; repair the file",
-            name, l->number);
+            l->number);
     if (count[0] > size / 6 || count[1] > size / 2)
-        return ebpo_fail(error, EBPO_E_FORMAT,
-                         "%s: %" PRIu64 " vertices and %" PRIu64
-                         " faces do not fit into a file of %" PRIu64 " bytes; it is damaged",
-                         name, count[0], count[1], size);
+        return ebpo_fail_file(error, EBPO_E_FORMAT, name,
+                              "%" PRIu64 " vertices and %" PRIu64
+                              " faces do not fit into a file of %" PRIu64 " bytes; it is damaged",
+                              count[0], count[1], size);
     return EBPO_OK;
 }
 
 static ebpo_status check_vertex(lines *l, uint64_t row, const char *name, ebpo_error *error)
 {
     if (!next_line(l))
-        return ebpo_fail(error, EBPO_E_FORMAT,
-                         "%s: the file ends before vertex %" PRIu64
-                         "; it is cut short, get it again",
-                         name, row);
+        return ebpo_fail_file(error, EBPO_E_FORMAT, name,
+                              "the file ends before vertex %" PRIu64
+                              "; it is cut short, get it again",
+                              row);
     if (!next_number(l) || !next_number(l) || !next_number(l))
-        return ebpo_fail(error, EBPO_E_FORMAT,
-                         "%s: line %" PRIu64 ": vertex %" PRIu64
-                         " has no three coordinates; repair the file",
-                         name, l->number, row);
+        return ebpo_fail_file(error, EBPO_E_FORMAT, name,
+                              "line %" PRIu64 ": vertex %" PRIu64
+                              " has no three coordinates; repair the file",
+                              l->number, row);
     return EBPO_OK;
 }
 
@@ -114,32 +114,33 @@ static ebpo_status check_face(lines *l, uint64_t row, uint64_t vertices, const c
 {
     uint64_t corners, index;
     if (!next_line(l))
-        return ebpo_fail(error, EBPO_E_FORMAT,
-                         "%s: the file ends before face %" PRIu64 "; it is cut short, get it again",
-                         name, row);
+        return ebpo_fail_file(error, EBPO_E_FORMAT, name,
+                              "the file ends before face %" PRIu64
+                              "; it is cut short, get it again",
+                              row);
     if (!next_count(l, &corners) || !corners)
-        return ebpo_fail(error, EBPO_E_FORMAT,
-                         "%s: line %" PRIu64 ": face %" PRIu64
-                         " has no number of corners; repair the file",
-                         name, l->number, row);
+        return ebpo_fail_file(error, EBPO_E_FORMAT, name,
+                              "line %" PRIu64 ": face %" PRIu64
+                              " has no number of corners; repair the file",
+                              l->number, row);
     if (corners > MOST_CORNERS)
-        return ebpo_fail(
-            error, EBPO_E_UNSUPPORTED,
-            "%s: line %" PRIu64 ": face %" PRIu64 " has %" PRIu64
+        return ebpo_fail_file(
+            error, EBPO_E_UNSUPPORTED, name,
+            "line %" PRIu64 ": face %" PRIu64 " has %" PRIu64
             " corners and assimp reads no OFF face of more than %d; convert the file to PLY",
-            name, l->number, row, corners, MOST_CORNERS);
+            l->number, row, corners, MOST_CORNERS);
     for (uint64_t i = 0; i < corners; i++) {
         if (!next_count(l, &index))
-            return ebpo_fail(error, EBPO_E_FORMAT,
-                             "%s: line %" PRIu64 ": face %" PRIu64 " names fewer than its %" PRIu64
-                             " vertices; repair the file",
-                             name, l->number, row, corners);
+            return ebpo_fail_file(error, EBPO_E_FORMAT, name,
+                                  "line %" PRIu64 ": face %" PRIu64 " names fewer than its %" PRIu64
+                                  " vertices; repair the file",
+                                  l->number, row, corners);
         if (index >= vertices)
-            return ebpo_fail(error, EBPO_E_FORMAT,
-                             "%s: line %" PRIu64 ": face %" PRIu64 " names vertex %" PRIu64
-                             ", but there are %" PRIu64
-                             " vertices; repair the file or drop the face",
-                             name, l->number, row, index, vertices);
+            return ebpo_fail_file(error, EBPO_E_FORMAT, name,
+                                  "line %" PRIu64 ": face %" PRIu64 " names vertex %" PRIu64
+                                  ", but there are %" PRIu64
+                                  " vertices; repair the file or drop the face",
+                                  l->number, row, index, vertices);
     }
     return EBPO_OK;
 }

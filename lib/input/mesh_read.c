@@ -69,9 +69,8 @@ static ebpo_status parse(ebpo_mesh *out, const ebpo_whole_file *file, const char
     if (dot && strcasecmp(dot, ".ply") == 0) /* its reader says best what is wrong */
         return ebpo_ply_parse_memory(out, file->data, file->size, path, workspace, threads,
                                      progress, error);
-    return ebpo_fail(error, EBPO_E_FORMAT,
-                     "%s: neither its first bytes nor its name tell a PLY, OBJ, STL or OFF file",
-                     ebpo_path_name(path));
+    return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_path_name(path),
+                          "neither its first bytes nor its name tell a PLY, OBJ, STL or OFF file");
 }
 
 ebpo_status ebpo_mesh_read(ebpo_mesh *out, const char *path, const ebpo_mesh_read_options *options,

@@ -32,11 +32,11 @@ static ebpo_status path_read(void *user, uint64_t offset, uint64_t size, void *d
         if (got < 0)
             return ebpo_fail_errno(error, s->path, "cannot be read");
         if (got == 0)
-            return ebpo_fail(
-                error, EBPO_E_IO,
-                "%s: byte %" PRIu64
+            return ebpo_fail_at(
+                error, EBPO_E_IO, s->path, "", (int64_t)offset,
+                "byte %" PRIu64
                 " cannot be read: the file became shorter while it was open; open it again",
-                s->path, offset);
+                offset);
         to += got;
         offset += (uint64_t)got;
         size -= (uint64_t)got;
@@ -62,8 +62,8 @@ static ebpo_status open_regular(const char *path, int *fd, uint64_t *size, ebpo_
     if (fstat(*fd, &facts) < 0)
         status = ebpo_fail_errno(error, path, "cannot be examined");
     else if (!S_ISREG(facts.st_mode))
-        status = ebpo_fail(error, EBPO_E_IO,
-                           "%s: not a regular file; give the name of an .ebpo.h5 file", path);
+        status = ebpo_fail_file(error, EBPO_E_IO, path,
+                                "not a regular file; give the name of an .ebpo.h5 file");
     else
         *size = (uint64_t)facts.st_size;
     if (status != EBPO_OK)
@@ -142,11 +142,11 @@ ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size, v
     if (size == 0)
         return EBPO_OK;
     if (offset > input->source.size || size > input->source.size - offset)
-        return ebpo_fail(error, EBPO_E_FORMAT,
-                         "%s: bytes %" PRIu64 " to %" PRIu64
-                         " are named, but the file ends at %" PRIu64
-                         "; get a fresh copy of the file",
-                         input->shown, offset, offset + size - 1, input->source.size);
+        return ebpo_fail_at(error, EBPO_E_FORMAT, input->shown, "", (int64_t)offset,
+                            "bytes %" PRIu64 " to %" PRIu64
+                            " are named, but the file ends at %" PRIu64
+                            "; get a fresh copy of the file",
+                            offset, offset + size - 1, input->source.size);
     uint64_t begin = offset > at_hand(input) ? offset : at_hand(input);
     atomic_fetch_add_explicit(&input->bytes, offset + size > begin ? offset + size - begin : 0,
                               memory_order_relaxed);
@@ -154,10 +154,13 @@ ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size, v
     ebpo_status status = input->source.read(input->source.user, offset, size, data, &cause);
     if (status == EBPO_OK)
         return EBPO_OK;
-    if (*cause.message)
-        return ebpo_fail(error, status, "%s", cause.message);
-    return ebpo_fail(error, status, "%s: bytes %" PRIu64 " to %" PRIu64 " could not be read",
-                     input->shown, offset, offset + size - 1);
+    if (*cause.message) {
+        cause.status = status; /* a caller's own source may tell nothing but the message */
+        return ebpo_fail_with(error, &cause);
+    }
+    return ebpo_fail_at(error, status, input->shown, "", (int64_t)offset,
+                        "bytes %" PRIu64 " to %" PRIu64 " could not be read", offset,
+                        offset + size - 1);
 }
 
 void ebpo_input_expect(ebpo_input *input, const ebpo_range *ranges, size_t count)

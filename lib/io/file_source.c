@@ -27,8 +27,8 @@ static ebpo_status read_whole(ebpo_whole_file *file, const char *path, ebpo_erro
         if (got < 0)
             return ebpo_fail_errno(error, path, "cannot be read");
         if (got == 0)
-            return ebpo_fail(error, EBPO_E_IO,
-                             "%s: became shorter while it was read; read it again", path);
+            return ebpo_fail_file(error, EBPO_E_IO, path,
+                                  "became shorter while it was read; read it again");
         at += (uint64_t)got;
     }
     return EBPO_OK;
@@ -41,7 +41,7 @@ static ebpo_status map_or_read(ebpo_whole_file *file, const char *path, ebpo_err
         return EBPO_OK;
     }
     if (file->size > (uint64_t)PTRDIFF_MAX)
-        return ebpo_fail(error, EBPO_E_LIMIT, "%s: too large for this machine's addresses", path);
+        return ebpo_fail_file(error, EBPO_E_LIMIT, path, "too large for this machine's addresses");
     void *mapped = mmap(NULL, (size_t)file->size, PROT_READ, MAP_PRIVATE, file->fd, 0);
     if (mapped == MAP_FAILED)
         return read_whole(file, path, error);
@@ -65,8 +65,8 @@ ebpo_status ebpo_whole_file_open(ebpo_whole_file *out, const char *path, ebpo_er
         goto done;
     }
     if (!S_ISREG(st.st_mode)) {
-        status = ebpo_fail(error, EBPO_E_IO, "%s: %s; name a regular file", path,
-                           S_ISDIR(st.st_mode) ? "is a folder" : "is a pipe or device");
+        status = ebpo_fail_file(error, EBPO_E_IO, path, "%s; name a regular file",
+                                S_ISDIR(st.st_mode) ? "is a folder" : "is a pipe or device");
         goto done;
     }
     file.size = (uint64_t)st.st_size;
@@ -88,8 +88,8 @@ ebpo_status ebpo_whole_file_unchanged(const ebpo_whole_file *file, const char *p
         return ebpo_fail_errno(error, path, "cannot be examined");
     if ((uint64_t)st.st_size != file->size || st.st_mtim.tv_sec != file->mtime_s ||
         st.st_mtim.tv_nsec != file->mtime_ns)
-        return ebpo_fail(error, EBPO_E_IO, "%s: was changed while it was read; read it again",
-                         path);
+        return ebpo_fail_file(error, EBPO_E_IO, path,
+                              "was changed while it was read; read it again");
     return EBPO_OK;
 }
 

@@ -52,7 +52,7 @@ void ebpo_publish_abandon_all(void)
 static ebpo_status check_target(const char *path, ebpo_error *error)
 {
     if (!*ebpo_path_name(path))
-        return ebpo_fail(error, EBPO_E_IO, "%s: names no file; give the output a file name", path);
+        return ebpo_fail_file(error, EBPO_E_IO, path, "names no file; give the output a file name");
     struct stat st;
     if (lstat(path, &st) != 0)
         return errno == ENOENT ? EBPO_OK : ebpo_fail_errno(error, path, "cannot be written");
@@ -61,9 +61,9 @@ static ebpo_status check_target(const char *path, ebpo_error *error)
     const char *what = S_ISDIR(st.st_mode)   ? "is a folder"
                        : S_ISLNK(st.st_mode) ? "is a symbolic link"
                                              : "is a pipe or device";
-    return ebpo_fail(error, EBPO_E_IO,
-                     "%s: %s, which cannot be replaced by an output file; name another file", path,
-                     what);
+    return ebpo_fail_file(error, EBPO_E_IO, path,
+                          "%s, which cannot be replaced by an output file; name another file",
+                          what);
 }
 
 static ebpo_status resolve(ebpo_publish *publish, const char *path, ebpo_error *error)
@@ -99,9 +99,8 @@ static ebpo_status create_temporary(ebpo_publish *publish, ebpo_error *error)
             return ebpo_fail_memory(error, PATH_MAX);
         }
         if (strlen(publish->temporary) >= PATH_MAX)
-            return ebpo_fail(error, EBPO_E_IO,
-                             "%s: the path is too long; write to a folder with a shorter one",
-                             publish->shown);
+            return ebpo_fail_file(error, EBPO_E_IO, publish->shown,
+                                  "the path is too long; write to a folder with a shorter one");
         /* Known to the signal handler before it exists, so that there is no moment in which it
          * would be left behind. */
         strcpy(slots[publish->slot].path, publish->temporary);
@@ -130,8 +129,8 @@ ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path, ebpo_error *
         status = resolve(&publish, path, error);
     if (status == EBPO_OK && (publish.slot = take_slot()) < 0)
         status =
-            ebpo_fail(error, EBPO_E_LIMIT, "%s: more than %d files are being written at a time",
-                      path, EBPO_PUBLISH_SLOTS);
+            ebpo_fail_file(error, EBPO_E_LIMIT, path,
+                           "more than %d files are being written at a time", EBPO_PUBLISH_SLOTS);
     if (status == EBPO_OK)
         status = create_temporary(&publish, error);
     if (status != EBPO_OK) {

@@ -167,10 +167,10 @@ static ebpo_status make_room(filling *f, ebpo_error *error)
     struct ebpo_arrangement *order = mesh->arrangement;
     uint64_t count = mesh->face_count + f->added, capacity = mesh->face_count;
     if (count > UINT32_MAX - 1)
-        return ebpo_fail(error, EBPO_E_LIMIT,
-                         "%s: %llu faces with the filled holes, but 2^32 - 2 is the limit; "
-                         "split the mesh",
-                         ebpo_mesh_label(mesh), (unsigned long long)count);
+        return ebpo_fail_file(error, EBPO_E_LIMIT, ebpo_mesh_label(mesh),
+                              "%llu faces with the filled holes, but 2^32 - 2 is the limit; "
+                              "split the mesh",
+                              (unsigned long long)count);
     if (!ebpo_array_grow(mesh->workspace, &mesh->faces, &capacity, count, 3 * sizeof *mesh->faces))
         return ebpo_workspace_fail(mesh->workspace, count * 3 * sizeof *mesh->faces, error);
     capacity = mesh->face_count;

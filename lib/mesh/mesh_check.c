@@ -24,14 +24,14 @@ static ebpo_status coordinates(void *context, uint64_t begin, uint64_t end, unsi
         ebpo_mesh_position(c->mesh, v, p);
         for (int k = 0; k < 3; k++)
             if (!isfinite(p[k]))
-                return ebpo_fail(error, EBPO_E_FORMAT,
-                                 "%s: vertex %llu has %c = %s; repair the coordinate or drop the "
-                                 "vertex and its faces",
-                                 ebpo_mesh_label(c->mesh),
-                                 (unsigned long long)ebpo_mesh_source_vertex(c->mesh, v), "xyz"[k],
-                                 isnan(p[k]) ? "nan"
-                                 : p[k] > 0  ? "inf"
-                                             : "-inf");
+                return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_mesh_label(c->mesh),
+                                      "vertex %llu has %c = %s; repair the coordinate or drop the "
+                                      "vertex and its faces",
+                                      (unsigned long long)ebpo_mesh_source_vertex(c->mesh, v),
+                                      "xyz"[k],
+                                      isnan(p[k]) ? "nan"
+                                      : p[k] > 0  ? "inf"
+                                                  : "-inf");
     }
     ebpo_workspace_settle(c->mesh->workspace);
     return EBPO_OK;
@@ -294,9 +294,9 @@ ebpo_status ebpo_mesh_check(ebpo_mesh_report *report, const ebpo_mesh *mesh, uns
     if (status != EBPO_OK)
         return status;
     if (mesh->face_count == 0)
-        return ebpo_fail(error, EBPO_E_FORMAT,
-                         "%s: %llu vertices but no faces; give a triangle mesh, not a point cloud",
-                         ebpo_mesh_label(mesh), (unsigned long long)mesh->vertex_count);
+        return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_mesh_label(mesh),
+                              "%llu vertices but no faces; give a triangle mesh, not a point cloud",
+                              (unsigned long long)mesh->vertex_count);
     ebpo_check check = {
         .mesh = mesh, .threads = ebpo_thread_count(threads), .progress = progress, .report = report
     };

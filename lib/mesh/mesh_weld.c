@@ -32,12 +32,12 @@ static ebpo_status check_indices(void *context, uint64_t begin, uint64_t end, un
     (void)worker;
     for (uint64_t i = 3 * begin; i < 3 * end; i++)
         if (mesh->faces[i] >= mesh->vertex_count)
-            return ebpo_fail(error, EBPO_E_FORMAT,
-                             "%s: face %llu names vertex %lu, but there are %llu vertices; "
-                             "repair the file or drop the face",
-                             ebpo_mesh_label(mesh),
-                             (unsigned long long)ebpo_mesh_source_face(mesh, i / 3),
-                             (unsigned long)mesh->faces[i], (unsigned long long)mesh->vertex_count);
+            return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_mesh_label(mesh),
+                                  "face %llu names vertex %lu, but there are %llu vertices; "
+                                  "repair the file or drop the face",
+                                  (unsigned long long)ebpo_mesh_source_face(mesh, i / 3),
+                                  (unsigned long)mesh->faces[i],
+                                  (unsigned long long)mesh->vertex_count);
     ebpo_workspace_settle(mesh->workspace);
     return EBPO_OK;
 }

@@ -17,11 +17,11 @@ typedef struct build {
 static ebpo_status bad_index(const ebpo_mesh *mesh, uint64_t face, uint32_t vertex,
                              ebpo_error *error)
 {
-    return ebpo_fail(error, EBPO_E_FORMAT,
-                     "%s: face %llu names vertex %lu, but there are %llu vertices; "
-                     "repair the file or drop the face",
-                     ebpo_mesh_label(mesh), (unsigned long long)ebpo_mesh_source_face(mesh, face),
-                     (unsigned long)vertex, (unsigned long long)mesh->vertex_count);
+    return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_mesh_label(mesh),
+                          "face %llu names vertex %lu, but there are %llu vertices; "
+                          "repair the file or drop the face",
+                          (unsigned long long)ebpo_mesh_source_face(mesh, face),
+                          (unsigned long)vertex, (unsigned long long)mesh->vertex_count);
 }
 
 static ebpo_status count_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,

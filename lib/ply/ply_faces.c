@@ -34,8 +34,8 @@ static ebpo_status face_capacity(ply_parser *p, uint64_t more)
 {
     ebpo_mesh *mesh = p->mesh;
     if (more > MOST_FACES - mesh->face_count)
-        return ebpo_fail(p->error, EBPO_E_LIMIT,
-                         "%s: more than 2^32 - 2 triangles; split the model", p->name);
+        return ebpo_fail_file(p->error, EBPO_E_LIMIT, p->name,
+                              "more than 2^32 - 2 triangles; split the model");
     if (!ebpo_array_grow(mesh->workspace, &mesh->faces, &p->face_capacity, mesh->face_count + more,
                          3 * sizeof *mesh->faces))
         return ebpo_workspace_fail(mesh->workspace,
@@ -86,11 +86,11 @@ static ebpo_status triangulate(ply_parser *p, uint32_t n, uint64_t row)
     ebpo_polygon_kind kind =
         ebpo_polygon_triangulate(triangle, (const double(*)[3])position, n, scratch);
     if (kind == EBPO_POLYGON_TOO_LARGE)
-        return ebpo_fail(
-            p->error, EBPO_E_LIMIT,
-            "%s: face %" PRIu64 " is a concave polygon of %" PRIu32
+        return ebpo_fail_file(
+            p->error, EBPO_E_LIMIT, p->name,
+            "face %" PRIu64 " is a concave polygon of %" PRIu32
             " corners, too intricate to be cut into triangles here; triangulate it in the source",
-            p->name, row, n);
+            row, n);
     p->mesh->polygons_triangulated++;
     p->mesh->polygons_concave += kind == EBPO_POLYGON_CONCAVE;
     for (uint32_t i = 0; i < n - 2; i++)
@@ -107,8 +107,8 @@ ebpo_status ebpo_ply_add_polygon(ply_parser *p, uint64_t row)
     }
     if (p->corner_count > 3)
         return p->corner_count > MOST_FACES
-                   ? ebpo_fail(p->error, EBPO_E_LIMIT,
-                               "%s: face %" PRIu64 " has more than 2^32 - 2 corners", p->name, row)
+                   ? ebpo_fail_file(p->error, EBPO_E_LIMIT, p->name,
+                                    "face %" PRIu64 " has more than 2^32 - 2 corners", row)
                    : triangulate(p, (uint32_t)p->corner_count, row);
     ebpo_status status = face_capacity(p, 1);
     if (status == EBPO_OK)

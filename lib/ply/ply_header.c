@@ -55,10 +55,10 @@ static ebpo_status fail(const reader *r, const char *what, ply_word word)
 {
     char text[PLY_WORD_TEXT];
     ebpo_ply_word_text(text, word);
-    return ebpo_fail(r->error, EBPO_E_FORMAT,
-                     "%s: line %" PRIu64
-                     ": %s '%s'; this is not a PLY header as the format describes it",
-                     r->name, r->line, what, text);
+    return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->name,
+                          "line %" PRIu64
+                          ": %s '%s'; this is not a PLY header as the format describes it",
+                          r->line, what, text);
 }
 
 /* The next line without its end, and without the '\r' of a DOS file. False at the end of the data.
@@ -259,8 +259,8 @@ static ebpo_status check_magic(reader *r, uint64_t size)
     if (size >= 5 && memcmp(r->at, "ply\r", 4) == 0 && r->at[4] != '\n')
         r->header->line_end = '\r';
     if (size < 4 || memcmp(r->at, "ply", 3) != 0 || !next_line(r, &line) || line.n != 3)
-        return ebpo_fail(r->error, EBPO_E_FORMAT,
-                         "%s: line 1: no PLY file, it does not begin with a line 'ply'", r->name);
+        return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->name,
+                              "line 1: no PLY file, it does not begin with a line 'ply'");
     return EBPO_OK;
 }
 
@@ -270,11 +270,10 @@ static ebpo_status statements(reader *r, bool whole)
     ply_word line = { "", 0 };
     while (!ended) {
         if (!next_line(r, &line))
-            return ebpo_fail(r->error, EBPO_E_FORMAT,
-                             "%s: line %" PRIu64
-                             ": %s before 'end_header'; the file is cut short or no PLY file",
-                             r->name, r->line + 1,
-                             whole ? "the file ends" : "a megabyte of header");
+            return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->name,
+                                  "line %" PRIu64
+                                  ": %s before 'end_header'; the file is cut short or no PLY file",
+                                  r->line + 1, whole ? "the file ends" : "a megabyte of header");
         ebpo_status status = statement(r, line, &ended);
         if (status != EBPO_OK)
             return status;
@@ -296,10 +295,10 @@ static ebpo_status check_roles(const reader *r)
 {
     const ply_header *h = r->header;
     if (h->vertex < 0)
-        return ebpo_fail(r->error, EBPO_E_FORMAT,
-                         "%s: line %" PRIu64
-                         ": the header names no element 'vertex'; there is no mesh in this file",
-                         r->name, r->line);
+        return ebpo_fail_file(
+            r->error, EBPO_E_FORMAT, r->name,
+            "line %" PRIu64 ": the header names no element 'vertex'; there is no mesh in this file",
+            r->line);
     for (uint64_t i = 0; i < h->elements; i++) {
         const ply_element *e = &h->element[i];
         static const char *const missing[] = { "", "x", "y", "z", "vertex_indices" };
@@ -307,11 +306,11 @@ static ebpo_status check_roles(const reader *r)
         ply_role to = e->kind == PLY_KIND_VERTEX ? PLY_ROLE_Z : PLY_ROLE_CORNERS;
         for (int role = (int)from; role <= (int)to && e->kind != PLY_KIND_OTHER; role++)
             if (!has_role(h, e, (ply_role)role))
-                return ebpo_fail(r->error, EBPO_E_FORMAT,
-                                 "%s: line %" PRIu64
-                                 ": this element has no %s '%s'; the mesh cannot be read without",
-                                 r->name, e->line, role == PLY_ROLE_CORNERS ? "list" : "property",
-                                 missing[role]);
+                return ebpo_fail_file(
+                    r->error, EBPO_E_FORMAT, r->name,
+                    "line %" PRIu64
+                    ": this element has no %s '%s'; the mesh cannot be read without",
+                    e->line, role == PLY_ROLE_CORNERS ? "list" : "property", missing[role]);
     }
     return EBPO_OK;
 }

@@ -47,11 +47,12 @@ static ebpo_status check_counts(ply_parser *p)
         char name[PLY_WORD_TEXT];
         ebpo_ply_word_text(name, e->name);
         if (p->header.encoding == PLY_ASCII || e->has_list)
-            return ebpo_fail(p->error, EBPO_E_FORMAT,
-                             "%s: line %" PRIu64 ": %" PRIu64
-                             " rows of element '%s' do not fit into the rest of the file, %" PRIu64
-                             " bytes; it is cut short or damaged, get it again",
-                             p->name, e->line, e->count, name, left);
+            return ebpo_fail_file(
+                p->error, EBPO_E_FORMAT, p->name,
+                "line %" PRIu64 ": %" PRIu64
+                " rows of element '%s' do not fit into the rest of the file, %" PRIu64
+                " bytes; it is cut short or damaged, get it again",
+                e->line, e->count, name, left);
         p->at = p->size;
         return ebpo_ply_fail_end(p, e, left / e->row_bytes);
     }
@@ -64,15 +65,16 @@ static ebpo_status check_parts(const ply_parser *p)
     uint64_t vertices = h->element[h->vertex].count,
              faces = h->face >= 0 ? h->element[h->face].count : 0;
     if (vertices > MOST_VERTICES || faces > MOST_VERTICES)
-        return ebpo_fail(p->error, EBPO_E_LIMIT,
-                         "%s: %" PRIu64 " vertices and %" PRIu64
-                         " faces, but no more than 2^32 - 2 of each can be read; split the model",
-                         p->name, vertices, faces);
+        return ebpo_fail_file(
+            p->error, EBPO_E_LIMIT, p->name,
+            "%" PRIu64 " vertices and %" PRIu64
+            " faces, but no more than 2^32 - 2 of each can be read; split the model",
+            vertices, faces);
     if (!faces && (h->strips < 0 || !h->element[h->strips].count))
-        return ebpo_fail(p->error, EBPO_E_FORMAT,
-                         "%s: has %" PRIu64
-                         " vertices but no faces: a point cloud; make a surface of it first",
-                         p->name, vertices);
+        return ebpo_fail_file(p->error, EBPO_E_FORMAT, p->name,
+                              "has %" PRIu64
+                              " vertices but no faces: a point cloud; make a surface of it first",
+                              vertices);
     return EBPO_OK;
 }
 
@@ -151,9 +153,9 @@ static ebpo_status read_body(ply_parser *p)
             status = read_early_faces(p);
     }
     if (status == EBPO_OK && p->mesh->face_count == 0)
-        status = ebpo_fail(p->error, EBPO_E_FORMAT,
-                           "%s: none of its faces has three corners; there is no mesh in this file",
-                           p->name);
+        status =
+            ebpo_fail_file(p->error, EBPO_E_FORMAT, p->name,
+                           "none of its faces has three corners; there is no mesh in this file");
     return status;
 }
 

@@ -18,9 +18,10 @@ ebpo_status ebpo_ply_fail(const ply_parser *p, const char *format, ...)
     vsnprintf(text, sizeof text, format, args);
     va_end(args);
     if (p->header.encoding == PLY_ASCII)
-        return ebpo_fail(p->error, EBPO_E_FORMAT, "%s: line %" PRIu64 ": %s", p->name, p->line,
-                         text);
-    return ebpo_fail(p->error, EBPO_E_FORMAT, "%s: byte %" PRIu64 ": %s", p->name, p->at, text);
+        return ebpo_fail_file(p->error, EBPO_E_FORMAT, p->name, "line %" PRIu64 ": %s", p->line,
+                              text);
+    return ebpo_fail_at(p->error, EBPO_E_FORMAT, p->name, "", (int64_t)p->at,
+                        "byte %" PRIu64 ": %s", p->at, text);
 }
 
 const char *ebpo_ply_row_name(const ply_element *element)

@@ -219,10 +219,9 @@ ebpo_status ebpo_measure(ebpo_file *file, unsigned threads, ebpo_mass *out, ebpo
     if (status != EBPO_OK)
         return status;
     if (ebpo_file_info(file)->pruned)
-        return ebpo_fail(error, EBPO_E_ABSENT,
-                         "%s: the file is a subset, of whose mesh a part was left out: it cannot "
-                         "be measured; measure the original",
-                         file->in.shown);
+        return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
+                              "the file is a subset, of whose mesh a part was left out: it cannot "
+                              "be measured; measure the original");
     status = ebpo_file_read_mesh(file, &mesh, threads, error);
     if (status != EBPO_OK)
         goto done;

@@ -40,11 +40,11 @@ ebpo_status ebpo_check_mesh(const ebpo_model *model, ebpo_error *error)
 {
     if (model->info->parts & EBPO_PART_MESH)
         return EBPO_OK;
-    return ebpo_fail(error, EBPO_E_ABSENT,
-                     "%s: the file was written without its mesh: exact answers need it; ask with a "
-                     "level, or take a file with it (`ebpo subset`, `ebpo fetch` or "
-                     "`ebpo convert` with --profile collision or full)",
-                     model->file->in.shown);
+    return ebpo_fail_file(
+        error, EBPO_E_ABSENT, model->file->in.shown,
+        "the file was written without its mesh: exact answers need it; ask with a "
+        "level, or take a file with it (`ebpo subset`, `ebpo fetch` or "
+        "`ebpo convert` with --profile collision or full)");
 }
 
 ebpo_status ebpo_check_solid(const ebpo_model *model, ebpo_error *error)

@@ -30,25 +30,23 @@ static ebpo_status settle_box(ebpo_cutting *c)
         return EBPO_OK;
     for (int k = 0; k < 3; k++) {
         if (!isfinite(o->min[k]) || !isfinite(o->max[k]) || !(o->min[k] <= o->max[k]))
-            return ebpo_fail(c->error, EBPO_E_ARGUMENT,
-                             "%s: a box needs finite corners, the lower one first on each axis",
-                             shown);
+            return ebpo_fail_file(c->error, EBPO_E_ARGUMENT, shown,
+                                  "a box needs finite corners, the lower one first on each axis");
         if (ebpo_wall(&c->box, k, 0, 0) > o->max[k] || ebpo_wall(&c->box, k, 0, 1) < o->min[k])
-            return ebpo_fail(c->error, EBPO_E_ARGUMENT,
-                             "%s: the box does not meet the model, which lies within %.17g %.17g "
-                             "%.17g and %.17g %.17g %.17g",
-                             shown, c->box.origin[0], c->box.origin[1], c->box.origin[2],
-                             ebpo_wall(&c->box, 0, 0, 1), ebpo_wall(&c->box, 1, 0, 1),
-                             ebpo_wall(&c->box, 2, 0, 1));
+            return ebpo_fail_file(c->error, EBPO_E_ARGUMENT, shown,
+                                  "the box does not meet the model, which lies within %.17g %.17g "
+                                  "%.17g and %.17g %.17g %.17g",
+                                  c->box.origin[0], c->box.origin[1], c->box.origin[2],
+                                  ebpo_wall(&c->box, 0, 0, 1), ebpo_wall(&c->box, 1, 0, 1),
+                                  ebpo_wall(&c->box, 2, 0, 1));
         if (c->from->boxed &&
             (c->from->kept_box[k] > o->max[k] || c->from->kept_box[3 + k] < o->min[k]))
-            return ebpo_fail(c->error, EBPO_E_ARGUMENT,
-                             "%s: the box does not meet the one that this file was cut to, %.17g "
-                             "%.17g %.17g to %.17g %.17g %.17g; take the subset of the "
-                             "original",
-                             shown, c->from->kept_box[0], c->from->kept_box[1],
-                             c->from->kept_box[2], c->from->kept_box[3], c->from->kept_box[4],
-                             c->from->kept_box[5]);
+            return ebpo_fail_file(c->error, EBPO_E_ARGUMENT, shown,
+                                  "the box does not meet the one that this file was cut to, %.17g "
+                                  "%.17g %.17g to %.17g %.17g %.17g; take the subset of the "
+                                  "original",
+                                  c->from->kept_box[0], c->from->kept_box[1], c->from->kept_box[2],
+                                  c->from->kept_box[3], c->from->kept_box[4], c->from->kept_box[5]);
     }
     for (int k = 0; k < 3; k++) {
         info->kept_box[k] = c->from->boxed ? fmax(o->min[k], c->from->kept_box[k]) : o->min[k];
@@ -66,9 +64,9 @@ static ebpo_status settle(ebpo_cutting *c)
     int deepest = c->from->level_count - 1;
     if (o->last_level < -1 || o->last_level >= EBPO_LEVELS_MAX ||
         (o->last_level > deepest && !c->from->pruned))
-        return ebpo_fail(c->error, EBPO_E_ARGUMENT,
-                         "%s: there is no level %d; the file has levels 0 to %d", c->file->in.shown,
-                         o->last_level, deepest);
+        return ebpo_fail_file(c->error, EBPO_E_ARGUMENT, c->file->in.shown,
+                              "there is no level %d; the file has levels 0 to %d", o->last_level,
+                              deepest);
     if (!(o->max_error >= 0) || !isfinite(o->max_error))
         return ebpo_fail(c->error, EBPO_E_ARGUMENT,
                          "maximum error %g: give a length above 0, or 0 to keep everything",

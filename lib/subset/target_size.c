@@ -67,10 +67,10 @@ static ebpo_status bracket(fitting *f, bool *pruned)
     if (status == EBPO_OK)
         status = try_error(f, coarsest, &bytes, pruned);
     if (status == EBPO_OK && bytes > f->options->target_bytes)
-        return ebpo_fail(f->error, EBPO_E_ARGUMENT,
-                         "%s: no subset with these parts has at most %" PRIu64
-                         " bytes; the least has %" PRIu64,
-                         f->file->in.shown, f->options->target_bytes, bytes);
+        return ebpo_fail_file(f->error, EBPO_E_ARGUMENT, f->file->in.shown,
+                              "no subset with these parts has at most %" PRIu64
+                              " bytes; the least has %" PRIu64,
+                              f->options->target_bytes, bytes);
     f->fits = coarsest;
     f->fit_bytes = bytes;
     f->too_large = 0;
@@ -151,9 +151,8 @@ ebpo_status ebpo_subset_fit(ebpo_file *file, const char *path, ebpo_subset_optio
                   .error = error };
     bool done = false;
     if (options->max_error != 0)
-        return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "%s: a maximum error and a target size exclude each other",
-                         file->in.shown);
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, file->in.shown,
+                              "a maximum error and a target size exclude each other");
     ebpo_status status = ebpo_publish_begin(&f.trial, path, error);
     if (status == EBPO_OK)
         status = ebpo_publish_begin(&f.best, path, error);

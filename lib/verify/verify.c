@@ -42,7 +42,7 @@ static ebpo_status check_content(ebpo_file *file, const ebpo_verify_options *opt
         ebpo_tally_check(tally, EBPO_VERIFY_CONTENT, status == EBPO_OK, "%s", own.message);
         return EBPO_OK;
     }
-    return ebpo_fail(error, status, "%s", own.message);
+    return ebpo_fail_with(error, &own);
 }
 
 static ebpo_status check_tree(ebpo_file *file, const ebpo_verify_options *options,
@@ -58,7 +58,7 @@ static ebpo_status check_tree(ebpo_file *file, const ebpo_verify_options *option
         ebpo_tree_free(&tree);
         return status;
     }
-    return is_finding(status) ? EBPO_OK : ebpo_fail(error, status, "%s", own.message);
+    return is_finding(status) ? EBPO_OK : ebpo_fail_with(error, &own);
 }
 
 static ebpo_status check_source(ebpo_file *file, const ebpo_verify_options *options,
@@ -77,7 +77,7 @@ static ebpo_status check_source(ebpo_file *file, const ebpo_verify_options *opti
         return EBPO_OK;
     }
     if (status != EBPO_OK)
-        return ebpo_fail(error, status, "%s", own.message);
+        return ebpo_fail_with(error, &own);
     status =
         ebpo_check_source(tally, file, &stored, ordered, options->source, options->threads, error);
     ebpo_mesh_free(&stored);

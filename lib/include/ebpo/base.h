@@ -72,15 +72,22 @@ typedef enum ebpo_status {
     EBPO_E_ABSENT = -10      /* the file was written without the part that is needed */
 } ebpo_status;
 
-/* What went wrong, where, and what to do next, as one sentence without a newline. */
+/* Set by a function that fails, otherwise left alone. The caller owns it, and may pass NULL
+ * instead. */
 typedef struct ebpo_error {
     ebpo_status status;
+    /* what went wrong, where, and what to do next: one sentence without a newline, which begins
+     * with `file` and `object` where these are known */
     char message[480];
+    char file[256];       /* the file or URL at fault, as messages show it; "" when there is none */
+    char object[64];      /* path inside an .ebpo.h5 file, such as "/levels/03/planes"; or "" */
+    int64_t offset;       /* byte in the file at fault; -1: not known */
+    uint64_t reserved[4]; /* 0 */
 } ebpo_error;
 
-#define EBPO_ERROR_INIT \
-    {                   \
-        EBPO_OK, ""     \
+#define EBPO_ERROR_INIT                \
+    {                                  \
+        EBPO_OK, "", "", "", -1, { 0 } \
     }
 
 /* Name of a status ("EBPO_E_FORMAT"); a static string, never NULL. */
