@@ -31,9 +31,9 @@ int main(int argc, char **argv)
     double p[3];
     if (argc != 2)
         return fputs("usage: query MODEL.ebpo.h5 <points.txt\n", stderr), 2;
-    bool good = ebpo_open(&file, argv[1], &error) == EBPO_OK &&
-                ebpo_model_open(&model, file, NULL, &error) == EBPO_OK &&
-                ebpo_context_new(&context, model, &error) == EBPO_OK;
+    bool good = ebpo_open(argv[1], &file, &error) == EBPO_OK &&
+                ebpo_model_new(file, NULL, &model, &error) == EBPO_OK &&
+                ebpo_context_new(model, &context, &error) == EBPO_OK;
     for (long number = 1; good && fgets(line, sizeof line, stdin); number++) {
         int end = 0, count = sscanf(line, "%lf %lf %lf %n", &p[0], &p[1], &p[2], &end);
         if (count == EOF) /* an empty line */
@@ -51,7 +51,7 @@ int main(int argc, char **argv)
     if (ferror(stdout))
         perror("query: standard output");
     ebpo_context_free(context);
-    ebpo_model_close(model);
+    ebpo_model_free(model);
     ebpo_close(file);
     return !good;
 }

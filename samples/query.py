@@ -16,7 +16,8 @@ NOT_SOLID = -7  # ebpo/base.h
 
 
 class Error(ctypes.Structure):  # ebpo/base.h
-    _fields_ = [("status", ctypes.c_int), ("message", ctypes.c_char * 480)]
+    _fields_ = [("status", ctypes.c_int), ("message", ctypes.c_char * 480), ("file", ctypes.c_char * 256),
+                ("object", ctypes.c_char * 64), ("offset", ctypes.c_int64), ("reserved", ctypes.c_uint64 * 4)]
 
 
 class Inside(ctypes.Structure):  # ebpo/query.h, as all below
@@ -38,9 +39,9 @@ class Model:
             raise RuntimeError("libebpo is not found; install it, or name it in EBPO_LIBRARY")
         self.library = ctypes.CDLL(name)
         self.file, self.model, self.context = ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_void_p()
-        self.call("ebpo_open", ctypes.byref(self.file), os.fsencode(path))
-        self.call("ebpo_model_open", ctypes.byref(self.model), self.file, None)
-        self.call("ebpo_context_new", ctypes.byref(self.context), self.model)
+        self.call("ebpo_open", os.fsencode(path), ctypes.byref(self.file))
+        self.call("ebpo_model_new", self.file, None, ctypes.byref(self.model))
+        self.call("ebpo_context_new", self.model, ctypes.byref(self.context))
 
         error = Error()  # a question about no points tells whether there is an inside
         self.solid = self.library.ebpo_inside_many(self.context, None, ctypes.c_uint64(0), None, None, ctypes.byref(error)) != NOT_SOLID

@@ -23,8 +23,8 @@ int main(int argc, char **argv)
         return 2;
     }
     options.polygons = true;
-    if (ebpo_open(&file, argv[1], &error) != EBPO_OK ||
-        ebpo_stream_new(&stream, file, &options, &error) != EBPO_OK)
+    if (ebpo_open(argv[1], &file, &error) != EBPO_OK ||
+        ebpo_stream_new(file, &options, &stream, &error) != EBPO_OK)
         goto done;
     while (ebpo_stream_next_level(stream, &level, &more, &error) == EBPO_OK && more) {
         uint64_t polyhedra = 0, polygons = 0;

@@ -39,8 +39,8 @@ int main(int argc, char **argv)
         observer.eye[k] = strtod(argv[2 + k], NULL);
         observer.direction[k] = -observer.eye[k]; /* looks at the origin */
     }
-    if (ebpo_open(&file, argv[1], &error) != EBPO_OK ||
-        ebpo_view_stream_new(&stream, file, &options, &error) != EBPO_OK)
+    if (ebpo_open(argv[1], &file, &error) != EBPO_OK ||
+        ebpo_view_stream_new(file, &options, &stream, &error) != EBPO_OK)
         goto done;
     for (int frame = 0; frame < 2 && error.status == EBPO_OK; frame++) {
         uint64_t arrived = 0, polygons = 0;

@@ -41,7 +41,7 @@ static ebpo_status arrange_and_mend(const preparation *p, bool weld, ebpo_error 
     ebpo_status status =
         unless_too_large(ebpo_arrange_to_mend(p->mesh, o->threads, &o->progress, error));
     if (status == EBPO_OK)
-        status = ebpo_mesh_check(&p->out->before, p->mesh, o->threads, o->progress, error);
+        status = ebpo_mesh_check(p->mesh, o->threads, o->progress, &p->out->before, error);
     return status == EBPO_OK ? mend(p, weld, error) : status;
 }
 
@@ -57,14 +57,14 @@ static ebpo_status prepare(const preparation *p, ebpo_error *error)
     if (status == EBPO_OK)
         status = unless_too_large(ebpo_arrange(p->mesh, -1, o->threads, &o->progress, error));
     if (status == EBPO_OK)
-        status = ebpo_mesh_check(&p->out->report, p->mesh, o->threads, o->progress, error);
+        status = ebpo_mesh_check(p->mesh, o->threads, o->progress, &p->out->report, error);
     if (status == EBPO_OK && !p->out->mended)
         p->out->before = p->out->report;
     return status;
 }
 
-ebpo_status ebpo_mesh_prepare(ebpo_prepared *out, ebpo_mesh *mesh,
-                              const ebpo_prepare_options *options, ebpo_error *error)
+ebpo_status ebpo_mesh_prepare(ebpo_mesh *mesh, const ebpo_prepare_options *options,
+                              ebpo_prepared *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     static const ebpo_prepared nothing = EBPO_PREPARED_INIT;

@@ -4,7 +4,7 @@
 
 #include <ebpo/workspace.h>
 
-/* ebpo_workspace_make without a least: for tests, which want small models in files. */
+/* ebpo_workspace_new without a least: for tests, which want small models in files. */
 EBPO_MUST_USE ebpo_status ebpo_workspace_make_any(ebpo_workspace **out, uint64_t memory,
                                                   const char *temp_dir, ebpo_error *error);
 

@@ -222,8 +222,8 @@ static ebpo_status choose_folder(ebpo_workspace *w, const char *wanted, ebpo_err
     return EBPO_OK;
 }
 
-ebpo_status ebpo_workspace_make(ebpo_workspace **out, const ebpo_workspace_options *options,
-                                ebpo_error *error)
+ebpo_status ebpo_workspace_new(const ebpo_workspace_options *options, ebpo_workspace **out,
+                               ebpo_error *error)
 {
     ebpo_workspace_options wanted = EBPO_WORKSPACE_OPTIONS_INIT;
     *out = NULL;
@@ -231,12 +231,12 @@ ebpo_status ebpo_workspace_make(ebpo_workspace **out, const ebpo_workspace_optio
     if (status != EBPO_OK)
         return status;
     uint64_t memory = wanted.memory ? wanted.memory : machine_memory() / 2;
-    if (memory < EBPO_WORKSPACE_LEAST && wanted.memory)
+    if (memory < EBPO_WORKSPACE_MIN && wanted.memory)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "%llu bytes of memory are too few; %d MiB are the least",
-                         (unsigned long long)memory, EBPO_WORKSPACE_LEAST >> 20);
-    if (memory < EBPO_WORKSPACE_LEAST)
-        memory = EBPO_WORKSPACE_LEAST;
+                         (unsigned long long)memory, EBPO_WORKSPACE_MIN >> 20);
+    if (memory < EBPO_WORKSPACE_MIN)
+        memory = EBPO_WORKSPACE_MIN;
     return ebpo_workspace_make_any(out, memory, wanted.temp_dir, error);
 }
 

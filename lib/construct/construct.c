@@ -288,9 +288,9 @@ static ebpo_status run_stages(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, 
     return status;
 }
 
-ebpo_status ebpo_build(ebpo_tree *out, ebpo_mesh *mesh, const ebpo_mesh_report *report,
+ebpo_status ebpo_build(ebpo_mesh *mesh, const ebpo_mesh_report *report,
                        const ebpo_mend_record *mend, const ebpo_build_options *options,
-                       ebpo_error *error)
+                       ebpo_tree *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_build_options wanted = EBPO_BUILD_OPTIONS_INIT;

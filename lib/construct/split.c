@@ -311,7 +311,7 @@ static ebpo_status fit_largest_piece(ebpo_builder *b, ebpo_error *error)
     uint64_t most = 1;
     if (b->workspace)
         ebpo_workspace_get_stats(b->workspace, &figures);
-    if (figures.memory < EBPO_WORKSPACE_LEAST)
+    if (figures.memory < EBPO_WORKSPACE_MIN)
         return EBPO_OK; /* none, or a test's */
     for (uint64_t i = 0; i < b->sub_count; i++)
         most = b->sub[i].list_count > most ? b->sub[i].list_count : most;

@@ -52,7 +52,7 @@ void ebpo_expect_all(ebpo_expected *e)
     *e = (ebpo_expected)EBPO_EXPECTED_INIT(e->file);
 }
 
-void ebpo_file_expect_levels(ebpo_file *file, int first, int last)
+void ebpo_file_prefetch_levels(ebpo_file *file, int first, int last)
 {
     ebpo_expected e = EBPO_EXPECTED_INIT(file);
     int end = last < file->info.level_count - 1 ? last : file->info.level_count - 1;

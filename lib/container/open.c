@@ -246,30 +246,30 @@ ebpo_status ebpo_reader_locate(ebpo_file *file, const ebpo_array_in *array, ebpo
     return ebpo_h5_chunk_count(&array->shape) == 1 ? EBPO_OK : ebpo_file_locate(file, error);
 }
 
-ebpo_status ebpo_open(ebpo_file **out, const char *path, ebpo_error *error)
+ebpo_status ebpo_open(const char *path, ebpo_file **out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_source source = EBPO_SOURCE_INIT;
     *out = NULL;
     if (ebpo_is_url(path))
-        return ebpo_open_url(out, path, NULL, error);
+        return ebpo_open_url(path, NULL, out, error);
     ebpo_status status = ebpo_source_of_path(&source, path, error);
     return status == EBPO_OK ? open_source(out, &source, path, error) : status;
 }
 
-ebpo_status ebpo_open_url(ebpo_file **out, const char *url, const ebpo_http_options *options,
+ebpo_status ebpo_open_url(const char *url, const ebpo_http_options *options, ebpo_file **out,
                           ebpo_error *error)
 {
     ebpo_source source = EBPO_SOURCE_INIT;
     *out = NULL;
-    ebpo_status status = ebpo_source_of_url(&source, url, options, error);
+    ebpo_status status = ebpo_source_of_url(url, options, &source, error);
     if (status != EBPO_OK)
         return status;
     char shown[EBPO_SHOWN_BYTES];
-    return open_source(out, &source, ebpo_url_shown(url, shown, sizeof shown), error);
+    return open_source(out, &source, ebpo_url_redact(url, shown, sizeof shown), error);
 }
 
-ebpo_status ebpo_open_memory(ebpo_file **out, const void *data, uint64_t size, const char *name,
+ebpo_status ebpo_open_memory(const void *data, uint64_t size, const char *name, ebpo_file **out,
                              ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
@@ -281,7 +281,7 @@ ebpo_status ebpo_open_memory(ebpo_file **out, const void *data, uint64_t size, c
     return open_source(out, &source, name ? name : "memory", error);
 }
 
-ebpo_status ebpo_open_source(ebpo_file **out, const ebpo_source *source, const char *name,
+ebpo_status ebpo_open_source(const ebpo_source *source, const char *name, ebpo_file **out,
                              ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
@@ -311,10 +311,12 @@ void ebpo_close(ebpo_file *file)
     free(file);
 }
 
-void ebpo_file_traffic(const ebpo_file *file, uint64_t *bytes, uint64_t *reads)
+ebpo_status ebpo_file_get_stats(const ebpo_file *file, ebpo_file_stats *out)
 {
-    *bytes = atomic_load(&file->in.bytes);
-    *reads = atomic_load(&file->in.reads);
+    ebpo_file_stats stats = EBPO_FILE_STATS_INIT;
+    stats.bytes_read = atomic_load(&file->in.bytes);
+    stats.reads = atomic_load(&file->in.reads);
+    return EBPO_GIVE(ebpo_file_stats, out, &stats);
 }
 
 ebpo_status ebpo_file_get_http_stats(const ebpo_file *file, ebpo_http_stats *out)

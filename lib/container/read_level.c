@@ -165,7 +165,7 @@ ebpo_status ebpo_file_read_level(ebpo_file *file, int level, ebpo_level *out, un
                               "there is no level %d; the file has levels 0 to %d", level,
                               info->level_count - 1);
     *out = ebpo_level_of_summary(info, level);
-    ebpo_file_expect_levels(file, level, level);
+    ebpo_file_prefetch_levels(file, level, level);
     ebpo_status status = read_arrays(file, level, out, threads, error);
     if (status == EBPO_OK && out->leaf_count)
         status = finish_leaves(file, level, out, threads, error);

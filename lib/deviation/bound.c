@@ -17,7 +17,7 @@ ebpo_status ebpo_bounder_make(ebpo_bounder *out, const ebpo_lod_model *whole, eb
 {
     memset(out, 0, sizeof *out);
     out->whole = whole;
-    return ebpo_context_new(&out->context, model, error);
+    return ebpo_context_new(model, &out->context, error);
 }
 
 void ebpo_bounder_free(ebpo_bounder *b)

@@ -222,7 +222,7 @@ static ebpo_status make_room(sampling *s, ebpo_model *model, ebpo_error *error)
     s->first_triangle[s->nodes.node_count] = triangles;
     ebpo_status status = EBPO_OK;
     for (unsigned i = 0; i < s->threads && status == EBPO_OK; i++)
-        status = ebpo_context_new(&s->contexts[i], model, error);
+        status = ebpo_context_new(model, &s->contexts[i], error);
     return status;
 }
 

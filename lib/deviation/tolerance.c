@@ -56,7 +56,7 @@ ebpo_status ebpo_tolerance_open(ebpo_tolerance **out, ebpo_file *file, bool plan
     options.progress = progress;
     ebpo_status status = ebpo_tree_read_whole(&n->tree, file, threads, error);
     if (status == EBPO_OK)
-        status = ebpo_model_open(&n->model, file, &options, error);
+        status = ebpo_model_new(file, &options, &n->model, error);
     if (status == EBPO_OK && !(n->bounders = ebpo_alloc_zero(n->threads, sizeof *n->bounders)))
         status = ebpo_fail_memory(error, n->threads * sizeof *n->bounders);
     for (unsigned i = 0; i < n->threads && status == EBPO_OK; i++)
@@ -87,7 +87,7 @@ void ebpo_tolerance_close(ebpo_tolerance *n)
         free(n->leaf[i]);
     }
     free(n->bounders);
-    ebpo_model_close(n->model);
+    ebpo_model_free(n->model);
     ebpo_lod_model_free(&n->tree);
     free(n);
 }

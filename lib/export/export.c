@@ -84,7 +84,7 @@ ebpo_status ebpo_export(ebpo_file *file, const char *path, ebpo_export_format fo
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, path,
                               "is no name for this format: too long, or with a ':'; take another");
     if (wanted.first_level <= wanted.last_level)
-        ebpo_file_expect_levels(file, 0, wanted.last_level);
+        ebpo_file_prefetch_levels(file, 0, wanted.last_level);
     status = write_format(&(ebpo_export_job){ file, path, second, format, &wanted, &own }, error);
     if (report)
         EBPO_GIVE(ebpo_export_report, report, &own);

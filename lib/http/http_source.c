@@ -254,7 +254,7 @@ static ebpo_status open_source(http_source *s, ebpo_error *error)
     return status;
 }
 
-ebpo_status ebpo_source_of_url(ebpo_source *out, const char *url, const ebpo_http_options *options,
+ebpo_status ebpo_source_of_url(const char *url, const ebpo_http_options *options, ebpo_source *out,
                                ebpo_error *error)
 {
     ebpo_http_options wanted = EBPO_HTTP_OPTIONS_INIT;
@@ -273,7 +273,7 @@ ebpo_status ebpo_source_of_url(ebpo_source *out, const char *url, const ebpo_htt
     s->options = wanted;
     bool copied = copy_options(&s->options);
     s->url = strdup(url);
-    ebpo_url_shown(url, s->shown, sizeof s->shown);
+    ebpo_url_redact(url, s->shown, sizeof s->shown);
     s->has_lock = pthread_mutex_init(&s->pieces.lock, NULL) == 0;
     if (s->has_lock && pthread_cond_init(&s->pieces.done, NULL) != 0) {
         pthread_mutex_destroy(&s->pieces.lock);

@@ -2,14 +2,14 @@
 #include "base/error.h"
 #include "http/http_source.h"
 
-ebpo_status ebpo_source_of_url(ebpo_source *out, const char *url, const ebpo_http_options *options,
+ebpo_status ebpo_source_of_url(const char *url, const ebpo_http_options *options, ebpo_source *out,
                                ebpo_error *error)
 {
     (void)options;
     *out = (ebpo_source)EBPO_SOURCE_INIT;
     char shown[EBPO_SHOWN_BYTES];
     return ebpo_fail_file(
-        error, EBPO_E_UNSUPPORTED, ebpo_url_shown(url, shown, sizeof shown),
+        error, EBPO_E_UNSUPPORTED, ebpo_url_redact(url, shown, sizeof shown),
         "this library was built without HTTP; install libcurl and build it again, "
         "or download the file");
 }

@@ -15,7 +15,7 @@ static size_t append(char *out, size_t used, size_t room, const char *text, size
     return used + taken;
 }
 
-char *ebpo_url_shown(const char *name, char *out, size_t room)
+char *ebpo_url_redact(const char *name, char *out, size_t room)
 {
     size_t used = 0;
     if (room == 0)

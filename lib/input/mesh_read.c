@@ -73,7 +73,7 @@ static ebpo_status parse(ebpo_mesh *out, const ebpo_whole_file *file, const char
                           "neither its first bytes nor its name tell a PLY, OBJ, STL or OFF file");
 }
 
-ebpo_status ebpo_mesh_read(ebpo_mesh *out, const char *path, const ebpo_mesh_read_options *options,
+ebpo_status ebpo_mesh_read(const char *path, const ebpo_mesh_read_options *options, ebpo_mesh *out,
                            ebpo_error *error)
 {
     EBPO_DEFAULT_FP;

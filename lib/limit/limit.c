@@ -227,23 +227,25 @@ static void job_free(job *j, unsigned threads)
     ebpo_lod_model_free(&j->model);
 }
 
-ebpo_status ebpo_limit_level(ebpo_file *file, int level, unsigned threads,
-                             const ebpo_progress *progress, ebpo_limit *out, ebpo_error *error)
+ebpo_status ebpo_limit_level(ebpo_file *file, int level, const ebpo_limit_options *options,
+                             ebpo_limit *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    static const ebpo_progress silent;
+    ebpo_limit_options asked = EBPO_LIMIT_OPTIONS_INIT;
     job j = { 0 };
     ebpo_limit found = EBPO_LIMIT_INIT;
-    ebpo_status status = EBPO_CHECK_SIZED(ebpo_limit, out, error);
+    ebpo_status status = EBPO_TAKE(ebpo_limit_options, &asked, options, error);
+    if (status == EBPO_OK)
+        status = EBPO_CHECK_SIZED(ebpo_limit, out, error);
     if (status == EBPO_OK)
         status = check(file, level, error);
     if (status != EBPO_OK)
         return status;
-    threads = ebpo_thread_count(threads);
+    unsigned threads = ebpo_thread_count(asked.threads);
     status = prepare(&j, file, level, threads, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, j.node_count, 1, hulls, &j,
-                                   progress ? progress : &silent, "convex hulls", error);
+        status = ebpo_parallel_for(threads, j.node_count, 1, hulls, &j, &asked.progress,
+                                   "convex hulls", error);
     for (uint64_t i = 0; i < j.node_count && status == EBPO_OK; i++) {
         /* not 0 times infinity */
         double volume = j.volume[i] > 0

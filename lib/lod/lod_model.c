@@ -19,7 +19,7 @@ void ebpo_lod_model_free(ebpo_lod_model *model)
 static ebpo_status read_levels(ebpo_lod_model *out, ebpo_file *file, unsigned threads,
                                ebpo_error *error)
 {
-    ebpo_file_expect_levels(file, 0, out->target);
+    ebpo_file_prefetch_levels(file, 0, out->target);
     for (int i = 0; i <= out->target; i++) {
         ebpo_status status = ebpo_file_read_level(file, i, &out->level[i], threads, error);
         if (status == EBPO_OK)

@@ -285,8 +285,8 @@ static ebpo_status run(ebpo_check *c, ebpo_error *error)
     return status;
 }
 
-ebpo_status ebpo_mesh_check(ebpo_mesh_report *report, const ebpo_mesh *mesh, unsigned threads,
-                            ebpo_progress progress, ebpo_error *error)
+ebpo_status ebpo_mesh_check(const ebpo_mesh *mesh, unsigned threads, ebpo_progress progress,
+                            ebpo_mesh_report *report, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     memset(report, 0, sizeof *report);

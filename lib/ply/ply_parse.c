@@ -240,8 +240,8 @@ static ebpo_status give_points(ply_parser *p, double **xyz, uint64_t *count)
     return EBPO_OK;
 }
 
-ebpo_status ebpo_points_parse_ply(double **xyz, uint64_t *count, const void *data, uint64_t size,
-                                  const char *name, ebpo_error *error)
+ebpo_status ebpo_points_parse_ply(const void *data, uint64_t size, const char *name, double **xyz,
+                                  uint64_t *count, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_mesh mesh = { 0 };

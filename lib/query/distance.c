@@ -142,11 +142,11 @@ static ebpo_status look_at_pruned(ebpo_context *c, ebpo_nearest *n, ebpo_error *
     return status;
 }
 
-ebpo_status ebpo_give_sign(ebpo_context *c, const double p[3], const ebpo_query_options *o,
+ebpo_status ebpo_give_sign(ebpo_context *c, const double p[3], const ebpo_distance_options *o,
                            ebpo_distance_result *out, ebpo_error *error)
 {
     ebpo_inside_result where;
-    ebpo_query_options plain = EBPO_QUERY_OPTIONS_INIT;
+    ebpo_inside_options plain = EBPO_INSIDE_OPTIONS_INIT;
     if (!c->model->info->solid || o->unsigned_distance || out->face == EBPO_NO_FACE)
         return EBPO_OK;
     ebpo_status status = c->model->whole ? ebpo_inside_whole(c, p, 1, &where, error)
@@ -162,7 +162,7 @@ static void look_ahead(ebpo_context *c, const double p[3], double reach)
         ebpo_context_prefetch(c, p, reach);
 }
 
-static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_query_options *o,
+static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_distance_options *o,
                          ebpo_distance_result *out, ebpo_error *error)
 {
     ebpo_nearest n;
@@ -201,7 +201,7 @@ static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_query_op
 
 typedef struct interval {
     ebpo_context *c;
-    const ebpo_query_options *o;
+    const ebpo_distance_options *o;
     ebpo_box box;
     const double *p;
     uint64_t deadline;
@@ -233,7 +233,7 @@ static ebpo_status narrow(interval *v, ebpo_node node, double lower, ebpo_error 
 }
 
 ebpo_status ebpo_distance_interval(ebpo_context *context, const double p[3],
-                                   const ebpo_query_options *options, double *lo, double *hi,
+                                   const ebpo_distance_options *options, double *lo, double *hi,
                                    ebpo_error *error)
 {
     interval v = { .c = context,
@@ -252,7 +252,7 @@ ebpo_status ebpo_distance_interval(ebpo_context *context, const double p[3],
     return status;
 }
 
-static ebpo_status limited(ebpo_context *c, const double p[3], const ebpo_query_options *o,
+static ebpo_status limited(ebpo_context *c, const double p[3], const ebpo_distance_options *o,
                            ebpo_distance_result *out, ebpo_error *error)
 {
     *out = (ebpo_distance_result){ NAN, 0, INFINITY, { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
@@ -262,7 +262,7 @@ static ebpo_status limited(ebpo_context *c, const double p[3], const ebpo_query_
     return status;
 }
 
-static ebpo_status one(ebpo_context *c, const double p[3], const ebpo_query_options *o,
+static ebpo_status one(ebpo_context *c, const double p[3], const ebpo_distance_options *o,
                        ebpo_distance_result *out, ebpo_error *error)
 {
     if (o->mode == EBPO_DISTANCE_ENVELOPE)
@@ -273,7 +273,15 @@ static ebpo_status one(ebpo_context *c, const double p[3], const ebpo_query_opti
 }
 
 /* Modes that cannot keep to a level or a deadline say so. */
-static ebpo_status check_mode(const ebpo_query_options *o, ebpo_error *error)
+static ebpo_status check_values(const ebpo_distance_options *o, ebpo_error *error)
+{
+    if (!(o->max_distance >= 0))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "maximum distance %g: give 0 or more",
+                         o->max_distance);
+    return o->mode <= EBPO_DISTANCE_ENVELOPE ? EBPO_OK : ebpo_fail_value(error);
+}
+
+static ebpo_status check_mode(const ebpo_distance_options *o, ebpo_error *error)
 {
     bool around = o->mode == EBPO_DISTANCE_RECURSIVE || o->mode == EBPO_DISTANCE_LEAVES;
     if (around && (o->level >= 0 || o->deadline_ns))
@@ -287,15 +295,17 @@ static ebpo_status check_mode(const ebpo_query_options *o, ebpo_error *error)
 }
 
 ebpo_status ebpo_distance_many(ebpo_context *context, const double *points, uint64_t count,
-                               const ebpo_query_options *options, ebpo_distance_result *out,
+                               const ebpo_distance_options *options, ebpo_distance_result *out,
                                ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_query_options wanted = EBPO_QUERY_OPTIONS_INIT;
-    const ebpo_query_options *o = &wanted;
-    ebpo_status status = EBPO_TAKE(ebpo_query_options, &wanted, options, error);
+    ebpo_distance_options wanted = EBPO_DISTANCE_OPTIONS_INIT;
+    const ebpo_distance_options *o = &wanted;
+    ebpo_status status = EBPO_TAKE(ebpo_distance_options, &wanted, options, error);
     if (status == EBPO_OK)
-        status = ebpo_check_options(o, error);
+        status = ebpo_check_query_level(o->level, error);
+    if (status == EBPO_OK)
+        status = check_values(o, error);
     if (status == EBPO_OK)
         status = check_mode(o, error);
     if (status == EBPO_OK)
@@ -308,7 +318,7 @@ ebpo_status ebpo_distance_many(ebpo_context *context, const double *points, uint
 }
 
 ebpo_status ebpo_distance(ebpo_context *context, const double point[3],
-                          const ebpo_query_options *options, ebpo_distance_result *out,
+                          const ebpo_distance_options *options, ebpo_distance_result *out,
                           ebpo_error *error)
 {
     return ebpo_distance_many(context, point, 1, options, out, error);

@@ -9,7 +9,7 @@
 #include "query/pruned.h"
 #include "query/query_node.h"
 
-static bool uses_envelopes(const ebpo_context *c, const ebpo_query_options *o)
+static bool uses_envelopes(const ebpo_context *c, const ebpo_inside_options *o)
 {
     /* An envelope tells that a point is outside, not its winding number: with rules other than
      * nonzero that is no whole answer. */
@@ -23,7 +23,7 @@ static bool uses_envelopes(const ebpo_context *c, const ebpo_query_options *o)
 
 typedef struct asking {
     ebpo_context *context;
-    const ebpo_query_options *options;
+    const ebpo_inside_options *options;
     ebpo_box box;
     bool envelopes;
     uint64_t deadline; /* 0: none */
@@ -247,7 +247,7 @@ ebpo_status ebpo_inside_pruned(ebpo_context *context, const double p[3], ebpo_in
                                ebpo_error *error)
 {
     const ebpo_model *m = context->model;
-    ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
+    ebpo_inside_options options = EBPO_INSIDE_OPTIONS_INIT;
     asking a = {
         .context = context, .options = &options, .box = ebpo_model_box(m), .envelopes = true, .p = p
     };
@@ -261,7 +261,7 @@ ebpo_status ebpo_inside_pruned(ebpo_context *context, const double p[3], ebpo_in
 }
 
 ebpo_status ebpo_inside_walk(ebpo_context *context, const double p[3],
-                             const ebpo_query_options *options, ebpo_inside_result *out,
+                             const ebpo_inside_options *options, ebpo_inside_result *out,
                              ebpo_error *error)
 {
     const ebpo_model *m = context->model;

@@ -36,7 +36,7 @@ static ebpo_status all_leaves(ebpo_context *c, ebpo_nearest *n, ebpo_node node, 
     return status;
 }
 
-ebpo_status ebpo_distance_around(ebpo_context *c, const double p[3], const ebpo_query_options *o,
+ebpo_status ebpo_distance_around(ebpo_context *c, const double p[3], const ebpo_distance_options *o,
                                  ebpo_distance_result *out, ebpo_error *error)
 {
     ebpo_box box = ebpo_model_box(c->model);
@@ -104,7 +104,7 @@ static void nearest_polygon(const ebpo_polytope *e, const ebpo_box *box, ebpo_ce
 }
 
 ebpo_status ebpo_distance_to_envelope(ebpo_context *c, const double p[3],
-                                      const ebpo_query_options *o, ebpo_distance_result *out,
+                                      const ebpo_distance_options *o, ebpo_distance_result *out,
                                       ebpo_error *error)
 {
     ebpo_box box = ebpo_model_box(c->model);

@@ -7,16 +7,16 @@
 /* Makes an answer's distance negative inside: solids, unless unsigned. Shared with the exact
  * distance. */
 EBPO_MUST_USE ebpo_status ebpo_give_sign(ebpo_context *context, const double p[3],
-                                         const ebpo_query_options *options,
+                                         const ebpo_distance_options *options,
                                          ebpo_distance_result *out, ebpo_error *error);
 /* Of the leaf around p; where there is none: nothing (LEAVES), or of all leaves below the deepest
  * gray node around p (RECURSIVE). */
 EBPO_MUST_USE ebpo_status ebpo_distance_around(ebpo_context *context, const double p[3],
-                                               const ebpo_query_options *options,
+                                               const ebpo_distance_options *options,
                                                ebpo_distance_result *out, ebpo_error *error);
 /* To the polygons of the envelope of the deepest gray node around p, at most at options->level. */
 EBPO_MUST_USE ebpo_status ebpo_distance_to_envelope(ebpo_context *context, const double p[3],
-                                                    const ebpo_query_options *options,
+                                                    const ebpo_distance_options *options,
                                                     ebpo_distance_result *out, ebpo_error *error);
 
 #endif

@@ -13,18 +13,17 @@
 #include "query/inside.h"
 #include "query/limited.h"
 
-ebpo_status ebpo_check_options(const ebpo_query_options *o, ebpo_error *error)
+ebpo_status ebpo_check_query_level(int level, ebpo_error *error)
 {
-    if (o->level < -1 || o->level >= EBPO_LEVELS_MAX)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "level %d: give 0 to %d, or -1 for all", o->level,
+    if (level < -1 || level >= EBPO_LEVELS_MAX)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "level %d: give 0 to %d, or -1 for all", level,
                          EBPO_LEVELS_MAX - 1);
-    if (!(o->max_distance >= 0))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "maximum distance %g: give 0 or more",
-                         o->max_distance);
-    if (o->envelopes > EBPO_ENVELOPES_SKIP || o->mode > EBPO_DISTANCE_ENVELOPE)
-        return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "query options hold a value that is none of its kind");
     return EBPO_OK;
+}
+
+ebpo_status ebpo_fail_value(ebpo_error *error)
+{
+    return ebpo_fail(error, EBPO_E_ARGUMENT, "query options hold a value that is none of its kind");
 }
 
 ebpo_status ebpo_check_points(const double *points, uint64_t count, ebpo_error *error)
@@ -57,16 +56,18 @@ ebpo_status ebpo_check_solid(const ebpo_model *model, ebpo_error *error)
 }
 
 ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64_t count,
-                             const ebpo_query_options *options, ebpo_inside_result *out,
+                             const ebpo_inside_options *options, ebpo_inside_result *out,
                              ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_query_options wanted = EBPO_QUERY_OPTIONS_INIT;
-    const ebpo_query_options *o = &wanted;
+    ebpo_inside_options wanted = EBPO_INSIDE_OPTIONS_INIT;
+    const ebpo_inside_options *o = &wanted;
     const ebpo_model *m = context->model;
-    ebpo_status status = EBPO_TAKE(ebpo_query_options, &wanted, options, error);
+    ebpo_status status = EBPO_TAKE(ebpo_inside_options, &wanted, options, error);
     if (status == EBPO_OK)
-        status = ebpo_check_options(o, error);
+        status = ebpo_check_query_level(o->level, error);
+    if (status == EBPO_OK && o->envelopes > EBPO_ENVELOPES_SKIP)
+        status = ebpo_fail_value(error);
     if (status == EBPO_OK)
         status = ebpo_check_solid(m, error);
     if (status == EBPO_OK)
@@ -86,7 +87,7 @@ ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64
 }
 
 ebpo_status ebpo_inside(ebpo_context *context, const double point[3],
-                        const ebpo_query_options *options, ebpo_inside_result *out,
+                        const ebpo_inside_options *options, ebpo_inside_result *out,
                         ebpo_error *error)
 {
     return ebpo_inside_many(context, point, 1, options, out, error);

@@ -189,8 +189,8 @@ static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
     return open_top(m, cut, error);
 }
 
-ebpo_status ebpo_model_open(ebpo_model **out, ebpo_file *file, const ebpo_model_options *options,
-                            ebpo_error *error)
+ebpo_status ebpo_model_new(ebpo_file *file, const ebpo_model_options *options, ebpo_model **out,
+                           ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_model_options wanted = EBPO_MODEL_OPTIONS_INIT;
@@ -212,7 +212,7 @@ ebpo_status ebpo_model_open(ebpo_model **out, ebpo_file *file, const ebpo_model_
                              (int)m->options.loading)
                  : open_parts(m, error);
     if (status != EBPO_OK) {
-        ebpo_model_close(m);
+        ebpo_model_free(m);
         return status;
     }
     m->open_seconds = (double)(ebpo_clock() - begin) * 1e-9;
@@ -220,7 +220,7 @@ ebpo_status ebpo_model_open(ebpo_model **out, ebpo_file *file, const ebpo_model_
     return EBPO_OK;
 }
 
-void ebpo_model_close(ebpo_model *m)
+void ebpo_model_free(ebpo_model *m)
 {
     if (!m)
         return;
@@ -237,7 +237,10 @@ static void gather_stats(const ebpo_model *m, ebpo_model_stats *out)
     out->cut_level = m->top ? m->top->cut_level : 0;
     out->budget = m->options.memory;
     out->open_seconds = m->open_seconds;
-    ebpo_file_traffic(m->file, &out->bytes_read, &out->reads);
+    ebpo_file_stats file = EBPO_FILE_STATS_INIT;
+    ebpo_file_get_stats(m->file, &file);
+    out->bytes_read = file.bytes_read;
+    out->reads = file.reads;
     out->leaves = m->leaves;
     out->leaves_one_wall = m->leaves_one_wall;
     for (int k = 0; k < 5; k++)
@@ -267,7 +270,7 @@ ebpo_status ebpo_model_get_stats(const ebpo_model *m, ebpo_model_stats *out)
 
 /* --- contexts --- */
 
-ebpo_status ebpo_context_new(ebpo_context **out, ebpo_model *model, ebpo_error *error)
+ebpo_status ebpo_context_new(ebpo_model *model, ebpo_context **out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     *out = ebpo_alloc_zero(1, sizeof **out);

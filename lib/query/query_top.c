@@ -167,7 +167,7 @@ ebpo_status ebpo_top_read(ebpo_top **out, ebpo_file *file, int cut_level, unsign
     top->cut_level = cut_level;
     reading r = { .top = top, .info = ebpo_file_info(file), .error = error };
     ebpo_status status = EBPO_OK;
-    ebpo_file_expect_levels(file, 0, cut_level);
+    ebpo_file_prefetch_levels(file, 0, cut_level);
     for (int number = 0; number <= cut_level && status == EBPO_OK; number++) {
         ebpo_level level;
         status = ebpo_file_read_level(file, number, &level, threads, error);

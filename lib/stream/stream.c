@@ -36,7 +36,7 @@ struct ebpo_stream {
     ebpo_node_buffers room;
 };
 
-ebpo_status ebpo_stream_new(ebpo_stream **out, ebpo_file *file, const ebpo_stream_options *options,
+ebpo_status ebpo_stream_new(ebpo_file *file, const ebpo_stream_options *options, ebpo_stream **out,
                             ebpo_error *error)
 {
     ebpo_stream_options wanted = EBPO_STREAM_OPTIONS_INIT;

@@ -51,11 +51,12 @@ static void look_at(const ebpo_view_stream *s, const ebpo_waiting *w, ebpo_view_
 
 ebpo_status ebpo_view_stream_get_stats(const ebpo_view_stream *s, ebpo_view_stats *out)
 {
-    uint64_t reads;
+    ebpo_file_stats file = EBPO_FILE_STATS_INIT;
     ebpo_view_stats stats = EBPO_VIEW_STATS_INIT;
     stats.nodes = s->delivered;
     stats.pixels = s->viewpoint.given ? 0 : NAN;
-    ebpo_file_traffic(s->file, &stats.bytes_read, &reads);
+    ebpo_file_get_stats(s->file, &file);
+    stats.bytes_read = file.bytes_read;
     for (int i = 0; i < 4; i++)
         stats.cut[i] = s->cut[i];
     for (uint64_t i = 0; i < s->frontier.count; i++)

@@ -60,8 +60,8 @@ static ebpo_status take_options(ebpo_view_stream *s, const ebpo_view_options *op
     return EBPO_OK;
 }
 
-ebpo_status ebpo_view_stream_new(ebpo_view_stream **out, ebpo_file *file,
-                                 const ebpo_view_options *options, ebpo_error *error)
+ebpo_status ebpo_view_stream_new(ebpo_file *file, const ebpo_view_options *options,
+                                 ebpo_view_stream **out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_view_options wanted = EBPO_VIEW_OPTIONS_INIT;

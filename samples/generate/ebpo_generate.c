@@ -153,8 +153,8 @@ static bool read_base(ebpo_mesh *mesh, const settings *s)
                 "ebpo-generate: --relief is for the bases sphere and torus; leave it out\n");
         return false;
     }
-    if (ebpo_mesh_read(mesh, s->base, NULL, &error) != EBPO_OK ||
-        ebpo_mesh_check(&report, mesh, 0, (ebpo_progress){ NULL, NULL }, &error) != EBPO_OK) {
+    if (ebpo_mesh_read(s->base, NULL, mesh, &error) != EBPO_OK ||
+        ebpo_mesh_check(mesh, 0, (ebpo_progress){ NULL, NULL }, &report, &error) != EBPO_OK) {
         fprintf(stderr, "ebpo-generate: %s\n", error.message);
         return false;
     }

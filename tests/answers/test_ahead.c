@@ -30,8 +30,8 @@ static double distance_and_sign(ebpo_model *model, const double p[3])
     ebpo_context *context;
     ebpo_distance_result distance;
     ebpo_inside_result inside;
-    ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
-    ASSERT_OK(ebpo_context_new(&context, model, error));
+    ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
+    ASSERT_OK(ebpo_context_new(model, &context, error));
     /* envelopes do not decide then: the cell that holds p is needed, however far its envelope is */
     options.unsigned_distance = model->info->rule != EBPO_RULE_NONZERO;
     ASSERT_OK(ebpo_distance(context, p, &options, &distance, error));
@@ -73,7 +73,7 @@ START_TEST(what_is_near_is_all_that_queries_nearby_need)
         ebpo_model *model;
         how.memory = UINT64_C(1) << 40;
         how.cut_level = cut;
-        ASSERT_OK(ebpo_model_open(&model, m.file, &how, error));
+        ASSERT_OK(ebpo_model_new(m.file, &how, &model, error));
         for (uint64_t i = 0; i < count && !model->whole; i++) {
             const double *p = points + 6 * i;
             double away[3];
@@ -81,7 +81,7 @@ START_TEST(what_is_near_is_all_that_queries_nearby_need)
                 away[k] = (p[k + 3] - p[k]) / (double)(4 << i % 8);
             looked += loads_nothing_more(model, p, away);
         }
-        ebpo_model_close(model);
+        ebpo_model_free(model);
     }
     ck_assert_uint_gt(looked, 0);
     query_model_free(&m);
@@ -101,7 +101,7 @@ START_TEST(the_nearest_come_first_and_a_larger_reach_only_adds)
     ebpo_model *model;
     how.memory = UINT64_C(1) << 40;
     how.cut_level = 2;
-    ASSERT_OK(ebpo_model_open(&model, m.file, &how, error));
+    ASSERT_OK(ebpo_model_new(m.file, &how, &model, error));
     for (uint64_t i = 0; i < count && model->top; i++) {
         uint64_t all[EBPO_CACHE_AHEAD], some[EBPO_CACHE_AHEAD];
         unsigned most = ebpo_subtrees_near(model, points + 3 * i, INFINITY, all);
@@ -114,7 +114,7 @@ START_TEST(the_nearest_come_first_and_a_larger_reach_only_adds)
                 ck_assert_uint_eq(some[k], all[k]);
         }
     }
-    ebpo_model_close(model);
+    ebpo_model_free(model);
     query_model_free(&m);
     free(points);
 }

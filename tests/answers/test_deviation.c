@@ -241,10 +241,10 @@ START_TEST(what_cannot_be_measured_is_refused)
         o.parts = i ? EBPO_PART_PLANES : EBPO_PART_PLANES | EBPO_PART_MESH;
         o.last_level = i ? -1 : m.info.level_count - 2;
         ck_assert(ebpo_subset(m.file, path, &o, &error) == EBPO_OK &&
-                  ebpo_open(&part, path, &error) == EBPO_OK &&
-                  ebpo_model_open(&part_model, part, NULL, &error) == EBPO_OK);
+                  ebpo_open(path, &part, &error) == EBPO_OK &&
+                  ebpo_model_new(part, NULL, &part_model, &error) == EBPO_OK);
         refused(part_model, part, 0, 0.05, EBPO_E_ABSENT, i ? "mesh" : "subset");
-        ebpo_model_close(part_model);
+        ebpo_model_free(part_model);
         ebpo_close(part);
         unlink(path);
     }

@@ -37,7 +37,7 @@ static void result_make(result *r, query_model *m, const char *name, const ebpo_
     ebpo_error error = EBPO_ERROR_INIT;
     snprintf(r->path, sizeof r->path, "%s/%s.ebpo.h5", m->folder, name);
     fine(ebpo_subset(m->file, r->path, o, &error), &error);
-    fine(ebpo_open(&r->file, r->path, &error), &error);
+    fine(ebpo_open(r->path, &r->file, &error), &error);
     r->info = ebpo_file_info(r->file);
 }
 
@@ -408,7 +408,7 @@ START_TEST(what_cannot_be_kept_to_is_refused)
     snprintf(again.path, sizeof again.path, "%s/again.ebpo.h5", m.folder);
     ebpo_error error = EBPO_ERROR_INIT;
     fine(ebpo_subset(r.file, again.path, &o, &error), &error); /* a subset of it still knows */
-    fine(ebpo_open(&again.file, again.path, &error), &error);
+    fine(ebpo_open(again.path, &again.file, &error), &error);
     ck_assert(ebpo_file_info(again.file)->kept_error == 0.1);
     result_free(&again);
     result_free(&r);

@@ -96,7 +96,7 @@ START_TEST(surfaces_have_distances_but_no_inside)
     ck_assert_int_eq(ebpo_inside(m.context, points, NULL, &inside, &error), EBPO_E_NOT_SOLID);
     ck_assert_int_ne(error.message[0], 0);
     for (int is_unsigned = 0; is_unsigned < 2; is_unsigned++) {
-        ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
+        ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
         options.unsigned_distance = is_unsigned;
         ck_assert_int_eq(ebpo_distance_many(m.context, points, count, &options, distance, &error),
                          EBPO_OK);

@@ -16,7 +16,7 @@ START_TEST(real_models_answer_like_brute_force)
     if (!folder)
         return;
     snprintf(path, sizeof path, "%s/%s.ply", folder, names[_i]);
-    ck_assert_msg(ebpo_mesh_read(&mesh, path, NULL, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_mesh_read(path, NULL, &mesh, &error) == EBPO_OK, "%s", error.message);
     query_model m;
     query_model_make(&m, names[_i], mesh, &query_variants[0]);
     query_ask(&m, query_scaled(2000), (uint64_t)_i + 31);

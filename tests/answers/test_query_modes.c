@@ -53,9 +53,10 @@ static void end(asked *a)
     free(a->distance);
 }
 
-static void ask_exactly(asked *a, ebpo_context *context, const ebpo_query_options *options)
+static void ask_exactly(asked *a, ebpo_context *context, const ebpo_inside_options *inside,
+                        const ebpo_distance_options *options)
 {
-    ASSERT_OK(ebpo_inside_many(context, a->points, a->count, options, a->inside, error));
+    ASSERT_OK(ebpo_inside_many(context, a->points, a->count, inside, a->inside, error));
     ck_assert_uint_eq(query_wrong_inside(&a->m, a->points, a->truth, a->count, a->inside), 0);
     ASSERT_OK(ebpo_distance_many(context, a->points, a->count, options, a->distance, error));
     ck_assert_uint_eq(query_wrong_distance(&a->m, a->points, a->truth, a->count,
@@ -69,15 +70,15 @@ static void ask_loaded(asked *a, const ebpo_model_options *how)
 {
     ebpo_model *model;
     ebpo_context *context;
-    ASSERT_OK(ebpo_model_open(&model, a->m.file, how, error));
-    ASSERT_OK(ebpo_context_new(&context, model, error));
+    ASSERT_OK(ebpo_model_new(a->m.file, how, &model, error));
+    ASSERT_OK(ebpo_context_new(model, &context, error));
     for (int envelopes = 0; envelopes < 3; envelopes++) {
-        ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
-        options.envelopes = (ebpo_envelopes)envelopes;
-        ask_exactly(a, context, &options);
+        ebpo_inside_options inside = EBPO_INSIDE_OPTIONS_INIT;
+        inside.envelopes = (ebpo_envelopes)envelopes;
+        ask_exactly(a, context, &inside, NULL);
     }
     ebpo_context_free(context);
-    ebpo_model_close(model);
+    ebpo_model_free(model);
 }
 
 /* With EBPO_TEST_SCALE below 1 each test takes other cases than the one before it, so that all have
@@ -111,14 +112,14 @@ static bool ask_within(asked *a, uint64_t budget, bool *resident)
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
     how.memory = budget;
-    ebpo_status status = ebpo_model_open(&model, a->m.file, &how, &error);
+    ebpo_status status = ebpo_model_new(a->m.file, &how, &model, &error);
     if (status == EBPO_OK)
-        status = ebpo_context_new(&context, model, &error);
+        status = ebpo_context_new(model, &context, &error);
     ck_assert_msg(status == EBPO_OK || status == EBPO_E_LIMIT, "%s", error.message);
     if (status == EBPO_E_LIMIT)
         ck_assert_int_ne(error.message[0], 0);
     else
-        ask_exactly(a, context, NULL);
+        ask_exactly(a, context, NULL, NULL);
     if (model) {
         ebpo_model_get_stats(model, &stats);
         ck_assert_uint_eq(stats.budget, budget);
@@ -127,7 +128,7 @@ static bool ask_within(asked *a, uint64_t budget, bool *resident)
         *resident = stats.resident;
     }
     ebpo_context_free(context);
-    ebpo_model_close(model);
+    ebpo_model_free(model);
     return status == EBPO_OK;
 }
 
@@ -157,7 +158,7 @@ START_TEST(batches_give_what_single_questions_give)
         return;
     asked a;
     begin(&a, _i, 1000);
-    ask_exactly(&a, a.m.context, NULL);
+    ask_exactly(&a, a.m.context, NULL, NULL);
     for (uint64_t i = 0; i < a.count; i++) {
         ebpo_inside_result inside;
         ebpo_distance_result distance;
@@ -177,10 +178,10 @@ START_TEST(warm_starts_and_signs_do_not_change_answers)
     asked a;
     begin(&a, _i, 600);
     for (int form = 0; form < 4; form++) {
-        ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
+        ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
         options.warm = form & 1;
         options.unsigned_distance = form & 2;
-        ask_exactly(&a, a.m.context, &options);
+        ask_exactly(&a, a.m.context, NULL, &options);
     }
     /* along a path, where the last answer is close */
     for (uint64_t i = 1; i < a.count; i++)
@@ -189,9 +190,9 @@ START_TEST(warm_starts_and_signs_do_not_change_answers)
                 a.points[k] + (a.points[3 + k] - a.points[k]) * (double)i / (double)a.count;
     query_find_truths(&a.m, a.points, a.count, a.truth);
     for (int warm = 0; warm < 2; warm++) {
-        ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
+        ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
         options.warm = warm;
-        ask_exactly(&a, a.m.context, &options);
+        ask_exactly(&a, a.m.context, NULL, &options);
     }
     end(&a);
 }
@@ -211,7 +212,7 @@ START_TEST(what_is_beyond_max_distance_is_left_out)
         oracle_nearest near;
         oracle_find_nearest(a.m.judge, a.points + 3 * i, &near);
         for (size_t l = 0; l < sizeof limits / sizeof *limits; l++) {
-            ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
+            ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
             ebpo_distance_result got;
             options.max_distance = limits[l];
             options.warm = i & 1;
@@ -236,9 +237,12 @@ END_TEST
 
 /* --- limits --- */
 
-static void ask_limited(asked *a, ebpo_context *context, const ebpo_query_options *options)
+static void ask_limited(asked *a, ebpo_context *context, ebpo_envelopes envelopes,
+                        const ebpo_distance_options *options)
 {
-    ASSERT_OK(ebpo_inside_many(context, a->points, a->count, options, a->inside, error));
+    ebpo_inside_options inside = query_inside_like(options);
+    inside.envelopes = envelopes;
+    ASSERT_OK(ebpo_inside_many(context, a->points, a->count, &inside, a->inside, error));
     ck_assert_uint_eq(query_wrong_limited_inside(&a->m, a->points, a->truth, a->count, a->inside),
                       0);
     ASSERT_OK(ebpo_distance_many(context, a->points, a->count, options, a->distance, error));
@@ -255,10 +259,9 @@ START_TEST(answers_limited_to_a_level_are_certain)
     begin(&a, _i, 600);
     for (int level = 0; level < a.m.info.level_count; level++)
         for (int envelopes = 0; envelopes < 3; envelopes++) {
-            ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
+            ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
             options.level = level;
-            options.envelopes = (ebpo_envelopes)envelopes;
-            ask_limited(&a, a.m.context, &options);
+            ask_limited(&a, a.m.context, (ebpo_envelopes)envelopes, &options);
         }
     end(&a);
 }
@@ -273,9 +276,9 @@ START_TEST(answers_limited_to_a_level_do_not_depend_on_what_is_in_memory)
     ebpo_distance_result *first = query_room(a.count, sizeof *first);
     ebpo_inside_result *where = query_room(a.count, sizeof *where);
     for (int level = 0; level < a.m.info.level_count; level += 2) {
-        ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
+        ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
         options.level = level;
-        ask_limited(&a, a.m.context, &options);
+        ask_limited(&a, a.m.context, EBPO_ENVELOPES_AUTO, &options);
         memcpy(first, a.distance, a.count * sizeof *first);
         memcpy(where, a.inside, a.count * sizeof *where);
         for (int cut = 0; cut < 4 && cut < a.m.info.level_count; cut++) {
@@ -283,11 +286,11 @@ START_TEST(answers_limited_to_a_level_do_not_depend_on_what_is_in_memory)
             ebpo_model *model;
             ebpo_context *context;
             how.cut_level = cut;
-            ASSERT_OK(ebpo_model_open(&model, a.m.file, &how, error));
-            ASSERT_OK(ebpo_context_new(&context, model, error));
-            ask_limited(&a, context, &options);
+            ASSERT_OK(ebpo_model_new(a.m.file, &how, &model, error));
+            ASSERT_OK(ebpo_context_new(model, &context, error));
+            ask_limited(&a, context, EBPO_ENVELOPES_AUTO, &options);
             ebpo_context_free(context);
-            ebpo_model_close(model);
+            ebpo_model_free(model);
         }
     }
     free(first);
@@ -305,15 +308,15 @@ START_TEST(answers_limited_by_a_deadline_are_certain)
     begin(&a, _i, 300);
     for (size_t d = 0; d < sizeof deadlines / sizeof *deadlines; d++)
         for (int cut = -1; cut < 2 && cut < a.m.info.level_count; cut++) {
-            ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
+            ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
             ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
             ebpo_model *model;
             ebpo_context *context;
             how.cut_level = cut;
             options.deadline_ns = deadlines[d];
-            ASSERT_OK(ebpo_model_open(&model, a.m.file, &how, error));
-            ASSERT_OK(ebpo_context_new(&context, model, error));
-            ask_limited(&a, context, &options);
+            ASSERT_OK(ebpo_model_new(a.m.file, &how, &model, error));
+            ASSERT_OK(ebpo_context_new(model, &context, error));
+            ask_limited(&a, context, EBPO_ENVELOPES_AUTO, &options);
             for (uint64_t i = 0; i < a.count;
                  i++) /* however short it is, some face is in the root cell; beyond the largest
                          double nobody can tell */
@@ -322,7 +325,7 @@ START_TEST(answers_limited_by_a_deadline_are_certain)
                                   fabs(a.points[3 * i + 2]) >
                               1e300);
             ebpo_context_free(context);
-            ebpo_model_close(model);
+            ebpo_model_free(model);
         }
     end(&a);
 }
@@ -335,7 +338,7 @@ START_TEST(the_theses_modes_never_claim_too_much)
     asked a;
     begin(&a, _i, 600);
     for (int mode = EBPO_DISTANCE_RECURSIVE; mode <= EBPO_DISTANCE_ENVELOPE; mode++) {
-        ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
+        ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
         options.mode = (ebpo_distance_mode)mode;
         ASSERT_OK(ebpo_distance_many(a.m.context, a.points, a.count, &options, a.distance, error));
         for (uint64_t i = 0; i < a.count; i++) {
@@ -364,7 +367,7 @@ START_TEST(the_theses_modes_do_not_depend_on_what_is_in_memory)
     begin(&a, _i, 300);
     ebpo_distance_result *resident = calloc(a.count, sizeof *resident);
     for (int mode = EBPO_DISTANCE_RECURSIVE; mode <= EBPO_DISTANCE_ENVELOPE; mode++) {
-        ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
+        ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
         options.mode = (ebpo_distance_mode)mode;
         ASSERT_OK(ebpo_distance_many(a.m.context, a.points, a.count, &options, resident, error));
         for (int cut = 1; cut < a.m.info.level_count; cut++) {
@@ -372,8 +375,8 @@ START_TEST(the_theses_modes_do_not_depend_on_what_is_in_memory)
             ebpo_model *model;
             ebpo_context *context;
             how.cut_level = cut;
-            ASSERT_OK(ebpo_model_open(&model, a.m.file, &how, error));
-            ASSERT_OK(ebpo_context_new(&context, model, error));
+            ASSERT_OK(ebpo_model_new(a.m.file, &how, &model, error));
+            ASSERT_OK(ebpo_context_new(model, &context, error));
             ASSERT_OK(ebpo_distance_many(context, a.points, a.count, &options, a.distance, error));
             for (uint64_t i = 0; i < a.count; i++) {
                 const ebpo_distance_result *got = a.distance + i, *want = resident + i;
@@ -385,7 +388,7 @@ START_TEST(the_theses_modes_do_not_depend_on_what_is_in_memory)
                               got->distance, got->face, want->distance, want->face);
             }
             ebpo_context_free(context);
-            ebpo_model_close(model);
+            ebpo_model_free(model);
         }
     }
     free(resident);
@@ -425,9 +428,9 @@ START_TEST(a_file_without_mesh_answers_by_levels_only)
     ck_assert_int_eq(ebpo_faces_in_box(m.context, p, p, &faces, &count, &error), EBPO_E_ABSENT);
     if (query_variants[cases[_i].variant].rule == EBPO_RULE_NONZERO)
         for (int level = 0; level < m.info.level_count; level++) {
-            ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
+            ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
             options.level = level;
-            ask_limited(&a, m.context, &options);
+            ask_limited(&a, m.context, EBPO_ENVELOPES_AUTO, &options);
         }
     query_model_free(&m);
     end(&a);
@@ -450,7 +453,7 @@ static void *ask_in_thread(void *user)
     thread_job *job = user;
     asked *a = job->a;
     ebpo_context *context;
-    job->status = ebpo_context_new(&context, job->model, NULL);
+    job->status = ebpo_context_new(job->model, &context, NULL);
     for (uint64_t i = 0; i < a->count && job->status == EBPO_OK; i++) {
         uint64_t at = (i + job->number * a->count / 4) % a->count;
         ebpo_inside_result inside;
@@ -472,7 +475,7 @@ static void ask_in_threads(asked *a, const ebpo_model_options *how)
     pthread_t thread[THREADS];
     thread_job job[THREADS];
     ebpo_model *model;
-    ASSERT_OK(ebpo_model_open(&model, a->m.file, how, error));
+    ASSERT_OK(ebpo_model_new(a->m.file, how, &model, error));
     for (unsigned i = 0; i < THREADS; i++) {
         job[i] = (thread_job){ .a = a, .model = model, .number = i };
         ck_assert_int_eq(pthread_create(&thread[i], NULL, ask_in_thread, &job[i]), 0);
@@ -483,7 +486,7 @@ static void ask_in_threads(asked *a, const ebpo_model_options *how)
         ck_assert_int_eq(job[i].status, EBPO_OK);
         ck_assert_uint_eq(job[i].different, 0);
     }
-    ebpo_model_close(model);
+    ebpo_model_free(model);
 }
 
 /* With ThreadSanitizer (meson setup build-tsan -Db_sanitize=thread; CK_RUN_CASE=threads
@@ -494,7 +497,7 @@ START_TEST(four_threads_get_the_answers_of_one)
         return;
     asked a;
     begin(&a, _i, 400);
-    ask_exactly(&a, a.m.context, NULL);
+    ask_exactly(&a, a.m.context, NULL, NULL);
     for (int loading = 0; loading < 3; loading++)
         for (int cut = -1; cut < 3 && cut < a.m.info.level_count; cut++)
             for (int prefetch = 0; prefetch < 2; prefetch++) {
@@ -515,7 +518,7 @@ START_TEST(four_threads_share_a_small_budget)
         return;
     asked a;
     begin(&a, _i, 400);
-    ask_exactly(&a, a.m.context, NULL);
+    ask_exactly(&a, a.m.context, NULL, NULL);
     int runs = 0;
     for (uint64_t budget = 16384; runs < 4; budget += budget / 3) {
         ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
@@ -523,12 +526,12 @@ START_TEST(four_threads_share_a_small_budget)
         ebpo_context *context[4] = { NULL };
         how.memory = budget;
         how.prefetch = true;
-        ebpo_status status = ebpo_model_open(&model, a.m.file, &how, NULL);
+        ebpo_status status = ebpo_model_new(a.m.file, &how, &model, NULL);
         for (int i = 0; i < 4 && status == EBPO_OK; i++)
-            status = ebpo_context_new(&context[i], model, NULL);
+            status = ebpo_context_new(model, &context[i], NULL);
         for (int i = 0; i < 4; i++)
             ebpo_context_free(context[i]);
-        ebpo_model_close(model);
+        ebpo_model_free(model);
         if (status == EBPO_OK) {
             ask_in_threads(&a, &how);
             runs++;

@@ -78,9 +78,9 @@ START_TEST(rays_do_not_depend_on_what_is_in_memory)
             uint64_t state = (uint64_t)(3 * loading + cut), wrong = 0;
             how.loading = (ebpo_loading)loading;
             how.cut_level = cut;
-            ck_assert_msg(ebpo_model_open(&model, m.file, &how, &error) == EBPO_OK, "%s",
+            ck_assert_msg(ebpo_model_new(m.file, &how, &model, &error) == EBPO_OK, "%s",
                           error.message);
-            ck_assert_msg(ebpo_context_new(&context, model, &error) == EBPO_OK, "%s",
+            ck_assert_msg(ebpo_context_new(model, &context, &error) == EBPO_OK, "%s",
                           error.message);
             for (uint64_t i = 0; i < query_scaled(60) && wrong == 0; i++) {
                 query_ray r;
@@ -89,7 +89,7 @@ START_TEST(rays_do_not_depend_on_what_is_in_memory)
             }
             ck_assert_uint_eq(wrong, 0);
             ebpo_context_free(context);
-            ebpo_model_close(model);
+            ebpo_model_free(model);
         }
     query_model_free(&m);
 }

@@ -73,7 +73,7 @@ static void make_ties(query_model *m, const double normal[3], const double middl
     }
     for (int step = 0; step < STEPS; step++)
         for (int i = 0; i < TIES; i++) {
-            ebpo_query_options cold = EBPO_QUERY_OPTIONS_INIT;
+            ebpo_distance_options cold = EBPO_DISTANCE_OPTIONS_INIT;
             ebpo_distance_result d;
             double at = (low[i] + high[i]) / 2;
             for (int k = 0; k < 3; k++)
@@ -104,19 +104,19 @@ START_TEST(faces_far_larger_than_a_subtree_are_weighed_exactly)
     for (int cut = 6; cut < m.info.level_count; cut++)
         for (int warm = 0; warm < 2; warm++) {
             ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
-            ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
+            ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
             ebpo_model *model;
             ebpo_context *context;
             how.cut_level = cut;
             options.warm = warm;
-            ck_assert_int_eq(ebpo_model_open(&model, m.file, &how, NULL), EBPO_OK);
-            ck_assert_int_eq(ebpo_context_new(&context, model, NULL), EBPO_OK);
+            ck_assert_int_eq(ebpo_model_new(m.file, &how, &model, NULL), EBPO_OK);
+            ck_assert_int_eq(ebpo_context_new(model, &context, NULL), EBPO_OK);
             ck_assert_int_eq(ebpo_distance_many(context, points[0], TIES, &options, got, NULL),
                              EBPO_OK);
             ck_assert_msg(query_wrong_distance(&m, points[0], truth, TIES, false, got) == 0,
                           "cut level %d, warm %d", cut, warm);
             ebpo_context_free(context);
-            ebpo_model_close(model);
+            ebpo_model_free(model);
         }
     query_model_free(&m);
 }

@@ -157,7 +157,7 @@ int main(int argc, char **argv)
                 ROUNDS_MOST);
         return 2;
     }
-    if (ebpo_open(&file, s.path, &error) != EBPO_OK) {
+    if (ebpo_open(s.path, &file, &error) != EBPO_OK) {
         fprintf(stderr, "bench_decode: %s\n", error.message);
         return EXIT_FAILURE;
     }

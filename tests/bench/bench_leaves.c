@@ -118,9 +118,9 @@ int main(int argc, char **argv)
     ebpo_file *file;
     ebpo_model *model;
     ebpo_context *context;
-    if (ebpo_open(&file, argv[1], &error) != EBPO_OK ||
-        ebpo_model_open(&model, file, NULL, &error) != EBPO_OK ||
-        ebpo_context_new(&context, model, &error) != EBPO_OK)
+    if (ebpo_open(argv[1], &file, &error) != EBPO_OK ||
+        ebpo_model_new(file, NULL, &model, &error) != EBPO_OK ||
+        ebpo_context_new(model, &context, &error) != EBPO_OK)
         fail(&error);
     bucket *buckets = calloc(KINDS, sizeof *buckets);
     if (!buckets)
@@ -143,7 +143,7 @@ int main(int argc, char **argv)
         printf("]\n");
     free(buckets);
     ebpo_context_free(context);
-    ebpo_model_close(model);
+    ebpo_model_free(model);
     ebpo_close(file);
     return 0;
 }

@@ -26,14 +26,14 @@ int main(int argc, char **argv)
     ebpo_mesh_report report;
     ebpo_error error = EBPO_ERROR_INIT;
     unsigned threads = argc > 2 ? (unsigned)atoi(argv[2]) : 0;
-    if (argc < 2 || ebpo_mesh_read(&mesh, argv[1], NULL, &error) != EBPO_OK) {
+    if (argc < 2 || ebpo_mesh_read(argv[1], NULL, &mesh, &error) != EBPO_OK) {
         fprintf(stderr, "bench_mesh_check: %s\n", argc < 2 ? "give a mesh file" : error.message);
         return EXIT_FAILURE;
     }
     double best = 1e30;
     for (int i = 0; i < 5; i++) {
         double start = now();
-        if (ebpo_mesh_check(&report, &mesh, threads, (ebpo_progress){ NULL, NULL }, &error) !=
+        if (ebpo_mesh_check(&mesh, threads, (ebpo_progress){ NULL, NULL }, &report, &error) !=
             EBPO_OK) {
             fprintf(stderr, "bench_mesh_check: %s\n", error.message);
             return EXIT_FAILURE;

@@ -18,11 +18,11 @@ int main()
     mesh.xyz32[3] = mesh.xyz32[7] = mesh.xyz32[11] = 1;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_mesh_report report;
-    if (ebpo_mesh_check(&report, &mesh, 1, ebpo_progress(), &error) != EBPO_OK || !report.balanced)
+    if (ebpo_mesh_check(&mesh, 1, ebpo_progress(), &report, &error) != EBPO_OK || !report.balanced)
         return 1;
     ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
     ebpo_tree tree;
-    if (ebpo_build(&tree, &mesh, &report, nullptr, &options, &error) != EBPO_OK) {
+    if (ebpo_build(&mesh, &report, nullptr, &options, &tree, &error) != EBPO_OK) {
         std::puts(error.message);
         return 1;
     }

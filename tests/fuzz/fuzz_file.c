@@ -24,19 +24,21 @@ static void ask(ebpo_file *file, int cut_level)
     options.cut_level = cut_level;
     options.threads = 1;
     options.memory = 64 << 20;
-    if (ebpo_model_open(&model, file, &options, NULL) != EBPO_OK)
+    if (ebpo_model_new(file, &options, &model, NULL) != EBPO_OK)
         return;
-    if (ebpo_context_new(&context, model, NULL) == EBPO_OK) {
+    if (ebpo_context_new(model, &context, NULL) == EBPO_OK) {
         ebpo_inside_result where;
         ebpo_distance_result distance;
         const ebpo_ray_hit *hits;
         const uint64_t *faces;
         uint64_t count;
         for (int i = 0; i < 4; i++) {
-            ebpo_query_options limited = EBPO_QUERY_OPTIONS_INIT;
+            ebpo_distance_options limited = EBPO_DISTANCE_OPTIONS_INIT;
             limited.level = i;
+            ebpo_inside_options inside_options = EBPO_INSIDE_OPTIONS_INIT;
+            inside_options.level = i;
             (void)!ebpo_inside(context, points[i], NULL, &where, NULL);
-            (void)!ebpo_inside(context, points[i], &limited, &where, NULL);
+            (void)!ebpo_inside(context, points[i], &inside_options, &where, NULL);
             (void)!ebpo_distance(context, points[i], NULL, &distance, NULL);
             (void)!ebpo_distance(context, points[i], &limited, &distance, NULL);
         }
@@ -44,7 +46,7 @@ static void ask(ebpo_file *file, int cut_level)
         (void)!ebpo_faces_in_box(context, points[0], points[2], &faces, &count, NULL);
         ebpo_context_free(context);
     }
-    ebpo_model_close(model);
+    ebpo_model_free(model);
 }
 
 static void view(ebpo_file *file, ebpo_priority priority)
@@ -58,7 +60,7 @@ static void view(ebpo_file *file, ebpo_priority priority)
     options.observer = &observer;
     options.polygons = options.windings = true;
     options.nodes = 2000;
-    if (ebpo_view_stream_new(&stream, file, &options, NULL) != EBPO_OK)
+    if (ebpo_view_stream_new(file, &options, &stream, NULL) != EBPO_OK)
         return;
     while (ebpo_view_stream_next(stream, &node, &end, NULL) == EBPO_OK && end == EBPO_VIEW_NODE)
         ;
@@ -83,7 +85,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     ebpo_file *file;
     ebpo_tree tree;
     ebpo_mesh mesh;
-    if (ebpo_open_memory(&file, data, size, "fuzzed", NULL) != EBPO_OK)
+    if (ebpo_open_memory(data, size, "fuzzed", &file, NULL) != EBPO_OK)
         return 0;
     if (ebpo_file_read_tree(file, &tree, 1, NULL) == EBPO_OK)
         ebpo_tree_free(&tree);

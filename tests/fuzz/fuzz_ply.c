@@ -14,7 +14,7 @@ static void read_points(const ebpo_mesh *mesh, const uint8_t *data, size_t size)
     double *xyz;
     uint64_t count;
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_status status = ebpo_points_parse_ply(&xyz, &count, data, size, "fuzz.ply", &error);
+    ebpo_status status = ebpo_points_parse_ply(data, size, "fuzz.ply", &xyz, &count, &error);
     if (status != EBPO_OK &&
         (mesh->face_count || xyz || count || error.status != status || !error.message[0]))
         abort();

@@ -167,12 +167,14 @@ static void hash_point(hashing *h, const stiff_case *c, ebpo_context *context, b
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status;
     for (int level = -1; level < 3; level += 3) { /* exact, and limited to level 2 */
-        ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
+        ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
         ebpo_inside_result inside;
         ebpo_distance_result distance;
         options.level = level;
+        ebpo_inside_options inside_options = EBPO_INSIDE_OPTIONS_INIT;
+        inside_options.level = level;
         if (solid) {
-            CALL(status, ebpo_inside(context, p, &options, &inside, &error));
+            CALL(status, ebpo_inside(context, p, &inside_options, &inside, &error));
             if (status != EBPO_OK)
                 fail(c, "inside", &error);
             number(h, (uint64_t)inside.where << 32 | (uint32_t)inside.winding);
@@ -248,7 +250,7 @@ static void hash_reach(hashing *h, const stiff_case *c, query_model *m)
         return;
     CALL(status, ebpo_subset(m->file, path, &options, &error));
     if (status == EBPO_OK)
-        status = ebpo_open(&file, path, &error);
+        status = ebpo_open(path, &file, &error);
     if (status != EBPO_OK)
         fail(c, "subset", &error);
     bytes(h, ebpo_file_info(file)->content_sha256, 32);
@@ -261,9 +263,9 @@ static void hash_questions(hashing *h, const stiff_case *c, query_model *m, uint
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status;
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
-    CALL(status, ebpo_model_open(&m->model, m->file, &options, &error));
+    CALL(status, ebpo_model_new(m->file, &options, &m->model, &error));
     if (status == EBPO_OK)
-        CALL(status, ebpo_context_new(&m->context, m->model, &error));
+        CALL(status, ebpo_context_new(m->model, &m->context, &error));
     if (status != EBPO_OK)
         fail(c, "open", &error);
     double *points = query_room(questions, 3 * sizeof *points);
@@ -285,7 +287,7 @@ static void hash_questions(hashing *h, const stiff_case *c, query_model *m, uint
     free(points);
     hash_reach(h, c, m);
     ebpo_context_free(m->context);
-    ebpo_model_close(m->model);
+    ebpo_model_free(m->model);
 }
 
 /* --- a case --- */
@@ -296,7 +298,7 @@ static ebpo_status check_mesh(hashing *h, const stiff_case *c, ebpo_mesh *mesh,
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status;
     *mesh = c->make(c);
-    CALL(status, ebpo_mesh_check(report, mesh, 2, (ebpo_progress){ NULL, NULL }, &error));
+    CALL(status, ebpo_mesh_check(mesh, 2, (ebpo_progress){ NULL, NULL }, report, &error));
     if (status != EBPO_OK)
         ebpo_mesh_free(mesh);
     *options = (ebpo_build_options)EBPO_BUILD_OPTIONS_INIT;
@@ -328,7 +330,7 @@ static void hash_selections(hashing *h, const stiff_case *c)
         options.select = selections[way];
         options.normals = way == 1 ? EBPO_NORMALS_ANGLE : EBPO_NORMALS_SPHERICAL;
         options.parts |= EBPO_PART_LEAF_PLANES;
-        CALL(status, ebpo_build(&tree, &mesh, &report, NULL, &options, &error));
+        CALL(status, ebpo_build(&mesh, &report, NULL, &options, &tree, &error));
         number(h, (uint64_t)status);
         for (int level = 0; status == EBPO_OK && level < tree.info.level_count; level++) {
             const ebpo_level *l = &tree.level[level];
@@ -352,7 +354,7 @@ static ebpo_status make_tree(hashing *h, const stiff_case *c, ebpo_tree *tree)
     if (status != EBPO_OK)
         return status;
     hash_report(h, &report);
-    CALL(status, ebpo_build(tree, &mesh, &report, NULL, &options, &error));
+    CALL(status, ebpo_build(&mesh, &report, NULL, &options, tree, &error));
     return status;
 }
 
@@ -390,7 +392,7 @@ void fp_hash_case(const stiff_case *c, const fp_setting *setting, uint64_t quest
     ebpo_status status;
     CALL(status, ebpo_tree_write(&tree, m.path, NULL, &error));
     if (status == EBPO_OK)
-        CALL(status, ebpo_open(&m.file, m.path, &error));
+        CALL(status, ebpo_open(m.path, &m.file, &error));
     if (status != EBPO_OK)
         fail(c, "file", &error);
     m.info = *ebpo_file_info(m.file);

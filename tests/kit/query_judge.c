@@ -42,7 +42,7 @@ ebpo_status query_build(ebpo_tree *tree, ebpo_mesh *mesh, const query_variant *v
                         ebpo_error *error)
 {
     ebpo_mesh_report report;
-    ebpo_status status = ebpo_mesh_check(&report, mesh, 1, (ebpo_progress){ NULL, NULL }, error);
+    ebpo_status status = ebpo_mesh_check(mesh, 1, (ebpo_progress){ NULL, NULL }, &report, error);
     if (status != EBPO_OK) {
         ebpo_mesh_free(mesh);
         return status;
@@ -54,7 +54,7 @@ ebpo_status query_build(ebpo_tree *tree, ebpo_mesh *mesh, const query_variant *v
     options.threads = 1;
     if (variant->parts)
         options.parts = variant->parts;
-    return ebpo_build(tree, mesh, &report, NULL, &options, error);
+    return ebpo_build(mesh, &report, NULL, &options, tree, error);
 }
 
 static ebpo_status write_tree(query_model *m, ebpo_mesh mesh, const query_variant *variant,
@@ -109,11 +109,11 @@ ebpo_status query_model_try(query_model *m, const char *name, ebpo_mesh mesh,
     snprintf(m->path, sizeof m->path, "%s/model.ebpo.h5", m->folder);
     ebpo_status status = write_tree(m, mesh, variant, error);
     if (status == EBPO_OK)
-        status = ebpo_open(&m->file, m->path, error);
+        status = ebpo_open(m->path, &m->file, error);
     if (status == EBPO_OK)
-        status = ebpo_model_open(&m->model, m->file, NULL, error);
+        status = ebpo_model_new(m->file, NULL, &m->model, error);
     if (status == EBPO_OK)
-        status = ebpo_context_new(&m->context, m->model, error);
+        status = ebpo_context_new(m->model, &m->context, error);
     if (status != EBPO_OK) {
         query_model_free(m);
         return status;
@@ -134,7 +134,7 @@ void query_model_make(query_model *m, const char *name, ebpo_mesh mesh,
 void query_model_free(query_model *m)
 {
     ebpo_context_free(m->context);
-    ebpo_model_close(m->model);
+    ebpo_model_free(m->model);
     ebpo_close(m->file);
     oracle_free(m->judge);
     ebpo_mesh_free(&m->mesh);

@@ -40,6 +40,15 @@ extern const int query_variant_count;
  * of small integers or anywhere. */
 ebpo_mesh query_random_solid(uint64_t seed, bool on_grid);
 
+/* As much of these options as the question whether a point is inside has too. */
+static inline ebpo_inside_options query_inside_like(const ebpo_distance_options *o)
+{
+    ebpo_inside_options inside = EBPO_INSIDE_OPTIONS_INIT;
+    inside.level = o->level;
+    inside.deadline_ns = o->deadline_ns;
+    return inside;
+}
+
 /* --- models: query_judge.c --- */
 
 typedef struct query_model {

@@ -148,8 +148,8 @@ static ebpo_mesh make_boxes_in_walls(void)
     ebpo_mesh_report report;
     ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
     ebpo_tree tree;
-    if (ebpo_mesh_check(&report, &frame, 1, (ebpo_progress){ NULL, NULL }, NULL) != EBPO_OK ||
-        ebpo_build(&tree, &frame, &report, NULL, &options, NULL) != EBPO_OK)
+    if (ebpo_mesh_check(&frame, 1, (ebpo_progress){ NULL, NULL }, &report, NULL) != EBPO_OK ||
+        ebpo_build(&frame, &report, NULL, &options, &tree, NULL) != EBPO_OK)
         abort();
     static const double eighths[][6] = { { 2, 2, 2, 4, 4, 4 },
                                          { 4, 4, 4, 6, 6, 6 },

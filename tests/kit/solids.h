@@ -3,7 +3,7 @@
 #ifndef EBPO_TESTS_SOLIDS_H
 #define EBPO_TESTS_SOLIDS_H
 
-#include <ebpo/mesh.h>
+#include <ebpo/file.h>
 
 /* All functions return a mesh that the caller frees with ebpo_mesh_free; they abort when memory is
  * short. Doubles, unless stated. */
@@ -78,5 +78,13 @@ extern const ebpo_test_solid ebpo_test_solids[];
 extern const int ebpo_test_solid_count;
 /* By name; aborts when there is none. */
 ebpo_mesh ebpo_test_make(const char *name);
+
+/* What ebpo_file_get_stats tells. */
+static inline ebpo_file_stats ebpo_test_file_stats(const ebpo_file *file)
+{
+    ebpo_file_stats stats = EBPO_FILE_STATS_INIT;
+    ebpo_file_get_stats(file, &stats);
+    return stats;
+}
 
 #endif

@@ -11,7 +11,7 @@
 static ebpo_status vector_read(const char *path, ebpo_tree *tree, ebpo_error *error)
 {
     ebpo_file *file;
-    ebpo_status status = ebpo_open(&file, path, error);
+    ebpo_status status = ebpo_open(path, &file, error);
     if (status != EBPO_OK)
         return status;
     status = ebpo_file_read_tree(file, tree, 1, error);

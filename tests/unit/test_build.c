@@ -13,9 +13,9 @@ static ebpo_status build_with(ebpo_tree *tree, ebpo_mesh mesh, const ebpo_build_
 {
     ebpo_mesh_report report;
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_status status = ebpo_mesh_check(&report, &mesh, 1, (ebpo_progress){ NULL, NULL }, &error);
+    ebpo_status status = ebpo_mesh_check(&mesh, 1, (ebpo_progress){ NULL, NULL }, &report, &error);
     ck_assert_msg(status == EBPO_OK, "%s", error.message);
-    return ebpo_build(tree, &mesh, &report, NULL, options, &error);
+    return ebpo_build(&mesh, &report, NULL, options, tree, &error);
 }
 
 static ebpo_tree build(ebpo_mesh mesh, const ebpo_build_options *options)
@@ -176,7 +176,7 @@ START_TEST(maximum_level_follows_equation_3)
     for (uint32_t n = 1; n <= 32; n *= 2) {
         ebpo_mesh mesh = ebpo_test_box(low, high, n);
         ebpo_mesh_report report;
-        ck_assert_int_eq(ebpo_mesh_check(&report, &mesh, 1, (ebpo_progress){ NULL, NULL }, NULL),
+        ck_assert_int_eq(ebpo_mesh_check(&mesh, 1, (ebpo_progress){ NULL, NULL }, &report, NULL),
                          EBPO_OK);
         int expected = 1;
         while (ldexp(1, -expected) >= report.mean_edge)

@@ -76,7 +76,7 @@ static ebpo_file *open_ok(const char *path)
 {
     ebpo_file *file;
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert_msg(ebpo_open(&file, path, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_open(path, &file, &error) == EBPO_OK, "%s", error.message);
     return file;
 }
 
@@ -399,7 +399,7 @@ static bool reads_well(const char *path, ebpo_error *error)
 {
     ebpo_file *file;
     ebpo_tree tree;
-    if (ebpo_open(&file, path, error) != EBPO_OK)
+    if (ebpo_open(path, &file, error) != EBPO_OK)
         return false;
     bool ok = ebpo_file_read_tree(file, &tree, 1, error) == EBPO_OK;
     if (ok)
@@ -469,7 +469,7 @@ START_TEST(flipped_bits_in_the_head_do_no_harm)
         data[at] ^= (uint8_t)(1u << at % 8);
         spill(in_folder("b.ebpo.h5"), data, size);
         ebpo_file *file;
-        if (ebpo_open(&file, in_folder("b.ebpo.h5"), NULL) == EBPO_OK) {
+        if (ebpo_open(in_folder("b.ebpo.h5"), &file, NULL) == EBPO_OK) {
             if (ebpo_file_read_tree(file, &back, 1, NULL) == EBPO_OK) {
                 same_tree(&tree, &back);
                 ebpo_tree_free(&back);
@@ -613,13 +613,13 @@ START_TEST(what_is_no_file_of_ours_is_named)
 {
     ebpo_file *file;
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert_int_eq(ebpo_open(&file, in_folder("none"), &error), EBPO_E_IO);
-    ck_assert_int_eq(ebpo_open(&file, folder, &error), EBPO_E_IO);
+    ck_assert_int_eq(ebpo_open(in_folder("none"), &file, &error), EBPO_E_IO);
+    ck_assert_int_eq(ebpo_open(folder, &file, &error), EBPO_E_IO);
     spill(in_folder("text"), (const uint8_t *)"hello", 5);
-    ck_assert_int_eq(ebpo_open(&file, in_folder("text"), &error), EBPO_E_FORMAT);
+    ck_assert_int_eq(ebpo_open(in_folder("text"), &file, &error), EBPO_E_FORMAT);
     hid_t fid = H5Fcreate(in_folder("other.h5"), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
     H5Fclose(fid);
-    ck_assert_int_eq(ebpo_open(&file, in_folder("other.h5"), &error), EBPO_E_FORMAT);
+    ck_assert_int_eq(ebpo_open(in_folder("other.h5"), &file, &error), EBPO_E_FORMAT);
     ck_assert_ptr_nonnull(strstr(error.message, "not an EBP-Octree"));
     ck_assert_ptr_null(file);
 }
@@ -632,7 +632,7 @@ START_TEST(callers_error_printing_is_given_back)
     ebpo_file *file;
     H5Eget_auto2(H5E_DEFAULT, &before, &data);
     spill(in_folder("text"), (const uint8_t *)"hello", 5);
-    ck_assert_int_eq(ebpo_open(&file, in_folder("text"), NULL), EBPO_E_FORMAT);
+    ck_assert_int_eq(ebpo_open(in_folder("text"), &file, NULL), EBPO_E_FORMAT);
     H5Eget_auto2(H5E_DEFAULT, &after, &data);
     ck_assert(before == after);
 }

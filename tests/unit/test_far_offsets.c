@@ -74,7 +74,7 @@ START_TEST(ply_elements_behind_4_gib_are_read)
     ebpo_mesh_free(&mesh);
     double *points;
     uint64_t count;
-    ck_assert_msg(ebpo_points_parse_ply(&points, &count, data, size, "far.ply", &error) == EBPO_OK,
+    ck_assert_msg(ebpo_points_parse_ply(data, size, "far.ply", &points, &count, &error) == EBPO_OK,
                   "%s", error.message);
     ck_assert_uint_eq(count, 4);
     ck_assert_double_eq(points[11], 1);
@@ -257,9 +257,9 @@ START_TEST(containers_are_read_from_beyond_8_gib)
                                .size = s.by + s.size,
                                .read = read_shifted,
                                .expect = away ? expect_shifted : NULL };
-        ck_assert_msg(ebpo_open_memory(&near, s.bytes, s.size, "near", &error) == EBPO_OK, "%s",
+        ck_assert_msg(ebpo_open_memory(s.bytes, s.size, "near", &near, &error) == EBPO_OK, "%s",
                       error.message);
-        ck_assert_msg(ebpo_open_source(&far, &source, "far", &error) == EBPO_OK, "%s",
+        ck_assert_msg(ebpo_open_source(&source, "far", &far, &error) == EBPO_OK, "%s",
                       error.message);
         ck_assert_uint_gt(far->level_array[0][EBPO_A_TYPES].chunks[0].address, 2 * FAR);
         char *here = text_of(near), *there = text_of(far);
@@ -283,9 +283,9 @@ START_TEST(container_files_on_disk_are_read_from_beyond_8_gib)
     ebpo_file *near, *far;
     int fd = open(path, O_CREAT | O_RDWR | O_TRUNC, 0600);
     if (pwrite(fd, s.bytes, s.size, (off_t)s.by) == (ssize_t)s.size) {
-        ck_assert_msg(ebpo_open_memory(&near, s.bytes, s.size, "near", &error) == EBPO_OK, "%s",
+        ck_assert_msg(ebpo_open_memory(s.bytes, s.size, "near", &near, &error) == EBPO_OK, "%s",
                       error.message);
-        ck_assert_msg(ebpo_open(&far, path, &error) == EBPO_OK, "%s", error.message);
+        ck_assert_msg(ebpo_open(path, &far, &error) == EBPO_OK, "%s", error.message);
         ck_assert_uint_eq(ebpo_file_info(far)->file_bytes, s.by + s.size);
         char *here = text_of(near), *there = text_of(far);
         ck_assert_str_eq(here, there);

@@ -215,9 +215,9 @@ START_TEST(bunny_of_glmark2_is_closed_when_it_is_there)
     ebpo_error error = EBPO_ERROR_INIT;
     if (access(path, R_OK) != 0)
         return;
-    ck_assert_msg(ebpo_mesh_read(&mesh, path, NULL, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_mesh_read(path, NULL, &mesh, &error) == EBPO_OK, "%s", error.message);
     ck_assert(mesh.vertex_count == 34835 && mesh.face_count == 69666);
-    ck_assert(ebpo_mesh_check(&report, &mesh, 1, silent, &error) == EBPO_OK);
+    ck_assert(ebpo_mesh_check(&mesh, 1, silent, &report, &error) == EBPO_OK);
     ck_assert(report.manifold && report.balanced && report.boundary_edges.count == 0);
     ebpo_mesh_free(&mesh);
 }

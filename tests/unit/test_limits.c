@@ -40,7 +40,7 @@ START_TEST(meshes_beyond_the_limit_are_refused_before_they_are_looked_at)
                            .faces = face };
         ebpo_mesh_report report;
         ebpo_error error = EBPO_ERROR_INIT;
-        ck_assert_int_eq(ebpo_mesh_check(&report, &mesh, 1, silent, &error), EBPO_E_LIMIT);
+        ck_assert_int_eq(ebpo_mesh_check(&mesh, 1, silent, &report, &error), EBPO_E_LIMIT);
         ck_assert_msg(strstr(error.message, "split") != NULL, "%s", error.message);
         ck_assert_int_eq(ebpo_mesh_arrange(&mesh, 1, silent, &error), EBPO_E_LIMIT);
         ck_assert_int_eq(ebpo_mesh_weld(&mesh, NULL, &error), EBPO_E_LIMIT);
@@ -249,7 +249,7 @@ START_TEST(sources_of_billions_take_no_memory)
     tree.info.source_vertex_count = tree.info.source_face_count = TWO32 - 2;
     tree.vertex_source[tree.info.vertex_count - 1] = UINT32_MAX - 2; /* the last of them */
     ck_assert_msg(ebpo_tree_write(&tree, path, NULL, &error) == EBPO_OK, "%s", error.message);
-    ck_assert_msg(ebpo_open(&file, path, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_open(path, &file, &error) == EBPO_OK, "%s", error.message);
     getrusage(RUSAGE_SELF, &before);
     ck_assert_msg(ebpo_file_read_source_mesh(file, &mesh, &ordered, 1, &error) == EBPO_OK, "%s",
                   error.message);

@@ -36,13 +36,13 @@ static ebpo_file *build(ebpo_mesh mesh, uint32_t parts, uint32_t leaf_faces)
     ebpo_file *file = NULL;
     options.parts = parts;
     options.leaf_faces = leaf_faces;
-    ck_assert_msg(ebpo_mesh_check(&report, &mesh, 0, options.progress, &error) == EBPO_OK, "%s",
+    ck_assert_msg(ebpo_mesh_check(&mesh, 0, options.progress, &report, &error) == EBPO_OK, "%s",
                   error.message);
-    ck_assert_msg(ebpo_build(&tree, &mesh, &report, &mend, &options, &error) == EBPO_OK, "%s",
+    ck_assert_msg(ebpo_build(&mesh, &report, &mend, &options, &tree, &error) == EBPO_OK, "%s",
                   error.message);
     ck_assert_msg(ebpo_tree_write(&tree, path, &write, &error) == EBPO_OK, "%s", error.message);
     ebpo_tree_free(&tree);
-    ck_assert_msg(ebpo_open(&file, path, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_open(path, &file, &error) == EBPO_OK, "%s", error.message);
     return file;
 }
 
@@ -117,7 +117,7 @@ START_TEST(volumes_of_a_real_model_agree_too)
     ebpo_mesh mesh;
     char name[4096];
     snprintf(name, sizeof name, "%s/armadillo.ply", models ? models : "");
-    if (!models || ebpo_mesh_read(&mesh, name, NULL, NULL) != EBPO_OK)
+    if (!models || ebpo_mesh_read(name, NULL, &mesh, NULL) != EBPO_OK)
         return;
     ebpo_file *file = build(mesh, USUAL | EBPO_PART_LEAF_PLANES, 16);
     const ebpo_info *info = ebpo_file_info(file);
@@ -141,7 +141,7 @@ START_TEST(envelopes_are_closed_and_fill_the_stated_volume)
         ebpo_mesh_report report;
         double volume = take(file, level, true, 0, &mesh);
         ck_assert_uint_gt(mesh.face_count, 0);
-        ck_assert(ebpo_mesh_check(&report, &mesh, 0, (ebpo_progress){ NULL, NULL }, NULL) ==
+        ck_assert(ebpo_mesh_check(&mesh, 0, (ebpo_progress){ NULL, NULL }, &report, NULL) ==
                   EBPO_OK);
         ck_assert_msg(report.balanced && report.unreferenced_vertices.count == 0, "%s level %d",
                       ebpo_test_solids[_i].name, level);

@@ -54,13 +54,13 @@ static ebpo_file *file_of(const ebpo_mesh *mesh, uint32_t parts)
     ebpo_file *file = NULL;
     ebpo_mesh copy = copy_of(mesh);
     options.parts = parts;
-    ck_assert_msg(ebpo_mesh_check(&report, mesh, 0, options.progress, &error) == EBPO_OK, "%s",
+    ck_assert_msg(ebpo_mesh_check(mesh, 0, options.progress, &report, &error) == EBPO_OK, "%s",
                   error.message);
-    ck_assert_msg(ebpo_build(&tree, &copy, &report, &mend, &options, &error) == EBPO_OK, "%s",
+    ck_assert_msg(ebpo_build(&copy, &report, &mend, &options, &tree, &error) == EBPO_OK, "%s",
                   error.message);
     ck_assert_msg(ebpo_tree_write(&tree, path, &write, &error) == EBPO_OK, "%s", error.message);
     ebpo_tree_free(&tree);
-    ck_assert_msg(ebpo_open(&file, path, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_open(path, &file, &error) == EBPO_OK, "%s", error.message);
     return file;
 }
 

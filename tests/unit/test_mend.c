@@ -87,8 +87,8 @@ static void expect_same_report(const ebpo_mesh *plain, const ebpo_mesh *m)
 {
     ebpo_mesh_report a, b;
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert(ebpo_mesh_check(&a, plain, 1, silent, &error) == EBPO_OK);
-    ck_assert(ebpo_mesh_check(&b, m, 2, silent, &error) == EBPO_OK);
+    ck_assert(ebpo_mesh_check(plain, 1, silent, &a, &error) == EBPO_OK);
+    ck_assert(ebpo_mesh_check(m, 2, silent, &b, &error) == EBPO_OK);
     expect_equal_reports(a, b);
 }
 
@@ -235,10 +235,10 @@ static void prepare_and_compare(ebpo_mesh plain, const ebpo_prepare_options *opt
     bool stl = strncmp(plain.source_format, "stl", 3) == 0;
     int steps = (options->weld || stl ? WELD : 0) | (options->orient ? ORIENT : 0) |
                 (options->fill_holes ? FILL : 0);
-    ck_assert_msg(ebpo_mesh_prepare(&p, &m, options, &error) == EBPO_OK, "%s", error.message);
-    ck_assert(ebpo_mesh_check(&before, &plain, 1, silent, &error) == EBPO_OK);
+    ck_assert_msg(ebpo_mesh_prepare(&m, options, &p, &error) == EBPO_OK, "%s", error.message);
+    ck_assert(ebpo_mesh_check(&plain, 1, silent, &before, &error) == EBPO_OK);
     mend(&plain, steps, &record);
-    ck_assert(ebpo_mesh_check(&after, &plain, 1, silent, &error) == EBPO_OK);
+    ck_assert(ebpo_mesh_check(&plain, 1, silent, &after, &error) == EBPO_OK);
     ck_assert(p.mended == (steps != 0) && memcmp(&p.record, &record, sizeof record) == 0);
     expect_equal_reports(p.before, before);
     expect_equal_reports(p.report, after);
@@ -279,14 +279,14 @@ START_TEST(preparing_may_be_stopped_and_checks_what_is_too_large_to_build)
     char mending[] = "mending";
     o.weld = true;
     o.progress = (ebpo_progress){ stop_at, mending };
-    ck_assert_int_eq(ebpo_mesh_prepare(&p, &m, &o, &error), EBPO_E_CANCELLED);
+    ck_assert_int_eq(ebpo_mesh_prepare(&m, &o, &p, &error), EBPO_E_CANCELLED);
     ck_assert(!p.mended && p.before.edges == 0);
     m.faces[0] = (uint32_t)m.vertex_count;
-    ck_assert_int_eq(ebpo_mesh_prepare(&p, &m, NULL, &error), EBPO_E_FORMAT);
+    ck_assert_int_eq(ebpo_mesh_prepare(&m, NULL, &p, &error), EBPO_E_FORMAT);
     m.faces[0] = 0;
     m.xyz64[3ul * m.faces[1]] = 1e302;
     ck_assert_int_eq(ebpo_mesh_arrange(&m, 1, silent, &error), EBPO_E_LIMIT);
-    ck_assert_msg(ebpo_mesh_prepare(&p, &m, NULL, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_mesh_prepare(&m, NULL, &p, &error) == EBPO_OK, "%s", error.message);
     ck_assert(p.report.max[0] == 1e302);
     ebpo_mesh_free(&m);
 }
@@ -301,8 +301,8 @@ START_TEST(what_was_mended_is_arranged_again_by_building)
     ebpo_error error = EBPO_ERROR_INIT;
     ck_assert(ebpo_arrange_to_mend(&m, 0, &silent, &error) == EBPO_OK);
     mend(&m, ALL, &record);
-    ck_assert(ebpo_mesh_check(&report, &m, 0, silent, &error) == EBPO_OK && report.balanced);
-    ck_assert_msg(ebpo_build(&tree, &m, &report, &record, NULL, &error) == EBPO_OK, "%s",
+    ck_assert(ebpo_mesh_check(&m, 0, silent, &report, &error) == EBPO_OK && report.balanced);
+    ck_assert_msg(ebpo_build(&m, &report, &record, NULL, &tree, &error) == EBPO_OK, "%s",
                   error.message);
     ebpo_tree_free(&tree);
 }

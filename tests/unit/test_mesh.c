@@ -15,7 +15,7 @@ static ebpo_mesh_report check_with(const ebpo_mesh *mesh, unsigned threads)
 {
     ebpo_mesh_report report;
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_status status = ebpo_mesh_check(&report, mesh, threads, silent, &error);
+    ebpo_status status = ebpo_mesh_check(mesh, threads, silent, &report, &error);
     ck_assert_msg(status == EBPO_OK, "%s", error.message);
     return report;
 }
@@ -223,7 +223,7 @@ static void expect_error(const ebpo_mesh *mesh, ebpo_status expected, const char
 {
     ebpo_mesh_report r;
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert_int_eq(ebpo_mesh_check(&r, mesh, 2, silent, &error), expected);
+    ck_assert_int_eq(ebpo_mesh_check(mesh, 2, silent, &r, &error), expected);
     ck_assert_msg(strstr(error.message, part) != NULL, "%s", error.message);
 }
 
@@ -510,7 +510,7 @@ static ebpo_mesh read_model(const char *name)
     ebpo_mesh mesh;
     ebpo_error error = EBPO_ERROR_INIT;
     snprintf(path, sizeof path, "%s/%s.ply", getenv("EBPO_MODELS"), name);
-    ebpo_status status = ebpo_mesh_read(&mesh, path, NULL, &error);
+    ebpo_status status = ebpo_mesh_read(path, NULL, &mesh, &error);
     ck_assert_msg(status == EBPO_OK, "%s", error.message);
     return mesh;
 }

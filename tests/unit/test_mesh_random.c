@@ -143,7 +143,7 @@ static ebpo_mesh_report check(const ebpo_mesh *mesh)
 {
     ebpo_mesh_report report;
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert_msg(ebpo_mesh_check(&report, mesh, 1, (ebpo_progress){ NULL, NULL }, &error) ==
+    ck_assert_msg(ebpo_mesh_check(mesh, 1, (ebpo_progress){ NULL, NULL }, &report, &error) ==
                       EBPO_OK,
                   "%s", error.message);
     return report;

@@ -479,7 +479,7 @@ static ebpo_status parse_points(double **xyz, uint64_t *count, const bytes *b, e
     uint8_t *copy = malloc(b->size ? b->size : 1);
     memcpy(copy, b->data, b->size);
     ebpo_status status =
-        ebpo_points_parse_ply(xyz, count, copy, b->size, "folder/points.ply", error);
+        ebpo_points_parse_ply(copy, b->size, "folder/points.ply", xyz, count, error);
     free(copy);
     return status;
 }
@@ -706,7 +706,7 @@ START_TEST(what_is_written_reads_back_with_the_same_bits)
         mesh.faces[i] = (uint32_t)(i * 7919 % n);
     ebpo_error error = EBPO_ERROR_INIT;
     ck_assert_msg(ebpo_mesh_write_ply(&mesh, name, &error) == EBPO_OK, "%s", error.message);
-    ck_assert_msg(ebpo_mesh_read(&back, name, NULL, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_mesh_read(name, NULL, &back, &error) == EBPO_OK, "%s", error.message);
     ck_assert(back.vertex_count == n && back.face_count == n && !back.xyz64 == !_i);
     ck_assert(memcmp(_i ? (void *)back.xyz64 : (void *)back.xyz32, xyz, 3 * n * width) == 0);
     ck_assert(memcmp(back.faces, mesh.faces, 3 * n * sizeof *mesh.faces) == 0);
@@ -740,7 +740,7 @@ START_TEST(read_file_records_its_digest)
     ebpo_mesh mesh;
     ebpo_sha256 state;
     uint8_t digest[32];
-    ck_assert(ebpo_mesh_read(&mesh, path, NULL, NULL) == EBPO_OK);
+    ck_assert(ebpo_mesh_read(path, NULL, &mesh, NULL) == EBPO_OK);
     ebpo_sha256_begin(&state);
     ebpo_sha256_add(&state, TRIANGLE "3 0 1 2\n", strlen(TRIANGLE "3 0 1 2\n"));
     ebpo_sha256_end(&state, digest);
@@ -754,11 +754,11 @@ START_TEST(reading_what_is_no_model_file_says_so)
 {
     ebpo_mesh mesh;
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert(ebpo_mesh_read(&mesh, "/nowhere/at.ply", NULL, &error) == EBPO_E_IO);
+    ck_assert(ebpo_mesh_read("/nowhere/at.ply", NULL, &mesh, &error) == EBPO_E_IO);
     ck_assert(strstr(error.message, "/nowhere/at.ply") != NULL);
-    ck_assert(ebpo_mesh_read(&mesh, "/tmp", NULL, &error) == EBPO_E_IO &&
+    ck_assert(ebpo_mesh_read("/tmp", NULL, &mesh, &error) == EBPO_E_IO &&
               strstr(error.message, "is a folder") != NULL);
-    ck_assert(ebpo_mesh_read(&mesh, "/dev/null", NULL, &error) == EBPO_E_IO);
+    ck_assert(ebpo_mesh_read("/dev/null", NULL, &mesh, &error) == EBPO_E_IO);
 }
 END_TEST
 
@@ -789,7 +789,7 @@ static bool read_model(ebpo_mesh *mesh, const char *name, ebpo_status expected, 
     snprintf(path, sizeof path, "%s/%s", models ? models : "", name);
     if (!models || access(path, R_OK) != 0)
         return false;
-    ck_assert_msg(ebpo_mesh_read(mesh, path, NULL, error) == expected, "%s: %s", path,
+    ck_assert_msg(ebpo_mesh_read(path, NULL, mesh, error) == expected, "%s: %s", path,
                   error->message);
     return true;
 }

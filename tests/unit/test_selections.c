@@ -312,8 +312,8 @@ static void write_file(ebpo_mesh mesh, const ebpo_build_options *options)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_mesh_report facts;
     ebpo_tree tree;
-    ck_assert(ebpo_mesh_check(&facts, &mesh, 1, (ebpo_progress){ 0 }, &error) == EBPO_OK);
-    ck_assert_msg(ebpo_build(&tree, &mesh, &facts, NULL, options, &error) == EBPO_OK, "%s",
+    ck_assert(ebpo_mesh_check(&mesh, 1, (ebpo_progress){ 0 }, &facts, &error) == EBPO_OK);
+    ck_assert_msg(ebpo_build(&mesh, &facts, NULL, options, &tree, &error) == EBPO_OK, "%s",
                   error.message);
     ck_assert_msg(ebpo_tree_write(&tree, path, NULL, &error) == EBPO_OK, "%s", error.message);
     ebpo_tree_free(&tree);
@@ -323,7 +323,7 @@ static ebpo_file *open_file(void)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file;
-    ck_assert_msg(ebpo_open(&file, path, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_open(path, &file, &error) == EBPO_OK, "%s", error.message);
     return file;
 }
 
@@ -430,12 +430,12 @@ START_TEST(selections_and_their_numbers_that_make_no_sense_are_refused)
         ebpo_mesh mesh = ebpo_test_tetrahedron(1);
         ebpo_mesh_report facts;
         ebpo_tree tree;
-        ck_assert(ebpo_mesh_check(&facts, &mesh, 1, (ebpo_progress){ 0 }, &error) == EBPO_OK);
+        ck_assert(ebpo_mesh_check(&mesh, 1, (ebpo_progress){ 0 }, &facts, &error) == EBPO_OK);
         options.select = wrong[i].select;
         options.percent = wrong[i].percent;
         options.k_root = wrong[i].k_root;
         options.normals = (ebpo_normal_distance)wrong[i].normals;
-        ck_assert_int_eq(ebpo_build(&tree, &mesh, &facts, NULL, &options, &error), EBPO_E_ARGUMENT);
+        ck_assert_int_eq(ebpo_build(&mesh, &facts, NULL, &options, &tree, &error), EBPO_E_ARGUMENT);
     }
 }
 END_TEST
@@ -446,7 +446,10 @@ static bool has_hulls(ebpo_file *file)
 {
     ebpo_limit limit = EBPO_LIMIT_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_status status = ebpo_limit_level(file, 0, 1, NULL, &limit, &error);
+    ebpo_status status =
+        ebpo_limit_level(file, 0,
+                         &(ebpo_limit_options){ sizeof(ebpo_limit_options), 1, { NULL, NULL } },
+                         &limit, &error);
     ck_assert(status == EBPO_OK || status == EBPO_E_ABSENT);
     if (status == EBPO_E_ABSENT)
         fprintf(stderr, "without qhull: the limit is not tested\n");
@@ -467,7 +470,10 @@ START_TEST(hulls_of_a_convex_solid_fill_it_at_every_level)
         for (int level = 0; level < info->level_count && has_hulls(file); level++) {
             ebpo_limit limit = EBPO_LIMIT_INIT;
             ebpo_error error = EBPO_ERROR_INIT;
-            ck_assert(ebpo_limit_level(file, level, 2, NULL, &limit, &error) == EBPO_OK);
+            ck_assert(ebpo_limit_level(file, level,
+                                       &(ebpo_limit_options){
+                                           sizeof(ebpo_limit_options), 2, { NULL, NULL } },
+                                       &limit, &error) == EBPO_OK);
             ck_assert_msg(fabs(limit.volume / info->report.volume - 1) < 1e-7,
                           "solid %zu, level %d: hulls fill %.9f", i, level,
                           limit.volume / info->report.volume);
@@ -500,7 +506,10 @@ START_TEST(no_envelope_is_smaller_than_the_limit_and_inherited_ones_come_close)
             ebpo_limit limit = EBPO_LIMIT_INIT;
             ebpo_error error = EBPO_ERROR_INIT;
             double volume;
-            ck_assert(ebpo_limit_level(file, level, 2, NULL, &limit, &error) == EBPO_OK);
+            ck_assert(ebpo_limit_level(file, level,
+                                       &(ebpo_limit_options){
+                                           sizeof(ebpo_limit_options), 2, { NULL, NULL } },
+                                       &limit, &error) == EBPO_OK);
             ck_assert(ebpo_lod_level(file, level, NULL, NULL, &volume, &error) == EBPO_OK);
             ck_assert_msg(volume >= limit.volume - 1e-9 * root,
                           "%s, level %d: %g below the limit %g", solid->name, level, volume,

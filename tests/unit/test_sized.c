@@ -26,7 +26,7 @@ static ebpo_workspace *made_with(const void *options, ebpo_status expected)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_workspace *workspace = NULL;
-    ck_assert_int_eq(ebpo_workspace_make(&workspace, options, &error), expected);
+    ck_assert_int_eq(ebpo_workspace_new(options, &workspace, &error), expected);
     if (expected != EBPO_OK)
         ck_assert_ptr_nonnull(strstr(error.message, "ebpo_workspace_options"));
     return workspace;
@@ -114,18 +114,18 @@ START_TEST(structs_that_were_not_begun)
     ebpo_source source = EBPO_SOURCE_INIT;
     ebpo_export_options one = EBPO_EXPORT_OPTIONS_INIT;
     ebpo_build_options build = EBPO_BUILD_OPTIONS_INIT;
-    REFUSED(ebpo_mesh_read_options, ebpo_mesh_read(&mesh, path, zeros(), error));
+    REFUSED(ebpo_mesh_read_options, ebpo_mesh_read(path, zeros(), &mesh, error));
     ebpo_prepared prepared = EBPO_PREPARED_INIT;
-    REFUSED(ebpo_prepare_options, ebpo_mesh_prepare(&prepared, &mesh, zeros(), error));
-    REFUSED(ebpo_prepared, ebpo_mesh_prepare(zeros(), &mesh, NULL, error));
-    REFUSED(ebpo_build_options, ebpo_build(&tree, &mesh, zeros(), NULL, zeros(), error));
+    REFUSED(ebpo_prepare_options, ebpo_mesh_prepare(&mesh, zeros(), &prepared, error));
+    REFUSED(ebpo_prepared, ebpo_mesh_prepare(&mesh, NULL, zeros(), error));
+    REFUSED(ebpo_build_options, ebpo_build(&mesh, zeros(), NULL, zeros(), &tree, error));
     build.times = zeros();
-    REFUSED(ebpo_build_times, ebpo_build(&tree, &mesh, NULL, NULL, &build, error));
+    REFUSED(ebpo_build_times, ebpo_build(&mesh, NULL, NULL, &build, &tree, error));
     REFUSED(ebpo_write_options, ebpo_tree_write(&tree, path, zeros(), error));
-    REFUSED(ebpo_source, ebpo_open_source((ebpo_file **)&made, zeros(), "zeros", error));
-    REFUSED(ebpo_http_options, ebpo_source_of_url(&source, "http://a/b", zeros(), error));
-    REFUSED(ebpo_source, ebpo_source_of_url(zeros(), "http://a/b", NULL, error));
-    REFUSED(ebpo_http_options, ebpo_open_url((ebpo_file **)&made, "http://a/b", zeros(), error));
+    REFUSED(ebpo_source, ebpo_open_source(zeros(), "zeros", (ebpo_file **)&made, error));
+    REFUSED(ebpo_http_options, ebpo_source_of_url("http://a/b", zeros(), &source, error));
+    REFUSED(ebpo_source, ebpo_source_of_url("http://a/b", NULL, zeros(), error));
+    REFUSED(ebpo_http_options, ebpo_open_url("http://a/b", zeros(), (ebpo_file **)&made, error));
     REFUSED(ebpo_verify_options,
             ebpo_verify(m.file, zeros(), &(ebpo_verify_report)EBPO_VERIFY_REPORT_INIT, error));
     REFUSED(ebpo_verify_report, ebpo_verify(m.file, NULL, zeros(), error));
@@ -133,21 +133,24 @@ START_TEST(structs_that_were_not_begun)
     REFUSED(ebpo_export_options, ebpo_export(m.file, path, EBPO_EXPORT_STL, zeros(), NULL, error));
     REFUSED(ebpo_export_report, ebpo_export(m.file, path, EBPO_EXPORT_STL, &one, zeros(), error));
     REFUSED(ebpo_subset_options, ebpo_subset(m.file, path, zeros(), error));
-    REFUSED(ebpo_limit, ebpo_limit_level(m.file, 0, 1, NULL, zeros(), error));
+    REFUSED(ebpo_limit, ebpo_limit_level(m.file, 0, NULL, zeros(), error));
+    ebpo_limit limit = EBPO_LIMIT_INIT;
+    REFUSED(ebpo_limit_options, ebpo_limit_level(m.file, 0, zeros(), &limit, error));
+    ck_assert_int_eq(ebpo_file_get_stats(m.file, zeros()), EBPO_E_ARGUMENT);
     REFUSED(ebpo_mass, ebpo_measure(m.file, 1, zeros(), error));
     REFUSED(ebpo_deviation, ebpo_deviation_level(m.model, m.file, 0, NULL, zeros(), error));
     REFUSED(ebpo_deviation_options,
             ebpo_deviation_level(m.model, m.file, 0, zeros(), &(ebpo_deviation)EBPO_DEVIATION_INIT,
                                  error));
-    REFUSED(ebpo_model_options, ebpo_model_open((ebpo_model **)&made, m.file, zeros(), error));
-    REFUSED(ebpo_query_options, ebpo_inside(m.context, p, zeros(), &inside, error));
-    REFUSED(ebpo_query_options, ebpo_distance(m.context, p, zeros(), &distance, error));
-    REFUSED(ebpo_stream_options, ebpo_stream_new((ebpo_stream **)&made, m.file, zeros(), error));
+    REFUSED(ebpo_model_options, ebpo_model_new(m.file, zeros(), (ebpo_model **)&made, error));
+    REFUSED(ebpo_inside_options, ebpo_inside(m.context, p, zeros(), &inside, error));
+    REFUSED(ebpo_distance_options, ebpo_distance(m.context, p, zeros(), &distance, error));
+    REFUSED(ebpo_stream_options, ebpo_stream_new(m.file, zeros(), (ebpo_stream **)&made, error));
     REFUSED(ebpo_view_options,
-            ebpo_view_stream_new((ebpo_view_stream **)&made, m.file, zeros(), error));
+            ebpo_view_stream_new(m.file, zeros(), (ebpo_view_stream **)&made, error));
     ebpo_view_options view = EBPO_VIEW_OPTIONS_INIT;
     view.observer = zeros();
-    REFUSED(ebpo_observer, ebpo_view_stream_new((ebpo_view_stream **)&made, m.file, &view, error));
+    REFUSED(ebpo_observer, ebpo_view_stream_new(m.file, &view, (ebpo_view_stream **)&made, error));
     ck_assert_int_eq(ebpo_model_get_stats(m.model, zeros()), EBPO_E_ARGUMENT);
     ck_assert_int_eq(ebpo_file_get_http_stats(m.file, zeros()), EBPO_E_ARGUMENT);
     ck_assert_ptr_null(made);

@@ -68,7 +68,7 @@ static void whole_open(whole *w, const char *name, uint64_t budget)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     memset(w, 0, sizeof *w);
-    ck_assert_msg(ebpo_open(&w->file, name, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_open(name, &w->file, &error) == EBPO_OK, "%s", error.message);
     ck_assert_msg(ebpo_file_read_tree(w->file, &w->tree, 1, &error) == EBPO_OK, "%s",
                   error.message);
     ck_assert_msg(ebpo_chunks_make(&w->chunks, w->file, budget, &error) == EBPO_OK, "%s",
@@ -110,9 +110,9 @@ static void build(ebpo_mesh mesh, uint32_t leaf_faces, int max_level, uint32_t p
     options.leaf_faces = leaf_faces;
     options.max_level = max_level;
     options.parts = parts;
-    ck_assert_msg(ebpo_mesh_check(&report, &mesh, 0, options.progress, &error) == EBPO_OK, "%s",
+    ck_assert_msg(ebpo_mesh_check(&mesh, 0, options.progress, &report, &error) == EBPO_OK, "%s",
                   error.message);
-    ck_assert_msg(ebpo_build(&tree, &mesh, &report, &mend, &options, &error) == EBPO_OK, "%s",
+    ck_assert_msg(ebpo_build(&mesh, &report, &mend, &options, &tree, &error) == EBPO_OK, "%s",
                   error.message);
     write_tree(&tree, ~0u);
 }
@@ -682,7 +682,7 @@ START_TEST(failed_vectors_give_errors_here_too)
         ebpo_chunks *chunks;
         uint64_t state = 1;
         snprintf(name, sizeof name, "%s/failed/%s", vectors, entry->d_name);
-        if (!strstr(entry->d_name, ".ebpo.h5") || ebpo_open(&file, name, NULL) != EBPO_OK)
+        if (!strstr(entry->d_name, ".ebpo.h5") || ebpo_open(name, &file, NULL) != EBPO_OK)
             continue;
         opened++;
         bool well = false;
@@ -787,7 +787,7 @@ START_TEST(subtrees_of_a_real_model_add_up)
     enum { CUT = 3 };
     uint64_t faces = 0, leaves = 0;
     snprintf(name, sizeof name, "%s/dragon100k.ply", models ? models : "");
-    if (!models || ebpo_mesh_read(&mesh, name, NULL, NULL) != EBPO_OK)
+    if (!models || ebpo_mesh_read(name, NULL, &mesh, NULL) != EBPO_OK)
         return;
     build(mesh, 16, -1, USUAL);
     whole_open(&w, path, 3 << 20);

@@ -9,6 +9,7 @@
 
 #include "container/reader.h"
 #include "random_tree.h"
+#include "solids.h"
 #include "tree_json.h"
 
 /* libhdf5 1.10 itself leaks when opening a damaged file fails; that is not what we look for here.
@@ -76,7 +77,7 @@ static void make_file(const random_tree_options *options, ebpo_codec codec)
     free(data);
     data = slurp(path, &size);
     ebpo_file *file;
-    ck_assert_msg(ebpo_open(&file, path, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_open(path, &file, &error) == EBPO_OK, "%s", error.message);
     free(expected);
     expected = read_text(file, 1);
     ebpo_close(file);
@@ -138,7 +139,7 @@ static void probe_close(void *user)
 static ebpo_status open_probe(ebpo_file **file, probe *p, ebpo_error *error)
 {
     ebpo_source source = { sizeof(ebpo_source), p, size, probe_read, probe_close, NULL, 0 };
-    return ebpo_open_source(file, &source, "afar", error);
+    return ebpo_open_source(&source, "afar", file, error);
 }
 
 /* The same content as libhdf5 arranges it by default: metadata here and there, chunks in B-trees.
@@ -230,8 +231,8 @@ START_TEST(memory_paths_and_sources_give_equal_trees)
         probe p = { .fail_at = UINT32_MAX };
         ebpo_file *file[3];
         make_file(_i ? &large : &small, (ebpo_codec)codec);
-        ck_assert_int_eq(ebpo_open(&file[0], path, NULL), EBPO_OK);
-        ck_assert_int_eq(ebpo_open_memory(&file[1], data, size, "bytes", NULL), EBPO_OK);
+        ck_assert_int_eq(ebpo_open(path, &file[0], NULL), EBPO_OK);
+        ck_assert_int_eq(ebpo_open_memory(data, size, "bytes", &file[1], NULL), EBPO_OK);
         ck_assert_int_eq(open_probe(&file[2], &p, NULL), EBPO_OK);
         for (int i = 0; i < 3; i++) {
             expect_tree(file[i], 2);
@@ -250,13 +251,17 @@ START_TEST(one_read_opens_a_file_and_each_byte_of_an_array_is_read_once)
     ebpo_file *file;
     ebpo_tree tree;
     make_file(&large, EBPO_CODEC_ZSTD);
-    ck_assert_int_eq(ebpo_open(&file, path, NULL), EBPO_OK);
+    ck_assert_int_eq(ebpo_open(path, &file, NULL), EBPO_OK);
     const ebpo_info *info = ebpo_file_info(file);
-    ebpo_file_traffic(file, &bytes, &reads);
-    ck_assert_uint_eq(reads, 1);
+    ebpo_file_stats stats = ebpo_test_file_stats(file);
+    bytes = stats.bytes_read;
+    ck_assert_uint_eq(stats.reads, 1);
     ck_assert_uint_eq(bytes, size < 131072 ? size : 131072);
     ck_assert_int_eq(ebpo_file_read_tree(file, &tree, 1, NULL), EBPO_OK);
-    ebpo_file_traffic(file, &later, &later_reads);
+    ebpo_file_stats after = ebpo_test_file_stats(file);
+    later = after.bytes_read;
+    later_reads = after.reads;
+    reads = stats.reads;
     ck_assert_uint_eq(later - bytes, size - info->head_bytes - info->chunk_index_bytes);
     uint64_t arrays = 0, chunks = 0;
     for (int i = 0; i < EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS; i++) {
@@ -297,7 +302,7 @@ START_TEST(the_index_is_found_whatever_the_head_says_of_its_place)
                                .close = probe_close,
                                .expect = probe_expect,
                                .at_hand = 100000 };
-        ck_assert_msg(ebpo_open_source(&file, &source, "far", &error) == EBPO_OK, "%s",
+        ck_assert_msg(ebpo_open_source(&source, "far", &file, &error) == EBPO_OK, "%s",
                       error.message);
         ebpo_info *info = &file->info;
         ck_assert(info->chunk_index_bytes > 0 && !atomic_load(&file->located) && p.reads == 1);
@@ -379,7 +384,7 @@ START_TEST(files_that_libhdf5_rearranged_give_equal_trees)
         rewrite_without_filters();
     else
         rewrite_with_trees();
-    ck_assert_msg(ebpo_open(&file, rewritten, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_open(rewritten, &file, &error) == EBPO_OK, "%s", error.message);
     expect_tree(file, 2);
     ebpo_close(file);
 }
@@ -415,7 +420,7 @@ START_TEST(chunk_tables_are_what_libhdf5_says)
         rewrite_with_trees();
     if (_i == 2)
         rewrite_without_filters();
-    ck_assert_int_eq(ebpo_open(&file, name, NULL), EBPO_OK);
+    ck_assert_int_eq(ebpo_open(name, &file, NULL), EBPO_OK);
     hid_t fid = H5Fopen(name, H5F_ACC_RDONLY, H5P_DEFAULT);
     for (int i = 0; i < EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS; i++) {
         const ebpo_array_in *a =
@@ -436,12 +441,12 @@ START_TEST(nothing_of_libhdf5_is_open_once_a_file_is)
     ebpo_file *file;
     ebpo_error error = EBPO_ERROR_INIT;
     make_file(&small, EBPO_CODEC_ZSTD);
-    ck_assert_int_eq(ebpo_open(&file, path, NULL), EBPO_OK);
+    ck_assert_int_eq(ebpo_open(path, &file, NULL), EBPO_OK);
     ck_assert_int_eq(H5Fget_obj_count(H5F_OBJ_ALL, H5F_OBJ_ALL), 0);
     ck_assert_int_eq(H5close(), 0); /* not even the library is needed any more */
     expect_tree(file, 2);
     ebpo_close(file);
-    ck_assert_msg(ebpo_open(&file, path, &error) == EBPO_OK, "%s",
+    ck_assert_msg(ebpo_open(path, &file, &error) == EBPO_OK, "%s",
                   error.message); /* and it comes back */
     ebpo_close(file);
 }
@@ -456,7 +461,7 @@ START_TEST(no_read_goes_beyond_bytes_in_memory)
         ebpo_error error = EBPO_ERROR_INIT;
         uint8_t *bytes = malloc(cut);
         memcpy(bytes, data, cut);
-        ebpo_status status = ebpo_open_memory(&file, bytes, cut, "cut.ebpo.h5", &error);
+        ebpo_status status = ebpo_open_memory(bytes, cut, "cut.ebpo.h5", &file, &error);
         if (status == EBPO_OK) {
             status = ebpo_file_read_tree(file, &tree, 1, &error);
             ebpo_close(file);
@@ -475,7 +480,7 @@ START_TEST(a_file_cut_short_while_it_is_open_fails_as_input)
     ebpo_tree tree;
     ebpo_error error = EBPO_ERROR_INIT;
     make_file(&large, EBPO_CODEC_ZSTD);
-    ck_assert_int_eq(ebpo_open(&file, path, NULL), EBPO_OK);
+    ck_assert_int_eq(ebpo_open(path, &file, NULL), EBPO_OK);
     ck_assert_int_eq(truncate(path, (off_t)size / 2), 0);
     ck_assert_int_eq(ebpo_file_read_tree(file, &tree, 2, &error), EBPO_E_IO);
     ck_assert_ptr_nonnull(strstr(error.message, path));
@@ -489,10 +494,10 @@ START_TEST(what_is_no_regular_file_fails_at_once)
     ebpo_file *file;
     ebpo_error error = EBPO_ERROR_INIT;
     ck_assert_int_eq(mkfifo(path, 0600), 0);
-    ck_assert_int_eq(ebpo_open(&file, path, &error), EBPO_E_IO);
+    ck_assert_int_eq(ebpo_open(path, &file, &error), EBPO_E_IO);
     ck_assert_ptr_nonnull(strstr(error.message, "not a regular file"));
-    ck_assert_int_eq(ebpo_open(&file, folder, &error), EBPO_E_IO);
-    ck_assert_int_eq(ebpo_open(&file, rewritten, &error), EBPO_E_IO);
+    ck_assert_int_eq(ebpo_open(folder, &file, &error), EBPO_E_IO);
+    ck_assert_int_eq(ebpo_open(rewritten, &file, &error), EBPO_E_IO);
     ck_assert_ptr_null(file);
 }
 END_TEST
@@ -502,11 +507,11 @@ START_TEST(missing_arguments_are_refused_and_the_source_closed)
     probe p = { .fail_at = 0 };
     ebpo_source source = { sizeof(ebpo_source), &p, 5, NULL, probe_close, NULL, 0 };
     ebpo_file *file;
-    ck_assert_int_eq(ebpo_open_source(&file, &source, "x", NULL), EBPO_E_ARGUMENT);
+    ck_assert_int_eq(ebpo_open_source(&source, "x", &file, NULL), EBPO_E_ARGUMENT);
     ck_assert_uint_eq(p.closes, 1);
-    ck_assert_int_eq(ebpo_open_memory(&file, NULL, 5, NULL, NULL), EBPO_E_ARGUMENT);
-    ck_assert_int_eq(ebpo_open_memory(&file, NULL, 0, NULL, NULL), EBPO_E_FORMAT);
-    ck_assert_int_eq(ebpo_open_memory(&file, "text", 4, NULL, NULL), EBPO_E_FORMAT);
+    ck_assert_int_eq(ebpo_open_memory(NULL, 5, NULL, &file, NULL), EBPO_E_ARGUMENT);
+    ck_assert_int_eq(ebpo_open_memory(NULL, 0, NULL, &file, NULL), EBPO_E_FORMAT);
+    ck_assert_int_eq(ebpo_open_memory("text", 4, NULL, &file, NULL), EBPO_E_FORMAT);
     ck_assert_ptr_null(file);
 }
 END_TEST
@@ -519,7 +524,7 @@ START_TEST(threads_read_one_file_at_once)
     pthread_t thread[4];
     void *text;
     make_file(&large, EBPO_CODEC_ZSTD);
-    ck_assert_int_eq(ebpo_open(&file, path, NULL), EBPO_OK);
+    ck_assert_int_eq(ebpo_open(path, &file, NULL), EBPO_OK);
     for (int i = 0; i < 4; i++)
         ck_assert_int_eq(pthread_create(&thread[i], NULL, read_in_thread, file), 0);
     for (int i = 0; i < 4; i++) {
@@ -535,7 +540,7 @@ static void *open_in_thread(void *user)
 {
     for (int i = 0; i < 20; i++) {
         ebpo_file *file;
-        if (ebpo_open(&file, user, NULL) != EBPO_OK)
+        if (ebpo_open(user, &file, NULL) != EBPO_OK)
             return user;
         ebpo_close(file);
     }

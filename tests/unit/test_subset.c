@@ -47,15 +47,15 @@ static void part_open(part *p, ebpo_file *from, const char *path,
     memset(p, 0, sizeof *p);
     snprintf(p->path, sizeof p->path, "%s", path);
     fine(ebpo_subset(from, path, options, &error), &error);
-    fine(ebpo_open(&p->file, path, &error), &error);
+    fine(ebpo_open(path, &p->file, &error), &error);
     p->info = ebpo_file_info(p->file);
     for (int way = 0; way < WAYS; way++) {
         ebpo_model_options o = EBPO_MODEL_OPTIONS_INIT;
         o.threads = 1;
         o.cut_level = way == 0 ? -1 : way;
         o.loading = way == 2 ? EBPO_LOAD_NODES : EBPO_LOAD_CACHE;
-        fine(ebpo_model_open(&p->model[way], p->file, &o, &error), &error);
-        fine(ebpo_context_new(&p->context[way], p->model[way], &error), &error);
+        fine(ebpo_model_new(p->file, &o, &p->model[way], &error), &error);
+        fine(ebpo_context_new(p->model[way], &p->context[way], &error), &error);
     }
 }
 
@@ -63,7 +63,7 @@ static void part_close(part *p)
 {
     for (int way = 0; way < WAYS; way++) {
         ebpo_context_free(p->context[way]);
-        ebpo_model_close(p->model[way]);
+        ebpo_model_free(p->model[way]);
     }
     ebpo_close(p->file);
     unlink(p->path);
@@ -135,15 +135,16 @@ static void ask_limited(query_model *m, part *p, int way, const double point[3],
                         const ebpo_subset_options *cut, const query_truth *truth)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_query_options o = EBPO_QUERY_OPTIONS_INIT;
+    ebpo_distance_options o = EBPO_DISTANCE_OPTIONS_INIT;
     bool equal = !cut->boxed && cut->parts & EBPO_PART_PLANES && p->info->parts & EBPO_PART_MESH;
     for (o.level = 0; o.level < m->info.level_count + 1; o.level++) {
+        ebpo_inside_options inside_options = query_inside_like(&o);
         ebpo_inside_result some, whole;
         ebpo_distance_result near, far;
         bool same = equal && (cut->last_level < 0 || o.level <= cut->last_level);
         if (m->info.solid) {
-            fine(ebpo_inside(p->context[way], point, &o, &some, &error), &error);
-            fine(ebpo_inside(m->context, point, &o, &whole, &error), &error);
+            fine(ebpo_inside(p->context[way], point, &inside_options, &some, &error), &error);
+            fine(ebpo_inside(m->context, point, &inside_options, &whole, &error), &error);
             ck_assert_msg(some.where == EBPO_MAYBE || some.where == truth->where,
                           "level %d: %d, and it is %d", o.level, some.where, truth->where);
             ck_assert(some.where != EBPO_MAYBE || truth->distance <= some.doubt);
@@ -232,7 +233,7 @@ static void stream_levels(part *p)
     ebpo_stream_options o = { sizeof(ebpo_stream_options), true, true, 1 };
     ebpo_stream_level level;
     bool more = true;
-    fine(ebpo_stream_new(&stream, p->file, &o, &error), &error);
+    fine(ebpo_stream_new(p->file, &o, &stream, &error), &error);
     for (fine(ebpo_stream_next_level(stream, &level, &more, &error), &error); more;
          fine(ebpo_stream_next_level(stream, &level, &more, &error), &error)) {
         ebpo_stream_node node;
@@ -356,7 +357,7 @@ START_TEST(everything_kept_is_the_same_content)
             o.max[k] = 100;
         }
         fine(ebpo_subset(m.file, path, &o, &error), &error);
-        fine(ebpo_open(&file, path, &error), &error);
+        fine(ebpo_open(path, &file, &error), &error);
         ck_assert(memcmp(ebpo_file_info(file)->content_sha256,
                          ebpo_file_info(m.file)->content_sha256, 32) == 0);
         ck_assert(!ebpo_file_info(file)->pruned);
@@ -377,8 +378,8 @@ static void same_parts(const char *a, const char *b)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file[2];
     ebpo_tree tree[2];
-    fine(ebpo_open(&file[0], a, &error), &error);
-    fine(ebpo_open(&file[1], b, &error), &error);
+    fine(ebpo_open(a, &file[0], &error), &error);
+    fine(ebpo_open(b, &file[1], &error), &error);
     for (int i = 0; i < 2; i++)
         fine(ebpo_file_read_tree(file[i], &tree[i], 1, &error), &error);
     ck_assert_int_eq(tree[0].info.level_count, tree[1].info.level_count);
@@ -427,7 +428,7 @@ START_TEST(a_subset_of_a_subset_is_the_subset)
         inner.last_level = i % 3 == 0 ? 3 : -1;
         fine(ebpo_subset(m.file, direct, &inner, &error), &error);
         fine(ebpo_subset(m.file, first, &outer, &error), &error);
-        fine(ebpo_open(&file, first, &error), &error);
+        fine(ebpo_open(first, &file, &error), &error);
         fine(ebpo_subset(file, second, &inner, &error), &error);
         ebpo_close(file);
         same_parts(direct, second);
@@ -533,7 +534,7 @@ START_TEST(damaged_subsets_do_no_harm)
         ebpo_tree tree;
         memcpy(damaged, bytes, size);
         damaged[ebpo_test_random(&state) % size] ^= (uint8_t)(1u << ebpo_test_random(&state) % 8);
-        if (ebpo_open_memory(&file, damaged, size, "damaged", &error) != EBPO_OK)
+        if (ebpo_open_memory(damaged, size, "damaged", &file, &error) != EBPO_OK)
             continue;
         opened++;
         if (ebpo_file_read_tree(file, &tree, 1, &error) == EBPO_OK)
@@ -587,7 +588,7 @@ static void use_all(ebpo_file *file, const ebpo_subset_options *o)
     (void)!ebpo_verify(file, &verify, &report, NULL);
     if (ebpo_subset_tree(&tree, file, o, NULL) == EBPO_OK)
         ebpo_tree_free(&tree);
-    if (ebpo_stream_new(&stream, file, NULL, NULL) == EBPO_OK)
+    if (ebpo_stream_new(file, NULL, &stream, NULL) == EBPO_OK)
         while (ebpo_stream_next_level(stream, &level, &more, NULL) == EBPO_OK && more)
             while (ebpo_stream_next_node(stream, &node, &more, NULL) == EBPO_OK && more)
                 continue;
@@ -604,9 +605,9 @@ static void use_all(ebpo_file *file, const ebpo_subset_options *o)
         options.cut_level = cut;
         options.threads = 1;
         options.loading = cut == 3 ? EBPO_LOAD_NODES : EBPO_LOAD_CACHE;
-        if (ebpo_model_open(&model, file, &options, NULL) != EBPO_OK)
+        if (ebpo_model_new(file, &options, &model, NULL) != EBPO_OK)
             continue;
-        ck_assert_int_eq(ebpo_context_new(&context, model, NULL), EBPO_OK);
+        ck_assert_int_eq(ebpo_context_new(model, &context, NULL), EBPO_OK);
         for (int i = 0; i < 12; i++) {
             double p[3] = { 0.1 * i, 0.4, 0.9 - 0.1 * i }, far[3] = { 9, 9, 9 };
             ebpo_inside_result where;
@@ -614,22 +615,23 @@ static void use_all(ebpo_file *file, const ebpo_subset_options *o)
             const ebpo_ray_hit *hits;
             const uint64_t *faces;
             uint64_t count;
-            ebpo_query_options limited = EBPO_QUERY_OPTIONS_INIT;
+            ebpo_distance_options limited = EBPO_DISTANCE_OPTIONS_INIT;
             limited.level = i % 6;
+            ebpo_inside_options inside_options = query_inside_like(&limited);
             (void)!ebpo_inside(context, p, NULL, &where, NULL);
-            (void)!ebpo_inside(context, p, &limited, &where, NULL);
+            (void)!ebpo_inside(context, p, &inside_options, &where, NULL);
             (void)!ebpo_distance(context, p, NULL, &distance, NULL);
             (void)!ebpo_distance(context, p, &limited, &distance, NULL);
             limited.mode = EBPO_DISTANCE_ENVELOPE;
             (void)!ebpo_distance(context, p, &limited, &distance, NULL);
-            limited = (ebpo_query_options)EBPO_QUERY_OPTIONS_INIT;
+            limited = (ebpo_distance_options)EBPO_DISTANCE_OPTIONS_INIT;
             limited.mode = EBPO_DISTANCE_RECURSIVE;
             (void)!ebpo_distance(context, p, &limited, &distance, NULL);
             (void)!ebpo_ray_all(context, p, far, 10, &hits, &count, NULL);
             (void)!ebpo_faces_in_box(context, p, far, &faces, &count, NULL);
         }
         ebpo_context_free(context);
-        ebpo_model_close(model);
+        ebpo_model_free(model);
     }
 }
 
@@ -655,14 +657,14 @@ START_TEST(subsets_that_lie_do_no_harm)
         size_t size = fread(bytes, 1, sizeof bytes, f);
         fclose(f);
         unlink(path);
-        fine(ebpo_open_memory(&file, bytes, size, "honest", &error), &error);
+        fine(ebpo_open_memory(bytes, size, "honest", &file, &error), &error);
         use_all(file, &o);
         for (uint64_t i = 0; i < query_scaled(150); i++) {
             ebpo_file *liar;
             memcpy(lying, bytes, size);
             for (uint64_t k = 0; k <= i % 3; k++)
                 lie(file, lying, &state);
-            fine(ebpo_open_memory(&liar, lying, size, "liar", &error), &error);
+            fine(ebpo_open_memory(lying, size, "liar", &liar, &error), &error);
             use_all(liar, &o);
             ebpo_close(liar);
         }

@@ -18,14 +18,14 @@ static void build_mesh(ebpo_mesh *mesh, uint32_t leaf_faces, ebpo_rule rule, ebp
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_mesh_report report;
-    ck_assert_msg(ebpo_mesh_check(&report, mesh, 1, (ebpo_progress){ 0 }, &error) == EBPO_OK, "%s",
+    ck_assert_msg(ebpo_mesh_check(mesh, 1, (ebpo_progress){ 0 }, &report, &error) == EBPO_OK, "%s",
                   error.message);
     ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
     options.leaf_faces = leaf_faces;
     options.rule = rule;
     options.threads = 1;
     options.parts |= EBPO_PART_LEAF_PLANES;
-    ck_assert_msg(ebpo_build(&tree, mesh, &report, &mend, &options, &error) == EBPO_OK, "%s",
+    ck_assert_msg(ebpo_build(mesh, &report, &mend, &options, &tree, &error) == EBPO_OK, "%s",
                   error.message);
 }
 
@@ -492,7 +492,7 @@ START_TEST(real_models_keep_their_promises)
         char path[4096];
         snprintf(path, sizeof path, "%s/%s.ply", folder, names[i]);
         ebpo_mesh mesh;
-        if (ebpo_mesh_read(&mesh, path, NULL, NULL) != EBPO_OK)
+        if (ebpo_mesh_read(path, NULL, &mesh, NULL) != EBPO_OK)
             continue; /* the folder may hold only some of them */
         build_mesh(&mesh, 16, EBPO_RULE_NONZERO, (ebpo_mend_record){ 0 });
         expect_fine(names[i]);

@@ -51,13 +51,13 @@ static void write_file(ebpo_mesh mesh, bool mended, uint32_t parts)
         ck_assert(ebpo_mesh_fill_holes(&mesh, &mend, &error) == EBPO_OK);
     }
     ebpo_mesh_report facts;
-    ck_assert(ebpo_mesh_check(&facts, &mesh, 1, (ebpo_progress){ 0 }, &error) == EBPO_OK);
+    ck_assert(ebpo_mesh_check(&mesh, 1, (ebpo_progress){ 0 }, &facts, &error) == EBPO_OK);
     ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
     options.leaf_faces = 8;
     options.threads = 1;
     options.parts |= EBPO_PART_LEAF_PLANES;
     ebpo_tree tree;
-    ck_assert_msg(ebpo_build(&tree, &mesh, &facts, &mend, &options, &error) == EBPO_OK, "%s",
+    ck_assert_msg(ebpo_build(&mesh, &facts, &mend, &options, &tree, &error) == EBPO_OK, "%s",
                   error.message);
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
     write.parts = parts;
@@ -70,7 +70,7 @@ static bool verify_against(const ebpo_mesh *source)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file;
-    if (ebpo_open(&file, path, &error) != EBPO_OK)
+    if (ebpo_open(path, &file, &error) != EBPO_OK)
         return false;
     ebpo_verify_options options = EBPO_VERIFY_OPTIONS_INIT;
     options.source = source;
@@ -163,7 +163,7 @@ START_TEST(damaged_files_are_findings_and_not_failures)
 {
     write_file(ebpo_test_make("sphere"), false, ~0u);
     ebpo_file *file;
-    ck_assert(ebpo_open(&file, path, NULL) == EBPO_OK);
+    ck_assert(ebpo_open(path, &file, NULL) == EBPO_OK);
     uint64_t head = ebpo_file_info(file)->head_bytes;
     ebpo_close(file);
     FILE *f = fopen(path, "r+b");
@@ -201,7 +201,7 @@ START_TEST(verifying_needs_a_file_and_may_be_stopped)
     ck_assert(ebpo_verify(NULL, NULL, &report, &error) == EBPO_E_ARGUMENT);
     write_file(ebpo_test_make("torus"), false, ~0u);
     ebpo_file *file;
-    ck_assert(ebpo_open(&file, path, &error) == EBPO_OK);
+    ck_assert(ebpo_open(path, &file, &error) == EBPO_OK);
     ebpo_verify_options options = EBPO_VERIFY_OPTIONS_INIT;
     options.progress.report = stop_at_once;
     ebpo_status status = ebpo_verify(file, &options, &report, &error);

@@ -60,9 +60,9 @@ static void write_solid(ebpo_mesh mesh, uint32_t parts, uint32_t leaf_faces)
     ebpo_tree tree;
     options.parts = parts;
     options.leaf_faces = leaf_faces;
-    ck_assert_msg(ebpo_mesh_check(&report, &mesh, 0, options.progress, &error) == EBPO_OK, "%s",
+    ck_assert_msg(ebpo_mesh_check(&mesh, 0, options.progress, &report, &error) == EBPO_OK, "%s",
                   error.message);
-    ck_assert_msg(ebpo_build(&tree, &mesh, &report, &mend, &options, &error) == EBPO_OK, "%s",
+    ck_assert_msg(ebpo_build(&mesh, &report, &mend, &options, &tree, &error) == EBPO_OK, "%s",
                   error.message);
     write_tree(&tree);
 }
@@ -79,7 +79,7 @@ static ebpo_file *open_file(void)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
-    ck_assert_msg(ebpo_open(&file, path, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_open(path, &file, &error) == EBPO_OK, "%s", error.message);
     return file;
 }
 
@@ -143,7 +143,7 @@ static ebpo_file *open_counted(counted *c, bool far)
         source.expect = expect_counted;
         source.at_hand = c->size < 4096 ? c->size : 4096;
     }
-    ck_assert_msg(ebpo_open_source(&file, &source, "counted", &error) == EBPO_OK, "%s",
+    ck_assert_msg(ebpo_open_source(&source, "counted", &file, &error) == EBPO_OK, "%s",
                   error.message);
     return file;
 }
@@ -206,7 +206,7 @@ static records read_records(ebpo_file *file, bool polygons)
     ebpo_stream_node node;
     records all = { NULL, 0 };
     bool more = true;
-    ck_assert(ebpo_stream_new(&stream, file, &options, NULL) == EBPO_OK);
+    ck_assert(ebpo_stream_new(file, &options, &stream, NULL) == EBPO_OK);
     while (ebpo_stream_next_level(stream, &level, &more, NULL) == EBPO_OK && more) {
         all.at = realloc(all.at, (all.count + level.node_count) * sizeof *all.at);
         while (ebpo_stream_next_node(stream, &node, &more, NULL) == EBPO_OK && more)
@@ -347,7 +347,7 @@ static ebpo_view_stream *new_view(ebpo_file *file, const ebpo_view_options *opti
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_view_stream *stream = NULL;
-    ck_assert_msg(ebpo_view_stream_new(&stream, file, options, &error) == EBPO_OK, "%s",
+    ck_assert_msg(ebpo_view_stream_new(file, options, &stream, &error) == EBPO_OK, "%s",
                   error.message);
     return stream;
 }
@@ -788,7 +788,7 @@ static uint64_t *sequence(ebpo_view_stream *stream, uint64_t *count, ebpo_view_e
 
 START_TEST(budgets_of_bytes_are_kept_and_only_cut_the_sequence_short)
 {
-    uint64_t random = 40 + (uint64_t)_i, all_count, count = 0, reads, bytes;
+    uint64_t random = 40 + (uint64_t)_i, all_count, count = 0, bytes;
     write_random(7, 13, true, true);
     counted c;
     ebpo_file *file = open_counted(&c, false);
@@ -799,12 +799,12 @@ START_TEST(budgets_of_bytes_are_kept_and_only_cut_the_sequence_short)
     uint64_t *all = sequence(stream, &all_count, &end);
     ck_assert_int_eq(end, EBPO_VIEW_DONE);
     ebpo_view_stream_free(stream);
-    ebpo_file_traffic(file, &bytes, &reads);
+    bytes = ebpo_test_file_stats(file).bytes_read;
     uint64_t needed = bytes, stops = 0;
     close_counted(&c, file);
     for (int far = 0; far < 2; far++) {
         file = open_counted(&c, far);
-        ebpo_file_traffic(file, &bytes, &reads);
+        bytes = ebpo_test_file_stats(file).bytes_read;
         options.bytes = bytes / 2;
         uint64_t opening = bytes; /* which does not know of the budget */
         stream = new_view(file, &options);
@@ -814,7 +814,7 @@ START_TEST(budgets_of_bytes_are_kept_and_only_cut_the_sequence_short)
             ck_assert(some_count == 0 || memcmp(all + count, some, some_count * sizeof *some) == 0);
             count += some_count;
             free(some);
-            ebpo_file_traffic(file, &bytes, &reads);
+            bytes = ebpo_test_file_stats(file).bytes_read;
             uint64_t allowed = options.bytes < opening ? opening : options.bytes;
             ck_assert_msg(bytes <= allowed && c.asked <= allowed,
                           "%llu read, %llu asked for, %llu allowed", (unsigned long long)bytes,
@@ -837,7 +837,7 @@ END_TEST
 
 START_TEST(budgets_of_nodes_memory_and_planes_left_away_do_not_change_the_sequence)
 {
-    uint64_t random = 60, all_count, count, bytes[3] = { 0 }, reads;
+    uint64_t random = 60, all_count, count, bytes[3] = { 0 };
     write_random(8, 13, false, true);
     ebpo_view_end end;
     ebpo_file *file = open_file();
@@ -845,7 +845,7 @@ START_TEST(budgets_of_nodes_memory_and_planes_left_away_do_not_change_the_sequen
     ebpo_view_options options = options_of(EBPO_PRIORITY_PIXELS, &observer);
     ebpo_view_stream *stream = new_view(file, &options);
     uint64_t *all = sequence(stream, &all_count, &end);
-    ebpo_file_traffic(file, &bytes[0], &reads);
+    bytes[0] = ebpo_test_file_stats(file).bytes_read;
     ebpo_view_stream_free(stream);
     ebpo_close(file);
     for (int variant = 1; variant < 3; variant++) {
@@ -865,7 +865,7 @@ START_TEST(budgets_of_nodes_memory_and_planes_left_away_do_not_change_the_sequen
         ck_assert(end == EBPO_VIEW_DONE && count + rest == all_count &&
                   memcmp(all + count, some, rest * sizeof *some) == 0);
         free(some);
-        ebpo_file_traffic(file, &bytes[variant], &reads);
+        bytes[variant] = ebpo_test_file_stats(file).bytes_read;
         ebpo_view_stream_free(stream);
         ebpo_close(file);
     }
@@ -931,7 +931,7 @@ START_TEST(options_that_make_no_sense_are_refused)
     bad[8].up[2] = NAN;
     for (int i = 0; i < 9; i++) {
         usual.observer = &bad[i];
-        ck_assert_msg(ebpo_view_stream_new(&stream, file, &usual, NULL) == EBPO_E_ARGUMENT &&
+        ck_assert_msg(ebpo_view_stream_new(file, &usual, &stream, NULL) == EBPO_E_ARGUMENT &&
                           !stream,
                       "observer %d", i);
     }
@@ -945,10 +945,10 @@ START_TEST(options_that_make_no_sense_are_refused)
     o[7].observer = NULL, o[7].distance = 1;
     o[8].memory = 65536;
     for (int i = 0; i < 9; i++)
-        ck_assert_msg(ebpo_view_stream_new(&stream, file, &o[i], NULL) == EBPO_E_ARGUMENT &&
+        ck_assert_msg(ebpo_view_stream_new(file, &o[i], &stream, NULL) == EBPO_E_ARGUMENT &&
                           !stream,
                       "options %d", i);
-    ck_assert(ebpo_view_stream_new(&stream, file, NULL, NULL) == EBPO_OK);
+    ck_assert(ebpo_view_stream_new(file, NULL, &stream, NULL) == EBPO_OK);
     ebpo_view_node node, again;
     ck_assert_int_eq(next(stream, &node), EBPO_VIEW_NODE);
     for (int i = 0; i < 9; i++)

@@ -133,14 +133,14 @@ START_TEST(bad_wishes_are_refused)
     ebpo_workspace *w;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_workspace_options o = { sizeof(ebpo_workspace_options), 1000000, NULL };
-    ck_assert_int_eq(ebpo_workspace_make(&w, &o, &error), EBPO_E_ARGUMENT);
+    ck_assert_int_eq(ebpo_workspace_new(&o, &w, &error), EBPO_E_ARGUMENT);
     ck_assert(w == NULL && strstr(error.message, "128 MiB") != NULL);
     o = (ebpo_workspace_options){ sizeof(ebpo_workspace_options), 0, "/no/such/folder" };
-    ck_assert_int_eq(ebpo_workspace_make(&w, &o, &error), EBPO_E_IO);
+    ck_assert_int_eq(ebpo_workspace_new(&o, &w, &error), EBPO_E_IO);
     ck_assert(strstr(error.message, "/no/such/folder") != NULL);
     o = (ebpo_workspace_options){ sizeof(ebpo_workspace_options), 0, "/proc" };
-    ck_assert_int_eq(ebpo_workspace_make(&w, &o, &error), EBPO_E_IO);
-    ck_assert_int_eq(ebpo_workspace_make(&w, NULL, &error), EBPO_OK);
+    ck_assert_int_eq(ebpo_workspace_new(&o, &w, &error), EBPO_E_IO);
+    ck_assert_int_eq(ebpo_workspace_new(NULL, &w, &error), EBPO_OK);
     ebpo_workspace_free(w);
 }
 END_TEST

@@ -64,8 +64,8 @@ static void build(ebpo_tree *tree, uint64_t faces, bool doubles, int max_level, 
     options.parts |= more_parts;
     options.threads = 1;
     options.unit = "m";
-    if (ebpo_mesh_check(&report, &mesh, 1, silent, &error) != EBPO_OK ||
-        ebpo_build(tree, &mesh, &report, &mend, &options, &error) != EBPO_OK)
+    if (ebpo_mesh_check(&mesh, 1, silent, &report, &error) != EBPO_OK ||
+        ebpo_build(&mesh, &report, &mend, &options, tree, &error) != EBPO_OK)
         die("build", error.message);
 }
 
@@ -99,7 +99,7 @@ static void subset(ebpo_tree *tree, const ebpo_subset_options *options)
     ebpo_file *whole;
     ebpo_error error = EBPO_ERROR_INIT;
     snprintf(path, sizeof path, "%s/passed/06_four_levels_leaf_planes.ebpo.h5", folder);
-    if (ebpo_open(&whole, path, &error) != EBPO_OK ||
+    if (ebpo_open(path, &whole, &error) != EBPO_OK ||
         ebpo_subset_tree(tree, whole, options, &error) != EBPO_OK)
         die(path, error.message);
     ebpo_close(whole);

@@ -68,9 +68,9 @@ static inline ebpo_status ask_into(const bench_job *job, ebpo_context *context, 
     const double *row = job->rows + i * (uint64_t)job->width;
     switch (job->query) {
     case BENCH_INSIDE:
-        return ebpo_inside(context, row, &job->options, (ebpo_inside_result *)answers + i, error);
+        return ebpo_inside(context, row, &job->inside, (ebpo_inside_result *)answers + i, error);
     case BENCH_DISTANCE:
-        return ebpo_distance(context, row, &job->options, (ebpo_distance_result *)answers + i,
+        return ebpo_distance(context, row, &job->distance, (ebpo_distance_result *)answers + i,
                              error);
     default: return ask_ray(row, context, (ebpo_ray_hit *)answers + i, error);
     }
@@ -130,9 +130,9 @@ ebpo_status bench_batch(const bench_job *job, ebpo_context *context, void *answe
     ebpo_status status = EBPO_OK;
     uint64_t start = bench_clock();
     if (job->query == BENCH_INSIDE)
-        status = ebpo_inside_many(context, job->rows, job->count, &job->options, answers, error);
+        status = ebpo_inside_many(context, job->rows, job->count, &job->inside, answers, error);
     else if (job->query == BENCH_DISTANCE)
-        status = ebpo_distance_many(context, job->rows, job->count, &job->options, answers, error);
+        status = ebpo_distance_many(context, job->rows, job->count, &job->distance, answers, error);
     else
         for (uint64_t i = 0; i < job->count && status == EBPO_OK; i++)
             status = ask_into(job, context, i, answers, error);

@@ -16,7 +16,8 @@ typedef union bench_answer {
 /* What is asked, with room for the answers. */
 typedef struct bench_job {
     bench_query query;
-    ebpo_query_options options;
+    ebpo_inside_options inside;
+    ebpo_distance_options distance;
     const double *rows;
     int width; /* doubles a row */
     uint64_t count;

@@ -16,10 +16,10 @@ bool memory_good(const char *command, const memory_values *v)
         command_usage(command, "--memory: '%s' is not a size such as 2G", v->memory);
         return false;
     }
-    if (bytes < EBPO_WORKSPACE_LEAST)
+    if (bytes < EBPO_WORKSPACE_MIN)
         fprintf(stderr, "ebpo %s: --memory %s is too little for any mesh; allow %dM at least\n",
-                command, v->memory, EBPO_WORKSPACE_LEAST >> 20);
-    return bytes >= EBPO_WORKSPACE_LEAST;
+                command, v->memory, EBPO_WORKSPACE_MIN >> 20);
+    return bytes >= EBPO_WORKSPACE_MIN;
 }
 
 /* Memory that is free again goes back to the system instead of waiting in each thread's heap: it
@@ -39,5 +39,5 @@ ebpo_status memory_make(ebpo_workspace **out, const memory_values *v, ebpo_error
     o.temp_dir = v->temp_dir;
     if (v->memory)
         (void)words_read_size(v->memory, &o.memory); /* memory_good saw to it */
-    return ebpo_workspace_make(out, &o, error);
+    return ebpo_workspace_new(&o, out, error);
 }

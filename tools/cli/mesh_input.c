@@ -16,12 +16,12 @@ ebpo_status mesh_input_read(mesh_input *out, const char *path, mending asked,
     wanted.fill_holes = asked.fill_holes;
     memset(out, 0, sizeof *out);
     out->prepared = (ebpo_prepared)EBPO_PREPARED_INIT;
-    ebpo_status status = ebpo_mesh_read(&out->mesh, path, &how, error);
+    ebpo_status status = ebpo_mesh_read(path, &how, &out->mesh, error);
     if (status != EBPO_OK)
         return status;
     out->as_read = out->mesh;
     out->as_read.faces = NULL;
-    status = ebpo_mesh_prepare(&out->prepared, &out->mesh, &wanted, error);
+    status = ebpo_mesh_prepare(&out->mesh, &wanted, &out->prepared, error);
     if (status != EBPO_OK)
         ebpo_mesh_free(&out->mesh);
     return status;

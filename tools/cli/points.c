@@ -253,7 +253,7 @@ static void read_ply(points *p)
     }
     if (!read_all(p))
         return;
-    if (ebpo_points_parse_ply(&p->ply, &p->ply_count, p->buffer, p->end, p->name, &error) !=
+    if (ebpo_points_parse_ply(p->buffer, p->end, p->name, &p->ply, &p->ply_count, &error) !=
         EBPO_OK) {
         fprintf(stderr, "ebpo %s: %s\n", p->command, error.message);
         p->failed = true;

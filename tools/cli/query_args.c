@@ -89,24 +89,28 @@ static bool read_time(const char *name, const char *text, uint64_t *out)
 }
 
 bool query_options_from(const char *name, const query_values *v, ebpo_model_options *model,
-                        ebpo_query_options *query)
+                        ebpo_inside_options *inside, ebpo_distance_options *distance)
 {
     *model = (ebpo_model_options)EBPO_MODEL_OPTIONS_INIT;
-    *query = (ebpo_query_options)EBPO_QUERY_OPTIONS_INIT;
+    *inside = (ebpo_inside_options)EBPO_INSIDE_OPTIONS_INIT;
+    *distance = (ebpo_distance_options)EBPO_DISTANCE_OPTIONS_INIT;
     /* What is below the level is not looked at, so it need not be in memory. */
     model->cut_level =
         v->cut_level < 0 && !v->memory && v->level >= 0 ? (int)v->level : (int)v->cut_level;
     model->loading = inside_meanings[v->inside_mode].loading;
     model->prefetch = v->prefetch;
     model->threads = (unsigned)v->threads;
-    query->level = (int)v->level;
-    query->envelopes = inside_meanings[v->inside_mode].envelopes;
-    query->mode = (ebpo_distance_mode)v->distance_mode;
-    query->unsigned_distance = v->unsigned_distance;
-    query->warm = !v->no_warm;
-    query->max_distance = v->max_distance;
-    return (!v->memory || read_size(name, v->memory, &model->memory)) &&
-           (!v->deadline || read_time(name, v->deadline, &query->deadline_ns));
+    inside->level = distance->level = (int)v->level;
+    inside->envelopes = inside_meanings[v->inside_mode].envelopes;
+    distance->mode = (ebpo_distance_mode)v->distance_mode;
+    distance->unsigned_distance = v->unsigned_distance;
+    distance->warm = !v->no_warm;
+    distance->max_distance = v->max_distance;
+    if ((v->memory && !read_size(name, v->memory, &model->memory)) ||
+        (v->deadline && !read_time(name, v->deadline, &inside->deadline_ns)))
+        return false;
+    distance->deadline_ns = inside->deadline_ns;
+    return true;
 }
 
 /* --- sessions --- */
@@ -122,16 +126,16 @@ int query_open(query_session *s, const char *name, const char *path,
     const ebpo_info *info = ebpo_file_info(s->file);
     if (!command_has_level(name, info, level) || !command_has_level(name, info, options->cut_level))
         return EXIT_USAGE;
-    ebpo_status status = ebpo_model_open(&s->model, s->file, options, &error);
+    ebpo_status status = ebpo_model_new(s->file, options, &s->model, &error);
     if (status == EBPO_OK)
-        status = ebpo_context_new(&s->context, s->model, &error);
+        status = ebpo_context_new(s->model, &s->context, &error);
     return status == EBPO_OK ? EXIT_FINE : command_failed(name, &error);
 }
 
 void query_close(query_session *s)
 {
     ebpo_context_free(s->context);
-    ebpo_model_close(s->model);
+    ebpo_model_free(s->model);
     ebpo_close(s->file);
     *s = (query_session)QUERY_SESSION_INIT;
 }

@@ -76,7 +76,7 @@ bool query_distance_fits(const char *name, const query_values *v);
 /* Both forms; `name` is the command's, for messages. False: the values do not fit, which has been
  * said on stderr (exit with EXIT_USAGE). */
 bool query_options_from(const char *name, const query_values *v, ebpo_model_options *model,
-                        ebpo_query_options *query);
+                        ebpo_inside_options *inside, ebpo_distance_options *distance);
 
 /* A file, its model in memory, and a context. */
 typedef struct query_session {

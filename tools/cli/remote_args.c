@@ -35,20 +35,23 @@ ebpo_status remote_open(ebpo_file **out, const char *name, const remote_values *
     *out = NULL;
     if (!options_from(values, &options, error))
         return EBPO_E_ARGUMENT;
-    return ebpo_is_url(name) ? ebpo_open_url(out, name, &options, error)
-                             : ebpo_open(out, name, error);
+    return ebpo_is_url(name) ? ebpo_open_url(name, &options, out, error)
+                             : ebpo_open(name, out, error);
 }
 
 const char *remote_shown(const char *name)
 {
     static char shown[1024];
-    return ebpo_is_url(name) ? ebpo_url_shown(name, shown, sizeof shown) : name;
+    return ebpo_is_url(name) ? ebpo_url_redact(name, shown, sizeof shown) : name;
 }
 
 traffic traffic_of(const ebpo_file *file)
 {
     traffic t = { .http = EBPO_HTTP_STATS_INIT };
-    ebpo_file_traffic(file, &t.bytes, &t.reads);
+    ebpo_file_stats stats = EBPO_FILE_STATS_INIT;
+    ebpo_file_get_stats(file, &stats);
+    t.bytes = stats.bytes_read;
+    t.reads = stats.reads;
     t.far = ebpo_file_get_http_stats(file, &t.http) == EBPO_OK;
     return t;
 }

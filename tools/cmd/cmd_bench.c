@@ -113,7 +113,7 @@ static int cold_start(const bench_job *job, const char *path, const ebpo_model_o
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     r->cold_pages = bench_drop_file(path);
     uint64_t begin = bench_clock();
-    int code = query_open(&s, "bench", path, holding, job->options.level, remote);
+    int code = query_open(&s, "bench", path, holding, job->inside.level, remote);
     r->cold_open_seconds = (double)(bench_clock() - begin) * 1e-9;
     if (code == EXIT_FINE && bench_ask(job, s.context, 0, &error) != EBPO_OK)
         code = command_failed("bench", &error);
@@ -208,7 +208,7 @@ static bool same_answer(bench_query query, const void *one, const void *other, u
 /* The batch must say what single questions said, unless time decides. */
 static int compare_answers(const bench_job *job, const void *batch)
 {
-    if (job->options.deadline_ns)
+    if (job->inside.deadline_ns)
         return EXIT_FINE;
     for (uint64_t i = 0; i < job->count; i++)
         if (!same_answer(job->query, job->answers, batch, i)) {
@@ -407,7 +407,7 @@ static int bench(bench_job *job, const values *v, const char *path,
     int code = cold_start(job, path, holding, &v->q.remote, &r);
     uint64_t begin = bench_clock();
     if (code == EXIT_FINE)
-        code = query_open(&s, "bench", path, holding, job->options.level, &v->q.remote);
+        code = query_open(&s, "bench", path, holding, job->inside.level, &v->q.remote);
     r.open_seconds = (double)(bench_clock() - begin) * 1e-9;
     if (code == EXIT_FINE)
         code = measure(job, &s, (int)v->repeat, batch, &r);
@@ -447,7 +447,7 @@ static int run(void *given, const char **operand)
     bench_job job = { .answers = NULL };
     bench_points p;
     if (!set_mode(v) || !options_fit(v) ||
-        !query_options_from("bench", &v->q, &holding, &job.options))
+        !query_options_from("bench", &v->q, &holding, &job.inside, &job.distance))
         return EXIT_USAGE;
     if (v->seed < 0)
         v->seed = 1;

@@ -200,7 +200,7 @@ static ebpo_status print_result(const values *v, const mesh_input *p, const char
     if (v->quiet && !v->json)
         return EBPO_OK;
     ebpo_file *file = NULL;
-    ebpo_status status = ebpo_open(&file, out, error);
+    ebpo_status status = ebpo_open(out, &file, error);
     if (status != EBPO_OK)
         return status;
     if (v->json)
@@ -262,7 +262,7 @@ static ebpo_status build_and_write(const values *v, mesh_input *p, const char *o
         ebpo_mesh_free(&p->mesh);
         return status;
     }
-    status = ebpo_build(&tree, &p->mesh, &p->prepared.report, &p->prepared.record, &build, error);
+    status = ebpo_build(&p->mesh, &p->prepared.report, &p->prepared.record, &build, &tree, error);
     if (status != EBPO_OK)
         return status;
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;

@@ -37,7 +37,7 @@ static const arg_spec spec = {
 };
 
 /* Then all that is certain is an interval. */
-static bool limited(const ebpo_query_options *o)
+static bool limited(const ebpo_distance_options *o)
 {
     return o->mode == EBPO_DISTANCE_EXACT && (o->level >= 0 || o->deadline_ns);
 }
@@ -46,9 +46,9 @@ static ebpo_status answer(const query_job *job, ebpo_context *context, const dou
                           uint64_t count, ebpo_error *error)
 {
     ebpo_distance_result *results = job->results;
-    ebpo_status status = ebpo_distance_many(context, rows, count, &job->options, results, error);
+    ebpo_status status = ebpo_distance_many(context, rows, count, &job->distance, results, error);
     if (status == EBPO_OK)
-        answers_distance(job->form, limited(&job->options), results, count);
+        answers_distance(job->form, limited(&job->distance), results, count);
     return status;
 }
 

@@ -31,7 +31,7 @@ static ebpo_status answer(const query_job *job, ebpo_context *context, const dou
                           uint64_t count, ebpo_error *error)
 {
     ebpo_inside_result *results = job->results;
-    ebpo_status status = ebpo_inside_many(context, rows, count, &job->options, results, error);
+    ebpo_status status = ebpo_inside_many(context, rows, count, &job->inside, results, error);
     if (status == EBPO_OK)
         answers_inside(job->form, results, count);
     return status;

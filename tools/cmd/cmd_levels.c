@@ -172,7 +172,7 @@ static ebpo_status tell(printer *p, ebpo_file *file, const char *path, bool *arr
     ebpo_stream *stream = NULL;
     wanted.planes = p->v->nodes;
     wanted.threads = (unsigned)p->v->threads;
-    ebpo_status status = ebpo_stream_new(&stream, file, &wanted, error);
+    ebpo_status status = ebpo_stream_new(file, &wanted, &stream, error);
     if (status != EBPO_OK)
         return status;
     if (p->v->json) {
@@ -184,7 +184,7 @@ static ebpo_status tell(printer *p, ebpo_file *file, const char *path, bool *arr
         print_head(remote_shown(path), p->info);
     }
     int to = p->v->to >= 0 ? (int)p->v->to : last;
-    ebpo_file_expect_levels(file, 0, to);
+    ebpo_file_prefetch_levels(file, 0, to);
     status = tell_levels(p, stream, to, arrived, error);
     traffic t = traffic_of(file);
     if (p->v->json) {

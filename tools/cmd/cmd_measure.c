@@ -178,22 +178,25 @@ static ebpo_status measure_levels(ebpo_file *file, const values *v, ebpo_progres
     wanted.tolerance = v->tolerance;
     wanted.questions = (uint64_t)v->questions;
     wanted.progress = opening.progress = progress;
-    ebpo_status status = ebpo_model_open(&model, file, &opening, error);
+    ebpo_status status = ebpo_model_new(file, &opening, &model, error);
     for (int i = 0; i < ebpo_file_info(file)->level_count && status == EBPO_OK; i++) {
         out[i] = (ebpo_deviation)EBPO_DEVIATION_INIT;
         status = ebpo_deviation_level(model, file, i, &wanted, &out[i], error);
     }
-    ebpo_model_close(model);
+    ebpo_model_free(model);
     return status;
 }
 
 static ebpo_status limit_levels(ebpo_file *file, const values *v, ebpo_progress progress,
                                 ebpo_limit *out, ebpo_error *error)
 {
+    ebpo_limit_options wanted = EBPO_LIMIT_OPTIONS_INIT;
+    wanted.threads = (unsigned)v->threads;
+    wanted.progress = progress;
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < ebpo_file_info(file)->level_count && status == EBPO_OK; i++) {
         out[i] = (ebpo_limit)EBPO_LIMIT_INIT;
-        status = ebpo_limit_level(file, i, (unsigned)v->threads, &progress, &out[i], error);
+        status = ebpo_limit_level(file, i, &wanted, &out[i], error);
     }
     return status;
 }

@@ -176,10 +176,10 @@ static ebpo_status load_mesh(job *j, ebpo_progress progress, ebpo_error *error)
                  "%s: is a mesh, which has no levels; convert it first", j->in);
         return error->status = EBPO_E_ARGUMENT;
     }
-    ebpo_status status = ebpo_mesh_read(&t->mesh, j->in, &read, error);
+    ebpo_status status = ebpo_mesh_read(j->in, &read, &t->mesh, error);
     /* The check makes sure that every index and coordinate can be drawn. */
     if (status == EBPO_OK)
-        status = ebpo_mesh_check(&report, &t->mesh, (unsigned)j->v.threads, progress, error);
+        status = ebpo_mesh_check(&t->mesh, (unsigned)j->v.threads, progress, &report, error);
     return status;
 }
 

@@ -128,7 +128,7 @@ static ebpo_status verify(const values *v, const char *path, ebpo_progress progr
     if (status == EBPO_OK)
         status = remote_open(&file, path, &v->remote, error);
     if (status == EBPO_OK && v->against)
-        status = ebpo_mesh_read(&source, v->against, &read, error);
+        status = ebpo_mesh_read(v->against, &read, &source, error);
     if (status == EBPO_OK) {
         ebpo_verify_options verify_options = EBPO_VERIFY_OPTIONS_INIT;
         verify_options.source = v->against ? &source : NULL;

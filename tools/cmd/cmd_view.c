@@ -238,7 +238,7 @@ static ebpo_status tell(printer *p, ebpo_file *file, const char *path,
     ebpo_view_stream *stream = NULL;
     ebpo_view_end end = EBPO_VIEW_NODE;
     const char *order = order_words[wanted->priority];
-    ebpo_status status = ebpo_view_stream_new(&stream, file, wanted, error);
+    ebpo_status status = ebpo_view_stream_new(file, wanted, &stream, error);
     if (status != EBPO_OK)
         return status;
     if (p->v->json) {

@@ -35,7 +35,7 @@ int query_run(query_job *job, const char *model, const char *path)
     ebpo_model_options holding;
     query_session session = QUERY_SESSION_INIT;
     points in;
-    if (!query_options_from(job->command, v, &holding, &job->options))
+    if (!query_options_from(job->command, v, &holding, &job->inside, &job->distance))
         return EXIT_USAGE;
     job->form = v->json ? ANSWERS_JSON : v->raw ? ANSWERS_RAW : ANSWERS_TEXT;
     answers_begin(job->command);

@@ -17,7 +17,8 @@ struct query_job {
     ebpo_status (*answer)(const query_job *job, ebpo_context *context, const double *rows,
                           uint64_t count, ebpo_error *error);
     void *results;              /* room for the answers of a batch, as `answer` wants it */
-    ebpo_query_options options; /* these two are set by query_run */
+    ebpo_inside_options inside; /* these two are set by query_run */
+    ebpo_distance_options distance;
     answer_form form;
 };
 

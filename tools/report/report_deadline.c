@@ -14,7 +14,7 @@ typedef struct timing {
 static ebpo_status ask(const comparison *c, ebpo_context *context, unsigned us, uint64_t clock_cost,
                        timing *t, ebpo_error *error)
 {
-    ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
+    ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
     options.deadline_ns = UINT64_C(1000) * us;
     options.unsigned_distance = true;
     options.warm = false; /* each point by itself */
@@ -53,7 +53,7 @@ ebpo_status report_deadlines(comparison *c, method *m, ebpo_model *model, int ro
                  .took = malloc(c->points * sizeof(double)) };
     uint64_t clock_cost = bench_clock_cost();
     ebpo_context *context = NULL;
-    ebpo_status status = ebpo_context_new(&context, model, error);
+    ebpo_status status = ebpo_context_new(model, &context, error);
     if (status == EBPO_OK && (!t.width || !t.took)) {
         snprintf(error->message, sizeof error->message,
                  "not enough memory for the points; give fewer with --points");

@@ -48,7 +48,7 @@ static ebpo_status levels_alone(comparison *c, method *m, ebpo_file *file, ebpo_
                                    (unsigned)c->v->threads };
     ebpo_stream *stream = NULL;
     bool more = true;
-    ebpo_status status = ebpo_stream_new(&stream, file, &wanted, error);
+    ebpo_status status = ebpo_stream_new(file, &wanted, &stream, error);
     for (int i = 0; i <= method_last(c, m) && status == EBPO_OK; i++) {
         ebpo_stream_level told;
         status = ebpo_stream_next_level(stream, &told, &more, error);
@@ -67,9 +67,11 @@ static ebpo_status limits(comparison *c, method *m, ebpo_file *file, ebpo_error 
 {
     for (int i = c->first; i <= method_last(c, m); i++) {
         ebpo_limit limit = EBPO_LIMIT_INIT;
+        ebpo_limit_options options = EBPO_LIMIT_OPTIONS_INIT;
+        options.threads = (unsigned)c->v->threads;
+        options.progress = c->progress;
         double *f = m->level[i];
-        ebpo_status status =
-            ebpo_limit_level(file, i, (unsigned)c->v->threads, &c->progress, &limit, error);
+        ebpo_status status = ebpo_limit_level(file, i, &options, &limit, error);
         if (status != EBPO_OK)
             return method_without(m, "limit", status, error);
         f[OF_LIMIT_VOLUME] = limit.volume;
@@ -109,7 +111,7 @@ static ebpo_status with_model(comparison *c, method *m, ebpo_file *file, ebpo_er
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     ebpo_model *model = NULL;
     options.threads = (unsigned)c->v->threads;
-    ebpo_status status = ebpo_model_open(&model, file, &options, error);
+    ebpo_status status = ebpo_model_new(file, &options, &model, error);
     if (status != EBPO_OK)
         return status;
     ebpo_model_get_stats(model, &stats);
@@ -117,7 +119,7 @@ static ebpo_status with_model(comparison *c, method *m, ebpo_file *file, ebpo_er
     status = deviations(c, m, file, model, error);
     if (status == EBPO_OK && c->v->need)
         status = report_needs(c, m, file, model, error);
-    ebpo_model_close(model);
+    ebpo_model_free(model);
     return status;
 }
 

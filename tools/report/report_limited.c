@@ -130,15 +130,17 @@ typedef struct asker {
 static ebpo_status timed(asker *a, bool distance, const double *points, int level, double *ns,
                          ebpo_error *error)
 {
-    ebpo_query_options options = EBPO_QUERY_OPTIONS_INIT;
+    ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
     options.level = level;
+    ebpo_inside_options inside = EBPO_INSIDE_OPTIONS_INIT;
+    inside.level = level;
     options.warm = false;
     options.unsigned_distance = true;
     uint64_t begin = bench_clock();
     ebpo_status status =
         distance
             ? ebpo_distance_many(a->context, points, a->c->points, &options, a->distance, error)
-            : ebpo_inside_many(a->context, points, a->c->points, &options, a->inside, error);
+            : ebpo_inside_many(a->context, points, a->c->points, &inside, a->inside, error);
     *ns = (double)(bench_clock() - begin) / (double)a->c->points;
     return status;
 }
@@ -216,7 +218,7 @@ ebpo_status report_limited(comparison *c, method *m, ebpo_model *model, int roun
                            ebpo_error *error)
 {
     asker a = { .c = c, .m = m, .round = &m->round[round], .first = round == 0 };
-    ebpo_status status = ebpo_context_new(&a.context, model, error);
+    ebpo_status status = ebpo_context_new(model, &a.context, error);
     a.inside = malloc(c->points * sizeof *a.inside);
     a.distance = malloc(c->points * sizeof *a.distance);
     a.width = malloc(c->points * sizeof *a.width);

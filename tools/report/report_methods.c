@@ -122,7 +122,7 @@ static ebpo_status build_one(comparison *c, const char *mesh, int selection, con
         return status;
     }
     double begin = progress_now();
-    status = ebpo_build(&tree, &p.mesh, &p.prepared.report, &p.prepared.record, &build, error);
+    status = ebpo_build(&p.mesh, &p.prepared.report, &p.prepared.record, &build, &tree, error);
     *seconds = progress_now() - begin;
     if (status != EBPO_OK)
         return status;

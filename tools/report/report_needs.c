@@ -35,7 +35,7 @@ static ebpo_status reach(const comparison *c, ebpo_model *model, const char *pat
     options.tolerance = 0.01; /* or a word that is kept would seem broken */
     options.threads = (unsigned)c->v->threads;
     options.progress = c->progress;
-    ebpo_status status = ebpo_open(&file, path, error);
+    ebpo_status status = ebpo_open(path, &file, error);
     if (status == EBPO_OK) {
         const ebpo_info *info = ebpo_file_info(file);
         n->figure[OF_NEED_BYTES] = (double)info->file_bytes;

@@ -21,8 +21,8 @@ static ebpo_status have_level(const comparison *c, const method *m, int level, d
     uint64_t begin = bench_clock();
     ebpo_status status = remote_open(&file, m->path, &c->v->remote, error);
     if (status == EBPO_OK) {
-        ebpo_file_expect_levels(file, 0, level);
-        status = ebpo_stream_new(&stream, file, &wanted, error);
+        ebpo_file_prefetch_levels(file, 0, level);
+        status = ebpo_stream_new(file, &wanted, &stream, error);
     }
     for (int i = 0; i <= level && status == EBPO_OK; i++)
         status = ebpo_stream_next_level(stream, &told, &more, error);
@@ -60,7 +60,7 @@ ebpo_status report_round(comparison *c, method *m, int round, ebpo_error *error)
     if (status == EBPO_OK)
         status = remote_open(&file, m->path, &c->v->remote, error);
     if (status == EBPO_OK)
-        status = ebpo_model_open(&model, file, &options, error);
+        status = ebpo_model_new(file, &options, &model, error);
     if (status == EBPO_OK) {
         ebpo_model_get_stats(model, &stats);
         m->round[round].open = stats.open_seconds;
@@ -68,7 +68,7 @@ ebpo_status report_round(comparison *c, method *m, int round, ebpo_error *error)
     }
     if (status == EBPO_OK)
         status = report_deadlines(c, m, model, round, error);
-    ebpo_model_close(model);
+    ebpo_model_free(model);
     ebpo_close(file);
     return status;
 }

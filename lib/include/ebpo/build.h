@@ -90,10 +90,10 @@ typedef struct ebpo_build_options {
 /* Builds the tree of a checked and perhaps mended mesh; `report` and `mend` are copied into the
  * file's facts. The mesh is consumed: its arrays are reordered into `out` (on failure it is freed
  * all the same). */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_build(ebpo_tree *out, ebpo_mesh *mesh,
-                                              const ebpo_mesh_report *report,
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_build(ebpo_mesh *mesh, const ebpo_mesh_report *report,
                                               const ebpo_mend_record *mend,
-                                              const ebpo_build_options *options, ebpo_error *error);
+                                              const ebpo_build_options *options, ebpo_tree *out,
+                                              ebpo_error *error);
 
 #ifdef __cplusplus
 }

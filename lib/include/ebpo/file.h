@@ -224,21 +224,27 @@ typedef struct ebpo_file ebpo_file;
  * that another program shortens or changes while it is open gives EBPO_E_IO or EBPO_E_FORMAT, never
  * wrong data (the pipelines with checksums). */
 /* a path, or a URL: ebpo/http.h */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_open(ebpo_file **out, const char *path, ebpo_error *error);
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_open(const char *path, ebpo_file **out, ebpo_error *error);
 /* The same from bytes in memory, which stay the caller's and must outlive the file. `name` is for
  * messages. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_memory(ebpo_file **out, const void *data,
-                                                    uint64_t size, const char *name,
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_memory(const void *data, uint64_t size,
+                                                    const char *name, ebpo_file **out,
                                                     ebpo_error *error);
 /* The same from any source; it is closed with the file (also when opening fails). */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_source(ebpo_file **out, const ebpo_source *source,
-                                                    const char *name, ebpo_error *error);
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_source(const ebpo_source *source, const char *name,
+                                                    ebpo_file **out, ebpo_error *error);
 /* NULL is fine. Models, contexts and streams made from the file are freed before. */
 EBPO_API void ebpo_close(ebpo_file *file);
 
 /* Bytes asked of the source so far, and how many times; the head's reading included. Of a file
- * opened by URL, what went over the net is told by ebpo_file_http_stats. */
-EBPO_API void ebpo_file_traffic(const ebpo_file *file, uint64_t *bytes, uint64_t *reads);
+ * opened by URL, what went over the net is told by ebpo_file_get_http_stats. */
+typedef struct ebpo_file_stats {
+    size_t struct_size; /* EBPO_FILE_STATS_INIT sets it */
+    uint64_t bytes_read;
+    uint64_t reads; /* calls of the source */
+} ebpo_file_stats;
+#define EBPO_FILE_STATS_INIT EBPO_SIZED(ebpo_file_stats)
+EBPO_API ebpo_status ebpo_file_get_stats(const ebpo_file *file, ebpo_file_stats *out);
 
 /* Lent; valid until the file is closed. */
 EBPO_API const ebpo_info *ebpo_file_info(const ebpo_file *file);
@@ -253,7 +259,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_locate(ebpo_file *file, ebpo_error 
  * source far away then fetches them with as few requests as it can, where reading one after the
  * other would ask for each by itself. Waits at most for the index of chunks (ebpo_file_locate);
  * cannot fail: what could not be fetched is told when it is read. */
-EBPO_API void ebpo_file_expect_levels(ebpo_file *file, int first, int last);
+EBPO_API void ebpo_file_prefetch_levels(ebpo_file *file, int first, int last);
 
 /* Levels, meshes and trees that are read from now on keep to `workspace` (NULL: to none, as at
  * first), which is freed after the last call that is given the file or one of them

@@ -1,11 +1,11 @@
 /* EBP-Octree in HDF5: files on web servers and object stores, read by ranges.
  *
- *     ebpo_open(&file, "https://example.org/model.ebpo.h5", &error);                       with the
+ *     ebpo_open("https://example.org/model.ebpo.h5", &file, &error);                       with the
  * usual options
  *
  *     ebpo_http_options options = EBPO_HTTP_OPTIONS_INIT;
  *     options.cache_folder = "/var/cache/models";
- *     ebpo_open_url(&file, "https://example.org/model.ebpo.h5", &options, &error);
+ *     ebpo_open_url("https://example.org/model.ebpo.h5", &options, &file, &error);
  *
  * Any server that answers "Range: bytes=a-b" with 206 will do. Opening costs one request, for the
  * first 128 KiB, which mostly bring levels 0 to 4 too. What is read later is announced by the
@@ -85,7 +85,7 @@ typedef struct ebpo_http_stats {
 
 /* A URL as messages show it, without user and password and without what follows "?"; any other name
  * as it is. Into out[room], cut off if need be; returns out. */
-EBPO_API char *ebpo_url_shown(const char *name, char *out, size_t room);
+EBPO_API char *ebpo_url_redact(const char *name, char *out, size_t room);
 
 /* True for names that begin with http:// or https://. */
 EBPO_API bool ebpo_is_url(const char *name);
@@ -97,14 +97,13 @@ EBPO_API bool ebpo_is_url(const char *name);
  * out of range, or a cache folder that cannot be used. Reading: EBPO_E_IO, also when the file on
  * the server has changed since it was opened, which then is the answer to all reads;
  * EBPO_E_CANCELLED. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_source_of_url(ebpo_source *out, const char *url,
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_source_of_url(const char *url,
                                                       const ebpo_http_options *options,
-                                                      ebpo_error *error);
+                                                      ebpo_source *out, ebpo_error *error);
 
 /* ebpo_open with options. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_url(ebpo_file **out, const char *url,
-                                                 const ebpo_http_options *options,
-                                                 ebpo_error *error);
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_url(const char *url, const ebpo_http_options *options,
+                                                 ebpo_file **out, ebpo_error *error);
 
 /* EBPO_E_ABSENT, with zeros, when the file was not opened by its URL. Any time, any thread. */
 EBPO_API ebpo_status ebpo_file_get_http_stats(const ebpo_file *file, ebpo_http_stats *out);

@@ -8,6 +8,16 @@
 extern "C" {
 #endif
 
+typedef struct ebpo_limit_options {
+    size_t struct_size; /* EBPO_LIMIT_OPTIONS_INIT sets it */
+    unsigned threads;   /* 0: all cores; the result does not depend on it */
+    ebpo_progress progress;
+} ebpo_limit_options;
+#define EBPO_LIMIT_OPTIONS_INIT                       \
+    {                                                 \
+        sizeof(ebpo_limit_options), 0, { NULL, NULL } \
+    }
+
 typedef struct ebpo_limit {
     size_t struct_size; /* EBPO_LIMIT_INIT sets it */
     /* of the level: hulls of gray nodes and leaves, cells of black nodes (levels 0 .. level, as in
@@ -24,9 +34,9 @@ typedef struct ebpo_limit {
  * certified: a figure to compare with; infinite or 0 where a cell's volume is no normal double
  * (coordinates beyond about 1e102 or below 1e-102). EBPO_E_ABSENT without mesh, and where the
  * library was built without qhull (`-Dqhull`); EBPO_E_ARGUMENT: no such level. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_limit_level(ebpo_file *file, int level, unsigned threads,
-                                                    const ebpo_progress *progress, ebpo_limit *out,
-                                                    ebpo_error *error);
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_limit_level(ebpo_file *file, int level,
+                                                    const ebpo_limit_options *options,
+                                                    ebpo_limit *out, ebpo_error *error);
 
 #ifdef __cplusplus
 }

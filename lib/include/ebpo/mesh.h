@@ -55,17 +55,17 @@ typedef struct ebpo_mesh_read_options {
  * bit and text is rounded correctly; assimp gives single precision, and for text now and then a
  * neighbour of the nearest float (lib/import/import.h has the figures). PLY is safe on untrusted
  * files. On failure `out` is cleared. `options` may be NULL. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_read(ebpo_mesh *out, const char *path,
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_read(const char *path,
                                                   const ebpo_mesh_read_options *options,
-                                                  ebpo_error *error);
+                                                  ebpo_mesh *out, ebpo_error *error);
 
 /* The vertices alone of a PLY file that is in memory, as doubles [*count][3] (exact: floats and
  * integers are widened), to be freed with free(). Every dialect that ebpo_mesh_read takes; faces
  * may be absent and are not looked at. Coordinates may be NaN or infinite. `name` is for messages.
  * Safe on untrusted bytes. On failure *xyz is NULL. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_points_parse_ply(double **xyz, uint64_t *count,
-                                                         const void *data, uint64_t size,
-                                                         const char *name, ebpo_error *error);
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_points_parse_ply(const void *data, uint64_t size,
+                                                         const char *name, double **xyz,
+                                                         uint64_t *count, ebpo_error *error);
 
 /* Writes a binary little-endian PLY: float or double vertices as the mesh holds them, int32 or
  * uint32 triangles. Appears whole or not at all (temporary name, fsync, rename). */
@@ -116,8 +116,8 @@ typedef struct ebpo_mesh_report {
 /* Checks a mesh. A NaN or infinite coordinate, an index out of range or a mesh without faces is
  * EBPO_E_FORMAT and named with its place; everything else is counted in the report. `threads` 0:
  * all cores. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_check(ebpo_mesh_report *report, const ebpo_mesh *mesh,
-                                                   unsigned threads, ebpo_progress progress,
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_check(const ebpo_mesh *mesh, unsigned threads,
+                                                   ebpo_progress progress, ebpo_mesh_report *report,
                                                    ebpo_error *error);
 
 /* Puts vertices and faces in the order of a Morton curve, so that neighbours in space are
@@ -193,9 +193,9 @@ typedef struct ebpo_prepared {
  * `options` may be NULL: no mending but that of STL. The mesh stays the caller's. Errors are those
  * of ebpo_mesh_check and the mending functions, and EBPO_E_CANCELLED; `out` is cleared then, and
  * the mesh is valid, with the steps that were done. Any thread; one call at a time for one mesh. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_prepare(ebpo_prepared *out, ebpo_mesh *mesh,
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_prepare(ebpo_mesh *mesh,
                                                      const ebpo_prepare_options *options,
-                                                     ebpo_error *error);
+                                                     ebpo_prepared *out, ebpo_error *error);
 
 #ifdef __cplusplus
 }

@@ -1,9 +1,9 @@
 /* EBP-Octree in HDF5: questions to a file. Point in solid, distance, rays, boxes: exact, with as
  * much of the file in memory as one allows.
  *
- *     ebpo_file *file;   ebpo_open(&file, "model.ebpo.h5", &error);
- *     ebpo_model *model; ebpo_model_open(&model, file, NULL, &error);
- *     ebpo_context *c;   ebpo_context_new(&c, model, &error);              one for each thread
+ *     ebpo_file *file;   ebpo_open("model.ebpo.h5", &file, &error);
+ *     ebpo_model *model; ebpo_model_new(file, NULL, &model, &error);
+ *     ebpo_context *c;   ebpo_context_new(model, &c, &error);              one for each thread
  *     ebpo_inside(c, point, NULL, &answer, &error);
  *
  * "Exact" means: the decision is that of arithmetic without rounding on the file's coordinates, for
@@ -59,11 +59,11 @@ typedef struct ebpo_model ebpo_model;
  * with one that would do (about the least). A budget that opens holds the average subtree many
  * times, but perhaps not the largest one: the question that needs it then is EBPO_E_LIMIT too, with
  * the budget that would do. The file must stay open as long as the model. `options` may be NULL. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_model_open(ebpo_model **out, ebpo_file *file,
-                                                   const ebpo_model_options *options,
-                                                   ebpo_error *error);
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_model_new(ebpo_file *file,
+                                                  const ebpo_model_options *options,
+                                                  ebpo_model **out, ebpo_error *error);
 /* After its contexts. NULL is fine. */
-EBPO_API void ebpo_model_close(ebpo_model *model);
+EBPO_API void ebpo_model_free(ebpo_model *model);
 
 /* Sums since opening, over all contexts. */
 typedef struct ebpo_model_stats {
@@ -78,7 +78,7 @@ typedef struct ebpo_model_stats {
     uint64_t prefetched; /* loaded in the background */
     uint64_t evicted;
     uint64_t bytes_read, reads; /* from the source, opening the file included */
-    double open_seconds;        /* of ebpo_model_open */
+    double open_seconds;        /* of ebpo_model_new */
     double load_seconds;        /* spent by questions waiting for subtrees */
     /* leaves in memory by kind: general, one plane, two planes, convex set, concave set */
     uint64_t leaves, leaves_of_kind[5];
@@ -90,7 +90,7 @@ EBPO_API ebpo_status ebpo_model_get_stats(const ebpo_model *model, ebpo_model_st
 
 /* One thread's place in a model: position, scratch, what it holds in memory. */
 typedef struct ebpo_context ebpo_context;
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_context_new(ebpo_context **out, ebpo_model *model,
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_context_new(ebpo_model *model, ebpo_context **out,
                                                     ebpo_error *error);
 EBPO_API void ebpo_context_free(ebpo_context *context);
 
@@ -98,50 +98,32 @@ EBPO_API void ebpo_context_free(ebpo_context *context);
 
 enum { EBPO_LEVEL_ALL = -1 };
 
+/* Points are three finite doubles in the model's unit; others are EBPO_E_ARGUMENT with the point's
+ * number. `options` may be NULL. Batches give the same answers as single calls. On failure (reading
+ * the file, memory) the results are unspecified. One context per thread. */
+
+/* ---- point in solid ---- */
+
 typedef enum ebpo_envelopes {
     EBPO_ENVELOPES_AUTO = 0, /* where they save loading */
     EBPO_ENVELOPES_USE = 1,  /* at every gray node on the way (EBP 2017, 4.2.1) */
     EBPO_ENVELOPES_SKIP = 2
 } ebpo_envelopes;
 
-typedef enum ebpo_distance_mode {
-    EBPO_DISTANCE_EXACT = 0,
-    /* EBP 2017, 4.4: the faces below the deepest gray node around the point; not the minimum */
-    EBPO_DISTANCE_RECURSIVE = 1,
-    EBPO_DISTANCE_LEAVES = 2, /* the faces of the leaf around the point; no answer elsewhere */
-    /* the envelope of the deepest gray node around the point, at most at `level`, unsigned;
-       max_distance does not matter; not the minimum */
-    EBPO_DISTANCE_ENVELOPE = 3
-} ebpo_distance_mode;
-
-typedef struct ebpo_query_options {
-    size_t struct_size; /* EBPO_QUERY_OPTIONS_INIT sets it */
+typedef struct ebpo_inside_options {
+    size_t struct_size; /* EBPO_INSIDE_OPTIONS_INIT sets it */
     /* look at levels 0 .. level only, with the certainty that these allow; EBPO_LEVEL_ALL: exact
      * answers */
     int level;
-    /* stop after about so much time for each point and tell what is certain by then; 0: no
+    ebpo_envelopes envelopes;
+    /* stop after about so many nanoseconds for each point and tell what is certain by then; 0: no
      * deadline. It bounds the search: a subtree or a leaf that is under way is finished */
     uint64_t deadline_ns;
-    ebpo_envelopes envelopes;
-    ebpo_distance_mode mode; /* of ebpo_distance */
-    bool unsigned_distance;  /* leave the sign away: less work; surfaces have none anyway */
-    /* ebpo_distance: begin with the last answer of this context; the answers are the same, close
-     * points are faster */
-    bool warm;
-    /* ebpo_distance: what is farther does not matter; >= 0, INFINITY: everything */
-    double max_distance;
-} ebpo_query_options;
-#define EBPO_QUERY_OPTIONS_INIT                                                                   \
-    {                                                                                             \
-        sizeof(ebpo_query_options), -1, 0, EBPO_ENVELOPES_AUTO, EBPO_DISTANCE_EXACT, false, true, \
-            __builtin_inf()                                                                       \
+} ebpo_inside_options;
+#define EBPO_INSIDE_OPTIONS_INIT                                            \
+    {                                                                       \
+        sizeof(ebpo_inside_options), EBPO_LEVEL_ALL, EBPO_ENVELOPES_AUTO, 0 \
     }
-
-/* Points are three finite doubles in the model's unit; others are EBPO_E_ARGUMENT with the point's
- * number. `options` may be NULL. Batches give the same answers as single calls. On failure (reading
- * the file, memory) the results are unspecified. One context per thread. */
-
-/* ---- point in solid ---- */
 
 typedef enum ebpo_where {
     EBPO_OUT = 0,
@@ -163,15 +145,49 @@ typedef struct ebpo_inside_result {
 /* BP 2008, section 5.1; EBP 2017, 4.2. A surface is EBPO_E_NOT_SOLID; a file without mesh
  * EBPO_E_ABSENT unless `level` is given. */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_inside(ebpo_context *context, const double point[3],
-                                               const ebpo_query_options *options,
+                                               const ebpo_inside_options *options,
                                                ebpo_inside_result *out, ebpo_error *error);
 /* `points`: [count][3]; `out`: [count]. */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_inside_many(ebpo_context *context, const double *points,
                                                     uint64_t count,
-                                                    const ebpo_query_options *options,
+                                                    const ebpo_inside_options *options,
                                                     ebpo_inside_result *out, ebpo_error *error);
 
 /* ---- distance ---- */
+
+typedef enum ebpo_distance_mode {
+    EBPO_DISTANCE_EXACT = 0,
+    /* EBP 2017, 4.4: the faces below the deepest gray node around the point; not the minimum */
+    EBPO_DISTANCE_RECURSIVE = 1,
+    EBPO_DISTANCE_LEAVES = 2, /* the faces of the leaf around the point; no answer elsewhere */
+    /* the envelope of the deepest gray node around the point, at most at `level`, unsigned;
+       max_distance does not matter; not the minimum */
+    EBPO_DISTANCE_ENVELOPE = 3
+} ebpo_distance_mode;
+
+typedef struct ebpo_distance_options {
+    size_t struct_size; /* EBPO_DISTANCE_OPTIONS_INIT sets it */
+    /* as in ebpo_inside_options */
+    int level;
+    ebpo_distance_mode mode;
+    uint64_t deadline_ns;
+    /* what is farther, in the model's unit, does not matter; >= 0, INFINITY: everything */
+    double max_distance;
+    /* leave the sign away: less work; surfaces have none anyway */
+    bool unsigned_distance;
+    /* begin with the last answer of this context; the answers are the same, close points are
+     * faster */
+    bool warm;
+    uint8_t reserved[6]; /* 0 */
+} ebpo_distance_options;
+#define EBPO_DISTANCE_OPTIONS_INIT                                                              \
+    {                                                                                           \
+        sizeof(ebpo_distance_options), EBPO_LEVEL_ALL, EBPO_DISTANCE_EXACT, 0, __builtin_inf(), \
+            false, true,                                                                        \
+        {                                                                                       \
+            0                                                                                   \
+        }                                                                                       \
+    }
 
 #define EBPO_NO_FACE UINT64_MAX
 
@@ -193,11 +209,11 @@ typedef struct ebpo_distance_result {
 /* EBP 2017, 4.4. EBPO_E_ABSENT without mesh unless `level` is given or the mode is
  * EBPO_DISTANCE_ENVELOPE. With `level` or a deadline: lo and hi; the distance when they meet. */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_distance(ebpo_context *context, const double point[3],
-                                                 const ebpo_query_options *options,
+                                                 const ebpo_distance_options *options,
                                                  ebpo_distance_result *out, ebpo_error *error);
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_distance_many(ebpo_context *context, const double *points,
                                                       uint64_t count,
-                                                      const ebpo_query_options *options,
+                                                      const ebpo_distance_options *options,
                                                       ebpo_distance_result *out, ebpo_error *error);
 
 /* ---- rays and boxes ---- */

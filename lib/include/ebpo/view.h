@@ -5,7 +5,7 @@
  *     options.priority = EBPO_PRIORITY_PIXELS;
  *     options.observer = &observer;
  *     options.pixels = 8;                                   refine until no visible cell is larger
- *     ebpo_view_stream_new(&stream, file, &options, &error);
+ *     ebpo_view_stream_new(file, &options, &stream, &error);
  *     while (ebpo_view_stream_next(stream, &node, &end, &error) == EBPO_OK && end ==
  * EBPO_VIEW_NODE)
  *         ...                                               draw; when node.complete, forget the
@@ -74,8 +74,8 @@ typedef struct ebpo_view_options {
      */
     double distance;
     int level; /* deepest level to deliver; -1: all */
-    /* stop before more of the file has been read than this, counted as ebpo_file_traffic does, all
-     * since opening included; 0: no limit */
+    /* stop before more of the file has been read than this, counted as ebpo_file_get_stats does,
+     * all since opening included; 0: no limit */
     uint64_t bytes;
     uint64_t nodes; /* stop before more nodes have been delivered than this; 0: no limit */
     /* Fixed. */
@@ -120,9 +120,9 @@ typedef struct ebpo_view_stream ebpo_view_stream;
 /* The file must stay open; nothing is read yet. One thread at a time; other threads may use the
  * file, but what they read counts as well. EBPO_E_ARGUMENT: options that make no sense. `options`
  * may be NULL. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_view_stream_new(ebpo_view_stream **out, ebpo_file *file,
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_view_stream_new(ebpo_file *file,
                                                         const ebpo_view_options *options,
-                                                        ebpo_error *error);
+                                                        ebpo_view_stream **out, ebpo_error *error);
 EBPO_API void ebpo_view_stream_free(ebpo_view_stream *stream); /* NULL is fine */
 
 /* The next node, lent until the next call on the stream. Of the file, the chunks are read that the

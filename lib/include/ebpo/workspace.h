@@ -14,7 +14,7 @@ extern "C" {
  * the budget allows. Results never depend on it. All functions may be called from any thread. */
 typedef struct ebpo_workspace ebpo_workspace;
 
-enum { EBPO_WORKSPACE_LEAST = 128 << 20 }; /* bytes: less is refused */
+enum { EBPO_WORKSPACE_MIN = 128 << 20 }; /* bytes: less is refused */
 
 typedef struct ebpo_workspace_options {
     size_t struct_size; /* EBPO_WORKSPACE_OPTIONS_INIT sets it */
@@ -28,11 +28,10 @@ typedef struct ebpo_workspace_options {
         sizeof(ebpo_workspace_options), 0, NULL \
     }
 
-/* `options` may be NULL. EBPO_E_ARGUMENT for less memory than EBPO_WORKSPACE_LEAST; EBPO_E_IO for a
+/* `options` may be NULL. EBPO_E_ARGUMENT for less memory than EBPO_WORKSPACE_MIN; EBPO_E_IO for a
  * folder that cannot be written to (looked at at once, so that it does not show after an hour). */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_workspace_make(ebpo_workspace **out,
-                                                       const ebpo_workspace_options *options,
-                                                       ebpo_error *error);
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_workspace_new(const ebpo_workspace_options *options,
+                                                      ebpo_workspace **out, ebpo_error *error);
 
 /* After the last call that is given a mesh or tree made with it (or a file that keeps to it); these
  * themselves may be freed or closed later. NULL is fine. */

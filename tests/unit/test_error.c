@@ -1,0 +1,113 @@
+/* What an error tells beside its message. */
+#include <check.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/ebpo.h>
+
+#include "query_kit.h"
+
+__attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
+const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
+
+static void assert_begins(const ebpo_error *error)
+{
+    char begin[400];
+    snprintf(begin, sizeof begin, "%s: %s%s", error->file, error->object,
+             *error->object ? ": " : "");
+    ck_assert_msg(strncmp(error->message, begin, strlen(begin)) == 0, "'%s' and '%s'",
+                  error->message, begin);
+}
+
+START_TEST(a_file_that_is_not_there)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file;
+    ck_assert_int_eq(ebpo_open("/no/such/file.ebpo.h5", &file, &error), EBPO_E_IO);
+    ck_assert_int_eq(error.status, EBPO_E_IO);
+    ck_assert_str_eq(error.file, "/no/such/file.ebpo.h5");
+    ck_assert_str_eq(error.object, "");
+    ck_assert_int_eq(error.offset, -1);
+    assert_begins(&error);
+}
+END_TEST
+
+START_TEST(a_byte_of_a_ply)
+{
+    static const char text[] = "ply\nformat binary_little_endian 1.0\nelement vertex 2\n"
+                               "property float x\nproperty float y\nproperty float z\n"
+                               "end_header\n0123456789";
+    ebpo_error error = EBPO_ERROR_INIT;
+    double *xyz;
+    uint64_t count;
+    ck_assert_int_eq(ebpo_points_parse_ply(text, sizeof text - 1, "points.ply", &xyz, &count,
+                                           &error),
+                     EBPO_E_FORMAT);
+    ck_assert_str_eq(error.file, "points.ply");
+    ck_assert_int_ge(error.offset, (int64_t)(strstr(text, "0123") - text));
+    assert_begins(&error);
+}
+END_TEST
+
+/* Bits of the arrays: the head is libhdf5's to judge. */
+START_TEST(an_array_of_a_damaged_file)
+{
+    static const query_variant usual = { "usual", 4, 4, EBPO_RULE_NONZERO, 0 };
+    static uint8_t bytes[1 << 20];
+    query_model m;
+    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 1), &usual);
+    FILE *f = fopen(m.path, "rb");
+    size_t size = fread(bytes, 1, sizeof bytes, f);
+    fclose(f);
+    int objects = 0;
+    for (size_t i = (size_t)ebpo_file_info(m.file)->head_bytes; i < size; i += 7) {
+        ebpo_error error = EBPO_ERROR_INIT;
+        ebpo_file *file = NULL;
+        bytes[i] ^= 1;
+        if (ebpo_open_memory(bytes, size, "damaged", &file, &error) == EBPO_OK &&
+            ebpo_file_check_content(file, 1, &error) == EBPO_E_FORMAT) {
+            ck_assert_str_eq(error.file, "damaged");
+            ck_assert(!*error.object || *error.object == '/');
+            objects += *error.object == '/';
+            assert_begins(&error);
+        }
+        ebpo_close(file);
+        bytes[i] ^= 1;
+    }
+    ck_assert_int_gt(objects, 0);
+    query_model_free(&m);
+}
+END_TEST
+
+/* What an earlier error said does not stay. */
+START_TEST(nothing_is_left_of_an_earlier_error)
+{
+    static const query_variant usual = { "usual", 4, 4, EBPO_RULE_NONZERO, 0 };
+    query_model m;
+    ebpo_error error = { EBPO_E_IO, "old", "old", "old", 5, { 0 } };
+    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 1), &usual);
+    ck_assert_int_eq(ebpo_lod_level(m.file, 99, NULL, NULL, NULL, &error), EBPO_E_ARGUMENT);
+    ck_assert_str_eq(error.file, "");
+    ck_assert_str_eq(error.object, "");
+    ck_assert_int_eq(error.offset, -1);
+    query_model_free(&m);
+}
+END_TEST
+
+int main(void)
+{
+    Suite *suite = suite_create("error");
+    TCase *tests = tcase_create("error");
+    tcase_set_timeout(tests, 120);
+    tcase_add_test(tests, a_file_that_is_not_there);
+    tcase_add_test(tests, a_byte_of_a_ply);
+    tcase_add_test(tests, an_array_of_a_damaged_file);
+    tcase_add_test(tests, nothing_is_left_of_an_earlier_error);
+    suite_add_tcase(suite, tests);
+    SRunner *runner = srunner_create(suite);
+    srunner_run_all(runner, CK_NORMAL);
+    int failed = srunner_ntests_failed(runner);
+    srunner_free(runner);
+    return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+}
