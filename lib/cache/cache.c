@@ -9,20 +9,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "base/hash.h"
-
-typedef enum slot_state { LOADING, READY, FAILED } slot_state;
-
-/* One key. In the table while LOADING or READY; a FAILED one lives on until its last waiter has
- * seen it. */
-typedef struct slot {
-    uint64_t key, bytes;
-    slot_state state;
-    unsigned pins, waiters;
-    void *item;
-    struct slot *chain;         /* in its bucket, or in a list of items that leave */
-    struct slot *older, *newer; /* READY and not pinned: by last use */
-} slot;
+#include "cache/cache_slots.h"
 
 /* What there must be room for. The background yields to everyone else, and drops nothing that was
  * asked for together. */
@@ -40,9 +27,7 @@ struct ebpo_cache {
     pthread_cond_t changed; /* loads ended, room came free */
     /* the background has something to do: apart from `changed`, or each unpin would wake it */
     pthread_cond_t asked;
-    slot **bucket;
-    uint64_t bucket_count, slot_count;
-    slot *oldest, *newest;
+    ebpo_cache_slots slots;
     uint64_t pinned; /* bytes of items that are in use */
     /* bytes reserved for loads under way, and of items on their way out: these become free or
      * pinned without anyone's help */
@@ -65,83 +50,10 @@ static double now(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* --- the table --- */
-
-static slot **bucket_of(slot **bucket, uint64_t bucket_count, uint64_t key)
-{
-    return &bucket[ebpo_hash_number(key) & (bucket_count - 1)];
-}
-
-static slot *find(const ebpo_cache *c, uint64_t key)
-{
-    slot *s = *bucket_of(c->bucket, c->bucket_count, key);
-    while (s && s->key != key)
-        s = s->chain;
-    return s;
-}
-
-/* Without memory the chains stay long, and that is all. */
-static void grow(ebpo_cache *c)
-{
-    uint64_t count = 2 * c->bucket_count;
-    slot **bucket = ebpo_alloc_zero(count, sizeof *bucket);
-    if (!bucket)
-        return;
-    for (uint64_t i = 0; i < c->bucket_count; i++)
-        for (slot *s = c->bucket[i], *next; s; s = next) {
-            next = s->chain;
-            slot **to = bucket_of(bucket, count, s->key);
-            s->chain = *to;
-            *to = s;
-        }
-    free(c->bucket);
-    c->bucket = bucket;
-    c->bucket_count = count;
-}
-
-static slot *add_slot(ebpo_cache *c, uint64_t key)
-{
-    slot *s = ebpo_alloc_zero(1, sizeof *s);
-    if (!s)
-        return NULL;
-    if (c->slot_count++ == c->bucket_count)
-        grow(c);
-    s->key = key;
-    slot **to = bucket_of(c->bucket, c->bucket_count, key);
-    s->chain = *to;
-    *to = s;
-    return s;
-}
-
-static void take_out(ebpo_cache *c, slot *s)
-{
-    slot **at = bucket_of(c->bucket, c->bucket_count, s->key);
-    while (*at != s)
-        at = &(*at)->chain;
-    *at = s->chain;
-    c->slot_count--;
-}
-
-/* --- the order of last use --- */
-
-static void link_newest(ebpo_cache *c, slot *s)
-{
-    s->older = c->newest;
-    s->newer = NULL;
-    *(c->newest ? &c->newest->newer : &c->oldest) = s;
-    c->newest = s;
-}
-
-static void unlink_used(ebpo_cache *c, slot *s)
-{
-    *(s->older ? &s->older->newer : &c->oldest) = s->newer;
-    *(s->newer ? &s->newer->older : &c->newest) = s->older;
-}
-
-static void pin(ebpo_cache *c, slot *s)
+static void pin(ebpo_cache *c, ebpo_cache_slot *s)
 {
     if (s->pins++ == 0) {
-        unlink_used(c, s);
+        ebpo_cache_slots_unlink(&c->slots, s);
         c->pinned += s->bytes;
     }
 }
@@ -165,13 +77,13 @@ static bool asked_ahead(const ebpo_cache *c, uint64_t key)
 
 /* Releases items that are out of the table. Their bytes count until they are really gone, or
  * another thread would use them twice. */
-static void release_all(ebpo_cache *c, slot *leaving)
+static void release_all(ebpo_cache *c, ebpo_cache_slot *leaving)
 {
     uint64_t bytes = 0;
     if (!leaving)
         return;
     pthread_mutex_unlock(&c->lock);
-    for (slot *next; leaving; leaving = next) {
+    for (ebpo_cache_slot *next; leaving; leaving = next) {
         next = leaving->chain;
         bytes += leaving->bytes;
         c->source.release(c->source.user, leaving->item);
@@ -183,10 +95,10 @@ static void release_all(ebpo_cache *c, slot *leaving)
     pthread_cond_broadcast(&c->changed);
 }
 
-static void drop(ebpo_cache *c, slot *s, slot **leaving)
+static void drop(ebpo_cache *c, ebpo_cache_slot *s, ebpo_cache_slot **leaving)
 {
-    unlink_used(c, s);
-    take_out(c, s);
+    ebpo_cache_slots_unlink(&c->slots, s);
+    ebpo_cache_slots_take(&c->slots, s);
     c->passing += s->bytes;
     s->chain = *leaving;
     *leaving = s;
@@ -197,7 +109,7 @@ static uint64_t kept_for(const ebpo_cache *c, const demand *d)
 {
     uint64_t bytes = 0;
     for (unsigned i = 0; d->ahead && i < c->ahead_count; i++) {
-        const slot *s = find(c, c->ahead[i]);
+        const ebpo_cache_slot *s = ebpo_cache_slots_find(&c->slots, c->ahead[i]);
         bytes += s && s->state == READY && !s->pins ? s->bytes : 0;
     }
     return bytes;
@@ -217,9 +129,9 @@ static room make_room(ebpo_cache *c, const demand *d)
             return ROOM_NEVER;
         if (sum(held, c->passing) > c->budget)
             return ROOM_LATER;
-        slot *leaving = NULL;
+        ebpo_cache_slot *leaving = NULL;
         uint64_t left = sum(c->stats.bytes, d->peak);
-        for (slot *s = c->oldest, *newer; s && left > c->budget; s = newer) {
+        for (ebpo_cache_slot *s = c->slots.oldest, *newer; s && left > c->budget; s = newer) {
             newer = s->newer;
             if (d->ahead && asked_ahead(c, s->key))
                 continue;
@@ -256,7 +168,7 @@ static ebpo_status wait_for_room(ebpo_cache *c, uint64_t peak, ebpo_error *error
 
 /* Ends a load: `reserved` gives way to the item, which is pinned by whoever waits for it (and `own`
  * times more), or to nothing. */
-static void settle(ebpo_cache *c, slot *s, bool loaded, uint64_t reserved, unsigned own)
+static void settle(ebpo_cache *c, ebpo_cache_slot *s, bool loaded, uint64_t reserved, unsigned own)
 {
     c->stats.bytes -= reserved;
     c->passing -= reserved;
@@ -267,9 +179,9 @@ static void settle(ebpo_cache *c, slot *s, bool loaded, uint64_t reserved, unsig
         if (s->pins)
             c->pinned += s->bytes;
         else
-            link_newest(c, s);
+            ebpo_cache_slots_link(&c->slots, s);
     } else {
-        take_out(c, s);
+        ebpo_cache_slots_take(&c->slots, s);
         s->state = FAILED;
         if (s->waiters == 0)
             free(s);
@@ -287,7 +199,8 @@ static ebpo_status estimate(ebpo_cache *c, uint64_t key, uint64_t *peak, ebpo_er
 }
 
 /* Calls the source, without the lock; an item that is larger than was said cannot stay. */
-static ebpo_status call_load(ebpo_cache *c, slot *s, uint64_t reserved, ebpo_error *error)
+static ebpo_status call_load(ebpo_cache *c, ebpo_cache_slot *s, uint64_t reserved,
+                             ebpo_error *error)
 {
     void *item = NULL;
     uint64_t bytes = 0;
@@ -307,7 +220,8 @@ static ebpo_status call_load(ebpo_cache *c, slot *s, uint64_t reserved, ebpo_err
 /* The lock is held at beginning and end. */
 static ebpo_status load_here(ebpo_cache *c, uint64_t key, void **item, ebpo_error *error)
 {
-    slot *s = add_slot(c, key); /* from here on others wait for this load */
+    ebpo_cache_slot *s =
+        ebpo_cache_slots_add(&c->slots, key); /* from here on others wait for this load */
     uint64_t peak = 0, reserved = 0;
     if (!s)
         return ebpo_fail_memory(error, sizeof *s);
@@ -331,7 +245,7 @@ static ebpo_status load_here(ebpo_cache *c, uint64_t key, void **item, ebpo_erro
 }
 
 /* Waits for another thread's load; false when it failed. The pin is already taken for us. */
-static bool wait_for(ebpo_cache *c, slot *s, void **item)
+static bool wait_for(ebpo_cache *c, ebpo_cache_slot *s, void **item)
 {
     s->waiters++;
     while (s->state == LOADING)
@@ -348,7 +262,7 @@ static bool wait_for(ebpo_cache *c, slot *s, void **item)
 
 static ebpo_status wait_or_load(ebpo_cache *c, uint64_t key, void **item, ebpo_error *error)
 {
-    for (slot *s; (s = find(c, key)) != NULL;) {
+    for (ebpo_cache_slot *s; (s = ebpo_cache_slots_find(&c->slots, key)) != NULL;) {
         if (s->state == READY) {
             pin(c, s);
             *item = s->item;
@@ -360,18 +274,25 @@ static ebpo_status wait_or_load(ebpo_cache *c, uint64_t key, void **item, ebpo_e
     return load_here(c, key, item, error);
 }
 
+/* Pins an item that is there. */
+static bool take_ready(ebpo_cache *c, uint64_t key, void **item)
+{
+    ebpo_cache_slot *s = ebpo_cache_slots_find(&c->slots, key);
+    if (!s || s->state != READY)
+        return false;
+    pin(c, s);
+    *item = s->item;
+    c->stats.hits++;
+    return true;
+}
+
 ebpo_status ebpo_cache_get(ebpo_cache *c, uint64_t key, void **item, bool *hit, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     *item = NULL;
     pthread_mutex_lock(&c->lock);
-    slot *s = find(c, key);
-    bool there = s && s->state == READY;
-    if (there) {
-        pin(c, s);
-        *item = s->item;
-        c->stats.hits++;
-    } else {
+    bool there = take_ready(c, key, item);
+    if (!there) {
         double begin = now();
         status = wait_or_load(c, key, item, error);
         c->stats.load_seconds += now() - begin;
@@ -385,13 +306,7 @@ ebpo_status ebpo_cache_get(ebpo_cache *c, uint64_t key, void **item, bool *hit, 
 bool ebpo_cache_try(ebpo_cache *c, uint64_t key, void **item)
 {
     pthread_mutex_lock(&c->lock);
-    slot *s = find(c, key);
-    bool there = s && s->state == READY;
-    if (there) {
-        pin(c, s);
-        *item = s->item;
-        c->stats.hits++;
-    }
+    bool there = take_ready(c, key, item);
     pthread_mutex_unlock(&c->lock);
     return there;
 }
@@ -399,7 +314,7 @@ bool ebpo_cache_try(ebpo_cache *c, uint64_t key, void **item)
 bool ebpo_cache_has(ebpo_cache *c, uint64_t key)
 {
     pthread_mutex_lock(&c->lock);
-    slot *s = find(c, key);
+    ebpo_cache_slot *s = ebpo_cache_slots_find(&c->slots, key);
     bool there = s && s->state == READY;
     pthread_mutex_unlock(&c->lock);
     return there;
@@ -408,10 +323,10 @@ bool ebpo_cache_has(ebpo_cache *c, uint64_t key)
 void ebpo_cache_unpin(ebpo_cache *c, uint64_t key)
 {
     pthread_mutex_lock(&c->lock);
-    slot *s = find(c, key);
+    ebpo_cache_slot *s = ebpo_cache_slots_find(&c->slots, key);
     if (s && s->pins && --s->pins == 0) {
         c->pinned -= s->bytes;
-        link_newest(c, s);
+        ebpo_cache_slots_link(&c->slots, s);
         pthread_cond_broadcast(&c->changed);
     }
     pthread_mutex_unlock(&c->lock);
@@ -423,7 +338,8 @@ void ebpo_cache_unpin(ebpo_cache *c, uint64_t key)
  * Nobody waits for our key meanwhile: whoever wants it loads it. */
 static bool load_ahead(ebpo_cache *c, demand *d)
 {
-    slot *s = find(c, d->key) ? NULL : add_slot(c, d->key);
+    ebpo_cache_slot *s =
+        ebpo_cache_slots_find(&c->slots, d->key) ? NULL : ebpo_cache_slots_add(&c->slots, d->key);
     if (!s)
         return true;
     if (!d->known) {
@@ -490,10 +406,10 @@ static void take_list(ebpo_cache *c, const uint64_t *keys, unsigned count)
         if (!asked_ahead(c, keys[i]))
             c->ahead[c->ahead_count++] = keys[i];
     for (unsigned i = c->ahead_count; i-- > 0;) {
-        slot *s = find(c, c->ahead[i]);
+        ebpo_cache_slot *s = ebpo_cache_slots_find(&c->slots, c->ahead[i]);
         if (s && s->state == READY && !s->pins) {
-            unlink_used(c, s);
-            link_newest(c, s);
+            ebpo_cache_slots_unlink(&c->slots, s);
+            ebpo_cache_slots_link(&c->slots, s);
         }
     }
 }
@@ -514,20 +430,15 @@ void ebpo_cache_prefetch(ebpo_cache *c, const uint64_t *keys, unsigned count)
 ebpo_status ebpo_cache_make(ebpo_cache **out, const ebpo_cache_source *source, const char *name,
                             uint64_t budget, ebpo_error *error)
 {
-    enum { BUCKETS = 64 };
     *out = NULL;
     ebpo_cache *c = ebpo_alloc_zero(1, sizeof *c);
-    slot **bucket = ebpo_alloc_zero(BUCKETS, sizeof *bucket);
-    if (!c || !bucket) {
-        free(bucket);
+    if (!c || !ebpo_cache_slots_make(&c->slots)) {
         free(c);
-        return ebpo_fail_memory(error, sizeof *c + BUCKETS * sizeof(slot *));
+        return ebpo_fail_memory(error, sizeof *c);
     }
     c->source = *source;
     strncpy(c->name, name, sizeof c->name - 1);
     c->budget = budget;
-    c->bucket = bucket;
-    c->bucket_count = BUCKETS;
     pthread_mutex_init(&c->lock, NULL);
     pthread_cond_init(&c->changed, NULL);
     pthread_cond_init(&c->asked, NULL);
@@ -537,10 +448,10 @@ ebpo_status ebpo_cache_make(ebpo_cache **out, const ebpo_cache_source *source, c
 
 void ebpo_cache_clear(ebpo_cache *c)
 {
-    slot *leaving = NULL;
+    ebpo_cache_slot *leaving = NULL;
     pthread_mutex_lock(&c->lock);
-    while (c->oldest)
-        drop(c, c->oldest, &leaving);
+    while (c->slots.oldest)
+        drop(c, c->slots.oldest, &leaving);
     release_all(c, leaving);
     pthread_mutex_unlock(&c->lock);
 }
@@ -563,8 +474,8 @@ void ebpo_cache_free(ebpo_cache *c)
     pthread_mutex_unlock(&c->lock);
     if (c->ahead_runs)
         pthread_join(c->ahead_thread, NULL);
-    for (uint64_t i = 0; i < c->bucket_count; i++)
-        for (slot *s = c->bucket[i], *next; s; s = next) {
+    for (uint64_t i = 0; i < c->slots.bucket_count; i++)
+        for (ebpo_cache_slot *s = c->slots.bucket[i], *next; s; s = next) {
             next = s->chain;
             c->source.release(c->source.user, s->item);
             free(s);
@@ -572,6 +483,6 @@ void ebpo_cache_free(ebpo_cache *c)
     pthread_cond_destroy(&c->asked);
     pthread_cond_destroy(&c->changed);
     pthread_mutex_destroy(&c->lock);
-    free(c->bucket);
+    free(c->slots.bucket);
     free(c);
 }
