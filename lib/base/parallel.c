@@ -73,10 +73,8 @@ static void work(run *r, unsigned number)
         uint64_t done = atomic_fetch_add(&r->done, end - begin) + (end - begin);
         if (number == 0 && r->progress && r->progress->report && now() - last > 0.1) {
             last = now();
-            if (!r->progress->report(r->progress->user, r->stage, done, r->count)) {
-                ebpo_fail(&error, EBPO_E_CANCELLED, "stopped on request during %s", r->stage);
+            if (!ebpo_progress_step(r->progress, r->stage, done, r->count, &error))
                 record_failure(r, begin, EBPO_E_CANCELLED, &error);
-            }
         }
     }
 }

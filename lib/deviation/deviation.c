@@ -164,10 +164,9 @@ static ebpo_status search(survey *s, const ebpo_deviation_options *o, ebpo_devia
         gather(s, done, done + size, out);
         done += size;
         block = block < BLOCK_MOST ? 2 * block : block;
-        if (status == EBPO_OK && s->progress->report &&
-            !s->progress->report(s->progress->user, "bounding envelopes", done, s->count))
-            status = ebpo_fail(s->error, EBPO_E_CANCELLED,
-                               "stopped on request while envelopes were bounded");
+        if (status == EBPO_OK &&
+            !ebpo_progress_step(s->progress, "bounding envelopes", done, s->count, s->error))
+            status = EBPO_E_CANCELLED;
     }
     return status;
 }

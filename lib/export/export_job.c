@@ -3,20 +3,15 @@
 #include <inttypes.h>
 
 #include "base/error.h"
-
-static bool goes_on(const ebpo_export_job *job, int i)
-{
-    const ebpo_progress *p = &job->options->progress;
-    return !p->report ||
-           p->report(p->user, "exporting", (uint64_t)i, (uint64_t)ebpo_block_count(job->options));
-}
+#include "base/parallel.h"
 
 ebpo_status ebpo_export_read_block(const ebpo_export_job *job, int i, ebpo_block_order order,
                                    ebpo_block *out, ebpo_error *error)
 {
     *out = (ebpo_block){ 0 };
-    if (!goes_on(job, i))
-        return ebpo_fail(error, EBPO_E_CANCELLED, "stopped as asked; nothing was written");
+    if (!ebpo_progress_step(&job->options->progress, "exporting", (uint64_t)i,
+                            (uint64_t)ebpo_block_count(job->options), error))
+        return EBPO_E_CANCELLED;
     ebpo_status status = ebpo_block_read(out, job->file, ebpo_block_level(job->options, i), order,
                                          job->options, error);
     if (status == EBPO_OK)

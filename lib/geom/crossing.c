@@ -2,19 +2,8 @@
  * Source of the shift: Edelsbrunner and Muecke, "Simulation of Simplicity", 1990. */
 #include "geom/strict_fp.h"
 
+#include "geom/min_max.h"
 #include "geom/predicates.h"
-
-static inline double min3(double a, double b, double c)
-{
-    double low = a < b ? a : b;
-    return low < c ? low : c;
-}
-
-static inline double max3(double a, double b, double c)
-{
-    double high = a > b ? a : b;
-    return high > c ? high : c;
-}
 
 static inline int compare(double a, double b) { return (a > b) - (a < b); }
 
@@ -64,8 +53,8 @@ static inline bool misses_bounds(const double from[3], double to, int axis, cons
                                  const double b[3], const double c[3])
 {
     for (int k = 0; k < 3; k++)
-        if ((k == axis ? to : from[k]) < min3(a[k], b[k], c[k]) ||
-            from[k] >= max3(a[k], b[k], c[k]))
+        if ((k == axis ? to : from[k]) < ebpo_min3(a[k], b[k], c[k]) ||
+            from[k] >= ebpo_max3(a[k], b[k], c[k]))
             return true;
     return false;
 }
@@ -81,9 +70,9 @@ int ebpo_axis_crossing(const double from[3], double to, int axis, const double a
     if (turn == 0 || shifted_side2d(axis, b, c, from) != turn ||
         shifted_side2d(axis, c, a, from) != turn)
         return 0;
-    if (from[axis] >= min3(a[axis], b[axis], c[axis]) && shifted_side3d(a, b, c, from) == turn)
+    if (from[axis] >= ebpo_min3(a[axis], b[axis], c[axis]) && shifted_side3d(a, b, c, from) == turn)
         return 0;
-    if (to < max3(a[axis], b[axis], c[axis])) {
+    if (to < ebpo_max3(a[axis], b[axis], c[axis])) {
         double end[3] = { from[0], from[1], from[2] };
         end[axis] = to;
         if (shifted_side3d(a, b, c, end) != turn)
@@ -105,7 +94,7 @@ bool ebpo_point_on_triangle(const double p[3], const double a[3], const double b
                             const double c[3])
 {
     for (int k = 0; k < 3; k++)
-        if (p[k] < min3(a[k], b[k], c[k]) || p[k] > max3(a[k], b[k], c[k]))
+        if (p[k] < ebpo_min3(a[k], b[k], c[k]) || p[k] > ebpo_max3(a[k], b[k], c[k]))
             return false;
     if (ebpo_orient3d(a, b, c, p) != 0)
         return false;

@@ -395,3 +395,11 @@ bool ebpo_polytope_child(const ebpo_polytope *p, unsigned octant, ebpo_polytope 
     some = ebpo_polytope_half(&z, 1, octant >> 1 & 1, &y) && some;
     return ebpo_polytope_half(&y, 0, octant & 1, out) && some;
 }
+
+void ebpo_polytope_sides(const ebpo_polytope *p, uint8_t sides[EBPO_POLYTOPE_VERTICES])
+{
+    memset(sides, 0, EBPO_POLYTOPE_VERTICES);
+    for (int f = 0; f < p->face_count; f++)
+        for (int i = p->first[f]; p->tag[f] < 0 && i < p->first[f + 1]; i++)
+            sides[p->corner[i]] |= (uint8_t)(1u << (-1 - p->tag[f]));
+}

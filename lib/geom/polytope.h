@@ -49,6 +49,10 @@ bool ebpo_polytope_half(const ebpo_polytope *p, int axis, int side, ebpo_polytop
 /* Copies what is in use: much less than the struct. */
 void ebpo_polytope_copy(ebpo_polytope *to, const ebpo_polytope *from);
 
+/* Of each vertex bit 2 * axis + side for each wall of the cube that it lies on, whatever rounding
+ * made of it. */
+void ebpo_polytope_sides(const ebpo_polytope *p, uint8_t sides[EBPO_POLYTOPE_VERTICES]);
+
 double ebpo_polytope_volume(const ebpo_polytope *p);
 
 /* Volume that clipping by n . x <= d would remove; 0 when it is certainly below `least`, for which

@@ -26,27 +26,6 @@ void ebpo_polyhedra_free(ebpo_polyhedra *piece)
     piece->node_count = piece->node_capacity = piece->polygon_count = piece->polygon_capacity = 0;
 }
 
-/* `sides`: bit 2 * axis + side for each cell wall that the point lies on, whatever rounding made of
- * it. Such points get the wall's own coordinate, so that neighbouring cells agree to the last bit.
- */
-static double to_model(const ebpo_box *box, ebpo_cell cell, int axis, double xi, unsigned sides)
-{
-    double low = ebpo_wall(box, axis, cell.level, cell.at[axis]);
-    if (xi <= 0 || sides >> 2 * axis & 1)
-        return low;
-    if (xi >= 1 || sides >> (2 * axis + 1) & 1)
-        return ebpo_wall(box, axis, cell.level, cell.at[axis] + 1);
-    return low + xi * (box->size[axis] / (double)(1u << cell.level));
-}
-
-static void find_sides(const ebpo_polytope *p, uint8_t sides[EBPO_POLYTOPE_VERTICES])
-{
-    memset(sides, 0, EBPO_POLYTOPE_VERTICES);
-    for (int f = 0; f < p->face_count; f++)
-        for (int i = p->first[f]; p->tag[f] < 0 && i < p->first[f + 1]; i++)
-            sides[p->corner[i]] |= (uint8_t)(1u << (-1 - p->tag[f]));
-}
-
 static void add_fan(ebpo_polyhedra *piece, const uint32_t *number, const uint16_t *loop,
                     int corners)
 {
@@ -95,7 +74,7 @@ ebpo_status ebpo_polyhedra_add(ebpo_polyhedra *piece, const ebpo_polytope *p, co
                                 (piece->vertex_count + piece->face_count) * 3 * sizeof(double));
     uint32_t number[EBPO_POLYTOPE_VERTICES];
     uint8_t sides[EBPO_POLYTOPE_VERTICES];
-    find_sides(p, sides);
+    ebpo_polytope_sides(p, sides);
     memset(number, 0xff, sizeof number);
     uint64_t first_vertex = piece->vertex_count;
     for (int f = 0; f < p->face_count; f++) {
@@ -107,7 +86,7 @@ ebpo_status ebpo_polyhedra_add(ebpo_polyhedra *piece, const ebpo_polytope *p, co
                 continue;
             for (int k = 0; k < 3; k++)
                 piece->xyz[3 * piece->vertex_count + (uint64_t)k] =
-                    to_model(box, cell, k, p->vertex[v][k], sides[v]);
+                    ebpo_wall_point(box, cell, k, p->vertex[v][k], sides[v]);
             number[v] = (uint32_t)piece->vertex_count++;
         }
         add_fan(piece, number, p->corner + p->first[f], p->first[f + 1] - p->first[f]);

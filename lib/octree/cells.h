@@ -108,4 +108,17 @@ static inline bool ebpo_locate(const ebpo_box *box, int level, const double p[3]
     return true;
 }
 
+/* From the cell's coordinates to the model's. A point on a wall (`sides`: ebpo_polytope_sides) gets
+ * the wall's own coordinate, so that neighbouring cells agree to the last bit. */
+static inline double ebpo_wall_point(const ebpo_box *box, ebpo_cell cell, int axis, double xi,
+                                     unsigned sides)
+{
+    double low = ebpo_wall(box, axis, cell.level, cell.at[axis]);
+    if (xi <= 0 || sides >> 2 * axis & 1)
+        return low;
+    if (xi >= 1 || sides >> (2 * axis + 1) & 1)
+        return ebpo_wall(box, axis, cell.level, cell.at[axis] + 1);
+    return low + xi * (box->size[axis] / (double)(1u << cell.level));
+}
+
 #endif

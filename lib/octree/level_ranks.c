@@ -62,28 +62,18 @@ static ebpo_status sums_disagree(int number, const char *what, ebpo_error *error
                      "level %d: the counts of its %s do not add up; run ebpo verify", number, what);
 }
 
-static ebpo_status sum8(uint64_t **out, const uint8_t *counts, uint64_t count, uint64_t total,
-                        int number, const char *what, ebpo_error *error)
+/* The sums of the counts before each; `bytes`: of a count, 1 or 4. */
+static ebpo_status sum_before(uint64_t **out, const void *counts, size_t bytes, uint64_t count,
+                              uint64_t total, int number, const char *what, ebpo_error *error)
 {
+    const uint8_t *narrow = counts;
+    const uint32_t *wide = counts;
     if (!(*out = ebpo_alloc(count, sizeof **out)))
         return ebpo_fail_memory(error, count * sizeof **out);
     uint64_t sum = 0;
     for (uint64_t i = 0; i < count; i++) {
         (*out)[i] = sum;
-        sum += counts[i];
-    }
-    return sum == total ? EBPO_OK : sums_disagree(number, what, error);
-}
-
-static ebpo_status sum32(uint64_t **out, const uint32_t *counts, uint64_t count, uint64_t total,
-                         int number, const char *what, ebpo_error *error)
-{
-    if (!(*out = ebpo_alloc(count, sizeof **out)))
-        return ebpo_fail_memory(error, count * sizeof **out);
-    uint64_t sum = 0;
-    for (uint64_t i = 0; i < count; i++) {
-        (*out)[i] = sum;
-        sum += counts[i];
+        sum += bytes == 1 ? narrow[i] : wide[i];
     }
     return sum == total ? EBPO_OK : sums_disagree(number, what, error);
 }
@@ -94,14 +84,14 @@ ebpo_status ebpo_level_ranks_make(ebpo_level_ranks *out, const ebpo_level *level
     memset(out, 0, sizeof *out);
     ebpo_status status = make_ranks(out, level, number, error);
     if (status == EBPO_OK && level->plane_counts)
-        status = sum8(&out->plane_first, level->plane_counts, level->gray_count, level->plane_count,
-                      number, "planes", error);
+        status = sum_before(&out->plane_first, level->plane_counts, 1, level->gray_count,
+                            level->plane_count, number, "planes", error);
     if (status == EBPO_OK && level->leaf_plane_counts)
-        status = sum8(&out->leaf_plane_first, level->leaf_plane_counts, level->leaf_count,
-                      level->leaf_plane_count, number, "leaf planes", error);
+        status = sum_before(&out->leaf_plane_first, level->leaf_plane_counts, 1, level->leaf_count,
+                            level->leaf_plane_count, number, "leaf planes", error);
     if (status == EBPO_OK && level->leaf_ref_count)
-        status = sum32(&out->ref_first, level->leaf_ref_count, level->leaf_count, level->ref_count,
-                       number, "face lists", error);
+        status = sum_before(&out->ref_first, level->leaf_ref_count, 4, level->leaf_count,
+                            level->ref_count, number, "face lists", error);
     if (status != EBPO_OK)
         ebpo_level_ranks_free(out);
     return status;

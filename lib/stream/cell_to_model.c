@@ -3,7 +3,8 @@
 #include "stream/cell_to_model.h"
 
 #include <math.h>
-#include <string.h>
+
+#include "octree/cells.h"
 
 /* With t the cell's shortest side and N = t n / size, the half-space is N . (p - corner) <= t d /
  * 4096. For any normal a, any factor f > 0, and p in the cell: a . p = a . corner + f N . (p -
@@ -36,26 +37,12 @@ void ebpo_plane_to_world(const ebpo_box *box, ebpo_cell cell, const int32_t n[3]
              (16 * DBL_EPSILON * reach + 4 * DBL_MIN * bulk + 64 * DBL_TRUE_MIN);
 }
 
-static double to_world(const ebpo_box *box, ebpo_cell cell, int axis, double xi, unsigned sides)
-{
-    double low = ebpo_wall(box, axis, cell.level, cell.at[axis]);
-    if (xi <= 0 || sides >> 2 * axis & 1)
-        return low;
-    if (xi >= 1 || sides >> (2 * axis + 1) & 1)
-        return ebpo_wall(box, axis, cell.level, cell.at[axis] + 1);
-    return low + xi * (box->size[axis] / (double)(1u << cell.level));
-}
-
 void ebpo_polytope_to_world(const ebpo_polytope *p, const ebpo_box *box, ebpo_cell cell,
                             double (*out)[3])
 {
-    /* bit 2 * axis + side: on that wall, whatever rounding made of it */
     uint8_t sides[EBPO_POLYTOPE_VERTICES];
-    memset(sides, 0, sizeof sides);
-    for (int f = 0; f < p->face_count; f++)
-        for (int i = p->first[f]; p->tag[f] < 0 && i < p->first[f + 1]; i++)
-            sides[p->corner[i]] |= (uint8_t)(1u << (-1 - p->tag[f]));
+    ebpo_polytope_sides(p, sides);
     for (int v = 0; v < p->vertex_count; v++)
         for (int k = 0; k < 3; k++)
-            out[v][k] = to_world(box, cell, k, p->vertex[v][k], sides[v]);
+            out[v][k] = ebpo_wall_point(box, cell, k, p->vertex[v][k], sides[v]);
 }

@@ -5,6 +5,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/parallel.h"
 #include "octree/cells.h"
 #include "octree/node_types.h"
 #include "subset/subset_parts.h"
@@ -294,13 +295,11 @@ ebpo_status ebpo_cut_levels(ebpo_cutting *c)
     ebpo_status status = d.parent ? EBPO_OK : ebpo_fail_memory(c->error, sizeof *d.parent);
     info->level_count = 0;
     for (; d.goes_on && status == EBPO_OK; d.level++) {
-        const ebpo_progress *progress = &c->options->progress;
-        if (progress->report && !progress->report(progress->user, "reading levels",
-                                                  (uint64_t)d.level, (uint64_t)c->last_level + 1))
-            status =
-                ebpo_fail(c->error, EBPO_E_CANCELLED, "stopped on request while levels were read");
-        if (status != EBPO_OK)
+        if (!ebpo_progress_step(&c->options->progress, "reading levels", (uint64_t)d.level,
+                                (uint64_t)c->last_level + 1, c->error)) {
+            status = EBPO_E_CANCELLED;
             break;
+        }
         d.to = &c->out->level[d.level];
         d.read = (passed){ { 0 }, 0, 0, 0 };
         d.filled = 0;

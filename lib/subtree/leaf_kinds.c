@@ -16,6 +16,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
+#include "geom/min_max.h"
 #include "geom/predicates.h"
 #include "subtree/subtree_parts.h"
 
@@ -44,18 +45,6 @@ typedef struct job {
 
 enum { LEAVES_A_PIECE = 2048 };
 
-static inline double least3(double a, double b, double c)
-{
-    double low = a < b ? a : b;
-    return low < c ? low : c;
-}
-
-static inline double most3(double a, double b, double c)
-{
-    double high = a > b ? a : b;
-    return high > c ? high : c;
-}
-
 /* The boxes of a block's faces, and those that meet the cell. */
 typedef struct block_boxes {
     double least[3][EBPO_BLOCK], most[3][EBPO_BLOCK];
@@ -78,8 +67,8 @@ static void look_at_block(const ebpo_subtree *s, const ebpo_listed_block *listed
                 x[i][lane] = s->wide ? s->block64[at] : (double)s->block32[at];
             }
         for (int lane = 0; lane < EBPO_BLOCK; lane++) {
-            double least = least3(x[0][lane], x[1][lane], x[2][lane]),
-                   most = most3(x[0][lane], x[1][lane], x[2][lane]);
+            double least = ebpo_min3(x[0][lane], x[1][lane], x[2][lane]),
+                   most = ebpo_max3(x[0][lane], x[1][lane], x[2][lane]);
             out->least[k][lane] = least;
             out->most[k][lane] = most;
             away[lane] |= (least > high[k]) | (most < low[k]);
@@ -208,7 +197,7 @@ static bool face_plane(const ebpo_subtree *s, const leaf_faces *f, int face, pla
         out->n[k] = a - b;
         norm += fabs(a - b);
         products += fabs(a) + fabs(b);
-        reach = most3(reach, most3(fabs(p[0][k]), fabs(p[1][k]), fabs(p[2][k])), 0);
+        reach = ebpo_max3(reach, ebpo_max3(fabs(p[0][k]), fabs(p[1][k]), fabs(p[2][k])), 0);
     }
     /* n is right to 2^-50 of the products, so to 2^-40 of its norm, and n . xi to 2^-33 for every
      * corner: less than what sides_of calls certain. */
