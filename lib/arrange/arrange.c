@@ -431,9 +431,9 @@ static void put_in_place(arranging *a)
     struct ebpo_arrangement *before = mesh->arrangement;
     compose(before, mesh->workspace, a->to->vertex_source, mesh->vertex_count);
     ebpo_arrangement_free(before);
-    ebpo_array_free(mesh->xyz32);
-    ebpo_array_free(mesh->xyz64);
-    ebpo_array_free(mesh->faces);
+    ebpo_array_free(mesh->workspace, mesh->xyz32);
+    ebpo_array_free(mesh->workspace, mesh->xyz64);
+    ebpo_array_free(mesh->workspace, mesh->faces);
     mesh->xyz32 = a->xyz32;
     mesh->xyz64 = a->xyz64;
     mesh->faces = a->faces;
@@ -457,6 +457,8 @@ static ebpo_status run(arranging a, int level, ebpo_error *error)
     if (mesh->arrangement && mesh->arrangement->key && mesh->arrangement->level == level)
         return EBPO_OK; /* it would come out the same */
     a.to = ebpo_alloc_zero(1, sizeof *a.to);
+    if (a.to)
+        a.to->workspace = mesh->workspace;
     status = a.to ? look_at_all(&a, level, error) : ebpo_fail_memory(error, sizeof *a.to);
     if (status == EBPO_OK)
         status = sort_vertices(&a, error);
@@ -467,12 +469,12 @@ static ebpo_status run(arranging a, int level, ebpo_error *error)
         put_in_place(&a);
     }
     ebpo_arrangement_free(a.to);
-    ebpo_array_free(a.referenced);
+    ebpo_array_free(mesh->workspace, a.referenced);
     free(a.bounds);
-    ebpo_array_free(a.xyz32);
-    ebpo_array_free(a.xyz64);
-    ebpo_array_free(a.corners);
-    ebpo_array_free(a.faces);
+    ebpo_array_free(mesh->workspace, a.xyz32);
+    ebpo_array_free(mesh->workspace, a.xyz64);
+    ebpo_array_free(mesh->workspace, a.corners);
+    ebpo_array_free(mesh->workspace, a.faces);
     return status;
 }
 

@@ -190,8 +190,8 @@ static ebpo_status sort_group(const sorting *t, uint64_t g, ebpo_error *error)
         }
         s->take(s->context, t->first[g], sorted, count);
     }
-    ebpo_array_free(keys);
-    ebpo_array_free(sorted);
+    ebpo_array_free(room, keys);
+    ebpo_array_free(room, sorted);
     return status;
 }
 
@@ -257,7 +257,7 @@ static ebpo_status run(sorting *t, ebpo_error *error)
     if (status == EBPO_OK)
         status =
             ebpo_parallel_for(s->threads, s->count, GRAIN, deal, t, &progress, s->stage, error);
-    ebpo_array_free(t->made);
+    ebpo_array_free(s->workspace, t->made);
     t->made = NULL;
     pass.begin = pass.end++;
     if (status == EBPO_OK)
@@ -285,8 +285,8 @@ ebpo_status ebpo_sort_run(const ebpo_sort *sort, ebpo_error *error)
     ebpo_status status = t.made && t.dealt && t.group_of && t.in_bin
                              ? run(&t, error)
                              : ebpo_workspace_fail(sort->workspace, 2 * bytes, error);
-    ebpo_array_free(t.made);
-    ebpo_array_free(t.dealt);
+    ebpo_array_free(sort->workspace, t.made);
+    ebpo_array_free(sort->workspace, t.dealt);
     free(t.first);
     free(t.next);
     free(t.group_of);

@@ -41,10 +41,10 @@ ebpo_status ebpo_build_check_branch(const ebpo_branch *s, ebpo_error *error)
 
 void ebpo_branch_forget(ebpo_branch *s)
 {
-    ebpo_array_free(s->nodes);
-    ebpo_array_free(s->details);
-    ebpo_array_free(s->entries);
-    ebpo_array_free(s->crossing);
+    ebpo_array_free(s->workspace, s->nodes);
+    ebpo_array_free(s->workspace, s->details);
+    ebpo_array_free(s->workspace, s->entries);
+    ebpo_array_free(s->workspace, s->crossing);
     s->nodes = NULL;
     s->details = NULL;
     s->entries = s->crossing = NULL;
@@ -55,9 +55,9 @@ void ebpo_branch_forget(ebpo_branch *s)
 void ebpo_subtree_release(ebpo_branch *s)
 {
     ebpo_branch_forget(s);
-    ebpo_array_free(s->list);
+    ebpo_array_free(s->workspace, s->list);
     free(s->fresh);
-    ebpo_array_free(s->above);
+    ebpo_array_free(s->workspace, s->above);
     ebpo_proposals_free(s->proposals);
     s->proposals = NULL;
     s->list = NULL;

@@ -64,6 +64,7 @@ typedef struct ebpo_branch {
     struct ebpo_proposals *proposals; /* NULL: planes are chosen on the way down */
     struct ebpo_piece_level *out;     /* [EBPO_LEVELS_MAX] what emit makes */
     ebpo_polytope *above;             /* the parent's envelope cut to this cell */
+    ebpo_workspace *workspace;        /* the builder's, of all arrays */
 } ebpo_branch;
 
 /* Bounds of runs of vertices, 16 to a block, 16 blocks to a block above, and so on. */
@@ -72,6 +73,7 @@ typedef struct ebpo_bounds {
     double (*box[EBPO_BOUNDS_LEVELS])[2][3]; /* box[k][i]: of vertices [i * 16^(k+1), ...) */
     uint64_t count[EBPO_BOUNDS_LEVELS];
     int levels;
+    ebpo_workspace *workspace; /* the builder's */
 } ebpo_bounds;
 
 typedef struct ebpo_builder {

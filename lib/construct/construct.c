@@ -192,7 +192,7 @@ static ebpo_status prepare(ebpo_builder *b, ebpo_mesh *mesh, const ebpo_mesh_rep
 static void builder_free(ebpo_builder *b)
 {
     ebpo_bounds_free(&b->bounds);
-    ebpo_array_free(b->number);
+    ebpo_array_free(b->workspace, b->number);
     ebpo_branch_free(&b->top);
     for (uint64_t i = 0; i < b->sub_count; i++)
         ebpo_branch_free(&b->sub[i]);
@@ -245,7 +245,7 @@ static ebpo_status build_pieces(ebpo_builder *b, ebpo_error *error)
     ebpo_status status =
         job.scratch ? EBPO_OK : ebpo_fail_memory(error, b->threads * sizeof *job.scratch);
     for (unsigned i = 0; i < b->threads && status == EBPO_OK; i++)
-        status = ebpo_emit_scratch_make(&job.scratch[i], error);
+        status = ebpo_emit_scratch_make(&job.scratch[i], b->workspace, error);
     if (status == EBPO_OK)
         status = ebpo_parallel_for(b->threads, b->sub_count, 1, work_on_pieces, &job,
                                    &b->options->progress, "envelopes", error);
@@ -295,9 +295,13 @@ ebpo_status ebpo_build(ebpo_mesh *mesh, const ebpo_mesh_report *report,
     EBPO_DEFAULT_FP;
     ebpo_build_options wanted = EBPO_BUILD_OPTIONS_INIT;
     ebpo_build_times times = EBPO_BUILD_TIMES_INIT, *asked = NULL;
-    ebpo_builder b = { .workspace = mesh->workspace };
+    ebpo_builder b = { .workspace = mesh->workspace,
+                       .top.workspace = mesh->workspace,
+                       .bounds.workspace = mesh->workspace };
     memset(out, 0, sizeof *out);
-    out->mesh.workspace = mesh->workspace;
+    out->workspace = out->mesh.workspace = mesh->workspace;
+    for (int i = 0; i < EBPO_LEVELS_MAX; i++)
+        out->level[i].workspace = mesh->workspace;
     ebpo_status status = EBPO_TAKE(ebpo_build_options, &wanted, options, error);
     if (status == EBPO_OK && wanted.times)
         status = EBPO_CHECK_SIZED(ebpo_build_times, wanted.times, error);

@@ -73,7 +73,7 @@ static bool hand_down(ebpo_builder *b, const pending *p, wave *next)
             continue;
         }
         if (!ebpo_grow(&next->nodes, &next->capacity, next->count + 1, sizeof *next->nodes)) {
-            ebpo_array_free(envelope);
+            ebpo_array_free(b->workspace, envelope);
             return false;
         }
         next->nodes[next->count++] = (pending){ node->child + o, ebpo_cell_child(p->cell, o),
@@ -85,7 +85,7 @@ static bool hand_down(ebpo_builder *b, const pending *p, wave *next)
 static void wave_free(wave *w)
 {
     for (uint64_t i = 0; i < w->count; i++)
-        ebpo_array_free(w->nodes[i].envelope);
+        ebpo_array_free(w->b->workspace, w->nodes[i].envelope);
     free(w->nodes);
     *w = (wave){ .b = w->b };
 }
@@ -101,7 +101,7 @@ static ebpo_status start(ebpo_builder *b, wave *w, ebpo_error *error)
         return EBPO_OK;
     }
     if (!ebpo_grow(&w->nodes, &w->capacity, 1, sizeof *w->nodes)) {
-        ebpo_array_free(cube);
+        ebpo_array_free(b->workspace, cube);
         return no_memory(b, error);
     }
     w->nodes[w->count++] = (pending){ 0, b->top.cell, 0, cube };

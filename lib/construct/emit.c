@@ -20,6 +20,7 @@ struct ebpo_emit_scratch {
     ebpo_envelope_scratch *envelope;
     ebpo_triangle *faces; /* of one leaf */
     uint64_t faces_capacity;
+    ebpo_workspace *workspace;
 };
 
 typedef struct emitter {
@@ -28,7 +29,8 @@ typedef struct emitter {
     ebpo_emit_scratch *scratch;
 } emitter;
 
-ebpo_status ebpo_emit_scratch_make(ebpo_emit_scratch **out, ebpo_error *error)
+ebpo_status ebpo_emit_scratch_make(ebpo_emit_scratch **out, ebpo_workspace *workspace,
+                                   ebpo_error *error)
 {
     *out = ebpo_alloc_zero(1, sizeof **out);
     ebpo_status status =
@@ -36,6 +38,8 @@ ebpo_status ebpo_emit_scratch_make(ebpo_emit_scratch **out, ebpo_error *error)
     if (status != EBPO_OK) {
         free(*out);
         *out = NULL;
+    } else {
+        (*out)->workspace = workspace;
     }
     return status;
 }
@@ -45,7 +49,7 @@ void ebpo_emit_scratch_free(ebpo_emit_scratch *scratch)
     if (!scratch)
         return;
     ebpo_scratch_free(scratch->envelope);
-    ebpo_array_free(scratch->faces);
+    ebpo_array_free(scratch->workspace, scratch->faces);
     free(scratch);
 }
 
@@ -54,7 +58,7 @@ static bool grow_leaf_arrays(ebpo_piece_level *out, uint64_t refs)
     ebpo_level *l = &out->level;
     uint64_t n = l->leaf_count + 1, *c = out->capacity;
 #define GROW(array, ID, need) \
-    ebpo_array_grow_late(out->workspace, &l->array, &c[EBPO_A_##ID], need, sizeof *l->array)
+    ebpo_array_grow_late(l->workspace, &l->array, &c[EBPO_A_##ID], need, sizeof *l->array)
     return GROW(leaf_winding, LEAF_WINDING, n) && GROW(leaf_first, LEAF_SKIP, n) &&
            GROW(leaf_new, LEAF_NEW, n) && GROW(leaf_ref_count, LEAF_REF_COUNT, n) &&
            GROW(leaf_plane_counts, LEAF_PLANE_COUNTS, n) &&
@@ -133,7 +137,7 @@ static bool emit_leaf(emitter *e, uint32_t detail, ebpo_cell cell, int32_t windi
     l->leaf_plane_counts[l->leaf_count++] = (uint8_t)planes;
     if (!stored)
         return true;
-    if (!ebpo_array_grow_late(out->workspace, &l->leaf_planes, &out->capacity[EBPO_A_LEAF_PLANES],
+    if (!ebpo_array_grow_late(l->workspace, &l->leaf_planes, &out->capacity[EBPO_A_LEAF_PLANES],
                               l->leaf_plane_count + (uint64_t)planes, sizeof *l->leaf_planes))
         return false;
     if (planes)
@@ -226,7 +230,7 @@ ebpo_status ebpo_emit_piece(const ebpo_builder *b, ebpo_emit_scratch *scratch, e
     emitter e = { b, s, scratch };
     s->out = ebpo_array_zero(b->workspace, EBPO_LEVELS_MAX, sizeof *s->out);
     for (int level = 0; s->out && level < EBPO_LEVELS_MAX; level++)
-        s->out[level].workspace = b->workspace;
+        s->out[level].level.workspace = b->workspace;
     if (!s->out || !emit(&e, 0, s->cell, s->winding, s->above))
         return ebpo_workspace_fail_while(b->workspace, "while computing envelopes", error);
     return EBPO_OK;

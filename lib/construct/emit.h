@@ -5,7 +5,8 @@
 #include "construct/builder.h"
 
 typedef struct ebpo_emit_scratch ebpo_emit_scratch;
-ebpo_status ebpo_emit_scratch_make(ebpo_emit_scratch **out, ebpo_error *error);
+ebpo_status ebpo_emit_scratch_make(ebpo_emit_scratch **out, ebpo_workspace *workspace,
+                                   ebpo_error *error);
 void ebpo_emit_scratch_free(ebpo_emit_scratch *scratch);
 
 /* What leaves refer to (leaf_refs) is still told by the faces' numbers along the curve. */

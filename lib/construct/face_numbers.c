@@ -170,7 +170,7 @@ ebpo_status ebpo_build_mesh(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, eb
         status = ebpo_workspace_fail(b->workspace, nv * 16 + nf * 16, error);
     else
         status = move_all(&job, final, error);
-    ebpo_array_free(face_at);
-    ebpo_array_free(final);
+    ebpo_array_free(b->workspace, face_at);
+    ebpo_array_free(b->workspace, final);
     return status;
 }

@@ -41,13 +41,13 @@ static ebpo_piece_level *current(joiner *j)
 {
     if (j->current)
         return j->current;
-    ebpo_piece_level *out = ebpo_alloc_zero(EBPO_LEVELS_MAX, sizeof *out);
+    ebpo_piece_level *out = ebpo_array_zero(j->b->workspace, EBPO_LEVELS_MAX, sizeof *out);
     if (!out || !push(j, out)) {
-        free(out);
+        ebpo_array_free(j->b->workspace, out);
         return NULL;
     }
     for (int level = 0; level < EBPO_LEVELS_MAX; level++)
-        out[level].workspace = j->b->workspace;
+        out[level].level.workspace = j->b->workspace;
     return j->current = out;
 }
 
@@ -129,7 +129,7 @@ static bool join_array(const joiner *j, int level, int id, ebpo_level *out)
             ebpo_array_copy(j->b->workspace, to, array, bytes);
         to += bytes;
         if (!j->stretch[i][level].packed)
-            ebpo_array_free(array);
+            ebpo_array_free(j->b->workspace, array);
         ebpo_level_set_array(from, id, NULL);
         ebpo_workspace_settle(j->b->workspace);
     }
@@ -213,7 +213,7 @@ static void leave_out(const ebpo_builder *b, ebpo_level *l)
     ebpo_level_drop(l, ~(parts | (b->solid ? EBPO_NEEDS_SOLID : 0) | EBPO_NEEDS_ALWAYS));
     for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
         if (ebpo_schema[id].if_needed && ebpo_level_is_usual(l, id)) {
-            ebpo_array_free(ebpo_level_array(l, id));
+            ebpo_array_free(l->workspace, ebpo_level_array(l, id));
             ebpo_level_set_array(l, id, NULL);
         }
     if (!(parts & EBPO_PART_MESH))

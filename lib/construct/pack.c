@@ -13,6 +13,7 @@ enum { STORE_BYTES = 16 << 20, ALIGNMENT = 8 };
 
 /* Blocks of the workspace, filled one after the other. */
 struct ebpo_store {
+    ebpo_workspace *workspace;
     pthread_mutex_t lock;
     char **blocks;
     uint64_t block_count, block_capacity;
@@ -47,8 +48,10 @@ static bool make_store(ebpo_builder *b)
 {
     static pthread_mutex_t making = PTHREAD_MUTEX_INITIALIZER;
     pthread_mutex_lock(&making);
-    if (!b->store && (b->store = ebpo_alloc_zero(1, sizeof *b->store)))
+    if (!b->store && (b->store = ebpo_alloc_zero(1, sizeof *b->store))) {
         pthread_mutex_init(&b->store->lock, NULL);
+        b->store->workspace = b->workspace;
+    }
     pthread_mutex_unlock(&making);
     return b->store != NULL;
 }
@@ -78,7 +81,7 @@ static void pack_array(const ebpo_builder *b, ebpo_level *level, int id, char *t
     uint64_t bytes = ebpo_level_rows(level, id) * ebpo_schema[id].held_size;
     if (array && bytes)
         ebpo_array_copy(b->workspace, to, array, bytes);
-    ebpo_array_free(array);
+    ebpo_array_free(b->workspace, array);
     ebpo_level_set_array(level, id, array && bytes ? to : NULL);
 }
 
@@ -109,7 +112,7 @@ void ebpo_store_free(struct ebpo_store *store)
     if (!store)
         return;
     for (uint64_t i = 0; i < store->block_count; i++)
-        ebpo_array_free(store->blocks[i]);
+        ebpo_array_free(store->workspace, store->blocks[i]);
     free(store->blocks);
     pthread_mutex_destroy(&store->lock);
     free(store);

@@ -273,8 +273,8 @@ ebpo_status ebpo_build_partition(ebpo_builder *b, ebpo_branch *s, ebpo_error *er
     ebpo_status status = grow_from_list(&g);
     if (status == EBPO_OK)
         s->root_type = s->nodes[0].type;
-    ebpo_array_free(g.stack);
-    ebpo_array_free(g.mask);
+    ebpo_array_free(b->workspace, g.stack);
+    ebpo_array_free(b->workspace, g.mask);
     free(g.faces);
     free(g.set.slots);
     return status;

@@ -9,7 +9,6 @@
 /* Of one level. */
 typedef struct ebpo_piece_level {
     ebpo_level level;
-    ebpo_workspace *workspace;            /* for large arrays */
     bool packed;                          /* its arrays are in the builder's store */
     uint64_t capacity[EBPO_LEVEL_ARRAYS]; /* by ebpo_array_id */
 } ebpo_piece_level;

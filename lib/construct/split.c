@@ -159,7 +159,7 @@ static ebpo_status split_top(ebpo_builder *b, ebpo_cell cell, const uint32_t *li
     if (status == EBPO_OK)
         status = ebpo_parallel_for(b->threads, count, SPLIT_GRAIN, hand_out, &t, &progress,
                                    "cutting into pieces", error);
-    ebpo_array_free(t.mask);
+    ebpo_array_free(b->workspace, t.mask);
     free(t.begin);
     return status;
 }
@@ -197,7 +197,7 @@ static ebpo_status add_piece(cutting *c, ebpo_build_node *node, ebpo_cell cell, 
                              uint64_t count)
 {
     ebpo_builder *b = c->b;
-    ebpo_branch s = { .cell = cell, .list = list, .list_count = count };
+    ebpo_branch s = { .cell = cell, .list = list, .list_count = count, .workspace = b->workspace };
     ebpo_status status =
         ebpo_build_check_lists(b->face_count, b->sub_count + 1, c->entries += count, c->error);
     if (status == EBPO_OK &&
@@ -205,7 +205,7 @@ static ebpo_status add_piece(cutting *c, ebpo_build_node *node, ebpo_cell cell, 
          !mark_fresh(b, &s, c->listed)))
         status = no_memory(b, c->error);
     if (status != EBPO_OK) {
-        ebpo_array_free(list);
+        ebpo_array_free(b->workspace, list);
         return status;
     }
     node->type = EBPO_LEAF;
@@ -240,12 +240,12 @@ static ebpo_status grow_top(cutting *c, uint32_t index, ebpo_cell cell, uint32_t
                                                   .cross_begin = crossing,
                                                   .cross_end = s->cross_count };
     }
-    ebpo_array_free(list);
+    ebpo_array_free(b->workspace, list);
     for (unsigned o = 0; o < 8; o++) {
         if (status == EBPO_OK && sizes[o])
             status = grow_top(c, child + o, ebpo_cell_child(cell, o), lists[o], sizes[o]);
         else
-            ebpo_array_free(lists[o]);
+            ebpo_array_free(b->workspace, lists[o]);
     }
     if (status == EBPO_OK)
         s->details[detail].entry_end = b->sub_count; /* in the top, entries are pieces */
@@ -266,7 +266,7 @@ static ebpo_status cut(ebpo_builder *b, ebpo_error *error)
     if (!all || !c.listed ||
         !ebpo_array_grow_late(b->workspace, &b->top.nodes, &b->top.node_capacity, 1,
                               sizeof *b->top.nodes)) {
-        ebpo_array_free(all);
+        ebpo_array_free(b->workspace, all);
         status = no_memory(b, error);
     } else {
         memset(&b->top.nodes[0], 0, sizeof b->top.nodes[0]);
@@ -277,7 +277,7 @@ static ebpo_status cut(ebpo_builder *b, ebpo_error *error)
         }
         status = grow_top(&c, 0, b->top.cell, all, b->face_count);
     }
-    ebpo_array_free(c.listed);
+    ebpo_array_free(b->workspace, c.listed);
     return status;
 }
 

@@ -42,7 +42,7 @@ static bool known_point(ebpo_supports *s, const double x[3], double slack)
 
 static bool add_point(ebpo_supports *s, const double x[3], double slack)
 {
-    if (!ebpo_array_grow_late(s->b->workspace, &s->point, &s->capacity, s->count / 4 + 1,
+    if (!ebpo_array_grow_late(s->workspace, &s->point, &s->capacity, s->count / 4 + 1,
                               sizeof *s->point))
         return false;
     if (known_point(s, x, EBPO_NORMAL_NORM * slack))
@@ -86,7 +86,7 @@ static bool add_crossings(ebpo_supports *s, const ebpo_branch *branch, const ebp
         double points[9][3], slack;
         if (i % (branch->list ? 1024 : 32) ==
             0) /* of the top: each from another place of the files */
-            ebpo_workspace_settle(s->b->workspace);
+            ebpo_workspace_settle(s->workspace);
         ebpo_branch_triangle(s->b, branch, branch->crossing[i], &face);
         int count = ebpo_clip_triangle(&s->b->box, s->cell, &face, points, &slack);
         for (int p = 0; p < count; p++)
@@ -101,8 +101,7 @@ static bool clear_table(ebpo_supports *s, uint64_t points)
 {
     uint64_t size = ebpo_hash_slots(2 * points < TABLE_MOST ? 2 * points : TABLE_MOST);
     s->place_count = size;
-    if (!ebpo_array_grow_late(s->b->workspace, &s->place, &s->place_capacity, size,
-                              sizeof *s->place))
+    if (!ebpo_array_grow_late(s->workspace, &s->place, &s->place_capacity, size, sizeof *s->place))
         return false;
     memset(s->place, 0, size * sizeof *s->place);
     return true;
@@ -114,6 +113,7 @@ static bool gather(ebpo_supports *s, const ebpo_builder *b, const ebpo_branch *b
     uint64_t begin, end;
     ebpo_build_vertex_range(b, cell, &begin, &end);
     s->b = b;
+    s->workspace = b->workspace;
     s->cell = cell;
     s->sweep = ebpo_sweep_best();
     s->count = 0;
@@ -152,7 +152,7 @@ static void among_points(const ebpo_supports *s, const double n[3], double enoug
                          double where[3])
 {
     if (s->count > MANY_POINTS)
-        ebpo_workspace_settle(s->b->workspace);
+        ebpo_workspace_settle(s->workspace);
     const ebpo_sweep_points points = { (const double(*)[4][4])s->point, (const double(*)[7])s->box,
                                        (s->count + 3) / 4 };
     uint64_t stretch = s->sweep->highest(&points, n, enough, support);
@@ -163,7 +163,7 @@ static void among_points(const ebpo_supports *s, const double n[3], double enoug
 static bool box_points(ebpo_supports *s)
 {
     uint64_t fours = (s->count + 3) / 4;
-    if (!ebpo_array_grow_late(s->b->workspace, &s->box, &s->box_capacity, fours / EBPO_STRETCH + 1,
+    if (!ebpo_array_grow_late(s->workspace, &s->box, &s->box_capacity, fours / EBPO_STRETCH + 1,
                               sizeof *s->box))
         return false;
     for (uint64_t i = 0; i < fours; i++) {
@@ -207,7 +207,7 @@ double ebpo_supports_find_from(const ebpo_supports *s, const int32_t normal[3], 
     among_points(s, n, enough, &support, where);
     if (s->begin >= s->end || support >= enough)
         return support;
-    ebpo_workspace_settle(s->b->workspace); /* so many vertices lie all over the file */
+    ebpo_workspace_settle(s->workspace); /* so many vertices lie all over the file */
     uint64_t at;
     double p[3] = { 0, 0, 0 };
     support = ebpo_bounds_support(s->b, s->cell, n, s->begin, s->end, support, &at);
@@ -222,9 +222,9 @@ double ebpo_supports_find_from(const ebpo_supports *s, const int32_t normal[3], 
 
 void ebpo_supports_free(ebpo_supports *s)
 {
-    ebpo_array_free(s->point);
-    ebpo_array_free(s->box);
-    ebpo_array_free(s->place);
+    ebpo_array_free(s->workspace, s->point);
+    ebpo_array_free(s->workspace, s->box);
+    ebpo_array_free(s->workspace, s->place);
     s->point = NULL;
     s->place = NULL;
     s->box = NULL;

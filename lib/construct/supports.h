@@ -8,6 +8,7 @@
 
 typedef struct ebpo_supports {
     const ebpo_builder *b;
+    ebpo_workspace *workspace; /* the builder's, since something was gathered */
     ebpo_cell cell;
     /* four points: cell coordinates, and what rounding may add to a support (see sweep.h) */
     double (*point)[4][4];

@@ -52,7 +52,7 @@ ebpo_status ebpo_bounds_make(ebpo_builder *b, ebpo_error *error)
 void ebpo_bounds_free(ebpo_bounds *bounds)
 {
     for (int i = 0; i < bounds->levels; i++)
-        ebpo_array_free(bounds->box[i]);
+        ebpo_array_free(bounds->workspace, bounds->box[i]);
     bounds->levels = 0;
 }
 

@@ -41,7 +41,7 @@ static ebpo_status check_types(const ebpo_check *check, const ebpo_info *info, i
     if (level == 0 && arrays->types[0] > 3)
         return ebpo_check_fail(check, level, "types", "the root has siblings", error);
     for (uint64_t i = 0; i < groups; i++) {
-        ebpo_settle_all_at(i);
+        ebpo_workspace_settle_at(check->workspace, i);
         for (unsigned octant = 0; octant < ebpo_group_octants(level); octant++)
             counts[ebpo_group_type(arrays->types[i], octant)]++;
     }
@@ -76,7 +76,7 @@ static ebpo_status check_planes(const ebpo_check *check, int level, const char *
                                "the counts do not add up to the number of planes", error);
     for (uint64_t i = 0; i < plane_count; i++) {
         int32_t n[3], d;
-        ebpo_settle_all_at(i);
+        ebpo_workspace_settle_at(check->workspace, i);
         if (!ebpo_plane_code_decode(planes[i], n, &d))
             return ebpo_check_fail(check, level, planes_name, "a code stands for no plane", error);
     }
@@ -95,12 +95,14 @@ static ebpo_status check_windings(const ebpo_check *check, const ebpo_info *info
     if (arrays->leaf_count && !arrays->leaf_winding)
         return ebpo_check_fail(check, level, "leaf_winding", "the array is missing", error);
     if (arrays->black_winding)
-        for (uint64_t i = 0; i < arrays->black_count; ebpo_settle_all_at(i++))
+        for (uint64_t i = 0; i < arrays->black_count;
+             ebpo_workspace_settle_at(check->workspace, i++))
             if (!ebpo_rule_inside(info->rule, arrays->black_winding[i]))
                 return ebpo_check_fail(check, level, "black_winding",
                                        "a black node lies outside by the winding rule", error);
     if (arrays->white_winding)
-        for (uint64_t i = 0; i < arrays->white_count; ebpo_settle_all_at(i++))
+        for (uint64_t i = 0; i < arrays->white_count;
+             ebpo_workspace_settle_at(check->workspace, i++))
             if (ebpo_rule_inside(info->rule, arrays->white_winding[i]))
                 return ebpo_check_fail(check, level, "white_winding",
                                        "a white node lies inside by the winding rule", error);
@@ -131,7 +133,7 @@ static ebpo_status check_leaves(const ebpo_check *check, const ebpo_info *info, 
                                error);
     for (uint64_t i = 0; i < arrays->leaf_count; i++) {
         uint64_t first = arrays->leaf_first[i];
-        ebpo_settle_all_at(i);
+        ebpo_workspace_settle_at(check->workspace, i);
         if (first < end || first > info->face_count ||
             arrays->leaf_new[i] > info->face_count - first)
             return ebpo_check_fail(
@@ -223,7 +225,7 @@ ebpo_status ebpo_check_map(const ebpo_check *check, const char *array, const uin
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
         uint64_t bit = UINT64_C(1) << map[i] % 64;
-        ebpo_settle_all_at(i);
+        ebpo_workspace_settle_at(check->workspace, i);
         if (map[i] >= limit || seen[map[i] / 64] & bit)
             status = ebpo_check_fail(check, -1, array,
                                      "a source number is out of range or used twice", error);
@@ -237,7 +239,8 @@ ebpo_status ebpo_check_map(const ebpo_check *check, const char *array, const uin
 ebpo_status ebpo_check_finite(const ebpo_check *check, const ebpo_mesh *mesh, ebpo_error *error)
 {
     bool finite = true;
-    for (uint64_t i = 0; i < mesh->vertex_count * 3; ebpo_settle_all_at(i++))
+    for (uint64_t i = 0; i < mesh->vertex_count * 3;
+         ebpo_workspace_settle_at(check->workspace, i++))
         finite &= mesh->xyz32 ? isfinite(mesh->xyz32[i]) : isfinite(mesh->xyz64[i]);
     return finite ? EBPO_OK
                   : ebpo_check_fail(check, -1, "/mesh/vertices",

@@ -9,6 +9,7 @@
 typedef struct ebpo_check {
     const char *shown; /* the file's name */
     ebpo_status as;
+    ebpo_workspace *workspace; /* what the arrays may be in, or NULL */
 } ebpo_check;
 
 /* One array of one level is wrong: "shown: /levels/03/planes: what; next". */

@@ -369,7 +369,7 @@ void ebpo_chunks_free(ebpo_chunks *chunks)
         chunks->idle = desk->next;
         free_scratch(desk);
     }
-    ebpo_array_free(chunks->seen);
+    ebpo_array_free(chunks->file->workspace, chunks->seen);
     free(chunks->ahead);
     pthread_mutex_destroy(&chunks->lock);
     free(chunks);

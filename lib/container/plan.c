@@ -140,7 +140,7 @@ static ebpo_status index_faces(ebpo_plan *plan, const ebpo_check *check, ebpo_er
         return ebpo_fail_memory(error, mesh->face_count / rows * 8);
     uint64_t seen = 0;
     for (uint64_t i = 0; i < mesh->face_count * 3; i++) {
-        ebpo_settle_all_at(i);
+        ebpo_workspace_settle_at(mesh->workspace, i);
         if (i % (3 * (uint64_t)rows) == 0)
             plan->faces_index[i / (3 * (uint64_t)rows)] = seen;
         if (mesh->faces[i] > seen || mesh->faces[i] >= mesh->vertex_count)
@@ -153,19 +153,19 @@ static ebpo_status index_faces(ebpo_plan *plan, const ebpo_check *check, ebpo_er
 }
 
 /* Least of 1, 2, 4 bytes that holds all values. */
-static uint8_t narrow_unsigned(const uint32_t *values, uint64_t count)
+static uint8_t narrow_unsigned(const ebpo_level *level, const uint32_t *values, uint64_t count)
 {
     uint32_t all = 0;
-    for (uint64_t i = 0; i < count; ebpo_settle_all_at(i++))
+    for (uint64_t i = 0; i < count; ebpo_workspace_settle_at(level->workspace, i++))
         all |= values[i];
     return all <= UINT8_MAX ? 1 : all <= UINT16_MAX ? 2 : 4;
 }
 
-static uint8_t narrow_signed(const int32_t *values, uint64_t count)
+static uint8_t narrow_signed(const ebpo_level *level, const int32_t *values, uint64_t count)
 {
     int32_t low = 0, high = 0;
     for (uint64_t i = 0; i < count; i++) {
-        ebpo_settle_all_at(i);
+        ebpo_workspace_settle_at(level->workspace, i);
         low = values[i] < low ? values[i] : low;
         high = values[i] > high ? values[i] : high;
     }
@@ -176,7 +176,7 @@ static uint8_t narrow_skips(const ebpo_level *level)
 {
     uint64_t end = 0, all = 0;
     for (uint64_t i = 0; i < level->leaf_count; i++) {
-        ebpo_settle_all_at(i);
+        ebpo_workspace_settle_at(level->workspace, i);
         all |= level->leaf_first[i] - end;
         end = level->leaf_first[i] + level->leaf_new[i];
     }
@@ -193,8 +193,10 @@ static uint8_t stored_size(const ebpo_plan *plan, const ebpo_array_out *a, const
         return plan->info.double_coordinates ? 8 : 4;
     if (!(spec->sizes & (spec->sizes - 1)))
         return spec->sizes;
-    uint64_t count = ebpo_level_rows(&plan->tree->level[a->level], a->id);
-    return spec->is_signed ? narrow_signed(values, count) : narrow_unsigned(values, count);
+    const ebpo_level *level = &plan->tree->level[a->level];
+    uint64_t count = ebpo_level_rows(level, a->id);
+    return spec->is_signed ? narrow_signed(level, values, count)
+                           : narrow_unsigned(level, values, count);
 }
 
 /* Where the values are and how wide they get. */
@@ -238,7 +240,7 @@ static void add_array(ebpo_plan *plan, ebpo_array_id id, int level)
 ebpo_status ebpo_plan_make(ebpo_plan *plan, const ebpo_tree *tree,
                            const ebpo_write_options *options, const char *shown, ebpo_error *error)
 {
-    ebpo_check check = { shown, EBPO_E_ARGUMENT };
+    ebpo_check check = { shown, EBPO_E_ARGUMENT, tree->workspace };
     memset(plan, 0, sizeof *plan);
     plan->tree = tree;
     ebpo_status status = settle_facts(plan, options, &check, error);

@@ -85,7 +85,7 @@ static ebpo_status check_index(ebpo_file *file, ebpo_array_id id, int number, co
         status = ebpo_check_fail(&check, number, ebpo_schema[id].name,
                                  "the index contradicts the arrays that it is about", error);
     }
-    ebpo_array_free(stored);
+    ebpo_array_free(file->workspace, stored);
     return status;
 }
 
@@ -165,6 +165,7 @@ ebpo_status ebpo_file_read_level(ebpo_file *file, int level, ebpo_level *out, un
                               "there is no level %d; the file has levels 0 to %d", level,
                               info->level_count - 1);
     *out = ebpo_level_of_summary(info, level);
+    out->workspace = file->workspace;
     ebpo_file_prefetch_levels(file, level, level);
     ebpo_status status = read_arrays(file, level, out, threads, error);
     if (status == EBPO_OK && out->leaf_count)

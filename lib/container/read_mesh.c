@@ -17,8 +17,8 @@ void ebpo_tree_free(ebpo_tree *tree)
     for (int i = 0; i < EBPO_LEVELS_MAX; i++)
         ebpo_level_free(&tree->level[i]);
     ebpo_mesh_free(&tree->mesh);
-    ebpo_array_free(tree->vertex_source);
-    ebpo_array_free(tree->face_source);
+    ebpo_array_free(tree->workspace, tree->vertex_source);
+    ebpo_array_free(tree->workspace, tree->face_source);
     memset(tree, 0, sizeof *tree);
 }
 
@@ -115,7 +115,7 @@ ebpo_status ebpo_file_read_mesh(ebpo_file *file, ebpo_mesh *out, unsigned thread
     if (status == EBPO_OK)
         status = ebpo_reader_rows(file, ebpo_reader_array(file, EBPO_A_FACES, 0), threads,
                                   take_faces, &j, error);
-    ebpo_array_free(j.faces_index);
+    ebpo_array_free(out->workspace, j.faces_index);
     if (status != EBPO_OK)
         ebpo_mesh_free(out);
     return status;
@@ -146,7 +146,7 @@ static ebpo_status read_map(ebpo_file *file, ebpo_workspace *workspace, ebpo_arr
     if (status == EBPO_OK)
         *out = map;
     else
-        ebpo_array_free(map);
+        ebpo_array_free(workspace, map);
     return status;
 }
 
@@ -170,7 +170,7 @@ static ebpo_status read_maps(ebpo_file *file, ebpo_workspace *workspace, uint32_
         status = read_map(file, workspace, EBPO_A_FACE_SOURCE, face_limit(&file->info), threads,
                           face_source, error);
     if (status != EBPO_OK) {
-        ebpo_array_free(*vertex_source);
+        ebpo_array_free(workspace, *vertex_source);
         *vertex_source = NULL;
     }
     return status;
@@ -196,6 +196,7 @@ ebpo_status ebpo_file_read_tree(ebpo_file *file, ebpo_tree *out, unsigned thread
     memset(out, 0, sizeof *out);
     ebpo_expect_tree(file);
     out->info = file->info;
+    out->workspace = file->workspace;
     ebpo_check check = ebpo_reader_check(file);
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < file->info.level_count && status == EBPO_OK; i++)
@@ -246,7 +247,7 @@ static ebpo_status sort_by_source(ebpo_workspace *workspace, const uint32_t *sou
     if (status == EBPO_OK)
         *place = out;
     else
-        ebpo_array_free(out);
+        ebpo_array_free(workspace, out);
     return status;
 }
 
@@ -260,10 +261,10 @@ static ebpo_status reorder_vertices(ebpo_mesh *mesh, const uint32_t *place, ebpo
     for (uint64_t i = 0; i < mesh->vertex_count; ebpo_workspace_settle_often(mesh->workspace, i++))
         memcpy(sorted + place[i] * size, old + i * size, size);
     if (mesh->xyz32) {
-        ebpo_array_free(mesh->xyz32);
+        ebpo_array_free(mesh->workspace, mesh->xyz32);
         mesh->xyz32 = (float *)(void *)sorted;
     } else {
-        ebpo_array_free(mesh->xyz64);
+        ebpo_array_free(mesh->workspace, mesh->xyz64);
         mesh->xyz64 = (double *)(void *)sorted;
     }
     return EBPO_OK;
@@ -278,7 +279,7 @@ static ebpo_status reorder_faces(ebpo_mesh *mesh, const uint32_t *vertex_place,
     for (uint64_t i = 0; i < mesh->face_count * 3;
          ebpo_workspace_settle_often(mesh->workspace, i++))
         sorted[3 * (uint64_t)face_place[i / 3] + i % 3] = vertex_place[mesh->faces[i]];
-    ebpo_array_free(mesh->faces);
+    ebpo_array_free(mesh->workspace, mesh->faces);
     mesh->faces = sorted;
     return EBPO_OK;
 }
@@ -295,14 +296,14 @@ static ebpo_status to_source_order(ebpo_file *file, ebpo_mesh *mesh, unsigned th
     if (status == EBPO_OK)
         status = sort_by_source(workspace, face_source, mesh->face_count, face_limit(&file->info),
                                 &face_place, error);
-    ebpo_array_free(vertex_source);
-    ebpo_array_free(face_source);
+    ebpo_array_free(workspace, vertex_source);
+    ebpo_array_free(workspace, face_source);
     if (status == EBPO_OK)
         status = reorder_vertices(mesh, vertex_place, error);
     if (status == EBPO_OK)
         status = reorder_faces(mesh, vertex_place, face_place, error);
-    ebpo_array_free(vertex_place);
-    ebpo_array_free(face_place);
+    ebpo_array_free(workspace, vertex_place);
+    ebpo_array_free(workspace, face_place);
     return status;
 }
 

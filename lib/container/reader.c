@@ -199,7 +199,7 @@ ebpo_status ebpo_reader_make(ebpo_file *file, ebpo_array_id id, int level, unsig
                      : ebpo_workspace_fail(file->workspace, array->shape.rows * size * cols, error);
     }
     if (status != EBPO_OK) {
-        ebpo_array_free(values);
+        ebpo_array_free(file->workspace, values);
         values = NULL;
     }
     memcpy(values_out, &values, sizeof values);

@@ -75,7 +75,7 @@ static inline const ebpo_array_in *ebpo_reader_array(const ebpo_file *file, ebpo
 
 static inline ebpo_check ebpo_reader_check(const ebpo_file *file)
 {
-    return (ebpo_check){ file->in.shown, EBPO_E_FORMAT };
+    return (ebpo_check){ file->in.shown, EBPO_E_FORMAT, file->workspace };
 }
 
 /* Decoding state and room for one stored chunk, of one thread; zero-initialise, clear when done. */

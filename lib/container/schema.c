@@ -72,6 +72,7 @@ struct all_of_level {
 #include "container/array_table.inc"
     uint64_t group_count, pruned_count;
     double gray_volume, leaf_volume;
+    ebpo_workspace *workspace;
 };
 _Static_assert(sizeof(struct all_of_level) == sizeof(ebpo_level),
                "ebpo_level has an array or a count without a row in array_table.inc");
@@ -173,7 +174,7 @@ bool ebpo_level_is_usual(const ebpo_level *level, int id)
     const ebpo_array_spec *spec = &ebpo_schema[id];
     const char *values = ebpo_level_array(level, id);
     uint64_t count = values ? ebpo_level_rows(level, id) : 0;
-    for (uint64_t i = 0; i < count; ebpo_settle_all_at(i++))
+    for (uint64_t i = 0; i < count; ebpo_workspace_settle_at(level->workspace, i++))
         if (!is_value(values + i * spec->held_size, spec->held_size, spec->usual))
             return false;
     return true;
@@ -183,7 +184,7 @@ void ebpo_level_drop(ebpo_level *level, uint32_t needs)
 {
     for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
         if (ebpo_schema_is_held(id) && !(ebpo_schema[id].needs & ~needs)) {
-            ebpo_array_free(ebpo_level_array(level, id));
+            ebpo_array_free(level->workspace, ebpo_level_array(level, id));
             ebpo_level_set_array(level, id, NULL);
         }
 }

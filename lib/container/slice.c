@@ -21,7 +21,7 @@ void ebpo_slice_free(ebpo_slice *slice)
         ebpo_level_free(&slice->level[i]);
     free(slice->outer);
     ebpo_mesh_free(&slice->mesh);
-    ebpo_array_free(slice->face_source);
+    ebpo_array_free(NULL, slice->face_source);
     memset(slice, 0, sizeof *slice);
 }
 

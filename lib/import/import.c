@@ -366,8 +366,8 @@ ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const 
         snprintf(mesh.source_format, sizeof mesh.source_format, "%s", format_names[format]);
         mesh.source_size = size;
     } else {
-        ebpo_array_free(mesh.xyz32);
-        ebpo_array_free(mesh.faces);
+        ebpo_array_free(workspace, mesh.xyz32);
+        ebpo_array_free(workspace, mesh.faces);
         mesh = (ebpo_mesh){ 0 };
     }
     *out = mesh;

@@ -8,6 +8,7 @@
 #include "base/parallel.h"
 #include "base/sha256.h"
 #include "base/arrays.h"
+#include "base/workspace_extents.h"
 #include "base/sized.h"
 #include "import/import.h"
 #include "io/file_source.h"

@@ -1,6 +1,6 @@
 /* The public face of publish.h: whole files, and giving up. */
 #include "base/error.h"
-#include "base/arrays.h"
+#include "base/unnamed_file.h"
 #include "io/publish.h"
 
 ebpo_status ebpo_write_file(const char *path, const void *data, size_t size, ebpo_error *error)

@@ -13,6 +13,7 @@
 bool ebpo_boundary_add(ebpo_boundary *boundary, const ebpo_mesh *mesh, uint32_t from, uint32_t to,
                        uint32_t face)
 {
+    boundary->workspace = mesh->workspace;
     if (!ebpo_array_grow(mesh->workspace, &boundary->edges, &boundary->capacity,
                          boundary->count + 1, sizeof *boundary->edges))
         return false;
@@ -30,6 +31,7 @@ ebpo_status ebpo_boundary_join(ebpo_boundary *boundary, ebpo_boundary *lists, un
     uint64_t total = 0;
     for (unsigned i = 0; i < count; i++)
         total += lists[i].count;
+    boundary->workspace = mesh->workspace;
     if (total && !ebpo_array_grow(mesh->workspace, &boundary->edges, &boundary->capacity, total,
                                   sizeof *boundary->edges))
         return ebpo_workspace_fail(mesh->workspace, total * sizeof *boundary->edges, error);
@@ -45,15 +47,15 @@ ebpo_status ebpo_boundary_join(ebpo_boundary *boundary, ebpo_boundary *lists, un
 
 void ebpo_boundary_free(ebpo_boundary *boundary)
 {
-    ebpo_array_free(boundary->edges);
+    ebpo_array_free(boundary->workspace, boundary->edges);
     *boundary = (ebpo_boundary){ .edges = NULL };
 }
 
 void ebpo_loops_free(ebpo_loops *loops)
 {
-    ebpo_array_free(loops->first);
-    ebpo_array_free(loops->vertex);
-    ebpo_array_free(loops->start);
+    ebpo_array_free(loops->workspace, loops->first);
+    ebpo_array_free(loops->workspace, loops->vertex);
+    ebpo_array_free(loops->workspace, loops->start);
     *loops = (ebpo_loops){ .count = 0 };
 }
 
@@ -384,7 +386,7 @@ static ebpo_status chain(chaining *c, ebpo_error *error)
 ebpo_status ebpo_boundary_loops(ebpo_loops *out, ebpo_boundary *boundary, const ebpo_stars *stars,
                                 const ebpo_mesh *mesh, unsigned threads, ebpo_error *error)
 {
-    *out = (ebpo_loops){ .count = 0 };
+    *out = (ebpo_loops){ .workspace = mesh->workspace };
     chaining c = { .edges = boundary->edges,
                    .count = boundary->count,
                    .stars = stars,
@@ -393,12 +395,12 @@ ebpo_status ebpo_boundary_loops(ebpo_loops *out, ebpo_boundary *boundary, const 
                    .out = out };
     ebpo_status status = chain(&c, error);
     ebpo_star_free(&c.star);
-    ebpo_array_free(c.arrivals);
-    ebpo_array_free(c.next);
-    ebpo_array_free(c.continued);
-    ebpo_array_free(c.walked);
-    ebpo_array_free(c.place);
-    ebpo_array_free(c.path);
+    ebpo_array_free(mesh->workspace, c.arrivals);
+    ebpo_array_free(mesh->workspace, c.next);
+    ebpo_array_free(mesh->workspace, c.continued);
+    ebpo_array_free(mesh->workspace, c.walked);
+    ebpo_array_free(mesh->workspace, c.place);
+    ebpo_array_free(mesh->workspace, c.path);
     if (status != EBPO_OK)
         ebpo_loops_free(out);
     return status;
@@ -474,9 +476,9 @@ ebpo_status ebpo_loops_rank(uint64_t **triangles, const ebpo_loops *loops, const
             ebpo_workspace_settle_often(mesh->workspace, i);
         }
     }
-    ebpo_array_free(r.sorted);
+    ebpo_array_free(mesh->workspace, r.sorted);
     if (status != EBPO_OK)
-        ebpo_array_free(before);
+        ebpo_array_free(mesh->workspace, before);
     else
         *triangles = before;
     return status;

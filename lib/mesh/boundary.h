@@ -15,6 +15,7 @@ typedef struct ebpo_boundary_edge {
 typedef struct ebpo_boundary {
     ebpo_boundary_edge *edges;
     uint64_t count, capacity;
+    ebpo_workspace *workspace; /* the mesh's, since something was added */
 } ebpo_boundary;
 
 /* Appends; false when memory is short. */
@@ -37,6 +38,7 @@ typedef struct ebpo_loops {
     uint64_t on_paths;
     /* what cannot be closed: edges whose directions do not continue one another */
     uint64_t open_chains;
+    ebpo_workspace *workspace; /* the mesh's, of all arrays */
 } ebpo_loops;
 
 /* Chains the edges (which are sorted by the way). Where several boundaries pass a vertex, each
@@ -49,7 +51,7 @@ EBPO_MUST_USE ebpo_status ebpo_boundary_loops(ebpo_loops *out, ebpo_boundary *bo
 void ebpo_loops_free(ebpo_loops *loops);
 
 /* As if the mesh were in the source's order: how many triangles the loops before each one get, n -
- * 2 a loop. [count], freed by ebpo_array_free. */
+ * 2 a loop. [count], the mesh's workspace owns it. */
 EBPO_MUST_USE ebpo_status ebpo_loops_rank(uint64_t **triangles, const ebpo_loops *loops,
                                           const ebpo_mesh *mesh, unsigned threads,
                                           ebpo_error *error);

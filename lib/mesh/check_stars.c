@@ -205,11 +205,11 @@ static void join_blocks(const ebpo_check *check, const star_block *blocks, uint6
         r->edges ? ldexp(ebpo_sum_value(&length) / (double)r->edges, check->units.length) : 0;
 }
 
-static void free_scratch(scratch *s)
+static void free_scratch(scratch *s, ebpo_workspace *workspace)
 {
     ebpo_star_free(&s->star);
-    ebpo_array_free(s->fans);
-    ebpo_array_free(s->opposites);
+    ebpo_array_free(workspace, s->fans);
+    ebpo_array_free(workspace, s->opposites);
 }
 
 ebpo_status ebpo_check_stars(ebpo_check *check, ebpo_error *error)
@@ -234,7 +234,7 @@ ebpo_status ebpo_check_stars(ebpo_check *check, ebpo_error *error)
     status = ebpo_boundary_join(&check->boundary, boundaries, check->threads, check->mesh, error);
 done:
     for (unsigned t = 0; pass.scratch && t < check->threads; t++)
-        free_scratch(&pass.scratch[t]);
+        free_scratch(&pass.scratch[t], check->mesh->workspace);
     for (unsigned t = 0; boundaries && t < check->threads; t++)
         ebpo_boundary_free(&boundaries[t]);
     free(boundaries);

@@ -209,18 +209,18 @@ static ebpo_status run(filling *f, ebpo_error *error)
         return status;
     mesh->face_count += f->added;
     if (mesh->arrangement) { /* the new faces stand at the end */
-        ebpo_array_free(mesh->arrangement->key);
+        ebpo_array_free(mesh->workspace, mesh->arrangement->key);
         mesh->arrangement->key = NULL;
     }
     return EBPO_OK;
 }
 
-static void free_scratch(scratch *s)
+static void free_scratch(scratch *s, ebpo_workspace *workspace)
 {
     ebpo_star_free(&s->star);
     ebpo_boundary_free(&s->boundary);
-    ebpo_array_free(s->point);
-    ebpo_array_free(s->triangles);
+    ebpo_array_free(workspace, s->point);
+    ebpo_array_free(workspace, s->triangles);
 }
 
 ebpo_status ebpo_mesh_fill_holes(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
@@ -240,9 +240,9 @@ ebpo_status ebpo_mesh_fill_holes(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo
     ebpo_stars_free(&f.stars);
     ebpo_boundary_free(&f.boundary);
     ebpo_loops_free(&f.loops);
-    ebpo_array_free(f.before);
+    ebpo_array_free(mesh->workspace, f.before);
     for (unsigned t = 0; f.scratch && t < f.threads; t++)
-        free_scratch(&f.scratch[t]);
+        free_scratch(&f.scratch[t], mesh->workspace);
     free(f.scratch);
     return status;
 }

@@ -207,7 +207,7 @@ static ebpo_status compare_all(ebpo_check *check, ebpo_finding *finding, ebpo_er
             ebpo_finding_add(finding, source);
         ebpo_workspace_settle_often(mesh->workspace, v);
     }
-    ebpo_array_free(lowest);
+    ebpo_array_free(mesh->workspace, lowest);
     ebpo_positions_free(&positions);
     return status;
 }
@@ -275,7 +275,7 @@ static ebpo_status run(ebpo_check *c, ebpo_error *error)
         status = ebpo_check_stars(c, error);
     if (status == EBPO_OK)
         status = boundary_loops(c, error);
-    ebpo_array_free(c->parents);
+    ebpo_array_free(c->mesh->workspace, c->parents);
     c->parents = NULL;
     ebpo_stars_free(&c->stars); /* makes room for the table of positions */
     if (status == EBPO_OK)

@@ -8,9 +8,9 @@ void ebpo_arrangement_free(struct ebpo_arrangement *arrangement)
 {
     if (!arrangement)
         return;
-    ebpo_array_free(arrangement->key);
-    ebpo_array_free(arrangement->vertex_source);
-    ebpo_array_free(arrangement->face_source);
+    ebpo_array_free(arrangement->workspace, arrangement->key);
+    ebpo_array_free(arrangement->workspace, arrangement->vertex_source);
+    ebpo_array_free(arrangement->workspace, arrangement->face_source);
     free(arrangement);
 }
 
@@ -18,9 +18,9 @@ void ebpo_mesh_free(ebpo_mesh *mesh)
 {
     if (!mesh)
         return;
-    ebpo_array_free(mesh->xyz32);
-    ebpo_array_free(mesh->xyz64);
-    ebpo_array_free(mesh->faces);
+    ebpo_array_free(mesh->workspace, mesh->xyz32);
+    ebpo_array_free(mesh->workspace, mesh->xyz64);
+    ebpo_array_free(mesh->workspace, mesh->faces);
     ebpo_arrangement_free(mesh->arrangement);
     memset(mesh, 0, sizeof *mesh);
 }

@@ -19,10 +19,11 @@ struct ebpo_arrangement {
      * and among the others. NULL: arranged for mending, or mended since; neighbours in space are
      * still neighbours in memory, but what builds has to arrange again */
     uint64_t *key;
-    int level;               /* that was asked for: -1: as deep as is sensible */
-    bool grouped;            /* vertices at one position are one run */
-    uint32_t *vertex_source; /* [vertex_count] numbers in the source */
-    uint32_t *face_source;   /* [face_count] */
+    int level;                 /* that was asked for: -1: as deep as is sensible */
+    bool grouped;              /* vertices at one position are one run */
+    uint32_t *vertex_source;   /* [vertex_count] numbers in the source */
+    uint32_t *face_source;     /* [face_count] */
+    ebpo_workspace *workspace; /* the mesh's, of all arrays */
 };
 
 /* NULL: nothing. */

@@ -202,7 +202,7 @@ static void move_vertices(welding *w)
     }
     mesh->vertex_count = w->kept;
     if (order) {
-        ebpo_array_free(order->key);
+        ebpo_array_free(mesh->workspace, order->key);
         order->key = NULL;
     }
     void *smaller = mesh->workspace || order ? NULL : ebpo_realloc(base, 3 * w->kept, size / 3);
@@ -252,10 +252,10 @@ ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error
         record->weld = true;
         record->welded_vertices += count - mesh->vertex_count;
     }
-    ebpo_array_free(w.map);
-    ebpo_array_free(w.from);
-    ebpo_array_free(w.stays);
-    ebpo_array_free(w.before);
+    ebpo_array_free(mesh->workspace, w.map);
+    ebpo_array_free(mesh->workspace, w.from);
+    ebpo_array_free(mesh->workspace, w.stays);
+    ebpo_array_free(mesh->workspace, w.before);
     free(w.heads);
     return status;
 }

@@ -327,8 +327,8 @@ ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_err
         record->unorientable_components += o.unorientable;
     }
     pthread_mutex_destroy(&o.lock);
-    ebpo_array_free(o.above);
-    ebpo_array_free(o.flags);
-    ebpo_array_free(o.patches);
+    ebpo_array_free(mesh->workspace, o.above);
+    ebpo_array_free(mesh->workspace, o.flags);
+    ebpo_array_free(mesh->workspace, o.patches);
     return status;
 }

@@ -72,7 +72,7 @@ ebpo_status ebpo_positions_build(ebpo_positions *out, const ebpo_mesh *mesh, uns
                                  const ebpo_progress *progress, ebpo_error *error)
 {
     uint64_t size = ebpo_hash_slots(mesh->vertex_count + mesh->vertex_count / 3);
-    *out = (ebpo_positions){ .mesh = mesh, .mask = size - 1 };
+    *out = (ebpo_positions){ .mesh = mesh, .workspace = mesh->workspace, .mask = size - 1 };
     out->slots = ebpo_array_alloc(mesh->workspace, size, sizeof *out->slots);
     if (!out->slots)
         return ebpo_workspace_fail(mesh->workspace, size * sizeof *out->slots, error);
@@ -86,7 +86,7 @@ ebpo_status ebpo_positions_build(ebpo_positions *out, const ebpo_mesh *mesh, uns
 
 void ebpo_positions_free(ebpo_positions *positions)
 {
-    ebpo_array_free(positions->slots);
+    ebpo_array_free(positions->workspace, positions->slots);
     *positions = (ebpo_positions){ .mesh = NULL };
 }
 

@@ -10,7 +10,8 @@ typedef struct ebpo_positions {
     const ebpo_mesh *mesh; /* borrowed */
     uint32_t *slots;
     uint64_t mask;
-    uint64_t repeated; /* vertices whose position an earlier vertex has */
+    ebpo_workspace *workspace; /* the mesh's */
+    uint64_t repeated;         /* vertices whose position an earlier vertex has */
 } ebpo_positions;
 
 /* -0 equals 0; NaNs are compared by their bits. `out` is cleared on failure. The result is the same

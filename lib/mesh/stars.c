@@ -70,7 +70,7 @@ static ebpo_status place_faces(void *context, uint64_t begin, uint64_t end, unsi
 ebpo_status ebpo_stars_build(ebpo_stars *out, const ebpo_mesh *mesh, unsigned threads,
                              const ebpo_progress *progress, ebpo_error *error)
 {
-    *out = (ebpo_stars){ NULL, NULL };
+    *out = (ebpo_stars){ .workspace = mesh->workspace };
     build b = { mesh, out };
     out->first = ebpo_array_zero(mesh->workspace, mesh->vertex_count + 1, sizeof *out->first);
     if (!out->first)
@@ -101,9 +101,9 @@ done:
 
 void ebpo_stars_free(ebpo_stars *stars)
 {
-    ebpo_array_free(stars->first);
-    ebpo_array_free(stars->face);
-    *stars = (ebpo_stars){ NULL, NULL };
+    ebpo_array_free(stars->workspace, stars->first);
+    ebpo_array_free(stars->workspace, stars->face);
+    *stars = (ebpo_stars){ .first = NULL };
 }
 
 static int compare_links(const void *a, const void *b)
@@ -142,6 +142,7 @@ bool ebpo_star_gather(ebpo_star *star, const ebpo_stars *stars, const ebpo_mesh 
 {
     uint64_t degree = ebpo_stars_degree(stars, v);
     star->count = star->faces = 0;
+    star->workspace = mesh->workspace;
     if (!ebpo_array_grow_late(mesh->workspace, &star->links, &star->capacity, 2 * degree,
                               sizeof *star->links))
         return false;
@@ -163,7 +164,7 @@ bool ebpo_star_gather(ebpo_star *star, const ebpo_stars *stars, const ebpo_mesh 
 
 void ebpo_star_free(ebpo_star *star)
 {
-    ebpo_array_free(star->links);
+    ebpo_array_free(star->workspace, star->links);
     *star = (ebpo_star){ .links = NULL };
 }
 

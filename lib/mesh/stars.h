@@ -9,6 +9,7 @@
 typedef struct ebpo_stars {
     uint64_t *first; /* [vertex_count + 1] */
     uint32_t *face;
+    ebpo_workspace *workspace; /* the mesh's, of both */
 } ebpo_stars;
 
 /* Checks every index first (EBPO_E_FORMAT naming the lowest bad face). `out` is cleared on failure.
@@ -43,6 +44,7 @@ typedef struct ebpo_star {
     uint64_t count;
     uint64_t faces; /* entries: faces that name no vertex twice */
     uint64_t capacity;
+    ebpo_workspace *workspace; /* the mesh's, since something was gathered */
 } ebpo_star;
 
 /* Gathers the edge uses at vertex v. False when memory is short. */

@@ -178,10 +178,10 @@ static bool cut_ears(const ebpo_chain *chain, uint32_t (*triangles)[3])
         push_ear(&c, p);
         push_ear(&c, q);
     }
-    ebpo_array_free(c.before);
-    ebpo_array_free(c.after);
-    ebpo_array_free(c.version);
-    ebpo_array_free(c.heap);
+    ebpo_array_free(w, c.before);
+    ebpo_array_free(w, c.after);
+    ebpo_array_free(w, c.version);
+    ebpo_array_free(w, c.heap);
     return ok;
 }
 

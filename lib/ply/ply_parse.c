@@ -213,9 +213,9 @@ ebpo_status ebpo_ply_parse_memory(ebpo_mesh *out, const uint8_t *data, uint64_t 
         trim(&p);
         describe(&p);
     } else {
-        ebpo_array_free(mesh.xyz32);
-        ebpo_array_free(mesh.xyz64);
-        ebpo_array_free(mesh.faces);
+        ebpo_array_free(workspace, mesh.xyz32);
+        ebpo_array_free(workspace, mesh.xyz64);
+        ebpo_array_free(workspace, mesh.faces);
         mesh = (ebpo_mesh){ 0 };
     }
     release(&p);

@@ -24,7 +24,7 @@ static ebpo_status check(const ebpo_mesh *mesh, ebpo_error *error)
     if ((mesh->vertex_count && !mesh->xyz32 == !mesh->xyz64) || (mesh->face_count && !mesh->faces))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "the mesh to write has counts without arrays, or positions of both kinds");
-    for (uint64_t i = 0; i < 3 * mesh->face_count; ebpo_settle_all_at(i++))
+    for (uint64_t i = 0; i < 3 * mesh->face_count; ebpo_workspace_settle_at(mesh->workspace, i++))
         if (mesh->faces[i] >= mesh->vertex_count)
             return ebpo_fail(error, EBPO_E_ARGUMENT,
                              "face %" PRIu64 " of the mesh to write names vertex %" PRIu32
@@ -61,7 +61,7 @@ static bool write_vertices(FILE *f, const ebpo_mesh *mesh, uint8_t *buffer)
                 ebpo_store64(buffer + 8 * i, wide);
             }
         }
-        ebpo_settle_all();
+        ebpo_workspace_settle(mesh->workspace);
         if (fwrite(buffer, width, n, f) != n)
             return false;
         done += n;
@@ -80,7 +80,7 @@ static bool write_faces(FILE *f, const ebpo_mesh *mesh, uint8_t *buffer)
             for (int k = 0; k < 3; k++)
                 ebpo_store32(at + 1 + 4 * k, mesh->faces[3 * (done + i) + (uint64_t)k]);
         }
-        ebpo_settle_all();
+        ebpo_workspace_settle(mesh->workspace);
         if (fwrite(buffer, FACE_BYTES, n, f) != n)
             return false;
         done += n;

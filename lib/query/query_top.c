@@ -178,7 +178,7 @@ ebpo_status ebpo_top_read(ebpo_top **out, ebpo_file *file, int cut_level, unsign
                                       &r.next_types, error);
         if (status == EBPO_OK)
             status = add_level(&r, number, &level, r.group - (number ? level.group_count : 0));
-        ebpo_array_free(r.next_types);
+        ebpo_array_free(file->workspace, r.next_types);
         r.next_types = NULL;
         ebpo_level_free(&level);
     }

@@ -38,7 +38,7 @@ static bool types_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
         !CHECK(level->types || groups == 0, "level %d has no types", l))
         return false;
     uint64_t count[4] = { 0 };
-    for (uint64_t group = 0; group < groups; ebpo_settle_all_at(group++))
+    for (uint64_t group = 0; group < groups; ebpo_workspace_settle_at(level->workspace, group++))
         for (unsigned octant = 0; octant < (l == 0 ? 1u : 8u); octant++)
             count[ebpo_twin_type(level, group, octant)]++;
     return CHECK(count[EBPO_GRAY] == level->gray_count && count[EBPO_LEAF] == level->leaf_count &&
@@ -50,14 +50,15 @@ static bool types_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
 }
 
 /* Per-node counts and the array they share out. */
-static bool counted_shape(ebpo_tally *tally, int l, const char *what, uint64_t nodes,
-                          const uint8_t *counts, uint64_t total, const uint32_t *items)
+static bool counted_shape(ebpo_tally *tally, const ebpo_level *level, int l, const char *what,
+                          uint64_t nodes, const uint8_t *counts, uint64_t total,
+                          const uint32_t *items)
 {
     if (!CHECK((counts || nodes == 0) && (items || total == 0), "level %d: %s are missing", l,
                what))
         return false;
     uint64_t sum = 0;
-    for (uint64_t i = 0; i < nodes; ebpo_settle_all_at(i++))
+    for (uint64_t i = 0; i < nodes; ebpo_workspace_settle_at(level->workspace, i++))
         sum += counts[i];
     return CHECK(sum == total, "level %d: counts of %s sum to %" PRIu64 ", but there are %" PRIu64,
                  l, what, sum, total);
@@ -96,7 +97,8 @@ static bool lists_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
                l))
         return false;
     uint64_t refs = 0, fresh = 0;
-    for (uint64_t leaf = 0; leaf < level->leaf_count; ebpo_settle_all_at(leaf++)) {
+    for (uint64_t leaf = 0; leaf < level->leaf_count;
+         ebpo_workspace_settle_at(level->workspace, leaf++)) {
         refs += level->leaf_ref_count[leaf];
         fresh += level->leaf_new[leaf];
     }
@@ -107,7 +109,8 @@ static bool lists_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
         return false;
     refs = 0;
     bool ok = true;
-    for (uint64_t leaf = 0; leaf < level->leaf_count; ebpo_settle_all_at(leaf++)) {
+    for (uint64_t leaf = 0; leaf < level->leaf_count;
+         ebpo_workspace_settle_at(level->workspace, leaf++)) {
         ok &= CHECK(
             leaf_faces_in_range(level, leaf, refs, tree->mesh.face_count),
             "level %d, leaf %" PRIu64
@@ -134,9 +137,9 @@ static bool mesh_shape(ebpo_tally *tally, const ebpo_tree *tree)
                "the head and the mesh differ about the kind of coordinates"))
         return false;
     uint64_t outside = 0, infinite = 0;
-    for (uint64_t i = 0; i < 3 * mesh->face_count; ebpo_settle_all_at(i++))
+    for (uint64_t i = 0; i < 3 * mesh->face_count; ebpo_workspace_settle_at(mesh->workspace, i++))
         outside += mesh->faces[i] >= mesh->vertex_count;
-    for (uint64_t i = 0; i < mesh->vertex_count; ebpo_settle_all_at(i++)) {
+    for (uint64_t i = 0; i < mesh->vertex_count; ebpo_workspace_settle_at(mesh->workspace, i++)) {
         double p[3];
         ebpo_mesh_position(mesh, i, p);
         infinite += !isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2]);
@@ -157,11 +160,11 @@ bool ebpo_check_shape(ebpo_tally *tally, const ebpo_tree *tree)
         if (!types_shape(tally, tree, l) || !windings_shape(tally, tree, l) ||
             ((parts & EBPO_PART_MESH) && !lists_shape(tally, tree, l)) ||
             ((parts & EBPO_PART_PLANES) &&
-             !counted_shape(tally, l, "planes", level->gray_count, level->plane_counts,
+             !counted_shape(tally, level, l, "planes", level->gray_count, level->plane_counts,
                             level->plane_count, level->planes)) ||
             ((parts & EBPO_PART_LEAF_PLANES) &&
-             !counted_shape(tally, l, "leaf planes", level->leaf_count, level->leaf_plane_counts,
-                            level->leaf_plane_count, level->leaf_planes)))
+             !counted_shape(tally, level, l, "leaf planes", level->leaf_count,
+                            level->leaf_plane_counts, level->leaf_plane_count, level->leaf_planes)))
             return false;
     }
     return true;

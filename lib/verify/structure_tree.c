@@ -99,7 +99,7 @@ static void check_gray(descent *d, const ebpo_twin_node *node)
     node_check(d, node, node->cell.level < d->view->tree->info.max_level,
                "a node at the maximum level is gray");
     bool touched = false;
-    ebpo_settle_all_at(d->grays++);
+    ebpo_workspace_settle_at(d->view->workspace, d->grays++);
     for (unsigned octant = 0; octant < 8; octant++) {
         ebpo_twin_node child = ebpo_twin_child(d->view, node, octant);
         touched |= child.type >= EBPO_LEAF;
@@ -114,7 +114,7 @@ static void check_vertices(ebpo_tally *tally, const ebpo_twin_tree *view)
     uint64_t outside = 0, first = 0;
     for (uint64_t i = 3 * mesh->face_count; i-- > 0;) {
         double p[3];
-        ebpo_settle_all_at(i);
+        ebpo_workspace_settle_at(mesh->workspace, i);
         ebpo_mesh_position(mesh, mesh->faces[i], p);
         bool within = true;
         for (int k = 0; k < 3; k++)
@@ -133,7 +133,7 @@ static void check_vertices(ebpo_tally *tally, const ebpo_twin_tree *view)
 static bool edges_balance(const ebpo_mesh *mesh)
 {
     uint64_t sum = 0;
-    for (uint64_t f = 0; f < mesh->face_count; ebpo_settle_all_at(f++))
+    for (uint64_t f = 0; f < mesh->face_count; ebpo_workspace_settle_at(mesh->workspace, f++))
         for (int i = 0; i < 3; i++) {
             uint64_t a = mesh->faces[3 * f + (uint64_t)i],
                      b = mesh->faces[3 * f + (uint64_t)(i + 1) % 3];

@@ -24,7 +24,9 @@ static unsigned octants_at(int level) { return level == 0 ? 1 : 8; }
 ebpo_status ebpo_twin_make(ebpo_twin_tree *out, const ebpo_tree *tree, ebpo_workspace *workspace,
                            ebpo_error *error)
 {
-    *out = (ebpo_twin_tree){ .tree = tree, .box.grid_level = tree->info.grid_level };
+    *out = (ebpo_twin_tree){ .tree = tree,
+                             .workspace = workspace,
+                             .box.grid_level = tree->info.grid_level };
     for (int k = 0; k < 3; k++) {
         out->box.origin[k] = tree->info.box_origin[k];
         out->box.size[k] = tree->info.box_size[k];
@@ -53,7 +55,7 @@ ebpo_status ebpo_twin_make(ebpo_twin_tree *out, const ebpo_tree *tree, ebpo_work
 void ebpo_twin_free(ebpo_twin_tree *view)
 {
     for (int l = 0; l < EBPO_LEVELS_MAX; l++)
-        ebpo_array_free(view->groups[l]);
+        ebpo_array_free(view->workspace, view->groups[l]);
     *view = (ebpo_twin_tree){ 0 };
 }
 

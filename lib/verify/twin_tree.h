@@ -19,6 +19,7 @@ typedef struct ebpo_twin_tree {
     ebpo_box box;
     bool has_mesh, has_planes, has_leaf_planes;
     ebpo_twin_group *groups[EBPO_LEVELS_MAX]; /* [group_count] for each level */
+    ebpo_workspace *workspace;                /* owns the groups */
 } ebpo_twin_tree;
 
 /* A node. `rank` counts the nodes of its own type that come before it in its level. */

@@ -82,7 +82,7 @@ static ebpo_status sort_points(columns *c, ebpo_ray_points *points, ebpo_error *
     ebpo_ray_point *sorted = ebpo_array_alloc(points->workspace, points->count, sizeof *sorted);
     c->first = ebpo_alloc_zero(cells + 1, sizeof *c->first);
     if (!sorted || !c->first) {
-        ebpo_array_free(sorted);
+        ebpo_array_free(points->workspace, sorted);
         return ebpo_workspace_fail(points->workspace, points->count * sizeof *sorted, error);
     }
     for (uint64_t i = 0; i < points->count; ebpo_workspace_settle_at(points->workspace, i++))
@@ -97,7 +97,7 @@ static ebpo_status sort_points(columns *c, ebpo_ray_points *points, ebpo_error *
     /* each had moved on to the next one's beginning */
     memmove(c->first + 1, c->first, cells * sizeof *c->first);
     c->first[0] = 0;
-    ebpo_array_free(points->point);
+    ebpo_array_free(points->workspace, points->point);
     points->point = c->point = sorted;
     points->capacity = points->count;
     return EBPO_OK;

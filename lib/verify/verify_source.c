@@ -140,8 +140,8 @@ static ebpo_status compare_as_sets(ebpo_tally *tally, const ebpo_mesh *a, const 
         differ += faces ? face_order(a, left[i], b, right[i]) != 0
                         : memcmp(vertex_bytes(a, left[i]), vertex_bytes(b, right[i]),
                                  vertex_size(a)) != 0;
-    ebpo_array_free(left);
-    ebpo_array_free(right);
+    ebpo_array_free(a->workspace, left);
+    ebpo_array_free(b->workspace, right);
     if (short_of_memory)
         return ebpo_workspace_fail(a->workspace, count * sizeof *left, error);
     tally->checks[EBPO_VERIFY_SOURCE] += count - 1;
@@ -184,8 +184,8 @@ static ebpo_status compare_some(ebpo_tally *tally, ebpo_file *file, const ebpo_m
                     "the face (by its source number) has other corners in the file");
         }
     }
-    ebpo_array_free(vertex_source);
-    ebpo_array_free(face_source);
+    ebpo_array_free(part.workspace, vertex_source);
+    ebpo_array_free(part.workspace, face_source);
     ebpo_mesh_free(&part);
     return status;
 }

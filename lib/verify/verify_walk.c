@@ -288,9 +288,9 @@ static ebpo_status open_node(walk *w, uint64_t at, ebpo_error *error)
     n->children = w->upper_count;
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)
         status = add_child(w, at, octant, error);
-    ebpo_array_free(w->shared_octants);
+    ebpo_array_free(w->options->workspace, w->shared_octants);
     w->shared_octants = NULL;
-    ebpo_array_free(n->faces);
+    ebpo_array_free(w->options->workspace, n->faces);
     n->faces = NULL;
     return status;
 }
@@ -345,7 +345,7 @@ static ebpo_status subtree_task(void *context, uint64_t begin, uint64_t end, uns
         if (n->face_count)
             memcpy(self->stack.faces, n->faces, n->face_count * sizeof *n->faces);
         ebpo_status status = walk_down(w, self, &n->node, 0, n->face_count, &n->corners, error);
-        ebpo_array_free(n->faces);
+        ebpo_array_free(w->options->workspace, n->faces);
         n->faces = NULL;
         if (status != EBPO_OK)
             return status;
@@ -398,7 +398,7 @@ static ebpo_status follow_rays(walk *w, ebpo_error *error)
         for (uint64_t k = 0; k < own->count; ebpo_workspace_settle_at(own->workspace, k++))
             if (!ebpo_rays_add(all, &own->point[k]))
                 return ebpo_workspace_fail(all->workspace, all->count * sizeof *all->point, error);
-        ebpo_array_free(own->point);
+        ebpo_array_free(own->workspace, own->point);
         *own = (ebpo_ray_points){ .workspace = all->workspace };
     }
     ebpo_status status = ebpo_rays_follow(all, &w->view->tree->mesh, &w->view->box, w->threads,
@@ -413,14 +413,14 @@ static void release(walk *w)
     for (unsigned i = 0; w->workers && i < w->threads; i++) {
         free(w->workers[i].stack.faces);
         free(w->workers[i].stack.octants);
-        ebpo_array_free(w->workers[i].points.point);
+        ebpo_array_free(w->options->workspace, w->workers[i].points.point);
     }
     for (uint64_t at = 0; at < w->upper_count; at++)
-        ebpo_array_free(w->upper[at].faces);
+        ebpo_array_free(w->options->workspace, w->upper[at].faces);
     free(w->workers);
     free(w->upper);
     free(w->subtrees);
-    ebpo_array_free(w->shared_octants);
+    ebpo_array_free(w->options->workspace, w->shared_octants);
 }
 
 ebpo_status ebpo_verify_walk(ebpo_tally *tally, const ebpo_twin_tree *view,

@@ -372,7 +372,7 @@ static void touch_ends(ebpo_workspace *w)
     ck_assert_uint_eq(array[count - 1], 11);
     ebpo_workspace_settle(w);
     ck_assert_uint_eq(array[FAR / 8], 13);
-    ebpo_array_free(array);
+    ebpo_array_free(w, array);
 }
 
 START_TEST(workspaces_hold_arrays_beyond_4_gib_in_memory)

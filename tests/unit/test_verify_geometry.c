@@ -168,7 +168,7 @@ static void check_rays(const char *name)
     ck_assert_uint_eq(points.count, 100);
     for (uint64_t i = 0; i < points.count; i++)
         ck_assert_int_eq(points.point[i].found, points.point[i].told);
-    ebpo_array_free(points.point);
+    ebpo_array_free(points.workspace, points.point);
     ebpo_mesh_free(&mesh);
 }
 

@@ -57,11 +57,11 @@ START_TEST(what_does_not_fit_goes_to_files_without_names)
     for (int i = 0; i < 5 * MIB; i++)
         ck_assert_msg(filed[i] == 0, "byte %d", i);
     memset(filed, 7, 5 * MIB);
-    ebpo_array_free(held);
-    ebpo_array_free(small);
+    ebpo_array_free(w, held);
+    ebpo_array_free(w, small);
     ebpo_workspace_free(w); /* blocks outlive it */
     ck_assert(filed[0] == 7 && filed[5 * MIB - 1] == 7);
-    ebpo_array_free(filed);
+    ebpo_array_free(w, filed);
 }
 END_TEST
 
@@ -77,7 +77,7 @@ START_TEST(growing_keeps_what_was_there)
     for (uint32_t i = 0; i < 3000000; i++)
         if (a[i] != i * 2654435761u)
             ck_abort_msg("number %lu changed", (unsigned long)i);
-    ebpo_array_free(a);
+    ebpo_array_free(w, a);
     ebpo_workspace_stats f = EBPO_WORKSPACE_STATS_INIT;
     ebpo_workspace_get_stats(w, &f);
     ck_assert(f.held == 0 && f.filed == 0 && f.filed_most > 0 && f.held_most > 0);
@@ -109,7 +109,7 @@ START_TEST(pages_of_files_are_let_go_of)
         }
     ck_assert_msg(most <= budget / 3 * 4, "%llu MiB of %llu", (unsigned long long)most >> 20,
                   (unsigned long long)(budget / 3 * 4) >> 20);
-    ebpo_array_free(a);
+    ebpo_array_free(w, a);
     ebpo_workspace_free(w);
 }
 END_TEST
@@ -120,9 +120,8 @@ START_TEST(without_a_workspace_it_is_malloc)
     uint64_t capacity = 10 << 20;
     ck_assert(a && ebpo_array_grow(NULL, &a, &capacity, 20 << 20, 1));
     ebpo_workspace_settle(NULL);
-    ebpo_settle_all();
-    ebpo_array_free(a);
-    ebpo_array_free(NULL);
+    ebpo_array_free(NULL, a);
+    ebpo_array_free(NULL, NULL);
     ebpo_workspace_free(NULL);
     ck_assert_ptr_null(ebpo_array_alloc(NULL, UINT64_MAX / 2, 16));
 }

@@ -83,6 +83,7 @@ typedef struct ebpo_level {
      * are 0 (and count as eight white nodes); on the last level all gray nodes are pruned, and have
      * no groups */
     uint64_t pruned_count;
+    ebpo_workspace *workspace; /* owns all its arrays; NULL: malloc's */
 } ebpo_level;
 
 EBPO_API void ebpo_level_free(ebpo_level *level);
@@ -166,6 +167,7 @@ typedef struct ebpo_tree {
     uint32_t *vertex_source; /* [vertex_count] number in the source, or NULL */
     /* [face_count]; numbers >= source_face_count: faces added by filling holes */
     uint32_t *face_source;
+    ebpo_workspace *workspace; /* owns the two; NULL: malloc's */
 } ebpo_tree;
 
 EBPO_API void ebpo_tree_free(ebpo_tree *tree);

@@ -1,0 +1,18 @@
+/* The extents of a workspace: whole pages of memory, or of files. */
+#ifndef EBPO_BASE_WORKSPACE_EXTENTS_H
+#define EBPO_BASE_WORKSPACE_EXTENTS_H
+
+#include "base/workspace_parts.h"
+
+/* NULL: the workspace's `failed` tells why. */
+ebpo_extent *ebpo_extent_make(ebpo_workspace *w, size_t bytes, ebpo_extent_kind kind);
+ebpo_extent *ebpo_part_make(ebpo_workspace *w, size_t bytes);
+/* Takes the extent that begins there out of the table; NULL: it is none of the workspace's. */
+ebpo_extent *ebpo_extent_take(ebpo_workspace *w, const void *at, bool foreign);
+void ebpo_extent_free(ebpo_workspace *w, ebpo_extent *extent);
+
+/* A mapping of somebody else's whose pages may be let go of too (of a file that is only read). */
+void ebpo_workspace_watch(ebpo_workspace *workspace, void *mapped, size_t bytes);
+void ebpo_workspace_unwatch(ebpo_workspace *workspace, void *mapped);
+
+#endif
