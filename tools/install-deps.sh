@@ -8,7 +8,7 @@ viewer="nginx-light nodejs"
 command -v npm >/dev/null || viewer="$viewer npm"
 modules=no
 # dpkg-dev tells meson where libraries go on Debian.
-packages="gcc dpkg-dev pkg-config meson ninja-build libhdf5-dev libzstd-dev zlib1g-dev libgmp-dev nettle-dev libassimp-dev libpng-dev libcurl4-openssl-dev libqhull-dev"
+packages="gcc dpkg-dev pkg-config meson ninja-build libhdf5-dev libzstd-dev zlib1g-dev libgmp-dev nettle-dev libassimp-dev libpng-dev libcairo2-dev libjs-chart.js libcurl4-openssl-dev libqhull-dev"
 for option in "$@"; do
     case $option in
     --tests) packages="$packages check hdf5-tools python3 python3-h5py python3-numpy clang libclang-rt-14-dev g++ mandoc chromium $viewer"; [ $modules = yes ] || modules=tests ;;

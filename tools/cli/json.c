@@ -38,7 +38,7 @@ static void quoted(json *j, const char *text)
             fputs("\\ufffd", j->out);
         else if (*s == '"' || *s == '\\')
             fprintf(j->out, "\\%c", *s);
-        else if (*s < 0x20 || *s == 0x7f)
+        else if (*s < 0x20 || *s == 0x7f || (*s == '<' && j->in_page))
             fprintf(j->out, "\\u%04x", *s);
         else
             fwrite(s, 1, (size_t)length, j->out);

@@ -11,6 +11,7 @@ enum { JSON_DEPTH = 16 };
 typedef struct json {
     FILE *out;
     int depth;
+    bool in_page; /* '<' is written as \u003c, so that no text ends a script element of HTML */
     bool filled[JSON_DEPTH]; /* something stands before at this depth */
     char close[JSON_DEPTH];
 } json;

@@ -212,6 +212,11 @@ static unsigned thread_count(const job *j)
     return j->v.threads ? (unsigned)j->v.threads : cores > 0 ? (unsigned)cores : 1;
 }
 
+static int caption_height(const job *j, int width)
+{
+    return j->v.levels && picture_has_captions() ? 14 * (1 + width / 240) : 0;
+}
+
 static ebpo_status draw_tile(const job *j, const tile *t, picture *p, const camera *view,
                              const int at[4], ebpo_error *error)
 {
@@ -219,12 +224,11 @@ static ebpo_status draw_tile(const job *j, const tile *t, picture *p, const came
     raster_style style = { { 0.30, 0.48, 0.66 }, t->closed, j->v.edges };
     if (t->level == MESH)
         memcpy(style.colour, (const double[3]){ 0.66, 0.54, 0.40 }, sizeof style.colour);
-    int caption = j->v.levels ? 1 + at[2] / 240 : 0;
-    ebpo_status status = raster_draw(p, at[0], at[1], at[2], at[3] - 14 * caption, view, &t->mesh,
-                                     &style, thread_count(j), error);
+    int caption = caption_height(j, at[2]), drawn = at[3] - caption;
+    ebpo_status status =
+        raster_draw(p, at[0], at[1], at[2], drawn, view, &t->mesh, &style, thread_count(j), error);
     if (status == EBPO_OK && caption)
-        picture_text(p, at[0] + (at[2] - picture_text_width(caption, t->caption)) / 2,
-                     at[1] + at[3] - 12 * caption, caption, ink, t->caption);
+        picture_caption(p, at[0], at[1] + drawn, at[2], caption, ink, t->caption);
     return status;
 }
 
@@ -235,7 +239,7 @@ static ebpo_status draw(const job *j, picture *p, ebpo_error *error)
                                                  : 6;
     int rows = (j->tile_count + columns - 1) / columns;
     int width = j->width / columns, height = j->height / rows;
-    int caption = j->v.levels ? 14 * (1 + width / 240) : 0;
+    int caption = caption_height(j, width);
     ebpo_status status = EBPO_OK;
     camera view;
     const tile *first = coarsest(j);

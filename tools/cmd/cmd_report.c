@@ -132,12 +132,14 @@ static ebpo_status write_one(const comparison *c, const char *name,
     return error->status = status;
 }
 
+static void write_json(FILE *out, const comparison *c) { report_to_json(out, c, false); }
+
 static ebpo_status write_all(const comparison *c, ebpo_error *error)
 {
     ebpo_status status = write_one(c, "report.csv", report_csv, error);
     if (status == EBPO_OK)
-        status = write_one(c, "report.json", report_to_json, error);
-    if (status == EBPO_OK)
+        status = write_one(c, "report.json", write_json, error);
+    if (status == EBPO_OK && !report_page_missing())
         status = write_one(c, "report.html", report_page, error);
     return status;
 }
@@ -154,8 +156,8 @@ static void summary(const comparison *c, const char *place)
     printf("%s: ", place);
     for (int i = 0; i < c->count; i++)
         printf("%s%s", i ? ", " : "", c->methods[i].name);
-    printf("; levels %d to %d; %s/report.html, report.csv, report.json in %.0f s\n", c->first,
-           comparison_last(c), place, c->seconds);
+    printf("; levels %d to %d; %s/%sreport.csv, report.json in %.0f s\n", c->first,
+           comparison_last(c), place, report_page_missing() ? "" : "report.html, ", c->seconds);
     for (int i = 0; i < c->count; i++)
         for (int k = 0; k < c->methods[i].note_count; k++)
             printf("  %s: %s\n", c->methods[i].name, c->methods[i].note[k]);
@@ -198,8 +200,10 @@ static int work(comparison *c, const char *const *operand, const char *place, pr
     if (!output_commit(place, c->folder))
         return EXIT_FAILED;
     c->folder[0] = 0;
+    if (report_page_missing())
+        fprintf(stderr, "ebpo report: warning: no page: %s\n", report_page_missing());
     if (c->v->json)
-        report_to_json(stdout, c);
+        report_to_json(stdout, c, false);
     else if (!c->v->quiet)
         summary(c, place);
     return EXIT_FINE;

@@ -205,8 +205,10 @@ int report_find_methods(comparison *c, const char *const *operand);
 
 /* What is written. */
 void report_csv(FILE *out, const comparison *c);
-void report_to_json(FILE *out, const comparison *c);
+void report_to_json(FILE *out, const comparison *c, bool in_page); /* in_page: see json.h */
 void report_page(FILE *out, const comparison *c);
+/* Why this build writes no page and how to get one, or NULL: it does. */
+const char *report_page_missing(void);
 
 /* "Intel(R) Xeon(R) Processor @ 2.50GHz", "" where the system does not tell; lent. */
 const char *machine_processor(void);

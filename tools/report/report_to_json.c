@@ -29,6 +29,7 @@ static void one_method(json *j, const comparison *c, const method *m)
     json_text(j, "name", m->name);
     json_text(j, "file", remote_shown(m->path));
     json_int(j, "levels_in_file", m->levels);
+    json_bool(j, "leaf_planes_stored", m->info.parts & EBPO_PART_LEAF_PLANES);
     figures(j, whole_figures, m->whole, WHOLE_FIGURES);
     json_array(j, "levels");
     for (int i = c->first; i <= method_last(c, m); i++) {
@@ -71,7 +72,10 @@ static void model(json *j, const comparison *c)
     json_text(j, "name", c->model);
     json_text(j, "source", info->source_name);
     json_text(j, "source_sha256", hex);
+    json_uint(j, "source_bytes", info->source_size);
     json_text(j, "kind", info->solid ? "solid" : "surface");
+    json_text(j, "rule", words_rule(info->rule));
+    json_text(j, "coordinates", info->double_coordinates ? "double" : "float");
     json_uint(j, "faces", info->face_count);
     json_uint(j, "vertices", info->vertex_count);
     json_text(j, "unit", info->unit);
@@ -83,10 +87,11 @@ static void model(json *j, const comparison *c)
     json_end(j);
 }
 
-void report_to_json(FILE *out, const comparison *c)
+void report_to_json(FILE *out, const comparison *c, bool in_page)
 {
     json j;
     json_begin(&j, out);
+    j.in_page = in_page;
     json_object(&j, NULL);
     json_text(&j, "version", ebpo_version());
     json_int(&j, "seed", c->v->seed);
@@ -97,6 +102,12 @@ void report_to_json(FILE *out, const comparison *c)
     json_uint(&j, "cores", machine_cores());
     json_end(&j);
     model(&j, c);
+    json_object(&j, "levels");
+    json_int(&j, "first", c->first);
+    json_int(&j, "last", comparison_last(c));
+    json_end(&j);
+    if (c->without_pictures)
+        json_text(&j, "without_pictures", c->without_pictures);
     json_array(&j, "quantities");
     names(&j, "method", whole_figures, WHOLE_FIGURES);
     names(&j, "level", level_figures, LEVEL_FIGURES);

@@ -1,0 +1,24 @@
+'use strict';
+// The report's data and what is derived from it.
+
+const byId = (id) => document.getElementById(id);
+const report = JSON.parse(byId('report').textContent); // as in report.json
+const drawn = JSON.parse(byId('drawn').textContent); // pictures: data URIs
+
+const { model, methods } = report;
+const levels = Array.from({ length: report.levels.last - report.levels.first + 1 }, (_, i) => report.levels.first + i);
+const solid = methods.some((m) => m.levels.some((l) => l.excess !== null));
+
+// undefined: this method has no such level.
+const levelOf = (method, level) => method.levels.find((l) => l.level === level);
+
+// A length in percent of the diagonal of the model's box.
+const ofDiagonal = (v) => (model.diagonal > 0 ? times(100 / model.diagonal, v) : null);
+
+// The least figure of levels (of different methods), null if none has it.
+function leastOf(some, of) {
+  const figures = some.filter(Boolean).map(of).filter((v) => v !== null);
+  return figures.length ? Math.min(...figures) : null;
+}
+
+const least = (level, of) => leastOf(methods.map((m) => levelOf(m, level)), of);

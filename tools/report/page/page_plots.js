@@ -1,0 +1,97 @@
+'use strict';
+// Which figures each plot shows. An axis has `of`, which finds its figure in a level or a deadline; `dotted`, a second
+// one; `limit`, that of the limit, a line of its own.
+
+const { percent: PERCENT, bytes: BYTE, seconds: TIME } = format;
+
+const LEVEL = { name: 'level', as: format.level, of: (l) => l.level };
+const BYTES_SO_FAR = { name: 'bytes so far', as: BYTE, of: (l) => l.cumulative_bytes };
+const LEVEL_TIME = { name: 'time to have the level', as: TIME, of: (l) => l.have_seconds };
+const INSIDE_TIME = { name: 'time of a question', as: TIME, of: (l) => fromNs(l.inside_ns) };
+const DISTANCE_TIME = { name: 'time of a question', as: TIME, of: (l) => fromNs(l.distance_ns) };
+const DEADLINE = { name: 'deadline', as: TIME, of: (d) => 1e-6 * d.microseconds };
+
+const excess = (of) => ({ name: 'excess of volume, % of the solid', as: PERCENT, of, limit: (l) => l.limit_excess });
+const volume = (of) => ({ name: 'volume of the envelopes', as: format.number, of });
+// A surface has no volume to exceed: the envelopes' own.
+const ALL_KNOWN = solid ? excess((l) => l.excess) : volume((l) => l.envelope_volume);
+const LEVELS_ALONE = solid ? excess((l) => l.levels_excess) : volume((l) => l.levels_volume);
+const RATIO = { name: 'times the limit’s excess', as: format.times, of: (l) => l.excess_to_limit, limit: () => 1 };
+const FARTHEST = {
+  name: 'farthest point, % of the diagonal', as: PERCENT, of: (l) => ofDiagonal(l.hausdorff_hi),
+};
+const MEAN = { name: 'mean distance, % of the diagonal', as: PERCENT, of: (l) => ofDiagonal(l.distance_mean) };
+const MAYBE_NEAR = {
+  name: 'MAYBE, % of points within 1 % of the diagonal', as: PERCENT, of: (l) => percent(l.maybe_near),
+};
+const MAYBE_UNIFORM = { name: 'MAYBE, % of uniform points', as: PERCENT, of: (l) => percent(l.maybe_uniform) };
+const WIDTH = { name: '% of the diagonal', as: PERCENT, of: (l) => ofDiagonal(l.width_median) };
+const CERTAIN = { name: '% of the diagonal', as: PERCENT, of: (d) => ofDiagonal(d.deadline_width_p99) };
+const TAKEN = {
+  name: 'time taken', as: TIME, of: (d) => fromNs(d.deadline_took_p99), dotted: (d) => fromNs(d.deadline_took_median),
+};
+const SENT_SO_FAR = {
+  name: 'bytes so far', as: BYTE, of: (l) => l.cumulative_bytes, dotted: (l) => l.thesis_cumulative_bytes,
+};
+const SENT = { name: 'bytes of the level', as: BYTE, of: (l) => l.bytes, dotted: (l) => l.thesis_bytes };
+
+// By the data-plot of the page's figures.
+const axesOf = {
+  'volume-by-level': [LEVEL, ALL_KNOWN],
+  'ratio-by-level': [LEVEL, RATIO],
+  'volume-by-bytes': [BYTES_SO_FAR, LEVELS_ALONE],
+  'farthest-by-bytes': [BYTES_SO_FAR, FARTHEST],
+  'mean-by-bytes': [BYTES_SO_FAR, MEAN],
+  'maybe-by-bytes': [BYTES_SO_FAR, MAYBE_NEAR],
+  'volume-by-time': [LEVEL_TIME, LEVELS_ALONE],
+  'farthest-by-time': [LEVEL_TIME, FARTHEST],
+  'maybe-by-time': [INSIDE_TIME, MAYBE_UNIFORM],
+  'width-by-time': [DISTANCE_TIME, WIDTH],
+  'width-by-deadline': [DEADLINE, CERTAIN],
+  'taken-by-deadline': [DEADLINE, TAKEN],
+  'sent-so-far': [LEVEL, SENT_SO_FAR],
+  'sent-by-level': [LEVEL, SENT],
+};
+
+// --- series ---
+
+function methodSeries(x, of, dotted) {
+  const rows = (m) => (x === DEADLINE ? m.deadlines : m.levels);
+  const points = (m) => rows(m).map((r) => ({ x: x.of(r), y: of(r), level: r.level }));
+  return methods.map((m, method) => ({ name: m.name, method, dotted, points: points(m) }));
+}
+
+// The limit is a fact of the cells; with methods that end in other leaves, the least. It has no bytes and no time of
+// its own: it stands where the leanest method stands. Times are noisy; a deeper level is not there sooner.
+function limitSeries(x, limit) {
+  let at = 0;
+  const points = levels.map((level) => {
+    at = Math.max(at, least(level, x.of) ?? 0);
+    return { x: at, y: least(level, limit), level };
+  });
+  return { name: 'limit', points };
+}
+
+// Time taken equals the time that was promised.
+function promise() {
+  return { name: 'promised', points: methods[0].deadlines.map((d) => ({ x: DEADLINE.of(d), y: DEADLINE.of(d) })) };
+}
+
+function seriesOf(x, y) {
+  return [
+    ...methodSeries(x, y.of, false),
+    ...(y.dotted ? methodSeries(x, y.dotted, true) : []),
+    ...(y.limit ? [limitSeries(x, y.limit)] : []),
+    ...(y === TAKEN ? [promise()] : []),
+  ];
+}
+
+function showPlots() {
+  preparePlots();
+  for (const figure of document.querySelectorAll('[data-plot]')) {
+    const [x, y] = axesOf[figure.dataset.plot];
+    if (!solid && (y === ALL_KNOWN || y === LEVELS_ALONE))
+      figure.querySelector('figcaption').textContent = 'Volume of the envelopes';
+    figure.hidden = !plot(figure, x, y, seriesOf(x, y));
+  }
+}

@@ -1,0 +1,150 @@
+'use strict';
+// Plots of series, drawn by Chart.js: logarithmic axes, levels as whole numbers, colours from the style sheet.
+// An axis is { name, as: a function of format }; a series { name, method, points: [{ x, y, level }], dotted }, and one
+// without method is a reference, such as the limit.
+
+const METHOD_COLOURS = 8;
+const SHAPES = ['circle', 'rect', 'triangle', 'rectRot'];
+const charts = new Map(); // by the figure's data-plot
+
+// A colour of the style sheet as it is now: light, dark or for paper.
+const styleColour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+const methodColour = (method) => styleColour(method === undefined ? 'reference' : `m${method % METHOD_COLOURS}`);
+
+// --- axes ---
+
+// The next of 1, 2, 5 times a power of ten, below or above.
+function rounded(v, up) {
+  const decade = 10 ** Math.floor(Math.log10(v)), steps = [1, 2, 5, 10].map((s) => s * decade);
+  return up ? steps.find((s) => s >= 0.9999 * v) : steps.findLast((s) => s <= 1.0001 * v);
+}
+
+// What has a place on an axis: levels are counted, all else is logarithmic.
+const fits = (axis, v) => Number.isFinite(v) && (axis.as === format.level ? v >= 0 : v > 0);
+
+// Less than a factor of five is divided evenly, or there would be hardly a number at it.
+function scaleOf(values, axis) {
+  const low = Math.min(...values), high = Math.max(...values);
+  if (axis.as === format.level)
+    return { type: 'linear', min: low - 0.25, max: high + 0.25, ticks: { stepSize: 1, includeBounds: false } };
+  const margin = 0.06 * (high - low), ticks = { includeBounds: false };
+  if (high < 5 * low)
+    return { type: 'linear', min: 0.98 * low - margin, max: 1.02 * high + margin, ticks };
+  const [min, max] = [rounded(low / 1.1, false), rounded(high * 1.1, true)];
+  return { type: 'logarithmic', min, max, ticks: { autoSkip: false } };
+}
+
+// Of a logarithmic axis 1, 2 and 5 get a number where there is room, else powers of ten alone.
+function isLabelled(scale, v) {
+  if (scale.type !== 'logarithmic')
+    return true;
+  const room = (scale.isHorizontal() ? scale.width / 150 : scale.height / 60) / Math.log10(scale.max / scale.min);
+  const digit = Math.round(v / 10 ** Math.floor(Math.log10(v * 1.0001)));
+  return digit === 1 || (room > 1 && (digit === 2 || digit === 5));
+}
+
+function scaleOptions(values, axis) {
+  const { ticks, ...scale } = scaleOf(values, axis);
+  const label = function (v) { return isLabelled(this, v) ? axis.as(v) : ''; };
+  return {
+    ...scale,
+    ticks: { ...ticks, maxRotation: 0, padding: 6, color: () => styleColour('soft'), callback: label },
+    grid: { drawBorder: false, drawTicks: false, color: (c) => styleColour(c.tick?.label ? 'grid' : 'grid-fine') },
+  };
+}
+
+// --- series ---
+
+function dataset({ name, method, points, dotted }) {
+  const thin = method === undefined || dotted, colour = () => methodColour(method);
+  return {
+    label: name, data: points, method, dotted, showLine: true, clip: false,
+    order: method ?? Infinity, // the first on top
+    borderColor: colour, borderWidth: thin ? 1.6 : 2, borderDash: dotted ? [2, 4] : thin ? [6, 4] : [],
+    pointStyle: thin ? 'circle' : SHAPES[method % SHAPES.length],
+    pointRadius: thin ? 2 : method % SHAPES.length ? 5 : 4, pointHoverRadius: thin ? 4 : 6,
+    pointBackgroundColor: colour, pointBorderColor: () => styleColour('card'), pointBorderWidth: 1.2,
+    backgroundColor: colour,
+  };
+}
+
+// Which point of the first series is which level; left out where numbers would stand on each other.
+const levelNumbers = {
+  id: 'levelNumbers',
+  afterDatasetsDraw(chart) {
+    const { ctx } = chart, levels = chart.data.datasets[0].data.map((p) => p.level);
+    let last;
+    ctx.save();
+    Object.assign(ctx, { font: `11px ${Chart.defaults.font.family}`, textAlign: 'center', lineWidth: 3 });
+    Object.assign(ctx, { lineJoin: 'round', fillStyle: styleColour('soft'), strokeStyle: styleColour('card') });
+    for (const [i, { x, y }] of chart.getDatasetMeta(0).data.entries()) {
+      if (last && Math.hypot(x - last.x, y - last.y) < 13)
+        continue;
+      ctx.strokeText(levels[i], x, y - 9);
+      ctx.fillText(levels[i], x, y - 9);
+      last = { x, y };
+    }
+    ctx.restore();
+  },
+};
+
+// --- the plot ---
+
+function tooltip(x, y) {
+  const title = ([{ dataset, raw }]) => dataset.label + (raw.level === undefined ? '' : `, level ${raw.level}`);
+  const say = (axis, v) => (axis.as === format.level ? [] : [`${axis.name}: ${axis.as(v)}`]);
+  return { displayColors: false, callbacks: { title, label: ({ raw }) => [...say(y, raw.y), ...say(x, raw.x)] } };
+}
+
+// A method's dotted line goes with its other one.
+function toggle(event, item, legend) {
+  const { chart } = legend, shown = chart.isDatasetVisible(item.datasetIndex);
+  chart.data.datasets.forEach((d, i) => d.label === item.text && chart.setDatasetVisibility(i, !shown));
+  chart.update();
+}
+
+function legend(datasets) {
+  return {
+    display: datasets.filter((d) => !d.dotted).length > 1, align: 'end', onClick: toggle,
+    labels: {
+      usePointStyle: true, boxWidth: 8, boxHeight: 8, padding: 12, color: () => styleColour('ink'),
+      filter: (item) => !datasets[item.datasetIndex].dotted,
+    },
+  };
+}
+
+function options(x, y, datasets) {
+  const points = datasets.flatMap((d) => d.data);
+  const title = { display: true, text: x.name, align: 'end', color: () => styleColour('soft') };
+  return {
+    animation: false, maintainAspectRatio: false, devicePixelRatio: Math.max(2, window.devicePixelRatio),
+    interaction: { mode: 'nearest', intersect: false },
+    scales: { x: { ...scaleOptions(points.map((p) => p.x), x), title }, y: scaleOptions(points.map((p) => p.y), y) },
+    plugins: { legend: legend(datasets), tooltip: tooltip(x, y) },
+  };
+}
+
+// Fills the figure; false when there is nothing to draw, and then it is left as it was.
+function plot(figure, x, y, series) {
+  const onAxes = series.map((s) => ({ ...s, points: s.points.filter((p) => fits(x, p.x) && fits(y, p.y)) }));
+  const datasets = onAxes.filter((s) => s.points.length).map(dataset);
+  if (datasets.every((d) => d.method === undefined))
+    return false;
+  const caption = figure.querySelector('figcaption'), canvas = element('canvas', { role: 'img' });
+  canvas.ariaLabel = `${caption.textContent}: ${y.name} against ${x.name}`;
+  caption.append(element('small', {}, y.name));
+  figure.append(element('div', {}, canvas));
+  const numbered = x.as !== format.level && datasets[0].data[0].level !== undefined;
+  const chart = new Chart(canvas, {
+    type: 'scatter', data: { datasets }, plugins: numbered ? [levelNumbers] : [], options: options(x, y, datasets),
+  });
+  charts.set(figure.dataset.plot, chart);
+  return true;
+}
+
+// Before the first plot. Colours change with the system's, and for paper.
+function preparePlots() {
+  Chart.defaults.font.family = getComputedStyle(document.body).fontFamily;
+  for (const query of ['(prefers-color-scheme: dark)', 'print'])
+    matchMedia(query).addEventListener('change', () => charts.forEach((chart) => chart.update()));
+}
