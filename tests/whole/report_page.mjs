@@ -136,8 +136,10 @@ const plotAxes = (told) => {
     'width-by-time': [figure('distance_ns', 1e-9), far(told, 'width_median')],
     'width-by-deadline': [deadline, far(told, 'deadline_width_p99')],
     'taken-by-deadline': [deadline, figure('deadline_took_p99', 1e-9), figure('deadline_took_median', 1e-9)],
-    'sent-so-far': [level, soFar, figure('thesis_cumulative_bytes')],
-    'sent-by-level': [level, figure('bytes'), figure('thesis_bytes')],
+    ...(told.methods.some((m) => m.levels.some((l) => l.thesis_bytes !== null)) && {
+      'sent-so-far': [level, soFar, figure('thesis_cumulative_bytes')],
+      'sent-by-level': [level, figure('bytes'), figure('thesis_bytes')],
+    }),
   };
 };
 

@@ -103,8 +103,8 @@ function hideEmpty() {
 
 showHead();
 showPictures();
-showPlots();
 showTables();
+showPlots();
 showNotes();
 hideEmpty();
 document.documentElement.dataset.shown = 'all';

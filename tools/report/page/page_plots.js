@@ -86,9 +86,10 @@ function seriesOf(x, y) {
   ];
 }
 
+// After the tables, which hide sections that have nothing to say.
 function showPlots() {
   preparePlots();
-  for (const figure of document.querySelectorAll('[data-plot]')) {
+  for (const figure of document.querySelectorAll('section:not([hidden]) [data-plot]')) {
     const [x, y] = axesOf[figure.dataset.plot];
     if (!solid && (y === ALL_KNOWN || y === LEVELS_ALONE))
       figure.querySelector('figcaption').textContent = 'Volume of the envelopes';
