@@ -10,6 +10,8 @@
 
 const char *ebpo_version(void) { return EBPO_VERSION; }
 
+int ebpo_version_number(void) { return EBPO_VERSION_NUMBER; }
+
 const char *ebpo_status_name(ebpo_status status)
 {
     switch (status) {

@@ -2,11 +2,21 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 
 #include <ebpo/ebpo.h>
 
 int main()
 {
+    char version[32];
+    std::snprintf(version, sizeof version, "%d.%d.%d", EBPO_VERSION_MAJOR, EBPO_VERSION_MINOR,
+                  EBPO_VERSION_PATCH);
+    if (std::strcmp(version, ebpo_version()) != 0 || ebpo_version_number() != EBPO_VERSION_NUMBER ||
+        EBPO_VERSION_NUMBER < EBPO_VERSION_OF(0, 1, 0))
+        return 2;
+    ebpo_file_stats stats = EBPO_FILE_STATS_INIT;
+    if (stats.struct_size != sizeof stats || stats.reads != 0)
+        return 3;
     ebpo_mesh mesh = {};
     mesh.vertex_count = 4;
     mesh.face_count = 4;
