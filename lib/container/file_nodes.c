@@ -61,35 +61,63 @@ ebpo_status ebpo_chunks_children(ebpo_chunks *chunks, const ebpo_node *gray, uin
     return ebpo_ranks_check(chunks, gray->cell.level + 1, ranks, counts, error);
 }
 
-ebpo_status ebpo_chunks_planes(ebpo_chunks *chunks, const ebpo_node *gray, uint32_t codes[255],
-                               uint32_t *count, ebpo_error *error)
+/* Where a node's planes stand: those that a gray node adds, or that are stored for a leaf. */
+typedef struct plane_list {
+    ebpo_array_id counts, codes;
+    uint32_t part;
+    uint64_t all; /* of the level */
+} plane_list;
+
+static plane_list planes_of(const ebpo_chunks *chunks, const ebpo_node *node)
 {
-    uint64_t first, planes;
-    uint8_t own;
-    *count = 0;
-    ebpo_status status = check_type(chunks, gray, EBPO_GRAY, "planes", error);
-    if (status != EBPO_OK || !(chunks->file->info.parts & EBPO_PART_PLANES))
-        return status;
-    status = ebpo_ranks_planes(chunks, gray->cell.level, gray->rank, &first, error);
-    if (status == EBPO_OK)
-        status = ebpo_chunks_integers(chunks, EBPO_A_PLANE_COUNTS, gray->cell.level, gray->rank, 1,
-                                      &own, sizeof own, error);
-    if (status != EBPO_OK || own == 0)
-        return status;
-    planes = chunks->file->info.level[gray->cell.level].plane_count;
-    if (own > planes - first)
-        return ebpo_chunks_fail(chunks, gray->cell.level, EBPO_A_PLANE_COUNTS,
+    const ebpo_level_summary *s = &chunks->file->info.level[node->cell.level];
+    return node->type == EBPO_LEAF ? (plane_list){ EBPO_A_LEAF_PLANE_COUNTS, EBPO_A_LEAF_PLANES,
+                                                   EBPO_PART_LEAF_PLANES, s->leaf_plane_count }
+                                   : (plane_list){ EBPO_A_PLANE_COUNTS, EBPO_A_PLANES,
+                                                   EBPO_PART_PLANES, s->plane_count };
+}
+
+static ebpo_status read_codes(ebpo_chunks *chunks, const plane_list *list, int level,
+                              uint64_t first, unsigned count, uint32_t *codes, ebpo_error *error)
+{
+    if (count > list->all - first)
+        return ebpo_chunks_fail(chunks, level, list->counts,
                                 "the counts do not add up to the number of planes", error);
-    status = ebpo_chunks_integers(chunks, EBPO_A_PLANES, gray->cell.level, first, own, codes,
-                                  sizeof *codes, error);
-    for (unsigned i = 0; i < own && status == EBPO_OK; i++) {
+    ebpo_status status =
+        ebpo_chunks_integers(chunks, list->codes, level, first, count, codes, sizeof *codes, error);
+    for (unsigned i = 0; i < count && status == EBPO_OK; i++) {
         int32_t n[3], d;
         if (!ebpo_plane_code_decode(codes[i], n, &d))
-            status = ebpo_chunks_fail(chunks, gray->cell.level, EBPO_A_PLANES,
-                                      "a code stands for no plane", error);
+            status =
+                ebpo_chunks_fail(chunks, level, list->codes, "a code stands for no plane", error);
     }
+    return status;
+}
+
+ebpo_status ebpo_chunks_planes(ebpo_chunks *chunks, const ebpo_node *node,
+                               uint32_t codes[EBPO_NODE_PLANES], unsigned *count, ebpo_error *error)
+{
+    uint64_t first = 0;
+    uint8_t own = 0;
+    *count = 0;
+    ebpo_status status = node->type == EBPO_LEAF
+                             ? ebpo_chunks_check_node(chunks, node, error)
+                             : check_type(chunks, node, EBPO_GRAY, "planes", error);
+    if (status != EBPO_OK)
+        return status;
+    int level = node->cell.level;
+    plane_list list = planes_of(chunks, node);
+    if (!(chunks->file->info.parts & list.part))
+        return EBPO_OK;
+    status = node->type == EBPO_LEAF
+                 ? ebpo_ranks_leaf_planes(chunks, level, node->rank, &first, error)
+                 : ebpo_ranks_planes(chunks, level, node->rank, &first, error);
     if (status == EBPO_OK)
-        *count = own;
+        status = ebpo_chunks_integers(chunks, list.counts, level, node->rank, 1, &own, sizeof own,
+                                      error);
+    if (status == EBPO_OK && own)
+        status = read_codes(chunks, &list, level, first, own, codes, error);
+    *count = status == EBPO_OK ? own : 0;
     return status;
 }
 
@@ -121,3 +149,43 @@ ebpo_status ebpo_chunks_winding(ebpo_chunks *chunks, const ebpo_node *node, int3
                                   "a node's winding number contradicts its type", error);
     return status;
 }
+
+/* --- for cursors --- */
+
+ebpo_status ebpo_chunks_root(ebpo_chunks *chunks, ebpo_node *root, ebpo_error *error)
+{
+    uint16_t types = 0;
+    ebpo_status status =
+        ebpo_chunks_integers(chunks, EBPO_A_TYPES, 0, 0, 1, &types, sizeof types, error);
+    *root = (ebpo_node){ .type = ebpo_group_type(types, 0) };
+    return status;
+}
+
+static ebpo_status children(void *holder, ebpo_node *gray, ebpo_node child[8], ebpo_error *error)
+{
+    ebpo_chunks *chunks = holder;
+    uint16_t types;
+    uint64_t ranks[4];
+    ebpo_status status = ebpo_chunks_children(chunks, gray, &types, ranks, error);
+    if (status != EBPO_OK)
+        return status;
+    gray->pruned = chunks->file->info.pruned && types == 0;
+    for (unsigned octant = 0; octant < 8; octant++)
+        child[octant] = ebpo_node_child(gray, octant, types, ranks);
+    return EBPO_OK;
+}
+
+static ebpo_status planes(void *holder, const ebpo_node *node, uint32_t codes[EBPO_NODE_PLANES],
+                          unsigned *count, ebpo_error *error)
+{
+    *count = 0;
+    return ebpo_node_is_uniform(node) ? EBPO_OK
+                                      : ebpo_chunks_planes(holder, node, codes, count, error);
+}
+
+static ebpo_status winding(void *holder, const ebpo_node *uniform, int32_t *out, ebpo_error *error)
+{
+    return ebpo_chunks_winding(holder, uniform, out, error);
+}
+
+const ebpo_node_source ebpo_chunks_source = { children, planes, winding };

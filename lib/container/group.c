@@ -75,25 +75,6 @@ static ebpo_status read_gray_planes(ebpo_chunks *chunks, int level, uint64_t cou
                       error);
 }
 
-/* Stored planes of leaves before one. */
-static ebpo_status leaf_planes_before(ebpo_chunks *chunks, int level, uint64_t rank,
-                                      uint64_t *planes, ebpo_error *error)
-{
-    uint64_t row[3] = { 0, 0, 0 }, sum = 0, all = chunks->file->info.level[level].leaf_plane_count;
-    ebpo_status status = EBPO_OK;
-    if (rank >= EBPO_INDEX_ROWS)
-        status = ebpo_chunks_integers(chunks, EBPO_A_LEAF_INDEX, level, rank / EBPO_INDEX_ROWS, 1,
-                                      row, sizeof *row, error);
-    if (status == EBPO_OK)
-        status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_PLANE_COUNTS, level, block_of(rank),
-                                 rank - block_of(rank), &sum, error);
-    if (status == EBPO_OK && (row[2] > all || sum > all - row[2]))
-        status = ebpo_chunks_fail(chunks, level, EBPO_A_LEAF_INDEX,
-                                  "the index contradicts the counts in the head", error);
-    *planes = row[2] + sum;
-    return status;
-}
-
 static ebpo_status read_leaf_planes(ebpo_chunks *chunks, int level, uint64_t count, ebpo_group *out,
                                     ebpo_error *error)
 {
@@ -101,7 +82,7 @@ static ebpo_status read_leaf_planes(ebpo_chunks *chunks, int level, uint64_t cou
     uint8_t counts[8];
     if (!(chunks->file->info.parts & EBPO_PART_LEAF_PLANES) || count == 0)
         return EBPO_OK;
-    ebpo_status status = leaf_planes_before(chunks, level, rank, &first, error);
+    ebpo_status status = ebpo_ranks_leaf_planes(chunks, level, rank, &first, error);
     if (status == EBPO_OK)
         status = ebpo_chunks_integers(chunks, EBPO_A_LEAF_PLANE_COUNTS, level, rank, count, counts,
                                       sizeof *counts, error);
@@ -270,7 +251,7 @@ static bool missing(ebpo_chunks *chunks, const ebpo_group_number *number, unsign
     if (gray && ebpo_ranks_planes(chunks, level, rank[EBPO_GRAY], &first, NULL) == EBPO_OK)
         any |= missing_codes(chunks, EBPO_A_PLANE_COUNTS, EBPO_A_PLANES, level, rank[EBPO_GRAY],
                              counts[EBPO_GRAY], first, keys);
-    if (leaf && leaf_planes_before(chunks, level, rank[EBPO_LEAF], &first, NULL) == EBPO_OK)
+    if (leaf && ebpo_ranks_leaf_planes(chunks, level, rank[EBPO_LEAF], &first, NULL) == EBPO_OK)
         any |= missing_codes(chunks, EBPO_A_LEAF_PLANE_COUNTS, EBPO_A_LEAF_PLANES, level,
                              rank[EBPO_LEAF], counts[EBPO_LEAF], first, keys);
     return any;

@@ -8,7 +8,7 @@
 
 #include "cache/cache.h"
 #include "container/schema.h"
-#include "octree/node.h"
+#include "octree/node_source.h"
 
 /* Decoded chunks under a budget (0: no limit; the smallest that works is a few MiB). */
 typedef struct ebpo_chunks ebpo_chunks;
@@ -37,15 +37,20 @@ EBPO_MUST_USE ebpo_status ebpo_chunks_children(ebpo_chunks *chunks, const ebpo_n
                                                uint16_t *types, uint64_t ranks[4],
                                                ebpo_error *error);
 
-/* Plane codes that a gray node adds; at most 255 into `codes`. *count is 0 without the part. */
-EBPO_MUST_USE ebpo_status ebpo_chunks_planes(ebpo_chunks *chunks, const ebpo_node *gray,
-                                             uint32_t codes[255], uint32_t *count,
+/* Codes of the planes that a gray node adds, or that are stored for a leaf; *count is 0 without the
+ * part. */
+EBPO_MUST_USE ebpo_status ebpo_chunks_planes(ebpo_chunks *chunks, const ebpo_node *node,
+                                             uint32_t codes[EBPO_NODE_PLANES], unsigned *count,
                                              ebpo_error *error);
 
 /* Winding number that the file gives for a white, black or leaf node (leaf: lowest corner). Solids
  * only. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_winding(ebpo_chunks *chunks, const ebpo_node *node,
                                               int32_t *winding, ebpo_error *error);
+
+/* For cursors (octree/cursor.h): the root; the holder is an ebpo_chunks. */
+EBPO_MUST_USE ebpo_status ebpo_chunks_root(ebpo_chunks *chunks, ebpo_node *root, ebpo_error *error);
+extern const ebpo_node_source ebpo_chunks_source;
 
 /* A subtree (or the whole tree) with everything that its leaves list. Levels are counted from its
  * root: level[0] has one group, of which only octant 0 exists and is the root. Faces have local

@@ -3,7 +3,8 @@
 #ifndef EBPO_OCTREE_NODE_TABLE_H
 #define EBPO_OCTREE_NODE_TABLE_H
 
-#include "octree/cells.h"
+#include "octree/node.h"
+#include "octree/rule.h"
 
 /* An entry: two bits of kind, 30 of value. */
 typedef enum ebpo_entry_kind {
@@ -37,6 +38,21 @@ static inline bool ebpo_entry_uniform(int32_t winding, uint32_t *entry)
         return false;
     *entry = ebpo_entry(EBPO_ENTRY_UNIFORM, (uint32_t)(winding + EBPO_ENTRY_ZERO));
     return true;
+}
+
+/* The node that an entry describes. */
+static inline ebpo_node ebpo_entry_node(uint32_t entry, ebpo_cell cell, ebpo_rule rule)
+{
+    ebpo_node node = { .cell = cell, .entry = entry, .type = EBPO_GRAY };
+    switch (ebpo_entry_kind_of(entry)) {
+    case EBPO_ENTRY_UNIFORM:
+        node.type = ebpo_rule_inside(rule, ebpo_entry_winding(entry)) ? EBPO_BLACK : EBPO_WHITE;
+        break;
+    case EBPO_ENTRY_LEAF: node.type = EBPO_LEAF; break;
+    case EBPO_ENTRY_BELOW: node.pruned = true; break;
+    case EBPO_ENTRY_GRAY: break;
+    }
+    return node;
 }
 
 typedef struct ebpo_node_table {

@@ -2,6 +2,7 @@
 #include "geom/strict_fp.h"
 
 #include "base/error.h"
+#include "octree/cursor.h"
 #include "octree/node_types.h"
 #include "query/clock.h"
 #include "query/inside.h"
@@ -119,21 +120,43 @@ static ebpo_status uniform_from_file(asking *a, const ebpo_node *node, ebpo_insi
     return status;
 }
 
-/* The gray node's child around p; or finds that it is pruned. */
-static ebpo_status step_down(const asking *a, ebpo_node *node, ebpo_error *error)
+static bool is_late(const asking *a) { return a->deadline && ebpo_clock() > a->deadline; }
+
+/* A gray node on the way; *done when it answers. Whether it is pruned is known once its
+ * children have been asked for. */
+static ebpo_status pass_gray(asking *a, ebpo_cursor *c, bool *done, ebpo_inside_result *out,
+                             ebpo_error *error)
 {
     const ebpo_model *m = a->context->model;
-    uint16_t types;
-    uint64_t ranks[4];
-    ebpo_status status = ebpo_chunks_children(m->chunks, node, &types, ranks, error);
+    const ebpo_node *node = ebpo_cursor_node(c), *child;
+    uint32_t codes[EBPO_NODE_PLANES];
+    unsigned count = 0;
+    ebpo_status status = EBPO_OK;
+    *done = true;
+    if (a->envelopes)
+        status = ebpo_cursor_planes(c, codes, &count, error);
     if (status != EBPO_OK)
         return status;
-    node->pruned = m->info->pruned && types == 0;
-    if (!node->pruned)
-        *node = ebpo_node_child(node,
-                                ebpo_octant_at(a->at, m->info->level_count - 2 - node->cell.level),
-                                types, ranks);
-    return EBPO_OK;
+    if (ebpo_outside_planes(&a->box, node->cell, codes, count, a->p)) {
+        *out = (ebpo_inside_result){ EBPO_OUT, 0, 0 };
+        return EBPO_OK;
+    }
+    bool limited = a->options->level >= 0;
+    if ((limited && (node->cell.level >= a->options->level || node->pruned)) || is_late(a)) {
+        maybe(a, node->cell, out);
+        return EBPO_OK;
+    }
+    status = ebpo_cursor_children(c, &child, error);
+    if (status != EBPO_OK)
+        return status;
+    *done = !child;
+    if (child)
+        ebpo_cursor_down(c, ebpo_octant_at(a->at, m->info->level_count - 2 - node->cell.level));
+    else if (limited || is_late(a))
+        maybe(a, node->cell, out);
+    else
+        status = ebpo_fail_pruned(m, node->cell, error);
+    return status;
 }
 
 /* From a node BELOW on. */
@@ -141,36 +164,22 @@ static ebpo_status walk_file(asking *a, const ebpo_node *below, ebpo_inside_resu
                              ebpo_error *error)
 {
     const ebpo_model *m = a->context->model;
-    ebpo_node node = m->top->below[ebpo_entry_value(below->entry)];
-    ebpo_status status = EBPO_OK;
-    while (node.type == EBPO_GRAY) {
-        uint32_t codes[255], count = 0;
-        if (a->envelopes)
-            status = ebpo_chunks_planes(m->chunks, &node, codes, &count, error);
-        if (status != EBPO_OK)
-            return status;
-        if (ebpo_outside_planes(&a->box, node.cell, codes, count, a->p)) {
-            *out = (ebpo_inside_result){ EBPO_OUT, 0, 0 };
-            return EBPO_OK;
-        }
-        if ((a->options->level >= 0 && (node.cell.level >= a->options->level || node.pruned)) ||
-            (a->deadline && ebpo_clock() > a->deadline)) {
-            maybe(a, node.cell, out);
-            return EBPO_OK;
-        }
-        if (node.pruned)
-            return ebpo_fail_pruned(m, node.cell, error);
-        status = step_down(a, &node, error);
-        if (status != EBPO_OK)
+    ebpo_cursor c;
+    ebpo_cursor_begin(&c, &ebpo_chunks_source, m->chunks,
+                      m->top->below[ebpo_entry_value(below->entry)]);
+    while (ebpo_cursor_node(&c)->type == EBPO_GRAY) {
+        bool done;
+        ebpo_status status = pass_gray(a, &c, &done, out, error);
+        if (status != EBPO_OK || done)
             return status;
     }
-    if (node.type == EBPO_LEAF &&
-        (a->options->level >= 0 || (a->deadline && ebpo_clock() > a->deadline))) {
-        maybe(a, node.cell, out);
+    const ebpo_node *node = ebpo_cursor_node(&c);
+    if (node->type == EBPO_LEAF && (a->options->level >= 0 || is_late(a))) {
+        maybe(a, node->cell, out);
         return EBPO_OK;
     }
-    return node.type == EBPO_LEAF ? leaf_from_file(a, &node, out, error)
-                                  : uniform_from_file(a, &node, out, error);
+    return node->type == EBPO_LEAF ? leaf_from_file(a, node, out, error)
+                                   : uniform_from_file(a, node, out, error);
 }
 
 static ebpo_status walk_nodes(asking *a, ebpo_inside_result *out, ebpo_error *error)

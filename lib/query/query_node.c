@@ -3,49 +3,33 @@
 #include "query/query_node.h"
 
 #include <math.h>
+#include <string.h>
 
-#include "octree/rule.h"
 #include "query/pruned.h"
 
-static const ebpo_node_table *table_of(const ebpo_model *model, const ebpo_node *node)
+/* A node of the top. */
+static ebpo_node node_of(const ebpo_model *model, uint32_t entry, ebpo_cell cell)
 {
-    return node->subtree ? &node->subtree->nodes : &model->top->nodes;
-}
-
-/* What an entry says beside itself. */
-static void fill_in(const ebpo_model *model, ebpo_node *node)
-{
-    const ebpo_node *below;
-    switch (ebpo_entry_kind_of(node->entry)) {
-    case EBPO_ENTRY_UNIFORM:
-        node->type = ebpo_rule_inside(model->info->rule, ebpo_entry_winding(node->entry))
-                         ? EBPO_BLACK
-                         : EBPO_WHITE;
-        break;
-    case EBPO_ENTRY_LEAF: node->type = EBPO_LEAF; break;
-    case EBPO_ENTRY_GRAY: node->type = EBPO_GRAY; break;
-    case EBPO_ENTRY_BELOW:
-        below = node->subtree ? NULL : &model->top->below[ebpo_entry_value(node->entry)];
-        node->type = below ? below->type : EBPO_GRAY;
-        node->pruned = !below || below->pruned;
-        break;
+    ebpo_node node = ebpo_entry_node(entry, cell, model->info->rule);
+    if (ebpo_node_is_below(&node)) {
+        const ebpo_node *below = &model->top->below[ebpo_entry_value(entry)];
+        node.type = below->type;
+        node.pruned = below->pruned;
     }
+    return node;
 }
 
 ebpo_node ebpo_model_root(const ebpo_model *model)
 {
-    ebpo_node root = { .subtree = model->whole };
-    root.entry = table_of(model, &root)->root;
-    fill_in(model, &root);
-    return root;
+    return model->whole ? ebpo_subtree_root(model->whole)
+                        : node_of(model, model->top->nodes.root, (ebpo_cell){ 0, { 0, 0, 0 } });
 }
 
 ebpo_node ebpo_model_child(const ebpo_model *model, const ebpo_node *gray, unsigned octant)
 {
-    ebpo_node child = { .cell = ebpo_cell_child(gray->cell, octant), .subtree = gray->subtree };
-    child.entry = ebpo_table_child(table_of(model, gray), gray->entry, octant);
-    fill_in(model, &child);
-    return child;
+    return gray->subtree ? ebpo_subtree_child(gray->subtree, gray, octant)
+                         : node_of(model, ebpo_table_child(&model->top->nodes, gray->entry, octant),
+                                   ebpo_cell_child(gray->cell, octant));
 }
 
 ebpo_status ebpo_model_enter(ebpo_context *context, ebpo_node *node, ebpo_error *error)
@@ -69,15 +53,13 @@ const uint32_t *ebpo_model_planes(const ebpo_model *model, const ebpo_node *node
     uint32_t value = ebpo_entry_value(node->entry);
     bool below = ebpo_node_is_below(node);
     *count = 0;
-    if (!node->subtree && (below || node->type == EBPO_GRAY)) {
-        ebpo_top_planes planes = below ? model->top->below_planes[value] : model->top->gray[value];
-        *count = planes.count;
-        return model->top->planes + planes.first;
-    }
-    if (node->type != EBPO_GRAY || !node->subtree->gray_first)
+    if (node->subtree)
+        return ebpo_subtree_planes(node->subtree, node, count);
+    if (!below && node->type != EBPO_GRAY)
         return NULL;
-    *count = node->subtree->gray_first[value + 1] - node->subtree->gray_first[value];
-    return node->subtree->gray_planes + node->subtree->gray_first[value];
+    ebpo_top_planes planes = below ? model->top->below_planes[value] : model->top->gray[value];
+    *count = planes.count;
+    return model->top->planes + planes.first;
 }
 
 double ebpo_model_lower_bound(const ebpo_model *m, const ebpo_box *box, const ebpo_node *node,
@@ -104,3 +86,39 @@ int ebpo_rank_children(const ebpo_model *m, const ebpo_box *box, const ebpo_node
     }
     return count;
 }
+
+/* --- for cursors --- */
+
+static ebpo_status children(void *holder, ebpo_node *gray, ebpo_node child[8], ebpo_error *error)
+{
+    ebpo_context *context = holder;
+    ebpo_status status = EBPO_OK;
+    if (gray->pruned)
+        return EBPO_OK;
+    if (ebpo_node_is_below(gray))
+        status = ebpo_model_enter(context, gray, error);
+    for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)
+        child[octant] = ebpo_model_child(context->model, gray, octant);
+    return status;
+}
+
+static ebpo_status planes(void *holder, const ebpo_node *node, uint32_t codes[EBPO_NODE_PLANES],
+                          unsigned *count, ebpo_error *error)
+{
+    const ebpo_context *context = holder;
+    (void)error;
+    const uint32_t *from = ebpo_model_planes(context->model, node, count);
+    if (*count)
+        memcpy(codes, from, *count * sizeof *codes);
+    return EBPO_OK;
+}
+
+static ebpo_status winding(void *holder, const ebpo_node *uniform, int32_t *out, ebpo_error *error)
+{
+    (void)holder;
+    (void)error;
+    *out = ebpo_entry_winding(uniform->entry);
+    return EBPO_OK;
+}
+
+const ebpo_node_source ebpo_context_source = { children, planes, winding };

@@ -117,6 +117,7 @@ ebpo_status ebpo_subtree_make(ebpo_subtree **out, ebpo_slice *slice, const ebpo_
     s->root = slice->root;
     s->deepest = slice->root.cell.level + slice->level_count - 1;
     s->solid = info->solid;
+    s->rule = (uint8_t)info->rule;
     s->has_planes = with_planes;
     s->wide = needs_doubles(info);
     s->outer_count = slice->outer_count;

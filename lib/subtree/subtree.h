@@ -7,6 +7,7 @@
 
 #include "container/slice.h"
 #include "geom/cell.h"
+#include "octree/node_source.h"
 #include "octree/node_table.h"
 
 /* --- leaves --- */
@@ -83,6 +84,7 @@ typedef struct ebpo_subtree {
     ebpo_box box; /* of the whole model */
     int deepest;  /* level of its deepest nodes */
     bool solid, has_planes;
+    uint8_t rule; /* ebpo_rule */
     ebpo_node_table nodes;
     ebpo_subtree_leaf *leaf;
     uint32_t leaf_count;
@@ -123,6 +125,17 @@ void ebpo_subtree_free(ebpo_subtree *subtree);
  * Bounds from counts. */
 void ebpo_subtree_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
                            uint64_t *peak);
+
+/* --- its nodes (subtree_nodes.c); `entry` is what finds them --- */
+
+ebpo_node ebpo_subtree_root(const ebpo_subtree *subtree);
+/* Child of a gray node that is not pruned. */
+ebpo_node ebpo_subtree_child(const ebpo_subtree *subtree, const ebpo_node *gray, unsigned octant);
+/* Codes of a gray node's planes, where the subtree has kept them. */
+const uint32_t *ebpo_subtree_planes(const ebpo_subtree *subtree, const ebpo_node *node,
+                                    unsigned *count);
+/* For cursors (octree/cursor.h); the holder is an ebpo_subtree. */
+extern const ebpo_node_source ebpo_subtree_source;
 
 /* A face's corners. */
 static inline void ebpo_subtree_triangle(const ebpo_subtree *s, uint32_t slot, double out[3][3])
