@@ -134,7 +134,7 @@ static void whole_open(whole *w, const char *name, int cut_level, bool shape)
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
     ebpo_slice slice;
     memset(w, 0, sizeof *w);
-    fine(ebpo_open(&w->file, name, &error), &error);
+    fine(ebpo_open(name, &w->file, &error), &error);
     fine(ebpo_file_read_tree(w->file, &w->tree, 1, &error), &error);
     for (int i = 0; i < w->tree.info.level_count; i++)
         fine(ebpo_level_ranks_make(&w->ranks[i], &w->tree.level[i], i, &error), &error);
@@ -151,14 +151,14 @@ static void whole_open(whole *w, const char *name, int cut_level, bool shape)
     }
     options.cut_level = cut_level;
     options.threads = 1;
-    fine(ebpo_model_open(&w->model, w->file, &options, &error), &error);
-    fine(ebpo_context_new(&w->context, w->model, &error), &error);
+    fine(ebpo_model_new(w->file, &options, &w->model, &error), &error);
+    fine(ebpo_context_new(w->model, &w->context, &error), &error);
 }
 
 static void whole_close(whole *w)
 {
     ebpo_context_free(w->context);
-    ebpo_model_close(w->model);
+    ebpo_model_free(w->model);
     ebpo_subtree_free(w->subtree);
     ebpo_chunks_free(w->chunks);
     for (int i = 0; i < EBPO_LEVELS_MAX; i++)
@@ -387,8 +387,8 @@ static void build(ebpo_mesh mesh, uint32_t leaf_faces, uint32_t parts)
     ebpo_tree tree;
     options.leaf_faces = leaf_faces;
     options.parts = parts;
-    fine(ebpo_mesh_check(&report, &mesh, 0, options.progress, &error), &error);
-    fine(ebpo_build(&tree, &mesh, &report, &mend, &options, &error), &error);
+    fine(ebpo_mesh_check(&mesh, 0, options.progress, &report, &error), &error);
+    fine(ebpo_build(&mesh, &report, &mend, &options, &tree, &error), &error);
     fine(ebpo_tree_write(&tree, path, &write, &error), &error);
     ebpo_tree_free(&tree);
 }
@@ -398,7 +398,7 @@ static void cut(const double low, const double high, int last_level)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_subset_options options = EBPO_SUBSET_OPTIONS_INIT;
     ebpo_file *file;
-    fine(ebpo_open(&file, path, &error), &error);
+    fine(ebpo_open(path, &file, &error), &error);
     const ebpo_info *info = ebpo_file_info(file);
     options.boxed = high > low;
     for (int k = 0; k < 3; k++) {
@@ -454,7 +454,7 @@ START_TEST(nodes_of_a_real_model_are_the_same_whatever_holds_them)
     char name[4096];
     ebpo_mesh mesh;
     snprintf(name, sizeof name, "%s/conrod.ply", models ? models : "");
-    if (models && ebpo_mesh_read(&mesh, name, NULL, NULL) == EBPO_OK)
+    if (models && ebpo_mesh_read(name, NULL, &mesh, NULL) == EBPO_OK)
         compare_model(mesh, 16, USUAL, 5);
 }
 END_TEST
