@@ -3,8 +3,8 @@
 #include <pthread.h>
 #include <sched.h>
 #include <stdatomic.h>
-#include <time.h>
 
+#include "base/clock.h"
 #include "base/error.h"
 #include "base/fp_env.h"
 
@@ -51,16 +51,9 @@ static void record_failure(run *r, uint64_t at, ebpo_status status, const ebpo_e
     atomic_store(&r->stop, true);
 }
 
-static double now(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 static void work(run *r, unsigned number)
 {
-    double last = now();
+    double last = ebpo_seconds();
     while (!atomic_load(&r->stop)) {
         uint64_t begin = atomic_fetch_add(&r->next, r->grain);
         if (begin >= r->count)
@@ -71,8 +64,8 @@ static void work(run *r, unsigned number)
         if (status != EBPO_OK)
             record_failure(r, begin, status, &error);
         uint64_t done = atomic_fetch_add(&r->done, end - begin) + (end - begin);
-        if (number == 0 && r->progress && r->progress->report && now() - last > 0.1) {
-            last = now();
+        if (number == 0 && r->progress && r->progress->report && ebpo_seconds() - last > 0.1) {
+            last = ebpo_seconds();
             if (!ebpo_progress_step(r->progress, r->stage, done, r->count, &error))
                 record_failure(r, begin, EBPO_E_CANCELLED, &error);
         }

@@ -5,9 +5,9 @@
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include "base/alloc.h"
+#include "base/clock.h"
 #include "base/error.h"
 #include "cache/cache_slots.h"
 
@@ -42,13 +42,6 @@ struct ebpo_cache {
     unsigned ahead_count, ahead_next;
     uint64_t asking; /* how often something was asked for */
 };
-
-static double now(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 static void pin(ebpo_cache *c, ebpo_cache_slot *s)
 {
@@ -293,9 +286,9 @@ ebpo_status ebpo_cache_get(ebpo_cache *c, uint64_t key, void **item, bool *hit, 
     pthread_mutex_lock(&c->lock);
     bool there = take_ready(c, key, item);
     if (!there) {
-        double begin = now();
+        double begin = ebpo_seconds();
         status = wait_or_load(c, key, item, error);
-        c->stats.load_seconds += now() - begin;
+        c->stats.load_seconds += ebpo_seconds() - begin;
     }
     pthread_mutex_unlock(&c->lock);
     if (hit)

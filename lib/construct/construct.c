@@ -4,10 +4,10 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include "arrange/arrange.h"
 #include "base/alloc.h"
+#include "base/clock.h"
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
@@ -207,13 +207,6 @@ typedef struct piece_job {
     _Atomic uint64_t cells_ns, envelopes_ns; /* of all threads */
 } piece_job;
 
-static uint64_t nanoseconds(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (uint64_t)t.tv_sec * UINT64_C(1000000000) + (uint64_t)t.tv_nsec;
-}
-
 static ebpo_status work_on_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                   ebpo_error *error)
 {
@@ -222,11 +215,11 @@ static ebpo_status work_on_pieces(void *context, uint64_t begin, uint64_t end, u
     ebpo_status status = EBPO_OK;
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
         ebpo_branch *s = &b->sub[i];
-        uint64_t begun = nanoseconds();
+        uint64_t begun = ebpo_clock();
         status = ebpo_build_partition(b, s, error);
         if (status == EBPO_OK)
             status = ebpo_build_number(b, s, error);
-        uint64_t cut = nanoseconds();
+        uint64_t cut = ebpo_clock();
         job->cells_ns += cut - begun;
         if (status == EBPO_OK)
             status = ebpo_emit_piece(b, job->scratch[worker], s, error);
@@ -234,7 +227,7 @@ static ebpo_status work_on_pieces(void *context, uint64_t begin, uint64_t end, u
         if (status == EBPO_OK)
             status = ebpo_build_pack(b, s->out, error);
         ebpo_workspace_settle(b->workspace);
-        job->envelopes_ns += nanoseconds() - cut;
+        job->envelopes_ns += ebpo_clock() - cut;
     }
     return status;
 }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/clock.h"
 #include "base/error.h"
 #include "base/sized.h"
 #include "http/disk.h"
@@ -166,11 +167,11 @@ bool ebpo_source_http_stats(const ebpo_source *source, ebpo_http_stats *out)
 static ebpo_status request(http_source *s, ebpo_request *r, ebpo_error *error)
 {
     pthread_mutex_lock(&s->pieces.lock);
-    double since = ebpo_http_now();
+    double since = ebpo_seconds();
     ebpo_transfers_add(s->pieces.transfers, r, true);
     while (!r->done)
         pthread_cond_wait(&s->pieces.done, &s->pieces.lock);
-    s->pieces.wait_seconds += ebpo_http_now() - since;
+    s->pieces.wait_seconds += ebpo_seconds() - since;
     pthread_mutex_unlock(&s->pieces.lock);
     if (r->status != EBPO_OK && error)
         *error = r->error;

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/clock.h"
 #include "base/error.h"
 
 enum {
@@ -446,7 +447,7 @@ ebpo_status ebpo_range_cache_read(ebpo_range_cache *p, uint64_t offset, uint64_t
     uint64_t at = offset, end = offset + size;
     ebpo_status status = EBPO_OK;
     pthread_mutex_lock(&p->lock);
-    double since = ebpo_http_now();
+    double since = ebpo_seconds();
     if (!cover(p, offset, end))
         status = ebpo_fail_memory(error, size);
     if (status == EBPO_OK)
@@ -459,7 +460,7 @@ ebpo_status ebpo_range_cache_read(ebpo_range_cache *p, uint64_t offset, uint64_t
          i++)
         /* what comes of these requests is not this reader's any more */
         p->piece[i]->demanded = p->piece[i]->users > 0;
-    p->wait_seconds += ebpo_http_now() - since;
+    p->wait_seconds += ebpo_seconds() - since;
     pthread_mutex_unlock(&p->lock);
     return status;
 }

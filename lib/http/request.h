@@ -4,7 +4,6 @@
 
 #include <ebpo/http.h>
 
-#include <time.h>
 
 #include "http/answer.h"
 
@@ -30,13 +29,5 @@ typedef struct ebpo_request {
     double due, deadline; /* seconds; deadline 0: nobody waits and nothing was sent yet */
     uint64_t whole_room;
 } ebpo_request;
-
-/* Monotonic, in seconds. */
-static inline double ebpo_http_now(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 #endif

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/clock.h"
 #include "ebpo_config.h"
 
 enum {
@@ -22,7 +23,7 @@ static int look_for_stall(void *user, curl_off_t total, curl_off_t done, curl_of
 {
     ebpo_slot *s = user;
     curl_off_t connected = 0;
-    double now = ebpo_http_now();
+    double now = ebpo_seconds();
     (void)total;
     (void)done;
     (void)upload_total;
@@ -40,7 +41,7 @@ static int look_for_stall(void *user, curl_off_t total, curl_off_t done, curl_of
 static size_t take_header(char *line, size_t size, size_t count, void *user)
 {
     ebpo_slot *s = user;
-    s->moved = ebpo_http_now();
+    s->moved = ebpo_seconds();
     ebpo_answer_line(&s->answer, line, size * count);
     if (s->answer.header_bytes <= EBPO_HTTP_HEADERS_MAX)
         return size * count;
@@ -100,7 +101,7 @@ static size_t take_body(char *bytes, size_t size, size_t count, void *user)
 {
     ebpo_slot *s = user;
     size *= count;
-    s->moved = ebpo_http_now();
+    s->moved = ebpo_seconds();
     ebpo_slot_judge(s);
     s->received += size;
     if (s->verdict == EBPO_ANSWER_PART)

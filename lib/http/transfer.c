@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/clock.h"
 #include "base/error.h"
 #include "base/random.h"
 #include "http/slot.h"
@@ -70,7 +71,7 @@ ebpo_status ebpo_transfers_make(ebpo_transfers **out, const char *url, const cha
     t->lock = lock;
     t->done = done;
     t->slot_count = options->connections < EBPO_SLOTS_MAX ? options->connections : EBPO_SLOTS_MAX;
-    t->random = (uint64_t)(ebpo_http_now() * 1e9) ^ (uint64_t)(uintptr_t)t;
+    t->random = (uint64_t)(ebpo_seconds() * 1e9) ^ (uint64_t)(uintptr_t)t;
     if (set_up(t)) {
         *out = t;
         return EBPO_OK;
@@ -131,7 +132,7 @@ static bool dequeue(ebpo_transfers *t, ebpo_request *r)
 void ebpo_transfers_add(ebpo_transfers *t, ebpo_request *r, bool urgent)
 {
     if (urgent)
-        r->deadline = ebpo_http_now() + t->options->time_limit;
+        r->deadline = ebpo_seconds() + t->options->time_limit;
     enqueue(t, r);
     curl_multi_wakeup(t->multi);
 }
@@ -140,7 +141,7 @@ void ebpo_transfers_urge(ebpo_transfers *t, ebpo_request *r)
 {
     if (r->deadline > 0)
         return;
-    r->deadline = ebpo_http_now() + t->options->time_limit;
+    r->deadline = ebpo_seconds() + t->options->time_limit;
     if (dequeue(t, r))
         enqueue(t, r);
     curl_multi_wakeup(t->multi);
@@ -324,7 +325,7 @@ static void end_attempt(ebpo_transfers *t, ebpo_slot *s, CURLcode code)
 {
     long connections = 0, redirects = 0;
     ebpo_request *r = s->request;
-    double now = ebpo_http_now();
+    double now = ebpo_seconds();
     curl_easy_getinfo(s->easy, CURLINFO_NUM_CONNECTS, &connections);
     curl_easy_getinfo(s->easy, CURLINFO_REDIRECT_COUNT, &redirects);
     curl_multi_remove_handle(t->multi, s->easy);
@@ -404,9 +405,9 @@ static bool start_due(ebpo_transfers *t, double *wait)
     bool quit = t->quit;
     if (t->cancelled)
         cancel_queue(t);
-    while (!quit && (r = next_due(t, ebpo_http_now(), wait)) != NULL) {
+    while (!quit && (r = next_due(t, ebpo_seconds(), wait)) != NULL) {
         ebpo_slot *s = free_slot(t);
-        begin_attempt(t, s, r, ebpo_http_now());
+        begin_attempt(t, s, r, ebpo_seconds());
         if (curl_multi_add_handle(t->multi, s->easy) != CURLM_OK) {
             t->active--;
             s->request = NULL;

@@ -50,9 +50,7 @@ ebpo_status ebpo_lod_model_read(ebpo_lod_model *out, ebpo_file *file, int target
     memset(out, 0, sizeof *out);
     out->info = ebpo_file_info(file);
     out->target = target;
-    memcpy(out->box.origin, out->info->box_origin, sizeof out->box.origin);
-    memcpy(out->box.size, out->info->box_size, sizeof out->box.size);
-    out->box.grid_level = out->info->grid_level;
+    out->box = ebpo_root_box(out->info);
     uint32_t parts = out->info->parts;
     out->leaf_source = parts & EBPO_PART_LEAF_PLANES ? EBPO_LEAF_STORED
                        : parts & EBPO_PART_MESH      ? EBPO_LEAF_DERIVED

@@ -3,7 +3,18 @@
 #ifndef EBPO_OCTREE_CELLS_H
 #define EBPO_OCTREE_CELLS_H
 
+#include <ebpo/file.h>
+
 #include "geom/cell.h"
+
+/* A file's root cell. */
+static inline ebpo_box ebpo_root_box(const ebpo_info *info)
+{
+    const double *origin = info->box_origin, *size = info->box_size;
+    return (ebpo_box){ { origin[0], origin[1], origin[2] },
+                       { size[0], size[1], size[2] },
+                       info->grid_level };
+}
 
 static inline ebpo_cell ebpo_cell_child(ebpo_cell cell, unsigned octant)
 {

@@ -6,11 +6,11 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/clock.h"
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/sized.h"
 #include "query/prefetch.h"
-#include "query/clock.h"
 #include "query/inside.h"
 #include "query/limited.h"
 #include "query/modes.h"
@@ -18,6 +18,7 @@
 #include "query/options.h"
 #include "query/pruned.h"
 #include "query/query_node.h"
+#include "query/sign.h"
 
 /* --- exact: every subtree that may hold something nearer --- */
 
@@ -139,20 +140,6 @@ static ebpo_status look_at_pruned(ebpo_context *c, ebpo_nearest *n, ebpo_error *
         pruned_within(c, n, &box, root, ebpo_model_lower_bound(c->model, &box, &root, 0, n->p),
                       &nearest, error);
     n->passed_over = fmin(n->passed_over, nearest);
-    return status;
-}
-
-ebpo_status ebpo_give_sign(ebpo_context *c, const double p[3], const ebpo_distance_options *o,
-                           ebpo_distance_result *out, ebpo_error *error)
-{
-    ebpo_inside_result where;
-    ebpo_inside_options plain = EBPO_INSIDE_OPTIONS_INIT;
-    if (!c->model->info->solid || o->unsigned_distance || out->face == EBPO_NO_FACE)
-        return EBPO_OK;
-    ebpo_status status = c->model->whole ? ebpo_inside_whole(c, p, 1, &where, error)
-                                         : ebpo_inside_walk(c, p, &plain, &where, error);
-    if (status == EBPO_OK && where.where == EBPO_IN)
-        out->distance = -out->distance;
     return status;
 }
 

@@ -2,9 +2,9 @@
 #include "geom/strict_fp.h"
 
 #include "base/error.h"
+#include "base/clock.h"
 #include "octree/cursor.h"
 #include "octree/node_types.h"
-#include "query/clock.h"
 #include "query/inside.h"
 #include "query/limited.h"
 #include "query/pruned.h"

@@ -12,6 +12,7 @@
 #include "query/nearest.h"
 #include "query/pruned.h"
 #include "query/query_node.h"
+#include "query/sign.h"
 
 static const ebpo_distance_result nothing = { INFINITY,          0,           INFINITY,
                                               { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };

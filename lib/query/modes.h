@@ -4,11 +4,6 @@
 
 #include "query/query_model.h"
 
-/* Makes an answer's distance negative inside: solids, unless unsigned. Shared with the exact
- * distance. */
-EBPO_MUST_USE ebpo_status ebpo_give_sign(ebpo_context *context, const double p[3],
-                                         const ebpo_distance_options *options,
-                                         ebpo_distance_result *out, ebpo_error *error);
 /* Of the leaf around p; where there is none: nothing (LEAVES), or of all leaves below the deepest
  * gray node around p (RECURSIVE). */
 EBPO_MUST_USE ebpo_status ebpo_distance_around(ebpo_context *context, const double p[3],

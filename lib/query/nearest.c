@@ -11,8 +11,8 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/clock.h"
 #include "base/error.h"
-#include "query/clock.h"
 
 /* Beyond so many halves of the subtree's size, single precision tells nothing apart. */
 #define FAR 32.0

@@ -9,10 +9,10 @@
 #include <string.h>
 
 #include "base/alloc.h"
+#include "base/clock.h"
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/sized.h"
-#include "query/clock.h"
 
 /* Decoded chunks: an eighth of the budget, within these. */
 enum { CHUNKS_LEAST = 2 << 20, CHUNKS_MOST = 128 << 20, SUBTREES_LEAST = 2 << 20 };

@@ -49,13 +49,7 @@ struct ebpo_context {
         warm_source_face; /* its number in the file, and the one that callers are told */
 };
 
-static inline ebpo_box ebpo_model_box(const ebpo_model *m)
-{
-    const ebpo_info *i = m->info;
-    return (ebpo_box){ { i->box_origin[0], i->box_origin[1], i->box_origin[2] },
-                       { i->box_size[0], i->box_size[1], i->box_size[2] },
-                       i->grid_level };
-}
+static inline ebpo_box ebpo_model_box(const ebpo_model *m) { return ebpo_root_box(m->info); }
 
 /* EBPO_E_ARGUMENT for a point that is not finite; `number` is for the message. */
 EBPO_MUST_USE ebpo_status ebpo_check_points(const double *points, uint64_t count,

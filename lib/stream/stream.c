@@ -51,7 +51,7 @@ ebpo_status ebpo_stream_new(ebpo_file *file, const ebpo_stream_options *options,
     s->info = ebpo_file_info(file);
     s->options = wanted;
     s->level = -1;
-    s->box = ebpo_node_box(s->info);
+    s->box = ebpo_root_box(s->info);
     s->bytes = s->info->head_bytes;
     if (s->options.polygons && !(s->envelopes = ebpo_alloc_zero(1, sizeof *s->envelopes))) {
         ebpo_stream_free(s);

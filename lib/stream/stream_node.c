@@ -8,14 +8,6 @@
 #include "octree/octcode.h"
 #include "stream/cell_to_model.h"
 
-ebpo_box ebpo_node_box(const ebpo_info *info)
-{
-    ebpo_box box = { .grid_level = info->grid_level };
-    memcpy(box.origin, info->box_origin, sizeof box.origin);
-    memcpy(box.size, info->box_size, sizeof box.size);
-    return box;
-}
-
 void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcode,
                      ebpo_node_type type)
 {

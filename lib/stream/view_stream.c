@@ -74,7 +74,7 @@ ebpo_status ebpo_view_stream_new(ebpo_file *file, const ebpo_view_options *optio
         return ebpo_fail_memory(error, sizeof *s);
     s->file = file;
     s->info = ebpo_file_info(file);
-    s->box = ebpo_node_box(s->info);
+    s->box = ebpo_root_box(s->info);
     status = take_options(s, &wanted, error);
     if (status == EBPO_OK)
         status = ebpo_chunks_make_counted(&s->chunks, file, s->options.memory, error);

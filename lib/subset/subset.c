@@ -75,11 +75,7 @@ static ebpo_status settle(ebpo_cutting *c)
     c->parts = c->from->parts & o->parts;
     if (!(c->parts & EBPO_PART_MESH))
         c->parts &= ~(uint32_t)EBPO_PART_MAPS;
-    for (int k = 0; k < 3; k++) {
-        c->box.origin[k] = c->from->box_origin[k];
-        c->box.size[k] = c->from->box_size[k];
-    }
-    c->box.grid_level = c->from->grid_level;
+    c->box = ebpo_root_box(c->from);
     *info = *c->from;
     if (!c->from->pruned)
         memcpy(info->subset_of, c->from->content_sha256, sizeof info->subset_of);

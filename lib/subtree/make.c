@@ -111,9 +111,7 @@ ebpo_status ebpo_subtree_make(ebpo_subtree **out, ebpo_slice *slice, const ebpo_
         ebpo_slice_free(slice);
         return ebpo_fail_memory(error, sizeof *s);
     }
-    memcpy(s->box.origin, info->box_origin, sizeof s->box.origin);
-    memcpy(s->box.size, info->box_size, sizeof s->box.size);
-    s->box.grid_level = info->grid_level;
+    s->box = ebpo_root_box(info);
     s->root = slice->root;
     s->deepest = slice->root.cell.level + slice->level_count - 1;
     s->solid = info->solid;

@@ -23,13 +23,6 @@ size_t bench_answer_bytes(bench_query query)
 
 /* --- clock --- */
 
-uint64_t bench_clock(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (uint64_t)t.tv_sec * 1000000000 + (uint64_t)t.tv_nsec;
-}
-
 static int compare_u64(const void *a, const void *b)
 {
     uint64_t x, y;
@@ -43,8 +36,8 @@ uint64_t bench_clock_cost(void)
     enum { READINGS = 10001 };
     static uint64_t cost[READINGS];
     for (int i = 0; i < READINGS; i++) {
-        uint64_t start = bench_clock();
-        cost[i] = bench_clock() - start;
+        uint64_t start = tool_clock();
+        cost[i] = tool_clock() - start;
     }
     qsort(cost, READINGS, sizeof *cost, compare_u64);
     return cost[READINGS / 2];
@@ -102,13 +95,13 @@ ebpo_status bench_singly(const bench_job *job, ebpo_context *context, uint64_t c
 {
     ebpo_status status = EBPO_OK;
     double sum = 0;
-    uint64_t begin = bench_clock();
+    uint64_t begin = tool_clock();
     for (uint64_t i = 0; i < job->count && status == EBPO_OK; i++) {
         if (job->rate > 0)
             wait_until(begin + (uint64_t)((double)i / job->rate * 1e9));
-        uint64_t start = bench_clock();
+        uint64_t start = tool_clock();
         status = bench_ask(job, context, i, error);
-        uint64_t took = bench_clock() - start;
+        uint64_t took = tool_clock() - start;
         job->ns[i] = took > clock_cost ? took - clock_cost : 0;
     }
     if (status != EBPO_OK)
@@ -128,7 +121,7 @@ ebpo_status bench_batch(const bench_job *job, ebpo_context *context, void *answe
                         bench_figures *out, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    uint64_t start = bench_clock();
+    uint64_t start = tool_clock();
     if (job->query == BENCH_INSIDE)
         status = ebpo_inside_many(context, job->rows, job->count, &job->inside, answers, error);
     else if (job->query == BENCH_DISTANCE)
@@ -136,7 +129,7 @@ ebpo_status bench_batch(const bench_job *job, ebpo_context *context, void *answe
     else
         for (uint64_t i = 0; i < job->count && status == EBPO_OK; i++)
             status = ask_into(job, context, i, answers, error);
-    out->batch = (double)(bench_clock() - start) / (double)job->count;
+    out->batch = (double)(tool_clock() - start) / (double)job->count;
     return status;
 }
 

@@ -4,6 +4,8 @@
 
 #include <ebpo/query.h>
 
+#include "cli/tool_clock.h"
+
 typedef enum bench_query { BENCH_INSIDE, BENCH_DISTANCE, BENCH_RAY } bench_query;
 
 /* An answer to a ray: none has face EBPO_NO_FACE. */
@@ -34,8 +36,6 @@ typedef struct bench_figures {
     double batch;                 /* nanoseconds a query, all asked at once */
 } bench_figures;
 
-/* Nanoseconds on a clock that only goes forward. */
-uint64_t bench_clock(void);
 /* What a reading of the clock adds to a time: the median of 10,001. */
 uint64_t bench_clock_cost(void);
 

@@ -2,17 +2,15 @@
 
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "cli/stage_rows.h"
+#include "cli/tool_clock.h"
 #include "cli/words.h"
 
 double progress_now(void)
 {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+    return 1e-9 * (double)tool_clock();
 }
 
 /* While a mesh is read, what is done are bytes. */

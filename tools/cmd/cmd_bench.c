@@ -112,12 +112,12 @@ static int cold_start(const bench_job *job, const char *path, const ebpo_model_o
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     r->cold_pages = bench_drop_file(path);
-    uint64_t begin = bench_clock();
+    uint64_t begin = tool_clock();
     int code = query_open(&s, "bench", path, holding, job->inside.level, remote);
-    r->cold_open_seconds = (double)(bench_clock() - begin) * 1e-9;
+    r->cold_open_seconds = (double)(tool_clock() - begin) * 1e-9;
     if (code == EXIT_FINE && bench_ask(job, s.context, 0, &error) != EBPO_OK)
         code = command_failed("bench", &error);
-    r->cold_seconds = (double)(bench_clock() - begin) * 1e-9;
+    r->cold_seconds = (double)(tool_clock() - begin) * 1e-9;
     if (code == EXIT_FINE) {
         ebpo_model_get_stats(s.model, &stats);
         r->cold_bytes = stats.bytes_read;
@@ -405,10 +405,10 @@ static int bench(bench_job *job, const values *v, const char *path,
     query_session s = QUERY_SESSION_INIT;
     bench_reset_peak();
     int code = cold_start(job, path, holding, &v->q.remote, &r);
-    uint64_t begin = bench_clock();
+    uint64_t begin = tool_clock();
     if (code == EXIT_FINE)
         code = query_open(&s, "bench", path, holding, job->inside.level, &v->q.remote);
-    r.open_seconds = (double)(bench_clock() - begin) * 1e-9;
+    r.open_seconds = (double)(tool_clock() - begin) * 1e-9;
     if (code == EXIT_FINE)
         code = measure(job, &s, (int)v->repeat, batch, &r);
     if (s.file)

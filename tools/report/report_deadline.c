@@ -21,9 +21,9 @@ static ebpo_status ask(const comparison *c, ebpo_context *context, unsigned us, 
     t->exact = t->late = 0;
     for (uint64_t i = 0; i < c->points; i++) {
         ebpo_distance_result answer;
-        uint64_t begin = bench_clock();
+        uint64_t begin = tool_clock();
         ebpo_status status = ebpo_distance(context, c->uniform + 3 * i, &options, &answer, error);
-        uint64_t took = bench_clock() - begin;
+        uint64_t took = tool_clock() - begin;
         if (status != EBPO_OK)
             return status;
         t->took[i] = took > clock_cost ? (double)(took - clock_cost) : 0;

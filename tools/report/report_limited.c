@@ -136,12 +136,12 @@ static ebpo_status timed(asker *a, bool distance, const double *points, int leve
     inside.level = level;
     options.warm = false;
     options.unsigned_distance = true;
-    uint64_t begin = bench_clock();
+    uint64_t begin = tool_clock();
     ebpo_status status =
         distance
             ? ebpo_distance_many(a->context, points, a->c->points, &options, a->distance, error)
             : ebpo_inside_many(a->context, points, a->c->points, &inside, a->inside, error);
-    *ns = (double)(bench_clock() - begin) / (double)a->c->points;
+    *ns = (double)(tool_clock() - begin) / (double)a->c->points;
     return status;
 }
 

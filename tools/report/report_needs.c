@@ -75,9 +75,9 @@ static ebpo_status one_need(comparison *c, method *m, ebpo_file *file, ebpo_mode
     need_result *n = &m->need[m->need_count];
     *n = (need_result){ kind, asked, { NAN, NAN, NAN, NAN, NAN } };
     snprintf(path, sizeof path, "%s/need.ebpo.h5", c->folder);
-    uint64_t begin = bench_clock();
+    uint64_t begin = tool_clock();
     ebpo_status status = cut(c, file, n, path, error);
-    n->figure[OF_NEED_SECONDS] = 1e-9 * (double)(bench_clock() - begin);
+    n->figure[OF_NEED_SECONDS] = 1e-9 * (double)(tool_clock() - begin);
     if (status == EBPO_OK)
         status = reach(c, model, path, n, error);
     unlink(path);

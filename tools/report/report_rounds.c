@@ -18,7 +18,7 @@ static ebpo_status have_level(const comparison *c, const method *m, int level, d
     if (!ebpo_is_url(m->path))
         bench_drop_file(m->path);
     wanted.threads = (unsigned)c->v->threads;
-    uint64_t begin = bench_clock();
+    uint64_t begin = tool_clock();
     ebpo_status status = remote_open(&file, m->path, &c->v->remote, error);
     if (status == EBPO_OK) {
         ebpo_file_prefetch_levels(file, 0, level);
@@ -26,7 +26,7 @@ static ebpo_status have_level(const comparison *c, const method *m, int level, d
     }
     for (int i = 0; i <= level && status == EBPO_OK; i++)
         status = ebpo_stream_next_level(stream, &told, &more, error);
-    *seconds = 1e-9 * (double)(bench_clock() - begin);
+    *seconds = 1e-9 * (double)(tool_clock() - begin);
     if (status == EBPO_OK)
         *t = traffic_of(file);
     ebpo_stream_free(stream);
