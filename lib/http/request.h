@@ -4,7 +4,6 @@
 
 #include <ebpo/http.h>
 
-
 #include "http/answer.h"
 
 /* Zero-initialise, fill in the first part, keep in place until done. */

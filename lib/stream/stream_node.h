@@ -16,7 +16,6 @@ typedef struct ebpo_node_buffers {
     uint32_t polygon_first[EBPO_POLYTOPE_FACES + 1], corners[EBPO_POLYTOPE_CORNERS];
 } ebpo_node_buffers;
 
-
 /* Octcode, type, cell; a black node's volume. */
 void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcode,
                      ebpo_node_type type);

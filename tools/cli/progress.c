@@ -8,10 +8,7 @@
 #include "cli/tool_clock.h"
 #include "cli/words.h"
 
-double progress_now(void)
-{
-    return 1e-9 * (double)tool_clock();
-}
+double progress_now(void) { return 1e-9 * (double)tool_clock(); }
 
 /* While a mesh is read, what is done are bytes. */
 static void draw_rate(const progress_line *line, double speed, uint64_t total)
