@@ -3,15 +3,17 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/sized.h"
 #include "container/content.h"
 #include "container/reader.h"
 
 /* Arrays are independent, so threads take whole ones; chunks within one must come in order. */
 typedef struct content_job {
-    ebpo_file *file;
+    const ebpo_file *file;
     const ebpo_array_in *array[EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS];
     uint8_t digest[EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS][32];
     unsigned count;
+    ebpo_read_options alone; /* chunks in order */
 } content_job;
 
 static ebpo_status take(void *context, const ebpo_array_in *array, uint64_t chunk, uint64_t row,
@@ -33,7 +35,7 @@ static ebpo_status digest_arrays(void *context, uint64_t begin, uint64_t end, un
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
         ebpo_sha256 state;
         ebpo_sha256_begin(&state);
-        status = ebpo_reader_rows(j->file, j->array[i], 1, take, &state, error);
+        status = ebpo_reader_rows(j->file, j->array[i], &j->alone, take, &state, error);
         ebpo_sha256_end(&state, j->digest[i]);
     }
     return status;
@@ -55,9 +57,15 @@ static ebpo_status compare(content_job *j, ebpo_error *error)
     return status;
 }
 
-ebpo_status ebpo_file_check_content(ebpo_file *file, unsigned threads, ebpo_error *error)
+ebpo_status ebpo_file_check_content(const ebpo_file *file, const ebpo_read_options *options,
+                                    ebpo_error *error)
 {
-    content_job j = { .file = file };
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_read_options, &read, options, error);
+    if (status != EBPO_OK)
+        return status;
+    content_job j = { .file = file, .alone = read };
+    j.alone.threads = 1;
     /* then in the order of the file, in which it comes; else the largest first */
     bool far = ebpo_input_expects(&file->in);
     for (int id = EBPO_ARRAYS - 1; id >= EBPO_LEVEL_ARRAYS; id--)
@@ -73,7 +81,6 @@ ebpo_status ebpo_file_check_content(ebpo_file *file, unsigned threads, ebpo_erro
         j.array[j.count - 1 - i] = other;
     }
     ebpo_expect_tree(file);
-    ebpo_status status =
-        ebpo_parallel_for(threads, j.count, 1, digest_arrays, &j, NULL, "check", error);
+    status = ebpo_parallel_for(read.threads, j.count, 1, digest_arrays, &j, NULL, "check", error);
     return status == EBPO_OK ? compare(&j, error) : status;
 }

@@ -324,7 +324,7 @@ static void release(void *user, void *item)
     free(item);
 }
 
-static ebpo_status make(ebpo_chunks **out, ebpo_file *file, uint64_t budget, bool counted,
+static ebpo_status make(ebpo_chunks **out, const ebpo_file *file, uint64_t budget, bool counted,
                         ebpo_error *error)
 {
     *out = NULL;
@@ -334,11 +334,12 @@ static ebpo_status make(ebpo_chunks **out, ebpo_file *file, uint64_t budget, boo
     c->file = file;
     c->counted = counted;
     c->limit = UINT64_MAX;
+    ebpo_read_options read = ebpo_read_threads(1);
     pthread_mutex_init(&c->lock, NULL);
     ebpo_cache_source source = { c, estimate, load, release };
     ebpo_status status = counted ? EBPO_OK
-                                 : ebpo_reader_make(file, EBPO_A_FACES_INDEX, 0, 1, sizeof *c->seen,
-                                                    &c->seen, error);
+                                 : ebpo_reader_make(file, EBPO_A_FACES_INDEX, 0, &read,
+                                                    sizeof *c->seen, &c->seen, error);
     if (status == EBPO_OK)
         status = ebpo_cache_make(&c->cache, &source, "chunk", budget, error);
     if (status == EBPO_OK)
@@ -348,12 +349,13 @@ static ebpo_status make(ebpo_chunks **out, ebpo_file *file, uint64_t budget, boo
     return status;
 }
 
-ebpo_status ebpo_chunks_make(ebpo_chunks **out, ebpo_file *file, uint64_t budget, ebpo_error *error)
+ebpo_status ebpo_chunks_make(ebpo_chunks **out, const ebpo_file *file, uint64_t budget,
+                             ebpo_error *error)
 {
     return make(out, file, budget, false, error);
 }
 
-ebpo_status ebpo_chunks_make_counted(ebpo_chunks **out, ebpo_file *file, uint64_t budget,
+ebpo_status ebpo_chunks_make_counted(ebpo_chunks **out, const ebpo_file *file, uint64_t budget,
                                      ebpo_error *error)
 {
     return make(out, file, budget, true, error);
@@ -369,7 +371,7 @@ void ebpo_chunks_free(ebpo_chunks *chunks)
         chunks->idle = desk->next;
         free_scratch(desk);
     }
-    ebpo_array_free(chunks->file->workspace, chunks->seen);
+    ebpo_array_free(NULL, chunks->seen);
     free(chunks->ahead);
     pthread_mutex_destroy(&chunks->lock);
     free(chunks);

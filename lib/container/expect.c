@@ -47,12 +47,12 @@ void ebpo_expect_root(ebpo_expected *e, uint32_t needs)
 
 void ebpo_expect_all(ebpo_expected *e)
 {
-    ebpo_input_expect(&e->file->in, e->range, e->count);
+    ebpo_input_expect(&ebpo_reader_own(e->file)->in, e->range, e->count);
     free(e->range);
     *e = (ebpo_expected)EBPO_EXPECTED_INIT(e->file);
 }
 
-void ebpo_file_prefetch_levels(ebpo_file *file, int first, int last)
+void ebpo_file_prefetch_levels(const ebpo_file *file, int first, int last)
 {
     ebpo_expected e = EBPO_EXPECTED_INIT(file);
     int end = last < file->info.level_count - 1 ? last : file->info.level_count - 1;
@@ -61,7 +61,7 @@ void ebpo_file_prefetch_levels(ebpo_file *file, int first, int last)
     ebpo_expect_all(&e);
 }
 
-void ebpo_expect_tree(ebpo_file *file)
+void ebpo_expect_tree(const ebpo_file *file)
 {
     ebpo_expected e = EBPO_EXPECTED_INIT(file);
     for (int level = 0; level < file->info.level_count; level++)

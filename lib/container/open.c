@@ -29,7 +29,7 @@ static ebpo_status open_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_id id,
         ebpo_h5_read_array(h5, a->path, most, &a->shape, &a->chunks, &a->stored_bytes, error);
     if (status != EBPO_OK)
         return status;
-    ebpo_check check = ebpo_reader_check(file);
+    ebpo_check check = ebpo_reader_check(file, NULL);
     if (a->shape.rows != rows)
         return ebpo_check_fail(&check, -1, a->path,
                                "the array's length contradicts the counts in the head", error);
@@ -75,24 +75,33 @@ static ebpo_status open_group(ebpo_h5_in *h5, const char *path, bool wanted, ebp
     return status;
 }
 
-/* Bytes by part, of the arrays whose chunks are known. */
-static ebpo_status sum_stored(ebpo_file *file, ebpo_error *error)
+uint64_t ebpo_reader_level_bytes(const ebpo_file *file, int level)
 {
-    ebpo_info *info = &file->info;
-    uint64_t stored = 0;
-    for (int level = 0; level < info->level_count; level++) {
-        info->level[level].stored_bytes = 0;
-        for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
-            info->level[level].stored_bytes += file->level_array[level][id].stored_bytes;
-    }
-    info->mesh_vertex_bytes = info->mesh_face_bytes = info->map_bytes = 0;
+    uint64_t bytes = 0;
+    for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
+        bytes += file->level_array[level][id].stored_bytes;
+    return bytes;
+}
+
+/* Of the arrays whose chunks are known. */
+static ebpo_stored_sizes stored_sizes(const ebpo_file *file)
+{
+    ebpo_stored_sizes sizes = { .map_bytes = 0 };
+    for (int level = 0; level < file->info.level_count; level++)
+        sizes.level_bytes[level] = ebpo_reader_level_bytes(file, level);
     for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS; id++)
-        *(uint64_t *)(void *)((char *)info + ebpo_schema[id].bytes) +=
+        *(uint64_t *)(void *)((char *)&sizes + ebpo_schema[id].bytes) +=
             file->root_array[id].stored_bytes;
-    for (int level = 0; level < info->level_count; level++)
-        stored += info->level[level].stored_bytes;
-    stored += info->mesh_vertex_bytes + info->mesh_face_bytes + info->map_bytes;
-    if (stored > info->file_bytes)
+    return sizes;
+}
+
+static ebpo_status check_stored(const ebpo_file *file, ebpo_error *error)
+{
+    ebpo_stored_sizes sizes = stored_sizes(file);
+    uint64_t stored = sizes.mesh_vertex_bytes + sizes.mesh_face_bytes + sizes.map_bytes;
+    for (int level = 0; level < file->info.level_count; level++)
+        stored += sizes.level_bytes[level];
+    if (stored > file->info.file_bytes)
         return ebpo_fail_file(
             error, EBPO_E_FORMAT, file->in.shown,
             "the arrays' chunks take more room than the file has; get a fresh copy of the file");
@@ -120,7 +129,7 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *erro
     info->codec = pipeline == EBPO_PIPELINE_ZSTD      ? EBPO_CODEC_ZSTD
                   : pipeline == EBPO_PIPELINE_DEFLATE ? EBPO_CODEC_DEFLATE
                                                       : EBPO_CODEC_NONE;
-    return status == EBPO_OK ? sum_stored(file, error) : status;
+    return status == EBPO_OK ? check_stored(file, error) : status;
 }
 
 /* Files that other programs have rewritten may state what is no longer true. */
@@ -222,14 +231,12 @@ static ebpo_status locate_all(ebpo_file *file, ebpo_error *error)
     for (int i = 0; i < EBPO_ARRAYS && status == EBPO_OK; i++)
         status = locate_array(file, &h5, &file->root_array[i], error);
     status = ebpo_h5_close(&h5, status, error);
-    return status == EBPO_OK ? sum_stored(file, error) : status;
+    return status == EBPO_OK ? check_stored(file, error) : status;
 }
 
-ebpo_status ebpo_file_locate(ebpo_file *file, ebpo_error *error)
+static ebpo_status locate(ebpo_file *file, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    if (atomic_load(&file->located))
-        return EBPO_OK;
     pthread_mutex_lock(&file->lock);
     if (!atomic_load(&file->located)) {
         status = locate_all(file, error);
@@ -240,10 +247,19 @@ ebpo_status ebpo_file_locate(ebpo_file *file, ebpo_error *error)
     return status;
 }
 
-ebpo_status ebpo_reader_locate(ebpo_file *file, const ebpo_array_in *array, ebpo_error *error)
+ebpo_status ebpo_file_locate(const ebpo_file *file, ebpo_stored_sizes *out, ebpo_error *error)
+{
+    ebpo_status status =
+        atomic_load(&file->located) ? EBPO_OK : locate(ebpo_reader_own(file), error);
+    if (out)
+        *out = status == EBPO_OK ? stored_sizes(file) : (ebpo_stored_sizes){ .map_bytes = 0 };
+    return status;
+}
+
+ebpo_status ebpo_reader_locate(const ebpo_file *file, const ebpo_array_in *array, ebpo_error *error)
 {
     /* A single chunk's place stands in the array's header: known since the opening. */
-    return ebpo_h5_chunk_count(&array->shape) == 1 ? EBPO_OK : ebpo_file_locate(file, error);
+    return ebpo_h5_chunk_count(&array->shape) == 1 ? EBPO_OK : ebpo_file_locate(file, NULL, error);
 }
 
 ebpo_status ebpo_open(const char *path, ebpo_file **out, ebpo_error *error)
@@ -325,11 +341,6 @@ ebpo_status ebpo_file_get_http_stats(const ebpo_file *file, ebpo_http_stats *out
     bool told = ebpo_source_http_stats(&file->in.source, &stats);
     ebpo_status status = EBPO_GIVE(ebpo_http_stats, out, &stats);
     return status == EBPO_OK && !told ? EBPO_E_ABSENT : status;
-}
-
-void ebpo_file_set_workspace(ebpo_file *file, ebpo_workspace *workspace)
-{
-    file->workspace = workspace;
 }
 
 const ebpo_info *ebpo_file_info(const ebpo_file *file) { return &file->info; }

@@ -6,17 +6,19 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
+#include "base/sized.h"
 #include "base/arrays.h"
 #include "container/plan.h"
 #include "container/reader.h"
 
 /* leaf_first holds skips; each leaf's new faces end before the next one's begin. */
-static ebpo_status add_up_skips(ebpo_file *file, int number, ebpo_level *level, ebpo_error *error)
+static ebpo_status add_up_skips(const ebpo_file *file, int number, ebpo_level *level,
+                                ebpo_error *error)
 {
-    ebpo_check check = ebpo_reader_check(file);
+    ebpo_check check = ebpo_reader_check(file, level->workspace);
     uint64_t end = 0, faces = file->info.face_count;
     for (uint64_t i = 0; i < level->leaf_count; i++) {
-        ebpo_workspace_settle_at(file->workspace, i);
+        ebpo_workspace_settle_at(level->workspace, i);
         uint64_t skip = level->leaf_first[i];
         if (skip > faces - end || level->leaf_new[i] > faces - end - skip)
             return ebpo_check_fail(&check, number, "leaf_skip",
@@ -28,7 +30,7 @@ static ebpo_status add_up_skips(ebpo_file *file, int number, ebpo_level *level, 
 }
 
 typedef struct refs_job {
-    ebpo_file *file;
+    const ebpo_file *file;
     int number;
     ebpo_level *level;
     const uint64_t *index;
@@ -59,11 +61,11 @@ static ebpo_status decode_refs(void *context, uint64_t begin, uint64_t end, unsi
     uint64_t leaf = begin * EBPO_INDEX_ROWS, at = j->index[begin * 3 + 1];
     uint64_t stop =
         end * EBPO_INDEX_ROWS < j->level->leaf_count ? end * EBPO_INDEX_ROWS : j->level->leaf_count;
-    ebpo_workspace_settle(j->file->workspace);
+    ebpo_workspace_settle(j->level->workspace);
     for (; leaf < stop; at += j->level->leaf_ref_count[leaf++])
         if (!ebpo_refs_decode(j->level->leaf_refs + at, j->level->leaf_ref_count[leaf],
                               j->level->leaf_first[leaf])) {
-            ebpo_check check = ebpo_reader_check(j->file);
+            ebpo_check check = ebpo_reader_check(j->file, j->level->workspace);
             return ebpo_check_fail(&check, j->number, "leaf_refs",
                                    "a reference does not lead to a face before the leaf's own",
                                    error);
@@ -71,33 +73,36 @@ static ebpo_status decode_refs(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-static ebpo_status check_index(ebpo_file *file, ebpo_array_id id, int number, const uint64_t *right,
-                               ebpo_error *error)
+static ebpo_status check_index(const ebpo_file *file, ebpo_array_id id, const ebpo_level *level,
+                               int number, const uint64_t *right, ebpo_error *error)
 {
     const ebpo_array_in *array = ebpo_reader_array(file, id, number);
     uint64_t *stored = NULL;
     if (!array->present)
         return EBPO_OK;
-    ebpo_status status = ebpo_reader_make(file, id, number, 1, sizeof *stored, &stored, error);
+    ebpo_read_options read = ebpo_read_threads(1);
+    read.workspace = level->workspace;
+    ebpo_status status = ebpo_reader_make(file, id, number, &read, sizeof *stored, &stored, error);
     if (status == EBPO_OK &&
         memcmp(stored, right, array->shape.rows * array->shape.cols * sizeof *stored) != 0) {
-        ebpo_check check = ebpo_reader_check(file);
+        ebpo_check check = ebpo_reader_check(file, level->workspace);
         status = ebpo_check_fail(&check, number, ebpo_schema[id].name,
                                  "the index contradicts the arrays that it is about", error);
     }
-    ebpo_array_free(file->workspace, stored);
+    ebpo_array_free(level->workspace, stored);
     return status;
 }
 
 /* Counts of references, and skips. */
-static ebpo_status finish_lists(ebpo_file *file, int number, ebpo_level *level, ebpo_error *error)
+static ebpo_status finish_lists(const ebpo_file *file, int number, ebpo_level *level,
+                                ebpo_error *error)
 {
     uint64_t refs = 0;
     if (!level->leaf_first)
         return EBPO_OK;
-    for (uint64_t i = 0; i < level->leaf_count; ebpo_workspace_settle_at(file->workspace, i++))
+    for (uint64_t i = 0; i < level->leaf_count; ebpo_workspace_settle_at(level->workspace, i++))
         refs += level->leaf_ref_count[i];
-    ebpo_check check = ebpo_reader_check(file);
+    ebpo_check check = ebpo_reader_check(file, level->workspace);
     if (refs != level->ref_count)
         return ebpo_check_fail(&check, number, "leaf_ref_count",
                                "the counts do not add up to the number of references", error);
@@ -105,25 +110,25 @@ static ebpo_status finish_lists(ebpo_file *file, int number, ebpo_level *level, 
 }
 
 /* References are decoded here: leaf_index tells each block of leaves where to begin. */
-static ebpo_status finish_leaves(ebpo_file *file, int number, ebpo_level *level, unsigned threads,
-                                 ebpo_error *error)
+static ebpo_status finish_leaves(const ebpo_file *file, int number, ebpo_level *level,
+                                 const ebpo_read_options *options, ebpo_error *error)
 {
     uint64_t *index = ebpo_index_leaves(level);
     ebpo_status status =
         index ? EBPO_OK : ebpo_fail_memory(error, level->leaf_count / EBPO_INDEX_ROWS * 24);
     if (status == EBPO_OK)
-        status = check_index(file, EBPO_A_LEAF_INDEX, number, index, error);
+        status = check_index(file, EBPO_A_LEAF_INDEX, level, number, index, error);
     if (status == EBPO_OK && level->leaf_refs) {
         refs_job j = { file, number, level, index };
         uint64_t blocks = (level->leaf_count - 1) / EBPO_INDEX_ROWS + 1;
-        status = ebpo_parallel_for(blocks > 1 ? threads : 1, blocks, 1, decode_refs, &j, NULL,
-                                   "read", error);
+        status = ebpo_parallel_for(blocks > 1 ? options->threads : 1, blocks, 1, decode_refs, &j,
+                                   NULL, "read", error);
     }
     free(index);
     return status;
 }
 
-static ebpo_status check_indexes(ebpo_file *file, int number, const ebpo_level *level,
+static ebpo_status check_indexes(const ebpo_file *file, int number, const ebpo_level *level,
                                  ebpo_error *error)
 {
     uint64_t *types = ebpo_index_types(level, number == 0), *gray = ebpo_index_gray(level);
@@ -131,49 +136,53 @@ static ebpo_status check_indexes(ebpo_file *file, int number, const ebpo_level *
                              ? EBPO_OK
                              : ebpo_fail_memory(error, level->group_count / EBPO_INDEX_ROWS * 32);
     if (status == EBPO_OK)
-        status = check_index(file, EBPO_A_TYPES_INDEX, number, types, error);
+        status = check_index(file, EBPO_A_TYPES_INDEX, level, number, types, error);
     if (status == EBPO_OK)
-        status = check_index(file, EBPO_A_GRAY_INDEX, number, gray, error);
+        status = check_index(file, EBPO_A_GRAY_INDEX, level, number, gray, error);
     free(types);
     free(gray);
     return status;
 }
 
-static ebpo_status read_arrays(ebpo_file *file, int number, ebpo_level *level, unsigned threads,
-                               ebpo_error *error)
+static ebpo_status read_arrays(const ebpo_file *file, int number, ebpo_level *level,
+                               const ebpo_read_options *options, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (int id = 0; id < EBPO_LEVEL_ARRAYS && status == EBPO_OK; id++) {
         void *array;
         if (!ebpo_schema_is_held(id))
             continue;
-        status = ebpo_reader_make(file, (ebpo_array_id)id, number, threads,
+        status = ebpo_reader_make(file, (ebpo_array_id)id, number, options,
                                   ebpo_schema[id].held_size, &array, error);
         ebpo_level_set_array(level, id, array);
     }
     return status == EBPO_OK ? finish_lists(file, number, level, error) : status;
 }
 
-ebpo_status ebpo_file_read_level(ebpo_file *file, int level, ebpo_level *out, unsigned threads,
-                                 ebpo_error *error)
+ebpo_status ebpo_file_read_level(const ebpo_file *file, int level, const ebpo_read_options *options,
+                                 ebpo_level *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     memset(out, 0, sizeof *out);
     const ebpo_info *info = &file->info;
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_read_options, &read, options, error);
+    if (status != EBPO_OK)
+        return status;
     if (level < 0 || level >= info->level_count)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, file->in.shown,
                               "there is no level %d; the file has levels 0 to %d", level,
                               info->level_count - 1);
     *out = ebpo_level_of_summary(info, level);
-    out->workspace = file->workspace;
+    out->workspace = read.workspace;
     ebpo_file_prefetch_levels(file, level, level);
-    ebpo_status status = read_arrays(file, level, out, threads, error);
+    status = read_arrays(file, level, out, &read, error);
     if (status == EBPO_OK && out->leaf_count)
-        status = finish_leaves(file, level, out, threads, error);
+        status = finish_leaves(file, level, out, &read, error);
     if (status == EBPO_OK)
         status = check_indexes(file, level, out, error);
     if (status == EBPO_OK) {
-        ebpo_check check = ebpo_reader_check(file);
+        ebpo_check check = ebpo_reader_check(file, out->workspace);
         status = ebpo_check_level(&check, info, level, out, error);
     }
     if (status != EBPO_OK)

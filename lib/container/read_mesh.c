@@ -6,6 +6,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/fp_env.h"
+#include "base/sized.h"
 #include "base/arrays.h"
 #include "codec/coding.h"
 #include "container/reader.h"
@@ -30,7 +31,7 @@ static ebpo_status absent(const ebpo_file *file, const char *part, ebpo_error *e
 }
 
 typedef struct mesh_job {
-    ebpo_file *file;
+    const ebpo_file *file;
     ebpo_mesh *mesh;
     uint64_t *faces_index; /* NULL: a single chunk */
     uint64_t seen;         /* by the last chunk */
@@ -55,7 +56,7 @@ static ebpo_status take_faces(void *context, const ebpo_array_in *array, uint64_
                               uint64_t row, uint64_t rows, const uint8_t *bytes, ebpo_error *error)
 {
     mesh_job *j = context;
-    ebpo_check check = ebpo_reader_check(j->file);
+    ebpo_check check = ebpo_reader_check(j->file, j->mesh->workspace);
     uint64_t last = ebpo_h5_chunk_count(&array->shape) - 1;
     uint64_t seen = j->faces_index ? j->faces_index[chunk] : 0;
     if (seen > j->mesh->vertex_count || (chunk == 0 && seen))
@@ -71,10 +72,11 @@ static ebpo_status take_faces(void *context, const ebpo_array_in *array, uint64_
     return EBPO_OK;
 }
 
-static ebpo_status make_mesh(ebpo_file *file, ebpo_mesh *out, ebpo_error *error)
+static ebpo_status make_mesh(const ebpo_file *file, ebpo_mesh *out, ebpo_workspace *workspace,
+                             ebpo_error *error)
 {
     const ebpo_info *info = &file->info;
-    ebpo_workspace *workspace = out->workspace = file->workspace;
+    out->workspace = workspace;
     out->vertex_count = info->vertex_count;
     out->face_count = info->face_count;
     if (info->double_coordinates)
@@ -92,33 +94,45 @@ static ebpo_status make_mesh(ebpo_file *file, ebpo_mesh *out, ebpo_error *error)
     return EBPO_OK;
 }
 
-ebpo_status ebpo_file_read_mesh(ebpo_file *file, ebpo_mesh *out, unsigned threads,
-                                ebpo_error *error)
+static ebpo_status read_mesh(const ebpo_file *file, ebpo_mesh *out, const ebpo_read_options *read,
+                             ebpo_error *error)
+{
+    mesh_job j = { .file = file, .mesh = out };
+    ebpo_check check = ebpo_reader_check(file, read->workspace);
+    ebpo_read_options alone = *read;
+    alone.threads = 1;
+    ebpo_status status = make_mesh(file, out, read->workspace, error);
+    if (status == EBPO_OK)
+        status = ebpo_reader_rows(file, ebpo_reader_array(file, EBPO_A_VERTICES, 0), read,
+                                  take_vertices, &j, error);
+    if (status == EBPO_OK)
+        status = ebpo_check_finite(&check, out, error);
+    if (status == EBPO_OK)
+        status = ebpo_reader_make(file, EBPO_A_FACES_INDEX, 0, &alone, 8, &j.faces_index, error);
+    if (status == EBPO_OK)
+        status = ebpo_reader_rows(file, ebpo_reader_array(file, EBPO_A_FACES, 0), read, take_faces,
+                                  &j, error);
+    ebpo_array_free(read->workspace, j.faces_index);
+    if (status != EBPO_OK)
+        ebpo_mesh_free(out);
+    return status;
+}
+
+ebpo_status ebpo_file_read_mesh(const ebpo_file *file, const ebpo_read_options *options,
+                                ebpo_mesh *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     memset(out, 0, sizeof *out);
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_read_options, &read, options, error);
+    if (status != EBPO_OK)
+        return status;
     if (!(file->info.parts & EBPO_PART_MESH))
         return absent(file, "mesh", error);
     ebpo_expected expected = EBPO_EXPECTED_INIT(file);
     ebpo_expect_root(&expected, EBPO_NEEDS_MESH);
     ebpo_expect_all(&expected);
-    mesh_job j = { .file = file, .mesh = out };
-    ebpo_check check = ebpo_reader_check(file);
-    ebpo_status status = make_mesh(file, out, error);
-    if (status == EBPO_OK)
-        status = ebpo_reader_rows(file, ebpo_reader_array(file, EBPO_A_VERTICES, 0), threads,
-                                  take_vertices, &j, error);
-    if (status == EBPO_OK)
-        status = ebpo_check_finite(&check, out, error);
-    if (status == EBPO_OK)
-        status = ebpo_reader_make(file, EBPO_A_FACES_INDEX, 0, 1, 8, &j.faces_index, error);
-    if (status == EBPO_OK)
-        status = ebpo_reader_rows(file, ebpo_reader_array(file, EBPO_A_FACES, 0), threads,
-                                  take_faces, &j, error);
-    ebpo_array_free(out->workspace, j.faces_index);
-    if (status != EBPO_OK)
-        ebpo_mesh_free(out);
-    return status;
+    return read_mesh(file, out, &read, error);
 }
 
 static ebpo_status take_numbers(void *context, const ebpo_array_in *array, uint64_t chunk,
@@ -132,22 +146,18 @@ static ebpo_status take_numbers(void *context, const ebpo_array_in *array, uint6
     return EBPO_OK;
 }
 
-static ebpo_status read_map(ebpo_file *file, ebpo_workspace *workspace, ebpo_array_id id,
-                            uint64_t limit, unsigned threads, uint32_t **out, ebpo_error *error)
+static ebpo_status read_map(const ebpo_file *file, ebpo_array_id id, uint64_t limit,
+                            const ebpo_read_options *read, uint32_t **out, ebpo_error *error)
 {
     const ebpo_array_in *array = ebpo_reader_array(file, id, 0);
-    ebpo_check check = ebpo_reader_check(file);
-    uint32_t *map = ebpo_array_alloc(workspace, array->shape.rows, sizeof *map);
+    ebpo_check check = ebpo_reader_check(file, read->workspace);
+    uint32_t *map = *out = ebpo_array_alloc(read->workspace, array->shape.rows, sizeof *map);
     if (!map)
-        return ebpo_workspace_fail(workspace, array->shape.rows * sizeof *map, error);
-    ebpo_status status = ebpo_reader_rows(file, array, threads, take_numbers, map, error);
-    if (status == EBPO_OK)
-        status = ebpo_check_map(&check, array->path, map, array->shape.rows, limit, error);
-    if (status == EBPO_OK)
-        *out = map;
-    else
-        ebpo_array_free(workspace, map);
-    return status;
+        return ebpo_workspace_fail(read->workspace, array->shape.rows * sizeof *map, error);
+    ebpo_status status = ebpo_reader_rows(file, array, read, take_numbers, map, error);
+    return status == EBPO_OK
+               ? ebpo_check_map(&check, array->path, map, array->shape.rows, limit, error)
+               : status;
 }
 
 static uint64_t face_limit(const ebpo_info *info)
@@ -155,58 +165,72 @@ static uint64_t face_limit(const ebpo_info *info)
     return info->source_face_count + info->mend.added_faces;
 }
 
-static ebpo_status read_maps(ebpo_file *file, ebpo_workspace *workspace, uint32_t **vertex_source,
-                             uint32_t **face_source, unsigned threads, ebpo_error *error)
+void ebpo_maps_free(ebpo_maps *maps)
 {
-    *vertex_source = *face_source = NULL;
+    if (!maps)
+        return;
+    ebpo_array_free(maps->workspace, maps->vertex_source);
+    ebpo_array_free(maps->workspace, maps->face_source);
+    memset(maps, 0, sizeof *maps);
+}
+
+ebpo_status ebpo_file_read_maps(const ebpo_file *file, const ebpo_read_options *options,
+                                ebpo_maps *out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    memset(out, 0, sizeof *out);
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_read_options, &read, options, error);
+    if (status != EBPO_OK)
+        return status;
     if (!(file->info.parts & EBPO_PART_MAPS))
         return absent(file, "maps to the source's numbers", error);
     ebpo_expected expected = EBPO_EXPECTED_INIT(file);
     ebpo_expect_root(&expected, EBPO_NEEDS_MAPS);
     ebpo_expect_all(&expected);
-    ebpo_status status = read_map(file, workspace, EBPO_A_VERTEX_SOURCE,
-                                  file->info.source_vertex_count, threads, vertex_source, error);
+    out->workspace = read.workspace;
+    status = read_map(file, EBPO_A_VERTEX_SOURCE, file->info.source_vertex_count, &read,
+                      &out->vertex_source, error);
     if (status == EBPO_OK)
-        status = read_map(file, workspace, EBPO_A_FACE_SOURCE, face_limit(&file->info), threads,
-                          face_source, error);
-    if (status != EBPO_OK) {
-        ebpo_array_free(workspace, *vertex_source);
-        *vertex_source = NULL;
-    }
+        status = read_map(file, EBPO_A_FACE_SOURCE, face_limit(&file->info), &read,
+                          &out->face_source, error);
+    if (status != EBPO_OK)
+        ebpo_maps_free(out);
     return status;
 }
 
-ebpo_status ebpo_reader_maps(ebpo_file *file, uint32_t **vertex_source, uint32_t **face_source,
-                             unsigned threads, ebpo_error *error)
+static ebpo_status read_parts(const ebpo_file *file, ebpo_tree *out, const ebpo_read_options *read,
+                              ebpo_error *error)
 {
-    return read_maps(file, file->workspace, vertex_source, face_source, threads, error);
-}
-
-ebpo_status ebpo_file_read_maps(ebpo_file *file, uint32_t **vertex_source, uint32_t **face_source,
-                                unsigned threads, ebpo_error *error)
-{
-    EBPO_DEFAULT_FP;
-    return read_maps(file, NULL, vertex_source, face_source, threads, error);
-}
-
-ebpo_status ebpo_file_read_tree(ebpo_file *file, ebpo_tree *out, unsigned threads,
-                                ebpo_error *error)
-{
-    EBPO_DEFAULT_FP;
-    memset(out, 0, sizeof *out);
-    ebpo_expect_tree(file);
-    out->info = file->info;
-    out->workspace = file->workspace;
-    ebpo_check check = ebpo_reader_check(file);
+    ebpo_check check = ebpo_reader_check(file, read->workspace);
+    ebpo_maps maps = { .vertex_source = NULL };
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < file->info.level_count && status == EBPO_OK; i++)
-        status = ebpo_file_read_level(file, i, &out->level[i], threads, error);
+        status = ebpo_file_read_level(file, i, read, &out->level[i], error);
     if (status == EBPO_OK && file->info.parts & EBPO_PART_MESH)
         status = ebpo_check_order(&check, out, error);
     if (status == EBPO_OK && file->info.parts & EBPO_PART_MESH)
-        status = ebpo_file_read_mesh(file, &out->mesh, threads, error);
+        status = ebpo_file_read_mesh(file, read, &out->mesh, error);
     if (status == EBPO_OK && file->info.parts & EBPO_PART_MAPS)
-        status = ebpo_reader_maps(file, &out->vertex_source, &out->face_source, threads, error);
+        status = ebpo_file_read_maps(file, read, &maps, error);
+    out->vertex_source = maps.vertex_source;
+    out->face_source = maps.face_source;
+    return status;
+}
+
+ebpo_status ebpo_file_read_tree(const ebpo_file *file, const ebpo_read_options *options,
+                                ebpo_tree *out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    memset(out, 0, sizeof *out);
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_read_options, &read, options, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_expect_tree(file);
+    out->info = file->info;
+    out->workspace = read.workspace;
+    status = read_parts(file, out, &read, error);
     if (status != EBPO_OK)
         ebpo_tree_free(out);
     return status;
@@ -284,20 +308,20 @@ static ebpo_status reorder_faces(ebpo_mesh *mesh, const uint32_t *vertex_place,
     return EBPO_OK;
 }
 
-static ebpo_status to_source_order(ebpo_file *file, ebpo_mesh *mesh, unsigned threads,
-                                   ebpo_error *error)
+static ebpo_status to_source_order(const ebpo_file *file, ebpo_mesh *mesh,
+                                   const ebpo_read_options *read, ebpo_error *error)
 {
-    uint32_t *vertex_source, *face_source, *vertex_place = NULL, *face_place = NULL;
-    ebpo_workspace *workspace = file->workspace;
-    ebpo_status status = ebpo_reader_maps(file, &vertex_source, &face_source, threads, error);
+    uint32_t *vertex_place = NULL, *face_place = NULL;
+    ebpo_workspace *workspace = read->workspace;
+    ebpo_maps maps;
+    ebpo_status status = ebpo_file_read_maps(file, read, &maps, error);
     if (status == EBPO_OK)
-        status = sort_by_source(workspace, vertex_source, mesh->vertex_count,
+        status = sort_by_source(workspace, maps.vertex_source, mesh->vertex_count,
                                 file->info.source_vertex_count, &vertex_place, error);
     if (status == EBPO_OK)
-        status = sort_by_source(workspace, face_source, mesh->face_count, face_limit(&file->info),
-                                &face_place, error);
-    ebpo_array_free(workspace, vertex_source);
-    ebpo_array_free(workspace, face_source);
+        status = sort_by_source(workspace, maps.face_source, mesh->face_count,
+                                face_limit(&file->info), &face_place, error);
+    ebpo_maps_free(&maps);
     if (status == EBPO_OK)
         status = reorder_vertices(mesh, vertex_place, error);
     if (status == EBPO_OK)
@@ -307,17 +331,24 @@ static ebpo_status to_source_order(ebpo_file *file, ebpo_mesh *mesh, unsigned th
     return status;
 }
 
-ebpo_status ebpo_file_read_source_mesh(ebpo_file *file, ebpo_mesh *out, bool *source_order,
-                                       unsigned threads, ebpo_error *error)
+ebpo_status ebpo_file_read_source_mesh(const ebpo_file *file, const ebpo_read_options *options,
+                                       ebpo_mesh *out, bool *source_order, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     bool maps = file->info.parts & EBPO_PART_MAPS;
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_read_options, &read, options, error);
+    memset(out, 0, sizeof *out);
+    if (source_order)
+        *source_order = false;
+    if (status != EBPO_OK)
+        return status;
     ebpo_expected expected = EBPO_EXPECTED_INIT(file);
     ebpo_expect_root(&expected, EBPO_NEEDS_MESH | EBPO_NEEDS_MAPS);
     ebpo_expect_all(&expected);
-    ebpo_status status = ebpo_file_read_mesh(file, out, threads, error);
+    status = ebpo_file_read_mesh(file, &read, out, error);
     if (status == EBPO_OK && maps)
-        status = to_source_order(file, out, threads, error);
+        status = to_source_order(file, out, &read, error);
     if (source_order)
         *source_order = status == EBPO_OK && maps;
     if (status != EBPO_OK)

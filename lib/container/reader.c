@@ -21,10 +21,11 @@ typedef struct scratch {
 } scratch;
 
 typedef struct job {
-    ebpo_file *file;
+    const ebpo_file *file;
     const ebpo_array_in *array;
     ebpo_rows_fn take;
     void *context;
+    ebpo_workspace *workspace;
     scratch **scratch; /* for each worker, made when first needed */
 } job;
 
@@ -37,8 +38,8 @@ void ebpo_chunk_reader_clear(ebpo_chunk_reader *reader)
 }
 
 /* Bytes [address, address + bytes) of the file to reader->stored, with room for at least `room`. */
-static ebpo_status fetch(ebpo_file *file, ebpo_chunk_reader *reader, uint64_t address, size_t bytes,
-                         size_t room, ebpo_error *error)
+static ebpo_status fetch(const ebpo_file *file, ebpo_chunk_reader *reader, uint64_t address,
+                         size_t bytes, size_t room, ebpo_error *error)
 {
     if (room < bytes)
         room = bytes;
@@ -49,10 +50,10 @@ static ebpo_status fetch(ebpo_file *file, ebpo_chunk_reader *reader, uint64_t ad
     }
     if (!reader->stored)
         return ebpo_fail_memory(error, room);
-    return ebpo_input_read(&file->in, address, bytes, reader->stored, error);
+    return ebpo_input_read(&ebpo_reader_own(file)->in, address, bytes, reader->stored, error);
 }
 
-static ebpo_status decode(ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
+static ebpo_status decode(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
                           ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *raw_out,
                           ebpo_error *error)
 {
@@ -70,7 +71,7 @@ static ebpo_status decode(ebpo_file *file, const ebpo_array_in *array, uint64_t 
     return EBPO_OK;
 }
 
-ebpo_status ebpo_reader_chunk(ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
+ebpo_status ebpo_reader_chunk(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
                               ebpo_chunk_reader *reader, uint8_t *raw, ebpo_error *error)
 {
     ebpo_status status = ebpo_reader_locate(file, array, error);
@@ -128,21 +129,26 @@ static ebpo_status read_chunks(void *context, uint64_t begin, uint64_t end, unsi
         size_t bytes;
         uint64_t run = find_run(j->array, begin, end, &bytes);
         status = read_run(j, j->scratch[worker], begin, run, bytes, error);
-        ebpo_workspace_settle(j->file->workspace);
+        ebpo_workspace_settle(j->workspace);
         begin = run;
     }
     return status;
 }
 
-ebpo_status ebpo_reader_rows(ebpo_file *file, const ebpo_array_in *array, unsigned threads,
-                             ebpo_rows_fn take, void *context, ebpo_error *error)
+ebpo_status ebpo_reader_rows(const ebpo_file *file, const ebpo_array_in *array,
+                             const ebpo_read_options *options, ebpo_rows_fn take, void *context,
+                             ebpo_error *error)
 {
     uint64_t chunks = ebpo_h5_chunk_count(&array->shape);
     ebpo_status status = ebpo_reader_locate(file, array, error);
     if (status != EBPO_OK)
         return status;
-    threads = chunks > 2 ? ebpo_thread_count(threads) : 1;
-    job j = { .file = file, .array = array, .take = take, .context = context };
+    unsigned threads = chunks > 2 ? ebpo_thread_count(options->threads) : 1;
+    job j = { .file = file,
+              .array = array,
+              .take = take,
+              .context = context,
+              .workspace = options->workspace };
     j.scratch = ebpo_alloc_zero(threads, sizeof *j.scratch);
     if (!j.scratch)
         return ebpo_fail_memory(error, threads * sizeof *j.scratch);
@@ -178,28 +184,30 @@ static ebpo_status take_integers(void *context, const ebpo_array_in *array, uint
     return EBPO_OK;
 }
 
-ebpo_status ebpo_reader_integers(ebpo_file *file, const ebpo_array_in *array, unsigned threads,
-                                 void *values, size_t size, ebpo_error *error)
+ebpo_status ebpo_reader_integers(const ebpo_file *file, const ebpo_array_in *array,
+                                 const ebpo_read_options *options, void *values, size_t size,
+                                 ebpo_error *error)
 {
     target t = { values, size };
-    return ebpo_reader_rows(file, array, threads, take_integers, &t, error);
+    return ebpo_reader_rows(file, array, options, take_integers, &t, error);
 }
 
-ebpo_status ebpo_reader_make(ebpo_file *file, ebpo_array_id id, int level, unsigned threads,
-                             size_t size, void *values_out, ebpo_error *error)
+ebpo_status ebpo_reader_make(const ebpo_file *file, ebpo_array_id id, int level,
+                             const ebpo_read_options *options, size_t size, void *values_out,
+                             ebpo_error *error)
 {
     const ebpo_array_in *array = ebpo_reader_array(file, id, level);
     void *values = NULL;
     ebpo_status status = EBPO_OK;
     if (array->present) {
         uint64_t cols = array->shape.cols ? array->shape.cols : 1;
-        values = ebpo_array_alloc(file->workspace, array->shape.rows, size * cols);
-        status = values
-                     ? ebpo_reader_integers(file, array, threads, values, size, error)
-                     : ebpo_workspace_fail(file->workspace, array->shape.rows * size * cols, error);
+        values = ebpo_array_alloc(options->workspace, array->shape.rows, size * cols);
+        status = values ? ebpo_reader_integers(file, array, options, values, size, error)
+                        : ebpo_workspace_fail(options->workspace, array->shape.rows * size * cols,
+                                              error);
     }
     if (status != EBPO_OK) {
-        ebpo_array_free(file->workspace, values);
+        ebpo_array_free(options->workspace, values);
         values = NULL;
     }
     memcpy(values_out, &values, sizeof values);

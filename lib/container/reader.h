@@ -28,14 +28,13 @@ struct ebpo_file {
     ebpo_info info;
     ebpo_array_in level_array[EBPO_LEVELS_MAX][EBPO_LEVEL_ARRAYS];
     ebpo_array_in root_array[EBPO_ARRAYS]; /* those from EBPO_A_VERTICES on */
-    ebpo_workspace *workspace;             /* what whole arrays keep to, or NULL; borrowed */
     pthread_mutex_t lock;
     atomic_bool located; /* the chunks of all arrays are known */
 };
 
 /* After this the chunks of an array that is present are known. Reads from a file that is far away,
  * once. Any thread. */
-EBPO_MUST_USE ebpo_status ebpo_reader_locate(ebpo_file *file, const ebpo_array_in *array,
+EBPO_MUST_USE ebpo_status ebpo_reader_locate(const ebpo_file *file, const ebpo_array_in *array,
                                              ebpo_error *error);
 
 /* What will be read, collected and then announced; nothing is done for sources that do not want to
@@ -46,7 +45,7 @@ EBPO_MUST_USE ebpo_status ebpo_reader_locate(ebpo_file *file, const ebpo_array_i
  *     ebpo_expect_all(&expected);
  */
 typedef struct ebpo_expected {
-    ebpo_file *file;
+    const ebpo_file *file;
     ebpo_range *range;
     uint64_t count, room;
     bool failed; /* where chunks lie could not be read */
@@ -63,7 +62,7 @@ void ebpo_expect_level(ebpo_expected *expected, int level);
 /* The arrays of the root that are there for any of these needs. */
 void ebpo_expect_root(ebpo_expected *expected, uint32_t needs);
 /* Announces the whole file. */
-void ebpo_expect_tree(ebpo_file *file);
+void ebpo_expect_tree(const ebpo_file *file);
 /* Announces what was collected, and frees it. */
 void ebpo_expect_all(ebpo_expected *expected);
 
@@ -73,10 +72,34 @@ static inline const ebpo_array_in *ebpo_reader_array(const ebpo_file *file, ebpo
     return id < EBPO_LEVEL_ARRAYS ? &file->level_array[level][id] : &file->root_array[id];
 }
 
-static inline ebpo_check ebpo_reader_check(const ebpo_file *file)
+/* What the file keeps for itself while it is read: counters, and where chunks lie. Atomic, or under
+ * its lock. */
+static inline ebpo_file *ebpo_reader_own(const ebpo_file *file)
 {
-    return (ebpo_check){ file->in.shown, EBPO_E_FORMAT, file->workspace };
+    return (ebpo_file *)(uintptr_t)file;
 }
+
+/* `workspace`: what the arrays are in, or NULL. */
+static inline ebpo_check ebpo_reader_check(const ebpo_file *file, ebpo_workspace *workspace)
+{
+    return (ebpo_check){ file->in.shown, EBPO_E_FORMAT, workspace };
+}
+
+/* What callers leave out. */
+static inline ebpo_read_options ebpo_read_chosen(const ebpo_read_options *options)
+{
+    return options ? *options : (ebpo_read_options)EBPO_READ_OPTIONS_INIT;
+}
+/* In memory, by so many threads. */
+static inline ebpo_read_options ebpo_read_threads(unsigned threads)
+{
+    ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
+    options.threads = threads;
+    return options;
+}
+
+/* Bytes of a level in the file, once it has been read. */
+uint64_t ebpo_reader_level_bytes(const ebpo_file *file, int level);
 
 /* Decoding state and room for one stored chunk, of one thread; zero-initialise, clear when done. */
 typedef struct ebpo_chunk_reader {
@@ -89,7 +112,7 @@ void ebpo_chunk_reader_clear(ebpo_chunk_reader *reader);
 /* Fetches chunk number `chunk` of an array that is present and decodes it: chunk_rows rows as the
  * specification describes them (the last chunk with its filling), into `raw` of
  * EBPO_CHUNK_BYTES_MAX bytes. Several threads at once, each with its own reader. */
-EBPO_MUST_USE ebpo_status ebpo_reader_chunk(ebpo_file *file, const ebpo_array_in *array,
+EBPO_MUST_USE ebpo_status ebpo_reader_chunk(const ebpo_file *file, const ebpo_array_in *array,
                                             uint64_t chunk, ebpo_chunk_reader *reader, uint8_t *raw,
                                             ebpo_error *error);
 
@@ -99,25 +122,21 @@ typedef ebpo_status (*ebpo_rows_fn)(void *context, const ebpo_array_in *array, u
                                     uint64_t row, uint64_t rows, const uint8_t *bytes,
                                     ebpo_error *error);
 
-/* Reads all chunks of an array that is present. Chunks come in any order, unless threads is 1. */
-EBPO_MUST_USE ebpo_status ebpo_reader_rows(ebpo_file *file, const ebpo_array_in *array,
-                                           unsigned threads, ebpo_rows_fn take, void *context,
-                                           ebpo_error *error);
+/* Reads all chunks of an array that is present. Chunks come in any order, unless threads is 1. Of
+ * the workspace, pages are released meanwhile. */
+EBPO_MUST_USE ebpo_status ebpo_reader_rows(const ebpo_file *file, const ebpo_array_in *array,
+                                           const ebpo_read_options *options, ebpo_rows_fn take,
+                                           void *context, ebpo_error *error);
 
 /* Reads integers into `values`, of `size` bytes each. */
-EBPO_MUST_USE ebpo_status ebpo_reader_integers(ebpo_file *file, const ebpo_array_in *array,
-                                               unsigned threads, void *values, size_t size,
-                                               ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_reader_integers(const ebpo_file *file, const ebpo_array_in *array,
+                                               const ebpo_read_options *options, void *values,
+                                               size_t size, ebpo_error *error);
 
-/* The same into new memory: NULL when the array is absent. To be freed with ebpo_array_free. */
-EBPO_MUST_USE ebpo_status ebpo_reader_make(ebpo_file *file, ebpo_array_id id, int level,
-                                           unsigned threads, size_t size, void *values_out,
-                                           ebpo_error *error);
-
-/* Like ebpo_file_read_maps, but in the file's workspace: to be freed with ebpo_array_free. */
-EBPO_MUST_USE ebpo_status ebpo_reader_maps(ebpo_file *file, uint32_t **vertex_source,
-                                           uint32_t **face_source, unsigned threads,
-                                           ebpo_error *error);
+/* The same into new memory: NULL when the array is absent. The workspace of the options owns it. */
+EBPO_MUST_USE ebpo_status ebpo_reader_make(const ebpo_file *file, ebpo_array_id id, int level,
+                                           const ebpo_read_options *options, size_t size,
+                                           void *values_out, ebpo_error *error);
 
 /* A leaf's references in place: gaps, counted down from its first new face, to ascending numbers.
  * False when one falls below 0. */

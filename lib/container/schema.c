@@ -39,7 +39,7 @@ const ebpo_array_spec ebpo_schema[EBPO_ARRAYS] = {
                       .cols = cols_,                                                       \
                       .sizes = stored,                                                     \
                       .since = since_,                                                     \
-                      .bytes = offsetof(ebpo_info, bytes_),                                \
+                      .bytes = offsetof(ebpo_stored_sizes, bytes_),                        \
                       .coding = coding_,                                                   \
                       .about = about_ },
 #include "container/array_table.inc"

@@ -12,12 +12,12 @@
 
 /* Decoded chunks under a budget (0: no limit; the smallest that works is a few MiB). */
 typedef struct ebpo_chunks ebpo_chunks;
-EBPO_MUST_USE ebpo_status ebpo_chunks_make(ebpo_chunks **out, ebpo_file *file, uint64_t budget,
-                                           ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_chunks_make(ebpo_chunks **out, const ebpo_file *file,
+                                           uint64_t budget, ebpo_error *error);
 /* The same for arrays of levels only, by one thread at a time, and counted: nothing is read or
  * announced but what was asked for, and nothing after which the file would have read more than the
  * limit (ebpo_chunks_limit; none at first). Then EBPO_E_LIMIT, and ebpo_chunks_refused is true. */
-EBPO_MUST_USE ebpo_status ebpo_chunks_make_counted(ebpo_chunks **out, ebpo_file *file,
+EBPO_MUST_USE ebpo_status ebpo_chunks_make_counted(ebpo_chunks **out, const ebpo_file *file,
                                                    uint64_t budget, ebpo_error *error);
 void ebpo_chunks_limit(ebpo_chunks *chunks, uint64_t bytes);
 bool ebpo_chunks_refused(const ebpo_chunks *chunks);
@@ -81,8 +81,8 @@ EBPO_MUST_USE ebpo_status ebpo_slice_read(ebpo_slice *out, ebpo_chunks *chunks,
                                           const ebpo_node *root, ebpo_error *error);
 
 /* The whole tree, on `threads` threads (0: all cores), without a cache of chunks. */
-EBPO_MUST_USE ebpo_status ebpo_slice_read_all(ebpo_slice *out, ebpo_file *file, unsigned threads,
-                                              ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_slice_read_all(ebpo_slice *out, const ebpo_file *file,
+                                              unsigned threads, ebpo_error *error);
 
 /* What ebpo_slice_read of this node will need, without reading its faces: nodes, leaves, listed
  * and new faces. */

@@ -15,7 +15,7 @@ static void drop(ebpo_level *level)
     level->gray_volume = level->leaf_volume = 0;
 }
 
-ebpo_status ebpo_slice_read_all(ebpo_slice *out, ebpo_file *file, unsigned threads,
+ebpo_status ebpo_slice_read_all(ebpo_slice *out, const ebpo_file *file, unsigned threads,
                                 ebpo_error *error)
 {
     memset(out, 0, sizeof *out);
@@ -23,7 +23,8 @@ ebpo_status ebpo_slice_read_all(ebpo_slice *out, ebpo_file *file, unsigned threa
         return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
                               "the file was written without its mesh; build it again with it");
     ebpo_tree tree;
-    ebpo_status status = ebpo_file_read_tree(file, &tree, threads, error);
+    ebpo_read_options read = ebpo_read_threads(threads);
+    ebpo_status status = ebpo_file_read_tree(file, &read, &tree, error);
     if (status != EBPO_OK)
         return status;
     out->level_count = file->info.level_count;

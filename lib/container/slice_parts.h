@@ -13,7 +13,7 @@
 typedef struct ebpo_chunk_scratch ebpo_chunk_scratch; /* what one loading thread needs */
 
 struct ebpo_chunks {
-    ebpo_file *file;
+    const ebpo_file *file;
     ebpo_cache *cache;
     /* [chunks of /mesh/faces] vertices seen before each; NULL: a single chunk, or no mesh */
     uint64_t *seen;
@@ -87,7 +87,7 @@ EBPO_MUST_USE ebpo_status ebpo_chunks_sum(ebpo_chunks *chunks, ebpo_array_id id,
 static inline ebpo_status ebpo_chunks_fail(const ebpo_chunks *chunks, int level, ebpo_array_id id,
                                            const char *what, ebpo_error *error)
 {
-    ebpo_check check = ebpo_reader_check(chunks->file);
+    ebpo_check check = ebpo_reader_check(chunks->file, NULL);
     return ebpo_check_fail(&check, level, ebpo_schema[id].name, what, error);
 }
 

@@ -254,10 +254,11 @@ static ebpo_status check(const ebpo_info *info, const ebpo_info *model, int leve
     return EBPO_OK;
 }
 
-ebpo_status ebpo_deviation_level(ebpo_model *model, ebpo_file *file, int level,
+ebpo_status ebpo_deviation_level(ebpo_model *model, const ebpo_file *file, int level,
                                  const ebpo_deviation_options *options, ebpo_deviation *out,
                                  ebpo_error *error)
 {
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
     EBPO_DEFAULT_FP;
     ebpo_deviation_options wanted = EBPO_DEVIATION_OPTIONS_INIT;
     const ebpo_deviation_options *o = &wanted;
@@ -279,7 +280,8 @@ ebpo_status ebpo_deviation_level(ebpo_model *model, ebpo_file *file, int level,
     if (status == EBPO_OK)
         status = ebpo_tree_read_whole(&whole, model->file, s.threads, error);
     if (status == EBPO_OK && file != model->file) {
-        status = ebpo_lod_model_read(&own, file, level, s.threads, error);
+        read.threads = s.threads;
+        status = ebpo_lod_model_read(&own, file, level, &read, error);
         s.tree = &own;
     }
     if (status == EBPO_OK)

@@ -226,7 +226,7 @@ static ebpo_status make_room(sampling *s, ebpo_model *model, ebpo_error *error)
     return status;
 }
 
-ebpo_status ebpo_deviation_sample(ebpo_model *model, ebpo_file *file, int level,
+ebpo_status ebpo_deviation_sample(ebpo_model *model, const ebpo_file *file, int level,
                                   const ebpo_deviation_options *options, ebpo_deviation *out,
                                   ebpo_error *error)
 {

@@ -42,7 +42,7 @@ static memory *new_memory(uint64_t count)
     return out;
 }
 
-ebpo_status ebpo_tolerance_open(ebpo_tolerance **out, ebpo_file *file, bool planes,
+ebpo_status ebpo_tolerance_open(ebpo_tolerance **out, const ebpo_file *file, bool planes,
                                 unsigned threads, ebpo_progress progress, ebpo_error *error)
 {
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;

@@ -18,8 +18,8 @@ typedef struct ebpo_tolerance_node {
 
 /* EBPO_E_ABSENT for a file without mesh or a subset. Opens a model of all of the file. `planes`
  * false: envelopes are cells. The file stays open as long. */
-EBPO_MUST_USE ebpo_status ebpo_tolerance_open(ebpo_tolerance **out, ebpo_file *file, bool planes,
-                                              unsigned threads, ebpo_progress progress,
+EBPO_MUST_USE ebpo_status ebpo_tolerance_open(ebpo_tolerance **out, const ebpo_file *file,
+                                              bool planes, unsigned threads, ebpo_progress progress,
                                               ebpo_error *error);
 void ebpo_tolerance_close(ebpo_tolerance *need);
 

@@ -5,7 +5,7 @@
 #include "base/error.h"
 #include "container/reader.h"
 
-ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, ebpo_file *file, unsigned threads,
+ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, const ebpo_file *file, unsigned threads,
                                  ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(file);
@@ -18,9 +18,11 @@ ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, ebpo_file *file, unsigned 
         return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
                               "is a subset, and how far envelopes reach beyond the model is "
                               "measured against all of its mesh; take the original");
-    ebpo_status status = ebpo_lod_model_read(out, file, info->level_count - 1, threads, error);
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    read.threads = threads;
+    ebpo_status status = ebpo_lod_model_read(out, file, info->level_count - 1, &read, error);
     if (status == EBPO_OK && !out->mesh.faces)
-        status = ebpo_file_read_mesh(file, &out->mesh, threads, error);
+        status = ebpo_file_read_mesh(file, &read, &out->mesh, error);
     if (status != EBPO_OK)
         ebpo_lod_model_free(out);
     return status;

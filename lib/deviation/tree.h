@@ -10,7 +10,7 @@
 
 /* Reads the whole model of a file that has a mesh and is no subset, else EBPO_E_ABSENT. Freed by
  * ebpo_lod_model_free. */
-EBPO_MUST_USE ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, ebpo_file *file,
+EBPO_MUST_USE ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, const ebpo_file *file,
                                                unsigned threads, ebpo_error *error);
 
 /* The node of `cell`; false: there is no such node. */

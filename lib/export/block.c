@@ -32,21 +32,23 @@ int ebpo_block_level(const ebpo_export_options *o, int i)
                : -1;
 }
 
-static ebpo_status read_mesh(ebpo_block *out, ebpo_file *file, ebpo_block_order order,
+static ebpo_status read_mesh(ebpo_block *out, const ebpo_file *file, ebpo_block_order order,
                              unsigned threads, ebpo_error *error)
 {
-    bool ordered;
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    read.threads = threads;
     snprintf(out->name, sizeof out->name, "mesh");
     if (order == EBPO_SOURCE_ORDER)
-        return ebpo_file_read_source_mesh(file, &out->mesh, &ordered, threads, error);
-    ebpo_status status = ebpo_file_read_mesh(file, &out->mesh, threads, error);
+        return ebpo_file_read_source_mesh(file, &read, &out->mesh, NULL, error);
+    ebpo_status status = ebpo_file_read_mesh(file, &read, &out->mesh, error);
     if (status == EBPO_OK && ebpo_file_info(file)->parts & EBPO_PART_MAPS)
-        status = ebpo_file_read_maps(file, &out->vertex_source, &out->face_source, threads, error);
+        status = ebpo_file_read_maps(file, &read, &out->maps, error);
     return status;
 }
 
-ebpo_status ebpo_block_read(ebpo_block *out, ebpo_file *file, int level, ebpo_block_order order,
-                            const ebpo_export_options *options, ebpo_error *error)
+ebpo_status ebpo_block_read(ebpo_block *out, const ebpo_file *file, int level,
+                            ebpo_block_order order, const ebpo_export_options *options,
+                            ebpo_error *error)
 {
     *out = (ebpo_block){ .level = level };
     if (level < 0)
@@ -62,8 +64,7 @@ void ebpo_block_free(ebpo_block *block)
 {
     ebpo_mesh_free(&block->mesh);
     ebpo_lod_nodes_free(&block->nodes);
-    free(block->vertex_source);
-    free(block->face_source);
+    ebpo_maps_free(&block->maps);
     memset(block, 0, sizeof *block);
 }
 
@@ -107,7 +108,7 @@ static int64_t value_of_face(const ebpo_block *block, uint64_t face, int column)
 {
     switch (column) {
     case EBPO_COLUMN_SOURCE_FACE:
-        return block->face_source ? (int64_t)block->face_source[face] : -1;
+        return block->maps.face_source ? (int64_t)block->maps.face_source[face] : -1;
     case EBPO_COLUMN_LEVEL:
     case EBPO_COLUMN_TYPE:
     case EBPO_COLUMN_LOD: return -1;
@@ -146,6 +147,6 @@ void *ebpo_column_of_vertices(const ebpo_block *block)
     uint64_t count = block->mesh.vertex_count;
     int64_t *values = ebpo_alloc(count, sizeof *values);
     for (uint64_t i = 0; values && i < count; i++)
-        values[i] = block->vertex_source ? (int64_t)block->vertex_source[i] : -1;
+        values[i] = block->maps.vertex_source ? (int64_t)block->maps.vertex_source[i] : -1;
     return values;
 }

@@ -10,8 +10,8 @@ typedef struct ebpo_block {
     int level; /* -1: the mesh */
     char name[24];
     ebpo_mesh mesh;
-    ebpo_lod_nodes nodes;                  /* levels */
-    uint32_t *vertex_source, *face_source; /* the mesh of a file with maps */
+    ebpo_lod_nodes nodes; /* levels */
+    ebpo_maps maps;       /* the mesh of a file with maps */
     double volume;
 } ebpo_block;
 
@@ -22,7 +22,7 @@ int ebpo_block_level(const ebpo_export_options *options, int i);
 /* `level` -1: the mesh, in the file's order with the source's numbers, or in the source's order
  * where the maps are there. Freed by ebpo_block_free, on failure too. */
 typedef enum ebpo_block_order { EBPO_FILE_ORDER, EBPO_SOURCE_ORDER } ebpo_block_order;
-EBPO_MUST_USE ebpo_status ebpo_block_read(ebpo_block *out, ebpo_file *file, int level,
+EBPO_MUST_USE ebpo_status ebpo_block_read(ebpo_block *out, const ebpo_file *file, int level,
                                           ebpo_block_order order,
                                           const ebpo_export_options *options, ebpo_error *error);
 void ebpo_block_free(ebpo_block *block);

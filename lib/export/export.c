@@ -65,7 +65,7 @@ static ebpo_status write_format(ebpo_export_job *job, ebpo_error *error)
     return ebpo_fail(error, EBPO_E_ARGUMENT, "%d is no export format", (int)job->format);
 }
 
-ebpo_status ebpo_export(ebpo_file *file, const char *path, ebpo_export_format format,
+ebpo_status ebpo_export(const ebpo_file *file, const char *path, ebpo_export_format format,
                         const ebpo_export_options *options, ebpo_export_report *report,
                         ebpo_error *error)
 {

@@ -6,7 +6,7 @@
 
 /* `path` and `second` are the names that the files get. */
 typedef struct ebpo_export_job {
-    ebpo_file *file;
+    const ebpo_file *file;
     const char *path, *second;
     ebpo_export_format format;
     const ebpo_export_options *options;

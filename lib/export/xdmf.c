@@ -115,7 +115,7 @@ static ebpo_status put_data(writer *w, const ebpo_block *block, ebpo_error *erro
     for (int i = 0; i < EBPO_COLUMNS_OF_NODES && !mesh && status == EBPO_OK; i++)
         status = put_attribute(w, block, ebpo_columns[i].name, "Cell", ebpo_columns[i].number,
                                ebpo_column_make(block, i, false), rows, error);
-    if (!mesh || !block->face_source)
+    if (!mesh || !block->maps.face_source)
         return status;
     const ebpo_column *c = &ebpo_columns[EBPO_COLUMN_SOURCE_FACE];
     status = put_attribute(w, block, c->name, "Cell", c->number,

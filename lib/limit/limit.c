@@ -177,7 +177,7 @@ static ebpo_status hulls(void *context, uint64_t begin, uint64_t end, unsigned w
 
 /* --- all of it --- */
 
-static ebpo_status check(ebpo_file *file, int level, ebpo_error *error)
+static ebpo_status check(const ebpo_file *file, int level, ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(file);
     if (level < 0 || level >= info->level_count)
@@ -190,14 +190,16 @@ static ebpo_status check(ebpo_file *file, int level, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status prepare(job *j, ebpo_file *file, int level, unsigned threads, ebpo_error *error)
+static ebpo_status prepare(job *j, const ebpo_file *file, int level, unsigned threads,
+                           ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(file);
     j->level = level;
-    ebpo_status status =
-        ebpo_lod_model_read(&j->model, file, info->level_count - 1, threads, error);
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    read.threads = threads;
+    ebpo_status status = ebpo_lod_model_read(&j->model, file, info->level_count - 1, &read, error);
     if (status == EBPO_OK)
-        status = ebpo_file_read_mesh(file, &j->mesh, threads, error);
+        status = ebpo_file_read_mesh(file, &read, &j->mesh, error);
     j->scratch = ebpo_alloc_zero(threads, sizeof *j->scratch);
     if (status == EBPO_OK) {
         j->tree = ebpo_lod_model_nodes(&j->model);
@@ -227,7 +229,7 @@ static void job_free(job *j, unsigned threads)
     ebpo_lod_model_free(&j->model);
 }
 
-ebpo_status ebpo_limit_level(ebpo_file *file, int level, const ebpo_limit_options *options,
+ebpo_status ebpo_limit_level(const ebpo_file *file, int level, const ebpo_limit_options *options,
                              ebpo_limit *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;

@@ -257,13 +257,13 @@ static void add_windings(ebpo_lod_nodes *nodes, const ebpo_lod_model *model)
     }
 }
 
-ebpo_status ebpo_lod_level(ebpo_file *file, int level, const ebpo_lod_options *options,
+ebpo_status ebpo_lod_level(const ebpo_file *file, int level, const ebpo_lod_options *options,
                            ebpo_mesh *out, double *volume, ebpo_error *error)
 {
     return ebpo_lod_level_nodes(file, level, options, out, NULL, volume, error);
 }
 
-ebpo_status ebpo_lod_level_nodes(ebpo_file *file, int level, const ebpo_lod_options *options,
+ebpo_status ebpo_lod_level_nodes(const ebpo_file *file, int level, const ebpo_lod_options *options,
                                  ebpo_mesh *out, ebpo_lod_nodes *nodes, double *volume,
                                  ebpo_error *error)
 {
@@ -285,7 +285,10 @@ ebpo_status ebpo_lod_level_nodes(ebpo_file *file, int level, const ebpo_lod_opti
                          info->level_count - 1);
     unsigned threads = ebpo_thread_count(wanted.threads);
     ebpo_lod_model model;
-    status = ebpo_lod_model_read(&model, file, level, threads, error);
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    read.threads = threads;
+    read.workspace = wanted.workspace;
+    status = ebpo_lod_model_read(&model, file, level, &read, error);
     if (status != EBPO_OK)
         return status;
     job j = {

@@ -16,12 +16,12 @@ void ebpo_lod_model_free(ebpo_lod_model *model)
     ebpo_mesh_free(&model->mesh);
 }
 
-static ebpo_status read_levels(ebpo_lod_model *out, ebpo_file *file, unsigned threads,
-                               ebpo_error *error)
+static ebpo_status read_levels(ebpo_lod_model *out, const ebpo_file *file,
+                               const ebpo_read_options *read, ebpo_error *error)
 {
     ebpo_file_prefetch_levels(file, 0, out->target);
     for (int i = 0; i <= out->target; i++) {
-        ebpo_status status = ebpo_file_read_level(file, i, &out->level[i], threads, error);
+        ebpo_status status = ebpo_file_read_level(file, i, read, &out->level[i], error);
         if (status == EBPO_OK)
             status = ebpo_level_ranks_make(&out->ranks[i], &out->level[i], i, error);
         if (status != EBPO_OK)
@@ -44,8 +44,8 @@ static bool has_leaves(const ebpo_lod_model *model)
     return false;
 }
 
-ebpo_status ebpo_lod_model_read(ebpo_lod_model *out, ebpo_file *file, int target, unsigned threads,
-                                ebpo_error *error)
+ebpo_status ebpo_lod_model_read(ebpo_lod_model *out, const ebpo_file *file, int target,
+                                const ebpo_read_options *read, ebpo_error *error)
 {
     memset(out, 0, sizeof *out);
     out->info = ebpo_file_info(file);
@@ -55,9 +55,9 @@ ebpo_status ebpo_lod_model_read(ebpo_lod_model *out, ebpo_file *file, int target
     out->leaf_source = parts & EBPO_PART_LEAF_PLANES ? EBPO_LEAF_STORED
                        : parts & EBPO_PART_MESH      ? EBPO_LEAF_DERIVED
                                                      : EBPO_LEAF_INHERITED;
-    ebpo_status status = read_levels(out, file, threads, error);
+    ebpo_status status = read_levels(out, file, read, error);
     if (status == EBPO_OK && out->leaf_source == EBPO_LEAF_DERIVED && has_leaves(out))
-        status = ebpo_file_read_mesh(file, &out->mesh, threads, error);
+        status = ebpo_file_read_mesh(file, read, &out->mesh, error);
     if (status != EBPO_OK)
         ebpo_lod_model_free(out);
     return status;

@@ -27,8 +27,9 @@ typedef struct ebpo_lod_model {
 } ebpo_lod_model;
 
 /* Reads levels 0 .. target. On failure nothing is left to free. */
-EBPO_MUST_USE ebpo_status ebpo_lod_model_read(ebpo_lod_model *out, ebpo_file *file, int target,
-                                              unsigned threads, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_lod_model_read(ebpo_lod_model *out, const ebpo_file *file,
+                                              int target, const ebpo_read_options *read,
+                                              ebpo_error *error);
 void ebpo_lod_model_free(ebpo_lod_model *model);
 
 /* Its nodes. */

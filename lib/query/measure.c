@@ -207,7 +207,7 @@ static void mass_of(ebpo_mass *out, const moments *m, const frame *f, bool solid
     inertia_of(out->inertia, central, f->exponent);
 }
 
-ebpo_status ebpo_measure(ebpo_file *file, unsigned threads, ebpo_mass *out, ebpo_error *error)
+ebpo_status ebpo_measure(const ebpo_file *file, unsigned threads, ebpo_mass *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_mesh mesh = { 0 };
@@ -222,7 +222,9 @@ ebpo_status ebpo_measure(ebpo_file *file, unsigned threads, ebpo_mass *out, ebpo
         return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
                               "the file is a subset, of whose mesh a part was left out: it cannot "
                               "be measured; measure the original");
-    status = ebpo_file_read_mesh(file, &mesh, threads, error);
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    read.threads = threads;
+    status = ebpo_file_read_mesh(file, &read, &mesh, error);
     if (status != EBPO_OK)
         goto done;
     block_count = mesh.face_count / BLOCK_FACES + (mesh.face_count % BLOCK_FACES != 0);

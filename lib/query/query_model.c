@@ -189,8 +189,8 @@ static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
     return open_top(m, cut, error);
 }
 
-ebpo_status ebpo_model_new(ebpo_file *file, const ebpo_model_options *options, ebpo_model **out,
-                           ebpo_error *error)
+ebpo_status ebpo_model_new(const ebpo_file *file, const ebpo_model_options *options,
+                           ebpo_model **out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_model_options wanted = EBPO_MODEL_OPTIONS_INIT;

@@ -13,7 +13,7 @@
 #include "subtree/subtree.h"
 
 struct ebpo_model {
-    ebpo_file *file;
+    const ebpo_file *file;
     const ebpo_info *info;
     ebpo_model_options options;
     const ebpo_kernels *kernels;

@@ -157,7 +157,7 @@ static ebpo_status add_level(reading *r, int number, const ebpo_level *level, ui
     return status;
 }
 
-ebpo_status ebpo_top_read(ebpo_top **out, ebpo_file *file, int cut_level, unsigned threads,
+ebpo_status ebpo_top_read(ebpo_top **out, const ebpo_file *file, int cut_level, unsigned threads,
                           ebpo_error *error)
 {
     *out = NULL;
@@ -167,18 +167,19 @@ ebpo_status ebpo_top_read(ebpo_top **out, ebpo_file *file, int cut_level, unsign
     top->cut_level = cut_level;
     reading r = { .top = top, .info = ebpo_file_info(file), .error = error };
     ebpo_status status = EBPO_OK;
+    ebpo_read_options read = ebpo_read_threads(threads);
     ebpo_file_prefetch_levels(file, 0, cut_level);
     for (int number = 0; number <= cut_level && status == EBPO_OK; number++) {
         ebpo_level level;
-        status = ebpo_file_read_level(file, number, &level, threads, error);
+        status = ebpo_file_read_level(file, number, &read, &level, error);
         if (status != EBPO_OK)
             break;
         if (r.info->level[number].pruned_count && number + 1 < r.info->level_count)
-            status = ebpo_reader_make(file, EBPO_A_TYPES, number + 1, threads, sizeof *r.next_types,
+            status = ebpo_reader_make(file, EBPO_A_TYPES, number + 1, &read, sizeof *r.next_types,
                                       &r.next_types, error);
         if (status == EBPO_OK)
             status = add_level(&r, number, &level, r.group - (number ? level.group_count : 0));
-        ebpo_array_free(file->workspace, r.next_types);
+        ebpo_array_free(read.workspace, r.next_types);
         r.next_types = NULL;
         ebpo_level_free(&level);
     }

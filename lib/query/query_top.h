@@ -25,7 +25,7 @@ typedef struct ebpo_top {
     uint64_t bytes;
 } ebpo_top;
 
-EBPO_MUST_USE ebpo_status ebpo_top_read(ebpo_top **out, ebpo_file *file, int cut_level,
+EBPO_MUST_USE ebpo_status ebpo_top_read(ebpo_top **out, const ebpo_file *file, int cut_level,
                                         unsigned threads, ebpo_error *error);
 void ebpo_top_free(ebpo_top *top);
 

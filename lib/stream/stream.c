@@ -14,7 +14,7 @@
 #include "base/fp_env.h"
 #include "base/parallel.h"
 #include "base/sized.h"
-#include "container/schema.h"
+#include "container/reader.h"
 #include "octree/cells.h"
 #include "octree/node_types.h"
 #include "stream/stream_node.h"
@@ -23,7 +23,7 @@
 enum { PIECE = 4096 };
 
 struct ebpo_stream {
-    ebpo_file *file;
+    const ebpo_file *file;
     const ebpo_info *info;
     ebpo_stream_options options;
     ebpo_box box;
@@ -36,8 +36,8 @@ struct ebpo_stream {
     ebpo_node_buffers room;
 };
 
-ebpo_status ebpo_stream_new(ebpo_file *file, const ebpo_stream_options *options, ebpo_stream **out,
-                            ebpo_error *error)
+ebpo_status ebpo_stream_new(const ebpo_file *file, const ebpo_stream_options *options,
+                            ebpo_stream **out, ebpo_error *error)
 {
     ebpo_stream_options wanted = EBPO_STREAM_OPTIONS_INIT;
     *out = NULL;
@@ -208,7 +208,8 @@ ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool 
         return EBPO_OK;
     ebpo_level *level = &s->kept[next];
     uint64_t parents = next ? s->kept[next - 1].gray_count : 1;
-    ebpo_status status = ebpo_file_read_level(s->file, next, level, s->options.threads, error);
+    ebpo_read_options read = ebpo_read_threads(s->options.threads);
+    ebpo_status status = ebpo_file_read_level(s->file, next, &read, level, error);
     if (status != EBPO_OK)
         return status;
     ebpo_level_drop(level, EBPO_NEEDS_MESH);
@@ -229,7 +230,7 @@ ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool 
         drop_passed(&s->kept[next - 1], s->options.polygons);
     s->level = next;
     s->settled += v.settled;
-    s->bytes += s->info->level[next].stored_bytes +
+    s->bytes += ebpo_reader_level_bytes(s->file, next) +
                 (next == s->info->index_level ? s->info->chunk_index_bytes : 0);
     ebpo_level_walk_begin(&s->walk, s->kept, next, s->info->pruned);
     *out = (ebpo_stream_level){ next, nodes, s->bytes, v.gray + s->settled };

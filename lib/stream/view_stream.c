@@ -60,7 +60,7 @@ static ebpo_status take_options(ebpo_view_stream *s, const ebpo_view_options *op
     return EBPO_OK;
 }
 
-ebpo_status ebpo_view_stream_new(ebpo_file *file, const ebpo_view_options *options,
+ebpo_status ebpo_view_stream_new(const ebpo_file *file, const ebpo_view_options *options,
                                  ebpo_view_stream **out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;

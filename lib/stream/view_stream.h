@@ -9,7 +9,7 @@
 #include "stream/observer.h"
 
 struct ebpo_view_stream {
-    ebpo_file *file;
+    const ebpo_file *file;
     const ebpo_info *info;
     ebpo_box box;
     ebpo_view_options options; /* observer: NULL, or `observer` below */

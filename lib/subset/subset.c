@@ -110,8 +110,8 @@ static void name_mesh(ebpo_tree *out)
     out->mesh.source_size = out->info.source_size;
 }
 
-ebpo_status ebpo_subset_tree(ebpo_tree *out, ebpo_file *file, const ebpo_subset_options *options,
-                             ebpo_error *error)
+ebpo_status ebpo_subset_tree(ebpo_tree *out, const ebpo_file *file,
+                             const ebpo_subset_options *options, ebpo_error *error)
 {
     ebpo_tolerance *need = NULL;
     ebpo_status status = EBPO_OK;
@@ -124,7 +124,7 @@ ebpo_status ebpo_subset_tree(ebpo_tree *out, ebpo_file *file, const ebpo_subset_
     return status;
 }
 
-ebpo_status ebpo_subset_tree_within(ebpo_tree *out, ebpo_file *file,
+ebpo_status ebpo_subset_tree_within(ebpo_tree *out, const ebpo_file *file,
                                     const ebpo_subset_options *options, ebpo_tolerance *need,
                                     ebpo_error *error)
 {

@@ -16,7 +16,7 @@ uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces)
                       ANYHOW);
 }
 
-ebpo_status ebpo_subset(ebpo_file *file, const char *path, const ebpo_subset_options *options,
+ebpo_status ebpo_subset(const ebpo_file *file, const char *path, const ebpo_subset_options *options,
                         ebpo_error *error)
 {
     EBPO_DEFAULT_FP;

@@ -9,7 +9,7 @@
 #include "geom/cell.h"
 
 typedef struct ebpo_cutting {
-    ebpo_file *file;
+    const ebpo_file *file;
     const ebpo_info *from;
     const ebpo_subset_options *options;
     ebpo_chunks *chunks;
@@ -33,20 +33,20 @@ void ebpo_cut_volumes(ebpo_cutting *c);
 
 /* The same with what is known of envelopes already: `need` of this file, for the planes that are
  * kept. */
-EBPO_MUST_USE ebpo_status ebpo_subset_tree_within(ebpo_tree *out, ebpo_file *file,
+EBPO_MUST_USE ebpo_status ebpo_subset_tree_within(ebpo_tree *out, const ebpo_file *file,
                                                   const ebpo_subset_options *options,
                                                   ebpo_tolerance *need, ebpo_error *error);
 
 /* --- size.c: the subset for options->target_bytes, published as `path`; trials are written beside
  * it. Changes max_error and parts of the options --- */
-EBPO_MUST_USE ebpo_status ebpo_subset_fit(ebpo_file *file, const char *path,
+EBPO_MUST_USE ebpo_status ebpo_subset_fit(const ebpo_file *file, const char *path,
                                           ebpo_subset_options *options, ebpo_error *error);
 
 /* How the subset is written: all parts that its tree has. */
 ebpo_write_options ebpo_subset_write_options(const ebpo_subset_options *options);
 
 /* The tree that would be written; for tests too. */
-EBPO_MUST_USE ebpo_status ebpo_subset_tree(ebpo_tree *out, ebpo_file *file,
+EBPO_MUST_USE ebpo_status ebpo_subset_tree(ebpo_tree *out, const ebpo_file *file,
                                            const ebpo_subset_options *options, ebpo_error *error);
 
 #endif

@@ -17,7 +17,7 @@
 static const double precision = 1.01, finest = 0x1p-40;
 
 typedef struct fitting {
-    ebpo_file *file;
+    const ebpo_file *file;
     ebpo_subset_options *options;
     ebpo_publish trial, best; /* best: the finest that fitted, once there is one */
     ebpo_tolerance *need;
@@ -141,7 +141,7 @@ static ebpo_status choose_parts(fitting *f, bool *found)
     return status;
 }
 
-ebpo_status ebpo_subset_fit(ebpo_file *file, const char *path, ebpo_subset_options *options,
+ebpo_status ebpo_subset_fit(const ebpo_file *file, const char *path, ebpo_subset_options *options,
                             ebpo_error *error)
 {
     fitting f = { .file = file,

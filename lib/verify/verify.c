@@ -33,11 +33,20 @@ static bool is_finding(ebpo_status status)
     return status == EBPO_E_FORMAT || status == EBPO_E_VERSION || status == EBPO_E_LIMIT;
 }
 
-static ebpo_status check_content(ebpo_file *file, const ebpo_verify_options *options,
+static ebpo_read_options reading(const ebpo_verify_options *options)
+{
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    read.threads = options->threads;
+    read.workspace = options->workspace;
+    return read;
+}
+
+static ebpo_status check_content(const ebpo_file *file, const ebpo_verify_options *options,
                                  ebpo_tally *tally, ebpo_error *error)
 {
     ebpo_error own = EBPO_ERROR_INIT;
-    ebpo_status status = ebpo_file_check_content(file, options->threads, &own);
+    ebpo_read_options read = reading(options);
+    ebpo_status status = ebpo_file_check_content(file, &read, &own);
     if (status == EBPO_OK || is_finding(status)) {
         ebpo_tally_check(tally, EBPO_VERIFY_CONTENT, status == EBPO_OK, "%s", own.message);
         return EBPO_OK;
@@ -45,12 +54,13 @@ static ebpo_status check_content(ebpo_file *file, const ebpo_verify_options *opt
     return ebpo_fail_with(error, &own);
 }
 
-static ebpo_status check_tree(ebpo_file *file, const ebpo_verify_options *options,
+static ebpo_status check_tree(const ebpo_file *file, const ebpo_verify_options *options,
                               ebpo_tally *tally, ebpo_error *error)
 {
     ebpo_error own = EBPO_ERROR_INIT;
+    ebpo_read_options read = reading(options);
     ebpo_tree tree = { 0 };
-    ebpo_status status = ebpo_file_read_tree(file, &tree, options->threads, &own);
+    ebpo_status status = ebpo_file_read_tree(file, &read, &tree, &own);
     if (status == EBPO_OK || is_finding(status))
         ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, status == EBPO_OK, "%s", own.message);
     if (status == EBPO_OK) {
@@ -61,30 +71,28 @@ static ebpo_status check_tree(ebpo_file *file, const ebpo_verify_options *option
     return is_finding(status) ? EBPO_OK : ebpo_fail_with(error, &own);
 }
 
-static ebpo_status check_source(ebpo_file *file, const ebpo_verify_options *options,
+static ebpo_status check_source(const ebpo_file *file, const ebpo_verify_options *options,
                                 ebpo_tally *tally, ebpo_error *error)
 {
     ebpo_error own = EBPO_ERROR_INIT;
+    ebpo_read_options read = reading(options);
     ebpo_mesh stored;
     bool ordered = false;
     if (ebpo_file_info(file)->pruned)
-        return ebpo_check_source(tally, file, NULL, false, options->source, options->threads,
-                                 error);
-    ebpo_status status =
-        ebpo_file_read_source_mesh(file, &stored, &ordered, options->threads, &own);
+        return ebpo_check_source(tally, file, NULL, false, options->source, &read, error);
+    ebpo_status status = ebpo_file_read_source_mesh(file, &read, &stored, &ordered, &own);
     if (is_finding(status)) {
         ebpo_tally_check(tally, EBPO_VERIFY_SOURCE, false, "%s", own.message);
         return EBPO_OK;
     }
     if (status != EBPO_OK)
         return ebpo_fail_with(error, &own);
-    status =
-        ebpo_check_source(tally, file, &stored, ordered, options->source, options->threads, error);
+    status = ebpo_check_source(tally, file, &stored, ordered, options->source, &read, error);
     ebpo_mesh_free(&stored);
     return status;
 }
 
-ebpo_status ebpo_verify(ebpo_file *file, const ebpo_verify_options *options,
+ebpo_status ebpo_verify(const ebpo_file *file, const ebpo_verify_options *options,
                         ebpo_verify_report *report, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
@@ -109,8 +117,6 @@ ebpo_status ebpo_verify(ebpo_file *file, const ebpo_verify_options *options,
                 "verify: the source has been arranged (ebpo_mesh_arrange); give it as it was read");
     }
     ebpo_tally tally = { 0 };
-    if (options->workspace)
-        ebpo_file_set_workspace(file, options->workspace);
     status = check_content(file, options, &tally, error);
     if (status == EBPO_OK)
         status = check_tree(file, options, &tally, error);

@@ -150,42 +150,41 @@ static ebpo_status compare_as_sets(ebpo_tally *tally, const ebpo_mesh *a, const 
 }
 
 /* A subset's mesh: each of its faces and vertices at its number in the source. */
-static ebpo_status compare_some(ebpo_tally *tally, ebpo_file *file, const ebpo_mesh *whole,
-                                unsigned threads, ebpo_error *error)
+static ebpo_status compare_some(ebpo_tally *tally, const ebpo_file *file, const ebpo_mesh *whole,
+                                const ebpo_read_options *read, ebpo_error *error)
 {
     ebpo_mesh part = { 0 };
-    uint32_t *vertex_source = NULL, *face_source = NULL;
-    ebpo_status status = ebpo_file_read_mesh(file, &part, threads, error);
+    ebpo_maps maps = { .vertex_source = NULL };
+    ebpo_status status = ebpo_file_read_mesh(file, read, &part, error);
     if (status == EBPO_OK)
-        status = ebpo_reader_maps(file, &vertex_source, &face_source, threads, error);
+        status = ebpo_file_read_maps(file, read, &maps, error);
     if (status == EBPO_OK && CHECK(!whole->xyz32 == !part.xyz32,
                                    "the source and the file hold different kinds of coordinates")) {
         tally->checks[EBPO_VERIFY_SOURCE] += part.vertex_count + part.face_count;
         for (uint64_t i = 0; i < part.vertex_count;
              ebpo_workspace_settle_often(part.workspace, i++))
-            if (vertex_source[i] >= whole->vertex_count ||
-                memcmp(vertex_bytes(whole, vertex_source[i]), vertex_bytes(&part, i),
+            if (maps.vertex_source[i] >= whole->vertex_count ||
+                memcmp(vertex_bytes(whole, maps.vertex_source[i]), vertex_bytes(&part, i),
                        vertex_size(&part)) != 0)
                 ebpo_tally_violation(tally, EBPO_VERIFY_SOURCE,
                                      &(ebpo_verify_place){ 0, EBPO_NO_FACE, EBPO_NO_PLANE },
                                      "vertex %" PRIu32
                                      " of the source has another position in the file",
-                                     vertex_source[i]);
+                                     maps.vertex_source[i]);
         for (uint64_t i = 0; i < part.face_count;
              ebpo_workspace_settle_often(part.workspace, i++)) {
-            bool equal = face_source[i] < whole->face_count;
+            bool equal = maps.face_source[i] < whole->face_count;
             for (uint64_t c = 0; c < 3 && equal; c++)
-                equal = whole->faces[3 * (uint64_t)face_source[i] + c] ==
-                        vertex_source[part.faces[3 * i + c]];
+                equal = whole->faces[3 * (uint64_t)maps.face_source[i] + c] ==
+                        maps.vertex_source[part.faces[3 * i + c]];
             if (!equal)
                 ebpo_tally_violation(
                     tally, EBPO_VERIFY_SOURCE,
-                    &(ebpo_verify_place){ 0, face_source[i], EBPO_NO_PLANE },
+                    &(ebpo_verify_place){ 0, maps.face_source[i], EBPO_NO_PLANE },
                     "the face (by its source number) has other corners in the file");
         }
     }
-    ebpo_array_free(part.workspace, vertex_source);
-    ebpo_array_free(part.workspace, face_source);
+    ebpo_maps_free(&maps);
     ebpo_mesh_free(&part);
     return status;
 }
@@ -221,8 +220,8 @@ static ebpo_status compare(ebpo_tally *tally, const ebpo_mesh *mended, const ebp
     return status;
 }
 
-ebpo_status ebpo_check_source(ebpo_tally *tally, ebpo_file *file, const ebpo_mesh *stored,
-                              bool ordered, const ebpo_mesh *source, unsigned threads,
+ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *file, const ebpo_mesh *stored,
+                              bool ordered, const ebpo_mesh *source, const ebpo_read_options *read,
                               ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(file);
@@ -251,7 +250,7 @@ ebpo_status ebpo_check_source(ebpo_tally *tally, ebpo_file *file, const ebpo_mes
         status = compare(tally, made, stored, ordered, error);
     else if (status == EBPO_OK &&
              info->parts & EBPO_PART_MAPS) /* without maps, nothing says which faces these are */
-        status = compare_some(tally, file, made, threads, error);
+        status = compare_some(tally, file, made, read, error);
     ebpo_mesh_free(&mended);
     return status;
 }

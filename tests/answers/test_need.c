@@ -10,6 +10,7 @@
 #include <ebpo/subset.h>
 #include <ebpo/verify.h>
 
+#include "read_by.h"
 #include "query_kit.h"
 #include "subset/subset_parts.h"
 #include "twin_reach.h"
@@ -74,8 +75,8 @@ static uint64_t missing(ebpo_file *coarse, ebpo_file *fine_file, uint64_t *nodes
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_tree a, b;
     uint64_t out = 0;
-    fine(ebpo_file_read_tree(coarse, &a, 1, &error), &error);
-    fine(ebpo_file_read_tree(fine_file, &b, 1, &error), &error);
+    fine(ebpo_file_read_tree(coarse, READ_BY(1), &a, &error), &error);
+    fine(ebpo_file_read_tree(fine_file, READ_BY(1), &b, &error), &error);
     struct pair {
         uint64_t a, b;
     } *now = query_room(1, sizeof *now), *next;
@@ -360,7 +361,7 @@ START_TEST(threads_and_a_detour_by_a_tree_do_not_change_the_bytes)
                 fine(ebpo_subset(m.file, path[way], &o, &error), &error);
             } else {
                 ebpo_tree tree;
-                fine(ebpo_file_read_tree(m.file, &tree, 1, &error), &error);
+                fine(ebpo_file_read_tree(m.file, READ_BY(1), &tree, &error), &error);
                 fine(ebpo_subset_of_tree(&tree, path[way], &o, &error), &error);
             }
             FILE *f = fopen(path[way], "rb");

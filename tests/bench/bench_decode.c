@@ -18,7 +18,7 @@ static const char *const names[PARTS] = { "levels", "mesh", "maps" };
 
 typedef struct settings {
     const char *path;
-    unsigned threads;
+    const ebpo_read_options *read;
     int rounds;
 } settings;
 
@@ -50,11 +50,12 @@ static uint64_t level_bytes(const ebpo_level *l)
     return sum + (l->leaf_plane_counts ? l->leaf_count * sizeof *l->leaf_plane_counts : 0);
 }
 
-static bool read_levels(ebpo_file *file, unsigned threads, uint64_t *bytes, ebpo_error *error)
+static bool read_levels(ebpo_file *file, const ebpo_read_options *read, uint64_t *bytes,
+                        ebpo_error *error)
 {
     for (int i = 0; i < ebpo_file_info(file)->level_count; i++) {
         ebpo_level level;
-        if (ebpo_file_read_level(file, i, &level, threads, error) != EBPO_OK)
+        if (ebpo_file_read_level(file, i, read, &level, error) != EBPO_OK)
             return false;
         *bytes += level_bytes(&level);
         ebpo_level_free(&level);
@@ -62,10 +63,11 @@ static bool read_levels(ebpo_file *file, unsigned threads, uint64_t *bytes, ebpo
     return true;
 }
 
-static bool read_mesh(ebpo_file *file, unsigned threads, uint64_t *bytes, ebpo_error *error)
+static bool read_mesh(ebpo_file *file, const ebpo_read_options *read, uint64_t *bytes,
+                      ebpo_error *error)
 {
     ebpo_mesh mesh;
-    if (ebpo_file_read_mesh(file, &mesh, threads, error) != EBPO_OK)
+    if (ebpo_file_read_mesh(file, read, &mesh, error) != EBPO_OK)
         return false;
     *bytes = mesh.vertex_count * 3 * (mesh.xyz64 ? sizeof *mesh.xyz64 : sizeof *mesh.xyz32) +
              mesh.face_count * 3 * sizeof *mesh.faces;
@@ -73,21 +75,22 @@ static bool read_mesh(ebpo_file *file, unsigned threads, uint64_t *bytes, ebpo_e
     return true;
 }
 
-static bool read_maps(ebpo_file *file, unsigned threads, uint64_t *bytes, ebpo_error *error)
+static bool read_maps(ebpo_file *file, const ebpo_read_options *read, uint64_t *bytes,
+                      ebpo_error *error)
 {
-    uint32_t *vertices, *faces;
-    if (ebpo_file_read_maps(file, &vertices, &faces, threads, error) != EBPO_OK)
+    ebpo_maps maps;
+    if (ebpo_file_read_maps(file, read, &maps, error) != EBPO_OK)
         return false;
-    *bytes =
-        (ebpo_file_info(file)->vertex_count + ebpo_file_info(file)->face_count) * sizeof *vertices;
-    free(vertices);
-    free(faces);
+    *bytes = (ebpo_file_info(file)->vertex_count + ebpo_file_info(file)->face_count) *
+             sizeof *maps.vertex_source;
+    ebpo_maps_free(&maps);
     return true;
 }
 
-static bool read_all(ebpo_file *file, unsigned threads, round_figures *f, ebpo_error *error)
+static bool read_all(ebpo_file *file, const ebpo_read_options *read, round_figures *f,
+                     ebpo_error *error)
 {
-    static bool (*const readers[PARTS])(ebpo_file *, unsigned, uint64_t *,
+    static bool (*const readers[PARTS])(ebpo_file *, const ebpo_read_options *, uint64_t *,
                                         ebpo_error *) = { read_levels, read_mesh, read_maps };
     static const uint32_t parts[PARTS] = { 0, EBPO_PART_MESH, EBPO_PART_MAPS };
     double cpu = now(CLOCK_PROCESS_CPUTIME_ID);
@@ -95,7 +98,7 @@ static bool read_all(ebpo_file *file, unsigned threads, round_figures *f, ebpo_e
     for (int i = 0; i < PARTS; i++) {
         double begin = now(CLOCK_MONOTONIC);
         if ((ebpo_file_info(file)->parts & parts[i]) == parts[i] &&
-            !readers[i](file, threads, &f->bytes[i], error))
+            !readers[i](file, read, &f->bytes[i], error))
             return false;
         f->seconds[i] = now(CLOCK_MONOTONIC) - begin;
     }
@@ -161,9 +164,11 @@ int main(int argc, char **argv)
         fprintf(stderr, "bench_decode: %s\n", error.message);
         return EXIT_FAILURE;
     }
-    bool ok = read_all(file, s.threads, &first, &error);
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    read.threads = s.threads;
+    bool ok = read_all(file, &read, &first, &error);
     for (int i = 0; ok && i < s.rounds; i++)
-        ok = read_all(file, s.threads, &f[i], &error);
+        ok = read_all(file, &read, &f[i], &error);
     if (ok) {
         qsort(f, (size_t)s.rounds, sizeof *f, by_seconds);
         print(&s, &f[s.rounds / 2], ebpo_file_info(file)->file_bytes);

@@ -3,6 +3,7 @@
 #include <ebpo/query.h>
 #include <ebpo/view.h>
 
+#include "read_by.h"
 #include "subset/subset_parts.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
@@ -87,11 +88,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     ebpo_mesh mesh;
     if (ebpo_open_memory(data, size, "fuzzed", &file, NULL) != EBPO_OK)
         return 0;
-    if (ebpo_file_read_tree(file, &tree, 1, NULL) == EBPO_OK)
+    if (ebpo_file_read_tree(file, READ_BY(1), &tree, NULL) == EBPO_OK)
         ebpo_tree_free(&tree);
-    if (ebpo_file_read_source_mesh(file, &mesh, NULL, 1, NULL) == EBPO_OK)
+    if (ebpo_file_read_source_mesh(file, READ_BY(1), &mesh, NULL, NULL) == EBPO_OK)
         ebpo_mesh_free(&mesh);
-    (void)!ebpo_file_check_content(file, 1, NULL);
+    (void)!ebpo_file_check_content(file, READ_BY(1), NULL);
     ebpo_subset_options part = EBPO_SUBSET_OPTIONS_INIT;
     part.last_level = 2;
     part.boxed = true;

@@ -2,6 +2,7 @@
  * own and the folder are left out. */
 #ifndef VECTOR_READ_H
 #define VECTOR_READ_H
+#include "read_by.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -14,9 +15,9 @@ static ebpo_status vector_read(const char *path, ebpo_tree *tree, ebpo_error *er
     ebpo_status status = ebpo_open(path, &file, error);
     if (status != EBPO_OK)
         return status;
-    status = ebpo_file_read_tree(file, tree, 1, error);
+    status = ebpo_file_read_tree(file, READ_BY(1), tree, error);
     if (status == EBPO_OK)
-        status = ebpo_file_check_content(file, 1, error);
+        status = ebpo_file_check_content(file, READ_BY(1), error);
     if (status != EBPO_OK)
         ebpo_tree_free(tree);
     ebpo_close(file);

@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "read_by.h"
 #include "codec/chunk.h"
 #include "codec/coding.h"
 #include "h5/h5.h"
@@ -154,10 +155,10 @@ START_TEST(trees_come_back_bit_for_bit)
             write_ok(&tree, in_folder("t.ebpo.h5"), (ebpo_codec)codec, threads, ~0u);
             ebpo_file *file = open_ok(in_folder("t.ebpo.h5"));
             ebpo_error error = EBPO_ERROR_INIT;
-            ck_assert_msg(ebpo_file_read_tree(file, &back, threads, &error) == EBPO_OK, "%s",
-                          error.message);
+            ck_assert_msg(ebpo_file_read_tree(file, READ_BY(threads), &back, &error) == EBPO_OK,
+                          "%s", error.message);
             ck_assert_int_eq(ebpo_file_info(file)->codec, codec);
-            ck_assert_msg(ebpo_file_check_content(file, threads, &error) == EBPO_OK, "%s",
+            ck_assert_msg(ebpo_file_check_content(file, READ_BY(threads), &error) == EBPO_OK, "%s",
                           error.message);
             same_tree(&tree, &back);
             ebpo_tree_free(&back);
@@ -242,10 +243,12 @@ START_TEST(all_metadata_is_in_two_pieces)
     write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, ~0u);
     ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
     const ebpo_info *info = ebpo_file_info(file);
+    ebpo_stored_sizes stored;
+    ck_assert_int_eq(ebpo_file_locate(file, &stored, NULL), EBPO_OK);
     metadata_places m = { info->head_bytes, info->chunk_index_offset, info->chunk_index_bytes, 0 };
     uint64_t size = info->file_bytes, first_levels = m.head;
     for (int level = 0; level < info->index_level; level++)
-        first_levels += info->level[level].stored_bytes;
+        first_levels += stored.level_bytes[level];
     ck_assert_int_gt(info->index_level, 3);
     ck_assert_uint_ge(m.index, first_levels);
     ck_assert_uint_gt(m.index_bytes, 0);
@@ -276,10 +279,12 @@ START_TEST(files_of_all_sizes_have_no_gaps)
             write_ok(&tree, in_folder("a.ebpo.h5"), (ebpo_codec)codec, 1, some);
             ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
             const ebpo_info *info = ebpo_file_info(file);
-            uint64_t sum = info->head_bytes + info->chunk_index_bytes + info->mesh_vertex_bytes +
-                           info->mesh_face_bytes + info->map_bytes;
+            ebpo_stored_sizes stored;
+            ck_assert_int_eq(ebpo_file_locate(file, &stored, NULL), EBPO_OK);
+            uint64_t sum = info->head_bytes + info->chunk_index_bytes + stored.mesh_vertex_bytes +
+                           stored.mesh_face_bytes + stored.map_bytes;
             for (int level = 0; level < info->level_count; level++)
-                sum += info->level[level].stored_bytes;
+                sum += stored.level_bytes[level];
             ck_assert_msg(sum == info->file_bytes, "seed %u, codec %d: %d bytes, the file has %d",
                           seed, codec, (int)sum, (int)info->file_bytes);
             ebpo_close(file);
@@ -324,25 +329,25 @@ START_TEST(parts_that_are_left_out_are_absent)
     ebpo_tree tree, back;
     ebpo_mesh mesh;
     ebpo_error error = EBPO_ERROR_INIT;
-    uint32_t *vertex_source, *face_source;
+    ebpo_maps maps;
     random_tree_make(&tree, &shapes[3]);
     for (uint32_t parts = 0; parts < 16; parts++) {
         write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, parts);
         ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
         uint32_t there = parts & EBPO_PART_MESH ? parts : parts & ~(uint32_t)EBPO_PART_MAPS;
         ck_assert_uint_eq(ebpo_file_info(file)->parts, there);
-        ck_assert_msg(ebpo_file_read_tree(file, &back, 1, &error) == EBPO_OK, "%s", error.message);
+        ck_assert_msg(ebpo_file_read_tree(file, READ_BY(1), &back, &error) == EBPO_OK, "%s",
+                      error.message);
         ck_assert_int_eq(back.level[5].leaf_planes != NULL, (there & EBPO_PART_LEAF_PLANES) != 0);
         ck_assert_int_eq(back.level[4].planes != NULL, (there & EBPO_PART_PLANES) != 0);
         ck_assert_int_eq(back.level[5].leaf_first != NULL, (there & EBPO_PART_MESH) != 0);
-        ck_assert_int_eq(ebpo_file_read_mesh(file, &mesh, 1, NULL),
+        ck_assert_int_eq(ebpo_file_read_mesh(file, READ_BY(1), &mesh, NULL),
                          there & EBPO_PART_MESH ? EBPO_OK : EBPO_E_ABSENT);
         ebpo_mesh_free(&mesh);
-        ck_assert_int_eq(ebpo_file_read_maps(file, &vertex_source, &face_source, 1, NULL),
+        ck_assert_int_eq(ebpo_file_read_maps(file, NULL, &maps, NULL),
                          there & EBPO_PART_MAPS ? EBPO_OK : EBPO_E_ABSENT);
-        free(vertex_source);
-        free(face_source);
-        ck_assert_int_eq(ebpo_file_check_content(file, 2, NULL), EBPO_OK);
+        ebpo_maps_free(&maps);
+        ck_assert_int_eq(ebpo_file_check_content(file, READ_BY(2), NULL), EBPO_OK);
         ebpo_tree_free(&back);
         ebpo_close(file);
     }
@@ -362,7 +367,7 @@ START_TEST(source_order_undoes_the_maps)
         tree.vertex_source[i] *= 2;
     write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, ~0u);
     ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
-    ck_assert_int_eq(ebpo_file_read_source_mesh(file, &mesh, &ordered, 2, NULL), EBPO_OK);
+    ck_assert_int_eq(ebpo_file_read_source_mesh(file, READ_BY(2), &mesh, &ordered, NULL), EBPO_OK);
     ck_assert(ordered);
     for (uint64_t i = 0; i < tree.mesh.face_count; i++)
         for (int k = 0; k < 3; k++)
@@ -388,7 +393,7 @@ START_TEST(read_only_folders_will_do)
     ck_assert_int_eq(chmod(in_folder("a.ebpo.h5"), 0444) | chmod(folder, 0555), 0);
     ebpo_file *file = open_ok(in_folder("a.ebpo.h5")), *again = open_ok(in_folder("a.ebpo.h5"));
     ebpo_close(file);
-    ck_assert_int_eq(ebpo_file_check_content(again, 1, NULL), EBPO_OK);
+    ck_assert_int_eq(ebpo_file_check_content(again, READ_BY(1), NULL), EBPO_OK);
     ebpo_close(again);
     ebpo_tree_free(&tree);
 }
@@ -401,10 +406,10 @@ static bool reads_well(const char *path, ebpo_error *error)
     ebpo_tree tree;
     if (ebpo_open(path, &file, error) != EBPO_OK)
         return false;
-    bool ok = ebpo_file_read_tree(file, &tree, 1, error) == EBPO_OK;
+    bool ok = ebpo_file_read_tree(file, READ_BY(1), &tree, error) == EBPO_OK;
     if (ok)
         ebpo_tree_free(&tree);
-    ok = ok && ebpo_file_check_content(file, 1, error) == EBPO_OK;
+    ok = ok && ebpo_file_check_content(file, READ_BY(1), error) == EBPO_OK;
     ebpo_close(file);
     return ok;
 }
@@ -470,7 +475,7 @@ START_TEST(flipped_bits_in_the_head_do_no_harm)
         spill(in_folder("b.ebpo.h5"), data, size);
         ebpo_file *file;
         if (ebpo_open(in_folder("b.ebpo.h5"), &file, NULL) == EBPO_OK) {
-            if (ebpo_file_read_tree(file, &back, 1, NULL) == EBPO_OK) {
+            if (ebpo_file_read_tree(file, READ_BY(1), &back, NULL) == EBPO_OK) {
                 same_tree(&tree, &back);
                 ebpo_tree_free(&back);
             }
@@ -550,7 +555,7 @@ START_TEST(an_index_that_contradicts_its_arrays_is_refused)
     ck_assert_int_lt(number, 8);
     ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert_int_eq(ebpo_file_read_level(file, number, &level, 1, &error), EBPO_E_FORMAT);
+    ck_assert_int_eq(ebpo_file_read_level(file, number, READ_BY(1), &level, &error), EBPO_E_FORMAT);
     ck_assert_ptr_nonnull(strstr(error.message, names[_i]));
     ebpo_close(file);
     ebpo_tree_free(&tree);

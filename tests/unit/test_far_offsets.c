@@ -10,6 +10,7 @@
 #include <sys/vfs.h>
 #include <unistd.h>
 
+#include "read_by.h"
 #include "base/arrays.h"
 #include "codec/coding.h"
 #include "container/plan.h"
@@ -234,7 +235,8 @@ static char *text_of(ebpo_file *file)
     char *text = NULL;
     size_t length = 0;
     FILE *out = open_memstream(&text, &length);
-    ck_assert_msg(ebpo_file_read_tree(file, &tree, 2, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_file_read_tree(file, READ_BY(2), &tree, &error) == EBPO_OK, "%s",
+                  error.message);
     tree_json(out, &tree);
     fclose(out);
     ebpo_tree_free(&tree);
@@ -266,7 +268,8 @@ START_TEST(containers_are_read_from_beyond_8_gib)
         ck_assert_str_eq(here, there);
         ck_assert_uint_gt(s.beyond, 0);
         ck_assert(!away || s.announced > 0);
-        ck_assert_msg(ebpo_file_check_content(far, 1, &error) == EBPO_OK, "%s", error.message);
+        ck_assert_msg(ebpo_file_check_content(far, READ_BY(1), &error) == EBPO_OK, "%s",
+                      error.message);
         free(here);
         free(there);
         ebpo_close(near);

@@ -7,6 +7,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "read_by.h"
 #include "construct/branch.h"
 #include "construct/partition.h"
 #include "codec/coding.h"
@@ -251,8 +252,8 @@ START_TEST(sources_of_billions_take_no_memory)
     ck_assert_msg(ebpo_tree_write(&tree, path, NULL, &error) == EBPO_OK, "%s", error.message);
     ck_assert_msg(ebpo_open(path, &file, &error) == EBPO_OK, "%s", error.message);
     getrusage(RUSAGE_SELF, &before);
-    ck_assert_msg(ebpo_file_read_source_mesh(file, &mesh, &ordered, 1, &error) == EBPO_OK, "%s",
-                  error.message);
+    ck_assert_msg(ebpo_file_read_source_mesh(file, READ_BY(1), &mesh, &ordered, &error) == EBPO_OK,
+                  "%s", error.message);
     getrusage(RUSAGE_SELF, &after);
     ck_assert(ordered);
     /* KiB; a number for each would be 16 GiB, and sanitizers take their own */

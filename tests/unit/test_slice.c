@@ -7,6 +7,7 @@
 
 #include <ebpo/build.h>
 
+#include "read_by.h"
 #include "container/slice_parts.h"
 #include "octree/node_types.h"
 #include "random_tree.h"
@@ -69,7 +70,7 @@ static void whole_open(whole *w, const char *name, uint64_t budget)
     ebpo_error error = EBPO_ERROR_INIT;
     memset(w, 0, sizeof *w);
     ck_assert_msg(ebpo_open(name, &w->file, &error) == EBPO_OK, "%s", error.message);
-    ck_assert_msg(ebpo_file_read_tree(w->file, &w->tree, 1, &error) == EBPO_OK, "%s",
+    ck_assert_msg(ebpo_file_read_tree(w->file, READ_BY(1), &w->tree, &error) == EBPO_OK, "%s",
                   error.message);
     ck_assert_msg(ebpo_chunks_make(&w->chunks, w->file, budget, &error) == EBPO_OK, "%s",
                   error.message);

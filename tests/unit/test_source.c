@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "read_by.h"
 #include "container/reader.h"
 #include "random_tree.h"
 #include "solids.h"
@@ -49,7 +50,7 @@ static char *read_text(ebpo_file *file, unsigned threads)
 {
     ebpo_tree tree;
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert_msg(ebpo_file_read_tree(file, &tree, threads, &error) == EBPO_OK, "%s",
+    ck_assert_msg(ebpo_file_read_tree(file, READ_BY(threads), &tree, &error) == EBPO_OK, "%s",
                   error.message);
     char *text = text_of(&tree);
     ebpo_tree_free(&tree);
@@ -61,7 +62,8 @@ static void expect_tree(ebpo_file *file, unsigned threads)
     ebpo_error error = EBPO_ERROR_INIT;
     char *text = read_text(file, threads);
     ck_assert_msg(strcmp(text, expected) == 0, "another tree came back");
-    ck_assert_msg(ebpo_file_check_content(file, threads, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_file_check_content(file, READ_BY(threads), &error) == EBPO_OK, "%s",
+                  error.message);
     free(text);
 }
 
@@ -257,7 +259,7 @@ START_TEST(one_read_opens_a_file_and_each_byte_of_an_array_is_read_once)
     bytes = stats.bytes_read;
     ck_assert_uint_eq(stats.reads, 1);
     ck_assert_uint_eq(bytes, size < 131072 ? size : 131072);
-    ck_assert_int_eq(ebpo_file_read_tree(file, &tree, 1, NULL), EBPO_OK);
+    ck_assert_int_eq(ebpo_file_read_tree(file, READ_BY(1), &tree, NULL), EBPO_OK);
     ebpo_file_stats after = ebpo_test_file_stats(file);
     later = after.bytes_read;
     later_reads = after.reads;
@@ -314,7 +316,7 @@ START_TEST(the_index_is_found_whatever_the_head_says_of_its_place)
         case 5: info->chunk_index_offset = 0, info->chunk_index_bytes = size; break;
         }
         unsigned before = p.reads;
-        ck_assert_msg(ebpo_file_locate(file, &error) == EBPO_OK, "%s", error.message);
+        ck_assert_msg(ebpo_file_locate(file, NULL, &error) == EBPO_OK, "%s", error.message);
         ck_assert_uint_le(p.reads - before, lie ? 20 : 2); /* the head once more, and the index */
         expect_tree(file, 1);
         ebpo_close(file);
@@ -336,7 +338,7 @@ static unsigned fail_everywhere(ebpo_status status, bool silent)
         ck_assert_int_eq(H5Fget_obj_count(H5F_OBJ_ALL, H5F_OBJ_ALL), 0);
         ck_assert_uint_eq(p.closes, got != EBPO_OK);
         if (got == EBPO_OK) {
-            got = ebpo_file_read_tree(file, &tree, 1, &error);
+            got = ebpo_file_read_tree(file, READ_BY(1), &tree, &error);
             if (got == EBPO_OK)
                 ebpo_tree_free(&tree);
             ebpo_close(file);
@@ -463,7 +465,7 @@ START_TEST(no_read_goes_beyond_bytes_in_memory)
         memcpy(bytes, data, cut);
         ebpo_status status = ebpo_open_memory(bytes, cut, "cut.ebpo.h5", &file, &error);
         if (status == EBPO_OK) {
-            status = ebpo_file_read_tree(file, &tree, 1, &error);
+            status = ebpo_file_read_tree(file, READ_BY(1), &tree, &error);
             ebpo_close(file);
         }
         ck_assert_int_eq(status, EBPO_E_FORMAT);
@@ -482,7 +484,7 @@ START_TEST(a_file_cut_short_while_it_is_open_fails_as_input)
     make_file(&large, EBPO_CODEC_ZSTD);
     ck_assert_int_eq(ebpo_open(path, &file, NULL), EBPO_OK);
     ck_assert_int_eq(truncate(path, (off_t)size / 2), 0);
-    ck_assert_int_eq(ebpo_file_read_tree(file, &tree, 2, &error), EBPO_E_IO);
+    ck_assert_int_eq(ebpo_file_read_tree(file, READ_BY(2), &tree, &error), EBPO_E_IO);
     ck_assert_ptr_nonnull(strstr(error.message, path));
     ck_assert_ptr_nonnull(strstr(error.message, "became shorter"));
     ebpo_close(file);

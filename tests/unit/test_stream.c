@@ -11,6 +11,7 @@
 #include <ebpo/ebpo.h>
 #include <ebpo/stream.h>
 
+#include "read_by.h"
 #include "geom/plane_code.h"
 #include "octree/octcode.h"
 #include "solids.h"
@@ -151,15 +152,17 @@ static void expect_tree(ebpo_file *file, bool planes, bool polygons)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_tree tree;
-    ck_assert_msg(ebpo_file_read_tree(file, &tree, 0, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_file_read_tree(file, NULL, &tree, &error) == EBPO_OK, "%s", error.message);
     ebpo_stream *stream = new_stream(file, planes, polygons, 2);
+    ebpo_stored_sizes stored;
+    ck_assert_int_eq(ebpo_file_locate(file, &stored, NULL), EBPO_OK);
     ebpo_stream_level level;
     uint64_t *parents = NULL, parent_count = 1, bytes = tree.info.head_bytes;
     int number = 0;
     for (; next_level(stream, &level); number++) {
         ck_assert_int_eq(level.level, number);
         ck_assert_uint_eq(level.node_count, number ? 8 * parent_count : 1);
-        bytes += tree.info.level[number].stored_bytes +
+        bytes += stored.level_bytes[number] +
                  (number == tree.info.index_level ? tree.info.chunk_index_bytes : 0);
         ck_assert_uint_eq(level.cumulative_bytes, bytes);
         expect_level(stream, &tree, number, &parents, &parent_count, planes || polygons);
@@ -269,6 +272,8 @@ START_TEST(only_the_level_asked_for_is_read)
     const ebpo_info *info = ebpo_file_info(file);
     ebpo_stream_level level;
     ebpo_stream_node node;
+    ebpo_stored_sizes stored;
+    ck_assert_int_eq(ebpo_file_locate(file, &stored, NULL), EBPO_OK);
     uint64_t before, after;
     for (int i = 0; i < info->level_count; i++) {
         before = ebpo_test_file_stats(file).bytes_read;
@@ -276,7 +281,7 @@ START_TEST(only_the_level_asked_for_is_read)
         while (next_node(stream, &node))
             ;
         after = ebpo_test_file_stats(file).bytes_read;
-        ck_assert_uint_le(after - before, info->level[i].stored_bytes);
+        ck_assert_uint_le(after - before, stored.level_bytes[i]);
     }
     ebpo_stream_free(stream);
     ebpo_close(file);
@@ -583,7 +588,7 @@ START_TEST(all_vertices_in_a_closed_cell_satisfy_its_planes)
     ebpo_stream_level level;
     ebpo_stream_node node;
     ebpo_mesh mesh;
-    ck_assert(ebpo_file_read_mesh(file, &mesh, 1, NULL) == EBPO_OK);
+    ck_assert(ebpo_file_read_mesh(file, READ_BY(1), &mesh, NULL) == EBPO_OK);
     uint64_t count = used_vertices(&mesh), step = 1 + count / 2000;
     while (next_level(stream, &level) && level.node_count < 20000)
         while (next_node(stream, &node))
@@ -631,7 +636,7 @@ static void expect_vertices_within(ebpo_file *file)
     ebpo_stream_level level;
     ebpo_stream_node node;
     ebpo_mesh mesh;
-    ck_assert(ebpo_file_read_mesh(file, &mesh, 0, NULL) == EBPO_OK);
+    ck_assert(ebpo_file_read_mesh(file, NULL, &mesh, NULL) == EBPO_OK);
     uint64_t count = used_vertices(&mesh);
     placed *list = malloc(count * sizeof *list);
     uint64_t checked = 0, planes = 0;

@@ -13,6 +13,7 @@
 #include <ebpo/subset.h>
 #include <ebpo/verify.h>
 
+#include "read_by.h"
 #include "container/reader.h"
 #include "query_kit.h"
 #include "subset/subset_parts.h"
@@ -381,7 +382,7 @@ static void same_parts(const char *a, const char *b)
     fine(ebpo_open(a, &file[0], &error), &error);
     fine(ebpo_open(b, &file[1], &error), &error);
     for (int i = 0; i < 2; i++)
-        fine(ebpo_file_read_tree(file[i], &tree[i], 1, &error), &error);
+        fine(ebpo_file_read_tree(file[i], READ_BY(1), &tree[i], &error), &error);
     ck_assert_int_eq(tree[0].info.level_count, tree[1].info.level_count);
     for (int l = 0; l < tree[0].info.level_count; l++) {
         const ebpo_level *x = &tree[0].level[l], *y = &tree[1].level[l];
@@ -537,7 +538,7 @@ START_TEST(damaged_subsets_do_no_harm)
         if (ebpo_open_memory(damaged, size, "damaged", &file, &error) != EBPO_OK)
             continue;
         opened++;
-        if (ebpo_file_read_tree(file, &tree, 1, &error) == EBPO_OK)
+        if (ebpo_file_read_tree(file, READ_BY(1), &tree, &error) == EBPO_OK)
             ebpo_tree_free(&tree);
         (void)!ebpo_subset(file, path, &o, &error);
         ebpo_close(file);

@@ -62,7 +62,7 @@ static int fill_path(bench_points *out, ebpo_file *file, uint64_t seed)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_mesh mesh = { 0 };
     double square = 0;
-    if (ebpo_file_read_mesh(file, &mesh, 0, &error) != EBPO_OK)
+    if (ebpo_file_read_mesh(file, NULL, &mesh, &error) != EBPO_OK)
         return command_failed("bench", &error);
     for (int k = 0; k < 3; k++)
         square += (report->max[k] - report->min[k]) * (report->max[k] - report->min[k]);

@@ -57,11 +57,11 @@ double facts_excess_ratio(const ebpo_info *info, double volume, double limit)
     return least > 1e-7 ? facts_excess(info, volume) / least : NAN;
 }
 
-uint64_t facts_cumulative(const ebpo_info *info, int level)
+uint64_t facts_cumulative(const ebpo_info *info, const ebpo_stored_sizes *stored, int level)
 {
     uint64_t sum = info->head_bytes;
     for (int i = 0; i <= level; i++)
-        sum += info->level[i].stored_bytes;
+        sum += stored->level_bytes[i];
     return sum + (level >= info->index_level ? info->chunk_index_bytes : 0);
 }
 
@@ -141,19 +141,19 @@ static void print_subset(FILE *out, const ebpo_info *info)
             (unsigned long long)pruned_nodes(info), hex);
 }
 
-static uint64_t level_bytes(const ebpo_info *info)
+static uint64_t level_bytes(const ebpo_info *info, const ebpo_stored_sizes *stored)
 {
     uint64_t sum = 0;
     for (int i = 0; i < info->level_count; i++)
-        sum += info->level[i].stored_bytes;
+        sum += stored->level_bytes[i];
     return sum;
 }
 
 /* What the file holds besides: nothing, unless another program wrote it. */
-static uint64_t other_bytes(const ebpo_info *info)
+static uint64_t other_bytes(const ebpo_info *info, const ebpo_stored_sizes *stored)
 {
-    uint64_t sum = info->head_bytes + info->chunk_index_bytes + level_bytes(info) +
-                   info->mesh_vertex_bytes + info->mesh_face_bytes + info->map_bytes;
+    uint64_t sum = info->head_bytes + info->chunk_index_bytes + level_bytes(info, stored) +
+                   stored->mesh_vertex_bytes + stored->mesh_face_bytes + stored->map_bytes;
     return info->file_bytes > sum ? info->file_bytes - sum : 0;
 }
 
@@ -169,7 +169,8 @@ static void print_bytes(FILE *out, const char *label, const ebpo_info *info, uin
     fputc('\n', out);
 }
 
-void facts_print(FILE *out, const char *path, const ebpo_info *info)
+void facts_print(FILE *out, const char *path, const ebpo_info *info,
+                 const ebpo_stored_sizes *stored)
 {
     char bytes[32], parts[64], version[32];
     fprintf(out, "%s: EBP-Octree %s, %s, levels 0 to %d, %s\n", path,
@@ -185,35 +186,36 @@ void facts_print(FILE *out, const char *path, const ebpo_info *info)
             words_codec(info->codec));
     print_bytes(out, "head", info, info->head_bytes);
     print_bytes(out, "index", info, info->chunk_index_bytes);
-    print_bytes(out, "levels", info, level_bytes(info));
-    print_bytes(out, "vertices", info, info->mesh_vertex_bytes);
-    print_bytes(out, "faces", info, info->mesh_face_bytes);
-    print_bytes(out, "maps", info, info->map_bytes);
-    print_bytes(out, "other", info, other_bytes(info));
+    print_bytes(out, "levels", info, level_bytes(info, stored));
+    print_bytes(out, "vertices", info, stored->mesh_vertex_bytes);
+    print_bytes(out, "faces", info, stored->mesh_face_bytes);
+    print_bytes(out, "maps", info, stored->map_bytes);
+    print_bytes(out, "other", info, other_bytes(info, stored));
     print_bytes(out, "file", info, info->file_bytes);
 }
 
-void facts_table(FILE *out, const ebpo_info *info)
+void facts_table(FILE *out, const ebpo_info *info, const ebpo_stored_sizes *stored)
 {
     fprintf(out, "%5s %9s %9s %9s %9s %9s %10s %12s %9s %10s %9s\n", "level", "gray", "leaf",
             "white", "black", "planes", "faces new", "faces again", "stored", "cumulative",
             info->solid ? "% solid" : "% box");
     for (int i = 0; i < info->level_count; i++) {
         const ebpo_level_summary *l = &info->level[i];
-        char stored[32], sum[32];
+        char taken[32], sum[32];
         fprintf(out, "%5d %9llu %9llu %9llu %9llu %9llu %10llu %12llu %9s %10s %9.2f\n", i,
                 (unsigned long long)l->gray_count, (unsigned long long)l->leaf_count,
                 (unsigned long long)facts_white(info, i), (unsigned long long)l->black_count,
                 (unsigned long long)(l->plane_count + l->leaf_plane_count),
                 (unsigned long long)l->new_count, (unsigned long long)l->ref_count,
-                words_bytes(stored, sizeof stored, l->stored_bytes),
-                words_bytes(sum, sizeof sum, facts_cumulative(info, i)), facts_percent(info, i));
+                words_bytes(taken, sizeof taken, stored->level_bytes[i]),
+                words_bytes(sum, sizeof sum, facts_cumulative(info, stored, i)),
+                facts_percent(info, i));
     }
 }
 
 /* --- JSON --- */
 
-static void json_level(json *j, const ebpo_info *info, int number)
+static void json_level(json *j, const ebpo_info *info, const ebpo_stored_sizes *stored, int number)
 {
     const ebpo_level_summary *l = &info->level[number];
     json_object(j, NULL);
@@ -228,8 +230,8 @@ static void json_level(json *j, const ebpo_info *info, int number)
     json_uint(j, "leaf_planes", l->leaf_plane_count);
     json_uint(j, "faces_new", l->new_count);
     json_uint(j, "faces_again", l->ref_count);
-    json_uint(j, "stored_bytes", l->stored_bytes);
-    json_uint(j, "cumulative_bytes", facts_cumulative(info, number));
+    json_uint(j, "stored_bytes", stored->level_bytes[number]);
+    json_uint(j, "cumulative_bytes", facts_cumulative(info, stored, number));
     json_real(j, "gray_volume", l->gray_volume);
     json_real(j, "leaf_volume", l->leaf_volume);
     json_real(j, "envelope_volume", facts_volume(info, number));
@@ -294,7 +296,7 @@ static void json_subset(json *j, const ebpo_info *info)
     json_end(j);
 }
 
-static void json_storage(json *j, const ebpo_info *info)
+static void json_storage(json *j, const ebpo_info *info, const ebpo_stored_sizes *stored)
 {
     char hex[65];
     words_hex(info->content_sha256, hex);
@@ -310,15 +312,15 @@ static void json_storage(json *j, const ebpo_info *info)
     json_uint(j, "file", info->file_bytes);
     json_uint(j, "head", info->head_bytes);
     json_uint(j, "index", info->chunk_index_bytes);
-    json_uint(j, "levels", level_bytes(info));
-    json_uint(j, "vertices", info->mesh_vertex_bytes);
-    json_uint(j, "faces", info->mesh_face_bytes);
-    json_uint(j, "maps", info->map_bytes);
-    json_uint(j, "other", other_bytes(info));
+    json_uint(j, "levels", level_bytes(info, stored));
+    json_uint(j, "vertices", stored->mesh_vertex_bytes);
+    json_uint(j, "faces", stored->mesh_face_bytes);
+    json_uint(j, "maps", stored->map_bytes);
+    json_uint(j, "other", other_bytes(info, stored));
     json_end(j);
 }
 
-void facts_json(json *j, const char *path, const ebpo_info *info)
+void facts_json(json *j, const char *path, const ebpo_info *info, const ebpo_stored_sizes *stored)
 {
     char version[32];
     json_text(j, "file", path);
@@ -329,9 +331,9 @@ void facts_json(json *j, const char *path, const ebpo_info *info)
     json_model(j, info);
     findings_json_mending(j, "mend", &info->mend);
     findings_json(j, "report", &info->report);
-    json_storage(j, info);
+    json_storage(j, info, stored);
     json_array(j, "levels");
     for (int i = 0; i < info->level_count; i++)
-        json_level(j, info, i);
+        json_level(j, info, stored, i);
     json_end(j);
 }

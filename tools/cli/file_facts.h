@@ -28,10 +28,12 @@ double facts_excess_ratio(const ebpo_info *info, double volume, double limit);
 /* White nodes of a level without the places of pruned nodes' children. */
 uint64_t facts_white(const ebpo_info *info, int level);
 /* Bytes of the head and of levels 0 .. level. */
-uint64_t facts_cumulative(const ebpo_info *info, int level);
+uint64_t facts_cumulative(const ebpo_info *info, const ebpo_stored_sizes *stored, int level);
 
-void facts_print(FILE *out, const char *path, const ebpo_info *info);
-void facts_table(FILE *out, const ebpo_info *info);
-void facts_json(json *j, const char *path, const ebpo_info *info);
+/* `stored`: by ebpo_file_locate. */
+void facts_print(FILE *out, const char *path, const ebpo_info *info,
+                 const ebpo_stored_sizes *stored);
+void facts_table(FILE *out, const ebpo_info *info, const ebpo_stored_sizes *stored);
+void facts_json(json *j, const char *path, const ebpo_info *info, const ebpo_stored_sizes *stored);
 
 #endif

@@ -176,13 +176,14 @@ static void print_summary(const values *v, const ebpo_info *info, const char *ou
     printf(", in %.1f s\n", seconds);
 }
 
-static void print_json(const mesh_input *p, const ebpo_info *info, const char *out,
-                       const progress_line *line, const stage_facts *stages, double seconds)
+static void print_json(const mesh_input *p, const ebpo_info *info, const ebpo_stored_sizes *stored,
+                       const char *out, const progress_line *line, const stage_facts *stages,
+                       double seconds)
 {
     json j;
     json_begin(&j, stdout);
     json_object(&j, NULL);
-    facts_json(&j, out, info);
+    facts_json(&j, out, info, stored);
     json_object(&j, "input");
     findings_json_source(&j, "mesh", &p->as_read);
     findings_json(&j, "report", &p->prepared.before);
@@ -200,11 +201,16 @@ static ebpo_status print_result(const values *v, const mesh_input *p, const char
     if (v->quiet && !v->json)
         return EBPO_OK;
     ebpo_file *file = NULL;
+    ebpo_stored_sizes stored;
     ebpo_status status = ebpo_open(out, &file, error);
-    if (status != EBPO_OK)
+    if (status == EBPO_OK)
+        status = ebpo_file_locate(file, &stored, error);
+    if (status != EBPO_OK) {
+        ebpo_close(file);
         return status;
+    }
     if (v->json)
-        print_json(p, ebpo_file_info(file), out, line, stages, seconds);
+        print_json(p, ebpo_file_info(file), &stored, out, line, stages, seconds);
     else {
         print_summary(v, ebpo_file_info(file), out, seconds);
         stages_print(stdout, line, stages, seconds);

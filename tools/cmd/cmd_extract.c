@@ -6,6 +6,7 @@
 #include "cli/command.h"
 #include "cli/memory_args.h"
 #include "cli/progress.h"
+#include "cli/reading.h"
 #include "cli/remote_args.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
@@ -56,19 +57,21 @@ static int check_values(const values *v, const char *in, const char *out)
     return EXIT_FINE;
 }
 
-static ebpo_status take(ebpo_file *file, const values *v, const char *path, ebpo_progress progress,
-                        ebpo_mesh *out, double *volume, ebpo_error *error)
+static ebpo_status take(ebpo_file *file, const values *v, const char *path,
+                        ebpo_workspace *workspace, ebpo_progress progress, ebpo_mesh *out,
+                        double *volume, ebpo_error *error)
 {
     if (!v->mesh) {
         ebpo_lod_options lod = EBPO_LOD_OPTIONS_INIT;
         lod.walls = !v->no_walls;
         lod.threads = (unsigned)v->threads;
         lod.progress = progress;
+        lod.workspace = workspace;
         return ebpo_lod_level(file, (int)v->level, &lod, out, volume, error);
     }
     bool source_order = false;
-    ebpo_status status =
-        ebpo_file_read_source_mesh(file, out, &source_order, (unsigned)v->threads, error);
+    ebpo_read_options read = reading(v->threads, workspace);
+    ebpo_status status = ebpo_file_read_source_mesh(file, &read, out, &source_order, error);
     if (status == EBPO_OK && !source_order)
         fprintf(stderr,
                 "ebpo extract: %s: note: holds no maps, so vertices and faces come in the file's "
@@ -115,9 +118,7 @@ static int run(void *given, const char **operand)
     if (status == EBPO_OK)
         status = remote_open(&file, operand[0], &v->remote, &error);
     if (status == EBPO_OK)
-        ebpo_file_set_workspace(file, workspace);
-    if (status == EBPO_OK)
-        status = take(file, v, operand[0], progress, &mesh, &volume, &error);
+        status = take(file, v, operand[0], workspace, progress, &mesh, &volume, &error);
     if (status == EBPO_OK)
         status = ebpo_mesh_write_ply(&mesh, operand[1], &error);
     progress_wipe(&line);

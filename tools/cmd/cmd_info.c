@@ -38,9 +38,10 @@ static int run(void *given, const char **operand)
         return EXIT_FAILED;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
+    ebpo_stored_sizes stored;
     ebpo_status status = remote_open(&file, operand[0], &v->remote, &error);
     if (status == EBPO_OK)
-        status = ebpo_file_locate(file, &error);
+        status = ebpo_file_locate(file, &stored, &error);
     if (status != EBPO_OK) {
         ebpo_close(file);
         return command_failed("info", &error);
@@ -51,13 +52,13 @@ static int run(void *given, const char **operand)
         json j;
         json_begin(&j, stdout);
         json_object(&j, NULL);
-        facts_json(&j, remote_shown(operand[0]), info);
+        facts_json(&j, remote_shown(operand[0]), info, &stored);
         remote_json(&j, &t, &v->remote);
         json_finish(&j);
     } else {
-        facts_print(stdout, remote_shown(operand[0]), info);
+        facts_print(stdout, remote_shown(operand[0]), info, &stored);
         putchar('\n');
-        facts_table(stdout, info);
+        facts_table(stdout, info, &stored);
         remote_tell(&t, &v->remote, false);
     }
     ebpo_close(file);

@@ -10,6 +10,7 @@
 #include "cli/command.h"
 #include "cli/file_facts.h"
 #include "cli/progress.h"
+#include "cli/reading.h"
 #include "cli/remote_args.h"
 #include "cmd/commands.h"
 #include "render/picture.h"
@@ -131,11 +132,12 @@ static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress pro
 {
     const ebpo_info *info = ebpo_file_info(file);
     unsigned threads = (unsigned)j->v.threads;
+    ebpo_read_options read = reading(j->v.threads, NULL);
     if (t->level == MESH) {
         snprintf(t->caption, sizeof t->caption, "mesh, %llu faces",
                  (unsigned long long)info->face_count);
         t->closed = info->solid && info->report.manifold;
-        return ebpo_file_read_mesh(file, &t->mesh, threads, error);
+        return ebpo_file_read_mesh(file, &read, &t->mesh, error);
     }
     ebpo_lod_options lod =
         /* walls too: they close the envelopes, and inner ones cannot be seen */

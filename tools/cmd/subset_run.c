@@ -205,14 +205,19 @@ ebpo_status subset_tell(const subset_values *v, const char *out_path, const ebpo
     ebpo_file *file = NULL;
     if (v->quiet && !v->json)
         return EBPO_OK;
+    ebpo_stored_sizes stored;
     ebpo_status status = ebpo_open(out_path, &file, error);
-    if (status != EBPO_OK)
+    if (status == EBPO_OK)
+        status = ebpo_file_locate(file, &stored, error);
+    if (status != EBPO_OK) {
+        ebpo_close(file);
         return status;
+    }
     if (v->json) {
         json j;
         json_begin(&j, stdout);
         json_object(&j, NULL);
-        facts_json(&j, out_path, ebpo_file_info(file));
+        facts_json(&j, out_path, ebpo_file_info(file), &stored);
         json_uint(&j, "source_bytes", from->file_bytes);
         if (t->far) {
             json_uint(&j, "fetched_requests", t->http.requests);

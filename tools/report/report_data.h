@@ -120,6 +120,7 @@ typedef struct round_times {
 typedef struct method {
     char name[64], path[4096];
     ebpo_info info;
+    ebpo_stored_sizes stored;
     int levels; /* of the file */
     double whole[WHOLE_FIGURES], level[EBPO_LEVELS_MAX][LEVEL_FIGURES],
         due[DEADLINES][DEADLINE_FIGURES];

@@ -18,8 +18,8 @@ static void from_head(const comparison *c, method *m)
     for (int i = c->first; i <= method_last(c, m); i++) {
         const ebpo_level_summary *s = &info->level[i];
         double *f = m->level[i];
-        f[OF_BYTES] = (double)s->stored_bytes;
-        f[OF_CUMULATIVE_BYTES] = (double)facts_cumulative(info, i);
+        f[OF_BYTES] = (double)m->stored.level_bytes[i];
+        f[OF_CUMULATIVE_BYTES] = (double)facts_cumulative(info, &m->stored, i);
         f[OF_GRAY] = (double)s->gray_count;
         f[OF_LEAVES] = (double)s->leaf_count;
         f[OF_PLANES] = (double)s->plane_count;

@@ -6,6 +6,7 @@
 
 #include "bench/bench_run.h"
 #include "bench/bench_walk.h"
+#include "cli/reading.h"
 #include "report/report_data.h"
 
 static ebpo_status no_memory(ebpo_error *error)
@@ -76,11 +77,12 @@ static ebpo_status make_near(comparison *c, const method *m, ebpo_error *error)
 {
     ebpo_file *file = NULL;
     ebpo_mesh mesh = { 0 };
+    ebpo_read_options read = reading(c->v->threads, NULL);
     double sum = 0, *sums = NULL;
     uint64_t random = (uint64_t)c->v->seed + 1;
     ebpo_status status = remote_open(&file, m->path, &c->v->remote, error);
     if (status == EBPO_OK)
-        status = ebpo_file_read_mesh(file, &mesh, (unsigned)c->v->threads, error);
+        status = ebpo_file_read_mesh(file, &read, &mesh, error);
     if (status == EBPO_OK && (!(sums = malloc((mesh.face_count + 1) * sizeof *sums)) ||
                               !(c->near = malloc(3 * c->points * sizeof *c->near))))
         status = no_memory(error);

@@ -34,7 +34,7 @@ static int learn(comparison *c, method *m)
     ebpo_file *file = NULL;
     ebpo_status status = remote_open(&file, m->path, &c->v->remote, &error);
     if (status == EBPO_OK)
-        status = ebpo_file_locate(file, &error);
+        status = ebpo_file_locate(file, &m->stored, &error);
     if (status == EBPO_OK)
         m->info = *ebpo_file_info(file);
     ebpo_close(file);

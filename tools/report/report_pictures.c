@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cli/reading.h"
 #include "report/report_data.h"
 
 #if EBPO_HAVE_PNG
@@ -152,7 +153,8 @@ static ebpo_status portrait(comparison *c, method *m, ebpo_file *file, ebpo_erro
     raster_style style = { { 0.66, 0.54, 0.40 }, m->info.solid && m->info.report.manifold, false };
     ebpo_mesh mesh = { 0 };
     camera view;
-    ebpo_status status = ebpo_file_read_mesh(file, &mesh, (unsigned)c->v->threads, error);
+    ebpo_read_options read = reading(c->v->threads, NULL);
+    ebpo_status status = ebpo_file_read_mesh(file, &read, &mesh, error);
     if (status == EBPO_OK && mesh.face_count) {
         camera_fit(&view, &mesh, c->azimuth, c->elevation, c->v->up, PORTRAIT_WIDTH,
                    PORTRAIT_HEIGHT);

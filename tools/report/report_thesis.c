@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cli/reading.h"
 #include "report/report_data.h"
 
 enum { NORMAL_SPAN = 1023 }; /* -511 .. 511 */
@@ -82,7 +83,8 @@ static ebpo_status add_up(comparison *c, method *m, ebpo_file *file, sent *s, eb
     double sum = 0;
     for (int i = 0; i <= method_last(c, m); i++) {
         ebpo_level l;
-        ebpo_status status = ebpo_file_read_level(file, i, &l, (unsigned)c->v->threads, error);
+        ebpo_read_options read = reading(c->v->threads, NULL);
+        ebpo_status status = ebpo_file_read_level(file, i, &read, &l, error);
         if (status != EBPO_OK)
             return status;
         double cost = plane_costs(s, l.planes, l.plane_count) +
@@ -104,7 +106,8 @@ ebpo_status report_thesis(comparison *c, method *m, ebpo_file *file, ebpo_error 
         method_note(m, "theses' cost model", "is that of a whole tree; this file is a subset");
         return EBPO_OK;
     }
-    ebpo_status status = ebpo_file_read_mesh(file, &s.mesh, (unsigned)c->v->threads, error);
+    ebpo_read_options read = reading(c->v->threads, NULL);
+    ebpo_status status = ebpo_file_read_mesh(file, &read, &s.mesh, error);
     if (status == EBPO_OK && !begin(&s)) {
         snprintf(error->message, sizeof error->message,
                  "not enough memory for a mark on each face and vertex");

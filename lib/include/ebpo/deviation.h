@@ -55,7 +55,7 @@ typedef struct ebpo_deviation {
  * itself. EBPO_E_ARGUMENT: no such level, a tolerance of 0, or a file that is neither the model's
  * nor a subset of it, as far as their digests, and else their sources and how they were built,
  * tell. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_deviation_level(ebpo_model *model, ebpo_file *file,
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_deviation_level(ebpo_model *model, const ebpo_file *file,
                                                         int level,
                                                         const ebpo_deviation_options *options,
                                                         ebpo_deviation *out, ebpo_error *error);

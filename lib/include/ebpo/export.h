@@ -77,7 +77,7 @@ EBPO_API bool ebpo_export_second_file(ebpo_export_format format, const char *pat
  * holds these, or a GLB beyond 2^32 bytes; EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY,
  * EBPO_E_CANCELLED as everywhere. `options` may be NULL. Any thread; the file may be in use
  * elsewhere. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_export(ebpo_file *file, const char *path,
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_export(const ebpo_file *file, const char *path,
                                                ebpo_export_format format,
                                                const ebpo_export_options *options,
                                                ebpo_export_report *report, ebpo_error *error);

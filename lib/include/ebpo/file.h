@@ -100,7 +100,6 @@ typedef struct ebpo_level_summary {
     uint64_t plane_count, leaf_plane_count;
     uint64_t new_count, ref_count; /* faces first seen, faces referenced again */
     double gray_volume, leaf_volume;
-    uint64_t stored_bytes; /* in the file, compressed; set when reading */
     /* gray nodes without children; white_count of the next level counts eight for each */
     uint64_t pruned_count;
 } ebpo_level_summary;
@@ -151,7 +150,7 @@ typedef struct ebpo_info {
     uint8_t subset_of[32];
     ebpo_level_summary level[EBPO_LEVELS_MAX];
     /* set when reading; head: up to the first level */
-    uint64_t file_bytes, head_bytes, mesh_vertex_bytes, mesh_face_bytes, map_bytes;
+    uint64_t file_bytes, head_bytes;
     /* set when reading: levels from this one on need the index of chunks as well; level_count: none
      * does */
     int index_level;
@@ -251,51 +250,77 @@ EBPO_API ebpo_status ebpo_file_get_stats(const ebpo_file *file, ebpo_file_stats 
 /* Lent; valid until the file is closed. */
 EBPO_API const ebpo_info *ebpo_file_info(const ebpo_file *file);
 
-/* Where all chunks lie, if that has not been read yet (files far away, ebpo_source.at_hand). Sets
- * stored_bytes of all levels, mesh_vertex_bytes, mesh_face_bytes and map_bytes in the info, which
- * before leave out arrays of more than one chunk; reading such an array does it too, so no other
- * thread should look at these then. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_locate(ebpo_file *file, ebpo_error *error);
+/* Bytes that parts take in the file, compressed. */
+typedef struct ebpo_stored_sizes {
+    uint64_t level_bytes[EBPO_LEVELS_MAX];
+    uint64_t mesh_vertex_bytes, mesh_face_bytes, map_bytes;
+} ebpo_stored_sizes;
+
+/* Finds out where all chunks lie, if that has not been read yet (files far away,
+ * ebpo_source.at_hand), and adds up what they take. `out` may be NULL. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_locate(const ebpo_file *file, ebpo_stored_sizes *out,
+                                                    ebpo_error *error);
 
 /* Announces that levels first .. last will be read; last beyond the last level: up to that one. A
  * source far away then fetches them with as few requests as it can, where reading one after the
  * other would ask for each by itself. Waits at most for the index of chunks (ebpo_file_locate);
  * cannot fail: what could not be fetched is told when it is read. */
-EBPO_API void ebpo_file_prefetch_levels(ebpo_file *file, int first, int last);
+EBPO_API void ebpo_file_prefetch_levels(const ebpo_file *file, int first, int last);
 
-/* Levels, meshes and trees that are read from now on keep to `workspace` (NULL: to none, as at
- * first), which is freed after the last call that is given the file or one of them
- * (ebpo_workspace_free). Before other threads use the file. */
-EBPO_API void ebpo_file_set_workspace(ebpo_file *file, ebpo_workspace *workspace);
+typedef struct ebpo_read_options {
+    size_t struct_size; /* EBPO_READ_OPTIONS_INIT sets it */
+    unsigned threads;   /* 0: all cores */
+    /* owns what is read, and is freed after it; NULL: malloc does */
+    ebpo_workspace *workspace;
+} ebpo_read_options;
+#define EBPO_READ_OPTIONS_INIT             \
+    {                                      \
+        sizeof(ebpo_read_options), 0, NULL \
+    }
 
-/* Reads one level (0 .. level_count - 1) and checks it: counts, ranges, order, index arrays.
- * The caller frees it with ebpo_level_free. `threads` 0: all cores. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_level(ebpo_file *file, int level, ebpo_level *out,
-                                                        unsigned threads, ebpo_error *error);
+/* In all of these `options` may be NULL. What is read is the caller's, and is freed by the function
+ * for its type; on failure it is cleared. */
+
+/* Reads one level (0 .. level_count - 1) and checks it: counts, ranges, order, index arrays. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_level(const ebpo_file *file, int level,
+                                                        const ebpo_read_options *options,
+                                                        ebpo_level *out, ebpo_error *error);
 
 /* Reads the mesh in file order; EBPO_E_ABSENT without the part. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_mesh(ebpo_file *file, ebpo_mesh *out,
-                                                       unsigned threads, ebpo_error *error);
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_mesh(const ebpo_file *file,
+                                                       const ebpo_read_options *options,
+                                                       ebpo_mesh *out, ebpo_error *error);
 
-/* Reads the maps: vertex_source[vertex_count] and face_source[face_count], both allocated with
- * malloc; checked to be permutations of 0 .. count - 1 (after welding: strictly different numbers
- * below source_vertex_count). EBPO_E_ABSENT without the part. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_maps(ebpo_file *file, uint32_t **vertex_source,
-                                                       uint32_t **face_source, unsigned threads,
-                                                       ebpo_error *error);
+/* Numbers in the source. */
+typedef struct ebpo_maps {
+    uint32_t *vertex_source;   /* [vertex_count] */
+    uint32_t *face_source;     /* [face_count] */
+    ebpo_workspace *workspace; /* owns both; NULL: malloc's */
+} ebpo_maps;
+
+/* Reads the maps, which are checked to be permutations of 0 .. count - 1 (after welding: strictly
+ * different numbers below source_vertex_count). EBPO_E_ABSENT without the part. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_maps(const ebpo_file *file,
+                                                       const ebpo_read_options *options,
+                                                       ebpo_maps *out, ebpo_error *error);
+/* Frees the arrays and clears the struct. NULL is fine. */
+EBPO_API void ebpo_maps_free(ebpo_maps *maps);
 
 /* Everything at once. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_tree(ebpo_file *file, ebpo_tree *out,
-                                                       unsigned threads, ebpo_error *error);
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_tree(const ebpo_file *file,
+                                                       const ebpo_read_options *options,
+                                                       ebpo_tree *out, ebpo_error *error);
 
 /* The mesh in the source's order where the maps are there (vertices by vertex_source, faces by
- * face_source), else in file order. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_source_mesh(ebpo_file *file, ebpo_mesh *out,
-                                                              bool *source_order, unsigned threads,
+ * face_source), else in file order: *source_order, which may be NULL, tells. */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_source_mesh(const ebpo_file *file,
+                                                              const ebpo_read_options *options,
+                                                              ebpo_mesh *out, bool *source_order,
                                                               ebpo_error *error);
 
 /* Recomputes the content checksum from all arrays and compares: EBPO_E_FORMAT when it differs. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_check_content(ebpo_file *file, unsigned threads,
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_check_content(const ebpo_file *file,
+                                                           const ebpo_read_options *options,
                                                            ebpo_error *error);
 
 /* Registers the zstd filter with libhdf5 in this process, so that the caller's own HDF5 calls can

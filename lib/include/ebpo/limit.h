@@ -34,7 +34,7 @@ typedef struct ebpo_limit {
  * certified: a figure to compare with; infinite or 0 where a cell's volume is no normal double
  * (coordinates beyond about 1e102 or below 1e-102). EBPO_E_ABSENT without mesh, and where the
  * library was built without qhull (`-Dqhull`); EBPO_E_ARGUMENT: no such level. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_limit_level(ebpo_file *file, int level,
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_limit_level(const ebpo_file *file, int level,
                                                     const ebpo_limit_options *options,
                                                     ebpo_limit *out, ebpo_error *error);
 

@@ -13,10 +13,11 @@ typedef struct ebpo_lod_options {
     bool walls;         /* keep polygons that lie on cell walls, so that each envelope is closed */
     unsigned threads;   /* 0: all cores */
     ebpo_progress progress;
+    ebpo_workspace *workspace; /* what is read of the file keeps to it; NULL: to none */
 } ebpo_lod_options;
-#define EBPO_LOD_OPTIONS_INIT                             \
-    {                                                     \
-        sizeof(ebpo_lod_options), true, 0, { NULL, NULL } \
+#define EBPO_LOD_OPTIONS_INIT                                   \
+    {                                                           \
+        sizeof(ebpo_lod_options), true, 0, { NULL, NULL }, NULL \
     }
 
 /* The envelopes of `level`: its gray nodes, and the leaves and black nodes of levels 0 .. level,
@@ -25,7 +26,7 @@ typedef struct ebpo_lod_options {
  * double vertices; node after node, vertices not shared between nodes. The polygons are rounded;
  * the guarantee is the decoded half-spaces'. `out` is freed by ebpo_mesh_free. `volume`, if not
  * NULL, receives the sum of the polyhedra's volumes. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_level(ebpo_file *file, int level,
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_level(const ebpo_file *file, int level,
                                                   const ebpo_lod_options *options, ebpo_mesh *out,
                                                   double *volume, ebpo_error *error);
 
@@ -52,7 +53,7 @@ typedef struct ebpo_lod_nodes {
 EBPO_API void ebpo_lod_nodes_free(ebpo_lod_nodes *nodes);
 
 /* The same with the nodes, freed by ebpo_lod_nodes_free; with `nodes` NULL it is ebpo_lod_level. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_level_nodes(ebpo_file *file, int level,
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_level_nodes(const ebpo_file *file, int level,
                                                         const ebpo_lod_options *options,
                                                         ebpo_mesh *out, ebpo_lod_nodes *nodes,
                                                         double *volume, ebpo_error *error);

@@ -59,7 +59,7 @@ typedef struct ebpo_model ebpo_model;
  * with one that would do (about the least). A budget that opens holds the average subtree many
  * times, but perhaps not the largest one: the question that needs it then is EBPO_E_LIMIT too, with
  * the budget that would do. The file must stay open as long as the model. `options` may be NULL. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_model_new(ebpo_file *file,
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_model_new(const ebpo_file *file,
                                                   const ebpo_model_options *options,
                                                   ebpo_model **out, ebpo_error *error);
 /* After its contexts. NULL is fine. */
@@ -260,8 +260,8 @@ typedef struct ebpo_mass {
 
 /* From the file's mesh, with compensated sums; does not depend on threads. EBPO_E_ABSENT without
  * mesh. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_measure(ebpo_file *file, unsigned threads, ebpo_mass *out,
-                                                ebpo_error *error);
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_measure(const ebpo_file *file, unsigned threads,
+                                                ebpo_mass *out, ebpo_error *error);
 
 #ifdef __cplusplus
 }

@@ -61,7 +61,7 @@ typedef struct ebpo_stream ebpo_stream;
 
 /* The file must stay open. One thread at a time. Of passed levels only node types stay in memory,
  * and with `polygons` their planes. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_stream_new(ebpo_file *file,
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_stream_new(const ebpo_file *file,
                                                    const ebpo_stream_options *options,
                                                    ebpo_stream **out, ebpo_error *error);
 EBPO_API void ebpo_stream_free(ebpo_stream *stream);

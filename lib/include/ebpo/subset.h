@@ -85,7 +85,7 @@ EBPO_API uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces);
  * thread; the file may be in use elsewhere. EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY,
  * EBPO_E_CANCELLED as everywhere. EBPO_E_ARGUMENT: no such level, a box without points, or one that
  * does not meet the model's root cell (or the box that an earlier subset has kept). */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_subset(ebpo_file *file, const char *path,
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_subset(const ebpo_file *file, const char *path,
                                                const ebpo_subset_options *options,
                                                ebpo_error *error);
 

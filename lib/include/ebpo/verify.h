@@ -42,8 +42,7 @@ typedef struct ebpo_verify_options {
      * least one of each level and type */
     uint64_t label_samples;
     ebpo_progress progress;
-    /* what the work keeps to, in memory and temporary files; NULL: as much memory as it takes.
-     * Freed after the last call that is given the file (ebpo_file_set_workspace) */
+    /* what the work keeps to, in memory and temporary files; NULL: as much memory as it takes. */
     ebpo_workspace *workspace;
 } ebpo_verify_options;
 #define EBPO_VERIFY_OPTIONS_INIT                                      \
@@ -53,7 +52,8 @@ typedef struct ebpo_verify_options {
 
 /* Verifies an open file. EBPO_OK when the work could be done, whatever it found: look at
  * report->violations. A file too damaged to be read counts as a structure violation. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_verify(ebpo_file *file, const ebpo_verify_options *options,
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_verify(const ebpo_file *file,
+                                               const ebpo_verify_options *options,
                                                ebpo_verify_report *report, ebpo_error *error);
 
 #ifdef __cplusplus

@@ -120,7 +120,7 @@ typedef struct ebpo_view_stream ebpo_view_stream;
 /* The file must stay open; nothing is read yet. One thread at a time; other threads may use the
  * file, but what they read counts as well. EBPO_E_ARGUMENT: options that make no sense. `options`
  * may be NULL. */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_view_stream_new(ebpo_file *file,
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_view_stream_new(const ebpo_file *file,
                                                         const ebpo_view_options *options,
                                                         ebpo_view_stream **out, ebpo_error *error);
 EBPO_API void ebpo_view_stream_free(ebpo_view_stream *stream); /* NULL is fine */
