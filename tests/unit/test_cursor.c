@@ -331,6 +331,7 @@ static void compare_envelopes(whole *w, holder which, uint64_t seed, uint64_t ju
     ebpo_error error = EBPO_ERROR_INIT;
     static ebpo_half_spaces expected, found;
     static ebpo_envelope_stack kept, fresh;
+    static ebpo_polytope cut;
     ebpo_cursor c;
     memset(&kept, 0, sizeof kept);
     begin(w, which, &c);
@@ -351,8 +352,12 @@ static void compare_envelopes(whole *w, holder which, uint64_t seed, uint64_t ju
         fine(ebpo_cursor_envelope(&c, &fresh, &b, &error), &error);
         ck_assert_int_eq(a->vertex_count, b->vertex_count);
         ck_assert_mem_eq(a->vertex, b->vertex, (size_t)a->vertex_count * sizeof a->vertex[0]);
-        if (n->type == EBPO_BLACK)
+        if (n->type == EBPO_BLACK) {
             ck_assert_double_eq(ebpo_polytope_volume(a), 1);
+        } else if (w->model && n->type != EBPO_WHITE) { /* of a shape: it does not become empty */
+            ebpo_half_spaces_cut(&expected, 0, &cut);
+            ck_assert_double_eq_tol(ebpo_polytope_volume(a), ebpo_polytope_volume(&cut), 1e-6);
+        }
     }
 }
 
@@ -393,7 +398,7 @@ static void build(ebpo_mesh mesh, uint32_t leaf_faces, uint32_t parts)
     ebpo_tree_free(&tree);
 }
 
-static void cut(const double low, const double high, int last_level)
+static void cut_file(double low, double high, int last_level)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_subset_options options = EBPO_SUBSET_OPTIONS_INIT;
@@ -430,10 +435,10 @@ static void compare_model(ebpo_mesh mesh, uint32_t leaf_faces, uint32_t parts, u
 {
     build(mesh, leaf_faces, parts);
     compare_file(path, seed, false);
-    cut(0.4, 0.55, -1);
+    cut_file(0.4, 0.55, -1);
     compare_file(part_path, seed, true);
     unlink(part_path);
-    cut(0, 0, 2);
+    cut_file(0, 0, 2);
     compare_file(part_path, seed, true);
 }
 
