@@ -10,6 +10,7 @@
 
 #include "cli/command.h"
 #include "cli/signals.h"
+#include "cli/words.h"
 
 static char being_made[4096]; /* for the signal handler */
 
@@ -29,17 +30,29 @@ static bool is_named(const char *name, const char *const *names)
 
 static bool is_dot(const char *name) { return strcmp(name, ".") == 0 || strcmp(name, "..") == 0; }
 
+/* What a report holds besides a file for each selection, SELECTION.ebpo.h5. */
+static const char *const fixed_names[] = { "report.csv", "report.json", "report.html", NULL };
+#define MODEL_ENDING ".ebpo.h5"
+
+static bool is_selection_file(const char *name)
+{
+    for (int i = 0; selection_words[i]; i++) {
+        size_t length = strlen(selection_words[i]);
+        if (strncmp(name, selection_words[i], length) == 0 &&
+            strcmp(name + length, MODEL_ENDING) == 0)
+            return true;
+    }
+    return false;
+}
+
 /* Only files of the names that a report has: whatever else is there is somebody's own. */
 static bool is_ours(const char *folder, const char *name)
 {
-    static const char *const names[] = { "report.csv",       "report.json",
-                                         "report.html",      "inherit.ebpo.h5",
-                                         "kmedoids.ebpo.h5", "offset.ebpo.h5",
-                                         "random.ebpo.h5",   NULL };
     char path[8192];
     struct stat st;
     snprintf(path, sizeof path, "%s/%s", folder, name);
-    return is_named(name, names) && lstat(path, &st) == 0 && S_ISREG(st.st_mode);
+    return (is_named(name, fixed_names) || is_selection_file(name)) && lstat(path, &st) == 0 &&
+           S_ISREG(st.st_mode);
 }
 
 static bool is_operand(const char *folder, const char *name, const char *const *operand)
@@ -122,20 +135,25 @@ void output_drop(const char *folder)
 }
 
 /* In a signal handler: only what may be called there. Names are known beforehand. */
+static void abandon_file(const char *stem, const char *ending)
+{
+    size_t length = strlen(being_made);
+    being_made[length] = '/';
+    strcpy(being_made + length + 1, stem);
+    strcat(being_made, ending);
+    unlink(being_made);
+    being_made[length] = 0;
+}
+
 static void abandon(void)
 {
-    static const char *const names[] = { "report.csv",     "report.json",     "report.html",
-                                         "need.ebpo.h5",   "inherit.ebpo.h5", "kmedoids.ebpo.h5",
-                                         "offset.ebpo.h5", "random.ebpo.h5" };
-    size_t length = strlen(being_made);
-    if (!length)
+    if (!being_made[0])
         return;
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-        being_made[length] = '/';
-        strcpy(being_made + length + 1, names[i]);
-        unlink(being_made);
-        being_made[length] = 0;
-    }
+    for (int i = 0; fixed_names[i]; i++)
+        abandon_file(fixed_names[i], "");
+    for (int i = 0; selection_words[i]; i++)
+        abandon_file(selection_words[i], MODEL_ENDING);
+    abandon_file("need", MODEL_ENDING); /* a trial of report_needs.c */
     rmdir(being_made);
 }
 
