@@ -35,8 +35,7 @@ def stub(text):
         declaration = re.sub(r"\bEBPO_MUST_USE\b|\bEBPO_PRINTF\([^)]*\)", "", declaration)
         lines.append(" ".join(declaration.split()) + " { __builtin_trap(); }")
     types = sorted(set(re.findall(r"^\}\s*(ebpo_\w+);", text, flags=re.M)))
-    lines.append("EBPO_API void types(%s);" % ", ".join(f"{name} *" for name in types))
-    lines.append("void types(%s) {}" % ", ".join(f"{name} *_{i}" for i, name in enumerate(types)))
+    lines += [f"EBPO_API void type_{name}({name} *it); void type_{name}({name} *it) {{ (void)it; }}" for name in types]
     for name, body in re.findall(r"typedef struct (ebpo_\w+) \{(.*?)^\}", text, flags=re.S | re.M):
         if re.match(r"\s*size_t struct_size;", body):
             last = body.strip().split(";")[-2]

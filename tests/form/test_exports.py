@@ -1,20 +1,87 @@
 #!/usr/bin/env python3
-"""The shared library exports exactly what the public headers declare with EBPO_API: test_exports.py LIBEBPO SOURCE_ROOT"""
+"""The public headers, the shared library, and the documents tell the same: test_exports.py LIBEBPO SOURCE_ROOT VERSION
+
+The library exports exactly what the headers declare; ebpo.h includes every header; whatever name a header, a page or a sample
+mentions is declared; each function says which threads may call it; each struct that begins with its size has its macro; the
+version is the project's.
+"""
 import pathlib
 import re
 import subprocess
 import sys
 
-library, root = sys.argv[1], pathlib.Path(sys.argv[2])
-declared = set()
-for header in (root / "lib/include/ebpo").glob("*.h"):
-    text = re.sub(r"/\*.*?\*/", "", header.read_text(), flags=re.S)
-    text = re.sub(r"^#(.*\\\n)*.*$", "", text, flags=re.M)
-    declared |= set(re.findall(r"EBPO_API\b[^;]*?\b(ebpo_\w+)\s*\(", text))
-output = subprocess.run(["nm", "-D", "--defined-only", library], check=True, capture_output=True, text=True).stdout
-exported = {line.split()[2] for line in output.splitlines() if len(line.split()) == 3}
-exported = {name for name in exported if not name.startswith(("_", "__"))}
-problems = [f"declared, not exported: {name}" for name in sorted(declared - exported)]
-problems += [f"exported, not declared: {name}" for name in sorted(exported - declared)]
+library, root, version = sys.argv[1], pathlib.Path(sys.argv[2]), sys.argv[3]
+headers = {path.name: path.read_text() for path in sorted((root / "lib/include/ebpo").glob("*.h"))}
+problems = []
+
+
+def code(text):
+    """Without comments and preprocessor lines."""
+    text = re.sub(r"/\*.*?\*/", "", text, flags=re.S)
+    return re.sub(r"^#(.*\\\n)*.*$", "", text, flags=re.M)
+
+
+def declared_functions():
+    names = set()
+    for text in headers.values():
+        names |= set(re.findall(r"EBPO_API\b[^;]*?\b(ebpo_\w+)\s*\(", code(text)))
+    return names
+
+
+def exported_functions():
+    output = subprocess.run(["nm", "-D", "--defined-only", library], check=True, capture_output=True, text=True).stdout
+    names = {line.split()[2] for line in output.splitlines() if len(line.split()) == 3}
+    return {name for name in names if not name.startswith("_")}
+
+
+def declared_names(functions):
+    """Functions, types and constants."""
+    names = set(functions)
+    for text in headers.values():
+        names |= set(re.findall(r"\b(?:struct|enum)\s+(ebpo_\w+)", code(text)))
+        names |= set(re.findall(r"^\}\s*(ebpo_\w+);", code(text), flags=re.M))
+        names |= set(re.findall(r"\(\*(ebpo_\w+)\)\(", code(text)))
+        names |= set(re.findall(r"\b(EBPO_\w+)\b", code(text)))
+        names |= set(re.findall(r"^#define\s+(EBPO_\w+)", text, flags=re.M))
+    return names | {"ebpo_sized"}
+
+
+def mentioned(text):
+    """Names in a text; "ebpo_view_*" and "EBPO_..._INIT" stand for several."""
+    return set(re.findall(r"\b((?:ebpo|EBPO)_[A-Za-z0-9]\w*)\b(?![*.\w])", text))
+
+
+def threads_of(text):
+    """(function, comment above it, which may be shared by declarations without an empty line between)."""
+    comment = ""
+    for block in re.split(r"\n\s*\n", text):
+        comments = " ".join(re.findall(r"/\*.*?\*/", block, flags=re.S))
+        for name in re.findall(r"EBPO_API\b[^;]*?\b(ebpo_\w+)\s*\(", code(block)):
+            yield name, comments
+
+
+functions, exported = declared_functions(), exported_functions()
+problems += [f"declared, not exported: {name}" for name in sorted(functions - exported)]
+problems += [f"exported, not declared: {name}" for name in sorted(exported - functions)]
+problems += [f"ebpo.h does not include {name}" for name in headers if name != "ebpo.h" and f"<ebpo/{name}>" not in headers["ebpo.h"]]
+
+names = declared_names(functions)
+for path, text in headers.items():
+    comments = " ".join(re.findall(r"/\*.*?\*/", text, flags=re.S))
+    problems += [f"{path}: a comment mentions {name}, which no header declares" for name in sorted(mentioned(comments) - names)]
+    problems += [f"{path}: {name} does not say 'Threads: ...'" for name, comment in threads_of(text) if "Threads:" not in comment]
+    problems += [f"{path}:{n}: {len(line)} characters" for n, line in enumerate(text.splitlines(), 1) if len(line) > 100]
+    for name in re.findall(r"typedef struct (ebpo_\w+) \{\s*size_t struct_size;", text):
+        if f"#define {name.upper()}_INIT" not in text:
+            problems.append(f"{path}: {name} begins with its size, and there is no {name.upper()}_INIT")
+
+for path in [root / "README.md", *(root / "docs/guide").glob("*.md"), *(root / "samples").glob("*.[ch]"), root / "samples/query.py"]:
+    problems += [f"{path.relative_to(root)}: mentions {name}, which no header declares"
+                 for name in sorted(mentioned(path.read_text()) - names) if name != "EBPO_LIBRARY"]
+
+numbers = [re.search(rf"#define EBPO_VERSION_{part}\s+(\d+)", headers["base.h"]).group(1) for part in ("MAJOR", "MINOR", "PATCH")]
+if ".".join(numbers) != version:
+    problems.append(f"base.h says version {'.'.join(numbers)}, meson.build {version}")
+
 print("\n".join(problems) or f"{len(exported)} public functions")
 sys.exit(1 if problems else 0)

@@ -1,21 +1,41 @@
-/* EBP-Octree in HDF5: the whole public interface. */
+/*
+ * EBP-Octree in HDF5: the whole public interface.
+ *
+ *   base.h        versions, errors, progress, outputs
+ *   workspace.h   how much memory the work may use
+ *   mesh.h        triangle meshes: reading, checking, mending
+ *   build.h       from a mesh to a tree
+ *   file.h        files: writing, opening, reading
+ *   http.h        files on web servers
+ *   query.h       point in solid, distance, rays, boxes, mass
+ *   stream.h      levels, coarse to fine
+ *   view.h        nodes in the order of an observer
+ *   lod.h         a level as closed polygons
+ *   export.h      levels and the mesh in other programs' formats
+ *   subset.h      a smaller file from a file
+ *   verify.h      proving that a file keeps its promises
+ *   deviation.h   how far a level reaches beyond the model
+ *   limit.h       what no convex envelope can be better than
+ *
+ * base.h says what holds for every function.
+ */
 #ifndef EBPO_EBPO_H
 #define EBPO_EBPO_H
 
 #include <ebpo/base.h>
+#include <ebpo/workspace.h>
 #include <ebpo/mesh.h>
-#include <ebpo/file.h>
 #include <ebpo/build.h>
-#include <ebpo/deviation.h>
-#include <ebpo/export.h>
+#include <ebpo/file.h>
 #include <ebpo/http.h>
-#include <ebpo/limit.h>
-#include <ebpo/lod.h>
 #include <ebpo/query.h>
 #include <ebpo/stream.h>
+#include <ebpo/view.h>
+#include <ebpo/lod.h>
+#include <ebpo/export.h>
 #include <ebpo/subset.h>
 #include <ebpo/verify.h>
-#include <ebpo/view.h>
-#include <ebpo/workspace.h>
+#include <ebpo/deviation.h>
+#include <ebpo/limit.h>
 
 #endif

@@ -1,5 +1,14 @@
-/* EBP-Octree in HDF5: what a `.ebpo.h5` file holds, reading and writing it. format-spec/ describes
- * the same, byte by byte. */
+/*
+ * EBP-Octree in HDF5: what an .ebpo.h5 file holds, reading and writing it.
+ * format-spec/ describes the same, byte by byte.
+ *
+ *   Contents   ebpo_level, ebpo_info, ebpo_tree: a whole model in memory
+ *   Writing    ebpo_tree_write
+ *   Sources    ebpo_source: where bytes come from
+ *   Opening    ebpo_open, ebpo_open_memory, ebpo_open_source, ebpo_close
+ *   Facts      ebpo_file_info, ebpo_file_get_stats, ebpo_file_locate
+ *   Reading    ebpo_file_read_level, ebpo_file_read_mesh, ebpo_file_read_tree ...
+ */
 #ifndef EBPO_FILE_H
 #define EBPO_FILE_H
 
@@ -9,98 +18,182 @@
 extern "C" {
 #endif
 
+/* Of the format that this library writes. */
 #define EBPO_FORMAT_MAJOR 1
 #define EBPO_FORMAT_MINOR 0
-#define EBPO_LEVELS_MAX   21 /* levels 0 to 20 */
 
-/* A node's type, two bits in `types`. */
+/* Levels 0 to 20. */
+#define EBPO_LEVELS_MAX 21
+
+/* ---- what a file holds ---- */
+
+/* A node's type, two bits in `types` of ebpo_level. */
 typedef enum ebpo_node_type {
-    /* no face touches the closed cell, which lies outside (in a surface model: no face touches it)
+    /*
+     * No face touches the closed cell, which lies outside. In a surface: no face
+     * touches it.
      */
     EBPO_WHITE = 0,
-    EBPO_BLACK = 1, /* no face touches the closed cell, which lies inside */
-    EBPO_LEAF = 2,  /* lists its faces, has no children */
-    /* has eight children, or is pruned: has had them, but they are not in this file */
+
+    /* No face touches the closed cell, which lies inside. */
+    EBPO_BLACK = 1,
+
+    /* Lists its faces, and has no children. */
+    EBPO_LEAF = 2,
+
+    /*
+     * Has eight children; or is pruned: has had them, but they are not in this
+     * file.
+     */
     EBPO_GRAY = 3
 } ebpo_node_type;
 
 /* Which points a solid is made of, by their winding number w. */
 typedef enum ebpo_rule {
     EBPO_RULE_NONZERO = 0, /* w != 0 */
-    EBPO_RULE_EVENODD = 1, /* w odd */
+    EBPO_RULE_EVENODD = 1, /* w is odd */
     EBPO_RULE_POSITIVE = 2 /* w > 0 */
 } ebpo_rule;
 
 /* Parts of a file, as bits. */
 typedef enum ebpo_part {
     EBPO_PART_PLANES = 1,     /* envelope planes of gray nodes */
-    EBPO_PART_MESH = 2,       /* vertices, faces and the leaves' face lists */
-    EBPO_PART_MAPS = 4,       /* source numbers of vertices and faces */
+    EBPO_PART_MESH = 2,       /* vertices, faces, and the leaves' lists of faces */
+    EBPO_PART_MAPS = 4,       /* numbers in the source, of vertices and faces */
     EBPO_PART_LEAF_PLANES = 8 /* stored envelope planes of leaves */
 } ebpo_part;
 
 typedef enum ebpo_codec {
     EBPO_CODEC_ZSTD = 0,    /* HDF5 filter 32015, frames with checksum */
-    EBPO_CODEC_DEFLATE = 1, /* HDF5's own; needs no plugin; fletcher32 checksum */
+    EBPO_CODEC_DEFLATE = 1, /* HDF5's own, needs no plugin; fletcher32 checksum */
     EBPO_CODEC_NONE = 2
 } ebpo_codec;
 
-/* One level, all nodes in octcode order. Rank: the i-th gray node of a level has the i-th group of
- * eight children in the next level. Arrays are NULL when their count is 0 or their part is absent.
+/*
+ * One level: all nodes in the order of their octcodes.
+ *
+ * The i-th gray node of a level has the i-th group of eight children in the next
+ * level. An array is NULL if its count is 0 or the file does not have its part.
  */
 typedef struct ebpo_level {
-    /* groups of eight siblings; level 0: one group, of which only octant 0 exists */
+    /*
+     * Groups of eight siblings; level 0: one group, of which only octant 0
+     * exists.
+     */
     uint64_t group_count;
+
     uint64_t gray_count, leaf_count, white_count, black_count;
-    /* [group_count]; type of octant i in bits 2i, 2i + 1; octant: bit 0 x, bit 1 y, bit 2 z */
+
+    /*
+     * [group_count]; type of octant i in bits 2i, 2i + 1; octant: bit 0 x, bit 1
+     * y, bit 2 z
+     */
     uint16_t *types;
-    uint8_t *plane_counts; /* [gray_count] planes that the node adds to its parent's envelope */
-    uint32_t *planes;      /* [plane_count] codes, see ebpo_plane_decode; node after node */
+
+    /* [gray_count] planes that the node adds to its parent's envelope */
+    uint8_t *plane_counts;
+
+    /* [plane_count] codes, see ebpo_plane_decode; node after node */
+    uint32_t *planes;
+
     uint64_t plane_count;
-    /* [leaf_count] winding number at the leaf's lowest corner, shifted (see format-spec); solids
-     * only */
+
+    /*
+     * [leaf_count] winding number at the leaf's lowest corner, shifted (see
+     * format-spec); solids only
+     */
     int32_t *leaf_winding;
-    int32_t *black_winding; /* [black_count], NULL: all 1 */
-    int32_t *white_winding; /* [white_count], NULL: all 0 */
-    uint64_t *leaf_first;   /* [leaf_count] number of the leaf's first new face */
-    /* [leaf_count] faces leaf_first .. leaf_first + leaf_new - 1 touch this leaf and no leaf before
-     * it */
+
+    /* [black_count], NULL: all 1 */
+    int32_t *black_winding;
+
+    /* [white_count], NULL: all 0 */
+    int32_t *white_winding;
+
+    /* [leaf_count] number of the leaf's first new face */
+    uint64_t *leaf_first;
+
+    /*
+     * [leaf_count] faces leaf_first .. leaf_first + leaf_new - 1 touch this leaf
+     * and no leaf before it
+     */
     uint32_t *leaf_new;
-    uint32_t *leaf_ref_count; /* [leaf_count] further faces, all of a number below leaf_first */
+
+    /* [leaf_count] further faces, all of a number below leaf_first */
+    uint32_t *leaf_ref_count;
+
     /* [ref_count] their numbers, ascending within each leaf; leaf after leaf */
     uint32_t *leaf_refs;
+
     uint64_t ref_count;
-    uint64_t new_count;         /* sum of leaf_new */
-    uint8_t *leaf_plane_counts; /* [leaf_count], part EBPO_PART_LEAF_PLANES */
-    uint32_t *leaf_planes;      /* [leaf_plane_count] */
+
+    /* Sum of leaf_new */
+    uint64_t new_count;
+
+    /* [leaf_count], part EBPO_PART_LEAF_PLANES */
+    uint8_t *leaf_plane_counts;
+
+    /* [leaf_plane_count] */
+    uint32_t *leaf_planes;
+
     uint64_t leaf_plane_count;
-    /* volume of the envelopes of this level's gray nodes, in the model's unit cubed */
+
+    /*
+     * Volume of the envelopes of this level's gray nodes, in the model's unit
+     * cubed.
+     */
     double gray_volume;
-    /* the same for its leaves: cut by stored planes, else as inherited (planes that readers derive
-     * cut off more) */
+
+    /*
+     * The same for its leaves: cut by stored planes, else as inherited (planes
+     * that readers derive cut off more)
+     */
     double leaf_volume;
-    /* of the gray nodes: those whose children are not in the file. Their groups in the next level
-     * are 0 (and count as eight white nodes); on the last level all gray nodes are pruned, and have
-     * no groups */
+
+    /*
+     * Of the gray nodes: those whose children are not in the file. Their groups
+     * in the next level are 0 (and count as eight white nodes); on the last
+     * level all gray nodes are pruned, and have no groups.
+     */
     uint64_t pruned_count;
-    ebpo_workspace *workspace; /* owns all its arrays; NULL: malloc's */
+
+    /* Owns all its arrays; NULL: malloc's. */
+    ebpo_workspace *workspace;
 } ebpo_level;
 
+/*
+ * Frees the arrays and clears the struct.
+ *
+ * Threads: one per level.
+ */
 EBPO_API void ebpo_level_free(ebpo_level *level);
 
-/* Half-space of a plane code in the coordinates of its node's cell: xi = (p - corner) / cell size,
- * per axis, so 0 <= xi <= 1. The envelope keeps the points with 4096 * (n . xi) <= d. All integers:
- * |n0| + |n1| + |n2| = 511, and nothing is ever rounded by a reader. False for the codes that stand
- * for no plane. */
+/*
+ * The half-space of a plane code, in the coordinates of its node's cell: xi =
+ * (p - corner) / cell size on each axis, so that xi is 0 to 1. The envelope keeps
+ * the points with 4096 * (n . xi) <= d.
+ *
+ * All numbers are integers, |n0| + |n1| + |n2| = 511, and a reader never rounds
+ * anything. False for the codes that stand for no plane.
+ *
+ * Threads: any.
+ */
 EBPO_API bool ebpo_plane_decode(uint32_t code, int32_t n[3], int32_t *d);
 
-/* Facts about a level that the head of the file tells without reading the level. */
+/* What the head of a file tells about a level, without reading the level. */
 typedef struct ebpo_level_summary {
     uint64_t gray_count, leaf_count, white_count, black_count;
     uint64_t plane_count, leaf_plane_count;
-    uint64_t new_count, ref_count; /* faces first seen, faces referenced again */
+
+    /* Faces first seen, faces referenced again. */
+    uint64_t new_count, ref_count;
+
     double gray_volume, leaf_volume;
-    /* gray nodes without children; white_count of the next level counts eight for each */
+
+    /*
+     * Gray nodes without children; white_count of the next level counts eight
+     * for each.
+     */
     uint64_t pruned_count;
 } ebpo_level_summary;
 
@@ -111,144 +204,300 @@ typedef struct ebpo_info {
     char source_name[256], source_format[16];
     uint8_t source_sha256[32];
     uint64_t source_size;
-    char unit[32], crs[256], date[32]; /* "" when not given */
-    bool solid;                        /* else a surface */
+
+    /* "" when not given */
+    char unit[32], crs[256], date[32];
+
+    /* Else it is a surface. */
+    bool solid;
+
     ebpo_rule rule;
     bool double_coordinates;
-    uint64_t vertex_count, face_count;               /* of the mesh in the file */
-    uint64_t source_vertex_count, source_face_count; /* triangles before mending */
-    double box_origin[3], box_size[3];               /* root cell */
-    int grid_level;                                  /* deepest level for which the box is exact */
-    int max_level;                                   /* the limit used in building */
-    int level_count;                                 /* levels 0 .. level_count - 1 are present */
+
+    /* Of the mesh in the file */
+    uint64_t vertex_count, face_count;
+
+    /* Triangles before mending */
+    uint64_t source_vertex_count, source_face_count;
+
+    /* The root cell. */
+    double box_origin[3], box_size[3];
+
+    /* Deepest level for which the box is exact. */
+    int grid_level;
+
+    /* The limit used in building. */
+    int max_level;
+
+    /* Levels 0 .. level_count - 1 are present. */
+    int level_count;
+
     uint32_t leaf_faces;
     double epsilon;
-    /* ebpo_selection (build.h) by which planes were chosen, and what it was told: */
+
+    /* The ebpo_selection (build.h) by which planes were chosen. */
     int selection;
-    double percent, k_root; /* percent or k_root: the theses' selections; else 0 */
-    int normals;            /* ebpo_normal_distance; k-medoids */
-    uint64_t seed;          /* k-medoids and random; else 0 */
+
+    /* Of the theses' selections, one of the two; else 0. */
+    double percent, k_root;
+
+    /* An ebpo_normal_distance, of k-medoids. */
+    int normals;
+
+    /* Of k-medoids and random; else 0. */
+    uint64_t seed;
+
     ebpo_mend_record mend;
-    ebpo_mesh_report report; /* counts and measures; places are not stored */
-    uint32_t parts;          /* ebpo_part bits */
+
+    /* Counts and measures; places are not stored. */
+    ebpo_mesh_report report;
+
+    /* ebpo_part bits */
+    uint32_t parts;
+
     ebpo_codec codec;
     uint8_t content_sha256[32];
-    /* where the places of the chunks of large arrays stand, behind the first levels: for fetching
-     * ahead, not relied on; 0: there are none, or the file does not say */
+
+    /*
+     * Where the places of the chunks of large arrays stand, behind the first
+     * levels: for fetching ahead, not relied on; 0: there are none, or the file
+     * does not say.
+     */
     uint64_t chunk_index_offset, chunk_index_bytes;
-    /* a subset: some gray nodes' children were left out (ebpo_subset). The rest below says what was
-     * asked for then */
+
+    /*
+     * A subset: some gray nodes' children were left out (ebpo_subset). The rest
+     * below says what was asked for then.
+     */
     bool pruned;
-    int cut_levels;     /* levels 0 .. cut_levels - 1 were kept; 0: all */
-    bool boxed;         /* what does not meet this box was left out: */
-    double kept_box[6]; /* min, max */
-    /* where nodes were pruned for it, their envelopes reach at most so far beyond the model; 0: not
-     * asked for */
+
+    /* Levels 0 .. cut_levels - 1 were kept; 0: all. */
+    int cut_levels;
+
+    /* What does not meet kept_box (min, max) was left out. */
+    bool boxed;
+    double kept_box[6];
+
+    /*
+     * Where nodes were pruned for it, their envelopes reach at most so far
+     * beyond the model; 0: not asked for.
+     */
     double kept_error;
-    /* content_sha256 of the file that it was taken from; the first one's, when it was a subset
-     * itself */
+
+    /*
+     * content_sha256 of the file that it was taken from; the first one's, when
+     * it was a subset itself.
+     */
     uint8_t subset_of[32];
+
     ebpo_level_summary level[EBPO_LEVELS_MAX];
-    /* set when reading; head: up to the first level */
+
+    /* Set when reading; head: up to the first level. */
     uint64_t file_bytes, head_bytes;
-    /* set when reading: levels from this one on need the index of chunks as well; level_count: none
-     * does */
+
+    /*
+     * Set when reading: levels from this one on need the index of chunks as
+     * well; level_count: none does.
+     */
     int index_level;
 } ebpo_info;
 
-/* A whole model in memory: what the builder makes and the writer writes. The mesh is in file order:
- * faces by the first leaf (depth-first octcode order) that they touch, vertices by first use,
- * unreferenced vertices last. */
+/*
+ * A whole model in memory: what ebpo_build makes and ebpo_tree_write writes.
+ *
+ * The mesh is in the order of the file: faces by the first leaf that they touch,
+ * depth first by octcode; vertices by their first use, those without faces last.
+ */
 typedef struct ebpo_tree {
     ebpo_info info;
     ebpo_level level[EBPO_LEVELS_MAX];
     ebpo_mesh mesh;
-    uint32_t *vertex_source; /* [vertex_count] number in the source, or NULL */
+
+    /* [vertex_count] number in the source, or NULL */
+    uint32_t *vertex_source;
+
     /* [face_count]; numbers >= source_face_count: faces added by filling holes */
     uint32_t *face_source;
-    ebpo_workspace *workspace; /* owns the two; NULL: malloc's */
+
+    /* Owns the two; NULL: malloc's. */
+    ebpo_workspace *workspace;
 } ebpo_tree;
 
+/*
+ * Frees the arrays and clears the struct.
+ *
+ * Threads: one per tree.
+ */
 EBPO_API void ebpo_tree_free(ebpo_tree *tree);
+
+/* ---- writing ---- */
 
 typedef struct ebpo_write_options {
     size_t struct_size; /* EBPO_WRITE_OPTIONS_INIT sets it */
+
     ebpo_codec codec;
-    int codec_level;  /* 0: the default (zstd 3, deflate 6) */
-    unsigned threads; /* 0: all cores */
-    uint32_t parts;   /* which parts to write, of those the tree has */
+
+    /* 0: the default, 3 of zstd and 6 of deflate. */
+    int codec_level;
+
+    /* 0: all cores. The result does not depend on it. */
+    unsigned threads;
+
+    /* Bits of ebpo_part: which to write, of those the tree has. */
+    uint32_t parts;
+
     ebpo_progress progress;
 } ebpo_write_options;
+
 #define EBPO_WRITE_OPTIONS_INIT                                                \
     {                                                                          \
         sizeof(ebpo_write_options), EBPO_CODEC_ZSTD, 0, 0, ~0u, { NULL, NULL } \
     }
 
-/* Writes the file: whole or not at all (temporary name, fsync, rename, fsync of the folder). Equal
- * trees give identical bytes. */
+/*
+ * Writes a tree as a file, which appears whole or not at all: under a temporary
+ * name, synced and renamed, and its folder synced. Equal trees give identical
+ * bytes.
+ *
+ * EBPO_E_ARGUMENT: the tree is not valid, or no such codec. EBPO_E_IO,
+ * EBPO_E_CANCELLED, EBPO_E_MEMORY.
+ *
+ * Threads: any, while nobody changes the tree.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_tree_write(const ebpo_tree *tree, const char *path,
                                                    const ebpo_write_options *options,
                                                    ebpo_error *error);
 
-/* Bytes [offset, offset + size) of a source. */
+/* ---- sources ---- */
+
+/* Bytes offset .. offset + size - 1 of a source. */
 typedef struct ebpo_range {
     uint64_t offset, size;
 } ebpo_range;
 
-/* Where bytes come from. `read` fills `data` with the bytes [offset, offset + size), all of which
- * lie within `size` of the source, or fails; it is called from several threads at once. `close` is
- * called once, when the file is closed or when opening fails. While a file is being opened, `read`
- * is called from inside libhdf5: it must then neither use libhdf5 nor open another file. */
+/*
+ * Where bytes come from. Begin it with EBPO_SOURCE_INIT. Its functions are called
+ * by several threads at once, but for `close`.
+ */
 typedef struct ebpo_source {
     size_t struct_size; /* EBPO_SOURCE_INIT sets it */
+
+    /* Handed to the functions. */
     void *user;
-    uint64_t size; /* bytes */
+
+    /* Bytes. */
+    uint64_t size;
+
+    /*
+     * Fills `data` with `size` bytes from `offset` on, all of which lie within the
+     * source, or fails.
+     *
+     * While a file is being opened, libhdf5 calls it: it must then neither use
+     * libhdf5 nor open another file.
+     */
     ebpo_status (*read)(void *user, uint64_t offset, uint64_t size, void *data, ebpo_error *error);
-    void (*close)(void *user); /* may be NULL */
-    /* May be NULL. Announces ranges, all within the source, that will be read soon, each about
-     * once: a source far away fetches them together and ahead of the reader. Nothing depends on it;
-     * it does not wait, and is called from several threads. */
+
+    /* Called once, when the file is closed or when opening fails. May be NULL. */
+    void (*close)(void *user);
+
+    /*
+     * Announces ranges within the source that will be read soon, each about once:
+     * a source far away fetches them together and ahead of the reader. It does not
+     * wait, and nothing depends on it. May be NULL.
+     */
     void (*expect)(void *user, const ebpo_range *ranges, size_t count);
-    /* With `expect`: so many bytes at the beginning need no fetching. When that is not the whole
-     * file, only what they tell is looked at in opening: where the chunks of arrays of more than
-     * one chunk lie is read when the first of these arrays is (or ebpo_file_locate called). */
+
+    /*
+     * With `expect`: so many bytes at the beginning need no fetching. If they are
+     * not the whole file, opening looks at no others. Where the chunks lie of
+     * arrays of more than one chunk is read when it is needed, or by
+     * ebpo_file_locate.
+     */
     uint64_t at_hand;
 } ebpo_source;
+
 #define EBPO_SOURCE_INIT EBPO_SIZED(ebpo_source)
 
-/* An open file. Immutable: any number of threads may use it at once. */
+/* ---- opening ---- */
+
+/*
+ * An open file. It does not change: any number of threads may use it at once.
+ */
 typedef struct ebpo_file ebpo_file;
 
-/* Opens a file and reads its head only: the facts, and where each chunk of each array is. HDF5 is
- * used for that and for nothing later; everything else is read straight from the source. Unknown
- * major version or unknown required part: EBPO_E_VERSION, by name. Safe on untrusted files. A file
- * that another program shortens or changes while it is open gives EBPO_E_IO or EBPO_E_FORMAT, never
- * wrong data (the pipelines with checksums). */
-/* a path, or a URL: ebpo/http.h */
+/*
+ * Opens a file by its path or URL (http.h), and reads its head only: the facts,
+ * and where each chunk of each array lies. libhdf5 is used for that and for nothing
+ * later: everything else is read straight from the source.
+ *
+ * Safe on untrusted files. A file that another program shortens or changes while it
+ * is open gives EBPO_E_IO or EBPO_E_FORMAT, never wrong data (with the codecs, which
+ * have checksums).
+ *
+ * EBPO_E_IO. EBPO_E_FORMAT: not such a file, or damaged. EBPO_E_VERSION: another
+ * major version, or a part that this library does not know. EBPO_E_MEMORY.
+ *
+ * Threads: any.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_open(const char *path, ebpo_file **out, ebpo_error *error);
-/* The same from bytes in memory, which stay the caller's and must outlive the file. `name` is for
- * messages. */
+
+/*
+ * The same from bytes in memory, which stay the caller's and must stay as long as
+ * the file. `name` is for messages and may be NULL.
+ *
+ * Threads: any.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_memory(const void *data, uint64_t size,
                                                     const char *name, ebpo_file **out,
                                                     ebpo_error *error);
-/* The same from any source; it is closed with the file (also when opening fails). */
+
+/*
+ * The same from any source, which is closed with the file. It is also closed if
+ * opening fails, unless its struct_size was never set.
+ *
+ * Threads: any.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_source(const ebpo_source *source, const char *name,
                                                     ebpo_file **out, ebpo_error *error);
-/* NULL is fine. Models, contexts and streams made from the file are freed before. */
+
+/*
+ * After the models and streams that were made from the file.
+ *
+ * Threads: one per file.
+ */
 EBPO_API void ebpo_close(ebpo_file *file);
 
-/* Bytes asked of the source so far, and how many times; the head's reading included. Of a file
- * opened by URL, what went over the net is told by ebpo_file_get_http_stats. */
+/* ---- facts ---- */
+
+/*
+ * Valid until the file is closed.
+ *
+ * Threads: any.
+ */
+EBPO_API const ebpo_info *ebpo_file_info(const ebpo_file *file);
+
+/* Sums since opening, of which the head's reading is a part. */
 typedef struct ebpo_file_stats {
     size_t struct_size; /* EBPO_FILE_STATS_INIT sets it */
-    uint64_t bytes_read;
-    uint64_t reads; /* calls of the source */
-} ebpo_file_stats;
-#define EBPO_FILE_STATS_INIT EBPO_SIZED(ebpo_file_stats)
-EBPO_API ebpo_status ebpo_file_get_stats(const ebpo_file *file, ebpo_file_stats *out);
 
-/* Lent; valid until the file is closed. */
-EBPO_API const ebpo_info *ebpo_file_info(const ebpo_file *file);
+    /* Bytes asked of the source. */
+    uint64_t bytes_read;
+
+    /* How many times. */
+    uint64_t reads;
+} ebpo_file_stats;
+
+#define EBPO_FILE_STATS_INIT EBPO_SIZED(ebpo_file_stats)
+
+/*
+ * What was asked of the source so far. ebpo_file_get_http_stats tells what went
+ * over the net.
+ *
+ * EBPO_E_ARGUMENT: `out` was not begun with its macro.
+ *
+ * Threads: any.
+ */
+EBPO_API ebpo_status ebpo_file_get_stats(const ebpo_file *file, ebpo_file_stats *out);
 
 /* Bytes that parts take in the file, compressed. */
 typedef struct ebpo_stored_sizes {
@@ -256,75 +505,150 @@ typedef struct ebpo_stored_sizes {
     uint64_t mesh_vertex_bytes, mesh_face_bytes, map_bytes;
 } ebpo_stored_sizes;
 
-/* Finds out where all chunks lie, if that has not been read yet (files far away,
- * ebpo_source.at_hand), and adds up what they take. `out` may be NULL. */
+/*
+ * Finds out where all chunks lie, if that has not been read yet (files far away,
+ * `at_hand` of ebpo_source), and adds up what they take. `out` may be NULL.
+ *
+ * EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY.
+ *
+ * Threads: any.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_locate(const ebpo_file *file, ebpo_stored_sizes *out,
                                                     ebpo_error *error);
 
-/* Announces that levels first .. last will be read; last beyond the last level: up to that one. A
- * source far away then fetches them with as few requests as it can, where reading one after the
- * other would ask for each by itself. Waits at most for the index of chunks (ebpo_file_locate);
- * cannot fail: what could not be fetched is told when it is read. */
+/*
+ * Announces that levels `first` to `last`, or to the last level, will be read. A
+ * source far away then fetches them with as few requests as it can, where reading
+ * one after the other would ask for each by itself.
+ *
+ * Waits for the index of chunks at most (ebpo_file_locate). Cannot fail: what could
+ * not be fetched is told when it is read.
+ *
+ * Threads: any.
+ */
 EBPO_API void ebpo_file_prefetch_levels(const ebpo_file *file, int first, int last);
 
+/* ---- reading ---- */
+
 typedef struct ebpo_read_options {
-    size_t struct_size; /* EBPO_READ_OPTIONS_INIT sets it */
-    unsigned threads;   /* 0: all cores */
-    /* owns what is read, and is freed after it; NULL: malloc does */
+    /* EBPO_READ_OPTIONS_INIT sets it. */
+    size_t struct_size;
+
+    /* 0: all cores */
+    unsigned threads;
+
+    /* Owns what is read, and is freed after it; NULL: malloc does. */
     ebpo_workspace *workspace;
 } ebpo_read_options;
+
 #define EBPO_READ_OPTIONS_INIT             \
     {                                      \
         sizeof(ebpo_read_options), 0, NULL \
     }
 
-/* In all of these `options` may be NULL. What is read is the caller's, and is freed by the function
- * for its type; on failure it is cleared. */
+/*
+ * What is read is the caller's, and is freed by the function for its type. On
+ * failure it is cleared.
+ */
 
-/* Reads one level (0 .. level_count - 1) and checks it: counts, ranges, order, index arrays. */
+/*
+ * Reads one level, from 0 on, and checks it: counts, ranges, order, index arrays.
+ * Freed by ebpo_level_free.
+ *
+ * EBPO_E_ARGUMENT: no such level. EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY.
+ *
+ * Threads: any.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_level(const ebpo_file *file, int level,
                                                         const ebpo_read_options *options,
                                                         ebpo_level *out, ebpo_error *error);
 
-/* Reads the mesh in file order; EBPO_E_ABSENT without the part. */
+/*
+ * Reads the mesh, in the order of the file. Freed by ebpo_mesh_free.
+ *
+ * EBPO_E_ABSENT: the file has no mesh. EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY.
+ *
+ * Threads: any.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_mesh(const ebpo_file *file,
                                                        const ebpo_read_options *options,
                                                        ebpo_mesh *out, ebpo_error *error);
 
 /* Numbers in the source. */
 typedef struct ebpo_maps {
-    uint32_t *vertex_source;   /* [vertex_count] */
-    uint32_t *face_source;     /* [face_count] */
-    ebpo_workspace *workspace; /* owns both; NULL: malloc's */
+    /* [vertex_count] */
+    uint32_t *vertex_source;
+
+    /* [face_count] */
+    uint32_t *face_source;
+
+    /* Owns both; NULL: malloc's */
+    ebpo_workspace *workspace;
 } ebpo_maps;
 
-/* Reads the maps, which are checked to be permutations of 0 .. count - 1 (after welding: strictly
- * different numbers below source_vertex_count). EBPO_E_ABSENT without the part. */
+/*
+ * Reads the maps. They are checked to be permutations of 0 .. count - 1; after
+ * welding, different numbers below source_vertex_count.
+ *
+ * EBPO_E_ABSENT: the file has no maps. EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY.
+ *
+ * Threads: any.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_maps(const ebpo_file *file,
                                                        const ebpo_read_options *options,
                                                        ebpo_maps *out, ebpo_error *error);
-/* Frees the arrays and clears the struct. NULL is fine. */
+
+/*
+ * Frees the arrays and clears the struct.
+ *
+ * Threads: one per struct.
+ */
 EBPO_API void ebpo_maps_free(ebpo_maps *maps);
 
-/* Everything at once. */
+/*
+ * Reads everything. Freed by ebpo_tree_free.
+ *
+ * EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY.
+ *
+ * Threads: any.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_tree(const ebpo_file *file,
                                                        const ebpo_read_options *options,
                                                        ebpo_tree *out, ebpo_error *error);
 
-/* The mesh in the source's order where the maps are there (vertices by vertex_source, faces by
- * face_source), else in file order: *source_order, which may be NULL, tells. */
+/*
+ * Reads the mesh and puts it into the order of the source if the file has maps;
+ * else it stays in the order of the file. *source_order tells which. Freed by
+ * ebpo_mesh_free.
+ *
+ * EBPO_E_ABSENT: the file has no mesh. EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY.
+ *
+ * Threads: any.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_source_mesh(const ebpo_file *file,
                                                               const ebpo_read_options *options,
                                                               ebpo_mesh *out, bool *source_order,
                                                               ebpo_error *error);
 
-/* Recomputes the content checksum from all arrays and compares: EBPO_E_FORMAT when it differs. */
+/*
+ * Computes the content checksum again from all arrays.
+ *
+ * EBPO_E_FORMAT: it is not the one in the head. EBPO_E_IO, EBPO_E_MEMORY.
+ *
+ * Threads: any.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_check_content(const ebpo_file *file,
                                                            const ebpo_read_options *options,
                                                            ebpo_error *error);
 
-/* Registers the zstd filter with libhdf5 in this process, so that the caller's own HDF5 calls can
- * read the files too. */
+/*
+ * Registers the zstd filter with libhdf5 in this process, so that the caller's own
+ * HDF5 calls can read the files too.
+ *
+ * EBPO_E_UNSUPPORTED: libhdf5 did not take it.
+ *
+ * Threads: any.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_register_filters(ebpo_error *error);
 
 #ifdef __cplusplus

@@ -1,4 +1,6 @@
-/* EBP-Octree in HDF5: what no convex envelope can be better than. */
+/*
+ * EBP-Octree in HDF5: what no convex envelope can be better than.
+ */
 #ifndef EBPO_LIMIT_H
 #define EBPO_LIMIT_H
 
@@ -10,30 +12,55 @@ extern "C" {
 
 typedef struct ebpo_limit_options {
     size_t struct_size; /* EBPO_LIMIT_OPTIONS_INIT sets it */
-    unsigned threads;   /* 0: all cores; the result does not depend on it */
+
+    /* 0: all cores. The result does not depend on it. */
+    unsigned threads;
+
     ebpo_progress progress;
 } ebpo_limit_options;
+
 #define EBPO_LIMIT_OPTIONS_INIT                       \
     {                                                 \
         sizeof(ebpo_limit_options), 0, { NULL, NULL } \
     }
 
+/* Volumes are in the model's unit cubed. */
 typedef struct ebpo_limit {
     size_t struct_size; /* EBPO_LIMIT_INIT sets it */
-    /* of the level: hulls of gray nodes and leaves, cells of black nodes (levels 0 .. level, as in
-     * ebpo_lod_level); model's unit cubed */
+
+    /*
+     * Of the level: hulls of gray nodes and leaves, cells of black nodes, of the
+     * same nodes as in ebpo_lod_level.
+     */
     double volume;
-    double gray_volume; /* the part of the level's gray nodes */
-    uint64_t hulls;     /* computed */
-    uint64_t flat;      /* of them without volume: their points lie in a plane, or nearly so */
+
+    /* The part of the level's gray nodes. */
+    double gray_volume;
+
+    /* How many hulls were computed. */
+    uint64_t hulls;
+
+    /* How many of them have no volume: their points lie in a plane, or nearly. */
+    uint64_t flat;
 } ebpo_limit;
+
 #define EBPO_LIMIT_INIT EBPO_SIZED(ebpo_limit)
 
-/* The volume of the convex hull of the solid in each cell (of a surface: of its faces there),
- * computed by qhull from the parts of faces in the cell and from its corners inside. Rounded, not
- * certified: a figure to compare with; infinite or 0 where a cell's volume is no normal double
- * (coordinates beyond about 1e102 or below 1e-102). EBPO_E_ABSENT without mesh, and where the
- * library was built without qhull (`-Dqhull`); EBPO_E_ARGUMENT: no such level. */
+/*
+ * The volume of the convex hull of the solid in each cell (of a surface: of its
+ * faces there), summed over a level. qhull computes it from the parts of faces in
+ * the cell and from the cell's corners that are inside.
+ *
+ * The sum is rounded and not certified: a figure to compare with. It is infinite
+ * or 0 where the volume of a cell is no normal double, which takes coordinates
+ * beyond about 1e102 or below 1e-102.
+ *
+ * EBPO_E_ABSENT: the file has no mesh, or the library was built without qhull.
+ * EBPO_E_ARGUMENT: no such level. EBPO_E_CANCELLED, EBPO_E_MEMORY, and the errors
+ * of reading.
+ *
+ * Threads: any.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_limit_level(const ebpo_file *file, int level,
                                                     const ebpo_limit_options *options,
                                                     ebpo_limit *out, ebpo_error *error);

@@ -1,4 +1,6 @@
-/* EBP-Octree in HDF5: a level as closed polygons. */
+/*
+ * EBP-Octree in HDF5: a level as closed polygons.
+ */
 #ifndef EBPO_LOD_H
 #define EBPO_LOD_H
 
@@ -10,22 +12,43 @@ extern "C" {
 
 typedef struct ebpo_lod_options {
     size_t struct_size; /* EBPO_LOD_OPTIONS_INIT sets it */
-    bool walls;         /* keep polygons that lie on cell walls, so that each envelope is closed */
-    unsigned threads;   /* 0: all cores */
+
+    /* Keep polygons that lie on cell walls, so that each envelope is closed. */
+    bool walls;
+
+    /* 0: all cores. The result does not depend on it. */
+    unsigned threads;
+
     ebpo_progress progress;
-    ebpo_workspace *workspace; /* what is read of the file keeps to it; NULL: to none */
+
+    /* What is read of the file keeps to it. NULL: as much memory as it takes. */
+    ebpo_workspace *workspace;
 } ebpo_lod_options;
+
 #define EBPO_LOD_OPTIONS_INIT                                   \
     {                                                           \
         sizeof(ebpo_lod_options), true, 0, { NULL, NULL }, NULL \
     }
 
-/* The envelopes of `level`: its gray nodes, and the leaves and black nodes of levels 0 .. level,
- * each a convex polyhedron cut from its cell by the half-spaces of the node and its ancestors;
- * leaves by stored planes, else by planes derived from their faces (EBP 2017, 3.4). Triangles with
- * double vertices; node after node, vertices not shared between nodes. The polygons are rounded;
- * the guarantee is the decoded half-spaces'. `out` is freed by ebpo_mesh_free. `volume`, if not
- * NULL, receives the sum of the polyhedra's volumes. */
+/*
+ * The envelopes of `level`: of its gray nodes, and of the leaves and black nodes
+ * of levels 0 to `level`. Each is a convex polyhedron, cut from its cell by the
+ * half-spaces of the node and of its ancestors. Leaves are cut by stored planes
+ * where the file has them, else by planes derived from their faces (EBP 2017,
+ * 3.4).
+ *
+ * The polygons are rounded. What is guaranteed to contain the solid is the
+ * decoded half-spaces.
+ *
+ * out      triangles with double vertices, node after node; nodes share no
+ *          vertices. Freed by ebpo_mesh_free. NULL: only the volume is wanted.
+ * volume   the sum of the polyhedra's volumes, in the model's unit cubed; or NULL
+ *
+ * EBPO_E_ARGUMENT: no such level. EBPO_E_LIMIT: more than 2^32 - 2 vertices or
+ * triangles. EBPO_E_CANCELLED, EBPO_E_MEMORY, and the errors of reading.
+ *
+ * Threads: any.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_level(const ebpo_file *file, int level,
                                                   const ebpo_lod_options *options, ebpo_mesh *out,
                                                   double *volume, ebpo_error *error);
@@ -33,26 +56,51 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_level(const ebpo_file *file, int lev
 /* One node of a level's envelopes. */
 typedef struct ebpo_lod_node {
     uint64_t octcode;
-    double volume; /* of the envelope, in the model's unit cubed */
-    /* black: in the cell; leaf: at the lowest corner; gray, and surfaces: 0 */
+
+    /* Of the envelope, in the model's unit cubed. */
+    double volume;
+
+    /* Black: in the cell. Leaf: at the lowest corner. Gray, and surfaces: 0. */
     int32_t winding;
-    ebpo_node_type type;                  /* gray (of the level asked for only), leaf or black */
-    uint32_t vertex_count, polygon_count; /* of the polyhedron, less what `walls` left out */
+
+    /* EBPO_GRAY (of the level asked for only), EBPO_LEAF or EBPO_BLACK. */
+    ebpo_node_type type;
+
+    /* Of the polyhedron, without what `walls` left out. */
+    uint32_t vertex_count, polygon_count;
 } ebpo_lod_node;
 
-/* Whose the triangles of ebpo_lod_level are. Nodes come level after level and in octcode order; the
- * mesh holds their vertices and triangles in the same order. A polygon of n corners is a fan of n -
- * 2 triangles around its first corner: corners 0 and 1 of its first triangle, then corner 2 of
- * each. */
+/*
+ * Whose the triangles of ebpo_lod_level are. Nodes come level after level, in
+ * the order of their octcodes; the mesh holds their vertices and triangles in the
+ * same order.
+ *
+ * A polygon of n corners is a fan of n - 2 triangles around its first corner:
+ * corners 0 and 1 of its first triangle, then corner 2 of each.
+ */
 typedef struct ebpo_lod_nodes {
     uint64_t node_count, polygon_count;
-    ebpo_lod_node *nodes; /* [node_count] */
-    uint8_t *corners;     /* [polygon_count] corners of each polygon, node after node */
+
+    /* [node_count] */
+    ebpo_lod_node *nodes;
+
+    /* [polygon_count] how many corners each polygon has, node after node */
+    uint8_t *corners;
 } ebpo_lod_nodes;
 
+/*
+ * Frees the arrays and clears the struct.
+ *
+ * Threads: one per struct.
+ */
 EBPO_API void ebpo_lod_nodes_free(ebpo_lod_nodes *nodes);
 
-/* The same with the nodes, freed by ebpo_lod_nodes_free; with `nodes` NULL it is ebpo_lod_level. */
+/*
+ * ebpo_lod_level, and the nodes with it, which are freed by ebpo_lod_nodes_free.
+ * `nodes` may be NULL; without `out` it must be.
+ *
+ * Threads: any.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_level_nodes(const ebpo_file *file, int level,
                                                         const ebpo_lod_options *options,
                                                         ebpo_mesh *out, ebpo_lod_nodes *nodes,

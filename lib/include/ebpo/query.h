@@ -1,15 +1,28 @@
-/* EBP-Octree in HDF5: questions to a file. Point in solid, distance, rays, boxes: exact, with as
- * much of the file in memory as one allows.
+/*
+ * EBP-Octree in HDF5: questions to a file, with as much of it in memory as one
+ * allows.
  *
- *     ebpo_file *file;   ebpo_open("model.ebpo.h5", &file, &error);
- *     ebpo_model *model; ebpo_model_new(file, NULL, &model, &error);
- *     ebpo_context *c;   ebpo_context_new(model, &c, &error);              one for each thread
- *     ebpo_inside(c, point, NULL, &answer, &error);
+ *   Models           ebpo_model_new, and ebpo_context_new for each thread
+ *   Point in solid   ebpo_inside, ebpo_inside_many
+ *   Distance         ebpo_distance, ebpo_distance_many
+ *   Rays and boxes   ebpo_ray_first, ebpo_ray_all, ebpo_faces_in_box
+ *   Mass             ebpo_measure
  *
- * "Exact" means: the decision is that of arithmetic without rounding on the file's coordinates, for
- * every finite double that is asked about, whatever the compiler, the floating-point environment,
- * the number of threads, the memory budget or the mode. Source of the methods: BP 2008, chapter 5;
- * EBP 2017, chapter 4; format-spec/README.md, section 5.
+ *     ebpo_file *file = NULL;
+ *     ebpo_model *model = NULL;
+ *     ebpo_context *context = NULL;
+ *     ebpo_open("model.ebpo.h5", &file, &error);
+ *     ebpo_model_new(file, NULL, &model, &error);
+ *     ebpo_context_new(model, &context, &error);
+ *     ebpo_inside(context, point, NULL, &answer, &error);
+ *
+ * Answers are exact. The decision is that of arithmetic without rounding on the
+ * file's coordinates, for every finite double that is asked about, whatever the
+ * compiler, the floating-point environment, the number of threads, the memory
+ * budget or the way of loading.
+ *
+ * Sources of the methods: BP 2008, chapter 5; EBP 2017, chapter 4;
+ * format-spec/README.md, section 5.
  */
 #ifndef EBPO_QUERY_H
 #define EBPO_QUERY_H
@@ -22,88 +35,171 @@ extern "C" {
 
 /* ---- models and contexts ---- */
 
-/* How what is not in memory is fetched: EBP 2017, section 4.2. The answers are the same. */
+/*
+ * How what is not in memory is loaded: EBP 2017, section 4.2. The answers are the
+ * same.
+ */
 typedef enum ebpo_loading {
-    /* whole subtrees, kept while the budget allows, least recently used out (4.2.3) */
+    /*
+     * Whole subtrees, kept while the budget allows; the least recently used go
+     * first (4.2.3).
+     */
     EBPO_LOAD_CACHE = 0,
-    EBPO_LOAD_SUBTREE = 1, /* one whole subtree at a time, nothing else kept (4.2.5) */
-    EBPO_LOAD_NODES = 2    /* the nodes on the way and the leaf only, nothing kept (4.2.4) */
+
+    /* One whole subtree at a time, nothing else is kept (4.2.5). */
+    EBPO_LOAD_SUBTREE = 1,
+
+    /* The nodes on the way and the leaf only, nothing is kept (4.2.4). */
+    EBPO_LOAD_NODES = 2
 } ebpo_loading;
 
 typedef struct ebpo_model_options {
     size_t struct_size; /* EBPO_MODEL_OPTIONS_INIT sets it */
-    /* bytes that the model may take, with its caches and what loading needs on the way; 0: as much
-     * as it needs. Beside it: the file's table of chunks (24 bytes a chunk) and what contexts
-     * gather of answers (hits, faces) */
+
+    /*
+     * Bytes that the model may take, with its caches and what loading needs on
+     * the way. 0: as much as it needs. Beside it there are the file's table of
+     * chunks (24 bytes a chunk) and what contexts gather of answers.
+     */
     uint64_t memory;
-    /* levels 0 .. cut_level stay in memory and subtrees below are loaded on demand; -1: by the
-     * budget (all at once when that fits) */
+
+    /*
+     * Levels 0 to cut_level stay in memory, and subtrees below them are loaded on
+     * demand. -1: by the budget, everything at once if that fits.
+     */
     int cut_level;
-    ebpo_loading loading; /* only matters where not all fits, or a cut level is given */
-    /* a thread in the background loads the subtrees that queries about places around the last one
-     * may need, the nearest first (EBP 2017, 4.2.3) */
+
+    /* Matters only if not all fits, or a cut level is given. */
+    ebpo_loading loading;
+
+    /*
+     * A thread in the background loads the subtrees that questions about points
+     * around the last one may need, the nearest first (EBP 2017, 4.2.3).
+     */
     bool prefetch;
-    unsigned threads; /* for opening; 0: all cores */
+
+    /* For making the model. 0: all cores. */
+    unsigned threads;
+
     ebpo_progress progress;
 } ebpo_model_options;
+
 #define EBPO_MODEL_OPTIONS_INIT                                                      \
     {                                                                                \
         sizeof(ebpo_model_options), 0, -1, EBPO_LOAD_CACHE, false, 0, { NULL, NULL } \
     }
 
-/* What is in memory of a file, made for speed. Immutable for its users; shared by threads. */
+/* What is in memory of a file, made for speed. Threads share it. */
 typedef struct ebpo_model ebpo_model;
 
-/* Reads what the budget allows: everything, or the levels up to the cut level. Levels whose mesh
- * part is absent serve level-limited questions only. EBPO_E_LIMIT when the budget is too small,
- * with one that would do (about the least). A budget that opens holds the average subtree many
- * times, but perhaps not the largest one: the question that needs it then is EBPO_E_LIMIT too, with
- * the budget that would do. The file must stay open as long as the model. `options` may be NULL. */
+/*
+ * Reads what the budget allows: everything, or the levels up to the cut level. A
+ * model of a file without mesh answers questions to a level only. The file must
+ * stay open as long as the model.
+ *
+ * EBPO_E_LIMIT: the budget is too small; the message names one that would do. A
+ * budget that is large enough here holds the average subtree many times, but
+ * perhaps not the largest: the question that needs that one is EBPO_E_LIMIT too.
+ * EBPO_E_ARGUMENT, EBPO_E_CANCELLED, EBPO_E_MEMORY, and the errors of reading.
+ *
+ * Threads: any.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_model_new(const ebpo_file *file,
                                                   const ebpo_model_options *options,
                                                   ebpo_model **out, ebpo_error *error);
-/* After its contexts. NULL is fine. */
+
+/*
+ * After its contexts.
+ *
+ * Threads: one per model.
+ */
 EBPO_API void ebpo_model_free(ebpo_model *model);
 
-/* Sums since opening, over all contexts. */
+/* Sums since the model was made, over all contexts. */
 typedef struct ebpo_model_stats {
     size_t struct_size; /* EBPO_MODEL_STATS_INIT sets it */
-    bool resident;      /* everything is in memory */
-    int cut_level;      /* 0 when resident */
-    /* bytes now and at most: tree, caches, what loading needs on the way */
+
+    /* Everything is in memory. */
+    bool resident;
+
+    /* 0 if resident. */
+    int cut_level;
+
+    /* Bytes, now and at most: tree, caches, what loading needs on the way. */
     uint64_t memory, memory_peak;
-    uint64_t budget; /* 0: none */
-    /* subtrees found in memory, loaded because a question needed them */
+
+    /* Bytes. 0: none. */
+    uint64_t budget;
+
+    /* Subtrees found in memory, and loaded because a question needed them. */
     uint64_t hits, loads;
-    uint64_t prefetched; /* loaded in the background */
+
+    /* Subtrees loaded in the background. */
+    uint64_t prefetched;
+
+    /* Subtrees dropped to make room. */
     uint64_t evicted;
-    uint64_t bytes_read, reads; /* from the source, opening the file included */
-    double open_seconds;        /* of ebpo_model_new */
-    double load_seconds;        /* spent by questions waiting for subtrees */
-    /* leaves in memory by kind: general, one plane, two planes, convex set, concave set */
+
+    /* Bytes read from the source, and how many times; opening the file included. */
+    uint64_t bytes_read, reads;
+
+    /* That ebpo_model_new took. */
+    double open_seconds;
+
+    /* That questions spent waiting for subtrees. */
+    double load_seconds;
+
+    /*
+     * Leaves in memory, and how many of each kind: general, one plane, two planes,
+     * convex set, concave set.
+     */
     uint64_t leaves, leaves_of_kind[5];
-    /* general leaves with a wall that no face meets: a single segment answers there */
+
+    /* General leaves with a wall that no face meets: one segment answers there. */
     uint64_t leaves_one_wall;
 } ebpo_model_stats;
+
 #define EBPO_MODEL_STATS_INIT EBPO_SIZED(ebpo_model_stats)
+
+/*
+ * EBPO_E_ARGUMENT: `out` was not begun with its macro.
+ *
+ * Threads: any.
+ */
 EBPO_API ebpo_status ebpo_model_get_stats(const ebpo_model *model, ebpo_model_stats *out);
 
-/* One thread's place in a model: position, scratch, what it holds in memory. */
+/* One thread's work with a model: position, scratch, what it holds in memory. */
 typedef struct ebpo_context ebpo_context;
+
+/*
+ * EBPO_E_MEMORY.
+ *
+ * Threads: any.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_context_new(ebpo_model *model, ebpo_context **out,
                                                     ebpo_error *error);
+
+/*
+ * Threads: one per context.
+ */
 EBPO_API void ebpo_context_free(ebpo_context *context);
 
-/* ---- what is common to questions ---- */
+/* ---- what all questions have in common ---- */
 
+/*
+ * Points are three finite doubles in the model's unit. Others are
+ * EBPO_E_ARGUMENT, with the point's number. Answers to many points are the same
+ * as to one point after the other.
+ *
+ * On failure, the answers are unspecified.
+ */
+
+/* A level for exact answers. */
 enum { EBPO_LEVEL_ALL = -1 };
-
-/* Points are three finite doubles in the model's unit; others are EBPO_E_ARGUMENT with the point's
- * number. `options` may be NULL. Batches give the same answers as single calls. On failure (reading
- * the file, memory) the results are unspecified. One context per thread. */
 
 /* ---- point in solid ---- */
 
+/* Whether envelopes are used to decide early. The answers are the same. */
 typedef enum ebpo_envelopes {
     EBPO_ENVELOPES_AUTO = 0, /* where they save loading */
     EBPO_ENVELOPES_USE = 1,  /* at every gray node on the way (EBP 2017, 4.2.1) */
@@ -112,14 +208,23 @@ typedef enum ebpo_envelopes {
 
 typedef struct ebpo_inside_options {
     size_t struct_size; /* EBPO_INSIDE_OPTIONS_INIT sets it */
-    /* look at levels 0 .. level only, with the certainty that these allow; EBPO_LEVEL_ALL: exact
-     * answers */
+
+    /*
+     * Look at levels 0 to `level` only, and say what is certain by these.
+     * EBPO_LEVEL_ALL: exact answers.
+     */
     int level;
+
     ebpo_envelopes envelopes;
-    /* stop after about so many nanoseconds for each point and tell what is certain by then; 0: no
-     * deadline. It bounds the search: a subtree or a leaf that is under way is finished */
+
+    /*
+     * Stop after about so many nanoseconds for each point, and say what is
+     * certain by then. 0: no deadline. A subtree or a leaf that is under way is
+     * finished.
+     */
     uint64_t deadline_ns;
 } ebpo_inside_options;
+
 #define EBPO_INSIDE_OPTIONS_INIT                                            \
     {                                                                       \
         sizeof(ebpo_inside_options), EBPO_LEVEL_ALL, EBPO_ENVELOPES_AUTO, 0 \
@@ -129,25 +234,45 @@ typedef enum ebpo_where {
     EBPO_OUT = 0,
     EBPO_IN = 1,
     EBPO_ON = 2,   /* on a face, an edge or a vertex */
-    EBPO_MAYBE = 3 /* level or deadline did not suffice */
+    EBPO_MAYBE = 3 /* the level or the deadline did not suffice */
 } ebpo_where;
 
 typedef struct ebpo_inside_result {
-    int32_t where; /* ebpo_where */
-    /* winding number; 0 when ON or MAYBE, and when level or deadline are given and an envelope
-     * decided (with rules other than nonzero it may be another one that is not inside) */
+    /* An ebpo_where. */
+    int32_t where;
+
+    /*
+     * The winding number. 0 if EBPO_ON or EBPO_MAYBE, and if an envelope decided
+     * because a level or deadline is given: with rules other than nonzero the
+     * true one may then be another that is not inside.
+     */
     int32_t winding;
-    /* MAYBE: the surface is at most so far away (the diagonal of the cell that was reached); else 0
+
+    /*
+     * EBPO_MAYBE: the surface is at most so far away, which is the diagonal of the
+     * cell that was reached. Else 0.
      */
     double doubt;
 } ebpo_inside_result;
 
-/* BP 2008, section 5.1; EBP 2017, 4.2. A surface is EBPO_E_NOT_SOLID; a file without mesh
- * EBPO_E_ABSENT unless `level` is given. */
+/*
+ * Whether a point is in the solid. BP 2008, section 5.1; EBP 2017, 4.2.
+ *
+ * EBPO_E_NOT_SOLID: the model is a surface. EBPO_E_ABSENT: the file has no mesh,
+ * and no level is given; or a subset does not hold what decides. EBPO_E_ARGUMENT,
+ * EBPO_E_LIMIT, EBPO_E_MEMORY, and the errors of reading.
+ *
+ * Threads: one per context.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_inside(ebpo_context *context, const double point[3],
                                                const ebpo_inside_options *options,
                                                ebpo_inside_result *out, ebpo_error *error);
-/* `points`: [count][3]; `out`: [count]. */
+
+/*
+ * The same for points[count][3], into out[count].
+ *
+ * Threads: one per context.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_inside_many(ebpo_context *context, const double *points,
                                                     uint64_t count,
                                                     const ebpo_inside_options *options,
@@ -157,29 +282,52 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_inside_many(ebpo_context *context, const
 
 typedef enum ebpo_distance_mode {
     EBPO_DISTANCE_EXACT = 0,
-    /* EBP 2017, 4.4: the faces below the deepest gray node around the point; not the minimum */
+
+    /*
+     * The faces below the deepest gray node around the point; not always the
+     * minimum (EBP 2017, 4.4).
+     */
     EBPO_DISTANCE_RECURSIVE = 1,
-    EBPO_DISTANCE_LEAVES = 2, /* the faces of the leaf around the point; no answer elsewhere */
-    /* the envelope of the deepest gray node around the point, at most at `level`, unsigned;
-       max_distance does not matter; not the minimum */
+
+    /* The faces of the leaf around the point; no answer elsewhere. */
+    EBPO_DISTANCE_LEAVES = 2,
+
+    /*
+     * The envelope of the deepest gray node around the point, at most at `level`.
+     * Unsigned, not always the minimum; max_distance does not matter.
+     */
     EBPO_DISTANCE_ENVELOPE = 3
 } ebpo_distance_mode;
 
 typedef struct ebpo_distance_options {
     size_t struct_size; /* EBPO_DISTANCE_OPTIONS_INIT sets it */
-    /* as in ebpo_inside_options */
+
+    /* As in ebpo_inside_options. */
     int level;
+
     ebpo_distance_mode mode;
+
+    /* As in ebpo_inside_options. */
     uint64_t deadline_ns;
-    /* what is farther, in the model's unit, does not matter; >= 0, INFINITY: everything */
+
+    /*
+     * What is farther away, in the model's unit, does not matter; at least 0.
+     * INFINITY: everything does.
+     */
     double max_distance;
-    /* leave the sign away: less work; surfaces have none anyway */
+
+    /* Leave the sign away: less work. Surfaces have none anyway. */
     bool unsigned_distance;
-    /* begin with the last answer of this context; the answers are the same, close points are
-     * faster */
+
+    /*
+     * Begin with the last answer of this context: faster for points that are
+     * close to each other. The answers are the same.
+     */
     bool warm;
-    uint8_t reserved[6]; /* 0 */
+
+    uint8_t reserved[6];
 } ebpo_distance_options;
+
 #define EBPO_DISTANCE_OPTIONS_INIT                                                              \
     {                                                                                           \
         sizeof(ebpo_distance_options), EBPO_LEVEL_ALL, EBPO_DISTANCE_EXACT, 0, __builtin_inf(), \
@@ -189,28 +337,57 @@ typedef struct ebpo_distance_options {
         }                                                                                       \
     }
 
+/* The number of no face. */
 #define EBPO_NO_FACE UINT64_MAX
 
 typedef struct ebpo_distance_result {
-    /* correctly rounded. Solids, unless unsigned: negative inside (-0.0 where it underflows).
-     * INFINITY: nothing within max_distance; NAN: not determined (lo, hi) */
+    /*
+     * Correctly rounded. Of solids negative inside, unless unsigned (-0.0 if it
+     * underflows). INFINITY: nothing within max_distance. NAN: not determined, see
+     * `lo` and `hi`.
+     */
     double distance;
-    /* the true distance (unsigned) is certainly within; equal to |distance| for exact answers */
+
+    /* The true distance, unsigned, is certainly within. Exact answers: both it. */
     double lo, hi;
-    double point[3]; /* nearest point, rounded; NAN: none */
-    /* unit normal of the face (outward by its orientation); of a face without area: (0, 0, 0) */
+
+    /* The nearest point, rounded. NAN: none. */
+    double point[3];
+
+    /*
+     * The unit normal of the face, outward by its orientation. (0, 0, 0) for a
+     * face without area.
+     */
     double normal[3];
-    /* number of the triangle in the source where the file has maps, else in the file. Of several at
-     * exactly the same distance the one that comes first in the file. EBPO_NO_FACE: none (limited
-     * answers, envelopes) */
+
+    /*
+     * The number of the triangle in the source if the file has maps, else in the
+     * file. Of several at exactly the same distance, the first one in the file.
+     * EBPO_NO_FACE: none (limited answers, envelopes).
+     */
     uint64_t face;
 } ebpo_distance_result;
 
-/* EBP 2017, 4.4. EBPO_E_ABSENT without mesh unless `level` is given or the mode is
- * EBPO_DISTANCE_ENVELOPE. With `level` or a deadline: lo and hi; the distance when they meet. */
+/*
+ * How far a point is from the model, and from which of its faces. EBP 2017, 4.4.
+ * With a level or a deadline the answer is `lo` and `hi`, and the distance if
+ * they meet.
+ *
+ * EBPO_E_ABSENT: the file has no mesh, and neither a level is given nor the mode
+ * EBPO_DISTANCE_ENVELOPE; or a subset does not hold what decides. EBPO_E_ARGUMENT,
+ * EBPO_E_LIMIT, EBPO_E_MEMORY, and the errors of reading.
+ *
+ * Threads: one per context.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_distance(ebpo_context *context, const double point[3],
                                                  const ebpo_distance_options *options,
                                                  ebpo_distance_result *out, ebpo_error *error);
+
+/*
+ * The same for points[count][3], into out[count].
+ *
+ * Threads: one per context.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_distance_many(ebpo_context *context, const double *points,
                                                       uint64_t count,
                                                       const ebpo_distance_options *options,
@@ -219,47 +396,95 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_distance_many(ebpo_context *context, con
 /* ---- rays and boxes ---- */
 
 typedef struct ebpo_ray_hit {
-    double t;      /* the ray is at origin + t direction; rounded (the order of hits is exact) */
-    uint64_t face; /* as in ebpo_distance_result */
-    /* 1: the ray goes in through the face's interior, -1: out; 0: it meets an edge or a vertex,
-     * runs within the face's plane, or the face has no area */
+    /*
+     * The hit is at origin + t direction. Rounded; hits are in the order of the
+     * exact values.
+     */
+    double t;
+
+    /* As in ebpo_distance_result. */
+    uint64_t face;
+
+    /*
+     * 1: the ray goes in through the inner part of the face. -1: it goes out. 0:
+     * it meets an edge or a vertex, runs within the face's plane, or the face has
+     * no area.
+     */
     int32_t side;
 } ebpo_ray_hit;
 
-/* The first closed triangle that meets origin + t direction, 0 <= t <= t_max; several at the same
- * t: the one that comes first in the file. `direction` is not (0, 0, 0), of any length; t_max >= 0,
- * INFINITY: a ray. *hit is false when there is none. */
+/*
+ * The first closed triangle that a ray meets: origin + t direction, with t from 0
+ * to t_max. Of several at the same t, the first one in the file. *hit is false if
+ * there is none.
+ *
+ * direction   of any length but 0
+ * t_max       at least 0; INFINITY for a ray without end
+ *
+ * EBPO_E_ABSENT: the file has no mesh, or a subset does not hold what decides.
+ * EBPO_E_ARGUMENT, EBPO_E_LIMIT, EBPO_E_MEMORY, and the errors of reading.
+ *
+ * Threads: one per context.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_first(ebpo_context *context, const double origin[3],
                                                   const double direction[3], double t_max,
                                                   ebpo_ray_hit *out, bool *hit, ebpo_error *error);
-/* All of them, by t, then by place in the file. `hits` is the context's, valid until its next call.
+
+/*
+ * All triangles that the ray meets, by t, then in the order of the file. `hits`
+ * is the context's, until its next call.
+ *
+ * Threads: one per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_all(ebpo_context *context, const double origin[3],
                                                 const double direction[3], double t_max,
                                                 const ebpo_ray_hit **hits, uint64_t *count,
                                                 ebpo_error *error);
 
-/* The faces (closed triangles) that meet the closed box min .. max, min <= max on each axis,
- * ascending by place in the file. `faces` is the context's, valid until its next call. */
+/*
+ * The closed triangles that meet the closed box min .. max, with min <= max on
+ * each axis, in the order of the file; numbers as in ebpo_distance_result. `faces`
+ * is the context's, until its next call.
+ *
+ * Errors are those of ebpo_ray_first.
+ *
+ * Threads: one per context.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_faces_in_box(ebpo_context *context, const double min[3],
                                                      const double max[3], const uint64_t **faces,
                                                      uint64_t *count, ebpo_error *error);
 
 /* ---- mass ---- */
 
+/* In the model's unit, squared, cubed and so on. */
 typedef struct ebpo_mass {
     size_t struct_size; /* EBPO_MASS_INIT sets it */
+
     double area;
-    /* the integral of the winding number: the solid's volume where that is 0 and 1 only; 0 for a
-     * surface. Where it is 0 so is all below */
+
+    /*
+     * The integral of the winding number, which is the volume of the solid if
+     * that is 0 and 1 only. 0 for a surface. If it is 0, so is all below.
+     */
     double volume;
+
     double centroid[3];
-    double inertia[3][3]; /* about the centroid, of density 1 */
+
+    /* About the centroid, for density 1. */
+    double inertia[3][3];
 } ebpo_mass;
+
 #define EBPO_MASS_INIT EBPO_SIZED(ebpo_mass)
 
-/* From the file's mesh, with compensated sums; does not depend on threads. EBPO_E_ABSENT without
- * mesh. */
+/*
+ * Area, volume, centroid and inertia of the file's mesh, by compensated sums.
+ * threads: 0 for all cores; the result does not depend on it.
+ *
+ * EBPO_E_ABSENT: the file has no mesh, or is a subset. EBPO_E_MEMORY, and the
+ * errors of reading.
+ *
+ * Threads: any.
+ */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_measure(const ebpo_file *file, unsigned threads,
                                                 ebpo_mass *out, ebpo_error *error);
 
