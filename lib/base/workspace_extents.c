@@ -50,10 +50,10 @@ static bool admit(ebpo_workspace *w, size_t bytes)
     if (filed) {
         f->filed += bytes;
         f->filed_total += bytes;
-        f->filed_most = f->filed > f->filed_most ? f->filed : f->filed_most;
+        f->filed_peak = f->filed > f->filed_peak ? f->filed : f->filed_peak;
     } else {
         f->held += bytes;
-        f->held_most = f->held > f->held_most ? f->held : f->held_most;
+        f->held_peak = f->held > f->held_peak ? f->held : f->held_peak;
     }
     w->holders++;
     pthread_mutex_unlock(&w->lock);

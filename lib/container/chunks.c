@@ -196,13 +196,13 @@ static uint64_t cost_of(const ebpo_chunks *c, const ebpo_array_in *array, uint64
     if (ebpo_h5_chunk_count(&array->shape) == 1 || atomic_load(&c->file->located))
         return array->chunks[chunk].bytes;
     const ebpo_info *info = &c->file->info;
-    uint64_t at_hand = c->file->in.source.at_hand,
+    uint64_t prefetched = c->file->in.source.prefetched,
              index_end = info->chunk_index_offset + info->chunk_index_bytes;
     /* libhdf5 goes through the headers once more */
-    uint64_t again = at_hand < info->head_bytes ? info->chunk_index_offset : 0;
-    uint64_t index = index_end <= at_hand                 ? 0
-                     : info->chunk_index_offset < at_hand ? index_end - at_hand
-                                                          : info->chunk_index_bytes;
+    uint64_t again = prefetched < info->head_bytes ? info->chunk_index_offset : 0;
+    uint64_t index = index_end <= prefetched                 ? 0
+                     : info->chunk_index_offset < prefetched ? index_end - prefetched
+                                                             : info->chunk_index_bytes;
     return again + index +
            ebpo_chunk_bound(array->shape.chunk_rows * ebpo_h5_row_bytes(&array->shape));
 }

@@ -219,7 +219,7 @@ static ebpo_status locate_all(ebpo_file *file, ebpo_error *error)
 {
     ebpo_h5_in h5 = EBPO_H5_IN_INIT;
     ebpo_range index = { file->info.chunk_index_offset, file->info.chunk_index_bytes };
-    if (index.size && index.offset + index.size > file->in.source.at_hand)
+    if (index.size && index.offset + index.size > file->in.source.prefetched)
         ebpo_input_expect(&file->in, &index, 1);
     ebpo_status status = ebpo_h5_open(&h5, &file->in, error);
     if (status == EBPO_OK)
@@ -249,10 +249,14 @@ static ebpo_status locate(ebpo_file *file, ebpo_error *error)
 
 ebpo_status ebpo_file_locate(const ebpo_file *file, ebpo_stored_sizes *out, ebpo_error *error)
 {
-    ebpo_status status =
-        atomic_load(&file->located) ? EBPO_OK : locate(ebpo_reader_own(file), error);
+    ebpo_stored_sizes sizes = EBPO_STORED_SIZES_INIT;
+    ebpo_status status = out ? EBPO_CHECK_SIZED(ebpo_stored_sizes, out, error) : EBPO_OK;
+    if (status == EBPO_OK && !atomic_load(&file->located))
+        status = locate(ebpo_reader_own(file), error);
+    if (status == EBPO_OK && out)
+        sizes = stored_sizes(file);
     if (out)
-        *out = status == EBPO_OK ? stored_sizes(file) : (ebpo_stored_sizes){ .map_bytes = 0 };
+        EBPO_GIVE(ebpo_stored_sizes, out, &sizes);
     return status;
 }
 

@@ -28,8 +28,8 @@ typedef struct driver_choice {
 ebpo_status ebpo_h5_driver_open(ebpo_h5_driver *driver, ebpo_input *input, ebpo_error *error)
 {
     uint64_t bytes = input->source.size < HEAD_BYTES ? input->source.size : HEAD_BYTES;
-    if (ebpo_input_is_far(input) && input->source.at_hand < bytes)
-        bytes = input->source.at_hand;
+    if (ebpo_input_is_far(input) && input->source.prefetched < bytes)
+        bytes = input->source.prefetched;
     *driver = (ebpo_h5_driver){ .input = input,
                                 .id = -1,
                                 .head = ebpo_alloc(bytes, 1),

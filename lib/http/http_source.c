@@ -290,7 +290,7 @@ ebpo_status ebpo_source_of_url(const char *url, const ebpo_http_options *options
     made.size = s->version.size;
     made.read = source_read;
     made.close = source_close;
-    made.expect = source_expect;
-    made.at_hand = s->head_bytes;
+    made.prefetch = source_expect;
+    made.prefetched = s->head_bytes;
     return EBPO_GIVE(ebpo_source, out, &made);
 }

@@ -108,9 +108,10 @@ ebpo_source ebpo_source_of_memory(const void *data, uint64_t size)
 
 /* What the source had to fetch before it could be opened: counted once, however often it is looked
  * at. */
-static uint64_t at_hand(const ebpo_input *input)
+static uint64_t prefetched(const ebpo_input *input)
 {
-    return input->source.at_hand < input->source.size ? input->source.at_hand : input->source.size;
+    return input->source.prefetched < input->source.size ? input->source.prefetched
+                                                         : input->source.size;
 }
 
 ebpo_status ebpo_input_open(ebpo_input *input, const ebpo_source *source, const char *name,
@@ -118,7 +119,7 @@ ebpo_status ebpo_input_open(ebpo_input *input, const ebpo_source *source, const 
 {
     input->source = *source;
     input->shown = strdup(name);
-    atomic_init(&input->bytes, at_hand(input));
+    atomic_init(&input->bytes, prefetched(input));
     atomic_init(&input->reads, 0);
     if (input->shown)
         return EBPO_OK;
@@ -147,7 +148,7 @@ ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size, v
                             " are named, but the file ends at %" PRIu64
                             "; get a fresh copy of the file",
                             offset, offset + size - 1, input->source.size);
-    uint64_t begin = offset > at_hand(input) ? offset : at_hand(input);
+    uint64_t begin = offset > prefetched(input) ? offset : prefetched(input);
     atomic_fetch_add_explicit(&input->bytes, offset + size > begin ? offset + size - begin : 0,
                               memory_order_relaxed);
     atomic_fetch_add_explicit(&input->reads, 1, memory_order_relaxed);
@@ -166,10 +167,10 @@ ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size, v
 void ebpo_input_expect(ebpo_input *input, const ebpo_range *ranges, size_t count)
 {
     uint64_t size = input->source.size;
-    if (!input->source.expect || count == 0)
+    if (!input->source.prefetch || count == 0)
         return;
     for (size_t i = 0; i < count; i++)
         if (ranges[i].offset > size || ranges[i].size > size - ranges[i].offset)
             return; /* the reading will say so */
-    input->source.expect(input->source.user, ranges, count);
+    input->source.prefetch(input->source.user, ranges, count);
 }

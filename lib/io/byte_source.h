@@ -37,13 +37,13 @@ EBPO_MUST_USE ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, ui
 /* True when announcing is of use. */
 static inline bool ebpo_input_expects(const ebpo_input *input)
 {
-    return input->source.expect != NULL;
+    return input->source.prefetch != NULL;
 }
 /* True when not everything is to be looked at in opening. */
 static inline bool ebpo_input_is_far(const ebpo_input *input)
 {
-    return input->source.expect && input->source.at_hand &&
-           input->source.at_hand < input->source.size;
+    return input->source.prefetch && input->source.prefetched &&
+           input->source.prefetched < input->source.size;
 }
 /* Announces what will be read. Ranges beyond the source's end are let pass: reading them will fail.
  */

@@ -243,7 +243,7 @@ START_TEST(all_metadata_is_in_two_pieces)
     write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, ~0u);
     ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
     const ebpo_info *info = ebpo_file_info(file);
-    ebpo_stored_sizes stored;
+    ebpo_stored_sizes stored = EBPO_STORED_SIZES_INIT;
     ck_assert_int_eq(ebpo_file_locate(file, &stored, NULL), EBPO_OK);
     metadata_places m = { info->head_bytes, info->chunk_index_offset, info->chunk_index_bytes, 0 };
     uint64_t size = info->file_bytes, first_levels = m.head;
@@ -279,7 +279,7 @@ START_TEST(files_of_all_sizes_have_no_gaps)
             write_ok(&tree, in_folder("a.ebpo.h5"), (ebpo_codec)codec, 1, some);
             ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
             const ebpo_info *info = ebpo_file_info(file);
-            ebpo_stored_sizes stored;
+            ebpo_stored_sizes stored = EBPO_STORED_SIZES_INIT;
             ck_assert_int_eq(ebpo_file_locate(file, &stored, NULL), EBPO_OK);
             uint64_t sum = info->head_bytes + info->chunk_index_bytes + stored.mesh_vertex_bytes +
                            stored.mesh_face_bytes + stored.map_bytes;

@@ -135,7 +135,7 @@ static void whole_open(whole *w, const char *name, int cut_level, bool shape)
     ebpo_slice slice;
     memset(w, 0, sizeof *w);
     fine(ebpo_open(name, &w->file, &error), &error);
-    fine(ebpo_file_read_tree(w->file, &w->tree, 1, &error), &error);
+    fine(ebpo_file_read_tree(w->file, NULL, &w->tree, &error), &error);
     for (int i = 0; i < w->tree.info.level_count; i++)
         fine(ebpo_level_ranks_make(&w->ranks[i], &w->tree.level[i], i, &error), &error);
     w->nodes = (ebpo_level_nodes){ w->tree.level, w->ranks, w->tree.info.level_count };

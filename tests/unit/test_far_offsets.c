@@ -258,7 +258,7 @@ START_TEST(containers_are_read_from_beyond_8_gib)
                                .user = &s,
                                .size = s.by + s.size,
                                .read = read_shifted,
-                               .expect = away ? expect_shifted : NULL };
+                               .prefetch = away ? expect_shifted : NULL };
         ck_assert_msg(ebpo_open_memory(s.bytes, s.size, "near", &near, &error) == EBPO_OK, "%s",
                       error.message);
         ck_assert_msg(ebpo_open_source(&source, "far", &far, &error) == EBPO_OK, "%s",
@@ -387,8 +387,8 @@ START_TEST(workspaces_hold_arrays_beyond_4_gib_in_memory)
                   error.message);
     touch_ends(w);
     ebpo_workspace_get_stats(w, &f);
-    ck_assert_uint_gt(f.held_most, FAR);
-    ck_assert_uint_eq(f.filed_most, 0);
+    ck_assert_uint_gt(f.held_peak, FAR);
+    ck_assert_uint_eq(f.filed_peak, 0);
     ebpo_workspace_free(w);
 }
 END_TEST
@@ -417,7 +417,7 @@ START_TEST(workspaces_hold_arrays_beyond_4_gib_in_files)
                   error.message);
     touch_ends(w);
     ebpo_workspace_get_stats(w, &f);
-    ck_assert_uint_gt(f.filed_most, FAR);
+    ck_assert_uint_gt(f.filed_peak, FAR);
     ebpo_workspace_free(w);
 }
 END_TEST

@@ -75,7 +75,7 @@ static ebpo_status read_all(const ebpo_source *s, ebpo_error *error)
     for (uint64_t i = 0; i < 10; i++)
         announced[i] = (ebpo_range){ (9 - i) * 300000, i == 0 ? DATA_BYTES - 2700000 : 300000 };
     if (status == EBPO_OK)
-        s->expect(s->user, announced, 10);
+        s->prefetch(s->user, announced, 10);
     for (int i = 9; i >= 0 && status == EBPO_OK; i--)
         status = read_one(s, announced[i].offset, announced[i].size, error);
     return status;
@@ -313,7 +313,7 @@ START_TEST(opening_is_one_request_and_what_was_announced_comes_in_few)
     ebpo_range ranges[29];
     for (uint64_t i = 0; i < 29; i++)
         ranges[i] = (ebpo_range){ HEAD_BYTES + i * 98000, 98000 };
-    s.expect(s.user, ranges, 29);
+    s.prefetch(s.user, ranges, 29);
     for (int i = 0; i < 29; i++)
         ck_assert_int_eq(read_one(&s, ranges[i].offset, ranges[i].size, &error), EBPO_OK);
     ck_assert_uint_eq(stats_of(&s).requests, 2);
@@ -333,7 +333,7 @@ START_TEST(what_was_announced_and_not_read_does_no_harm)
     for (int i = 0; i < 300; i++) {
         uint64_t at = next_random(&random) % (DATA_BYTES - 5000);
         ebpo_range twice[2] = { { at, 5000 }, { at + 1000, 2000 } };
-        s.expect(s.user, twice, 2);
+        s.prefetch(s.user, twice, 2);
         if (i % 3 == 0)
             ck_assert_int_eq(read_one(&s, next_random(&random) % (DATA_BYTES - 9000), 9000, &error),
                              EBPO_OK);
@@ -359,7 +359,7 @@ static void *read_anywhere(void *argument)
                  size = 1 + next_random(&r->random) % most;
         ebpo_error error = EBPO_ERROR_INIT;
         if (i % 2)
-            r->source->expect(r->source->user, &(ebpo_range){ at, size }, 1);
+            r->source->prefetch(r->source->user, &(ebpo_range){ at, size }, 1);
         ebpo_status status = read_one(r->source, at, size, &error);
         if (status != EBPO_OK)
             atomic_fetch_add(r->failures, 1);
@@ -460,7 +460,7 @@ START_TEST(a_source_is_closed_while_it_reads_ahead)
     ebpo_http_options o = quick();
     ebpo_source s = EBPO_SOURCE_INIT;
     ck_assert_int_eq(ebpo_source_of_url(web_url("good"), &o, &s, &error), EBPO_OK);
-    s.expect(s.user, &(ebpo_range){ 0, DATA_BYTES }, 1);
+    s.prefetch(s.user, &(ebpo_range){ 0, DATA_BYTES }, 1);
     s.close(s.user);
 }
 END_TEST
@@ -627,7 +627,7 @@ START_TEST(the_folder_serves_other_ranges_than_those_it_was_filled_with)
             uint64_t size = 1 + next_random(&random) % most;
             ebpo_range range = { offset, offset + size > DATA_BYTES ? DATA_BYTES - offset : size };
             if (i % 2)
-                s.expect(s.user, &range, 1);
+                s.prefetch(s.user, &range, 1);
             ck_assert_msg(read_one(&s, range.offset, range.size, &error) == EBPO_OK, "%s",
                           error.message);
         }

@@ -201,7 +201,7 @@ START_TEST(memory_does_not_change_what_mending_makes)
     ck_assert(ebpo_workspace_make_any(&w, 2 << 20, NULL, &error) == EBPO_OK);
     mend_both(damaged(ebpo_test_solid_count + _i), ALL, w);
     ebpo_workspace_get_stats(w, &f);
-    ck_assert_uint_gt(f.filed_most, 8 << 20);
+    ck_assert_uint_gt(f.filed_peak, 8 << 20);
     ck_assert(f.held == 0 && f.filed == 0);
     ebpo_workspace_free(w);
 }

@@ -137,6 +137,9 @@ START_TEST(structs_that_were_not_begun)
     ebpo_limit limit = EBPO_LIMIT_INIT;
     REFUSED(ebpo_limit_options, ebpo_limit_level(m.file, 0, zeros(), &limit, error));
     ck_assert_int_eq(ebpo_file_get_stats(m.file, zeros()), EBPO_E_ARGUMENT);
+    REFUSED(ebpo_stored_sizes, ebpo_file_locate(m.file, zeros(), error));
+    ebpo_level level;
+    REFUSED(ebpo_read_options, ebpo_file_read_level(m.file, 0, zeros(), &level, error));
     REFUSED(ebpo_mass, ebpo_measure(m.file, 1, zeros(), error));
     REFUSED(ebpo_deviation, ebpo_deviation_level(m.model, m.file, 0, NULL, zeros(), error));
     REFUSED(ebpo_deviation_options,

@@ -302,8 +302,8 @@ START_TEST(the_index_is_found_whatever_the_head_says_of_its_place)
                                .size = size,
                                .read = probe_read,
                                .close = probe_close,
-                               .expect = probe_expect,
-                               .at_hand = 100000 };
+                               .prefetch = probe_expect,
+                               .prefetched = 100000 };
         ck_assert_msg(ebpo_open_source(&source, "far", &file, &error) == EBPO_OK, "%s",
                       error.message);
         ebpo_info *info = &file->info;

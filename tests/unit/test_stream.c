@@ -154,7 +154,7 @@ static void expect_tree(ebpo_file *file, bool planes, bool polygons)
     ebpo_tree tree;
     ck_assert_msg(ebpo_file_read_tree(file, NULL, &tree, &error) == EBPO_OK, "%s", error.message);
     ebpo_stream *stream = new_stream(file, planes, polygons, 2);
-    ebpo_stored_sizes stored;
+    ebpo_stored_sizes stored = EBPO_STORED_SIZES_INIT;
     ck_assert_int_eq(ebpo_file_locate(file, &stored, NULL), EBPO_OK);
     ebpo_stream_level level;
     uint64_t *parents = NULL, parent_count = 1, bytes = tree.info.head_bytes;
@@ -272,7 +272,7 @@ START_TEST(only_the_level_asked_for_is_read)
     const ebpo_info *info = ebpo_file_info(file);
     ebpo_stream_level level;
     ebpo_stream_node node;
-    ebpo_stored_sizes stored;
+    ebpo_stored_sizes stored = EBPO_STORED_SIZES_INIT;
     ck_assert_int_eq(ebpo_file_locate(file, &stored, NULL), EBPO_OK);
     uint64_t before, after;
     for (int i = 0; i < info->level_count; i++) {

@@ -140,8 +140,8 @@ static ebpo_file *open_counted(counted *c, bool far)
         .struct_size = sizeof(ebpo_source), .user = c, .size = c->size, .read = read_counted
     };
     if (far) {
-        source.expect = expect_counted;
-        source.at_hand = c->size < 4096 ? c->size : 4096;
+        source.prefetch = expect_counted;
+        source.prefetched = c->size < 4096 ? c->size : 4096;
     }
     ck_assert_msg(ebpo_open_source(&source, "counted", &file, &error) == EBPO_OK, "%s",
                   error.message);

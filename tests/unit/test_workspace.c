@@ -80,7 +80,7 @@ START_TEST(growing_keeps_what_was_there)
     ebpo_array_free(w, a);
     ebpo_workspace_stats f = EBPO_WORKSPACE_STATS_INIT;
     ebpo_workspace_get_stats(w, &f);
-    ck_assert(f.held == 0 && f.filed == 0 && f.filed_most > 0 && f.held_most > 0);
+    ck_assert(f.held == 0 && f.filed == 0 && f.filed_peak > 0 && f.held_peak > 0);
     ebpo_workspace_free(w);
 }
 END_TEST

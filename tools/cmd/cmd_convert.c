@@ -201,7 +201,7 @@ static ebpo_status print_result(const values *v, const mesh_input *p, const char
     if (v->quiet && !v->json)
         return EBPO_OK;
     ebpo_file *file = NULL;
-    ebpo_stored_sizes stored;
+    ebpo_stored_sizes stored = EBPO_STORED_SIZES_INIT;
     ebpo_status status = ebpo_open(out, &file, error);
     if (status == EBPO_OK)
         status = ebpo_file_locate(file, &stored, error);

@@ -38,7 +38,7 @@ static int run(void *given, const char **operand)
         return EXIT_FAILED;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
-    ebpo_stored_sizes stored;
+    ebpo_stored_sizes stored = EBPO_STORED_SIZES_INIT;
     ebpo_status status = remote_open(&file, operand[0], &v->remote, &error);
     if (status == EBPO_OK)
         status = ebpo_file_locate(file, &stored, &error);

@@ -205,7 +205,7 @@ ebpo_status subset_tell(const subset_values *v, const char *out_path, const ebpo
     ebpo_file *file = NULL;
     if (v->quiet && !v->json)
         return EBPO_OK;
-    ebpo_stored_sizes stored;
+    ebpo_stored_sizes stored = EBPO_STORED_SIZES_INIT;
     ebpo_status status = ebpo_open(out_path, &file, error);
     if (status == EBPO_OK)
         status = ebpo_file_locate(file, &stored, error);

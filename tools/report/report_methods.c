@@ -33,8 +33,10 @@ static int learn(comparison *c, method *m)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
     ebpo_status status = remote_open(&file, m->path, &c->v->remote, &error);
-    if (status == EBPO_OK)
+    if (status == EBPO_OK) {
+        m->stored = (ebpo_stored_sizes)EBPO_STORED_SIZES_INIT;
         status = ebpo_file_locate(file, &m->stored, &error);
+    }
     if (status == EBPO_OK)
         m->info = *ebpo_file_info(file);
     ebpo_close(file);

@@ -405,15 +405,15 @@ typedef struct ebpo_source {
      * a source far away fetches them together and ahead of the reader. It does not
      * wait, and nothing depends on it. May be NULL.
      */
-    void (*expect)(void *user, const ebpo_range *ranges, size_t count);
+    void (*prefetch)(void *user, const ebpo_range *ranges, size_t count);
 
     /*
-     * With `expect`: so many bytes at the beginning need no fetching. If they are
+     * With `prefetch`: so many bytes at the beginning need no fetching. If they are
      * not the whole file, opening looks at no others. Where the chunks lie of
      * arrays of more than one chunk is read when it is needed, or by
      * ebpo_file_locate.
      */
-    uint64_t at_hand;
+    uint64_t prefetched;
 } ebpo_source;
 
 #define EBPO_SOURCE_INIT EBPO_SIZED(ebpo_source)
@@ -501,15 +501,19 @@ EBPO_API ebpo_status ebpo_file_get_stats(const ebpo_file *file, ebpo_file_stats 
 
 /* Bytes that parts take in the file, compressed. */
 typedef struct ebpo_stored_sizes {
+    size_t struct_size; /* EBPO_STORED_SIZES_INIT sets it */
+
     uint64_t level_bytes[EBPO_LEVELS_MAX];
     uint64_t mesh_vertex_bytes, mesh_face_bytes, map_bytes;
 } ebpo_stored_sizes;
 
+#define EBPO_STORED_SIZES_INIT EBPO_SIZED(ebpo_stored_sizes)
+
 /*
  * Finds out where all chunks lie, if that has not been read yet (files far away,
- * `at_hand` of ebpo_source), and adds up what they take. `out` may be NULL.
+ * `prefetched` of ebpo_source), and adds up what they take. `out` may be NULL.
  *
- * EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY.
+ * EBPO_E_ARGUMENT: `out` was not begun with its macro. EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY.
  *
  * Threads: any.
  */

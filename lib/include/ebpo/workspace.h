@@ -77,10 +77,10 @@ typedef struct ebpo_workspace_stats {
     uint64_t memory;
 
     /* Of arrays in memory: now, and at most. */
-    uint64_t held, held_most;
+    uint64_t held, held_peak;
 
     /* Of arrays in files: now, at most at one time, and summed over all. */
-    uint64_t filed, filed_most, filed_total;
+    uint64_t filed, filed_peak, filed_total;
 } ebpo_workspace_stats;
 
 #define EBPO_WORKSPACE_STATS_INIT EBPO_SIZED(ebpo_workspace_stats)
