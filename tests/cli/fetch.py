@@ -107,7 +107,7 @@ def refusals(tool, folder, path, url):
     Handler.reset()
     Handler.damage = True
     done = run(tool, "fetch", url, out)
-    expect("a transfer that was damaged", done.returncode == 1 and "begins anew" in done.stderr and not os.path.exists(part) and not os.path.exists(out), done.stderr)
+    expect("a transfer that was damaged", done.returncode == 1 and "starts again" in done.stderr and not os.path.exists(part) and not os.path.exists(out), done.stderr)
     done = run(tool, "fetch", url, out)
     expect("and the next one", done.returncode == 0 and content(out) == content(path), done.stderr)
     os.remove(out)
@@ -126,7 +126,7 @@ def resume(tool, folder, path, url):
     expect("an interruption keeps what came", done.returncode == 1 and not os.path.exists(out) and held > len(Handler.data) / 8 and held >= first - 131072 and "kept in " + part in done.stderr, (held, first, done.stderr))
     Handler.reset()
     done = run(tool, "fetch", url, out)
-    expect("and goes on from there", done.returncode == 0 and content(out) == content(path) and "going on with" in done.stderr, done.stderr)
+    expect("and goes on from there", done.returncode == 0 and content(out) == content(path) and "resuming with" in done.stderr, done.stderr)
     expect("without fetching it again", Handler.sent <= whole - held + 2 * 131072, f"{Handler.sent} of {whole}, {held} had come")
     expect("the folder goes", not os.path.exists(part))
     print(f"whole {whole} bytes; interrupted after {first}, {held} kept; then {Handler.sent}")

@@ -8,7 +8,7 @@
 
 #include "cli/command.h"
 
-static const arg_option help_option = { "help", 'h', ARG_FLAG, 0, NULL, "print this and end",
+static const arg_option help_option = { "help", 'h', ARG_FLAG, 0, NULL, "print this help and exit",
                                         0,      0,   NULL };
 
 /* Says what is wrong; the result to return. */
@@ -57,7 +57,7 @@ static arg_result find_word(const arg_spec *spec, const arg_option *o, const cha
         }
     char all[200];
     join_words(o->words, all, sizeof all);
-    return wrong(spec, "--%s: '%.*s' is none of: %s", o->name, (int)length, text, all);
+    return wrong(spec, "--%s: '%.*s' is not one of: %s", o->name, (int)length, text, all);
 }
 
 static arg_result set_bits(const arg_spec *spec, const arg_option *o, const char *text,
@@ -80,7 +80,7 @@ static arg_result add_to_list(const arg_spec *spec, const arg_option *o, const c
                               arg_list *out)
 {
     if (out->count == ARG_LIST_MAX)
-        return wrong(spec, "--%s: is given more than %d times", o->name, ARG_LIST_MAX);
+        return wrong(spec, "--%s: given more than %d times", o->name, ARG_LIST_MAX);
     out->item[out->count++] = text;
     return ARGS_RUN;
 }
@@ -217,15 +217,14 @@ arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values,
         else if (options && a[0] == '-' && a[1])
             result = take_letters(&p);
         else if (count == spec->most)
-            result = wrong(spec, "'%s' is one operand too many; expected: %s", a, spec->operands);
+            result = wrong(spec, "unexpected operand '%s'; expected: %s", a, spec->operands);
         else
             operands[count++] = a;
         if (result != ARGS_RUN)
             return result;
     }
     if (count < spec->least)
-        return wrong(spec, "%s; expected: %s",
-                     count ? "an operand is missing" : "operands are missing", spec->operands);
+        return wrong(spec, "missing operand%s; expected: %s", count ? "" : "s", spec->operands);
     return ARGS_RUN;
 }
 

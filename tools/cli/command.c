@@ -70,7 +70,7 @@ bool command_wants_hdf5(const char *name, const char *path)
     int is_hdf5 = command_is_hdf5(name, path);
     if (is_hdf5 == 0)
         fprintf(stderr,
-                "ebpo %s: %s: is not an .ebpo.h5 file; make one of a mesh with 'ebpo convert'\n",
+                "ebpo %s: %s: is not an .ebpo.h5 file; make one from a mesh with 'ebpo convert'\n",
                 name, path);
     return is_hdf5 > 0;
 }

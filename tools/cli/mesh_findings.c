@@ -16,8 +16,8 @@ static const struct finding_text {
     { offsetof(ebpo_mesh_report, misoriented_edges), "misoriented_edges",
       "edge whose two faces disagree in orientation",
       "edges whose two faces disagree in orientation", "face" },
-    { offsetof(ebpo_mesh_report, unbalanced_edges), "unbalanced_edges", "edge does not balance",
-      "edges do not balance", "face" },
+    { offsetof(ebpo_mesh_report, unbalanced_edges), "unbalanced_edges", "unbalanced edge",
+      "unbalanced edges", "face" },
     { offsetof(ebpo_mesh_report, bowtie_vertices), "bowtie_vertices",
       "vertex where several fans of faces meet", "vertices where several fans of faces meet",
       "vertex" },
@@ -30,7 +30,7 @@ static const struct finding_text {
     { offsetof(ebpo_mesh_report, unreferenced_vertices), "unreferenced_vertices",
       "vertex that no face uses", "vertices that no face uses", "vertex" },
     { offsetof(ebpo_mesh_report, repeated_positions), "repeated_positions",
-      "vertex at an earlier vertex's position", "vertices at an earlier vertex's position",
+      "vertex at the position of an earlier one", "vertices at the position of an earlier one",
       "vertex" },
 };
 enum { FINDINGS = sizeof findings / sizeof *findings };
@@ -68,7 +68,7 @@ static void print_findings(FILE *out, const ebpo_mesh_report *report)
         print_places(out, f, findings[i].place);
     }
     if (!any)
-        fputs("  nothing to complain about\n", out);
+        fputs("  no problems found\n", out);
 }
 
 static void print_reading(FILE *out, const ebpo_mesh *mesh)
@@ -86,7 +86,7 @@ static void print_reading(FILE *out, const ebpo_mesh *mesh)
         fprintf(out, "  %s unrolled\n",
                 words_plural(text, sizeof text, mesh->strips, "triangle strip", "triangle strips"));
     if (mesh->polygons_dropped)
-        fprintf(out, "  %s of fewer than three corners left out\n",
+        fprintf(out, "  %s with fewer than three corners left out\n",
                 words_plural(text, sizeof text, mesh->polygons_dropped, "polygon", "polygons"));
 }
 
@@ -95,7 +95,7 @@ static const char *kind(const ebpo_mesh_report *report)
     if (!report->balanced)
         return "a surface: its edges do not balance, so there is no inside";
     return report->manifold ? "a solid, closed 2-manifold"
-                            : "a solid: its edges balance, though it is no 2-manifold";
+                            : "a solid: its edges balance, though it is not a 2-manifold";
 }
 
 void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
@@ -170,7 +170,7 @@ static void advise_boundary(FILE *out, bool *any, const ebpo_mesh_report *report
         advise(out, any, report->repeated_positions.count, "repeated positions",
                "try --weld first");
     advise(out, any, edges, "boundary edges",
-           record->fill_holes ? "holes that are no simple loops need a mesh editor"
+           record->fill_holes ? "holes that are not simple loops need a mesh editor"
                               : "try --fill-holes");
 }
 
@@ -180,18 +180,16 @@ void findings_warn(FILE *out, const char *command, const char *path, const ebpo_
     if (report->balanced)
         return;
     bool any = false;
-    fprintf(
-        out,
-        "ebpo %s: %s: warning: this is a surface, not a solid, so what is inside stays unknown;",
-        command, path);
+    fprintf(out, "ebpo %s: %s: warning: this is a surface, not a solid, so it has no inside;",
+            command, path);
     advise_boundary(out, &any, report, record);
     if (report->misoriented_edges.count)
         advise(out, &any, report->misoriented_edges.count, "misoriented edges",
                record->orient ? "cannot be oriented; use a mesh editor" : "try --orient");
     if (report->nonmanifold_edges.count)
         advise(out, &any, report->nonmanifold_edges.count, "edges shared by more than two faces",
-               record->orient ? "remove the faces that are too many"
-                              : "try --orient, or remove the faces that are too many");
+               record->orient ? "remove the extra faces"
+                              : "try --orient, or remove the extra faces");
     if (!any)
         advise(out, &any, report->unbalanced_edges.count, "unbalanced edges", "see 'ebpo check'");
     fputc('\n', out);

@@ -10,11 +10,11 @@ typedef struct mending {
     bool weld, orient, fill_holes;
 } mending;
 
-#define MENDING_OPTIONS(type, member)                                     \
-    OPTION_FLAG("weld", 0, type, member.weld,                             \
-                "first merge vertices at one position (STL: always)"),    \
-        OPTION_FLAG("orient", 0, type, member.orient,                     \
-                    "then make neighbouring faces agree in orientation"), \
+#define MENDING_OPTIONS(type, member)                                               \
+    OPTION_FLAG("weld", 0, type, member.weld,                                       \
+                "first merge vertices at the same position (always done for STL)"), \
+        OPTION_FLAG("orient", 0, type, member.orient,                               \
+                    "then make neighbouring faces agree in orientation"),           \
         OPTION_FLAG("fill-holes", 0, type, member.fill_holes, "then close simple boundary loops")
 
 typedef struct mesh_input {

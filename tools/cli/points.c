@@ -108,12 +108,11 @@ static taken check_row(points *p, const double *row)
     if (p->kind == POINTS_RAYS && row[3] == 0 && row[4] == 0 && row[5] == 0)
         return fail_row(p, "the direction is 0 0 0");
     if (p->kind == POINTS_RAYS && !(row[6] >= 0))
-        return fail_row(p, "tmax is not 0 or more");
+        return fail_row(p, "tmax must be 0 or more");
     for (int k = 0; k < 3 && p->kind == POINTS_BOXES; k++)
         if (row[k] > row[3 + k])
-            return fail_row(
-                p, "the first corner of a box is the lower one, but %c0 is greater than %c1",
-                "xyz"[k], "xyz"[k]);
+            return fail_row(p, "the lower corner of a box comes first, but %c0 is greater than %c1",
+                            "xyz"[k], "xyz"[k]);
     return TAKEN;
 }
 
@@ -129,9 +128,8 @@ static char *skip_blanks(char *s)
 static taken wrong_count(points *p)
 {
     static const char *const expected[] = {
-        "three numbers are expected",
-        "six or seven numbers are expected: origin, direction and tmax",
-        "six numbers are expected: the lower and the upper corner"
+        "expected three numbers", "expected six or seven numbers: origin, direction and tmax",
+        "expected six numbers: the lower and the upper corner"
     };
     return fail_row(p, "%s", expected[p->kind]);
 }
@@ -172,8 +170,8 @@ static taken take_line(points *p, double *row)
         if (!p->ended) {
             p->line++;
             return fail_row(p,
-                            "is longer than %d bytes; this is no text of points (raw doubles are "
-                            "read with --raw)",
+                            "is longer than %d bytes; this is not a text file of points (--raw "
+                            "reads raw doubles)",
                             ROOM);
         }
         if (p->at == p->end)
@@ -184,7 +182,7 @@ static taken take_line(points *p, double *row)
     p->line++;
     if (memchr(begin, 0, (size_t)(end - begin)))
         return fail_row(
-            p, "holds a zero byte; this is no text of points (raw doubles are read with --raw)");
+            p, "contains a zero byte; this is not a text file of points (--raw reads raw doubles)");
     *end = 0;
     if (p->line == 1 && strncmp(begin, "\xef\xbb\xbf", 3) == 0) /* byte order mark */
         begin += 3;
@@ -213,8 +211,8 @@ static taken take_raw(points *p, double *row)
         return MORE_NEEDED;
     if (left < bytes)
         return fail(p,
-                    "%zu bytes are left over at the end, but each takes %zu; it is cut short or "
-                    "holds something else",
+                    "%zu bytes are left over at the end, but each item takes %zu; the input is cut "
+                    "short or is something else",
                     left, bytes);
     for (int i = 0; i < width; i++)
         row[i] = load_little(p->buffer + p->at + 8 * i);
@@ -247,7 +245,7 @@ static void read_ply(points *p)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     if (p->kind != POINTS) {
-        fail(p, "is a PLY, which holds points; %s are read as text or with --raw",
+        fail(p, "is a PLY file, which holds points; give %s as text or with --raw",
              p->kind == POINTS_RAYS ? "rays" : "boxes");
         return;
     }
@@ -304,15 +302,14 @@ static void begin(points *p)
     if (p->failed)
         return;
     if (begins_as_hdf5(p))
-        fail(p,
-             "is an HDF5 file and holds no %s; the model comes first, what is asked about second",
+        fail(p, "is an HDF5 file and holds no %s; the model comes first, then what to ask about",
              wanted[p->kind]);
     else if (begins_as_ply(p) && !p->raw)
         read_ply(p);
     else if (begins_as_ply(p) && p->kind == POINTS)
-        fail(p, "is a PLY and no raw doubles; it is read without --raw");
+        fail(p, "is a PLY file, not raw doubles; leave out --raw");
     else if (begins_as_ply(p))
-        fail(p, "is a PLY, which holds points; %s are read as text or as raw doubles",
+        fail(p, "is a PLY file, which holds points; give %s as text or as raw doubles",
              wanted[p->kind]);
 }
 

@@ -35,7 +35,7 @@ bool query_accepts(const char *name, const query_values *v, unsigned idle, const
                 { QUERY_PREFETCH, v->prefetch, "--prefetch" } };
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         if (all[i].given && idle & all[i].bit) {
-            command_usage(name, "%s has no effect with %s; leave one of them away", all[i].option,
+            command_usage(name, "%s has no effect with %s; leave out one of them", all[i].option,
                           with);
             return false;
         }

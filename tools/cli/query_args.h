@@ -24,14 +24,14 @@ typedef struct query_values {
     }
 
 /* Rows for the tables of options. In other structs query_values comes first. */
-#define QUERY_MODEL_OPTIONS                                                                       \
-    OPTION_TEXT("memory", 0, query_values, memory, "SIZE",                                        \
-                "bytes that the model may take: 64M, 1G, 512K (powers of 1024); 0, the default: " \
-                "as much as it needs"),                                                           \
-        OPTION_INT("cut-level", 0, query_values, cut_level, "C", 0, 20,                           \
-                   "keep levels 0 to C in memory, load subtrees below on demand; the default: "   \
-                   "all at once where --memory allows"),                                          \
-        OPTION_INT("threads", 0, query_values, threads, "N", 0, 256,                              \
+#define QUERY_MODEL_OPTIONS                                                                      \
+    OPTION_TEXT("memory", 0, query_values, memory, "SIZE",                                       \
+                "bytes that the model may use: 64M, 1G, 512K (powers of 1024); 0, the default: " \
+                "as many as it needs"),                                                          \
+        OPTION_INT("cut-level", 0, query_values, cut_level, "C", 0, 20,                          \
+                   "keep levels 0 to C in memory and load subtrees below on demand; default: "   \
+                   "everything at once if --memory allows"),                                     \
+        OPTION_INT("threads", 0, query_values, threads, "N", 0, 256,                             \
                    "threads for opening; 0, the default: all cores")
 
 /* Rays and boxes look at many subtrees anyway: nothing is loaded ahead of them. */
@@ -39,18 +39,18 @@ typedef struct query_values {
     OPTION_FLAG("prefetch", 0, query_values, prefetch, \
                 "load subtrees around the last one in the background")
 
-#define QUERY_FORM_OPTIONS(raw_text)                                                     \
-    OPTION_FLAG("raw", 0, query_values, raw, raw_text),                                  \
-        OPTION_FLAG("json", 0, query_values, json, "a JSON object for each, on a line"), \
-        OPTION_FLAG("stats", 0, query_values, remote.stats,                              \
-                    "what it took, on standard error at the end"),                       \
+#define QUERY_FORM_OPTIONS(raw_text)                                                           \
+    OPTION_FLAG("raw", 0, query_values, raw, raw_text),                                        \
+        OPTION_FLAG("json", 0, query_values, json, "print a JSON object for each, on a line"), \
+        OPTION_FLAG("stats", 0, query_values, remote.stats,                                    \
+                    "print what it took on standard error at the end"),                        \
         REMOTE_HTTP_OPTIONS(query_values, remote)
 
-#define QUERY_LIMIT_OPTIONS(level_text)                                                 \
-    OPTION_INT("level", 0, query_values, level, "L", 0, 20, level_text),                \
-        OPTION_TEXT("deadline", 0, query_values, deadline, "TIME",                      \
-                    "stop after about so long for each point and say what is certain; " \
-                    "microseconds, or with unit: 500ns, 50us, 1ms")
+#define QUERY_LIMIT_OPTIONS(level_text)                                                        \
+    OPTION_INT("level", 0, query_values, level, "L", 0, 20, level_text),                       \
+        OPTION_TEXT("deadline", 0, query_values, deadline, "TIME",                             \
+                    "stop after about this long for each point and print what is certain; in " \
+                    "microseconds, or with a unit: 500ns, 50us, 1ms")
 
 /* Words for --mode, NULL-terminated; EBP 2017, section 4.3. */
 extern const char *const inside_modes[];   /* fast, cache, nodes, ... */

@@ -23,34 +23,34 @@ typedef struct remote_values {
     }
 
 /* Rows for the tables of options; `member` is the remote_values in the struct `type`. */
-#define REMOTE_OPTIONS(type, member)                                                      \
-    OPTION_FLAG("stats", 0, type, member.stats,                                           \
-                "what was read, on standard error at the end: reads and bytes, of a URL " \
-                "requests, bytes, retries, seconds"),                                     \
+#define REMOTE_OPTIONS(type, member)                                                            \
+    OPTION_FLAG("stats", 0, type, member.stats,                                                 \
+                "print what was read on standard error at the end: reads and bytes; for a URL " \
+                "requests, bytes, retries, seconds"),                                           \
         REMOTE_HTTP_OPTIONS(type, member)
 
 /* Without --stats, for commands that have their own. */
-#define REMOTE_HTTP_OPTIONS(type, member)                                                  \
-    OPTION_TEXT("http-cache", 0, type, member.cache, "DIR",                                \
-                "keep what is fetched from a URL in this folder"),                         \
-        OPTION_TEXT("http-cache-size", 0, type, member.cache_size, "SIZE",                 \
-                    "that the folder may hold: 512M, 4G; the default: 1G"),                \
-        OPTION_REAL("http-timeout", 0, type, member.timeout, "SECONDS", 0.001, 1e6,        \
-                    "for one request with its retries; the default: 120"),                 \
-        OPTION_REAL("http-stall", 0, type, member.stall, "SECONDS", 1, 1e6,                \
-                    "give an answer up that brings nothing for so long; the default: 20"), \
-        OPTION_INT("http-retries", 0, type, member.retries, "N", 0, 1000,                  \
-                   "of a request that failed; the default: 5"),                            \
-        OPTION_INT("http-connections", 0, type, member.connections, "N", 1, 32,            \
-                   "requests at a time; the default: 6"),                                  \
-        OPTION_LIST("http-header", 0, type, member.headers, "LINE",                        \
-                    "send 'Name: value' too; may be repeated"),                            \
-        OPTION_TEXT("http-user", 0, type, member.user, "NAME:PASSWORD",                    \
-                    "for servers that ask; better in ~/.netrc"),                           \
-        OPTION_TEXT("http-ca", 0, type, member.ca_file, "FILE",                            \
-                    "certificates to trust instead of the system's"),                      \
-        OPTION_FLAG("http-unversioned", 0, type, member.unversioned,                       \
-                    "read large files from servers that tell no version, too")
+#define REMOTE_HTTP_OPTIONS(type, member)                                                \
+    OPTION_TEXT("http-cache", 0, type, member.cache, "DIR",                              \
+                "keep what is fetched from a URL in this folder"),                       \
+        OPTION_TEXT("http-cache-size", 0, type, member.cache_size, "SIZE",               \
+                    "how much the folder may hold: 512M, 4G; default: 1G"),              \
+        OPTION_REAL("http-timeout", 0, type, member.timeout, "SECONDS", 0.001, 1e6,      \
+                    "time limit for one request with its retries; default: 120"),        \
+        OPTION_REAL("http-stall", 0, type, member.stall, "SECONDS", 1, 1e6,              \
+                    "give up an answer that brings nothing for this long; default: 20"), \
+        OPTION_INT("http-retries", 0, type, member.retries, "N", 0, 1000,                \
+                   "retries of a failed request; default: 5"),                           \
+        OPTION_INT("http-connections", 0, type, member.connections, "N", 1, 32,          \
+                   "requests at a time; default: 6"),                                    \
+        OPTION_LIST("http-header", 0, type, member.headers, "LINE",                      \
+                    "also send 'Name: value'; may be repeated"),                         \
+        OPTION_TEXT("http-user", 0, type, member.user, "NAME:PASSWORD",                  \
+                    "for servers that ask for it; ~/.netrc is a better place"),          \
+        OPTION_TEXT("http-ca", 0, type, member.ca_file, "FILE",                          \
+                    "certificates to trust instead of the system's"),                    \
+        OPTION_FLAG("http-unversioned", 0, type, member.unversioned,                     \
+                    "also read large files from servers that give no version")
 
 /* ebpo_open, by path or by URL with these options. EBPO_E_ARGUMENT also for an option that makes no
  * sense. */

@@ -82,7 +82,7 @@ int selection_check(const char *name, const selection_options *o)
     if (code != EXIT_FINE)
         return code;
     if (o->percent >= 0 && o->k_root)
-        return command_usage(name, "--percent and --k-root exclude each other; give one");
+        return command_usage(name, "--percent and --k-root cannot be used together; give one");
     if (o->percent == 0)
         return command_usage(name, "--percent 0 leaves no planes; give more");
     return o->k_root ? check_k_root(name, o->k_root) : EXIT_FINE;

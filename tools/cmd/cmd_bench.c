@@ -38,26 +38,26 @@ static const arg_option options[] = {
                 "file of points or rays"),
     OPTION_FLAG("raw", 0, query_values, raw, "the file of points holds little-endian doubles"),
     OPTION_INT("count", 0, values, count, "N", 1, 1e9,
-               "how many; the default: 100000, or all of the file"),
+               "how many questions; default: 100000, or all of the file"),
     OPTION_INT("seed", 0, values, seed, "S", 0, 1e15,
-               "of uniform points and paths; the default: 1"),
+               "seed of uniform points and paths; default: 1"),
     OPTION_INT("repeat", 0, values, repeat, "R", 1, REPEAT_MAX,
                "ask everything R times; the figures are those of the median mean"),
     OPTION_REAL("rate", 0, values, rate, "HZ", 0, 1e9,
-                "ask so many single questions a second, and sleep in between"),
+                "ask this many single questions a second, and sleep in between"),
     OPTION_TEXT("mode", 'm', values, mode, "MODE", "as for 'ebpo inside' or 'ebpo distance'"),
     OPTION_REAL("max-distance", 0, query_values, max_distance, "D", 0, DBL_MAX,
                 "as for 'ebpo distance'"),
     OPTION_FLAG("unsigned", 0, query_values, unsigned_distance, "as for 'ebpo distance'"),
     OPTION_FLAG("no-warm", 0, query_values, no_warm, "as for 'ebpo distance'"),
-    QUERY_LIMIT_OPTIONS("look at levels 0 to L only"),
+    QUERY_LIMIT_OPTIONS("look only at levels 0 to L"),
     QUERY_MODEL_OPTIONS,
     QUERY_PREFETCH_OPTION,
     OPTION_TEXT("save-points", 0, values, save_points, "FILE",
                 "write what was asked about, as little-endian doubles"),
     OPTION_TEXT("save-answers", 0, values, save_answers, "FILE",
-                "write the answers: inside a byte each, as in 'where'; else a double (distance or "
-                "t) and an int64 (face or -1)"),
+                "write the answers: for inside a byte each, as in 'where'; else a double (distance "
+                "or t) and an int64 (face or -1)"),
     OPTION_FLAG("json", 0, query_values, json, "print all of it as JSON"),
     REMOTE_OPTIONS(query_values, remote),
     { 0 },
@@ -68,9 +68,10 @@ static const arg_spec spec = {
     .operands = "MODEL",
     .least = 1,
     .most = 1,
-    .summary = "how long questions to a file take",
-    .text = "MODEL is an .ebpo.h5 file or its URL. One thread asks. First a cold start (the system "
-            "is asked to forget the file), then each question by itself, then all of them at once.",
+    .summary = "measures how long questions to a file take",
+    .text = "MODEL is an .ebpo.h5 file or its URL. One thread asks: first after a cold start (the "
+            "system is asked to drop the file from memory), then each question by itself, then all "
+            "of them at once.",
     .options = options,
 };
 
@@ -96,9 +97,9 @@ static bool set_mode(values *v)
             *(v->query == BENCH_INSIDE ? &v->q.inside_mode : &v->q.distance_mode) = i;
             return true;
         }
-    fprintf(stderr, "ebpo bench: --mode: '%s' is no mode of %s; 'ebpo %s --help' %s\n", v->mode,
+    fprintf(stderr, "ebpo bench: --mode: '%s' is not a mode of %s; 'ebpo %s --help' %s\n", v->mode,
             query_words[v->query], query_words[v->query],
-            v->query == BENCH_RAY ? "has no modes" : "names them");
+            v->query == BENCH_RAY ? "says that it has none" : "lists them");
     return false;
 }
 
@@ -163,14 +164,14 @@ static bool options_fit(const values *v)
     snprintf(with, sizeof with, "--query %s", query_words[v->query]);
     if (v->q.raw && is_generated(v->points)) {
         fprintf(stderr,
-                "ebpo bench: --raw has no effect with --points %s; leave one of them away, or try "
+                "ebpo bench: --raw has no effect with --points %s; leave out one of them, or try "
                 "'ebpo bench --help'\n",
                 v->points);
         return false;
     }
     if (v->seed >= 0 && !is_generated(v->points)) {
         fprintf(stderr,
-                "ebpo bench: --seed has no effect with --points %s; leave one of them away, or try "
+                "ebpo bench: --seed has no effect with --points %s; leave out one of them, or try "
                 "'ebpo bench --help'\n",
                 v->points);
         return false;
@@ -214,7 +215,7 @@ static int compare_answers(const bench_job *job, const void *batch)
         if (!same_answer(job->query, job->answers, batch, i)) {
             fprintf(stderr,
                     "ebpo bench: question %" PRIu64
-                    " has one answer alone and another one in a batch: please report this\n",
+                    " has one answer alone and another in a batch; please report this\n",
                     i);
             return EXIT_FAILED;
         }

@@ -8,7 +8,7 @@
 static const arg_option options[] = {
     QUERY_MODEL_OPTIONS,
     QUERY_FORM_OPTIONS(
-        "boxes are six doubles each, answers a uint64 count and as many uint64 (little-endian)"),
+        "each box is six doubles, each answer a uint64 count and that many uint64 (little-endian)"),
     { 0 },
 };
 
@@ -17,9 +17,9 @@ static const arg_spec spec = {
     .operands = "MODEL [BOXES]",
     .least = 1,
     .most = 2,
-    .summary = "which faces meet boxes: how many, and their numbers",
-    .text = "MODEL is an .ebpo.h5 file. BOXES: lines 'x0 y0 z0 x1 y1 z1', the lower corner first; "
-            "absent or '-': standard input. Faces and boxes are closed: touching counts.",
+    .summary = "tells which faces meet boxes: how many, and their numbers",
+    .text = "MODEL is an .ebpo.h5 file. BOXES holds lines 'x0 y0 z0 x1 y1 z1', the lower corner "
+            "first; if absent or '-', standard input. Faces and boxes are closed: touching counts.",
     .options = options,
 };
 

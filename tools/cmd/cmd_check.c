@@ -19,7 +19,7 @@ typedef struct values {
 static const arg_option options[] = {
     MENDING_OPTIONS(values, mend),
     OPTION_FLAG("require-solid", 0, values, require_solid,
-                "end with code 3 if the mesh is not a solid"),
+                "exit with code 3 if the mesh is not a solid"),
     OPTION_THREADS(values, threads),
     MEMORY_OPTIONS(values, memory),
     OPTION_FLAG("json", 0, values, json, "print the report as JSON"),
@@ -32,8 +32,9 @@ static const arg_spec spec = {
     .operands = "IN.ply",
     .least = 1,
     .most = 1,
-    .summary = "what a mesh is: solid or surface, and each finding with its places",
-    .text = "With mending options: what it would be after mending. Nothing is written.",
+    .summary = "checks a mesh: solid or surface, and what is wrong with it and where",
+    .text = "With mending options, also shows what the mesh would be after mending. Nothing is "
+            "written.",
     .options = options,
 };
 

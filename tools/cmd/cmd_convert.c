@@ -45,37 +45,38 @@ static const arg_option options[] = {
                 "a plane is kept while it removes at least this share of its cell; default 0.003"),
     OPTION_WORD("select", 0, values, select, "NAME", selection_words,
                 "how planes are chosen: inherit (the default), or as in the theses: kmedoids, "
-                "offset (least), random"),
+                "offset (the least), random"),
     OPTION_REAL("percent", 0, values, percent, "P", 0, 100,
-                "the theses' ways: share of the candidates that is taken; default 40"),
+                "with the theses' selections: percentage of the candidates to take; default 40"),
     OPTION_TEXT("k-root", 0, values, k_root, "K",
-                "instead: K planes at the root, or 'K%' of the faces, half as many at each next "
-                "level (BP-Octree)"),
+                "instead of --percent: K planes at the root, or 'K%' of the faces, and half as "
+                "many at each further level (BP-Octree)"),
     OPTION_WORD("normals", 0, values, normals, "NAME", normals_words,
-                "kmedoids' distance of normals: spherical (the default, the theses') or angle "
-                "(without their poles)"),
+                "distance between normals for kmedoids: spherical (the default, as in the theses) "
+                "or angle (which has no poles)"),
     OPTION_INT("seed", 0, values, seed, "N", 0, 9007199254740992.0,
-               "of kmedoids and random; default 1"),
+               "seed for kmedoids and random; default 1"),
     OPTION_SET("with", 0, values, with, "LIST", with_words, "also store: leaf-planes"),
     OPTION_SET("without", 0, values, without, "LIST", without_words,
-               "leave out: maps, mesh (and with it maps), planes; commas between, may be repeated"),
-    OPTION_WORD(
-        "profile", 0, values, profile, "NAME", profile_words,
-        "instead of --with and --without: full (all parts), lod (for viewers: no mesh), collision "
-        "(for exact questions: mesh, no maps); as 'ebpo subset --profile' makes it of a full file"),
+               "leave out: maps, mesh (and with it the maps), planes; separated by commas, may be "
+               "repeated"),
+    OPTION_WORD("profile", 0, values, profile, "NAME", profile_words,
+                "instead of --with and --without: full (all parts), lod (for viewers: no mesh), "
+                "collision (for exact questions: mesh, no maps); the same file as 'ebpo subset "
+                "--profile' makes from a full one"),
     NEED_OPTIONS(values),
     OPTION_WORD("codec", 0, values, codec, "NAME", codec_words,
                 "zstd (the default), deflate or none"),
     OPTION_INT("zstd-level", 0, values, zstd_level, "N", 1, 22,
-               "effort of zstd, 1 to 22; default 3"),
+               "compression effort of zstd, 1 to 22; default 3"),
     OPTION_THREADS(values, threads),
     MEMORY_OPTIONS(values, memory),
     MENDING_OPTIONS(values, mend),
-    OPTION_WORD(
-        "rule", 0, values, rule, "NAME", rule_words,
-        "inside is where the winding number is nonzero (the default), odd (evenodd) or positive"),
+    OPTION_WORD("rule", 0, values, rule, "NAME", rule_words,
+                "a point is inside where the winding number is nonzero (the default), odd "
+                "(evenodd) or positive"),
     OPTION_FLAG("require-solid", 0, values, require_solid,
-                "end with code 3 if the mesh is not a solid"),
+                "exit with code 3 if the mesh is not a solid"),
     OPTION_TEXT("unit", 0, values, unit, "U", "unit of length to record, such as mm"),
     OPTION_TEXT("crs", 0, values, crs, "C",
                 "coordinate reference system to record, such as EPSG:25832"),
@@ -92,10 +93,10 @@ static const arg_spec spec = {
     .operands = "IN.ply OUT.ebpo.h5",
     .least = 2,
     .most = 2,
-    .summary = "a closed triangle mesh to an .ebpo.h5 file",
-    .text = "IN is PLY, or OBJ, STL or OFF where the library was built with assimp. OUT appears "
-            "whole or not at all; an older OUT is replaced. Mending is done in the order weld, "
-            "orient, fill holes.",
+    .summary = "converts a closed triangle mesh to an .ebpo.h5 file",
+    .text = "IN is a PLY file; OBJ, STL and OFF files can be read too if the library was built "
+            "with assimp. OUT appears complete or not at all; an existing OUT is replaced. Mending "
+            "is done in the order weld, orient, fill holes.",
     .options = options,
 };
 
@@ -109,10 +110,10 @@ static int check_values(const values *v, const char *in, const char *out)
     if (!memory_good("convert", &v->memory))
         return EXIT_USAGE;
     if (v->zstd_level && v->codec != EBPO_CODEC_ZSTD)
-        return command_usage("convert", "--zstd-level says nothing about --codec deflate or none");
+        return command_usage("convert", "--zstd-level does not apply to --codec deflate or none");
     if (v->profile >= 0 && (v->with || v->without))
         return command_usage(
-            "convert", "--profile says which parts are stored; leave --with and --without away");
+            "convert", "--profile says which parts are stored; leave out --with and --without");
     if (command_overwrites("convert", in, out))
         return EXIT_USAGE;
     return EXIT_FINE;
@@ -232,9 +233,9 @@ static ebpo_status room_to_judge(const values *v, const mesh_input *p, const cha
     if (needed <= figures.memory)
         return EBPO_OK;
     snprintf(error->message, sizeof error->message,
-             "%s: --max-error and --target-size measure with the whole model in memory, some %s of "
-             "it, and the budget is %s; allow more (--memory), or leave them out here and use "
-             "'ebpo subset' where there is more",
+             "%s: --max-error and --target-size measure with the whole model in memory, about %s, "
+             "but the budget is %s; allow more with --memory, or leave them out here and use 'ebpo "
+             "subset' on a machine that has it",
              in, words_bytes(bytes, sizeof bytes, needed),
              words_bytes(budget, sizeof budget, figures.memory));
     return EBPO_E_LIMIT;

@@ -8,19 +8,19 @@
 
 static const arg_option options[] = {
     OPTION_WORD("mode", 'm', query_values, distance_mode, "MODE", distance_modes,
-                "exact, the default, or one of EBP 2017, which do not promise the minimum: "
+                "exact, the default, or one of EBP 2017, which do not guarantee the minimum: "
                 "recursive, leaves, envelope"),
     OPTION_REAL("max-distance", 0, query_values, max_distance, "D", 0, DBL_MAX,
-                "what is farther than D does not matter: inf"),
+                "ignore what is farther than D: inf"),
     OPTION_FLAG("unsigned", 0, query_values, unsigned_distance,
                 "no sign (surfaces have none anyway)"),
     OPTION_FLAG("no-warm", 0, query_values, no_warm,
-                "do not begin with the answer before; the answers are the same"),
+                "do not start from the previous answer; the answers are the same"),
     QUERY_LIMIT_OPTIONS(
-        "look at levels 0 to L only and print lo and hi, between which the distance is"),
+        "look only at levels 0 to L and print lo and hi, between which the distance lies"),
     QUERY_MODEL_OPTIONS,
     QUERY_PREFETCH_OPTION,
-    QUERY_FORM_OPTIONS("points are three doubles each, answers seven doubles and a uint64, or lo "
+    QUERY_FORM_OPTIONS("each point is three doubles, each answer seven doubles and a uint64, or lo "
                        "and hi (little-endian)"),
     { 0 },
 };
@@ -30,9 +30,9 @@ static const arg_spec spec = {
     .operands = "MODEL [POINTS]",
     .least = 1,
     .most = 2,
-    .summary = "how far points are from the model: distance, nearest point, normal, face",
-    .text = "MODEL is an .ebpo.h5 file. POINTS: lines 'x y z', or a PLY; absent or '-': standard "
-            "input. Distances are correctly rounded, negative inside a solid.",
+    .summary = "tells how far points are from the model: distance, nearest point, normal, face",
+    .text = "MODEL is an .ebpo.h5 file. POINTS holds lines 'x y z', or is a PLY file; if absent or "
+            "'-', standard input. Distances are correctly rounded, and negative inside a solid.",
     .options = options,
 };
 

@@ -26,15 +26,15 @@ static const char *const format_words[] = {
 
 static const arg_option options[] = {
     OPTION_WORD("format", 0, values, format, "FORMAT", format_words,
-                "xdmf, vtkhdf, gltf, glb, obj or stl; the default: as OUT ends. xdmf comes with a "
-                "second file OUT.h5, gltf with one that ends in .bin"),
+                "xdmf, vtkhdf, gltf, glb, obj or stl; default: by the extension of OUT. xdmf comes "
+                "with a second file OUT.h5, gltf with one that ends in .bin"),
     OPTION_INT("level", 0, values, level, "N", 0, 20,
                "the envelopes of level N, and leaves and black nodes above it"),
     OPTION_TEXT("levels", 0, values, levels, "A-B",
-                "levels A to B, each a block of its own; not for stl"),
+                "levels A to B, each as a block of its own; not for stl"),
     OPTION_FLAG("mesh", 0, values, mesh,
-                "the model itself; beside levels a block of its own. xdmf and vtkhdf tell its "
-                "source's numbers, the others have its order"),
+                "the model itself; with levels, as a block of its own. xdmf and vtkhdf give the "
+                "numbers in the source, the others keep its order"),
     OPTION_THREADS(values, threads),
     OPTION_FLAG("json", 0, values, json, "print what was written as JSON"),
     OPTION_QUIET(values, quiet),
@@ -47,7 +47,7 @@ static const arg_spec spec = {
     .operands = "FILE OUT",
     .least = 2,
     .most = 2,
-    .summary = "levels and the model for ParaView (XDMF, VTKHDF), as glTF, OBJ or STL",
+    .summary = "writes levels and the model for ParaView (XDMF, VTKHDF), or as glTF, OBJ or STL",
     .text = "FILE is an .ebpo.h5 file or its URL. --level, --levels or --mesh is needed. XDMF and "
             "VTKHDF keep double coordinates and the nodes' data; glTF, OBJ and STL hold float32.",
     .options = options,
@@ -64,7 +64,7 @@ static int choose_format(values *v, const char *out)
     return v->format >= 0
                ? EXIT_FINE
                : command_usage("export",
-                               "the format is not told by the output's ending; give --format");
+                               "the output's extension does not say which format; give --format");
 }
 
 static int choose_levels(const values *v, ebpo_export_options *o)
@@ -74,10 +74,9 @@ static int choose_levels(const values *v, ebpo_export_options *o)
     *o = (ebpo_export_options)EBPO_EXPORT_OPTIONS_INIT;
     o->mesh = v->mesh;
     if (v->level < 0 && !v->levels && !v->mesh)
-        return command_usage("export",
-                             "what shall be exported? give --level N, --levels A-B or --mesh");
+        return command_usage("export", "nothing to export; give --level N, --levels A-B or --mesh");
     if (v->level >= 0 && v->levels)
-        return command_usage("export", "--level and --levels exclude each other");
+        return command_usage("export", "--level and --levels cannot be used together");
     if (v->level >= 0)
         o->first_level = o->last_level = (int)v->level;
     if (!v->levels)
@@ -85,7 +84,7 @@ static int choose_levels(const values *v, ebpo_export_options *o)
     if (sscanf(v->levels, "%2d-%2d%c", &first, &last, &rest) != 2 || first < 0 || last < first ||
         last >= EBPO_LEVELS_MAX)
         return command_usage(
-            "export", "--levels wants the first level, a hyphen and the last one, such as 0-6");
+            "export", "--levels expects the first level, a hyphen and the last one, such as 0-6");
     o->first_level = first;
     o->last_level = last;
     return EXIT_FINE;
@@ -203,8 +202,9 @@ static int run(void *given, const char **operand)
     if (code != EXIT_FINE)
         return code;
     if (!ebpo_export_second_file((ebpo_export_format)v->format, operand[1], second, sizeof second))
-        return command_usage("export",
-                             "the output's name is too long, or has a ':', which XDMF cannot take");
+        return command_usage(
+            "export",
+            "the output's name is too long, or contains a ':', which XDMF does not allow");
     code = check_names(operand[0], operand[1], second);
     if (code != EXIT_FINE)
         return code;

@@ -22,7 +22,7 @@ static const arg_option options[] = {
     OPTION_INT("level", 0, values, level, "N", 0, 20,
                "the envelopes of level N, and leaves and black nodes above it"),
     OPTION_FLAG("mesh", 0, values, mesh,
-                "the model itself, bit for bit; in the source's order where the maps are stored"),
+                "the model itself, bit for bit; in the order of the source if the maps are stored"),
     OPTION_FLAG("no-walls", 0, values, no_walls,
                 "with --level: leave out polygons that lie on cell walls"),
     OPTION_THREADS(values, threads),
@@ -37,18 +37,18 @@ static const arg_spec spec = {
     .operands = "FILE OUT.ply",
     .least = 2,
     .most = 2,
-    .summary = "a level's envelopes, or the model itself, as PLY",
+    .summary = "writes a level's envelopes, or the model itself, as PLY",
     .text = "FILE is an .ebpo.h5 file or its URL. Either --level or --mesh is needed. A level's "
-            "polygons are in memory whatever --memory says.",
+            "polygons are held in memory whatever --memory says.",
     .options = options,
 };
 
 static int check_values(const values *v, const char *in, const char *out)
 {
     if (v->level < 0 && !v->mesh)
-        return command_usage("extract", "what shall be extracted? give --level N or --mesh");
+        return command_usage("extract", "nothing to extract; give --level N or --mesh");
     if (v->level >= 0 && v->mesh)
-        return command_usage("extract", "--level and --mesh exclude each other");
+        return command_usage("extract", "--level and --mesh cannot be used together");
     if (v->mesh && v->no_walls)
         return command_usage("extract",
                              "--no-walls belongs to --level; the model has no cell walls");
@@ -73,13 +73,13 @@ static ebpo_status take(ebpo_file *file, const values *v, const char *path,
     ebpo_read_options read = reading(v->threads, workspace);
     ebpo_status status = ebpo_file_read_source_mesh(file, &read, out, &source_order, error);
     if (status == EBPO_OK && !source_order)
-        fprintf(stderr,
-                "ebpo extract: %s: note: holds no maps, so vertices and faces come in the file's "
-                "order\n",
-                remote_shown(path));
+        fprintf(
+            stderr,
+            "ebpo extract: %s: note: has no maps, so vertices and faces are in the file's order\n",
+            remote_shown(path));
     if (status == EBPO_OK && ebpo_file_info(file)->pruned)
         fprintf(stderr,
-                "ebpo extract: %s: note: is a subset, whose mesh is a part of the model's\n",
+                "ebpo extract: %s: note: is a subset, so its mesh is only part of the model's\n",
                 remote_shown(path));
     return status;
 }

@@ -24,10 +24,10 @@ static const arg_spec spec = {
     .operands = "URL OUT.ebpo.h5",
     .least = 2,
     .most = 2,
-    .summary = "a file by its URL, or levels, a box, parts of it; goes on where it was interrupted",
-    .text = "Only what is kept is fetched. OUT appears whole or not at all; until then what has "
-            "come lies in the folder OUT.part, from which the same command goes on. Without "
-            "options the whole content is fetched.",
+    .summary = "downloads a file, or levels, a box or parts of it; resumes after interruptions",
+    .text = "Only what is kept is fetched. OUT appears complete or not at all; until then what has "
+            "been fetched is in the folder OUT.part, from which the same command resumes. Without "
+            "options everything is fetched.",
     .options = options,
 };
 
@@ -77,7 +77,7 @@ static bool tick(void *user)
     fprintf(stderr, "\r\033[Kfetch: %s in %" PRIu64 " requests",
             words_bytes(bytes, sizeof bytes, s.bytes), s.requests);
     if (s.cache_bytes)
-        fprintf(stderr, ", %s had come before", words_bytes(before, sizeof before, s.cache_bytes));
+        fprintf(stderr, ", %s fetched earlier", words_bytes(before, sizeof before, s.cache_bytes));
     fflush(stderr);
     t->shown = true;
     return false;
@@ -103,11 +103,11 @@ static bool tell_resuming(const subset_values *v, ebpo_file *file, const char *u
         return false;
     if (s.cache_others && !s.cache_held)
         fprintf(stderr,
-                "ebpo fetch: %s: has changed on the server, or is another file than the one in %s; "
+                "ebpo fetch: %s: has changed on the server, or is not the file that is in %s; "
                 "fetching it from the beginning\n",
                 remote_shown(url), part);
     else if (s.cache_held && !v->quiet)
-        fprintf(stderr, "ebpo fetch: %s: going on with %s from %s\n", remote_shown(url),
+        fprintf(stderr, "ebpo fetch: %s: resuming with %s from %s\n", remote_shown(url),
                 words_bytes(bytes, sizeof bytes, s.cache_held), part);
     return s.cache_held > 0;
 }
@@ -146,8 +146,8 @@ static int fetch(subset_values *v, const char *url, const char *out, const char 
         access(part, F_OK) == 0) { /* kept blocks would be damaged the next time as well */
         remove_part(part);
         int code = command_failed("fetch", &error);
-        fprintf(stderr, "ebpo fetch: what had come was removed, as it may have been damaged on the "
-                        "way; the same command begins anew\n");
+        fprintf(stderr, "ebpo fetch: what had been fetched was removed, as it may have been "
+                        "damaged in transit; the same command starts again\n");
         return code;
     }
     if (part && (status == EBPO_OK ||
@@ -157,7 +157,8 @@ static int fetch(subset_values *v, const char *url, const char *out, const char 
         rmdir(part) != 0) { /* an empty one is of no use */
         int code = command_failed("fetch", &error);
         fprintf(stderr,
-                "ebpo fetch: what has come is kept in %s; the same command goes on from there\n",
+                "ebpo fetch: what has been fetched is kept in %s; the same command resumes from "
+                "there\n",
                 part);
         return code;
     }
@@ -173,10 +174,10 @@ static bool out_fits(const char *out, const char *part)
         return false;
     }
     if (part && lstat(part, &s) == 0 && !S_ISDIR(s.st_mode)) {
-        fprintf(stderr,
-                "ebpo fetch: %s: stands where what has come would be kept, and is no folder; move "
-                "it away\n",
-                part);
+        fprintf(
+            stderr,
+            "ebpo fetch: %s: is in the way of the folder for what has been fetched; move it away\n",
+            part);
         return false;
     }
     return true;

@@ -23,9 +23,9 @@ static const arg_spec spec = {
     .operands = "FILE",
     .least = 1,
     .most = 1,
-    .summary = "what a file is, what it holds, bytes by part, and a table by level",
+    .summary = "describes a file: its contents, bytes by part, and a table of levels",
     .text = "Only the head of the file is read. FILE is an .ebpo.h5 file or its URL; for meshes "
-            "there is 'ebpo check'.",
+            "use 'ebpo check'.",
     .options = options,
 };
 

@@ -7,12 +7,13 @@
 
 static const arg_option options[] = {
     OPTION_WORD("mode", 'm', query_values, inside_mode, "MODE", inside_modes,
-                "how to get there; the answers are the same. fast, the default, or one of EBP "
-                "2017: cache, nodes, subtree, each also with -plain (without envelopes)"),
-    QUERY_LIMIT_OPTIONS("look at levels 0 to L only: IN and OUT are certain, else MAYBE"),
+                "how answers are found; they are the same. fast, the default, or one of EBP 2017: "
+                "cache, nodes, subtree, each also with -plain (without envelopes)"),
+    QUERY_LIMIT_OPTIONS(
+        "look only at levels 0 to L: IN and OUT are certain, anything else is MAYBE"),
     QUERY_MODEL_OPTIONS,
     QUERY_PREFETCH_OPTION,
-    QUERY_FORM_OPTIONS("points are three doubles each, answers two int32 (little-endian)"),
+    QUERY_FORM_OPTIONS("each point is three doubles, each answer two int32 (little-endian)"),
     { 0 },
 };
 
@@ -21,9 +22,9 @@ static const arg_spec spec = {
     .operands = "MODEL [POINTS]",
     .least = 1,
     .most = 2,
-    .summary = "which points are in the solid: IN, OUT or ON, and the winding number",
-    .text = "MODEL is an .ebpo.h5 file of a solid. POINTS: lines 'x y z', or a PLY; absent or '-': "
-            "standard input. The answers are exact.",
+    .summary = "tells which points are in the solid: IN, OUT or ON, and the winding number",
+    .text = "MODEL is an .ebpo.h5 file of a solid. POINTS holds lines 'x y z', or is a PLY file; "
+            "if absent or '-', standard input. Answers are exact.",
     .options = options,
 };
 

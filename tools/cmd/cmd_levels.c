@@ -20,9 +20,9 @@ typedef struct values {
 } values;
 
 static const arg_option options[] = {
-    OPTION_INT("to", 0, values, to, "L", 0, 20, "end with level L; deeper ones are not read"),
+    OPTION_INT("to", 0, values, to, "L", 0, 20, "stop after level L; deeper ones are not read"),
     OPTION_FLAG("nodes", 0, values, nodes,
-                "a line for each node as well: octcode, type, cell, planes"),
+                "also print a line for each node: octcode, type, cell, planes"),
     OPTION_FLAG("json", 0, values, json, "print all of it as JSON"),
     OPTION_THREADS(values, threads),
     REMOTE_OPTIONS(values, remote),
@@ -34,9 +34,9 @@ static const arg_spec spec = {
     .operands = "FILE",
     .least = 1,
     .most = 1,
-    .summary = "reads a file level by level and tells of each as it arrives",
-    .text = "FILE is an .ebpo.h5 file or its URL. Bytes are those of the file up to and with the "
-            "level, times are since opening.",
+    .summary = "reads a file level by level and describes each as it arrives",
+    .text = "FILE is an .ebpo.h5 file or its URL. Bytes are counted up to and including the level, "
+            "times from opening.",
     .options = options,
 };
 

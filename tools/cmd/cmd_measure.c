@@ -21,18 +21,19 @@ typedef struct values {
 static const arg_option options[] = {
     OPTION_THREADS(values, threads),
     OPTION_FLAG("deviation", 0, values, deviation,
-                "also how far each level reaches beyond the model: certain bounds of the farthest "
-                "point, mean and rms over its surface"),
+                "also print how far each level reaches beyond the model: certain bounds on the "
+                "farthest point, mean and rms over its surface"),
     OPTION_REAL("tolerance", 0, values, tolerance, "T", 1e-6, 1000,
-                "with --deviation: bounds are refined until the upper one is at most 1 + T times "
+                "with --deviation: refine the bounds until the upper one is at most 1 + T times "
                 "the lower one; default 0.05"),
     OPTION_INT("questions", 0, values, questions, "N", 0, 9007199254740992.0,
-               "with --deviation: stop after about N distances for each level and tell what is "
-               "certain then; default 200000; 0: no limit"),
+               "with --deviation: stop after about N distances for each level and print what is "
+               "certain by then; default 200000; 0: no limit"),
     OPTION_FLAG("derived", 0, values, derived,
-                "also the volume of each level with leaves cut by planes derived from their faces"),
+                "also print the volume of each level with its leaves cut by planes derived from "
+                "their faces"),
     OPTION_FLAG("limit", 0, values, limit,
-                "that too, and the volume of the solid's convex hull in each cell, summed: no "
+                "the same, and the sum of the volumes of the solid's convex hulls in the cells: no "
                 "convex envelopes of these cells are smaller"),
     OPTION_FLAG("json", 0, values, json, "print the numbers as JSON"),
     REMOTE_OPTIONS(values, remote),
@@ -44,10 +45,9 @@ static const arg_spec spec = {
     .operands = "FILE",
     .least = 1,
     .most = 1,
-    .summary =
-        "area, volume, centroid and inertia, and the volume of each level or how far it reaches",
+    .summary = "measures area, volume, centroid, inertia, and the volume or reach of each level",
     .text = "FILE is an .ebpo.h5 file with its mesh, or its URL. Volume, centroid and inertia are "
-            "those of the winding number's integral (density 1); a surface has an area only.",
+            "those of the winding number's integral (density 1); a surface has only an area.",
     .options = options,
 };
 
@@ -227,8 +227,8 @@ static int measure(const char *path, const values *v)
     if (!(ebpo_file_info(file)->parts & EBPO_PART_MESH)) {
         ebpo_close(file);
         fprintf(stderr,
-                "ebpo measure: %s: was written without its mesh, which is measured; convert the "
-                "mesh again without '--without mesh'\n",
+                "ebpo measure: %s: has no mesh to measure; convert the mesh again without "
+                "'--without mesh'\n",
                 path);
         return EXIT_FAILED;
     }

@@ -8,12 +8,12 @@
 
 static const arg_option options[] = {
     OPTION_FLAG("all", 'a', query_values, all,
-                "all hits: their number, then t, face and side of each"),
+                "print all hits: their number, then t, face and side of each"),
     OPTION_REAL("tmax", 0, query_values, tmax, "T", 0, DBL_MAX,
-                "of rays that tell none: they end at origin + T direction"),
+                "for rays without their own tmax: they end at origin + T direction"),
     QUERY_MODEL_OPTIONS,
     QUERY_FORM_OPTIONS(
-        "rays are six doubles each, answers a double, a uint64 and an int64 (little-endian)"),
+        "each ray is six doubles, each answer a double, a uint64 and an int64 (little-endian)"),
     { 0 },
 };
 
@@ -22,9 +22,10 @@ static const arg_spec spec = {
     .operands = "MODEL [RAYS]",
     .least = 1,
     .most = 2,
-    .summary = "what rays hit: t, face and side of the first face",
-    .text = "MODEL is an .ebpo.h5 file. RAYS: lines 'ox oy oz dx dy dz [tmax]'; absent or '-': "
-            "standard input. What is hit, and in which order, is exact; '-' stands for nothing.",
+    .summary = "tells what rays hit: t, face and side of the first face",
+    .text =
+        "MODEL is an .ebpo.h5 file. RAYS holds lines 'ox oy oz dx dy dz [tmax]'; if absent or '-', "
+        "standard input. What is hit, and in which order, is exact; '-' means nothing is hit.",
     .options = options,
 };
 

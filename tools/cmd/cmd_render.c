@@ -34,7 +34,7 @@ static const arg_option options[] = {
     OPTION_TEXT("levels", 0, values, levels, "LIST",
                 "several side by side, with captions: levels and 'mesh', for example 0,2,4,mesh"),
     OPTION_TEXT("view", 0, values, view, "AZ,EL",
-                "from where: azimuth and elevation in degrees; default 30,20"),
+                "where to look from: azimuth and elevation in degrees; default 30,20"),
     OPTION_WORD("up", 0, values, up, "AXIS", up_words,
                 "the axis that points upwards: x, y (the default) or z"),
     OPTION_TEXT("size", 0, values, size, "WxH", "pixels, 16 to 8192 each; default 1200x900"),
@@ -50,7 +50,7 @@ static const arg_spec spec = {
     .operands = "FILE OUT.png",
     .least = 2,
     .most = 2,
-    .summary = "a shaded picture of a level or of the model, without a display",
+    .summary = "draws a shaded picture of a level or of the model, without a display",
     .text = "FILE is an .ebpo.h5 file or its URL, or a mesh.",
     .options = options,
 };
@@ -109,7 +109,7 @@ static int parse(job *j)
     char rest;
     const values *v = &j->v;
     if ((v->level >= 0) + v->mesh + (v->levels != NULL) > 1)
-        return command_usage("render", "--level, --levels and --mesh exclude each other");
+        return command_usage("render", "--level, --levels and --mesh cannot be used together");
     if (sscanf(v->view, "%lf,%lf%c", &j->azimuth, &j->elevation, &rest) != 2 ||
         !(j->azimuth >= -360 && j->azimuth <= 360) || !(j->elevation >= -90 && j->elevation <= 90))
         return usage_error("--view", v->view,
@@ -119,7 +119,7 @@ static int parse(job *j)
         return usage_error("--size", v->size, "a width, an x, and a height, each from 16 to 8192");
     if (v->levels && !parse_levels(j))
         return usage_error("--levels", v->levels,
-                           "a list of at most 24 levels (0 to 20) and 'mesh' with commas between");
+                           "a list of at most 24 levels (0 to 20) and 'mesh' separated by commas");
     if (!v->levels)
         j->tiles[j->tile_count++].level = v->level >= 0 ? (int)v->level : MESH;
     return EXIT_FINE;
@@ -247,7 +247,8 @@ static ebpo_status draw(const job *j, picture *p, ebpo_error *error)
     const tile *first = coarsest(j);
     if (height <= caption) {
         snprintf(error->message, sizeof error->message,
-                 "--size %s has no room for %d tiles; take a larger one", j->v.size, j->tile_count);
+                 "--size %s has no room for %d tiles; choose a larger one", j->v.size,
+                 j->tile_count);
         return error->status = EBPO_E_ARGUMENT;
     }
     paint_background(p);
@@ -268,7 +269,7 @@ static ebpo_status render(job *j, bool is_file, ebpo_progress progress, ebpo_err
     ebpo_status status = is_file ? load_file(j, progress, error) : load_mesh(j, progress, error);
     if (status == EBPO_OK && !picture_make(&p, j->width, j->height, white)) {
         snprintf(error->message, sizeof error->message,
-                 "no memory for a picture of %s; take a smaller --size", j->v.size);
+                 "not enough memory for a picture of %s; choose a smaller --size", j->v.size);
         status = error->status = EBPO_E_MEMORY;
     }
     if (status == EBPO_OK)
@@ -319,7 +320,7 @@ static int run(void *given, const char **operand)
     free(j);
     return code;
 #else
-    fprintf(stderr, "ebpo render: this build has no libpng; install libpng and build ebpo again\n");
+    fprintf(stderr, "ebpo render: this build has no libpng; install libpng and rebuild ebpo\n");
     return EXIT_USAGE;
 #endif
 }

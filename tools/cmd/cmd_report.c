@@ -16,41 +16,41 @@ static const char *const up_words[] = { "x", "y", "z", NULL };
 
 static const arg_option options[] = {
     OPTION_TEXT("out", 'o', report_values, out, "DIR",
-                "the folder to make; default: report-NAME, here"),
+                "the folder to make; default: report-NAME in the working directory"),
     OPTION_LIST("name", 0, report_values, names, "NAME",
-                "of a FILE's method, in their order; default: the file's name"),
+                "name of a FILE's method; give one for each, in order; default: the file's name"),
     OPTION_SET("select", 0, report_values, select, "LIST", selection_words,
-               "of a mesh: make a file with each of these selections of planes, inherit, kmedoids, "
-               "offset, random; default: inherit"),
+               "for a mesh: make a file with each of these selections of planes: inherit, "
+               "kmedoids, offset, random; default: inherit"),
     OPTION_REAL("percent", 0, report_values, percent, "P", 0, 100,
-                "of the theses' selections: share of the candidates; default 40"),
+                "for the theses' selections: percentage of the candidates; default 40"),
     OPTION_TEXT("k-root", 0, report_values, k_root, "K",
-                "instead: K planes at the root, or 'K%' of the faces, half as many at each next "
-                "level (BP-Octree)"),
+                "instead of --percent: K planes at the root, or 'K%' of the faces, and half as "
+                "many at each further level (BP-Octree)"),
     OPTION_WORD("normals", 0, report_values, normals, "NAME", normals_words,
-                "distance of normals for k-medoids: spherical (the default) or angle"),
+                "distance between normals for kmedoids: spherical (the default) or angle"),
     OPTION_INT("max-level", 0, report_values, max_level, "N", 0, 20,
-               "of a mesh: as for 'ebpo convert'"),
+               "for a mesh: as for 'ebpo convert'"),
     OPTION_INT("leaf-faces", 0, report_values, leaf_faces, "N", 0, 4294967295.0,
-               "of a mesh: as for 'ebpo convert'"),
+               "for a mesh: as for 'ebpo convert'"),
     OPTION_REAL("epsilon", 0, report_values, epsilon, "E", 0, 1,
-                "of a mesh: as for 'ebpo convert'"),
-    OPTION_FLAG("keep", 0, report_values, keep, "keep the files that were made of a mesh in DIR"),
-    OPTION_TEXT("levels", 0, report_values, levels, "A-B", "measure these levels only"),
+                "for a mesh: as for 'ebpo convert'"),
+    OPTION_FLAG("keep", 0, report_values, keep, "keep the files made from a mesh in DIR"),
+    OPTION_TEXT("levels", 0, report_values, levels, "A-B", "measure only these levels"),
     OPTION_INT("points", 0, report_values, points, "N", 1, 1e8,
                "questions of each kind; default 5000"),
     OPTION_INT("seed", 0, report_values, seed, "S", 0, 1e15,
-               "of all that is drawn at random; default 1"),
+               "seed of everything drawn at random; default 1"),
     OPTION_FLAG("need", 0, report_values, need,
-                "also cut files to errors and to sizes, and see how well they keep to them"),
+                "also make files for given errors and sizes, and see how well they keep to them"),
     OPTION_FLAG("no-pictures", 0, report_values, no_pictures, "no pictures of the levels"),
     OPTION_TEXT("view", 0, report_values, view, "AZ,EL",
-                "of the pictures: azimuth and elevation in degrees; default 30,20"),
+                "for the pictures: azimuth and elevation in degrees; default 30,20"),
     OPTION_WORD("up", 0, report_values, up, "AXIS", up_words,
-                "of the pictures: the axis that points upwards, x, y (the default) or z"),
+                "for the pictures: the axis that points upwards, x, y (the default) or z"),
     OPTION_INT("threads", 0, report_values, threads, "N", 0, 256,
-               "threads, but questions are timed on one; 0, the default: all cores"),
-    OPTION_FLAG("json", 0, report_values, json, "print the JSON on standard output too"),
+               "threads, although questions are timed on one; 0, the default: all cores"),
+    OPTION_FLAG("json", 0, report_values, json, "also print the JSON on standard output"),
     OPTION_QUIET(report_values, quiet),
     REMOTE_HTTP_OPTIONS(report_values, remote),
     { 0 },
@@ -61,10 +61,10 @@ static const arg_spec spec = {
     .operands = "FILE...",
     .least = 1,
     .most = ARGS_OPERANDS_MAX - 1,
-    .summary = "methods compared level by level: bytes, error, run time; a page with plots",
-    .text = "FILEs are .ebpo.h5 files of one model (or their URLs), each a method; or one mesh, "
-            "from which a file is made with each selection. DIR appears whole, with report.html, "
-            "report.csv and report.json; an older report there is replaced.",
+    .summary = "compares methods level by level: bytes, error, run time; a page with plots",
+    .text = "The FILEs are .ebpo.h5 files of one model (or their URLs), each a method; or one "
+            "mesh, from which a file is made with each selection. DIR appears complete, with "
+            "report.html, report.csv and report.json; an existing report is replaced.",
     .options = options,
 };
 
@@ -91,9 +91,9 @@ static int read_options(comparison *c, report_values *v, bool mesh)
     bool building = v->select || v->percent >= 0 || v->k_root || v->normals >= 0 ||
                     v->max_level >= 0 || v->leaf_faces >= 0 || v->epsilon >= 0 || v->keep;
     if (!mesh && building)
-        return command_usage("report",
-                             "--select, --percent, --k-root, --normals, --max-level, --leaf-faces, "
-                             "--epsilon and --keep are for a mesh, from which files are made");
+        return command_usage(
+            "report", "--select, --percent, --k-root, --normals, --max-level, --leaf-faces, "
+                      "--epsilon and --keep only apply to a mesh, from which files are made");
     const ebpo_build_options usual = EBPO_BUILD_OPTIONS_INIT;
     v->select = v->select ? v->select : 1u << EBPO_SELECT_INHERIT;
     /* the seed is of the points, too */
@@ -127,7 +127,7 @@ static ebpo_status write_one(const comparison *c, const char *name,
         status = ebpo_write_file(path, text, size, error);
     else
         snprintf(error->message, sizeof error->message,
-                 "%s: not enough memory; fewer --levels or --no-pictures need less", name);
+                 "%s: not enough memory; use fewer --levels, or --no-pictures", name);
     free(text);
     return error->status = status;
 }

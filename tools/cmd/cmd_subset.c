@@ -15,10 +15,10 @@ static const arg_spec spec = {
     .operands = "FILE OUT.ebpo.h5",
     .least = 2,
     .most = 2,
-    .summary = "a smaller .ebpo.h5 file of a file: levels, a box, parts, an error or a size",
-    .text = "FILE is an .ebpo.h5 file or its URL (what is interrupted begins anew; 'ebpo fetch' "
-            "goes on). OUT appears whole or not at all. Questions to it are answered as by FILE, "
-            "or refused where what was left out matters.",
+    .summary = "makes a smaller file: some levels, a box, parts, an error or a size",
+    .text = "FILE is an .ebpo.h5 file or its URL (an interrupted transfer starts again; 'ebpo "
+            "fetch' resumes). OUT appears complete or not at all. It answers questions as FILE "
+            "does, or refuses those for which something was left out.",
     .options = options,
 };
 

@@ -22,8 +22,8 @@ static const arg_option options[] = {
     OPTION_TEXT("against", 0, values, against, "IN.ply",
                 "also compare the model with its source, bit for bit"),
     OPTION_INT("samples", 0, values, samples, "N", 0, 9007199254740992.0,
-               "cells whose labels are checked by an independent winding number; 0, the default: "
-               "all of up to four million, a million of more"),
+               "number of cells whose labels are checked by an independent winding number; 0, the "
+               "default: all if there are at most four million, else one million"),
     OPTION_THREADS(values, threads),
     MEMORY_OPTIONS(values, memory),
     OPTION_FLAG("json", 0, values, json, "print the counts as JSON"),
@@ -37,9 +37,9 @@ static const arg_spec spec = {
     .operands = "FILE",
     .least = 1,
     .most = 1,
-    .summary = "checks every promise of a file; ends with code 1 if one is broken",
-    .text = "FILE is an .ebpo.h5 file or its URL. Containment is checked with the decoded "
-            "half-spaces, exactly, not with rounded polyhedra.",
+    .summary = "checks every promise of a file; exits with code 1 if one is broken",
+    .text = "FILE is an .ebpo.h5 file or its URL. Containment is checked exactly, with the decoded "
+            "half-spaces, not with rounded polyhedra.",
     .options = options,
 };
 

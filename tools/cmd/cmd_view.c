@@ -28,29 +28,31 @@ static const char *const order_words[] = { "level", "distance", "pixels", "front
 
 static const arg_option options[] = {
     OPTION_WORD("order", 0, values, order, "ORDER", order_words,
-                "what comes first: level, distance, pixels (the largest) or front-to-back; the "
+                "what comes first: level, distance, pixels (the largest) or front-to-back; "
                 "default: pixels with --eye, else level"),
     OPTION_TEXT("eye", 0, values, eye, "X,Y,Z", "where the observer is, in the model's unit"),
-    OPTION_TEXT("look", 0, values, look, "X,Y,Z", "the point looked at; the default: all around"),
-    OPTION_TEXT("up", 0, values, up, "X,Y,Z", "the direction upwards; the default: 0,1,0"),
+    OPTION_TEXT("look", 0, values, look, "X,Y,Z", "the point looked at; default: all around"),
+    OPTION_TEXT("up", 0, values, up, "X,Y,Z", "the direction upwards; default: 0,1,0"),
     OPTION_REAL("fov", 0, values, fov, "DEGREES", 0.001, 179.999,
-                "vertical angle of view; the default: 45"),
-    OPTION_TEXT("size", 0, values, size, "WxH", "of the picture, in pixels; the default: 1280x720"),
+                "vertical angle of view; default: 45"),
+    OPTION_TEXT("size", 0, values, size, "WxH", "size of the picture in pixels; default: 1280x720"),
     OPTION_REAL("pixels", 0, values, pixels, "P", 1e-9, 1e9,
-                "do not refine nodes that are no larger on the picture"),
+                "do not refine nodes that are at most this large in the picture"),
     OPTION_REAL("distance", 0, values, distance, "D", 0, 1e300,
-                "do not refine nodes that are farther away"),
-    OPTION_INT("to", 0, values, to, "L", 0, 20, "end with level L"),
+                "do not refine nodes that are farther away than this"),
+    OPTION_INT("to", 0, values, to, "L", 0, 20, "stop after level L"),
     OPTION_FLAG("seen-only", 0, values, seen_only,
-                "do not refine what is outside the picture; else that comes last"),
+                "do not refine what is outside the picture; otherwise that comes last"),
     OPTION_TEXT("bytes", 0, values, bytes, "SIZE",
-                "stop before more of the file is read than this: 512K, 4M"),
+                "stop before more than this of the file is read: 512K, 4M"),
     OPTION_INT("count", 0, values, count, "N", 1, 1e15,
-               "stop before more nodes than this have come"),
-    OPTION_TEXT("memory", 0, values, memory, "SIZE", "for decoded chunks; the default: no limit"),
+               "stop before more nodes than this have arrived"),
+    OPTION_TEXT("memory", 0, values, memory, "SIZE",
+                "memory for decoded chunks; default: no limit"),
     OPTION_TEXT("out", 'o', values, out, "CUT.ply",
                 "write the envelopes of the cut as closed polygons"),
-    OPTION_FLAG("nodes", 0, values, nodes, "a line for each node as well, in the order of arrival"),
+    OPTION_FLAG("nodes", 0, values, nodes,
+                "also print a line for each node, in the order of arrival"),
     OPTION_FLAG("json", 0, values, json, "print all of it as JSON"),
     REMOTE_OPTIONS(values, remote),
     { 0 },
@@ -61,9 +63,9 @@ static const arg_spec spec = {
     .operands = "FILE",
     .least = 1,
     .most = 1,
-    .summary = "reads the nodes first that matter to an observer, under a budget",
-    .text = "FILE is an .ebpo.h5 file or its URL. A line tells what is there each time that the "
-            "number of nodes has doubled, and at the end.",
+    .summary = "reads those nodes first that matter most to an observer, within a budget",
+    .text = "FILE is an .ebpo.h5 file or its URL. A line is printed each time the number of nodes "
+            "has doubled, and at the end.",
     .options = options,
 };
 
@@ -81,9 +83,8 @@ static int check_values(const values *v)
 {
     if (!v->eye && (v->order > EBPO_PRIORITY_LEVEL || v->look || v->fov > 0 || v->size ||
                     v->pixels > 0 || v->distance >= 0))
-        return command_usage(
-            "view", "--order distance, pixels and front-to-back, --look, --fov, --size, --pixels "
-                    "and --distance need --eye X,Y,Z");
+        return command_usage("view", "--order distance, pixels and front-to-back, --look, --fov, "
+                                     "--size, --pixels and --distance need --eye X,Y,Z");
     if (!v->look && (v->up || v->seen_only))
         return command_usage(
             "view",
@@ -97,7 +98,7 @@ static bool read_triple(const char *name, const char *text, double out[3])
     if (sscanf(text, "%lf,%lf,%lf%c", &out[0], &out[1], &out[2], &rest) == 3 && isfinite(out[0]) &&
         isfinite(out[1]) && isfinite(out[2]))
         return true;
-    command_usage("view", "--%s: '%s' is not three numbers with commas between", name, text);
+    command_usage("view", "--%s: '%s' is not three numbers separated by commas", name, text);
     return false;
 }
 
@@ -119,7 +120,7 @@ static bool read_observer(const values *v, ebpo_observer *o)
     for (int k = 0; k < 3 && v->look; k++)
         o->direction[k] = look[k] - o->eye[k];
     if (v->look && o->direction[0] == 0 && o->direction[1] == 0 && o->direction[2] == 0) {
-        fprintf(stderr, "ebpo view: --look and --eye are the same point; look at another one\n");
+        fprintf(stderr, "ebpo view: --look and --eye are the same point; choose another --look\n");
         return false;
     }
     if (v->fov > 0)
@@ -262,7 +263,7 @@ static ebpo_status tell(printer *p, ebpo_file *file, const char *path,
         json_finish(&p->j);
     } else {
         if (status == EBPO_OK && *arrived)
-            printf("%s\n", end == EBPO_VIEW_DONE    ? "all that was asked for is there"
+            printf("%s\n", end == EBPO_VIEW_DONE    ? "everything that was asked for has arrived"
                            : end == EBPO_VIEW_BYTES ? "stopped by --bytes"
                                                     : "stopped by --count");
         (void)command_flush("view");
@@ -272,8 +273,8 @@ static ebpo_status tell(printer *p, ebpo_file *file, const char *path,
     ebpo_view_stream_get_stats(stream, &stats);
     if (status == EBPO_OK && *arrived && p->v->out && stats.nodes == 0) {
         fprintf(stderr,
-                "ebpo view: %s: not written: the budget does not hold even the root, and no node "
-                "at all contains nothing; give --bytes more\n",
+                "ebpo view: %s: not written: the budget is too small even for the root; give more "
+                "--bytes\n",
                 p->v->out);
         *arrived = false;
     } else if (status == EBPO_OK && *arrived && p->v->out)

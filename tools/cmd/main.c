@@ -32,9 +32,9 @@ static void usage(FILE *out)
                  "as trees of convex envelopes.\n\ncommands:\n");
     for (int i = 0; i < COMMANDS; i++)
         fprintf(out, "  %-10s %s\n", commands[i]->spec->command, commands[i]->spec->summary);
-    fprintf(out, "  %-10s %s\n", "help", "what a command does and its options: ebpo help COMMAND");
-    fprintf(out, "\n  --version  the version, and end\n\nexit codes: 0 fine, 1 data or "
-                 "input/output, 2 usage, 3 not a solid where one is required\n");
+    fprintf(out, "  %-10s %s\n", "help", "describe a command and its options: ebpo help COMMAND");
+    fprintf(out, "\n  --version  print the version and exit\n\nexit codes: 0 success, 1 bad data "
+                 "or input/output, 2 wrong usage, 3 not a solid where one is required\n");
 }
 
 static int unknown_command(const char *name)
@@ -47,7 +47,7 @@ static int help(int argc, char **argv)
 {
     if (argc > 3) {
         fprintf(stderr,
-                "ebpo help: '%s' is one operand too many; expected: [COMMAND]; try 'ebpo help'\n",
+                "ebpo help: unexpected operand '%s'; expected: [COMMAND]; try 'ebpo help'\n",
                 argv[3]);
         return EXIT_USAGE;
     }

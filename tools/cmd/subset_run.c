@@ -89,7 +89,7 @@ int subset_need(const char *name, double max_error, const char *target_size,
                              "--target-size: '%s' is not a number of bytes such as 500K or 20M",
                              target_size);
     if (target_size && max_error > 0)
-        return command_usage(name, "--max-error and --target-size exclude each other");
+        return command_usage(name, "--max-error and --target-size cannot be used together");
     out->max_error = max_error;
     return EXIT_FINE;
 }
@@ -109,25 +109,23 @@ int subset_options(const char *name, const subset_values *v, const char *in, con
 {
     *out = (ebpo_subset_options)EBPO_SUBSET_OPTIONS_INIT;
     if (v->levels && !read_levels(v->levels, &out->last_level))
-        return command_usage(
-            name,
-            "--levels: '%s' is not 0-N with N up to 20; levels begin at 0, as each one "
-            "rests on those above",
-            v->levels);
+        return command_usage(name,
+                             "--levels: '%s' is not 0-N with N up to 20; levels begin at 0, as "
+                             "each one builds on those above",
+                             v->levels);
     if (v->box && !read_box(v->box, out))
         return command_usage(
-            name, "--box: '%s' is not six numbers with commas between, the lower corner first",
+            name, "--box: '%s' is not six numbers separated by commas, the lower corner first",
             v->box);
     if (v->parts && !read_parts(v->parts, &out->parts))
-        return command_usage(
-            name,
-            "--parts: '%s' is not a list of mesh, maps, envelopes, leaf-planes, or of "
-            "these with a minus sign before each",
-            v->parts);
+        return command_usage(name,
+                             "--parts: '%s' is not a list of mesh, maps, envelopes, leaf-planes, "
+                             "or of these with a minus sign before each",
+                             v->parts);
     if (v->parts && v->profile >= 0)
-        return command_usage(name, "--parts and --profile exclude each other");
+        return command_usage(name, "--parts and --profile cannot be used together");
     if (v->zstd_level && v->codec > EBPO_CODEC_ZSTD)
-        return command_usage(name, "--zstd-level says nothing about --codec deflate or none");
+        return command_usage(name, "--zstd-level does not apply to --codec deflate or none");
     if (command_overwrites(name, in, out_path))
         return EXIT_USAGE;
     if (v->profile >= 0)
@@ -156,13 +154,13 @@ ebpo_status subset_settle(const subset_values *v, const ebpo_info *info, const c
     bool named = v->parts && v->parts[0] != '-';
     if (named && out->parts & ~info->parts) {
         char parts[80];
-        snprintf(what, sizeof what, "--parts asks for %s, which the file does not hold",
+        snprintf(what, sizeof what, "--parts asks for %s, which the file does not have",
                  words_parts(parts, sizeof parts, out->parts & ~info->parts));
         return wrong(error, shown, what);
     }
     if (named && out->parts & EBPO_PART_MAPS && !(out->parts & EBPO_PART_MESH))
         return wrong(error, shown,
-                     "--parts asks for maps without the mesh, whose numbers they are; add mesh");
+                     "--parts asks for maps without the mesh that they number; add mesh");
     if (!v->parts && v->profile < 0 && out->last_level >= 0 &&
         out->last_level < info->level_count - 1)
         out->parts &= ~(uint32_t)(EBPO_PART_MESH | EBPO_PART_MAPS);
@@ -175,7 +173,7 @@ ebpo_status subset_settle(const subset_values *v, const ebpo_info *info, const c
     out->codec_level = (int)v->zstd_level;
     if (v->zstd_level && out->codec != EBPO_CODEC_ZSTD)
         return wrong(error, shown,
-                     "--zstd-level says nothing about the codec of this file; add --codec zstd");
+                     "--zstd-level does not apply to the codec of this file; add --codec zstd");
     return EBPO_OK;
 }
 
@@ -195,7 +193,7 @@ static void print_summary(const subset_values *v, const char *out_path, const eb
         printf(", %s in %" PRIu64 " requests", words_bytes(got, sizeof got, t->http.bytes),
                t->http.requests);
     if (t->far && t->http.cache_bytes)
-        printf(", %s had come before", words_bytes(got, sizeof got, t->http.cache_bytes));
+        printf(", %s fetched earlier", words_bytes(got, sizeof got, t->http.cache_bytes));
     printf(", in %.1f s\n", seconds);
 }
 

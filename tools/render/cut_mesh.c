@@ -54,8 +54,8 @@ ebpo_status cut_mesh_write(ebpo_view_stream *stream, const char *path, ebpo_erro
         status = ebpo_mesh_write_ply(&m.mesh, path, error);
     } else {
         snprintf(error->message, sizeof error->message,
-                 "%s: no memory for the cut's %" PRIu64 " faces; give a budget or --pixels", path,
-                 faces);
+                 "%s: not enough memory for the cut's %" PRIu64 " faces; give a budget or --pixels",
+                 path, faces);
         status = error->status = EBPO_E_MEMORY;
     }
     free(m.mesh.xyz64);

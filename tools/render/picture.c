@@ -34,7 +34,8 @@ ebpo_status picture_encode_png(const uint8_t *pixels, int width, int height, int
     *bytes = malloc(room);
     if (!*bytes)
         snprintf(error->message, sizeof error->message,
-                 "%s: no memory for %zu bytes; take a smaller picture", what, (size_t)room);
+                 "%s: not enough memory for %zu bytes; choose a smaller picture", what,
+                 (size_t)room);
     else if (!png_image_write_to_memory(&image, *bytes, &room, 0, pixels, 0, NULL))
         snprintf(error->message, sizeof error->message, "%s: libpng cannot encode the picture: %s",
                  what, image.message);

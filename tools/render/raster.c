@@ -340,7 +340,7 @@ ebpo_status raster_draw(picture *out, int x, int y, int width, int height, const
 {
     if (mesh->face_count >= EDGE) {
         snprintf(error->message, sizeof error->message,
-                 "more than 2147483647 faces cannot be drawn; take a coarser level");
+                 "more than 2147483647 faces cannot be drawn; choose a coarser level");
         return error->status = EBPO_E_LIMIT;
     }
     int side = (int64_t)width * height > 4000000 ? 2 : 3;
@@ -358,7 +358,8 @@ ebpo_status raster_draw(picture *out, int x, int y, int width, int height, const
     if (!r.samples || !r.normal) {
         status = error->status = EBPO_E_MEMORY;
         snprintf(error->message, sizeof error->message,
-                 "no memory for a picture of %d x %d; take a smaller --size", width, height);
+                 "not enough memory for a picture of %d x %d; choose a smaller --size", width,
+                 height);
         goto done;
     }
     for (uint64_t face = 0; face < mesh->face_count; face++)
