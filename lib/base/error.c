@@ -96,8 +96,8 @@ ebpo_status ebpo_fail_with(ebpo_error *error, const ebpo_error *cause)
 
 ebpo_status ebpo_fail_memory(ebpo_error *error, uint64_t bytes)
 {
-    return ebpo_fail(error, EBPO_E_MEMORY, "out of memory: %" PRIu64 " bytes could not be had",
-                     bytes);
+    return ebpo_fail(error, EBPO_E_MEMORY,
+                     "out of memory: %" PRIu64 " bytes could not be allocated", bytes);
 }
 
 ebpo_status ebpo_fail_errno(ebpo_error *error, const char *path, const char *what)

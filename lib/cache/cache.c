@@ -202,7 +202,7 @@ static ebpo_status call_load(ebpo_cache *c, ebpo_cache_slot *s, uint64_t reserve
         c->source.release(c->source.user, item);
         return ebpo_fail(error, EBPO_E_LIMIT,
                          "%s %" PRIu64 " takes %" PRIu64 " bytes, and at most %" PRIu64
-                         " were reckoned with; report this",
+                         " were expected; please report this",
                          c->name, s->key, bytes, reserved);
     }
     s->item = item;

@@ -180,7 +180,7 @@ static ebpo_status prepare(ebpo_builder *b, ebpo_mesh *mesh, const ebpo_mesh_rep
     if (!b->solid && options->require_solid)
         return ebpo_fail(error, EBPO_E_NOT_SOLID,
                          "%s does not balance (%llu edges are not used as often one way as the "
-                         "other), so it bounds no solid; "
+                         "other), so it does not bound a solid; "
                          "try --fill-holes, --orient or --weld, or leave out --require-solid for a "
                          "surface model",
                          mesh->source_name[0] ? mesh->source_name : "the mesh",

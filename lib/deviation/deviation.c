@@ -244,7 +244,7 @@ static ebpo_status check(const ebpo_info *info, const ebpo_info *model, int leve
                          "tolerance %g: give a number above 0, such as 0.05", o->tolerance);
     if (o->samples > UINT32_MAX)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "more than 4294967295 samples; a million tell the mean to three digits");
+                         "more than 4294967295 samples; a million give the mean to three digits");
     const char *differ = find_difference(info, model);
     if (differ)
         return ebpo_fail(error, EBPO_E_ARGUMENT,

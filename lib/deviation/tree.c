@@ -12,12 +12,12 @@ ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, const ebpo_file *file, uns
     if (!(info->parts & EBPO_PART_MESH))
         return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
                               "how far envelopes reach beyond the model is measured against its "
-                              "mesh, which the file does not hold; take a file with it "
+                              "mesh, which the file does not have; use a file with it "
                               "(`ebpo convert`)");
     if (info->pruned)
         return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
                               "is a subset, and how far envelopes reach beyond the model is "
-                              "measured against all of its mesh; take the original");
+                              "measured against all of its mesh; use the original");
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
     read.threads = threads;
     ebpo_status status = ebpo_lod_model_read(out, file, info->level_count - 1, &read, error);

@@ -62,7 +62,7 @@ static ebpo_status write_format(ebpo_export_job *job, ebpo_error *error)
     case EBPO_EXPORT_OBJ:
     case EBPO_EXPORT_STL: return ebpo_export_scene(job, error);
     }
-    return ebpo_fail(error, EBPO_E_ARGUMENT, "%d is no export format", (int)job->format);
+    return ebpo_fail(error, EBPO_E_ARGUMENT, "%d is not an export format", (int)job->format);
 }
 
 ebpo_status ebpo_export(const ebpo_file *file, const char *path, ebpo_export_format format,
@@ -82,7 +82,8 @@ ebpo_status ebpo_export(const ebpo_file *file, const char *path, ebpo_export_for
         return status;
     if (!ebpo_export_second_file(format, path, second, sizeof second))
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, path,
-                              "is no name for this format: too long, or with a ':'; take another");
+                              "cannot be used with this format: it is too long or contains a ':'; "
+                              "choose another name");
     if (wanted.first_level <= wanted.last_level)
         ebpo_file_prefetch_levels(file, 0, wanted.last_level);
     status = write_format(&(ebpo_export_job){ file, path, second, format, &wanted, &own }, error);

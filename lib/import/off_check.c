@@ -77,7 +77,7 @@ static ebpo_status check_counts(lines *l, uint64_t count[2], uint64_t size, cons
         return ebpo_fail_file(
             error, EBPO_E_FORMAT, name,
             "line %" PRIu64
-            ": the word OFF does not stand there alone; this is no OFF file that can be read",
+            ": the word OFF is not alone there; this is not an OFF file that can be read",
             l->number);
     if (!next_line(l) || !next_count(l, &count[0]) || !next_count(l, &count[1]) ||
         !next_count(l, &edges) || next_word(l, &word))

@@ -7,7 +7,7 @@ ebpo_status ebpo_hull_new(ebpo_hull **out, ebpo_error *error)
 {
     *out = NULL;
     return ebpo_fail(error, EBPO_E_ABSENT,
-                     "this library was built without qhull, so convex hulls are not to be had; "
+                     "this library was built without qhull, so it cannot compute convex hulls; "
                      "build it with -Dqhull=enabled");
 }
 

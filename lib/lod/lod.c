@@ -277,7 +277,8 @@ ebpo_status ebpo_lod_level_nodes(const ebpo_file *file, int level, const ebpo_lo
     if (status != EBPO_OK)
         return status;
     if (nodes && !out)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "a level's nodes are told with its polygons only");
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "a level's nodes are given only with its polygons");
     const ebpo_info *info = ebpo_file_info(file);
     if (level < 0 || level >= info->level_count)
         return ebpo_fail(error, EBPO_E_ARGUMENT,

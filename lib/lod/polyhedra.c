@@ -64,7 +64,7 @@ ebpo_status ebpo_polyhedra_add(ebpo_polyhedra *piece, const ebpo_polytope *p, co
 {
     if (piece->vertex_count + EBPO_POLYTOPE_VERTICES > count_limit)
         return ebpo_fail(error, EBPO_E_LIMIT,
-                         "the level has more than 4294967294 vertices; take a coarser level");
+                         "the level has more than 4294967294 vertices; choose a coarser level");
     if (!ebpo_grow(&piece->xyz, &piece->vertex_capacity,
                    piece->vertex_count + (uint64_t)p->vertex_count, 3 * sizeof(double)) ||
         !ebpo_grow(&piece->faces, &piece->face_capacity,
@@ -147,7 +147,7 @@ ebpo_status ebpo_polyhedra_join(ebpo_mesh *out, ebpo_lod_nodes *out_nodes,
     if (vertices > count_limit || faces > count_limit)
         return ebpo_fail(
             error, EBPO_E_LIMIT,
-            "the level has more than 4294967294 vertices or faces; take a coarser level");
+            "the level has more than 4294967294 vertices or faces; choose a coarser level");
     memset(out, 0, sizeof *out);
     out->xyz64 = ebpo_alloc(vertices, 3 * sizeof(double));
     out->faces = ebpo_alloc(faces, 3 * sizeof(uint32_t));

@@ -273,11 +273,11 @@ static ebpo_status check_mode(const ebpo_distance_options *o, ebpo_error *error)
     bool around = o->mode == EBPO_DISTANCE_RECURSIVE || o->mode == EBPO_DISTANCE_LEAVES;
     if (around && (o->level >= 0 || o->deadline_ns))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "the recursive and leaves modes of distance know neither level nor "
-                         "deadline; leave these away, or take the exact mode");
+                         "the recursive and leaves modes of distance have neither level nor "
+                         "deadline; leave these out, or use the exact mode");
     if (o->mode == EBPO_DISTANCE_ENVELOPE && o->deadline_ns)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "the envelope mode of distance knows no deadline; give a level instead");
+                         "the envelope mode of distance has no deadline; give a level instead");
     return EBPO_OK;
 }
 

@@ -23,7 +23,8 @@ ebpo_status ebpo_check_query_level(int level, ebpo_error *error)
 
 ebpo_status ebpo_fail_value(ebpo_error *error)
 {
-    return ebpo_fail(error, EBPO_E_ARGUMENT, "query options hold a value that is none of its kind");
+    return ebpo_fail(error, EBPO_E_ARGUMENT,
+                     "the query options contain a value that is not one of its kind");
 }
 
 ebpo_status ebpo_check_points(const double *points, uint64_t count, ebpo_error *error)
@@ -31,7 +32,8 @@ ebpo_status ebpo_check_points(const double *points, uint64_t count, ebpo_error *
     for (uint64_t i = 0; i < 3 * count; i++)
         if (!isfinite(points[i]))
             return ebpo_fail(error, EBPO_E_ARGUMENT,
-                             "point %" PRIu64 " has a coordinate that is no finite number", i / 3);
+                             "point %" PRIu64 " has a coordinate that is not a finite number",
+                             i / 3);
     return EBPO_OK;
 }
 
@@ -42,7 +44,7 @@ ebpo_status ebpo_check_mesh(const ebpo_model *model, ebpo_error *error)
     return ebpo_fail_file(
         error, EBPO_E_ABSENT, model->file->in.shown,
         "the file was written without its mesh: exact answers need it; ask with a "
-        "level, or take a file with it (`ebpo subset`, `ebpo fetch` or "
+        "level, or use a file that has it (`ebpo subset`, `ebpo fetch` or "
         "`ebpo convert` with --profile collision or full)");
 }
 

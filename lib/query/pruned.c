@@ -35,7 +35,7 @@ ebpo_status ebpo_fail_pruned(const ebpo_model *model, ebpo_cell cell, ebpo_error
     describe(model->info, cut, sizeof cut);
     return ebpo_fail(error, EBPO_E_ABSENT,
                      "%.120s: this needs nodes left out below level %d at %.6g %.6g %.6g (%s); ask "
-                     "with a level, or take a larger part of the original with "
+                     "with a level, or make a larger part of the original with "
                      "`ebpo subset` or `ebpo fetch`",
                      model->file->in.shown, cell.level, ebpo_wall(&box, 0, cell.level, cell.at[0]),
                      ebpo_wall(&box, 1, cell.level, cell.at[1]),

@@ -204,7 +204,7 @@ static ebpo_status cast(casting *c, ebpo_error *error)
     for (int k = 0; k < 3; k++) {
         if (!isfinite(c->ray.origin[k]) || !isfinite(c->ray.direction[k]))
             return ebpo_fail(error, EBPO_E_ARGUMENT,
-                             "the ray has a coordinate that is no finite number");
+                             "the ray has a coordinate that is not a finite number");
         moves = moves || c->ray.direction[k] != 0;
     }
     if (!moves || !(c->ray.t_max >= 0))

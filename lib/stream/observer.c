@@ -68,7 +68,7 @@ static ebpo_status make_frustum(ebpo_viewpoint *s, const ebpo_observer *o, doubl
     if (dot(side[0], side[0]) < 1e-12 || !normalise(side[0], side[0]))
         return ebpo_fail(
             error, EBPO_E_ARGUMENT,
-            "the observer's upward direction lies along the direction of sight; give another one");
+            "the observer's upward direction lies along the viewing direction; give another one");
     cross(side[0], forward, side[1]);
     double tangents[2] = { tangent * ((double)o->width / o->height), tangent };
     for (int i = 0; i < 2; i++)

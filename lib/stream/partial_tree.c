@@ -39,7 +39,7 @@ ebpo_status ebpo_partial_add(ebpo_partial *g, const ebpo_info *info, uint64_t pa
                                                             to many parents, without end */
         return ebpo_fail(
             error, EBPO_E_FORMAT,
-            "level %d: its index gives more gray nodes than the head tells of; run ebpo verify",
+            "level %d: its index gives more gray nodes than the head states; run ebpo verify",
             level);
     ebpo_status status = make_room(g, read->code_count, error);
     if (status != EBPO_OK)
