@@ -1,8 +1,8 @@
 /* Which subtrees are loaded ahead: what queries about places nearby need is among them. */
-#include <check.h>
 #include <math.h>
 #include <stdlib.h>
 
+#include "check_main.h"
 #include "query/prefetch.h"
 #include "query_kit.h"
 
@@ -120,7 +120,7 @@ START_TEST(the_nearest_come_first_and_a_larger_reach_only_adds)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("ahead");
     TCase *tests = tcase_create("ahead");
@@ -128,9 +128,5 @@ int main(void)
     tcase_add_loop_test(tests, what_is_near_is_all_that_queries_nearby_need, 0, CASES);
     tcase_add_loop_test(tests, the_nearest_come_first_and_a_larger_reach_only_adds, 0, CASES);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return suite;
 }

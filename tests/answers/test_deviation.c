@@ -1,5 +1,4 @@
 /* How far levels reach: bounds that hold, meet, and do not depend on scale, place or threads. */
-#include <check.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,11 +8,9 @@
 #include <ebpo/deviation.h>
 #include <ebpo/subset.h>
 
+#include "check_main.h"
 #include "query_kit.h"
 #include "twin_reach.h"
-
-__attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
 
 static const query_variant stored = { "stored", 4, 5, EBPO_RULE_NONZERO,
                                       EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS |
@@ -258,7 +255,7 @@ START_TEST(what_cannot_be_measured_is_refused)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("deviation");
     TCase *tests = tcase_create("deviation");
@@ -271,9 +268,5 @@ int main(void)
     tcase_add_test(tests, scale_and_place_scale_and_place_the_result);
     tcase_add_test(tests, what_cannot_be_measured_is_refused);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+    return suite;
 }

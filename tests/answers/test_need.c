@@ -1,5 +1,4 @@
 /* Choosing by need: subsets keep to the error or the size that was asked for. */
-#include <check.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,13 +9,11 @@
 #include <ebpo/subset.h>
 #include <ebpo/verify.h>
 
+#include "check_main.h"
 #include "read_by.h"
 #include "query_kit.h"
 #include "subset/subset_parts.h"
 #include "twin_reach.h"
-
-__attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
 
 static const query_variant stored = { "stored", 4, 6, EBPO_RULE_NONZERO,
                                       EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS |
@@ -423,7 +420,7 @@ START_TEST(what_cannot_be_kept_to_is_refused)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("need");
     TCase *tests = tcase_create("need");
@@ -436,9 +433,5 @@ int main(void)
     tcase_add_test(tests, threads_and_a_detour_by_a_tree_do_not_change_the_bytes);
     tcase_add_test(tests, what_cannot_be_kept_to_is_refused);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+    return suite;
 }

@@ -1,10 +1,10 @@
 /* The judge judged: the oracle against closed forms, against itself without its shortcuts, and
  * against the library's exact predicates. */
-#include <check.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "check_main.h"
 #include "geom/predicates.h"
 #include "oracle.h"
 #include "oracle_parts.h"
@@ -426,7 +426,7 @@ START_TEST(flat_boxes_and_points_meet_what_they_touch)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("oracle");
     TCase *tests = tcase_create("oracle");
@@ -445,9 +445,5 @@ int main(void)
     tcase_add_test(tests, boxes_agree_with_the_verifiers_clipping);
     tcase_add_test(tests, flat_boxes_and_points_meet_what_they_touch);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? 1 : 0;
+    return suite;
 }

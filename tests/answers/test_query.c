@@ -1,10 +1,10 @@
 /* Questions to small models of every kind, a million awkward points against the oracle.
  * EBPO_TEST_SCALE scales their number. */
-#include <check.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "check_main.h"
 #include "query_kit.h"
 
 /* Brute force takes a while over many faces, and with coordinates of two thousand bits. */
@@ -109,7 +109,7 @@ START_TEST(surfaces_have_distances_but_no_inside)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("query");
     TCase *points = tcase_create("points"), *refusals = tcase_create("refusals");
@@ -123,9 +123,5 @@ int main(void)
     tcase_add_loop_test(refusals, surfaces_have_distances_but_no_inside, 0, 5);
     suite_add_tcase(suite, points);
     suite_add_tcase(suite, refusals);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? 1 : 0;
+    return suite;
 }

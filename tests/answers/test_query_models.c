@@ -1,8 +1,8 @@
 /* Real models, in the folder that EBPO_MODELS names: awkward points against brute force. */
-#include <check.h>
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "check_main.h"
 #include "query_kit.h"
 
 static const char *const names[] = { "cheese_g133", "fertility", "selfint_A", "cad_adis16480" };
@@ -24,7 +24,7 @@ START_TEST(real_models_answer_like_brute_force)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("query_models");
     TCase *tests = tcase_create("models");
@@ -32,9 +32,5 @@ int main(void)
     tcase_add_loop_test(tests, real_models_answer_like_brute_force, 0,
                         sizeof names / sizeof *names);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? 1 : 0;
+    return suite;
 }

@@ -1,12 +1,12 @@
 /* Questions in all modes: however a file is loaded, whatever the budget, the order, the threads:
  * the answers are the same; with limits they are certain. */
-#include <check.h>
 #include <inttypes.h>
 #include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "check_main.h"
 #include "query_kit.h"
 
 /* Deep trees with all kinds of leaves; (solid, variant). */
@@ -541,7 +541,7 @@ START_TEST(four_threads_share_a_small_budget)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("query_modes");
     TCase *tests = tcase_create("modes"), *threads = tcase_create("threads");
@@ -563,9 +563,5 @@ int main(void)
     tcase_add_loop_test(threads, four_threads_share_a_small_budget, 0, CASES);
     suite_add_tcase(suite, tests);
     suite_add_tcase(suite, threads);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? 1 : 0;
+    return suite;
 }

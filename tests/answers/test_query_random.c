@@ -1,11 +1,11 @@
 /* Questions to small random solids against brute force: boxes and tetrahedra that touch, nest,
  * overlap and repeat. A failure prints the solid's seed; EBPO_TEST_SEED=<seed> asks that one only,
  * EBPO_TEST_SCALE scales their number. */
-#include <check.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "check_main.h"
 #include "query_kit.h"
 
 enum { POINTS = 400, RAYS = 60, BOXES = 20 };
@@ -89,16 +89,12 @@ START_TEST(random_solids_answer_like_brute_force)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("query_random");
     TCase *tests = tcase_create("random");
     tcase_set_timeout(tests, 1000);
     tcase_add_loop_test(tests, random_solids_answer_like_brute_force, 0, 8);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? 1 : 0;
+    return suite;
 }

@@ -1,11 +1,11 @@
 /* Rays and boxes against the oracle: through vertices, along edges, within faces, from everywhere
  * to everywhere. */
-#include <check.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "check_main.h"
 #include "query_kit.h"
 
 static void some_ray(query_model *m, uint64_t *state, query_ray *r)
@@ -193,7 +193,7 @@ START_TEST(boxes_that_make_no_sense_are_refused)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("query_rays");
     TCase *rays = tcase_create("rays"), *boxes = tcase_create("boxes");
@@ -206,9 +206,5 @@ int main(void)
     tcase_add_test(boxes, boxes_that_make_no_sense_are_refused);
     suite_add_tcase(suite, rays);
     suite_add_tcase(suite, boxes);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? 1 : 0;
+    return suite;
 }

@@ -1,10 +1,10 @@
 /* Questions where numbers of very different size meet: faces far larger than a subtree, edges far
  * shorter than a cell. */
-#include <check.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "check_main.h"
 #include "query_kit.h"
 
 static const query_variant deep = { "N=8, all levels", 8, 20, EBPO_RULE_NONZERO, 0 },
@@ -172,7 +172,7 @@ START_TEST(short_edges_do_not_tilt_the_planes_of_convex_leaves)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("query_stiff");
     TCase *tests = tcase_create("stiff");
@@ -180,9 +180,5 @@ int main(void)
     tcase_add_loop_test(tests, faces_far_larger_than_a_subtree_are_weighed_exactly, 0, 12);
     tcase_add_loop_test(tests, short_edges_do_not_tilt_the_planes_of_convex_leaves, 0, 60);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? 1 : 0;
+    return suite;
 }

@@ -1,10 +1,10 @@
 /* Each stiff case keeps its limits: stiff_cases.c. `test_stiff TEXT` runs those whose name holds
  * the text. */
-#include <check.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "check_main.h"
 #include "stiff.h"
 
 /* The oracle looks at every face for every question. */
@@ -43,13 +43,13 @@ START_TEST(stiff_cases_convert_verify_and_answer_exactly_or_are_refused_clearly)
 }
 END_TEST
 
-int main(int argc, char **argv)
+Suite *test_suite(void)
 {
-    if (argc > 1)
-        wanted = argv[1];
+    if (test_arguments[0])
+        wanted = test_arguments[0];
     if (!is_any_wanted()) {
         fprintf(stderr, "test_stiff: no case's name holds '%s'\n", wanted);
-        return 2;
+        exit(2);
     }
     Suite *suite = suite_create("stiff");
     TCase *tests = tcase_create("cases");
@@ -57,9 +57,5 @@ int main(int argc, char **argv)
     tcase_add_loop_test(tests, stiff_cases_convert_verify_and_answer_exactly_or_are_refused_clearly,
                         0, stiff_case_count);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? 1 : 0;
+    return suite;
 }

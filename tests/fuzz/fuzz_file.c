@@ -3,15 +3,11 @@
 #include <ebpo/query.h>
 #include <ebpo/view.h>
 
+#include "known_leaks.h"
 #include "read_by.h"
 #include "subset/subset_parts.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
-
-/* libhdf5 1.10 itself leaks when it gives up on a damaged object header; that is not what we look
- * for here. */
-__attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
 
 /* Questions through whole models and through subtrees loaded on demand. */
 static void ask(ebpo_file *file, int cut_level)

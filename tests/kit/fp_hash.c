@@ -1,5 +1,6 @@
 /* Calls the library from the environment that is asked for, and hashes what comes back. */
 #include "fp_hash.h"
+#include "scratch.h"
 
 #include <fenv.h>
 #include <math.h>
@@ -385,9 +386,7 @@ void fp_hash_case(const stiff_case *c, const fp_setting *setting, uint64_t quest
     number(h, (uint64_t)out->status);
     if (out->status != EBPO_OK)
         return;
-    strcpy(m.folder, "/tmp/ebpo-fp-XXXXXX");
-    if (!mkdtemp(m.folder))
-        abort();
+    scratch_make(m.folder);
     snprintf(m.path, sizeof m.path, "%s/model.ebpo.h5", m.folder);
     ebpo_status status;
     CALL(status, ebpo_tree_write(&tree, m.path, NULL, &error));
@@ -406,8 +405,7 @@ void fp_hash_case(const stiff_case *c, const fp_setting *setting, uint64_t quest
     hash_questions(h, c, &m, questions);
     ebpo_close(m.file);
     ebpo_tree_free(&tree);
-    unlink(m.path);
-    rmdir(m.folder);
+    scratch_remove(m.folder);
     out->kept = h->kept;
 }
 

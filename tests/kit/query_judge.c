@@ -1,5 +1,6 @@
 /* Models made for the tests of questions, and what the oracle says to the answers. */
 #include "query_kit.h"
+#include "scratch.h"
 
 #include <check.h>
 #include <float.h>
@@ -103,9 +104,7 @@ ebpo_status query_model_try(query_model *m, const char *name, ebpo_mesh mesh,
     memset(m, 0, sizeof *m);
     m->name = name;
     m->variant = variant->name;
-    strcpy(m->folder, "/tmp/ebpo-query-XXXXXX");
-    if (!mkdtemp(m->folder))
-        abort();
+    scratch_make(m->folder);
     snprintf(m->path, sizeof m->path, "%s/model.ebpo.h5", m->folder);
     ebpo_status status = write_tree(m, mesh, variant, error);
     if (status == EBPO_OK)
@@ -140,8 +139,7 @@ void query_model_free(query_model *m)
     ebpo_mesh_free(&m->mesh);
     free(m->face_source);
     free(m->normal);
-    unlink(m->path);
-    rmdir(m->folder);
+    scratch_remove(m->folder);
 }
 
 /* --- the truth --- */

@@ -7,6 +7,7 @@
 #include <ebpo/query.h>
 
 #include "oracle.h"
+#include "scratch.h"
 #include "solids.h"
 
 /* For Check tests: `call` may name `error`. */
@@ -59,7 +60,7 @@ typedef struct query_model {
     double (*normal)[3];   /* [face_count] */
     double size, largest;  /* longest side of the mesh's box; largest coordinate */
     oracle *judge;         /* not for several threads */
-    char folder[64], path[96];
+    char folder[SCRATCH_LENGTH], path[SCRATCH_LENGTH + 16];
     ebpo_file *file;
     ebpo_model *model;
     ebpo_context *context;

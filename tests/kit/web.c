@@ -7,15 +7,17 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "scratch.h"
+
 static pid_t server, owner;
 static int server_input = -1, port, number;
-static char folder[] = "/tmp/ebpo-web-XXXXXX", path[sizeof folder + 16];
+static char folder[SCRATCH_LENGTH], path[sizeof folder + 16];
 
 static bool write_file(const void *data, size_t size)
 {
-    FILE *f = mkdtemp(folder)
-                  ? (snprintf(path, sizeof path, "%s/served", folder), fopen(path, "wb"))
-                  : NULL;
+    scratch_make(folder);
+    snprintf(path, sizeof path, "%s/served", folder);
+    FILE *f = fopen(path, "wb");
     bool good = f && fwrite(data, 1, size, f) == size;
     return f && fclose(f) == 0 && good;
 }
@@ -51,8 +53,7 @@ void web_stop(void)
     close(server_input);
     waitpid(server, NULL, 0);
     server = 0;
-    unlink(path);
-    rmdir(folder);
+    scratch_remove(folder);
 }
 
 const char *web_url(const char *fault)

@@ -1,5 +1,4 @@
 /* The order of a mesh along the Morton curve, and sorting by groups, against plain twins. */
-#include <check.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,13 +7,11 @@
 #include <ebpo/ebpo.h>
 
 #include "arrange/arrange.h"
+#include "check_main.h"
 #include "base/sort.h"
 #include "mesh/mesh_parts.h"
 #include "octree/octcode.h"
 #include "solids.h"
-
-__attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
 
 static const ebpo_progress silent = { NULL, NULL };
 
@@ -236,7 +233,7 @@ START_TEST(what_cannot_be_arranged_is_refused_and_stays)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("arrange");
     TCase *tests = tcase_create("all");
@@ -246,9 +243,5 @@ int main(void)
     tcase_add_test(tests, memory_does_not_change_the_order);
     tcase_add_test(tests, what_cannot_be_arranged_is_refused_and_stays);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? 1 : 0;
+    return suite;
 }

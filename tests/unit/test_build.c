@@ -1,12 +1,12 @@
 /* The builder: trees keep their promises to the reader, on solids of every kind. Envelopes and
  * labels are proved by test_verify. */
-#include <check.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include <ebpo/build.h>
 
+#include "check_main.h"
 #include "solids.h"
 
 static ebpo_status build_with(ebpo_tree *tree, ebpo_mesh mesh, const ebpo_build_options *options)
@@ -308,7 +308,7 @@ START_TEST(bad_options_leave_nothing_behind)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("build");
     TCase *tests = tcase_create("build");
@@ -323,9 +323,5 @@ int main(void)
     tcase_add_test(tests, rules_differ_where_shells_overlap);
     tcase_add_test(tests, bad_options_leave_nothing_behind);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? 1 : 0;
+    return suite;
 }

@@ -1,6 +1,5 @@
 /* The cache against a plain model of itself, and under threads: the source counts what is loading
  * and what lives, and the budget holds at every moment. */
-#include <check.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -8,6 +7,7 @@
 #include <unistd.h>
 
 #include "base/error.h"
+#include "check_main.h"
 #include "cache/cache.h"
 #include "solids.h"
 
@@ -721,7 +721,7 @@ START_TEST(the_budget_holds_under_four_threads_and_the_background)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("cache");
     TCase *tests = tcase_create("cache");
@@ -744,9 +744,5 @@ int main(void)
     tcase_add_test(tests, freeing_ends_the_background_after_its_current_load);
     tcase_add_loop_test(tests, the_budget_holds_under_four_threads_and_the_background, 0, 3);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed != 0;
+    return suite;
 }

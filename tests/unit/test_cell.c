@@ -1,10 +1,10 @@
 /* Root boxes whose walls are exact doubles, and octcodes. */
-#include <check.h>
 #include <math.h>
 #include <stdlib.h>
 
 #include <gmp.h>
 
+#include "check_main.h"
 #include "exact_twin.h"
 #include "geom/cell.h"
 #include "octree/octcode.h"
@@ -244,7 +244,7 @@ START_TEST(octcode_valid_refuses_codes_without_leading_one)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     TCase *tests = tcase_create("cell");
     tcase_set_timeout(tests, 120);
@@ -259,9 +259,5 @@ int main(void)
     tcase_add_test(tests, octcode_valid_refuses_codes_without_leading_one);
     Suite *suite = suite_create("cell");
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return suite;
 }

@@ -1,45 +1,17 @@
 /* The container: trees come back bit for bit, equal trees give equal files, and damage is noticed.
  */
-#include <check.h>
 #include <fcntl.h>
 #include <hdf5.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "check_main.h"
 #include "read_by.h"
 #include "codec/chunk.h"
 #include "codec/coding.h"
 #include "h5/h5.h"
 #include "random_tree.h"
-
-/* libhdf5 1.10 itself leaks when it gives up on a damaged object header; that is not what we look
- * for here. */
-__attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
-
-static char folder[64];
-
-static void make_folder(void)
-{
-    snprintf(folder, sizeof folder, "/tmp/ebpo-container-XXXXXX");
-    ck_assert_ptr_nonnull(mkdtemp(folder));
-}
-
-static void remove_folder(void)
-{
-    char command[256];
-    snprintf(command, sizeof command, "chmod -R u+w '%s' && rm -rf '%s'", folder, folder);
-    ck_assert_int_eq(system(command), 0);
-}
-
-static const char *in_folder(const char *name)
-{
-    static char path[4][128];
-    static int turn;
-    turn = (turn + 1) % 4;
-    snprintf(path[turn], sizeof path[turn], "%s/%s", folder, name);
-    return path[turn];
-}
+#include "scratch.h"
 
 static uint8_t *slurp(const char *path, size_t *size)
 {
@@ -152,8 +124,8 @@ START_TEST(trees_come_back_bit_for_bit)
     random_tree_make(&tree, &options);
     for (int codec = EBPO_CODEC_ZSTD; codec <= EBPO_CODEC_NONE; codec++)
         for (unsigned threads = 1; threads <= 3; threads += 2) {
-            write_ok(&tree, in_folder("t.ebpo.h5"), (ebpo_codec)codec, threads, ~0u);
-            ebpo_file *file = open_ok(in_folder("t.ebpo.h5"));
+            write_ok(&tree, scratch("t.ebpo.h5"), (ebpo_codec)codec, threads, ~0u);
+            ebpo_file *file = open_ok(scratch("t.ebpo.h5"));
             ebpo_error error = EBPO_ERROR_INIT;
             ck_assert_msg(ebpo_file_read_tree(file, READ_BY(threads), &back, &error) == EBPO_OK,
                           "%s", error.message);
@@ -174,10 +146,10 @@ START_TEST(equal_trees_give_equal_bytes_for_any_thread_count)
     random_tree_make(&tree, &shapes[5]);
     for (int codec = EBPO_CODEC_ZSTD; codec <= EBPO_CODEC_NONE; codec++) {
         size_t size, other_size;
-        write_ok(&tree, in_folder("a.ebpo.h5"), (ebpo_codec)codec, 1, ~0u);
-        write_ok(&tree, in_folder("b.ebpo.h5"), (ebpo_codec)codec, 7, ~0u);
-        uint8_t *a = slurp(in_folder("a.ebpo.h5"), &size),
-                *b = slurp(in_folder("b.ebpo.h5"), &other_size);
+        write_ok(&tree, scratch("a.ebpo.h5"), (ebpo_codec)codec, 1, ~0u);
+        write_ok(&tree, scratch("b.ebpo.h5"), (ebpo_codec)codec, 7, ~0u);
+        uint8_t *a = slurp(scratch("a.ebpo.h5"), &size),
+                *b = slurp(scratch("b.ebpo.h5"), &other_size);
         ck_assert_uint_eq(size, other_size);
         ck_assert_int_eq(memcmp(a, b, size), 0);
         free(a);
@@ -193,8 +165,8 @@ START_TEST(content_checksum_does_not_depend_on_the_codec)
     uint8_t digest[32];
     random_tree_make(&tree, &shapes[2]);
     for (int codec = EBPO_CODEC_ZSTD; codec <= EBPO_CODEC_NONE; codec++) {
-        write_ok(&tree, in_folder("a.ebpo.h5"), (ebpo_codec)codec, 1, ~0u);
-        ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
+        write_ok(&tree, scratch("a.ebpo.h5"), (ebpo_codec)codec, 1, ~0u);
+        ebpo_file *file = open_ok(scratch("a.ebpo.h5"));
         if (codec == EBPO_CODEC_ZSTD)
             memcpy(digest, ebpo_file_info(file)->content_sha256, 32);
         ck_assert_int_eq(memcmp(digest, ebpo_file_info(file)->content_sha256, 32), 0);
@@ -240,8 +212,8 @@ START_TEST(all_metadata_is_in_two_pieces)
     ebpo_tree tree;
     random_tree_make(&tree, &shapes[4]);
     ck_assert_int_eq(tree.info.level_count, 12);
-    write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, ~0u);
-    ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
+    write_ok(&tree, scratch("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, ~0u);
+    ebpo_file *file = open_ok(scratch("a.ebpo.h5"));
     const ebpo_info *info = ebpo_file_info(file);
     ebpo_stored_sizes stored = EBPO_STORED_SIZES_INIT;
     ck_assert_int_eq(ebpo_file_locate(file, &stored, NULL), EBPO_OK);
@@ -254,7 +226,7 @@ START_TEST(all_metadata_is_in_two_pieces)
     ck_assert_uint_gt(m.index_bytes, 0);
     ebpo_close(file);
     ck_assert_uint_lt(m.head, 64 << 10);
-    hid_t fid = H5Fopen(in_folder("a.ebpo.h5"), H5F_ACC_RDONLY, H5P_DEFAULT);
+    hid_t fid = H5Fopen(scratch("a.ebpo.h5"), H5F_ACC_RDONLY, H5P_DEFAULT);
     ck_assert_int_ge(H5Lvisit(fid, H5_INDEX_NAME, H5_ITER_NATIVE, check_chunks, &m), 0);
     H5Fclose(fid);
     ck_assert_uint_eq(m.head + m.index_bytes + m.chunk_bytes, size);
@@ -276,8 +248,8 @@ START_TEST(files_of_all_sizes_have_no_gaps)
         random_tree_make(&tree, &options);
         for (int codec = EBPO_CODEC_ZSTD; codec <= EBPO_CODEC_NONE; codec++) {
             uint32_t some = parts[seed % 4];
-            write_ok(&tree, in_folder("a.ebpo.h5"), (ebpo_codec)codec, 1, some);
-            ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
+            write_ok(&tree, scratch("a.ebpo.h5"), (ebpo_codec)codec, 1, some);
+            ebpo_file *file = open_ok(scratch("a.ebpo.h5"));
             const ebpo_info *info = ebpo_file_info(file);
             ebpo_stored_sizes stored = EBPO_STORED_SIZES_INIT;
             ck_assert_int_eq(ebpo_file_locate(file, &stored, NULL), EBPO_OK);
@@ -300,8 +272,8 @@ START_TEST(libhdf5_reads_what_we_compress)
     random_tree_make(&tree, &shapes[5]);
     ck_assert_int_eq(ebpo_register_filters(NULL), EBPO_OK);
     for (int codec = EBPO_CODEC_ZSTD; codec <= EBPO_CODEC_NONE; codec++) {
-        write_ok(&tree, in_folder("a.ebpo.h5"), (ebpo_codec)codec, 2, ~0u);
-        hid_t fid = H5Fopen(in_folder("a.ebpo.h5"), H5F_ACC_RDONLY, H5P_DEFAULT);
+        write_ok(&tree, scratch("a.ebpo.h5"), (ebpo_codec)codec, 2, ~0u);
+        hid_t fid = H5Fopen(scratch("a.ebpo.h5"), H5F_ACC_RDONLY, H5P_DEFAULT);
         hid_t planes = H5Dopen2(fid, "/levels/06/planes", H5P_DEFAULT),
               codes = H5Dopen2(fid, "/mesh/faces", H5P_DEFAULT);
         uint32_t *values = malloc(tree.level[6].plane_count * 4),
@@ -332,8 +304,8 @@ START_TEST(parts_that_are_left_out_are_absent)
     ebpo_maps maps;
     random_tree_make(&tree, &shapes[3]);
     for (uint32_t parts = 0; parts < 16; parts++) {
-        write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, parts);
-        ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
+        write_ok(&tree, scratch("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, parts);
+        ebpo_file *file = open_ok(scratch("a.ebpo.h5"));
         uint32_t there = parts & EBPO_PART_MESH ? parts : parts & ~(uint32_t)EBPO_PART_MAPS;
         ck_assert_uint_eq(ebpo_file_info(file)->parts, there);
         ck_assert_msg(ebpo_file_read_tree(file, READ_BY(1), &back, &error) == EBPO_OK, "%s",
@@ -365,8 +337,8 @@ START_TEST(source_order_undoes_the_maps)
     tree.info.source_vertex_count = tree.mesh.vertex_count * 2;
     for (uint64_t i = 0; i < tree.mesh.vertex_count; i++)
         tree.vertex_source[i] *= 2;
-    write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, ~0u);
-    ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
+    write_ok(&tree, scratch("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, ~0u);
+    ebpo_file *file = open_ok(scratch("a.ebpo.h5"));
     ck_assert_int_eq(ebpo_file_read_source_mesh(file, READ_BY(2), &mesh, &ordered, NULL), EBPO_OK);
     ck_assert(ordered);
     for (uint64_t i = 0; i < tree.mesh.face_count; i++)
@@ -389,9 +361,9 @@ START_TEST(read_only_folders_will_do)
 {
     ebpo_tree tree;
     random_tree_make(&tree, &shapes[1]);
-    write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, ~0u);
-    ck_assert_int_eq(chmod(in_folder("a.ebpo.h5"), 0444) | chmod(folder, 0555), 0);
-    ebpo_file *file = open_ok(in_folder("a.ebpo.h5")), *again = open_ok(in_folder("a.ebpo.h5"));
+    write_ok(&tree, scratch("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, ~0u);
+    ck_assert_int_eq(chmod(scratch("a.ebpo.h5"), 0444) | chmod(scratch(NULL), 0555), 0);
+    ebpo_file *file = open_ok(scratch("a.ebpo.h5")), *again = open_ok(scratch("a.ebpo.h5"));
     ebpo_close(file);
     ck_assert_int_eq(ebpo_file_check_content(again, READ_BY(1), NULL), EBPO_OK);
     ebpo_close(again);
@@ -419,12 +391,12 @@ START_TEST(every_cut_off_file_is_refused)
     ebpo_tree tree;
     size_t size;
     random_tree_make(&tree, &shapes[2]);
-    write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, ~0u);
-    uint8_t *data = slurp(in_folder("a.ebpo.h5"), &size);
+    write_ok(&tree, scratch("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, ~0u);
+    uint8_t *data = slurp(scratch("a.ebpo.h5"), &size);
     for (size_t cut = 0; cut < size; cut += cut < size - 20 ? 197 : 1) {
         ebpo_error error = EBPO_ERROR_INIT;
-        spill(in_folder("b.ebpo.h5"), data, cut);
-        ck_assert_msg(!reads_well(in_folder("b.ebpo.h5"), &error), "cut at %zu", cut);
+        spill(scratch("b.ebpo.h5"), data, cut);
+        ck_assert_msg(!reads_well(scratch("b.ebpo.h5"), &error), "cut at %zu", cut);
         ck_assert_ptr_nonnull(strstr(error.message, "b.ebpo.h5"));
     }
     free(data);
@@ -439,19 +411,19 @@ START_TEST(every_flipped_bit_behind_the_head_is_noticed)
     ebpo_tree tree;
     size_t size;
     random_tree_make(&tree, &shapes[2]);
-    write_ok(&tree, in_folder("a.ebpo.h5"), (ebpo_codec)_i, 1, ~0u);
-    ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
+    write_ok(&tree, scratch("a.ebpo.h5"), (ebpo_codec)_i, 1, ~0u);
+    ebpo_file *file = open_ok(scratch("a.ebpo.h5"));
     uint64_t head = ebpo_file_info(file)->head_bytes;
     ck_assert_uint_eq(ebpo_file_info(file)->chunk_index_bytes, 0);
     ebpo_close(file);
-    uint8_t *data = slurp(in_folder("a.ebpo.h5"), &size);
+    uint8_t *data = slurp(scratch("a.ebpo.h5"), &size);
     unsigned missed = 0;
     for (size_t at = (size_t)head; at < size; at += 37) {
         ebpo_error error = EBPO_ERROR_INIT;
         uint8_t old = data[at];
         data[at] ^= (uint8_t)(1u << at % 8);
-        spill(in_folder("b.ebpo.h5"), data, size);
-        missed += reads_well(in_folder("b.ebpo.h5"), &error);
+        spill(scratch("b.ebpo.h5"), data, size);
+        missed += reads_well(scratch("b.ebpo.h5"), &error);
         data[at] = old;
     }
     ck_assert_uint_le(missed, _i == EBPO_CODEC_ZSTD ? 2 : 0);
@@ -467,14 +439,14 @@ START_TEST(flipped_bits_in_the_head_do_no_harm)
     ebpo_tree tree, back;
     size_t size;
     random_tree_make(&tree, &shapes[1]);
-    write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, ~0u);
-    uint8_t *data = slurp(in_folder("a.ebpo.h5"), &size);
+    write_ok(&tree, scratch("a.ebpo.h5"), EBPO_CODEC_ZSTD, 1, ~0u);
+    uint8_t *data = slurp(scratch("a.ebpo.h5"), &size);
     for (size_t at = 0; at < size && at < 9000; at += 13) {
         uint8_t old = data[at];
         data[at] ^= (uint8_t)(1u << at % 8);
-        spill(in_folder("b.ebpo.h5"), data, size);
+        spill(scratch("b.ebpo.h5"), data, size);
         ebpo_file *file;
-        if (ebpo_open(in_folder("b.ebpo.h5"), &file, NULL) == EBPO_OK) {
+        if (ebpo_open(scratch("b.ebpo.h5"), &file, NULL) == EBPO_OK) {
             if (ebpo_file_read_tree(file, READ_BY(1), &back, NULL) == EBPO_OK) {
                 same_tree(&tree, &back);
                 ebpo_tree_free(&back);
@@ -522,9 +494,9 @@ START_TEST(writer_refuses_a_tree_that_readers_would_refuse)
     ebpo_error error = EBPO_ERROR_INIT;
     random_tree_make(&tree, &shapes[2]);
     spoils[_i](&tree);
-    ck_assert_int_eq(ebpo_tree_write(&tree, in_folder("a.ebpo.h5"), NULL, &error), EBPO_E_ARGUMENT);
+    ck_assert_int_eq(ebpo_tree_write(&tree, scratch("a.ebpo.h5"), NULL, &error), EBPO_E_ARGUMENT);
     ck_assert_ptr_nonnull(strstr(error.message, "not written"));
-    ck_assert_int_ne(access(in_folder("a.ebpo.h5"), F_OK), 0);
+    ck_assert_int_ne(access(scratch("a.ebpo.h5"), F_OK), 0);
     ebpo_tree_free(&tree);
 }
 END_TEST
@@ -535,9 +507,9 @@ START_TEST(an_index_that_contradicts_its_arrays_is_refused)
     ebpo_tree tree;
     ebpo_level level;
     random_tree_make(&tree, &shapes[5]);
-    write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_ZSTD, 2, ~0u);
+    write_ok(&tree, scratch("a.ebpo.h5"), EBPO_CODEC_ZSTD, 2, ~0u);
     ck_assert_int_eq(ebpo_register_filters(NULL), EBPO_OK);
-    hid_t fid = H5Fopen(in_folder("a.ebpo.h5"), H5F_ACC_RDWR, H5P_DEFAULT);
+    hid_t fid = H5Fopen(scratch("a.ebpo.h5"), H5F_ACC_RDWR, H5P_DEFAULT);
     int number = 0;
     for (char path[64]; number < 8; number++) {
         snprintf(path, sizeof path, "/levels/%02d/%s", number, names[_i]);
@@ -553,7 +525,7 @@ START_TEST(an_index_that_contradicts_its_arrays_is_refused)
     }
     H5Fclose(fid);
     ck_assert_int_lt(number, 8);
-    ebpo_file *file = open_ok(in_folder("a.ebpo.h5"));
+    ebpo_file *file = open_ok(scratch("a.ebpo.h5"));
     ebpo_error error = EBPO_ERROR_INIT;
     ck_assert_int_eq(ebpo_file_read_level(file, number, READ_BY(1), &level, &error), EBPO_E_FORMAT);
     ck_assert_ptr_nonnull(strstr(error.message, names[_i]));
@@ -576,13 +548,13 @@ START_TEST(a_stopped_writer_leaves_the_old_file)
     ebpo_tree tree;
     size_t size, again;
     random_tree_make(&tree, &shapes[3]);
-    write_ok(&tree, in_folder("a.ebpo.h5"), EBPO_CODEC_DEFLATE, 1, ~0u);
-    uint8_t *before = slurp(in_folder("a.ebpo.h5"), &size);
+    write_ok(&tree, scratch("a.ebpo.h5"), EBPO_CODEC_DEFLATE, 1, ~0u);
+    uint8_t *before = slurp(scratch("a.ebpo.h5"), &size);
     ebpo_write_options options = EBPO_WRITE_OPTIONS_INIT;
     options.progress.report = stop_soon;
-    ck_assert_int_eq(ebpo_tree_write(&tree, in_folder("a.ebpo.h5"), &options, NULL),
+    ck_assert_int_eq(ebpo_tree_write(&tree, scratch("a.ebpo.h5"), &options, NULL),
                      EBPO_E_CANCELLED);
-    uint8_t *after = slurp(in_folder("a.ebpo.h5"), &again);
+    uint8_t *after = slurp(scratch("a.ebpo.h5"), &again);
     ck_assert(size == again && memcmp(before, after, size) == 0);
     free(before);
     free(after);
@@ -607,7 +579,7 @@ START_TEST(codec_and_level_are_checked)
         ebpo_write_options options = EBPO_WRITE_OPTIONS_INIT;
         options.codec = cases[i].codec;
         options.codec_level = cases[i].level;
-        ck_assert_int_eq(ebpo_tree_write(&tree, in_folder("a.ebpo.h5"), &options, NULL),
+        ck_assert_int_eq(ebpo_tree_write(&tree, scratch("a.ebpo.h5"), &options, NULL),
                          cases[i].status);
     }
     ebpo_tree_free(&tree);
@@ -618,13 +590,13 @@ START_TEST(what_is_no_file_of_ours_is_named)
 {
     ebpo_file *file;
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert_int_eq(ebpo_open(in_folder("none"), &file, &error), EBPO_E_IO);
-    ck_assert_int_eq(ebpo_open(folder, &file, &error), EBPO_E_IO);
-    spill(in_folder("text"), (const uint8_t *)"hello", 5);
-    ck_assert_int_eq(ebpo_open(in_folder("text"), &file, &error), EBPO_E_FORMAT);
-    hid_t fid = H5Fcreate(in_folder("other.h5"), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+    ck_assert_int_eq(ebpo_open(scratch("none"), &file, &error), EBPO_E_IO);
+    ck_assert_int_eq(ebpo_open(scratch(NULL), &file, &error), EBPO_E_IO);
+    spill(scratch("text"), (const uint8_t *)"hello", 5);
+    ck_assert_int_eq(ebpo_open(scratch("text"), &file, &error), EBPO_E_FORMAT);
+    hid_t fid = H5Fcreate(scratch("other.h5"), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
     H5Fclose(fid);
-    ck_assert_int_eq(ebpo_open(in_folder("other.h5"), &file, &error), EBPO_E_FORMAT);
+    ck_assert_int_eq(ebpo_open(scratch("other.h5"), &file, &error), EBPO_E_FORMAT);
     ck_assert_ptr_nonnull(strstr(error.message, "not an EBP-Octree"));
     ck_assert_ptr_null(file);
 }
@@ -636,8 +608,8 @@ START_TEST(callers_error_printing_is_given_back)
     void *data;
     ebpo_file *file;
     H5Eget_auto2(H5E_DEFAULT, &before, &data);
-    spill(in_folder("text"), (const uint8_t *)"hello", 5);
-    ck_assert_int_eq(ebpo_open(in_folder("text"), &file, NULL), EBPO_E_FORMAT);
+    spill(scratch("text"), (const uint8_t *)"hello", 5);
+    ck_assert_int_eq(ebpo_open(scratch("text"), &file, NULL), EBPO_E_FORMAT);
     H5Eget_auto2(H5E_DEFAULT, &after, &data);
     ck_assert(before == after);
 }
@@ -691,12 +663,12 @@ START_TEST(codings_return_every_bit_pattern)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("container");
     TCase *tests = tcase_create("container");
     tcase_set_timeout(tests, 300);
-    tcase_add_checked_fixture(tests, make_folder, remove_folder);
+    tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
     tcase_add_loop_test(tests, trees_come_back_bit_for_bit, 0, SHAPES);
     tcase_add_test(tests, equal_trees_give_equal_bytes_for_any_thread_count);
     tcase_add_test(tests, content_checksum_does_not_depend_on_the_codec);
@@ -719,9 +691,5 @@ int main(void)
     tcase_add_test(tests, chunks_come_back_from_every_pipeline);
     tcase_add_test(tests, codings_return_every_bit_pattern);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed != 0;
+    return suite;
 }

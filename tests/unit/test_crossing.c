@@ -1,10 +1,10 @@
 /* Crossings of faces by axis-parallel segments: against a twin that really shifts the segment, and
  * on closed meshes. */
-#include <check.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "check_main.h"
 #include "exact_twin.h"
 #include "geom/predicates.h"
 
@@ -385,7 +385,7 @@ START_TEST(point_on_triangle_includes_edges_corners_and_flat_faces)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     TCase *tests = tcase_create("crossing");
     tcase_set_timeout(tests, 300);
@@ -399,9 +399,5 @@ int main(void)
     tcase_add_test(tests, point_on_triangle_includes_edges_corners_and_flat_faces);
     Suite *suite = suite_create("crossing");
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return suite;
 }

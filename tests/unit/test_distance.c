@@ -1,12 +1,12 @@
 /* Point and triangle, against rationals: the definition (the least of the plane's distance, if the
  * point projects inside, and the three edges'), written down with mpq. */
-#include <check.h>
 #include <float.h>
 #include <gmp.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "check_main.h"
 #include "geom/distance_pairs.h"
 
 typedef struct point {
@@ -323,7 +323,7 @@ START_TEST(processors_with_fma_give_the_same_bits)
 END_TEST
 #endif
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("distance");
     TCase *exact = tcase_create("exact");
@@ -335,9 +335,5 @@ int main(void)
     tcase_add_test(exact, processors_with_fma_give_the_same_bits);
 #endif
     suite_add_tcase(suite, exact);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? 1 : 0;
+    return suite;
 }

@@ -1,6 +1,5 @@
 /* Bytes, rows and elements beyond 2^32, without the data: sparse files and mappings, of which only
  * what is looked at takes room. */
-#include <check.h>
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,16 +11,18 @@
 
 #include "read_by.h"
 #include "base/arrays.h"
+#include "check_main.h"
 #include "codec/coding.h"
 #include "container/plan.h"
 #include "container/reader.h"
 #include "import/import.h"
 #include "io/file_source.h"
 #include "ply/ply.h"
+#include "scratch.h"
 #include "tree_json.h"
 
 static const uint64_t FAR = UINT64_C(1) << 32;
-static char folder[] = "/tmp/ebpo-far-XXXXXX", path[64];
+static const char *path;
 
 /* Zeros that take no room until they are written to. NULL where the system does not lend what it
  * may not have. */
@@ -383,7 +384,7 @@ START_TEST(workspaces_hold_arrays_beyond_4_gib_in_memory)
     ebpo_workspace *w;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_workspace_stats f = EBPO_WORKSPACE_STATS_INIT;
-    ck_assert_msg(ebpo_workspace_make_any(&w, 64 * FAR, folder, &error) == EBPO_OK, "%s",
+    ck_assert_msg(ebpo_workspace_make_any(&w, 64 * FAR, scratch(NULL), &error) == EBPO_OK, "%s",
                   error.message);
     touch_ends(w);
     ebpo_workspace_get_stats(w, &f);
@@ -411,9 +412,9 @@ START_TEST(workspaces_hold_arrays_beyond_4_gib_in_files)
     ebpo_workspace *w;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_workspace_stats f = EBPO_WORKSPACE_STATS_INIT;
-    if (!disk_lends(folder))
+    if (!disk_lends(scratch(NULL)))
         return;
-    ck_assert_msg(ebpo_workspace_make_any(&w, 1 << 20, folder, &error) == EBPO_OK, "%s",
+    ck_assert_msg(ebpo_workspace_make_any(&w, 1 << 20, scratch(NULL), &error) == EBPO_OK, "%s",
                   error.message);
     touch_ends(w);
     ebpo_workspace_get_stats(w, &f);
@@ -426,7 +427,7 @@ START_TEST(workspaces_refuse_what_overflows)
 {
     ebpo_workspace *w;
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert_int_eq(ebpo_workspace_make_any(&w, 1 << 20, folder, &error), EBPO_OK);
+    ck_assert_int_eq(ebpo_workspace_make_any(&w, 1 << 20, scratch(NULL), &error), EBPO_OK);
     /* 2^64 + 2^21 bytes */
     ck_assert_ptr_null(ebpo_array_alloc(w, (UINT64_C(1) << 61) + (1 << 18), 8));
     ck_assert_ptr_null(ebpo_array_zero(w, (UINT64_C(1) << 60) + (1 << 17), 16));
@@ -435,14 +436,18 @@ START_TEST(workspaces_refuse_what_overflows)
 }
 END_TEST
 
-int main(void)
+static void enter(void)
 {
-    if (!mkdtemp(folder))
-        return 1;
-    snprintf(path, sizeof path, "%s/far", folder);
+    scratch_enter();
+    path = scratch("far");
+}
+
+Suite *test_suite(void)
+{
     Suite *suite = suite_create("far offsets");
     TCase *tests = tcase_create("far offsets");
     tcase_set_timeout(tests, 120);
+    tcase_add_checked_fixture(tests, enter, scratch_leave);
     tcase_add_test(tests, ply_elements_behind_4_gib_are_read);
     tcase_add_test(tests, ply_counts_that_a_short_file_cannot_hold_are_damage);
     tcase_add_test(tests, ply_counts_beyond_the_limit_are_refused_before_anything_is_allocated);
@@ -456,10 +461,5 @@ int main(void)
     tcase_add_test(tests, workspaces_hold_arrays_beyond_4_gib_in_files);
     tcase_add_test(tests, workspaces_refuse_what_overflows);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    rmdir(folder);
-    return failed ? 1 : 0;
+    return suite;
 }

@@ -1,8 +1,8 @@
 /* The models that ebpo-generate makes meet themselves nowhere, and its proof of that is right. */
-#include <check.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "check_main.h"
 #include "samples/generate/embedded.h"
 #include "samples/generate/shapes.h"
 #include "crossing_faces.h"
@@ -218,7 +218,7 @@ START_TEST(no_proof_for_what_goes_round_twice)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("generate");
     TCase *cases = tcase_create("generate");
@@ -231,9 +231,5 @@ int main(void)
     tcase_add_test(cases, no_proof_for_what_is_inside_out_double_or_pulled_through_itself);
     tcase_add_test(cases, no_proof_for_what_goes_round_twice);
     suite_add_tcase(suite, cases);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return suite;
 }

@@ -1,7 +1,6 @@
 /* Files on web servers, good ones and bad ones: the right bytes or a clear error, and never a hang
  * (each test has a time limit). test_http FAULTY_SERVER. EBPO_TEST_SCALE scales the number of
  * random schedules of faults. */
-#include <check.h>
 #include <dirent.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -15,8 +14,10 @@
 
 #include <ebpo/ebpo.h>
 
+#include "check_main.h"
 #include "http/answer.h"
 #include "http/http_source.h"
+#include "scratch.h"
 #include "solids.h"
 #include "web.h"
 
@@ -529,7 +530,7 @@ END_TEST
 
 /* --- the folder --- */
 
-static char cache[] = "/tmp/ebpo-cache-XXXXXX";
+static const char *cache;
 
 /* Calls for each file; returns how many there are. */
 static int each_file(void (*what)(const char *name))
@@ -554,8 +555,6 @@ static void damage(const char *name)
     close(fd);
 }
 
-static void erase(const char *name) { unlink(name); }
-
 static uint64_t total;
 static void add_up(const char *name)
 {
@@ -565,14 +564,8 @@ static void add_up(const char *name)
 
 static void set_up_cache(void)
 {
-    strcpy(cache, "/tmp/ebpo-cache-XXXXXX");
-    ck_assert_ptr_nonnull(mkdtemp(cache));
-}
-
-static void tear_down_cache(void)
-{
-    each_file(erase);
-    rmdir(cache);
+    scratch_enter();
+    cache = scratch(NULL);
 }
 
 static ebpo_http_stats visit_cached(const char *url, uint64_t bytes)
@@ -825,18 +818,18 @@ static void make_data(void)
         data[i] = (uint8_t)(next_random(&random) >> 24);
 }
 
-int main(int argc, char **argv)
+Suite *test_suite(void)
 {
     make_data();
-    if (argc < 2 || !web_start(argv[1], data, DATA_BYTES)) {
+    if (!test_arguments[0] || !web_start(test_arguments[0], data, DATA_BYTES)) {
         fprintf(stderr, "no Python, no web server\n");
-        return 77;
+        exit(TEST_SKIPPED);
     }
     Suite *suite = suite_create("http");
     TCase *tests = tcase_create("servers"), *folder = tcase_create("folder");
     tcase_set_timeout(tests, 120);
     tcase_set_timeout(folder, 120);
-    tcase_add_checked_fixture(folder, set_up_cache, tear_down_cache);
+    tcase_add_checked_fixture(folder, set_up_cache, scratch_leave);
     tcase_add_loop_test(tests, what_passes_or_does_no_harm_gives_the_same_bytes, 0,
                         sizeof readable / sizeof *readable);
     tcase_add_test(tests, a_server_that_sends_less_each_time_is_asked_for_the_rest);
@@ -866,11 +859,5 @@ int main(int argc, char **argv)
     tcase_add_test(folder, processes_share_the_folder);
     suite_add_tcase(suite, tests);
     suite_add_tcase(suite, folder);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    web_stop();
-    free(data);
-    return failed != 0;
+    return suite;
 }

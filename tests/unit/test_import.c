@@ -1,5 +1,4 @@
 /* OBJ, STL and OFF through assimp. */
-#include <check.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,6 +7,7 @@
 #include <ebpo/mesh.h>
 
 #include "base/endian.h"
+#include "check_main.h"
 #include "base/arrays.h"
 #include "ebpo_config.h"
 #include "import/import.h"
@@ -236,7 +236,7 @@ END_TEST
 
 #endif
 
-int main(void)
+Suite *test_suite(void)
 {
     TCase *tests = tcase_create("import");
     tcase_set_timeout(tests, 60);
@@ -257,9 +257,5 @@ int main(void)
 #endif
     Suite *suite = suite_create("import");
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return suite;
 }

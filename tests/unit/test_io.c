@@ -1,5 +1,4 @@
 /* Files: whole reading, and outputs that appear whole or not at all. */
-#include <check.h>
 #include <dirent.h>
 #include <signal.h>
 #include <stdio.h>
@@ -9,33 +8,25 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "check_main.h"
 #include "io/file_source.h"
 #include "io/publish.h"
+#include "scratch.h"
 
-static char folder[] = "/tmp/ebpo-io-XXXXXX";
-static char target[64];
+static const char *folder, *target;
 
 static void enter(void)
 {
-    strcpy(folder, "/tmp/ebpo-io-XXXXXX");
-    ck_assert(mkdtemp(folder) != NULL);
-    snprintf(target, sizeof target, "%s/out.bin", folder);
-}
-
-static int files_in_folder(void)
-{
-    int n = 0;
-    DIR *d = opendir(folder);
-    while (readdir(d))
-        n++;
-    closedir(d);
-    return n - 2;
+    scratch_enter();
+    folder = scratch(NULL);
+    target = scratch("out.bin");
 }
 
 static void leave(void)
 {
     unlink(target);
-    ck_assert(rmdir(folder) == 0);
+    ck_assert_int_eq(scratch_entries(), 0);
+    scratch_leave();
 }
 
 static void write_file(const char *path, const char *content)
@@ -61,10 +52,10 @@ START_TEST(stream_output_appears_on_commit_only)
     ck_assert(ebpo_publish_begin(&out, target, NULL) == EBPO_OK);
     fputs("new", ebpo_publish_stream(&out));
     check_content(target, "old");
-    ck_assert(files_in_folder() == 2);
+    ck_assert(scratch_entries() == 2);
     ck_assert(ebpo_publish_commit(&out, NULL) == EBPO_OK);
     check_content(target, "new");
-    ck_assert(files_in_folder() == 1 && stat(target, &st) == 0 && (st.st_mode & 0777) == 0640);
+    ck_assert(scratch_entries() == 1 && stat(target, &st) == 0 && (st.st_mode & 0777) == 0640);
     ebpo_publish_abort(&out);
     check_content(target, "new");
     umask(mask);
@@ -89,7 +80,7 @@ START_TEST(aborted_output_leaves_nothing_behind)
     fputs("new", ebpo_publish_stream(&out));
     ebpo_publish_abort(&out);
     ebpo_publish_abort(&out);
-    ck_assert(files_in_folder() == 1);
+    ck_assert(scratch_entries() == 1);
     check_content(target, "old");
 }
 END_TEST
@@ -101,7 +92,7 @@ START_TEST(commit_fails_when_the_temporary_file_is_gone)
     ck_assert(ebpo_publish_begin(&out, target, NULL) == EBPO_OK);
     unlink(ebpo_publish_path(&out));
     ck_assert(ebpo_publish_commit(&out, &error) == EBPO_E_IO);
-    ck_assert(files_in_folder() == 0 && strstr(error.message, target) != NULL);
+    ck_assert(scratch_entries() == 0 && strstr(error.message, target) != NULL);
 }
 END_TEST
 
@@ -132,7 +123,7 @@ START_TEST(targets_that_cannot_be_replaced_are_refused)
         refused(target, "Permission denied");
         chmod(folder, 0700);
     }
-    ck_assert(files_in_folder() == 0);
+    ck_assert(scratch_entries() == 0);
 }
 END_TEST
 
@@ -146,7 +137,7 @@ START_TEST(more_outputs_than_slots_are_refused_and_slots_come_back)
         for (int i = 0; i < EBPO_PUBLISH_SLOTS; i++)
             ebpo_publish_abort(&out[i]);
     }
-    ck_assert(files_in_folder() == 0);
+    ck_assert(scratch_entries() == 0);
 }
 END_TEST
 
@@ -165,13 +156,13 @@ START_TEST(signal_handler_removes_what_is_unfinished)
         signal(SIGTERM, on_signal);
         if (ebpo_publish_begin(&done, target, NULL) || ebpo_publish_commit(&done, NULL) ||
             ebpo_publish_begin(&open1, target, NULL) || ebpo_publish_begin(&open2, target, NULL) ||
-            files_in_folder() != 3)
+            scratch_entries() != 3)
             _exit(1);
         raise(SIGTERM);
     }
     int status;
     ck_assert(waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 3);
-    ck_assert(files_in_folder() == 1);
+    ck_assert(scratch_entries() == 1);
 }
 END_TEST
 
@@ -207,7 +198,7 @@ START_TEST(pipes_and_folders_are_refused_without_hanging)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     TCase *tests = tcase_create("io");
     tcase_add_checked_fixture(tests, enter, leave);
@@ -223,9 +214,5 @@ int main(void)
     tcase_add_test(tests, pipes_and_folders_are_refused_without_hanging);
     Suite *suite = suite_create("io");
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return suite;
 }

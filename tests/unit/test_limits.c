@@ -1,16 +1,15 @@
 /* Counts near and beyond what 32 bits hold, faked: right arithmetic where they are allowed,
  * EBPO_E_LIMIT before anything is touched where not. */
-#include <check.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "check_main.h"
 #include "read_by.h"
 #include "construct/branch.h"
 #include "construct/partition.h"
-#include "codec/coding.h"
 #include "container/head_facts.h"
 #include "container/plan.h"
 #include "container/slice_parts.h"
@@ -20,12 +19,13 @@
 #include "mesh/mesh_parts.h"
 #include "octree/octcode.h"
 #include "random_tree.h"
+#include "scratch.h"
 #include "stream/frontier.h"
 #include "stream/partial_tree.h"
 #include "subtree/subtree_parts.h"
 
 static const uint64_t TWO32 = UINT64_C(1) << 32;
-static char path[] = "/tmp/ebpo-limits-XXXXXX";
+static const char *path;
 
 /* --- meshes --- */
 
@@ -442,15 +442,18 @@ START_TEST(exports_that_a_format_cannot_count_are_refused)
 }
 END_TEST
 
-int main(void)
+static void enter(void)
 {
-    int fd = mkstemp(path);
-    if (fd < 0)
-        return 1;
-    close(fd);
+    scratch_enter();
+    path = scratch("limits");
+}
+
+Suite *test_suite(void)
+{
     Suite *suite = suite_create("limits");
     TCase *tests = tcase_create("limits");
     tcase_set_timeout(tests, 120);
+    tcase_add_checked_fixture(tests, enter, scratch_leave);
     tcase_add_test(tests, meshes_beyond_the_limit_are_refused_before_they_are_looked_at);
     tcase_add_test(tests, octcodes_reach_level_20_and_no_further);
     tcase_add_test(tests, lists_of_a_build_have_a_limit_that_does_not_wrap);
@@ -468,10 +471,5 @@ int main(void)
     tcase_add_test(tests, views_tell_groups_beyond_2_to_the_32_apart);
     tcase_add_test(tests, exports_that_a_format_cannot_count_are_refused);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    unlink(path);
-    return failed ? 1 : 0;
+    return suite;
 }

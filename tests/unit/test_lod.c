@@ -1,5 +1,4 @@
 /* Levels as polygons. */
-#include <check.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,21 +7,16 @@
 
 #include <ebpo/ebpo.h>
 
+#include "check_main.h"
+#include "scratch.h"
 #include "solids.h"
 
-static char folder[] = "/tmp/ebpo-lod-XXXXXX", path[64];
+static const char *path;
 
 static void make_folder(void)
 {
-    ck_assert_ptr_nonnull(mkdtemp(folder));
-    snprintf(path, sizeof path, "%s/x.ebpo.h5", folder);
-}
-
-static void remove_folder(void)
-{
-    unlink(path);
-    rmdir(folder);
-    strcpy(folder + strlen(folder) - 6, "XXXXXX");
+    scratch_enter();
+    path = scratch("x.ebpo.h5");
 }
 
 static ebpo_file *build(ebpo_mesh mesh, uint32_t parts, uint32_t leaf_faces)
@@ -317,12 +311,12 @@ START_TEST(a_cancelled_run_leaves_nothing)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("lod");
     TCase *cases = tcase_create("lod");
     tcase_set_timeout(cases, 120);
-    tcase_add_checked_fixture(cases, make_folder, remove_folder);
+    tcase_add_checked_fixture(cases, make_folder, scratch_leave);
     tcase_add_loop_test(cases, level_volumes_equal_those_stored_in_the_file, 0,
                         ebpo_test_solid_count);
     tcase_add_loop_test(cases, envelopes_are_closed_and_fill_the_stated_volume, 0,
@@ -336,9 +330,5 @@ int main(void)
     tcase_add_test(cases, a_level_that_is_not_there_is_refused);
     tcase_add_test(cases, a_cancelled_run_leaves_nothing);
     suite_add_tcase(suite, cases);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed != 0;
+    return suite;
 }

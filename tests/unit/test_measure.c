@@ -1,6 +1,5 @@
 /* Area, volume, centroid and inertia, held against closed forms and against the mesh's own
  * integrals in rational numbers. */
-#include <check.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,21 +10,16 @@
 
 #include <ebpo/ebpo.h>
 
+#include "check_main.h"
+#include "scratch.h"
 #include "solids.h"
 
-static char folder[] = "/tmp/ebpo-measure-XXXXXX", path[64];
+static const char *path;
 
 static void make_folder(void)
 {
-    ck_assert_ptr_nonnull(mkdtemp(folder));
-    snprintf(path, sizeof path, "%s/x.ebpo.h5", folder);
-}
-
-static void remove_folder(void)
-{
-    unlink(path);
-    rmdir(folder);
-    strcpy(folder + strlen(folder) - 6, "XXXXXX");
+    scratch_enter();
+    path = scratch("x.ebpo.h5");
 }
 
 static ebpo_mesh copy_of(const ebpo_mesh *mesh)
@@ -503,12 +497,12 @@ START_TEST(files_without_mesh_cannot_be_measured)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("measure");
     TCase *tests = tcase_create("mass");
     tcase_set_timeout(tests, 300);
-    tcase_add_checked_fixture(tests, make_folder, remove_folder);
+    tcase_add_checked_fixture(tests, make_folder, scratch_leave);
     tcase_add_test(tests, boxes_have_the_mass_of_boxes);
     tcase_add_test(tests, a_tetrahedron_has_the_mass_of_a_tetrahedron);
     tcase_add_test(tests, masses_are_the_exact_integrals_of_the_mesh);
@@ -523,9 +517,5 @@ int main(void)
     tcase_add_test(tests, masses_do_not_depend_on_threads);
     tcase_add_test(tests, files_without_mesh_cannot_be_measured);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+    return suite;
 }

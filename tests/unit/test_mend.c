@@ -1,6 +1,5 @@
 /* Mending of arranged meshes, in little memory and on all cores, against mending in the source's
  * order. */
-#include <check.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,12 +7,10 @@
 #include <ebpo/ebpo.h>
 
 #include "arrange/arrange.h"
+#include "check_main.h"
 #include "base/arrays.h"
 #include "mesh/mesh_parts.h"
 #include "solids.h"
-
-__attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
 
 static const ebpo_progress silent = { NULL, NULL };
 
@@ -308,7 +305,7 @@ START_TEST(what_was_mended_is_arranged_again_by_building)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("mend");
     TCase *tests = tcase_create("all");
@@ -323,9 +320,5 @@ int main(void)
     tcase_add_test(tests, preparing_may_be_stopped_and_checks_what_is_too_large_to_build);
     tcase_add_test(tests, what_was_mended_is_arranged_again_by_building);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? 1 : 0;
+    return suite;
 }

@@ -1,5 +1,4 @@
 /* Checking and mending meshes. */
-#include <check.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -7,6 +6,7 @@
 
 #include <ebpo/mesh.h>
 
+#include "check_main.h"
 #include "solids.h"
 
 static const ebpo_progress silent = { NULL, NULL };
@@ -569,7 +569,7 @@ START_TEST(filled_scans_are_balanced)
 }
 END_TEST
 
-static Suite *mesh_suite(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("mesh");
     TCase *checking = tcase_create("checking"), *mending = tcase_create("mending");
@@ -614,13 +614,4 @@ static Suite *mesh_suite(void)
         suite_add_tcase(suite, real);
     }
     return suite;
-}
-
-int main(void)
-{
-    SRunner *runner = srunner_create(mesh_suite());
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? EXIT_FAILURE : EXIT_SUCCESS;
 }

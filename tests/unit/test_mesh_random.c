@@ -1,11 +1,11 @@
 /* The mesh check against a plain twin, on small meshes made at random: every kind of defect, many
  * at once. */
-#include <check.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include <ebpo/mesh.h>
 
+#include "check_main.h"
 #include "solids.h"
 
 enum { MOST_VERTICES = 9, MOST_FACES = 24, ROUNDS = 20000 };
@@ -206,7 +206,7 @@ START_TEST(mending_random_meshes_keeps_its_promises)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("mesh, random");
     TCase *all = tcase_create("all");
@@ -214,9 +214,5 @@ int main(void)
     tcase_add_test(all, check_agrees_with_its_plain_twin);
     tcase_add_test(all, mending_random_meshes_keeps_its_promises);
     suite_add_tcase(suite, all);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+    return suite;
 }

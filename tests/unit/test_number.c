@@ -1,10 +1,10 @@
 /* Decimal text to float and double against the C library, which rounds correctly. */
-#include <check.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "check_main.h"
 #include "ply/decimal.h"
 
 static uint64_t next(uint64_t *state)
@@ -152,7 +152,7 @@ START_TEST(integers_are_read_whole_or_not_at_all)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     TCase *tests = tcase_create("number");
     tcase_set_timeout(tests, 120);
@@ -163,9 +163,5 @@ int main(void)
     tcase_add_test(tests, integers_are_read_whole_or_not_at_all);
     Suite *suite = suite_create("number");
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return suite;
 }

@@ -1,9 +1,9 @@
 /* Types in group words, cells and what lies beside them, against plain twins. */
-#include <check.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "check_main.h"
 #include "octree/cells.h"
 #include "octree/node_types.h"
 #include "octree/octcode.h"
@@ -187,7 +187,7 @@ START_TEST(points_lie_between_the_walls_of_the_cells_that_are_found)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     TCase *tests = tcase_create("octree");
     tcase_set_timeout(tests, 120);
@@ -199,9 +199,5 @@ int main(void)
     tcase_add_loop_test(tests, points_lie_between_the_walls_of_the_cells_that_are_found, 0, 42);
     Suite *suite = suite_create("octree");
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return suite;
 }

@@ -1,9 +1,9 @@
 /* Faces against cells, corner windings and selections, against plain twins that sample or
  * enumerate. */
-#include <check.h>
 #include <math.h>
 #include <stdlib.h>
 
+#include "check_main.h"
 #include "geom/plane_clip.h"
 #include "geom/plane_code.h"
 #include "planes/octants.h"
@@ -242,7 +242,7 @@ START_TEST(lazy_greedy_takes_what_plain_greedy_takes)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("planes");
     TCase *tests = tcase_create("planes");
@@ -253,9 +253,5 @@ int main(void)
     tcase_add_test(tests, corner_windings_of_a_cube_in_a_cell_are_zero_and_inside_ones_are_one);
     tcase_add_test(tests, lazy_greedy_takes_what_plain_greedy_takes);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? 1 : 0;
+    return suite;
 }

@@ -1,5 +1,5 @@
 /* Reading and writing PLY: dialects, messages, damage. */
-#include <check.h>
+#include <fcntl.h>
 #include <inttypes.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -10,7 +10,9 @@
 #include <ebpo/mesh.h>
 
 #include "base/sha256.h"
+#include "check_main.h"
 #include "ply/ply.h"
+#include "scratch.h"
 #include "solids.h"
 
 /* --- files made here --- */
@@ -689,10 +691,8 @@ static void fill_bits(void *to, size_t size, uint64_t *state)
 
 START_TEST(what_is_written_reads_back_with_the_same_bits)
 {
-    char path[] = "/tmp/ebpo-test-XXXXXX";
-    ck_assert(mkdtemp(path) != NULL);
-    char name[64];
-    snprintf(name, sizeof name, "%s/out.ply", path);
+    scratch_enter();
+    const char *name = scratch("out.ply");
     size_t width = _i ? 8 : 4;
     const uint64_t n = 20000; /* more than the writer's buffer */
     ebpo_mesh mesh = { .vertex_count = n, .face_count = n }, back;
@@ -714,7 +714,7 @@ START_TEST(what_is_written_reads_back_with_the_same_bits)
     ebpo_mesh_free(&mesh);
     ebpo_mesh_free(&back);
     unlink(name);
-    ck_assert(rmdir(path) == 0); /* nothing else was left */
+    ck_assert_int_eq(scratch_entries(), 0); /* nothing else was left */
 }
 END_TEST
 
@@ -733,8 +733,8 @@ END_TEST
 
 START_TEST(read_file_records_its_digest)
 {
-    char path[] = "/tmp/ebpo-test-XXXXXX";
-    int fd = mkstemp(path);
+    const char *path = scratch("triangle.ply");
+    int fd = open(path, O_CREAT | O_WRONLY, 0600);
     ck_assert(write(fd, TRIANGLE "3 0 1 2\n", strlen(TRIANGLE "3 0 1 2\n")) > 0);
     close(fd);
     ebpo_mesh mesh;
@@ -840,7 +840,7 @@ START_TEST(igea_in_strips_is_igea_in_triangles)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     TCase *tests = tcase_create("ply");
     tcase_set_timeout(tests, 120);
@@ -871,9 +871,5 @@ int main(void)
     tcase_add_test(tests, igea_in_strips_is_igea_in_triangles);
     Suite *suite = suite_create("ply");
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return suite;
 }

@@ -1,8 +1,8 @@
 /* Polygons become triangles that cover them: same area, all turning the polygon's way. */
-#include <check.h>
 #include <math.h>
 #include <stdlib.h>
 
+#include "check_main.h"
 #include "geom/polygon.h"
 #include "geom/predicates.h"
 
@@ -152,7 +152,7 @@ START_TEST(polygons_without_an_answer_become_fans)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     TCase *tests = tcase_create("polygon");
     tcase_set_timeout(tests, 120);
@@ -163,9 +163,5 @@ int main(void)
     tcase_add_test(tests, polygons_without_an_answer_become_fans);
     Suite *suite = suite_create("polygon");
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return suite;
 }

@@ -1,9 +1,9 @@
 /* Polytopes and plane codes: volumes add up, codes decode to what was encoded, and never to less
  * than the support. */
-#include <check.h>
 #include <math.h>
 #include <stdlib.h>
 
+#include "check_main.h"
 #include "geom/plane_code.h"
 #include "geom/polytope.h"
 #include "planes/planes.h"
@@ -214,7 +214,7 @@ START_TEST(planes_keep_their_meaning_in_child_cells)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("polytope");
     TCase *tests = tcase_create("polytope");
@@ -228,9 +228,5 @@ int main(void)
     tcase_add_test(tests, offset_is_the_least_that_keeps_the_support);
     tcase_add_test(tests, planes_keep_their_meaning_in_child_cells);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? 1 : 0;
+    return suite;
 }

@@ -1,9 +1,9 @@
 /* Exact predicates against rational twins, on inputs where rounding would decide. */
-#include <check.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "check_main.h"
 #include "exact_twin.h"
 #include "geom/predicates.h"
 #include "geom/predicates_exact.h"
@@ -143,7 +143,7 @@ START_TEST(sign_of_products_equals_rational_sum)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     TCase *tests = tcase_create("predicates");
     tcase_set_timeout(tests, 300);
@@ -156,9 +156,5 @@ int main(void)
     tcase_add_test(tests, sign_of_products_equals_rational_sum);
     Suite *suite = suite_create("predicates");
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return suite;
 }

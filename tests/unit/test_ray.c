@@ -1,13 +1,13 @@
 /* Rays and boxes against triangles, held against twins in rational numbers that share no method
  * with the library: a ray is clipped by linear conditions on t, a triangle is clipped as a polygon
  * by the box's half-spaces. */
-#include <check.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include <gmp.h>
 
+#include "check_main.h"
 #include "exact_twin.h"
 #include "geom/ray_triangle.h"
 
@@ -688,7 +688,7 @@ START_TEST(boxes_of_points_meet_what_they_lie_on)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("ray");
     TCase *rays = tcase_create("rays"), *boxes = tcase_create("boxes");
@@ -702,9 +702,5 @@ int main(void)
     tcase_add_loop_test(boxes, boxes_meet_triangles_as_rational_clipping_says, 0, BOX_KINDS);
     suite_add_tcase(suite, rays);
     suite_add_tcase(suite, boxes);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+    return suite;
 }

@@ -1,6 +1,5 @@
 /* Selections: the theses' against plain twins; the hull that proposes directions; files of every
  * selection keep the promises; and what no envelope can be better than. */
-#include <check.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,9 +12,11 @@
 #include <ebpo/verify.h>
 
 #include "base/arrays.h"
+#include "check_main.h"
 #include "geom/plane_code.h"
 #include "planes/hull_directions.h"
 #include "planes/planes.h"
+#include "scratch.h"
 #include "solids.h"
 
 enum { MOST = 48 };
@@ -292,19 +293,19 @@ END_TEST
 
 /* --- files --- */
 
-static char folder[32], path[64];
+static const char *path;
 
 static void enter(void)
 {
-    strcpy(folder, "/tmp/ebpo-select-XXXXXX");
-    ck_assert(mkdtemp(folder) != NULL);
-    snprintf(path, sizeof path, "%s/model.ebpo.h5", folder);
+    scratch_enter();
+    path = scratch("model.ebpo.h5");
 }
 
 static void leave(void)
 {
     unlink(path);
-    ck_assert(rmdir(folder) == 0);
+    ck_assert_int_eq(scratch_entries(), 0);
+    scratch_leave();
 }
 
 static void write_file(ebpo_mesh mesh, const ebpo_build_options *options)
@@ -523,7 +524,7 @@ START_TEST(no_envelope_is_smaller_than_the_limit_and_inherited_ones_come_close)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("selections");
     TCase *tests = tcase_create("choosing"), *files = tcase_create("files");
@@ -547,9 +548,5 @@ int main(void)
     tcase_add_loop_test(files, no_envelope_is_smaller_than_the_limit_and_inherited_ones_come_close,
                         0, ebpo_test_solid_count);
     suite_add_tcase(suite, files);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? 1 : 0;
+    return suite;
 }

@@ -1,5 +1,4 @@
 /* Parts of a file against the whole file: ranges, nodes, subtrees as one piece. */
-#include <check.h>
 #include <dirent.h>
 #include <pthread.h>
 #include <stdint.h>
@@ -7,30 +6,20 @@
 
 #include <ebpo/build.h>
 
+#include "check_main.h"
 #include "read_by.h"
 #include "container/slice_parts.h"
 #include "octree/node_types.h"
 #include "random_tree.h"
+#include "scratch.h"
 #include "solids.h"
 
-/* libhdf5 1.10 itself leaks when it gives up on a damaged object header; that is not what we look
- * for here. */
-__attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
-
-static char folder[] = "/tmp/ebpo-slice-XXXXXX", path[64];
+static const char *path;
 
 static void make_folder(void)
 {
-    ck_assert_ptr_nonnull(mkdtemp(folder));
-    snprintf(path, sizeof path, "%s/x.ebpo.h5", folder);
-}
-
-static void remove_folder(void)
-{
-    unlink(path);
-    rmdir(folder);
-    strcpy(folder + strlen(folder) - 6, "XXXXXX");
+    scratch_enter();
+    path = scratch("x.ebpo.h5");
 }
 
 /* A file, all of it in memory, and the number of nodes of each type before each group, counted one
@@ -814,12 +803,12 @@ START_TEST(subtrees_of_a_real_model_add_up)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("slice");
     TCase *cases = tcase_create("slice");
     tcase_set_timeout(cases, 300);
-    tcase_add_checked_fixture(cases, make_folder, remove_folder);
+    tcase_add_checked_fixture(cases, make_folder, scratch_leave);
     tcase_add_loop_test(cases, slices_of_random_trees_are_what_the_whole_file_says, 0, 20);
     tcase_add_loop_test(cases, slices_of_solids_are_what_the_whole_file_says, 0,
                         ebpo_test_solid_count);
@@ -836,12 +825,8 @@ int main(void)
     suite_add_tcase(suite, cases);
     cases = tcase_create("threads"); /* apart: CK_RUN_CASE=threads under a thread sanitizer */
     tcase_set_timeout(cases, 300);
-    tcase_add_checked_fixture(cases, make_folder, remove_folder);
+    tcase_add_checked_fixture(cases, make_folder, scratch_leave);
     tcase_add_test(cases, threads_share_one_cache);
     suite_add_tcase(suite, cases);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed != 0;
+    return suite;
 }

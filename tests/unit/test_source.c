@@ -1,24 +1,20 @@
 /* Files from memory, from paths and from a caller's own source: the same trees, few reads, and
  * every failure of a read told as what it is. */
-#include <check.h>
 #include <limits.h>
 #include <hdf5.h>
 #include <pthread.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "check_main.h"
 #include "read_by.h"
 #include "container/reader.h"
 #include "random_tree.h"
+#include "scratch.h"
 #include "solids.h"
 #include "tree_json.h"
 
-/* libhdf5 1.10 itself leaks when opening a damaged file fails; that is not what we look for here.
- */
-__attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
-
-static char folder[64], path[128], rewritten[128];
+static const char *path, *rewritten;
 static uint8_t *data; /* the bytes of `path`, in a block of exactly their size */
 static size_t size;
 static char *expected; /* the tree in it */
@@ -91,17 +87,14 @@ static const random_tree_options large = { 7, 3, 9, 90000, true, false, false, f
 
 static void set_up(void)
 {
-    snprintf(folder, sizeof folder, "/tmp/ebpo-source-XXXXXX");
-    ck_assert_ptr_nonnull(mkdtemp(folder));
-    snprintf(path, sizeof path, "%s/a.ebpo.h5", folder);
-    snprintf(rewritten, sizeof rewritten, "%s/b.ebpo.h5", folder);
+    scratch_enter();
+    path = scratch("a.ebpo.h5");
+    rewritten = scratch("b.ebpo.h5");
 }
 
 static void tear_down(void)
 {
-    char command[128];
-    snprintf(command, sizeof command, "rm -rf '%s'", folder);
-    ck_assert_int_eq(system(command), 0);
+    scratch_leave();
     free(data);
     free(expected);
     data = NULL;
@@ -498,7 +491,7 @@ START_TEST(what_is_no_regular_file_fails_at_once)
     ck_assert_int_eq(mkfifo(path, 0600), 0);
     ck_assert_int_eq(ebpo_open(path, &file, &error), EBPO_E_IO);
     ck_assert_ptr_nonnull(strstr(error.message, "not a regular file"));
-    ck_assert_int_eq(ebpo_open(folder, &file, &error), EBPO_E_IO);
+    ck_assert_int_eq(ebpo_open(scratch(NULL), &file, &error), EBPO_E_IO);
     ck_assert_int_eq(ebpo_open(rewritten, &file, &error), EBPO_E_IO);
     ck_assert_ptr_null(file);
 }
@@ -555,7 +548,7 @@ START_TEST(threads_open_one_file_at_once)
     void *failed;
     make_file(&small, EBPO_CODEC_ZSTD);
     for (int i = 0; i < 4; i++)
-        ck_assert_int_eq(pthread_create(&thread[i], NULL, open_in_thread, path), 0);
+        ck_assert_int_eq(pthread_create(&thread[i], NULL, open_in_thread, (void *)path), 0);
     for (int i = 0; i < 4; i++) {
         ck_assert_int_eq(pthread_join(thread[i], &failed), 0);
         ck_assert_ptr_null(failed);
@@ -563,7 +556,7 @@ START_TEST(threads_open_one_file_at_once)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("source");
     TCase *tests = tcase_create("source");
@@ -584,9 +577,5 @@ int main(void)
     tcase_add_test(tests, threads_read_one_file_at_once);
     tcase_add_test(tests, threads_open_one_file_at_once);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed != 0;
+    return suite;
 }

@@ -1,6 +1,5 @@
 /* Levels one after the other: the same nodes as in the tree read at once, planes that contain what
  * the codes contain (proved with rationals), closed polygons, volumes. */
-#include <check.h>
 #include <gmp.h>
 #include <math.h>
 #include <stdio.h>
@@ -11,25 +10,20 @@
 #include <ebpo/ebpo.h>
 #include <ebpo/stream.h>
 
+#include "check_main.h"
 #include "read_by.h"
 #include "geom/plane_code.h"
 #include "octree/octcode.h"
+#include "scratch.h"
 #include "solids.h"
 #include "stream/cell_to_model.h"
 
-static char folder[] = "/tmp/ebpo-stream-XXXXXX", path[64];
+static const char *path;
 
 static void make_folder(void)
 {
-    ck_assert_ptr_nonnull(mkdtemp(folder));
-    snprintf(path, sizeof path, "%s/x.ebpo.h5", folder);
-}
-
-static void remove_folder(void)
-{
-    unlink(path);
-    rmdir(folder);
-    strcpy(folder + strlen(folder) - 6, "XXXXXX");
+    scratch_enter();
+    path = scratch("x.ebpo.h5");
 }
 
 enum { USUAL = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS };
@@ -680,12 +674,12 @@ START_TEST(real_models_lie_within_their_streamed_planes)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("stream");
     TCase *tests = tcase_create("stream");
     tcase_set_timeout(tests, 900);
-    tcase_add_checked_fixture(tests, make_folder, remove_folder);
+    tcase_add_checked_fixture(tests, make_folder, scratch_leave);
     tcase_add_loop_test(tests, levels_and_nodes_equal_the_tree_read_at_once, 0,
                         ebpo_test_solid_count);
     tcase_add_test(tests, one_may_stop_within_a_level_and_go_on_with_the_next);
@@ -699,9 +693,5 @@ int main(void)
                         ebpo_test_solid_count);
     tcase_add_loop_test(tests, real_models_lie_within_their_streamed_planes, 0, 2);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed != 0;
+    return suite;
 }

@@ -1,5 +1,4 @@
 /* Subsets: every answer that they give is the whole file's, and what they cannot know they say. */
-#include <check.h>
 #include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
@@ -13,13 +12,11 @@
 #include <ebpo/subset.h>
 #include <ebpo/verify.h>
 
+#include "check_main.h"
 #include "read_by.h"
 #include "container/reader.h"
 #include "query_kit.h"
 #include "subset/subset_parts.h"
-
-__attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
 
 static const query_variant usual = { "usual", 4, 6, EBPO_RULE_NONZERO,
                                      EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS |
@@ -675,7 +672,7 @@ START_TEST(subsets_that_lie_do_no_harm)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("subset");
     TCase *tests = tcase_create("subset");
@@ -689,9 +686,5 @@ int main(void)
     tcase_add_test(tests, damaged_subsets_do_no_harm);
     tcase_add_test(tests, subsets_that_lie_do_no_harm);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+    return suite;
 }

@@ -1,6 +1,5 @@
 /* The verifier on trees that are right, and on trees with one thing wrong in each: caught, and in
  * the right kind. */
-#include <check.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,6 +7,7 @@
 
 #include <ebpo/build.h>
 
+#include "check_main.h"
 #include "solids.h"
 #include "verify/verify_parts.h"
 
@@ -501,7 +501,7 @@ START_TEST(real_models_keep_their_promises)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     TCase *tests = tcase_create("verify");
     tcase_set_timeout(tests, 300);
@@ -530,9 +530,5 @@ int main(void)
     tcase_add_test(tests, real_models_keep_their_promises);
     Suite *suite = suite_create("verify");
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return suite;
 }

@@ -1,6 +1,5 @@
 /* The verifier on files: with and without their parts, against their source and against another
  * one, whole and damaged. */
-#include <check.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,22 +8,24 @@
 #include <ebpo/build.h>
 #include <ebpo/verify.h>
 
+#include "check_main.h"
+#include "scratch.h"
 #include "solids.h"
 
-static char folder[32], path[64];
+static const char *path;
 static ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
 
 static void enter(void)
 {
-    strcpy(folder, "/tmp/ebpo-verify-XXXXXX");
-    ck_assert(mkdtemp(folder) != NULL);
-    snprintf(path, sizeof path, "%s/model.ebpo.h5", folder);
+    scratch_enter();
+    path = scratch("model.ebpo.h5");
 }
 
 static void leave(void)
 {
     unlink(path);
-    ck_assert(rmdir(folder) == 0);
+    ck_assert_int_eq(scratch_entries(), 0);
+    scratch_leave();
 }
 
 /* A mesh whose vertices repeat, with a hole and turned faces: all mending has something to do. */
@@ -213,7 +214,7 @@ START_TEST(verifying_needs_a_file_and_may_be_stopped)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     TCase *tests = tcase_create("verify file");
     tcase_set_timeout(tests, 300);
@@ -226,9 +227,5 @@ int main(void)
     tcase_add_test(tests, verifying_needs_a_file_and_may_be_stopped);
     Suite *suite = suite_create("verify file");
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return suite;
 }

@@ -1,10 +1,10 @@
 /* The verifier's own geometry: floating-point answers against rationals, rays against the library's
  * crossings, the certificates against clipping. */
-#include <check.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/arrays.h"
+#include "check_main.h"
 #include "geom/plane_code.h"
 #include "geom/predicates.h"
 #include "solids.h"
@@ -180,7 +180,7 @@ START_TEST(rays_along_all_axes_agree_also_through_vertices_and_edges)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     TCase *tests = tcase_create("verify geometry");
     tcase_set_timeout(tests, 300);
@@ -191,9 +191,5 @@ int main(void)
     tcase_add_test(tests, rays_along_all_axes_agree_also_through_vertices_and_edges);
     Suite *suite = suite_create("verify geometry");
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return suite;
 }

@@ -1,6 +1,5 @@
 /* Nodes in the order of an observer: against the ordinary stream, and against plain twins of every
  * key. */
-#include <check.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,7 +8,9 @@
 
 #include <ebpo/ebpo.h>
 
+#include "check_main.h"
 #include "random_tree.h"
+#include "scratch.h"
 #include "solids.h"
 
 /* ck_assert tells its parent process each time that it is passed. */
@@ -24,19 +25,12 @@
             ck_abort_msg(__VA_ARGS__); \
     } while (0)
 
-static char folder[] = "/tmp/ebpo-view-XXXXXX", path[64];
+static const char *path;
 
 static void make_folder(void)
 {
-    ck_assert_ptr_nonnull(mkdtemp(folder));
-    snprintf(path, sizeof path, "%s/x.ebpo.h5", folder);
-}
-
-static void remove_folder(void)
-{
-    unlink(path);
-    rmdir(folder);
-    strcpy(folder + strlen(folder) - 6, "XXXXXX");
+    scratch_enter();
+    path = scratch("x.ebpo.h5");
 }
 
 enum { USUAL = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS, PRIORITIES = 4 };
@@ -962,12 +956,12 @@ START_TEST(options_that_make_no_sense_are_refused)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("view");
     TCase *tests = tcase_create("view");
     tcase_set_timeout(tests, 900);
-    tcase_add_checked_fixture(tests, make_folder, remove_folder);
+    tcase_add_checked_fixture(tests, make_folder, scratch_leave);
     tcase_add_loop_test(tests, an_exhausted_stream_has_all_nodes_in_order_and_a_cut_at_any_time, 0,
                         ebpo_test_solid_count);
     tcase_add_loop_test(tests, trees_of_several_chunks_come_whole_too, 0, 4);
@@ -982,9 +976,5 @@ int main(void)
                         2);
     tcase_add_test(tests, options_that_make_no_sense_are_refused);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed != 0;
+    return suite;
 }

@@ -1,5 +1,4 @@
 /* Arrays in memory or in files, and what stays resident. */
-#include <check.h>
 #include <dirent.h>
 #include <signal.h>
 #include <stdio.h>
@@ -10,18 +9,8 @@
 #include <unistd.h>
 
 #include "base/arrays.h"
-
-static char folder[] = "/tmp/ebpo-workspace-XXXXXX";
-
-static int names_in_folder(void)
-{
-    int count = 0;
-    DIR *d = opendir(folder);
-    for (struct dirent *e = d ? readdir(d) : NULL; e; e = readdir(d))
-        count += strcmp(e->d_name, ".") != 0 && strcmp(e->d_name, "..") != 0;
-    closedir(d);
-    return count;
-}
+#include "check_main.h"
+#include "scratch.h"
 
 static uint64_t resident(void)
 {
@@ -36,7 +25,7 @@ static ebpo_workspace *make(uint64_t memory)
 {
     ebpo_workspace *w;
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert_msg(ebpo_workspace_make_any(&w, memory, folder, &error) == EBPO_OK, "%s",
+    ck_assert_msg(ebpo_workspace_make_any(&w, memory, scratch(NULL), &error) == EBPO_OK, "%s",
                   error.message);
     return w;
 }
@@ -53,7 +42,7 @@ START_TEST(what_does_not_fit_goes_to_files_without_names)
     ck_assert_uint_eq(f.memory, 8 * MIB);
     ck_assert_uint_eq(f.held, 3 * MIB);
     ck_assert_uint_eq(f.filed, 5 * MIB);
-    ck_assert_int_eq(names_in_folder(), 0);
+    ck_assert_int_eq(scratch_entries(), 0);
     for (int i = 0; i < 5 * MIB; i++)
         ck_assert_msg(filed[i] == 0, "byte %d", i);
     memset(filed, 7, 5 * MIB);
@@ -153,7 +142,7 @@ START_TEST(a_file_that_may_not_grow_is_an_error_that_names_the_folder)
     ck_assert_int_eq(setrlimit(RLIMIT_FSIZE, &limit), 0);
     ck_assert_ptr_null(ebpo_array_alloc(w, 5 << 20, 1));
     ck_assert_int_eq(ebpo_workspace_fail(w, 5 << 20, &error), EBPO_E_IO);
-    ck_assert_msg(strstr(error.message, folder) && strstr(error.message, "5242880"), "%s",
+    ck_assert_msg(strstr(error.message, scratch(NULL)) && strstr(error.message, "5242880"), "%s",
                   error.message);
     ebpo_workspace_stats f = EBPO_WORKSPACE_STATS_INIT;
     ebpo_workspace_get_stats(w, &f);
@@ -162,10 +151,8 @@ START_TEST(a_file_that_may_not_grow_is_an_error_that_names_the_folder)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
-    if (!mkdtemp(folder))
-        return 1;
     Suite *suite = suite_create("workspace");
     TCase *tests = tcase_create("arrays");
     tcase_set_timeout(tests, 120);
@@ -176,10 +163,5 @@ int main(void)
     tcase_add_test(tests, bad_wishes_are_refused);
     tcase_add_test(tests, a_file_that_may_not_grow_is_an_error_that_names_the_folder);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    rmdir(folder);
-    return failed ? 1 : 0;
+    return suite;
 }

@@ -10,15 +10,11 @@
 
 #include <ebpo/build.h>
 
+#include "known_leaks.h"
 #include "random_tree.h"
 #include "subset/subset_parts.h"
 #include "tree_json.h"
 #include "vector_read.h"
-
-/* libhdf5 1.10 itself leaks when it gives up on a damaged object header; that is not what we look
- * for here. */
-__attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
 
 static const char *folder;
 

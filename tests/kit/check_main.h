@@ -1,0 +1,15 @@
+/* The main function of Check programs: check_main.c. */
+#ifndef EBPO_TESTS_CHECK_MAIN_H
+#define EBPO_TESTS_CHECK_MAIN_H
+
+#include <check.h>
+
+/* What each program defines: its tests. It may end the program with
+ * TEST_SKIPPED after saying why. */
+Suite *test_suite(void);
+enum { TEST_SKIPPED = 77 };
+
+/* What the program was called with, without its own name; ends with NULL. */
+extern char **test_arguments;
+
+#endif
