@@ -1,31 +1,75 @@
 #!/bin/sh
-# All tests: installs what they need, builds with gcc, clang and sanitizers (warnings are errors) and runs every suite with gcc; with clang and sanitizers less of it, as said below.
-# Usage: tests/run.sh [gcc] [clang] [sanitize]; all three by default. Needs no model files; with ../shared/models or $EBPO_MODELS the real ones are tested too.
+# The tests, in three tiers. Each installs what it needs, builds (warnings are errors) and tests:
+#   tests/run.sh           medium, what CI runs: gcc, clang, sanitize, thread; 40 minutes at most
+#   tests/run.sh short     gcc alone, few inputs and nothing costly: while one works
+#   tests/run.sh long      every check in every build, all inputs with gcc: before a release
+#   tests/run.sh [TIER] BUILD...    only these of its builds; sanitize: address and undefined
+# What a tier leaves out is in the table below, nowhere else. Needs no model files; with
+# ../shared/models or $EBPO_MODELS the real ones are tested too.
 set -eu
 cd "$(dirname "$0")/.."
-sh tools/install-deps.sh --tests
-jobs=$(nproc)
-run() { # name, compiler, meson options...
-    name=$1 compiler=$2
-    shift 2
-    echo "=== $name ==="
-    [ -d "build-$name" ] || CC=$compiler meson setup "build-$name" -Dwerror=true -Dtests=enabled "$@"
-    ninja -C "build-$name" -j "$jobs"
-    # The viewer is not compiled: once is enough. What is long and no business of the compiler's: not with clang.
-    case $name in
-    gcc) less= ;;
-    clang) less="--no-suite viewer --no-suite long" ;;
-    *) less="--no-suite viewer" ;;
+tier=medium
+case "${1:-}" in short | medium | long) tier=$1 && shift ;; esac
+[ $# -gt 0 ] || case $tier in short) set -- gcc ;; *) set -- gcc clang sanitize thread ;; esac
+
+# The share of repeated inputs (EBPO_TEST_SCALE), and the suites that are left out:
+#   once     not compiled: one build is enough
+#   costly   compiled, but no compiler's business: with gcc and sanitizers
+#   viewer   the web viewer in node and a browser
+plan() { # build
+    case $tier-$1 in
+    short-*) echo "0.05 once costly viewer" ;;
+    medium-gcc) echo "0.3" ;;
+    medium-clang) echo "0.1 once costly viewer" ;;
+    medium-sanitize) echo "0.05 once viewer" ;;
+    long-gcc) echo "1" ;;
+    long-clang) echo "0.2" ;;
+    long-sanitize) echo "0.2" ;;
+    *-thread) echo "1" ;; # only the suite threads, all of it
     esac
-    # shellcheck disable=SC2086
-    EBPO_TEST_SCALE=${EBPO_TEST_SCALE:-1} meson test -C "build-$name" -v --no-rebuild $less
 }
-[ $# -gt 0 ] || set -- gcc clang sanitize
-for suite in "$@"; do
-    case $suite in
-    gcc) run gcc gcc ;;
-    clang) EBPO_TEST_SCALE=0.2 run clang clang ;; # the number of random points is gcc's business
-    sanitize) EBPO_TEST_SCALE=0.2 run sanitize gcc -Db_sanitize=address,undefined -Db_lundef=false --buildtype=debugoptimized -Dc_args=-fno-sanitize-recover=all -Dcpp_args=-fno-sanitize-recover=all ;;
-    *) echo "usage: tests/run.sh [gcc] [clang] [sanitize]" >&2; exit 2 ;;
+
+jobs=$(nproc)
+configure() { # build, meson options...
+    folder=build-$1
+    shift
+    [ -d "$folder" ] || meson setup "$folder" -Dwerror=true -Dtests=enabled "$@"
+}
+sanitized() { # sanitizers
+    stop=-fno-sanitize-recover=all
+    echo "-Db_sanitize=$1 -Db_lundef=false --buildtype=debugoptimized -Dc_args=$stop -Dcpp_args=$stop"
+}
+run() { # build
+    # shellcheck disable=SC2046
+    case $1 in
+    gcc | clang) CC=$1 configure "$1" ;;
+    sanitize) CC=gcc configure "$1" $(sanitized address,undefined) ;;
+    thread) CC=gcc configure "$1" $(sanitized thread) ;;
     esac
+    read -r share left_out <<EOF
+$(plan "$1")
+EOF
+    if [ "$1" = thread ]; then
+        suites="--suite threads" # meson builds what these need
+    else
+        ninja -C "build-$1" -j "$jobs"
+        suites="--no-rebuild"
+        for suite in $left_out; do suites="$suites --no-suite $suite"; done
+    fi
+    # shellcheck disable=SC2086
+    EBPO_TEST_SCALE=${EBPO_TEST_SCALE:-$share} meson test -C "build-$1" -v $suites
+}
+
+for build in "$@"; do
+    case $build in
+    gcc | clang | sanitize | thread) ;;
+    *) echo "usage: tests/run.sh [short|medium|long] [gcc] [clang] [sanitize] [thread]" >&2; exit 2 ;;
+    esac
+done
+sh tools/install-deps.sh --tests
+for build in "$@"; do
+    echo "=== $tier: $build ==="
+    began=$(date +%s)
+    run "$build"
+    echo "=== $tier: $build took $((($(date +%s) - began + 30) / 60)) minutes ==="
 done

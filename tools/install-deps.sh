@@ -11,7 +11,7 @@ modules=no
 packages="gcc dpkg-dev pkg-config meson ninja-build libhdf5-dev libzstd-dev zlib1g-dev libgmp-dev nettle-dev libassimp-dev libpng-dev libcairo2-dev libjs-chart.js libcurl4-openssl-dev libqhull-dev"
 for option in "$@"; do
     case $option in
-    --tests) packages="$packages abigail-tools check hdf5-tools python3 python3-h5py python3-numpy clang libclang-rt-14-dev g++ mandoc chromium $viewer"; [ $modules = yes ] || modules=tests ;;
+    --tests) packages="$packages abigail-tools check hdf5-tools python3 python3-h5py python3-numpy clang clang-format libclang-rt-14-dev g++ mandoc chromium $viewer"; [ $modules = yes ] || modules=tests ;;
     --demo) packages="$packages hdf5-tools glmark2-data python3-h5py" ;;
     --bench) packages="$packages g++ libembree-dev libcgal-dev python3 linux-perf valgrind" ;;
     --paraview) packages="$packages paraview python3-paraview xvfb xauth" ;;

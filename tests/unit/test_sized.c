@@ -1,15 +1,12 @@
 /* Structs that begin with their size: callers of other versions, and callers who forgot it. */
-#include <check.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include <ebpo/ebpo.h>
 
 #include "base/sized.h"
+#include "check_main.h"
 #include "query_kit.h"
-
-__attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
 
 /* What a caller of a later version would hand over. */
 typedef struct later_options {
@@ -161,7 +158,7 @@ START_TEST(structs_that_were_not_begun)
 }
 END_TEST
 
-int main(void)
+Suite *test_suite(void)
 {
     Suite *suite = suite_create("sized");
     TCase *tests = tcase_create("sized");
@@ -171,9 +168,5 @@ int main(void)
     tcase_add_test(tests, what_is_filled_in);
     tcase_add_test(tests, structs_that_were_not_begun);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+    return suite;
 }

@@ -1,7 +1,9 @@
 // What the peers' programs have in common: command line, PLY, points, clocks, one line of JSON.
 //
-// A peer is a class with: `static constexpr int doubles` (of one point: 3; of one ray: 6), `answer_type`, and
-//     peer(bool warm); void load(const char *path); void build(); answer_type answer(const double *point);
+// A peer is a class with: `static constexpr int doubles` (of one point: 3; of one ray: 6),
+// `answer_type`, and
+//     peer(bool warm); void load(const char *path); void build(); answer_type answer(const double
+//     *point);
 #ifndef EBPO_BENCH_PEER_HPP
 #define EBPO_BENCH_PEER_HPP
 
@@ -20,10 +22,12 @@
 #include <string>
 #include <vector>
 
-namespace bench {
+namespace bench
+{
 
 // Little-endian machines only, as the peers themselves.
-static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the peers' programs read little-endian numbers as they are");
+static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
+              "the peers' programs read little-endian numbers as they are");
 
 struct settings {
     std::string model, query, points, answers;
@@ -34,10 +38,11 @@ struct settings {
 // For building; where the peer can use more than one. 0: all cores.
 inline unsigned threads = 1;
 
-// What is written to --answers: for inside one byte, 1 inside and 0 outside; for the others 16 bytes.
+// What is written to --answers: for inside one byte, 1 inside and 0 outside; for the others 16
+// bytes.
 struct hit {
-    double value;  // distance, or the ray's parameter; infinity: none
-    int64_t face;  // -1: none
+    double value; // distance, or the ray's parameter; infinity: none
+    int64_t face; // -1: none
 };
 
 struct file {
@@ -71,8 +76,9 @@ struct ply_head {
 
 inline size_t ply_size(const std::string &type)
 {
-    static const char *const names[] = { "char", "uchar", "int8", "uint8", "short", "ushort", "int16", "uint16", "int", "uint",
-                                         "int32", "uint32", "float", "float32", "double", "float64" };
+    static const char *const names[] = { "char",  "uchar",   "int8",   "uint8",  "short", "ushort",
+                                         "int16", "uint16",  "int",    "uint",   "int32", "uint32",
+                                         "float", "float32", "double", "float64" };
     static const size_t sizes[] = { 1, 1, 1, 1, 2, 2, 2, 2, 4, 4, 4, 4, 4, 4, 8, 8 };
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++)
         if (type == names[i])
@@ -80,7 +86,8 @@ inline size_t ply_size(const std::string &type)
     throw std::runtime_error("PLY type \"" + type + "\" is not known");
 }
 
-// The vertices' properties may be anything scalar; faces have one list, of 32-bit numbers with counts of one byte.
+// The vertices' properties may be anything scalar; faces have one list, of 32-bit numbers with
+// counts of one byte.
 inline ply_head read_ply_head(FILE *stream)
 {
     ply_head head;
@@ -107,7 +114,8 @@ inline ply_head read_ply_head(FILE *stream)
         }
     }
     if (!binary || lists != 1 || std::max({ head.at[0], head.at[1], head.at[2] }) == SIZE_MAX)
-        throw std::runtime_error("only binary little-endian PLY with x, y, z and faces as one list (uchar, int) can be read");
+        throw std::runtime_error("only binary little-endian PLY with x, y, z and faces as one list "
+                                 "(uchar, int) can be read");
     return head;
 }
 
@@ -166,7 +174,8 @@ template <class Real> mesh<Real> read_ply(const char *path)
 inline void drop_from_memory(const std::string &path)
 {
     int descriptor = open(path.c_str(), O_RDONLY);
-    if (descriptor < 0 || (fsync(descriptor), posix_fadvise(descriptor, 0, 0, POSIX_FADV_DONTNEED)) != 0)
+    if (descriptor < 0 ||
+        (fsync(descriptor), posix_fadvise(descriptor, 0, 0, POSIX_FADV_DONTNEED)) != 0)
         throw std::runtime_error(path + ": cannot be dropped from memory");
     close(descriptor);
 }
@@ -223,7 +232,8 @@ inline std::vector<double> read_points(const std::string &path, uint64_t count, 
     return points;
 }
 
-template <class Answer> void write_answers(const std::string &path, const std::vector<Answer> &answers)
+template <class Answer>
+void write_answers(const std::string &path, const std::vector<Answer> &answers)
 {
     file out(path, "wb");
     if (fwrite(answers.data(), sizeof(Answer), answers.size(), out.stream) != answers.size())
@@ -279,12 +289,16 @@ template <class Peer> void run(const settings &s)
     std::sort(times.begin(), times.end());
     if (!s.answers.empty())
         write_answers(s.answers, answers);
-    printf("{\"peer\": \"%s\", \"query\": \"%s\", \"warm\": %s, \"points\": %" PRIu64 ", \"load_s\": %.6f, \"build_s\": %.6f, "
-           "\"first_answer_s\": %.6f, \"mean_ns\": %.1f, \"mean_cpu_ns\": %.1f, \"clocked_mean_ns\": %.1f, \"p50_ns\": %" PRIu64
-           ", \"p99_ns\": %" PRIu64 ", \"p999_ns\": %" PRIu64 ", \"max_ns\": %" PRIu64 ", \"clock_ns\": %" PRIu64
-           ", \"peak_mb\": %.1f}\n", Peer::name, s.query.c_str(), s.warm ? "true" : "false", count, took.load, took.build, (double)(answered - took.start) * 1e-9, (double)wall / (double)count,
-           (double)processor / (double)count, clocked, quantile(times, 0.5), quantile(times, 0.99), quantile(times, 0.999),
-           times.back(), cost, peak);
+    printf("{\"peer\": \"%s\", \"query\": \"%s\", \"warm\": %s, \"points\": %" PRIu64
+           ", \"load_s\": %.6f, \"build_s\": %.6f, "
+           "\"first_answer_s\": %.6f, \"mean_ns\": %.1f, \"mean_cpu_ns\": %.1f, "
+           "\"clocked_mean_ns\": %.1f, \"p50_ns\": %" PRIu64 ", \"p99_ns\": %" PRIu64
+           ", \"p999_ns\": %" PRIu64 ", \"max_ns\": %" PRIu64 ", \"clock_ns\": %" PRIu64
+           ", \"peak_mb\": %.1f}\n",
+           Peer::name, s.query.c_str(), s.warm ? "true" : "false", count, took.load, took.build,
+           (double)(answered - took.start) * 1e-9, (double)wall / (double)count,
+           (double)processor / (double)count, clocked, quantile(times, 0.5), quantile(times, 0.99),
+           quantile(times, 0.999), times.back(), cost, peak);
 }
 
 // Only loads and builds.
@@ -292,8 +306,9 @@ template <class Peer> void run_build(const settings &s)
 {
     Peer peer(s.warm);
     build_times took = timed_build(peer, s);
-    printf("{\"peer\": \"%s\", \"query\": \"build\", \"threads\": %u, \"load_s\": %.6f, \"build_s\": %.6f, \"peak_mb\": %.1f}\n", Peer::name, threads,
-           took.load, took.build, peak_megabytes());
+    printf("{\"peer\": \"%s\", \"query\": \"build\", \"threads\": %u, \"load_s\": %.6f, "
+           "\"build_s\": %.6f, \"peak_mb\": %.1f}\n",
+           Peer::name, threads, took.load, took.build, peak_megabytes());
 }
 
 inline bool parse(int argc, char **argv, settings &s)
@@ -328,12 +343,17 @@ template <class Inside, class Distance, class Ray> int main(int argc, char **arg
 {
     settings s;
     if (!parse(argc, argv, s)) {
-        fprintf(stderr, "usage: %s MODEL.ply inside|distance|ray POINTS.raw [--count N] [--warm] [--cold] [--answers FILE]\n"
-                "       %s MODEL.ply build [--threads N] [--cold]\n"
-                "POINTS.raw: little-endian doubles, x y z for each point; rays: origin and direction.\n"
-                "--warm  distance: search no farther than the last answer allows\n"
-                "--cold  ask the system to drop MODEL.ply from its cache first\n"
-                "build    only load and build what rays need; --threads 0: on all cores, where the peer can\n", argv[0], argv[0]);
+        fprintf(
+            stderr,
+            "usage: %s MODEL.ply inside|distance|ray POINTS.raw [--count N] [--warm] [--cold] "
+            "[--answers FILE]\n"
+            "       %s MODEL.ply build [--threads N] [--cold]\n"
+            "POINTS.raw: little-endian doubles, x y z for each point; rays: origin and direction.\n"
+            "--warm  distance: search no farther than the last answer allows\n"
+            "--cold  ask the system to drop MODEL.ply from its cache first\n"
+            "build    only load and build what rays need; --threads 0: on all cores, where the "
+            "peer can\n",
+            argv[0], argv[0]);
         return 2;
     }
     try {
