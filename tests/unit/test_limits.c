@@ -7,7 +7,7 @@
 #include <unistd.h>
 
 #include "check_main.h"
-#include "read_by.h"
+#include "codec/coding.h"
 #include "construct/branch.h"
 #include "construct/partition.h"
 #include "container/head_facts.h"
@@ -19,6 +19,7 @@
 #include "mesh/mesh_parts.h"
 #include "octree/octcode.h"
 #include "random_tree.h"
+#include "read_by.h"
 #include "scratch.h"
 #include "stream/frontier.h"
 #include "stream/partial_tree.h"
