@@ -5,10 +5,8 @@
 #include <unistd.h>
 
 #include "h5/h5.h"
-#include "h5/scope.h"
+#include "h5/h5_objects.h"
 #include "h5/zstd_filter.h"
-
-static const char DISK[] = "libhdf5 could not write; is the disk full?";
 
 /* Everything stays in object headers, wherever HDF5 would otherwise switch to B-trees and heaps. */
 enum { COMPACT = 65535 };
@@ -66,10 +64,8 @@ ebpo_status ebpo_h5_create(ebpo_h5_out *out, const char *path, const char *shown
         out->file = H5Fcreate(path ? path : "head", H5F_ACC_TRUNC, fcpl, fapl);
     if (out->file < 0)
         status = ebpo_h5_fail(error, EBPO_E_IO, shown, "", "libhdf5 could not create the file");
-    if (fapl >= 0)
-        H5Pclose(fapl);
-    if (fcpl >= 0)
-        H5Pclose(fcpl);
+    ebpo_h5_close_list(fapl);
+    ebpo_h5_close_list(fcpl);
     ebpo_h5_leave(&scope);
     return status;
 }
@@ -88,8 +84,7 @@ ebpo_status ebpo_h5_reopen(ebpo_h5_out *out, const char *path, uint64_t metadata
     if (out->file < 0)
         status = ebpo_h5_fail(error, EBPO_E_IO, out->shown, "",
                               "libhdf5 could not open again what it had written");
-    if (fapl >= 0)
-        H5Pclose(fapl);
+    ebpo_h5_close_list(fapl);
     ebpo_h5_leave(&scope);
     return status;
 }
@@ -99,7 +94,7 @@ ebpo_status ebpo_h5_root(ebpo_h5_out *out, ebpo_h5_id *id, ebpo_error *error)
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
     *id = H5Gopen2(out->file, "/", H5P_DEFAULT);
-    ebpo_status status = *id >= 0 ? EBPO_OK : ebpo_h5_fail(error, EBPO_E_IO, out->shown, "/", DISK);
+    ebpo_status status = ebpo_h5_written(out, "/", *id >= 0, error);
     ebpo_h5_leave(&scope);
     return status;
 }
@@ -110,32 +105,8 @@ ebpo_status ebpo_h5_make_group(ebpo_h5_out *out, const char *path, unsigned link
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
     hid_t gcpl = H5Pcreate(H5P_GROUP_CREATE);
-    *id = set_group(gcpl, links) ? H5Gcreate2(out->file, path, H5P_DEFAULT, gcpl, H5P_DEFAULT) : -1;
-    ebpo_status status =
-        *id >= 0 ? EBPO_OK : ebpo_h5_fail(error, EBPO_E_IO, out->shown, path, DISK);
-    if (gcpl >= 0)
-        H5Pclose(gcpl);
+    ebpo_status status = ebpo_h5_put_group(out, path, gcpl, set_group(gcpl, links), id, error);
     ebpo_h5_leave(&scope);
-    return status;
-}
-
-/* Writes an attribute of the stored type `type`; takes over type and space. */
-static ebpo_status put(ebpo_h5_out *out, hid_t object, const char *name, hid_t type, hid_t space,
-                       hid_t memory, const void *value, ebpo_error *error)
-{
-    hid_t attribute = -1;
-    if (type >= 0 && space >= 0) {
-        if (H5Aexists(object, name) > 0)
-            attribute = H5Aopen(object, name, H5P_DEFAULT);
-        else
-            attribute = H5Acreate2(object, name, type, space, H5P_DEFAULT, H5P_DEFAULT);
-    }
-    bool ok = attribute >= 0 && H5Awrite(attribute, memory < 0 ? type : memory, value) >= 0;
-    ebpo_status status = ok ? EBPO_OK : ebpo_h5_fail(error, EBPO_E_IO, out->shown, name, DISK);
-    if (attribute >= 0)
-        H5Aclose(attribute);
-    if (space >= 0)
-        H5Sclose(space);
     return status;
 }
 
@@ -151,7 +122,8 @@ ebpo_status ebpo_h5_put_text(ebpo_h5_out *out, ebpo_h5_id id, const char *name, 
         H5Tclose(type);
         type = -1;
     }
-    ebpo_status status = put(out, id, name, type, H5Screate(H5S_SCALAR), -1, text, error);
+    ebpo_status status =
+        ebpo_h5_put_attribute(out, id, name, type, H5Screate(H5S_SCALAR), -1, text, error);
     if (type >= 0)
         H5Tclose(type);
     ebpo_h5_leave(&scope);
@@ -163,8 +135,8 @@ ebpo_status ebpo_h5_put_int(ebpo_h5_out *out, ebpo_h5_id id, const char *name, i
 {
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
-    ebpo_status status =
-        put(out, id, name, H5T_STD_I64LE, H5Screate(H5S_SCALAR), H5T_NATIVE_INT64, &value, error);
+    ebpo_status status = ebpo_h5_put_attribute(out, id, name, H5T_STD_I64LE, H5Screate(H5S_SCALAR),
+                                               H5T_NATIVE_INT64, &value, error);
     ebpo_h5_leave(&scope);
     return status;
 }
@@ -174,8 +146,8 @@ ebpo_status ebpo_h5_put_count(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
 {
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
-    ebpo_status status =
-        put(out, id, name, H5T_STD_U64LE, H5Screate(H5S_SCALAR), H5T_NATIVE_UINT64, &value, error);
+    ebpo_status status = ebpo_h5_put_attribute(out, id, name, H5T_STD_U64LE, H5Screate(H5S_SCALAR),
+                                               H5T_NATIVE_UINT64, &value, error);
     ebpo_h5_leave(&scope);
     return status;
 }
@@ -187,8 +159,8 @@ ebpo_status ebpo_h5_put_real(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
     ebpo_h5_enter(&scope);
     hsize_t dims = count;
     hid_t space = count ? H5Screate_simple(1, &dims, NULL) : H5Screate(H5S_SCALAR);
-    ebpo_status status =
-        put(out, id, name, H5T_IEEE_F64LE, space, H5T_NATIVE_DOUBLE, values, error);
+    ebpo_status status = ebpo_h5_put_attribute(out, id, name, H5T_IEEE_F64LE, space,
+                                               H5T_NATIVE_DOUBLE, values, error);
     ebpo_h5_leave(&scope);
     return status;
 }
@@ -217,21 +189,14 @@ ebpo_status ebpo_h5_make_array(ebpo_h5_out *out, const char *path, const ebpo_h5
     int rank = shape->cols ? 2 : 1;
     hsize_t dims[2] = { shape->rows, shape->cols }, chunk[2] = { shape->chunk_rows, shape->cols };
     hid_t space = H5Screate_simple(rank, dims, NULL), dcpl = H5Pcreate(H5P_DATASET_CREATE);
-    *id = -1;
-    if (space >= 0 && dcpl >= 0 && H5Pset_chunk(dcpl, rank, chunk) >= 0 &&
-        H5Pset_obj_track_times(dcpl, false) >= 0 &&
-        H5Pset_attr_phase_change(dcpl, COMPACT, 0) >= 0 &&
-        H5Pset_fill_time(dcpl, H5D_FILL_TIME_NEVER) >= 0 &&
-        set_filters(dcpl, shape, out->codec_level))
-        *id =
-            H5Dcreate2(out->file, path, ebpo_h5_integer_type(shape->element_size, shape->is_signed),
-                       space, H5P_DEFAULT, dcpl, H5P_DEFAULT);
+    bool good = space >= 0 && dcpl >= 0 && H5Pset_chunk(dcpl, rank, chunk) >= 0 &&
+                H5Pset_obj_track_times(dcpl, false) >= 0 &&
+                H5Pset_attr_phase_change(dcpl, COMPACT, 0) >= 0 &&
+                H5Pset_fill_time(dcpl, H5D_FILL_TIME_NEVER) >= 0 &&
+                set_filters(dcpl, shape, out->codec_level);
     ebpo_status status =
-        *id >= 0 ? EBPO_OK : ebpo_h5_fail(error, EBPO_E_IO, out->shown, path, DISK);
-    if (space >= 0)
-        H5Sclose(space);
-    if (dcpl >= 0)
-        H5Pclose(dcpl);
+        ebpo_h5_put_dataset(out, path, ebpo_h5_integer_type(shape->element_size, shape->is_signed),
+                            space, dcpl, good, id, error);
     ebpo_h5_leave(&scope);
     return status;
 }
@@ -242,8 +207,7 @@ ebpo_status ebpo_h5_open_array(ebpo_h5_out *out, const char *path, ebpo_h5_id *i
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
     *id = H5Dopen2(out->file, path, H5P_DEFAULT);
-    ebpo_status status =
-        *id >= 0 ? EBPO_OK : ebpo_h5_fail(error, EBPO_E_IO, out->shown, path, DISK);
+    ebpo_status status = ebpo_h5_written(out, path, *id >= 0, error);
     ebpo_h5_leave(&scope);
     return status;
 }
@@ -255,9 +219,8 @@ ebpo_status ebpo_h5_put_chunk(ebpo_h5_out *out, const char *path, ebpo_h5_id id,
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
     hsize_t at[2] = { chunk * shape->chunk_rows, 0 };
-    ebpo_status status = EBPO_OK;
-    if (H5Dwrite_chunk(id, H5P_DEFAULT, 0, at, bytes, data) < 0)
-        status = ebpo_h5_fail(error, EBPO_E_IO, out->shown, path, DISK);
+    ebpo_status status =
+        ebpo_h5_written(out, path, H5Dwrite_chunk(id, H5P_DEFAULT, 0, at, bytes, data) >= 0, error);
     ebpo_h5_leave(&scope);
     return status;
 }
@@ -293,10 +256,9 @@ ebpo_status ebpo_h5_finish(ebpo_h5_out *out, ebpo_error *error)
         return EBPO_OK;
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
-    ebpo_status status = EBPO_OK;
-    if (H5Fflush(out->file, H5F_SCOPE_LOCAL) < 0 || H5Fclose(out->file) < 0)
-        status = ebpo_h5_fail(error, EBPO_E_IO, out->shown, "", DISK);
-    else
+    bool good = H5Fflush(out->file, H5F_SCOPE_LOCAL) >= 0 && H5Fclose(out->file) >= 0;
+    ebpo_status status = ebpo_h5_written(out, "", good, error);
+    if (good)
         out->file = -1;
     ebpo_h5_leave(&scope);
     return status;

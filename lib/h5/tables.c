@@ -3,9 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "h5/scope.h"
-
-static const char DISK[] = "libhdf5 could not write; is the disk full?";
+#include "h5/h5_objects.h"
 
 /* Deflate's fastest: these files are read once or twice, and numbers of nodes and corners shrink
  * well even so. */
@@ -50,10 +48,8 @@ ebpo_status ebpo_h5_create_plain(ebpo_h5_out *out, const char *path, const char 
         out->file = H5Fcreate(path, H5F_ACC_TRUNC, fcpl, fapl);
     if (out->file < 0)
         status = ebpo_h5_fail(error, EBPO_E_IO, shown, "", "libhdf5 could not create the file");
-    if (fapl >= 0)
-        H5Pclose(fapl);
-    if (fcpl >= 0)
-        H5Pclose(fcpl);
+    ebpo_h5_close_list(fapl);
+    ebpo_h5_close_list(fcpl);
     ebpo_h5_leave(&scope);
     return status;
 }
@@ -64,30 +60,9 @@ ebpo_status ebpo_h5_make_plain_group(ebpo_h5_out *out, const char *path, ebpo_h5
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
     hid_t gcpl = H5Pcreate(H5P_GROUP_CREATE);
-    *id = gcpl >= 0 && H5Pset_obj_track_times(gcpl, false) >= 0
-              ? H5Gcreate2(out->file, path, H5P_DEFAULT, gcpl, H5P_DEFAULT)
-              : -1;
-    ebpo_status status =
-        *id >= 0 ? EBPO_OK : ebpo_h5_fail(error, EBPO_E_IO, out->shown, path, DISK);
-    if (gcpl >= 0)
-        H5Pclose(gcpl);
+    bool good = gcpl >= 0 && H5Pset_obj_track_times(gcpl, false) >= 0;
+    ebpo_status status = ebpo_h5_put_group(out, path, gcpl, good, id, error);
     ebpo_h5_leave(&scope);
-    return status;
-}
-
-/* Takes over the space. */
-static ebpo_status put(ebpo_h5_out *out, hid_t object, const char *name, hid_t type, hid_t space,
-                       hid_t memory, const void *value, ebpo_error *error)
-{
-    hid_t attribute = type >= 0 && space >= 0
-                          ? H5Acreate2(object, name, type, space, H5P_DEFAULT, H5P_DEFAULT)
-                          : -1;
-    bool ok = attribute >= 0 && H5Awrite(attribute, memory, value) >= 0;
-    ebpo_status status = ok ? EBPO_OK : ebpo_h5_fail(error, EBPO_E_IO, out->shown, name, DISK);
-    if (attribute >= 0)
-        H5Aclose(attribute);
-    if (space >= 0)
-        H5Sclose(space);
     return status;
 }
 
@@ -97,8 +72,9 @@ ebpo_status ebpo_h5_put_ints(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
     hsize_t dims = count;
-    ebpo_status status = put(out, id, name, H5T_STD_I64LE, H5Screate_simple(1, &dims, NULL),
-                             H5T_NATIVE_INT64, values, error);
+    ebpo_status status =
+        ebpo_h5_put_attribute(out, id, name, H5T_STD_I64LE, H5Screate_simple(1, &dims, NULL),
+                              H5T_NATIVE_INT64, values, error);
     ebpo_h5_leave(&scope);
     return status;
 }
@@ -111,8 +87,8 @@ ebpo_status ebpo_h5_put_ascii(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
     hid_t type = H5Tcopy(H5T_C_S1);
     bool ok = type >= 0 && H5Tset_size(type, strlen(text)) >= 0 &&
               H5Tset_strpad(type, H5T_STR_NULLPAD) >= 0;
-    ebpo_status status =
-        put(out, id, name, ok ? type : -1, H5Screate(H5S_SCALAR), type, text, error);
+    ebpo_status status = ebpo_h5_put_attribute(out, id, name, ok ? type : -1, H5Screate(H5S_SCALAR),
+                                               type, text, error);
     if (type >= 0)
         H5Tclose(type);
     ebpo_h5_leave(&scope);
@@ -130,17 +106,11 @@ ebpo_status ebpo_h5_make_table(ebpo_h5_out *out, const char *path, ebpo_h5_numbe
     hid_t space = H5Screate_simple(rank, dims, most), dcpl = H5Pcreate(H5P_DATASET_CREATE);
     *table = (ebpo_h5_table){ .id = -1, .number = number, .cols = cols };
     snprintf(table->path, sizeof table->path, "%s", path);
-    if (space >= 0 && dcpl >= 0 && H5Pset_chunk(dcpl, rank, chunk) >= 0 &&
-        H5Pset_obj_track_times(dcpl, false) >= 0 && H5Pset_shuffle(dcpl) >= 0 &&
-        H5Pset_deflate(dcpl, DEFLATE) >= 0)
-        table->id =
-            H5Dcreate2(out->file, path, stored_type(number), space, H5P_DEFAULT, dcpl, H5P_DEFAULT);
+    bool good = space >= 0 && dcpl >= 0 && H5Pset_chunk(dcpl, rank, chunk) >= 0 &&
+                H5Pset_obj_track_times(dcpl, false) >= 0 && H5Pset_shuffle(dcpl) >= 0 &&
+                H5Pset_deflate(dcpl, DEFLATE) >= 0;
     ebpo_status status =
-        table->id >= 0 ? EBPO_OK : ebpo_h5_fail(error, EBPO_E_IO, out->shown, path, DISK);
-    if (space >= 0)
-        H5Sclose(space);
-    if (dcpl >= 0)
-        H5Pclose(dcpl);
+        ebpo_h5_put_dataset(out, path, stored_type(number), space, dcpl, good, &table->id, error);
     ebpo_h5_leave(&scope);
     return status;
 }
@@ -157,10 +127,8 @@ static bool append(ebpo_h5_table *table, const void *data, uint64_t rows)
         space >= 0 && memory >= 0 &&
         H5Sselect_hyperslab(space, H5S_SELECT_SET, start, NULL, count, NULL) >= 0 &&
         H5Dwrite(table->id, memory_type(table->number), memory, space, H5P_DEFAULT, data) >= 0;
-    if (space >= 0)
-        H5Sclose(space);
-    if (memory >= 0)
-        H5Sclose(memory);
+    ebpo_h5_close_space(space);
+    ebpo_h5_close_space(memory);
     return ok;
 }
 
@@ -171,11 +139,8 @@ ebpo_status ebpo_h5_append(ebpo_h5_out *out, ebpo_h5_table *table, const void *d
         return EBPO_OK;
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
-    ebpo_status status = EBPO_OK;
-    if (append(table, data, rows))
-        table->rows += rows;
-    else
-        status = ebpo_h5_fail(error, EBPO_E_IO, out->shown, table->path, DISK);
+    ebpo_status status = ebpo_h5_written(out, table->path, append(table, data, rows), error);
+    table->rows += status == EBPO_OK ? rows : 0;
     ebpo_h5_leave(&scope);
     return status;
 }

@@ -1,0 +1,26 @@
+/* Inside lib/h5, within a scope: what is written into every file, whatever its layout. What is
+ * taken over is closed, also when something failed before. */
+#ifndef EBPO_H5_H5_OBJECTS_H
+#define EBPO_H5_H5_OBJECTS_H
+
+#include "h5/h5.h"
+#include "h5/scope.h"
+
+/* EBPO_E_IO unless it went well; right after the call, as others wipe libhdf5's reason. */
+ebpo_status ebpo_h5_written(const ebpo_h5_out *out, const char *what, bool good, ebpo_error *error);
+
+/* Takes over the list of properties; `good`: it has them all. */
+ebpo_status ebpo_h5_put_group(const ebpo_h5_out *out, const char *path, hid_t gcpl, bool good,
+                              ebpo_h5_id *id, ebpo_error *error);
+/* Takes over space and properties. */
+ebpo_status ebpo_h5_put_dataset(const ebpo_h5_out *out, const char *path, hid_t type, hid_t space,
+                                hid_t dcpl, bool good, ebpo_h5_id *id, ebpo_error *error);
+/* Writes an attribute, from its stored type where `memory` is -1. Takes over the space. */
+ebpo_status ebpo_h5_put_attribute(const ebpo_h5_out *out, hid_t object, const char *name,
+                                  hid_t type, hid_t space, hid_t memory, const void *value,
+                                  ebpo_error *error);
+
+void ebpo_h5_close_list(hid_t list);
+void ebpo_h5_close_space(hid_t space);
+
+#endif
