@@ -21,14 +21,14 @@ typedef struct ebpo_cutting {
     ebpo_error *error;
 } ebpo_cutting;
 
-/* --- levels.c: the levels that remain, with face numbers of the source --- */
+/* --- subset_levels.c: the levels that remain, with face numbers of the source --- */
 EBPO_MUST_USE ebpo_status ebpo_cut_levels(ebpo_cutting *c);
 
-/* --- faces.c: the faces that the remaining leaves list, numbered anew, and their vertices and
- * maps. Without any, the parts are taken off --- */
+/* --- subset_faces.c: the faces that the remaining leaves list, numbered anew, and their vertices
+ * and maps. Without any, the parts are taken off --- */
 EBPO_MUST_USE ebpo_status ebpo_cut_faces(ebpo_cutting *c);
 
-/* --- volumes.c: of the envelopes of the nodes that remain --- */
+/* --- subset_volumes.c: of the envelopes of the nodes that remain --- */
 void ebpo_cut_volumes(ebpo_cutting *c);
 
 /* The same with what is known of envelopes already: `need` of this file, for the planes that are
@@ -37,8 +37,8 @@ EBPO_MUST_USE ebpo_status ebpo_subset_tree_within(ebpo_tree *out, const ebpo_fil
                                                   const ebpo_subset_options *options,
                                                   ebpo_tolerance *need, ebpo_error *error);
 
-/* --- size.c: the subset for options->target_bytes, published as `path`; trials are written beside
- * it. Changes max_error and parts of the options --- */
+/* --- target_size.c: the subset for options->target_bytes, published as `path`; trials are written
+ * beside it. Changes max_error and parts of the options --- */
 EBPO_MUST_USE ebpo_status ebpo_subset_fit(const ebpo_file *file, const char *path,
                                           ebpo_subset_options *options, ebpo_error *error);
 
