@@ -92,8 +92,8 @@ static ebpo_status find_bounds(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Exact walls at deep levels cost room around a model that is small and far from the origin: the
- * deepest level for which that hardly shows. */
+/* Exact walls at deep levels enlarge the box around a model that is small and far from the origin:
+ * the deepest level at which that hardly matters. */
 static bool choose_box(ebpo_box *out, const double min[3], const double max[3], int level)
 {
     static const double larger = 1 + 0x1p-16;
@@ -276,7 +276,7 @@ static ebpo_status sort_vertices(arranging *a, ebpo_error *error)
     return ebpo_sort_run(&sort, error);
 }
 
-/* --- faces: first told in the vertices' new numbers, then sorted by the least of these --- */
+/* --- faces: translated to the vertices' new numbers, then sorted by the least of these --- */
 
 static ebpo_status fill_ranks(void *context, uint64_t begin, uint64_t end, unsigned worker,
                               ebpo_error *error)
@@ -345,7 +345,7 @@ static ebpo_status translate_faces(arranging *a, uint64_t *passes, ebpo_error *e
 }
 
 typedef struct face_record {
-    /* least vertex << 32 | number in the source: from whatever order, the result is the same */
+    /* least vertex << 32 | number in the source: the result does not depend on the old order */
     uint64_t key;
     uint32_t corner[3], unused;
 } face_record;

@@ -18,8 +18,8 @@ void *ebpo_alloc_zero(uint64_t count, size_t size);
 /* Resizes to count * size bytes; on NULL the old block stays valid. */
 void *ebpo_realloc(void *block, uint64_t count, size_t size);
 
-/* Makes room for `need` items in a growing array (*capacity items of `size` bytes at *array), by
- * half as much again. False when memory is short; the array stays valid. */
+/* Makes room for `need` items in a growing array (*capacity items of `size` bytes at *array),
+ * growing it by half. False when memory is short; the array stays valid. */
 bool ebpo_grow(void *array, uint64_t *capacity, uint64_t need, size_t size);
 
 #endif

@@ -1,4 +1,4 @@
-/* Little-endian loads and stores; files are little-endian whatever the machine is. */
+/* Little-endian loads and stores: files are little-endian on every machine. */
 #ifndef EBPO_BASE_ENDIAN_H
 #define EBPO_BASE_ENDIAN_H
 

@@ -30,7 +30,7 @@ const char *ebpo_status_name(ebpo_status status)
     return "unknown status";
 }
 
-/* One line, whatever a file name or another library's message brings along. */
+/* Always one line, even if a file name or another library's message has several. */
 static void keep_to_one_line(char *text)
 {
     for (; *text; text++)

@@ -122,7 +122,7 @@ ebpo_status ebpo_parallel_for(unsigned threads, uint64_t count, uint64_t grain, 
               .stage = stage,
               .lock = PTHREAD_MUTEX_INITIALIZER,
               .status = EBPO_OK };
-    /* A stage is told when it begins, however short it will be: callers add up times by stages. */
+    /* Every stage reports its beginning, however short it is: callers add up times by stage. */
     if (!ebpo_progress_step(progress, stage, 0, count, error))
         return EBPO_E_CANCELLED;
     threads = ebpo_thread_count(threads);

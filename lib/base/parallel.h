@@ -38,8 +38,8 @@ static inline bool ebpo_progress_step_at(const ebpo_progress *progress, const ch
     return (i & 0xfffff) || ebpo_progress_step(progress, stage, done, total, error);
 }
 
-/* One of several passes of a stage: what it tells of itself is told as a stretch, `begin` to `end`
- * of `of`, so that what is done only grows. */
+/* One of several passes of a stage: its own progress is reported as the part from `begin` to `end`
+ * of `of`, so that the total only grows. */
 typedef struct ebpo_pass {
     const ebpo_progress *to; /* NULL is fine */
     uint64_t begin, end, of;

@@ -6,7 +6,7 @@
 
 #define EBPO_RANDOM_STEP UINT64_C(0x9e3779b97f4a7c15)
 
-/* Numbers that are told apart become numbers that seem to have nothing to do with each other. */
+/* Different numbers become numbers that look unrelated. */
 static inline uint64_t ebpo_random_mix(uint64_t x)
 {
     x = (x ^ x >> 30) * UINT64_C(0xbf58476d1ce4e5b9);

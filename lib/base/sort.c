@@ -75,8 +75,8 @@ static bool form_groups(sorting *t)
     return t->next != NULL;
 }
 
-/* Sorts a piece by groups, in the core's own cache, and moves each group's records together:
- * whatever order they came in, there are no more jumps than groups. */
+/* Sorts a piece by groups, in the core's own cache, and moves each group's records together: in
+ * whatever order they arrive, there are no more jumps than groups. */
 static ebpo_status deal(void *context, uint64_t begin, uint64_t end, unsigned worker,
                         ebpo_error *error)
 {

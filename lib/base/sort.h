@@ -1,6 +1,6 @@
-/* Sorting far more records than memory holds: they are dealt out to groups by the leading bits of
- * their keys, and each group, a stretch of the result, is sorted by itself. Arrays are gone through
- * in order, or in as many places at a time as there are groups. */
+/* Sorts far more records than memory holds. They are distributed to groups by the leading bits of
+ * their keys, and each group, a contiguous part of the result, is sorted by itself. Arrays are read
+ * and written in order, or at as many positions at a time as there are groups. */
 #ifndef EBPO_BASE_SORT_H
 #define EBPO_BASE_SORT_H
 
@@ -24,7 +24,8 @@ typedef struct ebpo_sort {
                         ebpo_error *error);
     /* Decides between records of one key, which must differ: less than 0 when `a` comes first. */
     int (*compare)(const void *a, const void *b);
-    /* Is given the sorted records, group by group, from any thread: those of places `place` on. */
+    /* Receives the sorted records, group by group, from any thread; the first has position `place`.
+     */
     void (*take)(void *context, uint64_t place, const void *records, uint64_t count);
 } ebpo_sort;
 

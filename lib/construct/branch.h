@@ -7,7 +7,7 @@
 /* Adds an empty detail, or eight empty nodes. False: out of memory. */
 bool ebpo_branch_detail(const ebpo_builder *b, ebpo_branch *s, uint32_t *index);
 bool ebpo_branch_children(const ebpo_builder *b, ebpo_branch *s, uint32_t *first);
-/* EBPO_E_LIMIT when the branch has as many nodes as 32 bits can number. */
+/* EBPO_E_LIMIT when 32 bits cannot number any more nodes of the branch. */
 ebpo_status ebpo_build_check_branch(const ebpo_branch *s, ebpo_error *error);
 
 /* Frees what partition made of the piece's list: it can be made again. */

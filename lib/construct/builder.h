@@ -44,8 +44,7 @@ typedef struct ebpo_build_detail {
 /* A subtree: its nodes, depth first. nodes[0] is its root. */
 typedef struct ebpo_branch {
     ebpo_cell cell;
-    /* faces that touch the cell, ascending; NULL for the top, which goes by the faces' own numbers
-     */
+    /* faces that touch the cell, ascending; NULL for the top, whose entries are face numbers */
     uint32_t *list;
     uint64_t list_count;
     uint8_t *fresh;              /* bit i: no piece before this one lists face list[i] */

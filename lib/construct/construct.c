@@ -250,8 +250,8 @@ static ebpo_status build_pieces(ebpo_builder *b, ebpo_error *error)
     return status;
 }
 
-/* From the root down a piece is done in one go. From the leaves up the top needs all pieces first:
- * their cells are made twice rather than kept. */
+/* From the root down, each piece is finished in one pass. From the leaves up, the top needs all
+ * pieces first: their cells are made twice rather than kept. */
 static ebpo_status build_tree(ebpo_builder *b, ebpo_error *error)
 {
     ebpo_status status = ebpo_build_corner_windings(b, error);

@@ -11,8 +11,8 @@ ebpo_status ebpo_build_corner_windings(ebpo_builder *b, ebpo_error *error);
 void ebpo_child_windings(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
                          int32_t offset[8]);
 /* The corner differences of a cell from the branch's faces that touch it: list[places[i]], or with
- * NULL the first `count` of the list. Long lists are gone through by parts of EBPO_CORNER_FACES,
- * the least of which and `count` is the room that is needed. */
+ * NULL the first `count` of the list. Long lists are processed EBPO_CORNER_FACES at a time, so
+ * `room` needs the lesser of that and `count`. */
 enum { EBPO_CORNER_FACES = 1 << 14 };
 void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell,
                          const uint32_t *places, uint64_t count, ebpo_triangle *room,
@@ -21,7 +21,7 @@ void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell 
  * corners agree when the mesh balances: false when they do not. */
 bool ebpo_gather_delta(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
                        int32_t delta[8]);
-/* Bit i: corner i is inside, by the rule that the builder goes by. */
+/* Bit i is set when corner i is inside by the builder's rule. */
 unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32_t delta[8]);
 
 #endif

@@ -9,7 +9,7 @@ ebpo_status ebpo_emit_scratch_make(ebpo_emit_scratch **out, ebpo_workspace *work
                                    ebpo_error *error);
 void ebpo_emit_scratch_free(ebpo_emit_scratch *scratch);
 
-/* What leaves refer to (leaf_refs) is still told by the faces' numbers along the curve. */
+/* leaf_refs still holds the faces' numbers along the curve, not the final ones. */
 ebpo_status ebpo_emit_piece(const ebpo_builder *b, ebpo_emit_scratch *scratch, ebpo_branch *s,
                             ebpo_error *error);
 

@@ -71,8 +71,8 @@ static double hopeless(const ebpo_polytope *envelope, double volume, const int32
     return most - fmin((most - least) * epsilon / (3 * volume), ebpo_needle * length);
 }
 
-/* Looks at one more direction. Those that cannot gain epsilon are dropped as soon as that shows.
- * The extreme point is kept for the hull. */
+/* Tries one more direction. It is dropped as soon as it turns out that it cannot gain epsilon. The
+ * extreme point is kept for the hull. */
 static void try_normal(ebpo_envelope_scratch *s, uint32_t normal, const ebpo_polytope *envelope,
                        double volume, double epsilon, double where[3])
 {
@@ -106,8 +106,8 @@ static void add_core(ebpo_envelope_scratch *s, const double where[3])
     s->core_count++;
 }
 
-/* The ways to the walls, edges and corners of a cell: whatever the faces look like, the hull is
- * known from all sides then. */
+/* The directions to the walls, edges and corners of a cell: then the hull is known from all sides,
+ * whatever the faces look like. */
 static void look_around(ebpo_envelope_scratch *s)
 {
     for (int i = 0; i < 27; i++) {

@@ -162,7 +162,7 @@ enum { LEAF_GRAIN = 1 << 13 };
 typedef struct numbering {
     const ebpo_builder *b;
     ebpo_level *level;
-    uint64_t *first; /* of each block of leaves: its place in leaf_refs */
+    uint64_t *first; /* of each block of leaves: its start in leaf_refs */
 } numbering;
 
 /* Leaves refer to faces by their numbers along the curve, as other pieces' final ones were not
@@ -233,7 +233,7 @@ static ebpo_status join_arrays(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Volumes are added in one order whatever the number of threads. */
+/* Volumes are added in a fixed order, whatever the number of threads. */
 static ebpo_status finish_level(const joiner *j, int level, uint64_t before, uint64_t all,
                                 ebpo_error *error)
 {

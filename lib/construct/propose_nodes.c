@@ -49,8 +49,8 @@ static int by_normal_alone(const void *a, const void *b)
     return (x->normal > y->normal) - (x->normal < y->normal);
 }
 
-/* More candidates than that are thinned out evenly: only leaves without a limit of faces have so
- * many, and k-medoids looks at all pairs. */
+/* More candidates than this are thinned out evenly: only leaves without a limit on faces have that
+ * many, and k-medoids compares all pairs. */
 enum { CANDIDATES_MOST = 4096 };
 
 /* Of equal normals one is left. Their supports are still to be found. */
@@ -276,7 +276,7 @@ static ebpo_status no_memory(ebpo_error *error)
     return ebpo_fail(error, EBPO_E_MEMORY, "out of memory while choosing planes");
 }
 
-/* To the builder's store, until the walk down comes by. */
+/* Moves them to the builder's store until the walk down needs them. */
 static ebpo_status pack(ebpo_builder *b, ebpo_branch *s, ebpo_error *error)
 {
     ebpo_proposals *p = s->proposals;

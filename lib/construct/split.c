@@ -1,6 +1,7 @@
-/* The top of the tree: cut until the pieces are small enough to be worked on side by side, by the
- * model's measure, never by the machine's. What a piece must know of the others is settled here:
- * which of its faces no piece before it lists, and the winding numbers at its corners. */
+/* The top of the tree: cut until the pieces are small enough to be processed in parallel. That
+ * depends on the model alone, never on the machine. What a piece must know of the others is
+ * computed here: which of its faces no earlier piece lists, and the winding numbers at its corners.
+ */
 #include "geom/strict_fp.h"
 
 #include "construct/split.h"
@@ -18,7 +19,7 @@
 #include "geom/ray_triangle.h"
 #include "planes/octants.h"
 
-/* Pieces of at most so many faces, but not more than about PIECES_MOST pieces. */
+/* Pieces have at most this many faces, but there are no more than about PIECES_MOST pieces. */
 enum { PIECE_FACES = 4096, PIECES_MOST = 2048, SPLIT_GRAIN = 1 << 13 };
 
 static ebpo_status no_memory(const ebpo_builder *b, ebpo_error *error)
@@ -26,8 +27,8 @@ static ebpo_status no_memory(const ebpo_builder *b, ebpo_error *error)
     return ebpo_workspace_fail_while(b->workspace, "while cutting the tree into pieces", error);
 }
 
-/* A node of the top: its faces are looked at in blocks, which are then handed out to the children's
- * lists side by side. */
+/* A node of the top: its faces are classified in blocks, which are then distributed to the
+ * children's lists in parallel. */
 typedef struct top_split {
     const ebpo_builder *b;
     ebpo_cell cell;
@@ -300,8 +301,8 @@ static ebpo_status corners_of_pieces(void *context, uint64_t begin, uint64_t end
     return EBPO_OK;
 }
 
-/* A piece is worked on in a thread's own memory, and cells of the deepest level that is allowed are
- * not cut, whatever they list: as many threads as half of the budget has room for. */
+/* A piece is processed in its thread's own memory, and cells of the deepest level are not cut,
+ * however many faces they list: so no more threads than fit into half of the budget. */
 static ebpo_status fit_largest_piece(ebpo_builder *b, ebpo_error *error)
 {
     /* points that a hull is made of; measured: a million faces at one vertex */

@@ -85,7 +85,7 @@ static bool add_crossings(ebpo_supports *s, const ebpo_branch *branch, const ebp
         ebpo_triangle face;
         double points[9][3], slack;
         if (i % (branch->list ? 1024 : 32) ==
-            0) /* of the top: each from another place of the files */
+            0) /* of the top: each is in a different part of the workspace's files */
             ebpo_workspace_settle(s->workspace);
         ebpo_branch_triangle(s->b, branch, branch->crossing[i], &face);
         int count = ebpo_clip_triangle(&s->b->box, s->cell, &face, points, &slack);
@@ -96,7 +96,7 @@ static bool add_crossings(ebpo_supports *s, const ebpo_branch *branch, const ebp
     return true;
 }
 
-/* For about so many points. */
+/* Sized for about that many points. */
 static bool clear_table(ebpo_supports *s, uint64_t points)
 {
     uint64_t size = ebpo_hash_slots(2 * points < TABLE_MOST ? 2 * points : TABLE_MOST);
@@ -207,7 +207,7 @@ double ebpo_supports_find_from(const ebpo_supports *s, const int32_t normal[3], 
     among_points(s, n, enough, &support, where);
     if (s->begin >= s->end || support >= enough)
         return support;
-    ebpo_workspace_settle(s->workspace); /* so many vertices lie all over the file */
+    ebpo_workspace_settle(s->workspace); /* that many vertices are spread over the whole file */
     uint64_t at;
     double p[3] = { 0, 0, 0 };
     support = ebpo_bounds_support(s->b, s->cell, n, s->begin, s->end, support, &at);

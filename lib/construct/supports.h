@@ -19,7 +19,7 @@ typedef struct ebpo_supports {
     /* of each stretch of points: least and greatest coordinates, greatest slack */
     double (*box)[7];
     uint64_t box_capacity;
-    /* vertices that are not among the points: looked at through their bounds */
+    /* vertices that are not among the points: searched by way of their bounds */
     uint64_t begin, end;
 } ebpo_supports;
 

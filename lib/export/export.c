@@ -22,8 +22,8 @@ bool ebpo_export_second_file(ebpo_export_format format, const char *path, char *
     int length = -1;
     if (room)
         *out = 0;
-    if (format == EBPO_EXPORT_XDMF) /* readers take what follows the first ":" for the place in the
-                                       HDF5 file */
+    if (format == EBPO_EXPORT_XDMF) /* readers take what follows the first ":" as the path within
+                                       the HDF5 file */
         length = strchr(name, ':') ? -1 : snprintf(out, room, "%s.h5", path);
     else if (format == EBPO_EXPORT_GLTF)
         length = snprintf(out, room, "%.*s.bin",

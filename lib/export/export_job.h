@@ -19,7 +19,7 @@ EBPO_MUST_USE ebpo_status ebpo_export_read_block(const ebpo_export_job *job, int
                                                  ebpo_block_order order, ebpo_block *out,
                                                  ebpo_error *error);
 
-/* EBPO_E_LIMIT for what a format cannot count. A GLB of so many bytes of text and of numbers: its
+/* EBPO_E_LIMIT for what a format cannot count. GLB, of that many bytes of text and of numbers: its
  * sizes have 32 bits. OBJ and STL: assimp numbers corners in 32 bits. */
 enum { EBPO_GLB_HEADS = 28 };
 EBPO_MUST_USE ebpo_status ebpo_export_check_glb(const char *path, uint64_t text, uint64_t bin,

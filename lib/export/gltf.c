@@ -40,8 +40,8 @@ typedef struct model {
 
 /* --- what is to be written --- */
 
-/* Far from zero a float32 has few digits left for the model: then vertices are told from the box's
- * middle, which is the nodes' translation. */
+/* Far from zero a float32 has few digits left for the model: then vertices are relative to the
+ * middle of the box, which becomes the nodes' translation. */
 static void choose_origin(model *m, const ebpo_info *info)
 {
     double size = 0, far = 0;
@@ -127,7 +127,7 @@ static void print_name(FILE *f, const char *name)
     }
 }
 
-/* Three numbers as JSON wants them, whatever the locale's decimal point. */
+/* Three numbers as JSON wants them, in any locale. */
 static void print_three(FILE *f, const char *before, const double x[3])
 {
     fputs(before, f);
@@ -225,7 +225,7 @@ static void write_words(FILE *f, const void *words, uint64_t count)
             memcpy(&word, from + 4 * (done + i), 4);
             ebpo_store32(buffer + 4 * i, word);
         }
-        fwrite(buffer, 4, n, f); /* what fails here, ferror tells */
+        fwrite(buffer, 4, n, f); /* failures show in ferror */
         done += n;
     }
 }

@@ -19,7 +19,7 @@ typedef struct cursor {
 
 static cursor *cursor_of(struct aiFile *file) { return (cursor *)(void *)file->UserData; }
 
-/* assimp does not look at what it is told here, so the failure is kept. */
+/* assimp ignores what this returns, so the failure is kept. */
 static void note_failure(ebpo_scene_file *target)
 {
     target->why = target->failed ? target->why : errno;

@@ -21,7 +21,7 @@ void ebpo_scene_file_begin(ebpo_scene_file *file, const char *path);
  * into `file`. */
 void ebpo_scene_file_offer(ebpo_scene_file *file, struct aiFileIO *io);
 EBPO_MUST_USE ebpo_status ebpo_scene_file_commit(ebpo_scene_file *file, ebpo_error *error);
-/* Removes it, unless it is in place. */
+/* Removes it, unless it was committed. */
 void ebpo_scene_file_abort(ebpo_scene_file *file);
 
 #endif

@@ -1,5 +1,5 @@
-/* VTKHDF 1.0: one unstructured grid of polygons. This version knows neither blocks (2.1 does) nor
- * polyhedra (2.5), so levels are told apart by the cells' number `lod`, and by being partitions.
+/* VTKHDF 1.0: one unstructured grid of polygons. This version has neither blocks (2.1 has) nor
+ * polyhedra (2.5), so levels are distinguished by the cell array `lod`, and by being partitions.
  * Source: VTK's documentation, "VTKHDF file format". */
 #include "geom/strict_fp.h"
 

@@ -24,7 +24,7 @@ typedef struct ebpo_cell {
     uint32_t at[3];
 } ebpo_cell;
 
-/* 2^-n, 0 <= n <= 1000. Multiplying with it rounds as dividing by 2^n does, in a fraction of the
+/* 2^-n, 0 <= n <= 1000. Multiplying by it rounds as dividing by 2^n does, in a fraction of the
  * time. */
 static inline double ebpo_half_power(int n)
 {

@@ -112,7 +112,7 @@ static double plane_distance(const relation *r, double *error)
     return fabs(dot(r->normal, r->corner[0])) / length;
 }
 
-/* The plane is never farther than the triangle; a plane of unknown tilt tells nothing, but no point
+/* The plane is never farther than the triangle; a plane of unknown tilt says nothing, but no point
  * of the triangle is farther from its edges than its height. */
 static void bound_by_edges(const relation *r, double plane, double error, ebpo_distance_bounds *out)
 {

@@ -15,11 +15,12 @@ typedef struct ebpo_measured {
 } ebpo_measured;
 
 typedef struct ebpo_distance_pairs {
-    /* The triangle's distance, its nearest feature being known. Coordinates whose products of four,
-     * and their rounding errors, stay within the doubles. */
+    /* The triangle's distance when its nearest feature is known. Products of four coordinates, and
+     * their rounding errors, must stay within the doubles. */
     void (*measure)(const double p[3], const double triangle[3][3], ebpo_feature feature,
                     ebpo_measured *out);
-    /* False when the arithmetic does not do: numbers beyond its range, or too much cancellation. */
+    /* False when the arithmetic does not suffice: numbers beyond its range, or too much
+     * cancellation. */
     bool (*unit_normal)(const double triangle[3][3], double normal[3]);
 } ebpo_distance_pairs;
 

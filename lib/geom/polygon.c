@@ -108,7 +108,7 @@ static double least(double a, double b, double c)
     return a < b ? (a < c ? a : c) : (b < c ? b : c);
 }
 
-/* Any other corner in the closed triangle, unless it shares a corner's place (outlines with a slit
+/* Any other corner in the closed triangle, unless it coincides with a corner (outlines with a slit
  * to a hole repeat corners). */
 static bool ear_holds_corner(outline *o, uint32_t a, uint32_t b, uint32_t c)
 {
@@ -142,7 +142,7 @@ static void cut_off(outline *o, uint32_t b, uint32_t triangle[3])
     o->left--;
 }
 
-/* Goes round and cuts every ear it meets, stepping over one corner after each cut so that fans of
+/* Goes around and cuts every ear it meets, skipping one corner after each cut so that fans of
  * slivers stay short. */
 static ebpo_polygon_kind cut_ears(outline *o, uint32_t (*triangle)[3])
 {

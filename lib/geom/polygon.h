@@ -1,6 +1,6 @@
 /* Cutting polygons in space into triangles over their own corners.
  *
- * The polygon is looked at along the axis on which its normal (Newell's sum) is largest. There a
+ * The polygon is projected along the axis on which its normal (Newell's sum) is largest. There a
  * convex polygon becomes a fan from its first corner; any other is cut ear by ear, every turn and
  * every point-in-ear test by the exact ebpo_orient2d. Polygons for which this has no answer (no
  * area, crossing themselves, coordinates that are not finite) become a fan, whatever it looks like:

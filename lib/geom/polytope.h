@@ -12,7 +12,7 @@
  * point. */
 enum { EBPO_POLYTOPE_VERTICES = 528, EBPO_POLYTOPE_FACES = 264, EBPO_POLYTOPE_CORNERS = 1584 };
 
-/* Face loops run counter-clockwise seen from outside. A face's tag tells the half-space it comes
+/* Face loops run counter-clockwise seen from outside. A face's tag names the half-space it comes
  * from: -1 - (2 * axis + side) for the walls of the first cube, then what ebpo_polytope_clip was
  * given. */
 typedef struct ebpo_polytope {

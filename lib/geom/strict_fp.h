@@ -26,7 +26,7 @@ _Static_assert(FLT_RADIX == 2 && DBL_MANT_DIG == 53 && DBL_MAX_EXP == 1024,
 
 #if defined(__clang__)
 /* Its unsafe-math flags define no macro, but give way to this. -ffp-contract=fast does not, and
- * cannot be seen either: tests/flags/fp_flags.py finds it out. */
+ * cannot be seen either: tests/flags/fp_flags.py detects it. */
 #pragma float_control(precise, on)
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__GNUC__)

@@ -76,7 +76,7 @@ static bool content_range(ebpo_answer *a, const char *at, const char *end)
     return true;
 }
 
-/* What is too long is kept as its digest: it is only ever compared. */
+/* If it is too long, its digest is kept: it is only ever compared. */
 static void keep_text(char out[EBPO_HTTP_TAG_BYTES], const char *text, size_t length)
 {
     if (length < EBPO_HTTP_TAG_BYTES) {
@@ -147,7 +147,7 @@ static const char *changed(const ebpo_answer *a, const ebpo_http_version *pinned
 {
     if (size != pinned->size)
         return "has changed on the server while it was open (another size); open it again";
-    /* Mirrors of one file may tell different times, not different tags. */
+    /* Mirrors of one file may report different times, but not different tags. */
     if (strcmp(a->etag, pinned->etag) != 0)
         return "has changed on the server while it was open (another ETag); open it again";
     if (!*pinned->etag && strcmp(a->modified, pinned->modified) != 0)

@@ -28,7 +28,7 @@ struct ebpo_disk {
     uint64_t limit;
     char key[65];
     pthread_mutex_t lock;
-    uint64_t written; /* since the folder was last looked through */
+    uint64_t written; /* since the folder was last scanned */
     uint64_t number;  /* for temporary names */
     uint64_t held, others;
 };

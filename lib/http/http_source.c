@@ -1,4 +1,4 @@
-/* A source by URL: opening, what is kept of the file, options. */
+/* A source by URL: opening it, what is kept of the file, options. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -207,8 +207,8 @@ static ebpo_status read_head(http_source *s, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Without ETag and Last-Modified nobody could tell whether two answers belong to one version. One
- * answer does. */
+/* Without ETag and Last-Modified there is no telling whether two answers belong to one version; a
+ * single answer does. */
 static ebpo_status read_whole(http_source *s, ebpo_error *error)
 {
     if (s->version.size > s->options.whole_limit)

@@ -27,7 +27,7 @@ struct ebpo_cached_range {
     bool fresh;      /* made for the announcement under way */
     piece_state state;
     unsigned users;                  /* threads that need it in its place */
-    bool demanded;                   /* a reader asked for it: its failure is the reader's */
+    bool demanded;                   /* a reader is waiting for it and gets its failure */
     bool to_store;                   /* fetched, not on disk yet */
     uint64_t fetch_begin, fetch_end; /* blocks at its ends may have come from disk */
     ebpo_request request;
@@ -126,8 +126,8 @@ static bool cover(ebpo_range_cache *p, uint64_t begin, uint64_t end)
 
 /* --- fetching --- */
 
-/* Whether a piece has all of the block at a place, or as much as the file has. Only such blocks go
- * to disk and come from there. */
+/* Whether a piece holds the whole block at an offset, or as much of it as the file has. Only such
+ * blocks are stored on disk. */
 static bool has_block(const ebpo_range_cache *p, uint64_t at, uint64_t end)
 {
     return at % EBPO_DISK_BLOCK == 0 && (end - at >= EBPO_DISK_BLOCK || end == p->size);
@@ -230,8 +230,8 @@ static bool start(ebpo_range_cache *p, ebpo_cached_range *piece, bool urgent)
     return true;
 }
 
-/* This thread is through with a piece, of which it has read so much. What was fetched stays until
- * the room is needed. */
+/* This thread is done with a piece, having read that much of it. What was fetched stays until the
+ * memory is needed. */
 static void release(ebpo_range_cache *p, ebpo_cached_range *piece, uint64_t read)
 {
     piece->users--;
@@ -248,7 +248,7 @@ static void release(ebpo_range_cache *p, ebpo_cached_range *piece, uint64_t read
         remove_at(p, find(p, piece->begin));
 }
 
-/* Fetches on from a place in the file, as far as the limit allows. */
+/* Reads ahead from an offset in the file, as far as the limit allows. */
 static void read_ahead(ebpo_range_cache *p, uint64_t from)
 {
     for (uint64_t i = find(p, from); i < p->count; i = find(p, from)) {
@@ -351,8 +351,8 @@ static bool has_come(const ebpo_cached_range *piece)
                                             piece->request.status == EBPO_OK));
 }
 
-/* Stores one piece that has come and that nobody has read yet, so that it is not lost when the
- * process ends; false when there is none. The lock is released meanwhile. */
+/* Stores one piece that has arrived but has not been read, so that it is not lost when the process
+ * ends; false when there is none. The lock is released meanwhile. */
 static bool store_one(ebpo_range_cache *p)
 {
     for (uint64_t i = 0; p->disk && i < p->count; i++) {
@@ -367,7 +367,7 @@ static bool store_one(ebpo_range_cache *p)
     return false;
 }
 
-/* Waits for a piece that this thread uses. One that failed while nobody wanted it is asked for
+/* Waits for a piece that this thread uses. One that failed while nobody wanted it is requested
  * again. */
 static ebpo_status await(ebpo_range_cache *p, ebpo_cached_range *piece, ebpo_error *error)
 {

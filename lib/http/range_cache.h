@@ -1,5 +1,5 @@
-/* Reading and reading ahead: a file's bytes in pieces, each fetched by one request, kept while
- * there is room: first what is announced and not read yet, then what was read last. */
+/* Reading and reading ahead: a file's bytes in pieces, each fetched by one request and kept as long
+ * as memory allows. Pieces announced but not yet read are kept first, then those read last. */
 #ifndef EBPO_HTTP_PIECES_H
 #define EBPO_HTTP_PIECES_H
 

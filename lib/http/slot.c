@@ -1,4 +1,4 @@
-/* What libcurl calls while an answer comes, and what it is told of each request. */
+/* libcurl's callbacks while an answer arrives, and the options of its handles. */
 #include "http/slot.h"
 
 #include <string.h>

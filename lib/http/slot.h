@@ -26,7 +26,7 @@ typedef struct ebpo_slot {
     ebpo_verdict verdict;
     ebpo_status status;
     char why[EBPO_WHY_BYTES];
-    uint64_t begin, end;                /* asked in this attempt */
+    uint64_t begin, end;                /* requested in this attempt */
     uint64_t received, taken, unwanted; /* bytes of its body */
     char trouble[CURL_ERROR_SIZE];
 } ebpo_slot;

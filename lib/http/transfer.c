@@ -11,7 +11,7 @@
 #include "http/slot.h"
 
 enum {
-    LOOK_MS = 100, /* between looks at `stop` and for stalls */
+    LOOK_MS = 100, /* between checks of `stop` and for stalls */
     IDLE_MS = 60000
 };
 static const double PAUSE_FIRST = 0.2, PAUSE_MOST = 8, PAUSE_ASKED_MOST = 60; /* seconds */
@@ -233,7 +233,7 @@ static bool passing(CURLcode code)
     }
 }
 
-/* What came is kept, so that the next attempt asks for the rest only. */
+/* Keeps what arrived, so that the next attempt requests only the rest. */
 static bool keep(ebpo_slot *s, CURLcode code)
 {
     ebpo_request *r = s->request;
@@ -272,8 +272,7 @@ static void describe(const ebpo_slot *s, CURLcode code, char *out, size_t room)
         snprintf(out, room, "%s", trouble);
 }
 
-/* Whether the rest may come in another answer: not where nobody could tell that it is of another
- * version. */
+/* Whether the rest may come in another answer: not if a change of version would go unnoticed. */
 static bool may_join(const ebpo_transfers *t, const ebpo_request *r)
 {
     const ebpo_http_version *v = r->first ? &r->version : &t->pinned;
@@ -360,7 +359,7 @@ static void cancel_queue(ebpo_transfers *t)
     }
 }
 
-/* Locked. Requests that have waited for a place too long end; *wait: seconds until something is
+/* Lock held. Requests that have waited too long for a slot end; *wait: seconds until something is
  * due. */
 static ebpo_request *next_due(ebpo_transfers *t, double now, double *wait)
 {

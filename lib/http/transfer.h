@@ -8,9 +8,9 @@
 
 typedef struct ebpo_transfers ebpo_transfers;
 
-/* The texts of `options` must stay. Everything below that says so is called with `lock` held;
- * whoever waits for a request waits on `done`, which is broadcast at each end. `url`: with user and
- * password, if they stand in it; `shown`: for messages. */
+/* The texts of `options` must outlive the transfers. Functions below that say so are called with
+ * `lock` held; wait for a request on `done`, which is broadcast whenever one ends. `url`: with user
+ * and password, if it has them; `shown`: for messages. */
 EBPO_MUST_USE ebpo_status ebpo_transfers_make(ebpo_transfers **out, const char *url,
                                               const char *shown, const ebpo_http_options *options,
                                               pthread_mutex_t *lock, pthread_cond_t *done,

@@ -1,5 +1,5 @@
-/* assimp's error text is one for the whole process: whoever calls it, to read or to write, holds
- * this. */
+/* assimp has one error text for the whole process: hold this lock during every call, to read or to
+ * write. */
 #ifndef EBPO_IMPORT_ASSIMP_LOCK_H
 #define EBPO_IMPORT_ASSIMP_LOCK_H
 

@@ -54,7 +54,7 @@ static bool next_count(lines *l, uint64_t *value)
     return n > 0 && n < 11;
 }
 
-/* A decimal number, as far as its letters tell; assimp parses it. */
+/* A decimal number, judged by its characters; assimp parses it. */
 static bool next_number(lines *l)
 {
     const char *word;

@@ -29,8 +29,8 @@ EBPO_MUST_USE ebpo_status ebpo_input_open(ebpo_input *input, const ebpo_source *
 void ebpo_input_close(ebpo_input *input);
 
 /* Bytes [offset, offset + size) into `data`. Beyond the source's end: EBPO_E_FORMAT, because only
- * the file itself can have named such a place. What the source's own `read` returns is handed on,
- * with a message if it gave none. */
+ * the file itself can have named such an offset. The status of the source's own `read` is passed
+ * on, with a message if it gave none. */
 EBPO_MUST_USE ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size,
                                           void *data, ebpo_error *error);
 
@@ -39,7 +39,7 @@ static inline bool ebpo_input_expects(const ebpo_input *input)
 {
     return input->source.prefetch != NULL;
 }
-/* True when not everything is to be looked at in opening. */
+/* True when opening should not read everything. */
 static inline bool ebpo_input_is_far(const ebpo_input *input)
 {
     return input->source.prefetch && input->source.prefetched &&

@@ -44,9 +44,9 @@ const char *ebpo_publish_path(const ebpo_publish *publish);
  * abort close it. */
 FILE *ebpo_publish_stream(ebpo_publish *publish);
 
-/* Flushes, syncs and renames. Whoever opened the file by name has closed it. On failure the
- * temporary file is removed and the target is as it was (but when only the last step failed, the
- * sync of the folder: then the new file is in place). */
+/* Flushes, syncs and renames. The caller has closed the file if it opened it by name. On failure
+ * the temporary file is removed and the target is as it was (but when only the last step failed,
+ * the sync of the folder: then the new file is in place). */
 EBPO_MUST_USE ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error *error);
 
 /* Closes and removes the temporary file. Harmless on EBPO_PUBLISH_INIT and after a commit. */

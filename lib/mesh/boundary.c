@@ -94,7 +94,7 @@ static ebpo_status make_edges(void *context, uint64_t begin, uint64_t end, void 
     return EBPO_OK;
 }
 
-/* Never asked: an edge that is used once has a key of its own. */
+/* Not needed: an edge that is used once has a key of its own. */
 static int compare_edges(const void *a, const void *b)
 {
     const ebpo_boundary_edge *x = a, *y = b;
@@ -165,7 +165,7 @@ static ebpo_status sort_all(chaining *c, ebpo_error *error)
 
 /* --- which edge continues which --- */
 
-/* A step may go to another place in each of ten arrays. */
+/* Each step may touch a distant part of each of ten arrays. */
 static void let_go(const chaining *c, uint64_t steps)
 {
     enum { OFTEN = 32 };

@@ -277,7 +277,7 @@ static ebpo_status run(ebpo_check *c, ebpo_error *error)
         status = boundary_loops(c, error);
     ebpo_array_free(c->mesh->workspace, c->parents);
     c->parents = NULL;
-    ebpo_stars_free(&c->stars); /* makes room for the table of positions */
+    ebpo_stars_free(&c->stars); /* frees memory for the table of positions */
     if (status == EBPO_OK)
         status = ebpo_check_positions(c, error);
     if (status == EBPO_OK)

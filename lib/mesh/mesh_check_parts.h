@@ -51,7 +51,7 @@ static inline double ebpo_scaled_length(const double d[3], const int exponent[3]
     return most * sqrt(sum);
 }
 
-/* Counts `place`, and keeps it when it is among the lowest. */
+/* Counts `place`, and keeps it if it is among the lowest. */
 static inline void ebpo_finding_add(ebpo_finding *finding, uint64_t place)
 {
     int kept = finding->count < EBPO_FINDING_PLACES ? (int)finding->count : EBPO_FINDING_PLACES;

@@ -164,7 +164,7 @@ static ebpo_status number_sources(welding *w, ebpo_error *error)
     return status;
 }
 
-/* --- putting it in place: nothing can fail from here on --- */
+/* --- writing the result: nothing can fail from here on --- */
 
 static ebpo_status rename_corners(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                   ebpo_error *error)
@@ -179,8 +179,8 @@ static ebpo_status rename_corners(void *context, uint64_t begin, uint64_t end, u
     return EBPO_OK;
 }
 
-/* A group's new place never lies behind any of its vertices, so moving in ascending order
- * overwrites nothing that is still needed. */
+/* A group's new index is never greater than that of any of its vertices, so moving in ascending
+ * order overwrites nothing that is still needed. */
 static void move_vertices(welding *w)
 {
     ebpo_mesh *mesh = w->mesh;

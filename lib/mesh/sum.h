@@ -16,7 +16,7 @@ __extension__ typedef unsigned __int128 ebpo_wide;
 
 typedef struct ebpo_sum {
     int64_t limb[EBPO_SUM_LIMBS]; /* [i] counts 2^(32 i - 1074) */
-    uint32_t adds;                /* since carries were settled */
+    uint32_t adds;                /* since the carries were propagated */
     double beyond;                /* sum of what is infinite or NaN */
 } ebpo_sum;
 

@@ -16,7 +16,7 @@ _Static_assert((int)EBPO_HULL_FACETS <= (int)EBPO_SWEEP_PLANES, "sweeps have roo
 
 enum { ROOM = EBPO_HULL_FACETS, WAYS = 14, VISIBLE = 192 };
 
-/* Planes by coordinate: each point is held against all of them. */
+/* Planes by coordinate: each point is tested against all of them. */
 typedef struct hull {
     const ebpo_sweep *sweep;
     const double (*p)[3];
@@ -176,7 +176,7 @@ static int edges_of(const hull *h, const uint16_t *visible, int seen, uint32_t *
     return listed;
 }
 
-/* Without a way out of the loop, so that compilers take several at a time. */
+/* No early exit from the loop, so that compilers vectorise it. */
 static bool has(const uint32_t *edges, int fours, uint32_t edge)
 {
     uint32_t found = 0;
@@ -185,7 +185,7 @@ static bool has(const uint32_t *edges, int fours, uint32_t edge)
     return found;
 }
 
-/* Places that got no new facet are filled from the end. */
+/* Slots that got no new facet are filled from the end. */
 static void close_gaps(hull *h, const uint16_t *place, int from, int to, int count)
 {
     for (int i = to - 1; i >= from; i--) /* places ascend */
@@ -194,8 +194,8 @@ static void close_gaps(hull *h, const uint16_t *place, int from, int to, int cou
     set_count(h, count);
 }
 
-/* False when no more points are to be added: too much in one step. (Then facets may overlap; what
- * comes of them are directions all the same.) */
+/* False when no more points are to be added: too much in one step. (Then facets may overlap; they
+ * still give directions.) */
 static bool add_point(hull *h, int point)
 {
     uint16_t visible[VISIBLE];

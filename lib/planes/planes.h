@@ -8,14 +8,15 @@
 #include "geom/polytope.h"
 
 enum {
-    /* a leaf, and a gray node below the first levels, adds at most so many to its parent's */
+    /* a leaf, and a gray node below the first levels, adds at most this many to its parent's */
     EBPO_PLANES_MAX = 32,
     EBPO_PLANES_CANDIDATES = 512, /* and chooses among at most so many */
     /* the theses' selections, which start from the cell; more than a byte counts is not stored */
     EBPO_PLANES_STORED = 255
 };
 
-/* What reaches so far beyond a candidate plane, in cells, is cut off even when it has no volume. */
+/* What reaches this far beyond a candidate plane, in cells, is cut off even when it has no volume.
+ */
 static const double ebpo_needle = 0.1;
 
 /* A candidate: a normal (bits 0-19 of a plane code) and the support of the solid in the cell in

@@ -1,6 +1,6 @@
 /* Greedy selection: the plane that removes most volume first. Gains only shrink while the envelope
- * does, so a gain computed earlier bounds today's and most candidates are never looked at again
- * (lazy evaluation). */
+ * does, so a gain computed earlier bounds the present one, and most candidates are never evaluated
+ * again (lazy evaluation). */
 #include "geom/strict_fp.h"
 
 #include <math.h>

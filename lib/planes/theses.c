@@ -95,7 +95,7 @@ typedef struct clustering {
 } clustering;
 
 /* The angle of (x, y) from the x axis, -pi .. pi, to about 1e-15, by operations that round alike
- * everywhere: libm's own differ from one to the next, and choices must not. */
+ * everywhere: implementations of libm differ, and choices must not. */
 static double angle_of(double y, double x)
 {
     double least = fmin(fabs(x), fabs(y)), most = fmax(fabs(x), fabs(y));

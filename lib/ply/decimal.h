@@ -1,4 +1,4 @@
-/* Decimal text to float and double, correctly rounded, whatever the locale. */
+/* Decimal text to float and double, correctly rounded in any locale. */
 #ifndef EBPO_PLY_NUMBER_H
 #define EBPO_PLY_NUMBER_H
 

@@ -1,6 +1,6 @@
-/* The body of an ascii PLY file. Values are told apart by white space, so a long list may be broken
- * into lines; but every row ends its line, otherwise a value too many in one row would shift all
- * that follow. */
+/* The body of an ascii PLY file. Values are separated by white space, so a long list may span
+ * several lines; but each row must end its line, or one value too many would shift all that follow.
+ */
 #include "geom/strict_fp.h"
 
 #include <inttypes.h>

@@ -126,8 +126,8 @@ static ebpo_status read_element(ply_parser *p, const ply_element *element, bool 
                                            : ebpo_ply_binary_element(p, element, store);
 }
 
-/* Faces that stand before the vertices are stepped over and read afterwards: to cut a polygon takes
- * its positions. */
+/* Faces that come before the vertices are skipped and read afterwards: cutting a polygon takes its
+ * positions. */
 static ebpo_status read_early_faces(ply_parser *p)
 {
     uint64_t at = p->at, line = p->line;
@@ -258,7 +258,7 @@ ebpo_status ebpo_points_parse_ply(const void *data, uint64_t size, const char *n
     p.at = p.header.body;
     p.line = p.header.body_line;
     for (int64_t i = 0; status == EBPO_OK && i <= p.header.vertex;
-         i++) /* what stands behind the vertices is not read */
+         i++) /* what follows the vertices is not read */
         status = read_element(&p, &p.header.element[i], i == p.header.vertex);
     if (status == EBPO_OK)
         status = give_points(&p, xyz, count);

@@ -20,7 +20,7 @@ typedef struct plain {
     bool swap;
 } plain;
 
-/* Rows done are told as bytes of the file, as the row by row reader does. */
+/* Reports rows as bytes of the file, as the row-by-row reader does. */
 static bool report(void *user, const char *stage, uint64_t done, uint64_t total)
 {
     const plain *t = user;
@@ -55,8 +55,7 @@ static ebpo_status deviate(plain *t, uint64_t row)
     return EBPO_E_FORMAT;
 }
 
-/* What stands behind a row that deviates is not where it is looked for; the rows are read again
- * then. */
+/* After a row that deviates nothing is where it was expected; those rows are read again. */
 static ebpo_status faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
                          ebpo_error *error)
 {

@@ -1,5 +1,5 @@
-/* What the parts of the PLY reader share: the place in the file, the mesh under construction, and
- * messages. */
+/* What the parts of the PLY reader share: the position in the file, the mesh under construction,
+ * and messages. */
 #ifndef EBPO_PLY_STATE_H
 #define EBPO_PLY_STATE_H
 
@@ -29,7 +29,7 @@ typedef struct ply_parser {
     ebpo_error *error;
 } ply_parser;
 
-/* EBPO_E_FORMAT: "name: line 17: ..." or "name: byte 1234: ...", from the parser's place. */
+/* EBPO_E_FORMAT: "name: line 17: ..." or "name: byte 1234: ...", from the parser's position. */
 ebpo_status ebpo_ply_fail(const ply_parser *p, const char *format, ...) EBPO_PRINTF(2, 3);
 /* The file ends within row `row` of `element`. */
 ebpo_status ebpo_ply_fail_end(const ply_parser *p, const ply_element *element, uint64_t row);
