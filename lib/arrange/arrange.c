@@ -110,7 +110,7 @@ static bool choose_box(ebpo_box *out, const double min[3], const double max[3], 
     return true;
 }
 
-static ebpo_status look_at_all(arranging *a, int level, ebpo_error *error)
+static ebpo_status measure_all(arranging *a, int level, ebpo_error *error)
 {
     ebpo_mesh *mesh = a->mesh;
     uint64_t blocks = (mesh->vertex_count + GRAIN - 1) / GRAIN;
@@ -459,7 +459,7 @@ static ebpo_status run(arranging a, int level, ebpo_error *error)
     a.to = ebpo_alloc_zero(1, sizeof *a.to);
     if (a.to)
         a.to->workspace = mesh->workspace;
-    status = a.to ? look_at_all(&a, level, error) : ebpo_fail_memory(error, sizeof *a.to);
+    status = a.to ? measure_all(&a, level, error) : ebpo_fail_memory(error, sizeof *a.to);
     if (status == EBPO_OK)
         status = sort_vertices(&a, error);
     if (status == EBPO_OK)

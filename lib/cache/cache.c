@@ -161,7 +161,8 @@ static ebpo_status wait_for_room(ebpo_cache *c, uint64_t peak, ebpo_error *error
 
 /* Ends a load: `reserved` gives way to the item, which is pinned by whoever waits for it (and `own`
  * times more), or to nothing. */
-static void settle(ebpo_cache *c, ebpo_cache_slot *s, bool loaded, uint64_t reserved, unsigned own)
+static void end_load(ebpo_cache *c, ebpo_cache_slot *s, bool loaded, uint64_t reserved,
+                     unsigned own)
 {
     c->stats.bytes -= reserved;
     c->passing -= reserved;
@@ -233,7 +234,7 @@ static ebpo_status load_here(ebpo_cache *c, uint64_t key, void **item, ebpo_erro
         c->stats.loads++;
         *item = s->item;
     }
-    settle(c, s, status == EBPO_OK, reserved, 1);
+    end_load(c, s, status == EBPO_OK, reserved, 1);
     return status;
 }
 
@@ -342,14 +343,14 @@ static bool load_ahead(ebpo_cache *c, demand *d)
     }
     room got = !d->known ? ROOM_NEVER : c->serving != c->tickets ? ROOM_LATER : make_room(c, d);
     if (got != ROOM_MADE) {
-        settle(c, s, false, 0, 0);
+        end_load(c, s, false, 0, 0);
         return got == ROOM_NEVER;
     }
     pthread_mutex_unlock(&c->lock);
     bool loaded = call_load(c, s, d->peak, NULL) == EBPO_OK;
     pthread_mutex_lock(&c->lock);
     c->stats.prefetched += loaded;
-    settle(c, s, loaded, d->peak, 0);
+    end_load(c, s, loaded, d->peak, 0);
     return true;
 }
 

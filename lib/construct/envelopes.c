@@ -108,7 +108,7 @@ static void add_core(ebpo_envelope_scratch *s, const double where[3])
 
 /* The directions to the walls, edges and corners of a cell: then the hull is known from all sides,
  * whatever the faces look like. */
-static void look_around(ebpo_envelope_scratch *s)
+static void try_all_around(ebpo_envelope_scratch *s)
 {
     for (int i = 0; i < 27; i++) {
         double way[3] = { i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1 }, where[3];
@@ -234,7 +234,7 @@ static void choose_directions(const ebpo_builder *b, ebpo_envelope_scratch *s,
     ebpo_candidate faces[EBPO_PLANES_CANDIDATES];
     int count = ebpo_build_candidates(b, branch, detail, FACES_BELOW, faces);
     s->core_count = 0;
-    look_around(s);
+    try_all_around(s);
     for (int i = 0; i < count; i++) {
         double where[3];
         try_normal(s, faces[i].normal, envelope, volume, epsilon, where);

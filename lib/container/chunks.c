@@ -26,33 +26,33 @@ struct ebpo_chunk_scratch {
 static ebpo_chunk_scratch *take_scratch(ebpo_chunks *c)
 {
     pthread_mutex_lock(&c->lock);
-    ebpo_chunk_scratch *desk = c->idle;
-    if (desk) {
-        c->idle = desk->next;
+    ebpo_chunk_scratch *scratch = c->idle;
+    if (scratch) {
+        c->idle = scratch->next;
         c->idle_count--;
     }
     pthread_mutex_unlock(&c->lock);
-    return desk ? desk : ebpo_alloc_zero(1, sizeof *desk);
+    return scratch ? scratch : ebpo_alloc_zero(1, sizeof *scratch);
 }
 
-static void free_scratch(ebpo_chunk_scratch *desk)
+static void free_scratch(ebpo_chunk_scratch *scratch)
 {
-    ebpo_chunk_reader_clear(&desk->reader);
-    free(desk);
+    ebpo_chunk_reader_clear(&scratch->reader);
+    free(scratch);
 }
 
-static void give_scratch(ebpo_chunks *c, ebpo_chunk_scratch *desk)
+static void give_scratch(ebpo_chunks *c, ebpo_chunk_scratch *scratch)
 {
     pthread_mutex_lock(&c->lock);
     bool keep = c->idle_count < IDLE_MAX;
     if (keep) {
-        desk->next = c->idle;
-        c->idle = desk;
+        scratch->next = c->idle;
+        c->idle = scratch;
         c->idle_count++;
     }
     pthread_mutex_unlock(&c->lock);
     if (!keep)
-        free_scratch(desk);
+        free_scratch(scratch);
 }
 
 static uint64_t key_of(const ebpo_array_in *array, uint64_t chunk)
@@ -298,17 +298,19 @@ static ebpo_status load(void *user, uint64_t key, void **item, uint64_t *bytes, 
         return allowed;
     uint64_t rows = chunk_rows(array, chunk_of(key));
     size_t row_bytes = ebpo_h5_row_bytes(&array->shape);
-    ebpo_chunk_scratch *desk = take_scratch(c);
-    void *made = desk ? ebpo_alloc(rows, row_bytes) : NULL;
-    ebpo_status status = made ? EBPO_OK : ebpo_fail_memory(error, rows * row_bytes + sizeof *desk);
+    ebpo_chunk_scratch *scratch = take_scratch(c);
+    void *made = scratch ? ebpo_alloc(rows, row_bytes) : NULL;
+    ebpo_status status =
+        made ? EBPO_OK : ebpo_fail_memory(error, rows * row_bytes + sizeof *scratch);
     if (!c->counted)
         expect_around(c, array, chunk_of(key));
     if (status == EBPO_OK)
-        status = ebpo_reader_chunk(c->file, array, chunk_of(key), &desk->reader, desk->raw, error);
+        status =
+            ebpo_reader_chunk(c->file, array, chunk_of(key), &scratch->reader, scratch->raw, error);
     if (status == EBPO_OK)
-        status = decode(c, array, chunk_of(key), desk->raw, made, error);
-    if (desk)
-        give_scratch(c, desk);
+        status = decode(c, array, chunk_of(key), scratch->raw, made, error);
+    if (scratch)
+        give_scratch(c, scratch);
     if (status == EBPO_OK) {
         *item = made;
         *bytes = rows * row_bytes;
@@ -367,9 +369,9 @@ void ebpo_chunks_free(ebpo_chunks *chunks)
         return;
     ebpo_cache_free(chunks->cache);
     while (chunks->idle) {
-        ebpo_chunk_scratch *desk = chunks->idle;
-        chunks->idle = desk->next;
-        free_scratch(desk);
+        ebpo_chunk_scratch *scratch = chunks->idle;
+        chunks->idle = scratch->next;
+        free_scratch(scratch);
     }
     ebpo_array_free(NULL, chunks->seen);
     free(chunks->ahead);

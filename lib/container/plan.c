@@ -54,8 +54,8 @@ static bool texts_ok(const ebpo_info *info)
 
 /* The facts as the file will state them: parts that are wanted and there, counts of what is
  * written. */
-static ebpo_status settle_facts(ebpo_plan *plan, const ebpo_write_options *options,
-                                const ebpo_check *check, ebpo_error *error)
+static ebpo_status resolve_facts(ebpo_plan *plan, const ebpo_write_options *options,
+                                 const ebpo_check *check, ebpo_error *error)
 {
     const ebpo_tree *tree = plan->tree;
     ebpo_info *info = &plan->info;
@@ -243,7 +243,7 @@ ebpo_status ebpo_plan_make(ebpo_plan *plan, const ebpo_tree *tree,
     ebpo_check check = { shown, EBPO_E_ARGUMENT, tree->workspace };
     memset(plan, 0, sizeof *plan);
     plan->tree = tree;
-    ebpo_status status = settle_facts(plan, options, &check, error);
+    ebpo_status status = resolve_facts(plan, options, &check, error);
     if (status == EBPO_OK)
         status = check_tree(plan, &check, error);
     if (status == EBPO_OK)

@@ -17,7 +17,7 @@ struct ebpo_chunks {
     ebpo_cache *cache;
     /* [chunks of /mesh/faces] vertices seen before each; NULL: a single chunk, or no mesh */
     uint64_t *seen;
-    pthread_mutex_t lock; /* of the desks that nobody uses */
+    pthread_mutex_t lock; /* of the scratch that is not in use */
     ebpo_chunk_scratch *idle;
     unsigned idle_count;
     /* Of chunks made by ebpo_chunks_make_counted, which one thread uses at a time. */

@@ -103,7 +103,7 @@ static void learn(ebpo_bounder *b, const double xi[3], double distance)
     b->target = fmax(b->target, b->ratio * b->lo);
 }
 
-static ebpo_status look_at(ebpo_bounder *b, const ebpo_fragment *fragment, ebpo_fragment_measure *l)
+static ebpo_status measure(ebpo_bounder *b, const ebpo_fragment *fragment, ebpo_fragment_measure *l)
 {
     double corner = 0;
     int farthest = 0;
@@ -182,7 +182,7 @@ static ebpo_status step(ebpo_bounder *b)
         ebpo_bound_raise(b, fragment.upper);
         return EBPO_OK;
     }
-    ebpo_status status = look_at(b, &fragment, &l);
+    ebpo_status status = measure(b, &fragment, &l);
     if (status != EBPO_OK)
         return status;
     fragment.upper = l.upper;

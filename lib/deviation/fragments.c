@@ -118,7 +118,7 @@ static double find_beyond(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_ce
 
 /* Inside, but for what thin part of the neighbours went with it: more than the slack, by which
  * neighbours overlap. */
-static void settle_black(ebpo_bounder *b, const ebpo_polytope *p, ebpo_cell cell, int levels)
+static void bound_black(ebpo_bounder *b, const ebpo_polytope *p, ebpo_cell cell, int levels)
 {
     double low[3], high[3];
     bool thin = false;
@@ -148,7 +148,7 @@ static ebpo_status cut_gray(ebpo_bounder *b, const ebpo_fragment *fragment)
             !ebpo_cut_axis(&y, 0, octant & 1, low[0] + half, &x))
             continue;
         if (child.type == EBPO_BLACK) {
-            settle_black(b, &x, child.cell, fragment->levels + 1);
+            bound_black(b, &x, child.cell, fragment->levels + 1);
             continue;
         }
         status = push_polytope(b,

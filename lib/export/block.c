@@ -68,7 +68,7 @@ void ebpo_block_free(ebpo_block *block)
     memset(block, 0, sizeof *block);
 }
 
-void ebpo_block_tell(const ebpo_block *block, ebpo_export_report *report)
+void ebpo_block_report(const ebpo_block *block, ebpo_export_report *report)
 {
     bool mesh = block->level < 0;
     report->block[report->block_count++] =

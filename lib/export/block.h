@@ -26,7 +26,7 @@ EBPO_MUST_USE ebpo_status ebpo_block_read(ebpo_block *out, const ebpo_file *file
                                           ebpo_block_order order,
                                           const ebpo_export_options *options, ebpo_error *error);
 void ebpo_block_free(ebpo_block *block);
-void ebpo_block_tell(const ebpo_block *block, ebpo_export_report *report);
+void ebpo_block_report(const ebpo_block *block, ebpo_export_report *report);
 
 /* A number for each node, or for each polygon that of its node; of the mesh, for each triangle. */
 typedef struct ebpo_column {

@@ -15,7 +15,7 @@ ebpo_status ebpo_export_read_block(const ebpo_export_job *job, int i, ebpo_block
     ebpo_status status = ebpo_block_read(out, job->file, ebpo_block_level(job->options, i), order,
                                          job->options, error);
     if (status == EBPO_OK)
-        ebpo_block_tell(out, job->report);
+        ebpo_block_report(out, job->report);
     return status;
 }
 

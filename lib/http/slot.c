@@ -18,8 +18,8 @@ enum {
 
 /* Some ten times a second while a request is under way. libcurl's own measure of speed is an
  * average over several seconds. */
-static int look_for_stall(void *user, curl_off_t total, curl_off_t done, curl_off_t upload_total,
-                          curl_off_t uploaded)
+static int check_stall(void *user, curl_off_t total, curl_off_t done, curl_off_t upload_total,
+                       curl_off_t uploaded)
 {
     ebpo_slot *s = user;
     curl_off_t connected = 0;
@@ -153,7 +153,7 @@ bool ebpo_slot_set_up(ebpo_slot *s)
     good = good && (!o->ca_file || curl_easy_setopt(e, CURLOPT_CAINFO, o->ca_file) == CURLE_OK);
     good = good && (!o->proxy || curl_easy_setopt(e, CURLOPT_PROXY, o->proxy) == CURLE_OK);
     curl_easy_setopt(e, CURLOPT_NOPROGRESS, 0L);
-    curl_easy_setopt(e, CURLOPT_XFERINFOFUNCTION, look_for_stall);
+    curl_easy_setopt(e, CURLOPT_XFERINFOFUNCTION, check_stall);
     curl_easy_setopt(e, CURLOPT_XFERINFODATA, s);
     curl_easy_setopt(e, CURLOPT_ERRORBUFFER, s->trouble);
     curl_easy_setopt(e, CURLOPT_HEADERFUNCTION, take_header);

@@ -417,7 +417,7 @@ static bool start_due(ebpo_transfers *t, double *wait)
     return !quit;
 }
 
-static void look_at_stop(ebpo_transfers *t)
+static void check_stop(ebpo_transfers *t)
 {
     const ebpo_http_options *o = t->options;
     if (!o->stop || t->cancelled || !o->stop(o->stop_user))
@@ -461,6 +461,6 @@ static void *drive(void *transfers)
         bool busy = running || wait * 1000 < IDLE_MS;
         int ms = (int)(wait * 1000) + 1;
         curl_multi_poll(t->multi, NULL, 0, busy && ms > LOOK_MS ? LOOK_MS : ms, NULL);
-        look_at_stop(t);
+        check_stop(t);
     }
 }

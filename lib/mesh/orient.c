@@ -82,7 +82,7 @@ static void flag(orienting *o, uint32_t face, uint8_t flags)
 }
 
 /* The uses of one edge. */
-static void look_at_edge(orienting *o, const ebpo_link *links, uint64_t uses)
+static void visit_edge(orienting *o, const ebpo_link *links, uint64_t uses)
 {
     uint32_t a = ebpo_link_face(&links[0]), b = ebpo_link_face(&links[uses - 1]);
     if (uses != 2 || a == b) {
@@ -110,8 +110,8 @@ static ebpo_status begin_faces(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-static ebpo_status look_around(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                               ebpo_error *error)
+static ebpo_status visit_vertices(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                  ebpo_error *error)
 {
     orienting *o = context;
     ebpo_star *star = &o->star[worker];
@@ -122,7 +122,7 @@ static ebpo_status look_around(void *context, uint64_t begin, uint64_t end, unsi
         for (uint64_t i = 0, next; i < star->count; i = next) {
             next = ebpo_star_run_end(star, i);
             if (ebpo_link_neighbour(&star->links[i]) > v)
-                look_at_edge(o, star->links + i, next - i);
+                visit_edge(o, star->links + i, next - i);
         }
     }
     return EBPO_OK;
@@ -139,7 +139,7 @@ static ebpo_status join_faces(orienting *o, ebpo_error *error)
         status = ebpo_parallel_for(threads, o->mesh->face_count, FACE_GRAIN, begin_faces, o, NULL,
                                    "", error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, o->mesh->vertex_count, VERTEX_GRAIN, look_around, o,
+        status = ebpo_parallel_for(threads, o->mesh->vertex_count, VERTEX_GRAIN, visit_vertices, o,
                                    NULL, "", error);
     for (unsigned t = 0; o->star && t < threads; t++)
         ebpo_star_free(&o->star[t]);

@@ -96,7 +96,7 @@ static int compare(const ebpo_nearest *n, const double triangle[3][3],
     return ebpo_triangle_distance_compare(n->p, triangle, (const double(*)[3])n->triangle);
 }
 
-static void look_at(ebpo_nearest *n, const ebpo_subtree *s, uint32_t slot)
+static void try_face(ebpo_nearest *n, const ebpo_subtree *s, uint32_t slot)
 {
     uint32_t local = s->slot_face[slot];
     if (local == EBPO_NO_SLOT)
@@ -122,8 +122,8 @@ void ebpo_nearest_leaf(ebpo_nearest *n, const ebpo_subtree *s, const ebpo_subtre
 {
     for (uint32_t b = 0; b < leaf->blocks; b++)
         for (unsigned lanes = s->list[leaf->list + b].lanes; lanes; lanes &= lanes - 1)
-            look_at(n, s,
-                    s->list[leaf->list + b].block * EBPO_BLOCK + (unsigned)__builtin_ctz(lanes));
+            try_face(n, s,
+                     s->list[leaf->list + b].block * EBPO_BLOCK + (unsigned)__builtin_ctz(lanes));
 }
 
 /* --- near: single precision --- */
@@ -204,7 +204,7 @@ static void judge(searching *g)
         if (c.low > g->best)
             continue;
         double before = g->n->limit;
-        look_at(g->n, g->s, c.slot);
+        try_face(g->n, g->s, c.slot);
         if (g->n->limit < before) {
             float limit = frame_limit(g);
             if (limit < g->best)
@@ -314,7 +314,7 @@ static void search_far(ebpo_nearest *n, const ebpo_subtree *s, uint32_t child)
 {
     if (child & EBPO_IS_BLOCK) {
         for (uint32_t lane = 0; lane < EBPO_BLOCK; lane++)
-            look_at(n, s, (child & ~EBPO_IS_BLOCK) * EBPO_BLOCK + lane);
+            try_face(n, s, (child & ~EBPO_IS_BLOCK) * EBPO_BLOCK + lane);
         return;
     }
     const ebpo_bound *b = &s->bound[child];

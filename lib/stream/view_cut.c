@@ -39,7 +39,7 @@ void ebpo_view_stream_cut(ebpo_view_stream *s, ebpo_view_visit_fn visit, void *u
         (void)visit_node(&v, (ebpo_partial_node){ 0, 0 });
 }
 
-static void look_at(const ebpo_view_stream *s, const ebpo_waiting *w, ebpo_view_stats *out)
+static void count_node(const ebpo_view_stream *s, const ebpo_waiting *w, ebpo_view_stats *out)
 {
     ebpo_cell cell = ebpo_cell_of_octcode(w->octcode);
     ebpo_seen look = ebpo_viewpoint_see(&s->viewpoint, &s->box, cell);
@@ -60,8 +60,8 @@ ebpo_status ebpo_view_stream_get_stats(const ebpo_view_stream *s, ebpo_view_stat
     for (int i = 0; i < 4; i++)
         stats.cut[i] = s->cut[i];
     for (uint64_t i = 0; i < s->frontier.count; i++)
-        look_at(s, &s->frontier.at[i], &stats);
+        count_node(s, &s->frontier.at[i], &stats);
     if (s->delivering && s->partial.group_count > 1)
-        look_at(s, &s->parent, &stats);
+        count_node(s, &s->parent, &stats);
     return EBPO_GIVE(ebpo_view_stats, out, &stats);
 }

@@ -21,7 +21,7 @@ uint32_t ebpo_profile_parts(ebpo_profile profile)
 
 /* The box against the root cell and against one that was kept before: then nothing but their common
  * part is here. */
-static ebpo_status settle_box(ebpo_cutting *c)
+static ebpo_status resolve_box(ebpo_cutting *c)
 {
     const ebpo_subset_options *o = c->options;
     const char *shown = c->file->in.shown;
@@ -57,7 +57,7 @@ static ebpo_status settle_box(ebpo_cutting *c)
     return EBPO_OK;
 }
 
-static ebpo_status settle(ebpo_cutting *c)
+static ebpo_status resolve_options(ebpo_cutting *c)
 {
     const ebpo_subset_options *o = c->options;
     ebpo_info *info = &c->out->info;
@@ -83,7 +83,7 @@ static ebpo_status settle(ebpo_cutting *c)
         info->cut_levels = c->last_level + 1;
     if (o->max_error > 0)
         info->kept_error = o->max_error;
-    return settle_box(c);
+    return resolve_box(c);
 }
 
 /* Without a box whole arrays will be read: a source far away then fetches them in few requests. */
@@ -135,7 +135,7 @@ ebpo_status ebpo_subset_tree_within(ebpo_tree *out, const ebpo_file *file,
                        .error = error,
                        .need = options->max_error > 0 ? need : NULL };
     memset(out, 0, sizeof *out);
-    ebpo_status status = settle(&c);
+    ebpo_status status = resolve_options(&c);
     if (status == EBPO_OK)
         announce(&c);
     if (status == EBPO_OK)

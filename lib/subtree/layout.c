@@ -57,7 +57,7 @@ static uint32_t add_bound(walk *w, const bundle *b)
     return (uint32_t)o->bound_count++;
 }
 
-static void settle(walk *w, bundle *b)
+static void close_bundle(walk *w, bundle *b)
 {
     if (b->members == 0 && b->end > b->begin) {
         b->member[0] = add_block(w, b->begin, b->end);
@@ -70,7 +70,7 @@ static bundle join(walk *w, bundle *part, int parts)
 {
     int total = 0;
     for (int i = 0; i < parts; i++) {
-        settle(w, &part[i]);
+        close_bundle(w, &part[i]);
         total += part[i].members;
     }
     while (total > EBPO_BLOCK && !w->failed) {

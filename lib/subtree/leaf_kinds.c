@@ -53,9 +53,8 @@ typedef struct block_boxes {
 
 /* Finds which of the faces listed in a block have boxes that meet the cell, and which walls these
  * boxes come to (bit 2 axis + side). Exact comparisons. */
-static void look_at_block(const ebpo_subtree *s, const ebpo_listed_block *listed,
-                          const double low[3], const double high[3], block_boxes *out,
-                          unsigned *walls)
+static void bound_block(const ebpo_subtree *s, const ebpo_listed_block *listed, const double low[3],
+                        const double high[3], block_boxes *out, unsigned *walls)
 {
     int away[EBPO_BLOCK] = { 0 }, touches[EBPO_BLOCK] = { 0 };
     for (int k = 0; k < 3; k++) {
@@ -133,7 +132,7 @@ static bool gather(ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const double 
     for (uint32_t b = 0; b < leaf->blocks; b++) {
         ebpo_listed_block *block = &s->list[leaf->list + b];
         block_boxes boxes;
-        look_at_block(s, block, low, high, &boxes, walls);
+        bound_block(s, block, low, high, &boxes, walls);
         if (fine)
             set_listed_box(block, &boxes, low, f->inverse);
         for (unsigned near = boxes.near; near && few; near &= near - 1) {

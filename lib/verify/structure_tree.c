@@ -27,16 +27,17 @@ static bool volume_possible(double volume, uint64_t cells, int l, const ebpo_inf
 static void check_summary(ebpo_tally *tally, const ebpo_tree *tree, int l)
 {
     const ebpo_level *level = &tree->level[l];
-    const ebpo_level_summary *told = &tree->info.level[l];
-    CHECK(told->gray_count == level->gray_count && told->leaf_count == level->leaf_count &&
-              told->white_count == level->white_count && told->black_count == level->black_count,
+    const ebpo_level_summary *stored = &tree->info.level[l];
+    CHECK(stored->gray_count == level->gray_count && stored->leaf_count == level->leaf_count &&
+              stored->white_count == level->white_count &&
+              stored->black_count == level->black_count,
           "level %d: the head's counts of nodes differ from the level's", l);
-    CHECK(told->plane_count == level->plane_count &&
-              told->leaf_plane_count == level->leaf_plane_count,
+    CHECK(stored->plane_count == level->plane_count &&
+              stored->leaf_plane_count == level->leaf_plane_count,
           "level %d: the head's counts of planes differ from the level's", l);
-    CHECK(told->new_count == level->new_count && told->ref_count == level->ref_count,
+    CHECK(stored->new_count == level->new_count && stored->ref_count == level->ref_count,
           "level %d: the head's counts of faces differ from the level's", l);
-    CHECK(told->gray_volume == level->gray_volume && told->leaf_volume == level->leaf_volume,
+    CHECK(stored->gray_volume == level->gray_volume && stored->leaf_volume == level->leaf_volume,
           "level %d: the head's volumes differ from the level's", l);
     CHECK(volume_possible(level->gray_volume, level->gray_count, l, &tree->info) &&
               volume_possible(level->leaf_volume, level->leaf_count, l, &tree->info),

@@ -109,13 +109,13 @@ void ebpo_check_terminal_label(ebpo_tally *tally, const ebpo_twin_tree *view,
 {
     if (node->type == EBPO_LEAF)
         return;
-    int64_t told = ebpo_twin_winding(view, node);
+    int64_t stored = ebpo_twin_winding(view, node);
     tally->checks[EBPO_VERIFY_LABELS]++;
-    if (ebpo_twin_inside(view, told) != (node->type == EBPO_BLACK))
+    if (ebpo_twin_inside(view, stored) != (node->type == EBPO_BLACK))
         ebpo_tally_violation(tally, EBPO_VERIFY_LABELS,
                              &(ebpo_verify_place){ node->code, EBPO_NO_FACE, EBPO_NO_PLANE },
                              "%s, but winding number %" PRId64 " lies %s by the file's rule",
-                             node->type == EBPO_BLACK ? "black" : "white", told,
+                             node->type == EBPO_BLACK ? "black" : "white", stored,
                              node->type == EBPO_BLACK ? "outside" : "inside");
 }
 
@@ -137,12 +137,12 @@ void ebpo_check_rays(ebpo_tally *tally, const ebpo_ray_points *points)
     tally->checks[EBPO_VERIFY_LABELS] += points->count;
     for (uint64_t i = 0; i < points->count; ebpo_workspace_settle_at(points->workspace, i++)) {
         const ebpo_ray_point *p = &points->point[i];
-        if (p->found != p->told)
+        if (p->found != p->stored)
             ebpo_tally_violation(tally, EBPO_VERIFY_LABELS,
                                  &(ebpo_verify_place){ p->octcode, EBPO_NO_FACE, EBPO_NO_PLANE },
                                  "winding number %" PRId64
                                  " is stored, a ray through the mesh finds %" PRId64,
-                                 p->told, p->found);
+                                 p->stored, p->found);
     }
 }
 

@@ -12,7 +12,7 @@
 typedef struct ebpo_ray_point {
     double at[3];
     uint64_t octcode; /* of the cell whose lowest corner it is */
-    int64_t told;     /* its winding number by the file */
+    int64_t stored;   /* its winding number by the file */
     int64_t found;    /* by ebpo_rays_follow */
 } ebpo_ray_point;
 

@@ -61,20 +61,20 @@ static ebpo_status mend_again(ebpo_mesh *mesh, const ebpo_mend_record *asked, eb
     return status;
 }
 
-static void check_record(ebpo_tally *tally, const ebpo_mend_record *told,
+static void check_record(ebpo_tally *tally, const ebpo_mend_record *stored,
                          const ebpo_mend_record *did)
 {
-    CHECK(told->welded_vertices == did->welded_vertices,
+    CHECK(stored->welded_vertices == did->welded_vertices,
           "%" PRIu64 " welded vertices are recorded, doing it again welds %" PRIu64,
-          told->welded_vertices, did->welded_vertices);
-    CHECK(told->flipped_faces == did->flipped_faces &&
-              told->unorientable_components == did->unorientable_components,
+          stored->welded_vertices, did->welded_vertices);
+    CHECK(stored->flipped_faces == did->flipped_faces &&
+              stored->unorientable_components == did->unorientable_components,
           "%" PRIu64 " flipped faces are recorded, doing it again flips %" PRIu64,
-          told->flipped_faces, did->flipped_faces);
-    CHECK(told->filled_holes == did->filled_holes && told->added_faces == did->added_faces &&
-              told->unfilled_holes == did->unfilled_holes,
+          stored->flipped_faces, did->flipped_faces);
+    CHECK(stored->filled_holes == did->filled_holes && stored->added_faces == did->added_faces &&
+              stored->unfilled_holes == did->unfilled_holes,
           "%" PRIu64 " faces filling holes are recorded, doing it again adds %" PRIu64,
-          told->added_faces, did->added_faces);
+          stored->added_faces, did->added_faces);
 }
 
 static void compare_in_order(ebpo_tally *tally, const ebpo_mesh *a, const ebpo_mesh *b)

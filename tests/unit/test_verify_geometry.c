@@ -167,7 +167,7 @@ static void check_rays(const char *name)
     ck_assert(ebpo_rays_follow(&points, &mesh, &around, 2, NULL, NULL) == EBPO_OK);
     ck_assert_uint_eq(points.count, 100);
     for (uint64_t i = 0; i < points.count; i++)
-        ck_assert_int_eq(points.point[i].found, points.point[i].told);
+        ck_assert_int_eq(points.point[i].found, points.point[i].stored);
     ebpo_array_free(points.workspace, points.point);
     ebpo_mesh_free(&mesh);
 }
