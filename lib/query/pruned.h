@@ -2,11 +2,8 @@
 #ifndef EBPO_QUERY_PRUNED_H
 #define EBPO_QUERY_PRUNED_H
 
+#include "query/absent.h"
 #include "query/query_node.h"
-
-/* EBPO_E_ABSENT: the question needs what was left out below this node. Says which file, where, and
- * what it was cut to. */
-ebpo_status ebpo_fail_pruned(const ebpo_model *model, ebpo_cell cell, ebpo_error *error);
 
 /* Whether something in the node's cell matters to the question. */
 typedef bool (*ebpo_matters_fn)(void *user, const ebpo_box *box, const ebpo_node *node);
