@@ -9,7 +9,7 @@
 #include "base/error.h"
 #include "base/arrays.h"
 #include "codec/coding.h"
-#include "container/slice_parts.h"
+#include "container/chunks.h"
 
 /* Readers are kept for the next load: setting up a decoder takes longer than a chunk. They are not
  * part of the budget. */

@@ -5,7 +5,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/hash.h"
-#include "container/slice_parts.h"
+#include "container/compact.h"
 
 static const uint32_t FREE = UINT32_MAX;
 

@@ -4,7 +4,8 @@
 #include <string.h>
 
 #include "base/error.h"
-#include "container/slice_parts.h"
+#include "container/chunks.h"
+#include "container/ranks.h"
 #include "geom/plane_code.h"
 #include "octree/node_types.h"
 #include "octree/rule.h"

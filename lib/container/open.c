@@ -9,7 +9,7 @@
 #include "base/fp_env.h"
 #include "base/sized.h"
 #include "container/head_facts.h"
-#include "container/reader.h"
+#include "container/open.h"
 #include "http/http_source.h"
 
 static ebpo_status open_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_id id, int level,

@@ -11,6 +11,7 @@
 #include "codec/coding.h"
 #include "container/array_check.h"
 #include "container/head_facts.h"
+#include "container/rank_index.h"
 #include "ebpo_config.h"
 
 void ebpo_plan_free(ebpo_plan *plan)

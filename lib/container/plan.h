@@ -39,10 +39,4 @@ void ebpo_plan_free(ebpo_plan *plan);
 void ebpo_plan_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64_t row,
                       uint64_t rows, uint8_t *file);
 
-/* Index arrays (also what readers compare against), one row for each EBPO_INDEX_ROWS items, at
- * least one; NULL when memory is short. */
-uint64_t *ebpo_index_types(const ebpo_level *level, bool root);
-uint64_t *ebpo_index_gray(const ebpo_level *level);
-uint64_t *ebpo_index_leaves(const ebpo_level *level);
-
 #endif

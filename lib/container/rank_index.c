@@ -2,7 +2,8 @@
  * zeros. */
 #include "base/alloc.h"
 #include "base/arrays.h"
-#include "container/plan.h"
+#include "container/rank_index.h"
+#include "container/schema.h"
 #include "octree/node_types.h"
 
 static uint64_t *make(uint64_t count, unsigned cols)

@@ -5,7 +5,8 @@
 
 #include "base/endian.h"
 #include "base/error.h"
-#include "container/slice_parts.h"
+#include "container/chunks.h"
+#include "container/ranks.h"
 #include "octree/node_types.h"
 
 ebpo_status ebpo_ranks_count_file(ebpo_chunks *chunks, int level, uint64_t group, uint64_t groups,

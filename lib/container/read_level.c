@@ -10,6 +10,7 @@
 #include "base/arrays.h"
 #include "container/plan.h"
 #include "container/reader.h"
+#include "container/rank_index.h"
 
 /* leaf_first holds skips; each leaf's new faces end before the next one's begin. */
 static ebpo_status add_up_skips(const ebpo_file *file, int number, ebpo_level *level,

@@ -1,41 +1,8 @@
-/* An open file, and reading its arrays chunk by chunk. */
+/* Reading the arrays of an open file chunk by chunk. */
 #ifndef EBPO_CONTAINER_READER_H
 #define EBPO_CONTAINER_READER_H
 
-#include <ebpo/file.h>
-#include <pthread.h>
-#include <stdatomic.h>
-
-#include "container/array_check.h"
-#include "container/schema.h"
-#include "h5/h5.h"
-#include "io/byte_source.h"
-
-typedef struct ebpo_array_in {
-    bool present;
-    ebpo_array_id id;
-    int level;
-    char path[EBPO_PATH_BYTES];
-    ebpo_h5_shape shape;
-    uint64_t stored_bytes;
-    /* [ebpo_h5_chunk_count(&shape)] where each is; NULL when the array is absent. After
-     * ebpo_reader_locate, unless it has one chunk only */
-    ebpo_h5_chunk *chunks;
-} ebpo_array_in;
-
-struct ebpo_file {
-    ebpo_input in;
-    ebpo_info info;
-    ebpo_array_in level_array[EBPO_LEVELS_MAX][EBPO_LEVEL_ARRAYS];
-    ebpo_array_in root_array[EBPO_ARRAYS]; /* those from EBPO_A_VERTICES on */
-    pthread_mutex_t lock;
-    atomic_bool located; /* the chunks of all arrays are known */
-};
-
-/* After this the chunks of an array that is present are known. Reads from a file that is far away,
- * once. Any thread. */
-EBPO_MUST_USE ebpo_status ebpo_reader_locate(const ebpo_file *file, const ebpo_array_in *array,
-                                             ebpo_error *error);
+#include "container/open.h"
 
 /* What will be read, collected and then announced; nothing is done for sources that do not want to
  * know. For one thread.
@@ -65,25 +32,6 @@ void ebpo_expect_root(ebpo_expected *expected, uint32_t needs);
 void ebpo_expect_tree(const ebpo_file *file);
 /* Announces what was collected, and frees it. */
 void ebpo_expect_all(ebpo_expected *expected);
-
-static inline const ebpo_array_in *ebpo_reader_array(const ebpo_file *file, ebpo_array_id id,
-                                                     int level)
-{
-    return id < EBPO_LEVEL_ARRAYS ? &file->level_array[level][id] : &file->root_array[id];
-}
-
-/* What the file keeps for itself while it is read: counters, and where chunks lie. Atomic, or under
- * its lock. */
-static inline ebpo_file *ebpo_reader_own(const ebpo_file *file)
-{
-    return (ebpo_file *)(uintptr_t)file;
-}
-
-/* `workspace`: what the arrays are in, or NULL. */
-static inline ebpo_check ebpo_reader_check(const ebpo_file *file, ebpo_workspace *workspace)
-{
-    return (ebpo_check){ file->in.shown, EBPO_E_FORMAT, workspace };
-}
 
 /* What callers leave out. */
 static inline ebpo_read_options ebpo_read_chosen(const ebpo_read_options *options)

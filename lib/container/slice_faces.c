@@ -5,7 +5,10 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "container/slice_parts.h"
+#include "container/chunks.h"
+#include "container/compact.h"
+#include "container/slice.h"
+#include "container/slice_faces.h"
 
 static void expect_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t *single,
                         uint64_t singles, uint64_t first, uint64_t rows)

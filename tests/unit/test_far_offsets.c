@@ -14,6 +14,7 @@
 #include "check_main.h"
 #include "codec/coding.h"
 #include "container/plan.h"
+#include "container/rank_index.h"
 #include "container/reader.h"
 #include "import/import.h"
 #include "io/file_source.h"

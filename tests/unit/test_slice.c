@@ -8,7 +8,9 @@
 
 #include "check_main.h"
 #include "read_by.h"
-#include "container/slice_parts.h"
+#include "container/chunks.h"
+#include "container/file_nodes.h"
+#include "container/slice.h"
 #include "octree/node_types.h"
 #include "random_tree.h"
 #include "scratch.h"

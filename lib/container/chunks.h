@@ -1,14 +1,34 @@
-/* What the files of slice.h share: pinned chunks, ranks, and the numbering of what a slice picks
- * out of the file. */
-#ifndef EBPO_CONTAINER_SLICE_PARTS_H
-#define EBPO_CONTAINER_SLICE_PARTS_H
+/* Ranges of arrays, through a cache of decoded chunks. What comes out has been checked: a hostile
+ * file gives EBPO_E_FORMAT, never an index out of range. Any thread. */
+#ifndef EBPO_CONTAINER_CHUNKS_H
+#define EBPO_CONTAINER_CHUNKS_H
 
 #include <pthread.h>
 
+#include "cache/cache.h"
 #include "container/reader.h"
-#include "container/slice.h"
 
-/* --- chunks.c --- */
+/* Decoded chunks under a budget (0: no limit; the smallest that works is a few MiB). */
+typedef struct ebpo_chunks ebpo_chunks;
+EBPO_MUST_USE ebpo_status ebpo_chunks_make(ebpo_chunks **out, const ebpo_file *file,
+                                           uint64_t budget, ebpo_error *error);
+/* The same for arrays of levels only, by one thread at a time, and counted: nothing is read or
+ * announced but what was asked for, and nothing after which the file would have read more than the
+ * limit (ebpo_chunks_limit; none at first). Then EBPO_E_LIMIT, and ebpo_chunks_refused is true. */
+EBPO_MUST_USE ebpo_status ebpo_chunks_make_counted(ebpo_chunks **out, const ebpo_file *file,
+                                                   uint64_t budget, ebpo_error *error);
+void ebpo_chunks_limit(ebpo_chunks *chunks, uint64_t bytes);
+bool ebpo_chunks_refused(const ebpo_chunks *chunks);
+void ebpo_chunks_free(ebpo_chunks *chunks);
+void ebpo_chunks_get_stats(ebpo_chunks *chunks, ebpo_cache_stats *out);
+
+/* Rows [row, row + rows) of a plain integer array that is present, each value widened to `size`
+ * bytes. Beyond the array's end: EBPO_E_ARGUMENT. */
+EBPO_MUST_USE ebpo_status ebpo_chunks_integers(ebpo_chunks *chunks, ebpo_array_id id, int level,
+                                               uint64_t row, uint64_t rows, void *values,
+                                               size_t size, ebpo_error *error);
+
+/* --- inside lib/container --- */
 
 typedef struct ebpo_chunk_scratch ebpo_chunk_scratch; /* what one loading thread needs */
 
@@ -79,72 +99,11 @@ bool ebpo_chunks_missing(ebpo_chunks *chunks, ebpo_array_id id, int level, uint6
  * announced and not been read stays small, also beside what the limit leaves. */
 void ebpo_chunks_announce(ebpo_chunks *chunks, const uint64_t *keys, unsigned now, unsigned count);
 
-/* Sum of rows of an unsigned array; EBPO_E_FORMAT when it is beyond 2^62. */
-EBPO_MUST_USE ebpo_status ebpo_chunks_sum(ebpo_chunks *chunks, ebpo_array_id id, int level,
-                                          uint64_t row, uint64_t rows, uint64_t *sum,
-                                          ebpo_error *error);
-
 static inline ebpo_status ebpo_chunks_fail(const ebpo_chunks *chunks, int level, ebpo_array_id id,
                                            const char *what, ebpo_error *error)
 {
     ebpo_check check = ebpo_reader_check(chunks->file, NULL);
     return ebpo_check_fail(&check, level, ebpo_schema[id].name, what, error);
 }
-
-/* --- ranks.c: from the nearest row of an index, and counting from there --- */
-
-/* ebpo_groups_count for groups [group, group + groups) of the file. */
-EBPO_MUST_USE ebpo_status ebpo_ranks_count_file(ebpo_chunks *chunks, int level, uint64_t group,
-                                                uint64_t groups, uint64_t counts[4],
-                                                ebpo_error *error);
-/* Nodes of each type of a level before a group. */
-EBPO_MUST_USE ebpo_status ebpo_ranks_before(ebpo_chunks *chunks, int level, uint64_t group,
-                                            uint64_t ranks[4], ebpo_error *error);
-/* [rank, rank + count) lies within the level, for each type. */
-EBPO_MUST_USE ebpo_status ebpo_ranks_check(const ebpo_chunks *chunks, int level,
-                                           const uint64_t ranks[4], const uint64_t counts[4],
-                                           ebpo_error *error);
-/* Planes of the gray nodes before one. */
-EBPO_MUST_USE ebpo_status ebpo_ranks_planes(ebpo_chunks *chunks, int level, uint64_t gray,
-                                            uint64_t *planes, ebpo_error *error);
-/* End of the new faces of the leaf before one, and references of the leaves before it. */
-EBPO_MUST_USE ebpo_status ebpo_ranks_leaf(ebpo_chunks *chunks, int level, uint64_t leaf,
-                                          uint64_t *end, uint64_t *refs, ebpo_error *error);
-
-/* Leaf planes of the leaves before one. */
-EBPO_MUST_USE ebpo_status ebpo_ranks_leaf_planes(ebpo_chunks *chunks, int level, uint64_t leaf,
-                                                 uint64_t *planes, ebpo_error *error);
-
-/* A node that the file has, as far as the head tells; else EBPO_E_ARGUMENT. */
-EBPO_MUST_USE ebpo_status ebpo_chunks_check_node(const ebpo_chunks *chunks, const ebpo_node *node,
-                                                 ebpo_error *error);
-
-/* --- compact.c: different numbers, sorted, and the place of each --- */
-
-typedef struct ebpo_compact {
-    /* open addressing, at most half full; number UINT32_MAX: free */
-    struct {
-        uint32_t number, place;
-    } * slot;
-    uint64_t mask;
-    uint32_t *sorted; /* [count] */
-    uint64_t count;
-} ebpo_compact;
-
-/* For at most `room` calls of add. Numbers are below 2^32 - 1. */
-EBPO_MUST_USE ebpo_status ebpo_compact_make(ebpo_compact *out, uint64_t room, ebpo_error *error);
-void ebpo_compact_free(ebpo_compact *compact);
-void ebpo_compact_add(ebpo_compact *compact, uint32_t number);
-/* After the last add: sorts. */
-EBPO_MUST_USE ebpo_status ebpo_compact_sort(ebpo_compact *compact, ebpo_error *error);
-/* Place of a number that was added. */
-uint32_t ebpo_compact_find(const ebpo_compact *compact, uint32_t number);
-
-/* --- slice_faces.c --- */
-
-/* From levels with numbers of the file, and first_face and face_count: everything else, and local
- * numbers in the levels. */
-EBPO_MUST_USE ebpo_status ebpo_slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks,
-                                                ebpo_error *error);
 
 #endif

@@ -1,0 +1,26 @@
+/* Different numbers out of a large range, sorted, and the position of each. */
+#ifndef EBPO_CONTAINER_COMPACT_H
+#define EBPO_CONTAINER_COMPACT_H
+
+#include <ebpo/base.h>
+
+typedef struct ebpo_compact {
+    /* open addressing, at most half full; number UINT32_MAX: free */
+    struct {
+        uint32_t number, place;
+    } * slot;
+    uint64_t mask;
+    uint32_t *sorted; /* [count] */
+    uint64_t count;
+} ebpo_compact;
+
+/* For at most `room` calls of add. Numbers are below 2^32 - 1. */
+EBPO_MUST_USE ebpo_status ebpo_compact_make(ebpo_compact *out, uint64_t room, ebpo_error *error);
+void ebpo_compact_free(ebpo_compact *compact);
+void ebpo_compact_add(ebpo_compact *compact, uint32_t number);
+/* After the last add: sorts. */
+EBPO_MUST_USE ebpo_status ebpo_compact_sort(ebpo_compact *compact, ebpo_error *error);
+/* Place of a number that was added. */
+uint32_t ebpo_compact_find(const ebpo_compact *compact, uint32_t number);
+
+#endif

@@ -1,0 +1,12 @@
+/* The faces and vertices of a slice. */
+#ifndef EBPO_CONTAINER_SLICE_FACES_H
+#define EBPO_CONTAINER_SLICE_FACES_H
+
+#include "container/slice.h"
+
+/* From levels with numbers of the file, and first_face and face_count: everything else, and local
+ * numbers in the levels. */
+EBPO_MUST_USE ebpo_status ebpo_slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks,
+                                                ebpo_error *error);
+
+#endif
