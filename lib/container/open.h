@@ -56,4 +56,7 @@ static inline ebpo_file *ebpo_reader_own(const ebpo_file *file)
     return (ebpo_file *)(uintptr_t)file;
 }
 
+/* Bytes of a level in the file, once it has been read. */
+uint64_t ebpo_reader_level_bytes(const ebpo_file *file, int level);
+
 #endif

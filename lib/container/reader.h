@@ -46,9 +46,6 @@ static inline ebpo_read_options ebpo_read_threads(unsigned threads)
     return options;
 }
 
-/* Bytes of a level in the file, once it has been read. */
-uint64_t ebpo_reader_level_bytes(const ebpo_file *file, int level);
-
 /* Decoding state and room for one stored chunk, of one thread; zero-initialise, clear when done. */
 typedef struct ebpo_chunk_reader {
     ebpo_chunk_coder coder;
