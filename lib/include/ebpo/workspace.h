@@ -62,8 +62,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_workspace_new(const ebpo_workspace_optio
                                                       ebpo_workspace **out, ebpo_error *error);
 
 /*
- * After the last call that is given a mesh or tree made with it (or a file
- * that keeps to it); these themselves may be freed or closed later.
+ * After everything that was made with it has been freed. NULL is fine.
  *
  * Threads: one per workspace.
  */
