@@ -1,5 +1,6 @@
 #!/bin/sh
-# Looks into a file with HDF5's own tools: what it is, what it holds, one level. Needs no environment variable once ebpo is installed.
+# Looks into a file with HDF5's own tools: what it is, what it holds, one level. Needs no
+# environment variable once ebpo is installed.
 # Usage: samples/inspect.sh FILE.ebpo.h5 [LEVEL]
 set -eu
 file=${1:?usage: inspect.sh FILE.ebpo.h5 [LEVEL]}
@@ -9,8 +10,10 @@ case ${2:-1} in
 *) echo "inspect.sh: $2 is no level; levels are 0 to 20" >&2; exit 2 ;;
 esac
 
-h5ls "$file" >/dev/null 2>&1 || { echo "inspect.sh: $file: not there, or not an HDF5 file" >&2; exit 1; }
-h5ls "$file/levels/$level" >/dev/null 2>&1 || { echo "inspect.sh: $file has no level $level; see ebpo info $file" >&2; exit 1; }
+h5ls "$file" >/dev/null 2>&1 || { echo "inspect.sh: $file: not there, or not an HDF5 file" \
+    >&2; exit 1; }
+h5ls "$file/levels/$level" >/dev/null 2>&1 || { echo \
+    "inspect.sh: $file has no level $level; see ebpo info $file" >&2; exit 1; }
 
 echo "== what it is"
 for name in about format_version kind vertex_count face_count box_origin box_size; do
@@ -23,7 +26,8 @@ h5ls -r "$file"
 
 echo "== level $level, first values: types of eight siblings in two bits each, planes of each gray node, plane codes"
 for name in types plane_counts planes; do
-    h5ls "$file/levels/$level" | grep -q "^$name " && h5dump -d "/levels/$level/$name" -A 0 -s 0 -c 1 "$file" | sed -n 's/^ *(0): /'"$name"': /p'
+    h5ls "$file/levels/$level" | grep -q "^$name " &&
+        h5dump -d "/levels/$level/$name" -A 0 -s 0 -c 1 "$file" | sed -n 's/^ *(0): /'"$name"': /p'
 done
 
 echo "== all of it, as HDF5 sees it: h5dump -A 0 -d /levels/$level/types $file"

@@ -2,12 +2,14 @@
 
     xvfb-run -a pvpython samples/paraview_levels.py OUT.xdmf PICTURE.png [COARSE [FINE]]
 
-Left, half of the envelopes of level COARSE (default: 3) and half of the mesh that they contain; right, the envelopes of level FINE (default: the last). Colours tell the envelopes'
+Left, half of the envelopes of level COARSE (default: 3) and half of the mesh that they contain;
+right, the envelopes of level FINE (default: the last). Colours tell the envelopes'
 volume, on a logarithmic scale."""
 import os
 import sys
 
-from paraview.simple import (Clip, ColorBy, CreateLayout, CreateRenderView, ExtractBlock, GetColorTransferFunction, SaveScreenshot, Show, Text,
+from paraview.simple import (Clip, ColorBy, CreateLayout, CreateRenderView, ExtractBlock,
+                             GetColorTransferFunction, SaveScreenshot, Show, Text,
                              Xdmf3ReaderT)
 
 TALL = 560
@@ -64,14 +66,16 @@ def make_view(words):
 
 
 def look_at(view):
-    view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = [0.5, 0.35, 1], [0, 0, 0], [0, 1, 0]
+    view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = [0.5, 0.35,
+                                                                     1], [0, 0, 0], [0, 1, 0]
     view.ResetCamera()
     view.CameraParallelProjection = 1
     view.CameraParallelScale *= 0.72
 
 
 def main():
-    path, picture = os.path.abspath(sys.argv[1]), sys.argv[2]  # beside a bare name this reader does not find the HDF5 file
+    # beside a bare name this reader does not find the HDF5 file
+    path, picture = os.path.abspath(sys.argv[1]), sys.argv[2]
     reader = Xdmf3ReaderT(FileName=[path])
     reader.UpdatePipeline()
     levels = [int(name[6:]) for name in grid_names(reader) if name.startswith("level_")]

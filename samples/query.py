@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
-"""Which points are inside, and how far away is the surface? The C library through ctypes: nothing to build.
+"""Which points are inside, and how far away is the surface? The C library through ctypes: nothing
+to build.
 
     samples/query.py MODEL.ebpo.h5 <points.txt
 
-Reads lines "x y z", with blanks or commas between, and answers each. The library is found where the system looks, or at EBPO_LIBRARY=/path/to/libebpo.so.
-As a module:  model = Model("bunny.ebpo.h5"); model.inside([(0, 0, 0)]); model.distance([(0, 0, 0)])
+Reads lines "x y z", with blanks or commas between, and answers each. The library is found where the
+system looks, or at EBPO_LIBRARY=/path/to/libebpo.so. As a module:  model = Model("bunny.ebpo.h5");
+model.inside([(0, 0, 0)]); model.distance([(0, 0, 0)])
 """
 import ctypes
 import ctypes.util
@@ -16,8 +18,10 @@ NOT_SOLID = -7  # ebpo/base.h
 
 
 class Error(ctypes.Structure):  # ebpo/base.h
-    _fields_ = [("status", ctypes.c_int), ("message", ctypes.c_char * 480), ("file", ctypes.c_char * 256),
-                ("object", ctypes.c_char * 64), ("offset", ctypes.c_int64), ("reserved", ctypes.c_uint64 * 4)]
+    _fields_ = [("status", ctypes.c_int), ("message", ctypes.c_char * 480),
+                ("file", ctypes.c_char * 256),
+                ("object", ctypes.c_char * 64), ("offset", ctypes.c_int64),
+                ("reserved", ctypes.c_uint64 * 4)]
 
 
 class Inside(ctypes.Structure):  # ebpo/query.h, as all below
@@ -26,7 +30,8 @@ class Inside(ctypes.Structure):  # ebpo/query.h, as all below
 
 
 class Distance(ctypes.Structure):
-    _fields_ = [("distance", ctypes.c_double), ("lo", ctypes.c_double), ("hi", ctypes.c_double), ("point", ctypes.c_double * 3),
+    _fields_ = [("distance", ctypes.c_double), ("lo", ctypes.c_double), ("hi", ctypes.c_double),
+                ("point", ctypes.c_double * 3),
                 ("normal", ctypes.c_double * 3), ("face", ctypes.c_uint64)]
 
 
@@ -44,7 +49,8 @@ class Model:
         self.call("ebpo_context_new", self.model, ctypes.byref(self.context))
 
         error = Error()  # a question about no points tells whether there is an inside
-        self.solid = self.library.ebpo_inside_many(self.context, None, ctypes.c_uint64(0), None, None, ctypes.byref(error)) != NOT_SOLID
+        self.solid = self.library.ebpo_inside_many(self.context, None, ctypes.c_uint64(0), None,
+                                                   None, ctypes.byref(error)) != NOT_SOLID
 
     def call(self, function, *arguments):
         error = Error()
@@ -87,7 +93,8 @@ def main():
                 continue
             where = model.inside([point])[0].word if model.solid else "surface"
             nearest = model.distance([point])[0]
-            print(f"{where}, {nearest.distance!r} from face {nearest.face} at", *map(repr, nearest.point))
+            print(f"{where}, {nearest.distance!r} from face {nearest.face} at",
+                  *map(repr, nearest.point))
     except (RuntimeError, OSError) as error:
         sys.exit(f"query.py: {error}")
 

@@ -1,6 +1,6 @@
 #!/bin/sh
-# The main job on a real model: installs what is needed, builds, installs, converts the closed bunny of Debian's glmark2-data, inspects, verifies
-# and draws it. Results in samples/out.
+# The main job on a real model: installs what is needed, builds, installs, converts the closed bunny
+# of Debian's glmark2-data, inspects, verifies and draws it. Results in samples/out.
 set -eu
 cd "$(dirname "$0")/.."
 sh tools/install-deps.sh --demo

@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
-"""Reads one level with h5py and prints its gray nodes: octcode, cell, and the half-spaces that the node adds to its parent's envelope.
+"""Reads one level with h5py and prints its gray nodes: octcode, cell, and the half-spaces that the
+node adds to its parent's envelope.
 
     samples/read_level.py FILE.ebpo.h5 [LEVEL]
 
-Each half-space keeps the points p with  n . (p - corner) / size <= d  (division axis by axis): nine numbers a line after the octcode.
+Each half-space keeps the points p with  n . (p - corner) / size <= d  (division axis by axis): nine
+numbers a line after the octcode.
 """
 import sys
 
@@ -12,7 +14,8 @@ import numpy as np
 
 
 def octcodes(file, level):
-    """Octcodes of all nodes of a level and their types, level by level from the root: the i-th gray node has the i-th eight children."""
+    """Octcodes of all nodes of a level and their types, level by level from the root: the i-th gray
+    node has the i-th eight children."""
     codes = np.array([1], dtype=np.uint64)
     for at in range(level + 1):
         groups = file[f"/levels/{at:02d}/types"][:]
@@ -34,7 +37,8 @@ def cells(codes, level, origin, size):
 
 
 def half_spaces(codes):
-    """Normals (integers of 1-norm 511) and offsets of plane codes, in cell coordinates: n . xi <= d."""
+    """Normals (integers of 1-norm 511) and offsets of plane codes, in cell coordinates: n . xi <=
+    d."""
     codes = codes.astype(np.int64)
     u, v, q = (codes & 1023) - 511, (codes >> 10 & 1023) - 511, codes >> 20
     w = 511 - abs(u) - abs(v)

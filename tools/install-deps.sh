@@ -1,6 +1,7 @@
 #!/bin/sh
-# Installs the Debian packages that building needs; with --tests also what the tests need, with --demo what the quick start needs,
-# with --bench the peers of the benchmarks and profilers, with --viewer what serves the web viewer, with --paraview ParaView (1 GB).
+# Installs the Debian packages that building needs; with --tests also what the tests need, with
+# --demo what the quick start needs, with --bench the peers of the benchmarks and profilers, with
+# --viewer what serves the web viewer, with --paraview ParaView (1 GB).
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 # Debian's nodejs comes without npm; others' brings it and conflicts with Debian's.
@@ -8,30 +9,40 @@ viewer="nginx-light nodejs"
 command -v npm >/dev/null || viewer="$viewer npm"
 modules=no
 # dpkg-dev tells meson where libraries go on Debian.
-packages="gcc dpkg-dev pkg-config meson ninja-build libhdf5-dev libzstd-dev zlib1g-dev libgmp-dev nettle-dev libassimp-dev libpng-dev libcairo2-dev libjs-chart.js libcurl4-openssl-dev libqhull-dev"
+packages="gcc dpkg-dev pkg-config meson ninja-build libhdf5-dev libzstd-dev zlib1g-dev \
+    libgmp-dev nettle-dev libassimp-dev libpng-dev libcairo2-dev libjs-chart.js \
+    libcurl4-openssl-dev libqhull-dev"
 for option in "$@"; do
     case $option in
-    --tests) packages="$packages abigail-tools check hdf5-tools python3 python3-h5py python3-numpy clang clang-format libclang-rt-14-dev g++ mandoc chromium $viewer"; [ $modules = yes ] || modules=tests ;;
+    --tests)
+        packages="$packages abigail-tools check hdf5-tools python3 python3-h5py python3-numpy \
+            clang clang-format libclang-rt-14-dev g++ mandoc chromium $viewer"
+        [ $modules = yes ] || modules=tests ;;
     --demo) packages="$packages hdf5-tools glmark2-data python3-h5py" ;;
     --bench) packages="$packages g++ libembree-dev libcgal-dev python3 linux-perf valgrind" ;;
     --paraview) packages="$packages paraview python3-paraview xvfb xauth" ;;
     --viewer) packages="$packages $viewer" modules=yes ;;
-    *) echo "usage: install-deps.sh [--tests] [--demo] [--bench] [--viewer] [--paraview]" >&2; exit 2 ;;
+    *) echo "usage: install-deps.sh [--tests] [--demo] [--bench] [--viewer] [--paraview]" \
+        >&2; exit 2 ;;
     esac
 done
 missing=
 for package in $packages; do
-    dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q 'ok installed' || missing="$missing $package"
+    dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q 'ok installed' ||
+        missing="$missing $package"
 done
 if [ -n "$missing" ]; then
     sudo=
     [ "$(id -u)" = 0 ] || sudo=sudo
     # shellcheck disable=SC2086
-    $sudo env DEBIAN_FRONTEND=noninteractive sh -c 'apt-get update -qq && apt-get install -y -qq --no-install-recommends "$@"' sh $missing
+    $sudo env DEBIAN_FRONTEND=noninteractive sh -c \
+        'apt-get update -qq && apt-get install -y -qq --no-install-recommends "$@"' sh $missing
 fi
 # The viewer's packages, as package-lock.json pins them.
-if [ $modules != no ] && ! cmp -s "$here/viewer/package-lock.json" "$here/viewer/node_modules/.installed"; then
-    (cd "$here/viewer" && npm ci --silent --no-audit --no-fund && cp package-lock.json node_modules/.installed) || {
+if [ $modules != no ] && ! cmp -s "$here/viewer/package-lock.json" \
+    "$here/viewer/node_modules/.installed"; then
+    (cd "$here/viewer" && npm ci --silent --no-audit --no-fund &&
+        cp package-lock.json node_modules/.installed) || {
         echo "install-deps.sh: npm could not install the viewer's packages (npm ci in tools/viewer says why)" >&2
         [ $modules = tests ] || exit 1
         echo "install-deps.sh: the viewer's tests will be skipped" >&2

@@ -1,4 +1,5 @@
-"""Commands measured from outside: time, memory, bytes read and written, as the kernel accounts for them."""
+"""Commands measured from outside: time, memory, bytes read and written, as the kernel accounts for
+them."""
 import json
 import os
 import pathlib
@@ -14,26 +15,34 @@ class Failed(RuntimeError):
 
 
 def drop_from_memory(path):
-    """Asks the system to forget a file, so that the next read goes to the disk. Returns the share in percent that it still holds, or None where that cannot be told."""
+    """Asks the system to forget a file, so that the next read goes to the disk. Returns the share
+    in percent that it still holds, or None where that cannot be told."""
     with open(path, "rb") as f:
         os.fsync(f.fileno())
         os.posix_fadvise(f.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
-    found = subprocess.run(["fincore", "-b", "-n", "-o", "RES", str(path)], capture_output=True, text=True)
-    return 100 * int(found.stdout) / max(1, os.path.getsize(path)) if found.returncode == 0 and found.stdout.strip() else None
+    found = subprocess.run(["fincore", "-b", "-n", "-o", "RES", str(path)], capture_output=True,
+                           text=True)
+    return (100 * int(found.stdout) / max(1, os.path.getsize(path)) if found.returncode == 0
+            and found.stdout.strip() else None)
 
 
 def io_of(pid):
-    """Of a process that has ended but is not yet waited for, its threads included: bytes from and to storage (pages of mapped files too), and bytes by read and write calls."""
+    """Of a process that has ended but is not yet waited for, its threads included: bytes from and
+    to storage (pages of mapped files too), and bytes by read and write calls."""
     try:
-        lines = dict(line.split(": ") for line in pathlib.Path(f"/proc/{pid}/io").read_text().splitlines())
+        lines = dict(line.split(": ")
+                     for line in pathlib.Path(f"/proc/{pid}/io").read_text().splitlines())
     except OSError:  # not for us to read
         return {}
-    return {"storage_read": int(lines["read_bytes"]), "storage_written": int(lines["write_bytes"]) - int(lines["cancelled_write_bytes"]),
-            "storage_dirtied": int(lines["write_bytes"]), "call_read": int(lines["rchar"]), "call_written": int(lines["wchar"])}
+    return {"storage_read": int(lines["read_bytes"]),
+            "storage_written": int(lines["write_bytes"]) - int(lines["cancelled_write_bytes"]),
+            "storage_dirtied": int(lines["write_bytes"]), "call_read": int(lines["rchar"]),
+            "call_written": int(lines["wchar"])}
 
 
 def run(*command, accept=(0,)):
-    """Seconds (wall, processor), peak memory (ru_maxrss, mapped pages of files included), input and output of one command, and what it printed.
+    """Seconds (wall, processor), peak memory (ru_maxrss, mapped pages of files included), input and
+    output of one command, and what it printed.
 
     What other programs have left to write is written first."""
     command = [str(c) for c in command]
@@ -50,8 +59,10 @@ def run(*command, accept=(0,)):
         printed, problem = out.read(), err.read().strip()
     if process.returncode not in accept:
         lines = problem.splitlines()
-        raise Failed(f"{pathlib.Path(command[0]).name} {command[1]}: {lines[-1] if lines else 'ended with ' + str(process.returncode)}")
-    return {"wall": wall, "cpu": usage.ru_utime + usage.ru_stime, "system": usage.ru_stime, "peak": usage.ru_maxrss * 1024, "major_faults": usage.ru_majflt,
+        raise Failed(f"{pathlib.Path(command[0]).name} {command[1]}: "
+                     f"{lines[-1] if lines else 'ended with ' + str(process.returncode)}")
+    return {"wall": wall, "cpu": usage.ru_utime + usage.ru_stime, "system": usage.ru_stime,
+            "peak": usage.ru_maxrss * 1024, "major_faults": usage.ru_majflt,
             **io, "printed": printed, "code": process.returncode}
 
 
@@ -64,6 +75,8 @@ def run_json(*command, accept=(0,)):
 
 def machine():
     """Processor, cores, memory and storage in words, without names of this machine."""
-    model = next((line.split(":", 1)[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")), "unknown processor")
+    model = next((line.split(":", 1)[1].strip() for line in open("/proc/cpuinfo")
+                  if line.startswith("model name")), "unknown processor")
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    return f"{model}, {len(os.sched_getaffinity(0))} cores, {memory / 2**30:.0f} GiB of memory, Linux {os.uname().release.split('-')[0]}"
+    return (f"{model}, {len(os.sched_getaffinity(0))} cores, {memory / 2**30:.0f} GiB of memory, "
+            f"Linux {os.uname().release.split('-')[0]}")

@@ -1,8 +1,10 @@
-"""Adds up the stacks of `perf script -F tid,ip,sym,dso`, from standard input; tests/bench/profile.sh runs it.
+"""Adds up the stacks of `perf script -F tid,ip,sym,dso`, from standard input;
+tests/bench/profile.sh runs it.
 
     profile_stacks.py BUILD_DIR CONVERT.json
 
-A stage is what the program gives to its threads (the function that ebpo_parallel_for calls), or, of what runs on one thread only, the library function that the command called and the one below that.
+A stage is what the program gives to its threads (the function that ebpo_parallel_for calls), or, of
+what runs on one thread only, the library function that the command called and the one below that.
 """
 import bisect
 import collections
@@ -19,15 +21,18 @@ OUTSIDE = "outside of the library"
 
 
 class Symbols:
-    """Functions of our own binaries: name and source file by address. Names alone will not do: many files have a function called `work`."""
+    """Functions of our own binaries: name and source file by address. Names alone will not do: many
+    files have a function called `work`."""
     def __init__(self, path):
         found = {}
-        for line in subprocess.run(["nm", "-l", "--defined-only", path], check=True, capture_output=True, text=True).stdout.splitlines():
+        for line in subprocess.run(["nm", "-l", "--defined-only", path], check=True,
+                                   capture_output=True, text=True).stdout.splitlines():
             symbol, _, place = line.partition("\t")
             address, kind, name = symbol.split(" ", 2)
             if kind in "tT":
                 source = re.search(r"((?:lib|tools)/[^:]*):\d+$", place)
-                found[int(address, 16)] = (re.sub(r"\.(?:constprop|isra|part|cold|lto_priv).*", "", name), source[1] if source else os.path.basename(path))
+                found[int(address, 16)] = (re.sub(r"\.(?:constprop|isra|part|cold|lto_priv).*", "",
+                                                  name), source[1] if source else os.path.basename(path))
         self.addresses, self.functions = sorted(found), found
 
     def at(self, address):
@@ -37,14 +42,16 @@ class Symbols:
 
 def stacks():
     """Lists of (function, file), the innermost first."""
-    own = {name: Symbols(f"{BUILD}/{path}") for name, path in [("libebpo.so", "lib/libebpo.so"), ("ebpo", "tools/ebpo")]}
+    own = {name: Symbols(f"{BUILD}/{path}") for name, path in [("libebpo.so", "lib/libebpo.so"),
+                                                               ("ebpo", "tools/ebpo")]}
     stack = []
     for line in sys.stdin:
         found = FRAME.match(line)
         if found:
             base = re.sub(r"\.so\..*", ".so", os.path.basename(found[3]))
             known = own[base].at(int(found[1], 16)) if base in own else None
-            stack.append(known or (found[2], "[kernel]" if base.startswith("[kernel") else f"[{base}]"))
+            stack.append(known or (found[2], "[kernel]" if base.startswith("[kernel")
+                                   else f"[{base}]"))
         elif stack:
             yield stack
             stack = []
@@ -64,7 +71,8 @@ def stage_of(stack):
     ours = [f for f in reversed(stack) if f[1].startswith("lib/")]
     if not ours:
         return OUTSIDE, []
-    return " > ".join(f[0] for f in ours[:2]) + f" ({ours[min(1, len(ours) - 1)][1]}), one thread", stack
+    return " > ".join(f[0]
+                      for f in ours[:2]) + f" ({ours[min(1, len(ours) - 1)][1]}), one thread", stack
 
 
 def table(title, counter, total, names, most):
@@ -90,10 +98,13 @@ def main():
         sys.exit("profile_stacks.py: no samples")
     with open(CONVERTED) as f:
         facts = json.load(f)
-    print(f"# Where building spends its time\n\n{facts['source']['name']}, {facts['faces']:,} faces, {facts['seconds']:.1f} s; {total:,} samples of processor time, of all threads. Percent of these.")
+    print(f"# Where building spends its time\n\n{facts['source']['name']}, {facts['faces']:,} "
+          f"faces, {facts['seconds']:.1f} s; {total:,} samples of processor time, of all threads. "
+          f"Percent of these.")
     table("By stage", stages, total, ["stage"], 20)
     for stage in [name for name, _ in stages.most_common(4) if name != OUTSIDE]:
-        table(f"Within {stage}: with all that they call", within[stage], total, ["function", "file"], TOP_OF_STAGE)
+        table(f"Within {stage}: with all that they call", within[stage], total,
+              ["function", "file"], TOP_OF_STAGE)
     table("By source file: its own", by_file, total, ["file"], TOP)
     table("By function: its own", by_function, total, ["function", "file"], TOP)
     table("By function: with all that it calls", inclusive, total, ["function", "file"], TOP)

@@ -1,9 +1,11 @@
 #!/bin/sh
-# Remakes docs/pictures/report-dragon.png and report-stiff.png: the pages of `ebpo report` for a dragon and for a shell whose wall is thinner than any cell.
+# Remakes docs/pictures/report-dragon.png and report-stiff.png: the pages of `ebpo report` for a
+# dragon and for a shell whose wall is thinner than any cell.
 #
 #     tests/bench/report_pictures.sh BUILD_DIR MODELS_DIR [FOLDER]
 #
-# MODELS_DIR holds dragon100k.ply; the reports stay in FOLDER (default: report-pictures in BUILD_DIR). Needs chromium and python3.
+# MODELS_DIR holds dragon100k.ply; the reports stay in FOLDER (default: report-pictures in
+# BUILD_DIR). Needs chromium and python3.
 set -eu
 build=$1 models=$2 folder=${3:-$1/report-pictures}
 root=$(cd "$(dirname "$0")/../.." && pwd)
@@ -20,7 +22,8 @@ AROUND, ACROSS, WALL = 120, 60, 5e-4
 
 def torus(radius, first, turn):
     points = [((1 + radius * math.cos(b)) * math.cos(a), radius * math.sin(b), (1 + radius * math.cos(b)) * math.sin(a))
-              for a in (2 * math.pi * i / AROUND for i in range(AROUND)) for b in (2 * math.pi * k / ACROSS for k in range(ACROSS))]
+              for a in (2 * math.pi * i / AROUND for i in range(AROUND))
+              for b in (2 * math.pi * k / ACROSS for k in range(ACROSS))]
     faces = []
     for i in range(AROUND):
         for k in range(ACROSS):
@@ -33,17 +36,20 @@ def torus(radius, first, turn):
 outer, inner = torus(0.4, 0, 1), torus(0.4 - WALL, AROUND * ACROSS, -1)
 points, faces = outer[0] + inner[0], outer[1] + inner[1]
 with open(sys.argv[1], "w", encoding="ascii") as f:
-    f.write(f"ply\nformat ascii 1.0\nelement vertex {len(points)}\nproperty double x\nproperty double y\nproperty double z\n"
+    f.write(f"ply\nformat ascii 1.0\nelement vertex {len(points)}\n"
+            "property double x\nproperty double y\nproperty double z\n"
             f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n")
     f.writelines("%.17g %.17g %.17g\n" % p for p in points)
     f.writelines("3 %d %d %d\n" % t for t in faces)
 PYTHON
 
 page() { # NAME PICTURE
-    chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --window-size=1320,4150 --screenshot="$root/docs/pictures/$2" "file://$(realpath "$folder/$1/report.html")"
+    chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --window-size=1320,4150 \
+        --screenshot="$root/docs/pictures/$2" "file://$(realpath "$folder/$1/report.html")"
 }
 
 "$build/tools/ebpo" report --select $methods --need -o "$folder/dragon" "$models/dragon100k.ply"
-"$build/tools/ebpo" report --select $methods --points 2000 --view 30,35 -o "$folder/stiff" "$folder/thin_shell.ply"
+"$build/tools/ebpo" report --select $methods --points 2000 --view 30,35 -o "$folder/stiff" \
+    "$folder/thin_shell.ply"
 page dragon report-dragon.png
 page stiff report-stiff.png

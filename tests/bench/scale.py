@@ -1,10 +1,15 @@
 #!/usr/bin/env python3
-"""Remakes docs/measured/scale.md: generated scan-like models of growing size, built, verified, decoded, opened and asked within a budget of memory, beside Embree and CGAL.
+"""Remakes docs/measured/scale.md: generated scan-like models of growing size, built, verified,
+decoded, opened and asked within a budget of memory, beside Embree and CGAL.
 
-    tests/bench/scale.py BUILD_DIR [--sizes 0.1,1,8,28] [--memory 1G] [--rounds N] -o docs/measured/scale.md [--json FILE]
+    tests/bench/scale.py BUILD_DIR [--sizes 0.1,1,8,28] [--memory 1G] [--rounds N] -o
+    docs/measured/scale.md [--json FILE]
 
-BUILD_DIR: a release build configured with -Dtests=enabled -Dpeers=enabled (tools/install-deps.sh --tests --bench installs what that needs). Models are made by ebpo-generate and kept in --work (28 million
-faces: 1 GB with all that is made of it, and as much for temporary files meanwhile). Run it on a machine that does nothing else; figures are medians of the rounds, in which the programs take turns.
+BUILD_DIR: a release build configured with -Dtests=enabled -Dpeers=enabled (tools/install-deps.sh
+--tests --bench installs what that needs). Models are made by ebpo-generate and kept in --work (28
+million faces: 1 GB with all that is made of it, and as much for temporary files meanwhile). Run it
+on a machine that does nothing else; figures are medians of the rounds, in which the programs take
+turns.
 """
 import argparse
 import json
@@ -21,7 +26,9 @@ from query import Page, figure, ratio
 BUDGET_OF_QUESTIONS = 256 * MIB
 OPENINGS = 5
 LARGE = 2000000  # faces from which on a third of the rounds is run
-GOALS = {"build_seconds": 150, "growth": 1.3, "first_levels": 1e6, "ratio_full": 0.60, "ratio_without_maps": 0.50, "decode": 300e6, "verify_times_build": 2, "first_answer": 0.050, "p999": 1e6}
+GOALS = {"build_seconds": 150, "growth": 1.3, "first_levels": 1e6, "ratio_full": 0.60,
+         "ratio_without_maps": 0.50, "decode": 300e6, "verify_times_build": 2,
+         "first_answer": 0.050, "p999": 1e6}
 
 
 class Scale:
@@ -32,7 +39,8 @@ class Scale:
         self.work = pathlib.Path(options.work or self.build / "bench-scale")
         self.work.mkdir(parents=True, exist_ok=True)
         self.load, self.problems = [], []
-        self.verify_options = ["--memory", options.memory, "--temp-dir", self.work] if "--memory" in measured.run(self.ebpo, "verify", "--help")["printed"] else []
+        self.verify_options = ["--memory", options.memory, "--temp-dir",
+                               self.work] if "--memory" in measured.run(self.ebpo, "verify", "--help")["printed"] else []
 
     def rounds(self, faces):
         return self.options.rounds if faces < LARGE else max(1, self.options.rounds // 3)
@@ -52,17 +60,20 @@ class Scale:
             return None
 
     def peer(self, name, ply):
-        return self.run(self.build / "tests" / "bench" / "peers" / f"peer_{name}", ply, "build", "--threads", 0, "--cold")
+        return self.run(self.build / "tests" / "bench" / "peers" / f"peer_{name}", ply, "build",
+                        "--threads", 0, "--cold")
 
 
 # ---- measuring ----
 
 def generate(scale, millions):
     target = scale.work / f"{scale.options.base}_{millions:g}m.ply"
-    command = ["ebpo-generate", "--base", scale.options.base, "--faces", str(round(millions * 1e6)), target.name]
+    command = ["ebpo-generate", "--base", scale.options.base, "--faces", str(round(millions * 1e6)),
+               target.name]
     made = None
     if not target.exists():
-        made = scale.run(scale.build / "samples" / "ebpo-generate", *command[1:-1], target, asks_json=False)
+        made = scale.run(scale.build / "samples" / "ebpo-generate", *command[1:-1], target,
+                         asks_json=False)
         if not made:
             sys.exit("scale.py: no model, no figures")
     return target, command, made
@@ -72,7 +83,9 @@ def build_all(scale, ply, file, faces):
     """Ours and the peers in turns, the PLY forgotten by the system before each."""
     runs = {"ebpo": [], "embree": [], "cgal": []}
     for _ in range(scale.rounds(faces)):
-        runs["ebpo"].append(scale.run(scale.ebpo, "convert", "--json", "-q", "--memory", scale.options.memory, "--temp-dir", scale.work, ply, file, cold=ply))
+        runs["ebpo"].append(scale.run(scale.ebpo, "convert", "--json", "-q", "--memory",
+                                      scale.options.memory, "--temp-dir", scale.work, ply, file,
+                                      cold=ply))
         for peer in "embree", "cgal":
             runs[peer].append(scale.peer(peer, ply))
     return {name: [r for r in some if r] for name, some in runs.items()}
@@ -84,20 +97,27 @@ def sizes_of(scale, file, bare, first):
     scale.run(scale.ebpo, "subset", "-q", "--parts", "-maps", file, bare, asks_json=False)
     scale.run(scale.ebpo, "subset", "-q", "--levels", "0-5", file, first, asks_json=False)
     last = info["levels"][min(5, len(info["levels"]) - 1)]
-    return {"info": info, "file": file.stat().st_size, "without_maps": bare.stat().st_size if bare.exists() else None,
-            "plain_ply": info["vertices"] * (24 if info["double_coordinates"] else 12) + info["faces"] * 13,
-            "first_levels": last["cumulative_bytes"], "first_levels_file": first.stat().st_size if first.exists() else None}
+    return {"info": info, "file": file.stat().st_size,
+            "without_maps": bare.stat().st_size if bare.exists() else None,
+            "plain_ply": info["vertices"] * (24 if info["double_coordinates"]
+                                             else 12) + info["faces"] * 13,
+            "first_levels": last["cumulative_bytes"],
+            "first_levels_file": first.stat().st_size if first.exists() else None}
 
 
 def ask(scale, file, query, count, *arguments, seed=1):
-    return scale.run(scale.ebpo, "bench", file, "--memory", BUDGET_OF_QUESTIONS, "--query", query, "--points", "path", "--count", count, "--seed", seed, "--json", *arguments)
+    return scale.run(scale.ebpo, "bench", file, "--memory", BUDGET_OF_QUESTIONS, "--query", query,
+                     "--points", "path", "--count", count, "--seed", seed, "--json", *arguments)
 
 
 def questions_of(scale, file):
-    """Opening with one question, near the surface so that something must be loaded for it, each time elsewhere; a path as fast as answers come, and at a haptic device's rate."""
+    """Opening with one question, near the surface so that something must be loaded for it, each
+    time elsewhere; a path as fast as answers come, and at a haptic device's rate."""
     o = scale.options
-    return {query: {"open": [ask(scale, file, query, 1, seed=seed) for seed in range(1, OPENINGS + 1)], "path": ask(scale, file, query, o.count, "--prefetch"),
-                    "rate": ask(scale, file, query, o.rate_count, "--prefetch", "--rate", 1000)} for query in ("inside", "distance")}
+    return {query: {"open": [ask(scale, file, query, 1, seed=seed)
+                             for seed in range(1, OPENINGS + 1)], "path": ask(scale, file, query, o.count, "--prefetch"),
+                    "rate": ask(scale, file, query, o.rate_count, "--prefetch", "--rate",
+                                1000)} for query in ("inside", "distance")}
 
 
 def study(scale, millions):
@@ -105,13 +125,16 @@ def study(scale, millions):
     file = ply.with_suffix(".ebpo.h5")
     others = [ply.with_suffix(f".{kind}.ebpo.h5") for kind in ("bare", "first")]
     faces = round(millions * 1e6)
-    result = {"millions": millions, "command": command, "made": made, "ply_bytes": ply.stat().st_size}
+    result = {"millions": millions, "command": command, "made": made,
+              "ply_bytes": ply.stat().st_size}
     result["builds"] = build_all(scale, ply, file, faces)
     if not result["builds"]["ebpo"]:
         return result
     result["sizes"] = sizes_of(scale, file, *others)
-    result["decode"] = scale.run(scale.build / "tests" / "bench" / "bench_decode", file, "--rounds", scale.options.rounds)
-    verified = [scale.run(scale.ebpo, "verify", "--json", *scale.verify_options, file, cold=file, accept=(0, 1)) for _ in range(scale.rounds(faces))]  # 1: with violations, which are told
+    result["decode"] = scale.run(scale.build / "tests" / "bench" / "bench_decode", file, "--rounds",
+                                 scale.options.rounds)
+    verified = [scale.run(scale.ebpo, "verify", "--json", *scale.verify_options, file, cold=file,
+                          accept=(0, 1)) for _ in range(scale.rounds(faces))]  # 1: with violations, which are told
     result["verify"] = [v for v in verified if v]
     result["questions"] = questions_of(scale, file)
     for path in others:
@@ -149,7 +172,8 @@ def built(result):
 
 
 def growth(results):
-    """Seconds a face of each model of a million faces or more: largest model by smallest, and the worst of all pairs (a larger model by a smaller one)."""
+    """Seconds a face of each model of a million faces or more: largest model by smallest, and the
+    worst of all pairs (a larger model by a smaller one)."""
     costs = [built(r) / faces_of(r) for r in results if faces_of(r) >= 0.9e6]
     if len(costs) < 2:
         return None, None
@@ -159,96 +183,153 @@ def growth(results):
 # ---- the page ----
 
 def section_models(page, results):
-    page.text("## Models", "", "Closed manifolds; that they meet themselves nowhere is proved for each before it is written ([how](../../samples/generate/embedded.h)). *Plain PLY*: 12 B a vertex and 13 B a "
+    page.text("## Models", "",
+              "Closed manifolds; that they meet themselves nowhere is proved for each before it "
+              "is written ([how](../../samples/generate/embedded.h)). *Plain PLY*: 12 B a vertex "
+              "and 13 B a "
               "face, binary, without its head of some 200 B.")
     page.table(["model", "faces", "vertices", "plain PLY MiB", "genus", "made by"],
-               [[f"{r['millions']:g} M", f"{faces_of(r):,}", f"{r['sizes']['info']['vertices']:,}", mib(r["sizes"]["plain_ply"]), r["sizes"]["info"]["report"]["genus"], f"`{shlex.join(r['command'])}`"]
+               [[f"{r['millions']:g} M", f"{faces_of(r):,}", f"{r['sizes']['info']['vertices']:,}",
+                 mib(r["sizes"]["plain_ply"]), r["sizes"]["info"]["report"]["genus"],
+                 f"`{shlex.join(r['command'])}`"]
                 for r in results])
 
 
 def section_build(page, results, memory):
-    page.text("## Building", "", f"`ebpo convert --memory {memory}`, the whole command from outside: reading the PLY, which the system has forgotten before, checking, building, compressing, fsync; on all "
-              "cores. *Peak*: the most that was resident (ru_maxrss), pages of mapped files included. *Read*, *written*: bytes from and to storage, as /proc/PID/io counts them for the process: the PLY, the "
-              "file, and temporary files both ways; what was written to temporary files and dropped before it reached the storage is in *dirtied* only.")
+    page.text("## Building", "",
+              f"`ebpo convert --memory {memory}`, the whole command from outside: reading the "
+              f"PLY, which the system has forgotten before, checking, building, compressing, "
+              f"fsync; on all "
+              "cores. *Peak*: the most that was resident (ru_maxrss), pages of mapped files "
+              "included. *Read*, *written*: bytes from and to storage, as /proc/PID/io counts "
+              "them for the process: the PLY, the "
+              "file, and temporary files both ways; what was written to temporary files and "
+              "dropped before it reached the storage is in *dirtied* only.")
     rows = []
     for r in results:
         ours, faces = r["builds"]["ebpo"], faces_of(r)
-        rows.append([f"{r['millions']:g} M", figure(built(r)), figure(middle(ours, "cpu")), f"{faces / built(r):,.0f}", figure(1e6 * built(r) / faces), mib(middle(ours, "peak")),
-                     figure(middle(ours, "peak") / faces), mib(middle(ours, "storage_read")), mib(middle(ours, "storage_written")), mib(middle(ours, "storage_dirtied")), len(ours)])
-    page.table(["model", "s", "CPU s", "faces/s", "us a face", "peak MiB", "peak B/face", "read MiB", "written MiB", "dirtied MiB", "rounds"], rows)
+        rows.append([f"{r['millions']:g} M", figure(built(r)), figure(middle(ours, "cpu")),
+                     f"{faces / built(r):,.0f}", figure(1e6 * built(r) / faces),
+                     mib(middle(ours, "peak")),
+                     figure(middle(ours, "peak") / faces), mib(middle(ours, "storage_read")),
+                     mib(middle(ours, "storage_written")), mib(middle(ours, "storage_dirtied")),
+                     len(ours)])
+    page.table(["model", "s", "CPU s", "faces/s", "us a face", "peak MiB", "peak B/face",
+                "read MiB", "written MiB", "dirtied MiB", "rounds"], rows)
     ends, worst = growth(results)
     if ends is not None:
-        page.text(f"Growth from a million faces on, in seconds a face: the largest model costs {ends:.2f} times what the smallest does; the worst of all pairs is {worst:.2f} (the goal: {GOALS['growth']}).")
+        page.text(f"Growth from a million faces on, in seconds a face: the largest model costs "
+                  f"{ends:.2f} times what the smallest does; the worst of all pairs is "
+                  f"{worst:.2f} (the goal: {GOALS['growth']}).")
 
 
 def section_stages(page, results):
-    page.text("### By stage", "", "Seconds, of the median run; stages under 1 % of every model are summed up as *others*.")
+    page.text("### By stage", "",
+              "Seconds, of the median run; stages under 1 % of every model are summed up as "
+              "*others*.")
     seconds = []
     for r in results:
         runs = sorted(r["builds"]["ebpo"], key=lambda run: run["wall"])
         seconds.append({s["stage"]: s["seconds"] for s in runs[len(runs) // 2]["report"]["stages"]})
     names = list(dict.fromkeys(name for found in seconds for name in found))
-    kept = [n for n in names if any(found.get(n, 0) >= sum(found.values()) / 100 for found in seconds)]
+    kept = [n for n in names if any(found.get(n, 0) >= sum(found.values()) / 100
+                                    for found in seconds)]
     for found in seconds:
-        found.update({"others": sum(t for n, t in found.items() if n not in kept), "all": sum(found.values())})
-    page.table(["stage"] + [f"{r['millions']:g} M" for r in results] + [f"% of {results[-1]['millions']:g} M"],
-               [[n] + [figure(found.get(n)) for found in seconds] + [figure(100 * seconds[-1].get(n, 0) / seconds[-1]["all"], 2)]
+        found.update({"others": sum(t for n, t in found.items() if n not in kept),
+                      "all": sum(found.values())})
+    page.table(["stage"] + [f"{r['millions']:g} M"
+                            for r in results] + [f"% of {results[-1]['millions']:g} M"],
+               [[n] + [figure(found.get(n))
+                       for found in seconds] + [figure(100 * seconds[-1].get(n, 0) / seconds[-1]["all"], 2)]
                 for n in kept + ["others", "all"]])
 
 
 def section_peers(page, results):
-    page.text("### Beside trees in memory", "", "In the same run, in turns: Embree 3's BVH (medium quality, robust, single precision, all cores) and CGAL's AABB tree (doubles, one core: it has no other way). *Load*: reading "
-              "the PLY, which the system has forgotten before; then the build alone. They answer from memory and store nothing; ours is a file, with levels of detail, verified structure and source numbers.")
+    page.text("### Beside trees in memory", "",
+              "In the same run, in turns: Embree 3's BVH (medium quality, robust, single "
+              "precision, all cores) and CGAL's AABB tree (doubles, one core: it has no other "
+              "way). *Load*: reading "
+              "the PLY, which the system has forgotten before; then the build alone. They answer "
+              "from memory and store nothing; ours is a file, with levels of detail, verified "
+              "structure and source numbers.")
     rows = []
     for r in results:
         row = [f"{r['millions']:g} M", figure(built(r)), mib(middle(r["builds"]["ebpo"], "peak"))]
         for peer in "embree", "cgal":
             runs = r["builds"][peer]
             took = [middle(runs, "report", key) for key in ("load_s", "build_s")]
-            row += [figure(took[0]), figure(took[1]), mib(middle(runs, "peak")), ratio(built(r), middle(runs, "wall"))]
+            row += [figure(took[0]), figure(took[1]), mib(middle(runs, "peak")),
+                    ratio(built(r), middle(runs, "wall"))]
         rows.append(row)
-    page.table(["model", "ours s", "peak MiB", "Embree load s", "build s", "peak MiB", "ours / Embree, whole", "CGAL load s", "build s", "peak MiB", "ours / CGAL, whole"], rows)
+    page.table(["model", "ours s", "peak MiB", "Embree load s", "build s", "peak MiB",
+                "ours / Embree, whole", "CGAL load s", "build s", "peak MiB",
+                "ours / CGAL, whole"], rows)
 
 
 def section_size(page, results):
-    page.text("## Size", "", "Files as they are on the disk. *Without maps*: `ebpo subset --parts -maps`. *Levels 0 to 5*: the file's first bytes up to the end of level 5; and as a file of their own "
+    page.text("## Size", "",
+              "Files as they are on the disk. *Without maps*: `ebpo subset --parts -maps`. "
+              "*Levels 0 to 5*: the file's first bytes up to the end of level 5; and as a file of "
+              "their own "
               "(`ebpo subset --levels 0-5`).")
     rows = []
     for r in results:
         s, faces = r["sizes"], faces_of(r)
         b = s["info"]["bytes"]
-        rows.append([f"{r['millions']:g} M", mib(s["file"]), f"{s['file'] / faces:.3f}", f"{s['file'] / s['plain_ply']:.3f}", mib(s["without_maps"]), figure(divided(s["without_maps"], s["plain_ply"]))]
-                    + [f"{b[part] / faces:.2f}" for part in ("vertices", "faces", "levels", "maps")] + [f"{s['first_levels']:,}", f"{s['first_levels_file']:,}" if s["first_levels_file"] else "-"])
-    page.table(["model", "file MiB", "B/face", "of plain PLY", "without maps MiB", "of plain PLY", "vertices B/face", "faces", "lists, tree, planes", "maps", "levels 0 to 5, bytes", "as a file"], rows)
+        rows.append([f"{r['millions']:g} M", mib(s["file"]), f"{s['file'] / faces:.3f}",
+                     f"{s['file'] / s['plain_ply']:.3f}", mib(s["without_maps"]),
+                     figure(divided(s["without_maps"], s["plain_ply"]))]
+                    + [f"{b[part] / faces:.2f}"
+                       for part in ("vertices", "faces", "levels",
+                                    "maps")] + [f"{s['first_levels']:,}",
+                                                f"{s['first_levels_file']:,}"
+                                                if s["first_levels_file"] else "-"])
+    page.table(["model", "file MiB", "B/face", "of plain PLY", "without maps MiB", "of plain PLY",
+                "vertices B/face", "faces", "lists, tree, planes", "maps", "levels 0 to 5, bytes",
+                "as a file"], rows)
 
 
 def section_decode(page, results):
-    page.text("### Decoding", "", "All of a file, checks included, on one core, from the system's memory: `tests/bench/bench_decode FILE` of BUILD_DIR. Bytes are those of the arrays that a reader gets.")
+    page.text("### Decoding", "",
+              "All of a file, checks included, on one core, from the system's memory: "
+              "`tests/bench/bench_decode FILE` of BUILD_DIR. Bytes are those of the arrays that a "
+              "reader gets.")
     rows = []
     for r in results:
         if r["decode"]:
             report = r["decode"]["report"]
-            rows.append([f"{r['millions']:g} M", mib(report["decoded_bytes"]), figure(report["seconds"]), figure(report["decoded_bytes_per_second"] / 1e6)]
-                        + [figure(p["decoded_bytes"] / p["seconds"] / 1e6) if p["seconds"] > 1e-5 else "-" for p in report["parts"]])
+            rows.append([f"{r['millions']:g} M", mib(report["decoded_bytes"]),
+                         figure(report["seconds"]),
+                         figure(report["decoded_bytes_per_second"] / 1e6)]
+                        + [figure(p["decoded_bytes"] / p["seconds"] / 1e6) if p["seconds"] > 1e-5
+                           else "-" for p in report["parts"]])
     page.table(["model", "decoded MiB", "s", "10^6 B/s", "of it levels", "mesh", "maps"], rows)
 
 
 def section_verify(page, scale, results):
     options = shlex.join(str(o) for o in scale.verify_options[:2])
-    page.text("## Verifying", "", f"`ebpo verify {options}`".replace(" `", "`") + ", the whole command from outside, the file forgotten by the system before; all cores."
-              + ("" if scale.verify_options else " This version of `verify` takes no budget of memory."))
+    page.text("## Verifying", "", f"`ebpo verify {options}`".replace(" `", "`")
+              + ", the whole command from outside, the file forgotten by the system before; all "
+                "cores."
+              + ("" if scale.verify_options
+                 else " This version of `verify` takes no budget of memory."))
     rows = []
     for r in results:
         runs = r["verify"]
         if runs:
             report = runs[0]["report"]
-            rows.append([f"{r['millions']:g} M", figure(middle(runs, "wall")), figure(middle(runs, "cpu")), ratio(middle(runs, "wall"), built(r)), mib(middle(runs, "peak")),
-                         mib(middle(runs, "storage_read")), mib(middle(runs, "storage_dirtied")), f"{report['checks']:,}", report["violations"]])
-    page.table(["model", "s", "CPU s", "times the build", "peak MiB", "read MiB", "dirtied MiB", "checks", "violations"], rows)
+            rows.append([f"{r['millions']:g} M", figure(middle(runs, "wall")),
+                         figure(middle(runs, "cpu")), ratio(middle(runs, "wall"), built(r)),
+                         mib(middle(runs, "peak")),
+                         mib(middle(runs, "storage_read")), mib(middle(runs, "storage_dirtied")),
+                         f"{report['checks']:,}", report["violations"]])
+    page.table(["model", "s", "CPU s", "times the build", "peak MiB", "read MiB", "dirtied MiB",
+                "checks", "violations"], rows)
 
 
 def with_longest(seconds):
-    return f"{figure(1e3 * statistics.median(seconds))} / {figure(1e3 * max(seconds))}" if seconds else "-"
+    return (f"{figure(1e3 * statistics.median(seconds))} / {figure(1e3 * max(seconds))}" if seconds
+            else "-")
 
 
 def warm_answer(report):
@@ -260,16 +341,30 @@ def opening_row(r, query):
     runs = r["questions"][query]["open"]
     reports = [run["report"] for run in runs if run]
     held = middle(runs, "report", "cold_share_still_held")
-    return [f"{r['millions']:g} M", query, with_longest([warm_answer(f) for f in reports])] + [with_longest([f[key] for f in reports]) for key in ("cold_open_seconds", "cold_first_answer_seconds")] \
-        + [mib(middle(runs, "report", "cold_bytes_read"), 3), figure(None if held is None else 100 * held), mib(middle(runs, "report", "model", "memory"), 3)]
+    return [f"{r['millions']:g} M", query,
+            with_longest([warm_answer(f)
+                          for f in reports])] + [with_longest([f[key] for f in reports])
+                                                 for key in ("cold_open_seconds",
+                                                             "cold_first_answer_seconds")] \
+        + [mib(middle(runs, "report", "cold_bytes_read"), 3),
+           figure(None if held is None else 100 * held),
+           mib(middle(runs, "report", "model", "memory"), 3)]
 
 
 def section_questions(page, results, options):
-    page.text("## Opening and asking", "", f"With a budget of {BUDGET_OF_QUESTIONS // MIB} MiB for the model, its levels down to the cut level in memory (`ebpo bench --memory {BUDGET_OF_QUESTIONS}`). From opening to the first exact answer, "
-              f"about a point near the surface, ms: median of {OPENINGS} points, and the longest; *cold*: the system was asked to forget the file, and still held so much of it. On all cores.")
-    page.table(["model", "question", "warm: first answer", "cold: open", "cold: first answer", "cold: MiB read", "still held %", "model MiB"],
+    page.text("## Opening and asking", "",
+              f"With a budget of {BUDGET_OF_QUESTIONS // MIB} MiB for the model, its levels down "
+              f"to the cut level in memory (`ebpo bench --memory {BUDGET_OF_QUESTIONS}`). From "
+              f"opening to the first exact answer, "
+              f"about a point near the surface, ms: median of {OPENINGS} points, and the longest; "
+              f"*cold*: the system was asked to forget the file, and still held so much of it. On "
+              f"all cores.")
+    page.table(["model", "question", "warm: first answer", "cold: open", "cold: first answer",
+                "cold: MiB read", "still held %", "model MiB"],
                [opening_row(r, query) for r in results for query in ("inside", "distance")])
-    page.text(f"A continuous path along the surface, prefetching, us for one question: {options.count:,} as fast as the answers come, and {options.rate_count:,} at 1,000 a second, as a haptic device asks.")
+    page.text(f"A continuous path along the surface, prefetching, us for one question: "
+              f"{options.count:,} as fast as the answers come, and {options.rate_count:,} at "
+              f"1,000 a second, as a haptic device asks.")
     rows = []
     for r in results:
         for query in "inside", "distance":
@@ -277,13 +372,19 @@ def section_questions(page, results, options):
                 run = r["questions"][query][kind]
                 if run:
                     ns, model = run["report"]["ns"], run["report"]["model"]
-                    rows.append([f"{r['millions']:g} M", query, words] + [figure(ns[q] / 1000) for q in ("mean", "p50", "p99", "p999", "max")] + [f"{model['loads']:,}", mib(model["memory_peak"], 3)])
-    page.table(["model", "question", "asked", "mean", "p50", "p99", "p99.9", "max", "subtrees loaded", "peak of the model MiB"], rows)
+                    rows.append([f"{r['millions']:g} M", query,
+                                 words] + [figure(ns[q] / 1000)
+                                           for q in ("mean", "p50", "p99", "p999",
+                                                     "max")] + [f"{model['loads']:,}",
+                                                                mib(model["memory_peak"], 3)])
+    page.table(["model", "question", "asked", "mean", "p50", "p99", "p99.9", "max",
+                "subtrees loaded", "peak of the model MiB"], rows)
 
 
 def bytes_of(size):
     """Of a size as `ebpo convert --memory` takes it."""
-    return int(size.rstrip("KMGTkmgt")) << 10 * " KMGT".index(size[-1].upper() if size[-1].isalpha() else " ")
+    return int(size.rstrip("KMGTkmgt")) << 10 * " KMGT".index(size[-1].upper() if size[-1].isalpha()
+                                                              else " ")
 
 
 def section_goals(page, scale, results):
@@ -291,29 +392,51 @@ def section_goals(page, scale, results):
     r = results[-1]
     s, questions = r["sizes"], r["questions"]
     first = [run["report"] for query in questions.values() for run in query["open"] if run]
-    tails = {kind: max((query[kind]["report"]["ns"]["p999"] for query in questions.values() if query[kind]), default=None) for kind in ("path", "rate")}
+    tails = {kind: max((query[kind]["report"]["ns"]["p999"] for query in questions.values()
+                        if query[kind]), default=None) for kind in ("path", "rate")}
     budget = bytes_of(scale.options.memory)
     _, worst = growth(results)
-    checks = [("build, s", built(r), GOALS["build_seconds"], "most"), ("build, peak MiB", max(run["peak"] for run in r["builds"]["ebpo"]) / MIB, budget / MIB, "most"), ("growth, worst pair", worst, GOALS["growth"], "most"), ("of plain PLY", s["file"] / s["plain_ply"], GOALS["ratio_full"], "most"),
-              ("of plain PLY, without maps", divided(s["without_maps"], s["plain_ply"]), GOALS["ratio_without_maps"], "most"), ("levels 0 to 5, bytes", s["first_levels"], GOALS["first_levels"], "most"),
-              ("decoding, 10^6 B/s a core", r["decode"] and r["decode"]["report"]["decoded_bytes_per_second"] / 1e6, GOALS["decode"] / 1e6, "least"),
-              ("verifying, times the build", divided(middle(r["verify"], "wall"), built(r)), GOALS["verify_times_build"], "most"),
-              ("verifying, peak MiB", divided(max((run["peak"] for run in r["verify"]), default=None), MIB), budget / MIB, "most"),
-              ("violations", r["verify"][0]["report"]["violations"] if r["verify"] else None, 0, "most"),
-              ("first answer warm, ms", max((warm_answer(f) for f in first), default=None), GOALS["first_answer"], "most"),
-              ("first answer cold, ms", max((f["cold_first_answer_seconds"] for f in first), default=None), GOALS["first_answer"], "most"),
-              ("p99.9 of a path at once, us", tails["path"], GOALS["p999"], "most"), ("p99.9 of a path at 1,000 Hz, us", tails["rate"], GOALS["p999"], "most")]
+    checks = [("build, s", built(r), GOALS["build_seconds"], "most"),
+              ("build, peak MiB", max(run["peak"] for run in r["builds"]["ebpo"]) / MIB,
+               budget / MIB, "most"), ("growth, worst pair", worst, GOALS["growth"],
+                                       "most"), ("of plain PLY", s["file"] / s["plain_ply"],
+                                                 GOALS["ratio_full"], "most"),
+              ("of plain PLY, without maps", divided(s["without_maps"], s["plain_ply"]),
+               GOALS["ratio_without_maps"], "most"), ("levels 0 to 5, bytes", s["first_levels"],
+                                                      GOALS["first_levels"], "most"),
+              ("decoding, 10^6 B/s a core", r["decode"]
+               and r["decode"]["report"]["decoded_bytes_per_second"] / 1e6, GOALS["decode"] / 1e6,
+               "least"),
+              ("verifying, times the build", divided(middle(r["verify"], "wall"), built(r)),
+               GOALS["verify_times_build"], "most"),
+              ("verifying, peak MiB",
+               divided(max((run["peak"] for run in r["verify"]), default=None), MIB), budget / MIB,
+               "most"),
+              ("violations", r["verify"][0]["report"]["violations"] if r["verify"] else None, 0,
+               "most"),
+              ("first answer warm, ms", max((warm_answer(f) for f in first), default=None),
+               GOALS["first_answer"], "most"),
+              ("first answer cold, ms",
+               max((f["cold_first_answer_seconds"] for f in first), default=None),
+               GOALS["first_answer"], "most"),
+              ("p99.9 of a path at once, us", tails["path"], GOALS["p999"], "most"),
+              ("p99.9 of a path at 1,000 Hz, us", tails["rate"], GOALS["p999"], "most")]
     rows = []
     for name, value, goal, side in checks:
         unit = 1e3 if name.endswith("ms") else 1e-3 if name.endswith("us") else 1
-        met = "-" if value is None else "yes" if (value <= goal if side == "most" else value >= goal) else "no"
-        rows.append([name, figure(value if value is None else value * unit), f"at {side} {figure(goal * unit)}", met])
-    page.text(f"## {r['millions']:g} million faces and the goals", "", "First answers, tails and peaks: the worst of all; the rest as in the tables below. All are of the largest model, but for the growth.")
+        met = ("-" if value is None else "yes"
+               if (value <= goal if side == "most" else value >= goal) else "no")
+        rows.append([name, figure(value if value is None else value * unit),
+                     f"at {side} {figure(goal * unit)}", met])
+    page.text(f"## {r['millions']:g} million faces and the goals", "",
+              "First answers, tails and peaks: the worst of all; the rest as in the tables below. "
+              "All are of the largest model, but for the growth.")
     page.table(["what", "measured", "goal", "met"], rows)
 
 
 def command_line(options):
-    words = ["tests/bench/scale.py", "BUILD_DIR", "--sizes", options.sizes, "--memory", options.memory, "--rounds", str(options.rounds)]
+    words = ["tests/bench/scale.py", "BUILD_DIR", "--sizes", options.sizes, "--memory",
+             options.memory, "--rounds", str(options.rounds)]
     words += ["--base", options.base] if options.base != "torus" else []
     return shlex.join(words + ["-o", "docs/measured/scale.md"])
 
@@ -321,8 +444,12 @@ def command_line(options):
 def write(scale, results):
     options, page = scale.options, Page()
     results = [r for r in results if "sizes" in r]
-    page.text("# Scale", "", f"Made by `{command_line(options)}`; nothing here was typed in but the goals, which the script names. {measured.machine()}. Medians of {options.rounds} rounds (a third of that from {LARGE:,} faces on) in "
-              f"which the programs take turns; load average of the machine meanwhile {statistics.median(scale.load):.1f} (median), {max(scale.load):.1f} (most).")
+    page.text("# Scale", "",
+              f"Made by `{command_line(options)}`; nothing here was typed in but the goals, which "
+              f"the script names. {measured.machine()}. Medians of {options.rounds} rounds (a "
+              f"third of that from {LARGE:,} faces on) in "
+              f"which the programs take turns; load average of the machine meanwhile "
+              f"{statistics.median(scale.load):.1f} (median), {max(scale.load):.1f} (most).")
     if results:
         section_goals(page, scale, results)
         section_models(page, results)
@@ -334,7 +461,9 @@ def write(scale, results):
         section_verify(page, scale, results)
         section_questions(page, results, options)
     if scale.problems:
-        page.text("## What failed", "", *[f"- {p.replace(str(scale.work), 'WORK')}" for p in dict.fromkeys(scale.problems)])
+        page.text("## What failed", "",
+                  *[f"- {p.replace(str(scale.work), 'WORK')}"
+                    for p in dict.fromkeys(scale.problems)])
     pathlib.Path(options.output).write_text("\n".join(page.lines).rstrip("\n") + "\n")
 
 
@@ -343,13 +472,20 @@ def write(scale, results):
 def parse():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("build", metavar="BUILD_DIR")
-    parser.add_argument("--sizes", default="0.1,1,8,28", help="millions of faces (default 0.1,1,8,28)")
-    parser.add_argument("--base", default="torus", choices=["torus", "sphere"], help="what ebpo-generate begins with; a sphere has 20 times a power of four faces (default torus)")
+    parser.add_argument("--sizes", default="0.1,1,8,28",
+                        help="millions of faces (default 0.1,1,8,28)")
+    parser.add_argument("--base", default="torus", choices=["torus", "sphere"],
+                        help="what ebpo-generate begins with; a sphere has 20 times a power of "
+                             "four faces (default torus)")
     parser.add_argument("--memory", default="1G", help="budget of convert and verify (default 1G)")
-    parser.add_argument("--rounds", type=int, default=3, help="of models below two million faces; larger ones: a third (default 3)")
-    parser.add_argument("--count", type=int, default=1000000, help="questions along a path (default 1,000,000)")
-    parser.add_argument("--rate-count", type=int, default=20000, help="of them, at 1,000 a second (default 20,000)")
-    parser.add_argument("--work", metavar="DIR", help="where models and temporary files are (default BUILD_DIR/bench-scale)")
+    parser.add_argument("--rounds", type=int, default=3,
+                        help="of models below two million faces; larger ones: a third (default 3)")
+    parser.add_argument("--count", type=int, default=1000000,
+                        help="questions along a path (default 1,000,000)")
+    parser.add_argument("--rate-count", type=int, default=20000,
+                        help="of them, at 1,000 a second (default 20,000)")
+    parser.add_argument("--work", metavar="DIR",
+                        help="where models and temporary files are (default BUILD_DIR/bench-scale)")
     parser.add_argument("--json", metavar="FILE", help="all figures of all runs")
     parser.add_argument("-v", "--verbose", action="store_true", help="print the commands")
     parser.add_argument("-o", "--output", required=True)
@@ -363,7 +499,10 @@ def main():
         results.append(study(scale, millions))
         write(scale, results)  # the page is whole after each
         if options.json:
-            pathlib.Path(options.json).write_text(json.dumps({"machine": measured.machine(), "load": scale.load, "problems": scale.problems, "results": results}, indent=1, default=str) + "\n")
+            pathlib.Path(options.json).write_text(json.dumps({"machine": measured.machine(),
+                                                              "load": scale.load,
+                                                              "problems": scale.problems,
+                                                              "results": results}, indent=1, default=str) + "\n")
 
 
 if __name__ == "__main__":

@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
 """What a view-dependent order saves: tests/bench/view.py EBPO FILE.ebpo.h5 [MILLISECONDS]
 
-For three views of a model (all of it, an eighth of the angle, from ten times as far) prints the bytes of the file that are read until no visible node is larger than so many pixels,
-beside those of whole levels; how coarse the picture is after so many bytes, by order; and, with a server on this machine that waits MILLISECONDS (default 50) before each answer,
-requests and seconds waited for them. Bytes, nodes and pixels are the same on every machine.
+For three views of a model (all of it, an eighth of the angle, from ten times as far) prints the
+bytes of the file that are read until no visible node is larger than so many pixels, beside those of
+whole levels; how coarse the picture is after so many bytes, by order; and, with a server on this
+machine that waits MILLISECONDS (default 50) before each answer, requests and seconds waited for
+them. Bytes, nodes and pixels are the same on every machine.
 """
 import http.server
 import json
@@ -20,7 +22,8 @@ ORDERS = ["level", "distance", "pixels", "front-to-back"]
 
 
 def run(*arguments):
-    return json.loads(subprocess.run([EBPO, *arguments, "--json"], check=True, capture_output=True, text=True).stdout)
+    return json.loads(subprocess.run([EBPO, *arguments, "--json"], check=True, capture_output=True,
+                                     text=True).stdout)
 
 
 def row(*cells):
@@ -40,16 +43,19 @@ def views():
     def view(away, up, fov):
         eye = [middle[0], middle[1] + 0.25 * away * side, middle[2] + away * side]
         look = [middle[0], middle[1] + up * side, middle[2]]
-        return ["--eye=" + ",".join(map(repr, eye)), "--look=" + ",".join(map(repr, look)), "--fov", str(fov), "--size", "1280x960"]
+        return ["--eye=" + ",".join(map(repr, eye)), "--look=" + ",".join(map(repr, look)), "--fov",
+                str(fov), "--size", "1280x960"]
 
-    return {"all of it": view(1.6, 0, 40), "an eighth of the angle": view(1.6, 0.25, 5), "ten times as far": view(16, 0, 40)}
+    return {"all of it": view(1.6, 0, 40), "an eighth of the angle": view(1.6, 0.25, 5),
+            "ten times as far": view(16, 0, 40)}
 
 
 def deepest(view, pixels):
     """The level that has to be there as a whole for this view."""
     for level in range(1, 21):
         try:
-            last = run("view", FILE, *view, "--seen-only", "--order", "level", "--to", str(level))["last"]
+            last = run("view", FILE, *view, "--seen-only", "--order", "level", "--to",
+                       str(level))["last"]
         except subprocess.CalledProcessError:
             return level - 1
         if last["pixels"] <= pixels:
@@ -70,7 +76,8 @@ class Slow(http.server.BaseHTTPRequestHandler):
             f.seek(begin)
             body = f.read(last + 1 - begin)
         self.send_response(206)
-        for name, value in (("Content-Range", f"bytes {begin}-{last}/{size}"), ("Content-Length", len(body)), ("ETag", '"1"')):
+        for name, value in (("Content-Range", f"bytes {begin}-{last}/{size}"),
+                            ("Content-Length", len(body)), ("ETag", '"1"')):
             self.send_header(name, str(value))
         self.end_headers()
         self.wfile.write(body)
@@ -88,12 +95,14 @@ def main():
             level = deepest(view, pixels)
             whole = run("view", FILE, "--to", str(level))["last"]
             levels = run("levels", FILE, "--to", str(level), "--stats")["traffic"]["bytes_read"]
-            row(name, pixels, f"{last['nodes']:,}", f"{last['bytes_read']:,}", f"0 to {level}", f"{whole['nodes']:,}", f"{whole['bytes_read']:,}", f"{levels:,}")
+            row(name, pixels, f"{last['nodes']:,}", f"{last['bytes_read']:,}", f"0 to {level}",
+                f"{whole['nodes']:,}", f"{whole['bytes_read']:,}", f"{levels:,}")
     print("\nLargest visible node, in pixels, after so many bytes (nodes in parentheses):\n")
     head("view", "bytes", *ORDERS)
     for name, view in views().items():
         for size in ("512K", "1M", "2M", "4M"):
-            lasts = [run("view", FILE, *view, "--order", order, "--bytes", size)["last"] for order in ORDERS]
+            lasts = [run("view", FILE, *view, "--order", order, "--bytes", size)["last"]
+                     for order in ORDERS]
             row(name, size, *(f"{last['pixels']:.3g} ({last['nodes']:,})" for last in lasts))
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Slow)
     threading.Thread(target=server.serve_forever, daemon=True).start()
@@ -102,8 +111,10 @@ def main():
     head("view", "order", "requests", "bytes", "s waited")
     for name, view in views().items():
         for order in ORDERS:
-            traffic = run("view", url, *view, "--seen-only", "--pixels", "4", "--order", order, "--stats")["traffic"]
-            row(name, order, traffic["requests"], f"{traffic['bytes']:,}", f"{traffic['seconds_waited']:.1f}")
+            traffic = run("view", url, *view, "--seen-only", "--pixels", "4", "--order", order,
+                          "--stats")["traffic"]
+            row(name, order, traffic["requests"], f"{traffic['bytes']:,}",
+                f"{traffic['seconds_waited']:.1f}")
     server.shutdown()
 
 

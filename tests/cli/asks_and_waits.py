@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
-"""Asks `ebpo inside MODEL` one point after the other through a pipe and waits for each answer before the next: asks_and_waits.py MODEL"""
+"""Asks `ebpo inside MODEL` one point after the other through a pipe and waits for each answer
+before the next: asks_and_waits.py MODEL"""
 import subprocess
 import sys
 
-with subprocess.Popen(["ebpo", "inside", sys.argv[1]], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as ebpo:
+with subprocess.Popen(["ebpo", "inside", sys.argv[1]], stdin=subprocess.PIPE,
+                      stdout=subprocess.PIPE, text=True) as ebpo:
     for point, answer in [("0.5 0.5 0.5", "IN 1"), ("2 0 0", "OUT 0"), ("1 1 1", "ON 0")] * 3:
         ebpo.stdin.write(point + "\n")
         ebpo.stdin.flush()

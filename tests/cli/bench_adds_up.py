@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
-"""ebpo bench --json on standard input agrees with itself and with the points that were saved: bench_adds_up.py POINTS.raw [INFO.json]
+"""ebpo bench --json on standard input agrees with itself and with the points that were saved:
+bench_adds_up.py POINTS.raw [INFO.json]
 
-With INFO.json (ebpo info --json) the points are a path: steps of at most a tenth of the mean edge and what the swing adds, within the box and its margin.
+With INFO.json (ebpo info --json) the points are a path: steps of at most a tenth of the mean edge
+and what the swing adds, within the box and its margin.
 """
 import array
 import json
@@ -20,13 +22,17 @@ def check(name, good):
 
 
 ns = bench["ns"]
-check("quantiles ascend", 0 <= ns["p50"] <= ns["p99"] <= ns["p999"] <= ns["max"] and 0 < ns["mean"] <= ns["max"])
+check("quantiles ascend", 0 <= ns["p50"] <= ns["p99"] <= ns["p999"] <= ns["max"]
+      and 0 < ns["mean"] <= ns["max"])
 check("as many points as counted", len(points) == wide * bench["count"])
 check("as many answers as points", sum(bench["answers"].values()) == bench["count"])
-check("opening comes before the first answer", 0 < bench["cold_open_seconds"] <= bench["cold_first_answer_seconds"])
-check("bytes were read", 0 < bench["cold_bytes_read"] and 0 < bench["bytes_read"] == bench["model"]["bytes_read"])
+check("opening comes before the first answer",
+      0 < bench["cold_open_seconds"] <= bench["cold_first_answer_seconds"])
+check("bytes were read", 0 < bench["cold_bytes_read"]
+      and 0 < bench["bytes_read"] == bench["model"]["bytes_read"])
 check("batch", bench["batch_ns"] > 0)
-check("budget", not bench["model"]["budget"] or bench["model_at_end"]["memory_peak"] <= bench["model"]["budget"])
+check("budget", not bench["model"]["budget"]
+      or bench["model_at_end"]["memory_peak"] <= bench["model"]["budget"])
 if len(sys.argv) > 2:
     mesh = json.load(open(sys.argv[2], encoding="utf-8"))["report"]
     low, high = mesh["min"], mesh["max"]
@@ -35,5 +41,7 @@ if len(sys.argv) > 2:
     step = mesh["mean_edge"] / 10 + 0.02 * diagonal * 0.1
     check("steps are short", all(math.dist(a, b) <= step for a, b in zip(rows, rows[1:])))
     check("the path goes somewhere", max(math.dist(rows[0], r) for r in rows) > 0.1 * diagonal)
-    check("points are near the box", all(l - 0.011 * diagonal <= c <= h + 0.011 * diagonal for r in rows for l, c, h in zip(low, r, high)))
+    check("points are near the box",
+          all(l - 0.011 * diagonal <= c <= h + 0.011 * diagonal for r in rows
+              for l, c, h in zip(low, r, high)))
 print("; ".join(wrong) or "fine")

@@ -1,6 +1,8 @@
-"""envelopes_hold.py OUT.xdmf|OUT.vtkhdf INFO.json NODES.json SOURCE.ply: what ebpo export wrote, read with h5py, is what ebpo info and ebpo levels --nodes tell.
+"""envelopes_hold.py OUT.xdmf|OUT.vtkhdf INFO.json NODES.json SOURCE.ply: what ebpo export wrote,
+read with h5py, is what ebpo info and ebpo levels --nodes tell.
 
-Every envelope is a closed polyhedron in its node's cell, with the volume that stands beside it; the nodes of a level cover each place once, and their volumes add up to the level's.
+Every envelope is a closed polyhedron in its node's cell, with the volume that stands beside it; the
+nodes of a level cover each place once, and their volumes add up to the level's.
 The mesh is the source's, by the source's numbers."""
 import json
 import math
@@ -29,7 +31,8 @@ def xdmf_blocks(path):
         with h5py.File(os.path.join(os.path.dirname(path), name), "r") as f:
             values = f[place][...]
         assert list(values.shape) == [int(v) for v in item.get("Dimensions").split()], place
-        assert values.dtype.kind == {"Float": "f", "Int": "i"}[item.get("NumberType")] and values.itemsize == int(item.get("Precision"))
+        assert (values.dtype.kind == {"Float": "f", "Int": "i"}[item.get("NumberType")]
+                and values.itemsize == int(item.get("Precision")))
         return values
 
     blocks = {}
@@ -40,13 +43,15 @@ def xdmf_blocks(path):
             stream, cells = iter(cells.tolist()), []
             for kind in stream:
                 assert kind == 16
-                cells.append([[next(stream) for _ in range(next(stream))] for _ in range(next(stream))])
+                cells.append([[next(stream) for _ in range(next(stream))]
+                              for _ in range(next(stream))])
         assert len(cells) == int(topology.get("NumberOfElements"))
         data = {a.get("Name"): array(a.find("DataItem")) for a in grid.findall("Attribute")}
         blocks[grid.get("Name")] = array(grid.find("Geometry/DataItem")), cells, data
     with h5py.File(path + ".h5", "r") as f:
         stored = []
-        f.visititems(lambda name, item: stored.append("/" + name) if isinstance(item, h5py.Dataset) else None)
+        f.visititems(lambda name, item: stored.append("/" + name) if isinstance(item, h5py.Dataset)
+                     else None)
     assert sorted(stored) == sorted(place for _, place in used)
     return blocks
 
@@ -58,7 +63,8 @@ def vtkhdf_blocks(path):
         top = f["VTKHDF"]
         assert list(top.attrs["Version"]) == [1, 0] and top.attrs["Type"] == b"UnstructuredGrid"
         point = corner = cell = offset = 0
-        for points, cells, corners in zip(top["NumberOfPoints"], top["NumberOfCells"], top["NumberOfConnectivityIds"]):
+        for points, cells, corners in zip(top["NumberOfPoints"], top["NumberOfCells"],
+                                          top["NumberOfConnectivityIds"]):
             offsets = top["Offsets"][offset:offset + cells + 1]
             ids = top["Connectivity"][corner:corner + corners]
             assert offsets[0] == 0 and offsets[-1] == corners
@@ -73,11 +79,14 @@ def vtkhdf_blocks(path):
                 blocks["mesh"] = where, numpy.array(polygons), data
             else:
                 assert (types == 7).all() and (data["source_face"] == -1).all()
-                first = numpy.flatnonzero(numpy.r_[True, data["octcode"][1:] != data["octcode"][:-1]])
+                first = numpy.flatnonzero(numpy.r_[True,
+                                                   data["octcode"][1:] != data["octcode"][:-1]])
                 whole = [polygons[a:b] for a, b in zip(first, [*first[1:], cells])]
-                blocks[f"level_{lod:02d}"] = where, whole, {k: v[first] for k, v in data.items() if k != "source_vertex"}
+                blocks[f"level_{lod:02d}"] = where, whole, {k: v[first] for k, v in data.items()
+                                                            if k != "source_vertex"}
             point, corner, cell, offset = point + points, corner + corners, cell + cells, offset + cells + 1
-        assert point == len(top["Points"]) and cell == len(top["Types"]) and corner == len(top["Connectivity"]) and offset == len(top["Offsets"])
+        assert (point == len(top["Points"]) and cell == len(top["Types"])
+                and corner == len(top["Connectivity"]) and offset == len(top["Offsets"]))
     return blocks
 
 
@@ -107,35 +116,43 @@ def check_polyhedron(points, polygons):
 
 def check_level(number, points, cells, data, info, nodes):
     levels = info["levels"]
-    assert len(cells) == levels[number]["gray"] + sum(v["leaf"] + v["black"] for v in levels[:number + 1])
+    assert len(cells) == levels[number]["gray"] + sum(v["leaf"] + v["black"]
+                                                      for v in levels[:number + 1])
     assert all(len(values) == len(cells) for values in data.values())
     codes = data["octcode"].tolist()
     all_codes = set(codes)
-    assert len(all_codes) == len(codes) and not any(code >> 3 * i in all_codes for code in codes for i in range(1, number + 1))
+    assert (len(all_codes) == len(codes) and not any(code >> 3 * i in all_codes for code in codes
+                                                     for i in range(1, number + 1)))
     used = 0
     for i, (code, polygons) in enumerate(zip(codes, cells)):
         level, low, size = cell_of(code, info)
         kind = data["type"][i]
-        assert level == data["level"][i] <= number and kind in (GRAY, LEAF, BLACK) and (kind != GRAY or level == number)
+        assert (level == data["level"][i] <= number and kind in (GRAY, LEAF, BLACK)
+                and (kind != GRAY or level == number))
         assert (TYPE_NAMES[kind], data["winding"][i]) == nodes[code]
         corners = sorted({c for polygon in polygons for c in polygon})
         used += len(corners)
-        assert (points[corners] >= low - 1e-12 * size).all() and (points[corners] <= low + size * (1 + 1e-12)).all()
+        assert ((points[corners] >= low - 1e-12 * size).all()
+                and (points[corners] <= low + size * (1 + 1e-12)).all())
         volume = check_polyhedron(points, polygons)
-        assert math.isclose(volume, data["volume"][i], rel_tol=1e-6, abs_tol=1e-9 * size.prod()), (code, volume, data["volume"][i])
+        assert (math.isclose(volume, data["volume"][i], rel_tol=1e-6,
+                             abs_tol=1e-9 * size.prod())), (code, volume, data["volume"][i])
     assert used == len(points)
     for kind, name in ((LEAF, "leaf"), (BLACK, "black")):
         for level in range(number + 1):
             assert ((data["type"] == kind) & (data["level"] == level)).sum() == levels[level][name]
-    stated, derived = levels[number]["envelope_volume"], any(l["leaf"] and not l["leaf_planes"] for l in levels[: number + 1])
+    stated, derived = levels[number]["envelope_volume"], any(l["leaf"] and not l["leaf_planes"]
+                                                             for l in levels[: number + 1])
     total = math.fsum(data["volume"])
-    assert math.isclose(total, stated, rel_tol=1e-9) or (derived and 0 < total < stated)  # derived planes cut off more than the file counts
+    # derived planes cut off more than the file counts
+    assert math.isclose(total, stated, rel_tol=1e-9) or (derived and 0 < total < stated)
 
 
 def check_mesh(points, cells, data, source):
     model, faces = export_reads.ply(source)
     vertex, face = data["source_vertex"], data["source_face"]
-    assert sorted(vertex.tolist()) == list(range(len(model))) and sorted(face.tolist()) == list(range(len(faces)))
+    assert (sorted(vertex.tolist()) == list(range(len(model)))
+            and sorted(face.tolist()) == list(range(len(faces))))
     assert (numpy.array(model)[vertex] == points).all()
     for triangle, number in zip(vertex[cells].tolist(), face.tolist()):
         wanted = list(faces[number])
@@ -147,9 +164,11 @@ def main():
     with open(about, encoding="utf-8") as f:
         info = json.load(f)
     with open(told, encoding="utf-8") as f:
-        nodes = {n["octcode"]: (n["type"], n["winding"]) for level in json.load(f)["levels"] for n in level["nodes"]}
+        nodes = {n["octcode"]: (n["type"], n["winding"]) for level in json.load(f)["levels"]
+                 for n in level["nodes"]}
     blocks = (xdmf_blocks if path.endswith(".xdmf") else vtkhdf_blocks)(path)
-    assert list(blocks) == [f"level_{i:02d}" for i in range(len(info["levels"]))] + ["mesh"], list(blocks)
+    assert (list(blocks) == [f"level_{i:02d}"
+                             for i in range(len(info["levels"]))] + ["mesh"]), list(blocks)
     for name, (points, cells, data) in blocks.items():
         if name == "mesh":
             check_mesh(points, cells, data, source)

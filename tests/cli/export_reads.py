@@ -1,4 +1,5 @@
-"""Small readers of the formats that ebpo export writes, and of our own PLY: for tests, sharing nothing with the writers."""
+"""Small readers of the formats that ebpo export writes, and of our own PLY: for tests, sharing
+nothing with the writers."""
 import json
 import os
 import struct
@@ -12,7 +13,8 @@ def ply(path):
     head = data[:at].decode().splitlines()
     count = {line.split()[1]: int(line.split()[2]) for line in head if line.startswith("element")}
     kind = "d" if "property double x" in head else "f"
-    points = list(struct.iter_unpack("<3" + kind, data[at:at + count["vertex"] * 3 * struct.calcsize(kind)]))
+    points = list(struct.iter_unpack("<3" + kind,
+                                     data[at:at + count["vertex"] * 3 * struct.calcsize(kind)]))
     at += count["vertex"] * 3 * struct.calcsize(kind)
     faces = [f[1:] for f in struct.iter_unpack("<B3I", data[at:at + 13 * count["face"]])]
     assert len(data) == at + 13 * count["face"]
@@ -40,10 +42,13 @@ def gltf(path):
     def values(number, kind, width, code):
         accessor = text["accessors"][number]
         view = text["bufferViews"][accessor["bufferView"]]
-        assert accessor["componentType"] == code and accessor["type"] == kind and view["byteOffset"] % 4 == 0
-        assert view["byteLength"] == 4 * width * accessor["count"] and view["byteOffset"] + view["byteLength"] <= len(binary)
+        assert (accessor["componentType"] == code and accessor["type"] == kind
+                and view["byteOffset"] % 4 == 0)
+        assert (view["byteLength"] == 4 * width * accessor["count"]
+                and view["byteOffset"] + view["byteLength"] <= len(binary))
         form = "<" + str(width) + ("f" if code == 5126 else "I")
-        return list(struct.iter_unpack(form, binary[view["byteOffset"]:view["byteOffset"] + view["byteLength"]])), accessor
+        return list(struct.iter_unpack(form,
+                                       binary[view["byteOffset"]:view["byteOffset"] + view["byteLength"]])), accessor
 
     found = []
     for number in text["scenes"][text["scene"]]["nodes"]:
@@ -54,7 +59,8 @@ def gltf(path):
         assert accessor["max"] == [max(p[k] for p in points) for k in range(3)]
         corners = [c[0] for c in values(primitive["indices"], "SCALAR", 1, 5125)[0]]
         assert primitive["material"] < len(text["materials"]) and max(corners) < len(points)
-        found.append((node["name"], node.get("translation", [0, 0, 0]), points, list(zip(*[iter(corners)] * 3))))
+        found.append((node["name"], node.get("translation", [0, 0, 0]), points,
+                      list(zip(*[iter(corners)] * 3))))
     return found
 
 
@@ -65,7 +71,8 @@ def obj(path):
         for line in f:
             words = line.split()
             if line.startswith("v "):
-                points.append(tuple(struct.unpack("<f", struct.pack("<f", float(v)))[0] for v in words[1:]))
+                points.append(tuple(struct.unpack("<f", struct.pack("<f", float(v)))[0]
+                                    for v in words[1:]))
             elif line[:2] in ("o ", "g "):
                 found.append((words[1], [0, 0, 0], points, []))
             elif line.startswith("f "):
@@ -79,7 +86,8 @@ def stl(path):
         data = f.read()
     count, = struct.unpack_from("<I", data, 80)
     assert len(data) == 84 + 50 * count
-    points = [c for facet in struct.iter_unpack("<12fH", data[84:]) for c in (facet[3:6], facet[6:9], facet[9:12])]
+    points = [c for facet in struct.iter_unpack("<12fH", data[84:])
+              for c in (facet[3:6], facet[6:9], facet[9:12])]
     return [("", [0, 0, 0], points, [(3 * i, 3 * i + 1, 3 * i + 2) for i in range(count)])]
 
 

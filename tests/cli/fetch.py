@@ -21,7 +21,8 @@ def expect(what, good, shown=""):
 
 
 class Handler(http.server.BaseHTTPRequestHandler):
-    """One file by ranges. `left`: requests that are answered before all others get 404; `nap`: seconds before each answer."""
+    """One file by ranges. `left`: requests that are answered before all others get 404; `nap`:
+    seconds before each answer."""
     protocol_version = "HTTP/1.1"
     data, etag, left, nap, sent, requests = b"", '"1"', 10 ** 9, 0, 0, 0
     damage = False  # of a bit of the second answer
@@ -66,48 +67,63 @@ def content(path):
 
 
 def run(*arguments):
-    return subprocess.run(arguments, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=300)
+    return subprocess.run(arguments, stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                          timeout=300)
 
 
 def blocks(part):
-    return sum(os.path.getsize(os.path.join(part, n)) - 56 for n in os.listdir(part)) if os.path.isdir(part) else 0
+    return (sum(os.path.getsize(os.path.join(part, n)) - 56 for n in os.listdir(part))
+            if os.path.isdir(part) else 0)
 
 
 def parts(tool, folder, path, url):
     out, near = os.path.join(folder, "o.ebpo.h5"), os.path.join(folder, "near.ebpo.h5")
-    for options in ([], ["--levels", "0-3"], ["--profile", "lod"], ["--box", "0,0,0,0.4,0.4,0.4"], ["--levels", "0-5", "--box", "0,0,-1,1,1,1", "--parts", "mesh,maps,envelopes"]):
+    for options in ([], ["--levels", "0-3"], ["--profile", "lod"], ["--box", "0,0,0,0.4,0.4,0.4"],
+                    ["--levels", "0-5", "--box", "0,0,-1,1,1,1", "--parts", "mesh,maps,envelopes"]):
         Handler.reset()
         done = run(tool, "fetch", *options, url, out)
         run(tool, "subset", "-q", *options, path, near)
-        expect(f"fetch {options}", done.returncode == 0 and content(out) == content(near), done.stderr)
+        expect(f"fetch {options}", done.returncode == 0 and content(out) == content(near),
+               done.stderr)
         expect(f"{options}: verify", run(tool, "verify", "-q", out).returncode == 0)
-        expect(f"{options}: nothing is left", sorted(os.listdir(folder)) == sorted(["m.ply", "m.ebpo.h5", "other.ebpo.h5", "o.ebpo.h5", "near.ebpo.h5"]), os.listdir(folder))
+        expect(f"{options}: nothing is left",
+               sorted(os.listdir(folder)) == sorted(["m.ply", "m.ebpo.h5", "other.ebpo.h5",
+                                                     "o.ebpo.h5",
+                                                     "near.ebpo.h5"]), os.listdir(folder))
         if options[:1] == ["--levels"] and len(options) == 2:
-            expect("few bytes for few levels", Handler.sent < len(Handler.data) / 4, f"{Handler.sent} of {len(Handler.data)}")
+            expect("few bytes for few levels", Handler.sent < len(Handler.data) / 4,
+                   f"{Handler.sent} of {len(Handler.data)}")
         if options[:1] == ["--box"]:
-            expect("less than half for a small box", Handler.sent < len(Handler.data) / 2, f"{Handler.sent} of {len(Handler.data)}")
+            expect("less than half for a small box", Handler.sent < len(Handler.data) / 2,
+                   f"{Handler.sent} of {len(Handler.data)}")
         os.remove(out)
     Handler.reset()
     told = json.loads(run(tool, "fetch", "--json", "--levels", "0-2", url, out).stdout)
-    expect("json", told["fetched_bytes"] == Handler.sent and told["fetched_requests"] == Handler.requests and told["subset"]["last_level"] == 2, told.get("fetched_bytes"))
+    expect("json", told["fetched_bytes"] == Handler.sent
+           and told["fetched_requests"] == Handler.requests and told["subset"]["last_level"] == 2,
+           told.get("fetched_bytes"))
     os.remove(out)
 
 
 def refusals(tool, folder, path, url):
-    """What could not be put in its place is said before anything is fetched; what came damaged is not kept."""
+    """What could not be put in its place is said before anything is fetched; what came damaged is
+    not kept."""
     out = os.path.join(folder, "o.ebpo.h5")
     part = out + ".part"
     Handler.reset()
     done = run(tool, "fetch", url, folder)
-    expect("a folder as OUT", done.returncode == 1 and "is a folder" in done.stderr and Handler.requests == 0, (done.stderr, Handler.requests))
+    expect("a folder as OUT", done.returncode == 1 and "is a folder" in done.stderr
+           and Handler.requests == 0, (done.stderr, Handler.requests))
     os.symlink(folder, part)
     done = run(tool, "fetch", url, out)
-    expect("a link as OUT.part", done.returncode == 1 and "move it away" in done.stderr and Handler.requests == 0 and os.path.islink(part), (done.stderr, Handler.requests))
+    expect("a link as OUT.part", done.returncode == 1 and "move it away" in done.stderr
+           and Handler.requests == 0 and os.path.islink(part), (done.stderr, Handler.requests))
     os.remove(part)
     Handler.reset()
     Handler.damage = True
     done = run(tool, "fetch", url, out)
-    expect("a transfer that was damaged", done.returncode == 1 and "starts again" in done.stderr and not os.path.exists(part) and not os.path.exists(out), done.stderr)
+    expect("a transfer that was damaged", done.returncode == 1 and "starts again" in done.stderr
+           and not os.path.exists(part) and not os.path.exists(out), done.stderr)
     done = run(tool, "fetch", url, out)
     expect("and the next one", done.returncode == 0 and content(out) == content(path), done.stderr)
     os.remove(out)
@@ -123,11 +139,16 @@ def resume(tool, folder, path, url):
     Handler.reset(left=5)
     done = run(tool, "fetch", "--http-connections", "1", url, out)
     held, first = blocks(part), Handler.sent
-    expect("an interruption keeps what came", done.returncode == 1 and not os.path.exists(out) and held > len(Handler.data) / 8 and held >= first - 131072 and "kept in " + part in done.stderr, (held, first, done.stderr))
+    expect("an interruption keeps what came",
+           done.returncode == 1 and not os.path.exists(out) and held > len(Handler.data) / 8
+           and held >= first - 131072 and "kept in " + part in done.stderr,
+           (held, first, done.stderr))
     Handler.reset()
     done = run(tool, "fetch", url, out)
-    expect("and goes on from there", done.returncode == 0 and content(out) == content(path) and "resuming with" in done.stderr, done.stderr)
-    expect("without fetching it again", Handler.sent <= whole - held + 2 * 131072, f"{Handler.sent} of {whole}, {held} had come")
+    expect("and goes on from there", done.returncode == 0 and content(out) == content(path)
+           and "resuming with" in done.stderr, done.stderr)
+    expect("without fetching it again", Handler.sent <= whole - held + 2 * 131072,
+           f"{Handler.sent} of {whole}, {held} had come")
     expect("the folder goes", not os.path.exists(part))
     print(f"whole {whole} bytes; interrupted after {first}, {held} kept; then {Handler.sent}")
     os.remove(out)
@@ -140,7 +161,8 @@ def resume(tool, folder, path, url):
         f.write(b"damage")
     Handler.reset()
     done = run(tool, "fetch", "-q", url, out)
-    expect("damaged blocks are fetched again", done.returncode == 0 and content(out) == content(path), done.stderr)
+    expect("damaged blocks are fetched again",
+           done.returncode == 0 and content(out) == content(path), done.stderr)
     os.remove(out)
 
 
@@ -151,7 +173,9 @@ def change(tool, folder, path, url):
     Handler.data, Handler.etag = content(other), '"2"'
     Handler.reset()
     done = run(tool, "fetch", url, out)
-    expect("a file that has changed begins anew", done.returncode == 0 and content(out) == content(other) and "has changed on the server" in done.stderr, done.stderr)
+    expect("a file that has changed begins anew",
+           done.returncode == 0 and content(out) == content(other)
+           and "has changed on the server" in done.stderr, done.stderr)
     expect("and its folder goes", not os.path.exists(out + ".part"))
     Handler.data, Handler.etag = content(path), '"1"'
     os.remove(out)
@@ -161,26 +185,32 @@ def interrupt(tool, folder, path, url):
     out = os.path.join(folder, "o.ebpo.h5")
     part = out + ".part"
     Handler.reset(nap=0.3)
-    child = subprocess.Popen([tool, "fetch", "--http-connections", "1", url, out], stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    child = subprocess.Popen([tool, "fetch", "--http-connections", "1", url, out],
+                             stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     begun = time.monotonic()
     while blocks(part) < 100000 and time.monotonic() - begun < 60 and child.poll() is None:
         time.sleep(0.02)
     child.send_signal(signal.SIGINT)
     child.wait(timeout=60)
     held = blocks(part)
-    expect("SIGINT keeps the blocks", child.returncode == -signal.SIGINT and held >= 90000 and not os.path.exists(out), (child.returncode, held))
+    expect("SIGINT keeps the blocks", child.returncode == -signal.SIGINT and held >= 90000
+           and not os.path.exists(out), (child.returncode, held))
     Handler.reset()
     done = run(tool, "fetch", "-q", url, out)
-    expect("and the next run ends well", done.returncode == 0 and content(out) == content(path), done.stderr)
+    expect("and the next run ends well", done.returncode == 0 and content(out) == content(path),
+           done.stderr)
     os.remove(out)
 
 
 def main():
     tool, generate = sys.argv[1:3]
     with tempfile.TemporaryDirectory() as folder:
-        path, other, ply = (os.path.join(folder, name) for name in ("m.ebpo.h5", "other.ebpo.h5", "m.ply"))
-        subprocess.run([generate, "--base", "torus", "--faces", "250000", ply], check=True, capture_output=True)
-        subprocess.run([tool, "convert", "-q", "--codec", "none", "--profile", "full", ply, path], check=True)
+        path, other, ply = (os.path.join(folder, name)
+                            for name in ("m.ebpo.h5", "other.ebpo.h5", "m.ply"))
+        subprocess.run([generate, "--base", "torus", "--faces", "250000", ply], check=True,
+                       capture_output=True)
+        subprocess.run([tool, "convert", "-q", "--codec", "none", "--profile", "full", ply, path],
+                       check=True)
         subprocess.run([tool, "convert", "-q", "--leaf-faces", "40", ply, other], check=True)
         Handler.data = content(path)
         server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
@@ -193,7 +223,8 @@ def main():
         change(tool, folder, path, url)
         interrupt(tool, folder, path, url)
         done = run(tool, "fetch", url + "/nothing", "/nowhere/x.ebpo.h5")
-        expect("no folder", done.returncode in (1, 2) and done.stderr.startswith("ebpo fetch: /nowhere/x.ebpo.h5"), done.stderr)
+        expect("no folder", done.returncode in (1, 2)
+               and done.stderr.startswith("ebpo fetch: /nowhere/x.ebpo.h5"), done.stderr)
         server.shutdown()
     print(f"{len(failures)} failed")
     return 1 if failures else 0

@@ -1,4 +1,5 @@
-"""info_adds_up.py FILE <JSON of ebpo info: bytes, volumes and counts are consistent with each other and with the file."""
+"""info_adds_up.py FILE <JSON of ebpo info: bytes, volumes and counts are consistent with each other
+and with the file."""
 import json
 import math
 import os
@@ -19,5 +20,6 @@ for i, level in enumerate(levels):
     nodes = level["gray"] + level["leaf"] + level["white"] + level["black"]
     assert nodes == (8 * levels[i - 1]["gray"] if i else 1), (i, nodes)
     assert i == 0 or level["envelope_volume"] <= levels[i - 1]["envelope_volume"] * (1 + 1e-9)
-assert sum(level["faces_new"] for level in levels) == (info["faces"] if "mesh" in info["parts"] else 0)
+assert sum(level["faces_new"] for level in levels) == (info["faces"] if "mesh" in info["parts"]
+                                                       else 0)
 print("fine")

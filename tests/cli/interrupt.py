@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""interrupt.py SIGNAL OUT COMMAND...: sends SIGNAL once a temporary file for OUT is there; prints how the command ended and what it left."""
+"""interrupt.py SIGNAL OUT COMMAND...: sends SIGNAL once a temporary file for OUT is there; prints
+how the command ended and what it left."""
 import os
 import signal
 import subprocess

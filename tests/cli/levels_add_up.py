@@ -1,4 +1,5 @@
-"""levels_add_up.py LEVELS.json <JSON of ebpo info: ebpo levels tells what ebpo info tells, and its nodes fill the levels."""
+"""levels_add_up.py LEVELS.json <JSON of ebpo info: ebpo levels tells what ebpo info tells, and its
+nodes fill the levels."""
 import json
 import math
 import sys
@@ -13,7 +14,8 @@ for level, info in zip(levels, told):
     for key in ("gray", "leaf", "white", "black", "planes", "cumulative_bytes"):
         assert level[key] == info[key], (key, level[key], info[key])
     assert math.isclose(level["volume"], info["envelope_volume"], rel_tol=1e-12)
-    assert last == 0 or math.isclose(level["percent_of_last"], 100 * info["envelope_volume"] / last, rel_tol=1e-12)
+    assert (last == 0 or math.isclose(level["percent_of_last"],
+                                      100 * info["envelope_volume"] / last, rel_tol=1e-12))
     assert level["ms"] >= ms
     ms = level["ms"]
     if "nodes" not in level:

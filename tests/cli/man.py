@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""man.py TOOL FOLDER: --help and the man page of each command name the same options, --help fits on 80 columns, and mandoc finds no error."""
+"""man.py TOOL FOLDER: --help and the man page of each command name the same options, --help fits on
+80 columns, and mandoc finds no error."""
 import os
 import re
 import shutil
@@ -23,7 +24,8 @@ def options_in_page(text):
 def main():
     tool, folder = sys.argv[1:]
     bad = 0
-    commands = [c for c in re.findall(r"^  ([a-z]+) ", help_of(tool, "help"), re.MULTILINE) if c != "help"]
+    commands = [c for c in re.findall(r"^  ([a-z]+) ", help_of(tool, "help"), re.MULTILINE)
+                if c != "help"]
     pages = ["ebpo.1", "ebpo-remote.7"]
     for command in commands:
         page = f"ebpo-{command}.1"
@@ -33,8 +35,10 @@ def main():
         in_help = options_in_help(help_of(tool, command, "--help"))
         if in_help != in_page or "help" not in in_help:
             bad += 1
-            print(f"{page}: missing {sorted(in_help - in_page)}, too many {sorted(in_page - in_help)}")
-        wide = [line for line in help_of(tool, command, "--help").splitlines()[1:] if len(line) > 80]
+            print(f"{page}: missing {sorted(in_help - in_page)}, too many "
+                  f"{sorted(in_page - in_help)}")
+        wide = [line for line in help_of(tool, command, "--help").splitlines()[1:]
+                if len(line) > 80]
         if wide:
             bad += 1
             print(f"ebpo {command} --help: wider than 80 columns: {wide[0]}")
@@ -43,7 +47,8 @@ def main():
             print(f"ebpo help {command} and ebpo {command} --help differ")
     if shutil.which("mandoc"):
         for page in pages:
-            lint = subprocess.run(["mandoc", "-Tlint", "-Wwarning", os.path.join(folder, page)], capture_output=True, text=True)
+            lint = subprocess.run(["mandoc", "-Tlint", "-Wwarning", os.path.join(folder, page)],
+                                  capture_output=True, text=True)
             if lint.returncode or lint.stdout:
                 bad += 1
                 print(lint.stdout)

@@ -1,4 +1,5 @@
-"""measures_agree.py INFO <JSON of ebpo measure: it fits what the file's head says (ebpo info --json)."""
+"""measures_agree.py INFO <JSON of ebpo measure: it fits what the file's head says (ebpo info
+--json)."""
 import json
 import math
 import sys

@@ -1,4 +1,5 @@
-"""picture_shows.py FILE.png WIDTH HEIGHT: a PNG of that size with a light border and something darker inside. Filters 0 to 4 of 8-bit RGB."""
+"""picture_shows.py FILE.png WIDTH HEIGHT: a PNG of that size with a light border and something
+darker inside. Filters 0 to 4 of 8-bit RGB."""
 import struct
 import sys
 import zlib
@@ -9,7 +10,8 @@ def rows_of(data):
     while at < len(data):
         length, kind = struct.unpack(">I4s", data[at:at + 8])
         body = data[at + 8:at + 8 + length]
-        assert struct.unpack(">I", data[at + 8 + length:at + 12 + length])[0] == zlib.crc32(kind + body)
+        assert struct.unpack(">I",
+                             data[at + 8 + length:at + 12 + length])[0] == zlib.crc32(kind + body)
         if kind == b"IHDR":
             size = struct.unpack(">IIBBBBB", body)
         if kind == b"IDAT":

@@ -1,4 +1,5 @@
-"""ply_moves.py IN.ply OUT.ply SCALE X Y Z: a binary PLY scaled, then moved, as text with all digits of its doubles."""
+"""ply_moves.py IN.ply OUT.ply SCALE X Y Z: a binary PLY scaled, then moved, as text with all digits
+of its doubles."""
 import sys
 
 import export_reads
@@ -6,7 +7,8 @@ import export_reads
 points, faces = export_reads.ply(sys.argv[1])
 scale, *move = (float(v) for v in sys.argv[3:7])
 with open(sys.argv[2], "w", encoding="ascii") as f:
-    f.write(f"ply\nformat ascii 1.0\nelement vertex {len(points)}\n" + "".join(f"property double {k}\n" for k in "xyz"))
+    f.write(f"ply\nformat ascii 1.0\nelement vertex {len(points)}\n"
+            + "".join(f"property double {k}\n" for k in "xyz"))
     f.write(f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n")
     for p in points:
         f.write(" ".join(repr(float(v) * scale + m) for v, m in zip(p, move)) + "\n")

@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
-"""report.py TOOL INPUTS FEATURES: the figures of `ebpo report`, against other commands, against figures made here, and against
-each other. The page holds the same data and nothing from elsewhere; what it draws of it: tests/whole/report_page.mjs."""
+"""report.py TOOL INPUTS FEATURES: the figures of `ebpo report`, against other commands, against
+figures made here, and against
+each other. The page holds the same data and nothing from elsewhere; what it draws of it:
+tests/whole/report_page.mjs."""
 import csv
 import html.parser
 import json
@@ -20,7 +22,8 @@ VOID = {"meta"}
 
 
 def run(*arguments, data=None):
-    return subprocess.run([TOOL, *map(str, arguments)], input=data, check=True, stdout=subprocess.PIPE).stdout
+    return subprocess.run([TOOL, *map(str, arguments)], input=data, check=True,
+                          stdout=subprocess.PIPE).stdout
 
 
 def report(folder, *arguments, seed=SEED):
@@ -41,10 +44,14 @@ def from_json(told):
     found = {}
     of = {q["name"]: q for q in told["quantities"]}
     for m in told["methods"]:
-        places = [("", "", m)] + [(str(l["level"]), "", l) for l in m["levels"]] + [("", f"{d['microseconds']}us", d) for d in m["deadlines"]]
-        places += [("", "=".join([k, repr_c(n[k])]), n) for n in m["needs"] for k in ("max_error", "target_bytes") if k in n]
+        places = [("", "", m)] + [(str(l["level"]), "", l)
+                                  for l in m["levels"]] + [("", f"{d['microseconds']}us", d)
+                                                           for d in m["deadlines"]]
+        places += [("", "=".join([k, repr_c(n[k])]), n) for n in m["needs"]
+                   for k in ("max_error", "target_bytes") if k in n]
         for level, parameter, figures in places:
-            found.update({(m["name"], level, parameter, k): v for k, v in figures.items() if k in of})
+            found.update({(m["name"], level, parameter, k): v for k, v in figures.items()
+                          if k in of})
     return found, of
 
 
@@ -57,7 +64,8 @@ def agree(rows, told):
     lines = {(r["method"], r["level"], r["parameter"], r["quantity"]): r for r in rows}
     assert len(lines) == len(rows) and lines.keys() == found.keys(), lines.keys() ^ found.keys()
     for key, line in lines.items():
-        assert value(line["value"]) == found[key] and line["unit"] == of[key[3]]["unit"], (key, line)
+        assert (value(line["value"]) == found[key]
+                and line["unit"] == of[key[3]]["unit"]), (key, line)
     return of
 
 
@@ -86,7 +94,8 @@ class Well(html.parser.HTMLParser):
 
 
 def page_holds(folder, told, pictures):
-    """The page has the report's data, so many pictures of levels, and no address; none without Chart.js."""
+    """The page has the report's data, so many pictures of levels, and no address; none without
+    Chart.js."""
     path = folder / "report.html"
     assert path.exists() == ("page" in FEATURES)
     if not path.exists():
@@ -99,8 +108,10 @@ def page_holds(folder, told, pictures):
     assert json.loads(parser.texts["report"]) == told
     drawn = json.loads(parser.texts["drawn"])
     expected = pictures if "png" in FEATURES else 0
-    assert sum(map(len, drawn["levels"])) == expected and ("portrait" in drawn) <= (expected > 0), drawn.keys()
-    assert all(uri.startswith("data:image/png;base64,") for levels in drawn["levels"] for uri in levels.values())
+    assert (sum(map(len, drawn["levels"])) == expected
+            and ("portrait" in drawn) <= (expected > 0)), drawn.keys()
+    assert all(uri.startswith("data:image/png;base64,") for levels in drawn["levels"]
+               for uri in levels.values())
     own = page.replace(parser.texts["chart"], "").replace(parser.texts["drawn"], "")
     assert "<long>" not in own, "a name is read as a tag"
     assert not re.search(r"url\(|@import|https?://|\{\{", own)
@@ -111,18 +122,23 @@ def page_holds(folder, told, pictures):
 def against_info(told, folder):
     for m in told["methods"]:
         info = json.loads(run("info", "--json", folder / f"{m['name']}.ebpo.h5"))
-        derived = [l["derived_volume"] for l in json.loads(run("measure", "--json", "--derived", folder / f"{m['name']}.ebpo.h5"))["levels"]]
+        derived = [l["derived_volume"]
+                   for l in json.loads(run("measure", "--json", "--derived",
+                                           folder / f"{m['name']}.ebpo.h5"))["levels"]]
         assert m["file_bytes"] == info["bytes"]["file"] and m["head_bytes"] == info["bytes"]["head"]
         assert m["all_planes"] == sum(l["planes"] + l["leaf_planes"] for l in info["levels"])
         solid = abs(info["report"]["volume"])
         for mine, theirs, volume in zip(m["levels"], info["levels"], derived, strict=True):
             assert mine["level"] == theirs["level"]
-            for a, b in (("bytes", "stored_bytes"), ("cumulative_bytes",) * 2, ("gray",) * 2, ("leaf",) * 2, ("planes",) * 2, ("leaf_planes",) * 2):
+            for a, b in (("bytes", "stored_bytes"), ("cumulative_bytes",) * 2, ("gray",) * 2,
+                         ("leaf",) * 2, ("planes",) * 2, ("leaf_planes",) * 2):
                 assert mine[a] == theirs[b], (m["name"], a, mine[a], theirs[b])
             assert mine["envelope_volume"] == volume <= theirs["envelope_volume"] * (1 + 1e-9)
             if told["model"]["kind"] == "solid" and solid > 0:
-                assert math.isclose(mine["excess"], 100 * (volume - solid) / solid, rel_tol=1e-9, abs_tol=1e-9)
-            assert mine["read_bytes"] >= mine["cumulative_bytes"] - info["bytes"]["head"] and mine["reads"] >= 1
+                assert math.isclose(mine["excess"], 100 * (volume - solid) / solid, rel_tol=1e-9,
+                                    abs_tol=1e-9)
+            assert (mine["read_bytes"] >= mine["cumulative_bytes"] - info["bytes"]["head"]
+                    and mine["reads"] >= 1)
 
 
 def unit_numbers(state):
@@ -145,36 +161,46 @@ def quantile(values, share):
 
 def questions(told, folder):
     numbers = uniform_points(told["model"])
-    text = "".join(f"{x!r} {y!r} {z!r}\n" for x, y, z in zip(numbers[::3], numbers[1::3], numbers[2::3])).encode()
+    text = "".join(f"{x!r} {y!r} {z!r}\n" for x, y, z in zip(numbers[::3], numbers[1::3],
+                                                             numbers[2::3])).encode()
     for m in told["methods"]:
         file = folder / f"{m['name']}.ebpo.h5"
         for l in m["levels"]:
             if told["model"]["kind"] == "solid":
                 answers = run("inside", "--level", l["level"], file, data=text).decode()
-                assert l["maybe_uniform"] == sum(line.startswith("MAYBE") for line in answers.splitlines()) / POINTS
+                assert l["maybe_uniform"] == sum(line.startswith("MAYBE")
+                                                 for line in answers.splitlines()) / POINTS
                 assert 0 <= l["maybe_near"] <= 1
             told_widths = run("distance", "--json", "--level", l["level"], file, data=text).decode()
             widths = [a["hi"] - a["lo"] for a in map(json.loads, told_widths.splitlines())]
-            assert l["width_median"] == quantile(widths, 0.5) and l["width_p99"] == quantile(widths, 0.99)
+            assert (l["width_median"] == quantile(widths, 0.5)
+                    and l["width_p99"] == quantile(widths, 0.99))
             assert math.isclose(l["width_mean"], sum(widths) / POINTS, rel_tol=1e-12)
         for due in m["deadlines"]:
-            assert 0 <= due["deadline_exact"] <= 1 and due["deadline_took_median"] <= due["deadline_took_p99"] <= due["deadline_took_max"]
+            assert (0 <= due["deadline_exact"] <= 1
+                    and due["deadline_took_median"] <= due["deadline_took_p99"] <= due["deadline_took_max"])
 
 
 def shapes(told, folder):
-    """What the deviation certifies holds for the vertices of the envelopes, by exact distances; the limit is one."""
+    """What the deviation certifies holds for the vertices of the envelopes, by exact distances; the
+    limit is one."""
     for m in told["methods"]:
         file = folder / f"{m['name']}.ebpo.h5"
         for l in m["levels"]:
             run("extract", "-q", file, folder / "level.ply", "--level", l["level"])
             answers = run("distance", "--json", file, folder / "level.ply")
-            reach = max([0, *(json.loads(line)["distance"] for line in answers.decode().splitlines())])
+            reach = max([0, *(json.loads(line)["distance"]
+                              for line in answers.decode().splitlines())])
             slack = 1e-6 * told["model"]["diagonal"]
-            assert reach <= l["hausdorff_hi"] + slack, (m["name"], l["level"], reach, l["hausdorff_hi"])
-            assert 0 <= l["hausdorff_lo"] <= l["hausdorff_hi"] and l["distance_mean"] <= l["distance_rms"] * (1 + 1e-12) <= l["hausdorff_hi"] + slack
+            assert (reach <= l["hausdorff_hi"] + slack), (m["name"], l["level"], reach,
+                                                          l["hausdorff_hi"])
+            assert (0 <= l["hausdorff_lo"] <= l["hausdorff_hi"]
+                    and l["distance_mean"] <= l["distance_rms"] * (1 + 1e-12) <= l["hausdorff_hi"] + slack)
             if l["limit_volume"] is not None:
                 assert l["limit_volume"] <= l["envelope_volume"] * (1 + 1e-9)
-                assert l["excess_to_limit"] is None or math.isclose(l["excess_to_limit"], l["excess"] / l["limit_excess"], rel_tol=1e-12)
+                assert (l["excess_to_limit"] is None
+                        or math.isclose(l["excess_to_limit"], l["excess"] / l["limit_excess"],
+                                        rel_tol=1e-12))
         (folder / "level.ply").unlink()
 
 
@@ -184,7 +210,8 @@ def needs(told):
             if "target_bytes" in n:
                 assert n["need_bytes"] <= n["target_bytes"], n
             elif n["need_hausdorff_lo"] is not None:
-                assert n["need_hausdorff_lo"] <= max(n["max_error"], m["levels"][-1]["hausdorff_hi"]) * (1 + 1e-9), n
+                assert (n["need_hausdorff_lo"] <= max(n["max_error"],
+                                                      m["levels"][-1]["hausdorff_hi"]) * (1 + 1e-9)), n
 
 
 # --- cases ---
@@ -195,7 +222,8 @@ def folder_of(inputs, name):
 
 def usual(inputs):
     folder = folder_of(inputs, "r")
-    arguments = ("--select", "inherit,kmedoids,offset,random", "--keep", "--no-pictures", "--need", "--max-level", "3", folder_of(inputs, "torus.ply"))
+    arguments = ("--select", "inherit,kmedoids,offset,random", "--keep", "--no-pictures", "--need",
+                 "--max-level", "3", folder_of(inputs, "torus.ply"))
     rows, told = report(folder, *arguments)
     of = agree(rows, told)
     page_holds(folder, told, 0)
@@ -203,20 +231,25 @@ def usual(inputs):
     questions(told, folder)
     shapes(told, folder)
     needs(told)
-    assert [m["name"] for m in told["methods"]] == ["inherit", "kmedoids", "offset", "random"] and all(m["build_seconds"] > 0 for m in told["methods"])
+    assert ([m["name"] for m in told["methods"]] == ["inherit", "kmedoids", "offset", "random"]
+            and all(m["build_seconds"] > 0 for m in told["methods"]))
     thesis_is_at_least(told)
     again, _ = report(folder_of(inputs, "again"), *arguments, "--threads", "1")
     steady = [[r for r in all_rows if not of[r["quantity"]]["timed"]] for all_rows in (rows, again)]
-    assert steady[0] == steady[1] and len(steady[0]) > 100, [x for x in zip(*steady) if x[0] != x[1]][:3]
+    assert (steady[0] == steady[1] and len(steady[0]) > 100), [x for x in zip(*steady)
+                                                               if x[0] != x[1]][:3]
     other, _ = report(folder_of(inputs, "other"), *arguments, seed=SEED + 1)
-    assert [r for r in other if r["quantity"] == "maybe_uniform"] != [r for r in rows if r["quantity"] == "maybe_uniform"]
+    assert [r for r in other
+            if r["quantity"] == "maybe_uniform"] != [r for r in rows
+                                                     if r["quantity"] == "maybe_uniform"]
 
 
 def thesis_is_at_least(told):
     """Every leaf, plane, face and vertex comes once, and is paid for."""
     for m in told["methods"]:
         total = m["levels"][-1]["thesis_cumulative_bytes"]
-        least = sum(l["leaf"] for l in m["levels"]) + 8 * m["all_planes"] + 12 * (told["model"]["faces"] + told["model"]["vertices"])
+        least = sum(l["leaf"]
+                    for l in m["levels"]) + 8 * m["all_planes"] + 12 * (told["model"]["faces"] + told["model"]["vertices"])
         assert least <= total, (least, total)
         assert math.isclose(sum(l["thesis_bytes"] for l in m["levels"]), total)
 
@@ -224,11 +257,14 @@ def thesis_is_at_least(told):
 def files(inputs):
     a, b = folder_of(inputs, "a.ebpo.h5"), folder_of(inputs, "b.ebpo.h5")
     run("convert", "-q", "--max-level", "2", folder_of(inputs, "sphere.ply"), a)
-    run("convert", "-q", "--max-level", "3", "--with", "leaf-planes", folder_of(inputs, "sphere.ply"), b)
-    rows, told = report(folder_of(inputs, "files"), "--name", "short", "--name", "<long> & 'odd'", a, b)
+    run("convert", "-q", "--max-level", "3", "--with", "leaf-planes",
+        folder_of(inputs, "sphere.ply"), b)
+    rows, told = report(folder_of(inputs, "files"), "--name", "short", "--name", "<long> & 'odd'",
+                        a, b)
     agree(rows, told)
     page_holds(folder_of(inputs, "files"), told, 7)
-    assert [len(m["levels"]) for m in told["methods"]] == [3, 4] and told["methods"][0]["build_seconds"] is None
+    assert ([len(m["levels"]) for m in told["methods"]] == [3, 4]
+            and told["methods"][0]["build_seconds"] is None)
     for l in told["methods"][0]["levels"]:
         assert l["levels_volume"] >= l["envelope_volume"] * (1 - 1e-9)
     _, whole = report(folder_of(inputs, "all"), "--need", "--no-pictures", b)
@@ -238,18 +274,21 @@ def files(inputs):
     # What the whole file reaches is that of its last level, measured or not.
     ratios = [[n["need_ratio"] for n in j["methods"][0]["needs"]] for j in (whole, told)]
     last = whole["methods"][0]["levels"][-1]["hausdorff_hi"]
-    assert ratios[0] == ratios[1] and any(n.get("max_error", last) < last for n in told["methods"][0]["needs"]), (ratios, last)
+    assert (ratios[0] == ratios[1] and any(n.get("max_error", last) < last
+                                           for n in told["methods"][0]["needs"])), (ratios, last)
 
 
 def surface(inputs):
     folder = folder_of(inputs, "surface")
-    rows, told = report(folder, "--keep", "--no-pictures", "--max-level", "2", folder_of(inputs, "open_box.ply"))
+    rows, told = report(folder, "--keep", "--no-pictures", "--max-level", "2",
+                        folder_of(inputs, "open_box.ply"))
     agree(rows, told)
     page_holds(folder, told, 0)
     against_info(told, folder)
     questions(told, folder)
     for l in told["methods"][0]["levels"]:
-        assert l["excess"] is None and l["maybe_uniform"] is None and l["inside_ns"] is None and l["width_median"] > 0 and l["hausdorff_hi"] >= 0
+        assert (l["excess"] is None and l["maybe_uniform"] is None and l["inside_ns"] is None
+                and l["width_median"] > 0 and l["hausdorff_hi"] >= 0)
     assert "exact_inside_ns" in told["methods"][0] and told["methods"][0]["exact_inside_ns"] is None
 
 
@@ -262,30 +301,36 @@ def single_leaf(inputs):
     level, = told["methods"][0]["levels"]
     assert (level["gray"], level["leaf"]) == (0, 1)
     # 4 faces and 4 vertices once; each plane has a normal of its own
-    assert level["leaf_planes"] > 0 and level["thesis_bytes"] == 1 + 12 * 4 + 12 * 4 + 20 * level["leaf_planes"]
+    assert (level["leaf_planes"] > 0
+            and level["thesis_bytes"] == 1 + 12 * 4 + 12 * 4 + 20 * level["leaf_planes"])
     assert abs(level["excess"]) < 10 and level["hausdorff_lo"] < 0.1 * told["model"]["diagonal"]
 
 
 def no_volume(inputs):
     flat = folder_of(inputs, "flat.ply")
-    flat.write_text("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 2\n"
-                    "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 2 1\n", encoding="ascii")
+    flat.write_text("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float "
+                    "y\nproperty float z\nelement face 2\n"
+                    "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 "
+                    "1 2\n3 0 2 1\n", encoding="ascii")
     rows, told = report(folder_of(inputs, "flat"), "--max-level", "1", flat)
     agree(rows, told)
     page_holds(folder_of(inputs, "flat"), told, 1)
-    assert told["model"]["volume"] == 0 and all(l["excess"] is None for l in told["methods"][0]["levels"])
+    assert (told["model"]["volume"] == 0 and all(l["excess"] is None
+                                                 for l in told["methods"][0]["levels"]))
 
 
 def without_mesh(inputs):
     file = folder_of(inputs, "bare.ebpo.h5")
-    run("convert", "-q", "--max-level", "2", "--without", "mesh", folder_of(inputs, "torus.ply"), file)
+    run("convert", "-q", "--max-level", "2", "--without", "mesh", folder_of(inputs, "torus.ply"),
+        file)
     rows, told = report(folder_of(inputs, "bare"), file)
     agree(rows, told)
     page_holds(folder_of(inputs, "bare"), told, 3)
     method, = told["methods"]
     assert method["exact_distance_ns"] is None and method["notes"]
     for l in method["levels"]:
-        assert l["hausdorff_hi"] is None and l["limit_volume"] is None and l["maybe_near"] is None and l["thesis_bytes"] is None
+        assert (l["hausdorff_hi"] is None and l["limit_volume"] is None and l["maybe_near"] is None
+                and l["thesis_bytes"] is None)
         assert l["maybe_uniform"] is not None and l["width_median"] > 0 and l["levels_volume"] > 0
 
 

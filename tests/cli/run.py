@@ -3,14 +3,16 @@
 
 run.py TOOL INPUTS FEATURES FILE.tests
 
-Each line of FILE.tests is
+Each line of FILE.tests, with the lines after it that begin with blanks, is
 
     exit code | standard output | standard error | command
 
-and is run by sh in a folder of its own for each file, in which the input meshes lie and in which later lines see what earlier
-ones wrote. Outputs are regular expressions (searched, "." matches newlines); an empty one means that there must be no output,
-* means anything, @NAME that the output equals the file NAME beside this script. "png:0" runs the line only when FEATURES
-(words with commas between) has png, "no-png:2" only when it has not. Lines that begin with # are comments.
+and is run by sh in a folder of its own for each file, in which the input meshes lie and in which
+later lines see what earlier ones wrote. Outputs are regular expressions (searched, "." matches
+newlines); an empty one means that there must be no output,
+* means anything, @NAME that the output equals the file NAME beside this script. "png:0" runs the
+line only when FEATURES (words with commas between) has png, "no-png:2" only when it has not. Lines
+that begin with # are comments.
 """
 import os
 import re
@@ -49,7 +51,8 @@ def run_line(line, folder, environment, features):
     code = wanted(code, features)
     if code is None:
         return None
-    done = subprocess.run(["sh", "-c", command], cwd=folder, env=environment, stdin=subprocess.DEVNULL, timeout=300,
+    done = subprocess.run(["sh", "-c", command], cwd=folder, env=environment,
+                          stdin=subprocess.DEVNULL, timeout=300,
                           capture_output=True)
     stdout, stderr = (b.decode("utf-8", "replace") for b in (done.stdout, done.stderr))
     wrong = []
@@ -62,17 +65,31 @@ def run_line(line, folder, environment, features):
     return "; ".join(wrong) + f"\n--- output\n{stdout}--- error\n{stderr}---" if wrong else None
 
 
+def lines_of(path):
+    """(number, test) of each test in a file; a line that begins with blanks continues the last."""
+    number, test = 0, ""
+    with open(path, encoding="utf-8") as data:
+        for at, line in enumerate(data, 1):
+            line = line.rstrip("\n")
+            if line.startswith(" "):
+                test += " " + line.lstrip()
+                continue
+            if test and not test.startswith("#"):
+                yield number, test
+            number, test = at, line
+    if test and not test.startswith("#"):
+        yield number, test
+
+
 def main():
     tool, inputs, features, tests = sys.argv[1:]
-    environment = dict(os.environ, LC_ALL="C.UTF-8", PATH=os.path.dirname(os.path.abspath(tool)) + ":" + os.environ["PATH"],
+    environment = dict(os.environ, LC_ALL="C.UTF-8",
+                       PATH=os.path.dirname(os.path.abspath(tool)) + ":" + os.environ["PATH"],
                        TESTS=HERE, INPUTS=os.path.abspath(inputs))
     bad = lines = 0
-    with tempfile.TemporaryDirectory() as folder, open(tests, encoding="utf-8") as data:
+    with tempfile.TemporaryDirectory() as folder:
         subprocess.run([inputs, folder], check=True)
-        for number, line in enumerate(data, 1):
-            line = line.rstrip("\n")
-            if not line or line.startswith("#"):
-                continue
+        for number, line in lines_of(tests):
             lines += 1
             wrong = run_line(line, folder, environment, features.split(","))
             if wrong:

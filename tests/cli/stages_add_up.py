@@ -1,10 +1,13 @@
 #!/usr/bin/env python3
-"""What `ebpo convert --json` says of its stages, read from standard input: whether it adds up; then the rows with the thesis' stages."""
+"""What `ebpo convert --json` says of its stages, read from standard input: whether it adds up; then
+the rows with the thesis' stages."""
 import json
 import sys
 
-NAMES = ["leaf creation", "corner labels", "leaf planes", "tree paths", "leaf clipping", "storing and propagating", "total"]
-ROWS = ["reading", "mending", "ordering", "checking", "cutting", "corners", "cells", "choosing", "top", "envelopes", "joining", "numbering", "writing", "judging"]
+NAMES = ["leaf creation", "corner labels", "leaf planes", "tree paths", "leaf clipping",
+         "storing and propagating", "total"]
+ROWS = ["reading", "mending", "ordering", "checking", "cutting", "corners", "cells", "choosing",
+        "top", "envelopes", "joining", "numbering", "writing", "judging"]
 
 
 def main():
@@ -14,7 +17,8 @@ def main():
     assert len({s["stage"] for s in stages}) == len(stages), "a stage is told twice"
     assert {s["name"] for s in stages} <= set(ROWS), [s["name"] for s in stages]
     assert sum(s["seconds"] for s in stages) <= facts["seconds"], "stages take longer than all"
-    assert [t["name"] for t in thesis] == NAMES and [t["number"] for t in thesis] == [1, 2, 3, 4, 5, 6, 7]
+    assert ([t["name"] for t in thesis] == NAMES
+            and [t["number"] for t in thesis] == [1, 2, 3, 4, 5, 6, 7])
     rows = {}
     for s in stages:
         assert set(s["thesis"]) <= set(range(1, 7)), s

@@ -1,4 +1,5 @@
-"""triangles_agree.py OUT NAME=MODEL.ply...: a glTF, OBJ or STL file holds these triangles, in their order, each coordinate the float32 nearest to that of the PLY (less the node's
+"""triangles_agree.py OUT NAME=MODEL.ply...: a glTF, OBJ or STL file holds these triangles, in their
+order, each coordinate the float32 nearest to that of the PLY (less the node's
 translation), and no vertex of one has become another's."""
 import struct
 import sys
@@ -14,6 +15,8 @@ for (name, origin, points, triangles), (wanted_name, path) in zip(found, wanted)
     assert len(faces) == len(triangles), (len(faces), len(triangles))
     for face, triangle in zip(faces, triangles):
         for here, there in zip(triangle, face):
-            rounded = struct.unpack("<3f", struct.pack("<3f", *(v - o for v, o in zip(model[there], origin))))
+            rounded = struct.unpack("<3f", struct.pack("<3f",
+                                                       *(v - o
+                                                         for v, o in zip(model[there], origin))))
             assert points[here] == rounded, (name, face, points[here], rounded)
 print("fine")

@@ -1,4 +1,5 @@
-"""view_adds_up.py LEVELS.json VIEW.json: an exhausted view has the nodes that the levels have, planes and winding numbers too, each parent before its children."""
+"""view_adds_up.py LEVELS.json VIEW.json: an exhausted view has the nodes that the levels have,
+planes and winding numbers too, each parent before its children."""
 import json
 import sys
 
@@ -10,12 +11,16 @@ for node in view["nodes"]:
     code = node["octcode"]
     assert code == 1 or code >> 3 in come, f"{code} before its parent"
     siblings.append(code)
-    assert len({c >> 3 for c in siblings}) == 1 and node["complete"] == (len(siblings) == (8 if code > 1 else 1)), siblings
+    assert (len({c >> 3 for c in siblings}) == 1
+            and node["complete"] == (len(siblings) == (8 if code > 1 else 1))), siblings
     if node["complete"]:
         siblings = []
     come[code] = {key: node[key] for key in told[code]}
 assert come == told, "other nodes"
 last = view["last"]
-kinds = {kind: sum(1 for n in come.values() if n["type"] == kind) for kind in ("leaf", "white", "black")}
-assert all(last[kind] == count for kind, count in kinds.items()) and last["gray"] == last["waiting"] == 0 and last["nodes"] == len(come) and view["end"] == "done", last
+kinds = {kind: sum(1 for n in come.values() if n["type"] == kind)
+         for kind in ("leaf", "white", "black")}
+assert (all(last[kind] == count for kind, count in kinds.items())
+        and last["gray"] == last["waiting"] == 0 and last["nodes"] == len(come)
+        and view["end"] == "done"), last
 print("fine")

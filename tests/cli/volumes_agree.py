@@ -1,4 +1,5 @@
-"""volumes_agree.py JSON <output of ebpo extract --level 0, 1, ...: the volumes are those that ebpo info tells; smaller where
+"""volumes_agree.py JSON <output of ebpo extract --level 0, 1, ...: the volumes are those that ebpo
+info tells; smaller where
 leaves are cut by planes that are derived from their faces, which the file does not count."""
 import json
 import math
@@ -11,5 +12,6 @@ assert len(volumes) >= 2
 for level, volume in enumerate(volumes):
     stated = levels[level]["envelope_volume"]
     derived = any(l["leaf"] and not l["leaf_planes"] for l in levels[: level + 1])
-    assert math.isclose(volume, stated, rel_tol=1e-7) or (derived and 0 < volume < stated), (level, volume, levels[level])
+    assert (math.isclose(volume, stated, rel_tol=1e-7)
+            or (derived and 0 < volume < stated)), (level, volume, levels[level])
 print("fine")

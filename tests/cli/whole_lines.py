@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
-"""Answers leave `ebpo COMMAND MODEL` as whole lines, also when it is interrupted: whole_lines.py COMMAND MODEL
+"""Answers leave `ebpo COMMAND MODEL` as whole lines, also when it is interrupted: whole_lines.py
+COMMAND MODEL
 
-Standard output is a pipe that keeps what was written apart (O_DIRECT): each piece must end with a line. Then SIGTERM, of which the program dies.
+Standard output is a pipe that keeps what was written apart (O_DIRECT): each piece must end with a
+line. Then SIGTERM, of which the program dies.
 """
 import itertools
 import os
@@ -16,7 +18,8 @@ PIECES = 200
 def ask(stream):
     try:
         for i in itertools.count():
-            stream.write(f"{i % 977 / 100} {i % 13 / 7} {i % 89 / 31}{' -1 0 0' if sys.argv[1] == 'ray' else ''}\n".encode())
+            stream.write(f"{i % 977 / 100} {i % 13 / 7} "
+                         f"{i % 89 / 31}{' -1 0 0' if sys.argv[1] == 'ray' else ''}\n".encode())
     except (BrokenPipeError, ValueError):
         pass
 
@@ -35,4 +38,5 @@ for number in itertools.count():
     if number == PIECES:
         process.send_signal(signal.SIGTERM)
 code = process.wait(timeout=60)
-print("fine" if code == -signal.SIGTERM and not broken and number > PIECES else f"code {code}, {broken} of {number} pieces end within a line")
+print("fine" if code == -signal.SIGTERM and not broken and number > PIECES
+      else f"code {code}, {broken} of {number} pieces end within a line")

@@ -3,7 +3,9 @@
 
     test_strict_fp.py SOURCE_ROOT COMPILER [ARGUMENT...]
 
-Each such source includes geom/strict_fp.h before all else, and the compiler (its name and the arguments for includes) stops there, with a message that says what to do, for each set of flags below that it knows.
+Each such source includes geom/strict_fp.h before all else, and the compiler (its name and the
+arguments for includes) stops there, with a message that says what to do, for each set of flags
+below that it knows.
 """
 import pathlib
 import re
@@ -14,7 +16,8 @@ import tempfile
 root, compiler = pathlib.Path(sys.argv[1]), sys.argv[2:]
 # These move numbers, and compute none that decides anything.
 MOVERS = {"base", "cache", "codec", "container", "h5", "http", "import", "input", "io", "include"}
-# Flags, and what the refusal must say. x87 registers keep 64 bits of mantissa; -mfpmath=both may keep them or not.
+# Flags, and what the refusal must say. x87 registers keep 64 bits of mantissa; -mfpmath=both may
+# keep them or not.
 REFUSED = [
     (["-ffast-math"], "fast-math"),
     (["-Ofast"], "fast-math"),
@@ -29,7 +32,8 @@ REFUSED = [
     (["-mfpmath=both"], "-mfpmath=sse"),
     (["-m32", "-mno-sse"], "-mfpmath=sse"),
 ]
-ACCEPTED = [["-O0"], ["-fno-math-errno"], ["-frounding-math"], ["-O3", "-march=native"], ["-O3", "-mfma", "-ffp-contract=fast"]]
+ACCEPTED = [["-O0"], ["-fno-math-errno"], ["-frounding-math"], ["-O3", "-march=native"],
+            ["-O3", "-mfma", "-ffp-contract=fast"]]
 
 
 def without_comments(text):
@@ -37,7 +41,8 @@ def without_comments(text):
 
 
 def compiled(flags, source):
-    return subprocess.run([*compiler, *flags, "-fsyntax-only", source], capture_output=True, text=True)
+    return subprocess.run([*compiler, *flags, "-fsyntax-only", source], capture_output=True,
+                          text=True)
 
 
 problems, numeric = [], []
@@ -50,20 +55,26 @@ for path in sorted((root / "lib").rglob("*.c")):
     numeric.append(path)
     first = re.search(r"#\s*include[^\n]*", text)
     if not first or "geom/strict_fp.h" not in first.group(0):
-        problems.append(f"{path.relative_to(root)}: computes with floating point but does not include geom/strict_fp.h first")
+        problems.append(f"{path.relative_to(root)}: computes with floating point but does not "
+                        f"include geom/strict_fp.h first")
 
 said = []
 with tempfile.TemporaryDirectory() as folder:
     known = pathlib.Path(folder, "known.c")
     known.write_text("int known;\n")
     source = pathlib.Path(folder, "refused.c")
-    source.write_text('#include "geom/strict_fp.h"\ndouble f(double x, double y);\ndouble f(double x, double y)\n{\n    return x + y;\n}\n')
+    source.write_text('#include "geom/strict_fp.h"\ndouble f(double x, double y);\ndouble '
+                      'f(double x, double y)\n{\n    return x + y;\n}\n')
     for flags, message in REFUSED:
-        if compiled(flags, known).returncode != 0 or "not supported" in compiled(flags, known).stderr or "unused" in compiled(flags, known).stderr:
+        if (compiled(flags, known).returncode != 0
+            or "not supported" in compiled(flags, known).stderr
+            or "unused" in compiled(flags, known).stderr):
             continue
         # What the flags do not change needs no refusal: clang ignores some of gcc's.
-        macros = subprocess.run([*compiler, *flags, "-dM", "-E", known], capture_output=True, text=True).stdout
-        plain = subprocess.run([*compiler, "-dM", "-E", known], capture_output=True, text=True).stdout
+        macros = subprocess.run([*compiler, *flags, "-dM", "-E", known], capture_output=True,
+                                text=True).stdout
+        plain = subprocess.run([*compiler, "-dM", "-E", known], capture_output=True,
+                               text=True).stdout
         if macros == plain:
             continue
         run = compiled(flags, source)
@@ -75,8 +86,10 @@ with tempfile.TemporaryDirectory() as folder:
             said.append(" ".join(flags))
     for flags in ACCEPTED:
         if compiled(flags, known).returncode == 0 and compiled(flags, source).returncode != 0:
-            problems.append(f"{' '.join(flags)}: refused, but should compile: {compiled(flags, source).stderr}")
+            problems.append(f"{' '.join(flags)}: refused, but should compile: "
+                            f"{compiled(flags, source).stderr}")
 if not said:
     problems.append("no flags were refused")
-print("\n".join(problems) or f"{len(numeric)} sources insist on strict floating point; refused: {', '.join(said)}")
+print("\n".join(problems)
+      or f"{len(numeric)} sources insist on strict floating point; refused: {', '.join(said)}")
 sys.exit(1 if problems else 0)

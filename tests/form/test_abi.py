@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """The public interface against its stored description: test_abi.py CC... -- SOURCE_ROOT [--update]
 
-What the headers declare is compiled into a library of empty functions, described by abidw and compared by abidiff with
-tests/form/libebpo.abi: so it does not matter what the real library's private structs are, or how it was compiled. test_exports.py
-sees to it that the real library exports just these functions. Also: structs that begin with their size must not end in padding,
-or a member that is appended would come to lie where older callers have garbage.
+What the headers declare is compiled into a library of empty functions, described by abidw and
+compared by abidiff with tests/form/libebpo.abi: so it does not matter what the real library's
+private structs are, or how it was compiled. test_exports.py sees to it that the real library
+exports just these functions. Also: structs that begin with their size must not end in padding, or a
+member that is appended would come to lie where older callers have garbage.
 """
 import pathlib
 import re
@@ -35,23 +36,28 @@ def stub(text):
         declaration = re.sub(r"\bEBPO_MUST_USE\b|\bEBPO_PRINTF\([^)]*\)", "", declaration)
         lines.append(" ".join(declaration.split()) + " { __builtin_trap(); }")
     types = sorted(set(re.findall(r"^\}\s*(ebpo_\w+);", text, flags=re.M)))
-    lines += [f"EBPO_API void type_{name}({name} *it); void type_{name}({name} *it) {{ (void)it; }}" for name in types]
+    lines += [f"EBPO_API void type_{name}({name} *it); void type_{name}({name} *it) {{ (void)it; }}"
+              for name in types]
     for name, body in re.findall(r"typedef struct (ebpo_\w+) \{(.*?)^\}", text, flags=re.S | re.M):
         if re.match(r"\s*size_t struct_size;", body):
             last = body.strip().split(";")[-2]
             member = re.search(r"\(\*(\w+)\)|(\w+)\s*(?:\[[^]]*\]\s*)*$", last)
             member = member.group(1) or member.group(2)
-            lines.append(f"_Static_assert(offsetof({name}, {member}) + sizeof((({name} *)0)->{member}) == sizeof({name}), "
-                         f'"{name} ends in padding: add a reserved member, or put a larger one last");')
+            lines.append(f"_Static_assert(offsetof({name}, {member}) + sizeof((({name} "
+                         f"*)0)->{member}) == sizeof({name}), "
+                         f'"{name} ends in padding: add a reserved member, or put a larger one '
+                         f'last");')
     return "\n".join(lines) + "\n"
 
 
 def describe(folder, output):
     source, library = folder / "stub.c", folder / "libebpo.so.0"
     source.write_text(stub(header_text()))
-    subprocess.run([*compiler, "-std=c11", "-g", "-O0", "-shared", "-fPIC", "-fvisibility=hidden", f"-I{INCLUDE}",
+    subprocess.run([*compiler, "-std=c11", "-g", "-O0", "-shared", "-fPIC", "-fvisibility=hidden",
+                    f"-I{INCLUDE}",
                     "-Wl,-soname,libebpo.so.0", "-nostdlib", "-o", library, source], check=True)
-    subprocess.run(["abidw", "--no-show-locs", "--no-corpus-path", "--no-comp-dir-path", "--no-elf-needed", "--out-file", output,
+    subprocess.run(["abidw", "--no-show-locs", "--no-corpus-path", "--no-comp-dir-path",
+                    "--no-elf-needed", "--out-file", output,
                     library], check=True)
 
 
@@ -73,8 +79,10 @@ def main():
     if compared.returncode == 0:
         return 0
     print(compared.stdout + compared.stderr)
-    print("The public interface is not the one that is stored. Unless that is what you want, mend lib/include/ebpo. A member may be "
-          "added at the end of a struct that begins with struct_size, a function or a constant may be added; all else breaks programs "
+    print("The public interface is not the one that is stored. Unless that is what you want, mend "
+          "lib/include/ebpo. A member may be "
+          "added at the end of a struct that begins with struct_size, a function or a constant "
+          "may be added; all else breaks programs "
           "and needs a new major version. Then:\n\n    tests/form/test_abi.py gcc -- . --update")
     return 1
 

@@ -10,8 +10,8 @@ import re
 import subprocess
 import sys
 
-COLUMNS = {}
-OTHERS = 500
+COLUMNS = {".build": 300, ".py": 140, ".sh": 120, ".md": 120, ".txt": 120}
+OTHERS = 199  # of C where it is a table, .tests, .js, .css, man pages, ...
 MADE = re.compile(  # by programs
     r"^(docs/measured/|format-spec/vectors/|tests/fuzz/seeds/|tests/flags/fp_golden\.txt$|"
     r".*package-lock\.json$|.*\.svg$)")

@@ -7,7 +7,8 @@ import sys
 root = pathlib.Path(sys.argv[1])
 skipped = {"node_modules", ".git"}
 pages = [p for p in root.rglob("*.md")
-         if not skipped & set(p.parts) and not any(part.startswith("build") for part in p.relative_to(root).parts)]
+         if not skipped & set(p.parts) and not any(part.startswith("build")
+                                                   for part in p.relative_to(root).parts)]
 problems = []
 for page in pages:
     for link in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):

@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
 """A web server that misbehaves as its addresses say.
 
-faulty_server.py FILE            serves FILE on 127.0.0.1, prints the port on a line, and ends when its standard input does
-http://127.0.0.1:PORT/FAULT/...  FAULT is one of the functions below without "fault_", numbers after dashes are its arguments
+faulty_server.py FILE            serves FILE on 127.0.0.1, prints the port on a line, and ends when
+its standard input does http://127.0.0.1:PORT/FAULT/...  FAULT is one of the functions below without
+"fault_", numbers after dashes are its arguments
 
-Each address counts its requests by itself, so a test takes an address of its own: what follows FAULT/ is not looked at.
+Each address counts its requests by itself, so a test takes an address of its own: what follows
+FAULT/ is not looked at.
 """
 import collections
 import email.utils
@@ -42,7 +44,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
         self.end_headers()
 
     def version(self, etag='"v1"', modified=MODIFIED):
-        return ([("ETag", etag)] if etag else []) + ([("Last-Modified", modified)] if modified else [])
+        return ([("ETag", etag)] if etag else []) + ([("Last-Modified", modified)] if modified
+                                                     else [])
 
     def asked(self, data):
         found = re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers.get("Range", ""))
@@ -52,7 +55,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
         return (begin, last) if begin <= last else None
 
     def part(self, data=None, version=None, extra=(), shift=0, cut=0, code=206):
-        """The range that was asked for. `shift`: of what Content-Range says; `cut`: bytes that are missing at the end."""
+        """The range that was asked for. `shift`: of what Content-Range says; `cut`: bytes that are
+        missing at the end."""
         data = self.data if data is None else data
         asked = self.asked(data)
         if asked is None:
@@ -60,7 +64,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
             return
         begin, last = asked
         body = data[begin:last + 1]
-        self.head(code, [("Content-Range", f"bytes {begin + shift}-{last + shift}/{len(data)}"), ("Content-Length", len(body))]
+        self.head(code, [("Content-Range", f"bytes {begin + shift}-{last + shift}/{len(data)}"),
+                         ("Content-Length", len(body))]
                   + (self.version() if version is None else version) + list(extra))
         self.wfile.write(body[:len(body) - cut])
         if cut:
@@ -68,7 +73,9 @@ class Handler(http.server.BaseHTTPRequestHandler):
 
     def whole(self, data=None, version=None):
         data = self.data if data is None else data
-        self.head(200, [("Content-Length", len(data))] + (self.version() if version is None else version))
+        self.head(200,
+                  [("Content-Length", len(data))] + (self.version() if version is None
+                                                     else version))
         self.wfile.write(data)
 
     def chunks(self, code, headers, body):
@@ -88,7 +95,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
 
     def fail(self, code, extra=()):
         text = b"<html>no</html>"
-        self.head(code, [("Content-Length", len(text)), ("Content-Type", "text/html")] + list(extra))
+        self.head(code, [("Content-Length", len(text)),
+                         ("Content-Type", "text/html")] + list(extra))
         self.wfile.write(text)
 
     def first(self, times, fault):
@@ -180,7 +188,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
         def fault():
             begin, last = self.asked(self.data)
             body = self.data[begin:last + 1][:500]
-            self.head(206, [("Content-Range", f"bytes {begin}-{last}/{len(self.data)}"), ("Content-Length", len(body))] + self.version())
+            self.head(206, [("Content-Range", f"bytes {begin}-{last}/{len(self.data)}"),
+                            ("Content-Length", len(body))] + self.version())
             self.wfile.write(body)
         self.first(times, fault)
 
@@ -188,7 +197,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
         """Answers with a shorter range than was asked for, and says so: that is allowed."""
         begin, last = self.asked(self.data)
         last = min(last, begin + 70000)
-        self.head(206, [("Content-Range", f"bytes {begin}-{last}/{len(self.data)}"), ("Content-Length", last - begin + 1)] + self.version())
+        self.head(206, [("Content-Range", f"bytes {begin}-{last}/{len(self.data)}"),
+                        ("Content-Length", last - begin + 1)] + self.version())
         self.wfile.write(self.data[begin:last + 1])
 
     def fault_wrong_range(self):
@@ -209,7 +219,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
 
     def fault_star(self):
         begin, last = self.asked(self.data)
-        self.head(206, [("Content-Range", f"bytes {begin}-{last}/*"), ("Content-Length", last + 1 - begin)])
+        self.head(206, [("Content-Range", f"bytes {begin}-{last}/*"),
+                        ("Content-Length", last + 1 - begin)])
         self.wfile.write(self.data[begin:last + 1])
 
     def fault_two_ranges(self):
@@ -218,22 +229,26 @@ class Handler(http.server.BaseHTTPRequestHandler):
 
     def fault_wide(self):
         begin = self.asked(self.data)[0]
-        self.head(206, [("Content-Range", f"bytes {begin}-{len(self.data) - 1}/{len(self.data)}"), ("Content-Length", len(self.data) - begin)])
+        self.head(206, [("Content-Range", f"bytes {begin}-{len(self.data) - 1}/{len(self.data)}"),
+                        ("Content-Length", len(self.data) - begin)])
         self.wfile.write(self.data[begin:])
 
     def fault_longer(self):
         begin, last = self.asked(self.data)
-        self.chunks(206, [("Content-Range", f"bytes {begin}-{last}/{len(self.data)}")], self.data[begin:last + 1] + b"more")
+        self.chunks(206, [("Content-Range", f"bytes {begin}-{last}/{len(self.data)}")],
+                    self.data[begin:last + 1] + b"more")
 
     def fault_multipart(self):
         body = b"--x\r\nContent-Range: bytes 0-9/100\r\n\r\n0123456789\r\n--x--\r\n"
-        self.head(206, [("Content-Type", "multipart/byteranges; boundary=x"), ("Content-Length", len(body))])
+        self.head(206, [("Content-Type", "multipart/byteranges; boundary=x"),
+                        ("Content-Length", len(body))])
         self.wfile.write(body)
 
     def fault_gzip(self):
         begin, last = self.asked(self.data)
         body = gzip.compress(self.data[begin:last + 1])
-        self.head(206, [("Content-Range", f"bytes {begin}-{last}/{len(self.data)}"), ("Content-Encoding", "gzip"), ("Content-Length", len(body))]
+        self.head(206, [("Content-Range", f"bytes {begin}-{last}/{len(self.data)}"),
+                        ("Content-Encoding", "gzip"), ("Content-Length", len(body))]
                   + self.version())
         self.wfile.write(body)
 
@@ -248,7 +263,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
     def fault_stall_body(self, times=1):
         def fault():
             begin, last = self.asked(self.data)
-            self.head(206, [("Content-Range", f"bytes {begin}-{last}/{len(self.data)}"), ("Content-Length", last + 1 - begin)] + self.version())
+            self.head(206, [("Content-Range", f"bytes {begin}-{last}/{len(self.data)}"),
+                            ("Content-Length", last + 1 - begin)] + self.version())
             self.wfile.write(self.data[begin:begin + 1000])
             self.nap()
         self.first(times, fault)
@@ -256,7 +272,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
     def fault_drip(self):
         """A few bytes at a time, for ever."""
         begin, last = self.asked(self.data)
-        self.head(206, [("Content-Range", f"bytes {begin}-{last}/{len(self.data)}"), ("Content-Length", last + 1 - begin)] + self.version())
+        self.head(206, [("Content-Range", f"bytes {begin}-{last}/{len(self.data)}"),
+                        ("Content-Length", last + 1 - begin)] + self.version())
         for at in range(begin, last + 1, 200):
             self.wfile.write(self.data[at:min(at + 200, last + 1)])
             self.wfile.flush()
@@ -338,7 +355,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
 
     def fault_chunked(self):
         begin, last = self.asked(self.data)
-        self.chunks(206, [("Content-Range", f"bytes {begin}-{last}/{len(self.data)}")], self.data[begin:last + 1])
+        self.chunks(206, [("Content-Range", f"bytes {begin}-{last}/{len(self.data)}")],
+                    self.data[begin:last + 1])
 
     def fault_headers(self, kilobytes=400):
         self.send_response_only(206)
@@ -354,7 +372,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
         self.head(416, [("Content-Range", "bytes */0"), ("Content-Length", 0)])
 
     def fault_private(self):
-        good = self.headers.get("Authorization") == "Basic bmFtZTpzZWNyZXQ=" and self.headers.get("X-Key") == "7"
+        good = (self.headers.get("Authorization") == "Basic bmFtZTpzZWNyZXQ="
+                and self.headers.get("X-Key") == "7")
         if good and self.headers.get("Accept-Encoding") == "identity":
             self.part()
         else:
@@ -365,9 +384,12 @@ class Handler(http.server.BaseHTTPRequestHandler):
         if dice.random() * 100 >= percent:
             self.part()
             return
-        passing = [lambda: self.part(cut=dice.randrange(1, 400)), self.drop, lambda: self.fail(503), lambda: self.fail(500),
-                   self.fault_less, self.fault_chunked, lambda: self.fault_lying_length(10**6), lambda: self.redirect("/good/r")]
-        final = [self.fault_gzip, self.fault_longer, self.fault_wrong_range, self.fault_no_range, self.fault_whole, lambda: self.fail(404),
+        passing = [lambda: self.part(cut=dice.randrange(1, 400)), self.drop, lambda: self.fail(503),
+                   lambda: self.fail(500),
+                   self.fault_less, self.fault_chunked, lambda: self.fault_lying_length(10**6),
+                   lambda: self.redirect("/good/r")]
+        final = [self.fault_gzip, self.fault_longer, self.fault_wrong_range, self.fault_no_range,
+                 self.fault_whole, lambda: self.fail(404),
                  lambda: self.part(data=self.data[::-1], version=self.version(etag='"v2"'))]
         dice.choice(final if dice.random() < 0.03 else passing)()
 

@@ -1,5 +1,6 @@
 #!/bin/sh
-# The zstd filter as a plugin, in the hands of HDF5's own tools: test_plugin.sh PLUGIN_FOLDER VECTORS
+# The zstd filter as a plugin, in the hands of HDF5's own tools: test_plugin.sh PLUGIN_FOLDER
+# VECTORS
 set -u
 export HDF5_PLUGIN_PATH="$1"
 vector="$2/passed/05_two_levels.ebpo.h5"
@@ -14,10 +15,13 @@ h5dump -d /mesh/faces "$vector" >"$work/dump" 2>&1 || fail "h5dump with the plug
 grep -q '(3,0): 2, 3, 1' "$work/dump" || fail "h5dump prints the codes of the faces"
 h5repack -f NONE "$vector" "$work/bare.h5" || fail "h5repack with the plugin"
 h5dump -d /mesh/faces "$work/bare.h5" | grep -q '(3,0): 2, 3, 1' || fail "h5repack keeps the values"
-h5repack -f SHUF -f UD=32015,0,1,5 "$plain" "$work/packed.h5" || fail "h5repack compresses with the plugin"
-h5dump -p -d /mesh/faces "$work/packed.h5" | grep -q 'FILTER_ID 32015' || fail "the filter is recorded"
+h5repack -f SHUF -f UD=32015,0,1,5 "$plain" "$work/packed.h5" ||
+    fail "h5repack compresses with the plugin"
+h5dump -p -d /mesh/faces "$work/packed.h5" | grep -q 'FILTER_ID 32015' ||
+    fail "the filter is recorded"
 
 # What the specification says of tools without the plugin.
-HDF5_PLUGIN_PATH=/nowhere h5dump -d /mesh/faces "$vector" >"$work/dump" 2>&1 ; [ $? = 1 ] || fail "h5dump without the plugin fails"
+HDF5_PLUGIN_PATH=/nowhere h5dump -d /mesh/faces "$vector" >"$work/dump" 2>&1 ; [ $? = 1 ] ||
+    fail "h5dump without the plugin fails"
 grep -q '(3,0): 2, 3, 1' "$work/dump" && fail "h5dump without the plugin prints nothing"
 exit 0

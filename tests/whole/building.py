@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
 """building.py TOOL GENERATE FULL_DISK
 
-What `ebpo convert` promises of memory, temporary files and bytes, on a model that does not fit into its budget:
+What `ebpo convert` promises of memory, temporary files and bytes, on a model that does not fit into
+its budget:
   - the bytes are the same for any number of threads and any budget;
   - the process never has more resident than --memory allows;
-  - interrupted at any stage, also by SIGKILL, it leaves nothing in --temp-dir, and nothing beside OUT unless killed;
+  - interrupted at any stage, also by SIGKILL, it leaves nothing in --temp-dir, and nothing beside
+  OUT unless killed;
   - a full disk is an error that names the folder, and leaves nothing.
 FULL_DISK is preloaded to make a disk full without being root.
 """
@@ -42,7 +44,8 @@ class Place:
     """A folder for the output and one for temporary files, both empty."""
 
     def __init__(self, root, name):
-        self.out_dir, self.temp_dir = os.path.join(root, name, "out"), os.path.join(root, name, "temp")
+        self.out_dir, self.temp_dir = os.path.join(root, name,
+                                                   "out"), os.path.join(root, name, "temp")
         os.makedirs(self.out_dir)
         os.makedirs(self.temp_dir)
         self.out = os.path.join(self.out_dir, "x.ebpo.h5")
@@ -56,7 +59,8 @@ class Place:
 
 def write_ply(path, vertices, faces):
     with open(path, "wb") as f:
-        f.write(b"ply\nformat binary_little_endian 1.0\nelement vertex %d\nproperty double x\nproperty double y\nproperty double z\n"
+        f.write(b"ply\nformat binary_little_endian 1.0\nelement vertex %d\nproperty double "
+                b"x\nproperty double y\nproperty double z\n"
                 b"element face %d\nproperty list uchar int vertex_indices\nend_header\n" % (len(vertices), len(faces)))
         f.write(b"".join(struct.pack("<3d", *v) for v in vertices))
         f.write(b"".join(struct.pack("<B3i", 3, *t) for t in faces))
@@ -65,7 +69,8 @@ def write_ply(path, vertices, faces):
 def write_fan(path, faces):
     """Two cones over one circle: half of the faces at each apex."""
     n = faces // 2
-    ring = [(math.cos(2 * math.pi * i / n), math.sin(2 * math.pi * i / n), 0.001 * (i % 7)) for i in range(n)]
+    ring = [(math.cos(2 * math.pi * i / n), math.sin(2 * math.pi * i / n), 0.001 * (i % 7))
+            for i in range(n)]
     sides = [t for i in range(n) for t in ((i, (i + 1) % n, n), ((i + 1) % n, i, n + 1))]
     write_ply(path, ring + [(0, 0, 1), (0, 0, -1)], sides)
 
@@ -78,7 +83,8 @@ def write_box(path):
 
 
 def usual_signals():
-    for number in signal.SIGINT, signal.SIGTERM, signal.SIGHUP:  # nohup and background jobs hand down that these are ignored
+    # nohup and background jobs hand down that these are ignored
+    for number in signal.SIGINT, signal.SIGTERM, signal.SIGHUP:
         signal.signal(number, signal.SIG_DFL)
 
 
@@ -101,7 +107,8 @@ def uses_files(pid, folder):
 def run(command, folder, environment=None, file_bytes=None):
     """Exit code, what was said, peak of resident bytes, whether files were used."""
     with tempfile.TemporaryFile() as said:
-        process = subprocess.Popen(command, stdout=said, stderr=said, stdin=subprocess.DEVNULL, preexec_fn=limits(file_bytes),
+        process = subprocess.Popen(command, stdout=said, stderr=said, stdin=subprocess.DEVNULL,
+                                   preexec_fn=limits(file_bytes),
                                    env=dict(os.environ, LC_ALL="C.UTF-8", **(environment or {})))
         filed = False
         while True:
@@ -112,7 +119,8 @@ def run(command, folder, environment=None, file_bytes=None):
             time.sleep(0.01)
         process.returncode = os.waitstatus_to_exitcode(status)
         said.seek(0)
-        return process.returncode, said.read().decode("utf-8", "replace"), usage.ru_maxrss * 1024, filed
+        return process.returncode, said.read().decode("utf-8",
+                                                      "replace"), usage.ru_maxrss * 1024, filed
 
 
 def slurp(path):
@@ -122,7 +130,8 @@ def slurp(path):
 
 def same_bytes_and_bounded_memory(root, model):
     place = Place(root, "plain")
-    code, said, free_peak, filed = run(place.command(model, "-q", "--memory", "16G", "--threads", "1"), place.temp_dir)
+    code, said, free_peak, filed = run(place.command(model, "-q", "--memory", "16G", "--threads",
+                                                     "1"), place.temp_dir)
     check(code == 0 and not said, f"a large budget: builds ({said.strip()})")
     if code:
         return
@@ -130,19 +139,25 @@ def same_bytes_and_bounded_memory(root, model):
     expected = slurp(place.out)
     for memory, threads in (("16G", 3), ("256M", 2), ("128M", 1), ("128M", 2), ("128M", 3)):
         os.unlink(place.out)
-        code, said, peak, filed = run(place.command(model, "-q", "--memory", memory, "--threads", str(threads)), place.temp_dir)
+        code, said, peak, filed = run(place.command(model, "-q", "--memory", memory, "--threads",
+                                                    str(threads)), place.temp_dir)
         name = f"--memory {memory} --threads {threads}"
         check(code == 0 and not said, f"{name}: builds ({said.strip()})")
         check(code == 0 and slurp(place.out) == expected, f"{name}: the bytes are the same")
-        check(place.left() == ["x.ebpo.h5"], f"{name}: leaves nothing but the output ({place.left()})")
+        check(place.left() == ["x.ebpo.h5"],
+              f"{name}: leaves nothing but the output ({place.left()})")
         if memory != "16G":
             budget = int(memory[:-1]) * MIB
             check(filed, f"{name}: uses temporary files")
             check(peak <= budget, f"{name}: {peak / MIB:.0f} MiB resident at most")
-            check(free_peak > budget, f"{name}: without a budget {free_peak / MIB:.0f} MiB, so the budget is put to the test")
+            check(free_peak > budget,
+                  f"{name}: without a budget {free_peak / MIB:.0f} MiB, so the budget is put to "
+                  f"the test")
     os.unlink(place.out)
-    code, said, peak, filed = run(place.command(model, "-q", "--memory", "128M", "--threads", "16"), place.temp_dir)
-    check(code == 0 and slurp(place.out) == expected and peak <= SMALL, f"--memory 128M --threads 16: the same bytes, {peak / MIB:.0f} MiB resident at most")
+    code, said, peak, filed = run(place.command(model, "-q", "--memory", "128M", "--threads", "16"),
+                                  place.temp_dir)
+    check(code == 0 and slurp(place.out) == expected and peak <= SMALL,
+          f"--memory 128M --threads 16: the same bytes, {peak / MIB:.0f} MiB resident at most")
     proving_and_extracting(place, model)
 
 
@@ -150,13 +165,20 @@ def proving_and_extracting(place, model):
     """What was built in little memory is proved and given back in as little."""
     back = os.path.join(place.out_dir, "back.ply")
     little = ["--temp-dir", place.temp_dir, "--memory"]
-    for what, command in (("verify --against", ["verify", place.out, "--against", model]), ("check --weld --orient --fill-holes", ["check", "--weld", "--orient", "--fill-holes", model])):
+    for what, command in (("verify --against", ["verify", place.out, "--against", model]),
+                          ("check --weld --orient --fill-holes",
+                           ["check", "--weld", "--orient", "--fill-holes", model])):
         _, _, free_peak, _ = run([TOOL, *command, "-q", *little, "16G"], place.temp_dir)
         code, said, peak, _ = run([TOOL, *command, "-q", *little, "128M"], place.temp_dir)
-        check(code == 0 and peak <= SMALL, f"{what} --memory 128M: {peak / MIB:.0f} MiB resident at most ({said.strip()})")
-        check(free_peak > SMALL, f"{what}: without a budget {free_peak / MIB:.0f} MiB, so the budget is put to the test")
-    code, _, peak, _ = run([TOOL, "extract", "--mesh", "-q", *little, "128M", place.out, back], place.temp_dir)
-    check(code == 0 and peak <= SMALL, f"extract --mesh --memory 128M: {peak / MIB:.0f} MiB resident at most")
+        check(code == 0 and peak <= SMALL,
+              f"{what} --memory 128M: {peak / MIB:.0f} MiB resident at most ({said.strip()})")
+        check(free_peak > SMALL,
+              f"{what}: without a budget {free_peak / MIB:.0f} MiB, so the budget is put to the "
+              f"test")
+    code, _, peak, _ = run([TOOL, "extract", "--mesh", "-q", *little, "128M", place.out, back],
+                           place.temp_dir)
+    check(code == 0 and peak <= SMALL,
+          f"extract --mesh --memory 128M: {peak / MIB:.0f} MiB resident at most")
     check(slurp(back) == slurp(model), "extract --mesh --memory 128M: the model, bit for bit")
 
 
@@ -164,13 +186,16 @@ def same_bytes_as_usual(root, model):
     """With envelopes as fine as they are by default."""
     place, seen = Place(root, "usual"), []
     for memory, threads in (("16G", 1), ("128M", 3)):
-        code, said, _, _ = run(place.command(model, "-q", "--memory", memory, "--threads", str(threads), options=[]), place.temp_dir)
+        code, said, _, _ = run(place.command(model, "-q", "--memory", memory, "--threads",
+                                             str(threads), options=[]), place.temp_dir)
         seen.append(slurp(place.out) if code == 0 else said)
-    check(isinstance(seen[0], bytes) and seen[0] == seen[1], "usual envelopes: the bytes are the same for 16G, 1 thread and 128M, 3 threads")
+    check(isinstance(seen[0], bytes) and seen[0] == seen[1],
+          "usual envelopes: the bytes are the same for 16G, 1 thread and 128M, 3 threads")
 
 
 def run_until(command, stage, number):
-    """Runs on a terminal, sends the signal once the stage is shown; how it ended and whether the stage was seen."""
+    """Runs on a terminal, sends the signal once the stage is shown; how it ended and whether the
+    stage was seen."""
     pid, terminal = pty.fork()
     if pid == 0:
         usual_signals()
@@ -195,8 +220,11 @@ def run_until(command, stage, number):
 def one_cell(root, model):
     """Cells that may not be cut are worked on in memory: half of the budget must do."""
     place = Place(root, "one cell")
-    code, said, _, _ = run(place.command(model, "-q", "--memory", "128M", options=["--max-level", "0"]), place.temp_dir)
-    check(code == 1 and "a cell of level 0, the deepest that was allowed, lists " in said and "allow more levels or more memory" in said and not place.left(), f"one cell: {said.strip()} ({code}, {place.left()})")
+    code, said, _, _ = run(place.command(model, "-q", "--memory", "128M",
+                                         options=["--max-level", "0"]), place.temp_dir)
+    check(code == 1 and "a cell of level 0, the deepest that was allowed, lists " in said
+          and "allow more levels or more memory" in said and not place.left(),
+          f"one cell: {said.strip()} ({code}, {place.left()})")
 
 
 def unlike_scans(root):
@@ -204,42 +232,65 @@ def unlike_scans(root):
     place, model = Place(root, "unlike scans"), os.path.join(root, "unlike.ply")
     write_box(model)
     for threads in "1", "3":
-        code, said, peak, _ = run(place.command(model, "-q", "--memory", "128M", "--threads", threads, options=["--leaf-faces", "0", "--max-level", "9"]), place.temp_dir)
-        check(code == 0 and peak <= SMALL, f"12 faces in 1.5 million leaves, {threads} threads: {peak / MIB:.0f} MiB resident at most ({said.strip()})")
+        code, said, peak, _ = run(place.command(model, "-q", "--memory", "128M", "--threads",
+                                                threads,
+                                                options=["--leaf-faces", "0", "--max-level",
+                                                         "9"]), place.temp_dir)
+        check(code == 0 and peak <= SMALL,
+              f"12 faces in 1.5 million leaves, {threads} threads: {peak / MIB:.0f} MiB resident "
+              f"at most ({said.strip()})")
     write_fan(model, 1_000_000)
     for threads in "1", "3":
-        code, said, peak, _ = run(place.command(model, "-q", "--memory", "192M", "--threads", threads, options=[]), place.temp_dir)
-        check(code == 0 and peak <= 192 * MIB, f"half a million faces at a vertex, {threads} threads: {peak / MIB:.0f} MiB resident at most ({said.strip()})")
+        code, said, peak, _ = run(place.command(model, "-q", "--memory", "192M", "--threads",
+                                                threads, options=[]), place.temp_dir)
+        check(code == 0 and peak <= 192 * MIB,
+              f"half a million faces at a vertex, {threads} threads: {peak / MIB:.0f} MiB "
+              f"resident at most ({said.strip()})")
     os.unlink(model)
 
 
 def interrupted(root, model):
-    cases = [(s, signal.SIGTERM) for s in ("reading", "ordering faces", "checking edges", "cutting into pieces", "top envelopes", "joining levels", "numbering vertices")]
-    cases += [(s, signal.SIGINT) for s in ("ordering vertices", "envelopes", "writing")] + [("writing", signal.SIGTERM), ("envelopes", signal.SIGHUP)]
-    for stage, number in cases + [("ordering faces", signal.SIGKILL), ("envelopes", signal.SIGKILL), ("writing", signal.SIGKILL)]:
+    cases = [(s, signal.SIGTERM) for s in ("reading", "ordering faces", "checking edges",
+                                           "cutting into pieces", "top envelopes", "joining levels",
+                                           "numbering vertices")]
+    cases += [(s, signal.SIGINT) for s in ("ordering vertices", "envelopes",
+                                           "writing")] + [("writing", signal.SIGTERM),
+                                                          ("envelopes", signal.SIGHUP)]
+    for stage, number in cases + [("ordering faces", signal.SIGKILL), ("envelopes", signal.SIGKILL),
+                                  ("writing", signal.SIGKILL)]:
         place = Place(root, f"{stage} {number}")
         code, seen = run_until(place.command(model, "--memory", "128M"), stage, number)
         name = f"{signal.Signals(number).name} while {stage}"
         check(seen and code == -number, f"{name}: ends by it ({code})")
-        check(not os.listdir(place.temp_dir), f"{name}: leaves nothing in --temp-dir ({place.left()})")
+        check(not os.listdir(place.temp_dir),
+              f"{name}: leaves nothing in --temp-dir ({place.left()})")
         if number != signal.SIGKILL:
-            check(not os.listdir(place.out_dir), f"{name}: leaves nothing beside the output ({place.left()})")
+            check(not os.listdir(place.out_dir),
+                  f"{name}: leaves nothing beside the output ({place.left()})")
 
 
 def files_with_names(root, model):
-    """Where files cannot be made without names, they have one for a moment only, and a signal in that moment finds it."""
+    """Where files cannot be made without names, they have one for a moment only, and a signal in
+    that moment finds it."""
     strange = {"LD_PRELOAD": FULL_DISK, "EBPO_TEST_NAMED": "1"}
     place = Place(root, "named")
-    code, said, _, filed = run(place.command(model, "-q", "--memory", "128M"), place.temp_dir, strange)
-    check(code == 0 and filed and place.left() == ["x.ebpo.h5"], f"without O_TMPFILE: builds, and leaves nothing but the output ({said.strip()} {place.left()})")
+    code, said, _, filed = run(place.command(model, "-q", "--memory", "128M"), place.temp_dir,
+                               strange)
+    check(code == 0 and filed and place.left() == ["x.ebpo.h5"],
+          f"without O_TMPFILE: builds, and leaves nothing but the output ({said.strip()} "
+          f"{place.left()})")
     place = Place(root, "named and interrupted")
-    process = subprocess.Popen(place.command(model, "-q"), env=dict(os.environ, EBPO_TEST_PAUSE="1", **strange), preexec_fn=limits())
+    process = subprocess.Popen(place.command(model, "-q"),
+                               env=dict(os.environ, EBPO_TEST_PAUSE="1", **strange),
+                               preexec_fn=limits())
     while process.poll() is None and not os.listdir(place.temp_dir):
         time.sleep(0.01)
     seen = os.listdir(place.temp_dir)
     process.send_signal(signal.SIGTERM)
     process.wait(timeout=60)
-    check(seen and process.returncode == -signal.SIGTERM and not place.left(), f"without O_TMPFILE: a file with a name is removed when interrupted ({seen}, then {place.left()})")
+    check(seen and process.returncode == -signal.SIGTERM and not place.left(),
+          f"without O_TMPFILE: a file with a name is removed when interrupted ({seen}, then "
+          f"{place.left()})")
 
 
 def full_disk(root, model):
@@ -248,35 +299,44 @@ def full_disk(root, model):
     while n < 1 << 16:
         place = Place(root, f"full {n}")
         n = 2 * n if n else 1
-        code, said, _, _ = run(place.command(model, "-q", "--memory", "128M"), place.temp_dir, {"LD_PRELOAD": FULL_DISK, "EBPO_TEST_FULL_AT": str(n)})
+        code, said, _, _ = run(place.command(model, "-q", "--memory", "128M"), place.temp_dir,
+                               {"LD_PRELOAD": FULL_DISK, "EBPO_TEST_FULL_AT": str(n)})
         if code == 0:
             break
         failed += 1
-        good = code == 1 and place.temp_dir in said and "No space left on device" in said and "another folder" in said and said.count("\n") == 1
+        good = (code == 1 and place.temp_dir in said and "No space left on device" in said
+                and "another folder" in said and said.count("\n") == 1)
         check(good, f"disk full at file {n}: {said.strip()} ({code})")
         check(not place.left(), f"disk full at file {n}: leaves nothing ({place.left()})")
     check(failed > 3, f"disk full: looked at {failed} moments")
     place = Place(root, "limit")
-    code, said, _, _ = run(place.command(model, "-q", "--memory", "128M"), place.temp_dir, file_bytes=256 << 10)
-    check(code == 1 and place.temp_dir in said and "File too large" in said and not place.left(), f"limit on the size of files: {said.strip()} ({code}, {place.left()})")
+    code, said, _, _ = run(place.command(model, "-q", "--memory", "128M"), place.temp_dir,
+                           file_bytes=256 << 10)
+    check(code == 1 and place.temp_dir in said and "File too large" in said and not place.left(),
+          f"limit on the size of files: {said.strip()} ({code}, {place.left()})")
 
 
 def really_full(root, model):
     """A file system of 20 MB of one's own, where the system lets us have one."""
     place = Place(root, "really full")
-    mount = 'mount -t tmpfs -o size=20M none "$1" 2>/dev/null || exit 77; temp=$1; shift; "$@"; code=$?; ls -A "$temp"; exit $code'
+    mount = ('mount -t tmpfs -o size=20M none "$1" 2>/dev/null || exit 77; temp=$1; shift; "$@"; '
+             'code=$?; ls -A "$temp"; exit $code')
     for unshare in (["unshare", "-m"], ["unshare", "-r", "-m"]):
         if shutil.which("unshare"):
-            code, said, _, _ = run([*unshare, "sh", "-c", mount, "sh", place.temp_dir, *place.command(model, "-q", "--memory", "128M")], place.temp_dir)
+            code, said, _, _ = run([*unshare, "sh", "-c", mount, "sh", place.temp_dir,
+                                    *place.command(model, "-q", "--memory",
+                                                   "128M")], place.temp_dir)
             if code == 1 and "ebpo convert" in said or code not in (1, 77):
-                check(code == 1 and place.temp_dir in said and "No space left on device" in said and said.count("\n") == 1 and not place.left(),
+                check(code == 1 and place.temp_dir in said and "No space left on device" in said
+                      and said.count("\n") == 1 and not place.left(),
                       f"a file system of 20 MB: {said.strip()} ({code}, {place.left()})")
                 return
     print("skipped a file system of 20 MB: neither root nor user namespaces may mount one here")
 
 
 def generate(model, faces):
-    subprocess.run([GENERATE, "--base", "torus", "--faces", str(faces), model], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([GENERATE, "--base", "torus", "--faces", str(faces), model], check=True,
+                   stdout=subprocess.DEVNULL)
 
 
 def main():

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""What ebpo-generate writes is a closed manifold without self-intersections, for every base, and the same at every run.
+"""What ebpo-generate writes is a closed manifold without self-intersections, for every base, and
+the same at every run.
 
     generator.py EBPO GENERATE CROSSING_FACES
 """
@@ -12,8 +13,10 @@ import tempfile
 EBPO, GENERATE, CROSSING_FACES = sys.argv[1:4]
 # The last one's base is the file that the first one made.
 MODELS = [["--base", "torus", "--faces", "5000"], ["--base", "torus", "--faces", "200000"],
-          ["--base", "torus", "--faces", "50000", "--relief", "0.2", "--roughness", "0.5", "--seed", "9"],
-          ["--base", "sphere", "--faces", "50000"], ["--base", "sphere", "--subdivide", "5", "--relief", "0.2", "--roughness", "0.5"],
+          ["--base", "torus", "--faces", "50000", "--relief", "0.2", "--roughness", "0.5", "--seed",
+           "9"],
+          ["--base", "sphere", "--faces", "50000"],
+          ["--base", "sphere", "--subdivide", "5", "--relief", "0.2", "--roughness", "0.5"],
           ["--base", "FILE", "--subdivide", "2"]]
 
 
@@ -24,12 +27,15 @@ def main():
             options = [f"{folder}/0.ply" if o == "FILE" else o for o in options]
             for target in path, again:
                 subprocess.run([GENERATE, *options, target], check=True, capture_output=True)
-            assert filecmp.cmp(path, again, shallow=False), f"{options}: another run gave other bytes"
+            assert (filecmp.cmp(path, again,
+                                shallow=False)), f"{options}: another run gave other bytes"
             judged = subprocess.run([CROSSING_FACES, path], capture_output=True, text=True)
             assert judged.returncode == 0, judged.stdout
-            report = json.loads(subprocess.run([EBPO, "check", "--json", path], check=True, capture_output=True, text=True).stdout)
+            report = json.loads(subprocess.run([EBPO, "check", "--json", path], check=True,
+                                               capture_output=True, text=True).stdout)
             assert report["report"]["manifold"], f"{options}: not a manifold"
-        lone = subprocess.run([GENERATE, "--base", "sphere", "--faces", "1", "--seed", "2", again], capture_output=True, text=True)
+        lone = subprocess.run([GENERATE, "--base", "sphere", "--faces", "1", "--seed", "2", again],
+                              capture_output=True, text=True)
         assert lone.returncode == 0 and not filecmp.cmp(path, again, shallow=False)
     print(f"{len(MODELS)} models are as promised")
 

@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""The same input gives the same bytes: for any number of threads, run after run, and for every compiler and its options.
+"""The same input gives the same bytes: for any number of threads, run after run, and for every
+compiler and its options.
 
     golden.py EBPO GENERATE EXPECTED [--update]
 
-EXPECTED holds a content digest for each input; the other builds of the same sources must reach it too. Real models are tested where $EBPO_MODELS
-names their folder.
+EXPECTED holds a content digest for each input; the other builds of the same sources must reach it
+too. Real models are tested where $EBPO_MODELS names their folder.
 """
 import filecmp
 import json
@@ -20,7 +21,8 @@ GENERATED = {
     "sphere": ["--base", "sphere", "--subdivide", "5", "--seed", "3"],
 }
 REAL = ["bunny_closed", "office_chair", "twin7081_left", "blade"]
-VARIANTS = {"default": [], "leaf-planes": ["--with", "leaf-planes", "--leaf-faces", "8"], "fine": ["--leaf-faces", "0", "--rule", "positive"]}
+VARIANTS = {"default": [], "leaf-planes": ["--with", "leaf-planes", "--leaf-faces", "8"],
+            "fine": ["--leaf-faces", "0", "--rule", "positive"]}
 
 
 def run(*arguments):
@@ -45,17 +47,21 @@ def main():
                 outputs = [f"{folder}/{threads}.ebpo.h5" for threads in (1, 5)]
                 for threads, output in zip((1, 5), outputs):
                     run(EBPO, "convert", "-q", "--threads", str(threads), *options, path, output)
-                if not all(filecmp.cmp(outputs[0], output, shallow=False) for output in outputs[1:]):
+                if (not all(filecmp.cmp(outputs[0], output, shallow=False)
+                            for output in outputs[1:])):
                     problems.append(f"{name} {variant}: bytes depend on the number of threads")
-                found[f"{name} {variant}"] = json.loads(run(EBPO, "info", "--json", outputs[0]))["content_sha256"]
+                found[f"{name} {variant}"] = json.loads(run(EBPO, "info", "--json",
+                                                            outputs[0]))["content_sha256"]
     expected = json.loads(EXPECTED.read_text()) if EXPECTED.exists() else {}
     if "--update" in sys.argv:
-        EXPECTED.write_text(json.dumps(dict(sorted({**expected, **found}.items())), indent=1) + "\n")
+        EXPECTED.write_text(json.dumps(dict(sorted({**expected, **found}.items())), indent=1)
+                            + "\n")
         expected = json.loads(EXPECTED.read_text())
     for key, digest in found.items():
         if expected.get(key) != digest:
             problems.append(f"{key}: content {digest}, expected {expected.get(key)}")
-    print("\n".join(problems) or f"{len(found)} files have the expected content, for 1 and 5 threads")
+    print("\n".join(problems)
+          or f"{len(found)} files have the expected content, for 1 and 5 threads")
     return 1 if problems else 0
 
 

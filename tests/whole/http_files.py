@@ -14,7 +14,8 @@ failures = []
 
 
 def run(tool, *arguments):
-    return subprocess.run([tool, *arguments], stdin=subprocess.DEVNULL, capture_output=True, timeout=600)
+    return subprocess.run([tool, *arguments], stdin=subprocess.DEVNULL, capture_output=True,
+                          timeout=600)
 
 
 def expect(what, good, shown=""):
@@ -25,8 +26,10 @@ def expect(what, good, shown=""):
 
 def equal(tool, what, path, url, *arguments):
     """The same output for a path and for a URL, whose name may stand in it."""
-    near, far = run(tool, arguments[0], path, *arguments[1:]), run(tool, arguments[0], url, *arguments[1:])
-    expect(what, near.returncode == 0 and far.returncode == 0 and near.stdout.replace(path.encode(), b"X") == far.stdout.replace(url.encode(), b"X"),
+    near, far = run(tool, arguments[0], path, *arguments[1:]), run(tool, arguments[0], url,
+                                                                   *arguments[1:])
+    expect(what, near.returncode == 0 and far.returncode == 0
+           and near.stdout.replace(path.encode(), b"X") == far.stdout.replace(url.encode(), b"X"),
            far.stderr.decode())
 
 
@@ -41,15 +44,20 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "m.ebpo.h5")
         ply, asked, rays = (os.path.join(folder, name) for name in ("m.ply", "points", "rays"))
-        scale = min(1, max(0.3, float(os.environ.get("EBPO_TEST_SCALE", "1"))))  # what comes in many pieces must stay so
-        subprocess.run([generate, "--base", "torus", "--faces", str(int(150000 * scale)), ply], check=True, capture_output=True)
+        # what comes in many pieces must stay so
+        scale = min(1, max(0.3, float(os.environ.get("EBPO_TEST_SCALE", "1"))))
+        subprocess.run([generate, "--base", "torus", "--faces", str(int(150000 * scale)), ply],
+                       check=True, capture_output=True)
         subprocess.run([tool, "convert", "-q", ply, path], check=True)
-        subprocess.run([tool, "bench", "--count", points, "--save-points", asked, path], check=True, capture_output=True)
-        subprocess.run([tool, "bench", "--query", "ray", "--count", "500", "--save-points", rays, path], check=True, capture_output=True)
+        subprocess.run([tool, "bench", "--count", points, "--save-points", asked, path], check=True,
+                       capture_output=True)
+        subprocess.run([tool, "bench", "--query", "ray", "--count", "500", "--save-points", rays,
+                        path], check=True, capture_output=True)
         server = subprocess.Popen([sys.executable, faulty_server, path],
                                   stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         try:
-            check(tool, folder, path, ply, asked, rays, f"http://127.0.0.1:{int(server.stdout.readline())}")
+            check(tool, folder, path, ply, asked, rays,
+                  f"http://127.0.0.1:{int(server.stdout.readline())}")
         finally:
             server.stdin.close()
             server.wait(timeout=30)
@@ -59,8 +67,10 @@ def main():
 
 def check(tool, folder, path, ply, asked, rays, site):
     good = f"{site}/good/m.ebpo.h5"
-    # Everything that is exact, with all in memory and with subtrees on demand, from servers with troubles that pass.
-    for url in (good, f"{site}/short-3/a", f"{site}/random-5-10/b", f"{site}/code_later-503-1-3/c", f"{site}/whole/d"):
+    # Everything that is exact, with all in memory and with subtrees on demand, from servers with
+    # troubles that pass.
+    for url in (good, f"{site}/short-3/a", f"{site}/random-5-10/b", f"{site}/code_later-503-1-3/c",
+                f"{site}/whole/d"):
         name = url.split("/")[3]
         more = ("--http-retries", "20") if "random" in name else ()
         equal(tool, f"inside {name}", path, url, "inside", asked, "--raw", *more)
@@ -68,54 +78,71 @@ def check(tool, folder, path, ply, asked, rays, site):
     for mode in ("--memory=12M", "--cut-level=3"):
         equal(tool, f"inside {mode}", path, good, "inside", asked, "--raw", mode)
         equal(tool, f"distance {mode}", path, good, "distance", asked, "--raw", mode)
-    equal(tool, "inside nodes", path, good, "inside", asked, "--raw", "--cut-level", "4", "--mode", "nodes")
+    equal(tool, "inside nodes", path, good, "inside", asked, "--raw", "--cut-level", "4", "--mode",
+          "nodes")
     equal(tool, "rays", path, good, "ray", rays, "--raw")
     equal(tool, "measure", path, good, "measure")
     equal(tool, "info", path, good, "info")
     equal(tool, "info --json", path, good, "info", "--json")
-    near, far = (json.loads(run(tool, "levels", source, "--json", "--nodes", "--to", "3").stdout)["levels"] for source in (path, good))
+    near, far = (json.loads(run(tool, "levels", source, "--json", "--nodes", "--to",
+                                "3").stdout)["levels"] for source in (path, good))
     for level in near + far:
         del level["ms"]
     expect("levels", near == far)
     expect("verify", run(tool, "verify", good, "--against", ply).returncode == 0)
     for what in (("--mesh",), ("--level", "4")):
         outs = [os.path.join(folder, name) for name in ("near.ply", "far.ply")]
-        done = [run(tool, "extract", source, out, *what).returncode for source, out in zip((path, good), outs)]
-        expect(f"extract {what}", done == [0, 0] and open(outs[0], "rb").read() == open(outs[1], "rb").read())
+        done = [run(tool, "extract", source, out, *what).returncode
+                for source, out in zip((path, good), outs)]
+        expect(f"extract {what}", done == [0, 0] and open(outs[0],
+                                                          "rb").read() == open(outs[1], "rb").read())
 
     for order in ("level", "distance", "pixels", "front-to-back"):
         seen = ("--eye", "5,4,3", "--look", "0,0,0", "--order", order)
-        near, far = (json.loads(run(tool, "view", source, *seen, "--json", "--nodes", "--count", "20001").stdout)["nodes"] for source in (path, good))
+        near, far = (json.loads(run(tool, "view", source, *seen, "--json", "--nodes", "--count",
+                                    "20001").stdout)["nodes"] for source in (path, good))
         expect(f"view {order}", near == far and len(near) > 19990)
         t = traffic(tool, "view", good, *seen, "--bytes", "300K")
-        expect(f"view {order} keeps to its budget", t["bytes_read"] <= 300 << 10 and t["bytes"] <= (300 << 10) + (64 << 10), t)
+        expect(f"view {order} keeps to its budget",
+               t["bytes_read"] <= 300 << 10 and t["bytes"] <= (300 << 10) + (64 << 10), t)
 
     # Requests and bytes.
     size = os.path.getsize(path)
     t = traffic(tool, "levels", good, "--to", "4")
-    expect("levels 0 to 4 take two requests and 150 KB", t["requests"] <= 2 and t["bytes"] <= 150000, t)
+    expect("levels 0 to 4 take two requests and 150 KB",
+           t["requests"] <= 2 and t["bytes"] <= 150000, t)
     t = traffic(tool, "levels", good)
     expect("no byte comes twice", t["bytes"] <= size, t)
     t = traffic(tool, "bench", good, "--count", "10")
-    expect("a whole file in few requests", t["bytes"] <= size and t["requests"] <= 3 + size // (1 << 20), t)
-    expect("local files tell reads and bytes", set(traffic(tool, "info", path)) == {"reads", "bytes_read"})
+    expect("a whole file in few requests", t["bytes"] <= size
+           and t["requests"] <= 3 + size // (1 << 20), t)
+    expect("local files tell reads and bytes",
+           set(traffic(tool, "info", path)) == {"reads", "bytes_read"})
 
     # The folder.
     cache = os.path.join(folder, "cache")
     first = traffic(tool, "measure", good, "--http-cache", cache)
     again = traffic(tool, "measure", good, "--http-cache", cache)
-    expect("the folder saves requests", first["requests"] > 1 and again["requests"] == 1 and again["cache_bytes"] > 0, (first, again))
+    expect("the folder saves requests", first["requests"] > 1 and again["requests"] == 1
+           and again["cache_bytes"] > 0, (first, again))
 
     # Errors: one line, code 1 or 2, no hang.
-    for url, code, words, more in ((f"{site}/code-404/x", 1, "404", ()), (f"{site}/code-503/x", 1, "503", ("--http-retries", "1")), (f"{site}/html/x", 1, "HDF5", ()),
-                                   (f"{site}/stall_head-9/x", 1, "s", ("--http-timeout", "1")), (f"{site}/change_etag/x", 1, "changed", ()),
-                                   (good, 2, "--http-cache-size", ("--http-cache-size", "much")), (good, 2, "one line", ("--http-header", "nonsense")),
+    for url, code, words, more in ((f"{site}/code-404/x", 1, "404", ()),
+                                   (f"{site}/code-503/x", 1, "503", ("--http-retries", "1")),
+                                   (f"{site}/html/x", 1, "HDF5", ()),
+                                   (f"{site}/stall_head-9/x", 1, "s", ("--http-timeout", "1")),
+                                   (f"{site}/change_etag/x", 1, "changed", ()),
+                                   (good, 2, "--http-cache-size", ("--http-cache-size", "much")),
+                                   (good, 2, "one line", ("--http-header", "nonsense")),
                                    (good, 2, "cache folder", ("--http-cache", "/nowhere/at/all"))):
         done = run(tool, "measure", url, *more)
         said = done.stderr.decode()
-        expect(f"error {url} {more}", done.returncode == code and words in said and said.count("\n") == 1 and not done.stdout, (done.returncode, said))
-    done = run(tool, "info", good.replace("//", "//me:secret@") + "?key=secret", "--http-timeout", "2")
-    expect("passwords are not shown", done.returncode == 0 and b"secret" not in done.stdout + done.stderr, done)
+        expect(f"error {url} {more}", done.returncode == code and words in said
+               and said.count("\n") == 1 and not done.stdout, (done.returncode, said))
+    done = run(tool, "info", good.replace("//", "//me:secret@") + "?key=secret", "--http-timeout",
+               "2")
+    expect("passwords are not shown", done.returncode == 0
+           and b"secret" not in done.stdout + done.stderr, done)
 
 
 sys.exit(main())

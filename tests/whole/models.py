@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
-"""Real models, end to end: convert, verify against the source, extract the mesh and compare it bit for bit.
+"""Real models, end to end: convert, verify against the source, extract the mesh and compare it bit
+for bit.
 
     models.py EBPO FOLDER [MOST_BYTES]
 
-FOLDER holds PLY files and wild/ with odd dialects. Which ones are solids is written down here, from the folder's own index; what is not must become a
-surface with a warning, or a solid by mending. Files above MOST_BYTES are left out.
+FOLDER holds PLY files and wild/ with odd dialects. Which ones are solids is written down here, from
+the folder's own index; what is not must become a surface with a warning, or a solid by mending.
+Files above MOST_BYTES are left out.
 """
 import json
 import pathlib
@@ -14,7 +16,8 @@ import tempfile
 
 EBPO, FOLDER = sys.argv[1], pathlib.Path(sys.argv[2])
 MOST = int(sys.argv[3]) if len(sys.argv) > 3 else 1 << 40
-SOLIDS = {"bunny_closed", "armadillo", "dragon100k", "lucy100k", "igea", "xyzrgb_dragon28k", "skull", "fertility", "cheese_g133", "thingi73416",
+SOLIDS = {"bunny_closed", "armadillo", "dragon100k", "lucy100k", "igea", "xyzrgb_dragon28k",
+          "skull", "fertility", "cheese_g133", "thingi73416",
           "thingi99865", "twin7081_left", "twin7081_right", "selfint_A", "cad_adis16480"}
 SURFACES = {"bunny", "dragon_vrip", "blade", "motorbike", "conrod", "office_chair"}
 # Three edges where the two directions do not cancel, says the index; it must not pass for a solid.
@@ -58,8 +61,10 @@ def check(path, folder, kind, options=()):
     verified = run(EBPO, "verify", "--json", str(target), "--against", str(path))
     expect(verified.returncode == 0, f"{name}: verify: {verified.stdout[-2000:]}{verified.stderr}")
     volumes = [level["envelope_volume"] for level in facts["levels"]]
-    expect(all(b <= a * (1 + 1e-9) for a, b in zip(volumes, volumes[1:])), f"{name}: level volumes increase: {volumes}")
-    expect(run(EBPO, "extract", "-q", "--mesh", str(target), str(back)).returncode == 0, f"{name}: extract")
+    expect(all(b <= a * (1 + 1e-9) for a, b in zip(volumes, volumes[1:])),
+           f"{name}: level volumes increase: {volumes}")
+    expect(run(EBPO, "extract", "-q", "--mesh", str(target), str(back)).returncode == 0,
+           f"{name}: extract")
     if not options and path.parent == FOLDER:
         expect(parse(back) == parse(path), f"{name}: the mesh that comes back differs")
     if kind == "surface":
@@ -81,7 +86,8 @@ def main():
                 continue
             done = run(EBPO, "check", str(path))
             if path.name == TRUNCATED:
-                expect(done.returncode == 1 and "byte" in done.stderr, f"{path.name}: not refused with its place: {done.stderr}")
+                expect(done.returncode == 1 and "byte" in done.stderr,
+                       f"{path.name}: not refused with its place: {done.stderr}")
             else:
                 expect(done.returncode == 0, f"{path.name}: {done.stderr}")
     print("\n".join(problems) or f"{count} checks of real models")

@@ -1,4 +1,5 @@
-"""paraview_opens.py FOLDER [PICTURE]: run by pvpython. The files in FOLDER are what the JSON beside each says, as ParaView reads them; or the picture shows something."""
+"""paraview_opens.py FOLDER [PICTURE]: run by pvpython. The files in FOLDER are what the JSON beside
+each says, as ParaView reads them; or the picture shows something."""
 import json
 import math
 import os
@@ -40,15 +41,21 @@ def check_xdmf():
         values = arrays(grid.GetCellData())
         assert grid.GetNumberOfPoints() == wanted["vertices"], name
         if wanted["block"] == "mesh":
-            assert name == "mesh" and cell_types(grid) == {TRIANGLE} and grid.GetNumberOfCells() == wanted["triangles"]
-            assert set(values) == {"source_face"} and set(arrays(grid.GetPointData())) == {"source_vertex"}
+            assert (name == "mesh" and cell_types(grid) == {TRIANGLE}
+                    and grid.GetNumberOfCells() == wanted["triangles"])
+            assert (set(values) == {"source_face"}
+                    and set(arrays(grid.GetPointData())) == {"source_vertex"})
             continue
-        assert name == f"level_{wanted['level']:02d}" and cell_types(grid) == {POLYHEDRON} and grid.GetNumberOfCells() == wanted["envelopes"]
+        assert (name == f"level_{wanted['level']:02d}" and cell_types(grid) == {POLYHEDRON}
+                and grid.GetNumberOfCells() == wanted["envelopes"])
         assert set(values) == OF_NODES
-        assert sum(grid.GetCell(k).GetNumberOfFaces() for k in range(grid.GetNumberOfCells())) == wanted["polygons"]
+        assert sum(grid.GetCell(k).GetNumberOfFaces()
+                   for k in range(grid.GetNumberOfCells())) == wanted["polygons"]
         volume = sum(values["volume"].GetValue(k) for k in range(grid.GetNumberOfCells()))
         assert 0 < volume <= wanted["volume"] * (1 + 1e-9)
-        low, size = grid.GetBounds()[::2], max(b - a for a, b in zip(grid.GetBounds()[::2], grid.GetBounds()[1::2]))
+        low, size = grid.GetBounds()[::2], max(b - a
+                                               for a, b in zip(grid.GetBounds()[::2],
+                                                               grid.GetBounds()[1::2]))
         assert size > 0 and all(math.isfinite(v) for v in low)
 
 
@@ -56,8 +63,10 @@ def check_vtkhdf():
     grid = fetched(VTKHDFReader(FileName=[os.path.join(folder, "model.vtkhdf")]))
     blocks = told("vtkhdf")
     values = arrays(grid.GetCellData())
-    assert grid.GetNumberOfPoints() == sum(b["vertices"] for b in blocks) and grid.GetNumberOfCells() == sum(b["polygons"] for b in blocks)
-    assert cell_types(grid) == {POLYGON, TRIANGLE} and set(values) == OF_NODES | {"lod", "source_face"}
+    assert (grid.GetNumberOfPoints() == sum(b["vertices"] for b in blocks)
+            and grid.GetNumberOfCells() == sum(b["polygons"] for b in blocks))
+    assert (cell_types(grid) == {POLYGON, TRIANGLE}
+            and set(values) == OF_NODES | {"lod", "source_face"})
     lods = [int(values["lod"].GetValue(i)) for i in range(grid.GetNumberOfCells())]
     for wanted in blocks:
         assert lods.count(wanted.get("level", -1)) == wanted["polygons"]
@@ -66,7 +75,8 @@ def check_vtkhdf():
 def check_glb():
     data = fetched(OpenDataFile(os.path.join(folder, "model.glb")))
     wanted, = told("glb")
-    assert data.GetNumberOfCells() == wanted["triangles"] and data.GetNumberOfPoints() == wanted["vertices"]
+    assert (data.GetNumberOfCells() == wanted["triangles"]
+            and data.GetNumberOfPoints() == wanted["vertices"])
 
 
 def check_picture(name):
@@ -76,7 +86,8 @@ def check_picture(name):
     image = reader.GetOutput()
     width, height = image.GetDimensions()[:2]
     for left in (0, width // 2):  # something large, of many shades, in each half
-        seen = [tuple(image.GetScalarComponentAsFloat(x, y, 0, k) for k in range(3)) for x in range(left, left + width // 2, 4) for y in range(0, height, 4)]
+        seen = [tuple(image.GetScalarComponentAsFloat(x, y, 0, k) for k in range(3))
+                for x in range(left, left + width // 2, 4) for y in range(0, height, 4)]
         shown = [c for c in seen if c != (255, 255, 255)]
         assert len(shown) > len(seen) / 10 and len(set(shown)) > 50, (len(shown), len(set(shown)))
 

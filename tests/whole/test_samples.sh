@@ -16,27 +16,38 @@ printf '0.5 0.25 0.5\n3 0.25 0.5\n1 1 1\n' >"$work/points"
 [ "$(sed 's/face [0-9]*/face N/' "$work/out")" = "IN, -0.25 from face N at 0.5 0 0.5
 OUT, 2 from face N at 1 0.25 0.5
 ON, 0 from face N at 1 1 1" ] || fail "query answers"
-EBPO_LIBRARY="$library" python3 "$samples/query.py" "$work/cube.ebpo.h5" <"$work/points" >"$work/out.py" 2>&1 || { cp "$work/out.py" "$work/out"; fail query.py; }
-sed 's/\.0\b//g' "$work/out.py" | cmp - "$work/out" >/dev/null || fail "query.py answers as query does"
+EBPO_LIBRARY="$library" python3 "$samples/query.py" "$work/cube.ebpo.h5" <"$work/points" \
+    >"$work/out.py" 2>&1 || { cp "$work/out.py" "$work/out"; fail query.py; }
+sed 's/\.0\b//g' "$work/out.py" | cmp - "$work/out" >/dev/null ||
+    fail "query.py answers as query does"
 
-# A surface has distances only; a line that is not understood ends both, after the answers before it.
-"$ebpo" convert -q "$work/open_box.ply" "$work/box.ebpo.h5" >"$work/out" 2>&1 || fail "convert open_box"
+# A surface has distances only; a line that is not understood ends both, after the answers before
+# it.
+"$ebpo" convert -q "$work/open_box.ply" "$work/box.ebpo.h5" >"$work/out" 2>&1 ||
+    fail "convert open_box"
 printf '0.5 0.25 0.5\n\n \t\n3 0.25\t0.5\r\n1 2\n7 7 7\n' >"$work/points"
 for model in cube box; do
-    "$query" "$work/$model.ebpo.h5" <"$work/points" >"$work/out" 2>"$work/err" && fail "query takes a bad line of $model"
-    [ "$(cat "$work/err")" = "query: line 5: three numbers are expected" ] || fail "query says where: $(cat "$work/err")"
+    "$query" "$work/$model.ebpo.h5" <"$work/points" >"$work/out" 2>"$work/err" &&
+        fail "query takes a bad line of $model"
+    [ "$(cat "$work/err")" = "query: line 5: three numbers are expected" ] ||
+        fail "query says where: $(cat "$work/err")"
     [ "$(wc -l <"$work/out")" = 2 ] || fail "query answers what comes before a bad line"
-    EBPO_LIBRARY="$library" python3 "$samples/query.py" "$work/$model.ebpo.h5" <"$work/points" >"$work/out.py" 2>"$work/err" && fail "query.py takes a bad line"
-    [ "$(cat "$work/err")" = "query.py: line 5: three numbers are expected" ] || fail "query.py says where: $(cat "$work/err")"
-    sed 's/\.0\b//g' "$work/out.py" | cmp - "$work/out" >/dev/null || { diff "$work/out.py" "$work/out"; fail "query.py answers as query does for $model"; }
+    EBPO_LIBRARY="$library" python3 "$samples/query.py" "$work/$model.ebpo.h5" <"$work/points" \
+        >"$work/out.py" 2>"$work/err" && fail "query.py takes a bad line"
+    [ "$(cat "$work/err")" = "query.py: line 5: three numbers are expected" ] ||
+        fail "query.py says where: $(cat "$work/err")"
+    sed 's/\.0\b//g' "$work/out.py" | cmp - "$work/out" >/dev/null ||
+        { diff "$work/out.py" "$work/out"; fail "query.py answers as query does for $model"; }
 done
 [ "$(grep -c '^surface, [0-9]' "$work/out")" = 2 ] || fail "a surface has distances"
 for line in '1 2 3 4' '1,,2,3' '1 2 3x' 'x'; do
     echo "$line" | "$query" "$work/cube.ebpo.h5" >"$work/out" 2>&1 && fail "query takes '$line'"
 done
-printf '# points\n3, 0.25 ,0.5 # far\n' | EBPO_LIBRARY="$library" python3 "$samples/query.py" "$work/cube.ebpo.h5" >"$work/out" 2>&1
+printf '# points\n3, 0.25 ,0.5 # far\n' | EBPO_LIBRARY="$library" python3 "$samples/query.py" \
+    "$work/cube.ebpo.h5" >"$work/out" 2>&1
 grep -q '^OUT, 2.0 from' "$work/out" || fail "query.py takes commas and comments"
-echo 1 2 3 | "$query" "$work/cube.ebpo.h5" >/dev/full 2>"$work/out" && fail "query does not see a full disk"
+echo 1 2 3 | "$query" "$work/cube.ebpo.h5" >/dev/full 2>"$work/out" &&
+    fail "query does not see a full disk"
 grep -q 'No space left' "$work/out" || fail "query says that the disk is full"
 
 command -v h5dump >/dev/null && command -v h5ls >/dev/null || exit 77
@@ -45,6 +56,9 @@ sh "$samples/inspect.sh" "$work/a.ebpo.h5" 1 >"$work/out" 2>&1 || fail inspect.s
 grep -q 'vertex_count *[0-9]' "$work/out" || fail "inspect.sh shows the number of vertices"
 grep -q 'plane_counts: [0-9]' "$work/out" || fail "inspect.sh shows a level's planes"
 /usr/bin/python3 -c 'import h5py' 2>/dev/null || exit 0
-/usr/bin/python3 "$samples/read_level.py" "$work/a.ebpo.h5" 1 >"$work/out" 2>&1 || fail read_level.py
-planes=$("$ebpo" info --json "$work/a.ebpo.h5" | /usr/bin/python3 -c 'import json, sys; print(json.load(sys.stdin)["levels"][1]["planes"])')
-[ "$(grep -c '^1[0-7] ' "$work/out")" = "$planes" ] || fail "read_level.py prints each plane of level 1 ($planes)"
+/usr/bin/python3 "$samples/read_level.py" "$work/a.ebpo.h5" 1 >"$work/out" 2>&1 ||
+    fail read_level.py
+planes=$("$ebpo" info --json "$work/a.ebpo.h5" |
+    /usr/bin/python3 -c 'import json, sys; print(json.load(sys.stdin)["levels"][1]["planes"])')
+[ "$(grep -c '^1[0-7] ' "$work/out")" = "$planes" ] ||
+    fail "read_level.py prints each plane of level 1 ($planes)"

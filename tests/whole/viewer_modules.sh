@@ -3,18 +3,24 @@
 set -eu
 EBPO_TOOL=$(realpath "$3") generate=$(realpath "$4") inputs=$(realpath "$5")
 cd "$2"
-[ -d node_modules/zstddec ] || { echo "skipped: $2/node_modules is missing; run tools/install-deps.sh --tests"; exit 77; }
+if [ ! -d node_modules/zstddec ]; then
+    echo "skipped: $2/node_modules is missing; run tools/install-deps.sh --tests"
+    exit 77
+fi
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 "$inputs" "$work"
 "$generate" --base torus --faces 8000 "$work/ring.ply"
-convert() { out=$1; shift; "$EBPO_TOOL" convert -q "$@" "$work/$out.ebpo.h5"; EBPO_FILES="${EBPO_FILES:-} $work/$out.ebpo.h5"; }
+convert() { out=$1; shift; "$EBPO_TOOL" convert -q "$@" \
+    "$work/$out.ebpo.h5"; EBPO_FILES="${EBPO_FILES:-} $work/$out.ebpo.h5"; }
 convert ring --with leaf-planes "$work/ring.ply"
 convert ring_without_mesh --without mesh "$work/ring.ply"
 convert ring_deflate --codec deflate --leaf-faces 4 "$work/ring.ply"
 convert cube --with leaf-planes --max-level 4 --leaf-faces 0 "$work/quads.ply"
-for solid in cavity overlapping_cubes inside_out_cube zero_area_face repeated_faces mobius; do convert $solid "$work/$solid.ply" 2>/dev/null; done
-subset() { out=$1; shift; "$EBPO_TOOL" subset -q "$@" "$work/ring.ebpo.h5" "$work/$out.ebpo.h5"; EBPO_FILES="$EBPO_FILES $work/$out.ebpo.h5"; }
+for solid in cavity overlapping_cubes inside_out_cube zero_area_face repeated_faces mobius; do \
+    convert $solid "$work/$solid.ply" 2>/dev/null; done
+subset() { out=$1; shift; "$EBPO_TOOL" subset -q "$@" "$work/ring.ebpo.h5" \
+    "$work/$out.ebpo.h5"; EBPO_FILES="$EBPO_FILES $work/$out.ebpo.h5"; }
 subset ring_levels --levels 0-3
 subset ring_box --box 0,0,-1,1,1,1 --profile lod
 export EBPO_TOOL EBPO_FILES

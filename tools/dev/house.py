@@ -89,7 +89,8 @@ def table(found):
             print(f"| {one['folder']} | {what}, lines | {s['count']} | {s['median']} | "
                   f"{s['90%']} | {s['largest']} |")
     for what, limit in (("functions", LONGEST_FUNCTION), ("files", LONGEST_FILE)):
-        beyond = sorted((x for one in found for x in one["long_" + what]), key=lambda x: -x["lines"])
+        beyond = sorted((x for one in found for x in one["long_" + what]),
+                        key=lambda x: -x["lines"])
         print(f"\n{len(beyond)} {what} of more than {limit} lines")
         for x in beyond:
             print(f"  {x['lines']:5}  {x['where']}  {x.get('name', '')}".rstrip())

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""embed.py OUT.c NAME=FILE...: the files as C, for report_page.c, which finds them by their names."""
+"""embed.py OUT.c NAME=FILE...: the files as C, for report_page.c, which finds them by their
+names."""
 import sys
 
 out, *parts = sys.argv[1:]

@@ -329,7 +329,10 @@ function probeShown() {
   const words = { in: 'Inside', out: 'Outside', on: 'On the surface', maybe: 'Undecided' };
   $('where').textContent = p.solid ? words[p.where] : 'No inside';
   $('where').className = p.solid ? p.where : 'maybe';
-  $('whereNote').textContent = !p.solid ? 'the model is a surface, not a solid' : p.exact ? 'exact' : p.where === 'maybe' ? (p.done ? `levels 0–${p.depth} do not say; the file has no mesh` : 'asking the leaf …') : `certain by levels 0–${p.depth}`;
+  $('whereNote').textContent = !p.solid ? 'the model is a surface, not a solid'
+    : p.exact ? 'exact'
+    : p.where === 'maybe' ? (p.done ? `levels 0–${p.depth} do not say; the file has no mesh` : 'asking the leaf …')
+    : `certain by levels 0–${p.depth}`;
   if (p.exact) {
     $('distance').textContent = length(p.where === 'on' ? 0 : p.distance, 7);
     $('distanceNote').textContent = `to the nearest face, in doubles; levels 0–${p.depth}: ${length(p.lo, 3)} to ${length(p.hi, 3)}`;

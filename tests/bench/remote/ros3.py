@@ -1,4 +1,5 @@
-"""One reading by HDF5's own ros3 driver: ros3.py URL TO|whole -> JSON. Needs HDF5_PLUGIN_PATH for zstd."""
+"""One reading by HDF5's own ros3 driver: ros3.py URL TO|whole -> JSON. Needs HDF5_PLUGIN_PATH for
+zstd."""
 import json
 import sys
 import time
