@@ -62,13 +62,29 @@ static ebpo_status check_types(const ebpo_check *check, const ebpo_info *info, i
     return EBPO_OK;
 }
 
+/* Whether the arrays are there that must be, and none that cannot be. */
+static ebpo_status check_presence(const ebpo_check *check, const ebpo_info *info, int level,
+                                  const ebpo_level *arrays, ebpo_error *error)
+{
+    for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++) {
+        const ebpo_array_spec *spec = &ebpo_schema[id];
+        bool called_for = ebpo_schema_rows(info, (ebpo_array_id)id, level) != 0;
+        if (!ebpo_schema_is_held(id))
+            continue;
+        if (called_for && !spec->if_needed && !ebpo_level_array(arrays, id))
+            return ebpo_check_fail(check, level, spec->name, "the array is missing", error);
+        if (!info->solid && spec->needs == EBPO_NEEDS_SOLID && ebpo_level_array(arrays, id))
+            return ebpo_check_fail(check, level, spec->name, "a surface has no winding numbers",
+                                   error);
+    }
+    return EBPO_OK;
+}
+
 static ebpo_status check_planes(const ebpo_check *check, int level, const char *counts_name,
                                 const uint8_t *counts, uint64_t nodes, const char *planes_name,
                                 const uint32_t *planes, uint64_t plane_count, ebpo_error *error)
 {
     uint64_t sum = 0;
-    if ((nodes && !counts) || (plane_count && !planes))
-        return ebpo_check_fail(check, level, counts_name, "the array is missing", error);
     for (uint64_t i = 0; i < nodes; i++)
         sum += counts[i];
     if (sum != plane_count)
@@ -86,14 +102,6 @@ static ebpo_status check_planes(const ebpo_check *check, int level, const char *
 static ebpo_status check_windings(const ebpo_check *check, const ebpo_info *info, int level,
                                   const ebpo_level *arrays, ebpo_error *error)
 {
-    if (!info->solid) {
-        if (arrays->leaf_winding || arrays->black_winding || arrays->white_winding)
-            return ebpo_check_fail(check, level, "leaf_winding", "a surface has no winding numbers",
-                                   error);
-        return EBPO_OK;
-    }
-    if (arrays->leaf_count && !arrays->leaf_winding)
-        return ebpo_check_fail(check, level, "leaf_winding", "the array is missing", error);
     if (arrays->black_winding)
         for (uint64_t i = 0; i < arrays->black_count;
              ebpo_workspace_settle_at(check->workspace, i++))
@@ -126,11 +134,6 @@ static ebpo_status check_leaves(const ebpo_check *check, const ebpo_info *info, 
 {
     const ebpo_level_summary *s = &info->level[level];
     uint64_t end = 0, news = 0, refs = 0;
-    if ((arrays->leaf_count &&
-         (!arrays->leaf_first || !arrays->leaf_new || !arrays->leaf_ref_count)) ||
-        (s->ref_count && !arrays->leaf_refs))
-        return ebpo_check_fail(check, level, "leaf_skip", "the leaves' face lists are missing",
-                               error);
     for (uint64_t i = 0; i < arrays->leaf_count; i++) {
         uint64_t first = arrays->leaf_first[i];
         ebpo_workspace_settle_at(check->workspace, i);
@@ -161,6 +164,8 @@ ebpo_status ebpo_check_level(const ebpo_check *check, const ebpo_info *info, int
                              const ebpo_level *arrays, ebpo_error *error)
 {
     ebpo_status status = check_types(check, info, level, arrays, error);
+    if (status == EBPO_OK)
+        status = check_presence(check, info, level, arrays, error);
     if (status == EBPO_OK && info->parts & EBPO_PART_PLANES)
         status =
             check_planes(check, level, "plane_counts", arrays->plane_counts, arrays->gray_count,

@@ -4,17 +4,11 @@
 #ifndef EBPO_CONTAINER_PICK_H
 #define EBPO_CONTAINER_PICK_H
 
-#include "container/slice.h"
-
-/* Groups [group, group + groups) of a level; level 0 has group 0. */
-typedef struct ebpo_run {
-    uint64_t group, groups;
-    uint64_t rank[4], count[4]; /* filled in by ebpo_pick_level: its nodes by type */
-} ebpo_run;
+#include "container/level_runs.h"
 
 /* All nodes of ascending runs that do not overlap, as one level: group_count is the sum of the
- * runs'. `parts` of those that the file has: planes, face lists (numbers of the file, leaf_first
- * too), leaf planes. Winding numbers where the file has them. Volumes are left 0. The caller frees
+ * runs', whose ranks and counts are filled in. Every array that is there for one of `parts` (face
+ * lists with the file's numbers, leaf_first too) or for none. Volumes are left 0. The caller frees
  * it with ebpo_level_free. */
 EBPO_MUST_USE ebpo_status ebpo_pick_level(ebpo_chunks *chunks, int level, ebpo_run *runs,
                                           uint64_t run_count, uint32_t parts, ebpo_level *out,

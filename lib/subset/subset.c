@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "container/reader.h"
+#include "octree/cells.h"
 #include "subset/subset_parts.h"
 
 enum { CHUNK_BUDGET = 64 << 20 };

@@ -8,6 +8,7 @@
 #include "base/parallel.h"
 #include "octree/cells.h"
 #include "octree/node_types.h"
+#include "subset/kept_nodes.h"
 #include "subset/subset_parts.h"
 
 static const uint64_t NOTHING = UINT64_MAX;
@@ -18,16 +19,11 @@ typedef struct gray {
     ebpo_cell cell;
 } gray;
 
-/* So much of the picked level has been passed. */
-typedef struct passed {
-    uint64_t of_type[4], planes, leaf_planes, refs;
-} passed;
-
 typedef struct descent {
     ebpo_cutting *c;
     int level;
     ebpo_level from, *to;
-    passed read;
+    ebpo_kept_nodes kept; /* of the one for the other */
     gray *parent, *child;
     ebpo_tolerance_node *judged; /* gray nodes and leaves as they come, with max_error; else NULL */
     uint64_t next_judged;
@@ -87,45 +83,20 @@ static ebpo_status pick(descent *d)
 static ebpo_status make_room(descent *d)
 {
     const ebpo_level *f = &d->from;
-    ebpo_level *t = d->to;
-    uint32_t parts = d->c->parts;
-    uint64_t grays = f->gray_count + f->leaf_count, planes = f->plane_count + f->leaf_plane_count,
-             whites = f->white_count + 8 * d->parent_count;
-    t->types = ebpo_alloc_zero(d->parent_count, sizeof *t->types);
-    bool good = t->types;
-    if (parts & EBPO_PART_PLANES && good)
-        good = (t->plane_counts = ebpo_alloc_zero(grays, 1)) &&
-               (t->planes = ebpo_alloc(planes, sizeof *t->planes));
-    if (parts & EBPO_PART_LEAF_PLANES && good)
-        good = (t->leaf_plane_counts = ebpo_alloc(f->leaf_count, 1)) &&
-               (t->leaf_planes = ebpo_alloc(f->leaf_plane_count, sizeof *t->leaf_planes));
-    if (d->c->from->solid && good)
-        good = (t->leaf_winding = ebpo_alloc(f->leaf_count, 4)) &&
-               (!f->black_winding || (t->black_winding = ebpo_alloc(f->black_count, 4))) &&
-               (!f->white_winding || (t->white_winding = ebpo_alloc_zero(whites, 4)));
-    if (parts & EBPO_PART_MESH && good)
-        good = (t->leaf_first = ebpo_alloc(f->leaf_count, sizeof *t->leaf_first)) &&
-               (t->leaf_new = ebpo_alloc(f->leaf_count, 4)) &&
-               (t->leaf_ref_count = ebpo_alloc(f->leaf_count, 4)) &&
-               (t->leaf_refs = ebpo_alloc(f->ref_count, 4));
-    return good ? EBPO_OK
-                : ebpo_fail_memory(d->c->error, f->leaf_count * 24 +
-                                                    (grays + f->ref_count + planes + whites) * 4);
+    uint64_t whites = 8 * d->parent_count,
+             more[4] = { [EBPO_WHITE] = whites, [EBPO_GRAY] = f->leaf_count };
+    uint32_t needs = d->c->parts | (d->c->from->solid ? EBPO_NEEDS_SOLID : 0) | EBPO_NEEDS_ALWAYS;
+    d->to->types = ebpo_alloc_zero(d->parent_count, sizeof *d->to->types);
+    return d->to->types && ebpo_kept_begin(&d->kept, f, d->to, needs, more)
+               ? EBPO_OK
+               : ebpo_fail_memory(d->c->error,
+                                  f->leaf_count * 28 + (f->gray_count + f->ref_count + whites) * 4);
 }
 
 /* --- nodes --- */
 
-static void add_gray(descent *d, ebpo_cell cell, uint64_t group, const uint32_t *codes,
-                     uint64_t count)
+static void add_child(descent *d, ebpo_cell cell, uint64_t group)
 {
-    ebpo_level *t = d->to;
-    if (t->plane_counts) {
-        t->plane_counts[t->gray_count] = (uint8_t)count;
-        if (count)
-            memcpy(t->planes + t->plane_count, codes, count * sizeof *codes);
-        t->plane_count += count;
-    }
-    t->gray_count++;
     d->child[d->child_count++] = (gray){ group, cell };
     d->goes_on = d->goes_on || group != NOTHING;
 }
@@ -136,80 +107,54 @@ static bool is_enough(descent *d) { return d->judged && d->judged[d->next_judged
 
 static void take_gray(descent *d, ebpo_cell cell)
 {
-    uint64_t rank = d->read.of_type[EBPO_GRAY]++, group = d->child[d->from.leaf_count + rank].group,
-             count = d->from.plane_counts ? d->from.plane_counts[rank] : 0;
+    uint64_t rank = d->kept.next[EBPO_GRAY], group = d->child[d->from.leaf_count + rank].group;
     bool enough = is_enough(d);
     if (enough || !may_go_on(d->c, d->level) || !meets_box(d->c, cell))
         group = NOTHING;
-    add_gray(d, cell, group, d->from.planes ? d->from.planes + d->read.planes : NULL, count);
-    d->read.planes += count;
+    ebpo_kept_take(&d->kept, EBPO_GRAY);
+    add_child(d, cell, group);
 }
 
-static void add_leaf(descent *d, uint64_t rank)
+/* The planes of the leaf in hand for the last gray node of the result. */
+static void add_leaf_planes(descent *d)
 {
     const ebpo_level *f = &d->from;
     ebpo_level *t = d->to;
-    uint64_t i = t->leaf_count++;
-    if (t->leaf_winding)
-        t->leaf_winding[i] = f->leaf_winding[rank];
-    if (t->leaf_plane_counts) {
-        uint64_t count = t->leaf_plane_counts[i] = f->leaf_plane_counts[rank];
-        if (count)
-            memcpy(t->leaf_planes + t->leaf_plane_count, f->leaf_planes + d->read.leaf_planes,
-                   count * sizeof *t->leaf_planes);
-        t->leaf_plane_count += count;
-    }
-    if (t->leaf_first) {
-        uint64_t count = t->leaf_ref_count[i] = f->leaf_ref_count[rank];
-        t->leaf_first[i] = f->leaf_first[rank];
-        t->leaf_new[i] = f->leaf_new[rank];
-        if (count)
-            memcpy(t->leaf_refs + t->ref_count, f->leaf_refs + d->read.refs,
-                   count * sizeof *t->leaf_refs);
-        t->ref_count += count;
-        t->new_count += f->leaf_new[rank];
-    }
+    uint64_t count =
+        f->leaf_plane_counts && t->plane_counts ? f->leaf_plane_counts[d->kept.next[EBPO_LEAF]] : 0;
+    if (count == 0)
+        return;
+    t->plane_counts[t->gray_count - 1] = (uint8_t)count;
+    memcpy(t->planes + t->plane_count, f->leaf_planes + d->kept.read[EBPO_PER_LEAF_PLANE],
+           count * sizeof *t->planes);
+    t->plane_count += count;
 }
 
 /* Outside the box a leaf becomes a pruned node; its own planes bound what is in its cell as well as
  * a gray node's do. Where its parent's do well enough, it needs none. */
 static ebpo_node_type take_leaf(descent *d, ebpo_cell cell)
 {
-    const ebpo_level *f = &d->from;
-    uint64_t rank = d->read.of_type[EBPO_LEAF]++,
-             planes = f->leaf_plane_counts ? f->leaf_plane_counts[rank] : 0;
-    bool enough = is_enough(d), kept = !enough && meets_box(d->c, cell);
-    if (kept)
-        add_leaf(d, rank);
-    else if (enough)
-        add_gray(d, cell, NOTHING, NULL, 0);
-    else
-        add_gray(d, cell, NOTHING, f->leaf_planes ? f->leaf_planes + d->read.leaf_planes : NULL,
-                 d->to->plane_counts ? planes : 0);
-    d->read.leaf_planes += planes;
-    d->read.refs += f->leaf_ref_count ? f->leaf_ref_count[rank] : 0;
-    return kept ? EBPO_LEAF : EBPO_GRAY;
+    bool enough = is_enough(d);
+    if (!enough && meets_box(d->c, cell)) {
+        ebpo_kept_take(&d->kept, EBPO_LEAF);
+        return EBPO_LEAF;
+    }
+    ebpo_kept_add(&d->kept, EBPO_GRAY);
+    if (!enough)
+        add_leaf_planes(d);
+    ebpo_kept_pass(&d->kept, EBPO_LEAF);
+    add_child(d, cell, NOTHING);
+    return EBPO_GRAY;
 }
 
 static ebpo_node_type take_node(descent *d, ebpo_node_type type, ebpo_cell cell)
 {
-    const ebpo_level *f = &d->from;
-    ebpo_level *t = d->to;
-    switch (type) {
-    case EBPO_GRAY: take_gray(d, cell); return type;
-    case EBPO_LEAF: return take_leaf(d, cell);
-    case EBPO_BLACK:
-        if (t->black_winding)
-            t->black_winding[t->black_count] = f->black_winding[d->read.of_type[type]];
-        t->black_count++;
-        break;
-    case EBPO_WHITE:
-        if (t->white_winding)
-            t->white_winding[t->white_count] = f->white_winding[d->read.of_type[type]];
-        t->white_count++;
-        break;
-    }
-    d->read.of_type[type]++;
+    if (type == EBPO_LEAF)
+        return take_leaf(d, cell);
+    if (type == EBPO_GRAY)
+        take_gray(d, cell);
+    else
+        ebpo_kept_take(&d->kept, type);
     return type;
 }
 
@@ -270,7 +215,8 @@ static ebpo_status cut_level(descent *d)
     d->to->group_count = d->parent_count;
     for (uint64_t i = 0; i < d->parent_count && status == EBPO_OK; i++) {
         if (d->parent[i].group == NOTHING)
-            d->to->white_count += 8; /* the places of children that are not here */
+            for (int k = 0; k < 8; k++) /* the places of children that are not here */
+                ebpo_kept_add(&d->kept, EBPO_WHITE);
         else
             take_group(d, i, d->from.types[next++]);
         d->filled += d->to->types[i] != 0;
@@ -301,7 +247,6 @@ ebpo_status ebpo_cut_levels(ebpo_cutting *c)
             break;
         }
         d.to = &c->out->level[d.level];
-        d.read = (passed){ { 0 }, 0, 0, 0 };
         d.filled = 0;
         d.goes_on = false;
         status = cut_level(&d);

@@ -6,6 +6,7 @@
 #include <math.h>
 
 #include "base/arrays.h"
+#include "container/schema.h"
 #include "mesh/mesh_parts.h"
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
@@ -150,6 +151,21 @@ static bool mesh_shape(ebpo_tally *tally, const ebpo_tree *tree)
     return CHECK(infinite == 0, "%" PRIu64 " vertices are not finite", infinite) && corners_fine;
 }
 
+/* What the checks above do not look for by name. Counted only when it fails. */
+static bool arrays_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
+{
+    const ebpo_level *level = &tree->level[l];
+    uint32_t has = ebpo_schema_has(&tree->info);
+    for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++) {
+        const ebpo_array_spec *spec = &ebpo_schema[id];
+        if (!ebpo_schema_is_held(id) || spec->if_needed || !(spec->needs & has) ||
+            ebpo_level_array(level, id) || !ebpo_level_rows(level, id))
+            continue;
+        return CHECK(false, "level %d: %s is missing", l, spec->name);
+    }
+    return true;
+}
+
 bool ebpo_check_shape(ebpo_tally *tally, const ebpo_tree *tree)
 {
     uint32_t parts = tree->info.parts;
@@ -164,7 +180,9 @@ bool ebpo_check_shape(ebpo_tally *tally, const ebpo_tree *tree)
                             level->plane_count, level->planes)) ||
             ((parts & EBPO_PART_LEAF_PLANES) &&
              !counted_shape(tally, level, l, "leaf planes", level->leaf_count,
-                            level->leaf_plane_counts, level->leaf_plane_count, level->leaf_planes)))
+                            level->leaf_plane_counts, level->leaf_plane_count,
+                            level->leaf_planes)) ||
+            !arrays_shape(tally, tree, l))
             return false;
     }
     return true;

@@ -213,7 +213,45 @@ void facts_table(FILE *out, const ebpo_info *info, const ebpo_stored_sizes *stor
     }
 }
 
+static const char *element_word(char word[8], const ebpo_array_facts *a)
+{
+    snprintf(word, 8, "%c%u", a->is_signed ? 'i' : 'u', 8 * a->element_bytes % 1000);
+    return word;
+}
+
+void facts_arrays(FILE *out, const ebpo_file *file)
+{
+    ebpo_array_facts a = EBPO_ARRAY_FACTS_INIT;
+    fprintf(out, "\n%-28s %4s %12s %4s %10s  %s\n", "array", "type", "rows", "cols", "stored",
+            "about");
+    for (unsigned n = 0; ebpo_file_array(file, n, &a); n++) {
+        char word[8], stored[32];
+        fprintf(out, "%-28s %4s %12llu %4u %10s  %s\n", a.path, element_word(word, &a),
+                (unsigned long long)a.rows, a.columns,
+                words_bytes(stored, sizeof stored, a.stored_bytes), a.about);
+    }
+}
+
 /* --- JSON --- */
+
+void facts_arrays_json(json *j, const ebpo_file *file)
+{
+    ebpo_array_facts a = EBPO_ARRAY_FACTS_INIT;
+    json_array(j, "arrays");
+    for (unsigned n = 0; ebpo_file_array(file, n, &a); n++) {
+        char word[8];
+        json_object(j, NULL);
+        json_text(j, "path", a.path);
+        json_text(j, "type", element_word(word, &a));
+        json_uint(j, "rows", a.rows);
+        json_uint(j, "columns", a.columns);
+        json_uint(j, "stored_bytes", a.stored_bytes);
+        json_text(j, "coding", a.coding);
+        json_text(j, "about", a.about);
+        json_end(j);
+    }
+    json_end(j);
+}
 
 static void json_level(json *j, const ebpo_info *info, const ebpo_stored_sizes *stored, int number)
 {

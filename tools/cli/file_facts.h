@@ -36,4 +36,8 @@ void facts_print(FILE *out, const char *path, const ebpo_info *info,
 void facts_table(FILE *out, const ebpo_info *info, const ebpo_stored_sizes *stored);
 void facts_json(json *j, const char *path, const ebpo_info *info, const ebpo_stored_sizes *stored);
 
+/* The arrays of a file, in the order of their bytes. */
+void facts_arrays(FILE *out, const ebpo_file *file);
+void facts_arrays_json(json *j, const ebpo_file *file);
+
 #endif

@@ -8,12 +8,13 @@
 #include "cmd/commands.h"
 
 typedef struct values {
-    bool json;
+    bool json, arrays;
     remote_values remote;
 } values;
 
 static const arg_option options[] = {
     OPTION_FLAG("json", 0, values, json, "print the facts as JSON"),
+    OPTION_FLAG("arrays", 0, values, arrays, "list the arrays of the file as well"),
     REMOTE_OPTIONS(values, remote),
     { 0 },
 };
@@ -53,12 +54,16 @@ static int run(void *given, const char **operand)
         json_begin(&j, stdout);
         json_object(&j, NULL);
         facts_json(&j, remote_shown(operand[0]), info, &stored);
+        if (v->arrays)
+            facts_arrays_json(&j, file);
         remote_json(&j, &t, &v->remote);
         json_finish(&j);
     } else {
         facts_print(stdout, remote_shown(operand[0]), info, &stored);
         putchar('\n');
         facts_table(stdout, info, &stored);
+        if (v->arrays)
+            facts_arrays(stdout, file);
         remote_tell(&t, &v->remote, false);
     }
     ebpo_close(file);

@@ -499,6 +499,22 @@ typedef struct ebpo_file_stats {
  */
 EBPO_API ebpo_status ebpo_file_get_stats(const ebpo_file *file, ebpo_file_stats *out);
 
+/* An array of a file. Texts live as long as the library. */
+typedef struct ebpo_array_facts {
+    size_t struct_size; /* EBPO_ARRAY_FACTS_INIT sets it */
+    char path[48];
+    uint64_t rows;
+    unsigned columns;       /* 1: one number a row */
+    unsigned element_bytes; /* in the file, before compression */
+    bool is_signed;
+    uint64_t stored_bytes;      /* compressed; after ebpo_file_locate */
+    const char *coding, *about; /* how numbers are to be read, and what they mean */
+} ebpo_array_facts;
+#define EBPO_ARRAY_FACTS_INIT EBPO_SIZED(ebpo_array_facts)
+
+/* The n-th array of the file (n from 0) in the order of their bytes; false: there are fewer. */
+EBPO_API bool ebpo_file_array(const ebpo_file *file, unsigned n, ebpo_array_facts *out);
+
 /* Bytes that parts take in the file, compressed. */
 typedef struct ebpo_stored_sizes {
     size_t struct_size; /* EBPO_STORED_SIZES_INIT sets it */

@@ -1,0 +1,33 @@
+/* What the head tells of each array. */
+#include <stdio.h>
+
+#include "base/sized.h"
+#include "container/reader.h"
+
+static const ebpo_array_in *find(const ebpo_file *file, unsigned n)
+{
+    for (int level = 0; level < file->info.level_count; level++)
+        for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
+            if (file->level_array[level][id].present && n-- == 0)
+                return &file->level_array[level][id];
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS; id++)
+        if (file->root_array[id].present && n-- == 0)
+            return &file->root_array[id];
+    return NULL;
+}
+
+bool ebpo_file_array(const ebpo_file *file, unsigned n, ebpo_array_facts *out)
+{
+    const ebpo_array_in *array = find(file, n);
+    if (!array)
+        return false;
+    ebpo_array_facts facts = { .rows = array->shape.rows,
+                               .columns = array->shape.cols ? array->shape.cols : 1,
+                               .element_bytes = array->shape.element_size,
+                               .is_signed = array->shape.is_signed,
+                               .stored_bytes = array->stored_bytes,
+                               .coding = ebpo_schema[array->id].coding,
+                               .about = ebpo_schema[array->id].about };
+    snprintf(facts.path, sizeof facts.path, "%s", array->path);
+    return EBPO_GIVE(ebpo_array_facts, out, &facts) == EBPO_OK;
+}
