@@ -1,3 +1,4 @@
+#include "geom/strict_fp.h"
 
 #include "construct/piece_levels.h"
 

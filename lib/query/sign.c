@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "query/sign.h"
 
 #include "query/inside.h"

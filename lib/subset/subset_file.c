@@ -1,4 +1,5 @@
 /* A subset becomes a file. */
+#include "geom/strict_fp.h"
 #include "base/fp_env.h"
 #include "base/sized.h"
 #include "container/container_write.h"

@@ -451,7 +451,7 @@ END_TEST
 START_TEST(surfaces_have_an_area_only)
 {
     ebpo_mesh mesh = ebpo_test_sheet(3, 4);
-    ebpo_mass m = mass_of(&mesh), none = { 0 };
+    ebpo_mass m = mass_of(&mesh), none = EBPO_MASS_INIT;
     assert_near(m.area, 9, 9, "area");
     none.area = m.area;
     ck_assert_mem_eq(&m, &none, sizeof m);
