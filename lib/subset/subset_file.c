@@ -1,5 +1,6 @@
 /* A subset becomes a file. */
 #include "geom/strict_fp.h"
+
 #include "base/fp_env.h"
 #include "base/sized.h"
 #include "container/container_write.h"
