@@ -58,7 +58,6 @@ static ebpo_status mark_vertices(void *context, uint64_t begin, uint64_t end, un
         if (!(__atomic_load_n(&a->referenced[v / 8], __ATOMIC_RELAXED) & bit))
             __atomic_fetch_or(&a->referenced[v / 8], bit, __ATOMIC_RELAXED);
     }
-    ebpo_workspace_settle(a->mesh->workspace);
     return EBPO_OK;
 }
 
@@ -88,7 +87,6 @@ static ebpo_status find_bounds(void *context, uint64_t begin, uint64_t end, unsi
             b[1][k] = p[k] > b[1][k] ? p[k] : b[1][k];
         }
     }
-    ebpo_workspace_settle(a->mesh->workspace);
     return EBPO_OK;
 }
 
@@ -119,11 +117,12 @@ static ebpo_status measure_all(arranging *a, int level, ebpo_error *error)
     if (!a->referenced || !a->bounds)
         return ebpo_workspace_fail(mesh->workspace,
                                    mesh->vertex_count / 8 + blocks * sizeof *a->bounds, error);
-    ebpo_status status = ebpo_parallel_for(a->threads, mesh->face_count, GRAIN, mark_vertices, a,
-                                           a->progress, "looking at faces", error);
+    ebpo_status status =
+        ebpo_parallel_for(a->threads, mesh->workspace, mesh->face_count, GRAIN, mark_vertices, a,
+                          a->progress, "looking at faces", error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(a->threads, mesh->vertex_count, GRAIN, find_bounds, a,
-                                   a->progress, "measuring the box", error);
+        status = ebpo_parallel_for(a->threads, mesh->workspace, mesh->vertex_count, GRAIN,
+                                   find_bounds, a, a->progress, "measuring the box", error);
     if (status != EBPO_OK)
         return status;
     double min[3] = { INFINITY, INFINITY, INFINITY }, max[3] = { -INFINITY, -INFINITY, -INFINITY };
@@ -288,7 +287,6 @@ static ebpo_status fill_ranks(void *context, uint64_t begin, uint64_t end, unsig
         if (v < a->rank_count)
             a->rank[v] = (uint32_t)i;
     }
-    ebpo_workspace_settle(a->mesh->workspace);
     return EBPO_OK;
 }
 
@@ -302,7 +300,6 @@ static ebpo_status translate(void *context, uint64_t begin, uint64_t end, unsign
         if (v < a->rank_count)
             a->corners[i] = a->rank[v];
     }
-    ebpo_workspace_settle(a->mesh->workspace);
     return EBPO_OK;
 }
 
@@ -332,12 +329,12 @@ static ebpo_status translate_faces(arranging *a, uint64_t *passes, ebpo_error *e
     for (a->rank_first = 0; a->rank_first < mesh->vertex_count && status == EBPO_OK;
          a->rank_first += a->rank_count) {
         pass.begin = pass.end++;
-        status = ebpo_parallel_for(a->threads, mesh->vertex_count, GRAIN, fill_ranks, a, &progress,
-                                   "ordering faces", error);
+        status = ebpo_parallel_for(a->threads, mesh->workspace, mesh->vertex_count, GRAIN,
+                                   fill_ranks, a, &progress, "ordering faces", error);
         pass.begin = pass.end++;
         if (status == EBPO_OK)
-            status = ebpo_parallel_for(a->threads, mesh->face_count, GRAIN, translate, a, &progress,
-                                       "ordering faces", error);
+            status = ebpo_parallel_for(a->threads, mesh->workspace, mesh->face_count, GRAIN,
+                                       translate, a, &progress, "ordering faces", error);
     }
     free(a->rank);
     a->rank = NULL;
@@ -419,10 +416,8 @@ static ebpo_status sort_faces(arranging *a, ebpo_error *error)
 static void compose(const struct ebpo_arrangement *before, ebpo_workspace *workspace, uint32_t *map,
                     uint64_t count)
 {
-    for (uint64_t i = 0; before && i < count; i++) {
-        ebpo_workspace_settle_often(workspace, i);
+    EBPO_FOR_ITEMS_SCATTERED(workspace, i, 0, before ? count : 0)
         map[i] = before->vertex_source[map[i]];
-    }
 }
 
 static void put_in_place(arranging *a)

@@ -51,20 +51,15 @@ enum { STEP = 4 << 20 };
 
 void ebpo_array_fill(ebpo_workspace *workspace, void *array, int byte, uint64_t bytes)
 {
-    for (uint64_t at = 0; at < bytes; at += STEP) {
+    EBPO_FOR_PIECES(workspace, at, bytes, STEP)
         memset((char *)array + at, byte, bytes - at < STEP ? (size_t)(bytes - at) : STEP);
-        ebpo_release_pages(workspace);
-    }
 }
 
 void ebpo_array_copy(ebpo_workspace *workspace, void *to, const void *from, uint64_t bytes)
 {
-    for (uint64_t at = 0; at < bytes; at += STEP) {
+    EBPO_FOR_PIECES(bytes > STEP ? workspace : NULL, at, bytes, STEP)
         memcpy((char *)to + at, (const char *)from + at,
                bytes - at < STEP ? (size_t)(bytes - at) : STEP);
-        if (bytes > STEP)
-            ebpo_release_pages(workspace);
-    }
 }
 
 bool ebpo_array_grow(ebpo_workspace *workspace, void *array, uint64_t *capacity, uint64_t need,

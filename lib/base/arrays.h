@@ -2,7 +2,7 @@
 #ifndef EBPO_BASE_ARRAYS_H
 #define EBPO_BASE_ARRAYS_H
 
-#include "base/release_pages.h"
+#include "base/array_loops.h"
 #include "base/workspace.h"
 
 /* count * size bytes, uninitialised; NULL when the product overflows, memory is short or the disk

@@ -7,10 +7,12 @@
 #include "base/clock.h"
 #include "base/error.h"
 #include "base/fp_env.h"
+#include "base/release_pages.h"
 
 enum { MAX_THREADS = 256 };
 
 typedef struct run {
+    ebpo_workspace *workspace;
     uint64_t count, grain;
     ebpo_task_fn task;
     void *context;
@@ -61,6 +63,7 @@ static void work(run *r, unsigned number)
         uint64_t end = r->count - begin < r->grain ? r->count : begin + r->grain;
         ebpo_error error = EBPO_ERROR_INIT;
         ebpo_status status = r->task(r->context, begin, end, number, &error);
+        ebpo_release_pages(r->workspace);
         if (status != EBPO_OK)
             record_failure(r, begin, status, &error);
         uint64_t done = atomic_fetch_add(&r->done, end - begin) + (end - begin);
@@ -110,11 +113,12 @@ ebpo_progress ebpo_pass_progress(ebpo_pass *pass)
     return (ebpo_progress){ pass->to && pass->to->report ? report_pass : NULL, pass };
 }
 
-ebpo_status ebpo_parallel_for(unsigned threads, uint64_t count, uint64_t grain, ebpo_task_fn task,
-                              void *context, const ebpo_progress *progress, const char *stage,
-                              ebpo_error *error)
+ebpo_status ebpo_parallel_for(unsigned threads, ebpo_workspace *workspace, uint64_t count,
+                              uint64_t grain, ebpo_task_fn task, void *context,
+                              const ebpo_progress *progress, const char *stage, ebpo_error *error)
 {
-    run r = { .count = count,
+    run r = { .workspace = workspace,
+              .count = count,
               .grain = grain ? grain : 1,
               .task = task,
               .context = context,

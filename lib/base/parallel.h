@@ -3,6 +3,7 @@
 #define EBPO_BASE_PARALLEL_H
 
 #include <ebpo/base.h>
+#include <ebpo/workspace.h>
 
 /* One piece: items [begin, end). `worker` is 0 .. threads - 1, for per-thread scratch. Anything but
  * EBPO_OK stops the whole run after the pieces that are under way; `error` belongs to this worker.
@@ -16,11 +17,12 @@ unsigned ebpo_thread_count(unsigned requested);
 /* Calls `task` over [0, count) in pieces of `grain` items (at least 1), handed out in ascending
  * order to `threads` threads (as ebpo_thread_count gives them); the calling thread works too and
  * reports progress (`stage`, items done; at the beginning 0). Which thread runs which piece is not
- * determined: results must not depend on it. Of several failures the one of the lowest piece is
- * returned. */
-ebpo_status ebpo_parallel_for(unsigned threads, uint64_t count, uint64_t grain, ebpo_task_fn task,
-                              void *context, const ebpo_progress *progress, const char *stage,
-                              ebpo_error *error);
+ * determined: results must not depend on it. After each piece, pages of `workspace` (NULL: of none)
+ * are released where its budget asks for it, so that tasks need not. Of several failures the one of
+ * the lowest piece is returned. */
+ebpo_status ebpo_parallel_for(unsigned threads, ebpo_workspace *workspace, uint64_t count,
+                              uint64_t grain, ebpo_task_fn task, void *context,
+                              const ebpo_progress *progress, const char *stage, ebpo_error *error);
 
 /* A stage without pieces begins. False when it is to stop; `error` then says so. */
 bool ebpo_progress_stage(const ebpo_progress *progress, const char *stage, ebpo_error *error);

@@ -5,34 +5,11 @@
 #include <ebpo/workspace.h>
 
 /* Between pieces of work, by each thread and for each few megabytes touched: releases pages of
- * files when the budget is nearly used up. Cheap; NULL is fine. */
+ * files when the budget is nearly used up. Cheap; NULL is fine. Loops (base/array_loops.h) and runs
+ * of pieces (base/parallel.h) call it: only what is neither, as a recursion, needs to itself. */
 void ebpo_release_pages(ebpo_workspace *workspace);
 
-/* The same within a loop that goes through arrays in order. */
-static inline void ebpo_release_pages_at(ebpo_workspace *workspace, uint64_t i)
-{
-    if (workspace && (i & 0x7fff) == 0)
-        ebpo_release_pages(workspace);
-}
-
-/* And within one that jumps about: each jump may bring in 16 pages. */
-static inline void ebpo_release_pages_often(ebpo_workspace *workspace, uint64_t i)
-{
-    if (workspace && (i & 0x7f) == 0)
-        ebpo_release_pages(workspace);
-}
-
-static inline void ebpo_workspace_settle(ebpo_workspace *workspace)
-{
-    ebpo_release_pages(workspace);
-}
-static inline void ebpo_workspace_settle_at(ebpo_workspace *workspace, uint64_t i)
-{
-    ebpo_release_pages_at(workspace, i);
-}
-static inline void ebpo_workspace_settle_often(ebpo_workspace *workspace, uint64_t i)
-{
-    ebpo_release_pages_often(workspace, i);
-}
+/* After so many items: of arrays gone through in order, or where each may bring in 16 pages. */
+enum { EBPO_ITEMS_IN_ORDER = 1 << 15, EBPO_ITEMS_SCATTERED = 1 << 7 };
 
 #endif

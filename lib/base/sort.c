@@ -46,7 +46,6 @@ static ebpo_status make_records(void *context, uint64_t begin, uint64_t end, uns
     ebpo_status status = s->make(s->context, begin, end, here, error);
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++, here += s->record)
         __atomic_fetch_add(&t->in_bin[key_of(here) >> s->shift], 1, __ATOMIC_RELAXED);
-    ebpo_workspace_settle(s->workspace);
     return status;
 }
 
@@ -106,10 +105,9 @@ static ebpo_status deal(void *context, uint64_t begin, uint64_t end, unsigned wo
         uint64_t place = __atomic_fetch_add(&t->next[g], count, __ATOMIC_RELAXED);
         memcpy(t->dealt + place * s->record, here + first * s->record, (size_t)count * s->record);
         if (++runs % JUMPS == 0)
-            ebpo_workspace_settle(s->workspace);
+            ebpo_release_pages(s->workspace);
     }
     free(here);
-    ebpo_workspace_settle(s->workspace);
     return EBPO_OK;
 }
 
@@ -203,7 +201,6 @@ static ebpo_status sort_groups(void *context, uint64_t begin, uint64_t end, unsi
     ebpo_status status = EBPO_OK;
     for (uint64_t g = begin; g < end && status == EBPO_OK; g++) {
         status = sort_group(t, g, error);
-        ebpo_workspace_settle(t->s->workspace);
     }
     return status;
 }
@@ -249,20 +246,20 @@ static ebpo_status run(sorting *t, ebpo_error *error)
     ebpo_pass pass = { s->progress, s->passes_before, s->passes_before + 1,
                        s->passes_before + EBPO_SORT_PASSES };
     ebpo_progress progress = ebpo_pass_progress(&pass);
-    ebpo_status status =
-        ebpo_parallel_for(s->threads, s->count, GRAIN, make_records, t, &progress, s->stage, error);
+    ebpo_status status = ebpo_parallel_for(s->threads, s->workspace, s->count, GRAIN, make_records,
+                                           t, &progress, s->stage, error);
     pass.begin = pass.end++;
     if (status == EBPO_OK && !form_groups(t))
         status = ebpo_fail_memory(error, 0);
     if (status == EBPO_OK)
-        status =
-            ebpo_parallel_for(s->threads, s->count, GRAIN, deal, t, &progress, s->stage, error);
+        status = ebpo_parallel_for(s->threads, s->workspace, s->count, GRAIN, deal, t, &progress,
+                                   s->stage, error);
     ebpo_array_free(s->workspace, t->made);
     t->made = NULL;
     pass.begin = pass.end++;
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads_for_groups(t), t->groups, 1, sort_groups, t, &progress,
-                                   s->stage, error);
+        status = ebpo_parallel_for(threads_for_groups(t), s->workspace, t->groups, 1, sort_groups,
+                                   t, &progress, s->stage, error);
     return status;
 }
 

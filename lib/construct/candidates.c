@@ -26,7 +26,7 @@ static void sample_faces(const ebpo_builder *b, const ebpo_branch *s, const uint
         uint32_t normal;
         if (step > 64 &&
             *count % 16 == 0) /* each is in a different part of the workspace's files */
-            ebpo_workspace_settle(b->workspace);
+            ebpo_release_pages(b->workspace);
         ebpo_branch_triangle(b, s, entries ? entries[i] : (uint32_t)i, &face);
         if (*count < SAMPLE_MOST && ebpo_face_normal_code(&b->box, &face, &normal))
             sample[(*count)++] = normal;

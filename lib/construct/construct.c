@@ -226,7 +226,6 @@ static ebpo_status work_on_pieces(void *context, uint64_t begin, uint64_t end, u
         ebpo_subtree_release(s);
         if (status == EBPO_OK)
             status = ebpo_build_pack(b, s->out, error);
-        ebpo_workspace_settle(b->workspace);
         job->envelopes_ns += ebpo_clock() - cut;
     }
     return status;
@@ -240,7 +239,7 @@ static ebpo_status build_pieces(ebpo_builder *b, ebpo_error *error)
     for (unsigned i = 0; i < b->threads && status == EBPO_OK; i++)
         status = ebpo_emit_scratch_make(&job.scratch[i], b->workspace, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(b->threads, b->sub_count, 1, work_on_pieces, &job,
+        status = ebpo_parallel_for(b->threads, b->workspace, b->sub_count, 1, work_on_pieces, &job,
                                    &b->options->progress, "envelopes", error);
     for (unsigned i = 0; i < b->threads && job.scratch; i++)
         ebpo_emit_scratch_free(job.scratch[i]);

@@ -120,7 +120,7 @@ ebpo_status ebpo_build_top(ebpo_builder *b, ebpo_error *error)
     while (status == EBPO_OK && now.count) {
         pass.begin = pass.end;
         pass.end += now.count;
-        status = ebpo_parallel_for(b->threads, now.count, 1, wave_envelopes, &now, &progress,
+        status = ebpo_parallel_for(b->threads, NULL, now.count, 1, wave_envelopes, &now, &progress,
                                    "top envelopes", error);
         for (uint64_t i = 0; i < now.count && status == EBPO_OK; i++)
             if (!hand_down(b, &now.nodes[i], &next))

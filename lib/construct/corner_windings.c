@@ -13,7 +13,8 @@ void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell 
                          int32_t delta[8])
 {
     memset(delta, 0, 8 * sizeof *delta);
-    for (uint64_t first = 0; first < count; first += EBPO_CORNER_FACES) {
+    ebpo_workspace *workspace = count < EBPO_CORNER_FACES ? NULL : b->workspace;
+    EBPO_FOR_PIECES(workspace, first, count, EBPO_CORNER_FACES) {
         uint64_t part = count - first < EBPO_CORNER_FACES ? count - first : EBPO_CORNER_FACES;
         int32_t own[8];
         for (uint64_t i = 0; i < part; i++)
@@ -22,8 +23,6 @@ void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell 
         ebpo_corner_windings(&b->box, cell, room, part, own);
         for (int i = 0; i < 8; i++)
             delta[i] += own[i];
-        if (part == EBPO_CORNER_FACES)
-            ebpo_workspace_settle(b->workspace);
     }
 }
 

@@ -190,7 +190,8 @@ static bool emit_gray(emitter *e, const ebpo_build_node *node, ebpo_cell cell, i
     const ebpo_builder *b = e->b;
     uint32_t codes[EBPO_PLANES_STORED];
     int planes = 0;
-    ebpo_workspace_settle_often(b->workspace, e->s->out[cell.level].level.gray_count);
+    if (e->s->out[cell.level].level.gray_count % EBPO_ITEMS_SCATTERED == 0)
+        ebpo_release_pages(b->workspace);
     if (b->options->parts & EBPO_PART_PLANES)
         planes = ebpo_gray_planes(b, e->scratch->envelope, e->s, node->detail, cell, winding,
                                   envelope, codes);

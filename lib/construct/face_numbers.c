@@ -24,7 +24,8 @@ static void number_leaf(ebpo_builder *b, const ebpo_branch *s, ebpo_build_detail
 static void number_node(ebpo_builder *b, ebpo_branch *s, uint32_t index, uint32_t *next)
 {
     const ebpo_build_node *node = &s->nodes[index];
-    ebpo_workspace_settle_often(b->workspace, index);
+    if (index % EBPO_ITEMS_SCATTERED == 0)
+        ebpo_release_pages(b->workspace);
     if (node->type == EBPO_LEAF)
         number_leaf(b, s, &s->details[node->detail], next);
     else if (node->type == EBPO_GRAY)
@@ -50,8 +51,7 @@ static void order_vertices(const ebpo_builder *b, const ebpo_mesh *mesh, const u
 {
     ebpo_array_fill(b->workspace, final, 0xff, mesh->vertex_count * sizeof *final);
     uint32_t next = 0;
-    for (uint64_t i = 0; i < mesh->face_count; i++) {
-        ebpo_workspace_settle_often(b->workspace, i);
+    EBPO_FOR_ITEMS_SCATTERED(b->workspace, i, 0, mesh->face_count) {
         const uint32_t *f = mesh->faces + 3 * (uint64_t)face_at[i];
         for (int k = 0; k < 3; k++)
             if (final[f[k]] == EBPO_NO_NUMBER) {
@@ -59,8 +59,7 @@ static void order_vertices(const ebpo_builder *b, const ebpo_mesh *mesh, const u
                 final[f[k]] = next++;
             }
     }
-    for (uint64_t v = 0; v < mesh->vertex_count; v++) {
-        ebpo_workspace_settle_often(b->workspace, v);
+    EBPO_FOR_ITEMS_SCATTERED(b->workspace, v, 0, mesh->vertex_count) {
         if (final[v] == EBPO_NO_NUMBER) {
             order[next] = (uint32_t)v;
             final[v] = next++;
@@ -84,10 +83,8 @@ static ebpo_status turn_around(void *context, uint64_t begin, uint64_t end, unsi
 {
     moving *m = context;
     (void)worker, (void)error;
-    for (uint64_t f = begin; f < end; f++) {
-        ebpo_workspace_settle_often(m->b->workspace, f);
+    EBPO_FOR_ITEMS_SCATTERED(m->b->workspace, f, begin, end)
         m->face_at[m->b->number[f]] = (uint32_t)f;
-    }
     return EBPO_OK;
 }
 
@@ -98,8 +95,7 @@ static ebpo_status move_vertices(void *context, uint64_t begin, uint64_t end, un
     const ebpo_mesh *mesh = m->mesh;
     ebpo_tree *out = m->out;
     (void)worker, (void)error;
-    for (uint64_t i = begin; i < end; i++) {
-        ebpo_workspace_settle_often(m->b->workspace, i);
+    EBPO_FOR_ITEMS_SCATTERED(m->b->workspace, i, begin, end) {
         uint64_t v = out->vertex_source[i];
         if (mesh->xyz64)
             memcpy(out->mesh.xyz64 + 3 * i, mesh->xyz64 + 3 * v, 3 * sizeof(double));
@@ -115,8 +111,7 @@ static ebpo_status move_faces(void *context, uint64_t begin, uint64_t end, unsig
 {
     moving *m = context;
     (void)worker, (void)error;
-    for (uint64_t i = begin; i < end; i++) {
-        ebpo_workspace_settle_often(m->b->workspace, i);
+    EBPO_FOR_ITEMS_SCATTERED(m->b->workspace, i, begin, end) {
         uint64_t f = m->face_at[i];
         m->out->face_source[i] = m->mesh->arrangement->face_source[f];
         for (uint64_t k = 0; k < 3; k++)
@@ -135,17 +130,17 @@ static ebpo_status move_all(moving *m, uint32_t *final, ebpo_error *error)
               place = { turn.to, 2 * faces, 2 * faces + vertices, all },
               move = { turn.to, 2 * faces + vertices, all, all };
     ebpo_progress progress = ebpo_pass_progress(&turn);
-    ebpo_status status =
-        ebpo_parallel_for(b->threads, faces, MOVE_GRAIN, turn_around, m, &progress, stage, error);
+    ebpo_status status = ebpo_parallel_for(b->threads, NULL, faces, MOVE_GRAIN, turn_around, m,
+                                           &progress, stage, error);
     if (status != EBPO_OK)
         return status;
     order_vertices(b, m->mesh, m->face_at, m->out->vertex_source, final);
     m->final = final;
     progress = ebpo_pass_progress(&place);
-    status = ebpo_parallel_for(b->threads, vertices, MOVE_GRAIN, move_vertices, m, &progress, stage,
-                               error);
+    status = ebpo_parallel_for(b->threads, NULL, vertices, MOVE_GRAIN, move_vertices, m, &progress,
+                               stage, error);
     progress = ebpo_pass_progress(&move);
-    return status == EBPO_OK ? ebpo_parallel_for(b->threads, faces, MOVE_GRAIN, move_faces, m,
+    return status == EBPO_OK ? ebpo_parallel_for(b->threads, NULL, faces, MOVE_GRAIN, move_faces, m,
                                                  &progress, stage, error)
                              : status;
 }

@@ -121,7 +121,7 @@ static bool join_array(const joiner *j, int level, int id, ebpo_level *out)
     if (!to)
         return false;
     ebpo_level_set_array(out, id, to);
-    for (uint64_t i = 0; i < j->count; i++) {
+    EBPO_FOR_ITEMS_EVERY(j->b->workspace, 1, i, 0, j->count) {
         ebpo_level *from = &j->stretch[i][level].level;
         void *array = ebpo_level_array(from, id);
         size_t bytes = (size_t)(ebpo_level_rows(from, id) * size);
@@ -131,7 +131,6 @@ static bool join_array(const joiner *j, int level, int id, ebpo_level *out)
         if (!j->stretch[i][level].packed)
             ebpo_array_free(j->b->workspace, array);
         ebpo_level_set_array(from, id, NULL);
-        ebpo_workspace_settle(j->b->workspace);
     }
     return true;
 }
@@ -174,11 +173,11 @@ static ebpo_status number_block(void *context, uint64_t begin, uint64_t end, uns
     ebpo_level *l = n->level;
     uint32_t *refs = l->leaf_refs + n->first[begin / LEAF_GRAIN];
     (void)worker, (void)error;
-    for (uint64_t i = begin; i < end; refs += l->leaf_ref_count[i++]) {
-        ebpo_workspace_settle_often(n->b->workspace, i);
+    EBPO_FOR_ITEMS_SCATTERED(n->b->workspace, i, begin, end) {
         for (uint32_t k = 0; k < l->leaf_ref_count[i]; k++)
             refs[k] = n->b->number[refs[k]];
         sort_numbers(refs, l->leaf_ref_count[i]);
+        refs += l->leaf_ref_count[i];
     }
     return EBPO_OK;
 }
@@ -192,15 +191,16 @@ static ebpo_status number_refs(const ebpo_builder *b, ebpo_level *l, uint64_t be
     numbering n = { b, l, ebpo_alloc(l->leaf_count / LEAF_GRAIN + 1, sizeof *n.first) };
     if (!n.first)
         return no_memory(b, error);
-    for (uint64_t i = 0, refs = 0; i < l->leaf_count; refs += l->leaf_ref_count[i++]) {
-        ebpo_workspace_settle_at(b->workspace, i);
+    uint64_t refs = 0;
+    EBPO_FOR_ITEMS(b->workspace, i, 0, l->leaf_count) {
         if (i % LEAF_GRAIN == 0)
             n.first[i / LEAF_GRAIN] = refs;
+        refs += l->leaf_ref_count[i];
     }
     ebpo_pass pass = { &b->options->progress, all + before, all + before + l->ref_count, 2 * all };
     ebpo_progress progress = ebpo_pass_progress(&pass);
-    ebpo_status status = ebpo_parallel_for(b->threads, l->leaf_count, LEAF_GRAIN, number_block, &n,
-                                           &progress, stage, error);
+    ebpo_status status = ebpo_parallel_for(b->threads, NULL, l->leaf_count, LEAF_GRAIN,
+                                           number_block, &n, &progress, stage, error);
     free(n.first);
     return status;
 }
@@ -272,8 +272,8 @@ ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error
     ebpo_pass pass = { &b->options->progress, 0, all, 2 * all };
     ebpo_progress progress = ebpo_pass_progress(&pass);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(b->threads, EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS, 1, join_arrays,
-                                   &j, &progress, stage, error);
+        status = ebpo_parallel_for(b->threads, NULL, EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS, 1,
+                                   join_arrays, &j, &progress, stage, error);
     for (int level = 0; level < EBPO_LEVELS_MAX && status == EBPO_OK; level++) {
         uint64_t own = out->level[level].ref_count;
         status = finish_level(&j, level, refs, all, error);

@@ -14,7 +14,7 @@
 #include "construct/vertex_bounds.h"
 #include "planes/octants.h"
 
-enum { SETTLE_FACES = 1 << 13 };
+enum { RELEASE_FACES = 1 << 13 };
 
 /* A mesh with huge faces and a deep maximum level would list every face in millions of cells. */
 static const uint64_t leaves_per_face = 64, leaves_always = 1 << 22, entries_per_face = 512,
@@ -73,8 +73,7 @@ bool ebpo_build_crossing(const ebpo_builder *b, ebpo_branch *s, ebpo_cell cell,
     uint64_t begin, end;
     ebpo_build_vertex_range(b, cell, &begin, &end);
     detail->cross_begin = s->cross_count;
-    for (uint64_t i = 0; i < count; i++) {
-        ebpo_workspace_settle_at(b->workspace, i);
+    EBPO_FOR_ITEMS_SCATTERED(b->workspace, i, 0, count) {
         const uint32_t *f = b->face[ebpo_branch_face(s, list[i])];
         if (f[0] - begin < end - begin && f[1] - begin < end - begin && f[2] - begin < end - begin)
             continue;
@@ -123,10 +122,8 @@ static ebpo_status split(grower *g, ebpo_cell cell, uint64_t at, uint64_t count,
     if (!ebpo_array_grow_late(g->b->workspace, &g->mask, &g->mask_capacity, count, 1))
         return no_memory(g->error);
     uint64_t sizes[8] = { 0 };
-    for (uint64_t i = 0; i < count; i++) {
+    EBPO_FOR_ITEMS_EVERY(b->workspace, RELEASE_FACES, i, 0, count) {
         ebpo_triangle face;
-        if (i % SETTLE_FACES == SETTLE_FACES - 1)
-            ebpo_workspace_settle(b->workspace);
         ebpo_branch_triangle(b, g->s, g->stack[at + i], &face);
         unsigned mask = ebpo_octants_touched(&b->box, cell, &face);
         g->mask[i] = (uint8_t)mask;
@@ -141,12 +138,9 @@ static ebpo_status split(grower *g, ebpo_cell cell, uint64_t at, uint64_t count,
         return no_memory(g->error);
     uint64_t next[8];
     memcpy(next, begin, sizeof next);
-    for (uint64_t i = 0; i < count; i++) {
-        if (i % SETTLE_FACES == SETTLE_FACES - 1)
-            ebpo_workspace_settle(b->workspace);
+    EBPO_FOR_ITEMS_EVERY(b->workspace, RELEASE_FACES, i, 0, count)
         for (unsigned mask = g->mask[i]; mask; mask &= mask - 1)
             g->stack[next[__builtin_ctz(mask)]++] = g->stack[at + i];
-    }
     return EBPO_OK;
 }
 
@@ -234,7 +228,8 @@ static ebpo_status grow(grower *g, uint32_t index, ebpo_cell cell, uint64_t at, 
         status = ebpo_build_check_branch(s, g->error);
     if (status != EBPO_OK)
         return status;
-    ebpo_workspace_settle_often(g->b->workspace, s->detail_count);
+    if (s->detail_count % EBPO_ITEMS_SCATTERED == 0)
+        ebpo_release_pages(g->b->workspace);
     if (!ebpo_branch_detail(g->b, s, &detail) || !ebpo_branch_children(g->b, s, &child))
         return no_memory(g->error);
     s->nodes[index] = (ebpo_build_node){ EBPO_GRAY, child, detail };

@@ -134,8 +134,8 @@ static ebpo_status propose_top(top_list *t, ebpo_pass *pass, ebpo_error *error)
             t->base--;
         pass->begin = pass->end;
         pass->end += end_of_level - t->base;
-        status = ebpo_parallel_for(b->threads, end_of_level - t->base, 1, propose_top_nodes, t,
-                                   &progress, "choosing planes", error);
+        status = ebpo_parallel_for(b->threads, NULL, end_of_level - t->base, 1, propose_top_nodes,
+                                   t, &progress, "choosing planes", error);
         for (uint64_t i = t->base; i < end_of_level && status == EBPO_OK; i++) {
             top_node *n = &t->nodes[i];
             if (n->parent != UINT64_MAX &&
@@ -158,8 +158,8 @@ ebpo_status ebpo_build_propose(ebpo_builder *b, ebpo_error *error)
     ebpo_pass pass = { &b->options->progress, 0, b->sub_count, b->sub_count + t.count };
     ebpo_progress progress = ebpo_pass_progress(&pass);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(b->threads, b->sub_count, 1, ebpo_propose_pieces, b, &progress,
-                                   "choosing planes", error);
+        status = ebpo_parallel_for(b->threads, b->workspace, b->sub_count, 1, ebpo_propose_pieces,
+                                   b, &progress, "choosing planes", error);
     atomic_store(&b->leaf_count, 0); /* the pieces are made once more */
     atomic_store(&b->entry_count, 0);
     if (status == EBPO_OK)

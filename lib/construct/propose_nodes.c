@@ -319,7 +319,6 @@ ebpo_status ebpo_propose_pieces(void *context, uint64_t first, uint64_t last, un
         if (status == EBPO_OK)
             status = pack(b, p.s, error);
         ebpo_branch_forget(p.s);
-        ebpo_workspace_settle(b->workspace);
     }
     proposer_free(&p);
     return status;

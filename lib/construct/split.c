@@ -69,9 +69,8 @@ static ebpo_status make_masks(void *context, uint64_t begin, uint64_t end, unsig
     uint64_t inside = t->end_vertex - t->first_vertex, *sizes = t->begin[begin / SPLIT_GRAIN];
     (void)worker, (void)error;
     memset(sizes, 0, sizeof t->begin[0]);
-    for (uint64_t i = begin; i < end; i++) {
+    EBPO_FOR_ITEMS_SCATTERED(b->workspace, i, begin, end) {
         ebpo_triangle face;
-        ebpo_workspace_settle_often(b->workspace, i);
         ebpo_build_triangle(b, t->list[i], &face);
         const uint32_t *f = b->face[t->list[i]];
         bool within = f[0] - t->first_vertex < inside && f[1] - t->first_vertex < inside &&
@@ -81,7 +80,6 @@ static ebpo_status make_masks(void *context, uint64_t begin, uint64_t end, unsig
         for (; mask; mask &= mask - 1)
             sizes[__builtin_ctz(mask)]++;
     }
-    ebpo_workspace_settle(b->workspace);
     return EBPO_OK;
 }
 
@@ -96,7 +94,6 @@ static ebpo_status hand_out(void *context, uint64_t begin, uint64_t end, unsigne
             int bit = __builtin_ctz(mask);
             t->to[bit][next[bit]++] = t->list[i];
         }
-    ebpo_workspace_settle(t->b->workspace);
     return EBPO_OK;
 }
 
@@ -151,15 +148,15 @@ static ebpo_status split_top(ebpo_builder *b, ebpo_cell cell, const uint32_t *li
     ebpo_build_vertex_range(b, cell, &t.first_vertex, &t.end_vertex);
     ebpo_status status = t.mask && t.begin ? EBPO_OK : no_memory(b, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(b->threads, count, SPLIT_GRAIN, make_masks, &t, &progress,
-                                   "cutting into pieces", error);
+        status = ebpo_parallel_for(b->threads, b->workspace, count, SPLIT_GRAIN, make_masks, &t,
+                                   &progress, "cutting into pieces", error);
     if (status == EBPO_OK) {
         add_up(&t, sizes);
         status = make_room(b, &t, lists, sizes, error);
     }
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(b->threads, count, SPLIT_GRAIN, hand_out, &t, &progress,
-                                   "cutting into pieces", error);
+        status = ebpo_parallel_for(b->threads, b->workspace, count, SPLIT_GRAIN, hand_out, &t,
+                                   &progress, "cutting into pieces", error);
     ebpo_array_free(b->workspace, t.mask);
     free(t.begin);
     return status;
@@ -173,8 +170,7 @@ static bool mark_fresh(ebpo_builder *b, ebpo_branch *s, uint8_t *listed)
         return false;
     s->first =
         b->sub_count ? b->sub[b->sub_count - 1].first + b->sub[b->sub_count - 1].fresh_count : 0;
-    for (uint64_t i = 0; i < s->list_count; i++) {
-        ebpo_workspace_settle_at(b->workspace, i);
+    EBPO_FOR_ITEMS(b->workspace, i, 0, s->list_count) {
         uint32_t f = s->list[i];
         unsigned before = listed[f / 8] >> f % 8 & 1;
         listed[f / 8] |= (uint8_t)(1u << f % 8);
@@ -272,10 +268,8 @@ static ebpo_status cut(ebpo_builder *b, ebpo_error *error)
     } else {
         memset(&b->top.nodes[0], 0, sizeof b->top.nodes[0]);
         b->top.node_count = 1;
-        for (uint64_t i = 0; i < b->face_count; i++) {
-            ebpo_workspace_settle_at(b->workspace, i);
+        EBPO_FOR_ITEMS(b->workspace, i, 0, b->face_count)
             all[i] = (uint32_t)i;
-        }
         status = grow_top(&c, 0, b->top.cell, all, b->face_count);
     }
     ebpo_array_free(b->workspace, c.listed);
@@ -295,7 +289,6 @@ static ebpo_status corners_of_pieces(void *context, uint64_t begin, uint64_t end
     for (uint64_t i = begin; i < end; i++) {
         ebpo_branch *s = &b->sub[i];
         ebpo_branch_corners(b, s, s->cell, NULL, s->list_count, faces, s->root_delta);
-        ebpo_workspace_settle(b->workspace);
     }
     free(faces);
     return EBPO_OK;
@@ -339,7 +332,7 @@ ebpo_status ebpo_build_split(ebpo_builder *b, ebpo_error *error)
     if (status == EBPO_OK)
         ebpo_array_fill(b->workspace, b->number, 0xff, b->face_count * sizeof *b->number);
     if (status == EBPO_OK && b->solid)
-        status = ebpo_parallel_for(b->threads, b->sub_count, 1, corners_of_pieces, b,
+        status = ebpo_parallel_for(b->threads, b->workspace, b->sub_count, 1, corners_of_pieces, b,
                                    &b->options->progress, "winding numbers", error);
     return status;
 }

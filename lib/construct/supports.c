@@ -81,12 +81,11 @@ static bool add_vertices(ebpo_supports *s, uint64_t begin, uint64_t end)
 
 static bool add_crossings(ebpo_supports *s, const ebpo_branch *branch, const ebpo_build_detail *d)
 {
-    for (uint64_t i = d->cross_begin; i < d->cross_end; i++) {
+    /* of the top: each is in a different part of the workspace's files */
+    const uint64_t every = branch->list ? 1024 : 32;
+    EBPO_FOR_ITEMS_EVERY(s->workspace, every, i, d->cross_begin, d->cross_end) {
         ebpo_triangle face;
         double points[9][3], slack;
-        if (i % (branch->list ? 1024 : 32) ==
-            0) /* of the top: each is in a different part of the workspace's files */
-            ebpo_workspace_settle(s->workspace);
         ebpo_branch_triangle(s->b, branch, branch->crossing[i], &face);
         int count = ebpo_clip_triangle(&s->b->box, s->cell, &face, points, &slack);
         for (int p = 0; p < count; p++)
@@ -152,7 +151,7 @@ static void among_points(const ebpo_supports *s, const double n[3], double enoug
                          double where[3])
 {
     if (s->count > MANY_POINTS)
-        ebpo_workspace_settle(s->workspace);
+        ebpo_release_pages(s->workspace);
     const ebpo_sweep_points points = { (const double(*)[4][4])s->point, (const double(*)[7])s->box,
                                        (s->count + 3) / 4 };
     uint64_t stretch = s->sweep->highest(&points, n, enough, support);
@@ -207,7 +206,7 @@ double ebpo_supports_find_from(const ebpo_supports *s, const int32_t normal[3], 
     among_points(s, n, enough, &support, where);
     if (s->begin >= s->end || support >= enough)
         return support;
-    ebpo_workspace_settle(s->workspace); /* that many vertices are spread over the whole file */
+    ebpo_release_pages(s->workspace); /* that many vertices are spread over the whole file */
     uint64_t at;
     double p[3] = { 0, 0, 0 };
     support = ebpo_bounds_support(s->b, s->cell, n, s->begin, s->end, support, &at);

@@ -32,10 +32,9 @@ ebpo_status ebpo_bounds_make(ebpo_builder *b, ebpo_error *error)
         bounds->box[level] = box;
         bounds->count[level] = n;
         bounds->levels = level + 1;
-        for (uint64_t i = 0; i < below; i++) {
+        EBPO_FOR_ITEMS(b->workspace, i, 0, below) {
             double p[3], *low = level ? bounds->box[level - 1][i][0] : p,
                          *high = level ? bounds->box[level - 1][i][1] : p;
-            ebpo_workspace_settle_at(b->workspace, i);
             if (level == 0)
                 ebpo_mesh_position(b->mesh, i, p);
             if (i % EBPO_BOUNDS_FAN == 0) {

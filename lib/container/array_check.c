@@ -40,8 +40,7 @@ static ebpo_status check_types(const ebpo_check *check, const ebpo_info *info, i
                                error);
     if (level == 0 && arrays->types[0] > 3)
         return ebpo_check_fail(check, level, "types", "the root has siblings", error);
-    for (uint64_t i = 0; i < groups; i++) {
-        ebpo_workspace_settle_at(check->workspace, i);
+    EBPO_FOR_ITEMS(check->workspace, i, 0, groups) {
         for (unsigned octant = 0; octant < ebpo_group_octants(level); octant++)
             counts[ebpo_group_type(arrays->types[i], octant)]++;
     }
@@ -90,9 +89,8 @@ static ebpo_status check_planes(const ebpo_check *check, int level, const char *
     if (sum != plane_count)
         return ebpo_check_fail(check, level, counts_name,
                                "the counts do not add up to the number of planes", error);
-    for (uint64_t i = 0; i < plane_count; i++) {
+    EBPO_FOR_ITEMS(check->workspace, i, 0, plane_count) {
         int32_t n[3], d;
-        ebpo_workspace_settle_at(check->workspace, i);
         if (!ebpo_plane_code_decode(planes[i], n, &d))
             return ebpo_check_fail(check, level, planes_name, "a code stands for no plane", error);
     }
@@ -103,14 +101,12 @@ static ebpo_status check_windings(const ebpo_check *check, const ebpo_info *info
                                   const ebpo_level *arrays, ebpo_error *error)
 {
     if (arrays->black_winding)
-        for (uint64_t i = 0; i < arrays->black_count;
-             ebpo_workspace_settle_at(check->workspace, i++))
+        EBPO_FOR_ITEMS(check->workspace, i, 0, arrays->black_count)
             if (!ebpo_rule_inside(info->rule, arrays->black_winding[i]))
                 return ebpo_check_fail(check, level, "black_winding",
                                        "a black node lies outside by the winding rule", error);
     if (arrays->white_winding)
-        for (uint64_t i = 0; i < arrays->white_count;
-             ebpo_workspace_settle_at(check->workspace, i++))
+        EBPO_FOR_ITEMS(check->workspace, i, 0, arrays->white_count)
             if (ebpo_rule_inside(info->rule, arrays->white_winding[i]))
                 return ebpo_check_fail(check, level, "white_winding",
                                        "a white node lies inside by the winding rule", error);
@@ -134,9 +130,8 @@ static ebpo_status check_leaves(const ebpo_check *check, const ebpo_info *info, 
 {
     const ebpo_level_summary *s = &info->level[level];
     uint64_t end = 0, news = 0, refs = 0;
-    for (uint64_t i = 0; i < arrays->leaf_count; i++) {
+    EBPO_FOR_ITEMS(check->workspace, i, 0, arrays->leaf_count) {
         uint64_t first = arrays->leaf_first[i];
-        ebpo_workspace_settle_at(check->workspace, i);
         if (first < end || first > info->face_count ||
             arrays->leaf_new[i] > info->face_count - first)
             return ebpo_check_fail(
@@ -228,14 +223,14 @@ ebpo_status ebpo_check_map(const ebpo_check *check, const char *array, const uin
     if (!seen)
         return ebpo_fail_memory(error, limit / 8);
     ebpo_status status = EBPO_OK;
-    for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
+    EBPO_FOR_ITEMS(check->workspace, i, 0, count) {
         uint64_t bit = UINT64_C(1) << map[i] % 64;
-        ebpo_workspace_settle_at(check->workspace, i);
-        if (map[i] >= limit || seen[map[i] / 64] & bit)
+        if (map[i] >= limit || seen[map[i] / 64] & bit) {
             status = ebpo_check_fail(check, -1, array,
                                      "a source number is out of range or used twice", error);
-        else
-            seen[map[i] / 64] |= bit;
+            break;
+        }
+        seen[map[i] / 64] |= bit;
     }
     free(seen);
     return status;
@@ -244,8 +239,7 @@ ebpo_status ebpo_check_map(const ebpo_check *check, const char *array, const uin
 ebpo_status ebpo_check_finite(const ebpo_check *check, const ebpo_mesh *mesh, ebpo_error *error)
 {
     bool finite = true;
-    for (uint64_t i = 0; i < mesh->vertex_count * 3;
-         ebpo_workspace_settle_at(check->workspace, i++))
+    EBPO_FOR_ITEMS(check->workspace, i, 0, mesh->vertex_count * 3)
         finite &= mesh->xyz32 ? isfinite(mesh->xyz32[i]) : isfinite(mesh->xyz64[i]);
     return finite ? EBPO_OK
                   : ebpo_check_fail(check, -1, "/mesh/vertices",

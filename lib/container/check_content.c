@@ -81,6 +81,7 @@ ebpo_status ebpo_file_check_content(const ebpo_file *file, const ebpo_read_optio
         j.array[j.count - 1 - i] = other;
     }
     ebpo_expect_tree(file);
-    status = ebpo_parallel_for(read.threads, j.count, 1, digest_arrays, &j, NULL, "check", error);
+    status =
+        ebpo_parallel_for(read.threads, NULL, j.count, 1, digest_arrays, &j, NULL, "check", error);
     return status == EBPO_OK ? compare(&j, error) : status;
 }

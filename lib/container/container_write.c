@@ -236,10 +236,11 @@ static ebpo_status compress_slot(void *context, uint64_t begin, uint64_t end, un
 static ebpo_status encode_window(writer *w, ebpo_error *error)
 {
     unsigned threads = w->used > 4 ? w->threads : 1;
-    ebpo_status status = ebpo_parallel_for(threads, w->used, 1, fill_slot, w, NULL, "write", error);
+    ebpo_status status = ebpo_parallel_for(threads, w->plan.tree->mesh.workspace, w->used, 1,
+                                           fill_slot, w, NULL, "write", error);
     if (status == EBPO_OK)
-        status =
-            ebpo_parallel_for(threads, w->used + 1u, 1, compress_slot, w, NULL, "write", error);
+        status = ebpo_parallel_for(threads, w->plan.tree->mesh.workspace, w->used + 1u, 1,
+                                   compress_slot, w, NULL, "write", error);
     return status;
 }
 
@@ -257,7 +258,6 @@ static ebpo_status flush_window(writer *w, ebpo_error *error)
                                    s->chunk, s->stored, s->stored_bytes, error);
     }
     w->used = 0;
-    ebpo_workspace_settle(w->plan.tree->mesh.workspace);
     const ebpo_progress *progress = &w->options->progress;
     if (status == EBPO_OK &&
         !ebpo_progress_step(progress, "writing", w->chunks_done, w->chunks, error))

@@ -86,8 +86,8 @@ ebpo_status ebpo_pick_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t
         ebpo_expect_all(&e);
         g.begin = begin;
         g.order = order;
-        status =
-            ebpo_parallel_for(threads, number, 1, gather_chunks, &g, NULL, "picking faces", error);
+        status = ebpo_parallel_for(threads, NULL, number, 1, gather_chunks, &g, NULL,
+                                   "picking faces", error);
     }
     free(begin);
     free(order);

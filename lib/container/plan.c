@@ -140,8 +140,7 @@ static ebpo_status index_faces(ebpo_plan *plan, const ebpo_check *check, ebpo_er
     if (!plan->faces_index)
         return ebpo_fail_memory(error, mesh->face_count / rows * 8);
     uint64_t seen = 0;
-    for (uint64_t i = 0; i < mesh->face_count * 3; i++) {
-        ebpo_workspace_settle_at(mesh->workspace, i);
+    EBPO_FOR_ITEMS(mesh->workspace, i, 0, mesh->face_count * 3) {
         if (i % (3 * (uint64_t)rows) == 0)
             plan->faces_index[i / (3 * (uint64_t)rows)] = seen;
         if (mesh->faces[i] > seen || mesh->faces[i] >= mesh->vertex_count)
@@ -157,7 +156,7 @@ static ebpo_status index_faces(ebpo_plan *plan, const ebpo_check *check, ebpo_er
 static uint8_t narrow_unsigned(const ebpo_level *level, const uint32_t *values, uint64_t count)
 {
     uint32_t all = 0;
-    for (uint64_t i = 0; i < count; ebpo_workspace_settle_at(level->workspace, i++))
+    EBPO_FOR_ITEMS(level->workspace, i, 0, count)
         all |= values[i];
     return all <= UINT8_MAX ? 1 : all <= UINT16_MAX ? 2 : 4;
 }
@@ -165,8 +164,7 @@ static uint8_t narrow_unsigned(const ebpo_level *level, const uint32_t *values, 
 static uint8_t narrow_signed(const ebpo_level *level, const int32_t *values, uint64_t count)
 {
     int32_t low = 0, high = 0;
-    for (uint64_t i = 0; i < count; i++) {
-        ebpo_workspace_settle_at(level->workspace, i);
+    EBPO_FOR_ITEMS(level->workspace, i, 0, count) {
         low = values[i] < low ? values[i] : low;
         high = values[i] > high ? values[i] : high;
     }
@@ -176,8 +174,7 @@ static uint8_t narrow_signed(const ebpo_level *level, const int32_t *values, uin
 static uint8_t narrow_skips(const ebpo_level *level)
 {
     uint64_t end = 0, all = 0;
-    for (uint64_t i = 0; i < level->leaf_count; i++) {
-        ebpo_workspace_settle_at(level->workspace, i);
+    EBPO_FOR_ITEMS(level->workspace, i, 0, level->leaf_count) {
         all |= level->leaf_first[i] - end;
         end = level->leaf_first[i] + level->leaf_new[i];
     }

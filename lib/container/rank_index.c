@@ -15,8 +15,7 @@ uint64_t *ebpo_index_types(const ebpo_level *level, bool root)
 {
     uint64_t *index = make(level->group_count, 4);
     uint64_t before[4] = { 0, 0, 0, 0 };
-    for (uint64_t i = 0; index && i < level->group_count; i++) {
-        ebpo_workspace_settle_at(level->workspace, i);
+    EBPO_FOR_ITEMS(level->workspace, i, 0, index ? level->group_count : 0) {
         if (i % EBPO_INDEX_ROWS == 0)
             for (int k = 0; k < 4; k++)
                 index[i / EBPO_INDEX_ROWS * 4 + k] = before[k];
@@ -42,8 +41,7 @@ uint64_t *ebpo_index_leaves(const ebpo_level *level)
 {
     uint64_t *index = make(level->leaf_count, 3);
     uint64_t end = 0, refs = 0, planes = 0;
-    for (uint64_t i = 0; index && i < level->leaf_count; i++) {
-        ebpo_workspace_settle_at(level->workspace, i);
+    EBPO_FOR_ITEMS(level->workspace, i, 0, index ? level->leaf_count : 0) {
         if (i % EBPO_INDEX_ROWS == 0) {
             index[i / EBPO_INDEX_ROWS * 3] = end;
             index[i / EBPO_INDEX_ROWS * 3 + 1] = refs;

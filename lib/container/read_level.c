@@ -18,8 +18,7 @@ static ebpo_status add_up_skips(const ebpo_file *file, int number, ebpo_level *l
 {
     ebpo_check check = ebpo_reader_check(file, level->workspace);
     uint64_t end = 0, faces = file->info.face_count;
-    for (uint64_t i = 0; i < level->leaf_count; i++) {
-        ebpo_workspace_settle_at(level->workspace, i);
+    EBPO_FOR_ITEMS(level->workspace, i, 0, level->leaf_count) {
         uint64_t skip = level->leaf_first[i];
         if (skip > faces - end || level->leaf_new[i] > faces - end - skip)
             return ebpo_check_fail(&check, number, "leaf_skip",
@@ -62,7 +61,6 @@ static ebpo_status decode_refs(void *context, uint64_t begin, uint64_t end, unsi
     uint64_t leaf = begin * EBPO_INDEX_ROWS, at = j->index[begin * 3 + 1];
     uint64_t stop =
         end * EBPO_INDEX_ROWS < j->level->leaf_count ? end * EBPO_INDEX_ROWS : j->level->leaf_count;
-    ebpo_workspace_settle(j->level->workspace);
     for (; leaf < stop; at += j->level->leaf_ref_count[leaf++])
         if (!ebpo_refs_decode(j->level->leaf_refs + at, j->level->leaf_ref_count[leaf],
                               j->level->leaf_first[leaf])) {
@@ -101,7 +99,7 @@ static ebpo_status finish_lists(const ebpo_file *file, int number, ebpo_level *l
     uint64_t refs = 0;
     if (!level->leaf_first)
         return EBPO_OK;
-    for (uint64_t i = 0; i < level->leaf_count; ebpo_workspace_settle_at(level->workspace, i++))
+    EBPO_FOR_ITEMS(level->workspace, i, 0, level->leaf_count)
         refs += level->leaf_ref_count[i];
     ebpo_check check = ebpo_reader_check(file, level->workspace);
     if (refs != level->ref_count)
@@ -122,8 +120,8 @@ static ebpo_status finish_leaves(const ebpo_file *file, int number, ebpo_level *
     if (status == EBPO_OK && level->leaf_refs) {
         refs_job j = { file, number, level, index };
         uint64_t blocks = (level->leaf_count - 1) / EBPO_INDEX_ROWS + 1;
-        status = ebpo_parallel_for(blocks > 1 ? options->threads : 1, blocks, 1, decode_refs, &j,
-                                   NULL, "read", error);
+        status = ebpo_parallel_for(blocks > 1 ? options->threads : 1, level->workspace, blocks, 1,
+                                   decode_refs, &j, NULL, "read", error);
     }
     free(index);
     return status;

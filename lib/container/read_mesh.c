@@ -252,14 +252,14 @@ static ebpo_status sort_by_source(ebpo_workspace *workspace, const uint32_t *sou
         bits && before && out
             ? EBPO_OK
             : ebpo_workspace_fail(workspace, words * 9 + count * sizeof *out, error);
-    for (uint64_t i = 0; i < count && status == EBPO_OK; ebpo_workspace_settle_at(workspace, i++))
+    EBPO_FOR_ITEMS(workspace, i, 0, status == EBPO_OK ? count : 0)
         bits[source[i] / 64] |= UINT64_C(1) << source[i] % 64;
     for (uint64_t w = 0; w < words && status == EBPO_OK; w++) {
         if (w % WORDS == 0)
             before[w / WORDS] = sum;
         sum += (uint32_t)__builtin_popcountll(bits[w]);
     }
-    for (uint64_t i = 0; i < count && status == EBPO_OK; ebpo_workspace_settle_at(workspace, i++)) {
+    EBPO_FOR_ITEMS(workspace, i, 0, status == EBPO_OK ? count : 0) {
         uint64_t word = source[i] / 64;
         out[i] = before[word / WORDS] +
                  (uint32_t)__builtin_popcountll(bits[word] & ((UINT64_C(1) << source[i] % 64) - 1));
@@ -282,7 +282,7 @@ static ebpo_status reorder_vertices(ebpo_mesh *mesh, const uint32_t *place, ebpo
     uint8_t *sorted = ebpo_array_alloc(mesh->workspace, mesh->vertex_count, size);
     if (!sorted)
         return ebpo_workspace_fail(mesh->workspace, mesh->vertex_count * size, error);
-    for (uint64_t i = 0; i < mesh->vertex_count; ebpo_workspace_settle_often(mesh->workspace, i++))
+    EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, 0, mesh->vertex_count)
         memcpy(sorted + place[i] * size, old + i * size, size);
     if (mesh->xyz32) {
         ebpo_array_free(mesh->workspace, mesh->xyz32);
@@ -300,8 +300,7 @@ static ebpo_status reorder_faces(ebpo_mesh *mesh, const uint32_t *vertex_place,
     uint32_t *sorted = ebpo_array_alloc(mesh->workspace, mesh->face_count, 3 * sizeof *sorted);
     if (!sorted)
         return ebpo_workspace_fail(mesh->workspace, mesh->face_count * 12, error);
-    for (uint64_t i = 0; i < mesh->face_count * 3;
-         ebpo_workspace_settle_often(mesh->workspace, i++))
+    EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, 0, mesh->face_count * 3)
         sorted[3 * (uint64_t)face_place[i / 3] + i % 3] = vertex_place[mesh->faces[i]];
     ebpo_array_free(mesh->workspace, mesh->faces);
     mesh->faces = sorted;

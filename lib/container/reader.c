@@ -129,7 +129,7 @@ static ebpo_status read_chunks(void *context, uint64_t begin, uint64_t end, unsi
         size_t bytes;
         uint64_t run = find_run(j->array, begin, end, &bytes);
         status = read_run(j, j->scratch[worker], begin, run, bytes, error);
-        ebpo_workspace_settle(j->workspace);
+        ebpo_release_pages(j->workspace);
         begin = run;
     }
     return status;
@@ -156,7 +156,7 @@ ebpo_status ebpo_reader_rows(const ebpo_file *file, const ebpo_array_in *array,
     uint64_t grain = chunks / (threads * 4) + 1;
     if (grain > RUN_CHUNKS)
         grain = RUN_CHUNKS;
-    status = ebpo_parallel_for(threads, chunks, grain, read_chunks, &j, NULL, "read", error);
+    status = ebpo_parallel_for(threads, NULL, chunks, grain, read_chunks, &j, NULL, "read", error);
     for (unsigned i = 0; i < threads; i++)
         if (j.scratch[i]) {
             ebpo_chunk_reader_clear(&j.scratch[i]->reader);

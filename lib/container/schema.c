@@ -174,7 +174,7 @@ bool ebpo_level_is_usual(const ebpo_level *level, int id)
     const ebpo_array_spec *spec = &ebpo_schema[id];
     const char *values = ebpo_level_array(level, id);
     uint64_t count = values ? ebpo_level_rows(level, id) : 0;
-    for (uint64_t i = 0; i < count; ebpo_workspace_settle_at(level->workspace, i++))
+    EBPO_FOR_ITEMS(level->workspace, i, 0, count)
         if (!is_value(values + i * spec->held_size, spec->held_size, spec->usual))
             return false;
     return true;

@@ -157,7 +157,7 @@ static ebpo_status search(survey *s, const ebpo_deviation_options *o, ebpo_devia
         uint64_t before = 0, after = 0;
         for (uint64_t i = 0; i < size; i++)
             before += s->nodes[s->order[done + i]].bound.questions;
-        status = ebpo_parallel_for(s->threads, size, 1, bound_some, s, NULL, NULL, s->error);
+        status = ebpo_parallel_for(s->threads, NULL, size, 1, bound_some, s, NULL, NULL, s->error);
         for (uint64_t i = 0; i < size; i++)
             after += s->nodes[s->order[done + i]].bound.questions;
         asked += after - before;
@@ -182,7 +182,7 @@ static ebpo_status bound_level(survey *s, const ebpo_deviation_options *o, ebpo_
         s->order[i] = i;
     s->goal = (ebpo_bound_goal){ 0, INFINITY, 0, 1 };
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(s->threads, s->count, 16, bound_some, s, s->progress,
+        status = ebpo_parallel_for(s->threads, NULL, s->count, 16, bound_some, s, s->progress,
                                    "looking at envelopes", s->error);
     if (status == EBPO_OK)
         status = sort_nodes(s);

@@ -40,7 +40,7 @@ EBPO_MUST_USE ebpo_status ebpo_fragment_push(ebpo_bounder *b, ebpo_fragment_kind
 EBPO_MUST_USE ebpo_status ebpo_fragment_leaf_faces(ebpo_bounder *b, ebpo_fragment *fragment,
                                                    const ebpo_node *leaf);
 
-/* Puts the parts of a piece, which is no longer on the stack, there, or settles them. */
+/* Puts the parts of a piece, which is no longer on the stack, there, or decides them. */
 EBPO_MUST_USE ebpo_status ebpo_fragment_cut(ebpo_bounder *b, const ebpo_fragment *fragment,
                                             const ebpo_fragment_measure *l);
 

@@ -242,7 +242,7 @@ ebpo_status ebpo_deviation_sample(ebpo_model *model, const ebpo_file *file, int 
         status = make_room(&s, model, error);
     if (status == EBPO_OK && s.mesh.face_count) {
         share_out(&s);
-        status = ebpo_parallel_for(s.threads, options->samples, 64, sample_some, &s,
+        status = ebpo_parallel_for(s.threads, NULL, options->samples, 64, sample_some, &s,
                                    &options->progress, "sampling the level's surface", error);
         if (status == EBPO_OK)
             sum_up(&s, out);

@@ -15,7 +15,7 @@
 enum { QUESTIONS = 4096 };
 
 /* The least max_error that was found to be enough, the largest one that was not, and a certain
- * lower bound. A search for a larger max_error asks no more and settles at no more (bound.h), so
+ * lower bound. A search for a larger max_error asks no more and accepts no more (bound.h), so
  * these tell what it would find; an upper bound from another search would not, as this one might
  * run out of questions just above it. */
 typedef struct memory {
@@ -142,8 +142,8 @@ ebpo_status ebpo_tolerance_judge(ebpo_tolerance *n, ebpo_tolerance_node *nodes, 
 {
     n->nodes = nodes;
     n->max_error = max_error;
-    return ebpo_parallel_for(n->threads, count, 8, judge_some, n, &n->progress, "judging envelopes",
-                             error);
+    return ebpo_parallel_for(n->threads, NULL, count, 8, judge_some, n, &n->progress,
+                             "judging envelopes", error);
 }
 
 ebpo_status ebpo_tolerance_most(ebpo_tolerance *n, double *out, ebpo_error *error)

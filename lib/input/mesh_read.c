@@ -30,11 +30,9 @@ static void *hash_file(void *argument)
     hashing *h = argument;
     ebpo_sha256 state;
     ebpo_sha256_begin(&state);
-    for (uint64_t at = 0; at < h->file->size; at += HASH_STEP) {
+    EBPO_FOR_PIECES(h->workspace, at, h->file->size, HASH_STEP)
         ebpo_sha256_add(&state, h->file->data + at,
                         h->file->size - at < HASH_STEP ? (size_t)(h->file->size - at) : HASH_STEP);
-        ebpo_workspace_settle(h->workspace);
-    }
     ebpo_sha256_end(&state, h->digest);
     return NULL;
 }

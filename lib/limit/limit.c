@@ -246,7 +246,7 @@ ebpo_status ebpo_limit_level(const ebpo_file *file, int level, const ebpo_limit_
     unsigned threads = ebpo_thread_count(asked.threads);
     status = prepare(&j, file, level, threads, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, j.node_count, 1, hulls, &j, &asked.progress,
+        status = ebpo_parallel_for(threads, NULL, j.node_count, 1, hulls, &j, &asked.progress,
                                    "convex hulls", error);
     for (uint64_t i = 0; i < j.node_count && status == EBPO_OK; i++) {
         /* not 0 times infinity */

@@ -191,7 +191,7 @@ static ebpo_status walk(job *j, unsigned threads, const ebpo_progress *progress,
     ebpo_status status = visit_root(&top);
     if (status != EBPO_OK)
         return status;
-    return ebpo_parallel_for(threads, j->seed_count, 1, walk_seeds, j, progress,
+    return ebpo_parallel_for(threads, NULL, j->seed_count, 1, walk_seeds, j, progress,
                              "clipping envelopes", error);
 }
 

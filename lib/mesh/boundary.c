@@ -36,10 +36,8 @@ ebpo_status ebpo_boundary_join(ebpo_boundary *boundary, ebpo_boundary *lists, un
                                   sizeof *boundary->edges))
         return ebpo_workspace_fail(mesh->workspace, total * sizeof *boundary->edges, error);
     for (unsigned i = 0; i < count; i++) {
-        for (uint64_t k = 0; k < lists[i].count; k++) {
+        EBPO_FOR_ITEMS(mesh->workspace, k, 0, lists[i].count)
             boundary->edges[boundary->count++] = lists[i].edges[k];
-            ebpo_workspace_settle_at(mesh->workspace, k);
-        }
         ebpo_boundary_free(&lists[i]);
     }
     return EBPO_OK;
@@ -170,7 +168,7 @@ static void let_go(const chaining *c, uint64_t steps)
 {
     enum { OFTEN = 32 };
     if (steps % OFTEN == 0)
-        ebpo_workspace_settle(c->mesh->workspace);
+        ebpo_release_pages(c->mesh->workspace);
 }
 
 static void connect(chaining *c, uint64_t edge, uint64_t next)
@@ -369,14 +367,12 @@ static ebpo_status chain(chaining *c, ebpo_error *error)
         return status;
     if (!connect_all(c))
         return ebpo_fail_memory(error, c->star.capacity * 2 * sizeof *c->star.links);
-    for (uint64_t e = 0; e < c->count; e++) {
-        ebpo_workspace_settle_at(w, e);
+    EBPO_FOR_ITEMS(w, e, 0, c->count) {
         if (!c->continued[e])
             walk(c, e);
     }
     c->out->on_paths = c->out->count;
-    for (uint64_t e = 0; e < c->count; e++) {
-        ebpo_workspace_settle_at(w, e);
+    EBPO_FOR_ITEMS(w, e, 0, c->count) {
         if (!c->walked[e])
             walk(c, first_of_cycle(c, e));
     }
@@ -470,10 +466,9 @@ ebpo_status ebpo_loops_rank(uint64_t **triangles, const ebpo_loops *loops, const
                            .compare = compare_ranks,
                            .take = take_ranks };
         status = ebpo_sort_run(&sort, error);
-        for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
+        EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, 0, status == EBPO_OK ? count : 0) {
             before[r.sorted[i].number] = sum;
             sum += r.sorted[i].triangles;
-            ebpo_workspace_settle_often(mesh->workspace, i);
         }
     }
     ebpo_array_free(mesh->workspace, r.sorted);

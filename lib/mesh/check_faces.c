@@ -103,9 +103,8 @@ static ebpo_status faces(void *context, uint64_t begin, uint64_t end, unsigned w
     const ebpo_mesh *mesh = pass->check->mesh;
     uint32_t *parents = pass->check->parents;
     face_block block = { .area2 = { .adds = 0 } };
-    for (uint64_t f = begin; f < end; f++) {
+    EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, begin, end) {
         const uint32_t *v = mesh->faces + 3 * f;
-        ebpo_workspace_settle_often(mesh->workspace, f);
         join(parents, v[0], v[1]);
         join(parents, v[1], v[2]);
         if (ebpo_face_repeats_index(v)) {
@@ -140,7 +139,7 @@ ebpo_status ebpo_check_faces(ebpo_check *check, ebpo_error *error)
         return ebpo_fail_memory(error, blocks * sizeof *pass.blocks);
     for (int k = 0; k < 3; k++)
         pass.centre[k] = ldexp(0.5 * r->min[k] + 0.5 * r->max[k], -check->units.exponent[k]);
-    ebpo_status status = ebpo_parallel_for(check->threads, count, FACE_GRAIN, faces, &pass,
+    ebpo_status status = ebpo_parallel_for(check->threads, NULL, count, FACE_GRAIN, faces, &pass,
                                            &check->progress, "measuring faces", error);
     ebpo_sum area2 = { .adds = 0 }, volume6 = { .adds = 0 };
     for (uint64_t i = 0; status == EBPO_OK && i < blocks; i++) {

@@ -169,9 +169,8 @@ static ebpo_status stars(void *context, uint64_t begin, uint64_t end, unsigned w
     const ebpo_check *check = pass->check;
     scratch *s = &pass->scratch[worker];
     star_block block = { .edges = 0 };
-    for (uint64_t v = begin; v < end; v++) {
+    EBPO_FOR_ITEMS_SCATTERED(check->mesh->workspace, v, begin, end) {
         uint32_t vertex = (uint32_t)v;
-        ebpo_workspace_settle_often(check->mesh->workspace, v);
         uint64_t degree = ebpo_stars_degree(&check->stars, vertex);
         if (degree == 0)
             continue;
@@ -226,8 +225,8 @@ ebpo_status ebpo_check_stars(ebpo_check *check, ebpo_error *error)
     }
     for (unsigned t = 0; t < check->threads; t++)
         pass.scratch[t].boundary = &boundaries[t];
-    status = ebpo_parallel_for(check->threads, count, STAR_GRAIN, stars, &pass, &check->progress,
-                               "checking edges", error);
+    status = ebpo_parallel_for(check->threads, NULL, count, STAR_GRAIN, stars, &pass,
+                               &check->progress, "checking edges", error);
     if (status != EBPO_OK)
         goto done;
     join_blocks(check, pass.blocks, blocks);

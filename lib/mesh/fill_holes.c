@@ -49,8 +49,7 @@ static ebpo_status collect(void *context, uint64_t begin, uint64_t end, unsigned
 {
     filling *f = context;
     scratch *s = &f->scratch[worker];
-    for (uint64_t v = begin; v < end; v++) {
-        ebpo_workspace_settle_often(f->mesh->workspace, v);
+    EBPO_FOR_ITEMS_SCATTERED(f->mesh->workspace, v, begin, end) {
         bool ok = ebpo_star_gather(&s->star, &f->stars, f->mesh, (uint32_t)v);
         for (uint64_t i = 0, next; ok && i < s->star.count; i = next) {
             const ebpo_link *link = &s->star.links[i];
@@ -69,8 +68,8 @@ static ebpo_status collect(void *context, uint64_t begin, uint64_t end, unsigned
 
 static ebpo_status collect_boundary(filling *f, ebpo_error *error)
 {
-    ebpo_status status = ebpo_parallel_for(f->threads, f->mesh->vertex_count, VERTEX_GRAIN, collect,
-                                           f, NULL, "", error);
+    ebpo_status status = ebpo_parallel_for(f->threads, NULL, f->mesh->vertex_count, VERTEX_GRAIN,
+                                           collect, f, NULL, "", error);
     ebpo_boundary *lists = ebpo_alloc(f->threads, sizeof *lists);
     if (!lists)
         return ebpo_fail_memory(error, f->threads * sizeof *lists);
@@ -123,10 +122,8 @@ static bool fill_loop(filling *f, scratch *s, uint64_t number)
     if (!ebpo_array_grow(workspace, &s->point, &s->point_room, n, sizeof *s->point) ||
         !ebpo_array_grow(workspace, &s->triangles, &s->triangle_room, n, sizeof *s->triangles))
         return false;
-    for (uint32_t i = 0; i < n; i++) {
+    EBPO_FOR_ITEMS_SCATTERED(workspace, i, 0, n)
         ebpo_mesh_position(f->mesh, loop[i], s->point[i]);
-        ebpo_workspace_settle_often(workspace, i + (uint64_t)1);
-    }
     bool search = n > 3 && n <= EBPO_OPTIMAL_CHAIN;
     if (search)
         mark_taken(f, s, loop, n);
@@ -137,12 +134,10 @@ static bool fill_loop(filling *f, scratch *s, uint64_t number)
     if (!ebpo_triangulate_chain(&chain, s->triangles))
         return false;
     uint32_t *face = f->mesh->faces + 3 * (f->mesh->face_count + f->before[number]);
-    for (uint32_t t = 0; t < n - 2;
-         t++, face += 3) { /* against the chain, as the faces beside it run along it */
-        for (int k = 0; k < 3; k++)
-            face[k] = loop[s->triangles[t][2 - k]];
-        ebpo_workspace_settle_often(workspace, t + (uint64_t)1);
-    }
+    /* against the chain, as the faces beside it run along it */
+    EBPO_FOR_ITEMS_SCATTERED(workspace, t, 0, n - 2)
+        for (uint64_t k = 0; k < 3; k++)
+            face[3 * t + k] = loop[s->triangles[t][2 - k]];
     return true;
 }
 
@@ -154,7 +149,6 @@ static ebpo_status fill_loops(void *context, uint64_t begin, uint64_t end, unsig
         if (!fill_loop(f, &f->scratch[worker], i))
             return ebpo_workspace_fail(f->mesh->workspace,
                                        (f->loops.first[i + 1] - f->loops.first[i]) * 132, error);
-    ebpo_workspace_settle(f->mesh->workspace);
     return EBPO_OK;
 }
 
@@ -177,10 +171,8 @@ static ebpo_status make_room(filling *f, ebpo_error *error)
     if (order && !ebpo_array_grow(mesh->workspace, &order->face_source, &capacity, count,
                                   sizeof *order->face_source))
         return ebpo_workspace_fail(mesh->workspace, count * sizeof *order->face_source, error);
-    for (uint64_t i = mesh->face_count; order && i < count; i++) {
+    EBPO_FOR_ITEMS(mesh->workspace, i, mesh->face_count, order ? count : 0)
         order->face_source[i] = (uint32_t)i;
-        ebpo_workspace_settle_at(mesh->workspace, i);
-    }
     return EBPO_OK;
 }
 
@@ -203,8 +195,8 @@ static ebpo_status run(filling *f, ebpo_error *error)
     if (status == EBPO_OK)
         status = make_room(f, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(f->threads, f->loops.count, LOOP_GRAIN, fill_loops, f, NULL, "",
-                                   error);
+        status = ebpo_parallel_for(f->threads, f->mesh->workspace, f->loops.count, LOOP_GRAIN,
+                                   fill_loops, f, NULL, "", error);
     if (status != EBPO_OK)
         return status;
     mesh->face_count += f->added;

@@ -33,14 +33,14 @@ static ebpo_status coordinates(void *context, uint64_t begin, uint64_t end, unsi
                                       : p[k] > 0  ? "inf"
                                                   : "-inf");
     }
-    ebpo_workspace_settle(c->mesh->workspace);
     return EBPO_OK;
 }
 
 ebpo_status ebpo_check_coordinates(ebpo_check *check, ebpo_error *error)
 {
-    return ebpo_parallel_for(check->threads, check->mesh->vertex_count, VERTEX_GRAIN, coordinates,
-                             check, &check->progress, "checking coordinates", error);
+    return ebpo_parallel_for(check->threads, check->mesh->workspace, check->mesh->vertex_count,
+                             VERTEX_GRAIN, coordinates, check, &check->progress,
+                             "checking coordinates", error);
 }
 
 typedef struct vertex_block {
@@ -75,7 +75,6 @@ static ebpo_status vertices(void *context, uint64_t begin, uint64_t end, unsigne
         }
     }
     pass->blocks[begin / VERTEX_GRAIN] = b;
-    ebpo_workspace_settle(pass->check->mesh->workspace);
     return EBPO_OK;
 }
 
@@ -106,8 +105,9 @@ ebpo_status ebpo_check_vertices(ebpo_check *check, ebpo_error *error)
     vertex_pass pass = { check, ebpo_alloc(blocks, sizeof *pass.blocks) };
     if (!pass.blocks)
         return ebpo_fail_memory(error, blocks * sizeof *pass.blocks);
-    ebpo_status status = ebpo_parallel_for(check->threads, count, VERTEX_GRAIN, vertices, &pass,
-                                           &check->progress, "checking vertices", error);
+    ebpo_status status =
+        ebpo_parallel_for(check->threads, check->mesh->workspace, count, VERTEX_GRAIN, vertices,
+                          &pass, &check->progress, "checking vertices", error);
     for (uint64_t i = 0; status == EBPO_OK && i < blocks; i++) {
         const vertex_block *b = &pass.blocks[i];
         for (int k = 0; k < 3; k++) {
@@ -175,7 +175,8 @@ static void compare_along_curve(const ebpo_mesh *mesh, ebpo_finding *finding)
             take_position(&a, &lowest, finding);
         if (order >= 0)
             take_position(&b, &lowest, finding);
-        ebpo_workspace_settle_at(mesh->workspace, steps);
+        if (steps % EBPO_ITEMS_IN_ORDER == 0)
+            ebpo_release_pages(mesh->workspace);
     }
 }
 
@@ -194,18 +195,16 @@ static ebpo_status compare_all(ebpo_check *check, ebpo_finding *finding, ebpo_er
         positions.repeated ? ebpo_array_alloc(mesh->workspace, count, sizeof *lowest) : NULL;
     if (positions.repeated && !lowest)
         status = ebpo_workspace_fail(mesh->workspace, count * sizeof *lowest, error);
-    for (uint64_t v = 0; lowest && v < count; v++) {
+    EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, v, 0, lowest ? count : 0) {
         uint32_t first = ebpo_positions_first(&positions, (uint32_t)v),
                  source = (uint32_t)ebpo_mesh_source_vertex(mesh, v);
         if (first == v || source < lowest[first])
             lowest[first] = source;
-        ebpo_workspace_settle_often(mesh->workspace, v);
     }
-    for (uint64_t v = 0; lowest && v < count; v++) {
+    EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, v, 0, lowest ? count : 0) {
         uint64_t source = ebpo_mesh_source_vertex(mesh, v);
         if (lowest[ebpo_positions_first(&positions, (uint32_t)v)] != source)
             ebpo_finding_add(finding, source);
-        ebpo_workspace_settle_often(mesh->workspace, v);
     }
     ebpo_array_free(mesh->workspace, lowest);
     ebpo_positions_free(&positions);
@@ -266,10 +265,8 @@ static ebpo_status run(ebpo_check *c, ebpo_error *error)
     c->parents = ebpo_array_alloc(c->mesh->workspace, count, sizeof *c->parents);
     if (!c->parents)
         return ebpo_workspace_fail(c->mesh->workspace, count * sizeof *c->parents, error);
-    for (uint64_t v = 0; v < count; v++) {
-        ebpo_workspace_settle_at(c->mesh->workspace, v);
+    EBPO_FOR_ITEMS(c->mesh->workspace, v, 0, count)
         c->parents[v] = (uint32_t)v;
-    }
     status = ebpo_check_faces(c, error);
     if (status == EBPO_OK)
         status = ebpo_check_stars(c, error);

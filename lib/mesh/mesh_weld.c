@@ -38,7 +38,6 @@ static ebpo_status check_indices(void *context, uint64_t begin, uint64_t end, un
                                   (unsigned long long)ebpo_mesh_source_face(mesh, i / 3),
                                   (unsigned long)mesh->faces[i],
                                   (unsigned long long)mesh->vertex_count);
-    ebpo_workspace_settle(mesh->workspace);
     return EBPO_OK;
 }
 
@@ -51,10 +50,9 @@ static ebpo_status group_by_table(welding *w, ebpo_error *error)
     ebpo_status status = ebpo_positions_build(&positions, mesh, 0, NULL, error);
     if (status != EBPO_OK)
         return status;
-    for (uint64_t v = 0; v < mesh->vertex_count; v++) {
+    EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, v, 0, mesh->vertex_count) {
         uint32_t first = ebpo_positions_first(&positions, (uint32_t)v);
         w->map[v] = first == v ? (uint32_t)w->kept++ : w->map[first];
-        ebpo_workspace_settle_often(mesh->workspace, v);
     }
     ebpo_positions_free(&positions);
     return EBPO_OK;
@@ -81,7 +79,6 @@ static ebpo_status count_heads(void *context, uint64_t begin, uint64_t end, unsi
     for (uint64_t v = begin; v < end; v++)
         count += begins_group(w->mesh, v);
     w->heads[begin / GRAIN] = count;
-    ebpo_workspace_settle(w->mesh->workspace);
     return EBPO_OK;
 }
 
@@ -95,7 +92,6 @@ static ebpo_status number_groups(void *context, uint64_t begin, uint64_t end, un
         next += begins_group(w->mesh, v);
         w->map[v] = (uint32_t)(next - 1);
     }
-    ebpo_workspace_settle(w->mesh->workspace);
     return EBPO_OK;
 }
 
@@ -105,13 +101,15 @@ static ebpo_status group_neighbours(welding *w, ebpo_error *error)
     w->heads = ebpo_alloc(blocks, sizeof *w->heads);
     if (!w->heads)
         return ebpo_fail_memory(error, blocks * sizeof *w->heads);
-    ebpo_status status = ebpo_parallel_for(0, n, GRAIN, count_heads, w, NULL, "", error);
+    ebpo_status status =
+        ebpo_parallel_for(0, w->mesh->workspace, n, GRAIN, count_heads, w, NULL, "", error);
     for (uint64_t i = 0; status == EBPO_OK && i < blocks; i++) {
         uint64_t count = w->heads[i];
         w->heads[i] = w->kept;
         w->kept += count;
     }
-    return status == EBPO_OK ? ebpo_parallel_for(0, n, GRAIN, number_groups, w, NULL, "", error)
+    return status == EBPO_OK ? ebpo_parallel_for(0, w->mesh->workspace, n, GRAIN, number_groups, w,
+                                                 NULL, "", error)
                              : status;
 }
 
@@ -123,9 +121,8 @@ static void choose(welding *w)
 {
     const ebpo_mesh *mesh = w->mesh;
     uint64_t met = 0;
-    for (uint64_t v = 0; v < mesh->vertex_count; v++) {
+    EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, v, 0, mesh->vertex_count) {
         uint32_t group = w->map[v];
-        ebpo_workspace_settle_often(mesh->workspace, v);
         if (group == met)
             w->from[met++] = (uint32_t)v;
         else if (ebpo_mesh_source_vertex(mesh, v) < ebpo_mesh_source_vertex(mesh, w->from[group]))
@@ -138,10 +135,9 @@ static ebpo_status mark_sources(void *context, uint64_t begin, uint64_t end, uns
 {
     welding *w = context;
     (void)worker, (void)error;
-    for (uint64_t i = begin; i < end; i++) {
+    EBPO_FOR_ITEMS_SCATTERED(w->mesh->workspace, i, begin, end) {
         uint64_t s = ebpo_mesh_source_vertex(w->mesh, w->from[i]);
         __atomic_fetch_or(&w->stays[s / WORD], UINT64_C(1) << s % WORD, __ATOMIC_RELAXED);
-        ebpo_workspace_settle_often(w->mesh->workspace, i);
     }
     return EBPO_OK;
 }
@@ -155,11 +151,11 @@ static ebpo_status number_sources(welding *w, ebpo_error *error)
     w->before = ebpo_array_alloc(workspace, words, sizeof *w->before);
     if (!w->stays || !w->before)
         return ebpo_workspace_fail(workspace, 2 * words * sizeof *w->stays, error);
-    ebpo_status status = ebpo_parallel_for(0, w->kept, GRAIN, mark_sources, w, NULL, "", error);
-    for (uint64_t i = 0; i < words; i++) {
+    ebpo_status status =
+        ebpo_parallel_for(0, NULL, w->kept, GRAIN, mark_sources, w, NULL, "", error);
+    EBPO_FOR_ITEMS(workspace, i, 0, words) {
         w->before[i] = sum;
         sum += (uint64_t)__builtin_popcountll(w->stays[i]);
-        ebpo_workspace_settle_at(workspace, i);
     }
     return status;
 }
@@ -171,10 +167,9 @@ static ebpo_status rename_corners(void *context, uint64_t begin, uint64_t end, u
 {
     const welding *w = context;
     (void)worker, (void)error;
-    for (uint64_t f = begin; f < end; f++) {
+    EBPO_FOR_ITEMS_SCATTERED(w->mesh->workspace, f, begin, end) {
         for (uint64_t i = 3 * f; i < 3 * f + 3; i++)
             w->mesh->faces[i] = w->map[w->mesh->faces[i]];
-        ebpo_workspace_settle_often(w->mesh->workspace, f);
     }
     return EBPO_OK;
 }
@@ -187,9 +182,8 @@ static void move_vertices(welding *w)
     struct ebpo_arrangement *order = mesh->arrangement;
     size_t size = 3 * (mesh->xyz32 ? sizeof *mesh->xyz32 : sizeof *mesh->xyz64);
     char *base = mesh->xyz32 ? (char *)mesh->xyz32 : (char *)mesh->xyz64;
-    for (uint64_t i = 0; i < w->kept; i++) {
+    EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, 0, w->kept) {
         uint64_t from = w->from[i];
-        ebpo_workspace_settle_often(mesh->workspace, i);
         if (from != i)
             memmove(base + i * size, base + from * size, size);
         if (order) {
@@ -215,8 +209,8 @@ static void move_vertices(welding *w)
 static ebpo_status run(welding *w, ebpo_error *error)
 {
     ebpo_mesh *mesh = w->mesh;
-    ebpo_status status =
-        ebpo_parallel_for(0, mesh->face_count, GRAIN, check_indices, mesh, NULL, "", error);
+    ebpo_status status = ebpo_parallel_for(0, mesh->workspace, mesh->face_count, GRAIN,
+                                           check_indices, mesh, NULL, "", error);
     if (status != EBPO_OK)
         return status;
     w->map = ebpo_array_alloc(mesh->workspace, mesh->vertex_count, sizeof *w->map);
@@ -233,7 +227,8 @@ static ebpo_status run(welding *w, ebpo_error *error)
     if (mesh->arrangement)
         status = number_sources(w, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(0, mesh->face_count, GRAIN, rename_corners, w, NULL, "", error);
+        status =
+            ebpo_parallel_for(0, NULL, mesh->face_count, GRAIN, rename_corners, w, NULL, "", error);
     if (status == EBPO_OK)
         move_vertices(w);
     return status;

@@ -106,7 +106,6 @@ static ebpo_status begin_faces(void *context, uint64_t begin, uint64_t end, unsi
         o->above[f] = f << 1;
         o->flags[f] = ebpo_face_repeats_index(o->mesh->faces + 3 * f) ? OPEN : 0;
     }
-    ebpo_workspace_settle(o->mesh->workspace);
     return EBPO_OK;
 }
 
@@ -115,8 +114,7 @@ static ebpo_status visit_vertices(void *context, uint64_t begin, uint64_t end, u
 {
     orienting *o = context;
     ebpo_star *star = &o->star[worker];
-    for (uint64_t v = begin; v < end; v++) {
-        ebpo_workspace_settle_often(o->mesh->workspace, v);
+    EBPO_FOR_ITEMS_SCATTERED(o->mesh->workspace, v, begin, end) {
         if (!ebpo_star_gather(star, &o->stars, o->mesh, (uint32_t)v))
             return ebpo_fail_memory(error, star->capacity * 2 * sizeof *star->links);
         for (uint64_t i = 0, next; i < star->count; i = next) {
@@ -136,11 +134,11 @@ static ebpo_status join_faces(orienting *o, ebpo_error *error)
     if (status == EBPO_OK && !o->star)
         status = ebpo_fail_memory(error, threads * sizeof *o->star);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, o->mesh->face_count, FACE_GRAIN, begin_faces, o, NULL,
-                                   "", error);
+        status = ebpo_parallel_for(threads, o->mesh->workspace, o->mesh->face_count, FACE_GRAIN,
+                                   begin_faces, o, NULL, "", error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, o->mesh->vertex_count, VERTEX_GRAIN, visit_vertices, o,
-                                   NULL, "", error);
+        status = ebpo_parallel_for(threads, NULL, o->mesh->vertex_count, VERTEX_GRAIN,
+                                   visit_vertices, o, NULL, "", error);
     for (unsigned t = 0; o->star && t < threads; t++)
         ebpo_star_free(&o->star[t]);
     free(o->star);
@@ -152,11 +150,10 @@ static ebpo_status join_faces(orienting *o, ebpo_error *error)
  * what is below them. */
 static void gather_flags(orienting *o)
 {
-    for (uint64_t f = 0; f < o->mesh->face_count; f++) {
+    EBPO_FOR_ITEMS_SCATTERED(o->mesh->workspace, f, 0, o->mesh->face_count) {
         uint64_t up = o->above[f], root = o->above[up >> 1] ^ (up & 1);
         o->above[f] = root;
         o->flags[root >> 1] |= o->flags[f];
-        ebpo_workspace_settle_often(o->mesh->workspace, f);
     }
 }
 
@@ -164,8 +161,7 @@ static void gather_flags(orienting *o)
 
 static bool list_patches(orienting *o)
 {
-    for (uint64_t f = 0; f < o->mesh->face_count; f++) {
-        ebpo_workspace_settle_at(o->mesh->workspace, f);
+    EBPO_FOR_ITEMS(o->mesh->workspace, f, 0, o->mesh->face_count) {
         if (o->above[f] >> 1 != f)
             continue;
         o->unorientable += (o->flags[f] & TWISTED) != 0;
@@ -202,8 +198,7 @@ static patch *patch_of(orienting *o, uint64_t f, patch *last)
 static void count_faces(orienting *o)
 {
     patch *p = NULL;
-    for (uint64_t f = 0; f < o->mesh->face_count; f++) {
-        ebpo_workspace_settle_often(o->mesh->workspace, f);
+    EBPO_FOR_ITEMS_SCATTERED(o->mesh->workspace, f, 0, o->mesh->face_count) {
         p = patch_of(o, f, p);
         if (!p)
             continue;
@@ -233,8 +228,7 @@ static ebpo_status measure(void *context, uint64_t begin, uint64_t end, unsigned
     ebpo_sum sum = { .adds = 0 };
     patch *last = NULL;
     double base[3] = { 0, 0, 0 };
-    for (uint64_t f = begin; f < end; f++) {
-        ebpo_workspace_settle_often(mesh->workspace, f);
+    EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, begin, end) {
         patch *p = patch_of(o, f, last);
         if (!p || !p->closed)
             continue;
@@ -275,8 +269,7 @@ static ebpo_status flip(void *context, uint64_t begin, uint64_t end, unsigned wo
     (void)worker, (void)error;
     uint64_t flipped = 0;
     patch *p = NULL;
-    for (uint64_t f = begin; f < end; f++) {
-        ebpo_workspace_settle_often(o->mesh->workspace, f);
+    EBPO_FOR_ITEMS_SCATTERED(o->mesh->workspace, f, begin, end) {
         p = patch_of(o, f, p);
         if (!p || ((o->above[f] & 1) != p->seed_turned) == p->turn_others)
             continue;
@@ -306,11 +299,12 @@ static ebpo_status run(orienting *o, ebpo_error *error)
     if (o->patch_count == 0)
         return EBPO_OK;
     count_faces(o);
-    status = ebpo_parallel_for(0, count, FACE_GRAIN, measure, o, NULL, "", error);
+    status = ebpo_parallel_for(0, NULL, count, FACE_GRAIN, measure, o, NULL, "", error);
     for (uint64_t i = 0; i < o->patch_count; i++)
         decide(&o->patches[i]);
-    return status == EBPO_OK ? ebpo_parallel_for(0, count, FACE_GRAIN, flip, o, NULL, "", error)
-                             : status;
+    return status == EBPO_OK
+               ? ebpo_parallel_for(0, NULL, count, FACE_GRAIN, flip, o, NULL, "", error)
+               : status;
 }
 
 ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)

@@ -60,10 +60,8 @@ static ebpo_status insert_range(void *context, uint64_t begin, uint64_t end, uns
     (void)worker, (void)error;
     ebpo_positions *t = context;
     uint64_t repeated = 0;
-    for (uint64_t v = begin; v < end; v++) {
-        ebpo_workspace_settle_often(t->mesh->workspace, v);
+    EBPO_FOR_ITEMS_SCATTERED(t->mesh->workspace, v, begin, end)
         repeated += insert(t, (uint32_t)v);
-    }
     __atomic_fetch_add(&t->repeated, repeated, __ATOMIC_RELAXED);
     return EBPO_OK;
 }
@@ -77,8 +75,9 @@ ebpo_status ebpo_positions_build(ebpo_positions *out, const ebpo_mesh *mesh, uns
     if (!out->slots)
         return ebpo_workspace_fail(mesh->workspace, size * sizeof *out->slots, error);
     ebpo_array_fill(mesh->workspace, out->slots, 0xff, size * sizeof *out->slots);
-    ebpo_status status = ebpo_parallel_for(threads, mesh->vertex_count, VERTEX_GRAIN, insert_range,
-                                           out, progress, "comparing positions", error);
+    ebpo_status status =
+        ebpo_parallel_for(threads, NULL, mesh->vertex_count, VERTEX_GRAIN, insert_range, out,
+                          progress, "comparing positions", error);
     if (status != EBPO_OK)
         ebpo_positions_free(out);
     return status;

@@ -29,9 +29,8 @@ static ebpo_status count_faces(void *context, uint64_t begin, uint64_t end, unsi
 {
     (void)worker;
     build *b = context;
-    for (uint64_t f = begin; f < end; f++) {
+    EBPO_FOR_ITEMS_SCATTERED(b->mesh->workspace, f, begin, end) {
         const uint32_t *v = b->mesh->faces + 3 * f;
-        ebpo_workspace_settle_often(b->mesh->workspace, f);
         for (int k = 0; k < 3; k++)
             if (v[k] >= b->mesh->vertex_count)
                 return bad_index(b->mesh, f, v[k], error);
@@ -55,9 +54,8 @@ static ebpo_status place_faces(void *context, uint64_t begin, uint64_t end, unsi
 {
     (void)worker, (void)error;
     build *b = context;
-    for (uint64_t f = begin; f < end; f++) {
+    EBPO_FOR_ITEMS_SCATTERED(b->mesh->workspace, f, begin, end) {
         const uint32_t *v = b->mesh->faces + 3 * f;
-        ebpo_workspace_settle_often(b->mesh->workspace, f);
         put(b->stars, v[0], f);
         if (v[1] != v[0])
             put(b->stars, v[1], f);
@@ -76,23 +74,21 @@ ebpo_status ebpo_stars_build(ebpo_stars *out, const ebpo_mesh *mesh, unsigned th
     if (!out->first)
         return ebpo_workspace_fail(mesh->workspace, (mesh->vertex_count + 1) * sizeof *out->first,
                                    error);
-    ebpo_status status = ebpo_parallel_for(threads, mesh->face_count, FACE_GRAIN, count_faces, &b,
-                                           progress, "counting faces at vertices", error);
+    ebpo_status status = ebpo_parallel_for(threads, NULL, mesh->face_count, FACE_GRAIN, count_faces,
+                                           &b, progress, "counting faces at vertices", error);
     if (status != EBPO_OK)
         goto done;
     uint64_t total = 0;
-    for (uint64_t v = 0; v < mesh->vertex_count; v++) {
-        ebpo_workspace_settle_at(mesh->workspace, v);
+    EBPO_FOR_ITEMS(mesh->workspace, v, 0, mesh->vertex_count)
         out->first[v] = total += out->first[v];
-    }
     out->first[mesh->vertex_count] = total;
     out->face = ebpo_array_alloc(mesh->workspace, total, sizeof *out->face);
     if (!out->face) {
         status = ebpo_workspace_fail(mesh->workspace, total * sizeof *out->face, error);
         goto done;
     }
-    status = ebpo_parallel_for(threads, mesh->face_count, FACE_GRAIN, place_faces, &b, progress,
-                               "linking faces to vertices", error);
+    status = ebpo_parallel_for(threads, NULL, mesh->face_count, FACE_GRAIN, place_faces, &b,
+                               progress, "linking faces to vertices", error);
 done:
     if (status != EBPO_OK)
         ebpo_stars_free(out);

@@ -167,7 +167,8 @@ static bool cut_ears(const ebpo_chain *chain, uint32_t (*triangles)[3])
         start_cutting(&c);
     while (ok && written < n - 2) {
         ear e = pop_ear(&c);
-        ebpo_workspace_settle_often(w, written);
+        if (written % EBPO_ITEMS_SCATTERED == 0)
+            ebpo_release_pages(w);
         if (e.version != c.version[e.tip])
             continue;
         uint32_t p = c.before[e.tip], q = c.after[e.tip];

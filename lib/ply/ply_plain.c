@@ -42,7 +42,6 @@ static ebpo_status vertices(void *context, uint64_t begin, uint64_t end, unsigne
                 ebpo_ply_store_coordinate(t->p->mesh, row, &property[i], at, t->swap);
             at += ebpo_ply_type_bytes(property[i].type);
         }
-    ebpo_workspace_settle(t->p->mesh->workspace);
     return EBPO_OK;
 }
 
@@ -76,7 +75,6 @@ static ebpo_status faces(void *context, uint64_t begin, uint64_t end, unsigned w
             if (k)
                 *face++ = (uint32_t)value;
         }
-    ebpo_workspace_settle(t->p->mesh->workspace);
     return EBPO_OK;
 }
 
@@ -108,8 +106,8 @@ static ebpo_status run(plain *t, ebpo_task_fn task)
     ply_parser *p = t->p;
     bool watched = p->progress && p->progress->report;
     t->progress = (ebpo_progress){ watched ? report : NULL, t };
-    ebpo_status status = ebpo_parallel_for(p->threads, t->element->count, GRAIN, task, t,
-                                           &t->progress, "reading", NULL);
+    ebpo_status status = ebpo_parallel_for(p->threads, p->mesh->workspace, t->element->count, GRAIN,
+                                           task, t, &t->progress, "reading", NULL);
     return status == EBPO_E_CANCELLED ? ebpo_ply_fail_stopped(p) : status;
 }
 

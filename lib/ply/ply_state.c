@@ -48,7 +48,7 @@ ebpo_status ebpo_ply_fail_stopped(const ply_parser *p)
 ebpo_status ebpo_ply_report(ply_parser *p)
 {
     p->next_report = p->at + REPORT_BYTES;
-    ebpo_workspace_settle(p->mesh->workspace);
+    ebpo_release_pages(p->mesh->workspace);
     if (!p->progress || !p->progress->report ||
         p->progress->report(p->progress->user, "reading", p->at, p->size))
         return EBPO_OK;

@@ -24,7 +24,7 @@ static ebpo_status check(const ebpo_mesh *mesh, ebpo_error *error)
     if ((mesh->vertex_count && !mesh->xyz32 == !mesh->xyz64) || (mesh->face_count && !mesh->faces))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "the mesh to write has counts without arrays, or positions of both kinds");
-    for (uint64_t i = 0; i < 3 * mesh->face_count; ebpo_workspace_settle_at(mesh->workspace, i++))
+    EBPO_FOR_ITEMS(mesh->workspace, i, 0, 3 * mesh->face_count)
         if (mesh->faces[i] >= mesh->vertex_count)
             return ebpo_fail(error, EBPO_E_ARGUMENT,
                              "face %" PRIu64 " of the mesh to write names vertex %" PRIu32
@@ -48,8 +48,9 @@ static bool write_vertices(FILE *f, const ebpo_mesh *mesh, uint8_t *buffer)
     size_t width = mesh->xyz64 ? 8 : 4;
     const uint8_t *from = mesh->xyz64 ? (const uint8_t *)mesh->xyz64 : (const uint8_t *)mesh->xyz32;
     uint64_t values = 3 * mesh->vertex_count;
-    for (uint64_t done = 0; done < values;) {
-        size_t n = values - done < BUFFER / width ? (size_t)(values - done) : BUFFER / width;
+    const size_t piece = BUFFER / width;
+    EBPO_FOR_PIECES(mesh->workspace, done, values, piece) {
+        size_t n = values - done < piece ? (size_t)(values - done) : piece;
         for (size_t i = 0; i < n; i++) {
             uint32_t narrow;
             uint64_t wide;
@@ -61,10 +62,8 @@ static bool write_vertices(FILE *f, const ebpo_mesh *mesh, uint8_t *buffer)
                 ebpo_store64(buffer + 8 * i, wide);
             }
         }
-        ebpo_workspace_settle(mesh->workspace);
         if (fwrite(buffer, width, n, f) != n)
             return false;
-        done += n;
     }
     return true;
 }
@@ -72,7 +71,7 @@ static bool write_vertices(FILE *f, const ebpo_mesh *mesh, uint8_t *buffer)
 static bool write_faces(FILE *f, const ebpo_mesh *mesh, uint8_t *buffer)
 {
     const uint64_t piece = BUFFER / FACE_BYTES;
-    for (uint64_t done = 0; done < mesh->face_count;) {
+    EBPO_FOR_PIECES(mesh->workspace, done, mesh->face_count, piece) {
         size_t n = (size_t)(mesh->face_count - done < piece ? mesh->face_count - done : piece);
         for (size_t i = 0; i < n; i++) {
             uint8_t *at = buffer + FACE_BYTES * i;
@@ -80,10 +79,8 @@ static bool write_faces(FILE *f, const ebpo_mesh *mesh, uint8_t *buffer)
             for (int k = 0; k < 3; k++)
                 ebpo_store32(at + 1 + 4 * k, mesh->faces[3 * (done + i) + (uint64_t)k]);
         }
-        ebpo_workspace_settle(mesh->workspace);
         if (fwrite(buffer, FACE_BYTES, n, f) != n)
             return false;
-        done += n;
     }
     return true;
 }

@@ -10,7 +10,7 @@
 #include "query/inside.h"
 
 /* Adds the crossings that the filter left open; true when the point lies on one of these faces. */
-static bool settle_open(const ebpo_subtree *s, const uint32_t *open, uint32_t count,
+static bool decide_open(const ebpo_subtree *s, const uint32_t *open, uint32_t count,
                         const ebpo_axis_segment *g, const double *point, int32_t *sum)
 {
     for (uint32_t i = 0; i < count; i++) {
@@ -30,7 +30,7 @@ static bool cross(const ebpo_kernels *kernels, const ebpo_subtree *s, const ebpo
 {
     uint32_t count = 0;
     *sum = kernels->crossings(s, s->list + leaf->list, leaf->blocks, g, open, &count);
-    return count == 0 || !settle_open(s, open, count, g, point, sum);
+    return count == 0 || !decide_open(s, open, count, g, point, sum);
 }
 
 /* A point in a leaf's cell. */

@@ -206,7 +206,7 @@ static ebpo_status walk_nodes(asking *a, ebpo_inside_result *out, ebpo_error *er
 }
 
 /* The subtree that is in the context's hands and holds p, or NULL; *entry: what the levels above
- * say, when they settle it. */
+ * say, when they decide it. */
 static const ebpo_subtree *held_around(const asking *a, uint32_t *entry)
 {
     const ebpo_context *c = a->context;

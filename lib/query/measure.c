@@ -234,8 +234,8 @@ ebpo_status ebpo_measure(const ebpo_file *file, unsigned threads, ebpo_mass *out
         goto done;
     }
     frame_of(&p.frame, &mesh);
-    status =
-        ebpo_parallel_for(threads, block_count, 1, measure_blocks, &p, NULL, "measuring", error);
+    status = ebpo_parallel_for(threads, NULL, block_count, 1, measure_blocks, &p, NULL, "measuring",
+                               error);
     if (status != EBPO_OK)
         goto done;
     for (uint64_t b = 0; b < block_count; b++)

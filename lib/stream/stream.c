@@ -30,7 +30,8 @@ struct ebpo_stream {
     int level; /* last one read; -1: none */
     ebpo_level kept[EBPO_LEVELS_MAX];
     uint64_t bytes;
-    double settled; /* volume of the leaves and black nodes of all levels before the next one */
+    double
+        uniform_volume; /* volume of the leaves and black nodes of all levels before the next one */
     ebpo_level_walk walk;
     ebpo_envelope_stack *envelopes; /* with polygons */
     ebpo_node_buffers room;
@@ -115,7 +116,7 @@ static ebpo_status check_level(const ebpo_level *level, int number, uint64_t par
 /* --- volumes --- */
 
 typedef struct volumes {
-    double gray, settled;
+    double gray, uniform_volume;
 } volumes;
 
 typedef struct job {
@@ -137,7 +138,7 @@ static ebpo_status sum_pieces(void *context, uint64_t begin, uint64_t end, unsig
         ebpo_level_walk_node node;
         for (int k = 0; k < PIECE && ebpo_level_walk_next(&walk, &node); k++)
             if (node.type != EBPO_WHITE)
-                *(node.type == EBPO_GRAY ? &j->found[i].gray : &j->found[i].settled) +=
+                *(node.type == EBPO_GRAY ? &j->found[i].gray : &j->found[i].uniform_volume) +=
                     ebpo_polytope_volume(
                         ebpo_level_walk_envelope(&walk, &node, &j->envelopes[worker])) *
                     cell;
@@ -175,11 +176,11 @@ static ebpo_status cut_volumes(const ebpo_stream *s, int target, uint64_t nodes,
         goto done;
     }
     find_starts(&j);
-    status =
-        ebpo_parallel_for(threads, pieces, 1, sum_pieces, &j, NULL, "cutting envelopes", error);
+    status = ebpo_parallel_for(threads, NULL, pieces, 1, sum_pieces, &j, NULL, "cutting envelopes",
+                               error);
     for (uint64_t i = 0; i < pieces; i++) {
         out->gray += j.found[i].gray;
-        out->settled += j.found[i].settled;
+        out->uniform_volume += j.found[i].uniform_volume;
     }
 done:
     free(j.starts);
@@ -229,11 +230,11 @@ ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool 
     if (next)
         drop_passed(&s->kept[next - 1], s->options.polygons);
     s->level = next;
-    s->settled += v.settled;
+    s->uniform_volume += v.uniform_volume;
     s->bytes += ebpo_reader_level_bytes(s->file, next) +
                 (next == s->info->index_level ? s->info->chunk_index_bytes : 0);
     ebpo_level_walk_begin(&s->walk, s->kept, next, s->info->pruned);
-    *out = (ebpo_stream_level){ next, nodes, s->bytes, v.gray + s->settled };
+    *out = (ebpo_stream_level){ next, nodes, s->bytes, v.gray + s->uniform_volume };
     *more = true;
     return EBPO_OK;
 }

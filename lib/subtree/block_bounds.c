@@ -203,6 +203,6 @@ ebpo_status ebpo_subtree_fill_bounds(ebpo_subtree *s, const ebpo_layout *layout,
     if (!s->bound)
         return ebpo_fail_memory(error, layout->bound_count * sizeof *s->bound);
     job j = { s, layout };
-    return ebpo_parallel_for(threads, layout->bound_count, 64, bound_nodes, &j, NULL, "open",
+    return ebpo_parallel_for(threads, NULL, layout->bound_count, 64, bound_nodes, &j, NULL, "open",
                              error);
 }

@@ -72,5 +72,6 @@ ebpo_status ebpo_subtree_fill_blocks(ebpo_subtree *s, const ebpo_slice *slice,
     if (!blocks || !s->slot_face)
         return ebpo_fail_memory(error, numbers * size);
     job j = { s, &slice->mesh, layout };
-    return ebpo_parallel_for(threads, layout->block_count, 1024, fill, &j, NULL, "open", error);
+    return ebpo_parallel_for(threads, NULL, layout->block_count, 1024, fill, &j, NULL, "open",
+                             error);
 }

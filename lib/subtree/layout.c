@@ -140,7 +140,7 @@ static bundle walk_node(walk *w, int depth, ebpo_node_type type, uint32_t begin)
     return (bundle){ begin, begin, 0, { 0 } };
 }
 
-/* Blocks are found in the order in which they are settled; numbers them by their faces instead, so
+/* Blocks are found in the order in which they are filled; numbers them by their faces instead, so
  * that what lies below a node is one range of blocks. */
 static bool number_blocks(ebpo_layout *o, uint64_t faces)
 {

@@ -297,7 +297,7 @@ static bool below_all(const plane *planes, int count, int flip, const double xi[
 static double within_cell(double x) { return x < 0 ? 0 : x > 1 ? 1 : x; }
 
 /* Winding numbers in P and in the rest of the cell, from the cell's corners and, if none of them is
- * in P, from a point near the middle of the faces. False when that does not settle it. */
+ * in P, from a point near the middle of the faces. False when that does not decide it. */
 static bool find_windings(const ebpo_subtree *s, ebpo_subtree_leaf *leaf, int32_t at_corner,
                           const leaf_faces *f, const plane *planes, int count, int flip)
 {
@@ -437,8 +437,8 @@ ebpo_status ebpo_subtree_fill_kinds(ebpo_subtree *s, const ebpo_cell *cells, uns
     job j = { s, cells, ebpo_alloc_zero(pieces, sizeof(piece)) };
     if (!j.piece)
         return ebpo_fail_memory(error, pieces * sizeof(piece));
-    ebpo_status status = ebpo_parallel_for(threads, s->leaf_count, LEAVES_A_PIECE, classify_leaves,
-                                           &j, NULL, "open", error);
+    ebpo_status status = ebpo_parallel_for(threads, NULL, s->leaf_count, LEAVES_A_PIECE,
+                                           classify_leaves, &j, NULL, "open", error);
     if (status == EBPO_OK)
         status = join_pieces(s, &j, pieces, error);
     for (uint64_t i = 0; i < pieces; i++)

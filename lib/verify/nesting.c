@@ -14,8 +14,7 @@ static void check_codes(ebpo_tally *tally, const ebpo_twin_tree *view, int l, eb
                         const uint8_t *counts)
 {
     const ebpo_level *level = &view->tree->level[l];
-    for (uint64_t group = 0; group < level->group_count;
-         ebpo_workspace_settle_at(level->workspace, group++))
+    EBPO_FOR_ITEMS(level->workspace, group, 0, level->group_count)
         for (unsigned octant = 0; octant < (l == 0 ? 1u : 8u); octant++) {
             if (ebpo_twin_type(level, group, octant) != type)
                 continue;

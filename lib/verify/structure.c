@@ -39,7 +39,7 @@ static bool types_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
         !CHECK(level->types || groups == 0, "level %d has no types", l))
         return false;
     uint64_t count[4] = { 0 };
-    for (uint64_t group = 0; group < groups; ebpo_workspace_settle_at(level->workspace, group++))
+    EBPO_FOR_ITEMS(level->workspace, group, 0, groups)
         for (unsigned octant = 0; octant < (l == 0 ? 1u : 8u); octant++)
             count[ebpo_twin_type(level, group, octant)]++;
     return CHECK(count[EBPO_GRAY] == level->gray_count && count[EBPO_LEAF] == level->leaf_count &&
@@ -59,7 +59,7 @@ static bool counted_shape(ebpo_tally *tally, const ebpo_level *level, int l, con
                what))
         return false;
     uint64_t sum = 0;
-    for (uint64_t i = 0; i < nodes; ebpo_workspace_settle_at(level->workspace, i++))
+    EBPO_FOR_ITEMS(level->workspace, i, 0, nodes)
         sum += counts[i];
     return CHECK(sum == total, "level %d: counts of %s sum to %" PRIu64 ", but there are %" PRIu64,
                  l, what, sum, total);
@@ -98,8 +98,7 @@ static bool lists_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
                l))
         return false;
     uint64_t refs = 0, fresh = 0;
-    for (uint64_t leaf = 0; leaf < level->leaf_count;
-         ebpo_workspace_settle_at(level->workspace, leaf++)) {
+    EBPO_FOR_ITEMS(level->workspace, leaf, 0, level->leaf_count) {
         refs += level->leaf_ref_count[leaf];
         fresh += level->leaf_new[leaf];
     }
@@ -110,8 +109,7 @@ static bool lists_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
         return false;
     refs = 0;
     bool ok = true;
-    for (uint64_t leaf = 0; leaf < level->leaf_count;
-         ebpo_workspace_settle_at(level->workspace, leaf++)) {
+    EBPO_FOR_ITEMS(level->workspace, leaf, 0, level->leaf_count) {
         ok &= CHECK(
             leaf_faces_in_range(level, leaf, refs, tree->mesh.face_count),
             "level %d, leaf %" PRIu64
@@ -138,9 +136,9 @@ static bool mesh_shape(ebpo_tally *tally, const ebpo_tree *tree)
                "the head and the mesh differ about the kind of coordinates"))
         return false;
     uint64_t outside = 0, infinite = 0;
-    for (uint64_t i = 0; i < 3 * mesh->face_count; ebpo_workspace_settle_at(mesh->workspace, i++))
+    EBPO_FOR_ITEMS(mesh->workspace, i, 0, 3 * mesh->face_count)
         outside += mesh->faces[i] >= mesh->vertex_count;
-    for (uint64_t i = 0; i < mesh->vertex_count; ebpo_workspace_settle_at(mesh->workspace, i++)) {
+    EBPO_FOR_ITEMS(mesh->workspace, i, 0, mesh->vertex_count) {
         double p[3];
         ebpo_mesh_position(mesh, i, p);
         infinite += !isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2]);

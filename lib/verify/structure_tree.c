@@ -100,7 +100,8 @@ static void check_gray(descent *d, const ebpo_twin_node *node)
     node_check(d, node, node->cell.level < d->view->tree->info.max_level,
                "a node at the maximum level is gray");
     bool touched = false;
-    ebpo_workspace_settle_at(d->view->workspace, d->grays++);
+    if (d->grays++ % EBPO_ITEMS_IN_ORDER == 0)
+        ebpo_release_pages(d->view->workspace);
     for (unsigned octant = 0; octant < 8; octant++) {
         ebpo_twin_node child = ebpo_twin_child(d->view, node, octant);
         touched |= child.type >= EBPO_LEAF;
@@ -113,15 +114,14 @@ static void check_vertices(ebpo_tally *tally, const ebpo_twin_tree *view)
 {
     const ebpo_mesh *mesh = &view->tree->mesh;
     uint64_t outside = 0, first = 0;
-    for (uint64_t i = 3 * mesh->face_count; i-- > 0;) {
+    EBPO_FOR_ITEMS(mesh->workspace, i, 0, 3 * mesh->face_count) {
         double p[3];
-        ebpo_workspace_settle_at(mesh->workspace, i);
         ebpo_mesh_position(mesh, mesh->faces[i], p);
         bool within = true;
         for (int k = 0; k < 3; k++)
             within &= p[k] > view->box.origin[k] && p[k] < view->box.origin[k] + view->box.size[k];
+        first = within || outside ? first : i;
         outside += !within;
-        first = within ? first : i;
     }
     CHECK(outside == 0,
           "%" PRIu64 " corners of faces are not strictly inside the root box, face %" PRIu64
@@ -134,7 +134,7 @@ static void check_vertices(ebpo_tally *tally, const ebpo_twin_tree *view)
 static bool edges_balance(const ebpo_mesh *mesh)
 {
     uint64_t sum = 0;
-    for (uint64_t f = 0; f < mesh->face_count; ebpo_workspace_settle_at(mesh->workspace, f++))
+    EBPO_FOR_ITEMS(mesh->workspace, f, 0, mesh->face_count)
         for (int i = 0; i < 3; i++) {
             uint64_t a = mesh->faces[3 * f + (uint64_t)i],
                      b = mesh->faces[3 * f + (uint64_t)(i + 1) % 3];

@@ -43,8 +43,7 @@ ebpo_status ebpo_twin_make(ebpo_twin_tree *out, const ebpo_tree *tree, ebpo_work
                                        error);
         }
         ebpo_twin_group sum = { 0 };
-        for (uint64_t group = 0; group < level->group_count;
-             ebpo_workspace_settle_at(workspace, group++)) {
+        EBPO_FOR_ITEMS(workspace, group, 0, level->group_count) {
             out->groups[l][group] = sum;
             add_group(&sum, out, level, group, octants_at(l));
         }

@@ -135,7 +135,7 @@ bool ebpo_label_note(ebpo_ray_points *points, const ebpo_twin_tree *view,
 void ebpo_check_rays(ebpo_tally *tally, const ebpo_ray_points *points)
 {
     tally->checks[EBPO_VERIFY_LABELS] += points->count;
-    for (uint64_t i = 0; i < points->count; ebpo_workspace_settle_at(points->workspace, i++)) {
+    EBPO_FOR_ITEMS(points->workspace, i, 0, points->count) {
         const ebpo_ray_point *p = &points->point[i];
         if (p->found != p->stored)
             ebpo_tally_violation(tally, EBPO_VERIFY_LABELS,

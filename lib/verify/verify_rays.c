@@ -85,14 +85,14 @@ static ebpo_status sort_points(columns *c, ebpo_ray_points *points, ebpo_error *
         ebpo_array_free(points->workspace, sorted);
         return ebpo_workspace_fail(points->workspace, points->count * sizeof *sorted, error);
     }
-    for (uint64_t i = 0; i < points->count; ebpo_workspace_settle_at(points->workspace, i++))
+    EBPO_FOR_ITEMS(points->workspace, i, 0, points->count)
         c->first[column_of_point(c, &points->point[i])]++;
     for (uint64_t i = 0, sum = 0; i <= cells; i++) {
         uint64_t own = c->first[i];
         c->first[i] = sum;
         sum += own;
     }
-    for (uint64_t i = 0; i < points->count; ebpo_workspace_settle_often(points->workspace, i++))
+    EBPO_FOR_ITEMS_SCATTERED(points->workspace, i, 0, points->count)
         sorted[c->first[column_of_point(c, &points->point[i])]++] = points->point[i];
     /* each had moved on to the next one's beginning */
     memmove(c->first + 1, c->first, cells * sizeof *c->first);
@@ -124,12 +124,13 @@ static ebpo_status follow(void *context, uint64_t begin, uint64_t end, unsigned 
         ebpo_corners face;
         ebpo_face_corners(c->mesh, f, &face);
         column_range r = columns_of_face(c, &face);
-        for (uint64_t z = r.from[1]; z <= r.to[1];
-             z++, ebpo_workspace_settle_often(c->mesh->workspace,
-                                              ++rows)) /* the columns of a row stand side by side */
+        /* the columns of a row stand side by side */
+        for (uint64_t z = r.from[1]; z <= r.to[1]; z++) {
             look(c, &face, c->first[z * c->side + r.from[0]], c->first[z * c->side + r.to[0] + 1]);
+            if (++rows % EBPO_ITEMS_SCATTERED == 0)
+                ebpo_release_pages(c->mesh->workspace);
+        }
     }
-    ebpo_workspace_settle(c->mesh->workspace);
     return EBPO_OK;
 }
 
@@ -138,12 +139,11 @@ ebpo_status ebpo_rays_follow(ebpo_ray_points *points, const ebpo_mesh *mesh, con
 {
     columns c = grid_for(mesh, box, points->count);
     ebpo_status status = sort_points(&c, points, error);
-    for (uint64_t i = 0; i < points->count && status == EBPO_OK;
-         ebpo_workspace_settle_at(points->workspace, i++))
+    EBPO_FOR_ITEMS(points->workspace, i, 0, status == EBPO_OK ? points->count : 0)
         c.point[i].found = 0;
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, mesh->face_count, FACE_GRAIN, follow, &c, progress,
-                                   "following rays", error);
+        status = ebpo_parallel_for(threads, mesh->workspace, mesh->face_count, FACE_GRAIN, follow,
+                                   &c, progress, "following rays", error);
     free(c.first);
     return status;
 }
@@ -152,7 +152,7 @@ double ebpo_rays_work(const ebpo_mesh *mesh, const ebpo_box *box, uint64_t count
 {
     columns c = grid_for(mesh, box, count);
     uint64_t covered = 0; /* columns, over all faces */
-    for (uint64_t f = 0; f < mesh->face_count; ebpo_workspace_settle_at(mesh->workspace, f++)) {
+    EBPO_FOR_ITEMS(mesh->workspace, f, 0, mesh->face_count) {
         ebpo_corners face;
         ebpo_face_corners(mesh, f, &face);
         column_range r = columns_of_face(&c, &face);

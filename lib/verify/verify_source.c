@@ -40,9 +40,9 @@ static ebpo_status copy_mesh(ebpo_mesh *out, const ebpo_mesh *mesh, ebpo_error *
                                    mesh->vertex_count * vertex_size(mesh) + mesh->face_count * 12,
                                    error);
     }
-    for (uint64_t i = 0; i < mesh->face_count; ebpo_workspace_settle_at(mesh->workspace, i++))
+    EBPO_FOR_ITEMS(mesh->workspace, i, 0, mesh->face_count)
         memcpy(out->faces + 3 * i, mesh->faces + 3 * i, 3 * sizeof *out->faces);
-    for (uint64_t i = 0; i < mesh->vertex_count; ebpo_workspace_settle_at(mesh->workspace, i++))
+    EBPO_FOR_ITEMS(mesh->workspace, i, 0, mesh->vertex_count)
         memcpy((char *)xyz + i * vertex_size(mesh), vertex_bytes(mesh, i), vertex_size(mesh));
     return EBPO_OK;
 }
@@ -81,14 +81,14 @@ static void compare_in_order(ebpo_tally *tally, const ebpo_mesh *a, const ebpo_m
 {
     size_t size = vertex_size(a);
     tally->checks[EBPO_VERIFY_SOURCE] += a->vertex_count + a->face_count;
-    for (uint64_t i = 0; i < a->vertex_count; ebpo_workspace_settle_at(a->workspace, i++))
+    EBPO_FOR_ITEMS(a->workspace, i, 0, a->vertex_count)
         if (memcmp(vertex_bytes(a, i), vertex_bytes(b, i), size) != 0)
             ebpo_tally_violation(tally, EBPO_VERIFY_SOURCE,
                                  &(ebpo_verify_place){ 0, EBPO_NO_FACE, EBPO_NO_PLANE },
                                  "vertex %" PRIu64
                                  " of the source has another position in the file",
                                  i);
-    for (uint64_t i = 0; i < a->face_count; ebpo_workspace_settle_at(a->workspace, i++))
+    EBPO_FOR_ITEMS(a->workspace, i, 0, a->face_count)
         if (memcmp(a->faces + 3 * i, b->faces + 3 * i, 3 * sizeof *a->faces) != 0)
             ebpo_tally_violation(tally, EBPO_VERIFY_SOURCE,
                                  &(ebpo_verify_place){ 0, i, EBPO_NO_PLANE },
@@ -122,7 +122,7 @@ static uint32_t *sorted(const ebpo_mesh *mesh, uint64_t count,
     uint32_t *order = ebpo_array_alloc(mesh->workspace, count, sizeof *order);
     if (!order)
         return NULL;
-    for (uint64_t i = 0; i < count; ebpo_workspace_settle_at(mesh->workspace, i++))
+    EBPO_FOR_ITEMS(mesh->workspace, i, 0, count)
         order[i] = (uint32_t)i;
     qsort_r(order, count, sizeof *order, compare, (void *)(uintptr_t)mesh);
     return order;
@@ -135,8 +135,7 @@ static ebpo_status compare_as_sets(ebpo_tally *tally, const ebpo_mesh *a, const 
     uint32_t *left = sorted(a, count, faces ? compare_faces : compare_vertices);
     uint32_t *right = sorted(b, count, faces ? compare_faces : compare_vertices);
     bool short_of_memory = !left || !right;
-    for (uint64_t i = 0; i < count && !short_of_memory;
-         ebpo_workspace_settle_often(a->workspace, i++))
+    EBPO_FOR_ITEMS_SCATTERED(a->workspace, i, 0, short_of_memory ? 0 : count)
         differ += faces ? face_order(a, left[i], b, right[i]) != 0
                         : memcmp(vertex_bytes(a, left[i]), vertex_bytes(b, right[i]),
                                  vertex_size(a)) != 0;
@@ -161,8 +160,7 @@ static ebpo_status compare_some(ebpo_tally *tally, const ebpo_file *file, const 
     if (status == EBPO_OK && CHECK(!whole->xyz32 == !part.xyz32,
                                    "the source and the file hold different kinds of coordinates")) {
         tally->checks[EBPO_VERIFY_SOURCE] += part.vertex_count + part.face_count;
-        for (uint64_t i = 0; i < part.vertex_count;
-             ebpo_workspace_settle_often(part.workspace, i++))
+        EBPO_FOR_ITEMS_SCATTERED(part.workspace, i, 0, part.vertex_count)
             if (maps.vertex_source[i] >= whole->vertex_count ||
                 memcmp(vertex_bytes(whole, maps.vertex_source[i]), vertex_bytes(&part, i),
                        vertex_size(&part)) != 0)
@@ -171,8 +169,7 @@ static ebpo_status compare_some(ebpo_tally *tally, const ebpo_file *file, const 
                                      "vertex %" PRIu32
                                      " of the source has another position in the file",
                                      maps.vertex_source[i]);
-        for (uint64_t i = 0; i < part.face_count;
-             ebpo_workspace_settle_often(part.workspace, i++)) {
+        EBPO_FOR_ITEMS_SCATTERED(part.workspace, i, 0, part.face_count) {
             bool equal = maps.face_source[i] < whole->face_count;
             for (uint64_t c = 0; c < 3 && equal; c++)
                 equal = whole->faces[3 * (uint64_t)maps.face_source[i] + c] ==

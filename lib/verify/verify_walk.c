@@ -126,7 +126,7 @@ static void visit_faces(const walk *w, worker *self, const ebpo_twin_node *node,
     /* Pages come in by faces looked at, but here and there a few for a node. */
     if ((self->visited += count + 64) >= 1 << 15) {
         self->visited = 0;
-        ebpo_workspace_settle(w->options->workspace);
+        ebpo_release_pages(w->options->workspace);
     }
 }
 
@@ -282,8 +282,9 @@ static ebpo_status open_node(walk *w, uint64_t at, ebpo_error *error)
     w->shared_octants = ebpo_array_alloc(w->options->workspace, n->face_count, 1);
     if (!w->shared_octants)
         return ebpo_workspace_fail(w->options->workspace, n->face_count, error);
-    ebpo_status status = ebpo_parallel_for(w->threads, n->face_count, FACE_GRAIN, shared_task, w,
-                                           &w->options->progress, "verifying upper levels", error);
+    ebpo_status status =
+        ebpo_parallel_for(w->threads, NULL, n->face_count, FACE_GRAIN, shared_task, w,
+                          &w->options->progress, "verifying upper levels", error);
     check_worth(w, &w->workers[0].tally, &n->node, n->face_count);
     n->children = w->upper_count;
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)
@@ -306,7 +307,7 @@ static ebpo_status add_root(walk *w, ebpo_error *error)
                             ebpo_array_alloc(w->options->workspace, count, sizeof *root.faces) };
     if (!root.faces)
         return ebpo_workspace_fail(w->options->workspace, count * sizeof *root.faces, error);
-    for (uint64_t i = 0; i < count; ebpo_workspace_settle_at(w->options->workspace, i++))
+    EBPO_FOR_ITEMS(w->options->workspace, i, 0, count)
         root.faces[i] = (uint32_t)i;
     w->upper[0] = root;
     w->upper_count = 1;
@@ -395,7 +396,7 @@ static ebpo_status follow_rays(walk *w, ebpo_error *error)
     ebpo_ray_points *all = &w->workers[0].points;
     for (unsigned i = 1; i < w->threads; i++) {
         ebpo_ray_points *own = &w->workers[i].points;
-        for (uint64_t k = 0; k < own->count; ebpo_workspace_settle_at(own->workspace, k++))
+        EBPO_FOR_ITEMS(own->workspace, k, 0, own->count)
             if (!ebpo_rays_add(all, &own->point[k]))
                 return ebpo_workspace_fail(all->workspace, all->count * sizeof *all->point, error);
         ebpo_array_free(own->workspace, own->point);
@@ -431,7 +432,7 @@ ebpo_status ebpo_verify_walk(ebpo_tally *tally, const ebpo_twin_tree *view,
     if (status == EBPO_OK)
         status = walk_upper(&w, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(w.threads, w.subtree_count, 1, subtree_task, &w,
+        status = ebpo_parallel_for(w.threads, NULL, w.subtree_count, 1, subtree_task, &w,
                                    &options->progress, "verifying subtrees", error);
     if (status == EBPO_OK && w.rays)
         status = follow_rays(&w, error);

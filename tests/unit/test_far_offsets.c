@@ -375,7 +375,7 @@ static void touch_ends(ebpo_workspace *w)
     array[FAR / 8] = 13; /* its bytes begin at 2^32 */
     ck_assert_uint_eq(array[0], 7);
     ck_assert_uint_eq(array[count - 1], 11);
-    ebpo_workspace_settle(w);
+    ebpo_release_pages(w);
     ck_assert_uint_eq(array[FAR / 8], 13);
     ebpo_array_free(w, array);
 }

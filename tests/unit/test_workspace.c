@@ -92,7 +92,7 @@ START_TEST(pages_of_files_are_let_go_of)
             else
                 ck_assert_msg(a[i] == (unsigned char)(i >> 12), "page %d", i >> 12);
             if (i % (1 << 20) == 0) {
-                ebpo_workspace_settle(w);
+                ebpo_release_pages(w);
                 most = resident() > most ? resident() : most;
             }
         }
@@ -108,7 +108,7 @@ START_TEST(without_a_workspace_it_is_malloc)
     char *a = ebpo_array_alloc(NULL, 10 << 20, 1);
     uint64_t capacity = 10 << 20;
     ck_assert(a && ebpo_array_grow(NULL, &a, &capacity, 20 << 20, 1));
-    ebpo_workspace_settle(NULL);
+    ebpo_release_pages(NULL);
     ebpo_array_free(NULL, a);
     ebpo_array_free(NULL, NULL);
     ebpo_workspace_free(NULL);
