@@ -2,7 +2,8 @@
 """Remakes docs/measured/transmission.md: bytes to fetch until a level is good enough, against the
 compressed PLY whole, and beside the BP-Octree thesis.
 
-    /usr/bin/python3 tests/bench/transmission.py BUILD_DIR MODEL.ply... -o docs/measured/transmission.md
+    /usr/bin/python3 tests/bench/transmission.py BUILD_DIR MODEL.ply... -o
+    docs/measured/transmission.md
 
 Needs h5py and the zstd command. No figure depends on the machine.
 """
@@ -68,7 +69,8 @@ def touched(tool, file, boxes):
 
 
 def farthest(tool, file, group, info, size):
-    """How far the level's envelopes reach from the solid, in percent of `size`: what is certain, and what their vertices show."""
+    """How far the level's envelopes reach from the solid, in percent of `size`: what is certain,
+    and what their vertices show."""
     nodes = [(code, shape) for code, kind, shape in zip(group["octcode"][...].tolist(),
                                                         group["type"][...],
                                                         polyhedra(group)) if kind != BLACK]

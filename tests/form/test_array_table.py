@@ -1,18 +1,21 @@
 #!/usr/bin/env python3
-"""test_array_table.py SOURCE: what is said of arrays in other languages says the same as the library's table, row by row:
+"""test_array_table.py SOURCE: what is said of arrays in other languages says the same as the
+library's table, row by row:
 the specification's section 4, its reader in Python, the viewer's reader."""
 import pathlib
 import re
 import sys
 
-SIZES = {"uint8_t": (1, False), "uint16_t": (2, False), "uint32_t": (4, False), "uint64_t": (8, False),
+SIZES = {"uint8_t": (1, False), "uint16_t": (2, False), "uint32_t": (4, False),
+         "uint64_t": (8, False),
          "int8_t": (1, True), "int16_t": (2, True), "int32_t": (4, True), "int64_t": (8, True)}
 
 
 def table(text):
     """[(name, sizes, signed)], in order; and the names of arrays that are held in memory."""
     rows, held = [], []
-    for kind, inside in re.findall(r"^(LEVEL_ARRAY|LEVEL_INDEX|ROOT_ARRAY)\((.*?)\)\n", re.sub(r"\n +", " ", text), re.M):
+    for kind, inside in re.findall(r"^(LEVEL_ARRAY|LEVEL_INDEX|ROOT_ARRAY)\((.*?)\)\n",
+                                   re.sub(r"\n +", " ", text), re.M):
         cells = [cell.strip() for cell in inside.split(",")]
         name = cells[1].strip('"')
         stored = {"LEVEL_ARRAY": 4, "ROOT_ARRAY": 3}.get(kind)
@@ -35,23 +38,31 @@ def of_specification(text):
 
 def of_viewer(text):
     return [(name, [int(n) for n in sizes.split(",")], signed == "true")
-            for name, sizes, signed in re.findall(r"^  '?([\w/]+)'?: \[\d+, \[([\d, ]+)\], (true|false),", text, re.M)]
+            for name, sizes, signed in re.findall(r"^  '?([\w/]+)'?: \[\d+, \[([\d, ]+)\], "
+                                                  r"(true|false),", text, re.M)]
 
 
 def compare(where, rows, wanted):
-    problems = [f"{where}: no row for {row[0]}, which is a row of array_table.inc" for row in wanted if row[0] not in [r[0] for r in rows]]
-    problems += [f"{where}: {row[0]} is no row of array_table.inc" for row in rows if row[0] not in [r[0] for r in wanted]]
+    problems = [f"{where}: no row for {row[0]}, which is a row of array_table.inc" for row in wanted
+                if row[0] not in [r[0] for r in rows]]
+    problems += [f"{where}: {row[0]} is no row of array_table.inc" for row in rows
+                 if row[0] not in [r[0] for r in wanted]]
     if not problems and [r[0] for r in rows] != [r[0] for r in wanted]:
         problems.append(f"{where}: another order than array_table.inc")
-    return problems or [f"{where}: {a[0]} has sizes {a[1]}, signed {a[2]}; array_table.inc says {b[1]}, {b[2]}"
+    return problems or [f"{where}: {a[0]} has sizes {a[1]}, signed {a[2]}; array_table.inc says "
+                        f"{b[1]}, {b[2]}"
                         for a, b in zip(rows, wanted) if a != b]
 
 
 def check_parts(root):
-    """Each part has a word in files, in the tools and in the viewer's reader, and a need in the table."""
-    parts = re.findall(r"^    EBPO_PART_(\w+) = \d+", (root / "lib/include/ebpo/file.h").read_text(), re.M)
-    places = {"lib/container/schema.h": "EBPO_NEEDS_{0} = EBPO_PART_{0},", "lib/container/head_facts.c": ", EBPO_PART_{0}, ",
-              "tools/cli/words.c": '"{1}"', "tools/viewer/reader/facts.js": "'{1}'", "format-spec/README.md": "| `{1}` |"}
+    """Each part has a word in files, in the tools and in the viewer's reader, and a need in the
+    table."""
+    parts = re.findall(r"^    EBPO_PART_(\w+) = \d+",
+                       (root / "lib/include/ebpo/file.h").read_text(), re.M)
+    places = {"lib/container/schema.h": "EBPO_NEEDS_{0} = EBPO_PART_{0},",
+              "lib/container/head_facts.c": ", EBPO_PART_{0}, ",
+              "tools/cli/words.c": '"{1}"', "tools/viewer/reader/facts.js": "'{1}'",
+              "format-spec/README.md": "| `{1}` |"}
     return [f"{place}: part {part} is not named" for part in parts for place, form in places.items()
             if form.format(part, part.lower().replace("_", "-")) not in (root / place).read_text()]
 
@@ -61,10 +72,13 @@ def main():
     rows, held = table((root / "lib/container/array_table.inc").read_text())
     if len(rows) < 20:
         sys.exit(f"only {len(rows)} rows found in array_table.inc: this test no longer reads it")
-    problems = compare("format-spec/README.md, section 4", of_specification((root / "format-spec/README.md").read_text()), rows)
-    problems += compare("tools/viewer/reader/facts.js", of_viewer((root / "tools/viewer/reader/facts.js").read_text()), rows)
+    problems = compare("format-spec/README.md, section 4",
+                       of_specification((root / "format-spec/README.md").read_text()), rows)
+    problems += compare("tools/viewer/reader/facts.js",
+                        of_viewer((root / "tools/viewer/reader/facts.js").read_text()), rows)
     reader = (root / "format-spec/read_ebpo.py").read_text()
-    problems += [f"format-spec/read_ebpo.py: {name} is not read" for name in held if f'"{name}"' not in reader]
+    problems += [f"format-spec/read_ebpo.py: {name} is not read" for name in held
+                 if f'"{name}"' not in reader]
     problems += check_parts(root)
     print("\n".join(problems) or f"{len(rows)} arrays, the same everywhere")
     sys.exit(1 if problems else 0)

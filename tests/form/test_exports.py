@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""The public headers, the shared library, and the documents tell the same: test_exports.py LIBEBPO SOURCE_ROOT VERSION
+"""The public headers, the shared library, and the documents tell the same: test_exports.py LIBEBPO
+SOURCE_ROOT VERSION
 
-The library exports exactly what the headers declare; ebpo.h includes every header; whatever name a header, a page or a sample
-mentions is declared; each function says which threads may call it; each struct that begins with its size has its macro; the
-version is the project's.
+The library exports exactly what the headers declare; ebpo.h includes every header; whatever name a
+header, a page or a sample mentions is declared; each function says which threads may call it; each
+struct that begins with its size has its macro; the version is the project's.
 """
 import pathlib
 import re
@@ -29,7 +30,8 @@ def declared_functions():
 
 
 def exported_functions():
-    output = subprocess.run(["nm", "-D", "--defined-only", library], check=True, capture_output=True, text=True).stdout
+    output = subprocess.run(["nm", "-D", "--defined-only", library], check=True,
+                            capture_output=True, text=True).stdout
     names = {line.split()[2] for line in output.splitlines() if len(line.split()) == 3}
     return {name for name in names if not name.startswith("_")}
 
@@ -52,7 +54,8 @@ def mentioned(text):
 
 
 def threads_of(text):
-    """(function, comment above it, which may be shared by declarations without an empty line between)."""
+    """(function, comment above it, which may be shared by declarations without an empty line
+    between)."""
     comment = ""
     for block in re.split(r"\n\s*\n", text):
         comments = " ".join(re.findall(r"/\*.*?\*/", block, flags=re.S))
@@ -63,23 +66,30 @@ def threads_of(text):
 functions, exported = declared_functions(), exported_functions()
 problems += [f"declared, not exported: {name}" for name in sorted(functions - exported)]
 problems += [f"exported, not declared: {name}" for name in sorted(exported - functions)]
-problems += [f"ebpo.h does not include {name}" for name in headers if name != "ebpo.h" and f"<ebpo/{name}>" not in headers["ebpo.h"]]
+problems += [f"ebpo.h does not include {name}" for name in headers if name != "ebpo.h"
+             and f"<ebpo/{name}>" not in headers["ebpo.h"]]
 
 names = declared_names(functions)
 for path, text in headers.items():
     comments = " ".join(re.findall(r"/\*.*?\*/", text, flags=re.S))
-    problems += [f"{path}: a comment mentions {name}, which no header declares" for name in sorted(mentioned(comments) - names)]
-    problems += [f"{path}: {name} does not say 'Threads: ...'" for name, comment in threads_of(text) if "Threads:" not in comment]
-    problems += [f"{path}:{n}: {len(line)} characters" for n, line in enumerate(text.splitlines(), 1) if len(line) > 100]
+    problems += [f"{path}: a comment mentions {name}, which no header declares"
+                 for name in sorted(mentioned(comments) - names)]
+    problems += [f"{path}: {name} does not say 'Threads: ...'" for name, comment in threads_of(text)
+                 if "Threads:" not in comment]
+    problems += [f"{path}:{n}: {len(line)} characters"
+                 for n, line in enumerate(text.splitlines(), 1) if len(line) > 100]
     for name in re.findall(r"typedef struct (ebpo_\w+) \{\s*size_t struct_size;", text):
         if f"#define {name.upper()}_INIT" not in text:
-            problems.append(f"{path}: {name} begins with its size, and there is no {name.upper()}_INIT")
+            problems.append(f"{path}: {name} begins with its size, and there is no "
+                            f"{name.upper()}_INIT")
 
-for path in [root / "README.md", *(root / "docs/guide").glob("*.md"), *(root / "samples").glob("*.[ch]"), root / "samples/query.py"]:
+for path in [root / "README.md", *(root / "docs/guide").glob("*.md"),
+             *(root / "samples").glob("*.[ch]"), root / "samples/query.py"]:
     problems += [f"{path.relative_to(root)}: mentions {name}, which no header declares"
                  for name in sorted(mentioned(path.read_text()) - names) if name != "EBPO_LIBRARY"]
 
-numbers = [re.search(rf"#define EBPO_VERSION_{part}\s+(\d+)", headers["base.h"]).group(1) for part in ("MAJOR", "MINOR", "PATCH")]
+numbers = [re.search(rf"#define EBPO_VERSION_{part}\s+(\d+)", headers["base.h"]).group(1)
+           for part in ("MAJOR", "MINOR", "PATCH")]
 if ".".join(numbers) != version:
     problems.append(f"base.h says version {'.'.join(numbers)}, meson.build {version}")
 

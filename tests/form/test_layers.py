@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """test_layers.py SOURCE NM LIBRARY OBJECTS: the house has floors, and nothing goes in a circle.
 
-lib/layers.txt and tools/layers.txt say which module stands on which floor. A file uses another when it includes its header, or
-when its object file asks for a symbol that the other's defines (a declaration written by hand needs no header); X.c, X.h and X.inc
-count as one. Held to:
+lib/layers.txt and tools/layers.txt say which module stands on which floor. A file uses another when
+it includes its header, or when its object file asks for a symbol that the other's defines (a
+declaration written by hand needs no header); X.c, X.h and X.inc count as one. Held to:
 - a file uses files of its own module and of lower floors only, not of siblings;
 - no circles of files, neither within a module nor across;
 - only lib/h5 includes <hdf5.h>, and only lib/http <curl/curl.h>.
@@ -14,7 +14,8 @@ import re
 import subprocess
 import sys
 
-# Point in solid is one recursion in two files: a subtree ends in a pruned node, whose envelopes lead down to a subtree.
+# Point in solid is one recursion in two files: a subtree ends in a pruned node, whose envelopes
+# lead down to a subtree.
 RECURSIONS = [{"query/inside", "query/inside_walk"}]
 OWNERS = {"hdf5": "h5", "curl/": "http"}  # who alone includes what
 
@@ -31,9 +32,11 @@ class Tree:
                 self.floors[module] = int(floor)
         self.files = [p for m in sorted(root.iterdir()) if m.is_dir() and m.name != "include"
                       for p in sorted(m.rglob("*")) if p.suffix in (".c", ".h", ".inc")]
-        self.uses = collections.defaultdict(lambda: collections.defaultdict(set))  # [file][other]: by what
+        # [file][other]: by what
+        self.uses = collections.defaultdict(lambda: collections.defaultdict(set))
         self.problems = [f"{root.name}/{module} has no floor in {root.name}/layers.txt"
-                         for module in sorted({self.name(p).split("/")[0] for p in self.files} - set(self.floors))]
+                         for module in sorted({self.name(p).split("/")[0]
+                                               for p in self.files} - set(self.floors))]
 
     def name(self, path):
         return str(path.relative_to(self.root).with_suffix(""))
@@ -50,20 +53,24 @@ class Tree:
                     continue
                 header = found.group(1)
                 for begin, owner in OWNERS.items():
-                    if self.root.name == "lib" and header.startswith(begin) and not self.name(path).startswith(owner + "/"):
-                        self.problems.append(f"{path.relative_to(self.root.parent)}:{number}: only lib/{owner} includes {header}")
+                    if (self.root.name == "lib" and header.startswith(begin)
+                        and not self.name(path).startswith(owner + "/")):
+                        self.problems.append(f"{path.relative_to(self.root.parent)}:{number}: "
+                                             f"only lib/{owner} includes {header}")
                 for target in (self.root / header, path.parent / header):
                     if target in self.files:
                         self.note(self.name(path), self.name(target), f"includes {header}")
                         break
 
     def read_symbols(self, listing):
-        """`listing`: what nm -A says. Objects are named after their sources, by their paths or the last part of these."""
+        """`listing`: what nm -A says. Objects are named after their sources, by their paths or the
+        last part of these."""
         by_object = {}
         for path in self.files:
             if path.suffix == ".c":
                 relative = str(path.relative_to(self.root))
-                by_object[relative.replace("/", "_") + ".o"] = by_object[path.name + ".o"] = self.name(path)
+                by_object[relative.replace("/", "_")
+                          + ".o"] = by_object[path.name + ".o"] = self.name(path)
         defined, wanted = {}, []
         for line in listing.splitlines():
             found = re.match(r"(.*?):\s*(?:[0-9a-fA-F]+)?\s+(\w)\s+(\S+)$", line)
@@ -84,7 +91,8 @@ class Tree:
             for used, by in sorted(self.uses[user].items()):
                 a, b = user.split("/")[0], used.split("/")[0]
                 if a != b and self.floors.get(b, 0) >= self.floors.get(a, 0):
-                    self.problems.append(f"{self.root.name}/{user} (floor {self.floors.get(a)}) uses {self.root.name}/{used} "
+                    self.problems.append(f"{self.root.name}/{user} (floor {self.floors.get(a)}) "
+                                         f"uses {self.root.name}/{used} "
                                          f"(floor {self.floors.get(b)}): {', '.join(sorted(by))}")
 
     def shortest_circle(self, start):
@@ -110,7 +118,8 @@ class Tree:
             if not circle or frozenset(circle) in told or set(circle) in RECURSIONS:
                 continue
             told.add(frozenset(circle))
-            steps = [f"    {a} uses {b}: {', '.join(sorted(self.uses[a][b]))}" for a, b in zip(circle, circle[1:] + circle[:1])]
+            steps = [f"    {a} uses {b}: {', '.join(sorted(self.uses[a][b]))}"
+                     for a, b in zip(circle, circle[1:] + circle[:1])]
             self.problems.append("\n".join([f"{self.root.name}: a circle of {len(circle)} files"] + steps))
 
 
@@ -121,9 +130,11 @@ def main():
     for folder, binaries in (("lib", [library]), ("tools", objects)):
         tree = Tree(source / folder)
         tree.read_includes()
-        listing = subprocess.run([nm, "-A", "-g", *binaries], capture_output=True, text=True, check=True).stdout
+        listing = subprocess.run([nm, "-A", "-g", *binaries], capture_output=True, text=True,
+                                 check=True).stdout
         if tree.read_symbols(listing) < len(tree.files) / 4:
-            tree.problems.append(f"{folder}: {nm} found hardly any symbols in {', '.join(binaries)[:200]}")
+            tree.problems.append(f"{folder}: {nm} found hardly any symbols in "
+                                 f"{', '.join(binaries)[:200]}")
         tree.check_floors()
         tree.check_circles()
         problems += tree.problems
