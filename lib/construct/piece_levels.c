@@ -1,7 +1,5 @@
 #include "geom/strict_fp.h"
 
-#include "geom/strict_fp.h"
-
 #include "construct/piece_levels.h"
 
 #include <string.h>
