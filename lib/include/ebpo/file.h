@@ -512,7 +512,11 @@ typedef struct ebpo_array_facts {
 } ebpo_array_facts;
 #define EBPO_ARRAY_FACTS_INIT EBPO_SIZED(ebpo_array_facts)
 
-/* The n-th array of the file (n from 0) in the order of their bytes; false: there are fewer. */
+/* The n-th array of the file (n from 0) in the order of their bytes.
+ *
+ * False when there are fewer; `out` is then as it was. Its texts are static.
+ *
+ * Threads: any. */
 EBPO_API bool ebpo_file_array(const ebpo_file *file, unsigned n, ebpo_array_facts *out);
 
 /* Bytes that parts take in the file, compressed. */
