@@ -1,0 +1,39 @@
+/* Each public function, called with real models: every_call_*.c hold the calls, test_every_call.c
+ * makes them with and without a workspace, and with allocations failing. */
+#ifndef EBPO_TESTS_EVERY_CALL_H
+#define EBPO_TESTS_EVERY_CALL_H
+
+#include <ebpo/ebpo.h>
+
+typedef struct every_call_env {
+    ebpo_workspace *workspace; /* NULL: malloc's memory */
+    ebpo_file *file; /* open before and after the call: a call that failed leaves it fit */
+    ebpo_error *error;
+} every_call_env;
+
+/* A call leaves nothing behind, whether it succeeds or fails. */
+typedef struct every_call {
+    const char *name;
+    ebpo_status (*call)(every_call_env *e);
+} every_call;
+
+/* Ends with a line without a name. */
+extern const every_call every_call_meshes[], every_call_files[], every_call_answers[];
+
+/* What the calls read, below the scratch folder. */
+#define EVERY_CALL_MODEL    "model.ebpo.h5"
+#define EVERY_CALL_PLY      "torus.ply"
+#define EVERY_CALL_SPLIT    "split.ply"    /* without shared vertices */
+#define EVERY_CALL_TURNED   "turned.ply"   /* some faces point the other way */
+#define EVERY_CALL_HOLED    "holed.ply"    /* some faces are missing */
+#define EVERY_CALL_CROSSING "crossing.ply" /* faces pierce each other */
+#define EVERY_CALL_OBJ      "torus.obj"
+
+/* A URL of the model; NULL: no server. */
+const char *every_call_url(void);
+
+/* All allocations succeed from here on to every_call_resume: for what tests need themselves. */
+void every_call_pause(void);
+void every_call_resume(void);
+
+#endif

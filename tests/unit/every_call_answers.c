@@ -1,0 +1,262 @@
+/* Calls that answer questions about a model, or hand out its levels. */
+#include "every_call.h"
+#include "scratch.h"
+
+enum { POINTS = 40 };
+
+static void make_points(double (*points)[3])
+{
+    for (int i = 0; i < POINTS; i++) {
+        points[i][0] = -4 + 0.2 * i;
+        points[i][1] = 0.1 * (i % 7);
+        points[i][2] = 0.05 * (i % 11);
+    }
+}
+
+static ebpo_status ask_many(ebpo_context *context, ebpo_error *error)
+{
+    double points[POINTS][3];
+    ebpo_inside_result inside[POINTS];
+    ebpo_distance_result distance[POINTS];
+    make_points(points);
+    ebpo_status status = ebpo_inside_many(context, points[0], POINTS, NULL, inside, error);
+    if (status == EBPO_OK)
+        status = ebpo_distance_many(context, points[0], POINTS, NULL, distance, error);
+    return status;
+}
+
+static ebpo_status ask_one(ebpo_context *context, ebpo_error *error)
+{
+    static const double point[3] = { 3, 0.1, 0.2 };
+    ebpo_inside_result inside;
+    ebpo_distance_result distance;
+    ebpo_status status = ebpo_inside(context, point, NULL, &inside, error);
+    if (status == EBPO_OK)
+        status = ebpo_distance(context, point, NULL, &distance, error);
+    return status;
+}
+
+static ebpo_status ask_rays(ebpo_context *context, ebpo_error *error)
+{
+    static const double origin[3] = { -9, 0.1, 0.2 }, direction[3] = { 1, 0, 0 };
+    static const double low[3] = { 0, 0, -1 }, high[3] = { 4, 4, 1 };
+    ebpo_ray_hit first;
+    const ebpo_ray_hit *hits;
+    const uint64_t *faces;
+    uint64_t count;
+    bool hit;
+    ebpo_status status = ebpo_ray_first(context, origin, direction, 99, &first, &hit, error);
+    if (status == EBPO_OK)
+        status = ebpo_ray_all(context, origin, direction, 99, &hits, &count, error);
+    if (status == EBPO_OK)
+        status = ebpo_faces_in_box(context, low, high, &faces, &count, error);
+    return status;
+}
+
+static ebpo_status ask_all(ebpo_model *model, ebpo_error *error)
+{
+    ebpo_context *context;
+    ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
+    ebpo_status status = ebpo_context_new(model, &context, error);
+    if (status == EBPO_OK)
+        status = ask_one(context, error);
+    if (status == EBPO_OK)
+        status = ask_many(context, error);
+    if (status == EBPO_OK)
+        status = ask_rays(context, error);
+    if (status == EBPO_OK)
+        status = ebpo_model_get_stats(model, &stats);
+    ebpo_context_free(context);
+    return status;
+}
+
+static ebpo_status ask(every_call_env *e, const ebpo_model_options *options)
+{
+    ebpo_model *model;
+    ebpo_status status = ebpo_model_new(e->file, options, &model, e->error);
+    if (status == EBPO_OK)
+        status = ask_all(model, e->error);
+    ebpo_model_free(model);
+    return status;
+}
+
+static ebpo_status call_ask(every_call_env *e)
+{
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    options.threads = 1;
+    return ask(e, &options);
+}
+
+static ebpo_status load_by(every_call_env *e, ebpo_loading loading, bool prefetch)
+{
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    options.threads = 1;
+    options.memory = 8 << 20;
+    options.cut_level = 2;
+    options.loading = loading;
+    options.prefetch = prefetch;
+    return ask(e, &options);
+}
+
+static ebpo_status call_ask_cached(every_call_env *e) { return load_by(e, EBPO_LOAD_CACHE, false); }
+static ebpo_status call_ask_ahead(every_call_env *e) { return load_by(e, EBPO_LOAD_CACHE, true); }
+static ebpo_status call_ask_subtree(every_call_env *e)
+{
+    return load_by(e, EBPO_LOAD_SUBTREE, false);
+}
+static ebpo_status call_ask_nodes(every_call_env *e) { return load_by(e, EBPO_LOAD_NODES, false); }
+
+static ebpo_status call_measure(every_call_env *e)
+{
+    ebpo_mass mass = EBPO_MASS_INIT;
+    return ebpo_measure(e->file, 1, &mass, e->error);
+}
+
+static ebpo_status call_deviation(every_call_env *e)
+{
+    ebpo_model *model;
+    ebpo_deviation_options options = EBPO_DEVIATION_OPTIONS_INIT;
+    ebpo_deviation deviation = EBPO_DEVIATION_INIT;
+    options.samples = 20;
+    options.questions = 50;
+    options.threads = 1;
+    ebpo_status status = ebpo_model_new(e->file, NULL, &model, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_deviation_level(model, e->file, 1, &options, &deviation, e->error);
+    ebpo_model_free(model);
+    return status;
+}
+
+static ebpo_status call_limit(every_call_env *e)
+{
+    ebpo_limit_options options = EBPO_LIMIT_OPTIONS_INIT;
+    ebpo_limit limit = EBPO_LIMIT_INIT;
+    options.threads = 1;
+    return ebpo_limit_level(e->file, 1, &options, &limit, e->error);
+}
+
+static ebpo_lod_options shaped(const every_call_env *e)
+{
+    ebpo_lod_options options = EBPO_LOD_OPTIONS_INIT;
+    options.threads = 1;
+    options.workspace = e->workspace;
+    return options;
+}
+
+static int last_level(const every_call_env *e) { return ebpo_file_info(e->file)->level_count - 1; }
+
+static ebpo_status call_lod(every_call_env *e)
+{
+    ebpo_mesh mesh;
+    double volume;
+    ebpo_lod_options options = shaped(e);
+    ebpo_status status = ebpo_lod_level(e->file, last_level(e), &options, &mesh, &volume, e->error);
+    if (status == EBPO_OK)
+        ebpo_mesh_free(&mesh);
+    return status;
+}
+
+static ebpo_status call_lod_nodes(every_call_env *e)
+{
+    ebpo_mesh mesh;
+    ebpo_lod_nodes nodes;
+    double volume;
+    ebpo_lod_options options = shaped(e);
+    ebpo_status status =
+        ebpo_lod_level_nodes(e->file, last_level(e), &options, &mesh, &nodes, &volume, e->error);
+    if (status == EBPO_OK) {
+        ebpo_mesh_free(&mesh);
+        ebpo_lod_nodes_free(&nodes);
+    }
+    return status;
+}
+
+static ebpo_status take_nodes(ebpo_stream *stream, ebpo_error *error)
+{
+    ebpo_stream_level level;
+    ebpo_stream_node node;
+    bool more = true, another = true;
+    ebpo_status status = EBPO_OK;
+    while (more && status == EBPO_OK) {
+        status = ebpo_stream_next_level(stream, &level, &more, error);
+        for (another = more; another && status == EBPO_OK;)
+            status = ebpo_stream_next_node(stream, &node, &another, error);
+    }
+    return status;
+}
+
+static ebpo_status call_stream(every_call_env *e)
+{
+    ebpo_stream *stream;
+    ebpo_stream_options options = EBPO_STREAM_OPTIONS_INIT;
+    options.polygons = true;
+    options.threads = 1;
+    ebpo_status status = ebpo_stream_new(e->file, &options, &stream, e->error);
+    if (status == EBPO_OK)
+        status = take_nodes(stream, e->error);
+    ebpo_stream_free(stream);
+    return status;
+}
+
+static bool visit(void *user, const ebpo_view_node *node)
+{
+    (void)node;
+    return ++*(int *)user < 20;
+}
+
+static ebpo_status take_view(ebpo_view_stream *stream, int most, ebpo_error *error)
+{
+    ebpo_view_node node;
+    ebpo_view_end end = EBPO_VIEW_NODE;
+    ebpo_status status = EBPO_OK;
+    while (end == EBPO_VIEW_NODE && status == EBPO_OK && most--)
+        status = ebpo_view_stream_next(stream, &node, &end, error);
+    return status;
+}
+
+static ebpo_status view(ebpo_view_stream *stream, ebpo_view_options *options, ebpo_error *error)
+{
+    ebpo_view_stats stats = EBPO_VIEW_STATS_INIT;
+    int visited = 0;
+    ebpo_status status = take_view(stream, 50, error);
+    options->priority = EBPO_PRIORITY_DISTANCE;
+    if (status == EBPO_OK)
+        status = ebpo_view_stream_change(stream, options, error);
+    if (status == EBPO_OK)
+        status = take_view(stream, 200, error);
+    ebpo_view_stream_cut(stream, visit, &visited);
+    return status == EBPO_OK ? ebpo_view_stream_get_stats(stream, &stats) : status;
+}
+
+static ebpo_status call_view(every_call_env *e)
+{
+    ebpo_view_stream *stream;
+    ebpo_observer observer = EBPO_OBSERVER_INIT;
+    ebpo_view_options options = EBPO_VIEW_OPTIONS_INIT;
+    observer.eye[2] = 9;
+    observer.direction[2] = -1;
+    options.priority = EBPO_PRIORITY_PIXELS;
+    options.observer = &observer;
+    options.polygons = options.windings = true;
+    ebpo_status status = ebpo_view_stream_new(e->file, &options, &stream, e->error);
+    if (status == EBPO_OK)
+        status = view(stream, &options, e->error);
+    ebpo_view_stream_free(stream);
+    return status;
+}
+
+const every_call every_call_answers[] = {
+    { "ask", call_ask },
+    { "ask_cached", call_ask_cached },
+    { "ask_ahead", call_ask_ahead },
+    { "ask_subtree", call_ask_subtree },
+    { "ask_nodes", call_ask_nodes },
+    { "measure", call_measure },
+    { "deviation", call_deviation },
+    { "limit", call_limit },
+    { "lod", call_lod },
+    { "lod_nodes", call_lod_nodes },
+    { "stream", call_stream },
+    { "view", call_view },
+    { NULL, NULL },
+};

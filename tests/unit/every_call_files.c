@@ -1,0 +1,329 @@
+/* Calls that read and write files. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "every_call.h"
+#include "scratch.h"
+
+static ebpo_read_options reading(const every_call_env *e)
+{
+    ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
+    options.threads = 1;
+    options.workspace = e->workspace;
+    return options;
+}
+
+static ebpo_status call_facts(every_call_env *e)
+{
+    ebpo_file_stats stats = EBPO_FILE_STATS_INIT;
+    ebpo_array_facts facts = { .struct_size = sizeof facts };
+    int32_t normal[3], distance;
+    char redacted[64], second[64];
+    unsigned arrays = 0;
+    while (ebpo_file_array(e->file, arrays, &facts))
+        arrays++;
+    (void)ebpo_plane_decode(0, normal, &distance);
+    (void)ebpo_export_second_file(EBPO_EXPORT_XDMF, "x.xdmf", second, sizeof second);
+    bool good = arrays && ebpo_version() && ebpo_version_number() == EBPO_VERSION_NUMBER &&
+                ebpo_status_name(EBPO_OK) && ebpo_export_format_name(EBPO_EXPORT_OBJ) &&
+                ebpo_is_url(ebpo_url_redact("http://a:b@c/", redacted, sizeof redacted)) &&
+                ebpo_profile_parts(EBPO_PROFILE_LOD) && ebpo_subset_memory(1000, 16) &&
+                ebpo_file_info(e->file)->level_count > 0;
+    return good ? ebpo_file_get_stats(e->file, &stats) : EBPO_E_ARGUMENT;
+}
+
+static ebpo_status call_workspace(every_call_env *e)
+{
+    ebpo_workspace *workspace;
+    ebpo_workspace_options options = EBPO_WORKSPACE_OPTIONS_INIT;
+    ebpo_workspace_stats stats = EBPO_WORKSPACE_STATS_INIT;
+    options.temp_dir = scratch(NULL);
+    ebpo_status status = ebpo_workspace_new(&options, &workspace, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_workspace_get_stats(workspace, &stats);
+    ebpo_workspace_free(workspace);
+    return status;
+}
+
+static ebpo_status call_outputs(every_call_env *e)
+{
+    ebpo_status status = ebpo_check_output(scratch("text"), e->error);
+    if (status == EBPO_OK)
+        status = ebpo_write_file(scratch("text"), "text", 4, e->error);
+    ebpo_abandon_outputs();
+    return status;
+}
+
+static ebpo_status call_filters(every_call_env *e) { return ebpo_register_filters(e->error); }
+
+static ebpo_status end_open(ebpo_file *file, ebpo_status status, ebpo_error *error)
+{
+    ebpo_stored_sizes sizes = EBPO_STORED_SIZES_INIT;
+    if (status == EBPO_OK)
+        status = ebpo_file_locate(file, &sizes, error);
+    ebpo_close(file);
+    return status;
+}
+
+static ebpo_status call_open(every_call_env *e)
+{
+    ebpo_file *file;
+    ebpo_status status = ebpo_open(scratch(EVERY_CALL_MODEL), &file, e->error);
+    return end_open(file, status, e->error);
+}
+
+/* A model in memory, which is the test's own. */
+typedef struct bytes {
+    char *data;
+    uint64_t size;
+} bytes;
+
+static bytes load(void)
+{
+    enum { MOST = 8 << 20 };
+    every_call_pause();
+    FILE *f = fopen(scratch(EVERY_CALL_MODEL), "rb");
+    bytes b = { malloc(MOST), 0 };
+    b.size = f && b.data ? fread(b.data, 1, MOST, f) : 0;
+    if (f)
+        fclose(f);
+    every_call_resume();
+    return b;
+}
+
+static ebpo_status call_open_memory(every_call_env *e)
+{
+    ebpo_file *file;
+    bytes b = load();
+    ebpo_status status = ebpo_open_memory(b.data, b.size, "memory", &file, e->error);
+    status = end_open(file, status, e->error);
+    free(b.data);
+    return status;
+}
+
+static ebpo_status read_bytes(void *user, uint64_t offset, uint64_t size, void *data,
+                              ebpo_error *error)
+{
+    (void)error;
+    memcpy(data, ((bytes *)user)->data + offset, size);
+    return EBPO_OK;
+}
+
+static void foresee(void *user, const ebpo_range *ranges, size_t count)
+{
+    (void)user, (void)ranges, (void)count;
+}
+
+static ebpo_status call_open_source(every_call_env *e)
+{
+    ebpo_file *file;
+    bytes b = load();
+    ebpo_source source = EBPO_SOURCE_INIT;
+    source.user = &b;
+    source.size = b.size;
+    source.read = read_bytes;
+    source.prefetch = foresee;
+    source.prefetched = 4096;
+    ebpo_status status = ebpo_open_source(&source, "source", &file, e->error);
+    if (status == EBPO_OK)
+        ebpo_file_prefetch_levels(file, 0, 2);
+    status = end_open(file, status, e->error);
+    free(b.data);
+    return status;
+}
+
+static ebpo_http_options plain_http(void)
+{
+    ebpo_http_options options = EBPO_HTTP_OPTIONS_INIT;
+    options.connect_timeout = 2;
+    options.retries = 0;
+    options.netrc = false;
+    options.proxy = "";
+    return options;
+}
+
+static ebpo_status call_source_of_url(every_call_env *e)
+{
+    ebpo_source source = EBPO_SOURCE_INIT;
+    ebpo_http_options options = plain_http();
+    char head[512];
+    if (!every_call_url())
+        return EBPO_OK;
+    ebpo_status status = ebpo_source_of_url(every_call_url(), &options, &source, e->error);
+    if (status != EBPO_OK)
+        return status;
+    status = source.read(source.user, 0, sizeof head, head, e->error);
+    source.close(source.user);
+    return status;
+}
+
+static ebpo_status call_open_url(every_call_env *e)
+{
+    ebpo_file *file;
+    ebpo_http_stats stats = EBPO_HTTP_STATS_INIT;
+    ebpo_http_options options = plain_http();
+    if (!every_call_url())
+        return EBPO_OK;
+    options.cache_folder = scratch("http-cache");
+    ebpo_status status = ebpo_open_url(every_call_url(), &options, &file, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_file_get_http_stats(file, &stats);
+    return end_open(file, status, e->error);
+}
+
+static ebpo_status call_read_level(every_call_env *e)
+{
+    ebpo_level level;
+    ebpo_read_options options = reading(e);
+    ebpo_status status = EBPO_OK;
+    for (int i = 0; i < ebpo_file_info(e->file)->level_count && status == EBPO_OK; i++) {
+        status = ebpo_file_read_level(e->file, i, &options, &level, e->error);
+        if (status == EBPO_OK)
+            ebpo_level_free(&level);
+    }
+    return status;
+}
+
+static ebpo_status call_read_mesh(every_call_env *e)
+{
+    ebpo_mesh mesh;
+    ebpo_read_options options = reading(e);
+    ebpo_status status = ebpo_file_read_mesh(e->file, &options, &mesh, e->error);
+    if (status == EBPO_OK)
+        ebpo_mesh_free(&mesh);
+    return status;
+}
+
+static ebpo_status call_read_source_mesh(every_call_env *e)
+{
+    ebpo_mesh mesh;
+    ebpo_read_options options = reading(e);
+    ebpo_status status = ebpo_file_read_source_mesh(e->file, &options, &mesh, NULL, e->error);
+    if (status == EBPO_OK)
+        ebpo_mesh_free(&mesh);
+    return status;
+}
+
+static ebpo_status call_read_maps(every_call_env *e)
+{
+    ebpo_maps maps;
+    ebpo_read_options options = reading(e);
+    ebpo_status status = ebpo_file_read_maps(e->file, &options, &maps, e->error);
+    if (status == EBPO_OK)
+        ebpo_maps_free(&maps);
+    return status;
+}
+
+static ebpo_status call_check_content(every_call_env *e)
+{
+    ebpo_read_options options = reading(e);
+    return ebpo_file_check_content(e->file, &options, e->error);
+}
+
+static ebpo_status call_write(every_call_env *e)
+{
+    ebpo_tree tree;
+    ebpo_read_options options = reading(e);
+    ebpo_write_options writing = EBPO_WRITE_OPTIONS_INIT;
+    writing.threads = 1;
+    ebpo_status status = ebpo_file_read_tree(e->file, &options, &tree, e->error);
+    if (status != EBPO_OK)
+        return status;
+    status = ebpo_tree_write(&tree, scratch("written.ebpo.h5"), &writing, e->error);
+    ebpo_tree_free(&tree);
+    return status;
+}
+
+static ebpo_subset_options half(void)
+{
+    ebpo_subset_options options = EBPO_SUBSET_OPTIONS_INIT;
+    options.boxed = true;
+    for (int axis = 0; axis < 3; axis++) {
+        options.min[axis] = -4;
+        options.max[axis] = axis ? 4 : 1;
+    }
+    options.threads = 1;
+    return options;
+}
+
+static ebpo_status call_subset_of_tree(every_call_env *e)
+{
+    ebpo_tree tree;
+    ebpo_read_options options = reading(e);
+    ebpo_subset_options part = half();
+    ebpo_status status = ebpo_file_read_tree(e->file, &options, &tree, e->error);
+    if (status != EBPO_OK)
+        return status;
+    status = ebpo_subset_of_tree(&tree, scratch("part.ebpo.h5"), &part, e->error);
+    ebpo_tree_free(&tree);
+    return status;
+}
+
+static ebpo_status call_subset(every_call_env *e)
+{
+    ebpo_subset_options part = half();
+    return ebpo_subset(e->file, scratch("part.ebpo.h5"), &part, e->error);
+}
+
+static ebpo_status call_subset_coarse(every_call_env *e)
+{
+    ebpo_subset_options part = EBPO_SUBSET_OPTIONS_INIT;
+    part.max_error = 0.3;
+    part.threads = 1;
+    return ebpo_subset(e->file, scratch("part.ebpo.h5"), &part, e->error);
+}
+
+static ebpo_status export_to(every_call_env *e, const char *name, ebpo_export_format format)
+{
+    ebpo_export_report report = { .struct_size = sizeof report };
+    ebpo_export_options options = EBPO_EXPORT_OPTIONS_INIT;
+    options.threads = 1;
+    return ebpo_export(e->file, scratch(name), format, &options, &report, e->error);
+}
+
+static ebpo_status call_xdmf(every_call_env *e) { return export_to(e, "x.xdmf", EBPO_EXPORT_XDMF); }
+static ebpo_status call_vtk(every_call_env *e) { return export_to(e, "x.hdf", EBPO_EXPORT_VTKHDF); }
+static ebpo_status call_gltf(every_call_env *e) { return export_to(e, "x.gltf", EBPO_EXPORT_GLTF); }
+static ebpo_status call_glb(every_call_env *e) { return export_to(e, "x.glb", EBPO_EXPORT_GLB); }
+static ebpo_status call_obj(every_call_env *e) { return export_to(e, "x.obj", EBPO_EXPORT_OBJ); }
+static ebpo_status call_stl(every_call_env *e) { return export_to(e, "x.stl", EBPO_EXPORT_STL); }
+
+static ebpo_status call_verify(every_call_env *e)
+{
+    ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
+    ebpo_verify_options options = EBPO_VERIFY_OPTIONS_INIT;
+    options.threads = 1;
+    options.workspace = e->workspace;
+    ebpo_status status = ebpo_verify(e->file, &options, &report, e->error);
+    return status == EBPO_OK && report.violations ? EBPO_E_FORMAT : status;
+}
+
+const every_call every_call_files[] = {
+    { "facts", call_facts },
+    { "workspace", call_workspace },
+    { "outputs", call_outputs },
+    { "filters", call_filters },
+    { "open", call_open },
+    { "open_memory", call_open_memory },
+    { "open_source", call_open_source },
+    { "source_of_url", call_source_of_url },
+    { "open_url", call_open_url },
+    { "read_level", call_read_level },
+    { "read_mesh", call_read_mesh },
+    { "read_source_mesh", call_read_source_mesh },
+    { "read_maps", call_read_maps },
+    { "check_content", call_check_content },
+    { "write", call_write },
+    { "subset_of_tree", call_subset_of_tree },
+    { "subset", call_subset },
+    { "subset_coarse", call_subset_coarse },
+    { "export_xdmf", call_xdmf },
+    { "export_vtkhdf", call_vtk },
+    { "export_gltf", call_gltf },
+    { "export_glb", call_glb },
+    { "export_obj", call_obj },
+    { "export_stl", call_stl },
+    { "verify", call_verify },
+    { NULL, NULL },
+};

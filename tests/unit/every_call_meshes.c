@@ -1,0 +1,185 @@
+/* Calls that take meshes: reading, checking, mending, building. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "every_call.h"
+#include "scratch.h"
+
+static ebpo_status read_mesh(every_call_env *e, const char *name, ebpo_mesh *mesh)
+{
+    ebpo_mesh_read_options options = EBPO_MESH_READ_OPTIONS_INIT;
+    options.threads = 1;
+    options.workspace = e->workspace;
+    return ebpo_mesh_read(scratch(name), &options, mesh, e->error);
+}
+
+static ebpo_status call_read(every_call_env *e)
+{
+    ebpo_mesh mesh;
+    ebpo_status status = read_mesh(e, EVERY_CALL_PLY, &mesh);
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
+static ebpo_status call_import(every_call_env *e)
+{
+    ebpo_mesh mesh;
+    ebpo_status status = read_mesh(e, EVERY_CALL_OBJ, &mesh);
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
+static ebpo_status call_parse_points(every_call_env *e)
+{
+    static const char text[] = "ply\nformat ascii 1.0\nelement vertex 2\nproperty double x\n"
+                               "property double y\nproperty double z\nend_header\n1 2 3\n4 5 6\n";
+    double *xyz;
+    uint64_t count;
+    ebpo_status status =
+        ebpo_points_parse_ply(text, sizeof text - 1, "points", &xyz, &count, e->error);
+    free(xyz);
+    return status;
+}
+
+static ebpo_status call_write_ply(every_call_env *e)
+{
+    ebpo_mesh mesh;
+    ebpo_status status = read_mesh(e, EVERY_CALL_PLY, &mesh);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_write_ply(&mesh, scratch("written.ply"), e->error);
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
+static ebpo_status call_check(every_call_env *e)
+{
+    ebpo_mesh mesh;
+    ebpo_mesh_report report;
+    ebpo_status status = read_mesh(e, EVERY_CALL_HOLED, &mesh);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_check(&mesh, 1, (ebpo_progress){ NULL, NULL }, &report, e->error);
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
+static ebpo_status call_arrange(every_call_env *e)
+{
+    ebpo_mesh mesh;
+    ebpo_status status = read_mesh(e, EVERY_CALL_CROSSING, &mesh);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_arrange(&mesh, 1, (ebpo_progress){ NULL, NULL }, e->error);
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
+static ebpo_status mend(every_call_env *e, const char *name,
+                        ebpo_status (*how)(ebpo_mesh *, ebpo_mend_record *, ebpo_error *))
+{
+    ebpo_mesh mesh;
+    ebpo_mend_record record;
+    memset(&record, 0, sizeof record);
+    ebpo_status status = read_mesh(e, name, &mesh);
+    if (status == EBPO_OK)
+        status = how(&mesh, &record, e->error);
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
+static ebpo_status weld(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+{
+    return ebpo_mesh_weld(mesh, record, error);
+}
+
+static ebpo_status orient(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+{
+    return ebpo_mesh_orient(mesh, record, error);
+}
+
+static ebpo_status fill(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+{
+    return ebpo_mesh_fill_holes(mesh, record, error);
+}
+
+static ebpo_status call_weld(every_call_env *e) { return mend(e, EVERY_CALL_SPLIT, weld); }
+static ebpo_status call_orient(every_call_env *e) { return mend(e, EVERY_CALL_TURNED, orient); }
+static ebpo_status call_fill_holes(every_call_env *e) { return mend(e, EVERY_CALL_HOLED, fill); }
+
+static ebpo_status prepare(ebpo_mesh *mesh, ebpo_prepared *out, ebpo_error *error)
+{
+    ebpo_prepare_options options = EBPO_PREPARE_OPTIONS_INIT;
+    options.weld = options.orient = options.fill_holes = true;
+    options.threads = 1;
+    return ebpo_mesh_prepare(mesh, &options, out, error);
+}
+
+static ebpo_status call_prepare(every_call_env *e)
+{
+    ebpo_mesh mesh;
+    ebpo_prepared prepared = EBPO_PREPARED_INIT;
+    ebpo_status status = read_mesh(e, EVERY_CALL_HOLED, &mesh);
+    if (status == EBPO_OK)
+        status = prepare(&mesh, &prepared, e->error);
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
+/* ebpo_build takes the mesh, whether it succeeds or not. */
+static ebpo_status build(every_call_env *e, const char *name, ebpo_selection selection,
+                         unsigned threads)
+{
+    ebpo_mesh mesh;
+    ebpo_tree tree;
+    ebpo_prepared prepared = EBPO_PREPARED_INIT;
+    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+    options.leaf_faces = 8;
+    options.threads = threads;
+    options.select = selection;
+    options.parts |= ebpo_selection_describe(selection)->from_leaves ? EBPO_PART_LEAF_PLANES : 0;
+    ebpo_status status = read_mesh(e, name, &mesh);
+    if (status == EBPO_OK)
+        status = prepare(&mesh, &prepared, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_build(&mesh, &prepared.report, &prepared.record, &options, &tree, e->error);
+    ebpo_mesh_free(&mesh);
+    if (status == EBPO_OK)
+        ebpo_tree_free(&tree);
+    return status;
+}
+
+static ebpo_status call_build(every_call_env *e)
+{
+    return build(e, EVERY_CALL_PLY, EBPO_SELECT_INHERIT, 1);
+}
+
+static ebpo_status call_build_crossing(every_call_env *e)
+{
+    return build(e, EVERY_CALL_CROSSING, EBPO_SELECT_RANDOM, 1);
+}
+
+static ebpo_status call_build_kmedoids(every_call_env *e)
+{
+    return build(e, EVERY_CALL_PLY, EBPO_SELECT_KMEDOIDS, 1);
+}
+
+static ebpo_status call_build_threads(every_call_env *e)
+{
+    return build(e, EVERY_CALL_PLY, EBPO_SELECT_OFFSET, 2);
+}
+
+const every_call every_call_meshes[] = {
+    { "read", call_read },
+    { "import", call_import },
+    { "parse_points", call_parse_points },
+    { "write_ply", call_write_ply },
+    { "check", call_check },
+    { "arrange", call_arrange },
+    { "weld", call_weld },
+    { "orient", call_orient },
+    { "fill_holes", call_fill_holes },
+    { "prepare", call_prepare },
+    { "build", call_build },
+    { "build_crossing", call_build_crossing },
+    { "build_kmedoids", call_build_kmedoids },
+    { "build_threads", call_build_threads },
+    { NULL, NULL },
+};

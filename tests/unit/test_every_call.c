@@ -1,0 +1,233 @@
+/* Every public function, with and without a small workspace, and with each allocation failing once:
+ * a call ends with a status, holds nothing after it, leaves no file behind and succeeds when it is
+ * made again. Meant for AddressSanitizer and LeakSanitizer, which see each call by itself: Check
+ * forks. test_every_call [FAULTY_SERVER] */
+#include <dirent.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/workspace.h"
+#include "check_main.h"
+#include "every_call.h"
+#include "failing_allocations.h"
+#include "scratch.h"
+#include "solids.h"
+#include "web.h"
+
+static ebpo_error error;
+static bool served;
+
+static void fine(ebpo_status status) { ck_assert_msg(status == EBPO_OK, "%s", error.message); }
+
+const char *every_call_url(void)
+{
+    every_call_pause();
+    const char *url = served ? web_url("good") : NULL;
+    every_call_resume();
+    return url;
+}
+
+void every_call_pause(void) { failing_allocations_pause(); }
+void every_call_resume(void) { failing_allocations_resume(); }
+
+/* --- what is read --- */
+
+static void write_mesh(ebpo_mesh *mesh, const char *name)
+{
+    fine(ebpo_mesh_write_ply(mesh, scratch(name), &error));
+    ebpo_mesh_free(mesh);
+}
+
+static void write_faulty_meshes(uint32_t n)
+{
+    ebpo_mesh mesh = ebpo_test_torus(3, 1, n, n), other = ebpo_test_torus(3, 1, n, n);
+    ebpo_test_split_vertices(&mesh);
+    write_mesh(&mesh, EVERY_CALL_SPLIT);
+    for (uint64_t face = 0; face < other.face_count; face += 9)
+        ebpo_test_turn_face(&other, face);
+    write_mesh(&other, EVERY_CALL_TURNED);
+    mesh = ebpo_test_torus(3, 1, n, n);
+    mesh.face_count -= 5;
+    write_mesh(&mesh, EVERY_CALL_HOLED);
+    mesh = ebpo_test_torus(3, 1, n, n);
+    other = ebpo_test_tetrahedron(4);
+    ebpo_test_append(&mesh, &other);
+    ebpo_mesh_free(&other);
+    write_mesh(&mesh, EVERY_CALL_CROSSING);
+}
+
+static void write_obj(void)
+{
+    static const char text[] = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+                               "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+    fine(ebpo_write_file(scratch(EVERY_CALL_OBJ), text, sizeof text - 1, &error));
+}
+
+static void write_model(uint32_t n)
+{
+    ebpo_mesh mesh = ebpo_test_torus(3, 1, n, n);
+    ebpo_prepared prepared = EBPO_PREPARED_INIT;
+    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_tree tree;
+    fine(ebpo_mesh_write_ply(&mesh, scratch(EVERY_CALL_PLY), &error));
+    fine(ebpo_mesh_prepare(&mesh, NULL, &prepared, &error));
+    options.leaf_faces = 8;
+    fine(ebpo_build(&mesh, &prepared.report, NULL, &options, &tree, &error));
+    fine(ebpo_tree_write(&tree, scratch(EVERY_CALL_MODEL), NULL, &error));
+    ebpo_tree_free(&tree);
+}
+
+static void serve(void)
+{
+    enum { MOST = 8 << 20 };
+    FILE *f = test_arguments[0] ? fopen(scratch(EVERY_CALL_MODEL), "rb") : NULL;
+    char *data = f ? malloc(MOST) : NULL;
+    size_t size = data ? fread(data, 1, MOST, f) : 0;
+    served = size && web_start(test_arguments[0], data, size);
+    if (f)
+        fclose(f);
+    free(data);
+}
+
+/* Once for all calls, which are made in children of this process. */
+static void write_all(uint32_t n)
+{
+    scratch_enter();
+    write_faulty_meshes(n);
+    write_obj();
+    write_model(n);
+    serve();
+}
+
+static void write_large(void) { write_all(48); }
+static void write_small(void) { write_all(10); }
+
+static void remove_all(void)
+{
+    web_stop();
+    scratch_leave();
+}
+
+static void begin(every_call_env *e, bool in_files)
+{
+    *e = (every_call_env){ .error = &error };
+    fine(ebpo_open(scratch(EVERY_CALL_MODEL), &e->file, &error));
+    if (in_files)
+        fine(ebpo_workspace_make_any(&e->workspace, 1 << 16, scratch(NULL), &error));
+}
+
+/* --- what is left --- */
+
+static int open_files(void)
+{
+    int count = 0;
+    DIR *folder = opendir("/proc/self/fd");
+    while (folder && readdir(folder))
+        count++;
+    if (folder)
+        closedir(folder);
+    return count;
+}
+
+static void expect_workspace_empty(const every_call_env *e, const char *name)
+{
+    ebpo_workspace_stats stats = EBPO_WORKSPACE_STATS_INIT;
+    if (!e->workspace)
+        return;
+    ebpo_workspace_get_stats(e->workspace, &stats);
+    ck_assert_msg(stats.held + stats.filed == 0, "%s leaves %llu bytes in the workspace", name,
+                  (unsigned long long)(stats.held + stats.filed));
+}
+
+static void finish(every_call_env *e)
+{
+    ebpo_close(e->file);
+    ebpo_workspace_free(e->workspace);
+}
+
+static const every_call *call_number(int i)
+{
+    static const every_call *const tables[] = { every_call_meshes, every_call_files,
+                                                every_call_answers };
+    for (size_t table = 0; table < sizeof tables / sizeof *tables; table++)
+        for (const every_call *c = tables[table]; c->name; c++)
+            if (i-- == 0)
+                return c;
+    return NULL;
+}
+
+static int call_count(void)
+{
+    int count = 0;
+    while (call_number(count))
+        count++;
+    return count;
+}
+
+/* --- the tests: one turn for each call, without a workspace and with one --- */
+
+START_TEST(a_call_leaves_nothing)
+{
+    const every_call *c = call_number(_i / 2);
+    every_call_env e;
+    begin(&e, _i % 2);
+    for (int turn = 0; turn < 2; turn++) {
+        ebpo_status status = c->call(&e);
+        ck_assert_msg(status == EBPO_OK, "%s: %s", c->name, error.message);
+        expect_workspace_empty(&e, c->name);
+    }
+    finish(&e);
+}
+END_TEST
+
+/* What fails: the n-th allocation, or all from it on. True: there are more allocations than that.
+ */
+static bool call_with_failure(const every_call *c, every_call_env *e, uint64_t n, bool onward)
+{
+    int files = open_files(), entries = scratch_entries();
+    error = (ebpo_error)EBPO_ERROR_INIT;
+    failing_allocations_begin(n, onward);
+    ebpo_status status = c->call(e);
+    bool more = failing_allocations_end() >= n;
+    ck_assert_msg(more || status == EBPO_OK, "%s: %s", c->name, error.message);
+    ck_assert_msg(status == EBPO_OK || error.message[0], "%s: allocation %llu: no message", c->name,
+                  (unsigned long long)n);
+    expect_workspace_empty(e, c->name);
+    ck_assert_msg(open_files() <= files, "%s: allocation %llu: a file stays open", c->name,
+                  (unsigned long long)n);
+    ck_assert_msg(status == EBPO_OK || scratch_entries() <= entries,
+                  "%s: allocation %llu: leaves a file behind", c->name, (unsigned long long)n);
+    return more;
+}
+
+START_TEST(a_call_survives_any_allocation_that_fails)
+{
+    const every_call *c = call_number(_i / 2);
+    const uint64_t dense = ebpo_test_scaled(200);
+    every_call_env e;
+    begin(&e, _i % 2);
+    fine(c->call(&e));
+    for (int onward = 0; onward < 2; onward++)
+        for (uint64_t n = 1; call_with_failure(c, &e, n, onward); n += 1 + n / dense)
+            ;
+    fine(c->call(&e));
+    finish(&e);
+}
+END_TEST
+
+Suite *test_suite(void)
+{
+    enum { SECONDS = 600 };
+    Suite *suite = suite_create("every_call");
+    TCase *all = tcase_create("all"), *failing = tcase_create("failing");
+    tcase_set_timeout(all, SECONDS);
+    tcase_add_unchecked_fixture(all, write_large, remove_all);
+    tcase_add_loop_test(all, a_call_leaves_nothing, 0, 2 * call_count());
+    suite_add_tcase(suite, all);
+    tcase_set_timeout(failing, SECONDS);
+    tcase_add_unchecked_fixture(failing, write_small, remove_all);
+    tcase_add_loop_test(failing, a_call_survives_any_allocation_that_fails, 0, 2 * call_count());
+    suite_add_tcase(suite, failing);
+    return suite;
+}
