@@ -130,8 +130,10 @@ static H5FD_t *driver_open(const char *name, unsigned flags, hid_t fapl, haddr_t
     if (!choice || flags & (H5F_ACC_RDWR | H5F_ACC_TRUNC | H5F_ACC_CREAT))
         return NULL;
     driver_file *file = calloc(1, sizeof *file);
-    if (!file)
+    if (!file) {
+        choice->driver->status = ebpo_fail_memory(&choice->driver->error, sizeof *file);
         return NULL;
+    }
     file->driver = choice->driver;
     return &file->libhdf5;
 }

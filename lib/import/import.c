@@ -89,6 +89,7 @@ typedef struct memory_file {
     const uint8_t *data;
     size_t size;
     const char *name;
+    bool no_memory; /* for opening it: assimp only learns that it cannot be opened */
 } memory_file;
 
 typedef struct cursor {
@@ -139,7 +140,7 @@ static void flush(struct aiFile *file) { (void)file; }
  */
 static struct aiFile *open_memory(struct aiFileIO *io, const char *name, const char *mode)
 {
-    const memory_file *source = (const memory_file *)(void *)io->UserData;
+    memory_file *source = (memory_file *)(void *)io->UserData;
     struct aiFile *file;
     cursor *c;
     if (strcmp(name, source->name) != 0 || mode[0] != 'r')
@@ -149,6 +150,7 @@ static struct aiFile *open_memory(struct aiFileIO *io, const char *name, const c
     if (!file || !c) {
         free(file);
         free(c);
+        source->no_memory = true;
         return NULL;
     }
     c->file = source;
@@ -317,12 +319,14 @@ done:
     return status;
 }
 
-static ebpo_status import_locked(ebpo_mesh *mesh, const memory_file *file, const char *name,
+static ebpo_status import_locked(ebpo_mesh *mesh, memory_file *file, const char *name,
                                  ebpo_error *error)
 {
-    struct aiFileIO io = { open_memory, close_memory, (aiUserData)(uintptr_t)file };
+    struct aiFileIO io = { open_memory, close_memory, (aiUserData)(void *)file };
     /* No post-processing: nothing may move, join or reorder. */
     const struct aiScene *scene = aiImportFileEx(file->name, 0, &io);
+    if (!scene && file->no_memory)
+        return ebpo_fail_memory(error, sizeof(struct aiFile));
     if (!scene) {
         char reason[200];
         snprintf(reason, sizeof reason, "%s", aiGetErrorString());
@@ -342,7 +346,7 @@ ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const 
                                uint64_t size, const char *name, ebpo_workspace *workspace,
                                ebpo_error *error)
 {
-    memory_file file = { data, (size_t)size, pseudo_names[format] };
+    memory_file file = { data, (size_t)size, pseudo_names[format], false };
     ebpo_mesh mesh = { .workspace = workspace };
     name = ebpo_path_name(name);
     ebpo_status status = check_budget(format, size, workspace, name, error);
