@@ -193,6 +193,8 @@ static bool call_with_failure(const every_call *c, every_call_env *e, uint64_t n
     ck_assert_msg(more || status == EBPO_OK, "%s: %s", c->name, error.message);
     ck_assert_msg(status == EBPO_OK || error.message[0], "%s: allocation %llu: no message", c->name,
                   (unsigned long long)n);
+    ck_assert_msg(status != EBPO_E_FORMAT, "%s: allocation %llu: called damaged: %s", c->name,
+                  (unsigned long long)n, error.message);
     expect_workspace_empty(e, c->name);
     ck_assert_msg(open_files() <= files, "%s: allocation %llu: a file stays open", c->name,
                   (unsigned long long)n);
