@@ -8,7 +8,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/array_loops.h"
 #include "base/arrays.h"
+#include "base/parallel.h"
 #include "check_main.h"
 #include "scratch.h"
 
@@ -103,6 +105,63 @@ START_TEST(pages_of_files_are_let_go_of)
 }
 END_TEST
 
+enum { PAGE = 4096, PAGES = 1 << 15, LINE = 64 };
+
+typedef struct touching {
+    unsigned char *array;
+    uint64_t most; /* bytes resident meanwhile */
+} touching;
+
+static void touch(touching *t, uint64_t byte)
+{
+    t->array[byte] = 1;
+    if (byte % (1 << 20) == 0)
+        t->most = resident() > t->most ? resident() : t->most;
+}
+
+static ebpo_status touch_pages(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
+{
+    (void)worker, (void)error;
+    for (uint64_t page = begin; page < end; page++)
+        touch(context, page * PAGE);
+    return EBPO_OK;
+}
+
+static void touch_all(int way, ebpo_workspace *w, touching *t)
+{
+    if (way == 0)
+        EBPO_FOR_ITEMS(w, i, 0, (uint64_t)PAGES * PAGE / LINE)
+            touch(t, i * LINE);
+    if (way == 1)
+        EBPO_FOR_ITEMS_SCATTERED(w, page, 0, PAGES) {
+            touch(t, page * PAGE);
+            continue; /* which lets pages go too */
+        }
+    if (way == 2)
+        EBPO_FOR_PIECES(w, page, PAGES, 256)
+            touch_pages(t, page, page + 256, 0, NULL);
+    if (way == 3)
+        ck_assert_int_eq(ebpo_parallel_for(1, w, PAGES, 256, touch_pages, t, NULL, "", NULL), 0);
+}
+
+START_TEST(loops_and_runs_let_go_of_pages)
+{
+#ifdef __SANITIZE_ADDRESS__
+    return; /* whose own memory is resident too */
+#endif
+    uint64_t budget = (resident() + (32 << 20)) / 3 * 4;
+    ebpo_workspace *w = make(budget);
+    touching t = { ebpo_array_alloc(w, (uint64_t)PAGES * PAGE, 1), 0 };
+    ck_assert_ptr_nonnull(t.array);
+    touch_all(_i, w, &t);
+    ck_assert_msg(t.most <= budget, "%llu MiB of %llu", (unsigned long long)t.most >> 20,
+                  (unsigned long long)budget >> 20);
+    ebpo_array_free(w, t.array);
+    ebpo_workspace_free(w);
+}
+END_TEST
+
 START_TEST(without_a_workspace_it_is_malloc)
 {
     char *a = ebpo_array_alloc(NULL, 10 << 20, 1);
@@ -159,6 +218,7 @@ Suite *test_suite(void)
     tcase_add_test(tests, what_does_not_fit_goes_to_files_without_names);
     tcase_add_test(tests, growing_keeps_what_was_there);
     tcase_add_test(tests, pages_of_files_are_let_go_of);
+    tcase_add_loop_test(tests, loops_and_runs_let_go_of_pages, 0, 4);
     tcase_add_test(tests, without_a_workspace_it_is_malloc);
     tcase_add_test(tests, bad_wishes_are_refused);
     tcase_add_test(tests, a_file_that_may_not_grow_is_an_error_that_names_the_folder);
