@@ -13,9 +13,13 @@ typedef struct preparation {
 } preparation;
 
 /* What is too large for an exact grid can be checked all the same; building says so again. */
-static ebpo_status unless_too_large(ebpo_status status)
+static ebpo_status unless_too_large(ebpo_status status, const ebpo_error *local, ebpo_error *error)
 {
-    return status == EBPO_E_LIMIT ? EBPO_OK : status;
+    if (status == EBPO_OK || status == EBPO_E_LIMIT)
+        return EBPO_OK;
+    if (error)
+        *error = *local;
+    return status;
 }
 
 static ebpo_status mend(const preparation *p, bool weld, ebpo_error *error)
@@ -38,8 +42,9 @@ static ebpo_status mend(const preparation *p, bool weld, ebpo_error *error)
 static ebpo_status arrange_and_mend(const preparation *p, bool weld, ebpo_error *error)
 {
     const ebpo_prepare_options *o = p->options;
-    ebpo_status status =
-        unless_too_large(ebpo_arrange_to_mend(p->mesh, o->threads, &o->progress, error));
+    ebpo_error local = EBPO_ERROR_INIT;
+    ebpo_status status = ebpo_arrange_to_mend(p->mesh, o->threads, &o->progress, &local);
+    status = unless_too_large(status, &local, error);
     if (status == EBPO_OK)
         status = ebpo_mesh_check(p->mesh, o->threads, o->progress, &p->out->before, error);
     return status == EBPO_OK ? mend(p, weld, error) : status;
@@ -54,8 +59,11 @@ static ebpo_status prepare(const preparation *p, ebpo_error *error)
     p->out->mended = weld || o->orient || o->fill_holes;
     if (p->out->mended)
         status = arrange_and_mend(p, weld, error);
-    if (status == EBPO_OK)
-        status = unless_too_large(ebpo_arrange(p->mesh, -1, o->threads, &o->progress, error));
+    if (status == EBPO_OK) {
+        ebpo_error local = EBPO_ERROR_INIT;
+        status = ebpo_arrange(p->mesh, -1, o->threads, &o->progress, &local);
+        status = unless_too_large(status, &local, error);
+    }
     if (status == EBPO_OK)
         status = ebpo_mesh_check(p->mesh, o->threads, o->progress, &p->out->report, error);
     if (status == EBPO_OK && !p->out->mended)

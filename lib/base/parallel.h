@@ -32,14 +32,6 @@ bool ebpo_progress_stage(const ebpo_progress *progress, const char *stage, ebpo_
 bool ebpo_progress_step(const ebpo_progress *progress, const char *stage, uint64_t done,
                         uint64_t total, ebpo_error *error);
 
-/* The same within a loop that goes through arrays in order. */
-static inline bool ebpo_progress_step_at(const ebpo_progress *progress, const char *stage,
-                                         uint64_t i, uint64_t done, uint64_t total,
-                                         ebpo_error *error)
-{
-    return (i & 0xfffff) || ebpo_progress_step(progress, stage, done, total, error);
-}
-
 /* One of several passes of a stage: its own progress is reported as the part from `begin` to `end`
  * of `of`, so that the total only grows. */
 typedef struct ebpo_pass {

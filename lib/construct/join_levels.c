@@ -111,6 +111,13 @@ static bool any_has(const joiner *j, int level, int id)
     return false;
 }
 
+static void fill_usual(const joiner *j, char *to, uint64_t bytes, int id)
+{
+    int64_t usual = ebpo_schema[id].usual; /* files are little-endian, and so are we */
+    EBPO_FOR_ITEMS(j->b->workspace, i, 0, bytes / ebpo_schema[id].held_size)
+        memcpy(to + i * ebpo_schema[id].held_size, &usual, ebpo_schema[id].held_size);
+}
+
 /* An array that none of the stretches has stays away. */
 static bool join_array(const joiner *j, int level, int id, ebpo_level *out)
 {
@@ -127,6 +134,8 @@ static bool join_array(const joiner *j, int level, int id, ebpo_level *out)
         size_t bytes = (size_t)(ebpo_level_rows(from, id) * size);
         if (array)
             ebpo_array_copy(j->b->workspace, to, array, bytes);
+        else /* a stretch in which all elements have the usual value */
+            fill_usual(j, to, bytes, id);
         to += bytes;
         if (!j->stretch[i][level].packed)
             ebpo_array_free(j->b->workspace, array);

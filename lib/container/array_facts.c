@@ -16,6 +16,13 @@ static const ebpo_array_in *find(const ebpo_file *file, unsigned n)
     return NULL;
 }
 
+/* Where the chunks of an array of several lie may be found by another thread just now. */
+static uint64_t stored_bytes(const ebpo_file *file, const ebpo_array_in *array)
+{
+    bool known = ebpo_h5_chunk_count(&array->shape) == 1 || atomic_load(&file->located);
+    return known ? array->stored_bytes : 0;
+}
+
 bool ebpo_file_array(const ebpo_file *file, unsigned n, ebpo_array_facts *out)
 {
     const ebpo_array_in *array = find(file, n);
@@ -25,7 +32,7 @@ bool ebpo_file_array(const ebpo_file *file, unsigned n, ebpo_array_facts *out)
                                .columns = array->shape.cols ? array->shape.cols : 1,
                                .element_bytes = array->shape.element_size,
                                .is_signed = array->shape.is_signed,
-                               .stored_bytes = array->stored_bytes,
+                               .stored_bytes = stored_bytes(file, array),
                                .coding = ebpo_schema[array->id].coding,
                                .about = ebpo_schema[array->id].about };
     snprintf(facts.path, sizeof facts.path, "%s", array->path);

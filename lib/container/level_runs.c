@@ -127,7 +127,11 @@ static ebpo_status find_span(const reading *r, ebpo_per per, uint64_t rank, span
     case EBPO_PER_PLANE: return ebpo_ranks_planes(r->chunks, r->level, rank, &s->first, r->error);
     case EBPO_PER_LEAF_PLANE:
         return ebpo_ranks_leaf_planes(r->chunks, r->level, rank, &s->first, r->error);
-    default: return ebpo_ranks_leaf(r->chunks, r->level, rank, &s->end, &s->first, r->error);
+    case EBPO_PER_REF:
+        return ebpo_ranks_leaf(r->chunks, r->level, rank, &s->end, &s->first, r->error);
+    default:
+        return ebpo_fail(r->error, EBPO_E_UNSUPPORTED,
+                         "a list whose beginnings no index tells; add it to find_span");
     }
 }
 

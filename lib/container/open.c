@@ -308,6 +308,8 @@ ebpo_status ebpo_open_source(const ebpo_source *source, const char *name, ebpo_f
     ebpo_source own = EBPO_SOURCE_INIT;
     *out = NULL;
     ebpo_status status = EBPO_TAKE(ebpo_source, &own, source, error);
+    if (status == EBPO_E_UNSUPPORTED && source->close) /* a newer caller's: what we know of it is */
+        source->close(source->user);
     if (status != EBPO_OK)
         return status;
     if (own.read)

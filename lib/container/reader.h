@@ -33,11 +33,6 @@ void ebpo_expect_tree(const ebpo_file *file);
 /* Announces what was collected, and frees it. */
 void ebpo_expect_all(ebpo_expected *expected);
 
-/* What callers leave out. */
-static inline ebpo_read_options ebpo_read_chosen(const ebpo_read_options *options)
-{
-    return options ? *options : (ebpo_read_options)EBPO_READ_OPTIONS_INIT;
-}
 /* In memory, by so many threads. */
 static inline ebpo_read_options ebpo_read_threads(unsigned threads)
 {

@@ -64,7 +64,7 @@ typedef struct ebpo_array_spec {
     uint8_t since;      /* minor version of the format */
     uint8_t held_size;  /* of an element in ebpo_level; 0: the array is not held there */
     uint16_t held;      /* offset of the pointer in ebpo_level */
-    uint16_t bytes;     /* arrays of the root: offset in ebpo_info of the bytes of their kind */
+    uint16_t bytes;     /* arrays of the root: offset in ebpo_stored_sizes of their kind */
     const char *coding; /* attribute */
     const char *about;  /* attribute */
 } ebpo_array_spec;

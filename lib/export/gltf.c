@@ -11,6 +11,7 @@
 
 #include "base/alloc.h"
 #include "base/endian.h"
+#include "base/arrays.h"
 #include "base/error.h"
 #include "export/floats.h"
 #include "export/formats.h"
@@ -98,8 +99,8 @@ static ebpo_status gather(model *m, const ebpo_export_job *job, ebpo_error *erro
         status = ebpo_mesh_floats(&p->xyz, &p->block.mesh, m->origin, &m->largest_change, error);
         if (status != EBPO_OK)
             return status;
-        free(p->block.mesh.xyz32);
-        free(p->block.mesh.xyz64);
+        ebpo_array_free(p->block.mesh.workspace, p->block.mesh.xyz32);
+        ebpo_array_free(p->block.mesh.workspace, p->block.mesh.xyz64);
         p->block.mesh.xyz32 = NULL;
         p->block.mesh.xyz64 = NULL;
         find_bounds(p);

@@ -23,26 +23,28 @@ static const char *vertex_bytes(const ebpo_mesh *mesh, uint64_t i)
            i * vertex_size(mesh);
 }
 
-static ebpo_status copy_mesh(ebpo_mesh *out, const ebpo_mesh *mesh, ebpo_error *error)
+static ebpo_status copy_mesh(ebpo_mesh *out, const ebpo_mesh *mesh, ebpo_workspace *workspace,
+                             ebpo_error *error)
 {
     *out = *mesh;
+    out->workspace = workspace;
     out->xyz32 = NULL;
     out->xyz64 = NULL;
-    out->faces = ebpo_array_alloc(mesh->workspace, mesh->face_count, 3 * sizeof *out->faces);
-    void *xyz = ebpo_array_alloc(mesh->workspace, mesh->vertex_count, vertex_size(mesh));
+    out->faces = ebpo_array_alloc(workspace, mesh->face_count, 3 * sizeof *out->faces);
+    void *xyz = ebpo_array_alloc(workspace, mesh->vertex_count, vertex_size(mesh));
     if (mesh->xyz32)
         out->xyz32 = xyz;
     else
         out->xyz64 = xyz;
     if (!out->faces || !xyz) {
         ebpo_mesh_free(out);
-        return ebpo_workspace_fail(mesh->workspace,
+        return ebpo_workspace_fail(workspace,
                                    mesh->vertex_count * vertex_size(mesh) + mesh->face_count * 12,
                                    error);
     }
-    EBPO_FOR_ITEMS(mesh->workspace, i, 0, mesh->face_count)
+    EBPO_FOR_ITEMS(workspace, i, 0, mesh->face_count)
         memcpy(out->faces + 3 * i, mesh->faces + 3 * i, 3 * sizeof *out->faces);
-    EBPO_FOR_ITEMS(mesh->workspace, i, 0, mesh->vertex_count)
+    EBPO_FOR_ITEMS(workspace, i, 0, mesh->vertex_count)
         memcpy((char *)xyz + i * vertex_size(mesh), vertex_bytes(mesh, i), vertex_size(mesh));
     return EBPO_OK;
 }
@@ -235,7 +237,7 @@ ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *file, const eb
     ebpo_mend_record did = { .weld = info->mend.weld,
                              .orient = info->mend.orient,
                              .fill_holes = info->mend.fill_holes };
-    ebpo_status status = as_it_is ? EBPO_OK : copy_mesh(&mended, source, error);
+    ebpo_status status = as_it_is ? EBPO_OK : copy_mesh(&mended, source, read->workspace, error);
     if (status != EBPO_OK)
         return status;
     if (!as_it_is)

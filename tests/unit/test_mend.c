@@ -283,7 +283,9 @@ START_TEST(preparing_may_be_stopped_and_checks_what_is_too_large_to_build)
     m.faces[0] = 0;
     m.xyz64[3ul * m.faces[1]] = 1e302;
     ck_assert_int_eq(ebpo_mesh_arrange(&m, 1, silent, &error), EBPO_E_LIMIT);
+    error = (ebpo_error)EBPO_ERROR_INIT;
     ck_assert_msg(ebpo_mesh_prepare(&m, NULL, &p, &error) == EBPO_OK, "%s", error.message);
+    ck_assert(error.status == EBPO_OK && !error.message[0]); /* what was passed over is not said */
     ck_assert(p.report.max[0] == 1e302);
     ebpo_mesh_free(&m);
 }

@@ -29,6 +29,35 @@ static ebpo_workspace *made_with(const void *options, ebpo_status expected)
     return workspace;
 }
 
+static ebpo_status no_bytes(void *user, uint64_t offset, uint64_t size, void *data,
+                            ebpo_error *error)
+{
+    (void)user, (void)offset, (void)size, (void)data, (void)error;
+    return EBPO_E_IO;
+}
+
+static void count_closes(void *user) { ++*(int *)user; }
+
+/* Whose source it is, once it has been handed over: ours, also when we refuse it. */
+START_TEST(a_source_of_a_later_version_is_closed)
+{
+    int closes = 0;
+    struct {
+        ebpo_source now;
+        uint64_t later;
+    } source = { EBPO_SOURCE_INIT, 1 };
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file;
+    source.now.struct_size = sizeof source;
+    source.now.user = &closes;
+    source.now.read = no_bytes;
+    source.now.close = count_closes;
+    ck_assert_int_eq(ebpo_open_source(&source.now, "later", &file, &error), EBPO_E_UNSUPPORTED);
+    ck_assert_ptr_null(file);
+    ck_assert_int_eq(closes, 1);
+}
+END_TEST
+
 START_TEST(options_of_other_versions)
 {
     later_options later = { EBPO_WORKSPACE_OPTIONS_INIT, 0 };
@@ -164,6 +193,7 @@ Suite *test_suite(void)
     TCase *tests = tcase_create("sized");
     tcase_set_timeout(tests, 120);
     tcase_add_test(tests, options_of_other_versions);
+    tcase_add_test(tests, a_source_of_a_later_version_is_closed);
     tcase_add_loop_test(tests, sizes_that_no_version_has, 0, 6);
     tcase_add_test(tests, what_is_filled_in);
     tcase_add_test(tests, structs_that_were_not_begun);

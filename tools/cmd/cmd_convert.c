@@ -232,6 +232,7 @@ static ebpo_status room_to_judge(const values *v, const mesh_input *p, const cha
     ebpo_workspace_get_stats(workspace, &figures);
     if (needed <= figures.memory)
         return EBPO_OK;
+    error->status = EBPO_E_LIMIT;
     snprintf(error->message, sizeof error->message,
              "%s: --max-error and --target-size measure with the whole model in memory, about %s, "
              "but the budget is %s; allow more with --memory, or leave them out here and use 'ebpo "

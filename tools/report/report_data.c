@@ -185,11 +185,6 @@ void report_stem(const char *path, char *out, size_t room)
         *dot = 0;
 }
 
-double report_of_diagonal(const comparison *c, double v)
-{
-    return c->diagonal > 0 ? 100 * (v / c->diagonal) : NAN;
-}
-
 static int compare_doubles(const void *a, const void *b)
 {
     double x, y;

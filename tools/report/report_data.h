@@ -173,8 +173,6 @@ void comparison_free(comparison *c);
 
 /* What a file is called: of "dir/bunny.ebpo.h5", or a URL that ends so, "bunny". */
 void report_stem(const char *path, char *out, size_t room);
-/* A length in percent of the diagonal of the model's box; NAN where that is 0. */
-double report_of_diagonal(const comparison *c, double v);
 
 /* What a build or a file cannot tell is noted once and leaves figures away; all else stays an
  * error. */

@@ -45,7 +45,8 @@
  *     ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
  *     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
  *
- * A program then runs with every later library of the same major version: what
+ * A program then runs with every later library of the same major version, from 1.0
+ * on: what
  * its structs do not have yet keeps the usual values, or is not filled in. It
  * runs with an earlier library too, unless it sets something that this library
  * does not know, which is EBPO_E_UNSUPPORTED. Without the macro, struct_size is
