@@ -169,12 +169,12 @@ static ebpo_status sort_group(const sorting *t, uint64_t g, ebpo_error *error)
     uint64_t count = t->first[g + 1] - t->first[g];
     const uint8_t *group = t->dealt + t->first[g] * s->record;
     /* records that differ in no leading bit */
-    ebpo_workspace *room = count > LARGE_GROUP ? s->workspace : NULL;
-    keyed *keys = ebpo_array_alloc(room, 2 * count, sizeof *keys);
-    uint8_t *sorted = ebpo_array_alloc(room, count, s->record);
+    ebpo_workspace *capacity = count > LARGE_GROUP ? s->workspace : NULL;
+    keyed *keys = ebpo_array_alloc(capacity, 2 * count, sizeof *keys);
+    uint8_t *sorted = ebpo_array_alloc(capacity, count, s->record);
     ebpo_status status = EBPO_OK;
     if (!keys || !sorted)
-        status = ebpo_workspace_fail(room, count * (2 * sizeof *keys + s->record), error);
+        status = ebpo_workspace_fail(capacity, count * (2 * sizeof *keys + s->record), error);
     else {
         for (uint64_t i = 0; i < count; i++)
             keys[i] = (keyed){ key_of(group + i * s->record), i };
@@ -188,8 +188,8 @@ static ebpo_status sort_group(const sorting *t, uint64_t g, ebpo_error *error)
         }
         s->take(s->context, t->first[g], sorted, count);
     }
-    ebpo_array_free(room, keys);
-    ebpo_array_free(room, sorted);
+    ebpo_array_free(capacity, keys);
+    ebpo_array_free(capacity, sorted);
     return status;
 }
 

@@ -110,11 +110,11 @@ static uint64_t kept_for(const ebpo_cache *c, const demand *d)
 
 static uint64_t sum(uint64_t a, uint64_t b) { return a > UINT64_MAX - b ? UINT64_MAX : a + b; }
 
-typedef enum room { ROOM_MADE, ROOM_LATER, ROOM_NEVER } room;
+typedef enum capacity { ROOM_MADE, ROOM_LATER, ROOM_NEVER } capacity;
 
 /* Reserves d->peak, dropping the least recently used items. ROOM_LATER: when loads under way end.
  */
-static room make_room(ebpo_cache *c, const demand *d)
+static capacity make_room(ebpo_cache *c, const demand *d)
 {
     while (c->budget && sum(c->stats.bytes, d->peak) > c->budget) {
         uint64_t held = sum(sum(c->pinned, kept_for(c, d)), d->peak);
@@ -143,7 +143,7 @@ static ebpo_status wait_for_room(ebpo_cache *c, uint64_t peak, ebpo_error *error
 {
     demand d = { .peak = peak };
     uint64_t ticket = c->tickets++;
-    room got = ROOM_LATER;
+    capacity got = ROOM_LATER;
     while (ticket != c->serving || (got = make_room(c, &d)) == ROOM_LATER)
         pthread_cond_wait(&c->changed, &c->lock);
     c->serving++;
@@ -341,7 +341,7 @@ static bool load_ahead(ebpo_cache *c, demand *d)
         d->known = estimate(c, d->key, &d->peak, NULL) == EBPO_OK;
         pthread_mutex_lock(&c->lock);
     }
-    room got = !d->known ? ROOM_NEVER : c->serving != c->tickets ? ROOM_LATER : make_room(c, d);
+    capacity got = !d->known ? ROOM_NEVER : c->serving != c->tickets ? ROOM_LATER : make_room(c, d);
     if (got != ROOM_MADE) {
         end_load(c, s, false, 0, 0);
         return got == ROOM_NEVER;

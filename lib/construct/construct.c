@@ -37,12 +37,13 @@ static int level_limit(const ebpo_mesh_report *report)
     return level;
 }
 
-static ebpo_status check_text(const char *name, const char *text, size_t room, ebpo_error *error)
+static ebpo_status check_text(const char *name, const char *text, size_t capacity,
+                              ebpo_error *error)
 {
     if (!text)
         return EBPO_OK;
-    if (strlen(text) >= room)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s is longer than %zu bytes", name, room - 1);
+    if (strlen(text) >= capacity)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s is longer than %zu bytes", name, capacity - 1);
     for (const unsigned char *c = (const unsigned char *)text; *c; c++)
         if (*c < 32 || *c == 127)
             return ebpo_fail(error, EBPO_E_ARGUMENT, "%s holds a control character", name);

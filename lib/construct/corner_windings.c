@@ -9,7 +9,7 @@
 #include "base/error.h"
 
 void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell,
-                         const uint32_t *places, uint64_t count, ebpo_triangle *room,
+                         const uint32_t *places, uint64_t count, ebpo_triangle *capacity,
                          int32_t delta[8])
 {
     memset(delta, 0, 8 * sizeof *delta);
@@ -19,8 +19,8 @@ void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell 
         int32_t own[8];
         for (uint64_t i = 0; i < part; i++)
             ebpo_branch_triangle(b, s, places ? places[first + i] : (uint32_t)(first + i),
-                                 &room[i]);
-        ebpo_corner_windings(&b->box, cell, room, part, own);
+                                 &capacity[i]);
+        ebpo_corner_windings(&b->box, cell, capacity, part, own);
         for (int i = 0; i < 8; i++)
             delta[i] += own[i];
     }

@@ -12,10 +12,10 @@ void ebpo_child_windings(const ebpo_builder *b, const ebpo_branch *s, uint32_t c
                          int32_t offset[8]);
 /* The corner differences of a cell from the branch's faces that touch it: list[places[i]], or with
  * NULL the first `count` of the list. Long lists are processed EBPO_CORNER_FACES at a time, so
- * `room` needs the lesser of that and `count`. */
+ * `capacity` needs the lesser of that and `count`. */
 enum { EBPO_CORNER_FACES = 1 << 14 };
 void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell,
-                         const uint32_t *places, uint64_t count, ebpo_triangle *room,
+                         const uint32_t *places, uint64_t count, ebpo_triangle *capacity,
                          int32_t delta[8]);
 /* A gray node's own corner differences from its children's. Crossings along any way between two
  * corners agree when the mesh balances: false when they do not. */

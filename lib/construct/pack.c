@@ -21,12 +21,12 @@ struct ebpo_store {
     size_t last_bytes;
 };
 
-static size_t room_for(uint64_t count, size_t size)
+static size_t reserve_for(uint64_t count, size_t size)
 {
     return (count * size + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
 }
 
-static char *take_room(ebpo_builder *b, struct ebpo_store *s, size_t bytes)
+static char *take_capacity(ebpo_builder *b, struct ebpo_store *s, size_t bytes)
 {
     if (!s->block_count || bytes > s->left) {
         size_t block = bytes > STORE_BYTES ? bytes : STORE_BYTES;
@@ -59,20 +59,21 @@ static bool make_store(ebpo_builder *b)
 static char *reserve(ebpo_builder *b, size_t bytes)
 {
     pthread_mutex_lock(&b->store->lock);
-    char *at = take_room(b, b->store, bytes);
+    char *at = take_capacity(b, b->store, bytes);
     pthread_mutex_unlock(&b->store->lock);
     return at;
 }
 
 void *ebpo_store_reserve(ebpo_builder *b, uint64_t bytes)
 {
-    return make_store(b) ? reserve(b, room_for(bytes, 1)) : NULL;
+    return make_store(b) ? reserve(b, reserve_for(bytes, 1)) : NULL;
 }
 
-static size_t room_of(const ebpo_level *level, int id)
+static size_t capacity_of(const ebpo_level *level, int id)
 {
-    return ebpo_schema_is_held(id) ? room_for(ebpo_level_rows(level, id), ebpo_schema[id].held_size)
-                                   : 0;
+    return ebpo_schema_is_held(id)
+               ? reserve_for(ebpo_level_rows(level, id), ebpo_schema[id].held_size)
+               : 0;
 }
 
 static void pack_array(const ebpo_builder *b, ebpo_level *level, int id, char *to)
@@ -92,7 +93,7 @@ ebpo_status ebpo_build_pack(ebpo_builder *b, ebpo_piece_level *out, ebpo_error *
         return EBPO_OK;
     for (int level = 0; level < EBPO_LEVELS_MAX; level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
-            bytes += room_of(&out[level].level, id);
+            bytes += capacity_of(&out[level].level, id);
     char *to = ebpo_store_reserve(b, bytes);
     if (!to)
         return ebpo_workspace_fail(b->workspace, bytes, error);
@@ -100,7 +101,7 @@ ebpo_status ebpo_build_pack(ebpo_builder *b, ebpo_piece_level *out, ebpo_error *
         for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
             if (ebpo_schema_is_held(id)) {
                 pack_array(b, &out[level].level, id, to);
-                to += room_of(&out[level].level, id);
+                to += capacity_of(&out[level].level, id);
             }
         out[level].packed = true;
     }

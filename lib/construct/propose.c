@@ -31,7 +31,7 @@ typedef struct top_node {
 typedef struct top_list {
     ebpo_builder *b;
     top_node *nodes;
-    uint64_t count, room, base;
+    uint64_t count, capacity, base;
 } top_list;
 
 /* Breadth first, so that a level's nodes are one stretch; windings come down on the way. */
@@ -40,7 +40,7 @@ static bool list_top(top_list *t)
     ebpo_builder *b = t->b;
     if (b->top.nodes[0].type == EBPO_LEAF)
         return true;
-    if (!ebpo_grow(&t->nodes, &t->room, 1, sizeof *t->nodes))
+    if (!ebpo_grow(&t->nodes, &t->capacity, 1, sizeof *t->nodes))
         return false;
     t->nodes[t->count++] = (top_node){ .cell = b->top.cell, .parent = UINT64_MAX };
     for (uint64_t i = 0; i < t->count; i++) {
@@ -54,7 +54,7 @@ static bool list_top(top_list *t)
                 b->sub[child->detail].winding = winding;
             if (child->type != EBPO_GRAY)
                 continue;
-            if (!ebpo_grow(&t->nodes, &t->room, t->count + 1, sizeof *t->nodes))
+            if (!ebpo_grow(&t->nodes, &t->capacity, t->count + 1, sizeof *t->nodes))
                 return false;
             t->nodes[t->count++] = (top_node){ .node = node->child + o,
                                                .cell = ebpo_cell_child(t->nodes[i].cell, o),

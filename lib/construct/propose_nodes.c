@@ -29,7 +29,7 @@ typedef struct proposer {
     const ebpo_selection_method *method;
     ebpo_supports supports;
     ebpo_candidate *candidates;
-    uint64_t candidate_room;
+    uint64_t candidate_capacity;
 } proposer;
 
 /* --- choosing, for leaves and gray nodes alike --- */
@@ -68,7 +68,7 @@ static bool make_candidates(proposer *p, ebpo_handover *given)
     for (uint64_t i = 0; i < kept; i += step)
         given->offers[given->offer_count++] = given->offers[i];
     kept = given->offer_count;
-    if (!ebpo_grow(&p->candidates, &p->candidate_room, kept, sizeof *p->candidates))
+    if (!ebpo_grow(&p->candidates, &p->candidate_capacity, kept, sizeof *p->candidates))
         return false;
     for (uint64_t i = 0; i < kept; i++)
         p->candidates[i] = (ebpo_candidate){ .normal = given->offers[i].normal, .support = -1e300 };

@@ -9,21 +9,21 @@
 
 static const uint32_t FREE = UINT32_MAX;
 
-ebpo_status ebpo_compact_make(ebpo_compact *out, uint64_t room, ebpo_error *error)
+ebpo_status ebpo_compact_make(ebpo_compact *out, uint64_t capacity, ebpo_error *error)
 {
     *out = (ebpo_compact){ .mask = 0 };
-    if (room > UINT64_C(1) << 31)
+    if (capacity > UINT64_C(1) << 31)
         return ebpo_fail(
             error, EBPO_E_LIMIT,
             "%llu references in one subtree are more than can be numbered; choose a deeper level",
-            (unsigned long long)room);
-    uint64_t slots = ebpo_hash_slots(2 * room);
+            (unsigned long long)capacity);
+    uint64_t slots = ebpo_hash_slots(2 * capacity);
     out->mask = slots - 1;
     out->slot = ebpo_alloc(slots, sizeof *out->slot);
-    out->sorted = ebpo_alloc(room, sizeof *out->sorted);
+    out->sorted = ebpo_alloc(capacity, sizeof *out->sorted);
     if (!out->slot || !out->sorted) {
         ebpo_compact_free(out);
-        return ebpo_fail_memory(error, slots * sizeof *out->slot + room * sizeof *out->sorted);
+        return ebpo_fail_memory(error, slots * sizeof *out->slot + capacity * sizeof *out->sorted);
     }
     memset(out->slot, 0xff, slots * sizeof *out->slot);
     return EBPO_OK;

@@ -14,8 +14,9 @@ typedef struct ebpo_compact {
     uint64_t count;
 } ebpo_compact;
 
-/* For at most `room` calls of add. Numbers are below 2^32 - 1. */
-EBPO_MUST_USE ebpo_status ebpo_compact_make(ebpo_compact *out, uint64_t room, ebpo_error *error);
+/* For at most `capacity` calls of add. Numbers are below 2^32 - 1. */
+EBPO_MUST_USE ebpo_status ebpo_compact_make(ebpo_compact *out, uint64_t capacity,
+                                            ebpo_error *error);
 void ebpo_compact_free(ebpo_compact *compact);
 void ebpo_compact_add(ebpo_compact *compact, uint32_t number);
 /* After the last add: sorts. */

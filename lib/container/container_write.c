@@ -141,12 +141,12 @@ static void close_handles(writer *w)
 static ebpo_status measure_metadata(writer *w, const char *shown, ebpo_error *error)
 {
     ebpo_plan *plan = &w->plan;
-    uint64_t room = (256 << 10) + (4 << 10) * (uint64_t)plan->count + 32 * w->chunks, headers = 0,
-             all = 0;
+    uint64_t capacity = (256 << 10) + (4 << 10) * (uint64_t)plan->count + 32 * w->chunks,
+             headers = 0, all = 0;
     bool indexed = false;
-    ebpo_status status = lay_out(w, NULL, shown, room, (first_chunk){ "", 1 }, error);
+    ebpo_status status = lay_out(w, NULL, shown, capacity, (first_chunk){ "", 1 }, error);
     if (status == EBPO_OK)
-        status = ebpo_h5_head_used(&w->out, room, &headers, error);
+        status = ebpo_h5_head_used(&w->out, capacity, &headers, error);
     for (unsigned i = 0; i < plan->count && status == EBPO_OK; i++) {
         const ebpo_array_out *a = &plan->array[i];
         indexed = indexed || ebpo_h5_chunk_count(&a->shape) > 1;
@@ -155,7 +155,7 @@ static ebpo_status measure_metadata(writer *w, const char *shown, ebpo_error *er
     }
     close_handles(w);
     if (status == EBPO_OK)
-        status = ebpo_h5_head_used(&w->out, room, &all, error);
+        status = ebpo_h5_head_used(&w->out, capacity, &all, error);
     ebpo_h5_discard(&w->out);
     w->head_bytes = (headers + 8 + 7) / 8 * 8; /* the last checksum may end in zero bytes */
     if (plan->count == 1)

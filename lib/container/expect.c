@@ -9,7 +9,7 @@ static void add(ebpo_expected *e, uint64_t offset, uint64_t size)
     ebpo_range *last = e->count ? &e->range[e->count - 1] : NULL;
     if (last && last->offset + last->size == offset)
         last->size += size;
-    else if (ebpo_grow(&e->range, &e->room, e->count + 1,
+    else if (ebpo_grow(&e->range, &e->capacity, e->count + 1,
                        sizeof *e->range)) /* else it is read without having been announced */
         e->range[e->count++] = (ebpo_range){ offset, size };
 }

@@ -37,19 +37,20 @@ void ebpo_chunk_reader_clear(ebpo_chunk_reader *reader)
     reader->capacity = 0;
 }
 
-/* Bytes [address, address + bytes) of the file to reader->stored, with room for at least `room`. */
+/* Bytes [address, address + bytes) of the file to reader->stored, with room for at least
+ * `capacity`. */
 static ebpo_status fetch(const ebpo_file *file, ebpo_chunk_reader *reader, uint64_t address,
-                         size_t bytes, size_t room, ebpo_error *error)
+                         size_t bytes, size_t capacity, ebpo_error *error)
 {
-    if (room < bytes)
-        room = bytes;
-    if (reader->capacity < room) {
+    if (capacity < bytes)
+        capacity = bytes;
+    if (reader->capacity < capacity) {
         free(reader->stored);
-        reader->stored = ebpo_alloc(room, 1);
-        reader->capacity = reader->stored ? room : 0;
+        reader->stored = ebpo_alloc(capacity, 1);
+        reader->capacity = reader->stored ? capacity : 0;
     }
     if (!reader->stored)
-        return ebpo_fail_memory(error, room);
+        return ebpo_fail_memory(error, capacity);
     return ebpo_input_read(&ebpo_reader_own(file)->in, address, bytes, reader->stored, error);
 }
 

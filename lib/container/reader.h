@@ -14,7 +14,7 @@
 typedef struct ebpo_expected {
     const ebpo_file *file;
     ebpo_range *range;
-    uint64_t count, room;
+    uint64_t count, capacity;
     bool failed; /* where chunks lie could not be read */
 } ebpo_expected;
 #define EBPO_EXPECTED_INIT(file) \

@@ -59,11 +59,11 @@ static ebpo_status gather(ebpo_chunks *chunks, ebpo_array_id id, size_t row_byte
 
 static ebpo_status collect_outer(ebpo_slice *slice, ebpo_compact *outer, ebpo_error *error)
 {
-    uint64_t room = 0;
+    uint64_t capacity = 0;
     for (int i = 0; i < slice->level_count; i++)
         for (uint64_t k = 0; k < slice->level[i].ref_count; k++)
-            room += slice->level[i].leaf_refs[k] < slice->first_face;
-    ebpo_status status = ebpo_compact_make(outer, room, error);
+            capacity += slice->level[i].leaf_refs[k] < slice->first_face;
+    ebpo_status status = ebpo_compact_make(outer, capacity, error);
     if (status != EBPO_OK)
         return status;
     for (int i = 0; i < slice->level_count; i++)
@@ -137,10 +137,10 @@ static ebpo_status new_vertices(ebpo_slice *slice, ebpo_chunks *chunks, uint64_t
 static ebpo_status collect_older(const ebpo_mesh *mesh, uint64_t begin, ebpo_compact *older,
                                  ebpo_error *error)
 {
-    uint64_t room = 0, corners = 3 * mesh->face_count;
+    uint64_t capacity = 0, corners = 3 * mesh->face_count;
     for (uint64_t i = 0; i < corners; i++)
-        room += mesh->faces[i] < begin;
-    ebpo_status status = ebpo_compact_make(older, room, error);
+        capacity += mesh->faces[i] < begin;
+    ebpo_status status = ebpo_compact_make(older, capacity, error);
     for (uint64_t i = 0; i < corners && status == EBPO_OK; i++)
         if (mesh->faces[i] < begin)
             ebpo_compact_add(older, mesh->faces[i]);

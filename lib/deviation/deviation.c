@@ -29,7 +29,7 @@ typedef struct survey {
     const ebpo_lod_model *tree, *whole; /* of the file, of the model's file; perhaps the same */
     int level;
     level_node *nodes;
-    uint64_t count, room, *order;
+    uint64_t count, capacity, *order;
     ebpo_bounder *bounders; /* [threads] */
     unsigned threads;
     ebpo_bound_goal goal;
@@ -42,7 +42,7 @@ typedef struct survey {
 
 static ebpo_status add_node(survey *s, const ebpo_node *node)
 {
-    if (!ebpo_grow(&s->nodes, &s->room, s->count + 1, sizeof *s->nodes))
+    if (!ebpo_grow(&s->nodes, &s->capacity, s->count + 1, sizeof *s->nodes))
         return ebpo_fail_memory(s->error, (s->count + 1) * sizeof *s->nodes);
     s->nodes[s->count++] = (level_node){ node->cell, { 0, INFINITY, { 0, 0, 0 }, 0 } };
     return EBPO_OK;

@@ -16,21 +16,22 @@ const char *ebpo_export_format_name(ebpo_export_format format)
     return (unsigned)format < sizeof names / sizeof *names ? names[format] : NULL;
 }
 
-bool ebpo_export_second_file(ebpo_export_format format, const char *path, char *out, size_t room)
+bool ebpo_export_second_file(ebpo_export_format format, const char *path, char *out,
+                             size_t capacity)
 {
     const char *name = ebpo_path_name(path), *dot = strrchr(name, '.');
     int length = -1;
-    if (room)
+    if (capacity)
         *out = 0;
     if (format == EBPO_EXPORT_XDMF) /* readers take what follows the first ":" as the path within
                                        the HDF5 file */
-        length = strchr(name, ':') ? -1 : snprintf(out, room, "%s.h5", path);
+        length = strchr(name, ':') ? -1 : snprintf(out, capacity, "%s.h5", path);
     else if (format == EBPO_EXPORT_GLTF)
-        length = snprintf(out, room, "%.*s.bin",
+        length = snprintf(out, capacity, "%.*s.bin",
                           (int)(dot && dot != name ? dot - path : (int)strlen(path)), path);
     else
         return true;
-    return length >= 0 && (size_t)length < room;
+    return length >= 0 && (size_t)length < capacity;
 }
 
 static ebpo_status check(const ebpo_info *info, ebpo_export_format format,

@@ -82,7 +82,7 @@ static int older(const void *a, const void *b)
 static entry *list(const ebpo_disk *d, uint64_t *count, uint64_t *bytes)
 {
     entry *entries = NULL;
-    uint64_t room = 0;
+    uint64_t capacity = 0;
     int fd = openat(d->folder, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     DIR *folder = fd < 0 ? NULL : fdopendir(fd);
     *count = *bytes = 0;
@@ -100,7 +100,7 @@ static entry *list(const ebpo_disk *d, uint64_t *count, uint64_t *bytes)
                 unlinkat(d->folder, f->d_name, 0);
             continue;
         }
-        if (!ebpo_grow(&entries, &room, *count + 1, sizeof *entries))
+        if (!ebpo_grow(&entries, &capacity, *count + 1, sizeof *entries))
             break;
         entry *e = &entries[(*count)++];
         e->used = st.st_mtim;

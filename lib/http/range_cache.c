@@ -73,7 +73,7 @@ static void remove_at(ebpo_range_cache *p, uint64_t i)
 static bool insert(ebpo_range_cache *p, uint64_t i, uint64_t begin, uint64_t end)
 {
     ebpo_cached_range *piece = ebpo_alloc_zero(1, sizeof *piece);
-    if (!piece || !ebpo_grow(&p->piece, &p->room, p->count + 1, sizeof *p->piece)) {
+    if (!piece || !ebpo_grow(&p->piece, &p->capacity, p->count + 1, sizeof *p->piece)) {
         free(piece);
         return false;
     }
@@ -479,5 +479,5 @@ void ebpo_range_cache_clear(ebpo_range_cache *p)
     }
     free(p->piece);
     p->piece = NULL;
-    p->count = p->room = p->held = 0;
+    p->count = p->capacity = p->held = 0;
 }

@@ -19,7 +19,7 @@ typedef struct ebpo_range_cache {
     uint64_t begin, size;      /* pieces lie within [begin, size) */
     uint64_t held_limit;       /* bytes of pieces; readers that wait may go above it */
     ebpo_cached_range **piece; /* [count] by offset, without overlaps */
-    uint64_t count, room;
+    uint64_t count, capacity;
     /* bytes of fetched pieces and those under way; announcements that brought something new */
     uint64_t held, plan;
     uint64_t clock; /* of reads */

@@ -26,7 +26,7 @@ typedef struct ebpo_request {
     struct ebpo_request *next;
     unsigned failures;
     double due, deadline; /* seconds; deadline 0: nobody waits and nothing was sent yet */
-    uint64_t whole_room;
+    uint64_t whole_capacity;
 } ebpo_request;
 
 #endif

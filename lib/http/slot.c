@@ -73,8 +73,8 @@ static size_t refuse(ebpo_slot *s, ebpo_status status, const char *why)
 
 static size_t take_part(ebpo_slot *s, const char *bytes, size_t size)
 {
-    uint64_t room = s->answer.last + 1 - s->begin - s->taken;
-    if (size > room)
+    uint64_t capacity = s->answer.last + 1 - s->begin - s->taken;
+    if (size > capacity)
         return refuse(s, EBPO_E_IO,
                       "the server sent more bytes than it was asked for and than it said; this "
                       "server or a proxy on the way is broken");
@@ -90,7 +90,7 @@ static size_t take_whole(ebpo_slot *s, const char *bytes, size_t size)
         return refuse(s, EBPO_E_UNSUPPORTED,
                       "the server has no byte ranges, and the file is larger than what would be "
                       "read as a whole; download the file, or use a server with ranges");
-    if (!ebpo_grow(&r->whole, &r->whole_room, s->taken + size, 1))
+    if (!ebpo_grow(&r->whole, &r->whole_capacity, s->taken + size, 1))
         return refuse(s, EBPO_E_MEMORY, "out of memory");
     memcpy(r->whole + s->taken, bytes, size);
     s->taken += size;

@@ -253,23 +253,24 @@ static bool keep(ebpo_slot *s, CURLcode code)
     }
     free(r->whole); /* an earlier answer began to send everything */
     r->whole = NULL;
-    r->whole_room = 0;
+    r->whole_capacity = 0;
     r->got = s->begin - r->offset + s->taken;
     return r->got == r->size;
 }
 
-static void describe(const ebpo_slot *s, CURLcode code, char *out, size_t room)
+static void describe(const ebpo_slot *s, CURLcode code, char *out, size_t capacity)
 {
     const char *trouble = *s->trouble ? s->trouble : curl_easy_strerror(code);
     if (s->judged && s->verdict == EBPO_ANSWER_LATER)
-        snprintf(out, room, "%s", s->why);
+        snprintf(out, capacity, "%s", s->why);
     else if (s->stalled)
-        snprintf(out, room, "the server sent nothing for %g s", s->owner->options->stall_timeout);
+        snprintf(out, capacity, "the server sent nothing for %g s",
+                 s->owner->options->stall_timeout);
     else if (code == CURLE_OK)
-        snprintf(out, room, "the server sent %" PRIu64 " bytes of %" PRIu64, s->taken,
+        snprintf(out, capacity, "the server sent %" PRIu64 " bytes of %" PRIu64, s->taken,
                  s->end - s->begin);
     else
-        snprintf(out, room, "%s", trouble);
+        snprintf(out, capacity, "%s", trouble);
 }
 
 /* Whether the rest may come in another answer: not if a change of version would go unnoticed. */

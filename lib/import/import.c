@@ -223,24 +223,24 @@ typedef struct polygon_capacity {
     void *scratch;
 } polygon_capacity;
 
-static bool polygon_room_get(polygon_capacity *room, uint64_t corners)
+static bool polygon_buffers_get(polygon_capacity *capacity, uint64_t corners)
 {
-    room->position = ebpo_alloc(corners, sizeof *room->position);
-    room->triangle = ebpo_alloc(corners, sizeof *room->triangle);
-    room->scratch = ebpo_alloc(ebpo_polygon_scratch_bytes(corners), 1);
-    return room->position && room->triangle && room->scratch;
+    capacity->position = ebpo_alloc(corners, sizeof *capacity->position);
+    capacity->triangle = ebpo_alloc(corners, sizeof *capacity->triangle);
+    capacity->scratch = ebpo_alloc(ebpo_polygon_scratch_bytes(corners), 1);
+    return capacity->position && capacity->triangle && capacity->scratch;
 }
 
-static void polygon_room_free(polygon_capacity *room)
+static void polygon_buffers_free(polygon_capacity *capacity)
 {
-    free(room->position);
-    free(room->triangle);
-    free(room->scratch);
+    free(capacity->position);
+    free(capacity->triangle);
+    free(capacity->scratch);
 }
 
 /* `map`: from this assimp mesh's vertices to ours. */
 static ebpo_status add_face(ebpo_mesh *mesh, const struct aiFace *face, const uint32_t *map,
-                            const polygon_capacity *room, const char *name, ebpo_error *error)
+                            const polygon_capacity *capacity, const char *name, ebpo_error *error)
 {
     uint32_t n = face->mNumIndices;
     if (n < 3) {
@@ -249,11 +249,11 @@ static ebpo_status add_face(ebpo_mesh *mesh, const struct aiFace *face, const ui
     }
     for (uint32_t i = 0; i < n; i++)
         for (int k = 0; k < 3; k++)
-            room->position[i][k] =
+            capacity->position[i][k] =
                 (double)mesh->xyz32[3 * (uint64_t)map[face->mIndices[i]] + (uint64_t)k];
     ebpo_polygon_kind kind =
-        ebpo_polygon_triangulate(room->triangle, (const double(*)[3])room->position, n,
-                                 room->scratch);
+        ebpo_polygon_triangulate(capacity->triangle, (const double(*)[3])capacity->position, n,
+                                 capacity->scratch);
     if (kind == EBPO_POLYGON_TOO_LARGE)
         return ebpo_fail_file(
             error, EBPO_E_LIMIT, name,
@@ -265,19 +265,19 @@ static ebpo_status add_face(ebpo_mesh *mesh, const struct aiFace *face, const ui
     for (uint32_t i = 0; i < n - 2; i++)
         for (int k = 0; k < 3; k++)
             mesh->faces[3 * (mesh->face_count + i) + (uint64_t)k] =
-                map[face->mIndices[room->triangle[i][k]]];
+                map[face->mIndices[capacity->triangle[i][k]]];
     mesh->face_count += n - 2;
     return EBPO_OK;
 }
 
 static ebpo_status add_faces(ebpo_mesh *mesh, const struct aiScene *scene, const uint32_t *map,
-                             const polygon_capacity *room, const char *name, ebpo_error *error)
+                             const polygon_capacity *capacity, const char *name, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (unsigned i = 0; i < scene->mNumMeshes; i++) {
         const struct aiMesh *m = scene->mMeshes[i];
         for (unsigned k = 0; k < m->mNumFaces && status == EBPO_OK; k++)
-            status = add_face(mesh, &m->mFaces[k], map, room, name, error);
+            status = add_face(mesh, &m->mFaces[k], map, capacity, name, error);
         map += m->mNumVertices;
     }
     return status;
@@ -290,7 +290,7 @@ static ebpo_status convert(ebpo_mesh *mesh, const struct aiScene *scene, const c
                            ebpo_error *error)
 {
     totals t = { 0, 0, 3 };
-    polygon_capacity room = { NULL, NULL, NULL };
+    polygon_capacity capacity = { NULL, NULL, NULL };
     uint32_t *map = NULL;
     float *smaller;
     ebpo_status status = scene_totals(&t, scene, name, error);
@@ -299,7 +299,7 @@ static ebpo_status convert(ebpo_mesh *mesh, const struct aiScene *scene, const c
     mesh->xyz32 = ebpo_array_alloc(mesh->workspace, t.vertices, 3 * sizeof *mesh->xyz32);
     mesh->faces = ebpo_array_alloc(mesh->workspace, t.triangles, 3 * sizeof *mesh->faces);
     map = ebpo_alloc(t.vertices, sizeof *map);
-    if (!mesh->xyz32 || !mesh->faces || !map || !polygon_room_get(&room, t.most_corners)) {
+    if (!mesh->xyz32 || !mesh->faces || !map || !polygon_buffers_get(&capacity, t.most_corners)) {
         status = ebpo_workspace_fail(mesh->workspace, t.vertices * 16 + t.triangles * 12, error);
         goto done;
     }
@@ -307,14 +307,14 @@ static ebpo_status convert(ebpo_mesh *mesh, const struct aiScene *scene, const c
     status = ebpo_import_weld(mesh->xyz32, t.vertices, map, &mesh->vertex_count, error);
     if (status != EBPO_OK)
         goto done;
-    status = add_faces(mesh, scene, map, &room, name, error);
+    status = add_faces(mesh, scene, map, &capacity, name, error);
     smaller = mesh->workspace
                   ? NULL
                   : ebpo_realloc(mesh->xyz32, mesh->vertex_count, 3 * sizeof *mesh->xyz32);
     if (smaller)
         mesh->xyz32 = smaller;
 done:
-    polygon_room_free(&room);
+    polygon_buffers_free(&capacity);
     free(map);
     return status;
 }

@@ -24,7 +24,7 @@ typedef struct scratch {
     uint32_t *list;
     ebpo_triangle *faces;
     double *points;
-    uint64_t list_count, list_capacity, faces_room, point_count, points_room;
+    uint64_t list_count, list_capacity, faces_capacity, point_count, points_capacity;
     ebpo_limit sum;
 } scratch;
 
@@ -106,7 +106,7 @@ static bool take_faces(const job *j, scratch *s)
         if (i == 0 || s->list[i] != s->list[i - 1])
             s->list[kept++] = s->list[i];
     s->list_count = kept;
-    if (!ebpo_grow(&s->faces, &s->faces_room, kept, sizeof *s->faces))
+    if (!ebpo_grow(&s->faces, &s->faces_capacity, kept, sizeof *s->faces))
         return false;
     for (uint64_t i = 0; i < kept; i++)
         for (uint64_t c = 0; c < 3; c++) {
@@ -135,7 +135,7 @@ static bool add_corners(const job *j, scratch *s, const ebpo_node *w)
         return true;
     int32_t delta[8], lowest = lowest_winding(j, *w);
     ebpo_corner_windings(&m->box, w->cell, s->faces, s->list_count, delta);
-    if (!ebpo_grow(&s->points, &s->points_room, s->point_count + 8, 3 * sizeof *s->points))
+    if (!ebpo_grow(&s->points, &s->points_capacity, s->point_count + 8, 3 * sizeof *s->points))
         return false;
     for (int i = 0; i < 8; i++)
         if (ebpo_rule_inside(m->info->rule, lowest + delta[i])) {
@@ -147,7 +147,7 @@ static bool add_corners(const job *j, scratch *s, const ebpo_node *w)
 
 static bool add_faces(const job *j, scratch *s, ebpo_cell cell)
 {
-    if (!ebpo_grow(&s->points, &s->points_room, s->point_count + 9 * s->list_count,
+    if (!ebpo_grow(&s->points, &s->points_capacity, s->point_count + 9 * s->list_count,
                    3 * sizeof *s->points))
         return false;
     for (uint64_t i = 0; i < s->list_count; i++) {

@@ -32,7 +32,7 @@ ebpo_status ebpo_lod_leaf_faces(const ebpo_lod_model *model, ebpo_cell cell, uin
         return ebpo_fail(error, EBPO_E_FORMAT,
                          "level %d: its leaves have no face lists; run ebpo verify", cell.level);
     uint64_t refs = level->leaf_ref_count[leaf], fresh = level->leaf_new[leaf];
-    if (!ebpo_grow(&scratch->faces, &scratch->room, refs + fresh, sizeof *scratch->faces))
+    if (!ebpo_grow(&scratch->faces, &scratch->capacity, refs + fresh, sizeof *scratch->faces))
         return ebpo_fail_memory(error, (refs + fresh) * sizeof *scratch->faces);
     const uint32_t *ref =
         level->leaf_refs ? level->leaf_refs + model->ranks[cell.level].ref_first[leaf] : NULL;

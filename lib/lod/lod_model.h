@@ -41,7 +41,7 @@ static inline ebpo_level_nodes ebpo_lod_model_nodes(const ebpo_lod_model *model)
 /* Room for the faces of one leaf; one for each thread, zero-initialised, freed with free(faces). */
 typedef struct ebpo_leaf_scratch {
     ebpo_triangle *faces;
-    uint64_t room;
+    uint64_t capacity;
 } ebpo_leaf_scratch;
 
 /* Cuts `envelope` (on entry the parent's in this cell) to that of leaf number `leaf` of the cell's

@@ -27,7 +27,7 @@ typedef struct scratch {
     ebpo_boundary boundary;
     double (*point)[3];
     uint32_t (*triangles)[3];
-    uint64_t point_room, triangle_room;
+    uint64_t point_capacity, triangle_capacity;
     /* the loop's vertices, for looking them up */
     placed sorted[EBPO_OPTIMAL_CHAIN];
     uint8_t taken[EBPO_OPTIMAL_CHAIN * EBPO_OPTIMAL_CHAIN];
@@ -119,8 +119,8 @@ static bool fill_loop(filling *f, scratch *s, uint64_t number)
     const uint32_t *loop = f->loops.vertex + f->loops.first[number];
     uint32_t n = (uint32_t)(f->loops.first[number + 1] - f->loops.first[number]);
     ebpo_workspace *workspace = f->mesh->workspace;
-    if (!ebpo_array_grow(workspace, &s->point, &s->point_room, n, sizeof *s->point) ||
-        !ebpo_array_grow(workspace, &s->triangles, &s->triangle_room, n, sizeof *s->triangles))
+    if (!ebpo_array_grow(workspace, &s->point, &s->point_capacity, n, sizeof *s->point) ||
+        !ebpo_array_grow(workspace, &s->triangles, &s->triangle_capacity, n, sizeof *s->triangles))
         return false;
     EBPO_FOR_ITEMS_SCATTERED(workspace, i, 0, n)
         ebpo_mesh_position(f->mesh, loop[i], s->point[i]);

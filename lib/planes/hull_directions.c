@@ -24,7 +24,7 @@ typedef struct hull {
     double nx[ROOM + 4], ny[ROOM + 4], nz[ROOM + 4], d[ROOM + 4];
     double length[ROOM], beyond;
     uint16_t corner[ROOM][3];
-    int count, room;
+    int count, capacity;
 } hull;
 
 static void cross_of(const double (*p)[3], int a, int b, int c, double n[3])
@@ -211,7 +211,7 @@ static bool add_point(hull *h, int point)
     for (int i = 0; i < listed; i++) {
         if (has(edges, (listed + 3) / 4, twins[i]))
             continue;
-        if (made >= seen && count == h->room)
+        if (made >= seen && count == h->capacity)
             return false;
         int place = made < seen ? visible[made] : count;
         if (!make_facet(h, place, (int)(edges[i] >> 16), (int)(edges[i] & 0xffff), point))
@@ -236,16 +236,16 @@ static void grow_hull(hull *h, int count, const int ways[WAYS])
 }
 
 int ebpo_hull_facets(const double (*points)[3], int count, double tolerance,
-                     ebpo_hull_facet *facets, int room)
+                     ebpo_hull_facet *facets, int capacity)
 {
     hull h;
     int corner[4], ways[WAYS];
     h.sweep = ebpo_sweep_best();
     h.p = points;
     h.count = 0;
-    h.room = room < ROOM ? room : ROOM;
+    h.capacity = capacity < ROOM ? capacity : ROOM;
     h.beyond = tolerance;
-    if (count < 4 || room < 4 || count > EBPO_HULL_POINTS)
+    if (count < 4 || capacity < 4 || count > EBPO_HULL_POINTS)
         return 0;
     extremes(points, count, ways);
     if (!first_four(points, count, ways, corner) || !first_facets(&h, corner))

@@ -28,9 +28,9 @@ typedef struct ebpo_sweep_points {
 
 typedef struct ebpo_sweep {
     /* Planes that p lies above by more than `above`, if it is beyond any by more than `beyond`
-     * (else none): writes the first `room` numbers and returns how many there are. */
+     * (else none): writes the first `capacity` numbers and returns how many there are. */
     int (*seen)(const ebpo_sweep_planes *planes, const double p[3], double beyond, double above,
-                uint16_t *list, int room);
+                uint16_t *list, int capacity);
     /* Raises *best to the greatest value among the points; ends when it has reached `enough`.
      * Returns the first point's number of the stretch that the value is from; UINT64_MAX: none is
      * greater. */

@@ -53,7 +53,7 @@ static void add_triangle(ebpo_mesh *mesh, uint32_t a, uint32_t b, uint32_t c)
 
 /* Scratch holds, one behind the other: corner positions, triangles, and what the triangulation asks
  * for. */
-static ebpo_status scratch_room(ply_parser *p, uint64_t n)
+static ebpo_status scratch_capacity(ply_parser *p, uint64_t n)
 {
     uint64_t each = 3 * sizeof(double) + 3 * sizeof(uint32_t) + sizeof(uint32_t), bytes;
     if (!ebpo_mul_ok(n, each, &bytes) ||
@@ -73,7 +73,7 @@ static void corner_position(const ebpo_mesh *mesh, uint32_t vertex, double out[3
 
 static ebpo_status triangulate(ply_parser *p, uint32_t n, uint64_t row)
 {
-    ebpo_status status = scratch_room(p, n);
+    ebpo_status status = scratch_capacity(p, n);
     if (status == EBPO_OK)
         status = face_capacity(p, n - 2);
     if (status != EBPO_OK)

@@ -23,7 +23,7 @@ typedef struct gathering {
     ebpo_context *context;
     const double *min, *max;
     pair *list;
-    uint64_t count, room;
+    uint64_t count, capacity;
     bool no_memory;
 } gathering;
 
@@ -37,7 +37,7 @@ static void try_block(gathering *g, const ebpo_subtree *s, uint32_t block)
         ebpo_subtree_triangle(s, slot, t);
         if (!ebpo_triangle_meets_box((const double(*)[3])t, g->min, g->max))
             continue;
-        g->no_memory = !ebpo_grow(&g->list, &g->room, g->count + 1, sizeof *g->list);
+        g->no_memory = !ebpo_grow(&g->list, &g->capacity, g->count + 1, sizeof *g->list);
         if (!g->no_memory)
             g->list[g->count++] =
                 (pair){ ebpo_subtree_file_face(s, local), ebpo_subtree_source_face(s, local) };

@@ -27,7 +27,7 @@ typedef struct casting {
     double limit; /* t beyond which nothing matters, certain */
     bool all;
     met *list; /* all hits; or the first one */
-    uint64_t count, room;
+    uint64_t count, capacity;
     bool no_memory;
 } casting;
 
@@ -55,7 +55,7 @@ static bool meets_slabs(const double origin[3], const double direction[3], doubl
 static bool keep(casting *c, const met *m)
 {
     if (c->all) {
-        if (!ebpo_grow(&c->list, &c->room, c->count + 1, sizeof *c->list))
+        if (!ebpo_grow(&c->list, &c->capacity, c->count + 1, sizeof *c->list))
             return false;
         c->list[c->count++] = *m;
         return true;
@@ -66,7 +66,7 @@ static bool keep(casting *c, const met *m)
         if (sign > 0 || (sign == 0 && m->file_face >= c->list[0].file_face))
             return true;
     }
-    if (!ebpo_grow(&c->list, &c->room, 1, sizeof *c->list))
+    if (!ebpo_grow(&c->list, &c->capacity, 1, sizeof *c->list))
         return false;
     c->list[0] = *m;
     c->count = 1;

@@ -17,7 +17,7 @@ typedef struct reading {
     ebpo_cell *gray;              /* cells of the last level's gray nodes */
     /* of the level below the one that is read, where they are needed to know pruned nodes */
     uint16_t *next_types;
-    uint64_t group_capacity, gray_room, plane_room, below_room, below_planes_room;
+    uint64_t group_capacity, gray_capacity, plane_capacity, below_capacity, below_planes_capacity;
     ebpo_error *error;
 } reading;
 
@@ -30,7 +30,8 @@ static ebpo_status no_memory(const reading *r)
 static ebpo_status add_planes(reading *r, const ebpo_level *level, uint32_t count,
                               uint64_t *in_level, ebpo_top_planes *out)
 {
-    if (!ebpo_grow(&r->top->planes, &r->plane_room, r->plane + count + 1, sizeof *r->top->planes))
+    if (!ebpo_grow(&r->top->planes, &r->plane_capacity, r->plane + count + 1,
+                   sizeof *r->top->planes))
         return no_memory(r);
     if (r->plane + count > UINT32_MAX)
         return ebpo_fail(r->error, EBPO_E_LIMIT,
@@ -62,8 +63,9 @@ static ebpo_status add_below(reading *r, const ebpo_level *level, const ebpo_nod
                              uint64_t *in_level, uint32_t *entry)
 {
     ebpo_top *t = r->top;
-    if (!ebpo_grow(&t->below, &r->below_room, r->below + 1, sizeof *t->below) ||
-        !ebpo_grow(&t->below_planes, &r->below_planes_room, r->below + 1, sizeof *t->below_planes))
+    if (!ebpo_grow(&t->below, &r->below_capacity, r->below + 1, sizeof *t->below) ||
+        !ebpo_grow(&t->below_planes, &r->below_planes_capacity, r->below + 1,
+                   sizeof *t->below_planes))
         return no_memory(r);
     if (r->below >= EBPO_ENTRY_ZERO)
         return ebpo_fail(r->error, EBPO_E_LIMIT, "too many nodes at cut level %d; give a lower one",
@@ -81,7 +83,7 @@ static ebpo_status add_gray(reading *r, const ebpo_level *level, uint64_t rank, 
     ebpo_top *t = r->top;
     uint64_t group = r->group++;
     if (!ebpo_grow(&t->nodes.group, &r->group_capacity, r->group, sizeof *t->nodes.group) ||
-        !ebpo_grow(&t->gray, &r->gray_room, r->group, sizeof *t->gray))
+        !ebpo_grow(&t->gray, &r->gray_capacity, r->group, sizeof *t->gray))
         return no_memory(r);
     if (r->group >= EBPO_ENTRY_ZERO)
         return ebpo_fail(r->error, EBPO_E_LIMIT,
@@ -191,9 +193,9 @@ ebpo_status ebpo_top_read(ebpo_top **out, const ebpo_file *file, int cut_level, 
     top->nodes.group_count = (uint32_t)r.group;
     top->below_count = r.below;
     top->bytes = sizeof *top + r.group_capacity * sizeof *top->nodes.group +
-                 r.gray_room * sizeof *top->gray + r.plane_room * 4 +
-                 r.below_room * sizeof *top->below +
-                 r.below_planes_room * sizeof *top->below_planes;
+                 r.gray_capacity * sizeof *top->gray + r.plane_capacity * 4 +
+                 r.below_capacity * sizeof *top->below +
+                 r.below_planes_capacity * sizeof *top->below_planes;
     *out = top;
     return EBPO_OK;
 }

@@ -22,7 +22,7 @@ void ebpo_frontier_free(ebpo_frontier *f)
 
 ebpo_status ebpo_frontier_reserve(ebpo_frontier *f, uint64_t more, ebpo_error *error)
 {
-    return ebpo_grow(&f->at, &f->room, f->count + more, sizeof *f->at)
+    return ebpo_grow(&f->at, &f->capacity, f->count + more, sizeof *f->at)
                ? EBPO_OK
                : ebpo_fail_memory(error, (f->count + more) * sizeof *f->at);
 }

@@ -16,7 +16,7 @@ typedef struct ebpo_waiting {
 
 typedef struct ebpo_frontier {
     ebpo_waiting *at; /* [count], a binary heap */
-    uint64_t count, room;
+    uint64_t count, capacity;
 } ebpo_frontier;
 
 void ebpo_frontier_free(ebpo_frontier *frontier);

@@ -34,7 +34,7 @@ struct ebpo_stream {
         uniform_volume; /* volume of the leaves and black nodes of all levels before the next one */
     ebpo_level_walk walk;
     ebpo_envelope_stack *envelopes; /* with polygons */
-    ebpo_node_buffers room;
+    ebpo_node_buffers capacity;
 };
 
 ebpo_status ebpo_stream_new(const ebpo_file *file, const ebpo_stream_options *options,
@@ -266,10 +266,11 @@ ebpo_status ebpo_stream_next_node(ebpo_stream *s, ebpo_stream_node *out, bool *m
     ebpo_node_begin(out, &s->box, node.octcode, node.type);
     out->winding = winding_of(&s->kept[s->level], &node);
     if (s->options.planes || s->options.polygons)
-        ebpo_node_add_planes(out, &s->box, node.codes, node.code_count, &s->room);
+        ebpo_node_add_planes(out, &s->box, node.codes, node.code_count, &s->capacity);
     if (s->options.polygons && node.type != EBPO_WHITE)
         ebpo_node_add_polygons(out, &s->box,
-                               ebpo_level_walk_envelope(&s->walk, &node, s->envelopes), &s->room);
+                               ebpo_level_walk_envelope(&s->walk, &node, s->envelopes),
+                               &s->capacity);
     *more = true;
     return EBPO_OK;
 }

@@ -19,30 +19,30 @@ void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcod
 }
 
 void ebpo_node_add_planes(ebpo_stream_node *out, const ebpo_box *box, const uint32_t *codes,
-                          unsigned count, ebpo_node_buffers *room)
+                          unsigned count, ebpo_node_buffers *capacity)
 {
     ebpo_cell cell = ebpo_cell_of_octcode(out->octcode);
     for (unsigned i = 0; i < count; i++) {
         int32_t n[3], d;
         if (ebpo_plane_decode(codes[i], n, &d))
-            ebpo_plane_to_world(box, cell, n, d, room->planes[out->plane_count++]);
+            ebpo_plane_to_world(box, cell, n, d, capacity->planes[out->plane_count++]);
     }
-    out->planes = (const double(*)[4])room->planes;
+    out->planes = (const double(*)[4])capacity->planes;
 }
 
 void ebpo_node_add_polygons(ebpo_stream_node *out, const ebpo_box *box, const ebpo_polytope *p,
-                            ebpo_node_buffers *room)
+                            ebpo_node_buffers *capacity)
 {
     ebpo_cell cell = ebpo_cell_of_octcode(out->octcode);
-    ebpo_polytope_to_world(p, box, cell, room->vertices);
+    ebpo_polytope_to_world(p, box, cell, capacity->vertices);
     for (int f = 0; f <= p->face_count; f++)
-        room->polygon_first[f] = p->first[f];
+        capacity->polygon_first[f] = p->first[f];
     for (int i = 0; i < p->corner_count; i++)
-        room->corners[i] = p->corner[i];
+        capacity->corners[i] = p->corner[i];
     out->volume = ebpo_polytope_volume(p) * ebpo_cell_volume(box, cell.level);
     out->vertex_count = (uint32_t)p->vertex_count;
     out->polygon_count = (uint32_t)p->face_count;
-    out->vertices = (const double(*)[3])room->vertices;
-    out->polygon_first = room->polygon_first;
-    out->corners = room->corners;
+    out->vertices = (const double(*)[3])capacity->vertices;
+    out->polygon_first = capacity->polygon_first;
+    out->corners = capacity->corners;
 }

@@ -21,8 +21,8 @@ void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcod
                      ebpo_node_type type);
 /* At most EBPO_NODE_CODES codes. */
 void ebpo_node_add_planes(ebpo_stream_node *out, const ebpo_box *box, const uint32_t *codes,
-                          unsigned count, ebpo_node_buffers *room);
+                          unsigned count, ebpo_node_buffers *capacity);
 void ebpo_node_add_polygons(ebpo_stream_node *out, const ebpo_box *box,
-                            const ebpo_polytope *envelope, ebpo_node_buffers *room);
+                            const ebpo_polytope *envelope, ebpo_node_buffers *capacity);
 
 #endif

@@ -265,11 +265,12 @@ void ebpo_view_fill(ebpo_view_stream *s, ebpo_partial_node node, ebpo_view_node 
     if (s->options.planes || s->options.polygons) {
         unsigned count;
         const uint32_t *codes = ebpo_partial_codes(&s->partial, node, &count);
-        ebpo_node_add_planes(&out->node, &s->box, codes, count, &s->room);
+        ebpo_node_add_planes(&out->node, &s->box, codes, count, &s->capacity);
     }
     if (s->options.polygons && type != EBPO_WHITE)
         ebpo_node_add_polygons(&out->node, &s->box,
-                               ebpo_partial_envelope(&s->partial, node, s->envelopes), &s->room);
+                               ebpo_partial_envelope(&s->partial, node, s->envelopes),
+                               &s->capacity);
 }
 
 ebpo_status ebpo_view_stream_next(ebpo_view_stream *s, ebpo_view_node *out, ebpo_view_end *end,

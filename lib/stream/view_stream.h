@@ -25,7 +25,7 @@ struct ebpo_view_stream {
     uint64_t delivered, cut[4];
     ebpo_group read;
     ebpo_envelope_stack *envelopes; /* with polygons */
-    ebpo_node_buffers room;
+    ebpo_node_buffers capacity;
 };
 
 /* All about a node of `grown`; `complete` is left to the caller. */

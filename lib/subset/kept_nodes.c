@@ -11,7 +11,7 @@ static ebpo_per per_of(ebpo_node_type type)
     return per[type];
 }
 
-static uint64_t room_of(const ebpo_level *from, ebpo_per per, const uint64_t more[4])
+static uint64_t capacity_of(const ebpo_level *from, ebpo_per per, const uint64_t more[4])
 {
     int type = ebpo_schema_node_type(per);
     uint64_t leaf_planes = per == EBPO_PER_PLANE ? from->leaf_plane_count : 0;
@@ -62,7 +62,7 @@ bool ebpo_kept_begin(ebpo_kept_nodes *kept, const ebpo_level *from, ebpo_level *
         if (spec->per == EBPO_PER_GROUP || !ebpo_schema_is_held(id) || !(spec->needs & needs) ||
             (spec->if_needed && !ebpo_level_array(from, id)))
             continue;
-        void *array = ebpo_alloc(room_of(from, spec->per, more), spec->held_size);
+        void *array = ebpo_alloc(capacity_of(from, spec->per, more), spec->held_size);
         if (!array)
             return false;
         ebpo_level_set_array(to, id, array);

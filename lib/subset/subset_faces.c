@@ -15,7 +15,7 @@ typedef struct numbering {
     ebpo_cutting *c;
     uint32_t *number; /* [faces of the source] new number + 1; 0: none yet */
     uint32_t *old;    /* [count] of each new face */
-    uint64_t count, room;
+    uint64_t count, capacity;
     /* references */
     uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX], read[EBPO_LEVELS_MAX],
         written[EBPO_LEVELS_MAX];
@@ -23,7 +23,7 @@ typedef struct numbering {
 
 static bool add_new(numbering *n, uint32_t face)
 {
-    if (!ebpo_grow(&n->old, &n->room, n->count + 1, sizeof *n->old))
+    if (!ebpo_grow(&n->old, &n->capacity, n->count + 1, sizeof *n->old))
         return false;
     n->old[n->count++] = face;
     n->number[face] = (uint32_t)n->count;
@@ -89,7 +89,7 @@ static ebpo_status number_group(numbering *n, int level)
 
 typedef struct vertices {
     uint32_t *number, *old; /* as of faces */
-    uint64_t count, room;
+    uint64_t count, capacity;
 } vertices;
 
 static ebpo_status number_vertices(ebpo_cutting *c, vertices *v)
@@ -100,7 +100,7 @@ static ebpo_status number_vertices(ebpo_cutting *c, vertices *v)
     for (uint64_t i = 0; i < 3 * mesh->face_count && good; i++) {
         uint32_t vertex = mesh->faces[i];
         if (v->number[vertex] == 0) {
-            good = ebpo_grow(&v->old, &v->room, v->count + 1, sizeof *v->old);
+            good = ebpo_grow(&v->old, &v->capacity, v->count + 1, sizeof *v->old);
             if (good)
                 v->old[v->count++] = vertex;
             v->number[vertex] = (uint32_t)v->count;
@@ -110,7 +110,7 @@ static ebpo_status number_vertices(ebpo_cutting *c, vertices *v)
     for (uint64_t i = 0; i < c->from->vertex_count && good && !c->out->info.pruned;
          i++) /* those that no face uses belong to the whole */
         if (v->number[i] == 0) {
-            good = ebpo_grow(&v->old, &v->room, v->count + 1, sizeof *v->old);
+            good = ebpo_grow(&v->old, &v->capacity, v->count + 1, sizeof *v->old);
             if (good)
                 v->old[v->count++] = (uint32_t)i;
         }

@@ -29,8 +29,9 @@ static uint32_t add_block(walk *w, uint32_t begin, uint32_t end)
 {
     ebpo_layout *o = w->out;
     if (o->block_count >= w->most ||
-        !ebpo_grow(&o->block_begin, &o->block_room, o->block_count + 1, sizeof *o->block_begin) ||
-        !ebpo_grow(&o->block_end, &o->block_room2, o->block_count + 1, sizeof *o->block_end)) {
+        !ebpo_grow(&o->block_begin, &o->block_capacity, o->block_count + 1,
+                   sizeof *o->block_begin) ||
+        !ebpo_grow(&o->block_end, &o->block_capacity2, o->block_count + 1, sizeof *o->block_end)) {
         w->failed = true;
         return EBPO_NO_CHILD;
     }
@@ -44,9 +45,9 @@ static uint32_t add_bound(walk *w, const bundle *b)
 {
     ebpo_layout *o = w->out;
     uint64_t n = o->bound_count;
-    if (w->failed || !ebpo_grow(&o->child, &o->bound_room, n + 1, sizeof *o->child) ||
-        !ebpo_grow(&o->first_block, &o->bound_room2, n + 1, sizeof *o->first_block) ||
-        !ebpo_grow(&o->last_block, &o->bound_room3, n + 1, sizeof *o->last_block)) {
+    if (w->failed || !ebpo_grow(&o->child, &o->bound_capacity, n + 1, sizeof *o->child) ||
+        !ebpo_grow(&o->first_block, &o->bound_capacity2, n + 1, sizeof *o->first_block) ||
+        !ebpo_grow(&o->last_block, &o->bound_capacity3, n + 1, sizeof *o->last_block)) {
         w->failed = true;
         return EBPO_NO_CHILD;
     }

@@ -33,7 +33,7 @@ typedef struct leaf_faces {
 
 typedef struct piece {
     ebpo_four_planes *planes; /* found by one task, in the order of leaves */
-    uint64_t count, room;
+    uint64_t count, capacity;
     uint64_t kinds[5], one_wall;
 } piece;
 
@@ -339,7 +339,7 @@ static bool keep_planes(piece *out, ebpo_subtree_leaf *leaf, const plane *planes
                         int flip)
 {
     uint64_t groups = (uint64_t)(count + 3) / 4;
-    if (!ebpo_grow(&out->planes, &out->room, out->count + groups, sizeof *out->planes))
+    if (!ebpo_grow(&out->planes, &out->capacity, out->count + groups, sizeof *out->planes))
         return false;
     leaf->first_plane = (uint32_t)out->count; /* within the piece for now */
     for (uint64_t i = 0; i < groups * 4; i++) {

@@ -19,7 +19,7 @@ typedef struct walk {
     uint64_t list_capacity;
     /* blocks of one leaf, with the lanes that it lists: block << EBPO_BLOCK | lanes */
     uint64_t *scratch;
-    uint64_t scratch_room;
+    uint64_t scratch_capacity;
     ebpo_status status;
     ebpo_error *error;
 } walk;
@@ -69,7 +69,7 @@ static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank
 {
     ebpo_subtree_leaf *leaf = &w->s->leaf[number];
     uint64_t refs = level->leaf_ref_count[rank], count = 0;
-    if (!ebpo_grow(&w->scratch, &w->scratch_room, refs + level->leaf_new[rank],
+    if (!ebpo_grow(&w->scratch, &w->scratch_capacity, refs + level->leaf_new[rank],
                    sizeof *w->scratch)) {
         w->status = ebpo_fail_memory(w->error, refs * sizeof *w->scratch);
         return;

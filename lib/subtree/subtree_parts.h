@@ -10,12 +10,12 @@ typedef struct ebpo_layout {
     /* [block_count] first local face of each block, and one past the last; all faces, in order */
     uint32_t *block_begin;
     uint32_t *block_end;
-    uint64_t block_count, block_room;
+    uint64_t block_count, block_capacity;
     uint32_t (*child)[8]; /* [bound_count] as in ebpo_bound */
     /* [bound_count] blocks below a node are contiguous: first, and one past the last */
     uint32_t *first_block;
     uint32_t *last_block;
-    uint64_t bound_count, bound_room, bound_room2, bound_room3, block_room2;
+    uint64_t bound_count, bound_capacity, bound_capacity2, bound_capacity3, block_capacity2;
     uint32_t top;
 } ebpo_layout;
 

@@ -261,7 +261,7 @@ void oracle_free(oracle *o)
         return;
     for (size_t i = 0; i < 3 * (size_t)o->vertex_count; i++)
         mpz_clear(o->integer[i]);
-    for (uint32_t i = 0; i < o->item_room; i++)
+    for (uint32_t i = 0; i < o->item_capacity; i++)
         mpz_clears(o->items[i].t.num, o->items[i].t.den, NULL);
     for (int k = 0; k < 3; k++) {
         mpz_clears(o->p[k], o->normal[k], o->direction[k], NULL);

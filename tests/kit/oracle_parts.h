@@ -43,7 +43,7 @@ struct oracle {
     double *low;      /* [face_count] */
     oracle_hit *hits; /* [face_count] */
     oracle_ray_item *items;
-    uint32_t item_room; /* of items, how many are initialised */
+    uint32_t item_capacity; /* of items, how many are initialised */
 };
 
 /* Exponent of the lowest bit of x; INT_MAX for 0. */

@@ -140,9 +140,9 @@ static int by_t(const void *x, const void *y, void *user)
 
 static oracle_ray_item *item(oracle *o, uint32_t i)
 {
-    if (i == o->item_room) {
+    if (i == o->item_capacity) {
         mpz_inits(o->items[i].t.num, o->items[i].t.den, NULL);
-        o->item_room++;
+        o->item_capacity++;
     }
     return &o->items[i];
 }

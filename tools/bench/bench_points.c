@@ -89,11 +89,11 @@ static int generate(bench_points *out, const char *model, const remote_values *r
 
 static int read_all(bench_points *out, points *in, uint64_t most)
 {
-    uint64_t room = 0, got = 1;
+    uint64_t capacity = 0, got = 1;
     while (got && out->count < most) {
-        if (room < out->count + POINTS_BATCH) {
-            room = 2 * room + POINTS_BATCH;
-            if (make_room(out, room) != EXIT_FINE)
+        if (capacity < out->count + POINTS_BATCH) {
+            capacity = 2 * capacity + POINTS_BATCH;
+            if (make_room(out, capacity) != EXIT_FINE)
                 return EXIT_FAILED;
         }
         got = points_next(in, out->rows + out->count * (uint64_t)points_width(out->kind));

@@ -39,12 +39,12 @@ static arg_result set_real(const arg_spec *spec, const arg_option *o, const char
     return ARGS_RUN;
 }
 
-static void join_words(const char *const *words, char *out, size_t room)
+static void join_words(const char *const *words, char *out, size_t capacity)
 {
     size_t used = 0;
     out[0] = 0;
-    for (int i = 0; words[i] && used < room; i++)
-        used += (size_t)snprintf(out + used, room - used, "%s%s", i ? ", " : "", words[i]);
+    for (int i = 0; words[i] && used < capacity; i++)
+        used += (size_t)snprintf(out + used, capacity - used, "%s%s", i ? ", " : "", words[i]);
 }
 
 static arg_result find_word(const arg_spec *spec, const arg_option *o, const char *text,

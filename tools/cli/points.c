@@ -61,12 +61,12 @@ bool points_open(points *p, const char *by, const char *path, points_kind kind, 
                    .raw = raw,
                    .tmax = tmax,
                    .fd = STDIN_FILENO,
-                   .room = ROOM };
+                   .capacity = ROOM };
     if (!standard)
         p->fd = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY);
     if (p->fd < 0)
         return fail(p, "cannot be opened: %s", strerror(errno)) == TAKEN;
-    p->buffer = malloc(p->room + 1);
+    p->buffer = malloc(p->capacity + 1);
     if (!p->buffer)
         return fail(p, "not enough memory") == TAKEN;
     return true;
@@ -89,7 +89,7 @@ static bool fill(points *p)
     p->at = 0;
     ssize_t got;
     do
-        got = read(p->fd, p->buffer + p->end, p->room - p->end);
+        got = read(p->fd, p->buffer + p->end, p->capacity - p->end);
     while (got < 0 && errno == EINTR);
     if (got < 0)
         return fail(p, "cannot be read: %s", strerror(errno)) == TAKEN;
@@ -165,7 +165,7 @@ static taken take_line(points *p, double *row)
 {
     char *begin = p->buffer + p->at, *end = memchr(begin, '\n', p->end - p->at);
     if (!end) {
-        if (!p->ended && p->end - p->at < p->room)
+        if (!p->ended && p->end - p->at < p->capacity)
             return MORE_NEEDED;
         if (!p->ended) {
             p->line++;
@@ -229,12 +229,13 @@ static taken take_raw(points *p, double *row)
 static bool read_all(points *p)
 {
     while (!p->ended && !p->failed) {
-        if (p->end == p->room) {
-            char *wider = p->room <= SIZE_MAX / 4 ? realloc(p->buffer, 2 * p->room + 1) : NULL;
+        if (p->end == p->capacity) {
+            char *wider =
+                p->capacity <= SIZE_MAX / 4 ? realloc(p->buffer, 2 * p->capacity + 1) : NULL;
             if (!wider)
-                return fail(p, "not enough memory for %zu bytes", 2 * p->room) == TAKEN;
+                return fail(p, "not enough memory for %zu bytes", 2 * p->capacity) == TAKEN;
             p->buffer = wider;
-            p->room *= 2;
+            p->capacity *= 2;
         }
         fill(p);
     }

@@ -27,7 +27,7 @@ typedef struct points {
     double tmax; /* of rays that tell none */
     int fd;
     char *buffer; /* [room + 1] */
-    size_t room, at, end;
+    size_t capacity, at, end;
     bool begun, ended, failed; /* failed: said on stderr, the command shall end with EXIT_FAILED */
     uint64_t line, row;        /* of what was read last, from 1 */
     double *ply;               /* all vertices of a PLY, or NULL */

@@ -17,7 +17,7 @@ void words_init(void)
         selection_words[i] = ebpo_selection_describe((ebpo_selection)i)->name;
 }
 
-static char *scaled(char *out, size_t room, double v, const char *unit)
+static char *scaled(char *out, size_t capacity, double v, const char *unit)
 {
     static const char prefix[] = " KMGTPE";
     int i = 0;
@@ -26,39 +26,39 @@ static char *scaled(char *out, size_t room, double v, const char *unit)
         i++;
     }
     if (i == 0)
-        snprintf(out, room, "%.0f%s%s", v, *unit ? " " : "", unit);
+        snprintf(out, capacity, "%.0f%s%s", v, *unit ? " " : "", unit);
     else
-        snprintf(out, room, "%.*f %c%s", v < 9.995 ? 2 : v < 99.95 ? 1 : 0, v, prefix[i], unit);
+        snprintf(out, capacity, "%.*f %c%s", v < 9.995 ? 2 : v < 99.95 ? 1 : 0, v, prefix[i], unit);
     return out;
 }
 
-char *words_count(char *out, size_t room, double v) { return scaled(out, room, v, ""); }
+char *words_count(char *out, size_t capacity, double v) { return scaled(out, capacity, v, ""); }
 
-char *words_bytes(char *out, size_t room, uint64_t bytes)
+char *words_bytes(char *out, size_t capacity, uint64_t bytes)
 {
-    return scaled(out, room, (double)bytes, "B");
+    return scaled(out, capacity, (double)bytes, "B");
 }
 
-char *words_plural(char *out, size_t room, uint64_t count, const char *one, const char *many)
+char *words_plural(char *out, size_t capacity, uint64_t count, const char *one, const char *many)
 {
-    snprintf(out, room, "%llu %s", (unsigned long long)count, count == 1 ? one : many);
+    snprintf(out, capacity, "%llu %s", (unsigned long long)count, count == 1 ? one : many);
     return out;
 }
 
-char *words_parts(char *out, size_t room, uint32_t parts)
+char *words_parts(char *out, size_t capacity, uint32_t parts)
 {
     size_t used = 0;
     out[0] = 0;
     for (int i = 0; part_words[i]; i++)
-        if (parts >> i & 1 && used < room)
-            used +=
-                (size_t)snprintf(out + used, room - used, "%s%s", used ? ", " : "", part_words[i]);
+        if (parts >> i & 1 && used < capacity)
+            used += (size_t)snprintf(out + used, capacity - used, "%s%s", used ? ", " : "",
+                                     part_words[i]);
     return out;
 }
 
-char *words_format(char *out, size_t room, int major, int minor)
+char *words_format(char *out, size_t capacity, int major, int minor)
 {
-    snprintf(out, room, "%d.%d", major, minor);
+    snprintf(out, capacity, "%d.%d", major, minor);
     return out;
 }
 

@@ -11,15 +11,15 @@
 void words_init(void);
 
 /* 999, 12.3 K, 4.56 M. */
-char *words_count(char *out, size_t room, double v);
+char *words_count(char *out, size_t capacity, double v);
 /* 999 B, 12.3 KB, 4.56 MB: powers of 1000. */
-char *words_bytes(char *out, size_t room, uint64_t bytes);
+char *words_bytes(char *out, size_t capacity, uint64_t bytes);
 /* "1 hole", "3 holes". */
-char *words_plural(char *out, size_t room, uint64_t count, const char *one, const char *many);
+char *words_plural(char *out, size_t capacity, uint64_t count, const char *one, const char *many);
 /* Names of the ebpo_part bits with commas: "planes, mesh, maps". */
-char *words_parts(char *out, size_t room, uint32_t parts);
+char *words_parts(char *out, size_t capacity, uint32_t parts);
 /* "1.0" */
-char *words_format(char *out, size_t room, int major, int minor);
+char *words_format(char *out, size_t capacity, int major, int minor);
 const char *words_node_type(ebpo_node_type type);
 const char *words_rule(ebpo_rule rule);
 const char *words_codec(ebpo_codec codec);

@@ -210,11 +210,11 @@ static int work(comparison *c, const char *const *operand, const char *place, pr
 }
 
 /* Of "dir/bunny.ply" report-bunny. */
-static void default_place(const char *operand, char *out, size_t room)
+static void default_place(const char *operand, char *out, size_t capacity)
 {
     char stem[201];
     report_stem(operand, stem, sizeof stem);
-    snprintf(out, room, "report-%s", stem);
+    snprintf(out, capacity, "report-%s", stem);
 }
 
 static const report_values usual = { .percent = -1,

@@ -29,19 +29,19 @@ ebpo_status picture_encode_png(const uint8_t *pixels, int width, int height, int
     image.width = (png_uint_32)width;
     image.height = (png_uint_32)height;
     image.format = channels == 4 ? PNG_FORMAT_RGBA : PNG_FORMAT_RGB;
-    png_alloc_size_t room = PNG_IMAGE_PNG_SIZE_MAX(image);
+    png_alloc_size_t capacity = PNG_IMAGE_PNG_SIZE_MAX(image);
     ebpo_status status = EBPO_E_MEMORY;
-    *bytes = malloc(room);
+    *bytes = malloc(capacity);
     if (!*bytes)
         snprintf(error->message, sizeof error->message,
                  "%s: not enough memory for %zu bytes; choose a smaller picture", what,
-                 (size_t)room);
-    else if (!png_image_write_to_memory(&image, *bytes, &room, 0, pixels, 0, NULL))
+                 (size_t)capacity);
+    else if (!png_image_write_to_memory(&image, *bytes, &capacity, 0, pixels, 0, NULL))
         snprintf(error->message, sizeof error->message, "%s: libpng cannot encode the picture: %s",
                  what, image.message);
     else
         status = EBPO_OK;
-    *size = room;
+    *size = capacity;
     error->status = status;
     png_image_free(&image);
     if (status != EBPO_OK) {

@@ -175,10 +175,10 @@ void comparison_free(comparison *c)
     free(c->near);
 }
 
-void report_stem(const char *path, char *out, size_t room)
+void report_stem(const char *path, char *out, size_t capacity)
 {
     const char *shown = remote_shown(path), *slash = strrchr(shown, '/');
-    snprintf(out, room, "%s", slash ? slash + 1 : shown);
+    snprintf(out, capacity, "%s", slash ? slash + 1 : shown);
     char *ending = strstr(out, ".ebpo.h5");
     char *dot = ending ? ending : strrchr(out, '.');
     if (dot && dot != out)

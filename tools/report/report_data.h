@@ -172,7 +172,7 @@ void method_note(method *m, const char *what, const char *why);
 void comparison_free(comparison *c);
 
 /* What a file is called: of "dir/bunny.ebpo.h5", or a URL that ends so, "bunny". */
-void report_stem(const char *path, char *out, size_t room);
+void report_stem(const char *path, char *out, size_t capacity);
 
 /* What a build or a file cannot tell is noted once and leaves figures away; all else stays an
  * error. */

@@ -53,9 +53,9 @@ static int learn(comparison *c, method *m)
 }
 
 /* A file's name makes a method's, whatever is in it. */
-static void usable_stem(const char *path, char *name, size_t room)
+static void usable_stem(const char *path, char *name, size_t capacity)
 {
-    report_stem(path, name, room);
+    report_stem(path, name, capacity);
     for (char *c = name; *c; c++)
         if (strchr("/,\"\n\r", *c))
             *c = '_';

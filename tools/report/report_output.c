@@ -157,18 +157,18 @@ static void abandon(void)
     rmdir(being_made);
 }
 
-int output_begin(const char *place, const char *const *operand, char *folder, size_t room)
+int output_begin(const char *place, const char *const *operand, char *folder, size_t capacity)
 {
     size_t length = strlen(place);
     while (length > 1 && place[length - 1] == '/')
         length--;
     folder[0] = 0;
-    if (length + 40 > room || length + 40 > sizeof being_made)
+    if (length + 40 > capacity || length + 40 > sizeof being_made)
         return told(EXIT_USAGE, place, "the name is too long");
     int code = place_is_free(place, operand);
     if (code != EXIT_FINE)
         return code;
-    snprintf(folder, room, "%.*s.part-XXXXXX", (int)length, place);
+    snprintf(folder, capacity, "%.*s.part-XXXXXX", (int)length, place);
     if (!mkdtemp(folder)) {
         folder[0] = 0;
         return told(EXIT_FAILED, place, strerror(errno));

@@ -9,7 +9,7 @@
  * in the way at `place` that is not a report, or the folder cannot be made; EXIT_USAGE: one of the
  * operands (NULL-terminated) lies in the report that would be replaced. A report: a folder with
  * nothing but the files of one, report.json among them. */
-int output_begin(const char *place, const char *const *operand, char *folder, size_t room);
+int output_begin(const char *place, const char *const *operand, char *folder, size_t capacity);
 /* Moves the folder to its place; a report that was there is replaced. False, said on stderr: it
  * cannot be. */
 bool output_commit(const char *place, const char *folder);
