@@ -73,11 +73,13 @@ double ebpo_model_lower_bound(const ebpo_model *m, const ebpo_box *box, const eb
 int ebpo_rank_children(const ebpo_model *m, const ebpo_box *box, const ebpo_node *gray,
                        double parent, const double p[3], ebpo_ranked out[8])
 {
+    const ebpo_node_table *table = gray->subtree ? &gray->subtree->nodes : &m->top->nodes;
     int count = 0;
     for (unsigned octant = 0; octant < 8; octant++) {
-        ebpo_ranked r = { ebpo_model_child(m, gray, octant), 0 };
-        if (ebpo_node_is_uniform(&r.node))
+        /* most are uniform: nothing is made of them */
+        if (ebpo_entry_kind_of(ebpo_table_child(table, gray->entry, octant)) == EBPO_ENTRY_UNIFORM)
             continue;
+        ebpo_ranked r = { ebpo_model_child(m, gray, octant), 0 };
         r.lower = ebpo_model_lower_bound(m, box, &r.node, parent, p);
         int at = count++;
         for (; at > 0 && out[at - 1].lower > r.lower; at--)
