@@ -18,7 +18,7 @@ case "${1:-}" in short | medium | long) tier=$1 && shift ;; esac
 #   viewer   the web viewer in node and a browser
 plan() { # build
     case $tier-$1 in
-    short-*) echo "0.05 once costly viewer" ;;
+    short-*) echo "0.05 costly viewer" ;;
     medium-gcc) echo "0.3" ;;
     medium-clang) echo "0.1 once costly viewer" ;;
     medium-sanitize) echo "0.05 once viewer" ;;

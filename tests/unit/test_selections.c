@@ -418,7 +418,7 @@ START_TEST(selections_and_their_numbers_that_make_no_sense_are_refused)
         ebpo_selection select;
         double percent, k_root;
         int normals;
-    } wrong[] = { { (ebpo_selection)4, 40, 0, 0 },           { EBPO_SELECT_RANDOM, 0, 0, 0 },
+    } wrong[] = { { EBPO_SELECTION_COUNT, 40, 0, 0 },        { EBPO_SELECT_RANDOM, 0, 0, 0 },
                   { EBPO_SELECT_RANDOM, 101, 0, 0 },         { EBPO_SELECT_RANDOM, NAN, 0, 0 },
                   { EBPO_SELECT_KMEDOIDS, 40, -1, 0 },       { EBPO_SELECT_KMEDOIDS, 40, 0.5, 0 },
                   { EBPO_SELECT_KMEDOIDS, 40, INFINITY, 0 }, { EBPO_SELECT_KMEDOIDS, 40, 0, 2 } };

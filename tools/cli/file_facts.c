@@ -99,15 +99,17 @@ static void print_model(FILE *out, const ebpo_info *info)
         fprintf(out, "  date      %s\n", info->date);
     fprintf(out, "  built by  %s: maximum level %d, leaf faces %u, ", info->generator,
             info->max_level, info->leaf_faces);
-    if (info->selection == EBPO_SELECT_INHERIT)
-        fprintf(out, "epsilon %g\n", info->epsilon);
-    else if (info->selection < 0)
+    const ebpo_selection_traits *traits = ebpo_selection_describe((ebpo_selection)info->selection);
+    if (!traits)
         fputs("planes chosen in a way that this version does not know\n", out);
+    else if (!traits->from_leaves && info->selection != EBPO_SELECT_INHERIT)
+        fprintf(out, "selection %s, epsilon %g\n", traits->name, info->epsilon);
+    else if (!traits->from_leaves)
+        fprintf(out, "epsilon %g\n", info->epsilon);
     else if (info->k_root > 0)
-        fprintf(out, "selection %s, K %.10g at the root\n", selection_words[info->selection],
-                info->k_root);
+        fprintf(out, "selection %s, K %.10g at the root\n", traits->name, info->k_root);
     else
-        fprintf(out, "selection %s, %.10g %%\n", selection_words[info->selection], info->percent);
+        fprintf(out, "selection %s, %.10g %%\n", traits->name, info->percent);
 }
 
 uint64_t facts_white(const ebpo_info *info, int level)

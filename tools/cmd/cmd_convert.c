@@ -303,7 +303,8 @@ static stage_facts plan_stages(const values *v, const char *in)
     return (stage_facts){ .mended = v->mend.weld || v->mend.orient || v->mend.fill_holes ||
                                     (dot && strcasecmp(dot, ".stl") == 0),
                           .solid = true,
-                          .from_leaves = v->select != EBPO_SELECT_INHERIT,
+                          .from_leaves =
+                              ebpo_selection_describe((ebpo_selection)v->select)->from_leaves,
                           .judged = judges(v),
                           .leaf_planes = parts_of(v) & EBPO_PART_LEAF_PLANES,
                           .times = EBPO_BUILD_TIMES_INIT };
