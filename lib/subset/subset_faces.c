@@ -19,11 +19,13 @@ typedef struct numbering {
     /* references */
     uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX], read[EBPO_LEVELS_MAX],
         written[EBPO_LEVELS_MAX];
+    bool no_memory;
 } numbering;
 
 static bool add_new(numbering *n, uint32_t face)
 {
-    if (!ebpo_grow(&n->old, &n->capacity, n->count + 1, sizeof *n->old))
+    n->no_memory = !ebpo_grow(&n->old, &n->capacity, n->count + 1, sizeof *n->old);
+    if (n->no_memory)
         return false;
     n->old[n->count++] = face;
     n->number[face] = (uint32_t)n->count;
@@ -55,6 +57,8 @@ static ebpo_status number_leaf(numbering *n, int level)
     }
     for (uint64_t k = 0; k < l->leaf_new[i] && good; k++)
         good = n->number[l->leaf_first[i] + k] == 0 && add_new(n, (uint32_t)(l->leaf_first[i] + k));
+    if (n->no_memory)
+        return ebpo_fail_memory(n->c->error, n->count * sizeof *n->old);
     if (!good)
         return ebpo_fail(n->c->error, EBPO_E_FORMAT,
                          "level %d: a leaf lists a face twice or as new that an earlier leaf "
