@@ -6,6 +6,7 @@
 #if EBPO_HAVE_CAIRO
 
 #include <cairo.h>
+#include <dlfcn.h>
 #include <math.h>
 
 #if defined __SANITIZE_ADDRESS__
@@ -17,41 +18,81 @@ const char *__lsan_default_suppressions(void) { return "leak:libfontconfig"; }
 const char *__lsan_default_options(void) { return "print_suppressions=0"; }
 #endif
 
-bool picture_has_captions(void) { return true; }
+/* Loaded when the first caption is drawn: cairo comes with fifteen libraries, and commands that
+ * draw nothing would start a third later for them. */
+#define CAIRO_FUNCTIONS(X)      \
+    X(image_surface_create)     \
+    X(image_surface_get_data)   \
+    X(image_surface_get_stride) \
+    X(surface_flush)            \
+    X(surface_destroy)          \
+    X(create)                   \
+    X(destroy)                  \
+    X(select_font_face)         \
+    X(set_font_size)            \
+    X(text_extents)             \
+    X(move_to)                  \
+    X(show_text)
+
+static struct {
+#define MEMBER(name) __typeof__(&cairo_##name) name;
+    CAIRO_FUNCTIONS(MEMBER)
+#undef MEMBER
+} lib;
+
+static bool load(void)
+{
+    static bool tried, loaded;
+    if (tried)
+        return loaded;
+    tried = true;
+    void *library = dlopen("libcairo.so.2", RTLD_NOW | RTLD_LOCAL);
+    loaded = library != NULL;
+#define FIND(name)                                                        \
+    *(void **)&lib.name = loaded ? dlsym(library, "cairo_" #name) : NULL; \
+    loaded = loaded && lib.name;
+    CAIRO_FUNCTIONS(FIND)
+#undef FIND
+    return loaded;
+}
+
+bool picture_has_captions(void) { return load(); }
 
 static cairo_surface_t *coverage(int width, int height, const char *text)
 {
-    cairo_surface_t *surface = cairo_image_surface_create(CAIRO_FORMAT_A8, width, height);
-    cairo_t *cairo = cairo_create(surface);
+    cairo_surface_t *surface = lib.image_surface_create(CAIRO_FORMAT_A8, width, height);
+    cairo_t *cairo = lib.create(surface);
     cairo_text_extents_t extents;
     double size = 0.64 * height;
-    cairo_select_font_face(cairo, "sans-serif", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
-    cairo_set_font_size(cairo, size);
-    cairo_text_extents(cairo, text, &extents);
+    lib.select_font_face(cairo, "sans-serif", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
+    lib.set_font_size(cairo, size);
+    lib.text_extents(cairo, text, &extents);
     if (extents.x_advance > 0.96 * width) { /* as large as there is room */
-        cairo_set_font_size(cairo, size * 0.96 * width / extents.x_advance);
-        cairo_text_extents(cairo, text, &extents);
+        lib.set_font_size(cairo, size * 0.96 * width / extents.x_advance);
+        lib.text_extents(cairo, text, &extents);
     }
     /* on whole pixels, and all captions on one line, whichever letters they have */
-    cairo_move_to(cairo, floor((width - extents.x_advance) / 2), floor(0.72 * height));
-    cairo_show_text(cairo, text);
-    cairo_destroy(cairo);
-    cairo_surface_flush(surface);
+    lib.move_to(cairo, floor((width - extents.x_advance) / 2), floor(0.72 * height));
+    lib.show_text(cairo, text);
+    lib.destroy(cairo);
+    lib.surface_flush(surface);
     return surface;
 }
 
 void picture_caption(picture *p, int x, int y, int width, int height, const uint8_t colour[3],
                      const char *text)
 {
+    if (!load())
+        return;
     cairo_surface_t *surface = coverage(width, height, text);
-    const unsigned char *row = cairo_image_surface_get_data(surface); /* NULL: no memory */
-    for (int j = 0; row && j < height; j++, row += cairo_image_surface_get_stride(surface))
+    const unsigned char *row = lib.image_surface_get_data(surface); /* NULL: no memory */
+    for (int j = 0; row && j < height; j++, row += lib.image_surface_get_stride(surface))
         for (int i = 0; i < width; i++) {
             uint8_t *rgb = p->rgb + 3 * ((size_t)(y + j) * (size_t)p->width + (size_t)(x + i));
             for (int k = 0; k < 3; k++)
                 rgb[k] = (uint8_t)((rgb[k] * (255 - row[i]) + colour[k] * row[i] + 127) / 255);
         }
-    cairo_surface_destroy(surface);
+    lib.surface_destroy(surface);
 }
 
 #else
