@@ -18,8 +18,8 @@ const char *__lsan_default_suppressions(void) { return "leak:libfontconfig"; }
 const char *__lsan_default_options(void) { return "print_suppressions=0"; }
 #endif
 
-/* Loaded when the first caption is drawn: cairo comes with fifteen libraries, and commands that
- * draw nothing would start a third later for them. */
+/* Loaded when the first caption is drawn: cairo comes with fifteen libraries, which every command
+ * would otherwise load when it starts. */
 #define CAIRO_FUNCTIONS(X)      \
     X(image_surface_create)     \
     X(image_surface_get_data)   \
