@@ -52,7 +52,7 @@ void ebpo_branch_forget(ebpo_branch *s)
     s->entry_count = s->entry_capacity = s->cross_count = s->cross_capacity = 0;
 }
 
-void ebpo_subtree_release(ebpo_branch *s)
+void ebpo_branch_release(ebpo_branch *s)
 {
     ebpo_branch_forget(s);
     ebpo_array_free(s->workspace, s->list);
@@ -67,7 +67,7 @@ void ebpo_subtree_release(ebpo_branch *s)
 
 void ebpo_branch_free(ebpo_branch *s)
 {
-    ebpo_subtree_release(s);
+    ebpo_branch_release(s);
     ebpo_piece_levels_free(s->out);
     memset(s, 0, sizeof *s);
 }

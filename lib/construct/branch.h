@@ -13,7 +13,7 @@ ebpo_status ebpo_build_check_branch(const ebpo_branch *s, ebpo_error *error);
 /* Frees what partition made of the piece's list: it can be made again. */
 void ebpo_branch_forget(ebpo_branch *s);
 /* Frees what only partition and envelopes need; `out` and the root's facts stay. */
-void ebpo_subtree_release(ebpo_branch *s);
+void ebpo_branch_release(ebpo_branch *s);
 void ebpo_branch_free(ebpo_branch *s);
 
 #endif

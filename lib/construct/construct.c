@@ -224,7 +224,7 @@ static ebpo_status work_on_pieces(void *context, uint64_t begin, uint64_t end, u
         job->cells_ns += cut - begun;
         if (status == EBPO_OK)
             status = ebpo_emit_piece(b, job->scratch[worker], s, error);
-        ebpo_subtree_release(s);
+        ebpo_branch_release(s);
         if (status == EBPO_OK)
             status = ebpo_build_pack(b, s->out, error);
         job->envelopes_ns += ebpo_clock() - cut;

@@ -18,7 +18,7 @@ typedef struct ebpo_node {
         uint32_t entry; /* in tables: see node_table.h */
     };
     /* in a model whose subtrees are loaded on demand: that in which the node stands; else NULL */
-    const struct ebpo_subtree *subtree;
+    const struct ebpo_accel *subtree;
 } ebpo_node;
 
 /* White or black: no face touches it, and all of it is on one side. */

@@ -10,12 +10,12 @@
 #include "query/inside.h"
 
 /* Adds the crossings that the filter left open; true when the point lies on one of these faces. */
-static bool decide_open(const ebpo_subtree *s, const uint32_t *open, uint32_t count,
+static bool decide_open(const ebpo_accel *s, const uint32_t *open, uint32_t count,
                         const ebpo_axis_segment *g, const double *point, int32_t *sum)
 {
     for (uint32_t i = 0; i < count; i++) {
         double t[3][3];
-        ebpo_subtree_triangle(s, open[i], t);
+        ebpo_accel_triangle(s, open[i], t);
         if (point && ebpo_point_on_triangle(point, t[0], t[1], t[2]))
             return true;
         *sum += ebpo_axis_crossing(g->from, g->to, g->axis, t[0], t[1], t[2]);
@@ -25,7 +25,7 @@ static bool decide_open(const ebpo_subtree *s, const uint32_t *open, uint32_t co
 
 /* Crossings along a segment; `point` (its end) is looked for on the faces, NULL: is not. False when
  * it lies on one. */
-static bool cross(const ebpo_kernels *kernels, const ebpo_subtree *s, const ebpo_subtree_leaf *leaf,
+static bool cross(const ebpo_kernels *kernels, const ebpo_accel *s, const ebpo_accel_leaf *leaf,
                   const ebpo_axis_segment *g, const double *point, uint32_t *open, int32_t *sum)
 {
     uint32_t count = 0;
@@ -47,7 +47,7 @@ static uint8_t listed_cell(double xi)
     return cells < 0 ? 0 : cells < 255 ? (uint8_t)cells : 255;
 }
 
-static void find_in_leaf(const ebpo_subtree *s, ebpo_cell cell, const double p[3], in_leaf *out)
+static void find_in_leaf(const ebpo_accel *s, ebpo_cell cell, const double p[3], in_leaf *out)
 {
     ebpo_cell_bounds(&s->box, cell, out->low, out->high);
     for (int k = 0; k < 3; k++) {
@@ -57,7 +57,7 @@ static void find_in_leaf(const ebpo_subtree *s, ebpo_cell cell, const double p[3
 }
 
 /* From the leaf's free wall to the point. */
-static ebpo_axis_segment wall_segment(const ebpo_subtree_leaf *leaf, const in_leaf *i,
+static ebpo_axis_segment wall_segment(const ebpo_accel_leaf *leaf, const in_leaf *i,
                                       const double p[3])
 {
     int axis = leaf->wall / 2;
@@ -77,9 +77,8 @@ static ebpo_axis_segment wall_segment(const ebpo_subtree_leaf *leaf, const in_le
 }
 
 /* One segment from a wall that no face meets. */
-static bool from_wall(const ebpo_kernels *kernels, const ebpo_subtree *s,
-                      const ebpo_subtree_leaf *leaf, const in_leaf *i, const double p[3],
-                      uint32_t *open, int32_t *winding)
+static bool from_wall(const ebpo_kernels *kernels, const ebpo_accel *s, const ebpo_accel_leaf *leaf,
+                      const in_leaf *i, const double p[3], uint32_t *open, int32_t *winding)
 {
     ebpo_axis_segment g = wall_segment(leaf, i, p);
     int32_t sum;
@@ -91,8 +90,8 @@ static bool from_wall(const ebpo_kernels *kernels, const ebpo_subtree *s,
 
 /* Three segments from the lowest corner: format-spec, section 5. Faces that the point lies on come
  * up in the last one. */
-static bool from_corner(const ebpo_kernels *kernels, const ebpo_subtree *s,
-                        const ebpo_subtree_leaf *leaf, const in_leaf *i, const double p[3],
+static bool from_corner(const ebpo_kernels *kernels, const ebpo_accel *s,
+                        const ebpo_accel_leaf *leaf, const in_leaf *i, const double p[3],
                         uint32_t *open, int32_t *winding)
 {
     ebpo_axis_segment g = { { i->low[0], i->low[1], i->low[2] }, 0, 0, { 0, 0, 0 }, { 0, 0, 0 } };
@@ -112,7 +111,7 @@ static bool from_corner(const ebpo_kernels *kernels, const ebpo_subtree *s,
 }
 
 /* Signs of the planes alone; false when one is too close to tell. */
-static bool from_planes(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const in_leaf *in,
+static bool from_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const in_leaf *in,
                         int32_t *winding)
 {
     float xi[3] = { (float)in->xi[0], (float)in->xi[1], (float)in->xi[2] }, most = -INFINITY;
@@ -131,9 +130,9 @@ static bool from_planes(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, co
     return most < -EBPO_PLANE_ERROR;
 }
 
-static ebpo_status answer_in_leaf(ebpo_context *context, const ebpo_subtree *s,
-                                  const ebpo_subtree_leaf *leaf, const in_leaf *i,
-                                  const double p[3], ebpo_inside_result *out, ebpo_error *error)
+static ebpo_status answer_in_leaf(ebpo_context *context, const ebpo_accel *s,
+                                  const ebpo_accel_leaf *leaf, const in_leaf *i, const double p[3],
+                                  ebpo_inside_result *out, ebpo_error *error)
 {
     const ebpo_model *m = context->model;
     if (!ebpo_grow(&context->open, &context->open_capacity, (uint64_t)leaf->blocks * EBPO_BLOCK,
@@ -154,7 +153,7 @@ static ebpo_status answer_in_leaf(ebpo_context *context, const ebpo_subtree *s,
     return EBPO_OK;
 }
 
-ebpo_status ebpo_inside_leaf(ebpo_context *context, const ebpo_subtree *s, uint32_t number,
+ebpo_status ebpo_inside_leaf(ebpo_context *context, const ebpo_accel *s, uint32_t number,
                              ebpo_cell cell, const double p[3], ebpo_inside_result *out,
                              ebpo_error *error)
 {
@@ -171,7 +170,7 @@ void ebpo_inside_uniform(const ebpo_context *context, uint32_t entry, ebpo_insid
                                  winding, 0 };
 }
 
-ebpo_status ebpo_inside_subtree(ebpo_context *context, const ebpo_subtree *s, const uint32_t at[3],
+ebpo_status ebpo_inside_subtree(ebpo_context *context, const ebpo_accel *s, const uint32_t at[3],
                                 const double p[3], ebpo_inside_result *out, ebpo_error *error)
 {
     int fine = context->model->info->level_count - 1;
@@ -198,12 +197,12 @@ typedef struct lane {
 
 /* A point that ended in a leaf. */
 typedef struct waiting {
-    const ebpo_subtree_leaf *leaf;
+    const ebpo_accel_leaf *leaf;
     unsigned point;
     in_leaf in;
 } waiting;
 
-static void start_lanes(const ebpo_subtree *s, int fine, const double *points, unsigned count,
+static void start_lanes(const ebpo_accel *s, int fine, const double *points, unsigned count,
                         lane *l)
 {
     for (unsigned i = 0; i < count; i++) {
@@ -221,7 +220,7 @@ static void start_lanes(const ebpo_subtree *s, int fine, const double *points, u
         }
 }
 
-static void descend_together(const ebpo_subtree *s, int fine, unsigned count, lane *l)
+static void descend_together(const ebpo_accel *s, int fine, unsigned count, lane *l)
 {
     for (bool more = true; more;) {
         more = false;
@@ -232,9 +231,9 @@ static void descend_together(const ebpo_subtree *s, int fine, unsigned count, la
 }
 
 /* The cache lines of the blocks that the point's segment may meet. */
-static void prefetch_blocks(const ebpo_subtree *s, const waiting *w, const double p[3])
+static void prefetch_blocks(const ebpo_accel *s, const waiting *w, const double p[3])
 {
-    const ebpo_subtree_leaf *leaf = w->leaf;
+    const ebpo_accel_leaf *leaf = w->leaf;
     size_t size = EBPO_BLOCK_NUMBERS * (s->wide ? sizeof *s->block64 : sizeof *s->block32);
     const char *blocks = s->wide ? (const char *)s->block64 : (const char *)s->block32;
     ebpo_axis_segment g = { .high = { 255, 255, 255 } };
@@ -248,7 +247,7 @@ static void prefetch_blocks(const ebpo_subtree *s, const waiting *w, const doubl
                 __builtin_prefetch(blocks + s->list[leaf->list + b].block * size + line);
 }
 
-static ebpo_status answer_waiting(ebpo_context *context, const ebpo_subtree *s, const waiting *w,
+static ebpo_status answer_waiting(ebpo_context *context, const ebpo_accel *s, const waiting *w,
                                   unsigned count, const double *points, ebpo_inside_result *out,
                                   ebpo_error *error)
 {
@@ -266,9 +265,8 @@ static ebpo_status answer_waiting(ebpo_context *context, const ebpo_subtree *s, 
     return status;
 }
 
-static ebpo_status inside_together(ebpo_context *context, const ebpo_subtree *s,
-                                   const double *points, unsigned count, ebpo_inside_result *out,
-                                   ebpo_error *error)
+static ebpo_status inside_together(ebpo_context *context, const ebpo_accel *s, const double *points,
+                                   unsigned count, ebpo_inside_result *out, ebpo_error *error)
 {
     lane l[TOGETHER];
     waiting w[TOGETHER];
@@ -300,7 +298,7 @@ static ebpo_status inside_together(ebpo_context *context, const ebpo_subtree *s,
 ebpo_status ebpo_inside_whole(ebpo_context *context, const double *points, uint64_t count,
                               ebpo_inside_result *out, ebpo_error *error)
 {
-    const ebpo_subtree *s = context->model->whole;
+    const ebpo_accel *s = context->model->whole;
     ebpo_status status = EBPO_OK;
     if (count == 1) {
         uint32_t at[3];

@@ -93,16 +93,16 @@ static ebpo_status leaf_from_file(asking *a, const ebpo_node *leaf, ebpo_inside_
 {
     ebpo_model *m = a->context->model;
     ebpo_slice slice;
-    ebpo_subtree *subtree;
+    ebpo_accel *subtree;
     ebpo_status status = ebpo_model_has_room(m, leaf, error);
     if (status == EBPO_OK)
         status = ebpo_slice_read(&slice, m->chunks, leaf, error);
     if (status == EBPO_OK)
-        status = ebpo_subtree_make(&subtree, &slice, m->info, false, 1, error);
+        status = ebpo_accel_make(&subtree, &slice, m->info, false, 1, error);
     if (status == EBPO_OK) {
         status = ebpo_inside_leaf(a->context, subtree, ebpo_entry_value(subtree->nodes.root),
                                   leaf->cell, a->p, out, error);
-        ebpo_subtree_free(subtree);
+        ebpo_accel_free(subtree);
     }
     return status;
 }
@@ -207,7 +207,7 @@ static ebpo_status walk_nodes(asking *a, ebpo_inside_result *out, ebpo_error *er
 
 /* The subtree that is in the context's hands and holds p, or NULL; *entry: what the levels above
  * say, when they decide it. */
-static const ebpo_subtree *held_around(const asking *a, uint32_t *entry)
+static const ebpo_accel *held_around(const asking *a, uint32_t *entry)
 {
     const ebpo_context *c = a->context;
     *entry = ebpo_entry(EBPO_ENTRY_BELOW, 0);
@@ -225,7 +225,7 @@ static bool answer_at_hand(asking *a, ebpo_inside_result *out, ebpo_status *stat
 {
     const ebpo_model *m = a->context->model;
     uint32_t entry;
-    const ebpo_subtree *held = held_around(a, &entry);
+    const ebpo_accel *held = held_around(a, &entry);
     *status = EBPO_OK;
     if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_UNIFORM) {
         ebpo_inside_uniform(a->context, entry, out);

@@ -4,7 +4,7 @@
 #ifndef EBPO_QUERY_KERNELS_H
 #define EBPO_QUERY_KERNELS_H
 
-#include "subtree/subtree.h"
+#include "accel/accel.h"
 
 /* A segment along an axis from `from` (on all three axes) up to coordinate `to`: predicates.h,
  * ebpo_axis_crossing. */
@@ -39,7 +39,7 @@ typedef struct ebpo_kernels {
      * cell (as ebpo_axis_crossing gives them) with the segment; lanes that are not certain are
      * appended to `open` as slots (room for count * 8), their number to *open_count. Every face on
      * which the segment's end at `to` or `from` lies is among them. */
-    int32_t (*crossings)(const ebpo_subtree *s, const ebpo_listed_block *blocks, uint32_t count,
+    int32_t (*crossings)(const ebpo_accel *s, const ebpo_listed_block *blocks, uint32_t count,
                          const ebpo_axis_segment *segment, uint32_t *open, uint32_t *open_count);
     /* Squared lower bounds of the distance to the eight children, in the frame; the result has a
      * bit for each child whose bound is at most `limit2`. */
@@ -48,7 +48,7 @@ typedef struct ebpo_kernels {
     /* Certain bounds of the distances to eight faces, in the frame; the result has a bit for each
      * face whose lower bound is at most `best`. Lanes without a face have none, or one with a lower
      * bound of infinity. */
-    unsigned (*faces)(const ebpo_subtree *s, uint32_t block, const ebpo_probe *probe, float best,
+    unsigned (*faces)(const ebpo_accel *s, uint32_t block, const ebpo_probe *probe, float best,
                       float low[8], float high[8]);
 } ebpo_kernels;
 

@@ -96,17 +96,17 @@ static int compare(const ebpo_nearest *n, const double triangle[3][3],
     return ebpo_triangle_distance_compare(n->p, triangle, (const double(*)[3])n->triangle);
 }
 
-static void try_face(ebpo_nearest *n, const ebpo_subtree *s, uint32_t slot)
+static void try_face(ebpo_nearest *n, const ebpo_accel *s, uint32_t slot)
 {
     uint32_t local = s->slot_face[slot];
     if (local == EBPO_NO_SLOT)
         return;
-    uint64_t file_face = ebpo_subtree_file_face(s, local);
+    uint64_t file_face = ebpo_accel_file_face(s, local);
     if (n->found && file_face == n->file_face)
         return;
     double triangle[3][3];
     ebpo_distance_bounds b;
-    ebpo_subtree_triangle(s, slot, triangle);
+    ebpo_accel_triangle(s, slot, triangle);
     ebpo_triangle_distance_bounds(n->p, (const double(*)[3])triangle, &b);
     if (b.lo > n->limit)
         return;
@@ -115,10 +115,10 @@ static void try_face(ebpo_nearest *n, const ebpo_subtree *s, uint32_t slot)
         if (sign > 0 || (sign == 0 && file_face > n->file_face))
             return;
     }
-    take(n, (const double(*)[3])triangle, &b, file_face, ebpo_subtree_source_face(s, local));
+    take(n, (const double(*)[3])triangle, &b, file_face, ebpo_accel_source_face(s, local));
 }
 
-void ebpo_nearest_leaf(ebpo_nearest *n, const ebpo_subtree *s, const ebpo_subtree_leaf *leaf)
+void ebpo_nearest_leaf(ebpo_nearest *n, const ebpo_accel *s, const ebpo_accel_leaf *leaf)
 {
     for (uint32_t b = 0; b < leaf->blocks; b++)
         for (unsigned lanes = s->list[leaf->list + b].lanes; lanes; lanes &= lanes - 1)
@@ -128,7 +128,7 @@ void ebpo_nearest_leaf(ebpo_nearest *n, const ebpo_subtree *s, const ebpo_subtre
 
 /* --- near: single precision --- */
 
-static bool make_probe(const ebpo_subtree *s, const double p[3], ebpo_probe *out)
+static bool make_probe(const ebpo_accel *s, const double p[3], ebpo_probe *out)
 {
     double most = 1;
     for (int k = 0; k < 3; k++) {
@@ -160,7 +160,7 @@ typedef struct candidate {
 typedef struct searching {
     ebpo_nearest *n;
     const ebpo_kernels *kernels;
-    const ebpo_subtree *s;
+    const ebpo_accel *s;
     ebpo_probe probe;
     float best;   /* some face is certainly not farther, or what is does not matter: in the frame */
     float limit2; /* what squared lower bounds are compared with */
@@ -292,7 +292,7 @@ static void search_near(searching *g)
 /* --- far: double precision, boxes only --- */
 
 /* Lower bound of the distance to a child's box, in the model's unit. */
-static double box_distance(const ebpo_subtree *s, const ebpo_bound *b, int lane, const double p[3])
+static double box_distance(const ebpo_accel *s, const ebpo_bound *b, int lane, const double p[3])
 {
     double most = 0, sum = 0, d[3];
     for (int k = 0; k < 3; k++) {
@@ -310,7 +310,7 @@ static double box_distance(const ebpo_subtree *s, const ebpo_bound *b, int lane,
     return most * sqrt(sum) * (1 - 0x1p-40);
 }
 
-static void search_far(ebpo_nearest *n, const ebpo_subtree *s, uint32_t child)
+static void search_far(ebpo_nearest *n, const ebpo_accel *s, uint32_t child)
 {
     if (child & EBPO_IS_BLOCK) {
         for (uint32_t lane = 0; lane < EBPO_BLOCK; lane++)
@@ -340,7 +340,7 @@ static void search_far(ebpo_nearest *n, const ebpo_subtree *s, uint32_t child)
     }
 }
 
-void ebpo_nearest_search(ebpo_nearest *n, const ebpo_context *context, const ebpo_subtree *s)
+void ebpo_nearest_search(ebpo_nearest *n, const ebpo_context *context, const ebpo_accel *s)
 {
     searching g;
     g.n = n;

@@ -26,10 +26,10 @@ void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint6
                              uint64_t source_face);
 
 /* Searches all faces of a subtree. */
-void ebpo_nearest_search(ebpo_nearest *n, const ebpo_context *context, const ebpo_subtree *s);
+void ebpo_nearest_search(ebpo_nearest *n, const ebpo_context *context, const ebpo_accel *s);
 
 /* Looks at the faces that a leaf lists. */
-void ebpo_nearest_leaf(ebpo_nearest *n, const ebpo_subtree *s, const ebpo_subtree_leaf *leaf);
+void ebpo_nearest_leaf(ebpo_nearest *n, const ebpo_accel *s, const ebpo_accel_leaf *leaf);
 
 /* The answer but for its sign; nothing within the limit: INFINITY. */
 void ebpo_nearest_end(const ebpo_nearest *n, double max_distance, ebpo_distance_result *out);

@@ -27,24 +27,24 @@ typedef struct gathering {
     bool no_memory;
 } gathering;
 
-static void try_block(gathering *g, const ebpo_subtree *s, uint32_t block)
+static void try_block(gathering *g, const ebpo_accel *s, uint32_t block)
 {
     for (uint32_t lane = 0; lane < EBPO_BLOCK && !g->no_memory; lane++) {
         uint32_t slot = block * EBPO_BLOCK + lane, local = s->slot_face[slot];
         double t[3][3];
         if (local == EBPO_NO_SLOT)
             return;
-        ebpo_subtree_triangle(s, slot, t);
+        ebpo_accel_triangle(s, slot, t);
         if (!ebpo_triangle_meets_box((const double(*)[3])t, g->min, g->max))
             continue;
         g->no_memory = !ebpo_grow(&g->list, &g->capacity, g->count + 1, sizeof *g->list);
         if (!g->no_memory)
             g->list[g->count++] =
-                (pair){ ebpo_subtree_file_face(s, local), ebpo_subtree_source_face(s, local) };
+                (pair){ ebpo_accel_file_face(s, local), ebpo_accel_source_face(s, local) };
     }
 }
 
-static void gather_bound(gathering *g, const ebpo_subtree *s, const double low[3],
+static void gather_bound(gathering *g, const ebpo_accel *s, const double low[3],
                          const double high[3], uint32_t child)
 {
     if (child & EBPO_IS_BLOCK) {
@@ -62,7 +62,7 @@ static void gather_bound(gathering *g, const ebpo_subtree *s, const double low[3
     }
 }
 
-static void gather_subtree(gathering *g, const ebpo_subtree *s)
+static void gather_subtree(gathering *g, const ebpo_accel *s)
 {
     double low[3], high[3];
     if (s->bound_count == 0)

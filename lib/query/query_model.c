@@ -47,12 +47,12 @@ static ebpo_status estimate_subtree(void *user, uint64_t key, uint64_t *peak, ui
     ebpo_slice_size size;
     ebpo_status status = ebpo_slice_measure(m->chunks, &m->top->below[key], &size, error);
     if (status == EBPO_OK)
-        ebpo_subtree_estimate(&size, m->info, keep, peak);
+        ebpo_accel_estimate(&size, m->info, keep, peak);
     return status;
 }
 
 /* Adds a subtree's leaves to what is in memory, or (sign -1) takes them away. */
-static void count_leaves(ebpo_model *m, const ebpo_subtree *s, uint64_t sign)
+static void count_leaves(ebpo_model *m, const ebpo_accel *s, uint64_t sign)
 {
     m->leaves += sign * s->leaf_count;
     m->leaves_one_wall += sign * s->one_wall;
@@ -65,10 +65,10 @@ static ebpo_status load_subtree(void *user, uint64_t key, void **item, uint64_t 
 {
     ebpo_model *m = user;
     ebpo_slice slice;
-    ebpo_subtree *subtree = NULL;
+    ebpo_accel *subtree = NULL;
     ebpo_status status = ebpo_slice_read(&slice, m->chunks, &m->top->below[key], error);
     if (status == EBPO_OK)
-        status = ebpo_subtree_make(&subtree, &slice, m->info, true, 1, error);
+        status = ebpo_accel_make(&subtree, &slice, m->info, true, 1, error);
     if (status == EBPO_OK)
         count_leaves(m, subtree, 1);
     *item = subtree;
@@ -80,7 +80,7 @@ static void release_subtree(void *user, void *item)
 {
     if (item)
         count_leaves(user, item, (uint64_t)-1);
-    ebpo_subtree_free(item);
+    ebpo_accel_free(item);
 }
 
 /* --- how much, and where to cut --- */
@@ -93,7 +93,7 @@ ebpo_status ebpo_model_has_room(const ebpo_model *m, const ebpo_node *leaf, ebpo
         m->options.memory ? ebpo_slice_measure(m->chunks, leaf, &size, error) : EBPO_OK;
     if (status != EBPO_OK || !m->options.memory)
         return status;
-    ebpo_subtree_estimate(&size, m->info, &keep, &peak);
+    ebpo_accel_estimate(&size, m->info, &keep, &peak);
     uint64_t taken = m->top->bytes + chunk_budget(m->options.memory);
     if (taken + peak <= m->options.memory)
         return EBPO_OK;
@@ -110,7 +110,7 @@ static int choose_cut(const ebpo_info *info, uint64_t budget)
 {
     ebpo_slice_size size = whole_size(info);
     uint64_t keep, peak;
-    ebpo_subtree_estimate(&size, info, &keep, &peak);
+    ebpo_accel_estimate(&size, info, &keep, &peak);
     for (int level = 1; level < info->level_count; level++) {
         uint64_t grays = info->level[level].gray_count;
         uint64_t top = ebpo_top_estimate(info, level);
@@ -136,7 +136,7 @@ static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
     ebpo_slice slice;
     ebpo_status status = ebpo_slice_read_all(&slice, m->file, m->options.threads, error);
     if (status == EBPO_OK)
-        status = ebpo_subtree_make(&m->whole, &slice, m->info, true, m->options.threads, error);
+        status = ebpo_accel_make(&m->whole, &slice, m->info, true, m->options.threads, error);
     if (m->whole)
         count_leaves(m, m->whole, 1);
     return status;
@@ -170,7 +170,7 @@ static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
     ebpo_slice_size size = whole_size(m->info);
     uint64_t keep, peak;
     size.outer = 0;
-    ebpo_subtree_estimate(&size, m->info, &keep, &peak);
+    ebpo_accel_estimate(&size, m->info, &keep, &peak);
     int deepest = m->info->level_count - 1;
     if (!(m->info->parts & EBPO_PART_MESH)) /* nothing could be loaded from below a cut level */
         return open_top(m, deepest, error);
@@ -227,7 +227,7 @@ void ebpo_model_free(ebpo_model *m)
     ebpo_cache_free(m->cache);
     ebpo_chunks_free(m->chunks);
     ebpo_top_free(m->top);
-    ebpo_subtree_free(m->whole);
+    ebpo_accel_free(m->whole);
     free(m);
 }
 
@@ -315,7 +315,7 @@ static ebpo_status too_little(const ebpo_model *m, uint32_t below, ebpo_error *e
                      m->options.memory, m->top->cut_level, least);
 }
 
-ebpo_status ebpo_context_subtree(ebpo_context *c, uint32_t below, ebpo_subtree **out,
+ebpo_status ebpo_context_subtree(ebpo_context *c, uint32_t below, ebpo_accel **out,
                                  ebpo_error *error)
 {
     const ebpo_model *m = c->model;

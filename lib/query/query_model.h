@@ -10,15 +10,15 @@
 #include "octree/rule.h"
 #include "query/kernels.h"
 #include "query/query_top.h"
-#include "subtree/subtree.h"
+#include "accel/accel.h"
 
 struct ebpo_model {
     const ebpo_file *file;
     const ebpo_info *info;
     ebpo_model_options options;
     const ebpo_kernels *kernels;
-    ebpo_subtree *whole; /* everything, or NULL: */
-    ebpo_top *top;       /* levels 0 .. cut level */
+    ebpo_accel *whole; /* everything, or NULL: */
+    ebpo_top *top;     /* levels 0 .. cut level */
     ebpo_chunks *chunks;
     ebpo_cache *cache; /* subtrees by their number in the top */
     double open_seconds;
@@ -30,7 +30,7 @@ typedef struct ebpo_ranked ebpo_ranked; /* query/query_node.h */
 
 struct ebpo_context {
     ebpo_model *model;
-    ebpo_subtree *pinned; /* the subtree last used, when it came from the cache */
+    ebpo_accel *pinned; /* the subtree last used, when it came from the cache */
     uint64_t pinned_key;
     uint32_t *open; /* slots that a filter left open */
     uint64_t open_capacity;
@@ -62,6 +62,6 @@ EBPO_MUST_USE ebpo_status ebpo_model_has_room(const ebpo_model *model, const ebp
 
 /* The subtree with this number, in memory until the context asks for another one. */
 EBPO_MUST_USE ebpo_status ebpo_context_subtree(ebpo_context *context, uint32_t below,
-                                               ebpo_subtree **out, ebpo_error *error);
+                                               ebpo_accel **out, ebpo_error *error);
 
 #endif

@@ -21,20 +21,20 @@ static ebpo_node node_of(const ebpo_model *model, uint32_t entry, ebpo_cell cell
 
 ebpo_node ebpo_model_root(const ebpo_model *model)
 {
-    return model->whole ? ebpo_subtree_root(model->whole)
+    return model->whole ? ebpo_accel_root(model->whole)
                         : node_of(model, model->top->nodes.root, (ebpo_cell){ 0, { 0, 0, 0 } });
 }
 
 ebpo_node ebpo_model_child(const ebpo_model *model, const ebpo_node *gray, unsigned octant)
 {
-    return gray->subtree ? ebpo_subtree_child(gray->subtree, gray, octant)
+    return gray->subtree ? ebpo_accel_child(gray->subtree, gray, octant)
                          : node_of(model, ebpo_table_child(&model->top->nodes, gray->entry, octant),
                                    ebpo_cell_child(gray->cell, octant));
 }
 
 ebpo_status ebpo_model_enter(ebpo_context *context, ebpo_node *node, ebpo_error *error)
 {
-    ebpo_subtree *subtree;
+    ebpo_accel *subtree;
     if (node->pruned)
         return ebpo_fail_pruned(context->model, node->cell, error);
     ebpo_status status =
@@ -54,7 +54,7 @@ const uint32_t *ebpo_model_planes(const ebpo_model *model, const ebpo_node *node
     bool below = ebpo_node_is_below(node);
     *count = 0;
     if (node->subtree)
-        return ebpo_subtree_planes(node->subtree, node, count);
+        return ebpo_accel_planes(node->subtree, node, count);
     if (!below && node->type != EBPO_GRAY)
         return NULL;
     ebpo_top_planes planes = below ? model->top->below_planes[value] : model->top->gray[value];

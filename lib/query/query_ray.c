@@ -74,19 +74,19 @@ static bool keep(casting *c, const met *m)
     return true;
 }
 
-static void try_block(casting *c, const ebpo_subtree *s, uint32_t block)
+static void try_block(casting *c, const ebpo_accel *s, uint32_t block)
 {
     for (uint32_t lane = 0; lane < EBPO_BLOCK; lane++) {
         uint32_t slot = block * EBPO_BLOCK + lane, local = s->slot_face[slot];
         met m;
         if (local == EBPO_NO_SLOT)
             return;
-        ebpo_subtree_triangle(s, slot, m.triangle);
+        ebpo_accel_triangle(s, slot, m.triangle);
         ebpo_ray_triangle(&c->ray, (const double(*)[3])m.triangle, &m.meeting);
         if (!m.meeting.meets)
             continue;
-        m.file_face = ebpo_subtree_file_face(s, local);
-        m.source_face = ebpo_subtree_source_face(s, local);
+        m.file_face = ebpo_accel_file_face(s, local);
+        m.source_face = ebpo_accel_source_face(s, local);
         c->no_memory = c->no_memory || !keep(c, &m);
     }
 }
@@ -113,7 +113,7 @@ typedef struct entered {
     uint32_t child;
 } entered;
 
-static void cast_bound(casting *c, const ebpo_subtree *s, const framed *f, uint32_t child)
+static void cast_bound(casting *c, const ebpo_accel *s, const framed *f, uint32_t child)
 {
     if (child & EBPO_IS_BLOCK) {
         try_block(c, s, child & ~EBPO_IS_BLOCK);
@@ -140,7 +140,7 @@ static void cast_bound(casting *c, const ebpo_subtree *s, const framed *f, uint3
             cast_bound(c, s, f, order[i].child);
 }
 
-static void cast_subtree(casting *c, const ebpo_subtree *s)
+static void cast_subtree(casting *c, const ebpo_accel *s)
 {
     framed f;
     double most = 2, longest = 0;

@@ -4,7 +4,7 @@
 #define EBPO_QUERY_TOP_H
 
 #include "container/slice.h"
-#include "subtree/subtree.h"
+#include "accel/accel.h"
 
 typedef struct ebpo_top_planes {
     uint32_t first;

@@ -42,7 +42,7 @@ static void fail(const ebpo_error *error)
 
 static void sort_points(const ebpo_model *m, uint64_t points, bucket *buckets)
 {
-    const ebpo_subtree *s = m->whole;
+    const ebpo_accel *s = m->whole;
     int fine = m->info->level_count - 1;
     uint64_t state = 1;
     for (uint64_t i = 0; i < points; i++) {
@@ -76,7 +76,7 @@ static double pass(ebpo_context *c, const bucket *b, ebpo_inside_result *out)
 static void measure(ebpo_context *c, bucket *b)
 {
     static ebpo_inside_result with[MOST], without[MOST];
-    ebpo_subtree *s = c->model->whole;
+    ebpo_accel *s = c->model->whole;
     uint8_t *kinds = malloc(s->leaf_count);
     if (!kinds)
         exit(EXIT_FAILURE);

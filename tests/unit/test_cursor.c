@@ -121,7 +121,7 @@ typedef struct whole {
     ebpo_level_ranks ranks[EBPO_LEVELS_MAX];
     ebpo_level_nodes nodes;
     ebpo_chunks *chunks;
-    ebpo_subtree *subtree;
+    ebpo_accel *subtree;
     ebpo_model *model;
     ebpo_context *context;
     twin twin;
@@ -146,7 +146,7 @@ static void whole_open(whole *w, const char *name, int cut_level, bool shape)
         return;
     if (ebpo_file_info(w->file)->parts & EBPO_PART_MESH) {
         fine(ebpo_slice_read_all(&slice, w->file, 1, &error), &error);
-        fine(ebpo_subtree_make(&w->subtree, &slice, ebpo_file_info(w->file), true, 1, &error),
+        fine(ebpo_accel_make(&w->subtree, &slice, ebpo_file_info(w->file), true, 1, &error),
              &error);
     }
     options.cut_level = cut_level;
@@ -159,7 +159,7 @@ static void whole_close(whole *w)
 {
     ebpo_context_free(w->context);
     ebpo_model_free(w->model);
-    ebpo_subtree_free(w->subtree);
+    ebpo_accel_free(w->subtree);
     ebpo_chunks_free(w->chunks);
     for (int i = 0; i < EBPO_LEVELS_MAX; i++)
         ebpo_level_ranks_free(&w->ranks[i]);
@@ -186,7 +186,7 @@ static void begin(whole *w, holder which, ebpo_cursor *c)
         ebpo_cursor_begin(c, &ebpo_chunks_source, w->chunks, root);
         break;
     case SUBTREE:
-        ebpo_cursor_begin(c, &ebpo_subtree_source, w->subtree, ebpo_subtree_root(w->subtree));
+        ebpo_cursor_begin(c, &ebpo_accel_source, w->subtree, ebpo_accel_root(w->subtree));
         break;
     default:
         ebpo_cursor_begin(c, &ebpo_context_source, w->context, ebpo_model_root(w->model));

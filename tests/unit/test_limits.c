@@ -25,7 +25,7 @@
 #include "scratch.h"
 #include "stream/frontier.h"
 #include "stream/partial_tree.h"
-#include "subtree/subtree_parts.h"
+#include "accel/accel_parts.h"
 
 static const uint64_t TWO32 = UINT64_C(1) << 32;
 static const char *path;
@@ -335,24 +335,24 @@ static ebpo_slice fake_slice(void)
 START_TEST(subtrees_refuse_what_they_cannot_number)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_subtree *subtree;
+    ebpo_accel *subtree;
     ebpo_info *info = head_of(3, 1);
     info->solid = false;
     ebpo_slice slice = fake_slice();
-    ck_assert_msg(ebpo_subtree_make(&subtree, &slice, info, true, 1, &error) == EBPO_OK, "%s",
+    ck_assert_msg(ebpo_accel_make(&subtree, &slice, info, true, 1, &error) == EBPO_OK, "%s",
                   error.message);
-    ebpo_subtree_free(subtree);
+    ebpo_accel_free(subtree);
     slice = fake_slice();
     slice.mesh.face_count = UINT64_C(1) << 31; /* faces are numbered in 31 bits */
-    ck_assert_int_eq(ebpo_subtree_make(&subtree, &slice, info, true, 1, &error), EBPO_E_LIMIT);
+    ck_assert_int_eq(ebpo_accel_make(&subtree, &slice, info, true, 1, &error), EBPO_E_LIMIT);
     slice = fake_slice();
     slice.level[0].plane_count = TWO32; /* planes in 32 */
-    ck_assert_int_eq(ebpo_subtree_make(&subtree, &slice, info, true, 1, &error), EBPO_E_LIMIT);
+    ck_assert_int_eq(ebpo_accel_make(&subtree, &slice, info, true, 1, &error), EBPO_E_LIMIT);
     ck_assert_msg(strstr(error.message, "planes") != NULL, "%s", error.message);
     slice = fake_slice();
     slice.level[1].leaf_count = slice.level[1].group_count = EBPO_ENTRY_ZERO; /* nodes in 29 */
     slice.level_count = 2;
-    ck_assert_int_eq(ebpo_subtree_make(&subtree, &slice, info, true, 1, &error), EBPO_E_LIMIT);
+    ck_assert_int_eq(ebpo_accel_make(&subtree, &slice, info, true, 1, &error), EBPO_E_LIMIT);
     ck_assert_msg(strstr(error.message, "nodes") != NULL, "%s", error.message);
     free(info);
 }
@@ -367,7 +367,7 @@ START_TEST(estimates_of_billions_do_not_wrap)
                              .refs = UINT64_C(1) << 36,
                              .new_faces = TWO32 - 2,
                              .outer = UINT64_C(1) << 36 };
-    ebpo_subtree_estimate(&size, info, &keep, &peak);
+    ebpo_accel_estimate(&size, info, &keep, &peak);
     ck_assert_uint_gt(keep, size.refs * sizeof(ebpo_listed_block) +
                                 size.outer / 4 * EBPO_BLOCK_NUMBERS * 4);
     ck_assert_uint_gt(peak, keep);

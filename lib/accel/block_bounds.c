@@ -9,7 +9,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "subtree/subtree_parts.h"
+#include "accel/accel_parts.h"
 
 /* Above so many blocks the slab is left away (a ball takes its place): such patches curve too much
  * for one. */
@@ -22,7 +22,7 @@ static const double slab_reach = 2;
 static const double slack = 0x1p-22;
 
 typedef struct job {
-    ebpo_subtree *s;
+    ebpo_accel *s;
     const ebpo_layout *layout;
 } job;
 
@@ -36,7 +36,7 @@ typedef struct lanes {
     double x[3][3][EBPO_BLOCK];
 } lanes;
 
-static void load_lanes(const ebpo_subtree *s, uint32_t block, lanes *out)
+static void load_lanes(const ebpo_accel *s, uint32_t block, lanes *out)
 {
     for (int i = 0; i < 9; i++) {
         uint64_t at = (uint64_t)block * EBPO_BLOCK_NUMBERS + (uint64_t)i * EBPO_BLOCK;
@@ -125,7 +125,7 @@ static void set_child(ebpo_bound *b, int lane, const extent *e, const float axis
     b->half[lane] = up((w->to - w->from) / 2 + slack);
 }
 
-static void bound_blocks(const ebpo_subtree *s, ebpo_bound *b, int lane, uint32_t first,
+static void bound_blocks(const ebpo_accel *s, ebpo_bound *b, int lane, uint32_t first,
                          uint32_t last)
 {
     extent e = { { INFINITY, INFINITY, INFINITY },
@@ -194,8 +194,8 @@ static ebpo_status bound_nodes(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-ebpo_status ebpo_subtree_fill_bounds(ebpo_subtree *s, const ebpo_layout *layout, unsigned threads,
-                                     ebpo_error *error)
+ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout, unsigned threads,
+                                   ebpo_error *error)
 {
     s->bound_count = (uint32_t)layout->bound_count;
     s->top = layout->top;

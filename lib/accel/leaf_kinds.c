@@ -18,7 +18,7 @@
 #include "base/parallel.h"
 #include "geom/min_max.h"
 #include "geom/predicates.h"
-#include "subtree/subtree_parts.h"
+#include "accel/accel_parts.h"
 
 enum { FACES_MAX = 64 };
 
@@ -38,7 +38,7 @@ typedef struct piece {
 } piece;
 
 typedef struct job {
-    ebpo_subtree *s;
+    ebpo_accel *s;
     const ebpo_cell *cells;
     piece *piece;
 } job;
@@ -53,7 +53,7 @@ typedef struct block_boxes {
 
 /* Finds which of the faces listed in a block have boxes that meet the cell, and which walls these
  * boxes come to (bit 2 axis + side). Exact comparisons. */
-static void bound_block(const ebpo_subtree *s, const ebpo_listed_block *listed, const double low[3],
+static void bound_block(const ebpo_accel *s, const ebpo_listed_block *listed, const double low[3],
                         const double high[3], block_boxes *out, unsigned *walls)
 {
     int away[EBPO_BLOCK] = { 0 }, touches[EBPO_BLOCK] = { 0 };
@@ -105,10 +105,10 @@ static void set_listed_box(ebpo_listed_block *out, const block_boxes *b, const d
     }
 }
 
-static void add_face(const ebpo_subtree *s, uint32_t slot, leaf_faces *f)
+static void add_face(const ebpo_accel *s, uint32_t slot, leaf_faces *f)
 {
     double t[3][3];
-    ebpo_subtree_triangle(s, slot, t);
+    ebpo_accel_triangle(s, slot, t);
     for (int i = 0; i < 9; i++)
         f->p[f->count][i / 3][i % 3] = (t[i / 3][i % 3] - f->low[i % 3]) * f->inverse[i % 3];
     f->slot[f->count++] = slot;
@@ -116,7 +116,7 @@ static void add_face(const ebpo_subtree *s, uint32_t slot, leaf_faces *f)
 
 /* Gathers the faces whose boxes meet the cell, the walls that they come to, and the boxes of the
  * list. False when they are not to be had: too many, or a cell too small for what follows. */
-static bool gather(ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const double low[3],
+static bool gather(ebpo_accel *s, const ebpo_accel_leaf *leaf, const double low[3],
                    const double high[3], leaf_faces *f, unsigned *walls)
 {
     bool fine = true;
@@ -145,7 +145,7 @@ static bool gather(ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const double 
 }
 
 /* Crossings of the leaf's faces with a segment along an axis. */
-static int32_t crossings(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, const double from[3],
+static int32_t crossings(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const double from[3],
                          double to, int axis)
 {
     int32_t sum = 0;
@@ -153,8 +153,7 @@ static int32_t crossings(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, c
         const ebpo_listed_block *listed = &s->list[leaf->list + b];
         for (unsigned lanes = listed->lanes; lanes; lanes &= lanes - 1) {
             double t[3][3];
-            ebpo_subtree_triangle(s, listed->block * EBPO_BLOCK + (unsigned)__builtin_ctz(lanes),
-                                  t);
+            ebpo_accel_triangle(s, listed->block * EBPO_BLOCK + (unsigned)__builtin_ctz(lanes), t);
             sum += ebpo_axis_crossing(from, to, axis, t[0], t[1], t[2]);
         }
     }
@@ -162,7 +161,7 @@ static int32_t crossings(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, c
 }
 
 /* From the lowest corner to any shifted point of the cell, axis by axis. */
-static int32_t winding_at(const ebpo_subtree *s, const ebpo_subtree_leaf *leaf, int32_t at_corner,
+static int32_t winding_at(const ebpo_accel *s, const ebpo_accel_leaf *leaf, int32_t at_corner,
                           const double low[3], const double p[3])
 {
     double from[3] = { low[0], low[1], low[2] };
@@ -180,11 +179,11 @@ typedef struct plane {
 
 /* The plane of a face in the cell's coordinates, 1-norm 1. False when rounding could have touched
  * it: a sliver, or corners far outside the cell. */
-static bool face_plane(const ebpo_subtree *s, const leaf_faces *f, int face, plane *out)
+static bool face_plane(const ebpo_accel *s, const leaf_faces *f, int face, plane *out)
 {
     const double(*p)[3] = (const double(*)[3])f->p[face];
     double t[3][3], e[3], g[3], norm = 0, products = 0, reach = 0;
-    ebpo_subtree_triangle(s, f->slot[face], t);
+    ebpo_accel_triangle(s, f->slot[face], t);
     for (int k = 0; k < 3; k++) { /* of the corners as they are: those in the cell's coordinates are
                                      rounded, which short edges do not stand */
         e[k] = (t[1][k] - t[0][k]) * f->inverse[k];
@@ -211,11 +210,11 @@ static bool face_plane(const ebpo_subtree *s, const leaf_faces *f, int face, pla
 }
 
 /* Exact side of a corner of face j with regard to the plane of face i: -1 below, 1 above. */
-static int exact_side(const ebpo_subtree *s, uint32_t plane_slot, uint32_t point_slot, int corner)
+static int exact_side(const ebpo_accel *s, uint32_t plane_slot, uint32_t point_slot, int corner)
 {
     double a[3][3], b[3][3];
-    ebpo_subtree_triangle(s, plane_slot, a);
-    ebpo_subtree_triangle(s, point_slot, b);
+    ebpo_accel_triangle(s, plane_slot, a);
+    ebpo_accel_triangle(s, point_slot, b);
     for (int i = 0; i < 3; i++) /* neighbours share corners */
         if (a[i][0] == b[corner][0] && a[i][1] == b[corner][1] && a[i][2] == b[corner][2])
             return 0;
@@ -224,7 +223,7 @@ static int exact_side(const ebpo_subtree *s, uint32_t plane_slot, uint32_t point
 
 /* Adds up on which sides of plane i the faces lie: bit 0 some corner above, bit 1 some corner
  * below. */
-static unsigned sides_of(const ebpo_subtree *s, const leaf_faces *f, int i, const plane *q,
+static unsigned sides_of(const ebpo_accel *s, const leaf_faces *f, int i, const plane *q,
                          unsigned wanted)
 {
     unsigned sides = 0;
@@ -242,7 +241,7 @@ static unsigned sides_of(const ebpo_subtree *s, const leaf_faces *f, int i, cons
     return sides;
 }
 
-static bool same_plane(const ebpo_subtree *s, const leaf_faces *f, int i, int j)
+static bool same_plane(const ebpo_accel *s, const leaf_faces *f, int i, int j)
 {
     for (int c = 0; c < 3; c++)
         if (exact_side(s, f->slot[i], f->slot[j], c) != 0)
@@ -252,7 +251,7 @@ static bool same_plane(const ebpo_subtree *s, const leaf_faces *f, int i, int j)
 
 /* All distinct planes of the leaf when it is convex (`flip` 1) or concave (-1, planes turned). The
  * number of planes, or 0. */
-static int collect_planes(const ebpo_subtree *s, const leaf_faces *f, plane *out, int *flip)
+static int collect_planes(const ebpo_accel *s, const leaf_faces *f, plane *out, int *flip)
 {
     int count = 0, of_face[EBPO_KIND_PLANES_MAX];
     unsigned allowed = 3; /* bit 0: convex is still possible, bit 1: concave */
@@ -298,7 +297,7 @@ static double within_cell(double x) { return x < 0 ? 0 : x > 1 ? 1 : x; }
 
 /* Winding numbers in P and in the rest of the cell, from the cell's corners and, if none of them is
  * in P, from a point near the middle of the faces. False when that does not decide it. */
-static bool find_windings(const ebpo_subtree *s, ebpo_subtree_leaf *leaf, int32_t at_corner,
+static bool find_windings(const ebpo_accel *s, ebpo_accel_leaf *leaf, int32_t at_corner,
                           const leaf_faces *f, const plane *planes, int count, int flip)
 {
     bool have_inner = false, have_outer = false, certain;
@@ -335,8 +334,7 @@ static bool find_windings(const ebpo_subtree *s, ebpo_subtree_leaf *leaf, int32_
     return have_outer;
 }
 
-static bool keep_planes(piece *out, ebpo_subtree_leaf *leaf, const plane *planes, int count,
-                        int flip)
+static bool keep_planes(piece *out, ebpo_accel_leaf *leaf, const plane *planes, int count, int flip)
 {
     uint64_t groups = (uint64_t)(count + 3) / 4;
     if (!ebpo_grow(&out->planes, &out->capacity, out->count + groups, sizeof *out->planes))
@@ -367,7 +365,7 @@ static uint8_t choose_wall(unsigned walls)
     return open ? (uint8_t)__builtin_ctz(open) : EBPO_NO_WALL;
 }
 
-static bool classify(ebpo_subtree *s, ebpo_subtree_leaf *leaf, const ebpo_cell *cell, piece *out)
+static bool classify(ebpo_accel *s, ebpo_accel_leaf *leaf, const ebpo_cell *cell, piece *out)
 {
     double low[3], high[3];
     leaf_faces f;
@@ -405,7 +403,7 @@ static ebpo_status classify_leaves(void *context, uint64_t begin, uint64_t end, 
     return EBPO_OK;
 }
 
-static ebpo_status join_pieces(ebpo_subtree *s, const job *j, uint64_t pieces, ebpo_error *error)
+static ebpo_status join_pieces(ebpo_accel *s, const job *j, uint64_t pieces, ebpo_error *error)
 {
     for (uint64_t i = 0; i < pieces; i++)
         s->plane_groups += j->piece[i].count;
@@ -428,8 +426,8 @@ static ebpo_status join_pieces(ebpo_subtree *s, const job *j, uint64_t pieces, e
     return EBPO_OK;
 }
 
-ebpo_status ebpo_subtree_fill_kinds(ebpo_subtree *s, const ebpo_cell *cells, unsigned threads,
-                                    ebpo_error *error)
+ebpo_status ebpo_accel_fill_kinds(ebpo_accel *s, const ebpo_cell *cells, unsigned threads,
+                                  ebpo_error *error)
 {
     if (!s->solid || s->leaf_count == 0)
         return EBPO_OK;

@@ -7,10 +7,10 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "subtree/subtree_parts.h"
+#include "accel/accel_parts.h"
 
 typedef struct job {
-    ebpo_subtree *s;
+    ebpo_accel *s;
     const ebpo_mesh *mesh;
     const ebpo_layout *layout;
 } job;
@@ -36,7 +36,7 @@ static ebpo_status fill(void *context, uint64_t begin, uint64_t end, unsigned wo
     (void)worker;
     (void)error;
     job *j = context;
-    ebpo_subtree *s = j->s;
+    ebpo_accel *s = j->s;
     for (uint64_t b = begin; b < end; b++)
         for (unsigned lane = 0; lane < EBPO_BLOCK; lane++) {
             uint32_t face = j->layout->block_begin[b] + lane;
@@ -57,8 +57,8 @@ static ebpo_status fill(void *context, uint64_t begin, uint64_t end, unsigned wo
     return EBPO_OK;
 }
 
-ebpo_status ebpo_subtree_fill_blocks(ebpo_subtree *s, const ebpo_slice *slice,
-                                     const ebpo_layout *layout, unsigned threads, ebpo_error *error)
+ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_slice *slice,
+                                   const ebpo_layout *layout, unsigned threads, ebpo_error *error)
 {
     uint64_t numbers = layout->block_count * EBPO_BLOCK_NUMBERS,
              size = s->wide ? sizeof(double) : sizeof(float);

@@ -5,10 +5,10 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "octree/node_types.h"
-#include "subtree/subtree_parts.h"
+#include "accel/accel_parts.h"
 
 typedef struct walk {
-    ebpo_subtree *s;
+    ebpo_accel *s;
     const ebpo_slice *slice;
     const uint32_t *slot_of; /* [local face] */
     ebpo_cell *cells;
@@ -32,9 +32,9 @@ static int compare_numbers(const void *a, const void *b)
 
 static bool same_block(uint64_t a, uint64_t b) { return a >> EBPO_BLOCK == b >> EBPO_BLOCK; }
 
-static void put_list(walk *w, ebpo_subtree_leaf *leaf, uint64_t count)
+static void put_list(walk *w, ebpo_accel_leaf *leaf, uint64_t count)
 {
-    ebpo_subtree *s = w->s;
+    ebpo_accel *s = w->s;
     uint64_t kept = 0;
     if (count)
         qsort(w->scratch, count, sizeof *w->scratch, compare_numbers);
@@ -67,7 +67,7 @@ static void put_list(walk *w, ebpo_subtree_leaf *leaf, uint64_t count)
  * become one entry at once. */
 static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank, uint32_t number)
 {
-    ebpo_subtree_leaf *leaf = &w->s->leaf[number];
+    ebpo_accel_leaf *leaf = &w->s->leaf[number];
     uint64_t refs = level->leaf_ref_count[rank], count = 0;
     if (!ebpo_grow(&w->scratch, &w->scratch_capacity, refs + level->leaf_new[rank],
                    sizeof *w->scratch)) {
@@ -136,7 +136,7 @@ static uint32_t walk_node(walk *w, int depth, ebpo_node_type type, ebpo_cell cel
 static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **slot_of)
 {
     const ebpo_slice *slice = w->slice;
-    ebpo_subtree *s = w->s;
+    ebpo_accel *s = w->s;
     uint64_t groups = 0, leaves = 0;
     for (int depth = 0; depth < slice->level_count; depth++) {
         w->group_begin[depth] = depth ? groups : 0;
@@ -165,8 +165,8 @@ static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **slot
     return EBPO_OK;
 }
 
-ebpo_status ebpo_subtree_fill_nodes(ebpo_subtree *s, const ebpo_slice *slice,
-                                    const ebpo_layout *layout, ebpo_cell **cells, ebpo_error *error)
+ebpo_status ebpo_accel_fill_nodes(ebpo_accel *s, const ebpo_slice *slice, const ebpo_layout *layout,
+                                  ebpo_cell **cells, ebpo_error *error)
 {
     walk w = { .s = s, .slice = slice, .status = EBPO_OK, .error = error };
     uint32_t *slot_of = NULL;

@@ -1,8 +1,8 @@
 /* The stages of making a subtree. */
-#ifndef EBPO_SUBTREE_PARTS_H
-#define EBPO_SUBTREE_PARTS_H
+#ifndef EBPO_ACCEL_PARTS_H
+#define EBPO_ACCEL_PARTS_H
 
-#include "subtree/subtree.h"
+#include "accel/accel.h"
 
 /* Faces to blocks and blocks to a hierarchy: only which goes where; nothing is computed from
  * coordinates. One walk through the tree. */
@@ -25,19 +25,19 @@ EBPO_MUST_USE ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *s
 void ebpo_layout_free(ebpo_layout *layout);
 
 /* Fills blocks and slots (parallel). */
-EBPO_MUST_USE ebpo_status ebpo_subtree_fill_blocks(ebpo_subtree *s, const ebpo_slice *slice,
-                                                   const ebpo_layout *layout, unsigned threads,
-                                                   ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_slice *slice,
+                                                 const ebpo_layout *layout, unsigned threads,
+                                                 ebpo_error *error);
 /* Bounds of the hierarchy, from the blocks (parallel). */
-EBPO_MUST_USE ebpo_status ebpo_subtree_fill_bounds(ebpo_subtree *s, const ebpo_layout *layout,
-                                                   unsigned threads, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout,
+                                                 unsigned threads, ebpo_error *error);
 /* Child tables and leaf records with their lists of blocks (one walk); cells: [leaf_count] the
  * leaves' cells. */
-EBPO_MUST_USE ebpo_status ebpo_subtree_fill_nodes(ebpo_subtree *s, const ebpo_slice *slice,
-                                                  const ebpo_layout *layout, ebpo_cell **cells,
-                                                  ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_accel_fill_nodes(ebpo_accel *s, const ebpo_slice *slice,
+                                                const ebpo_layout *layout, ebpo_cell **cells,
+                                                ebpo_error *error);
 /* Free walls and kinds (parallel). */
-EBPO_MUST_USE ebpo_status ebpo_subtree_fill_kinds(ebpo_subtree *s, const ebpo_cell *cells,
-                                                  unsigned threads, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_accel_fill_kinds(ebpo_accel *s, const ebpo_cell *cells,
+                                                unsigned threads, ebpo_error *error);
 
 #endif

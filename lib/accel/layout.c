@@ -7,7 +7,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "octree/node_types.h"
-#include "subtree/subtree_parts.h"
+#include "accel/accel_parts.h"
 
 /* What a walk brings up from a node: either up to eight faces that are no block yet, or up to eight
  * members of the hierarchy. */

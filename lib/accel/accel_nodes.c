@@ -1,26 +1,23 @@
 #include <string.h>
 
-#include "subtree/subtree.h"
+#include "accel/accel.h"
 
-static ebpo_node node_of(const ebpo_subtree *s, uint32_t entry, ebpo_cell cell)
+static ebpo_node node_of(const ebpo_accel *s, uint32_t entry, ebpo_cell cell)
 {
     ebpo_node node = ebpo_entry_node(entry, cell, (ebpo_rule)s->rule);
     node.subtree = s;
     return node;
 }
 
-ebpo_node ebpo_subtree_root(const ebpo_subtree *s)
-{
-    return node_of(s, s->nodes.root, s->root.cell);
-}
+ebpo_node ebpo_accel_root(const ebpo_accel *s) { return node_of(s, s->nodes.root, s->root.cell); }
 
-ebpo_node ebpo_subtree_child(const ebpo_subtree *s, const ebpo_node *gray, unsigned octant)
+ebpo_node ebpo_accel_child(const ebpo_accel *s, const ebpo_node *gray, unsigned octant)
 {
     return node_of(s, ebpo_table_child(&s->nodes, gray->entry, octant),
                    ebpo_cell_child(gray->cell, octant));
 }
 
-const uint32_t *ebpo_subtree_planes(const ebpo_subtree *s, const ebpo_node *node, unsigned *count)
+const uint32_t *ebpo_accel_planes(const ebpo_accel *s, const ebpo_node *node, unsigned *count)
 {
     uint32_t number = ebpo_entry_value(node->entry);
     *count = 0;
@@ -36,7 +33,7 @@ static ebpo_status children(void *holder, ebpo_node *gray, ebpo_node child[8], e
 {
     (void)error;
     for (unsigned octant = 0; octant < 8 && !gray->pruned; octant++)
-        child[octant] = ebpo_subtree_child(holder, gray, octant);
+        child[octant] = ebpo_accel_child(holder, gray, octant);
     return EBPO_OK;
 }
 
@@ -44,7 +41,7 @@ static ebpo_status planes(void *holder, const ebpo_node *node, uint32_t codes[EB
                           unsigned *count, ebpo_error *error)
 {
     (void)error;
-    const uint32_t *from = ebpo_subtree_planes(holder, node, count);
+    const uint32_t *from = ebpo_accel_planes(holder, node, count);
     if (*count)
         memcpy(codes, from, *count * sizeof *codes);
     return EBPO_OK;
@@ -58,4 +55,4 @@ static ebpo_status winding(void *holder, const ebpo_node *uniform, int32_t *out,
     return EBPO_OK;
 }
 
-const ebpo_node_source ebpo_subtree_source = { children, planes, winding };
+const ebpo_node_source ebpo_accel_source = { children, planes, winding };

@@ -7,8 +7,8 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
-#include "subtree/subtree_parts.h"
-#include "subtree/subtree.h"
+#include "accel/accel_parts.h"
+#include "accel/accel.h"
 
 /* Single precision does for blocks while its squares and cubes stay far from its ends; coordinates
  * beyond that, and doubles, take doubles. */
@@ -22,7 +22,7 @@ static bool needs_doubles(const ebpo_info *info)
     return info->double_coordinates || !(most < 0x1p40) || !(least > 0x1p-40);
 }
 
-static void make_frame(ebpo_subtree *s)
+static void make_frame(ebpo_accel *s)
 {
     double most = 0, low[3], high[3];
     ebpo_cell_bounds(&s->box, s->root.cell, low, high);
@@ -35,7 +35,7 @@ static void make_frame(ebpo_subtree *s)
     s->scale = ldexp(1, exponent < -1000 ? 1000 : exponent > 1000 ? -1000 : 1 - exponent);
 }
 
-static ebpo_status copy_planes(ebpo_subtree *s, const ebpo_slice *slice, ebpo_error *error)
+static ebpo_status copy_planes(ebpo_accel *s, const ebpo_slice *slice, ebpo_error *error)
 {
     uint64_t grays = 0, planes = 0, at = 0;
     for (int i = 0; i < slice->level_count; i++) {
@@ -66,7 +66,7 @@ static ebpo_status copy_planes(ebpo_subtree *s, const ebpo_slice *slice, ebpo_er
     return EBPO_OK;
 }
 
-static uint64_t count_bytes(const ebpo_subtree *s)
+static uint64_t count_bytes(const ebpo_accel *s)
 {
     uint64_t cells = s->nodes.grid_bits ? UINT64_C(1) << 3 * s->nodes.grid_bits : 0;
     uint64_t faces = s->face_source || s->outer ? (uint64_t)s->block_count * 8 : 0;
@@ -79,7 +79,7 @@ static uint64_t count_bytes(const ebpo_subtree *s)
            (s->gray_first ? (s->gray_count + s->gray_first[s->gray_count]) * 4 : 0);
 }
 
-static ebpo_status make(ebpo_subtree *s, ebpo_slice *slice, bool with_planes, unsigned threads,
+static ebpo_status make(ebpo_accel *s, ebpo_slice *slice, bool with_planes, unsigned threads,
                         ebpo_error *error)
 {
     ebpo_layout layout;
@@ -87,26 +87,26 @@ static ebpo_status make(ebpo_subtree *s, ebpo_slice *slice, bool with_planes, un
     ebpo_status status = ebpo_layout_make(&layout, slice, EBPO_BLOCKS_MOST, error);
     if (status != EBPO_OK)
         return status;
-    status = ebpo_subtree_fill_blocks(s, slice, &layout, threads, error);
+    status = ebpo_accel_fill_blocks(s, slice, &layout, threads, error);
     ebpo_mesh_free(&slice->mesh);
     if (status == EBPO_OK)
-        status = ebpo_subtree_fill_bounds(s, &layout, threads, error);
+        status = ebpo_accel_fill_bounds(s, &layout, threads, error);
     if (status == EBPO_OK)
-        status = ebpo_subtree_fill_nodes(s, slice, &layout, &cells, error);
+        status = ebpo_accel_fill_nodes(s, slice, &layout, &cells, error);
     ebpo_layout_free(&layout);
     if (status == EBPO_OK)
-        status = ebpo_subtree_fill_kinds(s, cells, threads, error);
+        status = ebpo_accel_fill_kinds(s, cells, threads, error);
     if (status == EBPO_OK && with_planes)
         status = copy_planes(s, slice, error);
     free(cells);
     return status;
 }
 
-ebpo_status ebpo_subtree_make(ebpo_subtree **out, ebpo_slice *slice, const ebpo_info *info,
-                              bool with_planes, unsigned threads, ebpo_error *error)
+ebpo_status ebpo_accel_make(ebpo_accel **out, ebpo_slice *slice, const ebpo_info *info,
+                            bool with_planes, unsigned threads, ebpo_error *error)
 {
     *out = NULL;
-    ebpo_subtree *s = ebpo_alloc_zero(1, sizeof *s);
+    ebpo_accel *s = ebpo_alloc_zero(1, sizeof *s);
     if (!s) {
         ebpo_slice_free(slice);
         return ebpo_fail_memory(error, sizeof *s);
@@ -131,7 +131,7 @@ ebpo_status ebpo_subtree_make(ebpo_subtree **out, ebpo_slice *slice, const ebpo_
     slice->outer = slice->face_source = NULL;
     ebpo_slice_free(slice);
     if (status != EBPO_OK) {
-        ebpo_subtree_free(s);
+        ebpo_accel_free(s);
         return status;
     }
     if (s->root.cell.level == 0)
@@ -141,7 +141,7 @@ ebpo_status ebpo_subtree_make(ebpo_subtree **out, ebpo_slice *slice, const ebpo_
     return EBPO_OK;
 }
 
-void ebpo_subtree_free(ebpo_subtree *s)
+void ebpo_accel_free(ebpo_accel *s)
 {
     if (!s)
         return;
@@ -162,13 +162,12 @@ void ebpo_subtree_free(ebpo_subtree *s)
 
 /* Blocks are more than half full but for the last of each leaf or list; lists name at most one
  * block for each listed face. */
-void ebpo_subtree_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
-                           uint64_t *peak)
+void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
+                         uint64_t *peak)
 {
     uint64_t wide = needs_doubles(info) ? 2 : 1, faces = size->new_faces + size->outer;
     uint64_t blocks = faces / 4 + 2, bounds = blocks / 3 + 2;
-    *keep = sizeof(ebpo_subtree) + size->groups * 64 +
-            size->leaves * (sizeof(ebpo_subtree_leaf) + 64) +
+    *keep = sizeof(ebpo_accel) + size->groups * 64 + size->leaves * (sizeof(ebpo_accel_leaf) + 64) +
             (size->refs + size->new_faces) * sizeof(ebpo_listed_block) +
             blocks * (EBPO_BLOCK_NUMBERS * 4 * wide + 32) + bounds * sizeof(ebpo_bound) + faces * 8;
     *peak = *keep + size->groups * 128 + size->leaves * 64 + faces * (12 + 36 * wide + 24) + 65536;

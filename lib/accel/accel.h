@@ -1,7 +1,8 @@
-/* A subtree (or a whole tree) decoded into the form that questions are asked of: child tables,
- * leaves with blocks of faces, and a bounding hierarchy. Immutable once made; any thread. */
-#ifndef EBPO_SUBTREE_SUBTREE_H
-#define EBPO_SUBTREE_SUBTREE_H
+/* Acceleration structures: a subtree (or a whole tree) decoded into the form that questions are
+ * asked of: child tables, leaves with blocks of faces, and a bounding hierarchy. Immutable once
+ * made; any thread. */
+#ifndef EBPO_ACCEL_ACCEL_H
+#define EBPO_ACCEL_ACCEL_H
 
 #include <ebpo/file.h>
 
@@ -33,7 +34,7 @@ typedef struct ebpo_listed_block {
 } ebpo_listed_block;
 enum { EBPO_LISTED_CELLS = 254 };
 
-typedef struct ebpo_subtree_leaf {
+typedef struct ebpo_accel_leaf {
     uint32_t list; /* its blocks are list[list .. list + blocks - 1] of the subtree */
     uint32_t blocks;
     uint8_t kind; /* ebpo_leaf_kind */
@@ -48,7 +49,7 @@ typedef struct ebpo_subtree_leaf {
     /* of kinds other than general: winding number where all planes say "below", elsewhere in the
      * cell */
     int32_t inner, outer;
-} ebpo_subtree_leaf;
+} ebpo_accel_leaf;
 
 /* Four planes n . xi - d in the cell's coordinates (0 .. 1 on each axis), |n0| + |n1| + |n2| = 1;
  * beyond EBPO_PLANE_ERROR the sign is certain. */
@@ -79,14 +80,14 @@ typedef struct ebpo_bound {
 #define EBPO_IS_BLOCK UINT32_C(0x80000000)
 #define EBPO_NO_CHILD UINT32_MAX
 
-typedef struct ebpo_subtree {
+typedef struct ebpo_accel {
     ebpo_node root;
     ebpo_box box; /* of the whole model */
     int deepest;  /* level of its deepest nodes */
     bool solid, has_planes;
     uint8_t rule; /* ebpo_rule */
     ebpo_node_table nodes;
-    ebpo_subtree_leaf *leaf;
+    ebpo_accel_leaf *leaf;
     uint32_t leaf_count;
     ebpo_listed_block *list; /* blocks of leaves */
     uint64_t list_count;
@@ -112,33 +113,33 @@ typedef struct ebpo_subtree {
     uint64_t gray_count;
     uint64_t kinds[5], one_wall;
     uint64_t bytes; /* of memory, all in all */
-} ebpo_subtree;
+} ebpo_accel;
 
 /* Makes it from a slice, which is consumed (freed, also on failure). `with_planes`: keep gray
  * nodes' planes. `threads` 0: all cores. */
-EBPO_MUST_USE ebpo_status ebpo_subtree_make(ebpo_subtree **out, ebpo_slice *slice,
-                                            const ebpo_info *info, bool with_planes,
-                                            unsigned threads, ebpo_error *error);
-void ebpo_subtree_free(ebpo_subtree *subtree);
+EBPO_MUST_USE ebpo_status ebpo_accel_make(ebpo_accel **out, ebpo_slice *slice,
+                                          const ebpo_info *info, bool with_planes, unsigned threads,
+                                          ebpo_error *error);
+void ebpo_accel_free(ebpo_accel *subtree);
 
 /* Bytes that the subtree will take, and that making it will take at most (the slice included).
  * Bounds from counts. */
-void ebpo_subtree_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
-                           uint64_t *peak);
+void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
+                         uint64_t *peak);
 
 /* --- its nodes (subtree_nodes.c); `entry` is what finds them --- */
 
-ebpo_node ebpo_subtree_root(const ebpo_subtree *subtree);
+ebpo_node ebpo_accel_root(const ebpo_accel *subtree);
 /* Child of a gray node that is not pruned. */
-ebpo_node ebpo_subtree_child(const ebpo_subtree *subtree, const ebpo_node *gray, unsigned octant);
+ebpo_node ebpo_accel_child(const ebpo_accel *subtree, const ebpo_node *gray, unsigned octant);
 /* Codes of a gray node's planes, where the subtree has kept them. */
-const uint32_t *ebpo_subtree_planes(const ebpo_subtree *subtree, const ebpo_node *node,
-                                    unsigned *count);
-/* For cursors (octree/cursor.h); the holder is an ebpo_subtree. */
-extern const ebpo_node_source ebpo_subtree_source;
+const uint32_t *ebpo_accel_planes(const ebpo_accel *subtree, const ebpo_node *node,
+                                  unsigned *count);
+/* For cursors (octree/cursor.h); the holder is an ebpo_accel. */
+extern const ebpo_node_source ebpo_accel_source;
 
 /* A face's corners. */
-static inline void ebpo_subtree_triangle(const ebpo_subtree *s, uint32_t slot, double out[3][3])
+static inline void ebpo_accel_triangle(const ebpo_accel *s, uint32_t slot, double out[3][3])
 {
     uint64_t at = (uint64_t)(slot / EBPO_BLOCK) * EBPO_BLOCK_NUMBERS + slot % EBPO_BLOCK;
     for (int i = 0; i < 9; i++)
@@ -146,15 +147,15 @@ static inline void ebpo_subtree_triangle(const ebpo_subtree *s, uint32_t slot, d
                                     : (double)s->block32[at + (uint64_t)i * EBPO_BLOCK];
 }
 
-static inline uint64_t ebpo_subtree_file_face(const ebpo_subtree *s, uint32_t local)
+static inline uint64_t ebpo_accel_file_face(const ebpo_accel *s, uint32_t local)
 {
     return local < s->outer_count ? s->outer[local] : s->first_face + (local - s->outer_count);
 }
 
 /* Number that callers are told. */
-static inline uint64_t ebpo_subtree_source_face(const ebpo_subtree *s, uint32_t local)
+static inline uint64_t ebpo_accel_source_face(const ebpo_accel *s, uint32_t local)
 {
-    return s->face_source ? s->face_source[local] : ebpo_subtree_file_face(s, local);
+    return s->face_source ? s->face_source[local] : ebpo_accel_file_face(s, local);
 }
 
 #endif
