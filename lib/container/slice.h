@@ -36,6 +36,14 @@ void ebpo_slice_free(ebpo_slice *slice);
 EBPO_MUST_USE ebpo_status ebpo_slice_read(ebpo_slice *out, ebpo_chunks *chunks,
                                           const ebpo_node *root, ebpo_error *error);
 
+/* The nodes alone, of at most `levels` levels below the root (EBPO_SLICE_ALL: all), and what
+ * `needs` (EBPO_NEEDS_..., schema.h) names of their arrays: no faces, and faces in lists have the
+ * numbers of the file. Also of a file without mesh. */
+enum { EBPO_SLICE_ALL = -1 };
+EBPO_MUST_USE ebpo_status ebpo_slice_read_nodes(ebpo_slice *out, ebpo_chunks *chunks,
+                                                const ebpo_node *root, uint32_t needs, int levels,
+                                                ebpo_error *error);
+
 /* The whole tree, on `threads` threads (0: all cores), without a cache of chunks. */
 EBPO_MUST_USE ebpo_status ebpo_slice_read_all(ebpo_slice *out, const ebpo_file *file,
                                               unsigned threads, ebpo_error *error);
@@ -44,10 +52,15 @@ EBPO_MUST_USE ebpo_status ebpo_slice_read_all(ebpo_slice *out, const ebpo_file *
  * and new faces. */
 typedef struct ebpo_slice_size {
     uint64_t groups, leaves, refs, new_faces;
-    uint64_t outer; /* of the faces that are new elsewhere there are at most so many */
+    uint64_t outer;  /* of the faces that are new elsewhere there are at most so many */
+    uint64_t planes; /* where planes are asked for */
 } ebpo_slice_size;
 EBPO_MUST_USE ebpo_status ebpo_slice_measure(ebpo_chunks *chunks, const ebpo_node *root,
                                              ebpo_slice_size *out, ebpo_error *error);
+/* The same for ebpo_slice_read_nodes. */
+EBPO_MUST_USE ebpo_status ebpo_slice_measure_nodes(ebpo_chunks *chunks, const ebpo_node *root,
+                                                   uint32_t needs, int levels, ebpo_slice_size *out,
+                                                   ebpo_error *error);
 
 /* Which file number a local face has. */
 static inline uint64_t ebpo_slice_file_face(const ebpo_slice *slice, uint32_t local)

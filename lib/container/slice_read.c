@@ -45,10 +45,25 @@ static ebpo_status root_range(const ebpo_chunks *chunks, const ebpo_node *root, 
     return ebpo_chunks_check_node(chunks, root, error);
 }
 
-/* Whether the range has a next level: the gray nodes of the last one are pruned. */
-static bool goes_on(const ebpo_chunks *chunks, const range *r)
+/* Which of a subtree's nodes, and what of them (EBPO_NEEDS_...). */
+typedef struct extent {
+    uint32_t needs;
+    int end; /* one past the deepest level */
+} extent;
+
+/* `levels` below the root's, or all. */
+static extent extent_of(const ebpo_chunks *chunks, const ebpo_node *root, uint32_t needs,
+                        int levels)
 {
-    return r->run.count[EBPO_GRAY] && r->level + 1 < chunks->file->info.level_count;
+    int count = chunks->file->info.level_count, last = root->cell.level + levels;
+    return (extent){ needs & ebpo_schema_has(&chunks->file->info),
+                     levels >= 0 && last + 1 < count ? last + 1 : count };
+}
+
+/* Whether the range has a next level: the gray nodes of the file's last one are pruned. */
+static bool goes_on(const extent *e, const range *r)
+{
+    return r->run.count[EBPO_GRAY] && r->level + 1 < e->end;
 }
 
 /* The next level's range. */
@@ -68,21 +83,15 @@ static ebpo_status next_range(ebpo_chunks *chunks, range *r, uint16_t **types, e
                              : status;
 }
 
-/* What a slice holds: everything but planes of leaves. */
-static uint32_t needs(const ebpo_chunks *chunks)
-{
-    return ebpo_schema_has(&chunks->file->info) & ~(uint32_t)EBPO_NEEDS_LEAF_PLANES;
-}
-
 /* What reading a level's nodes begins with, and the next level's types; only files far away care.
  */
-static void expect_nodes(ebpo_chunks *chunks, const range *r)
+static void expect_nodes(ebpo_chunks *chunks, const extent *x, const range *r)
 {
     ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
     uint64_t gray = r->run.rank[EBPO_GRAY], index = gray / EBPO_INDEX_ROWS,
              counted = index * EBPO_INDEX_ROWS;
-    ebpo_runs_expect(chunks, &e, r->level, &r->run, 1, needs(chunks));
-    if (goes_on(chunks, r)) {
+    ebpo_runs_expect(chunks, &e, r->level, &r->run, 1, x->needs);
+    if (goes_on(x, r)) {
         ebpo_chunks_expect(chunks, &e, EBPO_A_TYPES_INDEX, r->level + 1, index, 1);
         ebpo_chunks_expect(chunks, &e, EBPO_A_TYPES, r->level + 1, counted,
                            gray + r->run.count[EBPO_GRAY] - counted);
@@ -91,16 +100,17 @@ static void expect_nodes(ebpo_chunks *chunks, const range *r)
 }
 
 /* Everything of one level but its types. */
-static ebpo_status read_nodes(ebpo_chunks *chunks, const range *r, ebpo_level *out,
+static ebpo_status read_nodes(ebpo_chunks *chunks, const extent *x, const range *r, ebpo_level *out,
                               ebpo_error *error)
 {
-    expect_nodes(chunks, r);
-    return ebpo_runs_read(chunks, r->level, &r->run, 1, needs(chunks), out, error);
+    expect_nodes(chunks, x, r);
+    return ebpo_runs_read(chunks, r->level, &r->run, 1, x->needs, out, error);
 }
 
-static ebpo_status read_levels(ebpo_slice *slice, ebpo_chunks *chunks, const ebpo_node *root,
+static ebpo_status read_levels(ebpo_slice *slice, ebpo_chunks *chunks, const extent *x,
                                ebpo_error *error)
 {
+    const ebpo_node *root = &slice->root;
     range r;
     ebpo_status status = root_range(chunks, root, &r, error);
     if (status != EBPO_OK)
@@ -110,13 +120,13 @@ static ebpo_status read_levels(ebpo_slice *slice, ebpo_chunks *chunks, const ebp
     if (!slice->level[0].types)
         return ebpo_fail_memory(error, sizeof(uint16_t));
     slice->level[0].types[0] = (uint16_t)root->type;
-    status = read_nodes(chunks, &r, &slice->level[0], error);
-    for (slice->level_count = 1; status == EBPO_OK && goes_on(chunks, &r); slice->level_count++) {
+    status = read_nodes(chunks, x, &r, &slice->level[0], error);
+    for (slice->level_count = 1; status == EBPO_OK && goes_on(x, &r); slice->level_count++) {
         ebpo_level *out = &slice->level[slice->level_count];
         out->group_count = r.run.count[EBPO_GRAY];
         status = next_range(chunks, &r, &out->types, error);
         if (status == EBPO_OK)
-            status = read_nodes(chunks, &r, out, error);
+            status = read_nodes(chunks, x, &r, out, error);
     }
     return status;
 }
@@ -156,17 +166,29 @@ static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
     return EBPO_OK;
 }
 
-ebpo_status ebpo_slice_read(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_node *root,
-                            ebpo_error *error)
+ebpo_status ebpo_slice_read_nodes(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_node *root,
+                                  uint32_t needs, int levels, ebpo_error *error)
 {
     memset(out, 0, sizeof *out);
     out->root = *root;
     out->pruned = chunks->file->info.pruned;
+    extent x = extent_of(chunks, root, needs, levels);
+    ebpo_status status = read_levels(out, chunks, &x, error);
+    if (status != EBPO_OK)
+        ebpo_slice_free(out);
+    return status;
+}
+
+ebpo_status ebpo_slice_read(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_node *root,
+                            ebpo_error *error)
+{
+    memset(out, 0, sizeof *out);
     if (!(chunks->file->info.parts & EBPO_PART_MESH))
         return ebpo_fail_file(error, EBPO_E_ABSENT, chunks->file->in.shown,
                               "the file was written without its mesh; build it again with it");
     walk w = { .chunks = chunks, .slice = out };
-    ebpo_status status = read_levels(out, chunks, root, error);
+    ebpo_status status = ebpo_slice_read_nodes(out, chunks, root, ~(uint32_t)EBPO_NEEDS_LEAF_PLANES,
+                                               EBPO_SLICE_ALL, error);
     if (status == EBPO_OK)
         status = walk_group(&w, 0, error);
     if (status == EBPO_OK)
@@ -176,14 +198,11 @@ ebpo_status ebpo_slice_read(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_nod
     return status;
 }
 
-static ebpo_status measure_leaves(ebpo_chunks *chunks, const range *r, ebpo_slice_size *out,
-                                  ebpo_error *error)
+static ebpo_status measure_faces(ebpo_chunks *chunks, const range *r, ebpo_slice_size *out,
+                                 ebpo_error *error)
 {
     uint64_t refs = 0, fresh = 0, first = r->run.rank[EBPO_LEAF], count = r->run.count[EBPO_LEAF];
     const ebpo_level_summary *s = &chunks->file->info.level[r->level];
-    out->leaves += count;
-    if (count == 0 || !(chunks->file->info.parts & EBPO_PART_MESH))
-        return EBPO_OK;
     ebpo_status status =
         ebpo_chunks_sum(chunks, EBPO_A_LEAF_REF_COUNT, r->level, first, count, &refs, error);
     if (status == EBPO_OK)
@@ -196,20 +215,53 @@ static ebpo_status measure_leaves(ebpo_chunks *chunks, const range *r, ebpo_slic
     return status;
 }
 
-ebpo_status ebpo_slice_measure(ebpo_chunks *chunks, const ebpo_node *root, ebpo_slice_size *out,
-                               ebpo_error *error)
+static ebpo_status measure_planes(ebpo_chunks *chunks, const range *r, ebpo_node_type type,
+                                  ebpo_slice_size *out, ebpo_error *error)
+{
+    ebpo_array_id id = type == EBPO_LEAF ? EBPO_A_LEAF_PLANE_COUNTS : EBPO_A_PLANE_COUNTS;
+    uint64_t sum = 0, count = r->run.count[type];
+    ebpo_status status =
+        count ? ebpo_chunks_sum(chunks, id, r->level, r->run.rank[type], count, &sum, error)
+              : EBPO_OK;
+    out->planes += sum;
+    return status;
+}
+
+static ebpo_status measure_nodes(ebpo_chunks *chunks, const extent *x, const range *r,
+                                 ebpo_slice_size *out, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    out->leaves += r->run.count[EBPO_LEAF];
+    if (x->needs & EBPO_NEEDS_MESH && r->run.count[EBPO_LEAF])
+        status = measure_faces(chunks, r, out, error);
+    if (status == EBPO_OK && x->needs & EBPO_NEEDS_PLANES)
+        status = measure_planes(chunks, r, EBPO_GRAY, out, error);
+    if (status == EBPO_OK && x->needs & EBPO_NEEDS_LEAF_PLANES)
+        status = measure_planes(chunks, r, EBPO_LEAF, out, error);
+    return status;
+}
+
+ebpo_status ebpo_slice_measure_nodes(ebpo_chunks *chunks, const ebpo_node *root, uint32_t needs,
+                                     int levels, ebpo_slice_size *out, ebpo_error *error)
 {
     range r;
+    extent x = extent_of(chunks, root, needs, levels);
     *out = (ebpo_slice_size){ .groups = 1 };
     ebpo_status status = root_range(chunks, root, &r, error);
     if (status == EBPO_OK)
-        status = measure_leaves(chunks, &r, out, error);
-    while (status == EBPO_OK && goes_on(chunks, &r)) {
+        status = measure_nodes(chunks, &x, &r, out, error);
+    while (status == EBPO_OK && goes_on(&x, &r)) {
         out->groups += r.run.count[EBPO_GRAY];
         status = next_range(chunks, &r, NULL, error);
         if (status == EBPO_OK)
-            status = measure_leaves(chunks, &r, out, error);
+            status = measure_nodes(chunks, &x, &r, out, error);
     }
     out->outer = root->cell.level == 0 ? 0 : out->refs;
     return status;
+}
+
+ebpo_status ebpo_slice_measure(ebpo_chunks *chunks, const ebpo_node *root, ebpo_slice_size *out,
+                               ebpo_error *error)
+{
+    return ebpo_slice_measure_nodes(chunks, root, EBPO_NEEDS_MESH, EBPO_SLICE_ALL, out, error);
 }
