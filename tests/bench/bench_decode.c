@@ -18,7 +18,7 @@ static const char *const names[PARTS] = { "levels", "mesh", "maps" };
 
 typedef struct settings {
     const char *path;
-    const ebpo_read_options *read;
+    unsigned threads;
     int rounds;
 } settings;
 

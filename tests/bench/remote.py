@@ -1,243 +1,200 @@
 #!/usr/bin/env python3
-"""Remakes docs/measured/remote.md: requests, bytes and times of reading by URL, beside HDF5's ros3 driver and h5wasm.
+"""Remakes docs/measured/remote.md: requests, bytes, waves and times of questions by URL, before and
+after a change of library or file, and beside HDF5's ros3 driver and h5wasm.
 
-    tests/bench/remote.py BUILD_DIR MODEL.ebpo.h5... [--latency 0,50,200] [--rounds 3] -o
-    docs/measured/remote.md
+    tests/bench/remote.py BUILD_DIR LARGE.ebpo.h5 SMALL.ebpo.h5
+        --before BUILD_DIR LARGE.ebpo.h5 SMALL.ebpo.h5 --ply LARGE.ply -o docs/measured/remote.md
+        [--json FILE [--only PATTERN]]
 
-nginx serves the models; its log says what was asked for. For latencies a forwarder stands before it
-that holds back everything by half the round trip, in both directions, and each new connection by a
-whole one (the handshake). Needs nginx, chromium, python3-h5py, npm (h5wasm is installed below
-BUILD_DIR) and `sh tools/install-deps.sh --tests`.
+BUILD_DIR: release builds inside their checkouts, whose viewers are measured, too. The files hold
+the same two models, each written by its build; a third side asks the new build about the old files.
+nginx serves them; its log says what was asked for. Before it stands a line with latency (and for
+the viewer a rate). With --json measurements are kept; --only then repeats those whose name matches.
+Needs nginx, chromium, python3-h5py, npm (h5wasm is installed below BUILD_DIR) and
+`sh tools/install-deps.sh --tests`.
 """
 import argparse
-import asyncio
+import contextlib
 import json
-import os
 import pathlib
 import re
 import shlex
-import shutil
-import socket
-import statistics
 import subprocess
 import sys
-import threading
-import time
 
 HERE = pathlib.Path(__file__).resolve().parent
-ROOT = HERE.parent.parent
+sys.path.insert(1, str(HERE / "remote"))
+# pylint: disable=wrong-import-position
+import asked
+import drivers
+import measured
+import remote_page
+from served import Line, Server, free_port, wait_for
+
+SINGLES, VIEWS, OPENINGS, PATH, EQUAL, ROUNDS = 11, 5, 5, 1000000, 10000, 2
+ROUND_TRIP, RATE = 0.1, 5e6 / 8
+LATENCIES = [0, 50, 200]
 
 
-def free_port():
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
+class Measurements:
+    """By name, "SIDE/ROW"; each is written down as soon as it is there."""
+    def __init__(self, options):
+        self.path = options.json and pathlib.Path(options.json)
+        self.only = re.compile(options.only) if options.only is not None else None
+        self.found = (json.loads(self.path.read_text())
+                      if self.path and self.path.exists() else {})
+
+    def take(self, name, measure):
+        if not (self.only.search(name) if self.only else name not in self.found):
+            return
+        print(name, file=sys.stderr, flush=True)
+        try:
+            self.found[name] = measure()
+        except (subprocess.CalledProcessError, RuntimeError, measured.Failed) as error:
+            said = (getattr(error, "stderr", None) or str(error)).strip().splitlines()
+            print(f"remote.py: {name}: {said[-1] if said else error}", file=sys.stderr)
+            self.found.pop(name, None)
+        if self.path:
+            self.path.write_text(json.dumps(self.found, indent=1))
 
 
-class Server:
-    """nginx on the models and the page; lines of its log are (status, bytes, uri)."""
-    def __init__(self, work, models, modules):
-        self.work, self.port, self.log = work, free_port(), work / "access.log"
-        shutil.rmtree(work / "www", ignore_errors=True)
-        (work / "www").mkdir(parents=True)
-        (work / "tmp").mkdir(exist_ok=True)
-        self.log.write_text("")
-        for model in models:
-            (work / "www" / model.name).symlink_to(model.resolve())
-        (work / "www/viewer").symlink_to(ROOT / "tools/viewer")
-        (work / "www/modules").symlink_to(modules)
-        (work / "www/worker.js").symlink_to(HERE / "remote/worker.js")
-        (work / "www/bench.html").write_text("<!doctype html><title>bench</title>")
-        temporary = " ".join(f"{kind}_temp_path {work}/tmp/{kind};"
-                             for kind in ["client_body", "proxy", "fastcgi", "uwsgi", "scgi"])
-        (work / "nginx.conf").write_text(f"""{"user root;" if os.getuid() == 0 else ""}
-worker_processes 1; daemon off; pid {work}/pid; error_log {work}/error.log;
-events {{ }}
-http {{
-    log_format short '$status $body_bytes_sent $request_method $uri'; access_log {self.log} short; {temporary}
-    types {{ text/html html; text/javascript js mjs; application/wasm wasm; }}
-    server {{ listen 127.0.0.1:{self.port}; root {work}/www; include {ROOT}/samples/nginx-ebpo.conf; }}
-}}
-""")
-        self.process = subprocess.Popen(["nginx", "-e", str(work / "error.log"), "-p", str(work),
-                                         "-c", str(work / "nginx.conf")])
-        for _ in range(100):
-            with socket.socket() as s:
-                if s.connect_ex(("127.0.0.1", self.port)) == 0:
-                    break
-            time.sleep(0.1)
+# --- the viewer ---
 
-    def traffic(self, name):
-        """Requests and bytes for a file since the last call; nginx writes a line when an answer is out."""
-        time.sleep(0.3)
-        lines = [line.split(" ", 3) for line in self.log.read_text().splitlines()]
-        self.log.write_text("")
-        lines = [line for line in lines if line[3].endswith(name)]
-        return len(lines), sum(int(line[1]) for line in lines)
-
-    def close(self):
-        self.process.terminate()
-        self.process.wait()
+def view(side, large, work):
+    """Its page as its own samples/serve.sh serves it, over a slow line."""
+    folder, log, port = work / "shown", work / "shown.log", free_port()
+    folder.mkdir(exist_ok=True)
+    shown = folder / side.link("large")
+    shown.unlink(missing_ok=True)
+    shown.symlink_to(side.files["large"].resolve())
+    log.write_text("")
+    script = side.root / "samples/serve.sh"
+    install = ["--no-install"] if "--no-install" in script.read_text() else []
+    serving = subprocess.Popen(["sh", script, *install, "--port", str(port), "--folder", folder,
+                                "--log", log], stdout=subprocess.DEVNULL)
+    try:
+        wait_for(port)
+        line = Line(port, ROUND_TRIP, RATE)
+        eye, at = (",".join(map(repr, p)) for p in large.view(0))
+        done = subprocess.run(["node", HERE / "remote/viewed.mjs", HERE.parent.parent /
+                               "tools/viewer", f"http://127.0.0.1:{line.port}/?file=models/{shown.name}", log, shown.name,
+                               eye, at, work / side.name], check=True, capture_output=True,
+                              text=True)
+        return json.loads(done.stdout)
+    finally:
+        shown.unlink()
+        serving.terminate()
+        serving.wait()
 
 
-class Delay:
-    """Forwards a port to another with a round trip of `seconds` on top."""
-    def __init__(self, to, seconds):
-        self.to, self.half, self.port = to, seconds / 2, free_port()
-        self.loop = asyncio.new_event_loop()
-        ready = threading.Event()
-        threading.Thread(target=self.run, args=(ready,), daemon=True).start()
-        ready.wait()
+# --- building ---
 
-    def run(self, ready):
-        asyncio.set_event_loop(self.loop)
-        self.loop.run_until_complete(asyncio.start_server(self.connection, "127.0.0.1", self.port,
-                                                          limit=1 << 20))
-        ready.set()
-        self.loop.run_forever()
-
-    async def connection(self, reader, writer):
-        await asyncio.sleep(2 * self.half)
-        far_reader, far_writer = await asyncio.open_connection("127.0.0.1", self.to, limit=1 << 20)
-        await asyncio.gather(self.forward(reader, far_writer), self.forward(far_reader, writer),
-                             return_exceptions=True)
-
-    async def forward(self, reader, writer):
-        """What came at t leaves at t + half, however much follows: a delay, not a limit on the rate."""
-        queue = asyncio.Queue()
-
-        async def take():
-            while data := await reader.read(1 << 16):
-                queue.put_nowait((self.loop.time() + self.half, data))
-            queue.put_nowait((0, b""))
-
-        async def give():
-            while True:
-                due, data = await queue.get()
-                if not data:
-                    writer.close()
-                    return
-                await asyncio.sleep(max(0, due - self.loop.time()))
-                writer.write(data)
-                await writer.drain()
-        await asyncio.gather(take(), give())
+def build_in_turns(sides, ply, work):
+    """[CPU seconds of (before, after) of each round], in the order before, after, after, before."""
+    out, rounds = work / "built.ebpo.h5", []
+    for _ in range(ROUNDS):
+        taken = [0, 0]
+        for which in (0, 1, 1, 0):
+            taken[which] += measured.run(sides[which].ebpo, "convert", "-q", "--memory", "4G",
+                                         "--temp-dir", work, ply, out)["cpu"]
+        rounds.append(taken)
+    return rounds
 
 
-class Readers:
-    def __init__(self, build, site, work):
-        self.tool, self.site = build / "tools/ebpo", site
-        self.plugins = str(build / "lib/h5")
-        self.point = work / "point"
-        self.point.write_text("0 0 0\n")
+# --- all of it ---
 
-    def ours(self, url, to):
-        """The library, by the command that reads the same."""
-        if to == "whole":
-            command = [self.tool, "distance", "--json", url, self.point]
-        else:
-            command = [self.tool, "levels", "--json", "--to", str(to), url]
-        begin = time.perf_counter()
-        text = subprocess.run(command, check=True, capture_output=True, text=True,
-                              stdin=subprocess.DEVNULL).stdout
-        ms = 1e3 * (time.perf_counter() - begin)
-        return {"first": json.loads(text)["levels"][0]["ms"] if to != "whole" else None, "ms": ms}
-
-    def ros3(self, url, to):
-        environment = dict(os.environ, HDF5_PLUGIN_PATH=self.plugins)
-        return json.loads(subprocess.run(["/usr/bin/python3", HERE / "remote/ros3.py", url,
-                                          str(to)], check=True, capture_output=True, text=True, env=environment).stdout)
-
-    def browser(self, reader, url, to):
-        done = subprocess.run(["node", HERE / "remote/browser.mjs", ROOT / "tools/viewer",
-                               self.site, reader, url,
-                               str(to)], check=True, capture_output=True, text=True)
-        answer = json.loads(done.stdout)
-        if "failed" in answer:
-            sys.exit(f"{reader}: {answer['failed']}")
-        return answer
-
-    def all(self):
-        return {"ebpo (C)": self.ours, "HDF5 ros3": self.ros3,
-                "viewer's reader": lambda *a: self.browser("ours", *a),
-                "h5wasm, lazy file": lambda *a: self.browser("h5wasm", *a)}
+def measure_sides(take, sides, server, line, work):
+    large = asked.Places(sides[0], "large", 100, work)
+    small = asked.Places(sides[0], "small", 50, work)
+    for name, row in asked.rows(large, small, work, SINGLES, VIEWS).items():
+        for side in sides:
+            take(f"{side.name}/{name}",
+                 lambda s=side, r=row: {"what": r.what, "command": r.command,
+                                        **asked.measure(server, line, s, r, work)})
+    crowd = large.crowd("crowd.txt", EQUAL)
+    near = Line(server.port, 0)
+    take(f"{sides[-1].name}/same", lambda: asked.same_answers(sides[-1], near, "large", crowd))
+    for side in sides:
+        take(f"{side.name}/size", lambda s=side: {which: f.stat().st_size
+                                                  for which, f in s.files.items()})
+        take(f"{side.name}/local", lambda s=side: asked.local(s, s.files["large"], OPENINGS, PATH))
+        if side.name != remote_page.MIXED:
+            take(f"{side.name}/viewer", lambda s=side: view(s, large, work))
 
 
-def requests_table(page, server, readers, models):
-    page += ["## Requests and bytes", "",
-             "From nginx's log; of whole files in memory, in MB a request on average. *whole*: "
-             "everything in memory by `ebpo distance`, all datasets by ros3 and h5wasm; the "
-             "viewer's reader reads levels and mesh, no maps.", "",
-             "| file | bytes | reader | levels 0 to 4: requests | bytes | levels 0 to 5: requests "
-             "| bytes | whole: requests | bytes | MB a request |",
-             "|---|---|---|---|---|---|---|---|---|---|"]
-    for model in models:
-        for name, read in readers.all().items():
-            url, cells = f"http://127.0.0.1:{server.port}/{model.name}", []
-            for to in [4, 5, "whole"]:
-                if to == "whole" and name != "ebpo (C)" and model.stat().st_size > 100e6:
-                    cells += ["-", "-", "-"]
-                    continue
-                server.traffic(model.name)
-                read(url, to)
-                count, size = server.traffic(model.name)
-                cells += [f"{count:,}", f"{size:,}"] + ([f"{size / count / 1e6:.2f}"]
-                                                        if to == "whole" else [])
-            page.append(f"| {model.name} | {model.stat().st_size:,} | {name} | " + " | ".join(cells)
-                        + " |")
-    page.append("")
+def measure_drivers(take, side, server, work):
+    readers = drivers.Readers(side.build, f"http://127.0.0.1:{server.port}", work)
+    models = {side.link(which): side.files[which].stat().st_size for which in ("small", "large")}
+    take("drivers/requests", lambda: drivers.requests_of(server, readers, models))
+    take("drivers/latency", lambda: drivers.latency_of(server, readers, side.link("large"),
+                                                       LATENCIES, 3))
 
 
-def latency_table(page, server, readers, model, latencies, rounds):
-    page += ["## Time with latency", "",
-             f"{model.name}, ms until level 0, and levels 0 to 5, are decoded (medians of "
-             f"{rounds}). The C command's second figure includes the start of the process, the "
-             f"others' do not include theirs, nor loading "
-             "their code.", "", "| round trip, ms | reader | level 0 | levels 0 to 5 |",
-             "|---|---|---|---|"]
-    for latency in latencies:
-        port = Delay(server.port, latency / 1e3).port if latency else server.port
-        for name, read in readers.all().items():
-            runs = [read(f"http://127.0.0.1:{port}/{model.name}", 5) for _ in range(rounds)]
-            page.append(f"| {latency} | {name} | "
-                        f"{statistics.median(r['first'] for r in runs):,.0f} | "
-                        f"{statistics.median(r['ms'] for r in runs):,.0f} |")
-    page.append("")
+def h5wasm_below(work):
+    subprocess.run(["npm", "install", "--silent", "--no-audit", "--no-fund", "--prefix", work,
+                    "h5wasm@0.8", "h5wasm-plugins"], check=True)
+    return json.loads((work / "node_modules/h5wasm/package.json").read_text())["version"]
 
 
-def main():
+def links_of(sides, work):
+    page = work / "bench.html"
+    page.write_text("<!doctype html><title>bench</title>")
+    links = {side.link(which): file for side in sides for which, file in side.files.items()}
+    return {**links, "viewer": drivers.ROOT / "tools/viewer", "modules": work / "node_modules",
+            "worker.js": HERE / "remote/worker.js", "bench.html": page}
+
+
+def command_of(options):
+    def names(paths):
+        return [p.name for p in paths]
+    command = ["tests/bench/remote.py", "BUILD_DIR", *names(options.files)]
+    if options.before:
+        command += ["--before", "BUILD_DIR_BEFORE", *names(options.before[1:])]
+    if options.ply:
+        command += ["--ply", options.ply.name]
+    return shlex.join(command + ["-o", "docs/measured/remote.md"])
+
+
+def parse():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("build", type=pathlib.Path)
-    parser.add_argument("models", type=pathlib.Path, nargs="+")
-    parser.add_argument("--latency", default="0,50,200")
-    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("files", type=pathlib.Path, nargs=2)
+    parser.add_argument("--before", type=pathlib.Path, nargs=3)
+    parser.add_argument("--ply", type=pathlib.Path)
+    parser.add_argument("--json")
+    parser.add_argument("--only")
     parser.add_argument("-o", "--output", required=True)
-    o = parser.parse_args()
-    work = o.build.resolve() / "bench-remote"
+    return parser.parse_args()
+
+
+def sides_of(options):
+    new = options.build.resolve()
+    sides = [asked.Side(remote_page.AFTER, new, *options.files)]
+    if options.before:
+        old, *files = options.before
+        sides[:0] = [asked.Side(remote_page.BEFORE, old.resolve(), *files),
+                     asked.Side(remote_page.MIXED, new, *files)]
+    return sides
+
+
+def main():
+    options = parse()
+    sides, results = sides_of(options), Measurements(options)
+    work = sides[-1].build / "bench-remote"
     work.mkdir(exist_ok=True)
-    subprocess.run(["npm", "install", "--silent", "--no-audit", "--no-fund", "--prefix", work,
-                    "h5wasm@0.8", "h5wasm-plugins"], check=True)
-    modules = work / "node_modules"
-    version = json.loads((modules / "h5wasm/package.json").read_text())["version"]
-    server = Server(work, o.models, modules)
-    try:
-        readers = Readers(o.build.resolve(), f"http://127.0.0.1:{server.port}", work)
-        nginx = re.search(r"nginx/\S+", subprocess.run(["nginx", "-v"], capture_output=True,
-                                                       text=True).stderr)[0]
-        command = shlex.join(["tests/bench/remote.py",
-                              "BUILD_DIR"] + [m.name
-                                              for m in o.models] + ["--latency", o.latency,
-                                                                    "--rounds", str(o.rounds), "-o",
-                                                                    "docs/measured/remote.md"])
-        page = ["# Files on web servers: measured", "",
-                f"Made by `{command}`; {nginx}, h5wasm {version} with its zstd plugin, HDF5's "
-                f"ros3 driver through Debian's h5py with our plugin, all on one machine.", ""]
-        requests_table(page, server, readers, o.models)
-        latency_table(page, server, readers, o.models[-1], [int(x) for x in o.latency.split(",")],
-                      o.rounds)
-        pathlib.Path(o.output).write_text("\n".join(page).rstrip() + "\n")
-    finally:
-        server.close()
+    nginx = re.search(r"nginx/\S+", subprocess.run(["nginx", "-v"], capture_output=True, text=True,
+                                                   check=True).stderr)[0]
+    programs = f"{nginx}, h5wasm {h5wasm_below(work)}"
+    with contextlib.closing(Server(work, drivers.ROOT / "samples/nginx-ebpo.conf",
+                                   links_of(sides, work))) as server:
+        line = Line(server.port, ROUND_TRIP)
+        measure_sides(results.take, sides, server, line, work)
+        measure_drivers(results.take, sides[-1], server, work)
+    if options.ply and options.before:
+        results.take("build", lambda: build_in_turns([sides[0], sides[-1]], options.ply, work))
+    page = remote_page.made(results.found, command_of(options), programs)
+    pathlib.Path(options.output).write_text(page)
 
 
 main()
