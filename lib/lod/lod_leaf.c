@@ -50,17 +50,14 @@ ebpo_status ebpo_lod_leaf_faces(const ebpo_lod_model *model, ebpo_cell cell, uin
     return EBPO_OK;
 }
 
-static unsigned inside_corners(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf,
-                               const ebpo_triangle *faces, uint64_t count)
+unsigned ebpo_lod_inside_corners(const ebpo_box *box, ebpo_cell cell, ebpo_rule rule,
+                                 int32_t winding, const ebpo_triangle *faces, uint64_t count)
 {
-    const int32_t *winding = model->level[cell.level].leaf_winding;
-    if (!model->info->solid || !winding)
-        return 0;
     int32_t delta[8];
-    ebpo_corner_windings(&model->box, cell, faces, count, delta);
+    ebpo_corner_windings(box, cell, faces, count, delta);
     unsigned inside = 0;
     for (unsigned i = 0; i < 8; i++)
-        inside |= (unsigned)ebpo_rule_inside(model->info->rule, winding[leaf] + delta[i]) << i;
+        inside |= (unsigned)ebpo_rule_inside(rule, winding + delta[i]) << i;
     return inside;
 }
 
@@ -73,7 +70,11 @@ ebpo_status ebpo_lod_leaf_planes(const ebpo_lod_model *model, ebpo_cell cell, ui
     ebpo_status status = ebpo_lod_leaf_faces(model, cell, leaf, scratch, &count, error);
     if (status != EBPO_OK)
         return status;
-    unsigned inside = inside_corners(model, cell, leaf, scratch->faces, count);
+    const int32_t *winding = model->level[cell.level].leaf_winding;
+    unsigned inside = model->info->solid && winding
+                          ? ebpo_lod_inside_corners(&model->box, cell, model->info->rule,
+                                                    winding[leaf], scratch->faces, count)
+                          : 0;
     /* Derived planes cost no bytes: each that removes anything is taken, as in the volumes that the
      * file states. */
     *plane_count =

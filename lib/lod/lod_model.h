@@ -55,6 +55,11 @@ EBPO_MUST_USE ebpo_status ebpo_lod_leaf_faces(const ebpo_lod_model *model, ebpo_
                                               uint64_t leaf, ebpo_leaf_scratch *scratch,
                                               uint64_t *count, ebpo_error *error);
 
+/* Which corners of a solid's leaf lie inside, for ebpo_leaf_planes; `winding`: at its lowest one.
+ */
+unsigned ebpo_lod_inside_corners(const ebpo_box *box, ebpo_cell cell, ebpo_rule rule,
+                                 int32_t winding, const ebpo_triangle *faces, uint64_t count);
+
 /* The planes that a leaf derives from its faces; `envelope` as in ebpo_lod_leaf. */
 EBPO_MUST_USE ebpo_status ebpo_lod_leaf_planes(const ebpo_lod_model *model, ebpo_cell cell,
                                                uint64_t leaf, ebpo_leaf_scratch *scratch,

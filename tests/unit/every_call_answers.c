@@ -245,6 +245,34 @@ static ebpo_status call_view(every_call_env *e)
     return status;
 }
 
+static ebpo_status take_subtree(ebpo_subtree *subtree, ebpo_error *error)
+{
+    ebpo_subtree_nodes nodes = EBPO_SUBTREE_NODES_INIT;
+    ebpo_subtree_faces faces = EBPO_SUBTREE_FACES_INIT;
+    ebpo_subtree_node node = EBPO_SUBTREE_NODE_INIT;
+    ebpo_status status = ebpo_subtree_get_nodes(subtree, &nodes);
+    if (status == EBPO_OK)
+        status = ebpo_subtree_get_faces(subtree, &faces, error);
+    for (uint64_t i = 0; i < nodes.node_count && status == EBPO_OK; i += 5)
+        status = ebpo_subtree_get_node(subtree, i, true, &node, error);
+    return status;
+}
+
+static ebpo_status call_subtree(every_call_env *e)
+{
+    static const double point[3] = { 2.5, 1, 0.3 };
+    ebpo_subtree *subtree;
+    ebpo_subtree_options options = EBPO_SUBTREE_OPTIONS_INIT;
+    options.corners = options.or_leaf_above = true;
+    options.memory = 64 << 20;
+    uint64_t octcode = ebpo_octcode_at(ebpo_file_info(e->file), point, 1);
+    ebpo_status status = ebpo_subtree_open(e->file, octcode, &options, &subtree, e->error);
+    if (status == EBPO_OK)
+        status = take_subtree(subtree, e->error);
+    ebpo_subtree_close(subtree);
+    return status;
+}
+
 const every_call every_call_answers[] = {
     { "ask", call_ask },
     { "ask_cached", call_ask_cached },
@@ -258,5 +286,6 @@ const every_call every_call_answers[] = {
     { "lod_nodes", call_lod_nodes },
     { "stream", call_stream },
     { "view", call_view },
+    { "subtree", call_subtree },
     { NULL, NULL },
 };

@@ -10,6 +10,7 @@
  *   query.h       point in solid, distance, rays, boxes, mass
  *   stream.h      levels, coarse to fine
  *   view.h        nodes in the order of an observer
+ *   subtree.h     a part of a model as plain arrays: nodes, envelopes, faces
  *   lod.h         a level as closed polygons
  *   export.h      levels and the mesh in other programs' formats
  *   subset.h      a smaller file from a file
@@ -31,6 +32,7 @@
 #include <ebpo/query.h>
 #include <ebpo/stream.h>
 #include <ebpo/view.h>
+#include <ebpo/subtree.h>
 #include <ebpo/lod.h>
 #include <ebpo/export.h>
 #include <ebpo/subset.h>

@@ -1,0 +1,764 @@
+/* Subtrees as plain arrays, against a twin that reads the whole file and picks by hand. */
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/ebpo.h>
+
+#include "check_main.h"
+#include "octree/node_types.h"
+#include "octree/octcode.h"
+#include "random_tree.h"
+#include "read_by.h"
+#include "scratch.h"
+#include "solids.h"
+
+/* ck_assert tells its parent process each time that it is passed. */
+#define EXPECT(condition)                                      \
+    do {                                                       \
+        if (!(condition))                                      \
+            ck_abort_msg("line %d: %s", __LINE__, #condition); \
+    } while (0)
+
+static const char *path;
+
+static void make_folder(void)
+{
+    scratch_enter();
+    path = scratch("x.ebpo.h5");
+}
+
+enum { USUAL = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS };
+
+/* --- files --- */
+
+static ebpo_file *write_tree(ebpo_tree *tree, uint32_t parts, ebpo_codec codec)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file = NULL;
+    ebpo_write_options options = EBPO_WRITE_OPTIONS_INIT;
+    options.parts = parts;
+    options.codec = codec;
+    ck_assert_msg(ebpo_tree_write(tree, path, &options, &error) == EBPO_OK, "%s", error.message);
+    ebpo_tree_free(tree);
+    ck_assert_msg(ebpo_open(path, &file, &error) == EBPO_OK, "%s", error.message);
+    return file;
+}
+
+static ebpo_file *write_random(uint64_t seed, int levels, unsigned gray_share, bool leaf_planes)
+{
+    random_tree_options options = { seed,          levels,        gray_share,    5,
+                                    seed % 3 != 0, seed % 2 != 0, seed % 4 != 0, leaf_planes };
+    ebpo_tree tree;
+    random_tree_make(&tree, &options);
+    return write_tree(&tree, ~0u, EBPO_CODEC_ZSTD);
+}
+
+static ebpo_file *write_solid(ebpo_mesh mesh, uint32_t parts, uint32_t leaf_faces, ebpo_codec codec)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_mesh_report report;
+    ebpo_mend_record mend = { 0 };
+    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_tree tree;
+    options.parts = parts;
+    options.leaf_faces = leaf_faces;
+    ck_assert_msg(ebpo_mesh_check(&mesh, 0, options.progress, &report, &error) == EBPO_OK, "%s",
+                  error.message);
+    ck_assert_msg(ebpo_build(&mesh, &report, &mend, &options, &tree, &error) == EBPO_OK, "%s",
+                  error.message);
+    return write_tree(&tree, parts, codec);
+}
+
+/* --- the twin: every node of the file, level after level --- */
+
+typedef struct twin_node {
+    uint64_t octcode, rank[4], refs; /* such nodes of the level before it, and their references */
+    uint64_t plane;                  /* of its own, where they begin in the level */
+    ebpo_node_type type;
+} twin_node;
+
+typedef struct twin {
+    ebpo_tree tree;
+    twin_node *node[EBPO_LEVELS_MAX];
+    uint64_t count[EBPO_LEVELS_MAX];
+} twin;
+
+static void count_on(twin_node *at, const ebpo_level *l, twin_node *out, uint64_t planes[2])
+{
+    *out = *at;
+    out->plane = at->type == EBPO_LEAF ? planes[1] : planes[0];
+    if (at->type == EBPO_GRAY && l->plane_counts)
+        planes[0] += l->plane_counts[at->rank[EBPO_GRAY]];
+    if (at->type == EBPO_LEAF && l->leaf_plane_counts)
+        planes[1] += l->leaf_plane_counts[at->rank[EBPO_LEAF]];
+    if (at->type == EBPO_LEAF && l->leaf_ref_count)
+        at->refs += l->leaf_ref_count[at->rank[EBPO_LEAF]];
+    at->rank[at->type]++;
+}
+
+static void list_level(twin *t, int i)
+{
+    const ebpo_level *l = &t->tree.level[i];
+    uint64_t group = 0, planes[2] = { 0, 0 }, parents = i ? t->count[i - 1] : 1;
+    twin_node at = { .octcode = 1 };
+    t->node[i] = calloc(8 * l->group_count + 1, sizeof *t->node[i]);
+    for (uint64_t p = 0; p < parents; p++) {
+        if (i && t->node[i - 1][p].type != EBPO_GRAY)
+            continue;
+        uint16_t types = l->types[group++];
+        if (i && t->tree.info.pruned && types == 0) {
+            at.rank[EBPO_WHITE] += 8;
+            continue;
+        }
+        for (unsigned octant = 0; octant < (i ? 8 : 1); octant++) {
+            at.octcode = i ? t->node[i - 1][p].octcode << 3 | octant : 1;
+            at.type = (ebpo_node_type)(types >> 2 * octant & 3);
+            count_on(&at, l, &t->node[i][t->count[i]++], planes);
+        }
+    }
+}
+
+static void twin_make(twin *t, const ebpo_file *file)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    memset(t, 0, sizeof *t);
+    ck_assert_msg(ebpo_file_read_tree(file, READ_BY(1), &t->tree, &error) == EBPO_OK, "%s",
+                  error.message);
+    for (int i = 0; i < t->tree.info.level_count; i++)
+        list_level(t, i);
+}
+
+static void twin_free(twin *t)
+{
+    for (int i = 0; i < EBPO_LEVELS_MAX; i++)
+        free(t->node[i]);
+    ebpo_tree_free(&t->tree);
+}
+
+/* --- comparing --- */
+
+typedef struct pair {
+    const twin *t;
+    ebpo_subtree *subtree;
+    ebpo_subtree_nodes nodes;
+    ebpo_subtree_faces faces;
+    uint64_t octcode;
+    int level;
+    uint8_t *listed; /* by number in the file; 2: new in this subtree */
+} pair;
+
+static int32_t winding_of(const ebpo_level *l, const twin_node *n)
+{
+    const int32_t *of_type[4] = { l->white_winding, l->black_winding, l->leaf_winding, NULL };
+    return of_type[n->type] ? of_type[n->type][n->rank[n->type]] : n->type == EBPO_BLACK;
+}
+
+static void compare_planes(const pair *p, const ebpo_level *l, const twin_node *n, uint64_t number)
+{
+    uint64_t count = 0;
+    const uint32_t *codes = n->type == EBPO_LEAF ? l->leaf_planes : l->planes;
+    if (n->type == EBPO_GRAY && l->plane_counts)
+        count = l->plane_counts[n->rank[EBPO_GRAY]];
+    if (n->type == EBPO_LEAF && l->leaf_plane_counts)
+        count = l->leaf_plane_counts[n->rank[EBPO_LEAF]];
+    if (!p->nodes.plane_first) {
+        EXPECT(count == 0);
+        return;
+    }
+    uint32_t first = p->nodes.plane_first[number];
+    EXPECT(p->nodes.plane_first[number + 1] - first == count);
+    EXPECT(count == 0 || memcmp(p->nodes.planes + first, codes + n->plane, count * 4) == 0);
+}
+
+static void compare_list(pair *p, const ebpo_level *l, const twin_node *n, uint64_t number)
+{
+    uint32_t first = p->faces.list_first[number];
+    uint64_t rank = n->rank[EBPO_LEAF];
+    uint32_t refs = n->type == EBPO_LEAF ? l->leaf_ref_count[rank] : 0,
+             fresh = n->type == EBPO_LEAF ? l->leaf_new[rank] : 0;
+    EXPECT(p->faces.list_first[number + 1] - first == refs + fresh);
+    for (uint32_t k = 0; k < refs + fresh; k++) {
+        uint64_t face = k < refs ? l->leaf_refs[n->refs + k] : l->leaf_first[rank] + (k - refs);
+        EXPECT(p->faces.list[first + k] < p->faces.face_count);
+        EXPECT(p->faces.numbers[p->faces.list[first + k]] == face);
+        if (p->listed[face] < 2)
+            p->listed[face] = k < refs ? 1 : 2;
+    }
+}
+
+/* Nodes of level `level` of the tree; `links` counts the gray nodes of the level before. */
+static void compare_level(pair *p, int i, bool has_faces)
+{
+    int level = p->level + i;
+    const ebpo_level *l = &p->t->tree.level[level];
+    uint64_t number = p->nodes.level_first[i];
+    for (uint64_t k = 0; k < p->t->count[level]; k++) {
+        const twin_node *n = &p->t->node[level][k];
+        if (n->octcode >> 3 * i != p->octcode)
+            continue;
+        EXPECT(number < p->nodes.level_first[i + 1]);
+        EXPECT(p->nodes.octcodes[number] == n->octcode);
+        EXPECT(p->nodes.types[number] == n->type);
+        EXPECT(!p->nodes.windings == !p->t->tree.info.solid);
+        if (p->nodes.windings)
+            EXPECT(p->nodes.windings[number] == (n->type == EBPO_GRAY ? 0 : winding_of(l, n)));
+        compare_planes(p, l, n, number);
+        if (has_faces)
+            compare_list(p, l, n, number);
+        number++;
+    }
+    EXPECT(number == p->nodes.level_first[i + 1]);
+}
+
+/* Children are where the next level has their octcodes, or nowhere. */
+static void compare_children(const pair *p)
+{
+    uint64_t linked = 1;
+    for (uint64_t i = 0; i < p->nodes.node_count; i++) {
+        uint32_t first = p->nodes.children[i];
+        if (first == EBPO_NO_CHILDREN)
+            continue;
+        EXPECT(p->nodes.types[i] == EBPO_GRAY);
+        EXPECT((uint64_t)first + 8 <= p->nodes.node_count);
+        for (unsigned octant = 0; octant < 8; octant++)
+            EXPECT(p->nodes.octcodes[first + octant] == (p->nodes.octcodes[i] << 3 | octant));
+        linked += 8;
+    }
+    EXPECT(linked == p->nodes.node_count); /* each has its parent */
+}
+
+static void compare_corner(const pair *p, uint64_t face, int corner)
+{
+    const ebpo_mesh *mesh = &p->t->tree.mesh;
+    uint64_t ours = p->faces.faces[3 * face + (uint64_t)corner],
+             theirs = mesh->faces[3 * (uint64_t)p->faces.numbers[face] + (uint64_t)corner];
+    EXPECT(ours < p->faces.vertex_count);
+    EXPECT(!p->faces.xyz32 == !mesh->xyz32 && !p->faces.xyz64 == !mesh->xyz64);
+    if (mesh->xyz32) {
+        EXPECT(memcmp(p->faces.xyz32 + 3 * ours, mesh->xyz32 + 3 * theirs, 12) == 0);
+        EXPECT(memcmp(p->faces.corners32 + 9 * face + 3 * (uint64_t)corner,
+                      mesh->xyz32 + 3 * theirs, 12) == 0);
+    } else {
+        EXPECT(memcmp(p->faces.xyz64 + 3 * ours, mesh->xyz64 + 3 * theirs, 24) == 0);
+        EXPECT(memcmp(p->faces.corners64 + 9 * face + 3 * (uint64_t)corner,
+                      mesh->xyz64 + 3 * theirs, 24) == 0);
+    }
+}
+
+static void compare_faces(const pair *p)
+{
+    uint64_t listed = 0, fresh = 0;
+    for (uint64_t i = 0; i < p->t->tree.mesh.face_count; i++) {
+        listed += p->listed[i] > 0;
+        fresh += p->listed[i] == 2;
+    }
+    EXPECT(p->faces.face_count == listed && p->faces.outer_count == listed - fresh);
+    for (uint64_t i = 0; i < listed; i++) {
+        EXPECT(i == 0 || p->faces.numbers[i] > p->faces.numbers[i - 1]);
+        EXPECT(p->listed[p->faces.numbers[i]] == (i < p->faces.outer_count ? 1 : 2));
+        EXPECT(!p->faces.source == !p->t->tree.face_source);
+        if (p->faces.source)
+            EXPECT(p->faces.source[i] == p->t->tree.face_source[p->faces.numbers[i]]);
+        for (int corner = 0; corner < 3; corner++)
+            compare_corner(p, i, corner);
+    }
+}
+
+static void compare_above(const pair *p)
+{
+    for (int level = 0; level < p->level && p->nodes.above_first; level++) {
+        uint64_t code = p->octcode >> 3 * (p->level - level), k = 0;
+        const ebpo_level *l = &p->t->tree.level[level];
+        while (p->t->node[level][k].octcode != code)
+            k++;
+        const twin_node *n = &p->t->node[level][k];
+        uint64_t count = l->plane_counts ? l->plane_counts[n->rank[EBPO_GRAY]] : 0;
+        EXPECT(p->nodes.above_first[level + 1] - p->nodes.above_first[level] == count);
+        EXPECT(count == 0 || memcmp(p->nodes.above_planes + p->nodes.above_first[level],
+                                    l->planes + n->plane, count * 4) == 0);
+    }
+}
+
+static void check_subtree(const twin *t, const ebpo_file *file, const twin_node *root,
+                          const ebpo_subtree_options *options)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    pair p = { .t = t, .nodes = EBPO_SUBTREE_NODES_INIT, .faces = EBPO_SUBTREE_FACES_INIT };
+    p.octcode = root->octcode;
+    p.level = ebpo_octcode_level(root->octcode);
+    ck_assert_msg(ebpo_subtree_open(file, root->octcode, options, &p.subtree, &error) == EBPO_OK,
+                  "%s", error.message);
+    EXPECT(ebpo_subtree_get_nodes(p.subtree, &p.nodes) == EBPO_OK);
+    bool has_faces = ebpo_subtree_get_faces(p.subtree, &p.faces, &error) == EBPO_OK;
+    EXPECT(has_faces == (options->levels < 0));
+    EXPECT(p.nodes.level == p.level && p.nodes.level_first[0] == 0);
+    EXPECT(options->levels < 0 || p.nodes.level_count <= options->levels + 1);
+    EXPECT(options->memory == 0 || p.nodes.memory <= options->memory);
+    p.listed = calloc(t->tree.mesh.face_count + 1, 1);
+    for (int i = 0; i < p.nodes.level_count; i++)
+        compare_level(&p, i, has_faces);
+    EXPECT(p.nodes.node_count == p.nodes.level_first[p.nodes.level_count]);
+    compare_children(&p);
+    compare_above(&p);
+    if (has_faces)
+        compare_faces(&p);
+    free(p.listed);
+    ebpo_subtree_close(p.subtree);
+}
+
+static ebpo_subtree_options with_corners(void)
+{
+    ebpo_subtree_options options = EBPO_SUBTREE_OPTIONS_INIT;
+    options.corners = true;
+    return options;
+}
+
+static bool is_pruned(const twin *t, const twin_node *n)
+{
+    int level = ebpo_octcode_level(n->octcode) + 1;
+    return t->tree.info.pruned && n->type == EBPO_GRAY &&
+           (level == t->tree.info.level_count ||
+            t->tree.level[level].types[n->rank[EBPO_GRAY]] == 0);
+}
+
+static void check_refused(const ebpo_file *file, uint64_t octcode, ebpo_status status,
+                          const char *word)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_subtree *subtree = (void *)1;
+    ck_assert_int_eq(ebpo_subtree_open(file, octcode, NULL, &subtree, &error), status);
+    ck_assert_ptr_null(subtree);
+    ck_assert_msg(strstr(error.message, word), "%s", error.message);
+}
+
+/* Every `step`th gray node and leaf; all others are refused. */
+static void check_all(const ebpo_file *file, uint64_t step)
+{
+    twin t;
+    uint64_t turn = 0;
+    ebpo_subtree_options options = with_corners();
+    twin_make(&t, file);
+    for (int level = 0; level < t.tree.info.level_count; level++)
+        for (uint64_t k = 0; k < t.count[level]; k++) {
+            const twin_node *n = &t.node[level][k];
+            if (turn++ % step && level)
+                continue;
+            options.levels = turn % 4 == 3 ? (int)turn / 4 % 3 : -1;
+            if (n->type == EBPO_WHITE || n->type == EBPO_BLACK)
+                check_refused(file, n->octcode, EBPO_E_ARGUMENT,
+                              n->type == EBPO_WHITE ? "is white" : "is black");
+            else if (is_pruned(&t, n))
+                check_refused(file, n->octcode, EBPO_E_ABSENT, "is a subset");
+            else
+                check_subtree(&t, file, n, &options);
+        }
+    twin_free(&t);
+}
+
+START_TEST(subtrees_of_random_trees_are_what_the_whole_file_says)
+{
+    if (!ebpo_test_wanted(_i))
+        return;
+    ebpo_file *file = write_random((uint64_t)_i, 1 + _i % 5, 2 + (unsigned)_i % 5, _i % 5 == 0);
+    check_all(file, 1);
+    ebpo_close(file);
+}
+END_TEST
+
+START_TEST(subtrees_of_solids_are_what_the_whole_file_says)
+{
+    if (!ebpo_test_wanted(_i))
+        return;
+    ebpo_file *file =
+        write_solid(ebpo_test_solids[_i].make(),
+                    _i % 2 ? USUAL : EBPO_PART_MESH | EBPO_PART_LEAF_PLANES, 2, EBPO_CODEC_ZSTD);
+    check_all(file, 3);
+    ebpo_close(file);
+}
+END_TEST
+
+/* Index arrays, chunks by the dozen. */
+START_TEST(subtrees_of_larger_trees_agree)
+{
+    ebpo_file *file =
+        _i ? write_random(5, 7, 12, true)
+           : write_solid(ebpo_test_torus(2, 0.7, 160, 100), USUAL, 4, EBPO_CODEC_ZSTD);
+    check_all(file, _i ? 9973 : 211);
+    ebpo_close(file);
+}
+END_TEST
+
+static ebpo_file *write_subset(void)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_subset_options options = EBPO_SUBSET_OPTIONS_INIT;
+    ebpo_file *small = NULL,
+              *file = write_solid(ebpo_test_torus(2, 0.7, 40, 30), USUAL, 4, EBPO_CODEC_ZSTD);
+    const char *name = scratch("small.ebpo.h5");
+    options.last_level = 4;
+    options.boxed = true;
+    for (int k = 0; k < 3; k++)
+        options.max[k] = 3;
+    ck_assert_msg(ebpo_subset(file, name, &options, &error) == EBPO_OK, "%s", error.message);
+    ebpo_close(file);
+    ck_assert_msg(ebpo_open(name, &small, &error) == EBPO_OK, "%s", error.message);
+    ck_assert(ebpo_file_info(small)->pruned);
+    return small;
+}
+
+START_TEST(subtrees_of_subsets_end_where_these_do)
+{
+    ebpo_file *file = write_subset();
+    check_all(file, 1);
+    ebpo_close(file);
+}
+END_TEST
+
+/* --- nodes in the model's coordinates --- */
+
+static void same_node(const ebpo_stream_node *a, const ebpo_stream_node *b)
+{
+    EXPECT(a->octcode == b->octcode && a->type == b->type && a->winding == b->winding);
+    EXPECT(memcmp(a->min, b->min, sizeof a->min) == 0 &&
+           memcmp(a->max, b->max, sizeof a->max) == 0);
+    EXPECT(a->plane_count == b->plane_count && a->volume == b->volume);
+    for (uint32_t i = 0; i < a->plane_count; i++)
+        EXPECT(memcmp(a->planes[i], b->planes[i], sizeof a->planes[i]) == 0);
+    EXPECT(a->vertex_count == b->vertex_count && a->polygon_count == b->polygon_count);
+    for (uint32_t i = 0; i < a->vertex_count; i++)
+        EXPECT(memcmp(a->vertices[i], b->vertices[i], sizeof a->vertices[i]) == 0);
+    for (uint32_t i = 0; a->polygon_count && i <= a->polygon_count; i++)
+        EXPECT(a->polygon_first[i] == b->polygon_first[i]);
+    for (uint32_t i = 0; a->polygon_count && i < a->polygon_first[a->polygon_count]; i++)
+        EXPECT(a->corners[i] == b->corners[i]);
+}
+
+/* Subtrees below these nodes of a level, by octcode. */
+static ebpo_subtree *open_around(const ebpo_file *file, uint64_t octcode, int level, uint32_t parts,
+                                 uint64_t *number)
+{
+    ebpo_subtree *subtree = NULL;
+    ebpo_subtree_options options = EBPO_SUBTREE_OPTIONS_INIT;
+    ebpo_subtree_nodes nodes = EBPO_SUBTREE_NODES_INIT;
+    int up = ebpo_octcode_level(octcode) - level;
+    options.parts = parts;
+    if (ebpo_subtree_open(file, octcode >> 3 * (up > 0 ? up : 0), &options, &subtree, NULL) !=
+        EBPO_OK)
+        return NULL;
+    EXPECT(ebpo_subtree_get_nodes(subtree, &nodes) == EBPO_OK);
+    for (*number = 0; nodes.octcodes[*number] != octcode; ++*number)
+        EXPECT(*number + 1 < nodes.node_count);
+    return subtree;
+}
+
+/* Without faces the nodes are those of streams, to the last bit. */
+START_TEST(nodes_are_those_of_streams)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 30, 20),
+                                  USUAL | (_i % 2 ? EBPO_PART_LEAF_PLANES : 0), 6, EBPO_CODEC_ZSTD);
+    ebpo_stream *stream = NULL;
+    ebpo_stream_options options = EBPO_STREAM_OPTIONS_INIT;
+    ebpo_stream_level level;
+    ebpo_stream_node node;
+    bool more = true, another;
+    uint64_t compared = 0, number;
+    options.polygons = true;
+    ck_assert_int_eq(ebpo_stream_new(file, &options, &stream, &error), EBPO_OK);
+    while (ebpo_stream_next_level(stream, &level, &more, &error) == EBPO_OK && more)
+        while (ebpo_stream_next_node(stream, &node, &another, &error) == EBPO_OK && another) {
+            ebpo_subtree_node own = EBPO_SUBTREE_NODE_INIT;
+            if (node.octcode % 7 && node.octcode > 64)
+                continue;
+            ebpo_subtree *subtree = open_around(file, node.octcode, _i,
+                                                EBPO_PART_PLANES | EBPO_PART_LEAF_PLANES, &number);
+            if (!subtree)
+                continue; /* white and black ones */
+            ck_assert_int_eq(ebpo_subtree_get_node(subtree, number, true, &own, &error), EBPO_OK);
+            same_node(&own.node, &node);
+            compared++;
+            ebpo_subtree_close(subtree);
+        }
+    ck_assert_uint_gt(compared, 50);
+    ebpo_stream_free(stream);
+    ebpo_close(file);
+}
+END_TEST
+
+/* With faces, leaves are cut by planes that follow from them, as in whole levels. */
+START_TEST(leaves_are_those_of_whole_levels)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file = write_solid(ebpo_test_solids[_i].make(), USUAL, 3, EBPO_CODEC_ZSTD);
+    const ebpo_info *info = ebpo_file_info(file);
+    ebpo_mesh mesh;
+    ebpo_lod_nodes nodes;
+    ck_assert_msg(ebpo_lod_level_nodes(file, info->level_count - 1, NULL, &mesh, &nodes, NULL,
+                                       &error) == EBPO_OK,
+                  "%s", error.message);
+    for (uint64_t i = 0; i < nodes.node_count; i += 1 + i / 16) {
+        ebpo_subtree_node own = EBPO_SUBTREE_NODE_INIT;
+        uint64_t number;
+        if (nodes.nodes[i].type != EBPO_LEAF)
+            continue;
+        ebpo_subtree *subtree = open_around(file, nodes.nodes[i].octcode, (int)i % 4, ~0u, &number);
+        ck_assert_ptr_nonnull(subtree);
+        ck_assert_int_eq(ebpo_subtree_get_node(subtree, number, true, &own, &error), EBPO_OK);
+        ck_assert_int_eq(own.node.winding, nodes.nodes[i].winding);
+        ck_assert_double_eq_tol(own.node.volume, nodes.nodes[i].volume,
+                                1e-9 * nodes.nodes[i].volume);
+        ebpo_subtree_close(subtree);
+    }
+    ebpo_mesh_free(&mesh);
+    ebpo_lod_nodes_free(&nodes);
+    ebpo_close(file);
+}
+END_TEST
+
+/* What a node inherits, its own planes and its cell bound the envelope's corners. */
+START_TEST(inherited_half_spaces_bound_the_envelope)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 30, 20), USUAL, 6, EBPO_CODEC_ZSTD);
+    ebpo_subtree *subtree = NULL;
+    ebpo_subtree_nodes nodes = EBPO_SUBTREE_NODES_INIT;
+    uint64_t inherited = 0;
+    ck_assert_int_eq(ebpo_subtree_open(file, 9, NULL, &subtree, &error), EBPO_OK);
+    ck_assert_int_eq(ebpo_subtree_get_nodes(subtree, &nodes), EBPO_OK);
+    for (uint64_t i = 0; i < nodes.node_count; i++) {
+        ebpo_subtree_node n = EBPO_SUBTREE_NODE_INIT;
+        ck_assert_int_eq(ebpo_subtree_get_node(subtree, i, true, &n, &error), EBPO_OK);
+        for (uint32_t v = 0; v < n.node.vertex_count && n.node.type != EBPO_BLACK; v++)
+            for (uint32_t h = 0; h < n.inherited_count; h++) {
+                const double *x = n.node.vertices[v], *a = n.inherited[h];
+                EXPECT(a[0] * x[0] + a[1] * x[1] + a[2] * x[2] <= a[3] + 1e-9);
+            }
+        inherited += n.inherited_count;
+    }
+    ck_assert_uint_gt(inherited, nodes.node_count);
+    ebpo_subtree_node none = EBPO_SUBTREE_NODE_INIT;
+    ck_assert_int_eq(ebpo_subtree_get_node(subtree, nodes.node_count, true, &none, &error),
+                     EBPO_E_ARGUMENT);
+    ebpo_subtree_close(subtree);
+    ebpo_close(file);
+}
+END_TEST
+
+/* --- what is refused --- */
+
+START_TEST(octcodes_that_are_none_are_refused)
+{
+    static const uint64_t none[] = { 0, 2, 7, 16, 50, UINT64_C(1) << 63, UINT64_MAX };
+    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 30, 20), USUAL, 6, EBPO_CODEC_ZSTD);
+    for (size_t i = 0; i < sizeof none / sizeof *none; i++)
+        check_refused(file, none[i], EBPO_E_ARGUMENT, "is not an octcode");
+    ebpo_close(file);
+}
+END_TEST
+
+START_TEST(where_the_tree_ends_the_leaf_above_is_named_and_opened)
+{
+    twin t;
+    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 30, 20), USUAL, 6, EBPO_CODEC_ZSTD);
+    twin_make(&t, file);
+    for (int level = 1; level < t.tree.info.level_count; level++)
+        for (uint64_t k = 0; k < t.count[level]; k += 1 + k / 4) {
+            const twin_node *n = &t.node[level][k];
+            ebpo_subtree_options options = EBPO_SUBTREE_OPTIONS_INIT;
+            ebpo_subtree_nodes nodes = EBPO_SUBTREE_NODES_INIT;
+            ebpo_subtree *subtree = NULL;
+            uint64_t below = n->octcode << 6 | 5;
+            if (n->type == EBPO_GRAY)
+                continue;
+            check_refused(file, below, EBPO_E_ARGUMENT,
+                          n->type == EBPO_LEAF ? "tree ends above it" : "would lie in");
+            options.or_leaf_above = true;
+            ck_assert_int_eq(ebpo_subtree_open(file, below, &options, &subtree, NULL),
+                             n->type == EBPO_LEAF ? EBPO_OK : EBPO_E_ARGUMENT);
+            if (subtree) {
+                ck_assert_int_eq(ebpo_subtree_get_nodes(subtree, &nodes), EBPO_OK);
+                ck_assert(nodes.octcodes[0] == n->octcode && nodes.node_count == 1);
+            }
+            ebpo_subtree_close(subtree);
+        }
+    twin_free(&t);
+    ebpo_close(file);
+}
+END_TEST
+
+START_TEST(octcodes_of_points_are_those_of_the_cells_around_them)
+{
+    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 30, 20), USUAL, 6, EBPO_CODEC_ZSTD);
+    const ebpo_info *info = ebpo_file_info(file);
+    double outside[3] = { info->box_origin[0] - 1, 0, 0 };
+    uint64_t state = 7;
+    for (int n = 0; n < 200; n++) {
+        double p[3], low[3];
+        int level = n % 8;
+        for (int k = 0; k < 3; k++) {
+            low[k] = info->box_origin[k];
+            p[k] = low[k] + info->box_size[k] * ebpo_test_random_unit(&state);
+        }
+        uint64_t octcode = ebpo_octcode_at(info, p, level);
+        EXPECT(ebpo_octcode_level(octcode) == level);
+        for (int i = 1; i <= level; i++)
+            for (int k = 0; k < 3; k++) {
+                double half = info->box_size[k] / (double)(1u << i);
+                if (octcode >> 3 * (level - i) >> k & 1)
+                    low[k] += half;
+                EXPECT(p[k] >= low[k] && p[k] <= low[k] + half);
+            }
+    }
+    ck_assert_uint_eq(ebpo_octcode_at(info, outside, 3), 0);
+    ck_assert_uint_eq(ebpo_octcode_at(info, info->box_origin, -1), 0);
+    ck_assert_uint_eq(ebpo_octcode_at(info, info->box_origin, EBPO_LEVELS_MAX), 0);
+    ck_assert_uint_eq(ebpo_octcode_at(info, (double[]){ NAN, 0, 0 }, 2), 0);
+    ebpo_close(file);
+}
+END_TEST
+
+START_TEST(without_faces_there_are_nodes_and_a_reason)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_subtree *subtree = NULL;
+    ebpo_subtree_options options = EBPO_SUBTREE_OPTIONS_INIT;
+    ebpo_subtree_faces faces = EBPO_SUBTREE_FACES_INIT;
+    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 30, 20),
+                                  _i == 0 ? EBPO_PART_PLANES : USUAL, 6, EBPO_CODEC_ZSTD);
+    static const char *const why[] = { "without its mesh", "EBPO_PART_MESH", "levels = -1" };
+    if (_i == 1)
+        options.parts = EBPO_PART_PLANES | EBPO_PART_MAPS;
+    if (_i == 2)
+        options.levels = 2;
+    ck_assert_int_eq(ebpo_subtree_open(file, 1, &options, &subtree, &error), EBPO_OK);
+    ck_assert_int_eq(ebpo_subtree_get_faces(subtree, &faces, &error), EBPO_E_ABSENT);
+    ck_assert_msg(strstr(error.message, why[_i]), "%s", error.message);
+    faces.struct_size = 0;
+    ck_assert_int_eq(ebpo_subtree_get_faces(subtree, &faces, &error), EBPO_E_ARGUMENT);
+    ebpo_subtree_close(subtree);
+    options.levels = -2;
+    ck_assert_int_eq(ebpo_subtree_open(file, 1, &options, &subtree, &error), EBPO_E_ARGUMENT);
+    ebpo_close(file);
+}
+END_TEST
+
+/* The message of too small a limit names one that does; one byte less does not. */
+START_TEST(a_limit_of_memory_is_named_and_kept)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    twin t;
+    ebpo_subtree_options options = with_corners();
+    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 60, 40), USUAL, 6, EBPO_CODEC_ZSTD);
+    twin_make(&t, file);
+    for (int level = 0; level < 3; level++)
+        for (uint64_t k = 0; k < t.count[level]; k++) {
+            ebpo_subtree *subtree = NULL;
+            if (t.node[level][k].type != EBPO_GRAY)
+                continue;
+            options.memory = 1;
+            ck_assert_int_eq(ebpo_subtree_open(file, t.node[level][k].octcode, &options, &subtree,
+                                               &error),
+                             EBPO_E_LIMIT);
+            const char *named = strstr(error.message, "allowed; ");
+            ck_assert_ptr_nonnull(named);
+            options.memory = strtoull(named + strlen("allowed; "), NULL, 10);
+            check_subtree(&t, file, &t.node[level][k], &options);
+            options.memory--;
+            ck_assert_int_eq(ebpo_subtree_open(file, t.node[level][k].octcode, &options, &subtree,
+                                               &error),
+                             EBPO_E_LIMIT);
+        }
+    twin_free(&t);
+    ebpo_close(file);
+}
+END_TEST
+
+/* --- hostile files --- */
+
+static void check_bounds(const ebpo_subtree_nodes *n, const ebpo_subtree_faces *f, bool has_faces)
+{
+    for (uint64_t i = 0; i < n->node_count; i++) {
+        EXPECT(n->children[i] == EBPO_NO_CHILDREN || n->children[i] + 8 <= n->node_count);
+        EXPECT(!n->plane_first || n->plane_first[i] <= n->plane_first[i + 1]);
+        EXPECT(!has_faces || f->list_first[i] <= f->list_first[i + 1]);
+    }
+    for (uint32_t i = 0; has_faces && i < f->list_first[n->node_count]; i++)
+        EXPECT(f->list[i] < f->face_count);
+    for (uint64_t i = 0; has_faces && i < 3 * f->face_count; i++)
+        EXPECT(f->faces[i] < f->vertex_count);
+}
+
+static bool try_changed(const uint8_t *data, uint64_t size, uint64_t octcode)
+{
+    ebpo_file *file = NULL;
+    ebpo_subtree *subtree = NULL;
+    ebpo_subtree_nodes nodes = EBPO_SUBTREE_NODES_INIT;
+    ebpo_subtree_faces faces = EBPO_SUBTREE_FACES_INIT;
+    ebpo_status status = ebpo_open_memory(data, size, NULL, &file, NULL);
+    if (status == EBPO_OK)
+        status = ebpo_subtree_open(file, octcode, NULL, &subtree, NULL);
+    EXPECT(status == EBPO_OK || status == EBPO_E_FORMAT || status == EBPO_E_ARGUMENT ||
+           status == EBPO_E_LIMIT || status == EBPO_E_VERSION || status == EBPO_E_ABSENT);
+    if (status == EBPO_OK) {
+        ebpo_subtree_node node = EBPO_SUBTREE_NODE_INIT;
+        EXPECT(ebpo_subtree_get_nodes(subtree, &nodes) == EBPO_OK);
+        bool has_faces = ebpo_subtree_get_faces(subtree, &faces, NULL) == EBPO_OK;
+        check_bounds(&nodes, &faces, has_faces);
+        for (uint64_t i = 0; i < nodes.node_count; i += 97)
+            EXPECT(ebpo_subtree_get_node(subtree, i, true, &node, NULL) == EBPO_OK);
+    }
+    ebpo_subtree_close(subtree);
+    ebpo_close(file);
+    return status == EBPO_OK;
+}
+
+/* Files without checksums, so that what is changed is read. */
+START_TEST(changed_bytes_never_lead_outside)
+{
+    FILE *f;
+    uint64_t state = 99 + (uint64_t)_i, turns = ebpo_test_scaled(400), refused = 0;
+    ebpo_close(write_solid(ebpo_test_torus(2, 0.7, 30, 20), USUAL, 6, EBPO_CODEC_NONE));
+    ck_assert_ptr_nonnull(f = fopen(path, "rb"));
+    ck_assert_int_eq(fseek(f, 0, SEEK_END), 0);
+    uint64_t size = (uint64_t)ftell(f);
+    uint8_t *data = malloc(size);
+    rewind(f);
+    ck_assert_uint_eq(fread(data, 1, size, f), size);
+    fclose(f);
+    for (uint64_t n = 0; n < turns; n++) {
+        uint64_t at = size / 4 + ebpo_test_random(&state) % (size - size / 4);
+        uint8_t kept = data[at];
+        data[at] = ebpo_test_random(&state) % 2 ? 0xff : (uint8_t)(kept ^ 1);
+        refused += !try_changed(data, size, n % 2 ? 1 : 8 + n % 8);
+        data[at] = kept;
+    }
+    ck_assert_uint_gt(refused, 0);
+    free(data);
+}
+END_TEST
+
+Suite *test_suite(void)
+{
+    Suite *suite = suite_create("subtree");
+    TCase *tests = tcase_create("subtree");
+    tcase_set_timeout(tests, 600);
+    tcase_add_checked_fixture(tests, make_folder, scratch_leave);
+    tcase_add_loop_test(tests, subtrees_of_random_trees_are_what_the_whole_file_says, 0, 40);
+    tcase_add_loop_test(tests, subtrees_of_solids_are_what_the_whole_file_says, 0,
+                        ebpo_test_solid_count);
+    tcase_add_loop_test(tests, subtrees_of_larger_trees_agree, 0, 2);
+    tcase_add_test(tests, subtrees_of_subsets_end_where_these_do);
+    tcase_add_loop_test(tests, nodes_are_those_of_streams, 0, 3);
+    tcase_add_loop_test(tests, leaves_are_those_of_whole_levels, 0, ebpo_test_solid_count);
+    tcase_add_test(tests, inherited_half_spaces_bound_the_envelope);
+    tcase_add_test(tests, octcodes_that_are_none_are_refused);
+    tcase_add_test(tests, where_the_tree_ends_the_leaf_above_is_named_and_opened);
+    tcase_add_test(tests, octcodes_of_points_are_those_of_the_cells_around_them);
+    tcase_add_loop_test(tests, without_faces_there_are_nodes_and_a_reason, 0, 3);
+    tcase_add_test(tests, a_limit_of_memory_is_named_and_kept);
+    tcase_add_loop_test(tests, changed_bytes_never_lead_outside, 0, 3);
+    suite_add_tcase(suite, tests);
+    return suite;
+}
