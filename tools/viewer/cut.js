@@ -6,9 +6,11 @@ import { BLACK, GRAY, LEAF, WHITE } from './reader/index.js';
 
 const TILE_NODES = 300;        // a tile's most: fewer tiles are fewer draw calls, smaller ones are made again faster
 const NODES_A_PASS = 2400;     // newly made in one pass, so that a picture comes early and improves; the first passes make fewer yet
-const POLYTOPES_KEPT = 100000; // of about 1.3 KB, besides those of the cut itself
+const POLYTOPES_KEPT = 40000;  // of about 1.3 KB, besides those of the cut itself
 const PRUNE_PASSES = 64;
 const MESH_LEAVES = 1000;      // whose faces are asked for at once, about
+const MESH_SUBTREES = 24;      // the same where the file has subtrees
+const NODES_MISSING = 1 << 14; // told of in one pass
 const LEAF_SHARE = 4;          // in small files leaves' faces are taken even when so many times smaller than a gray node may be
 const GROUP_LEVELS = 3;        // leaves below one node so many levels above have neighbouring faces in the file
 const GROUP_LEAVES = 12;       // fewer wanted ones are not worth their chunks, unless they are large
@@ -67,8 +69,9 @@ export class Cut {
     this.low = tree.info.box_size.map((s) => -s / 2 * this.scene.scale);
   }
 
-  // Projected size of the node's cell in pixels; what is out of sight counts a tenth.
+  // Projected size of the node's cell in pixels; what is out of sight counts a tenth, and `unseen` says that it was.
   #pixels(node, view) {
+    this.unseen = false;
     const h = this.half[node.level];
     let near = 0, c, d;
     const center = this.center ??= [0, 0, 0];
@@ -82,6 +85,7 @@ export class Cut {
     for (const [x, y, z, w] of view.planes)
       if (x * center[0] + y * center[1] + z * center[2] + w < -(Math.abs(x) * h[0] + Math.abs(y) * h[1] + Math.abs(z) * h[2])) {
         px *= 0.1;
+        this.unseen = true;
         break;
       }
     return px;
@@ -90,8 +94,8 @@ export class Cut {
   /**
    * One pass. `view`: { eye, planes, pixels } in scene coordinates, `pixels` those of a length 1 at distance 1. `want`: { level (deepest), mesh
    * (real faces in leaves), pixels (cells are refined until they are smaller), triangles (at most about), black (draw black nodes), lines, cells }.
-   * Returns { set: [tile], removed: [key], more, deeper, leaves, stats }: `more`: another pass would refine further; `deeper`: a level is missing;
-   * `leaves`: leaves whose faces are missing, most important first.
+   * Returns { set: [tile], removed: [key], more, deeper, missing, leaves, stats }: `more`: another pass would refine further; `deeper`: nodes are
+   * missing: those below `missing`, [{ node, levels }], most important first, so many levels of them; `leaves`: leaves whose faces are missing, likewise.
    */
   update(view, want) {
     const chosen = this.#choose(view, want), tiles = new Map();
@@ -131,7 +135,7 @@ export class Cut {
       }
     this.size = chosen.nodes.length;
     this.#tidy();
-    return { set, removed, more: chosen.more, deeper: chosen.deeper, leaves: chosen.leaves, stats: { ...this.#stats(), levels: chosen.levels } };
+    return { set, removed, more: chosen.more, deeper: chosen.missing.length > 0, missing: chosen.missing, leaves: chosen.leaves, stats: { ...this.#stats(), levels: chosen.levels } };
   }
 
   #stats() {
@@ -146,15 +150,15 @@ export class Cut {
   }
 
   #choose(view, want) {
-    const heap = new Heap(), out = { nodes: [], more: false, deeper: false, leaves: [], levels: [] };
+    const heap = new Heap(), out = { nodes: [], more: false, missing: [], leaves: [], levels: [] };
     const groups = new Map(), share = this.small ? LEAF_SHARE : 1;
     let estimate = 0, fresh = Math.max(Math.min(NODES_A_PASS, 16 * 4 ** this.pass++), this.size / 2);
-    const add = (node, px) => {
+    const add = (node, px, unseen) => {
       node.id ??= ++this.ids;
       node.useMesh = false;
       if (node.type === LEAF && want.mesh) {
         node.useMesh = node.mesh !== undefined;
-        if (!node.mesh && px > want.pixels / share && this.tree.info.parts.has('mesh'))
+        if (!node.mesh && px > want.pixels / share && (this.small || !unseen) && this.tree.info.parts.has('mesh'))
           this.#group(groups, node, px);
       }
       estimate += node.useMesh ? node.mesh.length / 9 : node.triangles ?? 24;
@@ -164,27 +168,27 @@ export class Cut {
     const offer = (node) => {
       const px = this.#pixels(node, view);
       if (node.type === GRAY || (node.type === LEAF && want.mesh))
-        heap.push({ node, px });
+        heap.push({ node, px, unseen: this.unseen });
       else
-        add(node, px);
+        add(node, px, this.unseen);
     };
     if (this.tree.root.type !== WHITE)
       offer(this.tree.root);
     while (heap.items.length) {
-      const { node, px } = heap.pop();
+      const { node, px, unseen } = heap.pop();
       const full = estimate + 24 * heap.items.length > want.triangles;
       if (node.type !== GRAY || node.level >= want.level || px <= want.pixels || full || this.tree.isPruned(node)) {
-        add(node, px);
+        add(node, px, unseen);
         continue;
       }
       const known = node.pass === this.pass - 1;
       const children = known || fresh > 0 ? this.tree.children(node) : undefined;
       if (!children) {
-        if (node.level >= this.tree.depth)
-          out.deeper = true;
-        else
+        if (!known && fresh <= 0)
           out.more = true;
-        add(node, px);
+        else if (!this.tree.isPruned(node) && (this.small || !unseen) && out.missing.length < NODES_MISSING)
+          out.missing.push({ node, levels: this.#levelsWanted(node, px, want) });
+        add(node, px, unseen);
         continue;
       }
       node.pass = this.pass;
@@ -198,9 +202,14 @@ export class Cut {
     return out;
   }
 
+  // How many levels below a node are worth having at once: until cells are as small as is wanted.
+  #levelsWanted(node, px, want) {
+    return Math.max(1, Math.min(want.level - node.level, want.pixels > 0 ? Math.ceil(Math.log2(px / want.pixels)) : Infinity));
+  }
+
   #group(groups, leaf, px) {
     let node = leaf;
-    for (let i = 0; i < GROUP_LEVELS && node.parent; i++)
+    for (let i = 0; node.parent && (leaf.subtree === undefined ? i < GROUP_LEVELS : node.subtree !== undefined); i++)
       node = node.parent;
     const group = groups.get(node) ?? { leaves: [], sum: 0, most: 0 };
     groups.set(node, group);
@@ -211,9 +220,13 @@ export class Cut {
 
   // Neighbours together, the groups that are seen most first; scattered leaves would cost a chunk of 64 KB each.
   #leavesToFetch(groups, want) {
-    const out = [];
-    for (const { leaves, most } of [...groups.values()].sort((a, b) => b.sum - a.sum))
-      if (out.length < MESH_LEAVES && (this.small || leaves.length >= GROUP_LEAVES || most > LARGE_LEAF * want.pixels))
+    const out = [], { subtree_level: C } = this.tree.info;
+    let subtrees = 0;
+    for (const [node, { leaves, most }] of [...groups].sort((a, b) => b[1].sum - a[1].sum))
+      if (node.level === C) { // the root of a subtree
+        if (subtrees++ < MESH_SUBTREES)
+          out.push(...leaves);
+      } else if (out.length < MESH_LEAVES && (this.small || leaves.length >= GROUP_LEAVES || most > LARGE_LEAF * want.pixels))
         out.push(...leaves);
     return out;
   }

@@ -2,11 +2,9 @@
 // 'idle' and 'failed'.
 import { ZSTDDecoder } from './node_modules/zstddec/dist/zstddec.mjs'; // workers have no import maps
 import { Cut } from './cut.js';
-import { Tree, distanceInterval, inside, insideLeaf, loadZstd, nearestFace, openEbpo } from './reader/index.js';
+import { GRAY, Tree, distanceInterval, growForQuestion, growForView, inside, insideLeaf, loadZstd, nearestFace, openEbpo } from './reader/index.js';
 
 const FIRST_LEVELS = 5;                   // come with the first request, as a rule
-const TREE_BYTES_MOST = 512 * 1024 * 1024; // decoded arrays of levels, roughly
-
 const SMALL_MESH = 8 * 1024 * 1024;       // stored bytes
 const MESH_BYTES_A_VIEW = 16 * 1024 * 1024; // of larger ones, before the camera moves again
 
@@ -24,7 +22,7 @@ class OpenFile {
     this.number = number;
     this.began = performance.now();
     this.timeline = []; // { level, ms, bytes, requests }
-    this.busy = { level: undefined, mesh: false };
+    this.busy = { level: undefined, nodes: false, mesh: false };
     this.running = this.again = false;
     this.probes = 0;
   }
@@ -62,20 +60,16 @@ class OpenFile {
   }
 
   async #loadNext(last) {
-    for (const level of await this.file.levels(this.tree.depth + 1, last)) {
+    for (const level of await this.file.levels(this.tree.depth + 1, last))
       this.tree.add(level);
-      this.timeline.push({ level: level.level, ms: performance.now() - this.began, ...this.file.traffic });
-    }
     if (!this.ended)
-      post({ type: 'loaded', opening: this.number, depth: this.tree.depth, timeline: this.timeline, traffic: this.file.traffic });
+      this.#loaded();
   }
 
-  #levelFits(level) {
-    const bytes = (l) => this.tree.info.levels[l].gray * 40 + this.tree.info.levels[l].planes * 4 + this.tree.info.levels[l].leaf * 6;
-    let sum = 0;
-    for (let l = 0; l <= level; l++)
-      sum += bytes(l);
-    return sum < TREE_BYTES_MOST;
+  #loaded() {
+    for (let level = this.timeline.length; level <= this.tree.depth; level++)
+      this.timeline.push({ level, ms: performance.now() - this.began, ...this.file.traffic });
+    post({ type: 'loaded', opening: this.number, depth: this.tree.depth, timeline: this.timeline, traffic: this.file.traffic });
   }
 
   async pump() {
@@ -97,14 +91,13 @@ class OpenFile {
       this.again = false;
       result = this.cut.update(view, want);
       this.#send(result);
-      const deeper = result.deeper && this.#levelFits(this.tree.depth + 1);
-      if (deeper && !this.busy.level)
-        this.#later(this.load(this.tree.depth + 1));
-      if (result.leaves.length && !this.busy.mesh && !result.more && !deeper && this.#meshAllowed())
+      if (result.deeper && !this.busy.nodes && !this.busy.level)
+        this.#later(this.#loadNodes(result.missing));
+      if (result.leaves.length && !this.busy.mesh && !result.more && !result.deeper && this.#meshAllowed())
         this.#later(this.#loadMesh(result.leaves));
       await new Promise((done) => setTimeout(done)); // lets a newer view in
     } while (!this.ended && (this.again || result.more));
-    if (!this.ended && !this.busy.level && !this.busy.mesh)
+    if (!this.ended && !this.busy.level && !this.busy.nodes && !this.busy.mesh)
       post({ type: 'idle', opening: this.number, want: want.number, traffic: this.file.traffic, deeper: result.deeper });
   }
 
@@ -118,6 +111,18 @@ class OpenFile {
 
   #later(work) {
     work.then(() => this.ended || this.pump(), (error) => this.ended || post({ type: 'failed', opening: this.number, error: describe(error), late: true }));
+  }
+
+  async #loadNodes(missing) {
+    this.busy.nodes = true;
+    try {
+      const { depth } = this.tree;
+      await growForView(this.file, this.tree, missing);
+      if (!this.ended && this.tree.depth > depth)
+        this.#loaded();
+    } finally {
+      this.busy.nodes = false;
+    }
   }
 
   async #loadMesh(leaves) {
@@ -143,23 +148,23 @@ class OpenFile {
     answer({ ...coarse, exact: false, done: !file.info.parts.has('mesh') });
     if (!file.info.parts.has('mesh'))
       return;
-    const deeper = () => this.load(tree.depth + 1);
+    const lean = tree.lean(), deeper = (nodes) => growForQuestion(file, lean, nodes);
     let where;
     if (solid) {
-      let found = inside(tree, point);
-      while (found.where === 'maybe' && tree.children(found.node) === undefined && !tree.isPruned(found.node) && tree.depth + 1 < tree.info.level_count) {
-        await deeper();
-        found = inside(tree, point);
+      let found = inside(lean, point);
+      while (found.where === 'maybe' && lean.children(found.node) === undefined && found.node.type === GRAY && !lean.isPruned(found.node)) {
+        await deeper([found.node]);
+        found = inside(lean, point);
       }
-      if (found.where === 'maybe' && tree.isPruned(found.node)) { // a subset: no more is known here
+      if (found.where === 'maybe' && lean.isPruned(found.node)) { // a subset: no more is known here
         answer({ ...coarse, exact: false, done: true });
         return;
       }
-      where = found.where === 'maybe' ? insideLeaf(tree, found.node, point, (await file.leafFaces([found.node]))[0]).where : found.where;
+      where = found.where === 'maybe' ? insideLeaf(lean, found.node, point, (await file.leafFaces([found.node]))[0]).where : found.where;
     }
     let near;
     try {
-      near = await nearestFace(tree, point, (leaves) => file.leafFaces(leaves), deeper);
+      near = await nearestFace(lean, point, (leaves) => file.leafFaces(leaves), deeper);
     } catch (error) {
       if (error.code !== 'ABSENT')
         throw error;

@@ -83,7 +83,7 @@ export function zstdFrameFault(data, size) {
   return at + 4 === data.length ? undefined : 'the zstd frame does not fill the chunk';
 }
 
-async function inflate(data) {
+async function inflate(data, most) {
   const stream = new DecompressionStream('deflate'), writer = stream.writable.getWriter();
   writer.write(data).catch(() => {});
   writer.close().catch(() => {});
@@ -94,7 +94,7 @@ async function inflate(data) {
     if (done)
       break;
     total += value.length;
-    if (total > CHUNK_BYTES_MAX) {
+    if (total > most) {
       reader.cancel().catch(() => {});
       break;
     }
@@ -144,7 +144,7 @@ export async function decodeChunk(stored, pipeline, elementSize, size, zstd) {
     if (data.length !== size) // the decoder gives no bytes on errors
       return { fault: 'the zstd frame does not decode, or its checksum does not match' };
   } else if (pipeline === 'deflate') {
-    data = await inflate(data).catch(() => new Uint8Array(0));
+    data = await inflate(data, size).catch(() => new Uint8Array(0));
     if (data.length !== size)
       return { fault: "the deflate stream does not decode to the chunk's size" };
   } else if (data.length !== size) {

@@ -11,17 +11,31 @@ export function isInside(rule, winding) {
   return rule === 'nonzero' ? winding !== 0 : rule === 'evenodd' ? winding % 2 !== 0 : winding > 0;
 }
 
-function checkTypes(info, level) {
-  const counts = [0, 0, 0, 0], octants = level.level ? 8 : 1, s = level.summary;
-  if (level.level === 0 && level.types[0] > 3)
+/** How many nodes of each type (white, black, leaf, gray) groups of a level have. */
+export function countTypes(types, level) {
+  const counts = [0, 0, 0, 0], octants = level ? 8 : 1;
+  if (level === 0 && types[0] > 3)
     throw formatError(levelPath(0, 'types'), 'the root has siblings');
-  for (const types of level.types)
+  for (const group of types)
     for (let o = 0; o < octants; o++)
-      counts[types >> 2 * o & 3]++;
+      counts[group >> 2 * o & 3]++;
+  return counts;
+}
+
+function checkTypes(info, level) {
+  const counts = countTypes(level.types, level.level), s = level.summary;
   if (counts[WHITE] !== s.white || counts[BLACK] !== s.black || counts[LEAF] !== s.leaf || counts[GRAY] !== s.gray)
     throw formatError(levelPath(level.level, 'types'), 'the types do not add up to the counts in the head');
   if (info.parts.has('pruned') && level.level && level.types.reduce((sum, t) => sum + (t === 0), 0) !== info.levels[level.level - 1].pruned)
     throw formatError(levelPath(level.level, 'types'), 'there is not one empty group for each pruned node of the level above');
+}
+
+/** Winding numbers of black and white nodes against the rule. */
+export function checkWindings(info, level, black, white) {
+  if (black?.some((w) => !isInside(info.winding_rule, w)))
+    throw formatError(levelPath(level, 'black_winding'), 'a black node lies outside by the winding rule');
+  if (white?.some((w) => isInside(info.winding_rule, w)))
+    throw formatError(levelPath(level, 'white_winding'), 'a white node lies inside by the winding rule');
 }
 
 function checkPlanes(level, countsName, counts, planesName, planes, total) {
@@ -40,10 +54,7 @@ export function checkLevel(info, level) {
   checkTypes(info, level);
   checkPlanes(level, 'plane_counts', level.planeCounts, 'planes', level.planes, level.summary.planes);
   checkPlanes(level, 'leaf_plane_counts', level.leafPlaneCounts, 'leaf_planes', level.leafPlanes, level.summary.leaf_planes);
-  if (level.blackWinding?.some((w) => !isInside(info.winding_rule, w)))
-    throw formatError(levelPath(level.level, 'black_winding'), 'a black node lies outside by the winding rule');
-  if (level.whiteWinding?.some((w) => isInside(info.winding_rule, w)))
-    throw formatError(levelPath(level.level, 'white_winding'), 'a white node lies inside by the winding rule');
+  checkWindings(info, level.level, level.blackWinding, level.whiteWinding);
 }
 
 /** types_index and gray_index against the sums that they state. */

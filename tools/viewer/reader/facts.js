@@ -1,10 +1,11 @@
 // What a file's head says: root attributes, levels, and the table of arrays. format-spec/README.md, sections 3 and 4.
+import { CHUNK_BYTES_MAX } from './chunk.js';
 import { EbpoError, formatError } from './error.js';
 import { text } from './hdf5.js';
 
 export const LEVELS_MAX = 21, INDEX_ROWS = 4096;
 const MESH_MAX = 2 ** 32 - 2, NODES_MAX = 2 ** 40;
-const KNOWN_PARTS = ['levels', 'mesh', 'planes', 'maps', 'leaf-planes', 'pruned'];
+const KNOWN_PARTS = ['levels', 'mesh', 'planes', 'maps', 'leaf-planes', 'subtrees', 'pruned'];
 
 const WORDS = { kind: ['surface', 'solid'], winding_rule: ['nonzero', 'evenodd', 'positive'], coordinate_type: ['float32', 'float64'] };
 const TEXTS = ['source_name', 'source_format', 'unit', 'crs', 'date'];
@@ -14,7 +15,7 @@ const COUNTS = ['source_size', 'vertex_count', 'face_count', 'source_vertex_coun
   'mesh_nonmanifold_edges', 'mesh_misoriented_edges', 'mesh_unbalanced_edges', 'mesh_bowtie_vertices', 'mesh_zero_area_faces',
   'mesh_index_repeated_faces', 'mesh_repeated_faces', 'mesh_unreferenced_vertices', 'mesh_repeated_positions', 'mesh_edges', 'mesh_components',
   'mesh_boundary_loops'];
-const HINTS = ['chunk_index_offset', 'chunk_index_bytes']; // may be absent, and wrong
+const HINTS = ['chunk_index_offset', 'chunk_index_bytes', 'top_bytes']; // may be absent, and wrong
 const NUMBERS = ['grid_level', 'max_level', 'level_count'];
 const REALS = ['epsilon', 'mesh_area', 'mesh_volume', 'mesh_mean_edge'];
 const TRIPLES = ['box_origin', 'box_size', 'mesh_min', 'mesh_max'];
@@ -146,6 +147,7 @@ export function readFacts(attributes) {
   if (out.level_count < 1 || out.level_count > LEVELS_MAX)
     throw formatError('/', `level_count is not 1 to ${LEVELS_MAX}`);
   out.solid = out.kind === 'solid';
+  out.subtree_level = out.parts.has('subtrees') ? facts.int('subtree_level', 1, out.level_count - 2) : undefined;
   if (out.parts.has('pruned')) {
     out.subset_of = facts.text('subset_of');
     if (!/^[0-9a-f]{64}$/.test(out.subset_of))
@@ -282,7 +284,7 @@ const LEVEL_ARRAYS = {
   leaf_planes: [0, [4], false, (info, s) => has(info, 'leaf-planes', s.leaf_planes)],
 };
 const faceChunks = (info) => {
-  const rows = chunkRows(info.face_count, 3, 4);
+  const rows = info.subtree_level === undefined ? chunkRows(info.face_count, 3, 4) : FIXED_ROWS['/mesh/faces'];
   return info.face_count > rows ? Math.ceil(info.face_count / rows) : 0;
 };
 const ROOT_ARRAYS = {
@@ -293,15 +295,39 @@ const ROOT_ARRAYS = {
   '/maps/face_source': [0, [4], false, (info) => has(info, 'maps', info.face_count)],
 };
 
-/** The arrays that a file with these facts has: [{ path, level, name, cols, sizes, signed, rows, mayBeAbsent }]. */
+/** Columns of /subtrees/counts. */
+export const subtreeCols = (info) => 6 + 7 * (info.level_count - 1 - info.subtree_level);
+
+// With the part subtrees. rows: undefined where the array itself says it.
+const subtreeArrays = (info) => (info.subtree_level === undefined ? [] : [
+  { path: '/subtrees/counts', cols: subtreeCols(info), sizes: [4], rows: info.levels[info.subtree_level].gray },
+  { path: '/subtrees/index', cols: subtreeCols(info), sizes: [8], rows: undefined },
+  { path: '/subtrees/outer', cols: 0, sizes: [4], rows: undefined, mayBeAbsent: true },
+  { path: '/subtrees/places', cols: 2, sizes: [4], rows: undefined },
+]);
+
+/** The arrays that a file with these facts has: [{ path, level, order, name, cols, sizes, signed, rows, mayBeAbsent }]. `order`: among those of its level. */
 export function arraysOf(info) {
   const out = [];
   info.levels.forEach((summary, level) => {
     const folder = `/levels/${String(level).padStart(2, '0')}`, groups = level ? info.levels[level - 1].gray : 1;
-    for (const [name, [cols, sizes, signed, rows, mayBeAbsent]] of Object.entries(LEVEL_ARRAYS))
-      out.push({ path: `${folder}/${name}`, level, name, cols, sizes, signed, rows: rows(info, summary, groups), mayBeAbsent });
+    Object.entries(LEVEL_ARRAYS).forEach(([name, [cols, sizes, signed, rows, mayBeAbsent]], order) =>
+      out.push({ path: `${folder}/${name}`, level, order, name, cols, sizes, signed, rows: rows(info, summary, groups), mayBeAbsent }));
   });
   for (const [path, [cols, sizes, signed, rows]] of Object.entries(ROOT_ARRAYS))
     out.push({ path, level: undefined, name: path, cols, sizes, signed, rows: rows(info) });
-  return out.filter((a) => a.rows > 0);
+  out.push(...subtreeArrays(info).map((a) => ({ ...a, level: undefined, name: a.path, signed: false })));
+  return out.filter((a) => a.rows !== 0);
+}
+
+// With the part subtrees.
+const FIXED_ROWS = { '/mesh/faces': 2048, '/mesh/vertices': 1024, '/subtrees/places': Infinity };
+
+/** Whether chunks of an array may have so many rows. */
+export function chunkRowsFit(info, path, rows, cols, elementSize, chunk) {
+  if (info.subtree_level === undefined)
+    return chunk === chunkRows(rows, cols, elementSize);
+  if (FIXED_ROWS[path])
+    return chunk === Math.min(rows, FIXED_ROWS[path]);
+  return chunk * elementSize * Math.max(cols, 1) <= CHUNK_BYTES_MAX && (chunk === rows || (chunk < rows && Number.isInteger(Math.log2(chunk))));
 }

@@ -6,7 +6,7 @@ import { EbpoError } from './error.js';
 import { axisCrossing, onTriangle } from './predicates.js';
 
 const MORE = 1 + 1e-12, LESS = 1 - 1e-12; // for lengths: a few roundings are 1e-15
-const TOGETHER = 8;                       // leaves whose faces are asked for at once
+const TOGETHER = 8, TOGETHER_MOST = 64;   // leaves whose faces are asked for at once, at first and later
 const NEAR = 1 / 256;                     // a gray node or leaf has surface within so much of its cell: format-spec, section 5
 
 /** Whether p certainly lies beyond one of the node's own half-spaces. In doubles with a margin: values are up to 2^22, errors below 1e-8. */
@@ -141,32 +141,43 @@ export function nearestOnTriangle(p, f, at) {
 }
 
 /**
- * The nearest face: { distance, point, leaves }. `facesOf(leaves)` gives (a promise of) the faces of each leaf, and `deeper()` brings one more
- * level into the tree. Cells are searched nearest first, so few leaves are looked at.
+ * The nearest face: { distance, point, leaves }. `facesOf(leaves)` gives (a promise of) the faces of each leaf, and `deeper(nodes)` brings the
+ * children of these nodes into the tree, all at once. Cells are searched nearest first, so few leaves are looked at.
  */
 export async function nearestFace(tree, p, facesOf, deeper) {
-  let best = [Infinity], looked = 0;
-  const queue = [[cellNear(tree, tree.root, p), tree.root]];
+  let best = [Infinity], bound = Infinity, looked = 0, together = TOGETHER, ahead = 1;
+  const queue = [];
+  const add = (node) => {
+    queue.push([cellNear(tree, node, p), node]);
+    bound = Math.min(bound, cellFar(tree, node, p));
+  };
+  const wanted = (near) => near <= best[0] && near <= bound;
+  const missing = (node) => node.type === GRAY && !tree.children(node) && !tree.isPruned(node);
+  add(tree.root);
   while (queue.length) {
     queue.sort((a, b) => b[0] - a[0]); // few entries: a heap would not pay
-    if (queue.at(-1)[0] > best[0])
+    const [near, node] = queue.at(-1), leaves = [];
+    if (!wanted(near))
       break;
-    const leaves = [];
-    while (queue.at(-1)?.[1].type === LEAF && queue.at(-1)[0] <= best[0] && leaves.length < TOGETHER)
+    while (queue.at(-1)?.[1].type === LEAF && wanted(queue.at(-1)[0]) && leaves.length < together)
       leaves.push(queue.pop()[1]);
     if (!leaves.length) {
-      const [, node] = queue.pop();
-      while (!tree.children(node)) {
-        if (tree.isPruned(node))
-          throw new EbpoError('ABSENT', 'the file is a subset: the nearest face may be among those that were left out; take a larger part of the original');
-        await deeper();
+      if (missing(node)) { // with those that are likely to be wanted then; when that was too few, twice as many
+        const next = queue.filter(([d, n]) => wanted(d) && missing(n)).reverse(), close = near + tree.size(node, 0) / 16;
+        await deeper(next.filter(([d], i) => i < ahead || d <= close).map(([, n]) => n));
+        ahead *= 2;
       }
-      for (const child of tree.children(node))
+      const children = tree.children(node);
+      if (!children)
+        throw new EbpoError('ABSENT', 'the file is a subset: the nearest face may be among those that were left out; take a larger part of the original');
+      queue.splice(queue.findLastIndex((entry) => entry[1] === node), 1);
+      for (const child of children)
         if (child.type === GRAY || child.type === LEAF)
-          queue.push([cellNear(tree, child, p), child]);
+          add(child);
       continue;
     }
     looked += leaves.length;
+    together = Math.min(2 * together, TOGETHER_MOST);
     for (const faces of await facesOf(leaves))
       for (let at = 0; at < faces.length; at += 9) {
         const found = nearestOnTriangle(p, faces, at);

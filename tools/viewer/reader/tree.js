@@ -1,16 +1,22 @@
 // The octree as nodes with children, from levels as they arrive: format-spec/README.md, section 5.
-import { BLACK, GRAY, LEAF, WHITE } from './decode.js';
+import { BLACK, GRAY, LEAF } from './decode.js';
 import { cube, envelope } from './envelope.js';
+import { INDEX_ROWS } from './facts.js';
+import { Segment } from './segment.js';
+
+const PARTS_BYTES = 48 * 1024 * 1024; // of segments that are kept besides those of nodes in use
 
 /** One node. `at`: its cell's place in its level; `rank`: among the nodes of its type in its level; `octant`: among its siblings. */
 export class Node {
-  constructor(parent, octant, type, rank) {
+  constructor(parent, octant, type, rank, segment, subtree) {
     this.parent = parent;
     this.level = parent ? parent.level + 1 : 0;
     this.octant = octant;
-    this.at = parent ? parent.at.map((n, k) => 2 * n + (octant >> k & 1)) : [0, 0, 0];
+    this.at = parent ? [2 * parent.at[0] + (octant & 1), 2 * parent.at[1] + (octant >> 1 & 1), 2 * parent.at[2] + (octant >> 2)] : [0, 0, 0];
     this.type = type;
     this.rank = rank;
+    this.segment = segment; // where it is described
+    this.subtree = subtree; // which it is below the root of, in files that have subtrees
     this.children = undefined;
     this.polytope = undefined;
   }
@@ -19,76 +25,102 @@ export class Node {
 export class Tree {
   constructor(info) {
     this.info = info;
-    this.levels = []; // as file.levels() gives them, with `before` and `planeBegin` added
+    this.levels = []; // whole ones, as segments
+    this.parts = new Map(); // other segments by level and part, oldest first
+    this.partBytes = 0;
+    this.depth = -1; // deepest level of which something was ever at hand
     this.root = undefined;
   }
 
-  /** Levels come in order. */
+  /** A whole level, as file.levels() gives it. */
   add(level) {
-    const before = [WHITE, BLACK, LEAF, GRAY].map(() => new Uint32Array(level.groups)), count = [0, 0, 0, 0], octants = level.level ? 8 : 1;
-    for (let g = 0; g < level.groups; g++) {
-      const types = level.types[g];
-      for (let t = 0; t < 4; t++)
-        before[t][g] = count[t];
-      for (let o = 0; o < octants; o++)
-        count[types >> 2 * o & 3]++;
+    this.levels[level.level] = level instanceof Segment ? level : new Segment(level);
+    this.depth = Math.max(this.depth, level.level);
+    if (level.level === 0)
+      this.root = new Node(undefined, 0, level.types[0] & 3, 0, this.levels[0]);
+  }
+
+  /** A part of a level (parts.js). */
+  addPart(part, segment) {
+    const key = segment.level * 2 ** 40 + part;
+    if (this.parts.has(key))
+      return;
+    this.parts.set(key, segment);
+    this.partBytes += segment.byteLength;
+    this.depth = Math.max(this.depth, segment.level);
+    for (const [old, { byteLength }] of this.parts) {
+      if (this.partBytes <= PARTS_BYTES || old === key)
+        break;
+      this.parts.delete(old);
+      this.partBytes -= byteLength;
     }
-    const begins = (counts) => {
-      const begin = new Uint32Array((counts?.length ?? 0) + 1);
-      counts?.forEach((n, i) => (begin[i + 1] = begin[i] + n));
-      return begin;
-    };
-    this.levels.push({ ...level, before, planeBegin: begins(level.planeCounts), leafPlaneBegin: begins(level.leafPlaneCounts) });
-    this.root ??= new Node(undefined, 0, level.types[0] & 3, 0);
   }
 
-  /** Deepest level at hand. */
-  get depth() {
-    return this.levels.length - 1;
+  hasPart(level, part) {
+    return this.parts.has(level * 2 ** 40 + part);
   }
 
-  /** Whether a gray node has no children in the file, as in a subset; undefined while that is not known, the next level not being at hand. */
+  /** A tree that shares the whole levels, also those that come later: for questions, which read no planes of parts. */
+  lean() {
+    const tree = new Tree(this.info);
+    tree.levels = this.levels;
+    tree.depth = this.depth;
+    tree.root = new Node(undefined, 0, this.root.type, 0, this.levels[0]);
+    return tree;
+  }
+
+  /** The part of the next level in which a gray node's children are. */
+  partOf(node) {
+    const { subtree_level: C } = this.info;
+    return C === undefined || node.level < C ? Math.floor(node.rank / INDEX_ROWS) : node.level === C ? node.rank : node.subtree;
+  }
+
+  #segmentBelow(node) {
+    const whole = this.levels[node.level + 1];
+    if (whole)
+      return whole;
+    const key = (node.level + 1) * 2 ** 40 + this.partOf(node), part = this.parts.get(key);
+    if (part) {
+      this.parts.delete(key); // to the young end
+      this.parts.set(key, part);
+    }
+    return part;
+  }
+
+  /** Whether a gray node has no children in the file, as in a subset; undefined while that is not known, its part of the next level not being at hand. */
   isPruned(node) {
     if (node.type !== GRAY || !this.info.parts.has('pruned'))
       return false;
     if (node.level + 1 === this.info.level_count)
       return true;
-    const level = this.levels[node.level + 1];
-    return level && level.types[node.rank] === 0;
+    if (node.children)
+      return false;
+    const segment = this.#segmentBelow(node);
+    return segment && segment.typesOf(node.rank) === 0;
   }
 
-  /** The eight children of a gray node; undefined while their level is not at hand, and for a pruned node. */
+  /** The eight children of a gray node; undefined while their part of the level is not at hand, and for a pruned node. */
   children(node) {
-    const level = this.levels[node.level + 1];
-    if (!level || node.type !== GRAY || this.isPruned(node))
+    if (node.children || node.type !== GRAY)
+      return node.children;
+    const segment = this.#segmentBelow(node), types = segment?.typesOf(node.rank);
+    if (!segment || (types === 0 && this.info.parts.has('pruned')))
       return undefined;
-    if (!node.children) {
-      const rank = level.before.map((b) => b[node.rank]), types = level.types[node.rank];
-      node.children = Array.from({ length: 8 }, (_, o) => {
-        const type = types >> 2 * o & 3;
-        return new Node(node, o, type, rank[type]++);
-      });
-    }
+    const ranks = segment.ranks(node.rank), subtree = node.level === this.info.subtree_level ? node.rank : node.subtree;
+    node.children = Array.from({ length: 8 }, (_, o) => {
+      const type = types >> 2 * o & 3;
+      return new Node(node, o, type, ranks[type]++, segment, subtree);
+    });
     return node.children;
   }
 
   /** The node's own plane codes. */
   planes(node) {
-    const level = this.levels[node.level], i = node.rank;
-    if (node.type === GRAY && level.planes)
-      return level.planes.subarray(level.planeBegin[i], level.planeBegin[i + 1]);
-    if (node.type === LEAF && level.leafPlanes)
-      return level.leafPlanes.subarray(level.leafPlaneBegin[i], level.leafPlaneBegin[i + 1]);
-    return [];
+    return node.type === GRAY ? node.segment.grayPlanes(node.rank) : node.type === LEAF ? node.segment.leafPlanesOf(node.rank) : [];
   }
 
   winding(node) {
-    const level = this.levels[node.level];
-    if (node.type === WHITE)
-      return level.whiteWinding?.[node.rank] ?? 0;
-    if (node.type === BLACK)
-      return level.blackWinding?.[node.rank] ?? 1;
-    return node.type === LEAF ? level.leafWinding?.[node.rank] ?? 0 : 0;
+    return node.type === GRAY ? 0 : node.segment.winding(node.type, node.rank) ?? (node.type === BLACK ? 1 : 0);
   }
 
   /**

@@ -1,0 +1,163 @@
+// Chunks on their way from bytes to values: asked for in batches, neighbours in one request, several requests under way, decoded as they come, and
+// kept under a budget of memory.
+import { decodeChunk } from './chunk.js';
+import { formatError } from './error.js';
+
+const GAP_BYTES = 16 * 1024;            // rather read this much for nothing than ask twice
+const REQUEST_BYTES = 4 * 1024 * 1024;  // a request's most
+const REQUESTS = 6;                     // at once, as browsers do for a host
+export const CACHE_BYTES = 64 * 1024 * 1024;
+
+const keyOf = ({ array, chunk }) => array.number * 2 ** 32 + chunk;
+
+export class ChunkCache {
+  /**
+   * `head`: the file's first bytes, which are not fetched again. `values(array, chunk, bytes)`: what is kept of a chunk: something with byteLength, or a promise of it.
+   */
+  constructor(source, head, { zstd, values, budget = CACHE_BYTES }) {
+    Object.assign(this, { source, head, zstd, values, budget });
+    this.kept = new Map();    // by key, oldest first
+    this.bytes = 0;           // of what is kept
+    this.pending = new Map(); // promises by key
+    this.busy = 0;
+    this.queue = [];
+  }
+
+  /** Values of chunks: wanted is [{ array, chunk }], of any arrays, all of which have their `chunks`. */
+  async get(wanted) {
+    const missing = [], found = wanted.map((item) => {
+      const key = keyOf(item), hit = this.recall(key);
+      if (hit !== undefined)
+        return hit;
+      let promise = this.pending.get(key);
+      if (!promise) {
+        promise = new Promise((done, fail) => missing.push({ ...item, key, done, fail }));
+        this.pending.set(key, promise);
+      }
+      return promise;
+    });
+    this.#load(missing);
+    return Promise.all(found);
+  }
+
+  #load(missing) {
+    this.decoded(missing).forEach(async (promise, i) => {
+      const { array, chunk, key, done, fail } = missing[i];
+      try {
+        const values = await this.values(array, chunk, await promise);
+        this.remember(key, values);
+        done(values);
+      } catch (error) {
+        fail(error);
+      } finally {
+        this.pending.delete(key);
+      }
+    });
+  }
+
+  /** How many bytes would be fetched for these. */
+  cost(wanted) {
+    let sum = 0;
+    for (const item of wanted) {
+      const { at, bytes } = item.array.chunks[item.chunk], key = keyOf(item);
+      if (at + bytes > this.coming && !this.kept.has(key) && !this.pending.has(key))
+        sum += bytes;
+    }
+    return sum;
+  }
+
+  /** Decoded bytes of chunks, not kept: [Promise]. */
+  decoded(wanted) {
+    return this.fetch(wanted.map(({ array, chunk }) => array.chunks[chunk])).map(async (promise, i) => {
+      const { array, chunk } = wanted[i];
+      const { bytes, fault } = await decodeChunk(await promise, array.pipeline, array.elementSize, array.chunkRows * array.rowBytes, await this.zstd);
+      if (fault)
+        throw formatError(`${array.path}: chunk ${chunk}`, `the chunk is damaged: ${fault}`);
+      return bytes;
+    });
+  }
+
+  // --- what is kept: also other things than chunks, under keys that are texts ---
+
+  recall(key) {
+    const hit = this.kept.get(key);
+    if (hit !== undefined) {
+      this.kept.delete(key); // to the young end
+      this.kept.set(key, hit);
+    }
+    return hit;
+  }
+
+  remember(key, values) {
+    if (this.kept.has(key))
+      return;
+    this.kept.set(key, values);
+    this.bytes += values.byteLength;
+    for (const [old, { byteLength }] of this.kept) {
+      if (this.bytes <= this.budget)
+        break;
+      this.kept.delete(old);
+      this.bytes -= byteLength;
+    }
+  }
+
+  // --- bytes ---
+
+  /** How many of the file's first bytes are there or on their way: to read them takes no request. */
+  get coming() {
+    return Math.max(this.head.length, this.source.coming ?? 0);
+  }
+
+  /** Ranges [{ at, bytes }] of the file: [Promise of Uint8Array], in the same order. */
+  fetch(ranges) {
+    const { coming } = this, out = new Array(ranges.length), behind = [];
+    ranges.forEach((r, i) => (r.at + r.bytes <= coming ? (out[i] = this.#first(r.at, r.at + r.bytes)) : behind.push(i)));
+    behind.sort((a, b) => ranges[a].at - ranges[b].at);
+    let run;
+    for (const i of behind) {
+      const from = Math.max(ranges[i].at, coming), to = ranges[i].at + ranges[i].bytes;
+      if (!run || from - run.to > GAP_BYTES || Math.max(to, run.to) - run.from > REQUEST_BYTES)
+        run = this.#run(from);
+      run.to = Math.max(run.to, to);
+      out[i] = this.#piece(run, ranges[i].at, from, to);
+    }
+    return out;
+  }
+
+  // A request that is made when the batch is complete.
+  #run(from) {
+    const run = { from, to: from };
+    run.data = Promise.resolve().then(() => this.#turn(() => this.source.read(run.from, run.to - run.from)));
+    run.data.catch(() => {}); // its pieces tell
+    return run;
+  }
+
+  async #piece(run, at, from, to) {
+    const data = await run.data, piece = data.subarray(from - run.from, to - run.from);
+    if (at === from)
+      return piece;
+    const out = new Uint8Array(to - at); // begins in the first bytes and goes on behind them
+    out.set(await this.#first(at, from));
+    out.set(piece, from - at);
+    return out;
+  }
+
+  async #first(from, to) {
+    return to <= this.head.length ? this.head.subarray(from, to) : this.source.read(from, to - from);
+  }
+
+  async #turn(work) {
+    if (this.busy >= REQUESTS)
+      await new Promise((done) => this.queue.push(done)); // takes over the turn of the one that ended
+    else
+      this.busy++;
+    try {
+      return await work();
+    } finally {
+      if (this.queue.length)
+        this.queue.shift()();
+      else
+        this.busy--;
+    }
+  }
+}

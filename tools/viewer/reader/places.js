@@ -1,0 +1,65 @@
+// Where all chunks lie, by the list that files with subtrees have: format-spec/README.md, section 9, "Places".
+import { formatError } from './error.js';
+
+/** The number of an array in that list. `order`: of the arrays of a level. */
+export function placeNumber(path, level, order) {
+  return level === undefined ? ROOT_NUMBERS[path] : 64 * level + order;
+}
+
+const ROOT_NUMBERS = { '/mesh/vertices': 4096, '/mesh/faces': 4097, '/mesh/faces_index': 4098, '/maps/vertex_source': 4099, '/maps/face_source': 4100,
+  '/subtrees/index': 4112, '/subtrees/counts': 4113, '/subtrees/outer': 4114, '/subtrees/places': 4115 }; // the last one is not in its list
+
+const WHERE = '/subtrees/places';
+
+/** Whether the list is still true: other programs that write the file anew leave it as it was. */
+export function placesHold(places, size) {
+  const { attributes } = places.object, stated = (name) => {
+    const a = attributes.get(name);
+    return a?.type?.class === 'integer' && a.type.size === 8 && !a.type.signed && a.type.little && a.data.length >= 8
+      ? Number(new DataView(a.data.buffer, a.data.byteOffset, 8).getBigUint64(0, true)) : undefined;
+  };
+  return stated('file_bytes') === size && stated('offset') === places.chunks[0].at;
+}
+
+// Where the list begins: an array of a single chunk tells its place.
+function begin(rows, byNumber) {
+  let before = 0;
+  for (let i = 0; i < rows.length; i += 2) {
+    const chunks = byNumber.get(rows[i])?.chunks;
+    if (chunks && chunks[0].at >= before)
+      return chunks[0].at - before;
+    before += rows[i + 1];
+  }
+  throw formatError(WHERE, 'the chunks of level 0 are not in it');
+}
+
+/** `rows`: pairs of number and bytes; `arrays`: all but places. -> Map(array, [{ at, bytes }]). */
+export function readPlaces(rows, arrays, size) {
+  const byNumber = new Map(), out = new Map();
+  for (const array of arrays) {
+    byNumber.set(array.number, array);
+    out.set(array, []);
+  }
+  let at = begin(rows, byNumber);
+  for (let i = 0; i < rows.length; i += 2) {
+    const array = byNumber.get(rows[i]), bytes = rows[i + 1];
+    if (at + bytes > size)
+      throw formatError(WHERE, 'a chunk reaches beyond the end of the file');
+    if (array) {
+      const chunks = out.get(array);
+      if (chunks.length === array.chunkCount)
+        throw formatError(WHERE, `${array.path} has more chunks here than it has`);
+      if (bytes === 0 || bytes > array.chunkMost)
+        throw formatError(WHERE, `a chunk of ${array.path} has a size that it cannot have`);
+      chunks.push({ at, bytes });
+    }
+    at += bytes;
+  }
+  for (const [array, chunks] of out) {
+    if (chunks.length !== array.chunkCount)
+      throw formatError(WHERE, `${array.path} has fewer chunks here than it has`);
+    if (array.chunks && (array.chunks[0].at !== chunks[0].at || array.chunks[0].bytes !== chunks[0].bytes)) // of a single chunk, its header tells
+      throw formatError(WHERE, `${array.path} lies elsewhere`);
+  }
+  return out;
+}

@@ -1,0 +1,128 @@
+// Arrays of an open file, by rows: which chunks hold them, and their values.
+import { ChunkCache } from './cache.js';
+import { decodeFaces, decodeVertices } from './decode.js';
+import { formatError } from './error.js';
+
+export class Store {
+  /** `arrays`: by path, as file.js describes them; all that is asked for must have its chunks. */
+  constructor(info, arrays, source, head, options) {
+    this.info = info;
+    this.arrays = arrays;
+    this.small = new Map();
+    this.cache = new ChunkCache(source, head, { ...options, values: (array, chunk, bytes) => this.#values(array, chunk, bytes) });
+  }
+
+  async #values(array, chunk, bytes) {
+    if (array.path === '/mesh/faces')
+      return decodeFaces(bytes, array, chunk, await this.facesIndex(), this.info.vertex_count);
+    return array.path === '/mesh/vertices' ? decodeVertices(bytes, array, chunk) : typed(array, bytes);
+  }
+
+  /** Rows from .. to - 1 of arrays, as chunks: wanted is [{ path, from, to }] -> [{ array, chunk }], each once. Nothing of absent arrays. */
+  chunksOf(wanted) {
+    const out = [], seen = new Set();
+    for (const { path, from, to } of wanted) {
+      const array = this.arrays.get(path);
+      for (let chunk = array ? Math.floor(from / array.chunkRows) : 0; array && chunk * array.chunkRows < to; chunk++) {
+        const key = array.number * 2 ** 32 + chunk;
+        if (!seen.has(key))
+          out.push({ array, chunk });
+        seen.add(key);
+      }
+    }
+    return out;
+  }
+
+  /** Rows from .. to - 1 of arrays of one column: [typed array of its own]; undefined for absent arrays. */
+  async rows(wanted) {
+    const chunks = this.chunksOf(wanted), values = await this.cache.get(chunks), byArray = new Map();
+    chunks.forEach(({ array, chunk }, i) => {
+      if (!byArray.has(array))
+        byArray.set(array, new Map());
+      byArray.get(array).set(chunk, values[i]);
+    });
+    return wanted.map(({ path, from, to }) => {
+      const array = this.arrays.get(path);
+      if (!array)
+        return undefined;
+      if (from >= to)
+        return new (storedType(array))(0);
+      const out = new (storedType(array))(to - from);
+      for (let at = from; at < to;) {
+        const chunk = Math.floor(at / array.chunkRows), begin = chunk * array.chunkRows, end = Math.min(to, begin + array.chunkRows);
+        out.set(byArray.get(array).get(chunk).subarray(at - begin, end - begin), at - from);
+        at = end;
+      }
+      return out;
+    });
+  }
+
+  /** Three numbers of each of some rows, into `out`. */
+  async triples(path, rows, out) {
+    const array = this.arrays.get(path), shift = array.chunkRows, numbers = new Map();
+    for (const row of rows) {
+      const chunk = Math.floor(row / shift);
+      if (!numbers.has(chunk))
+        numbers.set(chunk, undefined);
+    }
+    const wanted = [...numbers.keys()], values = await this.cache.get(wanted.map((chunk) => ({ array, chunk })));
+    wanted.forEach((chunk, i) => numbers.set(chunk, values[i]));
+    for (let i = 0; i < rows.length; i++) {
+      const chunk = Math.floor(rows[i] / shift), from = numbers.get(chunk), at = 3 * (rows[i] - chunk * shift);
+      out[3 * i] = from[at];
+      out[3 * i + 1] = from[at + 1];
+      out[3 * i + 2] = from[at + 2];
+    }
+  }
+
+  /** Whole arrays as stored before filters, not kept; absent ones are undefined. -> Map(path, bytes) */
+  async raw(paths) {
+    const arrays = paths.map((path) => this.arrays.get(path)).filter(Boolean), wanted = arrays.flatMap(everyChunk), out = new Map();
+    for (const array of arrays)
+      out.set(array.path, new Uint8Array(array.rows * array.rowBytes));
+    await Promise.all(this.cache.decoded(wanted).map(async (promise, i) => {
+      const { array, chunk } = wanted[i], all = out.get(array.path), at = chunk * array.chunkRows * array.rowBytes, bytes = await promise;
+      all.set(bytes.subarray(0, all.length - at), at);
+    }));
+    return out;
+  }
+
+  /** A small array of 64-bit numbers, read once; undefined if absent. */
+  whole(path) {
+    if (!this.small.has(path))
+      this.small.set(path, this.raw([path]).then((raw) => this.integers(raw, path, Float64Array), (error) => {
+        this.small.delete(path);
+        throw error;
+      }));
+    return this.small.get(path);
+  }
+
+  async facesIndex() {
+    return await this.whole('/mesh/faces_index') ?? Float64Array.of(0);
+  }
+
+  /** An array's integers from raw(), widened to Type (Float64Array holds those of 64 bits). */
+  integers(raw, path, Type) {
+    const bytes = raw.get(path);
+    if (!bytes)
+      return undefined;
+    const values = typed(this.arrays.get(path), bytes);
+    if (values instanceof Type)
+      return values;
+    if (!(values instanceof BigUint64Array))
+      return Type.from(values);
+    return Type.from(values, (v) => {
+      if (v > BigInt(Number.MAX_SAFE_INTEGER))
+        throw formatError(path, 'a number is too large');
+      return Number(v);
+    });
+  }
+}
+
+const storedType = (array) => ({ 1: [Uint8Array, Int8Array], 2: [Uint16Array, Int16Array], 4: [Uint32Array, Int32Array], 8: [BigUint64Array] }[array.elementSize][+array.signed]);
+
+function typed(array, bytes) {
+  return new (storedType(array))(bytes.buffer, bytes.byteOffset, bytes.length / array.elementSize);
+}
+
+export const everyChunk = (array) => Array.from({ length: array.chunkCount }, (_, chunk) => ({ array, chunk }));
