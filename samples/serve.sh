@@ -1,41 +1,55 @@
 #!/bin/sh
-# The viewer and models on this machine: installs nginx and what the viewer needs, serves, and
-# prints the address. Ends with Ctrl-C.
-#   serve.sh [--port N] [--folder DIR] [--log FILE] [--no-install]
-# DIR holds .ebpo.h5 files (samples/out, which samples/quickstart.sh fills). Nothing is written
-# outside a temporary folder and tools/viewer/node_modules.
+# The viewer and models on this machine: serves them by nginx and prints the address. Ends with
+# Ctrl-C.
+#   serve.sh [--port N] [--folder DIR] [--log FILE] [--sources]
+# DIR holds .ebpo.h5 files (samples/out, which samples/quickstart.sh fills). The page is bundled
+# anew each time; --sources serves it as it is written. Installs nothing and writes nothing outside
+# a temporary folder; what is missing is said.
 set -eu
 here=$(cd "$(dirname "$0")/.." && pwd)
-viewer=$here/tools/viewer port=8080 folder=$here/samples/out log='' install=yes
+viewer=$here/tools/viewer port=8080 folder=$here/samples/out log='' bundle=yes
 while [ $# -gt 0 ]; do
     case $1 in
     --port) port=$2; shift 2 ;;
-    --folder) folder=$(cd "$2" && pwd); shift 2 ;;
+    --folder) folder=$2; shift 2 ;;
     --log) log=$2; shift 2 ;;
-    --no-install) install=no; shift ;;
-    *) echo "usage: serve.sh [--port N] [--folder DIR] [--log FILE] [--no-install]" >&2; exit 2 ;;
+    --sources) bundle=no; shift ;;
+    *) echo "usage: serve.sh [--port N] [--folder DIR] [--log FILE] [--sources]" >&2; exit 2 ;;
     esac
 done
-if [ $install = yes ]; then
-    sh "$here/tools/install-deps.sh" --viewer
-    ls "$folder"/*.ebpo.h5 >/dev/null 2>&1 || sh "$here/samples/quickstart.sh"
-fi
+missing() {
+    echo "serve.sh: $1 is missing; run sh $here/tools/install-deps.sh --viewer" >&2
+    exit 1
+}
+PATH=$PATH:/usr/sbin
+command -v nginx >/dev/null || missing nginx
+command -v node >/dev/null || missing node
+[ -d "$viewer/node_modules/three" ] || missing "tools/viewer/node_modules"
 if ! ls "$folder"/*.ebpo.h5 >/dev/null 2>&1; then
-    echo "serve.sh: $folder: no .ebpo.h5 file is there; run samples/quickstart.sh," \
-        "or name a folder with --folder" >&2
+    echo "serve.sh: $folder: no .ebpo.h5 file is there; name a folder with --folder, or run" \
+        "sh $here/samples/quickstart.sh for a sample" >&2
     exit 1
 fi
+folder=$(cd "$folder" && pwd)
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 trap 'exit 0' INT TERM
 mkdir -p "$work/www/models" "$work/tmp"
-for file in "$viewer"/*; do ln -s "$file" "$work/www/"; done
+if [ $bundle = yes ] && [ ! -d "$viewer/node_modules/esbuild" ]; then
+    echo "serve.sh: esbuild is missing, so the page is served as it is written and loads slower;" \
+        "npm ci in tools/viewer installs it" >&2
+    bundle=no
+fi
+if [ $bundle = yes ]; then
+    node "$viewer/bundle.mjs" "$work/www"
+else
+    for file in "$viewer"/*; do ln -s "$file" "$work/www/"; done
+fi
 for file in "$folder"/*.ebpo.h5; do ln -s "$file" "$work/www/models/"; done
 node "$viewer/list.js" "$work"/www/models/*.ebpo.h5 >"$work/www/models/index.json"
 
-# An nginx of one's own: no root, no system folders. Scripts are compressed on the way, models
-# never.
+# An nginx of one's own: no root, no system folders. The page is sent compressed, models never.
 user=
 [ "$(id -u)" = 0 ] && user="user root;"
 cat >"$work/nginx.conf" <<END
@@ -47,7 +61,7 @@ http {
     fastcgi_temp_path $work/tmp/c; uwsgi_temp_path $work/tmp/d; scgi_temp_path $work/tmp/e;
     types { text/html html; text/css css; text/javascript js mjs; application/json json; image/svg+xml svg; }
     sendfile on; tcp_nopush on;
-    gzip on; gzip_types text/css text/javascript application/json;
+    gzip on; gzip_types text/css text/javascript application/json; gzip_static on;
     server {
         listen 127.0.0.1:$port;
         root $work/www;

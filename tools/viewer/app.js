@@ -11,8 +11,8 @@ const state = {
 
 let timer; // until the worker hears of the camera
 
-const worker = new Worker('worker.js', { type: 'module' });
-const scene = new Scene($('canvas'), { changed: cameraMoved, drawn: frameDrawn });
+const boot = window.ebpoBoot, { worker } = boot; // boot.js has begun, perhaps with a file
+const scene = new Scene($('canvas'), boot, { changed: cameraMoved, drawn: frameDrawn });
 
 // --- numbers for people ---
 
@@ -23,7 +23,8 @@ const length = (x, digits = 5) => `${Number(x.toPrecision(digits))}${state.info?
 
 // --- opening ---
 
-function open(what, name) {
+// `begun`: boot.js has told the worker already.
+function open(what, name, begun) {
   state.opening++;
   Object.assign(state, { info: undefined, depth: -1, idle: false, timeline: [], stats: undefined, probe: undefined, error: undefined, shownAfter: undefined, auto: AUTO.first, frames: [] });
   scene.clear();
@@ -32,11 +33,12 @@ function open(what, name) {
   busy(true);
   $('start').hidden = true;
   state.shownName = name;
-  worker.postMessage({ type: 'open', opening: state.opening, what });
+  if (!begun)
+    worker.postMessage({ type: 'open', opening: state.opening, what, ahead: boot.ahead });
   ask();
 }
 
-function openUrl(text) {
+function openUrl(text, begun) {
   let url;
   try {
     url = new URL(text, location.href);
@@ -48,7 +50,7 @@ function openUrl(text) {
   address.searchParams.set('file', text);
   history.replaceState(null, '', address);
   $('url').value = text;
-  open(url.href, decodeURIComponent(url.pathname.split('/').at(-1)));
+  open(url.href, decodeURIComponent(url.pathname.split('/').at(-1)), begun);
 }
 
 function openFile(file) {
@@ -90,7 +92,7 @@ const handlers = {
       $(id).hidden = id === 'panel' && innerWidth <= 760;
     const stops = i.level_count - 1 + (i.parts.has('mesh') ? 1 : 0);
     $('level').max = stops;
-    $('level').value = askedLevel() ?? stops;
+    $('level').value = boot.level ?? stops;
     makeLevels();
     layout();
     scene.home();
@@ -134,7 +136,9 @@ const handlers = {
   },
 };
 worker.onmessage = ({ data }) => {
-  if (data.opening === state.opening)
+  if (data.type === 'forget')
+    boot.forget();
+  else if (data.opening === state.opening)
     handlers[data.type](data);
 };
 worker.onerror = (e) => showError({ message: `The page's worker failed (${e.message ?? 'it could not be loaded'}); run npm ci in tools/viewer, and reload` });
@@ -145,17 +149,11 @@ function cameraMoved() {
   timer ??= setTimeout(ask, 90);
 }
 
-// &level= of the address; undefined: all.
-function askedLevel() {
-  const text = new URLSearchParams(location.search).get('level');
-  return text !== null && /^\d+$/.test(text) ? Number(text) : undefined;
-}
-
 function ask() {
   clearTimeout(timer);
   timer = undefined;
   const mesh = state.info?.parts.has('mesh') && Number($('level').value) === state.info.level_count;
-  const level = mesh ? 99 : state.info ? Number($('level').value) : askedLevel() ?? 99; // already right while the file is being opened
+  const level = mesh ? 99 : state.info ? Number($('level').value) : boot.level ?? 99; // already right while the file is being opened
   state.idle = false;
   if (state.info)
     busy(true);
@@ -479,7 +477,7 @@ async function listSamples(address) {
 
 // --- begin: ?file= address, &level= number or mesh, &detail= pixels, &theme=, &samples= list ---
 
-const query = new URLSearchParams(location.search);
+const { query } = boot;
 setTheme(query.get('theme') ?? (matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark'));
 $('detail').value = query.get('detail') ?? 'auto';
 if (!$('detail').value)
@@ -487,7 +485,8 @@ if (!$('detail').value)
 if (query.has('samples'))
   listSamples(query.get('samples')).catch((e) => showError({ message: `${query.get('samples')}: the list of samples cannot be read (${e.message}); check the address` }));
 if (query.has('file'))
-  openUrl(query.get('file'));
+  openUrl(query.get('file'), boot.opening === 1);
+boot.said.splice(0).forEach((data) => worker.onmessage({ data }));
 
 /** For tests and for the curious: what is shown. */
 window.ebpoViewer = {

@@ -85,13 +85,13 @@ const colour = (text) => new THREE.Color(text);
 
 export class Scene {
   /** `changed()` is called when the camera moved, `drawn(ms)` after each frame. */
-  constructor(canvas, { changed, drawn }) {
+  constructor(canvas, { context, contextOptions, fieldOfView }, { changed, drawn }) {
     this.canvas = canvas;
     this.drawn = drawn;
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: 'high-performance', preserveDrawingBuffer: true });
+    this.renderer = new THREE.WebGLRenderer({ canvas, context, ...contextOptions });
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     this.scene = new THREE.Scene();
-    this.camera = new THREE.PerspectiveCamera(38, 1, 0.001, 100);
+    this.camera = new THREE.PerspectiveCamera(fieldOfView, 1, 0.001, 100);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = !matchMedia('(prefers-reduced-motion: reduce)').matches;
     this.controls.dampingFactor = 0.12;
@@ -114,10 +114,19 @@ export class Scene {
     this.cellLines = this.#lineMaterial('#4cc2ff', 0.35);
     this.tiles = new Map();
     this.walls = true;
+    this.#warmUp();
     this.#makeProbe();
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
     this.resize();
     this.home();
+  }
+
+  // The program is made while the model is on its way, by a triangle without area.
+  #warmUp() {
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(9), 3));
+    geometry.setAttribute('tag', new THREE.BufferAttribute(new Uint8Array(12), 4));
+    this.scene.add(this.warm = new THREE.Mesh(geometry, this.faces));
   }
 
   #lineMaterial(text, opacity) {
@@ -230,6 +239,7 @@ export class Scene {
 
   /** All changes of one pass together, so that no gap is ever seen. */
   setTiles(set, removed) {
+    this.scene.remove(this.warm);
     removed.forEach((key) => this.#remove(key));
     for (const t of set) {
       this.#remove(t.key);

@@ -2,14 +2,17 @@
 // 'idle' and 'failed'.
 import { ZSTDDecoder } from './node_modules/zstddec/dist/zstddec.mjs'; // workers have no import maps
 import { Cut } from './cut.js';
-import { GRAY, Tree, distanceInterval, growForQuestion, growForView, inside, insideLeaf, loadZstd, nearestFace, openEbpo } from './reader/index.js';
+import { fetchAfter, takeFirst } from './handover.js';
+import { GRAY, Tree, UrlSource, distanceInterval, growForQuestion, growForView, inside, insideLeaf, loadZstd, nearestFace, openEbpo, sourceOf } from './reader/index.js';
 
+const TIMEOUT_MS = 20000;                 // without a byte
 const FIRST_LEVELS = 5;                   // come with the first request, as a rule
 const SMALL_MESH = 8 * 1024 * 1024;       // stored bytes
 const MESH_BYTES_A_VIEW = 16 * 1024 * 1024; // of larger ones, before the camera moves again
 
 let current; // one open file
 let view, want;
+let zstd; // the decoder, soon
 
 function post(message, transfer = []) {
   self.postMessage(message, transfer);
@@ -31,8 +34,11 @@ class OpenFile {
     return current !== this;
   }
 
-  async open(what) {
-    this.file = await openEbpo(what, { zstd: await loadZstd(ZSTDDecoder) });
+  async open(what, ahead) {
+    zstd ??= loadZstd(ZSTDDecoder); // is made while the head comes
+    this.source = typeof what === 'string' ? new UrlSource(what, { ahead, timeout: TIMEOUT_MS, patient: true, fetch: fetchAfter(() => post({ type: 'forget' })) }) : sourceOf(what);
+    this.file = await openEbpo(this.source);
+    this.file.zstd = await zstd;
     const { info, source } = this.file;
     this.tree = new Tree(info);
     const meshBytes = ['/mesh/vertices', '/mesh/faces'].reduce((sum, path) => sum + (this.file.arrays.has(path) ? this.file.arrays.get(path).bytes ?? Infinity : 0), 0);
@@ -175,16 +181,23 @@ class OpenFile {
   }
 }
 
+function end() {
+  current?.source?.close?.();
+  current = undefined;
+}
+
 self.onmessage = async ({ data }) => {
   try {
-    if (data.type === 'open') {
-      current = undefined;
+    if (data.type === 'first') {
+      takeFirst(data);
+    } else if (data.type === 'open') {
+      end();
       const mine = current = new OpenFile(data.opening);
-      await mine.open(data.what);
+      await mine.open(data.what, data.ahead);
       if (!mine.ended && view)
         await mine.pump();
     } else if (data.type === 'close') {
-      current = undefined;
+      end();
     } else if (data.type === 'view') {
       ({ view, want } = data);
       if (current?.tree?.root)

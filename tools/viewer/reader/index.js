@@ -1,7 +1,7 @@
 // Reads EBP-Octree files: docs/guide/viewer.md.
 export { EbpoError } from './error.js';
 export { openEbpo, EbpoFile } from './file.js';
-export { BlobSource, BytesSource, UrlSource } from './source.js';
+export { BlobSource, BytesSource, UrlSource, sourceOf } from './source.js';
 export { loadZstd } from './chunk.js';
 export { WHITE, BLACK, LEAF, GRAY, isInside } from './decode.js';
 export { Tree } from './tree.js';

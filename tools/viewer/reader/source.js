@@ -54,14 +54,57 @@ export class BlobSource {
 
 const RETRIES = 3;
 const WAIT_MS = 250;
+const PATIENCE_MS = 20000;    // a patient source on a dead line tries again by itself so often
+const GOOD_BYTES = 64 * 1024; // an answer that brought so much was no failure: the counting of retries begins anew
 const RETRY_STATUS = new Set([429, 500, 502, 503, 504]);
+
+// Answers that no repetition mends: what they mean, and what to do next.
+const REFUSED = {
+  401: ['the server wants to know who asks', 'sign in there, or ask for an address that needs no password'],
+  403: ['the server does not let this page have it', 'ask its owner for access; a signed address may have run out: get a fresh one'],
+  404: ['there is no such file', 'check the address'],
+  410: ['there is no such file any more', 'check the address'],
+};
+
+/** Bytes from .. to - 1 while they come, over as many requests as that takes; what has come is never asked for again. */
+class Transfer {
+  constructor(from, to) {
+    Object.assign(this, { from, to, got: 0, data: undefined, at: performance.now(), waiting: [] });
+  }
+
+  get end() {
+    return this.from + this.got;
+  }
+
+  add(bytes) {
+    this.data ??= new Uint8Array(this.to - this.from);
+    this.data.set(bytes, this.got);
+    this.got += bytes.length;
+    this.at = performance.now();
+    this.waiting = this.waiting.filter((w) => w.to > this.end || w.done());
+  }
+
+  /** When everything before `to` is there. */
+  reaches(to) {
+    return this.end >= to ? undefined : new Promise((done, fail) => this.waiting.push({ to, done, fail }));
+  }
+
+  /** No more will come. */
+  finish(error) {
+    this.waiting.splice(0).forEach((w) => (error ? w.fail(error) : w.done()));
+  }
+}
 
 /**
  * A file on any static web server, by range requests. The server must answer 206 with Content-Range; one that answers 200 is read once as a
  * whole when the file is not larger than `wholeLimit`. The ETag of the first answer (else Last-Modified) is pinned: a file that changes under
  * way is an error, never a mixture, where the server tells either (and, to pages of other origins, exposes it). Failed requests are repeated a few times, with pauses that grow and vary.
  *
- * Options: `wholeLimit` (bytes, 64 MiB), `timeout` (ms without a byte, 30000), `fetch` (another implementation), `headers` (for credentials).
+ * The browser's cache may answer: the first request asks the server whether what it has is still right, and others must have the same ETag.
+ *
+ * Options: `wholeLimit` (bytes, 64 MiB), `timeout` (ms without a byte, 30000), `fetch` (another implementation), `headers` (for credentials),
+ * `ahead` (bytes that the first request asks for at least: what is read of them comes from that answer, as it arrives), `patient` (an open file whose
+ * line is dead waits for `retry()` rather than fail).
  */
 export class UrlSource {
   constructor(url, options = {}) {
@@ -71,74 +114,152 @@ export class UrlSource {
     this.headers = options.headers ?? {};
     this.wholeLimit = options.wholeLimit ?? 64 * 1024 * 1024;
     this.timeout = options.timeout ?? 30000;
+    this.ahead = options.ahead ?? 0;
+    this.patient = options.patient ?? false;
     this.requests = this.bytes = 0;
     this.size = undefined;
-    this.tag = undefined;    // what the file's ETag or date was at first
-    this.whole = undefined;  // all bytes, from a server without ranges
+    this.tag = undefined;     // what the file's ETag or date was at first
+    this.whole = undefined;   // all bytes, from a server without ranges
+    this.first = undefined;   // the first answer, which is read from while it comes
+    this.running = new Map(); // transfers under way, and how to end their request
+    this.trouble = undefined; // why a patient source waits
+    this.retried = 0;
+    this.closed = false;
   }
 
   async open(bytes) {
-    return this.#range(0, bytes, true);
+    this.first = new Transfer(0, Math.max(bytes, this.ahead));
+    const all = this.#run(this.first, true), enough = this.first.reaches(bytes);
+    all.catch(() => {}); // what fails later is told to whom reads it
+    await Promise.race([all, enough]);
+    return this.whole ? this.whole.subarray(0, bytes) : this.first.data.subarray(0, Math.min(bytes, this.first.got));
   }
 
   async read(offset, length) {
+    const end = offset + length, { first } = this;
+    if (this.running.has(first) && offset < first.to)
+      await first.reaches(Math.min(end, first.to));
     if (this.whole)
-      return this.whole.subarray(offset, offset + length);
-    return this.#range(offset, length, false);
+      return this.whole.subarray(offset, end);
+    const have = Math.max(offset, Math.min(end, first?.end ?? 0));
+    if (have === end)
+      return first.data.subarray(offset, end);
+    const rest = new Transfer(have, end);
+    await this.#run(rest, false);
+    return have === offset ? rest.data : joined([first.data.subarray(offset, have), rest.data]);
+  }
+
+  /** What is waited for: { from, to, got, quiet }, `quiet` the ms since a byte of it came. */
+  underway() {
+    return [...this.running.keys()].filter((t) => t.end < t.to).map((t) => ({ from: t.from, to: t.to, got: t.got, quiet: performance.now() - t.at }));
+  }
+
+  /** Asks again at once for everything that is waited for. */
+  retry() {
+    this.retried++;
+    this.again?.();
+    this.running.forEach((abort) => abort?.abort());
+  }
+
+  /** Ends everything under way; nothing can be read any more. */
+  close() {
+    this.closed = true;
+    this.retry();
   }
 
   #fail(what, next, cause) {
     return new EbpoError('NETWORK', `${this.url}: ${what}; ${next}`, { cause });
   }
 
-  async #range(offset, length, first) {
-    for (let attempt = 0; ; attempt++) {
-      try {
-        return await this.#once(offset, length, first);
-      } catch (error) {
-        if (!error.again || attempt === RETRIES)
+  async #run(transfer, first) {
+    this.running.set(transfer, undefined);
+    try {
+      for (let attempt = 0, before = 0; !this.whole && !(transfer.got === transfer.to - transfer.from); attempt++) {
+        const { retried } = this, error = await this.#once(transfer, first && transfer.got === 0).then(() => undefined, (e) => e);
+        if (!error)
+          continue;
+        if (!error.again)
           throw error;
-        await new Promise((done) => setTimeout(done, WAIT_MS * 2 ** attempt * (0.5 + Math.random())));
+        if (transfer.got - before > GOOD_BYTES)
+          attempt = 0;
+        before = transfer.got;
+        if (retried !== this.retried)
+          attempt = -1;
+        else if (attempt < RETRIES)
+          await this.#pause(WAIT_MS * 2 ** attempt * (0.5 + Math.random()));
+        else if (!this.patient || this.tag === undefined)
+          throw error;
+        else
+          attempt = await this.#wait(error);
+        if (this.closed)
+          throw error;
       }
+      transfer.finish();
+    } catch (error) {
+      transfer.finish(error);
+      throw error;
+    } finally {
+      this.running.delete(transfer);
     }
   }
 
-  async #once(offset, length, first) {
-    const abort = new AbortController();
-    let timer;
+  #pause(ms) {
+    this.woken ??= new Promise((done) => (this.again = done)).then(() => (this.woken = this.again = undefined));
+    return Promise.race([this.woken, new Promise((done) => setTimeout(done, ms))]);
+  }
+
+  // A dead line: nothing is given up, and nothing that has come is lost.
+  async #wait(error) {
+    this.trouble = error;
+    await this.#pause(PATIENCE_MS);
+    this.trouble = undefined;
+    return -1;
+  }
+
+  async #once(transfer, first, cache = first ? 'no-cache' : this.tag === null ? 'no-store' : 'default') {
+    const abort = new AbortController(), offset = transfer.end, length = transfer.to - offset;
+    let timer, late = false;
     const alive = () => {
       clearTimeout(timer);
-      timer = setTimeout(() => abort.abort(), this.timeout);
+      timer = setTimeout(() => {
+        late = true;
+        abort.abort();
+      }, this.timeout);
     };
     alive();
     const transient = (what, next, cause) => Object.assign(this.#fail(what, next, cause), { again: true });
     this.requests++;
+    this.running.set(transfer, abort);
+    transfer.at = performance.now();
     try {
-      // no-store: Chromium serialises concurrent ranges of one URL on its cache. Browsers drop Accept-Encoding, and send identity with ranges.
+      // Browsers drop Accept-Encoding, and send identity with ranges.
       const response = await this.fetch(this.url, {
-        cache: 'no-store', signal: abort.signal,
-        headers: { ...this.headers, 'Range': `bytes=${offset}-${offset + length - 1}`, 'Accept-Encoding': 'identity' },
+        cache, signal: abort.signal, headers: { ...this.headers, 'Range': `bytes=${offset}-${transfer.to - 1}`, 'Accept-Encoding': 'identity' },
       });
       if (RETRY_STATUS.has(response.status))
         throw transient(`the server answers ${response.status}`, 'try again later');
-      if (response.status !== 206 && response.status !== 200)
-        throw this.#fail(`the server answers ${response.status} ${response.statusText}`.trimEnd(), 'check the address');
+      this.#refused(response, first);
       if (response.headers.get('content-encoding') && response.headers.get('content-encoding') !== 'identity')
         throw this.#fail('the server compresses the file on the way, which makes ranges meaningless', 'switch that off for .h5 files');
+      if (cache === 'default' && versionOf(response) !== this.tag) { // perhaps the cache's answer is old, and the server's is not
+        abort.abort();
+        return await this.#once(transfer, first, 'no-store');
+      }
       this.#pin(response, first);
-      const want = response.status === 206 ? this.#partial(response, offset, length, first) : this.#wholeFile(response, first);
-      const data = await this.#drain(response, want, alive);
-      if (want !== undefined && data.length !== want)
-        throw transient(`the server sent ${data.length} bytes of ${want}`, 'try again');
-      if (response.status === 206)
-        return data;
-      this.whole = data;
-      this.size = data.length;
-      return data.subarray(offset, offset + length);
+      if (response.status === 200) {
+        await this.#takeWhole(response, first, alive);
+        return;
+      }
+      const want = this.#partial(response, offset, length, first), had = transfer.got;
+      if (first)
+        transfer.to = offset + want;
+      await this.#drain(response, want, alive, (bytes) => transfer.add(bytes));
+      if (transfer.got - had !== want)
+        throw transient(`the server sent ${transfer.got - had} bytes of ${want}`, 'try again');
     } catch (cause) {
       if (cause instanceof EbpoError)
         throw cause;
-      if (abort.signal.aborted)
+      if (late)
         throw transient(`no byte came for ${this.timeout / 1000} s`, 'try again later', cause);
       throw transient(`the request failed (${cause.message})`, 'check the address, the network, and that the server allows this page\'s origin (CORS)', cause);
     } finally {
@@ -147,8 +268,18 @@ export class UrlSource {
     }
   }
 
+  #refused({ status, statusText }, first) {
+    if (status === 206 || status === 200)
+      return;
+    const said = `the server answers ${status} ${statusText}`.trimEnd();
+    if (status === 416)
+      throw first ? this.#fail(`${said}: the file is empty`, 'put it there again') : this.#fail(`${said}: the file got shorter on the server since it was opened`, 'open it again');
+    const [what, next] = REFUSED[status] ?? [undefined, 'check the address'];
+    throw this.#fail(what ? `${said}: ${what}` : said, next);
+  }
+
   #pin(response, first) {
-    const tag = response.headers.get('etag') ?? response.headers.get('last-modified');
+    const tag = versionOf(response);
     if (first && this.tag === undefined)
       this.tag = tag;
     else if (tag !== this.tag)
@@ -168,14 +299,19 @@ export class UrlSource {
     return to - from + 1;
   }
 
-  // Returns the length, or undefined when the server does not state it.
-  #wholeFile(response, first) {
+  // The answer of a server without ranges.
+  async #takeWhole(response, first, alive) {
     if (!first)
       throw this.#fail('the server stopped answering ranges', 'open it again');
-    const stated = response.headers.get('content-length');
-    if (stated !== null && Number(stated) > this.wholeLimit)
+    const stated = response.headers.get('content-length'), want = stated === null ? undefined : Number(stated), parts = [];
+    if (want > this.wholeLimit)
       throw this.#noRanges(`${stated} bytes`);
-    return stated === null ? undefined : Number(stated);
+    await this.#drain(response, want, alive, (bytes) => parts.push(bytes));
+    const whole = joined(parts);
+    if (want !== undefined && whole.length !== want)
+      throw Object.assign(this.#fail(`the server sent ${whole.length} bytes of ${want}`, 'try again'), { again: true });
+    this.whole = whole;
+    this.size = whole.length;
   }
 
   #noRanges(size) {
@@ -183,31 +319,31 @@ export class UrlSource {
   }
 
   // The body, counted while it comes: never more than was promised.
-  async #drain(response, want, alive) {
+  async #drain(response, want, alive, take) {
     const most = want ?? this.wholeLimit;
-    const parts = [];
     let total = 0;
     for (const reader = response.body.getReader(); ;) {
       const { done, value } = await reader.read();
       if (done)
-        break;
+        return;
       alive();
       total += value.length;
       this.bytes += value.length;
       if (total > most)
         throw want === undefined ? this.#noRanges(`more than ${most} bytes`) : this.#fail('the server sent more bytes than it said', 'use another server');
-      parts.push(value);
+      take(value);
     }
-    if (parts.length === 1)
-      return parts[0];
-    const all = new Uint8Array(total);
-    let at = 0;
-    for (const part of parts) {
-      all.set(part, at);
-      at += part.length;
-    }
-    return all;
   }
+}
+
+const versionOf = (response) => response.headers.get('etag') ?? response.headers.get('last-modified');
+
+function joined(parts) {
+  if (parts.length === 1)
+    return parts[0];
+  const all = new Uint8Array(parts.reduce((sum, part) => sum + part.length, 0));
+  parts.reduce((at, part) => (all.set(part, at), at + part.length), 0);
+  return all;
 }
 
 /** A source for whatever was given: URL or its text, Blob or File, ArrayBuffer or bytes, or a source already. */

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { createServer } from 'node:http';
 import test from 'node:test';
-import { EbpoError, openEbpo } from '../index.js';
+import { EbpoError, UrlSource, openEbpo } from '../index.js';
 
 const bytes = readFileSync(new URL('../../../../format-spec/vectors/passed/06_four_levels_leaf_planes.ebpo.h5', import.meta.url));
 const part = bytes.length >> 1; // a head that is read in pieces
@@ -122,6 +122,108 @@ test('bytes that were changed on the way are noticed', () => fails((answer, n) =
 test('nobody there', async () => {
   const url = await serve(undefined, (address) => address);
   await assert.rejects(readAll(url), (error) => error instanceof EbpoError && error.code === 'NETWORK' && /request failed/.test(error.message));
+});
+
+test('what a status means is said', async () => {
+  for (const [status, said] of [[401, /401.*who asks/], [403, /403.*does not let this page.*access/], [404, /404.*no such file.*address/], [410, /410.*any more/],
+    [416, /416.*is empty/], [418, /418/]])
+    await fails((answer) => (answer.status = status), 'NETWORK', said);
+  await fails((answer, n) => (n > 1 ? (answer.status = 416) : undefined), 'NETWORK', /416.*got shorter.*open it again/);
+});
+
+let finish;
+test('the first answer is read from while it comes, and brings a small file whole', () => serve((answer, n, response) => {
+  response.writeHead(206, answer.headers);
+  response.write(answer.body.subarray(0, part));
+  finish = () => response.end(answer.body.subarray(part));
+  return false;
+}, async (url, asked) => {
+  const source = new UrlSource(url, { ahead: 1 << 20 });
+  assert.equal((await source.open(part)).length, part);
+  const [begin, across] = [await source.read(3, 7), source.read(part - 5, 10)];
+  assert.deepEqual(Buffer.from(begin), bytes.subarray(3, 10));
+  assert.deepEqual(source.underway().map(({ from, to, got }) => [from, to, got]), [[0, bytes.length, part]]);
+  finish();
+  assert.deepEqual(Buffer.from(await across), bytes.subarray(part - 5, part + 5));
+  assert.deepEqual(asked, [[0, bytes.length - 1]]);
+  assert.deepEqual(source.underway(), []);
+}));
+
+test('behind the first answer ranges are asked for, across its end only what it has not', () => serve(undefined, async (url, asked) => {
+  const source = new UrlSource(url, { ahead: part });
+  await source.open(100);
+  assert.deepEqual(Buffer.from(await source.read(part - 4, 20)), bytes.subarray(part - 4, part + 16));
+  assert.deepEqual(Buffer.from(await source.read(part + 30, 20)), bytes.subarray(part + 30, part + 50));
+  assert.deepEqual(asked, [[0, part - 1], [part, part + 15], [part + 30, part + 49]]);
+}));
+
+// Each answer breaks off after 300 bytes until `broken` is 0.
+const breaking = (broken) => (answer, n, response) => {
+  if (--broken < 0)
+    return true;
+  response.writeHead(206, answer.headers);
+  response.write(answer.body.subarray(0, 300), () => setTimeout(() => response.destroy(), 20));
+  return false;
+};
+test('a broken answer goes on where it ended', () => serve(breaking(2), async (url, asked) => {
+  const source = new UrlSource(url);
+  assert.deepEqual(Buffer.from(await source.open(part)), bytes.subarray(0, part));
+  assert.deepEqual(asked, [[0, part - 1], [300, part - 1], [600, part - 1]]);
+}));
+
+let dead = true;
+test('a patient source waits on a dead line, says why, and goes on when told', () => serve((answer, n, response) => {
+  if (n > 1 && dead)
+    response.destroy();
+  return n === 1 || !dead;
+}, async (url, asked) => {
+  const source = new UrlSource(url, { patient: true });
+  await source.open(100);
+  const reading = Promise.all([source.read(200, 50), source.read(400, 50)]);
+  for (let i = 0; i < 200 && !source.trouble; i++)
+    await new Promise((done) => setTimeout(done, 50));
+  assert.match(source.trouble.message, /request failed/);
+  assert.equal(source.underway().length, 2);
+  dead = false;
+  source.retry();
+  const [a, b] = await reading;
+  assert.deepEqual([Buffer.from(a), Buffer.from(b)], [bytes.subarray(200, 250), bytes.subarray(400, 450)]);
+  assert.equal(source.trouble, undefined);
+  assert.equal(asked.filter(([from]) => from === 0).length, 1);
+}));
+
+test('told to try again, a stalled request is asked again, for its rest only; a closed source ends', () => serve((answer, n, response) => {
+  response.writeHead(206, answer.headers);
+  response.write(answer.body.subarray(0, 100));
+  return false;
+}, async (url, asked) => {
+  const source = new UrlSource(url, { patient: true }), opened = source.open(300);
+  for (const wanted of [100, 200, 300]) {
+    while ((source.underway()[0]?.got ?? 300) < wanted)
+      await new Promise((done) => setTimeout(done, 20));
+    source.retry();
+  }
+  assert.deepEqual(Buffer.from(await opened), bytes.subarray(0, 300));
+  assert.deepEqual(asked, [[0, 299], [100, 299], [200, 299]]);
+  const reading = assert.rejects(source.read(500, 300), { code: 'NETWORK' });
+  source.close();
+  await reading;
+}));
+
+test('the cache may answer; an answer of another version is asked for again behind its back', async () => {
+  const modes = [], answer = (from, to, tag) => new Response(bytes.subarray(from, to + 1), { status: 206, headers: { 'Content-Range': `bytes ${from}-${to}/${bytes.length}`, 'ETag': tag } });
+  const fetch = async (url, { cache, headers }) => {
+    const [from, to] = headers.Range.match(/\d+/g).map(Number);
+    modes.push(cache);
+    return answer(from, to, modes.length === 2 || stale ? '"old"' : '"new"');
+  };
+  let stale = false;
+  const source = new UrlSource('https://example.org/a', { fetch });
+  await source.open(100);
+  assert.deepEqual(Buffer.from(await source.read(200, 50)), bytes.subarray(200, 250));
+  assert.deepEqual(modes, ['no-cache', 'default', 'no-store']);
+  stale = true;
+  await assert.rejects(source.read(300, 50), /was changed on the server/);
 });
 
 test('files and bytes are read alike', async () => {

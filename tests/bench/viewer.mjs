@@ -1,0 +1,177 @@
+// The viewer in a headless Chromium over a slow line: viewer.mjs [OPTION VALUE ...] MODEL.ebpo.h5 ...
+// For each model, a table row: how long until the first picture (median of the rounds) and until the picture has settled, requests and bytes of the model
+// by then, triangles, and what a second visit still fetches. All connections share the line, in turns, as they would.
+// --kbits 5000   --ms 100 (round trip)   --rounds 9   --pictures FOLDER (of the settled page)   --query TEXT (more of the address)   --sources (not bundled)
+// --viewer ROOT (another checkout)
+import { spawn } from 'node:child_process';
+import { existsSync, mkdtempSync, readFileSync, rmSync, symlinkSync } from 'node:fs';
+import { connect, createServer } from 'node:net';
+import { tmpdir } from 'node:os';
+import { basename, join, resolve } from 'node:path';
+import { pathToFileURL } from 'node:url';
+
+const options = { kbits: 5000, ms: 100, rounds: 9, pictures: undefined, query: '', sources: false, viewer: resolve(import.meta.dirname ?? new URL('.', import.meta.url).pathname, '../..') }, models = [];
+for (let i = 2; i < process.argv.length; i++) {
+  const name = process.argv[i].startsWith('--') ? process.argv[i].slice(2) : undefined;
+  if (!name)
+    models.push(resolve(process.argv[i]));
+  else if (typeof options[name] === 'boolean')
+    options[name] = true;
+  else
+    options[name] = typeof options[name] === 'number' ? Number(process.argv[++i]) : process.argv[++i];
+}
+const root = resolve(options.viewer), viewer = join(root, 'tools/viewer'), work = mkdtempSync(join(tmpdir(), 'ebpo-bench-')), log = join(work, 'access.log');
+const { chromium } = await import(pathToFileURL(join(viewer, 'node_modules/playwright-core/index.mjs')));
+
+const PIECE = 4096, QUEUE = 65536; // what a turn sends, and what the line holds of a connection
+
+// A line between a port of its own and `to`: every connection and every byte comes late, and bytes come at the line's rate, connections in turns.
+function line(to) {
+  const waiting = []; // connections with something to send: { queue, send }
+  let busy = false;
+  const later = (work) => setTimeout(work, options.ms / 2);
+  const turn = () => {
+    const next = waiting.shift();
+    busy = Boolean(next);
+    if (!next)
+      return;
+    const piece = next.queue.subarray(0, PIECE);
+    next.queue = next.queue.subarray(PIECE);
+    if (next.queue.length)
+      waiting.push(next);
+    next.sent(piece);
+    free = Math.max(free, performance.now()) + piece.length * 8 / options.kbits;
+    setTimeout(turn, free - performance.now());
+  };
+  let free = 0;
+  const server = createServer((near) => {
+    const far = connect(to, '127.0.0.1'), down = { queue: Buffer.alloc(0), sent: (piece) => {
+      later(() => near.write(piece));
+      if (down.queue.length < QUEUE)
+        far.resume();
+      if (!down.queue.length && down.ended)
+        later(() => near.end());
+    } };
+    const ready = performance.now() + options.ms; // after the handshake
+    near.on('data', (data) => setTimeout(() => far.write(data), Math.max(0, ready - performance.now()) + options.ms / 2));
+    far.on('data', (data) => {
+      if (!down.queue.length)
+        waiting.push(down);
+      down.queue = Buffer.concat([down.queue, data]);
+      if (down.queue.length >= QUEUE)
+        far.pause();
+      if (!busy)
+        turn();
+    });
+    far.on('end', () => {
+      down.ended = true;
+      if (!down.queue.length)
+        later(() => near.end());
+    });
+    near.on('close', () => far.destroy());
+    for (const socket of [near, far])
+      socket.on('error', () => {});
+  });
+  return new Promise((done) => server.listen(0, '127.0.0.1', () => done(server)));
+}
+
+// --- the server and the browser ---
+
+const cleanup = [() => rmSync(work, { recursive: true, force: true })];
+
+async function serve() {
+  const probe = await new Promise((done) => {
+    const server = createServer().listen(0, '127.0.0.1', () => done(server));
+  });
+  const { port } = probe.address();
+  await new Promise((done) => probe.close(done));
+  for (const model of models)
+    symlinkSync(model, join(work, basename(model)));
+  const script = join(root, 'samples/serve.sh'), old = readFileSync(script, 'utf8').includes('--no-install') ? ['--no-install'] : options.sources ? ['--sources'] : [];
+  const server = spawn('sh', [script, ...old, '--port', String(port), '--folder', work, '--log', log], { stdio: ['ignore', 'ignore', 'inherit'] });
+  cleanup.push(() => new Promise((done) => server.once('exit', done).kill('SIGTERM')));
+  for (let i = 0; i < 100 && !await fetch(`http://127.0.0.1:${port}/`).then((r) => r.ok, () => false); i++)
+    await new Promise((done) => setTimeout(done, 100));
+  const slow = await line(port);
+  cleanup.push(() => slow.close());
+  return `http://localhost:${slow.address().port}/`;
+}
+
+let logged = 0;
+// Since the last call: what of the model and of the page was sent.
+function traffic() {
+  const lines = readFileSync(log, 'utf8').split('\n').filter(Boolean), sums = { requests: 0, bytes: 0, page: 0 };
+  for (const text of lines.slice(logged)) {
+    const bytes = Number(/" \d+ (\d+) "/.exec(text)[1]), isModel = text.includes('/models/') && !text.includes('index.json');
+    sums.requests += isModel ? 1 : 0;
+    sums[isModel ? 'bytes' : 'page'] += bytes;
+  }
+  logged = lines.length;
+  return sums;
+}
+
+// In the page: when a picture was there, and when nothing more came.
+const WATCH = `{
+  const look = () => {
+    if (!(window.ebpoViewer?.state.stats?.triangles > 0))
+      requestAnimationFrame(look);
+    else
+      requestAnimationFrame(() => (window.firstPicture = performance.now()));
+  };
+  look();
+}`;
+
+async function visit(page, address) {
+  await page.goto(address, { waitUntil: 'commit' });
+  await page.waitForFunction(() => window.firstPicture, undefined, { timeout: 120000, polling: 50 });
+  const first = await page.evaluate(() => window.firstPicture), settledAt = Date.now();
+  for (let idle = 0; idle < 10 && Date.now() - settledAt < 180000;) {
+    await page.waitForTimeout(100);
+    idle = await page.evaluate(() => window.ebpoViewer.state.idle) ? idle + 1 : 0;
+  }
+  const { settled, state } = await page.evaluate(() => ({ settled: performance.now(), state: window.ebpoViewer.state }));
+  await page.waitForTimeout(200); // nginx writes its log when an answer is out
+  return { first, settled: settled - 1000, stats: state.stats, ...traffic() };
+}
+
+const median = (list) => [...list].sort((a, b) => a - b)[list.length >> 1];
+const seconds = (ms) => (ms / 1000).toFixed(2), kilo = (n) => (n / 1000).toFixed(0);
+
+async function measure(browser, site, model) {
+  const rounds = [], address = `${site}?file=models/${basename(model)}&theme=dark${options.query && '&' + options.query}`;
+  let again;
+  for (let round = 0; round < options.rounds; round++) {
+    const context = await browser.newContext({ viewport: { width: 1200, height: 800 }, reducedMotion: 'reduce' }), page = await context.newPage();
+    await context.addInitScript(WATCH);
+    traffic();
+    rounds.push(await visit(page, address));
+    if (round === 0) {
+      if (options.pictures)
+        await page.screenshot({ path: join(options.pictures, basename(model).replace('.ebpo.h5', '.png')) });
+      await page.goto('about:blank');
+      again = await visit(page, address);
+    }
+    await context.close();
+  }
+  const of = (what) => median(rounds.map(what)), { stats } = rounds[0];
+  console.log(`| ${basename(model)} | ${kilo(of((r) => r.page))} | ${seconds(of((r) => r.first))} | ${seconds(of((r) => r.settled))} | ${of((r) => r.requests)} | ${kilo(of((r) => r.bytes))} `
+    + `| ${stats.triangles} | ${stats.wallTriangles} | ${stats.meshTriangles} | ${again.requests} | ${kilo(again.bytes)} | ${seconds(again.first)} |`);
+}
+
+let code = 0;
+try {
+  const site = await serve(), flags = ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'];
+  const executablePath = ['/usr/bin/chromium', '/usr/bin/chromium-browser'].find(existsSync);
+  const browser = await chromium.launch({ executablePath, args: process.getuid() === 0 ? ['--no-sandbox', ...flags] : flags });
+  cleanup.push(() => browser.close());
+  console.log(`${options.kbits} kbit/s, ${options.ms} ms, ${options.rounds} rounds${options.query && ', ' + options.query}${options.sources ? ', not bundled' : ''}; page and model in KB, times in s\n`);
+  console.log('| model | page | first picture | settled | requests | model | triangles | on walls | real faces | again: requests | model | first picture |\n|---|---|---|---|---|---|---|---|---|---|---|---|');
+  for (const model of models)
+    await measure(browser, site, model);
+} catch (error) {
+  console.error(error);
+  code = 1;
+}
+for (const undo of cleanup.reverse())
+  await undo();
+process.exit(code);

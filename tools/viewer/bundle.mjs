@@ -1,0 +1,32 @@
+// node bundle.mjs FOLDER: the page in four files and an icon: index.html with its style and boot.js, app.js with three.js, worker.js with the reader and zstd;
+// smaller, and each again with .gz behind its name for servers that send such (nginx: gzip_static). Writes FOLDER, nothing else.
+import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { gzipSync } from 'node:zlib';
+import { build, transform } from 'esbuild';
+
+const [folder] = process.argv.slice(2), here = import.meta.dirname ?? new URL('.', import.meta.url).pathname;
+const TARGET = 'es2022';
+const read = (name) => readFileSync(join(here, name), 'utf8');
+const small = async (name, loader) => (await transform(read(name), { loader, minify: true, target: TARGET })).code.trim();
+
+// Function and string: what stands in the page is text, so that no `$&` of it means anything.
+function replace(page, from, to) {
+  if (page.split(from).length !== 2)
+    throw new Error(`index.html: ${from} is expected once`);
+  return page.replace(from, () => to);
+}
+
+let page = read('index.html');
+page = replace(page, '<link rel="stylesheet" href="style.css">', `<style>${await small('style.css', 'css')}</style>`);
+page = replace(page, '<script src="boot.js"></script>', `<script>${await small('boot.js', 'js')}</script>`);
+page = replace(page, /<script type="importmap">[^]*?<\/script>\n/.exec(page)[0], '');
+
+const { outputFiles } = await build({ entryPoints: ['app.js', 'worker.js'].map((name) => join(here, name)), outdir: folder, bundle: true, minify: true, format: 'esm', target: TARGET,
+  external: ['node:*'], legalComments: 'eof', write: false, logLevel: 'warning' });
+const files = new Map([['index.html', Buffer.from(page)], ['icon.svg', Buffer.from(read('icon.svg'))], ...outputFiles.map((f) => [f.path.slice(f.path.lastIndexOf('/') + 1), Buffer.from(f.contents)])]);
+mkdirSync(folder, { recursive: true });
+for (const [name, bytes] of files) {
+  writeFileSync(join(folder, name), bytes);
+  writeFileSync(join(folder, `${name}.gz`), gzipSync(bytes, { level: 9 }));
+}
