@@ -37,8 +37,7 @@ class OpenFile {
   async open(what, ahead) {
     zstd ??= loadZstd(ZSTDDecoder); // is made while the head comes
     this.source = typeof what === 'string' ? new UrlSource(what, { ahead, timeout: TIMEOUT_MS, patient: true, fetch: fetchAfter(() => post({ type: 'forget' })) }) : sourceOf(what);
-    this.file = await openEbpo(this.source);
-    this.file.zstd = await zstd;
+    this.file = await openEbpo(this.source, { zstd });
     const { info, source } = this.file;
     this.tree = new Tree(info);
     const meshBytes = ['/mesh/vertices', '/mesh/faces'].reduce((sum, path) => sum + (this.file.arrays.has(path) ? this.file.arrays.get(path).bytes ?? Infinity : 0), 0);
