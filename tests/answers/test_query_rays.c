@@ -188,7 +188,142 @@ START_TEST(boxes_that_make_no_sense_are_refused)
                                            &error),
                          EBPO_E_ARGUMENT);
         ck_assert_int_ne(error.message[0], 0);
+        ck_assert_int_eq(ebpo_triangles_in_box(m.context, boxes[i], boxes[i] + 3, NULL, NULL, NULL),
+                         EBPO_E_ARGUMENT);
     }
+    query_model_free(&m);
+}
+END_TEST
+
+/* --- triangles --- */
+
+enum { CUTS = 4 }; /* ways of holding a model */
+
+typedef struct gathered {
+    const query_model *m;
+    uint32_t *face; /* numbers in the file */
+    uint64_t count, blocks, most;
+    bool fine, ascending;
+} gathered;
+
+static int compare_numbers(const void *a, const void *b)
+{
+    const uint32_t *x = a, *y = b;
+    return (*x > *y) - (*x < *y);
+}
+
+static bool keep_triangles(void *user, const ebpo_triangles *t)
+{
+    gathered *g = user;
+    g->fine &= t->count >= 1 && t->count <= EBPO_TRIANGLES_MOST;
+    for (uint64_t i = 0; i < t->count && g->fine; i++) {
+        uint64_t face = t->file_faces[i];
+        g->fine = g->count < g->m->mesh.face_count && face < g->m->mesh.face_count &&
+                  t->faces[i] == query_told(g->m, (uint32_t)face);
+        for (int k = 0; k < 3 && g->fine; k++) {
+            double corner[3];
+            ebpo_test_point(&g->m->mesh, g->m->mesh.faces[3 * face + (uint64_t)k], corner);
+            g->fine = memcmp(t->corners[i][k], corner, sizeof corner) == 0;
+        }
+        if (!g->fine)
+            break;
+        g->ascending &= g->count == 0 || g->face[g->count - 1] < face;
+        g->face[g->count++] = (uint32_t)face;
+    }
+    return ++g->blocks < g->most;
+}
+
+/* The triangles are those that the judge names, each once. */
+static bool ask_triangles(query_model *m, ebpo_context *context, bool resident, const double low[3],
+                          const double high[3])
+{
+    const uint32_t *expected;
+    uint32_t n;
+    ebpo_error error = EBPO_ERROR_INIT;
+    gathered g = { .m = m, .most = UINT64_MAX, .fine = true, .ascending = true };
+    g.face = query_room(m->mesh.face_count + 1, sizeof *g.face);
+    oracle_box(m->judge, low, high, &expected, &n);
+    ck_assert_msg(ebpo_triangles_in_box(context, low, high, keep_triangles, &g, &error) == EBPO_OK,
+                  "%s", error.message);
+    bool same = g.fine && g.count == n && (g.ascending || !resident);
+    qsort(g.face, g.count, sizeof *g.face, compare_numbers);
+    for (uint32_t i = 0; i < n && same; i++)
+        same = g.face[i] == expected[i];
+    free(g.face);
+    return same;
+}
+
+static void hold(query_model *m, int way, ebpo_model **model, ebpo_context **context)
+{
+    static const ebpo_loading loading[CUTS] = { EBPO_LOAD_CACHE, EBPO_LOAD_CACHE, EBPO_LOAD_SUBTREE,
+                                                EBPO_LOAD_NODES };
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    options.cut_level = way ? way : -1;
+    options.loading = loading[way];
+    ASSERT_OK(ebpo_model_new(m->file, &options, model, error));
+    ASSERT_OK(ebpo_context_new(*model, context, error));
+}
+
+START_TEST(triangles_of_boxes_come_once_each)
+{
+    query_model m;
+    ebpo_model *model[CUTS];
+    ebpo_context *context[CUTS];
+    uint64_t count = query_scaled(100), wrong = 0;
+    double(*p)[3] = query_room(2 * count, sizeof *p);
+    query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
+                     &query_variants[(_i + 2) % query_variant_count]);
+    for (int way = 0; way < CUTS; way++)
+        hold(&m, way, &model[way], &context[way]);
+    query_make_points(&m, 2 * count, (uint64_t)_i + 78, p[0]);
+    for (uint64_t i = 0; i < count; i++) {
+        double low[3], high[3];
+        for (int k = 0; k < 3; k++) {
+            low[k] = fmin(p[2 * i][k], p[2 * i + 1][k]);
+            high[k] = fmax(p[2 * i][k], p[2 * i + 1][k]);
+        }
+        for (int way = 0; way < CUTS; way++)
+            wrong += !ask_triangles(&m, context[way], way == 0, low, high);
+    }
+    ck_assert_uint_eq(wrong, 0);
+    for (int way = 0; way < CUTS; way++) {
+        ebpo_context_free(context[way]);
+        ebpo_model_free(model[way]);
+    }
+    free(p);
+    query_model_free(&m);
+}
+END_TEST
+
+/* More than the budget holds at once; and whoever has enough says so. */
+START_TEST(triangles_of_all_of_a_model_keep_to_its_budget)
+{
+    query_model m;
+    ebpo_model *model;
+    ebpo_context *context;
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
+    options.memory = 12 << 20;
+    query_model_make(&m, "torus", ebpo_test_torus(2, 0.7, 400, 250), &query_variants[0]);
+    ASSERT_OK(ebpo_model_new(m.file, &options, &model, error));
+    ASSERT_OK(ebpo_context_new(model, &context, error));
+    for (int turn = 0; turn < 2; turn++) {
+        static const double low[3] = { -9, -9, -9 }, high[3] = { 9, 9, 9 };
+        gathered g = { .m = &m, .most = turn ? 3 : UINT64_MAX, .fine = true };
+        g.face = query_room(m.mesh.face_count + 1, sizeof *g.face);
+        ASSERT_OK(ebpo_triangles_in_box(context, low, high, keep_triangles, &g, error));
+        ck_assert(g.fine);
+        ck_assert_uint_eq(g.count, turn ? 3 * EBPO_TRIANGLES_MOST : m.mesh.face_count);
+        qsort(g.face, g.count, sizeof *g.face, compare_numbers);
+        for (uint64_t i = 1; i < g.count; i++)
+            if (g.face[i] == g.face[i - 1])
+                ck_abort_msg("face %u came twice", g.face[i]);
+        free(g.face);
+    }
+    ck_assert_int_eq(ebpo_model_get_stats(model, &stats), EBPO_OK);
+    ck_assert(!stats.resident && stats.evicted > 0 && stats.memory_peak <= options.memory);
+    ebpo_context_free(context);
+    ebpo_model_free(model);
     query_model_free(&m);
 }
 END_TEST
@@ -204,6 +339,8 @@ Suite *test_suite(void)
     tcase_add_test(rays, rays_that_make_no_sense_are_refused);
     tcase_add_loop_test(boxes, boxes_hold_what_brute_force_says, 0, query_solid_count());
     tcase_add_test(boxes, boxes_that_make_no_sense_are_refused);
+    tcase_add_loop_test(boxes, triangles_of_boxes_come_once_each, 0, query_solid_count());
+    tcase_add_test(boxes, triangles_of_all_of_a_model_keep_to_its_budget);
     suite_add_tcase(suite, rays);
     suite_add_tcase(suite, boxes);
     return suite;

@@ -36,6 +36,12 @@ static ebpo_status ask_one(ebpo_context *context, ebpo_error *error)
     return status;
 }
 
+static bool count_triangles(void *user, const ebpo_triangles *triangles)
+{
+    *(uint64_t *)user += triangles->count;
+    return true;
+}
+
 static ebpo_status ask_rays(ebpo_context *context, ebpo_error *error)
 {
     static const double origin[3] = { -9, 0.1, 0.2 }, direction[3] = { 1, 0, 0 };
@@ -50,6 +56,8 @@ static ebpo_status ask_rays(ebpo_context *context, ebpo_error *error)
         status = ebpo_ray_all(context, origin, direction, 99, &hits, &count, error);
     if (status == EBPO_OK)
         status = ebpo_faces_in_box(context, low, high, &faces, &count, error);
+    if (status == EBPO_OK)
+        status = ebpo_triangles_in_box(context, low, high, count_triangles, &count, error);
     return status;
 }
 

@@ -5,7 +5,7 @@
  *   Models           ebpo_model_new, and ebpo_context_new for each thread
  *   Point in solid   ebpo_inside, ebpo_inside_many
  *   Distance         ebpo_distance, ebpo_distance_many
- *   Rays and boxes   ebpo_ray_first, ebpo_ray_all, ebpo_faces_in_box
+ *   Rays and boxes   ebpo_ray_first, ebpo_ray_all, ebpo_faces_in_box, ebpo_triangles_in_box
  *   Mass             ebpo_measure
  *
  *     ebpo_file *file = NULL;
@@ -453,6 +453,47 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_all(ebpo_context *context, const dou
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_faces_in_box(ebpo_context *context, const double min[3],
                                                      const double max[3], const uint64_t **faces,
                                                      uint64_t *count, ebpo_error *error);
+
+/* At most so many triangles are given at a time. */
+enum { EBPO_TRIANGLES_MOST = 1024 };
+
+/* Triangles, lent until the function returns that is called with them. */
+typedef struct ebpo_triangles {
+    /* 1 to EBPO_TRIANGLES_MOST */
+    uint64_t count;
+
+    /* [count] corner after corner, in the model's unit: what the file stores, exactly */
+    const double (*corners)[3][3];
+
+    /* [count] as in ebpo_distance_result; and in the file */
+    const uint64_t *faces, *file_faces;
+
+    uint64_t reserved[4];
+} ebpo_triangles;
+
+/* False: enough. */
+typedef bool (*ebpo_triangles_fn)(void *user, const ebpo_triangles *triangles);
+
+/*
+ * The triangles of ebpo_faces_in_box with their corners, each once, given to `take` block by block:
+ * within the model's budget however many they are. What is under way takes 4 bytes more for each
+ * triangle of one subtree; if all is resident, for each of the answer.
+ *
+ * In the order of the file if all is resident. Else subtree by subtree as the model holds them (cut
+ * level), depth first, and within each in the order of the file.
+ *
+ * take   must not use the context; when it returns false, nothing more is given, and the call
+ *        succeeds
+ *
+ * Errors are those of ebpo_ray_first. EBPO_E_ABSENT and EBPO_E_ARGUMENT come before the first
+ * triangle.
+ *
+ * Threads: one per context.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_triangles_in_box(ebpo_context *context, const double min[3],
+                                                         const double max[3],
+                                                         ebpo_triangles_fn take, void *user,
+                                                         ebpo_error *error);
 
 /* ---- mass ---- */
 

@@ -1,0 +1,155 @@
+#include "geom/strict_fp.h"
+
+#include "query/box_walk.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "geom/ray_triangle.h"
+#include "query/options.h"
+#include "query/pruned.h"
+
+ebpo_status ebpo_check_box(const double min[3], const double max[3], ebpo_error *error)
+{
+    for (int k = 0; k < 3; k++)
+        if (!isfinite(min[k]) || !isfinite(max[k]) || !(min[k] <= max[k]))
+            return ebpo_fail(error, EBPO_E_ARGUMENT,
+                             "a box needs finite corners, the lower one first on each axis");
+    return EBPO_OK;
+}
+
+/* --- in one accel --- */
+
+static void try_block(ebpo_box_walk *w, const ebpo_accel *s, uint32_t block)
+{
+    for (uint32_t lane = 0; lane < EBPO_BLOCK && !w->no_memory; lane++) {
+        uint32_t slot = block * EBPO_BLOCK + lane;
+        double t[3][3];
+        if (s->slot_face[slot] == EBPO_NO_SLOT)
+            return;
+        ebpo_accel_triangle(s, slot, t);
+        if (!ebpo_triangle_meets_box((const double(*)[3])t, w->min, w->max))
+            continue;
+        w->no_memory = !ebpo_grow(&w->slot, &w->capacity, w->count + 1, sizeof *w->slot);
+        if (!w->no_memory)
+            w->slot[w->count++] = slot;
+    }
+}
+
+static void gather_bound(ebpo_box_walk *w, const ebpo_accel *s, const double low[3],
+                         const double high[3], uint32_t child)
+{
+    if (child & EBPO_IS_BLOCK) {
+        try_block(w, s, child & ~EBPO_IS_BLOCK);
+        return;
+    }
+    const ebpo_bound *b = &s->bound[child];
+    for (int lane = 0; lane < 8; lane++) {
+        bool meets = b->child[lane] != EBPO_NO_CHILD;
+        for (int k = 0; k < 3; k++)
+            meets =
+                meets && (double)b->low[k][lane] <= high[k] && (double)b->high[k][lane] >= low[k];
+        if (meets)
+            gather_bound(w, s, low, high, b->child[lane]);
+    }
+}
+
+static int compare_slots(const void *a, const void *b)
+{
+    const uint32_t *x = a, *y = b;
+    return (*x > *y) - (*x < *y);
+}
+
+/* Blocks are numbered in the order of their faces. */
+static ebpo_status gather(ebpo_box_walk *w, const ebpo_accel *s, ebpo_error *error)
+{
+    double low[3], high[3];
+    w->count = 0;
+    if (s->bound_count == 0)
+        return EBPO_OK;
+    for (int k = 0; k < 3; k++) {
+        low[k] = (w->min[k] - s->centre[k]) * s->scale;
+        high[k] = (w->max[k] - s->centre[k]) * s->scale;
+        low[k] -= (fabs(low[k]) + 2) * 0x1p-48;
+        high[k] += (fabs(high[k]) + 2) * 0x1p-48;
+    }
+    gather_bound(w, s, low, high, s->top);
+    if (w->no_memory)
+        return ebpo_fail_memory(error, (w->count + 1) * sizeof *w->slot);
+    if (w->count)
+        qsort(w->slot, w->count, sizeof *w->slot, compare_slots);
+    return w->take(w, s, error);
+}
+
+/* --- in all of them --- */
+
+static bool box_matters(void *user, const ebpo_box *box, const ebpo_node *node)
+{
+    const ebpo_box_walk *w = user;
+    return ebpo_cell_meets(box, node->cell, w->min, w->max);
+}
+
+static ebpo_status gather_node(ebpo_box_walk *w, const ebpo_box *box, ebpo_node node,
+                               ebpo_error *error)
+{
+    if (ebpo_node_is_uniform(&node) || !box_matters(w, box, &node))
+        return EBPO_OK;
+    ebpo_status status = EBPO_OK;
+    if (ebpo_node_is_below(&node)) {
+        w->below = node;
+        status = ebpo_model_enter(w->context, &node, error);
+        return status == EBPO_OK ? gather(w, node.subtree, error) : status;
+    }
+    for (unsigned octant = 0; octant < 8 && status == EBPO_OK && !w->enough; octant++)
+        status = gather_node(w, box, ebpo_model_child(w->context->model, &node, octant), error);
+    return status;
+}
+
+ebpo_status ebpo_box_walk_check(ebpo_box_walk *w, ebpo_error *error)
+{
+    return ebpo_check_pruned(w->context, box_matters, w, error);
+}
+
+ebpo_status ebpo_box_walk_run(ebpo_box_walk *w, ebpo_error *error)
+{
+    const ebpo_model *m = w->context->model;
+    ebpo_box box = ebpo_model_box(m);
+    ebpo_status status =
+        m->whole ? gather(w, m->whole, error) : gather_node(w, &box, ebpo_model_root(m), error);
+    free(w->slot);
+    w->slot = NULL;
+    return status;
+}
+
+/* --- each face once --- */
+
+/* Accels list the faces that touch the cells in whose place they stand. So the first one that has a
+ * face is the first, depth first, whose cell the face touches: no list of what has been seen is
+ * needed, however much that is. */
+static bool find_first(const ebpo_box_walk *w, const ebpo_box *box, ebpo_node node,
+                       const double triangle[3][3], uint32_t *entry)
+{
+    double low[3], high[3];
+    if (ebpo_node_is_uniform(&node) || !ebpo_cell_meets(box, node.cell, w->min, w->max))
+        return false;
+    ebpo_cell_bounds(box, node.cell, low, high);
+    if (!ebpo_triangle_meets_box(triangle, low, high))
+        return false;
+    *entry = node.entry;
+    bool found = ebpo_node_is_below(&node);
+    for (unsigned octant = 0; octant < 8 && !ebpo_node_is_below(&node) && !found; octant++)
+        found =
+            find_first(w, box, ebpo_model_child(w->context->model, &node, octant), triangle, entry);
+    return found;
+}
+
+bool ebpo_box_walk_is_first(const ebpo_box_walk *w, const double triangle[3][3])
+{
+    const ebpo_model *m = w->context->model;
+    ebpo_box box = ebpo_model_box(m);
+    uint32_t entry = 0;
+    return m->whole || !find_first(w, &box, ebpo_model_root(m), triangle, &entry) ||
+           entry == w->below.entry;
+}
