@@ -16,6 +16,7 @@ Needs nginx, chromium, python3-h5py, npm (h5wasm is installed below BUILD_DIR) a
 import argparse
 import contextlib
 import json
+import os
 import pathlib
 import re
 import shlex
@@ -31,7 +32,7 @@ import measured
 import remote_page
 from served import Line, Server, free_port, wait_for
 
-SINGLES, VIEWS, OPENINGS, PATH, EQUAL, ROUNDS = 11, 5, 5, 1000000, 10000, 2
+SINGLES, VIEWS, OPENINGS, PATH, EQUAL, ROUNDS = 11, 5, 5, 200000, 10000, 2
 ROUND_TRIP, RATE = 0.1, 5e6 / 8
 LATENCIES = [0, 50, 200]
 
@@ -48,6 +49,7 @@ class Measurements:
         if not (self.only.search(name) if self.only else name not in self.found):
             return
         print(name, file=sys.stderr, flush=True)
+        self.found.setdefault("load", {})[name] = os.getloadavg()[0]
         try:
             self.found[name] = measure()
         except (subprocess.CalledProcessError, RuntimeError, measured.Failed) as error:
@@ -76,10 +78,10 @@ def view(side, large, work):
         wait_for(port)
         line = Line(port, ROUND_TRIP, RATE)
         eye, at = (",".join(map(repr, p)) for p in large.view(0))
-        done = subprocess.run(["node", HERE / "remote/viewed.mjs", HERE.parent.parent /
-                               "tools/viewer", f"http://127.0.0.1:{line.port}/?file=models/{shown.name}", log, shown.name,
-                               eye, at, work / side.name], check=True, capture_output=True,
-                              text=True)
+        address = f"http://127.0.0.1:{line.port}/?file=models/{shown.name}"
+        done = subprocess.run(["node", HERE / "remote/viewed.mjs", drivers.ROOT / "tools/viewer",
+                               address, log, shown.name, eye, at, work / side.name], check=True,
+                              capture_output=True, text=True)
         return json.loads(done.stdout)
     finally:
         shown.unlink()
@@ -118,8 +120,7 @@ def measure_sides(take, sides, server, line, work):
         take(f"{side.name}/size", lambda s=side: {which: f.stat().st_size
                                                   for which, f in s.files.items()})
         take(f"{side.name}/local", lambda s=side: asked.local(s, s.files["large"], OPENINGS, PATH))
-        if side.name != remote_page.MIXED:
-            take(f"{side.name}/viewer", lambda s=side: view(s, large, work))
+        take(f"{side.name}/viewer", lambda s=side: view(s, large, work))
 
 
 def measure_drivers(take, side, server, work):

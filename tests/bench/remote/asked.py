@@ -1,0 +1,199 @@
+"""What is asked of a file by URL, and how often: rows that are measured for each side."""
+import json
+import math
+import random
+import shutil
+import subprocess
+import time
+
+BUDGET = "256M"
+NEAR = 1e-4     # of the diagonal
+VIEW_FROM = 0.03
+KEPT = 588e3    # bytes of the box that is fetched
+CONNECTIONS = 32  # where waves are counted: the most that the command opens
+
+
+class Side:
+    """A build in its checkout, with a large and a small file of the same two models."""
+    def __init__(self, name, build, large, small):
+        self.name, self.build, self.files = name, build, {"large": large, "small": small}
+        self.ebpo, self.root = build / "tools/ebpo", build.parent
+
+    def run(self, *command):
+        return subprocess.run([self.ebpo, *map(str, command)], check=True, capture_output=True,
+                              text=True, stdin=subprocess.DEVNULL).stdout
+
+    def link(self, which):
+        return f"{self.name.replace(' ', '_')}_{which}.ebpo.h5"
+
+
+# --- where ---
+
+def unit(dice):
+    z, turn = 2 * dice.random() - 1, 2 * math.pi * dice.random()
+    flat = math.sqrt(1 - z * z)
+    return [flat * math.cos(turn), flat * math.sin(turn), z]
+
+
+def numbers(*values):
+    return " ".join(repr(x) for x in values)
+
+
+class Places:
+    """Random places on a model: where random lines through the ball around it enter the surface,
+    evenly by area as far as it is seen from outside. Always the same for one model."""
+    def __init__(self, side, which, count, work):
+        self.work, self.side, self.file = work, side, side.files[which]
+        info = json.loads(side.run("info", "--json", self.file))
+        self.diagonal = math.dist([0, 0, 0], info["box_size"])
+        self.centre = [o + s / 2 for o, s in zip(info["box_origin"], info["box_size"])]
+        dice, rays = random.Random(1), []
+        for _ in range(16 * count):
+            d, a, r = unit(dice), unit(dice), self.diagonal / 2
+            side_step = [x - y * sum(p * q for p, q in zip(a, d)) for x, y in zip(a, d)]
+            rays.append(([c - 2 * r * x + r * s for c, x, s in zip(self.centre, d, side_step)], d))
+        asked = work / f"rays_{which}.txt"
+        asked.write_text("".join(numbers(*o, *d) + "\n" for o, d in rays))
+        hits = map(json.loads, side.run("ray", "--json", "--memory", "2G", self.file,
+                                        asked).splitlines())
+        self.found = [([o + hit["t"] * x for o, x in zip(origin, d)], d)
+                      for (origin, d), hit in zip(rays, hits) if hit][:count]
+        if len(self.found) < count:
+            raise RuntimeError(f"{self.file}: only {len(self.found)} places of {count}")
+
+    def near(self, name, begin, count):
+        """A file of points at most NEAR diagonals from the surface."""
+        path = self.work / name
+        lines = []
+        for i in range(begin, begin + count):
+            shift = [NEAR * self.diagonal * random.Random(i).random() * x
+                     for x in unit(random.Random(i))]
+            lines.append(numbers(*(p + s for p, s in zip(self.found[i][0], shift))) + "\n")
+        path.write_text("".join(lines))
+        return path
+
+    def crowd(self, name, count):
+        """A file of points around all places, up to 100 times as far as the near ones."""
+        path, dice = self.work / name, random.Random(2)
+        path.write_text("".join(
+            numbers(*(p + 10**-(2 + 2 * dice.random()) * self.diagonal * x
+                      for p, x in zip(self.found[i % len(self.found)][0], unit(dice)))) + "\n"
+            for i in range(count)))
+        return path
+
+    def view(self, i):
+        """Eye and what is looked at, from outside."""
+        at, d = self.found[i]
+        return [p - VIEW_FROM * self.diagonal * x for p, x in zip(at, d)], at
+
+    def box(self, i):
+        """The cube around a place of which `ebpo subset` keeps about KEPT bytes."""
+        low, high, out = 0, 0.1 * self.diagonal, self.work / "box.ebpo.h5"
+        for _ in range(14):
+            half = (low + high) / 2
+            box = [round(x + s * half, 3) for s in (-1, 1) for x in self.found[i][0]]
+            self.side.run("subset", "-q", "--box", ",".join(map(repr, box)), self.file, out)
+            kept = out.stat().st_size
+            if abs(kept - KEPT) < 0.01 * KEPT:
+                break
+            low, high = (half, high) if kept < KEPT else (low, half)
+        return ",".join(map(repr, box)), kept
+
+
+# --- rows ---
+
+class Row:
+    """Commands that are asked one by one: `command` as the page shows it, `asks` what fills it."""
+    def __init__(self, name, what, command, asks, which="large", waves=True):
+        self.name, self.what, self.command = name, what, command
+        self.asks, self.which, self.waves = asks, which, waves
+
+
+def rows(large, small, work, singles, views):
+    """All rows of questions by URL."""
+    each = [large.near(f"near_{i}.txt", i, 1) for i in range(singles)]
+    hundred, fifty = large.near("near_100.txt", 0, 100), small.near("near_50.txt", 0, 50)
+    box, kept = large.box(0)
+    seen = [[numbers(*p).replace(" ", ",") for p in large.view(i)] for i in range(views)]
+
+    def points(command, files, *options):
+        return [[command, *options, "URL", file] for file in files]
+    budget = ["--memory", BUDGET]
+    shown = f"ebpo {{}} --memory {BUDGET} URL {{}}"
+    table = [Row(f"{c} one", f"one {c} near the surface", shown.format(c, "POINT"),
+                 points(c, each, *budget)) for c in ("distance", "inside")]
+    table += [Row(f"{c} 100", f"100 near points: {c}", shown.format(c, "POINTS"),
+                  points(c, [hundred], *budget)) for c in ("distance", "inside")]
+    table += [Row(f"{c} 50 small", f"50 near points of the small model: {c}",
+                  shown.format(c, "POINTS"), points(c, [fifty], *budget), "small")
+              for c in ("distance", "inside")]
+    table += [
+        Row("box", f"`fetch --box` that keeps {kept:,} B", f"ebpo fetch -q --box {box} URL OUT",
+            [["fetch", "-q", "--box", box, "URL", "OUT"]]),
+        Row("view", f"nodes of a view from {VIEW_FROM} diagonals away",
+            "ebpo view --eye EYE --look AT --seen-only --pixels 16 URL",
+            [["view", "--eye", eye, "--look", at, "--seen-only", "--pixels", "16", "URL"]
+             for eye, at in seen]),
+        *(Row(f"levels {to}", f"levels 0 to {to}, types and planes", f"ebpo levels --to {to} URL",
+              [["levels", "--to", to, "URL"]]) for to in (5, 8)),
+        Row("no budget", "one inside, without `--memory`", "ebpo inside URL POINT",
+            points("inside", each[:1]), waves=False)]
+    return {row.name: row for row in table}
+
+
+def ask(server, line, side, row, work, connections=None):
+    """One after the other, each a new process: {requests, bytes, seconds or waves: [of each]}."""
+    out, found = work / "out.ebpo.h5", {"requests": [], "bytes": [], "seconds": [], "waves": []}
+    name = side.link(row.which)
+    for command in row.asks:
+        words = {"URL": f"http://127.0.0.1:{line.port}/{name}", "OUT": out}
+        command = [str(words.get(word, word)) for word in command]
+        if connections:
+            command[1:1] = ["--http-connections", str(connections)]
+        out.unlink(missing_ok=True)
+        shutil.rmtree(f"{out}.part", ignore_errors=True)
+        server.traffic(name)
+        line.requests = []
+        begin = time.perf_counter()
+        said = side.run(*command)
+        found["seconds"].append(time.perf_counter() - begin)
+        count, size = server.traffic(name)
+        found["requests"].append(count)
+        found["bytes"].append(size)
+        found["waves"].append(line.waves(connections or 1000))
+        if not said and row.name != "box":
+            raise RuntimeError(f"{side.name}, {row.name}: nothing was answered")
+    return found
+
+
+def measure(server, line, side, row, work):
+    """As the command asks by itself; and in what waves, with connections enough."""
+    found = ask(server, line, side, row, work)
+    found["round_trips"] = found.pop("waves")
+    if row.waves:
+        found["waves"] = ask(server, line, side, row, work, CONNECTIONS)["waves"]
+    return found
+
+
+# --- on this machine ---
+
+def local(side, file, seeds, count):
+    """A first answer from a file that the system has forgotten; a path at once; uniform points."""
+    def bench(*options):
+        return json.loads(side.run("bench", "--json", "--memory", BUDGET, *options, file))
+    found = {}
+    for query in "inside", "distance":
+        found[query] = {
+            "first": [bench("--query", query, "--points", "path", "--count", 1, "--seed", seed)
+                      for seed in range(1, seeds + 1)],
+            "path": bench("--query", query, "--points", "path", "--count", count, "--prefetch"),
+            "uniform": bench("--query", query, "--points", "uniform", "--count", count // 200)}
+    return found
+
+
+def same_answers(side, line, which, points):
+    """Whether what is said by URL is what is said of the file."""
+    url = f"http://127.0.0.1:{line.port}/{side.link(which)}"
+    return all(side.run(command, "--memory", BUDGET, url, points)
+               == side.run(command, "--memory", BUDGET, side.files[which], points)
+               for command in ("inside", "distance"))
