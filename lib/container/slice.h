@@ -12,8 +12,7 @@
  * root: level[0] has one group, of which only octant 0 exists and is the root. Faces have local
  * numbers in the order of their numbers in the file: first the `outer_count` faces that its leaves
  * list but that are new in leaves before it, then its own new ones, first_face .. first_face +
- * face_count - 1 in the file. leaf_first and leaf_refs of the levels hold local numbers. No planes
- * of leaves. */
+ * face_count - 1 in the file. leaf_first and leaf_refs of the levels hold local numbers. */
 typedef struct ebpo_slice {
     ebpo_node root;
     /* the file is a subset: empty groups are those of pruned nodes, as are gray nodes on the last
@@ -32,7 +31,14 @@ typedef struct ebpo_slice {
 
 void ebpo_slice_free(ebpo_slice *slice);
 
-/* Reads the subtree of a gray node, or a single leaf. EBPO_E_ABSENT without mesh. */
+/* Reads the subtree of a gray node, or a single leaf, with its faces, and what `needs` names beside
+ * them (EBPO_NEEDS_..., schema.h: planes, stored planes of leaves, maps). EBPO_E_ABSENT without
+ * mesh. */
+EBPO_MUST_USE ebpo_status ebpo_slice_read_parts(ebpo_slice *out, ebpo_chunks *chunks,
+                                                const ebpo_node *root, uint32_t needs,
+                                                ebpo_error *error);
+
+/* All but stored planes of leaves. */
 EBPO_MUST_USE ebpo_status ebpo_slice_read(ebpo_slice *out, ebpo_chunks *chunks,
                                           const ebpo_node *root, ebpo_error *error);
 

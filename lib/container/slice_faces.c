@@ -192,7 +192,8 @@ static ebpo_status take_source(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_erro
                   error);
 }
 
-ebpo_status ebpo_slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_error *error)
+ebpo_status ebpo_slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks, bool maps,
+                                  ebpo_error *error)
 {
     enum { ROW = 3 * sizeof(uint32_t) };
     ebpo_status status = number_faces(slice, error);
@@ -206,5 +207,5 @@ ebpo_status ebpo_slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_e
                     slice->face_count, slice->mesh.faces, error);
     if (status == EBPO_OK)
         status = take_vertices(slice, chunks, error);
-    return status == EBPO_OK ? take_source(slice, chunks, error) : status;
+    return status == EBPO_OK && maps ? take_source(slice, chunks, error) : status;
 }

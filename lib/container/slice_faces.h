@@ -4,9 +4,9 @@
 
 #include "container/slice.h"
 
-/* From levels with numbers of the file, and first_face and face_count: everything else, and local
- * numbers in the levels. */
-EBPO_MUST_USE ebpo_status ebpo_slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks,
+/* From levels with numbers of the file, and first_face and face_count: everything else, with `maps`
+ * numbers in the source, too, and local numbers in the levels. */
+EBPO_MUST_USE ebpo_status ebpo_slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks, bool maps,
                                                 ebpo_error *error);
 
 #endif

@@ -179,23 +179,30 @@ ebpo_status ebpo_slice_read_nodes(ebpo_slice *out, ebpo_chunks *chunks, const eb
     return status;
 }
 
-ebpo_status ebpo_slice_read(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_node *root,
-                            ebpo_error *error)
+ebpo_status ebpo_slice_read_parts(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_node *root,
+                                  uint32_t needs, ebpo_error *error)
 {
+    enum { ALWAYS = EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH | EBPO_NEEDS_SOLID };
     memset(out, 0, sizeof *out);
     if (!(chunks->file->info.parts & EBPO_PART_MESH))
         return ebpo_fail_file(error, EBPO_E_ABSENT, chunks->file->in.shown,
                               "the file was written without its mesh; build it again with it");
     walk w = { .chunks = chunks, .slice = out };
-    ebpo_status status = ebpo_slice_read_nodes(out, chunks, root, ~(uint32_t)EBPO_NEEDS_LEAF_PLANES,
-                                               EBPO_SLICE_ALL, error);
+    ebpo_status status =
+        ebpo_slice_read_nodes(out, chunks, root, needs | ALWAYS, EBPO_SLICE_ALL, error);
     if (status == EBPO_OK)
         status = walk_group(&w, 0, error);
     if (status == EBPO_OK)
-        status = ebpo_slice_take_faces(out, chunks, error);
+        status = ebpo_slice_take_faces(out, chunks, needs & EBPO_NEEDS_MAPS, error);
     if (status != EBPO_OK)
         ebpo_slice_free(out);
     return status;
+}
+
+ebpo_status ebpo_slice_read(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_node *root,
+                            ebpo_error *error)
+{
+    return ebpo_slice_read_parts(out, chunks, root, ~(uint32_t)EBPO_NEEDS_LEAF_PLANES, error);
 }
 
 static ebpo_status measure_faces(ebpo_chunks *chunks, const range *r, ebpo_slice_size *out,

@@ -229,10 +229,8 @@ ebpo_status ebpo_subtree_take_faces(ebpo_subtree *s, ebpo_slice *slice,
     s->mesh = slice->mesh;
     memset(&slice->mesh, 0, sizeof slice->mesh);
     s->outer_count = slice->outer_count;
-    if (options->parts & EBPO_PART_MAPS) {
-        s->source = slice->face_source;
-        slice->face_source = NULL;
-    }
+    s->source = slice->face_source;
+    slice->face_source = NULL;
     s->memory += s->mesh.face_count * 3 * sizeof(uint32_t) +
                  s->mesh.vertex_count * 3 * (s->mesh.xyz32 ? sizeof(float) : sizeof(double));
     ebpo_status status = take_lists(s, slice, error);

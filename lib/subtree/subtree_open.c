@@ -156,40 +156,6 @@ static ebpo_status check_memory(const ebpo_subtree *s, ebpo_chunks *chunks, uint
 
 /* --- reading --- */
 
-/* Stored planes of leaves, which slices with faces do not have. */
-static ebpo_status add_leaf_planes(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_error *error)
-{
-    ebpo_slice nodes;
-    ebpo_status status =
-        ebpo_slice_read_nodes(&nodes, chunks, &slice->root,
-                              EBPO_NEEDS_ALWAYS | EBPO_NEEDS_LEAF_PLANES, EBPO_SLICE_ALL, error);
-    for (int i = 0; status == EBPO_OK && i < slice->level_count; i++) {
-        ebpo_level *to = &slice->level[i], *from = &nodes.level[i];
-        to->leaf_plane_counts = from->leaf_plane_counts;
-        to->leaf_planes = from->leaf_planes;
-        to->leaf_plane_count = from->leaf_plane_count;
-        from->leaf_plane_counts = NULL;
-        from->leaf_planes = NULL;
-    }
-    if (status == EBPO_OK)
-        ebpo_slice_free(&nodes);
-    return status;
-}
-
-static ebpo_status read_slice(ebpo_slice *out, const ebpo_subtree *s, ebpo_chunks *chunks,
-                              uint32_t needs, int levels, ebpo_error *error)
-{
-    if (s->no_faces)
-        return ebpo_slice_read_nodes(out, chunks, &s->root, needs, levels, error);
-    ebpo_status status = ebpo_slice_read(out, chunks, &s->root, error);
-    if (status != EBPO_OK || !(needs & EBPO_NEEDS_LEAF_PLANES))
-        return status;
-    status = add_leaf_planes(out, chunks, error);
-    if (status != EBPO_OK)
-        ebpo_slice_free(out);
-    return status;
-}
-
 /* What of the arrays is wanted; sets `no_faces`. */
 static uint32_t choose_needs(ebpo_subtree *s, const ebpo_subtree_options *o, uint32_t parts)
 {
@@ -216,7 +182,9 @@ static ebpo_status fill(ebpo_subtree *s, ebpo_chunks *chunks, ebpo_cursor *c,
     if (status == EBPO_OK && needs & (EBPO_NEEDS_PLANES | EBPO_NEEDS_LEAF_PLANES))
         status = take_above(s, c, error);
     if (status == EBPO_OK)
-        status = read_slice(&slice, s, chunks, needs, o->levels, error);
+        status = s->no_faces
+                     ? ebpo_slice_read_nodes(&slice, chunks, &s->root, needs, o->levels, error)
+                     : ebpo_slice_read_parts(&slice, chunks, &s->root, needs, error);
     if (status != EBPO_OK)
         return status;
     status = ebpo_subtree_take_nodes(s, &slice, error);
