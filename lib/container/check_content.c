@@ -8,6 +8,11 @@
 #include "container/reader.h"
 
 /* Arrays are independent, so threads take whole ones; chunks within one must come in order. */
+typedef struct array_digest {
+    const ebpo_info *info;
+    ebpo_sha256 state;
+} array_digest;
+
 typedef struct content_job {
     const ebpo_file *file;
     const ebpo_array_in *array[EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS];
@@ -19,10 +24,11 @@ typedef struct content_job {
 static ebpo_status take(void *context, const ebpo_array_in *array, uint64_t chunk, uint64_t row,
                         uint64_t rows, const uint8_t *bytes, ebpo_error *error)
 {
+    array_digest *d = context;
     (void)chunk;
-    (void)row;
     (void)error;
-    ebpo_sha256_add(context, bytes, rows * ebpo_h5_row_bytes(&array->shape));
+    ebpo_content_rows(d->info, array->id, row, rows, ebpo_h5_row_bytes(&array->shape), bytes,
+                      &d->state);
     return EBPO_OK;
 }
 
@@ -33,10 +39,10 @@ static ebpo_status digest_arrays(void *context, uint64_t begin, uint64_t end, un
     (void)worker;
     ebpo_status status = EBPO_OK;
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
-        ebpo_sha256 state;
-        ebpo_sha256_begin(&state);
-        status = ebpo_reader_rows(j->file, j->array[i], &j->alone, take, &state, error);
-        ebpo_sha256_end(&state, j->digest[i]);
+        array_digest d = { .info = &j->file->info };
+        ebpo_sha256_begin(&d.state);
+        status = ebpo_reader_rows(j->file, j->array[i], &j->alone, take, &d, error);
+        ebpo_sha256_end(&d.state, j->digest[i]);
     }
     return status;
 }
@@ -69,7 +75,7 @@ ebpo_status ebpo_file_check_content(const ebpo_file *file, const ebpo_read_optio
     /* then in the order of the file, in which it comes; else the largest first */
     bool far = ebpo_input_expects(&file->in);
     for (int id = EBPO_ARRAYS - 1; id >= EBPO_LEVEL_ARRAYS; id--)
-        if (file->root_array[id].present)
+        if (file->root_array[id].present && ebpo_content_has(&file->info, (ebpo_array_id)id))
             j.array[j.count++] = &file->root_array[id];
     for (int level = file->info.level_count - 1; level >= 0; level--)
         for (int id = EBPO_LEVEL_ARRAYS - 1; id >= 0; id--)

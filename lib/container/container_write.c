@@ -12,10 +12,12 @@
 #include "base/sha256.h"
 #include "base/arrays.h"
 #include "base/sized.h"
+#include "container/chunk_order.h"
 #include "container/content.h"
 #include "container/head_facts.h"
 #include "container/plan.h"
 #include "container/container_write.h"
+#include "container/places.h"
 #include "io/publish.h"
 
 /* Chunks that are in memory at a time: 8 MiB raw and as much encoded. */
@@ -42,8 +44,13 @@ typedef struct writer {
     slot slots[WINDOW];
     unsigned used;            /* slots */
     ebpo_chunk_coder *coders; /* one for each thread */
+    ebpo_chunk_order order;
+    ebpo_sha256 *digest; /* [arrays of the plan] */
     ebpo_content content;
     uint64_t chunk_bytes, chunks_done, chunks;
+    ebpo_array_out places; /* without subtrees it has no rows */
+    uint32_t (*place)[2];  /* [rows of places] */
+    uint64_t place_count, top_bytes;
     /* headers; the index of arrays of several chunks, and where it begins (0: there is none, or not
      * yet) */
     uint64_t head_bytes, index_bytes, index_at;
@@ -90,6 +97,31 @@ typedef struct first_chunk {
     size_t bytes;
 } first_chunk;
 
+static unsigned links_of_table(const writer *w)
+{
+    return w->places.shape.rows ? EBPO_ARRAYS - EBPO_A_SUBTREE_INDEX : 0;
+}
+
+static ebpo_status make_table_group(writer *w, ebpo_error *error)
+{
+    ebpo_h5_id id = -1;
+    if (!links_of_table(w))
+        return EBPO_OK;
+    ebpo_status status = ebpo_h5_make_group(&w->out, "/subtrees", links_of_table(w), &id, error);
+    ebpo_h5_close_id(id);
+    return status;
+}
+
+/* Of the list of chunks: its own place and the file's size, which tell readers whether it still
+ * holds. */
+static ebpo_status put_holds(writer *w, uint64_t file_bytes, uint64_t offset, ebpo_error *error)
+{
+    ebpo_status status =
+        ebpo_h5_put_count(&w->out, w->places.handle, "file_bytes", file_bytes, error);
+    return status == EBPO_OK ? ebpo_h5_put_count(&w->out, w->places.handle, "offset", offset, error)
+                             : status;
+}
+
 static ebpo_status make_array(writer *w, ebpo_array_out *a, const first_chunk *first,
                               ebpo_error *error)
 {
@@ -111,7 +143,8 @@ static ebpo_status lay_out(writer *w, const char *path, const char *shown, uint6
 {
     ebpo_plan *plan = &w->plan;
     w->out.codec_level = w->options->codec_level;
-    ebpo_status status = ebpo_h5_create(&w->out, path, shown, head_bytes, 3, error);
+    ebpo_status status =
+        ebpo_h5_create(&w->out, path, shown, head_bytes, 3 + (links_of_table(w) != 0), error);
     if (status == EBPO_OK)
         status = ebpo_h5_root(&w->out, &w->root, error);
     if (status == EBPO_OK)
@@ -122,8 +155,14 @@ static ebpo_status lay_out(writer *w, const char *path, const char *shown, uint6
         status = make_root_group(w, "/mesh", EBPO_PART_MESH, error);
     if (status == EBPO_OK)
         status = make_root_group(w, "/maps", EBPO_PART_MAPS, error);
+    if (status == EBPO_OK)
+        status = make_table_group(w, error);
     for (unsigned i = 0; i < plan->count && status == EBPO_OK; i++)
         status = make_array(w, &plan->array[i], i == 0 ? &first : NULL, error);
+    if (status == EBPO_OK && w->places.shape.rows)
+        status = make_array(w, &w->places, NULL, error);
+    if (status == EBPO_OK && w->places.shape.rows)
+        status = put_holds(w, 0, 0, error);
     return status;
 }
 
@@ -133,8 +172,17 @@ static void close_handles(writer *w)
         ebpo_h5_close_id(w->plan.array[i].handle);
         w->plan.array[i].handle = -1;
     }
+    ebpo_h5_close_id(w->places.handle);
     ebpo_h5_close_id(w->root);
-    w->root = -1;
+    w->places.handle = w->root = -1;
+}
+
+static bool has_index(const ebpo_plan *plan)
+{
+    for (unsigned i = 0; i < plan->count; i++)
+        if (ebpo_h5_chunk_count(&plan->array[i].shape) > 1)
+            return true;
+    return false;
 }
 
 /* Sizes of headers and index: the same file in memory, with chunks of one byte. */
@@ -143,13 +191,11 @@ static ebpo_status measure_metadata(writer *w, const char *shown, ebpo_error *er
     ebpo_plan *plan = &w->plan;
     uint64_t capacity = (256 << 10) + (4 << 10) * (uint64_t)plan->count + 32 * w->chunks,
              headers = 0, all = 0;
-    bool indexed = false;
     ebpo_status status = lay_out(w, NULL, shown, capacity, (first_chunk){ "", 1 }, error);
     if (status == EBPO_OK)
         status = ebpo_h5_head_used(&w->out, capacity, &headers, error);
     for (unsigned i = 0; i < plan->count && status == EBPO_OK; i++) {
         const ebpo_array_out *a = &plan->array[i];
-        indexed = indexed || ebpo_h5_chunk_count(&a->shape) > 1;
         for (uint64_t k = i == 0; k < ebpo_h5_chunk_count(&a->shape) && status == EBPO_OK; k++)
             status = ebpo_h5_put_chunk(&w->out, a->path, a->handle, &a->shape, k, "", 1, error);
     }
@@ -161,7 +207,7 @@ static ebpo_status measure_metadata(writer *w, const char *shown, ebpo_error *er
     if (plan->count == 1)
         w->head_bytes += ALONE_BYTES;
     /* not by the sizes, which are too small where a checksum ends in zero bytes */
-    w->index_bytes = indexed ? (all - headers + 8 + 7) / 8 * 8 : 0;
+    w->index_bytes = has_index(plan) ? (all - headers + 8 + 7) / 8 * 8 : 0;
     return status;
 }
 
@@ -175,6 +221,8 @@ static ebpo_status begin_index(writer *w, const char *path, ebpo_error *error)
     for (unsigned i = 0; i < w->plan.count && status == EBPO_OK; i++)
         status =
             ebpo_h5_open_array(&w->out, w->plan.array[i].path, &w->plan.array[i].handle, error);
+    if (status == EBPO_OK && w->places.shape.rows)
+        status = ebpo_h5_open_array(&w->out, w->places.path, &w->places.handle, error);
     return status;
 }
 
@@ -203,11 +251,20 @@ static void digest_slots(writer *w)
     for (unsigned i = 0; i < w->used; i++) {
         const slot *s = &w->slots[i];
         const ebpo_h5_shape *shape = &s->array->shape;
-        uint64_t left = shape->rows - s->chunk * shape->chunk_rows;
-        size_t rows = left < shape->chunk_rows ? (size_t)left : shape->chunk_rows;
-        ebpo_content_add(&w->content, s->raw, rows * ebpo_h5_row_bytes(shape));
-        if (left <= shape->chunk_rows)
-            ebpo_content_end_array(&w->content, s->array->path);
+        uint64_t row = s->chunk * shape->chunk_rows, left = shape->rows - row;
+        ebpo_sha256 *state = &w->digest[s->array - w->plan.array];
+        uint8_t digest[32];
+        if (!ebpo_content_has(&w->plan.info, s->array->id))
+            continue;
+        if (row == 0)
+            ebpo_sha256_begin(state);
+        ebpo_content_rows(&w->plan.info, s->array->id, row,
+                          left < shape->chunk_rows ? left : shape->chunk_rows,
+                          ebpo_h5_row_bytes(shape), s->raw, state);
+        if (left > shape->chunk_rows)
+            continue;
+        ebpo_sha256_end(state, digest);
+        ebpo_content_put(&w->content, s->array->path, digest);
     }
 }
 
@@ -244,14 +301,33 @@ static ebpo_status encode_window(writer *w, ebpo_error *error)
     return status;
 }
 
+static void note_place(writer *w, uint32_t number, uint64_t bytes)
+{
+    if (!w->places.shape.rows)
+        return;
+    w->place[w->place_count][0] = number;
+    w->place[w->place_count++][1] = (uint32_t)bytes;
+}
+
+/* Called for each chunk, in the order of the file, before it is written. */
+static void place_chunk(writer *w, const slot *s)
+{
+    if (w->index_at == 0 && ebpo_h5_chunk_count(&s->array->shape) > 1) {
+        w->index_at = w->head_bytes + w->chunk_bytes;
+        note_place(w, EBPO_PLACE_GAP, w->index_bytes);
+    }
+    note_place(w, ebpo_place_number(s->array->id, s->array->level), s->stored_bytes);
+    w->chunk_bytes += s->stored_bytes;
+    if (w->chunks_done + 1 == w->order.top)
+        w->top_bytes = w->head_bytes + w->chunk_bytes + (w->index_at ? w->index_bytes : 0);
+}
+
 static ebpo_status flush_window(writer *w, ebpo_error *error)
 {
     ebpo_status status = encode_window(w, error);
     for (unsigned i = 0; i < w->used && status == EBPO_OK; i++) {
         const slot *s = &w->slots[i];
-        if (w->index_at == 0 && ebpo_h5_chunk_count(&s->array->shape) > 1)
-            w->index_at = w->head_bytes + w->chunk_bytes;
-        w->chunk_bytes += s->stored_bytes;
+        place_chunk(w, s);
         if (w->chunks_done++ == 0)
             continue; /* written by lay_out */
         status = ebpo_h5_put_chunk(&w->out, s->array->path, s->array->handle, &s->array->shape,
@@ -268,16 +344,46 @@ static ebpo_status flush_window(writer *w, ebpo_error *error)
 static ebpo_status write_chunks(writer *w, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    for (unsigned i = 0; i < w->plan.count && status == EBPO_OK; i++) {
-        const ebpo_array_out *a = &w->plan.array[i];
-        for (uint64_t k = 0; k < ebpo_h5_chunk_count(&a->shape) && status == EBPO_OK; k++) {
-            w->slots[w->used].array = a;
-            w->slots[w->used++].chunk = k;
-            if (w->used == WINDOW)
-                status = flush_window(w, error);
-        }
+    for (uint64_t i = 0; i < w->order.count && status == EBPO_OK; i++) {
+        w->slots[w->used].array = &w->plan.array[w->order.chunk[i].array];
+        w->slots[w->used++].chunk = w->order.chunk[i].chunk;
+        if (w->used == WINDOW)
+            status = flush_window(w, error);
     }
     return status == EBPO_OK && w->used ? flush_window(w, error) : status;
+}
+
+/* The last chunk of the file. Where libhdf5 has put something else in between, the list says that
+ * it does not hold. */
+static ebpo_status write_places(writer *w, ebpo_error *error)
+{
+    uint8_t *stored = NULL;
+    size_t bytes = 0;
+    uint64_t offset = w->head_bytes + w->chunk_bytes + w->index_bytes, size = 0;
+    ebpo_status status = ebpo_places_encode(w->place, w->place_count, w->places.shape.pipeline,
+                                            w->options->codec_level, &stored, &bytes, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_put_chunk(&w->out, w->places.path, w->places.handle, &w->places.shape, 0,
+                                   stored, bytes, error);
+    free(stored);
+    if (status == EBPO_OK)
+        status = ebpo_h5_size(&w->out, &size, error);
+    bool holds = size == offset + bytes;
+    return status == EBPO_OK ? put_holds(w, holds ? size : 0, holds ? offset : 0, error) : status;
+}
+
+static void plan_places(writer *w)
+{
+    w->places = (ebpo_array_out){ .id = EBPO_A_PLACES, .handle = -1 };
+    ebpo_schema_path(EBPO_A_PLACES, 0, w->places.path);
+    if (!w->plan.info.subtree_level)
+        return;
+    uint64_t rows = w->chunks + has_index(&w->plan);
+    w->places.shape = (ebpo_h5_shape){ .rows = rows,
+                                       .cols = ebpo_schema[EBPO_A_PLACES].cols,
+                                       .chunk_rows = (uint32_t)rows,
+                                       .element_size = 4,
+                                       .pipeline = w->plan.array[0].shape.pipeline };
 }
 
 static ebpo_status make_window(writer *w, ebpo_error *error)
@@ -289,7 +395,9 @@ static ebpo_status make_window(writer *w, ebpo_error *error)
     w->coders = ebpo_alloc_zero(w->threads, sizeof *w->coders);
     uint8_t *block = ebpo_alloc(wanted, slot_bytes);
     w->slots[0].raw = block;
-    if (!w->coders || !block)
+    w->digest = ebpo_alloc(w->plan.count, sizeof *w->digest);
+    w->place = ebpo_alloc(w->places.shape.rows, sizeof *w->place);
+    if (!w->coders || !block || !w->digest || !w->place)
         return ebpo_fail_memory(error, wanted * slot_bytes);
     for (unsigned i = 0; i < wanted; i++) {
         w->slots[i].raw = block + i * slot_bytes;
@@ -324,12 +432,16 @@ static ebpo_status write_file(writer *w, const char *path, const char *shown, eb
         status = begin_index(w, path, error);
     if (status == EBPO_OK)
         status = write_chunks(w, error);
+    if (status == EBPO_OK && w->places.shape.rows)
+        status = write_places(w, error);
     if (status == EBPO_OK)
         status = ebpo_content_end(&w->content, digest, error);
     if (status == EBPO_OK)
         status = ebpo_facts_put_digest(&w->out, w->root, digest, error);
     if (status == EBPO_OK)
         status = ebpo_facts_put_index(&w->out, w->root, w->index_at, w->index_bytes, error);
+    if (status == EBPO_OK && w->plan.info.subtree_level)
+        status = ebpo_facts_put_top(&w->out, w->root, w->top_bytes, error);
     close_handles(w);
     if (status == EBPO_OK)
         /* another libhdf5 may have placed metadata otherwise: no reader relies on it, tests do */
@@ -371,8 +483,10 @@ static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const cha
         status = EBPO_E_CANCELLED;
     if (status == EBPO_OK)
         status = ebpo_plan_make(&w->plan, tree, w->options, shown, error);
-    for (unsigned i = 0; i < w->plan.count; i++)
-        w->chunks += ebpo_h5_chunk_count(&w->plan.array[i].shape);
+    if (status == EBPO_OK)
+        status = ebpo_chunk_order_make(&w->order, &w->plan, error);
+    w->chunks = w->order.count;
+    plan_places(w);
     if (status == EBPO_OK)
         status = make_window(w, error);
     if (status == EBPO_OK && publish)
@@ -387,6 +501,9 @@ static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const cha
         ebpo_chunk_coder_clear(&w->coders[i]);
     free(w->coders);
     free(w->slots[0].raw);
+    free(w->digest);
+    free(w->place);
+    ebpo_chunk_order_free(&w->order);
     ebpo_plan_free(&w->plan);
     ebpo_content_free(&w->content);
     free(w);

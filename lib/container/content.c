@@ -7,12 +7,26 @@
 #include "base/alloc.h"
 #include "base/error.h"
 
-void ebpo_content_add(ebpo_content *content, const void *data, size_t bytes)
+/* Of chunks of faces as they are without subtrees. */
+enum { PLAIN_FACE_ROWS = 4096, SKIPPED = PLAIN_FACE_ROWS / EBPO_FACE_BLOCK };
+
+bool ebpo_content_has(const ebpo_info *info, ebpo_array_id id)
 {
-    if (!content->open)
-        ebpo_sha256_begin(&content->state);
-    content->open = true;
-    ebpo_sha256_add(&content->state, data, bytes);
+    if (id == EBPO_A_FACES_INDEX && info->subtree_level)
+        return info->face_count > PLAIN_FACE_ROWS;
+    return !(ebpo_schema[id].needs & EBPO_NEEDS_SUBTREES);
+}
+
+void ebpo_content_rows(const ebpo_info *info, ebpo_array_id id, uint64_t row, uint64_t rows,
+                       size_t row_bytes, const uint8_t *bytes, ebpo_sha256 *state)
+{
+    if (id != EBPO_A_FACES_INDEX || !info->subtree_level) {
+        ebpo_sha256_add(state, bytes, rows * row_bytes);
+        return;
+    }
+    for (uint64_t i = 0; i < rows; i++)
+        if ((row + i) % SKIPPED == 0)
+            ebpo_sha256_add(state, bytes + i * row_bytes, row_bytes);
 }
 
 void ebpo_content_put(ebpo_content *content, const char *path, const uint8_t digest[32])
@@ -25,14 +39,6 @@ void ebpo_content_put(ebpo_content *content, const char *path, const uint8_t dig
     ebpo_content_entry *entry = &content->entries[content->count++];
     snprintf(entry->path, sizeof entry->path, "%s", path);
     memcpy(entry->digest, digest, 32);
-}
-
-void ebpo_content_end_array(ebpo_content *content, const char *path)
-{
-    uint8_t digest[32];
-    ebpo_sha256_end(&content->state, digest);
-    content->open = false;
-    ebpo_content_put(content, path, digest);
 }
 
 static int by_path(const void *a, const void *b)

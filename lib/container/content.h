@@ -14,19 +14,20 @@ typedef struct ebpo_content_entry {
     uint8_t digest[32];
 } ebpo_content_entry;
 
-/* Zero-initialise. Bytes of an array are added in order, then the array is ended; then the next, in
- * any order of arrays. */
+/* Whether an array counts. How a file is laid out does not: tables of subtrees are left out. */
+bool ebpo_content_has(const ebpo_info *info, ebpo_array_id id);
+/* Rows from `row` on of one that counts, in order, as far as they do. */
+void ebpo_content_rows(const ebpo_info *info, ebpo_array_id id, uint64_t row, uint64_t rows,
+                       size_t row_bytes, const uint8_t *bytes, ebpo_sha256 *state);
+
+/* Zero-initialise. Arrays come in any order. */
 typedef struct ebpo_content {
-    ebpo_sha256 state;
-    bool open, short_of_memory;
+    bool short_of_memory;
     ebpo_content_entry *entries;
     uint64_t count, capacity;
 } ebpo_content;
 
-void ebpo_content_add(ebpo_content *content, const void *data, size_t bytes);
-/* An array whose digest is known. */
 void ebpo_content_put(ebpo_content *content, const char *path, const uint8_t digest[32]);
-void ebpo_content_end_array(ebpo_content *content, const char *path);
 EBPO_MUST_USE ebpo_status ebpo_content_end(ebpo_content *content, uint8_t digest[32],
                                            ebpo_error *error);
 void ebpo_content_free(ebpo_content *content);

@@ -13,7 +13,7 @@
 #include "ebpo_config.h"
 
 static const char FORMAT[] = "EBP-Octree in HDF5";
-static const char FORMAT_VERSION[] = "1.0", DRAFT[] = "1.0-draft";
+static const char FORMAT_VERSION[] = "1.1", DRAFT[] = "1.0-draft";
 static const char ABOUT[] = "A triangle mesh with an octree of convex envelopes (EBP-Octree), "
                             "level by level: /levels/00 and so on, "
                             "then /mesh, then /maps. Each array's attributes name its coding; the "
@@ -161,8 +161,9 @@ static ebpo_status put_fact(ebpo_h5_out *out, ebpo_h5_id id, const fact *f, cons
 
 /* A reader that does not know an optional part is none the wiser, but right; without a required one
  * it would be wrong. */
-/* info.pruned: a word in the list of parts, but nothing that one could leave out */
-enum { PRUNED = 1 << 30 };
+/* info.pruned and subtree_level: words in the list of parts, but nothing that one could leave out
+ */
+enum { PRUNED = 1 << 30, SUBTREES = 1 << 29 };
 static const struct {
     const char *word;
     unsigned part;
@@ -173,6 +174,7 @@ static const struct {
     { "planes", EBPO_PART_PLANES, false },
     { "maps", EBPO_PART_MAPS, false },
     { "leaf-planes", EBPO_PART_LEAF_PLANES, false },
+    { "subtrees", SUBTREES, true },
     { "pruned", PRUNED, true },
 };
 enum { PARTS = sizeof parts / sizeof parts[0] };
@@ -181,7 +183,7 @@ static ebpo_status put_parts(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info 
                              bool required, ebpo_error *error)
 {
     char words[128] = "";
-    uint32_t has = info->parts | (info->pruned ? PRUNED : 0);
+    uint32_t has = info->parts | (info->pruned ? PRUNED : 0) | (info->subtree_level ? SUBTREES : 0);
     for (int i = 0; i < PARTS; i++)
         if (parts[i].required == required && (!parts[i].part || has & parts[i].part)) {
             size_t used = strlen(words);
@@ -212,6 +214,16 @@ static ebpo_status put_selection(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_i
     for (int i = 0; i < SELECTION_FACTS && status == EBPO_OK; i++)
         status = put_fact(out, root, &selection_facts[i], info, error);
     return status;
+}
+
+static const fact subtree_level_fact = { "subtree_level", NUMBER, AT(subtree_level) },
+                  top_bytes_fact = { "top_bytes", HINT, AT(top_bytes) };
+
+static ebpo_status put_subtrees(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info,
+                                ebpo_error *error)
+{
+    ebpo_status status = put_fact(out, root, &subtree_level_fact, info, error);
+    return status == EBPO_OK ? put_fact(out, root, &top_bytes_fact, info, error) : status;
 }
 
 /* Only in subsets: other files stay as they are. */
@@ -248,6 +260,8 @@ ebpo_status ebpo_facts_put(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *i
         status = put_fact(out, root, &facts[i], info, error);
     if (status == EBPO_OK)
         status = put_selection(out, root, info, error);
+    if (status == EBPO_OK && info->subtree_level)
+        status = put_subtrees(out, root, info, error);
     if (status == EBPO_OK && info->pruned)
         status = put_subset(out, root, info, error);
     return status;
@@ -265,6 +279,11 @@ ebpo_status ebpo_facts_put_index(ebpo_h5_out *out, ebpo_h5_id root, uint64_t off
     ebpo_status status = ebpo_h5_put_count(out, root, "chunk_index_offset", offset, error);
     return status == EBPO_OK ? ebpo_h5_put_count(out, root, "chunk_index_bytes", bytes, error)
                              : status;
+}
+
+ebpo_status ebpo_facts_put_top(ebpo_h5_out *out, ebpo_h5_id root, uint64_t bytes, ebpo_error *error)
+{
+    return ebpo_h5_put_count(out, root, top_bytes_fact.name, bytes, error);
 }
 
 ebpo_status ebpo_facts_put_level(ebpo_h5_out *out, ebpo_h5_id group,
@@ -449,8 +468,20 @@ static ebpo_status get_parts(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, e
         if (seen >> i & 1)
             info->parts |= parts[i].part;
     info->pruned = info->parts & PRUNED;
-    info->parts &= ~(uint32_t)PRUNED;
+    info->subtree_level = info->parts & SUBTREES ? 1 : 0; /* until get_subtrees */
+    info->parts &= ~(uint32_t)(PRUNED | SUBTREES);
     return seen & 1 ? EBPO_OK : wrong_value(in, "/", "required_parts", error);
+}
+
+static ebpo_status get_subtrees(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebpo_error *error)
+{
+    ebpo_status status = get_fact(in, root, "/", &subtree_level_fact, info, error);
+    if (status == EBPO_OK)
+        status = get_fact(in, root, "/", &top_bytes_fact, info, error);
+    if (status == EBPO_OK && (info->subtree_level < 1 || info->level_count > EBPO_LEVELS_MAX ||
+                              info->subtree_level > info->level_count - 2))
+        status = wrong_value(in, "/", "subtree_level", error);
+    return status;
 }
 
 static ebpo_status get_subset(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebpo_error *error)
@@ -523,6 +554,8 @@ ebpo_status ebpo_facts_get(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, ebp
         status = get_fact(in, root, "/", &facts[i], info, error);
     if (status == EBPO_OK)
         status = get_selection(in, root, info, error);
+    if (status == EBPO_OK && info->subtree_level)
+        status = get_subtrees(in, root, info, error);
     return status == EBPO_OK && info->pruned ? get_subset(in, root, info, error) : status;
 }
 

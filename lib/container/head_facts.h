@@ -15,6 +15,8 @@ EBPO_MUST_USE ebpo_status ebpo_facts_put_digest(ebpo_h5_out *out, ebpo_h5_id roo
                                                 const uint8_t digest[32], ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_facts_put_index(ebpo_h5_out *out, ebpo_h5_id root, uint64_t offset,
                                                uint64_t bytes, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_facts_put_top(ebpo_h5_out *out, ebpo_h5_id root, uint64_t bytes,
+                                             ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_facts_put_level(ebpo_h5_out *out, ebpo_h5_id group,
                                                const ebpo_level_summary *level, ebpo_error *error);
 

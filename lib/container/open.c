@@ -23,20 +23,27 @@ static ebpo_status open_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_id id,
     ebpo_schema_path(id, level, a->path);
     if (rows == 0 || (spec->if_needed && ebpo_h5_look(h5, a->path) == EBPO_H5_ABSENT))
         return EBPO_OK;
-    /* places of more are in the index */
-    uint64_t most = ebpo_input_is_far(&file->in) ? 1 : UINT64_MAX;
-    ebpo_status status =
-        ebpo_h5_read_array(h5, a->path, most, &a->shape, &a->chunks, &a->stored_bytes, error);
+    /* places of more are in the index, or in a list */
+    uint64_t most = ebpo_input_is_far(&file->in) || file->has_places ? 1 : UINT64_MAX;
+    ebpo_status status = ebpo_h5_read_array(h5, a->path, most, ebpo_reader_rows_of_chunk(file, id),
+                                            &a->shape, &a->chunks, &a->stored_bytes, error);
     if (status != EBPO_OK)
         return status;
     ebpo_check check = ebpo_reader_check(file, NULL);
-    if (a->shape.rows != rows)
+    if (a->shape.rows != rows && rows != EBPO_ROWS_STATED)
         return ebpo_check_fail(&check, -1, a->path,
                                "the array's length contradicts the counts in the head", error);
-    if (a->shape.cols != spec->cols || !(spec->sizes & a->shape.element_size) ||
-        a->shape.is_signed != spec->is_signed)
+    if (a->shape.cols != ebpo_schema_cols(&file->info, id) ||
+        !(spec->sizes & a->shape.element_size) || a->shape.is_signed != spec->is_signed)
         return ebpo_check_fail(&check, -1, a->path,
                                "the array has the wrong type or the wrong number of columns",
+                               error);
+    if (file->info.subtree_level && a->shape.chunk_rows != a->shape.rows &&
+        ((id == EBPO_A_FACES && a->shape.chunk_rows != EBPO_FACE_BLOCK) ||
+         (id == EBPO_A_VERTICES && a->shape.chunk_rows != EBPO_VERTEX_BLOCK) ||
+         (id == EBPO_A_SUBTREE_COUNTS && a->shape.chunk_rows != ebpo_subtree_rows(&file->info))))
+        return ebpo_check_fail(&check, -1, a->path,
+                               "the array's chunks do not have the size that the format fixes",
                                error);
     bool wide = file->info.double_coordinates;
     if (id == EBPO_A_VERTICES && a->shape.element_size != (wide ? 8 : 4))
@@ -75,43 +82,39 @@ static ebpo_status open_group(ebpo_h5_in *h5, const char *path, bool wanted, ebp
     return status;
 }
 
-uint64_t ebpo_reader_level_bytes(const ebpo_file *file, int level)
+/* The list of all chunks, which holds unless another program has rewritten the file. */
+static ebpo_status open_places(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
 {
-    uint64_t bytes = 0;
-    for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
-        bytes += file->level_array[level][id].stored_bytes;
-    return bytes;
-}
-
-/* Of the arrays whose chunks are known. */
-static ebpo_stored_sizes stored_sizes(const ebpo_file *file)
-{
-    ebpo_stored_sizes sizes = { .map_bytes = 0 };
-    for (int level = 0; level < file->info.level_count; level++)
-        sizes.level_bytes[level] = ebpo_reader_level_bytes(file, level);
-    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS; id++)
-        *(uint64_t *)(void *)((char *)&sizes + ebpo_schema[id].bytes) +=
-            file->root_array[id].stored_bytes;
-    return sizes;
-}
-
-static ebpo_status check_stored(const ebpo_file *file, ebpo_error *error)
-{
-    ebpo_stored_sizes sizes = stored_sizes(file);
-    uint64_t stored = sizes.mesh_vertex_bytes + sizes.mesh_face_bytes + sizes.map_bytes;
-    for (int level = 0; level < file->info.level_count; level++)
-        stored += sizes.level_bytes[level];
-    if (stored > file->info.file_bytes)
-        return ebpo_fail_file(
-            error, EBPO_E_FORMAT, file->in.shown,
-            "the arrays' chunks take more room than the file has; get a fresh copy of the file");
-    return EBPO_OK;
+    const ebpo_array_in *a = &file->root_array[EBPO_A_PLACES];
+    ebpo_h5_id id, group;
+    uint64_t bytes = 0, offset = 0;
+    ebpo_status status = ebpo_h5_open_group(h5, "/subtrees", &group, error);
+    ebpo_h5_close_id(group);
+    if (status == EBPO_OK)
+        status = open_array(file, h5, EBPO_A_PLACES, 0, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_look_at_array(h5, a->path, &id, error);
+    if (status != EBPO_OK)
+        return status;
+    status = ebpo_h5_get_count(h5, id, a->path, "file_bytes", &bytes, error);
+    if (status == EBPO_OK)
+        status = ebpo_h5_get_count(h5, id, a->path, "offset", &offset, error);
+    ebpo_h5_close_id(id);
+    file->has_places = status == EBPO_OK && bytes == file->info.file_bytes && a->chunks &&
+                       offset == a->chunks[0].address;
+    return status == EBPO_E_ABSENT ? EBPO_OK : status;
 }
 
 static ebpo_status open_arrays(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
 {
     ebpo_info *info = &file->info;
     info->index_level = info->level_count;
+    info->file_bytes = file->in.source.size;
+    if (info->subtree_level) {
+        ebpo_status places = open_places(file, h5, error);
+        if (places != EBPO_OK)
+            return places;
+    }
     ebpo_status status = open_group(h5, "/mesh", info->parts & EBPO_PART_MESH, error);
     if (status == EBPO_OK)
         status = open_group(h5, "/maps", info->parts & EBPO_PART_MAPS, error);
@@ -122,14 +125,13 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *erro
             if (level == 0 && id == EBPO_A_TYPES && a->chunks)
                 info->head_bytes = a->chunks[0].address; /* the first array in the file */
         }
-    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS && status == EBPO_OK; id++)
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_A_PLACES && status == EBPO_OK; id++)
         status = open_array(file, h5, (ebpo_array_id)id, 0, error);
-    info->file_bytes = file->in.source.size;
     ebpo_pipeline pipeline = file->level_array[0][EBPO_A_TYPES].shape.pipeline;
     info->codec = pipeline == EBPO_PIPELINE_ZSTD      ? EBPO_CODEC_ZSTD
                   : pipeline == EBPO_PIPELINE_DEFLATE ? EBPO_CODEC_DEFLATE
                                                       : EBPO_CODEC_NONE;
-    return status == EBPO_OK ? check_stored(file, error) : status;
+    return status == EBPO_OK ? ebpo_stored_check(file, error) : status;
 }
 
 /* Files that other programs have rewritten may state what is no longer true. */
@@ -188,82 +190,6 @@ static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const
     else
         ebpo_close(file);
     return status;
-}
-
-/* --- files far away: what the opening left for later --- */
-
-static ebpo_status locate_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_in *a,
-                                ebpo_error *error)
-{
-    ebpo_h5_shape shape;
-    ebpo_h5_chunk *chunks;
-    uint64_t stored;
-    if (!a->present || a->chunks)
-        return EBPO_OK;
-    ebpo_status status =
-        ebpo_h5_read_array(h5, a->path, UINT64_MAX, &shape, &chunks, &stored, error);
-    if (status != EBPO_OK)
-        return status;
-    if (shape.rows != a->shape.rows || shape.cols != a->shape.cols ||
-        shape.element_size != a->shape.element_size || shape.pipeline != a->shape.pipeline) {
-        free(chunks);
-        return ebpo_fail_at(error, EBPO_E_IO, file->in.shown, a->path, -1,
-                            "the file has changed while it was open; open it again");
-    }
-    a->chunks = chunks;
-    a->stored_bytes = stored;
-    return EBPO_OK;
-}
-
-static ebpo_status locate_all(ebpo_file *file, ebpo_error *error)
-{
-    ebpo_h5_in h5 = EBPO_H5_IN_INIT;
-    ebpo_range index = { file->info.chunk_index_offset, file->info.chunk_index_bytes };
-    if (index.size && index.offset + index.size > file->in.source.prefetched)
-        ebpo_input_expect(&file->in, &index, 1);
-    ebpo_status status = ebpo_h5_open(&h5, &file->in, error);
-    if (status == EBPO_OK)
-        ebpo_h5_expect_index(&h5, index);
-    for (int i = 0; i < EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS && status == EBPO_OK; i++)
-        status =
-            locate_array(file, &h5,
-                         &file->level_array[i / EBPO_LEVEL_ARRAYS][i % EBPO_LEVEL_ARRAYS], error);
-    for (int i = 0; i < EBPO_ARRAYS && status == EBPO_OK; i++)
-        status = locate_array(file, &h5, &file->root_array[i], error);
-    status = ebpo_h5_close(&h5, status, error);
-    return status == EBPO_OK ? check_stored(file, error) : status;
-}
-
-static ebpo_status locate(ebpo_file *file, ebpo_error *error)
-{
-    ebpo_status status = EBPO_OK;
-    pthread_mutex_lock(&file->lock);
-    if (!atomic_load(&file->located)) {
-        status = locate_all(file, error);
-        if (status == EBPO_OK)
-            atomic_store(&file->located, true);
-    }
-    pthread_mutex_unlock(&file->lock);
-    return status;
-}
-
-ebpo_status ebpo_file_locate(const ebpo_file *file, ebpo_stored_sizes *out, ebpo_error *error)
-{
-    ebpo_stored_sizes sizes = EBPO_STORED_SIZES_INIT;
-    ebpo_status status = out ? EBPO_CHECK_SIZED(ebpo_stored_sizes, out, error) : EBPO_OK;
-    if (status == EBPO_OK && !atomic_load(&file->located))
-        status = locate(ebpo_reader_own(file), error);
-    if (status == EBPO_OK && out)
-        sizes = stored_sizes(file);
-    if (out)
-        EBPO_GIVE(ebpo_stored_sizes, out, &sizes);
-    return status;
-}
-
-ebpo_status ebpo_reader_locate(const ebpo_file *file, const ebpo_array_in *array, ebpo_error *error)
-{
-    /* A single chunk's place stands in the array's header: known since the opening. */
-    return ebpo_h5_chunk_count(&array->shape) == 1 ? EBPO_OK : ebpo_file_locate(file, NULL, error);
 }
 
 ebpo_status ebpo_open(const char *path, ebpo_file **out, ebpo_error *error)

@@ -30,6 +30,7 @@ struct ebpo_file {
     ebpo_array_in root_array[EBPO_ARRAYS]; /* those from EBPO_A_VERTICES on */
     pthread_mutex_t lock;
     atomic_bool located; /* the chunks of all arrays are known */
+    bool has_places;     /* a list says where they are */
 };
 
 /* After this the chunks of an array that is present are known. Reads from a file that is far away,
@@ -55,6 +56,12 @@ static inline ebpo_file *ebpo_reader_own(const ebpo_file *file)
 {
     return (ebpo_file *)(uintptr_t)file;
 }
+
+/* How many rows the file's chunks may have. */
+ebpo_h5_rows ebpo_reader_rows_of_chunk(const ebpo_file *file, ebpo_array_id id);
+
+/* Whether the chunks that are known fit the file. */
+EBPO_MUST_USE ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error);
 
 /* Bytes of a level in the file, once it has been read. */
 uint64_t ebpo_reader_level_bytes(const ebpo_file *file, int level);

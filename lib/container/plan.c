@@ -10,6 +10,7 @@
 #include "base/arrays.h"
 #include "codec/coding.h"
 #include "container/array_check.h"
+#include "container/chunk_rows.h"
 #include "container/head_facts.h"
 #include "container/rank_index.h"
 #include "ebpo_config.h"
@@ -23,6 +24,7 @@ void ebpo_plan_free(ebpo_plan *plan)
         for (int i = 0; i < EBPO_INDEXES; i++)
             free(plan->index[level][i]);
     free(plan->faces_index);
+    ebpo_subtree_sums_free(&plan->subtrees);
     memset(plan, 0, sizeof *plan);
 }
 
@@ -64,6 +66,8 @@ static ebpo_status resolve_facts(ebpo_plan *plan, const ebpo_write_options *opti
     info->version_major = EBPO_FORMAT_MAJOR;
     info->version_minor = EBPO_FORMAT_MINOR;
     info->codec = options->codec;
+    info->subtree_level = 0;
+    info->top_bytes = 0;
     info->parts &= options->parts;
     if (!(info->parts & EBPO_PART_MESH))
         info->parts &= ~(uint32_t)EBPO_PART_MAPS;
@@ -89,6 +93,7 @@ static ebpo_status resolve_facts(ebpo_plan *plan, const ebpo_write_options *opti
                                "a name, unit, CRS or date is not UTF-8 without control characters",
                                error);
     summarise(info, tree);
+    info->subtree_level = ebpo_subtree_level_for(info, options->subtree_faces);
     return ebpo_facts_check(info, check->shown, check->as, error);
 }
 
@@ -135,7 +140,8 @@ static ebpo_status index_levels(ebpo_plan *plan, ebpo_error *error)
 static ebpo_status index_faces(ebpo_plan *plan, const ebpo_check *check, ebpo_error *error)
 {
     const ebpo_mesh *mesh = &plan->tree->mesh;
-    uint32_t rows = ebpo_h5_chunk_rows(mesh->face_count, 3, 4);
+    uint32_t rows =
+        ebpo_rows_of_chunk(&plan->info, EBPO_A_FACES, 0, mesh->face_count, 3, sizeof(uint32_t));
     plan->faces_index = ebpo_alloc(mesh->face_count / rows + 1, sizeof *plan->faces_index);
     if (!plan->faces_index)
         return ebpo_fail_memory(error, mesh->face_count / rows * 8);
@@ -203,6 +209,12 @@ static void find_values(const ebpo_plan *plan, ebpo_array_out *a)
     const ebpo_array_spec *spec = &ebpo_schema[a->id];
     if (a->id == EBPO_A_FACES_INDEX)
         a->values = plan->faces_index;
+    else if (a->id == EBPO_A_SUBTREE_INDEX)
+        a->values = plan->subtrees.index;
+    else if (a->id == EBPO_A_SUBTREE_COUNTS)
+        a->values = plan->subtrees.counts;
+    else if (a->id == EBPO_A_SUBTREE_OUTER)
+        a->values = plan->subtrees.outer;
     else if (ebpo_schema_is_held(a->id))
         a->values = ebpo_level_array(&plan->tree->level[a->level], a->id);
     else if (spec->per >= EBPO_PER_GROUP_BLOCK && spec->per <= EBPO_PER_LEAF_BLOCK)
@@ -220,18 +232,21 @@ static ebpo_pipeline pipeline_of(ebpo_codec codec)
 
 static void add_array(ebpo_plan *plan, ebpo_array_id id, int level)
 {
-    uint64_t rows = ebpo_schema_rows(&plan->info, id, level);
-    if (rows == 0 ||
-        (ebpo_schema[id].if_needed && ebpo_level_is_usual(&plan->tree->level[level], id)))
+    uint64_t rows = id == EBPO_A_SUBTREE_OUTER ? plan->subtrees.outer_count
+                                               : ebpo_schema_rows(&plan->info, id, level);
+    if (rows == 0 || rows == EBPO_ROWS_STATED ||
+        (id < EBPO_LEVEL_ARRAYS && ebpo_schema[id].if_needed &&
+         ebpo_level_is_usual(&plan->tree->level[level], id)))
         return;
     ebpo_array_out *a = &plan->array[plan->count++];
     *a = (ebpo_array_out){ .id = id, .level = level, .handle = -1 };
     ebpo_schema_path(id, level, a->path);
     find_values(plan, a);
     a->shape.rows = rows;
-    a->shape.cols = ebpo_schema[id].cols;
+    a->shape.cols = ebpo_schema_cols(&plan->info, id);
     a->shape.is_signed = ebpo_schema[id].is_signed;
-    a->shape.chunk_rows = ebpo_h5_chunk_rows(rows, a->shape.cols, a->shape.element_size);
+    a->shape.chunk_rows =
+        ebpo_rows_of_chunk(&plan->info, id, level, rows, a->shape.cols, a->shape.element_size);
     a->shape.pipeline = pipeline_of(plan->info.codec);
 }
 
@@ -248,6 +263,8 @@ ebpo_status ebpo_plan_make(ebpo_plan *plan, const ebpo_tree *tree,
         status = index_levels(plan, error);
     if (status == EBPO_OK && plan->info.parts & EBPO_PART_MESH)
         status = index_faces(plan, &check, error);
+    if (status == EBPO_OK && plan->info.subtree_level)
+        status = ebpo_subtree_sums_make(&plan->subtrees, tree, &plan->info, error);
     if (status != EBPO_OK)
         goto done;
     plan->array = ebpo_alloc((uint64_t)plan->info.level_count * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS,
@@ -259,7 +276,7 @@ ebpo_status ebpo_plan_make(ebpo_plan *plan, const ebpo_tree *tree,
     for (int level = 0; level < plan->info.level_count; level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
             add_array(plan, (ebpo_array_id)id, level);
-    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS; id++)
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_A_PLACES; id++)
         add_array(plan, (ebpo_array_id)id, 0);
 done:
     if (status != EBPO_OK)

@@ -5,6 +5,7 @@
 #include <ebpo/file.h>
 
 #include "container/schema.h"
+#include "container/subtree_sums.h"
 #include "h5/h5.h"
 
 typedef struct ebpo_array_out {
@@ -24,7 +25,8 @@ typedef struct ebpo_plan {
     ebpo_array_out *array;
     unsigned count;
     uint64_t *index[EBPO_LEVELS_MAX][EBPO_INDEXES];
-    uint64_t *faces_index; /* vertices seen before each chunk of faces */
+    uint64_t *faces_index;      /* vertices seen before each chunk of faces */
+    ebpo_subtree_sums subtrees; /* nothing, if info.subtree_level is 0 */
 } ebpo_plan;
 
 /* Checks the tree (EBPO_E_ARGUMENT) and lists its arrays. The tree stays the caller's and must

@@ -42,6 +42,17 @@ const ebpo_array_spec ebpo_schema[EBPO_ARRAYS] = {
                       .bytes = offsetof(ebpo_stored_sizes, bytes_),                        \
                       .coding = coding_,                                                   \
                       .about = about_ },
+#define TABLE_ARRAY(ID, path, cols_, stored, per_, about_)                  \
+    [EBPO_A_##ID] = { .name = path,                                         \
+                      .per = EBPO_PER_##per_,                               \
+                      .needs = EBPO_NEEDS_SUBTREES,                         \
+                      .cols = cols_,                                        \
+                      .sizes = stored,                                      \
+                      .since = 1,                                           \
+                      .if_needed = EBPO_PER_##per_ == EBPO_PER_OUTER_BLOCK, \
+                      .bytes = offsetof(ebpo_stored_sizes, subtree_bytes),  \
+                      .coding = "plain",                                    \
+                      .about = about_ },
 #include "container/array_table.inc"
 };
 
@@ -90,10 +101,38 @@ uint64_t ebpo_schema_index_rows(uint64_t count)
     return count > EBPO_INDEX_ROWS ? (count - 1) / EBPO_INDEX_ROWS + 1 : 0;
 }
 
-static uint64_t face_chunks(uint64_t faces)
+static uint64_t face_chunks(const ebpo_info *info)
 {
-    uint32_t rows = ebpo_h5_chunk_rows(faces, 3, 4);
+    uint64_t faces = info->face_count,
+             rows = info->subtree_level ? EBPO_FACE_BLOCK : ebpo_h5_chunk_rows(faces, 3, 4);
     return faces > rows ? (faces - 1) / rows + 1 : 0;
+}
+
+static uint64_t subtrees(const ebpo_info *info)
+{
+    return info->level[info->subtree_level].gray_count;
+}
+
+static uint64_t subtree_chunks(const ebpo_info *info)
+{
+    uint64_t rows = ebpo_subtree_rows(info);
+    return (subtrees(info) + rows - 1) / rows;
+}
+
+uint32_t ebpo_subtree_rows(const ebpo_info *info)
+{
+    uint32_t full = EBPO_SUBTREE_ROWS;
+    while (full * ebpo_schema_cols(info, EBPO_A_SUBTREE_COUNTS) * 4 > EBPO_CHUNK_BYTES_MAX)
+        full /= 2;
+    return full;
+}
+
+uint32_t ebpo_schema_cols(const ebpo_info *info, ebpo_array_id id)
+{
+    int below = info->level_count - 1 - info->subtree_level;
+    return ebpo_schema[id].cols == EBPO_COLS_OF_SUBTREES
+               ? EBPO_SUBTREE_LEVELS + EBPO_SUBTREE_LEVEL_COLS * (uint32_t)below
+               : ebpo_schema[id].cols;
 }
 
 static uint64_t load(const void *record, size_t offset)
@@ -121,7 +160,11 @@ uint64_t ebpo_schema_rows(const ebpo_info *info, ebpo_array_id id, int level)
     case EBPO_PER_LEAF_BLOCK: return ebpo_schema_index_rows(l->leaf_count);
     case EBPO_PER_VERTEX: return info->vertex_count;
     case EBPO_PER_FACE: return info->face_count;
-    case EBPO_PER_FACE_CHUNK: return face_chunks(info->face_count);
+    case EBPO_PER_FACE_CHUNK: return face_chunks(info);
+    case EBPO_PER_SUBTREE_CHUNK: return subtree_chunks(info);
+    case EBPO_PER_SUBTREE: return subtrees(info);
+    case EBPO_PER_OUTER_BLOCK:
+    case EBPO_PER_CHUNK: return EBPO_ROWS_STATED;
     default: return load(l, ebpo_counts[per].in_summary);
     }
 }

@@ -14,7 +14,8 @@ typedef enum ebpo_array_id {
 #include "container/array_table.inc"
     EBPO_LEVEL_ARRAYS,
     EBPO_BEFORE_ROOT = EBPO_LEVEL_ARRAYS - 1,
-#define ROOT_ARRAY(ID, ...) EBPO_A_##ID,
+#define ROOT_ARRAY(ID, ...)  EBPO_A_##ID,
+#define TABLE_ARRAY(ID, ...) EBPO_A_##ID,
 #include "container/array_table.inc"
     EBPO_ARRAYS
 } ebpo_array_id;
@@ -30,7 +31,11 @@ typedef enum ebpo_per {
     EBPO_PER_LEAF_BLOCK,
     EBPO_PER_VERTEX,
     EBPO_PER_FACE,
-    EBPO_PER_FACE_CHUNK
+    EBPO_PER_FACE_CHUNK,
+    EBPO_PER_SUBTREE_CHUNK, /* of the rows of subtrees */
+    EBPO_PER_SUBTREE,
+    EBPO_PER_OUTER_BLOCK,
+    EBPO_PER_CHUNK
 } ebpo_per;
 
 /* What an array is there for, as bits: parts, and whether winding numbers are defined. */
@@ -40,14 +45,51 @@ enum {
     EBPO_NEEDS_MAPS = EBPO_PART_MAPS,
     EBPO_NEEDS_LEAF_PLANES = EBPO_PART_LEAF_PLANES,
     EBPO_NEEDS_MESH_OR_LEAF_PLANES = EBPO_PART_MESH | EBPO_PART_LEAF_PLANES,
+    EBPO_NEEDS_SUBTREES = 1 << 28,
     EBPO_NEEDS_SOLID = 1 << 29,
     EBPO_NEEDS_ALWAYS = 1 << 30
 };
 
 enum {
     EBPO_INDEX_ROWS = 4096, /* items between two rows of an index array */
-    EBPO_PATH_BYTES = 48
+    EBPO_PATH_BYTES = 48,
+    /* with the part `subtrees` (format-spec/README.md, section 9) */
+    EBPO_FACE_BLOCK = 2048, /* rows of a chunk */
+    EBPO_VERTEX_BLOCK = 1024,
+    EBPO_SUBTREE_ROWS = 128,
+    EBPO_COLS_OF_SUBTREES = 255 /* ebpo_schema_cols tells */
 };
+
+/* Columns of /subtrees/counts; the last seven for each level below the subtrees' roots, from
+ * EBPO_SUBTREE_LEVELS on. */
+enum {
+    EBPO_S_FACES_BEFORE,
+    EBPO_S_FACES,
+    EBPO_S_VERTICES_BEFORE,
+    EBPO_S_VERTICES,
+    EBPO_S_OUTER_FACES,
+    EBPO_S_OUTER_VERTICES,
+    EBPO_SUBTREE_LEVELS,
+    EBPO_S_GRAY = 0,
+    EBPO_S_LEAF,
+    EBPO_S_BLACK,
+    EBPO_S_PLANES,
+    EBPO_S_LEAF_PLANES,
+    EBPO_S_REFS,
+    EBPO_S_ENDS,
+    EBPO_SUBTREE_LEVEL_COLS
+};
+static inline unsigned ebpo_subtree_column(const ebpo_info *info, int level, unsigned what)
+{
+    return EBPO_SUBTREE_LEVELS +
+           EBPO_SUBTREE_LEVEL_COLS * (unsigned)(level - info->subtree_level - 1) + what;
+}
+
+/* Rows of a chunk of /subtrees/counts, of which there may be fewer. */
+uint32_t ebpo_subtree_rows(const ebpo_info *info);
+
+/* Rows of arrays whose length nothing but themselves tells. */
+#define EBPO_ROWS_STATED UINT64_MAX
 
 /* The index arrays of a level, in the order of what they count. */
 enum { EBPO_INDEX_TYPES, EBPO_INDEX_GRAY, EBPO_INDEX_LEAVES, EBPO_INDEXES };
@@ -82,7 +124,11 @@ extern const ebpo_count_spec ebpo_counts[EBPO_COUNTS];
 /* Absolute path of an array; `level` matters for level arrays only. */
 void ebpo_schema_path(ebpo_array_id id, int level, char path[EBPO_PATH_BYTES]);
 
-/* Rows that the head's counts and parts call for; 0: the array is not in the file. */
+/* Columns of an array; 0: one dimension. */
+uint32_t ebpo_schema_cols(const ebpo_info *info, ebpo_array_id id);
+
+/* Rows that the head's counts and parts call for, or EBPO_ROWS_STATED; 0: the array is not in the
+ * file. */
 uint64_t ebpo_schema_rows(const ebpo_info *info, ebpo_array_id id, int level);
 
 /* Rows of an index array over `count` items: one each EBPO_INDEX_ROWS, but none when one would do
@@ -98,7 +144,8 @@ static inline uint64_t ebpo_schema_groups(const ebpo_info *info, int level)
 /* The needs that a file, or a tree, fulfils. */
 static inline uint32_t ebpo_schema_has(const ebpo_info *info)
 {
-    return info->parts | (info->solid ? EBPO_NEEDS_SOLID : 0) | EBPO_NEEDS_ALWAYS;
+    return info->parts | (info->solid ? EBPO_NEEDS_SOLID : 0) |
+           (info->subtree_level ? EBPO_NEEDS_SUBTREES : 0) | EBPO_NEEDS_ALWAYS;
 }
 
 /* Lists are behind counts: of planes, leaf planes and references each node of one type has a
@@ -114,6 +161,12 @@ const ebpo_list_spec *ebpo_schema_list(ebpo_per per);
 int ebpo_schema_node_type(ebpo_per per);
 
 /* --- a level in memory --- */
+
+static inline bool ebpo_schema_is_index(int id)
+{
+    return ebpo_schema[id].per >= EBPO_PER_GROUP_BLOCK &&
+           ebpo_schema[id].per <= EBPO_PER_LEAF_BLOCK;
+}
 
 static inline bool ebpo_schema_is_held(int id) { return ebpo_schema[id].held_size != 0; }
 

@@ -89,6 +89,8 @@ EBPO_MUST_USE ebpo_status ebpo_h5_put_chunk(ebpo_h5_out *out, const char *path, 
  * raw data begins at first_raw. */
 EBPO_MUST_USE ebpo_status ebpo_h5_head_used(ebpo_h5_out *out, uint64_t first_raw, uint64_t *bytes,
                                             ebpo_error *error);
+/* Bytes that the file has so far. */
+EBPO_MUST_USE ebpo_status ebpo_h5_size(ebpo_h5_out *out, uint64_t *bytes, ebpo_error *error);
 /* Flushes and closes. Harmless when already closed. */
 EBPO_MUST_USE ebpo_status ebpo_h5_finish(ebpo_h5_out *out, ebpo_error *error);
 void ebpo_h5_discard(ebpo_h5_out *out);
@@ -127,6 +129,9 @@ ebpo_h5_kind ebpo_h5_look(ebpo_h5_in *in, const char *path);
 
 EBPO_MUST_USE ebpo_status ebpo_h5_open_group(ebpo_h5_in *in, const char *path, ebpo_h5_id *id,
                                              ebpo_error *error);
+/* Opens an array for its attributes. */
+EBPO_MUST_USE ebpo_status ebpo_h5_look_at_array(ebpo_h5_in *in, const char *path, ebpo_h5_id *id,
+                                                ebpo_error *error);
 
 /* Attributes of an open group; `object` names it in messages. EBPO_E_ABSENT (without a message)
  * when there is none, EBPO_E_FORMAT for another type or size. Text: fixed length, at most size - 1
@@ -148,14 +153,22 @@ typedef struct ebpo_h5_chunk {
     uint32_t bytes;
 } ebpo_h5_chunk;
 
+/* How many rows the chunks of an array may have. */
+typedef enum ebpo_h5_rows {
+    EBPO_H5_ROWS_FULL,  /* as ebpo_h5_chunk_rows says */
+    EBPO_H5_ROWS_POWER, /* a power of two, at most so many */
+    EBPO_H5_ROWS_ALL    /* one chunk, however large */
+} ebpo_h5_rows;
+
 /* Tells an array's shape and its chunks' places, ebpo_h5_chunk_count(shape) of them, which the
  * caller frees; NULL on failure. Checked: little-endian integers, one or two fixed dimensions, one
- * of the pipelines, chunks as ebpo_h5_chunk_rows says; every chunk is there, lies within the file,
+ * of the pipelines, chunks of the rows asked for; every chunk is there, lies within the file,
  * has passed its filters, and takes at most ebpo_chunk_bound bytes. `stored_bytes`: their sum.
  * Arrays of more than `most` chunks: only the shape is told, *chunks is NULL. */
 EBPO_MUST_USE ebpo_status ebpo_h5_read_array(ebpo_h5_in *in, const char *path, uint64_t most,
-                                             ebpo_h5_shape *shape, ebpo_h5_chunk **chunks,
-                                             uint64_t *stored_bytes, ebpo_error *error);
+                                             ebpo_h5_rows rows, ebpo_h5_shape *shape,
+                                             ebpo_h5_chunk **chunks, uint64_t *stored_bytes,
+                                             ebpo_error *error);
 
 /* True for UTF-8 without control characters. */
 bool ebpo_h5_text_ok(const char *text);

@@ -221,6 +221,20 @@ ebpo_status ebpo_h5_get_real(ebpo_h5_in *in, ebpo_h5_id id, const char *object, 
                        "it is not of f64 numbers", error);
 }
 
+ebpo_status ebpo_h5_look_at_array(ebpo_h5_in *in, const char *path, ebpo_h5_id *id,
+                                  ebpo_error *error)
+{
+    bool found = ebpo_h5_look(in, path) == EBPO_H5_ARRAY;
+    ebpo_h5_scope scope;
+    ebpo_h5_enter(&scope);
+    *id = found ? H5Dopen2(in->file, path, H5P_DEFAULT) : -1;
+    ebpo_status status =
+        *id >= 0 ? EBPO_OK
+                 : ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, path, "the array is damaged");
+    ebpo_h5_leave(&scope);
+    return status;
+}
+
 /* Number of filters, with their ids; shuffle must have been set for our elements. -1 when there are
  * more than three. */
 static int list_filters(hid_t dcpl, unsigned element_size, int ids[3])
@@ -286,7 +300,19 @@ static bool find_type(hid_t dataset, ebpo_h5_shape *shape)
     return found;
 }
 
-static const char *find_shape(hid_t dataset, hid_t dcpl, ebpo_h5_shape *shape)
+enum { COLS_MOST = 160 };
+
+/* Chunks of 4 GiB and more are none of HDF5's. */
+static bool rows_fit(const ebpo_h5_shape *shape, ebpo_h5_rows rule, hsize_t rows)
+{
+    uint64_t full = ebpo_h5_chunk_rows(shape->rows, shape->cols, shape->element_size);
+    if (rule == EBPO_H5_ROWS_ALL)
+        return rows == shape->rows && rows * ebpo_h5_row_bytes(shape) <= UINT32_MAX;
+    bool power = rows && !(rows & (rows - 1));
+    return rows == full || (rule == EBPO_H5_ROWS_POWER && power && rows < full);
+}
+
+static const char *find_shape(hid_t dataset, hid_t dcpl, ebpo_h5_rows rule, ebpo_h5_shape *shape)
 {
     hsize_t dims[2] = { 0, 0 }, most[2] = { 0, 0 }, chunk[2] = { 0, 0 };
     hid_t space = H5Dget_space(dataset);
@@ -296,15 +322,15 @@ static const char *find_shape(hid_t dataset, hid_t dcpl, ebpo_h5_shape *shape)
         H5Sclose(space);
     if (!find_type(dataset, shape))
         return "the array is not of little-endian integers";
-    if (!plain || dims[0] == 0 || most[0] != dims[0] || most[1] != dims[1] || dims[1] > 8 ||
+    if (!plain || dims[0] == 0 || most[0] != dims[0] || most[1] != dims[1] || dims[1] > COLS_MOST ||
         (rank == 2 && dims[1] == 0))
         return "the array does not have one or two fixed dimensions";
     shape->rows = dims[0];
     shape->cols = rank == 2 ? (uint32_t)dims[1] : 0;
     if (H5Pget_layout(dcpl) != H5D_CHUNKED || H5Pget_chunk(dcpl, 2, chunk) != rank)
         return "the array is not stored in chunks";
-    shape->chunk_rows = ebpo_h5_chunk_rows(shape->rows, shape->cols, shape->element_size);
-    if (chunk[0] != shape->chunk_rows || chunk[1] != shape->cols)
+    shape->chunk_rows = (uint32_t)chunk[0];
+    if (!rows_fit(shape, rule, chunk[0]) || chunk[1] != shape->cols)
         return "the array's chunks do not have the size that the format fixes";
     if (!find_pipeline(dcpl, shape->element_size, &shape->pipeline))
         return "the array's filters are none of the format's";
@@ -366,7 +392,7 @@ static ebpo_status find_chunks(ebpo_h5_in *in, hid_t dataset, const char *path,
     return EBPO_OK;
 }
 
-ebpo_status ebpo_h5_read_array(ebpo_h5_in *in, const char *path, uint64_t most,
+ebpo_status ebpo_h5_read_array(ebpo_h5_in *in, const char *path, uint64_t most, ebpo_h5_rows rows,
                                ebpo_h5_shape *shape, ebpo_h5_chunk **chunks, uint64_t *stored_bytes,
                                ebpo_error *error)
 {
@@ -383,7 +409,7 @@ ebpo_status ebpo_h5_read_array(ebpo_h5_in *in, const char *path, uint64_t most,
     hid_t dataset = H5Dopen2(in->file, path, H5P_DEFAULT),
           dcpl = dataset >= 0 ? H5Dget_create_plist(dataset) : -1;
     const char *wrong =
-        dcpl < 0 ? "the array's description is damaged" : find_shape(dataset, dcpl, shape);
+        dcpl < 0 ? "the array's description is damaged" : find_shape(dataset, dcpl, rows, shape);
     ebpo_status status =
         wrong ? ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, path, wrong) : EBPO_OK;
     if (status == EBPO_OK && ebpo_h5_chunk_count(shape) <= most)

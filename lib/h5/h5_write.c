@@ -250,6 +250,18 @@ ebpo_status ebpo_h5_head_used(ebpo_h5_out *out, uint64_t first_raw, uint64_t *by
     return status;
 }
 
+ebpo_status ebpo_h5_size(ebpo_h5_out *out, uint64_t *bytes, ebpo_error *error)
+{
+    ebpo_h5_scope scope;
+    ebpo_h5_enter(&scope);
+    hsize_t size = 0;
+    bool good = H5Fget_filesize(out->file, &size) >= 0;
+    *bytes = size;
+    ebpo_status status = ebpo_h5_written(out, "", good, error);
+    ebpo_h5_leave(&scope);
+    return status;
+}
+
 ebpo_status ebpo_h5_finish(ebpo_h5_out *out, ebpo_error *error)
 {
     if (out->file < 0)

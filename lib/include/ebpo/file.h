@@ -20,7 +20,7 @@ extern "C" {
 
 /* Of the format that this library writes. */
 #define EBPO_FORMAT_MAJOR 1
-#define EBPO_FORMAT_MINOR 0
+#define EBPO_FORMAT_MINOR 1
 
 /* Levels 0 to 20. */
 #define EBPO_LEVELS_MAX 21
@@ -266,6 +266,18 @@ typedef struct ebpo_info {
     uint64_t chunk_index_offset, chunk_index_bytes;
 
     /*
+     * The level whose gray nodes are the roots of subtrees: each of these lies
+     * together in the file, and a table tells where. 0: there is no such table.
+     */
+    int subtree_level;
+
+    /*
+     * With such a table: all that looking up a subtree takes lies within the first
+     * so many bytes. 0: the file does not say.
+     */
+    uint64_t top_bytes;
+
+    /*
      * A subset: some gray nodes' children were left out (ebpo_subset). The rest
      * below says what was asked for then.
      */
@@ -347,11 +359,20 @@ typedef struct ebpo_write_options {
     uint32_t parts;
 
     ebpo_progress progress;
+
+    /*
+     * Subtrees of so many faces on average, or more, lie together each, so that one
+     * is read at once (format-spec/README.md, section 9). 0: 1,024, in files of
+     * 131,072 faces and more. EBPO_NO_SUBTREES: none, as in format 1.0.
+     */
+    uint64_t subtree_faces;
 } ebpo_write_options;
 
-#define EBPO_WRITE_OPTIONS_INIT                                                \
-    {                                                                          \
-        sizeof(ebpo_write_options), EBPO_CODEC_ZSTD, 0, 0, ~0u, { NULL, NULL } \
+#define EBPO_NO_SUBTREES UINT64_MAX
+
+#define EBPO_WRITE_OPTIONS_INIT                                                   \
+    {                                                                             \
+        sizeof(ebpo_write_options), EBPO_CODEC_ZSTD, 0, 0, ~0u, { NULL, NULL }, 0 \
     }
 
 /*
@@ -525,6 +546,9 @@ typedef struct ebpo_stored_sizes {
 
     uint64_t level_bytes[EBPO_LEVELS_MAX];
     uint64_t mesh_vertex_bytes, mesh_face_bytes, map_bytes;
+
+    /* Of the table of subtrees. */
+    uint64_t subtree_bytes;
 } ebpo_stored_sizes;
 
 #define EBPO_STORED_SIZES_INIT EBPO_SIZED(ebpo_stored_sizes)

@@ -1,0 +1,123 @@
+#include "container/chunk_order.h"
+
+#include <stdlib.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "container/chunk_rows.h"
+
+typedef struct ordering {
+    const ebpo_plan *plan;
+    ebpo_chunk_order *out;
+} ordering;
+
+static void add_array(ordering *o, unsigned array)
+{
+    const ebpo_array_out *a = &o->plan->array[array];
+    uint64_t chunks = ebpo_h5_chunk_count(&a->shape);
+    for (uint64_t k = 0; k < chunks; k++)
+        o->out->chunk[o->out->count++] = (ebpo_ordered_chunk){ array, (uint32_t)k, 0 };
+}
+
+static int by_subtree(const void *a, const void *b)
+{
+    const ebpo_ordered_chunk *x = a, *y = b;
+    if (x->subtree != y->subtree)
+        return x->subtree < y->subtree ? -1 : 1;
+    return x->array != y->array ? (x->array > y->array) - (x->array < y->array)
+                                : (x->chunk > y->chunk) - (x->chunk < y->chunk);
+}
+
+/* Which arrays come next. */
+typedef struct choice {
+    int first_level, last_level; /* of the arrays of levels */
+    enum { WHOLE, TOP_INDEXES, TYPES, PLANES, TYPES_AND_PLANES, OTHERS, MESH, MAPS, TABLE } kind;
+} choice;
+
+static bool is_planes(ebpo_array_id id) { return id == EBPO_A_PLANE_COUNTS || id == EBPO_A_PLANES; }
+
+static bool chosen(const choice *c, const ebpo_array_out *a)
+{
+    bool of_level = a->id < EBPO_LEVEL_ARRAYS,
+         here = of_level && a->level >= c->first_level && a->level <= c->last_level,
+         index = of_level && ebpo_schema_is_index(a->id);
+    switch (c->kind) {
+    case WHOLE: return here;
+    case TOP_INDEXES:
+        return (here && index) || a->id == EBPO_A_SUBTREE_INDEX || a->id == EBPO_A_FACES_INDEX;
+    case TYPES: return here && a->id == EBPO_A_TYPES;
+    case PLANES: return here && is_planes(a->id);
+    case TYPES_AND_PLANES: return here && (a->id == EBPO_A_TYPES || is_planes(a->id));
+    case OTHERS: return here && !index && a->id != EBPO_A_TYPES && !is_planes(a->id);
+    case MESH: return a->id == EBPO_A_VERTICES || a->id == EBPO_A_FACES;
+    case MAPS: return a->id == EBPO_A_VERTEX_SOURCE || a->id == EBPO_A_FACE_SOURCE;
+    case TABLE: return a->id == EBPO_A_SUBTREE_COUNTS || a->id == EBPO_A_SUBTREE_OUTER;
+    }
+    return false;
+}
+
+static void add(ordering *o, const choice *c)
+{
+    for (unsigned i = 0; i < o->plan->count; i++)
+        if (chosen(c, &o->plan->array[i]))
+            add_array(o, i);
+}
+
+static void add_by_subtree(ordering *o, const choice *c)
+{
+    uint64_t begin = o->out->count;
+    add(o, c);
+    for (uint64_t i = begin; i < o->out->count; i++) {
+        ebpo_ordered_chunk *chunk = &o->out->chunk[i];
+        const ebpo_array_out *a = &o->plan->array[chunk->array];
+        uint64_t row = (uint64_t)chunk->chunk * a->shape.chunk_rows;
+        chunk->subtree =
+            ebpo_subtree_of_row(&o->plan->subtrees, &o->plan->info, a->id, a->level, row);
+    }
+    if (o->out->count > begin)
+        qsort(o->out->chunk + begin, o->out->count - begin, sizeof *o->out->chunk, by_subtree);
+}
+
+static void order_subtrees(ordering *o)
+{
+    const ebpo_info *info = &o->plan->info;
+    int whole = ebpo_last_whole_level(info), deep = ebpo_first_deep_level(info),
+        last = info->level_count - 1;
+    add(o, &(choice){ 0, whole, WHOLE });
+    add(o, &(choice){ whole + 1, last, TOP_INDEXES });
+    o->out->top = o->out->count;
+    add(o, &(choice){ 0, 0, TABLE });
+    for (int level = whole + 1; level < deep; level++)
+        add_by_subtree(o, &(choice){ level, level, TYPES_AND_PLANES });
+    add_by_subtree(o, &(choice){ whole + 1, deep - 1, OTHERS });
+    for (int level = deep; level <= last; level++)
+        add_by_subtree(o, &(choice){ level, level, PLANES });
+    add_by_subtree(o, &(choice){ deep, last, TYPES });
+    add_by_subtree(o, &(choice){ deep, last, OTHERS });
+    add_by_subtree(o, &(choice){ 0, 0, MESH });
+    add_by_subtree(o, &(choice){ 0, 0, MAPS });
+}
+
+ebpo_status ebpo_chunk_order_make(ebpo_chunk_order *out, const ebpo_plan *plan, ebpo_error *error)
+{
+    ordering o = { plan, out };
+    uint64_t chunks = 0;
+    *out = (ebpo_chunk_order){ NULL, 0, 0 };
+    for (unsigned i = 0; i < plan->count; i++)
+        chunks += ebpo_h5_chunk_count(&plan->array[i].shape);
+    out->chunk = ebpo_alloc(chunks, sizeof *out->chunk);
+    if (!out->chunk)
+        return ebpo_fail_memory(error, chunks * sizeof *out->chunk);
+    if (plan->info.subtree_level)
+        order_subtrees(&o);
+    else
+        for (unsigned i = 0; i < plan->count; i++)
+            add_array(&o, i);
+    return EBPO_OK;
+}
+
+void ebpo_chunk_order_free(ebpo_chunk_order *order)
+{
+    free(order->chunk);
+    *order = (ebpo_chunk_order){ NULL, 0, 0 };
+}

@@ -1,0 +1,68 @@
+#include "container/chunk_rows.h"
+
+#include "h5/h5.h"
+
+enum {
+    FIRST_LEVELS = 5,    /* these lie together, whatever the subtrees */
+    LEAVES_OF_DEEP = 64, /* a deep level has a leaf for each so many faces */
+    CHUNK_FACES = 16384, /* that a chunk of a lower level goes with */
+    CHUNK_LEAST = 256,   /* bytes */
+    MAP_ROWS = 4096,
+    FACES_INDEX_ROWS = 512,
+    OUTER_ROWS = 4096
+};
+
+int ebpo_last_whole_level(const ebpo_info *info)
+{
+    return info->subtree_level > FIRST_LEVELS ? info->subtree_level : FIRST_LEVELS;
+}
+
+int ebpo_first_deep_level(const ebpo_info *info)
+{
+    int level = ebpo_last_whole_level(info) + 1;
+    while (level < info->level_count &&
+           info->level[level].leaf_count < info->face_count / LEAVES_OF_DEEP)
+        level++;
+    return level;
+}
+
+/* The power of two that is nearest, by its ratio, to the rows that go with CHUNK_FACES faces. */
+static uint64_t rows_for_faces(const ebpo_info *info, uint64_t rows)
+{
+    double wanted = (double)rows * CHUNK_FACES / (double)info->face_count;
+    uint64_t found = 1;
+    while ((double)found * 1.4142135623730951 < wanted)
+        found *= 2;
+    return found;
+}
+
+static uint64_t wanted_rows(const ebpo_info *info, ebpo_array_id id, int level, uint64_t rows,
+                            uint32_t row_bytes)
+{
+    switch (id) {
+    case EBPO_A_FACES: return EBPO_FACE_BLOCK;
+    case EBPO_A_VERTICES: return EBPO_VERTEX_BLOCK;
+    case EBPO_A_VERTEX_SOURCE:
+    case EBPO_A_FACE_SOURCE: return MAP_ROWS;
+    case EBPO_A_FACES_INDEX: return FACES_INDEX_ROWS;
+    case EBPO_A_SUBTREE_COUNTS: return ebpo_subtree_rows(info);
+    case EBPO_A_SUBTREE_OUTER: return OUTER_ROWS;
+    default: break;
+    }
+    if (id >= EBPO_LEVEL_ARRAYS || level <= ebpo_last_whole_level(info) || ebpo_schema_is_index(id))
+        return UINT64_MAX;
+    uint64_t found = rows_for_faces(info, rows);
+    while (found * row_bytes < CHUNK_LEAST)
+        found *= 2;
+    return found;
+}
+
+uint32_t ebpo_rows_of_chunk(const ebpo_info *info, ebpo_array_id id, int level, uint64_t rows,
+                            uint32_t cols, uint32_t element_size)
+{
+    uint32_t most = ebpo_h5_chunk_rows(rows, cols, element_size);
+    if (!info->subtree_level)
+        return most;
+    uint64_t wanted = wanted_rows(info, id, level, rows, element_size * (cols ? cols : 1));
+    return wanted < most ? (uint32_t)wanted : most;
+}

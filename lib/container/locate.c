@@ -1,0 +1,260 @@
+/* Where chunks lie: what the opening left for later, as it may be far away or long. */
+#include <stdlib.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/sized.h"
+#include "container/open.h"
+#include "container/places.h"
+
+uint64_t ebpo_reader_level_bytes(const ebpo_file *file, int level)
+{
+    uint64_t bytes = 0;
+    for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
+        bytes += file->level_array[level][id].stored_bytes;
+    return bytes;
+}
+
+/* Of the arrays whose chunks are known. */
+static ebpo_stored_sizes stored_sizes(const ebpo_file *file)
+{
+    ebpo_stored_sizes sizes = { .map_bytes = 0 };
+    for (int level = 0; level < file->info.level_count; level++)
+        sizes.level_bytes[level] = ebpo_reader_level_bytes(file, level);
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS; id++)
+        *(uint64_t *)(void *)((char *)&sizes + ebpo_schema[id].bytes) +=
+            file->root_array[id].stored_bytes;
+    return sizes;
+}
+
+ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error)
+{
+    ebpo_stored_sizes sizes = stored_sizes(file);
+    uint64_t stored =
+        sizes.mesh_vertex_bytes + sizes.mesh_face_bytes + sizes.map_bytes + sizes.subtree_bytes;
+    for (int level = 0; level < file->info.level_count; level++)
+        stored += sizes.level_bytes[level];
+    if (stored > file->info.file_bytes)
+        return ebpo_fail_file(
+            error, EBPO_E_FORMAT, file->in.shown,
+            "the arrays' chunks take more room than the file has; get a fresh copy of the file");
+    return EBPO_OK;
+}
+
+ebpo_h5_rows ebpo_reader_rows_of_chunk(const ebpo_file *file, ebpo_array_id id)
+{
+    return id == EBPO_A_PLACES        ? EBPO_H5_ROWS_ALL
+           : file->info.subtree_level ? EBPO_H5_ROWS_POWER
+                                      : EBPO_H5_ROWS_FULL;
+}
+
+/* --- by HDF5's index --- */
+
+static ebpo_status locate_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_in *a,
+                                ebpo_error *error)
+{
+    ebpo_h5_shape shape;
+    ebpo_h5_chunk *chunks;
+    uint64_t stored;
+    if (!a->present || a->chunks)
+        return EBPO_OK;
+    ebpo_status status =
+        ebpo_h5_read_array(h5, a->path, UINT64_MAX, ebpo_reader_rows_of_chunk(file, a->id), &shape,
+                           &chunks, &stored, error);
+    if (status != EBPO_OK)
+        return status;
+    if (shape.rows != a->shape.rows || shape.cols != a->shape.cols ||
+        shape.element_size != a->shape.element_size || shape.pipeline != a->shape.pipeline) {
+        free(chunks);
+        return ebpo_fail_at(error, EBPO_E_IO, file->in.shown, a->path, -1,
+                            "the file has changed while it was open; open it again");
+    }
+    a->chunks = chunks;
+    a->stored_bytes = stored;
+    return EBPO_OK;
+}
+
+static ebpo_status locate_by_index(ebpo_file *file, ebpo_error *error)
+{
+    ebpo_h5_in h5 = EBPO_H5_IN_INIT;
+    ebpo_range index = { file->info.chunk_index_offset, file->info.chunk_index_bytes };
+    if (index.size && index.offset + index.size > file->in.source.prefetched)
+        ebpo_input_expect(&file->in, &index, 1);
+    ebpo_status status = ebpo_h5_open(&h5, &file->in, error);
+    if (status == EBPO_OK)
+        ebpo_h5_expect_index(&h5, index);
+    for (int i = 0; i < EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS && status == EBPO_OK; i++)
+        status =
+            locate_array(file, &h5,
+                         &file->level_array[i / EBPO_LEVEL_ARRAYS][i % EBPO_LEVEL_ARRAYS], error);
+    for (int i = EBPO_LEVEL_ARRAYS; i < EBPO_ARRAYS && status == EBPO_OK; i++)
+        status = locate_array(file, &h5, &file->root_array[i], error);
+    status = ebpo_h5_close(&h5, status, error);
+    return status == EBPO_OK ? ebpo_stored_check(file, error) : status;
+}
+
+/* --- by the list of all chunks (format-spec/README.md, section 9) --- */
+
+/* Chunks seen so far of each array. */
+typedef struct listing {
+    ebpo_file *file;
+    uint64_t seen[EBPO_LEVELS_MAX][EBPO_LEVEL_ARRAYS], seen_root[EBPO_ARRAYS];
+} listing;
+
+static ebpo_status list_fails(const ebpo_file *file, const char *what, const char *path,
+                              ebpo_error *error)
+{
+    return ebpo_fail_at(error, EBPO_E_FORMAT, file->in.shown, file->root_array[EBPO_A_PLACES].path,
+                        -1, "%s %s; get a fresh copy of the file", what, path);
+}
+
+static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_h5_chunk chunk, ebpo_error *error)
+{
+    int level;
+    ebpo_array_id id = ebpo_place_array(number, &level);
+    if (id == EBPO_ARRAYS)
+        return EBPO_OK; /* a gap, or of a part that is not known */
+    ebpo_array_in *a =
+        id < EBPO_LEVEL_ARRAYS ? &l->file->level_array[level][id] : &l->file->root_array[id];
+    uint64_t *seen = id < EBPO_LEVEL_ARRAYS ? &l->seen[level][id] : &l->seen_root[id];
+    if (!a->present || *seen == ebpo_h5_chunk_count(&a->shape))
+        return list_fails(l->file, "the list has more chunks than", a->path, error);
+    if (chunk.bytes == 0 ||
+        chunk.bytes > ebpo_chunk_bound(a->shape.chunk_rows * ebpo_h5_row_bytes(&a->shape)))
+        return list_fails(l->file, "the list has a chunk of a size that it cannot have of", a->path,
+                          error);
+    if (ebpo_h5_chunk_count(&a->shape) == 1 &&
+        (a->chunks[0].address != chunk.address || a->chunks[0].bytes != chunk.bytes))
+        return list_fails(l->file, "the list contradicts the header of", a->path, error);
+    if (ebpo_h5_chunk_count(&a->shape) > 1) {
+        a->chunks[*seen] = chunk;
+        a->stored_bytes += chunk.bytes;
+    }
+    ++*seen;
+    return EBPO_OK;
+}
+
+/* Tables for chunks; before that, whether the file can hold them. */
+static ebpo_status begin_array(ebpo_file *file, ebpo_array_in *a, uint64_t *chunks,
+                               ebpo_error *error)
+{
+    if (!a->present || a->chunks)
+        return EBPO_OK;
+    *chunks += ebpo_h5_chunk_count(&a->shape);
+    if (*chunks > file->root_array[EBPO_A_PLACES].shape.rows)
+        return list_fails(file, "the list has fewer chunks than", a->path, error);
+    a->stored_bytes = 0;
+    a->chunks = ebpo_alloc_zero(ebpo_h5_chunk_count(&a->shape), sizeof *a->chunks);
+    return a->chunks ? EBPO_OK : ebpo_fail_memory(error, *chunks * sizeof *a->chunks);
+}
+
+static ebpo_status end_array(const listing *l, const ebpo_array_in *a, ebpo_error *error)
+{
+    uint64_t seen = a->id < EBPO_LEVEL_ARRAYS ? l->seen[a->level][a->id] : l->seen_root[a->id];
+    return !a->present || a->id == EBPO_A_PLACES || seen == ebpo_h5_chunk_count(&a->shape)
+               ? EBPO_OK
+               : list_fails(l->file, "the list has fewer chunks than", a->path, error);
+}
+
+static ebpo_array_in *array_number(ebpo_file *file, int i)
+{
+    int levels = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS;
+    return i < levels ? &file->level_array[i / EBPO_LEVEL_ARRAYS][i % EBPO_LEVEL_ARRAYS]
+                      : &file->root_array[EBPO_LEVEL_ARRAYS + i - levels];
+}
+enum { ALL_ARRAYS = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS - EBPO_LEVEL_ARRAYS };
+
+static ebpo_status list_chunks(ebpo_file *file, uint32_t (*pairs)[2], uint64_t count,
+                               ebpo_error *error)
+{
+    listing *l = ebpo_alloc_zero(1, sizeof *l);
+    uint64_t at = file->info.head_bytes, chunks = 0;
+    ebpo_status status = l ? EBPO_OK : ebpo_fail_memory(error, sizeof *l);
+    for (int i = 0; i < ALL_ARRAYS && status == EBPO_OK; i++)
+        status = begin_array(file, array_number(file, i), &chunks, error);
+    if (l)
+        l->file = file;
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
+        if (pairs[i][1] > file->info.file_bytes - at)
+            status =
+                list_fails(file, "a chunk lies beyond the end of the file in", "the list", error);
+        else
+            status = list_chunk(l, pairs[i][0], (ebpo_h5_chunk){ at, pairs[i][1] }, error);
+        at += pairs[i][1];
+    }
+    for (int i = 0; i < ALL_ARRAYS && status == EBPO_OK; i++)
+        status = end_array(l, array_number(file, i), error);
+    free(l);
+    return status;
+}
+
+/* A list half read is none. */
+static void forget(ebpo_file *file)
+{
+    for (int i = 0; i < ALL_ARRAYS; i++) {
+        ebpo_array_in *a = array_number(file, i);
+        if (a->present && ebpo_h5_chunk_count(&a->shape) > 1) {
+            free(a->chunks);
+            a->chunks = NULL;
+        }
+    }
+}
+
+static ebpo_status locate_by_list(ebpo_file *file, ebpo_error *error)
+{
+    const ebpo_array_in *a = &file->root_array[EBPO_A_PLACES];
+    ebpo_h5_chunk chunk = a->chunks[0];
+    uint32_t(*pairs)[2] = NULL;
+    const char *why = "";
+    uint8_t *stored = a->shape.rows <= file->info.file_bytes ? ebpo_alloc(chunk.bytes, 1) : NULL;
+    ebpo_status status = stored
+                             ? ebpo_input_read(&file->in, chunk.address, chunk.bytes, stored, error)
+                             : ebpo_fail_memory(error, chunk.bytes);
+    if (status == EBPO_OK) {
+        status = ebpo_places_decode(stored, chunk.bytes, a->shape.pipeline, a->shape.rows, &pairs,
+                                    &why, error);
+        if (status == EBPO_E_FORMAT)
+            status = list_fails(file, "the chunk is damaged:", why, error);
+    }
+    free(stored);
+    if (status == EBPO_OK)
+        status = list_chunks(file, pairs, a->shape.rows, error);
+    free(pairs);
+    if (status != EBPO_OK)
+        forget(file);
+    return status == EBPO_OK ? ebpo_stored_check(file, error) : status;
+}
+
+/* --- either way --- */
+
+static ebpo_status locate(ebpo_file *file, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    pthread_mutex_lock(&file->lock);
+    if (!atomic_load(&file->located)) {
+        status = file->has_places ? locate_by_list(file, error) : locate_by_index(file, error);
+        if (status == EBPO_OK)
+            atomic_store(&file->located, true);
+    }
+    pthread_mutex_unlock(&file->lock);
+    return status;
+}
+
+ebpo_status ebpo_file_locate(const ebpo_file *file, ebpo_stored_sizes *out, ebpo_error *error)
+{
+    ebpo_stored_sizes sizes = EBPO_STORED_SIZES_INIT;
+    ebpo_status status = out ? EBPO_CHECK_SIZED(ebpo_stored_sizes, out, error) : EBPO_OK;
+    if (status == EBPO_OK && !atomic_load(&file->located))
+        status = locate(ebpo_reader_own(file), error);
+    if (status == EBPO_OK && out)
+        sizes = stored_sizes(file);
+    if (out)
+        EBPO_GIVE(ebpo_stored_sizes, out, &sizes);
+    return status;
+}
+
+ebpo_status ebpo_reader_locate(const ebpo_file *file, const ebpo_array_in *array, ebpo_error *error)
+{
+    /* A single chunk's place stands in the array's header: known since the opening. */
+    return ebpo_h5_chunk_count(&array->shape) == 1 ? EBPO_OK : ebpo_file_locate(file, NULL, error);
+}

@@ -1,0 +1,92 @@
+#include "container/places.h"
+
+#include <stdlib.h>
+
+#include "base/alloc.h"
+#include "base/endian.h"
+#include "base/error.h"
+
+enum { LEVEL_NUMBERS = 64, MESH_NUMBERS = 4096, TABLE_NUMBERS = 4112 };
+
+uint32_t ebpo_place_number(ebpo_array_id id, int level)
+{
+    return id < EBPO_LEVEL_ARRAYS      ? (uint32_t)level * LEVEL_NUMBERS + (uint32_t)id
+           : id < EBPO_A_SUBTREE_INDEX ? MESH_NUMBERS + (uint32_t)(id - EBPO_LEVEL_ARRAYS)
+                                       : TABLE_NUMBERS + (uint32_t)(id - EBPO_A_SUBTREE_INDEX);
+}
+
+ebpo_array_id ebpo_place_array(uint32_t number, int *level)
+{
+    *level = 0;
+    if (number < MESH_NUMBERS) {
+        *level = (int)(number / LEVEL_NUMBERS);
+        return number % LEVEL_NUMBERS < EBPO_LEVEL_ARRAYS && *level < EBPO_LEVELS_MAX
+                   ? (ebpo_array_id)(number % LEVEL_NUMBERS)
+                   : EBPO_ARRAYS;
+    }
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_A_PLACES; id++)
+        if (ebpo_place_number((ebpo_array_id)id, 0) == number)
+            return (ebpo_array_id)id;
+    return EBPO_ARRAYS;
+}
+
+/* The elements' size as the pipeline sees it: the coder's scratch is too small for shuffling a long
+ * list, which is done here. */
+static bool shuffled(ebpo_pipeline pipeline)
+{
+    return pipeline == EBPO_PIPELINE_ZSTD || pipeline == EBPO_PIPELINE_DEFLATE;
+}
+
+ebpo_status ebpo_places_encode(uint32_t (*pairs)[2], uint64_t count, ebpo_pipeline pipeline,
+                               int codec_level, uint8_t **stored, size_t *bytes, ebpo_error *error)
+{
+    size_t size = count * 8;
+    ebpo_chunk_coder *coder = ebpo_alloc_zero(1, sizeof *coder);
+    uint8_t *raw = ebpo_alloc(size, 1), *turned = ebpo_alloc(size, 1);
+    *stored = ebpo_alloc(ebpo_chunk_bound(size), 1);
+    ebpo_status status = coder && raw && turned && *stored ? EBPO_OK : EBPO_E_MEMORY;
+    for (uint64_t i = 0; i < 2 * count && status == EBPO_OK; i++)
+        ebpo_store32(raw + 4 * i, pairs[i / 2][i % 2]);
+    if (status == EBPO_OK && shuffled(pipeline))
+        ebpo_shuffle(raw, size, 4, turned);
+    if (status == EBPO_OK)
+        status = ebpo_chunk_encode(coder, pipeline, codec_level, 1,
+                                   shuffled(pipeline) ? turned : raw, size, *stored, bytes);
+    if (coder)
+        ebpo_chunk_coder_clear(coder);
+    free(coder);
+    free(raw);
+    free(turned);
+    if (status == EBPO_OK)
+        return EBPO_OK;
+    free(*stored);
+    *stored = NULL;
+    return ebpo_fail_memory(error, size * 3);
+}
+
+ebpo_status ebpo_places_decode(const uint8_t *stored, size_t stored_bytes, ebpo_pipeline pipeline,
+                               uint64_t count, uint32_t (**pairs)[2], const char **why,
+                               ebpo_error *error)
+{
+    size_t size = count * 8;
+    ebpo_chunk_coder *coder = ebpo_alloc_zero(1, sizeof *coder);
+    uint8_t *raw = ebpo_alloc(size, 1), *turned = ebpo_alloc(size, 1);
+    *pairs = ebpo_alloc(count, sizeof **pairs);
+    ebpo_status status = coder && raw && turned && *pairs ? EBPO_OK : EBPO_E_MEMORY;
+    if (status == EBPO_OK)
+        status = ebpo_chunk_decode(coder, pipeline, 1, stored, stored_bytes, raw, size, why);
+    if (status == EBPO_OK && shuffled(pipeline))
+        ebpo_unshuffle(raw, size, 4, turned);
+    for (uint64_t i = 0; i < 2 * count && status == EBPO_OK; i++)
+        (*pairs)[i / 2][i % 2] = ebpo_load32((shuffled(pipeline) ? turned : raw) + 4 * i);
+    if (coder)
+        ebpo_chunk_coder_clear(coder);
+    free(coder);
+    free(raw);
+    free(turned);
+    if (status == EBPO_OK)
+        return EBPO_OK;
+    free(*pairs);
+    *pairs = NULL;
+    return status == EBPO_E_MEMORY ? ebpo_fail_memory(error, size * 3) : status;
+}
