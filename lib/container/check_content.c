@@ -8,10 +8,10 @@
 #include "container/reader.h"
 
 /* Arrays are independent, so threads take whole ones; chunks within one must come in order. */
-typedef struct array_digest {
+typedef struct taking {
     const ebpo_info *info;
-    ebpo_sha256 state;
-} array_digest;
+    ebpo_array_digest digest;
+} taking;
 
 typedef struct content_job {
     const ebpo_file *file;
@@ -24,11 +24,10 @@ typedef struct content_job {
 static ebpo_status take(void *context, const ebpo_array_in *array, uint64_t chunk, uint64_t row,
                         uint64_t rows, const uint8_t *bytes, ebpo_error *error)
 {
-    array_digest *d = context;
+    taking *t = context;
     (void)chunk;
     (void)error;
-    ebpo_content_rows(d->info, array->id, row, rows, ebpo_h5_row_bytes(&array->shape), bytes,
-                      &d->state);
+    ebpo_array_digest_add(&t->digest, t->info, array->id, &array->shape, row, rows, bytes);
     return EBPO_OK;
 }
 
@@ -39,10 +38,10 @@ static ebpo_status digest_arrays(void *context, uint64_t begin, uint64_t end, un
     (void)worker;
     ebpo_status status = EBPO_OK;
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
-        array_digest d = { .info = &j->file->info };
-        ebpo_sha256_begin(&d.state);
-        status = ebpo_reader_rows(j->file, j->array[i], &j->alone, take, &d, error);
-        ebpo_sha256_end(&d.state, j->digest[i]);
+        taking t = { .info = &j->file->info };
+        ebpo_array_digest_begin(&t.digest);
+        status = ebpo_reader_rows(j->file, j->array[i], &j->alone, take, &t, error);
+        ebpo_array_digest_end(&t.digest, j->digest[i]);
     }
     return status;
 }

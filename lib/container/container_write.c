@@ -45,7 +45,7 @@ typedef struct writer {
     unsigned used;            /* slots */
     ebpo_chunk_coder *coders; /* one for each thread */
     ebpo_chunk_order order;
-    ebpo_sha256 *digest; /* [arrays of the plan] */
+    ebpo_array_digest *digest; /* [arrays of the plan] */
     ebpo_content content;
     uint64_t chunk_bytes, chunks_done, chunks;
     ebpo_array_out places; /* without subtrees it has no rows */
@@ -252,18 +252,17 @@ static void digest_slots(writer *w)
         const slot *s = &w->slots[i];
         const ebpo_h5_shape *shape = &s->array->shape;
         uint64_t row = s->chunk * shape->chunk_rows, left = shape->rows - row;
-        ebpo_sha256 *state = &w->digest[s->array - w->plan.array];
+        ebpo_array_digest *state = &w->digest[s->array - w->plan.array];
         uint8_t digest[32];
         if (!ebpo_content_has(&w->plan.info, s->array->id))
             continue;
         if (row == 0)
-            ebpo_sha256_begin(state);
-        ebpo_content_rows(&w->plan.info, s->array->id, row,
-                          left < shape->chunk_rows ? left : shape->chunk_rows,
-                          ebpo_h5_row_bytes(shape), s->raw, state);
+            ebpo_array_digest_begin(state);
+        ebpo_array_digest_add(state, &w->plan.info, s->array->id, shape, row,
+                              left < shape->chunk_rows ? left : shape->chunk_rows, s->raw);
         if (left > shape->chunk_rows)
             continue;
-        ebpo_sha256_end(state, digest);
+        ebpo_array_digest_end(state, digest);
         ebpo_content_put(&w->content, s->array->path, digest);
     }
 }

@@ -8,6 +8,7 @@
 
 #include "base/sha256.h"
 #include "container/schema.h"
+#include "h5/h5.h"
 
 typedef struct ebpo_content_entry {
     char path[EBPO_PATH_BYTES];
@@ -16,9 +17,19 @@ typedef struct ebpo_content_entry {
 
 /* Whether an array counts. How a file is laid out does not: tables of subtrees are left out. */
 bool ebpo_content_has(const ebpo_info *info, ebpo_array_id id);
-/* Rows from `row` on of one that counts, in order, as far as they do. */
-void ebpo_content_rows(const ebpo_info *info, ebpo_array_id id, uint64_t row, uint64_t rows,
-                       size_t row_bytes, const uint8_t *bytes, ebpo_sha256 *state);
+/* One array, chunk after chunk. Chunks of fewer rows than without subtrees count as if they were
+ * parts of larger ones: codes that start anew with them are made to go on. */
+typedef struct ebpo_array_digest {
+    ebpo_sha256 state;
+    uint64_t last[3]; /* of the chunk before: the components' running sums */
+} ebpo_array_digest;
+
+void ebpo_array_digest_begin(ebpo_array_digest *digest);
+/* The chunk that begins with `row` of an array of this shape, without its filling. */
+void ebpo_array_digest_add(ebpo_array_digest *digest, const ebpo_info *info, ebpo_array_id id,
+                           const ebpo_h5_shape *shape, uint64_t row, uint64_t rows,
+                           const uint8_t *bytes);
+void ebpo_array_digest_end(ebpo_array_digest *digest, uint8_t out[32]);
 
 /* Zero-initialise. Arrays come in any order. */
 typedef struct ebpo_content {
