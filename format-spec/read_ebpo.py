@@ -66,6 +66,29 @@ def leaf_refs(level, first):
     return values[order].astype("u4")
 
 
+def full_rows(dataset):
+    """Rows of a chunk without the part `subtrees`."""
+    row, rows = dataset.dtype.itemsize * int(np.prod(dataset.shape[1:])), 1
+    while 2 * rows * row <= 65536:
+        rows *= 2
+    return min(rows, dataset.shape[0])
+
+
+def as_without_subtrees(name, dataset):
+    """What counts of an array in a file with subtrees; None: nothing."""
+    values = dataset[...]
+    if name == "/mesh/faces_index":
+        return values[::2] if len(values) > 2 else None
+    if name == "/mesh/vertices" or name.startswith("/maps/"):
+        code, full = values.dtype, full_rows(dataset)
+        plain = delta(dataset)
+        for row in range(dataset.chunks[0], len(values), dataset.chunks[0]):
+            if row % full:
+                step = plain[row] - plain[row - 1]
+                values[row] = ((step << 1) ^ (step >> (8 * code.itemsize - 1))).astype(code)
+    return values
+
+
 def content_sha256(file):
     """README.md, "Content checksum"."""
     names = []
@@ -75,8 +98,83 @@ def content_sha256(file):
                                    names.append(f"/{group}/{name}") if isinstance(item, h5py.Dataset) else None)
     total = hashlib.sha256()
     for name in sorted(names):
-        total.update(name.encode() + b"\0" + hashlib.sha256(file[name][...].tobytes()).digest())
+        values = as_without_subtrees(name, file[name]) if "subtrees" in file else file[name][...]
+        if values is not None:
+            total.update(name.encode() + b"\0" + hashlib.sha256(values.tobytes()).digest())
     return total.hexdigest()
+
+
+def check_subtrees(file):
+    """README.md, "Subtrees": the table adds up to what the tree has, and the list to the file."""
+    counts, index = (file[f"/subtrees/{name}"] for name in ("counts", "index"))
+    rows, sums = counts.chunks[0], np.cumsum(counts[...].astype("u8"), axis=0)
+    assert (index[1:] == sums[rows - 1:(len(index) - 1) * rows:rows]).all() and not index[0].any()
+    root, levels = int(file.attrs["subtree_level"]), int(file.attrs["level_count"])
+    subtree, own, column = np.arange(len(counts)), 0, 6
+    for number in range(root + 1, levels):
+        level = file[f"/levels/{number:02d}"]
+        types = (level["types"][...][:, None] >> (2 * np.arange(8, dtype="u2"))) & 3
+        of = np.repeat(subtree, 8).reshape(-1, 8)
+
+        def total(name, owners, level=level):
+            values = level[name][...] if name in level else np.zeros(len(owners))
+            return np.bincount(owners, values, len(counts))
+
+        gray, leaf = of[types == 3], of[types == 2]
+        ends = np.zeros(len(counts), "u8")
+        if "leaf_skip" in level:
+            np.maximum.at(ends, leaf, leaf_first(level) + level["leaf_new"][...])
+        ends = np.maximum.accumulate(ends)
+        own = own + total("leaf_new", leaf)
+        expected = [np.bincount(of[types == k], minlength=len(counts)) for k in (3, 2, 1)]
+        expected += [total("plane_counts", gray), total("leaf_plane_counts", leaf),
+                     total("leaf_ref_count", leaf), np.diff(ends, prepend=np.uint64(0))]
+        assert (np.transpose(expected) == counts[:, column:column + 7]).all(), f"level {number}"
+        subtree, column = gray, column + 7
+    assert (counts[:, 1] == own).all(), "new faces"
+    check_faces_of_subtrees(file, counts[...].astype("u8"), sums)
+    check_places(file)
+
+
+def check_faces_of_subtrees(file, counts, sums):
+    """First uses of vertices, and chunks from elsewhere that a subtree's own faces use."""
+    if "mesh" not in file:
+        return
+    corners = faces(file["/mesh/faces"]).reshape(-1, 3).astype("i8")
+    before = sums - counts
+    first, vertex = (before[:, k] + before[:, k + 1] + counts[:, k] for k in (0, 2))
+    outer = file["/subtrees/outer"][...] if "outer" in file["/subtrees"] else np.zeros(0, "u4")
+    for i, row in enumerate(counts.astype("i8")):
+        own = corners[int(first[i]):int(first[i]) + row[1]]
+        seen = corners[:int(first[i])].max(initial=-1) + 1
+        assert vertex[i] == seen and row[3] == max(own.max(initial=-1) + 1, seen) - seen
+        begin = int(before[i, 4] + before[i, 5]) + row[4]
+        blocks = {int(vertex[i]) // 1024 - int(d) for d in outer[begin:begin + row[5]]}
+        needed = set(own[own < vertex[i]] // 1024) - {int(vertex[i]) // 1024}
+        assert needed <= blocks, f"subtree {i}: chunks of vertices that are not listed"
+
+
+def check_places(file):
+    """The list of chunks leads to where HDF5 says that they are."""
+    names = ["types", "plane_counts", "planes", "leaf_winding", "black_winding", "white_winding",
+             "leaf_skip", "leaf_new", "leaf_ref_count", "leaf_refs", "types_index", "gray_index",
+             "leaf_index", "leaf_plane_counts", "leaf_planes"]
+    roots = {4096: "/mesh/vertices", 4097: "/mesh/faces", 4098: "/mesh/faces_index",
+             4099: "/maps/vertex_source", 4100: "/maps/face_source", 4112: "/subtrees/index",
+             4113: "/subtrees/counts", 4114: "/subtrees/outer"}
+    places, seen = file["/subtrees/places"], {}
+    at = file["/levels/00/types"].id.get_chunk_info(0).byte_offset
+    for number, size in places[...].astype("i8"):
+        path = (f"/levels/{number // 64:02d}/{names[number % 64]}" if number < 4096
+                else roots.get(number))
+        if path:
+            chunk = file[path].id.get_chunk_info(seen.setdefault(path, 0))
+            assert (chunk.byte_offset, chunk.size) == (at, size), f"{path}: chunk {seen[path]}"
+            seen[path] += 1
+        at += int(size)
+    assert all(count == file[path].id.get_num_chunks() for path, count in seen.items())
+    own = places.id.get_chunk_info(0)
+    assert (own.byte_offset, own.byte_offset + own.size) == (places.attrs["offset"], places.attrs["file_bytes"])
 
 
 def listed(values):
@@ -130,11 +228,13 @@ def read(path):
         assert text(file.attrs["format"]) == "EBP-Octree in HDF5" and file.attrs["format_version_major"] == 1
         assert text(file.attrs.get("format_version", "")) != "1.0-draft"
         required = text(file.attrs["required_parts"]).split()
-        unknown = set(required) - {"levels", "mesh", "planes", "maps", "leaf-planes", "pruned"}
+        unknown = set(required) - {"levels", "mesh", "planes", "maps", "leaf-planes", "subtrees", "pruned"}
         assert not unknown, f"needs {unknown}"
         parts = set(required + text(file.attrs["optional_parts"]).split())
         assert content_sha256(file) == text(file.attrs["content_sha256"]), "content_sha256 differs"
         check_pruned(file, "pruned" in parts)
+        if "subtrees" in parts:
+            check_subtrees(file)
         out = {name: text(file.attrs[name]) for name in ("kind", "winding_rule", "coordinate_type")}
         out["levels"] = [read_level(file, number, parts) for number in range(int(file.attrs["level_count"]))]
         mesh, maps = "mesh" in parts, "maps" in parts

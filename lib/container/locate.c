@@ -7,47 +7,6 @@
 #include "container/open.h"
 #include "container/places.h"
 
-uint64_t ebpo_reader_level_bytes(const ebpo_file *file, int level)
-{
-    uint64_t bytes = 0;
-    for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
-        bytes += file->level_array[level][id].stored_bytes;
-    return bytes;
-}
-
-/* Of the arrays whose chunks are known. */
-static ebpo_stored_sizes stored_sizes(const ebpo_file *file)
-{
-    ebpo_stored_sizes sizes = { .map_bytes = 0 };
-    for (int level = 0; level < file->info.level_count; level++)
-        sizes.level_bytes[level] = ebpo_reader_level_bytes(file, level);
-    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS; id++)
-        *(uint64_t *)(void *)((char *)&sizes + ebpo_schema[id].bytes) +=
-            file->root_array[id].stored_bytes;
-    return sizes;
-}
-
-ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error)
-{
-    ebpo_stored_sizes sizes = stored_sizes(file);
-    uint64_t stored =
-        sizes.mesh_vertex_bytes + sizes.mesh_face_bytes + sizes.map_bytes + sizes.subtree_bytes;
-    for (int level = 0; level < file->info.level_count; level++)
-        stored += sizes.level_bytes[level];
-    if (stored > file->info.file_bytes)
-        return ebpo_fail_file(
-            error, EBPO_E_FORMAT, file->in.shown,
-            "the arrays' chunks take more room than the file has; get a fresh copy of the file");
-    return EBPO_OK;
-}
-
-ebpo_h5_rows ebpo_reader_rows_of_chunk(const ebpo_file *file, ebpo_array_id id)
-{
-    return id == EBPO_A_PLACES        ? EBPO_H5_ROWS_ALL
-           : file->info.subtree_level ? EBPO_H5_ROWS_POWER
-                                      : EBPO_H5_ROWS_FULL;
-}
-
 /* --- by HDF5's index --- */
 
 static ebpo_status locate_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_in *a,
@@ -247,7 +206,7 @@ ebpo_status ebpo_file_locate(const ebpo_file *file, ebpo_stored_sizes *out, ebpo
     if (status == EBPO_OK && !atomic_load(&file->located))
         status = locate(ebpo_reader_own(file), error);
     if (status == EBPO_OK && out)
-        sizes = stored_sizes(file);
+        sizes = ebpo_reader_sizes(file);
     if (out)
         EBPO_GIVE(ebpo_stored_sizes, out, &sizes);
     return status;

@@ -82,6 +82,40 @@ static ebpo_status open_group(ebpo_h5_in *h5, const char *path, bool wanted, ebp
     return status;
 }
 
+uint64_t ebpo_reader_level_bytes(const ebpo_file *file, int level)
+{
+    uint64_t bytes = 0;
+    for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
+        bytes += file->level_array[level][id].stored_bytes;
+    return bytes;
+}
+
+/* Of the arrays whose chunks are known. */
+ebpo_stored_sizes ebpo_reader_sizes(const ebpo_file *file)
+{
+    ebpo_stored_sizes sizes = { .map_bytes = 0 };
+    for (int level = 0; level < file->info.level_count; level++)
+        sizes.level_bytes[level] = ebpo_reader_level_bytes(file, level);
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS; id++)
+        *(uint64_t *)(void *)((char *)&sizes + ebpo_schema[id].bytes) +=
+            file->root_array[id].stored_bytes;
+    return sizes;
+}
+
+ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error)
+{
+    ebpo_stored_sizes sizes = ebpo_reader_sizes(file);
+    uint64_t stored =
+        sizes.mesh_vertex_bytes + sizes.mesh_face_bytes + sizes.map_bytes + sizes.subtree_bytes;
+    for (int level = 0; level < file->info.level_count; level++)
+        stored += sizes.level_bytes[level];
+    if (stored > file->info.file_bytes)
+        return ebpo_fail_file(
+            error, EBPO_E_FORMAT, file->in.shown,
+            "the arrays' chunks take more room than the file has; get a fresh copy of the file");
+    return EBPO_OK;
+}
+
 /* The list of all chunks, which holds unless another program has rewritten the file. */
 static ebpo_status open_places(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
 {

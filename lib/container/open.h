@@ -58,9 +58,15 @@ static inline ebpo_file *ebpo_reader_own(const ebpo_file *file)
 }
 
 /* How many rows the file's chunks may have. */
-ebpo_h5_rows ebpo_reader_rows_of_chunk(const ebpo_file *file, ebpo_array_id id);
+static inline ebpo_h5_rows ebpo_reader_rows_of_chunk(const ebpo_file *file, ebpo_array_id id)
+{
+    return id == EBPO_A_PLACES        ? EBPO_H5_ROWS_ALL
+           : file->info.subtree_level ? EBPO_H5_ROWS_POWER
+                                      : EBPO_H5_ROWS_FULL;
+}
 
-/* Whether the chunks that are known fit the file. */
+/* Of the arrays whose chunks are known; and whether these fit the file. */
+ebpo_stored_sizes ebpo_reader_sizes(const ebpo_file *file);
 EBPO_MUST_USE ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error);
 
 /* Bytes of a level in the file, once it has been read. */

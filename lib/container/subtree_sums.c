@@ -16,9 +16,10 @@ enum { SUBTREES_A_TIME = 128 };
 int ebpo_subtree_level_for(const ebpo_info *info, uint64_t subtree_faces)
 {
     uint64_t faces = subtree_faces ? subtree_faces : USUAL_FACES;
-    int found = 0;
     if (subtree_faces == EBPO_NO_SUBTREES || (!subtree_faces && info->face_count < LEAST_FACES))
         return 0;
+    /* at least these, where it was asked for */
+    int found = subtree_faces && info->level_count > 2;
     for (int level = 1; level <= info->level_count - 2; level++) {
         uint64_t grays = info->level[level].gray_count;
         if (grays && info->face_count / grays >= faces)

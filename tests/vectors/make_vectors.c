@@ -65,7 +65,8 @@ static void build(ebpo_tree *tree, uint64_t faces, bool doubles, int max_level, 
         die("build", error.message);
 }
 
-static void write_vector(const char *name, ebpo_tree *tree, ebpo_codec codec, uint32_t parts)
+static void write_laid_out(const char *name, ebpo_tree *tree, ebpo_codec codec, uint32_t parts,
+                           uint64_t subtree_faces)
 {
     char path[512];
     ebpo_tree back;
@@ -73,6 +74,7 @@ static void write_vector(const char *name, ebpo_tree *tree, ebpo_codec codec, ui
     ebpo_write_options options = EBPO_WRITE_OPTIONS_INIT;
     options.codec = codec;
     options.parts = parts;
+    options.subtree_faces = subtree_faces;
     snprintf(tree->info.generator, sizeof tree->info.generator, "make_vectors");
     snprintf(path, sizeof path, "%s/passed/%s.ebpo.h5", folder, name);
     if (ebpo_tree_write(tree, path, &options, &error) != EBPO_OK ||
@@ -86,6 +88,11 @@ static void write_vector(const char *name, ebpo_tree *tree, ebpo_codec codec, ui
     fclose(out);
     ebpo_tree_free(&back);
     ebpo_tree_free(tree);
+}
+
+static void write_vector(const char *name, ebpo_tree *tree, ebpo_codec codec, uint32_t parts)
+{
+    write_laid_out(name, tree, codec, parts, 0);
 }
 
 /* A part of the file of vector 06. */
@@ -139,6 +146,13 @@ static void make_passed(void)
         box.max[k] = 0.2;
     subset(&tree, &box);
     write_vector("13_subset_box", &tree, EBPO_CODEC_ZSTD, ~0u);
+    build(&tree, 4, false, 3, 1, EBPO_PART_LEAF_PLANES);
+    write_laid_out("14_subtrees", &tree, EBPO_CODEC_ZSTD, ~0u, 1);
+    build(&tree, 4, false, 3, 1, EBPO_PART_LEAF_PLANES);
+    write_laid_out("15_subtrees_unfiltered", &tree, EBPO_CODEC_NONE, ~0u, 1);
+    random_tree_options more = { 13, 5, 10, 14, true, false, false, false };
+    random_tree_make(&tree, &more);
+    write_laid_out("16_many_subtrees", &tree, EBPO_CODEC_ZSTD, ~0u, 1);
 }
 
 /* --- failed --- */
@@ -267,6 +281,7 @@ static haddr_t chunk_address(const char *path, hsize_t *size)
 #define LONG      "11_two_chunks_of_faces"
 #define CUT_SHORT "12_subset_levels"
 #define BOXED     "13_subset_box"
+#define SUBTREES  "15_subtrees_unfiltered"
 
 static void v_format(void) { set_text("/", "format", "EBP-Octree in HDF6"); }
 static void v_format_missing(void) { drop_attribute("/", "format"); }
@@ -314,6 +329,11 @@ static void v_group_for_array(void)
     H5Gclose(H5Gcreate2(file, "/mesh/faces", H5P_DEFAULT, plist, H5P_DEFAULT));
     H5Pclose(plist);
 }
+static void v_subtree_level(void) { set_int("/", "subtree_level", 0); }
+static void v_subtree_table(void) { drop("/subtrees/counts"); }
+/* Its bytes stay, so that it still holds for a reader. */
+static void v_places_array(void) { poke("/subtrees/places", 2, 4097); }
+static void v_places_bytes(void) { poke("/subtrees/places", 3, 1 << 30); }
 static void v_soft_link(void)
 {
     drop("/mesh/faces");
@@ -383,6 +403,10 @@ static const failed_vector failed[] = {
     { "subset_levels_0", CUT_SHORT, v_subset_level, NONE },
     { "pruned_more_than_gray", BOXED, v_pruned_more, NONE },
     { "pruned_not_counted", BOXED, v_pruned_less, NONE },
+    { "subtree_level_0", SUBTREES, v_subtree_level, NONE },
+    { "subtree_table_missing", SUBTREES, v_subtree_table, NONE },
+    { "places_of_another_array", SUBTREES, v_places_array, NONE },
+    { "places_of_impossible_bytes", SUBTREES, v_places_bytes, NONE },
     { "pruned_in_a_whole_file", DEEP, v_pruned_whole, NONE },
     { "attribute_missing", LEAVES, v_attribute_missing, NONE },
     { "attribute_of_wrong_type", LEAVES, v_attribute_type, NONE },
