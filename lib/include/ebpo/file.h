@@ -363,7 +363,8 @@ typedef struct ebpo_write_options {
     /*
      * Subtrees of so many faces on average, or more, lie together each, so that one
      * is read at once (format-spec/README.md, section 9); at most those below level 1
-     * where there are not as many. 0: 1,024, in files of 131,072 faces and more. EBPO_NO_SUBTREES: none, as in format 1.0.
+     * where there are not as many. 0: 1,024, in files of 131,072 faces and more. EBPO_NO_SUBTREES:
+     * none, as in format 1.0.
      */
     uint64_t subtree_faces;
 } ebpo_write_options;
