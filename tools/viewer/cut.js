@@ -10,6 +10,7 @@ const POLYTOPES_KEPT = 40000;  // of about 1.3 KB, besides those of the cut itse
 const PRUNE_PASSES = 64;
 const MESH_LEAVES = 1000;      // whose faces are asked for at once, about
 const MESH_SUBTREES = 24;      // the same where the file has subtrees
+const FACE_PIXELS = 10;        // of the picture for each face of a subtree, from which on its faces are fetched, at a detail of 16 pixels
 const NODES_MISSING = 1 << 14; // told of in one pass
 const LEAF_SHARE = 4;          // in small files leaves' faces are taken even when so many times smaller than a gray node may be
 const GROUP_LEVELS = 3;        // leaves below one node so many levels above have neighbouring faces in the file
@@ -211,20 +212,22 @@ export class Cut {
     let node = leaf;
     for (let i = 0; node.parent && (leaf.subtree === undefined ? i < GROUP_LEVELS : node.subtree !== undefined); i++)
       node = node.parent;
-    const group = groups.get(node) ?? { leaves: [], sum: 0, most: 0 };
+    const group = groups.get(node) ?? { leaves: [], sum: 0, area: 0, most: 0 };
     groups.set(node, group);
     group.leaves.push(leaf);
     group.sum += px;
+    group.area += px * px;
     group.most = Math.max(group.most, px);
   }
 
-  // Neighbours together, the groups that are seen most first; scattered leaves would cost a chunk of 64 KB each.
+  // Neighbours together, the groups that are seen most first; scattered leaves would cost a chunk of 64 KB each, or the faces of a subtree.
   #leavesToFetch(groups, want) {
-    const out = [], { subtree_level: C } = this.tree.info;
+    const out = [], { info } = this.tree, C = info.subtree_level;
+    const worth = C === undefined || this.small ? 0 : FACE_PIXELS * (want.pixels / 16) ** 2 * info.face_count / info.levels[C].gray;
     let subtrees = 0;
-    for (const [node, { leaves, most }] of [...groups].sort((a, b) => b[1].sum - a[1].sum))
-      if (node.level === C) { // the root of a subtree
-        if (subtrees++ < MESH_SUBTREES)
+    for (const [node, { leaves, area, most }] of [...groups].sort((a, b) => b[1].area - a[1].area))
+      if (C !== undefined) { // its faces and vertices lie together
+        if (area >= worth && subtrees++ < MESH_SUBTREES)
           out.push(...leaves);
       } else if (out.length < MESH_LEAVES && (this.small || leaves.length >= GROUP_LEAVES || most > LARGE_LEAF * want.pixels))
         out.push(...leaves);

@@ -5,8 +5,46 @@ import { formatError } from './error.js';
 
 const GAP_BYTES = 16 * 1024;            // rather read this much for nothing than ask twice
 const REQUEST_BYTES = 4 * 1024 * 1024;  // a request's most
+const FEW = 12, SPARE_SHARE = 0.6;      // of one batch more requests than these are joined over wider gaps, for so much more of its bytes
 const REQUESTS = 6;                     // at once, as browsers do for a host
 export const CACHE_BYTES = 64 * 1024 * 1024;
+
+/** Requests for ranges: neighbours together, and when many are left, more than neighbours. */
+export function joined(ranges) {
+  const runs = [];
+  for (const r of ranges.sort((a, b) => a.from - b.from)) {
+    const run = runs.at(-1);
+    if (run && r.from - run.to <= GAP_BYTES && Math.max(r.to, run.to) - run.from <= REQUEST_BYTES) {
+      run.to = Math.max(run.to, r.to);
+      run.ranges.push(r);
+    } else {
+      runs.push({ from: r.from, to: r.to, ranges: [r] });
+    }
+  }
+  return runs.length > FEW ? fewer(runs) : runs;
+}
+
+// Over the least gaps first, while not much is read for nothing.
+function fewer(runs) {
+  let left = runs.reduce((sum, r) => sum + r.to - r.from, 0) * SPARE_SHARE, most = 0, joins = runs.length - FEW;
+  for (const gap of runs.slice(1).map((r, i) => r.from - runs[i].to).sort((a, b) => a - b)) {
+    if (joins-- === 0 || gap > left)
+      break;
+    left -= gap;
+    most = gap;
+  }
+  const out = [];
+  for (const r of runs) {
+    const last = out.at(-1);
+    if (last && r.from - last.to <= most && r.to - last.from <= REQUEST_BYTES) {
+      last.to = r.to;
+      last.ranges.push(...r.ranges);
+    } else {
+      out.push(r);
+    }
+  }
+  return out;
+}
 
 const keyOf = ({ array, chunk }) => array.number * 2 ** 32 + chunk;
 
@@ -111,25 +149,15 @@ export class ChunkCache {
   /** Ranges [{ at, bytes }] of the file: [Promise of Uint8Array], in the same order. */
   fetch(ranges) {
     const { coming } = this, out = new Array(ranges.length), behind = [];
-    ranges.forEach((r, i) => (r.at + r.bytes <= coming ? (out[i] = this.#first(r.at, r.at + r.bytes)) : behind.push(i)));
-    behind.sort((a, b) => ranges[a].at - ranges[b].at);
-    let run;
-    for (const i of behind) {
-      const from = Math.max(ranges[i].at, coming), to = ranges[i].at + ranges[i].bytes;
-      if (!run || from - run.to > GAP_BYTES || Math.max(to, run.to) - run.from > REQUEST_BYTES)
-        run = this.#run(from);
-      run.to = Math.max(run.to, to);
-      out[i] = this.#piece(run, ranges[i].at, from, to);
+    ranges.forEach((r, i) => (r.at + r.bytes <= coming ? (out[i] = this.#first(r.at, r.at + r.bytes))
+      : behind.push({ i, from: Math.max(r.at, coming), to: r.at + r.bytes })));
+    for (const run of joined(behind)) {
+      run.data = this.#turn(() => this.source.read(run.from, run.to - run.from));
+      run.data.catch(() => {}); // its pieces tell
+      for (const { i, from, to } of run.ranges)
+        out[i] = this.#piece(run, ranges[i].at, from, to);
     }
     return out;
-  }
-
-  // A request that is made when the batch is complete.
-  #run(from) {
-    const run = { from, to: from };
-    run.data = Promise.resolve().then(() => this.#turn(() => this.source.read(run.from, run.to - run.from)));
-    run.data.catch(() => {}); // its pieces tell
-    return run;
   }
 
   async #piece(run, at, from, to) {

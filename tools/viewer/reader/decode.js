@@ -192,6 +192,24 @@ function vertices64(bytes, n) {
   return new Float64Array(bits.buffer);
 }
 
+/** Codes of differences that begin anew each array.chunkRows rows -> bytes of those that do so each `rows` rows. */
+export function recode(bytes, array, rows) {
+  const wide = array.elementSize === 8, codes = new (wide ? BigUint64Array : Uint32Array)(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length)), cols = Math.max(array.cols, 1);
+  const value = wide ? (code) => (code >> 1n) ^ -(code & 1n) : (code) => (code >>> 1) ^ -(code & 1), none = wide ? 0n : 0;
+  const sums = new (wide ? BigInt64Array : Int32Array)(cols), zigzag = new (wide ? BigInt64Array : Int32Array)(1);
+  const code = wide ? (v) => ((zigzag[0] = v) << 1n) ^ (zigzag[0] >> 63n) : (v) => ((zigzag[0] = v) << 1) ^ (zigzag[0] >> 31);
+  for (let row = 0; row < array.rows; row++) {
+    const anew = row % array.chunkRows === 0, stays = row % rows === 0;
+    for (let k = 0, i = row * cols; k < cols; k++, i++) {
+      const difference = value(codes[i]);
+      if (anew && !stays)
+        codes[i] = code(difference - sums[k]);
+      sums[k] = (anew ? none : sums[k]) + difference;
+    }
+  }
+  return new Uint8Array(codes.buffer);
+}
+
 /** Faces of one chunk: 0 is the next vertex not seen before, k the k-th before that one. `index`: vertices seen before each chunk. */
 export function decodeFaces(bytes, array, chunk, index, vertexCount) {
   const n = rowsIn(array, chunk) * 3, codes = new Uint32Array(bytes.buffer, bytes.byteOffset, n), out = new Uint32Array(n);

@@ -1,9 +1,9 @@
 // An open EBP-Octree file: its facts, its levels, its mesh. Bytes are fetched when they are asked for, neighbours in one request.
 import { CHUNK_BYTES_MAX, chunkBound, pipelineOf } from './chunk.js';
 import { EbpoError, formatError } from './error.js';
-import { INDEX_ROWS, arraysOf, checkFacts, chunkRowsFit, readFacts, readLevelFacts } from './facts.js';
+import { INDEX_ROWS, arraysOf, checkFacts, chunkRows, chunkRowsFit, readFacts, readLevelFacts } from './facts.js';
 import { Hdf5, NeedBytes } from './hdf5.js';
-import { checkIndexes, checkLevel, checkOrder, decodeFaces, decodeLeaves, decodeMap, decodeVertices } from './decode.js';
+import { checkIndexes, checkLevel, checkOrder, decodeFaces, decodeLeaves, decodeMap, decodeVertices, recode } from './decode.js';
 import { Parts } from './parts.js';
 import { placeNumber, placesHold, readPlaces } from './places.js';
 import { sourceOf } from './source.js';
@@ -425,12 +425,14 @@ export class EbpoFile {
       throw named(this.source, formatError('', 'the content is not what content_sha256 says: the file was changed', 'get a fresh copy'));
   }
 
-  // What counts of an array: the index of faces as it is without subtrees, where chunks have 4,096.
+  // What counts of an array: what it would hold without subtrees, which have smaller chunks.
   #digested(path, bytes) {
-    if (path !== '/mesh/faces_index' || !this.info.parts.has('subtrees'))
+    const array = this.arrays.get(path), rows = chunkRows(array.rows, array.cols, array.elementSize);
+    if (!this.info.parts.has('subtrees'))
       return bytes;
-    const rows = new BigUint64Array(bytes.buffer, bytes.byteOffset, bytes.length / 8);
-    return this.info.face_count > 4096 ? new Uint8Array(rows.filter((_, i) => i % 2 === 0).buffer) : undefined;
+    if (path === '/mesh/faces_index')
+      return this.info.face_count > 4096 ? new Uint8Array(new BigUint64Array(bytes.buffer).filter((_, i) => i % 2 === 0).buffer) : undefined;
+    return path === '/mesh/vertices' || path.startsWith('/maps/') ? recode(bytes, array, rows) : bytes;
   }
 }
 

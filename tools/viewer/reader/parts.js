@@ -37,9 +37,9 @@ export class Parts {
 
   // `planes`: rows from .. to - 1 of planes are those of the gray nodes from `row` on, or fewer
   #ofSubtree(row, level) {
-    const d = row.level(level), has = (part) => this.info.parts.has(part);
-    return { ...d, exact: true, planes: has('planes') ? { row: d.first[GRAY], ...d.planes } : undefined,
-      leafPlanes: has('leaf-planes') ? { row: d.first[LEAF], ...d.leafPlanes } : undefined };
+    const d = row.level(level), has = (name) => this.store.arrays.has(folder(level) + name);
+    return { ...d, exact: true, planes: has('plane_counts') ? { row: d.first[GRAY], ...d.planes } : undefined,
+      leafPlanes: has('leaf_plane_counts') ? { row: d.first[LEAF], ...d.leafPlanes } : undefined };
   }
 
   async #ofBlock(level, block) {
@@ -57,8 +57,8 @@ export class Parts {
       return { row: from * INDEX_ROWS, from: value(from), to: value(to) };
     };
     return { level, group, groups: Math.min(INDEX_ROWS, groups - group), first: [...first], count, exact: false,
-      planes: this.info.parts.has('planes') ? span(gray, 'gray_index', 1, 0, s.planes, GRAY) : undefined,
-      leafPlanes: this.info.parts.has('leaf-planes') ? span(leaf, 'leaf_index', 3, 2, s.leaf_planes, LEAF) : undefined };
+      planes: store.arrays.has(at + 'plane_counts') ? span(gray, 'gray_index', 1, 0, s.planes, GRAY) : undefined,
+      leafPlanes: store.arrays.has(at + 'leaf_plane_counts') ? span(leaf, 'leaf_index', 3, 2, s.leaf_planes, LEAF) : undefined };
   }
 
   /** The rows of arrays that hold a part's nodes: [{ path, from, to }]. Without `planes` only what exact questions need. */
@@ -96,7 +96,7 @@ export class Parts {
     const own = d.first[type] - row, before = sum(counts.subarray(0, own)), n = sum(counts.subarray(own));
     if (d.exact ? before + n !== to - from : before + n > to - from)
       throw formatError(path, 'the counts do not add up to the number of planes');
-    const codes = d.exact ? planes : planes.slice(before, before + n);
+    const codes = (d.exact ? planes : planes?.slice(before, before + n)) ?? new Uint32Array(0);
     for (const code of codes)
       if ((code & 1023) === 1023 || (code >>> 10 & 1023) === 1023 || code >>> 20 === 4095)
         throw formatError(path.replace('_counts', 's'), 'a code stands for no plane');

@@ -1,0 +1,61 @@
+// A file as it comes over a line with delay: counts requests, bytes and waves. A wave is what is asked for without waiting for one another.
+import { openSync, readSync, fstatSync } from 'node:fs';
+
+const pause = (ms) => new Promise((done) => setTimeout(done, ms));
+
+export class SlowSource {
+  /** `what`: bytes, or a path. `ahead`: the first answer goes on coming up to there. `bandwidth` in bytes per ms. */
+  constructor(what, { latency = 2, ahead = 0, bandwidth = Infinity, name = 'slow' } = {}) {
+    Object.assign(this, { latency, ahead, bandwidth, name });
+    if (typeof what === 'string') {
+      const file = openSync(what);
+      this.size = fstatSync(file).size;
+      this.take = (offset, length) => {
+        const out = new Uint8Array(length);
+        readSync(file, out, 0, length, offset);
+        return out;
+      };
+    } else {
+      this.size = what.length;
+      this.take = (offset, length) => Uint8Array.from(what.subarray(offset, offset + length));
+    }
+    this.coming = 0;
+    this.asked = []; // [offset, length, wave]
+    this.done = 0;   // waves of which an answer has come
+    this.free = 0;   // when the line is
+    this.requests = this.bytes = this.waves = 0;
+  }
+
+  async #request(offset, length) {
+    const wave = this.done + 1;
+    this.requests++;
+    this.bytes += length;
+    this.asked.push([offset, length, wave]);
+    this.waves = Math.max(this.waves, wave);
+    const now = performance.now();
+    this.free = Math.max(this.free, now + this.latency) + length / this.bandwidth;
+    await pause(this.free - now);
+    this.done = Math.max(this.done, wave);
+    return this.take(offset, length);
+  }
+
+  async open(bytes) {
+    const first = Math.min(Math.max(bytes, this.ahead), this.size);
+    this.coming = first;
+    await this.#request(0, first);
+    return this.take(0, Math.min(bytes, this.size));
+  }
+
+  async read(offset, length) {
+    if (offset < 0 || offset + length > this.size)
+      throw new Error(`bytes ${offset} to ${offset + length} of ${this.size} were asked for`);
+    return offset + length <= this.coming ? this.take(offset, length) : this.#request(offset, length);
+  }
+
+  /** Since the last call: { requests, bytes, waves }. */
+  count() {
+    const { requests, bytes, done } = this.last ?? { requests: 0, bytes: 0, done: 0 }, out = { requests: this.requests - requests, bytes: this.bytes - bytes, waves: this.done - done };
+    this.last = { requests: this.requests, bytes: this.bytes, done: this.done };
+    return out;
+  }
+}
