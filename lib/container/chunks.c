@@ -1,5 +1,4 @@
 /* Decoded chunks through a cache. */
-#include <endian.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
@@ -171,6 +170,10 @@ void ebpo_chunks_expect(ebpo_chunks *c, ebpo_expected *e, ebpo_array_id id, int 
     if (!ebpo_input_expects(&c->file->in) || !array->present || rows == 0 ||
         row >= array->shape.rows)
         return;
+    if (c->collecting)
+        (void)ebpo_chunks_missing(c, id, level, row, rows, c->collecting);
+    if (c->counted)
+        return;
     uint64_t left = array->shape.rows - row, last = row + (rows < left ? rows : left) - 1;
     expect_missing(c, e, array, row / array->shape.chunk_rows, last / array->shape.chunk_rows + 1);
 }
@@ -213,6 +216,13 @@ static bool fits(const ebpo_chunks *c, uint64_t more)
     return taken <= c->limit && more <= c->limit - taken;
 }
 
+static ebpo_status refuse(ebpo_chunks *c, const ebpo_array_in *array, ebpo_error *error)
+{
+    c->refused = true;
+    return ebpo_fail_at(error, EBPO_E_LIMIT, c->file->in.shown, array->path, -1,
+                        "reading on would take more than the %" PRIu64 " bytes allowed", c->limit);
+}
+
 /* Called before a chunk is read: what was announced has been counted then. */
 static ebpo_status admit(ebpo_chunks *c, const ebpo_array_in *array, uint64_t key,
                          ebpo_error *error)
@@ -224,11 +234,7 @@ static ebpo_status admit(ebpo_chunks *c, const ebpo_array_in *array, uint64_t ke
             c->ahead_bytes -= cost;
             return EBPO_OK;
         }
-    if (fits(c, cost))
-        return EBPO_OK;
-    c->refused = true;
-    return ebpo_fail_at(error, EBPO_E_LIMIT, c->file->in.shown, array->path, -1,
-                        "reading on would take more than the %" PRIu64 " bytes allowed", c->limit);
+    return fits(c, cost) ? EBPO_OK : refuse(c, array, error);
 }
 
 static bool is_ahead(const ebpo_chunks *c, uint64_t key)
@@ -260,6 +266,15 @@ void ebpo_chunks_announce(ebpo_chunks *c, const uint64_t *keys, unsigned now, un
     ebpo_expect_all(&e);
 }
 
+static void add_key(ebpo_chunk_keys *keys, uint64_t key)
+{
+    for (unsigned k = 0; k < keys->count; k++)
+        if (keys->key[k] == key)
+            return;
+    if (keys->count < EBPO_CHUNK_KEYS)
+        keys->key[keys->count++] = key;
+}
+
 bool ebpo_chunks_missing(ebpo_chunks *c, ebpo_array_id id, int level, uint64_t row, uint64_t rows,
                          ebpo_chunk_keys *keys)
 {
@@ -271,14 +286,43 @@ bool ebpo_chunks_missing(ebpo_chunks *c, ebpo_array_id id, int level, uint64_t r
              last = (row + (rows < left ? rows : left) - 1) / array->shape.chunk_rows;
     for (uint64_t i = row / array->shape.chunk_rows; i <= last; i++) {
         uint64_t key = key_of(array, i);
-        bool listed = ebpo_cache_has(c->cache, key);
-        missing |= !listed;
-        for (unsigned k = 0; k < keys->count && !listed; k++)
-            listed = keys->key[k] == key;
-        if (!listed && keys->count < EBPO_CHUNK_KEYS)
-            keys->key[keys->count++] = key;
+        if (!ebpo_cache_has(c->cache, key)) {
+            missing = true;
+            add_key(keys, key);
+        }
     }
     return missing;
+}
+
+void ebpo_chunks_collect(ebpo_chunks *c, ebpo_chunk_keys *keys) { c->collecting = keys; }
+
+ebpo_status ebpo_chunks_fetch(ebpo_chunks *c, const ebpo_chunk_keys *keys, unsigned now,
+                              ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    ebpo_chunks_announce(c, keys->key, now, keys->count);
+    for (unsigned i = 0; i < now && status == EBPO_OK; i++) {
+        void *item;
+        status = ebpo_cache_get(c->cache, keys->key[i], &item, NULL, error);
+        if (status == EBPO_OK)
+            ebpo_cache_unpin(c->cache, keys->key[i]);
+    }
+    return status;
+}
+
+/* Vertices seen before each chunk of faces: of counted chunks only when the first is read. */
+static ebpo_status read_seen(ebpo_chunks *c, ebpo_error *error)
+{
+    const ebpo_array_in *index = ebpo_reader_array(c->file, EBPO_A_FACES_INDEX, 0);
+    uint64_t cost = 0;
+    ebpo_read_options read = ebpo_read_threads(1);
+    for (uint64_t i = 0; c->counted && index->present && i < ebpo_h5_chunk_count(&index->shape);
+         i++)
+        cost += cost_of(c, index, i);
+    if (c->counted && !fits(c, cost))
+        return refuse(c, index, error);
+    return ebpo_reader_make(c->file, EBPO_A_FACES_INDEX, 0, &read, sizeof *c->seen, &c->seen,
+                            error);
 }
 
 void ebpo_chunks_limit(ebpo_chunks *chunks, uint64_t bytes)
@@ -293,7 +337,10 @@ static ebpo_status load(void *user, uint64_t key, void **item, uint64_t *bytes, 
 {
     ebpo_chunks *c = user;
     const ebpo_array_in *array = array_of(c, key);
-    ebpo_status allowed = c->counted ? admit(c, array, key, error) : EBPO_OK;
+    ebpo_status allowed =
+        c->counted && array->id == EBPO_A_FACES && !c->seen ? read_seen(c, error) : EBPO_OK;
+    if (allowed == EBPO_OK && c->counted)
+        allowed = admit(c, array, key, error);
     if (allowed != EBPO_OK)
         return allowed;
     uint64_t rows = chunk_rows(array, chunk_of(key));
@@ -336,12 +383,9 @@ static ebpo_status make(ebpo_chunks **out, const ebpo_file *file, uint64_t budge
     c->file = file;
     c->counted = counted;
     c->limit = UINT64_MAX;
-    ebpo_read_options read = ebpo_read_threads(1);
     pthread_mutex_init(&c->lock, NULL);
     ebpo_cache_source source = { c, estimate, load, release };
-    ebpo_status status = counted ? EBPO_OK
-                                 : ebpo_reader_make(file, EBPO_A_FACES_INDEX, 0, &read,
-                                                    sizeof *c->seen, &c->seen, error);
+    ebpo_status status = counted ? EBPO_OK : read_seen(c, error);
     if (status == EBPO_OK)
         status = ebpo_cache_make(&c->cache, &source, "chunk", budget, error);
     if (status == EBPO_OK)
@@ -398,6 +442,10 @@ ebpo_status ebpo_held_chunk_load(ebpo_chunks *chunks, ebpo_held_chunk *view, uin
     void *item;
     ebpo_held_chunk_release(chunks, view); /* first: a tight budget may need the room */
     uint64_t key = key_of(view->array, chunk);
+    if (chunks->collecting && !ebpo_cache_has(chunks->cache, key)) {
+        add_key(chunks->collecting, key);
+        return EBPO_E_LIMIT;
+    }
     ebpo_status status = ebpo_cache_get(chunks->cache, key, &item, NULL, error);
     if (status != EBPO_OK)
         return status;
@@ -406,80 +454,4 @@ ebpo_status ebpo_held_chunk_load(ebpo_chunks *chunks, ebpo_held_chunk *view, uin
     view->end = view->begin + chunk_rows(view->array, chunk);
     view->rows = item;
     return EBPO_OK;
-}
-
-static void widen(const ebpo_h5_shape *shape, const uint8_t *rows, uint64_t numbers,
-                  uint8_t *values, size_t size)
-{
-    if (shape->element_size == size && __BYTE_ORDER == __LITTLE_ENDIAN)
-        memcpy(values, rows, numbers * size);
-    else
-        ebpo_integers_decode(rows, shape->element_size, shape->is_signed, numbers, values, size);
-}
-
-static ebpo_status check_rows(const ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row,
-                              uint64_t rows, size_t size, ebpo_error *error)
-{
-    const char *shown = chunks->file->in.shown;
-    if (id >= EBPO_LEVEL_ARRAYS || level < 0 || level >= chunks->file->info.level_count)
-        return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
-                              "level %d has no array number %d of integers", level, (int)id);
-    const ebpo_array_in *array = ebpo_reader_array(chunks->file, id, level);
-    if (!array->present || row > array->shape.rows || rows > array->shape.rows - row ||
-        size < array->shape.element_size)
-        return ebpo_fail_at(error, EBPO_E_ARGUMENT, shown, array->path, -1,
-                            "rows %" PRIu64 " to %" PRIu64
-                            " of %zu bytes are asked for, and the array has %" PRIu64 " of %d",
-                            row, row + rows, size, array->shape.rows, array->shape.element_size);
-    return EBPO_OK;
-}
-
-ebpo_status ebpo_chunks_integers(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row,
-                                 uint64_t rows, void *values, size_t size, ebpo_error *error)
-{
-    ebpo_status status = check_rows(chunks, id, level, row, rows, size, error);
-    if (status != EBPO_OK)
-        return status;
-    const ebpo_array_in *array = ebpo_reader_array(chunks->file, id, level);
-    ebpo_expected expected = EBPO_EXPECTED_INIT(chunks->file);
-    if (!chunks->counted)
-        ebpo_chunks_expect(chunks, &expected, id, level, row, rows);
-    ebpo_expect_all(&expected);
-    ebpo_held_chunk view = { .array = array };
-    uint64_t cols = array->shape.cols ? array->shape.cols : 1;
-    uint8_t *out = values;
-    while (rows && status == EBPO_OK) {
-        status = ebpo_held_chunk_move(chunks, &view, row, error);
-        if (status != EBPO_OK)
-            break;
-        uint64_t here = view.end - row < rows ? view.end - row : rows;
-        widen(&array->shape, view.rows + (row - view.begin) * ebpo_h5_row_bytes(&array->shape),
-              here * cols, out, size);
-        out += here * cols * size;
-        row += here;
-        rows -= here;
-    }
-    ebpo_held_chunk_release(chunks, &view);
-    return status;
-}
-
-ebpo_status ebpo_chunks_take(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t row,
-                             uint64_t rows, size_t size, void *values_out, ebpo_error *error)
-{
-    void *values = NULL;
-    /* before room is made */
-    ebpo_status status = rows ? check_rows(chunks, id, level, row, rows, size, error) : EBPO_OK;
-    if (status == EBPO_OK && rows) {
-        const ebpo_array_in *array = ebpo_reader_array(chunks->file, id, level);
-        uint64_t cols = array->shape.cols ? array->shape.cols : 1;
-        values = ebpo_alloc(rows, size * cols);
-        status = values ? ebpo_chunks_integers(chunks, id, level, row, rows, values, size, error)
-                        : ebpo_fail_memory(error, rows * size * cols);
-    }
-    if (status != EBPO_OK) {
-        free(values);
-        values = NULL;
-    }
-    memcpy(values_out, &values, sizeof values);
-    return status;
 }

@@ -12,8 +12,8 @@
 typedef struct ebpo_chunks ebpo_chunks;
 EBPO_MUST_USE ebpo_status ebpo_chunks_make(ebpo_chunks **out, const ebpo_file *file,
                                            uint64_t budget, ebpo_error *error);
-/* The same for arrays of levels only, by one thread at a time, and counted: nothing is read or
- * announced but what was asked for, and nothing after which the file would have read more than the
+/* The same for one thread at a time, and counted: nothing is read or announced but what was asked
+ * for, and nothing after which the file would have read more than the
  * limit (ebpo_chunks_limit; none at first). Then EBPO_E_LIMIT, and ebpo_chunks_refused is true. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_make_counted(ebpo_chunks **out, const ebpo_file *file,
                                                    uint64_t budget, ebpo_error *error);
@@ -46,6 +46,7 @@ struct ebpo_chunks {
     uint64_t limit;  /* of the bytes that the file has read, announced ones included */
     uint64_t *ahead; /* [ahead_count] keys that have been announced and not been read yet */
     uint64_t ahead_count, ahead_capacity, ahead_bytes;
+    struct ebpo_chunk_keys *collecting; /* ebpo_chunks_collect */
 };
 
 /* A place in an array: at most one chunk, pinned while rows in it are wanted. Begin with { .array =
@@ -78,7 +79,7 @@ EBPO_MUST_USE ebpo_status ebpo_chunks_take(ebpo_chunks *chunks, ebpo_array_id id
                                            void *values_out, ebpo_error *error);
 
 /* Collects the chunks of rows [row, row + rows), as far as the array has them, that are not in
- * memory. */
+ * memory. Counted chunks are announced otherwise (below): nothing, but while they are collected. */
 void ebpo_chunks_expect(ebpo_chunks *chunks, ebpo_expected *expected, ebpo_array_id id, int level,
                         uint64_t row, uint64_t rows);
 
@@ -98,6 +99,13 @@ bool ebpo_chunks_missing(ebpo_chunks *chunks, ebpo_array_id id, int level, uint6
  * count as read. The first `now` are needed at once; the others only as far as what has been
  * announced and not been read stays small, also beside what the limit leaves. */
 void ebpo_chunks_announce(ebpo_chunks *chunks, const uint64_t *keys, unsigned now, unsigned count);
+
+/* Trying out what a reading of counted chunks takes: until this is called with NULL, nothing is
+ * read. What is not in memory is added to `keys`, and reading it fails with EBPO_E_LIMIT. */
+void ebpo_chunks_collect(ebpo_chunks *chunks, ebpo_chunk_keys *keys);
+/* Announces counted chunks, as ebpo_chunks_announce, and reads the first `now`. */
+EBPO_MUST_USE ebpo_status ebpo_chunks_fetch(ebpo_chunks *chunks, const ebpo_chunk_keys *keys,
+                                            unsigned now, ebpo_error *error);
 
 static inline ebpo_status ebpo_chunks_fail(const ebpo_chunks *chunks, int level, ebpo_array_id id,
                                            const char *what, ebpo_error *error)

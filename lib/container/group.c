@@ -284,13 +284,7 @@ ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_number *group
             small += add_small(chunks, level, wanted, &keys);
         for (unsigned i = 1; i < count; i++)
             (void)missing(chunks, &groups[i], wanted, &keys);
-        ebpo_chunks_announce(chunks, keys.key, own, keys.count);
-        for (unsigned i = 0; i < own && status == EBPO_OK; i++) {
-            void *item;
-            status = ebpo_cache_get(chunks->cache, keys.key[i], &item, NULL, error);
-            if (status == EBPO_OK)
-                ebpo_cache_unpin(chunks->cache, keys.key[i]);
-        }
+        status = ebpo_chunks_fetch(chunks, &keys, own, error);
     }
     return status;
 }

@@ -32,8 +32,8 @@ typedef struct ebpo_slice {
 void ebpo_slice_free(ebpo_slice *slice);
 
 /* Reads the subtree of a gray node, or a single leaf, with its faces, and what `needs` names beside
- * them (EBPO_NEEDS_..., schema.h: planes, stored planes of leaves, maps). EBPO_E_ABSENT without
- * mesh. */
+ * them (EBPO_NEEDS_..., schema.h: windings, planes, stored planes of leaves, maps). EBPO_E_ABSENT
+ * without mesh. */
 EBPO_MUST_USE ebpo_status ebpo_slice_read_parts(ebpo_slice *out, ebpo_chunks *chunks,
                                                 const ebpo_node *root, uint32_t needs,
                                                 ebpo_error *error);

@@ -182,7 +182,7 @@ ebpo_status ebpo_slice_read_nodes(ebpo_slice *out, ebpo_chunks *chunks, const eb
 ebpo_status ebpo_slice_read_parts(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_node *root,
                                   uint32_t needs, ebpo_error *error)
 {
-    enum { ALWAYS = EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH | EBPO_NEEDS_SOLID };
+    enum { ALWAYS = EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH };
     memset(out, 0, sizeof *out);
     if (!(chunks->file->info.parts & EBPO_PART_MESH))
         return ebpo_fail_file(error, EBPO_E_ABSENT, chunks->file->in.shown,

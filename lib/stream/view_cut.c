@@ -1,4 +1,4 @@
-/* What of a view has been delivered: its cut, and figures. */
+/* What of a view has been delivered: faces of a leaf, the cut, and figures. */
 #include <math.h>
 
 #include "base/fp_env.h"
@@ -64,4 +64,10 @@ ebpo_status ebpo_view_stream_get_stats(const ebpo_view_stream *s, ebpo_view_stat
     if (s->delivering && s->partial.group_count > 1)
         count_node(s, &s->parent, &stats);
     return EBPO_GIVE(ebpo_view_stats, out, &stats);
+}
+
+ebpo_status ebpo_view_stream_get_faces(const ebpo_view_stream *stream, ebpo_view_faces *out)
+{
+    static const ebpo_view_faces none = EBPO_VIEW_FACES_INIT;
+    return EBPO_GIVE(ebpo_view_faces, out, stream->leaves ? &stream->leaves->now : &none);
 }

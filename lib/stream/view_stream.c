@@ -79,6 +79,8 @@ ebpo_status ebpo_view_stream_new(const ebpo_file *file, const ebpo_view_options 
     if (status == EBPO_OK)
         status = ebpo_chunks_make_counted(&s->chunks, file, s->options.memory, error);
     s->partial.windings = s->options.windings;
+    if (status == EBPO_OK && s->options.faces)
+        status = ebpo_view_leaves_new(&s->leaves, file, error);
     if (status == EBPO_OK && s->options.polygons &&
         !(s->envelopes = ebpo_alloc_zero(1, sizeof *s->envelopes)))
         status = ebpo_fail_memory(error, sizeof *s->envelopes);
@@ -96,6 +98,7 @@ void ebpo_view_stream_free(ebpo_view_stream *s)
     ebpo_chunks_free(s->chunks);
     ebpo_partial_free(&s->partial);
     ebpo_frontier_free(&s->frontier);
+    ebpo_view_leaves_free(s->leaves);
     free(s->envelopes);
     free(s);
 }
@@ -134,10 +137,11 @@ ebpo_status ebpo_view_stream_change(ebpo_view_stream *s, const ebpo_view_options
     if (status != EBPO_OK)
         return status;
     if (wanted.planes != now->planes || wanted.polygons != now->polygons ||
-        wanted.windings != now->windings || wanted.memory != now->memory)
+        wanted.windings != now->windings || wanted.memory != now->memory ||
+        wanted.faces != now->faces)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "view options: planes, polygons, windings and memory cannot be changed; "
-                         "make another stream");
+                         "view options: planes, polygons, windings, memory and faces cannot be "
+                         "changed; make another stream");
     status = take_options(s, &wanted, error);
     if (status != EBPO_OK)
         return status;
@@ -147,28 +151,57 @@ ebpo_status ebpo_view_stream_change(ebpo_view_stream *s, const ebpo_view_options
     return EBPO_OK;
 }
 
-static ebpo_group_number children_of(const ebpo_waiting *w)
+static ebpo_view_group children_of(const ebpo_waiting *w)
 {
-    return (ebpo_group_number){ ebpo_octcode_level(w->octcode) + 1, w->below };
+    return (ebpo_view_group){ { ebpo_octcode_level(w->octcode) + 1, w->below }, w->octcode };
 }
 
-/* Into s->read; of a file far away together with what comes soon. */
-static ebpo_status read_group(ebpo_view_stream *s, ebpo_group_number group, ebpo_error *error)
+/* What comes next, and after it what comes soon; returns how many groups. Of those that stand
+ * together in blocks of so many, one. */
+static unsigned coming(const ebpo_view_stream *s, const ebpo_view_group *first, unsigned block,
+                       ebpo_view_group groups[EBPO_FRONTIER_BLOCKS])
+{
+    uint64_t best[EBPO_FRONTIER_BLOCKS];
+    unsigned count = ebpo_frontier_blocks(&s->frontier, block, best);
+    groups[0] = *first;
+    for (unsigned i = 0; i < count; i++) /* the first is the one at hand */
+        groups[i] = children_of(&s->frontier.at[best[i]]);
+    return count ? count : 1;
+}
+
+/* Of a file far away: the group with what comes soon. */
+static ebpo_status fetch_group(ebpo_view_stream *s, const ebpo_view_group *group, unsigned wanted,
+                               ebpo_error *error)
+{
+    enum { FACES_BLOCK = 64, FACES_AHEAD = 64 }; /* trying out what faces take is work */
+    ebpo_view_group groups[EBPO_FRONTIER_BLOCKS];
+    ebpo_status status = EBPO_OK;
+    if (ebpo_group_is_far(s->chunks, &group->number, wanted)) {
+        ebpo_group_number numbers[EBPO_FRONTIER_BLOCKS];
+        unsigned count = coming(s, group, EBPO_GROUP_BLOCK, groups);
+        for (unsigned i = 0; i < count; i++)
+            numbers[i] = groups[i].number;
+        status = ebpo_group_fetch(s->chunks, numbers, count, wanted, error);
+    }
+    if (status != EBPO_OK || !s->leaves || !ebpo_view_leaves_are_far(s->chunks, group, wanted))
+        return status;
+    unsigned count = coming(s, group, FACES_BLOCK, groups);
+    return ebpo_view_leaves_fetch(s->chunks, groups, count < FACES_AHEAD ? count : FACES_AHEAD,
+                                  wanted, error);
+}
+
+/* Into s->read, and with faces those of its leaves. */
+static ebpo_status read_group(ebpo_view_stream *s, const ebpo_view_group *group, ebpo_error *error)
 {
     unsigned wanted = (s->options.planes || s->options.polygons ? EBPO_GROUP_PLANES : 0u) |
                       (s->options.windings ? EBPO_GROUP_WINDINGS : 0u);
-    ebpo_status status = EBPO_OK;
     ebpo_chunks_limit(s->chunks, s->options.bytes ? s->options.bytes : UINT64_MAX);
-    if (ebpo_group_is_far(s->chunks, &group, wanted)) {
-        uint64_t best[EBPO_FRONTIER_BLOCKS];
-        ebpo_group_number groups[EBPO_FRONTIER_BLOCKS] = { group };
-        unsigned count = ebpo_frontier_blocks(&s->frontier, EBPO_GROUP_BLOCK, best);
-        for (unsigned i = 0; i < count; i++) /* the first is the one at hand */
-            groups[i] = children_of(&s->frontier.at[best[i]]);
-        status = ebpo_group_fetch(s->chunks, groups, count ? count : 1, wanted, error);
-    }
-    return status == EBPO_OK
-               ? ebpo_group_read(s->chunks, group.level, group.group, wanted, &s->read, error)
+    ebpo_status status = fetch_group(s, group, wanted, error);
+    if (status == EBPO_OK)
+        status = ebpo_group_read(s->chunks, group->number.level, group->number.group, wanted,
+                                 &s->read, error);
+    return status == EBPO_OK && s->leaves
+               ? ebpo_view_leaves_read(s->leaves, s->chunks, group, &s->read, error)
                : status;
 }
 
@@ -177,7 +210,7 @@ static ebpo_status read_group(ebpo_view_stream *s, ebpo_group_number group, ebpo
 static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_error *error)
 {
     bool root = s->partial.group_count == 0;
-    ebpo_group_number group = { 0, 0 };
+    ebpo_view_group group = { { 0, 0 }, 0 };
     if (!root && (s->frontier.count == 0 || s->frontier.at[0].turn == EBPO_TURN_NEVER)) {
         *end = EBPO_VIEW_DONE;
         return EBPO_OK;
@@ -191,7 +224,7 @@ static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_err
     if (!root)
         group = children_of(&s->frontier.at[0]);
     ebpo_error why = EBPO_ERROR_INIT;
-    ebpo_status status = read_group(s, group, &why);
+    ebpo_status status = read_group(s, &group, &why);
     if (status == EBPO_E_LIMIT && ebpo_chunks_refused(s->chunks)) {
         *end = EBPO_VIEW_BYTES;
         return EBPO_OK;
@@ -278,6 +311,8 @@ ebpo_status ebpo_view_stream_next(ebpo_view_stream *s, ebpo_view_node *out, ebpo
 {
     EBPO_DEFAULT_FP;
     *end = EBPO_VIEW_NODE;
+    if (s->leaves)
+        ebpo_view_leaves_give_none(s->leaves);
     while (!s->delivering) {
         ebpo_status status = begin_group(s, end, error);
         if (status != EBPO_OK || *end != EBPO_VIEW_NODE)
@@ -286,6 +321,8 @@ ebpo_status ebpo_view_stream_next(ebpo_view_stream *s, ebpo_view_node *out, ebpo
     uint32_t group = (uint32_t)(s->partial.group_count - 1);
     unsigned octant = s->step++ ^ s->flip;
     ebpo_view_fill(s, (ebpo_partial_node){ group, (uint8_t)octant }, out);
+    if (s->leaves)
+        ebpo_view_leaves_give(s->leaves, octant);
     s->delivered++;
     out->complete = s->step == (group ? 8 : 1);
     if (out->complete)

@@ -7,6 +7,7 @@
 #include "stream/frontier.h"
 #include "stream/partial_tree.h"
 #include "stream/observer.h"
+#include "stream/view_faces.h"
 
 struct ebpo_view_stream {
     const ebpo_file *file;
@@ -26,6 +27,7 @@ struct ebpo_view_stream {
     ebpo_group read;
     ebpo_envelope_stack *envelopes; /* with polygons */
     ebpo_node_buffers capacity;
+    ebpo_view_leaves *leaves; /* with faces */
 };
 
 /* All about a node of `grown`; `complete` is left to the caller. */

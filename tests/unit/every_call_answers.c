@@ -216,10 +216,11 @@ static ebpo_status take_view(ebpo_view_stream *stream, int most, ebpo_error *err
 {
     ebpo_view_node node;
     ebpo_view_end end = EBPO_VIEW_NODE;
+    ebpo_view_faces faces = EBPO_VIEW_FACES_INIT;
     ebpo_status status = EBPO_OK;
     while (end == EBPO_VIEW_NODE && status == EBPO_OK && most--)
         status = ebpo_view_stream_next(stream, &node, &end, error);
-    return status;
+    return status == EBPO_OK ? ebpo_view_stream_get_faces(stream, &faces) : status;
 }
 
 static ebpo_status view(ebpo_view_stream *stream, ebpo_view_options *options, ebpo_error *error)
@@ -245,7 +246,7 @@ static ebpo_status call_view(every_call_env *e)
     observer.direction[2] = -1;
     options.priority = EBPO_PRIORITY_PIXELS;
     options.observer = &observer;
-    options.polygons = options.windings = true;
+    options.polygons = options.windings = options.faces = true;
     ebpo_status status = ebpo_view_stream_new(e->file, &options, &stream, e->error);
     if (status == EBPO_OK)
         status = view(stream, &options, e->error);

@@ -9,6 +9,7 @@
 #include <ebpo/ebpo.h>
 
 #include "check_main.h"
+#include "counted_source.h"
 #include "random_tree.h"
 #include "scratch.h"
 #include "solids.h"
@@ -81,72 +82,6 @@ static ebpo_file *open_solid(const char *name, uint32_t leaf_faces)
 {
     write_solid(ebpo_test_make(name), USUAL | EBPO_PART_LEAF_PLANES, leaf_faces);
     return open_file();
-}
-
-/* A source that counts each byte once that is read or announced, and can fail. */
-typedef struct counted {
-    uint8_t *data, *touched;
-    uint64_t size, asked;
-    bool far, failing;
-} counted;
-
-static void touch(counted *c, uint64_t offset, uint64_t size)
-{
-    for (uint64_t i = offset; i < offset + size; i++) {
-        c->asked += !c->touched[i];
-        c->touched[i] = 1;
-    }
-}
-
-static ebpo_status read_counted(void *user, uint64_t offset, uint64_t size, void *data,
-                                ebpo_error *error)
-{
-    counted *c = user;
-    if (c->failing) {
-        error->status = EBPO_E_IO;
-        strcpy(error->message, "the line is down");
-        return EBPO_E_IO;
-    }
-    touch(c, offset, size);
-    memcpy(data, c->data + offset, size);
-    return EBPO_OK;
-}
-
-static void expect_counted(void *user, const ebpo_range *ranges, size_t count)
-{
-    for (size_t i = 0; i < count; i++)
-        touch(user, ranges[i].offset, ranges[i].size);
-}
-
-static ebpo_file *open_counted(counted *c, bool far)
-{
-    ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_file *file = NULL;
-    FILE *f = fopen(path, "rb");
-    fseek(f, 0, SEEK_END);
-    *c = (counted){ .size = (uint64_t)ftell(f), .far = far };
-    rewind(f);
-    c->data = malloc(c->size);
-    c->touched = calloc(c->size, 1);
-    ck_assert_uint_eq(fread(c->data, 1, c->size, f), c->size);
-    fclose(f);
-    ebpo_source source = {
-        .struct_size = sizeof(ebpo_source), .user = c, .size = c->size, .read = read_counted
-    };
-    if (far) {
-        source.prefetch = expect_counted;
-        source.prefetched = c->size < 4096 ? c->size : 4096;
-    }
-    ck_assert_msg(ebpo_open_source(&source, "counted", &file, &error) == EBPO_OK, "%s",
-                  error.message);
-    return file;
-}
-
-static void close_counted(counted *c, ebpo_file *file)
-{
-    ebpo_close(file);
-    free(c->data);
-    free(c->touched);
 }
 
 /* --- the twin: all nodes by the ordinary stream, and keys computed plainly --- */
@@ -784,8 +719,8 @@ START_TEST(budgets_of_bytes_are_kept_and_only_cut_the_sequence_short)
 {
     uint64_t random = 40 + (uint64_t)_i, all_count, count = 0, bytes;
     write_random(7, 13, true, true);
-    counted c;
-    ebpo_file *file = open_counted(&c, false);
+    counted_source c;
+    ebpo_file *file = counted_open(&c, path, false);
     ebpo_observer observer = observer_of(file, &random);
     ebpo_view_options options = options_of((ebpo_priority)(_i % PRIORITIES), &observer);
     ebpo_view_end end;
@@ -795,9 +730,9 @@ START_TEST(budgets_of_bytes_are_kept_and_only_cut_the_sequence_short)
     ebpo_view_stream_free(stream);
     bytes = ebpo_test_file_stats(file).bytes_read;
     uint64_t needed = bytes, stops = 0;
-    close_counted(&c, file);
+    counted_close(&c, file);
     for (int far = 0; far < 2; far++) {
-        file = open_counted(&c, far);
+        file = counted_open(&c, path, far);
         bytes = ebpo_test_file_stats(file).bytes_read;
         options.bytes = bytes / 2;
         uint64_t opening = bytes; /* which does not know of the budget */
@@ -822,7 +757,7 @@ START_TEST(budgets_of_bytes_are_kept_and_only_cut_the_sequence_short)
         }
         ck_assert_uint_eq(count, all_count);
         ebpo_view_stream_free(stream);
-        close_counted(&c, file);
+        counted_close(&c, file);
     }
     ck_assert_uint_gt(stops, 20);
     free(all);
@@ -873,9 +808,9 @@ START_TEST(one_may_try_again_after_a_failure_and_streams_do_not_disturb_each_oth
 {
     uint64_t random = 70, all_count, count = 0;
     write_random(7, 13, false, true);
-    counted c;
+    counted_source c;
     ebpo_view_end end;
-    ebpo_file *file = open_counted(&c, _i == 1);
+    ebpo_file *file = counted_open(&c, path, _i == 1);
     ebpo_observer observer = observer_of(file, &random);
     ebpo_view_options options = options_of(EBPO_PRIORITY_DISTANCE, &observer);
     ebpo_view_stream *stream = new_view(file, &options);
@@ -906,7 +841,7 @@ START_TEST(one_may_try_again_after_a_failure_and_streams_do_not_disturb_each_oth
     ebpo_view_stream_free(stream);
     ebpo_view_stream_free(other);
     ebpo_view_stream_free(NULL);
-    close_counted(&c, file);
+    counted_close(&c, file);
 }
 END_TEST
 

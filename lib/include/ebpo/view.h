@@ -136,12 +136,23 @@ typedef struct ebpo_view_options {
      * the cut, and the plane codes.
      */
     uint64_t memory;
+
+    /*
+     * With each leaf read its faces (ebpo_view_stream_get_faces), within the limits of bytes and
+     * memory. Beside these, the stream takes one bit more for each face of the file.
+     */
+    bool faces;
+
+    uint8_t reserved[7];
 } ebpo_view_options;
 
 #define EBPO_VIEW_OPTIONS_INIT                                                     \
     {                                                                              \
         sizeof(ebpo_view_options), EBPO_PRIORITY_LEVEL, NULL, EBPO_UNSEEN_LAST, 0, \
-            __builtin_inf(), -1, 0, 0, true, false, false, 0                       \
+            __builtin_inf(), -1, 0, 0, true, false, false, 0, false,               \
+        {                                                                          \
+            0                                                                      \
+        }                                                                          \
     }
 
 typedef struct ebpo_view_node {
@@ -187,7 +198,8 @@ typedef struct ebpo_view_stream ebpo_view_stream;
  * Makes a stream of an open file, which must stay open. Nothing is read yet.
  * Others may use the file, but what they read counts as well (options.bytes).
  *
- * EBPO_E_ARGUMENT: options that make no sense. EBPO_E_MEMORY.
+ * EBPO_E_ARGUMENT: options that make no sense. EBPO_E_ABSENT: faces are wanted, and the file has no
+ * mesh. EBPO_E_MEMORY.
  *
  * Threads: any.
  */
@@ -220,6 +232,42 @@ EBPO_API void ebpo_view_stream_free(ebpo_view_stream *stream);
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_view_stream_next(ebpo_view_stream *stream,
                                                          ebpo_view_node *out, ebpo_view_end *end,
                                                          ebpo_error *error);
+
+/* The faces of a leaf: all that touch its cell. */
+typedef struct ebpo_view_faces {
+    size_t struct_size; /* EBPO_VIEW_FACES_INIT sets it */
+
+    /* All, and those of them that have come with no leaf before. */
+    uint64_t face_count, new_count;
+
+    /* [face_count] corner after corner, in the model's unit */
+    const double (*corners)[3][3];
+
+    /* [face_count] number in the file, ascending */
+    const uint32_t *numbers;
+
+    /*
+     * [face_count] 1: has come with a leaf before, so that who draws the others draws each face
+     * once; else 0
+     */
+    const uint8_t *repeated;
+} ebpo_view_faces;
+
+#define EBPO_VIEW_FACES_INIT EBPO_SIZED(ebpo_view_faces)
+
+/*
+ * With options.faces: those of the leaf that ebpo_view_stream_next gave last; none if it gave
+ * another node or none. Arrays are the stream's, until the next call on it.
+ *
+ * They have been read with the leaf and its siblings, at most as far as options.bytes allows: where
+ * their faces would exceed it, the siblings do not come either.
+ *
+ * EBPO_E_ARGUMENT: `out` was not begun with its macro.
+ *
+ * Threads: one per stream.
+ */
+EBPO_API ebpo_status ebpo_view_stream_get_faces(const ebpo_view_stream *stream,
+                                                ebpo_view_faces *out);
 
 /*
  * Takes other options, for example an observer who has moved. The cut stays; what

@@ -1,0 +1,298 @@
+/* The faces that come with the leaves of a view, against the leaves' lists in the whole file. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/ebpo.h>
+
+#include "check_main.h"
+#include "counted_source.h"
+#include "random_tree.h"
+#include "scratch.h"
+#include "solids.h"
+
+/* ck_assert tells its parent process each time that it is passed. */
+#define EXPECT(condition)                                      \
+    do {                                                       \
+        if (!(condition))                                      \
+            ck_abort_msg("line %d: %s", __LINE__, #condition); \
+    } while (0)
+
+static const char *path;
+
+static void make_folder(void)
+{
+    scratch_enter();
+    path = scratch("x.ebpo.h5");
+}
+
+/* --- files --- */
+
+static void write_tree(ebpo_tree *tree)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert_msg(ebpo_tree_write(tree, path, NULL, &error) == EBPO_OK, "%s", error.message);
+    ebpo_tree_free(tree);
+}
+
+static void write_solid(ebpo_mesh mesh, uint32_t parts)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_mesh_report report;
+    ebpo_mend_record mend = { 0 };
+    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_tree tree;
+    options.parts = parts;
+    options.leaf_faces = 6;
+    ck_assert_msg(ebpo_mesh_check(&mesh, 0, options.progress, &report, &error) == EBPO_OK, "%s",
+                  error.message);
+    ck_assert_msg(ebpo_build(&mesh, &report, &mend, &options, &tree, &error) == EBPO_OK, "%s",
+                  error.message);
+    write_tree(&tree);
+}
+
+/* Model 0 and 1: a solid and a tree of many chunks; even ones have floats. */
+static void write_model(int i)
+{
+    if (i % 2) {
+        random_tree_options options = { 5 + (uint64_t)i, 6, 12, 4, true, i % 4 == 1, true, false };
+        ebpo_tree tree;
+        random_tree_make(&tree, &options);
+        write_tree(&tree);
+        return;
+    }
+    ebpo_mesh mesh = ebpo_test_torus(2, 0.7, 120, 80);
+    ebpo_test_to_float(&mesh);
+    write_solid(mesh, EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS);
+}
+
+static ebpo_view_options viewing(const ebpo_info *info, int priority, ebpo_observer *observer)
+{
+    ebpo_view_options options = EBPO_VIEW_OPTIONS_INIT;
+    *observer = (ebpo_observer)EBPO_OBSERVER_INIT;
+    for (int k = 0; k < 3; k++) {
+        observer->eye[k] = info->box_origin[k] + 0.1 * (k + 1) * info->box_size[k];
+        observer->direction[k] = 1 + 0.1 * k;
+    }
+    options.priority = (ebpo_priority)priority;
+    options.observer = observer;
+    options.faces = true;
+    return options;
+}
+
+/* --- the twin --- */
+
+typedef struct twin {
+    ebpo_mesh mesh;
+    uint8_t *given;
+    uint64_t leaves, repeated, fresh;
+} twin;
+
+static void check_corners(const twin *t, const ebpo_view_faces *f)
+{
+    for (uint64_t i = 0; i < f->face_count; i++)
+        for (int k = 0; k < 3; k++) {
+            double corner[3];
+            ebpo_test_point(&t->mesh, t->mesh.faces[3 * (uint64_t)f->numbers[i] + (uint64_t)k],
+                            corner);
+            EXPECT(memcmp(corner, f->corners[i][k], sizeof corner) == 0);
+        }
+}
+
+/* The list is that which the subtree of this leaf has. */
+static void check_leaf(twin *t, const ebpo_file *file, uint64_t octcode, const ebpo_view_faces *f)
+{
+    ebpo_subtree *subtree = NULL;
+    ebpo_subtree_faces own = EBPO_SUBTREE_FACES_INIT;
+    uint64_t fresh = 0;
+    if (t->leaves++ % 97 == 0) {
+        EXPECT(ebpo_subtree_open(file, octcode, NULL, &subtree, NULL) == EBPO_OK);
+        EXPECT(ebpo_subtree_get_faces(subtree, &own, NULL) == EBPO_OK);
+        EXPECT(own.face_count == f->face_count);
+        for (uint64_t i = 0; i < own.face_count; i++)
+            EXPECT(own.numbers[i] == f->numbers[i]);
+        ebpo_subtree_close(subtree);
+    }
+    for (uint64_t i = 0; i < f->face_count; i++) {
+        EXPECT(f->numbers[i] < t->mesh.face_count);
+        EXPECT(f->repeated[i] == t->given[f->numbers[i]]);
+        fresh += !f->repeated[i];
+        t->given[f->numbers[i]] = 1;
+    }
+    EXPECT(fresh == f->new_count);
+    t->fresh += fresh;
+    t->repeated += f->face_count - fresh;
+    check_corners(t, f);
+}
+
+/* Takes the stream to its end, or to that of a budget. */
+static ebpo_view_end take_all(ebpo_view_stream *stream, const ebpo_file *whole, twin *t)
+{
+    ebpo_view_node node;
+    ebpo_view_end end;
+    for (;;) {
+        ebpo_error error = EBPO_ERROR_INIT;
+        ebpo_view_faces faces = EBPO_VIEW_FACES_INIT;
+        ck_assert_msg(ebpo_view_stream_next(stream, &node, &end, &error) == EBPO_OK, "%s",
+                      error.message);
+        EXPECT(ebpo_view_stream_get_faces(stream, &faces) == EBPO_OK);
+        if (end != EBPO_VIEW_NODE || node.node.type != EBPO_LEAF)
+            EXPECT(faces.face_count == 0 && faces.new_count == 0);
+        else
+            check_leaf(t, whole, node.node.octcode, &faces);
+        if (end != EBPO_VIEW_NODE)
+            return end;
+    }
+}
+
+static twin twin_make(ebpo_file **whole)
+{
+    twin t = { .leaves = 0 };
+    ck_assert(ebpo_open(path, whole, NULL) == EBPO_OK);
+    ck_assert(ebpo_file_read_mesh(*whole, NULL, &t.mesh, NULL) == EBPO_OK);
+    t.given = calloc(t.mesh.face_count, 1);
+    return t;
+}
+
+static void twin_free(twin *t, ebpo_file *whole)
+{
+    free(t->given);
+    ebpo_mesh_free(&t->mesh);
+    ebpo_close(whole);
+}
+
+/* --- tests --- */
+
+START_TEST(every_face_comes_with_its_leaves_and_once_new)
+{
+    ebpo_file *whole = NULL;
+    ebpo_observer observer;
+    write_model(_i);
+    for (int far = 0; far < 2; far++) {
+        counted_source c;
+        ebpo_file *file = counted_open(&c, path, far);
+        twin t = twin_make(&whole);
+        ebpo_view_options options = viewing(ebpo_file_info(file), (_i + far) % 4, &observer);
+        ebpo_view_stream *stream = NULL;
+        options.memory = far ? 0 : 2 << 20;
+        ck_assert(ebpo_view_stream_new(file, &options, &stream, NULL) == EBPO_OK);
+        ck_assert_int_eq(take_all(stream, whole, &t), EBPO_VIEW_DONE);
+        ck_assert_uint_eq(t.fresh, t.mesh.face_count);
+        ck_assert_uint_gt(t.repeated, 0);
+        if (far) /* nearly nothing is waited for by itself */
+            ck_assert_msg(c.alone < 16 && c.batches > 0, "%llu reads, %llu batches",
+                          (unsigned long long)c.alone, (unsigned long long)c.batches);
+        ebpo_view_stream_free(stream);
+        counted_close(&c, file);
+        twin_free(&t, whole);
+    }
+}
+END_TEST
+
+START_TEST(faces_count_in_the_budget_of_bytes)
+{
+    ebpo_file *whole = NULL;
+    ebpo_observer observer;
+    write_model(_i);
+    counted_source c;
+    ebpo_file *file = counted_open(&c, path, _i > 1);
+    twin t = twin_make(&whole);
+    ebpo_view_options options = viewing(ebpo_file_info(file), _i % 4, &observer);
+    ebpo_view_stream *stream = NULL;
+    ebpo_view_end end = EBPO_VIEW_BYTES;
+    uint64_t stops = 0;
+    options.bytes = ebpo_test_file_stats(file).bytes_read;
+    ck_assert(ebpo_view_stream_new(file, &options, &stream, NULL) == EBPO_OK);
+    while ((end = take_all(stream, whole, &t)) == EBPO_VIEW_BYTES) {
+        uint64_t bytes = ebpo_test_file_stats(file).bytes_read;
+        ck_assert_msg(bytes <= options.bytes && c.asked <= options.bytes,
+                      "%llu read, %llu asked for, %llu allowed", (unsigned long long)bytes,
+                      (unsigned long long)c.asked, (unsigned long long)options.bytes);
+        options.bytes += c.size / 24;
+        ck_assert(ebpo_view_stream_change(stream, &options, NULL) == EBPO_OK);
+        ck_assert_uint_lt(stops++, 500);
+    }
+    ck_assert_uint_gt(stops, 8);
+    ck_assert_int_eq(end, EBPO_VIEW_DONE);
+    ck_assert_uint_eq(t.fresh, t.mesh.face_count);
+    ebpo_view_stream_free(stream);
+    counted_close(&c, file);
+    twin_free(&t, whole);
+}
+END_TEST
+
+START_TEST(one_may_try_again_after_a_failure)
+{
+    ebpo_file *whole = NULL;
+    ebpo_observer observer;
+    write_model(0);
+    counted_source c;
+    ebpo_file *file = counted_open(&c, path, _i == 1);
+    twin t = twin_make(&whole);
+    ebpo_view_options options = viewing(ebpo_file_info(file), 1, &observer);
+    ebpo_view_stream *stream = NULL;
+    uint64_t state = 5, failed = 0;
+    ck_assert(ebpo_view_stream_new(file, &options, &stream, NULL) == EBPO_OK);
+    for (;;) {
+        ebpo_view_node node;
+        ebpo_view_end end;
+        ebpo_view_faces faces = EBPO_VIEW_FACES_INIT;
+        c.failing = ebpo_test_random(&state) % 2;
+        ebpo_status status = ebpo_view_stream_next(stream, &node, &end, NULL);
+        c.failing = false;
+        failed += status == EBPO_E_IO;
+        EXPECT(status == EBPO_OK || status == EBPO_E_IO);
+        EXPECT(ebpo_view_stream_get_faces(stream, &faces) == EBPO_OK);
+        if (status != EBPO_OK)
+            EXPECT(faces.face_count == 0);
+        else if (end != EBPO_VIEW_NODE)
+            break;
+        else if (node.node.type == EBPO_LEAF)
+            check_leaf(&t, whole, node.node.octcode, &faces);
+    }
+    ck_assert_uint_gt(failed, 3);
+    ck_assert_uint_eq(t.fresh, t.mesh.face_count);
+    ebpo_view_stream_free(stream);
+    counted_close(&c, file);
+    twin_free(&t, whole);
+}
+END_TEST
+
+START_TEST(without_the_option_or_a_mesh_there_are_none)
+{
+    ebpo_file *file = NULL;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_view_stream *stream = NULL;
+    ebpo_view_options options = EBPO_VIEW_OPTIONS_INIT;
+    ebpo_view_node node;
+    ebpo_view_end end;
+    ebpo_view_faces faces = EBPO_VIEW_FACES_INIT, unsized = { 0 };
+    write_solid(ebpo_test_make("torus"), EBPO_PART_PLANES);
+    ck_assert(ebpo_open(path, &file, NULL) == EBPO_OK);
+    ck_assert(ebpo_view_stream_new(file, &options, &stream, NULL) == EBPO_OK);
+    ck_assert(ebpo_view_stream_next(stream, &node, &end, NULL) == EBPO_OK);
+    ck_assert_int_eq(ebpo_view_stream_get_faces(stream, &unsized), EBPO_E_ARGUMENT);
+    ck_assert_int_eq(ebpo_view_stream_get_faces(stream, &faces), EBPO_OK);
+    ck_assert(faces.face_count == 0 && !faces.corners);
+    options.faces = true;
+    ck_assert_int_eq(ebpo_view_stream_change(stream, &options, NULL), EBPO_E_ARGUMENT);
+    ebpo_view_stream_free(stream);
+    ck_assert_int_eq(ebpo_view_stream_new(file, &options, &stream, &error), EBPO_E_ABSENT);
+    ck_assert_ptr_nonnull(strstr(error.message, "without its mesh"));
+    ebpo_close(file);
+}
+END_TEST
+
+Suite *test_suite(void)
+{
+    Suite *suite = suite_create("view_faces");
+    TCase *tests = tcase_create("view_faces");
+    tcase_set_timeout(tests, 600);
+    tcase_add_checked_fixture(tests, make_folder, scratch_leave);
+    tcase_add_loop_test(tests, every_face_comes_with_its_leaves_and_once_new, 0, 4);
+    tcase_add_loop_test(tests, faces_count_in_the_budget_of_bytes, 0, 4);
+    tcase_add_loop_test(tests, one_may_try_again_after_a_failure, 0, 2);
+    tcase_add_test(tests, without_the_option_or_a_mesh_there_are_none);
+    suite_add_tcase(suite, tests);
+    return suite;
+}
