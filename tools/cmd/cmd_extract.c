@@ -1,4 +1,4 @@
-/* ebpo extract: a level's envelopes, or the model itself, as PLY. */
+/* ebpo extract: a level's envelopes, the model itself, or a part of it, as PLY. */
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
@@ -11,8 +11,15 @@
 #include "cli/words.h"
 #include "cmd/commands.h"
 
+/* What is written. */
+typedef struct extracted {
+    ebpo_mesh mesh;
+    ebpo_subtree *lender; /* of the mesh, unless NULL */
+    double volume;
+} extracted;
+
 typedef struct values {
-    int64_t level, threads;
+    int64_t level, subtree, threads;
     memory_values memory;
     bool mesh, no_walls, quiet;
     remote_values remote;
@@ -23,6 +30,8 @@ static const arg_option options[] = {
                "the envelopes of level N, and leaves and black nodes above it"),
     OPTION_FLAG("mesh", 0, values, mesh,
                 "the model itself, bit for bit; in the order of the source if the maps are stored"),
+    OPTION_INT("subtree", 0, values, subtree, "OCTCODE", 1, INT64_MAX,
+               "the faces that touch the cell of this node, a gray one or a leaf, and no others"),
     OPTION_FLAG("no-walls", 0, values, no_walls,
                 "with --level: leave out polygons that lie on cell walls"),
     OPTION_THREADS(values, threads),
@@ -37,19 +46,21 @@ static const arg_spec spec = {
     .operands = "FILE OUT.ply",
     .least = 2,
     .most = 2,
-    .summary = "writes a level's envelopes, or the model itself, as PLY",
-    .text = "FILE is an .ebpo.h5 file or its URL. Either --level or --mesh is needed. A level's "
-            "polygons are held in memory whatever --memory says.",
+    .summary = "writes a level's envelopes, the model, or a part of it, as PLY",
+    .text = "FILE is an .ebpo.h5 file or its URL. One of --level, --mesh and --subtree is needed. "
+            "A level's polygons are held in memory whatever --memory says.",
     .options = options,
 };
 
 static int check_values(const values *v, const char *in, const char *out)
 {
-    if (v->level < 0 && !v->mesh)
-        return command_usage("extract", "nothing to extract; give --level N or --mesh");
-    if (v->level >= 0 && v->mesh)
-        return command_usage("extract", "--level and --mesh cannot be used together");
-    if (v->mesh && v->no_walls)
+    int asked = (v->level >= 0) + v->mesh + (v->subtree > 0);
+    if (asked == 0)
+        return command_usage("extract",
+                             "nothing to extract; give --level N, --mesh or --subtree OCTCODE");
+    if (asked > 1)
+        return command_usage("extract", "--level, --mesh and --subtree cannot be used together");
+    if (v->level < 0 && v->no_walls)
         return command_usage("extract",
                              "--no-walls belongs to --level; the model has no cell walls");
     if (command_overwrites("extract", in, out))
@@ -57,21 +68,44 @@ static int check_values(const values *v, const char *in, const char *out)
     return EXIT_FINE;
 }
 
-static ebpo_status take(ebpo_file *file, const values *v, const char *path,
-                        ebpo_workspace *workspace, ebpo_progress progress, ebpo_mesh *out,
-                        double *volume, ebpo_error *error)
+/* Its faces as a mesh, lent by the subtree. */
+static ebpo_status take_subtree(const ebpo_file *file, const values *v,
+                                const ebpo_workspace *workspace, extracted *out, ebpo_error *error)
 {
+    ebpo_subtree_options how = EBPO_SUBTREE_OPTIONS_INIT;
+    ebpo_subtree_faces faces = EBPO_SUBTREE_FACES_INIT;
+    ebpo_workspace_stats allowed = EBPO_WORKSPACE_STATS_INIT;
+    ebpo_workspace_get_stats(workspace, &allowed);
+    how.parts = EBPO_PART_MESH;
+    how.memory = allowed.memory;
+    ebpo_status status = ebpo_subtree_open(file, (uint64_t)v->subtree, &how, &out->lender, error);
+    if (status == EBPO_OK)
+        status = ebpo_subtree_get_faces(out->lender, &faces, error);
+    out->mesh.vertex_count = faces.vertex_count;
+    out->mesh.face_count = faces.face_count;
+    out->mesh.xyz32 = (float *)faces.xyz32;
+    out->mesh.xyz64 = (double *)faces.xyz64;
+    out->mesh.faces = (uint32_t *)faces.faces;
+    return status;
+}
+
+static ebpo_status take(ebpo_file *file, const values *v, const char *path,
+                        ebpo_workspace *workspace, ebpo_progress progress, extracted *out,
+                        ebpo_error *error)
+{
+    if (v->subtree > 0)
+        return take_subtree(file, v, workspace, out, error);
     if (!v->mesh) {
         ebpo_lod_options lod = EBPO_LOD_OPTIONS_INIT;
         lod.walls = !v->no_walls;
         lod.threads = (unsigned)v->threads;
         lod.progress = progress;
         lod.workspace = workspace;
-        return ebpo_lod_level(file, (int)v->level, &lod, out, volume, error);
+        return ebpo_lod_level(file, (int)v->level, &lod, &out->mesh, &out->volume, error);
     }
     bool source_order = false;
     ebpo_read_options read = reading(v->threads, workspace);
-    ebpo_status status = ebpo_file_read_source_mesh(file, &read, out, &source_order, error);
+    ebpo_status status = ebpo_file_read_source_mesh(file, &read, &out->mesh, &source_order, error);
     if (status == EBPO_OK && !source_order)
         fprintf(
             stderr,
@@ -84,18 +118,18 @@ static ebpo_status take(ebpo_file *file, const values *v, const char *path,
     return status;
 }
 
-static void summarise(const values *v, const char *out, const ebpo_mesh *mesh, double volume)
+static void summarise(const values *v, const char *path, const extracted *out)
 {
     char vertices[40], faces[40];
-    words_plural(vertices, sizeof vertices, mesh->vertex_count, "vertex", "vertices");
-    words_plural(faces, sizeof faces, mesh->face_count, "face", "faces");
-    printf("%s: %s, %s", out, vertices, faces);
-    if (!v->mesh)
-        printf(", envelope volume %.9g", volume);
+    words_plural(vertices, sizeof vertices, out->mesh.vertex_count, "vertex", "vertices");
+    words_plural(faces, sizeof faces, out->mesh.face_count, "face", "faces");
+    printf("%s: %s, %s", path, vertices, faces);
+    if (v->level >= 0)
+        printf(", envelope volume %.9g", out->volume);
     putchar('\n');
 }
 
-static const values usual = { .level = -1, .remote = REMOTE_VALUES_INIT };
+static const values usual = { .level = -1, .subtree = -1, .remote = REMOTE_VALUES_INIT };
 
 static int run(void *given, const char **operand)
 {
@@ -111,24 +145,25 @@ static int run(void *given, const char **operand)
     ebpo_progress progress = progress_start(&line, "extract", v->quiet);
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
-    ebpo_mesh mesh = { 0 };
-    double volume = 0;
+    extracted out = { .volume = 0 };
     ebpo_workspace *workspace = NULL;
     ebpo_status status = memory_make(&workspace, &v->memory, &error);
     if (status == EBPO_OK)
         status = remote_open(&file, operand[0], &v->remote, &error);
     if (status == EBPO_OK)
-        status = take(file, v, operand[0], workspace, progress, &mesh, &volume, &error);
+        status = take(file, v, operand[0], workspace, progress, &out, &error);
     if (status == EBPO_OK)
-        status = ebpo_mesh_write_ply(&mesh, operand[1], &error);
+        status = ebpo_mesh_write_ply(&out.mesh, operand[1], &error);
     progress_wipe(&line);
     if (status == EBPO_OK && !v->quiet)
-        summarise(v, operand[1], &mesh, volume);
+        summarise(v, operand[1], &out);
     if (status == EBPO_OK) {
         traffic t = traffic_of(file);
         remote_tell(&t, &v->remote, false);
     }
-    ebpo_mesh_free(&mesh);
+    if (!out.lender)
+        ebpo_mesh_free(&out.mesh);
+    ebpo_subtree_close(out.lender);
     ebpo_close(file);
     ebpo_workspace_free(workspace);
     return status == EBPO_OK ? EXIT_FINE : command_failed("extract", &error);
