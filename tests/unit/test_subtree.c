@@ -1,5 +1,6 @@
 /* Subtrees as plain arrays, against a twin that reads the whole file and picks by hand. */
 #include <math.h>
+#include <pthread.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -48,8 +49,10 @@ static ebpo_file *write_tree(ebpo_tree *tree, uint32_t parts, ebpo_codec codec)
 
 static ebpo_file *write_random(uint64_t seed, int levels, unsigned gray_share, bool leaf_planes)
 {
-    random_tree_options options = { seed,          levels,        gray_share,    5,
-                                    seed % 3 != 0, seed % 2 != 0, seed % 4 != 0, leaf_planes };
+    bool solid = seed % 3 != 0;
+    random_tree_options options = {
+        seed, levels, gray_share, 5, solid, seed % 2 != 0, solid && seed % 4 != 0, leaf_planes
+    };
     ebpo_tree tree;
     random_tree_make(&tree, &options);
     return write_tree(&tree, ~0u, EBPO_CODEC_ZSTD);
@@ -390,17 +393,22 @@ START_TEST(subtrees_of_larger_trees_agree)
 }
 END_TEST
 
-static ebpo_file *write_subset(void)
+/* Of a solid, or of a tree in which white nodes have winding numbers. */
+static ebpo_file *write_subset(bool windings)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_subset_options options = EBPO_SUBSET_OPTIONS_INIT;
-    ebpo_file *small = NULL,
-              *file = write_solid(ebpo_test_torus(2, 0.7, 40, 30), USUAL, 4, EBPO_CODEC_ZSTD);
+    ebpo_file *small = NULL, *file = windings ? write_random(7, 6, 8, false)
+                                              : write_solid(ebpo_test_torus(2, 0.7, 40, 30), USUAL,
+                                                            4, EBPO_CODEC_ZSTD);
+    const ebpo_info *info = ebpo_file_info(file);
     const char *name = scratch("small.ebpo.h5");
     options.last_level = 4;
     options.boxed = true;
-    for (int k = 0; k < 3; k++)
-        options.max[k] = 3;
+    for (int k = 0; k < 3; k++) {
+        options.min[k] = info->box_origin[k] + 0.4 * info->box_size[k];
+        options.max[k] = info->box_origin[k] + 0.9 * info->box_size[k];
+    }
     ck_assert_msg(ebpo_subset(file, name, &options, &error) == EBPO_OK, "%s", error.message);
     ebpo_close(file);
     ck_assert_msg(ebpo_open(name, &small, &error) == EBPO_OK, "%s", error.message);
@@ -410,7 +418,7 @@ static ebpo_file *write_subset(void)
 
 START_TEST(subtrees_of_subsets_end_where_these_do)
 {
-    ebpo_file *file = write_subset();
+    ebpo_file *file = write_subset(_i);
     check_all(file, 1);
     ebpo_close(file);
 }
@@ -517,6 +525,19 @@ START_TEST(leaves_are_those_of_whole_levels)
 }
 END_TEST
 
+/* Planes of all that is above a node. */
+static uint64_t planes_above(const ebpo_subtree_nodes *nodes, uint64_t number)
+{
+    uint64_t planes = nodes->above_first[nodes->level], code = nodes->octcodes[number] >> 3;
+    for (uint64_t i = number; i > 0 && code; code >>= 3) {
+        while (i > 0 && nodes->octcodes[i] != code)
+            i--;
+        if (nodes->octcodes[i] == code)
+            planes += nodes->plane_first[i + 1] - nodes->plane_first[i];
+    }
+    return planes;
+}
+
 /* What a node inherits, its own planes and its cell bound the envelope's corners. */
 START_TEST(inherited_half_spaces_bound_the_envelope)
 {
@@ -535,6 +556,7 @@ START_TEST(inherited_half_spaces_bound_the_envelope)
                 const double *x = n.node.vertices[v], *a = n.inherited[h];
                 EXPECT(a[0] * x[0] + a[1] * x[1] + a[2] * x[2] <= a[3] + 1e-9);
             }
+        EXPECT(n.inherited_count == planes_above(&nodes, i));
         inherited += n.inherited_count;
     }
     ck_assert_uint_gt(inherited, nodes.node_count);
@@ -542,6 +564,44 @@ START_TEST(inherited_half_spaces_bound_the_envelope)
     ck_assert_int_eq(ebpo_subtree_get_node(subtree, nodes.node_count, true, &none, &error),
                      EBPO_E_ARGUMENT);
     ebpo_subtree_close(subtree);
+    ebpo_close(file);
+}
+END_TEST
+
+/* --- threads --- */
+
+typedef struct opening {
+    const twin *t;
+    const ebpo_file *file;
+    uint64_t first;
+} opening;
+
+static void *open_some(void *user)
+{
+    const opening *o = user;
+    ebpo_subtree_options options = with_corners();
+    for (int level = 1; level < o->t->tree.info.level_count; level++)
+        for (uint64_t k = o->first; k < o->t->count[level]; k += 40)
+            if (o->t->node[level][k].type == EBPO_GRAY)
+                check_subtree(o->t, o->file, &o->t->node[level][k], &options);
+    return NULL;
+}
+
+START_TEST(threads_share_a_file)
+{
+    enum { THREADS = 4 };
+    pthread_t thread[THREADS];
+    opening o[THREADS];
+    twin t;
+    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 40, 30), USUAL, 4, EBPO_CODEC_ZSTD);
+    twin_make(&t, file);
+    for (unsigned i = 0; i < THREADS; i++) {
+        o[i] = (opening){ &t, file, i };
+        ck_assert_int_eq(pthread_create(&thread[i], NULL, open_some, &o[i]), 0);
+    }
+    for (unsigned i = 0; i < THREADS; i++)
+        ck_assert_int_eq(pthread_join(thread[i], NULL), 0);
+    twin_free(&t);
     ebpo_close(file);
 }
 END_TEST
@@ -749,10 +809,11 @@ Suite *test_suite(void)
     tcase_add_loop_test(tests, subtrees_of_solids_are_what_the_whole_file_says, 0,
                         ebpo_test_solid_count);
     tcase_add_loop_test(tests, subtrees_of_larger_trees_agree, 0, 2);
-    tcase_add_test(tests, subtrees_of_subsets_end_where_these_do);
+    tcase_add_loop_test(tests, subtrees_of_subsets_end_where_these_do, 0, 2);
     tcase_add_loop_test(tests, nodes_are_those_of_streams, 0, 3);
     tcase_add_loop_test(tests, leaves_are_those_of_whole_levels, 0, ebpo_test_solid_count);
     tcase_add_test(tests, inherited_half_spaces_bound_the_envelope);
+    tcase_add_test(tests, threads_share_a_file);
     tcase_add_test(tests, octcodes_that_are_none_are_refused);
     tcase_add_test(tests, where_the_tree_ends_the_leaf_above_is_named_and_opened);
     tcase_add_test(tests, octcodes_of_points_are_those_of_the_cells_around_them);
