@@ -86,13 +86,14 @@ export class Parts {
     if (found.some((n, t) => n !== d.count[t]))
       throw formatError(at + 'types', d.exact ? 'the types do not add up to what /subtrees/counts says' : 'the types do not add up to what types_index says');
     checkWindings(this.info, d.level, blackWinding, whiteWinding);
-    const gray = planes && d.planes ? this.#planes(d, GRAY, d.planes, ...rest.splice(0, 2), at + 'plane_counts') : {};
-    const leaf = planes && d.leafPlanes ? this.#planes(d, LEAF, d.leafPlanes, ...rest, at + 'leaf_plane_counts') : {};
+    const gray = planes && d.planes ? this.#planes(d, GRAY, d.planes, at + 'plane_counts', ...rest.splice(0, 2)) : {};
+    const leaf = planes && d.leafPlanes ? this.#planes(d, LEAF, d.leafPlanes, at + 'leaf_plane_counts', ...rest) : {};
     return new Segment({ level: d.level, group: d.group, first: d.first, types, leafWinding, blackWinding, whiteWinding,
       planeCounts: gray.counts, planes: gray.planes, leafPlaneCounts: leaf.counts, leafPlanes: leaf.planes });
   }
 
-  #planes(d, type, { row, from, to }, counts, planes, path) {
+  // A level without nodes of the type has no such arrays.
+  #planes(d, type, { row, from, to }, path, counts = new Uint8Array(0), planes = new Uint32Array(0)) {
     const own = d.first[type] - row, before = sum(counts.subarray(0, own)), n = sum(counts.subarray(own));
     if (d.exact ? before + n !== to - from : before + n > to - from)
       throw formatError(path, 'the counts do not add up to the number of planes');
