@@ -10,10 +10,12 @@ export const LEVEL_COLOURS = ['#3d2c6b', '#473f8c', '#4257a0', '#3a6fa8', '#3387
 
 const VERTEX = `
   attribute vec4 tag;
+  attribute vec2 bend;
   varying vec3 eyeSpace;
   varying vec3 scenePlace;
   varying vec3 colour;
   varying vec3 lent;
+  varying float turned;
   flat varying int kind;
   uniform int colouring;
   uniform vec3 plain, mesh, types[4], levels[21];
@@ -23,13 +25,10 @@ const VERTEX = `
     scenePlace = position;
     kind = int(tag.y + 0.5) & 3;
     bool face = int(tag.y + 0.5) > 3;
-    lent = vec3(0.0);
-    if (tag.z > 0.5) { // octahedral, on polygons that lie on cell walls
-      vec2 o = (tag.zw - 128.0) / 127.0;
-      vec3 n = vec3(o, 1.0 - abs(o.x) - abs(o.y));
-      if (n.z < 0.0) n.xy = (1.0 - abs(n.yx)) * vec2(n.x < 0.0 ? -1.0 : 1.0, n.y < 0.0 ? -1.0 : 1.0);
-      lent = normalMatrix * normalize(n);
-    }
+    vec3 n = vec3(bend, 1.0 - abs(bend.x) - abs(bend.y)); // octahedral
+    if (n.z < 0.0) n.xy = (1.0 - abs(n.yx)) * vec2(n.x < 0.0 ? -1.0 : 1.0, n.y < 0.0 ? -1.0 : 1.0);
+    lent = normalMatrix * normalize(n) * (tag.z / 255.0);
+    turned = face ? 1.0 : 0.0;
     colour = colouring == 0 ? plain : colouring == 1 ? levels[int(tag.x + 0.5)] : face ? mesh : types[kind];
     gl_Position = projectionMatrix * at;
   }`;
@@ -39,6 +38,7 @@ const FRAGMENT = `
   varying vec3 scenePlace;
   varying vec3 colour;
   varying vec3 lent;
+  varying float turned; // 1 for faces, whose back is lit from there; that of an envelope is seen through cracks only
   flat varying int kind;
   uniform vec4 clip;
   uniform bool clipping;
@@ -46,9 +46,13 @@ const FRAGMENT = `
   void main() {
     if (clipping && dot(clip.xyz, scenePlace) > clip.w) discard;
     if (clipping && kind == 1 && gl_FrontFacing) discard; // what is full inside shows where it is cut only
-    vec3 n = normalize(cross(dFdx(eyeSpace), dFdy(eyeSpace)));
-    vec3 toEye = normalize(-eyeSpace);
-    if (dot(lent, lent) > 0.1 && !clipping) n = normalize(lent + toEye * max(0.0, 0.25 - dot(lent, toEye)));
+    vec3 toEye = normalize(-eyeSpace), flatly = cross(dFdx(eyeSpace), dFdy(eyeSpace));
+    float size = dot(flatly, flatly); // nothing to go by on slivers below a pixel
+    vec3 n = size > 0.0 && size < 1.0 ? flatly * inversesqrt(size) : toEye;
+    float weight = min(length(lent), 1.0);
+    vec3 smoothly = lent * (gl_FrontFacing ? 1.0 : -1.0);
+    n = normalize(mix(n, smoothly / max(weight, 0.001), weight) + 0.0001 * toEye);
+    n = !gl_FrontFacing && turned < 0.5 ? toEye : normalize(n + toEye * max(0.0, 0.15 - dot(n, toEye)));
     if (!gl_FrontFacing && clipping) { // the back of a closed body seen through the cut: fills the section
       float hatch = abs(fract((gl_FragCoord.x + gl_FragCoord.y) / 9.0) - 0.5) < 0.07 ? 0.82 : 1.0;
       gl_FragColor = vec4(mix(section, colour, 0.22) * hatch, 1.0);
@@ -109,7 +113,7 @@ export class Scene {
       sky: { value: colour('#59616f') }, ground: { value: colour('#23252b') },
     };
     this.faces = new THREE.ShaderMaterial({ uniforms: this.uniforms, vertexShader: VERTEX, fragmentShader: FRAGMENT, side: THREE.DoubleSide,
-      polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
+      polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
     this.wire = this.#lineMaterial('#0b0d12', 0.55);
     this.cellLines = this.#lineMaterial('#4cc2ff', 0.35);
     this.tiles = new Map();
@@ -126,6 +130,7 @@ export class Scene {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(9), 3));
     geometry.setAttribute('tag', new THREE.BufferAttribute(new Uint8Array(12), 4));
+    geometry.setAttribute('bend', new THREE.BufferAttribute(new Int16Array(6), 2, true));
     this.scene.add(this.warm = new THREE.Mesh(geometry, this.faces));
   }
 
@@ -239,6 +244,7 @@ export class Scene {
 
   /** All changes of one pass together, so that no gap is ever seen. */
   setTiles(set, removed) {
+    this.faces.polygonOffset = set.some((t) => t.lines) || (this.faces.polygonOffset && !set.length); // for lines only: steep walls would sink into cracks
     this.scene.remove(this.warm);
     removed.forEach((key) => this.#remove(key));
     for (const t of set) {
@@ -247,6 +253,7 @@ export class Scene {
       const position = new THREE.BufferAttribute(t.position, 3);
       geometry.setAttribute('position', position);
       geometry.setAttribute('tag', new THREE.BufferAttribute(t.tag, 4));
+      geometry.setAttribute('bend', new THREE.BufferAttribute(t.normal, 2, true));
       geometry.setIndex(new THREE.BufferAttribute(t.index, 1));
       geometry.computeBoundingSphere();
       tile.mesh = new THREE.Mesh(geometry, this.faces);

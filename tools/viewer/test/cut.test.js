@@ -3,6 +3,8 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import test from 'node:test';
 import { Cut } from '../cut.js';
+import { MeshStore } from '../mesh.js';
+import { Walls, sidesOf, subtract } from '../walls.js';
 import { BLACK, GRAY, LEAF, Tree, openEbpo } from '../reader/index.js';
 
 const bytes = readFileSync(new URL('../../../format-spec/vectors/passed/06_four_levels_leaf_planes.ebpo.h5', import.meta.url));
@@ -94,7 +96,8 @@ test('leaves show their real faces once these are there', async () => {
   leaves.forEach((leaf, i) => cut.addMesh(leaf, lists[i]));
   const { stats, leaves: missing } = settle(cut, want);
   assert.equal(missing.length, 0);
-  assert.equal(stats.meshTriangles, file.info.levels.reduce((n, l) => n + l.faces_new + l.faces_referenced, 0));
+  assert.equal(stats.meshTriangles, file.info.face_count); // each once, though leaves list it again
+  assert.ok(file.info.levels.some((l) => l.faces_referenced > 0));
   assert.equal(new Set(lists.flatMap((l) => [...l.numbers])).size, file.info.face_count);
 });
 
@@ -108,4 +111,112 @@ test('the tree has the nodes that the file counts, and each has its place', asyn
   };
   walk(tree.root);
   file.info.levels.forEach((l, i) => assert.deepEqual(count[i], { gray: l.gray, leaf: l.leaf, black: l.black }));
+});
+
+// --- walls ---
+
+const inside = (p, u, v) => {
+  let sign = 0;
+  for (let i = 0, j = p.length - 2; i < p.length; j = i, i += 2) {
+    const side = Math.sign((p[i] - p[j]) * (v - p[j + 1]) - (p[i + 1] - p[j + 1]) * (u - p[j]));
+    if (side && sign && side !== sign)
+      return false;
+    sign ||= side;
+  }
+  return true;
+};
+
+test('a convex polygon without another: every point is in one piece or hidden', () => {
+  const square = [0, 0, 1, 0, 1, 1, 0, 1], cases = [[0.2, 0.2, 0.7, 0.3, 0.5, 0.9], [-1, -1, 2, -1, 2, 0.5, -1, 0.5], [0.5, 0.9, 0.7, 0.3, 0.2, 0.2], [2, 2, 3, 2, 3, 3], [-1, -1, 2, -1, 2, 2, -1, 2]];
+  for (const q of cases) {
+    const pieces = subtract([square], q);
+    for (let i = 0; i < 400; i++) {
+      const u = (i % 20 + 0.513) / 20, v = (Math.floor(i / 20) + 0.487) / 20;
+      assert.equal(pieces.filter((p) => inside(p, u, v)).length, inside(q, u, v) ? 0 : 1, `${u} ${v} of ${q}`);
+    }
+  }
+});
+
+// A point of a drawn envelope's wall is seen unless it lies in a black cell's wall or in that of an envelope drawn on the other side.
+test('walls: what is hidden is hidden by a neighbour, and by nothing else', async () => {
+  const { tree, cut } = await load();
+  settle(cut, { ...all, level: 3 });
+  const drawn = new Set(cut.nodes), walls = new Walls(tree, (n) => drawn.has(n), (n) => tree.polytope(n)), found = { seen: 0, hidden: 0 };
+  const polygon = (p, f, axis) => Array.from({ length: p.first[f + 1] - p.first[f] }, (_, i) => [(axis + 1) % 3, (axis + 2) % 3].map((k) => p.x[3 * p.corner[p.first[f] + i] + k])).flat();
+  const twin = (node, axis, side, u, v) => { // from the root down, by a point on the other side
+    const x = node.at.map((n) => n / 2 ** node.level);
+    x[axis] = (node.at[axis] + side) / 2 ** node.level;
+    x[(axis + 1) % 3] += u / 2 ** node.level;
+    x[(axis + 2) % 3] += v / 2 ** node.level;
+    if ((x[axis] === 0 && side === 0) || (x[axis] === 1 && side === 1))
+      return false;
+    let n = tree.root;
+    while (!drawn.has(n) && tree.children(n))
+      n = tree.children(n)[[0, 1, 2].reduce((o, k) => o | (k === axis ? (side ? x[k] >= (2 * n.at[k] + 1) / 2 ** (n.level + 1) : x[k] > (2 * n.at[k] + 1) / 2 ** (n.level + 1)) : x[k] >= (2 * n.at[k] + 1) / 2 ** (n.level + 1)) << k, 0)];
+    if (n.type === BLACK)
+      return true;
+    const p = tree.polytope(n), f = [...sidesOf(p)].indexOf(2 * axis + 1 - side), at = (k) => x[k] * 2 ** n.level - n.at[k];
+    return drawn.has(n) && f >= 0 && inside(polygon(p, f, axis), at((axis + 1) % 3), at((axis + 2) % 3));
+  };
+  for (const node of drawn) {
+    const p = tree.polytope(node), sides = sidesOf(p);
+    for (let f = 0; f < p.faces; f++) {
+      assert.equal(sides[f] >= 0, p.wall[f] === 1);
+      if (sides[f] < 0)
+        continue;
+      const axis = sides[f] >> 1, own = polygon(p, f, axis), pieces = walls.seen(node, p, f) ?? [own];
+      for (let i = 0; i < 49; i++) {
+        const u = (i % 7 + 0.5137) / 7, v = (Math.floor(i / 7) + 0.4871) / 7;
+        if (!inside(own, u, v))
+          continue;
+        const isSeen = pieces.some((q) => inside(q, u, v)), hidden = twin(node, axis, sides[f] & 1, u, v);
+        found[isSeen ? 'seen' : 'hidden']++;
+        assert.ok(!isSeen || !hidden, `${node.level} ${node.at} side ${sides[f]} at ${u} ${v}: drawn though hidden`);
+        found.wrong = (found.wrong ?? 0) + (!isSeen && !hidden ? 1 : 0);
+      }
+    }
+  }
+  assert.ok(found.seen > 100 && found.hidden > 1000, JSON.stringify(found));
+  assert.ok(found.wrong <= 0.01 * found.seen, `thin pieces only: ${JSON.stringify(found)}`);
+});
+
+// --- real faces ---
+
+const CUBE = [[0, 1, 3], [0, 3, 2], [4, 7, 5], [4, 6, 7], [0, 5, 1], [0, 4, 5], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 7, 3], [1, 5, 7]];
+const cornersOf = (v) => [v & 1, v >> 1 & 1, v >> 2];
+
+test('normals: edges of a cube stay, a bent sheet is smooth, and by angles', () => {
+  const store = new MeshStore(), leaf = { id: 1 }, n = [0, 0, 0];
+  store.add(leaf, CUBE.flat().flatMap(cornersOf), CUBE.map((_, i) => i));
+  assert.equal(store.vertices, 8);
+  for (let c = 0; c < 36; c++) {
+    store.cornerNormal(c, n);
+    const own = Math.floor(c / 3), size = Math.hypot(...n);
+    for (let k = 0; k < 3; k++)
+      assert.ok(Math.abs(n[k] / size - store.normal[3 * own + k]) < 1e-6);
+  }
+  const sheet = new MeshStore(), z = 0.1; // two triangles and one across the fold: angles of 45 + 45 on one side weigh as 90 on the other
+  sheet.add({ id: 2 }, [0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 0, 0, 1, 1, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, -1, 0, z], [1, 2, 3]);
+  sheet.cornerNormal(0, n);
+  const lean = Math.hypot(z, 1), wanted = [z / lean * Math.PI / 2, 0, Math.PI / 2 + Math.PI / 2 / lean];
+  for (let k = 0; k < 3; k++)
+    assert.ok(Math.abs(Math.abs(n[k]) - Math.abs(wanted[k])) < 1e-5, `${n} ${wanted}`);
+});
+
+test('a face that several leaves list is drawn by one of them, by another when that is gone, and told when its normals change', () => {
+  const store = new MeshStore(), a = { id: 7 }, b = { id: 3 }, corners = CUBE.flat().flatMap(cornersOf);
+  store.add(a, corners.slice(0, 27), [0, 1, 2]);
+  const before = a.stamp;
+  store.add(b, corners.slice(18, 45), [2, 3, 4]);
+  assert.ok(a.stamp > before);
+  assert.equal(store.faces, 5);
+  store.share([a, b]);
+  assert.deepEqual([a.owned, b.owned], [2, 3]);
+  const { ownedHash } = a;
+  store.share([a]);
+  assert.equal(a.owned, 3);
+  assert.notEqual(a.ownedHash, ownedHash);
+  store.keep([a]);
+  store.share([a]);
+  assert.deepEqual([store.faces, a.owned], [3, 3]);
 });

@@ -1,0 +1,149 @@
+// What can be seen of the polygons on cell walls: where two envelopes meet they hide each other's.
+import { BLACK, WHITE } from './reader/index.js';
+
+const ON = 1e-9;           // in cells
+const THIN = 1 / 128;      // in cells: pieces that are not as wide on average are left out
+const HIDDEN = [];
+const QUADRANT = (u, v) => [u, v, u + 0.5, v, u + 0.5, v + 0.5, u, v + 0.5];
+
+const area = (p) => {
+  let sum = 0;
+  for (let i = 0, j = p.length - 2; i < p.length; j = i, i += 2)
+    sum += p[j] * p[i + 1] - p[i] * p[j + 1];
+  return sum / 2;
+};
+
+// Both sides of the line through (x, y) with direction (dx, dy): left and right of it.
+function split(p, x, y, dx, dy) {
+  const left = [], right = [], side = (i) => dx * (p[i + 1] - y) - dy * (p[i] - x);
+  for (let i = 0; i < p.length; i += 2) {
+    const j = (i + 2) % p.length, a = side(i), b = side(j);
+    if (a >= -ON)
+      left.push(p[i], p[i + 1]);
+    if (a <= ON)
+      right.push(p[i], p[i + 1]);
+    if ((a > ON && b < -ON) || (a < -ON && b > ON)) {
+      const t = a / (a - b), u = p[i] + t * (p[j] - p[i]), v = p[i + 1] + t * (p[j + 1] - p[i + 1]);
+      left.push(u, v);
+      right.push(u, v);
+    }
+  }
+  return [left, right];
+}
+
+function isSeen(p) {
+  let around = 0;
+  for (let i = 0, j = p.length - 2; i < p.length; j = i, i += 2)
+    around += Math.hypot(p[i] - p[j], p[i + 1] - p[j + 1]);
+  return 2 * Math.abs(area(p)) > THIN * around;
+}
+
+/** Convex polygons [u, v, u, v ...] without a convex one. */
+export function subtract(pieces, q) {
+  if (area(q) < 0)
+    q = q.map((_, i) => q[q.length - 2 - i + 2 * (i % 2)]); // counter-clockwise
+  const out = [];
+  for (let piece of pieces) {
+    const outside = [];
+    for (let i = 0, j = q.length - 2; i < q.length && piece; j = i, i += 2) {
+      const length = Math.hypot(q[i] - q[j], q[i + 1] - q[j + 1]) || 1;
+      const [left, right] = split(piece, q[j], q[j + 1], (q[i] - q[j]) / length, (q[i + 1] - q[j + 1]) / length);
+      if (right.length > 4 && isSeen(right))
+        outside.push(right);
+      piece = left.length > 4 && Math.abs(area(left)) > ON ? left : undefined;
+    }
+    out.push(...outside); // what is left of the piece is hidden
+  }
+  return out;
+}
+
+/** By polygon: 2 axis + side of the wall that it lies on, or -1. Kept with the polytope. */
+export function sidesOf(p) {
+  p.sides ??= Int8Array.from({ length: p.faces }, (_, f) => {
+    for (let s = 0; p.wall[f] && s < 6; s++) {
+      let on = true;
+      for (let i = p.first[f]; i < p.first[f + 1]; i++)
+        on &&= Math.abs(p.x[3 * p.corner[i] + (s >> 1)] - (s & 1)) < ON;
+      if (on)
+        return s;
+    }
+    return -1;
+  });
+  return p.sides;
+}
+
+// A polygon of node `of` as [u, v ...] in the cell of `node`, on the two axes after `axis`.
+function inCell(node, of, p, f, axis) {
+  const scale = 2 ** (node.level - of.level), u = (axis + 1) % 3, v = (axis + 2) % 3, out = [];
+  for (let i = p.first[f]; i < p.first[f + 1]; i++) {
+    const x = 3 * p.corner[i];
+    out.push((of.at[u] + p.x[x + u]) * scale - node.at[u], (of.at[v] + p.x[x + v]) * scale - node.at[v]);
+  }
+  return out;
+}
+
+export class Walls {
+  /** `drawn(node)`: whether a node is in the cut, `envelope(node)`: its polytope, or undefined where it is drawn otherwise. */
+  constructor(tree, drawn, envelope) {
+    Object.assign(this, { tree, drawn, envelope });
+  }
+
+  sideOf(p, f) {
+    return sidesOf(p)[f];
+  }
+
+  /** What is seen of polygon f of a node's polytope p, which lies on a wall: convex pieces [u, v ...], or undefined for all of it. */
+  seen(node, p, f) {
+    const side = sidesOf(p)[f], axis = side >> 1;
+    if (side < 0)
+      return undefined;
+    const other = this.#across(node, axis, side & 1 ? 1 : -1);
+    if (!other || other.type === WHITE)
+      return undefined;
+    if (other.type === BLACK)
+      return HIDDEN;
+    const own = [inCell(node, node, p, f, axis)];
+    if (this.drawn(other))
+      return other.level < node.level - 1 ? undefined : this.#without(own, node, other, side ^ 1);
+    return other.children ? this.#belowOf(own, node, other, side ^ 1) : undefined;
+  }
+
+  #without(pieces, node, other, side) {
+    const p = this.envelope(other), sides = p && sidesOf(p);
+    for (let f = 0; p && f < p.faces; f++)
+      if (sides[f] === side)
+        return subtract(pieces, inCell(node, other, p, f, side >> 1));
+    return pieces;
+  }
+
+  // The neighbour is drawn by its children: the four at the wall.
+  #belowOf(pieces, node, other, side) {
+    const axis = side >> 1, u = (axis + 1) % 3, v = (axis + 2) % 3;
+    for (const child of other.children)
+      if ((child.octant >> axis & 1) === (side & 1)) {
+        if (child.type === BLACK)
+          pieces = subtract(pieces, QUADRANT((child.octant >> u & 1) / 2, (child.octant >> v & 1) / 2));
+        else if (this.drawn(child))
+          pieces = this.#without(pieces, node, child, side);
+      }
+    return pieces;
+  }
+
+  // The node behind a wall: of the same level, or a drawn or uniform one above that; undefined outside of the root.
+  #across(node, axis, step) {
+    const { level } = node, to = [...node.at];
+    to[axis] += step;
+    if (to[axis] < 0 || to[axis] >= 2 ** level)
+      return undefined;
+    let n = node, up = 0;
+    do { // up to an ancestor that has both
+      n = n.parent;
+      up++;
+    } while (Math.floor(to[axis] / 2 ** up) !== n.at[axis]);
+    for (; up > 0 && n.children && !this.drawn(n); up--) {
+      const at = 2 ** (up - 1);
+      n = n.children[(Math.floor(to[0] / at) & 1) | (Math.floor(to[1] / at) & 1) << 1 | (Math.floor(to[2] / at) & 1) << 2];
+    }
+    return n;
+  }
+}
