@@ -164,7 +164,8 @@ def check_places(file):
              4113: "/subtrees/counts", 4114: "/subtrees/outer"}
     places, seen = file["/subtrees/places"], {}
     at = file["/levels/00/types"].id.get_chunk_info(0).byte_offset
-    for number, size in places[...].astype("i8"):
+    for place in places[...]:
+        number, size = divmod(int(place), 1 << 32)
         path = (f"/levels/{number // 64:02d}/{names[number % 64]}" if number < 4096
                 else roots.get(number))
         if path:

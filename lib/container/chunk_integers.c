@@ -22,7 +22,8 @@ static ebpo_status check_rows(const ebpo_chunks *chunks, ebpo_array_id id, int l
                               uint64_t rows, size_t size, ebpo_error *error)
 {
     const char *shown = chunks->file->in.shown;
-    if (id >= EBPO_LEVEL_ARRAYS || level < 0 || level >= chunks->file->info.level_count)
+    if ((id >= EBPO_LEVEL_ARRAYS && id != EBPO_A_SUBTREE_OUTER) || level < 0 ||
+        level >= chunks->file->info.level_count)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
                               "level %d has no array number %d of integers", level, (int)id);
     const ebpo_array_in *array = ebpo_reader_array(chunks->file, id, level);

@@ -184,7 +184,8 @@ static void expect_around(ebpo_chunks *c, const ebpo_array_in *array, uint64_t c
 {
     uint64_t begin = chunk / AROUND * AROUND, count = ebpo_h5_chunk_count(&array->shape);
     ebpo_expected e = EBPO_EXPECTED_INIT(c->file);
-    if (!ebpo_input_expects(&c->file->in))
+    /* with subtrees its neighbours in the file are other arrays' */
+    if (!ebpo_input_expects(&c->file->in) || c->file->info.subtree_level)
         return;
     expect_missing(c, &e, array, begin, count - begin < AROUND ? count : begin + AROUND);
     ebpo_expect_all(&e);

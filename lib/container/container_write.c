@@ -49,7 +49,7 @@ typedef struct writer {
     ebpo_content content;
     uint64_t chunk_bytes, chunks_done, chunks;
     ebpo_array_out places; /* without subtrees it has no rows */
-    uint32_t (*place)[2];  /* [rows of places] */
+    uint64_t *place;       /* [rows of places] */
     uint64_t place_count, top_bytes;
     /* headers; the index of arrays of several chunks, and where it begins (0: there is none, or not
      * yet) */
@@ -304,8 +304,7 @@ static void note_place(writer *w, uint32_t number, uint64_t bytes)
 {
     if (!w->places.shape.rows)
         return;
-    w->place[w->place_count][0] = number;
-    w->place[w->place_count++][1] = (uint32_t)bytes;
+    w->place[w->place_count++] = ebpo_place(number, bytes);
 }
 
 /* Called for each chunk, in the order of the file, before it is written. */
@@ -379,9 +378,8 @@ static void plan_places(writer *w)
         return;
     uint64_t rows = w->chunks + has_index(&w->plan);
     w->places.shape = (ebpo_h5_shape){ .rows = rows,
-                                       .cols = ebpo_schema[EBPO_A_PLACES].cols,
                                        .chunk_rows = (uint32_t)rows,
-                                       .element_size = 4,
+                                       .element_size = 8,
                                        .pipeline = w->plan.array[0].shape.pipeline };
 }
 

@@ -52,6 +52,34 @@ void ebpo_expect_all(ebpo_expected *e)
     *e = (ebpo_expected)EBPO_EXPECTED_INIT(e->file);
 }
 
+/* Not of a size that no file has for its first levels. */
+static bool is_top(const ebpo_info *info)
+{
+    enum { SHARE = 16, ANYWAY = 1 << 20 };
+    return info->top_bytes <= info->file_bytes / SHARE + ANYWAY;
+}
+
+void ebpo_expect_top(const ebpo_file *file)
+{
+    const ebpo_info *info = &file->info;
+    ebpo_file *own = ebpo_reader_own(file);
+    uint64_t index_end = info->chunk_index_offset + info->chunk_index_bytes, from,
+             top = info->top_bytes < info->file_bytes ? info->top_bytes : info->file_bytes;
+    if (!ebpo_input_expects(&file->in) || !file->has_places || atomic_load(&file->located) ||
+        !is_top(info))
+        return;
+    const ebpo_h5_chunk *places = file->root_array[EBPO_A_PLACES].chunks;
+    ebpo_range range[3] = { { places->address, places->bytes } };
+    size_t count = 1;
+    from = file->in.source.prefetched;
+    if (from < info->chunk_index_offset && info->chunk_index_offset <= top)
+        range[count++] = (ebpo_range){ from, info->chunk_index_offset - from };
+    from = from > index_end ? from : index_end;
+    if (from < top)
+        range[count++] = (ebpo_range){ from, top - from };
+    ebpo_input_expect(&own->in, range, count);
+}
+
 void ebpo_file_prefetch_levels(const ebpo_file *file, int first, int last)
 {
     ebpo_expected e = EBPO_EXPECTED_INIT(file);

@@ -6,6 +6,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "container/ranks.h"
+#include "container/subtree_table.h"
 #include "geom/plane_code.h"
 #include "octree/rule.h"
 
@@ -55,7 +56,7 @@ static int index_of(int id)
 /* Arrays with sums are read from the nearest row of their index on. */
 static void expect_column(const reading *r, ebpo_expected *e, int id, int type)
 {
-    int index = index_of(id);
+    int index = ebpo_subtree_table_has(r->chunks->file, r->level) ? -1 : index_of(id);
     for (uint64_t i = 0; i < r->run_count; i++) {
         uint64_t rank = r->run[i].rank[type], count = r->run[i].count[type],
                  row = rank / EBPO_INDEX_ROWS, from = index < 0 ? rank : row * EBPO_INDEX_ROWS;

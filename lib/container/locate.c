@@ -123,7 +123,7 @@ static ebpo_array_in *array_number(ebpo_file *file, int i)
 }
 enum { ALL_ARRAYS = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS - EBPO_LEVEL_ARRAYS };
 
-static ebpo_status list_chunks(ebpo_file *file, uint32_t (*pairs)[2], uint64_t count,
+static ebpo_status list_chunks(ebpo_file *file, const uint64_t *places, uint64_t count,
                                ebpo_error *error)
 {
     listing *l = ebpo_alloc_zero(1, sizeof *l);
@@ -134,12 +134,13 @@ static ebpo_status list_chunks(ebpo_file *file, uint32_t (*pairs)[2], uint64_t c
     if (l)
         l->file = file;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
-        if (pairs[i][1] > file->info.file_bytes - at)
+        if (ebpo_place_bytes_of(places[i]) > file->info.file_bytes - at)
             status =
                 list_fails(file, "a chunk lies beyond the end of the file in", "the list", error);
         else
-            status = list_chunk(l, pairs[i][0], (ebpo_h5_chunk){ at, pairs[i][1] }, error);
-        at += pairs[i][1];
+            status = list_chunk(l, ebpo_place_number_of(places[i]),
+                                (ebpo_h5_chunk){ at, ebpo_place_bytes_of(places[i]) }, error);
+        at += ebpo_place_bytes_of(places[i]);
     }
     for (int i = 0; i < ALL_ARRAYS && status == EBPO_OK; i++)
         status = end_array(l, array_number(file, i), error);
@@ -163,22 +164,22 @@ static ebpo_status locate_by_list(ebpo_file *file, ebpo_error *error)
 {
     const ebpo_array_in *a = &file->root_array[EBPO_A_PLACES];
     ebpo_h5_chunk chunk = a->chunks[0];
-    uint32_t(*pairs)[2] = NULL;
+    uint64_t *places = NULL;
     const char *why = "";
     uint8_t *stored = a->shape.rows <= file->info.file_bytes ? ebpo_alloc(chunk.bytes, 1) : NULL;
     ebpo_status status = stored
                              ? ebpo_input_read(&file->in, chunk.address, chunk.bytes, stored, error)
                              : ebpo_fail_memory(error, chunk.bytes);
     if (status == EBPO_OK) {
-        status = ebpo_places_decode(stored, chunk.bytes, a->shape.pipeline, a->shape.rows, &pairs,
+        status = ebpo_places_decode(stored, chunk.bytes, a->shape.pipeline, a->shape.rows, &places,
                                     &why, error);
         if (status == EBPO_E_FORMAT)
             status = list_fails(file, "the chunk is damaged:", why, error);
     }
     free(stored);
     if (status == EBPO_OK)
-        status = list_chunks(file, pairs, a->shape.rows, error);
-    free(pairs);
+        status = list_chunks(file, places, a->shape.rows, error);
+    free(places);
     if (status != EBPO_OK)
         forget(file);
     return status == EBPO_OK ? ebpo_stored_check(file, error) : status;

@@ -78,7 +78,7 @@ static uint64_t take(uint32_t *blocks, uint64_t count, uint64_t from, uint32_t *
     if (count)
         qsort(blocks, count, sizeof *blocks, descending);
     for (uint64_t i = 0; i < count; i++)
-        if (blocks[i] < from)
+        if (blocks[i] <= from)
             out[taken++] = (uint32_t)(from - blocks[i]);
     return taken;
 }

@@ -37,7 +37,7 @@ static bool shuffled(ebpo_pipeline pipeline)
     return pipeline == EBPO_PIPELINE_ZSTD || pipeline == EBPO_PIPELINE_DEFLATE;
 }
 
-ebpo_status ebpo_places_encode(uint32_t (*pairs)[2], uint64_t count, ebpo_pipeline pipeline,
+ebpo_status ebpo_places_encode(const uint64_t *places, uint64_t count, ebpo_pipeline pipeline,
                                int codec_level, uint8_t **stored, size_t *bytes, ebpo_error *error)
 {
     size_t size = count * 8;
@@ -45,10 +45,10 @@ ebpo_status ebpo_places_encode(uint32_t (*pairs)[2], uint64_t count, ebpo_pipeli
     uint8_t *raw = ebpo_alloc(size, 1), *turned = ebpo_alloc(size, 1);
     *stored = ebpo_alloc(ebpo_chunk_bound(size), 1);
     ebpo_status status = coder && raw && turned && *stored ? EBPO_OK : EBPO_E_MEMORY;
-    for (uint64_t i = 0; i < 2 * count && status == EBPO_OK; i++)
-        ebpo_store32(raw + 4 * i, pairs[i / 2][i % 2]);
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
+        ebpo_store64(raw + 8 * i, places[i]);
     if (status == EBPO_OK && shuffled(pipeline))
-        ebpo_shuffle(raw, size, 4, turned);
+        ebpo_shuffle(raw, size, 8, turned);
     if (status == EBPO_OK)
         status = ebpo_chunk_encode(coder, pipeline, codec_level, 1,
                                    shuffled(pipeline) ? turned : raw, size, *stored, bytes);
@@ -65,20 +65,20 @@ ebpo_status ebpo_places_encode(uint32_t (*pairs)[2], uint64_t count, ebpo_pipeli
 }
 
 ebpo_status ebpo_places_decode(const uint8_t *stored, size_t stored_bytes, ebpo_pipeline pipeline,
-                               uint64_t count, uint32_t (**pairs)[2], const char **why,
+                               uint64_t count, uint64_t **places, const char **why,
                                ebpo_error *error)
 {
     size_t size = count * 8;
     ebpo_chunk_coder *coder = ebpo_alloc_zero(1, sizeof *coder);
     uint8_t *raw = ebpo_alloc(size, 1), *turned = ebpo_alloc(size, 1);
-    *pairs = ebpo_alloc(count, sizeof **pairs);
-    ebpo_status status = coder && raw && turned && *pairs ? EBPO_OK : EBPO_E_MEMORY;
+    *places = ebpo_alloc(count, sizeof **places);
+    ebpo_status status = coder && raw && turned && *places ? EBPO_OK : EBPO_E_MEMORY;
     if (status == EBPO_OK)
         status = ebpo_chunk_decode(coder, pipeline, 1, stored, stored_bytes, raw, size, why);
     if (status == EBPO_OK && shuffled(pipeline))
-        ebpo_unshuffle(raw, size, 4, turned);
-    for (uint64_t i = 0; i < 2 * count && status == EBPO_OK; i++)
-        (*pairs)[i / 2][i % 2] = ebpo_load32((shuffled(pipeline) ? turned : raw) + 4 * i);
+        ebpo_unshuffle(raw, size, 8, turned);
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
+        (*places)[i] = ebpo_load64((shuffled(pipeline) ? turned : raw) + 8 * i);
     if (coder)
         ebpo_chunk_coder_clear(coder);
     free(coder);
@@ -86,7 +86,7 @@ ebpo_status ebpo_places_decode(const uint8_t *stored, size_t stored_bytes, ebpo_
     free(turned);
     if (status == EBPO_OK)
         return EBPO_OK;
-    free(*pairs);
-    *pairs = NULL;
+    free(*places);
+    *places = NULL;
     return status == EBPO_E_MEMORY ? ebpo_fail_memory(error, size * 3) : status;
 }

@@ -1,12 +1,13 @@
-/* Ranks: where a node's group, planes and faces begin. An index row each 4,096 items, and counting
- * from there; such a block lies in one chunk, as chunks of more than one have a power of two of
- * rows, at least 4,096 for all arrays of one column. */
+/* Ranks: where a node's group, planes and faces begin. Of levels below the roots of subtrees the
+ * table tells where each subtree begins; of others an index has a row each 4,096 items. Counting
+ * goes on from there. */
 #include <string.h>
 
 #include "base/endian.h"
 #include "base/error.h"
 #include "container/chunks.h"
 #include "container/ranks.h"
+#include "container/subtree_table.h"
 #include "octree/node_types.h"
 
 ebpo_status ebpo_ranks_count_file(ebpo_chunks *chunks, int level, uint64_t group, uint64_t groups,
@@ -84,6 +85,20 @@ static ebpo_status index_row(ebpo_chunks *chunks, ebpo_array_id id, int level, u
                                                          1, row, sizeof *row, error);
 }
 
+/* The subtree that holds an item of a level, if the table tells of it. */
+static ebpo_status find_subtree(ebpo_chunks *chunks, int level, unsigned what, uint64_t item,
+                                ebpo_subtree_row *row, ebpo_error *error)
+{
+    return ebpo_subtree_table_find(chunks, ebpo_subtree_column(&chunks->file->info, level, what),
+                                   item, row, error);
+}
+
+static uint64_t level_sum(const ebpo_chunks *chunks, const ebpo_subtree_row *row, int level,
+                          unsigned what)
+{
+    return row->before[ebpo_subtree_column(&chunks->file->info, level, what)];
+}
+
 static const char *const contradicts = "the index contradicts the counts in the head";
 
 ebpo_status ebpo_ranks_check(const ebpo_chunks *chunks, int level, const uint64_t ranks[4],
@@ -99,11 +114,34 @@ ebpo_status ebpo_ranks_check(const ebpo_chunks *chunks, int level, const uint64_
     return EBPO_OK;
 }
 
+/* Ranks at which a subtree's groups of a level begin, and the first of these. */
+static ebpo_status ranks_of_subtree(ebpo_chunks *chunks, int level, uint64_t group,
+                                    uint64_t ranks[4], uint64_t *from, ebpo_error *error)
+{
+    const ebpo_info *info = &chunks->file->info;
+    ebpo_subtree_row row;
+    bool roots = level == info->subtree_level + 1; /* a group for each subtree */
+    uint64_t last = info->level[info->subtree_level].gray_count - 1;
+    ebpo_status status =
+        roots ? ebpo_subtree_table_row(chunks, group < last ? group : last, &row, error)
+              : find_subtree(chunks, level - 1, EBPO_S_GRAY, group, &row, error);
+    if (status != EBPO_OK)
+        return status;
+    *from = ebpo_subtree_groups(info, &row, level, false);
+    ranks[EBPO_GRAY] = level_sum(chunks, &row, level, EBPO_S_GRAY);
+    ranks[EBPO_LEAF] = level_sum(chunks, &row, level, EBPO_S_LEAF);
+    ranks[EBPO_BLACK] = level_sum(chunks, &row, level, EBPO_S_BLACK);
+    ranks[EBPO_WHITE] = 8 * *from - ranks[EBPO_GRAY] - ranks[EBPO_LEAF] - ranks[EBPO_BLACK];
+    return EBPO_OK;
+}
+
 ebpo_status ebpo_ranks_before(ebpo_chunks *chunks, int level, uint64_t group, uint64_t ranks[4],
                               ebpo_error *error)
 {
     uint64_t counts[4], from = group / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS;
-    ebpo_status status = index_row(chunks, EBPO_A_TYPES_INDEX, level, group, 4, ranks, error);
+    ebpo_status status = ebpo_subtree_table_has(chunks->file, level)
+                             ? ranks_of_subtree(chunks, level, group, ranks, &from, error)
+                             : index_row(chunks, EBPO_A_TYPES_INDEX, level, group, 4, ranks, error);
     if (status == EBPO_OK)
         status = ebpo_ranks_count_file(chunks, level, from, group - from, counts, error);
     if (status == EBPO_OK)
@@ -118,7 +156,17 @@ ebpo_status ebpo_ranks_planes(ebpo_chunks *chunks, int level, uint64_t gray, uin
 {
     uint64_t sum = 0, from = gray / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS,
              all = chunks->file->info.level[level].plane_count;
-    ebpo_status status = index_row(chunks, EBPO_A_GRAY_INDEX, level, gray, 1, planes, error);
+    ebpo_subtree_row row;
+    ebpo_status status;
+    if (ebpo_subtree_table_has(chunks->file, level)) {
+        status = find_subtree(chunks, level, EBPO_S_GRAY, gray, &row, error);
+        if (status != EBPO_OK)
+            return status;
+        from = level_sum(chunks, &row, level, EBPO_S_GRAY);
+        *planes = level_sum(chunks, &row, level, EBPO_S_PLANES);
+    } else {
+        status = index_row(chunks, EBPO_A_GRAY_INDEX, level, gray, 1, planes, error);
+    }
     if (status == EBPO_OK)
         status =
             ebpo_chunks_sum(chunks, EBPO_A_PLANE_COUNTS, level, from, gray - from, &sum, error);
@@ -128,13 +176,30 @@ ebpo_status ebpo_ranks_planes(ebpo_chunks *chunks, int level, uint64_t gray, uin
     return status;
 }
 
+/* What leaf_index says, or the table; of the leaf `*from`. */
+static ebpo_status leaf_row(ebpo_chunks *chunks, int level, uint64_t leaf, uint64_t row[3],
+                            uint64_t *from, ebpo_error *error)
+{
+    ebpo_subtree_row subtree;
+    if (!ebpo_subtree_table_has(chunks->file, level))
+        return index_row(chunks, EBPO_A_LEAF_INDEX, level, leaf, 3, row, error);
+    ebpo_status status = find_subtree(chunks, level, EBPO_S_LEAF, leaf, &subtree, error);
+    if (status != EBPO_OK)
+        return status;
+    *from = level_sum(chunks, &subtree, level, EBPO_S_LEAF);
+    row[0] = level_sum(chunks, &subtree, level, EBPO_S_ENDS);
+    row[1] = level_sum(chunks, &subtree, level, EBPO_S_REFS);
+    row[2] = level_sum(chunks, &subtree, level, EBPO_S_LEAF_PLANES);
+    return EBPO_OK;
+}
+
 ebpo_status ebpo_ranks_leaf(ebpo_chunks *chunks, int level, uint64_t leaf, uint64_t *end,
                             uint64_t *refs, ebpo_error *error)
 {
     const ebpo_info *info = &chunks->file->info;
     uint64_t row[3], skip = 0, fresh = 0, listed = 0,
                      from = leaf / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS;
-    ebpo_status status = index_row(chunks, EBPO_A_LEAF_INDEX, level, leaf, 3, row, error);
+    ebpo_status status = leaf_row(chunks, level, leaf, row, &from, error);
     if (status == EBPO_OK)
         status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_SKIP, level, from, leaf - from, &skip, error);
     if (status == EBPO_OK)
@@ -160,7 +225,7 @@ ebpo_status ebpo_ranks_leaf_planes(ebpo_chunks *chunks, int level, uint64_t leaf
 {
     uint64_t row[3], sum = 0, from = leaf / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS,
                      all = chunks->file->info.level[level].leaf_plane_count;
-    ebpo_status status = index_row(chunks, EBPO_A_LEAF_INDEX, level, leaf, 3, row, error);
+    ebpo_status status = leaf_row(chunks, level, leaf, row, &from, error);
     if (status == EBPO_OK)
         status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_PLANE_COUNTS, level, from, leaf - from, &sum,
                                  error);

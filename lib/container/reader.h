@@ -30,6 +30,9 @@ void ebpo_expect_level(ebpo_expected *expected, int level);
 void ebpo_expect_root(ebpo_expected *expected, uint32_t needs);
 /* Announces the whole file. */
 void ebpo_expect_tree(const ebpo_file *file);
+/* Announces what looking up a subtree takes, if the file has subtrees and says so: levels down to
+ * their roots, the sums before them, and where all chunks lie. */
+void ebpo_expect_top(const ebpo_file *file);
 /* Announces what was collected, and frees it. */
 void ebpo_expect_all(ebpo_expected *expected);
 

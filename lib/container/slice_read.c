@@ -13,6 +13,8 @@
 #include "container/level_runs.h"
 #include "container/ranks.h"
 #include "container/slice_faces.h"
+#include "container/subtree_expect.h"
+#include "container/subtree_table.h"
 #include "octree/node_types.h"
 
 void ebpo_slice_free(ebpo_slice *slice)
@@ -48,7 +50,8 @@ static ebpo_status root_range(const ebpo_chunks *chunks, const ebpo_node *root, 
 /* Which of a subtree's nodes, and what of them (EBPO_NEEDS_...). */
 typedef struct extent {
     uint32_t needs;
-    int end; /* one past the deepest level */
+    int end;    /* one past the deepest level */
+    bool faces; /* that the leaves list will be read as well */
 } extent;
 
 /* `levels` below the root's, or all. */
@@ -57,7 +60,7 @@ static extent extent_of(const ebpo_chunks *chunks, const ebpo_node *root, uint32
 {
     int count = chunks->file->info.level_count, last = root->cell.level + levels;
     return (extent){ needs & ebpo_schema_has(&chunks->file->info),
-                     levels >= 0 && last + 1 < count ? last + 1 : count };
+                     levels >= 0 && last + 1 < count ? last + 1 : count, false };
 }
 
 /* Whether the range has a next level: the gray nodes of the file's last one are pruned. */
@@ -91,7 +94,9 @@ static void expect_nodes(ebpo_chunks *chunks, const extent *x, const range *r)
     uint64_t gray = r->run.rank[EBPO_GRAY], index = gray / EBPO_INDEX_ROWS,
              counted = index * EBPO_INDEX_ROWS;
     ebpo_runs_expect(chunks, &e, r->level, &r->run, 1, x->needs);
-    if (goes_on(x, r)) {
+    if (goes_on(x, r) && ebpo_subtree_table_has(chunks->file, r->level + 1)) {
+        ebpo_chunks_expect(chunks, &e, EBPO_A_TYPES, r->level + 1, gray, r->run.count[EBPO_GRAY]);
+    } else if (goes_on(x, r)) {
         ebpo_chunks_expect(chunks, &e, EBPO_A_TYPES_INDEX, r->level + 1, index, 1);
         ebpo_chunks_expect(chunks, &e, EBPO_A_TYPES, r->level + 1, counted,
                            gray + r->run.count[EBPO_GRAY] - counted);
@@ -99,10 +104,24 @@ static void expect_nodes(ebpo_chunks *chunks, const extent *x, const range *r)
     ebpo_expect_all(&e);
 }
 
+/* From the level of subtrees' roots on, all that is below is known. */
+static void expect_below(ebpo_chunks *chunks, const extent *x, const range *r)
+{
+    uint64_t first = r->run.rank[EBPO_GRAY], count = r->run.count[EBPO_GRAY];
+    ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
+    if (r->level != chunks->file->info.subtree_level || !goes_on(x, r) ||
+        !ebpo_input_expects(&chunks->file->in))
+        return;
+    ebpo_subtree_table_expect_run(chunks, first, count);
+    ebpo_subtrees_expect(chunks, &e, first, count, x->needs, x->faces);
+    ebpo_expect_all(&e);
+}
+
 /* Everything of one level but its types. */
 static ebpo_status read_nodes(ebpo_chunks *chunks, const extent *x, const range *r, ebpo_level *out,
                               ebpo_error *error)
 {
+    expect_below(chunks, x, r);
     expect_nodes(chunks, x, r);
     return ebpo_runs_read(chunks, r->level, &r->run, 1, x->needs, out, error);
 }
@@ -166,30 +185,41 @@ static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
     return EBPO_OK;
 }
 
-ebpo_status ebpo_slice_read_nodes(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_node *root,
-                                  uint32_t needs, int levels, ebpo_error *error)
+static ebpo_status read_extent(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_node *root,
+                               const extent *x, ebpo_error *error)
 {
     memset(out, 0, sizeof *out);
     out->root = *root;
     out->pruned = chunks->file->info.pruned;
-    extent x = extent_of(chunks, root, needs, levels);
-    ebpo_status status = read_levels(out, chunks, &x, error);
+    ebpo_status status = read_levels(out, chunks, x, error);
     if (status != EBPO_OK)
         ebpo_slice_free(out);
     return status;
 }
 
+ebpo_status ebpo_slice_read_nodes(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_node *root,
+                                  uint32_t needs, int levels, ebpo_error *error)
+{
+    extent x = extent_of(chunks, root, needs, levels);
+    return read_extent(out, chunks, root, &x, error);
+}
+
 ebpo_status ebpo_slice_read_parts(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_node *root,
                                   uint32_t needs, ebpo_error *error)
 {
+<<<<<<< HEAD
     enum { ALWAYS = EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH };
+=======
+    enum { ALWAYS = EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH | EBPO_NEEDS_SOLID };
+    extent x = extent_of(chunks, root, needs | ALWAYS, EBPO_SLICE_ALL);
+>>>>>>> 281b96d (A subtree is looked up in the table and announced at once; levels above it too; by URL a budget is the rule, and subtrees come without planes unless a question needs them)
     memset(out, 0, sizeof *out);
     if (!(chunks->file->info.parts & EBPO_PART_MESH))
         return ebpo_fail_file(error, EBPO_E_ABSENT, chunks->file->in.shown,
                               "the file was written without its mesh; build it again with it");
     walk w = { .chunks = chunks, .slice = out };
-    ebpo_status status =
-        ebpo_slice_read_nodes(out, chunks, root, needs | ALWAYS, EBPO_SLICE_ALL, error);
+    x.faces = true;
+    ebpo_status status = read_extent(out, chunks, root, &x, error);
     if (status == EBPO_OK)
         status = walk_group(&w, 0, error);
     if (status == EBPO_OK)
@@ -248,6 +278,38 @@ static ebpo_status measure_nodes(ebpo_chunks *chunks, const extent *x, const ran
     return status;
 }
 
+/* What the table says of a subtree, but for its root. */
+static ebpo_status measure_subtree(ebpo_chunks *chunks, const extent *x, uint64_t subtree,
+                                   ebpo_slice_size *out, ebpo_error *error)
+{
+    const ebpo_info *info = &chunks->file->info;
+    ebpo_subtree_row row;
+    ebpo_status status = ebpo_subtree_table_row(chunks, subtree, &row, error);
+    for (int level = info->subtree_level + 1; level < x->end && status == EBPO_OK; level++) {
+        uint64_t has[EBPO_SUBTREE_LEVEL_COLS];
+        for (unsigned k = 0; k < EBPO_SUBTREE_LEVEL_COLS; k++)
+            has[k] = row.after[ebpo_subtree_column(info, level, k)] -
+                     row.before[ebpo_subtree_column(info, level, k)];
+        out->groups += ebpo_subtree_groups(info, &row, level, true) -
+                       ebpo_subtree_groups(info, &row, level, false);
+        out->leaves += has[EBPO_S_LEAF];
+        out->refs += x->needs & EBPO_NEEDS_MESH ? has[EBPO_S_REFS] : 0;
+        out->planes += (x->needs & EBPO_NEEDS_PLANES ? has[EBPO_S_PLANES] : 0) +
+                       (x->needs & EBPO_NEEDS_LEAF_PLANES ? has[EBPO_S_LEAF_PLANES] : 0);
+    }
+    if (status == EBPO_OK && x->needs & EBPO_NEEDS_MESH)
+        out->new_faces += row.after[EBPO_S_FACES] - row.before[EBPO_S_FACES];
+    return status;
+}
+
+static bool is_subtree(const ebpo_chunks *chunks, const extent *x, const ebpo_node *root)
+{
+    const ebpo_info *info = &chunks->file->info;
+    /* of fewer levels the table does not tell the faces */
+    return info->subtree_level && root->cell.level == info->subtree_level &&
+           root->type == EBPO_GRAY && x->end == info->level_count;
+}
+
 ebpo_status ebpo_slice_measure_nodes(ebpo_chunks *chunks, const ebpo_node *root, uint32_t needs,
                                      int levels, ebpo_slice_size *out, ebpo_error *error)
 {
@@ -257,6 +319,11 @@ ebpo_status ebpo_slice_measure_nodes(ebpo_chunks *chunks, const ebpo_node *root,
     ebpo_status status = root_range(chunks, root, &r, error);
     if (status == EBPO_OK)
         status = measure_nodes(chunks, &x, &r, out, error);
+    if (status == EBPO_OK && is_subtree(chunks, &x, root)) {
+        status = measure_subtree(chunks, &x, root->rank, out, error);
+        out->outer = out->refs;
+        return status;
+    }
     while (status == EBPO_OK && goes_on(&x, &r)) {
         out->groups += r.run.count[EBPO_GRAY];
         status = next_range(chunks, &r, NULL, error);

@@ -27,8 +27,8 @@
 static bool put_off(ebpo_context *c, const ebpo_nearest *n, const ebpo_node *node, double lower)
 {
     uint64_t key = ebpo_entry_value(node->entry);
-    if (n->deadline || (c->pinned && c->pinned_key == key) ||
-        ebpo_cache_has(c->model->cache, key) ||
+    if (n->deadline || ebpo_context_has_pinned(c, key) ||
+        ebpo_cache_has(c->model->cache, ebpo_context_key(c, key)) ||
         !ebpo_grow(&c->later, &c->later_capacity, c->later_count + 1, sizeof *c->later))
         return false;
     c->later[c->later_count++] = (ebpo_ranked){ *node, lower };
@@ -299,6 +299,9 @@ ebpo_status ebpo_distance_many(ebpo_context *context, const double *points, uint
         status = ebpo_check_points(points, count, error);
     if (status == EBPO_OK && o->level < 0 && o->mode != EBPO_DISTANCE_ENVELOPE)
         status = ebpo_check_mesh(context->model, error);
+    /* of a subset, bounds decide whether what is missing matters */
+    context->planes = o->level >= 0 || o->deadline_ns || o->mode != EBPO_DISTANCE_EXACT ||
+                      context->model->info->pruned;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
         status = one(context, points + 3 * i, o, &out[i], error);
     return status;

@@ -215,7 +215,7 @@ static const ebpo_accel *held_around(const asking *a, uint32_t *entry)
         return c->model->whole;
     *entry = ebpo_descend(&c->model->top->nodes, c->model->info->level_count - 1, a->at).entry;
     bool below = ebpo_entry_kind_of(*entry) == EBPO_ENTRY_BELOW;
-    return below && c->pinned && c->pinned_key == ebpo_entry_value(*entry) ? c->pinned : NULL;
+    return below && ebpo_context_has_pinned(c, ebpo_entry_value(*entry)) ? c->pinned : NULL;
 }
 
 /* True when everything that p needs is in the context's hands: then envelopes save nothing, and

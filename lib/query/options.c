@@ -79,6 +79,8 @@ ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64
     if (status == EBPO_OK && m->whole && o->level < 0 && !o->deadline_ns &&
         o->envelopes != EBPO_ENVELOPES_USE)
         return ebpo_inside_whole(context, points, count, out, error);
+    context->planes =
+        o->level >= 0 || o->deadline_ns || o->envelopes == EBPO_ENVELOPES_USE || m->info->pruned;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
         status = ebpo_inside_walk(context, points + 3 * i, o, &out[i], error);
         if (status == EBPO_OK && ebpo_model_prefetches(m) &&

@@ -84,5 +84,8 @@ void ebpo_context_prefetch(ebpo_context *c, const double p[3], double reach)
      * is within the reach and 2 w. A cell's diagonal is 1.73 sides: where envelopes do not decide
      * (other rules than nonzero), the cell that holds the place is needed. */
     uint64_t keys[EBPO_CACHE_AHEAD];
-    ebpo_cache_prefetch(m->cache, keys, ebpo_subtrees_near(m, p, fabs(reach) + 2.25 * side, keys));
+    unsigned count = ebpo_subtrees_near(m, p, fabs(reach) + 2.25 * side, keys);
+    for (unsigned i = 0; i < count; i++)
+        keys[i] = ebpo_context_key(c, keys[i]);
+    ebpo_cache_prefetch(m->cache, keys, count);
 }

@@ -45,7 +45,7 @@ static ebpo_status estimate_subtree(void *user, uint64_t key, uint64_t *peak, ui
 {
     ebpo_model *m = user;
     ebpo_slice_size size;
-    ebpo_status status = ebpo_slice_measure(m->chunks, &m->top->below[key], &size, error);
+    ebpo_status status = ebpo_slice_measure(m->chunks, &m->top->below[key >> 1], &size, error);
     if (status == EBPO_OK)
         ebpo_accel_estimate(&size, m->info, keep, peak);
     return status;
@@ -66,9 +66,12 @@ static ebpo_status load_subtree(void *user, uint64_t key, void **item, uint64_t 
     ebpo_model *m = user;
     ebpo_slice slice;
     ebpo_accel *subtree = NULL;
-    ebpo_status status = ebpo_slice_read(&slice, m->chunks, &m->top->below[key], error);
+    uint32_t needs =
+        EBPO_NEEDS_MESH | EBPO_NEEDS_MAPS | (key & 1 ? (uint32_t)EBPO_NEEDS_PLANES : 0);
+    ebpo_status status =
+        ebpo_slice_read_parts(&slice, m->chunks, &m->top->below[key >> 1], needs, error);
     if (status == EBPO_OK)
-        status = ebpo_accel_make(&subtree, &slice, m->info, true, 1, error);
+        status = ebpo_accel_make(&subtree, &slice, m->info, key & 1, 1, error);
     if (status == EBPO_OK)
         count_leaves(m, subtree, 1);
     *item = subtree;
@@ -131,6 +134,26 @@ static uint64_t least_budget(const ebpo_info *info)
     return budget;
 }
 
+/* Files far away are read in parts, unless they are small: nobody asked for all of them. */
+enum { FAR_MEMORY = 256 << 20, FAR_WHOLE_BYTES = 2 << 20 };
+
+static bool reads_parts(const ebpo_model *m)
+{
+    bool small = m->info->file_bytes <= FAR_WHOLE_BYTES;
+    return ebpo_input_is_far(&m->file->in) && !small &&
+           (m->info->subtree_level || m->default_memory);
+}
+
+/* The roots of the file's subtrees, which are read as one, if the budget allows them. */
+static int prefer_subtrees(const ebpo_info *info, uint64_t budget, int cut)
+{
+    int level = info->subtree_level;
+    return level > cut && ebpo_top_estimate(info, level) <= budget / 4 &&
+                   ebpo_top_estimate(info, level) + chunk_budget(budget) + SUBTREES_LEAST <= budget
+               ? level
+               : cut;
+}
+
 static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
 {
     ebpo_slice slice;
@@ -176,7 +199,7 @@ static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
         return open_top(m, deepest, error);
     if (o->cut_level >= 0)
         return open_top(m, o->cut_level < deepest ? o->cut_level : deepest, error);
-    if (o->memory == 0 || peak <= o->memory)
+    if ((o->memory == 0 || peak <= o->memory) && !reads_parts(m))
         return open_whole(m, error);
     int cut = choose_cut(m->info, o->memory);
     if (cut < 0) {
@@ -186,7 +209,7 @@ static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
                          " bytes is too small for this model; give at least %" PRIu64,
                          o->memory, least < peak ? least : peak);
     }
-    return open_top(m, cut, error);
+    return open_top(m, prefer_subtrees(m->info, o->memory, cut), error);
 }
 
 ebpo_status ebpo_model_new(const ebpo_file *file, const ebpo_model_options *options,
@@ -206,6 +229,9 @@ ebpo_status ebpo_model_new(const ebpo_file *file, const ebpo_model_options *opti
     m->info = ebpo_file_info(file);
     m->options = wanted;
     m->kernels = ebpo_kernels_best();
+    m->default_memory = !wanted.memory && ebpo_input_is_far(&file->in);
+    if (m->default_memory && wanted.cut_level < 0)
+        m->options.memory = FAR_MEMORY;
     status = m->options.loading > EBPO_LOAD_NODES
                  ? ebpo_fail(error, EBPO_E_ARGUMENT,
                              "model options: there is no way of loading number %d",
@@ -303,7 +329,8 @@ void ebpo_context_free(ebpo_context *c)
 static ebpo_status too_little(const ebpo_model *m, uint32_t below, ebpo_error *error)
 {
     uint64_t peak, keep, least;
-    if (estimate_subtree((ebpo_model *)m, below, &peak, &keep, NULL) != EBPO_OK)
+    if (estimate_subtree((ebpo_model *)m, ebpo_subtree_key(below, true), &peak, &keep, NULL) !=
+        EBPO_OK)
         return EBPO_E_LIMIT;
     least = m->top->bytes + peak;
     while (m->top->bytes + chunk_budget(least) + peak > least)
@@ -320,17 +347,18 @@ ebpo_status ebpo_context_subtree(ebpo_context *c, uint32_t below, ebpo_accel **o
 {
     const ebpo_model *m = c->model;
     void *item;
-    if (c->pinned && c->pinned_key == below) {
+    if (ebpo_context_has_pinned(c, below)) {
         *out = c->pinned;
         return EBPO_OK;
     }
     let_go(c);
     if (m->options.loading != EBPO_LOAD_CACHE)
         ebpo_cache_clear(m->cache);
-    ebpo_status status = ebpo_cache_get(m->cache, below, &item, NULL, error);
+    uint64_t key = ebpo_context_key(c, below);
+    ebpo_status status = ebpo_cache_get(m->cache, key, &item, NULL, error);
     if (status != EBPO_OK)
         return status == EBPO_E_LIMIT && m->options.memory ? too_little(m, below, error) : status;
     *out = c->pinned = item;
-    c->pinned_key = below;
+    c->pinned_key = key;
     return EBPO_OK;
 }

@@ -6,6 +6,7 @@
 #include <pthread.h>
 
 #include "cache/cache.h"
+#include "container/reader.h"
 #include "container/slice.h"
 #include "octree/rule.h"
 #include "query/kernels.h"
@@ -16,6 +17,7 @@ struct ebpo_model {
     const ebpo_file *file;
     const ebpo_info *info;
     ebpo_model_options options;
+    bool default_memory; /* nobody asked for a budget, but the file is far away */
     const ebpo_kernels *kernels;
     ebpo_accel *whole; /* everything, or NULL: */
     ebpo_top *top;     /* levels 0 .. cut level */
@@ -32,6 +34,7 @@ struct ebpo_context {
     ebpo_model *model;
     ebpo_accel *pinned; /* the subtree last used, when it came from the cache */
     uint64_t pinned_key;
+    bool planes;    /* the question needs envelopes below the cut level */
     uint32_t *open; /* slots that a filter left open */
     uint64_t open_capacity;
     ebpo_ray_hit *hits;
@@ -59,6 +62,23 @@ EBPO_MUST_USE ebpo_status ebpo_check_points(const double *points, uint64_t count
  * EBPO_LOAD_NODES loads it past the cache. */
 EBPO_MUST_USE ebpo_status ebpo_model_has_room(const ebpo_model *model, const ebpo_node *leaf,
                                               ebpo_error *error);
+
+/* Subtrees are kept with the planes of their nodes, which few questions need and which take reads
+ * of their own, or without. */
+static inline uint64_t ebpo_subtree_key(uint64_t below, bool planes) { return below << 1 | planes; }
+
+static inline bool ebpo_context_has_pinned(const ebpo_context *c, uint64_t below)
+{
+    return c->pinned && c->pinned_key >> 1 == below && (c->pinned_key & 1 || !c->planes);
+}
+
+/* Under which key the question finds it: one that is there with planes does for all. */
+static inline uint64_t ebpo_context_key(const ebpo_context *c, uint64_t below)
+{
+    uint64_t full = ebpo_subtree_key(below, true);
+    return c->planes || ebpo_cache_has(c->model->cache, full) ? full
+                                                              : ebpo_subtree_key(below, false);
+}
 
 /* The subtree with this number, in memory until the context asks for another one. */
 EBPO_MUST_USE ebpo_status ebpo_context_subtree(ebpo_context *context, uint32_t below,

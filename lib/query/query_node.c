@@ -97,6 +97,7 @@ static ebpo_status children(void *holder, ebpo_node *gray, ebpo_node child[8], e
     ebpo_status status = EBPO_OK;
     if (gray->pruned)
         return EBPO_OK;
+    context->planes = true; /* cursors may ask for them */
     if (ebpo_node_is_below(gray))
         status = ebpo_model_enter(context, gray, error);
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)

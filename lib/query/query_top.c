@@ -170,6 +170,7 @@ ebpo_status ebpo_top_read(ebpo_top **out, const ebpo_file *file, int cut_level, 
     reading r = { .top = top, .info = ebpo_file_info(file), .error = error };
     ebpo_status status = EBPO_OK;
     ebpo_read_options read = ebpo_read_threads(threads);
+    ebpo_expect_top(file);
     ebpo_file_prefetch_levels(file, 0, cut_level);
     for (int number = 0; number <= cut_level && status == EBPO_OK; number++) {
         ebpo_level level;

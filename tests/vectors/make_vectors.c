@@ -333,8 +333,8 @@ static void v_group_for_array(void)
 static void v_subtree_level(void) { set_int("/", "subtree_level", 0); }
 static void v_subtree_table(void) { drop("/subtrees/counts"); }
 /* Its bytes stay, so that it still holds for a reader. */
-static void v_places_array(void) { poke("/subtrees/places", 2, 4097); }
-static void v_places_bytes(void) { poke("/subtrees/places", 3, 1 << 30); }
+static void v_places_array(void) { poke("/subtrees/places", 1, INT64_C(4097) << 32 | 8); }
+static void v_places_bytes(void) { poke("/subtrees/places", 1, 1 << 30); }
 static void v_soft_link(void)
 {
     drop("/mesh/faces");

@@ -303,7 +303,7 @@ const subtreeArrays = (info) => (info.subtree_level === undefined ? [] : [
   { path: '/subtrees/counts', cols: subtreeCols(info), sizes: [4], rows: info.levels[info.subtree_level].gray },
   { path: '/subtrees/index', cols: subtreeCols(info), sizes: [8], rows: undefined },
   { path: '/subtrees/outer', cols: 0, sizes: [4], rows: undefined, mayBeAbsent: true },
-  { path: '/subtrees/places', cols: 2, sizes: [4], rows: undefined },
+  { path: '/subtrees/places', cols: 0, sizes: [8], rows: undefined },
 ]);
 
 /** The arrays that a file with these facts has: [{ path, level, order, name, cols, sizes, signed, rows, mayBeAbsent }]. `order`: among those of its level. */

@@ -25,15 +25,15 @@ export function placesHold(places, size) {
 function begin(rows, byNumber) {
   let before = 0;
   for (let i = 0; i < rows.length; i += 2) {
-    const chunks = byNumber.get(rows[i])?.chunks;
+    const chunks = byNumber.get(rows[i + 1])?.chunks;
     if (chunks && chunks[0].at >= before)
       return chunks[0].at - before;
-    before += rows[i + 1];
+    before += rows[i];
   }
   throw formatError(WHERE, 'the chunks of level 0 are not in it');
 }
 
-/** `rows`: pairs of number and bytes; `arrays`: all but places. -> Map(array, [{ at, bytes }]). */
+/** `rows`: for each chunk, bytes and number; `arrays`: all but places. -> Map(array, [{ at, bytes }]). */
 export function readPlaces(rows, arrays, size) {
   const byNumber = new Map(), out = new Map();
   for (const array of arrays) {
@@ -42,7 +42,7 @@ export function readPlaces(rows, arrays, size) {
   }
   let at = begin(rows, byNumber);
   for (let i = 0; i < rows.length; i += 2) {
-    const array = byNumber.get(rows[i]), bytes = rows[i + 1];
+    const array = byNumber.get(rows[i + 1]), bytes = rows[i];
     if (at + bytes > size)
       throw formatError(WHERE, 'a chunk reaches beyond the end of the file');
     if (array) {

@@ -1,0 +1,119 @@
+#include "container/subtree_expect.h"
+
+#include <stdlib.h>
+
+#include "base/alloc.h"
+#include "container/subtree_table.h"
+
+typedef struct telling {
+    ebpo_chunks *chunks;
+    ebpo_expected *expected;
+    const ebpo_subtree_row *first, *last;
+    uint32_t needs;
+} telling;
+
+static void rows(const telling *t, ebpo_array_id id, int level, uint64_t begin, uint64_t end)
+{
+    if (end > begin)
+        ebpo_chunks_expect(t->chunks, t->expected, id, level, begin, end - begin);
+}
+
+/* The level's sums of a column before the subtrees and behind them. */
+static uint64_t sum(const telling *t, int level, unsigned what, bool after)
+{
+    unsigned column = ebpo_subtree_column(&t->chunks->file->info, level, what);
+    return after ? t->last->after[column] : t->first->before[column];
+}
+
+static uint64_t sum_of(const telling *t, ebpo_per per, int level, bool after)
+{
+    const ebpo_info *info = &t->chunks->file->info;
+    uint64_t groups = ebpo_subtree_groups(info, after ? t->last : t->first, level, after);
+    switch (per) {
+    case EBPO_PER_GROUP: return groups;
+    case EBPO_PER_GRAY: return sum(t, level, EBPO_S_GRAY, after);
+    case EBPO_PER_LEAF: return sum(t, level, EBPO_S_LEAF, after);
+    case EBPO_PER_BLACK: return sum(t, level, EBPO_S_BLACK, after);
+    case EBPO_PER_WHITE:
+        return 8 * groups - sum(t, level, EBPO_S_GRAY, after) - sum(t, level, EBPO_S_LEAF, after) -
+               sum(t, level, EBPO_S_BLACK, after);
+    case EBPO_PER_PLANE: return sum(t, level, EBPO_S_PLANES, after);
+    case EBPO_PER_LEAF_PLANE: return sum(t, level, EBPO_S_LEAF_PLANES, after);
+    case EBPO_PER_REF: return sum(t, level, EBPO_S_REFS, after);
+    default: return 0; /* index arrays, which the table stands for */
+    }
+}
+
+static void tell_nodes(const telling *t)
+{
+    const ebpo_info *info = &t->chunks->file->info;
+    for (int level = info->subtree_level + 1; level < info->level_count; level++)
+        for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
+            if (ebpo_schema[id].needs & t->needs)
+                rows(t, (ebpo_array_id)id, level, sum_of(t, ebpo_schema[id].per, level, false),
+                     sum_of(t, ebpo_schema[id].per, level, true));
+}
+
+/* A chunk of faces or vertices, `distance` blocks before `from`. */
+static void tell_block(const telling *t, ebpo_array_id id, uint64_t from, uint64_t block_rows,
+                       uint32_t distance)
+{
+    uint64_t block = from / block_rows;
+    if (distance > block)
+        return;
+    rows(t, id, 0, (block - distance) * block_rows, (block - distance) * block_rows + 1);
+    if (id == EBPO_A_FACES && t->needs & EBPO_NEEDS_MAPS)
+        rows(t, EBPO_A_FACE_SOURCE, 0, (block - distance) * block_rows,
+             (block - distance) * block_rows + block_rows);
+}
+
+static void tell_own_faces(const telling *t)
+{
+    uint64_t faces = t->last->after[EBPO_S_FACES_BEFORE] + t->last->after[EBPO_S_FACES],
+             vertices = t->last->after[EBPO_S_VERTICES_BEFORE] + t->last->after[EBPO_S_VERTICES];
+    rows(t, EBPO_A_FACES, 0, t->first->face, faces);
+    rows(t, EBPO_A_VERTICES, 0, t->first->vertex, vertices);
+    if (t->needs & EBPO_NEEDS_MAPS)
+        rows(t, EBPO_A_FACE_SOURCE, 0, t->first->face, faces);
+}
+
+/* The rows of `outer` are hints: of any value, and of any number. */
+static void tell_outer(const telling *t, const ebpo_subtree_row *row)
+{
+    enum { OUTER_MOST = 1 << 16 };
+    uint64_t first = row->before[EBPO_S_OUTER_FACES] + row->before[EBPO_S_OUTER_VERTICES],
+             faces = row->after[EBPO_S_OUTER_FACES] - row->before[EBPO_S_OUTER_FACES],
+             vertices = row->after[EBPO_S_OUTER_VERTICES] - row->before[EBPO_S_OUTER_VERTICES],
+             count = faces + vertices;
+    const ebpo_array_in *array = ebpo_reader_array(t->chunks->file, EBPO_A_SUBTREE_OUTER, 0);
+    uint32_t *outer;
+    if (!array->present || count == 0 || count > OUTER_MOST || first > array->shape.rows ||
+        count > array->shape.rows - first ||
+        ebpo_chunks_take(t->chunks, EBPO_A_SUBTREE_OUTER, 0, first, count, sizeof *outer, &outer,
+                         NULL) != EBPO_OK)
+        return;
+    for (uint64_t i = 0; i < count; i++)
+        tell_block(t, i < faces ? EBPO_A_FACES : EBPO_A_VERTICES,
+                   i < faces ? row->face : row->vertex,
+                   i < faces ? EBPO_FACE_BLOCK : EBPO_VERTEX_BLOCK, outer[i]);
+    free(outer);
+}
+
+void ebpo_subtrees_expect(ebpo_chunks *chunks, ebpo_expected *expected, uint64_t first,
+                          uint64_t count, uint32_t needs, bool faces)
+{
+    const ebpo_info *info = &chunks->file->info;
+    ebpo_subtree_row *row = ebpo_alloc(3, sizeof *row);
+    telling t = { chunks, expected, &row[0], &row[1], needs };
+    if (row && count && ebpo_input_expects(&chunks->file->in) &&
+        ebpo_subtree_table_row(chunks, first, &row[0], NULL) == EBPO_OK &&
+        ebpo_subtree_table_row(chunks, first + count - 1, &row[1], NULL) == EBPO_OK) {
+        tell_nodes(&t);
+        if (faces && info->parts & EBPO_PART_MESH)
+            tell_own_faces(&t);
+        for (uint64_t i = 0; i < count && faces && info->parts & EBPO_PART_MESH; i++)
+            if (ebpo_subtree_table_row(chunks, first + i, &row[2], NULL) == EBPO_OK)
+                tell_outer(&t, &row[2]);
+    }
+    free(row);
+}
