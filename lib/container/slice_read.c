@@ -207,12 +207,8 @@ ebpo_status ebpo_slice_read_nodes(ebpo_slice *out, ebpo_chunks *chunks, const eb
 ebpo_status ebpo_slice_read_parts(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_node *root,
                                   uint32_t needs, ebpo_error *error)
 {
-<<<<<<< HEAD
     enum { ALWAYS = EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH };
-=======
-    enum { ALWAYS = EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH | EBPO_NEEDS_SOLID };
     extent x = extent_of(chunks, root, needs | ALWAYS, EBPO_SLICE_ALL);
->>>>>>> 281b96d (A subtree is looked up in the table and announced at once; levels above it too; by URL a budget is the rule, and subtrees come without planes unless a question needs them)
     memset(out, 0, sizeof *out);
     if (!(chunks->file->info.parts & EBPO_PART_MESH))
         return ebpo_fail_file(error, EBPO_E_ABSENT, chunks->file->in.shown,
