@@ -16,12 +16,13 @@ static const struct {
               { "giant_and_dust", 0 } };
 enum { CASES = sizeof cases / sizeof *cases };
 
-static void load(ebpo_model *model, const uint64_t *keys, unsigned count)
+static void load(ebpo_model *model, const uint64_t *below, unsigned count)
 {
     for (unsigned i = 0; i < count; i++) {
         void *item;
-        ASSERT_OK(ebpo_cache_get(model->cache, keys[i], &item, NULL, error));
-        ebpo_cache_unpin(model->cache, keys[i]);
+        uint64_t key = ebpo_subtree_key(below[i], false);
+        ASSERT_OK(ebpo_cache_get(model->cache, key, &item, NULL, error));
+        ebpo_cache_unpin(model->cache, key);
     }
 }
 

@@ -136,7 +136,7 @@ def resume(tool, folder, path, url):
     run(tool, "fetch", "-q", url, out)
     whole = Handler.sent
     os.remove(out)
-    Handler.reset(left=5)
+    Handler.reset(left=3)
     done = run(tool, "fetch", "--http-connections", "1", url, out)
     held, first = blocks(part), Handler.sent
     expect("an interruption keeps what came",
@@ -153,7 +153,7 @@ def resume(tool, folder, path, url):
     print(f"whole {whole} bytes; interrupted after {first}, {held} kept; then {Handler.sent}")
     os.remove(out)
     # A block that was damaged on the disk is fetched again.
-    Handler.reset(left=5)
+    Handler.reset(left=3)
     run(tool, "fetch", "-q", "--http-connections", "1", url, out)
     victim = os.path.join(part, sorted(os.listdir(part))[0])
     with open(victim, "r+b") as f:
@@ -168,7 +168,7 @@ def resume(tool, folder, path, url):
 
 def change(tool, folder, path, url):
     out, other = os.path.join(folder, "o.ebpo.h5"), os.path.join(folder, "other.ebpo.h5")
-    Handler.reset(left=5)
+    Handler.reset(left=3)
     run(tool, "fetch", "-q", "--http-connections", "1", url, out)
     Handler.data, Handler.etag = content(other), '"2"'
     Handler.reset()
