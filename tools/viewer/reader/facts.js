@@ -320,8 +320,8 @@ export function arraysOf(info) {
   return out.filter((a) => a.rows !== 0);
 }
 
-// With the part subtrees.
-const FIXED_ROWS = { '/mesh/faces': 2048, '/mesh/vertices': 1024, '/subtrees/places': Infinity };
+/** Rows of a chunk, with the part subtrees. */
+export const FIXED_ROWS = { '/mesh/faces': 2048, '/mesh/vertices': 1024, '/subtrees/places': Infinity };
 
 /** Whether chunks of an array may have so many rows. */
 export function chunkRowsFit(info, path, rows, cols, elementSize, chunk) {

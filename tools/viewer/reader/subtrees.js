@@ -1,6 +1,6 @@
 // What each subtree has and where it begins in every array: format-spec/README.md, section 9, "The table".
 import { formatError } from './error.js';
-import { subtreeCols } from './facts.js';
+import { FIXED_ROWS, subtreeCols } from './facts.js';
 
 const FACES = 1, VERTICES = 3, OUTER = 4, BELOW = 6, LEVEL_COLS = 7; // columns; 0 and 2 are what lies before the subtree
 const GRAY = 0, LEAF = 1, BLACK = 2, PLANES = 3, LEAF_PLANES = 4, REFS = 5, END = 6;
@@ -91,9 +91,9 @@ export class Subtrees {
     const ranges = rows.map((r) => ({ path: '/subtrees/outer', from: r.outer, to: r.outer + r.outerFaces + r.outerVertices })), { store } = this;
     const outer = await store.rows(ranges), out = new Map();
     const add = (path, first, count, distances) => {
-      const array = store.arrays.get(path), block = Math.floor(first / array.chunkRows);
+      const array = store.arrays.get(path), rows = FIXED_ROWS[path], block = Math.floor(first / rows); // the array may be shorter than a block
       const put = (chunk) => chunk >= 0 && chunk < array.chunkCount && out.set(array.number * 2 ** 32 + chunk, { array, chunk });
-      for (let chunk = block; chunk * array.chunkRows < first + Math.max(count, 1); chunk++) // also without new ones: a distance of 0 is left out
+      for (let chunk = block; chunk * rows < first + Math.max(count, 1); chunk++) // also without new ones: a distance of 0 is left out
         put(chunk);
       distances?.forEach((d) => put(block - d));
     };

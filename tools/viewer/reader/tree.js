@@ -28,14 +28,18 @@ export class Tree {
     this.levels = []; // whole ones, as segments
     this.parts = new Map(); // other segments by level and part, oldest first
     this.partBytes = 0;
-    this.depth = -1; // deepest level of which something was ever at hand
+    this.partDepth = -1; // deepest level of which a part was ever at hand
     this.root = undefined;
+  }
+
+  /** Deepest level of which something is at hand. */
+  get depth() {
+    return Math.max(this.levels.length - 1, this.partDepth);
   }
 
   /** A whole level, as file.levels() gives it. */
   add(level) {
     this.levels[level.level] = level instanceof Segment ? level : new Segment(level);
-    this.depth = Math.max(this.depth, level.level);
     if (level.level === 0)
       this.root = new Node(undefined, 0, level.types[0] & 3, 0, this.levels[0]);
   }
@@ -47,7 +51,7 @@ export class Tree {
       return;
     this.parts.set(key, segment);
     this.partBytes += segment.byteLength;
-    this.depth = Math.max(this.depth, segment.level);
+    this.partDepth = Math.max(this.partDepth, segment.level);
     for (const [old, { byteLength }] of this.parts) {
       if (this.partBytes <= PARTS_BYTES || old === key)
         break;
@@ -64,7 +68,6 @@ export class Tree {
   lean() {
     const tree = new Tree(this.info);
     tree.levels = this.levels;
-    tree.depth = this.depth;
     tree.root = new Node(undefined, 0, this.root.type, 0, this.levels[0]);
     return tree;
   }
