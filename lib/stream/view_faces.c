@@ -45,9 +45,8 @@ void ebpo_view_leaves_free(ebpo_view_leaves *l)
     free(l);
 }
 
-/* The octant's node, if it is a leaf. */
-static bool leaf_of(const ebpo_view_group *group, const ebpo_group *read, unsigned octant,
-                    ebpo_node *out)
+bool ebpo_view_leaf_of(const ebpo_view_group *group, const ebpo_group *read, unsigned octant,
+                       ebpo_node *out)
 {
     if (ebpo_group_type(read->types, octant) != EBPO_LEAF ||
         octant >= ebpo_group_octants(group->number.level))
@@ -58,59 +57,6 @@ static bool leaf_of(const ebpo_view_group *group, const ebpo_group *read, unsign
                         .rank = read->rank[EBPO_LEAF] +
                                 ebpo_group_count(read->types, EBPO_LEAF, octant) };
     return true;
-}
-
-/* --- files far away --- */
-
-/* Reads all that a group takes, for nothing but to find out what is missing. */
-static void try_group(ebpo_chunks *chunks, const ebpo_view_group *group, unsigned wanted,
-                      ebpo_group *read)
-{
-    ebpo_node leaf;
-    if (ebpo_group_read(chunks, group->number.level, group->number.group, wanted, read, NULL) !=
-        EBPO_OK)
-        return;
-    for (unsigned octant = 0; octant < 8; octant++) {
-        ebpo_slice slice;
-        if (leaf_of(group, read, octant, &leaf) &&
-            ebpo_slice_read_parts(&slice, chunks, &leaf, 0, NULL) == EBPO_OK)
-            ebpo_slice_free(&slice);
-    }
-}
-
-bool ebpo_view_leaves_are_far(ebpo_chunks *chunks, const ebpo_view_group *group, unsigned wanted)
-{
-    ebpo_chunk_keys keys = { .count = 0 };
-    ebpo_group read;
-    if (!ebpo_input_expects(&chunks->file->in))
-        return false;
-    ebpo_chunks_collect(chunks, &keys);
-    try_group(chunks, group, wanted, &read);
-    ebpo_chunks_collect(chunks, NULL);
-    return keys.count > 0;
-}
-
-ebpo_status ebpo_view_leaves_fetch(ebpo_chunks *chunks, const ebpo_view_group *groups,
-                                   unsigned count, unsigned wanted, ebpo_error *error)
-{
-    /* lists, references, faces, vertices, with what ranks take in between; beyond that, reading
-     * goes on without having been announced */
-    enum { PASSES = 12 };
-    ebpo_status status = EBPO_OK;
-    ebpo_group read;
-    for (int pass = 0; pass < PASSES && status == EBPO_OK; pass++) {
-        ebpo_chunk_keys keys = { .count = 0 };
-        ebpo_chunks_collect(chunks, &keys);
-        try_group(chunks, &groups[0], wanted, &read);
-        unsigned own = keys.count;
-        for (unsigned i = 1; i < count && own; i++)
-            try_group(chunks, &groups[i], wanted, &read);
-        ebpo_chunks_collect(chunks, NULL);
-        if (own == 0)
-            break;
-        status = ebpo_chunks_fetch(chunks, &keys, own, error);
-    }
-    return status;
 }
 
 /* --- reading --- */
@@ -132,7 +78,7 @@ ebpo_status ebpo_view_leaves_read(ebpo_view_leaves *l, ebpo_chunks *chunks,
     ebpo_node leaf;
     drop_slices(l);
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)
-        if (leaf_of(group, read, octant, &leaf)) {
+        if (ebpo_view_leaf_of(group, read, octant, &leaf)) {
             status = ebpo_slice_read_parts(&l->slice[octant], chunks, &leaf, 0, error);
             if (status == EBPO_OK)
                 status = make_room(l, l->slice[octant].mesh.face_count, error);

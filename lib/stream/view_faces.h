@@ -24,21 +24,15 @@ EBPO_MUST_USE ebpo_status ebpo_view_leaves_new(ebpo_view_leaves **out, const ebp
                                                ebpo_error *error);
 void ebpo_view_leaves_free(ebpo_view_leaves *leaves);
 
-/* Groups of siblings whose nodes and faces will be wanted: `parent` is an octcode, 0 of the root's
- * group. */
+/* A group of siblings; `parent` is an octcode, 0 of the root's group. */
 typedef struct ebpo_view_group {
     ebpo_group_number number;
     uint64_t parent;
 } ebpo_view_group;
 
-/* True when the file is far away and not all of that is in memory. */
-bool ebpo_view_leaves_are_far(ebpo_chunks *chunks, const ebpo_view_group *group, unsigned wanted);
-
-/* For files far away: fetches what the first group and the faces of its leaves take and is not in
- * memory, and announces with it what the others take. EBPO_E_LIMIT as ebpo_group_read. */
-EBPO_MUST_USE ebpo_status ebpo_view_leaves_fetch(ebpo_chunks *chunks, const ebpo_view_group *groups,
-                                                 unsigned count, unsigned wanted,
-                                                 ebpo_error *error);
+/* The node of an octant of a group that has been read, if it is a leaf. */
+bool ebpo_view_leaf_of(const ebpo_view_group *group, const ebpo_group *read, unsigned octant,
+                       ebpo_node *out);
 
 /* The faces of all leaves of a group that has been read. On failure there are none. */
 EBPO_MUST_USE ebpo_status ebpo_view_leaves_read(ebpo_view_leaves *leaves, ebpo_chunks *chunks,

@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/sized.h"
+#include "stream/view_fetch.h"
 
 enum { MEMORY_LEAST = 1 << 20 };
 
@@ -151,52 +152,14 @@ ebpo_status ebpo_view_stream_change(ebpo_view_stream *s, const ebpo_view_options
     return EBPO_OK;
 }
 
-static ebpo_view_group children_of(const ebpo_waiting *w)
-{
-    return (ebpo_view_group){ { ebpo_octcode_level(w->octcode) + 1, w->below }, w->octcode };
-}
-
-/* What comes next, and after it what comes soon; returns how many groups. Of those that stand
- * together in blocks of so many, one. */
-static unsigned coming(const ebpo_view_stream *s, const ebpo_view_group *first, unsigned block,
-                       ebpo_view_group groups[EBPO_FRONTIER_BLOCKS])
-{
-    uint64_t best[EBPO_FRONTIER_BLOCKS];
-    unsigned count = ebpo_frontier_blocks(&s->frontier, block, best);
-    groups[0] = *first;
-    for (unsigned i = 0; i < count; i++) /* the first is the one at hand */
-        groups[i] = children_of(&s->frontier.at[best[i]]);
-    return count ? count : 1;
-}
-
-/* Of a file far away: the group with what comes soon. */
-static ebpo_status fetch_group(ebpo_view_stream *s, const ebpo_view_group *group, unsigned wanted,
-                               ebpo_error *error)
-{
-    enum { FACES_BLOCK = 64, FACES_AHEAD = 64 }; /* trying out what faces take is work */
-    ebpo_view_group groups[EBPO_FRONTIER_BLOCKS];
-    ebpo_status status = EBPO_OK;
-    if (ebpo_group_is_far(s->chunks, &group->number, wanted)) {
-        ebpo_group_number numbers[EBPO_FRONTIER_BLOCKS];
-        unsigned count = coming(s, group, EBPO_GROUP_BLOCK, groups);
-        for (unsigned i = 0; i < count; i++)
-            numbers[i] = groups[i].number;
-        status = ebpo_group_fetch(s->chunks, numbers, count, wanted, error);
-    }
-    if (status != EBPO_OK || !s->leaves || !ebpo_view_leaves_are_far(s->chunks, group, wanted))
-        return status;
-    unsigned count = coming(s, group, FACES_BLOCK, groups);
-    return ebpo_view_leaves_fetch(s->chunks, groups, count < FACES_AHEAD ? count : FACES_AHEAD,
-                                  wanted, error);
-}
-
 /* Into s->read, and with faces those of its leaves. */
 static ebpo_status read_group(ebpo_view_stream *s, const ebpo_view_group *group, ebpo_error *error)
 {
     unsigned wanted = (s->options.planes || s->options.polygons ? EBPO_GROUP_PLANES : 0u) |
                       (s->options.windings ? EBPO_GROUP_WINDINGS : 0u);
     ebpo_chunks_limit(s->chunks, s->options.bytes ? s->options.bytes : UINT64_MAX);
-    ebpo_status status = fetch_group(s, group, wanted, error);
+    ebpo_status status = ebpo_view_fetch(s->chunks, &s->partial, &s->frontier, group, wanted,
+                                         s->leaves != NULL, error);
     if (status == EBPO_OK)
         status = ebpo_group_read(s->chunks, group->number.level, group->number.group, wanted,
                                  &s->read, error);
@@ -222,7 +185,7 @@ static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_err
         return EBPO_OK;
     }
     if (!root)
-        group = children_of(&s->frontier.at[0]);
+        group = ebpo_view_children(&s->frontier.at[0]);
     ebpo_error why = EBPO_ERROR_INIT;
     ebpo_status status = read_group(s, &group, &why);
     if (status == EBPO_E_LIMIT && ebpo_chunks_refused(s->chunks)) {

@@ -8,6 +8,7 @@
 #include <ebpo/ebpo.h>
 
 #include "check_main.h"
+#include "counted_source.h"
 #include "octree/node_types.h"
 #include "octree/octcode.h"
 #include "random_tree.h"
@@ -30,10 +31,11 @@ static void make_folder(void)
     path = scratch("x.ebpo.h5");
 }
 
-enum { USUAL = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS };
+enum { USUAL = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS, FEW = 6 };
 
 /* --- files --- */
 
+/* Files of an even number of levels have subtrees of their own, where there are as many faces. */
 static ebpo_file *write_tree(ebpo_tree *tree, uint32_t parts, ebpo_codec codec)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -41,6 +43,7 @@ static ebpo_file *write_tree(ebpo_tree *tree, uint32_t parts, ebpo_codec codec)
     ebpo_write_options options = EBPO_WRITE_OPTIONS_INIT;
     options.parts = parts;
     options.codec = codec;
+    options.subtree_faces = tree->info.level_count % 2 ? EBPO_NO_SUBTREES : 60;
     ck_assert_msg(ebpo_tree_write(tree, path, &options, &error) == EBPO_OK, "%s", error.message);
     ebpo_tree_free(tree);
     ck_assert_msg(ebpo_open(path, &file, &error) == EBPO_OK, "%s", error.message);
@@ -568,6 +571,36 @@ START_TEST(inherited_half_spaces_bound_the_envelope)
 }
 END_TEST
 
+/* --- files far away --- */
+
+/* Of a file with subtrees, one is asked for in few batches, whatever its size. */
+START_TEST(subtrees_of_files_far_away_come_in_few_batches)
+{
+    twin t;
+    counted_source c;
+    uint64_t most = 0;
+    ebpo_subtree_options options = with_corners();
+    ebpo_mesh mesh = ebpo_test_torus(2, 0.7, 160, 100);
+    ebpo_close(write_solid(mesh, USUAL, 4, EBPO_CODEC_ZSTD));
+    ebpo_file *near = NULL, *far = NULL;
+    ck_assert(ebpo_open(path, &near, NULL) == EBPO_OK);
+    int level = ebpo_file_info(near)->subtree_level;
+    ck_assert_int_gt(level, 0);
+    twin_make(&t, near);
+    for (uint64_t k = 0; k < t.count[level]; k += 7) {
+        if (t.node[level][k].type != EBPO_GRAY)
+            continue;
+        far = counted_open(&c, path, true);
+        check_subtree(&t, far, &t.node[level][k], &options);
+        most = c.batches + c.alone > most ? c.batches + c.alone : most;
+        counted_close(&c, far);
+    }
+    ck_assert_msg(most <= FEW, "%llu", (unsigned long long)most);
+    twin_free(&t);
+    ebpo_close(near);
+}
+END_TEST
+
 /* --- threads --- */
 
 typedef struct opening {
@@ -813,6 +846,7 @@ Suite *test_suite(void)
     tcase_add_loop_test(tests, nodes_are_those_of_streams, 0, 3);
     tcase_add_loop_test(tests, leaves_are_those_of_whole_levels, 0, ebpo_test_solid_count);
     tcase_add_test(tests, inherited_half_spaces_bound_the_envelope);
+    tcase_add_test(tests, subtrees_of_files_far_away_come_in_few_batches);
     tcase_add_test(tests, threads_share_a_file);
     tcase_add_test(tests, octcodes_that_are_none_are_refused);
     tcase_add_test(tests, where_the_tree_ends_the_leaf_above_is_named_and_opened);

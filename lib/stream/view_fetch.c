@@ -1,0 +1,158 @@
+#include "stream/view_fetch.h"
+
+#include "container/subtree_expect.h"
+#include "container/subtree_table.h"
+#include "octree/octcode.h"
+
+typedef struct fetching {
+    ebpo_chunks *chunks;
+    const ebpo_partial *partial;
+    const ebpo_frontier *frontier;
+    unsigned wanted;
+    bool faces;
+} fetching;
+
+ebpo_view_group ebpo_view_children(const ebpo_waiting *w)
+{
+    return (ebpo_view_group){ { ebpo_octcode_level(w->octcode) + 1, w->below }, w->octcode };
+}
+
+/* What comes next, and after it what comes soon; returns how many groups. Of those that stand
+ * together in blocks of so many, one. */
+static unsigned coming(const fetching *f, const ebpo_view_group *first, unsigned block,
+                       ebpo_view_group groups[EBPO_FRONTIER_BLOCKS])
+{
+    uint64_t best[EBPO_FRONTIER_BLOCKS];
+    unsigned count = ebpo_frontier_blocks(f->frontier, block, best);
+    groups[0] = *first;
+    for (unsigned i = 0; i < count; i++) /* the first is the one at hand */
+        groups[i] = ebpo_view_children(&f->frontier->at[best[i]]);
+    return count ? count : 1;
+}
+
+/* Reads all that a group takes, for nothing but to find out what is missing. */
+static void try_group(const fetching *f, const ebpo_view_group *group)
+{
+    ebpo_group read;
+    ebpo_node leaf;
+    ebpo_status status = ebpo_group_read(f->chunks, group->number.level, group->number.group,
+                                         f->wanted, &read, NULL);
+    for (unsigned octant = 0; octant < 8 && f->faces && status == EBPO_OK; octant++) {
+        ebpo_slice slice;
+        if (ebpo_view_leaf_of(group, &read, octant, &leaf) &&
+            ebpo_slice_read_parts(&slice, f->chunks, &leaf, 0, NULL) == EBPO_OK)
+            ebpo_slice_free(&slice);
+    }
+}
+
+/* --- subtrees --- */
+
+static bool below_subtrees(const fetching *f, const ebpo_view_group *group)
+{
+    return group->parent && ebpo_subtree_table_has(f->chunks->file, group->number.level);
+}
+
+/* The number of the subtree that a group stands in: its root's rank among gray nodes. */
+static uint64_t subtree_of(const fetching *f, const ebpo_view_group *group)
+{
+    int last = ebpo_octcode_level(group->parent), level = f->chunks->file->info.subtree_level;
+    ebpo_partial_node node = { 0, 0 };
+    for (int depth = 1; depth <= level; depth++)
+        node = (ebpo_partial_node){ f->partial->group[node.group].child[node.octant],
+                                    (uint8_t)(group->parent >> 3 * (last - depth) & 7) };
+    return ebpo_partial_children(f->partial, node);
+}
+
+/* All of the subtrees of these groups, each once. */
+static void try_subtrees(const fetching *f, const ebpo_view_group *groups, unsigned count)
+{
+    enum { SUBTREES_MOST = 32 };
+    uint64_t done[SUBTREES_MOST];
+    unsigned subtrees = 0;
+    uint32_t needs =
+        EBPO_NEEDS_ALWAYS | (f->faces ? EBPO_NEEDS_MESH : 0) |
+        (f->wanted & EBPO_GROUP_WINDINGS ? EBPO_NEEDS_SOLID : 0) |
+        (f->wanted & EBPO_GROUP_PLANES ? EBPO_NEEDS_PLANES | EBPO_NEEDS_LEAF_PLANES : 0);
+    for (unsigned i = 0; i < count && subtrees < SUBTREES_MOST; i++) {
+        ebpo_expected none = EBPO_EXPECTED_INIT(f->chunks->file);
+        uint64_t number = below_subtrees(f, &groups[i]) ? subtree_of(f, &groups[i]) : UINT64_MAX;
+        bool known = number == UINT64_MAX;
+        for (unsigned k = 0; k < subtrees && !known; k++)
+            known = done[k] == number;
+        if (known)
+            continue;
+        done[subtrees++] = number;
+        ebpo_subtrees_expect(f->chunks, &none, number, 1, needs, f->faces);
+    }
+}
+
+/* --- fetching --- */
+
+/* The chunks that the group waits for next, and behind these what others take; how many are its
+ * own.
+ */
+static unsigned collect(const fetching *f, const ebpo_view_group *groups, unsigned count,
+                        ebpo_chunk_keys *keys)
+{
+    enum { TRIED = 64 }; /* trying is work */
+    keys->count = 0;
+    ebpo_chunks_collect(f->chunks, keys);
+    try_group(f, &groups[0]);
+    unsigned own = keys->count;
+    if (own && below_subtrees(f, &groups[0]))
+        try_subtrees(f, groups, count);
+    else
+        for (unsigned i = 1; i < count && i < TRIED && own; i++)
+            try_group(f, &groups[i]);
+    ebpo_chunks_collect(f->chunks, NULL);
+    return own;
+}
+
+/* Pass by pass: lists, references, faces, vertices, with what ranks take in between. Beyond that,
+ * reading goes on without having been announced. */
+static ebpo_status fetch_tried(const fetching *f, const ebpo_view_group *group, ebpo_error *error)
+{
+    enum { BLOCK = 64, PASSES = 12 };
+    ebpo_view_group groups[EBPO_FRONTIER_BLOCKS] = { *group };
+    ebpo_chunk_keys keys;
+    ebpo_status status = EBPO_OK;
+    unsigned count = 1;
+    for (int pass = 0; pass < PASSES && status == EBPO_OK; pass++) {
+        unsigned own = collect(f, groups, count, &keys);
+        if (own == 0)
+            break;
+        if (pass == 0) {
+            count = coming(f, group, BLOCK, groups);
+            own = collect(f, groups, count, &keys);
+        }
+        status = ebpo_chunks_fetch(f->chunks, &keys, own, error);
+    }
+    return status;
+}
+
+/* Nodes alone, of levels above the subtrees or of files without. */
+static ebpo_status fetch_nodes(const fetching *f, const ebpo_view_group *group, ebpo_error *error)
+{
+    ebpo_view_group groups[EBPO_FRONTIER_BLOCKS];
+    ebpo_group_number numbers[EBPO_FRONTIER_BLOCKS];
+    if (!ebpo_group_is_far(f->chunks, &group->number, f->wanted))
+        return EBPO_OK;
+    unsigned count = coming(f, group, EBPO_GROUP_BLOCK, groups);
+    for (unsigned i = 0; i < count; i++)
+        numbers[i] = groups[i].number;
+    return ebpo_group_fetch(f->chunks, numbers, count, f->wanted, error);
+}
+
+ebpo_status ebpo_view_fetch(ebpo_chunks *chunks, const ebpo_partial *partial,
+                            const ebpo_frontier *frontier, const ebpo_view_group *group,
+                            unsigned wanted, bool faces, ebpo_error *error)
+{
+    fetching f = { chunks, partial, frontier, wanted, faces };
+    ebpo_status status = EBPO_OK;
+    if (!ebpo_input_expects(&chunks->file->in))
+        return EBPO_OK;
+    if (!below_subtrees(&f, group))
+        status = fetch_nodes(&f, group, error);
+    return status == EBPO_OK && (faces || below_subtrees(&f, group)) ? fetch_tried(&f, group, error)
+                                                                     : status;
+}
