@@ -170,5 +170,6 @@ ebpo_write_options ebpo_subset_write_options(const ebpo_subset_options *options)
     write.codec_level = options->codec_level;
     write.threads = options->threads;
     write.progress = options->progress;
+    write.subtree_faces = options->subtree_faces;
     return write;
 }

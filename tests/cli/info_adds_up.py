@@ -9,8 +9,13 @@ info = json.load(sys.stdin)
 size = os.path.getsize(sys.argv[1])
 b, levels = info["bytes"], info["levels"]
 assert b["file"] == size, (b["file"], size)
-assert b["head"] + b["levels"] + b["vertices"] + b["faces"] + b["maps"] + b["other"] == size, b
-assert levels[-1]["cumulative_bytes"] == b["head"] + b["levels"]
+assert sum(b.values()) - b["file"] == size and b["other"] == 0, b
+subtrees = info.get("subtrees")
+assert (subtrees is None) == (b["subtrees"] == 0), (subtrees, b)
+if subtrees:
+    assert subtrees["count"] == levels[subtrees["level"]]["gray"] > 0, subtrees
+    assert b["head"] < subtrees["top_bytes"] <= size, subtrees
+assert levels[-1]["cumulative_bytes"] == b["head"] + b["index"] + b["levels"]
 cell = math.prod(info["box_size"])
 below = 0
 for i, level in enumerate(levels):

@@ -274,6 +274,16 @@ static ebpo_status call_subset_coarse(every_call_env *e)
     return ebpo_subset(e->file, scratch("part.ebpo.h5"), &part, e->error);
 }
 
+static ebpo_status call_repack(every_call_env *e)
+{
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
+    read.threads = write.threads = 1;
+    read.workspace = e->workspace;
+    write.subtree_faces = 1;
+    return ebpo_file_repack(e->file, scratch("part.ebpo.h5"), &read, &write, e->error);
+}
+
 static ebpo_status export_to(every_call_env *e, const char *name, ebpo_export_format format)
 {
     ebpo_export_report report = { .struct_size = sizeof report };
@@ -318,6 +328,7 @@ const every_call every_call_files[] = {
     { "subset_of_tree", call_subset_of_tree },
     { "subset", call_subset },
     { "subset_coarse", call_subset_coarse },
+    { "repack", call_repack },
     { "export_xdmf", call_xdmf },
     { "export_vtkhdf", call_vtk },
     { "export_gltf", call_gltf },

@@ -4,7 +4,7 @@
 
 #include <ebpo/ebpo.h>
 
-enum { EXIT_FINE = 0, EXIT_FAILED = 1, EXIT_USAGE = 2, EXIT_NOT_SOLID = 3 };
+enum { EXIT_FINE = 0, EXIT_FAILED = 1, EXIT_USAGE = 2, EXIT_NOT_SOLID = 3, EXIT_DIFFERS = 4 };
 
 /* Prints "ebpo convert: message" and returns the exit code that the status stands for. */
 int command_failed(const char *name, const ebpo_error *error);

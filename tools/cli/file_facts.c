@@ -155,7 +155,8 @@ static uint64_t level_bytes(const ebpo_info *info, const ebpo_stored_sizes *stor
 static uint64_t other_bytes(const ebpo_info *info, const ebpo_stored_sizes *stored)
 {
     uint64_t sum = info->head_bytes + info->chunk_index_bytes + level_bytes(info, stored) +
-                   stored->mesh_vertex_bytes + stored->mesh_face_bytes + stored->map_bytes;
+                   stored->mesh_vertex_bytes + stored->mesh_face_bytes + stored->map_bytes +
+                   stored->subtree_bytes;
     return info->file_bytes > sum ? info->file_bytes - sum : 0;
 }
 
@@ -186,12 +187,17 @@ void facts_print(FILE *out, const char *path, const ebpo_info *info,
     print_model(out, info);
     fprintf(out, "  holds     %s; codec %s\n", words_parts(parts, sizeof parts, info->parts),
             words_codec(info->codec));
+    if (info->subtree_level)
+        fprintf(out, "  subtrees  %llu below level %d, each to be read at once\n",
+                (unsigned long long)info->level[info->subtree_level].gray_count,
+                info->subtree_level);
     print_bytes(out, "head", info, info->head_bytes);
     print_bytes(out, "index", info, info->chunk_index_bytes);
     print_bytes(out, "levels", info, level_bytes(info, stored));
     print_bytes(out, "vertices", info, stored->mesh_vertex_bytes);
     print_bytes(out, "faces", info, stored->mesh_face_bytes);
     print_bytes(out, "maps", info, stored->map_bytes);
+    print_bytes(out, "subtrees", info, stored->subtree_bytes);
     print_bytes(out, "other", info, other_bytes(info, stored));
     print_bytes(out, "file", info, info->file_bytes);
 }
@@ -356,7 +362,15 @@ static void json_storage(json *j, const ebpo_info *info, const ebpo_stored_sizes
     json_uint(j, "vertices", stored->mesh_vertex_bytes);
     json_uint(j, "faces", stored->mesh_face_bytes);
     json_uint(j, "maps", stored->map_bytes);
+    json_uint(j, "subtrees", stored->subtree_bytes);
     json_uint(j, "other", other_bytes(info, stored));
+    json_end(j);
+    if (!info->subtree_level)
+        return;
+    json_object(j, "subtrees");
+    json_int(j, "level", info->subtree_level);
+    json_uint(j, "count", info->level[info->subtree_level].gray_count);
+    json_uint(j, "top_bytes", info->top_bytes);
     json_end(j);
 }
 

@@ -13,6 +13,7 @@
 #include "cli/progress.h"
 #include "cli/selection_args.h"
 #include "cli/stages.h"
+#include "cli/subtree_args.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
 #include "cmd/subset_run.h"
@@ -22,7 +23,7 @@ typedef struct values {
     double epsilon, percent, max_error;
     int select, normals;
     int64_t seed;
-    const char *k_root, *target_size;
+    const char *k_root, *target_size, *subtree_faces;
     memory_values memory;
     uint32_t with, without;
     int codec, rule, profile;
@@ -69,6 +70,7 @@ static const arg_option options[] = {
                 "zstd (the default), deflate or none"),
     OPTION_INT("zstd-level", 0, values, zstd_level, "N", 1, 22,
                "compression effort of zstd, 1 to 22; default 3"),
+    SUBTREE_OPTION(values, subtree_faces),
     OPTION_THREADS(values, threads),
     MEMORY_OPTIONS(values, memory),
     MENDING_OPTIONS(values, mend),
@@ -114,7 +116,9 @@ static int check_values(const values *v, const char *in, const char *out)
     if (v->profile >= 0 && (v->with || v->without))
         return command_usage(
             "convert", "--profile says which parts are stored; leave out --with and --without");
-    if (command_overwrites("convert", in, out))
+    uint64_t subtree_faces;
+    if (!subtree_faces_read("convert", v->subtree_faces, &subtree_faces) ||
+        command_overwrites("convert", in, out))
         return EXIT_USAGE;
     return EXIT_FINE;
 }
@@ -278,12 +282,14 @@ static ebpo_status build_and_write(const values *v, mesh_input *p, const char *o
     write.codec_level = (int)v->zstd_level;
     write.threads = (unsigned)v->threads;
     write.progress = progress;
+    (void)subtree_faces_read("convert", v->subtree_faces, &write.subtree_faces);
     if (need->max_error > 0 || need->target_bytes) {
         ebpo_subset_options subset = *need;
         subset.codec = write.codec;
         subset.codec_level = write.codec_level;
         subset.threads = write.threads;
         subset.progress = progress;
+        subset.subtree_faces = write.subtree_faces;
         subset.choose_parts = chooses_parts(v);
         if (v->profile >= 0)
             subset.parts = ebpo_profile_parts((ebpo_profile)v->profile);

@@ -10,12 +10,12 @@
 #include "cli/words.h"
 #include "cmd/commands.h"
 
-static const command *const commands[] = { &command_convert, &command_check,    &command_info,
-                                           &command_levels,  &command_view,     &command_extract,
-                                           &command_export,  &command_subset,   &command_fetch,
-                                           &command_measure, &command_render,   &command_verify,
-                                           &command_inside,  &command_distance, &command_ray,
-                                           &command_box,     &command_bench,    &command_report };
+static const command *const commands[] = {
+    &command_convert, &command_check,  &command_info,   &command_levels, &command_view,
+    &command_extract, &command_export, &command_subset, &command_repack, &command_fetch,
+    &command_measure, &command_render, &command_verify, &command_inside, &command_distance,
+    &command_ray,     &command_box,    &command_bench,  &command_report
+};
 enum { COMMANDS = sizeof commands / sizeof *commands };
 
 static const command *find(const char *name)
@@ -34,7 +34,9 @@ static void usage(FILE *out)
         fprintf(out, "  %-10s %s\n", commands[i]->spec->command, commands[i]->spec->summary);
     fprintf(out, "  %-10s %s\n", "help", "describe a command and its options: ebpo help COMMAND");
     fprintf(out, "\n  --version  print the version and exit\n\nexit codes: 0 success, 1 bad data "
-                 "or input/output, 2 wrong usage, 3 not a solid where one is required\n");
+                 "or input/output, 2 wrong usage, 3 not a solid where one is required, 4 (repack) "
+                 "the content "
+                 "would differ\n");
 }
 
 static int unknown_command(const char *name)

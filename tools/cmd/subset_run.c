@@ -126,7 +126,8 @@ int subset_options(const char *name, const subset_values *v, const char *in, con
         return command_usage(name, "--parts and --profile cannot be used together");
     if (v->zstd_level && v->codec > EBPO_CODEC_ZSTD)
         return command_usage(name, "--zstd-level does not apply to --codec deflate or none");
-    if (command_overwrites(name, in, out_path))
+    if (!subtree_faces_read(name, v->subtree_faces, &out->subtree_faces) ||
+        command_overwrites(name, in, out_path))
         return EXIT_USAGE;
     if (v->profile >= 0)
         out->parts = ebpo_profile_parts((ebpo_profile)v->profile);

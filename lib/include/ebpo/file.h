@@ -8,6 +8,7 @@
  *   Opening    ebpo_open, ebpo_open_memory, ebpo_open_source, ebpo_close
  *   Facts      ebpo_file_info, ebpo_file_get_stats, ebpo_file_locate
  *   Reading    ebpo_file_read_level, ebpo_file_read_mesh, ebpo_file_read_tree ...
+ *   Rewriting  ebpo_file_repack
  */
 #ifndef EBPO_FILE_H
 #define EBPO_FILE_H
@@ -689,6 +690,26 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_source_mesh(const ebpo_file *f
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_check_content(const ebpo_file *file,
                                                            const ebpo_read_options *options,
                                                            ebpo_error *error);
+
+/*
+ * Writes a file anew: all that it holds, laid out as `write` says (codec, subtrees;
+ * its `parts` are not asked). The new file appears whole or not at all, and may take
+ * the place of the one that is read. Before that it is read again: its
+ * content_sha256 is that of `file`, which by that is checked as well.
+ *
+ * The whole model is held at once, as `read` says.
+ *
+ * EBPO_E_FORMAT: the content of `file` is not what its checksum says.
+ * EBPO_E_UNSUPPORTED: it is, but this library would write other arrays (another program
+ * has chosen wider types than needed, say); nothing is written. EBPO_E_ARGUMENT,
+ * EBPO_E_IO, EBPO_E_CANCELLED, EBPO_E_MEMORY, as reading and writing give them.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_repack(const ebpo_file *file, const char *path,
+                                                    const ebpo_read_options *read,
+                                                    const ebpo_write_options *write,
+                                                    ebpo_error *error);
 
 /*
  * Registers the zstd filter with libhdf5 in this process, so that the caller's own

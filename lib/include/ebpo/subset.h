@@ -93,15 +93,15 @@ typedef struct ebpo_subset_options {
     unsigned threads;
 
     ebpo_progress progress;
+
+    /* As in ebpo_write_options; of the subset's faces. */
+    uint64_t subtree_faces;
 } ebpo_subset_options;
 
 #define EBPO_SUBSET_OPTIONS_INIT                                                      \
     {                                                                                 \
         sizeof(ebpo_subset_options), -1, false, false, { 0, 0, 0 }, { 0, 0, 0 }, ~0u, \
-            EBPO_CODEC_ZSTD, 0, 0, 0, 0,                                              \
-        {                                                                             \
-            NULL, NULL                                                                \
-        }                                                                             \
+            EBPO_CODEC_ZSTD, 0, 0, 0, 0, { NULL, NULL }, 0                            \
     }
 
 /*
