@@ -3,6 +3,7 @@
 import assert from 'node:assert/strict';
 import { execFileSync, spawn } from 'node:child_process';
 import { copyFileSync, existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, statSync, symlinkSync, utimesSync, writeFileSync } from 'node:fs';
+import { createServer as createHttp, request as ask } from 'node:http';
 import { createServer } from 'node:net';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -67,7 +68,7 @@ async function show(browser, address) {
   const page = await browser.newPage({ viewport: SIZE, colorScheme: 'dark', reducedMotion: 'reduce' });
   page.on('pageerror', (e) => complaints.push(e.message));
   page.on('console', (m) => ['error', 'warning'].includes(m.type()) && !/GPU stall|WebGL-0x/.test(m.text()) && complaints.push(m.text()));
-  await page.goto(address);
+  await page.goto(address, { waitUntil: 'commit' });
   return page;
 }
 
@@ -307,6 +308,111 @@ async function oneRequest(browser, address) {
   requests();
 }
 
+// A line that can be bad: { address, line }; `line.mode` says what becomes of questions for the model: 'good', 'stall' after `line.most` bytes of the body,
+// 'dead', or a status. line.sent: what was delivered of it, [from, to].
+async function badLine(address) {
+  const line = { mode: 'good', most: 0, sent: [], held: new Set() }, { port } = new URL(address);
+  const server = createHttp((question, answer) => {
+    const isModel = question.url.startsWith('/models/'), mode = isModel ? line.mode : 'good';
+    if (mode === 'dead') {
+      question.socket.destroy();
+    } else if (typeof mode === 'number') {
+      answer.writeHead(mode);
+      answer.end();
+    } else {
+      ask({ port, path: question.url, headers: question.headers }, (far) => {
+        const begin = Number(/\d+/.exec(far.headers['content-range'] ?? '0')), most = mode === 'stall' ? line.most : Infinity, sent = [begin, begin];
+        if (mode === 'stall' && most === 0)
+          return;
+        if (isModel)
+          line.sent.push(sent);
+        answer.writeHead(far.statusCode, far.headers);
+        far.on('data', (data) => {
+          const part = data.subarray(0, Math.max(0, most - (sent[1] - begin)));
+          sent[1] += part.length;
+          answer.write(part);
+        });
+        far.on('end', () => most === Infinity && answer.end());
+      }).end();
+    }
+  });
+  await new Promise((done) => server.listen(0, '127.0.0.1', done));
+  cleanup.push(() => server.closeAllConnections() ?? server.close());
+  return { address: `http://localhost:${server.address().port}/`, line };
+}
+
+// `gaps`: bytes that came along because they lay between others that were wanted, and were wanted later.
+function checkOnce(sent, gaps = 0) {
+  const sorted = [...sent].sort((a, b) => a[0] - b[0] || a[1] - b[1]);
+  let twice = 0, end = 0;
+  for (const [from, to] of sorted) {
+    twice += Math.max(0, Math.min(end, to) - from);
+    end = Math.max(end, to);
+  }
+  assert.ok(twice <= gaps, `nothing is fetched twice: ${JSON.stringify(sorted)}`);
+}
+
+// Before and in the middle of the first answer nothing comes: it is said, and Retry goes on with the rest.
+async function stalls(browser, { address, line }) {
+  const quiet = complaints.length;
+  for (const most of [0, 200_000]) {
+    Object.assign(line, { mode: 'stall', most, sent: [] });
+    const page = await show(browser, `${address}?file=models/ring.ebpo.h5`);
+    await page.waitForSelector('#stall:not([hidden])', { timeout: 15000 });
+    assert.match(await page.textContent('#stallWhat'), /Nothing has come for \d+ s/);
+    assert.match(await page.textContent('#stallNext'), most ? /Waiting for .*, \d+ KB of \d+ KB\./ : /Waiting for the first levels, 1\.05 MB of 1\.05 MB\./);
+    assert.equal(await page.isVisible('#opening'), most === 0); // with so much there is a picture already
+    assert.equal(await page.textContent('#openingName'), 'ring.ebpo.h5');
+    const percent = Number(await page.getAttribute('#progress', 'aria-valuenow'));
+    assert.ok(most ? percent > 20 && percent < 60 : percent === 0, `progress ${percent}`);
+    line.mode = 'good';
+    await page.click('#stallRetry');
+    const state = await settled(page);
+    assert.ok(state.stats.meshTriangles > 0 && !state.error);
+    assert.ok(await page.isHidden('#stall') && await page.isHidden('#opening'));
+    checkOnce(line.sent);
+    await page.close();
+  }
+  complaints.length = quiet;
+}
+
+// The line dies when the file is open: nothing is lost, and with the line all of it comes.
+async function dies(browser, { address, line }) {
+  const quiet = complaints.length;
+  Object.assign(line, { mode: 'good', sent: [] });
+  const page = await show(browser, `${address}?file=models/ring.ebpo.h5&level=4&detail=0`);
+  await settled(page);
+  line.mode = 'dead';
+  for (let i = 0; i < 6; i++)
+    await page.keyboard.press('ArrowRight');
+  await page.waitForSelector('#stall:not([hidden]):has-text("line is dead")', { timeout: 30000 });
+  line.mode = 'good';
+  await page.click('#stallRetry');
+  const state = await settled(page);
+  assert.ok(state.stats.meshTriangles > 0 && !state.error && await page.isHidden('#stall'));
+  checkOnce(line.sent, 4096);
+  await page.close();
+  complaints.length = quiet;
+}
+
+// What a status means is said, and there is a way to try again.
+async function statuses(browser, { address, line }) {
+  const quiet = complaints.length;
+  for (const [status, what, next] of [[403, /403.*does not let this page/, /access/], [404, /404.*no such file/, /address/], [416, /416.*is empty/, /again/], [503, /503/, /later/]]) {
+    line.mode = status;
+    const page = await show(browser, `${address}?file=models/ring.ebpo.h5&level=3`);
+    await page.waitForSelector('#error:not([hidden])', { timeout: 30000 });
+    assert.match(await page.textContent('#errorWhat'), what);
+    assert.match(await page.textContent('#errorNext'), next);
+    line.mode = 'good';
+    await page.click('#errorRetry');
+    await settled(page);
+    assert.ok(await page.isHidden('#error'));
+    await page.close();
+  }
+  complaints.length = quiet;
+}
+
 // The page as it is written, without a bundle.
 async function fromSources(browser) {
   const page = await show(browser, `${await serve('--sources')}?file=models/ring.ebpo.h5&level=4`), state = await settled(page);
@@ -357,6 +463,10 @@ async function main() {
   await step('errors say what, and what next', () => errors(browser, address));
   await step('the model is asked for before the page\'s code is there', () => modelFirst(browser, address));
   await step('a small file comes in one request, and is not fetched again unless it has changed', () => oneRequest(browser, address));
+  const bad = await badLine(address);
+  await step('a stall is told, and Retry goes on with what has not come', () => stalls(browser, bad));
+  await step('a dead line loses nothing', () => dies(browser, bad));
+  await step('a status says what it means, and can be tried again', () => statuses(browser, bad));
   await step('the page works as it is written, too', () => fromSources(browser));
   await step('serve.sh says what is missing', () => servesOrSays());
   await step('a sample is opened from the list', () => samples(browser, address));

@@ -1,4 +1,5 @@
 // The page: what is asked for, what is shown, and the worker in between.
+import { busy, bytes, showError, showLine, showOpening } from './line.js';
 import { LEVEL_COLOURS, MESH_COLOUR, Scene, TYPE_COLOURS } from './scene.js';
 
 const $ = (id) => document.getElementById(id);
@@ -17,7 +18,6 @@ const scene = new Scene($('canvas'), boot, { changed: cameraMoved, drawn: frameD
 // --- numbers for people ---
 
 const count = (n) => n.toLocaleString('en');
-const bytes = (n) => (n < 1000 ? `${n} B` : n < 1e6 ? `${(n / 1e3).toFixed(n < 1e4 ? 1 : 0)} KB` : n < 1e9 ? `${(n / 1e6).toFixed(n < 1e7 ? 2 : 1)} MB` : `${(n / 1e9).toFixed(2)} GB`);
 const time = (ms) => (ms < 1000 ? `${Math.round(ms)} ms` : `${(ms / 1000).toFixed(2)} s`);
 const length = (x, digits = 5) => `${Number(x.toPrecision(digits))}${state.info?.unit ? ' ' + state.info.unit : ''}`;
 
@@ -31,8 +31,9 @@ function open(what, name, begun) {
   scene.home();
   showError();
   busy(true);
+  showOpening(name);
   $('start').hidden = true;
-  state.shownName = name;
+  Object.assign(state, { shownName: name, what });
   if (!begun)
     worker.postMessage({ type: 'open', opening: state.opening, what, ahead: boot.ahead });
   ask();
@@ -66,6 +67,8 @@ function close() {
   worker.postMessage({ type: 'close', opening: state.opening });
   scene.clear();
   busy(false);
+  showOpening();
+  showError();
   for (const id of ['panel', 'bar', 'tools'])
     $(id).hidden = true;
   $('start').hidden = false;
@@ -84,6 +87,7 @@ const handlers = {
   opened(m) {
     Object.assign(state, { info: m.info, scene: m.scene, bytesTo: m.bytesTo, size: m.size, traffic: m.traffic });
     const i = m.info, name = state.shownName ?? m.name;
+    $('openingText').textContent = `${count(i.face_count)} faces`;
     document.title = `${name} – EBP-Octree viewer`;
     $('name').textContent = name;
     $('name').title = m.name;
@@ -107,8 +111,10 @@ const handlers = {
   },
   tiles(m) {
     scene.setTiles(m.set, m.removed);
-    if (m.set.length)
+    if (m.set.length) {
       state.shownAfter ??= m.ms;
+      showOpening();
+    }
     Object.assign(state, { stats: m.stats, traffic: m.traffic });
     showLevels();
     showStats();
@@ -127,9 +133,14 @@ const handlers = {
     }
     showStats();
   },
+  line(m) {
+    state.line = m;
+    showLine(m);
+  },
   failed(m) {
-    showError(m.error);
+    showError(m.error, m.error.code === 'NETWORK' ? retry : undefined);
     busy(false);
+    showOpening();
     state.error = m.error;
     if (!state.info)
       $('start').hidden = false;
@@ -144,6 +155,17 @@ worker.onmessage = ({ data }) => {
 worker.onerror = (e) => showError({ message: `The page's worker failed (${e.message ?? 'it could not be loaded'}); run npm ci in tools/viewer, and reload` });
 
 // --- to the worker ---
+
+// What came before is kept, and not asked for again; a file that could not be opened is opened anew.
+function retry() {
+  state.error = undefined;
+  if (!state.info) {
+    open(state.what, state.shownName);
+    return;
+  }
+  worker.postMessage({ type: 'retry' });
+  ask();
+}
 
 function cameraMoved() {
   timer ??= setTimeout(ask, 90);
@@ -340,22 +362,6 @@ function probeShown() {
   }
 }
 
-// --- errors ---
-
-function showError(error) {
-  $('error').hidden = !error;
-  if (!error)
-    return;
-  const cut = error.message.lastIndexOf('; ');
-  const sentence = (s) => s.charAt(0).toUpperCase() + s.slice(1) + (/[.!?]$/.test(s) ? '' : '.');
-  $('errorWhat').textContent = cut < 0 ? error.message : error.message.slice(0, cut);
-  $('errorNext').textContent = cut < 0 ? '' : sentence(error.message.slice(cut + 2));
-}
-
-function busy(on) {
-  $('progress').classList.toggle('on', on);
-}
-
 // --- wiring ---
 
 $('openForm').onsubmit = (e) => {
@@ -365,6 +371,7 @@ $('openForm').onsubmit = (e) => {
 };
 $('file').onchange = () => $('file').files[0] && openFile($('file').files[0]);
 $('close').onclick = close;
+$('stallRetry').onclick = () => worker.postMessage({ type: 'retry' });
 $('errorClose').onclick = () => showError();
 $('level').oninput = levelChanged;
 $('detail').onchange = ask;
@@ -478,7 +485,7 @@ async function listSamples(address) {
 // --- begin: ?file= address, &level= number or mesh, &detail= pixels, &theme=, &samples= list ---
 
 const { query } = boot;
-setTheme(query.get('theme') ?? (matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark'));
+setTheme(document.documentElement.dataset.theme);
 $('detail').value = query.get('detail') ?? 'auto';
 if (!$('detail').value)
   $('detail').value = 'auto';
@@ -486,12 +493,13 @@ if (query.has('samples'))
   listSamples(query.get('samples')).catch((e) => showError({ message: `${query.get('samples')}: the list of samples cannot be read (${e.message}); check the address` }));
 if (query.has('file'))
   openUrl(query.get('file'), boot.opening === 1);
+boot.over();
 boot.said.splice(0).forEach((data) => worker.onmessage({ data }));
 
 /** For tests and for the curious: what is shown. */
 window.ebpoViewer = {
   get state() {
-    return { idle: state.idle, depth: state.depth, stats: state.stats, traffic: state.traffic, timeline: state.timeline, shownAfter: state.shownAfter, probe: state.probe, error: state.error,
+    return { idle: state.idle, depth: state.depth, stats: state.stats, traffic: state.traffic, timeline: state.timeline, shownAfter: state.shownAfter, probe: state.probe, error: state.error, line: state.line,
       levels: state.info?.levels.length, walls: scene.walls, calls: state.calls };
   },
   get place() {

@@ -10,9 +10,10 @@
 
   const query = new URLSearchParams(location.search), said = [];
   const number = (name) => (/^\d+$/.test(query.get(name) ?? '') ? Number(query.get(name)) : undefined);
+  document.documentElement.dataset.theme = query.get('theme') ?? (matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark');
   const worker = new Worker('worker.js', { type: 'module' });
   worker.onmessage = ({ data }) => said.push(data);
-  const boot = window.ebpoBoot = { worker, said, query, level: number('level'), detail: number('detail'), fieldOfView: FIELD_OF_VIEW, opening: 0,
+  const boot = window.ebpoBoot = { worker, said, query, level: number('level'), detail: number('detail'), fieldOfView: FIELD_OF_VIEW, opening: 0, over() {},
     contextOptions: { antialias: true, powerPreference: 'high-performance', preserveDrawingBuffer: true } };
   boot.ahead = boot.level <= COARSE_LEVEL ? COARSE_BYTES : FIRST_BYTES;
   // The picture's context takes long to make: between the page's first paint and its code there is time for it.
@@ -37,7 +38,18 @@
   boot.forget = () => abort.abort();
   boot.opening = 1;
   post({ range: `bytes=0-${boot.ahead - 1}` });
-  let got = 0;
+  // The card before the first picture, until app.js takes over.
+  let got = 0, last = performance.now();
+  const name = decodeURIComponent(boot.url.split(/[?#]/)[0].split('/').at(-1)), say = () => {
+    const text = document.getElementById('openingText'), quiet = Math.floor((performance.now() - last) / 1000);
+    if (!text)
+      return;
+    document.getElementById('openingName').textContent = name;
+    text.textContent = quiet > 2 ? `Nothing has come for ${quiet} s; waiting for ${got >= HEAD_BYTES ? "the page's code" : 'the model'}` : got ? `${Math.round(got / 1000)} KB` : 'Asked for';
+  };
+  const telling = setInterval(say, 200);
+  document.documentElement.classList.add('opening');
+  boot.over = () => clearInterval(telling);
   (async () => {
     const response = await fetch(boot.url, { cache: 'no-cache', signal: abort.signal, headers: { Range: `bytes=0-${boot.ahead - 1}` } });
     post({ head: { status: response.status, statusText: response.statusText, headers: [...response.headers] } });
@@ -46,6 +58,7 @@
       if (done)
         break;
       got += value.length;
+      last = performance.now();
       post({ bytes: value }, [value.buffer]);
       if (got >= HEAD_BYTES)
         begin();

@@ -5,6 +5,7 @@ import { Cut } from './cut.js';
 import { fetchAfter, takeFirst } from './handover.js';
 import { GRAY, Tree, UrlSource, distanceInterval, growForQuestion, growForView, inside, insideLeaf, loadZstd, nearestFace, openEbpo, sourceOf } from './reader/index.js';
 
+const LINE_MS = 250;                      // the page hears so often of what is under way
 const TIMEOUT_MS = 20000;                 // without a byte
 const FIRST_LEVELS = 5;                   // come with the first request, as a rule
 const SMALL_MESH = 8 * 1024 * 1024;       // stored bytes
@@ -180,6 +181,21 @@ class OpenFile {
   }
 }
 
+// What is under way, for the page; and that nothing is any more.
+let silent = true;
+function tellLine() {
+  const underway = current?.source?.underway?.() ?? [];
+  if (!underway.length && silent)
+    return;
+  silent = !underway.length;
+  const sum = (of) => underway.reduce((total, t) => total + of(t), 0), { busy, source } = current ?? {};
+  const what = !current?.tree?.root ? 'the first levels' : busy.mesh && !busy.nodes ? 'faces' : 'finer levels';
+  post({ type: 'line', opening: current?.number, got: sum((t) => t.got), want: sum((t) => t.to - t.from), quiet: underway.length ? Math.min(...underway.map((t) => t.quiet)) : 0,
+    what, trouble: source?.trouble?.message });
+}
+setInterval(tellLine, LINE_MS);
+self.addEventListener('online', () => current?.source?.retry?.());
+
 function end() {
   current?.source?.close?.();
   current = undefined;
@@ -195,6 +211,8 @@ self.onmessage = async ({ data }) => {
       await mine.open(data.what, data.ahead);
       if (!mine.ended && view)
         await mine.pump();
+    } else if (data.type === 'retry') {
+      current?.source?.retry?.();
     } else if (data.type === 'close') {
       end();
     } else if (data.type === 'view') {

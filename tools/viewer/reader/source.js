@@ -61,7 +61,7 @@ const RETRY_STATUS = new Set([429, 500, 502, 503, 504]);
 // Answers that no repetition mends: what they mean, and what to do next.
 const REFUSED = {
   401: ['the server wants to know who asks', 'sign in there, or ask for an address that needs no password'],
-  403: ['the server does not let this page have it', 'ask its owner for access; a signed address may have run out: get a fresh one'],
+  403: ['the server does not let this page have it', 'ask its owner for access, or for a fresh address where it was signed: such run out'],
   404: ['there is no such file', 'check the address'],
   410: ['there is no such file any more', 'check the address'],
 };
@@ -216,7 +216,8 @@ export class UrlSource {
     return -1;
   }
 
-  async #once(transfer, first, cache = first ? 'no-cache' : this.tag === null ? 'no-store' : 'default') {
+  // What is gone on with is not for the cache: Chromium would ask for it twice.
+  async #once(transfer, first, cache = first ? 'no-cache' : this.tag === null || transfer.asked ? 'no-store' : 'default') {
     const abort = new AbortController(), offset = transfer.end, length = transfer.to - offset;
     let timer, late = false;
     const alive = () => {
@@ -229,8 +230,8 @@ export class UrlSource {
     alive();
     const transient = (what, next, cause) => Object.assign(this.#fail(what, next, cause), { again: true });
     this.requests++;
+    transfer.asked = true;
     this.running.set(transfer, abort);
-    transfer.at = performance.now();
     try {
       // Browsers drop Accept-Encoding, and send identity with ranges.
       const response = await this.fetch(this.url, {
