@@ -85,7 +85,7 @@ void ebpo_chunks_expect(ebpo_chunks *chunks, ebpo_expected *expected, ebpo_array
 
 /* Chunks, each once. What does not fit is left out: then it is read without having been announced.
  */
-enum { EBPO_CHUNK_KEYS = 512 };
+enum { EBPO_CHUNK_KEYS = 1024 };
 typedef struct ebpo_chunk_keys {
     unsigned count;
     uint64_t key[EBPO_CHUNK_KEYS];

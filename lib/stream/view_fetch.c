@@ -63,27 +63,43 @@ static uint64_t subtree_of(const fetching *f, const ebpo_view_group *group)
     return ebpo_partial_children(f->partial, node);
 }
 
-/* All of the subtrees of these groups, each once. */
-static void try_subtrees(const fetching *f, const ebpo_view_group *groups, unsigned count)
+enum { SUBTREES_MOST = 64 };
+
+/* In which subtrees these groups stand, each once; 0: in too many. */
+static unsigned subtrees_of(const fetching *f, const ebpo_view_group *groups, unsigned count,
+                            uint64_t numbers[SUBTREES_MOST])
 {
-    enum { SUBTREES_MOST = 32 };
-    uint64_t done[SUBTREES_MOST];
-    unsigned subtrees = 0;
-    uint32_t needs =
-        EBPO_NEEDS_ALWAYS | (f->faces ? EBPO_NEEDS_MESH : 0) |
-        (f->wanted & EBPO_GROUP_WINDINGS ? EBPO_NEEDS_SOLID : 0) |
-        (f->wanted & EBPO_GROUP_PLANES ? EBPO_NEEDS_PLANES | EBPO_NEEDS_LEAF_PLANES : 0);
-    for (unsigned i = 0; i < count && subtrees < SUBTREES_MOST; i++) {
-        ebpo_expected none = EBPO_EXPECTED_INIT(f->chunks->file);
-        uint64_t number = below_subtrees(f, &groups[i]) ? subtree_of(f, &groups[i]) : UINT64_MAX;
-        bool known = number == UINT64_MAX;
-        for (unsigned k = 0; k < subtrees && !known; k++)
-            known = done[k] == number;
-        if (known)
+    unsigned found = 0;
+    for (unsigned i = 0; i < count; i++) {
+        if (!below_subtrees(f, &groups[i]))
             continue;
-        done[subtrees++] = number;
-        ebpo_subtrees_expect(f->chunks, &none, number, 1, needs, f->faces);
+        uint64_t number = subtree_of(f, &groups[i]);
+        unsigned k = 0;
+        while (k < found && numbers[k] != number)
+            k++;
+        if (k == SUBTREES_MOST)
+            return 0;
+        numbers[k] = number;
+        found += k == found;
     }
+    return found;
+}
+
+/* All of the subtrees of these groups. False where the view goes through so many that it comes to
+ * the end of none soon: then what the next groups take is enough. */
+static bool try_subtrees(const fetching *f, const ebpo_view_group *groups, unsigned count)
+{
+    uint64_t numbers[SUBTREES_MOST];
+    bool planes = f->wanted & EBPO_GROUP_PLANES, windings = f->wanted & EBPO_GROUP_WINDINGS;
+    uint32_t needs = EBPO_NEEDS_ALWAYS | (f->faces ? EBPO_NEEDS_MESH : 0) |
+                     (windings ? EBPO_NEEDS_SOLID : 0) |
+                     (planes ? EBPO_NEEDS_PLANES | EBPO_NEEDS_LEAF_PLANES : 0);
+    unsigned subtrees = subtrees_of(f, groups, count, numbers);
+    for (unsigned i = 0; i < subtrees; i++) {
+        ebpo_expected none = EBPO_EXPECTED_INIT(f->chunks->file);
+        ebpo_subtrees_expect(f->chunks, &none, numbers[i], 1, needs, f->faces);
+    }
+    return subtrees > 0;
 }
 
 /* --- fetching --- */
@@ -99,10 +115,8 @@ static unsigned collect(const fetching *f, const ebpo_view_group *groups, unsign
     ebpo_chunks_collect(f->chunks, keys);
     try_group(f, &groups[0]);
     unsigned own = keys->count;
-    if (own && below_subtrees(f, &groups[0]))
-        try_subtrees(f, groups, count);
-    else
-        for (unsigned i = 1; i < count && i < TRIED && own; i++)
+    if (own && !try_subtrees(f, groups, count))
+        for (unsigned i = 1; i < count && i < TRIED; i++)
             try_group(f, &groups[i]);
     ebpo_chunks_collect(f->chunks, NULL);
     return own;
@@ -113,19 +127,14 @@ static unsigned collect(const fetching *f, const ebpo_view_group *groups, unsign
 static ebpo_status fetch_tried(const fetching *f, const ebpo_view_group *group, ebpo_error *error)
 {
     enum { BLOCK = 64, PASSES = 12 };
-    ebpo_view_group groups[EBPO_FRONTIER_BLOCKS] = { *group };
+    ebpo_view_group groups[EBPO_FRONTIER_BLOCKS];
     ebpo_chunk_keys keys;
     ebpo_status status = EBPO_OK;
-    unsigned count = 1;
-    for (int pass = 0; pass < PASSES && status == EBPO_OK; pass++) {
-        unsigned own = collect(f, groups, count, &keys);
-        if (own == 0)
-            break;
-        if (pass == 0) {
-            count = coming(f, group, BLOCK, groups);
-            own = collect(f, groups, count, &keys);
-        }
-        status = ebpo_chunks_fetch(f->chunks, &keys, own, error);
+    unsigned count = coming(f, group, BLOCK, groups), own = 1;
+    for (int pass = 0; pass < PASSES && own && status == EBPO_OK; pass++) {
+        own = collect(f, groups, count, &keys);
+        if (own)
+            status = ebpo_chunks_fetch(f->chunks, &keys, own, error);
     }
     return status;
 }
@@ -149,8 +158,6 @@ ebpo_status ebpo_view_fetch(ebpo_chunks *chunks, const ebpo_partial *partial,
 {
     fetching f = { chunks, partial, frontier, wanted, faces };
     ebpo_status status = EBPO_OK;
-    if (!ebpo_input_expects(&chunks->file->in))
-        return EBPO_OK;
     if (!below_subtrees(&f, group))
         status = fetch_nodes(&f, group, error);
     return status == EBPO_OK && (faces || below_subtrees(&f, group)) ? fetch_tried(&f, group, error)

@@ -6,10 +6,10 @@
 #include "stream/partial_tree.h"
 #include "stream/view_faces.h"
 
-/* For files far away: fetches what the group (EBPO_GROUP_...) and with `faces` those of its leaves
- * take and is not in memory, and announces with it what the next groups of the frontier take: where
- * the file has a table of subtrees, all of the subtrees in which they are. Counted chunks:
- * EBPO_E_LIMIT as ebpo_group_read. */
+/* For files far away, when not all is in memory: fetches what the group (EBPO_GROUP_...) and with
+ * `faces` those of its leaves take and is not in memory, and announces with it what the next groups
+ * of the frontier take: where the file has a table of subtrees, all of the subtrees in which they
+ * are. Counted chunks: EBPO_E_LIMIT as ebpo_group_read. */
 EBPO_MUST_USE ebpo_status ebpo_view_fetch(ebpo_chunks *chunks, const ebpo_partial *partial,
                                           const ebpo_frontier *frontier,
                                           const ebpo_view_group *group, unsigned wanted, bool faces,

@@ -152,20 +152,40 @@ ebpo_status ebpo_view_stream_change(ebpo_view_stream *s, const ebpo_view_options
     return EBPO_OK;
 }
 
+static ebpo_status read_now(ebpo_view_stream *s, const ebpo_view_group *group, unsigned wanted,
+                            ebpo_error *error)
+{
+    ebpo_status status = ebpo_group_read(s->chunks, group->number.level, group->number.group,
+                                         wanted, &s->read, error);
+    return status == EBPO_OK && s->leaves
+               ? ebpo_view_leaves_read(s->leaves, s->chunks, group, &s->read, error)
+               : status;
+}
+
+/* Of a file far away, from memory alone; false: there is more to it. */
+static bool read_at_once(ebpo_view_stream *s, const ebpo_view_group *group, unsigned wanted)
+{
+    ebpo_chunk_keys missing = { .count = 0 };
+    ebpo_chunks_collect(s->chunks, &missing);
+    ebpo_status status = read_now(s, group, wanted, NULL);
+    ebpo_chunks_collect(s->chunks, NULL);
+    return status == EBPO_OK && missing.count == 0;
+}
+
 /* Into s->read, and with faces those of its leaves. */
 static ebpo_status read_group(ebpo_view_stream *s, const ebpo_view_group *group, ebpo_error *error)
 {
     unsigned wanted = (s->options.planes || s->options.polygons ? EBPO_GROUP_PLANES : 0u) |
                       (s->options.windings ? EBPO_GROUP_WINDINGS : 0u);
+    ebpo_status status = EBPO_OK;
     ebpo_chunks_limit(s->chunks, s->options.bytes ? s->options.bytes : UINT64_MAX);
-    ebpo_status status = ebpo_view_fetch(s->chunks, &s->partial, &s->frontier, group, wanted,
-                                         s->leaves != NULL, error);
-    if (status == EBPO_OK)
-        status = ebpo_group_read(s->chunks, group->number.level, group->number.group, wanted,
-                                 &s->read, error);
-    return status == EBPO_OK && s->leaves
-               ? ebpo_view_leaves_read(s->leaves, s->chunks, group, &s->read, error)
-               : status;
+    if (ebpo_input_expects(&s->chunks->file->in)) {
+        if (read_at_once(s, group, wanted))
+            return EBPO_OK;
+        status = ebpo_view_fetch(s->chunks, &s->partial, &s->frontier, group, wanted,
+                                 s->leaves != NULL, error);
+    }
+    return status == EBPO_OK ? read_now(s, group, wanted, error) : status;
 }
 
 /* Begins with the children of the top of the frontier, or with the root. Of a pruned node there are

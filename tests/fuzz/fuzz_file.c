@@ -1,6 +1,7 @@
 /* Any bytes as a file: opening, reading everything and asking ends in a status, nothing else. */
 #include <ebpo/lod.h>
 #include <ebpo/query.h>
+#include <ebpo/subtree.h>
 #include <ebpo/view.h>
 
 #include "known_leaks.h"
@@ -8,6 +9,12 @@
 #include "subset/subset_parts.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+static bool take_triangles(void *user, const ebpo_triangles *triangles)
+{
+    *(uint64_t *)user += triangles->count;
+    return true;
+}
 
 /* Questions through whole models and through subtrees loaded on demand. */
 static void ask(ebpo_file *file, int cut_level)
@@ -41,6 +48,7 @@ static void ask(ebpo_file *file, int cut_level)
         }
         (void)!ebpo_ray_all(context, points[1], points[2], 10, &hits, &count, NULL);
         (void)!ebpo_faces_in_box(context, points[0], points[2], &faces, &count, NULL);
+        (void)!ebpo_triangles_in_box(context, points[0], points[2], take_triangles, &count, NULL);
         ebpo_context_free(context);
     }
     ebpo_model_free(model);
@@ -56,12 +64,29 @@ static void view(ebpo_file *file, ebpo_priority priority)
     options.priority = priority;
     options.observer = &observer;
     options.polygons = options.windings = true;
+    options.faces = ebpo_file_info(file)->parts & EBPO_PART_MESH;
     options.nodes = 2000;
     if (ebpo_view_stream_new(file, &options, &stream, NULL) != EBPO_OK)
         return;
     while (ebpo_view_stream_next(stream, &node, &end, NULL) == EBPO_OK && end == EBPO_VIEW_NODE)
         ;
     ebpo_view_stream_free(stream);
+}
+
+static void load(ebpo_file *file, uint64_t octcode)
+{
+    ebpo_subtree_options options = EBPO_SUBTREE_OPTIONS_INIT;
+    ebpo_subtree_nodes nodes = EBPO_SUBTREE_NODES_INIT;
+    ebpo_subtree_node node = EBPO_SUBTREE_NODE_INIT;
+    ebpo_subtree *subtree;
+    options.corners = options.or_leaf_above = true;
+    options.memory = 64 << 20;
+    if (ebpo_subtree_open(file, octcode, &options, &subtree, NULL) != EBPO_OK)
+        return;
+    ebpo_subtree_get_nodes(subtree, &nodes);
+    for (uint64_t i = 0; i < nodes.node_count && i < 200; i++)
+        (void)!ebpo_subtree_get_node(subtree, i, true, &node, NULL);
+    ebpo_subtree_close(subtree);
 }
 
 static void cut_level(ebpo_file *file)
@@ -99,6 +124,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     cut_level(file);
     for (int cut = -1; cut < 3; cut++)
         ask(file, cut);
+    for (uint64_t octcode = 1; octcode < 65; octcode += 9)
+        load(file, octcode);
     view(file, EBPO_PRIORITY_LEVEL);
     view(file, EBPO_PRIORITY_FRONT_TO_BACK);
     ebpo_close(file);
