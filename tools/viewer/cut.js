@@ -3,6 +3,7 @@
 //
 // Coordinates of the scene: the model's box is centred on the origin and scaled so that half its diagonal is 1. Done in doubles, then rounded.
 import { Field } from './field.js';
+import { Hidden } from './hidden.js';
 import { MeshStore } from './mesh.js';
 import { BLACK, GRAY, LEAF, WHITE } from './reader/index.js';
 import { TileMaker, planeVector } from './tile.js';
@@ -13,8 +14,9 @@ const NODES_A_PASS = 2400;     // newly made in one pass, so that a picture come
 const POLYTOPES_KEPT = 40000;  // of about 1.3 KB, besides those of the cut itself
 const PRUNE_PASSES = 64;
 const MESH_LEAVES = 1000;      // whose faces are asked for at once, about
-const MESH_SUBTREES = 24;      // the same where the file has subtrees
+const MESH_SUBTREES = 16;      // the same where the file has subtrees
 const FACE_PIXELS = 10;        // of the picture for each face of a subtree, from which on its faces are fetched, at a detail of 16 pixels
+const NEARER_LEVELS = 2;       // nodes that lack so many more levels than others are fetched before these
 const NODES_MISSING = 1 << 14; // told of in one pass
 const LEAF_SHARE = 4;          // in small files leaves' faces are taken even when so many times smaller than a gray node may be
 const GROUP_LEVELS = 3;        // leaves below one node so many levels above have neighbouring faces in the file
@@ -244,7 +246,24 @@ export class Cut {
           offer(child);
     }
     out.levels = Array.from(out.levels, (n) => n ?? 0);
+    if (!this.small && !out.more && want.pixels > 0 && (out.missing.length || groups.size))
+      this.#leaveHidden(view, out, groups);
     return Object.assign(out, whole ?? { leaves: this.#leavesToFetch(groups, want) });
+  }
+
+  // Of a large file nothing is fetched that other nodes hide.
+  #leaveHidden(view, out, groups) {
+    const hidden = new Hidden(view, out.nodes, (node) => {
+      const { low, size } = this.#place(node);
+      return { center: low.map((l, k) => l + size[k] / 2), radius: Math.hypot(...size) / 2 };
+    });
+    const nearest = Math.max(...out.missing.map(({ levels }) => levels)) - NEARER_LEVELS; // hide others when they are there
+    out.missing = out.missing.filter(({ node, levels }) => levels >= nearest && !hidden.has(node));
+    for (const [root, group] of groups) {
+      group.leaves = hidden.has(root) ? [] : group.leaves;
+      if (!group.leaves.some((leaf) => !hidden.has(leaf)))
+        groups.delete(root);
+    }
   }
 
   // How many levels below a node are worth having at once: until cells are as small as is wanted.

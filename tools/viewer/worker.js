@@ -10,6 +10,7 @@ const TIMEOUT_MS = 20000;                 // without a byte
 const FIRST_LEVELS = 5;                   // come with the first request, as a rule
 const SMALL_MESH = 8 * 1024 * 1024;       // stored bytes
 const MESH_BYTES_A_VIEW = 16 * 1024 * 1024; // of larger ones, before the camera moves again
+const SUBTREE_BYTES_A_VIEW = 1.5 * 1024 * 1024; // the same where the file has subtrees, of which few bytes are for nothing
 
 let current; // one open file
 let view, want;
@@ -110,9 +111,9 @@ class OpenFile {
   #meshAllowed() {
     if (this.viewNumber !== want.number) {
       this.viewNumber = want.number;
-      this.viewBytes = this.file.traffic.bytes;
+      this.meshBytes = 0;
     }
-    return this.cut.small || want.pixels === 0 || this.file.traffic.bytes - this.viewBytes < MESH_BYTES_A_VIEW;
+    return this.cut.small || want.pixels === 0 || this.meshBytes < (this.tree.info.subtree_level === undefined ? MESH_BYTES_A_VIEW : SUBTREE_BYTES_A_VIEW);
   }
 
   #later(work) {
@@ -133,11 +134,13 @@ class OpenFile {
 
   async #loadMesh(leaves) {
     this.busy.mesh = true;
+    const before = this.file.traffic.bytes;
     try {
       const lists = await this.file.leafFaces(leaves);
       leaves.forEach((leaf, i) => this.cut.addMesh(leaf, lists[i]));
     } finally {
       this.busy.mesh = false;
+      this.meshBytes += this.file.traffic.bytes - before;
     }
   }
 

@@ -275,8 +275,8 @@ export class EbpoFile {
   // --- parts of levels ---
 
   /**
-   * Nodes of parts of levels, as segments for Tree.addPart(): wanted is [{ level, part }], Tree.partOf() names them. In one batch. Without `planes`
-   * only what exact questions need.
+   * Nodes of parts of levels, as segments for Tree.addPart(): wanted is [{ level, part }], Tree.partOf() names them. In one batch. With `planes` what
+   * drawing needs, else what exact questions need: leaves' winding numbers.
    */
   async nodeParts(wanted, { planes = true } = {}) {
     return this.#told(async () => {

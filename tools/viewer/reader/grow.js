@@ -1,7 +1,7 @@
 // Brings into a tree what is below some of its nodes: whole levels where little is left out by that, else parts of levels, all in one batch.
 import { INDEX_ROWS } from './facts.js';
 
-const BATCH_BYTES = 512 * 1024;                // of parts, so that pictures come in between
+const BATCH_BYTES = 256 * 1024;                // of parts, so that pictures come in between
 const WHOLE_SHARE = 0.3;                       // of a level's parts, from which on all of it is taken
 const WHOLE_BYTES_MOST = 64 * 1024 * 1024;     // of whole levels, decoded, about
 

@@ -61,15 +61,15 @@ export class Parts {
       leafPlanes: store.arrays.has(at + 'leaf_plane_counts') ? span(leaf, 'leaf_index', 3, 2, s.leaf_planes, LEAF) : undefined };
   }
 
-  /** The rows of arrays that hold a part's nodes: [{ path, from, to }]. Without `planes` only what exact questions need. */
+  /** The rows of arrays that hold a part's nodes: [{ path, from, to }]. With `planes` for drawing, else for exact questions, which need leaves' winding numbers. */
   nodeRanges(d, planes) {
     const at = folder(d.level), of = (name, type) => ({ path: at + name, from: d.first[type], to: d.first[type] + d.count[type] });
-    const out = [{ path: at + 'types', from: d.group, to: d.group + d.groups }, of('leaf_winding', LEAF), of('black_winding', BLACK), of('white_winding', WHITE)];
+    const out = [{ path: at + 'types', from: d.group, to: d.group + d.groups }, of('black_winding', BLACK), of('white_winding', WHITE)];
     const add = (name, type, p, counts) => p && out.push({ path: at + counts, from: p.row, to: d.first[type] + d.count[type] }, { path: at + name, from: p.from, to: p.to });
-    if (planes) {
-      add('planes', GRAY, d.planes, 'plane_counts');
-      add('leaf_planes', LEAF, d.leafPlanes, 'leaf_plane_counts');
-    }
+    if (!planes)
+      return [...out, of('leaf_winding', LEAF)];
+    add('planes', GRAY, d.planes, 'plane_counts');
+    add('leaf_planes', LEAF, d.leafPlanes, 'leaf_plane_counts');
     return out;
   }
 
@@ -81,8 +81,8 @@ export class Parts {
     return described.map((d, i) => this.#segment(d, values.splice(0, wanted[i].length), planes));
   }
 
-  #segment(d, [types, leafWinding, blackWinding, whiteWinding, ...rest], planes) {
-    const at = folder(d.level), found = countTypes(types, d.level);
+  #segment(d, [types, blackWinding, whiteWinding, ...rest], planes) {
+    const leafWinding = planes ? undefined : rest.shift(), at = folder(d.level), found = countTypes(types, d.level);
     if (found.some((n, t) => n !== d.count[t]))
       throw formatError(at + 'types', d.exact ? 'the types do not add up to what /subtrees/counts says' : 'the types do not add up to what types_index says');
     checkWindings(this.info, d.level, blackWinding, whiteWinding);

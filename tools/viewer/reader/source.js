@@ -125,6 +125,7 @@ export class UrlSource {
     this.trouble = undefined; // why a patient source waits
     this.retried = 0;
     this.closed = false;
+    this.byCache = 0;         // requests under way that go by the browser's cache
   }
 
   async open(bytes) {
@@ -147,6 +148,11 @@ export class UrlSource {
     const rest = new Transfer(have, end);
     await this.#run(rest, false);
     return have === offset ? rest.data : joined([first.data.subarray(offset, have), rest.data]);
+  }
+
+  /** How many of the file's first bytes are there or on their way with the first answer: to read them takes no request. */
+  get coming() {
+    return this.whole ? this.whole.length : this.first ? (this.running.has(this.first) ? Math.min(this.first.to, this.size ?? 0) : this.first.end) : 0;
   }
 
   /** What is waited for: { from, to, got, quiet }, `quiet` the ms since a byte of it came. */
@@ -216,8 +222,13 @@ export class UrlSource {
     return -1;
   }
 
-  // What is gone on with is not for the cache: Chromium would ask for it twice.
-  async #once(transfer, first, cache = first ? 'no-cache' : this.tag === null || transfer.asked ? 'no-store' : 'default') {
+  // What is gone on with is not for the cache: Chromium would ask for it twice. And it lets requests of one address that go by its cache wait for each
+  // other: one at a time does, so that batches stay side by side.
+  #cacheMode(transfer, first) {
+    return first ? 'no-cache' : this.tag === null || transfer.asked || this.byCache ? 'no-store' : 'default';
+  }
+
+  async #once(transfer, first, cache = this.#cacheMode(transfer, first)) {
     const abort = new AbortController(), offset = transfer.end, length = transfer.to - offset;
     let timer, late = false;
     const alive = () => {
@@ -231,6 +242,7 @@ export class UrlSource {
     const transient = (what, next, cause) => Object.assign(this.#fail(what, next, cause), { again: true });
     this.requests++;
     transfer.asked = true;
+    this.byCache += cache === 'no-store' ? 0 : 1;
     this.running.set(transfer, abort);
     try {
       // Browsers drop Accept-Encoding, and send identity with ranges.
@@ -266,6 +278,7 @@ export class UrlSource {
     } finally {
       clearTimeout(timer);
       abort.abort(); // ends what is left of a body that nobody wants
+      this.byCache -= cache === 'no-store' ? 0 : 1;
     }
   }
 

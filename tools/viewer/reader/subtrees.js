@@ -93,7 +93,7 @@ export class Subtrees {
     const add = (path, first, count, distances) => {
       const array = store.arrays.get(path), rows = FIXED_ROWS[path], block = Math.floor(first / rows); // the array may be shorter than a block
       const put = (chunk) => chunk >= 0 && chunk < array.chunkCount && out.set(array.number * 2 ** 32 + chunk, { array, chunk });
-      for (let chunk = block; chunk * rows < first + Math.max(count, 1); chunk++) // also without new ones: a distance of 0 is left out
+      for (let chunk = block; count && chunk * rows < first + count; chunk++)
         put(chunk);
       distances?.forEach((d) => put(block - d));
     };

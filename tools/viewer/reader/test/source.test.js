@@ -260,3 +260,20 @@ for (const [what, offset, bytes] of [['nowhere', 0, 0], ['somewhere else', 100, 
     info.chunk_index_offset = offset ?? info.chunk_index_offset;
     info.chunk_index_bytes = bytes;
   }));
+
+test('of requests side by side one goes by the cache, which would make them wait for each other', () => serve(undefined, async (url) => {
+  const modes = [], file = await openEbpo(url, { headBytes: part, fetch: (address, init) => {
+    modes.push(init.cache);
+    return fetch(address, init);
+  } });
+  const { source } = file, read = (i) => source.read(part + 10 * i, 10);
+  await Promise.all([0, 1, 2].map(read));
+  await read(3);
+  assert.deepEqual(modes, ['no-cache', 'default', 'no-store', 'no-store', 'default']);
+}));
+test('what the first answer brings is not asked for again, and is known to come', () => serve(undefined, async (url, asked) => {
+  const file = await openEbpo(url, { headBytes: part, ahead: part + 5000 });
+  assert.equal(file.source.coming, part + 5000);
+  assert.equal((await file.source.read(part, 5000)).length, 5000);
+  assert.equal(asked.length, 1);
+}));

@@ -1,0 +1,56 @@
+// What is probably hidden behind nearer nodes, so that it need not be fetched: by a coarse picture of which part of the view is covered, and how far
+// away. A guess, not a test of visibility: what it says only puts off what is fetched.
+const ACROSS = 48, DOWN = 32;
+const COVERED = 1; // times its area, until a tile counts as covered
+
+const dot = (p, [x, y, z, w]) => x * p[0] + y * p[1] + z * p[2] + w;
+
+export class Hidden {
+  /** `view` as of Cut.update(); `place(node)`: { center, radius } in its coordinates. */
+  constructor(view, nodes, place) {
+    Object.assign(this, { view, place });
+    if (view.planes.length !== 4)
+      return;
+    const [a, b] = view.planes.slice(2), across = this.#opening(0), down = this.#opening(2);
+    this.tileArea = (across / ACROSS) * (down / DOWN); // at distance 1
+    this.depth = new Float64Array(ACROSS * DOWN).fill(Infinity);
+    const cover = new Float64Array(ACROSS * DOWN), seen = nodes.map((node) => this.#see(node)).filter((s) => s && dot(s.center, a) + dot(s.center, b) > 0);
+    for (const s of seen.sort((x, y) => x.distance - y.distance))
+      this.#tiles(s, (tile, share) => {
+        cover[tile] += share;
+        if (cover[tile] >= COVERED && this.depth[tile] === Infinity)
+          this.depth[tile] = s.distance + 2 * s.radius;
+        return true;
+      });
+  }
+
+  // The view's width or height at distance 1, from two opposite planes.
+  #opening(i) {
+    const [a, b] = this.view.planes.slice(i, i + 2), cos = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    return 2 * Math.tan((Math.PI - Math.acos(Math.max(-1, Math.min(1, cos)))) / 2);
+  }
+
+  #see(node) {
+    const { center, radius } = this.place(node), { eye, planes } = this.view, [l, r, t, b] = planes.map((p) => dot(center, p));
+    const distance = Math.hypot(center[0] - eye[0], center[1] - eye[1], center[2] - eye[2]);
+    return l + r > 0 && t + b > 0 ? { center, radius, distance, u: l / (l + r) * ACROSS, v: t / (t + b) * DOWN } : undefined;
+  }
+
+  // Calls back with each tile that a node's surface may cover, and how much of it; true goes on.
+  #tiles({ radius, distance, u, v }, each) {
+    const edge = 2 * radius / Math.sqrt(3) / Math.max(distance, radius), area = edge * edge / this.tileArea, half = Math.sqrt(area) / 2;
+    const from = [Math.max(0, Math.floor(u - half)), Math.max(0, Math.floor(v - half))], to = [Math.min(ACROSS - 1, Math.floor(u + half)), Math.min(DOWN - 1, Math.floor(v + half))];
+    const share = Math.min(1, area / Math.max(1, (Math.floor(u + half) - Math.floor(u - half) + 1) * (Math.floor(v + half) - Math.floor(v - half) + 1)));
+    for (let y = from[1]; y <= to[1]; y++)
+      for (let x = from[0]; x <= to[0]; x++)
+        if (!each(y * ACROSS + x, share))
+          return false;
+    return true;
+  }
+
+  /** Whether all of a node lies behind what covers the view there. */
+  has(node) {
+    const s = this.depth && this.#see(node);
+    return Boolean(s) && s.distance > s.radius && this.#tiles(s, (tile) => this.depth[tile] < s.distance - s.radius);
+  }
+}
