@@ -26,7 +26,7 @@ export function joined(ranges) {
 
 // Over the least gaps first, while not much is read for nothing.
 function fewer(runs) {
-  let left = runs.reduce((sum, r) => sum + r.to - r.from, 0) * SPARE_SHARE, most = 0, joins = runs.length - FEW;
+  let left = Math.max(SPARE_BYTES, runs.reduce((sum, r) => sum + r.to - r.from, 0) * SPARE_SHARE), most = 0, joins = runs.length - FEW;
   for (const gap of runs.slice(1).map((r, i) => r.from - runs[i].to).sort((a, b) => a - b)) {
     if (joins-- === 0 || gap > left)
       break;

@@ -266,14 +266,15 @@ test('of requests side by side one goes by the cache, which would make them wait
     modes.push(init.cache);
     return fetch(address, init);
   } });
+  modes.length = 0;
   const { source } = file, read = (i) => source.read(part + 10 * i, 10);
   await Promise.all([0, 1, 2].map(read));
   await read(3);
-  assert.deepEqual(modes, ['no-cache', 'default', 'no-store', 'no-store', 'default']);
+  assert.deepEqual(modes, ['default', 'no-store', 'no-store', 'default']);
 }));
 test('what the first answer brings is not asked for again, and is known to come', () => serve(undefined, async (url, asked) => {
-  const file = await openEbpo(url, { headBytes: part, ahead: part + 5000 });
-  assert.equal(file.source.coming, part + 5000);
-  assert.equal((await file.source.read(part, 5000)).length, 5000);
-  assert.equal(asked.length, 1);
+  const ahead = bytes.length - 100, file = await openEbpo(url, { headBytes: part, ahead });
+  assert.equal(file.source.coming, ahead);
+  assert.deepEqual(Buffer.from(await file.source.read(part, ahead - part)), bytes.subarray(part, ahead));
+  assert.deepEqual(asked, [[0, ahead - 1]]);
 }));
