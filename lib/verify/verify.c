@@ -8,11 +8,13 @@
 #include "mesh/mesh_parts.h"
 #include "verify/nesting.h"
 #include "verify/verify_source.h"
+#include "verify/verify_subtrees.h"
 #include "verify/structure.h"
 #include "verify/verify_walk.h"
 
-ebpo_status ebpo_verify_tree(ebpo_tally *tally, const ebpo_tree *tree,
-                             const ebpo_verify_options *options, ebpo_error *error)
+/* `file`: where the tree is from, or NULL. */
+static ebpo_status verify_tree_of(ebpo_tally *tally, const ebpo_file *file, const ebpo_tree *tree,
+                                  const ebpo_verify_options *options, ebpo_error *error)
 {
     if (!ebpo_check_shape(tally, tree))
         return EBPO_OK;
@@ -23,8 +25,16 @@ ebpo_status ebpo_verify_tree(ebpo_tally *tally, const ebpo_tree *tree,
     ebpo_check_structure(tally, &view);
     ebpo_check_nesting(tally, &view);
     status = ebpo_verify_walk(tally, &view, options, error);
+    if (status == EBPO_OK && file)
+        status = ebpo_check_subtrees(tally, file, &view, options, error);
     ebpo_twin_free(&view);
     return status;
+}
+
+ebpo_status ebpo_verify_tree(ebpo_tally *tally, const ebpo_tree *tree,
+                             const ebpo_verify_options *options, ebpo_error *error)
+{
+    return verify_tree_of(tally, NULL, tree, options, error);
 }
 
 /* A failure that says something about the file and not about this machine or call. */
@@ -64,7 +74,7 @@ static ebpo_status check_tree(const ebpo_file *file, const ebpo_verify_options *
     if (status == EBPO_OK || is_finding(status))
         ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, status == EBPO_OK, "%s", own.message);
     if (status == EBPO_OK) {
-        status = ebpo_verify_tree(tally, &tree, options, error);
+        status = verify_tree_of(tally, file, &tree, options, error);
         ebpo_tree_free(&tree);
         return status;
     }
@@ -117,7 +127,9 @@ ebpo_status ebpo_verify(const ebpo_file *file, const ebpo_verify_options *option
                 "verify: the source has been arranged (ebpo_mesh_arrange); give it as it was read");
     }
     ebpo_tally tally = { 0 };
-    status = check_content(file, options, &tally, error);
+    status = ebpo_check_places(&tally, file, options, error);
+    if (status == EBPO_OK)
+        status = check_content(file, options, &tally, error);
     if (status == EBPO_OK)
         status = check_tree(file, options, &tally, error);
     if (status == EBPO_OK && options->source)

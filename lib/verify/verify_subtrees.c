@@ -1,0 +1,298 @@
+/* The table of subtrees, counted anew: one visit of the whole tree, leaf by leaf in the order of
+ * the faces. Writer and reader go level by level; nothing of theirs is used but how arrays are
+ * read. */
+#include "verify/verify_subtrees.h"
+
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/arrays.h"
+#include "base/error.h"
+#include "container/reader.h"
+
+#define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
+
+/* Columns, as the specification numbers them. */
+enum {
+    FACES_BETWEEN,
+    FACES,
+    VERTICES_BETWEEN,
+    VERTICES,
+    OUTER_FACES,
+    OUTER_VERTICES,
+    FIRST_LEVEL,
+    GRAY = 0,
+    LEAF,
+    BLACK,
+    PLANES,
+    LEAF_PLANES,
+    REFERENCES,
+    END,
+    OF_A_LEVEL,
+    MOST_COLS = FIRST_LEVEL + OF_A_LEVEL * EBPO_LEVELS_MAX
+};
+enum { ROWS_OF_FACES = 2048, ROWS_OF_VERTICES = 1024, SUBTREES_A_TIME = 128 };
+static const char *const names[] = { "faces before", "faces",           "vertices before",
+                                     "vertices",     "blocks of faces", "blocks of vertices" };
+static const char *const level_names[] = { "gray nodes",  "leaves",     "black nodes",   "planes",
+                                           "leaf planes", "references", "the faces' end" };
+
+/* Numbers as they come up. */
+typedef struct numbers {
+    uint32_t *at;
+    uint64_t count, capacity;
+} numbers;
+
+typedef struct recount {
+    ebpo_tally *tally;
+    const ebpo_twin_tree *view;
+    int level; /* of the subtrees' roots */
+    unsigned cols, rows_of_chunk;
+    const uint32_t *counts, *outer;
+    const uint64_t *index;
+    uint64_t subtrees, outer_rows;
+    /* so far */
+    uint64_t subtree, faces, vertices, outer_done, end[EBPO_LEVELS_MAX];
+    uint64_t sum[MOST_COLS], row[MOST_COLS];
+    bool within; /* a subtree */
+    numbers outer_faces;
+    bool no_memory;
+} recount;
+
+static bool add(numbers *list, uint32_t number)
+{
+    if (list->count && list->at[list->count - 1] == number)
+        return true;
+    if (!ebpo_grow(&list->at, &list->capacity, list->count + 1, sizeof *list->at))
+        return false;
+    list->at[list->count++] = number;
+    return true;
+}
+
+static int ascending(const void *a, const void *b)
+{
+    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
+}
+
+static void sort_once(numbers *list)
+{
+    uint64_t kept = 0;
+    if (list->count)
+        qsort(list->at, list->count, sizeof *list->at, ascending);
+    for (uint64_t i = 0; i < list->count; i++)
+        if (!kept || list->at[kept - 1] != list->at[i])
+            list->at[kept++] = list->at[i];
+    list->count = kept;
+}
+
+static const char *column_name(const recount *c, unsigned column, int *level)
+{
+    if (column < FIRST_LEVEL)
+        return *level = -1, names[column];
+    *level = c->level + 1 + (int)((column - FIRST_LEVEL) / OF_A_LEVEL);
+    return level_names[(column - FIRST_LEVEL) % OF_A_LEVEL];
+}
+
+/* --- a subtree is complete --- */
+
+/* The distances that must be listed, against those that are. */
+static void compare_outer(recount *c, const char *what, uint64_t from, const numbers *needed,
+                          unsigned column)
+{
+    ebpo_tally *tally = c->tally;
+    uint64_t first = c->outer_done, i = 0;
+    for (; i < needed->count; i++)
+        if (first + i >= c->outer_rows || c->outer[first + i] > from ||
+            from - c->outer[first + i] != needed->at[needed->count - 1 - i])
+            break;
+    if (i < needed->count)
+        CHECK(false,
+              "/subtrees/outer, subtree %" PRIu64 ": needs block %" PRIu32
+              " of %s, which is not the next in the list",
+              c->subtree, needed->at[needed->count - 1 - i], what);
+    else
+        CHECK(true, "%s", "");
+    c->row[column] = needed->count;
+    c->outer_done += needed->count;
+}
+
+static void note_vertices(recount *c, numbers *blocks, uint64_t face, uint64_t first_vertex)
+{
+    for (int k = 0; k < 3; k++) {
+        uint32_t vertex = c->view->tree->mesh.faces[3 * face + (uint64_t)k];
+        if (vertex < first_vertex && !add(blocks, vertex / ROWS_OF_VERTICES))
+            c->no_memory = true;
+    }
+}
+
+static void check_outer(recount *c)
+{
+    numbers faces = { 0 }, vertices = { 0 };
+    uint64_t first_face = c->faces - c->row[FACES], first_vertex = c->vertices - c->row[VERTICES];
+    for (uint64_t i = 0; i < c->outer_faces.count; i++)
+        if (c->outer_faces.at[i] < first_face) {
+            if (!add(&faces, c->outer_faces.at[i] / ROWS_OF_FACES))
+                c->no_memory = true;
+            note_vertices(c, &vertices, c->outer_faces.at[i], first_vertex);
+        }
+    for (uint64_t face = first_face; face < c->faces; face++)
+        note_vertices(c, &vertices, face, first_vertex);
+    sort_once(&faces);
+    sort_once(&vertices);
+    compare_outer(c, "/mesh/faces", first_face / ROWS_OF_FACES, &faces, OUTER_FACES);
+    compare_outer(c, "/mesh/vertices", first_vertex / ROWS_OF_VERTICES, &vertices, OUTER_VERTICES);
+    free(faces.at);
+    free(vertices.at);
+    c->outer_faces.count = 0;
+}
+
+static void check_row(recount *c)
+{
+    ebpo_tally *tally = c->tally;
+    const uint32_t *stated = c->counts + c->subtree * c->cols;
+    int level;
+    if (c->view->has_mesh)
+        check_outer(c);
+    for (unsigned k = 0; k < c->cols; k++) {
+        const char *name = column_name(c, k, &level);
+        if (c->subtree % c->rows_of_chunk == 0)
+            CHECK(c->index[c->subtree / c->rows_of_chunk * c->cols + k] == c->sum[k],
+                  "/subtrees/index, before subtree %" PRIu64 ", column %u (%s): states %" PRIu64
+                  ", there are %" PRIu64,
+                  c->subtree, k, name, c->index[c->subtree / c->rows_of_chunk * c->cols + k],
+                  c->sum[k]);
+        CHECK(stated[k] == c->row[k],
+              "/subtrees/counts, subtree %" PRIu64 ", column %u (%s%s): states %" PRIu32
+              ", there are %" PRIu64,
+              c->subtree, k, name, level < 0 ? "" : " of a level", stated[k], c->row[k]);
+        c->sum[k] += c->row[k];
+    }
+    memset(c->row, 0, sizeof c->row);
+}
+
+/* --- visiting --- */
+
+/* Faces that are new in a leaf, and vertices that are new in these. */
+static void see_faces(recount *c, uint64_t count)
+{
+    const ebpo_mesh *mesh = &c->view->tree->mesh;
+    uint64_t seen = c->vertices;
+    for (uint64_t i = 3 * c->faces; i < 3 * (c->faces + count); i++)
+        seen += mesh->faces[i] == seen;
+    c->row[c->within ? FACES : FACES_BETWEEN] += count;
+    c->row[c->within ? VERTICES : VERTICES_BETWEEN] += seen - c->vertices;
+    c->faces += count;
+    c->vertices = seen;
+}
+
+static void see_leaf(recount *c, const ebpo_twin_node *leaf, uint64_t *row)
+{
+    const ebpo_level *level = &c->view->tree->level[leaf->cell.level];
+    uint32_t planes, references;
+    if (c->within) {
+        (void)ebpo_twin_planes(c->view, leaf, &planes);
+        row[LEAF]++;
+        row[LEAF_PLANES] += planes;
+    }
+    if (!c->view->has_mesh)
+        return;
+    if (c->within) {
+        const uint32_t *face = ebpo_twin_refs(c->view, leaf, &references);
+        uint64_t end = level->leaf_first[leaf->rank] + level->leaf_new[leaf->rank];
+        for (uint32_t i = 0; i < references; i++)
+            if (!add(&c->outer_faces, face[i]))
+                c->no_memory = true;
+        row[REFERENCES] += references;
+        row[END] += end - c->end[leaf->cell.level];
+        c->end[leaf->cell.level] = end;
+    }
+    /* the leaves' faces follow one another, which is checked elsewhere */
+    if (c->faces + level->leaf_new[leaf->rank] <= c->view->tree->mesh.face_count)
+        see_faces(c, level->leaf_new[leaf->rank]);
+}
+
+static void see_node(recount *c, const ebpo_twin_node *node);
+
+static void see_children(recount *c, const ebpo_twin_node *node)
+{
+    if (!ebpo_twin_is_pruned(c->view, node))
+        for (unsigned octant = 0; octant < 8; octant++) {
+            ebpo_twin_node child = ebpo_twin_child(c->view, node, octant);
+            see_node(c, &child);
+        }
+}
+
+static void see_node(recount *c, const ebpo_twin_node *node)
+{
+    uint64_t *row =
+        c->within ? c->row + FIRST_LEVEL + OF_A_LEVEL * (unsigned)(node->cell.level - c->level - 1)
+                  : NULL;
+    uint32_t planes;
+    if (node->type == EBPO_LEAF)
+        see_leaf(c, node, row);
+    else if (node->type == EBPO_BLACK && c->within)
+        row[BLACK]++;
+    else if (node->type == EBPO_GRAY && c->within) {
+        (void)ebpo_twin_planes(c->view, node, &planes);
+        row[GRAY]++;
+        row[PLANES] += planes;
+        see_children(c, node);
+    } else if (node->type == EBPO_GRAY && node->cell.level == c->level) {
+        c->within = true;
+        see_children(c, node);
+        c->within = false;
+        check_row(c);
+        if (++c->subtree % SUBTREES_A_TIME == 0)
+            ebpo_release_pages(c->view->workspace);
+    } else if (node->type == EBPO_GRAY)
+        see_children(c, node);
+}
+
+static ebpo_status recount_table(recount *c, ebpo_error *error)
+{
+    ebpo_tally *tally = c->tally;
+    ebpo_twin_node root = ebpo_twin_root(c->view);
+    see_node(c, &root);
+    CHECK(c->outer_done == c->outer_rows,
+          "/subtrees/outer has %" PRIu64 " rows, but %" PRIu64 " blocks are needed", c->outer_rows,
+          c->outer_done);
+    free(c->outer_faces.at);
+    return c->no_memory ? ebpo_fail_memory(error, 0) : EBPO_OK;
+}
+
+ebpo_status ebpo_check_subtrees(ebpo_tally *tally, const ebpo_file *file,
+                                const ebpo_twin_tree *view, const ebpo_verify_options *options,
+                                ebpo_error *error)
+{
+    const ebpo_array_in *counts = ebpo_reader_array(file, EBPO_A_SUBTREE_COUNTS, 0),
+                        *outer = ebpo_reader_array(file, EBPO_A_SUBTREE_OUTER, 0);
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    ebpo_error own = EBPO_ERROR_INIT;
+    recount c = { .tally = tally, .view = view, .level = file->info.subtree_level };
+    read.threads = options->threads;
+    if (!c.level)
+        return EBPO_OK;
+    c.cols = counts->shape.cols;
+    c.rows_of_chunk = counts->shape.chunk_rows;
+    c.outer_rows = outer->present ? outer->shape.rows : 0;
+    ebpo_status status = ebpo_reader_make(file, EBPO_A_SUBTREE_COUNTS, 0, &read, sizeof *c.counts,
+                                          (void *)&c.counts, &own);
+    if (status == EBPO_OK)
+        status = ebpo_reader_make(file, EBPO_A_SUBTREE_INDEX, 0, &read, sizeof *c.index,
+                                  (void *)&c.index, &own);
+    if (status == EBPO_OK)
+        status = ebpo_reader_make(file, EBPO_A_SUBTREE_OUTER, 0, &read, sizeof *c.outer,
+                                  (void *)&c.outer, &own);
+    if (status == EBPO_OK)
+        status = recount_table(&c, &own);
+    free((void *)(uintptr_t)c.counts);
+    free((void *)(uintptr_t)c.index);
+    free((void *)(uintptr_t)c.outer);
+    if (status != EBPO_E_FORMAT)
+        return status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &own);
+    CHECK(false, "%s", own.message);
+    return EBPO_OK;
+}

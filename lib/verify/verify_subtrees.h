@@ -1,0 +1,20 @@
+/* The part `subtrees` (format-spec/README.md, section 9) against what it speaks of. */
+#ifndef EBPO_VERIFY_SUBTREES_H
+#define EBPO_VERIFY_SUBTREES_H
+
+#include "verify/tally.h"
+#include "verify/twin_tree.h"
+
+/* Every column of the table, by visiting the tree depth first; and the blocks from elsewhere, each
+ * listed that is needed, and no other. Nothing to do in files without subtrees. */
+EBPO_MUST_USE ebpo_status ebpo_check_subtrees(ebpo_tally *tally, const ebpo_file *file,
+                                              const ebpo_twin_tree *view,
+                                              const ebpo_verify_options *options,
+                                              ebpo_error *error);
+
+/* The list of chunks against HDF5's index. Nothing to do where another program has rewritten the
+ * file, which the list's attributes tell. */
+EBPO_MUST_USE ebpo_status ebpo_check_places(ebpo_tally *tally, const ebpo_file *file,
+                                            const ebpo_verify_options *options, ebpo_error *error);
+
+#endif

@@ -1,0 +1,82 @@
+#include "changed_array.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "codec/chunk.h"
+#include "container/reader.h"
+
+void changeable_load(changeable *c, const char *path)
+{
+    FILE *f = fopen(path, "rb");
+    if (!f || fseek(f, 0, SEEK_END) != 0)
+        abort();
+    c->size = (uint64_t)ftell(f);
+    c->data = malloc(c->size);
+    rewind(f);
+    if (!c->data || fread(c->data, 1, c->size, f) != c->size || fclose(f) != 0 ||
+        ebpo_open(path, &c->file, NULL) != EBPO_OK ||
+        ebpo_file_locate(c->file, NULL, NULL) != EBPO_OK)
+        abort();
+}
+
+void changeable_free(changeable *c)
+{
+    ebpo_close(c->file);
+    free(c->data);
+}
+
+static const ebpo_array_in *array_of(const changeable *c, ebpo_array_id id)
+{
+    return ebpo_reader_array(c->file, id, 0);
+}
+
+static unsigned columns(const ebpo_array_in *a) { return a->shape.cols ? a->shape.cols : 1; }
+
+uint64_t changeable_count(const changeable *c, ebpo_array_id id)
+{
+    const ebpo_array_in *a = array_of(c, id);
+    return a->present ? a->shape.rows * columns(a) : 0;
+}
+
+static uint8_t *item_at(const changeable *c, const ebpo_array_in *a, uint64_t item,
+                        const ebpo_h5_chunk **chunk)
+{
+    uint64_t of_chunk = (uint64_t)a->shape.chunk_rows * columns(a);
+    *chunk = &a->chunks[item / of_chunk];
+    return c->data + (*chunk)->address + item % of_chunk * a->shape.element_size;
+}
+
+uint64_t changeable_get(const changeable *c, ebpo_array_id id, uint64_t item)
+{
+    const ebpo_h5_chunk *chunk;
+    uint64_t value = 0;
+    memcpy(&value, item_at(c, array_of(c, id), item, &chunk), array_of(c, id)->shape.element_size);
+    return value;
+}
+
+uint64_t changeable_put(changeable *c, ebpo_array_id id, uint64_t item, uint64_t value)
+{
+    const ebpo_array_in *a = array_of(c, id);
+    const ebpo_h5_chunk *chunk;
+    uint8_t *at = item_at(c, a, item, &chunk);
+    uint64_t before = changeable_get(c, id, item);
+    ebpo_chunk_coder *coder = calloc(1, sizeof *coder);
+    size_t raw_bytes = chunk->bytes - 4, bytes;
+    uint8_t *raw = malloc(raw_bytes), *stored = malloc(ebpo_chunk_bound(raw_bytes));
+    memcpy(at, &value, a->shape.element_size);
+    if (!coder || !raw || !stored)
+        abort();
+    memcpy(raw, c->data + chunk->address, raw_bytes);
+    if (ebpo_chunk_encode(coder, EBPO_PIPELINE_CHECKSUM, 0, a->shape.element_size, raw, raw_bytes,
+                          stored, &bytes) != EBPO_OK ||
+        bytes != chunk->bytes)
+        abort();
+    memcpy(c->data + chunk->address, stored, bytes);
+    ebpo_chunk_coder_clear(coder);
+    free(coder);
+    free(raw);
+    free(stored);
+    return before;
+}

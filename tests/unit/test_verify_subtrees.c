@@ -1,0 +1,197 @@
+/* The verifier on the part `subtrees`: every number of it is changed, and named. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/build.h>
+#include <ebpo/subset.h>
+#include <ebpo/verify.h>
+
+#include "changed_array.h"
+#include "check_main.h"
+#include "scratch.h"
+#include "solids.h"
+
+static const char *path;
+static ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
+
+static void enter(void)
+{
+    scratch_enter();
+    path = scratch("x.ebpo.h5");
+}
+
+static void write_model(ebpo_mesh mesh, uint32_t parts, uint64_t subtree_faces)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_mesh_report facts;
+    ebpo_mend_record mend = { 0 };
+    ebpo_build_options build = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
+    ebpo_tree tree;
+    build.leaf_faces = 4;
+    build.parts = ebpo_profile_parts(EBPO_PROFILE_FULL);
+    build.max_level = 5;
+    write.codec = EBPO_CODEC_NONE;
+    write.parts = parts;
+    write.subtree_faces = subtree_faces;
+    ck_assert(ebpo_mesh_check(&mesh, 1, build.progress, &facts, &error) == EBPO_OK);
+    ck_assert_msg(ebpo_build(&mesh, &facts, &mend, &build, &tree, &error) == EBPO_OK &&
+                      ebpo_tree_write(&tree, path, &write, &error) == EBPO_OK,
+                  "%s", error.message);
+    ebpo_tree_free(&tree);
+}
+
+/* False when the file cannot be opened. */
+static bool verify_memory(const changeable *c)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file;
+    ebpo_verify_options options = EBPO_VERIFY_OPTIONS_INIT;
+    options.threads = 1;
+    options.label_samples = 1;
+    if (ebpo_open_memory(c->data, c->size, "x", &file, &error) != EBPO_OK)
+        return false;
+    ck_assert_msg(ebpo_verify(file, &options, &report, &error) == EBPO_OK, "%s", error.message);
+    ebpo_close(file);
+    return true;
+}
+
+static void expect_fine(const changeable *c)
+{
+    ck_assert(verify_memory(c));
+    ck_assert_msg(report.violations == 0, "%s %s", report.structure.first, report.content.first);
+}
+
+static void expect_named(changeable *c, ebpo_array_id id, uint64_t item, uint64_t value)
+{
+    char name[EBPO_PATH_BYTES];
+    uint64_t before = changeable_put(c, id, item, value);
+    ebpo_schema_path(id, 0, name);
+    if (before != value && verify_memory(c))
+        ck_assert_msg(report.structure.violations > 0 && strstr(report.structure.first, name),
+                      "%s, number %d: %s", name, (int)item, report.structure.first);
+    changeable_put(c, id, item, before);
+}
+
+/* Of arrays with many numbers, some of each column. */
+static void change_array(changeable *c, ebpo_array_id id, uint64_t step)
+{
+    uint64_t count = changeable_count(c, id);
+    ck_assert_uint_gt(count, 0);
+    for (uint64_t i = 0; i < count; i += step) {
+        uint64_t value = changeable_get(c, id, i);
+        expect_named(c, id, i, value + 1);
+        if (value && i % 3 == 0)
+            expect_named(c, id, i, value - 1);
+    }
+}
+
+static uint64_t steps(uint64_t count) { return (uint64_t)((double)count / ebpo_test_scale()); }
+
+START_TEST(every_number_of_the_table_is_counted_anew)
+{
+    changeable c;
+    write_model(ebpo_test_torus(2, 0.7, 60, 40), ~0u, _i ? 8 : 200);
+    changeable_load(&c, path);
+    expect_fine(&c);
+    change_array(&c, EBPO_A_SUBTREE_INDEX, 1);
+    change_array(&c, EBPO_A_SUBTREE_COUNTS, steps(53));
+    change_array(&c, EBPO_A_SUBTREE_OUTER, steps(31));
+    changeable_free(&c);
+}
+END_TEST
+
+/* The reader refuses some of them by itself. */
+START_TEST(every_place_is_compared_with_the_index)
+{
+    changeable c;
+    write_model(ebpo_test_torus(2, 0.7, 60, 40), ~0u, 8);
+    changeable_load(&c, path);
+    uint64_t count = changeable_count(&c, EBPO_A_PLACES);
+    for (uint64_t i = 0; i < count; i += steps(23)) {
+        uint64_t place = changeable_get(&c, EBPO_A_PLACES, i);
+        expect_named(&c, EBPO_A_PLACES, i, place + 1);
+        expect_named(&c, EBPO_A_PLACES, i, place ^ UINT64_C(1) << 32);
+        expect_named(&c, EBPO_A_PLACES, i, (place & UINT32_MAX) | UINT64_C(4097) << 32);
+    }
+    changeable_free(&c);
+}
+END_TEST
+
+/* Rows of the list in another order, whose sizes agree. */
+START_TEST(chunks_that_have_changed_places_are_noticed)
+{
+    changeable c;
+    unsigned found = 0;
+    write_model(ebpo_test_torus(2, 0.7, 60, 40), ~0u, 8);
+    changeable_load(&c, path);
+    for (uint64_t i = 1; i < changeable_count(&c, EBPO_A_PLACES); i++) {
+        uint64_t a = changeable_get(&c, EBPO_A_PLACES, i - 1),
+                 b = changeable_get(&c, EBPO_A_PLACES, i);
+        if (a == b || (uint32_t)a != (uint32_t)b)
+            continue;
+        if (found++ >= ebpo_test_scaled(40))
+            break;
+        changeable_put(&c, EBPO_A_PLACES, i - 1, b);
+        expect_named(&c, EBPO_A_PLACES, i, a);
+        changeable_put(&c, EBPO_A_PLACES, i - 1, a);
+    }
+    ck_assert_uint_gt(found, 0);
+    changeable_free(&c);
+}
+END_TEST
+
+START_TEST(without_parts_the_table_holds_too)
+{
+    static const uint32_t parts[] = { EBPO_PART_PLANES, EBPO_PART_MESH,
+                                      EBPO_PART_MESH | EBPO_PART_LEAF_PLANES,
+                                      EBPO_PART_LEAF_PLANES };
+    changeable c;
+    write_model(_i % 2 ? ebpo_test_make("sphere") : ebpo_test_sheet(3, 30), parts[_i], 20);
+    changeable_load(&c, path);
+    expect_fine(&c);
+    change_array(&c, EBPO_A_SUBTREE_COUNTS, steps(41));
+    changeable_free(&c);
+}
+END_TEST
+
+START_TEST(subsets_have_rows_for_pruned_nodes)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_subset_options subset = EBPO_SUBSET_OPTIONS_INIT;
+    ebpo_file *whole;
+    changeable c;
+    subset.codec = EBPO_CODEC_NONE;
+    subset.subtree_faces = 8;
+    subset.last_level = _i ? 4 : -1;
+    subset.boxed = true;
+    for (int k = 0; k < 3; k++)
+        subset.max[k] = 1.5;
+    write_model(ebpo_test_torus(2, 0.7, 60, 40), ~0u, EBPO_NO_SUBTREES);
+    ck_assert(ebpo_open(path, &whole, &error) == EBPO_OK);
+    path = scratch("part.ebpo.h5");
+    ck_assert_msg(ebpo_subset(whole, path, &subset, &error) == EBPO_OK, "%s", error.message);
+    ebpo_close(whole);
+    changeable_load(&c, path);
+    ck_assert(ebpo_file_info(c.file)->subtree_level > 0 && ebpo_file_info(c.file)->pruned);
+    expect_fine(&c);
+    change_array(&c, EBPO_A_SUBTREE_COUNTS, steps(41));
+    changeable_free(&c);
+}
+END_TEST
+
+Suite *test_suite(void)
+{
+    Suite *suite = suite_create("verify_subtrees");
+    TCase *tests = tcase_create("verify_subtrees");
+    tcase_set_timeout(tests, 600);
+    tcase_add_checked_fixture(tests, enter, scratch_leave);
+    tcase_add_loop_test(tests, every_number_of_the_table_is_counted_anew, 0, 2);
+    tcase_add_test(tests, every_place_is_compared_with_the_index);
+    tcase_add_test(tests, chunks_that_have_changed_places_are_noticed);
+    tcase_add_loop_test(tests, without_parts_the_table_holds_too, 0, 4);
+    tcase_add_loop_test(tests, subsets_have_rows_for_pruned_nodes, 0, 2);
+    suite_add_tcase(suite, tests);
+    return suite;
+}
