@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "geom/ray_triangle.h"
 #include "query/options.h"
+#include "query/prefetch.h"
 #include "query/pruned.h"
 
 ebpo_status ebpo_check_box(const double min[3], const double max[3], ebpo_error *error)
@@ -91,6 +92,31 @@ static bool box_matters(void *user, const ebpo_box *box, const ebpo_node *node)
     return ebpo_cell_meets(box, node->cell, w->min, w->max);
 }
 
+/* Without memory for it, subtrees are announced as they are entered. */
+static void list_ahead(ebpo_box_walk *w, const ebpo_box *box, ebpo_node node)
+{
+    if (ebpo_node_is_uniform(&node) || !box_matters(w, box, &node) || w->no_memory)
+        return;
+    if (ebpo_node_is_below(&node)) {
+        w->no_memory =
+            !ebpo_grow(&w->ahead, &w->ahead_capacity, w->ahead_count + 1, sizeof *w->ahead);
+        if (!w->no_memory)
+            w->ahead[w->ahead_count++] = ebpo_entry_value(node.entry);
+        return;
+    }
+    for (unsigned octant = 0; octant < 8; octant++)
+        list_ahead(w, box, ebpo_model_child(w->context->model, &node, octant));
+}
+
+/* Before a subtree is entered: with the first of each window those behind it. */
+static void announce(ebpo_box_walk *w)
+{
+    uint64_t at = w->entered++, left = at < w->ahead_count ? w->ahead_count - at : 0;
+    if (at % EBPO_ANNOUNCED_MOST == 0 && left)
+        ebpo_context_announce(w->context, w->ahead + at,
+                              left < EBPO_ANNOUNCED_MOST ? left : EBPO_ANNOUNCED_MOST);
+}
+
 static ebpo_status gather_node(ebpo_box_walk *w, const ebpo_box *box, ebpo_node node,
                                ebpo_error *error)
 {
@@ -99,6 +125,7 @@ static ebpo_status gather_node(ebpo_box_walk *w, const ebpo_box *box, ebpo_node 
     ebpo_status status = EBPO_OK;
     if (ebpo_node_is_below(&node)) {
         w->below = node;
+        announce(w);
         status = ebpo_model_enter(w->context, &node, error);
         return status == EBPO_OK ? gather(w, node.subtree, error) : status;
     }
@@ -116,10 +143,14 @@ ebpo_status ebpo_box_walk_run(ebpo_box_walk *w, ebpo_error *error)
 {
     const ebpo_model *m = w->context->model;
     ebpo_box box = ebpo_model_box(m);
+    if (!m->whole && m->options.loading == EBPO_LOAD_CACHE && ebpo_input_expects(&m->file->in))
+        list_ahead(w, &box, ebpo_model_root(m));
+    w->no_memory = false;
     ebpo_status status =
         m->whole ? gather(w, m->whole, error) : gather_node(w, &box, ebpo_model_root(m), error);
     free(w->slot);
-    w->slot = NULL;
+    free(w->ahead);
+    w->slot = w->ahead = NULL;
     return status;
 }
 

@@ -15,6 +15,9 @@ struct ebpo_box_walk {
     uint64_t count, capacity;
     ebpo_node below; /* in whose place it stands, when it is not the whole tree */
     bool no_memory, enough;
+    /* Of a file far away: what the walk will enter, in its order, and how many it has. */
+    uint32_t *ahead;
+    uint64_t ahead_count, ahead_capacity, entered;
     /* Called for each accel that the box meets, depth first; *enough ends the walk. */
     ebpo_status (*take)(ebpo_box_walk *walk, const ebpo_accel *s, ebpo_error *error);
 };

@@ -7,6 +7,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "container/subtree_expect.h"
+#include "container/subtree_table.h"
 #include "query/query_node.h"
 
 typedef struct wanted {
@@ -88,4 +90,52 @@ void ebpo_context_prefetch(ebpo_context *c, const double p[3], double reach)
     for (unsigned i = 0; i < count; i++)
         keys[i] = ebpo_context_key(c, keys[i]);
     ebpo_cache_prefetch(m->cache, keys, count);
+}
+
+/* The number in the file's table of the subtree that this one is or lies in, when it is to be
+ * loaded; UINT64_MAX: none. */
+static uint64_t table_number(const ebpo_context *c, uint32_t below)
+{
+    const ebpo_model *m = c->model;
+    const ebpo_node *root = &m->top->below[below];
+    int level = root->cell.level;
+    if (level < m->info->subtree_level || root->pruned ||
+        ebpo_cache_has(m->cache, ebpo_context_key(c, below)))
+        return UINT64_MAX;
+    if (level == m->info->subtree_level)
+        return root->type == EBPO_GRAY ? root->rank : UINT64_MAX;
+    ebpo_subtree_row row;
+    unsigned column =
+        ebpo_subtree_column(m->info, level, root->type == EBPO_GRAY ? EBPO_S_GRAY : EBPO_S_LEAF);
+    return ebpo_subtree_table_find(m->chunks, column, root->rank, &row, NULL) == EBPO_OK
+               ? row.subtree
+               : UINT64_MAX;
+}
+
+/* Its place in the list, or the list's end. */
+static uint64_t place_of(const uint64_t *numbers, uint64_t count, uint64_t number)
+{
+    uint64_t i = 0;
+    while (i < count && numbers[i] != number)
+        i++;
+    return i;
+}
+
+void ebpo_context_announce(const ebpo_context *c, const uint32_t *below, uint64_t count)
+{
+    const ebpo_model *m = c->model;
+    ebpo_expected expected = EBPO_EXPECTED_INIT(m->file);
+    uint64_t numbers[EBPO_ANNOUNCED_MOST] = { 0 }, found = 0;
+    if (m->info->subtree_level == 0 || !ebpo_input_expects(&m->file->in))
+        return;
+    for (uint64_t i = 0; i < count && found < EBPO_ANNOUNCED_MOST; i++) {
+        uint64_t number = table_number(c, below[i]);
+        if (number != UINT64_MAX && place_of(numbers, found, number) == found)
+            numbers[found++] = number;
+    }
+    ebpo_subtree_table_expect(m->chunks, numbers, found);
+    for (uint64_t i = 0; i < found; i++)
+        ebpo_subtrees_expect(m->chunks, &expected, numbers[i], 1, ebpo_subtree_needs(c->planes),
+                             true);
+    ebpo_expect_all(&expected);
 }

@@ -13,6 +13,11 @@ void ebpo_context_prefetch(ebpo_context *context, const double p[3], double reac
 unsigned ebpo_subtrees_near(const ebpo_model *model, const double p[3], double limit,
                             uint64_t keys[EBPO_CACHE_AHEAD]);
 
+/* Announces subtrees that will be entered soon, by their numbers in the top, together: of files far
+ * away that have a table of subtrees. Those in memory are left out. */
+enum { EBPO_ANNOUNCED_MOST = 64 };
+void ebpo_context_announce(const ebpo_context *context, const uint32_t *below, uint64_t count);
+
 /* True when the model's options ask for it. */
 static inline bool ebpo_model_prefetches(const ebpo_model *m)
 {

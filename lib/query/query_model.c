@@ -66,10 +66,8 @@ static ebpo_status load_subtree(void *user, uint64_t key, void **item, uint64_t 
     ebpo_model *m = user;
     ebpo_slice slice;
     ebpo_accel *subtree = NULL;
-    uint32_t needs = EBPO_NEEDS_MESH | EBPO_NEEDS_MAPS | EBPO_NEEDS_SOLID |
-                     (key & 1 ? (uint32_t)EBPO_NEEDS_PLANES : 0);
-    ebpo_status status =
-        ebpo_slice_read_parts(&slice, m->chunks, &m->top->below[key >> 1], needs, error);
+    ebpo_status status = ebpo_slice_read_parts(&slice, m->chunks, &m->top->below[key >> 1],
+                                               ebpo_subtree_needs(key & 1), error);
     if (status == EBPO_OK)
         status = ebpo_accel_make(&subtree, &slice, m->info, key & 1, 1, error);
     if (status == EBPO_OK)

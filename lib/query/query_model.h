@@ -67,6 +67,13 @@ EBPO_MUST_USE ebpo_status ebpo_model_has_room(const ebpo_model *model, const ebp
  * of their own, or without. */
 static inline uint64_t ebpo_subtree_key(uint64_t below, bool planes) { return below << 1 | planes; }
 
+/* Of the file, what such a subtree takes. */
+static inline uint32_t ebpo_subtree_needs(bool planes)
+{
+    return EBPO_NEEDS_MESH | EBPO_NEEDS_MAPS | EBPO_NEEDS_SOLID |
+           (planes ? (uint32_t)EBPO_NEEDS_PLANES : 0);
+}
+
 static inline bool ebpo_context_has_pinned(const ebpo_context *c, uint64_t below)
 {
     return c->pinned && c->pinned_key >> 1 == below && (c->pinned_key & 1 || !c->planes);
