@@ -5,7 +5,7 @@ import { formatError } from './error.js';
 
 const GAP_BYTES = 16 * 1024;            // rather read this much for nothing than ask twice
 const REQUEST_BYTES = 4 * 1024 * 1024;  // a request's most
-const FEW = 12, SPARE_SHARE = 0.25;     // of one batch more requests than these are joined over wider gaps, for so much more of its bytes
+const FEW = 12, SPARE_SHARE = 0.25, SPARE_BYTES = 64 * 1024; // of one batch more requests than these are joined over wider gaps, for so much more of its bytes
 const REQUESTS = 6;                     // at once, as browsers do for a host
 export const CACHE_BYTES = 64 * 1024 * 1024;
 

@@ -65,7 +65,8 @@ export class EbpoFile {
       } catch (error) {
         if (!(error instanceof NeedBytes))
           throw error;
-        await this.#moreHead(Math.min(source.size, Math.max(error.end, 2 * this.head.length)));
+        const { length } = this.head, coming = source.coming > length ? source.coming : source.size; // rather what is on its way than another request
+        await this.#moreHead(Math.min(source.size, Math.max(error.end, Math.min(2 * length, coming))));
       }
     this.store = new Store(this.info, this.arrays, source, this.head, { zstd: this.options.zstd, budget: this.options.cacheBytes });
     this.parts = new Parts(this.store);
