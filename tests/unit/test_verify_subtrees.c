@@ -95,7 +95,7 @@ START_TEST(every_number_of_the_table_is_counted_anew)
     write_model(ebpo_test_torus(2, 0.7, 60, 40), ~0u, _i ? 8 : 200);
     changeable_load(&c, path);
     expect_fine(&c);
-    change_array(&c, EBPO_A_SUBTREE_INDEX, 1);
+    change_array(&c, EBPO_A_SUBTREE_INDEX, steps(1));
     change_array(&c, EBPO_A_SUBTREE_COUNTS, steps(53));
     change_array(&c, EBPO_A_SUBTREE_OUTER, steps(31));
     changeable_free(&c);
