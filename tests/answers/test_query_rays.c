@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "check_main.h"
+#include "counted_source.h"
 #include "query_kit.h"
 
 static void some_ray(query_model *m, uint64_t *state, query_ray *r)
@@ -295,35 +296,53 @@ START_TEST(triangles_of_boxes_come_once_each)
 }
 END_TEST
 
-/* More than the budget holds at once; and whoever has enough says so. */
-START_TEST(triangles_of_all_of_a_model_keep_to_its_budget)
+/* All triangles, and those of some blocks: each once. */
+static void take_all(const query_model *m, ebpo_context *context)
 {
-    query_model m;
-    ebpo_model *model;
-    ebpo_context *context;
-    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
-    ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
-    options.memory = 12 << 20;
-    query_model_make(&m, "torus", ebpo_test_torus(2, 0.7, 400, 250), &query_variants[0]);
-    ASSERT_OK(ebpo_model_new(m.file, &options, &model, error));
-    ASSERT_OK(ebpo_context_new(model, &context, error));
     for (int turn = 0; turn < 2; turn++) {
         static const double low[3] = { -9, -9, -9 }, high[3] = { 9, 9, 9 };
-        gathered g = { .m = &m, .most = turn ? 3 : UINT64_MAX, .fine = true };
-        g.face = query_room(m.mesh.face_count + 1, sizeof *g.face);
+        gathered g = { .m = m, .most = turn ? 3 : UINT64_MAX, .fine = true };
+        g.face = query_room(m->mesh.face_count + 1, sizeof *g.face);
         ASSERT_OK(ebpo_triangles_in_box(context, low, high, keep_triangles, &g, error));
         ck_assert(g.fine);
-        ck_assert_uint_eq(g.count, turn ? 3 * EBPO_TRIANGLES_MOST : m.mesh.face_count);
+        ck_assert_uint_eq(g.count, turn ? 3 * EBPO_TRIANGLES_MOST : m->mesh.face_count);
         qsort(g.face, g.count, sizeof *g.face, compare_numbers);
         for (uint64_t i = 1; i < g.count; i++)
             if (g.face[i] == g.face[i - 1])
                 ck_abort_msg("face %u came twice", g.face[i]);
         free(g.face);
     }
+}
+
+/* More than the budget holds at once; and whoever has enough says so. The file is large enough for
+ * subtrees of its own: far away, many are asked for at a time. */
+START_TEST(triangles_of_all_of_a_model_keep_to_its_budget)
+{
+    query_model m;
+    counted_source c;
+    query_model_make(&m, "torus", ebpo_test_torus(2, 0.7, 400, 250), &query_variants[0]);
+    int level = ebpo_file_info(m.file)->subtree_level;
+    ck_assert_int_gt(level, 0);
+    ebpo_file *far = _i ? counted_open(&c, m.path, true) : NULL;
+    ebpo_model *model;
+    ebpo_context *context;
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
+    options.memory = 12 << 20;
+    options.cut_level = _i == 2 ? level : -1;
+    ASSERT_OK(ebpo_model_new(far ? far : m.file, &options, &model, error));
+    ASSERT_OK(ebpo_context_new(model, &context, error));
+    take_all(&m, context);
     ck_assert_int_eq(ebpo_model_get_stats(model, &stats), EBPO_OK);
     ck_assert(!stats.resident && stats.evicted > 0 && stats.memory_peak <= options.memory);
+    if (far)
+        ck_assert_msg((c.batches + c.alone) * 3 < stats.loads * 2, "%llu batches, %llu reads, %llu",
+                      (unsigned long long)c.batches, (unsigned long long)c.alone,
+                      (unsigned long long)stats.loads);
     ebpo_context_free(context);
     ebpo_model_free(model);
+    if (far)
+        counted_close(&c, far);
     query_model_free(&m);
 }
 END_TEST
@@ -340,7 +359,7 @@ Suite *test_suite(void)
     tcase_add_loop_test(boxes, boxes_hold_what_brute_force_says, 0, query_solid_count());
     tcase_add_test(boxes, boxes_that_make_no_sense_are_refused);
     tcase_add_loop_test(boxes, triangles_of_boxes_come_once_each, 0, query_solid_count());
-    tcase_add_test(boxes, triangles_of_all_of_a_model_keep_to_its_budget);
+    tcase_add_loop_test(boxes, triangles_of_all_of_a_model_keep_to_its_budget, 0, 3);
     suite_add_tcase(suite, rays);
     suite_add_tcase(suite, boxes);
     return suite;
