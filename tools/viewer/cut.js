@@ -279,7 +279,7 @@ export class Cut {
     groups.set(node, group);
     group.leaves.push(leaf);
     group.large += isLarge ? 1 : 0;
-    group.area += px * px;
+    group.area += isLarge ? px * px : 0;
     group.most = Math.max(group.most, px);
   }
 

@@ -52,7 +52,8 @@ const FRAGMENT = `
     float weight = min(length(lent), 1.0);
     vec3 smoothly = lent * (gl_FrontFacing ? 1.0 : -1.0);
     n = normalize(mix(n, smoothly / max(weight, 0.001), weight) + 0.0001 * toEye);
-    n = !gl_FrontFacing && turned < 0.5 ? toEye : normalize(n + toEye * max(0.0, 0.15 - dot(n, toEye)));
+    if (!gl_FrontFacing && turned < 0.5) n = normalize(lent + toEye); // neither darker nor lighter than what is around the crack
+    n = normalize(n + toEye * max(0.0, 0.15 - dot(n, toEye)));
     if (!gl_FrontFacing && clipping) { // the back of a closed body seen through the cut: fills the section
       float hatch = abs(fract((gl_FragCoord.x + gl_FragCoord.y) / 9.0) - 0.5) < 0.07 ? 0.82 : 1.0;
       gl_FragColor = vec4(mix(section, colour, 0.22) * hatch, 1.0);
