@@ -65,7 +65,8 @@ export class Subtrees {
   /** Rows of the table: a Map from the subtrees' numbers to SubtreeRow. */
   async rows(numbers) {
     const { cols, counts } = this, wanted = [...new Set(numbers.map((i) => Math.floor(i / counts.chunkRows)))];
-    const [index, values] = await Promise.all([this.#index(), this.store.cache.get(wanted.map((chunk) => ({ array: counts, chunk })))]);
+    const asked = this.store.cache.get(wanted.map((chunk) => ({ array: counts, chunk }))), mesh = this.info.parts.has('mesh');
+    const [index, values] = await Promise.all([this.#index(), asked, mesh && this.store.facesIndex()]); // the last lies beside the index; faces would wait for it
     const chunks = new Map(wanted.map((chunk, i) => [chunk, values[i]])), out = new Map();
     for (const [chunk, rows] of chunks)
       if (!this.checked.has(chunk))
