@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "container/chunks.h"
 #include "container/ranks.h"
+#include "container/subtree_table.h"
 #include "geom/plane_code.h"
 #include "octree/node_types.h"
 #include "octree/rule.h"
@@ -168,6 +169,11 @@ ebpo_status ebpo_group_read(ebpo_chunks *chunks, int level, uint64_t group, unsi
 static bool missing_counted(ebpo_chunks *chunks, ebpo_array_id index, ebpo_array_id counts,
                             int level, uint64_t item, uint64_t items, ebpo_chunk_keys *keys)
 {
+    uint64_t first;
+    if (ebpo_subtree_table_has(chunks->file, level))
+        return ebpo_subtree_table_missing(chunks, level, ebpo_schema[counts].per, item, keys,
+                                          &first) ||
+               ebpo_chunks_missing(chunks, counts, level, first, item - first + items, keys);
     bool missing = item >= EBPO_INDEX_ROWS &&
                    ebpo_chunks_missing(chunks, index, level, item / EBPO_INDEX_ROWS, 1, keys);
     return ebpo_chunks_missing(chunks, counts, level, block_of(item), item - block_of(item) + items,
@@ -268,7 +274,7 @@ ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_number *group
                              unsigned wanted, ebpo_error *error)
 {
     enum {
-        STAGES = 3 /* types, counts, planes */,
+        STAGES = 4 /* where its subtree begins, types, counts, planes */,
         FIRST_BYTES = 32 << 10 /* of the first levels, which everyone needs */
     };
     ebpo_status status = EBPO_OK;

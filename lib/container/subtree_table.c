@@ -204,6 +204,45 @@ ebpo_status ebpo_subtree_table_find(ebpo_chunks *chunks, unsigned column, uint64
     return check_row(chunks, out, error);
 }
 
+/* Groups of the first level below the roots are the subtrees themselves. */
+static bool is_direct(const ebpo_info *info, int level, ebpo_per per)
+{
+    return per == EBPO_PER_GROUP && level == info->subtree_level + 1;
+}
+
+static unsigned column_of(const ebpo_info *info, int level, ebpo_per per)
+{
+    return per == EBPO_PER_GROUP  ? ebpo_subtree_column(info, level - 1, EBPO_S_GRAY)
+           : per == EBPO_PER_GRAY ? ebpo_subtree_column(info, level, EBPO_S_GRAY)
+                                  : ebpo_subtree_column(info, level, EBPO_S_LEAF);
+}
+
+bool ebpo_subtree_table_missing(ebpo_chunks *chunks, int level, ebpo_per per, uint64_t item,
+                                ebpo_chunk_keys *keys, uint64_t *first)
+{
+    const ebpo_file *file = chunks->file;
+    const ebpo_array_in *index = ebpo_reader_array(file, EBPO_A_SUBTREE_INDEX, 0),
+                        *rows = ebpo_reader_array(file, EBPO_A_SUBTREE_COUNTS, 0);
+    bool direct = is_direct(&file->info, level, per);
+    unsigned column = direct ? 0 : column_of(&file->info, level, per);
+    uint64_t chunk = item / rows->shape.chunk_rows;
+    ebpo_subtree_row row;
+    *first = item;
+    if (ebpo_chunks_missing(chunks, EBPO_A_SUBTREE_INDEX, 0, 0, index->shape.rows, keys))
+        return true;
+    if (!direct && find_chunk(chunks, column, item, &chunk, NULL) != EBPO_OK)
+        return true;
+    if (ebpo_chunks_missing(chunks, EBPO_A_SUBTREE_COUNTS, 0, chunk * rows->shape.chunk_rows, 1,
+                            keys))
+        return true;
+    if (direct)
+        return false;
+    if (ebpo_subtree_table_find(chunks, column, item, &row, NULL) != EBPO_OK)
+        return true;
+    *first = row.before[column];
+    return false;
+}
+
 /* A chunk of the table, and what of `outer` goes with it. */
 static void expect_rows_at(ebpo_chunks *chunks, ebpo_expected *e, uint64_t chunk)
 {

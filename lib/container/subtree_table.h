@@ -32,6 +32,12 @@ EBPO_MUST_USE ebpo_status ebpo_subtree_table_find(ebpo_chunks *chunks, unsigned 
 uint64_t ebpo_subtree_groups(const ebpo_info *info, const ebpo_subtree_row *row, int level,
                              bool after);
 
+/* Adds the chunks of the table that are not in memory and that finding an item of a level takes (of
+ * its groups, gray nodes or leaves, by EBPO_PER_...); true if there are any, else *first is where
+ * its subtree begins. Errors are the reading's to tell: then true as well. */
+bool ebpo_subtree_table_missing(ebpo_chunks *chunks, int level, ebpo_per per, uint64_t item,
+                                ebpo_chunk_keys *keys, uint64_t *first);
+
 /* Announces what reading rows of the table takes, of subtrees in any order. */
 void ebpo_subtree_table_expect(ebpo_chunks *chunks, const uint64_t *subtrees, uint64_t count);
 void ebpo_subtree_table_expect_run(ebpo_chunks *chunks, uint64_t first, uint64_t count);

@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/sized.h"
+#include "query/batch.h"
 #include "query/prefetch.h"
 #include "query/inside.h"
 #include "query/limited.h"
@@ -302,8 +303,15 @@ ebpo_status ebpo_distance_many(ebpo_context *context, const double *points, uint
     /* of a subset, bounds decide whether what is missing matters */
     context->planes = o->level >= 0 || o->deadline_ns || o->mode != EBPO_DISTANCE_EXACT ||
                       context->model->info->pruned;
-    for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
-        status = one(context, points + 3 * i, o, &out[i], error);
+    ebpo_batch batch = { .count = 0 };
+    if (status == EBPO_OK)
+        ebpo_batch_begin(&batch, context, points, o->deadline_ns || o->level >= 0 ? 0 : count,
+                         true);
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
+        uint64_t k = batch.count ? ebpo_batch_next(&batch, i) : i;
+        status = one(context, points + 3 * k, o, &out[k], error);
+    }
+    ebpo_batch_end(&batch);
     return status;
 }
 

@@ -9,6 +9,7 @@
 #include "base/fp_env.h"
 #include "base/sized.h"
 #include "container/reader.h"
+#include "query/batch.h"
 #include "query/prefetch.h"
 #include "query/inside.h"
 #include "query/limited.h"
@@ -81,12 +82,18 @@ ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64
         return ebpo_inside_whole(context, points, count, out, error);
     context->planes =
         o->level >= 0 || o->deadline_ns || o->envelopes == EBPO_ENVELOPES_USE || m->info->pruned;
+    ebpo_batch batch = { .count = 0 };
+    if (status == EBPO_OK)
+        ebpo_batch_begin(&batch, context, points, o->deadline_ns || o->level >= 0 ? 0 : count,
+                         false);
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
-        status = ebpo_inside_walk(context, points + 3 * i, o, &out[i], error);
+        uint64_t k = batch.count ? ebpo_batch_next(&batch, i) : i;
+        status = ebpo_inside_walk(context, points + 3 * k, o, &out[k], error);
         if (status == EBPO_OK && ebpo_model_prefetches(m) &&
             (o->level < 0 || o->level > m->top->cut_level))
-            ebpo_context_prefetch(context, points + 3 * i, 0);
+            ebpo_context_prefetch(context, points + 3 * k, 0);
     }
+    ebpo_batch_end(&batch);
     return status;
 }
 

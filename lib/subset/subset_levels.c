@@ -6,6 +6,8 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
+#include "container/subtree_expect.h"
+#include "container/subtree_table.h"
 #include "octree/cells.h"
 #include "octree/node_types.h"
 #include "subset/kept_nodes.h"
@@ -45,9 +47,34 @@ static bool may_go_on(const ebpo_cutting *c, int level)
 
 /* --- runs of groups that are wanted --- */
 
+/* Of a file with subtrees: where the parents are their roots, all that is below can be announced.
+ * Faces as well, unless there are so many that they would push out what is read before them. */
+static void expect_subtrees(const descent *d)
+{
+    enum { WITH_FACES = 256 };
+    const ebpo_cutting *c = d->c;
+    ebpo_expected e = EBPO_EXPECTED_INIT(c->file);
+    uint64_t count = 0, *roots = ebpo_alloc(d->parent_count, sizeof *roots);
+    bool deep = c->last_level == c->from->level_count - 1;
+    uint32_t needs = c->parts | EBPO_NEEDS_ALWAYS | EBPO_NEEDS_SOLID;
+    for (uint64_t i = 0; roots && i < d->parent_count; i++)
+        if (d->parent[i].group != NOTHING)
+            roots[count++] = d->parent[i].group;
+    if (count)
+        ebpo_subtree_table_expect(c->chunks, roots, count);
+    for (uint64_t i = 0; i < count; i++)
+        ebpo_subtrees_expect(c->chunks, &e, roots[i], 1, needs,
+                             deep && count <= WITH_FACES && c->parts & EBPO_PART_MESH);
+    ebpo_expect_all(&e);
+    free(roots);
+}
+
 static ebpo_status pick(descent *d)
 {
     uint64_t count = 0;
+    if (d->c->from->subtree_level && d->level == d->c->from->subtree_level + 1 &&
+        ebpo_input_expects(&d->c->file->in))
+        expect_subtrees(d);
     ebpo_run *runs = ebpo_alloc(d->parent_count, sizeof *runs);
     if (!runs)
         return ebpo_fail_memory(d->c->error, d->parent_count * sizeof *runs);

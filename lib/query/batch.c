@@ -1,0 +1,201 @@
+#include "geom/strict_fp.h"
+
+#include "query/batch.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "container/reader.h"
+#include "container/subtree_expect.h"
+#include "container/subtree_table.h"
+#include "octree/octcode.h"
+#include "query/nearest.h"
+#include "query/prefetch.h"
+#include "query/query_node.h"
+
+/* Subtrees announced at a time, and points that they are gathered from: some megabytes, of which
+ * two are under way. */
+enum { SUBTREES_A_TIME = 128, POINTS_A_TIME = 4096 };
+
+typedef struct placed {
+    uint64_t key, point;
+} placed;
+
+static int compare_placed(const void *x, const void *y)
+{
+    const placed *a = x, *b = y;
+    if (a->key != b->key)
+        return a->key < b->key ? -1 : 1;
+    return (a->point > b->point) - (a->point < b->point);
+}
+
+static int compare_numbers(const void *x, const void *y)
+{
+    uint64_t a = *(const uint64_t *)x, b = *(const uint64_t *)y;
+    return (a > b) - (a < b);
+}
+
+/* Of the nearest cell, for points outside the box. */
+static uint64_t curve_key(const ebpo_box *box, const double p[3])
+{
+    ebpo_cell cell = { .level = EBPO_MAX_LEVEL };
+    for (int k = 0; k < 3; k++) {
+        double part = (p[k] - box->origin[k]) / box->size[k] * 0x1p20;
+        cell.at[k] = !(part > 0) ? 0 : part < 0x1p20 ? (uint32_t)part : (1u << 20) - 1;
+    }
+    return ebpo_octcode_of_cell(cell);
+}
+
+static uint64_t *make_order(const ebpo_box *box, const double *points, uint64_t count)
+{
+    placed *list = ebpo_alloc(count, sizeof *list);
+    uint64_t *order = ebpo_alloc(count, sizeof *order);
+    for (uint64_t i = 0; list && i < count; i++)
+        list[i] = (placed){ curve_key(box, points + 3 * i), i };
+    if (list && order)
+        qsort(list, count, sizeof *list, compare_placed);
+    for (uint64_t i = 0; list && order && i < count; i++)
+        order[i] = list[i].point;
+    if (!list) {
+        free(order);
+        order = NULL;
+    }
+    free(list);
+    return order;
+}
+
+void ebpo_batch_begin(ebpo_batch *b, ebpo_context *context, const double *points, uint64_t count,
+                      bool reach)
+{
+    const ebpo_model *m = context->model;
+    ebpo_box box = ebpo_model_box(m);
+    *b = (ebpo_batch){ .context = context, .points = points, .count = count, .reach = reach };
+    if (m->whole || count < 2 || m->options.loading != EBPO_LOAD_CACHE)
+        return;
+    b->order = make_order(&box, points, count);
+    b->far = ebpo_input_expects(&m->file->in) && m->info->subtree_level &&
+             m->top->cut_level == m->info->subtree_level && m->info->parts & EBPO_PART_MESH;
+}
+
+void ebpo_batch_end(ebpo_batch *b)
+{
+    free(b->order);
+    free(b->below);
+}
+
+/* --- announcing --- */
+
+/* The subtree where the search for a point begins; EBPO_NO_SUBTREE: the top decides. */
+#define EBPO_NO_SUBTREE UINT64_MAX
+static uint64_t home_of(const ebpo_batch *b, const double p[3])
+{
+    const ebpo_model *m = b->context->model;
+    uint64_t keys[EBPO_CACHE_AHEAD];
+    uint32_t at[3];
+    ebpo_box box = ebpo_model_box(m);
+    int fine = m->info->level_count - 1;
+    if (b->reach)
+        return ebpo_subtrees_near(m, p, INFINITY, keys) ? keys[0] : EBPO_NO_SUBTREE;
+    if (!ebpo_locate(&box, fine, p, at))
+        return EBPO_NO_SUBTREE;
+    uint32_t entry = ebpo_descend(&m->top->nodes, fine, at).entry;
+    return ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW ? ebpo_entry_value(entry)
+                                                         : EBPO_NO_SUBTREE;
+}
+
+static void collect(ebpo_batch *b, uint64_t below)
+{
+    if (below != EBPO_NO_SUBTREE &&
+        !ebpo_cache_has(b->context->model->cache, ebpo_context_key(b->context, below)) &&
+        ebpo_grow(&b->below, &b->capacity, b->below_count + 1, sizeof *b->below))
+        b->below[b->below_count++] = below;
+}
+
+/* Ranks of the roots in place of the top's numbers, each once and ascending. Leaves of the top have
+ * no row in the table: they are few, and are read when it comes to them. */
+static void to_ranks(ebpo_batch *b)
+{
+    const ebpo_model *m = b->context->model;
+    uint64_t kept = 0;
+    for (uint64_t i = 0; i < b->below_count; i++) {
+        const ebpo_node *root = &m->top->below[b->below[i]];
+        if (root->type == EBPO_GRAY && root->cell.level == m->info->subtree_level)
+            b->below[kept++] = root->rank;
+    }
+    if (kept)
+        qsort(b->below, kept, sizeof *b->below, compare_numbers);
+    b->below_count = 0;
+    for (uint64_t i = 0; i < kept; i++)
+        if (i == 0 || b->below[i] != b->below[i - 1])
+            b->below[b->below_count++] = b->below[i];
+}
+
+static void announce(ebpo_batch *b)
+{
+    ebpo_model *m = b->context->model;
+    ebpo_expected e = EBPO_EXPECTED_INIT(m->file);
+    uint32_t needs = EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH | EBPO_NEEDS_MAPS | EBPO_NEEDS_SOLID |
+                     (b->context->planes ? (uint32_t)EBPO_NEEDS_PLANES : 0);
+    to_ranks(b);
+    ebpo_subtree_table_expect(m->chunks, b->below, b->below_count);
+    for (uint64_t i = 0; i < b->below_count; i++)
+        ebpo_subtrees_expect(m->chunks, &e, b->below[i], 1, needs, true);
+    ebpo_expect_all(&e);
+    b->below_count = 0;
+}
+
+static const double *point(const ebpo_batch *b, uint64_t i)
+{
+    return b->points + 3 * (b->order ? b->order[i] : i);
+}
+
+/* Subtrees that the next points begin with. */
+static void tell_next(ebpo_batch *b)
+{
+    uint64_t begin = b->told;
+    while (b->told < b->count && b->told - begin < POINTS_A_TIME &&
+           b->below_count < SUBTREES_A_TIME) {
+        uint64_t before = b->below_count, home = home_of(b, point(b, b->told++));
+        if (before == 0 || b->below[before - 1] != home)
+            collect(b, home);
+    }
+    announce(b);
+}
+
+/* What else is near, as far as where a point begins tells: with these, nothing is left that would
+ * be asked for alone. */
+static void search_around(ebpo_batch *b, uint64_t end)
+{
+    ebpo_context *c = b->context;
+    for (; b->searched < end; b->searched++) {
+        const double *p = point(b, b->searched);
+        uint64_t home = home_of(b, p), keys[EBPO_CACHE_AHEAD];
+        ebpo_accel *accel;
+        ebpo_nearest n;
+        if (home == EBPO_NO_SUBTREE || c->model->top->below[home].pruned ||
+            ebpo_context_subtree(c, (uint32_t)home, &accel, NULL) != EBPO_OK)
+            continue; /* the question will tell */
+        ebpo_nearest_begin(&n, p, INFINITY);
+        ebpo_nearest_search(&n, c, accel);
+        unsigned count = ebpo_subtrees_near(c->model, p, fmin(n.upper, n.limit), keys);
+        for (unsigned k = 0; k < count; k++)
+            collect(b, keys[k]);
+    }
+    announce(b);
+}
+
+uint64_t ebpo_batch_next(ebpo_batch *b, uint64_t i)
+{
+    if (b->far && i == 0)
+        tell_next(b);
+    if (b->far && i >= (b->reach ? b->searched : b->told - (b->told != 0)) && i < b->count) {
+        uint64_t end = b->told;
+        if (b->told < b->count)
+            tell_next(b);
+        if (b->reach)
+            search_around(b, end);
+    }
+    return b->order ? b->order[i] : i;
+}
