@@ -49,8 +49,10 @@ static bool chosen(const choice *c, const ebpo_array_out *a)
     case PLANES: return here && is_planes(a->id);
     case TYPES_AND_PLANES: return here && (a->id == EBPO_A_TYPES || is_planes(a->id));
     case OTHERS: return here && !index && a->id != EBPO_A_TYPES && !is_planes(a->id);
-    case MESH: return a->id == EBPO_A_VERTICES || a->id == EBPO_A_FACES;
-    case MAPS: return a->id == EBPO_A_VERTEX_SOURCE || a->id == EBPO_A_FACE_SOURCE;
+    /* questions tell the source's faces, and read these numbers with the faces */
+    case MESH:
+        return a->id == EBPO_A_VERTICES || a->id == EBPO_A_FACES || a->id == EBPO_A_FACE_SOURCE;
+    case MAPS: return a->id == EBPO_A_VERTEX_SOURCE;
     case TABLE: return a->id == EBPO_A_SUBTREE_COUNTS || a->id == EBPO_A_SUBTREE_OUTER;
     }
     return false;

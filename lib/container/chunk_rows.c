@@ -40,10 +40,10 @@ static uint64_t wanted_rows(const ebpo_info *info, ebpo_array_id id, int level, 
                             uint32_t row_bytes)
 {
     switch (id) {
+    case EBPO_A_FACE_SOURCE:
     case EBPO_A_FACES: return EBPO_FACE_BLOCK;
     case EBPO_A_VERTICES: return EBPO_VERTEX_BLOCK;
-    case EBPO_A_VERTEX_SOURCE:
-    case EBPO_A_FACE_SOURCE: return MAP_ROWS;
+    case EBPO_A_VERTEX_SOURCE: return MAP_ROWS;
     case EBPO_A_FACES_INDEX: return FACES_INDEX_ROWS;
     case EBPO_A_SUBTREE_COUNTS: return ebpo_subtree_rows(info);
     case EBPO_A_SUBTREE_OUTER: return OUTER_ROWS;

@@ -42,9 +42,11 @@ static void digest(const uint8_t head[DIGEST_AT], const void *data, size_t size,
     ebpo_sha256_end(&sha, out);
 }
 
-static void make_key(ebpo_disk *d, const char *url, const ebpo_http_version *v)
+/* Blocks of the usual size are named as they always were. */
+static void make_key(ebpo_disk *d, size_t block, const char *url, const ebpo_http_version *v)
 {
-    uint8_t size[8], out[32];
+    uint8_t size[8], of_block[8], out[32];
+    ebpo_store64(of_block, block);
     ebpo_sha256 sha;
     ebpo_store64(size, v->size);
     ebpo_sha256_begin(&sha);
@@ -52,6 +54,8 @@ static void make_key(ebpo_disk *d, const char *url, const ebpo_http_version *v)
     ebpo_sha256_add(&sha, v->etag, strlen(v->etag) + 1);
     ebpo_sha256_add(&sha, v->modified, strlen(v->modified) + 1);
     ebpo_sha256_add(&sha, size, sizeof size);
+    if (block != EBPO_DISK_BLOCK)
+        ebpo_sha256_add(&sha, of_block, sizeof of_block);
     ebpo_sha256_end(&sha, out);
     ebpo_sha256_hex(out, d->key);
 }
@@ -158,8 +162,8 @@ static bool writable(int folder)
     return true;
 }
 
-ebpo_status ebpo_disk_open(ebpo_disk **out, const char *folder, uint64_t bytes, const char *url,
-                           const ebpo_http_version *version, ebpo_error *error)
+ebpo_status ebpo_disk_open(ebpo_disk **out, const char *folder, uint64_t bytes, size_t block,
+                           const char *url, const ebpo_http_version *version, ebpo_error *error)
 {
     *out = NULL;
     int fd = mkdir(folder, 0777) == 0 || errno == EEXIST
@@ -180,7 +184,7 @@ ebpo_status ebpo_disk_open(ebpo_disk **out, const char *folder, uint64_t bytes, 
     d->folder = fd;
     d->limit = bytes;
     pthread_mutex_init(&d->lock, NULL);
-    make_key(d, url, version);
+    make_key(d, block, url, version);
     trim(d);
     count_held(d);
     *out = d;

@@ -11,7 +11,8 @@
 #include "http/answer.h"
 
 enum {
-    EBPO_DISK_BLOCK = 32768,
+    EBPO_DISK_BLOCK = 32768, /* usually */
+    EBPO_DISK_BLOCK_LEAST = 4096,
     /* of the first request, after which whole blocks follow: opening needs some 50 KB (13 levels),
        and levels 0 to 4 come with it */
     EBPO_HTTP_HEAD = 131072
@@ -21,15 +22,15 @@ _Static_assert(EBPO_HTTP_HEAD % EBPO_DISK_BLOCK == 0, "blocks would begin within
 typedef struct ebpo_disk ebpo_disk;
 
 /* Makes the folder, if its parent is there. EBPO_E_ARGUMENT when it cannot be written. `bytes`:
- * that the folder may hold. */
+ * that the folder may hold; `block`: of a block. */
 EBPO_MUST_USE ebpo_status ebpo_disk_open(ebpo_disk **out, const char *folder, uint64_t bytes,
-                                         const char *url, const ebpo_http_version *version,
-                                         ebpo_error *error);
+                                         size_t block, const char *url,
+                                         const ebpo_http_version *version, ebpo_error *error);
 /* Bytes that the folder held when it was opened: of this version of this file, and others. */
 void ebpo_disk_held(const ebpo_disk *disk, uint64_t *held, uint64_t *others);
 void ebpo_disk_close(ebpo_disk *disk);
 
-/* `size`: EBPO_DISK_BLOCK, less at the end of the file. False: not there. */
+/* `size`: a block, less at the end of the file. False: not there. */
 bool ebpo_disk_get(ebpo_disk *disk, uint64_t block, void *data, size_t size);
 void ebpo_disk_put(ebpo_disk *disk, uint64_t block, const void *data, size_t size);
 

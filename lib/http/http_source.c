@@ -98,6 +98,13 @@ static ebpo_status check_options(const ebpo_http_options *o, const char *shown, 
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
                               "%u connections at a time; give 1 to %d", o->connections,
                               CONNECTIONS_MAX);
+    if (o->cache_block &&
+        (o->cache_block < EBPO_DISK_BLOCK_LEAST || o->cache_block > EBPO_HTTP_HEAD ||
+         o->cache_block & (o->cache_block - 1)))
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
+                              "blocks of %u bytes in the cache folder; give a power of two from "
+                              "%d to %d, or 0",
+                              o->cache_block, EBPO_DISK_BLOCK_LEAST, EBPO_HTTP_HEAD);
     for (const char *const *h = o->headers; h && *h; h++)
         if (!header_ok(*h))
             return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
@@ -242,9 +249,10 @@ static ebpo_status open_source(http_source *s, ebpo_error *error)
         status = read_whole(s, error);
     /* The folder last: it is named by the version. A broken one is said also where it is not
      * needed. */
+    s->pieces.block = o->cache_block ? o->cache_block : EBPO_DISK_BLOCK;
     if (status == EBPO_OK && o->cache_folder)
-        status = ebpo_disk_open(&s->pieces.disk, o->cache_folder, o->cache_bytes, s->url,
-                                &s->version, error);
+        status = ebpo_disk_open(&s->pieces.disk, o->cache_folder, o->cache_bytes, s->pieces.block,
+                                s->url, &s->version, error);
     if (status == EBPO_OK && !versioned) {
         ebpo_disk_close(s->pieces.disk);
         s->pieces.disk = NULL;

@@ -92,11 +92,9 @@ static bool insert(ebpo_range_cache *p, uint64_t i, uint64_t begin, uint64_t end
 static bool insert_pieces(ebpo_range_cache *p, uint64_t i, uint64_t begin, uint64_t end)
 {
     uint64_t number = (end - begin + EBPO_RANGE_BYTES - 1) / EBPO_RANGE_BYTES;
-    uint64_t each = ((end - begin + number - 1) / number + EBPO_DISK_BLOCK - 1) / EBPO_DISK_BLOCK *
-                    EBPO_DISK_BLOCK;
+    uint64_t each = ((end - begin + number - 1) / number + p->block - 1) / p->block * p->block;
     for (; begin < end; i++) {
-        uint64_t stop =
-            end - begin <= each ? end : (begin + each) / EBPO_DISK_BLOCK * EBPO_DISK_BLOCK;
+        uint64_t stop = end - begin <= each ? end : (begin + each) / p->block * p->block;
         if (!insert(p, i, begin, stop))
             return false;
         begin = stop;
@@ -108,8 +106,8 @@ static bool insert_pieces(ebpo_range_cache *p, uint64_t i, uint64_t begin, uint6
 static bool cover(ebpo_range_cache *p, uint64_t begin, uint64_t end)
 {
     if (p->disk) {
-        begin = begin / EBPO_DISK_BLOCK * EBPO_DISK_BLOCK;
-        end = (end + EBPO_DISK_BLOCK - 1) / EBPO_DISK_BLOCK * EBPO_DISK_BLOCK;
+        begin = begin / p->block * p->block;
+        end = (end + p->block - 1) / p->block * p->block;
     }
     begin = begin < p->begin ? p->begin : begin;
     end = end > p->size ? p->size : end;
@@ -130,7 +128,7 @@ static bool cover(ebpo_range_cache *p, uint64_t begin, uint64_t end)
  * blocks are stored on disk. */
 static bool has_block(const ebpo_range_cache *p, uint64_t at, uint64_t end)
 {
-    return at % EBPO_DISK_BLOCK == 0 && (end - at >= EBPO_DISK_BLOCK || end == p->size);
+    return at % p->block == 0 && (end - at >= p->block || end == p->size);
 }
 
 /* Blocks from disk, from both ends inwards; the lock is released meanwhile. What is left is to be
@@ -141,16 +139,15 @@ static void load_from_disk(ebpo_range_cache *p, ebpo_cached_range *piece)
     piece->state = PIECE_LOADING;
     pthread_mutex_unlock(&p->lock);
     while (begin < end && has_block(p, begin, end)) {
-        size_t size = (size_t)(end - begin < EBPO_DISK_BLOCK ? end - begin : EBPO_DISK_BLOCK);
-        if (!ebpo_disk_get(p->disk, begin / EBPO_DISK_BLOCK, piece->data + (begin - piece->begin),
-                           size))
+        size_t size = (size_t)(end - begin < p->block ? end - begin : p->block);
+        if (!ebpo_disk_get(p->disk, begin / p->block, piece->data + (begin - piece->begin), size))
             break;
         begin += size;
         got += size;
     }
     while (begin < end) {
-        uint64_t block = (end - 1) / EBPO_DISK_BLOCK, at = block * EBPO_DISK_BLOCK;
-        if (at <= begin || (end % EBPO_DISK_BLOCK && end != p->size) ||
+        uint64_t block = (end - 1) / p->block, at = block * p->block;
+        if (at <= begin || (end % p->block && end != p->size) ||
             !ebpo_disk_get(p->disk, block, piece->data + (at - piece->begin), (size_t)(end - at)))
             break;
         got += end - at;
@@ -335,11 +332,11 @@ static void store(ebpo_range_cache *p, ebpo_cached_range *piece)
 {
     piece->to_store = false;
     pthread_mutex_unlock(&p->lock);
-    for (uint64_t at = piece->fetch_begin; at < piece->fetch_end; at += EBPO_DISK_BLOCK) {
+    for (uint64_t at = piece->fetch_begin; at < piece->fetch_end; at += p->block) {
         uint64_t left = piece->fetch_end - at;
         if (has_block(p, at, piece->fetch_end))
-            ebpo_disk_put(p->disk, at / EBPO_DISK_BLOCK, piece->data + (at - piece->begin),
-                          (size_t)(left < EBPO_DISK_BLOCK ? left : EBPO_DISK_BLOCK));
+            ebpo_disk_put(p->disk, at / p->block, piece->data + (at - piece->begin),
+                          (size_t)(left < p->block ? left : p->block));
     }
     pthread_mutex_lock(&p->lock);
 }

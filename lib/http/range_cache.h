@@ -16,6 +16,7 @@ typedef struct ebpo_range_cache {
     pthread_cond_t done;
     ebpo_transfers *transfers;
     ebpo_disk *disk;           /* or NULL */
+    uint64_t block;            /* of the disk's */
     uint64_t begin, size;      /* pieces lie within [begin, size) */
     uint64_t held_limit;       /* bytes of pieces; readers that wait may go above it */
     ebpo_cached_range **piece; /* [count] by offset, without overlaps */

@@ -9,6 +9,7 @@ static bool options_from(const remote_values *v, ebpo_http_options *o, ebpo_erro
 {
     *o = (ebpo_http_options)EBPO_HTTP_OPTIONS_INIT;
     o->cache_folder = v->cache;
+    o->cache_block = v->cache_block;
     if (v->cache_size && !words_read_size(v->cache_size, &o->cache_bytes)) {
         error->status = EBPO_E_ARGUMENT;
         snprintf(error->message, sizeof error->message,

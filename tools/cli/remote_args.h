@@ -11,6 +11,7 @@
 typedef struct remote_values {
     bool stats, unversioned;
     const char *cache, *cache_size, *user, *ca_file;
+    unsigned cache_block; /* bytes; 0: as usual */
     double timeout, stall;
     int64_t retries, connections;
     arg_list headers;

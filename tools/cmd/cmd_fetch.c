@@ -112,6 +112,8 @@ static bool tell_resuming(const subset_values *v, ebpo_file *file, const char *u
     return s.cache_held > 0;
 }
 
+enum { BOX_BLOCK = 8192 };
+
 static int fetch(subset_values *v, const char *url, const char *out, const char *part,
                  ebpo_subset_options *subset)
 {
@@ -125,6 +127,8 @@ static int fetch(subset_values *v, const char *url, const char *out, const char 
     if (part) {
         v->remote.cache = part;
         v->remote.cache_size = "1048576T";
+        /* a box takes many short ranges */
+        v->remote.cache_block = v->box ? BOX_BLOCK : 0;
     }
     ebpo_status status = remote_open(&file, url, &v->remote, &error);
     bool held = status == EBPO_OK && part && tell_resuming(v, file, url, part);

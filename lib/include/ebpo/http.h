@@ -108,12 +108,19 @@ typedef struct ebpo_http_options {
      */
     bool (*stop)(void *user);
     void *stop_user;
+
+    /*
+     * Bytes of a block in the folder, a power of two from 4 KiB to 128 KiB: what is
+     * fetched is rounded outward to whole blocks, which small ones make cheaper and
+     * many. Blocks of other sizes are not found. 0: 32 KiB.
+     */
+    unsigned cache_block;
 } ebpo_http_options;
 
 #define EBPO_HTTP_OPTIONS_INIT                                                                \
     {                                                                                         \
         sizeof(ebpo_http_options), 15, 20, 120, 5, 6, UINT64_C(48) << 20, UINT64_C(64) << 20, \
-            false, true, NULL, NULL, NULL, NULL, NULL, NULL, UINT64_C(1) << 30, NULL, NULL    \
+            false, true, NULL, NULL, NULL, NULL, NULL, NULL, UINT64_C(1) << 30, NULL, NULL, 0 \
     }
 
 /* Sums since opening. */
