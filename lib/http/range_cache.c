@@ -8,8 +8,12 @@
 #include "base/error.h"
 
 enum {
-    GAP_BYTES = 16384, /* between announced ranges: fetching them costs less than another request */
-    STALE_AFTER = 64   /* announcements: what has not been read by then will hardly be */
+    /* between announced ranges: fetching them costs less than another request; of many, requests
+     * are what takes time */
+    GAP_BYTES = 16384,
+    GAP_BYTES_OF_MANY = 24576,
+    MANY = 256,
+    STALE_AFTER = 64 /* announcements: what has not been read by then will hardly be */
 };
 
 typedef enum piece_state {
@@ -287,12 +291,11 @@ static void add_wanted(ebpo_range_cache *p, const ebpo_range *range)
 /* Pieces for the ranges (sorted), one for those that lie close together. */
 static void note(ebpo_range_cache *p, const ebpo_range *sorted, size_t count)
 {
-    uint64_t before = p->count;
+    uint64_t before = p->count, gap = count > MANY ? GAP_BYTES_OF_MANY : GAP_BYTES;
     p->announcing = true;
     for (size_t i = 0; i < count;) {
         uint64_t begin = sorted[i].offset, end = begin + sorted[i].size;
-        for (i++; i < count && (sorted[i].offset <= end || sorted[i].offset - end <= GAP_BYTES);
-             i++)
+        for (i++; i < count && (sorted[i].offset <= end || sorted[i].offset - end <= gap); i++)
             end = sorted[i].offset + sorted[i].size > end ? sorted[i].offset + sorted[i].size : end;
         if (begin < end && !cover(p, begin, end))
             break;
