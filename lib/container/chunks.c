@@ -267,6 +267,14 @@ void ebpo_chunks_announce(ebpo_chunks *c, const uint64_t *keys, unsigned now, un
     ebpo_expect_all(&e);
 }
 
+bool ebpo_chunks_announced(const ebpo_chunks *c, const ebpo_chunk_keys *keys)
+{
+    for (unsigned i = 0; i < keys->count; i++)
+        if (!is_ahead(c, keys->key[i]))
+            return false;
+    return true;
+}
+
 static void add_key(ebpo_chunk_keys *keys, uint64_t key)
 {
     for (unsigned k = 0; k < keys->count; k++)
@@ -302,8 +310,12 @@ ebpo_status ebpo_chunks_fetch(ebpo_chunks *c, const ebpo_chunk_keys *keys, unsig
 {
     ebpo_status status = EBPO_OK;
     ebpo_chunks_announce(c, keys->key, now, keys->count);
-    for (unsigned i = 0; i < now && status == EBPO_OK; i++) {
+    for (unsigned i = 0; i < keys->count && status == EBPO_OK; i++) {
         void *item;
+        /* rows of the table are awaited too: only they tell what comes after them */
+        bool table = array_of(c, keys->key[i])->id >= EBPO_A_SUBTREE_INDEX;
+        if (i >= now && !(table && is_ahead(c, keys->key[i])))
+            continue;
         status = ebpo_cache_get(c->cache, keys->key[i], &item, NULL, error);
         if (status == EBPO_OK)
             ebpo_cache_unpin(c->cache, keys->key[i]);

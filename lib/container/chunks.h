@@ -85,7 +85,7 @@ void ebpo_chunks_expect(ebpo_chunks *chunks, ebpo_expected *expected, ebpo_array
 
 /* Chunks, each once. What does not fit is left out: then it is read without having been announced.
  */
-enum { EBPO_CHUNK_KEYS = 1024 };
+enum { EBPO_CHUNK_KEYS = 8192 };
 typedef struct ebpo_chunk_keys {
     unsigned count;
     uint64_t key[EBPO_CHUNK_KEYS];
@@ -100,6 +100,8 @@ bool ebpo_chunks_missing(ebpo_chunks *chunks, ebpo_array_id id, int level, uint6
  * announced and not been read stays small, also beside what the limit leaves. */
 void ebpo_chunks_announce(ebpo_chunks *chunks, const uint64_t *keys, unsigned now, unsigned count);
 
+/* Of counted arrays: whether all of these have been announced, and not been read yet. */
+bool ebpo_chunks_announced(const ebpo_chunks *chunks, const ebpo_chunk_keys *keys);
 /* Trying out what a reading of counted chunks takes: until this is called with NULL, nothing is
  * read. What is not in memory is added to `keys`, and reading it fails with EBPO_E_LIMIT. */
 void ebpo_chunks_collect(ebpo_chunks *chunks, ebpo_chunk_keys *keys);

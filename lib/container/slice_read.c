@@ -113,7 +113,7 @@ static void expect_below(ebpo_chunks *chunks, const extent *x, const range *r)
         !ebpo_input_expects(&chunks->file->in))
         return;
     ebpo_subtree_table_expect_run(chunks, first, count);
-    ebpo_subtrees_expect(chunks, &e, first, count, x->needs, x->faces);
+    ebpo_subtrees_expect(chunks, &e, first, count, x->needs, x->end - 1, x->faces);
     ebpo_expect_all(&e);
 }
 

@@ -10,6 +10,7 @@ typedef struct telling {
     ebpo_expected *expected;
     const ebpo_subtree_row *first, *last;
     uint32_t needs;
+    int last_level;
 } telling;
 
 static void rows(const telling *t, ebpo_array_id id, int level, uint64_t begin, uint64_t end)
@@ -47,7 +48,8 @@ static uint64_t sum_of(const telling *t, ebpo_per per, int level, bool after)
 static void tell_nodes(const telling *t)
 {
     const ebpo_info *info = &t->chunks->file->info;
-    for (int level = info->subtree_level + 1; level < info->level_count; level++)
+    for (int level = info->subtree_level + 1; level < info->level_count && level <= t->last_level;
+         level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
             if (ebpo_schema[id].needs & t->needs)
                 rows(t, (ebpo_array_id)id, level, sum_of(t, ebpo_schema[id].per, level, false),
@@ -100,11 +102,11 @@ static void tell_outer(const telling *t, const ebpo_subtree_row *row)
 }
 
 void ebpo_subtrees_expect(ebpo_chunks *chunks, ebpo_expected *expected, uint64_t first,
-                          uint64_t count, uint32_t needs, bool faces)
+                          uint64_t count, uint32_t needs, int last_level, bool faces)
 {
     const ebpo_info *info = &chunks->file->info;
     ebpo_subtree_row *row = ebpo_alloc(3, sizeof *row);
-    telling t = { chunks, expected, &row[0], &row[1], needs };
+    telling t = { chunks, expected, &row[0], &row[1], needs, faces ? EBPO_LEVELS_MAX : last_level };
     if (row && count && ebpo_input_expects(&chunks->file->in) &&
         ebpo_subtree_table_row(chunks, first, &row[0], NULL) == EBPO_OK &&
         ebpo_subtree_table_row(chunks, first + count - 1, &row[1], NULL) == EBPO_OK) {

@@ -141,7 +141,7 @@ static void announce(ebpo_batch *b)
     to_ranks(b);
     ebpo_subtree_table_expect(m->chunks, b->below, b->below_count);
     for (uint64_t i = 0; i < b->below_count; i++)
-        ebpo_subtrees_expect(m->chunks, &e, b->below[i], 1, needs, true);
+        ebpo_subtrees_expect(m->chunks, &e, b->below[i], 1, needs, EBPO_LEVELS_MAX, true);
     ebpo_expect_all(&e);
     b->below_count = 0;
 }

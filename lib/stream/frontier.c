@@ -68,7 +68,7 @@ void ebpo_frontier_sort(ebpo_frontier *f)
 unsigned ebpo_frontier_blocks(const ebpo_frontier *f, uint64_t span,
                               uint64_t places[EBPO_FRONTIER_BLOCKS])
 {
-    enum { SLOTS = 1024 };
+    enum { SLOTS = 4 * EBPO_FRONTIER_BLOCKS };
     struct {
         uint64_t block, place;
     } slot[SLOTS]; /* block 0: free */

@@ -31,7 +31,7 @@ void ebpo_frontier_sort(ebpo_frontier *frontier);
 /* Of the nodes whose turn comes, the first one of each block of `span` children's groups of a
  * level: their places in `at`, in order. The top is the first. At most EBPO_FRONTIER_BLOCKS;
  * returns how many. */
-enum { EBPO_FRONTIER_BLOCKS = 256 };
+enum { EBPO_FRONTIER_BLOCKS = 1024 };
 unsigned ebpo_frontier_blocks(const ebpo_frontier *frontier, uint64_t span,
                               uint64_t places[EBPO_FRONTIER_BLOCKS]);
 

@@ -10,6 +10,7 @@ typedef struct fetching {
     const ebpo_frontier *frontier;
     unsigned wanted;
     bool faces;
+    const ebpo_view_depth *depth;
 } fetching;
 
 ebpo_view_group ebpo_view_children(const ebpo_waiting *w)
@@ -63,61 +64,71 @@ static uint64_t subtree_of(const fetching *f, const ebpo_view_group *group)
     return ebpo_partial_children(f->partial, node);
 }
 
-enum { SUBTREES_MOST = 64 };
+enum { SUBTREES_MOST = EBPO_FRONTIER_BLOCKS, WITH_FACES = 64 };
 
-/* In which subtrees these groups stand, each once; 0: in too many. */
+/* A subtree that the view goes into, by its number and its root. */
+typedef struct entered {
+    uint64_t number, octcode;
+} entered;
+
+/* In which subtrees these groups stand, each once. */
 static unsigned subtrees_of(const fetching *f, const ebpo_view_group *groups, unsigned count,
-                            uint64_t numbers[SUBTREES_MOST])
+                            entered list[SUBTREES_MOST])
 {
+    int level = f->chunks->file->info.subtree_level;
     unsigned found = 0;
     for (unsigned i = 0; i < count; i++) {
         if (!below_subtrees(f, &groups[i]))
             continue;
-        uint64_t number = subtree_of(f, &groups[i]);
+        uint64_t root = groups[i].parent >> 3 * (ebpo_octcode_level(groups[i].parent) - level);
         unsigned k = 0;
-        while (k < found && numbers[k] != number)
+        while (k < found && list[k].octcode != root)
             k++;
-        if (k == SUBTREES_MOST)
-            return 0;
-        numbers[k] = number;
-        found += k == found;
+        if (k == found)
+            list[found++] = (entered){ subtree_of(f, &groups[i]), root };
     }
     return found;
 }
 
-/* All of the subtrees of these groups. False where the view goes through so many that it comes to
- * the end of none soon: then what the next groups take is enough. */
+/* Of the subtrees of these groups, all that the view will come to. Faces: not where it goes through
+ * so many that it comes to the end of none soon; then what the next groups take is enough. */
 static bool try_subtrees(const fetching *f, const ebpo_view_group *groups, unsigned count)
 {
-    uint64_t numbers[SUBTREES_MOST];
+    entered list[SUBTREES_MOST];
     bool planes = f->wanted & EBPO_GROUP_PLANES, windings = f->wanted & EBPO_GROUP_WINDINGS;
     uint32_t needs = EBPO_NEEDS_ALWAYS | (f->faces ? EBPO_NEEDS_MESH : 0) |
                      (windings ? EBPO_NEEDS_SOLID : 0) |
                      (planes ? EBPO_NEEDS_PLANES | EBPO_NEEDS_LEAF_PLANES : 0);
-    unsigned subtrees = subtrees_of(f, groups, count, numbers);
+    unsigned subtrees = subtrees_of(f, groups, count, list);
+    if (f->faces && subtrees > WITH_FACES)
+        return false;
     for (unsigned i = 0; i < subtrees; i++) {
         ebpo_expected none = EBPO_EXPECTED_INIT(f->chunks->file);
-        ebpo_subtrees_expect(f->chunks, &none, numbers[i], 1, needs, f->faces);
+        ebpo_subtrees_expect(f->chunks, &none, list[i].number, 1, needs,
+                             f->depth->level(f->depth->user, list[i].octcode), f->faces);
     }
     return subtrees > 0;
 }
 
 /* --- fetching --- */
 
-/* The chunks that the group waits for next, and behind these what others take; how many are its
- * own.
- */
-static unsigned collect(const fetching *f, const ebpo_view_group *groups, unsigned count,
-                        ebpo_chunk_keys *keys)
+/* The chunks that the group waits for next, and, unless they have been announced before, behind
+ * these what the next groups take: so one batch is used up before the next one is told. How many
+ * are its own. */
+static unsigned collect(const fetching *f, const ebpo_view_group *group, ebpo_chunk_keys *keys)
 {
-    enum { TRIED = 64 }; /* trying is work */
+    enum { FACES_BLOCK = 64, TRIED = 64 }; /* trying is work */
+    ebpo_view_group groups[EBPO_FRONTIER_BLOCKS];
     keys->count = 0;
     ebpo_chunks_collect(f->chunks, keys);
-    try_group(f, &groups[0]);
+    try_group(f, group);
     unsigned own = keys->count;
-    if (own && !try_subtrees(f, groups, count))
-        for (unsigned i = 1; i < count && i < TRIED; i++)
+    if (own && !ebpo_chunks_announced(f->chunks, keys)) {
+        unsigned count = coming(f, group, f->faces ? FACES_BLOCK : 1, groups);
+        bool told = try_subtrees(f, groups, count);
+        for (unsigned i = 1; i < count && i < TRIED && !told; i++)
             try_group(f, &groups[i]);
+    }
     ebpo_chunks_collect(f->chunks, NULL);
     return own;
 }
@@ -126,13 +137,12 @@ static unsigned collect(const fetching *f, const ebpo_view_group *groups, unsign
  * reading goes on without having been announced. */
 static ebpo_status fetch_tried(const fetching *f, const ebpo_view_group *group, ebpo_error *error)
 {
-    enum { BLOCK = 64, PASSES = 12 };
-    ebpo_view_group groups[EBPO_FRONTIER_BLOCKS];
+    enum { PASSES = 12 };
     ebpo_chunk_keys keys;
     ebpo_status status = EBPO_OK;
-    unsigned count = coming(f, group, BLOCK, groups), own = 1;
+    unsigned own = 1;
     for (int pass = 0; pass < PASSES && own && status == EBPO_OK; pass++) {
-        own = collect(f, groups, count, &keys);
+        own = collect(f, group, &keys);
         if (own)
             status = ebpo_chunks_fetch(f->chunks, &keys, own, error);
     }
@@ -154,9 +164,10 @@ static ebpo_status fetch_nodes(const fetching *f, const ebpo_view_group *group, 
 
 ebpo_status ebpo_view_fetch(ebpo_chunks *chunks, const ebpo_partial *partial,
                             const ebpo_frontier *frontier, const ebpo_view_group *group,
-                            unsigned wanted, bool faces, ebpo_error *error)
+                            unsigned wanted, bool faces, const ebpo_view_depth *depth,
+                            ebpo_error *error)
 {
-    fetching f = { chunks, partial, frontier, wanted, faces };
+    fetching f = { chunks, partial, frontier, wanted, faces, depth };
     ebpo_status status = EBPO_OK;
     if (!below_subtrees(&f, group))
         status = fetch_nodes(&f, group, error);

@@ -172,6 +172,18 @@ static bool read_at_once(ebpo_view_stream *s, const ebpo_view_group *group, unsi
     return status == EBPO_OK && missing.count == 0;
 }
 
+/* The first level at which nothing below the node is refined any more, seen from where it is
+ * nearest. */
+static int depth_below(const void *user, uint64_t octcode)
+{
+    const ebpo_view_stream *s = user;
+    ebpo_seen look = ebpo_viewpoint_see(&s->viewpoint, &s->box, ebpo_cell_of_octcode(octcode));
+    int level = ebpo_octcode_level(octcode);
+    while (level < s->info->level_count && turn_of(s, level, look) != EBPO_TURN_NEVER)
+        level++;
+    return level;
+}
+
 /* Into s->read, and with faces those of its leaves. */
 static ebpo_status read_group(ebpo_view_stream *s, const ebpo_view_group *group, ebpo_error *error)
 {
@@ -179,11 +191,12 @@ static ebpo_status read_group(ebpo_view_stream *s, const ebpo_view_group *group,
                       (s->options.windings ? EBPO_GROUP_WINDINGS : 0u);
     ebpo_status status = EBPO_OK;
     ebpo_chunks_limit(s->chunks, s->options.bytes ? s->options.bytes : UINT64_MAX);
+    ebpo_view_depth depth = { depth_below, s };
     if (ebpo_input_expects(&s->chunks->file->in)) {
         if (read_at_once(s, group, wanted))
             return EBPO_OK;
         status = ebpo_view_fetch(s->chunks, &s->partial, &s->frontier, group, wanted,
-                                 s->leaves != NULL, error);
+                                 s->leaves != NULL, &depth, error);
     }
     return status == EBPO_OK ? read_now(s, group, wanted, error) : status;
 }

@@ -63,7 +63,7 @@ static void expect_subtrees(const descent *d)
     if (count)
         ebpo_subtree_table_expect(c->chunks, roots, count);
     for (uint64_t i = 0; i < count; i++)
-        ebpo_subtrees_expect(c->chunks, &e, roots[i], 1, needs,
+        ebpo_subtrees_expect(c->chunks, &e, roots[i], 1, needs, c->last_level,
                              deep && count <= WITH_FACES && c->parts & EBPO_PART_MESH);
     ebpo_expect_all(&e);
     free(roots);
