@@ -136,6 +136,6 @@ void ebpo_context_announce(const ebpo_context *c, const uint32_t *below, uint64_
     ebpo_subtree_table_expect(m->chunks, numbers, found);
     for (uint64_t i = 0; i < found; i++)
         ebpo_subtrees_expect(m->chunks, &expected, numbers[i], 1, ebpo_subtree_needs(c->planes),
-                             true);
+                             EBPO_LEVELS_MAX, true);
     ebpo_expect_all(&expected);
 }
