@@ -135,19 +135,50 @@ static uint64_t bound(const ebpo_slice_size *size, const ebpo_info *info, bool w
            (whole ? 0 : 3 * faces * OLDER) + vertices * 3 * number;
 }
 
+/* References to faces that are new before the subtree: that many outer faces at most. Reads the
+ * lists, of which most are references within the subtree. */
+static ebpo_status count_outer(const ebpo_subtree *s, ebpo_chunks *chunks, uint64_t *outer,
+                               ebpo_error *error)
+{
+    ebpo_slice lists;
+    uint64_t first = UINT64_MAX;
+    *outer = 0;
+    ebpo_status status =
+        ebpo_slice_read_nodes(&lists, chunks, &s->root, EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH,
+                              EBPO_SLICE_ALL, error);
+    if (status != EBPO_OK)
+        return status;
+    for (int i = 0; i < lists.level_count; i++) /* ascending within a level */
+        if (lists.level[i].leaf_count && lists.level[i].leaf_first[0] < first)
+            first = lists.level[i].leaf_first[0];
+    for (int i = 0; i < lists.level_count; i++)
+        for (uint64_t k = 0; k < lists.level[i].ref_count; k++)
+            *outer += lists.level[i].leaf_refs[k] < first;
+    ebpo_slice_free(&lists);
+    return EBPO_OK;
+}
+
 static ebpo_status check_memory(const ebpo_subtree *s, ebpo_chunks *chunks, uint32_t needs,
                                 const ebpo_subtree_options *o, ebpo_error *error)
 {
     ebpo_slice_size size;
+    const ebpo_info *info = &chunks->file->info;
+    bool whole = s->root.cell.level == 0, corners = o->corners && !s->no_faces;
     if (o->memory == 0)
         return EBPO_OK;
     ebpo_status status = ebpo_slice_measure_nodes(chunks, &s->root, needs, o->levels, &size, error);
     if (status != EBPO_OK)
         return status;
-    uint64_t least = least_memory(
-        bound(&size, &chunks->file->info, s->root.cell.level == 0, o->corners && !s->no_faces));
-    if (least <= o->memory)
-        return EBPO_OK;
+    ebpo_slice_size lists = size;
+    lists.outer = lists.new_faces = 0;
+    uint64_t least = least_memory(bound(&size, info, whole, corners));
+    if (least > o->memory && size.outer &&
+        least_memory(bound(&lists, info, whole, corners)) <= o->memory) {
+        status = count_outer(s, chunks, &size.outer, error);
+        least = least_memory(bound(&size, info, whole, corners));
+    }
+    if (status != EBPO_OK || least <= o->memory)
+        return status;
     return ebpo_fail_file(error, EBPO_E_LIMIT, chunks->file->in.shown,
                           "the subtree of node %" PRIu64 " may take more than the %" PRIu64
                           " bytes allowed; %" PRIu64 " are enough, or open the subtrees below it",

@@ -737,32 +737,46 @@ START_TEST(without_faces_there_are_nodes_and_a_reason)
 }
 END_TEST
 
-/* The message of too small a limit names one that does; one byte less does not. */
-START_TEST(a_limit_of_memory_is_named_and_kept)
+/* The limit that a refusal names; 0: it is enough. */
+static uint64_t named_limit(const ebpo_file *file, uint64_t octcode, uint64_t memory)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    twin t;
+    ebpo_subtree *subtree = NULL;
     ebpo_subtree_options options = with_corners();
-    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 60, 40), USUAL, 6, EBPO_CODEC_ZSTD);
+    options.memory = memory;
+    ebpo_status status = ebpo_subtree_open(file, octcode, &options, &subtree, &error);
+    ebpo_subtree_close(subtree);
+    if (status == EBPO_OK)
+        return 0;
+    const char *named = strstr(error.message, "allowed; ");
+    ck_assert_msg(status == EBPO_E_LIMIT && named, "%s", error.message);
+    return strtoull(named + strlen("allowed; "), NULL, 10);
+}
+
+/* The message of too small a limit names one that does. With less, lists are looked at for how many
+ * faces are not the subtree's own: the limit named then is exact. */
+START_TEST(a_limit_of_memory_is_named_and_kept)
+{
+    twin t;
+    unsigned exact = 0;
+    ebpo_subtree_options options = with_corners();
+    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 120, 80), USUAL, 6, EBPO_CODEC_ZSTD);
     twin_make(&t, file);
     for (int level = 0; level < 3; level++)
         for (uint64_t k = 0; k < t.count[level]; k++) {
-            ebpo_subtree *subtree = NULL;
             if (t.node[level][k].type != EBPO_GRAY)
                 continue;
-            options.memory = 1;
-            ck_assert_int_eq(ebpo_subtree_open(file, t.node[level][k].octcode, &options, &subtree,
-                                               &error),
-                             EBPO_E_LIMIT);
-            const char *named = strstr(error.message, "allowed; ");
-            ck_assert_ptr_nonnull(named);
-            options.memory = strtoull(named + strlen("allowed; "), NULL, 10);
+            uint64_t octcode = t.node[level][k].octcode, named = named_limit(file, octcode, 1);
+            options.memory = named;
             check_subtree(&t, file, &t.node[level][k], &options);
-            options.memory--;
-            ck_assert_int_eq(ebpo_subtree_open(file, t.node[level][k].octcode, &options, &subtree,
-                                               &error),
-                             EBPO_E_LIMIT);
+            uint64_t less = named_limit(file, octcode, named * 5 / 8);
+            ck_assert_uint_gt(less, named * 5 / 8);
+            ck_assert(level ? less <= named : less == named);
+            ck_assert_uint_eq(named_limit(file, octcode, less), 0);
+            ck_assert(less == named || named_limit(file, octcode, less - 1) == less);
+            exact += less < named;
         }
+    ck_assert_uint_gt(exact, 3);
     twin_free(&t);
     ebpo_close(file);
 }
