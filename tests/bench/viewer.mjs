@@ -2,7 +2,7 @@
 // For each model, a table row: how long until the first picture (median of the rounds) and until the picture has settled, requests and bytes of the model
 // by then, triangles, and what a second visit still fetches. All connections share the line, in turns, as they would.
 // --kbits 5000   --ms 100 (round trip)   --rounds 9   --pictures FOLDER (of the settled page)   --query TEXT (more of the address)   --sources (not bundled)
-// --viewer ROOT (another checkout)
+// --viewer ROOT (another checkout)   --near 0.03 (a row more: a click's distance, then the camera so many of the box's diagonals from the point clicked)
 import { spawn } from 'node:child_process';
 import { existsSync, mkdtempSync, readFileSync, rmSync, symlinkSync } from 'node:fs';
 import { connect, createServer } from 'node:net';
@@ -10,7 +10,7 @@ import { tmpdir } from 'node:os';
 import { basename, join, resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
 
-const options = { kbits: 5000, ms: 100, rounds: 9, pictures: undefined, query: '', sources: false, viewer: resolve(import.meta.dirname ?? new URL('.', import.meta.url).pathname, '../..') }, models = [];
+const options = { kbits: 5000, ms: 100, rounds: 9, pictures: undefined, query: '', sources: false, near: 0, viewer: resolve(import.meta.dirname ?? new URL('.', import.meta.url).pathname, '../..') }, models = [];
 for (let i = 2; i < process.argv.length; i++) {
   const name = process.argv[i].startsWith('--') ? process.argv[i].slice(2) : undefined;
   if (!name)
@@ -124,14 +124,44 @@ const WATCH = `{
 async function visit(page, address) {
   await page.goto(address, { waitUntil: 'commit' });
   await page.waitForFunction(() => window.firstPicture, undefined, { timeout: 120000, polling: 50 });
-  const first = await page.evaluate(() => window.firstPicture), settledAt = Date.now();
-  for (let idle = 0; idle < 10 && Date.now() - settledAt < 180000;) {
-    await page.waitForTimeout(100);
-    idle = await page.evaluate(() => window.ebpoViewer.state.idle) ? idle + 1 : 0;
-  }
+  const first = await page.evaluate(() => window.firstPicture);
+  await settle(page);
   const { settled, state } = await page.evaluate(() => ({ settled: performance.now(), state: window.ebpoViewer.state }));
   await page.waitForTimeout(200); // nginx writes its log when an answer is out
   return { first, settled: settled - 1000, stats: state.stats, ...traffic() };
+}
+
+// A click in the middle until its distance is exact, then a close-up of that point until it has settled.
+async function closeUp(page) {
+  const { width, height } = page.viewportSize(), began = Date.now();
+  await page.mouse.click(width / 2 - 155, height / 2);
+  await page.waitForFunction(() => window.ebpoViewer.state.probe?.exact, undefined, { timeout: 120000, polling: 20 });
+  const clicked = Date.now() - began;
+  await page.waitForTimeout(200);
+  const click = traffic(), moved = Date.now();
+  await page.evaluate((near) => {
+    const { scene, place, state } = window.ebpoViewer, at = state.probe.nearest.map((x, k) => (x - place.center[k]) * place.scale);
+    const eye = scene.camera.position.toArray(), away = eye.map((x, k) => x - at[k]), length = Math.hypot(...away);
+    scene.controls.target.set(...at);
+    scene.camera.position.set(...at.map((x, k) => x + away[k] / length * 2 * near));
+    scene.controls.update();
+  }, options.near);
+  await settle(page);
+  const settled = Date.now() - moved - 1000;
+  await page.waitForTimeout(200);
+  const view = traffic(), stats = await page.evaluate(() => window.ebpoViewer.state.stats);
+  const memory = await page.evaluate(() => performance.measureUserAgentSpecificMemory?.().then((m) => m.bytes).catch(() => 0));
+  console.log(`  click: ${seconds(clicked)} s, ${click.requests} requests, ${kilo(click.bytes)} KB; close-up from ${options.near}: ${seconds(settled)} s, ${view.requests} requests, ${kilo(view.bytes)} KB, `
+    + `${stats.triangles} triangles, ${stats.meshTriangles} of them real faces${memory ? `, ${kilo(memory / 1000)} MB` : ''}`);
+}
+
+async function settle(page) {
+  const began = Date.now();
+  await page.waitForTimeout(200);
+  for (let idle = 0; idle < 10 && Date.now() - began < 180000;) {
+    await page.waitForTimeout(100);
+    idle = await page.evaluate(() => window.ebpoViewer.state.idle) ? idle + 1 : 0;
+  }
 }
 
 const median = (list) => [...list].sort((a, b) => a - b)[list.length >> 1];
@@ -148,6 +178,11 @@ async function measure(browser, site, model) {
     if (round === 0) {
       if (options.pictures)
         await page.screenshot({ path: join(options.pictures, basename(model).replace('.ebpo.h5', '.png')) });
+      if (options.near) {
+        await closeUp(page);
+        if (options.pictures)
+          await page.screenshot({ path: join(options.pictures, basename(model).replace('.ebpo.h5', '_near.png')) });
+      }
       await page.goto('about:blank');
       again = await visit(page, address);
     }

@@ -16,6 +16,10 @@ convert() { out=$1; shift; "$EBPO_TOOL" convert -q "$@" \
 convert ring --with leaf-planes "$work/ring.ply"
 convert ring_without_mesh --without mesh "$work/ring.ply"
 convert ring_deflate --codec deflate --leaf-faces 4 "$work/ring.ply"
+"$generate" --base torus --faces 20000 "$work/ring2.ply"
+convert ring_blocks --leaf-faces 1 --subtree-faces none "$work/ring2.ply"
+convert ring_subtrees --leaf-faces 4 --subtree-faces 200 --with leaf-planes "$work/ring.ply"
+convert ring_subtrees_bare --subtree-faces 500 --codec none --without maps "$work/ring.ply"
 convert cube --with leaf-planes --max-level 4 --leaf-faces 0 "$work/quads.ply"
 for solid in cavity overlapping_cubes inside_out_cube zero_area_face repeated_faces mobius; do \
     convert $solid "$work/$solid.ply" 2>/dev/null; done

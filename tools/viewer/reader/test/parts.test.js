@@ -123,9 +123,9 @@ for (const path of files) {
     const plain = plainTree(await all.levels(0, all.info.level_count - 1, { faces: true })), mesh = await all.mesh(), { info } = all;
     for (const cacheBytes of [1 << 26, 5000]) {
       const file = await openEbpo(bytes, { cacheBytes }), tree = await grown(file, (t, nodes) => growForQuestion(file, t, nodes)), leaves = leavesOf(tree);
-      const step = Math.ceil(leaves.length / 20);
+      const step = Math.ceil(leaves.length / 8);
       for (let i = 0; i < leaves.length; i += step) {
-        const some = leaves.slice(i, i + Math.min(step, 300)), faces = await file.leafFaces(some);
+        const some = leaves.slice(i, i + Math.min(step, 100)), faces = await file.leafFaces(some);
         some.forEach((leaf, k) => {
           const numbers = find(tree, leaf, plain).faces;
           assert.deepEqual([...faces[k].numbers], numbers);
@@ -147,7 +147,7 @@ for (const path of files) {
     whole.add((await file.levels(0, 0))[0]);
     const full = new Tree(file.info), all = await openEbpo(bytes);
     (await all.levels(0, all.info.level_count - 1)).forEach((level) => full.add(level));
-    for (const p of await points(file, Math.max(6, Math.min(60, Math.floor(2e6 / file.info.face_count))))) {
+    for (const p of await points(file, Math.max(6, Math.min(40, Math.floor(5e5 / file.info.face_count))))) {
       const { near, where } = await ask(file, whole, p), old = await ask(all, full, p);
       let best = Infinity;
       for (let at = 0; at < corners.length && !path.startsWith(passed); at += 9) // vectors' faces do not lie where their trees say

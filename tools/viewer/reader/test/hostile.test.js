@@ -1,0 +1,131 @@
+// Tables of subtrees and lists of places that lie: an error that names the object, or the right answer, and never anything else.
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import test from 'node:test';
+import { fletcher32 } from '../chunk.js';
+import { EbpoError, openEbpo } from '../index.js';
+import { readPlaces } from '../places.js';
+import { readAll } from './as_json.js';
+
+const original = readFileSync(new URL('../../../../format-spec/vectors/passed/15_subtrees_unfiltered.ebpo.h5', import.meta.url));
+const good = await openEbpo(original);
+await good.locate();
+const { info } = good, below = info.level_count - 1 - info.subtree_level;
+
+// A copy in which a chunk was changed, with the checksum that it then has.
+function changed(path, change, chunk = 0) {
+  const bytes = Buffer.from(original), { at, bytes: length } = good.arrays.get(path).chunks[chunk], data = bytes.subarray(at, at + length - 4);
+  change(data);
+  bytes.writeUInt32LE(fletcher32(data), at + length - 4);
+  return bytes;
+}
+
+// Everything that is read by subtree.
+async function readBySubtree(bytes) {
+  const file = await openEbpo(bytes, { name: 'a' }), numbers = Array.from({ length: info.levels[info.subtree_level].gray }, (_, i) => i);
+  await file.locate();
+  const found = await file.subtrees(numbers), drawn = await file.nodeParts(found.map(({ level, part }) => ({ level, part })));
+  const leaves = found.flatMap(({ level, part, segment }) => Array.from({ length: [...segment.types].reduce((n, t) => n + [0, 1, 2, 3, 4, 5, 6, 7].filter((o) => (t >> 2 * o & 3) === 2).length, 0) },
+    (_, i) => ({ level, subtree: part, rank: segment.first[2] + i })));
+  const faces = await file.leafFaces(leaves);
+  return JSON.stringify([found.map(({ segment }) => [...segment.types]), drawn.map((s) => [...s.planes ?? []]), faces.map((f) => [...f, ...f.numbers])]);
+}
+
+async function refused(bytes, said, read = readBySubtree) {
+  await assert.rejects(read(bytes), (error) => {
+    assert.ok(error instanceof EbpoError, error.stack);
+    assert.equal(error.code, 'FORMAT');
+    assert.match(error.message, said);
+    return true;
+  });
+}
+
+// The list of a file with arrays of several chunks, as pairs of bytes and number.
+const many = await openEbpo(readFileSync(new URL('../../../../format-spec/vectors/passed/16_many_subtrees.ebpo.h5', import.meta.url)));
+const list = many.arrays.get('/subtrees/places'), arrays = [...many.arrays.values()].filter((a) => a !== list), [stored] = await Promise.all(many.store.cache.decoded([{ array: list, chunk: 0 }]));
+const placed = (change) => {
+  const rows = new Uint32Array(stored.slice().buffer);
+  change(rows, rows.length - 2);
+  return readPlaces(rows, arrays, many.source.size);
+};
+
+test('places: a chunk too many, too few, too large, beyond the end, elsewhere', async () => {
+  assert.deepEqual([...placed(() => {}).values()].map((chunks) => chunks.length), arrays.map((a) => a.chunkCount));
+  const wrong = (change, said) => assert.throws(() => placed(change), (error) => error instanceof EbpoError && error.code === 'FORMAT' && said.test(error.message));
+  wrong((rows) => (rows[3] = rows[1]), /\/subtrees\/places: .*more chunks/);
+  wrong((rows, last) => (rows[last + 1] = 70000), /\/subtrees\/places: .*fewer chunks/);
+  wrong((rows, last) => (rows[last] = 2 ** 32 - 1), /\/subtrees\/places: a chunk reaches beyond the end/);
+  wrong((rows) => (rows[6] += 1), /\/subtrees\/places: .*lies elsewhere/);
+  wrong((rows) => (rows[6] = 0), /\/subtrees\/places: .*size that it cannot have/);
+  wrong((rows) => (rows[6] = 100000), /\/subtrees\/places: .*size that it cannot have/);
+  wrong((rows) => rows.fill(70000), /\/subtrees\/places: the chunks of level 0 are not in it/);
+  await many.locate();
+  for (const [array, chunks] of placed(() => {}))
+    assert.deepEqual(chunks, array.chunks.map(({ at, bytes }) => ({ at, bytes })), array.path);
+});
+
+test('places that say that they are stale are not used', async () => {
+  const bytes = many.source.data;
+  async function placesOf(change) {
+    const file = await openEbpo(bytes), { attributes } = file.arrays.get('/subtrees/places').object;
+    change(attributes);
+    let reads = 0;
+    const { cache } = file.store, decoded = cache.decoded.bind(cache);
+    cache.decoded = (wanted) => (reads += wanted.length) && decoded(wanted);
+    await file.locate();
+    return { where: [...file.arrays.values()].map((x) => x.chunks.map((c) => c.at)), reads };
+  }
+  const { where: right, reads: once } = await placesOf(() => {});
+  assert.equal(once, 1);
+  for (const name of ['file_bytes', 'offset'])
+    for (const change of [(a) => a.set(name, { ...a.get(name), data: Uint8Array.from(a.get(name).data, (byte, i) => byte ^ (i === 0)) }), (a) => a.delete(name)]) {
+      const { where, reads } = await placesOf(change);
+      assert.equal(reads, 0);
+      assert.deepEqual(where, right);
+    }
+});
+
+test('counts that do not add up, in each column', async () => {
+  const cols = 6 + 7 * below;
+  for (let column = 0; column < cols; column++)
+    for (const by of [1, 2 ** 31]) {
+      const bytes = changed('/subtrees/counts', (data) => data.writeUInt32LE((data.readUInt32LE(4 * column) + by) >>> 0, 4 * column));
+      if (![0, 2].includes(column) && !(column >= 6 && column % 7 === 5)) // what lies before, and ends, have no sum in the head
+        await refused(bytes, /\/subtrees\/counts: /);
+      else
+        await readBySubtree(bytes).then((found) => assert.ok(found), (error) => assert.ok(error instanceof EbpoError, error.stack));
+    }
+});
+
+test('counts of which one subtree has what another should', async () => {
+  const cols = 6 + 7 * below, move = (column, from, to) => changed('/subtrees/counts', (data) => [[from, -1], [to, 1]].forEach(([row, by]) => {
+    const at = 4 * (row * cols + column), value = data.readUInt32LE(at);
+    data.writeUInt32LE((value + by) >>> 0, at);
+  }));
+  for (const column of [6, 7, 8, 9, 11, 13])
+    for (const [from, to] of [[0, 1], [1, 0]]) {
+      const bytes = move(column, from, to);
+      await readBySubtree(bytes).then((found) => assert.fail(`column ${column} is believed: ${found.length}`), (error) => assert.ok(error instanceof EbpoError, error.stack));
+    }
+});
+
+test('an index that does not begin with 0', () => refused(changed('/subtrees/index', (data) => data.writeUInt32LE(1, 8)), /\/subtrees\/index: its first row is not 0/));
+
+test('500 changes of the tables at random: an error, or the same', async () => {
+  const right = await readBySubtree(original);
+  let state = 3, errors = 0;
+  const random = (n) => Math.floor((state = (state * 48271) % 2147483647) / 2147483647 * n);
+  for (let i = 0; i < 500; i++) {
+    const path = ['/subtrees/counts', '/subtrees/index'][i % 2];
+    const bytes = changed(path, (data) => {
+      for (let k = random(3); k >= 0; k--)
+        data[random(data.length)] ^= 1 << random(8);
+    });
+    const found = await readBySubtree(bytes).catch((error) => assert.ok(error instanceof EbpoError, error.stack) ?? errors++);
+    if (typeof found === 'string')
+      assert.equal(found, right, `${path}, change ${i}`);
+  }
+  assert.ok(errors > 400, String(errors));
+});
+
+test('the whole file is read alike', async () => assert.ok((await readAll(original, 'a')).levels.length));
