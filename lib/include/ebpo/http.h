@@ -115,12 +115,14 @@ typedef struct ebpo_http_options {
      * many. Blocks of other sizes are not found. 0: 32 KiB.
      */
     unsigned cache_block;
+
+    uint32_t reserved;
 } ebpo_http_options;
 
-#define EBPO_HTTP_OPTIONS_INIT                                                                \
-    {                                                                                         \
-        sizeof(ebpo_http_options), 15, 20, 120, 5, 6, UINT64_C(48) << 20, UINT64_C(64) << 20, \
-            false, true, NULL, NULL, NULL, NULL, NULL, NULL, UINT64_C(1) << 30, NULL, NULL, 0 \
+#define EBPO_HTTP_OPTIONS_INIT                                                                   \
+    {                                                                                            \
+        sizeof(ebpo_http_options), 15, 20, 120, 5, 6, UINT64_C(48) << 20, UINT64_C(64) << 20,    \
+            false, true, NULL, NULL, NULL, NULL, NULL, NULL, UINT64_C(1) << 30, NULL, NULL, 0, 0 \
     }
 
 /* Sums since opening. */
