@@ -3,7 +3,7 @@
 after a change of library or file, and beside HDF5's ros3 driver and h5wasm.
 
     tests/bench/remote.py BUILD_DIR LARGE.ebpo.h5 SMALL.ebpo.h5
-        --before BUILD_DIR LARGE.ebpo.h5 SMALL.ebpo.h5 --ply LARGE.ply -o docs/measured/remote.md
+        --before BUILD_DIR LARGE.ebpo.h5 SMALL.ebpo.h5 --ply SMALL.ply -o docs/measured/remote.md
         [--json FILE [--only PATTERN]]
 
 BUILD_DIR: release builds inside their checkouts, whose viewers are measured, too. The files hold
@@ -53,8 +53,8 @@ class Measurements:
         try:
             self.found[name] = measure()
         except (subprocess.CalledProcessError, RuntimeError, measured.Failed) as error:
-            said = (getattr(error, "stderr", None) or str(error)).strip().splitlines()
-            print(f"remote.py: {name}: {said[-1] if said else error}", file=sys.stderr)
+            said = (getattr(error, "stderr", None) or str(error)).strip()
+            print(f"remote.py: {name}: {said}", file=sys.stderr)
             self.found.pop(name, None)
         if self.path:
             self.path.write_text(json.dumps(self.found, indent=1))
