@@ -165,6 +165,7 @@ def parse():
     parser.add_argument("--ply", type=pathlib.Path)
     parser.add_argument("--json")
     parser.add_argument("--only")
+    parser.add_argument("--note", help="a sentence for the page")
     parser.add_argument("-o", "--output", required=True)
     return parser.parse_args()
 
@@ -194,7 +195,7 @@ def main():
         measure_drivers(results.take, sides[-1], server, work)
     if options.ply and options.before:
         results.take("build", lambda: build_in_turns([sides[0], sides[-1]], options.ply, work))
-    page = remote_page.made(results.found, command_of(options), programs)
+    page = remote_page.made(results.found, command_of(options), programs, options.note)
     pathlib.Path(options.output).write_text(page)
 
 

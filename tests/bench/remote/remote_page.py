@@ -201,7 +201,7 @@ def driver_tables(page, found):
                 for latency, reader, first, last in found.found.get("drivers/latency", [])])
 
 
-def made(results, command, programs):
+def made(results, command, programs, note):
     page, found = Page(), Found(results)
     load = results.get("load", {}).values()
     page.text("# Files on web servers: measured", "",
@@ -209,14 +209,18 @@ def made(results, command, programs):
               f"Debian's h5py with our plugin, all on one machine: {measured.machine()}; its "
               f"load average meanwhile {figure(statistics.median(load))} (median), "
               f"{figure(max(load))} (most). Requests, bytes and waves are exact; times are to be "
-              "compared within a row.", "",
+              "compared within a row, and roughly: rows were measured in several runs (`--json`, "
+              "`--only`).", "",
               "The large model: `ebpo-generate --base lucy100k.ply --subdivide 4 lucy28.ply` "
               "(25,592,320 faces), the small one: `ebpo-generate --base igea.ply --subdivide 2 "
               "igea4.ply` (4,298,976 faces).")
+    if note:
+        page.text(note)
     goal_table(page, found)
     question_tables(page, found)
     viewer_table(page, found)
     local_table(page, found)
     size_table(page, found)
-    driver_tables(page, found)
+    if found.found.get("drivers/latency"):
+        driver_tables(page, found)
     return "\n".join(page.lines).rstrip() + "\n"
