@@ -99,7 +99,73 @@ static uint64_t level_sum(const ebpo_chunks *chunks, const ebpo_subtree_row *row
     return row->before[ebpo_subtree_column(&chunks->file->info, level, what)];
 }
 
+/* What the row says that the subtree has. */
+static uint64_t level_has(const ebpo_chunks *chunks, const ebpo_subtree_row *row, int level,
+                          unsigned what)
+{
+    return row->after[ebpo_subtree_column(&chunks->file->info, level, what)] -
+           level_sum(chunks, row, level, what);
+}
+
 static const char *const contradicts = "the index contradicts the counts in the head";
+
+/* Rows that add up may still tell a subtree what is another's: its own nodes are counted. */
+static ebpo_status row_lies(const ebpo_chunks *chunks, ebpo_error *error)
+{
+    return ebpo_chunks_fail(chunks, -1, EBPO_A_SUBTREE_COUNTS,
+                            "a row contradicts the nodes of its subtree", error);
+}
+
+static ebpo_status check_types(ebpo_chunks *chunks, int level, const ebpo_subtree_row *row,
+                               ebpo_error *error)
+{
+    const ebpo_info *info = &chunks->file->info;
+    uint64_t from = ebpo_subtree_groups(info, row, level, false),
+             to = ebpo_subtree_groups(info, row, level, true), counts[4];
+    ebpo_status status = ebpo_ranks_count_file(chunks, level, from, to - from, counts, error);
+    if (status != EBPO_OK)
+        return status;
+    return counts[EBPO_GRAY] == level_has(chunks, row, level, EBPO_S_GRAY) &&
+                   counts[EBPO_LEAF] == level_has(chunks, row, level, EBPO_S_LEAF) &&
+                   counts[EBPO_BLACK] == level_has(chunks, row, level, EBPO_S_BLACK)
+               ? EBPO_OK
+               : row_lies(chunks, error);
+}
+
+/* A list: `id` has the counts of the nodes that `nodes` counts. */
+static ebpo_status check_list(ebpo_chunks *chunks, int level, const ebpo_subtree_row *row,
+                              ebpo_array_id id, unsigned nodes, unsigned what, ebpo_error *error)
+{
+    uint64_t sum = 0;
+    ebpo_status status = ebpo_chunks_sum(chunks, id, level, level_sum(chunks, row, level, nodes),
+                                         level_has(chunks, row, level, nodes), &sum, error);
+    return status != EBPO_OK || sum == level_has(chunks, row, level, what)
+               ? status
+               : row_lies(chunks, error);
+}
+
+/* The end of the leaves' faces, and whether these are among the subtree's. */
+static ebpo_status check_ends(ebpo_chunks *chunks, int level, const ebpo_subtree_row *row,
+                              ebpo_error *error)
+{
+    uint64_t first = level_sum(chunks, row, level, EBPO_S_LEAF),
+             leaves = level_has(chunks, row, level, EBPO_S_LEAF),
+             grown = level_has(chunks, row, level, EBPO_S_ENDS),
+             begin = level_sum(chunks, row, level, EBPO_S_ENDS), gap = 0, skip = 0, fresh = 0;
+    if (leaves == 0)
+        return grown ? row_lies(chunks, error) : EBPO_OK;
+    ebpo_status status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_SKIP, level, first, 1, &gap, error);
+    if (status == EBPO_OK)
+        status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_SKIP, level, first, leaves, &skip, error);
+    if (status == EBPO_OK)
+        status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_NEW, level, first, leaves, &fresh, error);
+    if (status != EBPO_OK)
+        return status;
+    uint64_t has = row->after[EBPO_S_FACES] - row->before[EBPO_S_FACES];
+    return skip + fresh == grown && begin + gap >= row->face && begin + grown <= row->face + has
+               ? EBPO_OK
+               : row_lies(chunks, error);
+}
 
 ebpo_status ebpo_ranks_check(const ebpo_chunks *chunks, int level, const uint64_t ranks[4],
                              const uint64_t counts[4], ebpo_error *error)
@@ -127,12 +193,13 @@ static ebpo_status ranks_of_subtree(ebpo_chunks *chunks, int level, uint64_t gro
               : find_subtree(chunks, level - 1, EBPO_S_GRAY, group, &row, error);
     if (status != EBPO_OK)
         return status;
+    status = check_types(chunks, level, &row, error);
     *from = ebpo_subtree_groups(info, &row, level, false);
     ranks[EBPO_GRAY] = level_sum(chunks, &row, level, EBPO_S_GRAY);
     ranks[EBPO_LEAF] = level_sum(chunks, &row, level, EBPO_S_LEAF);
     ranks[EBPO_BLACK] = level_sum(chunks, &row, level, EBPO_S_BLACK);
     ranks[EBPO_WHITE] = 8 * *from - ranks[EBPO_GRAY] - ranks[EBPO_LEAF] - ranks[EBPO_BLACK];
-    return EBPO_OK;
+    return status;
 }
 
 ebpo_status ebpo_ranks_before(ebpo_chunks *chunks, int level, uint64_t group, uint64_t ranks[4],
@@ -160,6 +227,9 @@ ebpo_status ebpo_ranks_planes(ebpo_chunks *chunks, int level, uint64_t gray, uin
     ebpo_status status;
     if (ebpo_subtree_table_has(chunks->file, level)) {
         status = find_subtree(chunks, level, EBPO_S_GRAY, gray, &row, error);
+        if (status == EBPO_OK)
+            status = check_list(chunks, level, &row, EBPO_A_PLANE_COUNTS, EBPO_S_GRAY,
+                                EBPO_S_PLANES, error);
         if (status != EBPO_OK)
             return status;
         from = level_sum(chunks, &row, level, EBPO_S_GRAY);
@@ -176,14 +246,21 @@ ebpo_status ebpo_ranks_planes(ebpo_chunks *chunks, int level, uint64_t gray, uin
     return status;
 }
 
-/* What leaf_index says, or the table; of the leaf `*from`. */
-static ebpo_status leaf_row(ebpo_chunks *chunks, int level, uint64_t leaf, uint64_t row[3],
-                            uint64_t *from, ebpo_error *error)
+/* What leaf_index says, or the table; of the leaf `*from`. `faces`: of these, else of planes. */
+static ebpo_status leaf_row(ebpo_chunks *chunks, int level, uint64_t leaf, bool faces,
+                            uint64_t row[3], uint64_t *from, ebpo_error *error)
 {
     ebpo_subtree_row subtree;
     if (!ebpo_subtree_table_has(chunks->file, level))
         return index_row(chunks, EBPO_A_LEAF_INDEX, level, leaf, 3, row, error);
     ebpo_status status = find_subtree(chunks, level, EBPO_S_LEAF, leaf, &subtree, error);
+    if (status == EBPO_OK)
+        status = faces ? check_list(chunks, level, &subtree, EBPO_A_LEAF_REF_COUNT, EBPO_S_LEAF,
+                                    EBPO_S_REFS, error)
+                       : check_list(chunks, level, &subtree, EBPO_A_LEAF_PLANE_COUNTS, EBPO_S_LEAF,
+                                    EBPO_S_LEAF_PLANES, error);
+    if (status == EBPO_OK && faces)
+        status = check_ends(chunks, level, &subtree, error);
     if (status != EBPO_OK)
         return status;
     *from = level_sum(chunks, &subtree, level, EBPO_S_LEAF);
@@ -199,7 +276,7 @@ ebpo_status ebpo_ranks_leaf(ebpo_chunks *chunks, int level, uint64_t leaf, uint6
     const ebpo_info *info = &chunks->file->info;
     uint64_t row[3], skip = 0, fresh = 0, listed = 0,
                      from = leaf / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS;
-    ebpo_status status = leaf_row(chunks, level, leaf, row, &from, error);
+    ebpo_status status = leaf_row(chunks, level, leaf, true, row, &from, error);
     if (status == EBPO_OK)
         status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_SKIP, level, from, leaf - from, &skip, error);
     if (status == EBPO_OK)
@@ -225,7 +302,7 @@ ebpo_status ebpo_ranks_leaf_planes(ebpo_chunks *chunks, int level, uint64_t leaf
 {
     uint64_t row[3], sum = 0, from = leaf / EBPO_INDEX_ROWS * EBPO_INDEX_ROWS,
                      all = chunks->file->info.level[level].leaf_plane_count;
-    ebpo_status status = leaf_row(chunks, level, leaf, row, &from, error);
+    ebpo_status status = leaf_row(chunks, level, leaf, false, row, &from, error);
     if (status == EBPO_OK)
         status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_PLANE_COUNTS, level, from, leaf - from, &sum,
                                  error);

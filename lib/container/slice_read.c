@@ -185,6 +185,31 @@ static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
     return EBPO_OK;
 }
 
+static bool is_subtree(const ebpo_chunks *chunks, const extent *x, const ebpo_node *root)
+{
+    const ebpo_info *info = &chunks->file->info;
+    /* of fewer levels the table does not tell the faces */
+    return info->subtree_level && root->cell.level == info->subtree_level &&
+           root->type == EBPO_GRAY && x->end == info->level_count;
+}
+
+/* The leaves' faces are those that the table gives the subtree. */
+static ebpo_status check_own_faces(const ebpo_slice *slice, ebpo_chunks *chunks, const extent *x,
+                                   ebpo_error *error)
+{
+    ebpo_subtree_row row;
+    if (!is_subtree(chunks, x, &slice->root))
+        return EBPO_OK;
+    ebpo_status status = ebpo_subtree_table_row(chunks, slice->root.rank, &row, error);
+    if (status != EBPO_OK)
+        return status;
+    uint64_t has = row.after[EBPO_S_FACES] - row.before[EBPO_S_FACES];
+    return has == slice->face_count && (has == 0 || row.face == slice->first_face)
+               ? EBPO_OK
+               : ebpo_chunks_fail(chunks, -1, EBPO_A_SUBTREE_COUNTS,
+                                  "a row contradicts the faces of its subtree", error);
+}
+
 static ebpo_status read_extent(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_node *root,
                                const extent *x, ebpo_error *error)
 {
@@ -218,6 +243,8 @@ ebpo_status ebpo_slice_read_parts(ebpo_slice *out, ebpo_chunks *chunks, const eb
     ebpo_status status = read_extent(out, chunks, root, &x, error);
     if (status == EBPO_OK)
         status = walk_group(&w, 0, error);
+    if (status == EBPO_OK)
+        status = check_own_faces(out, chunks, &x, error);
     if (status == EBPO_OK)
         status = ebpo_slice_take_faces(out, chunks, needs & EBPO_NEEDS_MAPS, error);
     if (status != EBPO_OK)
@@ -296,14 +323,6 @@ static ebpo_status measure_subtree(ebpo_chunks *chunks, const extent *x, uint64_
     if (status == EBPO_OK && x->needs & EBPO_NEEDS_MESH)
         out->new_faces += row.after[EBPO_S_FACES] - row.before[EBPO_S_FACES];
     return status;
-}
-
-static bool is_subtree(const ebpo_chunks *chunks, const extent *x, const ebpo_node *root)
-{
-    const ebpo_info *info = &chunks->file->info;
-    /* of fewer levels the table does not tell the faces */
-    return info->subtree_level && root->cell.level == info->subtree_level &&
-           root->type == EBPO_GRAY && x->end == info->level_count;
 }
 
 ebpo_status ebpo_slice_measure_nodes(ebpo_chunks *chunks, const ebpo_node *root, uint32_t needs,
