@@ -499,7 +499,8 @@ boot.said.splice(0).forEach((data) => worker.onmessage({ data }));
 /** For tests and for the curious: what is shown. */
 window.ebpoViewer = {
   get state() {
-    return { idle: state.idle, depth: state.depth, stats: state.stats, traffic: state.traffic, timeline: state.timeline, shownAfter: state.shownAfter, probe: state.probe, error: state.error, line: state.line,
+    return { idle: state.idle, depth: state.depth, stats: state.stats, traffic: state.traffic, timeline: state.timeline, shownAfter: state.shownAfter, probe: state.probe,
+      error: state.error, line: state.line,
       levels: state.info?.levels.length, walls: scene.walls, calls: state.calls };
   },
   get place() {

@@ -24,7 +24,8 @@ page = replace(page, /<script type="importmap">[^]*?<\/script>\n/.exec(page)[0],
 
 const { outputFiles } = await build({ entryPoints: ['app.js', 'worker.js'].map((name) => join(here, name)), outdir: folder, bundle: true, minify: true, format: 'esm', target: TARGET,
   external: ['node:*'], legalComments: 'eof', write: false, logLevel: 'warning' });
-const files = new Map([['index.html', Buffer.from(page)], ['icon.svg', Buffer.from(read('icon.svg'))], ...outputFiles.map((f) => [f.path.slice(f.path.lastIndexOf('/') + 1), Buffer.from(f.contents)])]);
+const files = new Map([['index.html', Buffer.from(page)], ['icon.svg', Buffer.from(read('icon.svg'))], 
+  ...outputFiles.map((f) => [f.path.slice(f.path.lastIndexOf('/') + 1), Buffer.from(f.contents)])]);
 mkdirSync(folder, { recursive: true });
 for (const [name, bytes] of files) {
   writeFileSync(join(folder, name), bytes);

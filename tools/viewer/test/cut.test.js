@@ -127,7 +127,8 @@ const inside = (p, u, v) => {
 };
 
 test('a convex polygon without another: every point is in one piece or hidden', () => {
-  const square = [0, 0, 1, 0, 1, 1, 0, 1], cases = [[0.2, 0.2, 0.7, 0.3, 0.5, 0.9], [-1, -1, 2, -1, 2, 0.5, -1, 0.5], [0.5, 0.9, 0.7, 0.3, 0.2, 0.2], [2, 2, 3, 2, 3, 3], [-1, -1, 2, -1, 2, 2, -1, 2]];
+  const square = [0, 0, 1, 0, 1, 1, 0, 1];
+  const cases = [[0.2, 0.2, 0.7, 0.3, 0.5, 0.9], [-1, -1, 2, -1, 2, 0.5, -1, 0.5], [0.5, 0.9, 0.7, 0.3, 0.2, 0.2], [2, 2, 3, 2, 3, 3], [-1, -1, 2, -1, 2, 2, -1, 2]];
   for (const q of cases) {
     const pieces = subtract([square], q);
     for (let i = 0; i < 400; i++) {
@@ -152,7 +153,10 @@ test('walls: what is hidden is hidden by a neighbour, and by nothing else', asyn
       return false;
     let n = tree.root;
     while (!drawn.has(n) && tree.children(n))
-      n = tree.children(n)[[0, 1, 2].reduce((o, k) => o | (k === axis ? (side ? x[k] >= (2 * n.at[k] + 1) / 2 ** (n.level + 1) : x[k] > (2 * n.at[k] + 1) / 2 ** (n.level + 1)) : x[k] >= (2 * n.at[k] + 1) / 2 ** (n.level + 1)) << k, 0)];
+      n = tree.children(n)[[0, 1, 2].reduce((o, k) => {
+        const middle = (2 * n.at[k] + 1) / 2 ** (n.level + 1);
+        return o | (k === axis && !side ? x[k] > middle : x[k] >= middle) << k;
+      }, 0)];
     if (n.type === BLACK)
       return true;
     const p = tree.polytope(n), f = [...sidesOf(p)].indexOf(2 * axis + 1 - side), at = (k) => x[k] * 2 ** n.level - n.at[k];

@@ -1,4 +1,4 @@
-// The viewer in a headless Chromium over a slow line: viewer.mjs [OPTION VALUE ...] MODEL.ebpo.h5 ...
+// The viewer in a headless Chromium over a slow line: viewer_line.mjs [OPTION VALUE ...] MODEL.ebpo.h5 ...
 // For each model, a table row: how long until the first picture (median of the rounds) and until the picture has settled, requests and bytes of the model
 // by then, triangles, and what a second visit still fetches. All connections share the line, in turns, as they would.
 // --kbits 5000   --ms 100 (round trip)   --rounds 9   --pictures FOLDER (of the settled page)   --query TEXT (more of the address)   --sources (not bundled)
@@ -10,7 +10,8 @@ import { tmpdir } from 'node:os';
 import { basename, join, resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
 
-const options = { kbits: 5000, ms: 100, rounds: 9, pictures: undefined, query: '', sources: false, near: 0, viewer: resolve(import.meta.dirname ?? new URL('.', import.meta.url).pathname, '../..') }, models = [];
+const options = {
+  kbits: 5000, ms: 100, rounds: 9, pictures: undefined, query: '', sources: false, near: 0, viewer: resolve(import.meta.dirname ?? new URL('.', import.meta.url).pathname, '../..') }, models = [];
 for (let i = 2; i < process.argv.length; i++) {
   const name = process.argv[i].startsWith('--') ? process.argv[i].slice(2) : undefined;
   if (!name)
@@ -151,7 +152,8 @@ async function closeUp(page) {
   await page.waitForTimeout(200);
   const view = traffic(), stats = await page.evaluate(() => window.ebpoViewer.state.stats);
   const memory = await page.evaluate(() => performance.measureUserAgentSpecificMemory?.().then((m) => m.bytes).catch(() => 0));
-  console.log(`  click: ${seconds(clicked)} s, ${click.requests} requests, ${kilo(click.bytes)} KB; close-up from ${options.near}: ${seconds(settled)} s, ${view.requests} requests, ${kilo(view.bytes)} KB, `
+  console.log(`  click: ${seconds(clicked)} s, ${click.requests} requests, ${kilo(click.bytes)} KB; ` +
+    `close-up from ${options.near}: ${seconds(settled)} s, ${view.requests} requests, ${kilo(view.bytes)} KB, `
     + `${stats.triangles} triangles, ${stats.meshTriangles} of them real faces${memory ? `, ${kilo(memory / 1000)} MB` : ''}`);
 }
 
@@ -199,8 +201,10 @@ try {
   const executablePath = ['/usr/bin/chromium', '/usr/bin/chromium-browser'].find(existsSync);
   const browser = await chromium.launch({ executablePath, args: process.getuid() === 0 ? ['--no-sandbox', ...flags] : flags });
   cleanup.push(() => browser.close());
-  console.log(`${options.kbits} kbit/s, ${options.ms} ms, ${options.rounds} rounds${options.query && ', ' + options.query}${options.sources ? ', not bundled' : ''}; page and model in KB, times in s\n`);
-  console.log('| model | page | first picture | settled | requests | model | triangles | on walls | real faces | again: requests | model | first picture |\n|---|---|---|---|---|---|---|---|---|---|---|---|');
+  console.log(`${options.kbits} kbit/s, ${options.ms} ms, ${options.rounds} rounds${options.query && ', ' + options.query}${options.sources ? ', not bundled' : ''}; ` +
+    'page and model in KB, times in s\n');
+  console.log('| model | page | first picture | settled | requests | model | triangles | on walls | real faces | again: requests | model | first picture |\n' +
+    '|---|---|---|---|---|---|---|---|---|---|---|---|');
   for (const model of models)
     await measure(browser, site, model);
 } catch (error) {
