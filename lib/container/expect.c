@@ -32,10 +32,12 @@ void ebpo_expect_array(ebpo_expected *e, const ebpo_array_in *array)
     ebpo_expect_chunks(e, array, 0, array->present ? ebpo_h5_chunk_count(&array->shape) : 0);
 }
 
-void ebpo_expect_level(ebpo_expected *e, int level)
+void ebpo_expect_level(ebpo_expected *e, int level, uint32_t without)
 {
+    uint32_t needs = ebpo_schema_has(&e->file->info) & ~without;
     for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
-        ebpo_expect_array(e, &e->file->level_array[level][id]);
+        if (ebpo_schema[id].needs & needs)
+            ebpo_expect_array(e, &e->file->level_array[level][id]);
 }
 
 void ebpo_expect_root(ebpo_expected *e, uint32_t needs)
@@ -85,7 +87,7 @@ void ebpo_file_prefetch_levels(const ebpo_file *file, int first, int last)
     ebpo_expected e = EBPO_EXPECTED_INIT(file);
     int end = last < file->info.level_count - 1 ? last : file->info.level_count - 1;
     for (int level = first < 0 ? 0 : first; level <= end; level++)
-        ebpo_expect_level(&e, level);
+        ebpo_expect_level(&e, level, 0);
     ebpo_expect_all(&e);
 }
 
@@ -93,7 +95,7 @@ void ebpo_expect_tree(const ebpo_file *file)
 {
     ebpo_expected e = EBPO_EXPECTED_INIT(file);
     for (int level = 0; level < file->info.level_count; level++)
-        ebpo_expect_level(&e, level);
+        ebpo_expect_level(&e, level, 0);
     ebpo_expect_root(&e, ~0u);
     ebpo_expect_all(&e);
 }

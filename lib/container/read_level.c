@@ -147,15 +147,23 @@ static ebpo_status read_arrays(const ebpo_file *file, int number, ebpo_level *le
                                const ebpo_read_options *options, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
+    uint32_t needs = ebpo_schema_has(&file->info) & ~(uint32_t)options->without;
     for (int id = 0; id < EBPO_LEVEL_ARRAYS && status == EBPO_OK; id++) {
         void *array;
-        if (!ebpo_schema_is_held(id))
+        if (!ebpo_schema_is_held(id) || !(ebpo_schema[id].needs & needs))
             continue;
         status = ebpo_reader_make(file, (ebpo_array_id)id, number, options,
                                   ebpo_schema[id].held_size, &array, error);
         ebpo_level_set_array(level, id, array);
     }
     return status == EBPO_OK ? finish_lists(file, number, level, error) : status;
+}
+
+static void expect_arrays(const ebpo_file *file, int level, uint32_t without)
+{
+    ebpo_expected e = EBPO_EXPECTED_INIT(file);
+    ebpo_expect_level(&e, level, without);
+    ebpo_expect_all(&e);
 }
 
 ebpo_status ebpo_file_read_level(const ebpo_file *file, int level, const ebpo_read_options *options,
@@ -174,15 +182,18 @@ ebpo_status ebpo_file_read_level(const ebpo_file *file, int level, const ebpo_re
                               info->level_count - 1);
     *out = ebpo_level_of_summary(info, level);
     out->workspace = read.workspace;
-    ebpo_file_prefetch_levels(file, level, level);
+    expect_arrays(file, level, (uint32_t)read.without);
     status = read_arrays(file, level, out, &read, error);
-    if (status == EBPO_OK && out->leaf_count)
+    /* what leaf_index says is about the parts that are left out */
+    if (status == EBPO_OK && out->leaf_count && !(read.without & EBPO_NEEDS_MESH_OR_LEAF_PLANES))
         status = finish_leaves(file, level, out, &read, error);
     if (status == EBPO_OK)
         status = check_indexes(file, level, out, error);
     if (status == EBPO_OK) {
         ebpo_check check = ebpo_reader_check(file, out->workspace);
-        status = ebpo_check_level(&check, info, level, out, error);
+        ebpo_info seen = *info;
+        seen.parts &= ~(uint32_t)read.without;
+        status = ebpo_check_level(&check, &seen, level, out, error);
     }
     if (status != EBPO_OK)
         ebpo_level_free(out);

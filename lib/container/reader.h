@@ -25,7 +25,8 @@ typedef struct ebpo_expected {
 void ebpo_expect_chunks(ebpo_expected *expected, const ebpo_array_in *array, uint64_t begin,
                         uint64_t end);
 void ebpo_expect_array(ebpo_expected *expected, const ebpo_array_in *array);
-void ebpo_expect_level(ebpo_expected *expected, int level);
+/* A level's arrays but those of parts that will not be read. */
+void ebpo_expect_level(ebpo_expected *expected, int level, uint32_t without);
 /* The arrays of the root that are there for any of these needs. */
 void ebpo_expect_root(ebpo_expected *expected, uint32_t needs);
 /* Announces the whole file. */

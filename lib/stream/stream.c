@@ -199,6 +199,14 @@ static volumes stated_volumes(const ebpo_stream *s, int level)
 
 /* --- levels --- */
 
+void ebpo_stream_prefetch(const ebpo_stream *s, int last)
+{
+    ebpo_expected e = EBPO_EXPECTED_INIT(s->file);
+    for (int level = s->level + 1; level <= last && level < s->info->level_count; level++)
+        ebpo_expect_level(&e, level, EBPO_PART_MESH);
+    ebpo_expect_all(&e);
+}
+
 ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool *more,
                                    ebpo_error *error)
 {
@@ -210,10 +218,10 @@ ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool 
     ebpo_level *level = &s->kept[next];
     uint64_t parents = next ? s->kept[next - 1].gray_count : 1;
     ebpo_read_options read = ebpo_read_threads(s->options.threads);
+    read.without = EBPO_PART_MESH;
     ebpo_status status = ebpo_file_read_level(s->file, next, &read, level, error);
     if (status != EBPO_OK)
         return status;
-    ebpo_level_drop(level, EBPO_NEEDS_MESH);
     volumes v = stated_volumes(s, next);
     /* the head has been checked: at most all parents */
     uint64_t nodes = next ? 8 * (parents - s->info->level[next - 1].pruned_count) : 1;

@@ -186,6 +186,7 @@ static ebpo_status take_nodes(ebpo_stream *stream, ebpo_error *error)
     bool more = true, another = true;
     ebpo_status status = EBPO_OK;
     while (more && status == EBPO_OK) {
+        ebpo_stream_prefetch(stream, 1);
         status = ebpo_stream_next_level(stream, &level, &more, error);
         for (another = more; another && status == EBPO_OK;)
             status = ebpo_stream_next_node(stream, &node, &another, error);

@@ -184,7 +184,7 @@ static ebpo_status tell(printer *p, ebpo_file *file, const char *path, bool *arr
         print_head(remote_shown(path), p->info);
     }
     int to = p->v->to >= 0 ? (int)p->v->to : last;
-    ebpo_file_prefetch_levels(file, 0, to);
+    ebpo_stream_prefetch(stream, to);
     status = tell_levels(p, stream, to, arrived, error);
     traffic t = traffic_of(file);
     if (p->v->json) {

@@ -589,11 +589,17 @@ typedef struct ebpo_read_options {
 
     /* Owns what is read, and is freed after it; NULL: malloc does. */
     ebpo_workspace *workspace;
+
+    /*
+     * Of levels, bits of ebpo_part that are not read though the file has them: their
+     * arrays are NULL, the counts stay.
+     */
+    uint64_t without;
 } ebpo_read_options;
 
-#define EBPO_READ_OPTIONS_INIT             \
-    {                                      \
-        sizeof(ebpo_read_options), 0, NULL \
+#define EBPO_READ_OPTIONS_INIT                \
+    {                                         \
+        sizeof(ebpo_read_options), 0, NULL, 0 \
     }
 
 /*

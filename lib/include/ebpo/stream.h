@@ -131,6 +131,16 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_stream_new(const ebpo_file *file,
 EBPO_API void ebpo_stream_free(ebpo_stream *stream);
 
 /*
+ * Announces that the stream will be read down to level `last`. A source far away
+ * then fetches these levels with as few requests as it can, where reading one
+ * after the other would ask for each by itself. Cannot fail: what could not be
+ * fetched is told when it is read.
+ *
+ * Threads: one per stream.
+ */
+EBPO_API void ebpo_stream_prefetch(const ebpo_stream *stream, int last);
+
+/*
  * Reads the next level, level 0 first, and nothing deeper. After the last one,
  * *more is false and *out is left alone.
  *
