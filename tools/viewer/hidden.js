@@ -1,7 +1,7 @@
 // What is probably hidden behind nearer nodes, so that it need not be fetched: by a coarse picture of which part of the view is covered, and how far
 // away. A guess, not a test of visibility: what it says only puts off what is fetched.
 const ACROSS = 48, DOWN = 32;
-const COVERED = 1; // times its area, until a tile counts as covered
+const COVERED = 0.8; // times its area, until a tile counts as covered
 
 const dot = (p, [x, y, z, w]) => x * p[0] + y * p[1] + z * p[2] + w;
 
@@ -12,6 +12,7 @@ export class Hidden {
     if (view.planes.length !== 4)
       return;
     const [a, b] = view.planes.slice(2), across = this.#opening(0), down = this.#opening(2);
+    this.forward = Math.hypot(...[0, 1, 2].map((k) => view.planes[0][k] + view.planes[1][k]));
     this.tileArea = (across / ACROSS) * (down / DOWN); // at distance 1
     this.depth = new Float64Array(ACROSS * DOWN).fill(Infinity);
     const cover = new Float64Array(ACROSS * DOWN), seen = nodes.map((node) => this.#see(node)).filter((s) => s && dot(s.center, a) + dot(s.center, b) > 0);
@@ -33,12 +34,12 @@ export class Hidden {
   #see(node) {
     const { center, radius } = this.place(node), { eye, planes } = this.view, [l, r, t, b] = planes.map((p) => dot(center, p));
     const distance = Math.hypot(center[0] - eye[0], center[1] - eye[1], center[2] - eye[2]);
-    return l + r > 0 && t + b > 0 ? { center, radius, distance, u: l / (l + r) * ACROSS, v: t / (t + b) * DOWN } : undefined;
+    return l + r > 0 && t + b > 0 ? { center, radius, distance, depth: (l + r) / this.forward, u: l / (l + r) * ACROSS, v: t / (t + b) * DOWN } : undefined;
   }
 
   // Calls back with each tile that a node's surface may cover, and how much of it; true goes on.
-  #tiles({ radius, distance, u, v }, each) {
-    const edge = 2 * radius / Math.sqrt(3) / Math.max(distance, radius), area = edge * edge / this.tileArea, half = Math.sqrt(area) / 2;
+  #tiles({ radius, depth, u, v }, each) {
+    const edge = 2 * radius / Math.sqrt(3) / Math.max(depth, radius), area = edge * edge / this.tileArea, half = Math.sqrt(area) / 2;
     const from = [Math.max(0, Math.floor(u - half)), Math.max(0, Math.floor(v - half))], to = [Math.min(ACROSS - 1, Math.floor(u + half)), Math.min(DOWN - 1, Math.floor(v + half))];
     const share = Math.min(1, area / Math.max(1, (Math.floor(u + half) - Math.floor(u - half) + 1) * (Math.floor(v + half) - Math.floor(v - half) + 1)));
     for (let y = from[1]; y <= to[1]; y++)
