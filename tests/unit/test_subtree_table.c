@@ -1,0 +1,432 @@
+/* The table of subtrees against plain counting, the order of chunks against the specification, and
+ * the same model in both layouts. */
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/query.h>
+#include <ebpo/subset.h>
+
+#include "check_main.h"
+#include "container/places.h"
+#include "container/slice.h"
+#include "container/subtree_table.h"
+#include "counted_source.h"
+#include "octree/node_types.h"
+#include "random_tree.h"
+#include "read_by.h"
+#include "scratch.h"
+#include "solids.h"
+#include "two_layouts.h"
+
+#define EXPECT(condition)                                      \
+    do {                                                       \
+        if (!(condition))                                      \
+            ck_abort_msg("line %d: %s", __LINE__, #condition); \
+    } while (0)
+
+enum { ALL = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES };
+
+static void enter(void) { scratch_enter(); }
+
+/* --- the table, counted node by node --- */
+
+typedef struct plain_table {
+    ebpo_tree tree;
+    int level;
+    unsigned cols;
+    uint64_t subtrees;
+    uint64_t (*sum)[EBPO_SUBTREE_COLS]; /* [subtrees + 1] before each */
+} plain_table;
+
+/* Which subtree each group of a level belongs to; the level's gray nodes give the next one's. */
+static uint64_t *owners_below(const plain_table *t, int level, const uint64_t *group_owner)
+{
+    const ebpo_level *l = &t->tree.level[level];
+    uint64_t *owner = malloc((l->gray_count + 1) * sizeof *owner), gray = 0;
+    for (uint64_t g = 0; g < l->group_count; g++)
+        for (unsigned octant = 0; octant < ebpo_group_octants(level); octant++)
+            if (ebpo_group_type(l->types[g], octant) == EBPO_GRAY) {
+                owner[gray] = group_owner ? group_owner[g] : gray;
+                gray++;
+            }
+    return owner;
+}
+
+static void count_leaf(plain_table *t, const ebpo_level *l, uint64_t leaf, uint64_t *has)
+{
+    has[EBPO_S_LEAF]++;
+    if (l->leaf_plane_counts)
+        has[EBPO_S_LEAF_PLANES] += l->leaf_plane_counts[leaf];
+    if (!l->leaf_first)
+        return;
+    has[EBPO_S_REFS] += l->leaf_ref_count[leaf];
+    has[EBPO_S_ENDS] += l->leaf_first[leaf] + l->leaf_new[leaf] -
+                        (leaf ? l->leaf_first[leaf - 1] + l->leaf_new[leaf - 1] : 0);
+    (void)t;
+}
+
+static void count_groups(plain_table *t, int level, const uint64_t *owner)
+{
+    const ebpo_level *l = &t->tree.level[level];
+    uint64_t leaf = 0, gray = 0;
+    for (uint64_t g = 0; g < l->group_count; g++)
+        for (unsigned octant = 0; octant < 8; octant++) {
+            uint64_t *has = t->sum[owner[g] + 1] + ebpo_subtree_column(&t->tree.info, level, 0);
+            switch (ebpo_group_type(l->types[g], octant)) {
+            case EBPO_GRAY:
+                has[EBPO_S_GRAY]++;
+                has[EBPO_S_PLANES] += l->plane_counts ? l->plane_counts[gray] : 0;
+                gray++;
+                break;
+            case EBPO_LEAF: count_leaf(t, l, leaf++, has); break;
+            case EBPO_BLACK: has[EBPO_S_BLACK]++; break;
+            default: break;
+            }
+        }
+}
+
+static void plain_make(plain_table *t, const ebpo_file *file)
+{
+    const ebpo_info *info = ebpo_file_info(file);
+    ck_assert(ebpo_file_read_tree(file, READ_BY(1), &t->tree, NULL) == EBPO_OK);
+    t->level = info->subtree_level;
+    t->cols = ebpo_schema_cols(info, EBPO_A_SUBTREE_COUNTS);
+    t->subtrees = info->level[t->level].gray_count;
+    t->sum = calloc(t->subtrees + 1, sizeof *t->sum);
+    uint64_t *owner = owners_below(t, t->level, NULL);
+    for (int level = t->level + 1; level < info->level_count; level++) {
+        uint64_t *next = owners_below(t, level, owner);
+        count_groups(t, level, owner);
+        free(owner);
+        owner = next;
+    }
+    free(owner);
+    for (uint64_t i = 0; i < t->subtrees; i++)
+        for (unsigned k = 0; k < t->cols; k++)
+            t->sum[i + 1][k] += t->sum[i][k];
+}
+
+static void plain_free(plain_table *t)
+{
+    ebpo_tree_free(&t->tree);
+    free(t->sum);
+}
+
+/* Faces and vertices: the verifier's business; here that they follow one another. */
+static void check_faces(const plain_table *t, const ebpo_subtree_row *row, uint64_t *face,
+                        uint64_t *vertex)
+{
+    EXPECT(row->face >= *face && row->vertex >= *vertex);
+    *face = row->face + row->after[EBPO_S_FACES] - row->before[EBPO_S_FACES];
+    *vertex = row->vertex + row->after[EBPO_S_VERTICES] - row->before[EBPO_S_VERTICES];
+    EXPECT(*face <= t->tree.mesh.face_count && *vertex <= t->tree.mesh.vertex_count);
+}
+
+static void check_rows(const plain_table *t, ebpo_chunks *chunks)
+{
+    uint64_t face = 0, vertex = 0;
+    for (uint64_t i = 0; i < t->subtrees; i++) {
+        ebpo_subtree_row row;
+        EXPECT(ebpo_subtree_table_row(chunks, i, &row, NULL) == EBPO_OK);
+        EXPECT(row.subtree == i);
+        for (unsigned k = EBPO_SUBTREE_LEVELS; k < t->cols; k++)
+            EXPECT(row.before[k] == t->sum[i][k] && row.after[k] == t->sum[i + 1][k]);
+        if (t->tree.mesh.faces)
+            check_faces(t, &row, &face, &vertex);
+    }
+}
+
+static void check_find(const plain_table *t, ebpo_chunks *chunks)
+{
+    uint64_t state = 1;
+    for (unsigned k = EBPO_SUBTREE_LEVELS; k < t->cols; k++)
+        for (int n = 0; n < 20 && t->sum[t->subtrees][k]; n++) {
+            uint64_t item = ebpo_test_random(&state) % t->sum[t->subtrees][k], last = 0;
+            ebpo_subtree_row row;
+            for (uint64_t i = 0; i < t->subtrees; i++)
+                last = t->sum[i][k] <= item ? i : last;
+            EXPECT(ebpo_subtree_table_find(chunks, k, item, &row, NULL) == EBPO_OK);
+            EXPECT(row.subtree == last);
+        }
+}
+
+static void check_table(const ebpo_file *file)
+{
+    plain_table t;
+    ebpo_chunks *chunks;
+    EXPECT(ebpo_file_info(file)->subtree_level > 0);
+    plain_make(&t, file);
+    EXPECT(ebpo_chunks_make(&chunks, file, 0, NULL) == EBPO_OK);
+    check_rows(&t, chunks);
+    check_find(&t, chunks);
+    ebpo_chunks_free(chunks);
+    plain_free(&t);
+}
+
+/* --- both layouts --- */
+
+static void check_same(const two_layouts *l, uint64_t step)
+{
+    const ebpo_info *a = ebpo_file_info(l->with), *b = ebpo_file_info(l->without);
+    uint64_t turn = 0;
+    EXPECT(memcmp(a->content_sha256, b->content_sha256, 32) == 0);
+    EXPECT(b->subtree_level == 0);
+    EXPECT(ebpo_file_check_content(l->with, READ_BY(1), NULL) == EBPO_OK);
+    for (int level = 0; level < a->level_count; level++) {
+        uint64_t count, *codes = octcodes_of_level(l->without, level, &count);
+        for (uint64_t i = 0; i < count; i++) {
+            ebpo_status with, without;
+            if (turn++ % step)
+                continue;
+            uint64_t sum = subtree_sum(l->without, codes[i], &without);
+            EXPECT(subtree_sum(l->with, codes[i], &with) == sum && with == without);
+        }
+        free(codes);
+    }
+}
+
+static const uint64_t sizes[] = { 1, 8, 100 };
+
+START_TEST(random_trees_are_the_same_in_both_layouts)
+{
+    bool solid = _i % 3 != 0;
+    if (!ebpo_test_wanted(_i))
+        return;
+    random_tree_options options = {
+        (uint64_t)_i + 40,    3 + _i % 5, 3 + (unsigned)_i % 6, 5, solid, _i % 2 != 0,
+        solid && _i % 4 != 0, _i % 5 < 2
+    };
+    two_layouts l;
+    ebpo_tree tree;
+    random_tree_make(&tree, &options);
+    two_layouts_write(&l, &tree, _i % 7 ? ~0u : EBPO_PART_PLANES, (ebpo_codec)(_i % 3),
+                      sizes[_i / 3 % 3]);
+    check_table(l.with);
+    check_same(&l, 1 + (unsigned)_i % 5);
+    two_layouts_close(&l);
+}
+END_TEST
+
+static const uint32_t parts[] = { ALL, EBPO_PART_MESH, EBPO_PART_PLANES, EBPO_PART_LEAF_PLANES,
+                                  EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS };
+
+START_TEST(models_are_the_same_in_both_layouts)
+{
+    two_layouts l;
+    ebpo_mesh mesh = ebpo_test_torus(2, 0.7, 60, 40);
+    if (!ebpo_test_wanted(_i))
+        return;
+    if (_i % 2)
+        ebpo_test_to_float(&mesh);
+    two_layouts_build(&l, mesh, 6, parts[_i % 5], (ebpo_codec)(_i % 3), sizes[_i / 5 % 3]);
+    check_table(l.with);
+    check_same(&l, 7);
+    two_layouts_close(&l);
+}
+END_TEST
+
+/* Pruned nodes have rows; those above the subtrees' roots have none. */
+START_TEST(subsets_are_the_same_in_both_layouts)
+{
+    two_layouts l;
+    ebpo_subset_options subset = EBPO_SUBSET_OPTIONS_INIT;
+    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 60, 40), 6, ALL, EBPO_CODEC_ZSTD, 8);
+    subset.boxed = true;
+    for (int k = 0; k < 3; k++)
+        subset.max[k] = 1.5;
+    const char *with = scratch("a.ebpo.h5"), *without = scratch("b.ebpo.h5");
+    subset.subtree_faces = sizes[_i];
+    ck_assert(ebpo_subset(_i % 2 ? l.with : l.without, with, &subset, NULL) == EBPO_OK);
+    subset.subtree_faces = EBPO_NO_SUBTREES;
+    ck_assert(ebpo_subset(l.with, without, &subset, NULL) == EBPO_OK);
+    two_layouts_close(&l);
+    ck_assert(ebpo_open(with, &l.with, NULL) == EBPO_OK);
+    ck_assert(ebpo_open(without, &l.without, NULL) == EBPO_OK);
+    ck_assert(ebpo_file_info(l.with)->pruned);
+    check_table(l.with);
+    check_same(&l, 1);
+    two_layouts_close(&l);
+}
+END_TEST
+
+/* --- the order of chunks: section 9 --- */
+
+typedef struct placed {
+    uint64_t address;
+    ebpo_array_id id;
+    int level;
+    uint64_t row;
+} placed;
+
+static int by_address(const void *a, const void *b)
+{
+    const placed *x = a, *y = b;
+    return (x->address > y->address) - (x->address < y->address);
+}
+
+static uint64_t list_chunks(const ebpo_file *file, placed *out)
+{
+    uint64_t count = 0;
+    for (int i = 0; i < EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS; i++) {
+        int of_levels = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS, level = i / EBPO_LEVEL_ARRAYS;
+        if (i >= of_levels && i - of_levels < EBPO_LEVEL_ARRAYS)
+            continue;
+        const ebpo_array_in *a = i < of_levels ? &file->level_array[level][i % EBPO_LEVEL_ARRAYS]
+                                               : &file->root_array[i - of_levels];
+        for (uint64_t k = 0; a->present && k < ebpo_h5_chunk_count(&a->shape); k++)
+            out[count++] =
+                (placed){ a->chunks[k].address, a->id, a->level, k * a->shape.chunk_rows };
+    }
+    qsort(out, count, sizeof *out, by_address);
+    return count;
+}
+
+/* Where the specification's list has it: the step, and within it the level or nothing. */
+static unsigned step_of(const ebpo_info *info, const placed *p)
+{
+    int whole = info->subtree_level > 5 ? info->subtree_level : 5, deep = whole + 1;
+    while (deep < info->level_count && info->level[deep].leaf_count < info->face_count / 64)
+        deep++;
+    bool of_level = p->id < EBPO_LEVEL_ARRAYS, middle = p->level < deep,
+         planes = p->id == EBPO_A_PLANES || p->id == EBPO_A_PLANE_COUNTS ||
+                  p->id == EBPO_A_LEAF_PLANES || p->id == EBPO_A_LEAF_PLANE_COUNTS,
+         list = p->id == EBPO_A_LEAF_SKIP || p->id == EBPO_A_LEAF_NEW ||
+                p->id == EBPO_A_LEAF_REF_COUNT || p->id == EBPO_A_LEAF_REFS;
+    if (of_level && p->level <= whole)
+        return 0;
+    if ((of_level && ebpo_schema_is_index(p->id)) || p->id == EBPO_A_SUBTREE_INDEX ||
+        p->id == EBPO_A_FACES_INDEX)
+        return 1;
+    if (p->id == EBPO_A_SUBTREE_COUNTS || p->id == EBPO_A_SUBTREE_OUTER)
+        return 2;
+    if (of_level && middle)
+        return list ? 200 : 100 + (unsigned)p->level;
+    if (of_level)
+        return planes ? 300 + (unsigned)p->level : list ? 500 : 400;
+    return p->id == EBPO_A_PLACES ? 800 : p->id == EBPO_A_VERTEX_SOURCE ? 700 : 600;
+}
+
+static unsigned column_of(const ebpo_info *info, const placed *p)
+{
+    static const unsigned what[EBPO_COUNTS] = { EBPO_S_GRAY,   EBPO_S_LEAF,        0, EBPO_S_BLACK,
+                                                EBPO_S_PLANES, EBPO_S_LEAF_PLANES, 0, EBPO_S_REFS };
+    return ebpo_subtree_column(info, p->level, what[ebpo_schema[p->id].per]);
+}
+
+/* The subtree that a chunk's first row belongs to; -1: not told here. */
+static int64_t subtree_of(ebpo_chunks *chunks, const placed *p)
+{
+    const ebpo_info *info = &chunks->file->info;
+    ebpo_subtree_row row;
+    if (p->id >= EBPO_LEVEL_ARRAYS || ebpo_schema[p->id].per == EBPO_PER_WHITE)
+        return -1;
+    if (p->id == EBPO_A_TYPES && p->level == info->subtree_level + 1)
+        return (int64_t)p->row;
+    placed gray = { 0, EBPO_A_PLANE_COUNTS, p->level - 1, p->row };
+    EXPECT(ebpo_subtree_table_find(chunks, column_of(info, p->id == EBPO_A_TYPES ? &gray : p),
+                                   p->row, &row, NULL) == EBPO_OK);
+    return (int64_t)row.subtree;
+}
+
+START_TEST(chunks_lie_in_the_order_of_the_specification)
+{
+    two_layouts l;
+    ebpo_tree tree;
+    ebpo_chunks *chunks;
+    random_tree_options options = { 21, 9, 6, 9, true, false, false, true };
+    if (_i)
+        two_layouts_build(&l, ebpo_test_torus(2, 0.7, 400, 200), 8, ALL, EBPO_CODEC_NONE, 0);
+    else {
+        random_tree_make(&tree, &options);
+        two_layouts_write(&l, &tree, ~0u, EBPO_CODEC_ZSTD, 60);
+    }
+    const ebpo_info *info = ebpo_file_info(l.with);
+    EXPECT(ebpo_file_locate(l.with, NULL, NULL) == EBPO_OK);
+    EXPECT(ebpo_chunks_make(&chunks, l.with, 0, NULL) == EBPO_OK);
+    placed *p = malloc(sizeof *p << 20);
+    uint64_t count = list_chunks(l.with, p), sorted = 0;
+    EXPECT(count > 100);
+    for (uint64_t i = 1; i < count; i++) {
+        unsigned before = step_of(info, &p[i - 1]), step = step_of(info, &p[i]);
+        ck_assert_msg(step >= before, "%s of level %d, row %d, after %s of level %d, row %d",
+                      ebpo_schema[p[i].id].name, p[i].level, (int)p[i].row,
+                      ebpo_schema[p[i - 1].id].name, p[i - 1].level, (int)p[i - 1].row);
+        if (step == 1 && info->top_bytes)
+            EXPECT(p[i].address < info->top_bytes);
+        if (step != before || step < 100 || step >= 600)
+            continue;
+        int64_t a = subtree_of(chunks, &p[i - 1]), b = subtree_of(chunks, &p[i]);
+        EXPECT(a < 0 || b < 0 || a <= b);
+        sorted++;
+    }
+    EXPECT(sorted > 20);
+    free(p);
+    ebpo_chunks_free(chunks);
+    two_layouts_close(&l);
+}
+END_TEST
+
+/* --- far away --- */
+
+typedef struct answer {
+    double distance;
+    int32_t where;
+    uint64_t waves;
+} answer;
+
+/* One question, cold: its distance, or where the point is. */
+static answer ask(const ebpo_file *file, const counted_source *far, const double p[3], bool inside)
+{
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model *model;
+    ebpo_context *context;
+    ebpo_distance_result distance = { .distance = 0 };
+    ebpo_inside_result where = { .where = EBPO_OUT };
+    uint64_t opened = far ? far->batches + far->alone : 0;
+    options.threads = 1;
+    options.memory = 64 << 20;
+    EXPECT(ebpo_model_new(file, &options, &model, NULL) == EBPO_OK);
+    EXPECT(ebpo_context_new(model, &context, NULL) == EBPO_OK);
+    EXPECT((inside ? ebpo_inside(context, p, NULL, &where, NULL)
+                   : ebpo_distance(context, p, NULL, &distance, NULL)) == EBPO_OK);
+    ebpo_context_free(context);
+    ebpo_model_free(model);
+    return (answer){ distance.distance, where.where, far ? far->batches + far->alone - opened : 0 };
+}
+
+/* Distance or inside of points near the surface: what is asked for after opening, at most. */
+START_TEST(a_question_from_afar_takes_few_waves)
+{
+    enum { WAVES = 4 };
+    two_layouts l;
+    counted_source c;
+    uint64_t state = 3;
+    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 200, 120), 8, ALL, EBPO_CODEC_ZSTD, 400);
+    for (int n = 0; n < 10; n++) {
+        double cosine, sine;
+        ebpo_test_circle((uint32_t)(ebpo_test_random(&state) % 1000), 1000, &cosine, &sine);
+        double p[3] = { 2.71 * cosine, 2.71 * sine, 0.01 };
+        ebpo_file *far = counted_open(&c, l.packed, true);
+        answer a = ask(far, &c, p, n % 2), b = ask(l.without, NULL, p, n % 2);
+        counted_close(&c, far);
+        ck_assert_msg(a.waves <= WAVES, "%d waves", (int)a.waves);
+        EXPECT(a.distance == b.distance && a.where == b.where);
+    }
+    two_layouts_close(&l);
+}
+END_TEST
+
+Suite *test_suite(void)
+{
+    Suite *suite = suite_create("subtree_table");
+    TCase *tests = tcase_create("subtree_table");
+    tcase_set_timeout(tests, 900);
+    tcase_add_checked_fixture(tests, enter, scratch_leave);
+    tcase_add_loop_test(tests, random_trees_are_the_same_in_both_layouts, 0, 30);
+    tcase_add_loop_test(tests, models_are_the_same_in_both_layouts, 0, 15);
+    tcase_add_loop_test(tests, subsets_are_the_same_in_both_layouts, 0, 3);
+    tcase_add_loop_test(tests, chunks_lie_in_the_order_of_the_specification, 0, 2);
+    tcase_add_test(tests, a_question_from_afar_takes_few_waves);
+    suite_add_tcase(suite, tests);
+    return suite;
+}
