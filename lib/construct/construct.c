@@ -296,6 +296,8 @@ ebpo_status ebpo_build(ebpo_mesh *mesh, const ebpo_mesh_report *report,
     for (int i = 0; i < EBPO_LEVELS_MAX; i++)
         out->level[i].workspace = mesh->workspace;
     ebpo_status status = EBPO_TAKE(ebpo_build_options, &wanted, options, error);
+    /* other bits stand for other needs of arrays */
+    wanted.parts &= EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES;
     if (status == EBPO_OK && wanted.times)
         status = EBPO_CHECK_SIZED(ebpo_build_times, wanted.times, error);
     if (status == EBPO_OK) {

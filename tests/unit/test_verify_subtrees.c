@@ -30,7 +30,7 @@ static void write_model(ebpo_mesh mesh, uint32_t parts, uint64_t subtree_faces)
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
     ebpo_tree tree;
     build.leaf_faces = 4;
-    build.parts = ebpo_profile_parts(EBPO_PROFILE_FULL);
+    build.parts = ~0u;
     build.max_level = 5;
     write.codec = EBPO_CODEC_NONE;
     write.parts = parts;
