@@ -118,7 +118,8 @@ export class Parts {
       if (!this.bySubtree(level))
         return this.block(level, part);
       const row = rows.get(part), d = row.level(level);
-      return { level, part, key: `lists of subtree ${part} ${level}`, first: d.first[LEAF], count: d.count[LEAF], refs: d.refs, end: d.end, faces: { from: row.firstFace, to: row.firstFace + row.faces } };
+      return { level, part, key: `lists of subtree ${part} ${level}`, first: d.first[LEAF], count: d.count[LEAF], refs: d.refs, end: d.end,
+        faces: { from: row.firstFace, to: row.firstFace + row.faces } };
     }));
   }
 
@@ -129,7 +130,8 @@ export class Parts {
     if (refs.from > refs.to || refs.to > s.faces_referenced)
       throw formatError(folder(level) + 'leaf_index', 'the index contradicts the arrays that it is about');
     const start = index ? index[3 * block] : 0;
-    return { level, part: block, key: `lists ${block} ${level}`, first, count: Math.min(s.leaf - first, INDEX_ROWS), refs, end: { from: start, to: index && next < index.length ? index[next] : undefined }, faces: { from: 0, to: this.info.face_count } };
+    return { level, part: block, key: `lists ${block} ${level}`, first, count: Math.min(s.leaf - first, INDEX_ROWS), refs,
+      end: { from: start, to: index && next < index.length ? index[next] : undefined }, faces: { from: 0, to: this.info.face_count } };
   }
 
   listRanges(d) {

@@ -43,7 +43,8 @@ export class Segment {
     }
     this.planeBegin = begins(planeCounts);
     this.leafPlaneBegin = begins(leafPlaneCounts);
-    this.byteLength = 2 * types.length + this.before.length * 4 + [planeCounts, planes, leafPlaneCounts, leafPlanes, this.planeBegin, this.leafPlaneBegin, ...this.windings].reduce((sum, a) => sum + (a?.byteLength ?? 0), 0);
+    this.byteLength = 2 * types.length + this.before.length * 4
+      + [planeCounts, planes, leafPlaneCounts, leafPlanes, this.planeBegin, this.leafPlaneBegin, ...this.windings].reduce((sum, a) => sum + (a?.byteLength ?? 0), 0);
   }
 
   /** Ranks (white, black, leaf, gray) at which a group begins. */

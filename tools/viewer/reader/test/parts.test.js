@@ -31,7 +31,8 @@ function plainTree(levels) {
     });
     at = 0;
     if (level.leafFirst)
-      nodes[level.level][LEAF].forEach((n, i) => (n.faces = [...level.leafRefs?.slice(at, at += level.leafRefCount[i]) ?? [], ...Array.from({ length: level.leafNew[i] }, (_, k) => level.leafFirst[i] + k)]));
+      nodes[level.level][LEAF].forEach((n, i) => (n.faces = [...level.leafRefs?.slice(at, at += level.leafRefCount[i]) ?? [],
+        ...Array.from({ length: level.leafNew[i] }, (_, k) => level.leafFirst[i] + k)]));
     nodes[level.level][0].forEach((n, i) => (n.winding = level.whiteWinding?.[i] ?? 0));
     nodes[level.level][1].forEach((n, i) => (n.winding = level.blackWinding?.[i] ?? 1));
   });
