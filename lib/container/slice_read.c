@@ -307,6 +307,8 @@ static ebpo_status measure_subtree(ebpo_chunks *chunks, const extent *x, uint64_
 {
     const ebpo_info *info = &chunks->file->info;
     ebpo_subtree_row row;
+    /* what reading it will want to know of the table comes with the same request */
+    ebpo_subtree_table_expect_run(chunks, subtree, 1);
     ebpo_status status = ebpo_subtree_table_row(chunks, subtree, &row, error);
     for (int level = info->subtree_level + 1; level < x->end && status == EBPO_OK; level++) {
         uint64_t has[EBPO_SUBTREE_LEVEL_COLS];

@@ -360,6 +360,14 @@ static void cancel_queue(ebpo_transfers *t)
     }
 }
 
+/* Of large requests fewer: together they would only share the line, and the first one come last. */
+static unsigned slots_for(const ebpo_transfers *t, const ebpo_request *r)
+{
+    enum { LARGE_BYTES = 256 << 10, LARGE_AT_A_TIME = 6 };
+    return r->size > LARGE_BYTES && t->slot_count > LARGE_AT_A_TIME ? LARGE_AT_A_TIME
+                                                                    : t->slot_count;
+}
+
 /* Lock held. Requests that have waited too long for a slot end; *wait: seconds until something is
  * due. */
 static ebpo_request *next_due(ebpo_transfers *t, double now, double *wait)
@@ -376,7 +384,7 @@ static ebpo_request *next_due(ebpo_transfers *t, double now, double *wait)
             finish(t, r, EBPO_E_IO, why);
             continue;
         }
-        if (r->due <= now && t->active < t->slot_count) {
+        if (r->due <= now && t->active < slots_for(t, r)) {
             *at = r->next;
             return r;
         }
