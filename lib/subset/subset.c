@@ -91,7 +91,7 @@ static ebpo_status resolve_options(ebpo_cutting *c)
 static void announce(const ebpo_cutting *c)
 {
     ebpo_expected e = EBPO_EXPECTED_INIT(c->file);
-    if (c->last_level >= c->from->subtree_level)
+    if (c->last_level > c->from->subtree_level)
         ebpo_expect_top(c->file);
     if (c->options->boxed || c->need || !ebpo_input_expects(&c->file->in))
         return;

@@ -72,8 +72,13 @@ def run(*arguments):
 
 
 def blocks(part):
-    return (sum(os.path.getsize(os.path.join(part, n)) - 56 for n in os.listdir(part))
-            if os.path.isdir(part) else 0)
+    total = 0
+    for name in os.listdir(part) if os.path.isdir(part) else []:
+        try:
+            total += os.path.getsize(os.path.join(part, name)) - 56
+        except FileNotFoundError:  # a temporary name, gone meanwhile
+            pass
+    return total
 
 
 def parts(tool, folder, path, url):
