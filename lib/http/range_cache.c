@@ -11,7 +11,7 @@ enum {
     /* between announced ranges: fetching them costs less than another request; of many, requests
      * are what takes time */
     GAP_BYTES = 16384,
-    GAP_BYTES_OF_MANY = 24576,
+    GAP_BYTES_OF_MANY = 32768,
     MANY = 256,
     STALE_AFTER = 64 /* announcements: what has not been read by then will hardly be */
 };
