@@ -8,8 +8,6 @@
 
 #include "base/alloc.h"
 #include "container/reader.h"
-#include "container/subtree_expect.h"
-#include "container/subtree_table.h"
 #include "octree/octcode.h"
 #include "query/nearest.h"
 #include "query/prefetch.h"
@@ -29,12 +27,6 @@ static int compare_placed(const void *x, const void *y)
     if (a->key != b->key)
         return a->key < b->key ? -1 : 1;
     return (a->point > b->point) - (a->point < b->point);
-}
-
-static int compare_numbers(const void *x, const void *y)
-{
-    uint64_t a = *(const uint64_t *)x, b = *(const uint64_t *)y;
-    return (a > b) - (a < b);
 }
 
 /* Of the nearest cell, for points outside the box. */
@@ -76,7 +68,7 @@ void ebpo_batch_begin(ebpo_batch *b, ebpo_context *context, const double *points
         return;
     b->order = make_order(&box, points, count);
     b->far = ebpo_input_expects(&m->file->in) && m->info->subtree_level &&
-             m->top->cut_level == m->info->subtree_level && m->info->parts & EBPO_PART_MESH;
+             m->info->parts & EBPO_PART_MESH;
 }
 
 void ebpo_batch_end(ebpo_batch *b)
@@ -110,39 +102,12 @@ static void collect(ebpo_batch *b, uint64_t below)
     if (below != EBPO_NO_SUBTREE &&
         !ebpo_cache_has(b->context->model->cache, ebpo_context_key(b->context, below)) &&
         ebpo_grow(&b->below, &b->capacity, b->below_count + 1, sizeof *b->below))
-        b->below[b->below_count++] = below;
-}
-
-/* Ranks of the roots in place of the top's numbers, each once and ascending. Leaves of the top have
- * no row in the table: they are few, and are read when it comes to them. */
-static void to_ranks(ebpo_batch *b)
-{
-    const ebpo_model *m = b->context->model;
-    uint64_t kept = 0;
-    for (uint64_t i = 0; i < b->below_count; i++) {
-        const ebpo_node *root = &m->top->below[b->below[i]];
-        if (root->type == EBPO_GRAY && root->cell.level == m->info->subtree_level)
-            b->below[kept++] = root->rank;
-    }
-    if (kept)
-        qsort(b->below, kept, sizeof *b->below, compare_numbers);
-    b->below_count = 0;
-    for (uint64_t i = 0; i < kept; i++)
-        if (i == 0 || b->below[i] != b->below[i - 1])
-            b->below[b->below_count++] = b->below[i];
+        b->below[b->below_count++] = (uint32_t)below;
 }
 
 static void announce(ebpo_batch *b)
 {
-    ebpo_model *m = b->context->model;
-    ebpo_expected e = EBPO_EXPECTED_INIT(m->file);
-    uint32_t needs = EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH | EBPO_NEEDS_MAPS | EBPO_NEEDS_SOLID |
-                     (b->context->planes ? (uint32_t)EBPO_NEEDS_PLANES : 0);
-    to_ranks(b);
-    ebpo_subtree_table_expect(m->chunks, b->below, b->below_count);
-    for (uint64_t i = 0; i < b->below_count; i++)
-        ebpo_subtrees_expect(m->chunks, &e, b->below[i], 1, needs, EBPO_LEVELS_MAX, true);
-    ebpo_expect_all(&e);
+    ebpo_context_announce(b->context, b->below, b->below_count);
     b->below_count = 0;
 }
 

@@ -13,7 +13,7 @@ typedef struct ebpo_batch {
     bool far, reach;
     uint64_t told;     /* points whose subtrees have been announced */
     uint64_t searched; /* points around which it has been looked for further ones */
-    uint64_t *below;   /* [capacity] subtrees that are being collected, in the top's numbers */
+    uint32_t *below;   /* [capacity] subtrees that are being collected, in the top's numbers */
     uint64_t below_count, capacity;
 } ebpo_batch;
 

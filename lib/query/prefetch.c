@@ -5,8 +5,10 @@
 #include "query/prefetch.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
+#include "base/alloc.h"
 #include "container/subtree_expect.h"
 #include "container/subtree_table.h"
 #include "query/query_node.h"
@@ -112,30 +114,41 @@ static uint64_t table_number(const ebpo_context *c, uint32_t below)
                : UINT64_MAX;
 }
 
-/* Its place in the list, or the list's end. */
-static uint64_t place_of(const uint64_t *numbers, uint64_t count, uint64_t number)
+static int compare_numbers(const void *x, const void *y)
 {
-    uint64_t i = 0;
-    while (i < count && numbers[i] != number)
-        i++;
-    return i;
+    uint64_t a = *(const uint64_t *)x, b = *(const uint64_t *)y;
+    return (a > b) - (a < b);
+}
+
+/* Ascending, each once; returns how many. */
+static uint64_t sort_numbers(uint64_t *numbers, uint64_t count)
+{
+    uint64_t kept = 0;
+    if (count)
+        qsort(numbers, count, sizeof *numbers, compare_numbers);
+    for (uint64_t i = 0; i < count; i++)
+        if (i == 0 || numbers[i] != numbers[kept - 1])
+            numbers[kept++] = numbers[i];
+    return kept;
 }
 
 void ebpo_context_announce(const ebpo_context *c, const uint32_t *below, uint64_t count)
 {
     const ebpo_model *m = c->model;
     ebpo_expected expected = EBPO_EXPECTED_INIT(m->file);
-    uint64_t numbers[EBPO_ANNOUNCED_MOST] = { 0 }, found = 0;
-    if (m->info->subtree_level == 0 || !ebpo_input_expects(&m->file->in))
+    if (m->info->subtree_level == 0 || !ebpo_input_expects(&m->file->in) || count == 0)
         return;
-    for (uint64_t i = 0; i < count && found < EBPO_ANNOUNCED_MOST; i++) {
+    uint64_t found = 0, *numbers = ebpo_alloc(count, sizeof *numbers);
+    for (uint64_t i = 0; numbers && i < count; i++) {
         uint64_t number = table_number(c, below[i]);
-        if (number != UINT64_MAX && place_of(numbers, found, number) == found)
+        if (number != UINT64_MAX)
             numbers[found++] = number;
     }
+    found = sort_numbers(numbers, found);
     ebpo_subtree_table_expect(m->chunks, numbers, found);
     for (uint64_t i = 0; i < found; i++)
         ebpo_subtrees_expect(m->chunks, &expected, numbers[i], 1, ebpo_subtree_needs(c->planes),
                              EBPO_LEVELS_MAX, true);
     ebpo_expect_all(&expected);
+    free(numbers);
 }

@@ -70,7 +70,7 @@ static inline uint64_t ebpo_subtree_key(uint64_t below, bool planes) { return be
 /* Of the file, what such a subtree takes. */
 static inline uint32_t ebpo_subtree_needs(bool planes)
 {
-    return EBPO_NEEDS_MESH | EBPO_NEEDS_MAPS | EBPO_NEEDS_SOLID |
+    return EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH | EBPO_NEEDS_MAPS | EBPO_NEEDS_SOLID |
            (planes ? (uint32_t)EBPO_NEEDS_PLANES : 0);
 }
 
