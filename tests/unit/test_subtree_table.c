@@ -213,9 +213,9 @@ static const uint32_t parts[] = { ALL, EBPO_PART_MESH, EBPO_PART_PLANES, EBPO_PA
 START_TEST(models_are_the_same_in_both_layouts)
 {
     two_layouts l;
-    ebpo_mesh mesh = ebpo_test_torus(2, 0.7, 60, 40);
     if (!ebpo_test_wanted(_i))
         return;
+    ebpo_mesh mesh = ebpo_test_torus(2, 0.7, 60, 40);
     if (_i % 2)
         ebpo_test_to_float(&mesh);
     two_layouts_build(&l, mesh, 6, parts[_i % 5], (ebpo_codec)(_i % 3), sizes[_i / 5 % 3]);
