@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "stream/view_faces.h"
 
 #include <stdlib.h>

@@ -25,12 +25,15 @@ typedef struct values {
     remote_values remote;
 } values;
 
+/* All octcodes are below; limits of options are doubles, which hold this one. */
+#define OCTCODE_MOST (INT64_C(1) << 61)
+
 static const arg_option options[] = {
     OPTION_INT("level", 0, values, level, "N", 0, 20,
                "the envelopes of level N, and leaves and black nodes above it"),
     OPTION_FLAG("mesh", 0, values, mesh,
                 "the model itself, bit for bit; in the order of the source if the maps are stored"),
-    OPTION_INT("subtree", 0, values, subtree, "OCTCODE", 1, INT64_MAX,
+    OPTION_INT("subtree", 0, values, subtree, "OCTCODE", 1, OCTCODE_MOST,
                "the faces that touch the cell of this node, a gray one or a leaf, and no others"),
     OPTION_FLAG("no-walls", 0, values, no_walls,
                 "with --level: leave out polygons that lie on cell walls"),
