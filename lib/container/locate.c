@@ -7,6 +7,14 @@
 #include "container/open.h"
 #include "container/places.h"
 
+static ebpo_array_in *array_number(ebpo_file *file, int i)
+{
+    int levels = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS;
+    return i < levels ? &file->level_array[i / EBPO_LEVEL_ARRAYS][i % EBPO_LEVEL_ARRAYS]
+                      : &file->root_array[EBPO_LEVEL_ARRAYS + i - levels];
+}
+enum { ALL_ARRAYS = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS - EBPO_LEVEL_ARRAYS };
+
 /* --- by HDF5's index --- */
 
 static ebpo_status locate_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_in *a,
@@ -42,12 +50,8 @@ static ebpo_status locate_by_index(ebpo_file *file, ebpo_error *error)
     ebpo_status status = ebpo_h5_open(&h5, &file->in, error);
     if (status == EBPO_OK)
         ebpo_h5_expect_index(&h5, index);
-    for (int i = 0; i < EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS && status == EBPO_OK; i++)
-        status =
-            locate_array(file, &h5,
-                         &file->level_array[i / EBPO_LEVEL_ARRAYS][i % EBPO_LEVEL_ARRAYS], error);
-    for (int i = EBPO_LEVEL_ARRAYS; i < EBPO_ARRAYS && status == EBPO_OK; i++)
-        status = locate_array(file, &h5, &file->root_array[i], error);
+    for (int i = 0; i < ALL_ARRAYS && status == EBPO_OK; i++)
+        status = locate_array(file, &h5, array_number(file, i), error);
     status = ebpo_h5_close(&h5, status, error);
     return status == EBPO_OK ? ebpo_stored_check(file, error) : status;
 }
@@ -115,14 +119,6 @@ static ebpo_status end_array(const listing *l, const ebpo_array_in *a, ebpo_erro
                : list_fails(l->file, "the list has fewer chunks than", a->path, error);
 }
 
-static ebpo_array_in *array_number(ebpo_file *file, int i)
-{
-    int levels = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS;
-    return i < levels ? &file->level_array[i / EBPO_LEVEL_ARRAYS][i % EBPO_LEVEL_ARRAYS]
-                      : &file->root_array[EBPO_LEVEL_ARRAYS + i - levels];
-}
-enum { ALL_ARRAYS = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS - EBPO_LEVEL_ARRAYS };
-
 static ebpo_status list_chunks(ebpo_file *file, const uint64_t *places, uint64_t count,
                                ebpo_error *error)
 {
@@ -166,7 +162,9 @@ static ebpo_status locate_by_list(ebpo_file *file, ebpo_error *error)
     ebpo_h5_chunk chunk = a->chunks[0];
     uint64_t *places = NULL;
     const char *why = "";
-    uint8_t *stored = a->shape.rows <= file->info.file_bytes ? ebpo_alloc(chunk.bytes, 1) : NULL;
+    if (a->shape.rows > file->info.file_bytes)
+        return list_fails(file, "the list has more rows than", "the file has bytes", error);
+    uint8_t *stored = ebpo_alloc(chunk.bytes, 1);
     ebpo_status status = stored
                              ? ebpo_input_read(&file->in, chunk.address, chunk.bytes, stored, error)
                              : ebpo_fail_memory(error, chunk.bytes);
