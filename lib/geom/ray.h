@@ -15,6 +15,9 @@ typedef struct ebpo_ray_meeting {
     /* 1: it goes against the normal through the triangle's interior (enters), -1: with it (leaves),
      * 0: an edge, a corner, within the plane, or no area */
     int side;
+    /* 1: the line goes against the normal, -1: with it, wherever it meets the triangle; 0: within
+     * the plane, or no area */
+    int facing;
     double t; /* of the first common point, correctly rounded to 2 ulp or better */
 } ebpo_ray_meeting;
 

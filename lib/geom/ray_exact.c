@@ -22,7 +22,7 @@ typedef struct scene {
 /* What the line and the triangle have in common, in units of the scene. */
 typedef struct stretch {
     bool any;
-    int side;
+    int side, facing;
     mpq_t low, high;
 } stretch;
 
@@ -197,7 +197,8 @@ static void meet_line(stretch *st, const scene *s)
     else if (negative == 0 || positive == 0) {
         determinant(numerator, s->corner[0], s->corner[1], s->corner[2]);
         stretch_add(st, numerator, denominator);
-        st->side = negative == 3 ? 1 : positive == 3 ? -1 : 0;
+        st->facing = negative ? 1 : -1;
+        st->side = negative == 3 || positive == 3 ? st->facing : 0;
     }
     mpz_clears(edge[0], edge[1], edge[2], denominator, numerator, NULL);
 }
@@ -235,7 +236,7 @@ static void meet(stretch *st, const ebpo_segment *ray, const double triangle[3][
 {
     scene s;
     st->any = false;
-    st->side = 0;
+    st->side = st->facing = 0;
     mpq_inits(st->low, st->high, NULL);
     scene_init(&s, ray, triangle);
     meet_line(st, &s);
@@ -252,6 +253,7 @@ void ebpo_ray_triangle_exact(const ebpo_segment *ray, const double triangle[3][3
     meet(&st, ray, triangle);
     out->meets = st.any;
     out->side = st.any ? st.side : 0;
+    out->facing = st.any ? st.facing : 0;
     /* Towards 0, so less than 1 ulp off. */
     out->t = st.any ? mpq_get_d(st.low) : INFINITY;
     stretch_clear(&st);

@@ -120,7 +120,7 @@ static bool apart_on_an_axis(const ebpo_segment *ray, double e[3][3])
 
 static inline void set_miss(ebpo_ray_meeting *out)
 {
-    *out = (ebpo_ray_meeting){ false, 0, INFINITY };
+    *out = (ebpo_ray_meeting){ false, 0, 0, INFINITY };
 }
 
 /* The line goes through the triangle's interior; `sign`: that of normal . direction. False when t
@@ -135,7 +135,7 @@ static bool meet_interior(const ebpo_segment *ray, const double triangle[3][3], 
         set_miss(out);
         return true;
     }
-    *out = (ebpo_ray_meeting){ true, -sign, t };
+    *out = (ebpo_ray_meeting){ true, -sign, -sign, t };
     return ray->t_max == INFINITY || certainly_less(t, ray->t_max);
 }
 

@@ -40,7 +40,7 @@ static uint64_t curve_key(const ebpo_box *box, const double p[3])
     return ebpo_octcode_of_cell(cell);
 }
 
-static uint64_t *make_order(const ebpo_box *box, const double *points, uint64_t count)
+uint64_t *ebpo_curve_order(const ebpo_box *box, const double *points, uint64_t count)
 {
     placed *list = ebpo_alloc(count, sizeof *list);
     uint64_t *order = ebpo_alloc(count, sizeof *order);
@@ -66,7 +66,7 @@ void ebpo_batch_begin(ebpo_batch *b, ebpo_context *context, const double *points
     *b = (ebpo_batch){ .context = context, .points = points, .count = count, .reach = reach };
     if (m->whole || count < 2 || m->options.loading != EBPO_LOAD_CACHE)
         return;
-    b->order = make_order(&box, points, count);
+    b->order = ebpo_curve_order(&box, points, count);
     b->far = ebpo_input_expects(&m->file->in) && m->info->subtree_level &&
              m->info->parts & EBPO_PART_MESH;
 }

@@ -23,6 +23,10 @@ void ebpo_batch_begin(ebpo_batch *batch, ebpo_context *context, const double *po
                       uint64_t count, bool reach);
 void ebpo_batch_end(ebpo_batch *batch);
 
+/* The points' numbers [count] along the curve, of the nearest cell for points outside the box; the
+ * caller frees it. NULL: no memory. */
+uint64_t *ebpo_curve_order(const ebpo_box *box, const double *points, uint64_t count);
+
 /* The i-th point to be asked about; i goes from 0 on. */
 uint64_t ebpo_batch_next(ebpo_batch *batch, uint64_t i);
 

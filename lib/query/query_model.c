@@ -318,6 +318,8 @@ void ebpo_context_free(ebpo_context *c)
     let_go(c);
     free(c->open);
     free(c->hits);
+    free(c->hit_begin);
+    free(c->met);
     free(c->later);
     free(c->faces);
     free(c);

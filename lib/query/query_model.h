@@ -29,6 +29,7 @@ struct ebpo_model {
 };
 
 typedef struct ebpo_ranked ebpo_ranked; /* query/query_node.h */
+typedef struct ebpo_met ebpo_met;       /* query/ray_hits.h */
 
 struct ebpo_context {
     ebpo_model *model;
@@ -39,6 +40,10 @@ struct ebpo_context {
     uint64_t open_capacity;
     ebpo_ray_hit *hits;
     uint64_t hit_capacity;
+    uint64_t *hit_begin; /* of many rays */
+    uint64_t hit_begin_capacity;
+    ebpo_met *met; /* of one ray, before they are sorted */
+    uint64_t met_capacity;
     uint64_t *faces;
     uint64_t face_capacity;
     ebpo_ranked *later; /* subtrees that a search has put off */

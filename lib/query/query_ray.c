@@ -1,260 +1,48 @@
-/* Rays and boxes against the model: conservative on the way down, exact at the faces. */
+/* One ray: what it meets first, whether it meets anything, all that it meets. */
 #include "geom/strict_fp.h"
 
-#include "geom/ray_triangle.h"
-
-#include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "query/options.h"
-#include "query/pruned.h"
-#include "query/query_node.h"
+#include "query/ray_walk.h"
 
-/* A face that the ray meets, with what exact comparison needs. */
-typedef struct met {
-    double triangle[3][3];
-    uint64_t file_face, source_face;
-    ebpo_ray_meeting meeting;
-} met;
-
-typedef struct casting {
-    ebpo_context *context;
-    ebpo_segment ray;
-    double limit; /* t beyond which nothing matters, certain */
-    bool all;
-    met *list; /* all hits; or the first one */
-    uint64_t count, capacity;
-    bool no_memory;
-} casting;
-
-/* Interval of t in which the ray is within [low, high] widened by `slack`, cut to 0 .. limit; false
- * when it is empty. */
-static bool meets_slabs(const double origin[3], const double direction[3], double limit,
-                        const double low[3], const double high[3], double slack, double *enter)
+static ebpo_status cast(ebpo_casting *c, ebpo_context *context, const double origin[3],
+                        const double direction[3], double t_max, ebpo_ray_wants wants,
+                        ebpo_error *error)
 {
-    double from = 0, to = limit;
-    for (int k = 0; k < 3; k++) {
-        double a = low[k] - slack - origin[k], b = high[k] + slack - origin[k];
-        if (direction[k] == 0) {
-            if (a > 0 || b < 0)
-                return false;
-            continue;
-        }
-        double t0 = a / direction[k], t1 = b / direction[k];
-        from = fmax(from, fmin(t0, t1) - fabs(fmin(t0, t1)) * 0x1p-50);
-        to = fmin(to, fmax(t0, t1) + fabs(fmax(t0, t1)) * 0x1p-50);
-    }
-    *enter = from;
-    return from <= to;
-}
-
-static bool keep(casting *c, const met *m)
-{
-    if (c->all) {
-        if (!ebpo_grow(&c->list, &c->capacity, c->count + 1, sizeof *c->list))
-            return false;
-        c->list[c->count++] = *m;
-        return true;
-    }
-    if (c->count) {
-        int sign = ebpo_ray_compare(&c->ray, (const double(*)[3])m->triangle,
-                                    (const double(*)[3])c->list[0].triangle);
-        if (sign > 0 || (sign == 0 && m->file_face >= c->list[0].file_face))
-            return true;
-    }
-    if (!ebpo_grow(&c->list, &c->capacity, 1, sizeof *c->list))
-        return false;
-    c->list[0] = *m;
-    c->count = 1;
-    c->limit = fmin(c->limit, m->meeting.t * (1 + 0x1p-48) + DBL_MIN);
-    return true;
-}
-
-static void try_block(casting *c, const ebpo_accel *s, uint32_t block)
-{
-    for (uint32_t lane = 0; lane < EBPO_BLOCK; lane++) {
-        uint32_t slot = block * EBPO_BLOCK + lane, local = s->slot_face[slot];
-        met m;
-        if (local == EBPO_NO_SLOT)
-            return;
-        ebpo_accel_triangle(s, slot, m.triangle);
-        ebpo_ray_triangle(&c->ray, (const double(*)[3])m.triangle, &m.meeting);
-        if (!m.meeting.meets)
-            continue;
-        m.file_face = ebpo_accel_file_face(s, local);
-        m.source_face = ebpo_accel_source_face(s, local);
-        c->no_memory = c->no_memory || !keep(c, &m);
-    }
-}
-
-/* The ray in the subtree's frame, its direction scaled by a power of two to about 1. Widening
- * covers the rounding of all. */
-typedef struct framed {
-    double origin[3], direction[3], slack;
-    /* t in the frame for t = 1; 0 or infinite where that leaves the doubles, and then limits prune
-     * nothing */
-    double limit_scale;
-} framed;
-
-static double frame_limit(const casting *c, const framed *f)
-{
-    double limit = c->limit * f->limit_scale * (1 + 0x1p-40);
-    return f->limit_scale > 0 && limit > 0x1p-500 ? limit
-           : c->limit > 0 || c->count             ? INFINITY
-                                                  : 0x1p-40;
-}
-
-typedef struct entered {
-    double enter;
-    uint32_t child;
-} entered;
-
-static void cast_bound(casting *c, const ebpo_accel *s, const framed *f, uint32_t child)
-{
-    if (child & EBPO_IS_BLOCK) {
-        try_block(c, s, child & ~EBPO_IS_BLOCK);
-        return;
-    }
-    const ebpo_bound *b = &s->bound[child];
-    entered order[8];
-    int count = 0;
-    for (int lane = 0; lane < 8; lane++) {
-        if (b->child[lane] == EBPO_NO_CHILD)
-            continue;
-        double low[3] = { b->low[0][lane], b->low[1][lane], b->low[2][lane] },
-               high[3] = { b->high[0][lane], b->high[1][lane], b->high[2][lane] };
-        entered e = { 0, b->child[lane] };
-        if (!meets_slabs(f->origin, f->direction, frame_limit(c, f), low, high, f->slack, &e.enter))
-            continue;
-        int at = count++;
-        for (; at > 0 && order[at - 1].enter > e.enter; at--)
-            order[at] = order[at - 1];
-        order[at] = e;
-    }
-    for (int i = 0; i < count && !c->no_memory; i++)
-        if (order[i].enter <= frame_limit(c, f))
-            cast_bound(c, s, f, order[i].child);
-}
-
-static void cast_subtree(casting *c, const ebpo_accel *s)
-{
-    framed f;
-    double most = 2, longest = 0;
-    int exponent;
-    if (s->bound_count == 0)
-        return;
-    for (int k = 0; k < 3; k++)
-        longest = fmax(longest, fabs(c->ray.direction[k]));
-    frexp(longest, &exponent);
-    for (int k = 0; k < 3; k++) {
-        f.origin[k] = (c->ray.origin[k] - s->centre[k]) * s->scale;
-        f.direction[k] = ldexp(c->ray.direction[k], -exponent);
-        most = fmax(most, fabs(f.origin[k]));
-    }
-    f.limit_scale = ldexp(s->scale, exponent);
-    f.slack = most * 0x1p-48;
-    cast_bound(c, s, &f, s->top);
-}
-
-/* Whether the ray comes to the node's cell before its limit; rather yes than no. */
-static bool meets_cell(const casting *c, const ebpo_box *box, const ebpo_node *node)
-{
-    double low[3], high[3], slack = 0, enter;
-    ebpo_cell_bounds(box, node->cell, low, high);
-    for (int k = 0; k < 3; k++)
-        slack = fmax(slack, (fabs(low[k]) + fabs(high[k]) + fabs(c->ray.origin[k])) * 0x1p-48);
-    return meets_slabs(c->ray.origin, c->ray.direction, c->limit, low, high, slack, &enter);
-}
-
-static bool ray_matters(void *user, const ebpo_box *box, const ebpo_node *node)
-{
-    return meets_cell(user, box, node);
-}
-
-static ebpo_status cast_node(casting *c, const ebpo_box *box, ebpo_node node, ebpo_error *error)
-{
-    const ebpo_model *m = c->context->model;
-    if (ebpo_node_is_uniform(&node) || !meets_cell(c, box, &node) ||
-        node.pruned) /* pruned: see cast */
-        return EBPO_OK;
-    if (ebpo_node_is_below(&node)) {
-        ebpo_status status = ebpo_model_enter(c->context, &node, error);
-        if (status == EBPO_OK)
-            cast_subtree(c, node.subtree);
-        return status;
-    }
-    /* Children in the order in which the ray meets their cells. */
-    unsigned turn = 0;
-    for (int k = 0; k < 3; k++)
-        turn |= (unsigned)(c->ray.direction[k] < 0) << k;
-    ebpo_status status = EBPO_OK;
-    for (unsigned i = 0; i < 8 && status == EBPO_OK; i++)
-        status = cast_node(c, box, ebpo_model_child(m, &node, i ^ turn), error);
-    return status;
-}
-
-static ebpo_status cast(casting *c, ebpo_error *error)
-{
-    ebpo_status status = ebpo_check_mesh(c->context->model, error);
-    bool moves = false;
-    for (int k = 0; k < 3; k++) {
-        if (!isfinite(c->ray.origin[k]) || !isfinite(c->ray.direction[k]))
-            return ebpo_fail(error, EBPO_E_ARGUMENT,
-                             "the ray has a coordinate that is not a finite number");
-        moves = moves || c->ray.direction[k] != 0;
-    }
-    if (!moves || !(c->ray.t_max >= 0))
-        return ebpo_fail(
-            error, EBPO_E_ARGUMENT,
-            "a ray needs a direction other than (0, 0, 0), and t_max must be 0 or more");
-    if (status != EBPO_OK)
-        return status;
-    if (c->context->model->whole) {
-        cast_subtree(c, c->context->model->whole);
-    } else {
-        ebpo_box box = ebpo_model_box(c->context->model);
-        status = cast_node(c, &box, ebpo_model_root(c->context->model), error);
-    }
-    if (status == EBPO_OK && !c->no_memory)
-        status = ebpo_check_pruned(c->context, ray_matters, c, error);
-    if (status == EBPO_OK && c->no_memory)
-        status = ebpo_fail_memory(error, c->count * sizeof *c->list);
-    return status;
-}
-
-static casting make_casting(ebpo_context *context, const double origin[3],
-                            const double direction[3], double t_max, bool all)
-{
-    casting c = { .context = context, .limit = t_max, .all = all };
-    memcpy(c.ray.origin, origin, sizeof c.ray.origin);
-    memcpy(c.ray.direction, direction, sizeof c.ray.direction);
-    c.ray.t_max = t_max;
-    return c;
+    ebpo_segment ray = { .t_max = t_max };
+    memcpy(ray.origin, origin, sizeof ray.origin);
+    memcpy(ray.direction, direction, sizeof ray.direction);
+    ebpo_casting_begin(c, context, &ray, wants, EBPO_RAY_BOTH);
+    ebpo_status status = ebpo_check_mesh(context->model, error);
+    const char *fault = ebpo_ray_fault(&ray);
+    if (fault)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "the ray %s", fault);
+    return status == EBPO_OK ? ebpo_ray_walk(c, error) : status;
 }
 
 ebpo_status ebpo_ray_first(ebpo_context *context, const double origin[3], const double direction[3],
                            double t_max, ebpo_ray_hit *out, bool *hit, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    casting c = make_casting(context, origin, direction, t_max, false);
-    ebpo_status status = cast(&c, error);
+    ebpo_casting c;
+    ebpo_status status = cast(&c, context, origin, direction, t_max, EBPO_WANTS_FIRST, error);
     *hit = status == EBPO_OK && c.count;
     if (*hit)
-        *out = (ebpo_ray_hit){ c.list[0].meeting.t, c.list[0].source_face, c.list[0].meeting.side };
-    free(c.list);
+        *out = ebpo_hit_of(&c.first);
     return status;
 }
 
-static int compare_met(const void *a, const void *b, void *ray)
+ebpo_status ebpo_ray_any(ebpo_context *context, const double origin[3], const double direction[3],
+                         double t_max, bool *any, ebpo_error *error)
 {
-    const met *x = a, *y = b;
-    int sign =
-        ebpo_ray_compare(ray, (const double(*)[3])x->triangle, (const double(*)[3])y->triangle);
-    return sign ? sign : (x->file_face > y->file_face) - (x->file_face < y->file_face);
+    EBPO_DEFAULT_FP;
+    ebpo_casting c;
+    ebpo_status status = cast(&c, context, origin, direction, t_max, EBPO_WANTS_ANY, error);
+    *any = status == EBPO_OK && c.count;
+    return status;
 }
 
 ebpo_status ebpo_ray_all(ebpo_context *context, const double origin[3], const double direction[3],
@@ -262,22 +50,16 @@ ebpo_status ebpo_ray_all(ebpo_context *context, const double origin[3], const do
                          ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    casting c = make_casting(context, origin, direction, t_max, true);
+    ebpo_casting c;
+    uint64_t end;
     *hits = NULL;
     *count = 0;
-    ebpo_status status = cast(&c, error);
-    if (status == EBPO_OK &&
-        !ebpo_grow(&context->hits, &context->hit_capacity, c.count, sizeof *context->hits))
-        status = ebpo_fail_memory(error, c.count * sizeof *context->hits);
-    if (status == EBPO_OK && c.count) {
-        qsort_r(c.list, c.count, sizeof *c.list, compare_met, &c.ray);
-        for (uint64_t i = 0; i < c.count; i++)
-            if (i == 0 || c.list[i].file_face != c.list[i - 1].file_face) /* subtrees share faces */
-                context->hits[(*count)++] =
-                    (ebpo_ray_hit){ c.list[i].meeting.t, c.list[i].source_face,
-                                    c.list[i].meeting.side };
+    ebpo_status status = cast(&c, context, origin, direction, t_max, EBPO_WANTS_ALL, error);
+    if (status == EBPO_OK)
+        status = ebpo_casting_sort(&c, 0, &end, error);
+    if (status == EBPO_OK && end) {
         *hits = context->hits;
+        *count = end;
     }
-    free(c.list);
     return status;
 }

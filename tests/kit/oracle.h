@@ -45,8 +45,9 @@ void oracle_normal(oracle *o, uint32_t face, double out[3]);
 
 typedef struct oracle_hit {
     uint32_t face;
-    int side; /* as ebpo_ray_hit */
-    double t; /* correctly rounded */
+    int side;   /* as ebpo_ray_hit */
+    int facing; /* 1: against the normal, -1: along it, 0: no area, or within the plane */
+    double t;   /* correctly rounded */
 } oracle_hit;
 /* The closed triangles that origin + t direction, 0 <= t <= t_max meets, by the exact t of the
  * first common point, then by number. The hits are the oracle's, until its next call. */

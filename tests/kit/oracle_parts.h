@@ -19,7 +19,7 @@ typedef struct oracle_fraction {
 typedef struct oracle_ray_item {
     oracle_fraction t;
     uint32_t face;
-    int side;
+    int side, facing;
 } oracle_ray_item;
 
 struct oracle {

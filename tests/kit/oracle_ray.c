@@ -88,11 +88,12 @@ static bool meet_within_plane(oracle *o, uint32_t face, oracle_fraction *t)
     return any;
 }
 
-static bool meet_face(oracle *o, uint32_t face, oracle_fraction *t, int *side)
+static bool meet_face(oracle *o, uint32_t face, oracle_fraction *t, int *side, int *facing)
 {
     oracle_load(o, face);
     oracle_dot(t->den, o->normal, o->direction);
     *side = 0;
+    *facing = -mpz_sgn(t->den);
     if (mpz_sgn(t->den) == 0)
         return meet_within_plane(o, face, t);
     int towards = mpz_sgn(t->den);
@@ -171,7 +172,8 @@ void oracle_ray(oracle *o, const double origin[3], const double direction[3], do
         oracle_set(o->direction[k], direction[k], unit);
     for (uint32_t f = 0; f < o->face_count; f++) {
         oracle_ray_item *at = item(o, n);
-        if (passes_by(o->box[f], origin, direction) || !meet_face(o, f, &at->t, &at->side))
+        if (passes_by(o->box[f], origin, direction) ||
+            !meet_face(o, f, &at->t, &at->side, &at->facing))
             continue;
         if (compare_to_end(o, &at->t, o->e - unit, t_max) > 0)
             continue;
@@ -182,6 +184,7 @@ void oracle_ray(oracle *o, const double origin[3], const double direction[3], do
     for (uint32_t i = 0; i < n; i++) {
         o->hits[i].face = o->items[i].face;
         o->hits[i].side = o->items[i].side;
+        o->hits[i].facing = o->items[i].facing;
         o->hits[i].t = oracle_round(o->items[i].t.num, o->items[i].t.den, o->e - unit, false);
     }
     *hits = o->hits;

@@ -354,6 +354,36 @@ static bool hits_fit(const query_model *m, const query_ray *r, const oracle_hit 
     return count == n;
 }
 
+/* Whether anything is met, and the first face from each side. */
+static bool ask_sides(query_model *m, ebpo_context *context, const query_ray *r,
+                      const oracle_hit *expected, uint32_t n)
+{
+    ebpo_ray ray = { .t_max = r->t_max };
+    memcpy(ray.origin, r->origin, sizeof ray.origin);
+    memcpy(ray.direction, r->direction, sizeof ray.direction);
+    for (int side = -1; side <= 1; side++) {
+        ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
+        ebpo_ray_hit first = { 0 };
+        bool any = false;
+        uint32_t i = 0;
+        options.sides = side > 0 ? EBPO_RAY_FRONT : side < 0 ? EBPO_RAY_BACK : EBPO_RAY_BOTH;
+        while (i < n && side && expected[i].facing != side)
+            i++;
+        if (ebpo_ray_first_many(context, &ray, 1, &options, &first, NULL) != EBPO_OK ||
+            ebpo_ray_any_many(context, &ray, 1, &options, &any, NULL) != EBPO_OK ||
+            any != (i < n) || (first.face != EBPO_NO_FACE) != any ||
+            (any && !hit_fits(m, &expected[i], &first))) {
+            show_ray(m, r);
+            fprintf(stderr, "from side %d: any %d, first t %a, face %llu\n", side, any, first.t,
+                    (unsigned long long)first.face);
+            return false;
+        }
+    }
+    bool any;
+    return ebpo_ray_any(context, r->origin, r->direction, r->t_max, &any, NULL) == EBPO_OK &&
+           any == (n > 0);
+}
+
 bool query_ask_ray(query_model *m, ebpo_context *context, const query_ray *r)
 {
     const oracle_hit *expected;
@@ -378,7 +408,7 @@ bool query_ask_ray(query_model *m, ebpo_context *context, const query_ray *r)
                 (unsigned long long)first.face, first.side);
         return false;
     }
-    return hits_fit(m, r, expected, n, hits, count);
+    return hits_fit(m, r, expected, n, hits, count) && ask_sides(m, context, r, expected, n);
 }
 
 void query_ask(query_model *m, uint64_t count, uint64_t seed)

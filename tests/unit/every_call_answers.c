@@ -1,4 +1,6 @@
 /* Calls that answer questions about a model, or hand out its levels. */
+#include <math.h>
+
 #include "every_call.h"
 #include "scratch.h"
 
@@ -42,6 +44,23 @@ static bool count_triangles(void *user, const ebpo_triangles *triangles)
     return true;
 }
 
+static ebpo_status ask_many_rays(ebpo_context *context, ebpo_error *error)
+{
+    static const ebpo_ray rays[2] = { { { -9, 0.1, 0.2 }, { 1, 0, 0 }, 99 },
+                                      { { 0, -9, 0.2 }, { 0, 1, 0 }, INFINITY } };
+    ebpo_ray_hit first[2];
+    const ebpo_ray_hit *hits;
+    const uint64_t *begin;
+    bool any[2];
+    ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
+    ebpo_status status = ebpo_ray_first_many(context, rays, 2, &options, first, error);
+    if (status == EBPO_OK)
+        status = ebpo_ray_any_many(context, rays, 2, &options, any, error);
+    if (status == EBPO_OK)
+        status = ebpo_ray_all_many(context, rays, 2, &options, &hits, &begin, error);
+    return status;
+}
+
 static ebpo_status ask_rays(ebpo_context *context, ebpo_error *error)
 {
     static const double origin[3] = { -9, 0.1, 0.2 }, direction[3] = { 1, 0, 0 };
@@ -54,6 +73,10 @@ static ebpo_status ask_rays(ebpo_context *context, ebpo_error *error)
     ebpo_status status = ebpo_ray_first(context, origin, direction, 99, &first, &hit, error);
     if (status == EBPO_OK)
         status = ebpo_ray_all(context, origin, direction, 99, &hits, &count, error);
+    if (status == EBPO_OK)
+        status = ebpo_ray_any(context, origin, direction, 99, &hit, error);
+    if (status == EBPO_OK)
+        status = ask_many_rays(context, error);
     if (status == EBPO_OK)
         status = ebpo_faces_in_box(context, low, high, &faces, &count, error);
     if (status == EBPO_OK)

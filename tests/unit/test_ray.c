@@ -206,12 +206,14 @@ static void keep_segment(interval *r, const rational3 p[3], const rational3 *ori
     mpq_clears(length, longest, NULL);
 }
 
-/* r->low: the first common point; returns the side. r is initialised here. */
-static int twin_ray(const ebpo_segment *ray, const double triangle[3][3], interval *r)
+/* r->low: the first common point; returns the side, and from which one the line comes. r is
+ * initialised here. */
+static int twin_ray(const ebpo_segment *ray, const double triangle[3][3], interval *r, int *facing)
 {
     rational3 p[3], f, g, normal, origin, direction;
     mpq_t slope;
     int side = 0;
+    *facing = 0;
     mpq_inits(r->low, r->high, slope, NULL);
     r->any = true;
     r->endless = ray->t_max == INFINITY;
@@ -229,7 +231,8 @@ static int twin_ray(const ebpo_segment *ray, const double triangle[3][3], interv
     else {
         keep_area(r, p, &normal, &origin, &direction);
         dot3(slope, &normal, &direction);
-        side = r->any && r->strict ? -mpq_sgn(slope) : 0;
+        *facing = r->any ? -mpq_sgn(slope) : 0;
+        side = r->strict ? *facing : 0;
     }
     for (int i = 0; i < 3; i++)
         clear3(&p[i]);
@@ -382,13 +385,15 @@ static void check_ray(const ebpo_segment *ray, const double triangle[3][3], int 
 {
     interval r;
     ebpo_ray_meeting m;
-    int side = twin_ray(ray, triangle, &r);
+    int facing, side = twin_ray(ray, triangle, &r, &facing);
     ebpo_ray_triangle(ray, triangle, &m);
     ck_assert_msg(m.meets == r.any, "kind %d, case %ld: meets %d, twin %d", kind, count->cases,
                   m.meets, r.any);
     if (m.meets) {
         ck_assert_msg(m.side == side, "kind %d, case %ld: side %d, twin %d", kind, count->cases,
                       m.side, side);
+        ck_assert_msg(m.facing == facing, "kind %d, case %ld: facing %d, twin %d", kind,
+                      count->cases, m.facing, facing);
         ck_assert_msg(close_enough(m.t, r.low), "kind %d, case %ld: t %a, twin %a", kind,
                       count->cases, m.t, mpq_get_d(r.low));
         ck_assert(m.t <= ray->t_max);
@@ -466,6 +471,7 @@ START_TEST(hits_are_ordered_as_rationals_are)
         ebpo_segment ray;
         double a[3][3], b[3][3], other_case[3][3];
         interval ra, rb;
+        int facing;
         ebpo_segment unused;
         ray_case(i % RAY_KINDS, &ray, a, &state);
         ray.t_max = INFINITY;
@@ -476,8 +482,8 @@ START_TEST(hits_are_ordered_as_rationals_are)
             b[1][0] = nudged(b[1][0], &state);
         if (twin_random(&state) % 8 == 0)
             memcpy(b, other_case, sizeof b);
-        twin_ray(&ray, (const double(*)[3])a, &ra);
-        twin_ray(&ray, (const double(*)[3])b, &rb);
+        twin_ray(&ray, (const double(*)[3])a, &ra, &facing);
+        twin_ray(&ray, (const double(*)[3])b, &rb, &facing);
         if (ra.any && rb.any) {
             int order = mpq_cmp(ra.low, rb.low);
             order = (order > 0) - (order < 0);
@@ -505,27 +511,28 @@ START_TEST(simple_rays_are_answered_by_hand)
         const double (*triangle)[3];
         ebpo_ray_meeting expected;
     } cases[] = {
-        { { { .5, .5, 0 }, { 0, 0, 2 }, INFINITY }, t, { true, -1, .5 } },
-        { { { .5, .5, 2 }, { 0, 0, -1 }, INFINITY }, t, { true, 1, 1 } },
-        { { { .5, .5, 2 }, { 0, 0, -1 }, 1 }, t, { true, 1, 1 } },
-        { { { .5, .5, 2 }, { 0, 0, -1 }, 0x1.fffffffffffffp-1 }, t, { false, 0, 0 } },
-        { { { .5, .5, 1 }, { 0, 0, -1 }, 0 }, t, { true, 1, 0 } },
-        { { { .5, .5, 0 }, { 0, 0, -1 }, INFINITY }, t, { false, 0, 0 } },
-        { { { 1, 1, 0 }, { 0, 0, 1 }, INFINITY }, t, { true, 0, 1 } },
-        { { { 0, 0, 0 }, { 0, 0, 1 }, INFINITY }, t, { true, 0, 1 } },
-        { { { -1, 1, 1 }, { 1, 0, 0 }, INFINITY }, t, { true, 0, 1 } },
-        { { { .5, .5, 1 }, { 1, 0, 0 }, INFINITY }, t, { true, 0, 0 } },
-        { { { -1, 1, 1.5 }, { 1, 0, 0 }, INFINITY }, t, { false, 0, 0 } },
-        { { { 2, -1, 0 }, { 0, 4, 0 }, INFINITY }, flat, { true, 0, .25 } },
-        { { { 0, 0, 0 }, { 1, 0, 0 }, INFINITY }, flat, { true, 0, 1 } },
-        { { { 4, 0, 0 }, { 1, 0, 0 }, INFINITY }, flat, { false, 0, 0 } },
-        { { { 0, 0, 0 }, { 1, 1, 1 }, 1 }, point, { true, 0, 1 } },
-        { { { 0, 0, 0 }, { 1, 1, 2 }, INFINITY }, point, { false, 0, 0 } },
+        { { { .5, .5, 0 }, { 0, 0, 2 }, INFINITY }, t, { true, -1, -1, .5 } },
+        { { { .5, .5, 2 }, { 0, 0, -1 }, INFINITY }, t, { true, 1, 1, 1 } },
+        { { { .5, .5, 2 }, { 0, 0, -1 }, 1 }, t, { true, 1, 1, 1 } },
+        { { { .5, .5, 2 }, { 0, 0, -1 }, 0x1.fffffffffffffp-1 }, t, { false, 0, 0, 0 } },
+        { { { .5, .5, 1 }, { 0, 0, -1 }, 0 }, t, { true, 1, 1, 0 } },
+        { { { .5, .5, 0 }, { 0, 0, -1 }, INFINITY }, t, { false, 0, 0, 0 } },
+        { { { 1, 1, 0 }, { 0, 0, 1 }, INFINITY }, t, { true, 0, -1, 1 } },
+        { { { 0, 0, 0 }, { 0, 0, 1 }, INFINITY }, t, { true, 0, -1, 1 } },
+        { { { -1, 1, 1 }, { 1, 0, 0 }, INFINITY }, t, { true, 0, 0, 1 } },
+        { { { .5, .5, 1 }, { 1, 0, 0 }, INFINITY }, t, { true, 0, 0, 0 } },
+        { { { -1, 1, 1.5 }, { 1, 0, 0 }, INFINITY }, t, { false, 0, 0, 0 } },
+        { { { 2, -1, 0 }, { 0, 4, 0 }, INFINITY }, flat, { true, 0, 0, .25 } },
+        { { { 0, 0, 0 }, { 1, 0, 0 }, INFINITY }, flat, { true, 0, 0, 1 } },
+        { { { 4, 0, 0 }, { 1, 0, 0 }, INFINITY }, flat, { false, 0, 0, 0 } },
+        { { { 0, 0, 0 }, { 1, 1, 1 }, 1 }, point, { true, 0, 0, 1 } },
+        { { { 0, 0, 0 }, { 1, 1, 2 }, INFINITY }, point, { false, 0, 0, 0 } },
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         ebpo_ray_meeting m;
         ebpo_ray_triangle(&cases[i].ray, cases[i].triangle, &m);
-        ck_assert_msg(m.meets == cases[i].expected.meets && m.side == cases[i].expected.side,
+        ck_assert_msg(m.meets == cases[i].expected.meets && m.side == cases[i].expected.side &&
+                          m.facing == cases[i].expected.facing,
                       "case %zu", i);
         ck_assert_msg(!m.meets || m.t == cases[i].expected.t, "case %zu: t %g", i, m.t);
     }

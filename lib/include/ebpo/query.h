@@ -5,7 +5,8 @@
  *   Models           ebpo_model_new, and ebpo_context_new for each thread
  *   Point in solid   ebpo_inside, ebpo_inside_many
  *   Distance         ebpo_distance, ebpo_distance_many
- *   Rays and boxes   ebpo_ray_first, ebpo_ray_all, ebpo_faces_in_box, ebpo_triangles_in_box
+ *   Rays             ebpo_ray_first, ebpo_ray_any, ebpo_ray_all, and each of these for many
+ *   Boxes            ebpo_faces_in_box, ebpo_triangles_in_box
  *   Mass             ebpo_measure
  *
  *     ebpo_file *file = NULL;
@@ -394,7 +395,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_distance_many(ebpo_context *context, con
                                                       const ebpo_distance_options *options,
                                                       ebpo_distance_result *out, ebpo_error *error);
 
-/* ---- rays and boxes ---- */
+/* ---- rays ---- */
 
 typedef struct ebpo_ray_hit {
     /*
@@ -441,6 +442,93 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_all(ebpo_context *context, const dou
                                                 const double direction[3], double t_max,
                                                 const ebpo_ray_hit **hits, uint64_t *count,
                                                 ebpo_error *error);
+
+/*
+ * Whether the ray meets any triangle: what ebpo_ray_first says in *hit, with less work.
+ *
+ * Errors are those of ebpo_ray_first.
+ *
+ * Threads: one per context.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_any(ebpo_context *context, const double origin[3],
+                                                const double direction[3], double t_max, bool *any,
+                                                ebpo_error *error);
+
+/*
+ * Which triangles count. Their normals decide, wherever they are met, so that nothing slips through
+ * between two of them: an edge or a vertex belongs to all its triangles. Those without area, and
+ * those in whose plane the ray runs, have no sides: they count with EBPO_RAY_BOTH only.
+ */
+typedef enum ebpo_ray_sides {
+    EBPO_RAY_BOTH = 0,  /* all */
+    EBPO_RAY_FRONT = 1, /* met against their normal: from outside, if the model is a solid */
+    EBPO_RAY_BACK = 2   /* met along their normal */
+} ebpo_ray_sides;
+
+typedef struct ebpo_ray_options {
+    size_t struct_size; /* EBPO_RAY_OPTIONS_INIT sets it */
+
+    ebpo_ray_sides sides;
+
+    /*
+     * 0: all cores. Few rays take fewer threads; ways of loading other than
+     * EBPO_LOAD_CACHE one.
+     */
+    unsigned threads;
+} ebpo_ray_options;
+
+#define EBPO_RAY_OPTIONS_INIT                      \
+    {                                              \
+        sizeof(ebpo_ray_options), EBPO_RAY_BOTH, 1 \
+    }
+
+/* origin + t direction, as in ebpo_ray_first. */
+typedef struct ebpo_ray {
+    double origin[3], direction[3];
+    double t_max;
+} ebpo_ray;
+
+/*
+ * ebpo_ray_first for rays[count], into out[count]; where nothing is met, t is INFINITY and the face
+ * is EBPO_NO_FACE. options: NULL for the usual ones. Answers depend neither on the threads nor on
+ * what else is asked. If not everything is in memory, rays are followed in the order in which they
+ * enter the model, along a curve, so that subtrees are loaded few times.
+ *
+ * EBPO_E_ARGUMENT, with the ray's number: before any is answered. Else the errors of
+ * ebpo_ray_first; of several the one of the first ray in the order of work. On failure, `out` is
+ * unspecified.
+ *
+ * Threads: one per context; further ones live for the call.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_first_many(ebpo_context *context, const ebpo_ray *rays,
+                                                       uint64_t count,
+                                                       const ebpo_ray_options *options,
+                                                       ebpo_ray_hit *out, ebpo_error *error);
+
+/*
+ * ebpo_ray_any for rays[count], into any[count]; the rest as in ebpo_ray_first_many.
+ *
+ * Threads: one per context; further ones live for the call.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_any_many(ebpo_context *context, const ebpo_ray *rays,
+                                                     uint64_t count,
+                                                     const ebpo_ray_options *options, bool *any,
+                                                     ebpo_error *error);
+
+/*
+ * ebpo_ray_all for rays[count]: the hits of ray i are hits[begin[i]] to hits[begin[i + 1] - 1];
+ * `begin` has count + 1 items. Both are the context's, until its next call. The rest as in
+ * ebpo_ray_first_many.
+ *
+ * Threads: one per context; further ones live for the call.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_all_many(ebpo_context *context, const ebpo_ray *rays,
+                                                     uint64_t count,
+                                                     const ebpo_ray_options *options,
+                                                     const ebpo_ray_hit **hits,
+                                                     const uint64_t **begin, ebpo_error *error);
+
+/* ---- boxes ---- */
 
 /*
  * The closed triangles that meet the closed box min .. max, with min <= max on

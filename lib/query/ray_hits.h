@@ -1,0 +1,51 @@
+/* What a ray has met so far: exact decisions about one triangle after the other, of which the
+ * question's answer is kept. One thread. */
+#ifndef EBPO_QUERY_RAY_HITS_H
+#define EBPO_QUERY_RAY_HITS_H
+
+#include "geom/ray.h"
+#include "query/query_model.h"
+
+typedef enum ebpo_ray_wants { EBPO_WANTS_FIRST, EBPO_WANTS_ANY, EBPO_WANTS_ALL } ebpo_ray_wants;
+
+/* A face that the ray meets, with what exact comparison needs. */
+struct ebpo_met {
+    double triangle[3][3];
+    uint64_t file_face, source_face;
+    ebpo_ray_meeting meeting;
+};
+
+typedef struct ebpo_casting {
+    ebpo_context *context; /* its list of faces takes all hits */
+    ebpo_segment ray;
+    ebpo_ray_wants wants;
+    ebpo_ray_sides sides; /* only such faces count */
+    double limit;         /* t beyond which nothing matters, certain; falls while searching */
+    bool done;            /* nothing more is to be looked at */
+    bool no_memory;
+    uint64_t count;
+    ebpo_met first; /* if count > 0, unless all are wanted */
+} ebpo_casting;
+
+void ebpo_casting_begin(ebpo_casting *casting, ebpo_context *context, const ebpo_segment *ray,
+                        ebpo_ray_wants wants, ebpo_ray_sides sides);
+
+/* Whether the ray meets m->triangle, and from a side that counts; then m->meeting says where. */
+bool ebpo_casting_meets(const ebpo_casting *casting, ebpo_met *m);
+
+/* A face that is met, with its numbers. */
+void ebpo_casting_keep(ebpo_casting *casting, const ebpo_met *m);
+
+/* All hits in order, each once, into context->hits from `begin` on, up to *end. */
+EBPO_MUST_USE ebpo_status ebpo_casting_sort(ebpo_casting *casting, uint64_t begin, uint64_t *end,
+                                            ebpo_error *error);
+
+static inline ebpo_ray_hit ebpo_hit_of(const ebpo_met *m)
+{
+    return (ebpo_ray_hit){ m->meeting.t, m->source_face, m->meeting.side };
+}
+
+/* What is wrong with a ray, as the end of a sentence; NULL: nothing. */
+const char *ebpo_ray_fault(const ebpo_segment *ray);
+
+#endif

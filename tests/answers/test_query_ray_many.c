@@ -1,0 +1,246 @@
+/* Many rays at once: answers are those of single ones, in their order, whatever the threads and
+ * whatever is in memory; and what a closed solid promises to every ray. */
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "check_main.h"
+#include "query_kit.h"
+
+typedef struct answers {
+    ebpo_ray_hit *first;
+    bool *any;
+} answers;
+
+static ebpo_ray *make_rays(query_model *m, uint64_t count, uint64_t seed)
+{
+    ebpo_ray *rays = query_room(count, sizeof *rays);
+    for (uint64_t i = 0; i < count; i++) {
+        ebpo_ray *r = &rays[i];
+        query_make_ray(m, &seed, r->origin, r->direction, &r->t_max);
+        for (int k = 0; k < 3; k++)
+            if (!isfinite(r->direction[k]))
+                r->direction[k] = copysign(1e308, r->direction[k]);
+    }
+    return rays;
+}
+
+static bool same_hit(const ebpo_ray_hit *a, const ebpo_ray_hit *b)
+{
+    return memcmp(&a->t, &b->t, sizeof a->t) == 0 && a->face == b->face && a->side == b->side;
+}
+
+/* The hits of one ray at a time, from all sides. */
+static void ask_singly(ebpo_context *context, const ebpo_ray *rays, uint64_t count, answers *out)
+{
+    for (uint64_t i = 0; i < count; i++) {
+        bool hit;
+        out->first[i] = (ebpo_ray_hit){ INFINITY, EBPO_NO_FACE, 0 };
+        ASSERT_OK(ebpo_ray_first(context, rays[i].origin, rays[i].direction, rays[i].t_max,
+                                 &out->first[i], &hit, error));
+        ASSERT_OK(ebpo_ray_any(context, rays[i].origin, rays[i].direction, rays[i].t_max,
+                               &out->any[i], error));
+        ck_assert_int_eq(hit, out->any[i]);
+    }
+}
+
+static void ask_together(ebpo_context *context, ebpo_context *other, const ebpo_ray *rays,
+                         uint64_t count, unsigned threads, const answers *expected)
+{
+    ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
+    const ebpo_ray_hit *hits, *single;
+    const uint64_t *begin;
+    uint64_t n;
+    answers got = { query_room(count, sizeof *got.first), query_room(count, sizeof *got.any) };
+    options.threads = threads;
+    ASSERT_OK(ebpo_ray_first_many(context, rays, count, &options, got.first, error));
+    ASSERT_OK(ebpo_ray_any_many(context, rays, count, &options, got.any, error));
+    ASSERT_OK(ebpo_ray_all_many(context, rays, count, &options, &hits, &begin, error));
+    for (uint64_t i = 0; i < count; i++) {
+        ck_assert(same_hit(&got.first[i], &expected->first[i]));
+        ck_assert_int_eq(got.any[i], expected->any[i]);
+        ASSERT_OK(ebpo_ray_all(other, rays[i].origin, rays[i].direction, rays[i].t_max, &single, &n,
+                               error));
+        ck_assert_uint_eq(begin[i + 1] - begin[i], n);
+        for (uint64_t k = 0; k < n; k++)
+            ck_assert(same_hit(&hits[begin[i] + k], &single[k]));
+        ck_assert(n == 0 || same_hit(&single[0], &expected->first[i]));
+    }
+    free(got.first);
+    free(got.any);
+}
+
+START_TEST(many_rays_are_answered_as_single_ones)
+{
+    query_model m;
+    query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[5]);
+    uint64_t count = _i == 2 ? 100 : 1100; /* enough for pieces that several threads take */
+    ebpo_ray *rays = make_rays(&m, count, 7);
+    answers expected = { query_room(count, sizeof *expected.first),
+                         query_room(count, sizeof *expected.any) };
+    ask_singly(m.context, rays, count, &expected);
+    ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+    how.cut_level = _i ? 2 : -1;
+    how.loading = _i == 2 ? EBPO_LOAD_SUBTREE : EBPO_LOAD_CACHE;
+    ebpo_model *model;
+    ebpo_context *context;
+    ASSERT_OK(ebpo_model_new(m.file, &how, &model, error));
+    ASSERT_OK(ebpo_context_new(model, &context, error));
+    for (unsigned threads = 1; threads < 4; threads += 2)
+        ask_together(context, m.context, rays, count, threads, &expected);
+    ebpo_context_free(context);
+    ebpo_model_free(model);
+    free(expected.first);
+    free(expected.any);
+    free(rays);
+    query_model_free(&m);
+}
+END_TEST
+
+START_TEST(rays_that_make_no_sense_are_named)
+{
+    query_model m;
+    query_model_make(&m, "cube", query_solid_by_name("cube"), &query_variants[0]);
+    ebpo_ray rays[3] = { { { 0, 0, 0 }, { 1, 0, 0 }, 1 },
+                         { { 0, 0, 0 }, { 1, 0, 0 }, INFINITY },
+                         { { 0, 0, 0 }, { 1, 0, 0 }, 1 } };
+    ebpo_ray_hit first[3];
+    const ebpo_ray_hit *hits;
+    const uint64_t *begin;
+    bool any[3];
+    ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
+    ASSERT_OK(ebpo_ray_all_many(m.context, rays, 0, NULL, &hits, &begin, error));
+    ck_assert_uint_eq(begin[0], 0);
+    ebpo_error error = EBPO_ERROR_INIT;
+    if (_i == 0)
+        rays[2].t_max = -1;
+    else if (_i == 1)
+        rays[2].direction[0] = 0;
+    else if (_i == 2)
+        rays[2].origin[1] = NAN;
+    else
+        options.sides = (ebpo_ray_sides)3;
+    ck_assert_int_eq(ebpo_ray_first_many(m.context, rays, 3, &options, first, &error),
+                     EBPO_E_ARGUMENT);
+    ck_assert(_i == 3 || strstr(error.message, "ray 2 "));
+    ck_assert_int_eq(ebpo_ray_any_many(m.context, rays, 3, &options, any, &error), EBPO_E_ARGUMENT);
+    ck_assert_int_eq(ebpo_ray_all_many(m.context, rays, 3, &options, &hits, &begin, &error),
+                     EBPO_E_ARGUMENT);
+    query_model_free(&m);
+}
+END_TEST
+
+/* --- closed solids --- */
+
+/* From p towards about a vertex, a point of an edge or of a face; false: there is no direction. */
+static bool aim(const query_model *m, const double p[3], uint64_t *state, ebpo_ray *out)
+{
+    static const double weights[][3] = {
+        { 1, 0, 0 }, { .5, .5, 0 }, { .25, .75, 0 }, { .25, .25, .5 }
+    };
+    const double *w = weights[ebpo_test_random(state) % 4];
+    uint64_t face = ebpo_test_random(state) % m->mesh.face_count;
+    *out = (ebpo_ray){ .t_max = INFINITY };
+    for (int i = 0; i < 3; i++) {
+        double corner[3];
+        ebpo_test_point(&m->mesh, m->mesh.faces[3 * face + (uint64_t)i], corner);
+        for (int k = 0; k < 3; k++)
+            out->direction[k] += w[i] * (corner[k] - p[k]);
+    }
+    memcpy(out->origin, p, sizeof out->origin);
+    return isfinite(out->direction[0] + out->direction[1] + out->direction[2]) &&
+           (out->direction[0] != 0 || out->direction[1] != 0 || out->direction[2] != 0);
+}
+
+/* What leaves a convex solid meets no front, and its back where it meets anything; what comes from
+ * outside meets the front first, and something of the back behind it or at the same place. */
+static bool convex_keeps_its_word(ebpo_context *context, const ebpo_ray *ray, bool from_inside)
+{
+    static const ebpo_ray_sides sides[3] = { EBPO_RAY_BOTH, EBPO_RAY_FRONT, EBPO_RAY_BACK };
+    ebpo_ray_hit hit[3];
+    for (int i = 0; i < 3; i++) {
+        ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
+        options.sides = sides[i];
+        ASSERT_OK(ebpo_ray_first_many(context, ray, 1, &options, &hit[i], error));
+    }
+    if (from_inside)
+        return hit[0].face != EBPO_NO_FACE && hit[1].face == EBPO_NO_FACE &&
+               same_hit(&hit[2], &hit[0]);
+    /* what runs within a face may be told of that face: then t is the same but for rounding */
+    return hit[0].face == EBPO_NO_FACE ||
+           (fabs(hit[0].t - hit[1].t) <= 4 * DBL_EPSILON * hit[0].t &&
+            hit[2].face != EBPO_NO_FACE && hit[2].t >= hit[1].t);
+}
+
+START_TEST(convex_solids_are_tight)
+{
+    static const char *const names[] = { "sphere", "cube" };
+    query_model m;
+    query_model_make(&m, names[_i], query_solid_by_name(names[_i]), &query_variants[5]);
+    uint64_t state = 5, count = query_scaled(3000), wrong = 0;
+    double *points = query_room(count, 3 * sizeof *points);
+    query_make_points(&m, count, 9, points);
+    for (uint64_t i = 0; i < count; i++) {
+        ebpo_inside_result where;
+        ebpo_ray ray;
+        ASSERT_OK(ebpo_inside(m.context, points + 3 * i, NULL, &where, error));
+        if (!aim(&m, points + 3 * i, &state, &ray) || where.where == EBPO_ON)
+            continue;
+        wrong += !convex_keeps_its_word(m.context, &ray, where.where == EBPO_IN);
+    }
+    ck_assert_uint_eq(wrong, 0);
+    free(points);
+    query_model_free(&m);
+}
+END_TEST
+
+/* No ray leaves a solid unseen; one that meets no edge goes in as often as out, but for its
+ * beginning. */
+START_TEST(solids_are_tight)
+{
+    query_model m;
+    query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
+                     &query_variants[_i % query_variant_count]);
+    uint64_t state = 5, count = query_scaled(m.mesh.face_count > 500 ? 500 : 2000), wrong = 0;
+    double *points = query_room(count, 3 * sizeof *points);
+    query_make_points(&m, count, 9, points);
+    for (uint64_t i = 0; i < count && m.info.solid; i++) {
+        ebpo_inside_result where;
+        const ebpo_ray_hit *hits;
+        uint64_t n;
+        ebpo_ray ray;
+        int sum = 0;
+        bool clean = true, any;
+        ASSERT_OK(ebpo_inside(m.context, points + 3 * i, NULL, &where, error));
+        if (!aim(&m, points + 3 * i, &state, &ray) || where.where == EBPO_ON)
+            continue;
+        ASSERT_OK(ebpo_ray_any(m.context, ray.origin, ray.direction, INFINITY, &any, error));
+        ASSERT_OK(ebpo_ray_all(m.context, ray.origin, ray.direction, INFINITY, &hits, &n, error));
+        for (uint64_t k = 0; k < n; k++) {
+            clean &= hits[k].side != 0;
+            sum += hits[k].side;
+        }
+        wrong += any != (n > 0) || (where.winding && !any) || (clean && sum != -where.winding);
+    }
+    ck_assert_uint_eq(wrong, 0);
+    free(points);
+    query_model_free(&m);
+}
+END_TEST
+
+Suite *test_suite(void)
+{
+    Suite *suite = suite_create("query_ray_many");
+    TCase *many = tcase_create("many"), *tight = tcase_create("tight");
+    tcase_set_timeout(many, 600);
+    tcase_set_timeout(tight, 600);
+    tcase_add_loop_test(many, many_rays_are_answered_as_single_ones, 0, 3);
+    tcase_add_loop_test(many, rays_that_make_no_sense_are_named, 0, 4);
+    tcase_add_loop_test(tight, convex_solids_are_tight, 0, 2);
+    tcase_add_loop_test(tight, solids_are_tight, 0, query_solid_count());
+    suite_add_tcase(suite, many);
+    suite_add_tcase(suite, tight);
+    return suite;
+}
