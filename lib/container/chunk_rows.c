@@ -12,6 +12,8 @@ enum {
     OUTER_ROWS = 4096
 };
 
+__extension__ typedef unsigned __int128 wide; /* of rows there are at most 2^40 */
+
 int ebpo_last_whole_level(const ebpo_info *info)
 {
     return info->subtree_level > FIRST_LEVELS ? info->subtree_level : FIRST_LEVELS;
@@ -26,14 +28,14 @@ int ebpo_first_deep_level(const ebpo_info *info)
     return level;
 }
 
-/* The power of two that is nearest, by its ratio, to the rows that go with CHUNK_FACES faces. */
+/* The power of two that is nearest, by its ratio, to the rows that go with CHUNK_FACES faces: the
+ * first one that is not less than these over the root of 2. In integers, as bytes depend on it. */
 static uint64_t rows_for_faces(const ebpo_info *info, uint64_t rows)
 {
-    double wanted = (double)rows * CHUNK_FACES / (double)info->face_count;
-    uint64_t found = 1;
-    while ((double)found * 1.4142135623730951 < wanted)
+    wide wanted = (wide)rows * CHUNK_FACES, found = 1;
+    while (2 * (found * info->face_count) * (found * info->face_count) < wanted * wanted)
         found *= 2;
-    return found;
+    return (uint64_t)found;
 }
 
 static uint64_t wanted_rows(const ebpo_info *info, ebpo_array_id id, int level, uint64_t rows,

@@ -72,12 +72,14 @@ static ebpo_status decode_refs(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
+/* Of an index that is also about parts that are left out, nothing can be said. */
 static ebpo_status check_index(const ebpo_file *file, ebpo_array_id id, const ebpo_level *level,
-                               int number, const uint64_t *right, ebpo_error *error)
+                               int number, uint64_t without, const uint64_t *right,
+                               ebpo_error *error)
 {
     const ebpo_array_in *array = ebpo_reader_array(file, id, number);
     uint64_t *stored = NULL;
-    if (!array->present)
+    if (!array->present || ebpo_schema[id].needs & without)
         return EBPO_OK;
     ebpo_read_options read = ebpo_read_threads(1);
     read.workspace = level->workspace;
@@ -116,7 +118,8 @@ static ebpo_status finish_leaves(const ebpo_file *file, int number, ebpo_level *
     ebpo_status status =
         index ? EBPO_OK : ebpo_fail_memory(error, level->leaf_count / EBPO_INDEX_ROWS * 24);
     if (status == EBPO_OK)
-        status = check_index(file, EBPO_A_LEAF_INDEX, level, number, index, error);
+        status =
+            check_index(file, EBPO_A_LEAF_INDEX, level, number, options->without, index, error);
     if (status == EBPO_OK && level->leaf_refs) {
         refs_job j = { file, number, level, index };
         uint64_t blocks = (level->leaf_count - 1) / EBPO_INDEX_ROWS + 1;
@@ -128,16 +131,16 @@ static ebpo_status finish_leaves(const ebpo_file *file, int number, ebpo_level *
 }
 
 static ebpo_status check_indexes(const ebpo_file *file, int number, const ebpo_level *level,
-                                 ebpo_error *error)
+                                 uint64_t without, ebpo_error *error)
 {
     uint64_t *types = ebpo_index_types(level, number == 0), *gray = ebpo_index_gray(level);
     ebpo_status status = types && gray
                              ? EBPO_OK
                              : ebpo_fail_memory(error, level->group_count / EBPO_INDEX_ROWS * 32);
     if (status == EBPO_OK)
-        status = check_index(file, EBPO_A_TYPES_INDEX, level, number, types, error);
+        status = check_index(file, EBPO_A_TYPES_INDEX, level, number, without, types, error);
     if (status == EBPO_OK)
-        status = check_index(file, EBPO_A_GRAY_INDEX, level, number, gray, error);
+        status = check_index(file, EBPO_A_GRAY_INDEX, level, number, without, gray, error);
     free(types);
     free(gray);
     return status;
@@ -182,13 +185,13 @@ ebpo_status ebpo_file_read_level(const ebpo_file *file, int level, const ebpo_re
                               info->level_count - 1);
     *out = ebpo_level_of_summary(info, level);
     out->workspace = read.workspace;
+    read.without &= info->parts;
     expect_arrays(file, level, (uint32_t)read.without);
     status = read_arrays(file, level, out, &read, error);
-    /* what leaf_index says is about the parts that are left out */
-    if (status == EBPO_OK && out->leaf_count && !(read.without & EBPO_NEEDS_MESH_OR_LEAF_PLANES))
+    if (status == EBPO_OK && out->leaf_count)
         status = finish_leaves(file, level, out, &read, error);
     if (status == EBPO_OK)
-        status = check_indexes(file, level, out, error);
+        status = check_indexes(file, level, out, read.without, error);
     if (status == EBPO_OK) {
         ebpo_check check = ebpo_reader_check(file, out->workspace);
         ebpo_info seen = *info;

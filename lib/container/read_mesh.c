@@ -227,6 +227,10 @@ ebpo_status ebpo_file_read_tree(const ebpo_file *file, const ebpo_read_options *
     ebpo_status status = EBPO_TAKE(ebpo_read_options, &read, options, error);
     if (status != EBPO_OK)
         return status;
+    if (read.without)
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, file->in.shown,
+                              "parts to be left out are asked for, and a tree is read whole; set "
+                              "read options' `without` to 0, or read levels");
     ebpo_expect_tree(file);
     out->info = file->info;
     out->workspace = read.workspace;

@@ -307,7 +307,7 @@ static bool rows_fit(const ebpo_h5_shape *shape, ebpo_h5_rows rule, hsize_t rows
 {
     uint64_t full = ebpo_h5_chunk_rows(shape->rows, shape->cols, shape->element_size);
     if (rule == EBPO_H5_ROWS_ALL)
-        return rows == shape->rows && rows * ebpo_h5_row_bytes(shape) <= UINT32_MAX;
+        return rows == shape->rows && rows <= UINT32_MAX / ebpo_h5_row_bytes(shape);
     bool power = rows && !(rows & (rows - 1));
     return rows == full || (rule == EBPO_H5_ROWS_POWER && power && rows < full);
 }

@@ -591,8 +591,9 @@ typedef struct ebpo_read_options {
     ebpo_workspace *workspace;
 
     /*
-     * Of levels, bits of ebpo_part that are not read though the file has them: their
-     * arrays are NULL, the counts stay.
+     * ebpo_file_read_level: bits of ebpo_part that are not read though the file has
+     * them: their arrays are NULL, the counts stay. Whole trees (ebpo_file_read_tree,
+     * ebpo_file_repack) are not read without: EBPO_E_ARGUMENT unless it is 0.
      */
     uint64_t without;
 } ebpo_read_options;
@@ -664,7 +665,7 @@ EBPO_API void ebpo_maps_free(ebpo_maps *maps);
 /*
  * Reads everything. Freed by ebpo_tree_free.
  *
- * EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY.
+ * EBPO_E_ARGUMENT: `without` is not 0. EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY.
  *
  * Threads: any.
  */
