@@ -1,6 +1,6 @@
 /* Loading ahead. */
-#ifndef EBPO_QUERY_AHEAD_H
-#define EBPO_QUERY_AHEAD_H
+#ifndef EBPO_QUERY_PREFETCH_H
+#define EBPO_QUERY_PREFETCH_H
 
 #include "query/query_model.h"
 

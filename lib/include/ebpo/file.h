@@ -362,10 +362,11 @@ typedef struct ebpo_write_options {
     ebpo_progress progress;
 
     /*
-     * Subtrees of so many faces on average, or more, lie together each, so that one
-     * is read at once (format-spec/README.md, section 9); at most those below level 1
-     * where there are not as many. 0: 1,024, in files of 131,072 faces and more. EBPO_NO_SUBTREES:
-     * none, as in format 1.0.
+     * What is laid out so that it is read at once (format-spec/README.md, section 9):
+     * the subtrees of the deepest level that has at least so many faces for each gray
+     * node, or of level 1 where that has fewer. 0: 1,024, and no subtrees in files of
+     * fewer than 131,072 faces. EBPO_NO_SUBTREES: none, as in format 1.0. Trees of fewer
+     * than three levels have none.
      */
     uint64_t subtree_faces;
 } ebpo_write_options;

@@ -60,8 +60,10 @@ typedef struct ebpo_model_options {
     /*
      * Bytes that the model may take, with its caches and what loading needs on
      * the way. 0: as much as it needs; of a file on a server (http.h) that has more
-     * than 2 MiB and is not cut by `cut_level`, 256 MiB. Beside it there are the file's table of
-     * chunks (24 bytes a chunk) and what contexts gather of answers.
+     * than 2 MiB and is not cut by `cut_level`, 256 MiB. Such a file, if it has subtrees
+     * (ebpo_info.subtree_level), is read in parts however much is allowed. Beside it
+     * there are the file's table of chunks (24 bytes a chunk) and what contexts gather
+     * of answers.
      */
     uint64_t memory;
 
