@@ -1,7 +1,5 @@
-/* ebpo_tree_write: lays the file out once in memory to learn the sizes of its metadata, then writes
- * headers, the chunks of the first levels, the index of large arrays' chunks, and all other chunks,
- * in one go. */
-#include <stdio.h>
+/* ebpo_tree_write: headers, the chunks of the first levels, the index of large arrays' chunks, and
+ * all other chunks, in one go. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -15,17 +13,13 @@
 #include "container/chunk_order.h"
 #include "container/content.h"
 #include "container/head_facts.h"
-#include "container/plan.h"
 #include "container/container_write.h"
+#include "container/headers_write.h"
 #include "container/places.h"
 #include "io/publish.h"
 
 /* Chunks that are in memory at a time: 8 MiB raw and as much encoded. */
 enum { WINDOW = 128 };
-
-/* HDF5 lets a header grow within its metadata block by a tenth of what is left there: room for that
- * where no other header follows. */
-enum { ALONE_BYTES = 4096 };
 
 typedef struct slot {
     const ebpo_array_out *array;
@@ -39,192 +33,18 @@ typedef struct writer {
     ebpo_plan plan;
     const ebpo_write_options *options;
     unsigned threads;
-    ebpo_h5_out out;
-    ebpo_h5_id root;
+    ebpo_headers head;
     slot slots[WINDOW];
     unsigned used;            /* slots */
     ebpo_chunk_coder *coders; /* one for each thread */
     ebpo_chunk_order order;
     ebpo_array_digest *digest; /* [arrays of the plan] */
     ebpo_content content;
-    uint64_t chunk_bytes, chunks_done, chunks;
-    ebpo_array_out places; /* without subtrees it has no rows */
-    uint64_t *place;       /* [rows of places] */
+    uint64_t chunk_bytes, chunks_done;
+    uint64_t *place; /* [rows of places] */
     uint64_t place_count, top_bytes;
-    /* headers; the index of arrays of several chunks, and where it begins (0: there is none, or not
-     * yet) */
-    uint64_t head_bytes, index_bytes, index_at;
+    uint64_t index_at; /* where the index begins; 0: there is none, or not yet */
 } writer;
-
-static ebpo_status make_level_groups(writer *w, ebpo_error *error)
-{
-    const ebpo_info *info = &w->plan.info;
-    ebpo_h5_id id;
-    ebpo_status status =
-        ebpo_h5_make_group(&w->out, "/levels", (unsigned)info->level_count, &id, error);
-    ebpo_h5_close_id(status == EBPO_OK ? id : -1);
-    for (int level = 0; level < info->level_count && status == EBPO_OK; level++) {
-        char path[EBPO_PATH_BYTES];
-        unsigned links = 0;
-        for (unsigned i = 0; i < w->plan.count; i++)
-            links += w->plan.array[i].id < EBPO_LEVEL_ARRAYS && w->plan.array[i].level == level;
-        snprintf(path, sizeof path, "/levels/%02d", level);
-        status = ebpo_h5_make_group(&w->out, path, links, &id, error);
-        if (status == EBPO_OK)
-            status = ebpo_facts_put_level(&w->out, id, &info->level[level], error);
-        ebpo_h5_close_id(id);
-    }
-    return status;
-}
-
-/* A group of the root, if the part is there, with room for all arrays that it may have. */
-static ebpo_status make_root_group(writer *w, const char *path, ebpo_part part, ebpo_error *error)
-{
-    unsigned links = 0;
-    ebpo_h5_id id = -1;
-    if (!(w->plan.info.parts & part))
-        return EBPO_OK;
-    for (int k = EBPO_LEVEL_ARRAYS; k < EBPO_ARRAYS; k++)
-        links += (ebpo_schema[k].needs & part) != 0;
-    ebpo_status status = ebpo_h5_make_group(&w->out, path, links, &id, error);
-    ebpo_h5_close_id(id);
-    return status;
-}
-
-/* The file's first chunk (of the root's type), as soon as it can be. */
-typedef struct first_chunk {
-    const void *data;
-    size_t bytes;
-} first_chunk;
-
-static unsigned links_of_table(const writer *w)
-{
-    return w->places.shape.rows ? EBPO_ARRAYS - EBPO_A_SUBTREE_INDEX : 0;
-}
-
-static ebpo_status make_table_group(writer *w, ebpo_error *error)
-{
-    ebpo_h5_id id = -1;
-    if (!links_of_table(w))
-        return EBPO_OK;
-    ebpo_status status = ebpo_h5_make_group(&w->out, "/subtrees", links_of_table(w), &id, error);
-    ebpo_h5_close_id(id);
-    return status;
-}
-
-/* Of the list of chunks: its own place and the file's size, which tell readers whether it still
- * holds. */
-static ebpo_status put_holds(writer *w, uint64_t file_bytes, uint64_t offset, ebpo_error *error)
-{
-    ebpo_status status =
-        ebpo_h5_put_count(&w->out, w->places.handle, "file_bytes", file_bytes, error);
-    return status == EBPO_OK ? ebpo_h5_put_count(&w->out, w->places.handle, "offset", offset, error)
-                             : status;
-}
-
-static ebpo_status make_array(writer *w, ebpo_array_out *a, const first_chunk *first,
-                              ebpo_error *error)
-{
-    ebpo_status status = ebpo_h5_make_array(&w->out, a->path, &a->shape, &a->handle, error);
-    if (status == EBPO_OK && first)
-        status = ebpo_h5_put_chunk(&w->out, a->path, a->handle, &a->shape, 0, first->data,
-                                   first->bytes, error);
-    if (status == EBPO_OK)
-        status = ebpo_h5_put_text(&w->out, a->handle, "coding", ebpo_schema[a->id].coding, error);
-    if (status == EBPO_OK)
-        status = ebpo_h5_put_text(&w->out, a->handle, "about", ebpo_schema[a->id].about, error);
-    return status;
-}
-
-/* Everything but the chunks, and the first of these, before the first header grows by attributes:
- * HDF5 then cannot grow the metadata block at the end of the file, but only fill it. */
-static ebpo_status lay_out(writer *w, const char *path, const char *shown, uint64_t head_bytes,
-                           first_chunk first, ebpo_error *error)
-{
-    ebpo_plan *plan = &w->plan;
-    w->out.codec_level = w->options->codec_level;
-    ebpo_status status =
-        ebpo_h5_create(&w->out, path, shown, head_bytes, 3 + (links_of_table(w) != 0), error);
-    if (status == EBPO_OK)
-        status = ebpo_h5_root(&w->out, &w->root, error);
-    if (status == EBPO_OK)
-        status = ebpo_facts_put(&w->out, w->root, &plan->info, error);
-    if (status == EBPO_OK)
-        status = make_level_groups(w, error);
-    if (status == EBPO_OK)
-        status = make_root_group(w, "/mesh", EBPO_PART_MESH, error);
-    if (status == EBPO_OK)
-        status = make_root_group(w, "/maps", EBPO_PART_MAPS, error);
-    if (status == EBPO_OK)
-        status = make_table_group(w, error);
-    for (unsigned i = 0; i < plan->count && status == EBPO_OK; i++)
-        status = make_array(w, &plan->array[i], i == 0 ? &first : NULL, error);
-    if (status == EBPO_OK && w->places.shape.rows)
-        status = make_array(w, &w->places, NULL, error);
-    if (status == EBPO_OK && w->places.shape.rows)
-        status = put_holds(w, 0, 0, error);
-    return status;
-}
-
-static void close_handles(writer *w)
-{
-    for (unsigned i = 0; i < w->plan.count; i++) {
-        ebpo_h5_close_id(w->plan.array[i].handle);
-        w->plan.array[i].handle = -1;
-    }
-    ebpo_h5_close_id(w->places.handle);
-    ebpo_h5_close_id(w->root);
-    w->places.handle = w->root = -1;
-}
-
-static bool has_index(const ebpo_plan *plan)
-{
-    for (unsigned i = 0; i < plan->count; i++)
-        if (ebpo_h5_chunk_count(&plan->array[i].shape) > 1)
-            return true;
-    return false;
-}
-
-/* Sizes of headers and index: the same file in memory, with chunks of one byte. */
-static ebpo_status measure_metadata(writer *w, const char *shown, ebpo_error *error)
-{
-    ebpo_plan *plan = &w->plan;
-    uint64_t capacity = (256 << 10) + (4 << 10) * (uint64_t)plan->count + 32 * w->chunks,
-             headers = 0, all = 0;
-    ebpo_status status = lay_out(w, NULL, shown, capacity, (first_chunk){ "", 1 }, error);
-    if (status == EBPO_OK)
-        status = ebpo_h5_head_used(&w->out, capacity, &headers, error);
-    for (unsigned i = 0; i < plan->count && status == EBPO_OK; i++) {
-        const ebpo_array_out *a = &plan->array[i];
-        for (uint64_t k = i == 0; k < ebpo_h5_chunk_count(&a->shape) && status == EBPO_OK; k++)
-            status = ebpo_h5_put_chunk(&w->out, a->path, a->handle, &a->shape, k, "", 1, error);
-    }
-    close_handles(w);
-    if (status == EBPO_OK)
-        status = ebpo_h5_head_used(&w->out, capacity, &all, error);
-    ebpo_h5_discard(&w->out);
-    w->head_bytes = (headers + 8 + 7) / 8 * 8; /* the last checksum may end in zero bytes */
-    if (plan->count == 1)
-        w->head_bytes += ALONE_BYTES;
-    /* not by the sizes, which are too small where a checksum ends in zero bytes */
-    w->index_bytes = has_index(plan) ? (all - headers + 8 + 7) / 8 * 8 : 0;
-    return status;
-}
-
-/* What comes now is in a piece of its own, once the first array of several chunks calls for it. */
-static ebpo_status begin_index(writer *w, const char *path, ebpo_error *error)
-{
-    close_handles(w);
-    ebpo_status status = ebpo_h5_reopen(&w->out, path, w->index_bytes, error);
-    if (status == EBPO_OK)
-        status = ebpo_h5_root(&w->out, &w->root, error);
-    for (unsigned i = 0; i < w->plan.count && status == EBPO_OK; i++)
-        status =
-            ebpo_h5_open_array(&w->out, w->plan.array[i].path, &w->plan.array[i].handle, error);
-    if (status == EBPO_OK && w->places.shape.rows)
-        status = ebpo_h5_open_array(&w->out, w->places.path, &w->places.handle, error);
-    return status;
-}
 
 static ebpo_status fill_slot(void *context, uint64_t begin, uint64_t end, unsigned worker,
                              ebpo_error *error)
@@ -283,7 +103,7 @@ static ebpo_status compress_slot(void *context, uint64_t begin, uint64_t end, un
                               s->array->shape.element_size, s->raw, s->raw_bytes, s->stored,
                               &s->stored_bytes);
         if (status != EBPO_OK)
-            return ebpo_fail_at(error, status, w->out.shown, s->array->path, -1,
+            return ebpo_fail_at(error, status, w->head.out.shown, s->array->path, -1,
                                 "a chunk could not be compressed");
     }
     return EBPO_OK;
@@ -302,7 +122,7 @@ static ebpo_status encode_window(writer *w, ebpo_error *error)
 
 static void note_place(writer *w, uint32_t number, uint64_t bytes)
 {
-    if (!w->places.shape.rows)
+    if (!w->head.places.shape.rows)
         return;
     w->place[w->place_count++] = ebpo_place(number, bytes);
 }
@@ -311,13 +131,14 @@ static void note_place(writer *w, uint32_t number, uint64_t bytes)
 static void place_chunk(writer *w, const slot *s)
 {
     if (w->index_at == 0 && ebpo_h5_chunk_count(&s->array->shape) > 1) {
-        w->index_at = w->head_bytes + w->chunk_bytes;
-        note_place(w, EBPO_PLACE_GAP, w->index_bytes);
+        w->index_at = w->head.head_bytes + w->chunk_bytes;
+        note_place(w, EBPO_PLACE_GAP, w->head.index_bytes);
     }
     note_place(w, ebpo_place_number(s->array->id, s->array->level), s->stored_bytes);
     w->chunk_bytes += s->stored_bytes;
     if (w->chunks_done + 1 == w->order.top)
-        w->top_bytes = w->head_bytes + w->chunk_bytes + (w->index_at ? w->index_bytes : 0);
+        w->top_bytes =
+            w->head.head_bytes + w->chunk_bytes + (w->index_at ? w->head.index_bytes : 0);
 }
 
 static ebpo_status flush_window(writer *w, ebpo_error *error)
@@ -327,14 +148,14 @@ static ebpo_status flush_window(writer *w, ebpo_error *error)
         const slot *s = &w->slots[i];
         place_chunk(w, s);
         if (w->chunks_done++ == 0)
-            continue; /* written by lay_out */
-        status = ebpo_h5_put_chunk(&w->out, s->array->path, s->array->handle, &s->array->shape,
+            continue; /* written with the headers */
+        status = ebpo_h5_put_chunk(&w->head.out, s->array->path, s->array->handle, &s->array->shape,
                                    s->chunk, s->stored, s->stored_bytes, error);
     }
     w->used = 0;
     const ebpo_progress *progress = &w->options->progress;
     if (status == EBPO_OK &&
-        !ebpo_progress_step(progress, "writing", w->chunks_done, w->chunks, error))
+        !ebpo_progress_step(progress, "writing", w->chunks_done, w->order.count, error))
         status = EBPO_E_CANCELLED;
     return status;
 }
@@ -357,43 +178,32 @@ static ebpo_status write_places(writer *w, ebpo_error *error)
 {
     uint8_t *stored = NULL;
     size_t bytes = 0;
-    uint64_t offset = w->head_bytes + w->chunk_bytes + w->index_bytes, size = 0;
-    ebpo_status status = ebpo_places_encode(w->place, w->place_count, w->places.shape.pipeline,
+    uint64_t offset = w->head.head_bytes + w->chunk_bytes + w->head.index_bytes, size = 0;
+    ebpo_status status = ebpo_places_encode(w->place, w->place_count, w->head.places.shape.pipeline,
                                             w->options->codec_level, &stored, &bytes, error);
     if (status == EBPO_OK)
-        status = ebpo_h5_put_chunk(&w->out, w->places.path, w->places.handle, &w->places.shape, 0,
-                                   stored, bytes, error);
+        status = ebpo_h5_put_chunk(&w->head.out, w->head.places.path, w->head.places.handle,
+                                   &w->head.places.shape, 0, stored, bytes, error);
     free(stored);
     if (status == EBPO_OK)
-        status = ebpo_h5_size(&w->out, &size, error);
+        status = ebpo_h5_size(&w->head.out, &size, error);
     bool holds = size == offset + bytes;
-    return status == EBPO_OK ? put_holds(w, holds ? size : 0, holds ? offset : 0, error) : status;
-}
-
-static void plan_places(writer *w)
-{
-    w->places = (ebpo_array_out){ .id = EBPO_A_PLACES, .handle = -1 };
-    ebpo_schema_path(EBPO_A_PLACES, 0, w->places.path);
-    if (!w->plan.info.subtree_level)
-        return;
-    uint64_t rows = w->chunks + has_index(&w->plan);
-    w->places.shape = (ebpo_h5_shape){ .rows = rows,
-                                       .chunk_rows = (uint32_t)rows,
-                                       .element_size = 8,
-                                       .pipeline = w->plan.array[0].shape.pipeline };
+    return status == EBPO_OK
+               ? ebpo_headers_put_holds(&w->head, holds ? size : 0, holds ? offset : 0, error)
+               : status;
 }
 
 static ebpo_status make_window(writer *w, ebpo_error *error)
 {
     size_t bound = ebpo_chunk_bound(EBPO_CHUNK_BYTES_MAX),
            slot_bytes = EBPO_CHUNK_BYTES_MAX + bound;
-    uint64_t wanted = w->chunks < WINDOW ? w->chunks : WINDOW;
+    uint64_t wanted = w->order.count < WINDOW ? w->order.count : WINDOW;
     w->threads = ebpo_thread_count(w->options->threads);
     w->coders = ebpo_alloc_zero(w->threads, sizeof *w->coders);
     uint8_t *block = ebpo_alloc(wanted, slot_bytes);
     w->slots[0].raw = block;
     w->digest = ebpo_alloc(w->plan.count, sizeof *w->digest);
-    w->place = ebpo_alloc(w->places.shape.rows, sizeof *w->place);
+    w->place = ebpo_alloc(w->head.places.shape.rows, sizeof *w->place);
     if (!w->coders || !block || !w->digest || !w->place)
         return ebpo_fail_memory(error, wanted * slot_bytes);
     for (unsigned i = 0; i < wanted; i++) {
@@ -422,27 +232,29 @@ static ebpo_status write_file(writer *w, const char *path, const char *shown, eb
     size_t first_bytes = 0;
     ebpo_status status = encode_first(w, first, &first_bytes, error);
     if (status == EBPO_OK)
-        status = measure_metadata(w, shown, error);
+        status = ebpo_headers_measure(&w->head, shown, error);
     if (status == EBPO_OK)
-        status = lay_out(w, path, shown, w->head_bytes, (first_chunk){ first, first_bytes }, error);
-    if (status == EBPO_OK && w->index_bytes)
-        status = begin_index(w, path, error);
+        status = ebpo_headers_lay_out(&w->head, path, shown,
+                                      (ebpo_first_chunk){ first, first_bytes }, error);
+    if (status == EBPO_OK && w->head.index_bytes)
+        status = ebpo_headers_begin_index(&w->head, path, error);
     if (status == EBPO_OK)
         status = write_chunks(w, error);
-    if (status == EBPO_OK && w->places.shape.rows)
+    if (status == EBPO_OK && w->head.places.shape.rows)
         status = write_places(w, error);
     if (status == EBPO_OK)
         status = ebpo_content_end(&w->content, digest, error);
     if (status == EBPO_OK)
-        status = ebpo_facts_put_digest(&w->out, w->root, digest, error);
+        status = ebpo_facts_put_digest(&w->head.out, w->head.root, digest, error);
     if (status == EBPO_OK)
-        status = ebpo_facts_put_index(&w->out, w->root, w->index_at, w->index_bytes, error);
+        status = ebpo_facts_put_index(&w->head.out, w->head.root, w->index_at, w->head.index_bytes,
+                                      error);
     if (status == EBPO_OK && w->plan.info.subtree_level)
-        status = ebpo_facts_put_top(&w->out, w->root, w->top_bytes, error);
-    close_handles(w);
+        status = ebpo_facts_put_top(&w->head.out, w->head.root, w->top_bytes, error);
+    ebpo_headers_close(&w->head);
     if (status == EBPO_OK)
         /* another libhdf5 may have placed metadata otherwise: no reader relies on it, tests do */
-        status = ebpo_h5_finish(&w->out, error);
+        status = ebpo_h5_finish(&w->head.out, error);
     return status;
 }
 
@@ -473,8 +285,6 @@ static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const cha
     if (!w)
         return ebpo_fail_memory(error, sizeof *w);
     w->options = &wanted;
-    w->out = (ebpo_h5_out)EBPO_H5_OUT_INIT;
-    w->root = -1;
     status = check_options(w->options, shown, error);
     if (status == EBPO_OK && !ebpo_progress_stage(&w->options->progress, "writing", error))
         status = EBPO_E_CANCELLED;
@@ -482,16 +292,15 @@ static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const cha
         status = ebpo_plan_make(&w->plan, tree, w->options, shown, error);
     if (status == EBPO_OK)
         status = ebpo_chunk_order_make(&w->order, &w->plan, error);
-    w->chunks = w->order.count;
-    plan_places(w);
+    ebpo_headers_plan(&w->head, &w->plan, w->order.count, w->options->codec_level);
     if (status == EBPO_OK)
         status = make_window(w, error);
     if (status == EBPO_OK && publish)
         status = ebpo_publish_begin(publish, path, error);
     if (status == EBPO_OK)
         status = write_file(w, publish ? ebpo_publish_path(publish) : path, shown, error);
-    close_handles(w);
-    ebpo_h5_discard(&w->out);
+    ebpo_headers_close(&w->head);
+    ebpo_h5_discard(&w->head.out);
     if (status == EBPO_OK && publish)
         status = ebpo_publish_commit(publish, error);
     for (unsigned i = 0; w->coders && i < w->threads; i++)
