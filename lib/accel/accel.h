@@ -1,10 +1,13 @@
 /* Acceleration structures: a subtree (or a whole tree) decoded into the form that questions are
  * asked of: child tables, leaves with blocks of faces, and a bounding hierarchy. Immutable once
- * made; any thread. */
+ * made, but for what makes leaves easy, which is found out when it is first asked for; any thread.
+ */
 #ifndef EBPO_ACCEL_ACCEL_H
 #define EBPO_ACCEL_ACCEL_H
 
 #include <ebpo/file.h>
+#include <pthread.h>
+#include <stdatomic.h>
 
 #include "container/slice.h"
 #include "geom/cell.h"
@@ -20,13 +23,15 @@ typedef enum ebpo_leaf_kind {
     EBPO_LEAF_ONE_PLANE = 1,
     EBPO_LEAF_TWO_PLANES = 2,
     EBPO_LEAF_CONVEX = 3,
-    EBPO_LEAF_CONCAVE = 4
+    EBPO_LEAF_CONCAVE = 4,
+    EBPO_LEAF_UNKNOWN = 5, /* nobody has asked */
+    EBPO_LEAF_IN_HAND = 6  /* a thread is finding out */
 } ebpo_leaf_kind;
 enum { EBPO_NO_WALL = 6, EBPO_KIND_PLANES_MAX = 16 };
 
 /* A block in a leaf's list, and a box around what its faces may have in the leaf's cell: each axis
- * from 0 to 254, rounded outward; low > high: nothing. Solids only. Other faces may share the
- * block; `lanes` tells the leaf's own. */
+ * from 0 to 254, rounded outward; low > high: nothing. Of leaves whose kind is known. Other faces
+ * may share the block; `lanes` tells the leaf's own. */
 typedef struct ebpo_listed_block {
     uint32_t block;
     uint8_t low[3], high[3];
@@ -34,18 +39,20 @@ typedef struct ebpo_listed_block {
 } ebpo_listed_block;
 enum { EBPO_LISTED_CELLS = 254 };
 
+/* All from `wall` on is told by ebpo_leaf_know only. */
 typedef struct ebpo_accel_leaf {
     uint32_t list; /* its blocks are list[list .. list + blocks - 1] of the subtree */
     uint32_t blocks;
-    uint8_t kind; /* ebpo_leaf_kind */
+    _Atomic uint8_t kind; /* ebpo_leaf_kind; of surfaces always EBPO_LEAF_GENERAL */
     /* 2 axis + side (1: upper) of a wall that no face meets, or EBPO_NO_WALL */
     uint8_t wall;
     /* of kinds other than general: number of planes, from `first_plane` on, filled up to a multiple
      * of four */
     uint16_t planes;
-    /* on that wall; without one: at the lowest corner, shifted (format-spec, section 5) */
+    /* on that wall; without one, or if the kind is unknown: at the lowest corner, shifted
+     * (format-spec, section 5) */
     int32_t winding;
-    uint32_t first_plane; /* in groups of four */
+    uint32_t first_plane; /* EBPO_KIND_PLANE, in groups of four */
     /* of kinds other than general: winding number where all planes say "below", elsewhere in the
      * cell */
     int32_t inner, outer;
@@ -57,6 +64,28 @@ typedef struct ebpo_four_planes {
     float n[3][4], d[4];
 } ebpo_four_planes;
 #define EBPO_PLANE_ERROR 0x1p-19f
+
+/* What has been found out about a subtree's leaves. Planes lie in pages: a group's number is that
+ * of the page, then that within it. */
+enum { EBPO_KIND_PAGES = 24, EBPO_KIND_PAGE_BITS = 27 };
+#define EBPO_NO_PLANES UINT32_MAX
+typedef struct ebpo_leaf_kinds {
+    pthread_mutex_t lock; /* of what follows, but for reading planes of a leaf that is known */
+    ebpo_four_planes *page[EBPO_KIND_PAGES];
+    uint32_t pages;
+    uint64_t used, room;                   /* groups of the last page */
+    _Atomic uint64_t groups;               /* in all pages */
+    uint64_t groups_most;                  /* leaves beyond it stay general ones */
+    _Atomic uint64_t of_kind[5], one_wall; /* leaves known so far */
+} ebpo_leaf_kinds;
+#define EBPO_KIND_PLANE(kinds, number)                \
+    ((kinds)->page[(number) >> EBPO_KIND_PAGE_BITS] + \
+     ((number) & ((1u << EBPO_KIND_PAGE_BITS) - 1)))
+
+static inline ebpo_leaf_kind ebpo_leaf_kind_of(const ebpo_accel_leaf *leaf)
+{
+    return (ebpo_leaf_kind)atomic_load_explicit(&leaf->kind, memory_order_acquire);
+}
 
 /* --- faces --- */
 
@@ -91,10 +120,9 @@ typedef struct ebpo_accel {
     uint32_t leaf_count;
     ebpo_listed_block *list; /* blocks of leaves */
     uint64_t list_count;
-    ebpo_four_planes *planes;
-    uint64_t plane_groups;
-    bool wide;      /* blocks hold doubles */
-    float *block32; /* [block_count][72], or NULL */
+    ebpo_leaf_kinds *kinds; /* of solids, or NULL */
+    bool wide;              /* blocks hold doubles */
+    float *block32;         /* [block_count][72], or NULL */
     double *block64;
     uint32_t block_count;
     uint32_t *slot_face; /* [block_count][8] local numbers; EBPO_NO_SLOT: no face */
@@ -111,9 +139,15 @@ typedef struct ebpo_accel {
     /* [group_count + 1]: planes of the gray node whose children are group g */
     uint32_t *gray_first;
     uint64_t gray_count;
-    uint64_t kinds[5], one_wall;
-    uint64_t bytes; /* of memory, all in all */
+    /* of memory, all in all; without planes of kinds for a whole model, with all that there may be
+     * for a subtree */
+    uint64_t bytes;
 } ebpo_accel;
+
+/* Finds out about a leaf of a solid whose kind is unknown; `low`, `high`: its cell. False when
+ * another thread has done it. Without memory the leaf stays a general one. */
+bool ebpo_leaf_know(const ebpo_accel *subtree, ebpo_accel_leaf *leaf, const double low[3],
+                    const double high[3]);
 
 /* Makes it from a slice, which is consumed (freed, also on failure). `with_planes`: keep gray
  * nodes' planes. `threads` 0: all cores. */
@@ -121,6 +155,12 @@ EBPO_MUST_USE ebpo_status ebpo_accel_make(ebpo_accel **out, ebpo_slice *slice,
                                           const ebpo_info *info, bool with_planes, unsigned threads,
                                           ebpo_error *error);
 void ebpo_accel_free(ebpo_accel *subtree);
+
+/* Of memory, now, of a whole model. */
+static inline uint64_t ebpo_accel_bytes(const ebpo_accel *whole)
+{
+    return whole->bytes + (whole->kinds ? whole->kinds->groups * sizeof(ebpo_four_planes) : 0);
+}
 
 /* Bytes that the subtree will take, and that making it will take at most (the slice included).
  * Bounds from counts. */

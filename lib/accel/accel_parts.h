@@ -31,13 +31,11 @@ EBPO_MUST_USE ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_slice
 /* Bounds of the hierarchy, from the blocks (parallel). */
 EBPO_MUST_USE ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout,
                                                  unsigned threads, ebpo_error *error);
-/* Child tables and leaf records with their lists of blocks (one walk); cells: [leaf_count] the
- * leaves' cells. */
+/* Child tables and leaf records with their lists of blocks (one walk). */
 EBPO_MUST_USE ebpo_status ebpo_accel_fill_nodes(ebpo_accel *s, const ebpo_slice *slice,
-                                                const ebpo_layout *layout, ebpo_cell **cells,
-                                                ebpo_error *error);
-/* Free walls and kinds (parallel). */
-EBPO_MUST_USE ebpo_status ebpo_accel_fill_kinds(ebpo_accel *s, const ebpo_cell *cells,
-                                                unsigned threads, ebpo_error *error);
+                                                const ebpo_layout *layout, ebpo_error *error);
+/* Room for at most so many groups of planes; NULL: no memory. */
+ebpo_leaf_kinds *ebpo_leaf_kinds_make(uint64_t groups_most);
+void ebpo_leaf_kinds_free(ebpo_leaf_kinds *kinds);
 
 #endif

@@ -13,9 +13,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <sched.h>
+
 #include "base/alloc.h"
-#include "base/error.h"
-#include "base/parallel.h"
 #include "geom/min_max.h"
 #include "geom/predicates.h"
 #include "accel/accel_parts.h"
@@ -30,20 +30,6 @@ typedef struct leaf_faces {
     uint32_t slot[FACES_MAX];
     double low[3], size[3], inverse[3];
 } leaf_faces;
-
-typedef struct piece {
-    ebpo_four_planes *planes; /* found by one task, in the order of leaves */
-    uint64_t count, capacity;
-    uint64_t kinds[5], one_wall;
-} piece;
-
-typedef struct job {
-    ebpo_accel *s;
-    const ebpo_cell *cells;
-    piece *piece;
-} job;
-
-enum { LEAVES_A_PIECE = 2048 };
 
 /* The boxes of a block's faces, and those that meet the cell. */
 typedef struct block_boxes {
@@ -116,7 +102,7 @@ static void add_face(const ebpo_accel *s, uint32_t slot, leaf_faces *f)
 
 /* Gathers the faces whose boxes meet the cell, the walls that they come to, and the boxes of the
  * list. False when they are not to be had: too many, or a cell too small for what follows. */
-static bool gather(ebpo_accel *s, const ebpo_accel_leaf *leaf, const double low[3],
+static bool gather(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const double low[3],
                    const double high[3], leaf_faces *f, unsigned *walls)
 {
     bool fine = true;
@@ -334,27 +320,85 @@ static bool find_windings(const ebpo_accel *s, ebpo_accel_leaf *leaf, int32_t at
     return have_outer;
 }
 
-static bool keep_planes(piece *out, ebpo_accel_leaf *leaf, const plane *planes, int count, int flip)
+/* --- planes of all leaves: pages, each twice as large as the one before, so that what has been
+ * found stays where it is --- */
+
+enum { FIRST_PAGE = 16 };
+
+ebpo_leaf_kinds *ebpo_leaf_kinds_make(uint64_t groups_most)
 {
-    uint64_t groups = (uint64_t)(count + 3) / 4;
-    if (!ebpo_grow(&out->planes, &out->capacity, out->count + groups, sizeof *out->planes))
+    ebpo_leaf_kinds *k = ebpo_alloc_zero(1, sizeof *k);
+    if (k)
+        k->groups_most = groups_most;
+    if (k)
+        pthread_mutex_init(&k->lock, NULL);
+    return k;
+}
+
+void ebpo_leaf_kinds_free(ebpo_leaf_kinds *k)
+{
+    if (!k)
+        return;
+    for (int i = 0; i < EBPO_KIND_PAGES; i++)
+        free(k->page[i]);
+    pthread_mutex_destroy(&k->lock);
+    free(k);
+}
+
+/* A page for at least so many groups; false when there is none. */
+static bool add_page(ebpo_leaf_kinds *k, uint64_t least)
+{
+    uint64_t size = (uint64_t)FIRST_PAGE << k->pages, left = k->groups_most - k->groups;
+    size = size < left ? size : left;
+    if (size < least || k->pages == EBPO_KIND_PAGES)
         return false;
-    leaf->first_plane = (uint32_t)out->count; /* within the piece for now */
-    for (uint64_t i = 0; i < groups * 4; i++) {
-        const plane *q = &planes[i < (uint64_t)count ? i : 0];
-        ebpo_four_planes *g = &out->planes[out->count + i / 4];
-        for (int k = 0; k < 3; k++)
-            g->n[k][i % 4] = (float)(flip * q->n[k]);
-        g->d[i % 4] = (float)(flip * q->d);
-    }
-    out->count += groups;
-    leaf->planes = (uint16_t)count;
-    leaf->kind = count == 1   ? EBPO_LEAF_ONE_PLANE
-                 : count == 2 ? EBPO_LEAF_TWO_PLANES
-                 : flip > 0   ? EBPO_LEAF_CONVEX
-                              : EBPO_LEAF_CONCAVE;
+    k->page[k->pages] = aligned_alloc(64, size * sizeof **k->page);
+    if (!k->page[k->pages])
+        return false;
+    k->pages++;
+    k->groups += size;
+    k->used = 0;
+    k->room = size;
     return true;
 }
+
+/* The number of the first of so many groups, which lie in one page, or EBPO_NO_PLANES. */
+static uint32_t take_groups(ebpo_leaf_kinds *k, uint64_t groups)
+{
+    uint32_t number = EBPO_NO_PLANES;
+    pthread_mutex_lock(&k->lock);
+    if (k->used + groups <= k->room || add_page(k, groups)) {
+        number = (k->pages - 1) << EBPO_KIND_PAGE_BITS | (uint32_t)k->used;
+        k->used += groups;
+    }
+    pthread_mutex_unlock(&k->lock);
+    return number;
+}
+
+/* The kind of a leaf with these planes; without memory for them it stays a general one. */
+static ebpo_leaf_kind keep_planes(ebpo_leaf_kinds *kinds, ebpo_accel_leaf *leaf,
+                                  const plane *planes, int count, int flip)
+{
+    uint64_t groups = (uint64_t)(count + 3) / 4;
+    uint32_t first = take_groups(kinds, groups);
+    if (first == EBPO_NO_PLANES)
+        return EBPO_LEAF_GENERAL;
+    ebpo_four_planes *to = EBPO_KIND_PLANE(kinds, first);
+    leaf->first_plane = first;
+    for (uint64_t i = 0; i < groups * 4; i++) {
+        const plane *q = &planes[i < (uint64_t)count ? i : 0];
+        for (int k = 0; k < 3; k++)
+            to[i / 4].n[k][i % 4] = (float)(flip * q->n[k]);
+        to[i / 4].d[i % 4] = (float)(flip * q->d);
+    }
+    leaf->planes = (uint16_t)count;
+    return count == 1   ? EBPO_LEAF_ONE_PLANE
+           : count == 2 ? EBPO_LEAF_TWO_PLANES
+           : flip > 0   ? EBPO_LEAF_CONVEX
+                        : EBPO_LEAF_CONCAVE;
+}
+
+/* --- a leaf --- */
 
 /* A lower wall if there is one: its winding number is the corner's. */
 static uint8_t choose_wall(unsigned walls)
@@ -365,14 +409,13 @@ static uint8_t choose_wall(unsigned walls)
     return open ? (uint8_t)__builtin_ctz(open) : EBPO_NO_WALL;
 }
 
-static bool classify(ebpo_accel *s, ebpo_accel_leaf *leaf, const ebpo_cell *cell, piece *out)
+static ebpo_leaf_kind classify(const ebpo_accel *s, ebpo_accel_leaf *leaf, const double low[3],
+                               const double high[3])
 {
-    double low[3], high[3];
     leaf_faces f;
     plane planes[EBPO_KIND_PLANES_MAX];
     int flip = 1, count = 0;
     int32_t at_corner = leaf->winding;
-    ebpo_cell_bounds(&s->box, *cell, low, high);
     unsigned walls;
     bool few = gather(s, leaf, low, high, &f, &walls);
     leaf->wall = choose_wall(walls);
@@ -383,64 +426,24 @@ static bool classify(ebpo_accel *s, ebpo_accel_leaf *leaf, const ebpo_cell *cell
     }
     if (few && f.count)
         count = collect_planes(s, &f, planes, &flip);
-    bool ok = true;
-    if (count && find_windings(s, leaf, at_corner, &f, planes, count, flip))
-        ok = keep_planes(out, leaf, planes, count, flip);
-    out->kinds[leaf->kind]++;
-    out->one_wall += leaf->kind == EBPO_LEAF_GENERAL && leaf->wall != EBPO_NO_WALL;
-    return ok;
+    return count && find_windings(s, leaf, at_corner, &f, planes, count, flip)
+               ? keep_planes(s->kinds, leaf, planes, count, flip)
+               : EBPO_LEAF_GENERAL;
 }
 
-static ebpo_status classify_leaves(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                                   ebpo_error *error)
+bool ebpo_leaf_know(const ebpo_accel *s, ebpo_accel_leaf *leaf, const double low[3],
+                    const double high[3])
 {
-    (void)worker;
-    job *j = context;
-    piece *out = &j->piece[begin / LEAVES_A_PIECE];
-    for (uint64_t i = begin; i < end; i++)
-        if (!classify(j->s, &j->s->leaf[i], &j->cells[i], out))
-            return ebpo_fail_memory(error, out->count * sizeof *out->planes);
-    return EBPO_OK;
-}
-
-static ebpo_status join_pieces(ebpo_accel *s, const job *j, uint64_t pieces, ebpo_error *error)
-{
-    for (uint64_t i = 0; i < pieces; i++)
-        s->plane_groups += j->piece[i].count;
-    s->planes = aligned_alloc(64, (s->plane_groups + 1) * sizeof *s->planes);
-    if (!s->planes || s->plane_groups > UINT32_MAX)
-        return ebpo_fail_memory(error, s->plane_groups * sizeof *s->planes);
-    uint64_t at = 0;
-    for (uint64_t i = 0; i < pieces; i++) {
-        const piece *p = &j->piece[i];
-        if (p->count)
-            memcpy(s->planes + at, p->planes, p->count * sizeof *s->planes);
-        for (uint64_t k = i * LEAVES_A_PIECE; k < (i + 1) * LEAVES_A_PIECE && k < s->leaf_count;
-             k++)
-            s->leaf[k].first_plane += (uint32_t)at;
-        at += p->count;
-        for (int k = 0; k < 5; k++)
-            s->kinds[k] += p->kinds[k];
-        s->one_wall += p->one_wall;
+    uint8_t unknown = EBPO_LEAF_UNKNOWN;
+    if (!atomic_compare_exchange_strong(&leaf->kind, &unknown, EBPO_LEAF_IN_HAND)) {
+        while (ebpo_leaf_kind_of(leaf) == EBPO_LEAF_IN_HAND) /* a microsecond of another thread's */
+            sched_yield();
+        return false;
     }
-    return EBPO_OK;
-}
-
-ebpo_status ebpo_accel_fill_kinds(ebpo_accel *s, const ebpo_cell *cells, unsigned threads,
-                                  ebpo_error *error)
-{
-    if (!s->solid || s->leaf_count == 0)
-        return EBPO_OK;
-    uint64_t pieces = (s->leaf_count + LEAVES_A_PIECE - 1) / LEAVES_A_PIECE;
-    job j = { s, cells, ebpo_alloc_zero(pieces, sizeof(piece)) };
-    if (!j.piece)
-        return ebpo_fail_memory(error, pieces * sizeof(piece));
-    ebpo_status status = ebpo_parallel_for(threads, NULL, s->leaf_count, LEAVES_A_PIECE,
-                                           classify_leaves, &j, NULL, "open", error);
-    if (status == EBPO_OK)
-        status = join_pieces(s, &j, pieces, error);
-    for (uint64_t i = 0; i < pieces; i++)
-        free(j.piece[i].planes);
-    free(j.piece);
-    return status;
+    ebpo_leaf_kind kind = classify(s, leaf, low, high);
+    atomic_fetch_add(&s->kinds->of_kind[kind], 1);
+    if (kind == EBPO_LEAF_GENERAL && leaf->wall != EBPO_NO_WALL)
+        atomic_fetch_add(&s->kinds->one_wall, 1);
+    atomic_store_explicit(&leaf->kind, (uint8_t)kind, memory_order_release);
+    return true;
 }

@@ -66,13 +66,21 @@ static ebpo_status copy_planes(ebpo_accel *s, const ebpo_slice *slice, ebpo_erro
     return EBPO_OK;
 }
 
+/* Of planes that make leaves easy. Few leaves of one subtree are asked about; what they may take
+ * counts from the beginning. */
+static uint64_t groups_most(const ebpo_accel *s)
+{
+    return s->root.cell.level ? s->leaf_count / 4 : s->leaf_count;
+}
+
 static uint64_t count_bytes(const ebpo_accel *s)
 {
     uint64_t cells = s->nodes.grid_bits ? UINT64_C(1) << 3 * s->nodes.grid_bits : 0;
     uint64_t faces = s->face_source || s->outer ? (uint64_t)s->block_count * 8 : 0;
     return sizeof *s + s->nodes.group_count * sizeof *s->nodes.group + cells * 5 +
            s->leaf_count * sizeof *s->leaf + s->list_count * sizeof *s->list +
-           s->plane_groups * sizeof *s->planes +
+           (s->kinds ? sizeof *s->kinds : 0) +
+           (s->kinds && s->root.cell.level ? groups_most(s) * sizeof(ebpo_four_planes) : 0) +
            (uint64_t)s->block_count * (EBPO_BLOCK_NUMBERS * (s->wide ? 8 : 4) + EBPO_BLOCK * 4) +
            s->bound_count * sizeof *s->bound + (uint64_t)s->outer_count * 4 +
            (s->face_source ? faces * 4 : 0) +
@@ -83,7 +91,6 @@ static ebpo_status make(ebpo_accel *s, ebpo_slice *slice, bool with_planes, unsi
                         ebpo_error *error)
 {
     ebpo_layout layout;
-    ebpo_cell *cells = NULL;
     ebpo_status status = ebpo_layout_make(&layout, slice, EBPO_BLOCKS_MOST, error);
     if (status != EBPO_OK)
         return status;
@@ -92,13 +99,14 @@ static ebpo_status make(ebpo_accel *s, ebpo_slice *slice, bool with_planes, unsi
     if (status == EBPO_OK)
         status = ebpo_accel_fill_bounds(s, &layout, threads, error);
     if (status == EBPO_OK)
-        status = ebpo_accel_fill_nodes(s, slice, &layout, &cells, error);
+        status = ebpo_accel_fill_nodes(s, slice, &layout, error);
     ebpo_layout_free(&layout);
-    if (status == EBPO_OK)
-        status = ebpo_accel_fill_kinds(s, cells, threads, error);
+    if (status == EBPO_OK && s->solid) {
+        s->kinds = ebpo_leaf_kinds_make(groups_most(s));
+        status = s->kinds ? EBPO_OK : ebpo_fail_memory(error, sizeof *s->kinds);
+    }
     if (status == EBPO_OK && with_planes)
         status = copy_planes(s, slice, error);
-    free(cells);
     return status;
 }
 
@@ -148,7 +156,7 @@ void ebpo_accel_free(ebpo_accel *s)
     ebpo_node_table_free(&s->nodes);
     free(s->leaf);
     free(s->list);
-    free(s->planes);
+    ebpo_leaf_kinds_free(s->kinds);
     free(s->block32);
     free(s->block64);
     free(s->slot_face);
@@ -167,7 +175,8 @@ void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uin
 {
     uint64_t wide = needs_doubles(info) ? 2 : 1, faces = size->new_faces + size->outer;
     uint64_t blocks = faces / 4 + 2, bounds = blocks / 3 + 2;
-    *keep = sizeof(ebpo_accel) + size->groups * 64 + size->leaves * (sizeof(ebpo_accel_leaf) + 64) +
+    *keep = sizeof(ebpo_accel) + sizeof(ebpo_leaf_kinds) + size->groups * 64 +
+            size->leaves * (sizeof(ebpo_accel_leaf) + 64) +
             (size->refs + size->new_faces) * sizeof(ebpo_listed_block) +
             blocks * (EBPO_BLOCK_NUMBERS * 4 * wide + 32) + bounds * sizeof(ebpo_bound) + faces * 8;
     *peak = *keep + size->groups * 128 + size->leaves * 64 + faces * (12 + 36 * wide + 24) + 65536;

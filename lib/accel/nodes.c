@@ -10,8 +10,7 @@
 typedef struct walk {
     ebpo_accel *s;
     const ebpo_slice *slice;
-    const uint32_t *slot_of; /* [local face] */
-    ebpo_cell *cells;
+    const uint32_t *slot_of;           /* [local face] */
     uint64_t rank[EBPO_LEVELS_MAX][4]; /* nodes of each type of each level, seen so far */
     uint64_t refs[EBPO_LEVELS_MAX];
     uint64_t group_begin[EBPO_LEVELS_MAX]; /* number of the first group of each level */
@@ -86,6 +85,7 @@ static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank
             w->scratch[count++] = entry;
     }
     w->refs[depth] += refs;
+    leaf->kind = w->s->solid ? EBPO_LEAF_UNKNOWN : EBPO_LEAF_GENERAL;
     leaf->wall = EBPO_NO_WALL;
     leaf->winding = level->leaf_winding ? level->leaf_winding[rank] : 0;
     put_list(w, leaf, count);
@@ -101,7 +101,7 @@ static uint32_t uniform(walk *w, const int32_t *windings, uint64_t rank, int32_t
     return entry;
 }
 
-static uint32_t walk_node(walk *w, int depth, ebpo_node_type type, ebpo_cell cell)
+static uint32_t walk_node(walk *w, int depth, ebpo_node_type type)
 {
     const ebpo_level *level = &w->slice->level[depth];
     uint64_t rank = w->rank[depth][type]++;
@@ -113,7 +113,6 @@ static uint32_t walk_node(walk *w, int depth, ebpo_node_type type, ebpo_cell cel
         return uniform(w, level->black_winding, rank, 1);
     if (type == EBPO_LEAF) {
         uint32_t number = (uint32_t)(w->leaf_begin[depth] + rank);
-        w->cells[number] = cell;
         fill_leaf(w, level, depth, rank, number);
         return ebpo_entry(EBPO_ENTRY_LEAF, number);
     }
@@ -128,8 +127,7 @@ static uint32_t walk_node(walk *w, int depth, ebpo_node_type type, ebpo_cell cel
     }
     uint16_t types = w->slice->level[depth + 1].types[rank];
     for (unsigned octant = 0; octant < 8; octant++)
-        w->s->nodes.group[group][octant] =
-            walk_node(w, depth + 1, ebpo_group_type(types, octant), ebpo_cell_child(cell, octant));
+        w->s->nodes.group[group][octant] = walk_node(w, depth + 1, ebpo_group_type(types, octant));
     return ebpo_entry(EBPO_ENTRY_GRAY, (uint32_t)group);
 }
 
@@ -154,10 +152,9 @@ static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **slot
     s->nodes.group_count = (uint32_t)groups;
     s->leaf = ebpo_alloc_zero(leaves, sizeof *s->leaf);
     s->leaf_count = (uint32_t)leaves;
-    w->cells = ebpo_alloc(leaves, sizeof *w->cells);
     uint64_t faces = layout->block_count ? layout->block_end[layout->block_count - 1] : 0;
     uint32_t *map = *slot_of = ebpo_alloc(faces, sizeof *map);
-    if (!s->nodes.group || !s->leaf || !w->cells || !map)
+    if (!s->nodes.group || !s->leaf || !map)
         return ebpo_fail_memory(w->error, groups * 32 + leaves * sizeof *s->leaf + faces * 4);
     for (uint64_t b = 0; b < layout->block_count; b++)
         for (uint32_t face = layout->block_begin[b]; face < layout->block_end[b]; face++)
@@ -166,7 +163,7 @@ static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **slot
 }
 
 ebpo_status ebpo_accel_fill_nodes(ebpo_accel *s, const ebpo_slice *slice, const ebpo_layout *layout,
-                                  ebpo_cell **cells, ebpo_error *error)
+                                  ebpo_error *error)
 {
     walk w = { .s = s, .slice = slice, .status = EBPO_OK, .error = error };
     uint32_t *slot_of = NULL;
@@ -174,12 +171,10 @@ ebpo_status ebpo_accel_fill_nodes(ebpo_accel *s, const ebpo_slice *slice, const 
     if (status == EBPO_OK) {
         w.slot_of = slot_of;
         s->nodes.root_level = slice->root.cell.level;
-        s->nodes.root =
-            walk_node(&w, 0, ebpo_group_type(slice->level[0].types[0], 0), slice->root.cell);
+        s->nodes.root = walk_node(&w, 0, ebpo_group_type(slice->level[0].types[0], 0));
         status = w.status;
     }
     free(slot_of);
     free(w.scratch);
-    *cells = w.cells;
     return status;
 }

@@ -115,8 +115,9 @@ static bool from_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const 
                         int32_t *winding)
 {
     float xi[3] = { (float)in->xi[0], (float)in->xi[1], (float)in->xi[2] }, most = -INFINITY;
+    const ebpo_four_planes *first = EBPO_KIND_PLANE(s->kinds, leaf->first_plane);
     for (int i = 0; i < leaf->planes; i += 4) {
-        const ebpo_four_planes *q = &s->planes[leaf->first_plane + (uint32_t)i / 4];
+        const ebpo_four_planes *q = first + i / 4;
         for (int j = 0; j < 4; j++) {
             float value = q->n[0][j] * xi[0] + q->n[1][j] * xi[1] + q->n[2][j] * xi[2] - q->d[j];
             most = value > most ? value : most;
@@ -130,16 +131,29 @@ static bool from_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const 
     return most < -EBPO_PLANE_ERROR;
 }
 
-static ebpo_status answer_in_leaf(ebpo_context *context, const ebpo_accel *s,
-                                  const ebpo_accel_leaf *leaf, const in_leaf *i, const double p[3],
-                                  ebpo_inside_result *out, ebpo_error *error)
+/* What a leaf is like is found out when the first question comes to it. */
+static ebpo_leaf_kind kind_of(const ebpo_context *context, const ebpo_accel *s,
+                              ebpo_accel_leaf *leaf, const in_leaf *i)
+{
+    ebpo_leaf_kind kind = ebpo_leaf_kind_of(leaf);
+    if (kind < EBPO_LEAF_UNKNOWN)
+        return kind;
+    if (ebpo_leaf_know(s, leaf, i->low, i->high))
+        ebpo_model_count_kind(context->model, leaf);
+    return ebpo_leaf_kind_of(leaf);
+}
+
+static ebpo_status answer_in_leaf(ebpo_context *context, const ebpo_accel *s, ebpo_accel_leaf *leaf,
+                                  const in_leaf *i, const double p[3], ebpo_inside_result *out,
+                                  ebpo_error *error)
 {
     const ebpo_model *m = context->model;
     if (!ebpo_grow(&context->open, &context->open_capacity, (uint64_t)leaf->blocks * EBPO_BLOCK,
                    sizeof *context->open))
         return ebpo_fail_memory(error, (uint64_t)leaf->blocks * EBPO_BLOCK * sizeof *context->open);
     int32_t winding;
-    bool off = leaf->kind != EBPO_LEAF_GENERAL && from_planes(s, leaf, i, &winding);
+    bool off =
+        kind_of(context, s, leaf, i) != EBPO_LEAF_GENERAL && from_planes(s, leaf, i, &winding);
     if (!off)
         off = leaf->wall != EBPO_NO_WALL
                   ? from_wall(m->kernels, s, leaf, i, p, context->open, &winding)
@@ -197,7 +211,7 @@ typedef struct lane {
 
 /* A point that ended in a leaf. */
 typedef struct waiting {
-    const ebpo_accel_leaf *leaf;
+    ebpo_accel_leaf *leaf;
     unsigned point;
     in_leaf in;
 } waiting;
@@ -237,7 +251,7 @@ static void prefetch_blocks(const ebpo_accel *s, const waiting *w, const double 
     size_t size = EBPO_BLOCK_NUMBERS * (s->wide ? sizeof *s->block64 : sizeof *s->block32);
     const char *blocks = s->wide ? (const char *)s->block64 : (const char *)s->block32;
     ebpo_axis_segment g = { .high = { 255, 255, 255 } };
-    if (leaf->kind != EBPO_LEAF_GENERAL)
+    if (ebpo_leaf_kind_of(leaf) != EBPO_LEAF_GENERAL)
         return;
     if (leaf->wall != EBPO_NO_WALL)
         g = wall_segment(leaf, &w->in, p);
@@ -253,8 +267,8 @@ static ebpo_status answer_waiting(ebpo_context *context, const ebpo_accel *s, co
 {
     for (unsigned i = 0; i < count; i++) {
         __builtin_prefetch(s->list + w[i].leaf->list);
-        if (w[i].leaf->kind != EBPO_LEAF_GENERAL)
-            __builtin_prefetch(s->planes + w[i].leaf->first_plane);
+        if (kind_of(context, s, w[i].leaf, &w[i].in) != EBPO_LEAF_GENERAL)
+            __builtin_prefetch(EBPO_KIND_PLANE(s->kinds, w[i].leaf->first_plane));
     }
     for (unsigned i = 0; i < count; i++)
         prefetch_blocks(s, &w[i], points + 3 * w[i].point);

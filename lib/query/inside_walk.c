@@ -100,8 +100,10 @@ static ebpo_status leaf_from_file(asking *a, const ebpo_node *leaf, ebpo_inside_
     if (status == EBPO_OK)
         status = ebpo_accel_make(&subtree, &slice, m->info, false, 1, error);
     if (status == EBPO_OK) {
+        ebpo_model_count_leaves(m, subtree, 1);
         status = ebpo_inside_leaf(a->context, subtree, ebpo_entry_value(subtree->nodes.root),
                                   leaf->cell, a->p, out, error);
+        ebpo_model_count_leaves(m, subtree, -1);
         ebpo_accel_free(subtree);
     }
     return status;

@@ -51,13 +51,21 @@ static ebpo_status estimate_subtree(void *user, uint64_t key, uint64_t *peak, ui
     return status;
 }
 
-/* Adds a subtree's leaves to what is in memory, or (sign -1) takes them away. */
-static void count_leaves(ebpo_model *m, const ebpo_accel *s, uint64_t sign)
+void ebpo_model_count_leaves(ebpo_model *m, const ebpo_accel *s, int sign)
 {
-    m->leaves += sign * s->leaf_count;
-    m->leaves_one_wall += sign * s->one_wall;
+    m->leaves += (uint64_t)sign * s->leaf_count;
+    if (!s->kinds)
+        return;
+    m->leaves_one_wall += (uint64_t)sign * s->kinds->one_wall;
     for (int k = 0; k < 5; k++)
-        m->leaves_of_kind[k] += sign * s->kinds[k];
+        m->leaves_of_kind[k] += (uint64_t)sign * s->kinds->of_kind[k];
+}
+
+void ebpo_model_count_kind(ebpo_model *m, const ebpo_accel_leaf *leaf)
+{
+    m->leaves_of_kind[ebpo_leaf_kind_of(leaf)]++;
+    m->leaves_one_wall +=
+        ebpo_leaf_kind_of(leaf) == EBPO_LEAF_GENERAL && leaf->wall != EBPO_NO_WALL;
 }
 
 static ebpo_status load_subtree(void *user, uint64_t key, void **item, uint64_t *bytes,
@@ -71,7 +79,7 @@ static ebpo_status load_subtree(void *user, uint64_t key, void **item, uint64_t 
     if (status == EBPO_OK)
         status = ebpo_accel_make(&subtree, &slice, m->info, key & 1, 1, error);
     if (status == EBPO_OK)
-        count_leaves(m, subtree, 1);
+        ebpo_model_count_leaves(m, subtree, 1);
     *item = subtree;
     *bytes = status == EBPO_OK ? subtree->bytes : 0;
     return status;
@@ -80,7 +88,7 @@ static ebpo_status load_subtree(void *user, uint64_t key, void **item, uint64_t 
 static void release_subtree(void *user, void *item)
 {
     if (item)
-        count_leaves(user, item, (uint64_t)-1);
+        ebpo_model_count_leaves(user, item, -1);
     ebpo_accel_free(item);
 }
 
@@ -159,7 +167,7 @@ static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
     if (status == EBPO_OK)
         status = ebpo_accel_make(&m->whole, &slice, m->info, true, m->options.threads, error);
     if (m->whole)
-        count_leaves(m, m->whole, 1);
+        ebpo_model_count_leaves(m, m->whole, 1);
     return status;
 }
 
@@ -270,7 +278,7 @@ static void gather_stats(const ebpo_model *m, ebpo_model_stats *out)
     for (int k = 0; k < 5; k++)
         out->leaves_of_kind[k] = m->leaves_of_kind[k];
     if (m->whole) {
-        out->memory = out->memory_peak = m->whole->bytes;
+        out->memory = out->memory_peak = ebpo_accel_bytes(m->whole);
         return;
     }
     ebpo_cache_stats subtrees, chunks;

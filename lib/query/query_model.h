@@ -24,9 +24,14 @@ struct ebpo_model {
     ebpo_chunks *chunks;
     ebpo_cache *cache; /* subtrees by their number in the top */
     double open_seconds;
-    /* in the subtrees that are in memory */
+    /* in the subtrees that are in memory; kinds of those that were asked about */
     _Atomic uint64_t leaves, leaves_of_kind[5], leaves_one_wall;
 };
+
+/* Adds a subtree's leaves to what is in memory, or (sign -1) takes them away; a leaf whose kind has
+ * been found out. */
+void ebpo_model_count_leaves(ebpo_model *model, const ebpo_accel *subtree, int sign);
+void ebpo_model_count_kind(ebpo_model *model, const ebpo_accel_leaf *leaf);
 
 typedef struct ebpo_ranked ebpo_ranked; /* query/query_node.h */
 typedef struct ebpo_met ebpo_met;       /* query/ray_hits.h */

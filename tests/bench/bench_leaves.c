@@ -40,6 +40,19 @@ static void fail(const ebpo_error *error)
     exit(EXIT_FAILURE);
 }
 
+/* Of all leaves, as if each had been asked about. */
+static void know_below(const ebpo_accel *s, const ebpo_node *node)
+{
+    double low[3], high[3];
+    ebpo_cell_bounds(&s->box, node->cell, low, high);
+    if (ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_LEAF)
+        (void)ebpo_leaf_know(s, &s->leaf[ebpo_entry_value(node->entry)], low, high);
+    for (unsigned octant = 0; octant < 8 && node->type == EBPO_GRAY && !node->pruned; octant++) {
+        ebpo_node child = ebpo_accel_child(s, node, octant);
+        know_below(s, &child);
+    }
+}
+
 static void sort_points(const ebpo_model *m, uint64_t points, bucket *buckets)
 {
     const ebpo_accel *s = m->whole;
@@ -56,7 +69,7 @@ static void sort_points(const ebpo_model *m, uint64_t points, bucket *buckets)
         uint32_t entry = ebpo_descend(&s->nodes, fine, at).entry;
         if (ebpo_entry_kind_of(entry) != EBPO_ENTRY_LEAF)
             continue;
-        bucket *b = &buckets[s->leaf[ebpo_entry_value(entry)].kind];
+        bucket *b = &buckets[ebpo_leaf_kind_of(&s->leaf[ebpo_entry_value(entry)])];
         b->seen++;
         if (b->count < MOST)
             memcpy(b->points[b->count++], p, sizeof p);
@@ -125,6 +138,8 @@ int main(int argc, char **argv)
     bucket *buckets = calloc(KINDS, sizeof *buckets);
     if (!buckets)
         return EXIT_FAILURE;
+    ebpo_node root = ebpo_accel_root(model->whole);
+    know_below(model->whole, &root);
     sort_points(model, points, buckets);
     printf(json ? "[" : "%-12s %10s %10s %10s %14s\n", "kind", "leaves", "points", "ns",
            "ns as general");
@@ -136,11 +151,11 @@ int main(int argc, char **argv)
         printf(json ? "%s{\"kind\": \"%s\", \"leaves\": %" PRIu64 ", \"points\": %" PRIu64
                       ", \"ns\": %.1f, \"ns_as_general\": %.1f}"
                     : "%s%-12s %10" PRIu64 " %10" PRIu64 " %10.1f %14.1f\n",
-               json && k ? ", " : "", names[k], model->whole->kinds[k], b->seen, b->ns,
-               b->ns_as_general);
+               json && k ? ", " : "", names[k], atomic_load(&model->whole->kinds->of_kind[k]),
+               b->seen, b->ns, b->ns_as_general);
     }
     if (json)
-        printf("]\n");
+        printf(", {\"one_wall\": %" PRIu64 "}]\n", atomic_load(&model->whole->kinds->one_wall));
     free(buckets);
     ebpo_context_free(context);
     ebpo_model_free(model);

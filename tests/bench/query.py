@@ -39,9 +39,7 @@ OURS = {"mean": "ns.mean", "p50": "ns.p50", "p99": "ns.p99", "p999": "ns.p999", 
         "batch": "batch_ns", "open": "cold_open_seconds",
         "first": "cold_first_answer_seconds", "read": "cold_bytes_read",
         "peak": "peak_memory_bytes", "memory": "model.memory",
-        "memory_peak": "model.memory_peak", "loads": "model.loads", "leaves": "model.leaves",
-        "kinds": "model.leaves_of_kind",
-        "one_wall": "model.leaves_one_wall"}
+        "memory_peak": "model.memory_peak", "loads": "model.loads"}
 PEER = {"mean": "clocked_mean_ns", "batch": "mean_ns", "p50": "p50_ns", "p99": "p99_ns",
         "p999": "p999_ns", "max": "max_ns", "first": "first_answer_s", "peak": "peak_mb"}
 
@@ -420,13 +418,13 @@ def section_leaves(bench, page, models):
               "taken as general ones and by the planes (`tests/bench/bench_leaves MODEL.ebpo.h5`).")
     rows, gains = [], []
     for model in models:
-        report = bench.ours(model, "inside", "--count", 100)
-        leaves = at(report, "leaves")
+        *kinds, last = json.loads(bench.run(bench.build / "tests" / "bench" / "bench_leaves",
+                                            model.file, "--json"))
+        leaves = sum(kind["leaves"] for kind in kinds)
         rows.append([model.name, f"{model.faces:,}", f"{leaves:,}"]
                     + [figure(100 * n / max(1, leaves))
-                       for n in at(report, "kinds") + [at(report, "one_wall")]])
-        for kind in json.loads(bench.run(bench.build / "tests" / "bench" / "bench_leaves",
-                                         model.file, "--json"))[1:]:
+                       for n in [kind["leaves"] for kind in kinds] + [last["one_wall"]]])
+        for kind in kinds[1:]:
             if kind["points"]:
                 gains.append([model.name, kind["kind"], f"{kind['points']:,}",
                               figure(kind["ns_as_general"]), figure(kind["ns"]),

@@ -154,12 +154,12 @@ typedef struct ebpo_model_stats {
     double load_seconds;
 
     /*
-     * Leaves in memory, and how many of each kind: general, one plane, two planes,
-     * convex set, concave set.
+     * Leaves in memory, and of those that questions have come to, how many of each kind:
+     * general, one plane, two planes, convex set, concave set.
      */
     uint64_t leaves, leaves_of_kind[5];
 
-    /* General leaves with a wall that no face meets: one segment answers there. */
+    /* Of the general ones, those with a wall that no face meets: one segment answers there. */
     uint64_t leaves_one_wall;
 } ebpo_model_stats;
 
