@@ -1,54 +1,34 @@
 #include "two_layouts.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <ebpo/build.h>
-
+#include "model_file.h"
 #include "octree/node_types.h"
 #include "read_by.h"
 #include "scratch.h"
 
-static void must(bool fine, const ebpo_error *error)
-{
-    if (fine)
-        return;
-    fprintf(stderr, "two_layouts: %s\n", error->message);
-    abort();
-}
-
 void two_layouts_write(two_layouts *out, ebpo_tree *tree, uint32_t parts, ebpo_codec codec,
                        uint64_t subtree_faces)
 {
-    ebpo_error error = EBPO_ERROR_INIT;
     ebpo_write_options options = EBPO_WRITE_OPTIONS_INIT;
+    ebpo_error error = EBPO_ERROR_INIT;
     *out = (two_layouts){ scratch("packed.ebpo.h5"), scratch("plain.ebpo.h5"), NULL, NULL };
     options.parts = parts;
     options.codec = codec;
     options.threads = 1;
     options.subtree_faces = subtree_faces;
-    must(ebpo_tree_write(tree, out->packed, &options, &error) == EBPO_OK, &error);
+    model_must(ebpo_tree_write(tree, out->packed, &options, &error), "writing", &error);
     options.subtree_faces = EBPO_NO_SUBTREES;
-    must(ebpo_tree_write(tree, out->plain, &options, &error) == EBPO_OK, &error);
-    ebpo_tree_free(tree);
-    must(ebpo_open(out->packed, &out->with, &error) == EBPO_OK, &error);
-    must(ebpo_open(out->plain, &out->without, &error) == EBPO_OK, &error);
+    model_write(tree, out->plain, &options);
+    out->with = model_open(out->packed);
+    out->without = model_open(out->plain);
 }
 
 void two_layouts_build(two_layouts *out, ebpo_mesh mesh, uint32_t leaf_faces, uint32_t parts,
                        ebpo_codec codec, uint64_t subtree_faces)
 {
-    ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_mesh_report report;
-    ebpo_mend_record mend = { 0 };
-    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
-    ebpo_tree tree;
-    options.leaf_faces = leaf_faces;
-    options.parts = parts;
-    options.threads = 1;
-    must(ebpo_mesh_check(&mesh, 1, options.progress, &report, &error) == EBPO_OK, &error);
-    must(ebpo_build(&mesh, &report, &mend, &options, &tree, &error) == EBPO_OK, &error);
+    ebpo_tree tree = model_build_parts(mesh, leaf_faces, parts);
     two_layouts_write(out, &tree, parts, codec, subtree_faces);
 }
 
@@ -116,7 +96,7 @@ uint64_t *octcodes_of_level(const ebpo_file *file, int level, uint64_t *count)
     for (int i = 0; i <= level; i++) {
         ebpo_level l;
         ebpo_error error = EBPO_ERROR_INIT;
-        must(ebpo_file_read_level(file, i, READ_BY(1), &l, &error) == EBPO_OK, &error);
+        model_must(ebpo_file_read_level(file, i, READ_BY(1), &l, &error), "reading", &error);
         uint64_t *next = malloc((8 * l.group_count + 1) * sizeof *next);
         wanted = realloc(wanted, (8 * l.group_count + 1) * sizeof *wanted);
         uint64_t nexts = 0;

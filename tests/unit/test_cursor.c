@@ -9,6 +9,7 @@
 #include <ebpo/build.h>
 #include <ebpo/subset.h>
 
+#include "model_file.h"
 #include "octree/cursor.h"
 #include "octree/level_nodes.h"
 #include "query/query_node.h"
@@ -384,18 +385,8 @@ END_TEST
 
 static void build(ebpo_mesh mesh, uint32_t leaf_faces, uint32_t parts)
 {
-    ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_mesh_report report;
-    ebpo_mend_record mend = { 0 };
-    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
-    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
-    ebpo_tree tree;
-    options.leaf_faces = leaf_faces;
-    options.parts = parts;
-    fine(ebpo_mesh_check(&mesh, 0, options.progress, &report, &error), &error);
-    fine(ebpo_build(&mesh, &report, &mend, &options, &tree, &error), &error);
-    fine(ebpo_tree_write(&tree, path, &write, &error), &error);
-    ebpo_tree_free(&tree);
+    ebpo_tree tree = model_build_parts(mesh, leaf_faces, parts);
+    model_write(&tree, path, NULL);
 }
 
 static void cut_file(double low, double high, int last_level)

@@ -8,6 +8,7 @@
 #include <ebpo/ebpo.h>
 
 #include "check_main.h"
+#include "model_file.h"
 #include "scratch.h"
 #include "solids.h"
 
@@ -21,23 +22,9 @@ static void make_folder(void)
 
 static ebpo_file *build(ebpo_mesh mesh, uint32_t parts, uint32_t leaf_faces)
 {
-    ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_mesh_report report;
-    ebpo_mend_record mend = { 0 };
-    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
-    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
-    ebpo_tree tree;
-    ebpo_file *file = NULL;
-    options.parts = parts;
-    options.leaf_faces = leaf_faces;
-    ck_assert_msg(ebpo_mesh_check(&mesh, 0, options.progress, &report, &error) == EBPO_OK, "%s",
-                  error.message);
-    ck_assert_msg(ebpo_build(&mesh, &report, &mend, &options, &tree, &error) == EBPO_OK, "%s",
-                  error.message);
-    ck_assert_msg(ebpo_tree_write(&tree, path, &write, &error) == EBPO_OK, "%s", error.message);
-    ebpo_tree_free(&tree);
-    ck_assert_msg(ebpo_open(path, &file, &error) == EBPO_OK, "%s", error.message);
-    return file;
+    ebpo_tree tree = model_build_parts(mesh, leaf_faces, parts);
+    model_write(&tree, path, NULL);
+    return model_open(path);
 }
 
 enum { USUAL = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS };

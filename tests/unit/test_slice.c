@@ -7,6 +7,7 @@
 #include <ebpo/build.h>
 
 #include "check_main.h"
+#include "model_file.h"
 #include "read_by.h"
 #include "container/chunks.h"
 #include "container/file_nodes.h"
@@ -83,29 +84,20 @@ static void whole_close(whole *w)
 
 static void write_tree(ebpo_tree *tree, uint32_t parts)
 {
-    ebpo_error error = EBPO_ERROR_INIT;
     ebpo_write_options options = EBPO_WRITE_OPTIONS_INIT;
     options.parts = parts;
-    ck_assert_msg(ebpo_tree_write(tree, path, &options, &error) == EBPO_OK, "%s", error.message);
-    ebpo_tree_free(tree);
+    model_write(tree, path, &options);
 }
 
 enum { USUAL = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS };
 
 static void build(ebpo_mesh mesh, uint32_t leaf_faces, int max_level, uint32_t parts)
 {
-    ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_mesh_report report;
-    ebpo_mend_record mend = { 0 };
     ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
-    ebpo_tree tree;
     options.leaf_faces = leaf_faces;
     options.max_level = max_level;
     options.parts = parts;
-    ck_assert_msg(ebpo_mesh_check(&mesh, 0, options.progress, &report, &error) == EBPO_OK, "%s",
-                  error.message);
-    ck_assert_msg(ebpo_build(&mesh, &report, &mend, &options, &tree, &error) == EBPO_OK, "%s",
-                  error.message);
+    ebpo_tree tree = model_build(mesh, &options);
     write_tree(&tree, ~0u);
 }
 

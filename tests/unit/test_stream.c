@@ -11,6 +11,7 @@
 #include <ebpo/stream.h>
 
 #include "check_main.h"
+#include "model_file.h"
 #include "read_by.h"
 #include "geom/plane_code.h"
 #include "octree/octcode.h"
@@ -30,29 +31,14 @@ enum { USUAL = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS };
 
 static void write_file(ebpo_mesh mesh, uint32_t parts, uint32_t leaf_faces)
 {
-    ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_mesh_report report;
-    ebpo_mend_record mend = { 0 };
-    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
-    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
-    ebpo_tree tree;
-    options.parts = parts;
-    options.leaf_faces = leaf_faces;
-    ck_assert_msg(ebpo_mesh_check(&mesh, 0, options.progress, &report, &error) == EBPO_OK, "%s",
-                  error.message);
-    ck_assert_msg(ebpo_build(&mesh, &report, &mend, &options, &tree, &error) == EBPO_OK, "%s",
-                  error.message);
-    ck_assert_msg(ebpo_tree_write(&tree, path, &write, &error) == EBPO_OK, "%s", error.message);
-    ebpo_tree_free(&tree);
+    ebpo_tree tree = model_build_parts(mesh, leaf_faces, parts);
+    model_write(&tree, path, NULL);
 }
 
 static ebpo_file *build(ebpo_mesh mesh, uint32_t parts, uint32_t leaf_faces)
 {
-    ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_file *file = NULL;
     write_file(mesh, parts, leaf_faces);
-    ck_assert_msg(ebpo_open(path, &file, &error) == EBPO_OK, "%s", error.message);
-    return file;
+    return model_open(path);
 }
 
 static ebpo_stream *new_stream(ebpo_file *file, bool planes, bool polygons, unsigned threads)

@@ -9,6 +9,7 @@
 
 #include "check_main.h"
 #include "counted_source.h"
+#include "model_file.h"
 #include "octree/node_types.h"
 #include "octree/octcode.h"
 #include "random_tree.h"
@@ -38,16 +39,12 @@ enum { USUAL = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS, FEW = 6 };
 /* Files of an even number of levels have subtrees of their own, where there are as many faces. */
 static ebpo_file *write_tree(ebpo_tree *tree, uint32_t parts, ebpo_codec codec)
 {
-    ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_file *file = NULL;
     ebpo_write_options options = EBPO_WRITE_OPTIONS_INIT;
     options.parts = parts;
     options.codec = codec;
     options.subtree_faces = tree->info.level_count % 2 ? EBPO_NO_SUBTREES : 60;
-    ck_assert_msg(ebpo_tree_write(tree, path, &options, &error) == EBPO_OK, "%s", error.message);
-    ebpo_tree_free(tree);
-    ck_assert_msg(ebpo_open(path, &file, &error) == EBPO_OK, "%s", error.message);
-    return file;
+    model_write(tree, path, &options);
+    return model_open(path);
 }
 
 static ebpo_file *write_random(uint64_t seed, int levels, unsigned gray_share, bool leaf_planes)
@@ -63,17 +60,7 @@ static ebpo_file *write_random(uint64_t seed, int levels, unsigned gray_share, b
 
 static ebpo_file *write_solid(ebpo_mesh mesh, uint32_t parts, uint32_t leaf_faces, ebpo_codec codec)
 {
-    ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_mesh_report report;
-    ebpo_mend_record mend = { 0 };
-    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
-    ebpo_tree tree;
-    options.parts = parts;
-    options.leaf_faces = leaf_faces;
-    ck_assert_msg(ebpo_mesh_check(&mesh, 0, options.progress, &report, &error) == EBPO_OK, "%s",
-                  error.message);
-    ck_assert_msg(ebpo_build(&mesh, &report, &mend, &options, &tree, &error) == EBPO_OK, "%s",
-                  error.message);
+    ebpo_tree tree = model_build_parts(mesh, leaf_faces, parts);
     return write_tree(&tree, parts, codec);
 }
 

@@ -23,8 +23,6 @@ static const double points[POINTS][3] = { { 2.7, 0.1, 0.2 },
                                           { -1.9, 0.3, 0.69 },
                                           { 0, 2.1, -0.5 } };
 
-static void enter(void) { scratch_enter(); }
-
 /* What the file without a table says. */
 typedef struct truth {
     two_layouts files;
@@ -254,7 +252,7 @@ Suite *test_suite(void)
     Suite *suite = suite_create("subtree_hostile");
     TCase *tests = tcase_create("subtree_hostile");
     tcase_set_timeout(tests, 900);
-    tcase_add_checked_fixture(tests, enter, scratch_leave);
+    tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
     tcase_add_loop_test(tests, numbers_that_lie_are_noticed_or_do_no_harm, 0, 3);
     tcase_add_test(tests, rows_that_lie_together_are_noticed_or_do_no_harm);
     suite_add_tcase(suite, tests);

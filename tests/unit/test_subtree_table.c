@@ -26,8 +26,6 @@
 
 enum { ALL = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES };
 
-static void enter(void) { scratch_enter(); }
-
 /* --- the table, counted node by node --- */
 
 typedef struct plain_table {
@@ -421,7 +419,7 @@ Suite *test_suite(void)
     Suite *suite = suite_create("subtree_table");
     TCase *tests = tcase_create("subtree_table");
     tcase_set_timeout(tests, 900);
-    tcase_add_checked_fixture(tests, enter, scratch_leave);
+    tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
     tcase_add_loop_test(tests, random_trees_are_the_same_in_both_layouts, 0, 30);
     tcase_add_loop_test(tests, models_are_the_same_in_both_layouts, 0, 15);
     tcase_add_loop_test(tests, subsets_are_the_same_in_both_layouts, 0, 3);

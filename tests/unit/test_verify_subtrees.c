@@ -9,6 +9,7 @@
 
 #include "changed_array.h"
 #include "check_main.h"
+#include "model_file.h"
 #include "scratch.h"
 #include "solids.h"
 
@@ -23,23 +24,16 @@ static void enter(void)
 
 static void write_model(ebpo_mesh mesh, uint32_t parts, uint64_t subtree_faces)
 {
-    ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_mesh_report facts;
-    ebpo_mend_record mend = { 0 };
     ebpo_build_options build = EBPO_BUILD_OPTIONS_INIT;
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
-    ebpo_tree tree;
     build.leaf_faces = 4;
     build.parts = ~0u;
     build.max_level = 5;
     write.codec = EBPO_CODEC_NONE;
     write.parts = parts;
     write.subtree_faces = subtree_faces;
-    ck_assert(ebpo_mesh_check(&mesh, 1, build.progress, &facts, &error) == EBPO_OK);
-    ck_assert_msg(ebpo_build(&mesh, &facts, &mend, &build, &tree, &error) == EBPO_OK &&
-                      ebpo_tree_write(&tree, path, &write, &error) == EBPO_OK,
-                  "%s", error.message);
-    ebpo_tree_free(&tree);
+    ebpo_tree tree = model_build(mesh, &build);
+    model_write(&tree, path, &write);
 }
 
 /* False when the file cannot be opened. */

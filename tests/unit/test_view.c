@@ -10,6 +10,7 @@
 
 #include "check_main.h"
 #include "counted_source.h"
+#include "model_file.h"
 #include "random_tree.h"
 #include "scratch.h"
 #include "solids.h"
@@ -38,28 +39,10 @@ enum { USUAL = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS, PRIORITIES = 
 
 /* --- files --- */
 
-static void write_tree(ebpo_tree *tree)
-{
-    ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
-    ck_assert_msg(ebpo_tree_write(tree, path, &write, &error) == EBPO_OK, "%s", error.message);
-    ebpo_tree_free(tree);
-}
-
 static void write_solid(ebpo_mesh mesh, uint32_t parts, uint32_t leaf_faces)
 {
-    ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_mesh_report report;
-    ebpo_mend_record mend = { 0 };
-    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
-    ebpo_tree tree;
-    options.parts = parts;
-    options.leaf_faces = leaf_faces;
-    ck_assert_msg(ebpo_mesh_check(&mesh, 0, options.progress, &report, &error) == EBPO_OK, "%s",
-                  error.message);
-    ck_assert_msg(ebpo_build(&mesh, &report, &mend, &options, &tree, &error) == EBPO_OK, "%s",
-                  error.message);
-    write_tree(&tree);
+    ebpo_tree tree = model_build_parts(mesh, leaf_faces, parts);
+    model_write(&tree, path, NULL);
 }
 
 static void write_random(int levels, unsigned gray_share, bool windings, bool leaf_planes)
@@ -67,21 +50,13 @@ static void write_random(int levels, unsigned gray_share, bool windings, bool le
     random_tree_options options = { 5, levels, gray_share, 1, true, false, windings, leaf_planes };
     ebpo_tree tree;
     random_tree_make(&tree, &options);
-    write_tree(&tree);
-}
-
-static ebpo_file *open_file(void)
-{
-    ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_file *file = NULL;
-    ck_assert_msg(ebpo_open(path, &file, &error) == EBPO_OK, "%s", error.message);
-    return file;
+    model_write(&tree, path, NULL);
 }
 
 static ebpo_file *open_solid(const char *name, uint32_t leaf_faces)
 {
     write_solid(ebpo_test_make(name), USUAL | EBPO_PART_LEAF_PLANES, leaf_faces);
-    return open_file();
+    return model_open(path);
 }
 
 /* --- the twin: all nodes by the ordinary stream, and keys computed plainly --- */
@@ -503,7 +478,7 @@ START_TEST(an_exhausted_stream_has_all_nodes_in_order_and_a_cut_at_any_time)
     for (int variant = 0; variant < 2; variant++) {
         write_solid(ebpo_test_solids[_i].make(), variant ? USUAL | EBPO_PART_LEAF_PLANES : USUAL,
                     4);
-        ebpo_file *file = open_file();
+        ebpo_file *file = model_open(path);
         for (int priority = 0; priority < PRIORITIES; priority++) {
             ebpo_observer observer = observer_of(file, &random);
             bool observed = priority != EBPO_PRIORITY_LEVEL || variant;
@@ -519,7 +494,7 @@ START_TEST(trees_of_several_chunks_come_whole_too)
 {
     uint64_t random = 5 + (uint64_t)_i;
     write_random(_i == 0 ? 8 : 5, 13, _i != 0, true); /* 8 levels: several chunks in most arrays */
-    ebpo_file *file = open_file();
+    ebpo_file *file = model_open(path);
     ebpo_observer observer = observer_of(file, &random);
     expect_whole(file,
                  (ebpo_priority)(_i % PRIORITIES == 0 ? EBPO_PRIORITY_PIXELS : _i % PRIORITIES),
@@ -550,7 +525,7 @@ START_TEST(pruned_nodes_of_subsets_stay_in_the_cut)
     }
     ck_assert_msg(ebpo_subset(whole, path, &options, &error) == EBPO_OK, "%s", error.message);
     ebpo_close(whole);
-    ebpo_file *file = open_file();
+    ebpo_file *file = model_open(path);
     info = ebpo_file_info(file);
     for (int level = 0; level < info->level_count; level++)
         pruned += info->level[level].pruned_count;
@@ -769,7 +744,7 @@ START_TEST(budgets_of_nodes_memory_and_planes_left_away_do_not_change_the_sequen
     uint64_t random = 60, all_count, count, bytes[3] = { 0 };
     write_random(8, 13, false, true);
     ebpo_view_end end;
-    ebpo_file *file = open_file();
+    ebpo_file *file = model_open(path);
     ebpo_observer observer = observer_of(file, &random);
     ebpo_view_options options = options_of(EBPO_PRIORITY_PIXELS, &observer);
     ebpo_view_stream *stream = new_view(file, &options);
@@ -781,7 +756,7 @@ START_TEST(budgets_of_nodes_memory_and_planes_left_away_do_not_change_the_sequen
         options.memory = variant == 1 ? 2 << 20 : 0;
         options.planes = options.windings = variant == 1;
         options.nodes = 5000;
-        file = open_file();
+        file = model_open(path);
         stream = new_view(file, &options);
         uint64_t *some = sequence(stream, &count, &end);
         ck_assert(end == EBPO_VIEW_NODES && count <= 5000 && count > 5000 - 8);

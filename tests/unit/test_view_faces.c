@@ -7,6 +7,7 @@
 
 #include "check_main.h"
 #include "counted_source.h"
+#include "model_file.h"
 #include "random_tree.h"
 #include "scratch.h"
 #include "solids.h"
@@ -30,26 +31,14 @@ static void make_folder(void)
 
 static void write_tree(ebpo_tree *tree, uint64_t subtree_faces)
 {
-    ebpo_error error = EBPO_ERROR_INIT;
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
     write.subtree_faces = subtree_faces;
-    ck_assert_msg(ebpo_tree_write(tree, path, &write, &error) == EBPO_OK, "%s", error.message);
-    ebpo_tree_free(tree);
+    model_write(tree, path, &write);
 }
 
 static void write_solid(ebpo_mesh mesh, uint32_t parts, uint64_t subtree_faces)
 {
-    ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_mesh_report report;
-    ebpo_mend_record mend = { 0 };
-    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
-    ebpo_tree tree;
-    options.parts = parts;
-    options.leaf_faces = 6;
-    ck_assert_msg(ebpo_mesh_check(&mesh, 0, options.progress, &report, &error) == EBPO_OK, "%s",
-                  error.message);
-    ck_assert_msg(ebpo_build(&mesh, &report, &mend, &options, &tree, &error) == EBPO_OK, "%s",
-                  error.message);
+    ebpo_tree tree = model_build_parts(mesh, 6, parts);
     write_tree(&tree, subtree_faces);
 }
 

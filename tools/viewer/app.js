@@ -51,7 +51,7 @@ function openUrl(text, begun) {
   address.searchParams.set('file', text);
   history.replaceState(null, '', address);
   $('url').value = text;
-  open(url.href, decodeURIComponent(url.pathname.split('/').at(-1)), begun);
+  open(url.href, boot.nameOf(url.href), begun);
 }
 
 function openFile(file) {

@@ -15,6 +15,15 @@
   worker.onmessage = ({ data }) => said.push(data);
   const boot = window.ebpoBoot = { worker, said, query, level: number('level'), detail: number('detail'), fieldOfView: FIELD_OF_VIEW, opening: 0, over() {},
     contextOptions: { antialias: true, powerPreference: 'high-performance', preserveDrawingBuffer: true } };
+  // A name may have a % that stands for itself.
+  boot.nameOf = (url) => {
+    const last = url.split(/[?#]/)[0].split('/').at(-1);
+    try {
+      return decodeURIComponent(last);
+    } catch {
+      return last;
+    }
+  };
   boot.ahead = boot.level <= COARSE_LEVEL ? COARSE_BYTES : FIRST_BYTES;
   // The picture's context takes long to make: between the page's first paint and its code there is time for it.
   document.addEventListener('readystatechange', () => requestAnimationFrame(() => setTimeout(() => {
@@ -40,7 +49,7 @@
   post({ range: `bytes=0-${boot.ahead - 1}` });
   // The card before the first picture, until app.js takes over.
   let got = 0, last = performance.now();
-  const name = decodeURIComponent(boot.url.split(/[?#]/)[0].split('/').at(-1)), say = () => {
+  const name = boot.nameOf(boot.url), say = () => {
     const text = document.getElementById('openingText'), quiet = Math.floor((performance.now() - last) / 1000);
     if (!text)
       return;

@@ -18,7 +18,7 @@ export function placesHold(places, size) {
     return a?.type?.class === 'integer' && a.type.size === 8 && !a.type.signed && a.type.little && a.data.length >= 8
       ? Number(new DataView(a.data.buffer, a.data.byteOffset, 8).getBigUint64(0, true)) : undefined;
   };
-  return stated('file_bytes') === size && stated('offset') === places.chunks[0].at;
+  return stated('file_bytes') === size && places.chunks !== undefined && stated('offset') === places.chunks[0].at;
 }
 
 // Where the list begins: an array of a single chunk tells its place.
