@@ -5,6 +5,8 @@
 #ifndef EBPO_GEOM_DOUBLE_DOUBLE_H
 #define EBPO_GEOM_DOUBLE_DOUBLE_H
 
+#include <stdbool.h>
+
 #include "geom/expansion.h"
 
 static inline ebpo_pair ebpo_pair_of(double x) { return (ebpo_pair){ x, 0 }; }
@@ -35,6 +37,22 @@ static inline ebpo_pair ebpo_pair_divide(ebpo_pair a, ebpo_pair b)
     double first = a.head / b.head;
     ebpo_pair rest = ebpo_pair_subtract(a, ebpo_pair_multiply(b, ebpo_pair_of(first)));
     return ebpo_pair_add(ebpo_pair_of(first), ebpo_pair_of(rest.head / b.head));
+}
+
+/* a / b as two doubles that differ by one step at most, the exact quotient rounded to nearest being
+ * one of them; equal, where there is no doubt. `error`: how far a and b are off together, as a part
+ * of themselves. False where the quotient is so large or small that this does not hold. */
+static inline bool ebpo_pair_quotient(ebpo_pair a, ebpo_pair b, double error, double out[2])
+{
+    double q = a.head / b.head;
+    if (!(fabs(q) >= 0x1p-900 && fabs(q) <= 0x1p900 && error <= 0x1p-56))
+        return false;
+    ebpo_pair back = ebpo_two_product(q, b.head);
+    double rest = ((a.head - back.head) - back.tail) + (a.tail - q * b.tail);
+    double correction = rest / b.head, margin = fabs(q) * (error + 0x1p-100);
+    out[0] = q + (correction - margin);
+    out[1] = q + (correction + margin);
+    return out[0] == out[0] && out[1] == out[1];
 }
 
 #endif

@@ -96,4 +96,68 @@ static inline int ebpo_expansion_sign(const double *e, int n)
     return n == 0 ? 0 : e[n - 1] > 0 ? 1 : -1;
 }
 
+/* Fewer components, each the rounded sum of itself and all below: e shrinks in place. Shewchuk's
+ * COMPRESS. */
+static inline int ebpo_expansion_compress(double *e, int n)
+{
+    if (n == 0)
+        return 0;
+    int bottom = n - 1, top = 0;
+    double sum = e[n - 1];
+    for (int i = n - 2; i >= 0; i--) {
+        ebpo_pair pair = ebpo_two_sum(sum, e[i]);
+        sum = pair.head;
+        if (pair.tail != 0) {
+            e[bottom--] = sum;
+            sum = pair.tail;
+        }
+    }
+    e[bottom] = sum;
+    for (int i = bottom + 1; i < n; i++) {
+        ebpo_pair pair = ebpo_two_sum(e[i], sum);
+        sum = pair.head;
+        if (pair.tail != 0)
+            e[top++] = pair.tail;
+    }
+    e[top++] = sum;
+    return top;
+}
+
+/* out = e * f for f of at most two components, e of at most 16; room for 4 n. */
+static inline int ebpo_expansion_times(double *out, const double *e, int n, const double *f, int m)
+{
+    double low[32], high[32];
+    if (m == 0)
+        return 0;
+    if (m == 1)
+        return ebpo_expansion_scale(out, e, n, f[0]);
+    int low_n = ebpo_expansion_scale(low, e, n, f[0]);
+    int high_n = ebpo_expansion_scale(high, e, n, f[1]);
+    return ebpo_expansion_sum(out, low, low_n, high, high_n);
+}
+
+/* A difference as an expansion of at most two components. */
+typedef struct ebpo_difference {
+    int n;
+    double x[2];
+} ebpo_difference;
+
+static inline ebpo_difference ebpo_difference_of(ebpo_pair pair)
+{
+    ebpo_difference d = { 0 };
+    d.n = ebpo_expansion_of_pair(d.x, pair);
+    return d;
+}
+
+/* out = p * q - r * s; room for 16. */
+static inline int ebpo_expansion_minor(double *out, ebpo_difference p, ebpo_difference q,
+                                       ebpo_difference r, ebpo_difference s)
+{
+    double left[8], right[8];
+    int left_n = ebpo_expansion_times(left, p.x, p.n, q.x, q.n);
+    int right_n = ebpo_expansion_times(right, r.x, r.n, s.x, s.n);
+    ebpo_expansion_negate(right, right_n);
+    return ebpo_expansion_sum(out, left, left_n, right, right_n);
+}
+
 #endif

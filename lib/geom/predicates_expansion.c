@@ -28,54 +28,18 @@ static bool coordinates_in_range(const double *x, int n)
     return in_range(x, n, 0x1p-247, 0x1p300);
 }
 
-/* out = e * f for f of at most two components, e of at most 16; room for 4 n. */
-static int times(double *out, const double *e, int n, const double *f, int m)
-{
-    double low[32], high[32];
-    if (m == 0)
-        return 0;
-    if (m == 1)
-        return ebpo_expansion_scale(out, e, n, f[0]);
-    int low_n = ebpo_expansion_scale(low, e, n, f[0]);
-    int high_n = ebpo_expansion_scale(high, e, n, f[1]);
-    return ebpo_expansion_sum(out, low, low_n, high, high_n);
-}
-
-/* A difference as an expansion of at most two components. */
-typedef struct difference {
-    int n;
-    double x[2];
-} difference;
-
-static difference difference_of(ebpo_pair pair)
-{
-    difference d = { 0 };
-    d.n = ebpo_expansion_of_pair(d.x, pair);
-    return d;
-}
-
-/* out = p * q - r * s; room for 16. */
-static int minor2(double *out, difference p, difference q, difference r, difference s)
-{
-    double left[8], right[8];
-    int left_n = times(left, p.x, p.n, q.x, q.n);
-    int right_n = times(right, r.x, r.n, s.x, s.n);
-    ebpo_expansion_negate(right, right_n);
-    return ebpo_expansion_sum(out, left, left_n, right, right_n);
-}
-
 int ebpo_orient2d_expansion(const double a[2], const double b[2], const double c[2])
 {
     const double all[6] = { a[0], a[1], b[0], b[1], c[0], c[1] };
     if (!coordinates_in_range(all, 6))
         return EBPO_SIGN_UNKNOWN;
-    difference m[2][2];
+    ebpo_difference m[2][2];
     for (int k = 0; k < 2; k++) {
-        m[k][0] = difference_of(ebpo_two_difference(b[k], a[k]));
-        m[k][1] = difference_of(ebpo_two_difference(c[k], a[k]));
+        m[k][0] = ebpo_difference_of(ebpo_two_difference(b[k], a[k]));
+        m[k][1] = ebpo_difference_of(ebpo_two_difference(c[k], a[k]));
     }
     double det[16];
-    int n = minor2(det, m[0][0], m[1][1], m[1][0], m[0][1]);
+    int n = ebpo_expansion_minor(det, m[0][0], m[1][1], m[1][0], m[0][1]);
     return ebpo_expansion_sign(det, n);
 }
 
@@ -128,14 +92,14 @@ static bool integer_determinant(int *sign, ebpo_pair m[3][3])
 }
 
 /* out = the determinant; room for 192. */
-static int expand_determinant(double *out, difference m[3][3])
+static int expand_determinant(double *out, ebpo_difference m[3][3])
 {
     double minor[16], term[3][64], two[128];
     int term_n[3];
     for (int k = 0; k < 3; k++) {
         int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
-        int n = minor2(minor, m[u][0], m[v][1], m[v][0], m[u][1]);
-        term_n[k] = times(term[k], minor, n, m[k][2].x, m[k][2].n);
+        int n = ebpo_expansion_minor(minor, m[u][0], m[v][1], m[v][0], m[u][1]);
+        term_n[k] = ebpo_expansion_times(term[k], minor, n, m[k][2].x, m[k][2].n);
     }
     int two_n = ebpo_expansion_sum(two, term[0], term_n[0], term[1], term_n[1]);
     return ebpo_expansion_sum(out, two, two_n, term[2], term_n[2]);
@@ -165,19 +129,30 @@ static double expansion_size(const double *e, int n)
 
 static int expansion_determinant_sign(ebpo_pair m[3][3], bool heads_exact)
 {
-    difference d[3][3];
+    ebpo_difference d[3][3];
     double det[192];
     for (int k = 0; k < 3; k++)
         for (int i = 0; i < 3; i++)
-            d[k][i] = difference_of((ebpo_pair){ m[k][i].head, 0 });
+            d[k][i] = ebpo_difference_of((ebpo_pair){ m[k][i].head, 0 });
     int n = expand_determinant(det, d);
     if (heads_exact || expansion_size(det, n) > error_of_heads(m))
         return ebpo_expansion_sign(det, n);
     for (int k = 0; k < 3; k++)
         for (int i = 0; i < 3; i++)
-            d[k][i] = difference_of(m[k][i]);
+            d[k][i] = ebpo_difference_of(m[k][i]);
     n = expand_determinant(det, d);
     return ebpo_expansion_sign(det, n);
+}
+
+int ebpo_determinant_expansion(ebpo_pair m[3][3])
+{
+    bool heads_exact = true;
+    for (int k = 0; k < 3; k++)
+        heads_exact &= (m[k][0].tail == 0) & (m[k][1].tail == 0) & (m[k][2].tail == 0);
+    int sign;
+    if (heads_exact && integer_determinant(&sign, m))
+        return sign;
+    return expansion_determinant_sign(m, heads_exact);
 }
 
 int ebpo_orient3d_expansion(const double a[3], const double b[3], const double c[3],
@@ -187,17 +162,12 @@ int ebpo_orient3d_expansion(const double a[3], const double b[3], const double c
         !coordinates_in_range(d, 3))
         return EBPO_SIGN_UNKNOWN;
     ebpo_pair m[3][3];
-    bool heads_exact = true;
     for (int k = 0; k < 3; k++) {
         m[k][0] = ebpo_two_difference(b[k], a[k]);
         m[k][1] = ebpo_two_difference(c[k], a[k]);
         m[k][2] = ebpo_two_difference(d[k], a[k]);
-        heads_exact &= (m[k][0].tail == 0) & (m[k][1].tail == 0) & (m[k][2].tail == 0);
     }
-    int sign;
-    if (heads_exact && integer_determinant(&sign, m))
-        return sign;
-    return expansion_determinant_sign(m, heads_exact);
+    return ebpo_determinant_expansion(m);
 }
 
 /* --- sums of products --- */

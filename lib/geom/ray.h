@@ -18,7 +18,7 @@ typedef struct ebpo_ray_meeting {
     /* 1: the line goes against the normal, -1: with it, wherever it meets the triangle; 0: within
      * the plane, or no area */
     int facing;
-    double t; /* of the first common point, correctly rounded to 2 ulp or better */
+    double t; /* of the first common point, correctly rounded */
 } ebpo_ray_meeting;
 
 #endif

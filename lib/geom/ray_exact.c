@@ -10,6 +10,8 @@
 
 #include <limits.h>
 #include <math.h>
+#include <stdint.h>
+#include <string.h>
 
 #include <gmp.h>
 
@@ -246,6 +248,25 @@ static void meet(stretch *st, const ebpo_segment *ray, const double triangle[3][
 
 static void stretch_clear(stretch *st) { mpq_clears(st->low, st->high, NULL); }
 
+/* To the nearest double, t >= 0; mpq_get_d cuts off. */
+static double rounded(const mpq_t t)
+{
+    double low = mpq_get_d(t), high = nextafter(low, INFINITY);
+    if (low == INFINITY)
+        return low;
+    mpq_t middle, half;
+    mpq_inits(middle, half, NULL);
+    mpq_set_d(middle, low);
+    mpq_set_d(half, high < INFINITY ? high - low : low - nextafter(low, 0));
+    mpq_div_2exp(half, half, 1);
+    mpq_add(middle, middle, half);
+    int sign = mpq_cmp(t, middle);
+    uint64_t bits;
+    memcpy(&bits, &low, sizeof bits);
+    mpq_clears(middle, half, NULL);
+    return sign > 0 || (sign == 0 && bits % 2) ? high : low;
+}
+
 void ebpo_ray_triangle_exact(const ebpo_segment *ray, const double triangle[3][3],
                              ebpo_ray_meeting *out)
 {
@@ -254,8 +275,7 @@ void ebpo_ray_triangle_exact(const ebpo_segment *ray, const double triangle[3][3
     out->meets = st.any;
     out->side = st.any ? st.side : 0;
     out->facing = st.any ? st.facing : 0;
-    /* Towards 0, so less than 1 ulp off. */
-    out->t = st.any ? mpq_get_d(st.low) : INFINITY;
+    out->t = st.any ? rounded(st.low) : INFINITY;
     stretch_clear(&st);
 }
 

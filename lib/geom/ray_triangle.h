@@ -1,6 +1,7 @@
 /* Rays and boxes against triangles, exact: the decisions are those of arithmetic without rounding,
- * for every finite double. Filters in floating point first, integers of any size (GMP) when they do
- * not suffice. Pure functions, any thread; the same results with every compiler and its flags. */
+ * for every finite double. Filters in floating point first, then exact arithmetic on doubles
+ * (expansions), integers of any size (GMP) where numbers are too large or too small for these. Pure
+ * functions, any thread; the same results with every compiler and its flags. */
 #ifndef EBPO_GEOM_RAY_TRIANGLE_H
 #define EBPO_GEOM_RAY_TRIANGLE_H
 
@@ -8,8 +9,10 @@
 
 void ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3], ebpo_ray_meeting *out);
 
-/* Sign of t(a) - t(b), exact, for two triangles that the ray meets (first common points). */
-int ebpo_ray_compare(const ebpo_segment *ray, const double a[3][3], const double b[3][3]);
+/* Sign of t(a) - t(b), exact, for two triangles that the ray meets (first common points) as
+ * ebpo_ray_triangle has said. */
+int ebpo_ray_compare(const ebpo_segment *ray, const double a[3][3], const ebpo_ray_meeting *at_a,
+                     const double b[3][3], const ebpo_ray_meeting *at_b);
 
 /* True when the closed triangle and the closed box [min, max] have a common point (min <= max on
  * each axis; a box may be flat or a point). */

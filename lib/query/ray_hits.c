@@ -32,8 +32,8 @@ bool ebpo_casting_meets(const ebpo_casting *c, ebpo_met *m)
 static int compare_met(const void *a, const void *b, void *ray)
 {
     const ebpo_met *x = a, *y = b;
-    int sign =
-        ebpo_ray_compare(ray, (const double(*)[3])x->triangle, (const double(*)[3])y->triangle);
+    int sign = ebpo_ray_compare(ray, (const double(*)[3])x->triangle, &x->meeting,
+                                (const double(*)[3])y->triangle, &y->meeting);
     return sign ? sign : (x->file_face > y->file_face) - (x->file_face < y->file_face);
 }
 

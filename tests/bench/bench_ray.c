@@ -1,14 +1,16 @@
 /* Processor time for one ray or box against one triangle, the best of many rounds: bench_ray. */
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 #include <time.h>
 
 #include "exact_twin.h"
 #include "geom/ray_triangle.h"
 
-enum { COUNT = 4096, ROUNDS = 500 };
+enum { COUNT = 4096, ROUNDS = 30 };
 
 static double triangles[COUNT][3][3], box_min[COUNT][3], box_max[COUNT][3];
+static double others[COUNT][3][3]; /* neighbours of the triangles */
 static ebpo_segment rays[COUNT];
 
 static double now(void)
@@ -18,49 +20,115 @@ static double now(void)
     return (double)t.tv_sec * 1e9 + (double)t.tv_nsec;
 }
 
-/* aim: 0 at random, 1 at the triangle's middle, 2 at a corner. */
-static void prepare(int aim, uint64_t *state)
+typedef enum aim {
+    AT_RANDOM,
+    AT_THE_MIDDLE,
+    AT_A_CORNER, /* as near as the direction's rounding lets it */
+    AT_A_CORNER_EXACTLY,
+    AT_AN_EDGE_EXACTLY,
+    FROM_A_CORNER,
+    FROM_AN_EDGE,
+    FROM_THE_FACE, /* within rounding */
+    TO_THE_FACE,   /* ends there, within rounding */
+    TO_A_CORNER,
+    ALONG_AN_AXIS, /* through a corner */
+    WITHIN_THE_PLANE
+} aim;
+
+/* Points with few bits, so that differences are exact. */
+static double coarse(uint64_t *state)
+{
+    return (double)(float)(0x1p-20 * (double)twin_integer(state, -(1 << 20), 1 << 20));
+}
+
+static void make_triangles(int n, aim a, uint64_t *state)
+{
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; i < 3; i++)
+            triangles[n][i][k] = coarse(state);
+    if (a == WITHIN_THE_PLANE)
+        for (int i = 0; i < 3; i++)
+            triangles[n][i][2] = 0.5;
+    memcpy(others[n], triangles[n], sizeof others[n]);
+    for (int k = 0; k < 3; k++)
+        others[n][2][k] = coarse(state);
+}
+
+static void make_ray(int n, aim a, uint64_t *state)
+{
+    const double(*t)[3] = (const double(*)[3])triangles[n];
+    bool exact = a == AT_A_CORNER_EXACTLY || a == AT_AN_EDGE_EXACTLY || a == TO_A_CORNER;
+    for (int k = 0; k < 3; k++) {
+        double middle = (t[0][k] + t[1][k] + t[2][k]) / 3, edge = (t[0][k] + t[1][k]) / 2,
+               from = exact ? 4 * coarse(state) : 3 * twin_uniform(state),
+               to = a == AT_THE_MIDDLE || a == TO_THE_FACE ? middle
+                    : a == AT_AN_EDGE_EXACTLY              ? edge
+                    : a == AT_RANDOM || (a >= FROM_A_CORNER && a <= FROM_THE_FACE)
+                        ? 9 * twin_uniform(state)
+                        : t[0][k];
+        from = a == FROM_A_CORNER ? t[0][k] : a == FROM_AN_EDGE ? edge : from;
+        from = a == FROM_THE_FACE ? middle : from;
+        rays[n].origin[k] = a == ALONG_AN_AXIS && k != 1 ? t[0][k] : from;
+        rays[n].direction[k] = a == ALONG_AN_AXIS ? (k == 1 ? 1 : 0) : to - from;
+        if (a == WITHIN_THE_PLANE) {
+            rays[n].origin[k] = k == 2 ? 0.5 : from;
+            rays[n].direction[k] = k == 2 ? 0 : middle - from;
+        }
+    }
+    rays[n].t_max = a == TO_THE_FACE || a == TO_A_CORNER ? 1 : 1e9;
+    if (a == ALONG_AN_AXIS)
+        rays[n].origin[1] = -9;
+}
+
+static void prepare(aim a, uint64_t *state)
 {
     for (int n = 0; n < COUNT; n++) {
-        rays[n].t_max = 1e9;
+        make_triangles(n, a, state);
+        make_ray(n, a, state);
         for (int k = 0; k < 3; k++) {
-            for (int i = 0; i < 3; i++)
-                triangles[n][i][k] = (float)twin_uniform(state);
-            double middle = (triangles[n][0][k] + triangles[n][1][k] + triangles[n][2][k]) / 3;
-            rays[n].origin[k] = 3 * twin_uniform(state);
-            rays[n].direction[k] =
-                aim == 0 ? twin_uniform(state)
-                         : (aim == 1 ? middle : triangles[n][0][k]) - rays[n].origin[k];
-            box_min[n][k] = middle + .4 * twin_uniform(state);
+            box_min[n][k] = triangles[n][0][k] + .4 * twin_uniform(state);
             box_max[n][k] = box_min[n][k] + .1;
         }
     }
 }
 
-static void time_rays(const char *name, int aim, int rounds, uint64_t *state)
+/* One ray against a triangle; and which of two neighbours it meets first, where it meets both. */
+static void time_rays(const char *name, aim a, uint64_t *state)
 {
-    long hits = 0;
-    double best = 1e30;
-    prepare(aim, state);
-    for (int r = 0; r < rounds; r++) {
+    static ebpo_ray_meeting met[2][COUNT];
+    long hits = 0, both = 0, ties = 0;
+    double best = 1e30, best_order = 1e30;
+    prepare(a, state);
+    for (int r = 0; r < ROUNDS; r++) {
         double begin = now();
-        hits = 0;
+        hits = both = ties = 0;
         for (int n = 0; n < COUNT; n++) {
-            ebpo_ray_meeting m;
-            ebpo_ray_triangle(&rays[n], (const double(*)[3])triangles[n], &m);
-            hits += m.meets;
+            ebpo_ray_triangle(&rays[n], (const double(*)[3])triangles[n], &met[0][n]);
+            hits += met[0][n].meets;
         }
         best = fmin(best, (now() - begin) / COUNT);
+        for (int n = 0; n < COUNT; n++)
+            ebpo_ray_triangle(&rays[n], (const double(*)[3])others[n], &met[1][n]);
+        begin = now();
+        for (int n = 0; n < COUNT; n++) {
+            if (!met[0][n].meets || !met[1][n].meets)
+                continue;
+            both++;
+            ties += ebpo_ray_compare(&rays[n], (const double(*)[3])triangles[n], &met[0][n],
+                                     (const double(*)[3])others[n], &met[1][n]) == 0;
+        }
+        best_order = fmin(best_order, (now() - begin) / (double)(both ? both : 1));
     }
-    printf("%-18s %8.1f ns  %5.1f %% meet\n", name, best, 100.0 * (double)hits / COUNT);
+    printf("%-22s %8.1f ns  %5.1f %% meet; %8.1f ns to compare %4ld pairs, %4ld ties\n", name, best,
+           100.0 * (double)hits / COUNT, both ? best_order : 0.0, both, ties);
 }
 
-static void time_boxes(int rounds, uint64_t *state)
+static void time_boxes(uint64_t *state)
 {
     long hits = 0;
     double best = 1e30;
-    prepare(0, state);
-    for (int r = 0; r < rounds; r++) {
+    prepare(AT_RANDOM, state);
+    for (int r = 0; r < ROUNDS; r++) {
         double begin = now();
         hits = 0;
         for (int n = 0; n < COUNT; n++)
@@ -68,15 +136,19 @@ static void time_boxes(int rounds, uint64_t *state)
                 ebpo_triangle_meets_box((const double(*)[3])triangles[n], box_min[n], box_max[n]);
         best = fmin(best, (now() - begin) / COUNT);
     }
-    printf("%-18s %8.1f ns  %5.1f %% meet\n", "box", best, 100.0 * (double)hits / COUNT);
+    printf("%-22s %8.1f ns  %5.1f %% meet\n", "box", best, 100.0 * (double)hits / COUNT);
 }
 
 int main(void)
 {
     uint64_t state = 1;
-    time_rays("ray at random", 0, ROUNDS, &state);
-    time_rays("ray at the middle", 1, ROUNDS, &state);
-    time_rays("ray at a corner", 2, ROUNDS / 50, &state);
-    time_boxes(ROUNDS, &state);
+    static const char *const names[] = {
+        "at random",           "at the middle", "at a corner",   "at a corner, exactly",
+        "at an edge, exactly", "from a corner", "from an edge",  "from the face",
+        "to the face",         "to a corner",   "along an axis", "within the plane"
+    };
+    for (int a = AT_RANDOM; a <= WITHIN_THE_PLANE; a++)
+        time_rays(names[a], (aim)a, &state);
+    time_boxes(&state);
     return 0;
 }

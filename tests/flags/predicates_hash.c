@@ -75,7 +75,7 @@ static uint64_t hash_rays(uint64_t hash, const double *p)
         ebpo_ray_triangle(&ray, other, &n);
         hash = mix_double(mix(hash, m.meets ? m.side : 7), m.t);
         if (m.meets && n.meets)
-            hash = mix(hash, ebpo_ray_compare(&ray, triangle, other));
+            hash = mix(hash, ebpo_ray_compare(&ray, triangle, &m, other, &n));
     }
     const double low[3] = { p[9], fmin(p[10], p[1]), p[11] },
                  high[3] = { p[9], fmax(p[10], p[1]), p[11] };

@@ -401,8 +401,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_distance_many(ebpo_context *context, con
 
 typedef struct ebpo_ray_hit {
     /*
-     * The hit is at origin + t direction. Rounded; hits are in the order of the
-     * exact values.
+     * The hit is at origin + t direction. Correctly rounded; hits are in the order
+     * of the exact values.
      */
     double t;
 
