@@ -42,7 +42,7 @@ int main(int argc, char **argv)
     ebpo_subtree_faces faces = EBPO_SUBTREE_FACES_INIT;
     double point[3];
     if (argc < 7) {
-        fprintf(stderr, "usage: draw_around FILE.ebpo.h5 X Y Z LEVEL OUT.ply\n");
+        fprintf(stderr, "usage: draw_around FILE.ebpo.h5|URL X Y Z LEVEL OUT.ply\n");
         return 2;
     }
     for (int k = 0; k < 3; k++)

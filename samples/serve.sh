@@ -47,7 +47,10 @@ else
     for file in "$viewer"/*; do ln -s "$file" "$work/www/"; done
 fi
 for file in "$folder"/*.ebpo.h5; do ln -s "$file" "$work/www/models/"; done
-node "$viewer/list.js" "$work"/www/models/*.ebpo.h5 >"$work/www/models/index.json"
+node "$viewer/list.js" "$work"/www/models/*.ebpo.h5 >"$work/www/models/index.json" || {
+    echo "serve.sh: $folder: none of its files can be shown" >&2
+    exit 1
+}
 
 # An nginx of one's own: no root, no system folders. The page is sent compressed, models never.
 user=

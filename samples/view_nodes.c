@@ -25,8 +25,9 @@ int main(int argc, char **argv)
     ebpo_observer observer = EBPO_OBSERVER_INIT;
     ebpo_view_node node;
     ebpo_view_end end = EBPO_VIEW_NODE;
+    double middle[3];
     if (argc < 5) {
-        fprintf(stderr, "usage: view_nodes FILE.ebpo.h5 X Y Z [BYTES]\n");
+        fprintf(stderr, "usage: view_nodes FILE.ebpo.h5|URL X Y Z [BYTES]\n");
         return 2;
     }
     options.priority = EBPO_PRIORITY_PIXELS;
@@ -35,12 +36,16 @@ int main(int argc, char **argv)
     options.pixels = 16;
     options.polygons = true;
     options.bytes = argc > 5 ? strtoull(argv[5], NULL, 10) : 0;
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < 3; k++)
         observer.eye[k] = strtod(argv[2 + k], NULL);
-        observer.direction[k] = -observer.eye[k]; /* looks at the origin */
+    if (ebpo_open(argv[1], &file, &error) != EBPO_OK)
+        goto done;
+    const ebpo_info *info = ebpo_file_info(file);
+    for (int k = 0; k < 3; k++) {
+        middle[k] = info->box_origin[k] + info->box_size[k] / 2;
+        observer.direction[k] = middle[k] - observer.eye[k];
     }
-    if (ebpo_open(argv[1], &file, &error) != EBPO_OK ||
-        ebpo_view_stream_new(file, &options, &stream, &error) != EBPO_OK)
+    if (ebpo_view_stream_new(file, &options, &stream, &error) != EBPO_OK)
         goto done;
     for (int frame = 0; frame < 2 && error.status == EBPO_OK; frame++) {
         uint64_t arrived = 0, polygons = 0;
@@ -53,8 +58,9 @@ int main(int argc, char **argv)
         printf("%" PRIu64 " nodes more, %" PRIu64 " bytes read: %" PRIu64
                " polygons to draw, no node larger than %.3g pixels\n",
                arrived, stats.bytes_read, polygons, stats.pixels);
+        /* Half as far from the middle: what is there already is not read again. */
         for (int k = 0; k < 3; k++)
-            observer.eye[k] /= 2; /* half as far away: what is there already is not read again */
+            observer.eye[k] += (middle[k] - observer.eye[k]) / 2;
         if (error.status == EBPO_OK && ebpo_view_stream_change(stream, &options, &error) != EBPO_OK)
             break;
     }

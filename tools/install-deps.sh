@@ -15,7 +15,7 @@ packages="gcc dpkg-dev pkg-config meson ninja-build libhdf5-dev libzstd-dev zlib
 for option in "$@"; do
     case $option in
     --tests)
-        packages="$packages abigail-tools check hdf5-tools python3 python3-h5py python3-numpy \
+        packages="$packages abigail-tools check git hdf5-tools python3 python3-h5py python3-numpy \
             clang clang-format libclang-rt-14-dev g++ mandoc chromium $viewer"
         [ $modules = yes ] || modules=tests ;;
     --demo) packages="$packages hdf5-tools glmark2-data python3-h5py" ;;

@@ -434,6 +434,11 @@ async function servesOrSays() {
   };
   mkdirSync(empty);
   assert.match(says(process.env, '--folder', empty), /^1 serve\.sh: .*no \.ebpo\.h5 file is there;.*--folder.*quickstart\.sh[^\n]*\n$/);
+  writeFileSync(join(empty, 'torn.ebpo.h5'), readFileSync(join(models, 'ring.ebpo.h5')).subarray(0, 5000));
+  assert.match(says(process.env, '--folder', empty), /^1 list\.js: left out: torn\.ebpo\.h5: [^/\n]*cut off[^/\n]*\nserve\.sh: .*none of its files can be shown\n$/);
+  const list = JSON.parse(run('node', [join(root, 'tools/viewer/list.js'), join(empty, 'torn.ebpo.h5'), join(models, 'ring.ebpo.h5')]));
+  assert.deepEqual(list.map((item) => item.file), ['ring.ebpo.h5']);
+  rmSync(join(empty, 'torn.ebpo.h5'));
   const few = join(work, 'bin');
   mkdirSync(few);
   for (const name of ['dirname', 'ls', 'sh', 'id'])

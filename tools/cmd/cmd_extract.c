@@ -71,8 +71,26 @@ static int check_values(const values *v, const char *in, const char *out)
     return EXIT_FINE;
 }
 
+/* Gray nodes of a whole subtree that have no children are pruned. */
+static void warn_of_pruned(const ebpo_subtree *subtree, const char *path)
+{
+    ebpo_subtree_nodes nodes = EBPO_SUBTREE_NODES_INIT;
+    uint64_t pruned = 0;
+    if (ebpo_subtree_get_nodes(subtree, &nodes) != EBPO_OK)
+        return;
+    for (uint64_t i = 0; i < nodes.node_count; i++)
+        pruned += nodes.types[i] == EBPO_GRAY && nodes.children[i] == EBPO_NO_CHILDREN;
+    char lacking[40];
+    words_plural(lacking, sizeof lacking, pruned, "node", "nodes");
+    if (pruned)
+        fprintf(stderr,
+                "ebpo extract: %s: note: is a subset without what is below %s of this subtree, so "
+                "faces are missing\n",
+                remote_shown(path), lacking);
+}
+
 /* Its faces as a mesh, lent by the subtree. */
-static ebpo_status take_subtree(const ebpo_file *file, const values *v,
+static ebpo_status take_subtree(const ebpo_file *file, const values *v, const char *path,
                                 const ebpo_workspace *workspace, extracted *out, ebpo_error *error)
 {
     ebpo_subtree_options how = EBPO_SUBTREE_OPTIONS_INIT;
@@ -84,6 +102,8 @@ static ebpo_status take_subtree(const ebpo_file *file, const values *v,
     ebpo_status status = ebpo_subtree_open(file, (uint64_t)v->subtree, &how, &out->lender, error);
     if (status == EBPO_OK)
         status = ebpo_subtree_get_faces(out->lender, &faces, error);
+    if (status == EBPO_OK)
+        warn_of_pruned(out->lender, path);
     out->mesh.vertex_count = faces.vertex_count;
     out->mesh.face_count = faces.face_count;
     out->mesh.xyz32 = (float *)faces.xyz32;
@@ -97,7 +117,7 @@ static ebpo_status take(ebpo_file *file, const values *v, const char *path,
                         ebpo_error *error)
 {
     if (v->subtree > 0)
-        return take_subtree(file, v, workspace, out, error);
+        return take_subtree(file, v, path, workspace, out, error);
     if (!v->mesh) {
         ebpo_lod_options lod = EBPO_LOD_OPTIONS_INIT;
         lod.walls = !v->no_walls;

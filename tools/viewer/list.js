@@ -1,4 +1,5 @@
-// node list.js FILE ...: a list of files for the viewer's first page (?samples=), as JSON.
+// node list.js FILE ...: a list of files for the viewer's first page (?samples=), as JSON. Files that
+// cannot be read are left out, which is said; if no other is there, the exit code is 1.
 import { promises as fs } from 'node:fs';
 import { basename } from 'node:path';
 import { openEbpo } from './reader/index.js';
@@ -17,6 +18,13 @@ async function headOf(path) {
 }
 
 const list = [];
-for (const path of process.argv.slice(2))
-  list.push(await headOf(path));
+for (const path of process.argv.slice(2)) {
+  try {
+    list.push(await headOf(path));
+  } catch (error) {
+    console.error(`list.js: left out: ${basename(path)}: ${error.message.replace(`${path}: `, '')}`);
+  }
+}
+if (!list.length)
+  process.exit(1);
 console.log(JSON.stringify(list, null, 1));
