@@ -8,13 +8,18 @@
 set -eu
 here=$(cd "$(dirname "$0")/.." && pwd)
 viewer=$here/tools/viewer port=8080 folder=$here/samples/out log='' bundle=yes
+usage() {
+    echo "usage: serve.sh [--port N] [--folder DIR] [--log FILE] [--sources]" >&2
+    exit 2
+}
 while [ $# -gt 0 ]; do
+    case $1 in --port | --folder | --log) [ $# -gt 1 ] || usage ;; esac
     case $1 in
     --port) port=$2; shift 2 ;;
     --folder) folder=$2; shift 2 ;;
     --log) log=$2; shift 2 ;;
     --sources) bundle=no; shift ;;
-    *) echo "usage: serve.sh [--port N] [--folder DIR] [--log FILE] [--sources]" >&2; exit 2 ;;
+    *) usage ;;
     esac
 done
 missing() {
@@ -76,4 +81,7 @@ echo "http://localhost:$port/?samples=models/index.json"
 nginx -e stderr -p "$work" -c "$work/nginx.conf" &
 server=$!
 trap 'kill $server 2>/dev/null; wait $server 2>/dev/null; exit 0' INT TERM
-wait $server
+wait $server || {
+    echo "serve.sh: nginx does not serve, as it says above; --port names another port" >&2
+    exit 1
+}

@@ -51,6 +51,14 @@ static void path_close(void *user)
     free(s);
 }
 
+static ebpo_status fail_to_open(const char *path, ebpo_error *error)
+{
+    if (errno == ENOENT && strstr(path, "://"))
+        return ebpo_fail_file(error, EBPO_E_IO, path,
+                              "no such file, and of URLs only http:// and https:// are read");
+    return ebpo_fail_errno(error, path, "cannot be opened");
+}
+
 /* Non-blocking: a pipe must not hang us. */
 static ebpo_status open_regular(const char *path, int *fd, uint64_t *size, ebpo_error *error)
 {
@@ -58,7 +66,7 @@ static ebpo_status open_regular(const char *path, int *fd, uint64_t *size, ebpo_
     ebpo_status status = EBPO_OK;
     *fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
     if (*fd < 0)
-        return ebpo_fail_errno(error, path, "cannot be opened");
+        return fail_to_open(path, error);
     if (fstat(*fd, &facts) < 0)
         status = ebpo_fail_errno(error, path, "cannot be examined");
     else if (!S_ISREG(facts.st_mode))

@@ -439,6 +439,8 @@ async function servesOrSays() {
   const list = JSON.parse(run('node', [join(root, 'tools/viewer/list.js'), join(empty, 'torn.ebpo.h5'), join(models, 'ring.ebpo.h5')]));
   assert.deepEqual(list.map((item) => item.file), ['ring.ebpo.h5']);
   rmSync(join(empty, 'torn.ebpo.h5'));
+  assert.match(says(process.env, '--port'), /^2 usage: serve\.sh/);
+  assert.match(says(process.env, '--folder', models, '--port', '99999'), /^1 [^]*\nserve\.sh: nginx does not serve, .*--port[^\n]*\n$/);
   const few = join(work, 'bin');
   mkdirSync(few);
   for (const name of ['dirname', 'ls', 'sh', 'id'])

@@ -21,8 +21,8 @@ bool command_same_file(const char *a, const char *b);
 /* True, said on stderr (exit with EXIT_USAGE): writing `out` would overwrite `in`. */
 bool command_overwrites(const char *name, const char *in, const char *out);
 
-/* 1: the file begins as an HDF5 file does, or is a URL, 0: it does not, -1: it cannot be read (said
- * on stderr). */
+/* 1: the file begins as an HDF5 file does, or opening it will tell: a URL, or no such file; 0: it
+ * begins otherwise, -1: it cannot be read (said on stderr). */
 int command_is_hdf5(const char *name, const char *path);
 
 /* False, said on stderr (exit with EXIT_FAILED): the file cannot be read, or is something else than
