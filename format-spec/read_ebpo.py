@@ -111,6 +111,7 @@ def check_subtrees(file):
     assert (index[1:] == sums[rows - 1:(len(index) - 1) * rows:rows]).all() and not index[0].any()
     root, levels = int(file.attrs["subtree_level"]), int(file.attrs["level_count"])
     subtree, own, column = np.arange(len(counts)), 0, 6
+    firsts, refs = np.full(len(counts), -1), [np.zeros(0, "i8") for _ in range(len(counts))]
     for number in range(root + 1, levels):
         level = file[f"/levels/{number:02d}"]
         types = (level["types"][...][:, None] >> (2 * np.arange(8, dtype="u2"))) & 3
@@ -123,7 +124,14 @@ def check_subtrees(file):
         gray, leaf = of[types == 3], of[types == 2]
         ends = np.zeros(len(counts), "u8")
         if "leaf_skip" in level:
-            np.maximum.at(ends, leaf, leaf_first(level) + level["leaf_new"][...])
+            first = leaf_first(level)
+            np.maximum.at(ends, leaf, first + level["leaf_new"][...])
+            listed, owners = leaf_refs(level, first), np.repeat(leaf, level["leaf_ref_count"][...].astype("i8"))
+            for i in np.unique(leaf):
+                least = first[leaf == i].min()
+                firsts[i] = least if firsts[i] < 0 else min(firsts[i], least)
+            for i in np.unique(owners):
+                refs[i] = np.concatenate([refs[i], listed[owners == i]])
         ends = np.maximum.accumulate(ends)
         own = own + total("leaf_new", leaf)
         expected = [np.bincount(of[types == k], minlength=len(counts)) for k in (3, 2, 1)]
@@ -132,26 +140,34 @@ def check_subtrees(file):
         assert (np.transpose(expected) == counts[:, column:column + 7]).all(), f"level {number}"
         subtree, column = gray, column + 7
     assert (counts[:, 1] == own).all(), "new faces"
-    check_faces_of_subtrees(file, counts[...].astype("u8"), sums)
+    check_faces_of_subtrees(file, counts[...].astype("u8"), sums, firsts, refs)
     check_places(file)
 
 
-def check_faces_of_subtrees(file, counts, sums):
-    """First uses of vertices, and chunks from elsewhere that a subtree's own faces use."""
+def distances(numbers, rows, at):
+    """From the block of `at` back to the blocks of some faces or vertices, ascending, each once."""
+    return sorted((at // rows - np.unique(numbers // rows)).tolist())
+
+
+def check_faces_of_subtrees(file, counts, sums, firsts, refs):
+    """Where a subtree's faces and vertices begin, and the blocks from elsewhere that it needs.
+    `firsts`: the least leaf_first of its leaves, -1 without any; `refs`: what these refer to."""
     if "mesh" not in file:
         return
     corners = faces(file["/mesh/faces"]).reshape(-1, 3).astype("i8")
-    before = sums - counts
-    first, vertex = (before[:, k] + before[:, k + 1] + counts[:, k] for k in (0, 2))
+    before = (sums - counts).astype("i8")
     outer = file["/subtrees/outer"][...] if "outer" in file["/subtrees"] else np.zeros(0, "u4")
     for i, row in enumerate(counts.astype("i8")):
-        own = corners[int(first[i]):int(first[i]) + row[1]]
-        seen = corners[:int(first[i])].max(initial=-1) + 1
-        assert vertex[i] == seen and row[3] == max(own.max(initial=-1) + 1, seen) - seen
-        begin = int(before[i, 4] + before[i, 5]) + row[4]
-        blocks = {int(vertex[i]) // 1024 - int(d) for d in outer[begin:begin + row[5]]}
-        needed = set(own[own < vertex[i]] // 1024) - {int(vertex[i]) // 1024}
-        assert needed <= blocks, f"subtree {i}: chunks of vertices that are not listed"
+        first, vertex = (before[i, k] + before[i, k + 1] + row[k] for k in (0, 2))
+        own, older = corners[first:first + row[1]], refs[i][refs[i] < first]
+        seen = corners[:first].max(initial=-1) + 1
+        assert firsts[i] in (-1, first), f"subtree {i}: first face"
+        assert vertex == seen and row[3] == max(own.max(initial=-1) + 1, seen) - seen, f"subtree {i}: vertices"
+        used = np.concatenate([own.ravel(), corners[older].ravel()])
+        blocks = distances(older, 2048, first), distances(used[used < vertex], 1024, vertex)
+        begin = before[i, 4] + before[i, 5]
+        assert (len(blocks[0]), len(blocks[1])) == (row[4], row[5]), f"subtree {i}: blocks"
+        assert outer[begin:begin + row[4] + row[5]].tolist() == blocks[0] + blocks[1], f"subtree {i}: blocks"
 
 
 def check_places(file):

@@ -9,6 +9,7 @@
 
 #include "check_main.h"
 #include "counted_source.h"
+#include "expect.h"
 #include "model_file.h"
 #include "octree/node_types.h"
 #include "octree/octcode.h"
@@ -16,13 +17,6 @@
 #include "read_by.h"
 #include "scratch.h"
 #include "solids.h"
-
-/* ck_assert tells its parent process each time that it is passed. */
-#define EXPECT(condition)                                      \
-    do {                                                       \
-        if (!(condition))                                      \
-            ck_abort_msg("line %d: %s", __LINE__, #condition); \
-    } while (0)
 
 static const char *path;
 

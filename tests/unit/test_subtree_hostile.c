@@ -8,15 +8,10 @@
 
 #include "changed_array.h"
 #include "check_main.h"
+#include "expect.h"
 #include "scratch.h"
 #include "solids.h"
 #include "two_layouts.h"
-
-#define EXPECT(condition)                                      \
-    do {                                                       \
-        if (!(condition))                                      \
-            ck_abort_msg("line %d: %s", __LINE__, #condition); \
-    } while (0)
 
 enum { POINTS = 3 };
 static const double points[POINTS][3] = { { 2.7, 0.1, 0.2 },

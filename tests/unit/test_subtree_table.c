@@ -11,18 +11,13 @@
 #include "container/slice.h"
 #include "container/subtree_table.h"
 #include "counted_source.h"
+#include "expect.h"
 #include "octree/node_types.h"
 #include "random_tree.h"
 #include "read_by.h"
 #include "scratch.h"
 #include "solids.h"
 #include "two_layouts.h"
-
-#define EXPECT(condition)                                      \
-    do {                                                       \
-        if (!(condition))                                      \
-            ck_abort_msg("line %d: %s", __LINE__, #condition); \
-    } while (0)
 
 enum { ALL = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES };
 

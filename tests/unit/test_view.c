@@ -10,22 +10,11 @@
 
 #include "check_main.h"
 #include "counted_source.h"
+#include "expect.h"
 #include "model_file.h"
 #include "random_tree.h"
 #include "scratch.h"
 #include "solids.h"
-
-/* ck_assert tells its parent process each time that it is passed. */
-#define EXPECT(condition)                                      \
-    do {                                                       \
-        if (!(condition))                                      \
-            ck_abort_msg("line %d: %s", __LINE__, #condition); \
-    } while (0)
-#define EXPECT_MSG(condition, ...)     \
-    do {                               \
-        if (!(condition))              \
-            ck_abort_msg(__VA_ARGS__); \
-    } while (0)
 
 static const char *path;
 
