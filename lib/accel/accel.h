@@ -167,7 +167,7 @@ static inline uint64_t ebpo_accel_bytes(const ebpo_accel *whole)
 void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
                          uint64_t *peak);
 
-/* --- its nodes (subtree_nodes.c); `entry` is what finds them --- */
+/* --- its nodes (accel_nodes.c); `entry` is what finds them --- */
 
 ebpo_node ebpo_accel_root(const ebpo_accel *subtree);
 /* Child of a gray node that is not pruned. */
