@@ -184,23 +184,39 @@ static void hit_raw(const ebpo_ray_hit *hit)
     raw_u64(stdout, (uint64_t)(int64_t)hit->side);
 }
 
-void answers_ray_first(answer_form form, const ebpo_ray_hit *hit)
+static void hit_text(const ebpo_ray_hit *hit)
 {
-    static const ebpo_ray_hit none = { INFINITY, EBPO_NO_FACE, 0 };
-    if (form == ANSWERS_RAW) {
-        hit_raw(hit ? hit : &none);
-    } else if (form == ANSWERS_JSON) {
-        if (hit)
-            hit_json("", hit);
+    printf("%.17g %" PRIu64 " %" PRId32, hit->t, hit->face, hit->side);
+}
+
+void answers_ray_first(answer_form form, const ebpo_ray_hit *hits, uint64_t count)
+{
+    for (uint64_t i = 0; i < count; i++) {
+        bool none = hits[i].face == EBPO_NO_FACE;
+        if (form == ANSWERS_RAW)
+            hit_raw(&hits[i]);
+        else if (none)
+            fputs(form == ANSWERS_JSON ? "null" : "-", stdout);
+        else if (form == ANSWERS_JSON)
+            hit_json("", &hits[i]);
         else
-            fputs("null", stdout);
-        putchar('\n');
-    } else if (hit) {
-        printf("%.17g %" PRIu64 " %" PRId32 "\n", hit->t, hit->face, hit->side);
-    } else {
-        puts("-");
+            hit_text(&hits[i]);
+        if (form != ANSWERS_RAW)
+            putchar('\n');
+        leave_whole();
     }
-    leave_whole();
+}
+
+void answers_ray_any(answer_form form, const bool *any, uint64_t count)
+{
+    static const char *const words[2][2] = { { "no", "yes" }, { "false", "true" } };
+    for (uint64_t i = 0; i < count; i++) {
+        if (form == ANSWERS_RAW)
+            raw_u64(stdout, any[i]);
+        else
+            puts(words[form == ANSWERS_JSON][any[i]]);
+        leave_whole();
+    }
 }
 
 /* Of an answer that is a list: what is before it, and after it. */
@@ -229,8 +245,10 @@ void answers_ray_all(answer_form form, const ebpo_ray_hit *hits, uint64_t count)
             hit_raw(&hits[i]);
         else if (form == ANSWERS_JSON)
             hit_json(i ? ", " : "", &hits[i]);
-        else
-            printf(" %.17g %" PRIu64 " %" PRId32, hits[i].t, hits[i].face, hits[i].side);
+        else {
+            putchar(' ');
+            hit_text(&hits[i]);
+        }
     end_list(form);
 }
 

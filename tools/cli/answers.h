@@ -19,8 +19,9 @@ void answers_inside(answer_form form, const ebpo_inside_result *results, uint64_
 /* `limited`: lo and hi only. */
 void answers_distance(answer_form form, bool limited, const ebpo_distance_result *results,
                       uint64_t count);
-/* `hit` NULL: none. */
-void answers_ray_first(answer_form form, const ebpo_ray_hit *hit);
+void answers_ray_first(answer_form form, const ebpo_ray_hit *hits, uint64_t count);
+void answers_ray_any(answer_form form, const bool *any, uint64_t count);
+/* Of one ray. */
 void answers_ray_all(answer_form form, const ebpo_ray_hit *hits, uint64_t count);
 void answers_box(answer_form form, const uint64_t *faces, uint64_t count);
 

@@ -8,6 +8,7 @@
 const char *const inside_modes[] = { "fast",        "cache",       "nodes",         "subtree",
                                      "cache-plain", "nodes-plain", "subtree-plain", NULL };
 const char *const distance_modes[] = { "exact", "recursive", "leaves", "envelope", NULL };
+const char *const ray_sides[] = { "both", "front", "back", NULL };
 
 static const struct {
     ebpo_loading loading;

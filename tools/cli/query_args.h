@@ -13,8 +13,8 @@ typedef struct query_values {
     const char *memory, *deadline;
     int64_t cut_level, threads, level;
     double max_distance, tmax;
-    int inside_mode, distance_mode; /* indices into the words below */
-    bool prefetch, raw, json, unsigned_distance, no_warm, all;
+    int inside_mode, distance_mode, ray_sides; /* indices into the words below */
+    bool prefetch, raw, json, unsigned_distance, no_warm, all, any;
     remote_values remote;
 } query_values;
 #define QUERY_VALUES_INIT                                                         \
@@ -24,7 +24,9 @@ typedef struct query_values {
     }
 
 /* Rows for the tables of options. In other structs query_values comes first. */
-#define QUERY_MODEL_OPTIONS                                                                      \
+#define QUERY_MODEL_OPTIONS QUERY_MODEL_OPTIONS_FOR("opening")
+/* `work`: what takes threads. */
+#define QUERY_MODEL_OPTIONS_FOR(work)                                                            \
     OPTION_TEXT("memory", 0, query_values, memory, "SIZE",                                       \
                 "bytes that the model may use: 64M, 1G, 512K (powers of 1024); 0, the default: " \
                 "as many as it needs"),                                                          \
@@ -32,7 +34,7 @@ typedef struct query_values {
                    "keep levels 0 to C in memory and load subtrees below on demand; default: "   \
                    "everything at once if --memory allows"),                                     \
         OPTION_INT("threads", 0, query_values, threads, "N", 0, 256,                             \
-                   "threads for opening; 0, the default: all cores")
+                   "threads for " work "; 0, the default: all cores")
 
 /* Rays and boxes look at many subtrees anyway: nothing is loaded ahead of them. */
 #define QUERY_PREFETCH_OPTION                          \
@@ -55,6 +57,7 @@ typedef struct query_values {
 /* Words for --mode, NULL-terminated; EBP 2017, section 4.3. */
 extern const char *const inside_modes[];   /* fast, cache, nodes, ... */
 extern const char *const distance_modes[]; /* in the order of ebpo_distance_mode */
+extern const char *const ray_sides[];      /* for --sides, in the order of ebpo_ray_sides */
 
 /* Options as bits, to say which of them another one leaves without effect. */
 enum {
