@@ -97,17 +97,42 @@ enum { EBPO_BLOCKS_MOST = 1 << 29 };
 
 /* --- bounding hierarchy over the blocks --- */
 
-/* Eight children, each within a box and within a round slab (a cylinder): what a curved sheet needs
- * for its distance to be told apart from its neighbours'. In the subtree's own frame: (x - centre)
- * * scale, about -1 .. 1; rounded outward. Children that are not there: empty boxes at infinity. */
+/* Eight children, their boxes in steps of 8 bits: axis k from origin + step * low to origin + step
+ * * high, in the subtree's own frame: (x - centre) * scale, about -1 .. 1 (farther where listed
+ * faces reach beyond the cell). Steps are powers of two, so decoding rounds nothing but the last
+ * sum. The boxes are wider than the faces by what single precision can lose:
+ * docs/develop/bounds.md. */
 typedef struct ebpo_bound {
-    float low[3][8], high[3][8];
-    /* |(x - middle) . axis| <= half, and at most radius away from the axis */
-    float axis[3][8], middle[3][8], radius[8], half[8];
+    _Alignas(64) float origin[3];
+    float step[3];
+    uint8_t low[3][8], high[3][8];
     uint32_t child[8]; /* number of a node, or of a block with EBPO_IS_BLOCK */
+    uint8_t count;     /* of children; they have the first lanes */
+    uint8_t spare[23];
 } ebpo_bound;
 #define EBPO_IS_BLOCK UINT32_C(0x80000000)
 #define EBPO_NO_CHILD UINT32_MAX
+
+/* Two sides of a child's box, decoded: exact to 2^-52 of the greater of origin and side. */
+typedef struct ebpo_bound_sides {
+    double low, high;
+} ebpo_bound_sides;
+static inline ebpo_bound_sides ebpo_bound_side(const ebpo_bound *b, int lane, int axis)
+{
+    double origin = (double)b->origin[axis], step = (double)b->step[axis];
+    return (ebpo_bound_sides){ origin + step * b->low[axis][lane],
+                               origin + step * b->high[axis][lane] };
+}
+
+/* What a curved sheet needs for its distance to be told apart from its neighbours': with x the
+ * place of a point of the child seen from the middle of its box as decoded, and a = axis / 128,
+ *   along_step * from <= x . a <= along_step * to,   x . x - (x . a)^2 <= (aside_step * radius)^2.
+ */
+typedef struct ebpo_bound_slab {
+    float along_step, aside_step;
+    int8_t axis[3][8], from[8], to[8];
+    uint8_t radius[8];
+} ebpo_bound_slab;
 
 typedef struct ebpo_accel {
     ebpo_node root;
@@ -127,7 +152,9 @@ typedef struct ebpo_accel {
     uint32_t block_count;
     uint32_t *slot_face; /* [block_count][8] local numbers; EBPO_NO_SLOT: no face */
     double centre[3], scale;
+    double reach; /* no coordinate of a decoded box is greater, in the frame; 1 at least */
     ebpo_bound *bound;
+    ebpo_bound_slab *slab; /* [bound_count] */
     uint32_t bound_count;
     uint32_t top; /* the root of the hierarchy */
     uint32_t outer_count;

@@ -1,5 +1,6 @@
 /* Boxes and round slabs around the blocks below each child. All in doubles, in the subtree's frame,
- * then rounded outward to floats. */
+ * then rounded outward to 8 bits. docs/develop/bounds.md proves that what is read from them in
+ * single precision still bounds. */
 #include "geom/strict_fp.h"
 
 #include <math.h>
@@ -11,24 +12,24 @@
 #include "base/parallel.h"
 #include "accel/accel_parts.h"
 
-/* Above so many blocks the slab is left away (a ball takes its place): such patches curve too much
- * for one. */
+/* Above so many blocks the slab is left away: such patches curve too much for one. */
 enum { SLAB_BLOCKS_MAX = 1024 };
-/* A subtree lists faces that reach beyond its cell. Where they reach beyond this, in units of the
- * frame, floats cannot hold a slab closely enough and the box alone bounds. */
-static const double slab_reach = 2;
-/* Widening, in units of the frame (1 is half the subtree's size), for the rounding of what is
- * computed here and of the axis to floats. */
-static const double slack = 0x1p-22;
-
-typedef struct job {
-    ebpo_accel *s;
-    const ebpo_layout *layout;
-} job;
+/* Boxes are wider than their faces by this, relative to the farthest of their coordinates, slabs
+ * by that. */
+static const double box_slack = 0x1p-19, slab_slack = 0x1p-18;
+/* Of a model without any extent. */
+static const double least_slack = 0x1p-60;
+enum { AXIS_UNIT = 128 };
 
 typedef struct extent {
     double low[3], high[3], normal[3];
 } extent;
+
+typedef struct job {
+    ebpo_accel *s;
+    const ebpo_layout *layout;
+    extent *of_node;
+} job;
 
 /* A block's corners in the frame, [corner][axis][lane]; lanes without a face repeat the first one.
  */
@@ -38,6 +39,9 @@ typedef struct lanes {
 
 static void load_lanes(const ebpo_accel *s, uint32_t block, lanes *out)
 {
+    int count = EBPO_BLOCK;
+    while (s->slot_face[block * EBPO_BLOCK + (uint32_t)count - 1] == EBPO_NO_SLOT)
+        count--;
     for (int i = 0; i < 9; i++) {
         uint64_t at = (uint64_t)block * EBPO_BLOCK_NUMBERS + (uint64_t)i * EBPO_BLOCK;
         double *x = out->x[i / 3][i % 3], centre = s->centre[i % 3];
@@ -45,13 +49,19 @@ static void load_lanes(const ebpo_accel *s, uint32_t block, lanes *out)
             x[lane] =
                 s->wide ? s->block64[at + (uint64_t)lane] : (double)s->block32[at + (uint64_t)lane];
         for (int lane = 0; lane < EBPO_BLOCK; lane++)
-            x[lane] = s->slot_face[block * EBPO_BLOCK + (uint32_t)lane] == EBPO_NO_SLOT
-                          ? x[0]
-                          : (x[lane] - centre) * s->scale;
+            x[lane] = (x[lane] - centre) * s->scale;
+        for (int lane = count; lane < EBPO_BLOCK; lane++)
+            x[lane] = x[0];
     }
 }
 
-static void add_block(const lanes *l, extent *e)
+/* --- extents --- */
+
+static const extent nothing = { { INFINITY, INFINITY, INFINITY },
+                                { -INFINITY, -INFINITY, -INFINITY },
+                                { 0, 0, 0 } };
+
+static void add_lanes(const lanes *l, extent *e)
 {
     for (int k = 0; k < 3; k++) {
         int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
@@ -72,32 +82,118 @@ static void add_block(const lanes *l, extent *e)
     }
 }
 
-/* The axis as the floats that readers will use; a zero axis makes the slab a ball. */
-static void choose_axis(const extent *e, float axis[3])
+static void add_extent(const extent *part, extent *e)
 {
-    double length = sqrt(e->normal[0] * e->normal[0] + e->normal[1] * e->normal[1] +
-                         e->normal[2] * e->normal[2]);
-    for (int k = 0; k < 3; k++)
-        axis[k] = length > 0 ? (float)(e->normal[k] / length) : 0;
+    for (int k = 0; k < 3; k++) {
+        e->low[k] = fmin(e->low[k], part->low[k]);
+        e->high[k] = fmax(e->high[k], part->high[k]);
+        e->normal[k] += part->normal[k];
+    }
 }
 
+/* What the blocks right below a node add to it. */
+static ebpo_status extend_by_blocks(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                    ebpo_error *error)
+{
+    (void)worker;
+    (void)error;
+    job *j = context;
+    for (uint64_t n = begin; n < end; n++) {
+        j->of_node[n] = nothing;
+        for (int lane = 0; lane < 8; lane++) {
+            uint32_t child = j->layout->child[n][lane];
+            if (child == EBPO_NO_CHILD || !(child & EBPO_IS_BLOCK))
+                continue;
+            lanes l;
+            load_lanes(j->s, child & ~EBPO_IS_BLOCK, &l);
+            add_lanes(&l, &j->of_node[n]);
+        }
+    }
+    return EBPO_OK;
+}
+
+/* Nodes come after their children. */
+static void extend_by_nodes(job *j)
+{
+    for (uint64_t n = 0; n < j->layout->bound_count; n++)
+        for (int lane = 0; lane < 8; lane++) {
+            uint32_t child = j->layout->child[n][lane];
+            if (child != EBPO_NO_CHILD && !(child & EBPO_IS_BLOCK))
+                add_extent(&j->of_node[child], &j->of_node[n]);
+        }
+}
+
+/* --- boxes --- */
+
+/* Origin and step of one axis: so that 255 steps hold what must be held. */
+static double choose_grid(double low, double high, float *origin, float *step)
+{
+    double slack = fmax(fabs(low), fabs(high)) * box_slack + least_slack;
+    *origin = (float)(low - slack);
+    if ((double)*origin > low - slack)
+        *origin = nextafterf(*origin, -INFINITY);
+    int exponent;
+    frexp((high + slack - (double)*origin) / 255, &exponent);
+    *step = (float)ldexp(1, exponent);
+    return slack;
+}
+
+static uint8_t to_byte(double x) { return (uint8_t)(x < 0 ? 0 : x > 255 ? 255 : x); }
+
+static void set_boxes(ebpo_bound *b, const extent *all, const extent child[8])
+{
+    for (int k = 0; k < 3; k++) {
+        double slack = choose_grid(all->low[k], all->high[k], &b->origin[k], &b->step[k]);
+        for (int lane = 0; lane < b->count; lane++) {
+            double from = child[lane].low[k] - slack - (double)b->origin[k],
+                   to = child[lane].high[k] + slack - (double)b->origin[k];
+            b->low[k][lane] = to_byte(floor(from / (double)b->step[k]));
+            b->high[k][lane] = to_byte(ceil(to / (double)b->step[k]));
+        }
+    }
+}
+
+/* The greatest coordinate of any of its boxes. */
+static double reach_of(const ebpo_bound *b)
+{
+    double reach = 0;
+    for (int k = 0; k < 3; k++)
+        reach = fmax(reach, fmax(fabs((double)b->origin[k]),
+                                 fabs((double)b->origin[k] + 255 * (double)b->step[k])));
+    return reach;
+}
+
+/* --- slabs --- */
+
 typedef struct slab {
+    double middle[3], axis[3];
     double from, to, radius2;
 } slab;
 
-static void add_to_slab(const lanes *l, const double middle[3], const float axis[3], slab *out)
+/* Rounded towards zero: the decoded axis is never longer than 1, which the bound rests upon. */
+static void choose_axis(const extent *e, ebpo_bound_slab *b, int lane, slab *out)
+{
+    double length = sqrt(e->normal[0] * e->normal[0] + e->normal[1] * e->normal[1] +
+                         e->normal[2] * e->normal[2]);
+    for (int k = 0; k < 3; k++) {
+        double part = length > 0 && length < INFINITY ? e->normal[k] / length : 0;
+        b->axis[k][lane] = (int8_t)(part * (AXIS_UNIT - 0.5));
+        out->axis[k] = (double)b->axis[k][lane] / AXIS_UNIT;
+    }
+}
+
+static void add_to_slab(const lanes *l, slab *out)
 {
     for (int i = 0; i < 3; i++) {
         double along[EBPO_BLOCK] = { 0 }, square[EBPO_BLOCK] = { 0 };
         for (int k = 0; k < 3; k++)
             for (int lane = 0; lane < EBPO_BLOCK; lane++) {
-                double d = l->x[i][k][lane] - middle[k];
-                along[lane] += d * (double)axis[k];
+                double d = l->x[i][k][lane] - out->middle[k];
+                along[lane] += d * out->axis[k];
                 square[lane] += d * d;
             }
         for (int lane = 0; lane < EBPO_BLOCK; lane++) {
-            /* the axis is a unit vector up to its rounding */
-            double radius2 = square[lane] - along[lane] * along[lane] + square[lane] * 0x1p-22;
+            double radius2 = square[lane] - along[lane] * along[lane];
             out->from = along[lane] < out->from ? along[lane] : out->from;
             out->to = along[lane] > out->to ? along[lane] : out->to;
             out->radius2 = radius2 > out->radius2 ? radius2 : out->radius2;
@@ -105,72 +201,62 @@ static void add_to_slab(const lanes *l, const double middle[3], const float axis
     }
 }
 
-static float down(double x) { return nextafterf((float)(x - slack), -INFINITY); }
-
-static float up(double x) { return nextafterf((float)(x + slack), INFINITY); }
-
-static void set_child(ebpo_bound *b, int lane, const extent *e, const float axis[3],
-                      const double middle[3], const slab *w)
+/* Without an axis and as wide as the box is: says nothing that the box does not say. */
+static void no_slab(ebpo_bound_slab *b, int lane, const double half[3], slab *out)
 {
-    double shift = (w->from + w->to) / 2;
     for (int k = 0; k < 3; k++) {
-        b->low[k][lane] = down(e->low[k]);
-        b->high[k][lane] = up(e->high[k]);
-        b->axis[k][lane] = axis[k];
-        b->middle[k][lane] = (float)(middle[k] + shift * (double)axis[k]);
+        b->axis[k][lane] = 0;
+        out->radius2 += half[k] * half[k];
     }
-    /* The middle, less than slab_reach, is rounded to floats, which moves it by less than the
-     * slack. */
-    b->radius[lane] = up(sqrt(w->radius2 > 0 ? w->radius2 : 0) + slack);
-    b->half[lane] = up((w->to - w->from) / 2 + slack);
 }
 
-static void bound_blocks(const ebpo_accel *s, ebpo_bound *b, int lane, uint32_t first,
-                         uint32_t last)
+static slab measure_slab(const job *j, uint64_t n, int lane, const extent *e)
 {
-    extent e = { { INFINITY, INFINITY, INFINITY },
-                 { -INFINITY, -INFINITY, -INFINITY },
-                 { 0, 0, 0 } };
-    lanes l;
+    const ebpo_bound *b = &j->s->bound[n];
+    slab out = { { 0, 0, 0 }, { 0, 0, 0 }, 0, 0, 0 };
+    double half[3];
+    for (int k = 0; k < 3; k++) {
+        ebpo_bound_sides side = ebpo_bound_side(b, lane, k);
+        out.middle[k] = (side.low + side.high) / 2;
+        half[k] = (side.high - side.low) / 2;
+    }
+    uint32_t child = b->child[lane], first = child & ~EBPO_IS_BLOCK, last = first + 1;
+    if (!(child & EBPO_IS_BLOCK)) {
+        first = j->layout->first_block[child];
+        last = j->layout->last_block[child];
+    }
+    if (last - first > SLAB_BLOCKS_MAX) {
+        no_slab(&j->s->slab[n], lane, half, &out);
+        return out;
+    }
+    choose_axis(e, &j->s->slab[n], lane, &out);
     for (uint32_t block = first; block < last; block++) {
-        load_lanes(s, block, &l);
-        add_block(&l, &e);
+        lanes l;
+        load_lanes(j->s, block, &l);
+        add_to_slab(&l, &out);
     }
-    float axis[3] = { 0, 0, 0 };
-    double middle[3];
-    for (int k = 0; k < 3; k++)
-        middle[k] = (e.low[k] + e.high[k]) / 2;
-    slab w = { 0, 0, 0 };
-    double reach = 0;
-    for (int k = 0; k < 3; k++)
-        reach = fmax(reach, fmax(fabs(e.low[k]), fabs(e.high[k])));
-    if (!(reach < slab_reach)) {
-        middle[0] = middle[1] = middle[2] = 0;
-        w.radius2 = INFINITY;
-    } else if (last - first > SLAB_BLOCKS_MAX) {
-        for (int k = 0; k < 3; k++)
-            w.radius2 += (e.high[k] - middle[k]) * (e.high[k] - middle[k]);
-    } else {
-        choose_axis(&e, axis);
-        w = (slab){ INFINITY, -INFINITY, 0 };
-        for (uint32_t block = first; block < last; block++) {
-            if (last - first > 1)
-                load_lanes(s, block, &l);
-            add_to_slab(&l, middle, axis, &w);
-        }
-    }
-    set_child(b, lane, &e, axis, middle, &w);
+    return out;
 }
 
-static void bound_nothing(ebpo_bound *b, int lane)
+static void set_slabs(ebpo_bound_slab *b, int count, double reach, const slab child[8])
 {
-    for (int k = 0; k < 3; k++) {
-        b->low[k][lane] = INFINITY;
-        b->high[k][lane] = -INFINITY;
-        b->axis[k][lane] = b->middle[k][lane] = 0;
+    double slack = reach * slab_slack, along = 0, aside = 0, radius[8];
+    for (int lane = 0; lane < count; lane++) {
+        along = fmax(along, fmax(child[lane].to, -child[lane].from) + slack);
+        /* the square is off by less than 2^-48 of reach * reach */
+        radius[lane] = sqrt(fmax(child[lane].radius2, 0) + reach * reach * 0x1p-44) + slack;
+        aside = fmax(aside, radius[lane]);
     }
-    b->radius[lane] = b->half[lane] = 0;
+    b->along_step = (float)(along / 126);
+    b->aside_step = (float)(aside / 254);
+    for (int lane = 0; lane < count; lane++) {
+        b->from[lane] = (int8_t)floor((child[lane].from - slack) / (double)b->along_step);
+        b->to[lane] = (int8_t)ceil((child[lane].to + slack) / (double)b->along_step);
+        b->radius[lane] = (uint8_t)ceil(radius[lane] / (double)b->aside_step);
+    }
 }
+
+/* --- all of them --- */
 
 static ebpo_status bound_nodes(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                ebpo_error *error)
@@ -180,29 +266,60 @@ static ebpo_status bound_nodes(void *context, uint64_t begin, uint64_t end, unsi
     job *j = context;
     for (uint64_t n = begin; n < end; n++) {
         ebpo_bound *b = &j->s->bound[n];
+        extent part[8];
+        slab slabs[8];
+        memset(b, 0, sizeof *b);
+        memset(&j->s->slab[n], 0, sizeof j->s->slab[n]);
         for (int lane = 0; lane < 8; lane++) {
             uint32_t child = b->child[lane] = j->layout->child[n][lane];
             if (child == EBPO_NO_CHILD)
-                bound_nothing(b, lane);
-            else if (child & EBPO_IS_BLOCK)
-                bound_blocks(j->s, b, lane, child & ~EBPO_IS_BLOCK, (child & ~EBPO_IS_BLOCK) + 1);
-            else
-                bound_blocks(j->s, b, lane, j->layout->first_block[child],
-                             j->layout->last_block[child]);
+                continue;
+            b->count = (uint8_t)(lane + 1);
+            lanes l;
+            part[lane] = child & EBPO_IS_BLOCK ? nothing : j->of_node[child];
+            if (child & EBPO_IS_BLOCK) {
+                load_lanes(j->s, child & ~EBPO_IS_BLOCK, &l);
+                add_lanes(&l, &part[lane]);
+            }
         }
+        set_boxes(b, &j->of_node[n], part);
+        for (int lane = 0; lane < b->count; lane++)
+            slabs[lane] = measure_slab(j, n, lane, &part[lane]);
+        set_slabs(&j->s->slab[n], b->count, reach_of(b), slabs);
     }
     return EBPO_OK;
+}
+
+static ebpo_status make_room(job *j, ebpo_error *error)
+{
+    uint64_t count = j->layout->bound_count;
+    ebpo_accel *s = j->s;
+    s->bound = aligned_alloc(64, (count + 1) * sizeof *s->bound);
+    s->slab = ebpo_alloc(count, sizeof *s->slab);
+    j->of_node = ebpo_alloc(count, sizeof *j->of_node);
+    if (s->bound && s->slab && j->of_node)
+        return EBPO_OK;
+    return ebpo_fail_memory(error, count * (sizeof *s->bound + sizeof *s->slab));
 }
 
 ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout, unsigned threads,
                                    ebpo_error *error)
 {
+    job j = { s, layout, NULL };
     s->bound_count = (uint32_t)layout->bound_count;
     s->top = layout->top;
-    s->bound = aligned_alloc(64, (layout->bound_count * sizeof *s->bound + 127) / 64 * 64);
-    if (!s->bound)
-        return ebpo_fail_memory(error, layout->bound_count * sizeof *s->bound);
-    job j = { s, layout };
-    return ebpo_parallel_for(threads, NULL, layout->bound_count, 64, bound_nodes, &j, NULL, "open",
-                             error);
+    s->reach = 1;
+    ebpo_status status = make_room(&j, error);
+    if (status == EBPO_OK)
+        status = ebpo_parallel_for(threads, NULL, layout->bound_count, 64, extend_by_blocks, &j,
+                                   NULL, "open", error);
+    if (status == EBPO_OK) {
+        extend_by_nodes(&j);
+        status = ebpo_parallel_for(threads, NULL, layout->bound_count, 64, bound_nodes, &j, NULL,
+                                   "open", error);
+    }
+    if (status == EBPO_OK && s->bound_count)
+        s->reach = fmax(1, reach_of(&s->bound[s->top]));
+    free(j.of_node);
+    return status;
 }

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 
 #include "base/alloc.h"
+#include "base/eight.h"
 #include "base/error.h"
 #include "geom/ray_triangle.h"
 #include "query/options.h"
@@ -39,22 +40,25 @@ static void try_block(ebpo_box_walk *w, const ebpo_accel *s, uint32_t block)
     }
 }
 
-static void gather_bound(ebpo_box_walk *w, const ebpo_accel *s, const double low[3],
-                         const double high[3], uint32_t child)
+/* low, high: the box in the frame. Boxes of the hierarchy are wider than their faces by more than
+ * what floats lose here. */
+static void gather_bound(ebpo_box_walk *w, const ebpo_accel *s, const float low[3],
+                         const float high[3], uint32_t child)
 {
     if (child & EBPO_IS_BLOCK) {
         try_block(w, s, child & ~EBPO_IS_BLOCK);
         return;
     }
     const ebpo_bound *b = &s->bound[child];
-    for (int lane = 0; lane < 8; lane++) {
-        bool meets = b->child[lane] != EBPO_NO_CHILD;
-        for (int k = 0; k < 3; k++)
-            meets =
-                meets && (double)b->low[k][lane] <= high[k] && (double)b->high[k][lane] >= low[k];
-        if (meets)
-            gather_bound(w, s, low, high, b->child[lane]);
+    f8 apart = f8_all(0);
+    for (int k = 0; k < 3; k++) {
+        f8 step = f8_all(b->step[k]), origin = f8_all(b->origin[k]);
+        f8 from = f8_add(origin, f8_mul(f8_from_bytes(b->low[k]), step)),
+           to = f8_add(origin, f8_mul(f8_from_bytes(b->high[k]), step));
+        apart = f8_or(apart, f8_or(f8_less(f8_all(high[k]), from), f8_less(to, f8_all(low[k]))));
     }
+    for (unsigned lanes = ~f8_bits(apart) & ((1u << b->count) - 1); lanes; lanes &= lanes - 1)
+        gather_bound(w, s, low, high, b->child[__builtin_ctz(lanes)]);
 }
 
 static int compare_slots(const void *a, const void *b)
@@ -66,15 +70,13 @@ static int compare_slots(const void *a, const void *b)
 /* Blocks are numbered in the order of their faces. */
 static ebpo_status gather(ebpo_box_walk *w, const ebpo_accel *s, ebpo_error *error)
 {
-    double low[3], high[3];
+    float low[3], high[3];
     w->count = 0;
     if (s->bound_count == 0)
         return EBPO_OK;
     for (int k = 0; k < 3; k++) {
-        low[k] = (w->min[k] - s->centre[k]) * s->scale;
-        high[k] = (w->max[k] - s->centre[k]) * s->scale;
-        low[k] -= (fabs(low[k]) + 2) * 0x1p-48;
-        high[k] += (fabs(high[k]) + 2) * 0x1p-48;
+        low[k] = (float)((w->min[k] - s->centre[k]) * s->scale);
+        high[k] = (float)((w->max[k] - s->centre[k]) * s->scale);
     }
     gather_bound(w, s, low, high, s->top);
     if (w->no_memory)

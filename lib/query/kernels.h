@@ -5,6 +5,7 @@
 #define EBPO_QUERY_KERNELS_H
 
 #include "accel/accel.h"
+#include "query/ray_kernel.h"
 
 /* A segment along an axis from `from` (on all three axes) up to coordinate `to`: predicates.h,
  * ebpo_axis_crossing. */
@@ -43,13 +44,16 @@ typedef struct ebpo_kernels {
                          const ebpo_axis_segment *segment, uint32_t *open, uint32_t *open_count);
     /* Squared lower bounds of the distance to the eight children, in the frame; the result has a
      * bit for each child whose bound is at most `limit2`. */
-    unsigned (*bounds)(const ebpo_bound *bound, const ebpo_probe *probe, float limit2,
-                       float lower2[8]);
+    unsigned (*bounds)(const ebpo_bound *bound, const ebpo_bound_slab *slab,
+                       const ebpo_probe *probe, float limit2, float lower2[8]);
     /* Certain bounds of the distances to eight faces, in the frame; the result has a bit for each
      * face whose lower bound is at most `best`. Lanes without a face have none, or one with a lower
      * bound of infinity. */
     unsigned (*faces)(const ebpo_accel *s, uint32_t block, const ebpo_probe *probe, float best,
                       float low[8], float high[8]);
+    /* Walks through search->s: candidates, and the limit. Not pure: it asks search->decide when
+     * there are many. */
+    void (*ray)(ebpo_ray_search *search);
 } ebpo_kernels;
 
 /* Those that suit this processor best. */

@@ -2,5 +2,6 @@
 #include "geom/strict_fp.h"
 
 #include "query/kernels.inc"
+#include "query/ray_kernel.inc"
 
-const ebpo_kernels ebpo_kernels_avx2 = { crossings, bounds, faces };
+const ebpo_kernels ebpo_kernels_avx2 = { crossings, bounds, faces, ray_walk };

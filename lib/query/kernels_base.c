@@ -2,8 +2,9 @@
 #include "geom/strict_fp.h"
 
 #include "query/kernels.inc"
+#include "query/ray_kernel.inc"
 
-const ebpo_kernels ebpo_kernels_base = { crossings, bounds, faces };
+const ebpo_kernels ebpo_kernels_base = { crossings, bounds, faces, ray_walk };
 
 const ebpo_kernels *ebpo_kernels_best(void)
 {

@@ -13,28 +13,10 @@
 #include "base/alloc.h"
 #include "base/clock.h"
 #include "base/error.h"
+#include "query/visits.h"
 
 /* Beyond so many halves of the subtree's size, single precision tells nothing apart. */
 #define FAR 32.0
-
-/* A child to visit: the bits of its squared lower bound (not negative, so of the same order as
- * integers), then its number. */
-typedef uint64_t visit;
-
-static inline visit make_visit(float lower2, uint32_t child)
-{
-    uint32_t bits;
-    memcpy(&bits, &lower2, sizeof bits);
-    return (uint64_t)bits << 32 | child;
-}
-
-static inline float visit_lower2(visit v)
-{
-    uint32_t bits = (uint32_t)(v >> 32);
-    float lower2;
-    memcpy(&lower2, &bits, sizeof lower2);
-    return lower2;
-}
 
 void ebpo_nearest_begin(ebpo_nearest *n, const double p[3], double max_distance)
 {
@@ -230,48 +212,29 @@ static void add_block(searching *g, uint32_t block)
     }
 }
 
-/* Children that matter, farthest first, so that the nearest is on top. */
-static uint32_t push_children(visit *stack, uint32_t top, const ebpo_bound *bound, unsigned lanes,
-                              const float lower2[8])
-{
-    uint32_t base = top;
-    for (; lanes; lanes &= lanes - 1) {
-        unsigned lane = (unsigned)__builtin_ctz(lanes);
-        visit v = make_visit(lower2[lane], bound->child[lane]);
-        uint32_t at = top++;
-        for (; at > base && stack[at - 1] < v; at--)
-            stack[at] = stack[at - 1];
-        stack[at] = v;
-    }
-    return top;
-}
-
 /* Out of time: what is left on the stack bounds what was passed over. */
-static void give_up(searching *g, const visit *stack, uint32_t top)
+static void give_up(searching *g, const ebpo_visit *stack, uint32_t top)
 {
     ebpo_nearest *n = g->n;
     n->late = true;
     for (uint32_t i = 0; i < top; i++) {
         double lower =
-            (sqrt((double)visit_lower2(stack[i])) * (1 - 0x1p-20) - (double)g->probe.error) /
+            (sqrt((double)ebpo_visit_key(stack[i])) * (1 - 0x1p-20) - (double)g->probe.error) /
             g->probe.scale64;
         n->passed_over = fmin(n->passed_over, fmax(lower, 0));
     }
 }
 
-/* An octree level adds at most one level to the hierarchy, a long list of one leaf eleven. */
-enum { STACK = 64 * 8 };
-
 static void search_near(searching *g)
 {
-    visit stack[STACK];
+    ebpo_visit stack[EBPO_VISITS_MOST];
     uint32_t top = 1, steps = 0;
     set_best(g, frame_limit(g));
-    stack[0] = make_visit(0, g->s->top);
+    stack[0] = ebpo_visit_make(0, g->s->top);
     while (top) {
-        visit v = stack[--top];
+        ebpo_visit v = stack[--top];
         uint32_t child = (uint32_t)v;
-        if (visit_lower2(v) > g->limit2)
+        if (ebpo_visit_key(v) > g->limit2)
             continue;
         if (g->n->deadline && (++steps & 7) == 0 && ebpo_clock() > g->n->deadline) {
             give_up(g, stack, top + 1);
@@ -283,8 +246,9 @@ static void search_near(searching *g)
         }
         float lower2[8];
         const ebpo_bound *bound = &g->s->bound[child];
-        unsigned lanes = g->kernels->bounds(bound, &g->probe, g->limit2, lower2);
-        top = push_children(stack, top, bound, lanes, lower2);
+        unsigned lanes =
+            g->kernels->bounds(bound, &g->s->slab[child], &g->probe, g->limit2, lower2);
+        top = ebpo_visit_push(stack, top, bound, lanes, lower2);
     }
     judge(g);
 }
@@ -296,8 +260,9 @@ static double box_distance(const ebpo_accel *s, const ebpo_bound *b, int lane, c
 {
     double most = 0, sum = 0, d[3];
     for (int k = 0; k < 3; k++) {
-        double low = s->centre[k] + (double)b->low[k][lane] / s->scale,
-               high = s->centre[k] + (double)b->high[k][lane] / s->scale;
+        ebpo_bound_sides sides = ebpo_bound_side(b, lane, k);
+        double low = s->centre[k] + sides.low / s->scale,
+               high = s->centre[k] + sides.high / s->scale;
         d[k] = fmax(fmax(low - p[k], p[k] - high), 0);
         most = fmax(most, d[k]);
     }
@@ -320,11 +285,10 @@ static void search_far(ebpo_nearest *n, const ebpo_accel *s, uint32_t child)
     const ebpo_bound *b = &s->bound[child];
     double lower[8];
     unsigned left = 0;
-    for (int lane = 0; lane < 8; lane++)
-        if (b->child[lane] != EBPO_NO_CHILD) {
-            lower[lane] = box_distance(s, b, lane, n->p);
-            left |= 1u << lane;
-        }
+    for (int lane = 0; lane < b->count; lane++) {
+        lower[lane] = box_distance(s, b, lane, n->p);
+        left |= 1u << lane;
+    }
     while (left) {
         int best = __builtin_ctz(left);
         for (int lane = best + 1; lane < 8; lane++)

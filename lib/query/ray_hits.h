@@ -3,10 +3,8 @@
 #ifndef EBPO_QUERY_RAY_HITS_H
 #define EBPO_QUERY_RAY_HITS_H
 
-#include "geom/ray.h"
 #include "query/query_model.h"
-
-typedef enum ebpo_ray_wants { EBPO_WANTS_FIRST, EBPO_WANTS_ANY, EBPO_WANTS_ALL } ebpo_ray_wants;
+#include "query/ray_kernel.h"
 
 /* A face that the ray meets, with what exact comparison needs. */
 struct ebpo_met {

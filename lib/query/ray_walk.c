@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "query/pruned.h"
 #include "query/query_node.h"
+#include "query/ray_search.h"
 
 /* Interval of t in which the ray is within [low, high] widened by `slack`, cut to 0 .. limit; false
  * when it is empty. */
@@ -29,91 +30,35 @@ static bool meets_slabs(const double origin[3], const double direction[3], doubl
     return from <= to;
 }
 
-static void try_block(ebpo_casting *c, const ebpo_accel *s, uint32_t block)
+static void decide(ebpo_ray_search *r, uint32_t slot)
 {
-    for (uint32_t lane = 0; lane < EBPO_BLOCK; lane++) {
-        uint32_t slot = block * EBPO_BLOCK + lane, local = s->slot_face[slot];
-        ebpo_met m;
-        if (local == EBPO_NO_SLOT)
-            return;
-        ebpo_accel_triangle(s, slot, m.triangle);
-        if (!ebpo_casting_meets(c, &m))
-            continue;
-        m.file_face = ebpo_accel_file_face(s, local);
-        m.source_face = ebpo_accel_source_face(s, local);
-        ebpo_casting_keep(c, &m);
-        if (c->done)
-            return;
-    }
-}
-
-/* The ray in the subtree's frame, its direction scaled by a power of two to about 1. Widening
- * covers the rounding of all. */
-typedef struct framed {
-    double origin[3], direction[3], slack;
-    /* t in the frame for t = 1; 0 or infinite where that leaves the doubles, and then limits prune
-     * nothing */
-    double limit_scale;
-} framed;
-
-static double frame_limit(const ebpo_casting *c, const framed *f)
-{
-    double limit = c->limit * f->limit_scale * (1 + 0x1p-40);
-    return f->limit_scale > 0 && limit > 0x1p-500 ? limit
-           : c->limit > 0 || c->count             ? INFINITY
-                                                  : 0x1p-40;
-}
-
-typedef struct entered {
-    double enter;
-    uint32_t child;
-} entered;
-
-static void cast_bound(ebpo_casting *c, const ebpo_accel *s, const framed *f, uint32_t child)
-{
-    if (child & EBPO_IS_BLOCK) {
-        try_block(c, s, child & ~EBPO_IS_BLOCK);
+    ebpo_casting *c = r->user;
+    ebpo_met m;
+    uint32_t local = r->s->slot_face[slot];
+    ebpo_accel_triangle(r->s, slot, m.triangle);
+    if (!ebpo_casting_meets(c, &m))
         return;
-    }
-    const ebpo_bound *b = &s->bound[child];
-    entered order[8];
-    int count = 0;
-    for (int lane = 0; lane < 8; lane++) {
-        if (b->child[lane] == EBPO_NO_CHILD)
-            continue;
-        double low[3] = { b->low[0][lane], b->low[1][lane], b->low[2][lane] },
-               high[3] = { b->high[0][lane], b->high[1][lane], b->high[2][lane] };
-        entered e = { 0, b->child[lane] };
-        if (!meets_slabs(f->origin, f->direction, frame_limit(c, f), low, high, f->slack, &e.enter))
-            continue;
-        int at = count++;
-        for (; at > 0 && order[at - 1].enter > e.enter; at--)
-            order[at] = order[at - 1];
-        order[at] = e;
-    }
-    for (int i = 0; i < count && !c->done; i++)
-        if (order[i].enter <= frame_limit(c, f))
-            cast_bound(c, s, f, order[i].child);
+    m.file_face = ebpo_accel_file_face(r->s, local);
+    m.source_face = ebpo_accel_source_face(r->s, local);
+    ebpo_casting_keep(c, &m);
+    r->done = c->done;
+    r->limit = c->limit;
 }
 
 static void cast_subtree(ebpo_casting *c, const ebpo_accel *s)
 {
-    framed f;
-    double most = 2, longest = 0;
-    int exponent;
-    if (s->bound_count == 0)
-        return;
-    for (int k = 0; k < 3; k++)
-        longest = fmax(longest, fabs(c->ray.direction[k]));
-    frexp(longest, &exponent);
-    for (int k = 0; k < 3; k++) {
-        f.origin[k] = (c->ray.origin[k] - s->centre[k]) * s->scale;
-        f.direction[k] = ldexp(c->ray.direction[k], -exponent);
-        most = fmax(most, fabs(f.origin[k]));
+    ebpo_ray_search r;
+    r.ray = c->ray;
+    r.wants = c->wants;
+    r.facing = c->sides == EBPO_RAY_BOTH ? 0 : c->sides == EBPO_RAY_FRONT ? 1 : -1;
+    r.limit = c->limit;
+    r.decide = decide;
+    r.user = c;
+    ebpo_ray_search_accel(&r, c->context->model->kernels, s);
+    if (r.met) { /* only where any hit was wanted */
+        c->count = 1;
+        c->done = true;
     }
-    f.limit_scale = ldexp(s->scale, exponent);
-    f.slack = most * 0x1p-48;
-    cast_bound(c, s, &f, s->top);
 }
 
 /* Whether the ray comes to the node's cell before its limit; rather yes than no. */

@@ -1,0 +1,141 @@
+/* Eight floats at a time, by name: one register with AVX2, otherwise two of 16 bytes (gcc 12 makes
+ * poor code of its own 32-byte vectors for these). Masks are all ones or all zeros in a lane. */
+#ifndef EBPO_BASE_EIGHT_H
+#define EBPO_BASE_EIGHT_H
+
+#include <stdint.h>
+#include <string.h>
+
+#if defined(__SSE2__)
+#include <immintrin.h>
+#endif
+
+#define EBPO_EIGHT static inline __attribute__((always_inline))
+
+#if defined(__AVX2__)
+
+typedef __m256 f8;
+
+EBPO_EIGHT f8 f8_all(float x) { return _mm256_set1_ps(x); }
+EBPO_EIGHT f8 f8_load(const float *x) { return _mm256_loadu_ps(x); }
+EBPO_EIGHT void f8_store(float *x, f8 a) { _mm256_storeu_ps(x, a); }
+EBPO_EIGHT f8 f8_add(f8 a, f8 b) { return _mm256_add_ps(a, b); }
+EBPO_EIGHT f8 f8_sub(f8 a, f8 b) { return _mm256_sub_ps(a, b); }
+EBPO_EIGHT f8 f8_mul(f8 a, f8 b) { return _mm256_mul_ps(a, b); }
+EBPO_EIGHT f8 f8_div(f8 a, f8 b) { return _mm256_div_ps(a, b); }
+EBPO_EIGHT f8 f8_min(f8 a, f8 b) { return _mm256_min_ps(a, b); }
+EBPO_EIGHT f8 f8_max(f8 a, f8 b) { return _mm256_max_ps(a, b); }
+EBPO_EIGHT f8 f8_sqrt(f8 a) { return _mm256_sqrt_ps(a); }
+EBPO_EIGHT f8 f8_less(f8 a, f8 b) { return _mm256_cmp_ps(a, b, _CMP_LT_OQ); }
+EBPO_EIGHT f8 f8_at_most(f8 a, f8 b) { return _mm256_cmp_ps(a, b, _CMP_LE_OQ); }
+EBPO_EIGHT f8 f8_and(f8 a, f8 b) { return _mm256_and_ps(a, b); }
+EBPO_EIGHT f8 f8_or(f8 a, f8 b) { return _mm256_or_ps(a, b); }
+EBPO_EIGHT f8 f8_pick(f8 mask, f8 yes, f8 no) { return _mm256_blendv_ps(no, yes, mask); }
+EBPO_EIGHT unsigned f8_bits(f8 mask) { return (unsigned)_mm256_movemask_ps(mask); }
+EBPO_EIGHT f8 f8_abs(f8 a)
+{
+    return _mm256_and_ps(a, _mm256_castsi256_ps(_mm256_set1_epi32(0x7fffffff)));
+}
+EBPO_EIGHT f8 f8_from_bytes(const uint8_t *x)
+{
+    return _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)x)));
+}
+EBPO_EIGHT f8 f8_from_signed(const int8_t *x)
+{
+    return _mm256_cvtepi32_ps(_mm256_cvtepi8_epi32(_mm_loadl_epi64((const __m128i *)x)));
+}
+
+#else
+
+typedef float f4 __attribute__((vector_size(16)));
+typedef int32_t i4 __attribute__((vector_size(16)));
+typedef struct f8 {
+    f4 half[2];
+} f8;
+#define EBPO_BOTH(expression_of_h)           \
+    f8 out;                                  \
+    for (int h = 0; h < 2; h++)              \
+        out.half[h] = (f4)(expression_of_h); \
+    return out
+
+EBPO_EIGHT f8 f8_all(float x) { EBPO_BOTH(((f4){ x, x, x, x })); }
+EBPO_EIGHT f8 f8_load(const float *x)
+{
+    f8 out;
+    memcpy(&out, x, sizeof out);
+    return out;
+}
+EBPO_EIGHT void f8_store(float *x, f8 a) { memcpy(x, &a, sizeof a); }
+EBPO_EIGHT f8 f8_add(f8 a, f8 b) { EBPO_BOTH(a.half[h] + b.half[h]); }
+EBPO_EIGHT f8 f8_sub(f8 a, f8 b) { EBPO_BOTH(a.half[h] - b.half[h]); }
+EBPO_EIGHT f8 f8_mul(f8 a, f8 b) { EBPO_BOTH(a.half[h] * b.half[h]); }
+EBPO_EIGHT f8 f8_div(f8 a, f8 b) { EBPO_BOTH(a.half[h] / b.half[h]); }
+EBPO_EIGHT f8 f8_less(f8 a, f8 b) { EBPO_BOTH(a.half[h] < b.half[h]); }
+EBPO_EIGHT f8 f8_at_most(f8 a, f8 b) { EBPO_BOTH(a.half[h] <= b.half[h]); }
+EBPO_EIGHT f8 f8_and(f8 a, f8 b) { EBPO_BOTH((i4)a.half[h] & (i4)b.half[h]); }
+EBPO_EIGHT f8 f8_or(f8 a, f8 b) { EBPO_BOTH((i4)a.half[h] | (i4)b.half[h]); }
+EBPO_EIGHT f8 f8_abs(f8 a) { EBPO_BOTH((i4)a.half[h] & 0x7fffffff); }
+EBPO_EIGHT f8 f8_pick(f8 mask, f8 yes, f8 no)
+{
+    EBPO_BOTH(((i4)yes.half[h] & (i4)mask.half[h]) | ((i4)no.half[h] & ~(i4)mask.half[h]));
+}
+
+#if defined(__SSE2__)
+EBPO_EIGHT f8 f8_min(f8 a, f8 b) { EBPO_BOTH(_mm_min_ps(a.half[h], b.half[h])); }
+EBPO_EIGHT f8 f8_max(f8 a, f8 b) { EBPO_BOTH(_mm_max_ps(a.half[h], b.half[h])); }
+EBPO_EIGHT f8 f8_sqrt(f8 a) { EBPO_BOTH(_mm_sqrt_ps(a.half[h])); }
+EBPO_EIGHT unsigned f8_bits(f8 mask)
+{
+    return (unsigned)(_mm_movemask_ps(mask.half[0]) | _mm_movemask_ps(mask.half[1]) << 4);
+}
+EBPO_EIGHT f8 f8_from_bytes(const uint8_t *x)
+{
+    __m128i none = _mm_setzero_si128(),
+            words = _mm_unpacklo_epi8(_mm_loadl_epi64((const __m128i *)x), none);
+    return (f8){ { _mm_cvtepi32_ps(_mm_unpacklo_epi16(words, none)),
+                   _mm_cvtepi32_ps(_mm_unpackhi_epi16(words, none)) } };
+}
+EBPO_EIGHT f8 f8_from_signed(const int8_t *x)
+{
+    __m128i bytes = _mm_loadl_epi64((const __m128i *)x), twice = _mm_unpacklo_epi8(bytes, bytes);
+    return (f8){ { _mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpacklo_epi16(twice, twice), 24)),
+                   _mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpackhi_epi16(twice, twice), 24)) } };
+}
+#else
+#include <math.h>
+EBPO_EIGHT f8 f8_min(f8 a, f8 b) { return f8_pick(f8_less(a, b), a, b); }
+EBPO_EIGHT f8 f8_max(f8 a, f8 b) { return f8_pick(f8_less(b, a), a, b); }
+EBPO_EIGHT f8 f8_sqrt(f8 a)
+{
+    for (int i = 0; i < 8; i++)
+        a.half[i / 4][i % 4] = sqrtf(a.half[i / 4][i % 4]);
+    return a;
+}
+EBPO_EIGHT unsigned f8_bits(f8 mask)
+{
+    unsigned out = 0;
+    for (int i = 0; i < 8; i++)
+        out |= (unsigned)(((i4)mask.half[i / 4])[i % 4] < 0) << i;
+    return out;
+}
+EBPO_EIGHT f8 f8_from_bytes(const uint8_t *x)
+{
+    f8 out;
+    for (int i = 0; i < 8; i++)
+        out.half[i / 4][i % 4] = x[i];
+    return out;
+}
+EBPO_EIGHT f8 f8_from_signed(const int8_t *x)
+{
+    f8 out;
+    for (int i = 0; i < 8; i++)
+        out.half[i / 4][i % 4] = x[i];
+    return out;
+}
+#endif
+#endif
+
+EBPO_EIGHT f8 f8_min3(f8 a, f8 b, f8 c) { return f8_min(a, f8_min(b, c)); }
+EBPO_EIGHT f8 f8_max3(f8 a, f8 b, f8 c) { return f8_max(a, f8_max(b, c)); }
+
+#endif

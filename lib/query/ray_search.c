@@ -1,0 +1,184 @@
+#include "geom/strict_fp.h"
+
+#include "query/ray_search.h"
+
+#include <math.h>
+#include <stddef.h>
+
+/* Origins farther from the box than this many times its reach are moved towards it. */
+static const double near_enough = 4;
+/* Stands for infinity: finite, so that products with 0 are numbers. */
+#define BEYOND 0x1p100f
+
+/* --- limits --- */
+
+/* t in the frame, from the moved origin; `sign` 1: not less than the true one, -1: not greater. */
+static float frame_t(const ebpo_ray_search *r, double t, int sign)
+{
+    double scaled = t * r->limit_scale;
+    if (!(r->limit_scale > 0 && r->limit_scale < INFINITY && scaled < (double)BEYOND))
+        return sign > 0 || t == INFINITY ? BEYOND : -1;
+    double rest = scaled - r->moved + sign * (0x1p-50 * (scaled + r->moved) + 0x1p-90);
+    return (float)(rest + sign * fabs(rest) * 0x1p-22);
+}
+
+static void lower_bound(ebpo_ray_search *r)
+{
+    float bound = frame_t(r, r->limit, 1);
+    r->bound = bound < r->bound ? bound : r->bound;
+}
+
+/* --- the ray in the frame --- */
+
+typedef struct framed {
+    double origin[3], direction[3];
+    double most; /* no coordinate of the origin is greater */
+} framed;
+
+/* The direction is scaled by a power of two to a longest coordinate of .5 to 1. */
+static framed to_frame(ebpo_ray_search *r)
+{
+    const ebpo_accel *s = r->s;
+    framed f;
+    double longest = 0;
+    int exponent;
+    f.most = 0;
+    for (int k = 0; k < 3; k++)
+        longest = fmax(longest, fabs(r->ray.direction[k]));
+    frexp(longest, &exponent);
+    for (int k = 0; k < 3; k++) {
+        r->from[k] = r->ray.origin[k];
+        f.origin[k] = (r->ray.origin[k] - s->centre[k]) * s->scale;
+        f.direction[k] = ldexp(r->ray.direction[k], -exponent);
+        f.most = fmax(f.most, fabs(f.origin[k]));
+    }
+    r->limit_scale = ldexp(s->scale, exponent);
+    r->moved = 0;
+    return f;
+}
+
+/* Where the ray comes to the cube of `reach` around all faces, somewhat before; false: nowhere.
+ * Rounding is far below what the cube is widened by as long as the origin is not so far away that
+ * the ray is blurred to the cube's size; then it stays where it is. */
+static bool entry(const framed *f, double reach, double *t)
+{
+    double from = 0, to = INFINITY;
+    for (int k = 0; k < 3; k++) {
+        double wall = 2 * reach * (f->direction[k] < 0 ? -1 : 1);
+        if (f->direction[k] == 0) {
+            if (fabs(f->origin[k]) > 2 * reach)
+                return false;
+            continue;
+        }
+        from = fmax(from, (-wall - f->origin[k]) / f->direction[k]);
+        to = fmin(to, (wall - f->origin[k]) / f->direction[k]);
+    }
+    *t = from;
+    return from <= to;
+}
+
+static bool move_origin(ebpo_ray_search *r, framed *f)
+{
+    double t;
+    if (f->most <= near_enough * r->s->reach || !(f->most < 0x1p46 * r->s->reach))
+        return true;
+    if (!entry(f, r->s->reach, &t))
+        return false;
+    r->moved = t;
+    f->most = 0;
+    for (int k = 0; k < 3; k++) {
+        f->origin[k] += t * f->direction[k];
+        f->most = fmax(f->most, fabs(f->origin[k]));
+        r->from[k] = r->s->centre[k] + f->origin[k] / r->s->scale;
+    }
+    return true;
+}
+
+/* How far off the origin may be, in the frame: moved, brought into the frame, back into the model's
+ * unit, and split into floats there; and what replacing a small direction does. */
+static double origin_error(const ebpo_ray_search *r, const framed *f)
+{
+    double unit = 0;
+    for (int k = 0; k < 3; k++)
+        unit = fmax(unit, fabs(r->from[k]) + fabs(r->s->centre[k]));
+    return 0x1p-50 * (f->most + r->moved) + 0x1p-46 * (unit * r->s->scale) +
+           0x1p-57 * (f->most + r->s->reach) + 0x1p-53;
+}
+
+static void set_boxes(ebpo_ray_search *r, const framed *f, double error)
+{
+    bool blind = !(f->most < 0x1p80);
+    for (int k = 0; k < 3; k++) {
+        double d = f->direction[k], origin = blind ? 0 : f->origin[k],
+               slack = blind ? (double)BEYOND : fabs(origin) * 0x1p-21 + error;
+        bool back = d < 0;
+        if (fabs(d) < 0x1p-60)
+            d = back ? -0x1p-60 : 0x1p-60;
+        r->inverse[k] = (float)(1 / d);
+        r->near_from[k] = (float)(origin + (back ? -slack : slack));
+        r->far_from[k] = (float)(origin - (back ? -slack : slack));
+        unsigned low = (unsigned)(offsetof(ebpo_bound, low) + (size_t)k * 8),
+                 high = (unsigned)(offsetof(ebpo_bound, high) + (size_t)k * 8);
+        r->near_at[k] = back ? high : low;
+        r->far_at[k] = back ? low : high;
+    }
+}
+
+static void set_faces(ebpo_ray_search *r, const framed *f, double error)
+{
+    int z = 0;
+    for (int k = 1; k < 3; k++)
+        z = fabs(f->direction[k]) > fabs(f->direction[z]) ? k : z;
+    r->axis[2] = z;
+    r->axis[0] = z == 2 ? 0 : z + 1;
+    r->axis[1] = z == 0 ? 2 : z - 1;
+    for (int i = 0; i < 2; i++)
+        r->shear[i] = (float)(f->direction[r->axis[i]] / f->direction[z]);
+    r->shear[2] = (float)(1 / f->direction[z]);
+    for (int k = 0; k < 3; k++) {
+        r->from_high[k] = (float)r->from[k];
+        r->from_low[k] = (float)(r->from[k] - (double)r->from_high[k]);
+    }
+    r->blur = f->most < 0x1p30 ? (float)(error * 0x1p23 + 0x1p-30) : INFINITY;
+}
+
+/* --- candidates --- */
+
+static void judge(ebpo_ray_search *r)
+{
+    while (r->count && !r->done) {
+        int first = 0;
+        for (int i = 1; i < r->count; i++)
+            first = r->waiting[i].low < r->waiting[first].low ? i : first;
+        ebpo_ray_candidate c = r->waiting[first];
+        r->waiting[first] = r->waiting[--r->count];
+        if (c.low > r->bound)
+            continue;
+        double before = r->limit;
+        r->decide(r, c.slot);
+        if (r->limit < before)
+            lower_bound(r);
+    }
+    r->count = 0;
+}
+
+void ebpo_ray_search_accel(ebpo_ray_search *r, const ebpo_kernels *kernels, const ebpo_accel *s)
+{
+    r->s = s;
+    r->judge = judge;
+    r->count = 0;
+    r->done = r->met = false;
+    if (s->bound_count == 0)
+        return;
+    framed f = to_frame(r);
+    if (!move_origin(r, &f))
+        return;
+    double error = origin_error(r, &f);
+    set_boxes(r, &f, error);
+    set_faces(r, &f, error);
+    r->surely = frame_t(r, r->ray.t_max, -1);
+    r->bound = BEYOND;
+    lower_bound(r);
+    kernels->ray(r);
+    judge(r);
+}
