@@ -58,9 +58,9 @@ typedef struct extent {
 static extent extent_of(const ebpo_chunks *chunks, const ebpo_node *root, uint32_t needs,
                         int levels)
 {
-    int count = chunks->file->info.level_count, last = root->cell.level + levels;
+    int count = chunks->file->info.level_count, below = count - 1 - root->cell.level;
     return (extent){ needs & ebpo_schema_has(&chunks->file->info),
-                     levels >= 0 && last + 1 < count ? last + 1 : count, false };
+                     levels >= 0 && levels < below ? root->cell.level + levels + 1 : count, false };
 }
 
 /* Whether the range has a next level: the gray nodes of the file's last one are pruned. */

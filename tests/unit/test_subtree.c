@@ -1,4 +1,5 @@
 /* Subtrees as plain arrays, against a twin that reads the whole file and picks by hand. */
+#include <limits.h>
 #include <math.h>
 #include <pthread.h>
 #include <stdint.h>
@@ -693,6 +694,29 @@ START_TEST(octcodes_of_points_are_those_of_the_cells_around_them)
 }
 END_TEST
 
+/* As many levels as one may name are all. */
+START_TEST(more_levels_than_there_are_is_all)
+{
+    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 30, 20), USUAL, 6, EBPO_CODEC_ZSTD);
+    ebpo_subtree_options options = EBPO_SUBTREE_OPTIONS_INIT;
+    static const int levels[] = { -1, EBPO_LEVELS_MAX, INT_MAX };
+    uint64_t nodes[3];
+    for (int i = 0; i < 3; i++) {
+        ebpo_subtree *subtree = NULL;
+        ebpo_subtree_nodes all = EBPO_SUBTREE_NODES_INIT;
+        options.levels = levels[i];
+        ck_assert_int_eq(ebpo_subtree_open(file, 1, &options, &subtree, NULL), EBPO_OK);
+        ck_assert_int_eq(ebpo_subtree_get_nodes(subtree, &all), EBPO_OK);
+        nodes[i] = all.node_count;
+        ebpo_subtree_close(subtree);
+    }
+    ck_assert_uint_gt(nodes[0], 1);
+    ck_assert_uint_eq(nodes[0], nodes[1]);
+    ck_assert_uint_eq(nodes[0], nodes[2]);
+    ebpo_close(file);
+}
+END_TEST
+
 START_TEST(without_faces_there_are_nodes_and_a_reason)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -847,6 +871,7 @@ Suite *test_suite(void)
     tcase_add_test(tests, where_the_tree_ends_the_leaf_above_is_named_and_opened);
     tcase_add_test(tests, octcodes_of_points_are_those_of_the_cells_around_them);
     tcase_add_loop_test(tests, without_faces_there_are_nodes_and_a_reason, 0, 3);
+    tcase_add_test(tests, more_levels_than_there_are_is_all);
     tcase_add_test(tests, a_limit_of_memory_is_named_and_kept);
     tcase_add_loop_test(tests, changed_bytes_never_lead_outside, 0, 3);
     suite_add_tcase(suite, tests);
