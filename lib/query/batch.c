@@ -130,18 +130,21 @@ static void tell_next(ebpo_batch *b)
 }
 
 /* What else is near, as far as where a point begins tells: with these, nothing is left that would
- * be asked for alone. */
+ * be asked for alone. A subtree that cannot be loaded ends it: the question will tell, and each
+ * further try may wait as long as the first. */
 static void search_around(ebpo_batch *b, uint64_t end)
 {
     ebpo_context *c = b->context;
-    for (; b->searched < end; b->searched++) {
+    for (bool fails = false; b->searched < end && !fails; b->searched++) {
         const double *p = point(b, b->searched);
         uint64_t home = home_of(b, p), keys[EBPO_CACHE_AHEAD];
         ebpo_accel *accel;
         ebpo_nearest n;
-        if (home == EBPO_NO_SUBTREE || c->model->top->below[home].pruned ||
-            ebpo_context_subtree(c, (uint32_t)home, &accel, NULL) != EBPO_OK)
-            continue; /* the question will tell */
+        if (home == EBPO_NO_SUBTREE || c->model->top->below[home].pruned)
+            continue;
+        fails = ebpo_context_subtree(c, (uint32_t)home, &accel, NULL) != EBPO_OK;
+        if (fails)
+            continue;
         ebpo_nearest_begin(&n, p, INFINITY);
         ebpo_nearest_search(&n, c, accel);
         unsigned count = ebpo_subtrees_near(c->model, p, fmin(n.upper, n.limit), keys);

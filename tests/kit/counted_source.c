@@ -19,6 +19,7 @@ static ebpo_status read_counted(void *user, uint64_t offset, uint64_t size, void
 {
     counted_source *c = user;
     if (c->failing) {
+        c->failed++;
         error->status = EBPO_E_IO;
         strcpy(error->message, "the line is down");
         return EBPO_E_IO;

@@ -9,6 +9,7 @@ typedef struct counted_source {
     uint64_t size, asked; /* bytes of the file; of them touched */
     uint64_t batches;     /* announcements */
     uint64_t alone;       /* reads of what had not been touched before */
+    uint64_t failed;      /* reads while it failed */
     bool failing;
 } counted_source;
 

@@ -409,6 +409,40 @@ START_TEST(a_question_from_afar_takes_few_waves)
 }
 END_TEST
 
+/* What is down makes each try wait: of many points the first that needs it ends the search for what
+ * others need, and the question tells. */
+START_TEST(a_line_that_is_down_is_not_tried_for_each_point)
+{
+    enum { POINTS = 200 };
+    two_layouts l;
+    counted_source c;
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model *model;
+    ebpo_context *context;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_distance_result *found = calloc(POINTS, sizeof *found);
+    double(*p)[3] = calloc(POINTS, sizeof *p);
+    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 200, 120), 8, ALL, EBPO_CODEC_ZSTD, 400);
+    for (uint32_t i = 0; i < POINTS; i++)
+        ebpo_test_circle(i, POINTS, &p[i][0], &p[i][1]);
+    ebpo_file *far = counted_open(&c, l.packed, true);
+    options.cut_level = ebpo_file_info(far)->subtree_level;
+    EXPECT(ebpo_model_new(far, &options, &model, NULL) == EBPO_OK);
+    EXPECT(ebpo_context_new(model, &context, NULL) == EBPO_OK);
+    c.failing = true;
+    EXPECT(ebpo_distance_many(context, p[0], POINTS, NULL, found, &error) == EBPO_E_IO);
+    ck_assert_msg(c.failed < 16, "%d tries", (int)c.failed);
+    c.failing = false;
+    EXPECT(ebpo_distance_many(context, p[0], POINTS, NULL, found, &error) == EBPO_OK);
+    ebpo_context_free(context);
+    ebpo_model_free(model);
+    counted_close(&c, far);
+    two_layouts_close(&l);
+    free(found);
+    free(p);
+}
+END_TEST
+
 Suite *test_suite(void)
 {
     Suite *suite = suite_create("subtree_table");
@@ -420,6 +454,7 @@ Suite *test_suite(void)
     tcase_add_loop_test(tests, subsets_are_the_same_in_both_layouts, 0, 3);
     tcase_add_loop_test(tests, chunks_lie_in_the_order_of_the_specification, 0, 2);
     tcase_add_test(tests, a_question_from_afar_takes_few_waves);
+    tcase_add_test(tests, a_line_that_is_down_is_not_tried_for_each_point);
     suite_add_tcase(suite, tests);
     return suite;
 }
