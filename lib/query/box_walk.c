@@ -158,17 +158,21 @@ ebpo_status ebpo_box_walk_run(ebpo_box_walk *w, ebpo_error *error)
 
 /* --- each face once --- */
 
-/* Accels list the faces that touch the cells in whose place they stand. So the first one that has a
- * face is the first, depth first, whose cell the face touches: no list of what has been seen is
- * needed, however much that is. */
+static bool touches_cell(const ebpo_box *box, const ebpo_node *node, const double triangle[3][3])
+{
+    double low[3], high[3];
+    ebpo_cell_bounds(box, node->cell, low, high);
+    return ebpo_triangle_meets_box(triangle, low, high);
+}
+
+/* Accels list the faces that touch the cells in whose place they stand, and some that only pass by
+ * (format-spec, section 5). So of those whose cell the face touches, one is the first, depth first:
+ * no list of what has been seen is needed, however much that is. */
 static bool find_first(const ebpo_box_walk *w, const ebpo_box *box, ebpo_node node,
                        const double triangle[3][3], uint32_t *entry)
 {
-    double low[3], high[3];
-    if (ebpo_node_is_uniform(&node) || !ebpo_cell_meets(box, node.cell, w->min, w->max))
-        return false;
-    ebpo_cell_bounds(box, node.cell, low, high);
-    if (!ebpo_triangle_meets_box(triangle, low, high))
+    if (ebpo_node_is_uniform(&node) || !ebpo_cell_meets(box, node.cell, w->min, w->max) ||
+        !touches_cell(box, &node, triangle))
         return false;
     *entry = node.entry;
     bool found = ebpo_node_is_below(&node);
@@ -178,11 +182,14 @@ static bool find_first(const ebpo_box_walk *w, const ebpo_box *box, ebpo_node no
     return found;
 }
 
-bool ebpo_box_walk_is_first(const ebpo_box_walk *w, const double triangle[3][3])
+bool ebpo_box_walk_is_first(const ebpo_box_walk *w, bool own, const double triangle[3][3])
 {
     const ebpo_model *m = w->context->model;
     ebpo_box box = ebpo_model_box(m);
     uint32_t entry = 0;
-    return m->whole || !find_first(w, &box, ebpo_model_root(m), triangle, &entry) ||
-           entry == w->below.entry;
+    if (m->whole)
+        return true;
+    if (own) /* no accel before this one has it */
+        return touches_cell(&box, &w->below, triangle);
+    return find_first(w, &box, ebpo_model_root(m), triangle, &entry) && entry == w->below.entry;
 }

@@ -32,8 +32,8 @@ EBPO_MUST_USE ebpo_status ebpo_box_walk_check(ebpo_box_walk *walk, ebpo_error *e
 /* The whole walk. The list of slots is freed. */
 EBPO_MUST_USE ebpo_status ebpo_box_walk_run(ebpo_box_walk *walk, ebpo_error *error);
 
-/* The triangle is found in the accel at hand first: in no other whose place comes earlier, so that
- * a walk that takes it where this is true takes each once. Of a face's own accel it always is. */
-bool ebpo_box_walk_is_first(const ebpo_box_walk *walk, const double triangle[3][3]);
+/* The triangle, which meets the box, is to be taken in the accel at hand and in no other, so that a
+ * walk that takes it where this is true takes each once. `own`: the accel has it as its own. */
+bool ebpo_box_walk_is_first(const ebpo_box_walk *walk, bool own, const double triangle[3][3]);
 
 #endif

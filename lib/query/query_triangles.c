@@ -41,8 +41,7 @@ static ebpo_status take(ebpo_box_walk *walk, const ebpo_accel *s, ebpo_error *er
         uint32_t local = s->slot_face[walk->slot[i]];
         double(*corners)[3] = d->block->corners[d->count];
         ebpo_accel_triangle(s, walk->slot[i], corners);
-        /* others have this face as well when it is not the accel's own */
-        if (local < s->outer_count && !ebpo_box_walk_is_first(walk, (const double(*)[3])corners))
+        if (!ebpo_box_walk_is_first(walk, local >= s->outer_count, (const double(*)[3])corners))
             continue;
         d->block->faces[d->count] = ebpo_accel_source_face(s, local);
         d->block->file_faces[d->count++] = ebpo_accel_file_face(s, local);

@@ -296,6 +296,58 @@ START_TEST(triangles_of_boxes_come_once_each)
 }
 END_TEST
 
+/* A tetrahedron above an edge of eight cells, upwards in x and y: its slanting face passes by the
+ * edge so closely that the cell below it lists it, too, and has it as new. */
+static void add_passing(ebpo_mesh *mesh, const double at[3], double a)
+{
+    static const uint32_t face[4][3] = { { 0, 2, 1 }, { 0, 1, 3 }, { 0, 3, 2 }, { 1, 2, 3 } };
+    double x = at[0] + 0x1p-52, y = at[1], z = at[2];
+    uint32_t first = ebpo_test_append_vertex(mesh, x + a, y - a, z);
+    ebpo_test_append_vertex(mesh, x - a, y + a, z);
+    ebpo_test_append_vertex(mesh, x + a / 2, y - a / 2, z + a);
+    ebpo_test_append_vertex(mesh, x + a, y + a, z + a / 3);
+    for (int i = 0; i < 4; i++)
+        ebpo_test_append_face(mesh, first + face[i][0], first + face[i][1], first + face[i][2]);
+}
+
+/* The corners of the box belong to whole cubes, so that it is the same whatever lies between. */
+static ebpo_mesh passing_by(const ebpo_info *box)
+{
+    static const double low[2][3] = { { 0, 0, 0 }, { 1 - 0x1p-8, 1 - 0x1p-8, 1 - 0x1p-8 } },
+                        high[2][3] = { { 0x1p-8, 0x1p-8, 0x1p-8 }, { 1, 1, 1 } };
+    ebpo_mesh mesh = ebpo_test_box(low[0], high[0], 1), other = ebpo_test_box(low[1], high[1], 1);
+    ebpo_test_append(&mesh, &other);
+    ebpo_mesh_free(&other);
+    for (int i = 0; box && i < 7 * 7; i++) {
+        const int wall[3] = { 1 + i % 7, 1 + i / 7, 1 + i % 5 };
+        double at[3];
+        for (int k = 0; k < 3; k++)
+            at[k] = box->box_origin[k] + box->box_size[k] / 8 * wall[k];
+        add_passing(&mesh, at, box->box_size[0] / 32);
+    }
+    return mesh;
+}
+
+START_TEST(triangles_that_pass_by_a_cell_come_once)
+{
+    static const query_variant variant = { "passing", 1, 6, EBPO_RULE_NONZERO, 0 };
+    static const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
+    query_model frame, m;
+    query_model_make(&frame, "frame", passing_by(NULL), &variant);
+    query_model_make(&m, "passing", passing_by(ebpo_file_info(frame.file)), &variant);
+    query_model_free(&frame);
+    for (int way = 0; way < CUTS; way++) {
+        ebpo_model *model;
+        ebpo_context *context;
+        hold(&m, way, &model, &context);
+        ck_assert_msg(ask_triangles(&m, context, way == 0, low, high), "way %d", way);
+        ebpo_context_free(context);
+        ebpo_model_free(model);
+    }
+    query_model_free(&m);
+}
+END_TEST
+
 /* All triangles, and those of some blocks: each once. */
 static void take_all(const query_model *m, ebpo_context *context)
 {
@@ -359,6 +411,7 @@ Suite *test_suite(void)
     tcase_add_loop_test(boxes, boxes_hold_what_brute_force_says, 0, query_solid_count());
     tcase_add_test(boxes, boxes_that_make_no_sense_are_refused);
     tcase_add_loop_test(boxes, triangles_of_boxes_come_once_each, 0, query_solid_count());
+    tcase_add_test(boxes, triangles_that_pass_by_a_cell_come_once);
     tcase_add_loop_test(boxes, triangles_of_all_of_a_model_keep_to_its_budget, 0, 3);
     suite_add_tcase(suite, rays);
     suite_add_tcase(suite, boxes);
