@@ -60,25 +60,29 @@ enum {
     EBPO_COLS_OF_SUBTREES = 255 /* ebpo_schema_cols tells */
 };
 
-/* Columns of /subtrees/counts; the last seven for each level below the subtrees' roots, from
- * EBPO_SUBTREE_LEVELS on. */
+/* Columns of /subtrees/counts: what of a subtree, and of what lies between it and the one before
+ * (`BEFORE`: of leaves down to the roots' level). */
 enum {
-    EBPO_S_FACES_BEFORE,
+    EBPO_S_FACES_BEFORE, /* new ones */
     EBPO_S_FACES,
-    EBPO_S_VERTICES_BEFORE,
+    EBPO_S_VERTICES_BEFORE, /* first used by these */
     EBPO_S_VERTICES,
-    EBPO_S_OUTER_FACES,
+    EBPO_S_OUTER_FACES, /* rows of /subtrees/outer about blocks of faces */
     EBPO_S_OUTER_VERTICES,
-    EBPO_SUBTREE_LEVELS,
-    EBPO_S_GRAY = 0,
+    EBPO_SUBTREE_LEVELS /* then for each level below the roots': */
+};
+enum {
+    EBPO_S_GRAY,
     EBPO_S_LEAF,
     EBPO_S_BLACK,
     EBPO_S_PLANES,
     EBPO_S_LEAF_PLANES,
     EBPO_S_REFS,
-    EBPO_S_ENDS,
+    EBPO_S_ENDS, /* by how much the end of the level's new faces grows */
     EBPO_SUBTREE_LEVEL_COLS
 };
+
+/* `level`: below the roots'; `what`: one of the last. */
 static inline unsigned ebpo_subtree_column(const ebpo_info *info, int level, unsigned what)
 {
     return EBPO_SUBTREE_LEVELS +

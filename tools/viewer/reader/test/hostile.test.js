@@ -4,7 +4,7 @@ import { readFileSync } from 'node:fs';
 import test from 'node:test';
 import { fletcher32 } from '../chunk.js';
 import { EbpoError, openEbpo } from '../index.js';
-import { readPlaces } from '../places.js';
+import { placesHold, readPlaces } from '../places.js';
 import { readAll } from './as_json.js';
 
 const original = readFileSync(new URL('../../../../format-spec/vectors/passed/15_subtrees_unfiltered.ebpo.h5', import.meta.url));
@@ -126,6 +126,13 @@ test('500 changes of the tables at random: an error, or the same', async () => {
       assert.equal(found, right, `${path}, change ${i}`);
   }
   assert.ok(errors > 400, String(errors));
+});
+
+test('a list whose own place is not known does not hold', () => {
+  const places = good.arrays.get('/subtrees/places');
+  assert.equal(placesHold(places, original.length), true);
+  assert.equal(placesHold(places, original.length + 1), false);
+  assert.equal(placesHold({ ...places, chunks: undefined }, original.length), false);
 });
 
 test('the whole file is read alike', async () => assert.ok((await readAll(original, 'a')).levels.length));
