@@ -277,6 +277,8 @@ def same(a, b, narrow):
 
 
 if __name__ == "__main__":
+    if len(sys.argv) not in (2, 3) or sys.argv[1].startswith("-"):
+        sys.exit("usage: read_ebpo.py FILE.ebpo.h5 [EXPECTED.json]")
     found = read(sys.argv[1])
     if len(sys.argv) == 2:
         json.dump(found, sys.stdout, indent=1)
