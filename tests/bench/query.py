@@ -10,8 +10,8 @@ what that needs). Each model is converted once (kept in --work); every figure is
 --rounds runs (a third of that above a million faces) in which the programs take turns, one thread
 each, on one core. The modes are measured on the largest model below a million faces.
 
-What is asked of `ebpo bench FILE --query inside|distance|ray --points uniform|path --seed S --count
-N --json`: --save-points and --save-answers (both in the peers' layout: tests/bench/peers/peer.hpp;
+What is asked of `ebpo bench FILE --query inside|distance|ray|ray-any|ray-all --points
+uniform|path|camera|segments|degenerate --seed S --count N --json`: --save-points and --save-answers (both in the peers' layout: tests/bench/peers/peer.hpp;
 inside: 0 out, 1 in, 2 on the surface), --mode, --level, --memory BYTES, --prefetch; in its JSON the
 keys of OURS below.
 """
@@ -30,6 +30,8 @@ import sys
 SECTIONS = ["inside", "distance", "ray", "opening", "modes", "distance-modes", "out-of-core",
             "leaves"]
 PEERS = ["embree", "cgal"]
+RAYS = ["uniform", "camera", "segments", "degenerate"]
+QUESTIONS = {"ray": "first hit", "ray-any": "any hit", "ray-all": "all hits"}
 CUT = 4 # level, of the second way of opening
 # Of --count; the peers take up to 200 us for the nearest point of a point far away.
 SHARE = {("distance", "uniform"): 10, ("distance", "path"): 2}
@@ -158,15 +160,24 @@ def hits_of(path):
     return values, faces
 
 
-def differences(query, ours, theirs, tolerance):
-    """How many answers differ. inside: of points that are not on the surface. distance, ray: by
-    more than `tolerance`, or one has none."""
+def lengths_of(path):
+    """Of the rays' directions."""
+    data = array.array("d", pathlib.Path(path).read_bytes())
+    return [math.hypot(*data[i + 3:i + 6]) for i in range(0, len(data), 6)]
+
+
+def differences(query, ours, theirs, tolerance, lengths=None):
+    """How many answers differ. inside: of points that are not on the surface. ray-any: one has a
+    hit. ray-all: their number. distance, ray: by more than `tolerance`, or one has none; `lengths`:
+    of what the parameters of rays count."""
     if query == "inside":
         return sum(a != b for a, b in zip(inside_of(ours), inside_of(theirs)) if a != 2)
     (a, a_faces), (b, b_faces) = hits_of(ours), hits_of(theirs)
+    tolerance = 0.5 if query == "ray-all" else tolerance
+    units = lengths if query == "ray" and lengths else [1] * len(a)
     none = [(x < 0) != (y < 0) for x, y in zip(a_faces, b_faces)]
-    return sum(n or (f >= 0 and not abs(abs(x) - y) <= tolerance)
-               for n, f, x, y in zip(none, a_faces, a, b))
+    return sum(n or (f >= 0 and not abs(abs(x) - y) * u <= tolerance)
+               for n, f, x, y, u in zip(none, a_faces, a, b, units))
 
 
 # ---- markdown ----
@@ -228,7 +239,7 @@ def compare(bench, model, query, points):
 def section_query(bench, page, models, query, title, note):
     page.text(f"## {title}", "", note)
     tails = []
-    for points in ["uniform", "path"] if query != "ray" else ["uniform"]:
+    for points in ["uniform", "path"]:
         rows, warm = [], query == "distance" and points == "path"
         for model in models:
             count, reports, wrong = compare(bench, model, query, points)
@@ -242,7 +253,7 @@ def section_query(bench, page, models, query, title, note):
                         + [ratio(batch["ebpo"], batch["embree"])] + [figure(wrong[p])
                                                                      for p in PEERS])
             tails += tail_rows(model, points, reports)
-        page.text(f"{points.capitalize()} {'rays' if query == 'ray' else 'points'}, {count:,} for "
+        page.text(f"{points.capitalize()} points, {count:,} for "
                   f"each model, us for one: each call by the clock, then "
                   "all together without.")
         names = ["Embree"] + (["Embree, warm"] if warm else []) + ["CGAL"]
@@ -261,6 +272,57 @@ def tail_rows(model, points, reports):
                          "ours" if who == "ebpo"
                          else who] + [us(median(runs, n)) for n in ["p50", "p99", "p999", "max"]])
     return rows
+
+
+def compare_rays(bench, model, query, points):
+    """Means of single calls, ours all together, and how many answers of the peers differ."""
+    raw = bench.work / f"{model.name}.{points}.rays.raw"
+    peers = PEERS if (query, points) == ("ray", "uniform") else ["embree"]
+    answers = {who: bench.work / f"answers.{who}" for who in ["ebpo"] + peers}
+    reports = {who: [] for who in answers}
+    end = ["--tmax", 1] if points == "segments" else []
+    for _ in range(bench.rounds(model)):
+        reports["ebpo"].append(bench.ours(model, query, "--count", bench.options.count,
+                                          "--save-points", raw, "--save-answers", answers["ebpo"],
+                                          points=points))
+        for peer in peers:
+            reports[peer].append(bench.peer(peer, model, query, raw, "--answers", answers[peer],
+                                            *end))
+    wrong = {p: None if None in reports[p]
+             else differences(query, answers["ebpo"], answers[p], 1e-6 * model.diagonal,
+                              lengths_of(raw)) for p in peers}
+    return reports, wrong
+
+
+def section_rays(bench, page, models):
+    page.text("## Rays", "",
+              "*uniform*: from points in the box, directions uniform. *camera*: one eye, through "
+              "the pixels of a picture. *segments*: uniform, a twentieth of the diagonal long. "
+              "*degenerate*: in turns to a vertex, to the middle of an edge, from a vertex, along "
+              "an axis through a vertex. Embree: robust scene of high quality, in single "
+              "precision; all hits by a filter function, sorted and each face once, as ours. "
+              "*differs*: the first hit by more than a millionth of the box's diagonal, only one "
+              "hits, or another number of hits. Ours are exact: a ray through a vertex meets all "
+              "faces around it, which single precision seldom says of degenerate rays. us for "
+              "one: each call by the clock, then all together without.")
+    rows = []
+    for points in RAYS:
+        for query, question in QUESTIONS.items():
+            for model in models:
+                if not re.search(bench.options.rows, f"{model.name} {points} {question}"):
+                    continue
+                reports, wrong = compare_rays(bench, model, query, points)
+                one, batch = ({who: median(runs, name) for who, runs in reports.items()}
+                              for name in ["mean", "batch"])
+                rows.append([model.name, f"{model.faces:,}", points, question]
+                            + [us(one.get(who)) for who in ["ebpo"] + PEERS]
+                            + [ratio(one["ebpo"], one.get(p)) for p in PEERS]
+                            + [us(batch["ebpo"]), us(batch["embree"]),
+                               ratio(batch["ebpo"], batch["embree"])]
+                            + [figure(wrong.get(p)) for p in PEERS])
+    page.table(["model", "faces", "rays", "question", "ours", "Embree", "CGAL", "ours / Embree",
+                "ours / CGAL", "ours, batch", "Embree, loop", "batch / loop", "Embree differs",
+                "CGAL differs"], rows)
 
 
 def section_opening(bench, page, models):
@@ -449,6 +511,8 @@ def command_line(options):
     words += ["--count", str(options.count), "--rounds", str(options.rounds)]
     if options.sections != ",".join(SECTIONS):
         words += ["--sections", options.sections] + (["--update"] if options.update else [])
+    if options.rows:
+        words += ["--rows", options.rows]
     if options.faces_from_generator:
         words += ["--faces-from-generator", str(options.faces_from_generator)]
         words += ["--base", pathlib.Path(options.base).name] if options.base else []
@@ -474,6 +538,9 @@ def parse():
                              "BUILD_DIR/bench-query)")
     parser.add_argument("--sections", default=",".join(SECTIONS),
                         help="comma list of " + ", ".join(SECTIONS))
+    parser.add_argument("--rows", default="", metavar="REGEX",
+                        help="of the rays' table only the rows whose 'model rays question' matches, "
+                             "such as 'bunny.* camera any hit'")
     parser.add_argument("--update", action="store_true",
                         help="replace only these sections of an existing OUTPUT")
     parser.add_argument("-v", "--verbose", action="store_true", help="print the commands")
@@ -494,11 +561,7 @@ def sections(bench, page, models, wanted):
                       "precision. *warm*: the search starts from the "
                       "last answer, as ours does. *differs*: by more than a millionth of the "
                       "box's diagonal.")
-    if "ray" in wanted:
-        section_query(bench, page, models, "ray", "Rays",
-                      "The first hit of rays from uniform points in uniform directions. "
-                      "*differs*: by more than a millionth of the box's diagonal, or only one hits.")
-    for name, section in [("opening", section_opening), ("modes", section_modes),
+    for name, section in [("ray", section_rays), ("opening", section_opening), ("modes", section_modes),
                           ("distance-modes", section_distance_modes),
                           ("out-of-core", section_out_of_core), ("leaves", section_leaves)]:
         if name in wanted:

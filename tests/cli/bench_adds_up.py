@@ -11,7 +11,7 @@ import math
 import sys
 
 bench = json.load(sys.stdin)
-wide = 6 if bench["query"] == "ray" else 3
+wide = 6 if bench["query"].startswith("ray") else 3
 points = array.array("d", open(sys.argv[1], "rb").read())
 wrong = []
 

@@ -7,10 +7,15 @@
 #include <string.h>
 
 #include "cli/answers.h"
+#include "bench/bench_rays.h"
 #include "bench/bench_walk.h"
 #include "cli/command.h"
 
 enum { USUAL_COUNT = 100000 };
+
+/* Words for what is not read from a file. */
+typedef enum generator { UNIFORM, PATH, CAMERA, SEGMENTS, DEGENERATE, NO_GENERATOR } generator;
+static const char *const generators[] = { "uniform", "path", "camera", "segments", "degenerate" };
 
 static int make_room(bench_points *out, uint64_t count)
 {
@@ -24,39 +29,17 @@ static int make_room(bench_points *out, uint64_t count)
     return EXIT_FINE;
 }
 
-/* Of any length but about 1, uniform over the sphere: by rejection, which takes no functions that
- * differ between systems. */
-static void random_direction(uint64_t *random, double out[3])
+static void fill_uniform(bench_points *out, const bench_scene *scene, uint64_t seed)
 {
-    double square;
-    do {
-        square = 0;
-        for (int k = 0; k < 3; k++) {
-            out[k] = 2 * bench_random_unit(random) - 1;
-            square += out[k] * out[k];
-        }
-    } while (square > 1 || square < 0.01);
-    double length = sqrt(square);
-    for (int k = 0; k < 3; k++)
-        out[k] /= length;
-}
-
-static void fill_uniform(bench_points *out, const ebpo_info *info, uint64_t seed)
-{
-    const double *low = info->report.min, *high = info->report.max;
-    int width = points_width(out->kind);
-    for (uint64_t i = 0; i < out->count; i++) {
-        double *row = out->rows + i * (uint64_t)width;
-        for (int k = 0; k < 3; k++)
-            row[k] = low[k] + bench_random_unit(&seed) * (high[k] - low[k]);
-        if (out->kind == POINTS_RAYS) {
-            random_direction(&seed, row + 3);
-            row[6] = INFINITY;
-        }
+    for (uint64_t i = 0; i < 3 * out->count; i++) {
+        uint64_t k = i % 3;
+        out->rows[i] = scene->low[k] + bench_random_unit(&seed) * (scene->high[k] - scene->low[k]);
     }
 }
 
-static int fill_path(bench_points *out, ebpo_file *file, uint64_t seed)
+/* What is generated from the mesh itself: a path, or degenerate rays. */
+static int fill_from_mesh(bench_points *out, ebpo_file *file, const bench_scene *scene,
+                          uint64_t seed)
 {
     const ebpo_mesh_report *report = &ebpo_file_info(file)->report;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -66,23 +49,48 @@ static int fill_path(bench_points *out, ebpo_file *file, uint64_t seed)
         return command_failed("bench", &error);
     for (int k = 0; k < 3; k++)
         square += (report->max[k] - report->min[k]) * (report->max[k] - report->min[k]);
-    bool good = bench_walk(&mesh, report->mean_edge, sqrt(square), seed, out->count, out->rows);
+    bool good = true;
+    if (out->kind == POINTS_RAYS)
+        bench_rays_degenerate(scene, &mesh, seed, out->count, out->rows);
+    else
+        good = bench_walk(&mesh, report->mean_edge, sqrt(square), seed, out->count, out->rows);
     ebpo_mesh_free(&mesh);
     return good ? EXIT_FINE : command_no_memory("bench");
 }
 
-static int generate(bench_points *out, const char *model, const remote_values *remote, bool path,
-                    uint64_t seed)
+static int fill(bench_points *out, ebpo_file *file, generator what, uint64_t seed)
+{
+    const ebpo_mesh_report *report = &ebpo_file_info(file)->report;
+    bench_scene scene;
+    memcpy(scene.low, report->min, sizeof scene.low);
+    memcpy(scene.high, report->max, sizeof scene.high);
+    switch (what) {
+    case PATH:
+    case DEGENERATE: return fill_from_mesh(out, file, &scene, seed);
+    case CAMERA: bench_rays_camera(&scene, seed, out->count, out->rows); break;
+    case SEGMENTS: bench_rays_segments(&scene, seed, out->count, out->rows); break;
+    default:
+        if (out->kind == POINTS_RAYS)
+            bench_rays_uniform(&scene, seed, out->count, out->rows);
+        else
+            fill_uniform(out, &scene, seed);
+    }
+    return EXIT_FINE;
+}
+
+static int generate(bench_points *out, const char *model, const remote_values *remote,
+                    generator what, uint64_t seed, double tmax)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
     int code = make_room(out, out->count);
     if (code == EXIT_FINE && remote_open(&file, model, remote, &error) != EBPO_OK)
         code = command_failed("bench", &error);
-    if (code == EXIT_FINE && path)
-        code = fill_path(out, file, seed);
-    else if (code == EXIT_FINE)
-        fill_uniform(out, ebpo_file_info(file), seed);
+    if (code == EXIT_FINE)
+        code = fill(out, file, what, seed);
+    if (code == EXIT_FINE && out->kind == POINTS_RAYS)
+        for (uint64_t i = 0; i < out->count; i++)
+            out->rows[7 * i + 6] = fmin(out->rows[7 * i + 6], tmax);
     ebpo_close(file);
     return code;
 }
@@ -108,21 +116,33 @@ static int read_all(bench_points *out, points *in, uint64_t most)
     return out->count ? EXIT_FINE : EXIT_FAILED;
 }
 
+static generator generator_of(const char *what)
+{
+    int i = 0;
+    while (i < NO_GENERATOR && strcmp(what, generators[i]) != 0)
+        i++;
+    return (generator)i;
+}
+
+bool bench_points_generated(const char *what) { return generator_of(what) != NO_GENERATOR; }
+
 int bench_points_make(bench_points *out, points_kind kind, const char *model,
                       const remote_values *remote, const char *what, bool raw, uint64_t count,
-                      uint64_t seed)
+                      uint64_t seed, double tmax)
 {
-    bool path = strcmp(what, "path") == 0;
+    generator by = generator_of(what);
     *out = (bench_points){ .kind = kind, .count = count ? count : USUAL_COUNT };
-    if (path && kind == POINTS_RAYS)
+    if (by == PATH && kind == POINTS_RAYS)
         return command_usage("bench",
                              "a path has points; for rays give --points uniform or a file");
-    if (path || strcmp(what, "uniform") == 0)
-        return generate(out, model, remote, path, seed);
+    if (by > PATH && by < NO_GENERATOR && kind != POINTS_RAYS)
+        return command_usage("bench", "--points %s makes rays; add --query ray", what);
+    if (by != NO_GENERATOR)
+        return generate(out, model, remote, by, seed, tmax);
     points in;
     out->count = 0;
     int code = EXIT_FAILED;
-    if (points_open(&in, "bench", what, kind, raw, INFINITY))
+    if (points_open(&in, "bench", what, kind, raw, tmax))
         code = read_all(out, &in, count ? count : UINT64_MAX);
     points_close(&in);
     return code;

@@ -13,13 +13,16 @@ typedef struct bench_points {
     uint64_t count;
 } bench_points;
 
-/* `what`: "uniform" (in the mesh's bounding box; rays with directions uniform over the sphere),
- * "path" (along the surface; points only), or a file, of which at most `count` are taken (0: all;
- * 100,000 of the others). Returns an exit code; what is wrong is said on stderr. bench_points_free
- * in any case. */
+/* `what`: "uniform" (in the mesh's bounding box), "path" (along the surface; points only),
+ * "camera", "segments" or "degenerate" (rays: bench_rays.h), or a file, of which at most `count`
+ * are taken (0: all; 100,000 of the others). `tmax`: of rays that tell none, and at most that of
+ * generated ones. Returns an exit code; what is wrong is said on stderr. bench_points_free in any
+ * case. */
 int bench_points_make(bench_points *out, points_kind kind, const char *model,
                       const remote_values *remote, const char *what, bool raw, uint64_t count,
-                      uint64_t seed);
+                      uint64_t seed, double tmax);
+/* Every file but the five words. */
+bool bench_points_generated(const char *what);
 void bench_points_free(bench_points *p);
 
 /* As little-endian doubles, 3 or 6 for each. */

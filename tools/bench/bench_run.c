@@ -45,13 +45,65 @@ uint64_t bench_clock_cost(void)
 
 /* --- questions --- */
 
-static ebpo_status ask_ray(const double *row, ebpo_context *context, ebpo_ray_hit *out,
-                           ebpo_error *error)
+static const ebpo_ray_hit nothing = { .t = INFINITY, .face = EBPO_NO_FACE };
+
+static ebpo_ray_hit answer_any(bool any) { return any ? (ebpo_ray_hit){ .t = 0 } : nothing; }
+
+static ebpo_ray_hit answer_all(const ebpo_ray_hit *hits, uint64_t count)
+{
+    return count ? (ebpo_ray_hit){ .t = (double)count, .face = hits[0].face } : nothing;
+}
+
+static ebpo_status ask_ray(bench_query query, const double *row, ebpo_context *context,
+                           ebpo_ray_hit *out, ebpo_error *error)
 {
     bool hit = false;
-    ebpo_status status = ebpo_ray_first(context, row, row + 3, row[6], out, &hit, error);
-    if (!hit)
-        *out = (ebpo_ray_hit){ .t = INFINITY, .face = EBPO_NO_FACE };
+    const ebpo_ray_hit *hits;
+    uint64_t count;
+    ebpo_status status;
+    if (query == BENCH_RAY_ALL) {
+        status = ebpo_ray_all(context, row, row + 3, row[6], &hits, &count, error);
+        *out = answer_all(hits, count);
+    } else if (query == BENCH_RAY_ANY) {
+        status = ebpo_ray_any(context, row, row + 3, row[6], &hit, error);
+        *out = answer_any(hit);
+    } else {
+        status = ebpo_ray_first(context, row, row + 3, row[6], out, &hit, error);
+        if (!hit)
+            *out = nothing;
+    }
+    return status;
+}
+
+static ebpo_status ask_any_many(const bench_job *job, ebpo_context *context,
+                                const ebpo_ray_options *how, ebpo_ray_hit *out, ebpo_error *error)
+{
+    bool *any = malloc(job->count ? job->count : 1);
+    if (!any)
+        return EBPO_E_MEMORY;
+    ebpo_status status =
+        ebpo_ray_any_many(context, (const void *)job->rows, job->count, how, any, error);
+    for (uint64_t i = 0; i < job->count && status == EBPO_OK; i++)
+        out[i] = answer_any(any[i]);
+    free(any);
+    return status;
+}
+
+static ebpo_status ask_many_rays(const bench_job *job, ebpo_context *context, ebpo_ray_hit *out,
+                                 ebpo_error *error)
+{
+    ebpo_ray_options how = EBPO_RAY_OPTIONS_INIT;
+    const void *rays = job->rows;
+    const ebpo_ray_hit *hits;
+    const uint64_t *begin;
+    how.threads = 1;
+    if (job->query == BENCH_RAY)
+        return ebpo_ray_first_many(context, rays, job->count, &how, out, error);
+    if (job->query == BENCH_RAY_ANY)
+        return ask_any_many(job, context, &how, out, error);
+    ebpo_status status = ebpo_ray_all_many(context, rays, job->count, &how, &hits, &begin, error);
+    for (uint64_t i = 0; i < job->count && status == EBPO_OK; i++)
+        out[i] = answer_all(hits + begin[i], begin[i + 1] - begin[i]);
     return status;
 }
 
@@ -65,7 +117,7 @@ static inline ebpo_status ask_into(const bench_job *job, ebpo_context *context, 
     case BENCH_DISTANCE:
         return ebpo_distance(context, row, &job->distance, (ebpo_distance_result *)answers + i,
                              error);
-    default: return ask_ray(row, context, (ebpo_ray_hit *)answers + i, error);
+    default: return ask_ray(job->query, row, context, (ebpo_ray_hit *)answers + i, error);
     }
 }
 
@@ -127,8 +179,7 @@ ebpo_status bench_batch(const bench_job *job, ebpo_context *context, void *answe
     else if (job->query == BENCH_DISTANCE)
         status = ebpo_distance_many(context, job->rows, job->count, &job->distance, answers, error);
     else
-        for (uint64_t i = 0; i < job->count && status == EBPO_OK; i++)
-            status = ask_into(job, context, i, answers, error);
+        status = ask_many_rays(job, context, answers, error);
     out->batch = (double)(tool_clock() - start) / (double)job->count;
     return status;
 }

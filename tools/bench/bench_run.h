@@ -6,9 +6,17 @@
 
 #include "cli/tool_clock.h"
 
-typedef enum bench_query { BENCH_INSIDE, BENCH_DISTANCE, BENCH_RAY } bench_query;
+/* Those from BENCH_RAY on are about rays: the first hit, any, all. */
+typedef enum bench_query {
+    BENCH_INSIDE,
+    BENCH_DISTANCE,
+    BENCH_RAY,
+    BENCH_RAY_ANY,
+    BENCH_RAY_ALL
+} bench_query;
 
-/* An answer to a ray: none has face EBPO_NO_FACE. */
+/* An answer to a ray: none has face EBPO_NO_FACE. For any hit, t and face are 0; for all, t is
+ * their number and the face the first one's. */
 typedef union bench_answer {
     ebpo_inside_result inside;
     ebpo_distance_result distance;
@@ -20,8 +28,8 @@ typedef struct bench_job {
     bench_query query;
     ebpo_inside_options inside;
     ebpo_distance_options distance;
-    const double *rows;
-    int width; /* doubles a row */
+    const double *rows; /* of rays: as ebpo_ray */
+    int width;          /* doubles a row */
     uint64_t count;
     double rate;   /* single questions a second; 0: as fast as they are answered */
     uint64_t *ns;  /* [count] */
@@ -44,8 +52,8 @@ EBPO_MUST_USE ebpo_status bench_ask(const bench_job *job, ebpo_context *context,
 /* Each query by itself, timed singly: all figures but `batch`. Sorts job->ns. */
 EBPO_MUST_USE ebpo_status bench_singly(const bench_job *job, ebpo_context *context,
                                        uint64_t clock_cost, bench_figures *out, ebpo_error *error);
-/* All at once through the functions for many points (rays: one after the other), into `answers`, of
- * the same room as job->answers. */
+/* All at once through the functions for many points or rays, on one thread, into `answers`, of the
+ * same room as job->answers. */
 EBPO_MUST_USE ebpo_status bench_batch(const bench_job *job, ebpo_context *context, void *answers,
                                       bench_figures *out, ebpo_error *error);
 

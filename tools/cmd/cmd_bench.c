@@ -24,7 +24,9 @@ typedef struct values {
     double rate;
 } values;
 
-static const char *const query_words[] = { "inside", "distance", "ray", NULL };
+static const char *const query_words[] = {
+    "inside", "distance", "ray", "ray-any", "ray-all", NULL
+};
 enum { REPEAT_MAX = 99 };
 /* What became of a question for a distance or a ray. Interval: level or deadline did not suffice.
  */
@@ -32,10 +34,12 @@ enum { NOTHING, FOUND, INTERVAL };
 
 static const arg_option options[] = {
     OPTION_WORD("query", 0, values, query, "QUERY", query_words,
-                "inside (the default), distance or ray"),
-    OPTION_TEXT("points", 0, values, points, "WHAT",
-                "uniform (the default): in the bounding box; path: a walk along the surface; or a "
-                "file of points or rays"),
+                "inside (the default), distance, ray (the first hit), ray-any or ray-all"),
+    OPTION_TEXT(
+        "points", 0, values, points, "WHAT",
+        "uniform (the default): in the bounding box; path: a walk along the surface; camera, "
+        "segments or degenerate: rays; or a file of points or rays"),
+    OPTION_REAL("tmax", 0, query_values, tmax, "T", 0, DBL_MAX, "as for 'ebpo ray'"),
     OPTION_FLAG("raw", 0, query_values, raw, "the file of points holds little-endian doubles"),
     OPTION_INT("count", 0, values, count, "N", 1, 1e9,
                "how many questions; default: 100000, or all of the file"),
@@ -92,14 +96,14 @@ static bool set_mode(values *v)
     const char *const *words = v->query == BENCH_INSIDE ? inside_modes : distance_modes;
     if (!v->mode)
         return true;
-    for (int i = 0; words[i] && v->query != BENCH_RAY; i++)
+    for (int i = 0; words[i] && v->query < BENCH_RAY; i++)
         if (strcmp(words[i], v->mode) == 0) {
             *(v->query == BENCH_INSIDE ? &v->q.inside_mode : &v->q.distance_mode) = i;
             return true;
         }
     fprintf(stderr, "ebpo bench: --mode: '%s' is not a mode of %s; 'ebpo %s --help' %s\n", v->mode,
             query_words[v->query], query_words[v->query],
-            v->query == BENCH_RAY ? "says that it has none" : "lists them");
+            v->query >= BENCH_RAY ? "says that it has none" : "lists them");
     return false;
 }
 
@@ -148,28 +152,26 @@ static double median_batch(const bench_figures *f, int count)
     return median_by_mean(by_batch, count).mean;
 }
 
-/* Every file but the two words. */
-static bool is_generated(const char *what)
-{
-    return strcmp(what, "uniform") == 0 || strcmp(what, "path") == 0;
-}
-
 /* Options without effect are refused, or figures would be taken for something that they are not. */
 static bool options_fit(const values *v)
 {
     char with[40];
     unsigned idle = QUERY_UNSIGNED | QUERY_MAX_DISTANCE | QUERY_NO_WARM;
-    if (v->query == BENCH_RAY)
+    if (v->query >= BENCH_RAY)
         idle |= QUERY_LEVEL | QUERY_DEADLINE | QUERY_PREFETCH;
     snprintf(with, sizeof with, "--query %s", query_words[v->query]);
-    if (v->q.raw && is_generated(v->points)) {
+    if (isfinite(v->q.tmax) && v->query < BENCH_RAY) {
+        command_usage("bench", "--tmax has no effect with %s; leave out one of them", with);
+        return false;
+    }
+    if (v->q.raw && bench_points_generated(v->points)) {
         fprintf(stderr,
                 "ebpo bench: --raw has no effect with --points %s; leave out one of them, or try "
                 "'ebpo bench --help'\n",
                 v->points);
         return false;
     }
-    if (v->seed >= 0 && !is_generated(v->points)) {
+    if (v->seed >= 0 && !bench_points_generated(v->points)) {
         fprintf(stderr,
                 "ebpo bench: --seed has no effect with --points %s; leave out one of them, or try "
                 "'ebpo bench --help'\n",
@@ -371,7 +373,7 @@ static void print_json(const values *v, const char *path, uint64_t count, const 
     json_object(&j, NULL);
     json_text(&j, "file", path);
     json_text(&j, "query", query_words[v->query]);
-    if (v->query == BENCH_RAY)
+    if (v->query >= BENCH_RAY)
         json_null(&j, "mode");
     else
         json_text(&j, "mode",
@@ -380,7 +382,7 @@ static void print_json(const values *v, const char *path, uint64_t count, const 
     json_int(&j, "level", v->q.level);
     json_text(&j, "points", v->points);
     json_uint(&j, "count", count);
-    if (is_generated(v->points))
+    if (bench_points_generated(v->points))
         json_int(&j, "seed", v->seed);
     else
         json_null(&j, "seed");
@@ -426,12 +428,12 @@ static int bench(bench_job *job, const values *v, const char *path,
 
 static int prepare(const values *v, const char *path, bench_points *p)
 {
-    points_kind kind = v->query == BENCH_RAY ? POINTS_RAYS : POINTS;
+    points_kind kind = v->query >= BENCH_RAY ? POINTS_RAYS : POINTS;
     *p = (bench_points){ .rows = NULL };
     if (!command_wants_hdf5("bench", path))
         return EXIT_FAILED;
     int code = bench_points_make(p, kind, path, &v->q.remote, v->points, v->q.raw,
-                                 (uint64_t)v->count, (uint64_t)v->seed);
+                                 (uint64_t)v->count, (uint64_t)v->seed, v->q.tmax);
     if (code == EXIT_FINE && v->save_points)
         code = bench_points_save(p, v->save_points);
     return code;

@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <cinttypes>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -20,6 +21,7 @@
 #include <numeric>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 namespace bench
@@ -35,13 +37,19 @@ struct settings {
     bool cold = false, warm = false;
 };
 
+// Where rays end.
+inline double tmax = INFINITY;
+
+// Nothing will be asked: the quality that Embree has by default, as a build that is done often.
+inline bool only_building = false;
+
 // For building; where the peer can use more than one. 0: all cores.
 inline unsigned threads = 1;
 
 // What is written to --answers: for inside one byte, 1 inside and 0 outside; for the others 16
 // bytes.
 struct hit {
-    double value; // distance, or the ray's parameter; infinity: none
+    double value; // distance, the ray's parameter, or for ray-all the number of hits
     int64_t face; // -1: none
 };
 
@@ -324,6 +332,8 @@ inline bool parse(int argc, char **argv, settings &s)
             s.count = strtoull(argv[++i], nullptr, 10);
         else if (word == "--threads" && i + 1 < argc)
             threads = (unsigned)strtoul(argv[++i], nullptr, 10);
+        else if (word == "--tmax" && i + 1 < argc)
+            tmax = strtod(argv[++i], nullptr);
         else if (word == "--answers" && i + 1 < argc)
             s.answers = argv[++i];
         else if (word.rfind("--", 0) == 0)
@@ -336,19 +346,33 @@ inline bool parse(int argc, char **argv, settings &s)
     if (words.size() != 3 || !s.count)
         return false;
     s.model = words[0], s.query = words[1], s.points = words[2];
-    return s.query == "inside" || s.query == "distance" || s.query == "ray" || s.query == "build";
+    for (const char *known : { "inside", "distance", "ray", "ray-any", "ray-all", "build" })
+        if (s.query == known)
+            return true;
+    return false;
 }
 
-template <class Inside, class Distance, class Ray> int main(int argc, char **argv)
+// void: the peer is not asked that.
+template <class Peer> void run_if_any(const settings &s)
+{
+    if constexpr (std::is_void_v<Peer>)
+        throw std::runtime_error("this peer does not answer " + s.query);
+    else
+        run<Peer>(s);
+}
+
+template <class Inside, class Distance, class Ray, class Any = void, class All = void>
+int main(int argc, char **argv)
 {
     settings s;
     if (!parse(argc, argv, s)) {
         fprintf(
             stderr,
-            "usage: %s MODEL.ply inside|distance|ray POINTS.raw [--count N] [--warm] [--cold] "
-            "[--answers FILE]\n"
+            "usage: %s MODEL.ply inside|distance|ray|ray-any|ray-all POINTS.raw [--count N] "
+            "[--warm] [--cold] [--tmax T] [--answers FILE]\n"
             "       %s MODEL.ply build [--threads N] [--cold]\n"
             "POINTS.raw: little-endian doubles, x y z for each point; rays: origin and direction.\n"
+            "--tmax T  rays end at origin + T direction\n"
             "--warm  distance: search no farther than the last answer allows\n"
             "--cold  ask the system to drop MODEL.ply from its cache first\n"
             "build    only load and build what rays need; --threads 0: on all cores, where the "
@@ -361,9 +385,14 @@ template <class Inside, class Distance, class Ray> int main(int argc, char **arg
             run<Inside>(s);
         else if (s.query == "distance")
             run<Distance>(s);
-        else if (s.query == "build")
+        else if (s.query == "ray-any")
+            run_if_any<Any>(s);
+        else if (s.query == "ray-all")
+            run_if_any<All>(s);
+        else if (s.query == "build") {
+            only_building = true;
             run_build<Ray>(s);
-        else
+        } else
             run<Ray>(s);
     } catch (const std::exception &error) {
         fprintf(stderr, "%s: %s\n", argv[0], error.what());

@@ -1,7 +1,8 @@
 // Embree 3 as a peer: one thread (building: more, if told so), single precision.
 //
 // inside: parity of all hits of a ray in a fixed oblique direction, robust scene. distance:
-// rtcPointQuery with a shrinking radius. ray: first hit.
+// rtcPointQuery with a shrinking radius. ray, ray-any, ray-all: the first hit, whether there is
+// any, and all by a filter function, robust scene of high quality.
 #include <embree3/rtcore.h>
 
 #include <cmath>
@@ -216,15 +217,39 @@ class distance
 
 // ---- rays ----
 
-class first_hit
+RTCRay ray_of(const double *from)
+{
+    RTCRay ray = {};
+    ray.org_x = (float)from[0], ray.org_y = (float)from[1], ray.org_z = (float)from[2];
+    ray.dir_x = (float)from[3], ray.dir_y = (float)from[4], ray.dir_z = (float)from[5];
+    ray.tfar = (float)bench::tmax;
+    ray.mask = ~0u;
+    return ray;
+}
+
+// High quality is what Embree's authors advise where a scene is built once.
+class ray_peer
 {
   public:
     static constexpr const char *name = "embree";
     static constexpr int doubles = 6;
     using answer_type = bench::hit;
 
-    explicit first_hit(bool) : tree(RTC_SCENE_FLAG_ROBUST, RTC_BUILD_QUALITY_MEDIUM) {}
+    explicit ray_peer(bool)
+        : tree(RTC_SCENE_FLAG_ROBUST,
+               bench::only_building ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH)
+    {
+    }
     void load(const char *path) { tree.load(path); }
+
+  protected:
+    scene tree;
+};
+
+class first_hit : public ray_peer
+{
+  public:
+    using ray_peer::ray_peer;
     void build() { tree.build(nullptr); }
 
     bench::hit answer(const double *ray)
@@ -232,19 +257,77 @@ class first_hit
         RTCIntersectContext context;
         rtcInitIntersectContext(&context);
         RTCRayHit r = {};
-        r.ray.org_x = (float)ray[0], r.ray.org_y = (float)ray[1], r.ray.org_z = (float)ray[2];
-        r.ray.dir_x = (float)ray[3], r.ray.dir_y = (float)ray[4], r.ray.dir_z = (float)ray[5];
-        r.ray.tfar = INFINITY;
-        r.ray.mask = ~0u;
+        r.ray = ray_of(ray);
         r.hit.geomID = RTC_INVALID_GEOMETRY_ID;
         rtcIntersect1(tree.handle, &context, &r);
         return { r.ray.tfar, r.hit.geomID == RTC_INVALID_GEOMETRY_ID ? -1 : (int64_t)r.hit.primID };
     }
+};
+
+class any_hit : public ray_peer
+{
+  public:
+    using ray_peer::ray_peer;
+    void build() { tree.build(nullptr); }
+
+    bench::hit answer(const double *from)
+    {
+        RTCIntersectContext context;
+        rtcInitIntersectContext(&context);
+        RTCRay ray = ray_of(from);
+        rtcOccluded1(tree.handle, &context, &ray);
+        return ray.tfar < 0 ? bench::hit{ 0, 0 } : bench::hit{ INFINITY, -1 };
+    }
+};
+
+struct gathering_context {
+    RTCIntersectContext base; // first: Embree passes its address on
+    struct met {
+        float t;
+        uint32_t face;
+    };
+    std::vector<met> *list;
+};
+
+void gather_and_go_on(const RTCFilterFunctionNArguments *arguments)
+{
+    const RTCRay *ray = (const RTCRay *)arguments->ray;
+    const RTCHit *hit = (const RTCHit *)arguments->hit;
+    ((gathering_context *)arguments->context)->list->push_back({ ray->tfar, hit->primID });
+    arguments->valid[0] = 0;
+}
+
+// All hits in their order. Splits in space put a face into several leaves: each is told once.
+class all_hits : public ray_peer
+{
+  public:
+    using ray_peer::ray_peer;
+    void build() { tree.build(gather_and_go_on); }
+
+    bench::hit answer(const double *from)
+    {
+        gathering_context context;
+        rtcInitIntersectContext(&context.base);
+        list.clear();
+        context.list = &list;
+        RTCRay ray = ray_of(from);
+        rtcOccluded1(tree.handle, &context.base, &ray);
+        std::sort(list.begin(), list.end(), [](const auto &a, const auto &b) {
+            return a.t != b.t ? a.t < b.t : a.face < b.face;
+        });
+        auto end = std::unique(list.begin(), list.end(),
+                               [](const auto &a, const auto &b) { return a.face == b.face; });
+        double count = (double)(end - list.begin());
+        return count > 0 ? bench::hit{ count, list[0].face } : bench::hit{ INFINITY, -1 };
+    }
 
   private:
-    scene tree;
+    std::vector<gathering_context::met> list;
 };
 
 } // namespace
 
-int main(int argc, char **argv) { return bench::main<inside, distance, first_hit>(argc, argv); }
+int main(int argc, char **argv)
+{
+    return bench::main<inside, distance, first_hit, any_hit, all_hits>(argc, argv);
+}
