@@ -31,20 +31,14 @@ static int by_subtree(const void *a, const void *b)
 /* Which arrays come next. */
 typedef struct choice {
     int first_level, last_level; /* of the arrays of levels */
-    enum { WHOLE, TOP_INDEXES, NODES, PLANES, NODES_AND_PLANES, OTHERS, MESH, MAPS, TABLE } kind;
+    enum { WHOLE, TOP_INDEXES, NODES, LISTS, MESH, MAPS, TABLE } kind;
 } choice;
 
-/* What all who come to a node read, what envelopes take, and the lists of faces. */
-static bool is_of_node(ebpo_array_id id)
+/* Else what nodes are. */
+static bool is_of_faces(ebpo_array_id id)
 {
-    return id == EBPO_A_TYPES || id == EBPO_A_LEAF_WINDING || id == EBPO_A_BLACK_WINDING ||
-           id == EBPO_A_WHITE_WINDING;
-}
-
-static bool is_planes(ebpo_array_id id)
-{
-    return id == EBPO_A_PLANE_COUNTS || id == EBPO_A_PLANES || id == EBPO_A_LEAF_PLANE_COUNTS ||
-           id == EBPO_A_LEAF_PLANES;
+    return id == EBPO_A_LEAF_SKIP || id == EBPO_A_LEAF_NEW || id == EBPO_A_LEAF_REF_COUNT ||
+           id == EBPO_A_LEAF_REFS;
 }
 
 static bool chosen(const choice *c, const ebpo_array_out *a)
@@ -56,10 +50,8 @@ static bool chosen(const choice *c, const ebpo_array_out *a)
     case WHOLE: return here;
     case TOP_INDEXES:
         return (here && index) || a->id == EBPO_A_SUBTREE_INDEX || a->id == EBPO_A_FACES_INDEX;
-    case NODES: return here && is_of_node(a->id);
-    case PLANES: return here && is_planes(a->id);
-    case NODES_AND_PLANES: return here && (is_of_node(a->id) || is_planes(a->id));
-    case OTHERS: return here && !index && !is_of_node(a->id) && !is_planes(a->id);
+    case NODES: return here && !index && !is_of_faces(a->id);
+    case LISTS: return here && is_of_faces(a->id);
     /* questions tell the source's faces, and read these numbers with the faces */
     case MESH:
         return a->id == EBPO_A_VERTICES || a->id == EBPO_A_FACES || a->id == EBPO_A_FACE_SOURCE;
@@ -101,12 +93,10 @@ static void order_subtrees(ordering *o)
     o->out->top = o->out->count;
     add(o, &(choice){ 0, 0, TABLE });
     for (int level = whole + 1; level < deep; level++)
-        add_by_subtree(o, &(choice){ level, level, NODES_AND_PLANES });
-    add_by_subtree(o, &(choice){ whole + 1, deep - 1, OTHERS });
-    for (int level = deep; level <= last; level++)
-        add_by_subtree(o, &(choice){ level, level, PLANES });
+        add_by_subtree(o, &(choice){ level, level, NODES });
+    add_by_subtree(o, &(choice){ whole + 1, deep - 1, LISTS });
     add_by_subtree(o, &(choice){ deep, last, NODES });
-    add_by_subtree(o, &(choice){ deep, last, OTHERS });
+    add_by_subtree(o, &(choice){ deep, last, LISTS });
     add_by_subtree(o, &(choice){ 0, 0, MESH });
     add_by_subtree(o, &(choice){ 0, 0, MAPS });
 }

@@ -7,7 +7,8 @@ enum {
     LEAVES_OF_DEEP = 64, /* a deep level has a leaf for each so many faces */
     CHUNK_FACES = 16384, /* that a chunk of a lower level goes with */
     CHUNK_LEAST = 256,   /* bytes */
-    MAP_ROWS = 4096,
+    CHUNK_MOST = 32768,
+    MAP_ROWS = 2048,
     FACES_INDEX_ROWS = 512,
     OUTER_ROWS = 4096
 };
@@ -56,6 +57,8 @@ static uint64_t wanted_rows(const ebpo_info *info, ebpo_array_id id, int level, 
     uint64_t found = rows_for_faces(info, rows);
     while (found * row_bytes < CHUNK_LEAST)
         found *= 2;
+    while (found * row_bytes > CHUNK_MOST)
+        found /= 2;
     return found;
 }
 

@@ -7,6 +7,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/arrays.h"
+#include "base/hash.h"
 #include "codec/coding.h"
 #include "container/chunks.h"
 
@@ -14,7 +15,7 @@
  * part of the budget. */
 enum { IDLE_MAX = 4, CHUNK_BITS = 48, AROUND = 4 };
 /* Announced for later: at most so much, and a share of what a limit leaves. */
-enum { AHEAD_MOST = 2 << 20, AHEAD_SHARE = 4 };
+enum { AHEAD_MOST = 4 << 20, AHEAD_SHARE = 4 };
 
 struct ebpo_chunk_scratch {
     ebpo_chunk_scratch *next;
@@ -275,13 +276,38 @@ bool ebpo_chunks_announced(const ebpo_chunks *c, const ebpo_chunk_keys *keys)
     return true;
 }
 
+static void clear_slots(ebpo_chunk_keys *keys, unsigned slots)
+{
+    keys->mask = slots - 1;
+    memset(keys->slot, 0, slots * sizeof *keys->slot);
+}
+
+void ebpo_chunk_keys_begin(ebpo_chunk_keys *keys)
+{
+    keys->count = 0;
+    clear_slots(keys, 16);
+}
+
+static uint64_t slot_of(const ebpo_chunk_keys *keys, uint64_t key)
+{
+    uint64_t at;
+    EBPO_HASH_FIND(at, ebpo_hash_number(key), keys->mask,
+                   !keys->slot[at] || keys->key[keys->slot[at] - 1] == key);
+    return at;
+}
+
 static void add_key(ebpo_chunk_keys *keys, uint64_t key)
 {
-    for (unsigned k = 0; k < keys->count; k++)
-        if (keys->key[k] == key)
-            return;
-    if (keys->count < EBPO_CHUNK_KEYS)
-        keys->key[keys->count++] = key;
+    uint64_t at = slot_of(keys, key);
+    if (keys->slot[at] || keys->count == EBPO_CHUNK_KEYS)
+        return;
+    keys->key[keys->count++] = key;
+    keys->slot[at] = (uint16_t)keys->count;
+    if (2 * keys->count <= keys->mask || keys->count == EBPO_CHUNK_KEYS)
+        return;
+    clear_slots(keys, 2 * (keys->mask + 1));
+    for (unsigned i = 0; i < keys->count; i++)
+        keys->slot[slot_of(keys, keys->key[i])] = (uint16_t)(i + 1);
 }
 
 bool ebpo_chunks_missing(ebpo_chunks *c, ebpo_array_id id, int level, uint64_t row, uint64_t rows,
@@ -305,6 +331,15 @@ bool ebpo_chunks_missing(ebpo_chunks *c, ebpo_array_id id, int level, uint64_t r
 
 void ebpo_chunks_collect(ebpo_chunks *c, ebpo_chunk_keys *keys) { c->collecting = keys; }
 
+/* Rows of the table, and what leads to the subtrees: only they tell what comes after them. */
+static bool tells_more(const ebpo_chunks *c, uint64_t key)
+{
+    const ebpo_array_in *a = array_of(c, key);
+    return a->id >= EBPO_A_SUBTREE_INDEX ||
+           ((a->id == EBPO_A_TYPES || a->id == EBPO_A_TYPES_INDEX) &&
+            a->level <= c->file->info.subtree_level);
+}
+
 ebpo_status ebpo_chunks_fetch(ebpo_chunks *c, const ebpo_chunk_keys *keys, unsigned now,
                               ebpo_error *error)
 {
@@ -312,9 +347,7 @@ ebpo_status ebpo_chunks_fetch(ebpo_chunks *c, const ebpo_chunk_keys *keys, unsig
     ebpo_chunks_announce(c, keys->key, now, keys->count);
     for (unsigned i = 0; i < keys->count && status == EBPO_OK; i++) {
         void *item;
-        /* rows of the table are awaited too: only they tell what comes after them */
-        bool table = array_of(c, keys->key[i])->id >= EBPO_A_SUBTREE_INDEX;
-        if (i >= now && !(table && is_ahead(c, keys->key[i])))
+        if (i >= now && !(tells_more(c, keys->key[i]) && is_ahead(c, keys->key[i])))
             continue;
         status = ebpo_cache_get(c->cache, keys->key[i], &item, NULL, error);
         if (status == EBPO_OK)

@@ -84,12 +84,14 @@ void ebpo_chunks_expect(ebpo_chunks *chunks, ebpo_expected *expected, ebpo_array
                         uint64_t row, uint64_t rows);
 
 /* Chunks, each once. What does not fit is left out: then it is read without having been announced.
- */
+ * Begin with ebpo_chunk_keys_begin: what is not in use is never cleared. */
 enum { EBPO_CHUNK_KEYS = 8192 };
 typedef struct ebpo_chunk_keys {
-    unsigned count;
+    unsigned count, mask; /* mask + 1 slots */
     uint64_t key[EBPO_CHUNK_KEYS];
+    uint16_t slot[2 * EBPO_CHUNK_KEYS]; /* number in `key` + 1; 0: free */
 } ebpo_chunk_keys;
+void ebpo_chunk_keys_begin(ebpo_chunk_keys *keys);
 
 /* Adds the chunks of rows [row, row + rows), as far as the array has them, that are not in memory;
  * true if there are any. */

@@ -266,7 +266,8 @@ static bool missing(ebpo_chunks *chunks, const ebpo_group_number *number, unsign
 
 bool ebpo_group_is_far(ebpo_chunks *chunks, const ebpo_group_number *number, unsigned wanted)
 {
-    ebpo_chunk_keys keys = { .count = 0 };
+    ebpo_chunk_keys keys;
+    ebpo_chunk_keys_begin(&keys);
     return ebpo_input_expects(&chunks->file->in) && missing(chunks, number, wanted, &keys);
 }
 
@@ -279,7 +280,8 @@ ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_number *group
     };
     ebpo_status status = EBPO_OK;
     for (int stage = 0; stage < STAGES && status == EBPO_OK; stage++) {
-        ebpo_chunk_keys keys = { .count = 0 };
+        ebpo_chunk_keys keys;
+        ebpo_chunk_keys_begin(&keys);
         if (!missing(chunks, &groups[0], wanted, &keys))
             break;
         unsigned own = keys.count;

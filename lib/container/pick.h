@@ -20,4 +20,11 @@ EBPO_MUST_USE ebpo_status ebpo_pick_rows(ebpo_chunks *chunks, ebpo_array_id id,
                                          const uint32_t *rows, uint64_t count, unsigned threads,
                                          void *out, ebpo_error *error);
 
+/* Announces what picking these faces takes (parts: mesh, maps), and the vertices that come first
+ * with the chunks that hold them: most that the faces use. */
+void ebpo_faces_expect(ebpo_chunks *chunks, const uint32_t *faces, uint64_t count, uint32_t parts);
+/* The same of vertices. */
+void ebpo_vertices_expect(ebpo_chunks *chunks, const uint32_t *vertices, uint64_t count,
+                          uint32_t parts);
+
 #endif

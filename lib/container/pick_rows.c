@@ -8,6 +8,64 @@
 #include "container/pick.h"
 #include "container/chunks.h"
 
+/* --- announcing --- */
+
+/* Which chunks of the array these rows lie in; NULL: not known. The caller frees it. */
+static bool *chunks_of(const ebpo_array_in *array, const uint32_t *rows, uint64_t count)
+{
+    bool *has = ebpo_alloc_zero(ebpo_h5_chunk_count(&array->shape), sizeof *has);
+    for (uint64_t i = 0; has && i < count; i++)
+        if (rows[i] < array->shape.rows)
+            has[rows[i] / array->shape.chunk_rows] = true;
+    return has;
+}
+
+static void expect_vertices(ebpo_chunks *chunks, ebpo_expected *e, uint64_t row, uint64_t rows,
+                            uint32_t parts)
+{
+    ebpo_chunks_expect(chunks, e, EBPO_A_VERTICES, 0, row, rows);
+    if (parts & EBPO_PART_MAPS)
+        ebpo_chunks_expect(chunks, e, EBPO_A_VERTEX_SOURCE, 0, row, rows);
+}
+
+void ebpo_faces_expect(ebpo_chunks *chunks, const uint32_t *faces, uint64_t count, uint32_t parts)
+{
+    const ebpo_array_in *array = ebpo_reader_array(chunks->file, EBPO_A_FACES, 0);
+    uint64_t number = ebpo_h5_chunk_count(&array->shape), rows = array->shape.chunk_rows;
+    ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
+    bool *has = ebpo_input_expects(&chunks->file->in) ? chunks_of(array, faces, count) : NULL;
+    for (uint64_t i = 0; has && i < number; i++) {
+        uint64_t first = chunks->seen ? chunks->seen[i] : 0,
+                 end = chunks->seen && i + 1 < number ? chunks->seen[i + 1]
+                                                      : chunks->file->info.vertex_count;
+        if (!has[i])
+            continue;
+        ebpo_chunks_expect(chunks, &e, EBPO_A_FACES, 0, i * rows, rows);
+        if (parts & EBPO_PART_MAPS)
+            ebpo_chunks_expect(chunks, &e, EBPO_A_FACE_SOURCE, 0, i * rows, rows);
+        if (first < end)
+            expect_vertices(chunks, &e, first, end - first, parts);
+    }
+    ebpo_expect_all(&e);
+    free(has);
+}
+
+void ebpo_vertices_expect(ebpo_chunks *chunks, const uint32_t *vertices, uint64_t count,
+                          uint32_t parts)
+{
+    const ebpo_array_in *array = ebpo_reader_array(chunks->file, EBPO_A_VERTICES, 0);
+    uint64_t rows = array->shape.chunk_rows;
+    ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
+    bool *has = ebpo_input_expects(&chunks->file->in) ? chunks_of(array, vertices, count) : NULL;
+    for (uint64_t i = 0; has && i < ebpo_h5_chunk_count(&array->shape); i++)
+        if (has[i])
+            expect_vertices(chunks, &e, i * rows, rows, parts);
+    ebpo_expect_all(&e);
+    free(has);
+}
+
+/* --- reading --- */
+
 typedef struct gathering {
     ebpo_chunks *chunks;
     const ebpo_array_in *array;

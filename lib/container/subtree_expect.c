@@ -105,15 +105,20 @@ void ebpo_subtrees_expect(ebpo_chunks *chunks, ebpo_expected *expected, uint64_t
                           uint64_t count, uint32_t needs, int last_level, bool faces)
 {
     const ebpo_info *info = &chunks->file->info;
+    bool mesh = faces && info->parts & EBPO_PART_MESH, alone = count == 1; /* then one row is all */
     ebpo_subtree_row *row = ebpo_alloc(3, sizeof *row);
-    telling t = { chunks, expected, &row[0], &row[1], needs, faces ? EBPO_LEVELS_MAX : last_level };
+    telling t = { chunks,  expected,
+                  &row[0], alone ? &row[0] : &row[1],
+                  needs,   faces ? EBPO_LEVELS_MAX : last_level };
     if (row && count && ebpo_input_expects(&chunks->file->in) &&
         ebpo_subtree_table_row(chunks, first, &row[0], NULL) == EBPO_OK &&
-        ebpo_subtree_table_row(chunks, first + count - 1, &row[1], NULL) == EBPO_OK) {
+        (alone || ebpo_subtree_table_row(chunks, first + count - 1, &row[1], NULL) == EBPO_OK)) {
         tell_nodes(&t);
-        if (faces && info->parts & EBPO_PART_MESH)
+        if (mesh)
             tell_own_faces(&t);
-        for (uint64_t i = 0; i < count && faces && info->parts & EBPO_PART_MESH; i++)
+        if (mesh && alone)
+            tell_outer(&t, &row[0]);
+        for (uint64_t i = 0; i < count && mesh && !alone; i++)
             if (ebpo_subtree_table_row(chunks, first + i, &row[2], NULL) == EBPO_OK)
                 tell_outer(&t, &row[2]);
     }

@@ -363,7 +363,7 @@ static void cancel_queue(ebpo_transfers *t)
 /* Of large requests fewer: together they would only share the line, and the first one come last. */
 static unsigned slots_for(const ebpo_transfers *t, const ebpo_request *r)
 {
-    enum { LARGE_BYTES = 256 << 10, LARGE_AT_A_TIME = 6 };
+    enum { LARGE_BYTES = 1 << 20, LARGE_AT_A_TIME = 6 };
     return r->size > LARGE_BYTES && t->slot_count > LARGE_AT_A_TIME ? LARGE_AT_A_TIME
                                                                     : t->slot_count;
 }

@@ -64,50 +64,91 @@ static uint64_t subtree_of(const fetching *f, const ebpo_view_group *group)
     return ebpo_partial_children(f->partial, node);
 }
 
-enum { SUBTREES_MOST = EBPO_FRONTIER_BLOCKS, WITH_FACES = 64 };
+enum { SUBTREES_MOST = 4096, WITH_FACES = 64 };
 
 /* A subtree that the view goes into, by its number and its root. */
 typedef struct entered {
     uint64_t number, octcode;
 } entered;
 
-/* In which subtrees these groups stand, each once. */
-static unsigned subtrees_of(const fetching *f, const ebpo_view_group *groups, unsigned count,
-                            entered list[SUBTREES_MOST])
+typedef struct entering {
+    unsigned count;
+    entered list[SUBTREES_MOST];
+} entering;
+
+/* In which subtrees these groups stand, each once; not what waits at a root. */
+static void enter_groups(const fetching *f, const ebpo_view_group *groups, unsigned count,
+                         entering *e)
 {
     int level = f->chunks->file->info.subtree_level;
-    unsigned found = 0;
     for (unsigned i = 0; i < count; i++) {
-        if (!below_subtrees(f, &groups[i]))
+        if (!below_subtrees(f, &groups[i]) || (!f->faces && groups[i].number.level == level + 1))
             continue;
         uint64_t root = groups[i].parent >> 3 * (ebpo_octcode_level(groups[i].parent) - level);
         unsigned k = 0;
-        while (k < found && list[k].octcode != root)
+        while (k < e->count && e->list[k].octcode != root)
             k++;
-        if (k == found)
-            list[found++] = (entered){ subtree_of(f, &groups[i]), root };
+        if (k == e->count)
+            e->list[e->count++] = (entered){ subtree_of(f, &groups[i]), root };
     }
-    return found;
+}
+
+/* The subtrees that the view will come to from a node above them: the types of the levels in
+ * between are in memory, or else are noted as missing. */
+static void enter_below(const fetching *f, const ebpo_view_group *children, entering *e)
+{
+    int level = children->number.level;
+    ebpo_group read;
+    if (ebpo_group_read(f->chunks, level, children->number.group, 0, &read, NULL) != EBPO_OK)
+        return;
+    for (unsigned octant = 0; octant < 8 && e->count < SUBTREES_MOST; octant++) {
+        uint64_t octcode = ebpo_octcode_child(children->parent, octant),
+                 rank = read.rank[EBPO_GRAY] + ebpo_group_count(read.types, EBPO_GRAY, octant);
+        if (ebpo_group_type(read.types, octant) != EBPO_GRAY ||
+            f->depth->level(f->depth->user, octcode) <= level)
+            continue;
+        if (level == f->chunks->file->info.subtree_level)
+            e->list[e->count++] = (entered){ rank, octcode };
+        else
+            enter_below(f, &(ebpo_view_group){ { level + 1, rank }, octcode }, e);
+    }
+}
+
+/* What waits at the subtrees' roots and above. */
+static void enter_frontier(const fetching *f, entering *e)
+{
+    int level = f->chunks->file->info.subtree_level;
+    for (uint64_t i = 0; i < f->frontier->count && e->count < SUBTREES_MOST; i++) {
+        const ebpo_waiting *w = &f->frontier->at[i];
+        ebpo_view_group children = ebpo_view_children(w);
+        if (w->turn == EBPO_TURN_SEEN && children.number.level <= level)
+            enter_below(f, &children, e);
+        else if (w->turn == EBPO_TURN_SEEN && children.number.level == level + 1)
+            e->list[e->count++] = (entered){ w->below, w->octcode };
+    }
 }
 
 /* Of the subtrees of these groups, all that the view will come to. Faces: not where it goes through
  * so many that it comes to the end of none soon; then what the next groups take is enough. */
 static bool try_subtrees(const fetching *f, const ebpo_view_group *groups, unsigned count)
 {
-    entered list[SUBTREES_MOST];
+    entering e;
     bool planes = f->wanted & EBPO_GROUP_PLANES, windings = f->wanted & EBPO_GROUP_WINDINGS;
     uint32_t needs = EBPO_NEEDS_ALWAYS | (f->faces ? EBPO_NEEDS_MESH : 0) |
                      (windings ? EBPO_NEEDS_SOLID : 0) |
                      (planes ? EBPO_NEEDS_PLANES | EBPO_NEEDS_LEAF_PLANES : 0);
-    unsigned subtrees = subtrees_of(f, groups, count, list);
-    if (f->faces && subtrees > WITH_FACES)
+    e.count = 0;
+    enter_groups(f, groups, count, &e);
+    if (!f->faces)
+        enter_frontier(f, &e);
+    if (f->faces && e.count > WITH_FACES)
         return false;
-    for (unsigned i = 0; i < subtrees; i++) {
+    for (unsigned i = 0; i < e.count; i++) {
         ebpo_expected none = EBPO_EXPECTED_INIT(f->chunks->file);
-        ebpo_subtrees_expect(f->chunks, &none, list[i].number, 1, needs,
-                             f->depth->level(f->depth->user, list[i].octcode), f->faces);
+        ebpo_subtrees_expect(f->chunks, &none, e.list[i].number, 1, needs,
+                             f->depth->level(f->depth->user, e.list[i].octcode), f->faces);
     }
-    return subtrees > 0;
+    return e.count > 0;
 }
 
 /* --- fetching --- */
@@ -119,7 +160,7 @@ static unsigned collect(const fetching *f, const ebpo_view_group *group, ebpo_ch
 {
     enum { FACES_BLOCK = 64, TRIED = 64 }; /* trying is work */
     ebpo_view_group groups[EBPO_FRONTIER_BLOCKS];
-    keys->count = 0;
+    ebpo_chunk_keys_begin(keys);
     ebpo_chunks_collect(f->chunks, keys);
     try_group(f, group);
     unsigned own = keys->count;
@@ -156,6 +197,8 @@ static ebpo_status fetch_nodes(const fetching *f, const ebpo_view_group *group, 
     ebpo_group_number numbers[EBPO_FRONTIER_BLOCKS];
     if (!ebpo_group_is_far(f->chunks, &group->number, f->wanted))
         return EBPO_OK;
+    if (f->chunks->limit == UINT64_MAX)
+        ebpo_expect_top(f->chunks->file); /* with it what the subtrees ask for first */
     unsigned count = coming(f, group, EBPO_GROUP_BLOCK, groups);
     for (unsigned i = 0; i < count; i++)
         numbers[i] = groups[i].number;

@@ -165,7 +165,8 @@ static ebpo_status read_now(ebpo_view_stream *s, const ebpo_view_group *group, u
 /* Of a file far away, from memory alone; false: there is more to it. */
 static bool read_at_once(ebpo_view_stream *s, const ebpo_view_group *group, unsigned wanted)
 {
-    ebpo_chunk_keys missing = { .count = 0 };
+    ebpo_chunk_keys missing;
+    ebpo_chunk_keys_begin(&missing);
     ebpo_chunks_collect(s->chunks, &missing);
     ebpo_status status = read_now(s, group, wanted, NULL);
     ebpo_chunks_collect(s->chunks, NULL);

@@ -130,6 +130,7 @@ static ebpo_status take_vertices(ebpo_cutting *c)
     if (status == EBPO_OK) {
         size_t size = c->from->double_coordinates ? 3 * sizeof(double) : 3 * sizeof(float);
         void *xyz = ebpo_alloc(v.count, size);
+        ebpo_vertices_expect(c->chunks, v.old, v.count, c->parts);
         out->info.vertex_count = out->mesh.vertex_count = v.count;
         out->mesh.xyz32 = c->from->double_coordinates ? NULL : xyz;
         out->mesh.xyz64 = c->from->double_coordinates ? xyz : NULL;
@@ -152,6 +153,7 @@ static ebpo_status take_faces(ebpo_cutting *c, const numbering *n)
 {
     ebpo_tree *out = c->out;
     out->info.face_count = out->mesh.face_count = n->count;
+    ebpo_faces_expect(c->chunks, n->old, n->count, c->parts);
     out->mesh.faces = ebpo_alloc(n->count, 3 * sizeof *out->mesh.faces);
     ebpo_status status = out->mesh.faces
                              ? ebpo_pick_rows(c->chunks, EBPO_A_FACES, n->old, n->count,

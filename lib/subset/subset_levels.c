@@ -47,15 +47,13 @@ static bool may_go_on(const ebpo_cutting *c, int level)
 
 /* --- runs of groups that are wanted --- */
 
-/* Of a file with subtrees: where the parents are their roots, all that is below can be announced.
- * Faces as well, unless there are so many that they would push out what is read before them. */
+/* Of a file with subtrees: where the parents are their roots, all nodes below can be announced, and
+ * lists of faces. Which faces: these tell. */
 static void expect_subtrees(const descent *d)
 {
-    enum { WITH_FACES = 256 };
     const ebpo_cutting *c = d->c;
     ebpo_expected e = EBPO_EXPECTED_INIT(c->file);
     uint64_t count = 0, *roots = ebpo_alloc(d->parent_count, sizeof *roots);
-    bool deep = c->last_level == c->from->level_count - 1;
     uint32_t needs = c->parts | EBPO_NEEDS_ALWAYS | EBPO_NEEDS_SOLID;
     for (uint64_t i = 0; roots && i < d->parent_count; i++)
         if (d->parent[i].group != NOTHING)
@@ -63,8 +61,7 @@ static void expect_subtrees(const descent *d)
     if (count)
         ebpo_subtree_table_expect(c->chunks, roots, count);
     for (uint64_t i = 0; i < count; i++)
-        ebpo_subtrees_expect(c->chunks, &e, roots[i], 1, needs, c->last_level,
-                             deep && count <= WITH_FACES && c->parts & EBPO_PART_MESH);
+        ebpo_subtrees_expect(c->chunks, &e, roots[i], 1, needs, c->last_level, false);
     ebpo_expect_all(&e);
     free(roots);
 }

@@ -281,8 +281,6 @@ static unsigned step_of(const ebpo_info *info, const placed *p)
     while (deep < info->level_count && info->level[deep].leaf_count < info->face_count / 64)
         deep++;
     bool of_level = p->id < EBPO_LEVEL_ARRAYS, middle = p->level < deep,
-         planes = p->id == EBPO_A_PLANES || p->id == EBPO_A_PLANE_COUNTS ||
-                  p->id == EBPO_A_LEAF_PLANES || p->id == EBPO_A_LEAF_PLANE_COUNTS,
          list = p->id == EBPO_A_LEAF_SKIP || p->id == EBPO_A_LEAF_NEW ||
                 p->id == EBPO_A_LEAF_REF_COUNT || p->id == EBPO_A_LEAF_REFS;
     if (of_level && p->level <= whole)
@@ -295,8 +293,8 @@ static unsigned step_of(const ebpo_info *info, const placed *p)
     if (of_level && middle)
         return list ? 200 : 100 + (unsigned)p->level;
     if (of_level)
-        return planes ? 300 + (unsigned)p->level : list ? 500 : 400;
-    return p->id == EBPO_A_PLACES ? 800 : p->id == EBPO_A_VERTEX_SOURCE ? 700 : 600;
+        return list ? 400 : 300;
+    return p->id == EBPO_A_PLACES ? 700 : p->id == EBPO_A_VERTEX_SOURCE ? 600 : 500;
 }
 
 static unsigned column_of(const ebpo_info *info, const placed *p)

@@ -43,7 +43,7 @@ typedef struct remote_values {
         OPTION_INT("http-retries", 0, type, member.retries, "N", 0, 1000,                \
                    "retries of a failed request; default: 5"),                           \
         OPTION_INT("http-connections", 0, type, member.connections, "N", 1, 32,          \
-                   "requests at a time, of large ones at most six; default: 16"),        \
+                   "requests at a time, of large ones at most six; default: 32"),        \
         OPTION_LIST("http-header", 0, type, member.headers, "LINE",                      \
                     "also send 'Name: value'; may be repeated"),                         \
         OPTION_TEXT("http-user", 0, type, member.user, "NAME:PASSWORD",                  \

@@ -69,7 +69,7 @@ static const arg_option options[] = {
     OPTION_WORD("codec", 0, values, codec, "NAME", codec_words,
                 "zstd (the default), deflate or none"),
     OPTION_INT("zstd-level", 0, values, zstd_level, "N", 1, 22,
-               "compression effort of zstd, 1 to 22; default 3"),
+               "effort of zstd, 1 to 22; default 3, 5 where it pays"),
     SUBTREE_OPTION(values, subtree_faces),
     OPTION_THREADS(values, threads),
     MEMORY_OPTIONS(values, memory),

@@ -27,7 +27,7 @@ static const arg_option options[] = {
     OPTION_WORD("codec", 0, values, codec, "NAME", codec_words,
                 "zstd, deflate or none; default: that of the input"),
     OPTION_INT("zstd-level", 0, values, zstd_level, "N", 1, 22,
-               "compression effort of zstd, 1 to 22; default 3"),
+               "effort of zstd, 1 to 22; default 3, 5 where it pays"),
     OPTION_THREADS(values, threads),
     MEMORY_OPTIONS(values, memory),
     OPTION_FLAG("json", 0, values, json, "print the facts of the result as JSON"),

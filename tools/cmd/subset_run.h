@@ -38,7 +38,7 @@ extern const char *const profile_words[];
         OPTION_WORD("codec", 0, subset_values, codec, "NAME", codec_words,                         \
                     "zstd, deflate or none; default: that of the input"),                          \
         OPTION_INT("zstd-level", 0, subset_values, zstd_level, "N", 1, 22,                         \
-                   "compression effort of zstd, 1 to 22; default 3"),                              \
+                   "effort of zstd, 1 to 22; default 3, 5 where it pays"),                         \
         SUBTREE_OPTION(subset_values, subtree_faces), OPTION_THREADS(subset_values, threads),      \
         OPTION_FLAG("json", 0, subset_values, json, "print the facts of the result as JSON"),      \
         OPTION_QUIET(subset_values, quiet), REMOTE_OPTIONS(subset_values, remote)

@@ -51,7 +51,7 @@ typedef struct ebpo_http_options {
      */
     unsigned retries;
 
-    /* Requests at a time, 1 to 32; of those above 256 KiB at most six. */
+    /* Requests at a time, 1 to 32; of those above 1 MiB at most six. */
     unsigned connections;
 
     /*
@@ -121,7 +121,7 @@ typedef struct ebpo_http_options {
 
 #define EBPO_HTTP_OPTIONS_INIT                                                                   \
     {                                                                                            \
-        sizeof(ebpo_http_options), 15, 20, 120, 5, 16, UINT64_C(48) << 20, UINT64_C(64) << 20,   \
+        sizeof(ebpo_http_options), 15, 20, 120, 5, 32, UINT64_C(48) << 20, UINT64_C(64) << 20,   \
             false, true, NULL, NULL, NULL, NULL, NULL, NULL, UINT64_C(1) << 30, NULL, NULL, 0, 0 \
     }
 

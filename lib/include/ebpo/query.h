@@ -69,7 +69,9 @@ typedef struct ebpo_model_options {
 
     /*
      * Levels 0 to cut_level stay in memory, and subtrees below them are loaded on
-     * demand. -1: by the budget, everything at once if that fits.
+     * demand. -1: by the budget, everything at once if that fits; of a file on a
+     * server that has more than 2 MiB and subtrees, never everything, whatever
+     * the budget (`ebpo fetch` brings whole files).
      */
     int cut_level;
 

@@ -9,7 +9,7 @@ import subprocess
 import threading
 import time
 
-CLOSE = 0.005  # seconds within which things count as happening at once
+BUSY = 0.02  # seconds within which a client that has much to do uses a connection that became free
 
 
 def free_port():
@@ -72,7 +72,7 @@ class Line:
     def __init__(self, to, seconds, rate=None):
         self.to, self.half, self.rate, self.port = to, seconds / 2, rate, free_port()
         self.free_at = 0   # when the line has carried what it has taken
-        self.requests = []  # [sent, answered in whole] as the client sees it
+        self.requests = []  # [sent, answered in whole, connection] as the client sees it
         self.loop = asyncio.new_event_loop()
         ready = threading.Event()
         threading.Thread(target=self.run, args=(ready,), daemon=True).start()
@@ -87,13 +87,13 @@ class Line:
 
     async def connection(self, reader, writer):
         """A client connects because it has a request, which it sends after the handshake."""
-        call = [self.loop.time(), None]
+        call = [self.loop.time(), None, writer]
         self.requests.append(call)
 
         def sent():
             nonlocal call
             if call[1]:
-                call = [self.loop.time(), None]
+                call = [self.loop.time(), None, writer]
                 self.requests.append(call)
 
         def arrived():
@@ -136,13 +136,14 @@ class Line:
 
     def waves(self, connections):
         """Batches of the requests since the last call. One begins a wave if it was sent after an
-        answer of the wave had come in whole, unless all `connections` were busy until then: it had
-        only waited for one of them."""
-        calls, self.requests = sorted(c for c in self.requests if c[1]), []
+        answer of the wave had come in whole, unless all `connections` were busy until then, and
+        some still are: it had only waited for one of them."""
+        calls, self.requests = sorted((c for c in self.requests if c[1]), key=lambda c: c[:2]), []
         count, first_answer = 0, 0
-        for i, (sent, answered) in enumerate(calls):
-            busy = sum(1 for call in calls[:i] if call[1] > sent - CLOSE)
-            if i == 0 or (sent > first_answer and busy < connections):
+        for i, (sent, answered, _) in enumerate(calls):
+            busy = len({id(call[2]) for call in calls[:i] if call[1] > sent - BUSY})
+            waited = busy >= connections and any(call[1] > sent for call in calls[:i])
+            if i == 0 or (sent > first_answer and not waited):
                 count, first_answer = count + 1, answered
             first_answer = min(first_answer, answered)
         return count
