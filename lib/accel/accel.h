@@ -99,16 +99,17 @@ enum { EBPO_BLOCKS_MOST = 1 << 29 };
 
 /* Eight children, their boxes in steps of 8 bits: axis k from origin + step * low to origin + step
  * * high, in the subtree's own frame: (x - centre) * scale, about -1 .. 1 (farther where listed
- * faces reach beyond the cell). Steps are powers of two, so decoding rounds nothing but the last
- * sum. The boxes are wider than the faces by what single precision can lose:
- * docs/develop/bounds.md. */
+ * faces reach beyond the cell). The boxes are wider than the faces by what
+ * single precision can lose: docs/develop/bounds.md. */
 typedef struct ebpo_bound {
     _Alignas(64) float origin[3];
     float step[3];
     uint8_t low[3][8], high[3][8];
     uint32_t child[8]; /* number of a node, or of a block with EBPO_IS_BLOCK */
-    uint8_t count;     /* of children; they have the first lanes */
-    uint8_t spare[23];
+    /* Slabs pay above this squared limit of a search: for nodes that are not large beside it. */
+    float slab_limit2;
+    uint8_t count; /* of children; they have the first lanes */
+    uint8_t spare[19];
 } ebpo_bound;
 #define EBPO_IS_BLOCK UINT32_C(0x80000000)
 #define EBPO_NO_CHILD UINT32_MAX
@@ -125,13 +126,14 @@ static inline ebpo_bound_sides ebpo_bound_side(const ebpo_bound *b, int lane, in
 }
 
 /* What a curved sheet needs for its distance to be told apart from its neighbours': with x the
- * place of a point of the child seen from the middle of its box as decoded, and a = axis / 128,
+ * place of a point of the child seen from the middle of its box as decoded, and a = axis / 2^15,
  *   along_step * from <= x . a <= along_step * to,   x . x - (x . a)^2 <= (aside_step * radius)^2.
- */
+ * 16 bits: with 8 the axis is off by what curved sheets are thick, a fifth more blocks are met. */
 typedef struct ebpo_bound_slab {
+    _Alignas(64) int16_t axis[3][8];
+    int16_t from[8], to[8], radius[8];
     float along_step, aside_step;
-    int8_t axis[3][8], from[8], to[8];
-    uint8_t radius[8];
+    uint8_t spare[24];
 } ebpo_bound_slab;
 
 typedef struct ebpo_accel {

@@ -26,6 +26,7 @@ EBPO_EIGHT f8 f8_div(f8 a, f8 b) { return _mm256_div_ps(a, b); }
 EBPO_EIGHT f8 f8_min(f8 a, f8 b) { return _mm256_min_ps(a, b); }
 EBPO_EIGHT f8 f8_max(f8 a, f8 b) { return _mm256_max_ps(a, b); }
 EBPO_EIGHT f8 f8_sqrt(f8 a) { return _mm256_sqrt_ps(a); }
+EBPO_EIGHT f8 f8_about_inverse(f8 a) { return _mm256_rcp_ps(a); }
 EBPO_EIGHT f8 f8_less(f8 a, f8 b) { return _mm256_cmp_ps(a, b, _CMP_LT_OQ); }
 EBPO_EIGHT f8 f8_at_most(f8 a, f8 b) { return _mm256_cmp_ps(a, b, _CMP_LE_OQ); }
 EBPO_EIGHT f8 f8_and(f8 a, f8 b) { return _mm256_and_ps(a, b); }
@@ -40,9 +41,9 @@ EBPO_EIGHT f8 f8_from_bytes(const uint8_t *x)
 {
     return _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)x)));
 }
-EBPO_EIGHT f8 f8_from_signed(const int8_t *x)
+EBPO_EIGHT f8 f8_from_shorts(const int16_t *x)
 {
-    return _mm256_cvtepi32_ps(_mm256_cvtepi8_epi32(_mm_loadl_epi64((const __m128i *)x)));
+    return _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm_loadu_si128((const __m128i *)x)));
 }
 
 #else
@@ -84,6 +85,7 @@ EBPO_EIGHT f8 f8_pick(f8 mask, f8 yes, f8 no)
 EBPO_EIGHT f8 f8_min(f8 a, f8 b) { EBPO_BOTH(_mm_min_ps(a.half[h], b.half[h])); }
 EBPO_EIGHT f8 f8_max(f8 a, f8 b) { EBPO_BOTH(_mm_max_ps(a.half[h], b.half[h])); }
 EBPO_EIGHT f8 f8_sqrt(f8 a) { EBPO_BOTH(_mm_sqrt_ps(a.half[h])); }
+EBPO_EIGHT f8 f8_about_inverse(f8 a) { EBPO_BOTH(_mm_rcp_ps(a.half[h])); }
 EBPO_EIGHT unsigned f8_bits(f8 mask)
 {
     return (unsigned)(_mm_movemask_ps(mask.half[0]) | _mm_movemask_ps(mask.half[1]) << 4);
@@ -95,16 +97,17 @@ EBPO_EIGHT f8 f8_from_bytes(const uint8_t *x)
     return (f8){ { _mm_cvtepi32_ps(_mm_unpacklo_epi16(words, none)),
                    _mm_cvtepi32_ps(_mm_unpackhi_epi16(words, none)) } };
 }
-EBPO_EIGHT f8 f8_from_signed(const int8_t *x)
+EBPO_EIGHT f8 f8_from_shorts(const int16_t *x)
 {
-    __m128i bytes = _mm_loadl_epi64((const __m128i *)x), twice = _mm_unpacklo_epi8(bytes, bytes);
-    return (f8){ { _mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpacklo_epi16(twice, twice), 24)),
-                   _mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpackhi_epi16(twice, twice), 24)) } };
+    __m128i words = _mm_loadu_si128((const __m128i *)x);
+    return (f8){ { _mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpacklo_epi16(words, words), 16)),
+                   _mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpackhi_epi16(words, words), 16)) } };
 }
 #else
 #include <math.h>
 EBPO_EIGHT f8 f8_min(f8 a, f8 b) { return f8_pick(f8_less(a, b), a, b); }
 EBPO_EIGHT f8 f8_max(f8 a, f8 b) { return f8_pick(f8_less(b, a), a, b); }
+EBPO_EIGHT f8 f8_about_inverse(f8 a) { return f8_div(f8_all(1), a); }
 EBPO_EIGHT f8 f8_sqrt(f8 a)
 {
     for (int i = 0; i < 8; i++)
@@ -125,7 +128,7 @@ EBPO_EIGHT f8 f8_from_bytes(const uint8_t *x)
         out.half[i / 4][i % 4] = x[i];
     return out;
 }
-EBPO_EIGHT f8 f8_from_signed(const int8_t *x)
+EBPO_EIGHT f8 f8_from_shorts(const int16_t *x)
 {
     f8 out;
     for (int i = 0; i < 8; i++)
@@ -137,5 +140,28 @@ EBPO_EIGHT f8 f8_from_signed(const int8_t *x)
 
 EBPO_EIGHT f8 f8_min3(f8 a, f8 b, f8 c) { return f8_min(a, f8_min(b, c)); }
 EBPO_EIGHT f8 f8_max3(f8 a, f8 b, f8 c) { return f8_max(a, f8_max(b, c)); }
+
+/* 1 / a to about 2^-22, not always the same on all processors: for filters only. No number for 0.
+ */
+EBPO_EIGHT f8 f8_inverse(f8 a)
+{
+    f8 x = f8_about_inverse(a);
+    return f8_mul(x, f8_sub(f8_all(2), f8_mul(a, x)));
+}
+
+/* The least of the eight, none of which may be no number. */
+EBPO_EIGHT float f8_least(f8 a)
+{
+#if defined(__AVX2__)
+    __m128 x = _mm_min_ps(_mm256_castps256_ps128(a), _mm256_extractf128_ps(a, 1));
+    x = _mm_min_ps(x, _mm_movehl_ps(x, x));
+    return _mm_cvtss_f32(_mm_min_ss(x, _mm_movehdup_ps(x)));
+#else
+    float least = a.half[0][0];
+    for (int i = 1; i < 8; i++)
+        least = a.half[i / 4][i % 4] < least ? a.half[i / 4][i % 4] : least;
+    return least;
+#endif
+}
 
 #endif

@@ -2,6 +2,7 @@
 #include "geom/strict_fp.h"
 
 #include "query/kernels.inc"
+#include "query/near_kernel.inc"
 #include "query/ray_kernel.inc"
 
-const ebpo_kernels ebpo_kernels_avx2 = { crossings, bounds, faces, ray_walk };
+const ebpo_kernels ebpo_kernels_avx2 = { crossings, near_walk, ray_walk };

@@ -13,7 +13,7 @@
 #include "base/alloc.h"
 #include "base/clock.h"
 #include "base/error.h"
-#include "query/visits.h"
+#include "query/kernels.h"
 
 /* Beyond so many halves of the subtree's size, single precision tells nothing apart. */
 #define FAR 32.0
@@ -130,126 +130,66 @@ static bool make_probe(const ebpo_accel *s, const double p[3], ebpo_probe *out)
     return true;
 }
 
-/* A search under way. Faces that may be nearest wait as candidates until the end: by then nearly
- * all are known to be farther. */
-enum { CANDIDATES = 64 };
-
-typedef struct candidate {
-    float low;
-    uint32_t slot;
-} candidate;
-
-typedef struct searching {
-    ebpo_nearest *n;
-    const ebpo_kernels *kernels;
-    const ebpo_accel *s;
-    ebpo_probe probe;
-    float best;   /* some face is certainly not farther, or what is does not matter: in the frame */
-    float limit2; /* what squared lower bounds are compared with */
-    int count;
-    candidate waiting[CANDIDATES];
-} searching;
-
-static void set_best(searching *g, float best)
-{
-    float limit = best * (1 + 0x1p-18f) + g->probe.error;
-    g->best = best;
-    g->limit2 = limit * limit;
-}
-
 /* The limit in the frame, rounded up. */
-static float frame_limit(const searching *g)
+static float frame_limit(const ebpo_near_search *g)
 {
-    double limit = g->n->limit * g->probe.scale64 * (1 + 0x1p-20) + DBL_MIN;
+    const ebpo_nearest *n = g->user;
+    double limit = n->limit * g->probe.scale64 * (1 + 0x1p-20) + DBL_MIN;
     return limit < 0x1p60 ? (float)limit * (1 + 0x1p-20f) + FLT_MIN : 0x1p60f;
 }
 
-static void drop_far(searching *g)
-{
-    int kept = 0;
-    for (int i = 0; i < g->count; i++)
-        if (g->waiting[i].low <= g->best)
-            g->waiting[kept++] = g->waiting[i];
-    g->count = kept;
-}
-
 /* Judges the candidates, the most promising first. */
-static void judge(searching *g)
+static void judge(ebpo_near_search *g)
 {
-    drop_far(g);
+    ebpo_nearest *n = g->user;
+    ebpo_near_drop_far(g);
     while (g->count) {
         int first = 0;
         for (int i = 1; i < g->count; i++)
             first = g->waiting[i].low < g->waiting[first].low ? i : first;
-        candidate c = g->waiting[first];
+        ebpo_near_candidate c = g->waiting[first];
         g->waiting[first] = g->waiting[--g->count];
         if (c.low > g->best)
             continue;
-        double before = g->n->limit;
-        try_face(g->n, g->s, c.slot);
-        if (g->n->limit < before) {
+        double before = n->limit;
+        try_face(n, g->s, c.slot);
+        if (n->limit < before) {
             float limit = frame_limit(g);
             if (limit < g->best)
-                set_best(g, limit);
+                ebpo_near_set_best(g, limit);
         }
     }
 }
 
-static void add_block(searching *g, uint32_t block)
-{
-    float low[8], high[8], best = g->best;
-    for (unsigned lanes = g->kernels->faces(g->s, block, &g->probe, g->best, low, high); lanes;
-         lanes &= lanes - 1) {
-        unsigned lane = (unsigned)__builtin_ctz(lanes);
-        if (g->count == CANDIDATES)
-            drop_far(g);
-        if (g->count == CANDIDATES)
-            judge(g);
-        g->waiting[g->count++] = (candidate){ low[lane], block * EBPO_BLOCK + lane };
-        best = high[lane] < best ? high[lane] : best;
-        if (best < g->best)
-            set_best(g, best);
-    }
-}
-
 /* Out of time: what is left on the stack bounds what was passed over. */
-static void give_up(searching *g, const ebpo_visit *stack, uint32_t top)
+static void give_up(const ebpo_near_search *g)
 {
-    ebpo_nearest *n = g->n;
+    ebpo_nearest *n = g->user;
     n->late = true;
-    for (uint32_t i = 0; i < top; i++) {
+    for (uint32_t i = 0; i < g->top; i++) {
         double lower =
-            (sqrt((double)ebpo_visit_key(stack[i])) * (1 - 0x1p-20) - (double)g->probe.error) /
+            (sqrt((double)ebpo_visit_key(g->stack[i])) * (1 - 0x1p-20) - (double)g->probe.error) /
             g->probe.scale64;
         n->passed_over = fmin(n->passed_over, fmax(lower, 0));
     }
 }
 
-static void search_near(searching *g)
+static bool late(ebpo_near_search *g)
 {
-    ebpo_visit stack[EBPO_VISITS_MOST];
-    uint32_t top = 1, steps = 0;
-    set_best(g, frame_limit(g));
-    stack[0] = ebpo_visit_make(0, g->s->top);
-    while (top) {
-        ebpo_visit v = stack[--top];
-        uint32_t child = (uint32_t)v;
-        if (ebpo_visit_key(v) > g->limit2)
-            continue;
-        if (g->n->deadline && (++steps & 7) == 0 && ebpo_clock() > g->n->deadline) {
-            give_up(g, stack, top + 1);
-            break;
-        }
-        if (child & EBPO_IS_BLOCK) {
-            add_block(g, child & ~EBPO_IS_BLOCK);
-            continue;
-        }
-        float lower2[8];
-        const ebpo_bound *bound = &g->s->bound[child];
-        unsigned lanes =
-            g->kernels->bounds(bound, &g->s->slab[child], &g->probe, g->limit2, lower2);
-        top = ebpo_visit_push(stack, top, bound, lanes, lower2);
-    }
+    const ebpo_nearest *n = g->user;
+    return ebpo_clock() > n->deadline;
+}
+
+static void search_near(ebpo_nearest *n, const ebpo_kernels *kernels, ebpo_near_search *g)
+{
+    g->user = n;
+    g->judge = judge;
+    g->late = n->deadline ? late : NULL;
+    g->count = 0;
+    ebpo_near_set_best(g, frame_limit(g));
+    kernels->near(g);
+    if (g->top)
+        give_up(g);
     judge(g);
 }
 
@@ -306,15 +246,12 @@ static void search_far(ebpo_nearest *n, const ebpo_accel *s, uint32_t child)
 
 void ebpo_nearest_search(ebpo_nearest *n, const ebpo_context *context, const ebpo_accel *s)
 {
-    searching g;
-    g.n = n;
-    g.kernels = context->model->kernels;
+    ebpo_near_search g;
     g.s = s;
-    g.count = 0;
     if (s->bound_count == 0)
         return;
     if (make_probe(s, n->p, &g.probe))
-        search_near(&g);
+        search_near(n, context->model->kernels, &g);
     else
         search_far(n, s, s->top);
 }

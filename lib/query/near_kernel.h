@@ -1,0 +1,56 @@
+/* A search for the nearest face of one accel, as the kernels see it. */
+#ifndef EBPO_QUERY_NEAR_KERNEL_H
+#define EBPO_QUERY_NEAR_KERNEL_H
+
+#include "query/visits.h"
+
+/* A point as the kernels want it. */
+typedef struct ebpo_probe {
+    double p[3];
+    float high[3], low[3]; /* p = high + low up to 2^-48 of |p| (blocks of floats) */
+    float local[3];        /* in the subtree's frame */
+    float scale;           /* of the frame */
+    double scale64;
+    /* bound on what rounding does to a distance between the point and a bound, in the frame */
+    float error;
+} ebpo_probe;
+
+/* Faces that may be nearest wait until the end: by then nearly all are known to be farther. */
+typedef struct ebpo_near_candidate {
+    float low;
+    uint32_t slot;
+} ebpo_near_candidate;
+enum { EBPO_NEAR_CANDIDATES = 64 };
+
+typedef struct ebpo_near_search ebpo_near_search;
+struct ebpo_near_search {
+    const ebpo_accel *s;
+    ebpo_probe probe;
+    void *user;
+    void (*judge)(ebpo_near_search *search); /* decides about all that waits */
+    bool (*late)(ebpo_near_search *search);  /* NULL: there is time */
+    float best;   /* some face is certainly not farther, or what is does not matter: in the frame */
+    float limit2; /* what squared lower bounds are compared with */
+    int count;
+    ebpo_near_candidate waiting[EBPO_NEAR_CANDIDATES];
+    uint32_t top; /* visits that were left when it was late */
+    ebpo_visit stack[EBPO_VISITS_MOST];
+};
+
+static inline void ebpo_near_set_best(ebpo_near_search *g, float best)
+{
+    float limit = best * (1 + 0x1p-18f) + g->probe.error;
+    g->best = best;
+    g->limit2 = limit * limit;
+}
+
+static inline void ebpo_near_drop_far(ebpo_near_search *g)
+{
+    int kept = 0;
+    for (int i = 0; i < g->count; i++)
+        if (g->waiting[i].low <= g->best)
+            g->waiting[kept++] = g->waiting[i];
+    g->count = kept;
+}
+
+#endif
