@@ -359,54 +359,6 @@ END_TEST
 
 /* --- far away --- */
 
-typedef struct answer {
-    double distance;
-    int32_t where;
-    uint64_t waves;
-} answer;
-
-/* One question, cold: its distance, or where the point is. */
-static answer ask(const ebpo_file *file, const counted_source *far, const double p[3], bool inside)
-{
-    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
-    ebpo_model *model;
-    ebpo_context *context;
-    ebpo_distance_result distance = { .distance = 0 };
-    ebpo_inside_result where = { .where = EBPO_OUT };
-    uint64_t opened = far ? far->batches + far->alone : 0;
-    options.threads = 1;
-    options.memory = 64 << 20;
-    EXPECT(ebpo_model_new(file, &options, &model, NULL) == EBPO_OK);
-    EXPECT(ebpo_context_new(model, &context, NULL) == EBPO_OK);
-    EXPECT((inside ? ebpo_inside(context, p, NULL, &where, NULL)
-                   : ebpo_distance(context, p, NULL, &distance, NULL)) == EBPO_OK);
-    ebpo_context_free(context);
-    ebpo_model_free(model);
-    return (answer){ distance.distance, where.where, far ? far->batches + far->alone - opened : 0 };
-}
-
-/* Distance or inside of points near the surface: what is asked for after opening, at most. */
-START_TEST(a_question_from_afar_takes_few_waves)
-{
-    enum { WAVES = 4 };
-    two_layouts l;
-    counted_source c;
-    uint64_t state = 3;
-    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 200, 120), 8, ALL, EBPO_CODEC_ZSTD, 400);
-    for (int n = 0; n < 10; n++) {
-        double cosine, sine;
-        ebpo_test_circle((uint32_t)(ebpo_test_random(&state) % 1000), 1000, &cosine, &sine);
-        double p[3] = { 2.71 * cosine, 2.71 * sine, 0.01 };
-        ebpo_file *far = counted_open(&c, l.packed, true);
-        answer a = ask(far, &c, p, n % 2), b = ask(l.without, NULL, p, n % 2);
-        counted_close(&c, far);
-        ck_assert_msg(a.waves <= WAVES, "%d waves", (int)a.waves);
-        EXPECT(a.distance == b.distance && a.where == b.where);
-    }
-    two_layouts_close(&l);
-}
-END_TEST
-
 /* What is down makes each try wait: of many points the first that needs it ends the search for what
  * others need, and the question tells. */
 START_TEST(a_line_that_is_down_is_not_tried_for_each_point)
@@ -451,7 +403,6 @@ Suite *test_suite(void)
     tcase_add_loop_test(tests, models_are_the_same_in_both_layouts, 0, 15);
     tcase_add_loop_test(tests, subsets_are_the_same_in_both_layouts, 0, 3);
     tcase_add_loop_test(tests, chunks_lie_in_the_order_of_the_specification, 0, 2);
-    tcase_add_test(tests, a_question_from_afar_takes_few_waves);
     tcase_add_test(tests, a_line_that_is_down_is_not_tried_for_each_point);
     suite_add_tcase(suite, tests);
     return suite;

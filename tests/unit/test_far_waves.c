@@ -1,0 +1,149 @@
+/* How many batches, one waiting for the other, things take of a file far away. */
+#include <stdlib.h>
+
+#include <ebpo/query.h>
+#include <ebpo/subset.h>
+#include <ebpo/view.h>
+
+#include "check_main.h"
+#include "counted_source.h"
+#include "expect.h"
+#include "scratch.h"
+#include "solids.h"
+#include "two_layouts.h"
+
+enum { ALL = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES };
+
+/* --- questions --- */
+
+typedef struct answer {
+    double distance;
+    int32_t where;
+    uint64_t waves;
+} answer;
+
+/* One question, cold: its distance, or where the point is. */
+static answer ask(const ebpo_file *file, const counted_source *far, const double p[3], bool inside)
+{
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model *model;
+    ebpo_context *context;
+    ebpo_distance_result distance = { .distance = 0 };
+    ebpo_inside_result where = { .where = EBPO_OUT };
+    uint64_t opened = far ? far->batches + far->alone : 0;
+    options.threads = 1;
+    options.memory = 64 << 20;
+    EXPECT(ebpo_model_new(file, &options, &model, NULL) == EBPO_OK);
+    EXPECT(ebpo_context_new(model, &context, NULL) == EBPO_OK);
+    EXPECT((inside ? ebpo_inside(context, p, NULL, &where, NULL)
+                   : ebpo_distance(context, p, NULL, &distance, NULL)) == EBPO_OK);
+    ebpo_context_free(context);
+    ebpo_model_free(model);
+    return (answer){ distance.distance, where.where, far ? far->batches + far->alone - opened : 0 };
+}
+
+/* Distance or inside of points near the surface: what is asked for after opening, at most. */
+START_TEST(a_question_from_afar_takes_few_waves)
+{
+    enum { WAVES = 4 };
+    two_layouts l;
+    counted_source c;
+    uint64_t state = 3;
+    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 200, 120), 8, ALL, EBPO_CODEC_ZSTD, 400);
+    for (int n = 0; n < 10; n++) {
+        double cosine, sine;
+        ebpo_test_circle((uint32_t)(ebpo_test_random(&state) % 1000), 1000, &cosine, &sine);
+        double p[3] = { 2.71 * cosine, 2.71 * sine, 0.01 };
+        ebpo_file *far = counted_open(&c, l.packed, true);
+        answer a = ask(far, &c, p, n % 2), b = ask(l.without, NULL, p, n % 2);
+        counted_close(&c, far);
+        ck_assert_msg(a.waves <= WAVES, "%d waves", (int)a.waves);
+        EXPECT(a.distance == b.distance && a.where == b.where);
+    }
+    two_layouts_close(&l);
+}
+END_TEST
+
+/* --- parts of the file --- */
+
+/* After the head: the top, rows of the table, nodes with lists, faces with the vertices that come
+ * with them. */
+START_TEST(a_box_from_afar_takes_few_waves)
+{
+    enum { WAVES = 4 };
+    two_layouts l;
+    counted_source c;
+    ebpo_subset_options box = EBPO_SUBSET_OPTIONS_INIT;
+    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 400, 240), 9, ALL, EBPO_CODEC_ZSTD, 400);
+    box.boxed = true;
+    for (int k = 0; k < 3; k++) {
+        box.min[k] = k ? -0.3 : 2.2;
+        box.max[k] = k ? 0.3 : 3;
+    }
+    ebpo_file *far = counted_open(&c, l.packed, true);
+    uint64_t opened = c.batches + c.alone;
+    EXPECT(ebpo_subset(far, scratch("box.ebpo.h5"), &box, NULL) == EBPO_OK);
+    ck_assert_msg(c.batches + c.alone - opened <= WAVES, "%d waves",
+                  (int)(c.batches + c.alone - opened));
+    ck_assert_msg(c.asked < c.size / 2, "%d of %d bytes", (int)c.asked, (int)c.size);
+    counted_close(&c, far);
+    two_layouts_close(&l);
+}
+END_TEST
+
+static uint64_t count_nodes(const ebpo_file *file, const ebpo_view_options *options)
+{
+    ebpo_view_stream *stream;
+    ebpo_view_node node;
+    ebpo_view_end end;
+    uint64_t count = 0;
+    EXPECT(ebpo_view_stream_new(file, options, &stream, NULL) == EBPO_OK);
+    do {
+        EXPECT(ebpo_view_stream_next(stream, &node, &end, NULL) == EBPO_OK);
+        count += end == EBPO_VIEW_NODE;
+    } while (end == EBPO_VIEW_NODE);
+    ebpo_view_stream_free(stream);
+    return count;
+}
+
+/* Whatever comes first in it: all subtrees that a view will come to are asked for together. */
+START_TEST(a_view_from_afar_takes_few_waves)
+{
+    enum { WAVES = 4 };
+    static const ebpo_priority order[] = { EBPO_PRIORITY_LEVEL, EBPO_PRIORITY_PIXELS,
+                                           EBPO_PRIORITY_FRONT_TO_BACK };
+    two_layouts l;
+    counted_source c;
+    ebpo_observer observer = EBPO_OBSERVER_INIT;
+    ebpo_view_options view = EBPO_VIEW_OPTIONS_INIT;
+    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 400, 240), 9, ALL, EBPO_CODEC_ZSTD, 400);
+    observer.eye[0] = 4;
+    observer.direction[0] = -1;
+    observer.up[2] = 1;
+    view.observer = &observer;
+    view.unseen = EBPO_UNSEEN_NEVER;
+    view.pixels = 8;
+    view.planes = true;
+    view.priority = order[_i];
+    ebpo_file *far = counted_open(&c, l.packed, true);
+    uint64_t opened = c.batches + c.alone, nodes = count_nodes(far, &view);
+    ck_assert_msg(c.batches + c.alone - opened <= WAVES, "%d waves",
+                  (int)(c.batches + c.alone - opened));
+    EXPECT(nodes == count_nodes(l.without, &view) && nodes > 1000);
+    counted_close(&c, far);
+    two_layouts_close(&l);
+}
+END_TEST
+
+Suite *test_suite(void)
+{
+    Suite *suite = suite_create("far_waves");
+    TCase *tests = tcase_create("far_waves");
+    tcase_set_timeout(tests, 900);
+    tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
+    tcase_add_test(tests, a_question_from_afar_takes_few_waves);
+    tcase_add_test(tests, a_box_from_afar_takes_few_waves);
+    tcase_add_loop_test(tests, a_view_from_afar_takes_few_waves, 0, 3);
+    suite_add_tcase(suite, tests);
+    return suite;
+}
