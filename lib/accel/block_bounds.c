@@ -6,6 +6,9 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
 
 #include "base/alloc.h"
 #include "base/error.h"
@@ -33,11 +36,45 @@ typedef struct job {
     extent *of_node;
 } job;
 
-/* A block's corners in the frame, [corner][axis][lane]; lanes without a face repeat the first one.
+/* Two lanes at a time. */
+typedef double pair __attribute__((vector_size(16)));
+enum { PAIRS = EBPO_BLOCK / 2 };
+
+#if defined(__SSE2__)
+static inline pair lesser(pair a, pair b) { return (pair)_mm_min_pd((__m128d)a, (__m128d)b); }
+static inline pair greater(pair a, pair b) { return (pair)_mm_max_pd((__m128d)a, (__m128d)b); }
+static inline pair two_floats(const float *p)
+{
+    return (pair)_mm_cvtps_pd(_mm_castpd_ps(_mm_load_sd((const double *)(const void *)p)));
+}
+#else
+typedef int64_t pair_mask __attribute__((vector_size(16)));
+static inline pair pick(pair_mask mask, pair yes, pair no)
+{
+    return (pair)(((pair_mask)yes & mask) | ((pair_mask)no & ~mask));
+}
+static inline pair lesser(pair a, pair b) { return pick(a < b, a, b); }
+static inline pair greater(pair a, pair b) { return pick(a > b, a, b); }
+static inline pair two_floats(const float *p) { return (pair){ (double)p[0], (double)p[1] }; }
+#endif
+
+static double least_of(pair x) { return x[0] < x[1] ? x[0] : x[1]; }
+static double most_of(pair x) { return x[0] > x[1] ? x[0] : x[1]; }
+
+/* A block's corners in the frame, [corner][axis][lanes]; lanes without a face repeat the first one.
  */
 typedef struct lanes {
-    double x[3][3][EBPO_BLOCK];
+    pair x[3][3][PAIRS];
 } lanes;
+
+/* Eight coordinates as they are. */
+static inline void load_eight(const ebpo_accel *s, uint64_t at, pair x[PAIRS])
+{
+    for (uint64_t h = 0; h < PAIRS && s->wide; h++)
+        x[h] = (pair){ s->block64[at + 2 * h], s->block64[at + 2 * h + 1] };
+    for (uint64_t h = 0; h < PAIRS && !s->wide; h++)
+        x[h] = two_floats(s->block32 + at + 2 * h);
+}
 
 static void load_lanes(const ebpo_accel *s, uint32_t block, lanes *out)
 {
@@ -45,15 +82,13 @@ static void load_lanes(const ebpo_accel *s, uint32_t block, lanes *out)
     while (s->slot_face[block * EBPO_BLOCK + (uint32_t)count - 1] == EBPO_NO_SLOT)
         count--;
     for (int i = 0; i < 9; i++) {
-        uint64_t at = (uint64_t)block * EBPO_BLOCK_NUMBERS + (uint64_t)i * EBPO_BLOCK;
-        double *x = out->x[i / 3][i % 3], centre = s->centre[i % 3];
-        for (int lane = 0; lane < EBPO_BLOCK; lane++)
-            x[lane] =
-                s->wide ? s->block64[at + (uint64_t)lane] : (double)s->block32[at + (uint64_t)lane];
-        for (int lane = 0; lane < EBPO_BLOCK; lane++)
-            x[lane] = (x[lane] - centre) * s->scale;
+        pair *x = out->x[i / 3][i % 3];
+        double centre = s->centre[i % 3], scale = s->scale;
+        load_eight(s, (uint64_t)block * EBPO_BLOCK_NUMBERS + (uint64_t)i * EBPO_BLOCK, x);
+        for (int h = 0; h < PAIRS; h++)
+            x[h] = (x[h] - centre) * scale;
         for (int lane = count; lane < EBPO_BLOCK; lane++)
-            x[lane] = x[0];
+            x[lane / 2][lane % 2] = x[0][0];
     }
 }
 
@@ -63,23 +98,30 @@ static const extent nothing = { { INFINITY, INFINITY, INFINITY },
                                 { -INFINITY, -INFINITY, -INFINITY },
                                 { 0, 0, 0 } };
 
+static void add_corners(const lanes *l, int axis, extent *e)
+{
+    pair low = { e->low[axis], e->low[axis] }, high = { e->high[axis], e->high[axis] };
+    for (int i = 0; i < 3; i++)
+        for (int h = 0; h < PAIRS; h++) {
+            low = lesser(l->x[i][axis][h], low);
+            high = greater(l->x[i][axis][h], high);
+        }
+    e->low[axis] = least_of(low);
+    e->high[axis] = most_of(high);
+}
+
 static void add_lanes(const lanes *l, extent *e)
 {
     for (int k = 0; k < 3; k++) {
         int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
-        double low = e->low[k], high = e->high[k], normal = 0;
-        for (int i = 0; i < 3; i++)
-            for (int lane = 0; lane < EBPO_BLOCK; lane++) {
-                double x = l->x[i][k][lane];
-                low = x < low ? x : low;
-                high = x > high ? x : high;
-            }
-        for (int lane = 0; lane < EBPO_BLOCK; lane++)
-            normal +=
-                (l->x[1][u][lane] - l->x[0][u][lane]) * (l->x[2][v][lane] - l->x[0][v][lane]) -
-                (l->x[1][v][lane] - l->x[0][v][lane]) * (l->x[2][u][lane] - l->x[0][u][lane]);
-        e->low[k] = low;
-        e->high[k] = high;
+        double normal = 0;
+        add_corners(l, k, e);
+        for (int h = 0; h < PAIRS; h++) {
+            pair area = (l->x[1][u][h] - l->x[0][u][h]) * (l->x[2][v][h] - l->x[0][v][h]) -
+                        (l->x[1][v][h] - l->x[0][v][h]) * (l->x[2][u][h] - l->x[0][u][h]);
+            normal += area[0];
+            normal += area[1];
+        }
         e->normal[k] += normal;
     }
 }
@@ -188,21 +230,23 @@ static void choose_axis(const extent *e, ebpo_bound_slab *b, int lane, slab *out
 
 static void add_to_slab(const lanes *l, slab *out)
 {
-    for (int i = 0; i < 3; i++) {
-        double along[EBPO_BLOCK] = { 0 }, square[EBPO_BLOCK] = { 0 };
-        for (int k = 0; k < 3; k++)
-            for (int lane = 0; lane < EBPO_BLOCK; lane++) {
-                double d = l->x[i][k][lane] - out->middle[k];
-                along[lane] += d * out->axis[k];
-                square[lane] += d * d;
+    pair from = { out->from, out->from }, to = { out->to, out->to },
+         most = { out->radius2, out->radius2 };
+    for (int i = 0; i < 3; i++)
+        for (int h = 0; h < PAIRS; h++) {
+            pair along = { 0, 0 }, square = { 0, 0 };
+            for (int k = 0; k < 3; k++) {
+                pair d = l->x[i][k][h] - out->middle[k];
+                along += d * out->axis[k];
+                square += d * d;
             }
-        for (int lane = 0; lane < EBPO_BLOCK; lane++) {
-            double radius2 = square[lane] - along[lane] * along[lane];
-            out->from = along[lane] < out->from ? along[lane] : out->from;
-            out->to = along[lane] > out->to ? along[lane] : out->to;
-            out->radius2 = radius2 > out->radius2 ? radius2 : out->radius2;
+            from = lesser(along, from);
+            to = greater(along, to);
+            most = greater(square - along * along, most);
         }
-    }
+    out->from = least_of(from);
+    out->to = most_of(to);
+    out->radius2 = most_of(most);
 }
 
 /* Without an axis and as wide as the box is: says nothing that the box does not say. */

@@ -168,8 +168,7 @@ void ebpo_chunks_expect(ebpo_chunks *c, ebpo_expected *e, ebpo_array_id id, int 
                         uint64_t rows)
 {
     const ebpo_array_in *array = ebpo_reader_array(c->file, id, level);
-    if (!ebpo_input_expects(&c->file->in) || !array->present || rows == 0 ||
-        row >= array->shape.rows)
+    if (!ebpo_expected_wanted(e) || !array->present || rows == 0 || row >= array->shape.rows)
         return;
     if (c->collecting)
         (void)ebpo_chunks_missing(c, id, level, row, rows, c->collecting);

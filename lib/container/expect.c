@@ -14,10 +14,15 @@ static void add(ebpo_expected *e, uint64_t offset, uint64_t size)
         e->range[e->count++] = (ebpo_range){ offset, size };
 }
 
+bool ebpo_expected_wanted(const ebpo_expected *e)
+{
+    return ebpo_input_expects(&e->file->in) || (e->near && ebpo_input_hints(&e->file->in));
+}
+
 void ebpo_expect_chunks(ebpo_expected *e, const ebpo_array_in *array, uint64_t begin, uint64_t end)
 {
     /* A failure is the reading's to tell. */
-    if (!ebpo_input_expects(&e->file->in) || !array->present || e->failed)
+    if (!ebpo_expected_wanted(e) || !array->present || e->failed)
         return;
     /* not again and again: each time would take all retries */
     e->failed = ebpo_reader_locate(e->file, array, NULL) != EBPO_OK;
@@ -47,9 +52,36 @@ void ebpo_expect_root(ebpo_expected *e, uint32_t needs)
             ebpo_expect_array(e, &e->file->root_array[id]);
 }
 
+static int compare_ranges(const void *a, const void *b)
+{
+    uint64_t x = ((const ebpo_range *)a)->offset, y = ((const ebpo_range *)b)->offset;
+    return (x > y) - (x < y);
+}
+
+/* Joined where little lies between them: each takes a call of the system. */
+static void hint(ebpo_expected *e)
+{
+    enum { BETWEEN = 16 << 10 };
+    uint64_t kept = 0;
+    if (e->count)
+        qsort(e->range, e->count, sizeof *e->range, compare_ranges);
+    for (uint64_t i = 0; i < e->count; i++) {
+        ebpo_range *last = kept ? &e->range[kept - 1] : NULL, next = e->range[i];
+        uint64_t end = next.offset + next.size;
+        if (last && next.offset <= last->offset + last->size + BETWEEN)
+            last->size = end > last->offset + last->size ? end - last->offset : last->size;
+        else
+            e->range[kept++] = next;
+    }
+    ebpo_input_hint(&ebpo_reader_own(e->file)->in, e->range, kept);
+}
+
 void ebpo_expect_all(ebpo_expected *e)
 {
-    ebpo_input_expect(&ebpo_reader_own(e->file)->in, e->range, e->count);
+    if (ebpo_input_expects(&e->file->in))
+        ebpo_input_expect(&ebpo_reader_own(e->file)->in, e->range, e->count);
+    else
+        hint(e);
     free(e->range);
     *e = (ebpo_expected)EBPO_EXPECTED_INIT(e->file);
 }

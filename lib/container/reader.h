@@ -16,10 +16,11 @@ typedef struct ebpo_expected {
     ebpo_range *range;
     uint64_t count, capacity;
     bool failed; /* where chunks lie could not be read */
+    bool near;   /* of files on a disk, too: the system is told */
 } ebpo_expected;
-#define EBPO_EXPECTED_INIT(file) \
-    {                            \
-        file, NULL, 0, 0, false  \
+#define EBPO_EXPECTED_INIT(file)       \
+    {                                  \
+        file, NULL, 0, 0, false, false \
     }
 /* Chunks [begin, end) of an array that is present or not. */
 void ebpo_expect_chunks(ebpo_expected *expected, const ebpo_array_in *array, uint64_t begin,
@@ -34,6 +35,8 @@ void ebpo_expect_tree(const ebpo_file *file);
 /* Announces what looking up a subtree takes, if the file has subtrees and says so: levels down to
  * their roots, the sums before them, and where all chunks lie. */
 void ebpo_expect_top(const ebpo_file *file);
+/* Whether anything comes of it. */
+bool ebpo_expected_wanted(const ebpo_expected *expected);
 /* Announces what was collected, and frees it. */
 void ebpo_expect_all(ebpo_expected *expected);
 

@@ -110,7 +110,7 @@ void ebpo_subtrees_expect(ebpo_chunks *chunks, ebpo_expected *expected, uint64_t
     telling t = { chunks,  expected,
                   &row[0], alone ? &row[0] : &row[1],
                   needs,   faces ? EBPO_LEVELS_MAX : last_level };
-    if (row && count && ebpo_input_expects(&chunks->file->in) &&
+    if (row && count && ebpo_expected_wanted(expected) &&
         ebpo_subtree_table_row(chunks, first, &row[0], NULL) == EBPO_OK &&
         (alone || ebpo_subtree_table_row(chunks, first + count - 1, &row[1], NULL) == EBPO_OK)) {
         tell_nodes(&t);

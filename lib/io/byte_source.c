@@ -98,6 +98,32 @@ ebpo_status ebpo_source_of_path(ebpo_source *out, const char *path, ebpo_error *
     return EBPO_OK;
 }
 
+bool ebpo_input_hints(const ebpo_input *input)
+{
+#ifdef POSIX_FADV_WILLNEED
+    return input->source.read == path_read;
+#else
+    (void)input;
+    return false;
+#endif
+}
+
+void ebpo_input_hint(ebpo_input *input, const ebpo_range *ranges, size_t count)
+{
+    enum { LARGE = 1 << 20 };
+#ifdef POSIX_FADV_WILLNEED
+    const path_source *s = input->source.user;
+    for (size_t i = 0; i < count && ebpo_input_hints(input); i++)
+        if (ranges[i].size < LARGE && ranges[i].offset <= input->source.size)
+            (void)posix_fadvise(s->fd, (off_t)ranges[i].offset, (off_t)ranges[i].size,
+                                POSIX_FADV_WILLNEED); /* reading tells what is wrong */
+#else
+    (void)input;
+    (void)ranges;
+    (void)count;
+#endif
+}
+
 static ebpo_status memory_read(void *user, uint64_t offset, uint64_t size, void *data,
                                ebpo_error *error)
 {

@@ -49,4 +49,11 @@ static inline bool ebpo_input_is_far(const ebpo_input *input)
  */
 void ebpo_input_expect(ebpo_input *input, const ebpo_range *ranges, size_t count);
 
+/* True when the system can be told what of the source will be read, which helps where it lies on a
+ * disk: a file opened by its name. */
+bool ebpo_input_hints(const ebpo_input *input);
+/* Tells it; it begins to read, and nobody waits. Ranges that are large, which it reads ahead by
+ * itself, are let pass. */
+void ebpo_input_hint(ebpo_input *input, const ebpo_range *ranges, size_t count);
+
 #endif
