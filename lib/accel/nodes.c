@@ -29,14 +29,29 @@ static int compare_numbers(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+/* Most leaves list a few blocks, nearly in order. */
+static void sort_numbers(uint64_t *numbers, uint64_t count)
+{
+    enum { FEW = 32 };
+    if (count > FEW) {
+        qsort(numbers, count, sizeof *numbers, compare_numbers);
+        return;
+    }
+    for (uint64_t i = 1; i < count; i++) {
+        uint64_t number = numbers[i], at = i;
+        for (; at > 0 && numbers[at - 1] > number; at--)
+            numbers[at] = numbers[at - 1];
+        numbers[at] = number;
+    }
+}
+
 static bool same_block(uint64_t a, uint64_t b) { return a >> EBPO_BLOCK == b >> EBPO_BLOCK; }
 
 static void put_list(walk *w, ebpo_accel_leaf *leaf, uint64_t count)
 {
     ebpo_accel *s = w->s;
     uint64_t kept = 0;
-    if (count)
-        qsort(w->scratch, count, sizeof *w->scratch, compare_numbers);
+    sort_numbers(w->scratch, count);
     for (uint64_t i = 0; i < count; i++)
         if (kept && same_block(w->scratch[kept - 1], w->scratch[i]))
             w->scratch[kept - 1] |= w->scratch[i];

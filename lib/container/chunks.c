@@ -464,6 +464,7 @@ void ebpo_chunks_free(ebpo_chunks *chunks)
     }
     ebpo_array_free(NULL, chunks->seen);
     free(chunks->ahead);
+    free(chunks->rows);
     pthread_mutex_destroy(&chunks->lock);
     free(chunks);
 }

@@ -37,7 +37,8 @@ struct ebpo_chunks {
     ebpo_cache *cache;
     /* [chunks of /mesh/faces] vertices seen before each; NULL: a single chunk, or no mesh */
     uint64_t *seen;
-    pthread_mutex_t lock; /* of the scratch that is not in use */
+    pthread_mutex_t lock;        /* of the scratch that is not in use, and of `rows` */
+    struct ebpo_kept_rows *rows; /* of the table of subtrees, those last asked for; or NULL */
     ebpo_chunk_scratch *idle;
     unsigned idle_count;
     /* Of chunks made by ebpo_chunks_make_counted, which one thread uses at a time. */

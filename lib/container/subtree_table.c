@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "base/alloc.h"
 #include "base/endian.h"
 #include "base/error.h"
 
@@ -152,16 +153,65 @@ uint64_t ebpo_subtree_groups(const ebpo_info *info, const ebpo_subtree_row *row,
                : sums[ebpo_subtree_column(info, level - 1, EBPO_S_GRAY)];
 }
 
+/* --- rows kept: one subtree is asked for again and again while it is read, and adding up a chunk
+ * of rows takes longer than all else that is asked --- */
+
+enum { KEPT = 4 /* threads that read at once, mostly two */, BY_NUMBER = EBPO_SUBTREE_COLS };
+
+struct ebpo_kept_rows {
+    ebpo_subtree_row row[KEPT];
+    unsigned count, next;
+};
+
+static bool holds(const ebpo_subtree_row *row, unsigned column, uint64_t item)
+{
+    return column == BY_NUMBER ? row->subtree == item
+                               : row->before[column] <= item && item < row->after[column];
+}
+
+/* The row of a subtree, or (by a column) of the one that has an item, if it is kept. */
+static bool find_kept(ebpo_chunks *chunks, unsigned column, uint64_t item, ebpo_subtree_row *out)
+{
+    bool found = false;
+    pthread_mutex_lock(&chunks->lock);
+    const struct ebpo_kept_rows *kept = chunks->rows;
+    for (unsigned i = 0; kept && i < kept->count && !found; i++)
+        if ((found = holds(&kept->row[i], column, item)))
+            *out = kept->row[i];
+    pthread_mutex_unlock(&chunks->lock);
+    return found;
+}
+
+/* Checks a row, and keeps it; not of counted chunks, where each reading counts. */
+static ebpo_status keep_row(ebpo_chunks *chunks, const ebpo_subtree_row *row, ebpo_error *error)
+{
+    ebpo_status status = check_row(chunks, row, error);
+    if (status != EBPO_OK || chunks->counted)
+        return status;
+    pthread_mutex_lock(&chunks->lock);
+    if (!chunks->rows)
+        chunks->rows = ebpo_alloc_zero(1, sizeof *chunks->rows); /* without memory none is kept */
+    if (chunks->rows) {
+        chunks->rows->row[chunks->rows->next] = *row;
+        chunks->rows->next = (chunks->rows->next + 1) % KEPT;
+        chunks->rows->count += chunks->rows->count < KEPT;
+    }
+    pthread_mutex_unlock(&chunks->lock);
+    return EBPO_OK;
+}
+
 ebpo_status ebpo_subtree_table_row(ebpo_chunks *chunks, uint64_t subtree, ebpo_subtree_row *out,
                                    ebpo_error *error)
 {
     counts c;
+    if (find_kept(chunks, BY_NUMBER, subtree, out))
+        return EBPO_OK;
     ebpo_status status = open_counts(chunks, subtree, &c, error);
     if (status != EBPO_OK)
         return status;
     take_row(&c, subtree, out);
     ebpo_held_chunk_release(chunks, &c.view);
-    return check_row(chunks, out, error);
+    return keep_row(chunks, out, error);
 }
 
 /* The last chunk of rows before which there are at most so many items. */
@@ -189,6 +239,8 @@ ebpo_status ebpo_subtree_table_find(ebpo_chunks *chunks, unsigned column, uint64
     const ebpo_array_in *array = ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_COUNTS, 0);
     uint64_t chunk = 0;
     counts c;
+    if (find_kept(chunks, column, item, out))
+        return EBPO_OK;
     ebpo_status status = find_chunk(chunks, column, item, &chunk, error);
     if (status == EBPO_OK)
         status = open_counts(chunks, chunk * array->shape.chunk_rows, &c, error);
@@ -201,7 +253,7 @@ ebpo_status ebpo_subtree_table_find(ebpo_chunks *chunks, unsigned column, uint64
     }
     take_row(&c, found, out);
     ebpo_held_chunk_release(chunks, &c.view);
-    return check_row(chunks, out, error);
+    return keep_row(chunks, out, error);
 }
 
 /* Groups of the first level below the roots are the subtrees themselves. */
