@@ -110,7 +110,8 @@ static void expect_below(ebpo_chunks *chunks, const extent *x, const range *r)
     uint64_t first = r->run.rank[EBPO_GRAY], count = r->run.count[EBPO_GRAY];
     ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
     e.near = true;
-    if (r->level != chunks->file->info.subtree_level || !goes_on(x, r) || !ebpo_expected_wanted(&e))
+    if (!ebpo_subtree_table_has(chunks->file, r->level + 1) || !goes_on(x, r) ||
+        r->level != chunks->file->info.subtree_level || !ebpo_expected_wanted(&e))
         return;
     ebpo_subtree_table_expect_run(chunks, first, count);
     ebpo_subtrees_expect(chunks, &e, first, count, x->needs, x->end - 1, x->faces);
