@@ -483,7 +483,7 @@ typedef struct ebpo_ray_options {
 
 #define EBPO_RAY_OPTIONS_INIT                      \
     {                                              \
-        sizeof(ebpo_ray_options), EBPO_RAY_BOTH, 1 \
+        sizeof(ebpo_ray_options), EBPO_RAY_BOTH, 0 \
     }
 
 /* origin + t direction, as in ebpo_ray_first. */
