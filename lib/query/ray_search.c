@@ -4,6 +4,7 @@
 
 #include <math.h>
 #include <stddef.h>
+#include <string.h>
 
 /* Origins farther from the box than this many times its reach are moved towards it. */
 static const double near_enough = 4;
@@ -35,24 +36,45 @@ typedef struct framed {
     double most; /* no coordinate of the origin is greater */
 } framed;
 
+/* Not fmax, which is a call. */
+static inline double greater(double a, double b) { return a > b ? a : b; }
+
+/* x times 2^-exponent is from .5 to 1; x > 0. What frexp and ldexp do, without calls where that is
+ * a product by a normal number: *factor, or 0. */
+static inline int exponent_of(double x, double *factor)
+{
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    int exponent = (int)(bits >> 52);
+    *factor = 0;
+    if (exponent == 0 || exponent > 2040) {
+        frexp(x, &exponent);
+        return exponent;
+    }
+    bits = (uint64_t)(2045 - exponent) << 52;
+    memcpy(factor, &bits, sizeof bits);
+    return exponent - 1022;
+}
+
 /* The direction is scaled by a power of two to a longest coordinate of .5 to 1. */
 static framed to_frame(ebpo_ray_search *r)
 {
     const ebpo_accel *s = r->s;
     framed f;
     double longest = 0;
-    int exponent;
     f.most = 0;
     for (int k = 0; k < 3; k++)
-        longest = fmax(longest, fabs(r->ray.direction[k]));
-    frexp(longest, &exponent);
+        longest = greater(longest, fabs(r->ray.direction[k]));
+    double factor;
+    int exponent = exponent_of(longest, &factor);
     for (int k = 0; k < 3; k++) {
         r->from[k] = r->ray.origin[k];
         f.origin[k] = (r->ray.origin[k] - s->centre[k]) * s->scale;
-        f.direction[k] = ldexp(r->ray.direction[k], -exponent);
-        f.most = fmax(f.most, fabs(f.origin[k]));
+        f.direction[k] =
+            factor > 0 ? r->ray.direction[k] * factor : ldexp(r->ray.direction[k], -exponent);
+        f.most = greater(f.most, fabs(f.origin[k]));
     }
-    r->limit_scale = ldexp(s->scale, exponent);
+    r->limit_scale = factor > 0 ? s->scale / factor : ldexp(s->scale, exponent);
     r->moved = 0;
     return f;
 }
@@ -88,7 +110,7 @@ static bool move_origin(ebpo_ray_search *r, framed *f)
     f->most = 0;
     for (int k = 0; k < 3; k++) {
         f->origin[k] += t * f->direction[k];
-        f->most = fmax(f->most, fabs(f->origin[k]));
+        f->most = greater(f->most, fabs(f->origin[k]));
         r->from[k] = r->s->centre[k] + f->origin[k] / r->s->scale;
     }
     return true;
@@ -100,7 +122,7 @@ static double origin_error(const ebpo_ray_search *r, const framed *f)
 {
     double unit = 0;
     for (int k = 0; k < 3; k++)
-        unit = fmax(unit, fabs(r->from[k]) + fabs(r->s->centre[k]));
+        unit = greater(unit, fabs(r->from[k]) + fabs(r->s->centre[k]));
     return 0x1p-50 * (f->most + r->moved) + 0x1p-46 * (unit * r->s->scale) +
            0x1p-57 * (f->most + r->s->reach) + 0x1p-53;
 }
