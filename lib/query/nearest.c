@@ -14,6 +14,7 @@
 #include "base/clock.h"
 #include "base/error.h"
 #include "query/kernels.h"
+#include "query/near_order.h"
 
 /* Beyond so many halves of the subtree's size, single precision tells nothing apart. */
 #define FAR 32.0
@@ -48,36 +49,6 @@ void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint6
         take(n, triangle, &b, file_face, source_face);
 }
 
-static bool same_corner(const double a[3], const double b[3])
-{
-    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
-}
-
-/* Sign of the new face's distance less the winner's, exact. Faces around one vertex or edge are the
- * usual tie. */
-static int compare(const ebpo_nearest *n, const double triangle[3][3],
-                   const ebpo_distance_bounds *b)
-{
-    if (b->hi < n->bounds.lo)
-        return -1;
-    if (b->lo > n->bounds.hi)
-        return 1;
-    if (b->feature <= EBPO_NEAR_CORNER2 && n->bounds.feature <= EBPO_NEAR_CORNER2 &&
-        same_corner(triangle[b->feature], n->triangle[n->bounds.feature]))
-        return 0;
-    if (b->feature >= EBPO_NEAR_EDGE0 && b->feature <= EBPO_NEAR_EDGE2 &&
-        n->bounds.feature >= EBPO_NEAR_EDGE0 && n->bounds.feature <= EBPO_NEAR_EDGE2) {
-        const double *a0 = triangle[b->feature - EBPO_NEAR_EDGE0],
-                     *a1 = triangle[(b->feature - EBPO_NEAR_EDGE0 + 1) % 3];
-        const double *b0 = n->triangle[n->bounds.feature - EBPO_NEAR_EDGE0],
-                     *b1 = n->triangle[(n->bounds.feature - EBPO_NEAR_EDGE0 + 1) % 3];
-        if ((same_corner(a0, b1) && same_corner(a1, b0)) ||
-            (same_corner(a0, b0) && same_corner(a1, b1)))
-            return 0;
-    }
-    return ebpo_triangle_distance_compare(n->p, triangle, (const double(*)[3])n->triangle);
-}
-
 static void try_face(ebpo_nearest *n, const ebpo_accel *s, uint32_t slot)
 {
     uint32_t local = s->slot_face[slot];
@@ -93,7 +64,8 @@ static void try_face(ebpo_nearest *n, const ebpo_accel *s, uint32_t slot)
     if (b.lo > n->limit)
         return;
     if (n->found) {
-        int sign = compare(n, (const double(*)[3])triangle, &b);
+        int sign = ebpo_near_compare(n->p, (const double(*)[3])triangle, &b,
+                                     (const double(*)[3])n->triangle, &n->bounds);
         if (sign > 0 || (sign == 0 && file_face > n->file_face))
             return;
     }

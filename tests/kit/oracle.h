@@ -32,6 +32,14 @@ int oracle_distance_compare(oracle *o, double d);
 /* The double nearest to the exact distance between a point and one face. */
 double oracle_face_distance(oracle *o, const double p[3], uint32_t face);
 
+typedef struct oracle_near {
+    uint32_t face;
+    double distance; /* correctly rounded */
+} oracle_near;
+/* All faces at most `radius` away (0 or more, or INFINITY; compared exactly), by exact distance,
+ * then by number. The caller frees them. */
+oracle_near *oracle_order(oracle *o, const double p[3], double radius, uint32_t *count);
+
 /* Winding number of a point that is on no face; the mesh balances. Signed crossings of a ray in the
  * first of a row of directions that meets no edge, no vertex and is parallel to no face that it
  * meets. */

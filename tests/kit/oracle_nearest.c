@@ -85,6 +85,54 @@ int oracle_distance_compare(oracle *o, double d)
     return mpz_cmp(o->s[1], o->s[0]);
 }
 
+/* --- all faces in order --- */
+
+typedef struct ranked {
+    oracle *o;
+    oracle_fraction value;
+    uint32_t face;
+} ranked;
+
+static int compare_ranked(const void *x, const void *y)
+{
+    const ranked *a = x, *b = y;
+    int sign = oracle_fraction_compare(a->o, &a->value, &b->value);
+    return sign ? sign : (a->face > b->face) - (a->face < b->face);
+}
+
+static void *some(size_t count, size_t size)
+{
+    void *room = malloc((count ? count : 1) * size);
+    if (!room)
+        abort();
+    return room;
+}
+
+oracle_near *oracle_order(oracle *o, const double p[3], double radius, uint32_t *count)
+{
+    ranked *all = some(o->face_count, sizeof *all);
+    oracle_near *out = some(o->face_count, sizeof *out);
+    *count = 0;
+    set_point(o, p);
+    for (uint32_t f = 0; f < o->face_count; f++) {
+        face_distance(o, f, &o->best);
+        if (oracle_distance_compare(o, radius) > 0)
+            continue;
+        ranked *r = &all[(*count)++];
+        *r = (ranked){ .o = o, .face = f };
+        mpz_init_set(r->value.num, o->best.num);
+        mpz_init_set(r->value.den, o->best.den);
+    }
+    qsort(all, *count, sizeof *all, compare_ranked);
+    for (uint32_t i = 0; i < *count; i++) {
+        out[i].face = all[i].face;
+        out[i].distance = oracle_round(all[i].value.num, all[i].value.den, 2 * o->e, true);
+        mpz_clears(all[i].value.num, all[i].value.den, NULL);
+    }
+    free(all);
+    return out;
+}
+
 /* --- leaving out what is certainly farther; lengths in units of 2^scale --- */
 
 static double dot(const double a[3], const double b[3])

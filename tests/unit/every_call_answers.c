@@ -27,14 +27,23 @@ static ebpo_status ask_many(ebpo_context *context, ebpo_error *error)
     return status;
 }
 
+static bool count_faces(void *user, const ebpo_near_face *face)
+{
+    *(uint64_t *)user += face->distance < 3;
+    return true;
+}
+
 static ebpo_status ask_one(ebpo_context *context, ebpo_error *error)
 {
     static const double point[3] = { 3, 0.1, 0.2 };
     ebpo_inside_result inside;
     ebpo_distance_result distance;
+    uint64_t count = 0;
     ebpo_status status = ebpo_inside(context, point, NULL, &inside, error);
     if (status == EBPO_OK)
         status = ebpo_distance(context, point, NULL, &distance, error);
+    if (status == EBPO_OK)
+        status = ebpo_distance_within(context, point, NULL, count_faces, &count, error);
     return status;
 }
 

@@ -111,7 +111,7 @@ static void distance_json(bool limited, const ebpo_distance_result *r)
     if (limited) {
         compact_real("{\"lo\": ", r->lo);
         compact_real(", \"hi\": ", r->hi);
-        puts("}");
+        putchar('}');
         return;
     }
     compact_real("{\"distance\": ", r->distance);
@@ -122,15 +122,15 @@ static void distance_json(bool limited, const ebpo_distance_result *r)
         fputs(", \"point\": null, \"normal\": null", stdout);
     }
     if (r->face == EBPO_NO_FACE)
-        puts(", \"face\": null}");
+        fputs(", \"face\": null}", stdout);
     else
-        printf(", \"face\": %" PRIu64 "}\n", r->face);
+        printf(", \"face\": %" PRIu64 "}", r->face);
 }
 
 static void distance_text(bool limited, const ebpo_distance_result *r)
 {
     if (limited) {
-        printf("%.17g %.17g\n", r->lo, r->hi);
+        printf("%.17g %.17g", r->lo, r->hi);
         return;
     }
     printf("%.17g", r->distance);
@@ -140,9 +140,9 @@ static void distance_text(bool limited, const ebpo_distance_result *r)
         else
             fputs(" -", stdout);
     if (r->face == EBPO_NO_FACE)
-        puts(" -");
+        fputs(" -", stdout);
     else
-        printf(" %" PRIu64 "\n", r->face);
+        printf(" %" PRIu64, r->face);
 }
 
 static void distance_raw(bool limited, const ebpo_distance_result *r)
@@ -158,15 +158,52 @@ static void distance_raw(bool limited, const ebpo_distance_result *r)
     raw_u64(stdout, r->face);
 }
 
+static void put_distance(answer_form form, bool limited, const ebpo_distance_result *r)
+{
+    (form == ANSWERS_RAW    ? distance_raw
+     : form == ANSWERS_JSON ? distance_json
+                            : distance_text)(limited, r);
+}
+
 void answers_distance(answer_form form, bool limited, const ebpo_distance_result *results,
                       uint64_t count)
 {
     for (uint64_t i = 0; i < count; i++) {
-        (form == ANSWERS_RAW    ? distance_raw
-         : form == ANSWERS_JSON ? distance_json
-                                : distance_text)(limited, &results[i]);
+        put_distance(form, limited, &results[i]);
+        if (form != ANSWERS_RAW)
+            putchar('\n');
         leave_whole();
     }
+}
+
+/* --- the nearest faces: their number is known at the end only --- */
+
+void answers_near(answer_form form, const ebpo_near_face *face, bool first)
+{
+    ebpo_distance_result r = { .distance = face->distance, .face = face->face };
+    memcpy(r.point, face->point, sizeof r.point);
+    memcpy(r.normal, face->normal, sizeof r.normal);
+    if (form == ANSWERS_JSON)
+        fputs(first ? "[" : ", ", stdout);
+    put_distance(form, false, &r);
+    if (form == ANSWERS_TEXT) {
+        putchar('\n');
+        leave_whole(); /* lists in JSON leave when they are whole, or too long for that */
+    }
+}
+
+void answers_near_end(answer_form form, bool none)
+{
+    static const ebpo_distance_result nothing = { .distance = INFINITY,
+                                                  .point = { NAN, NAN, NAN },
+                                                  .face = EBPO_NO_FACE };
+    if (form == ANSWERS_RAW)
+        distance_raw(false, &nothing);
+    else if (form == ANSWERS_JSON)
+        puts(none ? "[]" : "]");
+    else
+        putchar('\n');
+    leave_whole();
 }
 
 /* --- rays and boxes --- */

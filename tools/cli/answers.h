@@ -19,6 +19,10 @@ void answers_inside(answer_form form, const ebpo_inside_result *results, uint64_
 /* `limited`: lo and hi only. */
 void answers_distance(answer_form form, bool limited, const ebpo_distance_result *results,
                       uint64_t count);
+/* Faces of one point, the nearest first: each as it is found, with what is before it and, for all
+ * of them, what is after the last one. */
+void answers_near(answer_form form, const ebpo_near_face *face, bool first);
+void answers_near_end(answer_form form, bool none);
 void answers_ray_first(answer_form form, const ebpo_ray_hit *hits, uint64_t count);
 void answers_ray_any(answer_form form, const bool *any, uint64_t count);
 /* Of one ray. */

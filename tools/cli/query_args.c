@@ -59,8 +59,15 @@ bool query_distance_fits(const char *name, const query_values *v)
             QUERY_DEADLINE | QUERY_MAX_DISTANCE | QUERY_UNSIGNED | QUERY_NO_WARM | QUERY_PREFETCH
     };
     static const unsigned idle[] = { 0, AROUND, AROUND, ENVELOPE };
+    const char *lists = v->nearest ? "--nearest" : "--within";
     char with[40];
     snprintf(with, sizeof with, "--mode %s", distance_modes[v->distance_mode]);
+    if (query_lists(v) && v->distance_mode != EBPO_DISTANCE_EXACT) {
+        command_usage(name, "%s has no effect with %s; leave out one of them", lists, with);
+        return false;
+    }
+    if (query_lists(v))
+        return query_accepts(name, v, AROUND | QUERY_MAX_DISTANCE | QUERY_UNSIGNED, lists);
     if (!query_accepts(name, v, idle[v->distance_mode], with))
         return false;
     return v->level < 0 ||

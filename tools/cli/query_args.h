@@ -11,8 +11,8 @@
 
 typedef struct query_values {
     const char *memory, *deadline;
-    int64_t cut_level, threads, level;
-    double max_distance, tmax;
+    int64_t cut_level, threads, level, nearest;
+    double max_distance, tmax, within;
     int inside_mode, distance_mode, ray_sides; /* indices into the words below */
     bool prefetch, raw, json, unsigned_distance, no_warm, all, any;
     remote_values remote;
@@ -20,7 +20,7 @@ typedef struct query_values {
 #define QUERY_VALUES_INIT                                                         \
     {                                                                             \
         .cut_level = -1, .level = -1, .max_distance = INFINITY, .tmax = INFINITY, \
-        .remote = REMOTE_VALUES_INIT                                              \
+        .within = INFINITY, .remote = REMOTE_VALUES_INIT                          \
     }
 
 /* Rows for the tables of options. In other structs query_values comes first. */
@@ -68,6 +68,12 @@ enum {
     QUERY_NO_WARM = 16,
     QUERY_PREFETCH = 32
 };
+
+/* Whether distance is asked for lists: --nearest or --within. */
+static inline bool query_lists(const query_values *v)
+{
+    return v->nearest > 0 || isfinite(v->within);
+}
 
 /* False: one of the options `idle` was given, which has no effect with `with`, such as "--mode
  * leaves"; said on stderr (exit with EXIT_USAGE). */

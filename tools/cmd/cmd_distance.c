@@ -12,6 +12,10 @@ static const arg_option options[] = {
                 "recursive, leaves, envelope"),
     OPTION_REAL("max-distance", 0, query_values, max_distance, "D", 0, DBL_MAX,
                 "ignore what is farther than D: inf"),
+    OPTION_INT("nearest", 'k', query_values, nearest, "K", 1, 9007199254740992.0,
+               "the K nearest faces of each point, a line for each, then an empty line"),
+    OPTION_REAL("within", 0, query_values, within, "R", 0, DBL_MAX,
+                "all faces at most R away likewise; with --nearest at most K of them"),
     OPTION_FLAG("unsigned", 0, query_values, unsigned_distance,
                 "no sign (surfaces have none anyway)"),
     OPTION_FLAG("no-warm", 0, query_values, no_warm,
@@ -21,7 +25,7 @@ static const arg_option options[] = {
     QUERY_MODEL_OPTIONS,
     QUERY_PREFETCH_OPTION,
     QUERY_FORM_OPTIONS("each point is three doubles, each answer seven doubles and a uint64, or lo "
-                       "and hi (little-endian)"),
+                       "and hi; lists end with a face of 2^64 - 1 (little-endian)"),
     { 0 },
 };
 
@@ -42,10 +46,41 @@ static bool limited(const ebpo_distance_options *o)
     return o->mode == EBPO_DISTANCE_EXACT && (o->level >= 0 || o->deadline_ns);
 }
 
+typedef struct listing {
+    answer_form form;
+    bool begun;
+} listing;
+
+static bool list(void *user, const ebpo_near_face *face)
+{
+    listing *l = user;
+    answers_near(l->form, face, !l->begun);
+    l->begun = true;
+    return !ferror(stdout);
+}
+
+static ebpo_status answer_lists(const query_job *job, ebpo_context *context, const double *rows,
+                                uint64_t count, ebpo_error *error)
+{
+    ebpo_within_options o = EBPO_WITHIN_OPTIONS_INIT;
+    ebpo_status status = EBPO_OK;
+    o.radius = job->values->within;
+    o.most = (uint64_t)job->values->nearest;
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
+        listing l = { job->form, false };
+        status = ebpo_distance_within(context, rows + 3 * i, &o, list, &l, error);
+        if (status == EBPO_OK)
+            answers_near_end(job->form, !l.begun);
+    }
+    return status;
+}
+
 static ebpo_status answer(const query_job *job, ebpo_context *context, const double *rows,
                           uint64_t count, ebpo_error *error)
 {
     ebpo_distance_result *results = job->results;
+    if (count && query_lists(job->values))
+        return answer_lists(job, context, rows, count, error);
     ebpo_status status = ebpo_distance_many(context, rows, count, &job->distance, results, error);
     if (status == EBPO_OK)
         answers_distance(job->form, limited(&job->distance), results, count);

@@ -4,7 +4,7 @@
  *
  *   Models           ebpo_model_new, and ebpo_context_new for each thread
  *   Point in solid   ebpo_inside, ebpo_inside_many
- *   Distance         ebpo_distance, ebpo_distance_many
+ *   Distance         ebpo_distance, ebpo_distance_many, ebpo_distance_within
  *   Rays             ebpo_ray_first, ebpo_ray_any, ebpo_ray_all, and each of these for many
  *   Boxes            ebpo_faces_in_box, ebpo_triangles_in_box
  *   Mass             ebpo_measure
@@ -398,6 +398,71 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_distance_many(ebpo_context *context, con
                                                       uint64_t count,
                                                       const ebpo_distance_options *options,
                                                       ebpo_distance_result *out, ebpo_error *error);
+
+typedef struct ebpo_within_options {
+    size_t struct_size; /* EBPO_WITHIN_OPTIONS_INIT sets it */
+
+    /*
+     * Faces at most so far away, in the model's unit, decided without rounding; at least 0.
+     * INFINITY: all.
+     */
+    double radius;
+
+    /* The nearest so many of these; 0: all. */
+    uint64_t most;
+
+    /* Without, normals are NAN: less work. */
+    bool normals;
+
+    uint8_t reserved[7];
+} ebpo_within_options;
+
+#define EBPO_WITHIN_OPTIONS_INIT                                     \
+    {                                                                \
+        sizeof(ebpo_within_options), __builtin_inf(), 0, true, { 0 } \
+    }
+
+/* A face and its distance, lent until the function returns that is called with it. */
+typedef struct ebpo_near_face {
+    /* Correctly rounded, unsigned. */
+    double distance;
+
+    /* As in ebpo_distance_result. */
+    double point[3], normal[3];
+
+    /* As in ebpo_distance_result; and in the file. */
+    uint64_t face, file_face;
+
+    uint64_t reserved[3];
+} ebpo_near_face;
+
+/* False: enough. */
+typedef bool (*ebpo_near_fn)(void *user, const ebpo_near_face *face);
+
+/*
+ * The nearest faces of a point, or all faces within a radius, each once, given to `take` in
+ * ascending order of their exact distances; of several at the same distance the first one in the
+ * file comes first, so the first of all is that of ebpo_distance.
+ *
+ * options   NULL for the usual ones: all faces of the model
+ * take      must not use the context; when it returns false, nothing more is given, and the call
+ *           succeeds
+ *
+ * What is under way takes at most 16 MiB, beside the model's budget, however many faces are given:
+ * after every 65,536 (without `most` also after some of the first ones) the search begins anew
+ * behind the last one. Subtrees are loaded the nearest first, and only those that may have a face
+ * of the answer; each once, if the budget holds them until the search is behind them.
+ *
+ * EBPO_E_ABSENT: as for ebpo_distance; in a subset perhaps after some faces, which are right.
+ * EBPO_E_ARGUMENT: before the first face. EBPO_E_LIMIT, EBPO_E_MEMORY, and the errors of reading.
+ *
+ * Threads: one per context.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_distance_within(ebpo_context *context,
+                                                        const double point[3],
+                                                        const ebpo_within_options *options,
+                                                        ebpo_near_fn take, void *user,
+                                                        ebpo_error *error);
 
 /* ---- rays ---- */
 

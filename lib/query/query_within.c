@@ -1,0 +1,197 @@
+/* The nearest faces of a point, one after the other. */
+#include "geom/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/fp_env.h"
+#include "base/sized.h"
+#include "query/near_band.h"
+#include "query/options.h"
+#include "query/pruned.h"
+
+/* The first band is small, for those who soon have enough; each one is some times larger, so that
+ * beginning anew costs little. */
+enum { FIRST_BAND = 256, BAND_GROWTH = 8, BAND_MOST = 1 << 16 };
+
+typedef struct within {
+    ebpo_context *context;
+    const ebpo_within_options *options;
+    ebpo_near_band band;
+    uint64_t given;
+    ebpo_near_fn take;
+    void *user;
+} within;
+
+/* --- not everything in memory: the nearest of what is left, until it is beyond the limit --- */
+
+/* Moves an item up the heap to where it belongs. */
+static bool push(ebpo_context *c, const ebpo_ranked *r)
+{
+    if (!ebpo_grow(&c->later, &c->later_capacity, c->later_count + 1, sizeof *c->later))
+        return false;
+    uint64_t at = c->later_count++;
+    for (; at > 0 && c->later[(at - 1) / 2].lower > r->lower; at = (at - 1) / 2)
+        c->later[at] = c->later[(at - 1) / 2];
+    c->later[at] = *r;
+    return true;
+}
+
+static ebpo_ranked pop(ebpo_context *c)
+{
+    ebpo_ranked first = c->later[0], last = c->later[--c->later_count];
+    uint64_t at = 0, child = 1;
+    for (; child < c->later_count; at = child, child = 2 * at + 1) {
+        child += child + 1 < c->later_count && c->later[child + 1].lower < c->later[child].lower;
+        if (!(c->later[child].lower < last.lower))
+            break;
+        c->later[at] = c->later[child];
+    }
+    c->later[at] = last;
+    return first;
+}
+
+/* What a subset has left out is looked at when the band is known. */
+static ebpo_status put(within *w, const ebpo_box *box, const ebpo_ranked *r, ebpo_error *error)
+{
+    bool idle = ebpo_node_is_uniform(&r->node) || r->node.pruned || r->lower > w->band.limit ||
+                ebpo_near_band_is_past(&w->band, ebpo_cell_far(box, r->node.cell, w->band.p));
+    return idle || push(w->context, r)
+               ? EBPO_OK
+               : ebpo_fail_memory(error, w->context->later_count * sizeof *r);
+}
+
+static ebpo_status search_below(within *w, ebpo_ranked *r, ebpo_error *error)
+{
+    if (w->band.count > w->band.most) /* it may not be needed */
+        ebpo_near_band_settle(&w->band);
+    if (r->lower > w->band.limit)
+        return EBPO_OK;
+    ebpo_status status = ebpo_model_enter(w->context, &r->node, error);
+    if (status == EBPO_OK)
+        ebpo_near_band_search(&w->band, r->node.subtree);
+    return status;
+}
+
+static ebpo_status put_children(within *w, const ebpo_box *box, const ebpo_ranked *r,
+                                ebpo_error *error)
+{
+    ebpo_ranked child[8];
+    int count = ebpo_rank_children(w->context->model, box, &r->node, r->lower, w->band.p, child);
+    ebpo_status status = EBPO_OK;
+    for (int i = 0; i < count && status == EBPO_OK; i++)
+        status = put(w, box, &child[i], error);
+    return status;
+}
+
+static ebpo_status search_parts(within *w, ebpo_error *error)
+{
+    ebpo_context *c = w->context;
+    ebpo_box box = ebpo_model_box(c->model);
+    ebpo_ranked root = { ebpo_model_root(c->model), 0 };
+    c->later_count = 0;
+    ebpo_status status = put(w, &box, &root, error);
+    while (status == EBPO_OK && c->later_count) {
+        ebpo_ranked r = pop(c);
+        if (r.lower > w->band.limit)
+            break;
+        status = ebpo_node_is_below(&r.node) ? search_below(w, &r, error)
+                                             : put_children(w, &box, &r, error);
+    }
+    return status;
+}
+
+/* --- band by band --- */
+
+static bool node_matters(void *user, const ebpo_box *box, const ebpo_node *node)
+{
+    const within *w = user;
+    return ebpo_model_lower_bound(w->context->model, box, node, 0, w->band.p) <= w->band.limit;
+}
+
+static ebpo_status search_band(within *w, uint64_t most, ebpo_error *error)
+{
+    const ebpo_model *m = w->context->model;
+    ebpo_status status = EBPO_OK;
+    ebpo_near_band_begin(&w->band, most);
+    if (m->whole)
+        ebpo_near_band_search(&w->band, m->whole);
+    else
+        status = search_parts(w, error);
+    if (status == EBPO_OK && w->band.no_memory)
+        status = ebpo_fail_memory(error, (w->band.count + 1) * sizeof *w->band.near);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_near_band_settle(&w->band);
+    return ebpo_check_pruned(w->context, node_matters, w, error);
+}
+
+/* False: enough. */
+static bool give(within *w, const ebpo_near *n)
+{
+    ebpo_triangle_nearest exact;
+    ebpo_near_face out = { .normal = { NAN, NAN, NAN },
+                           .face = n->source_face,
+                           .file_face = n->file_face };
+    ebpo_triangle_nearest_exact(n->p, (const double(*)[3])n->triangle, &n->bounds, &exact);
+    out.distance = exact.distance;
+    memcpy(out.point, exact.point, sizeof out.point);
+    if (w->options->normals)
+        ebpo_triangle_unit_normal((const double(*)[3])n->triangle, out.normal);
+    w->given++;
+    return w->take(w->user, &out);
+}
+
+static bool give_band(within *w)
+{
+    for (uint64_t i = 0; i < w->band.count; i++)
+        if (!give(w, &w->band.near[i]))
+            return false;
+    if (!w->band.cut)
+        return false;
+    w->band.has_after = true;
+    w->band.after = w->band.near[w->band.count - 1];
+    return true;
+}
+
+static ebpo_status stream(within *w, ebpo_error *error)
+{
+    uint64_t wanted = w->options->most ? w->options->most : UINT64_MAX,
+             most = w->options->most ? BAND_MOST : FIRST_BAND;
+    bool more = true;
+    ebpo_status status = EBPO_OK;
+    while (more && w->given < wanted && status == EBPO_OK) {
+        uint64_t left = wanted - w->given;
+        status = search_band(w, left < most ? left : most, error);
+        more = status == EBPO_OK && give_band(w);
+        most = most < BAND_MOST / BAND_GROWTH ? most * BAND_GROWTH : BAND_MOST;
+    }
+    return status;
+}
+
+ebpo_status ebpo_distance_within(ebpo_context *context, const double point[3],
+                                 const ebpo_within_options *options, ebpo_near_fn take, void *user,
+                                 ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_within_options wanted = EBPO_WITHIN_OPTIONS_INIT;
+    within w = { .context = context, .options = &wanted, .take = take, .user = user };
+    ebpo_status status = EBPO_TAKE(ebpo_within_options, &wanted, options, error);
+    if (status == EBPO_OK && !(wanted.radius >= 0))
+        status = ebpo_fail(error, EBPO_E_ARGUMENT, "radius %g: give 0 or more", wanted.radius);
+    if (status == EBPO_OK)
+        status = ebpo_check_points(point, 1, error);
+    if (status == EBPO_OK)
+        status = ebpo_check_mesh(context->model, error);
+    if (status != EBPO_OK)
+        return status;
+    context->planes = context->model->info->pruned; /* as in ebpo_distance */
+    memcpy(w.band.p, point, sizeof w.band.p);
+    w.band.radius = wanted.radius;
+    status = stream(&w, error);
+    free(w.band.near);
+    return status;
+}
