@@ -11,6 +11,7 @@ NEAR = 1e-4     # of the diagonal
 VIEW_FROM = 0.03
 KEPT = 588e3    # bytes of the box that is fetched
 CONNECTIONS = 32  # where waves are counted: the most that the command opens
+TRIES = 3
 
 
 class Side:
@@ -171,7 +172,9 @@ def measure(server, line, side, row, work):
     found = ask(server, line, side, row, work)
     found["round_trips"] = found.pop("waves")
     if row.waves:
-        found["waves"] = ask(server, line, side, row, work, CONNECTIONS)["waves"]
+        # a machine with much to do only ever adds to them
+        tries = [ask(server, line, side, row, work, CONNECTIONS)["waves"] for _ in range(TRIES)]
+        found["waves"] = [min(each) for each in zip(*tries)]
     return found
 
 

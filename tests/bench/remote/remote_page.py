@@ -116,7 +116,8 @@ def question_tables(page, found):
               "the present one had come in whole. *Waves*: the same with "
               f"`--http-connections {asked.CONNECTIONS}`, where a request that is sent when a "
               "connection becomes free, all having been busy, had only waited for that: what "
-              "depends on what. Times as the line before nginx has them.", "",
+              f"depends on what; the least of {asked.TRIES} tries, as a busy machine only adds to "
+              "them. Times as the line before nginx has them.", "",
               f"*Near*: at most {asked.NEAR:g} diagonals from the surface, at places where random "
               "lines enter the model.")
     for name, row in found.rows().items():
