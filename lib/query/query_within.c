@@ -11,6 +11,7 @@
 #include "base/sized.h"
 #include "query/near_band.h"
 #include "query/options.h"
+#include "query/prefetch.h"
 #include "query/pruned.h"
 
 /* The first band is small, for those who soon have enough; each one is some times larger, so that
@@ -22,6 +23,8 @@ typedef struct within {
     const ebpo_within_options *options;
     ebpo_near_band band;
     uint64_t given;
+    bool ahead;         /* lists_ahead */
+    uint64_t announced; /* subtrees that were, and were not entered since */
     ebpo_near_fn take;
     void *user;
 } within;
@@ -54,14 +57,46 @@ static ebpo_ranked pop(ebpo_context *c)
     return first;
 }
 
+/* Of a file far away: all subtrees within a radius will be entered, so they are listed at once, and
+ * asked for together. Of the nearest so many faces nobody knows. */
+static bool lists_ahead(const within *w)
+{
+    const ebpo_model *m = w->context->model;
+    return !w->options->most && isfinite(w->band.radius) && !m->whole &&
+           m->options.loading == EBPO_LOAD_CACHE && ebpo_input_expects(&m->file->in);
+}
+
+static ebpo_status put_children(within *w, const ebpo_box *box, const ebpo_ranked *r,
+                                ebpo_error *error);
+
 /* What a subset has left out is looked at when the band is known. */
 static ebpo_status put(within *w, const ebpo_box *box, const ebpo_ranked *r, ebpo_error *error)
 {
-    bool idle = ebpo_node_is_uniform(&r->node) || r->node.pruned || r->lower > w->band.limit ||
-                ebpo_near_band_is_past(&w->band, ebpo_cell_far(box, r->node.cell, w->band.p));
-    return idle || push(w->context, r)
-               ? EBPO_OK
-               : ebpo_fail_memory(error, w->context->later_count * sizeof *r);
+    if (ebpo_node_is_uniform(&r->node) || r->node.pruned || r->lower > w->band.limit ||
+        ebpo_near_band_is_past(&w->band, ebpo_cell_far(box, r->node.cell, w->band.p)))
+        return EBPO_OK;
+    if (w->ahead && !ebpo_node_is_below(&r->node))
+        return put_children(w, box, r, error);
+    return push(w->context, r) ? EBPO_OK
+                               : ebpo_fail_memory(error, w->context->later_count * sizeof *r);
+}
+
+/* Before a subtree is entered: with the first of each window some of those behind it. */
+static void announce(within *w, const ebpo_ranked *next)
+{
+    const ebpo_context *c = w->context;
+    uint32_t below[EBPO_ANNOUNCED_MOST];
+    uint64_t count = 0;
+    if (!w->ahead || w->announced) {
+        w->announced -= w->announced > 0;
+        return;
+    }
+    below[count++] = ebpo_entry_value(next->node.entry);
+    for (uint64_t i = 0; i < c->later_count && count < EBPO_ANNOUNCED_MOST; i++)
+        if (c->later[i].lower <= w->band.limit)
+            below[count++] = ebpo_entry_value(c->later[i].node.entry);
+    ebpo_context_announce(c, below, count);
+    w->announced = count - 1;
 }
 
 static ebpo_status search_below(within *w, ebpo_ranked *r, ebpo_error *error)
@@ -70,6 +105,7 @@ static ebpo_status search_below(within *w, ebpo_ranked *r, ebpo_error *error)
         ebpo_near_band_settle(&w->band);
     if (r->lower > w->band.limit)
         return EBPO_OK;
+    announce(w, r);
     ebpo_status status = ebpo_model_enter(w->context, &r->node, error);
     if (status == EBPO_OK)
         ebpo_near_band_search(&w->band, r->node.subtree);
@@ -191,6 +227,7 @@ ebpo_status ebpo_distance_within(ebpo_context *context, const double point[3],
     context->planes = context->model->info->pruned; /* as in ebpo_distance */
     memcpy(w.band.p, point, sizeof w.band.p);
     w.band.radius = wanted.radius;
+    w.ahead = lists_ahead(&w);
     status = stream(&w, error);
     free(w.band.near);
     return status;

@@ -64,6 +64,49 @@ START_TEST(a_question_from_afar_takes_few_waves)
 }
 END_TEST
 
+static bool add_up(void *user, const ebpo_near_face *face)
+{
+    *(double *)user += face->distance;
+    return true;
+}
+
+/* Cold. */
+static double sum_within(const ebpo_file *file, const double p[3], double radius)
+{
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_within_options within = EBPO_WITHIN_OPTIONS_INIT;
+    ebpo_model *model;
+    ebpo_context *context;
+    double sum = 0;
+    options.threads = 1;
+    options.memory = 64 << 20;
+    within.radius = radius;
+    EXPECT(ebpo_model_new(file, &options, &model, NULL) == EBPO_OK);
+    EXPECT(ebpo_context_new(model, &context, NULL) == EBPO_OK);
+    EXPECT(ebpo_distance_within(context, p, &within, add_up, &sum, NULL) == EBPO_OK);
+    ebpo_context_free(context);
+    ebpo_model_free(model);
+    return sum;
+}
+
+/* All subtrees within a radius are asked for together. */
+START_TEST(a_radius_from_afar_takes_few_waves)
+{
+    enum { WAVES = 4 };
+    static const double p[3] = { 2.71, 0, 0.01 };
+    two_layouts l;
+    counted_source c;
+    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 400, 240), 9, ALL, EBPO_CODEC_ZSTD, 400);
+    ebpo_file *far = counted_open(&c, l.packed, true);
+    uint64_t opened = c.batches + c.alone;
+    EXPECT(sum_within(far, p, 1) == sum_within(l.without, p, 1));
+    ck_assert_msg(c.batches + c.alone - opened <= WAVES, "%d waves",
+                  (int)(c.batches + c.alone - opened));
+    counted_close(&c, far);
+    two_layouts_close(&l);
+}
+END_TEST
+
 /* --- parts of the file --- */
 
 /* After the head: the top, rows of the table, nodes with lists, faces with the vertices that come
@@ -142,6 +185,7 @@ Suite *test_suite(void)
     tcase_set_timeout(tests, 900);
     tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
     tcase_add_test(tests, a_question_from_afar_takes_few_waves);
+    tcase_add_test(tests, a_radius_from_afar_takes_few_waves);
     tcase_add_test(tests, a_box_from_afar_takes_few_waves);
     tcase_add_loop_test(tests, a_view_from_afar_takes_few_waves, 0, 3);
     suite_add_tcase(suite, tests);
