@@ -15,7 +15,7 @@
  * part of the budget. */
 enum { IDLE_MAX = 4, CHUNK_BITS = 48, AROUND = 4 };
 /* Announced for later: at most so much, and a share of what a limit leaves. */
-enum { AHEAD_MOST = 4 << 20, AHEAD_SHARE = 4 };
+enum { AHEAD_MOST = 4 << 20, AHEAD_SHARE = 4, BATCH_SHARE = 16 };
 
 struct ebpo_chunk_scratch {
     ebpo_chunk_scratch *next;
@@ -246,20 +246,33 @@ static bool is_ahead(const ebpo_chunks *c, uint64_t key)
     return false;
 }
 
+static uint64_t least(uint64_t a, uint64_t b) { return a < b ? a : b; }
+
+/* A share of what the limit leaves, less what waits to be read. What waits may wait for long, as a
+ * view turns to others first: a smaller share is left for each batch, or each would be one chunk.
+ */
+uint64_t ebpo_chunks_room(const ebpo_chunks *c)
+{
+    uint64_t taken = atomic_load(&c->file->in.bytes),
+             left = c->limit > taken ? c->limit - taken : 0,
+             share = least(left / AHEAD_SHARE, AHEAD_MOST);
+    uint64_t batch = least(left / BATCH_SHARE, AHEAD_MOST / BATCH_SHARE);
+    return share > c->ahead_bytes + batch ? share - c->ahead_bytes : batch;
+}
+
 void ebpo_chunks_announce(ebpo_chunks *c, const uint64_t *keys, unsigned now, unsigned count)
 {
     ebpo_expected e = EBPO_EXPECTED_INIT(c->file);
+    uint64_t room = ebpo_chunks_room(c);
     for (unsigned i = 0; i < count; i++) {
         const ebpo_array_in *array = array_of(c, keys[i]);
         if (ebpo_h5_chunk_count(&array->shape) > 1 && !atomic_load(&c->file->located))
             continue; /* where it lies is not known yet */
-        uint64_t cost = cost_of(c, array, chunk_of(keys[i])),
-                 taken = atomic_load(&c->file->in.bytes);
-        uint64_t left = c->limit > taken ? c->limit - taken : 0,
-                 share = left / AHEAD_SHARE < AHEAD_MOST ? left / AHEAD_SHARE : AHEAD_MOST;
-        if (is_ahead(c, keys[i]) || !fits(c, cost) || (i >= now && c->ahead_bytes + cost > share) ||
+        uint64_t cost = cost_of(c, array, chunk_of(keys[i]));
+        if (is_ahead(c, keys[i]) || !fits(c, cost) || (i >= now && cost > room) ||
             !ebpo_grow(&c->ahead, &c->ahead_capacity, c->ahead_count + 1, sizeof *c->ahead))
             continue;
+        room -= i >= now ? cost : 0;
         c->ahead[c->ahead_count++] = keys[i];
         c->ahead_bytes += cost;
         ebpo_expect_chunks(&e, array, chunk_of(keys[i]), chunk_of(keys[i]) + 1);
@@ -284,6 +297,7 @@ static void clear_slots(ebpo_chunk_keys *keys, unsigned slots)
 void ebpo_chunk_keys_begin(ebpo_chunk_keys *keys)
 {
     keys->count = 0;
+    keys->bytes = 0;
     clear_slots(keys, 16);
 }
 
@@ -295,12 +309,13 @@ static uint64_t slot_of(const ebpo_chunk_keys *keys, uint64_t key)
     return at;
 }
 
-static void add_key(ebpo_chunk_keys *keys, uint64_t key)
+static void add_key(ebpo_chunk_keys *keys, uint64_t key, uint64_t bytes)
 {
     uint64_t at = slot_of(keys, key);
     if (keys->slot[at] || keys->count == EBPO_CHUNK_KEYS)
         return;
     keys->key[keys->count++] = key;
+    keys->bytes += bytes;
     keys->slot[at] = (uint16_t)keys->count;
     if (2 * keys->count <= keys->mask || keys->count == EBPO_CHUNK_KEYS)
         return;
@@ -322,7 +337,7 @@ bool ebpo_chunks_missing(ebpo_chunks *c, ebpo_array_id id, int level, uint64_t r
         uint64_t key = key_of(array, i);
         if (!ebpo_cache_has(c->cache, key)) {
             missing = true;
-            add_key(keys, key);
+            add_key(keys, key, cost_of(c, array, i));
         }
     }
     return missing;
@@ -489,7 +504,7 @@ ebpo_status ebpo_held_chunk_load(ebpo_chunks *chunks, ebpo_held_chunk *view, uin
     ebpo_held_chunk_release(chunks, view); /* first: a tight budget may need the room */
     uint64_t key = key_of(view->array, chunk);
     if (chunks->collecting && !ebpo_cache_has(chunks->cache, key)) {
-        add_key(chunks->collecting, key);
+        add_key(chunks->collecting, key, cost_of(chunks, view->array, chunk));
         return EBPO_E_LIMIT;
     }
     ebpo_status status = ebpo_cache_get(chunks->cache, key, &item, NULL, error);

@@ -89,6 +89,7 @@ void ebpo_chunks_expect(ebpo_chunks *chunks, ebpo_expected *expected, ebpo_array
 enum { EBPO_CHUNK_KEYS = 8192 };
 typedef struct ebpo_chunk_keys {
     unsigned count, mask; /* mask + 1 slots */
+    uint64_t bytes;       /* that reading them takes of the file */
     uint64_t key[EBPO_CHUNK_KEYS];
     uint16_t slot[2 * EBPO_CHUNK_KEYS]; /* number in `key` + 1; 0: free */
 } ebpo_chunk_keys;
@@ -102,6 +103,9 @@ bool ebpo_chunks_missing(ebpo_chunks *chunks, ebpo_array_id id, int level, uint6
  * count as read. The first `now` are needed at once; the others only as far as what has been
  * announced and not been read stays small, also beside what the limit leaves. */
 void ebpo_chunks_announce(ebpo_chunks *chunks, const uint64_t *keys, unsigned now, unsigned count);
+
+/* How many bytes may be announced now for later. */
+uint64_t ebpo_chunks_room(const ebpo_chunks *chunks);
 
 /* Of counted arrays: whether all of these have been announced, and not been read yet. */
 bool ebpo_chunks_announced(const ebpo_chunks *chunks, const ebpo_chunk_keys *keys);

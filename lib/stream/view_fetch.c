@@ -128,9 +128,11 @@ static void enter_frontier(const fetching *f, entering *e)
     }
 }
 
-/* Of the subtrees of these groups, all that the view will come to. Faces: not where it goes through
- * so many that it comes to the end of none soon; then what the next groups take is enough. */
-static bool try_subtrees(const fetching *f, const ebpo_view_group *groups, unsigned count)
+/* Of the subtrees of these groups, all that the view will come to, as far as `most` bytes go.
+ * Faces: not where it goes through so many that it comes to the end of none soon; then what the
+ * next groups take is enough. */
+static bool try_subtrees(const fetching *f, const ebpo_view_group *groups, unsigned count,
+                         const ebpo_chunk_keys *keys, uint64_t most)
 {
     entering e;
     bool planes = f->wanted & EBPO_GROUP_PLANES, windings = f->wanted & EBPO_GROUP_WINDINGS;
@@ -143,7 +145,7 @@ static bool try_subtrees(const fetching *f, const ebpo_view_group *groups, unsig
         enter_frontier(f, &e);
     if (f->faces && e.count > WITH_FACES)
         return false;
-    for (unsigned i = 0; i < e.count; i++) {
+    for (unsigned i = 0; i < e.count && keys->bytes < most; i++) {
         ebpo_expected none = EBPO_EXPECTED_INIT(f->chunks->file);
         ebpo_subtrees_expect(f->chunks, &none, e.list[i].number, 1, needs,
                              f->depth->level(f->depth->user, e.list[i].octcode), f->faces);
@@ -164,10 +166,11 @@ static unsigned collect(const fetching *f, const ebpo_view_group *group, ebpo_ch
     ebpo_chunks_collect(f->chunks, keys);
     try_group(f, group);
     unsigned own = keys->count;
+    uint64_t most = keys->bytes + ebpo_chunks_room(f->chunks);
     if (own && !ebpo_chunks_announced(f->chunks, keys)) {
         unsigned count = coming(f, group, f->faces ? FACES_BLOCK : 1, groups);
-        bool told = try_subtrees(f, groups, count);
-        for (unsigned i = 1; i < count && i < TRIED && !told; i++)
+        bool told = try_subtrees(f, groups, count, keys, most);
+        for (unsigned i = 1; i < count && i < TRIED && !told && keys->bytes < most; i++)
             try_group(f, &groups[i]);
     }
     ebpo_chunks_collect(f->chunks, NULL);

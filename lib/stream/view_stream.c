@@ -173,14 +173,39 @@ static bool read_at_once(ebpo_view_stream *s, const ebpo_view_group *group, unsi
     return status == EBPO_OK && missing.count == 0;
 }
 
-/* The first level at which nothing below the node is refined any more, seen from where it is
- * nearest. */
+/* A view that ends with a number of bytes or nodes comes to an unknown depth: what is this much
+ * deeper than the next node, or smaller, is not announced before its turn is near. */
+enum { SOON_LEVELS = 2 };
+
+static void set_soon(ebpo_view_stream *s, uint64_t next)
+{
+    int level = ebpo_octcode_level(next);
+    ebpo_seen look = ebpo_viewpoint_see(&s->viewpoint, &s->box, ebpo_cell_of_octcode(next));
+    bool ends = s->options.bytes || s->options.nodes;
+    s->soon_level =
+        ends && s->options.priority == EBPO_PRIORITY_LEVEL ? level + SOON_LEVELS : EBPO_LEVELS_MAX;
+    s->soon_pixels =
+        ends && s->options.priority == EBPO_PRIORITY_PIXELS
+            ? ldexp(ebpo_viewpoint_pixels(&s->viewpoint, level, look.distance2), -SOON_LEVELS)
+            : 0;
+}
+
+static bool is_late(const ebpo_view_stream *s, int level, ebpo_seen look)
+{
+    return level > s->soon_level ||
+           (s->soon_pixels > 0 &&
+            ebpo_viewpoint_pixels(&s->viewpoint, level, look.distance2) < s->soon_pixels);
+}
+
+/* The first level at which nothing below the node is refined any more, or not soon, seen from where
+ * it is nearest. */
 static int depth_below(const void *user, uint64_t octcode)
 {
     const ebpo_view_stream *s = user;
     ebpo_seen look = ebpo_viewpoint_see(&s->viewpoint, &s->box, ebpo_cell_of_octcode(octcode));
     int level = ebpo_octcode_level(octcode);
-    while (level < s->info->level_count && turn_of(s, level, look) != EBPO_TURN_NEVER)
+    while (level < s->info->level_count && turn_of(s, level, look) != EBPO_TURN_NEVER &&
+           !is_late(s, level, look))
         level++;
     return level;
 }
@@ -196,6 +221,7 @@ static ebpo_status read_group(ebpo_view_stream *s, const ebpo_view_group *group,
     if (ebpo_input_expects(&s->chunks->file->in)) {
         if (read_at_once(s, group, wanted))
             return EBPO_OK;
+        set_soon(s, group->parent ? group->parent : 1);
         status = ebpo_view_fetch(s->chunks, &s->partial, &s->frontier, group, wanted,
                                  s->leaves != NULL, &depth, error);
     }

@@ -28,6 +28,9 @@ struct ebpo_view_stream {
     ebpo_envelope_stack *envelopes; /* with polygons */
     ebpo_node_buffers capacity;
     ebpo_view_leaves *leaves; /* with faces */
+    /* what is deeper, or smaller, is not announced yet */
+    int soon_level;
+    double soon_pixels;
 };
 
 /* All about a node of `grown`; `complete` is left to the caller. */
