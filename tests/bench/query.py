@@ -11,9 +11,9 @@ what that needs). Each model is converted once (kept in --work); every figure is
 each, on one core. The modes are measured on the largest model below a million faces.
 
 What is asked of `ebpo bench FILE --query inside|distance|ray|ray-any|ray-all --points
-uniform|path|camera|segments|degenerate --seed S --count N --json`: --save-points and --save-answers (both in the peers' layout: tests/bench/peers/peer.hpp;
-inside: 0 out, 1 in, 2 on the surface), --mode, --level, --memory BYTES, --prefetch; in its JSON the
-keys of OURS below.
+uniform|path|camera|segments|degenerate --seed S --count N --json`: --save-points and --save-answers
+(both in the peers' layout: tests/bench/peers/peer.hpp; inside: 0 out, 1 in, 2 on the surface), --mode,
+--level, --memory BYTES, --prefetch; in its JSON the keys of OURS below.
 """
 import argparse
 import array

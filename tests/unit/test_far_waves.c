@@ -149,6 +149,20 @@ static uint64_t count_nodes(const ebpo_file *file, const ebpo_view_options *opti
     return count;
 }
 
+/* Of the torus seen from outside: with planes, and without what is not seen. */
+static ebpo_view_options look(ebpo_observer *observer, ebpo_priority order)
+{
+    ebpo_view_options view = EBPO_VIEW_OPTIONS_INIT;
+    observer->eye[0] = 4;
+    observer->direction[0] = -1;
+    observer->up[2] = 1;
+    view.observer = observer;
+    view.unseen = EBPO_UNSEEN_NEVER;
+    view.planes = true;
+    view.priority = order;
+    return view;
+}
+
 /* Whatever comes first in it: all subtrees that a view will come to are asked for together. */
 START_TEST(a_view_from_afar_takes_few_waves)
 {
@@ -158,22 +172,46 @@ START_TEST(a_view_from_afar_takes_few_waves)
     two_layouts l;
     counted_source c;
     ebpo_observer observer = EBPO_OBSERVER_INIT;
-    ebpo_view_options view = EBPO_VIEW_OPTIONS_INIT;
+    ebpo_view_options view = look(&observer, order[_i]);
     two_layouts_build(&l, ebpo_test_torus(2, 0.7, 400, 240), 9, ALL, EBPO_CODEC_ZSTD, 400);
-    observer.eye[0] = 4;
-    observer.direction[0] = -1;
-    observer.up[2] = 1;
-    view.observer = &observer;
-    view.unseen = EBPO_UNSEEN_NEVER;
     view.pixels = 8;
-    view.planes = true;
-    view.priority = order[_i];
     ebpo_file *far = counted_open(&c, l.packed, true);
     uint64_t opened = c.batches + c.alone, nodes = count_nodes(far, &view);
     ck_assert_msg(c.batches + c.alone - opened <= WAVES, "%d waves",
                   (int)(c.batches + c.alone - opened));
     EXPECT(nodes == count_nodes(l.without, &view) && nodes > 1000);
     counted_close(&c, far);
+    two_layouts_close(&l);
+}
+END_TEST
+
+/* How deep it comes is not known before: what is announced is what its turn is near, neither the
+ * deepest levels, for which there is no room, nor one node after the other. */
+START_TEST(a_view_that_ends_from_afar_takes_few_waves)
+{
+    static const struct {
+        ebpo_priority order;
+        uint64_t bytes, nodes, waves;
+    } ends[] = { { EBPO_PRIORITY_LEVEL, 0, 30000, 6 },
+                 { EBPO_PRIORITY_PIXELS, 0, 30000, 6 },
+                 { EBPO_PRIORITY_LEVEL, 400000, 0, 60 },
+                 { EBPO_PRIORITY_PIXELS, 400000, 0, 30 } };
+    two_layouts l;
+    counted_source c;
+    ebpo_observer observer = EBPO_OBSERVER_INIT;
+    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 400, 240), 9, ALL, EBPO_CODEC_ZSTD, 400);
+    for (size_t i = 0; i < sizeof ends / sizeof *ends; i++) {
+        ebpo_view_options view = look(&observer, ends[i].order);
+        view.bytes = ends[i].bytes;
+        view.nodes = ends[i].nodes;
+        ebpo_file *far = counted_open(&c, l.packed, true);
+        uint64_t opened = c.batches + c.alone, nodes = count_nodes(far, &view),
+                 waves = c.batches + c.alone - opened;
+        ck_assert_msg(waves <= ends[i].waves, "%d waves of view %d", (int)waves, (int)i);
+        EXPECT(c.asked <= (view.bytes ? view.bytes : c.size / 5));
+        EXPECT(view.bytes || nodes == count_nodes(l.without, &view));
+        counted_close(&c, far);
+    }
     two_layouts_close(&l);
 }
 END_TEST
@@ -188,6 +226,7 @@ Suite *test_suite(void)
     tcase_add_test(tests, a_radius_from_afar_takes_few_waves);
     tcase_add_test(tests, a_box_from_afar_takes_few_waves);
     tcase_add_loop_test(tests, a_view_from_afar_takes_few_waves, 0, 3);
+    tcase_add_test(tests, a_view_that_ends_from_afar_takes_few_waves);
     suite_add_tcase(suite, tests);
     return suite;
 }
