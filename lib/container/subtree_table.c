@@ -98,6 +98,10 @@ static ebpo_status open_counts(ebpo_chunks *chunks, uint64_t subtree, counts *c,
     for (uint64_t i = c->view.begin; i < c->view.end; i++)
         add_row(c, i, sums);
     bool last = c->view.end == array->shape.rows, exact;
+    if (last && sums[EBPO_S_OUTER_FACES] + sums[EBPO_S_OUTER_VERTICES] !=
+                    c->end[EBPO_S_OUTER_FACES]) /* they share its rows */
+        status = table_fails(chunks, EBPO_A_SUBTREE_OUTER,
+                             "it has not the rows that the table's counts add up to", error);
     for (uint32_t k = 0; k < c->cols && status == EBPO_OK; k++) {
         (void)total(chunks->file, k, &exact);
         if (last && !exact ? sums[k] > c->end[k] : sums[k] != c->end[k])

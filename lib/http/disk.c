@@ -4,6 +4,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
+#include <limits.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -162,13 +163,29 @@ static bool writable(int folder)
     return true;
 }
 
+/* With those above it that are missing. */
+static bool make_folder(const char *folder)
+{
+    char path[PATH_MAX];
+    size_t length = strlen(folder);
+    if (length >= sizeof path) {
+        errno = ENAMETOOLONG;
+        return false;
+    }
+    memcpy(path, folder, length + 1);
+    for (char *slash = strchr(path + 1, '/'); length && slash; slash = strchr(slash + 1, '/')) {
+        *slash = 0;
+        (void)mkdir(path, 0777); /* if that does not work, the next one tells */
+        *slash = '/';
+    }
+    return mkdir(path, 0777) == 0 || errno == EEXIST;
+}
+
 ebpo_status ebpo_disk_open(ebpo_disk **out, const char *folder, uint64_t bytes, size_t block,
                            const char *url, const ebpo_http_version *version, ebpo_error *error)
 {
     *out = NULL;
-    int fd = mkdir(folder, 0777) == 0 || errno == EEXIST
-                 ? open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC)
-                 : -1;
+    int fd = make_folder(folder) ? open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1;
     if (fd < 0 || !writable(fd)) {
         ebpo_fail_file(error, EBPO_E_ARGUMENT, folder,
                        "cannot be used as a cache folder: %s; give another one", strerror(errno));

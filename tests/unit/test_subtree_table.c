@@ -1,5 +1,6 @@
 /* The table of subtrees against plain counting, the order of chunks against the specification, and
  * the same model in both layouts. */
+#include <hdf5.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -357,6 +358,32 @@ START_TEST(chunks_lie_in_the_order_of_the_specification)
 }
 END_TEST
 
+/* --- refused --- */
+
+/* What the last columns count stands in a list of its own. */
+START_TEST(a_list_that_is_not_what_the_table_counts_is_refused)
+{
+    two_layouts l;
+    ebpo_file *file;
+    ebpo_status status;
+    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 60, 40), 6, ALL, EBPO_CODEC_NONE, 40);
+    hid_t h5 = H5Fopen(l.packed, H5F_ACC_RDWR, H5P_DEFAULT);
+    EXPECT(h5 >= 0 && H5Ldelete(h5, "/subtrees/outer", H5P_DEFAULT) >= 0 && H5Fclose(h5) >= 0);
+    EXPECT(ebpo_open(l.packed, &file, NULL) == EBPO_OK);
+    uint64_t count, refused = 0,
+                    *octcode = octcodes_of_level(file, ebpo_file_info(file)->subtree_level, &count);
+    for (uint64_t i = 0; i < count; i++) {
+        (void)subtree_sum(file, octcode[i], &status);
+        EXPECT(status == EBPO_OK || status == EBPO_E_FORMAT);
+        refused += status == EBPO_E_FORMAT;
+    }
+    ck_assert_uint_gt(refused, 0);
+    free(octcode);
+    ebpo_close(file);
+    two_layouts_close(&l);
+}
+END_TEST
+
 /* --- far away --- */
 
 /* What is down makes each try wait: of many points the first that needs it ends the search for what
@@ -403,6 +430,7 @@ Suite *test_suite(void)
     tcase_add_loop_test(tests, models_are_the_same_in_both_layouts, 0, 15);
     tcase_add_loop_test(tests, subsets_are_the_same_in_both_layouts, 0, 3);
     tcase_add_loop_test(tests, chunks_lie_in_the_order_of_the_specification, 0, 2);
+    tcase_add_test(tests, a_list_that_is_not_what_the_table_counts_is_refused);
     tcase_add_test(tests, a_line_that_is_down_is_not_tried_for_each_point);
     suite_add_tcase(suite, tests);
     return suite;

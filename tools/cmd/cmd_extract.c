@@ -34,7 +34,7 @@ static const arg_option options[] = {
     OPTION_FLAG("mesh", 0, values, mesh,
                 "the model itself, bit for bit; in the order of the source if the maps are stored"),
     OPTION_INT("subtree", 0, values, subtree, "OCTCODE", 1, OCTCODE_MOST,
-               "the faces that touch the cell of this node, a gray one or a leaf, and no others"),
+               "the faces that the leaves of this node list: those that touch its cell"),
     OPTION_FLAG("no-walls", 0, values, no_walls,
                 "with --level: leave out polygons that lie on cell walls"),
     OPTION_THREADS(values, threads),

@@ -94,8 +94,9 @@ typedef struct ebpo_http_options {
     const char *const *headers;
 
     /*
-     * A folder where bytes that were fetched are kept for the next time, made if
-     * it is missing. Any number of processes may share it. NULL: none.
+     * A folder where bytes that were fetched are kept for the next time; it and
+     * those above it are made if they are missing. Any number of processes may share it. NULL:
+     * none.
      */
     const char *cache_folder;
 

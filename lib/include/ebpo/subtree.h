@@ -202,10 +202,11 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_subtree_get_node(ebpo_subtree *subtree, 
 /* ---- faces ---- */
 
 /*
- * All faces that touch the subtree's cell, in the order of the file: first those that are new in a
- * leaf before the subtree's and only listed here again, then its own. So of all subtrees that share
- * a face one has it as its own, the whole tree all. Of a subset (ebpo_subset) those that are only
- * below pruned nodes are missing. Arrays are the subtree's.
+ * All faces that touch the subtree's cell (and maybe some that pass by it at the distance of a
+ * rounding error, which its leaves list, too), in the order of the file: first those that are new
+ * in a leaf before the subtree's and only listed here again, then its own. So of all subtrees that
+ * share a face one has it as its own, the whole tree all. Of a subset (ebpo_subset) those that are
+ * only below pruned nodes are missing. Arrays are the subtree's.
  */
 typedef struct ebpo_subtree_faces {
     size_t struct_size; /* EBPO_SUBTREE_FACES_INIT sets it */
