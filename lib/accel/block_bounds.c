@@ -17,10 +17,11 @@
 
 /* Above so many blocks the slab is left away: such patches curve too much for one. */
 enum { SLAB_BLOCKS_MAX = 1024 };
-/* Boxes are wider than their faces by this, relative to the farthest of their coordinates, slabs
- * by that. */
-static const double box_slack = 0x1p-19, slab_slack = 0x1p-18;
-/* Of a node's size, squared. Measured: 0 costs a tenth on paths, 0.1 as much in uniform points. */
+/* Boxes are wider than their faces by this, relative to the farthest of their coordinates. */
+static const double box_slack = 0x1p-19;
+/* Slabs by that, relative to the node's own size: patches are thinner than it is far away. */
+static const double slab_slack = 0x1p-19;
+/* Of a node's size, squared: slabs of nodes that are large beside a search drop hardly a child. */
 static const double slab_share = 0.01;
 /* Of a model without any extent. */
 static const double least_slack = 0x1p-60;
@@ -278,6 +279,9 @@ static slab measure_slab(const job *j, uint64_t n, int lane, const extent *e)
         return out;
     }
     choose_axis(e, &j->s->slab[n], lane, &out);
+    /* The middle of the box need not be between them: of a tilted patch it is off its plane. */
+    out.from = INFINITY;
+    out.to = -INFINITY;
     for (uint32_t block = first; block < last; block++) {
         lanes l;
         load_lanes(j->s, block, &l);
@@ -286,13 +290,19 @@ static slab measure_slab(const job *j, uint64_t n, int lane, const extent *e)
     return out;
 }
 
-static void set_slabs(ebpo_bound_slab *b, int count, double reach, const slab child[8])
+/* The longest side of the box that all children are in, at least 2^-18 of its reach. */
+static double size_of(const ebpo_bound *b)
 {
-    double slack = reach * slab_slack, along = 0, aside = 0, radius[8];
+    return 255 * (double)fmaxf(b->step[0], fmaxf(b->step[1], b->step[2]));
+}
+
+static void set_slabs(ebpo_bound_slab *b, int count, double size, const slab child[8])
+{
+    double slack = size * slab_slack, along = 0, aside = 0, radius[8];
     for (int lane = 0; lane < count; lane++) {
         along = fmax(along, fmax(child[lane].to, -child[lane].from) + slack);
-        /* the square is off by less than 2^-48 of reach * reach */
-        radius[lane] = sqrt(fmax(child[lane].radius2, 0) + reach * reach * 0x1p-44) + slack;
+        /* the square is off by less than 2^-49 of size * size */
+        radius[lane] = sqrt(fmax(child[lane].radius2, 0) + size * size * 0x1p-46) + slack;
         aside = fmax(aside, radius[lane]);
     }
     b->along_step = (float)(along / SHORT_MOST);
@@ -333,7 +343,7 @@ static ebpo_status bound_nodes(void *context, uint64_t begin, uint64_t end, unsi
         set_boxes(b, &j->of_node[n], part);
         for (int lane = 0; lane < b->count; lane++)
             slabs[lane] = measure_slab(j, n, lane, &part[lane]);
-        set_slabs(&j->s->slab[n], b->count, reach_of(b), slabs);
+        set_slabs(&j->s->slab[n], b->count, size_of(b), slabs);
     }
     return EBPO_OK;
 }

@@ -11,7 +11,7 @@ typedef struct ebpo_probe {
     float local[3];        /* in the subtree's frame */
     float scale;           /* of the frame */
     double scale64;
-    /* bound on what rounding does to a distance between the point and a bound, in the frame */
+    /* bound on what it does to a distance that `local` is rounded, in the frame */
     float error;
 } ebpo_probe;
 

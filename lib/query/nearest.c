@@ -97,8 +97,8 @@ static bool make_probe(const ebpo_accel *s, const double p[3], ebpo_probe *out)
     }
     out->scale = (float)s->scale;
     out->scale64 = s->scale;
-    /* three axes, three roundings each, of numbers up to `most` + 2 */
-    out->error = (float)most * 0x1p-19f;
+    /* `local` is off by 2^-24 of `most` on each axis: docs/develop/bounds.md, "Limits of points" */
+    out->error = (float)most * 0x1p-22f;
     return true;
 }
 

@@ -1,6 +1,6 @@
 /* The hierarchy over blocks of faces: what its bytes say of the faces below each child holds in
- * rational arithmetic, with the room that docs/develop/bounds.md counts on; and the kernels for any
- * processor answer as those for this one. */
+ * rational arithmetic, with the room that docs/develop/bounds.md counts on and hardly more; and the
+ * kernels for any processor answer as those for this one. */
 #include <gmp.h>
 #include <inttypes.h>
 #include <math.h>
@@ -15,6 +15,7 @@
 
 typedef struct exact {
     mpq_t x[3], middle[3], along, square, bound, part;
+    double least, most, aside2; /* of a child's faces along its axis, and off it */
     uint64_t wrong;
 } exact;
 
@@ -76,7 +77,15 @@ static bool in_box(exact *e, const ebpo_bound *b, int lane)
     return in;
 }
 
-static bool in_slab(exact *e, const ebpo_bound *b, const ebpo_bound_slab *slab, int lane)
+/* The longest side of a node. */
+static double size_of(const ebpo_bound *b)
+{
+    return 255 * fmax((double)b->step[0], fmax((double)b->step[1], (double)b->step[2]));
+}
+
+/* Where the corner is, seen from the middle of the child's box: along the axis, and the square of
+ * how far off it. */
+static void seen_from_middle(exact *e, const ebpo_bound *b, const ebpo_bound_slab *slab, int lane)
 {
     mpq_set_ui(e->along, 0, 1);
     mpq_set_ui(e->square, 0, 1);
@@ -90,15 +99,39 @@ static bool in_slab(exact *e, const ebpo_bound *b, const ebpo_bound_slab *slab, 
         mpq_mul(e->part, e->part, e->middle[k]);
         mpq_add(e->along, e->along, e->part);
     }
-    set_sum(e->bound, slab->along_step, slab->from[lane], 0, 0);
+    mpq_mul(e->part, e->along, e->along);
+    mpq_sub(e->square, e->square, e->part);
+}
+
+/* With the room that single precision needs, 15 u of the node's size: docs/develop/bounds.md,
+ * "Points against slabs". */
+static bool in_slab(exact *e, const ebpo_bound *b, const ebpo_bound_slab *slab, int lane)
+{
+    double needed = size_of(b) * 0x1p-24 * 15;
+    seen_from_middle(e, b, slab, lane);
+    set_sum(e->bound, slab->along_step, slab->from[lane], needed, 1);
     bool in = mpq_cmp(e->bound, e->along) <= 0;
-    set_sum(e->bound, slab->along_step, slab->to[lane], 0, 0);
+    set_sum(e->bound, slab->along_step, slab->to[lane], -needed, 1);
     in = in && mpq_cmp(e->along, e->bound) <= 0;
-    mpq_mul(e->along, e->along, e->along);
-    mpq_sub(e->square, e->square, e->along);
-    set_sum(e->bound, slab->aside_step, slab->radius[lane], 0, 0);
+    set_sum(e->bound, slab->aside_step, slab->radius[lane], -needed, 1);
+    in = in && mpq_sgn(e->bound) >= 0;
     mpq_mul(e->bound, e->bound, e->bound);
+    e->least = fmin(e->least, mpq_get_d(e->along));
+    e->most = fmax(e->most, mpq_get_d(e->along));
+    e->aside2 = fmax(e->aside2, mpq_get_d(e->square));
     return in && mpq_cmp(e->square, e->bound) <= 0;
+}
+
+/* After all corners of the child: a slab wider than what rounding asks for drops too little. */
+static bool is_tight(const exact *e, const ebpo_bound *b, const ebpo_bound_slab *slab, int lane)
+{
+    bool has_axis = slab->axis[0][lane] || slab->axis[1][lane] || slab->axis[2][lane];
+    double loose = size_of(b) * 0x1p-18, step = (double)slab->along_step,
+           aside_step = (double)slab->aside_step;
+    return !has_axis ||
+           (step * slab->from[lane] >= e->least - loose - 2 * step &&
+            step * slab->to[lane] <= e->most + loose + 2 * step &&
+            aside_step * slab->radius[lane] <= sqrt(fmax(e->aside2, 0)) + loose + 2 * aside_step);
 }
 
 /* Every face below `child` against what node `n` says of its child `lane`. */
@@ -144,7 +177,11 @@ START_TEST(boxes_and_slabs_contain_their_faces)
     for (uint32_t n = 0; n < s->bound_count; n++)
         for (int lane = 0; lane < s->bound[n].count; lane++) {
             e.wrong += !axis_is_short(&s->slab[n], lane);
+            e.least = INFINITY;
+            e.most = -INFINITY;
+            e.aside2 = 0;
             check_below(&e, s, n, lane, s->bound[n].child[lane]);
+            e.wrong += !is_tight(&e, &s->bound[n], &s->slab[n], lane);
         }
     ck_assert_uint_eq(e.wrong, 0);
     exact_free(&e);
