@@ -82,12 +82,21 @@ static ebpo_status open_group(ebpo_h5_in *h5, const char *path, bool wanted, ebp
     return status;
 }
 
-uint64_t ebpo_reader_level_bytes(const ebpo_file *file, int level)
+static uint64_t level_bytes(const ebpo_file *file, int level, bool located)
 {
     uint64_t bytes = 0;
-    for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
-        bytes += file->level_array[level][id].stored_bytes;
+    for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++) {
+        const ebpo_array_in *a = &file->level_array[level][id];
+        if (located || (a->present && ebpo_h5_chunk_count(&a->shape) == 1))
+            bytes += a->stored_bytes;
+    }
     return bytes;
+}
+
+/* Another thread may be locating the chunks: until then only those count that opening tells. */
+uint64_t ebpo_reader_level_bytes(const ebpo_file *file, int level)
+{
+    return level_bytes(file, level, atomic_load(&file->located));
 }
 
 /* Of the arrays whose chunks are known. */
@@ -95,7 +104,7 @@ ebpo_stored_sizes ebpo_reader_sizes(const ebpo_file *file)
 {
     ebpo_stored_sizes sizes = { .map_bytes = 0 };
     for (int level = 0; level < file->info.level_count; level++)
-        sizes.level_bytes[level] = ebpo_reader_level_bytes(file, level);
+        sizes.level_bytes[level] = level_bytes(file, level, true);
     for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS; id++)
         *(uint64_t *)(void *)((char *)&sizes + ebpo_schema[id].bytes) +=
             file->root_array[id].stored_bytes;
