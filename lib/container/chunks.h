@@ -101,7 +101,8 @@ bool ebpo_chunks_missing(ebpo_chunks *chunks, ebpo_array_id id, int level, uint6
                          uint64_t rows, ebpo_chunk_keys *keys);
 /* Announces chunks of counted arrays to the source, as far as the limit allows: from then on they
  * count as read. The first `now` are needed at once; the others only as far as what has been
- * announced and not been read stays small, also beside what the limit leaves. */
+ * announced and not been read stays small, also beside what the limit leaves, and a little more
+ * each time (ebpo_chunks_room). */
 void ebpo_chunks_announce(ebpo_chunks *chunks, const uint64_t *keys, unsigned now, unsigned count);
 
 /* How many bytes may be announced now for later. */
