@@ -134,7 +134,7 @@ def check(tool, folder, path, ply, asked, rays, site):
                                    (f"{site}/change_etag/x", 1, "changed", ()),
                                    (good, 2, "--http-cache-size", ("--http-cache-size", "much")),
                                    (good, 2, "one line", ("--http-header", "nonsense")),
-                                   (good, 2, "cache folder", ("--http-cache", "/nowhere/at/all"))):
+                                   (good, 2, "cache folder", ("--http-cache", "/proc/nowhere/at/all"))):
         done = run(tool, "measure", url, *more)
         said = done.stderr.decode()
         expect(f"error {url} {more}", done.returncode == code and words in said
