@@ -90,7 +90,7 @@ static inline ebpo_leaf_kind ebpo_leaf_kind_of(const ebpo_accel_leaf *leaf)
 /* --- faces --- */
 
 /* Blocks of eight faces: [9][8] coordinates: x, y, z of corner 0, of corner 1, of corner 2, in the
- * model's unit. Lanes without a face hold FLT_MAX (or DBL_MAX). */
+ * model's unit. Lanes without a face repeat the first one. face_block.h reads them. */
 enum { EBPO_BLOCK = 8, EBPO_BLOCK_NUMBERS = 72, EBPO_NO_SLOT = 0x7fffffff };
 /* At most: slots (block * EBPO_BLOCK + lane) have 32 bits. */
 enum { EBPO_BLOCKS_MOST = 1 << 29 };
@@ -152,7 +152,8 @@ typedef struct ebpo_accel {
     float *block32;         /* [block_count][72], or NULL */
     double *block64;
     uint32_t block_count;
-    uint32_t *slot_face; /* [block_count][8] local numbers; EBPO_NO_SLOT: no face */
+    /* [block_count + 1] local number of each block's first face; the others follow it */
+    uint32_t *block_face;
     double centre[3], scale;
     double reach; /* no coordinate of a decoded box is greater, in the frame; 1 at least */
     ebpo_bound *bound;
@@ -206,6 +207,13 @@ const uint32_t *ebpo_accel_planes(const ebpo_accel *subtree, const ebpo_node *no
                                   unsigned *count);
 /* For cursors (octree/cursor.h); the holder is an ebpo_accel. */
 extern const ebpo_node_source ebpo_accel_source;
+
+/* Local number of a slot's face; EBPO_NO_SLOT: the slot is empty. */
+static inline uint32_t ebpo_accel_slot_face(const ebpo_accel *s, uint32_t slot)
+{
+    const uint32_t *face = s->block_face + slot / EBPO_BLOCK;
+    return slot % EBPO_BLOCK < face[1] - face[0] ? face[0] + slot % EBPO_BLOCK : EBPO_NO_SLOT;
+}
 
 /* A face's corners. */
 static inline void ebpo_accel_triangle(const ebpo_accel *s, uint32_t slot, double out[3][3])

@@ -79,9 +79,7 @@ static inline void load_eight(const ebpo_accel *s, uint64_t at, pair x[PAIRS])
 
 static void load_lanes(const ebpo_accel *s, uint32_t block, lanes *out)
 {
-    int count = EBPO_BLOCK;
-    while (s->slot_face[block * EBPO_BLOCK + (uint32_t)count - 1] == EBPO_NO_SLOT)
-        count--;
+    int count = (int)(s->block_face[block + 1] - s->block_face[block]);
     for (int i = 0; i < 9; i++) {
         pair *x = out->x[i / 3][i % 3];
         double centre = s->centre[i % 3], scale = s->scale;

@@ -1,7 +1,6 @@
 /* Corners of faces, eight faces together. */
 #include "geom/strict_fp.h"
 
-#include <float.h>
 #include <stdlib.h>
 
 #include "base/alloc.h"
@@ -37,23 +36,17 @@ static ebpo_status fill(void *context, uint64_t begin, uint64_t end, unsigned wo
     (void)error;
     job *j = context;
     ebpo_accel *s = j->s;
-    for (uint64_t b = begin; b < end; b++)
+    for (uint64_t b = begin; b < end; b++) {
+        uint32_t first = j->layout->block_begin[b], last = j->layout->block_end[b];
+        s->block_face[b] = first;
         for (unsigned lane = 0; lane < EBPO_BLOCK; lane++) {
-            uint32_t face = j->layout->block_begin[b] + lane;
-            bool there = face < j->layout->block_end[b];
-            s->slot_face[b * EBPO_BLOCK + lane] = there ? face : EBPO_NO_SLOT;
-            if (there && s->wide)
+            uint32_t face = lane < last - first ? first + lane : first;
+            if (s->wide)
                 fill_lane64(s->block64 + b * EBPO_BLOCK_NUMBERS, lane, j->mesh, face);
-            else if (there)
-                fill_lane32(s->block32 + b * EBPO_BLOCK_NUMBERS, lane, j->mesh, face);
             else
-                for (unsigned i = 0; i < 9; i++) {
-                    if (s->wide)
-                        s->block64[b * EBPO_BLOCK_NUMBERS + i * EBPO_BLOCK + lane] = DBL_MAX;
-                    else
-                        s->block32[b * EBPO_BLOCK_NUMBERS + i * EBPO_BLOCK + lane] = FLT_MAX;
-                }
+                fill_lane32(s->block32 + b * EBPO_BLOCK_NUMBERS, lane, j->mesh, face);
         }
+    }
     return EBPO_OK;
 }
 
@@ -68,9 +61,10 @@ ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_slice *slice,
         s->block64 = blocks;
     else
         s->block32 = blocks;
-    s->slot_face = ebpo_alloc(layout->block_count, EBPO_BLOCK * sizeof *s->slot_face);
-    if (!blocks || !s->slot_face)
+    s->block_face = ebpo_alloc(layout->block_count + 1, sizeof *s->block_face);
+    if (!blocks || !s->block_face)
         return ebpo_fail_memory(error, numbers * size);
+    s->block_face[layout->block_count] = (uint32_t)slice->mesh.face_count;
     job j = { s, &slice->mesh, layout };
     return ebpo_parallel_for(threads, NULL, layout->block_count, 1024, fill, &j, NULL, "open",
                              error);

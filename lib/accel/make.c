@@ -81,7 +81,7 @@ static uint64_t count_bytes(const ebpo_accel *s)
            s->leaf_count * sizeof *s->leaf + s->list_count * sizeof *s->list +
            (s->kinds ? sizeof *s->kinds : 0) +
            (s->kinds && s->root.cell.level ? groups_most(s) * sizeof(ebpo_four_planes) : 0) +
-           (uint64_t)s->block_count * (EBPO_BLOCK_NUMBERS * (s->wide ? 8 : 4) + EBPO_BLOCK * 4) +
+           (uint64_t)s->block_count * (EBPO_BLOCK_NUMBERS * (s->wide ? 8 : 4) + 4) +
            s->bound_count * (sizeof *s->bound + sizeof *s->slab) + (uint64_t)s->outer_count * 4 +
            (s->face_source ? faces * 4 : 0) +
            (s->gray_first ? (s->gray_count + s->gray_first[s->gray_count]) * 4 : 0);
@@ -159,7 +159,7 @@ void ebpo_accel_free(ebpo_accel *s)
     ebpo_leaf_kinds_free(s->kinds);
     free(s->block32);
     free(s->block64);
-    free(s->slot_face);
+    free(s->block_face);
     free(s->bound);
     free(s->slab);
     free(s->outer);
@@ -179,7 +179,7 @@ void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uin
     *keep = sizeof(ebpo_accel) + sizeof(ebpo_leaf_kinds) + size->groups * 64 +
             size->leaves * (sizeof(ebpo_accel_leaf) + 64) +
             (size->refs + size->new_faces) * sizeof(ebpo_listed_block) +
-            blocks * (EBPO_BLOCK_NUMBERS * 4 * wide + 32) +
+            blocks * (EBPO_BLOCK_NUMBERS * 4 * wide + 4) +
             bounds * (sizeof(ebpo_bound) + sizeof(ebpo_bound_slab)) + faces * 8;
     *peak = *keep + size->groups * 128 + size->leaves * 64 + faces * (12 + 36 * wide + 24) +
             bounds * 72 + 65536;

@@ -29,7 +29,7 @@ static void try_block(ebpo_box_walk *w, const ebpo_accel *s, uint32_t block)
     for (uint32_t lane = 0; lane < EBPO_BLOCK && !w->no_memory; lane++) {
         uint32_t slot = block * EBPO_BLOCK + lane;
         double t[3][3];
-        if (s->slot_face[slot] == EBPO_NO_SLOT)
+        if (ebpo_accel_slot_face(s, slot) == EBPO_NO_SLOT)
             return;
         ebpo_accel_triangle(s, slot, t);
         if (!ebpo_triangle_meets_box((const double(*)[3])t, w->min, w->max))

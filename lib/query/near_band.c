@@ -63,7 +63,7 @@ static void add(ebpo_near_band *band, const ebpo_near *face)
 static void try_face(ebpo_near_band *band, const ebpo_accel *s, uint32_t slot)
 {
     ebpo_near face;
-    uint32_t local = s->slot_face[slot];
+    uint32_t local = ebpo_accel_slot_face(s, slot);
     if (local == EBPO_NO_SLOT || band->no_memory)
         return;
     ebpo_accel_triangle(s, slot, face.triangle);

@@ -51,7 +51,7 @@ void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint6
 
 static void try_face(ebpo_nearest *n, const ebpo_accel *s, uint32_t slot)
 {
-    uint32_t local = s->slot_face[slot];
+    uint32_t local = ebpo_accel_slot_face(s, slot);
     if (local == EBPO_NO_SLOT)
         return;
     uint64_t file_face = ebpo_accel_file_face(s, local);

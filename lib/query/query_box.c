@@ -26,7 +26,7 @@ static ebpo_status take(ebpo_box_walk *walk, const ebpo_accel *s, ebpo_error *er
     if (!ebpo_grow(&g->list, &g->capacity, g->count + walk->count, sizeof *g->list))
         return ebpo_fail_memory(error, (g->count + walk->count) * sizeof *g->list);
     for (uint64_t i = 0; i < walk->count; i++) {
-        uint32_t local = s->slot_face[walk->slot[i]];
+        uint32_t local = ebpo_accel_slot_face(s, walk->slot[i]);
         g->list[g->count++] =
             (pair){ ebpo_accel_file_face(s, local), ebpo_accel_source_face(s, local) };
     }

@@ -38,7 +38,7 @@ static ebpo_status take(ebpo_box_walk *walk, const ebpo_accel *s, ebpo_error *er
     delivery *d = (delivery *)walk;
     (void)error;
     for (uint64_t i = 0; i < walk->count && !walk->enough; i++) {
-        uint32_t local = s->slot_face[walk->slot[i]];
+        uint32_t local = ebpo_accel_slot_face(s, walk->slot[i]);
         double(*corners)[3] = d->block->corners[d->count];
         ebpo_accel_triangle(s, walk->slot[i], corners);
         if (!ebpo_box_walk_is_first(walk, local >= s->outer_count, (const double(*)[3])corners))

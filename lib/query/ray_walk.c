@@ -34,7 +34,7 @@ static void decide(ebpo_ray_search *r, uint32_t slot)
 {
     ebpo_casting *c = r->user;
     ebpo_met m;
-    uint32_t local = r->s->slot_face[slot];
+    uint32_t local = ebpo_accel_slot_face(r->s, slot);
     ebpo_accel_triangle(r->s, slot, m.triangle);
     if (!ebpo_casting_meets(c, &m))
         return;

@@ -145,7 +145,7 @@ static void check_below(exact *e, const ebpo_accel *s, uint32_t n, int lane, uin
     for (uint32_t i = 0; i < EBPO_BLOCK; i++) {
         uint32_t slot = (child & ~EBPO_IS_BLOCK) * EBPO_BLOCK + i;
         double t[3][3];
-        if (s->slot_face[slot] == EBPO_NO_SLOT)
+        if (ebpo_accel_slot_face(s, slot) == EBPO_NO_SLOT)
             return;
         ebpo_accel_triangle(s, slot, t);
         for (int corner = 0; corner < 3; corner++) {
