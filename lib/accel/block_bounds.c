@@ -34,7 +34,8 @@ typedef struct extent {
 typedef struct job {
     ebpo_accel *s;
     const ebpo_layout *layout;
-    extent *of_node;
+    ebpo_block_points points;
+    extent *of_block, *of_node;
 } job;
 
 /* Two lanes at a time. */
@@ -128,42 +129,40 @@ static void add_lanes(const lanes *l, extent *e)
 static void add_extent(const extent *part, extent *e)
 {
     for (int k = 0; k < 3; k++) {
-        e->low[k] = fmin(e->low[k], part->low[k]);
-        e->high[k] = fmax(e->high[k], part->high[k]);
+        e->low[k] = part->low[k] < e->low[k] ? part->low[k] : e->low[k];
+        e->high[k] = part->high[k] > e->high[k] ? part->high[k] : e->high[k];
         e->normal[k] += part->normal[k];
     }
 }
 
-/* What the blocks right below a node add to it. */
-static ebpo_status extend_by_blocks(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                                    ebpo_error *error)
+static ebpo_status extend_blocks(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
 {
     (void)worker;
     (void)error;
     job *j = context;
-    for (uint64_t n = begin; n < end; n++) {
-        j->of_node[n] = nothing;
-        for (int lane = 0; lane < 8; lane++) {
-            uint32_t child = j->layout->child[n][lane];
-            if (child == EBPO_NO_CHILD || !(child & EBPO_IS_BLOCK))
-                continue;
-            lanes l;
-            load_lanes(j->s, child & ~EBPO_IS_BLOCK, &l);
-            add_lanes(&l, &j->of_node[n]);
-        }
+    for (uint64_t b = begin; b < end; b++) {
+        lanes l;
+        load_lanes(j->s, (uint32_t)b, &l);
+        j->of_block[b] = nothing;
+        add_lanes(&l, &j->of_block[b]);
     }
     return EBPO_OK;
 }
 
-/* Nodes come after their children. */
-static void extend_by_nodes(job *j)
+static const extent *extent_of(const job *j, uint32_t child)
 {
-    for (uint64_t n = 0; n < j->layout->bound_count; n++)
-        for (int lane = 0; lane < 8; lane++) {
-            uint32_t child = j->layout->child[n][lane];
-            if (child != EBPO_NO_CHILD && !(child & EBPO_IS_BLOCK))
-                add_extent(&j->of_node[child], &j->of_node[n]);
-        }
+    return child & EBPO_IS_BLOCK ? &j->of_block[child & ~EBPO_IS_BLOCK] : &j->of_node[child];
+}
+
+/* Nodes come after their children. */
+static void extend_nodes(job *j)
+{
+    for (uint64_t n = 0; n < j->layout->bound_count; n++) {
+        j->of_node[n] = nothing;
+        for (int lane = 0; lane < 8 && j->layout->child[n][lane] != EBPO_NO_CHILD; lane++)
+            add_extent(extent_of(j, j->layout->child[n][lane]), &j->of_node[n]);
+    }
 }
 
 /* --- boxes --- */
@@ -227,25 +226,60 @@ static void choose_axis(const extent *e, ebpo_bound_slab *b, int lane, slab *out
     }
 }
 
-static void add_to_slab(const lanes *l, slab *out)
+/* Points of the frame, some at a time. */
+enum { SOME = 32 };
+typedef struct some_points {
+    double x[3][SOME];
+    int count;
+} some_points;
+
+static void add_to_slab(some_points *p, slab *out)
 {
     pair from = { out->from, out->from }, to = { out->to, out->to },
          most = { out->radius2, out->radius2 };
-    for (int i = 0; i < 3; i++)
-        for (int h = 0; h < PAIRS; h++) {
-            pair along = { 0, 0 }, square = { 0, 0 };
-            for (int k = 0; k < 3; k++) {
-                pair d = l->x[i][k][h] - out->middle[k];
-                along += d * out->axis[k];
-                square += d * d;
-            }
-            from = lesser(along, from);
-            to = greater(along, to);
-            most = greater(square - along * along, most);
+    for (int k = 0; k < 3 && p->count % 2; k++)
+        p->x[k][p->count] = p->x[k][p->count - 1];
+    for (int i = 0; i < p->count; i += 2) {
+        pair along = { 0, 0 }, square = { 0, 0 };
+        for (int k = 0; k < 3; k++) {
+            pair d = (pair){ p->x[k][i], p->x[k][i + 1] } - out->middle[k];
+            along += d * out->axis[k];
+            square += d * d;
         }
+        from = lesser(along, from);
+        to = greater(along, to);
+        most = greater(square - along * along, most);
+    }
     out->from = least_of(from);
     out->to = most_of(to);
     out->radius2 = most_of(most);
+    p->count = 0;
+}
+
+static inline void add_point(const job *j, uint32_t place, some_points *p, slab *out)
+{
+    const ebpo_mesh *mesh = j->points.mesh;
+    uint64_t at = 3 * (uint64_t)j->points.order[place];
+    for (unsigned k = 0; k < 3; k++) {
+        double x = mesh->xyz64 ? mesh->xyz64[at + k] : (double)mesh->xyz32[at + k];
+        p->x[k][p->count] = (x - j->s->centre[k]) * j->s->scale;
+    }
+    if (++p->count == SOME)
+        add_to_slab(p, out);
+}
+
+/* All vertices of a run of blocks. */
+static void add_run(const job *j, uint32_t begin, uint32_t end, slab *out)
+{
+    const ebpo_block_points *points = &j->points;
+    some_points p;
+    p.count = 0;
+    for (uint32_t place = points->first[begin]; place < points->first[end]; place++)
+        add_point(j, place, &p, out);
+    for (uint64_t i = points->first_older[begin]; i < points->first_older[end]; i++)
+        if (points->older[i] < points->first[begin])
+            add_point(j, points->older[i], &p, out);
+    add_to_slab(&p, out);
 }
 
 /* Without an axis and as wide as the box is: says nothing that the box does not say. */
@@ -280,11 +314,7 @@ static slab measure_slab(const job *j, uint64_t n, int lane, const extent *e)
     /* The middle of the box need not be between them: of a tilted patch it is off its plane. */
     out.from = INFINITY;
     out.to = -INFINITY;
-    for (uint32_t block = first; block < last; block++) {
-        lanes l;
-        load_lanes(j->s, block, &l);
-        add_to_slab(&l, &out);
-    }
+    add_run(j, first, last, &out);
     return out;
 }
 
@@ -331,12 +361,7 @@ static ebpo_status bound_nodes(void *context, uint64_t begin, uint64_t end, unsi
             if (child == EBPO_NO_CHILD)
                 continue;
             b->count = (uint8_t)(lane + 1);
-            lanes l;
-            part[lane] = child & EBPO_IS_BLOCK ? nothing : j->of_node[child];
-            if (child & EBPO_IS_BLOCK) {
-                load_lanes(j->s, child & ~EBPO_IS_BLOCK, &l);
-                add_lanes(&l, &part[lane]);
-            }
+            part[lane] = *extent_of(j, child);
         }
         set_boxes(b, &j->of_node[n], part);
         for (int lane = 0; lane < b->count; lane++)
@@ -352,30 +377,40 @@ static ebpo_status make_room(job *j, ebpo_error *error)
     ebpo_accel *s = j->s;
     s->bound = aligned_alloc(64, (count + 1) * sizeof *s->bound);
     s->slab = aligned_alloc(64, (count + 1) * sizeof *s->slab);
+    j->of_block = ebpo_alloc(j->layout->block_count, sizeof *j->of_block);
     j->of_node = ebpo_alloc(count, sizeof *j->of_node);
-    if (s->bound && s->slab && j->of_node)
+    if (s->bound && s->slab && j->of_block && j->of_node)
         return EBPO_OK;
     return ebpo_fail_memory(error, count * (sizeof *s->bound + sizeof *s->slab));
 }
 
-ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout, unsigned threads,
-                                   ebpo_error *error)
+static ebpo_status fill(job *j, unsigned threads, ebpo_error *error)
 {
-    job j = { s, layout, NULL };
+    ebpo_status status = ebpo_parallel_for(threads, NULL, j->layout->block_count, 512,
+                                           extend_blocks, j, NULL, "open", error);
+    if (status != EBPO_OK)
+        return status;
+    extend_nodes(j);
+    return ebpo_parallel_for(threads, NULL, j->layout->bound_count, 64, bound_nodes, j, NULL,
+                             "open", error);
+}
+
+ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_mesh *mesh, const ebpo_layout *layout,
+                                   unsigned threads, ebpo_error *error)
+{
+    job j = { .s = s, .layout = layout };
     s->bound_count = (uint32_t)layout->bound_count;
     s->top = layout->top;
     s->reach = 1;
-    ebpo_status status = make_room(&j, error);
+    ebpo_status status = ebpo_block_points_make(&j.points, mesh, layout, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(threads, NULL, layout->bound_count, 64, extend_by_blocks, &j,
-                                   NULL, "open", error);
-    if (status == EBPO_OK) {
-        extend_by_nodes(&j);
-        status = ebpo_parallel_for(threads, NULL, layout->bound_count, 64, bound_nodes, &j, NULL,
-                                   "open", error);
-    }
+        status = make_room(&j, error);
+    if (status == EBPO_OK)
+        status = fill(&j, threads, error);
     if (status == EBPO_OK && s->bound_count)
         s->reach = fmax(1, reach_of(&s->bound[s->top]));
+    ebpo_block_points_free(&j.points);
+    free(j.of_block);
     free(j.of_node);
     return status;
 }
