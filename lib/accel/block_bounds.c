@@ -12,6 +12,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/huge_pages.h"
 #include "base/parallel.h"
 #include "accel/accel_parts.h"
 
@@ -378,6 +379,8 @@ static ebpo_status make_room(job *j, ebpo_error *error)
     s->bound = aligned_alloc(64, (count + 1) * sizeof *s->bound);
     s->slab = aligned_alloc(64, (count + 1) * sizeof *s->slab);
     j->of_block = ebpo_alloc(j->layout->block_count, sizeof *j->of_block);
+    ebpo_prefer_huge_pages(s->bound, (count + 1) * sizeof *s->bound);
+    ebpo_prefer_huge_pages(s->slab, (count + 1) * sizeof *s->slab);
     j->of_node = ebpo_alloc(count, sizeof *j->of_node);
     if (s->bound && s->slab && j->of_block && j->of_node)
         return EBPO_OK;

@@ -5,6 +5,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/huge_pages.h"
 #include "base/parallel.h"
 #include "accel/accel_parts.h"
 
@@ -57,6 +58,7 @@ ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_slice *slice,
              size = s->wide ? sizeof(double) : sizeof(float);
     s->block_count = (uint32_t)layout->block_count;
     void *blocks = aligned_alloc(64, (numbers * size + 127) / 64 * 64);
+    ebpo_prefer_huge_pages(blocks, numbers * size);
     if (s->wide)
         s->block64 = blocks;
     else

@@ -43,6 +43,13 @@ static inline void ebpo_visit_fetch(const ebpo_accel *s, uint32_t child)
         __builtin_prefetch(at + 64 * i);
 }
 
+static inline void ebpo_visit_fetch_slab(const ebpo_accel *s, uint32_t node)
+{
+    const char *at = (const char *)&s->slab[node];
+    __builtin_prefetch(at);
+    __builtin_prefetch(at + 64);
+}
+
 /* Pushes the children of `lanes`, farthest first; returns the new top. */
 static inline uint32_t ebpo_visit_push(ebpo_visit *stack, uint32_t top, const ebpo_bound *bound,
                                        unsigned lanes, const float key[8])
