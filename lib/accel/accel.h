@@ -89,10 +89,22 @@ static inline ebpo_leaf_kind ebpo_leaf_kind_of(const ebpo_accel_leaf *leaf)
 
 /* --- faces --- */
 
-/* Blocks of eight faces: [9][8] coordinates: x, y, z of corner 0, of corner 1, of corner 2, in the
- * model's unit. Lanes without a face repeat the first one. face_block.h reads them. */
-enum { EBPO_BLOCK = 8, EBPO_BLOCK_NUMBERS = 72, EBPO_NO_SLOT = 0x7fffffff };
-/* At most: slots (block * EBPO_BLOCK + lane) have 32 bits. */
+/* A block of at most eight faces, the head of a record of its own size: after it x of all its
+ * vertices, then y, then z, in the model's unit: floats, or doubles (from EBPO_MESHLET_WIDE on).
+ * Corner i of lane l is vertex (corner[i] >> 4 * l) % 16. A block of more than 16 vertices has 24,
+ * and corner i of lane l is vertex 8 * i + l. Lanes without a face repeat the first one. Kernels
+ * read it with face_block.h; docs/develop/blocks.md. */
+typedef struct ebpo_meshlet {
+    uint32_t face; /* local number of the first face; the others follow */
+    uint32_t corner[3];
+    uint8_t faces, vertices;
+    uint8_t spare[2];
+} ebpo_meshlet;
+enum { EBPO_BLOCK = 8, EBPO_NO_SLOT = 0x7fffffff };
+enum { EBPO_MESHLET_SHARED = 16, EBPO_MESHLET_VERTICES = 24, EBPO_MESHLET_WIDE = 24 };
+/* A record begins at a multiple of so many bytes; the multiple is the block's number. */
+enum { EBPO_MESHLET_UNIT = 64 };
+/* Units at most: slots (block * EBPO_BLOCK + lane) have 32 bits. */
 enum { EBPO_BLOCKS_MOST = 1 << 29 };
 
 /* --- bounding hierarchy over the blocks --- */
@@ -149,11 +161,9 @@ typedef struct ebpo_accel {
     uint64_t list_count;
     ebpo_leaf_kinds *kinds; /* of solids, or NULL */
     bool wide;              /* blocks hold doubles */
-    float *block32;         /* [block_count][72], or NULL */
-    double *block64;
-    uint32_t block_count;
-    /* [block_count + 1] local number of each block's first face; the others follow it */
-    uint32_t *block_face;
+    char *meshlets;         /* [units][EBPO_MESHLET_UNIT]: ebpo_meshlet's records */
+    uint64_t units;
+    uint32_t face_count;
     double centre[3], scale;
     double reach; /* no coordinate of a decoded box is greater, in the frame; 1 at least */
     ebpo_bound *bound;
@@ -208,20 +218,43 @@ const uint32_t *ebpo_accel_planes(const ebpo_accel *subtree, const ebpo_node *no
 /* For cursors (octree/cursor.h); the holder is an ebpo_accel. */
 extern const ebpo_node_source ebpo_accel_source;
 
+static inline const ebpo_meshlet *ebpo_accel_meshlet(const ebpo_accel *s, uint32_t block)
+{
+    return (const void *)(s->meshlets + (uint64_t)block * EBPO_MESHLET_UNIT);
+}
+
+/* Its vertices' coordinates, [3][vertices]. */
+static inline const float *ebpo_meshlet_floats(const ebpo_meshlet *m)
+{
+    return (const void *)(m + 1);
+}
+static inline const double *ebpo_meshlet_doubles(const ebpo_meshlet *m)
+{
+    return (const void *)((const char *)m + EBPO_MESHLET_WIDE);
+}
+
+static inline unsigned ebpo_meshlet_vertex(const ebpo_meshlet *m, unsigned lane, unsigned corner)
+{
+    return m->vertices > EBPO_MESHLET_SHARED ? EBPO_BLOCK * corner + lane
+                                             : m->corner[corner] >> 4 * lane & 15;
+}
+
 /* Local number of a slot's face; EBPO_NO_SLOT: the slot is empty. */
 static inline uint32_t ebpo_accel_slot_face(const ebpo_accel *s, uint32_t slot)
 {
-    const uint32_t *face = s->block_face + slot / EBPO_BLOCK;
-    return slot % EBPO_BLOCK < face[1] - face[0] ? face[0] + slot % EBPO_BLOCK : EBPO_NO_SLOT;
+    const ebpo_meshlet *m = ebpo_accel_meshlet(s, slot / EBPO_BLOCK);
+    return slot % EBPO_BLOCK < m->faces ? m->face + slot % EBPO_BLOCK : EBPO_NO_SLOT;
 }
 
 /* A face's corners. */
 static inline void ebpo_accel_triangle(const ebpo_accel *s, uint32_t slot, double out[3][3])
 {
-    uint64_t at = (uint64_t)(slot / EBPO_BLOCK) * EBPO_BLOCK_NUMBERS + slot % EBPO_BLOCK;
-    for (int i = 0; i < 9; i++)
-        out[i / 3][i % 3] = s->wide ? s->block64[at + (uint64_t)i * EBPO_BLOCK]
-                                    : (double)s->block32[at + (uint64_t)i * EBPO_BLOCK];
+    const ebpo_meshlet *m = ebpo_accel_meshlet(s, slot / EBPO_BLOCK);
+    for (unsigned i = 0; i < 3; i++) {
+        unsigned at = ebpo_meshlet_vertex(m, slot % EBPO_BLOCK, i);
+        for (unsigned k = 0; k < 3; k++, at += m->vertices)
+            out[i][k] = s->wide ? ebpo_meshlet_doubles(m)[at] : (double)ebpo_meshlet_floats(m)[at];
+    }
 }
 
 static inline uint64_t ebpo_accel_file_face(const ebpo_accel *s, uint32_t local)

@@ -11,6 +11,8 @@ typedef struct ebpo_layout {
     uint32_t *block_begin;
     uint32_t *block_end;
     uint64_t block_count, block_capacity;
+    /* [block_count] by what the accel knows each block: ebpo_meshlet; made with the blocks */
+    uint32_t *block_number;
     uint32_t (*child)[8]; /* [bound_count] as in ebpo_bound */
     /* [bound_count] blocks below a node are contiguous: first, and one past the last */
     uint32_t *first_block;
@@ -26,7 +28,7 @@ void ebpo_layout_free(ebpo_layout *layout);
 
 /* Fills blocks and slots (parallel). */
 EBPO_MUST_USE ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_slice *slice,
-                                                 const ebpo_layout *layout, unsigned threads,
+                                                 ebpo_layout *layout, unsigned threads,
                                                  ebpo_error *error);
 
 /* The vertices of a run of blocks, [begin, end), each at least once: those that it has first, order

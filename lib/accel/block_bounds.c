@@ -70,27 +70,23 @@ typedef struct lanes {
     pair x[3][3][PAIRS];
 } lanes;
 
-/* Eight coordinates as they are. */
-static inline void load_eight(const ebpo_accel *s, uint64_t at, pair x[PAIRS])
+static void load_lanes(const job *j, uint32_t block, lanes *out)
 {
-    for (uint64_t h = 0; h < PAIRS && s->wide; h++)
-        x[h] = (pair){ s->block64[at + 2 * h], s->block64[at + 2 * h + 1] };
-    for (uint64_t h = 0; h < PAIRS && !s->wide; h++)
-        x[h] = two_floats(s->block32 + at + 2 * h);
-}
-
-static void load_lanes(const ebpo_accel *s, uint32_t block, lanes *out)
-{
-    int count = (int)(s->block_face[block + 1] - s->block_face[block]);
-    for (int i = 0; i < 9; i++) {
-        pair *x = out->x[i / 3][i % 3];
-        double centre = s->centre[i % 3], scale = s->scale;
-        load_eight(s, (uint64_t)block * EBPO_BLOCK_NUMBERS + (uint64_t)i * EBPO_BLOCK, x);
-        for (int h = 0; h < PAIRS; h++)
-            x[h] = (x[h] - centre) * scale;
-        for (int lane = count; lane < EBPO_BLOCK; lane++)
-            x[lane / 2][lane % 2] = x[0][0];
-    }
+    const ebpo_accel *s = j->s;
+    const ebpo_meshlet *m = ebpo_accel_meshlet(s, j->layout->block_number[block]);
+    double x[3][EBPO_MESHLET_VERTICES];
+    for (unsigned k = 0; k < 3; k++)
+        for (unsigned i = 0, at = k * m->vertices; i < m->vertices; i++, at++)
+            x[k][i] =
+                ((s->wide ? ebpo_meshlet_doubles(m)[at] : (double)ebpo_meshlet_floats(m)[at]) -
+                 s->centre[k]) *
+                s->scale;
+    for (unsigned i = 0; i < 3; i++)
+        for (unsigned lane = 0; lane < EBPO_BLOCK; lane++) {
+            unsigned at = ebpo_meshlet_vertex(m, lane < m->faces ? lane : 0, i);
+            for (unsigned k = 0; k < 3; k++)
+                out->x[i][k][lane / 2][lane % 2] = x[k][at];
+        }
 }
 
 /* --- extents --- */
@@ -144,7 +140,7 @@ static ebpo_status extend_blocks(void *context, uint64_t begin, uint64_t end, un
     job *j = context;
     for (uint64_t b = begin; b < end; b++) {
         lanes l;
-        load_lanes(j->s, (uint32_t)b, &l);
+        load_lanes(j, (uint32_t)b, &l);
         j->of_block[b] = nothing;
         add_lanes(&l, &j->of_block[b]);
     }
@@ -302,7 +298,7 @@ static slab measure_slab(const job *j, uint64_t n, int lane, const extent *e)
         out.middle[k] = (side.low + side.high) / 2;
         half[k] = (side.high - side.low) / 2;
     }
-    uint32_t child = b->child[lane], first = child & ~EBPO_IS_BLOCK, last = first + 1;
+    uint32_t child = j->layout->child[n][lane], first = child & ~EBPO_IS_BLOCK, last = first + 1;
     if (!(child & EBPO_IS_BLOCK)) {
         first = j->layout->first_block[child];
         last = j->layout->last_block[child];
@@ -345,6 +341,14 @@ static void set_slabs(ebpo_bound_slab *b, int count, double size, const slab chi
 
 /* --- all of them --- */
 
+/* As the accel has it. */
+static uint32_t child_number(const job *j, uint32_t child)
+{
+    return child == EBPO_NO_CHILD || !(child & EBPO_IS_BLOCK)
+               ? child
+               : j->layout->block_number[child & ~EBPO_IS_BLOCK] | EBPO_IS_BLOCK;
+}
+
 static ebpo_status bound_nodes(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                ebpo_error *error)
 {
@@ -358,7 +362,8 @@ static ebpo_status bound_nodes(void *context, uint64_t begin, uint64_t end, unsi
         memset(b, 0, sizeof *b);
         memset(&j->s->slab[n], 0, sizeof j->s->slab[n]);
         for (int lane = 0; lane < 8; lane++) {
-            uint32_t child = b->child[lane] = j->layout->child[n][lane];
+            uint32_t child = j->layout->child[n][lane];
+            b->child[lane] = child_number(j, child);
             if (child == EBPO_NO_CHILD)
                 continue;
             b->count = (uint8_t)(lane + 1);

@@ -1,7 +1,8 @@
-/* Corners of faces, eight faces together. */
+/* Faces, up to eight together, with the vertices that they share. */
 #include "geom/strict_fp.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/alloc.h"
 #include "base/error.h"
@@ -12,22 +13,100 @@
 typedef struct job {
     ebpo_accel *s;
     const ebpo_mesh *mesh;
-    const ebpo_layout *layout;
+    ebpo_layout *layout;
 } job;
 
-static void fill_lane32(float *block, unsigned lane, const ebpo_mesh *mesh, uint32_t face)
+/* A block's vertices, in the order in which its faces have them. */
+typedef struct shared {
+    uint32_t vertex[EBPO_MESHLET_VERTICES];
+    uint8_t at[EBPO_MESHLET_VERTICES]; /* [face][corner]: which of them */
+    unsigned faces, count;
+} shared;
+
+static void find_shared(const job *j, uint64_t block, shared *out)
 {
-    for (unsigned i = 0; i < 9; i++)
-        block[i * EBPO_BLOCK + lane] =
-            mesh->xyz32[3 * (uint64_t)mesh->faces[3 * (uint64_t)face + i / 3] + i % 3];
+    uint32_t begin = j->layout->block_begin[block];
+    const uint32_t *corner = j->mesh->faces + 3 * (uint64_t)begin;
+    out->faces = j->layout->block_end[block] - begin;
+    out->count = 0;
+    for (unsigned i = 0; i < 3 * out->faces; i++) {
+        unsigned at = out->count;
+        out->vertex[at] = corner[i];
+        while (at > 0 && out->vertex[at - 1] != corner[i])
+            at--;
+        out->at[i] = (uint8_t)(at ? at - 1 : out->count++);
+    }
 }
 
-static void fill_lane64(double *block, unsigned lane, const ebpo_mesh *mesh, uint32_t face)
+/* Of the record, in units. */
+static uint32_t size_of(const ebpo_accel *s, unsigned vertices)
 {
-    for (unsigned i = 0; i < 9; i++) {
-        uint64_t at = 3 * (uint64_t)mesh->faces[3 * (uint64_t)face + i / 3] + i % 3;
-        block[i * EBPO_BLOCK + lane] = mesh->xyz64 ? mesh->xyz64[at] : (double)mesh->xyz32[at];
+    if (vertices > EBPO_MESHLET_SHARED)
+        vertices = EBPO_MESHLET_VERTICES;
+    size_t bytes = s->wide ? EBPO_MESHLET_WIDE + 3 * vertices * sizeof(double)
+                           : sizeof(ebpo_meshlet) + 3 * vertices * sizeof(float);
+    return (uint32_t)((bytes + EBPO_MESHLET_UNIT - 1) / EBPO_MESHLET_UNIT);
+}
+
+static ebpo_status measure(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                           ebpo_error *error)
+{
+    (void)worker;
+    (void)error;
+    job *j = context;
+    shared v;
+    for (uint64_t b = begin; b < end; b++) {
+        find_shared(j, b, &v);
+        j->layout->block_number[b] = size_of(j->s, v.count);
     }
+    return EBPO_OK;
+}
+
+/* From sizes to numbers. False: too many. */
+static bool number_blocks(ebpo_accel *s, ebpo_layout *layout)
+{
+    for (uint64_t b = 0; b < layout->block_count; b++) {
+        uint32_t size = layout->block_number[b];
+        layout->block_number[b] = (uint32_t)s->units;
+        s->units += size;
+    }
+    return s->units <= EBPO_BLOCKS_MOST;
+}
+
+/* --- filling --- */
+
+/* What is not shared enough: each corner of each lane is a vertex of its own. */
+static void spread(shared *v)
+{
+    uint32_t corner[EBPO_MESHLET_VERTICES];
+    for (unsigned lane = 0; lane < EBPO_BLOCK; lane++)
+        for (unsigned i = 0; i < 3; i++)
+            corner[EBPO_BLOCK * i + lane] = v->vertex[v->at[3 * (lane < v->faces ? lane : 0) + i]];
+    memcpy(v->vertex, corner, sizeof corner);
+    v->count = EBPO_MESHLET_VERTICES;
+}
+
+static void set_corners(const shared *v, ebpo_meshlet *m)
+{
+    for (unsigned i = 0; i < 3; i++)
+        for (unsigned lane = 0; lane < EBPO_BLOCK; lane++)
+            m->corner[i] |= (uint32_t)v->at[3 * (lane < v->faces ? lane : 0) + i] << 4 * lane;
+}
+
+static void set_coordinates(const job *j, const shared *v, ebpo_meshlet *m)
+{
+    const ebpo_mesh *mesh = j->mesh;
+    float *x32 = (void *)(m + 1);
+    double *x64 = (void *)((char *)m + EBPO_MESHLET_WIDE);
+    for (unsigned i = 0; i < v->count; i++)
+        for (unsigned k = 0; k < 3; k++) {
+            uint64_t from = 3 * (uint64_t)v->vertex[i] + k;
+            unsigned to = k * v->count + i;
+            if (!j->s->wide)
+                x32[to] = mesh->xyz32[from];
+            else
+                x64[to] = mesh->xyz64 ? mesh->xyz64[from] : (double)mesh->xyz32[from];
+        }
 }
 
 static ebpo_status fill(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -36,38 +115,52 @@ static ebpo_status fill(void *context, uint64_t begin, uint64_t end, unsigned wo
     (void)worker;
     (void)error;
     job *j = context;
-    ebpo_accel *s = j->s;
+    shared v;
     for (uint64_t b = begin; b < end; b++) {
-        uint32_t first = j->layout->block_begin[b], last = j->layout->block_end[b];
-        s->block_face[b] = first;
-        for (unsigned lane = 0; lane < EBPO_BLOCK; lane++) {
-            uint32_t face = lane < last - first ? first + lane : first;
-            if (s->wide)
-                fill_lane64(s->block64 + b * EBPO_BLOCK_NUMBERS, lane, j->mesh, face);
-            else
-                fill_lane32(s->block32 + b * EBPO_BLOCK_NUMBERS, lane, j->mesh, face);
-        }
+        find_shared(j, b, &v);
+        char *at = j->s->meshlets + (uint64_t)j->layout->block_number[b] * EBPO_MESHLET_UNIT;
+        memset(at, 0, (size_t)size_of(j->s, v.count) * EBPO_MESHLET_UNIT);
+        ebpo_meshlet *m = (void *)at;
+        if (v.count > EBPO_MESHLET_SHARED)
+            spread(&v);
+        else
+            set_corners(&v, m);
+        m->face = j->layout->block_begin[b];
+        m->faces = (uint8_t)v.faces;
+        m->vertices = (uint8_t)v.count;
+        set_coordinates(j, &v, m);
     }
     return EBPO_OK;
 }
 
-ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_slice *slice,
-                                   const ebpo_layout *layout, unsigned threads, ebpo_error *error)
+/* Kernels read a table of 16 where it begins: what lies behind the last record is theirs too. */
+static ebpo_status make_room(ebpo_accel *s, ebpo_error *error)
 {
-    uint64_t numbers = layout->block_count * EBPO_BLOCK_NUMBERS,
-             size = s->wide ? sizeof(double) : sizeof(float);
-    s->block_count = (uint32_t)layout->block_count;
-    void *blocks = aligned_alloc(64, (numbers * size + 127) / 64 * 64);
-    ebpo_prefer_huge_pages(blocks, numbers * size);
-    if (s->wide)
-        s->block64 = blocks;
-    else
-        s->block32 = blocks;
-    s->block_face = ebpo_alloc(layout->block_count + 1, sizeof *s->block_face);
-    if (!blocks || !s->block_face)
-        return ebpo_fail_memory(error, numbers * size);
-    s->block_face[layout->block_count] = (uint32_t)slice->mesh.face_count;
+    uint64_t bytes = s->units * EBPO_MESHLET_UNIT;
+    s->meshlets = aligned_alloc(EBPO_MESHLET_UNIT, bytes + EBPO_MESHLET_UNIT);
+    if (!s->meshlets)
+        return ebpo_fail_memory(error, bytes);
+    ebpo_prefer_huge_pages(s->meshlets, bytes);
+    memset(s->meshlets + bytes, 0, EBPO_MESHLET_UNIT);
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_slice *slice, ebpo_layout *layout,
+                                   unsigned threads, ebpo_error *error)
+{
     job j = { s, &slice->mesh, layout };
-    return ebpo_parallel_for(threads, NULL, layout->block_count, 1024, fill, &j, NULL, "open",
-                             error);
+    layout->block_number = ebpo_alloc(layout->block_count, sizeof *layout->block_number);
+    if (!layout->block_number)
+        return ebpo_fail_memory(error, layout->block_count * sizeof *layout->block_number);
+    ebpo_status status = ebpo_parallel_for(threads, NULL, layout->block_count, 1024, measure, &j,
+                                           NULL, "open", error);
+    if (status == EBPO_OK && !number_blocks(s, layout))
+        status = ebpo_fail(error, EBPO_E_LIMIT,
+                           "the model has too many faces to be held at once; give a memory budget");
+    if (status == EBPO_OK)
+        status = make_room(s, error);
+    if (status == EBPO_OK)
+        status = ebpo_parallel_for(threads, NULL, layout->block_count, 1024, fill, &j, NULL, "open",
+                                   error);
+    return status;
 }

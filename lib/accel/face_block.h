@@ -8,34 +8,46 @@
 #include "base/eight.h"
 
 typedef struct ebpo_face_block {
-    const ebpo_accel *s;
-    uint64_t at;
-    unsigned count; /* faces: 1 to 8 */
+    const ebpo_meshlet *m;
+    n8 corner[3]; /* which vertices, where they are shared */
 } ebpo_face_block;
 
 EBPO_EIGHT ebpo_face_block ebpo_face_block_open(const ebpo_accel *s, uint32_t block)
 {
-    return (ebpo_face_block){ s, (uint64_t)block * EBPO_BLOCK_NUMBERS,
-                              s->block_face[block + 1] - s->block_face[block] };
+    ebpo_face_block b = { .m = ebpo_accel_meshlet(s, block) };
+    for (int i = 0; i < 3; i++)
+        b.corner[i] = n8_from_bits(b.m->corner[i]);
+    return b;
 }
 
 /* A bit for each lane that holds a face. */
-EBPO_EIGHT unsigned ebpo_face_block_lanes(const ebpo_face_block *b) { return (1u << b->count) - 1; }
+EBPO_EIGHT unsigned ebpo_face_block_lanes(const ebpo_face_block *b)
+{
+    return (1u << b->m->faces) - 1;
+}
 
 /* The three corners' coordinates on an axis, in the model's unit; of an accel of floats. */
 EBPO_EIGHT void ebpo_face_block_floats(const ebpo_face_block *b, int axis, f8 corner[3])
 {
+    const float *x = ebpo_meshlet_floats(b->m) + (unsigned)axis * b->m->vertices;
+    if (__builtin_expect(b->m->vertices > EBPO_MESHLET_SHARED, 0)) {
+        for (int i = 0; i < 3; i++)
+            corner[i] = f8_load(x + i * EBPO_BLOCK);
+        return;
+    }
+    f8_table table = f8_table_load(x); /* beyond its vertices: what lies behind, never picked */
     for (int i = 0; i < 3; i++)
-        corner[i] = f8_load(b->s->block32 + b->at + (unsigned)(3 * i + axis) * EBPO_BLOCK);
+        corner[i] = f8_look_up(table, b->corner[i]);
 }
 
 /* The same of an accel of doubles. */
 EBPO_EIGHT void ebpo_face_block_doubles(const ebpo_face_block *b, int axis,
                                         double corner[3][EBPO_BLOCK])
 {
-    for (int i = 0; i < 3; i++)
-        memcpy(corner[i], b->s->block64 + b->at + (unsigned)(3 * i + axis) * EBPO_BLOCK,
-               sizeof corner[i]);
+    const double *x = ebpo_meshlet_doubles(b->m) + (unsigned)axis * b->m->vertices;
+    for (unsigned i = 0; i < 3; i++)
+        for (unsigned lane = 0; lane < EBPO_BLOCK; lane++)
+            corner[i][lane] = x[ebpo_meshlet_vertex(b->m, lane, i)];
 }
 
 #endif

@@ -210,6 +210,7 @@ void ebpo_layout_free(ebpo_layout *layout)
 {
     free(layout->block_begin);
     free(layout->block_end);
+    free(layout->block_number);
     free(layout->child);
     free(layout->first_block);
     free(layout->last_block);

@@ -42,14 +42,15 @@ typedef struct block_boxes {
 static void bound_block(const ebpo_accel *s, const ebpo_listed_block *listed, const double low[3],
                         const double high[3], block_boxes *out, unsigned *walls)
 {
+    const ebpo_meshlet *m = ebpo_accel_meshlet(s, listed->block);
     int away[EBPO_BLOCK] = { 0 }, touches[EBPO_BLOCK] = { 0 };
-    for (int k = 0; k < 3; k++) {
+    for (unsigned k = 0; k < 3; k++) {
         double x[3][EBPO_BLOCK];
-        for (int i = 0; i < 3; i++)
-            for (int lane = 0; lane < EBPO_BLOCK; lane++) {
-                uint64_t at = (uint64_t)listed->block * EBPO_BLOCK_NUMBERS +
-                              (uint64_t)(3 * i + k) * EBPO_BLOCK + (uint64_t)lane;
-                x[i][lane] = s->wide ? s->block64[at] : (double)s->block32[at];
+        for (unsigned i = 0; i < 3; i++)
+            for (unsigned lane = 0; lane < EBPO_BLOCK; lane++) {
+                unsigned at = ebpo_meshlet_vertex(m, lane, i) + k * m->vertices;
+                x[i][lane] =
+                    s->wide ? ebpo_meshlet_doubles(m)[at] : (double)ebpo_meshlet_floats(m)[at];
             }
         for (int lane = 0; lane < EBPO_BLOCK; lane++) {
             double least = ebpo_min3(x[0][lane], x[1][lane], x[2][lane]),

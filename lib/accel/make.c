@@ -76,14 +76,13 @@ static uint64_t groups_most(const ebpo_accel *s)
 static uint64_t count_bytes(const ebpo_accel *s)
 {
     uint64_t cells = s->nodes.grid_bits ? UINT64_C(1) << 3 * s->nodes.grid_bits : 0;
-    uint64_t faces = s->face_source || s->outer ? (uint64_t)s->block_count * 8 : 0;
     return sizeof *s + s->nodes.group_count * sizeof *s->nodes.group + cells * 5 +
            s->leaf_count * sizeof *s->leaf + s->list_count * sizeof *s->list +
            (s->kinds ? sizeof *s->kinds : 0) +
            (s->kinds && s->root.cell.level ? groups_most(s) * sizeof(ebpo_four_planes) : 0) +
-           (uint64_t)s->block_count * (EBPO_BLOCK_NUMBERS * (s->wide ? 8 : 4) + 4) +
+           (s->units + 1) * EBPO_MESHLET_UNIT +
            s->bound_count * (sizeof *s->bound + sizeof *s->slab) + (uint64_t)s->outer_count * 4 +
-           (s->face_source ? faces * 4 : 0) +
+           (s->face_source ? (uint64_t)s->face_count * 4 : 0) +
            (s->gray_first ? (s->gray_count + s->gray_first[s->gray_count]) * 4 : 0);
 }
 
@@ -126,6 +125,7 @@ ebpo_status ebpo_accel_make(ebpo_accel **out, ebpo_slice *slice, const ebpo_info
     s->rule = (uint8_t)info->rule;
     s->has_planes = with_planes;
     s->wide = needs_doubles(info);
+    s->face_count = (uint32_t)slice->mesh.face_count;
     s->outer_count = slice->outer_count;
     s->first_face = slice->first_face;
     make_frame(s);
@@ -157,9 +157,7 @@ void ebpo_accel_free(ebpo_accel *s)
     free(s->leaf);
     free(s->list);
     ebpo_leaf_kinds_free(s->kinds);
-    free(s->block32);
-    free(s->block64);
-    free(s->block_face);
+    free(s->meshlets);
     free(s->bound);
     free(s->slab);
     free(s->outer);
@@ -170,7 +168,8 @@ void ebpo_accel_free(ebpo_accel *s)
 }
 
 /* Blocks are more than half full but for the last of each leaf or list; lists name at most one
- * block for each listed face. */
+ * block for each listed face. Of a face a record has three vertices at most, or four where it has
+ * room for more than 16. */
 void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
                          uint64_t *peak)
 {
@@ -179,7 +178,7 @@ void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uin
     *keep = sizeof(ebpo_accel) + sizeof(ebpo_leaf_kinds) + size->groups * 64 +
             size->leaves * (sizeof(ebpo_accel_leaf) + 64) +
             (size->refs + size->new_faces) * sizeof(ebpo_listed_block) +
-            blocks * (EBPO_BLOCK_NUMBERS * 4 * wide + 4) +
+            blocks * (EBPO_MESHLET_WIDE + EBPO_MESHLET_UNIT) + faces * 48 * wide +
             bounds * (sizeof(ebpo_bound) + sizeof(ebpo_bound_slab)) + faces * 8;
     *peak = *keep + size->groups * 128 + size->leaves * 64 + faces * (12 + 36 * wide + 36) +
             (blocks + bounds) * 72 + 65536;

@@ -173,7 +173,7 @@ static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **slot
         return ebpo_fail_memory(w->error, groups * 32 + leaves * sizeof *s->leaf + faces * 4);
     for (uint64_t b = 0; b < layout->block_count; b++)
         for (uint32_t face = layout->block_begin[b]; face < layout->block_end[b]; face++)
-            map[face] = (uint32_t)(b * EBPO_BLOCK) + face - layout->block_begin[b];
+            map[face] = layout->block_number[b] * EBPO_BLOCK + face - layout->block_begin[b];
     return EBPO_OK;
 }
 

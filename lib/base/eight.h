@@ -37,6 +37,30 @@ EBPO_EIGHT f8 f8_abs(f8 a)
 {
     return _mm256_and_ps(a, _mm256_castsi256_ps(_mm256_set1_epi32(0x7fffffff)));
 }
+/* Eight numbers below 16, and 16 floats from which they pick. */
+typedef struct n8 {
+    __m256i low, high; /* the lower three bits count; all ones from 8 on */
+} n8;
+typedef struct f8_table {
+    f8 first;
+    __m256i other; /* what turns a number of the first eight into that of the others */
+} f8_table;
+EBPO_EIGHT n8 n8_from_bits(uint32_t bits)
+{
+    __m256i x = _mm256_srlv_epi32(_mm256_set1_epi32((int)bits),
+                                  _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28));
+    return (n8){ x, _mm256_srai_epi32(_mm256_slli_epi32(x, 28), 31) };
+}
+EBPO_EIGHT f8_table f8_table_load(const float *x)
+{
+    f8 first = f8_load(x);
+    return (f8_table){ first, _mm256_castps_si256(_mm256_xor_ps(first, f8_load(x + 8))) };
+}
+EBPO_EIGHT f8 f8_look_up(f8_table t, n8 at)
+{
+    __m256i other = _mm256_and_si256(_mm256_permutevar8x32_epi32(t.other, at.low), at.high);
+    return _mm256_xor_ps(_mm256_permutevar8x32_ps(t.first, at.low), _mm256_castsi256_ps(other));
+}
 EBPO_EIGHT f8 f8_from_bytes(const uint8_t *x)
 {
     return _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)x)));
@@ -79,6 +103,21 @@ EBPO_EIGHT f8 f8_abs(f8 a) { EBPO_BOTH((i4)a.half[h] & 0x7fffffff); }
 EBPO_EIGHT f8 f8_pick(f8 mask, f8 yes, f8 no)
 {
     EBPO_BOTH(((i4)yes.half[h] & (i4)mask.half[h]) | ((i4)no.half[h] & ~(i4)mask.half[h]));
+}
+
+/* Eight numbers below 16, and 16 floats from which they pick. */
+typedef struct n8 {
+    uint32_t bits;
+} n8;
+typedef struct f8_table {
+    const float *x;
+} f8_table;
+EBPO_EIGHT n8 n8_from_bits(uint32_t bits) { return (n8){ bits }; }
+EBPO_EIGHT f8_table f8_table_load(const float *x) { return (f8_table){ x }; }
+EBPO_EIGHT f8 f8_look_up(f8_table t, n8 at)
+{
+    EBPO_BOTH(((f4){ t.x[at.bits >> 16 * h & 15], t.x[at.bits >> (16 * h + 4) & 15],
+                     t.x[at.bits >> (16 * h + 8) & 15], t.x[at.bits >> (16 * h + 12) & 15] }));
 }
 
 #if defined(__SSE2__)

@@ -248,8 +248,6 @@ static void descend_together(const ebpo_accel *s, int fine, unsigned count, lane
 static void prefetch_blocks(const ebpo_accel *s, const waiting *w, const double p[3])
 {
     const ebpo_accel_leaf *leaf = w->leaf;
-    size_t size = EBPO_BLOCK_NUMBERS * (s->wide ? sizeof *s->block64 : sizeof *s->block32);
-    const char *blocks = s->wide ? (const char *)s->block64 : (const char *)s->block32;
     ebpo_axis_segment g = { .high = { 255, 255, 255 } };
     if (ebpo_leaf_kind_of(leaf) != EBPO_LEAF_GENERAL)
         return;
@@ -257,8 +255,9 @@ static void prefetch_blocks(const ebpo_accel *s, const waiting *w, const double 
         g = wall_segment(leaf, &w->in, p);
     for (uint32_t b = 0; b < leaf->blocks && b < 8; b++)
         if (ebpo_axis_segment_meets(&g, &s->list[leaf->list + b]))
-            for (size_t line = 0; line < size; line += 64)
-                __builtin_prefetch(blocks + s->list[leaf->list + b].block * size + line);
+            for (int line = 0; line < (s->wide ? 4 : 2); line++)
+                __builtin_prefetch(
+                    (const char *)ebpo_accel_meshlet(s, s->list[leaf->list + b].block) + 64 * line);
 }
 
 static ebpo_status answer_waiting(ebpo_context *context, const ebpo_accel *s, const waiting *w,

@@ -35,9 +35,8 @@ static inline void ebpo_visit_fetch(const ebpo_accel *s, uint32_t child)
     const char *at = (const char *)&s->bound[child & ~EBPO_IS_BLOCK];
     unsigned lines = 2;
     if (child & EBPO_IS_BLOCK) {
-        uint64_t number = (uint64_t)(child & ~EBPO_IS_BLOCK) * EBPO_BLOCK_NUMBERS;
-        at = s->wide ? (const char *)(s->block64 + number) : (const char *)(s->block32 + number);
-        lines = 5;
+        at = (const char *)ebpo_accel_meshlet(s, child & ~EBPO_IS_BLOCK);
+        lines = s->wide ? 4 : 2;
     }
     for (unsigned i = 0; i < lines; i++)
         __builtin_prefetch(at + 64 * i);
