@@ -262,6 +262,13 @@ static inline uint64_t ebpo_accel_file_face(const ebpo_accel *s, uint32_t local)
     return local < s->outer_count ? s->outer[local] : s->first_face + (local - s->outer_count);
 }
 
+/* What the next function will read. */
+static inline void ebpo_accel_fetch_face(const ebpo_accel *s, uint32_t local)
+{
+    if (s->face_source)
+        __builtin_prefetch(&s->face_source[local]);
+}
+
 /* Number that callers are told. */
 static inline uint64_t ebpo_accel_source_face(const ebpo_accel *s, uint32_t local)
 {

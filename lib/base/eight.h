@@ -18,6 +18,11 @@ typedef __m256 f8;
 
 EBPO_EIGHT f8 f8_all(float x) { return _mm256_set1_ps(x); }
 EBPO_EIGHT f8 f8_load(const float *x) { return _mm256_loadu_ps(x); }
+EBPO_EIGHT f8 f8_load_twice(const float *x) { return _mm256_broadcast_ps((const __m128 *)x); }
+EBPO_EIGHT f8 f8_spread0(f8 a) { return _mm256_permute_ps(a, 0x00); }
+EBPO_EIGHT f8 f8_spread1(f8 a) { return _mm256_permute_ps(a, 0x55); }
+EBPO_EIGHT f8 f8_spread2(f8 a) { return _mm256_permute_ps(a, 0xaa); }
+EBPO_EIGHT f8 f8_spread3(f8 a) { return _mm256_permute_ps(a, 0xff); }
 EBPO_EIGHT void f8_store(float *x, f8 a) { _mm256_storeu_ps(x, a); }
 EBPO_EIGHT f8 f8_add(f8 a, f8 b) { return _mm256_add_ps(a, b); }
 EBPO_EIGHT f8 f8_sub(f8 a, f8 b) { return _mm256_sub_ps(a, b); }
@@ -90,6 +95,12 @@ EBPO_EIGHT f8 f8_load(const float *x)
     memcpy(&out, x, sizeof out);
     return out;
 }
+EBPO_EIGHT f8 f8_load_twice(const float *x)
+{
+    f4 a;
+    memcpy(&a, x, sizeof a);
+    return (f8){ { a, a } };
+}
 EBPO_EIGHT void f8_store(float *x, f8 a) { memcpy(x, &a, sizeof a); }
 EBPO_EIGHT f8 f8_add(f8 a, f8 b) { EBPO_BOTH(a.half[h] + b.half[h]); }
 EBPO_EIGHT f8 f8_sub(f8 a, f8 b) { EBPO_BOTH(a.half[h] - b.half[h]); }
@@ -129,6 +140,10 @@ EBPO_EIGHT unsigned f8_bits(f8 mask)
 {
     return (unsigned)(_mm_movemask_ps(mask.half[0]) | _mm_movemask_ps(mask.half[1]) << 4);
 }
+EBPO_EIGHT f8 f8_spread0(f8 a) { EBPO_BOTH(_mm_shuffle_ps(a.half[h], a.half[h], 0x00)); }
+EBPO_EIGHT f8 f8_spread1(f8 a) { EBPO_BOTH(_mm_shuffle_ps(a.half[h], a.half[h], 0x55)); }
+EBPO_EIGHT f8 f8_spread2(f8 a) { EBPO_BOTH(_mm_shuffle_ps(a.half[h], a.half[h], 0xaa)); }
+EBPO_EIGHT f8 f8_spread3(f8 a) { EBPO_BOTH(_mm_shuffle_ps(a.half[h], a.half[h], 0xff)); }
 EBPO_EIGHT f8 f8_from_bytes(const uint8_t *x)
 {
     __m128i none = _mm_setzero_si128(),
@@ -147,6 +162,10 @@ EBPO_EIGHT f8 f8_from_shorts(const int16_t *x)
 EBPO_EIGHT f8 f8_min(f8 a, f8 b) { return f8_pick(f8_less(a, b), a, b); }
 EBPO_EIGHT f8 f8_max(f8 a, f8 b) { return f8_pick(f8_less(b, a), a, b); }
 EBPO_EIGHT f8 f8_about_inverse(f8 a) { return f8_div(f8_all(1), a); }
+EBPO_EIGHT f8 f8_spread0(f8 a) { return f8_all(a.half[0][0]); }
+EBPO_EIGHT f8 f8_spread1(f8 a) { return f8_all(a.half[0][1]); }
+EBPO_EIGHT f8 f8_spread2(f8 a) { return f8_all(a.half[0][2]); }
+EBPO_EIGHT f8 f8_spread3(f8 a) { return f8_all(a.half[0][3]); }
 EBPO_EIGHT f8 f8_sqrt(f8 a)
 {
     for (int i = 0; i < 8; i++)
@@ -177,6 +196,8 @@ EBPO_EIGHT f8 f8_from_shorts(const int16_t *x)
 #endif
 #endif
 
+/* f8_load_twice: four floats, each half of the eight being these; f8_spread0 to 3: one of such four
+ * in all lanes. */
 EBPO_EIGHT f8 f8_min3(f8 a, f8 b, f8 c) { return f8_min(a, f8_min(b, c)); }
 EBPO_EIGHT f8 f8_max3(f8 a, f8 b, f8 c) { return f8_max(a, f8_max(b, c)); }
 

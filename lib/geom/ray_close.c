@@ -1,10 +1,6 @@
 /* What happens often is recognised: a corner at the origin (t = 0), a corner on the line, an edge
- * through the origin, a shared corner or edge. The rest goes through double-double arithmetic, then
- * expansions.
- *
- * Error bounds: as in predicates.c; each holds for the computed permanent (the sum of absolute
- * values), the slack covers underflow, and an overflow makes the bound infinite or not a number, so
- * that no comparison succeeds. */
+ * through the origin, a shared corner or edge. The rest goes through double-double arithmetic
+ * (ray_pairs.h), then expansions. */
 #include "geom/strict_fp.h"
 
 #include "geom/ray_close.h"
@@ -15,50 +11,11 @@
 #include "geom/predicates.h"
 #include "geom/predicates_expansion.h"
 #include "geom/ray_expansion.h"
-
-/* Far above every underflow error (2^-1075 each), and normal: arithmetic on denormals is slow. */
-static const double slack = 0x1p-960;
+#include "geom/ray_pairs.h"
 
 /* --- the parameter --- */
 
-/* A normal and the sum of absolute values behind each component. */
-typedef struct plane_normal {
-    ebpo_pair x[3];
-    double permanent[3];
-} plane_normal;
-
-static inline plane_normal cross(const ebpo_pair f[3], const ebpo_pair g[3])
-{
-    plane_normal n;
-    for (int k = 0; k < 3; k++) {
-        int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
-        ebpo_pair p = ebpo_pair_multiply(f[u], g[v]), q = ebpo_pair_multiply(f[v], g[u]);
-        n.x[k] = ebpo_pair_subtract(p, q);
-        n.permanent[k] = fabs(p.head) + fabs(q.head);
-    }
-    return n;
-}
-
-/* A value, at most `error` off. */
-typedef struct bounded {
-    ebpo_pair x;
-    double error;
-} bounded;
-
-/* n . y. Errors: some 12 * 2^-106 of the permanent in n, 12 more in products and sums; 2^-97 leaves
- * a margin. */
-static inline bounded dot(const plane_normal *n, const ebpo_pair y[3])
-{
-    ebpo_pair first = ebpo_pair_multiply(n->x[0], y[0]), second = ebpo_pair_multiply(n->x[1], y[1]);
-    bounded out = { ebpo_pair_add(ebpo_pair_add(first, second), ebpo_pair_multiply(n->x[2], y[2])),
-                    0 };
-    double a = fabs(y[0].head), b = fabs(y[1].head), c = fabs(y[2].head);
-    double permanent = n->permanent[0] * a + n->permanent[1] * b + n->permanent[2] * c;
-    out.error = 0x1p-97 * permanent + slack * (1 + a + b + c);
-    return out;
-}
-
-static inline int sign_of(const bounded *b)
+static inline int sign_of(const ebpo_bounded *b)
 {
     return b->x.head > b->error ? 1 : b->x.head < -b->error ? -1 : EBPO_SIDE_OPEN;
 }
@@ -68,25 +25,16 @@ static inline int sign_of(const bounded *b)
 typedef struct parameter {
     const ebpo_segment *ray;
     const double (*triangle)[3];
-    bounded numerator, denominator;
+    ebpo_plane_pairs at;
     bool made; /* the fraction is there */
     ebpo_fraction fraction;
 } parameter;
 
 static inline void begin(parameter *p, const ebpo_segment *ray, const double triangle[3][3])
 {
-    ebpo_pair f[3], g[3], to_plane[3], d[3];
-    for (int k = 0; k < 3; k++) {
-        f[k] = ebpo_two_difference(triangle[1][k], triangle[0][k]);
-        g[k] = ebpo_two_difference(triangle[2][k], triangle[0][k]);
-        to_plane[k] = ebpo_two_difference(triangle[0][k], ray->origin[k]);
-        d[k] = ebpo_pair_of(ray->direction[k]);
-    }
-    plane_normal n = cross(f, g);
     p->ray = ray;
     p->triangle = triangle;
-    p->numerator = dot(&n, to_plane);
-    p->denominator = dot(&n, d);
+    ebpo_ray_pairs_best()->plane(ray, triangle, &p->at);
     p->made = false;
 }
 
@@ -101,7 +49,7 @@ static bool make_fraction(parameter *p)
 /* Sign of t; that of the denominator is known. */
 static int sign_of_t(parameter *p, int denominator)
 {
-    int sign = sign_of(&p->numerator);
+    int sign = sign_of(&p->at.numerator);
     if (sign == EBPO_SIDE_OPEN)
         sign = -ebpo_orient3d(p->triangle[0], p->triangle[1], p->triangle[2], p->ray->origin);
     return sign * denominator;
@@ -110,10 +58,9 @@ static int sign_of_t(parameter *p, int denominator)
 /* t > 0, correctly rounded. */
 static bool value_of_t(parameter *p, double *t)
 {
-    const bounded *a = &p->numerator, *b = &p->denominator;
-    double out[2], error = a->error / fabs(a->x.head) + b->error / fabs(b->x.head);
+    const double *out = p->at.quotient;
     *t = 0;
-    if (ebpo_pair_quotient(a->x, b->x, error, out) && !(out[0] < out[1])) {
+    if (p->at.has_quotient && !(out[0] < out[1])) {
         *t = out[0];
         return true;
     }
@@ -124,10 +71,11 @@ static bool value_of_t(parameter *p, double *t)
 static int beyond_end(parameter *p, int denominator)
 {
     double end = p->ray->t_max;
-    ebpo_pair at_end = ebpo_pair_multiply(p->denominator.x, ebpo_pair_of(end));
-    bounded rest = { ebpo_pair_subtract(p->numerator.x, at_end), 0 };
-    rest.error = p->numerator.error + end * p->denominator.error +
-                 0x1p-97 * (fabs(p->numerator.x.head) + fabs(at_end.head)) + slack;
+    const ebpo_bounded *a = &p->at.numerator, *b = &p->at.denominator;
+    ebpo_pair at_end = ebpo_pair_multiply(b->x, ebpo_pair_of(end));
+    ebpo_bounded rest = { ebpo_pair_subtract(a->x, at_end), 0 };
+    rest.error = a->error + end * b->error + 0x1p-97 * (fabs(a->x.head) + fabs(at_end.head)) +
+                 EBPO_RAY_SLACK;
     int sign = sign_of(&rest);
     if (sign != EBPO_SIDE_OPEN)
         return sign * denominator;
@@ -178,6 +126,7 @@ static bool parallel(const double a[3], const double b[3])
 
 /* A corner relative to the ray's origin. */
 typedef struct corner {
+    const double *at; /* in the model */
     ebpo_pair x[3];
     double head[3];
     bool exact; /* no tails */
@@ -185,7 +134,7 @@ typedef struct corner {
 
 static corner corner_at(const ebpo_segment *ray, const double p[3])
 {
-    corner c = { .exact = true };
+    corner c = { .at = p, .exact = true };
     for (int k = 0; k < 3; k++) {
         c.x[k] = ebpo_two_difference(p[k], ray->origin[k]);
         c.head[k] = c.x[k].head;
@@ -199,23 +148,22 @@ static inline bool is_origin(const corner *c)
     return c->head[0] == 0 && c->head[1] == 0 && c->head[2] == 0;
 }
 
-/* Sign of d . (a x b), exact. */
+/* Sign of d . (a x b), exact. The same with b - a in place of b, which loses less where the edge is
+ * short beside its distance from the origin. */
 static int edge_side(const double d[3], const corner *a, const corner *b)
 {
-    ebpo_pair direction[3], m[3][3];
+    ebpo_pair m[3][3];
     if (a->exact && b->exact && parallel(a->head, b->head))
         return 0;
-    for (int k = 0; k < 3; k++)
-        direction[k] = ebpo_pair_of(d[k]);
-    plane_normal n = cross(a->x, b->x);
-    bounded value = dot(&n, direction);
+    ebpo_bounded value;
+    ebpo_ray_pairs_best()->edge(d, a->x, a->at, b->at, &value);
     int sign = sign_of(&value);
     if (sign != EBPO_SIDE_OPEN)
         return sign;
     for (int k = 0; k < 3; k++) {
         m[k][0] = a->x[k];
         m[k][1] = b->x[k];
-        m[k][2] = direction[k];
+        m[k][2] = ebpo_pair_of(d[k]);
     }
     return ebpo_determinant_expansion(m);
 }

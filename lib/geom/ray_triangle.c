@@ -86,6 +86,13 @@ void ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3], ebp
         ebpo_ray_triangle_exact(ray, triangle, out);
 }
 
+void ebpo_ray_interior(const ebpo_segment *ray, const double triangle[3][3], int facing,
+                       ebpo_ray_meeting *out)
+{
+    if (!ebpo_ray_meet_plane(ray, triangle, -facing, facing, out))
+        ebpo_ray_triangle_exact(ray, triangle, out);
+}
+
 int ebpo_ray_compare(const ebpo_segment *ray, const double a[3][3], const ebpo_ray_meeting *at_a,
                      const double b[3][3], const ebpo_ray_meeting *at_b)
 {

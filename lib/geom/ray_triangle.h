@@ -9,6 +9,11 @@
 
 void ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3], ebpo_ray_meeting *out);
 
+/* The same where the line certainly goes through the triangle's interior, `facing` as in the answer
+ * (not 0). */
+void ebpo_ray_interior(const ebpo_segment *ray, const double triangle[3][3], int facing,
+                       ebpo_ray_meeting *out);
+
 /* Sign of t(a) - t(b), exact, for two triangles that the ray meets (first common points) as
  * ebpo_ray_triangle has said. */
 int ebpo_ray_compare(const ebpo_segment *ray, const double a[3][3], const ebpo_ray_meeting *at_a,

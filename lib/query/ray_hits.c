@@ -21,9 +21,13 @@ void ebpo_casting_begin(ebpo_casting *c, ebpo_context *context, const ebpo_segme
     c->count = 0;
 }
 
-bool ebpo_casting_meets(const ebpo_casting *c, ebpo_met *m)
+bool ebpo_casting_meets(const ebpo_casting *c, int facing, ebpo_met *m)
 {
-    ebpo_ray_triangle(&c->ray, (const double(*)[3])m->triangle, &m->meeting);
+    const double(*triangle)[3] = (const double(*)[3])m->triangle;
+    if (facing)
+        ebpo_ray_interior(&c->ray, triangle, facing, &m->meeting);
+    else
+        ebpo_ray_triangle(&c->ray, triangle, &m->meeting);
     return m->meeting.meets && (c->sides == EBPO_RAY_BOTH ||
                                 m->meeting.facing == (c->sides == EBPO_RAY_FRONT ? 1 : -1));
 }
@@ -43,7 +47,8 @@ static void keep_first(ebpo_casting *c, const ebpo_met *m)
         return;
     c->first = *m;
     c->count = 1;
-    c->limit = fmin(c->limit, m->meeting.t * (1 + 0x1p-48) + DBL_MIN);
+    double limit = m->meeting.t * (1 + 0x1p-48) + DBL_MIN;
+    c->limit = limit < c->limit ? limit : c->limit;
 }
 
 void ebpo_casting_keep(ebpo_casting *c, const ebpo_met *m)

@@ -28,8 +28,9 @@ typedef struct ebpo_casting {
 void ebpo_casting_begin(ebpo_casting *casting, ebpo_context *context, const ebpo_segment *ray,
                         ebpo_ray_wants wants, ebpo_ray_sides sides);
 
-/* Whether the ray meets m->triangle, and from a side that counts; then m->meeting says where. */
-bool ebpo_casting_meets(const ebpo_casting *casting, ebpo_met *m);
+/* Whether the ray meets m->triangle, and from a side that counts; then m->meeting says where.
+ * `facing`: where that is certain already, because the line goes through its interior; else 0. */
+bool ebpo_casting_meets(const ebpo_casting *casting, int facing, ebpo_met *m);
 
 /* A face that is met, with its numbers. */
 void ebpo_casting_keep(ebpo_casting *casting, const ebpo_met *m);

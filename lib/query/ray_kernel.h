@@ -9,10 +9,12 @@ typedef enum ebpo_ray_wants { EBPO_WANTS_FIRST, EBPO_WANTS_ANY, EBPO_WANTS_ALL }
 
 typedef struct ebpo_ray_search ebpo_ray_search;
 
-/* A face that may be met: not before `low`, a t of the frame. */
+/* A face that may be met: not before `low`, a t of the frame. `facing`: of ebpo_ray_meeting, where
+ * the line certainly goes through its interior; else 0. */
 typedef struct ebpo_ray_candidate {
     float low;
     uint32_t slot;
+    int facing;
 } ebpo_ray_candidate;
 enum { EBPO_RAY_CANDIDATES = 64 };
 
@@ -22,9 +24,9 @@ struct ebpo_ray_search {
     ebpo_ray_wants wants;
     int facing;   /* 1, -1: only faces seen from the front, the back; 0: all */
     double limit; /* t beyond which nothing matters, certain; falls */
-    /* Decides exactly about a face, keeps it if it counts, and lowers search->limit and sets
-     * search->done accordingly. */
-    void (*decide)(ebpo_ray_search *search, uint32_t slot);
+    /* Decides exactly about a face (`facing`: as of a candidate), keeps it if it counts, and lowers
+     * search->limit and sets search->done accordingly. */
+    void (*decide)(ebpo_ray_search *search, uint32_t slot, int facing);
     void *user;
 
     /* All that follows is made by ebpo_ray_search_accel. */
@@ -34,7 +36,8 @@ struct ebpo_ray_search {
     const ebpo_accel *s;
     /* In the frame, from an origin moved along the ray to `moved`: what distances to the sides of
      * boxes start from, the nearer ones and the farther ones. */
-    float near_from[3], far_from[3], inverse[3];
+    float near_from[4], far_from[4], inverse[4];
+    float step_inverse[4];          /* 0, then `inverse` */
     unsigned near_at[3], far_at[3]; /* bytes in ebpo_bound where those sides are */
     int axis[3];                    /* z: where the direction is longest */
     float shear[3];                 /* x and y for a step of 1 along z; t for such a step */

@@ -133,17 +133,19 @@ static void set_boxes(ebpo_ray_search *r, const framed *f, double error)
     for (int k = 0; k < 3; k++) {
         double d = f->direction[k], origin = blind ? 0 : f->origin[k],
                slack = blind ? (double)BEYOND : fabs(origin) * 0x1p-21 + error;
-        bool back = d < 0;
-        if (fabs(d) < 0x1p-60)
-            d = back ? -0x1p-60 : 0x1p-60;
-        r->inverse[k] = (float)(1 / d);
-        r->near_from[k] = (float)(origin + (back ? -slack : slack));
-        r->far_from[k] = (float)(origin - (back ? -slack : slack));
+        double ahead = copysign(slack, d);
+        r->inverse[k] = (float)(1 / copysign(greater(fabs(d), 0x1p-60), d));
+        r->step_inverse[k + 1] = r->inverse[k];
+        r->near_from[k] = (float)(origin + ahead);
+        r->far_from[k] = (float)(origin - ahead);
+        /* No branch: half of them would be mispredicted. */
         unsigned low = (unsigned)(offsetof(ebpo_bound, low) + (size_t)k * 8),
-                 high = (unsigned)(offsetof(ebpo_bound, high) + (size_t)k * 8);
-        r->near_at[k] = back ? high : low;
-        r->far_at[k] = back ? low : high;
+                 high = (unsigned)(offsetof(ebpo_bound, high) + (size_t)k * 8),
+                 turn = (low ^ high) & (0 - (unsigned)(signbit(d) != 0));
+        r->near_at[k] = low ^ turn;
+        r->far_at[k] = high ^ turn;
     }
+    r->near_from[3] = r->far_from[3] = r->inverse[3] = r->step_inverse[0] = 0;
 }
 
 static void set_faces(ebpo_ray_search *r, const framed *f, double error)
@@ -177,7 +179,7 @@ static void judge(ebpo_ray_search *r)
         if (c.low > r->bound)
             continue;
         double before = r->limit;
-        r->decide(r, c.slot);
+        r->decide(r, c.slot, c.facing);
         if (r->limit < before)
             lower_bound(r);
     }

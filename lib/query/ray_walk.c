@@ -30,13 +30,14 @@ static bool meets_slabs(const double origin[3], const double direction[3], doubl
     return from <= to;
 }
 
-static void decide(ebpo_ray_search *r, uint32_t slot)
+static void decide(ebpo_ray_search *r, uint32_t slot, int facing)
 {
     ebpo_casting *c = r->user;
     ebpo_met m;
     uint32_t local = ebpo_accel_slot_face(r->s, slot);
+    ebpo_accel_fetch_face(r->s, local);
     ebpo_accel_triangle(r->s, slot, m.triangle);
-    if (!ebpo_casting_meets(c, &m))
+    if (!ebpo_casting_meets(c, facing, &m))
         return;
     m.file_face = ebpo_accel_file_face(r->s, local);
     m.source_face = ebpo_accel_source_face(r->s, local);
