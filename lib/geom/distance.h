@@ -37,9 +37,12 @@ typedef struct ebpo_triangle_nearest {
     ebpo_feature feature;
 } ebpo_triangle_nearest;
 /* Double-double arithmetic with an error bound, integers of any size (GMP) when that does not
- * decide the rounding. `bounds`: what ebpo_triangle_distance_bounds gave for the same, or NULL. */
+ * decide the rounding. `bounds`: what ebpo_triangle_distance_bounds gave for the same, or NULL.
+ * `normal`: what ebpo_triangle_unit_normal gives, for little more where the nearest point is in the
+ * interior, or NULL. */
 void ebpo_triangle_nearest_exact(const double p[3], const double triangle[3][3],
-                                 const ebpo_distance_bounds *bounds, ebpo_triangle_nearest *out);
+                                 const ebpo_distance_bounds *bounds, double *normal,
+                                 ebpo_triangle_nearest *out);
 
 /* Sign of distance(p, a) - distance(p, b), exact. */
 int ebpo_triangle_distance_compare(const double p[3], const double a[3][3], const double b[3][3]);

@@ -25,28 +25,42 @@ static bool ordinary(const double p[3], const double triangle[3][3])
     return reach < most_reach && size > least_size;
 }
 
+/* False: the arithmetic does not decide. *known: the normal (if it is wanted) is there. */
+static bool nearest_by_pairs(const double p[3], const double triangle[3][3],
+                             const ebpo_distance_bounds *bounds, double *normal, bool *known,
+                             ebpo_triangle_nearest *out)
+{
+    ebpo_measured m;
+    *known = false;
+    if (bounds->feature == EBPO_NEAR_UNKNOWN || !(bounds->lo > least_size) ||
+        !ordinary(p, triangle))
+        return false;
+    *known = ebpo_distance_pairs_best()->measure(p, triangle, bounds->feature, normal, &m);
+    double error = m.error * m.distance.head;
+    double least = m.distance.head + (m.distance.tail - error),
+           most = m.distance.head + (m.distance.tail + error);
+    if (!(m.error < 0x1p-56) || least != most)
+        return false;
+    out->distance = least;
+    out->feature = bounds->feature;
+    memcpy(out->point, m.point, sizeof out->point);
+    return true;
+}
+
 void ebpo_triangle_nearest_exact(const double p[3], const double triangle[3][3],
-                                 const ebpo_distance_bounds *bounds, ebpo_triangle_nearest *out)
+                                 const ebpo_distance_bounds *bounds, double *normal,
+                                 ebpo_triangle_nearest *out)
 {
     ebpo_distance_bounds b;
+    bool known;
     if (bounds)
         b = *bounds;
     else
         ebpo_triangle_distance_bounds(p, triangle, &b);
-    if (b.feature != EBPO_NEAR_UNKNOWN && b.lo > least_size && ordinary(p, triangle)) {
-        ebpo_measured m;
-        ebpo_distance_pairs_best()->measure(p, triangle, b.feature, &m);
-        double error = m.error * m.distance.head;
-        double least = m.distance.head + (m.distance.tail - error),
-               most = m.distance.head + (m.distance.tail + error);
-        if (m.error < 0x1p-56 && least == most) {
-            out->distance = least;
-            out->feature = b.feature;
-            memcpy(out->point, m.point, sizeof out->point);
-            return;
-        }
-    }
-    ebpo_triangle_nearest_gmp(p, triangle, out);
+    if (!nearest_by_pairs(p, triangle, &b, normal, &known, out))
+        ebpo_triangle_nearest_gmp(p, triangle, out);
+    if (normal && !known)
+        ebpo_triangle_unit_normal(triangle, normal);
 }
 
 int ebpo_triangle_distance_compare(const double p[3], const double a[3][3], const double b[3][3])

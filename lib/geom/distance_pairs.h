@@ -7,7 +7,8 @@
 #include "geom/distance.h"
 #include "geom/expansion.h"
 
-/* A distance with a bound on its relative error, and the nearest point. */
+/* A distance (head + tail; they may overlap by some bits) with a bound on its relative error, and
+ * the nearest point. */
 typedef struct ebpo_measured {
     ebpo_pair distance;
     double error;
@@ -16,9 +17,10 @@ typedef struct ebpo_measured {
 
 typedef struct ebpo_distance_pairs {
     /* The triangle's distance when its nearest feature is known. Products of four coordinates, and
-     * their rounding errors, must stay within the doubles. */
-    void (*measure)(const double p[3], const double triangle[3][3], ebpo_feature feature,
-                    ebpo_measured *out);
+     * their rounding errors, must stay within the doubles. `normal`: what unit_normal gives and
+     * returns, or NULL: true. */
+    bool (*measure)(const double p[3], const double triangle[3][3], ebpo_feature feature,
+                    double *normal, ebpo_measured *out);
     /* False when the arithmetic does not suffice: numbers beyond its range, or too much
      * cancellation. */
     bool (*unit_normal)(const double triangle[3][3], double normal[3]);

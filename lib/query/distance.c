@@ -157,7 +157,9 @@ static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_distance
     ebpo_nearest_begin(&n, p, o->max_distance);
     if (o->deadline_ns)
         n.deadline = ebpo_clock() + o->deadline_ns;
-    if (o->warm && c->warm)
+    if (o->warm && c->warm && c->model->whole)
+        ebpo_nearest_begin_at(&n, c->warm_block);
+    else if (o->warm && c->warm)
         ebpo_nearest_begin_with(&n, (const double(*)[3])c->warm_triangle, c->warm_face,
                                 c->warm_source_face);
     ebpo_status status = search_everything(c, &n, error);
@@ -179,6 +181,7 @@ static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_distance
     if (out->face == EBPO_NO_FACE)
         return EBPO_OK;
     c->warm = true;
+    c->warm_block = n.block;
     c->warm_face = n.file_face;
     c->warm_source_face = n.source_face;
     memcpy(c->warm_triangle, n.triangle, sizeof n.triangle);

@@ -97,8 +97,7 @@ static void nearest_polygon(const ebpo_polytope *e, const ebpo_box *box, ebpo_ce
     if (isinf(out->distance))
         return;
     ebpo_triangle_nearest exact;
-    ebpo_triangle_nearest_exact(p, (const double(*)[3])best, NULL, &exact);
-    ebpo_triangle_unit_normal((const double(*)[3])best, out->normal);
+    ebpo_triangle_nearest_exact(p, (const double(*)[3])best, NULL, out->normal, &exact);
     out->distance = exact.distance;
     for (int k = 0; k < 3; k++)
         out->point[k] = exact.point[k];

@@ -21,6 +21,7 @@ typedef struct ebpo_near_candidate {
     uint32_t slot;
 } ebpo_near_candidate;
 enum { EBPO_NEAR_CANDIDATES = 64 };
+#define EBPO_NO_BLOCK UINT32_MAX
 
 typedef struct ebpo_near_search ebpo_near_search;
 struct ebpo_near_search {
@@ -29,6 +30,7 @@ struct ebpo_near_search {
     void *user;
     void (*judge)(ebpo_near_search *search); /* decides about all that waits */
     bool (*late)(ebpo_near_search *search);  /* NULL: there is time */
+    uint32_t first_block;                    /* looked at before all others, or EBPO_NO_BLOCK */
     float best;   /* some face is certainly not farther, or what is does not matter: in the frame */
     float limit2; /* what squared lower bounds are compared with */
     int count;

@@ -26,6 +26,7 @@ void ebpo_nearest_begin(ebpo_nearest *n, const double p[3], double max_distance)
     n->limit = max_distance;
     n->upper = INFINITY;
     n->passed_over = INFINITY;
+    n->block = n->first_block = EBPO_NO_BLOCK;
 }
 
 static void take(ebpo_nearest *n, const double triangle[3][3], const ebpo_distance_bounds *bounds,
@@ -70,6 +71,7 @@ static void try_face(ebpo_nearest *n, const ebpo_accel *s, uint32_t slot)
             return;
     }
     take(n, (const double(*)[3])triangle, &b, file_face, ebpo_accel_source_face(s, local));
+    n->block = slot / EBPO_BLOCK;
 }
 
 void ebpo_nearest_leaf(ebpo_nearest *n, const ebpo_accel *s, const ebpo_accel_leaf *leaf)
@@ -158,6 +160,7 @@ static void search_near(ebpo_nearest *n, const ebpo_kernels *kernels, ebpo_near_
     g->judge = judge;
     g->late = n->deadline ? late : NULL;
     g->count = 0;
+    g->first_block = n->first_block;
     ebpo_near_set_best(g, frame_limit(g));
     kernels->near(g);
     if (g->top)
@@ -237,9 +240,9 @@ void ebpo_nearest_end(const ebpo_nearest *n, double max_distance, ebpo_distance_
                                                         max_distance) > 0))
         return;
     ebpo_triangle_nearest exact;
-    ebpo_triangle_nearest_exact(n->p, (const double(*)[3])n->triangle, &n->bounds, &exact);
+    ebpo_triangle_nearest_exact(n->p, (const double(*)[3])n->triangle, &n->bounds, out->normal,
+                                &exact);
     out->distance = out->lo = out->hi = exact.distance;
     memcpy(out->point, exact.point, sizeof out->point);
-    ebpo_triangle_unit_normal((const double(*)[3])n->triangle, out->normal);
     out->face = n->source_face;
 }

@@ -172,11 +172,10 @@ static bool give(within *w, const ebpo_near *n)
     ebpo_near_face out = { .normal = { NAN, NAN, NAN },
                            .face = n->source_face,
                            .file_face = n->file_face };
-    ebpo_triangle_nearest_exact(n->p, (const double(*)[3])n->triangle, &n->bounds, &exact);
+    ebpo_triangle_nearest_exact(n->p, (const double(*)[3])n->triangle, &n->bounds,
+                                w->options->normals ? out.normal : NULL, &exact);
     out.distance = exact.distance;
     memcpy(out.point, exact.point, sizeof out.point);
-    if (w->options->normals)
-        ebpo_triangle_unit_normal((const double(*)[3])n->triangle, out.normal);
     w->given++;
     return w->take(w->user, &out);
 }

@@ -92,8 +92,7 @@ static uint64_t hash_distances(uint64_t hash, const double *p)
     ebpo_triangle_nearest n;
     double normal[3];
     ebpo_triangle_distance_bounds(p + 9, triangle, &b);
-    ebpo_triangle_nearest_exact(p + 9, triangle, NULL, &n);
-    ebpo_triangle_unit_normal(triangle, normal);
+    ebpo_triangle_nearest_exact(p + 9, triangle, NULL, normal, &n);
     hash = mix_double(mix_double(mix_double(mix(hash, (int)n.feature), b.lo), b.hi), n.distance);
     for (int k = 0; k < 3; k++)
         hash = mix_double(mix_double(hash, n.point[k]), normal[k]);

@@ -200,7 +200,10 @@ START_TEST(distances_are_rounded_correctly_and_lie_within_their_bounds)
         exact_square(square, p, (const double(*)[3])t);
         ebpo_triangle_nearest n;
         ebpo_distance_bounds b;
-        ebpo_triangle_nearest_exact(p, (const double(*)[3])t, NULL, &n);
+        double normal[3], alone[3];
+        ebpo_triangle_nearest_exact(p, (const double(*)[3])t, NULL, normal, &n);
+        ebpo_triangle_unit_normal((const double(*)[3])t, alone);
+        ck_assert_msg(memcmp(normal, alone, sizeof normal) == 0, "case %d: another normal", i);
         ebpo_triangle_distance_bounds(p, (const double(*)[3])t, &b);
         ck_assert_msg(rounded_correctly(n.distance, square), "case %d: %a is not the distance", i,
                       n.distance);
@@ -311,8 +314,8 @@ START_TEST(processors_with_fma_give_the_same_bits)
         if (b.feature == EBPO_NEAR_UNKNOWN || !in_range(p, 3) || !in_range(t[0], 9))
             continue;
         ebpo_measured x, y;
-        ebpo_distance_pairs_base.measure(p, (const double(*)[3])t, b.feature, &x);
-        ebpo_distance_pairs_fma.measure(p, (const double(*)[3])t, b.feature, &y);
+        ebpo_distance_pairs_base.measure(p, (const double(*)[3])t, b.feature, n, &x);
+        ebpo_distance_pairs_fma.measure(p, (const double(*)[3])t, b.feature, m, &y);
         ck_assert_msg(memcmp(&x, &y, sizeof x) == 0, "case %d: %a and %a", i, x.distance.head,
                       y.distance.head);
         measured++;
