@@ -30,28 +30,9 @@ void ebpo_layout_free(ebpo_layout *layout);
 EBPO_MUST_USE ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_slice *slice,
                                                  ebpo_layout *layout, unsigned threads,
                                                  ebpo_error *error);
-
-/* The vertices of a run of blocks, [begin, end), each at least once: those that it has first, order
- * [first[begin] .. first[end]), and those of order[older[i]], first_older[begin] <= i <
- * first_older[end], that lie before. */
-typedef struct ebpo_block_points {
-    const ebpo_mesh *mesh;
-    uint32_t *order;       /* the mesh's vertices as the blocks have them first */
-    uint32_t *first;       /* [block_count + 1] */
-    uint32_t *older;       /* places in `order` of what blocks before have as well */
-    uint64_t *first_older; /* [block_count + 1] */
-    uint64_t older_capacity;
-} ebpo_block_points;
-
-/* `mesh` must live as long. */
-EBPO_MUST_USE ebpo_status ebpo_block_points_make(ebpo_block_points *out, const ebpo_mesh *mesh,
-                                                 const ebpo_layout *layout, ebpo_error *error);
-void ebpo_block_points_free(ebpo_block_points *points);
-
-/* Bounds of the hierarchy, from the blocks and their vertices (parallel). */
-EBPO_MUST_USE ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_mesh *mesh,
-                                                 const ebpo_layout *layout, unsigned threads,
-                                                 ebpo_error *error);
+/* Bounds of the hierarchy, from the blocks (parallel). */
+EBPO_MUST_USE ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout,
+                                                 unsigned threads, ebpo_error *error);
 /* Child tables and leaf records with their lists of blocks (one walk). */
 EBPO_MUST_USE ebpo_status ebpo_accel_fill_nodes(ebpo_accel *s, const ebpo_slice *slice,
                                                 const ebpo_layout *layout, ebpo_error *error);

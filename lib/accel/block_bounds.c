@@ -15,6 +15,7 @@
 #include "base/huge_pages.h"
 #include "base/parallel.h"
 #include "accel/accel_parts.h"
+#include "accel/block_measure.h"
 
 /* Above so many blocks the slab is left away: such patches curve too much for one. */
 enum { SLAB_BLOCKS_MAX = 1024 };
@@ -35,21 +36,16 @@ typedef struct extent {
 typedef struct job {
     ebpo_accel *s;
     const ebpo_layout *layout;
-    ebpo_block_points points;
+    const ebpo_block_measures *measures;
     extent *of_block, *of_node;
 } job;
 
 /* Two lanes at a time. */
 typedef double pair __attribute__((vector_size(16)));
-enum { PAIRS = EBPO_BLOCK / 2 };
 
 #if defined(__SSE2__)
 static inline pair lesser(pair a, pair b) { return (pair)_mm_min_pd((__m128d)a, (__m128d)b); }
 static inline pair greater(pair a, pair b) { return (pair)_mm_max_pd((__m128d)a, (__m128d)b); }
-static inline pair two_floats(const float *p)
-{
-    return (pair)_mm_cvtps_pd(_mm_castpd_ps(_mm_load_sd((const double *)(const void *)p)));
-}
 #else
 typedef int64_t pair_mask __attribute__((vector_size(16)));
 static inline pair pick(pair_mask mask, pair yes, pair no)
@@ -58,35 +54,28 @@ static inline pair pick(pair_mask mask, pair yes, pair no)
 }
 static inline pair lesser(pair a, pair b) { return pick(a < b, a, b); }
 static inline pair greater(pair a, pair b) { return pick(a > b, a, b); }
-static inline pair two_floats(const float *p) { return (pair){ (double)p[0], (double)p[1] }; }
 #endif
 
 static double least_of(pair x) { return x[0] < x[1] ? x[0] : x[1]; }
 static double most_of(pair x) { return x[0] > x[1] ? x[0] : x[1]; }
 
-/* A block's corners in the frame, [corner][axis][lanes]; lanes without a face repeat the first one.
- */
-typedef struct lanes {
-    pair x[3][3][PAIRS];
-} lanes;
+/* Vertices of a block of doubles, in the frame. */
+enum { PAIRS = EBPO_MESHLET_VERTICES / 2 };
+typedef struct vertices {
+    pair x[3][PAIRS];
+    unsigned pairs; /* the last vertex may be there twice */
+} vertices;
 
-static void load_lanes(const job *j, uint32_t block, lanes *out)
+static void load_vertices(const ebpo_accel *s, uint32_t block, vertices *out)
 {
-    const ebpo_accel *s = j->s;
-    const ebpo_meshlet *m = ebpo_accel_meshlet(s, j->layout->block_number[block]);
-    double x[3][EBPO_MESHLET_VERTICES];
-    for (unsigned k = 0; k < 3; k++)
-        for (unsigned i = 0, at = k * m->vertices; i < m->vertices; i++, at++)
-            x[k][i] =
-                ((s->wide ? ebpo_meshlet_doubles(m)[at] : (double)ebpo_meshlet_floats(m)[at]) -
-                 s->centre[k]) *
-                s->scale;
-    for (unsigned i = 0; i < 3; i++)
-        for (unsigned lane = 0; lane < EBPO_BLOCK; lane++) {
-            unsigned at = ebpo_meshlet_vertex(m, lane < m->faces ? lane : 0, i);
-            for (unsigned k = 0; k < 3; k++)
-                out->x[i][k][lane / 2][lane % 2] = x[k][at];
-        }
+    const ebpo_meshlet *m = ebpo_accel_meshlet(s, block);
+    const double *x = ebpo_meshlet_doubles(m);
+    unsigned count = m->vertices;
+    out->pairs = (count + 1) / 2;
+    for (unsigned k = 0; k < 3; k++, x += count)
+        for (unsigned i = 0; i < count; i += 2)
+            out->x[k][i / 2] =
+                ((pair){ x[i], x[i + 1 < count ? i + 1 : i] } - s->centre[k]) * s->scale;
 }
 
 /* --- extents --- */
@@ -95,31 +84,50 @@ static const extent nothing = { { INFINITY, INFINITY, INFINITY },
                                 { -INFINITY, -INFINITY, -INFINITY },
                                 { 0, 0, 0 } };
 
-static void add_corners(const lanes *l, int axis, extent *e)
-{
-    pair low = { e->low[axis], e->low[axis] }, high = { e->high[axis], e->high[axis] };
-    for (int i = 0; i < 3; i++)
-        for (int h = 0; h < PAIRS; h++) {
-            low = lesser(l->x[i][axis][h], low);
-            high = greater(l->x[i][axis][h], high);
-        }
-    e->low[axis] = least_of(low);
-    e->high[axis] = most_of(high);
-}
-
-static void add_lanes(const lanes *l, extent *e)
+static void add_vertices(const vertices *v, extent *e)
 {
     for (int k = 0; k < 3; k++) {
-        int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
-        double normal = 0;
-        add_corners(l, k, e);
-        for (int h = 0; h < PAIRS; h++) {
-            pair area = (l->x[1][u][h] - l->x[0][u][h]) * (l->x[2][v][h] - l->x[0][v][h]) -
-                        (l->x[1][v][h] - l->x[0][v][h]) * (l->x[2][u][h] - l->x[0][u][h]);
-            normal += area[0];
-            normal += area[1];
+        pair low = { e->low[k], e->low[k] }, high = { e->high[k], e->high[k] };
+        for (unsigned i = 0; i < v->pairs; i++) {
+            low = lesser(v->x[k][i], low);
+            high = greater(v->x[k][i], high);
         }
-        e->normal[k] += normal;
+        e->low[k] = least_of(low);
+        e->high[k] = most_of(high);
+    }
+}
+
+static void add_normals(const ebpo_accel *s, uint32_t block, double normal[3])
+{
+    const ebpo_meshlet *m = ebpo_accel_meshlet(s, block);
+    for (uint32_t lane = 0; lane < m->faces; lane++) {
+        double t[3][3];
+        ebpo_accel_triangle(s, block * EBPO_BLOCK + lane, t);
+        for (int k = 0; k < 3; k++) {
+            int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
+            normal[k] += (t[1][u] - t[0][u]) * (t[2][v] - t[0][v]) -
+                         (t[1][v] - t[0][v]) * (t[2][u] - t[0][u]);
+        }
+    }
+}
+
+static void extend_wide(const ebpo_accel *s, uint32_t block, extent *e)
+{
+    vertices v;
+    load_vertices(s, block, &v);
+    *e = nothing;
+    add_vertices(&v, e);
+    add_normals(s, block, e->normal);
+}
+
+static void extend_narrow(const job *j, uint32_t block, extent *e)
+{
+    ebpo_block_extent b;
+    j->measures->extent(j->s, block, &b);
+    for (int k = 0; k < 3; k++) {
+        e->low[k] = ((double)b.low[k] - j->s->centre[k]) * j->s->scale;
+        e->high[k] = ((double)b.high[k] - j->s->centre[k]) * j->s->scale;
+        e->normal[k] = (double)b.normal[k];
     }
 }
 
@@ -139,10 +147,11 @@ static ebpo_status extend_blocks(void *context, uint64_t begin, uint64_t end, un
     (void)error;
     job *j = context;
     for (uint64_t b = begin; b < end; b++) {
-        lanes l;
-        load_lanes(j, (uint32_t)b, &l);
-        j->of_block[b] = nothing;
-        add_lanes(&l, &j->of_block[b]);
+        uint32_t block = j->layout->block_number[b];
+        if (j->s->wide)
+            extend_wide(j->s, block, &j->of_block[b]);
+        else
+            extend_narrow(j, block, &j->of_block[b]);
     }
     return EBPO_OK;
 }
@@ -175,7 +184,15 @@ static double choose_grid(double low, double high, float *origin, float *step)
     return slack;
 }
 
-static uint8_t to_byte(double x) { return (uint8_t)(x < 0 ? 0 : x > 255 ? 255 : x); }
+/* floor and ceil of what an int holds; without calls. */
+static int round_down(double x)
+{
+    int whole = (int)x;
+    return whole - (whole > x);
+}
+static int round_up(double x) { return -round_down(-x); }
+
+static double to_byte(double x) { return x < 0 ? 0 : x > 255 ? 255 : x; }
 
 static void set_boxes(ebpo_bound *b, const extent *all, const extent child[8])
 {
@@ -184,8 +201,8 @@ static void set_boxes(ebpo_bound *b, const extent *all, const extent child[8])
         for (int lane = 0; lane < b->count; lane++) {
             double from = child[lane].low[k] - slack - (double)b->origin[k],
                    to = child[lane].high[k] + slack - (double)b->origin[k];
-            b->low[k][lane] = to_byte(floor(from / (double)b->step[k]));
-            b->high[k][lane] = to_byte(ceil(to / (double)b->step[k]));
+            b->low[k][lane] = (uint8_t)round_down(to_byte(from / (double)b->step[k]));
+            b->high[k][lane] = (uint8_t)round_up(to_byte(to / (double)b->step[k]));
         }
     }
     double size = 0;
@@ -223,60 +240,69 @@ static void choose_axis(const extent *e, ebpo_bound_slab *b, int lane, slab *out
     }
 }
 
-/* Points of the frame, some at a time. */
-enum { SOME = 32 };
-typedef struct some_points {
-    double x[3][SOME];
-    int count;
-} some_points;
+typedef struct slab_pairs {
+    pair middle[3], axis[3], from, to, most;
+} slab_pairs;
 
-static void add_to_slab(some_points *p, slab *out)
+static inline void add_to_slab(const vertices *v, slab_pairs *p)
 {
-    pair from = { out->from, out->from }, to = { out->to, out->to },
-         most = { out->radius2, out->radius2 };
-    for (int k = 0; k < 3 && p->count % 2; k++)
-        p->x[k][p->count] = p->x[k][p->count - 1];
-    for (int i = 0; i < p->count; i += 2) {
+    for (unsigned i = 0; i < v->pairs; i++) {
         pair along = { 0, 0 }, square = { 0, 0 };
         for (int k = 0; k < 3; k++) {
-            pair d = (pair){ p->x[k][i], p->x[k][i + 1] } - out->middle[k];
-            along += d * out->axis[k];
+            pair d = v->x[k][i] - p->middle[k];
+            along += d * p->axis[k];
             square += d * d;
         }
-        from = lesser(along, from);
-        to = greater(along, to);
-        most = greater(square - along * along, most);
+        p->from = lesser(along, p->from);
+        p->to = greater(along, p->to);
+        p->most = greater(square - along * along, p->most);
     }
-    out->from = least_of(from);
-    out->to = most_of(to);
-    out->radius2 = most_of(most);
-    p->count = 0;
 }
 
-static inline void add_point(const job *j, uint32_t place, some_points *p, slab *out)
+/* Of all vertices of a run of blocks. The middle of the box need not be between them: of a tilted
+ * patch it is off its plane. */
+static void add_run_wide(const job *j, uint32_t begin, uint32_t end, slab *out)
 {
-    const ebpo_mesh *mesh = j->points.mesh;
-    uint64_t at = 3 * (uint64_t)j->points.order[place];
-    for (unsigned k = 0; k < 3; k++) {
-        double x = mesh->xyz64 ? mesh->xyz64[at + k] : (double)mesh->xyz32[at + k];
-        p->x[k][p->count] = (x - j->s->centre[k]) * j->s->scale;
+    slab_pairs p = { .from = { INFINITY, INFINITY }, .to = { -INFINITY, -INFINITY } };
+    for (int k = 0; k < 3; k++) {
+        p.middle[k] = (pair){ out->middle[k], out->middle[k] };
+        p.axis[k] = (pair){ out->axis[k], out->axis[k] };
     }
-    if (++p->count == SOME)
-        add_to_slab(p, out);
+    for (uint32_t i = begin; i < end; i++) {
+        vertices v;
+        load_vertices(j->s, j->layout->block_number[i], &v);
+        add_to_slab(&v, &p);
+    }
+    out->from = least_of(p.from);
+    out->to = most_of(p.to);
+    out->radius2 = most_of(p.most);
 }
 
-/* All vertices of a run of blocks. */
-static void add_run(const job *j, uint32_t begin, uint32_t end, slab *out)
+/* The same in single precision, seen from two floats near the middle: what they are off it comes on
+ * top. */
+static void add_run_narrow(const job *j, uint32_t begin, uint32_t end, slab *out)
 {
-    const ebpo_block_points *points = &j->points;
-    some_points p;
-    p.count = 0;
-    for (uint32_t place = points->first[begin]; place < points->first[end]; place++)
-        add_point(j, place, &p, out);
-    for (uint64_t i = points->first_older[begin]; i < points->first_older[end]; i++)
-        if (points->older[i] < points->first[begin])
-            add_point(j, points->older[i], &p, out);
-    add_to_slab(&p, out);
+    const ebpo_accel *s = j->s;
+    ebpo_slab_view view = { .scale = (float)s->scale };
+    ebpo_slab_extent e;
+    double square = 0, along = 0, off2 = 0;
+    for (int k = 0; k < 3; k++) {
+        double middle = s->centre[k] + out->middle[k] / s->scale;
+        view.high[k] = (float)middle;
+        view.low[k] = (float)(middle - (double)view.high[k]);
+        view.axis[k] = (float)out->axis[k];
+        square += out->axis[k] * out->axis[k];
+        double seen = ((double)view.high[k] - s->centre[k] + (double)view.low[k]) * s->scale,
+               off = seen - out->middle[k];
+        along += off * out->axis[k];
+        off2 += off * off;
+    }
+    view.rest = (float)(1 - square);
+    j->measures->slab(s, j->layout->block_number + begin, end - begin, &view, &e);
+    double aside = sqrt((double)e.aside2) + sqrt(off2);
+    out->from = (double)e.from + along;
+    out->to = (double)e.to + along;
+    out->radius2 = aside * aside;
 }
 
 /* Without an axis and as wide as the box is: says nothing that the box does not say. */
@@ -308,10 +334,10 @@ static slab measure_slab(const job *j, uint64_t n, int lane, const extent *e)
         return out;
     }
     choose_axis(e, &j->s->slab[n], lane, &out);
-    /* The middle of the box need not be between them: of a tilted patch it is off its plane. */
-    out.from = INFINITY;
-    out.to = -INFINITY;
-    add_run(j, first, last, &out);
+    if (j->s->wide)
+        add_run_wide(j, first, last, &out);
+    else
+        add_run_narrow(j, first, last, &out);
     return out;
 }
 
@@ -333,9 +359,9 @@ static void set_slabs(ebpo_bound_slab *b, int count, double size, const slab chi
     b->along_step = (float)(along / SHORT_MOST);
     b->aside_step = (float)(aside / SHORT_MOST);
     for (int lane = 0; lane < count; lane++) {
-        b->from[lane] = (int16_t)floor((child[lane].from - slack) / (double)b->along_step);
-        b->to[lane] = (int16_t)ceil((child[lane].to + slack) / (double)b->along_step);
-        b->radius[lane] = (int16_t)ceil(radius[lane] / (double)b->aside_step);
+        b->from[lane] = (int16_t)round_down((child[lane].from - slack) / (double)b->along_step);
+        b->to[lane] = (int16_t)round_up((child[lane].to + slack) / (double)b->along_step);
+        b->radius[lane] = (int16_t)round_up(radius[lane] / (double)b->aside_step);
     }
 }
 
@@ -403,21 +429,18 @@ static ebpo_status fill(job *j, unsigned threads, ebpo_error *error)
                              "open", error);
 }
 
-ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_mesh *mesh, const ebpo_layout *layout,
-                                   unsigned threads, ebpo_error *error)
+ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout, unsigned threads,
+                                   ebpo_error *error)
 {
-    job j = { .s = s, .layout = layout };
+    job j = { .s = s, .layout = layout, .measures = ebpo_block_measures_best() };
     s->bound_count = (uint32_t)layout->bound_count;
     s->top = layout->top;
     s->reach = 1;
-    ebpo_status status = ebpo_block_points_make(&j.points, mesh, layout, error);
-    if (status == EBPO_OK)
-        status = make_room(&j, error);
+    ebpo_status status = make_room(&j, error);
     if (status == EBPO_OK)
         status = fill(&j, threads, error);
     if (status == EBPO_OK && s->bound_count)
         s->reach = fmax(1, reach_of(&s->bound[s->top]));
-    ebpo_block_points_free(&j.points);
     free(j.of_block);
     free(j.of_node);
     return status;

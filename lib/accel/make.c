@@ -94,9 +94,9 @@ static ebpo_status make(ebpo_accel *s, ebpo_slice *slice, bool with_planes, unsi
     if (status != EBPO_OK)
         return status;
     status = ebpo_accel_fill_blocks(s, slice, &layout, threads, error);
-    if (status == EBPO_OK)
-        status = ebpo_accel_fill_bounds(s, &slice->mesh, &layout, threads, error);
     ebpo_mesh_free(&slice->mesh);
+    if (status == EBPO_OK)
+        status = ebpo_accel_fill_bounds(s, &layout, threads, error);
     if (status == EBPO_OK)
         status = ebpo_accel_fill_nodes(s, slice, &layout, error);
     ebpo_layout_free(&layout);
@@ -180,6 +180,6 @@ void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uin
             (size->refs + size->new_faces) * sizeof(ebpo_listed_block) +
             blocks * (EBPO_MESHLET_WIDE + EBPO_MESHLET_UNIT) + faces * 48 * wide +
             bounds * (sizeof(ebpo_bound) + sizeof(ebpo_bound_slab)) + faces * 8;
-    *peak = *keep + size->groups * 128 + size->leaves * 64 + faces * (12 + 36 * wide + 36) +
+    *peak = *keep + size->groups * 128 + size->leaves * 64 + faces * (12 + 36 * wide + 24) +
             (blocks + bounds) * 72 + 65536;
 }
