@@ -148,6 +148,20 @@ typedef struct ebpo_bound_slab {
     uint8_t spare[24];
 } ebpo_bound_slab;
 
+/* A child's slab, decoded. */
+typedef struct ebpo_child_slab {
+    double axis[3], from, to, radius;
+} ebpo_child_slab;
+static inline ebpo_child_slab ebpo_bound_slab_of(const ebpo_bound_slab *b, int lane)
+{
+    double along = (double)b->along_step, aside = (double)b->aside_step;
+    return (ebpo_child_slab){ { b->axis[0][lane] * 0x1p-15, b->axis[1][lane] * 0x1p-15,
+                                b->axis[2][lane] * 0x1p-15 },
+                              along * b->from[lane],
+                              along * b->to[lane],
+                              aside * b->radius[lane] };
+}
+
 typedef struct ebpo_accel {
     ebpo_node root;
     ebpo_box box; /* of the whole model */

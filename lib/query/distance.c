@@ -2,10 +2,8 @@
 #include "geom/strict_fp.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
 #include "base/clock.h"
 #include "base/error.h"
 #include "base/fp_env.h"
@@ -16,93 +14,11 @@
 #include "query/limited.h"
 #include "query/modes.h"
 #include "query/nearest.h"
+#include "query/nearest_first.h"
 #include "query/options.h"
 #include "query/pruned.h"
 #include "query/query_node.h"
 #include "query/sign.h"
-
-/* --- exact: every subtree that may hold something nearer --- */
-
-/* Loading can wait: what is in memory, or nearer, may tell that it is not needed. Not under a
- * deadline, which might pass before anything is loaded, each time. */
-static bool put_off(ebpo_context *c, const ebpo_nearest *n, const ebpo_node *node, double lower)
-{
-    uint64_t key = ebpo_entry_value(node->entry);
-    if (n->deadline || ebpo_context_has_pinned(c, key) ||
-        ebpo_cache_has(c->model->cache, ebpo_context_key(c, key)) ||
-        !ebpo_grow(&c->later, &c->later_capacity, c->later_count + 1, sizeof *c->later))
-        return false;
-    c->later[c->later_count++] = (ebpo_ranked){ *node, lower };
-    return true;
-}
-
-static ebpo_status search_below(ebpo_context *c, ebpo_nearest *n, ebpo_node node, ebpo_error *error)
-{
-    ebpo_status status = ebpo_model_enter(c, &node, error);
-    if (status == EBPO_OK)
-        ebpo_nearest_search(n, c, node.subtree);
-    return status;
-}
-
-static bool is_late(ebpo_nearest *n, double lower)
-{
-    if (!n->late && (!n->deadline || ebpo_clock() <= n->deadline))
-        return false;
-    n->late = true;
-    n->passed_over = fmin(n->passed_over, lower);
-    return true;
-}
-
-static ebpo_status search_top(ebpo_context *c, ebpo_nearest *n, const ebpo_box *box, ebpo_node node,
-                              double lower, ebpo_error *error)
-{
-    if (lower > n->limit || ebpo_node_is_uniform(&node) || is_late(n, lower) ||
-        node.pruned) /* pruned: see look_at_pruned */
-        return EBPO_OK;
-    if (ebpo_node_is_below(&node)) {
-        /* it holds some face */
-        n->upper = fmin(n->upper, ebpo_cell_far(box, node.cell, n->p));
-        n->limit = fmin(n->limit, n->upper);
-        return put_off(c, n, &node, lower) ? EBPO_OK : search_below(c, n, node, error);
-    }
-    ebpo_ranked child[8];
-    int count = ebpo_rank_children(c->model, box, &node, lower, n->p, child);
-    ebpo_status status = EBPO_OK;
-    for (int i = 0; i < count && status == EBPO_OK; i++)
-        status = search_top(c, n, box, child[i].node, child[i].lower, error);
-    return status;
-}
-
-static int compare_ranked(const void *x, const void *y)
-{
-    const ebpo_ranked *a = x, *b = y;
-    if (a->lower != b->lower)
-        return a->lower < b->lower ? -1 : 1;
-    return (a->node.entry > b->node.entry) - (a->node.entry < b->node.entry);
-}
-
-/* The nearest first: then none is loaded that a nearer one makes needless. */
-static ebpo_status search_later(ebpo_context *c, ebpo_nearest *n, ebpo_error *error)
-{
-    ebpo_status status = EBPO_OK;
-    qsort(c->later, c->later_count, sizeof *c->later, compare_ranked);
-    for (uint64_t i = 0; i < c->later_count && status == EBPO_OK; i++)
-        if (c->later[i].lower <= n->limit)
-            status = search_below(c, n, c->later[i].node, error);
-    return status;
-}
-
-static ebpo_status search_everything(ebpo_context *c, ebpo_nearest *n, ebpo_error *error)
-{
-    if (c->model->whole) {
-        ebpo_nearest_search(n, c, c->model->whole);
-        return EBPO_OK;
-    }
-    ebpo_box box = ebpo_model_box(c->model);
-    c->later_count = 0;
-    ebpo_status status = search_top(c, n, &box, ebpo_model_root(c->model), 0, error);
-    return status == EBPO_OK && c->later_count ? search_later(c, n, error) : status;
-}
 
 /* --- subsets: when a face that was left out may be nearer than what was found --- */
 
@@ -162,7 +78,7 @@ static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_distance
     else if (o->warm && c->warm)
         ebpo_nearest_begin_with(&n, (const double(*)[3])c->warm_triangle, c->warm_face,
                                 c->warm_source_face);
-    ebpo_status status = search_everything(c, &n, error);
+    ebpo_status status = ebpo_nearest_first(c, &n, error);
     if (status == EBPO_OK)
         status = look_at_pruned(c, &n, error);
     if (status != EBPO_OK)
@@ -285,6 +201,15 @@ static ebpo_status check_mode(const ebpo_distance_options *o, ebpo_error *error)
     return EBPO_OK;
 }
 
+static void count_work(ebpo_context *c, uint64_t questions, uint64_t searched, uint64_t loaded)
+{
+    if (c->model->whole)
+        return;
+    c->model->distances += questions;
+    c->model->distance_subtrees += c->searched - searched;
+    c->model->distance_loads += c->loaded - loaded;
+}
+
 ebpo_status ebpo_distance_many(ebpo_context *context, const double *points, uint64_t count,
                                const ebpo_distance_options *options, ebpo_distance_result *out,
                                ebpo_error *error)
@@ -307,6 +232,7 @@ ebpo_status ebpo_distance_many(ebpo_context *context, const double *points, uint
     context->planes = o->level >= 0 || o->deadline_ns || o->mode != EBPO_DISTANCE_EXACT ||
                       context->model->info->pruned;
     ebpo_batch batch = { .count = 0 };
+    uint64_t searched = context->searched, loaded = context->loaded;
     if (status == EBPO_OK)
         ebpo_batch_begin(&batch, context, points, o->deadline_ns || o->level >= 0 ? 0 : count,
                          true);
@@ -315,6 +241,7 @@ ebpo_status ebpo_distance_many(ebpo_context *context, const double *points, uint
         status = one(context, points + 3 * k, o, &out[k], error);
     }
     ebpo_batch_end(&batch);
+    count_work(context, count, searched, loaded);
     return status;
 }
 

@@ -26,6 +26,18 @@ static uint64_t chunk_budget(uint64_t budget)
                                       : budget / 8;
 }
 
+/* Skeletons of subtrees, at most: searches that go everywhere gain more by them than by a few more
+ * subtrees. */
+static uint64_t skeleton_budget(const ebpo_model_options *o, uint64_t budget)
+{
+    return o->loading == EBPO_LOAD_CACHE ? budget / 8 : 0;
+}
+
+static uint64_t beside_subtrees(const ebpo_model_options *o, uint64_t budget)
+{
+    return chunk_budget(budget) + skeleton_budget(o, budget);
+}
+
 static ebpo_slice_size whole_size(const ebpo_info *info)
 {
     ebpo_slice_size size = { .new_faces = info->face_count };
@@ -78,8 +90,10 @@ static ebpo_status load_subtree(void *user, uint64_t key, void **item, uint64_t 
                                                ebpo_subtree_needs(key & 1), error);
     if (status == EBPO_OK)
         status = ebpo_accel_make(&subtree, &slice, m->info, key & 1, 1, error);
-    if (status == EBPO_OK)
+    if (status == EBPO_OK) {
         ebpo_model_count_leaves(m, subtree, 1);
+        ebpo_skeletons_keep(m->skeletons, key >> 1, subtree);
+    }
     *item = subtree;
     *bytes = status == EBPO_OK ? subtree->bytes : 0;
     return status;
@@ -103,7 +117,7 @@ ebpo_status ebpo_model_has_room(const ebpo_model *m, const ebpo_node *leaf, ebpo
     if (status != EBPO_OK || !m->options.memory)
         return status;
     ebpo_accel_estimate(&size, m->info, &keep, &peak);
-    uint64_t taken = m->top->bytes + chunk_budget(m->options.memory);
+    uint64_t taken = m->top->bytes + beside_subtrees(&m->options, m->options.memory);
     if (taken + peak <= m->options.memory)
         return EBPO_OK;
     return ebpo_fail(error, EBPO_E_LIMIT,
@@ -115,7 +129,7 @@ ebpo_status ebpo_model_has_room(const ebpo_model *m, const ebpo_node *leaf, ebpo
 
 /* Half the budget for subtrees must hold so many of the average size; the top may take a quarter.
  */
-static int choose_cut(const ebpo_info *info, uint64_t budget)
+static int choose_cut(const ebpo_info *info, const ebpo_model_options *o, uint64_t budget)
 {
     ebpo_slice_size size = whole_size(info);
     uint64_t keep, peak;
@@ -123,19 +137,19 @@ static int choose_cut(const ebpo_info *info, uint64_t budget)
     for (int level = 1; level < info->level_count; level++) {
         uint64_t grays = info->level[level].gray_count;
         uint64_t top = ebpo_top_estimate(info, level);
-        if (top > budget / 4 || top + chunk_budget(budget) + SUBTREES_LEAST > budget)
+        if (top > budget / 4 || top + beside_subtrees(o, budget) + SUBTREES_LEAST > budget)
             return -1;
         if (grays == 0 || keep / grays * SUBTREES_WANTED <= budget / 2)
             return level;
     }
-    return budget < chunk_budget(budget) + 2 * SUBTREES_LEAST ? -1 : info->level_count - 1;
+    return budget < beside_subtrees(o, budget) + 2 * SUBTREES_LEAST ? -1 : info->level_count - 1;
 }
 
 /* A budget that choose_cut accepts, not much more than the least. */
-static uint64_t least_budget(const ebpo_info *info)
+static uint64_t least_budget(const ebpo_info *info, const ebpo_model_options *o)
 {
     uint64_t budget = 4 << 20;
-    while (choose_cut(info, budget) < 0 && budget < UINT64_C(1) << 60)
+    while (choose_cut(info, o, budget) < 0 && budget < UINT64_C(1) << 60)
         budget += budget / 8;
     return budget;
 }
@@ -151,11 +165,12 @@ static bool reads_parts(const ebpo_model *m)
 }
 
 /* The roots of the file's subtrees, which are read as one, if the budget allows them. */
-static int prefer_subtrees(const ebpo_info *info, uint64_t budget, int cut)
+static int prefer_subtrees(const ebpo_info *info, const ebpo_model_options *o, int cut)
 {
     int level = info->subtree_level;
-    return level > cut && ebpo_top_estimate(info, level) <= budget / 4 &&
-                   ebpo_top_estimate(info, level) + chunk_budget(budget) + SUBTREES_LEAST <= budget
+    uint64_t top = ebpo_top_estimate(info, level), budget = o->memory;
+    return level > cut && top <= budget / 4 &&
+                   top + beside_subtrees(o, budget) + SUBTREES_LEAST <= budget
                ? level
                : cut;
 }
@@ -173,18 +188,25 @@ static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
 
 static ebpo_status open_top(ebpo_model *m, int cut_level, ebpo_error *error)
 {
-    uint64_t budget = m->options.memory, chunks = 0, cache = 0;
+    uint64_t budget = m->options.memory, chunks = 0, cache = 0, skeletons = UINT64_MAX;
     ebpo_status status = ebpo_top_read(&m->top, m->file, cut_level, m->options.threads, error);
     if (status != EBPO_OK)
         return status;
     if (budget) {
         chunks = chunk_budget(budget);
-        if (m->top->bytes + chunks + SUBTREES_LEAST > budget)
+        uint64_t taken = m->top->bytes + beside_subtrees(&m->options, budget);
+        if (taken + SUBTREES_LEAST > budget)
             return ebpo_fail(error, EBPO_E_LIMIT,
                              "levels 0 to %d and a cache take more than the budget of %" PRIu64
                              " bytes; give %" PRIu64 " or a lower cut level",
-                             cut_level, budget, m->top->bytes + chunks + SUBTREES_LEAST);
-        cache = budget - m->top->bytes - chunks;
+                             cut_level, budget, taken + SUBTREES_LEAST);
+        skeletons = ebpo_skeletons_room(m->top->below_count, skeleton_budget(&m->options, budget));
+        cache = budget - m->top->bytes - chunks - skeletons;
+    }
+    if (m->options.loading == EBPO_LOAD_CACHE && skeletons) {
+        m->skeletons = ebpo_skeletons_make(m->top->below_count, skeletons);
+        if (!m->skeletons)
+            return ebpo_fail_memory(error, m->top->below_count * sizeof(void *));
     }
     status = ebpo_chunks_make(&m->chunks, m->file, chunks, error);
     ebpo_cache_source source = { m, estimate_subtree, load_subtree, release_subtree };
@@ -207,15 +229,15 @@ static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
         return open_top(m, o->cut_level < deepest ? o->cut_level : deepest, error);
     if ((o->memory == 0 || peak <= o->memory) && !reads_parts(m))
         return open_whole(m, error);
-    int cut = choose_cut(m->info, o->memory);
+    int cut = choose_cut(m->info, o, o->memory);
     if (cut < 0) {
-        uint64_t least = least_budget(m->info);
+        uint64_t least = least_budget(m->info, o);
         return ebpo_fail(error, EBPO_E_LIMIT,
                          "a budget of %" PRIu64
                          " bytes is too small for this model; give at least %" PRIu64,
                          o->memory, least < peak ? least : peak);
     }
-    return open_top(m, prefer_subtrees(m->info, o->memory, cut), error);
+    return open_top(m, prefer_subtrees(m->info, o, cut), error);
 }
 
 ebpo_status ebpo_model_new(const ebpo_file *file, const ebpo_model_options *options,
@@ -257,6 +279,7 @@ void ebpo_model_free(ebpo_model *m)
     if (!m)
         return;
     ebpo_cache_free(m->cache);
+    ebpo_skeletons_free(m->skeletons);
     ebpo_chunks_free(m->chunks);
     ebpo_top_free(m->top);
     ebpo_accel_free(m->whole);
@@ -284,13 +307,18 @@ static void gather_stats(const ebpo_model *m, ebpo_model_stats *out)
     ebpo_cache_stats subtrees, chunks;
     ebpo_cache_get_stats(m->cache, &subtrees);
     ebpo_chunks_get_stats(m->chunks, &chunks);
-    out->memory = m->top->bytes + subtrees.bytes + chunks.bytes;
-    out->memory_peak = m->top->bytes + subtrees.peak_bytes + chunks.peak_bytes;
+    uint64_t stays = m->top->bytes + ebpo_skeletons_bytes(m->skeletons);
+    out->memory = stays + subtrees.bytes + chunks.bytes;
+    out->memory_peak = stays + subtrees.peak_bytes + chunks.peak_bytes;
     out->hits = subtrees.hits;
     out->loads = subtrees.loads;
     out->prefetched = subtrees.prefetched;
     out->evicted = subtrees.evicted;
     out->load_seconds = subtrees.load_seconds;
+    out->distances = m->distances;
+    out->distance_subtrees = m->distance_subtrees;
+    out->distance_loads = m->distance_loads;
+    out->skeleton_bytes = ebpo_skeletons_bytes(m->skeletons);
 }
 
 ebpo_status ebpo_model_get_stats(const ebpo_model *m, ebpo_model_stats *out)
@@ -328,7 +356,8 @@ void ebpo_context_free(ebpo_context *c)
     free(c->hits);
     free(c->hit_begin);
     free(c->met);
-    free(c->later);
+    free(c->queue);
+    free(c->seen);
     free(c->faces);
     free(c);
 }
@@ -341,7 +370,7 @@ static ebpo_status too_little(const ebpo_model *m, uint32_t below, ebpo_error *e
         EBPO_OK)
         return EBPO_E_LIMIT;
     least = m->top->bytes + peak;
-    while (m->top->bytes + chunk_budget(least) + peak > least)
+    while (m->top->bytes + beside_subtrees(&m->options, least) + peak > least)
         least += least / 8 + 1;
     return ebpo_fail(error, EBPO_E_LIMIT,
                      "the memory budget of %" PRIu64
@@ -363,7 +392,9 @@ ebpo_status ebpo_context_subtree(ebpo_context *c, uint32_t below, ebpo_accel **o
     if (m->options.loading != EBPO_LOAD_CACHE)
         ebpo_cache_clear(m->cache);
     uint64_t key = ebpo_context_key(c, below);
-    ebpo_status status = ebpo_cache_get(m->cache, key, &item, NULL, error);
+    bool hit = true;
+    ebpo_status status = ebpo_cache_get(m->cache, key, &item, &hit, error);
+    c->loaded += !hit;
     if (status != EBPO_OK)
         return status == EBPO_E_LIMIT && m->options.memory ? too_little(m, below, error) : status;
     *out = c->pinned = item;

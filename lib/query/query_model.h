@@ -11,6 +11,7 @@
 #include "octree/rule.h"
 #include "query/kernels.h"
 #include "query/query_top.h"
+#include "query/skeleton.h"
 #include "accel/accel.h"
 
 struct ebpo_model {
@@ -22,10 +23,12 @@ struct ebpo_model {
     ebpo_accel *whole; /* everything, or NULL: */
     ebpo_top *top;     /* levels 0 .. cut level */
     ebpo_chunks *chunks;
-    ebpo_cache *cache; /* subtrees by their number in the top */
+    ebpo_cache *cache;         /* subtrees by their number in the top */
+    ebpo_skeletons *skeletons; /* of those that have been loaded; or NULL */
     double open_seconds;
     /* in the subtrees that are in memory; kinds of those that were asked about */
     _Atomic uint64_t leaves, leaves_of_kind[5], leaves_one_wall;
+    _Atomic uint64_t distances, distance_subtrees, distance_loads; /* as in ebpo_model_stats */
 };
 
 /* Adds a subtree's leaves to what is in memory, or (sign -1) takes them away; a leaf whose kind has
@@ -51,9 +54,12 @@ struct ebpo_context {
     uint64_t met_capacity;
     uint64_t *faces;
     uint64_t face_capacity;
-    ebpo_ranked *later; /* subtrees that a search has put off */
-    uint64_t later_count, later_capacity;
-    bool has_prefetched; /* from here, by a query that reached so far */
+    ebpo_ranked *queue; /* of nodes to be searched: nearest_first.c */
+    uint64_t queue_count, queue_capacity;
+    uint32_t *seen; /* of subtrees, and the number of the question: nearest_first.c */
+    uint32_t question;
+    uint64_t searched, loaded; /* subtrees, by distances; that were not there, by all questions */
+    bool has_prefetched;       /* from here, by a query that reached so far */
     double prefetched_from[3], prefetched_reach;
     /* The last nearest face: where ebpo_distance begins, if asked to. */
     bool warm;

@@ -79,7 +79,7 @@ int ebpo_rank_children(const ebpo_model *m, const ebpo_box *box, const ebpo_node
         /* most are uniform: nothing is made of them */
         if (ebpo_entry_kind_of(ebpo_table_child(table, gray->entry, octant)) == EBPO_ENTRY_UNIFORM)
             continue;
-        ebpo_ranked r = { ebpo_model_child(m, gray, octant), 0 };
+        ebpo_ranked r = { ebpo_model_child(m, gray, octant), 0, 0 };
         r.lower = ebpo_model_lower_bound(m, box, &r.node, parent, p);
         int at = count++;
         for (; at > 0 && out[at - 1].lower > r.lower; at--)

@@ -39,6 +39,7 @@ double ebpo_model_lower_bound(const ebpo_model *model, const ebpo_box *box, cons
 struct ebpo_ranked {
     ebpo_node node;
     double lower;
+    uint8_t what; /* of a subtree: nearest_first.c */
 };
 
 int ebpo_rank_children(const ebpo_model *model, const ebpo_box *box, const ebpo_node *gray,

@@ -5,11 +5,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/alloc.h"
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/sized.h"
 #include "query/near_band.h"
+#include "query/node_queue.h"
 #include "query/options.h"
 #include "query/prefetch.h"
 #include "query/pruned.h"
@@ -31,32 +31,6 @@ typedef struct within {
 
 /* --- not everything in memory: the nearest of what is left, until it is beyond the limit --- */
 
-/* Moves an item up the heap to where it belongs. */
-static bool push(ebpo_context *c, const ebpo_ranked *r)
-{
-    if (!ebpo_grow(&c->later, &c->later_capacity, c->later_count + 1, sizeof *c->later))
-        return false;
-    uint64_t at = c->later_count++;
-    for (; at > 0 && c->later[(at - 1) / 2].lower > r->lower; at = (at - 1) / 2)
-        c->later[at] = c->later[(at - 1) / 2];
-    c->later[at] = *r;
-    return true;
-}
-
-static ebpo_ranked pop(ebpo_context *c)
-{
-    ebpo_ranked first = c->later[0], last = c->later[--c->later_count];
-    uint64_t at = 0, child = 1;
-    for (; child < c->later_count; at = child, child = 2 * at + 1) {
-        child += child + 1 < c->later_count && c->later[child + 1].lower < c->later[child].lower;
-        if (!(c->later[child].lower < last.lower))
-            break;
-        c->later[at] = c->later[child];
-    }
-    c->later[at] = last;
-    return first;
-}
-
 /* Of a file far away: all subtrees within a radius will be entered, so they are listed at once, and
  * asked for together. Of the nearest so many faces nobody knows. */
 static bool lists_ahead(const within *w)
@@ -77,8 +51,7 @@ static ebpo_status put(within *w, const ebpo_box *box, const ebpo_ranked *r, ebp
         return EBPO_OK;
     if (w->ahead && !ebpo_node_is_below(&r->node))
         return put_children(w, box, r, error);
-    return push(w->context, r) ? EBPO_OK
-                               : ebpo_fail_memory(error, w->context->later_count * sizeof *r);
+    return ebpo_queue_push(w->context, r, error);
 }
 
 /* Before a subtree is entered: with the first of each window some of those behind it. */
@@ -92,9 +65,9 @@ static void announce(within *w, const ebpo_ranked *next)
         return;
     }
     below[count++] = ebpo_entry_value(next->node.entry);
-    for (uint64_t i = 0; i < c->later_count && count < EBPO_ANNOUNCED_MOST; i++)
-        if (c->later[i].lower <= w->band.limit)
-            below[count++] = ebpo_entry_value(c->later[i].node.entry);
+    for (uint64_t i = 0; i < c->queue_count && count < EBPO_ANNOUNCED_MOST; i++)
+        if (c->queue[i].lower <= w->band.limit)
+            below[count++] = ebpo_entry_value(c->queue[i].node.entry);
     ebpo_context_announce(c, below, count);
     w->announced = count - 1;
 }
@@ -127,11 +100,11 @@ static ebpo_status search_parts(within *w, ebpo_error *error)
 {
     ebpo_context *c = w->context;
     ebpo_box box = ebpo_model_box(c->model);
-    ebpo_ranked root = { ebpo_model_root(c->model), 0 };
-    c->later_count = 0;
+    ebpo_ranked root = { ebpo_model_root(c->model), 0, 0 };
+    c->queue_count = 0;
     ebpo_status status = put(w, &box, &root, error);
-    while (status == EBPO_OK && c->later_count) {
-        ebpo_ranked r = pop(c);
+    while (status == EBPO_OK && c->queue_count) {
+        ebpo_ranked r = ebpo_queue_pop(c);
         if (r.lower > w->band.limit)
             break;
         status = ebpo_node_is_below(&r.node) ? search_below(w, &r, error)

@@ -323,6 +323,10 @@ static const struct sum {
     { "leaves", offsetof(ebpo_model_stats, leaves), SUM_UINT },
     { "leaves_of_kind", offsetof(ebpo_model_stats, leaves_of_kind), SUM_FIVE },
     { "leaves_one_wall", offsetof(ebpo_model_stats, leaves_one_wall), SUM_UINT },
+    { "distances", offsetof(ebpo_model_stats, distances), SUM_UINT },
+    { "distance_subtrees", offsetof(ebpo_model_stats, distance_subtrees), SUM_UINT },
+    { "distance_loads", offsetof(ebpo_model_stats, distance_loads), SUM_UINT },
+    { "skeleton_bytes", offsetof(ebpo_model_stats, skeleton_bytes), SUM_UINT },
 };
 enum { SUMS = sizeof sums / sizeof *sums };
 

@@ -163,6 +163,17 @@ typedef struct ebpo_model_stats {
 
     /* Of the general ones, those with a wall that no face meets: one segment answers there. */
     uint64_t leaves_one_wall;
+
+    /*
+     * Points whose distance was asked for while not everything was in memory, the subtrees that
+     * were searched for them, and those that had to be loaded first: the quotients tell what a
+     * question costs.
+     */
+    uint64_t distances, distance_subtrees, distance_loads;
+
+    /* Bytes of `memory`: what is kept of subtrees that are not, so that they are not loaded again
+     * for nothing. */
+    uint64_t skeleton_bytes;
 } ebpo_model_stats;
 
 #define EBPO_MODEL_STATS_INIT EBPO_SIZED(ebpo_model_stats)

@@ -1,0 +1,239 @@
+/* What is kept of subtrees that are not in memory: its bounds hold for every face, exactly; it
+ * takes the room that it was given; and it saves loading without changing an answer. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "check_main.h"
+#include "geom/distance.h"
+#include "query/query_model.h"
+#include "query_kit.h"
+
+/* --- bounds --- */
+
+/* Faces that are nearer to p than the bounds say. */
+static uint64_t count_nearer(const ebpo_accel *s, const double p[3], ebpo_skeleton_bounds bounds)
+{
+    uint64_t nearer = 0;
+    for (uint32_t slot = 0; slot < s->block_count * EBPO_BLOCK; slot++) {
+        double t[3][3], lower = s->slot_face[slot] < s->outer_count ? bounds.outer : bounds.own;
+        ebpo_distance_bounds b;
+        if (s->slot_face[slot] == EBPO_NO_SLOT)
+            continue;
+        ebpo_accel_triangle(s, slot, t);
+        ebpo_triangle_distance_bounds(p, (const double(*)[3])t, &b);
+        nearer +=
+            b.lo < lower && ebpo_triangle_distance_compare_to(p, (const double(*)[3])t, lower) < 0;
+    }
+    return nearer;
+}
+
+/* With more nodes bounds are better. */
+static void check_bounds(const ebpo_accel *s, const double *points, uint64_t count)
+{
+    ebpo_skeleton *few[] = { ebpo_skeleton_make(s, 1), ebpo_skeleton_make(s, 4),
+                             ebpo_skeleton_make(s, EBPO_SKELETON_NODES) };
+    for (uint64_t i = 0; i < count && few[2]; i++) {
+        ebpo_skeleton_bounds b[3];
+        for (int n = 0; n < 3; n++) {
+            b[n] = ebpo_skeleton_lower_bounds(few[n], points + 3 * i);
+            ck_assert_double_ge(b[n].own, n ? b[n - 1].own : 0);
+            ck_assert_double_ge(b[n].outer, n ? b[n - 1].outer : 0);
+        }
+        ck_assert_uint_eq(count_nearer(s, points + 3 * i, b[2]), 0);
+    }
+    for (int i = 0; i < 3; i++)
+        ebpo_skeleton_free(few[i]);
+}
+
+static bool holds(const ebpo_outer_box *box, const double t[3][3])
+{
+    bool in = true;
+    for (int i = 0; i < 9; i++)
+        in = in && box->low[i % 3] <= t[i / 3][i % 3] && t[i / 3][i % 3] <= box->high[i % 3];
+    return in;
+}
+
+/* Every outer face that is within the limit, exactly, is in some box. */
+static void check_outer_boxes(const ebpo_accel *s, const double p[3], double limit)
+{
+    ebpo_outer_box box[EBPO_OUTER_BOXES];
+    ebpo_skeleton *k = s->outer_count ? ebpo_skeleton_make(s, EBPO_SKELETON_NODES) : NULL;
+    unsigned count = k ? ebpo_skeleton_outer_boxes(k, p, limit, box) : 0;
+    for (uint32_t slot = 0; k && slot < s->block_count * EBPO_BLOCK; slot++) {
+        double t[3][3];
+        if (s->slot_face[slot] >= s->outer_count)
+            continue;
+        ebpo_accel_triangle(s, slot, t);
+        bool found = ebpo_triangle_distance_compare_to(p, (const double(*)[3])t, limit) > 0;
+        for (unsigned i = 0; i < count; i++)
+            found = found || holds(&box[i], (const double(*)[3])t);
+        ck_assert(found);
+    }
+    ebpo_skeleton_free(k);
+}
+
+START_TEST(no_face_is_nearer_than_its_subtrees_bound)
+{
+    query_model m;
+    query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
+                     &query_variants[_i % query_variant_count]);
+    uint64_t count = query_scaled(40 + 20000 / m.mesh.face_count);
+    double *points = query_room(count, 3 * sizeof *points);
+    query_make_points(&m, count, (uint64_t)_i, points);
+    check_bounds(m.model->whole, points, count);
+    ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model *model;
+    ebpo_context *context;
+    how.cut_level = 2;
+    ASSERT_OK(ebpo_model_new(m.file, &how, &model, error));
+    ASSERT_OK(ebpo_context_new(model, &context, error));
+    for (uint32_t below = 0; below < model->top->below_count; below++) {
+        ebpo_accel *s;
+        ASSERT_OK(ebpo_context_subtree(context, below, &s, error));
+        check_bounds(s, points, count);
+        check_outer_boxes(s, points, INFINITY);
+        check_outer_boxes(s, points, m.size / 4);
+        check_outer_boxes(s, points + 3, m.size / 16);
+    }
+    ebpo_context_free(context);
+    ebpo_model_free(model);
+    free(points);
+    query_model_free(&m);
+}
+END_TEST
+
+/* --- what they are for --- */
+
+typedef struct asked {
+    query_model m;
+    ebpo_model *model;
+    ebpo_context *context;
+    uint64_t count;
+    double *points;
+    query_truth *truth;
+    ebpo_distance_result *got;
+} asked;
+
+static void begin(asked *s, int solid, int variant, int cut_level, uint64_t count)
+{
+    ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+    query_model_make(&s->m, query_solid_name(solid), query_solid_make(solid),
+                     &query_variants[variant]);
+    how.cut_level = cut_level;
+    ASSERT_OK(ebpo_model_new(s->m.file, &how, &s->model, error));
+    ASSERT_OK(ebpo_context_new(s->model, &s->context, error));
+    s->count = count ? count : query_scaled(100 + 100000 / s->m.mesh.face_count);
+    s->points = query_room(s->count, 3 * sizeof *s->points);
+    s->truth = query_room(s->count, sizeof *s->truth);
+    s->got = query_room(s->count, sizeof *s->got);
+    query_make_points(&s->m, s->count, 7, s->points);
+    query_find_truths(&s->m, s->points, s->count, s->truth);
+}
+
+static void end(asked *s)
+{
+    ebpo_context_free(s->context);
+    ebpo_model_free(s->model);
+    query_model_free(&s->m);
+    free(s->points);
+    free(s->truth);
+    free(s->got);
+}
+
+/* Subtrees searched, with none in memory at the beginning. */
+static uint64_t subtrees_searched(asked *s)
+{
+    ebpo_model_stats before = EBPO_MODEL_STATS_INIT, after = EBPO_MODEL_STATS_INIT;
+    ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
+    options.unsigned_distance = true;
+    ebpo_cache_clear(s->model->cache);
+    ebpo_model_get_stats(s->model, &before);
+    ASSERT_OK(ebpo_distance_many(s->context, s->points, s->count, &options, s->got, error));
+    ebpo_model_get_stats(s->model, &after);
+    ck_assert_uint_eq(query_wrong_distance(&s->m, s->points, s->truth, s->count, true, s->got), 0);
+    ck_assert_uint_eq(after.distances - before.distances, s->model->whole ? 0 : s->count);
+    ck_assert_uint_eq(after.distance_loads - before.distance_loads, after.loads - before.loads);
+    return after.distance_subtrees - before.distance_subtrees;
+}
+
+/* Nothing known, some subtrees, nearly all. */
+START_TEST(answers_do_not_depend_on_what_is_known)
+{
+    asked s;
+    begin(&s, _i, _i % query_variant_count, 1 + _i % 3, 0);
+    uint64_t all = s.count;
+    s.count = all / 8;
+    subtrees_searched(&s);
+    s.count = all;
+    for (int round = 0; round < 3; round++)
+        subtrees_searched(&s);
+    end(&s);
+}
+END_TEST
+
+static int find_solid(const char *name)
+{
+    int i = 0;
+    while (strcmp(query_solid_name(i), name) != 0)
+        i++;
+    return i;
+}
+
+START_TEST(a_subtree_once_seen_is_not_searched_for_nothing)
+{
+    asked s;
+    begin(&s, find_solid("sphere"), 5, 2, 300);
+    subtrees_searched(&s);
+    uint64_t with = subtrees_searched(&s);
+    ebpo_skeletons *all = s.model->skeletons;
+    s.model->skeletons = NULL;
+    uint64_t without = subtrees_searched(&s);
+    s.model->skeletons = all;
+    ck_assert_uint_ge(with, s.count); /* one each */
+    ck_assert_msg(with * 3 < without * 2, "%d, %d without", (int)with, (int)without);
+    end(&s);
+}
+END_TEST
+
+/* --- room --- */
+
+START_TEST(room_is_kept_to)
+{
+    asked s;
+    begin(&s, find_solid("sphere"), 5, 2, 300);
+    uint64_t most = ebpo_skeletons_room(8, UINT64_MAX), one = ebpo_skeleton_bytes(1);
+    ck_assert_uint_eq(ebpo_skeletons_room(8, one), 0);
+    for (uint64_t room = most; room > one + 500; room -= 1 + room / 16) {
+        if (!ebpo_skeletons_room(8, room))
+            continue;
+        ebpo_skeletons *all = ebpo_skeletons_make(8, room);
+        uint64_t empty = ebpo_skeletons_bytes(all), known = 0;
+        ck_assert_ptr_null(ebpo_skeletons_find(all, 3));
+        for (int twice = 0; twice < 2; twice++)
+            for (uint64_t i = 0; i < 8; i++)
+                ebpo_skeletons_keep(all, i, s.m.model->whole);
+        for (uint64_t i = 0; i < 8; i++)
+            known += ebpo_skeletons_find(all, i) != NULL;
+        ck_assert_uint_ge(known, room == most ? 8 : 1);
+        ck_assert_uint_le(ebpo_skeletons_bytes(all), room);
+        ck_assert_uint_ge(ebpo_skeletons_bytes(all),
+                          empty + known * (one - ebpo_skeleton_bytes(0)));
+        ebpo_skeletons_free(all);
+    }
+    end(&s);
+}
+END_TEST
+
+Suite *test_suite(void)
+{
+    Suite *suite = suite_create("skeleton");
+    TCase *tests = tcase_create("skeleton");
+    tcase_set_timeout(tests, 600);
+    tcase_add_loop_test(tests, no_face_is_nearer_than_its_subtrees_bound, 0, query_solid_count());
+    tcase_add_loop_test(tests, answers_do_not_depend_on_what_is_known, 0, query_solid_count());
+    tcase_add_test(tests, a_subtree_once_seen_is_not_searched_for_nothing);
+    tcase_add_test(tests, room_is_kept_to);
+    suite_add_tcase(suite, tests);
+    return suite;
+}
