@@ -13,42 +13,7 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/sized.h"
-
-/* Decoded chunks: an eighth of the budget, within these. */
-enum { CHUNKS_LEAST = 2 << 20, CHUNKS_MOST = 128 << 20, SUBTREES_LEAST = 2 << 20 };
-/* Of a cache: a path needs the subtree where it is, those around, and room to load the next. */
-enum { SUBTREES_WANTED = 64 };
-
-static uint64_t chunk_budget(uint64_t budget)
-{
-    return budget / 8 < CHUNKS_LEAST  ? CHUNKS_LEAST
-           : budget / 8 > CHUNKS_MOST ? CHUNKS_MOST
-                                      : budget / 8;
-}
-
-/* Skeletons of subtrees, at most: searches that go everywhere gain more by them than by a few more
- * subtrees. */
-static uint64_t skeleton_budget(const ebpo_model_options *o, uint64_t budget)
-{
-    return o->loading == EBPO_LOAD_CACHE ? budget / 8 : 0;
-}
-
-static uint64_t beside_subtrees(const ebpo_model_options *o, uint64_t budget)
-{
-    return chunk_budget(budget) + skeleton_budget(o, budget);
-}
-
-static ebpo_slice_size whole_size(const ebpo_info *info)
-{
-    ebpo_slice_size size = { .new_faces = info->face_count };
-    for (int i = 0; i < info->level_count; i++) {
-        size.groups += info->level[i].gray_count;
-        size.leaves += info->level[i].leaf_count;
-        size.refs += info->level[i].ref_count;
-    }
-    size.outer = size.refs; /* of the subtrees of any level together */
-    return size;
-}
+#include "query/model_budget.h"
 
 /* --- subtrees for the cache --- */
 
@@ -106,7 +71,7 @@ static void release_subtree(void *user, void *item)
     ebpo_accel_free(item);
 }
 
-/* --- how much, and where to cut --- */
+/* --- opening --- */
 
 ebpo_status ebpo_model_has_room(const ebpo_model *m, const ebpo_node *leaf, ebpo_error *error)
 {
@@ -117,7 +82,7 @@ ebpo_status ebpo_model_has_room(const ebpo_model *m, const ebpo_node *leaf, ebpo
     if (status != EBPO_OK || !m->options.memory)
         return status;
     ebpo_accel_estimate(&size, m->info, &keep, &peak);
-    uint64_t taken = m->top->bytes + beside_subtrees(&m->options, m->options.memory);
+    uint64_t taken = m->top->bytes + ebpo_beside_subtrees(&m->options, m->options.memory);
     if (taken + peak <= m->options.memory)
         return EBPO_OK;
     return ebpo_fail(error, EBPO_E_LIMIT,
@@ -125,54 +90,6 @@ ebpo_status ebpo_model_has_room(const ebpo_model *m, const ebpo_node *leaf, ebpo
                      " bytes does not hold a leaf of level %d, which takes up to %" PRIu64
                      " more than the %" PRIu64 " in use; give a larger budget",
                      m->options.memory, leaf->cell.level, peak, taken);
-}
-
-/* Half the budget for subtrees must hold so many of the average size; the top may take a quarter.
- */
-static int choose_cut(const ebpo_info *info, const ebpo_model_options *o, uint64_t budget)
-{
-    ebpo_slice_size size = whole_size(info);
-    uint64_t keep, peak;
-    ebpo_accel_estimate(&size, info, &keep, &peak);
-    for (int level = 1; level < info->level_count; level++) {
-        uint64_t grays = info->level[level].gray_count;
-        uint64_t top = ebpo_top_estimate(info, level);
-        if (top > budget / 4 || top + beside_subtrees(o, budget) + SUBTREES_LEAST > budget)
-            return -1;
-        if (grays == 0 || keep / grays * SUBTREES_WANTED <= budget / 2)
-            return level;
-    }
-    return budget < beside_subtrees(o, budget) + 2 * SUBTREES_LEAST ? -1 : info->level_count - 1;
-}
-
-/* A budget that choose_cut accepts, not much more than the least. */
-static uint64_t least_budget(const ebpo_info *info, const ebpo_model_options *o)
-{
-    uint64_t budget = 4 << 20;
-    while (choose_cut(info, o, budget) < 0 && budget < UINT64_C(1) << 60)
-        budget += budget / 8;
-    return budget;
-}
-
-/* Files far away are read in parts, unless they are small: nobody asked for all of them. */
-enum { FAR_MEMORY = 256 << 20, FAR_WHOLE_BYTES = 2 << 20 };
-
-static bool reads_parts(const ebpo_model *m)
-{
-    bool small = m->info->file_bytes <= FAR_WHOLE_BYTES;
-    return ebpo_input_is_far(&m->file->in) && !small &&
-           (m->info->subtree_level || m->default_memory);
-}
-
-/* The roots of the file's subtrees, which are read as one, if the budget allows them. */
-static int prefer_subtrees(const ebpo_info *info, const ebpo_model_options *o, int cut)
-{
-    int level = info->subtree_level;
-    uint64_t top = ebpo_top_estimate(info, level), budget = o->memory;
-    return level > cut && top <= budget / 4 &&
-                   top + beside_subtrees(o, budget) + SUBTREES_LEAST <= budget
-               ? level
-               : cut;
 }
 
 static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
@@ -193,14 +110,15 @@ static ebpo_status open_top(ebpo_model *m, int cut_level, ebpo_error *error)
     if (status != EBPO_OK)
         return status;
     if (budget) {
-        chunks = chunk_budget(budget);
-        uint64_t taken = m->top->bytes + beside_subtrees(&m->options, budget);
-        if (taken + SUBTREES_LEAST > budget)
+        chunks = ebpo_chunk_budget(budget);
+        uint64_t taken = m->top->bytes + ebpo_beside_subtrees(&m->options, budget);
+        if (taken + EBPO_SUBTREES_LEAST > budget)
             return ebpo_fail(error, EBPO_E_LIMIT,
                              "levels 0 to %d and a cache take more than the budget of %" PRIu64
                              " bytes; give %" PRIu64 " or a lower cut level",
-                             cut_level, budget, taken + SUBTREES_LEAST);
-        skeletons = ebpo_skeletons_room(m->top->below_count, skeleton_budget(&m->options, budget));
+                             cut_level, budget, taken + EBPO_SUBTREES_LEAST);
+        skeletons =
+            ebpo_skeletons_room(m->top->below_count, ebpo_skeleton_budget(&m->options, budget));
         cache = budget - m->top->bytes - chunks - skeletons;
     }
     if (m->options.loading == EBPO_LOAD_CACHE && skeletons) {
@@ -217,27 +135,11 @@ static ebpo_status open_top(ebpo_model *m, int cut_level, ebpo_error *error)
 
 static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
 {
-    const ebpo_model_options *o = &m->options;
-    ebpo_slice_size size = whole_size(m->info);
-    uint64_t keep, peak;
-    size.outer = 0;
-    ebpo_accel_estimate(&size, m->info, &keep, &peak);
-    int deepest = m->info->level_count - 1;
-    if (!(m->info->parts & EBPO_PART_MESH)) /* nothing could be loaded from below a cut level */
-        return open_top(m, deepest, error);
-    if (o->cut_level >= 0)
-        return open_top(m, o->cut_level < deepest ? o->cut_level : deepest, error);
-    if ((o->memory == 0 || peak <= o->memory) && !reads_parts(m))
-        return open_whole(m, error);
-    int cut = choose_cut(m->info, o, o->memory);
-    if (cut < 0) {
-        uint64_t least = least_budget(m->info, o);
-        return ebpo_fail(error, EBPO_E_LIMIT,
-                         "a budget of %" PRIu64
-                         " bytes is too small for this model; give at least %" PRIu64,
-                         o->memory, least < peak ? least : peak);
-    }
-    return open_top(m, prefer_subtrees(m->info, o, cut), error);
+    ebpo_model_plan plan;
+    ebpo_status status = ebpo_plan_model(m->file, &m->options, m->default_memory, &plan, error);
+    if (status != EBPO_OK)
+        return status;
+    return plan.resident ? open_whole(m, error) : open_top(m, plan.cut_level, error);
 }
 
 ebpo_status ebpo_model_new(const ebpo_file *file, const ebpo_model_options *options,
@@ -257,14 +159,8 @@ ebpo_status ebpo_model_new(const ebpo_file *file, const ebpo_model_options *opti
     m->info = ebpo_file_info(file);
     m->options = wanted;
     m->kernels = ebpo_kernels_best();
-    m->default_memory = !wanted.memory && ebpo_input_is_far(&file->in);
-    if (m->default_memory && wanted.cut_level < 0)
-        m->options.memory = FAR_MEMORY;
-    status = m->options.loading > EBPO_LOAD_NODES
-                 ? ebpo_fail(error, EBPO_E_ARGUMENT,
-                             "model options: there is no way of loading number %d",
-                             (int)m->options.loading)
-                 : open_parts(m, error);
+    m->default_memory = ebpo_usual_memory(file, &m->options);
+    status = open_parts(m, error);
     if (status != EBPO_OK) {
         ebpo_model_free(m);
         return status;
@@ -370,7 +266,7 @@ static ebpo_status too_little(const ebpo_model *m, uint32_t below, ebpo_error *e
         EBPO_OK)
         return EBPO_E_LIMIT;
     least = m->top->bytes + peak;
-    while (m->top->bytes + beside_subtrees(&m->options, least) + peak > least)
+    while (m->top->bytes + ebpo_beside_subtrees(&m->options, least) + peak > least)
         least += least / 8 + 1;
     return ebpo_fail(error, EBPO_E_LIMIT,
                      "the memory budget of %" PRIu64

@@ -213,9 +213,12 @@ void ebpo_top_free(ebpo_top *top)
     free(top);
 }
 
+/* Arrays that grow have room for some items from the first one on: bytes of five. */
+enum { GROWN_LEAST = 4096 };
+
 uint64_t ebpo_top_estimate(const ebpo_info *info, int cut_level)
 {
-    uint64_t bytes = sizeof(ebpo_top), largest = 0;
+    uint64_t bytes = sizeof(ebpo_top) + GROWN_LEAST, largest = 0;
     for (int i = 0; i <= cut_level && i < info->level_count; i++) {
         const ebpo_level_summary *s = &info->level[i];
         uint64_t below = s->leaf_count + (i == cut_level ? s->gray_count : 0);

@@ -115,13 +115,11 @@ typedef struct asked {
     ebpo_distance_result *got;
 } asked;
 
-static void begin(asked *s, int solid, int variant, int cut_level, uint64_t count)
+static void begin(asked *s, int solid, int variant, const ebpo_model_options *how, uint64_t count)
 {
-    ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
     query_model_make(&s->m, query_solid_name(solid), query_solid_make(solid),
                      &query_variants[variant]);
-    how.cut_level = cut_level;
-    ASSERT_OK(ebpo_model_new(s->m.file, &how, &s->model, error));
+    ASSERT_OK(ebpo_model_new(s->m.file, how, &s->model, error));
     ASSERT_OK(ebpo_context_new(s->model, &s->context, error));
     s->count = count ? count : query_scaled(100 + 100000 / s->m.mesh.face_count);
     s->points = query_room(s->count, 3 * sizeof *s->points);
@@ -152,22 +150,29 @@ static uint64_t subtrees_searched(asked *s)
     ASSERT_OK(ebpo_distance_many(s->context, s->points, s->count, &options, s->got, error));
     ebpo_model_get_stats(s->model, &after);
     ck_assert_uint_eq(query_wrong_distance(&s->m, s->points, s->truth, s->count, true, s->got), 0);
-    ck_assert_uint_eq(after.distances - before.distances, s->model->whole ? 0 : s->count);
+    ck_assert_uint_eq(after.distances - before.distances, s->count);
     ck_assert_uint_eq(after.distance_loads - before.distance_loads, after.loads - before.loads);
     return after.distance_subtrees - before.distance_subtrees;
 }
 
-/* Nothing known, some subtrees, nearly all. */
+/* Nothing known, some subtrees, nearly all; or those that a small budget has room for. */
 START_TEST(answers_do_not_depend_on_what_is_known)
 {
     asked s;
-    begin(&s, _i, _i % query_variant_count, 1 + _i % 3, 0);
+    ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
+    how.cut_level = 1 + _i % 3;
+    how.memory = _i & 1 ? (UINT64_C(9) << 19) + (uint64_t)_i % 4 * 30000 : 0;
+    begin(&s, _i / 2, _i / 2 % query_variant_count, &how, 0);
     uint64_t all = s.count;
     s.count = all / 8;
     subtrees_searched(&s);
     s.count = all;
     for (int round = 0; round < 3; round++)
         subtrees_searched(&s);
+    ebpo_model_get_stats(s.model, &stats);
+    ck_assert(!how.memory || stats.memory_peak <= how.memory);
+    ck_assert(!how.memory || stats.skeleton_bytes <= how.memory / 8);
     end(&s);
 }
 END_TEST
@@ -183,7 +188,9 @@ static int find_solid(const char *name)
 START_TEST(a_subtree_once_seen_is_not_searched_for_nothing)
 {
     asked s;
-    begin(&s, find_solid("sphere"), 5, 2, 300);
+    ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+    how.cut_level = 2;
+    begin(&s, find_solid("sphere"), 5, &how, 300);
     subtrees_searched(&s);
     uint64_t with = subtrees_searched(&s);
     ebpo_skeletons *all = s.model->skeletons;
@@ -201,7 +208,9 @@ END_TEST
 START_TEST(room_is_kept_to)
 {
     asked s;
-    begin(&s, find_solid("sphere"), 5, 2, 300);
+    ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+    how.cut_level = 2;
+    begin(&s, find_solid("sphere"), 5, &how, 300);
     uint64_t most = ebpo_skeletons_room(8, UINT64_MAX), one = ebpo_skeleton_bytes(1);
     ck_assert_uint_eq(ebpo_skeletons_room(8, one), 0);
     for (uint64_t room = most; room > one + 500; room -= 1 + room / 16) {
@@ -225,15 +234,79 @@ START_TEST(room_is_kept_to)
 }
 END_TEST
 
+/* True when there is a model. */
+static bool check_plan(const query_model *m, uint64_t budget, uint64_t *least)
+{
+    ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model_plan plan = EBPO_MODEL_PLAN_INIT;
+    ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
+    ebpo_error told = EBPO_ERROR_INIT, error = EBPO_ERROR_INIT;
+    ebpo_model *model;
+    how.memory = budget;
+    ebpo_status status = ebpo_model_memory(m->file, &how, &plan, &told);
+    ck_assert_int_eq(ebpo_model_new(m->file, &how, &model, &error), status);
+    ck_assert_str_eq(told.message, error.message);
+    if (status != EBPO_OK)
+        return false;
+    ebpo_model_get_stats(model, &stats);
+    ck_assert(plan.resident == stats.resident && plan.cut_level == stats.cut_level);
+    ck_assert_uint_eq(plan.budget, budget);
+    ck_assert(plan.resident == (budget == 0 || budget >= plan.whole));
+    ck_assert_uint_le(stats.memory, stats.resident ? plan.whole : plan.top + plan.skeletons);
+    ck_assert_uint_le(plan.subtrees_held, plan.subtrees);
+    *least = plan.least;
+    ebpo_model_free(model);
+    return true;
+}
+
+/* With a cut level that is given, by counts. */
+static void check_cut_plan(const query_model *m, int cut_level)
+{
+    ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model_plan plan = EBPO_MODEL_PLAN_INIT, tight = EBPO_MODEL_PLAN_INIT;
+    ebpo_model *model;
+    how.cut_level = cut_level;
+    ASSERT_OK(ebpo_model_memory(m->file, &how, &plan, error));
+    ASSERT_OK(ebpo_model_new(m->file, &how, &model, error));
+    ck_assert(!plan.resident && plan.cut_level == model->top->cut_level);
+    ck_assert_uint_eq(plan.subtrees, model->top->below_count);
+    ck_assert_uint_eq(plan.subtrees_held, plan.subtrees);
+    ck_assert_uint_le(model->top->bytes, plan.top);
+    how.memory = 6 << 20;
+    ASSERT_OK(ebpo_model_memory(m->file, &how, &tight, error));
+    ck_assert(tight.cut_level == plan.cut_level && tight.subtrees == plan.subtrees);
+    ck_assert_uint_le(tight.skeletons, how.memory / 8);
+    ck_assert_uint_le(tight.subtrees_held * tight.subtree_bytes, how.memory);
+    ebpo_model_free(model);
+}
+
+START_TEST(a_budget_buys_what_was_told)
+{
+    query_model m;
+    uint64_t least = 0, parts = 0;
+    query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
+                     &query_variants[_i % query_variant_count]);
+    ck_assert(check_plan(&m, 0, &least));
+    for (uint64_t budget = 4096; budget < 64 << 20; budget += budget / 4)
+        parts += check_plan(&m, budget, &least);
+    ck_assert_uint_ge(parts, 1);
+    ck_assert(check_plan(&m, least, &least));
+    for (int cut_level = 0; cut_level < 4; cut_level++)
+        check_cut_plan(&m, cut_level);
+    query_model_free(&m);
+}
+END_TEST
+
 Suite *test_suite(void)
 {
     Suite *suite = suite_create("skeleton");
     TCase *tests = tcase_create("skeleton");
     tcase_set_timeout(tests, 600);
     tcase_add_loop_test(tests, no_face_is_nearer_than_its_subtrees_bound, 0, query_solid_count());
-    tcase_add_loop_test(tests, answers_do_not_depend_on_what_is_known, 0, query_solid_count());
+    tcase_add_loop_test(tests, answers_do_not_depend_on_what_is_known, 0, 2 * query_solid_count());
     tcase_add_test(tests, a_subtree_once_seen_is_not_searched_for_nothing);
     tcase_add_test(tests, room_is_kept_to);
+    tcase_add_loop_test(tests, a_budget_buys_what_was_told, 0, query_solid_count());
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -112,8 +112,11 @@ static ebpo_status ask_all(ebpo_model *model, ebpo_error *error)
 
 static ebpo_status ask(every_call_env *e, const ebpo_model_options *options)
 {
-    ebpo_model *model;
-    ebpo_status status = ebpo_model_new(e->file, options, &model, e->error);
+    ebpo_model *model = NULL;
+    ebpo_model_plan plan = EBPO_MODEL_PLAN_INIT;
+    ebpo_status status = ebpo_model_memory(e->file, options, &plan, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_model_new(e->file, options, &model, e->error);
     if (status == EBPO_OK)
         status = ask_all(model, e->error);
     ebpo_model_free(model);

@@ -2,7 +2,7 @@
  * EBP-Octree in HDF5: questions to a file, with as much of it in memory as one
  * allows.
  *
- *   Models           ebpo_model_new, and ebpo_context_new for each thread
+ *   Models           ebpo_model_new, and ebpo_context_new for each thread; ebpo_model_memory
  *   Point in solid   ebpo_inside, ebpo_inside_many
  *   Distance         ebpo_distance, ebpo_distance_many, ebpo_distance_within
  *   Rays             ebpo_ray_first, ebpo_ray_any, ebpo_ray_all, and each of these for many
@@ -113,6 +113,53 @@ typedef struct ebpo_model ebpo_model;
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_model_new(const ebpo_file *file,
                                                   const ebpo_model_options *options,
                                                   ebpo_model **out, ebpo_error *error);
+
+/*
+ * What a budget buys: told by the counts in the file's head, with nothing read or loaded. Bytes are
+ * bounds from above, most often twice what is taken; all but `budget`, `whole` and `least` are 0 if
+ * everything will be in memory.
+ */
+typedef struct ebpo_model_plan {
+    size_t struct_size; /* EBPO_MODEL_PLAN_INIT sets it */
+
+    /* Everything will be in memory. */
+    bool resident;
+
+    int cut_level;
+
+    /* As ebpo_model_new will understand it. 0: none. */
+    uint64_t budget;
+
+    /*
+     * From which budget on everything is in memory (files far away: see
+     * ebpo_model_options.memory), and one that would do, not much more than the least.
+     */
+    uint64_t whole, least;
+
+    /*
+     * Of the budget: levels down to the cut level; decoded chunks; what stays of subtrees that
+     * are not in memory. The rest is for subtrees.
+     */
+    uint64_t top, chunks, skeletons;
+
+    /* Below the cut level; bytes of the average one; so many of these are in memory at a time. */
+    uint64_t subtrees, subtree_bytes, subtrees_held;
+} ebpo_model_plan;
+
+#define EBPO_MODEL_PLAN_INIT EBPO_SIZED(ebpo_model_plan)
+
+/*
+ * What ebpo_model_new with these options (NULL: the usual ones) will make of the file. Where a cut
+ * level and a budget are given, that may still find the levels to take more than the budget.
+ *
+ * EBPO_E_LIMIT: the budget is too small; the message names one that would do.
+ * EBPO_E_ARGUMENT.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_model_memory(const ebpo_file *file,
+                                                     const ebpo_model_options *options,
+                                                     ebpo_model_plan *out, ebpo_error *error);
 
 /*
  * After its contexts.

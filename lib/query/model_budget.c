@@ -1,0 +1,195 @@
+#include "geom/strict_fp.h"
+
+#include "query/model_budget.h"
+
+#include <inttypes.h>
+
+#include "accel/accel.h"
+#include "base/error.h"
+#include "base/fp_env.h"
+#include "base/sized.h"
+#include "container/reader.h"
+#include "query/query_top.h"
+#include "query/skeleton.h"
+
+/* Decoded chunks: an eighth of the budget, within these. */
+enum { CHUNKS_LEAST = 2 << 20, CHUNKS_MOST = 128 << 20 };
+/* Of a cache: a path needs the subtree where it is, those around, and room to load the next. */
+enum { SUBTREES_WANTED = 64 };
+
+uint64_t ebpo_chunk_budget(uint64_t budget)
+{
+    return budget / 8 < CHUNKS_LEAST  ? CHUNKS_LEAST
+           : budget / 8 > CHUNKS_MOST ? CHUNKS_MOST
+                                      : budget / 8;
+}
+
+/* Skeletons of subtrees, at most: searches that go everywhere gain more by them than by a few more
+ * subtrees. Of what is beyond the least, so that small budgets do for what they would do for
+ * without them. */
+uint64_t ebpo_skeleton_budget(const ebpo_model_options *o, uint64_t budget)
+{
+    const uint64_t least = CHUNKS_LEAST + EBPO_SUBTREES_LEAST;
+    return o->loading == EBPO_LOAD_CACHE && budget > least ? (budget - least) / 8 : 0;
+}
+
+uint64_t ebpo_beside_subtrees(const ebpo_model_options *o, uint64_t budget)
+{
+    return ebpo_chunk_budget(budget) + ebpo_skeleton_budget(o, budget);
+}
+
+static ebpo_slice_size whole_size(const ebpo_info *info)
+{
+    ebpo_slice_size size = { .new_faces = info->face_count };
+    for (int i = 0; i < info->level_count; i++) {
+        size.groups += info->level[i].gray_count;
+        size.leaves += info->level[i].leaf_count;
+        size.refs += info->level[i].ref_count;
+    }
+    size.outer = size.refs; /* of the subtrees of any level together */
+    return size;
+}
+
+/* Half the budget for subtrees must hold so many of the average size; the top may take a quarter.
+ */
+static int choose_cut(const ebpo_info *info, const ebpo_model_options *o, uint64_t budget)
+{
+    ebpo_slice_size size = whole_size(info);
+    uint64_t keep, peak;
+    ebpo_accel_estimate(&size, info, &keep, &peak);
+    for (int level = 1; level < info->level_count; level++) {
+        uint64_t grays = info->level[level].gray_count;
+        uint64_t top = ebpo_top_estimate(info, level);
+        if (top > budget / 4 ||
+            top + ebpo_beside_subtrees(o, budget) + EBPO_SUBTREES_LEAST > budget)
+            return -1;
+        if (grays == 0 || keep / grays * SUBTREES_WANTED <= budget / 2)
+            return level;
+    }
+    return budget < ebpo_beside_subtrees(o, budget) + 2 * EBPO_SUBTREES_LEAST
+               ? -1
+               : info->level_count - 1;
+}
+
+/* A budget that choose_cut accepts, not much more than the least. */
+static uint64_t least_budget(const ebpo_info *info, const ebpo_model_options *o)
+{
+    uint64_t budget = 4 << 20;
+    while (choose_cut(info, o, budget) < 0 && budget < UINT64_C(1) << 60)
+        budget += budget / 8;
+    return budget;
+}
+
+/* Files far away are read in parts, unless they are small: nobody asked for all of them. */
+enum { FAR_MEMORY = 256 << 20, FAR_WHOLE_BYTES = 2 << 20 };
+
+static bool reads_parts(const ebpo_file *file, bool default_memory)
+{
+    const ebpo_info *info = ebpo_file_info(file);
+    bool small = info->file_bytes <= FAR_WHOLE_BYTES;
+    return ebpo_input_is_far(&file->in) && !small && (info->subtree_level || default_memory);
+}
+
+bool ebpo_usual_memory(const ebpo_file *file, ebpo_model_options *o)
+{
+    bool usual = !o->memory && ebpo_input_is_far(&file->in);
+    if (usual && o->cut_level < 0)
+        o->memory = FAR_MEMORY;
+    return usual;
+}
+
+/* The roots of the file's subtrees, which are read as one, if the budget allows them. */
+static int prefer_subtrees(const ebpo_info *info, const ebpo_model_options *o, int cut)
+{
+    int level = info->subtree_level;
+    uint64_t top = ebpo_top_estimate(info, level), budget = o->memory;
+    return level > cut && top <= budget / 4 &&
+                   top + ebpo_beside_subtrees(o, budget) + EBPO_SUBTREES_LEAST <= budget
+               ? level
+               : cut;
+}
+
+/* --- what comes of it --- */
+
+static ebpo_status choose(const ebpo_file *file, const ebpo_model_options *o, bool default_memory,
+                          ebpo_model_plan *out, ebpo_error *error)
+{
+    const ebpo_info *info = ebpo_file_info(file);
+    int deepest = info->level_count - 1;
+    if (!(info->parts & EBPO_PART_MESH)) /* nothing could be loaded from below a cut level */
+        out->cut_level = deepest;
+    else if (o->cut_level >= 0)
+        out->cut_level = o->cut_level < deepest ? o->cut_level : deepest;
+    else if ((o->memory == 0 || out->whole <= o->memory) && !reads_parts(file, default_memory))
+        out->resident = true;
+    else
+        out->cut_level = choose_cut(info, o, o->memory);
+    if (out->cut_level < 0)
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "a budget of %" PRIu64
+                         " bytes is too small for this model; give at least %" PRIu64,
+                         o->memory, out->least);
+    if (!out->resident && o->cut_level < 0 && info->parts & EBPO_PART_MESH)
+        out->cut_level = prefer_subtrees(info, o, out->cut_level);
+    return EBPO_OK;
+}
+
+/* By counts. */
+static void share(const ebpo_info *info, const ebpo_model_options *o, ebpo_model_plan *out)
+{
+    ebpo_slice_size size = whole_size(info);
+    uint64_t keep, peak, taken;
+    ebpo_accel_estimate(&size, info, &keep, &peak);
+    for (int level = 0; level <= out->cut_level; level++)
+        out->subtrees += info->level[level].leaf_count;
+    out->subtrees += info->level[out->cut_level].gray_count;
+    out->subtree_bytes = out->subtrees ? keep / out->subtrees : 0;
+    out->top = ebpo_top_estimate(info, out->cut_level);
+    out->chunks = o->memory ? ebpo_chunk_budget(o->memory) : 0;
+    out->skeletons =
+        ebpo_skeletons_room(out->subtrees,
+                            o->memory ? ebpo_skeleton_budget(o, o->memory) : UINT64_MAX);
+    taken = out->top + out->chunks + out->skeletons;
+    out->subtrees_held = out->subtrees;
+    if (o->memory && out->subtree_bytes) {
+        uint64_t room = o->memory > taken ? (o->memory - taken) / out->subtree_bytes : 0;
+        out->subtrees_held = room < out->subtrees ? room : out->subtrees;
+    }
+}
+
+ebpo_status ebpo_plan_model(const ebpo_file *file, const ebpo_model_options *o, bool default_memory,
+                            ebpo_model_plan *out, ebpo_error *error)
+{
+    const ebpo_info *info = ebpo_file_info(file);
+    ebpo_slice_size size = whole_size(info);
+    uint64_t keep, least;
+    *out = (ebpo_model_plan)EBPO_MODEL_PLAN_INIT;
+    if (o->loading > EBPO_LOAD_NODES)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "model options: there is no way of loading number %d", (int)o->loading);
+    size.outer = 0;
+    ebpo_accel_estimate(&size, info, &keep, &out->whole);
+    least = least_budget(info, o);
+    out->least = least < out->whole ? least : out->whole;
+    out->budget = o->memory;
+    ebpo_status status = choose(file, o, default_memory, out, error);
+    if (status == EBPO_OK && !out->resident)
+        share(info, o, out);
+    return status;
+}
+
+ebpo_status ebpo_model_memory(const ebpo_file *file, const ebpo_model_options *options,
+                              ebpo_model_plan *out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_model_options wanted = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model_plan plan;
+    ebpo_status status = EBPO_TAKE(ebpo_model_options, &wanted, options, error);
+    if (status == EBPO_OK)
+        status = EBPO_CHECK_SIZED(ebpo_model_plan, out, error);
+    if (status != EBPO_OK)
+        return status;
+    bool default_memory = ebpo_usual_memory(file, &wanted);
+    status = ebpo_plan_model(file, &wanted, default_memory, &plan, error);
+    return status == EBPO_OK ? EBPO_GIVE(ebpo_model_plan, out, &plan) : status;
+}
