@@ -9,6 +9,7 @@
 #include "base/clock.h"
 #include "base/error.h"
 #include "geom/cell.h"
+#include "octree/octcode.h"
 #include "query/node_queue.h"
 
 /* --- the search --- */
@@ -109,9 +110,12 @@ static ebpo_status consider_own(searching *g, uint32_t below, double lower, ebpo
     return r.lower <= g->n->limit ? ebpo_queue_push(c, &r, error) : EBPO_OK;
 }
 
-/* A walk to the subtrees whose cells meet a box. */
+/* A walk to the subtrees that may have outer faces of another one as their own: whose cells meet
+ * the faces' box, and come before it, depth first. */
 typedef struct owners {
     searching *g;
+    uint64_t code; /* of the other one */
+    int level;
     double lower;
     const ebpo_outer_box *outer;
     bool (*visit)(struct owners *o, uint32_t below, ebpo_error *error);
@@ -131,6 +135,13 @@ static bool cell_meets(const owners *o, ebpo_cell cell)
     return true;
 }
 
+static bool comes_before(const owners *o, ebpo_cell cell)
+{
+    uint64_t code = ebpo_octcode_of_cell(cell);
+    int deeper = cell.level - o->level;
+    return deeper > 0 ? code >> 3 * deeper < o->code : code <= o->code >> 3 * -deeper;
+}
+
 static bool is_known(owners *o, uint32_t below, ebpo_error *error)
 {
     (void)error;
@@ -147,10 +158,11 @@ static bool consider(owners *o, uint32_t below, ebpo_error *error)
 static bool visit_owners(owners *o, uint32_t entry, ebpo_cell cell, ebpo_error *error)
 {
     const ebpo_node_table *nodes = &o->g->c->model->top->nodes;
-    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_UNIFORM || !cell_meets(o, cell))
+    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_UNIFORM || !comes_before(o, cell) ||
+        !cell_meets(o, cell))
         return true;
     if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW)
-        return o->visit(o, ebpo_entry_value(entry), error);
+        return ebpo_octcode_of_cell(cell) == o->code || o->visit(o, ebpo_entry_value(entry), error);
     for (unsigned octant = 0; octant < 8; octant++)
         if (!visit_owners(o, ebpo_table_child(nodes, entry, octant), ebpo_cell_child(cell, octant),
                           error))
@@ -169,12 +181,17 @@ static bool visit_all(owners *o, const ebpo_outer_box *boxes, unsigned count, eb
 }
 
 /* False: some owner is not known, and nothing has been done. */
-static bool consider_owners(searching *g, const ebpo_skeleton *k, double lower, ebpo_status *status,
-                            ebpo_error *error)
+static bool consider_owners(searching *g, const ebpo_skeleton *k, const ebpo_ranked *r,
+                            ebpo_status *status, ebpo_error *error)
 {
     ebpo_outer_box box[EBPO_OUTER_BOXES];
     unsigned count = ebpo_skeleton_outer_boxes(k, g->n->p, g->n->limit, box);
-    owners o = { .g = g, .lower = lower, .visit = is_known, .status = EBPO_OK };
+    owners o = { .g = g,
+                 .code = ebpo_octcode_of_cell(r->node.cell),
+                 .level = r->node.cell.level,
+                 .lower = r->lower,
+                 .visit = is_known,
+                 .status = EBPO_OK };
     if (!visit_all(&o, box, count, error))
         return false;
     o.visit = consider;
@@ -203,7 +220,7 @@ static ebpo_status look_at_outer(searching *g, const ebpo_ranked *r, ebpo_error 
     uint32_t below = ebpo_entry_value(r->node.entry);
     const ebpo_skeleton *k = ebpo_skeletons_find(g->c->model->skeletons, below);
     ebpo_status status = EBPO_OK;
-    if (is_searched(g->c, below) || consider_owners(g, k, r->lower, &status, error))
+    if (is_searched(g->c, below) || consider_owners(g, k, r, &status, error))
         return status;
     return search_below(g, r->node, error);
 }

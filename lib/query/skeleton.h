@@ -1,5 +1,5 @@
 /* What is kept in memory of each subtree that has ever been loaded: the upper nodes of its
- * hierarchy over faces (accel/accel.h), at most ten, some 2.5 KB where the subtree takes hundreds.
+ * hierarchy over faces (accel/accel.h), at most ten, some 2.7 KB where the subtree takes hundreds.
  * They bound the distance to its faces much better than its cell and its envelope do, so that
  * searches load it again only if it may matter. Made when it is loaded, kept when the cache drops
  * it: works for every file, and costs no reading.
