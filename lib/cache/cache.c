@@ -16,6 +16,7 @@
 typedef struct demand {
     uint64_t key, peak;
     bool ahead;
+    bool aside; /* of what is set aside anyway */
     bool known; /* the peak, from an attempt before */
 } demand;
 
@@ -29,6 +30,7 @@ struct ebpo_cache {
     pthread_cond_t asked;
     ebpo_cache_slots slots;
     uint64_t pinned; /* bytes of items that are in use */
+    uint64_t aside_most, aside;
     /* bytes reserved for loads under way, and of items on their way out: these become free or
      * pinned without anyone's help */
     uint64_t passing;
@@ -117,7 +119,8 @@ typedef enum capacity { ROOM_MADE, ROOM_LATER, ROOM_NEVER } capacity;
 static capacity make_room(ebpo_cache *c, const demand *d)
 {
     while (c->budget && sum(c->stats.bytes, d->peak) > c->budget) {
-        uint64_t held = sum(sum(c->pinned, kept_for(c, d)), d->peak);
+        uint64_t held =
+            sum(sum(sum(c->pinned, kept_for(c, d)), d->aside ? 0 : d->peak), c->aside_most);
         if (held > c->budget)
             return ROOM_NEVER;
         if (sum(held, c->passing) > c->budget)
@@ -154,7 +157,8 @@ static ebpo_status wait_for_room(ebpo_cache *c, uint64_t peak, ebpo_error *error
                      "the %s cache's budget is %" PRIu64 " bytes, of which %" PRIu64
                      " are in use, and one %s more takes up to %" PRIu64 "; a budget of %" PRIu64
                      " would do",
-                     c->name, c->budget, c->pinned, c->name, peak, sum(c->pinned, peak));
+                     c->name, c->budget, sum(c->pinned, c->aside_most), c->name, peak,
+                     sum(sum(c->pinned, c->aside_most), peak));
 }
 
 /* --- loading --- */
@@ -324,6 +328,24 @@ void ebpo_cache_unpin(ebpo_cache *c, uint64_t key)
         pthread_cond_broadcast(&c->changed);
     }
     pthread_mutex_unlock(&c->lock);
+}
+
+/* --- aside --- */
+
+void ebpo_cache_set_aside(ebpo_cache *c, uint64_t most) { c->aside_most = most; }
+
+bool ebpo_cache_take_aside(ebpo_cache *c, uint64_t bytes)
+{
+    demand d = { .peak = bytes, .aside = true };
+    pthread_mutex_lock(&c->lock);
+    bool taken = bytes <= c->aside_most - c->aside;
+    if (taken) {
+        c->aside += bytes;
+        taken = make_room(c, &d) == ROOM_MADE;
+        *(taken ? &c->passing : &c->aside) -= bytes;
+    }
+    pthread_mutex_unlock(&c->lock);
+    return taken;
 }
 
 /* --- ahead --- */

@@ -23,8 +23,9 @@ typedef struct ebpo_cache_source {
 typedef struct ebpo_cache_stats {
     uint64_t hits;                       /* finds that needed no waiting */
     uint64_t loads, prefetched, evicted; /* by get, in the background, to make room */
-    uint64_t bytes, peak_bytes;          /* items, and what loads under way may take */
-    double load_seconds;                 /* that callers of get waited */
+    /* items, what loads under way may take, and what has been taken aside */
+    uint64_t bytes, peak_bytes;
+    double load_seconds; /* that callers of get waited */
 } ebpo_cache_stats;
 
 /* `budget` in bytes, 0: no limit. `name` ("subtree") is for messages. */
@@ -53,6 +54,13 @@ bool ebpo_cache_try(ebpo_cache *cache, uint64_t key, void **item);
  * count as just used. */
 enum { EBPO_CACHE_AHEAD = 64 };
 void ebpo_cache_prefetch(ebpo_cache *cache, const uint64_t *keys, unsigned count);
+
+/* Of the budget so many bytes at most may be taken for what stays beside the items; loads are
+ * refused as if all of them were. Before the cache is used. */
+void ebpo_cache_set_aside(ebpo_cache *cache, uint64_t most);
+/* Takes some of them for good, and drops items for it. False: they are all taken, or items in use
+ * and loads under way leave no room now. */
+bool ebpo_cache_take_aside(ebpo_cache *cache, uint64_t bytes);
 
 /* Drops everything that is not pinned. */
 void ebpo_cache_clear(ebpo_cache *cache);

@@ -38,7 +38,7 @@ static ebpo_status pruned_within(ebpo_context *c, const ebpo_nearest *n, const e
     if (status != EBPO_OK)
         return status;
     ebpo_ranked child[8];
-    int count = ebpo_rank_children(m, box, &node, lower, n->p, child);
+    int count = ebpo_rank_children(m, box, &node, lower, n->p, n->limit, child);
     for (int i = 0; i < count && status == EBPO_OK; i++)
         status = pruned_within(c, n, box, child[i].node, child[i].lower, nearest, error);
     return status;
@@ -132,7 +132,7 @@ static ebpo_status narrow(interval *v, ebpo_node node, double lower, ebpo_error 
             return status;
     }
     ebpo_ranked child[8];
-    int count = ebpo_rank_children(m, &v->box, &node, lower, v->p, child);
+    int count = ebpo_rank_children(m, &v->box, &node, lower, v->p, v->hi, child);
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < count && status == EBPO_OK; i++)
         status = narrow(v, child[i].node, child[i].lower, error);

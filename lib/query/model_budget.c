@@ -30,7 +30,7 @@ uint64_t ebpo_chunk_budget(uint64_t budget)
 uint64_t ebpo_skeleton_budget(const ebpo_model_options *o, uint64_t budget)
 {
     const uint64_t least = CHUNKS_LEAST + EBPO_SUBTREES_LEAST;
-    return o->loading == EBPO_LOAD_CACHE && budget > least ? (budget - least) / 8 : 0;
+    return o->loading == EBPO_LOAD_CACHE && budget > least ? (budget - least) / 4 : 0;
 }
 
 uint64_t ebpo_beside_subtrees(const ebpo_model_options *o, uint64_t budget)

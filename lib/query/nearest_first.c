@@ -27,7 +27,8 @@ typedef struct searching {
 static ebpo_status add(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     ebpo_nearest *n = g->n;
-    if (ebpo_node_is_uniform(&r->node) || r->node.pruned) /* pruned: see look_at_pruned */
+    if (r->lower > n->limit || ebpo_node_is_uniform(&r->node) ||
+        r->node.pruned) /* pruned: see look_at_pruned */
         return EBPO_OK;
     if (ebpo_node_is_below(&r->node)) {
         /* it holds some face */
@@ -40,7 +41,8 @@ static ebpo_status add(searching *g, const ebpo_ranked *r, ebpo_error *error)
 static ebpo_status add_children(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     ebpo_ranked child[8];
-    int count = ebpo_rank_children(g->c->model, &g->box, &r->node, r->lower, g->n->p, child);
+    int count =
+        ebpo_rank_children(g->c->model, &g->box, &r->node, r->lower, g->n->p, g->n->limit, child);
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < count && status == EBPO_OK; i++)
         status = add(g, &child[i], error);
@@ -66,6 +68,12 @@ static ebpo_status begin_question(ebpo_context *c, ebpo_error *error)
     return c->seen ? EBPO_OK : ebpo_fail_memory(error, count * sizeof *c->seen);
 }
 
+static bool is_there(const ebpo_context *c, uint32_t below)
+{
+    return ebpo_context_has_pinned(c, below) ||
+           ebpo_cache_has(c->model->cache, ebpo_context_key(c, below));
+}
+
 static ebpo_status search_below(searching *g, ebpo_node node, ebpo_error *error)
 {
     uint32_t below = ebpo_entry_value(node.entry);
@@ -73,10 +81,14 @@ static ebpo_status search_below(searching *g, ebpo_node node, ebpo_error *error)
         return EBPO_OK;
     g->c->seen[below] = 2 * g->c->question + 1;
     g->c->searched++;
+    uint64_t loaded = g->c->loaded;
     ebpo_status status = ebpo_model_enter(g->c, &node, error);
-    if (status == EBPO_OK)
-        ebpo_nearest_search(g->n, g->c, node.subtree);
-    return status;
+    if (status != EBPO_OK)
+        return status;
+    ebpo_nearest_search(g->n, g->c, node.subtree);
+    if (g->c->loaded > loaded)
+        ebpo_skeletons_grow(g->c->model->skeletons, below, node.subtree, g->n->p, g->n->limit);
+    return EBPO_OK;
 }
 
 /* --- what skeletons tell ---
@@ -105,7 +117,7 @@ static ebpo_status consider_own(searching *g, uint32_t below, double lower, ebpo
         return EBPO_OK;
     c->seen[below] = 2 * c->question;
     const ebpo_skeleton *k = ebpo_skeletons_find(c->model->skeletons, below);
-    double own = ebpo_skeleton_lower_bounds(k, g->n->p).own;
+    double own = ebpo_skeleton_lower_bounds(k, g->n->p, g->n->limit).own;
     ebpo_ranked r = { node_below(c->model, below), fmax(lower, own), OWN };
     return r.lower <= g->n->limit ? ebpo_queue_push(c, &r, error) : EBPO_OK;
 }
@@ -204,11 +216,15 @@ static ebpo_status look(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     uint32_t below = ebpo_entry_value(r->node.entry);
     const ebpo_skeleton *k = ebpo_skeletons_find(g->c->model->skeletons, below);
-    if (!k)
+    if (!k || ebpo_context_has_pinned(g->c, below))
         return search_below(g, r->node, error);
-    ebpo_skeleton_bounds bounds = ebpo_skeleton_lower_bounds(k, g->n->p);
-    ebpo_ranked own = { r->node, fmax(r->lower, bounds.own), OWN },
-                outer = { r->node, fmax(r->lower, bounds.outer), OUTER };
+    ebpo_skeleton_bounds bounds = ebpo_skeleton_lower_bounds(k, g->n->p, g->n->limit);
+    double least = fmax(r->lower, fmin(bounds.own, bounds.outer));
+    if (least > g->n->limit)
+        return EBPO_OK;
+    bool there = is_there(g->c, below); /* then both at once */
+    ebpo_ranked own = { r->node, there ? least : fmax(r->lower, bounds.own), OWN },
+                outer = { r->node, there ? INFINITY : fmax(r->lower, bounds.outer), OUTER };
     ebpo_status status = own.lower <= g->n->limit ? ebpo_queue_push(g->c, &own, error) : EBPO_OK;
     if (status == EBPO_OK && outer.lower <= g->n->limit)
         status = ebpo_queue_push(g->c, &outer, error);
@@ -220,7 +236,8 @@ static ebpo_status look_at_outer(searching *g, const ebpo_ranked *r, ebpo_error 
     uint32_t below = ebpo_entry_value(r->node.entry);
     const ebpo_skeleton *k = ebpo_skeletons_find(g->c->model->skeletons, below);
     ebpo_status status = EBPO_OK;
-    if (is_searched(g->c, below) || consider_owners(g, k, r, &status, error))
+    if (is_searched(g->c, below) ||
+        (!is_there(g->c, below) && consider_owners(g, k, r, &status, error)))
         return status;
     return search_below(g, r->node, error);
 }

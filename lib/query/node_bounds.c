@@ -67,7 +67,7 @@ bool ebpo_outside_planes(const ebpo_box *box, ebpo_cell cell, const uint32_t *co
 }
 
 double ebpo_envelope_distance(const ebpo_box *box, ebpo_cell cell, const uint32_t *codes,
-                              uint32_t count, const double p[3])
+                              uint32_t count, const double p[3], double enough)
 {
     double low[3], size[3], xi[3], d[3];
     cell_size(box, cell, low, size);
@@ -76,7 +76,7 @@ double ebpo_envelope_distance(const ebpo_box *box, ebpo_cell cell, const uint32_
         d[k] = fmax(fmax(low[k] - p[k], p[k] - (low[k] + size[k])), 0);
     }
     double best = length3(d) * (1 - 0x1p-48);
-    for (uint32_t i = 0; i < count; i++) {
+    for (uint32_t i = 0; i < count && !(best > enough); i++) {
         int32_t n[3];
         double error, value = plane_value(xi, codes[i], n, &error);
         if (!(value > error))

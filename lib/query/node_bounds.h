@@ -12,10 +12,10 @@ double ebpo_cell_diagonal(const ebpo_box *box, ebpo_cell cell);
 bool ebpo_outside_planes(const ebpo_box *box, ebpo_cell cell, const uint32_t *codes, uint32_t count,
                          const double p[3]);
 
-/* Certain lower bound of the distance of p to the cell cut by the half-spaces, and upper bound of
- * the distance to the farthest point of the cell. */
+/* Certain lower bound of the distance of p to the cell cut by the half-spaces: some bound is enough
+ * that is beyond `enough`. And upper bound of the distance to the farthest point of the cell. */
 double ebpo_envelope_distance(const ebpo_box *box, ebpo_cell cell, const uint32_t *codes,
-                              uint32_t count, const double p[3]);
+                              uint32_t count, const double p[3], double enough);
 double ebpo_cell_far(const ebpo_box *box, ebpo_cell cell, const double p[3]);
 
 #endif

@@ -47,7 +47,7 @@ static void look(looking *l, ebpo_node node, double lower)
         return;
     }
     ebpo_ranked child[8];
-    int count = ebpo_rank_children(l->model, &l->box, &node, lower, l->p, child);
+    int count = ebpo_rank_children(l->model, &l->box, &node, lower, l->p, l->limit, child);
     for (int i = 0; i < count; i++)
         look(l, child[i].node, child[i].lower);
 }

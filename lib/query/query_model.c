@@ -119,17 +119,17 @@ static ebpo_status open_top(ebpo_model *m, int cut_level, ebpo_error *error)
                              cut_level, budget, taken + EBPO_SUBTREES_LEAST);
         skeletons =
             ebpo_skeletons_room(m->top->below_count, ebpo_skeleton_budget(&m->options, budget));
-        cache = budget - m->top->bytes - chunks - skeletons;
-    }
-    if (m->options.loading == EBPO_LOAD_CACHE && skeletons) {
-        m->skeletons = ebpo_skeletons_make(m->top->below_count, skeletons);
-        if (!m->skeletons)
-            return ebpo_fail_memory(error, m->top->below_count * sizeof(void *));
+        cache = budget - m->top->bytes - chunks;
     }
     status = ebpo_chunks_make(&m->chunks, m->file, chunks, error);
     ebpo_cache_source source = { m, estimate_subtree, load_subtree, release_subtree };
     if (status == EBPO_OK)
         status = ebpo_cache_make(&m->cache, &source, "subtree", cache, error);
+    if (status == EBPO_OK && m->options.loading == EBPO_LOAD_CACHE && skeletons) {
+        m->skeletons = ebpo_skeletons_make(m->top->below_count, skeletons, m->cache);
+        if (!m->skeletons)
+            return ebpo_fail_memory(error, m->top->below_count * sizeof(void *));
+    }
     return status;
 }
 
@@ -203,9 +203,8 @@ static void gather_stats(const ebpo_model *m, ebpo_model_stats *out)
     ebpo_cache_stats subtrees, chunks;
     ebpo_cache_get_stats(m->cache, &subtrees);
     ebpo_chunks_get_stats(m->chunks, &chunks);
-    uint64_t stays = m->top->bytes + ebpo_skeletons_bytes(m->skeletons);
-    out->memory = stays + subtrees.bytes + chunks.bytes;
-    out->memory_peak = stays + subtrees.peak_bytes + chunks.peak_bytes;
+    out->memory = m->top->bytes + subtrees.bytes + chunks.bytes;
+    out->memory_peak = m->top->bytes + subtrees.peak_bytes + chunks.peak_bytes;
     out->hits = subtrees.hits;
     out->loads = subtrees.loads;
     out->prefetched = subtrees.prefetched;

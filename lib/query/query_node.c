@@ -62,16 +62,22 @@ const uint32_t *ebpo_model_planes(const ebpo_model *model, const ebpo_node *node
     return model->top->planes + planes.first;
 }
 
-double ebpo_model_lower_bound(const ebpo_model *m, const ebpo_box *box, const ebpo_node *node,
-                              double parent, const double p[3])
+static double bound_until(const ebpo_model *m, const ebpo_box *box, const ebpo_node *node,
+                          double parent, const double p[3], double enough)
 {
     uint32_t count;
     const uint32_t *codes = ebpo_model_planes(m, node, &count);
-    return fmax(parent, ebpo_envelope_distance(box, node->cell, codes, count, p));
+    return fmax(parent, ebpo_envelope_distance(box, node->cell, codes, count, p, enough));
+}
+
+double ebpo_model_lower_bound(const ebpo_model *m, const ebpo_box *box, const ebpo_node *node,
+                              double parent, const double p[3])
+{
+    return bound_until(m, box, node, parent, p, INFINITY);
 }
 
 int ebpo_rank_children(const ebpo_model *m, const ebpo_box *box, const ebpo_node *gray,
-                       double parent, const double p[3], ebpo_ranked out[8])
+                       double parent, const double p[3], double limit, ebpo_ranked out[8])
 {
     const ebpo_node_table *table = gray->subtree ? &gray->subtree->nodes : &m->top->nodes;
     int count = 0;
@@ -80,7 +86,9 @@ int ebpo_rank_children(const ebpo_model *m, const ebpo_box *box, const ebpo_node
         if (ebpo_entry_kind_of(ebpo_table_child(table, gray->entry, octant)) == EBPO_ENTRY_UNIFORM)
             continue;
         ebpo_ranked r = { ebpo_model_child(m, gray, octant), 0, 0 };
-        r.lower = ebpo_model_lower_bound(m, box, &r.node, parent, p);
+        r.lower = bound_until(m, box, &r.node, parent, p, limit);
+        if (r.lower > limit)
+            continue;
         int at = count++;
         for (; at > 0 && out[at - 1].lower > r.lower; at--)
             out[at] = out[at - 1];

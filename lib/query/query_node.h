@@ -35,7 +35,8 @@ const uint32_t *ebpo_model_planes(const ebpo_model *model, const ebpo_node *node
 double ebpo_model_lower_bound(const ebpo_model *model, const ebpo_box *box, const ebpo_node *node,
                               double parent, const double p[3]);
 
-/* Children of a gray node that are neither white nor black, nearest first; returns how many. */
+/* Children of a gray node that are neither white nor black nor beyond `limit`, nearest first;
+ * returns how many. */
 struct ebpo_ranked {
     ebpo_node node;
     double lower;
@@ -43,6 +44,6 @@ struct ebpo_ranked {
 };
 
 int ebpo_rank_children(const ebpo_model *model, const ebpo_box *box, const ebpo_node *gray,
-                       double parent, const double p[3], ebpo_ranked out[8]);
+                       double parent, const double p[3], double limit, ebpo_ranked out[8]);
 
 #endif

@@ -89,7 +89,8 @@ static ebpo_status put_children(within *w, const ebpo_box *box, const ebpo_ranke
                                 ebpo_error *error)
 {
     ebpo_ranked child[8];
-    int count = ebpo_rank_children(w->context->model, box, &r->node, r->lower, w->band.p, child);
+    int count = ebpo_rank_children(w->context->model, box, &r->node, r->lower, w->band.p,
+                                   w->band.limit, child);
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < count && status == EBPO_OK; i++)
         status = put(w, box, &child[i], error);

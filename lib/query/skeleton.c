@@ -2,37 +2,61 @@
 
 #include "query/skeleton.h"
 
+#include <float.h>
 #include <math.h>
+#include <pthread.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/alloc.h"
 
+typedef struct kept_node {
+    /* `child`: EBPO_IS_BLOCK; or kept, with the number here; or a number in the subtree's
+     * hierarchy, which becomes a kept one when the skeleton grows */
+    ebpo_bound bound;
+    ebpo_bound_slab slab;
+} kept_node;
+
+/* Nodes of a part, and parts: a power of two each. */
+enum { PART_NODES = 8, PARTS = EBPO_SKELETON_NODES / PART_NODES };
+#define IS_KEPT UINT32_C(0x40000000)
+
 struct ebpo_skeleton {
-    double centre[3], scale;  /* the subtree's frame */
-    ebpo_bound_slab *slab;    /* [count], behind the nodes */
-    uint32_t count, is_outer; /* a bit for each node whose faces are outer ones */
-    uint8_t own, outer;       /* a bit for each child of node 0 that has such faces: never both */
-    /* the node below this child of that node; 0: not kept, or a block */
-    uint8_t below[EBPO_SKELETON_NODES][8];
-    ebpo_bound bound[]; /* `child` tells nothing here */
+    double centre[3], scale; /* the subtree's frame */
+    unsigned count, first;   /* nodes; those of the first part at most */
+    uint8_t own, outer;      /* a bit for each child of node 0 that has such faces: never both */
+    kept_node *_Atomic part[PARTS];
 };
+
+static kept_node *node_at(const ebpo_skeleton *k, uint32_t number)
+{
+    return atomic_load_explicit(&k->part[number / PART_NODES], memory_order_acquire) +
+           number % PART_NODES;
+}
+
+/* A node below becomes known while others look. */
+static uint32_t child_of(const kept_node *n, int lane)
+{
+    return __atomic_load_n(&n->bound.child[lane], __ATOMIC_ACQUIRE);
+}
+static bool is_kept(uint32_t child) { return (child & (IS_KEPT | EBPO_IS_BLOCK)) == IS_KEPT; }
 
 /* Squares of numbers in such frames, and what comes back from them, are far from the ends of
  * doubles. */
 static const double scale_most = 0x1p500, place_most = 0x1p200;
 
-uint64_t ebpo_skeleton_bytes(unsigned nodes)
-{
-    uint64_t bytes =
-        sizeof(ebpo_skeleton) + nodes * (uint64_t)(sizeof(ebpo_bound) + sizeof(ebpo_bound_slab));
-    return (bytes + 63) / 64 * 64;
-}
+static uint64_t part_bytes(unsigned nodes) { return nodes * (uint64_t)sizeof(kept_node); }
+uint64_t ebpo_skeleton_bytes(unsigned nodes) { return sizeof(ebpo_skeleton) + part_bytes(nodes); }
 
-static void copy_node(ebpo_skeleton *k, const ebpo_accel *s, uint32_t node)
+/* Below this child of a node of the skeleton. */
+static void keep_child(ebpo_skeleton *k, const ebpo_accel *s, uint32_t *place)
 {
-    k->bound[k->count] = s->bound[node];
-    k->slab[k->count++] = s->slab[node];
+    uint32_t number = k->count++;
+    kept_node *n = node_at(k, number);
+    n->bound = s->bound[*place];
+    n->slab = s->slab[*place];
+    __atomic_store_n(place, IS_KEPT | number, __ATOMIC_RELEASE);
 }
 
 static double diagonal2(const ebpo_bound *b, int lane)
@@ -56,62 +80,76 @@ static bool is_outer(const ebpo_accel *s, uint32_t child)
 
 static void tell_kinds(ebpo_skeleton *k, const ebpo_accel *s)
 {
-    for (int lane = 0; lane < k->bound[0].count; lane++)
-        if (is_outer(s, k->bound[0].child[lane]))
+    const ebpo_bound *top = &s->bound[s->top];
+    for (int lane = 0; lane < top->count; lane++)
+        if (is_outer(s, top->child[lane]))
             k->outer |= (uint8_t)(1u << lane);
         else
             k->own |= (uint8_t)(1u << lane);
 }
 
-/* The node below the largest child that is not kept yet: its box is the loosest. But of outer faces
- * only the one or two nodes that hold them all, and these first: they are looked for in the
- * subtrees whose own they are, and small boxes tell in which. */
-static bool copy_next(ebpo_skeleton *k, const ebpo_accel *s)
+/* Of outer faces the one or two nodes below the topmost one, which hold them all: they are looked
+ * for in the subtrees whose own they are, and small boxes tell in which. */
+static void keep_outer(ebpo_skeleton *k, const ebpo_accel *s)
+{
+    kept_node *top = node_at(k, 0);
+    for (int lane = 0; lane < top->bound.count && k->count < k->first; lane++)
+        if (k->outer >> lane & 1 && !(top->bound.child[lane] & EBPO_IS_BLOCK))
+            keep_child(k, s, &top->bound.child[lane]);
+}
+
+/* Of own ones the node below the largest child that is not kept yet: its box is the loosest. */
+static bool keep_largest(ebpo_skeleton *k, const ebpo_accel *s, uint32_t outer_end)
 {
     double most = -1;
-    uint8_t *place = NULL;
-    uint32_t next = 0;
-    for (uint32_t node = 0; node < k->count; node++)
-        for (int lane = 0; lane < k->bound[node].count; lane++) {
-            uint32_t child = k->bound[node].child[lane];
-            bool outer = node ? k->is_outer >> node & 1 : k->outer >> lane & 1;
-            double size = child & EBPO_IS_BLOCK || k->below[node][lane] || (outer && node) ? -1
-                          : outer ? INFINITY
-                                  : diagonal2(&k->bound[node], lane);
+    uint32_t *place = NULL;
+    for (uint32_t number = 0; number < k->count; number += number ? 1 : outer_end) {
+        ebpo_bound *b = &node_at(k, number)->bound;
+        for (int lane = 0; lane < b->count; lane++) {
+            bool leads_on =
+                !(b->child[lane] & (IS_KEPT | EBPO_IS_BLOCK)) && (number || k->own >> lane & 1);
+            double size = leads_on ? diagonal2(b, lane) : -1;
             if (size > most) {
                 most = size;
-                place = &k->below[node][lane];
-                next = child;
+                place = &b->child[lane];
             }
         }
-    if (!place)
-        return false;
-    *place = (uint8_t)k->count;
-    k->is_outer |= (uint32_t)(most == INFINITY) << k->count;
-    copy_node(k, s, next);
-    return true;
+    }
+    if (place)
+        keep_child(k, s, place);
+    return place != NULL;
 }
 
 ebpo_skeleton *ebpo_skeleton_make(const ebpo_accel *s, unsigned nodes)
 {
     if (s->bound_count == 0 || !(s->scale <= scale_most && s->scale >= 1 / scale_most))
         return NULL;
-    unsigned count = s->bound_count < nodes ? s->bound_count : nodes;
-    ebpo_skeleton *k = aligned_alloc(64, ebpo_skeleton_bytes(count));
-    if (!k)
+    ebpo_skeleton *k = ebpo_alloc_zero(1, sizeof *k);
+    unsigned most = s->bound_count < nodes ? s->bound_count : nodes;
+    kept_node *first = k ? aligned_alloc(64, part_bytes(most)) : NULL;
+    if (!first) {
+        free(k);
         return NULL;
-    memset(k, 0, sizeof *k);
+    }
     memcpy(k->centre, s->centre, sizeof k->centre);
     k->scale = s->scale;
-    k->slab = (ebpo_bound_slab *)(k->bound + count);
-    copy_node(k, s, s->top);
+    k->part[0] = first;
+    k->first = most;
+    uint32_t top = s->top;
+    keep_child(k, s, &top);
     tell_kinds(k, s);
-    while (k->count < count && copy_next(k, s))
+    keep_outer(k, s);
+    for (uint32_t outer_end = k->count; k->count < most && keep_largest(k, s, outer_end);)
         ;
     return k;
 }
 
-void ebpo_skeleton_free(ebpo_skeleton *k) { free(k); }
+void ebpo_skeleton_free(ebpo_skeleton *k)
+{
+    for (int i = 0; k && i < PARTS; i++)
+        free(k->part[i]);
+    free(k);
+}
 
 /* --- bounds --- */
 
@@ -138,42 +176,68 @@ static double by_slab(const ebpo_child_slab *slab, const double to[3])
     return aside * aside + over * over;
 }
 
-/* Squared lower bound of the distance to a child, in the frame, before `certainly`. */
-static double child_bound(const ebpo_bound *b, const ebpo_bound_slab *slab, int lane,
-                          const double p[3])
+/* Squared lower bounds of the distances to the children, in the frame, before `certainly`: by
+ * boxes. */
+static void by_boxes(const ebpo_bound *b, const double p[3], double lower2[8])
 {
-    double square = 0, to[3];
-    for (int k = 0; k < 3; k++) {
-        ebpo_bound_sides side = ebpo_bound_side(b, lane, k);
-        double d = fmax(fmax(side.low - p[k], p[k] - side.high), 0);
-        to[k] = p[k] - (side.low + side.high) / 2;
-        square += d * d;
-    }
-    ebpo_child_slab decoded = ebpo_bound_slab_of(slab, lane);
-    return fmax(square, by_slab(&decoded, to));
+    for (int lane = 0; lane < 8; lane++)
+        lower2[lane] = 0;
+    for (int k = 0; k < 3; k++)
+        for (int lane = 0; lane < 8; lane++) {
+            double below = (double)b->origin[k] + (double)b->step[k] * b->low[k][lane] - p[k],
+                   above = p[k] - ((double)b->origin[k] + (double)b->step[k] * b->high[k][lane]),
+                   d = below > above ? below : above;
+            d = d > 0 ? d : 0;
+            lower2[lane] += d * d;
+        }
 }
 
-/* The least of what is below these children of a node, or `least` if that is less. */
-static double node_bound(const ebpo_skeleton *k, unsigned node, unsigned lanes, const double p[3],
-                         double parent, double least)
+static double by_child_slab(const kept_node *n, int lane, const double p[3])
 {
-    const ebpo_bound *b = &k->bound[node];
-    double lower2[8];
-    lanes &= (1u << b->count) - 1;
-    for (int lane = 0; lane < b->count; lane++)
-        lower2[lane] = fmax(parent, child_bound(b, &k->slab[node], lane, p));
-    while (lanes) {
-        int best = __builtin_ctz(lanes);
-        for (int lane = best + 1; lane < b->count; lane++)
-            if (lanes >> lane & 1 && lower2[lane] < lower2[best])
-                best = lane;
-        if (lower2[best] >= least)
-            break;
-        lanes &= ~(1u << best);
-        unsigned below = k->below[node][best];
-        least = below ? node_bound(k, below, 255, p, lower2[best], least) : lower2[best];
+    double to[3];
+    for (int k = 0; k < 3; k++) {
+        ebpo_bound_sides side = ebpo_bound_side(&n->bound, lane, k);
+        to[k] = p[k] - (side.low + side.high) / 2;
     }
-    return least;
+    ebpo_child_slab slab = ebpo_bound_slab_of(&n->slab, lane);
+    return by_slab(&slab, to);
+}
+
+/* The nearest of what has not been opened. */
+typedef struct nearest_place {
+    double lower2;
+    uint32_t *place;
+} nearest_place;
+
+/* Of what is below these children of a node, where it is nearer than `best`. Slabs are asked only
+ * where boxes do not tell enough. */
+static void look_below(const ebpo_skeleton *k, uint32_t number, unsigned lanes, const double p[3],
+                       double parent, nearest_place *best)
+{
+    kept_node *n = node_at(k, number);
+    double lower2[8];
+    unsigned told = 0;
+    by_boxes(&n->bound, p, lower2);
+    lanes &= (1u << n->bound.count) - 1;
+    while (lanes) {
+        int lane = __builtin_ctz(lanes);
+        for (int other = lane + 1; other < n->bound.count; other++)
+            if (lanes >> other & 1 && lower2[other] < lower2[lane])
+                lane = other;
+        if (lower2[lane] >= best->lower2)
+            break;
+        if (!(told >> lane & 1)) {
+            told |= 1u << lane;
+            lower2[lane] = fmax(fmax(lower2[lane], parent), by_child_slab(n, lane, p));
+            continue;
+        }
+        lanes &= ~(1u << lane);
+        uint32_t child = child_of(n, lane);
+        if (is_kept(child))
+            look_below(k, child & ~IS_KEPT, 255, p, lower2[lane], best);
+        else
+            *best = (nearest_place){ lower2[lane], &n->bound.child[lane] };
+    }
 }
 
 /* False, and somewhere: too far. */
@@ -189,15 +253,59 @@ static bool to_frame(const ebpo_skeleton *k, const double point[3], double p[3])
     return near;
 }
 
-ebpo_skeleton_bounds ebpo_skeleton_lower_bounds(const ebpo_skeleton *k, const double point[3])
+/* Its square in the frame, rounded up. */
+static double frame_limit2(const ebpo_skeleton *k, double limit)
 {
-    double p[3];
+    double most = limit * k->scale * (1 + 0x1p-38);
+    return most < place_most ? most * most * (1 + 0x1p-38) + DBL_MIN : INFINITY;
+}
+
+static double lower_bound(const ebpo_skeleton *k, unsigned lanes, const double p[3], double limit2)
+{
+    nearest_place best = { limit2, NULL };
+    if (lanes)
+        look_below(k, 0, lanes, p, 0, &best);
+    return best.place ? sqrt(best.lower2) * certainly / k->scale : INFINITY;
+}
+
+ebpo_skeleton_bounds ebpo_skeleton_lower_bounds(const ebpo_skeleton *k, const double point[3],
+                                                double limit)
+{
+    double p[3], limit2 = frame_limit2(k, limit);
     if (!to_frame(k, point, p))
         return (ebpo_skeleton_bounds){ k->own ? 0 : INFINITY, k->outer ? 0 : INFINITY };
-    double own = node_bound(k, 0, k->own, p, 0, INFINITY),
-           outer = k->outer ? node_bound(k, 0, k->outer, p, 0, INFINITY) : INFINITY;
-    return (ebpo_skeleton_bounds){ sqrt(own) * certainly / k->scale,
-                                   sqrt(outer) * certainly / k->scale };
+    return (ebpo_skeleton_bounds){ lower_bound(k, k->own, p, limit2),
+                                   lower_bound(k, k->outer, p, limit2) };
+}
+
+/* Where its nodes are asked for; NULL: it is as large as it may be, or no memory. */
+static bool has_place(ebpo_skeleton *k, bool (*take)(void *user, uint64_t bytes), void *user)
+{
+    unsigned part = k->count / PART_NODES;
+    if (k->first < PART_NODES || part >= PARTS)
+        return false;
+    if (k->part[part])
+        return true;
+    kept_node *nodes =
+        take(user, part_bytes(PART_NODES)) ? aligned_alloc(64, part_bytes(PART_NODES)) : NULL;
+    if (nodes)
+        atomic_store_explicit(&k->part[part], nodes, memory_order_release);
+    return nodes != NULL;
+}
+
+void ebpo_skeleton_grow(ebpo_skeleton *k, const ebpo_accel *s, const double point[3], double limit,
+                        bool (*take)(void *user, uint64_t bytes), void *user)
+{
+    double p[3], limit2 = frame_limit2(k, limit);
+    if (!k->own || !to_frame(k, point, p))
+        return;
+    for (int added = 0; added < PART_NODES; added++) {
+        nearest_place best = { limit2, NULL };
+        look_below(k, 0, k->own, p, 0, &best);
+        if (!best.place || *best.place & EBPO_IS_BLOCK || !has_place(k, take, user))
+            return;
+        keep_child(k, s, best.place);
+    }
 }
 
 static ebpo_outer_box box_of(const ebpo_skeleton *k, const ebpo_bound *b, int lane)
@@ -214,19 +322,21 @@ static ebpo_outer_box box_of(const ebpo_skeleton *k, const ebpo_bound *b, int la
 }
 
 /* Those of a node's children, and of the nodes right below it. */
-static unsigned boxes_of(const ebpo_skeleton *k, unsigned node, unsigned lanes, const double p[3],
-                         double limit, ebpo_outer_box out[])
+static unsigned boxes_of(const ebpo_skeleton *k, uint32_t number, unsigned lanes, const double p[3],
+                         double limit2, ebpo_outer_box out[])
 {
     unsigned count = 0;
-    const ebpo_bound *b = &k->bound[node];
-    for (int lane = 0; lane < b->count; lane++) {
-        double lower2 = child_bound(b, &k->slab[node], lane, p);
-        if (!(lanes >> lane & 1) || sqrt(lower2) * certainly / k->scale > limit)
+    double lower2[8];
+    const kept_node *n = node_at(k, number);
+    by_boxes(&n->bound, p, lower2);
+    for (int lane = 0; lane < n->bound.count; lane++) {
+        if (!(lanes >> lane & 1) || lower2[lane] > limit2 || by_child_slab(n, lane, p) > limit2)
             continue;
-        if (k->below[node][lane])
-            count += boxes_of(k, k->below[node][lane], 255, p, limit, out + count);
+        uint32_t child = child_of(n, lane);
+        if (is_kept(child))
+            count += boxes_of(k, child & ~IS_KEPT, 255, p, limit2, out + count);
         else
-            out[count++] = box_of(k, b, lane);
+            out[count++] = box_of(k, &n->bound, lane);
     }
     return count;
 }
@@ -235,14 +345,21 @@ unsigned ebpo_skeleton_outer_boxes(const ebpo_skeleton *k, const double point[3]
                                    ebpo_outer_box out[EBPO_OUTER_BOXES])
 {
     double p[3];
-    return boxes_of(k, 0, k->outer, p, to_frame(k, point, p) ? limit : INFINITY, out);
+    bool near = to_frame(k, point, p);
+    return boxes_of(k, 0, k->outer, p, near ? frame_limit2(k, limit) : INFINITY, out);
 }
 
 /* --- those of a model --- */
 
+/* With so many nodes each begins, if there is room for all. */
+enum { BEGIN_NODES = PART_NODES };
+
 struct ebpo_skeletons {
     uint64_t count, room;
-    unsigned nodes; /* of each */
+    ebpo_cache *cache;    /* of which it is, or NULL */
+    unsigned nodes;       /* of each, at first */
+    pthread_mutex_t lock; /* of what changes: searches do not wait for it */
+    uint64_t left;        /* that are not kept yet */
     _Atomic uint64_t bytes;
     _Atomic(ebpo_skeleton *) of[];
 };
@@ -255,7 +372,7 @@ static uint64_t frame_bytes(uint64_t count)
 /* So many that all have them, one at least. */
 static unsigned nodes_each(uint64_t count, uint64_t room)
 {
-    unsigned nodes = EBPO_SKELETON_NODES;
+    unsigned nodes = BEGIN_NODES;
     while (nodes > 1 && frame_bytes(count) + count * ebpo_skeleton_bytes(nodes) > room)
         nodes--;
     return nodes;
@@ -267,51 +384,77 @@ uint64_t ebpo_skeletons_room(uint64_t count, uint64_t room)
     return room < frame_bytes(count) + ebpo_skeleton_bytes(1) ? 0 : room < most ? room : most;
 }
 
-ebpo_skeletons *ebpo_skeletons_make(uint64_t count, uint64_t room)
+/* `later`: what must be left. */
+static bool take_room(ebpo_skeletons *all, uint64_t bytes, uint64_t later)
+{
+    if (all->bytes + bytes > all->room || all->room - all->bytes - bytes < later ||
+        (all->cache && !ebpo_cache_take_aside(all->cache, bytes)))
+        return false;
+    all->bytes += bytes;
+    return true;
+}
+
+/* For growing: what all others begin with is left. */
+static bool take_more(void *user, uint64_t bytes)
+{
+    ebpo_skeletons *all = user;
+    return take_room(all, bytes, all->left * ebpo_skeleton_bytes(all->nodes));
+}
+
+ebpo_skeletons *ebpo_skeletons_make(uint64_t count, uint64_t room, ebpo_cache *cache)
 {
     ebpo_skeletons *all = ebpo_alloc_zero(1, frame_bytes(count));
     if (!all)
         return NULL;
-    all->count = count;
+    all->count = all->left = count;
     all->room = room;
+    all->cache = cache;
     all->nodes = nodes_each(count, room);
-    all->bytes = frame_bytes(count);
-    return all;
+    pthread_mutex_init(&all->lock, NULL);
+    if (cache)
+        ebpo_cache_set_aside(cache, room);
+    if (take_room(all, frame_bytes(count), 0))
+        return all;
+    ebpo_skeletons_free(all);
+    return NULL;
 }
 
 void ebpo_skeletons_free(ebpo_skeletons *all)
 {
-    for (uint64_t i = 0; all && i < all->count; i++)
+    if (!all)
+        return;
+    for (uint64_t i = 0; i < all->count; i++)
         ebpo_skeleton_free(all->of[i]);
+    pthread_mutex_destroy(&all->lock);
     free(all);
 }
 
 uint64_t ebpo_skeletons_bytes(const ebpo_skeletons *all) { return all ? all->bytes : 0; }
 
-static bool take_room(ebpo_skeletons *all, uint64_t bytes)
-{
-    uint64_t taken = all->bytes;
-    while (taken + bytes <= all->room)
-        if (atomic_compare_exchange_weak(&all->bytes, &taken, taken + bytes))
-            return true;
-    return false;
-}
-
 void ebpo_skeletons_keep(ebpo_skeletons *all, uint64_t number, const ebpo_accel *subtree)
 {
     if (!all || all->of[number])
         return;
-    unsigned nodes = subtree->bound_count < all->nodes ? subtree->bound_count : all->nodes;
-    uint64_t bytes = ebpo_skeleton_bytes(nodes);
-    ebpo_skeleton *none = NULL, *made = NULL;
-    if (!take_room(all, bytes))
-        return;
-    made = ebpo_skeleton_make(subtree, nodes);
+    ebpo_skeleton *made = ebpo_skeleton_make(subtree, all->nodes);
+    pthread_mutex_lock(&all->lock);
     /* another thread may have loaded it, too: with planes */
-    if (made && atomic_compare_exchange_strong(&all->of[number], &none, made))
-        return;
-    atomic_fetch_sub(&all->bytes, bytes);
+    if (made && !all->of[number] && take_room(all, ebpo_skeleton_bytes(made->first), 0)) {
+        atomic_store_explicit(&all->of[number], made, memory_order_release);
+        all->left--;
+        made = NULL;
+    }
+    pthread_mutex_unlock(&all->lock);
     ebpo_skeleton_free(made);
+}
+
+void ebpo_skeletons_grow(ebpo_skeletons *all, uint64_t number, const ebpo_accel *subtree,
+                         const double p[3], double limit)
+{
+    if (!all || !all->of[number])
+        return;
+    pthread_mutex_lock(&all->lock);
+    ebpo_skeleton_grow(all->of[number], subtree, p, limit, take_more, all);
+    pthread_mutex_unlock(&all->lock);
 }
 
 const ebpo_skeleton *ebpo_skeletons_find(const ebpo_skeletons *all, uint64_t number)

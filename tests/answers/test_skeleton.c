@@ -28,21 +28,48 @@ static uint64_t count_nearer(const ebpo_accel *s, const double p[3], ebpo_skelet
     return nearer;
 }
 
-/* With more nodes bounds are better. */
+/* What is beyond a limit may be said to be nowhere. */
+static void check_limit(const ebpo_skeleton *k, const double p[3], ebpo_skeleton_bounds all)
+{
+    double limit[] = { all.own * (1 - 0x1p-30), all.own, all.outer, all.own / 2 + all.outer / 2 };
+    for (int i = 0; i < 4; i++) {
+        if (!isfinite(limit[i]))
+            continue;
+        ebpo_skeleton_bounds b = ebpo_skeleton_lower_bounds(k, p, limit[i]);
+        ck_assert(b.own == all.own || (b.own == INFINITY && all.own > limit[i]));
+        ck_assert(b.outer == all.outer || (b.outer == INFINITY && all.outer > limit[i]));
+    }
+}
+
+static bool take(void *user, uint64_t bytes)
+{
+    uint64_t *left = user;
+    if (bytes > *left)
+        return false;
+    *left -= bytes;
+    return true;
+}
+
+/* With more nodes bounds are better; until there is no room for more. */
 static void check_bounds(const ebpo_accel *s, const double *points, uint64_t count)
 {
+    uint64_t room = 3 * (ebpo_skeleton_bytes(8) - ebpo_skeleton_bytes(0));
     ebpo_skeleton *few[] = { ebpo_skeleton_make(s, 1), ebpo_skeleton_make(s, 4),
-                             ebpo_skeleton_make(s, EBPO_SKELETON_NODES) };
-    for (uint64_t i = 0; i < count && few[2]; i++) {
-        ebpo_skeleton_bounds b[3];
-        for (int n = 0; n < 3; n++) {
-            b[n] = ebpo_skeleton_lower_bounds(few[n], points + 3 * i);
+                             ebpo_skeleton_make(s, 8), ebpo_skeleton_make(s, 8) };
+    for (uint64_t i = 0; i < count && few[3]; i++) {
+        const double *p = points + 3 * i;
+        ebpo_skeleton_bounds b[4];
+        ebpo_skeleton_grow(few[3], s, p, INFINITY, take, &room);
+        for (int n = 0; n < 4; n++) {
+            b[n] = ebpo_skeleton_lower_bounds(few[n], p, INFINITY);
             ck_assert_double_ge(b[n].own, n ? b[n - 1].own : 0);
             ck_assert_double_ge(b[n].outer, n ? b[n - 1].outer : 0);
+            check_limit(few[n], p, b[n]);
         }
-        ck_assert_uint_eq(count_nearer(s, points + 3 * i, b[2]), 0);
+        ck_assert_uint_eq(count_nearer(s, p, b[2]), 0);
+        ck_assert_uint_eq(count_nearer(s, p, b[3]), 0);
     }
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; i < 4; i++)
         ebpo_skeleton_free(few[i]);
 }
 
@@ -58,7 +85,7 @@ static bool holds(const ebpo_outer_box *box, const double t[3][3])
 static void check_outer_boxes(const ebpo_accel *s, const double p[3], double limit)
 {
     ebpo_outer_box box[EBPO_OUTER_BOXES];
-    ebpo_skeleton *k = s->outer_count ? ebpo_skeleton_make(s, EBPO_SKELETON_NODES) : NULL;
+    ebpo_skeleton *k = s->outer_count ? ebpo_skeleton_make(s, 8) : NULL;
     unsigned count = k ? ebpo_skeleton_outer_boxes(k, p, limit, box) : 0;
     for (uint32_t slot = 0; k && slot < s->block_count * EBPO_BLOCK; slot++) {
         double t[3][3];
@@ -172,7 +199,7 @@ START_TEST(answers_do_not_depend_on_what_is_known)
         subtrees_searched(&s);
     ebpo_model_get_stats(s.model, &stats);
     ck_assert(!how.memory || stats.memory_peak <= how.memory);
-    ck_assert(!how.memory || stats.skeleton_bytes <= how.memory / 8);
+    ck_assert(!how.memory || stats.skeleton_bytes <= how.memory / 4);
     end(&s);
 }
 END_TEST
@@ -216,7 +243,7 @@ START_TEST(room_is_kept_to)
     for (uint64_t room = most; room > one + 500; room -= 1 + room / 16) {
         if (!ebpo_skeletons_room(8, room))
             continue;
-        ebpo_skeletons *all = ebpo_skeletons_make(8, room);
+        ebpo_skeletons *all = ebpo_skeletons_make(8, room, NULL);
         uint64_t empty = ebpo_skeletons_bytes(all), known = 0;
         ck_assert_ptr_null(ebpo_skeletons_find(all, 3));
         for (int twice = 0; twice < 2; twice++)
@@ -275,7 +302,7 @@ static void check_cut_plan(const query_model *m, int cut_level)
     how.memory = 6 << 20;
     ASSERT_OK(ebpo_model_memory(m->file, &how, &tight, error));
     ck_assert(tight.cut_level == plan.cut_level && tight.subtrees == plan.subtrees);
-    ck_assert_uint_le(tight.skeletons, how.memory / 8);
+    ck_assert_uint_le(tight.skeletons, how.memory / 4);
     ck_assert_uint_le(tight.subtrees_held * tight.subtree_bytes, how.memory);
     ebpo_model_free(model);
 }

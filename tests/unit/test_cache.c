@@ -326,6 +326,35 @@ START_TEST(pinned_items_stay_and_the_message_says_what_would_do)
 }
 END_TEST
 
+/* Items go for it, those in use do not; a load that would need it is refused before it is taken. */
+START_TEST(what_is_set_aside_is_taken_from_the_items_as_it_is_needed)
+{
+    begin_with(400, 100, 100);
+    ebpo_cache_set_aside(cache, 150);
+    for (uint64_t key = 0; key < 4; key++)
+        ck_assert(!use(key));
+    ebpo_cache_stats stats;
+    ck_assert(ebpo_cache_take_aside(cache, 60)); /* the oldest goes */
+    ck_assert_int_eq(src->live[0] + src->live[1], 1);
+    ck_assert(!ebpo_cache_take_aside(cache, 91));
+    get(2);
+    get(3);
+    ck_assert(ebpo_cache_take_aside(cache, 90));
+    ck_assert(!ebpo_cache_take_aside(cache, 1));
+    ebpo_cache_get_stats(cache, &stats);
+    ck_assert_uint_eq(stats.bytes, 350);
+    ck_assert_uint_le(stats.peak_bytes, 400);
+    void *it;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ck_assert_int_eq(ebpo_cache_get(cache, 5, &it, NULL, &error), EBPO_E_LIMIT);
+    ck_assert_msg(strstr(error.message, "budget of 450 would do"), "%s", error.message);
+    ebpo_cache_unpin(cache, 2);
+    ebpo_cache_unpin(cache, 3);
+    ck_assert(!use(5));
+    finish();
+}
+END_TEST
+
 START_TEST(a_failed_load_tells_why_and_leaves_nothing)
 {
     begin_with(300, 100, 120);
@@ -729,6 +758,7 @@ Suite *test_suite(void)
     TCase *tests = tcase_create("cache");
     tcase_set_timeout(tests, 300);
     tcase_add_loop_test(tests, random_operations_agree_with_a_plain_model, 1, 6);
+    tcase_add_test(tests, what_is_set_aside_is_taken_from_the_items_as_it_is_needed);
     tcase_add_test(tests, pinned_items_stay_and_the_message_says_what_would_do);
     tcase_add_test(tests, a_failed_load_tells_why_and_leaves_nothing);
     tcase_add_test(tests, an_item_beyond_its_estimate_does_not_break_the_budget);
