@@ -75,7 +75,7 @@ static bool is_outer(const ebpo_accel *s, uint32_t child)
 {
     while (!(child & EBPO_IS_BLOCK))
         child = s->bound[child].child[0];
-    return s->slot_face[(uint64_t)(child & ~EBPO_IS_BLOCK) * EBPO_BLOCK] < s->outer_count;
+    return ebpo_accel_slot_face(s, (child & ~EBPO_IS_BLOCK) * EBPO_BLOCK) < s->outer_count;
 }
 
 static void tell_kinds(ebpo_skeleton *k, const ebpo_accel *s)

@@ -11,15 +11,43 @@
 
 /* --- bounds --- */
 
+/* Of all faces of a subtree. */
+typedef struct slots {
+    uint64_t count;
+    uint32_t *list;
+} slots;
+
+static void add_slots(slots *all, const ebpo_accel *s, uint32_t child)
+{
+    for (int i = 0; !(child & EBPO_IS_BLOCK) && i < s->bound[child].count; i++)
+        add_slots(all, s, s->bound[child].child[i]);
+    for (uint32_t i = 0; child & EBPO_IS_BLOCK && i < EBPO_BLOCK; i++) {
+        uint32_t slot = (child & ~EBPO_IS_BLOCK) * EBPO_BLOCK + i;
+        if (ebpo_accel_slot_face(s, slot) == EBPO_NO_SLOT)
+            return;
+        all->list = realloc(all->list, (all->count + 1) * sizeof *all->list);
+        ck_assert_ptr_nonnull(all->list);
+        all->list[all->count++] = slot;
+    }
+}
+
+static slots slots_of(const ebpo_accel *s)
+{
+    slots all = { 0, NULL };
+    if (s->bound_count)
+        add_slots(&all, s, s->top);
+    return all;
+}
+
 /* Faces that are nearer to p than the bounds say. */
-static uint64_t count_nearer(const ebpo_accel *s, const double p[3], ebpo_skeleton_bounds bounds)
+static uint64_t count_nearer(const ebpo_accel *s, const slots *all, const double p[3],
+                             ebpo_skeleton_bounds bounds)
 {
     uint64_t nearer = 0;
-    for (uint32_t slot = 0; slot < s->block_count * EBPO_BLOCK; slot++) {
-        double t[3][3], lower = s->slot_face[slot] < s->outer_count ? bounds.outer : bounds.own;
+    for (uint64_t i = 0; i < all->count; i++) {
+        uint32_t slot = all->list[i], local = ebpo_accel_slot_face(s, slot);
+        double t[3][3], lower = local < s->outer_count ? bounds.outer : bounds.own;
         ebpo_distance_bounds b;
-        if (s->slot_face[slot] == EBPO_NO_SLOT)
-            continue;
         ebpo_accel_triangle(s, slot, t);
         ebpo_triangle_distance_bounds(p, (const double(*)[3])t, &b);
         nearer +=
@@ -56,6 +84,7 @@ static void check_bounds(const ebpo_accel *s, const double *points, uint64_t cou
     uint64_t room = 3 * (ebpo_skeleton_bytes(8) - ebpo_skeleton_bytes(0));
     ebpo_skeleton *few[] = { ebpo_skeleton_make(s, 1), ebpo_skeleton_make(s, 4),
                              ebpo_skeleton_make(s, 8), ebpo_skeleton_make(s, 8) };
+    slots all = slots_of(s);
     for (uint64_t i = 0; i < count && few[3]; i++) {
         const double *p = points + 3 * i;
         ebpo_skeleton_bounds b[4];
@@ -66,9 +95,10 @@ static void check_bounds(const ebpo_accel *s, const double *points, uint64_t cou
             ck_assert_double_ge(b[n].outer, n ? b[n - 1].outer : 0);
             check_limit(few[n], p, b[n]);
         }
-        ck_assert_uint_eq(count_nearer(s, p, b[2]), 0);
-        ck_assert_uint_eq(count_nearer(s, p, b[3]), 0);
+        ck_assert_uint_eq(count_nearer(s, &all, p, b[2]), 0);
+        ck_assert_uint_eq(count_nearer(s, &all, p, b[3]), 0);
     }
+    free(all.list);
     for (int i = 0; i < 4; i++)
         ebpo_skeleton_free(few[i]);
 }
@@ -87,9 +117,11 @@ static void check_outer_boxes(const ebpo_accel *s, const double p[3], double lim
     ebpo_outer_box box[EBPO_OUTER_BOXES];
     ebpo_skeleton *k = s->outer_count ? ebpo_skeleton_make(s, 8) : NULL;
     unsigned count = k ? ebpo_skeleton_outer_boxes(k, p, limit, box) : 0;
-    for (uint32_t slot = 0; k && slot < s->block_count * EBPO_BLOCK; slot++) {
+    slots all = slots_of(s);
+    for (uint64_t n = 0; k && n < all.count; n++) {
+        uint32_t slot = all.list[n];
         double t[3][3];
-        if (s->slot_face[slot] >= s->outer_count)
+        if (ebpo_accel_slot_face(s, slot) >= s->outer_count)
             continue;
         ebpo_accel_triangle(s, slot, t);
         bool found = ebpo_triangle_distance_compare_to(p, (const double(*)[3])t, limit) > 0;
@@ -97,6 +129,7 @@ static void check_outer_boxes(const ebpo_accel *s, const double p[3], double lim
             found = found || holds(&box[i], (const double(*)[3])t);
         ck_assert(found);
     }
+    free(all.list);
     ebpo_skeleton_free(k);
 }
 
