@@ -66,14 +66,29 @@ void ebpo_casting_keep(ebpo_casting *c, const ebpo_met *m)
     }
 }
 
+/* Mostly few, and in order but for some: what is met is found from the nearest box on. */
+static void sort_met(ebpo_met *met, uint64_t count, ebpo_segment *ray)
+{
+    if (count > 16) {
+        qsort_r(met, count, sizeof *met, compare_met, ray);
+        return;
+    }
+    for (uint64_t i = 1; i < count; i++) {
+        uint64_t at = i;
+        ebpo_met m = met[i];
+        for (; at > 0 && compare_met(&met[at - 1], &m, ray) > 0; at--)
+            met[at] = met[at - 1];
+        met[at] = m;
+    }
+}
+
 ebpo_status ebpo_casting_sort(ebpo_casting *c, uint64_t begin, uint64_t *end, ebpo_error *error)
 {
     ebpo_context *k = c->context;
     *end = begin;
     if (!ebpo_grow(&k->hits, &k->hit_capacity, begin + c->count, sizeof *k->hits))
         return ebpo_fail_memory(error, (begin + c->count) * sizeof *k->hits);
-    if (c->count)
-        qsort_r(k->met, c->count, sizeof *k->met, compare_met, &c->ray);
+    sort_met(k->met, c->count, &c->ray);
     for (uint64_t i = 0; i < c->count; i++)
         if (i == 0 || k->met[i].file_face != k->met[i - 1].file_face) /* subtrees share faces */
             k->hits[(*end)++] = ebpo_hit_of(&k->met[i]);
@@ -82,13 +97,14 @@ ebpo_status ebpo_casting_sort(ebpo_casting *c, uint64_t begin, uint64_t *end, eb
 
 const char *ebpo_ray_fault(const ebpo_segment *ray)
 {
-    bool moves = false;
+    double nothing = 0, longest = 0;
     for (int k = 0; k < 3; k++) {
-        if (!isfinite(ray->origin[k]) || !isfinite(ray->direction[k]))
-            return "has a coordinate that is not a finite number";
-        moves = moves || ray->direction[k] != 0;
+        nothing += ray->origin[k] * 0 + ray->direction[k] * 0;
+        longest = fabs(ray->direction[k]) > longest ? fabs(ray->direction[k]) : longest;
     }
-    if (!moves)
+    if (nothing != 0) /* no number: a coordinate is not a finite one */
+        return "has a coordinate that is not a finite number";
+    if (longest == 0)
         return "needs a direction other than (0, 0, 0)";
     return ray->t_max >= 0 ? NULL : "needs a t_max of 0 or more";
 }

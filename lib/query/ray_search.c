@@ -6,6 +6,8 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "geom/double_double.h"
+
 /* Origins farther from the box than this many times its reach are moved towards it. */
 static const double near_enough = 4;
 /* Stands for infinity: finite, so that products with 0 are numbers. */
@@ -33,7 +35,8 @@ static void lower_bound(ebpo_ray_search *r)
 
 typedef struct framed {
     double origin[3], direction[3];
-    double most; /* no coordinate of the origin is greater */
+    double inverse[3]; /* of the direction, small coordinates replaced */
+    double most;       /* no coordinate of the origin is greater */
 } framed;
 
 /* Not fmax, which is a call. */
@@ -99,19 +102,24 @@ static bool entry(const framed *f, double reach, double *t)
     return from <= to;
 }
 
+/* The origin goes along in double-double arithmetic: where the ray comes from hardly matters. */
 static bool move_origin(ebpo_ray_search *r, framed *f)
 {
+    const ebpo_accel *s = r->s;
     double t;
-    if (f->most <= near_enough * r->s->reach || !(f->most < 0x1p46 * r->s->reach))
+    if (f->most <= near_enough * s->reach || !(f->most < 0x1p46 * s->reach))
         return true;
-    if (!entry(f, r->s->reach, &t))
+    if (!entry(f, s->reach, &t))
         return false;
     r->moved = t;
     f->most = 0;
     for (int k = 0; k < 3; k++) {
-        f->origin[k] += t * f->direction[k];
+        ebpo_pair from = ebpo_two_difference(r->ray.origin[k], s->centre[k]),
+                  step = ebpo_two_product(t, f->direction[k]);
+        from = (ebpo_pair){ from.head * s->scale, from.tail * s->scale };
+        f->origin[k] = ebpo_pair_add(from, step).head;
         f->most = greater(f->most, fabs(f->origin[k]));
-        r->from[k] = r->s->centre[k] + f->origin[k] / r->s->scale;
+        r->from[k] = s->centre[k] + f->origin[k] / s->scale;
     }
     return true;
 }
@@ -123,18 +131,19 @@ static double origin_error(const ebpo_ray_search *r, const framed *f)
     double unit = 0;
     for (int k = 0; k < 3; k++)
         unit = greater(unit, fabs(r->from[k]) + fabs(r->s->centre[k]));
-    return 0x1p-50 * (f->most + r->moved) + 0x1p-46 * (unit * r->s->scale) +
+    return 0x1p-50 * f->most + 0x1p-98 * r->moved + 0x1p-46 * (unit * r->s->scale) +
            0x1p-57 * (f->most + r->s->reach) + 0x1p-53;
 }
 
-static void set_boxes(ebpo_ray_search *r, const framed *f, double error)
+static void set_boxes(ebpo_ray_search *r, framed *f, double error)
 {
     bool blind = !(f->most < 0x1p80);
     for (int k = 0; k < 3; k++) {
         double d = f->direction[k], origin = blind ? 0 : f->origin[k],
                slack = blind ? (double)BEYOND : fabs(origin) * 0x1p-21 + error;
         double ahead = copysign(slack, d);
-        r->inverse[k] = (float)(1 / copysign(greater(fabs(d), 0x1p-60), d));
+        f->inverse[k] = 1 / copysign(greater(fabs(d), 0x1p-60), d);
+        r->inverse[k] = (float)f->inverse[k];
         r->step_inverse[k + 1] = r->inverse[k];
         r->near_from[k] = (float)(origin + ahead);
         r->far_from[k] = (float)(origin - ahead);
@@ -150,15 +159,15 @@ static void set_boxes(ebpo_ray_search *r, const framed *f, double error)
 
 static void set_faces(ebpo_ray_search *r, const framed *f, double error)
 {
-    int z = 0;
-    for (int k = 1; k < 3; k++)
-        z = fabs(f->direction[k]) > fabs(f->direction[z]) ? k : z;
+    const double *d = f->direction;
+    int z = fabs(d[1]) > fabs(d[0]);
+    z = fabs(d[2]) > greater(fabs(d[0]), fabs(d[1])) ? 2 : z;
     r->axis[2] = z;
     r->axis[0] = z == 2 ? 0 : z + 1;
     r->axis[1] = z == 0 ? 2 : z - 1;
     for (int i = 0; i < 2; i++)
-        r->shear[i] = (float)(f->direction[r->axis[i]] / f->direction[z]);
-    r->shear[2] = (float)(1 / f->direction[z]);
+        r->shear[i] = (float)(d[r->axis[i]] * f->inverse[z]);
+    r->shear[2] = (float)f->inverse[z];
     for (int k = 0; k < 3; k++) {
         r->from_high[k] = (float)r->from[k];
         r->from_low[k] = (float)(r->from[k] - (double)r->from_high[k]);
@@ -168,11 +177,12 @@ static void set_faces(ebpo_ray_search *r, const framed *f, double error)
 
 /* --- candidates --- */
 
+/* The nearest first, where that may spare others. */
 static void judge(ebpo_ray_search *r)
 {
     while (r->count && !r->done) {
         int first = 0;
-        for (int i = 1; i < r->count; i++)
+        for (int i = 1; i < r->count && r->wants == EBPO_WANTS_FIRST; i++)
             first = r->waiting[i].low < r->waiting[first].low ? i : first;
         ebpo_ray_candidate c = r->waiting[first];
         r->waiting[first] = r->waiting[--r->count];
