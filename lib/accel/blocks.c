@@ -23,18 +23,25 @@ typedef struct shared {
     unsigned faces, count;
 } shared;
 
+/* Open addressing: one more than the number of a vertex among the block's, 0: free. */
+enum { TABLE_BITS = 6, TABLE = 1 << TABLE_BITS };
+
 static void find_shared(const job *j, uint64_t block, shared *out)
 {
     uint32_t begin = j->layout->block_begin[block];
     const uint32_t *corner = j->mesh->faces + 3 * (uint64_t)begin;
+    uint8_t table[TABLE] = { 0 };
     out->faces = j->layout->block_end[block] - begin;
     out->count = 0;
     for (unsigned i = 0; i < 3 * out->faces; i++) {
-        unsigned at = out->count;
-        out->vertex[at] = corner[i];
-        while (at > 0 && out->vertex[at - 1] != corner[i])
-            at--;
-        out->at[i] = (uint8_t)(at ? at - 1 : out->count++);
+        unsigned slot = corner[i] * UINT32_C(0x9e3779b1) >> (32 - TABLE_BITS);
+        while (table[slot] && out->vertex[table[slot] - 1] != corner[i])
+            slot = (slot + 1) % TABLE;
+        if (!table[slot]) {
+            out->vertex[out->count++] = corner[i];
+            table[slot] = (uint8_t)out->count;
+        }
+        out->at[i] = (uint8_t)(table[slot] - 1);
     }
 }
 

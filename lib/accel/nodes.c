@@ -16,94 +16,51 @@ typedef struct walk {
     uint64_t group_begin[EBPO_LEVELS_MAX]; /* number of the first group of each level */
     uint64_t leaf_begin[EBPO_LEVELS_MAX];
     uint64_t list_capacity;
-    /* blocks of one leaf, with the lanes that it lists: block << EBPO_BLOCK | lanes */
-    uint64_t *scratch;
-    uint64_t scratch_capacity;
     ebpo_status status;
     ebpo_error *error;
 } walk;
 
-static int compare_numbers(const void *a, const void *b)
-{
-    uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
-    return (x > y) - (x < y);
-}
-
-/* Most leaves list a few blocks, nearly in order. */
-static void sort_numbers(uint64_t *numbers, uint64_t count)
-{
-    enum { FEW = 32 };
-    if (count > FEW) {
-        qsort(numbers, count, sizeof *numbers, compare_numbers);
-        return;
-    }
-    for (uint64_t i = 1; i < count; i++) {
-        uint64_t number = numbers[i], at = i;
-        for (; at > 0 && numbers[at - 1] > number; at--)
-            numbers[at] = numbers[at - 1];
-        numbers[at] = number;
-    }
-}
-
-static bool same_block(uint64_t a, uint64_t b) { return a >> EBPO_BLOCK == b >> EBPO_BLOCK; }
-
-static void put_list(walk *w, ebpo_accel_leaf *leaf, uint64_t count)
+static bool make_list_room(walk *w, uint64_t more)
 {
     ebpo_accel *s = w->s;
-    uint64_t kept = 0;
-    sort_numbers(w->scratch, count);
-    for (uint64_t i = 0; i < count; i++)
-        if (kept && same_block(w->scratch[kept - 1], w->scratch[i]))
-            w->scratch[kept - 1] |= w->scratch[i];
-        else
-            w->scratch[kept++] = w->scratch[i];
-    if (!ebpo_grow(&s->list, &w->list_capacity, s->list_count + kept, sizeof *s->list)) {
-        w->status = ebpo_fail_memory(w->error, (s->list_count + kept) * sizeof *s->list);
-        return;
-    }
-    if (s->list_count + kept > UINT32_MAX) {
+    if (!ebpo_grow(&s->list, &w->list_capacity, s->list_count + more, sizeof *s->list))
+        w->status = ebpo_fail_memory(w->error, (s->list_count + more) * sizeof *s->list);
+    else if (s->list_count + more > UINT32_MAX)
         w->status =
             ebpo_fail(w->error, EBPO_E_LIMIT,
                       "the leaves list too many faces to be held at once; give a memory budget");
-        return;
-    }
-    for (uint64_t i = 0; i < kept; i++)
-        s->list[s->list_count + i] = (ebpo_listed_block){ (uint32_t)(w->scratch[i] >> EBPO_BLOCK),
-                                                          { 0, 0, 0 },
-                                                          { 255, 255, 255 },
-                                                          (uint8_t)w->scratch[i] };
-    leaf->list = (uint32_t)s->list_count;
-    leaf->blocks = (uint32_t)kept;
-    s->list_count += kept;
+    return w->status == EBPO_OK;
 }
 
-/* The new faces are a run of blocks; references are looked up one by one, runs within a block
- * become one entry at once. */
+/* Faces come in ascending order, and so do blocks: those of one block become one entry. */
+static inline void list_face(const walk *w, uint64_t face, ebpo_listed_block *list, uint32_t *count)
+{
+    uint32_t slot = w->slot_of[face], block = slot / EBPO_BLOCK;
+    uint8_t lane = (uint8_t)(1u << slot % EBPO_BLOCK);
+    if (*count && list[*count - 1].block == block)
+        list[*count - 1].lanes |= lane;
+    else
+        list[(*count)++] = (ebpo_listed_block){ block, { 0, 0, 0 }, { 255, 255, 255 }, lane };
+}
+
+/* References, which lie before the leaf's own faces, then these. */
 static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank, uint32_t number)
 {
     ebpo_accel_leaf *leaf = &w->s->leaf[number];
-    uint64_t refs = level->leaf_ref_count[rank], count = 0;
-    if (!ebpo_grow(&w->scratch, &w->scratch_capacity, refs + level->leaf_new[rank],
-                   sizeof *w->scratch)) {
-        w->status = ebpo_fail_memory(w->error, refs * sizeof *w->scratch);
+    uint64_t refs = level->leaf_ref_count[rank], fresh = level->leaf_new[rank];
+    if (!make_list_room(w, refs + fresh))
         return;
-    }
-    for (uint64_t i = 0; i < refs + level->leaf_new[rank]; i++) {
-        uint64_t face =
-            i < refs ? level->leaf_refs[w->refs[depth] + i] : level->leaf_first[rank] + (i - refs);
-        uint32_t slot = w->slot_of[face];
-        uint64_t entry = (uint64_t)(slot / EBPO_BLOCK) << EBPO_BLOCK | UINT64_C(1)
-                                                                           << slot % EBPO_BLOCK;
-        if (count && same_block(w->scratch[count - 1], entry))
-            w->scratch[count - 1] |= entry;
-        else
-            w->scratch[count++] = entry;
-    }
+    ebpo_listed_block *list = w->s->list + w->s->list_count;
+    for (uint64_t i = w->refs[depth]; i < w->refs[depth] + refs; i++)
+        list_face(w, level->leaf_refs[i], list, &leaf->blocks);
+    for (uint64_t i = level->leaf_first[rank]; i < level->leaf_first[rank] + fresh; i++)
+        list_face(w, i, list, &leaf->blocks);
+    leaf->list = (uint32_t)w->s->list_count;
+    w->s->list_count += leaf->blocks;
     w->refs[depth] += refs;
     leaf->kind = w->s->solid ? EBPO_LEAF_UNKNOWN : EBPO_LEAF_GENERAL;
     leaf->wall = EBPO_NO_WALL;
     leaf->winding = level->leaf_winding ? level->leaf_winding[rank] : 0;
-    put_list(w, leaf, count);
 }
 
 static uint32_t uniform(walk *w, const int32_t *windings, uint64_t rank, int32_t usual)
@@ -190,6 +147,5 @@ ebpo_status ebpo_accel_fill_nodes(ebpo_accel *s, const ebpo_slice *slice, const 
         status = w.status;
     }
     free(slot_of);
-    free(w.scratch);
     return status;
 }

@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "accel/block_measure.h"
 #include "check_main.h"
 #include "query/query_model.h"
 #include "query_kit.h"
@@ -189,6 +190,39 @@ START_TEST(boxes_and_slabs_contain_their_faces)
 }
 END_TEST
 
+/* --- what slabs are made of --- */
+
+static void same_measures(const ebpo_accel *s, uint32_t block, const ebpo_slab_view *view)
+{
+    const ebpo_block_measures *base = &ebpo_block_measures_base, *best = ebpo_block_measures_best();
+    ebpo_block_extent one, other;
+    ebpo_slab_extent one_slab, other_slab;
+    base->extent(s, block, &one);
+    best->extent(s, block, &other);
+    base->slab(s, &block, 1, view, &one_slab);
+    best->slab(s, &block, 1, view, &other_slab);
+    ck_assert_mem_eq(&one, &other, sizeof one);
+    ck_assert_mem_eq(&one_slab, &other_slab, sizeof one_slab);
+}
+
+START_TEST(blocks_are_measured_the_same_on_any_processor)
+{
+    query_model m;
+    query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
+                     &query_variants[_i % query_variant_count]);
+    const ebpo_accel *s = m.model->whole;
+    ebpo_slab_view view = { .scale = (float)s->scale, .axis = { 0.5f, -0.75f, 0.25f } };
+    view.rest = 0.125f;
+    for (int k = 0; k < 3; k++)
+        view.high[k] = (float)s->centre[k];
+    for (uint32_t n = 0; n < s->bound_count && !s->wide; n++)
+        for (int lane = 0; lane < s->bound[n].count; lane++)
+            if (s->bound[n].child[lane] & EBPO_IS_BLOCK)
+                same_measures(s, s->bound[n].child[lane] & ~EBPO_IS_BLOCK, &view);
+    query_model_free(&m);
+}
+END_TEST
+
 /* --- kernels --- */
 
 enum { KEPT = 64 };
@@ -261,6 +295,8 @@ Suite *test_suite(void)
     TCase *bounds = tcase_create("bounds");
     tcase_set_timeout(bounds, 600);
     tcase_add_loop_test(bounds, boxes_and_slabs_contain_their_faces, 0, query_solid_count());
+    tcase_add_loop_test(bounds, blocks_are_measured_the_same_on_any_processor, 0,
+                        query_solid_count());
     tcase_add_loop_test(bounds, kernels_for_any_processor_answer_the_same, 0, query_solid_count());
     suite_add_tcase(suite, bounds);
     return suite;
