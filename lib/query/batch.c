@@ -58,12 +58,30 @@ uint64_t *ebpo_curve_order(const ebpo_box *box, const double *points, uint64_t c
     return order;
 }
 
+/* Points in no order are asked about along the curve also where everything is in memory: what one
+ * reads the next one finds in the caches, and its answer is close. A path is in order already. */
+static bool scattered(const ebpo_box *box, const double *points, uint64_t count)
+{
+    const double far = 0x1p-5;
+    double sum = 0;
+    for (uint64_t i = 1; i < count; i++) {
+        double most = 0;
+        for (int k = 0; k < 3; k++)
+            most = fmax(most, fabs(points[3 * i + (unsigned)k] - points[3 * i + (unsigned)k - 3]) /
+                                  box->size[k]);
+        sum += most;
+    }
+    return count >= 32 && sum > far * (double)count;
+}
+
 void ebpo_batch_begin(ebpo_batch *b, ebpo_context *context, const double *points, uint64_t count,
                       bool reach)
 {
     const ebpo_model *m = context->model;
     ebpo_box box = ebpo_model_box(m);
     *b = (ebpo_batch){ .context = context, .points = points, .count = count, .reach = reach };
+    if (m->whole && reach && scattered(&box, points, count))
+        b->order = ebpo_curve_order(&box, points, count);
     if (m->whole || count < 2 || m->options.loading != EBPO_LOAD_CACHE)
         return;
     b->order = ebpo_curve_order(&box, points, count);
