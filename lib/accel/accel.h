@@ -24,13 +24,18 @@ typedef enum ebpo_leaf_kind {
     EBPO_LEAF_TWO_PLANES = 2,
     EBPO_LEAF_CONVEX = 3,
     EBPO_LEAF_CONCAVE = 4,
-    EBPO_LEAF_UNKNOWN = 5, /* nobody has asked */
-    EBPO_LEAF_IN_HAND = 6  /* a thread is finding out */
+    EBPO_LEAF_UNKNOWN = 5, /* few have asked: as a general one without a wall */
+    EBPO_LEAF_IN_HAND = 6, /* a thread is finding its wall and the boxes of its list */
+    EBPO_LEAF_WALLED = 7,  /* these are known: to be asked as a general one */
+    EBPO_LEAF_SORTED = 8   /* as before, and a thread is finding the kind */
 } ebpo_leaf_kind;
+/* Finding a wall takes as long as a few answers, finding the kind as dozens of them: they are done
+ * when so many questions have come. */
+enum { EBPO_LEAF_WALL_ASKED = 4, EBPO_LEAF_KIND_ASKED = 128 };
 enum { EBPO_NO_WALL = 6, EBPO_KIND_PLANES_MAX = 16 };
 
 /* A block in a leaf's list, and a box around what its faces may have in the leaf's cell: each axis
- * from 0 to 254, rounded outward; low > high: nothing. Of leaves whose kind is known. Other faces
+ * from 0 to 254, rounded outward; low > high: nothing. Of leaves whose wall is known. Other faces
  * may share the block; `lanes` tells the leaf's own. */
 typedef struct ebpo_listed_block {
     uint32_t block;
@@ -39,24 +44,28 @@ typedef struct ebpo_listed_block {
 } ebpo_listed_block;
 enum { EBPO_LISTED_CELLS = 254 };
 
-/* All from `wall` on is told by ebpo_leaf_know only. */
+/* What ebpo_leaf_ask finds is there once `kind` says so, and does not change then. */
 typedef struct ebpo_accel_leaf {
     uint32_t list; /* its blocks are list[list .. list + blocks - 1] of the subtree */
     uint32_t blocks;
-    _Atomic uint8_t kind; /* ebpo_leaf_kind; of surfaces always EBPO_LEAF_GENERAL */
+    int32_t winding;       /* at the lowest corner, shifted (format-spec, section 5) */
+    _Atomic uint8_t kind;  /* ebpo_leaf_kind; of surfaces always EBPO_LEAF_GENERAL */
+    _Atomic uint8_t asked; /* about how many questions came, until the kind is known */
     /* 2 axis + side (1: upper) of a wall that no face meets, or EBPO_NO_WALL */
     uint8_t wall;
-    /* of kinds other than general: number of planes, from `first_plane` on, filled up to a multiple
-     * of four */
-    uint16_t planes;
-    /* on that wall; without one, or if the kind is unknown: at the lowest corner, shifted
-     * (format-spec, section 5) */
-    int32_t winding;
-    uint32_t first_plane; /* EBPO_KIND_PLANE, in groups of four */
-    /* of kinds other than general: winding number where all planes say "below", elsewhere in the
-     * cell */
+    int8_t wall_step; /* winding number on that wall less the one at the corner */
+    /* of kinds other than general: EBPO_KIND_PLANE, in groups of four; number of planes, filled up
+     * to a multiple of four; winding number where all planes say "below", elsewhere in the cell */
+    uint32_t first_plane;
+    uint32_t planes;
     int32_t inner, outer;
 } ebpo_accel_leaf;
+
+/* False: a general one, of which neither the wall nor the boxes of the list are to be read yet. */
+static inline bool ebpo_leaf_is_walled(ebpo_leaf_kind kind)
+{
+    return kind != EBPO_LEAF_UNKNOWN && kind != EBPO_LEAF_IN_HAND;
+}
 
 /* Four planes n . xi - d in the cell's coordinates (0 .. 1 on each axis), |n0| + |n1| + |n2| = 1;
  * beyond EBPO_PLANE_ERROR the sign is certain. */
@@ -85,6 +94,11 @@ typedef struct ebpo_leaf_kinds {
 static inline ebpo_leaf_kind ebpo_leaf_kind_of(const ebpo_accel_leaf *leaf)
 {
     return (ebpo_leaf_kind)atomic_load_explicit(&leaf->kind, memory_order_acquire);
+}
+
+static inline bool ebpo_leaf_has_planes(ebpo_leaf_kind kind)
+{
+    return kind >= EBPO_LEAF_ONE_PLANE && kind <= EBPO_LEAF_CONCAVE;
 }
 
 /* --- faces --- */
@@ -179,7 +193,8 @@ typedef struct ebpo_accel {
     uint64_t units;
     uint32_t face_count;
     double centre[3], scale;
-    double reach; /* no coordinate of a decoded box is greater, in the frame; 1 at least */
+    float turn_error; /* query/kernels.inc, of blocks of floats */
+    double reach;     /* no coordinate of a decoded box is greater, in the frame; 1 at least */
     ebpo_bound *bound;
     ebpo_bound_slab *slab; /* [bound_count] */
     uint32_t bound_count;
@@ -198,10 +213,10 @@ typedef struct ebpo_accel {
     uint64_t bytes;
 } ebpo_accel;
 
-/* Finds out about a leaf of a solid whose kind is unknown; `low`, `high`: its cell. False when
- * another thread has done it. Without memory the leaf stays a general one. */
-bool ebpo_leaf_know(const ebpo_accel *subtree, ebpo_accel_leaf *leaf, const double low[3],
-                    const double high[3]);
+/* A question has come to a leaf of a solid whose kind is not known. Number EBPO_LEAF_WALL_ASKED
+ * finds its wall and the boxes of its list, number EBPO_LEAF_KIND_ASKED its kind; true when that
+ * was this one. Without memory the leaf stays a general one. */
+bool ebpo_leaf_ask(const ebpo_accel *subtree, ebpo_accel_leaf *leaf, ebpo_cell cell);
 
 /* Makes it from a slice, which is consumed (freed, also on failure). `with_planes`: keep gray
  * nodes' planes. `threads` 0: all cores. */

@@ -13,11 +13,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <sched.h>
-
 #include "base/alloc.h"
 #include "geom/min_max.h"
 #include "geom/predicates.h"
+#include "octree/cells.h"
 #include "accel/accel_parts.h"
 
 enum { FACES_MAX = 64 };
@@ -31,104 +30,52 @@ typedef struct leaf_faces {
     double low[3], size[3], inverse[3];
 } leaf_faces;
 
-/* The boxes of a block's faces, and those that meet the cell. */
-typedef struct block_boxes {
-    double least[3][EBPO_BLOCK], most[3][EBPO_BLOCK];
-    unsigned near; /* a bit for each face */
-} block_boxes;
+/* --- the faces in a leaf --- */
 
-/* Finds which of the faces listed in a block have boxes that meet the cell, and which walls these
- * boxes come to (bit 2 axis + side). Exact comparisons. */
-static void bound_block(const ebpo_accel *s, const ebpo_listed_block *listed, const double low[3],
-                        const double high[3], block_boxes *out, unsigned *walls)
+static bool meets_cell(const double t[3][3], const double low[3], const double high[3])
 {
-    const ebpo_meshlet *m = ebpo_accel_meshlet(s, listed->block);
-    int away[EBPO_BLOCK] = { 0 }, touches[EBPO_BLOCK] = { 0 };
-    for (unsigned k = 0; k < 3; k++) {
-        double x[3][EBPO_BLOCK];
-        for (unsigned i = 0; i < 3; i++)
-            for (unsigned lane = 0; lane < EBPO_BLOCK; lane++) {
-                unsigned at = ebpo_meshlet_vertex(m, lane, i) + k * m->vertices;
-                x[i][lane] =
-                    s->wide ? ebpo_meshlet_doubles(m)[at] : (double)ebpo_meshlet_floats(m)[at];
-            }
-        for (int lane = 0; lane < EBPO_BLOCK; lane++) {
-            double least = ebpo_min3(x[0][lane], x[1][lane], x[2][lane]),
-                   most = ebpo_max3(x[0][lane], x[1][lane], x[2][lane]);
-            out->least[k][lane] = least;
-            out->most[k][lane] = most;
-            away[lane] |= (least > high[k]) | (most < low[k]);
-            touches[lane] |= (least <= low[k]) << 2 * k | (most >= high[k]) << (2 * k + 1);
-        }
-    }
-    out->near = 0;
-    for (int lane = 0; lane < EBPO_BLOCK; lane++) {
-        bool near = listed->lanes >> lane & 1 && !away[lane];
-        out->near |= (unsigned)near << lane;
-        *walls |= near ? (unsigned)touches[lane] : 0;
-    }
+    for (int k = 0; k < 3; k++)
+        if (ebpo_min3(t[0][k], t[1][k], t[2][k]) > high[k] ||
+            ebpo_max3(t[0][k], t[1][k], t[2][k]) < low[k])
+            return false;
+    return true;
 }
 
-/* A coordinate in the cell, 0 .. EBPO_LISTED_CELLS, widened by far more than the rounding here and
- * in those that ask (2^-40). */
-static uint8_t listed(double x, double low, double inverse, double widening)
+static void add_face(uint32_t slot, const double t[3][3], leaf_faces *f)
 {
-    double cells = (x - low) * inverse * EBPO_LISTED_CELLS + widening;
-    return cells < 0 ? 0 : cells < 255 ? (uint8_t)cells : 255;
-}
-
-static void set_listed_box(ebpo_listed_block *out, const block_boxes *b, const double low[3],
-                           const double inverse[3])
-{
-    for (int k = 0; k < 3; k++) {
-        double least = INFINITY, most = -INFINITY;
-        for (int lane = 0; lane < EBPO_BLOCK; lane++)
-            if (b->near >> lane & 1) {
-                least = b->least[k][lane] < least ? b->least[k][lane] : least;
-                most = b->most[k][lane] > most ? b->most[k][lane] : most;
-            }
-        out->low[k] = b->near ? listed(least, low[k], inverse[k], -0x1p-8) : 255;
-        out->high[k] = b->near ? listed(most, low[k], inverse[k], 0x1p-8) : 0;
-    }
-}
-
-static void add_face(const ebpo_accel *s, uint32_t slot, leaf_faces *f)
-{
-    double t[3][3];
-    ebpo_accel_triangle(s, slot, t);
     for (int i = 0; i < 9; i++)
         f->p[f->count][i / 3][i % 3] = (t[i / 3][i % 3] - f->low[i % 3]) * f->inverse[i % 3];
     f->slot[f->count++] = slot;
 }
 
-/* Gathers the faces whose boxes meet the cell, the walls that they come to, and the boxes of the
- * list. False when they are not to be had: too many, or a cell too small for what follows. */
-static bool gather(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const double low[3],
-                   const double high[3], leaf_faces *f, unsigned *walls)
+/* Gathers the faces whose boxes meet the cell. False when they are not to be had: too many, or a
+ * cell too small for what follows. */
+static bool gather(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_cell cell, leaf_faces *f)
 {
-    bool fine = true;
+    double low[3], high[3];
+    ebpo_cell_bounds(&s->box, cell, low, high);
     f->count = 0;
-    *walls = 0;
     for (int k = 0; k < 3; k++) {
         f->low[k] = low[k];
         f->size[k] = high[k] - low[k];
         f->inverse[k] = 1 / f->size[k];
-        fine = fine && f->size[k] > 0x1p-900;
+        if (!(f->size[k] > 0x1p-900))
+            return false;
     }
-    bool few = fine;
     for (uint32_t b = 0; b < leaf->blocks; b++) {
-        ebpo_listed_block *block = &s->list[leaf->list + b];
-        block_boxes boxes;
-        bound_block(s, block, low, high, &boxes, walls);
-        if (fine)
-            set_listed_box(block, &boxes, low, f->inverse);
-        for (unsigned near = boxes.near; near && few; near &= near - 1) {
-            few = f->count < FACES_MAX;
-            if (few)
-                add_face(s, block->block * EBPO_BLOCK + (unsigned)__builtin_ctz(near), f);
+        const ebpo_listed_block *block = &s->list[leaf->list + b];
+        for (unsigned lanes = block->lanes; lanes; lanes &= lanes - 1) {
+            uint32_t slot = block->block * EBPO_BLOCK + (unsigned)__builtin_ctz(lanes);
+            double t[3][3];
+            ebpo_accel_triangle(s, slot, t);
+            if (!meets_cell((const double(*)[3])t, low, high))
+                continue;
+            if (f->count == FACES_MAX)
+                return false;
+            add_face(slot, (const double(*)[3])t, f);
         }
     }
-    return few;
+    return true;
 }
 
 /* Crossings of the leaf's faces with a segment along an axis. */
@@ -147,17 +94,18 @@ static int32_t crossings(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const
     return sum;
 }
 
-/* From the lowest corner to any shifted point of the cell, axis by axis. */
-static int32_t winding_at(const ebpo_accel *s, const ebpo_accel_leaf *leaf, int32_t at_corner,
-                          const double low[3], const double p[3])
+/* At any shifted point of the cell: from the lowest corner, axis by axis. */
+static int32_t winding_at(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const double low[3],
+                          const double p[3])
 {
     double from[3] = { low[0], low[1], low[2] };
+    int32_t winding = leaf->winding;
     for (int axis = 0; axis < 3; axis++) {
         if (p[axis] > from[axis])
-            at_corner += crossings(s, leaf, from, p[axis], axis);
+            winding += crossings(s, leaf, from, p[axis], axis);
         from[axis] = p[axis];
     }
-    return at_corner;
+    return winding;
 }
 
 typedef struct plane {
@@ -284,8 +232,8 @@ static double within_cell(double x) { return x < 0 ? 0 : x > 1 ? 1 : x; }
 
 /* Winding numbers in P and in the rest of the cell, from the cell's corners and, if none of them is
  * in P, from a point near the middle of the faces. False when that does not decide it. */
-static bool find_windings(const ebpo_accel *s, ebpo_accel_leaf *leaf, int32_t at_corner,
-                          const leaf_faces *f, const plane *planes, int count, int flip)
+static bool find_windings(const ebpo_accel *s, ebpo_accel_leaf *leaf, const leaf_faces *f,
+                          const plane *planes, int count, int flip)
 {
     bool have_inner = false, have_outer = false, certain;
     for (unsigned corner = 0; corner < 8; corner++) {
@@ -295,7 +243,7 @@ static bool find_windings(const ebpo_accel *s, ebpo_accel_leaf *leaf, int32_t at
             return false;
         for (int k = 0; k < 3; k++)
             p[k] = f->low[k] + xi[k] * f->size[k];
-        int32_t w = winding_at(s, leaf, at_corner, f->low, p);
+        int32_t w = winding_at(s, leaf, f->low, p);
         int32_t *known = below ? &leaf->inner : &leaf->outer;
         bool *have = below ? &have_inner : &have_outer;
         if (*have && *known != w)
@@ -316,7 +264,7 @@ static bool find_windings(const ebpo_accel *s, ebpo_accel_leaf *leaf, int32_t at
         }
         if (!below_all(planes, count, flip, xi, &certain) || !certain)
             return false;
-        leaf->inner = winding_at(s, leaf, at_corner, f->low, p);
+        leaf->inner = winding_at(s, leaf, f->low, p);
     }
     return have_outer;
 }
@@ -392,7 +340,7 @@ static ebpo_leaf_kind keep_planes(ebpo_leaf_kinds *kinds, ebpo_accel_leaf *leaf,
             to[i / 4].n[k][i % 4] = (float)(flip * q->n[k]);
         to[i / 4].d[i % 4] = (float)(flip * q->d);
     }
-    leaf->planes = (uint16_t)count;
+    leaf->planes = (uint32_t)count;
     return count == 1   ? EBPO_LEAF_ONE_PLANE
            : count == 2 ? EBPO_LEAF_TWO_PLANES
            : flip > 0   ? EBPO_LEAF_CONVEX
@@ -410,41 +358,74 @@ static uint8_t choose_wall(unsigned walls)
     return open ? (uint8_t)__builtin_ctz(open) : EBPO_NO_WALL;
 }
 
-static ebpo_leaf_kind classify(const ebpo_accel *s, ebpo_accel_leaf *leaf, const double low[3],
-                               const double high[3])
+static ebpo_leaf_kind classify(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell)
 {
     leaf_faces f;
     plane planes[EBPO_KIND_PLANES_MAX];
     int flip = 1, count = 0;
-    int32_t at_corner = leaf->winding;
-    unsigned walls;
-    bool few = gather(s, leaf, low, high, &f, &walls);
-    leaf->wall = choose_wall(walls);
-    if (leaf->wall != EBPO_NO_WALL && leaf->wall % 2) {
-        double p[3] = { low[0], low[1], low[2] };
-        p[leaf->wall / 2] = high[leaf->wall / 2];
-        leaf->winding = winding_at(s, leaf, at_corner, low, p);
-    }
-    if (few && f.count)
+    if (gather(s, leaf, cell, &f) && f.count)
         count = collect_planes(s, &f, planes, &flip);
-    return count && find_windings(s, leaf, at_corner, &f, planes, count, flip)
+    return count && find_windings(s, leaf, &f, planes, count, flip)
                ? keep_planes(s->kinds, leaf, planes, count, flip)
                : EBPO_LEAF_GENERAL;
 }
 
-bool ebpo_leaf_know(const ebpo_accel *s, ebpo_accel_leaf *leaf, const double low[3],
-                    const double high[3])
+/* Its wall, the winding number there, and the boxes of its list. */
+static void bound(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell)
 {
-    uint8_t unknown = EBPO_LEAF_UNKNOWN;
-    if (!atomic_compare_exchange_strong(&leaf->kind, &unknown, EBPO_LEAF_IN_HAND)) {
-        while (ebpo_leaf_kind_of(leaf) == EBPO_LEAF_IN_HAND) /* a microsecond of another thread's */
-            sched_yield();
-        return false;
+    uint8_t wall = choose_wall(ebpo_leaf_bound(s, leaf, cell));
+    int32_t step = 0;
+    if (wall != EBPO_NO_WALL && wall % 2) {
+        double low[3], high[3];
+        ebpo_cell_bounds(&s->box, cell, low, high);
+        step = crossings(s, leaf, low, high[wall / 2], wall / 2);
     }
-    ebpo_leaf_kind kind = classify(s, leaf, low, high);
+    bool small = step >= INT8_MIN && step <= INT8_MAX;
+    leaf->wall = small ? wall : EBPO_NO_WALL;
+    leaf->wall_step = (int8_t)(small ? step : 0);
+}
+
+static bool begin(ebpo_accel_leaf *leaf, ebpo_leaf_kind from, ebpo_leaf_kind to)
+{
+    uint8_t expected = (uint8_t)from;
+    return atomic_compare_exchange_strong(&leaf->kind, &expected, (uint8_t)to);
+}
+
+static void end(ebpo_accel_leaf *leaf, ebpo_leaf_kind kind)
+{
+    atomic_store_explicit(&leaf->kind, (uint8_t)kind, memory_order_release);
+}
+
+static void find_wall(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell)
+{
+    if (begin(leaf, EBPO_LEAF_UNKNOWN, EBPO_LEAF_IN_HAND)) {
+        bound(s, leaf, cell);
+        end(leaf, EBPO_LEAF_WALLED);
+    }
+}
+
+static bool find_kind(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell)
+{
+    if (!begin(leaf, EBPO_LEAF_WALLED, EBPO_LEAF_SORTED))
+        return false;
+    ebpo_leaf_kind kind = classify(s, leaf, cell);
     atomic_fetch_add(&s->kinds->of_kind[kind], 1);
     if (kind == EBPO_LEAF_GENERAL && leaf->wall != EBPO_NO_WALL)
         atomic_fetch_add(&s->kinds->one_wall, 1);
-    atomic_store_explicit(&leaf->kind, (uint8_t)kind, memory_order_release);
+    end(leaf, kind);
     return true;
+}
+
+bool ebpo_leaf_ask(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell)
+{
+    /* threads may count over each other: things are found a little later then */
+    int asked = atomic_load_explicit(&leaf->asked, memory_order_relaxed) + 1;
+    bool found = false;
+    if (asked >= EBPO_LEAF_WALL_ASKED)
+        find_wall(s, leaf, cell);
+    if (asked >= EBPO_LEAF_KIND_ASKED)
+        found = find_kind(s, leaf, cell);
+    else
+        atomic_store_explicit(&leaf->asked, (uint8_t)asked, memory_order_relaxed);
+    return found;
 }

@@ -22,6 +22,17 @@ static bool needs_doubles(const ebpo_info *info)
     return info->double_coordinates || !(most < 0x1p40) || !(least > 0x1p-40);
 }
 
+/* What floats lose of a cross product of differences of coordinates, with room to spare. */
+static double turn_error(const ebpo_box *box)
+{
+    double reach = 0, size = 0;
+    for (int k = 0; k < 3; k++) {
+        reach = fmax(reach, fmax(fabs(box->origin[k]), fabs(box->origin[k] + box->size[k])));
+        size = fmax(size, box->size[k]);
+    }
+    return 0x1p-43 * reach * size;
+}
+
 static void make_frame(ebpo_accel *s)
 {
     double most = 0, low[3], high[3];
@@ -32,6 +43,7 @@ static void make_frame(ebpo_accel *s)
     }
     int exponent;
     frexp(most, &exponent);
+    s->turn_error = (float)turn_error(&s->box);
     s->scale = ldexp(1, exponent < -1000 ? 1000 : exponent > 1000 ? -1000 : 1 - exponent);
 }
 

@@ -59,7 +59,6 @@ static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank
     w->s->list_count += leaf->blocks;
     w->refs[depth] += refs;
     leaf->kind = w->s->solid ? EBPO_LEAF_UNKNOWN : EBPO_LEAF_GENERAL;
-    leaf->wall = EBPO_NO_WALL;
     leaf->winding = level->leaf_winding ? level->leaf_winding[rank] : 0;
 }
 

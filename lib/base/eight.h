@@ -216,6 +216,10 @@ EBPO_EIGHT float f8_least(f8 a)
     __m128 x = _mm_min_ps(_mm256_castps256_ps128(a), _mm256_extractf128_ps(a, 1));
     x = _mm_min_ps(x, _mm_movehl_ps(x, x));
     return _mm_cvtss_f32(_mm_min_ss(x, _mm_movehdup_ps(x)));
+#elif defined(__SSE2__)
+    __m128 x = _mm_min_ps(a.half[0], a.half[1]);
+    x = _mm_min_ps(x, _mm_movehl_ps(x, x));
+    return _mm_cvtss_f32(_mm_min_ss(x, _mm_shuffle_ps(x, x, 1)));
 #else
     float least = a.half[0][0];
     for (int i = 1; i < 8; i++)

@@ -21,3 +21,12 @@ double ebpo_cell_volume(const ebpo_box *box, int level)
     double cells = (double)(1u << level);
     return box->size[0] / cells * (box->size[1] / cells) * (box->size[2] / cells);
 }
+
+bool ebpo_locator_decide(const ebpo_locator *l, const double p[3], ebpo_position *out)
+{
+    if (!ebpo_locate(&l->box, l->level, p, out->at))
+        return false;
+    for (int k = 0; k < 3; k++)
+        out->cells[k] = (p[k] - l->box.origin[k]) / l->box.size[k] * (2 * l->half);
+    return true;
+}

@@ -119,6 +119,45 @@ static inline bool ebpo_locate(const ebpo_box *box, int level, const double p[3]
     return true;
 }
 
+/* What finds the cells of one level, made once: most points need no division and no wall. */
+typedef struct ebpo_locator {
+    ebpo_box box;
+    int level;
+    double scale[3], half; /* cells in a unit; half of all cells of an axis */
+} ebpo_locator;
+
+/* A point's place in the grid of that level. */
+typedef struct ebpo_position {
+    uint32_t at[3];  /* its cell */
+    double cells[3]; /* its coordinates in cells, right to 2^-30 */
+} ebpo_position;
+
+static inline ebpo_locator ebpo_locator_make(const ebpo_box *box, int level)
+{
+    ebpo_locator l = { .box = *box, .level = level, .half = (double)(1u << level) / 2 };
+    for (int k = 0; k < 3; k++)
+        l.scale[k] = 2 * l.half / box->size[k]; /* infinite for boxes of almost no size */
+    return l;
+}
+
+/* Near a wall, or outside. */
+bool ebpo_locator_decide(const ebpo_locator *locator, const double p[3], ebpo_position *out);
+
+/* As ebpo_locate. */
+static inline bool ebpo_locator_find(const ebpo_locator *l, const double p[3], ebpo_position *out)
+{
+    bool sure = true;
+    for (int k = 0; k < 3; k++) {
+        double cells = (p[k] - l->box.origin[k]) * l->scale[k];
+        bool within = __builtin_fabs(cells - l->half) < l->half;
+        int32_t i = within ? (int32_t)cells : 0;
+        sure &= within & (__builtin_fabs(cells - (double)i - 0.5) < 0.5 - 0x1p-30);
+        out->cells[k] = cells;
+        out->at[k] = (uint32_t)i;
+    }
+    return __builtin_expect(sure, 1) || ebpo_locator_decide(l, p, out);
+}
+
 /* From the cell's coordinates to the model's. A point on a wall (`sides`: ebpo_polytope_sides) gets
  * the wall's own coordinate, so that neighbouring cells agree to the last bit. */
 static inline double ebpo_wall_point(const ebpo_box *box, ebpo_cell cell, int axis, double xi,

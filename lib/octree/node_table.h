@@ -102,7 +102,11 @@ static inline ebpo_descent ebpo_descent_begin(const ebpo_node_table *table, int 
     if (!table->grid)
         return (ebpo_descent){ table->root, table->root_level };
     uint64_t cell = ebpo_grid_cell(table, fine_level, at);
-    return (ebpo_descent){ table->grid[cell], table->root_level + table->grid_depth[cell] };
+    uint32_t entry = table->grid[cell];
+    /* most gray ones are of the grid's own level: a cache line less */
+    bool deep = ebpo_entry_kind_of(entry) == EBPO_ENTRY_GRAY;
+    int depth = deep ? table->grid_bits : table->grid_depth[cell];
+    return (ebpo_descent){ entry, table->root_level + depth };
 }
 
 /* One level down; false where there is none. */

@@ -1,8 +1,8 @@
 /* Point in solid, exact. */
 #include "geom/strict_fp.h"
 
-#include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/alloc.h"
 #include "base/error.h"
@@ -35,42 +35,40 @@ static bool cross(const ebpo_kernels *kernels, const ebpo_accel *s, const ebpo_a
 
 /* A point in a leaf's cell. */
 typedef struct in_leaf {
-    double low[3], high[3]; /* the cell */
-    double xi[3];           /* the point in it, 0 .. 1, rounded */
-    uint8_t cell[3];        /* and in the unit of ebpo_listed_block */
+    ebpo_cell leaf;
+    double xi[3];    /* the point in it, 0 .. 1, right to 2^-30 */
+    uint8_t cell[3]; /* and in the unit of ebpo_listed_block */
 } in_leaf;
 
-static uint8_t listed_cell(double xi)
+static inline void find_in_leaf(int fine, int level, const ebpo_position *place, in_leaf *out)
 {
-    double cells = xi * EBPO_LISTED_CELLS;
-    /* no number, as cells of no size give: 255, which meets the boxes of such cells */
-    return cells < 0 ? 0 : cells < 255 ? (uint8_t)cells : 255;
-}
-
-static void find_in_leaf(const ebpo_accel *s, ebpo_cell cell, const double p[3], in_leaf *out)
-{
-    ebpo_cell_bounds(&s->box, cell, out->low, out->high);
+    int up = fine - level;
+    double size = ebpo_half_power(up);
+    out->leaf.level = level;
     for (int k = 0; k < 3; k++) {
-        out->xi[k] = (p[k] - out->low[k]) * (1 / (out->high[k] - out->low[k]));
-        out->cell[k] = listed_cell(out->xi[k]);
+        out->leaf.at[k] = place->at[k] >> up;
+        out->xi[k] = (place->cells[k] - (double)(out->leaf.at[k] << up)) * size;
+        out->cell[k] = (uint8_t)(int)(out->xi[k] * EBPO_LISTED_CELLS);
     }
 }
 
 /* From the leaf's free wall to the point. */
-static ebpo_axis_segment wall_segment(const ebpo_accel_leaf *leaf, const in_leaf *i,
+static ebpo_axis_segment wall_segment(const ebpo_box *box, uint8_t wall, const in_leaf *i,
                                       const double p[3])
 {
-    int axis = leaf->wall / 2;
+    int axis = wall / 2;
     ebpo_axis_segment g = { { p[0], p[1], p[2] },
                             p[axis],
                             axis,
                             { i->cell[0], i->cell[1], i->cell[2] },
-                            { i->cell[0], i->cell[1], i->cell[2] } };
-    if (leaf->wall % 2) {
-        g.to = i->high[axis];
+                            { i->cell[0], i->cell[1], i->cell[2] },
+                            false };
+    double end = ebpo_wall(box, axis, i->leaf.level, i->leaf.at[axis] + wall % 2);
+    if (wall % 2) {
+        g.to = end;
         g.high[axis] = 255;
     } else {
-        g.from[axis] = i->low[axis];
+        g.from[axis] = end;
         g.low[axis] = 0;
     }
     return g;
@@ -80,21 +78,23 @@ static ebpo_axis_segment wall_segment(const ebpo_accel_leaf *leaf, const in_leaf
 static bool from_wall(const ebpo_kernels *kernels, const ebpo_accel *s, const ebpo_accel_leaf *leaf,
                       const in_leaf *i, const double p[3], uint32_t *open, int32_t *winding)
 {
-    ebpo_axis_segment g = wall_segment(leaf, i, p);
+    ebpo_axis_segment g = wall_segment(&s->box, leaf->wall, i, p);
     int32_t sum;
     if (!cross(kernels, s, leaf, &g, p, open, &sum))
         return false;
-    *winding = leaf->wall % 2 ? leaf->winding - sum : leaf->winding + sum;
+    *winding = leaf->winding + leaf->wall_step + (leaf->wall % 2 ? -sum : sum);
     return true;
 }
 
 /* Three segments from the lowest corner: format-spec, section 5. Faces that the point lies on come
- * up in the last one. */
+ * up in the last one. `boxed`: the boxes of the leaf's list are known. */
 static bool from_corner(const ebpo_kernels *kernels, const ebpo_accel *s,
-                        const ebpo_accel_leaf *leaf, const in_leaf *i, const double p[3],
-                        uint32_t *open, int32_t *winding)
+                        const ebpo_accel_leaf *leaf, bool boxed, const in_leaf *i,
+                        const double p[3], uint32_t *open, int32_t *winding)
 {
-    ebpo_axis_segment g = { { i->low[0], i->low[1], i->low[2] }, 0, 0, { 0, 0, 0 }, { 0, 0, 0 } };
+    double low[3], high[3];
+    ebpo_cell_bounds(&s->box, i->leaf, low, high);
+    ebpo_axis_segment g = { { low[0], low[1], low[2] }, 0, 0, { 0, 0, 0 }, { 0, 0, 0 }, !boxed };
     *winding = leaf->winding;
     for (int axis = 0; axis < 3; axis++) {
         int32_t sum;
@@ -110,93 +110,122 @@ static bool from_corner(const ebpo_kernels *kernels, const ebpo_accel *s,
     return true;
 }
 
+typedef float four_floats __attribute__((vector_size(16)));
+typedef int32_t four_signs __attribute__((vector_size(16)));
+
+static inline bool any(four_signs mask)
+{
+    uint64_t half[2];
+    memcpy(half, &mask, sizeof half);
+    return half[0] | half[1];
+}
+
 /* Signs of the planes alone; false when one is too close to tell. */
 static bool from_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const in_leaf *in,
                         int32_t *winding)
 {
-    float xi[3] = { (float)in->xi[0], (float)in->xi[1], (float)in->xi[2] }, most = -INFINITY;
-    const ebpo_four_planes *first = EBPO_KIND_PLANE(s->kinds, leaf->first_plane);
-    for (int i = 0; i < leaf->planes; i += 4) {
-        const ebpo_four_planes *q = first + i / 4;
-        for (int j = 0; j < 4; j++) {
-            float value = q->n[0][j] * xi[0] + q->n[1][j] * xi[1] + q->n[2][j] * xi[2] - q->d[j];
-            most = value > most ? value : most;
-        }
+    float x = (float)in->xi[0], y = (float)in->xi[1], z = (float)in->xi[2];
+    const ebpo_four_planes *q = EBPO_KIND_PLANE(s->kinds, leaf->first_plane);
+    four_signs above = { 0 }, near = { 0 };
+    for (int left = leaf->planes; left > 0; left -= 4, q++) {
+        four_floats n[3], d;
+        memcpy(n, q->n, sizeof n);
+        memcpy(&d, q->d, sizeof d);
+        four_floats value = n[0] * x + n[1] * y + n[2] * z - d;
+        above |= value > EBPO_PLANE_ERROR;
+        near |= value >= -EBPO_PLANE_ERROR;
     }
-    if (most > EBPO_PLANE_ERROR) {
+    if (any(above)) {
         *winding = leaf->outer;
         return true;
     }
     *winding = leaf->inner;
-    return most < -EBPO_PLANE_ERROR;
+    return !any(near);
 }
 
-/* What a leaf is like is found out when the first question comes to it. */
-static ebpo_leaf_kind kind_of(const ebpo_context *context, const ebpo_accel *s,
-                              ebpo_accel_leaf *leaf, const in_leaf *i)
+/* What a leaf is like is found out when questions come to it. */
+static __attribute__((noinline)) ebpo_leaf_kind ask_kind(const ebpo_context *context,
+                                                         const ebpo_accel *s, ebpo_accel_leaf *leaf,
+                                                         const in_leaf *i)
 {
-    ebpo_leaf_kind kind = ebpo_leaf_kind_of(leaf);
-    if (kind < EBPO_LEAF_UNKNOWN)
-        return kind;
-    if (ebpo_leaf_know(s, leaf, i->low, i->high))
+    if (ebpo_leaf_ask(s, leaf, i->leaf))
         ebpo_model_count_kind(context->model, leaf);
     return ebpo_leaf_kind_of(leaf);
+}
+
+static inline ebpo_leaf_kind kind_of(const ebpo_context *context, const ebpo_accel *s,
+                                     ebpo_accel_leaf *leaf, const in_leaf *i)
+{
+    ebpo_leaf_kind kind = ebpo_leaf_kind_of(leaf);
+    return kind <= EBPO_LEAF_CONCAVE ? kind : ask_kind(context, s, leaf, i);
+}
+
+static inline void give(const ebpo_context *context, int32_t winding, ebpo_inside_result *out)
+{
+    *out = (ebpo_inside_result){ ebpo_rule_inside(context->model->info->rule, winding) ? EBPO_IN
+                                                                                       : EBPO_OUT,
+                                 winding, 0 };
+}
+
+/* By crossing faces. */
+static ebpo_status answer_by_faces(ebpo_context *context, const ebpo_accel *s,
+                                   const ebpo_accel_leaf *leaf, bool walled, const in_leaf *i,
+                                   const double p[3], ebpo_inside_result *out, ebpo_error *error)
+{
+    const ebpo_kernels *kernels = context->model->kernels;
+    uint64_t most = (uint64_t)leaf->blocks * EBPO_BLOCK;
+    int32_t winding;
+    if (most > context->open_capacity &&
+        !ebpo_grow(&context->open, &context->open_capacity, most, sizeof *context->open))
+        return ebpo_fail_memory(error, most * sizeof *context->open);
+    bool off = walled && leaf->wall != EBPO_NO_WALL
+                   ? from_wall(kernels, s, leaf, i, p, context->open, &winding)
+                   : from_corner(kernels, s, leaf, walled, i, p, context->open, &winding);
+    if (off)
+        give(context, winding, out);
+    else
+        *out = (ebpo_inside_result){ EBPO_ON, 0, 0 };
+    return EBPO_OK;
 }
 
 static ebpo_status answer_in_leaf(ebpo_context *context, const ebpo_accel *s, ebpo_accel_leaf *leaf,
                                   const in_leaf *i, const double p[3], ebpo_inside_result *out,
                                   ebpo_error *error)
 {
-    const ebpo_model *m = context->model;
-    if (!ebpo_grow(&context->open, &context->open_capacity, (uint64_t)leaf->blocks * EBPO_BLOCK,
-                   sizeof *context->open))
-        return ebpo_fail_memory(error, (uint64_t)leaf->blocks * EBPO_BLOCK * sizeof *context->open);
     int32_t winding;
-    bool off =
-        kind_of(context, s, leaf, i) != EBPO_LEAF_GENERAL && from_planes(s, leaf, i, &winding);
-    if (!off)
-        off = leaf->wall != EBPO_NO_WALL
-                  ? from_wall(m->kernels, s, leaf, i, p, context->open, &winding)
-                  : from_corner(m->kernels, s, leaf, i, p, context->open, &winding);
-    if (!off) {
-        *out = (ebpo_inside_result){ EBPO_ON, 0, 0 };
-        return EBPO_OK;
-    }
-    *out = (ebpo_inside_result){ ebpo_rule_inside(m->info->rule, winding) ? EBPO_IN : EBPO_OUT,
-                                 winding, 0 };
+    ebpo_leaf_kind kind = kind_of(context, s, leaf, i);
+    if (!ebpo_leaf_has_planes(kind) || !from_planes(s, leaf, i, &winding))
+        return answer_by_faces(context, s, leaf, ebpo_leaf_is_walled(kind), i, p, out, error);
+    give(context, winding, out);
     return EBPO_OK;
 }
 
-ebpo_status ebpo_inside_leaf(ebpo_context *context, const ebpo_accel *s, uint32_t number,
-                             ebpo_cell cell, const double p[3], ebpo_inside_result *out,
+ebpo_status ebpo_inside_leaf(ebpo_context *context, const ebpo_accel *s, uint32_t number, int level,
+                             const ebpo_position *place, const double p[3], ebpo_inside_result *out,
                              ebpo_error *error)
 {
     in_leaf i;
-    find_in_leaf(s, cell, p, &i);
+    find_in_leaf(context->model->locator.level, level, place, &i);
     return answer_in_leaf(context, s, &s->leaf[number], &i, p, out, error);
 }
 
 void ebpo_inside_uniform(const ebpo_context *context, uint32_t entry, ebpo_inside_result *out)
 {
-    int32_t winding = ebpo_entry_winding(entry);
-    *out = (ebpo_inside_result){ ebpo_rule_inside(context->model->info->rule, winding) ? EBPO_IN
-                                                                                       : EBPO_OUT,
-                                 winding, 0 };
+    give(context, ebpo_entry_winding(entry), out);
 }
 
-ebpo_status ebpo_inside_subtree(ebpo_context *context, const ebpo_accel *s, const uint32_t at[3],
-                                const double p[3], ebpo_inside_result *out, ebpo_error *error)
+ebpo_status ebpo_inside_subtree(ebpo_context *context, const ebpo_accel *s,
+                                const ebpo_position *place, const double p[3],
+                                ebpo_inside_result *out, ebpo_error *error)
 {
-    int fine = context->model->info->level_count - 1;
-    ebpo_descent d = ebpo_descend(&s->nodes, fine, at);
+    ebpo_descent d = ebpo_descend(&s->nodes, context->model->locator.level, place->at);
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_UNIFORM) {
         ebpo_inside_uniform(context, d.entry, out);
         return EBPO_OK;
     }
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_BELOW)
         return ebpo_inside_pruned(context, p, out, error);
-    return ebpo_inside_leaf(context, s, ebpo_entry_value(d.entry), ebpo_descent_cell(&d, fine, at),
-                            p, out, error);
+    return ebpo_inside_leaf(context, s, ebpo_entry_value(d.entry), d.level, place, p, out, error);
 }
 
 /* Several points at a time, stage by stage, so that the memory that one stage needs is on its way
@@ -204,7 +233,7 @@ ebpo_status ebpo_inside_subtree(ebpo_context *context, const ebpo_accel *s, cons
 enum { TOGETHER = 16 };
 
 typedef struct lane {
-    uint32_t at[3];
+    ebpo_position place;
     bool within;
     ebpo_descent d;
 } lane;
@@ -216,20 +245,20 @@ typedef struct waiting {
     in_leaf in;
 } waiting;
 
-static void start_lanes(const ebpo_accel *s, int fine, const double *points, unsigned count,
-                        lane *l)
+static void start_lanes(const ebpo_accel *s, const ebpo_locator *locator, const double *points,
+                        unsigned count, lane *l)
 {
+    int fine = locator->level;
     for (unsigned i = 0; i < count; i++) {
-        l[i].within = ebpo_locate(&s->box, fine, points + 3 * i, l[i].at);
+        l[i].within = ebpo_locator_find(locator, points + 3 * i, &l[i].place);
         if (l[i].within && s->nodes.grid) {
-            uint64_t cell = ebpo_grid_cell(&s->nodes, fine, l[i].at);
+            uint64_t cell = ebpo_grid_cell(&s->nodes, fine, l[i].place.at);
             __builtin_prefetch(&s->nodes.grid[cell]);
-            __builtin_prefetch(&s->nodes.grid_depth[cell]);
         }
     }
     for (unsigned i = 0; i < count; i++)
         if (l[i].within) {
-            l[i].d = ebpo_descent_begin(&s->nodes, fine, l[i].at);
+            l[i].d = ebpo_descent_begin(&s->nodes, fine, l[i].place.at);
             ebpo_descent_prefetch(&l[i].d, &s->nodes);
         }
 }
@@ -239,7 +268,7 @@ static void descend_together(const ebpo_accel *s, int fine, unsigned count, lane
     for (bool more = true; more;) {
         more = false;
         for (unsigned i = 0; i < count; i++)
-            if (l[i].within && ebpo_descent_step(&l[i].d, &s->nodes, fine, l[i].at))
+            if (l[i].within && ebpo_descent_step(&l[i].d, &s->nodes, fine, l[i].place.at))
                 more |= ebpo_descent_prefetch(&l[i].d, &s->nodes);
     }
 }
@@ -248,11 +277,12 @@ static void descend_together(const ebpo_accel *s, int fine, unsigned count, lane
 static void prefetch_blocks(const ebpo_accel *s, const waiting *w, const double p[3])
 {
     const ebpo_accel_leaf *leaf = w->leaf;
-    ebpo_axis_segment g = { .high = { 255, 255, 255 } };
-    if (ebpo_leaf_kind_of(leaf) != EBPO_LEAF_GENERAL)
+    ebpo_leaf_kind kind = ebpo_leaf_kind_of(leaf);
+    ebpo_axis_segment g = { .everywhere = true };
+    if (ebpo_leaf_has_planes(kind))
         return;
-    if (leaf->wall != EBPO_NO_WALL)
-        g = wall_segment(leaf, &w->in, p);
+    if (ebpo_leaf_is_walled(kind) && leaf->wall != EBPO_NO_WALL)
+        g = wall_segment(&s->box, leaf->wall, &w->in, p);
     for (uint32_t b = 0; b < leaf->blocks && b < 8; b++)
         if (ebpo_axis_segment_meets(&g, &s->list[leaf->list + b]))
             for (int line = 0; line < (s->wide ? 4 : 2); line++)
@@ -266,7 +296,7 @@ static ebpo_status answer_waiting(ebpo_context *context, const ebpo_accel *s, co
 {
     for (unsigned i = 0; i < count; i++) {
         __builtin_prefetch(s->list + w[i].leaf->list);
-        if (kind_of(context, s, w[i].leaf, &w[i].in) != EBPO_LEAF_GENERAL)
+        if (ebpo_leaf_has_planes(ebpo_leaf_kind_of(w[i].leaf)))
             __builtin_prefetch(EBPO_KIND_PLANE(s->kinds, w[i].leaf->first_plane));
     }
     for (unsigned i = 0; i < count; i++)
@@ -284,8 +314,8 @@ static ebpo_status inside_together(ebpo_context *context, const ebpo_accel *s, c
     lane l[TOGETHER];
     waiting w[TOGETHER];
     unsigned leaves = 0;
-    int fine = context->model->info->level_count - 1;
-    start_lanes(s, fine, points, count, l);
+    int fine = context->model->locator.level;
+    start_lanes(s, &context->model->locator, points, count, l);
     descend_together(s, fine, count, l);
     for (unsigned i = 0; i < count; i++) {
         if (!l[i].within) {
@@ -300,8 +330,7 @@ static ebpo_status inside_together(ebpo_context *context, const ebpo_accel *s, c
             w[leaves].leaf = &s->leaf[ebpo_entry_value(l[i].d.entry)];
             w[leaves].point = i;
             __builtin_prefetch(w[leaves].leaf);
-            find_in_leaf(s, ebpo_descent_cell(&l[i].d, fine, l[i].at), points + 3 * i,
-                         &w[leaves].in);
+            find_in_leaf(fine, l[i].d.level, &l[i].place, &w[leaves].in);
             leaves++;
         }
     }
@@ -314,9 +343,9 @@ ebpo_status ebpo_inside_whole(ebpo_context *context, const double *points, uint6
     const ebpo_accel *s = context->model->whole;
     ebpo_status status = EBPO_OK;
     if (count == 1) {
-        uint32_t at[3];
-        if (ebpo_locate(&s->box, context->model->info->level_count - 1, points, at))
-            return ebpo_inside_subtree(context, s, at, points, out, error);
+        ebpo_position place;
+        if (ebpo_locator_find(&context->model->locator, points, &place))
+            return ebpo_inside_subtree(context, s, &place, points, out, error);
         *out = (ebpo_inside_result){ EBPO_OUT, 0, 0 };
         return EBPO_OK;
     }

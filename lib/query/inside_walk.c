@@ -29,7 +29,7 @@ typedef struct asking {
     bool envelopes;
     uint64_t deadline; /* 0: none */
     const double *p;
-    uint32_t at[3]; /* p's cell at the deepest level */
+    ebpo_position place;
 } asking;
 
 static void maybe(const asking *a, ebpo_cell cell, ebpo_inside_result *out)
@@ -76,12 +76,12 @@ static ebpo_status walk_down(asking *a, ebpo_inside_result *out, ebpo_error *err
             if (status != EBPO_OK)
                 return status;
             if (!a->envelopes && a->options->level < 0 && !a->deadline)
-                return ebpo_inside_subtree(a->context, node.subtree, a->at, a->p, out, error);
+                return ebpo_inside_subtree(a->context, node.subtree, &a->place, a->p, out, error);
         }
         if (ebpo_entry_kind_of(node.entry) == EBPO_ENTRY_LEAF)
             return ebpo_inside_leaf(a->context, node.subtree, ebpo_entry_value(node.entry),
-                                    node.cell, a->p, out, error);
-        node = ebpo_model_child(m, &node, ebpo_octant_at(a->at, fine - node.cell.level - 1));
+                                    node.cell.level, &a->place, a->p, out, error);
+        node = ebpo_model_child(m, &node, ebpo_octant_at(a->place.at, fine - node.cell.level - 1));
     }
 }
 
@@ -102,7 +102,7 @@ static ebpo_status leaf_from_file(asking *a, const ebpo_node *leaf, ebpo_inside_
     if (status == EBPO_OK) {
         ebpo_model_count_leaves(m, subtree, 1);
         status = ebpo_inside_leaf(a->context, subtree, ebpo_entry_value(subtree->nodes.root),
-                                  leaf->cell, a->p, out, error);
+                                  leaf->cell.level, &a->place, a->p, out, error);
         ebpo_model_count_leaves(m, subtree, -1);
         ebpo_accel_free(subtree);
     }
@@ -153,7 +153,8 @@ static ebpo_status pass_gray(asking *a, ebpo_cursor *c, bool *done, ebpo_inside_
         return status;
     *done = !child;
     if (child)
-        ebpo_cursor_down(c, ebpo_octant_at(a->at, m->info->level_count - 2 - node->cell.level));
+        ebpo_cursor_down(c,
+                         ebpo_octant_at(a->place.at, m->info->level_count - 2 - node->cell.level));
     else if (limited || is_late(a))
         maybe(a, node->cell, out);
     else
@@ -202,7 +203,7 @@ static ebpo_status walk_nodes(asking *a, ebpo_inside_result *out, ebpo_error *er
             maybe(a, node.cell, out);
             return EBPO_OK;
         }
-        node = ebpo_model_child(m, &node, ebpo_octant_at(a->at, fine - node.cell.level - 1));
+        node = ebpo_model_child(m, &node, ebpo_octant_at(a->place.at, fine - node.cell.level - 1));
     }
     return walk_file(a, &node, out, error);
 }
@@ -215,7 +216,8 @@ static const ebpo_accel *held_around(const asking *a, uint32_t *entry)
     *entry = ebpo_entry(EBPO_ENTRY_BELOW, 0);
     if (c->model->whole)
         return c->model->whole;
-    *entry = ebpo_descend(&c->model->top->nodes, c->model->info->level_count - 1, a->at).entry;
+    *entry =
+        ebpo_descend(&c->model->top->nodes, c->model->info->level_count - 1, a->place.at).entry;
     bool below = ebpo_entry_kind_of(*entry) == EBPO_ENTRY_BELOW;
     return below && ebpo_context_has_pinned(c, ebpo_entry_value(*entry)) ? c->pinned : NULL;
 }
@@ -236,21 +238,21 @@ static bool answer_at_hand(asking *a, ebpo_inside_result *out, ebpo_status *stat
     if (!held)
         return false;
     if (!a->deadline) {
-        *status = ebpo_inside_subtree(a->context, held, a->at, a->p, out, error);
+        *status = ebpo_inside_subtree(a->context, held, &a->place, a->p, out, error);
         return true;
     }
     int fine = m->info->level_count - 1;
-    ebpo_descent d = ebpo_descend(&held->nodes, fine, a->at);
+    ebpo_descent d = ebpo_descend(&held->nodes, fine, a->place.at);
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_BELOW)
         return false; /* pruned: envelopes may tell */
-    ebpo_cell cell = ebpo_descent_cell(&d, fine, a->at);
+    ebpo_cell cell = ebpo_descent_cell(&d, fine, a->place.at);
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_UNIFORM)
         ebpo_inside_uniform(a->context, d.entry, out);
     else if (ebpo_clock() > a->deadline)
         maybe(a, cell, out);
     else
-        *status =
-            ebpo_inside_leaf(a->context, held, ebpo_entry_value(d.entry), cell, a->p, out, error);
+        *status = ebpo_inside_leaf(a->context, held, ebpo_entry_value(d.entry), d.level, &a->place,
+                                   a->p, out, error);
     return true;
 }
 
@@ -262,7 +264,7 @@ ebpo_status ebpo_inside_pruned(ebpo_context *context, const double p[3], ebpo_in
     asking a = {
         .context = context, .options = &options, .box = ebpo_model_box(m), .envelopes = true, .p = p
     };
-    if (!ebpo_locate(&a.box, m->info->level_count - 1, p, a.at))
+    if (!ebpo_locator_find(&m->locator, p, &a.place))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "a point outside the root cell has no node");
     ebpo_status status = walk_down(&a, out, error);
     if (status == EBPO_OK && out->where == EBPO_OUT &&
@@ -283,7 +285,7 @@ ebpo_status ebpo_inside_walk(ebpo_context *context, const double p[3],
                  .p = p };
     if (options->deadline_ns)
         a.deadline = ebpo_clock() + options->deadline_ns;
-    if (!ebpo_locate(&a.box, m->info->level_count - 1, p, a.at)) {
+    if (!ebpo_locator_find(&m->locator, p, &a.place)) {
         *out = (ebpo_inside_result){ EBPO_OUT, 0, 0 };
         return EBPO_OK;
     }

@@ -16,13 +16,15 @@ typedef struct ebpo_axis_segment {
     int axis;
     /* its box in the leaf's cell, in the unit of ebpo_listed_block, rounded down */
     uint8_t low[3], high[3];
+    bool everywhere; /* the boxes of the list are not known */
 } ebpo_axis_segment;
 
 /* False when nothing that the block has in the cell can meet the segment. */
 static inline bool ebpo_axis_segment_meets(const ebpo_axis_segment *g, const ebpo_listed_block *b)
 {
-    return (g->high[0] >= b->low[0]) & (g->low[0] <= b->high[0]) & (g->high[1] >= b->low[1]) &
-           (g->low[1] <= b->high[1]) & (g->high[2] >= b->low[2]) & (g->low[2] <= b->high[2]);
+    return g->everywhere ||
+           ((g->high[0] >= b->low[0]) & (g->low[0] <= b->high[0]) & (g->high[1] >= b->low[1]) &
+            (g->low[1] <= b->high[1]) & (g->high[2] >= b->low[2]) & (g->low[2] <= b->high[2]));
 }
 
 typedef struct ebpo_kernels {

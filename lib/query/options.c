@@ -97,9 +97,29 @@ ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64
     return status;
 }
 
+/* Nothing to be checked but the point, and all in memory. */
+static inline bool is_plain(const ebpo_context *context, const ebpo_inside_options *o)
+{
+    return context->model->answers_inside &&
+           (!o || (o->struct_size == sizeof *o && o->level == EBPO_LEVEL_ALL &&
+                   o->envelopes == EBPO_ENVELOPES_AUTO && !o->deadline_ns));
+}
+
+static ebpo_status inside_plain(ebpo_context *context, const double point[3],
+                                ebpo_inside_result *out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_position place;
+    if (ebpo_locator_find(&context->model->locator, point, &place))
+        return ebpo_inside_subtree(context, context->model->whole, &place, point, out, error);
+    *out = (ebpo_inside_result){ EBPO_OUT, 0, 0 };
+    return ebpo_check_points(point, 1, error);
+}
+
 ebpo_status ebpo_inside(ebpo_context *context, const double point[3],
                         const ebpo_inside_options *options, ebpo_inside_result *out,
                         ebpo_error *error)
 {
-    return ebpo_inside_many(context, point, 1, options, out, error);
+    return is_plain(context, options) ? inside_plain(context, point, out, error)
+                                      : ebpo_inside_many(context, point, 1, options, out, error);
 }

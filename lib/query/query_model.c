@@ -157,6 +157,8 @@ ebpo_status ebpo_model_new(const ebpo_file *file, const ebpo_model_options *opti
     uint64_t begin = ebpo_clock();
     m->file = file;
     m->info = ebpo_file_info(file);
+    ebpo_box box = ebpo_root_box(m->info);
+    m->locator = ebpo_locator_make(&box, m->info->level_count - 1);
     m->options = wanted;
     m->kernels = ebpo_kernels_best();
     m->default_memory = ebpo_usual_memory(file, &m->options);
@@ -165,6 +167,7 @@ ebpo_status ebpo_model_new(const ebpo_file *file, const ebpo_model_options *opti
         ebpo_model_free(m);
         return status;
     }
+    m->answers_inside = m->whole && m->info->solid && m->info->parts & EBPO_PART_MESH;
     m->open_seconds = (double)(ebpo_clock() - begin) * 1e-9;
     *out = m;
     return EBPO_OK;

@@ -8,6 +8,7 @@
 #include "cache/cache.h"
 #include "container/reader.h"
 #include "container/slice.h"
+#include "octree/cells.h"
 #include "octree/rule.h"
 #include "query/kernels.h"
 #include "query/query_top.h"
@@ -17,11 +18,13 @@
 struct ebpo_model {
     const ebpo_file *file;
     const ebpo_info *info;
+    ebpo_locator locator; /* of the deepest level's cells */
     ebpo_model_options options;
     bool default_memory; /* nobody asked for a budget, but the file is far away */
     const ebpo_kernels *kernels;
-    ebpo_accel *whole; /* everything, or NULL: */
-    ebpo_top *top;     /* levels 0 .. cut level */
+    ebpo_accel *whole;   /* everything, or NULL: */
+    bool answers_inside; /* of a solid and with the mesh, whole */
+    ebpo_top *top;       /* levels 0 .. cut level */
     ebpo_chunks *chunks;
     ebpo_cache *cache;         /* subtrees by their number in the top */
     ebpo_skeletons *skeletons; /* of those that have been loaded; or NULL */

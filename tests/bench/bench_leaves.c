@@ -40,13 +40,12 @@ static void fail(const ebpo_error *error)
     exit(EXIT_FAILURE);
 }
 
-/* Of all leaves, as if each had been asked about. */
+/* Of all leaves, as if each had been asked about often. */
 static void know_below(const ebpo_accel *s, const ebpo_node *node)
 {
-    double low[3], high[3];
-    ebpo_cell_bounds(&s->box, node->cell, low, high);
-    if (ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_LEAF)
-        (void)ebpo_leaf_know(s, &s->leaf[ebpo_entry_value(node->entry)], low, high);
+    for (int i = 0; i < EBPO_LEAF_KIND_ASKED && ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_LEAF;
+         i++)
+        (void)ebpo_leaf_ask(s, &s->leaf[ebpo_entry_value(node->entry)], node->cell);
     for (unsigned octant = 0; octant < 8 && node->type == EBPO_GRAY && !node->pruned; octant++) {
         ebpo_node child = ebpo_accel_child(s, node, octant);
         know_below(s, &child);

@@ -203,7 +203,7 @@ typedef struct ebpo_model_stats {
     double load_seconds;
 
     /*
-     * Leaves in memory, and of those that questions have come to, how many of each kind:
+     * Leaves in memory, and of those that many questions have come to, how many of each kind:
      * general, one plane, two planes, convex set, concave set.
      */
     uint64_t leaves, leaves_of_kind[5];
