@@ -21,7 +21,7 @@ import sys
 
 import measured
 from measured import MIB, Failed
-from query import Page, figure, ratio
+from query_page import Page, figure, ratio
 
 BUDGET_OF_QUESTIONS = 256 * MIB
 OPENINGS = 5

@@ -1,9 +1,13 @@
 // What the peers' programs have in common: command line, PLY, points, clocks, one line of JSON.
 //
-// A peer is a class with: `static constexpr int doubles` (of one point: 3; of one ray: 6),
-// `answer_type`, and
-//     peer(bool warm); void load(const char *path); void build(); answer_type answer(const double
-//     *point);
+// A peer has a class for each structure that it asks: inside, distance, rays (any may be void),
+// with `static constexpr int doubles` (of one point: 3; of one ray: 6), `answer_type`, and
+//     void load(const char *path); void build();
+//     void begin(const job &); answer_type answer(const double *point);
+//     void answer_all(const double *points, uint64_t count, answer_type *);
+//     uint64_t bytes(); // of memory, beside the mesh as it was read; 0: not known
+//     void tell(); // prints more members of a JSON object
+// Of these `usual` has the last three.
 #ifndef EBPO_BENCH_PEER_HPP
 #define EBPO_BENCH_PEER_HPP
 
@@ -18,10 +22,13 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <iostream>
+#include <iterator>
+#include <memory>
 #include <numeric>
+#include <sstream>
 #include <stdexcept>
 #include <string>
-#include <type_traits>
 #include <vector>
 
 namespace bench
@@ -31,20 +38,32 @@ namespace bench
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
               "the peers' programs read little-endian numbers as they are");
 
-struct settings {
-    std::string model, query, points, answers;
+// Questions of one kind: QUERY POINTS.raw, then options.
+struct job {
+    std::string query, points, answers;
     uint64_t count = UINT64_MAX;
-    bool cold = false, warm = false;
+    double tmax = INFINITY; // where rays end
+    bool warm = false;      // distance: search no farther than the last answer allows
+    bool clocked = false;   // each question by the clock
+    bool batch = false;     // all in one call
+    bool base = false;      // without what only newer processors have
+    bool plain = false;     // distance: without sign
 };
 
-// Where rays end.
-inline double tmax = INFINITY;
+struct settings {
+    std::string model;
+    job one;
+    bool cold = false;
+};
 
 // Nothing will be asked: the quality that Embree has by default, as a build that is done often.
 inline bool only_building = false;
 
 // For building; where the peer can use more than one. 0: all cores.
 inline unsigned threads = 1;
+
+// Of ours: bytes that the model may take. 0: as many as it needs.
+inline uint64_t memory = 0;
 
 // What is written to --answers: for inside one byte, 1 inside and 0 outside; for the others 16
 // bytes.
@@ -252,153 +271,265 @@ void write_answers(const std::string &path, const std::vector<Answer> &answers)
 
 struct build_times {
     uint64_t start;
-    double load, build; // seconds
+    double load, build, load_cpu, build_cpu; // seconds
 };
 
 template <class Peer> build_times timed_build(Peer &peer, const settings &s)
 {
     if (s.cold)
         drop_from_memory(s.model);
-    uint64_t start = nanoseconds();
+    uint64_t start = nanoseconds(), cpu = nanoseconds(CLOCK_PROCESS_CPUTIME_ID);
     peer.load(s.model.c_str());
-    uint64_t loaded = nanoseconds();
+    uint64_t loaded = nanoseconds(), loaded_cpu = nanoseconds(CLOCK_PROCESS_CPUTIME_ID);
     peer.build();
-    return { start, (double)(loaded - start) * 1e-9, (double)(nanoseconds() - loaded) * 1e-9 };
+    return { start, (double)(loaded - start) * 1e-9, (double)(nanoseconds() - loaded) * 1e-9,
+             (double)(loaded_cpu - cpu) * 1e-9,
+             (double)(nanoseconds(CLOCK_PROCESS_CPUTIME_ID) - loaded_cpu) * 1e-9 };
+}
+
+template <class Peer> void print_build(const build_times &took, uint64_t bytes)
+{
+    printf("{\"peer\": \"%s\", \"threads\": %u, \"load_s\": %.6f, \"build_s\": %.6f, "
+           "\"load_cpu_s\": %.6f, \"build_cpu_s\": %.6f, \"bytes\": %" PRIu64 ", \"peak_mb\": %.1f",
+           Peer::name, threads, took.load, took.build, took.load_cpu, took.build_cpu, bytes,
+           peak_megabytes());
+}
+
+struct usual {
+    uint64_t bytes() const { return 0; }
+    void tell() const {}
+    template <class Answer> void answer_all(const double *, uint64_t, Answer *)
+    {
+        throw std::runtime_error("this peer answers questions one by one");
+    }
+};
+
+// Ascending times, without the clock's own.
+template <class Peer, class Answer>
+std::vector<uint64_t> answer_clocked(Peer &peer, const double *points, std::vector<Answer> &answers)
+{
+    std::vector<uint64_t> times(answers.size());
+    uint64_t cost = clock_cost();
+    for (uint64_t i = 0; i < times.size(); i++) {
+        uint64_t before = nanoseconds();
+        answers[i] = peer.answer(&points[i * Peer::doubles]);
+        uint64_t took = nanoseconds() - before;
+        times[i] = took > cost ? took - cost : 0;
+    }
+    std::sort(times.begin(), times.end());
+    return times;
+}
+
+inline void print_clocked(const std::vector<uint64_t> &times)
+{
+    printf(", \"clocked_mean_ns\": %.1f, \"p50_ns\": %" PRIu64 ", \"p99_ns\": %" PRIu64
+           ", \"p999_ns\": %" PRIu64 ", \"max_ns\": %" PRIu64,
+           std::accumulate(times.begin(), times.end(), 0.0) / (double)times.size(),
+           quantile(times, 0.5), quantile(times, 0.99), quantile(times, 0.999), times.back());
+}
+
+// Prints members of a JSON object.
+template <class Peer> void ask(Peer &peer, const job &j)
+{
+    std::vector<double> points = read_points(j.points, j.count, Peer::doubles);
+    uint64_t count = points.size() / Peer::doubles;
+    std::vector<typename Peer::answer_type> answers(count);
+    std::vector<uint64_t> times;
+    peer.begin(j);
+    uint64_t wall = nanoseconds(), cpu = nanoseconds(CLOCK_THREAD_CPUTIME_ID);
+    if (j.clocked)
+        times = answer_clocked(peer, points.data(), answers);
+    else if (j.batch)
+        peer.answer_all(points.data(), count, answers.data());
+    else
+        for (uint64_t i = 0; i < count; i++)
+            answers[i] = peer.answer(&points[i * Peer::doubles]);
+    cpu = nanoseconds(CLOCK_THREAD_CPUTIME_ID) - cpu;
+    wall = nanoseconds() - wall;
+    printf(", \"query\": \"%s\", \"count\": %" PRIu64 ", \"mean_ns\": %.1f, \"mean_cpu_ns\": %.1f",
+           j.query.c_str(), count, (double)wall / (double)count, (double)cpu / (double)count);
+    peer.tell();
+    if (!times.empty())
+        print_clocked(times);
+    if (!j.answers.empty())
+        write_answers(j.answers, answers);
 }
 
 template <class Peer> void run(const settings &s)
 {
-    std::vector<double> point = read_points(s.points, 1, Peer::doubles);
-    Peer peer(s.warm);
+    std::vector<double> point = read_points(s.one.points, 1, Peer::doubles);
+    Peer peer;
     build_times took = timed_build(peer, s);
+    peer.begin(s.one);
     volatile auto first = peer.answer(point.data());
     (void)first;
     uint64_t answered = nanoseconds();
-    double peak = peak_megabytes();
-
-    point = read_points(s.points, s.count, Peer::doubles);
-    uint64_t count = point.size() / Peer::doubles;
-    std::vector<typename Peer::answer_type> answers(count);
-    std::vector<uint64_t> times(count);
-    uint64_t wall = nanoseconds(), processor = nanoseconds(CLOCK_THREAD_CPUTIME_ID);
-    for (uint64_t i = 0; i < count; i++)
-        answers[i] = peer.answer(&point[i * Peer::doubles]);
-    processor = nanoseconds(CLOCK_THREAD_CPUTIME_ID) - processor;
-    wall = nanoseconds() - wall;
-
-    uint64_t cost = clock_cost();
-    for (uint64_t i = 0; i < count; i++) {
-        uint64_t before = nanoseconds();
-        answers[i] = peer.answer(&point[i * Peer::doubles]);
-        uint64_t took = nanoseconds() - before;
-        times[i] = took > cost ? took - cost : 0;
-    }
-    double clocked = std::accumulate(times.begin(), times.end(), 0.0) / (double)count;
-    std::sort(times.begin(), times.end());
-    if (!s.answers.empty())
-        write_answers(s.answers, answers);
-    printf("{\"peer\": \"%s\", \"query\": \"%s\", \"warm\": %s, \"points\": %" PRIu64
-           ", \"load_s\": %.6f, \"build_s\": %.6f, "
-           "\"first_answer_s\": %.6f, \"mean_ns\": %.1f, \"mean_cpu_ns\": %.1f, "
-           "\"clocked_mean_ns\": %.1f, \"p50_ns\": %" PRIu64 ", \"p99_ns\": %" PRIu64
-           ", \"p999_ns\": %" PRIu64 ", \"max_ns\": %" PRIu64 ", \"clock_ns\": %" PRIu64
-           ", \"peak_mb\": %.1f}\n",
-           Peer::name, s.query.c_str(), s.warm ? "true" : "false", count, took.load, took.build,
-           (double)(answered - took.start) * 1e-9, (double)wall / (double)count,
-           (double)processor / (double)count, clocked, quantile(times, 0.5), quantile(times, 0.99),
-           quantile(times, 0.999), times.back(), cost, peak);
+    print_build<Peer>(took, peer.bytes());
+    printf(", \"first_answer_s\": %.6f", (double)(answered - took.start) * 1e-9);
+    ask(peer, s.one);
+    printf("}\n");
 }
 
 // Only loads and builds.
 template <class Peer> void run_build(const settings &s)
 {
-    Peer peer(s.warm);
+    Peer peer;
     build_times took = timed_build(peer, s);
-    printf("{\"peer\": \"%s\", \"query\": \"build\", \"threads\": %u, \"load_s\": %.6f, "
-           "\"build_s\": %.6f, \"peak_mb\": %.1f}\n",
-           Peer::name, threads, took.load, took.build, peak_megabytes());
+    print_build<Peer>(took, peer.bytes());
+    printf("}\n");
 }
 
-inline bool parse(int argc, char **argv, settings &s)
+inline bool is_query(const std::string &word)
 {
-    std::vector<std::string> words;
-    for (int i = 1; i < argc; i++) {
-        std::string word = argv[i];
-        if (word == "--cold")
-            s.cold = true;
-        else if (word == "--warm")
-            s.warm = true;
-        else if (word == "--count" && i + 1 < argc)
-            s.count = strtoull(argv[++i], nullptr, 10);
-        else if (word == "--threads" && i + 1 < argc)
-            threads = (unsigned)strtoul(argv[++i], nullptr, 10);
-        else if (word == "--tmax" && i + 1 < argc)
-            tmax = strtod(argv[++i], nullptr);
-        else if (word == "--answers" && i + 1 < argc)
-            s.answers = argv[++i];
-        else if (word.rfind("--", 0) == 0)
-            return false;
-        else
-            words.push_back(word);
-    }
-    if (words.size() == 2 && words[1] == "build")
-        words.push_back("");
-    if (words.size() != 3 || !s.count)
-        return false;
-    s.model = words[0], s.query = words[1], s.points = words[2];
-    for (const char *known : { "inside", "distance", "ray", "ray-any", "ray-all", "build" })
-        if (s.query == known)
+    for (const char *known : { "inside", "distance", "ray", "ray-any", "ray-all" })
+        if (word == known)
             return true;
     return false;
 }
 
-// void: the peer is not asked that.
-template <class Peer> void run_if_any(const settings &s)
+// An option of a job; `value` is the next word, or "".
+inline bool parse_job(const std::string &word, const std::string &value, job &j, bool &took)
 {
-    if constexpr (std::is_void_v<Peer>)
-        throw std::runtime_error("this peer does not answer " + s.query);
+    bool *flags[] = { &j.warm, &j.clocked, &j.batch, &j.base, &j.plain };
+    const char *const names[] = { "--warm", "--clocked", "--batch", "--base", "--unsigned" };
+    for (int i = 0; i < 5; i++)
+        if (word == names[i])
+            return *flags[i] = true;
+    took = !value.empty();
+    if (word == "--count" && took)
+        return (j.count = strtoull(value.c_str(), nullptr, 10)) > 0;
+    if (word == "--tmax" && took)
+        j.tmax = strtod(value.c_str(), nullptr);
+    else if (word == "--answers" && took)
+        j.answers = value;
     else
-        run<Peer>(s);
+        return false;
+    return true;
 }
 
-template <class Inside, class Distance, class Ray, class Any = void, class All = void>
-int main(int argc, char **argv)
+inline bool parse(const std::vector<std::string> &in, settings &s, std::vector<std::string> &words)
+{
+    for (size_t i = 0; i < in.size(); i++) {
+        std::string value = i + 1 < in.size() ? in[i + 1] : "";
+        bool took = false;
+        if (in[i] == "--cold")
+            s.cold = true;
+        else if (in[i] == "--threads" && !value.empty())
+            threads = (unsigned)strtoul(in[++i].c_str(), nullptr, 10);
+        else if (in[i] == "--memory" && !value.empty())
+            memory = strtoull(in[++i].c_str(), nullptr, 10);
+        else if (in[i].rfind("--", 0) != 0)
+            words.push_back(in[i]);
+        else if (!parse_job(in[i], value, s.one, took))
+            return false;
+        else
+            i += took;
+    }
+    return true;
+}
+
+inline std::vector<std::string> split(const std::string &line)
+{
+    std::istringstream in(line);
+    return { std::istream_iterator<std::string>(in), {} };
+}
+
+// Jobs as lines of the standard input, until it ends; a line of JSON for each. What they ask is
+// built when it is first asked, and kept until something else is asked.
+template <class Inside, class Distance, class Rays> class server
+{
+  public:
+    explicit server(const settings &s) : base(s) {}
+    void run()
+    {
+        for (std::string line; std::getline(std::cin, line);) {
+            settings s;
+            std::vector<std::string> words;
+            if (!parse(split(line), s, words) || words.size() != 2 || !is_query(words[0]))
+                throw std::runtime_error("not a job: " + line);
+            s.one.query = words[0], s.one.points = words[1];
+            if (s.one.query == "inside")
+                one<Inside>(s.one, inside);
+            else if (s.one.query == "distance")
+                one<Distance>(s.one, distance);
+            else
+                one<Rays>(s.one, rays);
+            fflush(stdout);
+        }
+    }
+
+  private:
+    template <class Peer> void one(const job &j, std::unique_ptr<Peer> &peer)
+    {
+        if (!peer) {
+            inside.reset(), distance.reset(), rays.reset();
+            peer = std::make_unique<Peer>();
+            took = timed_build(*peer, base);
+        }
+        print_build<Peer>(took, peer->bytes());
+        ask(*peer, j);
+        printf("}\n");
+    }
+
+    settings base;
+    build_times took = {};
+    std::unique_ptr<Inside> inside;
+    std::unique_ptr<Distance> distance;
+    std::unique_ptr<Rays> rays;
+};
+
+template <class Inside, class Distance, class Rays>
+bool work(const settings &s, const std::vector<std::string> &words)
+{
+    if (words.size() == 2 && words[1] == "serve")
+        server<Inside, Distance, Rays>(s).run();
+    else if (words.size() == 2 && words[1] == "build") {
+        only_building = true;
+        run_build<Rays>(s);
+    } else if (words.size() != 3 || !is_query(words[1]))
+        return false;
+    else if (words[1] == "inside")
+        run<Inside>(s);
+    else if (words[1] == "distance")
+        run<Distance>(s);
+    else
+        run<Rays>(s);
+    return true;
+}
+
+template <class Inside, class Distance, class Rays> int main(int argc, char **argv)
 {
     settings s;
-    if (!parse(argc, argv, s)) {
-        fprintf(
-            stderr,
-            "usage: %s MODEL.ply inside|distance|ray|ray-any|ray-all POINTS.raw [--count N] "
-            "[--warm] [--cold] [--tmax T] [--answers FILE]\n"
-            "       %s MODEL.ply build [--threads N] [--cold]\n"
-            "POINTS.raw: little-endian doubles, x y z for each point; rays: origin and direction.\n"
-            "--tmax T  rays end at origin + T direction\n"
-            "--warm  distance: search no farther than the last answer allows\n"
-            "--cold  ask the system to drop MODEL.ply from its cache first\n"
-            "build    only load and build what rays need; --threads 0: on all cores, where the "
-            "peer can\n",
-            argv[0], argv[0]);
-        return 2;
-    }
+    std::vector<std::string> words;
     try {
-        if (s.query == "inside")
-            run<Inside>(s);
-        else if (s.query == "distance")
-            run<Distance>(s);
-        else if (s.query == "ray-any")
-            run_if_any<Any>(s);
-        else if (s.query == "ray-all")
-            run_if_any<All>(s);
-        else if (s.query == "build") {
-            only_building = true;
-            run_build<Ray>(s);
-        } else
-            run<Ray>(s);
+        if (parse({ argv + 1, argv + argc }, s, words) && words.size() >= 2) {
+            s.model = words[0], s.one.query = words[1];
+            s.one.points = words.size() > 2 ? words[2] : "";
+            if (work<Inside, Distance, Rays>(s, words))
+                return 0;
+        }
     } catch (const std::exception &error) {
         fprintf(stderr, "%s: %s\n", argv[0], error.what());
         return 1;
     }
-    return 0;
+    fprintf(stderr,
+            "usage: %s MODEL inside|distance|ray|ray-any|ray-all POINTS.raw [--count N] [--warm] "
+            "[--unsigned] [--base] [--batch] [--clocked] [--tmax T] [--answers FILE] [--cold]\n"
+            "       %s MODEL build [--threads N] [--cold]\n"
+            "       %s MODEL serve [--threads N] [--memory BYTES]\n"
+            "POINTS.raw: little-endian doubles, x y z for each point; rays: origin and direction.\n"
+            "--tmax T  rays end at origin + T direction\n"
+            "--warm  distance: search no farther than the last answer allows\n"
+            "--batch, --base, --unsigned  ours: all in one call; without what only newer "
+            "processors have; distance without sign\n"
+            "--clocked  each question by the clock\n"
+            "--memory  ours: what the model may take\n"
+            "--cold  ask the system to drop MODEL from its cache first\n"
+            "build    only load and build what rays need; --threads 0: on all cores, where the "
+            "peer can\n"
+            "serve    what the first line has after MODEL, from lines of the standard input\n",
+            argv[0], argv[0], argv[0]);
+    return 2;
 }
 
 } // namespace bench

@@ -23,14 +23,14 @@ using point_3 = kernel::Point_3;
 
 // ---- inside ----
 
-class inside
+class inside : public bench::usual
 {
   public:
     static constexpr const char *name = "cgal";
     static constexpr int doubles = 3;
     using answer_type = uint8_t;
 
-    explicit inside(bool) {}
+    void begin(const bench::job &) {}
 
     void load(const char *path)
     {
@@ -92,14 +92,14 @@ triangle_list read_triangles(const char *path)
     return out;
 }
 
-class distance
+class distance : public bench::usual
 {
   public:
     static constexpr const char *name = "cgal";
     static constexpr int doubles = 3;
     using answer_type = bench::hit;
 
-    explicit distance(bool warm_) : warm(warm_) {}
+    void begin(const bench::job &job) { warm = job.warm; }
     void load(const char *path) { triangles = read_triangles(path); }
 
     void build()
@@ -121,20 +121,24 @@ class distance
     }
 
   private:
-    bool warm;
+    bool warm = false;
     triangle_list triangles;
     triangle_tree tree;
     triangle_tree::Point_and_primitive_id last;
 };
 
-class first_hit
+class first_hit : public bench::usual
 {
   public:
     static constexpr const char *name = "cgal";
     static constexpr int doubles = 6;
     using answer_type = bench::hit;
 
-    explicit first_hit(bool) {}
+    void begin(const bench::job &job)
+    {
+        if (job.query != "ray")
+            throw std::runtime_error("this peer does not answer " + job.query);
+    }
     void load(const char *path) { triangles = read_triangles(path); }
 
     void build()

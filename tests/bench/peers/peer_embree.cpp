@@ -5,6 +5,7 @@
 // any, and all by a filter function, robust scene of high quality.
 #include <embree3/rtcore.h>
 
+#include <atomic>
 #include <cmath>
 
 #include "peer.hpp"
@@ -20,6 +21,7 @@ class scene
         : device(rtcNewDevice(("threads=" + std::to_string(bench::threads)).c_str())),
           handle(rtcNewScene(device))
     {
+        rtcSetDeviceMemoryMonitorFunction(device, count_bytes, &bytes);
         rtcSetSceneFlags(handle, flags);
         rtcSetSceneBuildQuality(handle, quality);
     }
@@ -53,6 +55,13 @@ class scene
             throw std::runtime_error("Embree cannot build");
     }
 
+    static bool count_bytes(void *into, ssize_t more, bool)
+    {
+        *(std::atomic<uint64_t> *)into += (uint64_t)more;
+        return true;
+    }
+
+    std::atomic<uint64_t> bytes{ 0 }; // of Embree, beside the mesh
     RTCDevice device;
     RTCScene handle;
     bench::mesh<float> triangles;
@@ -71,7 +80,7 @@ void count_and_go_on(const RTCFilterFunctionNArguments *arguments)
     arguments->valid[0] = 0;
 }
 
-class inside
+class inside : public bench::usual
 {
   public:
     static constexpr const char *name = "embree";
@@ -80,13 +89,15 @@ class inside
 
     // Splits in space would put a face into two leaves, and its hit would count twice: no build of
     // high quality.
-    explicit inside(bool) : tree(RTC_SCENE_FLAG_ROBUST, RTC_BUILD_QUALITY_MEDIUM)
+    inside() : tree(RTC_SCENE_FLAG_ROBUST, RTC_BUILD_QUALITY_MEDIUM)
     {
         if (!rtcGetDeviceProperty(tree.device, RTC_DEVICE_PROPERTY_FILTER_FUNCTION_SUPPORTED))
             throw std::runtime_error("this Embree has no filter functions");
     }
     void load(const char *path) { tree.load(path); }
     void build() { tree.build(count_and_go_on); }
+    void begin(const bench::job &) {}
+    uint64_t bytes() const { return tree.bytes; }
 
     uint8_t answer(const double *point)
     {
@@ -173,7 +184,7 @@ bool visit(RTCPointQueryFunctionArguments *arguments)
     return true;
 }
 
-class distance
+class distance : public bench::usual
 {
   public:
     static constexpr const char *name = "embree";
@@ -182,12 +193,15 @@ class distance
 
     // Compact: measured faster (5 to 25 %) and half the memory; a build of high quality takes three
     // times as long and gains nothing here.
-    explicit distance(bool warm_)
-        : tree(RTC_SCENE_FLAG_COMPACT, RTC_BUILD_QUALITY_MEDIUM), warm(warm_)
-    {
-    }
+    distance() : tree(RTC_SCENE_FLAG_COMPACT, RTC_BUILD_QUALITY_MEDIUM) {}
     void load(const char *path) { tree.load(path); }
     void build() { tree.build(nullptr); }
+    void begin(const bench::job &job)
+    {
+        warm = job.warm;
+        last_distance = INFINITY;
+    }
+    uint64_t bytes() const { return tree.bytes; }
 
     bench::hit answer(const double *point)
     {
@@ -210,75 +224,22 @@ class distance
 
   private:
     scene tree;
-    bool warm;
+    bool warm = false;
     vec last_point = { 0, 0, 0 };
     float last_distance = INFINITY;
 };
 
 // ---- rays ----
 
-RTCRay ray_of(const double *from)
+RTCRay ray_of(const double *from, double tmax)
 {
     RTCRay ray = {};
     ray.org_x = (float)from[0], ray.org_y = (float)from[1], ray.org_z = (float)from[2];
     ray.dir_x = (float)from[3], ray.dir_y = (float)from[4], ray.dir_z = (float)from[5];
-    ray.tfar = (float)bench::tmax;
+    ray.tfar = (float)tmax;
     ray.mask = ~0u;
     return ray;
 }
-
-// High quality is what Embree's authors advise where a scene is built once.
-class ray_peer
-{
-  public:
-    static constexpr const char *name = "embree";
-    static constexpr int doubles = 6;
-    using answer_type = bench::hit;
-
-    explicit ray_peer(bool)
-        : tree(RTC_SCENE_FLAG_ROBUST,
-               bench::only_building ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH)
-    {
-    }
-    void load(const char *path) { tree.load(path); }
-
-  protected:
-    scene tree;
-};
-
-class first_hit : public ray_peer
-{
-  public:
-    using ray_peer::ray_peer;
-    void build() { tree.build(nullptr); }
-
-    bench::hit answer(const double *ray)
-    {
-        RTCIntersectContext context;
-        rtcInitIntersectContext(&context);
-        RTCRayHit r = {};
-        r.ray = ray_of(ray);
-        r.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-        rtcIntersect1(tree.handle, &context, &r);
-        return { r.ray.tfar, r.hit.geomID == RTC_INVALID_GEOMETRY_ID ? -1 : (int64_t)r.hit.primID };
-    }
-};
-
-class any_hit : public ray_peer
-{
-  public:
-    using ray_peer::ray_peer;
-    void build() { tree.build(nullptr); }
-
-    bench::hit answer(const double *from)
-    {
-        RTCIntersectContext context;
-        rtcInitIntersectContext(&context);
-        RTCRay ray = ray_of(from);
-        rtcOccluded1(tree.handle, &context, &ray);
-        return ray.tfar < 0 ? bench::hit{ 0, 0 } : bench::hit{ INFINITY, -1 };
-    }
-};
 
 struct gathering_context {
     RTCIntersectContext base; // first: Embree passes its address on
@@ -297,20 +258,59 @@ void gather_and_go_on(const RTCFilterFunctionNArguments *arguments)
     arguments->valid[0] = 0;
 }
 
-// All hits in their order. Splits in space put a face into several leaves: each is told once.
-class all_hits : public ray_peer
+// High quality is what Embree's authors advise where a scene is built once.
+class rays : public bench::usual
 {
   public:
-    using ray_peer::ray_peer;
-    void build() { tree.build(gather_and_go_on); }
+    static constexpr const char *name = "embree";
+    static constexpr int doubles = 6;
+    using answer_type = bench::hit;
 
-    bench::hit answer(const double *from)
+    rays()
+        : tree(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION,
+               bench::only_building ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH)
+    {
+    }
+    void load(const char *path) { tree.load(path); }
+    void build() { tree.build(nullptr); }
+    void begin(const bench::job &job)
+    {
+        tmax = job.tmax;
+        how = job.query == "ray" ? &rays::first : job.query == "ray-any" ? &rays::any : &rays::all;
+    }
+    uint64_t bytes() const { return tree.bytes; }
+    bench::hit answer(const double *ray) { return (this->*how)(ray); }
+
+  private:
+    bench::hit first(const double *from)
+    {
+        RTCIntersectContext context;
+        rtcInitIntersectContext(&context);
+        RTCRayHit r = {};
+        r.ray = ray_of(from, tmax);
+        r.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+        rtcIntersect1(tree.handle, &context, &r);
+        return { r.ray.tfar, r.hit.geomID == RTC_INVALID_GEOMETRY_ID ? -1 : (int64_t)r.hit.primID };
+    }
+
+    bench::hit any(const double *from)
+    {
+        RTCIntersectContext context;
+        rtcInitIntersectContext(&context);
+        RTCRay ray = ray_of(from, tmax);
+        rtcOccluded1(tree.handle, &context, &ray);
+        return ray.tfar < 0 ? bench::hit{ 0, 0 } : bench::hit{ INFINITY, -1 };
+    }
+
+    // In their order. Splits in space put a face into several leaves: each is told once.
+    bench::hit all(const double *from)
     {
         gathering_context context;
         rtcInitIntersectContext(&context.base);
+        context.base.filter = gather_and_go_on;
         list.clear();
         context.list = &list;
-        RTCRay ray = ray_of(from);
+        RTCRay ray = ray_of(from, tmax);
         rtcOccluded1(tree.handle, &context.base, &ray);
         std::sort(list.begin(), list.end(), [](const auto &a, const auto &b) {
             return a.t != b.t ? a.t < b.t : a.face < b.face;
@@ -321,13 +321,12 @@ class all_hits : public ray_peer
         return count > 0 ? bench::hit{ count, list[0].face } : bench::hit{ INFINITY, -1 };
     }
 
-  private:
+    scene tree;
+    double tmax = INFINITY;
+    bench::hit (rays::*how)(const double *) = nullptr;
     std::vector<gathering_context::met> list;
 };
 
 } // namespace
 
-int main(int argc, char **argv)
-{
-    return bench::main<inside, distance, first_hit, any_hit, all_hits>(argc, argv);
-}
+int main(int argc, char **argv) { return bench::main<inside, distance, rays>(argc, argv); }

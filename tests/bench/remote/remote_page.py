@@ -3,7 +3,7 @@ import statistics
 
 import asked
 import measured
-from query import Page, figure
+from query_page import Page, figure
 
 BEFORE, MIXED, AFTER = "before", "old file", "after"
 SIDES = (BEFORE, MIXED, AFTER)

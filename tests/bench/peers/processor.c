@@ -1,0 +1,8 @@
+#include "processor.h"
+
+#include "query/query_model.h"
+
+void processor_is_base(ebpo_model *model, bool base)
+{
+    model->kernels = base ? &ebpo_kernels_base : ebpo_kernels_best();
+}
