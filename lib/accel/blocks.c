@@ -18,8 +18,8 @@ typedef struct job {
 
 /* A block's vertices, in the order in which its faces have them. */
 typedef struct shared {
-    uint32_t vertex[EBPO_MESHLET_VERTICES];
-    uint8_t at[EBPO_MESHLET_VERTICES]; /* [face][corner]: which of them */
+    uint32_t vertex[EBPO_MESHLET_VERTICES + 1]; /* and one that is looked for */
+    uint8_t at[EBPO_MESHLET_VERTICES];          /* [face][corner]: which of them */
     unsigned faces, count;
 } shared;
 
@@ -34,14 +34,17 @@ static void find_shared(const job *j, uint64_t block, shared *out)
     out->faces = j->layout->block_end[block] - begin;
     out->count = 0;
     for (unsigned i = 0; i < 3 * out->faces; i++) {
-        unsigned slot = corner[i] * UINT32_C(0x9e3779b1) >> (32 - TABLE_BITS);
-        while (table[slot] && out->vertex[table[slot] - 1] != corner[i])
-            slot = (slot + 1) % TABLE;
-        if (!table[slot]) {
-            out->vertex[out->count++] = corner[i];
-            table[slot] = (uint8_t)out->count;
+        unsigned slot = corner[i] * UINT32_C(0x9e3779b1) >> (32 - TABLE_BITS), at;
+        /* whether a corner is new is a toss: without a branch; vertices at one slot are rare */
+        out->vertex[out->count] = corner[i];
+        for (;; slot = (slot + 1) % TABLE) {
+            at = table[slot] ? table[slot] - 1u : out->count;
+            if (out->vertex[at] == corner[i])
+                break;
         }
-        out->at[i] = (uint8_t)(table[slot] - 1);
+        table[slot] = (uint8_t)(at + 1);
+        out->at[i] = (uint8_t)at;
+        out->count += at == out->count;
     }
 }
 

@@ -4,6 +4,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "base/huge_pages.h"
 #include "octree/node_types.h"
 #include "accel/accel_parts.h"
 
@@ -127,6 +128,9 @@ static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **slot
     uint32_t *map = *slot_of = ebpo_alloc(faces, sizeof *map);
     if (!s->nodes.group || !s->leaf || !map)
         return ebpo_fail_memory(w->error, groups * 32 + leaves * sizeof *s->leaf + faces * 4);
+    ebpo_prefer_huge_pages(s->nodes.group, groups * sizeof *s->nodes.group);
+    ebpo_prefer_huge_pages(s->leaf, leaves * sizeof *s->leaf);
+    ebpo_prefer_huge_pages(map, faces * sizeof *map);
     for (uint64_t b = 0; b < layout->block_count; b++)
         for (uint32_t face = layout->block_begin[b]; face < layout->block_end[b]; face++)
             map[face] = layout->block_number[b] * EBPO_BLOCK + face - layout->block_begin[b];
