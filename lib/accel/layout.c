@@ -66,28 +66,60 @@ static void close_bundle(walk *w, bundle *b)
     }
 }
 
-/* Wraps the fullest bundles in nodes of their own until all members together are at most eight. */
+/* Neighbours that together fill a node best; of those not wrapped yet, or the hierarchy would get
+ * deep. */
+typedef struct run {
+    int begin, end, members;
+} run;
+
+static run choose_run(const bundle *part, int parts, const bool wrapped[8])
+{
+    run best = { 0, 0, 0 };
+    for (int begin = 0; begin < parts; begin++) {
+        int members = 0;
+        for (int end = begin;
+             end < parts && !wrapped[end] && members + part[end].members <= EBPO_BLOCK; end++) {
+            members += part[end].members;
+            if (members > best.members)
+                best = (run){ begin, end + 1, members };
+        }
+    }
+    return best;
+}
+
+static bundle gather(const bundle *part, int parts)
+{
+    bundle out = { part[0].begin, part[parts - 1].end, 0, { 0 } };
+    for (int i = 0; i < parts; i++)
+        for (int k = 0; k < part[i].members; k++)
+            out.member[out.members++] = part[i].member[k];
+    return out;
+}
+
+/* Wraps neighbours in nodes, as full ones as there are, until all members together are at most
+ * eight. */
 static bundle join(walk *w, bundle *part, int parts)
 {
+    bool wrapped[8] = { false };
     int total = 0;
     for (int i = 0; i < parts; i++) {
         close_bundle(w, &part[i]);
         total += part[i].members;
     }
     while (total > EBPO_BLOCK && !w->failed) {
-        int fullest = 0;
-        for (int i = 1; i < parts; i++)
-            if (part[i].members > part[fullest].members)
-                fullest = i;
-        total -= part[fullest].members - 1;
-        part[fullest].member[0] = add_bound(w, &part[fullest]);
-        part[fullest].members = 1;
+        run r = choose_run(part, parts, wrapped);
+        bundle all = gather(part + r.begin, r.end - r.begin);
+        total -= all.members - 1;
+        all.member[0] = add_bound(w, &all);
+        all.members = 1;
+        part[r.begin] = all;
+        wrapped[r.begin] = true;
+        memmove(part + r.begin + 1, part + r.end, (size_t)(parts - r.end) * sizeof *part);
+        memmove(wrapped + r.begin + 1, wrapped + r.end, (size_t)(parts - r.end));
+        parts -= r.end - r.begin - 1;
     }
-    bundle out = { part[0].begin, part[parts - 1].end, 0, { 0 } };
-    for (int i = 0; i < parts && !w->failed; i++)
-        for (int k = 0; k < part[i].members; k++)
-            out.member[out.members++] = part[i].member[k];
-    return out;
+    return w->failed ? (bundle){ part[0].begin, part[parts - 1].end, 0, { 0 } }
+                     : gather(part, parts);
 }
 
 /* A range in its own order: blocks of equal size, eight by eight under nodes. */
