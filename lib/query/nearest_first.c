@@ -82,11 +82,12 @@ static ebpo_status search_below(searching *g, ebpo_node node, ebpo_error *error)
     g->c->seen[below] = 2 * g->c->question + 1;
     g->c->searched++;
     uint64_t loaded = g->c->loaded;
+    double limit = g->n->limit;
     ebpo_status status = ebpo_model_enter(g->c, &node, error);
     if (status != EBPO_OK)
         return status;
     ebpo_nearest_search(g->n, g->c, node.subtree);
-    if (g->c->loaded > loaded)
+    if (g->c->loaded > loaded && g->n->limit == limit) /* for nothing */
         ebpo_skeletons_grow(g->c->model->skeletons, below, node.subtree, g->n->p, g->n->limit);
     return EBPO_OK;
 }

@@ -19,7 +19,7 @@ typedef struct kept_node {
 } kept_node;
 
 /* Nodes of a part, and parts: a power of two each. */
-enum { PART_NODES = 8, PARTS = EBPO_SKELETON_NODES / PART_NODES };
+enum { PART_NODES = 8, PARTS = EBPO_SKELETON_NODES / PART_NODES, GROWN_AT_ONCE = 8 };
 #define IS_KEPT UINT32_C(0x40000000)
 
 struct ebpo_skeleton {
@@ -299,7 +299,7 @@ void ebpo_skeleton_grow(ebpo_skeleton *k, const ebpo_accel *s, const double poin
     double p[3], limit2 = frame_limit2(k, limit);
     if (!k->own || !to_frame(k, point, p))
         return;
-    for (int added = 0; added < PART_NODES; added++) {
+    for (int added = 0; added < GROWN_AT_ONCE; added++) {
         nearest_place best = { limit2, NULL };
         look_below(k, 0, k->own, p, 0, &best);
         if (!best.place || *best.place & EBPO_IS_BLOCK || !has_place(k, take, user))

@@ -2,8 +2,8 @@
  * hierarchy over faces (accel/accel.h), eight at first, 2 KB where the subtree takes hundreds. They
  * bound the distance to its faces much better than its cell and its envelope do, so that searches
  * load it again only if it may matter. Made when it is loaded, kept when the cache drops it: works
- * for every file, and costs no reading. Whenever a search has loaded it, nodes are added where it
- * was looked for: memory goes where bounds are too loose.
+ * for every file, and costs no reading. Whenever a search has loaded it for nothing, nodes are
+ * added where it was looked for: memory goes where bounds are too loose.
  *
  * Lower bounds only. Subtrees are searched in the order of certain lower bounds until the next is
  * beyond what has been found (nearest_first.c): those searched are the ones whose bound is at most

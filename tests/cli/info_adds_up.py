@@ -27,4 +27,11 @@ for i, level in enumerate(levels):
     assert i == 0 or level["envelope_volume"] <= levels[i - 1]["envelope_volume"] * (1 + 1e-9)
 assert sum(level["faces_new"] for level in levels) == (info["faces"] if "mesh" in info["parts"]
                                                        else 0)
+memory = info.get("memory")
+if memory:
+    held = memory["top"] + memory["chunks"] + memory["skeletons"]
+    assert 0 < memory["least"] <= memory["whole"], memory
+    assert memory["resident"] == (memory["budget"] in (0, max(memory["budget"], memory["whole"])))
+    assert memory["resident"] or held <= memory["budget"], memory
+    assert memory["subtrees_held"] <= memory["subtrees"], memory
 print("fine")

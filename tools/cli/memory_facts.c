@@ -1,0 +1,48 @@
+#include "cli/memory_facts.h"
+
+#include <inttypes.h>
+
+#include "cli/words.h"
+
+static void parts(FILE *out, const ebpo_model_plan *p)
+{
+    char top[40], chunks[40], skeletons[40], subtree[40];
+    fprintf(out, "          levels 0 to %d stay, %s; %" PRIu64 " subtrees below, %s the average\n",
+            p->cut_level, words_bytes(top, sizeof top, p->top), p->subtrees,
+            words_bytes(subtree, sizeof subtree, p->subtree_bytes));
+    if (p->subtrees_held < p->subtrees)
+        fprintf(out,
+                "          %" PRIu64 " of these at a time; up to %s for chunks, %s for what "
+                "stays of others\n",
+                p->subtrees_held, words_bytes(chunks, sizeof chunks, p->chunks),
+                words_bytes(skeletons, sizeof skeletons, p->skeletons));
+}
+
+void memory_facts(FILE *out, const ebpo_model_plan *p)
+{
+    char budget[40], whole[40], least[40];
+    fprintf(out, "\nmemory    %s: %s in memory\n",
+            p->budget ? words_bytes(budget, sizeof budget, p->budget) : "no budget",
+            p->resident ? "everything" : "not everything");
+    if (!p->resident)
+        parts(out, p);
+    fprintf(out, "          everything takes up to %s, the least that does is about %s\n",
+            words_bytes(whole, sizeof whole, p->whole), words_bytes(least, sizeof least, p->least));
+}
+
+void memory_facts_json(json *j, const char *key, const ebpo_model_plan *p)
+{
+    json_object(j, key);
+    json_uint(j, "budget", p->budget);
+    json_bool(j, "resident", p->resident);
+    json_int(j, "cut_level", p->cut_level);
+    json_uint(j, "whole", p->whole);
+    json_uint(j, "least", p->least);
+    json_uint(j, "top", p->top);
+    json_uint(j, "chunks", p->chunks);
+    json_uint(j, "skeletons", p->skeletons);
+    json_uint(j, "subtrees", p->subtrees);
+    json_uint(j, "subtree_bytes", p->subtree_bytes);
+    json_uint(j, "subtrees_held", p->subtrees_held);
+    json_end(j);
+}

@@ -1,0 +1,13 @@
+/* What a memory budget buys of a file, before anything is loaded. */
+#ifndef EBPO_TOOLS_MEMORY_FACTS_H
+#define EBPO_TOOLS_MEMORY_FACTS_H
+
+#include <ebpo/query.h>
+#include <stdio.h>
+
+#include "cli/json.h"
+
+void memory_facts(FILE *out, const ebpo_model_plan *plan);
+void memory_facts_json(json *j, const char *key, const ebpo_model_plan *plan);
+
+#endif
