@@ -43,15 +43,27 @@ static bool lists_ahead(const within *w)
 static ebpo_status put_children(within *w, const ebpo_box *box, const ebpo_ranked *r,
                                 ebpo_error *error);
 
+/* Of what a subtree lists: by what was kept of it, if it has been loaded before. */
+static double known_bound(const within *w, uint32_t below)
+{
+    const ebpo_skeleton *k = ebpo_skeletons_find(w->context->model->skeletons, below);
+    if (!k)
+        return 0;
+    ebpo_skeleton_bounds b = ebpo_skeleton_lower_bounds(k, w->band.p, w->band.limit);
+    return fmin(b.own, b.outer);
+}
+
 /* What a subset has left out is looked at when the band is known. */
 static ebpo_status put(within *w, const ebpo_box *box, const ebpo_ranked *r, ebpo_error *error)
 {
     if (ebpo_node_is_uniform(&r->node) || r->node.pruned || r->lower > w->band.limit ||
         ebpo_near_band_is_past(&w->band, ebpo_cell_far(box, r->node.cell, w->band.p)))
         return EBPO_OK;
-    if (w->ahead && !ebpo_node_is_below(&r->node))
-        return put_children(w, box, r, error);
-    return ebpo_queue_push(w->context, r, error);
+    if (!ebpo_node_is_below(&r->node))
+        return w->ahead ? put_children(w, box, r, error) : ebpo_queue_push(w->context, r, error);
+    ebpo_ranked below = *r;
+    below.lower = fmax(r->lower, known_bound(w, ebpo_entry_value(r->node.entry)));
+    return below.lower > w->band.limit ? EBPO_OK : ebpo_queue_push(w->context, &below, error);
 }
 
 /* Before a subtree is entered: with the first of each window some of those behind it. */

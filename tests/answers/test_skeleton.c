@@ -263,6 +263,47 @@ START_TEST(a_subtree_once_seen_is_not_searched_for_nothing)
 }
 END_TEST
 
+static bool add_distance(void *user, const ebpo_near_face *face)
+{
+    *(double *)user += face->distance;
+    return true;
+}
+
+/* Subtrees loaded for all faces within a radius, none in memory at the beginning; *sum: of their
+ * distances, in order. */
+static uint64_t loaded_within(asked *s, double *sum)
+{
+    ebpo_within_options how = EBPO_WITHIN_OPTIONS_INIT;
+    uint64_t loads = s->context->loaded;
+    how.radius = s->m.size / 50;
+    *sum = 0;
+    for (uint64_t i = 0; i < s->count; i++) {
+        ebpo_cache_clear(s->model->cache);
+        ASSERT_OK(
+            ebpo_distance_within(s->context, s->points + 3 * i, &how, add_distance, sum, error));
+    }
+    return s->context->loaded - loads;
+}
+
+START_TEST(faces_within_a_radius_are_looked_for_where_they_may_be)
+{
+    asked s;
+    double sums[3];
+    ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+    how.cut_level = 3;
+    begin(&s, find_solid("sphere"), 5, &how, 100);
+    uint64_t first = loaded_within(&s, &sums[0]), with = loaded_within(&s, &sums[1]);
+    ebpo_skeletons *all = s.model->skeletons;
+    s.model->skeletons = NULL;
+    uint64_t without = loaded_within(&s, &sums[2]);
+    s.model->skeletons = all;
+    ck_assert(sums[0] == sums[1] && sums[1] == sums[2]);
+    ck_assert_uint_le(with, first);
+    ck_assert_msg(with < without, "%d, %d without", (int)with, (int)without);
+    end(&s);
+}
+END_TEST
+
 /* --- room --- */
 
 START_TEST(room_is_kept_to)
@@ -365,6 +406,7 @@ Suite *test_suite(void)
     tcase_add_loop_test(tests, no_face_is_nearer_than_its_subtrees_bound, 0, query_solid_count());
     tcase_add_loop_test(tests, answers_do_not_depend_on_what_is_known, 0, 2 * query_solid_count());
     tcase_add_test(tests, a_subtree_once_seen_is_not_searched_for_nothing);
+    tcase_add_test(tests, faces_within_a_radius_are_looked_for_where_they_may_be);
     tcase_add_test(tests, room_is_kept_to);
     tcase_add_loop_test(tests, a_budget_buys_what_was_told, 0, query_solid_count());
     suite_add_tcase(suite, tests);
