@@ -87,7 +87,9 @@ static ebpo_status search_below(searching *g, ebpo_node node, ebpo_error *error)
     if (status != EBPO_OK)
         return status;
     ebpo_nearest_search(g->n, g->c, node.subtree);
-    if (g->c->loaded > loaded && g->n->limit == limit) /* for nothing */
+    /* for nothing, or as one of many that are about as far away */
+    bool again = g->n->limit == limit || g->n->limit > ebpo_cell_diagonal(&g->box, node.cell);
+    if (g->c->loaded > loaded && again)
         ebpo_skeletons_grow(g->c->model->skeletons, below, node.subtree, g->n->p, g->n->limit);
     return EBPO_OK;
 }
