@@ -29,36 +29,40 @@ typedef enum ebpo_leaf_kind {
     EBPO_LEAF_WALLED = 7,  /* these are known: to be asked as a general one */
     EBPO_LEAF_SORTED = 8   /* as before, and a thread is finding the kind */
 } ebpo_leaf_kind;
-/* Finding a wall takes as long as a few answers, finding the kind as dozens of them: they are done
- * when so many questions have come. */
-enum { EBPO_LEAF_WALL_ASKED = 4, EBPO_LEAF_KIND_ASKED = 128 };
+/* Finding a wall takes as long as an answer, finding the kind as dozens of them: they are done when
+ * so many questions have come. */
+enum { EBPO_LEAF_WALL_ASKED = 1, EBPO_LEAF_KIND_ASKED = 128 };
 enum { EBPO_NO_WALL = 6, EBPO_KIND_PLANES_MAX = 16 };
 
-/* A block in a leaf's list, and a box around what its faces may have in the leaf's cell: each axis
- * from 0 to 254, rounded outward; low > high: nothing. Of leaves whose wall is known. Other faces
- * may share the block; `lanes` tells the leaf's own. */
-typedef struct ebpo_listed_block {
-    uint32_t block;
-    uint8_t low[3], high[3];
-    uint8_t lanes;
-} ebpo_listed_block;
-enum { EBPO_LISTED_CELLS = 254 };
+/* A block in a leaf's list: bits 0 to 28 its number; 29 set in the last one of the leaf; 32 to 39
+ * the lanes that are the leaf's own, as other faces may share the block; 40 to 63 a box around what
+ * these may have in the cell, once the leaf has been walled: for each axis four bits of the lower
+ * side and four of 15 less the upper one, in sixteenths of the cell, rounded outward. */
+typedef _Atomic uint64_t ebpo_listed_block;
+enum { EBPO_LISTED_CELLS = 16, EBPO_LISTED_BOX = 40, EBPO_LISTED_LANES = 32 };
+#define EBPO_LISTED_LAST (UINT64_C(1) << 29)
+
+static inline uint64_t ebpo_listed(const ebpo_listed_block *b)
+{
+    return atomic_load_explicit(b, memory_order_relaxed);
+}
+static inline void ebpo_list(ebpo_listed_block *b, uint64_t listed)
+{
+    atomic_store_explicit(b, listed, memory_order_relaxed);
+}
+static inline uint32_t ebpo_listed_number(uint64_t b) { return b & (EBPO_LISTED_LAST - 1); }
+static inline unsigned ebpo_listed_lanes(uint64_t b) { return b >> EBPO_LISTED_LANES & 255; }
 
 /* What ebpo_leaf_ask finds is there once `kind` says so, and does not change then. */
 typedef struct ebpo_accel_leaf {
-    uint32_t list; /* its blocks are list[list .. list + blocks - 1] of the subtree */
-    uint32_t blocks;
+    uint32_t list;         /* its blocks begin at list[list] of the subtree */
     int32_t winding;       /* at the lowest corner, shifted (format-spec, section 5) */
+    uint32_t rows;         /* of kinds other than general: EBPO_KIND_ROW */
     _Atomic uint8_t kind;  /* ebpo_leaf_kind; of surfaces always EBPO_LEAF_GENERAL */
     _Atomic uint8_t asked; /* about how many questions came, until the kind is known */
     /* 2 axis + side (1: upper) of a wall that no face meets, or EBPO_NO_WALL */
     uint8_t wall;
     int8_t wall_step; /* winding number on that wall less the one at the corner */
-    /* of kinds other than general: EBPO_KIND_PLANE, in groups of four; number of planes, filled up
-     * to a multiple of four; winding number where all planes say "below", elsewhere in the cell */
-    uint32_t first_plane;
-    uint32_t planes;
-    int32_t inner, outer;
 } ebpo_accel_leaf;
 
 /* False: a general one, of which neither the wall nor the boxes of the list are to be read yet. */
@@ -67,27 +71,32 @@ static inline bool ebpo_leaf_is_walled(ebpo_leaf_kind kind)
     return kind != EBPO_LEAF_UNKNOWN && kind != EBPO_LEAF_IN_HAND;
 }
 
-/* Four planes n . xi - d in the cell's coordinates (0 .. 1 on each axis), |n0| + |n1| + |n2| = 1;
- * beyond EBPO_PLANE_ERROR the sign is certain. */
-typedef struct ebpo_four_planes {
-    float n[3][4], d[4];
-} ebpo_four_planes;
+/* What planes say of a leaf: a row of winding numbers, then four rows for each four planes
+ * n . xi - d in the cell's coordinates (0 .. 1 on each axis): n0 of all four, n1, n2, d.
+ * |n0| + |n1| + |n2| = 1; beyond EBPO_PLANE_ERROR the sign is certain. */
+typedef union ebpo_kind_row {
+    float of_four[4];
+    struct {
+        int32_t inner, outer; /* where all planes say "below"; elsewhere in the cell */
+        uint32_t fours;       /* the last one filled up */
+    } says;
+} ebpo_kind_row;
 #define EBPO_PLANE_ERROR 0x1p-19f
 
-/* What has been found out about a subtree's leaves. Planes lie in pages: a group's number is that
- * of the page, then that within it. */
+/* What has been found out about a subtree's leaves. Rows lie in pages: a row's number is that of
+ * the page, then that within it. */
 enum { EBPO_KIND_PAGES = 24, EBPO_KIND_PAGE_BITS = 27 };
-#define EBPO_NO_PLANES UINT32_MAX
+#define EBPO_NO_ROWS UINT32_MAX
 typedef struct ebpo_leaf_kinds {
-    pthread_mutex_t lock; /* of what follows, but for reading planes of a leaf that is known */
-    ebpo_four_planes *page[EBPO_KIND_PAGES];
+    pthread_mutex_t lock; /* of what follows, but for reading rows of a leaf that is known */
+    ebpo_kind_row *page[EBPO_KIND_PAGES];
     uint32_t pages;
-    uint64_t used, room;                   /* groups of the last page */
-    _Atomic uint64_t groups;               /* in all pages */
-    uint64_t groups_most;                  /* leaves beyond it stay general ones */
+    uint64_t used, room;                   /* rows of the last page */
+    _Atomic uint64_t rows;                 /* in all pages */
+    uint64_t rows_most;                    /* leaves beyond it stay general ones */
     _Atomic uint64_t of_kind[5], one_wall; /* leaves known so far */
 } ebpo_leaf_kinds;
-#define EBPO_KIND_PLANE(kinds, number)                \
+#define EBPO_KIND_ROW(kinds, number)                  \
     ((kinds)->page[(number) >> EBPO_KIND_PAGE_BITS] + \
      ((number) & ((1u << EBPO_KIND_PAGE_BITS) - 1)))
 
@@ -187,6 +196,7 @@ typedef struct ebpo_accel {
     uint32_t leaf_count;
     ebpo_listed_block *list; /* blocks of leaves */
     uint64_t list_count;
+    uint32_t list_longest;  /* blocks of one leaf */
     ebpo_leaf_kinds *kinds; /* of solids, or NULL */
     bool wide;              /* blocks hold doubles */
     char *meshlets;         /* [units][EBPO_MESHLET_UNIT]: ebpo_meshlet's records */
@@ -213,10 +223,15 @@ typedef struct ebpo_accel {
     uint64_t bytes;
 } ebpo_accel;
 
+/* Sets the boxes of a leaf's list; returns the walls of the cell that its faces come to, a bit for
+ * each: 2 axis + side (1: upper). ebpo_kernels has it. */
+typedef unsigned ebpo_walls_fn(const ebpo_accel *subtree, ebpo_listed_block *list, ebpo_cell cell);
+
 /* A question has come to a leaf of a solid whose kind is not known. Number EBPO_LEAF_WALL_ASKED
  * finds its wall and the boxes of its list, number EBPO_LEAF_KIND_ASKED its kind; true when that
  * was this one. Without memory the leaf stays a general one. */
-bool ebpo_leaf_ask(const ebpo_accel *subtree, ebpo_accel_leaf *leaf, ebpo_cell cell);
+bool ebpo_leaf_ask(const ebpo_accel *subtree, ebpo_accel_leaf *leaf, ebpo_cell cell,
+                   ebpo_walls_fn *walls);
 
 /* Makes it from a slice, which is consumed (freed, also on failure). `with_planes`: keep gray
  * nodes' planes. `threads` 0: all cores. */
@@ -228,7 +243,7 @@ void ebpo_accel_free(ebpo_accel *subtree);
 /* Of memory, now, of a whole model. */
 static inline uint64_t ebpo_accel_bytes(const ebpo_accel *whole)
 {
-    return whole->bytes + (whole->kinds ? whole->kinds->groups * sizeof(ebpo_four_planes) : 0);
+    return whole->bytes + (whole->kinds ? whole->kinds->rows * sizeof(ebpo_kind_row) : 0);
 }
 
 /* Bytes that the subtree will take, and that making it will take at most (the slice included).

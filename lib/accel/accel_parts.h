@@ -36,11 +36,8 @@ EBPO_MUST_USE ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layou
 /* Child tables and leaf records with their lists of blocks (one walk). */
 EBPO_MUST_USE ebpo_status ebpo_accel_fill_nodes(ebpo_accel *s, const ebpo_slice *slice,
                                                 const ebpo_layout *layout, ebpo_error *error);
-/* Sets the boxes of a leaf's list; returns the walls of the cell that its faces come to, a bit
- * for each: 2 axis + side (1: upper). */
-unsigned ebpo_leaf_bound(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_cell cell);
-/* Room for at most so many groups of planes; NULL: no memory. */
-ebpo_leaf_kinds *ebpo_leaf_kinds_make(uint64_t groups_most);
+/* Room for at most so many rows; NULL: no memory. */
+ebpo_leaf_kinds *ebpo_leaf_kinds_make(uint64_t rows_most);
 void ebpo_leaf_kinds_free(ebpo_leaf_kinds *kinds);
 
 #endif

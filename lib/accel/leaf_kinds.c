@@ -62,10 +62,11 @@ static bool gather(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_cell c
         if (!(f->size[k] > 0x1p-900))
             return false;
     }
-    for (uint32_t b = 0; b < leaf->blocks; b++) {
-        const ebpo_listed_block *block = &s->list[leaf->list + b];
-        for (unsigned lanes = block->lanes; lanes; lanes &= lanes - 1) {
-            uint32_t slot = block->block * EBPO_BLOCK + (unsigned)__builtin_ctz(lanes);
+    for (const ebpo_listed_block *at = s->list + leaf->list;; at++) {
+        uint64_t listed = ebpo_listed(at);
+        for (unsigned lanes = ebpo_listed_lanes(listed); lanes; lanes &= lanes - 1) {
+            uint32_t slot =
+                ebpo_listed_number(listed) * EBPO_BLOCK + (unsigned)__builtin_ctz(lanes);
             double t[3][3];
             ebpo_accel_triangle(s, slot, t);
             if (!meets_cell((const double(*)[3])t, low, high))
@@ -74,8 +75,9 @@ static bool gather(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_cell c
                 return false;
             add_face(slot, (const double(*)[3])t, f);
         }
+        if (listed & EBPO_LISTED_LAST)
+            return true;
     }
-    return true;
 }
 
 /* Crossings of the leaf's faces with a segment along an axis. */
@@ -83,15 +85,17 @@ static int32_t crossings(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const
                          double to, int axis)
 {
     int32_t sum = 0;
-    for (uint32_t b = 0; b < leaf->blocks; b++) {
-        const ebpo_listed_block *listed = &s->list[leaf->list + b];
-        for (unsigned lanes = listed->lanes; lanes; lanes &= lanes - 1) {
+    for (const ebpo_listed_block *at = s->list + leaf->list;; at++) {
+        uint64_t listed = ebpo_listed(at);
+        for (unsigned lanes = ebpo_listed_lanes(listed); lanes; lanes &= lanes - 1) {
             double t[3][3];
-            ebpo_accel_triangle(s, listed->block * EBPO_BLOCK + (unsigned)__builtin_ctz(lanes), t);
+            ebpo_accel_triangle(
+                s, ebpo_listed_number(listed) * EBPO_BLOCK + (unsigned)__builtin_ctz(lanes), t);
             sum += ebpo_axis_crossing(from, to, axis, t[0], t[1], t[2]);
         }
+        if (listed & EBPO_LISTED_LAST)
+            return sum;
     }
-    return sum;
 }
 
 /* At any shifted point of the cell: from the lowest corner, axis by axis. */
@@ -232,8 +236,8 @@ static double within_cell(double x) { return x < 0 ? 0 : x > 1 ? 1 : x; }
 
 /* Winding numbers in P and in the rest of the cell, from the cell's corners and, if none of them is
  * in P, from a point near the middle of the faces. False when that does not decide it. */
-static bool find_windings(const ebpo_accel *s, ebpo_accel_leaf *leaf, const leaf_faces *f,
-                          const plane *planes, int count, int flip)
+static bool find_windings(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const leaf_faces *f,
+                          const plane *planes, int count, int flip, ebpo_kind_row *out)
 {
     bool have_inner = false, have_outer = false, certain;
     for (unsigned corner = 0; corner < 8; corner++) {
@@ -244,7 +248,7 @@ static bool find_windings(const ebpo_accel *s, ebpo_accel_leaf *leaf, const leaf
         for (int k = 0; k < 3; k++)
             p[k] = f->low[k] + xi[k] * f->size[k];
         int32_t w = winding_at(s, leaf, f->low, p);
-        int32_t *known = below ? &leaf->inner : &leaf->outer;
+        int32_t *known = below ? &out->says.inner : &out->says.outer;
         bool *have = below ? &have_inner : &have_outer;
         if (*have && *known != w)
             return false;
@@ -264,21 +268,21 @@ static bool find_windings(const ebpo_accel *s, ebpo_accel_leaf *leaf, const leaf
         }
         if (!below_all(planes, count, flip, xi, &certain) || !certain)
             return false;
-        leaf->inner = winding_at(s, leaf, f->low, p);
+        out->says.inner = winding_at(s, leaf, f->low, p);
     }
     return have_outer;
 }
 
-/* --- planes of all leaves: pages, each twice as large as the one before, so that what has been
+/* --- rows of all leaves: pages, each twice as large as the one before, so that what has been
  * found stays where it is --- */
 
 enum { FIRST_PAGE = 16 };
 
-ebpo_leaf_kinds *ebpo_leaf_kinds_make(uint64_t groups_most)
+ebpo_leaf_kinds *ebpo_leaf_kinds_make(uint64_t rows_most)
 {
     ebpo_leaf_kinds *k = ebpo_alloc_zero(1, sizeof *k);
     if (k)
-        k->groups_most = groups_most;
+        k->rows_most = rows_most;
     if (k)
         pthread_mutex_init(&k->lock, NULL);
     return k;
@@ -294,10 +298,10 @@ void ebpo_leaf_kinds_free(ebpo_leaf_kinds *k)
     free(k);
 }
 
-/* A page for at least so many groups; false when there is none. */
+/* A page for at least so many rows; false when there is none. */
 static bool add_page(ebpo_leaf_kinds *k, uint64_t least)
 {
-    uint64_t size = (uint64_t)FIRST_PAGE << k->pages, left = k->groups_most - k->groups;
+    uint64_t size = (uint64_t)FIRST_PAGE << k->pages, left = k->rows_most - k->rows;
     size = size < left ? size : left;
     if (size < least || k->pages == EBPO_KIND_PAGES)
         return false;
@@ -305,20 +309,20 @@ static bool add_page(ebpo_leaf_kinds *k, uint64_t least)
     if (!k->page[k->pages])
         return false;
     k->pages++;
-    k->groups += size;
+    k->rows += size;
     k->used = 0;
     k->room = size;
     return true;
 }
 
-/* The number of the first of so many groups, which lie in one page, or EBPO_NO_PLANES. */
-static uint32_t take_groups(ebpo_leaf_kinds *k, uint64_t groups)
+/* The number of the first of so many rows, which lie in one page, or EBPO_NO_ROWS. */
+static uint32_t take_rows(ebpo_leaf_kinds *k, uint64_t rows)
 {
-    uint32_t number = EBPO_NO_PLANES;
+    uint32_t number = EBPO_NO_ROWS;
     pthread_mutex_lock(&k->lock);
-    if (k->used + groups <= k->room || add_page(k, groups)) {
+    if (k->used + rows <= k->room || add_page(k, rows)) {
         number = (k->pages - 1) << EBPO_KIND_PAGE_BITS | (uint32_t)k->used;
-        k->used += groups;
+        k->used += rows;
     }
     pthread_mutex_unlock(&k->lock);
     return number;
@@ -326,21 +330,21 @@ static uint32_t take_groups(ebpo_leaf_kinds *k, uint64_t groups)
 
 /* The kind of a leaf with these planes; without memory for them it stays a general one. */
 static ebpo_leaf_kind keep_planes(ebpo_leaf_kinds *kinds, ebpo_accel_leaf *leaf,
-                                  const plane *planes, int count, int flip)
+                                  const plane *planes, int count, int flip, ebpo_kind_row says)
 {
-    uint64_t groups = (uint64_t)(count + 3) / 4;
-    uint32_t first = take_groups(kinds, groups);
-    if (first == EBPO_NO_PLANES)
+    int fours = (count + 3) / 4;
+    uint32_t first = take_rows(kinds, 1 + 4 * (uint64_t)fours);
+    if (first == EBPO_NO_ROWS)
         return EBPO_LEAF_GENERAL;
-    ebpo_four_planes *to = EBPO_KIND_PLANE(kinds, first);
-    leaf->first_plane = first;
-    for (uint64_t i = 0; i < groups * 4; i++) {
-        const plane *q = &planes[i < (uint64_t)count ? i : 0];
-        for (int k = 0; k < 3; k++)
-            to[i / 4].n[k][i % 4] = (float)(flip * q->n[k]);
-        to[i / 4].d[i % 4] = (float)(flip * q->d);
+    ebpo_kind_row *row = EBPO_KIND_ROW(kinds, first);
+    says.says.fours = (uint32_t)fours;
+    *row++ = says;
+    for (int i = 0; i < 4 * fours; i++) {
+        const plane *q = &planes[i < count ? i : 0];
+        for (int k = 0; k < 4; k++)
+            row[i / 4 * 4 + k].of_four[i % 4] = (float)(flip * (k < 3 ? q->n[k] : q->d));
     }
-    leaf->planes = (uint32_t)count;
+    leaf->rows = first;
     return count == 1   ? EBPO_LEAF_ONE_PLANE
            : count == 2 ? EBPO_LEAF_TWO_PLANES
            : flip > 0   ? EBPO_LEAF_CONVEX
@@ -365,15 +369,16 @@ static ebpo_leaf_kind classify(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_
     int flip = 1, count = 0;
     if (gather(s, leaf, cell, &f) && f.count)
         count = collect_planes(s, &f, planes, &flip);
-    return count && find_windings(s, leaf, &f, planes, count, flip)
-               ? keep_planes(s->kinds, leaf, planes, count, flip)
+    ebpo_kind_row says = { .says = { 0, 0, 0 } };
+    return count && find_windings(s, leaf, &f, planes, count, flip, &says)
+               ? keep_planes(s->kinds, leaf, planes, count, flip, says)
                : EBPO_LEAF_GENERAL;
 }
 
 /* Its wall, the winding number there, and the boxes of its list. */
-static void bound(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell)
+static void bound(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell, ebpo_walls_fn *walls)
 {
-    uint8_t wall = choose_wall(ebpo_leaf_bound(s, leaf, cell));
+    uint8_t wall = choose_wall(walls(s, s->list + leaf->list, cell));
     int32_t step = 0;
     if (wall != EBPO_NO_WALL && wall % 2) {
         double low[3], high[3];
@@ -396,10 +401,11 @@ static void end(ebpo_accel_leaf *leaf, ebpo_leaf_kind kind)
     atomic_store_explicit(&leaf->kind, (uint8_t)kind, memory_order_release);
 }
 
-static void find_wall(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell)
+static void find_wall(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell,
+                      ebpo_walls_fn *walls)
 {
     if (begin(leaf, EBPO_LEAF_UNKNOWN, EBPO_LEAF_IN_HAND)) {
-        bound(s, leaf, cell);
+        bound(s, leaf, cell, walls);
         end(leaf, EBPO_LEAF_WALLED);
     }
 }
@@ -416,13 +422,13 @@ static bool find_kind(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell
     return true;
 }
 
-bool ebpo_leaf_ask(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell)
+bool ebpo_leaf_ask(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell, ebpo_walls_fn *walls)
 {
     /* threads may count over each other: things are found a little later then */
     int asked = atomic_load_explicit(&leaf->asked, memory_order_relaxed) + 1;
     bool found = false;
     if (asked >= EBPO_LEAF_WALL_ASKED)
-        find_wall(s, leaf, cell);
+        find_wall(s, leaf, cell, walls);
     if (asked >= EBPO_LEAF_KIND_ASKED)
         found = find_kind(s, leaf, cell);
     else

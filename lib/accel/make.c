@@ -80,9 +80,9 @@ static ebpo_status copy_planes(ebpo_accel *s, const ebpo_slice *slice, ebpo_erro
 
 /* Of planes that make leaves easy. Few leaves of one subtree are asked about; what they may take
  * counts from the beginning. */
-static uint64_t groups_most(const ebpo_accel *s)
+static uint64_t rows_most(const ebpo_accel *s)
 {
-    return s->root.cell.level ? s->leaf_count / 4 : s->leaf_count;
+    return s->root.cell.level ? s->leaf_count : 5 * (uint64_t)s->leaf_count;
 }
 
 static uint64_t count_bytes(const ebpo_accel *s)
@@ -91,7 +91,7 @@ static uint64_t count_bytes(const ebpo_accel *s)
     return sizeof *s + s->nodes.group_count * sizeof *s->nodes.group + cells * 5 +
            s->leaf_count * sizeof *s->leaf + s->list_count * sizeof *s->list +
            (s->kinds ? sizeof *s->kinds : 0) +
-           (s->kinds && s->root.cell.level ? groups_most(s) * sizeof(ebpo_four_planes) : 0) +
+           (s->kinds && s->root.cell.level ? rows_most(s) * sizeof(ebpo_kind_row) : 0) +
            (s->units + 1) * EBPO_MESHLET_UNIT +
            s->bound_count * (sizeof *s->bound + sizeof *s->slab) + (uint64_t)s->outer_count * 4 +
            (s->face_source ? (uint64_t)s->face_count * 4 : 0) +
@@ -113,7 +113,7 @@ static ebpo_status make(ebpo_accel *s, ebpo_slice *slice, bool with_planes, unsi
         status = ebpo_accel_fill_nodes(s, slice, &layout, error);
     ebpo_layout_free(&layout);
     if (status == EBPO_OK && s->solid) {
-        s->kinds = ebpo_leaf_kinds_make(groups_most(s));
+        s->kinds = ebpo_leaf_kinds_make(rows_most(s));
         status = s->kinds ? EBPO_OK : ebpo_fail_memory(error, sizeof *s->kinds);
     }
     if (status == EBPO_OK && with_planes)

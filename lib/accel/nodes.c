@@ -37,11 +37,12 @@ static bool make_list_room(walk *w, uint64_t more)
 static inline void list_face(const walk *w, uint64_t face, ebpo_listed_block *list, uint32_t *count)
 {
     uint32_t slot = w->slot_of[face], block = slot / EBPO_BLOCK;
-    uint8_t lane = (uint8_t)(1u << slot % EBPO_BLOCK);
-    if (*count && list[*count - 1].block == block)
-        list[*count - 1].lanes |= lane;
+    uint64_t lane = UINT64_C(1) << (slot % EBPO_BLOCK + EBPO_LISTED_LANES);
+    uint64_t last = *count ? ebpo_listed(&list[*count - 1]) : 0;
+    if (*count && ebpo_listed_number(last) == block)
+        ebpo_list(&list[*count - 1], last | lane);
     else
-        list[(*count)++] = (ebpo_listed_block){ block, { 0, 0, 0 }, { 255, 255, 255 }, lane };
+        ebpo_list(&list[(*count)++], block | lane);
 }
 
 /* References, which lie before the leaf's own faces, then these. */
@@ -49,15 +50,21 @@ static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank
 {
     ebpo_accel_leaf *leaf = &w->s->leaf[number];
     uint64_t refs = level->leaf_ref_count[rank], fresh = level->leaf_new[rank];
-    if (!make_list_room(w, refs + fresh))
+    if (!make_list_room(w, refs + fresh + 1))
         return;
     ebpo_listed_block *list = w->s->list + w->s->list_count;
+    uint32_t count = 0;
     for (uint64_t i = w->refs[depth]; i < w->refs[depth] + refs; i++)
-        list_face(w, level->leaf_refs[i], list, &leaf->blocks);
+        list_face(w, level->leaf_refs[i], list, &count);
     for (uint64_t i = level->leaf_first[rank]; i < level->leaf_first[rank] + fresh; i++)
-        list_face(w, i, list, &leaf->blocks);
+        list_face(w, i, list, &count);
+    if (!count) /* a leaf without faces: block 0 without lanes */
+        ebpo_list(&list[count++], 0);
+    ebpo_list(&list[count - 1], ebpo_listed(&list[count - 1]) | EBPO_LISTED_LAST);
+    if (w->s->list_longest < count)
+        w->s->list_longest = count;
     leaf->list = (uint32_t)w->s->list_count;
-    w->s->list_count += leaf->blocks;
+    w->s->list_count += count;
     w->refs[depth] += refs;
     leaf->kind = w->s->solid ? EBPO_LEAF_UNKNOWN : EBPO_LEAF_GENERAL;
     leaf->winding = level->leaf_winding ? level->leaf_winding[rank] : 0;

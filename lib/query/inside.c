@@ -29,15 +29,15 @@ static bool cross(const ebpo_kernels *kernels, const ebpo_accel *s, const ebpo_a
                   const ebpo_axis_segment *g, const double *point, uint32_t *open, int32_t *sum)
 {
     uint32_t count = 0;
-    *sum = kernels->crossings(s, s->list + leaf->list, leaf->blocks, g, open, &count);
+    *sum = kernels->crossings(s, s->list + leaf->list, g, open, &count);
     return count == 0 || !decide_open(s, open, count, g, point, sum);
 }
 
 /* A point in a leaf's cell. */
 typedef struct in_leaf {
     ebpo_cell leaf;
-    double xi[3];    /* the point in it, 0 .. 1, right to 2^-30 */
-    uint8_t cell[3]; /* and in the unit of ebpo_listed_block */
+    double xi[3];       /* the point in it, 0 .. 1, right to 2^-30 */
+    uint32_t sixteenth; /* and in the unit of ebpo_listed_block, eight bits an axis */
 } in_leaf;
 
 static inline void find_in_leaf(int fine, int level, const ebpo_position *place, in_leaf *out)
@@ -45,11 +45,19 @@ static inline void find_in_leaf(int fine, int level, const ebpo_position *place,
     int up = fine - level;
     double size = ebpo_half_power(up);
     out->leaf.level = level;
+    out->sixteenth = 0;
     for (int k = 0; k < 3; k++) {
         out->leaf.at[k] = place->at[k] >> up;
         out->xi[k] = (place->cells[k] - (double)(out->leaf.at[k] << up)) * size;
-        out->cell[k] = (uint8_t)(int)(out->xi[k] * EBPO_LISTED_CELLS);
+        int at = (int)(out->xi[k] * EBPO_LISTED_CELLS); /* rounding may say 16 */
+        out->sixteenth |= (uint32_t)(at < 15 ? at : 15) << 8 * k;
     }
+}
+
+/* ebpo_axis_segment.reach of the point alone, and of what goes on from it to a wall. */
+static inline uint32_t reach_of(const in_leaf *i)
+{
+    return i->sixteenth | (UINT32_C(0x0f0f0f) - i->sixteenth) << 4;
 }
 
 /* From the leaf's free wall to the point. */
@@ -60,17 +68,13 @@ static ebpo_axis_segment wall_segment(const ebpo_box *box, uint8_t wall, const i
     ebpo_axis_segment g = { { p[0], p[1], p[2] },
                             p[axis],
                             axis,
-                            { i->cell[0], i->cell[1], i->cell[2] },
-                            { i->cell[0], i->cell[1], i->cell[2] },
-                            false };
+                            /* the wall: 15 above, or 15 less 0 */
+                            reach_of(i) | (wall % 2 ? 0x0fu : 0xf0u) << 8 * axis };
     double end = ebpo_wall(box, axis, i->leaf.level, i->leaf.at[axis] + wall % 2);
-    if (wall % 2) {
+    if (wall % 2)
         g.to = end;
-        g.high[axis] = 255;
-    } else {
+    else
         g.from[axis] = end;
-        g.low[axis] = 0;
-    }
     return g;
 }
 
@@ -94,18 +98,22 @@ static bool from_corner(const ebpo_kernels *kernels, const ebpo_accel *s,
 {
     double low[3], high[3];
     ebpo_cell_bounds(&s->box, i->leaf, low, high);
-    ebpo_axis_segment g = { { low[0], low[1], low[2] }, 0, 0, { 0, 0, 0 }, { 0, 0, 0 }, !boxed };
+    ebpo_axis_segment g = { { low[0], low[1], low[2] }, 0, 0, EBPO_REACH_ALL };
+    uint32_t reach = 0xf0f0f0; /* at the corner on all axes */
     *winding = leaf->winding;
     for (int axis = 0; axis < 3; axis++) {
         int32_t sum;
+        uint32_t byte = UINT32_C(0xff) << 8 * axis;
         g.axis = axis;
         g.to = p[axis];
-        g.high[axis] = i->cell[axis];
+        reach |= i->sixteenth & byte;
+        if (boxed)
+            g.reach = reach;
         if (!cross(kernels, s, leaf, &g, axis == 2 ? p : NULL, open, &sum))
             return false;
         *winding += sum;
         g.from[axis] = p[axis];
-        g.low[axis] = i->cell[axis];
+        reach = (reach & ~byte) | (reach_of(i) & byte);
     }
     return true;
 }
@@ -125,21 +133,21 @@ static bool from_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const 
                         int32_t *winding)
 {
     float x = (float)in->xi[0], y = (float)in->xi[1], z = (float)in->xi[2];
-    const ebpo_four_planes *q = EBPO_KIND_PLANE(s->kinds, leaf->first_plane);
+    const ebpo_kind_row *row = EBPO_KIND_ROW(s->kinds, leaf->rows);
+    const ebpo_kind_row *says = row++;
     four_signs above = { 0 }, near = { 0 };
-    for (int left = leaf->planes; left > 0; left -= 4, q++) {
-        four_floats n[3], d;
-        memcpy(n, q->n, sizeof n);
-        memcpy(&d, q->d, sizeof d);
-        four_floats value = n[0] * x + n[1] * y + n[2] * z - d;
+    for (uint32_t left = says->says.fours; left > 0; left--, row += 4) {
+        four_floats q[4];
+        memcpy(q, row, sizeof q);
+        four_floats value = q[0] * x + q[1] * y + q[2] * z - q[3];
         above |= value > EBPO_PLANE_ERROR;
         near |= value >= -EBPO_PLANE_ERROR;
     }
     if (any(above)) {
-        *winding = leaf->outer;
+        *winding = says->says.outer;
         return true;
     }
-    *winding = leaf->inner;
+    *winding = says->says.inner;
     return !any(near);
 }
 
@@ -148,7 +156,7 @@ static __attribute__((noinline)) ebpo_leaf_kind ask_kind(const ebpo_context *con
                                                          const ebpo_accel *s, ebpo_accel_leaf *leaf,
                                                          const in_leaf *i)
 {
-    if (ebpo_leaf_ask(s, leaf, i->leaf))
+    if (ebpo_leaf_ask(s, leaf, i->leaf, context->model->kernels->walls))
         ebpo_model_count_kind(context->model, leaf);
     return ebpo_leaf_kind_of(leaf);
 }
@@ -173,7 +181,7 @@ static ebpo_status answer_by_faces(ebpo_context *context, const ebpo_accel *s,
                                    const double p[3], ebpo_inside_result *out, ebpo_error *error)
 {
     const ebpo_kernels *kernels = context->model->kernels;
-    uint64_t most = (uint64_t)leaf->blocks * EBPO_BLOCK;
+    uint64_t most = (uint64_t)s->list_longest * EBPO_BLOCK;
     int32_t winding;
     if (most > context->open_capacity &&
         !ebpo_grow(&context->open, &context->open_capacity, most, sizeof *context->open))
@@ -278,16 +286,21 @@ static void prefetch_blocks(const ebpo_accel *s, const waiting *w, const double 
 {
     const ebpo_accel_leaf *leaf = w->leaf;
     ebpo_leaf_kind kind = ebpo_leaf_kind_of(leaf);
-    ebpo_axis_segment g = { .everywhere = true };
+    ebpo_axis_segment g = { .reach = EBPO_REACH_ALL };
     if (ebpo_leaf_has_planes(kind))
         return;
     if (ebpo_leaf_is_walled(kind) && leaf->wall != EBPO_NO_WALL)
         g = wall_segment(&s->box, leaf->wall, &w->in, p);
-    for (uint32_t b = 0; b < leaf->blocks && b < 8; b++)
-        if (ebpo_axis_segment_meets(&g, &s->list[leaf->list + b]))
+    const ebpo_listed_block *list = s->list + leaf->list;
+    for (int b = 0; b < 8; b++) {
+        uint64_t listed = ebpo_listed(list + b);
+        if (ebpo_axis_segment_meets(&g, listed))
             for (int line = 0; line < (s->wide ? 4 : 2); line++)
-                __builtin_prefetch(
-                    (const char *)ebpo_accel_meshlet(s, s->list[leaf->list + b].block) + 64 * line);
+                __builtin_prefetch((const char *)ebpo_accel_meshlet(s, ebpo_listed_number(listed)) +
+                                   64 * line);
+        if (listed & EBPO_LISTED_LAST)
+            return;
+    }
 }
 
 static ebpo_status answer_waiting(ebpo_context *context, const ebpo_accel *s, const waiting *w,
@@ -297,7 +310,7 @@ static ebpo_status answer_waiting(ebpo_context *context, const ebpo_accel *s, co
     for (unsigned i = 0; i < count; i++) {
         __builtin_prefetch(s->list + w[i].leaf->list);
         if (ebpo_leaf_has_planes(ebpo_leaf_kind_of(w[i].leaf)))
-            __builtin_prefetch(EBPO_KIND_PLANE(s->kinds, w[i].leaf->first_plane));
+            __builtin_prefetch(EBPO_KIND_ROW(s->kinds, w[i].leaf->rows));
     }
     for (unsigned i = 0; i < count; i++)
         prefetch_blocks(s, &w[i], points + 3 * w[i].point);

@@ -4,5 +4,6 @@
 #include "query/kernels.inc"
 #include "query/near_kernel.inc"
 #include "query/ray_kernel.inc"
+#include "query/wall_kernel.inc"
 
-const ebpo_kernels ebpo_kernels_avx2 = { crossings, near_walk, ray_walk };
+const ebpo_kernels ebpo_kernels_avx2 = { crossings, walls, near_walk, ray_walk };

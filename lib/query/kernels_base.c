@@ -4,8 +4,9 @@
 #include "query/kernels.inc"
 #include "query/near_kernel.inc"
 #include "query/ray_kernel.inc"
+#include "query/wall_kernel.inc"
 
-const ebpo_kernels ebpo_kernels_base = { crossings, near_walk, ray_walk };
+const ebpo_kernels ebpo_kernels_base = { crossings, walls, near_walk, ray_walk };
 
 const ebpo_kernels *ebpo_kernels_best(void)
 {

@@ -76,10 +76,14 @@ static void try_face(ebpo_nearest *n, const ebpo_accel *s, uint32_t slot)
 
 void ebpo_nearest_leaf(ebpo_nearest *n, const ebpo_accel *s, const ebpo_accel_leaf *leaf)
 {
-    for (uint32_t b = 0; b < leaf->blocks; b++)
-        for (unsigned lanes = s->list[leaf->list + b].lanes; lanes; lanes &= lanes - 1)
+    for (const ebpo_listed_block *at = s->list + leaf->list;; at++) {
+        uint64_t listed = ebpo_listed(at);
+        for (unsigned lanes = ebpo_listed_lanes(listed); lanes; lanes &= lanes - 1)
             try_face(n, s,
-                     s->list[leaf->list + b].block * EBPO_BLOCK + (unsigned)__builtin_ctz(lanes));
+                     ebpo_listed_number(listed) * EBPO_BLOCK + (unsigned)__builtin_ctz(lanes));
+        if (listed & EBPO_LISTED_LAST)
+            return;
+    }
 }
 
 /* --- near: single precision --- */
