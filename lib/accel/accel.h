@@ -143,8 +143,9 @@ typedef struct ebpo_bound {
     uint32_t child[8]; /* number of a node, or of a block with EBPO_IS_BLOCK */
     /* Slabs pay above this squared limit of a search: for nodes that are not large beside it. */
     float slab_limit2;
-    uint8_t count; /* of children; they have the first lanes */
-    uint8_t spare[19];
+    uint32_t parent; /* number of a node; of the top: 0 */
+    uint8_t count;   /* of children; they have the first lanes */
+    uint8_t spare[15];
 } ebpo_bound;
 #define EBPO_IS_BLOCK UINT32_C(0x80000000)
 #define EBPO_NO_CHILD UINT32_MAX

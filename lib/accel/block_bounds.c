@@ -418,6 +418,14 @@ static ebpo_status make_room(job *j, ebpo_error *error)
     return ebpo_fail_memory(error, count * (sizeof *s->bound + sizeof *s->slab));
 }
 
+static void link_parents(ebpo_accel *s)
+{
+    for (uint32_t n = 0; n < s->bound_count; n++)
+        for (int lane = 0; lane < s->bound[n].count; lane++)
+            if (!(s->bound[n].child[lane] & EBPO_IS_BLOCK))
+                s->bound[s->bound[n].child[lane]].parent = n;
+}
+
 static ebpo_status fill(job *j, unsigned threads, ebpo_error *error)
 {
     ebpo_status status = ebpo_parallel_for(threads, NULL, j->layout->block_count, 512,
@@ -425,8 +433,11 @@ static ebpo_status fill(job *j, unsigned threads, ebpo_error *error)
     if (status != EBPO_OK)
         return status;
     extend_nodes(j);
-    return ebpo_parallel_for(threads, NULL, j->layout->bound_count, 64, bound_nodes, j, NULL,
-                             "open", error);
+    status = ebpo_parallel_for(threads, NULL, j->layout->bound_count, 64, bound_nodes, j, NULL,
+                               "open", error);
+    if (status == EBPO_OK)
+        link_parents(j->s);
+    return status;
 }
 
 ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout, unsigned threads,

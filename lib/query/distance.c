@@ -74,7 +74,7 @@ static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_distance
     if (o->deadline_ns)
         n.deadline = ebpo_clock() + o->deadline_ns;
     if (o->warm && c->warm && c->model->whole)
-        ebpo_nearest_begin_at(&n, c->warm_block);
+        ebpo_nearest_begin_at(&n, c->warm_block, c->warm_node);
     else if (o->warm && c->warm)
         ebpo_nearest_begin_with(&n, (const double(*)[3])c->warm_triangle, c->warm_face,
                                 c->warm_source_face);
@@ -98,6 +98,7 @@ static ebpo_status exact(ebpo_context *c, const double p[3], const ebpo_distance
         return EBPO_OK;
     c->warm = true;
     c->warm_block = n.block;
+    c->warm_node = n.node;
     c->warm_face = n.file_face;
     c->warm_source_face = n.source_face;
     memcpy(c->warm_triangle, n.triangle, sizeof n.triangle);

@@ -18,7 +18,7 @@ typedef struct ebpo_probe {
 /* Faces that may be nearest wait until the end: by then nearly all are known to be farther. */
 typedef struct ebpo_near_candidate {
     float low;
-    uint32_t slot;
+    uint32_t slot, node; /* that has its block as a child */
 } ebpo_near_candidate;
 enum { EBPO_NEAR_CANDIDATES = 64 };
 #define EBPO_NO_BLOCK UINT32_MAX
@@ -30,13 +30,15 @@ struct ebpo_near_search {
     void *user;
     void (*judge)(ebpo_near_search *search); /* decides about all that waits */
     bool (*late)(ebpo_near_search *search);  /* NULL: there is time */
-    uint32_t first_block;                    /* looked at before all others, or EBPO_NO_BLOCK */
+    /* looked at before all others, and the node above it; EBPO_NO_BLOCK: none */
+    uint32_t first_block, first_node;
     float best;   /* some face is certainly not farther, or what is does not matter: in the frame */
     float limit2; /* what squared lower bounds are compared with */
     int count;
     ebpo_near_candidate waiting[EBPO_NEAR_CANDIDATES];
     uint32_t top; /* visits that were left when it was late */
     ebpo_visit stack[EBPO_VISITS_MOST];
+    uint32_t from[EBPO_VISITS_MOST]; /* the nodes that have the stack's visits as children */
 };
 
 static inline void ebpo_near_set_best(ebpo_near_search *g, float best)

@@ -50,28 +50,29 @@ void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint6
         take(n, triangle, &b, file_face, source_face);
 }
 
-static void try_face(ebpo_nearest *n, const ebpo_accel *s, uint32_t slot)
+/* True: it is the nearest so far. */
+static bool try_face(ebpo_nearest *n, const ebpo_accel *s, uint32_t slot)
 {
     uint32_t local = ebpo_accel_slot_face(s, slot);
     if (local == EBPO_NO_SLOT)
-        return;
+        return false;
     uint64_t file_face = ebpo_accel_file_face(s, local);
     if (n->found && file_face == n->file_face)
-        return;
+        return false;
     double triangle[3][3];
     ebpo_distance_bounds b;
     ebpo_accel_triangle(s, slot, triangle);
     ebpo_triangle_distance_bounds(n->p, (const double(*)[3])triangle, &b);
     if (b.lo > n->limit)
-        return;
+        return false;
     if (n->found) {
         int sign = ebpo_near_compare(n->p, (const double(*)[3])triangle, &b,
                                      (const double(*)[3])n->triangle, &n->bounds);
         if (sign > 0 || (sign == 0 && file_face > n->file_face))
-            return;
+            return false;
     }
     take(n, (const double(*)[3])triangle, &b, file_face, ebpo_accel_source_face(s, local));
-    n->block = slot / EBPO_BLOCK;
+    return true;
 }
 
 void ebpo_nearest_leaf(ebpo_nearest *n, const ebpo_accel *s, const ebpo_accel_leaf *leaf)
@@ -130,7 +131,10 @@ static void judge(ebpo_near_search *g)
         if (c.low > g->best)
             continue;
         double before = n->limit;
-        try_face(n, g->s, c.slot);
+        if (try_face(n, g->s, c.slot)) {
+            n->block = c.slot / EBPO_BLOCK;
+            n->node = c.node;
+        }
         if (n->limit < before) {
             float limit = frame_limit(g);
             if (limit < g->best)
@@ -165,6 +169,7 @@ static void search_near(ebpo_nearest *n, const ebpo_kernels *kernels, ebpo_near_
     g->late = n->deadline ? late : NULL;
     g->count = 0;
     g->first_block = n->first_block;
+    g->first_node = n->first_node;
     ebpo_near_set_best(g, frame_limit(g));
     kernels->near(g);
     if (g->top)

@@ -13,11 +13,11 @@ typedef struct ebpo_nearest {
     ebpo_distance_bounds bounds; /* of the winner */
     double triangle[3][3];
     uint64_t file_face, source_face;
-    uint32_t block;       /* of the winner; EBPO_NO_BLOCK: it was known from before */
-    uint32_t first_block; /* where a search begins, or EBPO_NO_BLOCK */
-    uint64_t deadline;    /* of ebpo_clock, or 0 */
-    bool late;            /* it passed */
-    double passed_over;   /* lower bound of what was not looked at for want of time */
+    uint32_t block, node;             /* of the winner; EBPO_NO_BLOCK: it was known from before */
+    uint32_t first_block, first_node; /* where a search begins, or EBPO_NO_BLOCK */
+    uint64_t deadline;                /* of ebpo_clock, or 0 */
+    bool late;                        /* it passed */
+    double passed_over;               /* lower bound of what was not looked at for want of time */
 } ebpo_nearest;
 
 /* Nothing found yet. */
@@ -27,10 +27,11 @@ void ebpo_nearest_begin(ebpo_nearest *n, const double p[3], double max_distance)
 void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint64_t file_face,
                              uint64_t source_face);
 
-/* Begins with a block of the accel that will be searched, the only one. */
-static inline void ebpo_nearest_begin_at(ebpo_nearest *n, uint32_t block)
+/* Begins with a block of the accel that will be searched, the only one, and the node above it. */
+static inline void ebpo_nearest_begin_at(ebpo_nearest *n, uint32_t block, uint32_t node)
 {
     n->first_block = block;
+    n->first_node = node;
 }
 
 /* Searches all faces of a subtree. */

@@ -69,7 +69,8 @@ struct ebpo_context {
     double warm_triangle[3][3];
     uint64_t warm_face,
         warm_source_face; /* its number in the file, and the one that callers are told */
-    uint32_t warm_block;  /* it is there in the whole model, or EBPO_NO_BLOCK */
+    /* it is there in the whole model, and the node above; or EBPO_NO_BLOCK */
+    uint32_t warm_block, warm_node;
 };
 
 static inline ebpo_box ebpo_model_box(const ebpo_model *m) { return ebpo_root_box(m->info); }
