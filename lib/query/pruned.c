@@ -30,7 +30,8 @@ static ebpo_status check(const checking *k, ebpo_node node, ebpo_error *error)
 ebpo_status ebpo_check_pruned(ebpo_context *context, ebpo_matters_fn matters, void *user,
                               ebpo_error *error)
 {
+    if (!context->model->info->pruned)
+        return EBPO_OK;
     checking k = { context, matters, user, ebpo_model_box(context->model) };
-    return context->model->info->pruned ? check(&k, ebpo_model_root(context->model), error)
-                                        : EBPO_OK;
+    return check(&k, ebpo_model_root(context->model), error);
 }

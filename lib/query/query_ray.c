@@ -1,8 +1,6 @@
 /* One ray: what it meets first, whether it meets anything, all that it meets. */
 #include "geom/strict_fp.h"
 
-#include <string.h>
-
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "query/options.h"
@@ -12,12 +10,9 @@ static ebpo_status cast(ebpo_casting *c, ebpo_context *context, const double ori
                         const double direction[3], double t_max, ebpo_ray_wants wants,
                         ebpo_error *error)
 {
-    ebpo_segment ray = { .t_max = t_max };
-    memcpy(ray.origin, origin, sizeof ray.origin);
-    memcpy(ray.direction, direction, sizeof ray.direction);
-    ebpo_casting_begin(c, context, &ray, wants, EBPO_RAY_BOTH);
+    ebpo_casting_begin(c, context, origin, direction, t_max, wants, EBPO_RAY_BOTH);
     ebpo_status status = ebpo_check_mesh(context->model, error);
-    const char *fault = ebpo_ray_fault(&ray);
+    const char *fault = ebpo_ray_fault(&c->ray);
     if (fault)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "the ray %s", fault);
     return status == EBPO_OK ? ebpo_ray_walk(c, error) : status;

@@ -43,19 +43,12 @@ typedef struct batch {
 
 /* --- one ray --- */
 
-static ebpo_segment segment_of(const ebpo_ray *r)
-{
-    ebpo_segment s = { .t_max = r->t_max };
-    memcpy(s.origin, r->origin, sizeof s.origin);
-    memcpy(s.direction, r->direction, sizeof s.direction);
-    return s;
-}
-
 static ebpo_status answer(batch *b, uint64_t i, unsigned worker, ebpo_error *error)
 {
     ebpo_casting c;
-    ebpo_segment ray = segment_of(&b->rays[i]);
-    ebpo_casting_begin(&c, b->context[worker], &ray, b->wants, b->options.sides);
+    const ebpo_ray *r = &b->rays[i];
+    ebpo_casting_begin(&c, b->context[worker], r->origin, r->direction, r->t_max, b->wants,
+                       b->options.sides);
     ebpo_status status = ebpo_ray_walk(&c, error);
     if (status != EBPO_OK)
         return status;
@@ -121,6 +114,14 @@ static void put_in_order(batch *b, const ebpo_model *m)
 }
 
 /* --- all of them --- */
+
+static ebpo_segment segment_of(const ebpo_ray *r)
+{
+    ebpo_segment s = { .t_max = r->t_max };
+    memcpy(s.origin, r->origin, sizeof s.origin);
+    memcpy(s.direction, r->direction, sizeof s.direction);
+    return s;
+}
 
 static ebpo_status check_rays(const batch *b, const ebpo_model *m, ebpo_error *error)
 {

@@ -9,14 +9,19 @@
 #include "base/error.h"
 #include "geom/ray_triangle.h"
 
-void ebpo_casting_begin(ebpo_casting *c, ebpo_context *context, const ebpo_segment *ray,
-                        ebpo_ray_wants wants, ebpo_ray_sides sides)
+void ebpo_casting_begin(ebpo_casting *c, ebpo_context *context, const double origin[3],
+                        const double direction[3], double t_max, ebpo_ray_wants wants,
+                        ebpo_ray_sides sides)
 {
     c->context = context;
-    c->ray = *ray;
+    for (int k = 0; k < 3; k++) {
+        c->ray.origin[k] = origin[k];
+        c->ray.direction[k] = direction[k];
+    }
+    c->ray.t_max = t_max;
     c->wants = wants;
     c->sides = sides;
-    c->limit = ray->t_max;
+    c->limit = t_max;
     c->done = c->no_memory = false;
     c->count = 0;
 }

@@ -25,8 +25,9 @@ typedef struct ebpo_casting {
     ebpo_met first; /* if count > 0, unless all are wanted */
 } ebpo_casting;
 
-void ebpo_casting_begin(ebpo_casting *casting, ebpo_context *context, const ebpo_segment *ray,
-                        ebpo_ray_wants wants, ebpo_ray_sides sides);
+void ebpo_casting_begin(ebpo_casting *casting, ebpo_context *context, const double origin[3],
+                        const double direction[3], double t_max, ebpo_ray_wants wants,
+                        ebpo_ray_sides sides);
 
 /* Whether the ray meets m->triangle, and from a side that counts; then m->meeting says where.
  * `facing`: where that is certain already, because the line goes through its interior; else 0. */

@@ -20,7 +20,7 @@ enum { EBPO_RAY_CANDIDATES = 64 };
 
 struct ebpo_ray_search {
     /* Set by the caller. */
-    ebpo_segment ray;
+    const ebpo_segment *ray;
     ebpo_ray_wants wants;
     int facing;   /* 1, -1: only faces seen from the front, the back; 0: all */
     double limit; /* t beyond which nothing matters, certain; falls */

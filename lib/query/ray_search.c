@@ -67,14 +67,14 @@ static framed to_frame(ebpo_ray_search *r)
     double longest = 0;
     f.most = 0;
     for (int k = 0; k < 3; k++)
-        longest = greater(longest, fabs(r->ray.direction[k]));
+        longest = greater(longest, fabs(r->ray->direction[k]));
     double factor;
     int exponent = exponent_of(longest, &factor);
     for (int k = 0; k < 3; k++) {
-        r->from[k] = r->ray.origin[k];
-        f.origin[k] = (r->ray.origin[k] - s->centre[k]) * s->scale;
+        r->from[k] = r->ray->origin[k];
+        f.origin[k] = (r->ray->origin[k] - s->centre[k]) * s->scale;
         f.direction[k] =
-            factor > 0 ? r->ray.direction[k] * factor : ldexp(r->ray.direction[k], -exponent);
+            factor > 0 ? r->ray->direction[k] * factor : ldexp(r->ray->direction[k], -exponent);
         f.most = greater(f.most, fabs(f.origin[k]));
     }
     r->limit_scale = factor > 0 ? s->scale / factor : ldexp(s->scale, exponent);
@@ -114,7 +114,7 @@ static bool move_origin(ebpo_ray_search *r, framed *f)
     r->moved = t;
     f->most = 0;
     for (int k = 0; k < 3; k++) {
-        ebpo_pair from = ebpo_two_difference(r->ray.origin[k], s->centre[k]),
+        ebpo_pair from = ebpo_two_difference(r->ray->origin[k], s->centre[k]),
                   step = ebpo_two_product(t, f->direction[k]);
         from = (ebpo_pair){ from.head * s->scale, from.tail * s->scale };
         f->origin[k] = ebpo_pair_add(from, step).head;
@@ -210,7 +210,7 @@ void ebpo_ray_search_accel(ebpo_ray_search *r, const ebpo_kernels *kernels, cons
     double error = origin_error(r, &f);
     set_boxes(r, &f, error);
     set_faces(r, &f, error);
-    r->surely = frame_t(r, r->ray.t_max, -1);
+    r->surely = frame_t(r, r->ray->t_max, -1);
     r->bound = BEYOND;
     lower_bound(r);
     kernels->ray(r);

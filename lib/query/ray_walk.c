@@ -49,7 +49,7 @@ static void decide(ebpo_ray_search *r, uint32_t slot, int facing)
 static void cast_subtree(ebpo_casting *c, const ebpo_accel *s)
 {
     ebpo_ray_search r;
-    r.ray = c->ray;
+    r.ray = &c->ray;
     r.wants = c->wants;
     r.facing = c->sides == EBPO_RAY_BOTH ? 0 : c->sides == EBPO_RAY_FRONT ? 1 : -1;
     r.limit = c->limit;
