@@ -10,42 +10,66 @@
 #include "base/parallel.h"
 #include "accel/accel_parts.h"
 
+/* Which of a block's vertices, in the order in which its faces have them: [face][corner]. */
+typedef struct found {
+    uint8_t at[EBPO_MESHLET_VERTICES], count;
+} found;
+
 typedef struct job {
     ebpo_accel *s;
     const ebpo_mesh *mesh;
     ebpo_layout *layout;
+    found *found; /* of each block */
 } job;
 
-/* A block's vertices, in the order in which its faces have them. */
+/* A block's vertices. */
 typedef struct shared {
-    uint32_t vertex[EBPO_MESHLET_VERTICES + 1]; /* and one that is looked for */
-    uint8_t at[EBPO_MESHLET_VERTICES];          /* [face][corner]: which of them */
+    uint32_t vertex[EBPO_MESHLET_VERTICES];
+    const uint8_t *at; /* [face][corner]: which of them */
     unsigned faces, count;
 } shared;
 
 /* Open addressing: one more than the number of a vertex among the block's, 0: free. */
 enum { TABLE_BITS = 6, TABLE = 1 << TABLE_BITS };
 
-static void find_shared(const job *j, uint64_t block, shared *out)
+static const uint32_t *corners_of(const job *j, uint64_t block, unsigned *count)
 {
     uint32_t begin = j->layout->block_begin[block];
-    const uint32_t *corner = j->mesh->faces + 3 * (uint64_t)begin;
+    *count = 3 * (j->layout->block_end[block] - begin);
+    return j->mesh->faces + 3 * (uint64_t)begin;
+}
+
+static void find_shared(const job *j, uint64_t block)
+{
+    unsigned corners, count = 0;
+    const uint32_t *corner = corners_of(j, block, &corners);
+    uint32_t vertex[EBPO_MESHLET_VERTICES + 1]; /* and one that is looked for */
     uint8_t table[TABLE] = { 0 };
-    out->faces = j->layout->block_end[block] - begin;
-    out->count = 0;
-    for (unsigned i = 0; i < 3 * out->faces; i++) {
+    for (unsigned i = 0; i < corners; i++) {
         unsigned slot = corner[i] * UINT32_C(0x9e3779b1) >> (32 - TABLE_BITS), at;
         /* whether a corner is new is a toss: without a branch; vertices at one slot are rare */
-        out->vertex[out->count] = corner[i];
+        vertex[count] = corner[i];
         for (;; slot = (slot + 1) % TABLE) {
-            at = table[slot] ? table[slot] - 1u : out->count;
-            if (out->vertex[at] == corner[i])
+            at = table[slot] ? table[slot] - 1u : count;
+            if (vertex[at] == corner[i])
                 break;
         }
         table[slot] = (uint8_t)(at + 1);
-        out->at[i] = (uint8_t)at;
-        out->count += at == out->count;
+        j->found[block].at[i] = (uint8_t)at;
+        count += at == count;
     }
+    j->found[block].count = (uint8_t)count;
+}
+
+static void take_shared(const job *j, uint64_t block, shared *out)
+{
+    unsigned corners;
+    const uint32_t *corner = corners_of(j, block, &corners);
+    out->at = j->found[block].at;
+    out->faces = corners / 3;
+    out->count = j->found[block].count;
+    for (unsigned i = 0; i < corners; i++)
+        out->vertex[out->at[i]] = corner[i];
 }
 
 /* Of the record, in units. */
@@ -64,10 +88,9 @@ static ebpo_status measure(void *context, uint64_t begin, uint64_t end, unsigned
     (void)worker;
     (void)error;
     job *j = context;
-    shared v;
     for (uint64_t b = begin; b < end; b++) {
-        find_shared(j, b, &v);
-        j->layout->block_number[b] = size_of(j->s, v.count);
+        find_shared(j, b);
+        j->layout->block_number[b] = size_of(j->s, j->found[b].count);
     }
     return EBPO_OK;
 }
@@ -127,7 +150,7 @@ static ebpo_status fill(void *context, uint64_t begin, uint64_t end, unsigned wo
     job *j = context;
     shared v;
     for (uint64_t b = begin; b < end; b++) {
-        find_shared(j, b, &v);
+        take_shared(j, b, &v);
         char *at = j->s->meshlets + (uint64_t)j->layout->block_number[b] * EBPO_MESHLET_UNIT;
         memset(at, 0, (size_t)size_of(j->s, v.count) * EBPO_MESHLET_UNIT);
         ebpo_meshlet *m = (void *)at;
@@ -158,12 +181,15 @@ static ebpo_status make_room(ebpo_accel *s, ebpo_error *error)
 ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_slice *slice, ebpo_layout *layout,
                                    unsigned threads, ebpo_error *error)
 {
-    job j = { s, &slice->mesh, layout };
+    job j = { s, &slice->mesh, layout, NULL };
     layout->block_number = ebpo_alloc(layout->block_count, sizeof *layout->block_number);
-    if (!layout->block_number)
-        return ebpo_fail_memory(error, layout->block_count * sizeof *layout->block_number);
-    ebpo_status status = ebpo_parallel_for(threads, NULL, layout->block_count, 1024, measure, &j,
-                                           NULL, "open", error);
+    j.found = ebpo_alloc(layout->block_count, sizeof *j.found);
+    ebpo_status status = layout->block_number && j.found
+                             ? EBPO_OK
+                             : ebpo_fail_memory(error, layout->block_count * sizeof *j.found);
+    if (status == EBPO_OK)
+        status = ebpo_parallel_for(threads, NULL, layout->block_count, 1024, measure, &j, NULL,
+                                   "open", error);
     if (status == EBPO_OK && !number_blocks(s, layout))
         status = ebpo_fail(error, EBPO_E_LIMIT,
                            "the model has too many faces to be held at once; give a memory budget");
@@ -172,5 +198,6 @@ ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_slice *slice, ebpo_
     if (status == EBPO_OK)
         status = ebpo_parallel_for(threads, NULL, layout->block_count, 1024, fill, &j, NULL, "open",
                                    error);
+    free(j.found);
     return status;
 }
