@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "base/alloc.h"
-#include "base/huge_pages.h"
 #include "base/workspace_extents.h"
 
 /* Small ones and those without a workspace are not in the table: malloc never gives whole pages. */
@@ -21,8 +20,6 @@ static void *alloc(ebpo_workspace *w, uint64_t count, size_t size, bool zero)
         return part ? part->at : NULL;
     }
     void *at = zero ? ebpo_alloc_zero(count, size) : ebpo_alloc(count, size);
-    if (!w && ebpo_mul_ok(count, size, &bytes))
-        ebpo_prefer_huge_pages(at, bytes); /* one fault in place of 512 */
     if (!at && w)
         w->failed = 0;
     return at;
