@@ -356,6 +356,47 @@ def parse():
     return parser.parse_args()
 
 
+class Made:
+    """What has been measured so far; the page is whole after each step."""
+
+    def __init__(self, bench):
+        self.bench = bench
+        self.results, self.memory, self.tables = {}, {}, {}
+        self.budget, self.more = [], Page()
+        self.found = {"answers": None, "misses": None}
+
+    def publish(self, largest):
+        page, wanted = Page(), self.bench.options.sections.split(",")
+        if "rays" in wanted:
+            section_rays(page, self.results)
+        for query in ("distance", "inside"):
+            if query in wanted:
+                section_points(page, self.results, query, *POINTS[query])
+        section_tails(page, self.results)
+        if self.memory:
+            section_memory(page, self.memory)
+        if self.budget:
+            section_budget(page, largest, self.budget)
+        query_thesis.write(page, largest, self.tables)
+        page.lines += self.more.lines
+        query_checks.write(page, self.found)
+        write(self.bench.options, self.bench, page,
+              goals_table(self.results, self.memory, self.budget, self.tables, self.found))
+
+
+POINTS = {
+    "distance": ("Nearest point",
+                 "Ours is exact, signed (*no sign*: unsigned), in double, and begins with the last "
+                 "answer; Embree's point query is in single precision; *warm*: it searches no "
+                 "farther than the last answer allows. fcpw could not be had here. *differs*: by "
+                 "more than a millionth of the box's diagonal. us a point."),
+    "inside": ("Point in solid",
+               "Ours is exact in double; Embree counts the hits of a ray in single precision "
+               "(robust scene); CGAL's `Side_of_triangle_mesh` is exact. *differs*: answers that "
+               "are not ours, of the points that are not on the surface. us a point."),
+}
+
+
 def beside(bench, small, middling, wanted, found):
     """What the clock does not matter for."""
     if "answers" in wanted:
@@ -364,27 +405,20 @@ def beside(bench, small, middling, wanted, found):
         found["misses"] = query_checks.count_misses(bench, [small, middling])
 
 
-def write_tables(page, results, memory, budget, largest, wanted):
-    if "rays" in wanted:
-        section_rays(page, results)
-    if "distance" in wanted:
-        section_points(page, results, "distance", "Nearest point",
-                       "Ours is exact, signed (*no sign*: unsigned), in double, and begins with "
-                       "the last answer; Embree's point query is in single precision; *warm*: it "
-                       "searches no farther than the last answer allows. fcpw could not be had "
-                       "here. *differs*: by more than a millionth of the box's diagonal. us a "
-                       "point.")
-    if "inside" in wanted:
-        section_points(page, results, "inside", "Point in solid",
-                       "Ours is exact in double; Embree counts the hits of a ray in single "
-                       "precision (robust scene); CGAL's `Side_of_triangle_mesh` is exact. "
-                       "*differs*: answers that are not ours, of the points that are not on the "
-                       "surface. us a point.")
-    section_tails(page, results)
-    if memory:
-        section_memory(page, memory)
-    if budget:
-        section_budget(page, largest, budget)
+def ask_models(bench, models, made, wanted):
+    """In turns on one core, while another one is at what needs no clock."""
+    below = [m for m in models if m.faces < 2000000]
+    structures = [s for s in ("rays", "distance", "inside") if s in wanted]
+    with concurrent.futures.ThreadPoolExecutor(1) as side:
+        done = side.submit(beside, bench, models[0], below[-1], wanted, made.found)
+        for model in models:
+            made.results[model] = ask_model(bench, model, structures)
+            made.publish(models[-1])
+        if "opening" in wanted:
+            section_opening(bench, made.more, below)
+        if "leaves" in wanted:
+            section_leaves(bench, made.more, below)
+        done.result()
 
 
 def main():
@@ -394,28 +428,20 @@ def main():
     if unknown:
         sys.exit(f"query.py: no section is called {', '.join(sorted(unknown))}; there are "
                  f"{', '.join(SECTIONS)}")
-    bench, page = Bench(options), Page()
+    bench = Bench(options)
     models = sorted((Model(bench, ply) for ply in
                      list(options.models) + [grown(bench, what) for what in options.grow]),
                     key=lambda m: m.faces)
-    small, largest, below = models[0], models[-1], [m for m in models if m.faces < 2000000]
-    found = {"answers": None, "misses": None}
-    structures = [s for s in ("rays", "distance", "inside") if s in wanted]
-    with concurrent.futures.ThreadPoolExecutor(1) as side:
-        done = side.submit(beside, bench, small, below[-1], wanted, found)
-        results = {model: ask_model(bench, model, structures) for model in models}
-        done.result()
-    memory = {m: measure_memory(bench, m) for m in models} if "memory" in wanted else {}
-    budget = measure_budget(bench, largest) if "budget" in wanted else []
-    tables = query_thesis.tables(bench, largest, wanted)
-    write_tables(page, results, memory, budget, largest, wanted)
-    query_thesis.write(page, largest, tables)
-    if "opening" in wanted:
-        section_opening(bench, page, below)
-    if "leaves" in wanted:
-        section_leaves(bench, page, below)
-    query_checks.write(page, found)
-    write(options, bench, page, goals_table(results, memory, budget, tables, found))
+    made = Made(bench)
+    ask_models(bench, models, made, wanted)
+    if "memory" in wanted:
+        made.memory = {m: measure_memory(bench, m) for m in models}
+        made.publish(models[-1])
+    if "budget" in wanted:
+        made.budget = measure_budget(bench, models[-1])
+        made.publish(models[-1])
+    made.tables = query_thesis.tables(bench, models[-1], wanted)
+    made.publish(models[-1])
 
 
 def write(options, bench, page, goals):

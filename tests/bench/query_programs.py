@@ -45,8 +45,10 @@ class Bench:
         return done.stdout
 
     def ours(self, model, query, *arguments, points="uniform", core=None):
+        """`points`: a word, or a file of them."""
+        kind = ["--raw"] if pathlib.Path(points).suffix == ".raw" else ["--seed", 1]
         return json.loads(self.run(self.ebpo, "bench", model.file, "--query", query, "--points",
-                                   points, "--seed", 1, "--json", *arguments, core=core))
+                                   points, *kind, "--json", *arguments, core=core))
 
     def program(self, peer):
         return self.build / "tests" / "bench" / "peers" / f"peer_{peer}"

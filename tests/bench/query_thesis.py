@@ -1,9 +1,10 @@
 """The modes of the EBP thesis on a large model, with the thesis' memory, beside its figures."""
 from query_page import figure, us
 
-# What the thesis' program held: levels up to the cut level and a few subtrees, 11 to 13 MB.
-CUT, MEMORY = 7, 13 << 20
-COUNTS = {"uniform": 200, "path": 2000}
+# The thesis' program held 11 to 13 MB up to the cut level, and a few subtrees.
+CUT, MEMORY = 7, 16 << 20
+COUNTS = {"uniform": 100, "path": 20000}
+FEW = {"recursive": {"uniform": 4, "path": 1000}} # of what takes a second
 
 # EBP 2017, table 25: microseconds for a test, mean of three models of 26 to 28 million faces,
 # random points and a continuous path.
@@ -33,9 +34,9 @@ EBP_DISTANCE_LEVELS = [(87.911, 73.668), (25.624, 23.895), (7.595, 9.783), (10.4
 def ask(bench, model, query, *arguments):
     """Mean nanoseconds, and subtrees loaded, of uniform points and of a path."""
     out = {}
-    for points, count in COUNTS.items():
+    for points, count in FEW.get(arguments[-1], COUNTS).items():
         raw = model.questions(points, bench.options.count)
-        report = bench.ours(model, query, "--count", count, "--raw", "--memory", MEMORY,
+        report = bench.ours(model, query, "--count", count, "--memory", MEMORY,
                             "--cut-level", CUT, *arguments, points=raw)
         out[points] = (report["ns"]["mean"], report["model"]["loads"],
                        report["model"]["memory_peak"])
@@ -98,7 +99,8 @@ def cells(tables):
 def write(page, model, tables):
     note = (f"{model.name}, {model.faces:,} faces, {MEMORY >> 20} MiB, levels to {CUT} in memory "
             f"(`ebpo bench --memory {MEMORY} --cut-level {CUT}`), {COUNTS['uniform']:,} uniform "
-            f"points and {COUNTS['path']:,} of a path, us for one by the clock, from a model that "
+            f"points and {COUNTS['path']:,} of a path (*recursive*: "
+            f"{FEW['recursive']['uniform']} and {FEW['recursive']['path']:,}), us for one by the clock, from a model that "
             "has just been opened and a file that the system has been asked to forget")
     if "modes" in tables:
         page.text("## Modes of the EBP thesis", "",
