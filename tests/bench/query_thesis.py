@@ -130,3 +130,7 @@ def write(page, model, tables):
                    [[name, us(o["uniform"][0]), us(o["path"][0])]
                     + [figure(t) for t in thesis_distance(name) or ("-", "-")]
                     for name, o in tables["distances"].items()])
+    if not tables:
+        return
+    slower = [what for what, ours, theirs in cells(tables) if ours > theirs]
+    page.text("Slower than the thesis' figures: " + (", ".join(slower) or "none") + ".")
