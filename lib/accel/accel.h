@@ -85,7 +85,7 @@ typedef union ebpo_kind_row {
 
 /* What has been found out about a subtree's leaves. Rows lie in pages: a row's number is that of
  * the page, then that within it. */
-enum { EBPO_KIND_PAGES = 24, EBPO_KIND_PAGE_BITS = 27 };
+enum { EBPO_KIND_PAGES = 23, EBPO_KIND_PAGE_BITS = 27 };
 #define EBPO_NO_ROWS UINT32_MAX
 typedef struct ebpo_leaf_kinds {
     pthread_mutex_t lock; /* of what follows, but for reading rows of a leaf that is known */

@@ -26,7 +26,7 @@ EBPO_MUST_USE ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *s
                                            ebpo_error *error);
 void ebpo_layout_free(ebpo_layout *layout);
 
-/* Fills blocks and slots (parallel). */
+/* Fills blocks, and gives them their numbers (parallel). */
 EBPO_MUST_USE ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_slice *slice,
                                                  ebpo_layout *layout, unsigned threads,
                                                  ebpo_error *error);

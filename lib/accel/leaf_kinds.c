@@ -276,7 +276,8 @@ static bool find_windings(const ebpo_accel *s, const ebpo_accel_leaf *leaf, cons
 /* --- rows of all leaves: pages, each twice as large as the one before, so that what has been
  * found stays where it is --- */
 
-enum { FIRST_PAGE = 16 };
+/* What one leaf may take at most fits: 1 + 4 * 4. */
+enum { FIRST_PAGE = 32, PAGE_BYTES = 64 };
 
 ebpo_leaf_kinds *ebpo_leaf_kinds_make(uint64_t rows_most)
 {
@@ -305,7 +306,8 @@ static bool add_page(ebpo_leaf_kinds *k, uint64_t least)
     size = size < left ? size : left;
     if (size < least || k->pages == EBPO_KIND_PAGES)
         return false;
-    k->page[k->pages] = aligned_alloc(64, size * sizeof **k->page);
+    size_t bytes = (size * sizeof **k->page + PAGE_BYTES - 1) / PAGE_BYTES * PAGE_BYTES;
+    k->page[k->pages] = aligned_alloc(PAGE_BYTES, bytes);
     if (!k->page[k->pages])
         return false;
     k->pages++;

@@ -179,9 +179,10 @@ void ebpo_accel_free(ebpo_accel *s)
     free(s);
 }
 
-/* Blocks are more than half full but for the last of each leaf or list; lists name at most one
- * block for each listed face. Of a face a record has three vertices at most, or four where it has
- * room for more than 16. */
+/* Blocks are half full but for the one that a leaf of few faces has alone, where its neighbours'
+ * fill theirs: what that takes beyond its faces' share is in the 64 bytes of each leaf, as what its
+ * planes may take in a subtree. Lists name at most one block for each listed face. Of a face a
+ * record has three vertices at most, or four where it has room for more than 16. */
 void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
                          uint64_t *peak)
 {

@@ -144,6 +144,13 @@ static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **slot
     return EBPO_OK;
 }
 
+/* What has been counted is what is held. */
+static void trim_list(ebpo_accel *s)
+{
+    ebpo_listed_block *less = ebpo_realloc(s->list, s->list_count, sizeof *s->list);
+    s->list = less ? less : s->list;
+}
+
 ebpo_status ebpo_accel_fill_nodes(ebpo_accel *s, const ebpo_slice *slice, const ebpo_layout *layout,
                                   ebpo_error *error)
 {
@@ -157,5 +164,7 @@ ebpo_status ebpo_accel_fill_nodes(ebpo_accel *s, const ebpo_slice *slice, const 
         status = w.status;
     }
     free(slot_of);
+    if (status == EBPO_OK)
+        trim_list(s);
     return status;
 }

@@ -8,7 +8,7 @@
 typedef struct ebpo_cache ebpo_cache;
 
 /* Where items come from. Called without locks held, by any thread; estimate and load never twice at
- * a time for one key. They may use other caches, not this one. */
+ * a time for one key. They may use other caches, and of this one ebpo_cache_take_aside only. */
 typedef struct ebpo_cache_source {
     void *user;
     /* Bytes that loading `key` will take at most, the item itself included; room for that is made

@@ -242,7 +242,7 @@ ebpo_status ebpo_distance_many(ebpo_context *context, const double *points, uint
         status = one(context, points + 3 * k, o, &out[k], error);
     }
     ebpo_batch_end(&batch);
-    count_work(context, count, searched, loaded);
+    count_work(context, status == EBPO_OK ? count : 0, searched, loaded);
     return status;
 }
 

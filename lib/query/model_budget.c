@@ -148,7 +148,7 @@ static void share(const ebpo_info *info, const ebpo_model_options *o, ebpo_model
     out->chunks = o->memory ? ebpo_chunk_budget(o->memory) : 0;
     out->skeletons =
         ebpo_skeletons_room(out->subtrees,
-                            o->memory ? ebpo_skeleton_budget(o, o->memory) : UINT64_MAX);
+                            ebpo_skeleton_budget(o, o->memory ? o->memory : UINT64_MAX));
     taken = out->top + out->chunks + out->skeletons;
     out->subtrees_held = out->subtrees;
     if (o->memory && out->subtree_bytes) {

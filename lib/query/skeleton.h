@@ -23,9 +23,8 @@ typedef struct ebpo_skeleton_bounds {
     double own, outer;
 } ebpo_skeleton_bounds;
 
-/* NULL: the subtree has no faces, or is of a size that doubles do not square; no memory. At most
- * `nodes` nodes, 1 to 8. */
-enum { EBPO_SKELETON_NODES = 64 };
+/* With at most `nodes` nodes, 1 to 8. NULL: the subtree has no faces, or is of a size that doubles
+ * do not square; no memory. */
 ebpo_skeleton *ebpo_skeleton_make(const ebpo_accel *subtree, unsigned nodes);
 void ebpo_skeleton_free(ebpo_skeleton *skeleton);
 /* At most, of memory. */
@@ -35,6 +34,8 @@ uint64_t ebpo_skeleton_bytes(unsigned nodes);
 ebpo_skeleton_bounds ebpo_skeleton_lower_bounds(const ebpo_skeleton *skeleton, const double p[3],
                                                 double limit);
 
+/* As many as there may be after growing. */
+enum { EBPO_SKELETON_NODES = 64 };
 /* Adds up to eight nodes of the same subtree, those that are nearest to p as far as is known, while
  * that is within `limit`. `take` says whether there is room for more. */
 void ebpo_skeleton_grow(ebpo_skeleton *skeleton, const ebpo_accel *subtree, const double p[3],

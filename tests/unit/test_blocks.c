@@ -1,5 +1,5 @@
 /* Blocks hold the faces of the mesh they were made from, bit for bit, however they are read: one by
- * one and as kernels do on any processor. */
+ * one and as kernels do on any processor. An accel takes no more memory than was said before. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -103,6 +103,14 @@ static unsigned check_accel(const ebpo_accel *s, const ebpo_mesh *mesh, bool in_
     return r.largest;
 }
 
+static void check_estimate(const ebpo_accel *s, const ebpo_slice_size *size, const ebpo_info *info)
+{
+    uint64_t keep, peak;
+    ebpo_accel_estimate(size, info, &keep, &peak);
+    ck_assert_msg(s->bytes <= keep, "%d bytes, %d expected", (int)s->bytes, (int)keep);
+    ck_assert_uint_lt(keep, peak);
+}
+
 /* --- random meshes: one leaf --- */
 
 enum { FACES = 500 };
@@ -165,11 +173,74 @@ START_TEST(blocks_hold_the_faces_of_random_meshes)
     ebpo_accel *s = NULL;
     ASSERT_OK(ebpo_accel_make(&s, &slice, info, false, 1, error));
     ck_assert(s->wide == doubles);
+    check_estimate(s, &(ebpo_slice_size){ .leaves = 1, .new_faces = FACES }, info);
     unsigned largest = check_accel(s, &mesh, false);
     ck_assert_uint_eq(largest, pools[_i % POOLS] <= 17 ? largest : EBPO_MESHLET_VERTICES);
     ck_assert_uint_le(largest, EBPO_MESHLET_VERTICES);
     ebpo_accel_free(s);
     ebpo_mesh_free(&mesh);
+    free(info);
+}
+END_TEST
+
+/* --- 512 leaves of one face and of nine in turns: hardly any two share a block --- */
+
+enum { LEVELS = 4, LEAVES = 512, NINES = LEAVES / 2 * 10 };
+
+/* A soup. */
+static ebpo_mesh spread_mesh(bool doubles)
+{
+    ebpo_mesh mesh = { .vertex_count = 3 * NINES, .face_count = NINES };
+    mesh.faces = malloc(3 * NINES * sizeof *mesh.faces);
+    mesh.xyz64 = doubles ? calloc(3 * mesh.vertex_count, sizeof *mesh.xyz64) : NULL;
+    mesh.xyz32 = doubles ? NULL : calloc(3 * mesh.vertex_count, sizeof *mesh.xyz32);
+    for (uint32_t i = 0; i < 3 * NINES; i++)
+        mesh.faces[i] = i;
+    return mesh;
+}
+
+static ebpo_slice spread_leaves(bool doubles)
+{
+    ebpo_slice slice = { .root = { .cell.level = 1, .type = EBPO_GRAY },
+                         .level_count = LEVELS,
+                         .face_count = NINES,
+                         .mesh = spread_mesh(doubles) };
+    for (int depth = 0; depth < LEVELS; depth++) {
+        ebpo_level *level = &slice.level[depth];
+        uint64_t nodes = UINT64_C(1) << 3 * depth;
+        bool deepest = depth == LEVELS - 1;
+        level->group_count = depth ? nodes / 8 : 1;
+        *(deepest ? &level->leaf_count : &level->gray_count) = nodes;
+        level->types = calloc(level->group_count, sizeof *level->types);
+        for (uint64_t i = 0; i < level->group_count; i++)
+            for (int octant = 0; octant < (depth ? 8 : 1); octant++)
+                level->types[i] |= (uint16_t)((deepest ? EBPO_LEAF : EBPO_GRAY) << 2 * octant);
+    }
+    ebpo_level *last = &slice.level[LEVELS - 1];
+    last->leaf_first = calloc(LEAVES, sizeof *last->leaf_first);
+    last->leaf_new = calloc(LEAVES, sizeof *last->leaf_new);
+    last->leaf_ref_count = calloc(LEAVES, sizeof *last->leaf_ref_count);
+    for (uint64_t i = 0; i < LEAVES; i++) {
+        last->leaf_first[i] = (i + 1) / 2 + i / 2 * 9;
+        last->leaf_new[i] = i % 2 ? 9 : 1;
+    }
+    return slice;
+}
+
+START_TEST(an_accel_takes_no_more_than_was_said)
+{
+    ebpo_info *info = calloc(1, sizeof *info);
+    info->box_size[0] = info->box_size[1] = info->box_size[2] = 1;
+    info->double_coordinates = _i;
+    info->solid = true;
+    ebpo_slice slice = spread_leaves(_i);
+    ebpo_accel *s = NULL;
+    ASSERT_OK(ebpo_accel_make(&s, &slice, info, false, 1, error));
+    ck_assert_uint_eq(s->list_count, LEAVES / 2 * 3);
+    check_estimate(s,
+                   &(ebpo_slice_size){ .groups = 1 + 8 + 64, .leaves = LEAVES, .new_faces = NINES },
+                   info);
+    ebpo_accel_free(s);
     free(info);
 }
 END_TEST
@@ -182,9 +253,12 @@ static void check_subtree(const query_model *m, const ebpo_node *root)
     ebpo_slice slice;
     ebpo_accel *s = NULL;
     ASSERT_OK(ebpo_chunks_make(&chunks, m->file, 1 << 20, error));
+    ebpo_slice_size size;
+    ASSERT_OK(ebpo_slice_measure(chunks, root, &size, error));
     ASSERT_OK(ebpo_slice_read(&slice, chunks, root, error));
     ASSERT_OK(ebpo_accel_make(&s, &slice, &m->info, true, 1, error));
     check_accel(s, &m->mesh, true);
+    check_estimate(s, &size, &m->info);
     ebpo_accel_free(s);
     ebpo_chunks_free(chunks);
 }
@@ -209,6 +283,7 @@ Suite *test_suite(void)
     TCase *blocks = tcase_create("blocks");
     tcase_set_timeout(blocks, 600);
     tcase_add_loop_test(blocks, blocks_hold_the_faces_of_random_meshes, 0, 2 * POOLS);
+    tcase_add_loop_test(blocks, an_accel_takes_no_more_than_was_said, 0, 2);
     tcase_add_loop_test(blocks, blocks_hold_the_faces_of_files, 0, query_solid_count());
     suite_add_tcase(suite, blocks);
     return suite;
