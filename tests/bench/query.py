@@ -61,6 +61,16 @@ def ways_of(peer, points, query):
     return ways
 
 
+def in_turns(ways):
+    """After each way of ours another program, so that none finds what it needs in the processor's
+    caches because it was just asked the same."""
+    others = [w for w in ways if w[0] != "ebpo"]
+    turns = []
+    for i, ours in enumerate(w for w in ways if w[0] == "ebpo"):
+        turns += [ours, others[i % len(others)]]
+    return turns + others[len(turns) // 2:]
+
+
 def ask_cell(bench, model, servers, points, query):
     """Reports of all programs and ways on the same questions, in turns; answers that differ."""
     rays = query.startswith("ray")
@@ -72,7 +82,8 @@ def ask_cell(bench, model, servers, points, query):
             if p != "cgal" or query in ("ray", "inside", "distance")}
     reports = {way: [] for _, way in ways}
     for turn in range(bench.rounds(model) + 1):
-        for (peer, way), words in ways.items():
+        for peer, way in in_turns(ways):
+            words = ways[peer, way]
             save = ["--answers", told[peer]] if turn == 0 and way == peer else []
             report = servers[peer].ask(query, raw, *words, *end, *save)
             if turn > 0: # the first turn warms

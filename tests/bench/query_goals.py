@@ -15,7 +15,7 @@ class Goals:
     def __init__(self):
         self.rows = []
 
-    def add(self, what, goal, values, limits, digits=2):
+    def add(self, what, goal, values, limits, digits=3):
         """`values` against `limits` that they must not exceed, one by one."""
         known = [(v, l) for v, l in zip(values, limits) if v is not None]
         if not known:
@@ -38,10 +38,11 @@ def ray_goals(goals, results):
     for query, name, goal in RAYS:
         values = [max(v) for v in zip(*(column(results, p, query, "base") for p in ORDINARY))]
         goals.add(f"{name}, SSE2, the worst of the three", 2 * goal, values, [2 * goal] * 4)
-    values = [max(cells["degenerate", q]["ns"]["ebpo"] / cells["uniform", q]["ns"]["ebpo"]
-                  for q, _, _ in RAYS)
-              for cells in results.values() if ("degenerate", "ray") in cells]
-    goals.add("degenerate rays / uniform ones, the worst of three questions", 5, values, [5] * 4)
+    for query, name, _ in RAYS:
+        goals.add(f"degenerate rays / uniform ones, {name}", 5,
+                  [quotient(cells["degenerate", query]["ns"]["ebpo"],
+                            cells["uniform", query]["ns"]["ebpo"])
+                   for cells in results.values() if ("degenerate", query) in cells], [5] * 4)
 
 
 def point_goals(goals, results):
@@ -60,17 +61,17 @@ def goals_table(results, memory, budget, tables, found):
     ray_goals(goals, results)
     point_goals(goals, results)
     goals.add("memory, all in memory, B a face", 75, [m["bytes"] for m in memory.values()],
-              [75] * 4, 3)
+              [75] * 4)
     goals.add("loading / Embree's build, CPU", 0.65,
               [quotient(m["ours"], m["embree"]) for m in memory.values()], [0.65] * 4)
     for query, points, r in budget:
         if r and (query, points) == ("distance", "uniform"):
             goals.add("subtrees touched by a uniform distance, 256 MiB", 2.5,
-                      [(r["hits"] + r["loads"]) / r["count"]], [2.5], 3)
-            goals.add("ms a uniform distance, 256 MiB", 1, [r["clocked_mean_ns"] / 1e6], [1], 3)
+                      [(r["hits"] + r["loads"]) / r["count"]], [2.5])
+            goals.add("ms a uniform distance, 256 MiB", 1, [r["clocked_mean_ns"] / 1e6], [1])
         if r and points == "path":
             goals.add(f"continuous path at once, 256 MiB, {query}: p99.9 ms", 1,
-                      [r["p999_ns"] / 1e6], [1], 3)
+                      [r["p999_ns"] / 1e6], [1])
     thesis = list(query_thesis.cells(tables))
     if thesis:
         slower = [what for what, ours, theirs in thesis if ours > theirs]
