@@ -227,9 +227,9 @@ def main():
         resume(tool, folder, path, url)
         change(tool, folder, path, url)
         interrupt(tool, folder, path, url)
-        done = run(tool, "fetch", url + "/nothing", "/nowhere/x.ebpo.h5")
+        done = run(tool, "fetch", url + "/nothing", "/proc/nowhere/x.ebpo.h5")
         expect("no folder", done.returncode in (1, 2)
-               and done.stderr.startswith("ebpo fetch: /nowhere/x.ebpo.h5"), done.stderr)
+               and done.stderr.startswith("ebpo fetch: /proc/nowhere/x.ebpo.h5"), done.stderr)
         server.shutdown()
     print(f"{len(failures)} failed")
     return 1 if failures else 0
