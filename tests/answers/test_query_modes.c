@@ -31,15 +31,20 @@ typedef struct asked {
     ebpo_distance_result *distance;
 } asked;
 
+static void make_room(asked *a, uint64_t count)
+{
+    a->count = count;
+    a->points = query_room(count, 3 * sizeof *a->points);
+    a->truth = query_room(count, sizeof *a->truth);
+    a->inside = query_room(count, sizeof *a->inside);
+    a->distance = query_room(count, sizeof *a->distance);
+}
+
 static void begin(asked *a, int i, uint64_t count)
 {
     query_model_make(&a->m, cases[i].name, query_solid_by_name(cases[i].name),
                      &query_variants[cases[i].variant]);
-    a->count = query_scaled(count / 3);
-    a->points = query_room(a->count, 3 * sizeof *a->points);
-    a->truth = query_room(a->count, sizeof *a->truth);
-    a->inside = query_room(a->count, sizeof *a->inside);
-    a->distance = query_room(a->count, sizeof *a->distance);
+    make_room(a, query_scaled(count / 3));
     query_make_points(&a->m, a->count, (uint64_t)i + 1000, a->points);
     query_find_truths(&a->m, a->points, a->count, a->truth);
 }
@@ -469,7 +474,8 @@ static void *ask_in_thread(void *user)
     return NULL;
 }
 
-static void ask_in_threads(asked *a, const ebpo_model_options *how)
+static void in_threads(asked *a, const ebpo_model_options *how, void *(*ask)(void *job),
+                       ebpo_model_stats *stats)
 {
     enum { THREADS = 4 };
     pthread_t thread[THREADS];
@@ -478,7 +484,7 @@ static void ask_in_threads(asked *a, const ebpo_model_options *how)
     ASSERT_OK(ebpo_model_new(a->m.file, how, &model, error));
     for (unsigned i = 0; i < THREADS; i++) {
         job[i] = (thread_job){ .a = a, .model = model, .number = i };
-        ck_assert_int_eq(pthread_create(&thread[i], NULL, ask_in_thread, &job[i]), 0);
+        ck_assert_int_eq(pthread_create(&thread[i], NULL, ask, &job[i]), 0);
     }
     for (int i = 0; i < THREADS; i++)
         ck_assert_int_eq(pthread_join(thread[i], NULL), 0);
@@ -486,11 +492,18 @@ static void ask_in_threads(asked *a, const ebpo_model_options *how)
         ck_assert_int_eq(job[i].status, EBPO_OK);
         ck_assert_uint_eq(job[i].different, 0);
     }
+    ebpo_model_get_stats(model, stats);
     ebpo_model_free(model);
 }
 
+static void ask_in_threads(asked *a, const ebpo_model_options *how)
+{
+    ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
+    in_threads(a, how, ask_in_thread, &stats);
+}
+
 /* With ThreadSanitizer (meson setup build-tsan -Db_sanitize=thread; CK_RUN_CASE=threads
- * build-tsan/tests/answers/test_query_modes) these two look for races. */
+ * build-tsan/tests/answers/test_query_modes) these look for races. */
 START_TEST(four_threads_get_the_answers_of_one)
 {
     if (!ebpo_test_wanted(_i + 12))
@@ -541,6 +554,62 @@ START_TEST(four_threads_share_a_small_budget)
 }
 END_TEST
 
+/* A leaf's wall is found by its first question, its planes by the 128th, while others ask. */
+enum { POINTS_ASKED_OFTEN = 12, OFTEN = 200 };
+
+static void *ask_often(void *user)
+{
+    thread_job *job = user;
+    asked *a = job->a;
+    ebpo_context *context;
+    job->status = ebpo_context_new(job->model, &context, NULL);
+    for (uint64_t i = 0; i < OFTEN * a->count && job->status == EBPO_OK; i++) {
+        uint64_t at = (i + job->number) % a->count;
+        ebpo_inside_result inside;
+        job->status = ebpo_inside(context, a->points + 3 * at, NULL, &inside, NULL);
+        job->different += memcmp(&inside, &a->inside[at], sizeof inside) != 0;
+    }
+    ebpo_context_free(context);
+    return NULL;
+}
+
+/* Of points close to faces, on either side: in leaves. */
+static void begin_in_leaves(asked *a, int number)
+{
+    query_model_make(&a->m, cases[number].name, query_solid_by_name(cases[number].name),
+                     &query_variants[cases[number].variant]);
+    make_room(a, POINTS_ASKED_OFTEN);
+    const ebpo_mesh *mesh = &a->m.mesh;
+    for (uint64_t i = 0; i < a->count; i++) {
+        const uint32_t *corner = mesh->faces + 3 * (i * mesh->face_count / a->count);
+        for (uint64_t k = 0; k < 3; k++) {
+            double sum = 0;
+            for (int c = 0; c < 3; c++)
+                sum += mesh->xyz64 ? mesh->xyz64[3 * (uint64_t)corner[c] + k]
+                                   : (double)mesh->xyz32[3 * (uint64_t)corner[c] + k];
+            a->points[3 * i + k] = sum / 3 + (i % 3 == k ? a->m.size / 300 : 0) * (i % 2 ? 1 : -1);
+        }
+    }
+    query_find_truths(&a->m, a->points, a->count, a->truth);
+}
+
+START_TEST(leaves_that_are_found_out_meanwhile_give_the_same_answers)
+{
+    asked a;
+    ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
+    uint64_t found = 0;
+    begin_in_leaves(&a, _i);
+    ask_exactly(&a, a.m.context, NULL, NULL);
+    ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+    how.cut_level = _i % 2 ? 1 : -1;
+    in_threads(&a, &how, ask_often, &stats);
+    for (int k = 0; k < 5; k++)
+        found += stats.leaves_of_kind[k];
+    ck_assert_uint_ge(found, 1);
+    end(&a);
+}
+END_TEST
+
 Suite *test_suite(void)
 {
     Suite *suite = suite_create("query_modes");
@@ -561,6 +630,8 @@ Suite *test_suite(void)
     tcase_add_loop_test(tests, a_file_without_mesh_answers_by_levels_only, 0, CASES);
     tcase_add_loop_test(threads, four_threads_get_the_answers_of_one, 0, CASES);
     tcase_add_loop_test(threads, four_threads_share_a_small_budget, 0, CASES);
+    tcase_add_loop_test(threads, leaves_that_are_found_out_meanwhile_give_the_same_answers, 0,
+                        CASES);
     suite_add_tcase(suite, tests);
     suite_add_tcase(suite, threads);
     return suite;
