@@ -153,10 +153,9 @@ void ebpo_skeleton_free(ebpo_skeleton *k)
 
 /* --- bounds --- */
 
-/* Boxes and slabs are wider than their faces by 2^-19 of their greatest coordinate, and more (see
- * block_bounds.c). That covers what doubles lose to numbers of up to 2^20 times their size; where
- * the point is farther, what they lose is below 2^-45 of the distance. The factor below is for
- * that. */
+/* What doubles lose is covered by what boxes and slabs are wider than their faces where the point
+ * is near, and below 2^-45 of the distance where it is not: the factor below is for that
+ * (docs/develop/bounds.md, "Points against skeletons"). */
 static const double certainly = 1 - 0x1p-40;
 
 /* By |p - x|^2 >= (N(p) - radius)^2 + (along - [from, to])^2, as in the kernels: `to` is the place

@@ -116,8 +116,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_model_new(const ebpo_file *file,
 
 /*
  * What a budget buys: told by the counts in the file's head, with nothing read or loaded. Bytes are
- * bounds from above, most often twice what is taken; all but `budget`, `whole` and `least` are 0 if
- * everything will be in memory.
+ * bounds from above: everything and subtrees often take a fifth of them. All but `budget`, `whole`
+ * and `least` are 0 if everything will be in memory.
  */
 typedef struct ebpo_model_plan {
     size_t struct_size; /* EBPO_MODEL_PLAN_INIT sets it */
@@ -213,8 +213,8 @@ typedef struct ebpo_model_stats {
 
     /*
      * Points whose distance was asked for while not everything was in memory, the subtrees that
-     * were searched for them, and those that had to be loaded first: the quotients tell what a
-     * question costs.
+     * were searched for them, and the loads that this took, with those for the sign: the quotients
+     * tell what a question costs.
      */
     uint64_t distances, distance_subtrees, distance_loads;
 
