@@ -41,9 +41,12 @@ struct ebpo_near_search {
     uint32_t from[EBPO_VISITS_MOST]; /* the nodes that have the stack's visits as children */
 };
 
+/* What underflow of squares does to a distance is far less: sqrt(2^-149) and some. */
+#define EBPO_NEAR_UNDERFLOW 0x1p-56f
+
 static inline void ebpo_near_set_best(ebpo_near_search *g, float best)
 {
-    float limit = best * (1 + 0x1p-18f) + g->probe.error;
+    float limit = best * (1 + 0x1p-18f) + g->probe.error + EBPO_NEAR_UNDERFLOW;
     g->best = best;
     g->limit2 = limit * limit;
 }

@@ -172,6 +172,32 @@ START_TEST(short_edges_do_not_tilt_the_planes_of_convex_leaves)
 }
 END_TEST
 
+/* --- tiny faces in a model of size 1: squares of distances underflow in floats --- */
+
+START_TEST(the_nearest_of_tiny_faces_is_found_where_squares_underflow)
+{
+    const double m = 0x1p-77 * (1 + _i * 0.025), origin[3] = { 0, 0, 0 };
+    const double xyz[9][3] = { { -1, -1, -1 },    { 1, -1, 1 },       { 1, -1, -1 }, /* the size */
+                               { m, m, m },       { 1.02 * m, m, m }, { m, 1.02 * m, m },
+                               { 1.3 * m, 0, 0 }, { 1.32 * m, 0, 0 }, { 1.3 * m, 0.01 * m, 0 } };
+    ebpo_mesh mesh = { .vertex_count = 9,
+                       .face_count = 3,
+                       .xyz32 = malloc(27 * sizeof(float)),
+                       .faces = malloc(9 * sizeof(uint32_t)) };
+    for (uint32_t i = 0; i < 27; i++)
+        mesh.xyz32[i] = (float)xyz[i / 3][i % 3];
+    for (uint32_t i = 0; i < 9; i++)
+        mesh.faces[i] = i;
+    double wanted = (double)mesh.xyz32[18];
+    query_model model;
+    ebpo_distance_result got;
+    query_model_make(&model, "tiny faces", mesh, &one_leaf);
+    ck_assert_int_eq(ebpo_distance(model.context, origin, NULL, &got, NULL), EBPO_OK);
+    ck_assert(got.distance == wanted);
+    query_model_free(&model);
+}
+END_TEST
+
 Suite *test_suite(void)
 {
     Suite *suite = suite_create("query_stiff");
@@ -179,6 +205,7 @@ Suite *test_suite(void)
     tcase_set_timeout(tests, 600);
     tcase_add_loop_test(tests, faces_far_larger_than_a_subtree_are_weighed_exactly, 0, 12);
     tcase_add_loop_test(tests, short_edges_do_not_tilt_the_planes_of_convex_leaves, 0, 60);
+    tcase_add_loop_test(tests, the_nearest_of_tiny_faces_is_found_where_squares_underflow, 0, 320);
     suite_add_tcase(suite, tests);
     return suite;
 }
