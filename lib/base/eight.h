@@ -36,6 +36,7 @@ EBPO_EIGHT f8 f8_less(f8 a, f8 b) { return _mm256_cmp_ps(a, b, _CMP_LT_OQ); }
 EBPO_EIGHT f8 f8_at_most(f8 a, f8 b) { return _mm256_cmp_ps(a, b, _CMP_LE_OQ); }
 EBPO_EIGHT f8 f8_and(f8 a, f8 b) { return _mm256_and_ps(a, b); }
 EBPO_EIGHT f8 f8_or(f8 a, f8 b) { return _mm256_or_ps(a, b); }
+EBPO_EIGHT f8 f8_xor(f8 a, f8 b) { return _mm256_xor_ps(a, b); }
 EBPO_EIGHT f8 f8_pick(f8 mask, f8 yes, f8 no) { return _mm256_blendv_ps(no, yes, mask); }
 EBPO_EIGHT unsigned f8_bits(f8 mask) { return (unsigned)_mm256_movemask_ps(mask); }
 EBPO_EIGHT f8 f8_abs(f8 a)
@@ -110,6 +111,7 @@ EBPO_EIGHT f8 f8_less(f8 a, f8 b) { EBPO_BOTH(a.half[h] < b.half[h]); }
 EBPO_EIGHT f8 f8_at_most(f8 a, f8 b) { EBPO_BOTH(a.half[h] <= b.half[h]); }
 EBPO_EIGHT f8 f8_and(f8 a, f8 b) { EBPO_BOTH((i4)a.half[h] & (i4)b.half[h]); }
 EBPO_EIGHT f8 f8_or(f8 a, f8 b) { EBPO_BOTH((i4)a.half[h] | (i4)b.half[h]); }
+EBPO_EIGHT f8 f8_xor(f8 a, f8 b) { EBPO_BOTH((i4)a.half[h] ^ (i4)b.half[h]); }
 EBPO_EIGHT f8 f8_abs(f8 a) { EBPO_BOTH((i4)a.half[h] & 0x7fffffff); }
 EBPO_EIGHT f8 f8_pick(f8 mask, f8 yes, f8 no)
 {

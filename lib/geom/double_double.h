@@ -55,4 +55,28 @@ static inline bool ebpo_pair_quotient(ebpo_pair a, ebpo_pair b, double error, do
     return out[0] == out[0] && out[1] == out[1];
 }
 
+/* --- vectors --- */
+
+static inline ebpo_pair ebpo_pair_dot(const ebpo_pair a[3], const ebpo_pair b[3])
+{
+    return ebpo_pair_add(ebpo_pair_add(ebpo_pair_multiply(a[0], b[0]),
+                                       ebpo_pair_multiply(a[1], b[1])),
+                         ebpo_pair_multiply(a[2], b[2]));
+}
+
+static inline void ebpo_pair_cross(const ebpo_pair a[3], const ebpo_pair b[3], ebpo_pair out[3])
+{
+    for (int k = 0; k < 3; k++) {
+        int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
+        out[k] = ebpo_pair_subtract(ebpo_pair_multiply(a[u], b[v]), ebpo_pair_multiply(a[v], b[u]));
+    }
+}
+
+/* b - a, exact. */
+static inline void ebpo_pair_differences(const double a[3], const double b[3], ebpo_pair out[3])
+{
+    for (int k = 0; k < 3; k++)
+        out[k] = ebpo_two_difference(b[k], a[k]);
+}
+
 #endif

@@ -1,0 +1,257 @@
+/* Pairs of faces against brute force in rational arithmetic: kinds, the filter of eight, contacts.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "check_main.h"
+#include "exact_twin.h"
+#include "pair/contact.h"
+#include "pair/pair_filter.h"
+#include "pair/triangle_pair.h"
+#include "pair_twin.h"
+#include "solids.h"
+
+enum { CASES = 80000, FILTERED = 8000, CONTACTS = 20000 };
+
+typedef struct faces {
+    double a[3][3], b[3][3];
+} faces;
+
+#define CORNERS(face) ((const double(*)[3])(face))
+
+static void turn_around(double t[3][3])
+{
+    double first[3];
+    memcpy(first, t[0], sizeof first);
+    memmove(t[0], t[1], 2 * sizeof first);
+    memcpy(t[2], first, sizeof first);
+}
+
+static void mirror(double t[3][3])
+{
+    double last[3];
+    memcpy(last, t[2], sizeof last);
+    memcpy(t[2], t[1], sizeof last);
+    memcpy(t[1], last, sizeof last);
+}
+
+static ebpo_pair_kind kind_of(const faces *f)
+{
+    return ebpo_triangle_pair(CORNERS(f->a), CORNERS(f->b));
+}
+
+START_TEST(kinds_equal_brute_force)
+{
+    uint64_t state = (uint64_t)_i + 1;
+    int found[4] = { 0 };
+    for (int i = 0; i < (int)ebpo_test_scaled(CASES); i++) {
+        faces f;
+        twin_pair_case(f.a, f.b, _i, &state);
+        int expected = twin_pair_kind(CORNERS(f.a), CORNERS(f.b));
+        found[expected]++;
+        ck_assert_msg((int)kind_of(&f) == expected, "%s, case %d: %d, expected %d",
+                      twin_pair_name(_i), i, kind_of(&f), expected);
+    }
+    ck_assert_int_gt(found[EBPO_PAIR_APART] + found[EBPO_PAIR_TOUCHING], 0);
+    if (getenv("EBPO_TEST_TELL"))
+        printf("%-40s %8d apart %8d touching %8d crossing %8d coplanar\n", twin_pair_name(_i),
+               found[0], found[1], found[2], found[3]);
+}
+END_TEST
+
+START_TEST(kinds_do_not_depend_on_order)
+{
+    uint64_t state = (uint64_t)_i + 31;
+    for (int i = 0; i < (int)ebpo_test_scaled(CASES); i++) {
+        faces f;
+        twin_pair_case(f.a, f.b, _i, &state);
+        ebpo_pair_kind kind = kind_of(&f);
+        ck_assert_int_eq(ebpo_triangle_pair(CORNERS(f.b), CORNERS(f.a)), kind);
+        turn_around(i & 1 ? f.a : f.b);
+        ck_assert_int_eq(kind_of(&f), kind);
+        mirror(i & 2 ? f.a : f.b);
+        ck_assert_int_eq(kind_of(&f), kind);
+        turn_around(i & 1 ? f.b : f.a);
+        ck_assert_int_eq(kind_of(&f), kind);
+    }
+}
+END_TEST
+
+START_TEST(kinds_are_as_documented)
+{
+    static const double face[3][3] = { { 0, 0, 0 }, { 4, 0, 0 }, { 0, 4, 0 } };
+    static const struct {
+        double other[3][3];
+        ebpo_pair_kind kind;
+    } cases[] = {
+        { { { 0, 0, 1 }, { 4, 0, 1 }, { 0, 4, 1 } }, EBPO_PAIR_APART },
+        { { { 1, 1, -1 }, { 1, 1, 1 }, { 9, 9, 1 } }, EBPO_PAIR_CROSSING },
+        { { { 1, 1, 0 }, { 2, 1, 0 }, { 1, 2, 5 } }, EBPO_PAIR_TOUCHING },  /* an edge within */
+        { { { 1, 1, 0 }, { 1, 1, 2 }, { 2, 1, 5 } }, EBPO_PAIR_TOUCHING },  /* a corner within */
+        { { { 4, 0, 0 }, { 0, 4, 0 }, { 4, 4, 0 } }, EBPO_PAIR_TOUCHING },  /* an edge, one plane */
+        { { { 1, 1, 0 }, { 2, 1, 0 }, { 1, 2, 0 } }, EBPO_PAIR_COPLANAR },  /* within */
+        { { { 0, 0, 0 }, { 4, 0, 0 }, { 0, 4, 0 } }, EBPO_PAIR_COPLANAR },  /* itself */
+        { { { 1, 1, -1 }, { 1, 1, 1 }, { 1, 1, 0 } }, EBPO_PAIR_TOUCHING }, /* no area, through */
+        { { { 1, 1, 0 }, { 1, 1, 0 }, { 1, 1, 0 } }, EBPO_PAIR_TOUCHING },  /* a point */
+        { { { 3, 3, 0 }, { 3, 3, 0 }, { 3, 3, 0 } }, EBPO_PAIR_APART },
+        { { { 0, -1, -1 }, { 0, -1, 1 }, { 0, 1, 0 } }, EBPO_PAIR_TOUCHING }, /* at the corner */
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        ck_assert_int_eq(ebpo_triangle_pair(face, cases[i].other), cases[i].kind);
+        ck_assert_int_eq(ebpo_triangle_pair(cases[i].other, face), cases[i].kind);
+    }
+}
+END_TEST
+
+/* --- the filter --- */
+
+typedef struct batch {
+    faces f[8];
+    float a[72], b[72], error;
+} batch;
+
+/* Floats as a caller makes them: less a point, and off by up to `blur` of their size. */
+static void to_floats(batch *g, double blur, uint64_t *state)
+{
+    double most = 0;
+    for (int lane = 0; lane < 8; lane++)
+        for (int i = 0; i < 9; i++) {
+            const double *o = g->f[lane].a[0];
+            double x = g->f[lane].a[i / 3][i % 3] - o[i % 3],
+                   y = g->f[lane].b[i / 3][i % 3] - o[i % 3];
+            most = fmax(most, fmax(fabs(x), fabs(y)));
+        }
+    double off = most * blur;
+    for (int lane = 0; lane < 8; lane++)
+        for (int i = 0; i < 9; i++) {
+            const double *o = g->f[lane].a[0];
+            double by_a = off * twin_uniform(state), by_b = off * twin_uniform(state);
+            g->a[i * 8 + lane] = (float)(g->f[lane].a[i / 3][i % 3] - o[i % 3] + by_a);
+            g->b[i * 8 + lane] = (float)(g->f[lane].b[i / 3][i % 3] - o[i % 3] + by_b);
+        }
+    g->error = (float)(off * (1 + 0x1p-20) + most * 0x1.1p-24);
+}
+
+static void check_masks(const batch *g, ebpo_pair_masks masks, int *open)
+{
+    for (int lane = 0; lane < 8; lane++) {
+        ebpo_pair_kind kind = kind_of(&g->f[lane]);
+        bool apart = masks.apart >> lane & 1, crossing = masks.crossing >> lane & 1;
+        ck_assert(!apart || kind == EBPO_PAIR_APART);
+        ck_assert(!crossing || kind == EBPO_PAIR_CROSSING);
+        *open += !apart && !crossing;
+    }
+}
+
+static void check_builds(const batch *g, ebpo_pair_masks masks)
+{
+    const ebpo_pair_kernels *builds[] = { &ebpo_pair_kernels_base, ebpo_pair_kernels_best() };
+    for (int i = 0; i < 2; i++) {
+        ebpo_pair_masks other = builds[i]->eight(g->a, g->b, g->error);
+        ck_assert(other.apart == masks.apart && other.crossing == masks.crossing);
+        for (int lane = 0; lane < 8; lane++) {
+            float a[9], spread[72];
+            for (int k = 0; k < 72; k++) {
+                a[k / 8] = g->a[k / 8 * 8 + lane];
+                spread[k] = a[k / 8];
+            }
+            ebpo_pair_masks one = builds[i]->one(a, g->b, g->error),
+                            eight = builds[0]->eight(spread, g->b, g->error);
+            ck_assert(one.apart == eight.apart && one.crossing == eight.crossing);
+        }
+    }
+}
+
+/* Kinds of numbers that floats can hold. */
+static bool fit_for_floats(int kind) { return kind < 12; }
+
+START_TEST(filter_says_what_is_exact)
+{
+    static const double blurs[] = { 0, 0x1p-22, 0x1p-14, 0x1p-6 };
+    uint64_t state = (uint64_t)_i + 91;
+    if (!fit_for_floats(_i))
+        return;
+    int open[4] = { 0 }, count = (int)ebpo_test_scaled(FILTERED);
+    for (int i = 0; i < count; i++) {
+        batch g;
+        for (int lane = 0; lane < 8; lane++)
+            twin_pair_case(g.f[lane].a, g.f[lane].b, _i, &state);
+        to_floats(&g, blurs[i & 3], &state);
+        ebpo_pair_masks masks = ebpo_pair_kernels_base.eight(g.a, g.b, g.error);
+        check_masks(&g, masks, &open[i & 3]);
+        check_builds(&g, masks);
+    }
+    if (_i == 0) /* ordinary faces are for the filter */
+        ck_assert_int_lt(open[0] + open[1], count / 2 * 8 / 500);
+}
+END_TEST
+
+/* --- contacts --- */
+
+static twin_end end_for_twin(const ebpo_contact_end *end)
+{
+    return (twin_end){ end->point, (int)end->on_a, (int)end->on_b };
+}
+
+static void greatest(const faces *f, double most[3])
+{
+    for (int k = 0; k < 3; k++) {
+        most[k] = 0;
+        for (int i = 0; i < 3; i++)
+            most[k] = fmax(most[k], fmax(fabs(f->a[i][k]), fabs(f->b[i][k])));
+    }
+}
+
+static void check_contact(const faces *f, const char *name)
+{
+    ebpo_contact_end end[2], back[2];
+    double most[3];
+    ebpo_triangle_contact(CORNERS(f->a), CORNERS(f->b), end);
+    const twin_end both[] = { end_for_twin(&end[0]), end_for_twin(&end[1]) };
+    greatest(f, most);
+    const char *wrong = twin_pair_contact(CORNERS(f->a), CORNERS(f->b), both, most);
+    ck_assert_msg(!wrong, "%s: %s", name, wrong);
+    ebpo_triangle_contact(CORNERS(f->b), CORNERS(f->a), back);
+    for (int i = 0; i < 2; i++) {
+        ck_assert_mem_eq(end[i].point, back[1 - i].point, sizeof end[i].point);
+        ck_assert(end[i].on_a == back[1 - i].on_b && end[i].on_b == back[1 - i].on_a);
+    }
+    faces g = *f;
+    turn_around(g.a);
+    mirror(g.b);
+    ebpo_triangle_contact(CORNERS(g.a), CORNERS(g.b), back);
+    for (int i = 0; i < 2; i++)
+        ck_assert_mem_eq(end[i].point, back[1 - i].point, sizeof end[i].point);
+}
+
+START_TEST(contacts_are_where_faces_meet)
+{
+    uint64_t state = (uint64_t)_i + 171;
+    int found = 0;
+    for (int i = 0; i < (int)ebpo_test_scaled(CONTACTS); i++) {
+        faces f;
+        twin_pair_case(f.a, f.b, _i, &state);
+        if (kind_of(&f) != EBPO_PAIR_CROSSING)
+            continue;
+        found++;
+        check_contact(&f, twin_pair_name(_i));
+    }
+    ck_assert(_i != 0 || found > 0);
+}
+END_TEST
+
+Suite *test_suite(void)
+{
+    TCase *tests = tcase_create("pair");
+    tcase_set_timeout(tests, 1000);
+    tcase_add_test(tests, kinds_are_as_documented);
+    tcase_add_loop_test(tests, kinds_equal_brute_force, 0, TWIN_PAIR_KINDS);
+    tcase_add_loop_test(tests, kinds_do_not_depend_on_order, 0, TWIN_PAIR_KINDS);
+    tcase_add_loop_test(tests, filter_says_what_is_exact, 0, TWIN_PAIR_KINDS);
+    tcase_add_loop_test(tests, contacts_are_where_faces_meet, 0, TWIN_PAIR_KINDS);
+    Suite *suite = suite_create("pair");
+    suite_add_tcase(suite, tests);
+    return suite;
+}

@@ -1,0 +1,199 @@
+/* Posed coordinates: their definition, what is refused, and how far they are from true motions. */
+#include <math.h>
+#include <string.h>
+
+#include <gmp.h>
+
+#include "check_main.h"
+#include "exact_twin.h"
+#include "pair/pose.h"
+#include "solids.h"
+
+enum { CASES = 20000 };
+
+static const double unit_reach[3] = { 1, 1, 1 };
+
+static ebpo_pose unmoved(void)
+{
+    return (ebpo_pose){ { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, { 0, 0, 0 }, 1 };
+}
+
+/* Entries over the common denominator: the rotation of a quaternion of integers. */
+static int64_t exact_rotation(int64_t m[3][3], uint64_t *state)
+{
+    int64_t q[4], n = 0;
+    do {
+        n = 0;
+        for (int i = 0; i < 4; i++) {
+            q[i] = twin_integer(state, -1000, 1000);
+            n += q[i] * q[i];
+        }
+    } while (n == 0);
+    int64_t w = q[0], x = q[1], y = q[2], z = q[3];
+    int64_t r[3][3] = { { n - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y) },
+                        { 2 * (x * y + w * z), n - 2 * (x * x + z * z), 2 * (y * z - w * x) },
+                        { 2 * (x * z - w * y), 2 * (y * z + w * x), n - 2 * (x * x + y * y) } };
+    memcpy(m, r, sizeof r);
+    return n;
+}
+
+/* |given - (scale Q x + t)| <= bound on one axis; Q: row / n. */
+static bool within_bound(double given, const int64_t row[3], int64_t n, const ebpo_pose *pose,
+                         const double x[3], double t, double bound)
+{
+    mpq_t sum, part, other;
+    mpq_inits(sum, part, other, NULL);
+    for (int k = 0; k < 3; k++) {
+        mpq_set_d(part, x[k]);
+        mpq_set_si(other, row[k], 1);
+        mpq_mul(part, part, other);
+        mpq_add(sum, sum, part);
+    }
+    mpq_set_si(other, n, 1);
+    mpq_div(sum, sum, other);
+    mpq_set_d(other, pose->scale);
+    mpq_mul(sum, sum, other);
+    mpq_set_d(other, t);
+    mpq_add(sum, sum, other);
+    mpq_set_d(other, given);
+    mpq_sub(sum, sum, other);
+    mpq_abs(sum, sum);
+    mpq_set_d(other, bound);
+    bool within = mpq_cmp(sum, other) <= 0;
+    mpq_clears(sum, part, other, NULL);
+    return within;
+}
+
+/* The exact rotation, rounded, stretched by a symmetric matrix of up to `stretch`: it stays the
+ * nearest one. */
+static void stretched(const int64_t m[3][3], int64_t n, double stretch, double out[3][3],
+                      uint64_t *state)
+{
+    double s[3][3];
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k <= i; k++)
+            s[i][k] = s[k][i] = (i == k) + stretch * twin_uniform(state);
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) {
+            out[i][k] = (double)m[i][k] / (double)n;
+            if (stretch == 0)
+                continue;
+            out[i][k] = 0;
+            for (int j = 0; j < 3; j++)
+                out[i][k] += (double)m[i][j] / (double)n * s[j][k];
+        }
+}
+
+START_TEST(posed_points_are_as_close_as_stated)
+{
+    uint64_t state = 3;
+    for (int i = 0; i < (int)ebpo_test_scaled(CASES); i++) {
+        int64_t m[3][3], n = exact_rotation(m, &state);
+        ebpo_pose pose = unmoved();
+        ebpo_posing posing;
+        double x[3], out[3];
+        stretched((const int64_t(*)[3])m, n, i & 1 ? 0x1p-24 : 0, pose.rotation, &state);
+        for (int k = 0; k < 3; k++) {
+            x[k] = twin_uniform(&state);
+            pose.translation[k] = ldexp(twin_uniform(&state), (int)twin_integer(&state, -30, 30));
+        }
+        pose.scale = 1 + 0.5 * twin_uniform(&state);
+        ck_assert_int_eq(ebpo_posing_make(&posing, &pose, unit_reach, NULL), EBPO_OK);
+        ck_assert(posing.deviation < (i & 1 ? 0x1p-21 : 0x1p-49));
+        ebpo_posing_apply(&posing, x, out);
+        double length = sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]) * (1 + 0x1p-50);
+        for (int k = 0; k < 3; k++)
+            ck_assert(within_bound(out[k], m[k], n, &pose, x, pose.translation[k],
+                                   ebpo_posing_error(&posing, length)));
+    }
+}
+END_TEST
+
+/* One rounding for each operation, in the stated order. */
+START_TEST(posed_points_are_as_defined)
+{
+    uint64_t state = 5;
+    for (int i = 0; i < 1000; i++) {
+        int64_t m[3][3], n = exact_rotation(m, &state);
+        ebpo_pose pose = unmoved();
+        ebpo_posing posing;
+        for (int k = 0; k < 9; k++)
+            pose.rotation[k / 3][k % 3] = (double)m[k / 3][k % 3] / (double)n;
+        pose.scale = 3;
+        for (int k = 0; k < 3; k++)
+            pose.translation[k] = twin_uniform(&state);
+        double x[3] = { twin_uniform(&state), twin_uniform(&state), 1 }, out[3];
+        ck_assert_int_eq(ebpo_posing_make(&posing, &pose, unit_reach, NULL), EBPO_OK);
+        ebpo_posing_apply(&posing, x, out);
+        for (int k = 0; k < 3; k++) {
+            volatile double row[3], part[3], sum;
+            for (int j = 0; j < 3; j++) {
+                row[j] = 3 * pose.rotation[k][j];
+                part[j] = row[j] * x[j];
+            }
+            sum = part[0] + part[1];
+            sum = sum + part[2];
+            sum = sum + pose.translation[k];
+            ck_assert(out[k] == sum);
+        }
+    }
+}
+END_TEST
+
+static void refused(ebpo_pose pose, const double reach[3], const char *word)
+{
+    ebpo_error error;
+    ebpo_posing posing;
+    ck_assert_int_eq(ebpo_posing_make(&posing, &pose, reach, &error), EBPO_E_ARGUMENT);
+    ck_assert_msg(strstr(error.message, word) != NULL, "%s: not about \"%s\"", error.message, word);
+}
+
+START_TEST(what_is_no_pose_is_refused)
+{
+    const double far[3] = { 0x1p900, 0, 0 };
+    const double numbers[] = { NAN, INFINITY, -INFINITY };
+    for (int i = 0; i < 3; i++) {
+        ebpo_pose pose = unmoved();
+        pose.rotation[1][2] = numbers[i];
+        refused(pose, unit_reach, "finite");
+        pose = unmoved();
+        pose.translation[2] = numbers[i];
+        refused(pose, unit_reach, "finite");
+        pose = unmoved();
+        pose.scale = numbers[i];
+        refused(pose, unit_reach, "scale");
+    }
+    ebpo_pose pose = unmoved();
+    pose.rotation[0][0] = 1.001;
+    refused(pose, unit_reach, "off by 0.002");
+    pose.rotation[0][0] = 0x1p1000;
+    refused(pose, unit_reach, "off by inf");
+    pose.rotation[0][0] = -1;
+    refused(pose, unit_reach, "mirror");
+    pose = unmoved();
+    pose.rotation[0][1] = 0x1p-19;
+    refused(pose, unit_reach, "not a rotation");
+    pose.rotation[0][1] = 0x1p-21;
+    ebpo_posing posing;
+    ck_assert_int_eq(ebpo_posing_make(&posing, &pose, unit_reach, NULL), EBPO_OK);
+    pose = unmoved();
+    pose.scale = 0;
+    refused(pose, unit_reach, "scale");
+    pose.scale = 0x1p200;
+    refused(pose, far, "axis 0");
+    pose.scale = 1;
+    ck_assert_int_eq(ebpo_posing_make(&posing, &pose, far, NULL), EBPO_OK);
+}
+END_TEST
+
+Suite *test_suite(void)
+{
+    TCase *tests = tcase_create("pose");
+    tcase_set_timeout(tests, 300);
+    tcase_add_test(tests, posed_points_are_as_close_as_stated);
+    tcase_add_test(tests, posed_points_are_as_defined);
+    tcase_add_test(tests, what_is_no_pose_is_refused);
+    Suite *suite = suite_create("pose");
+    suite_add_tcase(suite, tests);
+    return suite;
+}
