@@ -156,10 +156,10 @@ void ebpo_triangle_nearest_gmp(const double p[3], const double triangle[3][3],
                ebpo_common_unit(&triangle[0][0], 9, ebpo_common_unit(p, 3, EBPO_UNIT_OF_ZEROS)));
     find(&n);
     out->feature = n.feature;
-    out->distance = ebpo_root_of_fraction(n.square, n.denominator, n.unit);
+    out->distance = ebpo_round_root(n.square, n.denominator, n.unit);
     for (int k = 0; k < 3; k++) {
         mpz_addmul(n.offset.x[k], n.p.x[k], n.offset_denominator);
-        out->point[k] = ebpo_fraction_value(n.offset.x[k], n.offset_denominator, n.unit);
+        out->point[k] = ebpo_round_quotient(n.offset.x[k], n.offset_denominator, n.unit);
     }
     if (n.feature <= EBPO_NEAR_CORNER2)
         memcpy(out->point, triangle[n.feature], sizeof out->point);
@@ -225,7 +225,7 @@ void ebpo_triangle_unit_normal_gmp(const double triangle[3][3], double normal[3]
     ebpo_vectorz_dot(n.t, &n.normal, &n.normal);
     for (int k = 0; k < 3; k++) {
         mpz_mul(n.u, n.normal.x[k], n.normal.x[k]);
-        double size = mpz_sgn(n.t) ? ebpo_root_of_fraction(n.u, n.t, 0) : 0;
+        double size = mpz_sgn(n.t) ? ebpo_round_root(n.u, n.t, 0) : 0;
         normal[k] = mpz_sgn(n.normal.x[k]) < 0 ? -size : size;
     }
     nearest_clear(&n);

@@ -89,7 +89,7 @@ static double round_integer(const mpz_t m, long exponent)
     return value;
 }
 
-double ebpo_root_of_fraction(const mpz_t square, const mpz_t denominator, int unit)
+double ebpo_round_root(const mpz_t square, const mpz_t denominator, int unit)
 {
     if (mpz_sgn(square) == 0)
         return 0;
@@ -113,7 +113,7 @@ double ebpo_root_of_fraction(const mpz_t square, const mpz_t denominator, int un
     return value;
 }
 
-double ebpo_fraction_value(const mpz_t numerator, const mpz_t denominator, int unit)
+double ebpo_round_quotient(const mpz_t numerator, const mpz_t denominator, int unit)
 {
     mpz_t q, rest, size;
     mpz_inits(q, rest, size, NULL);

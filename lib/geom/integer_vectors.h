@@ -26,9 +26,9 @@ int ebpo_common_unit(const double *x, int n, int unit);
 void ebpo_set_integer(mpz_t out, double x, int unit);
 
 /* sqrt(square / denominator) * 2^unit, the nearest double, ties to even; INFINITY beyond. */
-double ebpo_root_of_fraction(const mpz_t square, const mpz_t denominator, int unit);
+double ebpo_round_root(const mpz_t square, const mpz_t denominator, int unit);
 
 /* (numerator / denominator) * 2^unit, the same; denominator > 0. */
-double ebpo_fraction_value(const mpz_t numerator, const mpz_t denominator, int unit);
+double ebpo_round_quotient(const mpz_t numerator, const mpz_t denominator, int unit);
 
 #endif

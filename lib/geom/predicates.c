@@ -59,6 +59,11 @@ static int orient3d_filter(double m[3][3])
     return filtered(det, 8 * eps * permanent + slack * (1 + third));
 }
 
+static inline bool same_point(const double p[3], const double q[3])
+{
+    return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
+}
+
 int ebpo_orient3d(const double a[3], const double b[3], const double c[3], const double d[3])
 {
     double m[3][3];
@@ -74,6 +79,10 @@ int ebpo_orient3d(const double a[3], const double b[3], const double c[3], const
     for (int k = 0; k < 3; k++)
         if (m[k][0] == 0 && m[k][1] == 0 && m[k][2] == 0)
             return 0;
+    /* Faces that share a corner. */
+    if (same_point(a, b) || same_point(a, c) || same_point(a, d) || same_point(b, c) ||
+        same_point(b, d) || same_point(c, d))
+        return 0;
     sign = ebpo_orient3d_expansion(a, b, c, d);
     return sign != EBPO_SIGN_UNKNOWN ? sign : ebpo_orient3d_exact(a, b, c, d);
 }

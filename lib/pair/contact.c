@@ -129,7 +129,7 @@ static void exact_point(exact_piercing *e, int unit, double out[3])
         mpz_mul(e->numerator, e->end[1].x[k], e->height[0]);
         mpz_submul(e->numerator, e->end[0].x[k], e->height[1]);
         mpz_sub(e->normal.x[0], e->height[0], e->height[1]);
-        out[k] = ebpo_fraction_value(e->numerator, e->normal.x[0], unit);
+        out[k] = ebpo_round_quotient(e->numerator, e->normal.x[0], unit);
     }
 }
 

@@ -150,7 +150,7 @@ double ebpo_triangles_distance(const double a[3][3], const double b[3][3])
     fraction_init(&f);
     int unit = unit_of(a, b, EBPO_UNIT_OF_ZEROS);
     squared_distance(a, b, unit, &f);
-    double out = ebpo_root_of_fraction(f.square, f.denominator, unit);
+    double out = ebpo_round_root(f.square, f.denominator, unit);
     fraction_clear(&f);
     return out;
 }

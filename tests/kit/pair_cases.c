@@ -20,7 +20,8 @@ const char *twin_pair_name(int kind)
                                                         "an edge nearly in the other's plane",
                                                         "translated by 1e7",
                                                         "any exponent",
-                                                        "integers times a power of two" };
+                                                        "integers times a power of two",
+                                                        "an edge nearly through an edge" };
     return names[kind];
 }
 
@@ -56,6 +57,16 @@ static void nearly_on(double t[3][3], double out[3], uint64_t *state)
         v = 0;
     for (int k = 0; k < 3; k++)
         out[k] = moved(t[0][k] + u * (t[1][k] - t[0][k]) + v * (t[2][k] - t[0][k]), state);
+}
+
+/* The edge from corner `at` of b nearly meets the one from corner 0 of a. */
+static void nearly_through(double a[3][3], double b[3][3], int at, uint64_t *state)
+{
+    double u = fabs(twin_uniform(state)), v = 0.25 + fabs(twin_uniform(state));
+    for (int k = 0; k < 3; k++) {
+        double middle = a[0][k] + u * (a[1][k] - a[0][k]);
+        b[(at + 1) % 3][k] = moved(middle + v * (middle - b[at][k]), state);
+    }
 }
 
 /* Corners on one line, or at one point. */
@@ -148,6 +159,7 @@ void twin_pair_case(double a[3][3], double b[3][3], int kind, uint64_t *state)
         scale(a, b, exponent);
         break;
     case 13: scale(a, b, exponent); break;
+    case 14: nearly_through(a, b, at, state); break;
     default: break;
     }
     if (twin_random(state) & 1) {

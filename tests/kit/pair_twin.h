@@ -26,7 +26,7 @@ const char *twin_pair_contact(const double a[3][3], const double b[3][3], const 
 int twin_pair_distance_compare(const double a[3][3], const double b[3][3], double d);
 
 /* Fills two faces with a case of the given kind. */
-enum { TWIN_PAIR_KINDS = 14 };
+enum { TWIN_PAIR_KINDS = 15 };
 const char *twin_pair_name(int kind);
 void twin_pair_case(double a[3][3], double b[3][3], int kind, uint64_t *state);
 

@@ -1,0 +1,137 @@
+/* Nanoseconds for each pair of faces: the filter of eight, the exact test, contacts, distances; by
+ * kind of input. Not a test: prints a table. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+#include "exact_twin.h"
+#include "pair/contact.h"
+#include "pair/pair_distance.h"
+#include "pair/pair_filter.h"
+#include "pair/triangle_pair.h"
+#include "pair_twin.h"
+
+enum { PAIRS = 4096, ROUNDS = 40 };
+
+typedef double face[3][3];
+static face first[PAIRS], second[PAIRS], crossing[PAIRS][2];
+static float first32[PAIRS / 8][72], second32[PAIRS / 8][72];
+static float error;
+static int crossings;
+static volatile double sink;
+
+#define CORNERS(face) ((const double(*)[3])(face))
+
+static double now_ns(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return (double)t.tv_sec * 1e9 + (double)t.tv_nsec;
+}
+
+static void fill(int kind, uint64_t *state)
+{
+    double most = 0;
+    crossings = 0;
+    for (int i = 0; i < PAIRS; i++) {
+        twin_pair_case(first[i], second[i], kind, state);
+        if (ebpo_triangle_pair(CORNERS(first[i]), CORNERS(second[i])) == EBPO_PAIR_CROSSING) {
+            memcpy(crossing[crossings][0], first[i], sizeof(face));
+            memcpy(crossing[crossings++][1], second[i], sizeof(face));
+        }
+        for (int k = 0; k < 9; k++) {
+            double o = first[i][0][k % 3], x = first[i][k / 3][k % 3] - o,
+                   y = second[i][k / 3][k % 3] - o;
+            first32[i / 8][8 * k + i % 8] = (float)x;
+            second32[i / 8][8 * k + i % 8] = (float)y;
+            most = fmax(most, fmax(fabs(x), fabs(y)));
+        }
+    }
+    error = (float)(most * 0x1.1p-24);
+}
+
+typedef double work(int pair);
+
+static double filter_base(int i)
+{
+    return i % 8 ? 0 : ebpo_pair_kernels_base.eight(first32[i / 8], second32[i / 8], error).apart;
+}
+
+static double filter_best(int i)
+{
+    return i % 8 ? 0
+                 : ebpo_pair_kernels_best()->eight(first32[i / 8], second32[i / 8], error).apart;
+}
+
+static double filter_one(int i)
+{
+    return i % 8 ? 0 : ebpo_pair_kernels_best()->one(first32[0], second32[i / 8], error).apart;
+}
+
+static double exact_kind(int i)
+{
+    return ebpo_triangle_pair(CORNERS(first[i]), CORNERS(second[i]));
+}
+
+static double contact(int i)
+{
+    ebpo_contact_end end[2];
+    if (!crossings)
+        return 0;
+    ebpo_triangle_contact(CORNERS(crossing[i % crossings][0]), CORNERS(crossing[i % crossings][1]),
+                          end);
+    return end[0].point[0];
+}
+
+static double bounds(int i)
+{
+    ebpo_pair_distance_bounds out;
+    ebpo_triangles_distance_bounds(CORNERS(first[i]), CORNERS(second[i]), &out);
+    return out.lo;
+}
+
+static double exact_distance(int i)
+{
+    return ebpo_triangles_distance(CORNERS(first[i]), CORNERS(second[i]));
+}
+
+/* The least of some runs, by the thread's own time. */
+static double ns_per_pair(work *f, int pairs, int rounds)
+{
+    double least = INFINITY;
+    for (int round = 0; round < rounds; round++) {
+        double start = now_ns(), sum = 0;
+        for (int i = 0; i < pairs; i++)
+            sum += f(i);
+        sink = sum;
+        least = fmin(least, (now_ns() - start) / pairs);
+    }
+    return least;
+}
+
+static double share_open(void)
+{
+    int decided = 0;
+    for (int i = 0; i < PAIRS / 8; i++) {
+        ebpo_pair_masks m = ebpo_pair_kernels_base.eight(first32[i], second32[i], error);
+        decided += __builtin_popcount((unsigned)m.apart | m.crossing);
+    }
+    return 100 - 100.0 * decided / PAIRS;
+}
+
+int main(void)
+{
+    uint64_t state = 1;
+    printf("%-34s %8s %8s %8s %8s %8s %8s %8s %8s\n", "ns for each pair", "base", "best", "one",
+           "open %", "exact", "contact", "bounds", "distance");
+    for (int kind = 0; kind < TWIN_PAIR_KINDS; kind++) {
+        fill(kind, &state);
+        printf("%-34s %8.2f %8.2f %8.2f %8.2f %8.1f %8.0f %8.0f %8.0f\n", twin_pair_name(kind),
+               ns_per_pair(filter_base, PAIRS, ROUNDS), ns_per_pair(filter_best, PAIRS, ROUNDS),
+               ns_per_pair(filter_one, PAIRS, ROUNDS), share_open(),
+               ns_per_pair(exact_kind, PAIRS, ROUNDS), ns_per_pair(contact, PAIRS, 4),
+               ns_per_pair(bounds, PAIRS, ROUNDS), ns_per_pair(exact_distance, 64, 2));
+    }
+    return 0;
+}
