@@ -1,4 +1,5 @@
 /* Posed coordinates: their definition, what is refused, and how far they are from true motions. */
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -6,7 +7,7 @@
 
 #include "check_main.h"
 #include "exact_twin.h"
-#include "pair/pose.h"
+#include "pair/posed_block.h"
 #include "solids.h"
 
 enum { CASES = 20000 };
@@ -186,12 +187,85 @@ START_TEST(what_is_no_pose_is_refused)
 }
 END_TEST
 
+/* --- blocks --- */
+
+static void random_pose(ebpo_pose *pose, double far, uint64_t *state)
+{
+    int64_t m[3][3], n = exact_rotation(m, state);
+    for (int k = 0; k < 9; k++)
+        pose->rotation[k / 3][k % 3] = (double)m[k / 3][k % 3] / (double)n;
+    for (int k = 0; k < 3; k++)
+        pose->translation[k] = far * twin_uniform(state);
+    pose->scale = ldexp(1.5 + 0.4 * twin_uniform(state), (int)twin_integer(state, -20, 20));
+}
+
+/* Faces of about `size`, `far` from the model's origin; lanes from `faces` on have none. */
+static void random_block(double wide[72], float block[72], double far, double size, int faces,
+                         uint64_t *state)
+{
+    double centre[3] = { far * twin_uniform(state), far * twin_uniform(state), far };
+    for (int i = 0; i < 72; i++) {
+        block[i] = (float)(centre[i / 8 % 3] + size * twin_uniform(state));
+        if (i % 8 >= faces)
+            block[i] = FLT_MAX;
+        wide[i] = i % 8 >= faces ? DBL_MAX : (double)block[i];
+    }
+}
+
+static void check_block(const ebpo_block_posing *p, const ebpo_posed_block *posed,
+                        const double block[72], const double origin[3], int faces)
+{
+    float out[72], error = ebpo_posed_block_place(posed, p->unit, origin, out);
+    for (int at = 0; at < 3 * faces; at++) {
+        int first = 24 * (at / faces) + at % faces;
+        double x[3] = { block[first], block[first + 8], block[first + 16] }, world[3];
+        ebpo_posing_apply(&p->posing, x, world);
+        for (int k = 0; k < 3; k++) {
+            double off = fabs((double)out[first + 8 * k] - (world[k] - origin[k]) * p->unit);
+            ck_assert_msg(off <= (double)error * (1 + 0x1p-20), "off by %g, stated %g", off,
+                          (double)error);
+        }
+    }
+}
+
+START_TEST(posed_blocks_are_within_their_errors)
+{
+    uint64_t state = 17;
+    for (int i = 0; i < (int)ebpo_test_scaled(CASES); i++) {
+        double far = ldexp(1, (int)twin_integer(&state, -30, 20)), origin[3];
+        double size = far * ldexp(1, -(int)twin_integer(&state, 0, 20));
+        const double reach[3] = { 3 * far, 3 * far, 3 * far };
+        int faces = (int)twin_integer(&state, 1, 8);
+        ebpo_pose pose;
+        ebpo_posing posing;
+        ebpo_block_posing p;
+        ebpo_posed_block posed, wide;
+        double block[72];
+        float block32[72];
+        random_pose(&pose, far, &state);
+        ck_assert_int_eq(ebpo_posing_make(&posing, &pose, reach, NULL), EBPO_OK);
+        ebpo_block_posing_make(&p, &posing, far + 9 * far * pose.scale);
+        ck_assert(p.fits);
+        random_block(block, block32, far, size, faces, &state);
+        ebpo_posed_block_make(&posed, &p, block32);
+        ebpo_posed_block_make_wide(&wide, &p, block);
+        ck_assert_mem_eq(posed.base, wide.base, sizeof posed.base);
+        for (int k = 0; k < 3; k++)
+            origin[k] = posed.base[k] + pose.scale * size * twin_uniform(&state);
+        check_block(&p, &posed, block, origin, faces);
+        check_block(&p, &wide, block, origin, faces);
+        ck_assert((double)posed.error <= 0x1p-18 * pose.scale * p.unit * size + (double)p.doubt);
+    }
+}
+END_TEST
+
 Suite *test_suite(void)
 {
     TCase *tests = tcase_create("pose");
     tcase_set_timeout(tests, 300);
     tcase_add_test(tests, posed_points_are_as_close_as_stated);
     tcase_add_test(tests, posed_points_are_as_defined);
+    tcase_add_test(tests, posed_blocks_are_within_their_errors);
     tcase_add_test(tests, what_is_no_pose_is_refused);
     Suite *suite = suite_create("pose");
     suite_add_tcase(suite, tests);
