@@ -3,6 +3,7 @@
 
 #include "pair/flat_pair.h"
 
+#include <stdbool.h>
 #include <string.h>
 
 #include "geom/predicates.h"

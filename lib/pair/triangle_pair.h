@@ -6,12 +6,7 @@
 
 #include <stdbool.h>
 
-typedef enum ebpo_pair_kind {
-    EBPO_PAIR_APART = 0,
-    EBPO_PAIR_TOUCHING = 1, /* a common point; interiors do not meet */
-    EBPO_PAIR_CROSSING = 2, /* interiors meet, planes differ */
-    EBPO_PAIR_COPLANAR = 3  /* interiors meet in one plane */
-} ebpo_pair_kind;
+#include "pair/pair_kind.h"
 
 ebpo_pair_kind ebpo_triangle_pair(const double a[3][3], const double b[3][3]);
 

@@ -212,6 +212,20 @@ static void random_block(double wide[72], float block[72], double far, double si
     }
 }
 
+/* Of the block as such, beside its base; then as it is placed. */
+static void check_turned(const ebpo_block_posing *p, const ebpo_posed_block *posed,
+                         const double x[3], int first)
+{
+    double world[3];
+    ebpo_posing_apply(&p->posing, x, world);
+    for (int k = 0; k < 3; k++) {
+        double off = fabs((double)posed->x[first + 8 * k] - (world[k] - posed->base[k]) * p->unit);
+        ck_assert_msg(off <= (double)posed->error, "off by %g, stated %g", off,
+                      (double)posed->error);
+        ck_assert(fabsf(posed->x[first + 8 * k]) <= posed->reach);
+    }
+}
+
 static void check_block(const ebpo_block_posing *p, const ebpo_posed_block *posed,
                         const double block[72], const double origin[3], int faces)
 {
@@ -219,6 +233,7 @@ static void check_block(const ebpo_block_posing *p, const ebpo_posed_block *pose
     for (int at = 0; at < 3 * faces; at++) {
         int first = 24 * (at / faces) + at % faces;
         double x[3] = { block[first], block[first + 8], block[first + 16] }, world[3];
+        check_turned(p, posed, x, first);
         ebpo_posing_apply(&p->posing, x, world);
         for (int k = 0; k < 3; k++) {
             double off = fabs((double)out[first + 8 * k] - (world[k] - origin[k]) * p->unit);
@@ -250,8 +265,9 @@ START_TEST(posed_blocks_are_within_their_errors)
         ebpo_posed_block_make(&posed, &p, block32);
         ebpo_posed_block_make_wide(&wide, &p, block);
         ck_assert_mem_eq(posed.base, wide.base, sizeof posed.base);
+        double away = pose.scale * size * ldexp(1, (int)twin_integer(&state, -2, 8));
         for (int k = 0; k < 3; k++)
-            origin[k] = posed.base[k] + pose.scale * size * twin_uniform(&state);
+            origin[k] = posed.base[k] + away * twin_uniform(&state);
         check_block(&p, &posed, block, origin, faces);
         check_block(&p, &wide, block, origin, faces);
         ck_assert((double)posed.error <= 0x1p-18 * pose.scale * p.unit * size + (double)p.doubt);
