@@ -39,6 +39,11 @@ EBPO_EIGHT f8 f8_or(f8 a, f8 b) { return _mm256_or_ps(a, b); }
 EBPO_EIGHT f8 f8_xor(f8 a, f8 b) { return _mm256_xor_ps(a, b); }
 EBPO_EIGHT f8 f8_pick(f8 mask, f8 yes, f8 no) { return _mm256_blendv_ps(no, yes, mask); }
 EBPO_EIGHT unsigned f8_bits(f8 mask) { return (unsigned)_mm256_movemask_ps(mask); }
+/* x[from[0]], x[from[1]], ...; all of x[0] to x[7] may be read. */
+EBPO_EIGHT f8 f8_load_lanes(const float *x, const int32_t *from)
+{
+    return _mm256_permutevar8x32_ps(_mm256_loadu_ps(x), _mm256_loadu_si256((const __m256i *)from));
+}
 EBPO_EIGHT f8 f8_abs(f8 a)
 {
     return _mm256_and_ps(a, _mm256_castsi256_ps(_mm256_set1_epi32(0x7fffffff)));
@@ -101,6 +106,11 @@ EBPO_EIGHT f8 f8_load_twice(const float *x)
     f4 a;
     memcpy(&a, x, sizeof a);
     return (f8){ { a, a } };
+}
+EBPO_EIGHT f8 f8_load_lanes(const float *x, const int32_t *from)
+{
+    return (f8){ { { x[from[0]], x[from[1]], x[from[2]], x[from[3]] },
+                   { x[from[4]], x[from[5]], x[from[6]], x[from[7]] } } };
 }
 EBPO_EIGHT void f8_store(float *x, f8 a) { memcpy(x, &a, sizeof a); }
 EBPO_EIGHT f8 f8_add(f8 a, f8 b) { EBPO_BOTH(a.half[h] + b.half[h]); }

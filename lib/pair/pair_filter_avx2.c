@@ -3,4 +3,4 @@
 
 #include "pair/pair_filter.inc"
 
-const ebpo_pair_kernels ebpo_pair_kernels_avx2 = { filter_one, filter_eight };
+const ebpo_pair_kernels ebpo_pair_kernels_avx2 = { filter_one, filter_eight, filter_blocks };

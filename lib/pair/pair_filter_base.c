@@ -3,7 +3,7 @@
 
 #include "pair/pair_filter.inc"
 
-const ebpo_pair_kernels ebpo_pair_kernels_base = { filter_one, filter_eight };
+const ebpo_pair_kernels ebpo_pair_kernels_base = { filter_one, filter_eight, filter_blocks };
 
 const ebpo_pair_kernels *ebpo_pair_kernels_best(void)
 {

@@ -1,5 +1,5 @@
 /* Nanoseconds for each pair of faces: the filter of eight, the exact test, contacts, distances; by
- * kind of input. Not a test: prints a table. */
+ * kind of input; and for pairs of blocks. Not a test: prints a table. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -9,6 +9,7 @@
 #include "pair/contact.h"
 #include "pair/pair_distance.h"
 #include "pair/pair_filter.h"
+#include "pair/posed_block.h"
 #include "pair/triangle_pair.h"
 #include "pair_twin.h"
 
@@ -120,6 +121,96 @@ static double share_open(void)
     return 100 - 100.0 * decided / PAIRS;
 }
 
+/* --- blocks of a surface against blocks of another one that goes through it --- */
+
+enum { BLOCKS = 512 };
+static float patch[2][BLOCKS][72];
+static ebpo_posed_block posed[2][BLOCKS];
+static ebpo_block_posing posing[2];
+static ebpo_block_pairs found;
+
+/* Eight faces of a strip of four squares of a wavy surface. */
+static void fill_patch(float block[72], uint64_t *state)
+{
+    double height[2][5];
+    for (int i = 0; i < 10; i++)
+        height[i / 5][i % 5] = 0.3 * twin_uniform(state);
+    for (int lane = 0; lane < 8; lane++) {
+        static const int corners[2][3][2] = { { { 0, 0 }, { 1, 0 }, { 1, 1 } },
+                                              { { 0, 0 }, { 1, 1 }, { 0, 1 } } };
+        for (int c = 0; c < 3; c++) {
+            int x = corners[lane & 1][c][0] + lane / 2, y = corners[lane & 1][c][1];
+            block[8 * (3 * c) + lane] = (float)(x + 0.1 * height[y][x]);
+            block[8 * (3 * c + 1) + lane] = (float)y;
+            block[8 * (3 * c + 2) + lane] = (float)height[y][x];
+        }
+    }
+}
+
+static void fill_blocks(uint64_t *state)
+{
+    static const double reach[3] = { 8, 8, 8 };
+    static const ebpo_pose poses[] = {
+        { { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, { 0, 0, 0 }, 1 },
+        { { { 0.36, 0.48, -0.8 }, { -0.8, 0.6, 0 }, { 0.48, 0.64, 0.6 } }, { 1, 1.5, -1.5 }, 1 }
+    };
+    for (int of = 0; of < 2; of++) {
+        ebpo_posing p;
+        if (ebpo_posing_make(&p, &poses[of], reach, NULL) != EBPO_OK)
+            return;
+        ebpo_block_posing_make(&posing[of], &p, 32);
+        for (int i = 0; i < BLOCKS; i++) {
+            fill_patch(patch[of][i], state);
+            ebpo_posed_block_make(&posed[of][i], &posing[of], patch[of][i]);
+        }
+    }
+}
+
+static double turn_block(int i)
+{
+    ebpo_posed_block_make(&posed[1][i], &posing[1], patch[1][i]);
+    return (double)posed[1][i].x[0];
+}
+
+static double place_block(int i)
+{
+    float out[72];
+    float off = ebpo_posed_block_place(&posed[1][i], posing[0].unit, posed[0][i].base, out);
+    return (double)(off + out[0]);
+}
+
+static double pair_blocks_by(const ebpo_pair_kernels *kernels, int i)
+{
+    float a[72], b[72];
+    const double *origin = posed[0][i].base;
+    float off_a = ebpo_posed_block_place(&posed[0][i], posing[0].unit, origin, a),
+          off_b = ebpo_posed_block_place(&posed[1][i], posing[0].unit, origin, b);
+    kernels->blocks(a, 255, b, 255, off_a > off_b ? off_a : off_b, &found);
+    return found.count;
+}
+
+static double pair_blocks_base(int i) { return pair_blocks_by(&ebpo_pair_kernels_base, i); }
+
+static double pair_blocks_best(int i) { return pair_blocks_by(ebpo_pair_kernels_best(), i); }
+
+static void report_blocks(uint64_t *state)
+{
+    int meet = 0, certain = 0;
+    fill_blocks(state);
+    for (int i = 0; i < BLOCKS; i++) {
+        pair_blocks_best(i);
+        meet += (int)found.count;
+        for (unsigned k = 0; k < found.count; k++)
+            certain += (found.pair[k] & EBPO_CERTAINLY_CROSSING) != 0;
+    }
+    printf("\nns for each pair of blocks: turn one %.1f, place one %.1f, place and filter all 64 "
+           "pairs: base %.1f, best %.1f\n(%.2f crossing for certain, %.3f open)\n",
+           ns_per_pair(turn_block, BLOCKS, ROUNDS), ns_per_pair(place_block, BLOCKS, ROUNDS),
+           ns_per_pair(pair_blocks_base, BLOCKS, ROUNDS),
+           ns_per_pair(pair_blocks_best, BLOCKS, ROUNDS), (double)certain / BLOCKS,
+           (double)(meet - certain) / BLOCKS);
+}
+
 int main(void)
 {
     uint64_t state = 1;
@@ -133,5 +224,6 @@ int main(void)
                ns_per_pair(exact_kind, PAIRS, ROUNDS), ns_per_pair(contact, PAIRS, 4),
                ns_per_pair(bounds, PAIRS, ROUNDS), ns_per_pair(exact_distance, 64, 2));
     }
+    report_blocks(&state);
     return 0;
 }

@@ -9,6 +9,7 @@
 #include "exact_twin.h"
 #include "pair/contact.h"
 #include "pair/pair_filter.h"
+#include "pair/posed_block.h"
 #include "pair/triangle_pair.h"
 #include "pair_twin.h"
 #include "solids.h"
@@ -188,6 +189,135 @@ START_TEST(filter_says_what_is_exact)
 }
 END_TEST
 
+/* All pairs of two blocks are told as by one face at a time. */
+static void check_blocks(const batch *g, unsigned lanes_a, unsigned lanes_b)
+{
+    ebpo_block_pairs found, other;
+    unsigned at = 0;
+    ebpo_pair_kernels_base.blocks(g->a, lanes_a, g->b, lanes_b, g->error, &found);
+    ebpo_pair_kernels_best()->blocks(g->a, lanes_a, g->b, lanes_b, g->error, &other);
+    ck_assert(found.count == other.count && !memcmp(found.pair, other.pair, found.count));
+    for (unsigned i = 0; i < 64; i++) {
+        unsigned lane_a = i & 7, lane_b = i >> 3;
+        float a[9];
+        if (!(lanes_a >> lane_a & lanes_b >> lane_b & 1))
+            continue;
+        for (int k = 0; k < 9; k++)
+            a[k] = g->a[8 * k + (int)lane_a];
+        ebpo_pair_masks m = ebpo_pair_kernels_base.one(a, g->b, g->error);
+        if (m.apart >> lane_b & 1)
+            continue;
+        ck_assert_uint_lt(at, found.count);
+        unsigned expected = i | (m.crossing >> lane_b & 1 ? EBPO_CERTAINLY_CROSSING : 0);
+        ck_assert_uint_eq(found.pair[at++], expected);
+    }
+    ck_assert_uint_eq(at, found.count);
+}
+
+START_TEST(blocks_are_told_as_single_faces)
+{
+    uint64_t state = (uint64_t)_i + 131;
+    if (!fit_for_floats(_i))
+        return;
+    for (int i = 0; i < (int)ebpo_test_scaled(FILTERED); i++) {
+        batch g;
+        for (int lane = 0; lane < 8; lane++)
+            twin_pair_case(g.f[lane].a, g.f[lane].b, _i, &state);
+        to_floats(&g, 0, &state);
+        uint64_t lanes = twin_random(&state);
+        check_blocks(&g, i & 1 ? 255 : lanes & 255, i & 1 ? 255 : lanes >> 8 & 255);
+    }
+}
+END_TEST
+
+/* --- from blocks in files to pairs in the world --- */
+
+typedef struct posed_model {
+    float block[72];
+    double world[8][3][3];
+    ebpo_posing posing;
+    ebpo_posed_block posed;
+} posed_model;
+
+/* Equal poses keep what is degenerate nearly so; `turn`: none, a quarter, or neither. */
+static ebpo_pose pose_by(int turn)
+{
+    static const double rotations[3][3][3] = {
+        { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } },
+        { { 0, -1, 0 }, { 1, 0, 0 }, { 0, 0, 1 } },
+        { { 0.36, 0.48, -0.8 }, { -0.8, 0.6, 0 }, { 0.48, 0.64, 0.6 } }
+    };
+    ebpo_pose pose = { .translation = { turn * 0.3, turn * -70.1, 0.5 }, .scale = 1 + turn };
+    memcpy(pose.rotation, rotations[turn], sizeof pose.rotation);
+    return pose;
+}
+
+static void pose_model(posed_model *m, const ebpo_pose *pose)
+{
+    static const double reach[3] = { 2e7, 2e7, 2e7 };
+    ebpo_block_posing p;
+    ck_assert_int_eq(ebpo_posing_make(&m->posing, pose, reach, NULL), EBPO_OK);
+    ebpo_block_posing_make(&p, &m->posing, 2e8);
+    ebpo_posed_block_make(&m->posed, &p, m->block);
+    for (int lane = 0; lane < 8; lane++)
+        for (int c = 0; c < 3; c++) {
+            double x[3];
+            for (int k = 0; k < 3; k++)
+                x[k] = (double)m->block[8 * (3 * c + k) + lane];
+            ebpo_posing_apply(&m->posing, x, m->world[lane][c]);
+        }
+}
+
+static void fill_models(posed_model *a, posed_model *b, int kind, uint64_t *state)
+{
+    for (int lane = 0; lane < 8; lane++) {
+        faces f;
+        twin_pair_case(f.a, f.b, kind, state);
+        for (int k = 0; k < 9; k++) {
+            a->block[8 * k + lane] = (float)f.a[k / 3][k % 3];
+            b->block[8 * k + lane] = (float)f.b[k / 3][k % 3];
+        }
+    }
+}
+
+static void check_posed(const posed_model *a, const posed_model *b)
+{
+    float x[72], y[72];
+    double unit = ebpo_block_unit(2e8);
+    float off_a = ebpo_posed_block_place(&a->posed, unit, a->posed.base, x),
+          off_b = ebpo_posed_block_place(&b->posed, unit, a->posed.base, y);
+    ebpo_block_pairs found;
+    unsigned at = 0;
+    ebpo_pair_kernels_best()->blocks(x, 255, y, 255, fmaxf(off_a, off_b), &found);
+    for (unsigned i = 0; i < 64; i++) {
+        ebpo_pair_kind kind =
+            ebpo_triangle_pair(CORNERS(a->world[i & 7]), CORNERS(b->world[i >> 3]));
+        bool listed = at < found.count && (found.pair[at] & 63u) == i;
+        ck_assert(listed || kind == EBPO_PAIR_APART);
+        if (listed && found.pair[at++] & EBPO_CERTAINLY_CROSSING)
+            ck_assert_int_eq(kind, EBPO_PAIR_CROSSING);
+    }
+    ck_assert_uint_eq(at, found.count);
+}
+
+START_TEST(posed_blocks_lose_no_pair)
+{
+    uint64_t state = (uint64_t)_i + 151;
+    if (!fit_for_floats(_i))
+        return;
+    for (int i = 0; i < (int)ebpo_test_scaled(FILTERED); i++) {
+        posed_model a, b;
+        ebpo_pose pose = pose_by(i % 3);
+        fill_models(&a, &b, _i, &state);
+        pose_model(&a, &pose);
+        if (i & 4)
+            pose = pose_by((i + 1) % 3);
+        pose_model(&b, &pose);
+        check_posed(&a, &b);
+    }
+}
+END_TEST
+
 /* --- the filter where its bounds matter --- */
 
 /* Twice three corners by number, and the determinant of four of them. */
@@ -341,6 +471,8 @@ Suite *test_suite(void)
     tcase_add_loop_test(tests, kinds_equal_brute_force, 0, TWIN_PAIR_KINDS);
     tcase_add_loop_test(tests, kinds_do_not_depend_on_order, 0, TWIN_PAIR_KINDS);
     tcase_add_loop_test(tests, filter_says_what_is_exact, 0, TWIN_PAIR_KINDS);
+    tcase_add_loop_test(tests, blocks_are_told_as_single_faces, 0, TWIN_PAIR_KINDS);
+    tcase_add_loop_test(tests, posed_blocks_lose_no_pair, 0, TWIN_PAIR_KINDS);
     tcase_add_loop_test(tests, filter_holds_where_its_bounds_matter, 0, 4);
     tcase_add_loop_test(tests, contacts_are_where_faces_meet, 0, TWIN_PAIR_KINDS);
     Suite *suite = suite_create("pair");
