@@ -20,8 +20,8 @@ typedef struct ebpo_block_pairs {
     unsigned count;
 } ebpo_block_pairs;
 
-/* Faces are [9][8] floats as in blocks: x, y, z of corner 0, of corner 1, of corner 2. Each is
- * within `error` (0 or more) of the exact coordinate less that of a point, the same one for both
+/* Faces are [9][8] floats: x, y, z of corner 0, of corner 1, of corner 2, of eight faces each. Each
+ * is within `error` (0 or more) of the exact coordinate less that of a point, the same one for both
  * faces of a pair, and at most 2^36 in size. Lanes without a face may hold anything, and their bits
  * mean nothing. */
 typedef struct ebpo_pair_kernels {

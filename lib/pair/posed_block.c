@@ -1,12 +1,12 @@
-/* Loops over eight lanes, which compilers turn into vectors: the operations are the same ones. */
+/* Loops over 24 vertices, which compilers turn into vectors: the operations are the same ones. */
 #include "geom/strict_fp.h"
 
 #include "pair/posed_block.h"
 
-#include <float.h>
 #include <math.h>
+#include <string.h>
 
-enum { LANES = 8 };
+enum { MOST = EBPO_POSED_VERTICES };
 
 static float greater(float a, float b) { return a > b ? a : b; }
 
@@ -29,69 +29,55 @@ void ebpo_block_posing_make(ebpo_block_posing *out, const ebpo_posing *posing, d
         out->matrix[i / 3][i % 3] = (float)(posing->matrix[i / 3][i % 3] * out->unit);
 }
 
-/* One corner of eight faces less the first one's; returns the greatest 1-norm. */
-static float corner_less(const float *x, const float base[3], float d[3][LANES])
+void ebpo_posed_block_make(ebpo_posed_block *out, const ebpo_block_posing *p, const float *vertex,
+                           unsigned vertices)
 {
-    float most = 0;
-    for (int k = 0; k < 3; k++)
-        for (int lane = 0; lane < LANES; lane++) {
-            float v = x[k * LANES + lane];
-            d[k][lane] = v < FLT_MAX ? v - base[k] : 0;
-        }
-    for (int lane = 0; lane < LANES; lane++)
-        most = greater(most, fabsf(d[0][lane]) + fabsf(d[1][lane]) + fabsf(d[2][lane]));
-    return most;
-}
-
-void ebpo_posed_block_make(ebpo_posed_block *out, const ebpo_block_posing *p, const float *block)
-{
-    const float base[3] = { block[0], block[LANES], block[2 * LANES] };
+    const float base[3] = { vertex[0], vertex[vertices], vertex[2 * vertices] };
     ebpo_posing_apply(&p->posing, (const double[3]){ base[0], base[1], base[2] }, out->base);
-    float most = 0, d[3][LANES];
-    for (int c = 0; c < 3; c++) {
-        most = greater(most, corner_less(block + 3 * c * LANES, base, d));
-        for (int i = 0; i < 3; i++) {
-            const float *m = p->matrix[i];
-            for (int lane = 0; lane < LANES; lane++)
-                out->x[(3 * c + i) * LANES + lane] =
-                    (m[0] * d[0][lane] + m[1] * d[1][lane]) + m[2] * d[2][lane];
-        }
+    float most = 0, d[3][MOST] = { { 0 } };
+    for (unsigned k = 0; k < 3; k++)
+        for (unsigned i = 0; i < vertices; i++)
+            d[k][i] = vertex[k * vertices + i] - base[k];
+    for (int i = 0; i < MOST; i++)
+        most = greater(most, fabsf(d[0][i]) + fabsf(d[1][i]) + fabsf(d[2][i]));
+    for (int k = 0; k < 3; k++) {
+        const float *m = p->matrix[k];
+        for (int i = 0; i < MOST; i++)
+            out->x[k][i] = (m[0] * d[0][i] + m[1] * d[1][i]) + m[2] * d[2][i];
     }
+    out->vertices = vertices;
     out->reach = p->size * most * (1 + 0x1p-20f);
     out->error = 6 * 0x1p-24f * out->reach + p->doubt;
 }
 
 void ebpo_posed_block_make_wide(ebpo_posed_block *out, const ebpo_block_posing *p,
-                                const double *block)
+                                const double *vertex, unsigned vertices)
 {
-    const double base[3] = { block[0], block[LANES], block[2 * LANES] };
+    const double base[3] = { vertex[0], vertex[vertices], vertex[2 * vertices] };
     ebpo_posing_apply(&p->posing, base, out->base);
+    memset(out->x, 0, sizeof out->x);
     out->reach = 0;
-    for (int at = 0; at < 3 * LANES; at++) {
-        int c = at / LANES, lane = at % LANES;
-        const double *x = block + 3 * c * LANES + lane, v[3] = { x[0], x[LANES], x[2 * LANES] };
-        double posed[3] = { out->base[0], out->base[1], out->base[2] };
-        if (v[0] < DBL_MAX)
-            ebpo_posing_apply(&p->posing, v, posed);
-        for (int i = 0; i < 3; i++) {
-            float f = (float)((posed[i] - out->base[i]) * p->unit);
-            out->x[(3 * c + i) * LANES + lane] = f;
-            out->reach = greater(out->reach, fabsf(f));
+    for (unsigned i = 0; i < vertices; i++) {
+        double v[3] = { vertex[i], vertex[vertices + i], vertex[2 * vertices + i] }, posed[3];
+        ebpo_posing_apply(&p->posing, v, posed);
+        for (int k = 0; k < 3; k++) {
+            out->x[k][i] = (float)((posed[k] - out->base[k]) * p->unit);
+            out->reach = greater(out->reach, fabsf(out->x[k][i]));
         }
     }
+    out->vertices = vertices;
     out->error = 2 * 0x1p-24f * out->reach + p->doubt;
 }
 
 float ebpo_posed_block_place(const ebpo_posed_block *b, double unit, const double origin[3],
-                             float out[72])
+                             float out[3][EBPO_POSED_VERTICES])
 {
-    float shift[3], most = 0;
+    float most = 0;
     for (int k = 0; k < 3; k++) {
-        shift[k] = (float)((b->base[k] - origin[k]) * unit);
-        most = greater(most, fabsf(shift[k]));
+        float shift = (float)((b->base[k] - origin[k]) * unit);
+        most = greater(most, fabsf(shift));
+        for (int i = 0; i < MOST; i++)
+            out[k][i] = b->x[k][i] + shift;
     }
-    for (int i = 0; i < 9; i++)
-        for (int lane = 0; lane < LANES; lane++)
-            out[i * LANES + lane] = b->x[i * LANES + lane] + shift[i % 3];
     return b->error + 0x1.2p-24f * b->reach + 2.5f * 0x1p-24f * most;
 }

@@ -24,22 +24,28 @@ double ebpo_block_unit(double reach);
 /* reach: as for ebpo_block_unit, the same for both models of a pair. */
 void ebpo_block_posing_make(ebpo_block_posing *out, const ebpo_posing *posing, double reach);
 
-/* A block, turned, beside the posed coordinates of its first face's first corner. */
+/* At most: eight faces without a vertex in common. */
+enum { EBPO_POSED_VERTICES = 24 };
+
+/* A block's vertices, turned, beside the posed coordinates of its first one. */
 typedef struct ebpo_posed_block {
-    _Alignas(32) float x[72]; /* as in blocks; lanes without a face are at 0 */
-    double base[3];           /* posed coordinates, as defined */
-    float error;              /* x + base * unit less the exact one times unit, at most */
-    float reach;              /* no |x| is greater */
+    _Alignas(32) float x[3][EBPO_POSED_VERTICES]; /* 0 from `vertices` on */
+    double base[3];                               /* posed coordinates, as defined */
+    unsigned vertices;
+    float error; /* x + base * unit less the exact one times unit, at most */
+    float reach; /* no |x| is greater */
 } ebpo_posed_block;
 
-/* block: [9][8] as in accel.h; lane 0 has a face, lanes without one hold FLT_MAX (or DBL_MAX). The
- * first: p->fits. */
-void ebpo_posed_block_make(ebpo_posed_block *out, const ebpo_block_posing *p, const float *block);
+/* vertex: [3][vertices], all x, all y, all z, as blocks have them; 1 to 24 of them. The first:
+ * p->fits. */
+void ebpo_posed_block_make(ebpo_posed_block *out, const ebpo_block_posing *p, const float *vertex,
+                           unsigned vertices);
 void ebpo_posed_block_make_wide(ebpo_posed_block *out, const ebpo_block_posing *p,
-                                const double *block);
+                                const double *vertex, unsigned vertices);
 
-/* The block as seen from `origin` in the world, for ebpo_pair_kernels; returns its error. */
+/* The vertices as seen from `origin` in the world, from which a block's corners pick the faces that
+ * ebpo_pair_kernels take; returns their error. */
 float ebpo_posed_block_place(const ebpo_posed_block *b, double unit, const double origin[3],
-                             float out[72]);
+                             float out[3][EBPO_POSED_VERTICES]);
 
 #endif

@@ -252,13 +252,28 @@ static ebpo_pose pose_by(int turn)
     return pose;
 }
 
+/* Eight faces without common vertices, and back. */
+static void to_vertices(const float block[72], float vertex[3][24])
+{
+    for (int i = 0; i < 72; i++)
+        vertex[i / 8 % 3][i / 24 * 8 + i % 8] = block[i];
+}
+
+static void to_faces(float (*vertex)[24], float block[72])
+{
+    for (int i = 0; i < 72; i++)
+        block[i] = vertex[i / 8 % 3][i / 24 * 8 + i % 8];
+}
+
 static void pose_model(posed_model *m, const ebpo_pose *pose)
 {
     static const double reach[3] = { 2e7, 2e7, 2e7 };
     ebpo_block_posing p;
+    float vertex[3][24];
     ck_assert_int_eq(ebpo_posing_make(&m->posing, pose, reach, NULL), EBPO_OK);
     ebpo_block_posing_make(&p, &m->posing, 2e8);
-    ebpo_posed_block_make(&m->posed, &p, m->block);
+    to_vertices(m->block, vertex);
+    ebpo_posed_block_make(&m->posed, &p, vertex[0], 24);
     for (int lane = 0; lane < 8; lane++)
         for (int c = 0; c < 3; c++) {
             double x[3];
@@ -282,10 +297,12 @@ static void fill_models(posed_model *a, posed_model *b, int kind, uint64_t *stat
 
 static void check_posed(const posed_model *a, const posed_model *b)
 {
-    float x[72], y[72];
+    float x[72], y[72], vertex[2][3][24];
     double unit = ebpo_block_unit(2e8);
-    float off_a = ebpo_posed_block_place(&a->posed, unit, a->posed.base, x),
-          off_b = ebpo_posed_block_place(&b->posed, unit, a->posed.base, y);
+    float off_a = ebpo_posed_block_place(&a->posed, unit, a->posed.base, vertex[0]),
+          off_b = ebpo_posed_block_place(&b->posed, unit, a->posed.base, vertex[1]);
+    to_faces(vertex[0], x);
+    to_faces(vertex[1], y);
     ebpo_block_pairs found;
     unsigned at = 0;
     ebpo_pair_kernels_best()->blocks(x, 255, y, 255, fmaxf(off_a, off_b), &found);

@@ -1,5 +1,4 @@
 /* Posed coordinates: their definition, what is refused, and how far they are from true motions. */
-#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -199,44 +198,41 @@ static void random_pose(ebpo_pose *pose, double far, uint64_t *state)
     pose->scale = ldexp(1.5 + 0.4 * twin_uniform(state), (int)twin_integer(state, -20, 20));
 }
 
-/* Faces of about `size`, `far` from the model's origin; lanes from `faces` on have none. */
-static void random_block(double wide[72], float block[72], double far, double size, int faces,
+/* Vertices within about `size`, `far` from the model's origin. */
+static void random_block(double wide[72], float block[72], double far, double size, int vertices,
                          uint64_t *state)
 {
     double centre[3] = { far * twin_uniform(state), far * twin_uniform(state), far };
-    for (int i = 0; i < 72; i++) {
-        block[i] = (float)(centre[i / 8 % 3] + size * twin_uniform(state));
-        if (i % 8 >= faces)
-            block[i] = FLT_MAX;
-        wide[i] = i % 8 >= faces ? DBL_MAX : (double)block[i];
+    for (int i = 0; i < 3 * vertices; i++) {
+        block[i] = (float)(centre[i / vertices] + size * twin_uniform(state));
+        wide[i] = (double)block[i];
     }
 }
 
-/* Of the block as such, beside its base; then as it is placed. */
-static void check_turned(const ebpo_block_posing *p, const ebpo_posed_block *posed,
-                         const double x[3], int first)
+/* As the block is, beside its base; then as it is placed. */
+static void check_vertex(const ebpo_block_posing *p, const ebpo_posed_block *posed,
+                         const double world[3], int i)
 {
-    double world[3];
-    ebpo_posing_apply(&p->posing, x, world);
     for (int k = 0; k < 3; k++) {
-        double off = fabs((double)posed->x[first + 8 * k] - (world[k] - posed->base[k]) * p->unit);
+        double off = fabs((double)posed->x[k][i] - (world[k] - posed->base[k]) * p->unit);
         ck_assert_msg(off <= (double)posed->error, "off by %g, stated %g", off,
                       (double)posed->error);
-        ck_assert(fabsf(posed->x[first + 8 * k]) <= posed->reach);
+        ck_assert(fabsf(posed->x[k][i]) <= posed->reach);
     }
 }
 
 static void check_block(const ebpo_block_posing *p, const ebpo_posed_block *posed,
-                        const double block[72], const double origin[3], int faces)
+                        const double *vertex, const double origin[3], int vertices)
 {
-    float out[72], error = ebpo_posed_block_place(posed, p->unit, origin, out);
-    for (int at = 0; at < 3 * faces; at++) {
-        int first = 24 * (at / faces) + at % faces;
-        double x[3] = { block[first], block[first + 8], block[first + 16] }, world[3];
-        check_turned(p, posed, x, first);
+    float out[3][EBPO_POSED_VERTICES];
+    float error = ebpo_posed_block_place(posed, p->unit, origin, out);
+    ck_assert_uint_eq(posed->vertices, (unsigned)vertices);
+    for (int i = 0; i < vertices; i++) {
+        double x[3] = { vertex[i], vertex[vertices + i], vertex[2 * vertices + i] }, world[3];
         ebpo_posing_apply(&p->posing, x, world);
+        check_vertex(p, posed, world, i);
         for (int k = 0; k < 3; k++) {
-            double off = fabs((double)out[first + 8 * k] - (world[k] - origin[k]) * p->unit);
+            double off = fabs((double)out[k][i] - (world[k] - origin[k]) * p->unit);
             ck_assert_msg(off <= (double)error * (1 + 0x1p-20), "off by %g, stated %g", off,
                           (double)error);
         }
@@ -250,7 +246,7 @@ START_TEST(posed_blocks_are_within_their_errors)
         double far = ldexp(1, (int)twin_integer(&state, -30, 20)), origin[3];
         double size = far * ldexp(1, -(int)twin_integer(&state, 0, 20));
         const double reach[3] = { 3 * far, 3 * far, 3 * far };
-        int faces = (int)twin_integer(&state, 1, 8);
+        int vertices = (int)twin_integer(&state, 1, EBPO_POSED_VERTICES);
         ebpo_pose pose;
         ebpo_posing posing;
         ebpo_block_posing p;
@@ -261,15 +257,15 @@ START_TEST(posed_blocks_are_within_their_errors)
         ck_assert_int_eq(ebpo_posing_make(&posing, &pose, reach, NULL), EBPO_OK);
         ebpo_block_posing_make(&p, &posing, far + 9 * far * pose.scale);
         ck_assert(p.fits);
-        random_block(block, block32, far, size, faces, &state);
-        ebpo_posed_block_make(&posed, &p, block32);
-        ebpo_posed_block_make_wide(&wide, &p, block);
+        random_block(block, block32, far, size, vertices, &state);
+        ebpo_posed_block_make(&posed, &p, block32, (unsigned)vertices);
+        ebpo_posed_block_make_wide(&wide, &p, block, (unsigned)vertices);
         ck_assert_mem_eq(posed.base, wide.base, sizeof posed.base);
         double away = pose.scale * size * ldexp(1, (int)twin_integer(&state, -2, 8));
         for (int k = 0; k < 3; k++)
             origin[k] = posed.base[k] + away * twin_uniform(&state);
-        check_block(&p, &posed, block, origin, faces);
-        check_block(&p, &wide, block, origin, faces);
+        check_block(&p, &posed, block, origin, vertices);
+        check_block(&p, &wide, block, origin, vertices);
         ck_assert((double)posed.error <= 0x1p-18 * pose.scale * p.unit * size + (double)p.doubt);
     }
 }
