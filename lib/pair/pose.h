@@ -4,14 +4,7 @@
 #ifndef EBPO_PAIR_POSE_H
 #define EBPO_PAIR_POSE_H
 
-#include <ebpo/base.h>
-
-/* x of the model becomes rotation (scale x) + translation. */
-typedef struct ebpo_pose {
-    double rotation[3][3]; /* [i][k] multiplies x_k */
-    double translation[3];
-    double scale; /* greater than 0 */
-} ebpo_pose;
+#include <ebpo/pose.h>
 
 /* A pose that has been checked. */
 typedef struct ebpo_posing {

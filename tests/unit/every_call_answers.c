@@ -15,6 +15,12 @@ static void make_points(double (*points)[3])
     }
 }
 
+static ebpo_status pose_check(const ebpo_model *model, ebpo_error *error)
+{
+    ebpo_pose pose = EBPO_POSE_INIT;
+    return ebpo_pose_check(model, &pose, error);
+}
+
 static ebpo_status ask_many(ebpo_context *context, ebpo_error *error)
 {
     double points[POINTS][3];
@@ -106,6 +112,8 @@ static ebpo_status ask_all(ebpo_model *model, ebpo_error *error)
         status = ask_rays(context, error);
     if (status == EBPO_OK)
         status = ebpo_model_get_stats(model, &stats);
+    if (status == EBPO_OK)
+        status = pose_check(model, error);
     ebpo_context_free(context);
     return status;
 }

@@ -8,6 +8,7 @@
  *   file.h        files: writing, opening, reading
  *   http.h        files on web servers
  *   query.h       point in solid, distance, rays, boxes, mass
+ *   pose.h        where a model is in the world
  *   stream.h      levels, coarse to fine
  *   view.h        nodes in the order of an observer
  *   subtree.h     a part of a model as plain arrays: nodes, envelopes, faces
@@ -30,6 +31,7 @@
 #include <ebpo/file.h>
 #include <ebpo/http.h>
 #include <ebpo/query.h>
+#include <ebpo/pose.h>
 #include <ebpo/stream.h>
 #include <ebpo/view.h>
 #include <ebpo/subtree.h>
