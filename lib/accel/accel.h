@@ -239,6 +239,12 @@ bool ebpo_leaf_ask(const ebpo_accel *subtree, ebpo_accel_leaf *leaf, ebpo_cell c
 EBPO_MUST_USE ebpo_status ebpo_accel_make(ebpo_accel **out, ebpo_slice *slice,
                                           const ebpo_info *info, bool with_planes, unsigned threads,
                                           ebpo_error *error);
+/* The same of a whole model; EBPO_E_LIMIT if that took more than `most` bytes (UINT64_MAX: no
+ * limit), the slice included. */
+EBPO_MUST_USE ebpo_status ebpo_accel_make_within(ebpo_accel **out, ebpo_slice *slice,
+                                                 const ebpo_info *info, uint64_t most,
+                                                 bool with_planes, unsigned threads,
+                                                 ebpo_error *error);
 void ebpo_accel_free(ebpo_accel *subtree);
 
 /* Of memory, now, of a whole model. */
@@ -251,6 +257,9 @@ static inline uint64_t ebpo_accel_bytes(const ebpo_accel *whole)
  * Bounds from counts. */
 void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
                          uint64_t *peak);
+/* The same of a whole model, nearer, of ordinary ones: ebpo_accel_make_within refuses what exceeds
+ * a budget. */
+void ebpo_accel_estimate_whole(const ebpo_info *info, uint64_t *keep, uint64_t *peak);
 
 /* --- its nodes (accel_nodes.c); `entry` is what finds them --- */
 

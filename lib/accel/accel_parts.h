@@ -26,10 +26,30 @@ EBPO_MUST_USE ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *s
                                            ebpo_error *error);
 void ebpo_layout_free(ebpo_layout *layout);
 
+/* Single precision does for blocks while its squares and cubes stay far from its ends; coordinates
+ * beyond that, and doubles, take doubles. */
+bool ebpo_accel_needs_doubles(const ebpo_info *info);
+
+/* What making may take: `most` is UINT64_MAX, or the model is a whole one. */
+typedef struct ebpo_accel_room {
+    const ebpo_info *info;
+    uint64_t most;
+} ebpo_accel_room;
+/* EBPO_E_LIMIT if making a whole model with these blocks takes more. */
+EBPO_MUST_USE ebpo_status ebpo_accel_fits(const ebpo_accel_room *room, const ebpo_layout *layout,
+                                          uint64_t units, ebpo_error *error);
+
+/* Entries of leaves' lists at most: each reference is one, and more than eight new faces of a leaf
+ * are in 2 n / 9 blocks at most, fewer in one. */
+static inline uint64_t ebpo_list_most(uint64_t refs, uint64_t leaves, uint64_t faces)
+{
+    return refs + leaves + faces / 9 * 2 + 2;
+}
+
 /* Fills blocks, and gives them their numbers (parallel). */
 EBPO_MUST_USE ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_slice *slice,
-                                                 ebpo_layout *layout, unsigned threads,
-                                                 ebpo_error *error);
+                                                 ebpo_layout *layout, const ebpo_accel_room *room,
+                                                 unsigned threads, ebpo_error *error);
 /* Bounds of the hierarchy, from the blocks (parallel). */
 EBPO_MUST_USE ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout,
                                                  unsigned threads, ebpo_error *error);

@@ -179,7 +179,7 @@ static ebpo_status make_room(ebpo_accel *s, ebpo_error *error)
 }
 
 ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_slice *slice, ebpo_layout *layout,
-                                   unsigned threads, ebpo_error *error)
+                                   const ebpo_accel_room *room, unsigned threads, ebpo_error *error)
 {
     job j = { s, &slice->mesh, layout, NULL };
     layout->block_number = ebpo_alloc(layout->block_count, sizeof *layout->block_number);
@@ -193,6 +193,8 @@ ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_slice *slice, ebpo_
     if (status == EBPO_OK && !number_blocks(s, layout))
         status = ebpo_fail(error, EBPO_E_LIMIT,
                            "the model has too many faces to be held at once; give a memory budget");
+    if (status == EBPO_OK)
+        status = ebpo_accel_fits(room, layout, s->units, error);
     if (status == EBPO_OK)
         status = make_room(s, error);
     if (status == EBPO_OK)

@@ -10,18 +10,6 @@
 #include "accel/accel_parts.h"
 #include "accel/accel.h"
 
-/* Single precision does for blocks while its squares and cubes stay far from its ends; coordinates
- * beyond that, and doubles, take doubles. */
-static bool needs_doubles(const ebpo_info *info)
-{
-    double most = 0;
-    for (int k = 0; k < 3; k++)
-        most = fmax(most,
-                    fmax(fabs(info->box_origin[k]), fabs(info->box_origin[k] + info->box_size[k])));
-    double least = fmin(info->box_size[0], fmin(info->box_size[1], info->box_size[2]));
-    return info->double_coordinates || !(most < 0x1p40) || !(least > 0x1p-40);
-}
-
 /* What floats lose of a cross product of differences of coordinates, with room to spare. */
 static double turn_error(const ebpo_box *box)
 {
@@ -98,14 +86,16 @@ static uint64_t count_bytes(const ebpo_accel *s)
            (s->gray_first ? (s->gray_count + s->gray_first[s->gray_count]) * 4 : 0);
 }
 
-static ebpo_status make(ebpo_accel *s, ebpo_slice *slice, bool with_planes, unsigned threads,
-                        ebpo_error *error)
+static ebpo_status make(ebpo_accel *s, ebpo_slice *slice, const ebpo_accel_room *room,
+                        bool with_planes, unsigned threads, ebpo_error *error)
 {
     ebpo_layout layout;
     ebpo_status status = ebpo_layout_make(&layout, slice, EBPO_BLOCKS_MOST, error);
     if (status != EBPO_OK)
         return status;
-    status = ebpo_accel_fill_blocks(s, slice, &layout, threads, error);
+    status = ebpo_accel_fits(room, &layout, layout.block_count, error);
+    if (status == EBPO_OK)
+        status = ebpo_accel_fill_blocks(s, slice, &layout, room, threads, error);
     ebpo_mesh_free(&slice->mesh);
     if (status == EBPO_OK)
         status = ebpo_accel_fill_bounds(s, &layout, threads, error);
@@ -124,6 +114,14 @@ static ebpo_status make(ebpo_accel *s, ebpo_slice *slice, bool with_planes, unsi
 ebpo_status ebpo_accel_make(ebpo_accel **out, ebpo_slice *slice, const ebpo_info *info,
                             bool with_planes, unsigned threads, ebpo_error *error)
 {
+    return ebpo_accel_make_within(out, slice, info, UINT64_MAX, with_planes, threads, error);
+}
+
+ebpo_status ebpo_accel_make_within(ebpo_accel **out, ebpo_slice *slice, const ebpo_info *info,
+                                   uint64_t most, bool with_planes, unsigned threads,
+                                   ebpo_error *error)
+{
+    ebpo_accel_room room = { info, most };
     *out = NULL;
     ebpo_accel *s = ebpo_alloc_zero(1, sizeof *s);
     if (!s) {
@@ -136,7 +134,7 @@ ebpo_status ebpo_accel_make(ebpo_accel **out, ebpo_slice *slice, const ebpo_info
     s->solid = info->solid;
     s->rule = (uint8_t)info->rule;
     s->has_planes = with_planes;
-    s->wide = needs_doubles(info);
+    s->wide = ebpo_accel_needs_doubles(info);
     s->face_count = (uint32_t)slice->mesh.face_count;
     s->outer_count = slice->outer_count;
     s->first_face = slice->first_face;
@@ -145,7 +143,7 @@ ebpo_status ebpo_accel_make(ebpo_accel **out, ebpo_slice *slice, const ebpo_info
         slice->mesh.face_count >= EBPO_IS_BLOCK
             ? ebpo_fail(error, EBPO_E_LIMIT,
                         "the model has too many faces to be held at once; give a memory budget")
-            : make(s, slice, with_planes, threads, error);
+            : make(s, slice, &room, with_planes, threads, error);
     s->outer = slice->outer;
     s->face_source = slice->face_source;
     slice->outer = slice->face_source = NULL;
@@ -186,7 +184,7 @@ void ebpo_accel_free(ebpo_accel *s)
 void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
                          uint64_t *peak)
 {
-    uint64_t wide = needs_doubles(info) ? 2 : 1, faces = size->new_faces + size->outer;
+    uint64_t wide = ebpo_accel_needs_doubles(info) ? 2 : 1, faces = size->new_faces + size->outer;
     uint64_t blocks = faces / 4 + 2, bounds = blocks / 3 + 2;
     *keep = sizeof(ebpo_accel) + sizeof(ebpo_leaf_kinds) + size->groups * 64 +
             size->leaves * (sizeof(ebpo_accel_leaf) + 64) +

@@ -21,6 +21,8 @@ typedef struct walk {
     ebpo_error *error;
 } walk;
 
+/* For a leaf's entries, at most. What all leaves need was made at once, and is given back at the
+ * end. */
 static bool make_list_room(walk *w, uint64_t more)
 {
     ebpo_accel *s = w->s;
@@ -50,7 +52,7 @@ static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank
 {
     ebpo_accel_leaf *leaf = &w->s->leaf[number];
     uint64_t refs = level->leaf_ref_count[rank], fresh = level->leaf_new[rank];
-    if (!make_list_room(w, refs + fresh + 1))
+    if (!make_list_room(w, refs + (fresh > EBPO_BLOCK ? 2 * fresh / 9 : 1)))
         return;
     ebpo_listed_block *list = w->s->list + w->s->list_count;
     uint32_t count = 0;
@@ -114,12 +116,13 @@ static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **slot
 {
     const ebpo_slice *slice = w->slice;
     ebpo_accel *s = w->s;
-    uint64_t groups = 0, leaves = 0;
+    uint64_t groups = 0, leaves = 0, refs = 0;
     for (int depth = 0; depth < slice->level_count; depth++) {
         w->group_begin[depth] = depth ? groups : 0;
         w->leaf_begin[depth] = leaves;
         groups += depth ? slice->level[depth].group_count : 0;
         leaves += slice->level[depth].leaf_count;
+        refs += slice->level[depth].ref_count;
     }
     if (slice->level_count < EBPO_LEVELS_MAX)
         /* gray nodes are numbered on where they have no groups */
@@ -133,7 +136,9 @@ static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **slot
     s->leaf_count = (uint32_t)leaves;
     uint64_t faces = layout->block_count ? layout->block_end[layout->block_count - 1] : 0;
     uint32_t *map = *slot_of = ebpo_alloc(faces, sizeof *map);
-    if (!s->nodes.group || !s->leaf || !map)
+    bool list = ebpo_grow(&s->list, &w->list_capacity,
+                          ebpo_list_most(refs, leaves, slice->face_count), sizeof *s->list);
+    if (!s->nodes.group || !s->leaf || !map || !list)
         return ebpo_fail_memory(w->error, groups * 32 + leaves * sizeof *s->leaf + faces * 4);
     ebpo_prefer_huge_pages(s->nodes.group, groups * sizeof *s->nodes.group);
     ebpo_prefer_huge_pages(s->leaf, leaves * sizeof *s->leaf);

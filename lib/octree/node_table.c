@@ -31,12 +31,18 @@ static void paint(painter *p, uint32_t entry, ebpo_cell cell)
             }
 }
 
-void ebpo_node_table_make_grid(ebpo_node_table *table)
+int ebpo_node_grid_bits(uint64_t groups)
 {
     int bits = 0;
-    while (bits < 8 && UINT64_C(1) << 3 * (bits + 1) <= 8 * (uint64_t)table->group_count)
+    while (bits < 8 && UINT64_C(1) << 3 * (bits + 1) <= 8 * groups)
         bits++;
-    if (bits < 2)
+    return bits < 2 ? 0 : bits;
+}
+
+void ebpo_node_table_make_grid(ebpo_node_table *table)
+{
+    int bits = ebpo_node_grid_bits(table->group_count);
+    if (!bits)
         return;
     uint64_t cells = UINT64_C(1) << 3 * bits;
     table->grid = ebpo_alloc(cells, sizeof *table->grid);

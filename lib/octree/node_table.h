@@ -67,6 +67,8 @@ typedef struct ebpo_node_table {
     uint8_t *grid_depth; /* and the depth of that node below the root */
 } ebpo_node_table;
 
+/* Bits of the grid of a table of so many groups; 0: none. */
+int ebpo_node_grid_bits(uint64_t groups);
 /* Makes the grid: fewer cells than about twice the groups. Optional; without memory there is none.
  */
 void ebpo_node_table_make_grid(ebpo_node_table *table);

@@ -111,6 +111,19 @@ static int prefer_subtrees(const ebpo_info *info, const ebpo_model_options *o, i
 
 /* --- what comes of it --- */
 
+static ebpo_status choose_parts(const ebpo_info *info, const ebpo_model_options *o,
+                                ebpo_model_plan *out, ebpo_error *error)
+{
+    out->cut_level = choose_cut(info, o, o->memory);
+    if (out->cut_level < 0)
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "a budget of %" PRIu64
+                         " bytes is too small for this model; give at least %" PRIu64,
+                         o->memory, out->least);
+    out->cut_level = prefer_subtrees(info, o, out->cut_level);
+    return EBPO_OK;
+}
+
 static ebpo_status choose(const ebpo_file *file, const ebpo_model_options *o, bool default_memory,
                           ebpo_model_plan *out, ebpo_error *error)
 {
@@ -123,14 +136,7 @@ static ebpo_status choose(const ebpo_file *file, const ebpo_model_options *o, bo
     else if ((o->memory == 0 || out->whole <= o->memory) && !reads_parts(file, default_memory))
         out->resident = true;
     else
-        out->cut_level = choose_cut(info, o, o->memory);
-    if (out->cut_level < 0)
-        return ebpo_fail(error, EBPO_E_LIMIT,
-                         "a budget of %" PRIu64
-                         " bytes is too small for this model; give at least %" PRIu64,
-                         o->memory, out->least);
-    if (!out->resident && o->cut_level < 0 && info->parts & EBPO_PART_MESH)
-        out->cut_level = prefer_subtrees(info, o, out->cut_level);
+        return choose_parts(info, o, out, error);
     return EBPO_OK;
 }
 
@@ -161,14 +167,12 @@ ebpo_status ebpo_plan_model(const ebpo_file *file, const ebpo_model_options *o, 
                             ebpo_model_plan *out, ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(file);
-    ebpo_slice_size size = whole_size(info);
     uint64_t keep, least;
     *out = (ebpo_model_plan)EBPO_MODEL_PLAN_INIT;
     if (o->loading > EBPO_LOAD_NODES)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "model options: there is no way of loading number %d", (int)o->loading);
-    size.outer = 0;
-    ebpo_accel_estimate(&size, info, &keep, &out->whole);
+    ebpo_accel_estimate_whole(info, &keep, &out->whole);
     least = least_budget(info, o);
     out->least = least < out->whole ? least : out->whole;
     out->budget = o->memory;
@@ -176,6 +180,15 @@ ebpo_status ebpo_plan_model(const ebpo_file *file, const ebpo_model_options *o, 
     if (status == EBPO_OK && !out->resident)
         share(info, o, out);
     return status;
+}
+
+ebpo_status ebpo_plan_parts(const ebpo_file *file, const ebpo_model_options *o,
+                            ebpo_model_plan *out, ebpo_error *error)
+{
+    const ebpo_info *info = ebpo_file_info(file);
+    *out = (ebpo_model_plan)EBPO_MODEL_PLAN_INIT;
+    out->least = least_budget(info, o);
+    return choose_parts(info, o, out, error);
 }
 
 ebpo_status ebpo_model_memory(const ebpo_file *file, const ebpo_model_options *options,

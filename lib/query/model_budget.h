@@ -19,5 +19,8 @@ bool ebpo_usual_memory(const ebpo_file *file, ebpo_model_options *options);
 EBPO_MUST_USE ebpo_status ebpo_plan_model(const ebpo_file *file, const ebpo_model_options *options,
                                           bool default_memory, ebpo_model_plan *out,
                                           ebpo_error *error);
+/* The cut level for a budget that everything was found to exceed. Only that and `least` are set. */
+EBPO_MUST_USE ebpo_status ebpo_plan_parts(const ebpo_file *file, const ebpo_model_options *options,
+                                          ebpo_model_plan *out, ebpo_error *error);
 
 #endif

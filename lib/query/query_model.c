@@ -97,7 +97,9 @@ static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
     ebpo_slice slice;
     ebpo_status status = ebpo_slice_read_all(&slice, m->file, m->options.threads, error);
     if (status == EBPO_OK)
-        status = ebpo_accel_make(&m->whole, &slice, m->info, true, m->options.threads, error);
+        status = ebpo_accel_make_within(&m->whole, &slice, m->info,
+                                        m->options.memory ? m->options.memory : UINT64_MAX, true,
+                                        m->options.threads, error);
     if (m->whole)
         ebpo_model_count_leaves(m, m->whole, 1);
     return status;
@@ -137,9 +139,14 @@ static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
 {
     ebpo_model_plan plan;
     ebpo_status status = ebpo_plan_model(m->file, &m->options, m->default_memory, &plan, error);
-    if (status != EBPO_OK)
-        return status;
-    return plan.resident ? open_whole(m, error) : open_top(m, plan.cut_level, error);
+    if (status == EBPO_OK && plan.resident) {
+        status = open_whole(m, error);
+        /* more than ordinary models of its counts take */
+        if (status != EBPO_E_LIMIT || !m->options.memory)
+            return status;
+        status = ebpo_plan_parts(m->file, &m->options, &plan, error);
+    }
+    return status == EBPO_OK ? open_top(m, plan.cut_level, error) : status;
 }
 
 ebpo_status ebpo_model_new(const ebpo_file *file, const ebpo_model_options *options,

@@ -116,8 +116,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_model_new(const ebpo_file *file,
 
 /*
  * What a budget buys: told by the counts in the file's head, with nothing read or loaded. Bytes are
- * bounds from above: everything and subtrees often take a fifth of them. All but `budget`, `whole`
- * and `least` are 0 if everything will be in memory.
+ * bounds from above, of subtrees often five times what is taken; all but `budget`, `whole` and
+ * `least` are 0 if everything will be in memory.
  */
 typedef struct ebpo_model_plan {
     size_t struct_size; /* EBPO_MODEL_PLAN_INIT sets it */
@@ -131,8 +131,8 @@ typedef struct ebpo_model_plan {
     uint64_t budget;
 
     /*
-     * From which budget on everything is in memory (files far away: see
-     * ebpo_model_options.memory), and one that would do, not much more than the least.
+     * From which budget on everything is in memory (files far away: see ebpo_model_options.memory;
+     * a model that takes more stays in parts), and one that would do, little more than the least.
      */
     uint64_t whole, least;
 
