@@ -44,6 +44,13 @@ EBPO_EIGHT f8 f8_load_lanes(const float *x, const int32_t *from)
 {
     return _mm256_permutevar8x32_ps(_mm256_loadu_ps(x), _mm256_loadu_si256((const __m256i *)from));
 }
+/* All ones in the lanes whose bits are set, zeros in the others. */
+EBPO_EIGHT f8 f8_mask(unsigned lanes)
+{
+    __m256i bit = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128),
+            on = _mm256_and_si256(_mm256_set1_epi32((int)lanes), bit);
+    return _mm256_castsi256_ps(_mm256_cmpeq_epi32(on, bit));
+}
 EBPO_EIGHT f8 f8_abs(f8 a)
 {
     return _mm256_and_ps(a, _mm256_castsi256_ps(_mm256_set1_epi32(0x7fffffff)));
@@ -122,6 +129,10 @@ EBPO_EIGHT f8 f8_at_most(f8 a, f8 b) { EBPO_BOTH(a.half[h] <= b.half[h]); }
 EBPO_EIGHT f8 f8_and(f8 a, f8 b) { EBPO_BOTH((i4)a.half[h] & (i4)b.half[h]); }
 EBPO_EIGHT f8 f8_or(f8 a, f8 b) { EBPO_BOTH((i4)a.half[h] | (i4)b.half[h]); }
 EBPO_EIGHT f8 f8_xor(f8 a, f8 b) { EBPO_BOTH((i4)a.half[h] ^ (i4)b.half[h]); }
+EBPO_EIGHT f8 f8_mask(unsigned lanes)
+{
+    EBPO_BOTH((((int32_t)lanes >> 4 * h) & (i4){ 1, 2, 4, 8 }) != 0);
+}
 EBPO_EIGHT f8 f8_abs(f8 a) { EBPO_BOTH((i4)a.half[h] & 0x7fffffff); }
 EBPO_EIGHT f8 f8_pick(f8 mask, f8 yes, f8 no)
 {
