@@ -21,6 +21,28 @@ static ebpo_status pose_check(const ebpo_model *model, ebpo_error *error)
     return ebpo_pose_check(model, &pose, error);
 }
 
+static ebpo_status ask_boolean(ebpo_model *model, ebpo_error *error)
+{
+    const ebpo_boolean_operand operands[2] = { { model, EBPO_POSE_INIT },
+                                               { model, EBPO_POSE_INIT } };
+    const ebpo_boolean_node nodes[3] = { { EBPO_BOOLEAN_OPERAND, 0, 0, 0 },
+                                         { EBPO_BOOLEAN_OPERAND, 1, 0, 0 },
+                                         { EBPO_BOOLEAN_UNION, 0, 1, 0 } };
+    double points[POINTS][3];
+    ebpo_boolean_result results[POINTS];
+    ebpo_boolean_options options = EBPO_BOOLEAN_OPTIONS_INIT;
+    ebpo_boolean *boolean = NULL;
+    options.threads = 1;
+    make_points(points);
+    ebpo_status status = ebpo_boolean_new(operands, 2, nodes, 3, &options, &boolean, error);
+    if (status == EBPO_OK)
+        status = ebpo_boolean_inside(boolean, points[0], results, error);
+    if (status == EBPO_OK)
+        status = ebpo_boolean_inside_many(boolean, points[0], POINTS, results, error);
+    ebpo_boolean_free(boolean);
+    return status;
+}
+
 static ebpo_status ask_many(ebpo_context *context, ebpo_error *error)
 {
     double points[POINTS][3];
@@ -114,6 +136,8 @@ static ebpo_status ask_all(ebpo_model *model, ebpo_error *error)
         status = ebpo_model_get_stats(model, &stats);
     if (status == EBPO_OK)
         status = pose_check(model, error);
+    if (status == EBPO_OK)
+        status = ask_boolean(model, error);
     ebpo_context_free(context);
     return status;
 }

@@ -1,0 +1,94 @@
+/* Points of the world asked of models; bounds: docs/develop/booleans.md. */
+#include "geom/strict_fp.h"
+
+#include "boolean/posed_solid.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/error.h"
+#include "collide/posed_model.h"
+#include "query/options.h"
+
+/* More than the roundings of a bound's own computation. */
+static const double more = 1 + 0x1p-40;
+
+static void bound_box(ebpo_posed_solid *s)
+{
+    const ebpo_info *info = s->model->info;
+    for (int i = 0; i < 3; i++) {
+        double low = s->posing.translation[i], high = low, size = fabs(low);
+        for (int k = 0; k < 3; k++) {
+            double a = info->box_origin[k], b = a + info->box_size[k], m = s->posing.matrix[i][k];
+            low += fmin(m * a, m * b);
+            high += fmax(m * a, m * b);
+            size += fmax(fabs(m * a), fabs(m * b));
+        }
+        double rounding = 16 * 0x1p-53 * size + 0x1p-1070;
+        s->box[i] = low - rounding;
+        s->box[3 + i] = high + rounding;
+    }
+}
+
+ebpo_status ebpo_posed_solid_make(ebpo_posed_solid *out, const ebpo_boolean_operand *operand,
+                                  ebpo_error *error)
+{
+    double reach[3];
+    *out = (ebpo_posed_solid){ .model = operand->model };
+    memcpy(out->rotation, operand->pose.rotation, sizeof out->rotation);
+    ebpo_model_reach(operand->model, reach);
+    ebpo_status status = ebpo_check_solid(operand->model, error);
+    if (status == EBPO_OK)
+        status = ebpo_check_mesh(operand->model, error);
+    if (status == EBPO_OK)
+        status = ebpo_posing_make(&out->posing, &operand->pose, reach, error);
+    if (status != EBPO_OK)
+        return status;
+    /* reach is at most 2^1000: no sum overflows; 1.7321 is more than the root of 3 */
+    out->moved = 1.7321 * ebpo_posing_error(&out->posing, (reach[0] + reach[1] + reach[2]) * more);
+    bound_box(out);
+    if (!(out->moved / out->posing.scale <= 0x1p990))
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "pose: the model is too small for where it is: rounding moves it by %.3g "
+                         "of its own units",
+                         out->moved / out->posing.scale);
+    return EBPO_OK;
+}
+
+bool ebpo_posed_solid_near(const ebpo_posed_solid *s, const double w[3], double margin)
+{
+    for (int k = 0; k < 3; k++)
+        if ((s->box[k] - w[k]) * (1 - 0x1p-50) > margin ||
+            (w[k] - s->box[3 + k]) * (1 - 0x1p-50) > margin)
+            return false;
+    return true;
+}
+
+void ebpo_unpose(const ebpo_posed_solid *s, const double w[3], double p[3], double *doubt)
+{
+    double y[3], length = 0, scale = s->posing.scale;
+    for (int i = 0; i < 3; i++) {
+        y[i] = w[i] - s->posing.translation[i];
+        length += fabs(y[i]);
+    }
+    for (int k = 0; k < 3; k++)
+        p[k] = ((s->rotation[0][k] * y[0] + s->rotation[1][k] * y[1]) + s->rotation[2][k] * y[2]) /
+               scale;
+    double far = s->moved + length * (2 * s->posing.deviation + 8 * 0x1p-53) + 0x1p-1060;
+    *doubt = far / scale * more + 0x1p-1060;
+}
+
+ebpo_status ebpo_posed_solid_clear(ebpo_context *context, const double p[3], double doubt,
+                                   bool *clear, ebpo_error *error)
+{
+    double low[3], high[3];
+    const uint64_t *faces;
+    uint64_t count;
+    for (int k = 0; k < 3; k++) {
+        low[k] = nextafter(p[k] - doubt, -INFINITY);
+        high[k] = nextafter(p[k] + doubt, INFINITY);
+    }
+    ebpo_status status = ebpo_faces_in_box(context, low, high, &faces, &count, error);
+    *clear = status == EBPO_OK && count == 0;
+    return status;
+}

@@ -1,0 +1,36 @@
+/* A solid at a pose: where a point of the world lies in its model's coordinates, and whether it is
+ * inside, exact on posed coordinates. Proofs: docs/develop/booleans.md. Solids are not changed:
+ * any thread, each with a context of its own. */
+#ifndef EBPO_BOOLEAN_POSED_SOLID_H
+#define EBPO_BOOLEAN_POSED_SOLID_H
+
+#include "boolean/expression.h"
+#include "pair/pose.h"
+#include "query/query_model.h"
+
+typedef struct ebpo_posed_solid {
+    ebpo_model *model;
+    ebpo_posing posing;
+    double rotation[3][3];
+    double box[6]; /* low and high: no posed vertex is beyond */
+    double moved;  /* posed vertices are at most so far from where the true motion has them */
+} ebpo_posed_solid;
+
+/* EBPO_E_ARGUMENT: a pose; EBPO_E_NOT_SOLID, EBPO_E_ABSENT: a model. */
+EBPO_MUST_USE ebpo_status ebpo_posed_solid_make(ebpo_posed_solid *out,
+                                                const ebpo_boolean_operand *operand,
+                                                ebpo_error *error);
+
+/* False: w is certainly outside, beyond the box by more than `margin` (0 or more) on an axis. */
+bool ebpo_posed_solid_near(const ebpo_posed_solid *s, const double w[3], double margin);
+
+/* The point in the model's coordinates that the true motion brings to w, and *doubt: that point is
+ * within it of p, and so is what rounding has moved. If no face of the model is within *doubt of p,
+ * the posed model has at w the winding number that the model has at p. */
+void ebpo_unpose(const ebpo_posed_solid *s, const double w[3], double p[3], double *doubt);
+
+/* No face of the model is within `doubt` of p, for certain. */
+EBPO_MUST_USE ebpo_status ebpo_posed_solid_clear(ebpo_context *context, const double p[3],
+                                                 double doubt, bool *clear, ebpo_error *error);
+
+#endif

@@ -1,0 +1,132 @@
+/*
+ * EBP-Octree in HDF5: unions, intersections and differences of solids at poses, by query.
+ *
+ *   Expressions     ebpo_boolean_new
+ *   Point in solid  ebpo_boolean_inside, ebpo_boolean_inside_many
+ *
+ * Nothing is cut: there is no mesh of the result. Questions about it are answered by questions to
+ * the models. Decisions are those of arithmetic without rounding on posed coordinates (pose.h).
+ *
+ * The result is *regularised*: of an operand is meant the closure of what its winding numbers and
+ * its rule put inside, and the result is the closure of its own interior. So two boxes with a side
+ * in common make one box, and a box less an equal one is nothing.
+ */
+#ifndef EBPO_BOOLEAN_H
+#define EBPO_BOOLEAN_H
+
+#include <ebpo/pose.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- expressions ---- */
+
+typedef enum ebpo_boolean_operation {
+    EBPO_BOOLEAN_OPERAND = 0,             /* the operand with the number `left` */
+    EBPO_BOOLEAN_UNION = 1,               /* in one of both, or in both */
+    EBPO_BOOLEAN_INTERSECTION = 2,        /* in both */
+    EBPO_BOOLEAN_DIFFERENCE = 3,          /* in `left`, not in `right` */
+    EBPO_BOOLEAN_SYMMETRIC_DIFFERENCE = 4 /* in one of both, not in both */
+} ebpo_boolean_operation;
+
+/* A node of the tree; `left` and `right` are numbers of nodes that stand before it. */
+typedef struct ebpo_boolean_node {
+    int32_t operation; /* an ebpo_boolean_operation */
+    uint32_t left, right;
+    uint32_t reserved;
+} ebpo_boolean_node;
+
+/* A solid at a pose. Of one model there may be many. */
+typedef struct ebpo_boolean_operand {
+    ebpo_model *model;
+    ebpo_pose pose;
+} ebpo_boolean_operand;
+
+/* At most so many of each. */
+#define EBPO_BOOLEAN_OPERANDS_MAX 64
+#define EBPO_BOOLEAN_NODES_MAX    256
+
+typedef struct ebpo_boolean_options {
+    size_t struct_size; /* EBPO_BOOLEAN_OPTIONS_INIT sets it */
+
+    /* For questions about many points, and for cells. 0: all cores. Answers are the same. */
+    unsigned threads;
+
+    uint32_t reserved;
+} ebpo_boolean_options;
+
+#define EBPO_BOOLEAN_OPTIONS_INIT EBPO_SIZED(ebpo_boolean_options)
+
+/* An expression, and what its questions work with: a context of each operand for each thread. */
+typedef struct ebpo_boolean ebpo_boolean;
+
+/*
+ * An expression over operands[operand_count]: nodes[node_count], the last of which is the root. A
+ * node may be used by several others, and an operand by several nodes. Both arrays are copied; the
+ * models must outlive the expression.
+ *
+ * EBPO_E_ARGUMENT: a node names one that does not stand before it, or an operand that is not there;
+ * an unknown operation; a pose (ebpo_pose_check). EBPO_E_LIMIT: none, or too many, of operands or
+ * of nodes. EBPO_E_NOT_SOLID: an operand is a surface. EBPO_E_ABSENT: an operand's file has no
+ * mesh. EBPO_E_MEMORY. Each names the operand or the node, from 0.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_new(const ebpo_boolean_operand *operands,
+                                                    uint32_t operand_count,
+                                                    const ebpo_boolean_node *nodes,
+                                                    uint32_t node_count,
+                                                    const ebpo_boolean_options *options,
+                                                    ebpo_boolean **out, ebpo_error *error);
+
+/*
+ * Before its models.
+ *
+ * Threads: one per expression.
+ */
+EBPO_API void ebpo_boolean_free(ebpo_boolean *boolean);
+
+/* ---- point in solid ---- */
+
+typedef struct ebpo_boolean_result {
+    /*
+     * EBPO_IN: an inner point of the result; EBPO_OUT: an inner point of what is not in it; both
+     * are certain. EBPO_ON: on a posed face, and the other operands do not decide.
+     */
+    int32_t where;
+
+    /*
+     * 1: what `where` says is so; EBPO_ON: a boundary point of the result. 0, with EBPO_ON only:
+     * faces that are not all in one plane meet at the point, as on edges and at vertices, and it
+     * may be a boundary point or not.
+     */
+    int32_t certain;
+} ebpo_boolean_result;
+
+/*
+ * Whether a point of the world, three finite doubles, is in the result.
+ *
+ * EBPO_E_ARGUMENT: the point is not finite. EBPO_E_ABSENT: a subset does not hold what decides.
+ * EBPO_E_LIMIT, EBPO_E_MEMORY, and the errors of reading. On failure `out` is unspecified.
+ *
+ * Threads: one per expression.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_inside(ebpo_boolean *boolean, const double point[3],
+                                                       ebpo_boolean_result *out, ebpo_error *error);
+
+/*
+ * The same for points[count][3], into out[count]; the message names the point. Of several failures
+ * the one of the first point that failed.
+ *
+ * Threads: one per expression; further ones live for the call.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_inside_many(ebpo_boolean *boolean,
+                                                            const double *points, uint64_t count,
+                                                            ebpo_boolean_result *out,
+                                                            ebpo_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
