@@ -9,23 +9,6 @@
 #include "base/error.h"
 #include "geom/ray_triangle.h"
 
-void ebpo_casting_begin(ebpo_casting *c, ebpo_context *context, const double origin[3],
-                        const double direction[3], double t_max, ebpo_ray_wants wants,
-                        ebpo_ray_sides sides)
-{
-    c->context = context;
-    for (int k = 0; k < 3; k++) {
-        c->ray.origin[k] = origin[k];
-        c->ray.direction[k] = direction[k];
-    }
-    c->ray.t_max = t_max;
-    c->wants = wants;
-    c->sides = sides;
-    c->limit = t_max;
-    c->done = c->no_memory = false;
-    c->count = 0;
-}
-
 bool ebpo_casting_meets(const ebpo_casting *c, int facing, ebpo_met *m)
 {
     const double(*triangle)[3] = (const double(*)[3])m->triangle;
@@ -100,7 +83,7 @@ ebpo_status ebpo_casting_sort(ebpo_casting *c, uint64_t begin, uint64_t *end, eb
     return EBPO_OK;
 }
 
-const char *ebpo_ray_fault(const ebpo_segment *ray)
+const char *ebpo_ray_fault_of(const ebpo_segment *ray)
 {
     double nothing = 0, longest = 0;
     for (int k = 0; k < 3; k++) {

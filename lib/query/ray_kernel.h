@@ -34,16 +34,21 @@ struct ebpo_ray_search {
     bool met;  /* any wanted: some face is certainly met (`decide` was not told) */
     void (*judge)(ebpo_ray_search *search); /* decides about all that waits */
     const ebpo_accel *s;
-    /* In the frame, from an origin moved along the ray to `moved`: what distances to the sides of
-     * boxes start from, the nearer ones and the farther ones. */
+    /* In the frame: the direction with a longest coordinate of 2^-12 to 2^12, and the origin, moved
+     * along the ray to `moved`; how far off it may be, for boxes. */
+    double direction[3], origin[3], error;
+    /* Made of these by the kernels. What distances to the sides of boxes start from, the nearer
+     * ones and the farther ones; four floats, of which three count. */
     float near_from[4], far_from[4], inverse[4];
-    float step_inverse[4];          /* 0, then `inverse` */
-    unsigned near_at[3], far_at[3]; /* bytes in ebpo_bound where those sides are */
-    int axis[3];                    /* z: where the direction is longest */
-    float shear[3];                 /* x and y for a step of 1 along z; t for such a step */
+    float step_inverse[4];    /* any number, then `inverse` */
+    double inverse_double[4]; /* of the direction, small coordinates replaced */
+    /* bytes in ebpo_bound where those sides are: nearer ones, farther ones */
+    const uint8_t (*side_at)[3];
+    int axis[3];    /* z: where the direction is longest */
+    float shear[3]; /* x and y for a step of 1 along z; t for such a step */
     /* The origin in the model's unit, in two parts for blocks of floats. */
     double from[3];
-    float from_high[3], from_low[3];
+    float from_high[4], from_low[4];
     float blur; /* distance at which rounding would be as bad as the origin's own */
     double moved, limit_scale;
     float bound, surely; /* limit, rounded up; t_max, rounded down */

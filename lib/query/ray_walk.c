@@ -109,7 +109,7 @@ ebpo_status ebpo_ray_walk(ebpo_casting *c, ebpo_error *error)
         ebpo_box box = ebpo_model_box(c->context->model);
         status = cast_node(c, &box, ebpo_model_root(c->context->model), error);
     }
-    if (status == EBPO_OK && !c->done)
+    if (status == EBPO_OK && !c->done && c->context->model->info->pruned)
         status = ebpo_check_pruned(c->context, ray_matters, c, error);
     if (status == EBPO_OK && c->no_memory)
         status = ebpo_fail_memory(error, c->count * sizeof(ebpo_met));
