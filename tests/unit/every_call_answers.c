@@ -21,6 +21,23 @@ static ebpo_status pose_check(const ebpo_model *model, ebpo_error *error)
     return ebpo_pose_check(model, &pose, error);
 }
 
+static ebpo_status ask_boolean_cells(ebpo_boolean *boolean, ebpo_error *error)
+{
+    ebpo_boolean_cells_options options = EBPO_BOOLEAN_CELLS_OPTIONS_INIT;
+    ebpo_boolean_cells *cells = NULL;
+    ebpo_boolean_volume volume = EBPO_BOOLEAN_VOLUME_INIT;
+    ebpo_mesh mesh = { 0 };
+    options.level = 2;
+    ebpo_status status = ebpo_boolean_cells_new(boolean, &options, &cells, error);
+    if (status == EBPO_OK)
+        status = ebpo_boolean_cells_get_volume(cells, &volume);
+    if (status == EBPO_OK)
+        status = ebpo_boolean_cells_mesh(cells, EBPO_BOOLEAN_OUTER, &mesh, error);
+    ebpo_mesh_free(&mesh);
+    ebpo_boolean_cells_free(cells);
+    return status;
+}
+
 static ebpo_status ask_boolean(ebpo_model *model, ebpo_error *error)
 {
     const ebpo_boolean_operand operands[2] = { { model, EBPO_POSE_INIT },
@@ -39,6 +56,8 @@ static ebpo_status ask_boolean(ebpo_model *model, ebpo_error *error)
         status = ebpo_boolean_inside(boolean, points[0], results, error);
     if (status == EBPO_OK)
         status = ebpo_boolean_inside_many(boolean, points[0], POINTS, results, error);
+    if (status == EBPO_OK)
+        status = ask_boolean_cells(boolean, error);
     ebpo_boolean_free(boolean);
     return status;
 }

@@ -3,6 +3,7 @@
  *
  *   Expressions     ebpo_boolean_new
  *   Point in solid  ebpo_boolean_inside, ebpo_boolean_inside_many
+ *   Cells           ebpo_boolean_cells_new, ebpo_boolean_cells_get_volume, ebpo_boolean_cells_mesh
  *
  * Nothing is cut: there is no mesh of the result. Questions about it are answered by questions to
  * the models. Decisions are those of arithmetic without rounding on posed coordinates (pose.h).
@@ -125,6 +126,112 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_inside_many(ebpo_boolean *boolea
                                                             const double *points, uint64_t count,
                                                             ebpo_boolean_result *out,
                                                             ebpo_error *error);
+
+/* ---- cells ---- */
+
+typedef struct ebpo_boolean_cells_options {
+    size_t struct_size; /* EBPO_BOOLEAN_CELLS_OPTIONS_INIT sets it */
+
+    /* The finest cells: 2^-level of the root's edge; 0 to EBPO_BOOLEAN_LEVEL_MAX. */
+    int level;
+
+    uint32_t reserved;
+
+    /* EBPO_E_LIMIT if more cells of a level are mixed. They take 32 bytes each while the next level
+     * is made. 0: 2^25. */
+    uint64_t most;
+
+    ebpo_progress progress;
+} ebpo_boolean_cells_options;
+
+#define EBPO_BOOLEAN_LEVEL_MAX 20
+
+#define EBPO_BOOLEAN_CELLS_OPTIONS_INIT                             \
+    {                                                               \
+        sizeof(ebpo_boolean_cells_options), 6, 0, 0, { NULL, NULL } \
+    }
+
+/*
+ * The cells of an octree of the world, a cube around the result's box. A cell is *in* if all of the
+ * closed cell is inner to the result for certain, *out* if none of it belongs to the result for
+ * certain, else *mixed*. Uniform cells are not divided; mixed ones are, down to the level.
+ */
+typedef struct ebpo_boolean_cells ebpo_boolean_cells;
+
+/*
+ * Each operand is looked at in a ball around the cell: first by the white and black nodes of its
+ * tree, which decide most, then by its faces. What depends on one operand no more is not asked of
+ * it again. An operand that is used twice is taken for two: where its own boundary is, cells are
+ * mixed.
+ *
+ * EBPO_E_ARGUMENT: the level. EBPO_E_LIMIT: too many cells (`most`), or the result is so small or
+ * so far from the origin that corners of cells are no doubles. EBPO_E_CANCELLED, EBPO_E_MEMORY, and
+ * the errors of ebpo_boolean_inside.
+ *
+ * The cells stay as they are when the expression is freed.
+ *
+ * Threads: one per expression; further ones live for the call.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_cells_new(ebpo_boolean *boolean,
+                                                          const ebpo_boolean_cells_options *options,
+                                                          ebpo_boolean_cells **out,
+                                                          ebpo_error *error);
+
+/*
+ * Threads: one per cells.
+ */
+EBPO_API void ebpo_boolean_cells_free(ebpo_boolean_cells *cells);
+
+typedef struct ebpo_boolean_volume {
+    size_t struct_size; /* EBPO_BOOLEAN_VOLUME_INIT sets it */
+
+    /*
+     * The result's volume is certainly within, in the unit of the world, cubed: all in-cells, and
+     * these with all mixed ones. Exact on posed coordinates; 0 .. 0: the result is empty.
+     */
+    double lo, hi;
+
+    /* Of the root cell: its lowest corner and its edge, a power of two; 0: the result is empty. */
+    double origin[3], edge;
+
+    /* In-cells of any level; mixed cells of the finest level. */
+    uint64_t in_cells, mixed_cells;
+
+    /* Questions whether an operand is in or out of a cell: decided by the operand's box, by its
+     * white and black nodes, and those that took its faces. */
+    uint64_t by_box, by_nodes, by_faces;
+} ebpo_boolean_volume;
+
+#define EBPO_BOOLEAN_VOLUME_INIT EBPO_SIZED(ebpo_boolean_volume)
+
+/*
+ * EBPO_E_ARGUMENT: `out` was not begun with its macro.
+ *
+ * Threads: any.
+ */
+EBPO_API ebpo_status ebpo_boolean_cells_get_volume(const ebpo_boolean_cells *cells,
+                                                   ebpo_boolean_volume *out);
+
+typedef enum ebpo_boolean_side {
+    EBPO_BOOLEAN_OUTER = 0, /* all in-cells and mixed cells: holds the result */
+    EBPO_BOOLEAN_INNER = 1  /* all in-cells: the result holds it */
+} ebpo_boolean_side;
+
+/*
+ * The surface of these cells: squares of the finest level, two triangles each, in doubles. It
+ * balances, winding numbers are 0 and 1; where cells touch along edges or at corners, more than two
+ * faces meet. The mesh may be written, or converted: an .ebpo.h5 file that is built of the outer
+ * cells holds a solid that holds the result, and so do its envelopes.
+ *
+ * out   freed by ebpo_mesh_free; without faces if there are no such cells
+ *
+ * EBPO_E_ARGUMENT: no such side. EBPO_E_LIMIT: more than 2^32 - 2 faces. EBPO_E_MEMORY.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_cells_mesh(const ebpo_boolean_cells *cells,
+                                                           ebpo_boolean_side side, ebpo_mesh *out,
+                                                           ebpo_error *error);
 
 #ifdef __cplusplus
 }
