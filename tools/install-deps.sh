@@ -11,7 +11,7 @@ modules=no
 # dpkg-dev tells meson where libraries go on Debian.
 packages="gcc dpkg-dev pkg-config meson ninja-build libhdf5-dev libzstd-dev zlib1g-dev \
     libgmp-dev nettle-dev libassimp-dev libpng-dev libcairo2-dev libjs-chart.js \
-    libcurl4-openssl-dev libqhull-dev"
+    libcurl4-openssl-dev libqhull-dev libjansson-dev"
 for option in "$@"; do
     case $option in
     --tests)

@@ -1,5 +1,6 @@
 /* Calls that answer questions about a model, or hand out its levels. */
 #include <math.h>
+#include <unistd.h>
 
 #include "every_call.h"
 #include "scratch.h"
@@ -369,6 +370,98 @@ static ebpo_status call_subtree(every_call_env *e)
     return status;
 }
 
+static bool count_pairs(void *user, const ebpo_scene_pair *pairs, uint64_t count)
+{
+    *(uint64_t *)user += count + (pairs[0].a > pairs[0].b);
+    return true;
+}
+
+static ebpo_status look_at_scene(const ebpo_scene *scene)
+{
+    ebpo_scene_counts counts = EBPO_SCENE_COUNTS_INIT;
+    ebpo_scene_model_facts model = EBPO_SCENE_MODEL_FACTS_INIT;
+    ebpo_scene_instance instance = EBPO_SCENE_INSTANCE_INIT;
+    ebpo_scene_camera camera = EBPO_SCENE_CAMERA_INIT;
+    double clearance;
+    bool fine = ebpo_scene_get_counts(scene, &counts) == EBPO_OK && counts.instances == 2 &&
+                ebpo_scene_get_model(scene, 0, &model) == EBPO_OK && model.loaded &&
+                ebpo_scene_get_instance(scene, 1, &instance) == EBPO_OK &&
+                ebpo_scene_get_camera(scene, 0, &camera) == EBPO_OK &&
+                !ebpo_scene_get_layer(scene, 0) && ebpo_scene_pair_rule(scene, 0, 1, &clearance) &&
+                ebpo_scene_file(scene, 0) && !ebpo_scene_file(scene, 1);
+    return fine ? EBPO_OK : EBPO_E_ARGUMENT;
+}
+
+static ebpo_status ask_scene(ebpo_scene *scene, ebpo_error *error)
+{
+    double min[3], max[3], length;
+    uint64_t pairs = 0;
+    ebpo_pose pose;
+    ebpo_model *model;
+    ebpo_status status = ebpo_scene_load(scene, NULL, error);
+    if (status == EBPO_OK)
+        status = look_at_scene(scene);
+    if (status == EBPO_OK)
+        status = ebpo_scene_pose(scene, 1, 0.5, &pose, error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_motion(scene, 1, 0, 1, &length, error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_instance_box(scene, 1, 0, 1, min, max, error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_box(scene, 0, 1, min, max, error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_pairs(scene, 0, 1, count_pairs, &pairs, error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_model(scene, 0, &model, error);
+    return status == EBPO_OK && pairs != 1 ? EBPO_E_ARGUMENT : status;
+}
+
+static const char scene_text[] =
+    "{\"ebpo_scene\": \"1.0\", \"models\": {\"m\": {\"file\": \"" EVERY_CALL_MODEL "\"}},"
+    "\"routes\": {\"r\": {\"poses\": [{}, {\"quaternion\": [1, 0, 0, 1]}], \"step\": 1}},"
+    "\"cameras\": [{\"name\": \"c\", \"eye\": [9, 9, 9], \"target\": [0, 0, 0]}],"
+    "\"instances\": [{\"name\": \"a\", \"model\": \"m\", \"route\": \"r\"}]}";
+
+static ebpo_status call_scene(every_call_env *e)
+{
+    ebpo_scene *scene;
+    ebpo_scene_instance second = EBPO_SCENE_INSTANCE_INIT;
+    second.name = "b";
+    ebpo_status status = ebpo_scene_parse(scene_text, sizeof scene_text - 1, "scene", scratch(NULL),
+                                          NULL, &scene, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_add_instance(scene, &second, NULL, e->error);
+    if (status == EBPO_OK)
+        status = ask_scene(scene, e->error);
+    ebpo_scene_free(scene);
+    return status;
+}
+
+static ebpo_status call_scene_file(every_call_env *e)
+{
+    ebpo_scene *scene;
+    ebpo_status status =
+        ebpo_write_file(scratch("s.json"), scene_text, sizeof scene_text - 1, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_open(scratch("s.json"), NULL, &scene, e->error);
+    if (status == EBPO_OK)
+        ebpo_scene_free(scene);
+    every_call_pause();
+    unlink(scratch("s.json"));
+    every_call_resume();
+    return status;
+}
+
+static ebpo_status call_scene_new(every_call_env *e)
+{
+    ebpo_scene *scene;
+    ebpo_status status = ebpo_scene_new(&scene, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_add_model(scene, "m", "nowhere", NULL, NULL, e->error);
+    ebpo_scene_free(scene);
+    return status;
+}
+
 const every_call every_call_answers[] = {
     { "ask", call_ask },
     { "ask_cached", call_ask_cached },
@@ -383,5 +476,8 @@ const every_call every_call_answers[] = {
     { "stream", call_stream },
     { "view", call_view },
     { "subtree", call_subtree },
+    { "scene", call_scene },
+    { "scene_file", call_scene_file },
+    { "scene_new", call_scene_new },
     { NULL, NULL },
 };

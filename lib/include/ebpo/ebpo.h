@@ -19,6 +19,7 @@
  *   verify.h      proving that a file keeps its promises
  *   deviation.h   how far a level reaches beyond the model
  *   limit.h       what no convex envelope can be better than
+ *   scene.h       models at many places, that move
  *
  * base.h says what holds for every function.
  */
@@ -43,5 +44,6 @@
 #include <ebpo/verify.h>
 #include <ebpo/deviation.h>
 #include <ebpo/limit.h>
+#include <ebpo/scene.h>
 
 #endif

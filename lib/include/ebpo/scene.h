@@ -1,0 +1,383 @@
+/*
+ * EBP-Octree in HDF5: scenes. Models at many places, that move.
+ *
+ *   Making      ebpo_scene_open (a file: format-spec/scene.md), ebpo_scene_new,
+ *               ebpo_scene_add_model, ebpo_scene_add_instance
+ *   What it is  ebpo_scene_get_counts, ebpo_scene_get_model, ebpo_scene_get_instance,
+ *               ebpo_scene_get_camera, ebpo_scene_pair_rule
+ *   Models      ebpo_scene_load, ebpo_scene_file, ebpo_scene_model
+ *   In time     ebpo_scene_pose, ebpo_scene_motion, ebpo_scene_instance_box, ebpo_scene_box
+ *   Who meets   ebpo_scene_pairs
+ *
+ *     ebpo_scene *scene = NULL;
+ *     ebpo_scene_open("plant.scene.json", NULL, &scene, &error);
+ *     ebpo_scene_load(scene, NULL, &error);
+ *     ebpo_scene_box(scene, 0, 10, min, max, &error);
+ *     ebpo_scene_pairs(scene, 0, 10, take, NULL, &error);
+ *
+ * Models, instances and cameras have numbers from 0 in the order in which they were added. Times
+ * are in the scene's seconds; before a route's first time an instance is where it begins, after its
+ * last where it ends. Poses, boxes and pairs are the same on every machine.
+ */
+#ifndef EBPO_SCENE_H
+#define EBPO_SCENE_H
+
+#include <ebpo/pose.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct ebpo_scene ebpo_scene;
+
+/* ---- making ---- */
+
+typedef struct ebpo_scene_options {
+    size_t struct_size; /* EBPO_SCENE_OPTIONS_INIT sets it */
+
+    /* Most bytes of the scene file; of all files of poses that it names; 0: 64 MiB, 256 MiB. */
+    uint64_t most_bytes, most_pose_bytes;
+
+    /*
+     * Most values (objects, arrays, texts, numbers) in the scene file: about 250 bytes of memory
+     * each while it is read. 0: 4 million.
+     */
+    uint64_t most_values;
+
+    /*
+     * Files that the scene names may lie anywhere. Else they lie in the scene's folder or below
+     * it: their paths are relative and have no part "..".
+     */
+    bool outside;
+
+    /* Models on web servers may be named, with their digests. */
+    bool remote;
+
+    uint8_t reserved[6];
+} ebpo_scene_options;
+
+#define EBPO_SCENE_OPTIONS_INIT EBPO_SIZED(ebpo_scene_options)
+
+/*
+ * Reads a scene file, and the files of poses that it names; no model yet.
+ *
+ * EBPO_E_FORMAT: not such a file; the message has the line and the path of the member, such as
+ * "line 12: instances[3].pose.scale". EBPO_E_VERSION: of another major version. EBPO_E_LIMIT: more
+ * than a limit of the options. EBPO_E_ARGUMENT, EBPO_E_IO, EBPO_E_MEMORY.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_open(const char *path,
+                                                   const ebpo_scene_options *options,
+                                                   ebpo_scene **out, ebpo_error *error);
+
+/*
+ * The same of `size` bytes of text in memory.
+ *
+ * name     for messages
+ * folder   where relative paths begin; NULL: here
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_parse(const char *text, size_t size, const char *name,
+                                                    const char *folder,
+                                                    const ebpo_scene_options *options,
+                                                    ebpo_scene **out, ebpo_error *error);
+
+/*
+ * A scene without models. EBPO_E_MEMORY.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_new(ebpo_scene **out, ebpo_error *error);
+
+/*
+ * NULL is fine. Closes the files and models that it has opened.
+ *
+ * Threads: one per scene.
+ */
+EBPO_API void ebpo_scene_free(ebpo_scene *scene);
+
+/*
+ * Adds a model, whose file is opened by ebpo_scene_load. Texts are copied.
+ *
+ * name     1 to 255 bytes of UTF-8, of no other model of the scene
+ * path     of an .ebpo.h5 file, or its URL
+ * digest   its content_sha256; NULL: any
+ * number   may be NULL
+ *
+ * EBPO_E_ARGUMENT: the name. EBPO_E_MEMORY.
+ *
+ * Threads: one per scene.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_add_model(ebpo_scene *scene, const char *name,
+                                                        const char *path, const uint8_t digest[32],
+                                                        uint64_t *number, ebpo_error *error);
+
+/* The number of nothing: no route, no layer. */
+#define EBPO_SCENE_NONE UINT64_MAX
+
+typedef struct ebpo_scene_instance {
+    size_t struct_size; /* EBPO_SCENE_INSTANCE_INIT sets it */
+
+    /* 1 to 255 bytes of UTF-8, of no other instance. */
+    const char *name;
+
+    uint64_t model;
+
+    /* Where it is; of one with a route: where it is on what moves along the route. */
+    ebpo_pose pose;
+
+    /* Number of its route; and of its layer, as `ebpo_scene_get_layer` names it. */
+    uint64_t route, layer;
+
+    /* Two fixed instances are not asked about. One with a route is not fixed. */
+    bool fixed;
+
+    uint8_t reserved[7];
+} ebpo_scene_instance;
+
+#define EBPO_SCENE_INSTANCE_INIT                                                                \
+    {                                                                                           \
+        sizeof(ebpo_scene_instance), NULL, 0, EBPO_POSE_INIT, EBPO_SCENE_NONE, EBPO_SCENE_NONE, \
+            false,                                                                              \
+        {                                                                                       \
+            0                                                                                   \
+        }                                                                                       \
+    }
+
+/*
+ * Adds an instance of a model. Boxes that are asked for later have it in them, once its model is
+ * loaded. `number` may be NULL.
+ *
+ * EBPO_E_ARGUMENT: the name, no such model, route or layer, fixed with a route; the pose is none
+ * (ebpo_pose_check says more, of a model). EBPO_E_MEMORY.
+ *
+ * Threads: one per scene.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_add_instance(ebpo_scene *scene,
+                                                           const ebpo_scene_instance *instance,
+                                                           uint64_t *number, ebpo_error *error);
+
+/* ---- what it is ---- */
+
+typedef struct ebpo_scene_counts {
+    size_t struct_size; /* EBPO_SCENE_COUNTS_INIT sets it */
+
+    uint64_t models, instances, layers, groups, routes, cameras;
+
+    /* Poses of all routes; lines of "ignore" and of "clearance"; instances that are fixed. */
+    uint64_t poses, ignored, clearances, fixed;
+
+    /* From the first time of any route to the last. 0, 0: nothing moves. */
+    double begin, end;
+} ebpo_scene_counts;
+
+#define EBPO_SCENE_COUNTS_INIT EBPO_SIZED(ebpo_scene_counts)
+
+/*
+ * EBPO_E_ARGUMENT: `out` was not begun with its macro.
+ *
+ * Threads: any, while nobody changes the scene.
+ */
+EBPO_API ebpo_status ebpo_scene_get_counts(const ebpo_scene *scene, ebpo_scene_counts *out);
+
+typedef struct ebpo_scene_model_facts {
+    size_t struct_size; /* EBPO_SCENE_MODEL_FACTS_INIT sets it */
+
+    /* The scene's, until it is freed. The path is as the scene file has it. */
+    const char *name, *path;
+
+    /* All 0: none is stated. */
+    uint8_t digest[32];
+
+    uint64_t instances;
+
+    /* Its file is open; then the box of its faces, in its own unit. */
+    bool loaded;
+    uint8_t reserved[7];
+    double min[3], max[3];
+} ebpo_scene_model_facts;
+
+#define EBPO_SCENE_MODEL_FACTS_INIT EBPO_SIZED(ebpo_scene_model_facts)
+
+/*
+ * EBPO_E_ARGUMENT: no such model, or `out` was not begun with its macro.
+ *
+ * Threads: any, while nobody changes the scene.
+ */
+EBPO_API ebpo_status ebpo_scene_get_model(const ebpo_scene *scene, uint64_t model,
+                                          ebpo_scene_model_facts *out);
+
+/*
+ * As it was added. EBPO_E_ARGUMENT: no such instance, or `out` was not begun with its macro.
+ *
+ * Threads: any, while nobody changes the scene.
+ */
+EBPO_API ebpo_status ebpo_scene_get_instance(const ebpo_scene *scene, uint64_t instance,
+                                             ebpo_scene_instance *out);
+
+/*
+ * The name of a layer, until the scene is freed; NULL: there is no such layer.
+ *
+ * Threads: any, while nobody changes the scene.
+ */
+EBPO_API const char *ebpo_scene_get_layer(const ebpo_scene *scene, uint64_t layer);
+
+typedef struct ebpo_scene_camera {
+    size_t struct_size; /* EBPO_SCENE_CAMERA_INIT sets it */
+    const char *name;
+
+    /* In the world, or in what moves along its route. */
+    double eye[3], target[3], up[3];
+
+    /* Degrees, vertical. */
+    double fov;
+
+    uint32_t width, height;
+
+    /* Of its route, or EBPO_SCENE_NONE. */
+    uint64_t route;
+} ebpo_scene_camera;
+
+#define EBPO_SCENE_CAMERA_INIT EBPO_SIZED(ebpo_scene_camera)
+
+/*
+ * EBPO_E_ARGUMENT: no such camera, or `out` was not begun with its macro.
+ *
+ * Threads: any, while nobody changes the scene.
+ */
+EBPO_API ebpo_status ebpo_scene_get_camera(const ebpo_scene *scene, uint64_t camera,
+                                           ebpo_scene_camera *out);
+
+/*
+ * Whether a pair is to be asked about: not one that the scene ignores, not two fixed instances, not
+ * an instance and itself. Then *clearance is the greatest distance that the scene wants between
+ * them, 0 if none, in the world's unit. False too where there is no such instance.
+ *
+ * Threads: any, while nobody changes the scene.
+ */
+EBPO_API bool ebpo_scene_pair_rule(const ebpo_scene *scene, uint64_t a, uint64_t b,
+                                   double *clearance);
+
+/* ---- models ---- */
+
+typedef struct ebpo_load_options {
+    size_t struct_size; /* EBPO_LOAD_OPTIONS_INIT sets it */
+
+    /* Bytes of memory for each model that is asked questions, as in ebpo_model_options. */
+    uint64_t memory;
+
+    ebpo_progress progress;
+} ebpo_load_options;
+
+#define EBPO_LOAD_OPTIONS_INIT EBPO_SIZED(ebpo_load_options)
+
+/*
+ * Opens the files of models that are not open yet (heads only, one for each path), compares
+ * digests, and makes boxes. Files of models without instances are opened as well.
+ *
+ * EBPO_E_FORMAT: a file is none of this format or not the one that the scene means.
+ * EBPO_E_ARGUMENT: a model cannot be where an instance of it is, which the message names.
+ * EBPO_E_CANCELLED, EBPO_E_IO, EBPO_E_MEMORY.
+ *
+ * Threads: one per scene.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_load(ebpo_scene *scene,
+                                                   const ebpo_load_options *options,
+                                                   ebpo_error *error);
+
+/*
+ * The open file of a model, the scene's; NULL: not loaded, or no such model. Models of one path
+ * share it.
+ *
+ * Threads: any, while nobody changes the scene.
+ */
+EBPO_API const ebpo_file *ebpo_scene_file(const ebpo_scene *scene, uint64_t model);
+
+/*
+ * What questions are asked of, made when it is first asked for: the scene's, one for all instances
+ * and all models of one file.
+ *
+ * EBPO_E_ARGUMENT: not loaded, or no such model. The errors of ebpo_model_new.
+ *
+ * Threads: one per scene.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_model(ebpo_scene *scene, uint64_t model,
+                                                    ebpo_model **out, ebpo_error *error);
+
+/* ---- in time ---- */
+
+/*
+ * Where an instance is at a time (finite).
+ *
+ * EBPO_E_ARGUMENT: no such instance, or no such time.
+ *
+ * Threads: any, while nobody changes the scene.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_pose(const ebpo_scene *scene, uint64_t instance,
+                                                   double time, ebpo_pose *out, ebpo_error *error);
+
+/*
+ * No point of the instance's model moves farther than *length between any two times of
+ * from .. to, in the world's unit; its posed coordinates neither. INFINITY where a route jumps.
+ * 0: it does not move.
+ *
+ * EBPO_E_ARGUMENT: no such instance, not loaded, or not from <= to, both finite.
+ *
+ * Threads: any, while nobody changes the scene.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_motion(const ebpo_scene *scene, uint64_t instance,
+                                                     double from, double to, double *length,
+                                                     ebpo_error *error);
+
+/*
+ * A box that holds the instance's posed vertices at all times of from .. to: min and max of three.
+ *
+ * Errors as for ebpo_scene_motion.
+ *
+ * Threads: any, while nobody changes the scene.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_instance_box(const ebpo_scene *scene,
+                                                           uint64_t instance, double from,
+                                                           double to, double min[3], double max[3],
+                                                           ebpo_error *error);
+
+/*
+ * A box that holds all instances at all times of from .. to (EBP 2017, 5.6.1). Without instances
+ * min is INFINITY and max -INFINITY. Instances whose models were added after ebpo_scene_load are
+ * EBPO_E_ARGUMENT until it is called again. Errors as for ebpo_scene_motion.
+ *
+ * Threads: any, while nobody changes the scene.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_box(const ebpo_scene *scene, double from, double to,
+                                                  double min[3], double max[3], ebpo_error *error);
+
+/* ---- who meets ---- */
+
+/* Two instances, a < b, whose boxes come within `clearance` of each other. */
+typedef struct ebpo_scene_pair {
+    uint64_t a, b;
+    double clearance;
+} ebpo_scene_pair;
+
+/* Pairs, lent until it returns. False: enough. */
+typedef bool (*ebpo_scene_pairs_fn)(void *user, const ebpo_scene_pair *pairs, uint64_t count);
+
+/*
+ * The broad phase: pairs that ebpo_scene_pair_rule allows and whose boxes
+ * (ebpo_scene_instance_box) are at most their clearance apart on each axis; ascending by a, then b.
+ * No other pair of instances comes that close at any time of from .. to.
+ *
+ * EBPO_E_ARGUMENT: not loaded, or not from <= to, both finite. EBPO_E_MEMORY.
+ *
+ * Threads: any, while nobody changes the scene.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_pairs(const ebpo_scene *scene, double from, double to,
+                                                    ebpo_scene_pairs_fn take, void *user,
+                                                    ebpo_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

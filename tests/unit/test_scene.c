@@ -1,0 +1,446 @@
+/* Scenes: files good and bad, poses in time, boxes and pairs against plain twins. */
+#include "geom/strict_fp.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "check_main.h"
+#include "exact_twin.h"
+#include "pair/pose.h"
+#include "scene/scene_parts.h"
+#include "scratch.h"
+
+static ebpo_error error;
+
+static void fine(ebpo_status status)
+{
+    ck_assert_msg(status == EBPO_OK, "%s: %s", ebpo_status_name(status), error.message);
+}
+
+static ebpo_scene *parsed(const char *text)
+{
+    ebpo_scene *scene = NULL;
+    fine(ebpo_scene_parse(text, strlen(text), "s.json", NULL, NULL, &scene, &error));
+    return scene;
+}
+
+/* --- files --- */
+
+#define HEAD "{\"ebpo_scene\": \"1.0\",\n\"models\": {\"m\": {\"file\": \"m.ebpo.h5\"}},\n"
+#define ONE  "{\"name\": \"a\", \"model\": \"m\"}"
+
+static const struct {
+    const char *text, *says;
+} bad[] = {
+    { "", "line 1: is not JSON" },
+    { "[]", "line 1: a scene is an object" },
+    { "{}", "line 1: has no member ebpo_scene" },
+    { "{\"ebpo_scene\": \"2.0\"}", "version 2.0" },
+    { "{\"ebpo_scene\": \"1.0\",\n\"instances\": 3}", "line 2: instances: is not an array" },
+    { HEAD "\"colour\": 1}", "line 3: colour: is not a member" },
+    { HEAD "\"title\": 1}", "line 3: title: is not a text" },
+    { HEAD "\"title\": \"a\", \"title\": \"b\"}", "line 3: is not JSON: duplicate" },
+    { HEAD "\"instances\": [\n{\"model\": \"m\"}]}", "line 4: instances[0]: has no member name" },
+    { HEAD "\"instances\": [" ONE ",\n" ONE "]}", "line 4: instances[1]: there is another 'a'" },
+    { HEAD "\"instances\": [\n{\"name\": \"a\", \"model\": \"n\"}]}",
+      "line 4: instances[0].model: is not one of this scene" },
+    { HEAD "\"instances\": [{\"name\": \"a\", \"model\": \"m\",\n\"pose\": {\n\"scale\": \"1\"}}]}",
+      "line 5: instances[0].pose.scale: is not a number" },
+    { HEAD "\"instances\": [{\"name\": \"a\", \"model\": \"m\", \"pose\": {\"scale\": -1}}]}",
+      "the scale is -1" },
+    { HEAD "\"instances\": [{\"name\": \"a\", \"model\": \"m\", \"pose\":\n{\"rotation\": "
+           "[1,0,0,0,1,0,0,0,-1]}}]}",
+      "mirror" },
+    { HEAD "\"instances\": [{\"name\": \"a\", \"model\": \"m\", \"pose\":\n{\"rotation\": "
+           "[1,0,0,0,1,0,0,1]}}]}",
+      "line 4: instances[0].pose.rotation: is not an array of 9 numbers" },
+    { HEAD "\"instances\": [{\"name\": \"a\", \"model\": \"m\", \"pose\":\n{\"quaternion\": "
+           "[0,0,0,0]}}]}",
+      "the quaternion is 0" },
+    { HEAD "\"instances\": [{\"name\": \"*\", \"model\": \"m\"}]}", "cannot be a name" },
+    { HEAD "\"instances\": [{\"name\": \"a\\nb\", \"model\": \"m\"}]}", "control characters" },
+    { HEAD "\"routes\": {\"r\": {\"keys\": []}}}", "routes.r: has no poses" },
+    { HEAD "\"routes\": {\"r\": {}}}", "routes.r: has not one of keys" },
+    { HEAD "\"routes\": {\"r\": {\"keys\": [{\"time\": 1, \"pose\": {}},\n{\"time\": 1, \"pose\": "
+           "{}}]}}}",
+      "line 4: routes.r.keys[1]: time 1 is not above" },
+    { HEAD "\"routes\": {\"r\": {\"keys\": [{\"time\": 1}]}}}", "keys[0].pose: is not an object" },
+    { HEAD "\"routes\": {\"r\": {\"csv\": \"../p.csv\"}}}", "routes.r.csv: is outside" },
+    { HEAD "\"ignore\": [[\"a\"]]}", "ignore[0]: is not an array of two names" },
+    { HEAD "\"ignore\": [[\"*\",\n\"layer:x\"]]}", "line 4: ignore[0][1]: is no instance" },
+    { HEAD "\"clearance\": [{\"between\": [\"*\", \"*\"], \"distance\": -1}]}",
+      "clearance[0].distance: is below 0" },
+    { HEAD "\"cameras\": [{\"name\": \"c\", \"eye\": [0,0,1], \"target\": [0,0,2]}]}",
+      "up points to it" },
+    { "{\"ebpo_scene\": \"1.0\",\n\"models\": {\"m\": {\"file\": \"/etc/m\"}}}",
+      "line 2: models.m.file: is outside" },
+    { "{\"ebpo_scene\": \"1.0\", \"models\": {\"m\": {\"file\": \"a/../../m\"}}}", "is outside" },
+    { "{\"ebpo_scene\": \"1.0\", \"models\": {\"m\": {\"file\": \"http://h/m\"}}}", "allowed" },
+    { "{\"ebpo_scene\": \"1.0\", \"models\": {\"m\": {\"file\": \"m\", \"content_sha256\": "
+      "\"1\"}}}",
+      "is not 64 digits" },
+    { "[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[", "more than 32 levels" },
+    { "{\"ebpo_scene\": 1e999}", "is not JSON" },
+};
+
+START_TEST(bad_files)
+{
+    ebpo_scene *scene = NULL;
+    ebpo_status status =
+        ebpo_scene_parse(bad[_i].text, strlen(bad[_i].text), "s.json", NULL, NULL, &scene, &error);
+    ck_assert_msg(status != EBPO_OK && !scene, "%s", bad[_i].text);
+    ck_assert_msg(strstr(error.message, bad[_i].says), "%s\n%s", bad[_i].text, error.message);
+}
+END_TEST
+
+START_TEST(limits)
+{
+    static const char text[] = HEAD "\"x-a\": [1, 2, 3, \"[[[[,,,,\\\"\", 4]}";
+    ebpo_scene_options options = EBPO_SCENE_OPTIONS_INIT;
+    ebpo_scene *scene = NULL;
+    options.most_values = 16;
+    fine(ebpo_scene_parse(text, strlen(text), "s.json", NULL, &options, &scene, &error));
+    ebpo_scene_free(scene);
+    options.most_values = 15;
+    ck_assert_int_eq(ebpo_scene_parse(text, strlen(text), "s.json", NULL, &options, &scene, &error),
+                     EBPO_E_LIMIT);
+    options.most_values = 0;
+    options.most_bytes = strlen(text) - 1;
+    ck_assert_int_eq(ebpo_scene_parse(text, strlen(text), "s.json", NULL, &options, &scene, &error),
+                     EBPO_E_LIMIT);
+}
+END_TEST
+
+START_TEST(rules)
+{
+    ebpo_scene *s = parsed(
+        HEAD "\"layers\": [\"l\"], \"groups\": [\"g\", \"h\"], \"instances\": [" ONE ","
+             "{\"name\": \"b\", \"model\": \"m\", \"layer\": \"l\", \"groups\": [\"g\"]},"
+             "{\"name\": \"c\", \"model\": \"m\", \"fixed\": true},"
+             "{\"name\": \"d\", \"model\": \"m\", \"fixed\": true, \"groups\": [\"h\", \"g\"]}],"
+             "\"ignore\": [[\"group:h\", \"a\"]], \"clearance\": ["
+             "{\"between\": [\"*\", \"layer:l\"], \"distance\": 2},"
+             "{\"between\": [\"group:g\", \"group:g\"], \"distance\": 3}]}");
+    static double want[4][4] = {
+        { -1, 2, 0, -1 }, { 2, -1, 2, 3 }, { 0, 2, -1, -1 }, { -1, 3, -1, -1 }
+    };
+    for (uint64_t a = 0; a < 4; a++)
+        for (uint64_t b = 0; b < 4; b++) {
+            double clearance;
+            bool asked = ebpo_scene_pair_rule(s, a, b, &clearance);
+            ck_assert_msg((asked ? clearance : -1) == want[a][b], "%d %d", (int)a, (int)b);
+        }
+    ck_assert_str_eq(ebpo_scene_get_layer(s, 0), "l");
+    ck_assert_ptr_null(ebpo_scene_get_layer(s, 1));
+    ebpo_scene_free(s);
+}
+END_TEST
+
+START_TEST(csv)
+{
+    static const struct {
+        const char *text, *says;
+    } cases[] = {
+        { "time,x,y,z,qx,qy,qz,qw\n1,2,3,4,0,0,0,1\n\n2;2;3;5;0;0;0;-1\r\n", NULL },
+        { "scale, qw ,qz,qy,qx,z,y,x,time\n 1 , 1,0,0,0,4,3,2,1\n1,1,0,0,0,5,3,2,2", NULL },
+        { "time,x,y,z\n", "line 1: the first line names" },
+        { "time,x,y,z,qx,qy,qz,qw,qw\n", "line 1: each column is one of" },
+        { "time,x,y,z,qx,qy,qz,qw\n", "there are no poses" },
+        { "time,x,y,z,qx,qy,qz,qw\n1,2,3,4,0,0,0\n", "line 2: there are not as many" },
+        { "time,x,y,z,qx,qy,qz,qw\n1,2,3,4,0,0,0,a\n", "line 2: this is not a number" },
+        { "time,x,y,z,qx,qy,qz,qw\n1,2,3,4,0,0,0,1\n\n1,2,3,4,0,0,0,1\n", "line 4: time 1 is" },
+        { "time,x,y,z,qx,qy,qz,qw\n1,2,3,nan,0,0,0,1\n", "line 2: a number is not finite" },
+    };
+    static const char text[] = HEAD "\"routes\": {\"r\": {\"csv\": \"p.csv\"}}}";
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        ebpo_scene *s = NULL;
+        ebpo_pose pose;
+        fine(ebpo_write_file(scratch("p.csv"), cases[i].text, strlen(cases[i].text), &error));
+        ebpo_status status =
+            ebpo_scene_parse(text, strlen(text), "s.json", scratch(NULL), NULL, &s, &error);
+        if (cases[i].says) {
+            ck_assert_msg(status == EBPO_E_FORMAT && strstr(error.message, cases[i].says), "%s\n%s",
+                          cases[i].text, error.message);
+            continue;
+        }
+        fine(status);
+        scene_route_at(&s->routes[0], 1.5, &pose);
+        ck_assert(pose.translation[2] == 4.5 && pose.rotation[0][0] == 1);
+        ebpo_scene_free(s);
+    }
+}
+END_TEST
+
+/* --- poses --- */
+
+static double some(uint64_t *state, double size)
+{
+    return (double)twin_integer(state, -1000000, 1000000) * size / 1000000;
+}
+
+static void some_route(scene_route *route, uint64_t *state, int keys)
+{
+    for (int i = 0; i < keys; i++) {
+        scene_key key = { .time = i, .scale = 1 + 0.5 * fabs(some(state, 1)) };
+        for (int k = 0; k < 4; k++)
+            key.turn[k] = some(state, 1) + (k == 3 ? 1e-3 : 0);
+        for (int k = 0; k < 3; k++)
+            key.translation[k] = some(state, 3);
+        fine(scene_add_key(route, &key, &error));
+    }
+}
+
+/* By sines, as the books have it. */
+static void sine_twin(const double a[4], const double b[4], double u, double q[4])
+{
+    double dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
+    double sign = dot < 0 ? -1 : 1, angle = acos(fmin(fabs(dot), 1)), s = sin(angle);
+    for (int k = 0; k < 4; k++)
+        q[k] = s < 1e-9 ? a[k] : (sin((1 - u) * angle) * a[k] + sin(u * angle) * sign * b[k]) / s;
+}
+
+START_TEST(turns_evenly)
+{
+    uint64_t state = 7;
+    scene_route route = { 0 };
+    some_route(&route, &state, 300);
+    for (int i = 0; i + 1 < 300; i++) {
+        double u = fabs(some(&state, 1)), q[4];
+        ebpo_pose p;
+        if (u >= 1)
+            continue;
+        scene_route_at(&route, i + u, &p);
+        sine_twin(route.keys[i].turn, route.keys[i + 1].turn, (i + u) - i, q);
+        double twin[3][3] = {
+            { 1 - 2 * (q[1] * q[1] + q[2] * q[2]), 2 * (q[0] * q[1] - q[2] * q[3]),
+              2 * (q[0] * q[2] + q[1] * q[3]) },
+            { 2 * (q[0] * q[1] + q[2] * q[3]), 1 - 2 * (q[0] * q[0] + q[2] * q[2]),
+              2 * (q[1] * q[2] - q[0] * q[3]) },
+            { 2 * (q[0] * q[2] - q[1] * q[3]), 2 * (q[1] * q[2] + q[0] * q[3]),
+              1 - 2 * (q[0] * q[0] + q[1] * q[1]) },
+        };
+        for (int k = 0; k < 9; k++)
+            ck_assert_double_eq_tol((&p.rotation[0][0])[k], (&twin[0][0])[k], 1e-11);
+    }
+    free(route.keys);
+}
+END_TEST
+
+START_TEST(matrices_become_turns)
+{
+    uint64_t state = 8;
+    scene_route route = { 0 };
+    some_route(&route, &state, 500);
+    for (int i = 0; i < 500; i++) {
+        ebpo_pose p, again;
+        scene_route one = { 0 };
+        scene_key key = { .scale = 1 };
+        scene_route_at(&route, i, &p);
+        scene_turn_of_matrix((const double(*)[3])p.rotation, key.turn);
+        fine(scene_add_key(&one, &key, &error));
+        scene_route_at(&one, 0, &again);
+        for (int k = 0; k < 9; k++)
+            ck_assert_double_eq_tol((&p.rotation[0][0])[k], (&again.rotation[0][0])[k], 1e-14);
+        free(one.keys);
+    }
+    free(route.keys);
+}
+END_TEST
+
+/* --- boxes, motions, pairs --- */
+
+/* As if a file with this box had been opened. */
+static ebpo_scene *some_scene(uint64_t *state, int routes, int instances)
+{
+    ebpo_scene *s = NULL;
+    uint64_t number;
+    char name[20];
+    fine(ebpo_scene_new(&s, &error));
+    fine(ebpo_scene_add_model(s, "m", "m", NULL, NULL, &error));
+    s->models[0].file = 0;
+    for (int k = 0; k < 3; k++) {
+        s->models[0].min[k] = -0.3 - 0.1 * k;
+        s->models[0].max[k] = 0.2 + 0.4 * k;
+    }
+    for (int i = 0; i < routes; i++) {
+        snprintf(name, sizeof name, "r%d", i);
+        fine(scene_add_route(s, name, &number, &error));
+        some_route(&s->routes[i], state, 2 + i % 5);
+        s->routes[i].jumps = i % 4 == 3;
+    }
+    for (int i = 0; i < instances; i++) {
+        ebpo_scene_instance at = EBPO_SCENE_INSTANCE_INIT;
+        snprintf(name, sizeof name, "i%d", i);
+        at.name = name;
+        at.route = routes && i % 3 ? (uint64_t)(i % routes) : EBPO_SCENE_NONE;
+        at.fixed = i % 9 == 0;
+        at.pose.scale = 0.25 + fabs(some(state, 1));
+        for (int k = 0; k < 3; k++)
+            at.pose.translation[k] = some(state, 5);
+        fine(ebpo_scene_add_instance(s, &at, NULL, &error));
+    }
+    return s;
+}
+
+static void some_vertex(const ebpo_scene *s, uint64_t *state, double x[3])
+{
+    for (int k = 0; k < 3; k++) {
+        const scene_model *m = &s->models[0];
+        double u = (double)twin_integer(state, 0, 4) / 4;
+        x[k] = fmin(fmax(m->min[k] + u * (m->max[k] - m->min[k]), m->min[k]), m->max[k]);
+    }
+}
+
+static void posed(const ebpo_scene *s, uint64_t i, double time, const double x[3], double out[3])
+{
+    static const double reach[3] = { 2, 2, 2 };
+    ebpo_pose pose;
+    ebpo_posing posing;
+    fine(ebpo_scene_pose(s, i, time, &pose, &error));
+    fine(ebpo_posing_make(&posing, &pose, reach, &error));
+    ebpo_posing_apply(&posing, x, out);
+}
+
+START_TEST(boxes_and_motions_hold)
+{
+    uint64_t state = 9;
+    ebpo_scene *s = some_scene(&state, 12, 60);
+    for (int n = 0; n < 3000; n++) {
+        uint64_t i = (uint64_t)twin_integer(&state, 0, 59);
+        double from = some(&state, 4), to = from + fabs(some(&state, n % 3 ? 3 : 0.01)), box[2][3];
+        double x[3], at[2][3], length, gone = 0;
+        if (n % 7 == 0)
+            from = floor(from), to = from + 1;
+        fine(ebpo_scene_instance_box(s, i, from, to, box[0], box[1], &error));
+        fine(ebpo_scene_motion(s, i, from, to, &length, &error));
+        some_vertex(s, &state, x);
+        for (int e = 0; e < 2; e++) {
+            double time = e && n % 2 ? to : from + (to - from) * fabs(some(&state, 1));
+            posed(s, i, fmin(time, to), x, at[e]);
+            for (int k = 0; k < 3; k++)
+                ck_assert(at[e][k] >= box[0][k] && at[e][k] <= box[1][k]);
+        }
+        for (int k = 0; k < 3; k++)
+            gone += (at[0][k] - at[1][k]) * (at[0][k] - at[1][k]);
+        ck_assert_msg(sqrt(gone) <= length, "%g > %g", sqrt(gone), length);
+    }
+    ebpo_scene_free(s);
+}
+END_TEST
+
+/* Bounds are of use: a quarter turn at arm's length, a straight way. */
+START_TEST(bounds_are_close)
+{
+    ebpo_scene *s =
+        parsed(HEAD "\"routes\": {\"turn\": {\"keys\": [{\"time\": 0, \"pose\": {}}, {\"time\": 1, "
+                    "\"pose\": {\"quaternion\": [0, 0, 1, 1]}}]}, \"way\": {\"poses\": [{}, "
+                    "{\"translation\": [3, 4, 0]}], \"step\": 1}},"
+                    "\"instances\": [{\"name\": \"a\", \"model\": \"m\", \"route\": \"turn\"},"
+                    "{\"name\": \"b\", \"model\": \"m\", \"route\": \"way\"}]}");
+    double length, box[2][3];
+    s->models[0].file = 0;
+    s->models[0].max[0] = 1;
+    fine(ebpo_scene_motion(s, 0, 0, 1, &length, &error));
+    ck_assert_double_eq_tol(length, acos(0), 1e-9);
+    fine(ebpo_scene_instance_box(s, 0, 0, 1, box[0], box[1], &error));
+    ck_assert(box[1][0] < 1.003 && box[1][1] < 1.003 && box[0][0] > -0.003);
+    fine(ebpo_scene_motion(s, 1, 0.5, 1, &length, &error));
+    ck_assert_double_eq_tol(length, 2.5, 1e-9);
+    fine(ebpo_scene_box(s, 0, 1, box[0], box[1], &error));
+    ck_assert_double_eq_tol(box[1][0], 4, 1e-9);
+    ebpo_scene_free(s);
+}
+END_TEST
+
+START_TEST(box_grows_with_instances)
+{
+    uint64_t state = 10;
+    ebpo_scene *s = some_scene(&state, 0, 0);
+    double box[2][3];
+    fine(ebpo_scene_box(s, 0, 0, box[0], box[1], &error));
+    ck_assert(box[0][0] == INFINITY && box[1][2] == -INFINITY);
+    for (int i = 0; i < 3; i++) {
+        ebpo_scene_instance at = EBPO_SCENE_INSTANCE_INIT;
+        at.name = i == 0 ? "a" : i == 1 ? "b" : "c";
+        at.pose.translation[0] = 10 * i;
+        fine(ebpo_scene_add_instance(s, &at, NULL, &error));
+        fine(ebpo_scene_box(s, 0, 0, box[0], box[1], &error));
+        ck_assert_double_eq_tol(box[0][0], -0.3, 1e-9);
+        ck_assert_double_eq_tol(box[1][0], 0.2 + 10 * i, 1e-9);
+    }
+    ebpo_scene_free(s);
+}
+END_TEST
+
+typedef struct found {
+    ebpo_scene_pair pairs[20000];
+    uint64_t count;
+} found;
+
+static bool keep(void *user, const ebpo_scene_pair *pairs, uint64_t count)
+{
+    found *f = user;
+    memcpy(f->pairs + f->count, pairs, count * sizeof *pairs);
+    f->count += count;
+    return true;
+}
+
+/* Every pair of boxes, in order. */
+static void all_pairs(const ebpo_scene *s, double from, double to, found *f)
+{
+    ebpo_scene_pair p;
+    for (p.a = 0; p.a < s->instances_count; p.a++)
+        for (p.b = p.a + 1; p.b < s->instances_count; p.b++) {
+            double x[2][3], y[2][3];
+            fine(ebpo_scene_instance_box(s, p.a, from, to, x[0], x[1], &error));
+            fine(ebpo_scene_instance_box(s, p.b, from, to, y[0], y[1], &error));
+            bool near = ebpo_scene_pair_rule(s, p.a, p.b, &p.clearance);
+            for (int k = 0; k < 3; k++)
+                near &= x[0][k] - y[1][k] <= p.clearance && y[0][k] - x[1][k] <= p.clearance;
+            if (near)
+                f->pairs[f->count++] = p;
+        }
+}
+
+START_TEST(pairs_as_twin)
+{
+    static found fast, slow;
+    uint64_t state = 11 + (uint64_t)_i;
+    ebpo_scene *s = some_scene(&state, _i % 2 ? 8 : 0, 150);
+    fine(scene_add_rule(s, SCENE_ALL_SET, SCENE_ALL_SET, _i * 0.2, &error));
+    fine(scene_add_rule(s, 3, 7, 4, &error));
+    fine(scene_add_rule(s, 4, SCENE_ALL_SET, -1, &error));
+    scene_sort_rules(s);
+    fast.count = slow.count = 0;
+    fine(ebpo_scene_pairs(s, 0, _i < 2 ? 0 : 2.5, keep, &fast, &error));
+    all_pairs(s, 0, _i < 2 ? 0 : 2.5, &slow);
+    ck_assert_uint_gt(slow.count, 5);
+    ck_assert_uint_eq(fast.count, slow.count);
+    for (uint64_t i = 0; i < fast.count; i++)
+        ck_assert(fast.pairs[i].a == slow.pairs[i].a && fast.pairs[i].b == slow.pairs[i].b &&
+                  fast.pairs[i].clearance == slow.pairs[i].clearance);
+    ebpo_scene_free(s);
+}
+END_TEST
+
+Suite *test_suite(void)
+{
+    Suite *suite = suite_create("scene");
+    TCase *c = tcase_create("scene");
+    tcase_add_checked_fixture(c, scratch_enter, scratch_leave);
+    tcase_set_timeout(c, 300);
+    tcase_add_loop_test(c, bad_files, 0, sizeof bad / sizeof *bad);
+    tcase_add_test(c, limits);
+    tcase_add_test(c, rules);
+    tcase_add_test(c, csv);
+    tcase_add_test(c, turns_evenly);
+    tcase_add_test(c, matrices_become_turns);
+    tcase_add_test(c, boxes_and_motions_hold);
+    tcase_add_test(c, bounds_are_close);
+    tcase_add_test(c, box_grows_with_instances);
+    tcase_add_loop_test(c, pairs_as_twin, 0, 4);
+    suite_add_tcase(suite, c);
+    return suite;
+}

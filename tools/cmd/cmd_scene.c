@@ -1,0 +1,103 @@
+/* ebpo scene: models at many places, that move. */
+#include <math.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "cli/command.h"
+#include "cli/json.h"
+#include "cli/progress.h"
+#include "cli/words.h"
+#include "cmd/commands.h"
+#include "cmd/scene_run.h"
+
+static const arg_option options[] = {
+    OPTION_REAL("time", 't', scene_values, time, "T", -1e300, 1e300,
+                "boxes, pairs: at this time; default: the first of all routes"),
+    OPTION_REAL("from", 0, scene_values, from, "T", -1e300, 1e300,
+                "boxes, pairs: at all times from this one on; default: the first"),
+    OPTION_REAL("to", 0, scene_values, to, "T", -1e300, 1e300,
+                "boxes, pairs: up to this time; default: the last"),
+    OPTION_FLAG("outside", 0, scene_values, outside,
+                "files that the scene names may lie outside its folder"),
+    OPTION_FLAG("remote", 0, scene_values, remote,
+                "models may be on web servers, if their digests are given"),
+    OPTION_FLAG("json", 0, scene_values, json, "print JSON"),
+    OPTION_QUIET(scene_values, quiet),
+    { 0 },
+};
+
+static const arg_spec spec = {
+    .command = "scene",
+    .operands = "info|check|boxes|pairs FILE",
+    .least = 2,
+    .most = 2,
+    .summary = "describes a scene: models at many places, that move, and who may meet",
+    .text = "FILE is a scene in JSON. 'info' tells what it holds and where that is, 'check' opens "
+            "every model and says whether all fits together, 'boxes' prints the box of each "
+            "instance, 'pairs' the instances whose boxes come close enough to each other.",
+    .options = options,
+};
+
+/* Which times are asked about. */
+static bool settle_times(scene_values *v, const ebpo_scene *scene)
+{
+    ebpo_scene_counts c = EBPO_SCENE_COUNTS_INIT;
+    (void)ebpo_scene_get_counts(scene, &c);
+    bool span = !isnan(v->from) || !isnan(v->to);
+    if (span && !isnan(v->time))
+        return false;
+    if (!span) {
+        v->from = v->to = isnan(v->time) ? c.begin : v->time;
+    } else {
+        v->from = isnan(v->from) ? c.begin : v->from;
+        v->to = isnan(v->to) ? c.end : v->to;
+    }
+    return v->from <= v->to;
+}
+
+static const struct {
+    const char *name;
+    ebpo_status (*run)(const scene_values *v, const char *path, ebpo_scene *scene,
+                       ebpo_error *error);
+} deeds[] = {
+    { "info", scene_info },
+    { "check", scene_check },
+    { "boxes", scene_boxes },
+    { "pairs", scene_pairs },
+};
+enum { DEEDS = sizeof deeds / sizeof *deeds };
+
+static int run(void *given, const char **operand)
+{
+    scene_values *v = given;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_scene *scene = NULL;
+    int deed = 0;
+    while (deed < DEEDS && strcmp(operand[0], deeds[deed].name) != 0)
+        deed++;
+    if (deed == DEEDS)
+        return command_usage("scene", "'%s' is not one of info, check, boxes, pairs", operand[0]);
+    ebpo_scene_options how = EBPO_SCENE_OPTIONS_INIT;
+    ebpo_load_options load = EBPO_LOAD_OPTIONS_INIT;
+    how.outside = v->outside;
+    how.remote = v->remote;
+    ebpo_status status = ebpo_scene_open(operand[1], &how, &scene, &error);
+    if (status == EBPO_OK && !settle_times(v, scene)) {
+        ebpo_scene_free(scene);
+        return command_usage("scene", "--time stands alone; --from is not after --to");
+    }
+    progress_line line;
+    load.progress = progress_start(&line, "scene", v->quiet);
+    if (status == EBPO_OK)
+        status = ebpo_scene_load(scene, &load, &error);
+    progress_wipe(&line);
+    if (status == EBPO_OK)
+        status = deeds[deed].run(v, operand[1], scene, &error);
+    ebpo_scene_free(scene);
+    return status == EBPO_OK ? EXIT_FINE : command_failed("scene", &error);
+}
+
+static const scene_values usual = SCENE_VALUES_INIT;
+
+const command command_scene = { &spec, sizeof usual, &usual, run };

@@ -1,0 +1,26 @@
+/* What `ebpo scene` does with a scene whose models are loaded. */
+#ifndef EBPO_TOOLS_SCENE_RUN_H
+#define EBPO_TOOLS_SCENE_RUN_H
+
+#include <ebpo/ebpo.h>
+
+typedef struct scene_values {
+    double time, from, to; /* NAN: not given; then from and to are settled */
+    bool outside, remote, json, quiet;
+} scene_values;
+
+#define SCENE_VALUES_INIT                                                             \
+    {                                                                                 \
+        .time = __builtin_nan(""), .from = __builtin_nan(""), .to = __builtin_nan("") \
+    }
+
+ebpo_status scene_info(const scene_values *v, const char *path, ebpo_scene *scene,
+                       ebpo_error *error);
+ebpo_status scene_check(const scene_values *v, const char *path, ebpo_scene *scene,
+                        ebpo_error *error);
+ebpo_status scene_boxes(const scene_values *v, const char *path, ebpo_scene *scene,
+                        ebpo_error *error);
+ebpo_status scene_pairs(const scene_values *v, const char *path, ebpo_scene *scene,
+                        ebpo_error *error);
+
+#endif
