@@ -173,10 +173,13 @@ static void extend_nodes(job *j)
 
 /* --- boxes --- */
 
+/* fmax of what are numbers: without calls. */
+static double larger(double a, double b) { return a > b ? a : b; }
+
 /* Origin and step of one axis: so that 255 steps hold what must be held. */
 static double choose_grid(double low, double high, float *origin, float *step)
 {
-    double slack = fmax(fabs(low), fabs(high)) * box_slack + least_slack;
+    double slack = larger(fabs(low), fabs(high)) * box_slack + least_slack;
     *origin = (float)(low - slack);
     if ((double)*origin > low - slack)
         *origin = nextafterf(*origin, -INFINITY);
@@ -207,7 +210,7 @@ static void set_boxes(ebpo_bound *b, const extent *all, const extent child[8])
     }
     double size = 0;
     for (int k = 0; k < 3; k++)
-        size = fmax(size, all->high[k] - all->low[k]);
+        size = larger(size, all->high[k] - all->low[k]);
     b->slab_limit2 = (float)(size * size * slab_share);
 }
 
@@ -216,8 +219,8 @@ static double reach_of(const ebpo_bound *b)
 {
     double reach = 0;
     for (int k = 0; k < 3; k++)
-        reach = fmax(reach, fmax(fabs((double)b->origin[k]),
-                                 fabs((double)b->origin[k] + 255 * (double)b->step[k])));
+        reach = larger(reach, larger(fabs((double)b->origin[k]),
+                                     fabs((double)b->origin[k] + 255 * (double)b->step[k])));
     return reach;
 }
 
@@ -351,10 +354,10 @@ static void set_slabs(ebpo_bound_slab *b, int count, double size, const slab chi
 {
     double slack = size * slab_slack, along = 0, aside = 0, radius[8];
     for (int lane = 0; lane < count; lane++) {
-        along = fmax(along, fmax(child[lane].to, -child[lane].from) + slack);
+        along = larger(along, larger(child[lane].to, -child[lane].from) + slack);
         /* the square is off by less than 2^-49 of size * size */
-        radius[lane] = sqrt(fmax(child[lane].radius2, 0) + size * size * 0x1p-46) + slack;
-        aside = fmax(aside, radius[lane]);
+        radius[lane] = sqrt(larger(child[lane].radius2, 0) + size * size * 0x1p-46) + slack;
+        aside = larger(aside, radius[lane]);
     }
     b->along_step = (float)(along / SHORT_MOST);
     b->aside_step = (float)(aside / SHORT_MOST);
@@ -451,7 +454,7 @@ ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout, uns
     if (status == EBPO_OK)
         status = fill(&j, threads, error);
     if (status == EBPO_OK && s->bound_count)
-        s->reach = fmax(1, reach_of(&s->bound[s->top]));
+        s->reach = larger(1, reach_of(&s->bound[s->top]));
     free(j.of_block);
     free(j.of_node);
     return status;

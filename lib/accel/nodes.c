@@ -35,16 +35,24 @@ static bool make_list_room(walk *w, uint64_t more)
     return w->status == EBPO_OK;
 }
 
-/* Faces come in ascending order, and so do blocks: those of one block become one entry. */
-static inline void list_face(const walk *w, uint64_t face, ebpo_listed_block *list, uint32_t *count)
+/* A leaf's entries so far. */
+typedef struct listing {
+    ebpo_listed_block *list;
+    uint32_t count, block; /* that the last entry is of; none: no block's number */
+    uint64_t last;
+} listing;
+
+/* Faces come in ascending order, and so do blocks: those of one block become one entry. Whether a
+ * face begins one is a toss: without a branch. */
+static inline void list_face(const walk *w, uint64_t face, listing *l)
 {
     uint32_t slot = w->slot_of[face], block = slot / EBPO_BLOCK;
     uint64_t lane = UINT64_C(1) << (slot % EBPO_BLOCK + EBPO_LISTED_LANES);
-    uint64_t last = *count ? ebpo_listed(&list[*count - 1]) : 0;
-    if (*count && ebpo_listed_number(last) == block)
-        ebpo_list(&list[*count - 1], last | lane);
-    else
-        ebpo_list(&list[(*count)++], block | lane);
+    bool begins = block != l->block;
+    l->last = (begins ? block : l->last) | lane;
+    l->count += begins;
+    l->block = block;
+    ebpo_list(&l->list[l->count - 1], l->last);
 }
 
 /* References, which lie before the leaf's own faces, then these. */
@@ -54,19 +62,19 @@ static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank
     uint64_t refs = level->leaf_ref_count[rank], fresh = level->leaf_new[rank];
     if (!make_list_room(w, refs + (fresh > EBPO_BLOCK ? 2 * fresh / 9 : 1)))
         return;
-    ebpo_listed_block *list = w->s->list + w->s->list_count;
-    uint32_t count = 0;
-    for (uint64_t i = w->refs[depth]; i < w->refs[depth] + refs; i++)
-        list_face(w, level->leaf_refs[i], list, &count);
-    for (uint64_t i = level->leaf_first[rank]; i < level->leaf_first[rank] + fresh; i++)
-        list_face(w, i, list, &count);
-    if (!count) /* a leaf without faces: block 0 without lanes */
-        ebpo_list(&list[count++], 0);
-    ebpo_list(&list[count - 1], ebpo_listed(&list[count - 1]) | EBPO_LISTED_LAST);
-    if (w->s->list_longest < count)
-        w->s->list_longest = count;
+    listing l = { .list = w->s->list + w->s->list_count, .block = UINT32_MAX };
+    const uint32_t *ref = level->leaf_refs + w->refs[depth];
+    for (uint64_t i = 0; i < refs; i++)
+        list_face(w, ref[i], &l);
+    for (uint64_t i = level->leaf_first[rank], end = i + fresh; i < end; i++)
+        list_face(w, i, &l);
+    if (!l.count) /* a leaf without faces: block 0 without lanes */
+        l.count = 1;
+    ebpo_list(&l.list[l.count - 1], l.last | EBPO_LISTED_LAST);
+    if (w->s->list_longest < l.count)
+        w->s->list_longest = l.count;
     leaf->list = (uint32_t)w->s->list_count;
-    w->s->list_count += count;
+    w->s->list_count += l.count;
     w->refs[depth] += refs;
     leaf->kind = w->s->solid ? EBPO_LEAF_UNKNOWN : EBPO_LEAF_GENERAL;
     leaf->winding = level->leaf_winding ? level->leaf_winding[rank] : 0;

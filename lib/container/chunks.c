@@ -11,49 +11,9 @@
 #include "codec/coding.h"
 #include "container/chunks.h"
 
-/* Readers are kept for the next load: setting up a decoder takes longer than a chunk. They are not
- * part of the budget. */
-enum { IDLE_MAX = 4, CHUNK_BITS = 48, AROUND = 4 };
+enum { CHUNK_BITS = 48, AROUND = 4 };
 /* Announced for later: at most so much, and a share of what a limit leaves. */
 enum { AHEAD_MOST = 4 << 20, AHEAD_SHARE = 4, BATCH_SHARE = 16 };
-
-struct ebpo_chunk_scratch {
-    ebpo_chunk_scratch *next;
-    ebpo_chunk_reader reader;
-    uint8_t raw[EBPO_CHUNK_BYTES_MAX];
-};
-
-static ebpo_chunk_scratch *take_scratch(ebpo_chunks *c)
-{
-    pthread_mutex_lock(&c->lock);
-    ebpo_chunk_scratch *scratch = c->idle;
-    if (scratch) {
-        c->idle = scratch->next;
-        c->idle_count--;
-    }
-    pthread_mutex_unlock(&c->lock);
-    return scratch ? scratch : ebpo_alloc_zero(1, sizeof *scratch);
-}
-
-static void free_scratch(ebpo_chunk_scratch *scratch)
-{
-    ebpo_chunk_reader_clear(&scratch->reader);
-    free(scratch);
-}
-
-static void give_scratch(ebpo_chunks *c, ebpo_chunk_scratch *scratch)
-{
-    pthread_mutex_lock(&c->lock);
-    bool keep = c->idle_count < IDLE_MAX;
-    if (keep) {
-        scratch->next = c->idle;
-        c->idle = scratch;
-        c->idle_count++;
-    }
-    pthread_mutex_unlock(&c->lock);
-    if (!keep)
-        free_scratch(scratch);
-}
 
 static uint64_t key_of(const ebpo_array_in *array, uint64_t chunk)
 {
@@ -405,19 +365,19 @@ static ebpo_status load(void *user, uint64_t key, void **item, uint64_t *bytes, 
         return allowed;
     uint64_t rows = chunk_rows(array, chunk_of(key));
     size_t row_bytes = ebpo_h5_row_bytes(&array->shape);
-    ebpo_chunk_scratch *scratch = take_scratch(c);
-    void *made = scratch ? ebpo_alloc(rows, row_bytes) : NULL;
+    ebpo_idle_readers *idle = &ebpo_reader_own(c->file)->idle;
+    ebpo_idle_reader *reader = ebpo_idle_readers_take(idle);
+    void *made = reader ? ebpo_alloc(rows, row_bytes) : NULL;
     ebpo_status status =
-        made ? EBPO_OK : ebpo_fail_memory(error, rows * row_bytes + sizeof *scratch);
+        made ? EBPO_OK : ebpo_fail_memory(error, rows * row_bytes + sizeof *reader);
     if (!c->counted)
         expect_around(c, array, chunk_of(key));
     if (status == EBPO_OK)
         status =
-            ebpo_reader_chunk(c->file, array, chunk_of(key), &scratch->reader, scratch->raw, error);
+            ebpo_reader_chunk(c->file, array, chunk_of(key), &reader->reader, reader->raw, error);
     if (status == EBPO_OK)
-        status = decode(c, array, chunk_of(key), scratch->raw, made, error);
-    if (scratch)
-        give_scratch(c, scratch);
+        status = decode(c, array, chunk_of(key), reader->raw, made, error);
+    ebpo_idle_readers_give(idle, reader);
     if (status == EBPO_OK) {
         *item = made;
         *bytes = rows * row_bytes;
@@ -472,11 +432,6 @@ void ebpo_chunks_free(ebpo_chunks *chunks)
     if (!chunks)
         return;
     ebpo_cache_free(chunks->cache);
-    while (chunks->idle) {
-        ebpo_chunk_scratch *scratch = chunks->idle;
-        chunks->idle = scratch->next;
-        free_scratch(scratch);
-    }
     ebpo_array_free(NULL, chunks->seen);
     free(chunks->ahead);
     free(chunks->rows);

@@ -30,17 +30,13 @@ EBPO_MUST_USE ebpo_status ebpo_chunks_integers(ebpo_chunks *chunks, ebpo_array_i
 
 /* --- inside lib/container --- */
 
-typedef struct ebpo_chunk_scratch ebpo_chunk_scratch; /* what one loading thread needs */
-
 struct ebpo_chunks {
     const ebpo_file *file;
     ebpo_cache *cache;
     /* [chunks of /mesh/faces] vertices seen before each; NULL: a single chunk, or no mesh */
     uint64_t *seen;
-    pthread_mutex_t lock;        /* of the scratch that is not in use, and of `rows` */
+    pthread_mutex_t lock;        /* of `rows` */
     struct ebpo_kept_rows *rows; /* of the table of subtrees, those last asked for; or NULL */
-    ebpo_chunk_scratch *idle;
-    unsigned idle_count;
     /* Of chunks made by ebpo_chunks_make_counted, which one thread uses at a time. */
     bool counted;
     bool refused;    /* a load has been refused because of the limit */

@@ -221,6 +221,7 @@ static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const
     }
     ebpo_h5_in h5 = EBPO_H5_IN_INIT;
     pthread_mutex_init(&file->lock, NULL);
+    ebpo_idle_readers_make(&file->idle);
     atomic_init(&file->located, true);
     ebpo_status status = ebpo_input_open(&file->in, source, name, error);
     if (status == EBPO_OK)
@@ -298,6 +299,7 @@ void ebpo_close(ebpo_file *file)
     for (int i = 0; i < EBPO_ARRAYS; i++)
         free(file->root_array[i].chunks);
     ebpo_input_close(&file->in);
+    ebpo_idle_readers_free(&file->idle);
     pthread_mutex_destroy(&file->lock);
     free(file);
 }

@@ -7,6 +7,7 @@
 #include <stdatomic.h>
 
 #include "container/array_check.h"
+#include "container/idle_readers.h"
 #include "container/schema.h"
 #include "h5/h5.h"
 #include "io/byte_source.h"
@@ -31,6 +32,7 @@ struct ebpo_file {
     pthread_mutex_t lock;
     atomic_bool located; /* the chunks of all arrays are known */
     bool has_places;     /* a list says where they are */
+    ebpo_idle_readers idle;
 };
 
 /* After this the chunks of an array that is present are known. Reads from a file that is far away,
@@ -50,8 +52,8 @@ static inline ebpo_check ebpo_reader_check(const ebpo_file *file, ebpo_workspace
     return (ebpo_check){ file->in.shown, EBPO_E_FORMAT, workspace };
 }
 
-/* What the file keeps for itself while it is read: counters, and where chunks lie. Atomic, or under
- * its lock. */
+/* What the file keeps for itself while it is read: counters, where chunks lie, idle readers.
+ * Atomic, or under its locks. */
 static inline ebpo_file *ebpo_reader_own(const ebpo_file *file)
 {
     return (ebpo_file *)(uintptr_t)file;

@@ -15,27 +15,14 @@ enum {
     RUN_CHUNKS = 64      /* that a thread takes on at a time */
 };
 
-typedef struct scratch {
-    ebpo_chunk_reader reader;
-    uint8_t raw[EBPO_CHUNK_BYTES_MAX];
-} scratch;
-
 typedef struct job {
     const ebpo_file *file;
     const ebpo_array_in *array;
     ebpo_rows_fn take;
     void *context;
     ebpo_workspace *workspace;
-    scratch **scratch; /* for each worker, made when first needed */
+    ebpo_idle_reader **reader; /* for each worker, taken when first needed */
 } job;
-
-void ebpo_chunk_reader_clear(ebpo_chunk_reader *reader)
-{
-    ebpo_chunk_coder_clear(&reader->coder);
-    free(reader->stored);
-    reader->stored = NULL;
-    reader->capacity = 0;
-}
 
 /* Bytes [address, address + bytes) of the file to reader->stored, with room for at least
  * `capacity`. */
@@ -99,7 +86,7 @@ static uint64_t find_run(const ebpo_array_in *array, uint64_t begin, uint64_t en
     return next;
 }
 
-static ebpo_status read_run(job *j, scratch *s, uint64_t begin, uint64_t end, size_t bytes,
+static ebpo_status read_run(job *j, ebpo_idle_reader *s, uint64_t begin, uint64_t end, size_t bytes,
                             ebpo_error *error)
 {
     const ebpo_array_in *a = j->array;
@@ -121,15 +108,15 @@ static ebpo_status read_chunks(void *context, uint64_t begin, uint64_t end, unsi
                                ebpo_error *error)
 {
     job *j = context;
-    if (!j->scratch[worker])
-        j->scratch[worker] = ebpo_alloc_zero(1, sizeof(scratch));
-    if (!j->scratch[worker])
-        return ebpo_fail_memory(error, sizeof(scratch));
+    if (!j->reader[worker])
+        j->reader[worker] = ebpo_idle_readers_take(&ebpo_reader_own(j->file)->idle);
+    if (!j->reader[worker])
+        return ebpo_fail_memory(error, sizeof **j->reader);
     ebpo_status status = EBPO_OK;
     while (begin < end && status == EBPO_OK) {
         size_t bytes;
         uint64_t run = find_run(j->array, begin, end, &bytes);
-        status = read_run(j, j->scratch[worker], begin, run, bytes, error);
+        status = read_run(j, j->reader[worker], begin, run, bytes, error);
         ebpo_release_pages(j->workspace);
         begin = run;
     }
@@ -150,20 +137,17 @@ ebpo_status ebpo_reader_rows(const ebpo_file *file, const ebpo_array_in *array,
               .take = take,
               .context = context,
               .workspace = options->workspace };
-    j.scratch = ebpo_alloc_zero(threads, sizeof *j.scratch);
-    if (!j.scratch)
-        return ebpo_fail_memory(error, threads * sizeof *j.scratch);
+    j.reader = ebpo_alloc_zero(threads, sizeof *j.reader);
+    if (!j.reader)
+        return ebpo_fail_memory(error, threads * sizeof *j.reader);
     /* each thread gets a few turns, of runs as long as that allows */
     uint64_t grain = chunks / (threads * 4) + 1;
     if (grain > RUN_CHUNKS)
         grain = RUN_CHUNKS;
     status = ebpo_parallel_for(threads, NULL, chunks, grain, read_chunks, &j, NULL, "read", error);
     for (unsigned i = 0; i < threads; i++)
-        if (j.scratch[i]) {
-            ebpo_chunk_reader_clear(&j.scratch[i]->reader);
-            free(j.scratch[i]);
-        }
-    free(j.scratch);
+        ebpo_idle_readers_give(&ebpo_reader_own(file)->idle, j.reader[i]);
+    free(j.reader);
     return status;
 }
 

@@ -48,14 +48,6 @@ static inline ebpo_read_options ebpo_read_threads(unsigned threads)
     return options;
 }
 
-/* Decoding state and room for one stored chunk, of one thread; zero-initialise, clear when done. */
-typedef struct ebpo_chunk_reader {
-    ebpo_chunk_coder coder;
-    uint8_t *stored;
-    size_t capacity;
-} ebpo_chunk_reader;
-void ebpo_chunk_reader_clear(ebpo_chunk_reader *reader);
-
 /* Fetches chunk number `chunk` of an array that is present and decodes it: chunk_rows rows as the
  * specification describes them (the last chunk with its filling), into `raw` of
  * EBPO_CHUNK_BYTES_MAX bytes. Several threads at once, each with its own reader. */
