@@ -103,44 +103,94 @@ static void nearest_polygon(const ebpo_polytope *e, const ebpo_box *box, ebpo_ce
         out->point[k] = exact.point[k];
 }
 
+/* The nodes around a point, from the root to the last one that has an envelope. */
+typedef struct node_chain {
+    ebpo_node node[EBPO_LEVELS_MAX];
+    int count;
+    const ebpo_node *pruned; /* behind the last one, or NULL */
+    ebpo_node child;
+} node_chain;
+
+static ebpo_status follow(ebpo_context *c, const uint32_t at[3], int level, node_chain *out,
+                          ebpo_error *error)
+{
+    int fine = c->model->info->level_count - 1;
+    ebpo_node node = ebpo_model_root(c->model);
+    out->count = 0;
+    out->pruned = NULL;
+    for (;;) {
+        out->node[out->count++] = node;
+        if ((level >= 0 && node.cell.level >= level) || node.type != EBPO_GRAY)
+            return EBPO_OK;
+        if (ebpo_node_is_below(&node)) {
+            ebpo_status status = ebpo_model_enter(c, &node, error);
+            if (status != EBPO_OK)
+                return status;
+        }
+        out->child =
+            ebpo_model_child(c->model, &node, ebpo_octant_at(at, fine - node.cell.level - 1));
+        if (out->child.type != EBPO_GRAY)
+            return EBPO_OK;
+        if (c->model->info->boxed && out->child.pruned) {
+            /* leaves outside a subset's box look the same */
+            out->pruned = &out->child;
+            return EBPO_OK;
+        }
+        node = out->child;
+    }
+}
+
+/* The octant of a node in the one above. */
+static unsigned octant_of(ebpo_cell cell)
+{
+    return (cell.at[0] & 1) | (cell.at[1] & 1) << 1 | (cell.at[2] & 1) << 2;
+}
+
+/* The envelope of the last node that has any; its number in the chain. What a node's is cut from is
+ * the one above, so that one that is kept stands for all above it. */
+static int cut_envelope(ebpo_context *c, const node_chain *chain, ebpo_polytope *out)
+{
+    ebpo_polytope above;
+    int at = chain->count - 1;
+    while (at >= 0 && !ebpo_kept_envelopes_get(c->envelopes, chain->node[at].cell, out))
+        at--;
+    while (++at < chain->count) {
+        uint32_t count;
+        const ebpo_node *node = &chain->node[at];
+        const uint32_t *codes = ebpo_model_planes(c->model, node, &count);
+        if (at == 0) {
+            ebpo_polytope_cube(out);
+        } else {
+            ebpo_polytope_copy(&above, out);
+            if (!ebpo_polytope_child(&above, octant_of(node->cell), out)) {
+                ebpo_polytope_copy(out, &above);
+                break;
+            }
+        }
+        ebpo_planes_cut(out, codes, count);
+        ebpo_kept_envelopes_put(&c->envelopes, node->cell, out);
+    }
+    return at - 1;
+}
+
 ebpo_status ebpo_distance_to_envelope(ebpo_context *c, const double p[3],
                                       const ebpo_distance_options *o, ebpo_distance_result *out,
                                       ebpo_error *error)
 {
     ebpo_box box = ebpo_model_box(c->model);
     uint32_t at[3];
-    int fine = c->model->info->level_count - 1;
     *out = nothing;
-    if (!ebpo_locate(&box, fine, p, at))
+    if (!ebpo_locate(&box, c->model->info->level_count - 1, p, at))
         return EBPO_OK;
-    ebpo_node node = ebpo_model_root(c->model), gray = node;
-    ebpo_polytope envelope[2];
-    int now = 0;
-    ebpo_polytope_cube(&envelope[0]);
-    for (;;) {
-        uint32_t count;
-        const uint32_t *codes = ebpo_model_planes(c->model, &node, &count);
-        ebpo_planes_cut(&envelope[now], codes, count);
-        gray = node;
-        if ((o->level >= 0 && node.cell.level >= o->level) || node.type != EBPO_GRAY)
-            break;
-        if (ebpo_node_is_below(&node)) {
-            ebpo_status status = ebpo_model_enter(c, &node, error);
-            if (status != EBPO_OK)
-                return status;
-        }
-        unsigned octant = ebpo_octant_at(at, fine - node.cell.level - 1);
-        ebpo_node child = ebpo_model_child(c->model, &node, octant);
-        if (child.type != EBPO_GRAY)
-            break;
-        if (c->model->info->boxed && child.pruned) /* leaves outside a subset's box look the same */
-            return ebpo_fail_pruned(c->model, child.cell, error);
-        if (!ebpo_polytope_child(&envelope[now], octant, &envelope[1 - now]))
-            break;
-        now = 1 - now;
-        node = child;
-    }
-    nearest_polygon(&envelope[now], &box, gray.cell, p, out);
+    node_chain chain;
+    ebpo_polytope envelope;
+    ebpo_status status = follow(c, at, o->level, &chain, error);
+    if (status != EBPO_OK)
+        return status;
+    int last = cut_envelope(c, &chain, &envelope);
+    if (chain.pruned && last == chain.count - 1)
+        return ebpo_fail_pruned(c->model, chain.pruned->cell, error);
+    nearest_polygon(&envelope, &box, chain.node[last].cell, p, out);
     out->lo = 0;
     out->hi = INFINITY;
     return EBPO_OK;

@@ -264,6 +264,7 @@ void ebpo_context_free(ebpo_context *c)
     free(c->queue);
     free(c->seen);
     free(c->faces);
+    ebpo_kept_envelopes_free(c->envelopes);
     free(c);
 }
 

@@ -10,6 +10,7 @@
 #include "container/slice.h"
 #include "octree/cells.h"
 #include "octree/rule.h"
+#include "query/kept_envelopes.h"
 #include "query/kernels.h"
 #include "query/query_top.h"
 #include "query/skeleton.h"
@@ -62,7 +63,8 @@ struct ebpo_context {
     uint32_t *seen; /* of subtrees, and the number of the question: nearest_first.c */
     uint32_t question;
     uint64_t searched, loaded; /* subtrees, by distances; that were not there, by all questions */
-    bool has_prefetched;       /* from here, by a query that reached so far */
+    ebpo_kept_envelopes *envelopes; /* of distances to them; or NULL */
+    bool has_prefetched;            /* from here, by a query that reached so far */
     double prefetched_from[3], prefetched_reach;
     /* The last nearest face: where ebpo_distance begins, if asked to. */
     bool warm;

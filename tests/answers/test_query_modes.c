@@ -363,6 +363,33 @@ START_TEST(the_theses_modes_never_claim_too_much)
 }
 END_TEST
 
+/* A context keeps envelopes for its next questions; one that has just been made has none. */
+START_TEST(kept_envelopes_are_those_that_would_be_cut)
+{
+    if (!ebpo_test_wanted(_i + 11))
+        return;
+    asked a;
+    begin(&a, _i, 300);
+    ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
+    options.mode = EBPO_DISTANCE_ENVELOPE;
+    for (uint64_t i = 0; i < a.count; i++) {
+        ebpo_context *fresh;
+        ebpo_distance_result kept, cut;
+        options.level = (int)(i % (uint64_t)a.m.info.level_count);
+        ASSERT_OK(ebpo_context_new(a.m.model, &fresh, error));
+        ASSERT_OK(ebpo_distance(a.m.context, a.points + 3 * i, &options, &kept, error));
+        ASSERT_OK(ebpo_distance(fresh, a.points + 3 * i, &options, &cut, error));
+        ck_assert_msg(memcmp(&kept.distance, &cut.distance, sizeof kept.distance) == 0 &&
+                          memcmp(kept.normal, cut.normal, sizeof kept.normal) == 0,
+                      "level %d, point (%a, %a, %a): %a, and newly cut %a", options.level,
+                      a.points[3 * i], a.points[3 * i + 1], a.points[3 * i + 2], kept.distance,
+                      cut.distance);
+        ebpo_context_free(fresh);
+    }
+    end(&a);
+}
+END_TEST
+
 /* What a leaf or a node has is told by the file, not by what lies beside it in memory. */
 START_TEST(the_theses_modes_do_not_depend_on_what_is_in_memory)
 {
@@ -626,6 +653,7 @@ Suite *test_suite(void)
                         CASES);
     tcase_add_loop_test(tests, answers_limited_by_a_deadline_are_certain, 0, CASES);
     tcase_add_loop_test(tests, the_theses_modes_never_claim_too_much, 0, CASES);
+    tcase_add_loop_test(tests, kept_envelopes_are_those_that_would_be_cut, 0, CASES);
     tcase_add_loop_test(tests, the_theses_modes_do_not_depend_on_what_is_in_memory, 0, CASES);
     tcase_add_loop_test(tests, a_file_without_mesh_answers_by_levels_only, 0, CASES);
     tcase_add_loop_test(threads, four_threads_get_the_answers_of_one, 0, CASES);
