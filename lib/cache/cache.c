@@ -348,6 +348,15 @@ bool ebpo_cache_take_aside(ebpo_cache *c, uint64_t bytes)
     return taken;
 }
 
+void ebpo_cache_give_back_aside(ebpo_cache *c, uint64_t bytes)
+{
+    pthread_mutex_lock(&c->lock);
+    c->aside -= bytes;
+    c->stats.bytes -= bytes;
+    pthread_cond_broadcast(&c->changed);
+    pthread_mutex_unlock(&c->lock);
+}
+
 /* --- ahead --- */
 
 /* Loads d->key in the background, or lets it be; false when it must wait for the loads of others.

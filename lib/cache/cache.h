@@ -58,9 +58,11 @@ void ebpo_cache_prefetch(ebpo_cache *cache, const uint64_t *keys, unsigned count
 /* Of the budget so many bytes at most may be taken for what stays beside the items; loads are
  * refused as if all of them were. Before the cache is used. */
 void ebpo_cache_set_aside(ebpo_cache *cache, uint64_t most);
-/* Takes some of them for good, and drops items for it. False: they are all taken, or items in use
+/* Takes some of them, and drops items for it. False: they are all taken, or items in use
  * and loads under way leave no room now. */
 bool ebpo_cache_take_aside(ebpo_cache *cache, uint64_t bytes);
+/* What was taken so and is not needed any more. */
+void ebpo_cache_give_back_aside(ebpo_cache *cache, uint64_t bytes);
 
 /* Drops everything that is not pinned. */
 void ebpo_cache_clear(ebpo_cache *cache);

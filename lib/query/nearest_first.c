@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "geom/cell.h"
 #include "octree/octcode.h"
+#include "query/deep_bounds.h"
 #include "query/node_queue.h"
 
 /* --- the search --- */
@@ -22,6 +23,7 @@ typedef struct searching {
     ebpo_context *c;
     ebpo_nearest *n;
     ebpo_box box;
+    unsigned new_loads; /* of subtrees of which nothing was known */
 } searching;
 
 static ebpo_status add(searching *g, const ebpo_ranked *r, ebpo_error *error)
@@ -81,12 +83,15 @@ static ebpo_status search_below(searching *g, ebpo_node node, ebpo_error *error)
         return EBPO_OK;
     g->c->seen[below] = 2 * g->c->question + 1;
     g->c->searched++;
+    const ebpo_skeletons *skeletons = g->c->model->skeletons;
+    bool is_new = !ebpo_skeletons_find(skeletons, below);
     uint64_t loaded = g->c->loaded;
     double limit = g->n->limit;
     ebpo_status status = ebpo_model_enter(g->c, &node, error);
     if (status != EBPO_OK)
         return status;
     ebpo_nearest_search(g->n, g->c, node.subtree);
+    g->new_loads += g->c->loaded > loaded && is_new;
     /* for nothing, or as one of many that are about as far away */
     bool again = g->n->limit == limit || g->n->limit > ebpo_cell_diagonal(&g->box, node.cell);
     if (g->c->loaded > loaded && again)
@@ -215,19 +220,37 @@ static bool consider_owners(searching *g, const ebpo_skeleton *k, const ebpo_ran
     return true;
 }
 
+static double deep_bound(const searching *g, const ebpo_ranked *r)
+{
+    return ebpo_deep_bound(g->c->model, &g->box, &r->node, r->lower, g->n->p, g->n->limit);
+}
+
+/* Nothing has been kept of it: it is searched, but after what is nearer than it can be. */
+static ebpo_status look_at_new(searching *g, const ebpo_ranked *r, ebpo_error *error)
+{
+    ebpo_ranked all = { r->node, deep_bound(g, r), OWN };
+    if (all.lower > g->n->limit)
+        return EBPO_OK;
+    return all.lower > r->lower ? ebpo_queue_push(g->c, &all, error)
+                                : search_below(g, r->node, error);
+}
+
 static ebpo_status look(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     uint32_t below = ebpo_entry_value(r->node.entry);
     const ebpo_skeleton *k = ebpo_skeletons_find(g->c->model->skeletons, below);
-    if (!k || ebpo_context_has_pinned(g->c, below))
+    if (ebpo_context_has_pinned(g->c, below))
         return search_below(g, r->node, error);
+    if (!k)
+        return look_at_new(g, r, error);
     ebpo_skeleton_bounds bounds = ebpo_skeleton_lower_bounds(k, g->n->p, g->n->limit);
     double least = fmax(r->lower, fmin(bounds.own, bounds.outer));
     if (least > g->n->limit)
         return EBPO_OK;
     bool there = is_there(g->c, below); /* then both at once */
-    ebpo_ranked own = { r->node, there ? least : fmax(r->lower, bounds.own), OWN },
-                outer = { r->node, there ? INFINITY : fmax(r->lower, bounds.outer), OUTER };
+    double lower = there ? r->lower : deep_bound(g, r);
+    ebpo_ranked own = { r->node, there ? least : fmax(lower, bounds.own), OWN },
+                outer = { r->node, there ? INFINITY : fmax(lower, bounds.outer), OUTER };
     ebpo_status status = own.lower <= g->n->limit ? ebpo_queue_push(g->c, &own, error) : EBPO_OK;
     if (status == EBPO_OK && outer.lower <= g->n->limit)
         status = ebpo_queue_push(g->c, &outer, error);
@@ -271,12 +294,13 @@ static ebpo_status search_parts(searching *g, ebpo_error *error)
                  : next.what == OUTER            ? look_at_outer(g, &next, error)
                                                  : look(g, &next, error);
     }
+    ebpo_deep_bounds_tell(g->c->model, g->new_loads);
     return status;
 }
 
 ebpo_status ebpo_nearest_first(ebpo_context *c, ebpo_nearest *n, ebpo_error *error)
 {
-    searching g = { c, n, ebpo_model_box(c->model) };
+    searching g = { c, n, ebpo_model_box(c->model), 0 };
     if (!c->model->whole)
         return search_parts(&g, error);
     ebpo_nearest_search(n, c, c->model->whole);

@@ -188,6 +188,7 @@ void ebpo_model_free(ebpo_model *m)
     ebpo_skeletons_free(m->skeletons);
     ebpo_chunks_free(m->chunks);
     ebpo_top_free(m->top);
+    ebpo_top_free(m->deep);
     ebpo_accel_free(m->whole);
     free(m);
 }

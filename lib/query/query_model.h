@@ -4,6 +4,7 @@
 
 #include <ebpo/query.h>
 #include <pthread.h>
+#include <stdatomic.h>
 
 #include "cache/cache.h"
 #include "container/reader.h"
@@ -29,6 +30,9 @@ struct ebpo_model {
     ebpo_chunks *chunks;
     ebpo_cache *cache;         /* subtrees by their number in the top */
     ebpo_skeletons *skeletons; /* of those that have been loaded; or NULL */
+    _Atomic(ebpo_top *) deep;  /* levels below the cut: deep_bounds.h; or NULL */
+    atomic_bool deep_begun;
+    _Atomic uint64_t new_loads; /* that may have been for nothing, until then */
     double open_seconds;
     /* in the subtrees that are in memory; kinds of those that were asked about */
     _Atomic uint64_t leaves, leaves_of_kind[5], leaves_one_wall;

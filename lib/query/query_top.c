@@ -18,6 +18,7 @@ typedef struct reading {
     /* of the level below the one that is read, where they are needed to know pruned nodes */
     uint16_t *next_types;
     uint64_t group_capacity, gray_capacity, plane_capacity, below_capacity, below_planes_capacity;
+    bool envelopes; /* alone */
     ebpo_error *error;
 } reading;
 
@@ -63,14 +64,16 @@ static ebpo_status add_below(reading *r, const ebpo_level *level, const ebpo_nod
                              uint64_t *in_level, uint32_t *entry)
 {
     ebpo_top *t = r->top;
-    if (!ebpo_grow(&t->below, &r->below_capacity, r->below + 1, sizeof *t->below) ||
+    if ((!r->envelopes &&
+         !ebpo_grow(&t->below, &r->below_capacity, r->below + 1, sizeof *t->below)) ||
         !ebpo_grow(&t->below_planes, &r->below_planes_capacity, r->below + 1,
                    sizeof *t->below_planes))
         return no_memory(r);
     if (r->below >= EBPO_ENTRY_ZERO)
         return ebpo_fail(r->error, EBPO_E_LIMIT, "too many nodes at cut level %d; give a lower one",
                          t->cut_level);
-    t->below[r->below] = *node;
+    if (!r->envelopes)
+        t->below[r->below] = *node;
     *entry = ebpo_entry(EBPO_ENTRY_BELOW, (uint32_t)r->below);
     uint32_t count =
         node->type == EBPO_GRAY && level->plane_counts ? level->plane_counts[node->rank] : 0;
@@ -159,15 +162,36 @@ static ebpo_status add_level(reading *r, int number, const ebpo_level *level, ui
     return status;
 }
 
-ebpo_status ebpo_top_read(ebpo_top **out, const ebpo_file *file, int cut_level, unsigned threads,
-                          ebpo_error *error)
+/* An array with room for what it has; of less memory than before, or the same. */
+static void shrink(void *array, uint64_t *capacity, uint64_t count, size_t size)
+{
+    void **at = array, *less = *at ? realloc(*at, (count ? count : 1) * size) : NULL;
+    if (less) {
+        *at = less;
+        *capacity = count;
+    }
+}
+
+static void shrink_all(reading *r)
+{
+    ebpo_top *t = r->top;
+    shrink(&t->nodes.group, &r->group_capacity, r->group, sizeof *t->nodes.group);
+    shrink(&t->gray, &r->gray_capacity, r->group, sizeof *t->gray);
+    shrink(&t->planes, &r->plane_capacity, r->plane, sizeof *t->planes);
+    shrink(&t->below_planes, &r->below_planes_capacity, r->below, sizeof *t->below_planes);
+}
+
+static ebpo_status read_top(ebpo_top **out, const ebpo_file *file, int cut_level, unsigned threads,
+                            bool envelopes, ebpo_error *error)
 {
     *out = NULL;
     ebpo_top *top = ebpo_alloc_zero(1, sizeof *top);
     if (!top)
         return ebpo_fail_memory(error, sizeof *top);
     top->cut_level = cut_level;
-    reading r = { .top = top, .info = ebpo_file_info(file), .error = error };
+    reading r = {
+        .top = top, .info = ebpo_file_info(file), .envelopes = envelopes, .error = error
+    };
     ebpo_status status = EBPO_OK;
     ebpo_read_options read = ebpo_read_threads(threads);
     ebpo_expect_top(file);
@@ -191,6 +215,8 @@ ebpo_status ebpo_top_read(ebpo_top **out, const ebpo_file *file, int cut_level, 
         ebpo_top_free(top);
         return status;
     }
+    if (envelopes)
+        shrink_all(&r);
     top->nodes.group_count = (uint32_t)r.group;
     top->below_count = r.below;
     top->bytes = sizeof *top + r.group_capacity * sizeof *top->nodes.group +
@@ -199,6 +225,18 @@ ebpo_status ebpo_top_read(ebpo_top **out, const ebpo_file *file, int cut_level, 
                  r.below_planes_capacity * sizeof *top->below_planes;
     *out = top;
     return EBPO_OK;
+}
+
+ebpo_status ebpo_top_read(ebpo_top **out, const ebpo_file *file, int cut_level, unsigned threads,
+                          ebpo_error *error)
+{
+    return read_top(out, file, cut_level, threads, false, error);
+}
+
+ebpo_status ebpo_top_read_envelopes(ebpo_top **out, const ebpo_file *file, int cut_level,
+                                    unsigned threads, ebpo_error *error)
+{
+    return read_top(out, file, cut_level, threads, true, error);
 }
 
 void ebpo_top_free(ebpo_top *top)
@@ -216,7 +254,7 @@ void ebpo_top_free(ebpo_top *top)
 /* Arrays that grow have room for some items from the first one on: bytes of five. */
 enum { GROWN_LEAST = 4096 };
 
-uint64_t ebpo_top_estimate(const ebpo_info *info, int cut_level)
+static uint64_t estimate(const ebpo_info *info, int cut_level, size_t node)
 {
     uint64_t bytes = sizeof(ebpo_top) + GROWN_LEAST, largest = 0;
     for (int i = 0; i <= cut_level && i < info->level_count; i++) {
@@ -224,11 +262,21 @@ uint64_t ebpo_top_estimate(const ebpo_info *info, int cut_level)
         uint64_t below = s->leaf_count + (i == cut_level ? s->gray_count : 0);
         /* What is kept, and the arrays of the level while it is read. */
         bytes += (s->gray_count * (sizeof(uint32_t[8]) + sizeof(ebpo_top_planes)) +
-                  s->plane_count * 4 + below * (sizeof(ebpo_node) + sizeof(ebpo_top_planes))) *
+                  s->plane_count * 4 + below * (node + sizeof(ebpo_top_planes))) *
                  3 / 2;
         uint64_t arrays = s->gray_count * 27 + s->plane_count * 4 + s->leaf_count * 28 +
                           s->ref_count * 4 + (s->white_count + s->black_count) * 4;
         largest = arrays > largest ? arrays : largest;
     }
     return bytes + largest;
+}
+
+uint64_t ebpo_top_estimate(const ebpo_info *info, int cut_level)
+{
+    return estimate(info, cut_level, sizeof(ebpo_node));
+}
+
+uint64_t ebpo_top_envelopes_estimate(const ebpo_info *info, int cut_level)
+{
+    return estimate(info, cut_level, 0);
 }

@@ -20,16 +20,21 @@ typedef struct ebpo_top {
     ebpo_top_planes *gray; /* which of them are the gray node's whose children are group g */
 
     uint64_t below_count;
-    ebpo_node *below;
+    ebpo_node *below;              /* NULL of envelopes alone */
     ebpo_top_planes *below_planes; /* [below_count]; leaves have none */
     uint64_t bytes;
 } ebpo_top;
 
 EBPO_MUST_USE ebpo_status ebpo_top_read(ebpo_top **out, const ebpo_file *file, int cut_level,
                                         unsigned threads, ebpo_error *error);
+/* Only envelopes, with room for nothing else: without `below`. */
+EBPO_MUST_USE ebpo_status ebpo_top_read_envelopes(ebpo_top **out, const ebpo_file *file,
+                                                  int cut_level, unsigned threads,
+                                                  ebpo_error *error);
 void ebpo_top_free(ebpo_top *top);
 
 /* Bytes that the top will take: from the head alone. */
 uint64_t ebpo_top_estimate(const ebpo_info *info, int cut_level);
+uint64_t ebpo_top_envelopes_estimate(const ebpo_info *info, int cut_level);
 
 #endif

@@ -428,6 +428,23 @@ void ebpo_skeletons_free(ebpo_skeletons *all)
     free(all);
 }
 
+bool ebpo_skeletons_take(ebpo_skeletons *all, uint64_t bytes)
+{
+    pthread_mutex_lock(&all->lock);
+    bool taken = take_room(all, bytes, 0);
+    pthread_mutex_unlock(&all->lock);
+    return taken;
+}
+
+void ebpo_skeletons_give_back(ebpo_skeletons *all, uint64_t bytes)
+{
+    pthread_mutex_lock(&all->lock);
+    all->bytes -= bytes;
+    if (all->cache)
+        ebpo_cache_give_back_aside(all->cache, bytes);
+    pthread_mutex_unlock(&all->lock);
+}
+
 uint64_t ebpo_skeletons_bytes(const ebpo_skeletons *all) { return all ? all->bytes : 0; }
 
 void ebpo_skeletons_keep(ebpo_skeletons *all, uint64_t number, const ebpo_accel *subtree)

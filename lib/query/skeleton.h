@@ -60,6 +60,10 @@ ebpo_skeletons *ebpo_skeletons_make(uint64_t count, uint64_t room, ebpo_cache *c
 void ebpo_skeletons_free(ebpo_skeletons *all);
 /* The part of `room` that `count` skeletons can make use of. */
 uint64_t ebpo_skeletons_room(uint64_t count, uint64_t room);
+/* Of their room, for what tells of subtrees beside them; false: there is not enough left. And back,
+ * what has been taken so. Any thread. */
+bool ebpo_skeletons_take(ebpo_skeletons *all, uint64_t bytes);
+void ebpo_skeletons_give_back(ebpo_skeletons *all, uint64_t bytes);
 /* Of memory, now. */
 uint64_t ebpo_skeletons_bytes(const ebpo_skeletons *all);
 

@@ -6,6 +6,7 @@
 
 #include "check_main.h"
 #include "geom/distance.h"
+#include "query/deep_bounds.h"
 #include "query/query_model.h"
 #include "query_kit.h"
 
@@ -215,7 +216,8 @@ static uint64_t subtrees_searched(asked *s)
     return after.distance_subtrees - before.distance_subtrees;
 }
 
-/* Nothing known, some subtrees, nearly all; or those that a small budget has room for. */
+/* Nothing known, some subtrees, nearly all; or those that a small budget has room for; with levels
+ * below the cut, if there is room, or without. */
 START_TEST(answers_do_not_depend_on_what_is_known)
 {
     asked s;
@@ -224,6 +226,9 @@ START_TEST(answers_do_not_depend_on_what_is_known)
     how.cut_level = 1 + _i % 3;
     how.memory = _i & 1 ? (UINT64_C(9) << 19) + (uint64_t)_i % 4 * 30000 : 0;
     begin(&s, _i / 2, _i / 2 % query_variant_count, &how, 0);
+    if (_i / 2 % 2)
+        ebpo_deep_bounds_make(s.model);
+    ck_assert(!s.model->deep || s.model->deep->cut_level > how.cut_level);
     uint64_t all = s.count;
     s.count = all / 8;
     subtrees_searched(&s);
@@ -259,6 +264,52 @@ START_TEST(a_subtree_once_seen_is_not_searched_for_nothing)
     s.model->skeletons = all;
     ck_assert_uint_ge(with, s.count); /* one each */
     ck_assert_msg(with * 3 < without * 2, "%d, %d without", (int)with, (int)without);
+    end(&s);
+}
+END_TEST
+
+/* Of the first points, asked of a model of which nothing is known yet. */
+static uint64_t searched_at_first(int solid, int cut_level, bool deep)
+{
+    asked s;
+    ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+    how.cut_level = cut_level;
+    begin(&s, solid, 5, &how, 20);
+    uint64_t before = ebpo_skeletons_bytes(s.model->skeletons);
+    if (deep) {
+        ebpo_deep_bounds_make(s.model);
+        ck_assert_ptr_nonnull(s.model->deep);
+        ck_assert_uint_eq(ebpo_skeletons_bytes(s.model->skeletons), before + s.model->deep->bytes);
+        ck_assert_uint_le(s.model->deep->bytes,
+                          ebpo_top_envelopes_estimate(s.model->info, s.model->deep->cut_level));
+    }
+    uint64_t searched = subtrees_searched(&s);
+    end(&s);
+    return searched;
+}
+
+START_TEST(levels_below_the_cut_tell_of_subtrees_never_seen)
+{
+    int sphere = find_solid("sphere");
+    uint64_t with = searched_at_first(sphere, 3, true),
+             without = searched_at_first(sphere, 3, false);
+    ck_assert_msg(with * 10 < without * 9, "%d, %d without", (int)with, (int)without);
+}
+END_TEST
+
+/* Questions that come to many new subtrees each have them read; few new ones do not. */
+START_TEST(levels_below_the_cut_are_read_when_loads_were_for_nothing)
+{
+    asked s;
+    ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+    how.cut_level = 2;
+    begin(&s, find_solid("sphere"), 5, &how, 1);
+    for (int i = 0; i < 1000; i++)
+        ebpo_deep_bounds_tell(s.model, 4);
+    ck_assert_ptr_null(s.model->deep);
+    for (int i = 0; i < 1000; i++)
+        ebpo_deep_bounds_tell(s.model, 5);
+    ck_assert_ptr_nonnull(s.model->deep);
     end(&s);
 }
 END_TEST
@@ -406,6 +457,8 @@ Suite *test_suite(void)
     tcase_add_loop_test(tests, no_face_is_nearer_than_its_subtrees_bound, 0, query_solid_count());
     tcase_add_loop_test(tests, answers_do_not_depend_on_what_is_known, 0, 2 * query_solid_count());
     tcase_add_test(tests, a_subtree_once_seen_is_not_searched_for_nothing);
+    tcase_add_test(tests, levels_below_the_cut_tell_of_subtrees_never_seen);
+    tcase_add_test(tests, levels_below_the_cut_are_read_when_loads_were_for_nothing);
     tcase_add_test(tests, faces_within_a_radius_are_looked_for_where_they_may_be);
     tcase_add_test(tests, room_is_kept_to);
     tcase_add_loop_test(tests, a_budget_buys_what_was_told, 0, query_solid_count());
