@@ -26,7 +26,7 @@ typedef struct candidate {
 typedef struct walk {
     const ebpo_boolean *boolean;
     ebpo_boolean_cells *cells;
-    ebpo_boolean_cells_options options;
+    ebpo_cells_options options;
     candidate *asked; /* [8 * PARENTS] */
     ebpo_world_cell *parents, *next;
     uint64_t parent_count, parent_capacity, next_count, next_capacity;
@@ -148,13 +148,13 @@ static ebpo_status run(walk *w, ebpo_error *error)
     return status;
 }
 
-ebpo_status ebpo_boolean_cells_new(ebpo_boolean *boolean, const ebpo_boolean_cells_options *options,
+ebpo_status ebpo_boolean_cells_new(ebpo_boolean *boolean, const ebpo_cells_options *options,
                                    ebpo_boolean_cells **out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    walk w = { .boolean = boolean, .options = EBPO_BOOLEAN_CELLS_OPTIONS_INIT };
+    walk w = { .boolean = boolean, .options = EBPO_CELLS_OPTIONS_INIT };
     *out = NULL;
-    ebpo_status status = EBPO_TAKE(ebpo_boolean_cells_options, &w.options, options, error);
+    ebpo_status status = EBPO_TAKE(ebpo_cells_options, &w.options, options, error);
     if (status != EBPO_OK)
         return status;
     if (w.options.level < 0 || w.options.level > EBPO_BOOLEAN_LEVEL_MAX)
@@ -191,7 +191,7 @@ static double volume(const ebpo_boolean_cells *c, uint64_t count, bool up)
     return cells * (edge * edge * edge); /* a power of two, within the range */
 }
 
-ebpo_status ebpo_boolean_cells_get_volume(const ebpo_boolean_cells *cells, ebpo_boolean_volume *out)
+ebpo_status ebpo_boolean_cells_volume(const ebpo_boolean_cells *cells, ebpo_boolean_volume *out)
 {
     EBPO_DEFAULT_FP;
     uint64_t in = 0;

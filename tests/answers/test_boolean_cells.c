@@ -55,7 +55,7 @@ static ebpo_boolean *make_pair(ebpo_model *a, ebpo_pose pose_a, ebpo_model *b, e
 static ebpo_boolean_cells *make_cells(ebpo_boolean *boolean, int level)
 {
     ebpo_boolean_cells *cells;
-    ebpo_boolean_cells_options options = EBPO_BOOLEAN_CELLS_OPTIONS_INIT;
+    ebpo_cells_options options = EBPO_CELLS_OPTIONS_INIT;
     options.level = level;
     ASSERT_OK(ebpo_boolean_cells_new(boolean, &options, &cells, error));
     return cells;
@@ -65,7 +65,7 @@ static ebpo_boolean_volume volume_of(ebpo_boolean *boolean, int level)
 {
     ebpo_boolean_volume v = EBPO_BOOLEAN_VOLUME_INIT;
     ebpo_boolean_cells *cells = make_cells(boolean, level);
-    ck_assert_int_eq(ebpo_boolean_cells_get_volume(cells, &v), EBPO_OK);
+    ck_assert_int_eq(ebpo_boolean_cells_volume(cells, &v), EBPO_OK);
     ebpo_boolean_cells_free(cells);
     return v;
 }
@@ -180,7 +180,7 @@ START_TEST(surfaces_of_cells_hold_and_are_held)
         ebpo_boolean_cells *cells = make_cells(boolean, 5);
         ebpo_boolean_volume v = EBPO_BOOLEAN_VOLUME_INIT;
         ebpo_mesh outer, inner;
-        ck_assert_int_eq(ebpo_boolean_cells_get_volume(cells, &v), EBPO_OK);
+        ck_assert_int_eq(ebpo_boolean_cells_volume(cells, &v), EBPO_OK);
         ASSERT_OK(ebpo_boolean_cells_mesh(cells, EBPO_BOOLEAN_OUTER, &outer, error));
         ASSERT_OK(ebpo_boolean_cells_mesh(cells, EBPO_BOOLEAN_INNER, &inner, error));
         oracle *judge_outer = oracle_make(&outer), *judge_inner = oracle_make(&inner);
@@ -270,6 +270,96 @@ START_TEST(nodes_decide_most)
 }
 END_TEST
 
+/* --- distances --- */
+
+/* The result of two boxes in a row: boxes apart, or none. */
+typedef struct row_of_boxes {
+    int operation, count;
+    double low[2], high[2]; /* in x; 0 to 1 in y and z */
+} row_of_boxes;
+
+static double to_boundary(const row_of_boxes *row, const double p[3])
+{
+    double least = INFINITY;
+    for (int i = 0; i < row->count; i++) {
+        const double low[3] = { row->low[i], 0, 0 }, high[3] = { row->high[i], 1, 1 };
+        double out = 0, in = INFINITY;
+        for (int k = 0; k < 3; k++) {
+            double beyond = fmax(fmax(low[k] - p[k], p[k] - high[k]), 0);
+            out += beyond * beyond;
+            in = fmin(in, fmin(p[k] - low[k], high[k] - p[k]));
+        }
+        least = fmin(least, in > 0 ? in : sqrt(out));
+    }
+    return least;
+}
+
+static void check_distances(ebpo_boolean *boolean, const ebpo_pose *pose, const row_of_boxes *row)
+{
+    uint64_t state = 9;
+    for (uint64_t i = 0; i < query_scaled(100); i++) {
+        double p[3], w[3];
+        ebpo_boundary_distance got;
+        for (int k = 0; k < 3; k++)
+            p[k] = 2 * ebpo_test_random_unit(&state) - 0.3;
+        for (int k = 0; k < 3; k++)
+            w[k] = pose->rotation[k][0] * p[0] + pose->rotation[k][1] * p[1] +
+                   pose->rotation[k][2] * p[2] + pose->translation[k];
+        ASSERT_OK(ebpo_boolean_distance(boolean, w, NULL, &got, error));
+        double truth = to_boundary(row, p);
+        ck_assert_msg(got.lo <= truth + 1e-13 && got.hi >= truth - 1e-13,
+                      "operation %d, (%g, %g, %g): %.17g, not in %.17g .. %.17g", row->operation,
+                      p[0], p[1], p[2], truth, got.lo, got.hi);
+        ck_assert_msg(row->count == 0 || got.hi - got.lo <= 0.01 * got.hi,
+                      "operation %d, (%g, %g, %g): %.17g .. %.17g", row->operation, p[0], p[1],
+                      p[2], got.lo, got.hi);
+    }
+}
+
+START_TEST(distances_to_rows_of_boxes)
+{
+    static const row_of_boxes rows[] = {
+        { EBPO_BOOLEAN_UNION, 1, { 0, 0 }, { 1.5, 0 } },
+        { EBPO_BOOLEAN_INTERSECTION, 1, { 0.5, 0 }, { 1, 0 } },
+        { EBPO_BOOLEAN_DIFFERENCE, 1, { 0, 0 }, { 0.5, 0 } },
+        { EBPO_BOOLEAN_SYMMETRIC_DIFFERENCE, 2, { 0, 1 }, { 0.5, 1.5 } },
+    };
+    query_model cube = make_cube();
+    ebpo_pose pose = pose_of(0.3, 1, 2, -1, 0.5), beside = pose;
+    for (int k = 0; k < 3; k++)
+        beside.translation[k] += 0.5 * pose.rotation[k][0];
+    for (int i = 0; i < 4; i++) {
+        ebpo_boolean *boolean =
+            make_pair(cube.model, pose, cube.model, beside, rows[i].operation, 1);
+        check_distances(boolean, &pose, &rows[i]);
+        ebpo_boolean_free(boolean);
+    }
+    query_model_free(&cube);
+}
+END_TEST
+
+/* Of nothing there is no boundary: beyond the boxes for certain, between them perhaps. */
+START_TEST(distances_to_nothing)
+{
+    query_model cube = make_cube();
+    ebpo_pose at = pose_of(0.3, 1, 0, 0, 0), away = pose_of(0.3, 1, 9, 0, 0);
+    const double p[3] = { 4, 4, 4 };
+    ebpo_boundary_distance got;
+    ebpo_boundary_options few = EBPO_BOUNDARY_OPTIONS_INIT;
+    few.cells = 2000;
+    ebpo_boolean *boolean =
+        make_pair(cube.model, at, cube.model, away, EBPO_BOOLEAN_INTERSECTION, 1);
+    ASSERT_OK(ebpo_boolean_distance(boolean, p, NULL, &got, error));
+    ck_assert(got.lo == INFINITY && got.hi == INFINITY && got.inside.where == EBPO_OUT);
+    ebpo_boolean_free(boolean);
+    boolean = make_pair(cube.model, at, cube.model, at, EBPO_BOOLEAN_DIFFERENCE, 1);
+    ASSERT_OK(ebpo_boolean_distance(boolean, p, &few, &got, error));
+    ck_assert(got.lo > 3 && got.hi == INFINITY);
+    ebpo_boolean_free(boolean);
+    query_model_free(&cube);
+}
+END_TEST
+
 /* --- nothing, and too much --- */
 
 START_TEST(boxes_apart_have_nothing_in_common)
@@ -293,7 +383,7 @@ END_TEST
 static ebpo_status try_cells(ebpo_boolean *boolean, int level, uint64_t most)
 {
     ebpo_boolean_cells *cells;
-    ebpo_boolean_cells_options options = EBPO_BOOLEAN_CELLS_OPTIONS_INIT;
+    ebpo_cells_options options = EBPO_CELLS_OPTIONS_INIT;
     options.level = level;
     options.most = most;
     ebpo_status status = ebpo_boolean_cells_new(boolean, &options, &cells, NULL);
@@ -331,6 +421,8 @@ Suite *test_suite(void)
     tcase_add_test(c, swapping_and_threads_change_nothing);
     tcase_add_test(c, loading_changes_nothing);
     tcase_add_test(c, nodes_decide_most);
+    tcase_add_test(c, distances_to_rows_of_boxes);
+    tcase_add_test(c, distances_to_nothing);
     tcase_add_test(c, boxes_apart_have_nothing_in_common);
     tcase_add_test(c, what_cannot_be_is_refused);
     suite_add_tcase(s, c);

@@ -24,14 +24,14 @@ static ebpo_status pose_check(const ebpo_model *model, ebpo_error *error)
 
 static ebpo_status ask_boolean_cells(ebpo_boolean *boolean, ebpo_error *error)
 {
-    ebpo_boolean_cells_options options = EBPO_BOOLEAN_CELLS_OPTIONS_INIT;
+    ebpo_cells_options options = EBPO_CELLS_OPTIONS_INIT;
     ebpo_boolean_cells *cells = NULL;
     ebpo_boolean_volume volume = EBPO_BOOLEAN_VOLUME_INIT;
     ebpo_mesh mesh = { 0 };
     options.level = 2;
     ebpo_status status = ebpo_boolean_cells_new(boolean, &options, &cells, error);
     if (status == EBPO_OK)
-        status = ebpo_boolean_cells_get_volume(cells, &volume);
+        status = ebpo_boolean_cells_volume(cells, &volume);
     if (status == EBPO_OK)
         status = ebpo_boolean_cells_mesh(cells, EBPO_BOOLEAN_OUTER, &mesh, error);
     ebpo_mesh_free(&mesh);
@@ -48,6 +48,7 @@ static ebpo_status ask_boolean(ebpo_model *model, ebpo_error *error)
                                          { EBPO_BOOLEAN_UNION, 0, 1, 0 } };
     double points[POINTS][3];
     ebpo_boolean_result results[POINTS];
+    ebpo_boundary_distance distance;
     ebpo_boolean_options options = EBPO_BOOLEAN_OPTIONS_INIT;
     ebpo_boolean *boolean = NULL;
     options.threads = 1;
@@ -57,6 +58,8 @@ static ebpo_status ask_boolean(ebpo_model *model, ebpo_error *error)
         status = ebpo_boolean_inside(boolean, points[0], results, error);
     if (status == EBPO_OK)
         status = ebpo_boolean_inside_many(boolean, points[0], POINTS, results, error);
+    if (status == EBPO_OK)
+        status = ebpo_boolean_distance(boolean, points[0], NULL, &distance, error);
     if (status == EBPO_OK)
         status = ask_boolean_cells(boolean, error);
     ebpo_boolean_free(boolean);

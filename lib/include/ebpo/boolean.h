@@ -3,7 +3,8 @@
  *
  *   Expressions     ebpo_boolean_new
  *   Point in solid  ebpo_boolean_inside, ebpo_boolean_inside_many
- *   Cells           ebpo_boolean_cells_new, ebpo_boolean_cells_get_volume, ebpo_boolean_cells_mesh
+ *   Distance        ebpo_boolean_distance
+ *   Cells           ebpo_boolean_cells_new, ebpo_boolean_cells_volume, ebpo_boolean_cells_mesh
  *
  * Nothing is cut: there is no mesh of the result. Questions about it are answered by questions to
  * the models. Decisions are those of arithmetic without rounding on posed coordinates (pose.h).
@@ -127,10 +128,58 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_inside_many(ebpo_boolean *boolea
                                                             ebpo_boolean_result *out,
                                                             ebpo_error *error);
 
+/* ---- distance ---- */
+
+typedef struct ebpo_boundary_options {
+    size_t struct_size; /* EBPO_BOUNDARY_OPTIONS_INIT sets it */
+
+    /* Enough when hi - lo <= tolerance hi; at least 0. */
+    double tolerance;
+
+    /* Stop after about so many cells of the world, and say what is certain. 0: 100,000. */
+    uint64_t cells;
+} ebpo_boundary_options;
+
+#define EBPO_BOUNDARY_OPTIONS_INIT             \
+    {                                          \
+        sizeof(ebpo_boundary_options), 0.01, 0 \
+    }
+
+typedef struct ebpo_boundary_distance {
+    /*
+     * The distance to the result's boundary is certainly within; unsigned, in the unit of the
+     * world. 0 .. 0: on the boundary. INFINITY .. INFINITY: the result is empty; hi alone is
+     * INFINITY: perhaps.
+     */
+    double lo, hi;
+
+    /* Of the point itself. */
+    ebpo_boolean_result inside;
+
+    /* That were looked at. */
+    uint64_t cells;
+} ebpo_boundary_distance;
+
+/*
+ * How far a point of the world, three finite doubles, is from the boundary of the result. Where the
+ * nearest face of all operands is a part of that boundary, two distances answer, and `lo` and `hi`
+ * differ by rounding; elsewhere cells of the world are searched, the nearest first.
+ *
+ * EBPO_E_ARGUMENT: the point or the tolerance. EBPO_E_LIMIT: as ebpo_boolean_cells_new, of level 0.
+ * The errors of ebpo_boolean_inside.
+ *
+ * Threads: one per expression.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_distance(ebpo_boolean *boolean,
+                                                         const double point[3],
+                                                         const ebpo_boundary_options *options,
+                                                         ebpo_boundary_distance *out,
+                                                         ebpo_error *error);
+
 /* ---- cells ---- */
 
-typedef struct ebpo_boolean_cells_options {
-    size_t struct_size; /* EBPO_BOOLEAN_CELLS_OPTIONS_INIT sets it */
+typedef struct ebpo_cells_options {
+    size_t struct_size; /* EBPO_CELLS_OPTIONS_INIT sets it */
 
     /* The finest cells: 2^-level of the root's edge; 0 to EBPO_BOOLEAN_LEVEL_MAX. */
     int level;
@@ -142,13 +191,13 @@ typedef struct ebpo_boolean_cells_options {
     uint64_t most;
 
     ebpo_progress progress;
-} ebpo_boolean_cells_options;
+} ebpo_cells_options;
 
 #define EBPO_BOOLEAN_LEVEL_MAX 20
 
-#define EBPO_BOOLEAN_CELLS_OPTIONS_INIT                             \
-    {                                                               \
-        sizeof(ebpo_boolean_cells_options), 6, 0, 0, { NULL, NULL } \
+#define EBPO_CELLS_OPTIONS_INIT                             \
+    {                                                       \
+        sizeof(ebpo_cells_options), 6, 0, 0, { NULL, NULL } \
     }
 
 /*
@@ -173,7 +222,7 @@ typedef struct ebpo_boolean_cells ebpo_boolean_cells;
  * Threads: one per expression; further ones live for the call.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_cells_new(ebpo_boolean *boolean,
-                                                          const ebpo_boolean_cells_options *options,
+                                                          const ebpo_cells_options *options,
                                                           ebpo_boolean_cells **out,
                                                           ebpo_error *error);
 
@@ -209,8 +258,8 @@ typedef struct ebpo_boolean_volume {
  *
  * Threads: any.
  */
-EBPO_API ebpo_status ebpo_boolean_cells_get_volume(const ebpo_boolean_cells *cells,
-                                                   ebpo_boolean_volume *out);
+EBPO_API ebpo_status ebpo_boolean_cells_volume(const ebpo_boolean_cells *cells,
+                                               ebpo_boolean_volume *out);
 
 typedef enum ebpo_boolean_side {
     EBPO_BOOLEAN_OUTER = 0, /* all in-cells and mixed cells: holds the result */
