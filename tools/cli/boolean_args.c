@@ -1,0 +1,173 @@
+#include "cli/boolean_args.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli/command.h"
+
+enum { DEEPEST = 64 }; /* parentheses */
+
+typedef struct parsing {
+    const char *name, *text, *at;
+    uint32_t operands;
+    boolean_nodes *out;
+    int depth;
+} parsing;
+
+static bool fail(const parsing *p, const char *what)
+{
+    command_usage(p->name, "expression '%s', column %d: %s", p->text, (int)(p->at - p->text) + 1,
+                  what);
+    return false;
+}
+
+static void skip_blanks(parsing *p) { p->at += strspn(p->at, " \t\r\n"); }
+
+static bool add(parsing *p, int32_t operation, uint32_t left, uint32_t right, uint32_t *number)
+{
+    if (p->out->count == EBPO_BOOLEAN_NODES_MAX)
+        return fail(p, "too many operations");
+    *number = p->out->count++;
+    p->out->node[*number] = (ebpo_boolean_node){ operation, left, right, 0 };
+    return true;
+}
+
+static bool read_sum(parsing *p, uint32_t *number);
+
+static bool read_atom(parsing *p, uint32_t *number)
+{
+    skip_blanks(p);
+    if (*p->at == '(') {
+        if (++p->depth > DEEPEST)
+            return fail(p, "too many parentheses in each other");
+        p->at++;
+        if (!read_sum(p, number))
+            return false;
+        if (*p->at != ')')
+            return fail(p, "expected an operator or ')'");
+        p->at++;
+        p->depth--;
+    } else if (*p->at >= 'A' && *p->at <= 'Z') {
+        uint32_t operand = (uint32_t)(*p->at - 'A');
+        if (operand >= p->operands)
+            return fail(p, "there is no such model");
+        p->at++;
+        if (!add(p, EBPO_BOOLEAN_OPERAND, operand, 0, number))
+            return false;
+    } else {
+        return fail(p, "expected a model (A, B, ...) or '('");
+    }
+    skip_blanks(p);
+    return true;
+}
+
+static bool read_product(parsing *p, uint32_t *number)
+{
+    uint32_t right;
+    if (!read_atom(p, number))
+        return false;
+    while (*p->at == '&' || *p->at == '*') {
+        p->at++;
+        if (!read_atom(p, &right) || !add(p, EBPO_BOOLEAN_INTERSECTION, *number, right, number))
+            return false;
+    }
+    return true;
+}
+
+static int32_t operation_of(char c)
+{
+    return c == '|' || c == '+' ? EBPO_BOOLEAN_UNION
+           : c == '-'           ? EBPO_BOOLEAN_DIFFERENCE
+           : c == '^'           ? EBPO_BOOLEAN_SYMMETRIC_DIFFERENCE
+                                : EBPO_BOOLEAN_OPERAND;
+}
+
+static bool read_sum(parsing *p, uint32_t *number)
+{
+    int32_t operation;
+    uint32_t right;
+    if (!read_product(p, number))
+        return false;
+    while ((operation = operation_of(*p->at)) != EBPO_BOOLEAN_OPERAND) {
+        p->at++;
+        if (!read_product(p, &right) || !add(p, operation, *number, right, number))
+            return false;
+    }
+    return true;
+}
+
+bool boolean_read(const char *name, const char *text, uint32_t operands, boolean_nodes *out)
+{
+    parsing p = { name, text, text, operands, out, 0 };
+    uint32_t root;
+    out->count = 0;
+    if (!read_sum(&p, &root))
+        return false;
+    return *p.at == 0 || fail(&p, "expected an operator or the end");
+}
+
+/* --- poses --- */
+
+/* Into number[most]; returns how many there are, -1: something else stands there. */
+static int read_numbers(const char *text, double *number, int most)
+{
+    static const char between[] = " \t,";
+    int count = 0;
+    for (text += strspn(text, between); *text; text += strspn(text, between)) {
+        char *end;
+        double x = strtod(text, &end);
+        if (end == text || count == most || !isfinite(x))
+            return -1;
+        number[count++] = x;
+        text = end;
+    }
+    return count;
+}
+
+/* q: x, y, z, w of any length but 0. */
+static bool turn(ebpo_pose *pose, const double q[4])
+{
+    double most = fmax(fmax(fabs(q[0]), fabs(q[1])), fmax(fabs(q[2]), fabs(q[3])));
+    if (!(most > 0))
+        return false;
+    double x = q[0] / most, y = q[1] / most, z = q[2] / most, w = q[3] / most;
+    double s = 2 / (x * x + y * y + z * z + w * w);
+    const double r[3][3] = {
+        { 1 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y) },
+        { s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x) },
+        { s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y) },
+    };
+    memcpy(pose->rotation, r, sizeof r);
+    return true;
+}
+
+static bool read_pose(const char *name, const char *text, uint32_t operands, ebpo_pose *pose)
+{
+    double number[8] = { 0 };
+    const char *at = text + strspn(text, " \t");
+    uint32_t operand = *at >= 'A' && *at <= 'Z' ? (uint32_t)(*at - 'A') : operands;
+    int count = operand < operands ? read_numbers(at + 1, number, 8) : -1;
+    bool good = count == 3 || count == 7 || count == 8;
+    if (good && count > 3)
+        good = turn(&pose[operand], number + 3);
+    if (!good) {
+        command_usage(name,
+                      "--pose '%s': expected a model and 3, 7 or 8 numbers, 'B X Y Z QX QY QZ QW "
+                      "SCALE', the quaternion not 0",
+                      text);
+        return false;
+    }
+    memcpy(pose[operand].translation, number, sizeof pose[operand].translation);
+    if (count == 8)
+        pose[operand].scale = number[7];
+    return true;
+}
+
+bool boolean_read_poses(const char *name, const arg_list *texts, uint32_t operands, ebpo_pose *pose)
+{
+    for (int i = 0; i < texts->count; i++)
+        if (!read_pose(name, texts->item[i], operands, pose))
+            return false;
+    return true;
+}
