@@ -2,11 +2,6 @@
 #ifndef EBPO_PAIR_PAIR_KIND_H
 #define EBPO_PAIR_PAIR_KIND_H
 
-typedef enum ebpo_pair_kind {
-    EBPO_PAIR_APART = 0,
-    EBPO_PAIR_TOUCHING = 1, /* a common point; interiors do not meet */
-    EBPO_PAIR_CROSSING = 2, /* interiors meet, planes differ */
-    EBPO_PAIR_COPLANAR = 3  /* interiors meet in one plane */
-} ebpo_pair_kind;
+#include <ebpo/collide.h>
 
 #endif

@@ -16,10 +16,42 @@ static void make_points(double (*points)[3])
     }
 }
 
-static ebpo_status pose_check(const ebpo_model *model, ebpo_error *error)
+static bool count_met(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
-    ebpo_pose pose = EBPO_POSE_INIT;
-    return ebpo_pose_check(model, &pose, error);
+    (void)pairs;
+    *(uint64_t *)user += count;
+    return true;
+}
+
+static ebpo_status ask_two(ebpo_collider *collider, const ebpo_collide_options *options,
+                           ebpo_error *error)
+{
+    ebpo_face_pair pair;
+    ebpo_collider_stats stats = EBPO_COLLIDER_STATS_INIT;
+    int32_t found;
+    uint64_t count = 0;
+    ebpo_status status = ebpo_collide_first(collider, options, &pair, &found, error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_all(collider, options, count_met, &count, error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_self(collider, options, count_met, &count, error);
+    if (status == EBPO_OK)
+        status = ebpo_collider_get_stats(collider, &stats);
+    return status;
+}
+
+static ebpo_status collide(ebpo_model *model, ebpo_error *error)
+{
+    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
+    ebpo_collider *collider = NULL;
+    options.pose_b.translation[0] = 0.3;
+    ebpo_status status = ebpo_pose_check(model, &options.pose_b, error);
+    if (status == EBPO_OK)
+        status = ebpo_collider_new(model, model, NULL, &collider, error);
+    if (status == EBPO_OK)
+        status = ask_two(collider, &options, error);
+    ebpo_collider_free(collider);
+    return status;
 }
 
 static ebpo_status ask_boolean_cells(ebpo_boolean *boolean, ebpo_error *error)
@@ -158,9 +190,9 @@ static ebpo_status ask_all(ebpo_model *model, ebpo_error *error)
     if (status == EBPO_OK)
         status = ebpo_model_get_stats(model, &stats);
     if (status == EBPO_OK)
-        status = pose_check(model, error);
-    if (status == EBPO_OK)
         status = ask_boolean(model, error);
+    if (status == EBPO_OK && stats.resident)
+        status = collide(model, error);
     ebpo_context_free(context);
     return status;
 }

@@ -10,6 +10,7 @@
  *   query.h       point in solid, distance, rays, boxes, mass
  *   pose.h        where a model is in the world
  *   boolean.h     unions and differences of solids at poses, by query
+ *   collide.h     two models that meet
  *   stream.h      levels, coarse to fine
  *   view.h        nodes in the order of an observer
  *   subtree.h     a part of a model as plain arrays: nodes, envelopes, faces
@@ -35,6 +36,7 @@
 #include <ebpo/query.h>
 #include <ebpo/pose.h>
 #include <ebpo/boolean.h>
+#include <ebpo/collide.h>
 #include <ebpo/stream.h>
 #include <ebpo/view.h>
 #include <ebpo/subtree.h>

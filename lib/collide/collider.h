@@ -1,0 +1,44 @@
+/* A collider's parts, and what all questions begin with. */
+#ifndef EBPO_COLLIDE_COLLIDER_H
+#define EBPO_COLLIDE_COLLIDER_H
+
+#include <ebpo/collide.h>
+
+#include "collide/pair_walk.h"
+#include "query/query_model.h"
+
+struct ebpo_collider {
+    ebpo_model *model[2]; /* as the caller has them */
+    ebpo_collider_options options;
+    ebpo_pair_walk walk; /* of the calling thread */
+    uint64_t node_pairs, block_pairs, exact;
+};
+
+/* A question: options checked, models in the order that swapping does not change. */
+typedef struct ebpo_collision {
+    ebpo_collider *collider;
+    ebpo_collide_options options;
+    bool turned; /* the caller's B comes first */
+    ebpo_model *model[2];
+    ebpo_block_posing posing[2];
+    double reach;  /* no posed coordinate is greater */
+    uint64_t late; /* by ebpo_clock; UINT64_MAX: never */
+} ebpo_collision;
+
+EBPO_MUST_USE ebpo_status ebpo_collision_begin(ebpo_collision *out, ebpo_collider *collider,
+                                               const ebpo_collide_options *options,
+                                               ebpo_error *error);
+
+bool ebpo_collision_is_late(const ebpo_collision *collision);
+
+/* Adds a walk's counts to the collider's. */
+void ebpo_collider_count(ebpo_collider *collider, ebpo_pair_walk *walk);
+
+/* What the caller is told of local numbers of two accels. */
+ebpo_face_pair ebpo_collision_pair(const ebpo_collision *collision, const ebpo_accel *first,
+                                   const ebpo_accel *second, const ebpo_met_pair *met);
+
+/* A walk takes so many pairs before it looks at the clock. */
+enum { EBPO_WALK_PAIRS = 1024 };
+
+#endif

@@ -1,0 +1,18 @@
+/* Which kernels a walk uses. */
+#include "collide/pair_walk.h"
+
+void ebpo_pair_walk_begin(ebpo_pair_walk *w, const ebpo_accel_pair *pair)
+{
+    w->pair = pair;
+    w->kernels = ebpo_walk_kernels_best();
+    w->filter = ebpo_pair_kernels_best();
+    w->top = w->met_count = 0;
+    w->begin = 0;
+    w->end = pair->accel[0]->face_count;
+    for (int side = 0; side < 2; side++) {
+        for (int i = 0; i < EBPO_TURNED_NODES; i++)
+            w->turned[side][i].node = EBPO_NO_CHILD;
+        for (int i = 0; i < EBPO_POSED_FACES; i++)
+            w->posed[side][i].block = EBPO_NO_CHILD;
+    }
+}

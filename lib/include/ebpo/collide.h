@@ -1,0 +1,171 @@
+/*
+ * EBP-Octree in HDF5: two models that meet.
+ *
+ *   Two models       ebpo_collider_new, one for each thread that asks
+ *   Do they meet     ebpo_collide_first
+ *   All of it        ebpo_collide_all, ebpo_collide_self
+ *
+ * Poses are those of pose.h: decisions are exact on posed coordinates. Swapping the models, threads
+ * and processors change nothing. What the kinds of pairs mean: docs/develop/collision.md.
+ */
+#ifndef EBPO_COLLIDE_H
+#define EBPO_COLLIDE_H
+
+#include <ebpo/pose.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- two models ---- */
+
+typedef struct ebpo_collider_options {
+    size_t struct_size; /* EBPO_COLLIDER_OPTIONS_INIT sets it */
+
+    /* For all pairs and contacts. 0: all cores. The others use the calling thread. */
+    unsigned threads;
+
+    /*
+     * Bytes for pairs that wait to be given in order, beside the models' budgets. 0: 64 MiB. With
+     * less than all pairs need, the models are gone through several times.
+     */
+    uint64_t memory;
+} ebpo_collider_options;
+
+#define EBPO_COLLIDER_OPTIONS_INIT          \
+    {                                       \
+        sizeof(ebpo_collider_options), 0, 0 \
+    }
+
+/* Two models (or one, twice) for questions of one thread: stacks and what waits. */
+typedef struct ebpo_collider ebpo_collider;
+
+/*
+ * options: NULL for the usual ones. Both models must outlive it.
+ *
+ * EBPO_E_ABSENT: a file has no mesh. EBPO_E_LIMIT: a model is not all in memory. EBPO_E_ARGUMENT,
+ * EBPO_E_MEMORY.
+ *
+ * Threads: any; many colliders may share models.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_collider_new(ebpo_model *a, ebpo_model *b,
+                                                     const ebpo_collider_options *options,
+                                                     ebpo_collider **out, ebpo_error *error);
+
+/*
+ * NULL is fine.
+ *
+ * Threads: one per collider.
+ */
+EBPO_API void ebpo_collider_free(ebpo_collider *collider);
+
+/* Of every question. NULL: both models as in their files, no deadline. */
+typedef struct ebpo_collide_options {
+    size_t struct_size; /* EBPO_COLLIDE_OPTIONS_INIT sets it */
+
+    /* As ebpo_pose_check allows. */
+    ebpo_pose pose_a, pose_b;
+
+    /* Stop after about so many nanoseconds. 0: no deadline. */
+    uint64_t deadline_ns;
+
+    ebpo_progress progress;
+} ebpo_collide_options;
+
+#define EBPO_COLLIDE_OPTIONS_INIT                                                       \
+    {                                                                                   \
+        sizeof(ebpo_collide_options), EBPO_POSE_INIT, EBPO_POSE_INIT, 0, { NULL, NULL } \
+    }
+
+/* ---- do they meet ---- */
+
+/* How two faces lie to each other, as sets of points. */
+typedef enum ebpo_pair_kind {
+    EBPO_PAIR_APART = 0,
+    EBPO_PAIR_TOUCHING = 1, /* a common point; interiors do not meet */
+    EBPO_PAIR_CROSSING = 2, /* interiors meet, planes differ */
+    EBPO_PAIR_COPLANAR = 3  /* interiors meet in one plane */
+} ebpo_pair_kind;
+
+/* Numbers of faces as in ebpo_distance_result, and those in the files. */
+typedef struct ebpo_face_pair {
+    uint64_t face_a, face_b, file_face_a, file_face_b;
+
+    /* An ebpo_pair_kind, not EBPO_PAIR_APART. */
+    int32_t kind;
+
+    int32_t reserved;
+} ebpo_face_pair;
+
+/*
+ * A pair of faces that meet: the same one for the same files and poses, however many threads and on
+ * every processor, but not the least in any numbering. *found: 1 yes, 0 none, -1 the deadline left
+ * it open. A solid within another is no contact.
+ *
+ * EBPO_E_ARGUMENT: a pose (ebpo_pose_check). EBPO_E_CANCELLED: by `progress`. EBPO_E_LIMIT,
+ * EBPO_E_MEMORY, and the errors of reading.
+ *
+ * Threads: one per collider.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_first(ebpo_collider *collider,
+                                                      const ebpo_collide_options *options,
+                                                      ebpo_face_pair *out, int32_t *found,
+                                                      ebpo_error *error);
+
+/* ---- all of it ---- */
+
+/* Pairs, lent until it returns. False: enough. Calls come one after the other. */
+typedef bool (*ebpo_pairs_fn)(void *user, const ebpo_face_pair *pairs, uint64_t count);
+
+/*
+ * Every pair of faces that meet, once, by their positions in the files: those of the model that
+ * comes first (the one with the lesser content_sha256, then with the lesser pose bit by bit), then
+ * those of the other. When `take` returns false nothing more is given, and the call succeeds.
+ *
+ * After the deadline EBPO_E_CANCELLED; what was given is the beginning of all. Other errors are
+ * those of ebpo_collide_first.
+ *
+ * Threads: one per collider; further ones live for the call.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_all(ebpo_collider *collider,
+                                                    const ebpo_collide_options *options,
+                                                    ebpo_pairs_fn take, void *user,
+                                                    ebpo_error *error);
+
+/*
+ * The same of one model, as it is in its file: the pairs of its faces that meet otherwise than as
+ * neighbours do, face_a before face_b in the file. What two faces with equal corners have in common
+ * at such a corner, or along the edge between two of them, is no meeting; EBPO_PAIR_COPLANAR is one
+ * (a fold, or a face that is there twice). The collider is of one model, twice.
+ *
+ * EBPO_E_ARGUMENT: of two. Other errors are those of ebpo_collide_all.
+ *
+ * Threads: one per collider; further ones live for the call.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_self(ebpo_collider *collider,
+                                                     const ebpo_collide_options *options,
+                                                     ebpo_pairs_fn take, void *user,
+                                                     ebpo_error *error);
+
+/* Sums since the collider was made. */
+typedef struct ebpo_collider_stats {
+    size_t struct_size; /* EBPO_COLLIDER_STATS_INIT sets it */
+
+    /* Pairs looked at, of nodes and of blocks of faces; of faces, those left to the exact test. */
+    uint64_t node_pairs, block_pairs, exact;
+} ebpo_collider_stats;
+
+#define EBPO_COLLIDER_STATS_INIT EBPO_SIZED(ebpo_collider_stats)
+
+/*
+ * EBPO_E_ARGUMENT: `out` was not begun with its macro.
+ *
+ * Threads: one per collider.
+ */
+EBPO_API ebpo_status ebpo_collider_get_stats(const ebpo_collider *collider,
+                                             ebpo_collider_stats *out);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
