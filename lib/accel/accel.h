@@ -239,10 +239,10 @@ bool ebpo_leaf_ask(const ebpo_accel *subtree, ebpo_accel_leaf *leaf, ebpo_cell c
 EBPO_MUST_USE ebpo_status ebpo_accel_make(ebpo_accel **out, ebpo_slice *slice,
                                           const ebpo_info *info, bool with_planes, unsigned threads,
                                           ebpo_error *error);
-/* The same of a whole model; EBPO_E_LIMIT if that took more than `most` bytes (UINT64_MAX: no
- * limit), the slice included. */
+/* The same; EBPO_E_LIMIT if that took more, the slice included, than the room's most bytes (NULL:
+ * no limit); ordinary subtrees and models are refused before they have taken more. */
 EBPO_MUST_USE ebpo_status ebpo_accel_make_within(ebpo_accel **out, ebpo_slice *slice,
-                                                 const ebpo_info *info, uint64_t most,
+                                                 const ebpo_info *info, ebpo_room *room,
                                                  bool with_planes, unsigned threads,
                                                  ebpo_error *error);
 void ebpo_accel_free(ebpo_accel *subtree);
@@ -257,9 +257,15 @@ static inline uint64_t ebpo_accel_bytes(const ebpo_accel *whole)
  * Bounds from counts. */
 void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
                          uint64_t *peak);
-/* The same of a whole model, nearer, of ordinary ones: ebpo_accel_make_within refuses what exceeds
- * a budget. */
+/* The same, nearer, of ordinary models: of a whole one, of a subtree (its planes counted, or none
+ * kept). What has more is refused by ebpo_slice_read_within and ebpo_accel_make_within. */
 void ebpo_accel_estimate_whole(const ebpo_info *info, uint64_t *keep, uint64_t *peak);
+void ebpo_accel_estimate_subtree(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
+                                 uint64_t *peak);
+/* What ordinary subtrees take on average when there are so many, which have `all` together: nearer
+ * still, and little more. */
+uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info,
+                               uint64_t subtrees);
 
 /* --- its nodes (accel_nodes.c); `entry` is what finds them --- */
 

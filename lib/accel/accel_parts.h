@@ -30,13 +30,16 @@ void ebpo_layout_free(ebpo_layout *layout);
  * beyond that, and doubles, take doubles. */
 bool ebpo_accel_needs_doubles(const ebpo_info *info);
 
-/* What making may take: `most` is UINT64_MAX, or the model is a whole one. */
-typedef struct ebpo_accel_room {
+/* What is made, and of what. */
+typedef struct ebpo_accel_plan {
     const ebpo_info *info;
-    uint64_t most;
-} ebpo_accel_room;
-/* EBPO_E_LIMIT if making a whole model with these blocks takes more. */
-EBPO_MUST_USE ebpo_status ebpo_accel_fits(const ebpo_accel_room *room, const ebpo_layout *layout,
+    const ebpo_slice *slice;
+    bool with_planes;
+    ebpo_layout *layout; /* NULL: not known yet */
+} ebpo_accel_plan;
+/* EBPO_E_LIMIT if making it with these blocks (the usual ones without a layout) takes more than the
+ * room (NULL: no limit) has, the slice included. */
+EBPO_MUST_USE ebpo_status ebpo_accel_fits(ebpo_room *room, const ebpo_accel_plan *plan,
                                           uint64_t units, ebpo_error *error);
 
 /* Entries of leaves' lists at most: each reference is one, and more than eight new faces of a leaf
@@ -47,9 +50,9 @@ static inline uint64_t ebpo_list_most(uint64_t refs, uint64_t leaves, uint64_t f
 }
 
 /* Fills blocks, and gives them their numbers (parallel). */
-EBPO_MUST_USE ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_slice *slice,
-                                                 ebpo_layout *layout, const ebpo_accel_room *room,
-                                                 unsigned threads, ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_accel_plan *plan,
+                                                 ebpo_room *room, unsigned threads,
+                                                 ebpo_error *error);
 /* Bounds of the hierarchy, from the blocks (parallel). */
 EBPO_MUST_USE ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout,
                                                  unsigned threads, ebpo_error *error);

@@ -178,10 +178,11 @@ static ebpo_status make_room(ebpo_accel *s, ebpo_error *error)
     return EBPO_OK;
 }
 
-ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_slice *slice, ebpo_layout *layout,
-                                   const ebpo_accel_room *room, unsigned threads, ebpo_error *error)
+ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_accel_plan *plan, ebpo_room *room,
+                                   unsigned threads, ebpo_error *error)
 {
-    job j = { s, &slice->mesh, layout, NULL };
+    ebpo_layout *layout = plan->layout;
+    job j = { s, &plan->slice->mesh, layout, NULL };
     layout->block_number = ebpo_alloc(layout->block_count, sizeof *layout->block_number);
     j.found = ebpo_alloc(layout->block_count, sizeof *j.found);
     ebpo_status status = layout->block_number && j.found
@@ -194,7 +195,7 @@ ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_slice *slice, ebpo_
         status = ebpo_fail(error, EBPO_E_LIMIT,
                            "the model has too many faces to be held at once; give a memory budget");
     if (status == EBPO_OK)
-        status = ebpo_accel_fits(room, layout, s->units, error);
+        status = ebpo_accel_fits(room, plan, s->units, error);
     if (status == EBPO_OK)
         status = make_room(s, error);
     if (status == EBPO_OK)

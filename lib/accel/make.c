@@ -86,16 +86,20 @@ static uint64_t count_bytes(const ebpo_accel *s)
            (s->gray_first ? (s->gray_count + s->gray_first[s->gray_count]) * 4 : 0);
 }
 
-static ebpo_status make(ebpo_accel *s, ebpo_slice *slice, const ebpo_accel_room *room,
-                        bool with_planes, unsigned threads, ebpo_error *error)
+static ebpo_status make(ebpo_accel *s, ebpo_slice *slice, const ebpo_info *info, ebpo_room *room,
+                        unsigned threads, ebpo_error *error)
 {
     ebpo_layout layout;
-    ebpo_status status = ebpo_layout_make(&layout, slice, EBPO_BLOCKS_MOST, error);
+    ebpo_accel_plan plan = { info, slice, s->has_planes, NULL };
+    ebpo_status status = ebpo_accel_fits(room, &plan, 0, error);
+    if (status == EBPO_OK)
+        status = ebpo_layout_make(&layout, slice, EBPO_BLOCKS_MOST, error);
     if (status != EBPO_OK)
         return status;
-    status = ebpo_accel_fits(room, &layout, layout.block_count, error);
+    plan.layout = &layout;
+    status = ebpo_accel_fits(room, &plan, layout.block_count, error);
     if (status == EBPO_OK)
-        status = ebpo_accel_fill_blocks(s, slice, &layout, room, threads, error);
+        status = ebpo_accel_fill_blocks(s, &plan, room, threads, error);
     ebpo_mesh_free(&slice->mesh);
     if (status == EBPO_OK)
         status = ebpo_accel_fill_bounds(s, &layout, threads, error);
@@ -106,7 +110,7 @@ static ebpo_status make(ebpo_accel *s, ebpo_slice *slice, const ebpo_accel_room 
         s->kinds = ebpo_leaf_kinds_make(rows_most(s));
         status = s->kinds ? EBPO_OK : ebpo_fail_memory(error, sizeof *s->kinds);
     }
-    if (status == EBPO_OK && with_planes)
+    if (status == EBPO_OK && s->has_planes)
         status = copy_planes(s, slice, error);
     return status;
 }
@@ -114,14 +118,13 @@ static ebpo_status make(ebpo_accel *s, ebpo_slice *slice, const ebpo_accel_room 
 ebpo_status ebpo_accel_make(ebpo_accel **out, ebpo_slice *slice, const ebpo_info *info,
                             bool with_planes, unsigned threads, ebpo_error *error)
 {
-    return ebpo_accel_make_within(out, slice, info, UINT64_MAX, with_planes, threads, error);
+    return ebpo_accel_make_within(out, slice, info, NULL, with_planes, threads, error);
 }
 
 ebpo_status ebpo_accel_make_within(ebpo_accel **out, ebpo_slice *slice, const ebpo_info *info,
-                                   uint64_t most, bool with_planes, unsigned threads,
+                                   ebpo_room *room, bool with_planes, unsigned threads,
                                    ebpo_error *error)
 {
-    ebpo_accel_room room = { info, most };
     *out = NULL;
     ebpo_accel *s = ebpo_alloc_zero(1, sizeof *s);
     if (!s) {
@@ -143,7 +146,7 @@ ebpo_status ebpo_accel_make_within(ebpo_accel **out, ebpo_slice *slice, const eb
         slice->mesh.face_count >= EBPO_IS_BLOCK
             ? ebpo_fail(error, EBPO_E_LIMIT,
                         "the model has too many faces to be held at once; give a memory budget")
-            : make(s, slice, &room, with_planes, threads, error);
+            : make(s, slice, info, room, threads, error);
     s->outer = slice->outer;
     s->face_source = slice->face_source;
     slice->outer = slice->face_source = NULL;

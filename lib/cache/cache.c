@@ -163,13 +163,20 @@ static ebpo_status wait_for_room(ebpo_cache *c, uint64_t peak, ebpo_error *error
 
 /* --- loading --- */
 
+/* What was reserved for a load. */
+static void give_back(ebpo_cache *c, uint64_t reserved)
+{
+    c->stats.bytes -= reserved;
+    c->passing -= reserved;
+    pthread_cond_broadcast(&c->changed);
+}
+
 /* Ends a load: `reserved` gives way to the item, which is pinned by whoever waits for it (and `own`
  * times more), or to nothing. */
 static void end_load(ebpo_cache *c, ebpo_cache_slot *s, bool loaded, uint64_t reserved,
                      unsigned own)
 {
-    c->stats.bytes -= reserved;
-    c->passing -= reserved;
+    give_back(c, reserved);
     if (loaded) {
         s->state = READY;
         s->pins = own + s->waiters;
@@ -184,7 +191,6 @@ static void end_load(ebpo_cache *c, ebpo_cache_slot *s, bool loaded, uint64_t re
         if (s->waiters == 0)
             free(s);
     }
-    pthread_cond_broadcast(&c->changed);
 }
 
 static ebpo_status estimate(ebpo_cache *c, uint64_t key, uint64_t *peak, ebpo_error *error)
@@ -196,13 +202,16 @@ static ebpo_status estimate(ebpo_cache *c, uint64_t key, uint64_t *peak, ebpo_er
     return status;
 }
 
-/* Calls the source, without the lock; an item that is larger than was said cannot stay. */
-static ebpo_status call_load(ebpo_cache *c, ebpo_cache_slot *s, uint64_t reserved,
+/* Calls the source, without the lock; an item that is larger than was said cannot stay. *needed:
+ * what the source asks for, or 0. */
+static ebpo_status call_load(ebpo_cache *c, ebpo_cache_slot *s, uint64_t reserved, uint64_t *needed,
                              ebpo_error *error)
 {
     void *item = NULL;
     uint64_t bytes = 0;
-    ebpo_status status = c->source.load(c->source.user, s->key, &item, &bytes, error);
+    ebpo_status status = c->source.load(c->source.user, s->key, c->budget ? reserved : UINT64_MAX,
+                                        &item, &bytes, error);
+    *needed = status == EBPO_E_LIMIT && bytes > reserved ? bytes : 0;
     if (status == EBPO_OK && bytes > reserved && c->budget) {
         c->source.release(c->source.user, item);
         return ebpo_fail(error, EBPO_E_LIMIT,
@@ -213,6 +222,28 @@ static ebpo_status call_load(ebpo_cache *c, ebpo_cache_slot *s, uint64_t reserve
     s->item = item;
     s->bytes = bytes;
     return status;
+}
+
+/* With room for s's load, more of it each time that the source asks for that; *reserved: what ends
+ * with the load. The lock is held at beginning and end. */
+static ebpo_status load_with_room(ebpo_cache *c, ebpo_cache_slot *s, uint64_t peak,
+                                  uint64_t *reserved, ebpo_error *error)
+{
+    for (;;) {
+        uint64_t needed = 0;
+        ebpo_status status = wait_for_room(c, peak, error);
+        if (status != EBPO_OK)
+            return status;
+        *reserved = peak;
+        pthread_mutex_unlock(&c->lock);
+        status = call_load(c, s, peak, &needed, error);
+        pthread_mutex_lock(&c->lock);
+        if (!needed)
+            return status;
+        give_back(c, *reserved);
+        *reserved = 0;
+        peak = needed;
+    }
 }
 
 /* The lock is held at beginning and end. */
@@ -227,13 +258,7 @@ static ebpo_status load_here(ebpo_cache *c, uint64_t key, void **item, ebpo_erro
     ebpo_status status = estimate(c, key, &peak, error);
     pthread_mutex_lock(&c->lock);
     if (status == EBPO_OK)
-        status = wait_for_room(c, peak, error);
-    if (status == EBPO_OK) {
-        reserved = peak;
-        pthread_mutex_unlock(&c->lock);
-        status = call_load(c, s, reserved, error);
-        pthread_mutex_lock(&c->lock);
-    }
+        status = load_with_room(c, s, peak, &reserved, error);
     if (status == EBPO_OK) {
         c->stats.loads++;
         *item = s->item;
@@ -378,7 +403,8 @@ static bool load_ahead(ebpo_cache *c, demand *d)
         return got == ROOM_NEVER;
     }
     pthread_mutex_unlock(&c->lock);
-    bool loaded = call_load(c, s, d->peak, NULL) == EBPO_OK;
+    uint64_t needed;
+    bool loaded = call_load(c, s, d->peak, &needed, NULL) == EBPO_OK;
     pthread_mutex_lock(&c->lock);
     c->stats.prefetched += loaded;
     end_load(c, s, loaded, d->peak, 0);

@@ -11,12 +11,16 @@ typedef struct ebpo_cache ebpo_cache;
  * a time for one key. They may use other caches, and of this one ebpo_cache_take_aside only. */
 typedef struct ebpo_cache_source {
     void *user;
-    /* Bytes that loading `key` will take at most, the item itself included; room for that is made
-     * first. *keep: what the item takes once loaded, at most. */
+    /* Bytes that loading `key` will take, the item itself included; room for that is made first.
+     * *keep: what the item takes once loaded. */
     ebpo_status (*estimate)(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
                             ebpo_error *error);
-    /* *bytes: at most the peak that was said, or the get fails with EBPO_E_LIMIT. */
-    ebpo_status (*load)(void *user, uint64_t key, void **item, uint64_t *bytes, ebpo_error *error);
+    /* May take `most` bytes meanwhile: what was said, UINT64_MAX without a budget. *bytes: of the
+     * item. Where that does not do: EBPO_E_LIMIT, with what might do, more than `most`, in *bytes;
+     * then room for so much is made, and it is called again. An item that is larger is dropped,
+     * and the get fails with EBPO_E_LIMIT. */
+    ebpo_status (*load)(void *user, uint64_t key, uint64_t most, void **item, uint64_t *bytes,
+                        ebpo_error *error);
     void (*release)(void *user, void *item);
 } ebpo_cache_source;
 

@@ -353,8 +353,10 @@ void ebpo_chunks_limit(ebpo_chunks *chunks, uint64_t bytes)
 
 bool ebpo_chunks_refused(const ebpo_chunks *chunks) { return chunks->refused; }
 
-static ebpo_status load(void *user, uint64_t key, void **item, uint64_t *bytes, ebpo_error *error)
+static ebpo_status load(void *user, uint64_t key, uint64_t most, void **item, uint64_t *bytes,
+                        ebpo_error *error)
 {
+    (void)most;
     ebpo_chunks *c = user;
     const ebpo_array_in *array = array_of(c, key);
     ebpo_status allowed =

@@ -9,6 +9,12 @@
 
 static const uint32_t FREE = UINT32_MAX;
 
+uint64_t ebpo_compact_bytes(uint64_t capacity)
+{
+    const ebpo_compact *c = NULL;
+    return ebpo_hash_slots(2 * capacity) * sizeof *c->slot + capacity * 2 * sizeof *c->sorted;
+}
+
 ebpo_status ebpo_compact_make(ebpo_compact *out, uint64_t capacity, ebpo_error *error)
 {
     *out = (ebpo_compact){ .mask = 0 };

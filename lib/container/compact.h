@@ -14,6 +14,9 @@ typedef struct ebpo_compact {
     uint64_t count;
 } ebpo_compact;
 
+/* What that takes of memory at most, sorting included. */
+uint64_t ebpo_compact_bytes(uint64_t capacity);
+
 /* For at most `capacity` calls of add. Numbers are below 2^32 - 1. */
 EBPO_MUST_USE ebpo_status ebpo_compact_make(ebpo_compact *out, uint64_t capacity,
                                             ebpo_error *error);

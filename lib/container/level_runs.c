@@ -22,6 +22,7 @@ typedef struct reading {
     const ebpo_run *run;
     uint64_t run_count;
     uint32_t needs;
+    ebpo_room *room;
     span *span; /* for each run, of the list in hand */
     ebpo_level *out;
     ebpo_error *error;
@@ -86,8 +87,10 @@ void ebpo_runs_expect(ebpo_chunks *chunks, ebpo_expected *expected, int level, c
 static void *make_array(const reading *r, int id, uint64_t count, ebpo_status *status)
 {
     size_t size = ebpo_schema[id].held_size;
-    void *values = ebpo_alloc(count, size);
-    *status = values ? EBPO_OK : ebpo_fail_memory(r->error, count * size);
+    *status = ebpo_room_take(r->room, count * size, r->error);
+    void *values = *status == EBPO_OK ? ebpo_alloc(count, size) : NULL;
+    if (*status == EBPO_OK && !values)
+        *status = ebpo_fail_memory(r->error, count * size);
     ebpo_level_set_array(r->out, id, values);
     return values;
 }
@@ -275,9 +278,9 @@ static ebpo_status read_array(const reading *r, int id)
 }
 
 ebpo_status ebpo_runs_read(ebpo_chunks *chunks, int level, const ebpo_run *runs, uint64_t run_count,
-                           uint32_t needs, ebpo_level *out, ebpo_error *error)
+                           uint32_t needs, ebpo_room *room, ebpo_level *out, ebpo_error *error)
 {
-    reading r = { chunks, level, runs, run_count, needs, NULL, out, error };
+    reading r = { chunks, level, runs, run_count, needs, room, NULL, out, error };
     for (uint64_t i = 0; i < run_count; i++) {
         out->gray_count += runs[i].count[EBPO_GRAY];
         out->leaf_count += runs[i].count[EBPO_LEAF];

@@ -3,6 +3,7 @@
 #ifndef EBPO_CONTAINER_LEVEL_RUNS_H
 #define EBPO_CONTAINER_LEVEL_RUNS_H
 
+#include "base/room.h"
 #include "container/chunks.h"
 
 /* Groups [group, group + groups) of a level; level 0 has group 0. Its nodes by type: those of type
@@ -18,9 +19,9 @@ void ebpo_runs_expect(ebpo_chunks *chunks, ebpo_expected *expected, int level, c
 
 /* Arrays of the nodes of ascending runs, one behind the other, and their counts into `out`, which
  * has the types already. Those that are there for any of `needs`; faces have the numbers of the
- * file. */
+ * file. What they take is taken of `room` (NULL: no limit) first. */
 EBPO_MUST_USE ebpo_status ebpo_runs_read(ebpo_chunks *chunks, int level, const ebpo_run *runs,
-                                         uint64_t run_count, uint32_t needs, ebpo_level *out,
-                                         ebpo_error *error);
+                                         uint64_t run_count, uint32_t needs, ebpo_room *room,
+                                         ebpo_level *out, ebpo_error *error);
 
 #endif

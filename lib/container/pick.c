@@ -70,7 +70,7 @@ ebpo_status ebpo_pick_level(ebpo_chunks *chunks, int level, ebpo_run *runs, uint
         ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
         ebpo_runs_expect(chunks, &e, level, runs, run_count, needs);
         ebpo_expect_all(&e);
-        status = ebpo_runs_read(chunks, level, runs, run_count, needs, out, error);
+        status = ebpo_runs_read(chunks, level, runs, run_count, needs, NULL, out, error);
     }
     if (status != EBPO_OK)
         ebpo_level_free(out);

@@ -5,6 +5,7 @@
 
 #include <ebpo/file.h>
 
+#include "base/room.h"
 #include "container/chunks.h"
 #include "container/file_nodes.h"
 
@@ -37,6 +38,12 @@ void ebpo_slice_free(ebpo_slice *slice);
 EBPO_MUST_USE ebpo_status ebpo_slice_read_parts(ebpo_slice *out, ebpo_chunks *chunks,
                                                 const ebpo_node *root, uint32_t needs,
                                                 ebpo_error *error);
+
+/* The same of what has room: each array is taken of it before it is made, and stays taken; what is
+ * given back is only what reading needs on the way. EBPO_E_LIMIT beyond it. */
+EBPO_MUST_USE ebpo_status ebpo_slice_read_within(ebpo_slice *out, ebpo_chunks *chunks,
+                                                 const ebpo_node *root, uint32_t needs,
+                                                 ebpo_room *room, ebpo_error *error);
 
 /* All but stored planes of leaves. */
 EBPO_MUST_USE ebpo_status ebpo_slice_read(ebpo_slice *out, ebpo_chunks *chunks,

@@ -57,13 +57,16 @@ static ebpo_status gather(ebpo_chunks *chunks, ebpo_array_id id, size_t row_byte
 
 /* --- references --- */
 
-static ebpo_status collect_outer(ebpo_slice *slice, ebpo_compact *outer, ebpo_error *error)
+static ebpo_status collect_outer(ebpo_slice *slice, ebpo_compact *outer, ebpo_room *room,
+                                 ebpo_error *error)
 {
     uint64_t capacity = 0;
     for (int i = 0; i < slice->level_count; i++)
         for (uint64_t k = 0; k < slice->level[i].ref_count; k++)
             capacity += slice->level[i].leaf_refs[k] < slice->first_face;
-    ebpo_status status = ebpo_compact_make(outer, capacity, error);
+    ebpo_status status = ebpo_room_check(room, ebpo_compact_bytes(capacity), error);
+    if (status == EBPO_OK)
+        status = ebpo_compact_make(outer, capacity, error);
     if (status != EBPO_OK)
         return status;
     for (int i = 0; i < slice->level_count; i++)
@@ -90,10 +93,10 @@ static void localise(ebpo_slice *slice, const ebpo_compact *outer)
 }
 
 /* The list of outer faces stays with the slice. */
-static ebpo_status number_faces(ebpo_slice *slice, ebpo_error *error)
+static ebpo_status number_faces(ebpo_slice *slice, ebpo_room *room, ebpo_error *error)
 {
     ebpo_compact outer = { .slot = NULL };
-    ebpo_status status = collect_outer(slice, &outer, error);
+    ebpo_status status = collect_outer(slice, &outer, room, error);
     if (status == EBPO_OK)
         localise(slice, &outer);
     if (status == EBPO_OK && outer.count) {
@@ -134,13 +137,16 @@ static ebpo_status new_vertices(ebpo_slice *slice, ebpo_chunks *chunks, uint64_t
     return EBPO_OK;
 }
 
-static ebpo_status collect_older(const ebpo_mesh *mesh, uint64_t begin, ebpo_compact *older,
-                                 ebpo_error *error)
+static ebpo_status collect_older(const ebpo_mesh *mesh, uint64_t begin, ebpo_room *room,
+                                 ebpo_compact *older, uint64_t *bytes, ebpo_error *error)
 {
     uint64_t capacity = 0, corners = 3 * mesh->face_count;
     for (uint64_t i = 0; i < corners; i++)
         capacity += mesh->faces[i] < begin;
-    ebpo_status status = ebpo_compact_make(older, capacity, error);
+    *bytes = ebpo_compact_bytes(capacity);
+    ebpo_status status = ebpo_room_check(room, *bytes, error);
+    if (status == EBPO_OK)
+        status = ebpo_compact_make(older, capacity, error);
     for (uint64_t i = 0; i < corners && status == EBPO_OK; i++)
         if (mesh->faces[i] < begin)
             ebpo_compact_add(older, mesh->faces[i]);
@@ -156,19 +162,25 @@ static void renumber(ebpo_mesh *mesh, uint64_t begin, const ebpo_compact *older)
                                                 : mesh->faces[i] - less;
 }
 
-static ebpo_status take_vertices(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_error *error)
+static ebpo_status take_vertices(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_room *room,
+                                 ebpo_error *error)
 {
     ebpo_mesh *mesh = &slice->mesh;
     ebpo_compact older = { .slot = NULL };
-    uint64_t begin, end;
+    uint64_t begin, end, table = 0;
     bool wide = chunks->file->info.double_coordinates;
     size_t row_bytes = 3 * (wide ? sizeof(double) : sizeof(float));
     ebpo_status status = new_vertices(slice, chunks, &begin, &end, error);
     if (status == EBPO_OK)
-        status = collect_older(mesh, begin, &older, error);
+        status = collect_older(mesh, begin, room, &older, &table, error);
+    if (status == EBPO_OK) {
+        mesh->vertex_count = older.count + (end - begin);
+        status = ebpo_room_check(room, table + mesh->vertex_count * row_bytes, error);
+    }
+    if (status == EBPO_OK)
+        status = ebpo_room_take(room, mesh->vertex_count * row_bytes, error);
     if (status == EBPO_OK) {
         renumber(mesh, begin, &older);
-        mesh->vertex_count = older.count + (end - begin);
         void *xyz = ebpo_alloc(mesh->vertex_count, row_bytes);
         mesh->xyz32 = wide ? NULL : xyz;
         mesh->xyz64 = wide ? xyz : NULL;
@@ -193,19 +205,24 @@ static ebpo_status take_source(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_erro
 }
 
 ebpo_status ebpo_slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks, bool maps,
-                                  ebpo_error *error)
+                                  ebpo_room *room, ebpo_error *error)
 {
-    enum { ROW = 3 * sizeof(uint32_t) };
-    ebpo_status status = number_faces(slice, error);
+    enum { ROW = 3 * sizeof(uint32_t), NUMBER = sizeof(uint32_t) };
+    ebpo_status status = number_faces(slice, room, error);
+    slice->mesh.face_count = slice->outer_count + slice->face_count;
+    if (status == EBPO_OK)
+        status = ebpo_room_take(room,
+                                slice->outer_count * (uint64_t)NUMBER +
+                                    slice->mesh.face_count * (maps ? ROW + NUMBER : ROW),
+                                error);
     if (status != EBPO_OK)
         return status;
-    slice->mesh.face_count = slice->outer_count + slice->face_count;
     slice->mesh.faces = ebpo_alloc(slice->mesh.face_count, ROW);
     if (!slice->mesh.faces)
         return ebpo_fail_memory(error, slice->mesh.face_count * ROW);
     status = gather(chunks, EBPO_A_FACES, ROW, slice->outer, slice->outer_count, slice->first_face,
                     slice->face_count, slice->mesh.faces, error);
     if (status == EBPO_OK)
-        status = take_vertices(slice, chunks, error);
+        status = take_vertices(slice, chunks, room, error);
     return status == EBPO_OK && maps ? take_source(slice, chunks, error) : status;
 }

@@ -50,8 +50,9 @@ static ebpo_status root_range(const ebpo_chunks *chunks, const ebpo_node *root, 
 /* Which of a subtree's nodes, and what of them (EBPO_NEEDS_...). */
 typedef struct extent {
     uint32_t needs;
-    int end;    /* one past the deepest level */
-    bool faces; /* that the leaves list will be read as well */
+    int end;         /* one past the deepest level */
+    bool faces;      /* that the leaves list will be read as well */
+    ebpo_room *room; /* NULL: no limit */
 } extent;
 
 /* `levels` below the root's, or all. */
@@ -60,7 +61,8 @@ static extent extent_of(const ebpo_chunks *chunks, const ebpo_node *root, uint32
 {
     int count = chunks->file->info.level_count, below = count - 1 - root->cell.level;
     return (extent){ needs & ebpo_schema_has(&chunks->file->info),
-                     levels >= 0 && levels < below ? root->cell.level + levels + 1 : count, false };
+                     levels >= 0 && levels < below ? root->cell.level + levels + 1 : count, false,
+                     NULL };
 }
 
 /* Whether the range has a next level: the gray nodes of the file's last one are pruned. */
@@ -124,7 +126,7 @@ static ebpo_status read_nodes(ebpo_chunks *chunks, const extent *x, const range 
 {
     expect_below(chunks, x, r);
     expect_nodes(chunks, x, r);
-    return ebpo_runs_read(chunks, r->level, &r->run, 1, x->needs, out, error);
+    return ebpo_runs_read(chunks, r->level, &r->run, 1, x->needs, x->room, out, error);
 }
 
 static ebpo_status read_levels(ebpo_slice *slice, ebpo_chunks *chunks, const extent *x,
@@ -144,7 +146,9 @@ static ebpo_status read_levels(ebpo_slice *slice, ebpo_chunks *chunks, const ext
     for (slice->level_count = 1; status == EBPO_OK && goes_on(x, &r); slice->level_count++) {
         ebpo_level *out = &slice->level[slice->level_count];
         out->group_count = r.run.count[EBPO_GRAY];
-        status = next_range(chunks, &r, &out->types, error);
+        status = ebpo_room_take(x->room, out->group_count * sizeof *out->types, error);
+        if (status == EBPO_OK)
+            status = next_range(chunks, &r, &out->types, error);
         if (status == EBPO_OK)
             status = read_nodes(chunks, x, &r, out, error);
     }
@@ -233,6 +237,12 @@ ebpo_status ebpo_slice_read_nodes(ebpo_slice *out, ebpo_chunks *chunks, const eb
 ebpo_status ebpo_slice_read_parts(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_node *root,
                                   uint32_t needs, ebpo_error *error)
 {
+    return ebpo_slice_read_within(out, chunks, root, needs, NULL, error);
+}
+
+ebpo_status ebpo_slice_read_within(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_node *root,
+                                   uint32_t needs, ebpo_room *room, ebpo_error *error)
+{
     enum { ALWAYS = EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH };
     extent x = extent_of(chunks, root, needs | ALWAYS, EBPO_SLICE_ALL);
     memset(out, 0, sizeof *out);
@@ -241,13 +251,14 @@ ebpo_status ebpo_slice_read_parts(ebpo_slice *out, ebpo_chunks *chunks, const eb
                               "the file was written without its mesh; build it again with it");
     walk w = { .chunks = chunks, .slice = out };
     x.faces = true;
+    x.room = room;
     ebpo_status status = read_extent(out, chunks, root, &x, error);
     if (status == EBPO_OK)
         status = walk_group(&w, 0, error);
     if (status == EBPO_OK)
         status = check_own_faces(out, chunks, &x, error);
     if (status == EBPO_OK)
-        status = ebpo_slice_take_faces(out, chunks, needs & EBPO_NEEDS_MAPS, error);
+        status = ebpo_slice_take_faces(out, chunks, needs & EBPO_NEEDS_MAPS, room, error);
     if (status != EBPO_OK)
         ebpo_slice_free(out);
     return status;

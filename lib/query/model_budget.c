@@ -14,8 +14,9 @@
 
 /* Decoded chunks: an eighth of the budget, within these. */
 enum { CHUNKS_LEAST = 2 << 20, CHUNKS_MOST = 128 << 20 };
-/* Of a cache: a path needs the subtree where it is, those around, and room to load the next. */
-enum { SUBTREES_WANTED = 64 };
+/* Of a cache: a path needs the subtree where it is, those around, and room to load the next. More
+ * of them, smaller ones, are faster to load. */
+enum { SUBTREES_NEEDED = 64, SUBTREES_WANTED = 320 };
 
 uint64_t ebpo_chunk_budget(uint64_t budget)
 {
@@ -45,25 +46,24 @@ static ebpo_slice_size whole_size(const ebpo_info *info)
         size.groups += info->level[i].gray_count;
         size.leaves += info->level[i].leaf_count;
         size.refs += info->level[i].ref_count;
+        size.planes += info->level[i].plane_count;
     }
-    size.outer = size.refs; /* of the subtrees of any level together */
     return size;
 }
 
 /* Half the budget for subtrees must hold so many of the average size; the top may take a quarter.
  */
-static int choose_cut(const ebpo_info *info, const ebpo_model_options *o, uint64_t budget)
+static int cut_for(const ebpo_info *info, const ebpo_model_options *o, uint64_t budget,
+                   uint64_t subtrees)
 {
     ebpo_slice_size size = whole_size(info);
-    uint64_t keep, peak;
-    ebpo_accel_estimate(&size, info, &keep, &peak);
     for (int level = 1; level < info->level_count; level++) {
         uint64_t grays = info->level[level].gray_count;
         uint64_t top = ebpo_top_estimate(info, level);
         if (top > budget / 4 ||
             top + ebpo_beside_subtrees(o, budget) + EBPO_SUBTREES_LEAST > budget)
             return -1;
-        if (grays == 0 || keep / grays * SUBTREES_WANTED <= budget / 2)
+        if (grays == 0 || ebpo_accel_mean_bytes(&size, info, grays) * subtrees <= budget / 2)
             return level;
     }
     return budget < ebpo_beside_subtrees(o, budget) + 2 * EBPO_SUBTREES_LEAST
@@ -71,10 +71,16 @@ static int choose_cut(const ebpo_info *info, const ebpo_model_options *o, uint64
                : info->level_count - 1;
 }
 
+static int choose_cut(const ebpo_info *info, const ebpo_model_options *o, uint64_t budget)
+{
+    int cut = cut_for(info, o, budget, SUBTREES_WANTED);
+    return cut < 0 ? cut_for(info, o, budget, SUBTREES_NEEDED) : cut;
+}
+
 /* A budget that choose_cut accepts, not much more than the least. */
 static uint64_t least_budget(const ebpo_info *info, const ebpo_model_options *o)
 {
-    uint64_t budget = 4 << 20;
+    uint64_t budget = CHUNKS_LEAST + EBPO_SUBTREES_LEAST;
     while (choose_cut(info, o, budget) < 0 && budget < UINT64_C(1) << 60)
         budget += budget / 8;
     return budget;
@@ -144,12 +150,11 @@ static ebpo_status choose(const ebpo_file *file, const ebpo_model_options *o, bo
 static void share(const ebpo_info *info, const ebpo_model_options *o, ebpo_model_plan *out)
 {
     ebpo_slice_size size = whole_size(info);
-    uint64_t keep, peak, taken;
-    ebpo_accel_estimate(&size, info, &keep, &peak);
+    uint64_t taken;
     for (int level = 0; level <= out->cut_level; level++)
         out->subtrees += info->level[level].leaf_count;
     out->subtrees += info->level[out->cut_level].gray_count;
-    out->subtree_bytes = out->subtrees ? keep / out->subtrees : 0;
+    out->subtree_bytes = out->subtrees ? ebpo_accel_mean_bytes(&size, info, out->subtrees) : 0;
     out->top = ebpo_top_estimate(info, out->cut_level);
     out->chunks = o->memory ? ebpo_chunk_budget(o->memory) : 0;
     out->skeletons =

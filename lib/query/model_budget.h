@@ -5,7 +5,7 @@
 #include <ebpo/query.h>
 
 /* For loading one at least. */
-enum { EBPO_SUBTREES_LEAST = 2 << 20 };
+enum { EBPO_SUBTREES_LEAST = 1 << 20 };
 
 /* Bytes for decoded chunks, for skeletons, and for both: what is not for the top and subtrees. */
 uint64_t ebpo_chunk_budget(uint64_t budget);

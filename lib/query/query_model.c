@@ -22,9 +22,11 @@ static ebpo_status estimate_subtree(void *user, uint64_t key, uint64_t *peak, ui
 {
     ebpo_model *m = user;
     ebpo_slice_size size;
-    ebpo_status status = ebpo_slice_measure(m->chunks, &m->top->below[key >> 1], &size, error);
+    ebpo_status status =
+        ebpo_slice_measure_nodes(m->chunks, &m->top->below[key >> 1], ebpo_subtree_needs(key & 1),
+                                 EBPO_SLICE_ALL, &size, error);
     if (status == EBPO_OK)
-        ebpo_accel_estimate(&size, m->info, keep, peak);
+        ebpo_accel_estimate_subtree(&size, m->info, keep, peak);
     return status;
 }
 
@@ -45,22 +47,23 @@ void ebpo_model_count_kind(ebpo_model *m, const ebpo_accel_leaf *leaf)
         ebpo_leaf_kind_of(leaf) == EBPO_LEAF_GENERAL && leaf->wall != EBPO_NO_WALL;
 }
 
-static ebpo_status load_subtree(void *user, uint64_t key, void **item, uint64_t *bytes,
-                                ebpo_error *error)
+static ebpo_status load_subtree(void *user, uint64_t key, uint64_t most, void **item,
+                                uint64_t *bytes, ebpo_error *error)
 {
     ebpo_model *m = user;
+    ebpo_room room = { .most = most };
     ebpo_slice slice;
     ebpo_accel *subtree = NULL;
-    ebpo_status status = ebpo_slice_read_parts(&slice, m->chunks, &m->top->below[key >> 1],
-                                               ebpo_subtree_needs(key & 1), error);
+    ebpo_status status = ebpo_slice_read_within(&slice, m->chunks, &m->top->below[key >> 1],
+                                                ebpo_subtree_needs(key & 1), &room, error);
     if (status == EBPO_OK)
-        status = ebpo_accel_make(&subtree, &slice, m->info, key & 1, 1, error);
+        status = ebpo_accel_make_within(&subtree, &slice, m->info, &room, key & 1, 1, error);
     if (status == EBPO_OK) {
         ebpo_model_count_leaves(m, subtree, 1);
         ebpo_skeletons_keep(m->skeletons, key >> 1, subtree);
     }
     *item = subtree;
-    *bytes = status == EBPO_OK ? subtree->bytes : 0;
+    *bytes = status == EBPO_OK ? subtree->bytes : room.needed;
     return status;
 }
 
@@ -95,10 +98,10 @@ ebpo_status ebpo_model_has_room(const ebpo_model *m, const ebpo_node *leaf, ebpo
 static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
 {
     ebpo_slice slice;
+    ebpo_room room = { .most = m->options.memory };
     ebpo_status status = ebpo_slice_read_all(&slice, m->file, m->options.threads, error);
     if (status == EBPO_OK)
-        status = ebpo_accel_make_within(&m->whole, &slice, m->info,
-                                        m->options.memory ? m->options.memory : UINT64_MAX, true,
+        status = ebpo_accel_make_within(&m->whole, &slice, m->info, room.most ? &room : NULL, true,
                                         m->options.threads, error);
     if (m->whole)
         ebpo_model_count_leaves(m, m->whole, 1);

@@ -52,8 +52,10 @@ static ebpo_status estimate(void *user, uint64_t key, uint64_t *peak, uint64_t *
     return EBPO_OK;
 }
 
-static ebpo_status load(void *user, uint64_t key, void **out, uint64_t *bytes, ebpo_error *error)
+static ebpo_status load(void *user, uint64_t key, uint64_t limit, void **out, uint64_t *bytes,
+                        ebpo_error *error)
 {
+    (void)limit;
     source *s = user;
     pthread_mutex_lock(&s->lock);
     s->faults += s->loading[key]++ > 0;
@@ -390,6 +392,39 @@ START_TEST(an_item_beyond_its_estimate_does_not_break_the_budget)
     void *it;
     ck_assert_int_eq(ebpo_cache_get(cache, 1, &it, NULL, NULL), EBPO_E_LIMIT);
     ck_assert_uint_eq(stats().bytes, 0);
+    finish();
+}
+END_TEST
+
+/* Finds out while loading that it needs more than was said. */
+static ebpo_status load_more(void *user, uint64_t key, uint64_t limit, void **out, uint64_t *bytes,
+                             ebpo_error *error)
+{
+    const source *s = user;
+    if (limit >= s->peak[key])
+        return load(user, key, limit, out, bytes, error);
+    *bytes = limit + 60 < s->peak[key] ? limit + 60 : s->peak[key];
+    return ebpo_fail(error, EBPO_E_LIMIT, "%d bytes do not do", (int)limit);
+}
+
+START_TEST(a_load_that_needs_more_room_gets_it_or_is_refused)
+{
+    begin_with(300, 50, 150);
+    ebpo_cache_free(cache);
+    ebpo_cache_source from = { src, say_little, load_more, release };
+    ck_assert_int_eq(ebpo_cache_make(&cache, &from, "thing", 300, NULL), EBPO_OK);
+    void *it;
+    for (uint64_t key = 0; key < 5; key++) {
+        ck_assert_int_eq(ebpo_cache_get(cache, key, &it, NULL, NULL), EBPO_OK);
+        ck_assert_uint_le(stats().peak_bytes, 300);
+        ebpo_cache_unpin(cache, key);
+    }
+    ck_assert_uint_eq(stats().bytes, 200);
+    ck_assert_uint_eq(stats().evicted, 1);
+    src->peak[5] = 301;
+    ck_assert_int_eq(ebpo_cache_get(cache, 5, &it, NULL, NULL), EBPO_E_LIMIT);
+    ck_assert_uint_le(stats().peak_bytes, 300);
+    ck_assert(!ebpo_cache_has(cache, 5));
     finish();
 }
 END_TEST
@@ -762,6 +797,7 @@ Suite *test_suite(void)
     tcase_add_test(tests, pinned_items_stay_and_the_message_says_what_would_do);
     tcase_add_test(tests, a_failed_load_tells_why_and_leaves_nothing);
     tcase_add_test(tests, an_item_beyond_its_estimate_does_not_break_the_budget);
+    tcase_add_test(tests, a_load_that_needs_more_room_gets_it_or_is_refused);
     tcase_add_test(tests, without_a_budget_everything_stays);
     tcase_add_test(tests, many_who_want_the_same_key_load_it_once);
     tcase_add_test(tests, those_who_wait_for_a_load_that_fails_get_their_own_answer);

@@ -1,4 +1,4 @@
-/* What a whole model takes, counted at every allocation, against what was foretold. */
+/* What whole models and subtrees take, counted at every allocation, against what was foretold. */
 #include <malloc.h>
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -173,6 +173,184 @@ START_TEST(models_that_take_more_than_was_foretold_are_read_in_parts)
 }
 END_TEST
 
+/* --- subtrees --- */
+
+/* What the allocator rounds up, array by array. */
+enum { ROUNDING = 1 << 14 };
+
+typedef struct reading {
+    const query_model *m;
+    ebpo_top *top;
+    ebpo_chunks *chunks;
+    uint64_t kept, refused, beyond;
+} reading;
+
+static ebpo_accel *read_within(const reading *r, const ebpo_node *node, ebpo_room *room)
+{
+    ebpo_slice slice;
+    ebpo_accel *subtree = NULL;
+    ebpo_status status =
+        ebpo_slice_read_within(&slice, r->chunks, node, ebpo_subtree_needs(true), room, NULL);
+    if (status == EBPO_OK)
+        status = ebpo_accel_make_within(&subtree, &slice, &r->m->info, room, true, 1, NULL);
+    ck_assert(status == EBPO_OK || (status == EBPO_E_LIMIT && room->needed > room->most));
+    return subtree;
+}
+
+/* Decoded chunks are in memory already. */
+static void check_subtree(reading *r, const ebpo_node *node)
+{
+    ebpo_slice_size size;
+    ebpo_room room = { .most = UINT64_MAX };
+    ebpo_accel *subtree = read_within(r, node, &room);
+    ebpo_accel_free(subtree);
+    uint64_t keep, needs = ebpo_subtree_needs(true);
+    ASSERT_OK(
+        ebpo_slice_measure_nodes(r->chunks, node, (uint32_t)needs, EBPO_SLICE_ALL, &size, error));
+    room = (ebpo_room){ 0 };
+    ebpo_accel_estimate_subtree(&size, &r->m->info, &keep, &room.most);
+    for (bool done = false; !done; r->refused += !done) {
+        int64_t before = held;
+        most = before;
+        subtree = read_within(r, node, &room);
+        ck_assert_msg((uint64_t)(most - before) <= room.most + ROUNDING,
+                      "%s %s: %lld taken, %llu allowed", r->m->name, r->m->variant,
+                      (long long)(most - before), (unsigned long long)room.most);
+        done = subtree != NULL;
+        if (!done)
+            room = (ebpo_room){ .most = room.needed };
+    }
+    ck_assert_uint_le(subtree->bytes, room.most);
+    r->kept += subtree->bytes;
+    r->beyond += subtree->bytes > keep;
+    ebpo_accel_free(subtree);
+}
+
+static reading check_subtrees(const query_model *m, int cut_level)
+{
+    reading r = { .m = m };
+    ASSERT_OK(ebpo_top_read(&r.top, m->file, cut_level, 1, error));
+    ASSERT_OK(ebpo_chunks_make(&r.chunks, m->file, 0, error));
+    for (uint64_t i = 0; i < r.top->below_count; i++)
+        if (!r.top->below[i].pruned)
+            check_subtree(&r, &r.top->below[i]);
+    ebpo_chunks_free(r.chunks);
+    return r;
+}
+
+START_TEST(subtrees_take_at_most_the_room_they_have)
+{
+    for (int v = 0; v < query_variant_count; v++) {
+        query_model m;
+        query_model_make(&m, query_solid_name(_i), query_solid_make(_i), &query_variants[v]);
+        for (int cut_level = 1; cut_level < 4 && cut_level < m.info.level_count; cut_level++)
+            ebpo_top_free(check_subtrees(&m, cut_level).top);
+        query_model_free(&m);
+    }
+}
+END_TEST
+
+static void check_near(const char *name, ebpo_mesh mesh)
+{
+    query_model m;
+    query_model_make(&m, name, mesh, &usual);
+    for (int cut_level = 1; cut_level < 5; cut_level++) {
+        ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+        ebpo_model_plan plan = EBPO_MODEL_PLAN_INIT;
+        options.cut_level = cut_level;
+        ASSERT_OK(ebpo_model_memory(m.file, &options, &plan, error));
+        reading r = check_subtrees(&m, cut_level);
+        double mean = (double)r.kept / (double)r.top->below_count;
+        if (getenv("EBPO_TEST_SHOW"))
+            printf("%s %d: %.0f of %llu, %llu refused\n", name, cut_level, mean,
+                   (unsigned long long)plan.subtree_bytes, (unsigned long long)r.refused);
+        ck_assert_uint_eq(plan.subtrees, r.top->below_count);
+        ck_assert_msg((double)plan.subtree_bytes >= mean &&
+                          (double)plan.subtree_bytes <= 1.5 * mean,
+                      "%s %d: %.0f, %llu foretold", name, cut_level, mean,
+                      (unsigned long long)plan.subtree_bytes);
+        ck_assert_uint_eq(r.beyond, 0);
+        ck_assert_uint_le(r.refused, r.top->below_count / 50);
+        ebpo_top_free(r.top);
+    }
+    query_model_free(&m);
+}
+
+START_TEST(estimates_of_ordinary_subtrees_are_near)
+{
+    ebpo_mesh sphere = ebpo_test_sphere((double[3]){ 0.1, 0.2, 0.3 }, 1, 6),
+              torus = ebpo_test_torus(2, 0.5, 300, 150);
+    check_near("sphere", _i ? in_floats(sphere) : sphere);
+    check_near("torus", _i ? in_floats(torus) : torus);
+}
+END_TEST
+
+/* Beside the budget: what decodes chunks, a context, tables of the caches. */
+enum { BESIDE = 768 << 10 };
+
+/* Returns how many answers there were. */
+static int check_answers(const query_model *m, uint64_t memory)
+{
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
+    ebpo_model *model;
+    ebpo_context *context;
+    uint64_t state = 3;
+    int answers = 0;
+    options.memory = memory;
+    options.threads = 1;
+    int64_t before = held;
+    most = before;
+    ASSERT_OK(ebpo_model_new(m->file, &options, &model, error));
+    ASSERT_OK(ebpo_context_new(model, &context, error));
+    for (int i = 0; i < 20; i++) {
+        double p[3];
+        ebpo_distance_result whole, parts;
+        for (int k = 0; k < 3; k++)
+            p[k] = (double)(ebpo_test_random(&state) >> 11) * 0x1p-52 - 0.5;
+        ASSERT_OK(ebpo_distance(m->context, p, NULL, &whole, error));
+        ebpo_status status = ebpo_distance(context, p, NULL, &parts, NULL);
+        ck_assert(status == EBPO_OK || status == EBPO_E_LIMIT);
+        answers += status == EBPO_OK;
+        if (status == EBPO_OK)
+            ck_assert(parts.lo == whole.lo && parts.hi == whole.hi);
+    }
+    ck_assert_int_eq(ebpo_model_get_stats(model, &stats), EBPO_OK);
+    ck_assert_uint_le(stats.memory_peak, memory);
+    ck_assert_msg((uint64_t)(most - before) <= memory + BESIDE, "%lld taken, %llu allowed",
+                  (long long)(most - before), (unsigned long long)memory);
+    ebpo_context_free(context);
+    ebpo_model_free(model);
+    return answers;
+}
+
+/* Large triangles, each in many subtrees, and more across borders than ordinary ones have. */
+START_TEST(budgets_hold_for_extraordinary_subtrees)
+{
+    static const query_variant fine = { "fine", 16, 6, EBPO_RULE_NONZERO, 0 };
+    query_model m;
+    query_model_make(&m, "soup", soup(_i ? 6000 : 3000, _i ? 0.2 : 1), &fine);
+    uint64_t refused = 0, answers = 0;
+    for (int cut_level = 1; cut_level < 4; cut_level++) {
+        reading r = check_subtrees(&m, cut_level);
+        refused += r.refused;
+        ebpo_top_free(r.top);
+    }
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model_plan plan = EBPO_MODEL_PLAN_INIT;
+    ASSERT_OK(ebpo_model_memory(m.file, &options, &plan, error));
+    for (uint64_t memory = plan.least; memory < plan.whole; memory += memory / 2)
+        answers += (uint64_t)check_answers(&m, memory);
+    ck_assert_uint_gt(refused, 0);
+    if (getenv("EBPO_TEST_SHOW"))
+        printf("soup: least %llu, whole %llu, %d refused, %d answers\n",
+               (unsigned long long)plan.least, (unsigned long long)plan.whole, (int)refused,
+               (int)answers);
+    ck_assert(answers > 0 || plan.least == plan.whole);
+    query_model_free(&m);
+}
+END_TEST
+
 Suite *test_suite(void)
 {
     Suite *suite = suite_create("model_memory");
@@ -182,6 +360,9 @@ Suite *test_suite(void)
     tcase_add_loop_test(models, models_take_at_most_what_was_foretold, 0, query_solid_count());
     tcase_add_test(models, random_models_take_at_most_what_was_foretold);
     tcase_add_test(models, models_that_take_more_than_was_foretold_are_read_in_parts);
+    tcase_add_loop_test(models, subtrees_take_at_most_the_room_they_have, 0, query_solid_count());
+    tcase_add_loop_test(models, estimates_of_ordinary_subtrees_are_near, 0, 2);
+    tcase_add_loop_test(models, budgets_hold_for_extraordinary_subtrees, 0, 2);
     suite_add_tcase(suite, models);
     return suite;
 }

@@ -62,8 +62,9 @@ typedef struct ebpo_model_options {
      * the way. 0: as much as it needs; of a file on a server (http.h) that has more
      * than 2 MiB and is not cut by `cut_level`, 256 MiB. Such a file, if it has subtrees
      * (ebpo_info.subtree_level), is read in parts however much is allowed. Beside it
-     * there are the file's table of chunks (24 bytes a chunk) and what contexts gather
-     * of answers.
+     * there are the file's table of chunks (24 bytes a chunk), what decodes chunks (some
+     * 250 KB for each thread that loads), and contexts: what they gather of answers and,
+     * for distances, 4 bytes for each subtree below the cut level and a queue of nodes.
      */
     uint64_t memory;
 
@@ -116,8 +117,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_model_new(const ebpo_file *file,
 
 /*
  * What a budget buys: told by the counts in the file's head, with nothing read or loaded. Bytes are
- * bounds from above, of subtrees often five times what is taken; all but `budget`, `whole` and
- * `least` are 0 if everything will be in memory.
+ * bounds from above for ordinary models: of subtrees 1.05 to 1.4 times what is taken. What takes
+ * more than that keeps to the budget all the same: others are dropped for it, or it is refused. All
+ * but `budget`, `whole` and `least` are 0 if everything will be in memory.
  */
 typedef struct ebpo_model_plan {
     size_t struct_size; /* EBPO_MODEL_PLAN_INIT sets it */
@@ -133,6 +135,7 @@ typedef struct ebpo_model_plan {
     /*
      * From which budget on everything is in memory (files far away: see ebpo_model_options.memory;
      * a model that takes more stays in parts), and one that would do, little more than the least.
+     * With the least, few subtrees are there at a time.
      */
     uint64_t whole, least;
 
@@ -142,7 +145,10 @@ typedef struct ebpo_model_plan {
      */
     uint64_t top, chunks, skeletons;
 
-    /* Below the cut level; bytes of the average one; so many of these are in memory at a time. */
+    /*
+     * Below the cut level; bytes of the average one; so many of these are in memory at a time,
+     * while nothing is being loaded.
+     */
     uint64_t subtrees, subtree_bytes, subtrees_held;
 } ebpo_model_plan;
 
