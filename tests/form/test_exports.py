@@ -2,9 +2,10 @@
 """The public headers, the shared library, and the documents tell the same: test_exports.py LIBEBPO
 SOURCE_ROOT VERSION
 
-The library exports exactly what the headers declare; ebpo.h includes every header; whatever name a
-header, a page or a sample mentions is declared; each function says which threads may call it; each
-struct that begins with its size has its macro; the version is the project's.
+The library exports exactly what the headers declare; ebpo.h includes every header, and each is
+installed; whatever name a header, a page or a sample mentions is declared; each function says which
+threads may call it; each struct that begins with its size has its macro; the version is the
+project's.
 """
 import pathlib
 import re
@@ -68,6 +69,9 @@ problems += [f"declared, not exported: {name}" for name in sorted(functions - ex
 problems += [f"exported, not declared: {name}" for name in sorted(exported - functions)]
 problems += [f"ebpo.h does not include {name}" for name in headers if name != "ebpo.h"
              and f"<ebpo/{name}>" not in headers["ebpo.h"]]
+build = (root / "lib/meson.build").read_text()
+problems += [f"not installed (lib/meson.build): {name}" for name in headers
+             if f"'include/ebpo/{name}'" not in build]
 
 names = declared_names(functions)
 for path, text in headers.items():
