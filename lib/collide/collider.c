@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/sized.h"
+#include "collide/gap_search.h"
 #include "collide/posed_model.h"
 #include "query/options.h"
 
@@ -44,8 +45,10 @@ ebpo_status ebpo_collider_new(ebpo_model *a, ebpo_model *b, const ebpo_collider_
 
 void ebpo_collider_free(ebpo_collider *c)
 {
-    if (c)
-        ebpo_pair_walk_free(&c->walk);
+    if (!c)
+        return;
+    ebpo_pair_walk_free(&c->walk);
+    ebpo_gap_free(c->gap);
     free(c);
 }
 

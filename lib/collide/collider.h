@@ -12,6 +12,9 @@ struct ebpo_collider {
     ebpo_collider_options options;
     ebpo_pair_walk walk; /* of the calling thread */
     uint64_t node_pairs, block_pairs, exact;
+    struct ebpo_gap_search *gap; /* of distances, once one has been asked */
+    bool has_nearest;
+    uint32_t nearest[2]; /* slots of the last nearest pair, of the caller's A and B */
 };
 
 /* A question: options checked, models in the order that swapping does not change. */

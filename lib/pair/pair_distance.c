@@ -36,9 +36,12 @@ typedef struct search {
     double face[2][3][3];
     double reach; /* 1-norms of corners are at most that */
     double square, point[2][3];
+    int feature[2];
+    double room; /* of the points: from where their features end, as a part of the reach */
 } search;
 
-static void offer(search *s, int first, const double p[3], const double q[3])
+static void offer(search *s, int first, const double p[3], const double q[3], int on_p, int on_q,
+                  double room)
 {
     double d[3];
     subtract(p, q, d);
@@ -48,6 +51,9 @@ static void offer(search *s, int first, const double p[3], const double q[3])
     s->square = square;
     memcpy(s->point[first], p, sizeof s->point[0]);
     memcpy(s->point[!first], q, sizeof s->point[0]);
+    s->feature[first] = on_p;
+    s->feature[!first] = on_q;
+    s->room = room;
 }
 
 /* --- edges with edges --- */
@@ -56,6 +62,14 @@ static void along(const double from[3], const double edge[3], double t, double o
 {
     for (int k = 0; k < 3; k++)
         out[k] = from[k] + t * edge[k];
+}
+
+static int on_edge(int i, double t) { return t == 0 ? i : t == 1 ? (i + 1) % 3 : 3 + i; }
+
+/* From the nearer end, in length; ends are what they are. */
+static double room_on_edge(double t, double square)
+{
+    return t == 0 || t == 1 ? INFINITY : fmin(t, 1 - t) * sqrt(square);
 }
 
 static void offer_edges(search *s, int i, int j)
@@ -72,7 +86,10 @@ static void offer_edges(search *s, int i, int j)
     on_e = ee > 0 ? within_unit((on_f * ef - ew) / ee) : 0;
     along(p, e, on_e, x);
     along(q, f, on_f, y);
-    offer(s, 0, x, y);
+    bool edges = on_e > 0 && on_e < 1 && on_f > 0 && on_f < 1;
+    double room = fmin(room_on_edge(on_e, ee), room_on_edge(on_f, ff));
+    offer(s, 0, x, y, on_edge(i, on_e), on_edge(j, on_f),
+          edges && !(area > 0x1p-20 * ee * ff) ? 0 : room);
 }
 
 /* --- corners with planes --- */
@@ -96,7 +113,8 @@ static void offer_corner(search *s, int of, int i)
         return;
     for (int k = 0; k < 3; k++)
         foot[k] = plane[0][k] + (on_e * e[k] + on_f * f[k]);
-    offer(s, of, corner, foot);
+    double least = fmin(fmin(on_e, on_f), 1 - on_e - on_f), ee = dot(e, e), ff = dot(f, f);
+    offer(s, of, corner, foot, i, 6, nn > 0x1p-20 * ee * ff ? least * sqrt(nn / fmax(ee, ff)) : 0);
 }
 
 /* --- bounds --- */
@@ -105,7 +123,9 @@ static bool see_from_corner(const double a[3][3], const double b[3][3], search *
 {
     s->reach = 0;
     s->square = INFINITY;
+    s->room = 0;
     memset(s->point, 0, sizeof s->point);
+    memset(s->feature, 0, sizeof s->feature);
     for (int i = 0; i < 3; i++) {
         subtract(a[i], a[0], s->face[0][i]);
         subtract(b[i], a[0], s->face[1][i]);
@@ -131,6 +151,58 @@ static double gap_along(const search *s, const double n[3])
     return (least - most - 0x1p-48 * size * s->reach) / sqrt(dot(n, n));
 }
 
+/* --- features --- */
+
+static bool is_on(int corner, int feature)
+{
+    return feature == 6 || corner == feature ||
+           (feature >= 3 && (corner == feature - 3 || corner == (feature - 2) % 3));
+}
+
+/* Whether n from A's point to B's has all corners that the points' features do not have strictly
+ * behind it, and ahead of it, by more than n and the points may be off: docs/develop/collision.md,
+ * "Which features are nearest". */
+static bool features_certain(const search *s, const double n[3])
+{
+    const double enough = 0x1p-24;
+    if (!(s->room > enough * s->reach))
+        return false;
+    for (int of = 0; of < 2; of++)
+        for (int i = 0; i < 3; i++) {
+            double d[3];
+            subtract(s->face[of][i], s->point[of], d);
+            double ahead = of ? dot(n, d) : -dot(n, d);
+            if (!is_on(i, s->feature[of]) && !(ahead > enough * s->reach * s->reach))
+                return false;
+        }
+    return true;
+}
+
+/* Corners of the feature, in an order of their own. */
+static bool same_feature(const double a[3][3], int on_a, const double b[3][3], int on_b)
+{
+    int count = on_a < 3 ? 1 : on_a < 6 ? 2 : 3, most = on_b < 3 ? 1 : on_b < 6 ? 2 : 3;
+    if (count != most)
+        return false;
+    for (int i = 0; i < 3; i++) {
+        bool found = !is_on(i, on_a);
+        for (int j = 0; j < 3 && !found; j++)
+            found =
+                is_on(j, on_b) && a[i][0] == b[j][0] && a[i][1] == b[j][1] && a[i][2] == b[j][2];
+        if (!found)
+            return false;
+    }
+    return true;
+}
+
+bool ebpo_same_distance(const double a[3][3], const double b[3][3],
+                        const ebpo_pair_distance_bounds *ab, const double c[3][3],
+                        const double d[3][3], const ebpo_pair_distance_bounds *cd)
+{
+    return ab->certain && cd->certain && same_feature(a, ab->feature[0], c, cd->feature[0]) &&
+           same_feature(b, ab->feature[1], d, cd->feature[1]);
+}
+
 void ebpo_triangles_distance_bounds(const double a[3][3], const double b[3][3],
                                     ebpo_pair_distance_bounds *out)
 {
@@ -151,7 +223,9 @@ void ebpo_triangles_distance_bounds(const double a[3][3], const double b[3][3],
     if (distance > margin) {
         double gap = gap_along(&s, n);
         out->lo = gap > 0 ? gap * (1 - 0x1p-50) : 0;
+        out->certain = out->lo > 0 && features_certain(&s, n);
     }
+    memcpy(out->feature, s.feature, sizeof out->feature);
     for (int of = 0; of < 2; of++)
         for (int k = 0; k < 3; k++)
             out->point[of][k] = a[0][k] + s.point[of][k];

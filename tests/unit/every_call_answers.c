@@ -28,6 +28,7 @@ static ebpo_status ask_two(ebpo_collider *collider, const ebpo_collide_options *
 {
     ebpo_face_pair pair;
     ebpo_collider_stats stats = EBPO_COLLIDER_STATS_INIT;
+    ebpo_clearance clearance;
     int32_t found;
     uint64_t count = 0;
     ebpo_status status = ebpo_collide_first(collider, options, &pair, &found, error);
@@ -35,6 +36,8 @@ static ebpo_status ask_two(ebpo_collider *collider, const ebpo_collide_options *
         status = ebpo_collide_all(collider, options, count_met, &count, error);
     if (status == EBPO_OK)
         status = ebpo_collide_self(collider, options, count_met, &count, error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_distance(collider, options, NULL, &clearance, error);
     if (status == EBPO_OK)
         status = ebpo_collider_get_stats(collider, &stats);
     return status;

@@ -4,6 +4,7 @@
  *   Two models       ebpo_collider_new, one for each thread that asks
  *   Do they meet     ebpo_collide_first
  *   All of it        ebpo_collide_all, ebpo_collide_self
+ *   How far          ebpo_collide_distance
  *
  * Poses are those of pose.h: decisions are exact on posed coordinates. Swapping the models, threads
  * and processors change nothing. What the kinds of pairs mean: docs/develop/collision.md.
@@ -146,6 +147,85 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_self(ebpo_collider *collider,
                                                      const ebpo_collide_options *options,
                                                      ebpo_pairs_fn take, void *user,
                                                      ebpo_error *error);
+
+/* ---- how far ---- */
+
+/* How a figure is meant. */
+typedef enum ebpo_figure {
+    EBPO_FIGURE_EXACT = 0,    /* lo = hi: the double nearest to the true value */
+    EBPO_FIGURE_INTERVAL = 1, /* the true value is certainly in lo .. hi, both approached */
+    EBPO_FIGURE_BOUND = 2     /* certainly in lo .. hi; one of them says little: 0 or INFINITY */
+} ebpo_figure;
+
+typedef struct ebpo_certain {
+    double lo, hi;
+
+    /* An ebpo_figure. */
+    int32_t figure;
+
+    int32_t reserved;
+} ebpo_certain;
+
+typedef struct ebpo_clearance_options {
+    size_t struct_size; /* EBPO_CLEARANCE_OPTIONS_INIT sets it */
+
+    /* The answer's hi - lo may be so much, in the world's unit; 0: exact. */
+    double tolerance;
+
+    /* Only whether the distance is at least so much matters. Less than 0: not asked. */
+    double at_least;
+
+    /*
+     * Begin with the pair that this collider found last: faster where poses change little. Exact
+     * distances and decisions are the same; of intervals lo and hi, and of pairs that meet which
+     * one is told, may differ.
+     */
+    bool warm;
+
+    uint8_t reserved[7];
+} ebpo_clearance_options;
+
+#define EBPO_CLEARANCE_OPTIONS_INIT                         \
+    {                                                       \
+        sizeof(ebpo_clearance_options), 0, -1, false, { 0 } \
+    }
+
+typedef struct ebpo_clearance {
+    /* Of the faces, in the world's unit: 0 if any meet, not negative inside a solid. */
+    ebpo_certain distance;
+
+    /* 1 or 0, decided without rounding; -1: not asked, or open. */
+    int32_t at_least;
+
+    int32_t reserved;
+
+    /*
+     * Faces at `distance`, with a tolerance at hi or less, of equal distances those that are first
+     * in the order of ebpo_collide_all; if faces meet, two that do; EBPO_NO_FACE: none was found.
+     */
+    ebpo_face_pair pair;
+
+    /* Their nearest points, as far as doubles tell; a common one where they meet. */
+    double point_a[3], point_b[3];
+} ebpo_clearance;
+
+/*
+ * The least distance of points of A's faces and of B's; INFINITY if a model has no faces. A solid
+ * within another is as far away as their surfaces are. When `at_least` is asked the search ends as
+ * soon as that is decided: 1: the distance is in at_least .. INFINITY, and no pair is told; 0: the
+ * pair that was told is nearer. After the deadline `distance` is what is certain by then.
+ *
+ * options, clearance   NULL for the usual ones
+ *
+ * EBPO_E_ARGUMENT: also a tolerance below 0 or infinite, at_least is no number. Others, and
+ * threads, as for ebpo_collide_first.
+ *
+ * Threads: one per collider.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_distance(ebpo_collider *collider,
+                                                         const ebpo_collide_options *options,
+                                                         const ebpo_clearance_options *clearance,
+                                                         ebpo_clearance *out, ebpo_error *error);
 
 /* Sums since the collider was made. */
 typedef struct ebpo_collider_stats {

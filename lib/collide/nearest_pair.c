@@ -1,0 +1,210 @@
+#include "geom/strict_fp.h"
+
+#include "collide/nearest_pair.h"
+
+#include <math.h>
+
+#include "base/clock.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "pair/triangle_pair.h"
+
+typedef const double (*corners)[3];
+#define CORNERS(face, side) ((corners)(face)->corner[side])
+
+/* --- one pair --- */
+
+static void look(const ebpo_gap_search *g, const uint32_t slot[2], ebpo_face_two *out)
+{
+    for (int s = 0; s < 2; s++) {
+        double t[3][3];
+        out->slot[s] = slot[s];
+        ebpo_accel_triangle(g->accel[s], slot[s], t);
+        for (int i = 0; i < 3; i++)
+            ebpo_posing_apply(&g->posing[s].posing, t[i], out->corner[s][i]);
+    }
+    ebpo_triangles_distance_bounds(CORNERS(out, 0), CORNERS(out, 1), &out->bounds);
+}
+
+static uint64_t position(const ebpo_gap_search *g, const ebpo_face_two *f, int side)
+{
+    const ebpo_accel *s = g->accel[side];
+    return ebpo_accel_file_face(s, ebpo_accel_slot_face(s, f->slot[side]));
+}
+
+/* Of equal distances the first in the order of the files. */
+static bool earlier(const ebpo_gap_search *g, const ebpo_face_two *f, const ebpo_face_two *than)
+{
+    uint64_t a = position(g, f, 0), b = position(g, than, 0);
+    return a != b ? a < b : position(g, f, 1) < position(g, than, 1);
+}
+
+static bool nearer(const ebpo_gap_search *g, const ebpo_face_two *f, const ebpo_face_two *than)
+{
+    if (f->bounds.hi < than->bounds.lo)
+        return true;
+    if (f->bounds.lo > than->bounds.hi)
+        return false;
+    int order = 0;
+    if (!ebpo_same_distance(CORNERS(f, 0), CORNERS(f, 1), &f->bounds, CORNERS(than, 0),
+                            CORNERS(than, 1), &than->bounds))
+        order = ebpo_triangles_distance_compare(CORNERS(f, 0), CORNERS(f, 1), CORNERS(than, 0),
+                                                CORNERS(than, 1));
+    return order < 0 || (order == 0 && earlier(g, f, than));
+}
+
+/* --- all that wait --- */
+
+/* Rounded up, in the search's unit. */
+static float to_unit(const ebpo_gap_search *g, double distance)
+{
+    return (float)(distance * g->posing[0].unit * (1 + 0x1p-22)) + 0x1p-100f;
+}
+
+/* Of a pair that is apart; false: that is enough. */
+static bool compare_to_asked(ebpo_nearest_pair *n, const ebpo_face_two *f)
+{
+    if (!(f->bounds.lo < n->at_least) ||
+        (!(f->bounds.hi < n->at_least) &&
+         ebpo_triangles_distance_compare_to(CORNERS(f, 0), CORNERS(f, 1), n->at_least) >= 0))
+        return true;
+    n->is_at_least = 0;
+    n->best = *f;
+    n->found = true;
+    return false;
+}
+
+/* A tolerance asks for bounds only: the least of each. */
+static void take_within_tolerance(ebpo_nearest_pair *n, const ebpo_face_two *f)
+{
+    n->lo = fmin(n->lo, f->bounds.lo);
+    if (!n->found || f->bounds.hi < n->best.bounds.hi)
+        n->best = *f;
+    n->found = true;
+}
+
+static bool take(ebpo_gap_search *g, ebpo_nearest_pair *n, const uint32_t slot[2])
+{
+    ebpo_face_two f;
+    look(g, slot, &f);
+    if (!(f.bounds.lo > 0) &&
+        ebpo_triangle_pair(CORNERS(&f, 0), CORNERS(&f, 1)) != EBPO_PAIR_APART) {
+        n->best = f;
+        n->found = n->meets = true;
+        return false;
+    }
+    ebpo_gap_set_best(g, to_unit(g, f.bounds.hi), slot[0], slot[1]);
+    if (!isnan(n->at_least))
+        return compare_to_asked(n, &f);
+    if (n->tolerance > 0)
+        take_within_tolerance(n, &f);
+    else if (!n->found || nearer(g, &f, &n->best)) {
+        n->best = f;
+        n->found = true;
+    }
+    return true;
+}
+
+static bool go_on(ebpo_gap_search *g)
+{
+    ebpo_nearest_pair *n = g->user;
+    if (!ebpo_progress_step(n->progress, "distance", 0, 0, n->error))
+        n->status = EBPO_E_CANCELLED;
+    g->ended = n->status != EBPO_OK || (n->late != UINT64_MAX && ebpo_clock() >= n->late);
+    return !g->ended;
+}
+
+/* Many may be at nearly the same distance, where models have flat parts. */
+static bool judge(ebpo_gap_search *g)
+{
+    ebpo_nearest_pair *n = g->user;
+    bool more = true;
+    unsigned judged = 0, i = 0;
+    for (; i < g->waits && more; i++)
+        if (!(g->waiting[i].low > g->limit))
+            more = take(g, n, g->waiting[i].slot) && (++judged % 16 || go_on(g));
+    for (; !more && i < g->waits; i++) /* nobody will look at them */
+        n->lo = fmin(n->lo, fmax((double)g->waiting[i].low / g->posing[0].unit * (1 - 0x1p-20), 0));
+    g->waits = 0;
+    return more;
+}
+
+/* --- the answer --- */
+
+/* Of what has not been seen. */
+static double left_over(const ebpo_gap_search *g)
+{
+    double least = INFINITY;
+    for (uint64_t i = 0; i < g->count; i++)
+        least = fmin(least, fmax((double)g->stack[i].key, 0));
+    return sqrt(least) / g->posing[0].unit * (1 - 0x1p-18);
+}
+
+static void end_exact(ebpo_nearest_pair *n)
+{
+    n->lo = n->hi = ebpo_triangles_distance(CORNERS(&n->best, 0), CORNERS(&n->best, 1));
+}
+
+static void end_open(const ebpo_gap_search *g, ebpo_nearest_pair *n)
+{
+    n->hi = n->found ? n->best.bounds.hi : INFINITY;
+    n->lo = fmin(n->lo, n->hi);
+    if (g->ended)
+        n->lo = fmin(n->lo, left_over(g));
+    if (n->tolerance > 0)
+        n->lo = fmin(n->lo, n->hi - n->tolerance);
+    else if (n->found)
+        n->lo = fmin(n->lo, n->best.bounds.lo);
+    n->lo = fmax(n->lo, 0);
+}
+
+static void end(const ebpo_gap_search *g, ebpo_nearest_pair *n)
+{
+    bool asked = !isnan(n->at_least);
+    if (n->meets) {
+        n->lo = n->hi = 0;
+        n->is_at_least = asked ? n->at_least <= 0 : -1;
+    } else if (asked) {
+        if (n->is_at_least < 0 && !g->ended)
+            n->is_at_least = 1;
+        n->lo = n->is_at_least == 1 ? n->at_least : fmin(n->lo, n->at_least);
+        if (n->is_at_least == 1)
+            n->hi = INFINITY;
+        else
+            end_open(g, n);
+    } else if (!g->ended && n->tolerance == 0 && n->found)
+        end_exact(n);
+    else
+        end_open(g, n);
+}
+
+ebpo_status ebpo_nearest_pair_find(ebpo_gap_search *g, ebpo_nearest_pair *n, ebpo_error *error)
+{
+    uint32_t start[2] = { n->best.slot[0], n->best.slot[1] };
+    g->user = n;
+    g->judge = judge;
+    g->go_on = go_on;
+    g->tolerance = (float)(n->tolerance * g->posing[0].unit * (1 - 0x1p-20));
+    n->lo = INFINITY;
+    n->found = n->meets = false;
+    n->status = EBPO_OK;
+    n->error = error;
+    n->is_at_least = -1;
+    if (!isnan(n->at_least))
+        ebpo_gap_set_limit(g, to_unit(g, n->at_least));
+    bool more = !n->warm || take(g, n, start);
+    if (more)
+        ebpo_gap_walk_best()(g);
+    if (g->no_memory)
+        return ebpo_fail_memory(error, g->capacity * sizeof *g->stack);
+    if (n->status != EBPO_OK)
+        return n->status;
+    if (more && !n->meets && n->is_at_least < 0)
+        more = judge(g);
+    if (n->status != EBPO_OK)
+        return n->status;
+    if (more && !n->meets && isnan(n->at_least) && n->tolerance > 0 && g->best < INFINITY)
+        take(g, n, g->best_slot);
+    end(g, n);
+    return EBPO_OK;
+}

@@ -1,0 +1,86 @@
+// Two copies of one model at poses: what programs that ask for contacts and distances share.
+//
+// A line of a file of poses: a kind, nine numbers of the rotation by rows, three of the
+// translation; the second copy has the pose, the first stays where it is.
+#ifndef EBPO_BENCH_PAIRS_HPP
+#define EBPO_BENCH_PAIRS_HPP
+
+#include <fstream>
+
+#include "peer.hpp"
+
+namespace bench
+{
+
+struct pose {
+    std::string kind;
+    double rotation[9], translation[3];
+};
+
+inline std::vector<pose> read_poses(const char *path)
+{
+    std::ifstream in(path);
+    std::vector<pose> out;
+    pose p;
+    while (in >> p.kind) {
+        for (double &x : p.rotation)
+            in >> x;
+        for (double &x : p.translation)
+            in >> x;
+        out.push_back(p);
+    }
+    return out;
+}
+
+// The least of so many times, in microseconds. All is asked once before, so that all is in memory.
+template <class Work> double least_time(int rounds, Work work)
+{
+    double least = INFINITY;
+    for (int i = 0; i <= rounds; i++) {
+        timespec a, b;
+        clock_gettime(CLOCK_THREAD_CPUTIME_ID, &a);
+        work();
+        clock_gettime(CLOCK_THREAD_CPUTIME_ID, &b);
+        double t = 1e6 * (double)(b.tv_sec - a.tv_sec) + 1e-3 * (double)(b.tv_nsec - a.tv_nsec);
+        if (i)
+            least = std::min(least, t);
+    }
+    return least;
+}
+
+using face_pairs = std::vector<std::pair<uint64_t, uint64_t>>;
+
+// Little-endian, sorted, behind their number.
+inline void write_pairs(FILE *stream, face_pairs pairs)
+{
+    std::sort(pairs.begin(), pairs.end());
+    uint64_t count = pairs.size();
+    fwrite(&count, sizeof count, 1, stream);
+    fwrite(pairs.data(), sizeof pairs[0], count, stream);
+}
+
+// POSES QUESTION ROUNDS [PAIRS]: prints for each pose its kind, microseconds and a value; `which`
+// answers with the value and, of "all", fills the pairs.
+template <class Ask> int run_poses(char **argument, Ask ask)
+{
+    std::vector<pose> poses = read_poses(argument[0]);
+    std::string question = argument[1];
+    int rounds = atoi(argument[2]);
+    FILE *stream = argument[3] ? fopen(argument[3], "wb") : nullptr;
+    for (const pose &p : poses) {
+        face_pairs pairs;
+        double value = 0, us = least_time(rounds, [&] {
+                              pairs.clear();
+                              value = ask(p, question, pairs);
+                          });
+        printf("%s %.3f %.17g\n", p.kind.c_str(), us, value);
+        if (stream)
+            write_pairs(stream, pairs);
+    }
+    if (stream)
+        fclose(stream);
+    return 0;
+}
+
+} // namespace bench
+#endif
