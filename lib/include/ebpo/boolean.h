@@ -209,9 +209,9 @@ typedef struct ebpo_boolean_cells ebpo_boolean_cells;
 
 /*
  * Each operand is looked at in a ball around the cell: first by the white and black nodes of its
- * tree, which decide most, then by its faces. What depends on one operand no more is not asked of
- * it again. An operand that is used twice is taken for two: where its own boundary is, cells are
- * mixed.
+ * tree, which decide most while cells are larger than leaves, then by its faces. What depends on
+ * one operand no more is not asked of it again. An operand that is used twice is taken for two:
+ * where its own boundary is, cells are mixed.
  *
  * EBPO_E_ARGUMENT: the level. EBPO_E_LIMIT: too many cells (`most`), or the result is so small or
  * so far from the origin that corners of cells are no doubles. EBPO_E_CANCELLED, EBPO_E_MEMORY, and
