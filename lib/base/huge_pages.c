@@ -1,3 +1,4 @@
+/* Asking the system for large pages; that it may decline changes nothing. */
 #include "base/huge_pages.h"
 
 #include <stdint.h>

@@ -1,3 +1,4 @@
+/* Many questions at once: sorted along the curve, answered in the order in which they came. */
 #include "geom/strict_fp.h"
 
 #include "query/batch.h"

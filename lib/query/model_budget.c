@@ -1,3 +1,4 @@
+/* Which levels stay, and who gets which share of the budget. */
 #include "geom/strict_fp.h"
 
 #include "query/model_budget.h"

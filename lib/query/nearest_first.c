@@ -1,3 +1,4 @@
+/* Distances under a budget: subtrees are loaded in the order in which they may matter. */
 #include "geom/strict_fp.h"
 
 #include "query/nearest_first.h"

@@ -1,3 +1,4 @@
+/* Nodes that wait to be searched, the nearest first. */
 #include "query/node_queue.h"
 
 #include "base/alloc.h"

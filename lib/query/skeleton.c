@@ -1,3 +1,4 @@
+/* Bounds of the distance to subtrees that are not in memory: the upper nodes of each. */
 #include "geom/strict_fp.h"
 
 #include "query/skeleton.h"
