@@ -27,8 +27,8 @@ ebpo_status ebpo_collider_new(ebpo_model *a, ebpo_model *b, const ebpo_collider_
         status = ebpo_check_mesh(b, error);
     if (status == EBPO_OK && !(a->whole && b->whole))
         status = ebpo_fail(error, EBPO_E_LIMIT,
-                           "a model is not all in memory, which two models that meet need; give "
-                           "a larger budget");
+                           "a model is not all in memory, as two models that meet need it: give a "
+                           "larger budget, or fetch a file that is far away");
     if (status != EBPO_OK)
         return status;
     ebpo_collider *c = ebpo_alloc_zero(1, sizeof *c);

@@ -1,0 +1,191 @@
+/* ebpo collide: which faces of two models meet. */
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "cli/answers.h"
+#include "cli/command.h"
+#include "cli/progress.h"
+#include "cli/query_args.h"
+#include "cmd/commands.h"
+
+typedef struct collide_values {
+    const char *pose_a, *pose_b;
+    bool all, self, json, quiet;
+    double deadline;
+    int64_t threads;
+    remote_values remote;
+} collide_values;
+
+#define POSE_HELP                                                                    \
+    "where the model is: 'x y z' moves it; twelve numbers are the rows of a 3 by 4 " \
+    "matrix, a rotation and that; a thirteenth is a scale"
+
+static const arg_option options[] = {
+    OPTION_TEXT("pose-a", 0, collide_values, pose_a, "POSE", POSE_HELP),
+    OPTION_TEXT("pose-b", 0, collide_values, pose_b, "POSE", "the same of B"),
+    OPTION_FLAG("all", 0, collide_values, all, "print every pair of faces that meet"),
+    OPTION_FLAG("self", 0, collide_values, self,
+                "faces of one model that meet otherwise than as neighbours"),
+    OPTION_REAL("deadline", 0, collide_values, deadline, "SECONDS", 0, 1e9,
+                "stop after about so long; 0, the default: never"),
+    OPTION_FLAG("json", 0, collide_values, json, "print JSON, an object a line"),
+    OPTION_THREADS(collide_values, threads),
+    OPTION_QUIET(collide_values, quiet),
+    OPTION_FLAG("stats", 0, collide_values, remote.stats,
+                "print on standard error at the end how much was looked at"),
+    REMOTE_HTTP_OPTIONS(collide_values, remote),
+    { 0 },
+};
+
+static const arg_spec spec = {
+    .command = "collide",
+    .operands = "A [B]",
+    .least = 1,
+    .most = 2,
+    .summary = "tells whether the faces of two models meet, and which do",
+    .text = "A and B are .ebpo.h5 files with their mesh. Prints one pair of faces that meet, or "
+            "'none'. A solid within another one does not meet it.",
+    .options = options,
+};
+
+/* --- poses --- */
+
+/* How many numbers the text holds, at most `most`; -1: it holds something else, or more. */
+static int read_numbers(const char *text, double *out, int most)
+{
+    int count = 0;
+    for (const char *at = text;;) {
+        while (*at == ' ' || *at == ',' || *at == '\t')
+            at++;
+        if (!*at)
+            return count;
+        char *end;
+        double x = strtod(at, &end);
+        if (end == at || count == most)
+            return -1;
+        out[count++] = x;
+        at = end;
+    }
+}
+
+static bool read_pose(const char *name, const char *text, ebpo_pose *out)
+{
+    double x[13];
+    int count = text ? read_numbers(text, x, 13) : 0;
+    if (count != 3 && count < 12 && text) {
+        (void)command_usage("collide", "--%s takes 3, 12 or 13 numbers", name);
+        return false;
+    }
+    if (count == 3)
+        for (int i = 0; i < 3; i++)
+            out->translation[i] = x[i];
+    for (int i = 0; i < 3 && count >= 12; i++) {
+        for (int k = 0; k < 3; k++)
+            out->rotation[i][k] = x[4 * i + k];
+        out->translation[i] = x[4 * i + 3];
+    }
+    if (count == 13)
+        out->scale = x[12];
+    return true;
+}
+
+/* --- answers --- */
+
+static const char *const kinds[] = { "APART", "TOUCHING", "CROSSING", "COPLANAR" };
+
+static void print_pair(bool json, const ebpo_face_pair *p)
+{
+    if (json)
+        printf("{\"face_a\": %llu, \"face_b\": %llu, \"kind\": \"%s\"}\n",
+               (unsigned long long)p->face_a, (unsigned long long)p->face_b, kinds[p->kind]);
+    else
+        printf("%llu %llu %s\n", (unsigned long long)p->face_a, (unsigned long long)p->face_b,
+               kinds[p->kind]);
+}
+
+static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
+{
+    const collide_values *v = user;
+    for (uint64_t i = 0; i < count; i++)
+        print_pair(v->json, &pairs[i]);
+    return command_flush("collide");
+}
+
+static ebpo_status ask_first(const collide_values *v, ebpo_collider *c,
+                             const ebpo_collide_options *how, ebpo_error *error)
+{
+    ebpo_face_pair pair;
+    int32_t found;
+    ebpo_status status = ebpo_collide_first(c, how, &pair, &found, error);
+    if (status != EBPO_OK)
+        return status;
+    if (found == 1)
+        print_pair(v->json, &pair);
+    else if (v->json)
+        printf("{\"kind\": %s}\n", found ? "null" : "\"APART\"");
+    else
+        puts(found ? "not known" : "none");
+    return EBPO_OK;
+}
+
+static void tell_stats(const ebpo_collider *c)
+{
+    ebpo_collider_stats s = EBPO_COLLIDER_STATS_INIT;
+    if (ebpo_collider_get_stats(c, &s) == EBPO_OK)
+        fprintf(stderr, "%llu pairs of nodes, %llu of blocks; %llu of faces by the exact test\n",
+                (unsigned long long)s.node_pairs, (unsigned long long)s.block_pairs,
+                (unsigned long long)s.exact);
+}
+
+static int ask(collide_values *v, ebpo_model *a, ebpo_model *b, ebpo_collide_options *how)
+{
+    ebpo_collider_options with = EBPO_COLLIDER_OPTIONS_INIT;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_collider *c = NULL;
+    progress_line line;
+    with.threads = (unsigned)v->threads;
+    ebpo_status status = ebpo_collider_new(a, b, &with, &c, &error);
+    how->progress = progress_start(&line, "collide", v->quiet);
+    if (status == EBPO_OK)
+        status = v->self  ? ebpo_collide_self(c, how, take_pairs, v, &error)
+                 : v->all ? ebpo_collide_all(c, how, take_pairs, v, &error)
+                          : ask_first(v, c, how, &error);
+    progress_wipe(&line);
+    if (c && v->remote.stats)
+        tell_stats(c);
+    ebpo_collider_free(c);
+    if (status != EBPO_OK)
+        return command_failed("collide", &error);
+    return command_flush("collide") ? EXIT_FINE : EXIT_FAILED;
+}
+
+static int run(void *given, const char **operand)
+{
+    collide_values *v = given;
+    ebpo_collide_options how = EBPO_COLLIDE_OPTIONS_INIT;
+    ebpo_model_options holding = EBPO_MODEL_OPTIONS_INIT;
+    query_session a = QUERY_SESSION_INIT, b = QUERY_SESSION_INIT;
+    if (v->self == (operand[1] != NULL))
+        return command_usage("collide", "two models, or one and --self");
+    if (v->self && (v->all || v->pose_a || v->pose_b))
+        return command_usage("collide", "--self takes neither --all nor poses");
+    if (!read_pose("pose-a", v->pose_a, &how.pose_a) ||
+        !read_pose("pose-b", v->pose_b, &how.pose_b))
+        return EXIT_USAGE;
+    how.deadline_ns = (uint64_t)(v->deadline * 1e9);
+    holding.threads = (unsigned)v->threads;
+    answers_begin("collide");
+    int code = query_open(&a, "collide", operand[0], &holding, -1, &v->remote);
+    if (code == EXIT_FINE && !v->self)
+        code = query_open(&b, "collide", operand[1], &holding, -1, &v->remote);
+    if (code == EXIT_FINE)
+        code = ask(v, a.model, v->self ? a.model : b.model, &how);
+    query_close(&b);
+    query_close(&a);
+    return code;
+}
+
+static const collide_values usual = { .remote = REMOTE_VALUES_INIT };
+
+const command command_collide = { &spec, sizeof usual, &usual, run };
