@@ -12,6 +12,8 @@
 
 /* What rounding adds to lengths: of a few dozen operations, each 2^-53. */
 static const double slack = 0x1p-44;
+/* Times beyond would have differences that are no numbers. */
+static const double most_time = 0x1p1000;
 
 static double length4(const double q[4])
 {
@@ -72,15 +74,18 @@ static bool fits(const scene_key *key)
     ebpo_posing posing;
     memcpy(pose.translation, key->translation, sizeof pose.translation);
     pose.scale = key->scale;
-    return isfinite(key->time) && ebpo_posing_make(&posing, &pose, nowhere, NULL) == EBPO_OK;
+    return fabs(key->time) <= most_time &&
+           ebpo_posing_make(&posing, &pose, nowhere, NULL) == EBPO_OK;
 }
 
 ebpo_status scene_add_key(scene_route *route, const scene_key *key, ebpo_error *error)
 {
     scene_key k = *key;
     if (!fits(&k))
-        return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "a number is not finite, or the scale is not from 2^-300 to 2^300");
+        return ebpo_fail(
+            error, EBPO_E_ARGUMENT,
+            "a number is not finite, the time is beyond 2^1000, or the scale is not from "
+            "2^-300 to 2^300");
     if (!normalise(k.turn))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "the quaternion is 0 or too long");
     if (route->count && !(k.time > route->keys[route->count - 1].time))
@@ -189,6 +194,16 @@ static double angle_between(const double a[4], const double b[4])
     return 4 * (sum + term) * (1 + slack); /* what is left is below its first term / (1 - 1/2) */
 }
 
+double scene_length_above(const double way[3])
+{
+    double most = fmax(fmax(fabs(way[0]), fabs(way[1])), fabs(way[2])), sum = 0;
+    if (!(most > 0 && most < INFINITY))
+        return most;
+    for (int k = 0; k < 3; k++)
+        sum += (way[k] / most) * (way[k] / most);
+    return sqrt(sum) * (1 + slack) * most;
+}
+
 scene_step scene_route_step(const scene_route *route, double from, double to, double reach)
 {
     uint64_t n = key_at(route, from);
@@ -197,10 +212,9 @@ scene_step scene_route_step(const scene_route *route, double from, double to, do
     if (!(part > 0) || from < a->time || route->jumps)
         return (scene_step){ 0, 0 };
     part = part * (1 + slack) + slack;
-    double way = 0, size = 0;
+    double way[3], size = 0;
     for (int k = 0; k < 3; k++) {
-        double d = b->translation[k] - a->translation[k];
-        way += d * d;
+        way[k] = b->translation[k] - a->translation[k];
         size += fabs(a->translation[k]) + fabs(b->translation[k]);
     }
     double angle = angle_between(a->turn, b->turn), scale = fmax(a->scale, b->scale);
@@ -208,7 +222,8 @@ scene_step scene_route_step(const scene_route *route, double from, double to, do
     double turned = angle * part, grown = grows * part;
     double rounding = slack * (size + reach * scale);
     return (scene_step){
-        (sqrt(way) * part + reach * (scale * turned + grown)) * (1 + slack) + rounding,
+        (scene_length_above(way) * part + reach * (scale * turned + grown)) * (1 + slack) +
+            rounding,
         reach / 8 * (scale * turned * turned + 2 * grown * turned) * (1 + slack) + rounding,
     };
 }

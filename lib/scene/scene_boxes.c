@@ -78,12 +78,15 @@ static void posed_box(const ebpo_pose *pose, const scene_model *m, double min[3]
     }
 }
 
+/* What overflowed may be anywhere. */
+static double or_else(double x, double all) { return isnan(x) ? all : x; }
+
 static void join_box(double min[3], double max[3], const double low[3], const double high[3],
                      double by)
 {
     for (int k = 0; k < 3; k++) {
-        min[k] = fmin(min[k], low[k] - by);
-        max[k] = fmax(max[k], high[k] + by);
+        min[k] = fmin(min[k], or_else(low[k] - by, -INFINITY));
+        max[k] = fmax(max[k], or_else(high[k] + by, INFINITY));
     }
 }
 
@@ -98,13 +101,11 @@ static void empty_box(double min[3], double max[3])
 /* How far the instance's points are from the origin of what moves along its route, at most. */
 static double reach_of(const scene_instance *i, const scene_model *m)
 {
-    double min[3], max[3], sum = 0;
+    double min[3], max[3], far[3];
     posed_box(&i->as.pose, m, min, max);
-    for (int k = 0; k < 3; k++) {
-        double far = fmax(fabs(min[k]), fabs(max[k]));
-        sum += far * far;
-    }
-    return sqrt(sum) * (1 + slack);
+    for (int k = 0; k < 3; k++)
+        far[k] = fmax(fabs(min[k]), fabs(max[k]));
+    return scene_length_above(far);
 }
 
 static void box_at(const ebpo_scene *scene, const scene_instance *i, double time, double by,
@@ -126,7 +127,7 @@ static void box_between(const ebpo_scene *scene, const scene_instance *i, double
     double turned = reach > 0 ? sqrt(8 * all.sag / reach) : 0;
     int steps = turned < 32 * step_turn ? 1 + (int)(turned / step_turn) : 32;
     for (int n = 0; n < steps; n++) {
-        double begin = from + (to - from) * n / steps;
+        double begin = n == 0 ? from : from + (to - from) * n / steps;
         double end = n + 1 == steps ? to : from + (to - from) * (n + 1) / steps;
         double sag = scene_route_step(route, begin, end, reach).sag;
         box_at(scene, i, begin, sag, min, max);

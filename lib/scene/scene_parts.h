@@ -117,7 +117,7 @@ EBPO_MUST_USE ebpo_status scene_read_json(ebpo_scene *scene, const char *text, s
 /* ---- route.c ---- */
 
 /* Appends; a key's rotation is made a unit quaternion's. EBPO_E_ARGUMENT: not finite, time not
- * above the last, no rotation, scale out of range. */
+ * above the last or beyond 2^1000, no rotation, scale out of range. */
 EBPO_MUST_USE ebpo_status scene_add_key(scene_route *route, const scene_key *key,
                                         ebpo_error *error);
 /* The quaternion nearest to a matrix, of any length but 0. */
@@ -128,6 +128,9 @@ void scene_compose(const ebpo_pose *outer, const ebpo_pose *inner, ebpo_pose *ou
 /* Parts of from .. to between which a route's motion is smooth: the time at which the one that
  * begins at `from` ends. */
 double scene_route_next(const scene_route *route, double from, double to);
+
+/* At least the length, however small or large. */
+double scene_length_above(const double way[3]);
 
 /* How points at most `reach` from the route's origin move between two times that no key is between:
  * at most `length` from where they were; and at most `sag` off the straight line from the first to

@@ -66,6 +66,8 @@ static const struct {
     { HEAD "\"routes\": {\"r\": {\"keys\": [{\"time\": 1, \"pose\": {}},\n{\"time\": 1, \"pose\": "
            "{}}]}}}",
       "line 4: routes.r.keys[1]: time 1 is not above" },
+    { HEAD "\"routes\": {\"r\": {\"keys\": [{\"time\": -1.7e308, \"pose\": {}}]}}}",
+      "the time is beyond 2^1000" },
     { HEAD "\"routes\": {\"r\": {\"keys\": [{\"time\": 1}]}}}", "keys[0].pose: is not an object" },
     { HEAD "\"routes\": {\"r\": {\"csv\": \"../p.csv\"}}}", "routes.r.csv: is outside" },
     { HEAD "\"ignore\": [[\"a\"]]}", "ignore[0]: is not an array of two names" },
@@ -331,6 +333,35 @@ START_TEST(boxes_and_motions_hold)
 END_TEST
 
 /* Bounds are of use: a quarter turn at arm's length, a straight way. */
+/* An arm that turns by a right angle, its tip on the x axis halfway, and goes as far as it is long:
+ * squares of these lengths are no doubles. */
+START_TEST(boxes_of_any_size_hold)
+{
+    static const int exponents[] = { -560, 0, 530 };
+    for (int e = 0; e < 3; e++) {
+        double arm = ldexp(1, exponents[e]), low[3], high[3], length;
+        ebpo_scene *s = parsed(HEAD "\"routes\": {\"r\": {\"keys\": ["
+                                    "{\"time\": 0, \"pose\": {\"quaternion\": [0, 0, -2, 5]}},"
+                                    "{\"time\": 1, \"pose\": {\"quaternion\": [0, 0, 2, 5]}},"
+                                    "{\"time\": 2, \"pose\": {\"quaternion\": [0, 0, 2, 5]}}]}},"
+                                    "\"instances\": [{\"name\": \"a\", \"model\": \"m\","
+                                    "\"route\": \"r\"}]}");
+        s->models[0].file = 0;
+        s->models[0].min[0] = s->models[0].max[0] = arm;
+        s->routes[0].keys[2].translation[0] = arm;
+        fine(ebpo_scene_instance_box(s, 0, 0, 1, low, high, &error));
+        ck_assert(high[0] >= arm && high[0] < 1.1 * arm && low[0] > 0);
+        fine(ebpo_scene_motion(s, 0, 0, 1, &length, &error));
+        ck_assert(length >= arm && length < 2 * arm);
+        fine(ebpo_scene_motion(s, 0, 1, 2, &length, &error));
+        ck_assert(length >= arm && length < 1.1 * arm);
+        fine(ebpo_scene_instance_box(s, 0, -1e308, 1.7e308, low, high, &error));
+        ck_assert(low[0] > 0 && high[0] >= 1.7 * arm && high[0] < 2.1 * arm);
+        ebpo_scene_free(s);
+    }
+}
+END_TEST
+
 START_TEST(bounds_are_close)
 {
     ebpo_scene *s =
@@ -438,6 +469,7 @@ Suite *test_suite(void)
     tcase_add_test(c, turns_evenly);
     tcase_add_test(c, matrices_become_turns);
     tcase_add_test(c, boxes_and_motions_hold);
+    tcase_add_test(c, boxes_of_any_size_hold);
     tcase_add_test(c, bounds_are_close);
     tcase_add_test(c, box_grows_with_instances);
     tcase_add_loop_test(c, pairs_as_twin, 0, 4);
