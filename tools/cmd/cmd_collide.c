@@ -94,9 +94,9 @@ static bool read_pose(const char *name, const char *text, ebpo_pose *out)
 
 static const char *const kinds[] = { "APART", "TOUCHING", "CROSSING", "COPLANAR" };
 
-static void print_pair(bool json, const ebpo_face_pair *p)
+static void print_pair(bool as_json, const ebpo_face_pair *p)
 {
-    if (json)
+    if (as_json)
         printf("{\"face_a\": %llu, \"face_b\": %llu, \"kind\": \"%s\"}\n",
                (unsigned long long)p->face_a, (unsigned long long)p->face_b, kinds[p->kind]);
     else
