@@ -430,6 +430,22 @@ static ebpo_status look_at_scene(const ebpo_scene *scene)
     return fine ? EBPO_OK : EBPO_E_ARGUMENT;
 }
 
+static bool count_meetings(void *user, const ebpo_scene_meeting *meetings, uint64_t count)
+{
+    *(uint64_t *)user += count + (meetings[0].kind == EBPO_MEETING_NONE);
+    return true;
+}
+
+static ebpo_status meet_in_scene(ebpo_scene *scene, ebpo_error *error)
+{
+    uint64_t meetings = 0, asked = 0;
+    ebpo_scene_ask_options how = EBPO_SCENE_ASK_OPTIONS_INIT;
+    how.threads = 1;
+    how.count = true;
+    ebpo_status status = ebpo_scene_meet(scene, 1, &how, count_meetings, &meetings, &asked, error);
+    return status == EBPO_OK && (meetings != 1 || asked != 1) ? EBPO_E_ARGUMENT : status;
+}
+
 static ebpo_status ask_scene(ebpo_scene *scene, ebpo_error *error)
 {
     double min[3], max[3], length;
@@ -451,6 +467,8 @@ static ebpo_status ask_scene(ebpo_scene *scene, ebpo_error *error)
         status = ebpo_scene_pairs(scene, 0, 1, count_pairs, &pairs, error);
     if (status == EBPO_OK)
         status = ebpo_scene_model(scene, 0, &model, error);
+    if (status == EBPO_OK)
+        status = meet_in_scene(scene, error);
     return status == EBPO_OK && pairs != 1 ? EBPO_E_ARGUMENT : status;
 }
 

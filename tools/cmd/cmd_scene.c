@@ -9,19 +9,25 @@
 #include "cli/progress.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
+#include "cmd/scene_report.h"
 #include "cmd/scene_run.h"
 
 static const arg_option options[] = {
     OPTION_REAL("time", 't', scene_values, time, "T", -1e300, 1e300,
-                "boxes, pairs: at this time; default: the first of all routes"),
+                "at this time; default: the first of all routes"),
     OPTION_REAL("from", 0, scene_values, from, "T", -1e300, 1e300,
-                "boxes, pairs: at all times from this one on; default: the first"),
+                "from this time on; default: the first"),
     OPTION_REAL("to", 0, scene_values, to, "T", -1e300, 1e300,
-                "boxes, pairs: up to this time; default: the last"),
+                "up to this time; default: the last"),
+    OPTION_REAL("step", 0, scene_values, step, "S", 1e-300, 1e300,
+                "report: between --from and --to look every S seconds"),
+    OPTION_FLAG("count", 0, scene_values, count, "report: count all pairs of faces that meet"),
+    OPTION_THREADS(scene_values, threads),
     OPTION_FLAG("outside", 0, scene_values, outside,
                 "files that the scene names may lie outside its folder"),
     OPTION_FLAG("remote", 0, scene_values, remote,
                 "models may be on web servers, if their digests are given"),
+    OPTION_FLAG("csv", 0, scene_values, csv, "report: print CSV"),
     OPTION_FLAG("json", 0, scene_values, json, "print JSON"),
     OPTION_QUIET(scene_values, quiet),
     { 0 },
@@ -29,13 +35,14 @@ static const arg_option options[] = {
 
 static const arg_spec spec = {
     .command = "scene",
-    .operands = "info|check|boxes|pairs FILE",
+    .operands = "info|check|boxes|pairs|report FILE",
     .least = 2,
     .most = 2,
     .summary = "describes a scene: models at many places, that move, and who may meet",
     .text = "FILE is a scene in JSON. 'info' tells what it holds and where that is, 'check' opens "
             "every model and says whether all fits together, 'boxes' prints the box of each "
-            "instance, 'pairs' the instances whose boxes come close enough to each other.",
+            "instance, 'pairs' the instances whose boxes come close enough to each other, 'report' "
+            "those whose faces meet, exactly.",
     .options = options,
 };
 
@@ -56,15 +63,27 @@ static bool settle_times(scene_values *v, const ebpo_scene *scene)
     return v->from <= v->to;
 }
 
+enum { FRAMES_MOST = 10000000 };
+
+/* NULL, or what is wrong with the options of a report. */
+static const char *wrong_report(const scene_values *v)
+{
+    if (v->json && v->csv)
+        return "--json and --csv exclude each other";
+    if (v->to > v->from && !(v->step > 0))
+        return "from one time to another a report needs --step";
+    if (v->to > v->from && !((v->to - v->from) / v->step < FRAMES_MOST))
+        return "--step is so small that there are more than ten million times";
+    return NULL;
+}
+
 static const struct {
     const char *name;
     ebpo_status (*run)(const scene_values *v, const char *path, ebpo_scene *scene,
                        ebpo_error *error);
 } deeds[] = {
-    { "info", scene_info },
-    { "check", scene_check },
-    { "boxes", scene_boxes },
-    { "pairs", scene_pairs },
+    { "info", scene_info },   { "check", scene_check },   { "boxes", scene_boxes },
+    { "pairs", scene_pairs }, { "report", scene_report },
 };
 enum { DEEDS = sizeof deeds / sizeof *deeds };
 
@@ -77,7 +96,8 @@ static int run(void *given, const char **operand)
     while (deed < DEEDS && strcmp(operand[0], deeds[deed].name) != 0)
         deed++;
     if (deed == DEEDS)
-        return command_usage("scene", "'%s' is not one of info, check, boxes, pairs", operand[0]);
+        return command_usage("scene", "'%s' is not one of info, check, boxes, pairs, report",
+                             operand[0]);
     ebpo_scene_options how = EBPO_SCENE_OPTIONS_INIT;
     ebpo_load_options load = EBPO_LOAD_OPTIONS_INIT;
     how.outside = v->outside;
@@ -86,6 +106,12 @@ static int run(void *given, const char **operand)
     if (status == EBPO_OK && !settle_times(v, scene)) {
         ebpo_scene_free(scene);
         return command_usage("scene", "--time stands alone; --from is not after --to");
+    }
+    const char *wrong =
+        status == EBPO_OK && deeds[deed].run == scene_report ? wrong_report(v) : NULL;
+    if (wrong) {
+        ebpo_scene_free(scene);
+        return command_usage("scene", "%s", wrong);
     }
     progress_line line;
     load.progress = progress_start(&line, "scene", v->quiet);

@@ -6,7 +6,9 @@
 
 typedef struct scene_values {
     double time, from, to; /* NAN: not given; then from and to are settled */
-    bool outside, remote, json, quiet;
+    double step;           /* 0: not given */
+    int64_t threads;
+    bool outside, remote, json, csv, count, quiet;
 } scene_values;
 
 #define SCENE_VALUES_INIT                                                             \

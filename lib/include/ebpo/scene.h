@@ -7,7 +7,7 @@
  *               ebpo_scene_get_camera, ebpo_scene_pair_rule
  *   Models      ebpo_scene_load, ebpo_scene_file, ebpo_scene_model
  *   In time     ebpo_scene_pose, ebpo_scene_motion, ebpo_scene_instance_box, ebpo_scene_box
- *   Who meets   ebpo_scene_pairs
+ *   Who meets   ebpo_scene_pairs (boxes), ebpo_scene_meet (faces)
  *
  *     ebpo_scene *scene = NULL;
  *     ebpo_scene_open("plant.scene.json", NULL, &scene, &error);
@@ -376,6 +376,72 @@ typedef bool (*ebpo_scene_pairs_fn)(void *user, const ebpo_scene_pair *pairs, ui
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_pairs(const ebpo_scene *scene, double from, double to,
                                                     ebpo_scene_pairs_fn take, void *user,
                                                     ebpo_error *error);
+
+typedef enum ebpo_scene_meeting_kind {
+    EBPO_MEETING_NONE = 0,     /* no faces meet; one may still be within the other */
+    EBPO_MEETING_TOUCHING = 1, /* faces have common points, none has inner ones */
+    EBPO_MEETING_COPLANAR = 2, /* faces lie on each other, none cross */
+    EBPO_MEETING_CROSSING = 3  /* faces cross */
+} ebpo_scene_meeting_kind;
+
+/* Of two instances, a < b, whose faces meet. */
+typedef struct ebpo_scene_meeting {
+    uint64_t a, b;
+
+    /* A pair of their faces that meet, as ebpo_collide_first gives it. */
+    uint64_t face_a, face_b;
+
+    /*
+     * Pairs of faces of each kind (ebpo_pair_kind), all of them if ebpo_scene_ask_options.count;
+     * else what was seen until `kind` was certain.
+     */
+    uint64_t touching, crossing, coplanar;
+
+    /* What the scene wants between them. */
+    double clearance;
+
+    /* An ebpo_scene_meeting_kind, the greatest that any pair of faces has. */
+    int32_t kind;
+
+    int32_t reserved;
+} ebpo_scene_meeting;
+
+/* Meetings, lent until it returns. False: enough. */
+typedef bool (*ebpo_scene_meetings_fn)(void *user, const ebpo_scene_meeting *meetings,
+                                       uint64_t count);
+
+typedef struct ebpo_scene_ask_options {
+    size_t struct_size; /* EBPO_SCENE_ASK_OPTIONS_INIT sets it */
+
+    ebpo_progress progress;
+
+    /* 0: all cores. The answers do not depend on it. */
+    unsigned threads;
+
+    /* Count all pairs of faces that meet. */
+    bool count;
+
+    uint8_t reserved[3];
+} ebpo_scene_ask_options;
+
+#define EBPO_SCENE_ASK_OPTIONS_INIT EBPO_SIZED(ebpo_scene_ask_options)
+
+/*
+ * The narrow phase at a time: of the pairs of ebpo_scene_pairs those whose faces meet, exact on
+ * posed coordinates (collide.h), ascending by a, then b. An instance within another that no face
+ * meets, and a clearance that is not kept, are not meetings. Models are made as ebpo_scene_model
+ * does; all pairs of a model are asked of one. `asked`, the number of pairs asked, may be NULL.
+ *
+ * EBPO_E_ARGUMENT: not loaded, no such time, or a pose (ebpo_pose_check). EBPO_E_ABSENT: a model
+ * has no mesh. EBPO_E_LIMIT: a model is not all in memory (ebpo_load_options). EBPO_E_CANCELLED,
+ * EBPO_E_MEMORY, and the errors of reading.
+ *
+ * Threads: one per scene; further ones live for the call.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_meet(ebpo_scene *scene, double time,
+                                                   const ebpo_scene_ask_options *options,
+                                                   ebpo_scene_meetings_fn take, void *user,
+                                                   uint64_t *asked, ebpo_error *error);
 
 #ifdef __cplusplus
 }

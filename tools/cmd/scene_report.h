@@ -1,0 +1,10 @@
+/* `ebpo scene report`: who meets, time after time. */
+#ifndef EBPO_TOOLS_SCENE_REPORT_H
+#define EBPO_TOOLS_SCENE_REPORT_H
+
+#include "cmd/scene_run.h"
+
+ebpo_status scene_report(const scene_values *v, const char *path, ebpo_scene *scene,
+                         ebpo_error *error);
+
+#endif
