@@ -436,6 +436,12 @@ static bool count_meetings(void *user, const ebpo_scene_meeting *meetings, uint6
     return true;
 }
 
+static bool count_ways(void *user, const ebpo_scene_way *ways, uint64_t count)
+{
+    *(uint64_t *)user += count + (ways[0].reached != 1);
+    return true;
+}
+
 static ebpo_status meet_in_scene(ebpo_scene *scene, ebpo_error *error)
 {
     uint64_t meetings = 0, asked = 0;
@@ -443,7 +449,14 @@ static ebpo_status meet_in_scene(ebpo_scene *scene, ebpo_error *error)
     how.threads = 1;
     how.count = true;
     ebpo_status status = ebpo_scene_meet(scene, 1, &how, count_meetings, &meetings, &asked, error);
-    return status == EBPO_OK && (meetings != 1 || asked != 1) ? EBPO_E_ARGUMENT : status;
+    ebpo_scene_way_options along = EBPO_SCENE_WAY_OPTIONS_INIT;
+    uint64_t ways = 0;
+    along.threads = 1;
+    along.tolerance = 0.01;
+    if (status == EBPO_OK)
+        status = ebpo_scene_approach(scene, 0, 1, &along, count_ways, &ways, error);
+    return status == EBPO_OK && (meetings != 1 || asked != 1 || ways != 1) ? EBPO_E_ARGUMENT
+                                                                           : status;
 }
 
 static ebpo_status ask_scene(ebpo_scene *scene, ebpo_error *error)

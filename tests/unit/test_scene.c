@@ -97,6 +97,43 @@ START_TEST(bad_files)
 }
 END_TEST
 
+static const char whole[] = HEAD
+    "\"layers\": [\"l\"], \"groups\": [\"g\"], \"routes\": {\"r\": {\"keys\": [{\"time\": 0, "
+    "\"pose\": {}}, {\"time\": 2, \"pose\": {\"quaternion\": [0, 0, 1, 1], \"scale\": 2}}]}, "
+    "\"p\": {\"poses\": [{}, {\"translation\": [1, 2, 3]}], \"step\": 1, \"between\": "
+    "\"jump\"}},\n\"instances\": [" ONE ", {\"name\": \"b\", \"model\": \"m\", \"pose\": "
+    "{\"rotation\": [1, 0, 0, 0, 1, 0, 0, 0, 1]}, \"layer\": \"l\", \"groups\": [\"g\"], "
+    "\"route\": \"r\"}],\n\"cameras\": [{\"name\": \"c\", \"eye\": [1, 1, 1], \"target\": [0, 0, "
+    "0], \"fov\": 50, \"pixels\": [10, 10]}], \"ignore\": [[\"*\", \"group:g\"]],\n"
+    "\"clearance\": [{\"between\": [\"a\", \"layer:l\"], \"distance\": 1}], \"x-y\": [{}]}";
+
+/* Whatever the bytes are: a scene, or a message that names the file. */
+START_TEST(any_bytes)
+{
+    uint64_t state = 6;
+    int scenes = 0;
+    for (int n = 0; n < 4000; n++) {
+        size_t size = sizeof whole - 1;
+        char *text = malloc(size);
+        ebpo_scene *scene = NULL;
+        memcpy(text, whole, size);
+        for (int64_t k = twin_integer(&state, 0, 3); k > 0; k--) {
+            size_t at = (size_t)twin_integer(&state, 0, (int64_t)size - 1);
+            size_t from = (size_t)twin_integer(&state, 0, (int64_t)size - 1);
+            text[at] = n % 3 ? text[from] : (char)twin_integer(&state, 0, 255);
+        }
+        size -= n % 5 ? 0 : (size_t)twin_integer(&state, 0, (int64_t)size);
+        text = realloc(text, size + !size); /* so that reading on is noticed */
+        ebpo_status status = ebpo_scene_parse(text, size, "s.json", NULL, NULL, &scene, &error);
+        scenes += status == EBPO_OK;
+        ck_assert(status == EBPO_OK ? scene != NULL : strstr(error.message, "s.json") != NULL);
+        ebpo_scene_free(scene);
+        free(text);
+    }
+    ck_assert_int_gt(scenes, 400);
+}
+END_TEST
+
 START_TEST(limits)
 {
     static const char text[] = HEAD "\"x-a\": [1, 2, 3, \"[[[[,,,,\\\"\", 4]}";
@@ -463,6 +500,7 @@ Suite *test_suite(void)
     tcase_add_checked_fixture(c, scratch_enter, scratch_leave);
     tcase_set_timeout(c, 300);
     tcase_add_loop_test(c, bad_files, 0, sizeof bad / sizeof *bad);
+    tcase_add_test(c, any_bytes);
     tcase_add_test(c, limits);
     tcase_add_test(c, rules);
     tcase_add_test(c, csv);

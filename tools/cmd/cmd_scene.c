@@ -21,6 +21,8 @@ static const arg_option options[] = {
                 "up to this time; default: the last"),
     OPTION_REAL("step", 0, scene_values, step, "S", 1e-300, 1e300,
                 "report: between --from and --to look every S seconds"),
+    OPTION_REAL("tolerance", 0, scene_values, tolerance, "D", 1e-300, 1e300,
+                "approach: how near is near, beyond the clearance"),
     OPTION_FLAG("count", 0, scene_values, count, "report: count all pairs of faces that meet"),
     OPTION_THREADS(scene_values, threads),
     OPTION_FLAG("outside", 0, scene_values, outside,
@@ -35,14 +37,15 @@ static const arg_option options[] = {
 
 static const arg_spec spec = {
     .command = "scene",
-    .operands = "info|check|boxes|pairs|report FILE",
+    .operands = "info|check|boxes|pairs|report|approach FILE",
     .least = 2,
     .most = 2,
     .summary = "describes a scene: models at many places, that move, and who may meet",
-    .text = "FILE is a scene in JSON. 'info' tells what it holds and where that is, 'check' opens "
-            "every model and says whether all fits together, 'boxes' prints the box of each "
-            "instance, 'pairs' the instances whose boxes come close enough to each other, 'report' "
-            "those whose faces meet, exactly.",
+    .text =
+        "FILE is a scene in JSON. 'info' tells what it holds and where that is, 'check' opens "
+        "every model and says whether all fits together, 'boxes' prints the box of each "
+        "instance, 'pairs' the instances whose boxes come close enough to each other, 'report' "
+        "those whose faces meet or are too near, exactly, 'approach' when pairs first come near.",
     .options = options,
 };
 
@@ -83,7 +86,7 @@ static const struct {
                        ebpo_error *error);
 } deeds[] = {
     { "info", scene_info },   { "check", scene_check },   { "boxes", scene_boxes },
-    { "pairs", scene_pairs }, { "report", scene_report },
+    { "pairs", scene_pairs }, { "report", scene_report }, { "approach", scene_approach },
 };
 enum { DEEDS = sizeof deeds / sizeof *deeds };
 
@@ -96,7 +99,8 @@ static int run(void *given, const char **operand)
     while (deed < DEEDS && strcmp(operand[0], deeds[deed].name) != 0)
         deed++;
     if (deed == DEEDS)
-        return command_usage("scene", "'%s' is not one of info, check, boxes, pairs, report",
+        return command_usage("scene",
+                             "'%s' is not one of info, check, boxes, pairs, report, approach",
                              operand[0]);
     ebpo_scene_options how = EBPO_SCENE_OPTIONS_INIT;
     ebpo_load_options load = EBPO_LOAD_OPTIONS_INIT;
@@ -106,6 +110,10 @@ static int run(void *given, const char **operand)
     if (status == EBPO_OK && !settle_times(v, scene)) {
         ebpo_scene_free(scene);
         return command_usage("scene", "--time stands alone; --from is not after --to");
+    }
+    if (status == EBPO_OK && deeds[deed].run == scene_approach && !(v->tolerance > 0)) {
+        ebpo_scene_free(scene);
+        return command_usage("scene", "approach needs --tolerance");
     }
     const char *wrong =
         status == EBPO_OK && deeds[deed].run == scene_report ? wrong_report(v) : NULL;

@@ -7,7 +7,7 @@
 #include "cli/json.h"
 #include "cli/progress.h"
 
-static const char *const kinds[] = { "none", "touching", "coplanar", "crossing" };
+static const char *const kinds[] = { "none", "near", "touching", "coplanar", "crossing" };
 
 typedef struct report {
     const scene_values *v;
@@ -39,6 +39,7 @@ static void meeting_json(report *r, const ebpo_scene_meeting *m)
         json_uint(j, "crossing", m->crossing);
     }
     json_real(j, "clearance", m->clearance);
+    json_real(j, "distance", m->distance);
     json_end(j);
 }
 
@@ -67,7 +68,7 @@ static void meeting_csv(const report *r, const ebpo_scene_meeting *m)
     csv_text(name_of(r, m->a));
     putchar(',');
     csv_text(name_of(r, m->b));
-    printf(",%s,%llu,%llu", kinds[m->kind], (unsigned long long)m->face_a,
+    printf(",%s,%.17g,%llu,%llu", kinds[m->kind], m->distance, (unsigned long long)m->face_a,
            (unsigned long long)m->face_b);
     counts_csv(r, m);
     putchar('\n');
@@ -76,7 +77,9 @@ static void meeting_csv(const report *r, const ebpo_scene_meeting *m)
 static void meeting_words(const report *r, const ebpo_scene_meeting *m)
 {
     printf("%.9g\t%s\t%s\t%s", r->time, kinds[m->kind], name_of(r, m->a), name_of(r, m->b));
-    if (r->v->count)
+    if (m->kind == EBPO_MEETING_NEAR)
+        printf("\t%.9g of %.9g", m->distance, m->clearance);
+    else if (r->v->count)
         printf("\t%llu pairs of faces",
                (unsigned long long)(m->touching + m->coplanar + m->crossing));
     putchar('\n');
@@ -132,7 +135,8 @@ static void begin(report *r)
         json_object(&r->j, NULL);
         json_array(&r->j, "frames");
     } else if (r->v->csv) {
-        printf("time,a,b,kind,face_a,face_b%s\n", r->v->count ? ",touching,coplanar,crossing" : "");
+        printf("time,a,b,kind,distance,face_a,face_b%s\n",
+               r->v->count ? ",touching,coplanar,crossing" : "");
     }
 }
 

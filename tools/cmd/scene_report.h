@@ -1,4 +1,5 @@
-/* `ebpo scene report`: who meets, time after time. */
+/* `ebpo scene report`: who meets, time after time; `ebpo scene approach`: when they first come
+ * near. */
 #ifndef EBPO_TOOLS_SCENE_REPORT_H
 #define EBPO_TOOLS_SCENE_REPORT_H
 
@@ -6,5 +7,8 @@
 
 ebpo_status scene_report(const scene_values *v, const char *path, ebpo_scene *scene,
                          ebpo_error *error);
+
+ebpo_status scene_approach(const scene_values *v, const char *path, ebpo_scene *scene,
+                           ebpo_error *error);
 
 #endif

@@ -5,8 +5,8 @@
 #include <ebpo/ebpo.h>
 
 typedef struct scene_values {
-    double time, from, to; /* NAN: not given; then from and to are settled */
-    double step;           /* 0: not given */
+    double time, from, to;  /* NAN: not given; then from and to are settled */
+    double step, tolerance; /* 0: not given */
     int64_t threads;
     bool outside, remote, json, csv, count, quiet;
 } scene_values;

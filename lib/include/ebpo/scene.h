@@ -7,7 +7,8 @@
  *               ebpo_scene_get_camera, ebpo_scene_pair_rule
  *   Models      ebpo_scene_load, ebpo_scene_file, ebpo_scene_model
  *   In time     ebpo_scene_pose, ebpo_scene_motion, ebpo_scene_instance_box, ebpo_scene_box
- *   Who meets   ebpo_scene_pairs (boxes), ebpo_scene_meet (faces)
+ *   Who meets   ebpo_scene_pairs (boxes), ebpo_scene_meet (faces),
+ *               ebpo_scene_approach (all times)
  *
  *     ebpo_scene *scene = NULL;
  *     ebpo_scene_open("plant.scene.json", NULL, &scene, &error);
@@ -377,18 +378,19 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_pairs(const ebpo_scene *scene, dou
                                                     ebpo_scene_pairs_fn take, void *user,
                                                     ebpo_error *error);
 
-typedef enum ebpo_scene_meeting_kind {
+typedef enum ebpo_meeting_kind {
     EBPO_MEETING_NONE = 0,     /* no faces meet; one may still be within the other */
-    EBPO_MEETING_TOUCHING = 1, /* faces have common points, none has inner ones */
-    EBPO_MEETING_COPLANAR = 2, /* faces lie on each other, none cross */
-    EBPO_MEETING_CROSSING = 3  /* faces cross */
-} ebpo_scene_meeting_kind;
+    EBPO_MEETING_NEAR = 1,     /* none meet, but they are nearer than their clearance */
+    EBPO_MEETING_TOUCHING = 2, /* faces have common points, none has inner ones */
+    EBPO_MEETING_COPLANAR = 3, /* faces lie on each other, none cross */
+    EBPO_MEETING_CROSSING = 4  /* faces cross */
+} ebpo_meeting_kind;
 
-/* Of two instances, a < b, whose faces meet. */
+/* Of two instances, a < b, whose faces meet or come too near. */
 typedef struct ebpo_scene_meeting {
     uint64_t a, b;
 
-    /* A pair of their faces that meet, as ebpo_collide_first gives it. */
+    /* A pair of their faces that meet, as ebpo_collide_first gives it, or the nearest pair. */
     uint64_t face_a, face_b;
 
     /*
@@ -397,10 +399,10 @@ typedef struct ebpo_scene_meeting {
      */
     uint64_t touching, crossing, coplanar;
 
-    /* What the scene wants between them. */
-    double clearance;
+    /* What the scene wants between them, and of EBPO_MEETING_NEAR what there is, exact; else 0. */
+    double clearance, distance;
 
-    /* An ebpo_scene_meeting_kind, the greatest that any pair of faces has. */
+    /* An ebpo_meeting_kind, the greatest that any pair of faces has. */
     int32_t kind;
 
     int32_t reserved;
@@ -427,10 +429,11 @@ typedef struct ebpo_scene_ask_options {
 #define EBPO_SCENE_ASK_OPTIONS_INIT EBPO_SIZED(ebpo_scene_ask_options)
 
 /*
- * The narrow phase at a time: of the pairs of ebpo_scene_pairs those whose faces meet, exact on
- * posed coordinates (collide.h), ascending by a, then b. An instance within another that no face
- * meets, and a clearance that is not kept, are not meetings. Models are made as ebpo_scene_model
- * does; all pairs of a model are asked of one. `asked`, the number of pairs asked, may be NULL.
+ * The narrow phase at a time: of the pairs of ebpo_scene_pairs those whose faces meet or are nearer
+ * to each other than the pair's clearance, exact on posed coordinates (collide.h), ascending by a,
+ * then b. An instance within another that no face comes near is no meeting. Models are made as
+ * ebpo_scene_model does; all pairs of a model are asked of one. `asked`, the number of pairs asked,
+ * may be NULL.
  *
  * EBPO_E_ARGUMENT: not loaded, no such time, or a pose (ebpo_pose_check). EBPO_E_ABSENT: a model
  * has no mesh. EBPO_E_LIMIT: a model is not all in memory (ebpo_load_options). EBPO_E_CANCELLED,
@@ -442,6 +445,67 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_meet(ebpo_scene *scene, double tim
                                                    const ebpo_scene_ask_options *options,
                                                    ebpo_scene_meetings_fn take, void *user,
                                                    uint64_t *asked, ebpo_error *error);
+
+/* Two instances, a < b, on their way. */
+typedef struct ebpo_scene_way {
+    uint64_t a, b;
+
+    /* At all times before this one their faces are certainly farther apart than their clearance. */
+    double time;
+
+    /* Bounds of the distance of their faces then. */
+    double lo, hi;
+
+    double clearance;
+
+    /* Times at which they were looked at. */
+    uint64_t looks;
+
+    /*
+     * 1: at `time` they are at most clearance + tolerance apart. 0: `time` is the last time, at
+     * which they are farther apart, too. -1: after options.most_looks it was still open.
+     */
+    int32_t reached;
+
+    int32_t reserved;
+} ebpo_scene_way;
+
+/* Ways, lent until it returns. False: enough. */
+typedef bool (*ebpo_scene_ways_fn)(void *user, const ebpo_scene_way *ways, uint64_t count);
+
+typedef struct ebpo_scene_way_options {
+    size_t struct_size; /* EBPO_SCENE_WAY_OPTIONS_INIT sets it */
+
+    ebpo_progress progress;
+
+    /* Greater than 0, in the world's unit: the smaller, the more looks. */
+    double tolerance;
+
+    /* For each pair. 0: 10,000. */
+    uint64_t most_looks;
+
+    /* 0: all cores. The answers do not depend on it. */
+    unsigned threads;
+
+    uint32_t reserved;
+} ebpo_scene_way_options;
+
+#define EBPO_SCENE_WAY_OPTIONS_INIT EBPO_SIZED(ebpo_scene_way_options)
+
+/*
+ * When instances first come near each other, nothing being missed between two looks: each pair of
+ * ebpo_scene_pairs (from, to) is looked at, its distance and ebpo_scene_motion say until when
+ * nothing can happen, and then it is looked at again. A way for each pair, ascending by a, then b.
+ * An instance that is within another from the beginning, without coming near its faces, is apart.
+ *
+ * Errors as for ebpo_scene_meet; EBPO_E_ARGUMENT also: the tolerance is not above 0.
+ *
+ * Threads: one per scene; further ones live for the call.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_approach(ebpo_scene *scene, double from, double to,
+                                                       const ebpo_scene_way_options *options,
+                                                       ebpo_scene_ways_fn take, void *user,
+                                                       ebpo_error *error);
 
 #ifdef __cplusplus
 }

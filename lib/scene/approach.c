@@ -1,0 +1,151 @@
+/* When instances first come near each other: between two looks nothing is missed, for the way that
+ * both can go in the time between is shorter than what is between them. */
+#include "geom/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/fp_env.h"
+#include "base/parallel.h"
+#include "base/sized.h"
+#include "scene/asked_pairs.h"
+
+typedef struct travel {
+    const ebpo_scene *scene;
+    ebpo_scene_way_options how;
+    double from, to;
+    scene_pairs_list list;
+    ebpo_scene_way *ways;
+} travel;
+
+/* How far both go at most. */
+static ebpo_status motion_of(const travel *t, const ebpo_scene_way *w, double from, double to,
+                             double *out, ebpo_error *error)
+{
+    double a, b;
+    ebpo_status status = ebpo_scene_motion(t->scene, w->a, from, to, &a, error);
+    if (status == EBPO_OK)
+        status = ebpo_scene_motion(t->scene, w->b, from, to, &b, error);
+    if (status == EBPO_OK)
+        *out = (a + b) * (1 + 0x1p-50);
+    return status;
+}
+
+/* The next time to look: until then the way is shorter than `gap`; w->time where there is none. */
+static ebpo_status next_look(const travel *t, const ebpo_scene_way *w, double gap, double *next,
+                             ebpo_error *error)
+{
+    double low = w->time, high = t->to, at = high, length = 0;
+    ebpo_status status = motion_of(t, w, low, at, &length, error);
+    if (status != EBPO_OK || length < gap) {
+        *next = at;
+        return status;
+    }
+    /* halved until it fits, then a little longer again */
+    for (int n = 0; n < 70 && status == EBPO_OK && (low == w->time || n < 8); n++) {
+        at = low + (high - low) / 2;
+        status = motion_of(t, w, w->time, at, &length, error);
+        if (length < gap)
+            low = at;
+        else
+            high = at;
+    }
+    *next = low;
+    return status;
+}
+
+static ebpo_status look(const travel *t, ebpo_collider *collider, const ebpo_scene_pair *pair,
+                        ebpo_scene_way *w, ebpo_error *error)
+{
+    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
+    ebpo_clearance_options how = EBPO_CLEARANCE_OPTIONS_INIT;
+    ebpo_clearance found;
+    how.tolerance = t->how.tolerance / 4;
+    how.warm = true; /* lo and hi may differ by it: each pair has a collider of its own */
+    ebpo_status status = scene_pose_pair(t->scene, pair, w->time, &options, error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_distance(collider, &options, &how, &found, error);
+    if (status == EBPO_OK) {
+        w->lo = found.distance.lo;
+        w->hi = found.distance.hi;
+        w->looks++;
+    }
+    return status;
+}
+
+static ebpo_status go(const travel *t, ebpo_collider *collider, const ebpo_scene_pair *pair,
+                      ebpo_scene_way *w, ebpo_error *error)
+{
+    for (;;) {
+        double next;
+        ebpo_status status = look(t, collider, pair, w, error);
+        if (status != EBPO_OK)
+            return status;
+        w->reached = w->hi <= w->clearance + t->how.tolerance;
+        if (w->reached || w->time >= t->to)
+            return EBPO_OK;
+        if (w->looks >= t->how.most_looks) {
+            w->reached = -1;
+            return EBPO_OK;
+        }
+        status = next_look(t, w, w->lo - w->clearance, &next, error);
+        if (status != EBPO_OK)
+            return status;
+        w->time = next > w->time ? next : nextafter(w->time, INFINITY); /* a jump */
+    }
+}
+
+static ebpo_status go_pairs(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                            ebpo_error *error)
+{
+    const travel *t = context;
+    ebpo_status status = EBPO_OK;
+    (void)worker;
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
+        const ebpo_scene_pair *pair = &t->list.pairs[i];
+        ebpo_collider *collider = NULL;
+        t->ways[i] = (ebpo_scene_way){
+            .a = pair->a, .b = pair->b, .time = t->from, .clearance = pair->clearance
+        };
+        status = scene_collider(t->scene, pair, &collider, error);
+        if (status == EBPO_OK)
+            status = go(t, collider, pair, &t->ways[i], error);
+        ebpo_collider_free(collider);
+    }
+    return status;
+}
+
+static ebpo_status check(travel *t, const ebpo_scene_way_options *options, ebpo_error *error)
+{
+    ebpo_status status = EBPO_TAKE(ebpo_scene_way_options, &t->how, options, error);
+    if (status == EBPO_OK && !(t->how.tolerance > 0 && t->how.tolerance < INFINITY))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "the tolerance %g is not above 0",
+                         t->how.tolerance);
+    if (!t->how.most_looks)
+        t->how.most_looks = 10000;
+    return status;
+}
+
+ebpo_status ebpo_scene_approach(ebpo_scene *scene, double from, double to,
+                                const ebpo_scene_way_options *options, ebpo_scene_ways_fn take,
+                                void *user, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    travel t = { .scene = scene, .how = EBPO_SCENE_WAY_OPTIONS_INIT, .from = from, .to = to };
+    ebpo_status status = check(&t, options, error);
+    if (status == EBPO_OK)
+        status = scene_list_pairs(scene, from, to, &t.list, error);
+    t.ways = ebpo_alloc(t.list.count, sizeof *t.ways);
+    if (status == EBPO_OK && !t.ways)
+        status = ebpo_fail_memory(error, t.list.count * sizeof *t.ways);
+    if (status == EBPO_OK)
+        status = ebpo_parallel_for(ebpo_thread_count(t.how.threads), NULL, t.list.count, 1,
+                                   go_pairs, &t, &t.how.progress, "following routes", error);
+    if (status == EBPO_OK && t.list.count)
+        (void)take(user, t.ways, t.list.count);
+    free(t.list.pairs);
+    free(t.ways);
+    return status;
+}
