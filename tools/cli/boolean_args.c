@@ -1,10 +1,9 @@
 #include "cli/boolean_args.h"
 
-#include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "cli/command.h"
+#include "cli/pose_args.h"
 
 enum { DEEPEST = 64 }; /* parentheses */
 
@@ -109,59 +108,17 @@ bool boolean_read(const char *name, const char *text, uint32_t operands, boolean
 
 /* --- poses --- */
 
-/* Into number[most]; returns how many there are, -1: something else stands there. */
-static int read_numbers(const char *text, double *number, int most)
-{
-    static const char between[] = " \t,";
-    int count = 0;
-    for (text += strspn(text, between); *text; text += strspn(text, between)) {
-        char *end;
-        double x = strtod(text, &end);
-        if (end == text || count == most || !isfinite(x))
-            return -1;
-        number[count++] = x;
-        text = end;
-    }
-    return count;
-}
-
-/* q: x, y, z, w of any length but 0. */
-static bool turn(ebpo_pose *pose, const double q[4])
-{
-    double most = fmax(fmax(fabs(q[0]), fabs(q[1])), fmax(fabs(q[2]), fabs(q[3])));
-    if (!(most > 0))
-        return false;
-    double x = q[0] / most, y = q[1] / most, z = q[2] / most, w = q[3] / most;
-    double s = 2 / (x * x + y * y + z * z + w * w);
-    const double r[3][3] = {
-        { 1 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y) },
-        { s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x) },
-        { s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y) },
-    };
-    memcpy(pose->rotation, r, sizeof r);
-    return true;
-}
-
 static bool read_pose(const char *name, const char *text, uint32_t operands, ebpo_pose *pose)
 {
-    double number[8] = { 0 };
     const char *at = text + strspn(text, " \t");
     uint32_t operand = *at >= 'A' && *at <= 'Z' ? (uint32_t)(*at - 'A') : operands;
-    int count = operand < operands ? read_numbers(at + 1, number, 8) : -1;
-    bool good = count == 3 || count == 7 || count == 8;
-    if (good && count > 3)
-        good = turn(&pose[operand], number + 3);
-    if (!good) {
-        command_usage(name,
-                      "--pose '%s': expected a model and 3, 7 or 8 numbers, 'B X Y Z QX QY QZ QW "
-                      "SCALE', the quaternion not 0",
-                      text);
-        return false;
-    }
-    memcpy(pose[operand].translation, number, sizeof pose[operand].translation);
-    if (count == 8)
-        pose[operand].scale = number[7];
-    return true;
+    if (operand < operands && pose_read(at + 1, &pose[operand]))
+        return true;
+    command_usage(name,
+                  "--pose '%s': expected a model and a pose, 'B " POSE_FORM
+                  "', the quaternion not 0",
+                  text);
+    return false;
 }
 
 bool boolean_read_poses(const char *name, const arg_list *texts, uint32_t operands, ebpo_pose *pose)

@@ -16,8 +16,8 @@ typedef struct boolean_nodes {
  * on stderr what is wrong (exit with EXIT_USAGE). */
 bool boolean_read(const char *name, const char *text, uint32_t operands, boolean_nodes *out);
 
-/* "B X Y Z [QX QY QZ QW [SCALE]]", separated by blanks or commas, into pose[operands], which are
- * set before. False as above. */
+/* Each text a model and a pose as pose_read has it, into pose[operands], which are set before.
+ * False as above. */
 bool boolean_read_poses(const char *name, const arg_list *texts, uint32_t operands,
                         ebpo_pose *pose);
 

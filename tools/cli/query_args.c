@@ -84,7 +84,7 @@ static bool read_size(const char *name, const char *text, uint64_t *out)
     return false;
 }
 
-static bool read_time(const char *name, const char *text, uint64_t *out)
+bool query_read_time(const char *name, const char *text, uint64_t *out)
 {
     static const char *const units[] = { "", "us", "ns", "ms", "s", NULL };
     static const uint64_t factors[] = { 1000, 1000, 1, 1000000, 1000000000 };
@@ -115,7 +115,7 @@ bool query_options_from(const char *name, const query_values *v, ebpo_model_opti
     distance->warm = !v->no_warm;
     distance->max_distance = v->max_distance;
     if ((v->memory && !read_size(name, v->memory, &model->memory)) ||
-        (v->deadline && !read_time(name, v->deadline, &inside->deadline_ns)))
+        (v->deadline && !query_read_time(name, v->deadline, &inside->deadline_ns)))
         return false;
     distance->deadline_ns = inside->deadline_ns;
     return true;

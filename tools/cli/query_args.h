@@ -87,6 +87,9 @@ bool query_distance_fits(const char *name, const query_values *v);
 bool query_options_from(const char *name, const query_values *v, ebpo_model_options *model,
                         ebpo_inside_options *inside, ebpo_distance_options *distance);
 
+/* What --deadline takes, in ns. False as above. */
+bool query_read_time(const char *name, const char *text, uint64_t *out);
+
 /* A file, its model in memory, and a context. */
 typedef struct query_session {
     ebpo_file *file;

@@ -10,6 +10,7 @@
 #include "cli/command.h"
 #include "cli/json.h"
 #include "cli/points.h"
+#include "cli/pose_args.h"
 #include "cli/progress.h"
 #include "cli/query_args.h"
 #include "cmd/commands.h"
@@ -44,8 +45,9 @@ static const arg_option options[] = {
                 "of --distance: bounds are close enough when they differ by T times the upper one; "
                 "default 0.01"),
     OPTION_LIST("pose", 0, values, poses, "POSE",
-                "'B X Y Z [QX QY QZ QW [SCALE]]': where model B is: scaled, turned by a "
-                "quaternion, moved; may be repeated"),
+                "'B " POSE_FORM
+                "': where model B is: scaled, turned by a quaternion, moved; may be "
+                "repeated"),
     QUERY_MODEL_OPTIONS_FOR("opening, and for answers"),
     OPTION_FLAG("json", 0, query_values, json, "print JSON: an object, or one for each point"),
     REMOTE_HTTP_OPTIONS(query_values, remote),

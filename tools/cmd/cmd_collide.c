@@ -1,34 +1,30 @@
 /* ebpo collide: which faces of two models meet. */
 #include <stddef.h>
 #include <stdio.h>
-#include <stdlib.h>
 
 #include "cli/answers.h"
 #include "cli/command.h"
+#include "cli/pose_args.h"
 #include "cli/progress.h"
 #include "cli/query_args.h"
 #include "cmd/commands.h"
 
 typedef struct collide_values {
-    const char *pose_a, *pose_b;
+    const char *pose_a, *pose_b, *deadline;
     bool all, self, json, quiet;
-    double deadline;
     int64_t threads;
     remote_values remote;
 } collide_values;
 
-#define POSE_HELP                                                                    \
-    "where the model is: 'x y z' moves it; twelve numbers are the rows of a 3 by 4 " \
-    "matrix, a rotation and that; a thirteenth is a scale"
-
 static const arg_option options[] = {
-    OPTION_TEXT("pose-a", 0, collide_values, pose_a, "POSE", POSE_HELP),
+    OPTION_TEXT("pose-a", 0, collide_values, pose_a, "POSE",
+                "'" POSE_FORM "': where A is: scaled, turned by a quaternion, moved"),
     OPTION_TEXT("pose-b", 0, collide_values, pose_b, "POSE", "the same of B"),
     OPTION_FLAG("all", 0, collide_values, all, "print every pair of faces that meet"),
     OPTION_FLAG("self", 0, collide_values, self,
                 "faces of one model that meet otherwise than as neighbours"),
-    OPTION_REAL("deadline", 0, collide_values, deadline, "SECONDS", 0, 1e9,
-                "stop after about so long; 0, the default: never"),
+    OPTION_TEXT("deadline", 0, collide_values, deadline, "TIME",
+                "stop after about this long; in microseconds, or with a unit: 500us, 50ms, 2s"),
     OPTION_FLAG("json", 0, collide_values, json, "print JSON, an object a line"),
     OPTION_THREADS(collide_values, threads),
     OPTION_QUIET(collide_values, quiet),
@@ -49,45 +45,14 @@ static const arg_spec spec = {
     .options = options,
 };
 
-/* --- poses --- */
-
-/* How many numbers the text holds, at most `most`; -1: it holds something else, or more. */
-static int read_numbers(const char *text, double *out, int most)
-{
-    int count = 0;
-    for (const char *at = text;;) {
-        while (*at == ' ' || *at == ',' || *at == '\t')
-            at++;
-        if (!*at)
-            return count;
-        char *end;
-        double x = strtod(at, &end);
-        if (end == at || count == most)
-            return -1;
-        out[count++] = x;
-        at = end;
-    }
-}
-
 static bool read_pose(const char *name, const char *text, ebpo_pose *out)
 {
-    double x[13];
-    int count = text ? read_numbers(text, x, 13) : 0;
-    if (count != 3 && count < 12 && text) {
-        (void)command_usage("collide", "--%s takes 3, 12 or 13 numbers", name);
-        return false;
-    }
-    if (count == 3)
-        for (int i = 0; i < 3; i++)
-            out->translation[i] = x[i];
-    for (int i = 0; i < 3 && count >= 12; i++) {
-        for (int k = 0; k < 3; k++)
-            out->rotation[i][k] = x[4 * i + k];
-        out->translation[i] = x[4 * i + 3];
-    }
-    if (count == 13)
-        out->scale = x[12];
-    return true;
+    if (!text || pose_read(text, out))
+        return true;
+    (void)command_usage("collide",
+                        "--%s '%s': expected a pose, '" POSE_FORM "', the quaternion not 0", name,
+                        text);
+    return false;
 }
 
 /* --- answers --- */
@@ -171,9 +136,9 @@ static int run(void *given, const char **operand)
     if (v->self && (v->all || v->pose_a || v->pose_b))
         return command_usage("collide", "--self takes neither --all nor poses");
     if (!read_pose("pose-a", v->pose_a, &how.pose_a) ||
-        !read_pose("pose-b", v->pose_b, &how.pose_b))
+        !read_pose("pose-b", v->pose_b, &how.pose_b) ||
+        (v->deadline && !query_read_time("collide", v->deadline, &how.deadline_ns)))
         return EXIT_USAGE;
-    how.deadline_ns = (uint64_t)(v->deadline * 1e9);
     holding.threads = (unsigned)v->threads;
     answers_begin("collide");
     int code = query_open(&a, "collide", operand[0], &holding, -1, &v->remote);
