@@ -57,7 +57,7 @@ struct ebpo_scene {
     SCENE_LIST(scene_route, routes);
     SCENE_LIST(ebpo_scene_camera, cameras);
     SCENE_LIST(scene_rule, rules); /* sorted, once a file is read */
-    SCENE_LIST(char *, sets);      /* names: "*", "layer:L", "group:G", and instances' */
+    SCENE_LIST(char *, sets);      /* names: "*", those of layers, groups and instances */
     SCENE_LIST(uint64_t, layers);  /* their sets */
     SCENE_LIST(scene_file, files);
     json_t *names; /* of each kind and of sets, with their numbers */

@@ -23,7 +23,7 @@ extern "C" {
 typedef struct ebpo_collider_options {
     size_t struct_size; /* EBPO_COLLIDER_OPTIONS_INIT sets it */
 
-    /* For all pairs and contacts. 0: all cores. The others use the calling thread. */
+    /* For all pairs. 0: all cores. The other questions use the calling thread. */
     unsigned threads;
 
     /*
@@ -92,7 +92,7 @@ typedef enum ebpo_pair_kind {
 typedef struct ebpo_face_pair {
     uint64_t face_a, face_b, file_face_a, file_face_b;
 
-    /* An ebpo_pair_kind, not EBPO_PAIR_APART. */
+    /* An ebpo_pair_kind; EBPO_PAIR_APART where none was found, or of a nearest pair. */
     int32_t kind;
 
     int32_t reserved;
@@ -217,8 +217,8 @@ typedef struct ebpo_clearance {
  *
  * options, clearance   NULL for the usual ones
  *
- * EBPO_E_ARGUMENT: also a tolerance below 0 or infinite, at_least is no number. Others, and
- * threads, as for ebpo_collide_first.
+ * EBPO_E_ARGUMENT: also a tolerance below 0 or infinite, at_least is no number. Others as for
+ * ebpo_collide_first.
  *
  * Threads: one per collider.
  */
