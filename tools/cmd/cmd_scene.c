@@ -40,7 +40,7 @@ static const arg_spec spec = {
     .operands = "info|check|boxes|pairs|report|approach FILE",
     .least = 2,
     .most = 2,
-    .summary = "describes a scene: models at many places, that move, and who may meet",
+    .summary = "describes a scene: models at many places, that move, and which meet",
     .text =
         "FILE is a scene in JSON. 'info' tells what it holds and where that is, 'check' opens "
         "every model and says whether all fits together, 'boxes' prints the box of each "
