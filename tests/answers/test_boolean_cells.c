@@ -413,12 +413,13 @@ END_TEST
 Suite *test_suite(void)
 {
     Suite *s = suite_create("boolean_cells");
-    TCase *c = tcase_create("boolean_cells");
+    TCase *c = tcase_create("boolean_cells"), *threads = tcase_create("threads");
     tcase_set_timeout(c, 1200);
+    tcase_set_timeout(threads, 1200);
+    tcase_add_test(threads, swapping_and_threads_change_nothing);
     tcase_add_test(c, volumes_of_cubes);
     tcase_add_test(c, volumes_of_spheres);
     tcase_add_test(c, surfaces_of_cells_hold_and_are_held);
-    tcase_add_test(c, swapping_and_threads_change_nothing);
     tcase_add_test(c, loading_changes_nothing);
     tcase_add_test(c, nodes_decide_most);
     tcase_add_test(c, distances_to_rows_of_boxes);
@@ -426,5 +427,6 @@ Suite *test_suite(void)
     tcase_add_test(c, boxes_apart_have_nothing_in_common);
     tcase_add_test(c, what_cannot_be_is_refused);
     suite_add_tcase(s, c);
+    suite_add_tcase(s, threads);
     return s;
 }

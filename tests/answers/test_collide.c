@@ -265,6 +265,22 @@ START_TEST(all_pairs_are_those_of_brute_force)
 }
 END_TEST
 
+/* At one place each face meets its neighbours: pairs enough for every thread. */
+START_TEST(threads_find_the_same)
+{
+    query_model m;
+    ebpo_pose here = EBPO_POSE_INIT;
+    query_model_make(&m, "torus", query_solid_by_name("torus"), &query_variants[0]);
+    pair_list one = ask_all(m.model, &here, m.model, &here, 1, 0),
+              four = ask_all(m.model, &here, m.model, &here, 4, 0);
+    ck_assert_uint_gt(one.count, 1000);
+    check_same(&one, &four, "four threads");
+    free(one.pair);
+    free(four.pair);
+    query_model_free(&m);
+}
+END_TEST
+
 /* --- one model with itself --- */
 
 static bool same_point(const double p[3], const double q[3])
@@ -369,12 +385,15 @@ END_TEST
 
 Suite *test_suite(void)
 {
-    TCase *tests = tcase_create("collide");
+    TCase *tests = tcase_create("collide"), *threads = tcase_create("threads");
     tcase_set_timeout(tests, 900);
+    tcase_set_timeout(threads, 900);
+    tcase_add_test(threads, threads_find_the_same);
     tcase_add_loop_test(tests, all_pairs_are_those_of_brute_force, 0, NAMES * NAMES);
     tcase_add_loop_test(tests, faces_that_cross_within_a_model_are_found, 0, NAMES);
     tcase_add_test(tests, poses_are_refused_and_questions_end_early);
     Suite *suite = suite_create("collide");
     suite_add_tcase(suite, tests);
+    suite_add_tcase(suite, threads);
     return suite;
 }
