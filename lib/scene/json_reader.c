@@ -121,7 +121,7 @@ ebpo_status json_get_real(json_reader *r, const json_t *object, const char *key,
 ebpo_status json_get_reals(json_reader *r, const json_t *object, const char *key, bool needed,
                            double *out, size_t count)
 {
-    char what[40];
+    char what[64];
     const json_t *value = json_object_get(object, key);
     if (!value)
         return missing(r, key, needed);
