@@ -36,7 +36,7 @@ typedef struct scene_route {
  * own, that of all, its layer's and its groups'. */
 typedef struct scene_instance {
     ebpo_scene_instance as; /* its name is owned */
-    uint64_t *sets;         /* ascending */
+    uint64_t *sets;         /* ascending, once the rules are sorted */
     uint32_t set_count;
 } scene_instance;
 

@@ -14,6 +14,24 @@ static int compare_rules(const void *a, const void *b)
     return (x->b > y->b) - (x->b < y->b);
 }
 
+static int compare_sets(const void *a, const void *b)
+{
+    const uint64_t *x = a, *y = b;
+    return (*x > *y) - (*x < *y);
+}
+
+/* Ascending, each once. */
+static void sort_sets(scene_instance *i)
+{
+    uint32_t kept = 0;
+    if (i->set_count)
+        qsort(i->sets, i->set_count, sizeof *i->sets, compare_sets);
+    for (uint32_t k = 0; k < i->set_count; k++)
+        if (!kept || i->sets[kept - 1] != i->sets[k])
+            i->sets[kept++] = i->sets[k];
+    i->set_count = kept;
+}
+
 /* One rule for a pair of sets: ignored if any line says so, else the greatest clearance. */
 void scene_sort_rules(ebpo_scene *scene)
 {
@@ -31,6 +49,8 @@ void scene_sort_rules(ebpo_scene *scene)
             scene->rules[kept++] = rule;
     }
     scene->rules_count = kept;
+    for (uint64_t i = 0; i < scene->instances_count; i++)
+        sort_sets(&scene->instances[i]);
 }
 
 /* Of two sets: below 0 ignored, 0 also where there is no rule. */
@@ -42,6 +62,40 @@ static double rule_of(const ebpo_scene *scene, uint64_t a, uint64_t b)
     return rule ? rule->clearance : 0;
 }
 
+/* What is said of a pair so far; false: it is ignored. */
+static bool take_rule(double rule, double *clearance)
+{
+    *clearance = fmax(*clearance, rule);
+    return rule >= 0;
+}
+
+static bool by_sets(const ebpo_scene *scene, const scene_instance *x, const scene_instance *y,
+                    double *clearance)
+{
+    for (uint32_t i = 0; i < x->set_count; i++)
+        for (uint32_t k = 0; k < y->set_count; k++)
+            if (!take_rule(rule_of(scene, x->sets[i], y->sets[k]), clearance))
+                return false;
+    return true;
+}
+
+static bool is_in(const scene_instance *i, uint64_t set)
+{
+    return bsearch(&set, i->sets, i->set_count, sizeof set, compare_sets) != NULL;
+}
+
+static bool by_rules(const ebpo_scene *scene, const scene_instance *x, const scene_instance *y,
+                     double *clearance)
+{
+    for (uint64_t i = 0; i < scene->rules_count; i++) {
+        const scene_rule *r = &scene->rules[i];
+        if (((is_in(x, r->a) && is_in(y, r->b)) || (is_in(x, r->b) && is_in(y, r->a))) &&
+            !take_rule(r->clearance, clearance))
+            return false;
+    }
+    return true;
+}
+
 bool ebpo_scene_pair_rule(const ebpo_scene *scene, uint64_t a, uint64_t b, double *clearance)
 {
     *clearance = 0;
@@ -50,14 +104,7 @@ bool ebpo_scene_pair_rule(const ebpo_scene *scene, uint64_t a, uint64_t b, doubl
     const scene_instance *x = &scene->instances[a], *y = &scene->instances[b];
     if (x->as.fixed && y->as.fixed)
         return false;
-    if (!scene->rules_count)
-        return true;
-    for (uint32_t i = 0; i < x->set_count; i++)
-        for (uint32_t k = 0; k < y->set_count; k++) {
-            double rule = rule_of(scene, x->sets[i], y->sets[k]);
-            if (rule < 0)
-                return false;
-            *clearance = fmax(*clearance, rule);
-        }
-    return true;
+    /* each group with each of the other would take hours where both have 100,000 */
+    bool few = scene->rules_count < (uint64_t)x->set_count * y->set_count;
+    return (few ? by_rules : by_sets)(scene, x, y, clearance);
 }

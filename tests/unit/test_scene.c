@@ -472,6 +472,53 @@ static void all_pairs(const ebpo_scene *s, double from, double to, found *f)
         }
 }
 
+/* Few lines and many, of instances with few groups and many: each line looked at, in its order. */
+START_TEST(rules_as_twin)
+{
+    enum { INSTANCES = 8, MOST = 60 };
+    uint64_t state = 40 + (uint64_t)_i;
+    int groups = _i % 2 ? 12 : 1, lines = _i / 2 ? MOST : 4;
+    ebpo_scene *s = some_scene(&state, 0, 0);
+    bool in[INSTANCES][200] = { { false } };
+    scene_rule line[MOST];
+    char name[20];
+    for (int g = 0; g < groups; g++) {
+        snprintf(name, sizeof name, "g%d", g);
+        fine(scene_add_group(s, name, &error));
+    }
+    for (int i = 0; i < INSTANCES; i++) {
+        ebpo_scene_instance at = EBPO_SCENE_INSTANCE_INIT;
+        snprintf(name, sizeof name, "i%d", i);
+        at.name = name;
+        fine(ebpo_scene_add_instance(s, &at, NULL, &error));
+        in[i][SCENE_ALL_SET] = in[i][s->sets_count - 1] = true;
+        for (int g = 0; g < groups; g++) {
+            uint64_t set = (uint64_t)twin_integer(&state, 1, groups);
+            fine(scene_join_set(s, set, &error));
+            in[i][set] = true;
+        }
+    }
+    for (int i = 0; i < lines; i++) {
+        line[i].a = (uint64_t)twin_integer(&state, 1, (int)s->sets_count - 1);
+        line[i].b = (uint64_t)twin_integer(&state, i ? 1 : 0, (int)s->sets_count - 1);
+        line[i].clearance = i % 5 == 4 ? -1 : twin_integer(&state, 0, 9);
+        fine(scene_add_rule(s, line[i].a, line[i].b, line[i].clearance, &error));
+    }
+    scene_sort_rules(s);
+    for (uint64_t a = 0; a < INSTANCES; a++)
+        for (uint64_t b = 0; b < INSTANCES; b++) {
+            double want = 0, got;
+            for (int i = 0; i < lines && want >= 0; i++)
+                if ((in[a][line[i].a] && in[b][line[i].b]) ||
+                    (in[a][line[i].b] && in[b][line[i].a]))
+                    want = line[i].clearance < 0 ? -1 : fmax(want, line[i].clearance);
+            bool asked = ebpo_scene_pair_rule(s, a, b, &got);
+            ck_assert(a == b ? !asked : asked ? got == want : want < 0);
+        }
+    ebpo_scene_free(s);
+}
+END_TEST
+
 START_TEST(pairs_as_twin)
 {
     static found fast, slow;
@@ -510,6 +557,7 @@ Suite *test_suite(void)
     tcase_add_test(c, boxes_of_any_size_hold);
     tcase_add_test(c, bounds_are_close);
     tcase_add_test(c, box_grows_with_instances);
+    tcase_add_loop_test(c, rules_as_twin, 0, 4);
     tcase_add_loop_test(c, pairs_as_twin, 0, 4);
     suite_add_tcase(suite, c);
     return suite;
