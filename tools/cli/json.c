@@ -120,11 +120,9 @@ void json_int(json *j, const char *key, int64_t v)
 
 void json_real(json *j, const char *key, double v)
 {
+    char text[32];
     lead(j, key);
-    if (isfinite(v))
-        fprintf(j->out, "%.17g", v);
-    else
-        fputs("null", j->out);
+    fputs(json_number(v, text), j->out);
 }
 
 void json_bool(json *j, const char *key, bool v)
@@ -149,4 +147,10 @@ void json_reals(json *j, const char *key, const double *v, int count)
         else
             fprintf(j->out, "%snull", i ? ", " : "");
     fputc(']', j->out);
+}
+
+const char *json_number(double x, char text[32])
+{
+    snprintf(text, 32, isfinite(x) ? "%.17g" : "null", x);
+    return text;
 }

@@ -86,13 +86,6 @@ static void print_inside(const values *v, const ebpo_boolean_result *r)
         printf("%s%s\n", where_of(r), doubt_of(r));
 }
 
-/* As JSON has it, which knows no infinity. */
-static const char *number(double x, char text[32])
-{
-    snprintf(text, 32, isfinite(x) ? "%.17g" : "null", x);
-    return text;
-}
-
 static void print_distance(const values *v, const ebpo_boundary_distance *d)
 {
     if (!v->query.json)
@@ -100,8 +93,8 @@ static void print_distance(const values *v, const ebpo_boundary_distance *d)
     else
         printf("{\"lo\": %s, \"hi\": %s, \"where\": \"%s\", \"certain\": %s, \"cells\": %" PRIu64
                "}\n",
-               number(d->lo, (char[32]){ 0 }), number(d->hi, (char[32]){ 0 }), where_of(&d->inside),
-               d->inside.certain ? "true" : "false", d->cells);
+               json_number(d->lo, (char[32]){ 0 }), json_number(d->hi, (char[32]){ 0 }),
+               where_of(&d->inside), d->inside.certain ? "true" : "false", d->cells);
 }
 
 static void print_volume(const values *v, const ebpo_boolean_volume *b)
