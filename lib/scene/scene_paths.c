@@ -21,11 +21,11 @@ const char *scene_path_refused(const char *path, const ebpo_scene_options *optio
     if (!*path)
         return "is no path";
     if (ebpo_is_url(path) && !options->remote)
-        return "is on a server, which has to be allowed";
+        return "is on a server, which has to be allowed (ebpo scene --remote)";
     if (ebpo_is_url(path) && !has_digest)
         return "is on a server, and needs its content_sha256 here";
     if (!ebpo_is_url(path) && !options->outside && (*path == '/' || goes_up(path)))
-        return "is outside the scene's folder, which has to be allowed";
+        return "is outside the scene's folder, which has to be allowed (ebpo scene --outside)";
     return NULL;
 }
 

@@ -49,15 +49,15 @@ static const arg_spec spec = {
     .options = options,
 };
 
-/* Which times are asked about. */
-static bool settle_times(scene_values *v, const ebpo_scene *scene)
+/* Which times are asked about: one, unless a span is given, or `spans` makes it the usual. */
+static bool settle_times(scene_values *v, bool spans, const ebpo_scene *scene)
 {
     ebpo_scene_counts c = EBPO_SCENE_COUNTS_INIT;
     (void)ebpo_scene_get_counts(scene, &c);
-    bool span = !isnan(v->from) || !isnan(v->to);
+    bool span = !isnan(v->from) || !isnan(v->to) || v->step > 0;
     if (span && !isnan(v->time))
         return false;
-    if (!span) {
+    if (!span && !(spans && isnan(v->time))) {
         v->from = v->to = isnan(v->time) ? c.begin : v->time;
     } else {
         v->from = isnan(v->from) ? c.begin : v->from;
@@ -107,11 +107,12 @@ static int run(void *given, const char **operand)
     how.outside = v->outside;
     how.remote = v->remote;
     ebpo_status status = ebpo_scene_open(operand[1], &how, &scene, &error);
-    if (status == EBPO_OK && !settle_times(v, scene)) {
+    bool approach = deeds[deed].run == scene_approach;
+    if (status == EBPO_OK && !settle_times(v, approach, scene)) {
         ebpo_scene_free(scene);
         return command_usage("scene", "--time stands alone; --from is not after --to");
     }
-    if (status == EBPO_OK && deeds[deed].run == scene_approach && !(v->tolerance > 0)) {
+    if (status == EBPO_OK && approach && !(v->tolerance > 0)) {
         ebpo_scene_free(scene);
         return command_usage("scene", "approach needs --tolerance");
     }
