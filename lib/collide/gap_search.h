@@ -37,7 +37,8 @@ typedef struct ebpo_gap_faces {
     uint8_t lanes;
 } ebpo_gap_faces;
 
-enum { EBPO_GAP_CANDIDATES = 256, EBPO_GAP_FACES_KEPT = 16, EBPO_GAP_NONE = UINT32_MAX };
+enum { EBPO_GAP_CANDIDATES = 256, EBPO_GAP_FACES_KEPT = 16 };
+#define EBPO_GAP_NONE UINT32_MAX
 
 typedef struct ebpo_gap_search ebpo_gap_search;
 struct ebpo_gap_search {

@@ -2,6 +2,7 @@
 
 #include "collide/gathering.h"
 
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -59,7 +60,8 @@ static ebpo_status run_parts(void *user, uint64_t begin, uint64_t end, unsigned 
         uint64_t before = w->met_count;
         if (!w->kernels->run(w, EBPO_WALK_PAIRS))
             return no_memory(w, error);
-        if ((g->found += w->met_count - before) > g->most)
+        uint64_t more = w->met_count - before;
+        if (atomic_fetch_add(&g->found, more) + more > g->most)
             g->full = true;
         if (ebpo_collision_is_late(g->question))
             return ebpo_fail(error, EBPO_E_CANCELLED, "%s: the deadline has passed", stage);

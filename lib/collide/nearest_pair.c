@@ -74,12 +74,20 @@ static bool compare_to_asked(ebpo_nearest_pair *n, const ebpo_face_two *f)
     return false;
 }
 
-/* A tolerance asks for bounds only: the least of each. */
-static void take_within_tolerance(ebpo_nearest_pair *n, const ebpo_face_two *f)
+/* A tolerance asks for bounds only: the least of each. They are too wide for a gap that is tiny
+ * beside its faces, whose direction doubles hardly know: then for the exact distance, rounded. */
+static void take_within_tolerance(ebpo_nearest_pair *n, const ebpo_face_two *given)
 {
-    n->lo = fmin(n->lo, f->bounds.lo);
-    if (!n->found || f->bounds.hi < n->best.bounds.hi)
-        n->best = *f;
+    ebpo_face_two f = *given;
+    double hi = n->found ? fmin(f.bounds.hi, n->best.bounds.hi) : f.bounds.hi;
+    if (f.bounds.lo < hi - n->tolerance) {
+        double exact = ebpo_triangles_distance(CORNERS(&f, 0), CORNERS(&f, 1));
+        f.bounds.lo = nextafter(exact, 0);
+        f.bounds.hi = nextafter(exact, INFINITY);
+    }
+    n->lo = fmin(n->lo, f.bounds.lo);
+    if (!n->found || f.bounds.hi < n->best.bounds.hi)
+        n->best = f;
     n->found = true;
 }
 

@@ -1,3 +1,5 @@
+#include "geom/strict_fp.h"
+
 #include "query/kept_envelopes.h"
 
 #include <stdlib.h>

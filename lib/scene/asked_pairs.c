@@ -1,4 +1,6 @@
 /* Pairs of instances that are asked about one after the other, by any thread. */
+#include "geom/strict_fp.h"
+
 #include "scene/asked_pairs.h"
 
 #include <stdlib.h>

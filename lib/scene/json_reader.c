@@ -1,4 +1,6 @@
 /* Members of a scene file, by jansson. */
+#include "geom/strict_fp.h"
+
 #include "scene/json_reader.h"
 
 #include <stdarg.h>

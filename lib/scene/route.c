@@ -53,7 +53,7 @@ void scene_turn_of_matrix(const double m[3][3], double turn[4])
     turn[3] = m[k][j] - m[j][k];
 }
 
-static void matrix_of_turn(const double q[4], double m[3][3])
+static void matrix_of_turn(const double q[4], double (*m)[3])
 {
     double x = q[0], y = q[1], z = q[2], w = q[3];
     m[0][0] = 1 - 2 * (y * y + z * z);

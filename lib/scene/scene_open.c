@@ -1,4 +1,6 @@
 /* Scene files and the models that they name. */
+#include "geom/strict_fp.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

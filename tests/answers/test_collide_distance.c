@@ -63,7 +63,7 @@ static void check_points(const ebpo_clearance *got, double size, const char *wha
     double square = 0, most = 0;
     for (int k = 0; k < 3; k++) {
         square += pow(got->point_a[k] - got->point_b[k], 2);
-        most = fmax(most, fabs(got->point_a[k]));
+        most = fmax(most, fmax(fabs(got->point_a[k]), fabs(got->point_b[k])));
     }
     ck_assert_msg(fabs(sqrt(square) - got->distance.hi) <= 1e-13 * (size + most),
                   "%s: points are %.17g apart, not %.17g", what, sqrt(square), got->distance.hi);

@@ -26,7 +26,8 @@ void __wrap_free(void *block);
 
 static void *count(void *block)
 {
-    int64_t now = held += (int64_t)malloc_usable_size(block), before = most;
+    int64_t size = (int64_t)malloc_usable_size(block);
+    int64_t now = atomic_fetch_add(&held, size) + size, before = most;
     while (now > before && !atomic_compare_exchange_weak(&most, &before, now))
         ;
     return block;
