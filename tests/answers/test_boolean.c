@@ -267,7 +267,7 @@ static void ask_all(const char *const solids[OPERANDS], const ebpo_pose poses[OP
     for (int i = 0; i < OPERANDS; i++)
         operand_make(&o[i], solids[i], i, &poses[i]);
     for (int f = 0; f < FORMULAS; f++)
-        ask(o, &formulas[f], query_scaled(400), 77 + (uint64_t)f, seen);
+        ask(o, &formulas[f], 100 + query_scaled(300), 77 + (uint64_t)f, seen);
     for (int i = 0; i < OPERANDS; i++)
         operand_free(&o[i]);
     ck_assert(seen[EBPO_IN] && seen[EBPO_OUT]);
