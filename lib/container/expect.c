@@ -16,7 +16,8 @@ static void add(ebpo_expected *e, uint64_t offset, uint64_t size)
 
 bool ebpo_expected_wanted(const ebpo_expected *e)
 {
-    return ebpo_input_expects(&e->file->in) || (e->near && ebpo_input_hints(&e->file->in));
+    return e->summed || ebpo_input_expects(&e->file->in) ||
+           (e->near && ebpo_input_hints(&e->file->in));
 }
 
 void ebpo_expect_chunks(ebpo_expected *e, const ebpo_array_in *array, uint64_t begin, uint64_t end)
@@ -58,22 +59,40 @@ static int compare_ranges(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Joined where little lies between them: each takes a call of the system. */
-static void hint(ebpo_expected *e)
+/* By place, joined where at most so many bytes lie between them. */
+static void join_ranges(ebpo_expected *e, uint64_t between)
 {
-    enum { BETWEEN = 16 << 10 };
     uint64_t kept = 0;
     if (e->count)
         qsort(e->range, e->count, sizeof *e->range, compare_ranges);
     for (uint64_t i = 0; i < e->count; i++) {
         ebpo_range *last = kept ? &e->range[kept - 1] : NULL, next = e->range[i];
         uint64_t end = next.offset + next.size;
-        if (last && next.offset <= last->offset + last->size + BETWEEN)
+        if (last && next.offset <= last->offset + last->size + between)
             last->size = end > last->offset + last->size ? end - last->offset : last->size;
         else
             e->range[kept++] = next;
     }
-    ebpo_input_hint(&ebpo_reader_own(e->file)->in, e->range, kept);
+    e->count = kept;
+}
+
+/* Each takes a call of the system. */
+static void hint(ebpo_expected *e)
+{
+    enum { BETWEEN = 16 << 10 };
+    join_ranges(e, BETWEEN);
+    ebpo_input_hint(&ebpo_reader_own(e->file)->in, e->range, e->count);
+}
+
+uint64_t ebpo_expected_bytes(ebpo_expected *e)
+{
+    uint64_t sum = 0;
+    join_ranges(e, 0);
+    for (uint64_t i = 0; i < e->count; i++)
+        sum += e->range[i].size;
+    free(e->range);
+    *e = (ebpo_expected)EBPO_EXPECTED_INIT(e->file);
+    return sum;
 }
 
 void ebpo_expect_all(ebpo_expected *e)

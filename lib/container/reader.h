@@ -17,10 +17,11 @@ typedef struct ebpo_expected {
     uint64_t count, capacity;
     bool failed; /* where chunks lie could not be read */
     bool near;   /* of files on a disk, too: the system is told */
+    bool summed; /* of any file: for ebpo_expected_bytes */
 } ebpo_expected;
-#define EBPO_EXPECTED_INIT(file)       \
-    {                                  \
-        file, NULL, 0, 0, false, false \
+#define EBPO_EXPECTED_INIT(file)              \
+    {                                         \
+        file, NULL, 0, 0, false, false, false \
     }
 /* Chunks [begin, end) of an array that is present or not. */
 void ebpo_expect_chunks(ebpo_expected *expected, const ebpo_array_in *array, uint64_t begin,
@@ -39,6 +40,8 @@ void ebpo_expect_top(const ebpo_file *file);
 bool ebpo_expected_wanted(const ebpo_expected *expected);
 /* Announces what was collected, and frees it. */
 void ebpo_expect_all(ebpo_expected *expected);
+/* Instead: how many bytes of the file that is, each counted once. */
+uint64_t ebpo_expected_bytes(ebpo_expected *expected);
 
 /* In memory, by so many threads. */
 static inline ebpo_read_options ebpo_read_threads(unsigned threads)

@@ -11,6 +11,7 @@
 #include "base/parallel.h"
 #include "base/sized.h"
 #include "scene/asked_pairs.h"
+#include "scene/left_out.h"
 
 typedef struct travel {
     const ebpo_scene *scene;
@@ -56,23 +57,43 @@ static ebpo_status next_look(const travel *t, const ebpo_scene_way *w, double ga
     return status;
 }
 
-static ebpo_status look(const travel *t, ebpo_collider *collider, const ebpo_scene_pair *pair,
-                        ebpo_scene_way *w, ebpo_error *error)
+/* Of a collider that is not there: nothing is left to be near. */
+static ebpo_status ask_distance(const travel *t, ebpo_collider *collider,
+                                const ebpo_scene_pair *pair, ebpo_scene_way *w, ebpo_error *error)
 {
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_clearance_options how = EBPO_CLEARANCE_OPTIONS_INIT;
-    ebpo_clearance found;
+    ebpo_clearance found = { .distance = { .lo = INFINITY, .hi = INFINITY } };
     how.tolerance = t->how.tolerance / 4;
     how.warm = true; /* lo and hi may differ by it: each pair has a collider of its own */
     ebpo_status status = scene_pose_pair(t->scene, pair, w->time, &options, error);
-    if (status == EBPO_OK)
+    if (status == EBPO_OK && collider)
         status = ebpo_collide_distance(collider, &options, &how, &found, error);
-    if (status == EBPO_OK) {
-        w->lo = found.distance.lo;
-        w->hi = found.distance.hi;
-        w->looks++;
-    }
+    w->lo = found.distance.lo;
+    w->hi = found.distance.hi;
     return status;
+}
+
+static bool is_reached(const travel *t, const ebpo_scene_way *w)
+{
+    return w->hi <= w->clearance + t->how.tolerance;
+}
+
+static ebpo_status look(const travel *t, ebpo_collider *collider, const ebpo_scene_pair *pair,
+                        ebpo_scene_way *w, ebpo_error *error)
+{
+    double gap = INFINITY;
+    uint64_t lacking = 0;
+    ebpo_status status = ask_distance(t, collider, pair, w, error);
+    if (status == EBPO_OK)
+        status = scene_left_out(t->scene, pair, w->time, &gap, &lacking, error);
+    if (status != EBPO_OK)
+        return status;
+    w->looks++;
+    w->lo = fmin(w->lo, gap);
+    return is_reached(t, w) || gap > w->clearance
+               ? EBPO_OK
+               : scene_lacks(t->scene, pair, lacking, w->time, error);
 }
 
 static ebpo_status go(const travel *t, ebpo_collider *collider, const ebpo_scene_pair *pair,
@@ -83,7 +104,7 @@ static ebpo_status go(const travel *t, ebpo_collider *collider, const ebpo_scene
         ebpo_status status = look(t, collider, pair, w, error);
         if (status != EBPO_OK)
             return status;
-        w->reached = w->hi <= w->clearance + t->how.tolerance;
+        w->reached = is_reached(t, w);
         if (w->reached || w->time >= t->to)
             return EBPO_OK;
         if (w->looks >= t->how.most_looks) {

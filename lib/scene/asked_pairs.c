@@ -31,13 +31,20 @@ static ebpo_status make_models(ebpo_scene *scene, const scene_pairs_list *list, 
     return status;
 }
 
-ebpo_status scene_list_pairs(ebpo_scene *scene, double from, double to, scene_pairs_list *out,
+ebpo_status scene_keep_pairs(const ebpo_scene *scene, double from, double to, scene_pairs_list *out,
                              ebpo_error *error)
 {
     *out = (scene_pairs_list){ 0 };
     ebpo_status status = ebpo_scene_pairs(scene, from, to, keep_pairs, out, error);
     if (status == EBPO_OK && out->count && !out->pairs)
         status = ebpo_fail_memory(error, out->count * sizeof *out->pairs);
+    return status;
+}
+
+ebpo_status scene_list_pairs(ebpo_scene *scene, double from, double to, scene_pairs_list *out,
+                             ebpo_error *error)
+{
+    ebpo_status status = scene_keep_pairs(scene, from, to, out, error);
     if (status == EBPO_OK)
         status = make_models(scene, out, error);
     if (status != EBPO_OK) {
@@ -52,11 +59,20 @@ static ebpo_model *model_of(const ebpo_scene *scene, uint64_t instance)
     return scene->files[scene->models[scene->instances[instance].as.model].file].model;
 }
 
+static bool has_mesh(const ebpo_scene *scene, uint64_t instance)
+{
+    uint64_t model = scene->instances[instance].as.model;
+    return ebpo_file_info(ebpo_scene_file(scene, model))->parts & EBPO_PART_MESH;
+}
+
 ebpo_status scene_collider(const ebpo_scene *scene, const ebpo_scene_pair *pair,
                            ebpo_collider **out, ebpo_error *error)
 {
     ebpo_collider_options single = EBPO_COLLIDER_OPTIONS_INIT;
     single.threads = 1;
+    *out = NULL;
+    if (!has_mesh(scene, pair->a) || !has_mesh(scene, pair->b))
+        return EBPO_OK;
     return ebpo_collider_new(model_of(scene, pair->a), model_of(scene, pair->b), &single, out,
                              error);
 }

@@ -11,10 +11,14 @@ typedef struct scene_pairs_list {
     uint64_t count;
 } scene_pairs_list;
 
-/* Those of ebpo_scene_pairs; their models are made. On failure there is nothing to free. */
+/* Those of ebpo_scene_pairs. On failure there is nothing to free. */
+EBPO_MUST_USE ebpo_status scene_keep_pairs(const ebpo_scene *scene, double from, double to,
+                                           scene_pairs_list *out, ebpo_error *error);
+/* The same; their models are made. On failure there is nothing to free. */
 EBPO_MUST_USE ebpo_status scene_list_pairs(ebpo_scene *scene, double from, double to,
                                            scene_pairs_list *out, ebpo_error *error);
-/* For one of these pairs and one thread. */
+/* For one of these pairs and one thread. NULL: a file has no mesh; then scene_left_out counts all
+ * of it. */
 EBPO_MUST_USE ebpo_status scene_collider(const ebpo_scene *scene, const ebpo_scene_pair *pair,
                                          ebpo_collider **out, ebpo_error *error);
 /* Where both are at a time. */

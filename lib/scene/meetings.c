@@ -10,6 +10,7 @@
 #include "base/parallel.h"
 #include "base/sized.h"
 #include "scene/asked_pairs.h"
+#include "scene/left_out.h"
 
 typedef struct asking {
     const ebpo_scene *scene;
@@ -19,11 +20,20 @@ typedef struct asking {
     ebpo_scene_meeting *meetings;
 } asking;
 
-/* Counts pairs of faces by kind; only whether there is one that crosses, where that is enough. */
+/* Counts pairs of faces by kind, and keeps the first by numbers; only whether there is one that
+ * crosses, where that is enough. */
 typedef struct tally {
     ebpo_scene_meeting *m;
     bool enough;
 } tally;
+
+static void keep_first(ebpo_scene_meeting *m, const ebpo_face_pair *p)
+{
+    if (p->face_a < m->face_a || (p->face_a == m->face_a && p->face_b < m->face_b)) {
+        m->face_a = p->face_a;
+        m->face_b = p->face_b;
+    }
+}
 
 static bool count_faces(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
@@ -34,6 +44,8 @@ static bool count_faces(void *user, const ebpo_face_pair *pairs, uint64_t count)
         t->m->coplanar += pairs[i].kind == EBPO_PAIR_COPLANAR;
         if (t->enough && t->m->crossing)
             return false;
+        if (!t->enough)
+            keep_first(t->m, &pairs[i]);
     }
     return true;
 }
@@ -87,6 +99,17 @@ static ebpo_status ask_faces(const asking *a, ebpo_collider *collider,
     return status;
 }
 
+/* What has been left out of a file must not matter. */
+static ebpo_status check_left_out(const asking *a, const ebpo_scene_pair *pair, ebpo_error *error)
+{
+    double gap = INFINITY;
+    uint64_t lacking = 0;
+    ebpo_status status = scene_left_out(a->scene, pair, a->time, &gap, &lacking, error);
+    if (status == EBPO_OK && !(gap > pair->clearance))
+        status = scene_lacks(a->scene, pair, lacking, a->time, error);
+    return status;
+}
+
 static ebpo_status ask_pair(const asking *a, uint64_t n, ebpo_error *error)
 {
     const ebpo_scene_pair *pair = &a->list.pairs[n];
@@ -100,8 +123,10 @@ static ebpo_status ask_pair(const asking *a, uint64_t n, ebpo_error *error)
                                .clearance = pair->clearance };
     ebpo_status status = scene_pose_pair(a->scene, pair, a->time, &options, error);
     if (status == EBPO_OK)
-        status = scene_collider(a->scene, pair, &collider, error);
+        status = check_left_out(a, pair, error);
     if (status == EBPO_OK)
+        status = scene_collider(a->scene, pair, &collider, error);
+    if (status == EBPO_OK && collider)
         status = ask_faces(a, collider, &options, m, error);
     ebpo_collider_free(collider);
     return status;

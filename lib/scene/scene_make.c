@@ -77,6 +77,7 @@ void ebpo_scene_free(ebpo_scene *scene)
     free(scene->layers);
     free(scene->files);
     free(scene->folder);
+    free(scene->text);
     json_decref(scene->names);
     free(scene);
 }

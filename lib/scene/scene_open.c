@@ -30,6 +30,19 @@ static ebpo_status take_options(ebpo_scene_options *own, const ebpo_scene_option
     return status;
 }
 
+/* For packing. */
+static ebpo_status keep_text(ebpo_scene *scene, const char *text, size_t size, ebpo_error *error)
+{
+    scene->text = malloc(size + 1);
+    if (!scene->text)
+        return ebpo_fail_memory(error, size + 1);
+    memcpy(scene->text, text, size);
+    scene->text_size = size;
+    scene->text_models = scene->models_count;
+    scene->text_instances = scene->instances_count;
+    return EBPO_OK;
+}
+
 /* `folder` is taken over; NULL: there was no memory. */
 static ebpo_status parse(const char *text, size_t size, const char *name, char *folder,
                          const ebpo_scene_options *options, ebpo_scene **out, ebpo_error *error)
@@ -43,6 +56,8 @@ static ebpo_status parse(const char *text, size_t size, const char *name, char *
     } else {
         free(folder);
     }
+    if (status == EBPO_OK)
+        status = keep_text(scene, text, size, error);
     if (status == EBPO_OK)
         *out = scene;
     else

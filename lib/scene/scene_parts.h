@@ -62,8 +62,11 @@ struct ebpo_scene {
     SCENE_LIST(scene_file, files);
     json_t *names; /* of each kind and of sets, with their numbers */
     uint64_t groups, ignored, clearances;
-    char *folder;           /* where relative paths begin, "" or with a closing "/" */
-    ebpo_model_options how; /* of ebpo_scene_model */
+    char *folder; /* where relative paths begin, "" or with a closing "/" */
+    char *text;   /* that it was read from; NULL: none */
+    size_t text_size;
+    uint64_t text_models, text_instances; /* that are in it */
+    ebpo_model_options how;               /* of ebpo_scene_model */
 };
 
 #define SCENE_ALL_SET 0

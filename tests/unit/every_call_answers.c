@@ -442,6 +442,35 @@ static bool count_ways(void *user, const ebpo_scene_way *ways, uint64_t count)
     return true;
 }
 
+static bool count_needs(void *user, const ebpo_scene_need *needs, uint64_t count)
+{
+    *(uint64_t *)user += count + (needs[0].bytes == 0);
+    return true;
+}
+
+static bool count_packed(void *user, const ebpo_scene_packed *models, uint64_t count)
+{
+    *(uint64_t *)user += count + !models[0].answers;
+    return true;
+}
+
+static ebpo_status pack_scene(ebpo_scene *scene, ebpo_error *error)
+{
+    uint64_t needs = 0, packed = 0;
+    ebpo_plan_options plan = EBPO_PLAN_OPTIONS_INIT;
+    ebpo_pack_options pack = EBPO_PACK_OPTIONS_INIT;
+    pack.threads = 1;
+    ebpo_status status = ebpo_scene_plan(scene, 0, 1, &plan, count_needs, &needs, error);
+    if (status == EBPO_OK)
+        status =
+            ebpo_scene_pack(scene, scratch("packed"), 0, 1, &pack, count_packed, &packed, error);
+    every_call_pause();
+    if (status == EBPO_OK)
+        scratch_remove(scratch("packed"));
+    every_call_resume();
+    return status == EBPO_OK && (needs != 1 || packed != 1) ? EBPO_E_ARGUMENT : status;
+}
+
 static ebpo_status meet_in_scene(ebpo_scene *scene, ebpo_error *error)
 {
     uint64_t meetings = 0, asked = 0;
@@ -508,13 +537,16 @@ static ebpo_status call_scene(every_call_env *e)
 
 static ebpo_status call_scene_file(every_call_env *e)
 {
-    ebpo_scene *scene;
+    ebpo_scene *scene = NULL;
     ebpo_status status =
         ebpo_write_file(scratch("s.json"), scene_text, sizeof scene_text - 1, e->error);
     if (status == EBPO_OK)
         status = ebpo_scene_open(scratch("s.json"), NULL, &scene, e->error);
     if (status == EBPO_OK)
-        ebpo_scene_free(scene);
+        status = ebpo_scene_load(scene, NULL, e->error);
+    if (status == EBPO_OK)
+        status = pack_scene(scene, e->error);
+    ebpo_scene_free(scene);
     every_call_pause();
     unlink(scratch("s.json"));
     every_call_resume();

@@ -9,8 +9,11 @@
 #include "cli/progress.h"
 #include "cli/words.h"
 #include "cmd/commands.h"
+#include "cmd/scene_plan.h"
 #include "cmd/scene_report.h"
 #include "cmd/scene_run.h"
+
+static const char *const purpose_words[] = { "collide", "view", "inside", NULL };
 
 static const arg_option options[] = {
     OPTION_REAL("time", 't', scene_values, time, "T", -1e300, 1e300,
@@ -23,6 +26,16 @@ static const arg_option options[] = {
                 "report: between --from and --to look every S seconds"),
     OPTION_REAL("tolerance", 0, scene_values, tolerance, "D", 1e-300, 1e300,
                 "approach: how near is near, beyond the clearance"),
+    OPTION_WORD(
+        "for", 0, scene_values, purpose, "WHAT", purpose_words,
+        "plan, pack: what will be asked: collide (report, approach; the usual), view (pictures "
+        "from the cameras) or inside"),
+    OPTION_REAL("margin", 0, scene_values, margin, "D", 1e-300, 1e300,
+                "plan, pack: what comes so near, beyond the clearance, is needed too"),
+    OPTION_TEXT("output", 'o', scene_values, out, "DIR", "pack: the folder to make"),
+    OPTION_TEXT("target-size", 0, scene_values, target_size, "S",
+                "pack: models of at most this many bytes (K, M, G: powers of 1024) together, with "
+                "the least error"),
     OPTION_FLAG("count", 0, scene_values, count, "report: count all pairs of faces that meet"),
     OPTION_THREADS(scene_values, threads),
     OPTION_FLAG("outside", 0, scene_values, outside,
@@ -37,7 +50,7 @@ static const arg_option options[] = {
 
 static const arg_spec spec = {
     .command = "scene",
-    .operands = "info|check|boxes|pairs|report|approach FILE",
+    .operands = "info|check|boxes|pairs|report|approach|plan|pack FILE",
     .least = 2,
     .most = 2,
     .summary = "describes a scene: models at many places, that move, and which meet",
@@ -45,7 +58,8 @@ static const arg_spec spec = {
         "FILE is a scene in JSON. 'info' tells what it holds and where that is, 'check' opens "
         "every model and says whether all fits together, 'boxes' prints the box of each "
         "instance, 'pairs' the instances whose boxes come close enough to each other, 'report' "
-        "those whose faces meet or are too near, exactly, 'approach' when pairs first come near.",
+        "those whose faces meet or are too near, exactly, 'approach' when pairs first come near, "
+        "'plan' what of each model the scene can ever call for, 'pack' writes that as a folder.",
     .options = options,
 };
 
@@ -87,8 +101,15 @@ static const struct {
 } deeds[] = {
     { "info", scene_info },   { "check", scene_check },   { "boxes", scene_boxes },
     { "pairs", scene_pairs }, { "report", scene_report }, { "approach", scene_approach },
+    { "plan", scene_plan },   { "pack", scene_pack },
 };
 enum { DEEDS = sizeof deeds / sizeof *deeds };
+
+static bool is_for_all(int deed)
+{
+    return deeds[deed].run == scene_approach || deeds[deed].run == scene_plan ||
+           deeds[deed].run == scene_pack;
+}
 
 static int run(void *given, const char **operand)
 {
@@ -99,25 +120,30 @@ static int run(void *given, const char **operand)
     while (deed < DEEDS && strcmp(operand[0], deeds[deed].name) != 0)
         deed++;
     if (deed == DEEDS)
-        return command_usage("scene",
-                             "'%s' is not one of info, check, boxes, pairs, report, approach",
-                             operand[0]);
+        return command_usage(
+            "scene", "'%s' is not one of info, check, boxes, pairs, report, approach, plan, pack",
+            operand[0]);
     ebpo_scene_options how = EBPO_SCENE_OPTIONS_INIT;
     ebpo_load_options load = EBPO_LOAD_OPTIONS_INIT;
     how.outside = v->outside;
     how.remote = v->remote;
     ebpo_status status = ebpo_scene_open(operand[1], &how, &scene, &error);
-    bool approach = deeds[deed].run == scene_approach;
-    if (status == EBPO_OK && !settle_times(v, approach, scene)) {
+    if (status == EBPO_OK && !settle_times(v, is_for_all(deed), scene)) {
         ebpo_scene_free(scene);
         return command_usage("scene", "--time stands alone; --from is not after --to");
     }
-    if (status == EBPO_OK && approach && !(v->tolerance > 0)) {
+    if (status == EBPO_OK && deeds[deed].run == scene_approach && !(v->tolerance > 0)) {
         ebpo_scene_free(scene);
         return command_usage("scene", "approach needs --tolerance");
     }
     const char *wrong =
         status == EBPO_OK && deeds[deed].run == scene_report ? wrong_report(v) : NULL;
+    if (status == EBPO_OK && deeds[deed].run == scene_pack && !v->out)
+        wrong = "pack needs -o DIR";
+    uint64_t target;
+    if (status == EBPO_OK && v->target_size &&
+        (!words_read_size(v->target_size, &target) || !target))
+        wrong = "--target-size is a number of bytes such as 500K or 20M";
     if (wrong) {
         ebpo_scene_free(scene);
         return command_usage("scene", "%s", wrong);

@@ -9,6 +9,7 @@
  *   In time     ebpo_scene_pose, ebpo_scene_motion, ebpo_scene_instance_box, ebpo_scene_box
  *   Who meets   ebpo_scene_pairs (boxes), ebpo_scene_meet (faces),
  *               ebpo_scene_approach (all times)
+ *   What of it   ebpo_scene_plan, ebpo_scene_pack
  *
  *     ebpo_scene *scene = NULL;
  *     ebpo_scene_open("plant.scene.json", NULL, &scene, &error);
@@ -24,6 +25,7 @@
 #define EBPO_SCENE_H
 
 #include <ebpo/pose.h>
+#include <ebpo/subset.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -390,7 +392,10 @@ typedef enum ebpo_meeting_kind {
 typedef struct ebpo_scene_meeting {
     uint64_t a, b;
 
-    /* A pair of their faces that meet, as ebpo_collide_first gives it, or the nearest pair. */
+    /*
+     * A pair of their faces that meet: if all are counted the first by numbers, else one as
+     * ebpo_collide_first gives it; or the nearest pair.
+     */
     uint64_t face_a, face_b;
 
     /*
@@ -436,8 +441,8 @@ typedef struct ebpo_scene_ask_options {
  * may be NULL.
  *
  * EBPO_E_ARGUMENT: not loaded, no such time, or a pose (ebpo_pose_check). EBPO_E_ABSENT: a model
- * has no mesh. EBPO_E_LIMIT: a model is not all in memory (ebpo_load_options). EBPO_E_CANCELLED,
- * EBPO_E_MEMORY, and the errors of reading.
+ * has no mesh, or is a subset without faces that may matter. EBPO_E_LIMIT: a model is not all in
+ * memory (ebpo_load_options). EBPO_E_CANCELLED, EBPO_E_MEMORY, and the errors of reading.
  *
  * Threads: one per scene; further ones live for the call.
  */
@@ -506,6 +511,165 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_approach(ebpo_scene *scene, double
                                                        const ebpo_scene_way_options *options,
                                                        ebpo_scene_ways_fn take, void *user,
                                                        ebpo_error *error);
+
+/* ---- what of its models a scene needs ---- */
+
+typedef enum ebpo_scene_purpose {
+    /* ebpo_scene_meet and ebpo_scene_approach, with numbers of faces as in the source. */
+    EBPO_SCENE_FOR_COLLIDE = 0,
+
+    /* Pictures from the scene's cameras, of cells no larger than a pixel. */
+    EBPO_SCENE_FOR_VIEW = 1,
+
+    /* Whether points of instances are inside those that they may meet. */
+    EBPO_SCENE_FOR_INSIDE = 2
+} ebpo_scene_purpose;
+
+typedef struct ebpo_plan_options {
+    size_t struct_size; /* EBPO_PLAN_OPTIONS_INIT sets it */
+
+    ebpo_progress progress;
+
+    /*
+     * What comes so near beyond the clearance is taken along, in the world's unit: with more,
+     * ebpo_scene_approach takes fewer looks. 0: of each pair a 32nd of the longest side of the box
+     * of the smaller one.
+     */
+    double margin;
+
+    /* An ebpo_scene_purpose. */
+    int32_t purpose;
+
+    int32_t reserved;
+} ebpo_plan_options;
+
+#define EBPO_PLAN_OPTIONS_INIT                                                  \
+    {                                                                           \
+        sizeof(ebpo_plan_options), { NULL, NULL }, 0, EBPO_SCENE_FOR_COLLIDE, 0 \
+    }
+
+/* What a scene can ever call for of a model. Models of one file need the same. */
+typedef struct ebpo_scene_need {
+    size_t struct_size; /* EBPO_SCENE_NEED_INIT sets it */
+
+    uint64_t model;
+
+    /* Pairs of instances of which one is of this model's file, twice if both are; or cameras. */
+    uint64_t askers;
+
+    /* Subtrees of the file that meet the box, of all. 0, 0: it has none. */
+    uint64_t subtrees, of_subtrees;
+
+    /* Of the file's chunks that hold this, each counted once; and of the file. */
+    uint64_t bytes, file_bytes;
+
+    /* The box, in the model's unit, outside which no face is called for. */
+    double min[3], max[3];
+
+    /* Levels 0 to last_level, of so many. */
+    int32_t last_level, level_count;
+
+    /* Bits of ebpo_part, of those that the file has. Without the mesh: nothing is asked. */
+    uint32_t parts;
+
+    /* The box does not hold all faces. */
+    bool boxed;
+
+    uint8_t reserved[3];
+} ebpo_scene_need;
+
+#define EBPO_SCENE_NEED_INIT EBPO_SIZED(ebpo_scene_need)
+
+/* Needs, lent until it returns. What it returns is ignored. */
+typedef bool (*ebpo_scene_needs_fn)(void *user, const ebpo_scene_need *needs, uint64_t count);
+
+/*
+ * What questions of a purpose at any time of from .. to can call for, of each model: for collisions
+ * and containment what other instances come near to, on all their ways; for pictures levels. Only
+ * heads and tables of files are read.
+ *
+ * EBPO_E_ARGUMENT: not loaded, not from <= to, no such purpose, a margin below 0.
+ * EBPO_E_CANCELLED, EBPO_E_MEMORY, and the errors of reading.
+ *
+ * Threads: one per scene.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_plan(ebpo_scene *scene, double from, double to,
+                                                   const ebpo_plan_options *options,
+                                                   ebpo_scene_needs_fn take, void *user,
+                                                   ebpo_error *error);
+
+typedef struct ebpo_pack_options {
+    size_t struct_size; /* EBPO_PACK_OPTIONS_INIT sets it */
+
+    ebpo_progress progress;
+
+    /* As in ebpo_plan_options. */
+    double margin;
+
+    /*
+     * Bytes that all models shall have at most: if they have more, each is made smaller by the same
+     * share, with the least error that it takes (ebpo_subset). 0: no target.
+     */
+    uint64_t target_bytes;
+
+    /* As in ebpo_plan_options. */
+    int32_t purpose;
+
+    /* 0: all cores. The result does not depend on it. */
+    unsigned threads;
+} ebpo_pack_options;
+
+#define EBPO_PACK_OPTIONS_INIT                                                     \
+    {                                                                              \
+        sizeof(ebpo_pack_options), { NULL, NULL }, 0, 0, EBPO_SCENE_FOR_COLLIDE, 0 \
+    }
+
+/* A model of a packed scene. Models of one file share it. */
+typedef struct ebpo_scene_packed {
+    size_t struct_size; /* EBPO_SCENE_PACKED_INIT sets it */
+
+    uint64_t model;
+
+    /* Of its file; of the one that it comes from; and what was read of that. */
+    uint64_t bytes, source_bytes, bytes_read;
+
+    /* How far envelopes reach beyond the model where it was made smaller, in its unit; else 0. */
+    double max_error;
+
+    /* Their content_sha256. */
+    uint8_t digest[32], source_digest[32];
+
+    /* What was planned is answered; false: exact questions no longer are, for target_bytes. */
+    bool answers;
+
+    uint8_t reserved[7];
+} ebpo_scene_packed;
+
+#define EBPO_SCENE_PACKED_INIT EBPO_SIZED(ebpo_scene_packed)
+
+/* What was packed, lent until it returns. What it returns is ignored. */
+typedef bool (*ebpo_scene_packs_fn)(void *user, const ebpo_scene_packed *models, uint64_t count);
+
+/*
+ * Writes what ebpo_scene_plan finds as a new folder, which appears whole or not at all: subsets of
+ * the models' files, files of poses, and packed.scene.json, the scene with these files, their
+ * digests and those of what they come from. Questions of the purpose, at times of from .. to, have
+ * the same answers there: of ebpo_scene_meet the same, of ebpo_scene_approach the same with
+ * perhaps other looks; intervals of distances beyond the clearance may be wider. What would need
+ * more is refused (EBPO_E_ABSENT). `take` may be NULL.
+ *
+ * EBPO_E_ARGUMENT: as for ebpo_scene_plan; the scene was not read from a file, or has been added
+ * to; or target_bytes is below what a model can have. EBPO_E_ABSENT: target_bytes, and a file is a
+ * subset or has no mesh. EBPO_E_IO: also: the folder is there. EBPO_E_CANCELLED, EBPO_E_MEMORY, and
+ * the errors of reading.
+ *
+ * Threads: one per scene.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_pack(ebpo_scene *scene, const char *folder,
+                                                   double from, double to,
+                                                   const ebpo_pack_options *options,
+                                                   ebpo_scene_packs_fn take, void *user,
+                                                   ebpo_error *error);
 
 #ifdef __cplusplus
 }

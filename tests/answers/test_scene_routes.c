@@ -1,0 +1,269 @@
+/* Scenes on their way against looking at many times; packed ones against what they come from. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <ebpo/collide.h>
+#include <ebpo/scene.h>
+
+#include "check_main.h"
+#include "exact_twin.h"
+#include "model_file.h"
+#include "query_kit.h"
+
+enum { PARTS = 5, LAST = 3, TIMES = 7 };
+static const double clearance = 0.15, tolerance = 0.01;
+
+static double some(uint64_t *state, double size)
+{
+    return (double)twin_integer(state, -1000000, 1000000) * size / 1000000;
+}
+
+/* --- scenes --- */
+
+static void write_model(const char *name, ebpo_mesh mesh)
+{
+    ebpo_tree tree = model_build_parts(mesh, 4, ebpo_profile_parts(EBPO_PROFILE_FULL));
+    ebpo_write_options options = EBPO_WRITE_OPTIONS_INIT;
+    options.subtree_faces = 64;
+    model_write(&tree, scratch(name), &options);
+}
+
+static void begin(void)
+{
+    static const double low[3] = { -2, -2, -0.1 }, high[3] = { 2, 2, 0.1 }, middle[3] = { 0 };
+    scratch_enter();
+    write_model("m0.ebpo.h5", ebpo_test_box(low, high, 12));
+    write_model("m1.ebpo.h5", ebpo_test_torus(1, 0.3, 32, 16));
+    write_model("m2.ebpo.h5", ebpo_test_sphere(middle, 0.4, 3));
+}
+
+static void put_pose(FILE *f, uint64_t *state, double far)
+{
+    fprintf(f, "{\"translation\": [%.9g, %.9g, %.9g], \"quaternion\": [%.9g, %.9g, %.9g, 1]",
+            some(state, far), some(state, far), some(state, far), some(state, 1), some(state, 1),
+            some(state, 1));
+    fprintf(f, ", \"scale\": %.9g}", 0.75 + some(state, 0.25));
+}
+
+/* Two routes, of which one may jump; plates that are fixed, and what moves between them. */
+static ebpo_scene *some_scene(uint64_t seed)
+{
+    uint64_t state = 977 * seed + 5;
+    ebpo_scene *scene = NULL;
+    FILE *f = fopen(scratch("s.json"), "w");
+    fprintf(f, "{\"ebpo_scene\": \"1.0\", \"x-own\": [1], \"models\": {");
+    for (int i = 0; i < 3; i++)
+        fprintf(f, "%s\"m%d\": {\"file\": \"m%d.ebpo.h5\"}", i ? ", " : "", i, i);
+    fprintf(f, "}, \"routes\": {");
+    for (int i = 0; i < 2; i++) {
+        fprintf(f, "%s\"r%d\": {\"step\": 1, \"between\": \"%s\", \"poses\": [", i ? ", " : "", i,
+                i && seed % 3 == 2 ? "jump" : "even");
+        for (int k = 0; k <= LAST; k++) {
+            fputs(k ? ", " : "", f);
+            put_pose(f, &state, 2);
+        }
+        fprintf(f, "]}");
+    }
+    fprintf(f, "}, \"instances\": [");
+    for (int i = 0; i < PARTS; i++) {
+        fprintf(f, "%s{\"name\": \"i%d\", \"model\": \"m%d\", ", i ? ", " : "", i,
+                i < 2 ? 0 : 1 + i % 2);
+        fprintf(f, i < 2 ? "\"fixed\": true, \"pose\": " : "\"route\": \"r%d\", \"pose\": ", i % 2);
+        put_pose(f, &state, i < 2 ? 2 : 0.5);
+        fprintf(f, "}");
+    }
+    fprintf(f, "], \"clearance\": [{\"between\": [\"*\", \"i0\"], \"distance\": %.9g}]}",
+            clearance);
+    fclose(f);
+    ASSERT_OK(ebpo_scene_open(scratch("s.json"), NULL, &scene, error));
+    ASSERT_OK(ebpo_scene_load(scene, NULL, error));
+    return scene;
+}
+
+static ebpo_scene *packed_scene(ebpo_scene *from, double begin, double end, double margin)
+{
+    char path[200];
+    ebpo_scene *scene = NULL;
+    ebpo_pack_options how = EBPO_PACK_OPTIONS_INIT;
+    how.margin = margin;
+    snprintf(path, sizeof path, "%s/packed.scene.json", scratch("packed"));
+    if (access(scratch("packed"), F_OK) == 0)
+        scratch_remove(scratch("packed"));
+    ASSERT_OK(ebpo_scene_pack(from, scratch("packed"), begin, end, &how, NULL, NULL, error));
+    ASSERT_OK(ebpo_scene_open(path, NULL, &scene, error));
+    ASSERT_OK(ebpo_scene_load(scene, NULL, error));
+    return scene;
+}
+
+static int cut_models(const ebpo_scene *scene)
+{
+    int cut = 0;
+    for (uint64_t i = 0; ebpo_scene_file(scene, i); i++)
+        cut += ebpo_file_info(ebpo_scene_file(scene, i))->pruned;
+    return cut;
+}
+
+/* --- who meets --- */
+
+typedef struct met {
+    ebpo_scene_meeting list[PARTS * PARTS];
+    uint64_t count;
+} met;
+
+static bool keep_meetings(void *user, const ebpo_scene_meeting *meetings, uint64_t count)
+{
+    met *m = user;
+    memcpy(m->list, meetings, count * sizeof *meetings);
+    m->count = count;
+    return true;
+}
+
+static ebpo_status meet(ebpo_scene *scene, double time, met *out, ebpo_error *error)
+{
+    ebpo_scene_ask_options how = EBPO_SCENE_ASK_OPTIONS_INIT;
+    how.count = true;
+    memset(out, 0, sizeof *out);
+    return ebpo_scene_meet(scene, time, &how, keep_meetings, out, NULL, error);
+}
+
+START_TEST(packed_scenes_answer_the_same)
+{
+    uint64_t rounds = query_scaled(60), meetings = 0, cut = 0;
+    for (uint64_t n = 0; n < rounds + 3; n++) {
+        uint64_t state = n;
+        ebpo_scene *whole = some_scene(n), *part = packed_scene(whole, 0, LAST, n % 2 ? 1e-6 : 0);
+        for (int i = 0; i < TIMES; i++) {
+            double time = i < 2 ? (i ? LAST + 1 : -1) : 1.5 + some(&state, 1.5);
+            met a, b;
+            ASSERT_OK(meet(whole, time, &a, error));
+            ASSERT_OK(meet(part, time, &b, error));
+            meetings += a.count;
+            ck_assert_msg(memcmp(&a, &b, sizeof a) == 0, "seed %d, time %.17g: %d and %d", (int)n,
+                          time, (int)a.count, (int)b.count);
+        }
+        cut += (uint64_t)cut_models(part);
+        ebpo_scene_free(part);
+        ebpo_scene_free(whole);
+    }
+    ck_assert_uint_gt(meetings, 2 * rounds);
+    ck_assert_uint_gt(cut, 0);
+}
+END_TEST
+
+/* Of one time only: another one is answered as before, or not at all. */
+START_TEST(what_was_left_out_is_refused)
+{
+    uint64_t refused = 0, rounds = query_scaled(60) + 3;
+    for (uint64_t n = 0; n < rounds; n++) {
+        ebpo_scene *whole = some_scene(n), *part = packed_scene(whole, 0, 0, 0);
+        for (double time = 0.25; time <= LAST; time += 0.25) {
+            met a, b;
+            ebpo_error why = EBPO_ERROR_INIT;
+            ebpo_status status = meet(part, time, &b, &why);
+            if (status == EBPO_E_ABSENT) {
+                ck_assert(strstr(why.message, "is a part of another"));
+                refused++;
+                continue;
+            }
+            ck_assert_int_eq(status, EBPO_OK);
+            ASSERT_OK(meet(whole, time, &a, error));
+            ck_assert(memcmp(&a, &b, sizeof a) == 0);
+        }
+        ebpo_scene_free(part);
+        ebpo_scene_free(whole);
+    }
+    ck_assert_uint_gt(refused, rounds);
+}
+END_TEST
+
+/* --- on the way --- */
+
+typedef struct ways {
+    ebpo_scene_way list[PARTS * PARTS];
+    uint64_t count;
+} ways;
+
+static bool keep_ways(void *user, const ebpo_scene_way *list, uint64_t count)
+{
+    ways *w = user;
+    memcpy(w->list, list, count * sizeof *list);
+    w->count = count;
+    return true;
+}
+
+/* Of two instances in the whole scene, exact. */
+static double distance_at(ebpo_scene *scene, uint64_t a, uint64_t b, double time)
+{
+    ebpo_scene_instance at = EBPO_SCENE_INSTANCE_INIT;
+    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
+    ebpo_clearance found;
+    ebpo_collider *collider;
+    ebpo_model *model[2];
+    for (int i = 0; i < 2; i++) {
+        ck_assert_int_eq(ebpo_scene_get_instance(scene, i ? b : a, &at), EBPO_OK);
+        ASSERT_OK(ebpo_scene_model(scene, at.model, &model[i], error));
+        ASSERT_OK(
+            ebpo_scene_pose(scene, i ? b : a, time, i ? &options.pose_b : &options.pose_a, error));
+    }
+    ASSERT_OK(ebpo_collider_new(model[0], model[1], NULL, &collider, error));
+    ASSERT_OK(ebpo_collide_distance(collider, &options, NULL, &found, error));
+    ebpo_collider_free(collider);
+    return found.distance.hi;
+}
+
+static void check_way(ebpo_scene *whole, const ebpo_scene_way *w)
+{
+    double at = distance_at(whole, w->a, w->b, w->time);
+    ck_assert_int_ge(w->reached, 0);
+    ck_assert_msg(w->lo <= at && at <= w->hi, "%.17g is not in %.17g to %.17g", at, w->lo, w->hi);
+    if (w->reached)
+        ck_assert_double_le(at, w->clearance + tolerance);
+    else
+        ck_assert_double_gt(at, w->clearance);
+    for (int i = 0; i < 40; i++) {
+        double time = w->time * i / 40, d = distance_at(whole, w->a, w->b, time);
+        ck_assert_msg(d > w->clearance || w->time == 0, "pair %d %d: %g at time %.17g, not %.17g",
+                      (int)w->a, (int)w->b, d, time, w->time);
+    }
+}
+
+START_TEST(approach_misses_nothing)
+{
+    uint64_t rounds = query_scaled(40) + 3, reached = 0, apart = 0;
+    for (uint64_t n = 0; n < rounds; n++) {
+        ebpo_scene_way_options how = EBPO_SCENE_WAY_OPTIONS_INIT;
+        ways list[2] = { { .count = 0 }, { .count = 0 } };
+        ebpo_scene *whole = some_scene(n), *part = packed_scene(whole, 0, LAST, 0);
+        how.tolerance = tolerance;
+        ASSERT_OK(ebpo_scene_approach(whole, 0, LAST, &how, keep_ways, &list[0], error));
+        ASSERT_OK(ebpo_scene_approach(part, 0, LAST, &how, keep_ways, &list[1], error));
+        ck_assert_uint_eq(list[0].count, list[1].count);
+        for (uint64_t i = 0; i < 2 * list[0].count; i++) {
+            const ebpo_scene_way *w = &list[i % 2].list[i / 2];
+            check_way(whole, w);
+            reached += w->reached == 1 && w->time > 0;
+            apart += w->reached == 0;
+        }
+        ebpo_scene_free(part);
+        ebpo_scene_free(whole);
+    }
+    ck_assert_uint_gt(reached, rounds / 2);
+    ck_assert_uint_gt(apart, rounds / 2);
+}
+END_TEST
+
+Suite *test_suite(void)
+{
+    Suite *suite = suite_create("scene_routes");
+    TCase *tests = tcase_create("scene_routes");
+    tcase_add_checked_fixture(tests, begin, scratch_leave);
+    tcase_set_timeout(tests, 900);
+    tcase_add_test(tests, packed_scenes_answer_the_same);
+    tcase_add_test(tests, what_was_left_out_is_refused);
+    tcase_add_test(tests, approach_misses_nothing);
+    suite_add_tcase(suite, tests);
+    return suite;
+}
