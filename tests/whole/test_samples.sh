@@ -1,7 +1,8 @@
 #!/bin/sh
 # The samples do what they say: test_samples.sh EBPO SAMPLES PLUGIN_FOLDER INPUTS QUERY LIBEBPO
+# GENERATE
 set -u
-ebpo=$1 samples=$2 inputs=$4 query=$5 library=$6
+ebpo=$1 samples=$2 inputs=$4 query=$5 library=$6 generate=$7
 export HDF5_PLUGIN_PATH="$3"
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
@@ -49,6 +50,26 @@ grep -q '^OUT, 2.0 from' "$work/out" || fail "query.py takes commas and comments
 echo 1 2 3 | "$query" "$work/cube.ebpo.h5" >/dev/full 2>"$work/out" &&
     fail "query does not see a full disk"
 grep -q 'No space left' "$work/out" || fail "query says that the disk is full"
+
+# Scenes: of many parts, and of a robot, which packed is answered the same.
+PATH=$(dirname "$ebpo"):$(dirname "$generate"):$PATH
+python3 "$samples/many_parts.py" "$work/plant" 300 >"$work/out" 2>&1 || fail many_parts.py
+"$ebpo" scene report -q --time 5 "$work/plant/plant.scene.json" >"$work/out" 2>&1 || fail "plant"
+grep -q '^5	crossing	' "$work/out" || fail "parts meet"
+"$ebpo" scene pairs --from 0 --to 10 "$work/plant/plant.scene.json" >"$work/out" 2>&1 || fail pairs
+[ "$(grep -c '	tool	' "$work/out")" -gt 10 ] || fail "the tool flies through"
+python3 "$samples/robot_among_scans.py" "$work/robot" 20000 >"$work/out" 2>&1 ||
+    fail robot_among_scans.py
+"$ebpo" scene pack -q -o "$work/packed" "$work/robot/robot.scene.json" >"$work/out" 2>&1 ||
+    fail "pack the robot"
+for scene in robot/robot packed/packed; do
+    "$ebpo" scene report -q --count --csv --from 4 --to 7 --step 0.1 "$work/$scene.scene.json" \
+        >"$work/$(basename $scene).csv" 2>"$work/out" || fail "report of $scene"
+done
+cmp "$work/robot.csv" "$work/packed.csv" >"$work/out" 2>&1 || fail "the packed robot answers"
+grep -q '"hand",near,' "$work/robot.csv" || { cat "$work/robot.csv"; fail "the hand comes near"; }
+ring=$(wc -c <"$work/robot/ring.ebpo.h5") part=$(wc -c <"$work/packed/model-1.ebpo.h5")
+[ "$part" -lt $((ring / 2)) ] || fail "of the ring little is needed: $part of $ring bytes"
 
 command -v h5dump >/dev/null && command -v h5ls >/dev/null || exit 77
 "$ebpo" convert -q --leaf-faces 8 "$work/sphere.ply" "$work/a.ebpo.h5" || fail convert
