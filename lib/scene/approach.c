@@ -9,9 +9,8 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
-#include "base/sized.h"
-#include "scene/asked_pairs.h"
 #include "scene/left_out.h"
+#include "scene/pair_looks.h"
 
 typedef struct travel {
     const ebpo_scene *scene;
@@ -21,25 +20,12 @@ typedef struct travel {
     ebpo_scene_way *ways;
 } travel;
 
-/* How far both go at most. */
-static ebpo_status motion_of(const travel *t, const ebpo_scene_way *w, double from, double to,
-                             double *out, ebpo_error *error)
-{
-    double a, b;
-    ebpo_status status = ebpo_scene_motion(t->scene, w->a, from, to, &a, error);
-    if (status == EBPO_OK)
-        status = ebpo_scene_motion(t->scene, w->b, from, to, &b, error);
-    if (status == EBPO_OK)
-        *out = (a + b) * (1 + 0x1p-50);
-    return status;
-}
-
 /* The next time to look: until then the way is shorter than `gap`; w->time where there is none. */
-static ebpo_status next_look(const travel *t, const ebpo_scene_way *w, double gap, double *next,
-                             ebpo_error *error)
+static ebpo_status next_look(const travel *t, const ebpo_scene_pair *pair, const ebpo_scene_way *w,
+                             double gap, double *next, ebpo_error *error)
 {
     double low = w->time, high = t->to, at = high, length = 0;
-    ebpo_status status = motion_of(t, w, low, at, &length, error);
+    ebpo_status status = scene_pair_motion(t->scene, pair, low, at, &length, error);
     if (status != EBPO_OK || length < gap) {
         *next = at;
         return status;
@@ -47,7 +33,7 @@ static ebpo_status next_look(const travel *t, const ebpo_scene_way *w, double ga
     /* halved until it fits, then a little longer again */
     for (int n = 0; n < 70 && status == EBPO_OK && (low == w->time || n < 8); n++) {
         at = low + (high - low) / 2;
-        status = motion_of(t, w, w->time, at, &length, error);
+        status = scene_pair_motion(t->scene, pair, w->time, at, &length, error);
         if (length < gap)
             low = at;
         else
@@ -57,51 +43,25 @@ static ebpo_status next_look(const travel *t, const ebpo_scene_way *w, double ga
     return status;
 }
 
-/* Of a collider that is not there: nothing is left to be near. */
-static ebpo_status ask_distance(const travel *t, ebpo_collider *collider,
-                                const ebpo_scene_pair *pair, ebpo_scene_way *w, ebpo_error *error)
-{
-    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
-    ebpo_clearance_options how = EBPO_CLEARANCE_OPTIONS_INIT;
-    ebpo_clearance found = { .distance = { .lo = INFINITY, .hi = INFINITY } };
-    how.tolerance = t->how.tolerance / 4;
-    how.warm = true; /* lo and hi may differ by it: each pair has a collider of its own */
-    ebpo_status status = scene_pose_pair(t->scene, pair, w->time, &options, error);
-    if (status == EBPO_OK && collider)
-        status = ebpo_collide_distance(collider, &options, &how, &found, error);
-    w->lo = found.distance.lo;
-    w->hi = found.distance.hi;
-    return status;
-}
-
 static bool is_reached(const travel *t, const ebpo_scene_way *w)
 {
     return w->hi <= w->clearance + t->how.tolerance;
 }
 
-static ebpo_status look(const travel *t, ebpo_collider *collider, const ebpo_scene_pair *pair,
-                        ebpo_scene_way *w, ebpo_error *error)
+static ebpo_status look(const travel *t, scene_looks *looks, ebpo_scene_way *w, ebpo_error *error)
 {
-    double gap = INFINITY;
-    uint64_t lacking = 0;
-    ebpo_status status = ask_distance(t, collider, pair, w, error);
-    if (status == EBPO_OK)
-        status = scene_left_out(t->scene, pair, w->time, &gap, &lacking, error);
-    if (status != EBPO_OK)
-        return status;
+    ebpo_status status = scene_look(looks, w->time, &w->lo, &w->hi, error);
     w->looks++;
-    w->lo = fmin(w->lo, gap);
-    return is_reached(t, w) || gap > w->clearance
-               ? EBPO_OK
-               : scene_lacks(t->scene, pair, lacking, w->time, error);
+    if (status != EBPO_OK || is_reached(t, w) || looks->gap > w->clearance)
+        return status;
+    return scene_lacks(t->scene, looks->pair, looks->lacking, w->time, error);
 }
 
-static ebpo_status go(const travel *t, ebpo_collider *collider, const ebpo_scene_pair *pair,
-                      ebpo_scene_way *w, ebpo_error *error)
+static ebpo_status go(const travel *t, scene_looks *looks, ebpo_scene_way *w, ebpo_error *error)
 {
     for (;;) {
         double next;
-        ebpo_status status = look(t, collider, pair, w, error);
+        ebpo_status status = look(t, looks, w, error);
         if (status != EBPO_OK)
             return status;
         w->reached = is_reached(t, w);
@@ -111,7 +71,7 @@ static ebpo_status go(const travel *t, ebpo_collider *collider, const ebpo_scene
             w->reached = -1;
             return EBPO_OK;
         }
-        status = next_look(t, w, w->lo - w->clearance, &next, error);
+        status = next_look(t, looks->pair, w, w->lo - w->clearance, &next, error);
         if (status != EBPO_OK)
             return status;
         w->time = next > w->time ? next : nextafter(w->time, INFINITY); /* a jump */
@@ -126,26 +86,15 @@ static ebpo_status go_pairs(void *context, uint64_t begin, uint64_t end, unsigne
     (void)worker;
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
         const ebpo_scene_pair *pair = &t->list.pairs[i];
-        ebpo_collider *collider = NULL;
+        scene_looks looks = { .scene = t->scene, .pair = pair, .tolerance = t->how.tolerance / 4 };
         t->ways[i] = (ebpo_scene_way){
             .a = pair->a, .b = pair->b, .time = t->from, .clearance = pair->clearance
         };
-        status = scene_collider(t->scene, pair, &collider, error);
+        status = scene_collider(t->scene, pair, &looks.collider, error);
         if (status == EBPO_OK)
-            status = go(t, collider, pair, &t->ways[i], error);
-        ebpo_collider_free(collider);
+            status = go(t, &looks, &t->ways[i], error);
+        ebpo_collider_free(looks.collider);
     }
-    return status;
-}
-
-static ebpo_status check(travel *t, const ebpo_scene_way_options *options, ebpo_error *error)
-{
-    ebpo_status status = EBPO_TAKE(ebpo_scene_way_options, &t->how, options, error);
-    if (status == EBPO_OK && !(t->how.tolerance > 0 && t->how.tolerance < INFINITY))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "the tolerance %g is not above 0",
-                         t->how.tolerance);
-    if (!t->how.most_looks)
-        t->how.most_looks = 10000;
     return status;
 }
 
@@ -155,7 +104,7 @@ ebpo_status ebpo_scene_approach(ebpo_scene *scene, double from, double to,
 {
     EBPO_DEFAULT_FP;
     travel t = { .scene = scene, .how = EBPO_SCENE_WAY_OPTIONS_INIT, .from = from, .to = to };
-    ebpo_status status = check(&t, options, error);
+    ebpo_status status = scene_take_way_options(&t.how, options, error);
     if (status == EBPO_OK)
         status = scene_list_pairs(scene, from, to, &t.list, error);
     t.ways = ebpo_alloc(t.list.count, sizeof *t.ways);

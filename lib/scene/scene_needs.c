@@ -9,7 +9,7 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "scene/asked_pairs.h"
+#include "scene/pair_looks.h"
 #include "scene/scene_needs.h"
 #include "subset/subset_reads.h"
 
@@ -133,13 +133,11 @@ static ebpo_status come_near(const nearing *n, double from, double to, int halvi
 /* From key to key of either; a key itself begins the next part, as routes may jump there. */
 static ebpo_status come_near_along(const nearing *n)
 {
-    const scene_route *route[2] = { route_of(n->scene, n->of), route_of(n->scene, n->other) };
+    const ebpo_scene_pair pair = { n->of, n->other, 0 };
     double to = n->needs->to;
     ebpo_status status = EBPO_OK;
     for (double at = n->needs->from; at < to && status == EBPO_OK;) {
-        double next = to;
-        for (int i = 0; i < 2; i++)
-            next = route[i] ? fmin(next, scene_route_next(route[i], at, to)) : next;
+        double next = scene_pair_next(n->scene, &pair, at, to);
         status = come_near(n, at, nextafter(next, -INFINITY), HALVINGS);
         at = next;
     }

@@ -255,6 +255,59 @@ START_TEST(approach_misses_nothing)
 }
 END_TEST
 
+typedef struct leasts {
+    ebpo_scene_least list[PARTS * PARTS];
+    uint64_t count;
+} leasts;
+
+static bool keep_leasts(void *user, const ebpo_scene_least *list, uint64_t count)
+{
+    leasts *l = user;
+    memcpy(l->list, list, count * sizeof *list);
+    l->count = count;
+    return true;
+}
+
+static void check_least(ebpo_scene *whole, const ebpo_scene_least *l)
+{
+    ck_assert_double_ge(l->time, 0);
+    ck_assert_double_le(l->time, LAST);
+    if (l->hi < INFINITY)
+        ck_assert_double_le(distance_at(whole, l->a, l->b, l->time), l->hi);
+    for (int i = 0; i <= 60; i++) {
+        double d = distance_at(whole, l->a, l->b, LAST * (i / 60.));
+        ck_assert_msg(d >= l->lo, "pair %d %d: %.17g below %.17g", (int)l->a, (int)l->b, d, l->lo);
+    }
+}
+
+START_TEST(least_distances_hold)
+{
+    uint64_t rounds = query_scaled(40) + 3, apart = 0, closed = 0;
+    for (uint64_t n = 0; n < rounds; n++) {
+        ebpo_scene_way_options how = EBPO_SCENE_WAY_OPTIONS_INIT;
+        leasts list[2] = { { .count = 0 }, { .count = 0 } };
+        ebpo_scene *whole = some_scene(n), *part = packed_scene(whole, 0, LAST, 0);
+        how.tolerance = tolerance;
+        ASSERT_OK(ebpo_scene_least_distances(whole, 0, LAST, &how, keep_leasts, &list[0], error));
+        how.most_looks = 200;
+        ASSERT_OK(ebpo_scene_least_distances(part, 0, LAST, &how, keep_leasts, &list[1], error));
+        ck_assert_uint_eq(list[0].count, list[1].count);
+        for (uint64_t i = 0; i < list[0].count; i++) {
+            const ebpo_scene_least *l = &list[0].list[i];
+            ck_assert_msg(l->hi - l->lo <= tolerance, "%g to %g", l->lo, l->hi);
+            check_least(whole, l);
+            check_least(whole, &list[1].list[i]);
+            apart += l->lo > 0;
+            closed += list[1].list[i].hi - list[1].list[i].lo <= tolerance;
+        }
+        ebpo_scene_free(part);
+        ebpo_scene_free(whole);
+    }
+    ck_assert_uint_gt(apart, rounds);
+    ck_assert_uint_gt(closed, rounds);
+}
+END_TEST
+
 Suite *test_suite(void)
 {
     Suite *suite = suite_create("scene_routes");
@@ -264,6 +317,7 @@ Suite *test_suite(void)
     tcase_add_test(tests, packed_scenes_answer_the_same);
     tcase_add_test(tests, what_was_left_out_is_refused);
     tcase_add_test(tests, approach_misses_nothing);
+    tcase_add_test(tests, least_distances_hold);
     suite_add_tcase(suite, tests);
     return suite;
 }

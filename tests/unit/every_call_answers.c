@@ -471,6 +471,12 @@ static ebpo_status pack_scene(ebpo_scene *scene, ebpo_error *error)
     return status == EBPO_OK && (needs != 1 || packed != 1) ? EBPO_E_ARGUMENT : status;
 }
 
+static bool count_leasts(void *user, const ebpo_scene_least *list, uint64_t count)
+{
+    *(uint64_t *)user += count + (list[0].hi != 0);
+    return true;
+}
+
 static ebpo_status meet_in_scene(ebpo_scene *scene, ebpo_error *error)
 {
     uint64_t meetings = 0, asked = 0;
@@ -484,7 +490,9 @@ static ebpo_status meet_in_scene(ebpo_scene *scene, ebpo_error *error)
     along.tolerance = 0.01;
     if (status == EBPO_OK)
         status = ebpo_scene_approach(scene, 0, 1, &along, count_ways, &ways, error);
-    return status == EBPO_OK && (meetings != 1 || asked != 1 || ways != 1) ? EBPO_E_ARGUMENT
+    if (status == EBPO_OK)
+        status = ebpo_scene_least_distances(scene, 0, 1, &along, count_leasts, &ways, error);
+    return status == EBPO_OK && (meetings != 1 || asked != 1 || ways != 2) ? EBPO_E_ARGUMENT
                                                                            : status;
 }
 

@@ -37,6 +37,8 @@ static const arg_option options[] = {
                 "pack: models of at most this many bytes (K, M, G: powers of 1024) together, with "
                 "the least error"),
     OPTION_FLAG("count", 0, scene_values, count, "report: count all pairs of faces that meet"),
+    OPTION_FLAG("least", 0, scene_values, least,
+                "approach: how near they come at all times, and when"),
     OPTION_THREADS(scene_values, threads),
     OPTION_FLAG("outside", 0, scene_values, outside,
                 "files that the scene names may lie outside its folder"),

@@ -1,4 +1,4 @@
-/* When instances of a scene first come near each other. */
+/* When instances of a scene first come near each other; and how near they come. */
 #include <stdio.h>
 
 #include "cli/json.h"
@@ -57,6 +57,38 @@ static bool print_ways(void *user, const ebpo_scene_way *ways, uint64_t count)
     return true;
 }
 
+static void least_json(listing *l, const ebpo_scene_least *w)
+{
+    json *j = &l->j;
+    json_object(j, NULL);
+    json_text(j, "a", name_of(l, w->a));
+    json_text(j, "b", name_of(l, w->b));
+    json_real(j, "time", w->time);
+    json_real(j, "distance_lo", w->lo);
+    json_real(j, "distance_hi", w->hi);
+    json_real(j, "clearance", w->clearance);
+    json_uint(j, "looks", w->looks);
+    json_end(j);
+}
+
+static bool print_leasts(void *user, const ebpo_scene_least *list, uint64_t count)
+{
+    listing *l = user;
+    l->ways += count;
+    for (uint64_t i = 0; i < count; i++) {
+        const ebpo_scene_least *w = &list[i];
+        l->reached += w->lo <= w->clearance;
+        l->open += w->lo <= w->clearance && w->hi > w->clearance;
+        l->looks += w->looks;
+        if (l->v->json)
+            least_json(l, w);
+        else
+            printf("%.9g\tleast\t%s\t%s\t%.9g to %.9g\n", w->time, name_of(l, w->a),
+                   name_of(l, w->b), w->lo, w->hi);
+    }
+    return true;
+}
+
 ebpo_status scene_approach(const scene_values *v, const char *path, ebpo_scene *scene,
                            ebpo_error *error)
 {
@@ -71,7 +103,9 @@ ebpo_status scene_approach(const scene_values *v, const char *path, ebpo_scene *
     json_begin(&l.j, stdout);
     if (v->json)
         json_array(&l.j, NULL);
-    ebpo_status status = ebpo_scene_approach(scene, v->from, v->to, &how, print_ways, &l, error);
+    ebpo_status status =
+        v->least ? ebpo_scene_least_distances(scene, v->from, v->to, &how, print_leasts, &l, error)
+                 : ebpo_scene_approach(scene, v->from, v->to, &how, print_ways, &l, error);
     progress_wipe(&line);
     if (status != EBPO_OK)
         return status;

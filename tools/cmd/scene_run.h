@@ -10,7 +10,7 @@ typedef struct scene_values {
     const char *out, *target_size;
     int purpose; /* an ebpo_scene_purpose */
     int64_t threads;
-    bool outside, remote, json, csv, count, quiet;
+    bool outside, remote, json, csv, count, least, quiet;
 } scene_values;
 
 #define SCENE_VALUES_INIT                                                             \

@@ -8,7 +8,7 @@
  *   Models      ebpo_scene_load, ebpo_scene_file, ebpo_scene_model
  *   In time     ebpo_scene_pose, ebpo_scene_motion, ebpo_scene_instance_box, ebpo_scene_box
  *   Who meets   ebpo_scene_pairs (boxes), ebpo_scene_meet (faces),
- *               ebpo_scene_approach (all times)
+ *               ebpo_scene_approach, ebpo_scene_least_distances (all times)
  *   What of it   ebpo_scene_plan, ebpo_scene_pack
  *
  *     ebpo_scene *scene = NULL;
@@ -511,6 +511,42 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_approach(ebpo_scene *scene, double
                                                        const ebpo_scene_way_options *options,
                                                        ebpo_scene_ways_fn take, void *user,
                                                        ebpo_error *error);
+
+/* The least distance of two instances, a < b, over a time. */
+typedef struct ebpo_scene_least {
+    uint64_t a, b;
+
+    /* When they are at most `hi` apart. */
+    double time;
+
+    /*
+     * Bounds of the least distance of their faces, certain for all times: their difference is at
+     * most the tolerance, unless options.most_looks did not suffice, or what a file lacks leaves it
+     * open.
+     */
+    double lo, hi;
+
+    double clearance;
+
+    /* Times at which they were looked at. */
+    uint64_t looks;
+} ebpo_scene_least;
+
+/* Least distances, lent until it returns. What it returns is ignored. */
+typedef bool (*ebpo_scene_least_fn)(void *user, const ebpo_scene_least *list, uint64_t count);
+
+/*
+ * How near instances come to each other at any time of from .. to, and when, nothing being missed:
+ * each pair of ebpo_scene_pairs (from, to), ascending by a, then b. Options and errors are those of
+ * ebpo_scene_approach.
+ *
+ * Threads: one per scene; further ones live for the call.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_least_distances(ebpo_scene *scene, double from,
+                                                              double to,
+                                                              const ebpo_scene_way_options *options,
+                                                              ebpo_scene_least_fn take, void *user,
+                                                              ebpo_error *error);
 
 /* ---- what of its models a scene needs ---- */
 
