@@ -15,8 +15,30 @@
 #include "collide/posed_model.h"
 #include "query/options.h"
 
+/* What was left out of a subset might meet as well. */
+static ebpo_status check_complete(const ebpo_model *model, ebpo_error *error)
+{
+    if (!model->info->pruned)
+        return EBPO_OK;
+    return ebpo_fail_file(error, EBPO_E_ABSENT, model->file->in.shown,
+                          "is a part of another file, and what was left out might meet too: ask "
+                          "the whole file, or put both into a scene, which knows what matters "
+                          "(`ebpo scene`)");
+}
+
 ebpo_status ebpo_collider_new(ebpo_model *a, ebpo_model *b, const ebpo_collider_options *options,
                               ebpo_collider **out, ebpo_error *error)
+{
+    *out = NULL;
+    ebpo_status status = check_complete(a, error);
+    if (status == EBPO_OK)
+        status = check_complete(b, error);
+    return status == EBPO_OK ? ebpo_collider_of_parts(a, b, options, out, error) : status;
+}
+
+ebpo_status ebpo_collider_of_parts(ebpo_model *a, ebpo_model *b,
+                                   const ebpo_collider_options *options, ebpo_collider **out,
+                                   ebpo_error *error)
 {
     ebpo_collider_options wanted = EBPO_COLLIDER_OPTIONS_INIT;
     *out = NULL;

@@ -4,6 +4,7 @@
 
 #include <ebpo/collide.h>
 
+#include "collide/of_parts.h"
 #include "collide/pair_walk.h"
 #include "query/query_model.h"
 

@@ -8,6 +8,7 @@
 
 #include "base/alloc.h"
 #include "base/error.h"
+#include "collide/of_parts.h"
 
 static bool keep_pairs(void *user, const ebpo_scene_pair *pairs, uint64_t count)
 {
@@ -73,8 +74,8 @@ ebpo_status scene_collider(const ebpo_scene *scene, const ebpo_scene_pair *pair,
     *out = NULL;
     if (!has_mesh(scene, pair->a) || !has_mesh(scene, pair->b))
         return EBPO_OK;
-    return ebpo_collider_new(model_of(scene, pair->a), model_of(scene, pair->b), &single, out,
-                             error);
+    return ebpo_collider_of_parts(model_of(scene, pair->a), model_of(scene, pair->b), &single, out,
+                                  error);
 }
 
 ebpo_status scene_pose_pair(const ebpo_scene *scene, const ebpo_scene_pair *pair, double time,

@@ -162,9 +162,10 @@ ebpo_status scene_lacks(const ebpo_scene *scene, const ebpo_scene_pair *pair, ui
                         double time, ebpo_error *error)
 {
     const scene_model *m = model_of(scene, lacking);
-    return ebpo_fail(error, EBPO_E_ABSENT,
-                     "instances '%.80s' and '%.80s' at time %.9g: the file of model '%.80s' is a "
-                     "part of another, and what was left out may matter; ask the original scene",
-                     scene->instances[pair->a].as.name, scene->instances[pair->b].as.name, time,
-                     m->name);
+    return ebpo_fail(
+        error, EBPO_E_ABSENT,
+        "instances '%.80s' and '%.80s' at time %.9g: the file of model '%.80s' is a "
+        "part of another or has no mesh, and what is not in it may matter; ask a scene "
+        "with more of it",
+        scene->instances[pair->a].as.name, scene->instances[pair->b].as.name, time, m->name);
 }

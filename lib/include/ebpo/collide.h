@@ -44,8 +44,8 @@ typedef struct ebpo_collider ebpo_collider;
 /*
  * options: NULL for the usual ones. Both models must outlive it.
  *
- * EBPO_E_ABSENT: a file has no mesh. EBPO_E_LIMIT: a model is not all in memory. EBPO_E_ARGUMENT,
- * EBPO_E_MEMORY.
+ * EBPO_E_ABSENT: a file has no mesh, or is a subset. EBPO_E_LIMIT: a model is not all in memory.
+ * EBPO_E_ARGUMENT, EBPO_E_MEMORY.
  *
  * Threads: any; many colliders may share models.
  */
