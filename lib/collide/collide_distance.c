@@ -81,16 +81,20 @@ static ebpo_status search(ebpo_collision *q, const ebpo_clearance_options *o, eb
                           ebpo_error *error)
 {
     ebpo_collider *c = q->collider;
+    int32_t meet = 0;
     ebpo_status status = begin_search(q, error);
+    if (status == EBPO_OK) /* of models that meet bounds say little: that walk is better at it */
+        status = ebpo_collision_first(q, "distance", &meet, error);
     if (status != EBPO_OK)
         return status;
     ebpo_nearest_pair n = { .tolerance = o->tolerance,
                             .at_least = o->at_least < 0 ? NAN : o->at_least,
                             .late = q->late,
                             .progress = &q->options.progress,
+                            .meets = meet == 1,
                             .warm = o->warm && c->has_nearest };
     for (int s = 0; s < 2; s++)
-        n.best.slot[s] = c->nearest[s != q->turned];
+        n.best.slot[s] = n.meets ? c->walk.met_slot[s] : c->nearest[s != q->turned];
     status = ebpo_nearest_pair_find(c->gap, &n, error);
     if (status != EBPO_OK)
         return status;

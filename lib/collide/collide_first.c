@@ -7,8 +7,8 @@
 #include "collide/collider.h"
 
 /* -1: late. */
-static ebpo_status search(const ebpo_collision *q, ebpo_pair_walk *w, int32_t *found,
-                          ebpo_error *error)
+static ebpo_status search(const ebpo_collision *q, ebpo_pair_walk *w, const char *stage,
+                          int32_t *found, ebpo_error *error)
 {
     if (!w->kernels->start(w))
         return ebpo_fail_memory(error, w->capacity * sizeof *w->stack);
@@ -19,11 +19,32 @@ static ebpo_status search(const ebpo_collision *q, ebpo_pair_walk *w, int32_t *f
             *found = -1;
             return EBPO_OK;
         }
-        if (!ebpo_progress_step(&q->options.progress, "first contact", 0, 0, error))
+        if (!ebpo_progress_step(&q->options.progress, stage, 0, 0, error))
             return EBPO_E_CANCELLED;
     }
     *found = w->met_count > 0;
     return EBPO_OK;
+}
+
+ebpo_status ebpo_collision_first(const ebpo_collision *q, const char *stage, int32_t *found,
+                                 ebpo_error *error)
+{
+    ebpo_pair_walk *w = &q->collider->walk;
+    ebpo_accel_pair pair;
+    const ebpo_accel *accel[2] = { q->model[0]->whole, q->model[1]->whole };
+    const ebpo_block_posing *posing[2] = { &q->posing[0], &q->posing[1] };
+    *found = 0;
+    if (accel[0]->bound_count == 0 || accel[1]->bound_count == 0)
+        return EBPO_OK;
+    ebpo_accel_pair_make(&pair, accel, posing, q->reach);
+    if (pair.apart)
+        return EBPO_OK;
+    ebpo_pair_walk_begin(w, &pair);
+    w->first = true;
+    w->self = false;
+    ebpo_status status = search(q, w, stage, found, error);
+    ebpo_collider_count(q->collider, w);
+    return status;
 }
 
 ebpo_status ebpo_collide_first(ebpo_collider *c, const ebpo_collide_options *options,
@@ -31,25 +52,12 @@ ebpo_status ebpo_collide_first(ebpo_collider *c, const ebpo_collide_options *opt
 {
     EBPO_DEFAULT_FP;
     ebpo_collision q;
-    ebpo_accel_pair pair;
     *out = (ebpo_face_pair){ EBPO_NO_FACE, EBPO_NO_FACE, EBPO_NO_FACE, EBPO_NO_FACE, 0, 0 };
     *found = 0;
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
-    if (status != EBPO_OK)
-        return status;
-    const ebpo_accel *accel[2] = { q.model[0]->whole, q.model[1]->whole };
-    const ebpo_block_posing *posing[2] = { &q.posing[0], &q.posing[1] };
-    if (accel[0]->bound_count == 0 || accel[1]->bound_count == 0)
-        return EBPO_OK;
-    ebpo_accel_pair_make(&pair, accel, posing, q.reach);
-    if (pair.apart)
-        return EBPO_OK;
-    ebpo_pair_walk_begin(&c->walk, &pair);
-    c->walk.first = true;
-    c->walk.self = false;
-    status = search(&q, &c->walk, found, error);
+    if (status == EBPO_OK)
+        status = ebpo_collision_first(&q, "first contact", found, error);
     if (status == EBPO_OK && *found == 1)
-        *out = ebpo_collision_pair(&q, accel[0], accel[1], &c->walk.met[0]);
-    ebpo_collider_count(c, &c->walk);
+        *out = ebpo_collision_pair(&q, q.model[0]->whole, q.model[1]->whole, &c->walk.met[0]);
     return status;
 }

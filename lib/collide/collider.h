@@ -35,6 +35,11 @@ EBPO_MUST_USE ebpo_status ebpo_collision_begin(ebpo_collision *out, ebpo_collide
 
 bool ebpo_collision_is_late(const ebpo_collision *collision);
 
+/* The first contact: the collider's walk has it as met[0] and met_slot. found: as of
+ * ebpo_collide_first. */
+EBPO_MUST_USE ebpo_status ebpo_collision_first(const ebpo_collision *collision, const char *stage,
+                                               int32_t *found, ebpo_error *error);
+
 /* Adds a walk's counts to the collider's. */
 void ebpo_collider_count(ebpo_collider *collider, ebpo_pair_walk *walk);
 

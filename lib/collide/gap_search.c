@@ -14,14 +14,14 @@ void ebpo_gap_begin(ebpo_gap_search *g, const ebpo_accel *const accel[2],
     for (int s = 0; s < 2; s++) {
         g->accel[s] = accel[s];
         ebpo_block_posing_make(&g->posing[s], &posing[s], reach);
-        g->node[s].node = g->one[s].node = EBPO_GAP_NONE;
-        for (int i = 0; i < EBPO_GAP_FACES_KEPT; i++)
-            g->faces[s][i].block = EBPO_GAP_NONE;
+        for (int i = 0; i < EBPO_GAP_NODES; i++)
+            g->node[s][i].node = EBPO_NO_CHILD;
     }
+    ebpo_posed_faces_forget(g->faces);
     ebpo_two_frames_make(&g->frames, accel, g->posing);
     g->count = g->waits = 0;
     g->node_pairs = g->block_pairs = 0;
-    g->ended = g->no_memory = false;
+    g->ended = g->no_memory = g->is_heap = false;
     g->limit = g->square = g->best = INFINITY;
     g->tolerance = 0;
     g->way_number = 0;
@@ -112,57 +112,4 @@ bool ebpo_gap_wait_room(ebpo_gap_search *g)
             g->waiting[kept++] = g->waiting[i];
     g->waits = kept;
     return g->waits + 64 <= EBPO_GAP_CANDIDATES || g->judge(g);
-}
-
-/* --- blocks --- */
-
-static void pose_block(const ebpo_gap_search *g, int side, uint32_t block, ebpo_posed_block *out)
-{
-    const ebpo_accel *s = g->accel[side];
-    const ebpo_meshlet *m = ebpo_accel_meshlet(s, block);
-    const ebpo_block_posing *p = &g->posing[side];
-    unsigned count = m->vertices;
-    double wide[3 * EBPO_POSED_VERTICES];
-    if (!s->wide && p->fits) {
-        ebpo_posed_block_make(out, p, ebpo_meshlet_floats(m), count);
-        return;
-    }
-    for (unsigned i = 0; i < 3 * count; i++)
-        wide[i] = s->wide ? ebpo_meshlet_doubles(m)[i] : (double)ebpo_meshlet_floats(m)[i];
-    ebpo_posed_block_make_wide(out, p, wide, count);
-}
-
-static void pick_corners(const ebpo_meshlet *m, const ebpo_posed_block *b, ebpo_gap_faces *out)
-{
-    for (unsigned lane = 0; lane < EBPO_BLOCK; lane++) {
-        unsigned at[3];
-        for (unsigned i = 0; i < 3; i++)
-            at[i] = ebpo_meshlet_vertex(m, lane, i);
-        for (unsigned k = 0; k < 3; k++) {
-            float x = b->x[k][at[0]], y = b->x[k][at[1]], z = b->x[k][at[2]];
-            out->corner[k][lane] = x;
-            out->corner[3 + k][lane] = y;
-            out->corner[6 + k][lane] = z;
-            out->low[k][lane] = x < y ? (x < z ? x : z) : (y < z ? y : z);
-            out->high[k][lane] = x > y ? (x > z ? x : z) : (y > z ? y : z);
-        }
-    }
-}
-
-const ebpo_gap_faces *ebpo_gap_faces_of(ebpo_gap_search *g, int side, uint32_t block)
-{
-    ebpo_gap_faces *out = &g->faces[side][(block ^ block >> 4) % EBPO_GAP_FACES_KEPT];
-    if (out->block == block)
-        return out;
-    const ebpo_meshlet *m = ebpo_accel_meshlet(g->accel[side], block);
-    ebpo_posed_block posed;
-    pose_block(g, side, block, &posed);
-    pick_corners(m, &posed, out);
-    for (int k = 0; k < 3; k++)
-        out->base[k] = posed.base[k];
-    out->error = posed.error;
-    out->size = posed.reach;
-    out->lanes = (uint8_t)((1u << m->faces) - 1);
-    out->block = block;
-    return out;
 }

@@ -5,12 +5,14 @@
 #ifndef EBPO_COLLIDE_GAP_SEARCH_H
 #define EBPO_COLLIDE_GAP_SEARCH_H
 
+#include "collide/posed_faces.h"
 #include "collide/two_frames.h"
 
 /* A pair of children: node * 8 + lane of each. */
 typedef struct ebpo_gap_visit {
     float key; /* squared lower bound; where nodes meet, less than 0: how little they overlap */
     uint32_t child[2];
+    uint32_t way; /* the direction that the key knows of */
 } ebpo_gap_visit;
 
 /* A pair of faces, by slots, which is not certainly farther than `low`. */
@@ -28,17 +30,7 @@ typedef struct ebpo_gap_node {
     uint32_t node, way;
 } ebpo_gap_node;
 
-/* A block's faces, seen from the posed coordinates of its first vertex. */
-typedef struct ebpo_gap_faces {
-    _Alignas(32) float corner[9][8], low[3][8], high[3][8];
-    double base[3];
-    float error, size; /* as in ebpo_posed_block */
-    uint32_t block;
-    uint8_t lanes;
-} ebpo_gap_faces;
-
-enum { EBPO_GAP_CANDIDATES = 256, EBPO_GAP_FACES_KEPT = 16 };
-#define EBPO_GAP_NONE UINT32_MAX
+enum { EBPO_GAP_CANDIDATES = 256, EBPO_GAP_NODES = 16 };
 
 typedef struct ebpo_gap_search ebpo_gap_search;
 struct ebpo_gap_search {
@@ -60,14 +52,17 @@ struct ebpo_gap_search {
     bool ended;                             /* before all was seen */
     bool no_memory;
 
+    /* What is to be visited. Until a limit is known the last one comes next, then the least key,
+     * and it is a heap: stack[i] has no greater key than stack[2 i + 1] and stack[2 i + 2]. */
     ebpo_gap_visit *stack;
     uint64_t count, capacity;
+    bool is_heap;
     ebpo_gap_candidate waiting[EBPO_GAP_CANDIDATES];
     unsigned waits;
     uint64_t node_pairs, block_pairs;
 
-    ebpo_gap_node node[2], one[2];
-    ebpo_gap_faces faces[2][EBPO_GAP_FACES_KEPT];
+    ebpo_gap_node node[2][EBPO_GAP_NODES];
+    ebpo_posed_faces faces[2][EBPO_POSED_FACES];
 };
 
 /* NULL: no memory. */
@@ -88,9 +83,6 @@ void ebpo_gap_set_way(ebpo_gap_search *g, const float way[3]);
 bool ebpo_gap_room(ebpo_gap_search *g);
 /* Room for a block's pairs among those that wait; false: judge said that it is enough. */
 bool ebpo_gap_wait_room(ebpo_gap_search *g);
-
-/* A block's faces, kept until others take their place. */
-const ebpo_gap_faces *ebpo_gap_faces_of(ebpo_gap_search *g, int side, uint32_t block);
 
 /* The walk through all pairs from the tops on; what then waits may be nearest. When it has been
  * ended early the stack has what was not seen. Compiled twice, with the same results. */

@@ -194,10 +194,15 @@ ebpo_status ebpo_nearest_pair_find(ebpo_gap_search *g, ebpo_nearest_pair *n, ebp
     g->go_on = go_on;
     g->tolerance = (float)(n->tolerance * g->posing[0].unit * (1 - 0x1p-20));
     n->lo = INFINITY;
-    n->found = n->meets = false;
+    n->found = n->meets;
     n->status = EBPO_OK;
     n->error = error;
     n->is_at_least = -1;
+    if (n->meets) {
+        look(g, start, &n->best);
+        end(g, n);
+        return EBPO_OK;
+    }
     if (!isnan(n->at_least))
         ebpo_gap_set_limit(g, to_unit(g, n->at_least));
     bool more = !n->warm || take(g, n, start);

@@ -21,10 +21,10 @@ typedef struct ebpo_nearest_pair {
     double at_least;  /* NAN: not asked */
     uint64_t late;    /* by ebpo_clock; UINT64_MAX: never */
     const ebpo_progress *progress;
-    bool warm; /* `best` is of a search before */
+    bool warm;  /* slots of `best` are those of a search before */
+    bool meets; /* it is known that `best` does; out: it does, and is not the least one */
     /* Out: lo <= distance <= hi, equal if the answer is exact. */
     double lo, hi;
-    bool meets; /* `best` is a pair that does; not the least one */
     bool found;
     int is_at_least; /* 1, 0; -1: not asked, or open */
     ebpo_face_two best;

@@ -60,6 +60,8 @@ bool ebpo_pair_walk_decide(ebpo_pair_walk *w, uint32_t block_a, uint32_t block_b
                                            block_b * EBPO_BLOCK + lane_b);
         if (met.kind == EBPO_PAIR_APART)
             continue;
+        w->met_slot[0] = block_a * EBPO_BLOCK + lane_a;
+        w->met_slot[1] = block_b * EBPO_BLOCK + lane_b;
         w->met[w->met_count++] = met;
         if (w->first)
             break;

@@ -4,6 +4,7 @@
 #define EBPO_COLLIDE_PAIR_WALK_H
 
 #include "collide/accel_pair.h"
+#include "collide/posed_faces.h"
 #include "pair/pair_filter.h"
 #include "pair/pair_kind.h"
 
@@ -32,16 +33,7 @@ typedef struct ebpo_turned_node {
     uint8_t lanes;
 } ebpo_turned_node;
 
-/* A block's faces as the filter of pairs takes them, seen from `base`. */
-typedef struct ebpo_posed_faces {
-    _Alignas(32) float x[9][8];
-    double base[3];
-    float error, reach;
-    uint32_t block; /* EBPO_NO_CHILD: none is here */
-    uint8_t lanes;
-} ebpo_posed_faces;
-
-enum { EBPO_TURNED_NODES = 8, EBPO_POSED_FACES = 32 };
+enum { EBPO_TURNED_NODES = 8 };
 
 typedef struct ebpo_pair_walk ebpo_pair_walk;
 
@@ -68,6 +60,7 @@ struct ebpo_pair_walk {
     uint64_t top, capacity;
     ebpo_met_pair *met;
     uint64_t met_count, met_capacity;
+    uint32_t met_slot[2];                    /* of the pair that was found last */
     uint64_t node_pairs, block_pairs, exact; /* looked at; of faces, left to the exact test */
     ebpo_turned_node turned[2][EBPO_TURNED_NODES];
     ebpo_posed_faces posed[2][EBPO_POSED_FACES];

@@ -9,10 +9,7 @@ void ebpo_pair_walk_begin(ebpo_pair_walk *w, const ebpo_accel_pair *pair)
     w->top = w->met_count = 0;
     w->begin = 0;
     w->end = pair->accel[0]->face_count;
-    for (int side = 0; side < 2; side++) {
-        for (int i = 0; i < EBPO_TURNED_NODES; i++)
-            w->turned[side][i].node = EBPO_NO_CHILD;
-        for (int i = 0; i < EBPO_POSED_FACES; i++)
-            w->posed[side][i].block = EBPO_NO_CHILD;
-    }
+    for (int i = 0; i < 2 * EBPO_TURNED_NODES; i++)
+        w->turned[i / EBPO_TURNED_NODES][i % EBPO_TURNED_NODES].node = EBPO_NO_CHILD;
+    ebpo_posed_faces_forget(w->posed);
 }

@@ -46,8 +46,8 @@ void ebpo_posed_block_make(ebpo_posed_block *out, const ebpo_block_posing *p, co
             out->x[k][i] = (m[0] * d[0][i] + m[1] * d[1][i]) + m[2] * d[2][i];
     }
     out->vertices = vertices;
-    out->reach = p->size * most * (1 + 0x1p-20f);
-    out->error = 6 * 0x1p-24f * out->reach + p->doubt;
+    out->reach = ebpo_posed_block_reach(p, most);
+    out->error = ebpo_posed_block_error(p, out->reach);
 }
 
 void ebpo_posed_block_make_wide(ebpo_posed_block *out, const ebpo_block_posing *p,

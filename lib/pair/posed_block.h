@@ -36,6 +36,16 @@ typedef struct ebpo_posed_block {
     float reach; /* no |x| is greater */
 } ebpo_posed_block;
 
+/* Of vertices whose 1-norms, seen from the first one, are at most `most`. */
+static inline float ebpo_posed_block_reach(const ebpo_block_posing *p, float most)
+{
+    return p->size * most * (1 + 0x1p-20f);
+}
+static inline float ebpo_posed_block_error(const ebpo_block_posing *p, float reach)
+{
+    return 6 * 0x1p-24f * reach + p->doubt;
+}
+
 /* vertex: [3][vertices], all x, all y, all z, as blocks have them; 1 to 24 of them. The first:
  * p->fits. */
 void ebpo_posed_block_make(ebpo_posed_block *out, const ebpo_block_posing *p, const float *vertex,

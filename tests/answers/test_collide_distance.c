@@ -9,6 +9,8 @@
 
 #include "check_main.h"
 #include "models_twin.h"
+#include "pair/pair_distance.h"
+#include "solids.h"
 
 static const char *const names[] = { "cube",           "torus",      "touching_shells",
                                      "sheet",          "cube_twice", "zero_area_face",
@@ -182,6 +184,75 @@ START_TEST(distances_are_those_of_brute_force)
 }
 END_TEST
 
+/* --- deep hierarchies --- */
+
+static double box_gap(const double a[3][3], const double b[3][3])
+{
+    double square = 0;
+    for (int k = 0; k < 3; k++) {
+        double low = fmin(fmin(a[0][k], a[1][k]), a[2][k]) - fmax(fmax(b[0][k], b[1][k]), b[2][k]),
+               high = fmin(fmin(b[0][k], b[1][k]), b[2][k]) - fmax(fmax(a[0][k], a[1][k]), a[2][k]),
+               gap = fmax(fmax(low, high), 0);
+        square += gap * gap;
+    }
+    return sqrt(square);
+}
+
+/* The least bounds of all pairs of faces: the distance is in *lo .. *hi. */
+static void distance_of_all(const twin_faces *a, const twin_faces *b, double *lo, double *hi)
+{
+    *lo = *hi = INFINITY;
+    for (uint64_t i = 0; i < a->count; i++)
+        for (uint64_t j = 0; j < b->count; j++) {
+            const double(*p)[3] = (const double(*)[3])a->corner[i],
+                  (*q)[3] = (const double(*)[3])b->corner[j];
+            ebpo_pair_distance_bounds d;
+            if (box_gap(p, q) > *hi * (1 + 1e-9))
+                continue;
+            ebpo_triangles_distance_bounds(p, q, &d);
+            *lo = fmin(*lo, d.lo);
+            *hi = fmin(*hi, d.hi);
+        }
+}
+
+/* Moves b until it is nearly at a. */
+static void approach(two_models *t, const ebpo_pose *a, ebpo_pose *b, double left)
+{
+    for (int i = 0; i < 3; i++) {
+        ebpo_clearance c = ask(t->collider, a, b, 0, -1, false);
+        for (int k = 0; k < 3; k++)
+            b->translation[k] += (1 - left) * (c.point_a[k] - c.point_b[k]);
+    }
+}
+
+/* Turned about: what decides there are bounds that small models at straight poses hardly ask for.
+ */
+START_TEST(bounds_of_deep_hierarchies_hold)
+{
+    two_models t;
+    uint64_t state = (uint64_t)_i + 77;
+    ebpo_pose a, b;
+    twin_faces f[2];
+    double lo, hi;
+    for (int i = 0; i < 2; i++)
+        query_model_make(&t.model[i], "fine torus", ebpo_test_torus(2, 0.7, 64, 32),
+                         &query_variants[0]);
+    ASSERT_OK(ebpo_collider_new(t.model[0].model, t.model[1].model, NULL, &t.collider, error));
+    ASSERT_OK(ebpo_collider_new(t.model[1].model, t.model[0].model, NULL, &t.swapped, error));
+    twin_pose(TWIN_TURNED_APART, t.model[0].size, &state, &a, &b);
+    approach(&t, &a, &b, 0.1 * (1 + _i));
+    twin_faces_make(&f[0], &t.model[0], &a);
+    twin_faces_make(&f[1], &t.model[1], &b);
+    distance_of_all(&f[0], &f[1], &lo, &hi);
+    double got = ask(t.collider, &a, &b, 0, -1, false).distance.hi;
+    ck_assert_msg(lo > 0 && lo <= got && got <= hi, "%d: %.17g is not in %.17g .. %.17g", _i, got,
+                  lo, hi);
+    for (int i = 0; i < 2; i++)
+        twin_faces_free(&f[i]);
+    free_two(&t);
+}
+END_TEST
+
 /* A translation that rounds nothing changes nothing. */
 START_TEST(moving_both_alike_changes_nothing)
 {
@@ -227,6 +298,7 @@ Suite *test_suite(void)
     TCase *tests = tcase_create("collide_distance");
     tcase_set_timeout(tests, 900);
     tcase_add_loop_test(tests, distances_are_those_of_brute_force, 0, NAMES * NAMES);
+    tcase_add_loop_test(tests, bounds_of_deep_hierarchies_hold, 0, 6);
     tcase_add_test(tests, moving_both_alike_changes_nothing);
     tcase_add_test(tests, what_is_no_number_is_refused);
     Suite *suite = suite_create("collide_distance");

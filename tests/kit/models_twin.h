@@ -13,7 +13,7 @@
 
 /* --- poses --- */
 
-enum { TWIN_POSES = 16 };
+enum { TWIN_POSES = 16, TWIN_TURNED_APART = 14 };
 const char *twin_pose_name(int kind);
 /* Of a and b as meshes of sizes `size`: identical, quarter turns, half a size along axes, boxes
  * that touch, 1e-9 of the size, slight and deep ones, straight and turned about, one small within
