@@ -2,6 +2,7 @@
 #ifndef EBPO_BOOLEAN_BOOLEAN_H
 #define EBPO_BOOLEAN_BOOLEAN_H
 
+#include "boolean/expression.h"
 #include "boolean/posed_sides.h"
 
 struct ebpo_boolean {

@@ -3,7 +3,7 @@
 #ifndef EBPO_BOOLEAN_POSED_SIDES_H
 #define EBPO_BOOLEAN_POSED_SIDES_H
 
-#include "boolean/posed_solid.h"
+#include "collide/posed_solid.h"
 
 /* Around a point of the world. */
 typedef struct ebpo_posed_sides {

@@ -2,7 +2,8 @@
 #ifndef EBPO_BOOLEAN_SOLID_IN_CUBE_H
 #define EBPO_BOOLEAN_SOLID_IN_CUBE_H
 
-#include "boolean/posed_solid.h"
+#include "boolean/expression.h"
+#include "collide/posed_solid.h"
 
 /* What has decided. */
 enum { EBPO_CUBE_BY_BOX, EBPO_CUBE_BY_NODES, EBPO_CUBE_BY_FACES, EBPO_CUBE_WAYS };

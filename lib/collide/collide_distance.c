@@ -67,16 +67,6 @@ static void tell_pair(const ebpo_collision *q, const ebpo_nearest_pair *n, ebpo_
     }
 }
 
-static ebpo_certain certain(double lo, double hi)
-{
-    bool bound = lo != hi && (lo == 0 || isinf(hi));
-    return (ebpo_certain){ lo, hi,
-                           lo == hi ? EBPO_FIGURE_EXACT
-                           : bound  ? EBPO_FIGURE_BOUND
-                                    : EBPO_FIGURE_INTERVAL,
-                           0 };
-}
-
 static ebpo_status search(ebpo_collision *q, const ebpo_clearance_options *o, ebpo_clearance *out,
                           ebpo_error *error)
 {
@@ -100,7 +90,7 @@ static ebpo_status search(ebpo_collision *q, const ebpo_clearance_options *o, eb
         return status;
     c->node_pairs += c->gap->node_pairs;
     c->block_pairs += c->gap->block_pairs;
-    out->distance = certain(n.lo, n.hi);
+    out->distance = ebpo_certain_of(n.lo, n.hi);
     out->at_least = n.is_at_least;
     if (!n.found)
         return EBPO_OK;
@@ -129,7 +119,7 @@ ebpo_status ebpo_collide_distance(ebpo_collider *c, const ebpo_collide_options *
     if (status != EBPO_OK)
         return status;
     if (q.model[0]->whole->bound_count == 0 || q.model[1]->whole->bound_count == 0) {
-        out->distance = certain(INFINITY, INFINITY);
+        out->distance = ebpo_certain_of(INFINITY, INFINITY);
         out->at_least = wanted.at_least < 0 ? -1 : 1;
         return EBPO_OK;
     }

@@ -71,6 +71,8 @@ void ebpo_collider_free(ebpo_collider *c)
         return;
     ebpo_pair_walk_free(&c->walk);
     ebpo_gap_free(c->gap);
+    for (int i = 0; i < 2; i++)
+        ebpo_context_free(c->context[i]);
     free(c);
 }
 

@@ -2,6 +2,8 @@
 #ifndef EBPO_COLLIDE_COLLIDER_H
 #define EBPO_COLLIDE_COLLIDER_H
 
+#include <math.h>
+
 #include <ebpo/collide.h>
 
 #include "collide/of_parts.h"
@@ -15,7 +17,8 @@ struct ebpo_collider {
     uint64_t node_pairs, block_pairs, exact;
     struct ebpo_gap_search *gap; /* of distances, once one has been asked */
     bool has_nearest;
-    uint32_t nearest[2]; /* slots of the last nearest pair, of the caller's A and B */
+    uint32_t nearest[2];      /* slots of the last nearest pair, of the caller's A and B */
+    ebpo_context *context[2]; /* of depths, once one has been asked of that model */
 };
 
 /* A question: options checked, models in the order that swapping does not change. */
@@ -46,6 +49,17 @@ void ebpo_collider_count(ebpo_collider *collider, ebpo_pair_walk *walk);
 /* What the caller is told of local numbers of two accels. */
 ebpo_face_pair ebpo_collision_pair(const ebpo_collision *collision, const ebpo_accel *first,
                                    const ebpo_accel *second, const ebpo_met_pair *met);
+
+/* What is certain of a figure. */
+static inline ebpo_certain ebpo_certain_of(double lo, double hi)
+{
+    bool bound = lo != hi && (lo == 0 || isinf(hi));
+    return (ebpo_certain){ lo, hi,
+                           lo == hi ? EBPO_FIGURE_EXACT
+                           : bound  ? EBPO_FIGURE_BOUND
+                                    : EBPO_FIGURE_INTERVAL,
+                           0 };
+}
 
 /* A walk takes so many pairs before it looks at the clock. */
 enum { EBPO_WALK_PAIRS = 1024 };

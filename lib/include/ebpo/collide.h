@@ -5,6 +5,7 @@
  *   Do they meet     ebpo_collide_first
  *   All of it        ebpo_collide_all, ebpo_collide_self
  *   How far          ebpo_collide_distance
+ *   How deep         ebpo_collide_depth
  *
  * Poses are those of pose.h: decisions are exact on posed coordinates. Swapping the models, threads
  * and processors change nothing. What the kinds of pairs mean: docs/develop/collision.md.
@@ -148,7 +149,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_self(ebpo_collider *collider,
                                                      ebpo_pairs_fn take, void *user,
                                                      ebpo_error *error);
 
-/* ---- how far ---- */
+/* ---- how far, how deep ---- */
 
 /* How a figure is meant. */
 typedef enum ebpo_figure {
@@ -226,6 +227,26 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_distance(ebpo_collider *collider
                                                          const ebpo_collide_options *options,
                                                          const ebpo_clearance_options *clearance,
                                                          ebpo_clearance *out, ebpo_error *error);
+
+/*
+ * The depth of A's surface in B: the greatest distance to B's nearest face over points of A's faces
+ * that are in B, a solid; and the reverse. 0: none is. An interval, as no corner need be the deepest
+ * point: hi - lo is at most `tolerance`, and what rounding moves points by (2^-40 of the
+ * coordinates, more with matrices that are no exact rotations), unless the deadline ends it. This
+ * is not the least motion that parts the two: that is not computed.
+ *
+ * tolerance        greater than 0, in the world's unit; work grows with what it is asked to tell
+ * a_in_b, b_in_a   NULL: not asked
+ *
+ * EBPO_E_NOT_SOLID: what the depth in it is asked of is a surface. EBPO_E_ARGUMENT: also the
+ * tolerance. Others as for ebpo_collide_first.
+ *
+ * Threads: one per collider.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_depth(ebpo_collider *collider,
+                                                      const ebpo_collide_options *options,
+                                                      double tolerance, ebpo_certain *a_in_b,
+                                                      ebpo_certain *b_in_a, ebpo_error *error);
 
 /* Sums since the collider was made. */
 typedef struct ebpo_collider_stats {

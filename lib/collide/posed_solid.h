@@ -1,10 +1,9 @@
 /* A solid at a pose: where a point of the world lies in its model's coordinates, and whether it is
  * inside, exact on posed coordinates. Proofs: docs/develop/booleans.md. Solids are not changed:
  * any thread, each with a context of its own. */
-#ifndef EBPO_BOOLEAN_POSED_SOLID_H
-#define EBPO_BOOLEAN_POSED_SOLID_H
+#ifndef EBPO_COLLIDE_POSED_SOLID_H
+#define EBPO_COLLIDE_POSED_SOLID_H
 
-#include "boolean/expression.h"
 #include "pair/pose.h"
 #include "query/query_model.h"
 
@@ -17,9 +16,8 @@ typedef struct ebpo_posed_solid {
 } ebpo_posed_solid;
 
 /* EBPO_E_ARGUMENT: a pose; EBPO_E_NOT_SOLID, EBPO_E_ABSENT: a model. */
-EBPO_MUST_USE ebpo_status ebpo_posed_solid_make(ebpo_posed_solid *out,
-                                                const ebpo_boolean_operand *operand,
-                                                ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_posed_solid_make(ebpo_posed_solid *out, ebpo_model *model,
+                                                const ebpo_pose *pose, ebpo_error *error);
 
 /* False: w is certainly outside, beyond the box by more than `margin` (0 or more) on an axis. */
 bool ebpo_posed_solid_near(const ebpo_posed_solid *s, const double w[3], double margin);

@@ -1,7 +1,7 @@
 /* Points of the world asked of models; bounds: docs/develop/booleans.md. */
 #include "geom/strict_fp.h"
 
-#include "boolean/posed_solid.h"
+#include "collide/posed_solid.h"
 
 #include <math.h>
 #include <string.h>
@@ -30,18 +30,18 @@ static void bound_box(ebpo_posed_solid *s)
     }
 }
 
-ebpo_status ebpo_posed_solid_make(ebpo_posed_solid *out, const ebpo_boolean_operand *operand,
+ebpo_status ebpo_posed_solid_make(ebpo_posed_solid *out, ebpo_model *model, const ebpo_pose *pose,
                                   ebpo_error *error)
 {
     double reach[3];
-    *out = (ebpo_posed_solid){ .model = operand->model };
-    memcpy(out->rotation, operand->pose.rotation, sizeof out->rotation);
-    ebpo_model_reach(operand->model, reach);
-    ebpo_status status = ebpo_check_solid(operand->model, error);
+    *out = (ebpo_posed_solid){ .model = model };
+    memcpy(out->rotation, pose->rotation, sizeof out->rotation);
+    ebpo_model_reach(model, reach);
+    ebpo_status status = ebpo_check_solid(model, error);
     if (status == EBPO_OK)
-        status = ebpo_check_mesh(operand->model, error);
+        status = ebpo_check_mesh(model, error);
     if (status == EBPO_OK)
-        status = ebpo_posing_make(&out->posing, &operand->pose, reach, error);
+        status = ebpo_posing_make(&out->posing, pose, reach, error);
     if (status != EBPO_OK)
         return status;
     /* reach is at most 2^1000: no sum overflows; 1.7321 is more than the root of 3 */

@@ -1,0 +1,215 @@
+#include "geom/strict_fp.h"
+
+#include "collide/depth_search.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/clock.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "collide/pair_walk.h"
+#include "geom/distance.h"
+
+/* --- one point --- */
+
+/* How deep it is in the solid, less than 0 outside: surely within *lo .. *hi. */
+static ebpo_status depth_at(ebpo_depth_search *s, const double w[3], double *lo, double *hi,
+                            ebpo_error *error)
+{
+    double p[3], doubt, scale = s->solid->posing.scale;
+    ebpo_distance_result r;
+    ebpo_unpose(s->solid, w, p, &doubt);
+    s->asked++;
+    ebpo_status status = ebpo_distance(s->context, p, NULL, &r, error);
+    if (status != EBPO_OK)
+        return status;
+    double size = fabs(r.distance), off = 2 * doubt + 0x1p-50 * size;
+    *hi = (size + off) * scale;
+    *lo = -*hi;
+    if (!(size > off)) /* a face may be on either side of it */
+        return EBPO_OK;
+    if (r.distance < 0)
+        *lo = (size - off) * scale;
+    else
+        *hi = (off - size) * scale;
+    return EBPO_OK;
+}
+
+/* No point of the triangle in the solid is deeper than it is away from the face that was nearest to
+ * the last point asked about; and that is convex, so its corners tell. */
+static double most_at_corners(const ebpo_depth_search *s, const double corner[3][3])
+{
+    double most = 0, p[3], doubt;
+    for (int i = 0; i < 3; i++) {
+        ebpo_distance_bounds d;
+        ebpo_unpose(s->solid, corner[i], p, &doubt);
+        ebpo_triangle_distance_bounds(p, (const double(*)[3])s->context->warm_triangle, &d);
+        most = fmax(most, (d.hi + 2 * doubt) * s->solid->posing.scale + s->lost);
+    }
+    return most * (1 + 0x1p-50);
+}
+
+/* --- the heap --- */
+
+static bool push(ebpo_depth_search *s, const ebpo_depth_part *part)
+{
+    if (!ebpo_grow(&s->part, &s->capacity, s->count + 1, sizeof *s->part))
+        return false;
+    uint64_t at = s->count++;
+    for (uint64_t up; at > 0 && s->part[up = (at - 1) / 2].most < part->most; at = up)
+        s->part[at] = s->part[up];
+    s->part[at] = *part;
+    return true;
+}
+
+static ebpo_depth_part pop(ebpo_depth_search *s)
+{
+    ebpo_depth_part out = s->part[0], last = s->part[--s->count];
+    uint64_t at = 0;
+    for (uint64_t next; (next = 2 * at + 1) < s->count; at = next) {
+        next += next + 1 < s->count && s->part[next + 1].most > s->part[next].most;
+        if (!(s->part[next].most > last.most))
+            break;
+        s->part[at] = s->part[next];
+    }
+    s->part[at] = last;
+    return out;
+}
+
+/* --- parts --- */
+
+/* The part is within `radius` of the centre; `own`: the centre is a point of it. */
+static ebpo_status offer(ebpo_depth_search *s, ebpo_depth_part *part, const double centre[3],
+                         double radius, bool own, ebpo_error *error)
+{
+    double lo, hi;
+    if (!ebpo_posed_solid_near(s->solid, centre, radius))
+        return EBPO_OK;
+    ebpo_status status = depth_at(s, centre, &lo, &hi, error);
+    if (status != EBPO_OK)
+        return status;
+    if (own)
+        s->lo = fmax(s->lo, lo - s->lost);
+    part->most = (hi + radius) * (hi + radius > 0 ? 1 + 0x1p-50 : 1);
+    if (own && part->most > s->lo && s->context->warm)
+        part->most = fmin(part->most, most_at_corners(s, (const double(*)[3])part->corner));
+    if (!(part->most > s->lo + s->tolerance) || (own && !(radius > 4 * s->lost))) {
+        s->left = fmax(s->left, part->most);
+        return EBPO_OK;
+    }
+    return push(s, part) ? EBPO_OK : ebpo_fail_memory(error, s->capacity * sizeof *s->part);
+}
+
+static ebpo_status offer_child(ebpo_depth_search *s, uint32_t ref, ebpo_error *error)
+{
+    const ebpo_bound *b = &s->surface->bound[ref / 8];
+    double middle[3], centre[3], square = 0;
+    ebpo_depth_part part = { .ref = ref };
+    for (int k = 0; k < 3; k++) {
+        ebpo_bound_sides side = ebpo_bound_side(b, (int)(ref % 8), k);
+        double half = (side.high - side.low) / 2;
+        middle[k] = s->surface->centre[k] + (side.low + side.high) / 2 / s->surface->scale;
+        square += half * half;
+    }
+    ebpo_posing_apply(s->posing, middle, centre);
+    double radius = sqrt(square) / s->surface->scale * s->posing->scale * (1 + 0x1p-17) + s->lost;
+    return offer(s, &part, centre, radius, false, error);
+}
+
+static double length_between(const double a[3], const double b[3])
+{
+    double square = 0;
+    for (int k = 0; k < 3; k++)
+        square += (a[k] - b[k]) * (a[k] - b[k]);
+    return sqrt(square);
+}
+
+static ebpo_status offer_triangle(ebpo_depth_search *s, const double a[3], const double b[3],
+                                  const double c[3], ebpo_error *error)
+{
+    ebpo_depth_part part = { .ref = EBPO_NO_CHILD };
+    double centre[3], radius = 0;
+    const double *corner[3] = { a, b, c };
+    for (int k = 0; k < 3; k++)
+        centre[k] = a[k] + ((b[k] - a[k]) + (c[k] - a[k])) / 3;
+    for (int i = 0; i < 3; i++) {
+        memcpy(part.corner[i], corner[i], sizeof part.corner[i]);
+        radius = fmax(radius, length_between(corner[i], centre));
+    }
+    return offer(s, &part, centre, radius * (1 + 0x1p-50) + s->lost, true, error);
+}
+
+static ebpo_status divide_block(ebpo_depth_search *s, uint32_t block, ebpo_error *error)
+{
+    unsigned faces = ebpo_accel_meshlet(s->surface, block)->faces;
+    ebpo_status status = EBPO_OK;
+    for (unsigned lane = 0; lane < faces && status == EBPO_OK; lane++) {
+        double t[3][3];
+        ebpo_posed_triangle(s->surface, s->posing, block * EBPO_BLOCK + lane, t);
+        status = offer_triangle(s, t[0], t[1], t[2], error);
+    }
+    return status;
+}
+
+/* Into four, by the middles of the edges. */
+static ebpo_status divide_triangle(ebpo_depth_search *s, const ebpo_depth_part *p,
+                                   ebpo_error *error)
+{
+    double middle[3][3];
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            middle[i][k] = p->corner[i][k] + (p->corner[(i + 1) % 3][k] - p->corner[i][k]) / 2;
+    ebpo_status status = offer_triangle(s, middle[0], middle[1], middle[2], error);
+    for (int i = 0; i < 3 && status == EBPO_OK; i++)
+        status = offer_triangle(s, p->corner[i], middle[i], middle[(i + 2) % 3], error);
+    return status;
+}
+
+static ebpo_status divide_node(ebpo_depth_search *s, uint32_t node, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (uint32_t i = 0; i < s->surface->bound[node].count && status == EBPO_OK; i++)
+        status = offer_child(s, node * 8 + i, error);
+    return status;
+}
+
+static ebpo_status divide(ebpo_depth_search *s, const ebpo_depth_part *p, ebpo_error *error)
+{
+    if (p->ref == EBPO_NO_CHILD)
+        return divide_triangle(s, p, error);
+    uint32_t child = s->surface->bound[p->ref / 8].child[p->ref % 8];
+    return child & EBPO_IS_BLOCK ? divide_block(s, child & ~EBPO_IS_BLOCK, error)
+                                 : divide_node(s, child, error);
+}
+
+/* --- the search --- */
+
+static ebpo_status search(ebpo_depth_search *s, ebpo_error *error)
+{
+    ebpo_status status = divide_node(s, s->surface->top, error);
+    while (status == EBPO_OK && s->count > 0 && s->part[0].most > s->lo + s->tolerance) {
+        if (s->late != UINT64_MAX && ebpo_clock() >= s->late)
+            break;
+        if (s->asked % 64 == 0 && !ebpo_progress_step(s->progress, "depth", 0, 0, error))
+            return EBPO_E_CANCELLED;
+        ebpo_depth_part part = pop(s);
+        status = divide(s, &part, error);
+    }
+    return status;
+}
+
+ebpo_status ebpo_depth_search_run(ebpo_depth_search *s, ebpo_error *error)
+{
+    s->lost = 0x1p-46 * s->reach;
+    s->lo = 0;
+    ebpo_status status = search(s, error);
+    s->hi = fmax(s->lo, s->left);
+    if (s->count > 0)
+        s->hi = fmax(s->hi, s->part[0].most);
+    free(s->part);
+    s->part = NULL;
+    return status;
+}
