@@ -1,19 +1,20 @@
 /* ebpo collide: which faces of two models meet, and how far apart they are. */
+#include <float.h>
 #include <stddef.h>
 #include <stdio.h>
 
 #include "cli/answers.h"
 #include "cli/command.h"
-#include "cli/json.h"
 #include "cli/pose_args.h"
 #include "cli/progress.h"
 #include "cli/query_args.h"
+#include "cmd/collide_far.h"
 #include "cmd/commands.h"
 
 typedef struct collide_values {
     const char *pose_a, *pose_b, *deadline;
-    bool all, self, distance, json, quiet;
-    double tolerance;
+    bool all, self, json, quiet;
+    collide_far far;
     int64_t threads;
     remote_values remote;
 } collide_values;
@@ -25,10 +26,7 @@ static const arg_option options[] = {
     OPTION_FLAG("all", 0, collide_values, all, "print every pair of faces that meet"),
     OPTION_FLAG("self", 0, collide_values, self,
                 "faces of one model that meet otherwise than as neighbours"),
-    OPTION_FLAG("distance", 0, collide_values, distance,
-                "print how far apart the faces are: two bounds, and the nearest faces"),
-    OPTION_REAL("tolerance", 0, collide_values, tolerance, "T", 0, 1e300,
-                "of --distance: its bounds may be so far apart; 0, the default: exact"),
+    COLLIDE_FAR_OPTIONS(collide_values, far),
     OPTION_TEXT("deadline", 0, collide_values, deadline, "TIME",
                 "stop after about this long; in microseconds, or with a unit: 500us, 50ms, 2s"),
     OPTION_FLAG("json", 0, collide_values, json, "print JSON, an object a line"),
@@ -45,7 +43,8 @@ static const arg_spec spec = {
     .operands = "A [B]",
     .least = 1,
     .most = 2,
-    .summary = "tells whether the faces of two models meet, which do, and how far apart they are",
+    .summary =
+        "tells whether the faces of two models meet, which do, how far apart or deep they are",
     .text = "A and B are .ebpo.h5 files with their mesh. Prints one pair of faces that meet, or "
             "'none'. A solid within another one does not meet it.",
     .options = options,
@@ -100,40 +99,6 @@ static ebpo_status ask_first(const collide_values *v, ebpo_collider *c,
     return EBPO_OK;
 }
 
-/* Bounds, and the faces if some have been found. */
-static void print_distance(bool as_json, const ebpo_clearance *d)
-{
-    const double *p = d->point_a, *q = d->point_b;
-    const ebpo_face_pair *pair = &d->pair;
-    char lo[32], hi[32];
-    bool found = pair->face_a != EBPO_NO_FACE;
-    if (as_json)
-        printf("{\"lo\": %s, \"hi\": %s", json_number(d->distance.lo, lo),
-               json_number(d->distance.hi, hi));
-    else
-        printf("%.17g %.17g", d->distance.lo, d->distance.hi);
-    if (found && as_json)
-        printf(", \"face_a\": %llu, \"face_b\": %llu, \"point_a\": [%.17g, %.17g, %.17g], "
-               "\"point_b\": [%.17g, %.17g, %.17g]",
-               (unsigned long long)pair->face_a, (unsigned long long)pair->face_b, p[0], p[1], p[2],
-               q[0], q[1], q[2]);
-    else if (found)
-        printf(" %llu %llu", (unsigned long long)pair->face_a, (unsigned long long)pair->face_b);
-    puts(as_json ? "}" : "");
-}
-
-static ebpo_status ask_distance(const collide_values *v, ebpo_collider *c,
-                                const ebpo_collide_options *how, ebpo_error *error)
-{
-    ebpo_clearance_options wanted = EBPO_CLEARANCE_OPTIONS_INIT;
-    ebpo_clearance found;
-    wanted.tolerance = v->tolerance;
-    ebpo_status status = ebpo_collide_distance(c, how, &wanted, &found, error);
-    if (status == EBPO_OK)
-        print_distance(v->json, &found);
-    return status;
-}
-
 static void tell_stats(const ebpo_collider *c)
 {
     ebpo_collider_stats s = EBPO_COLLIDER_STATS_INIT;
@@ -153,10 +118,11 @@ static int ask(collide_values *v, ebpo_model *a, ebpo_model *b, ebpo_collide_opt
     ebpo_status status = ebpo_collider_new(a, b, &with, &c, &error);
     how->progress = progress_start(&line, "collide", v->quiet);
     if (status == EBPO_OK)
-        status = v->self       ? ebpo_collide_self(c, how, take_pairs, v, &error)
-                 : v->all      ? ebpo_collide_all(c, how, take_pairs, v, &error)
-                 : v->distance ? ask_distance(v, c, how, &error)
-                               : ask_first(v, c, how, &error);
+        status = v->self  ? ebpo_collide_self(c, how, take_pairs, v, &error)
+                 : v->all ? ebpo_collide_all(c, how, take_pairs, v, &error)
+                 : v->far.distance || v->far.depth
+                     ? collide_far_ask(&v->far, v->json, c, how, &error)
+                     : ask_first(v, c, how, &error);
     progress_wipe(&line);
     if (c && v->remote.stats)
         tell_stats(c);
@@ -174,9 +140,8 @@ static int run(void *given, const char **operand)
     query_session a = QUERY_SESSION_INIT, b = QUERY_SESSION_INIT;
     if (v->self == (operand[1] != NULL))
         return command_usage("collide", "two models, or one and --self");
-    if (v->distance ? v->all || v->self : v->tolerance > 0)
-        return command_usage("collide", "--distance takes neither --all nor --self, and only it "
-                                        "takes --tolerance");
+    if (!collide_far_fits(&v->far, v->all || v->self))
+        return EXIT_USAGE;
     if (v->self && (v->all || v->pose_a || v->pose_b))
         return command_usage("collide", "--self takes neither --all nor poses");
     if (!read_pose("pose-a", v->pose_a, &how.pose_a) ||
@@ -195,6 +160,6 @@ static int run(void *given, const char **operand)
     return code;
 }
 
-static const collide_values usual = { .remote = REMOTE_VALUES_INIT };
+static const collide_values usual = { .far = COLLIDE_FAR_INIT, .remote = REMOTE_VALUES_INIT };
 
 const command command_collide = { &spec, sizeof usual, &usual, run };

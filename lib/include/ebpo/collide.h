@@ -230,8 +230,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_distance(ebpo_collider *collider
 
 /*
  * The depth of A's surface in B: the greatest distance to B's nearest face over points of A's faces
- * that are in B, a solid; and the reverse. 0: none is. An interval, as no corner need be the deepest
- * point: hi - lo is at most `tolerance`, and what rounding moves points by (2^-40 of the
+ * that are in B, a solid; and the reverse. 0: none is. An interval, as no corner need be the
+ * deepest point: hi - lo is at most `tolerance`, and what rounding moves points by (2^-40 of the
  * coordinates, more with matrices that are no exact rotations), unless the deadline ends it. This
  * is not the least motion that parts the two: that is not computed.
  *

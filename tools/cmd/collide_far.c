@@ -1,0 +1,125 @@
+#include "cmd/collide_far.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+
+#include "cli/command.h"
+#include "cli/json.h"
+
+bool collide_far_fits(const collide_far *f, bool others)
+{
+    const char *wrong = NULL;
+    bool asked = f->distance || f->depth;
+    if ((asked && others) || (f->distance && f->depth) || (!asked && f->tolerance > 0))
+        wrong = "--distance and --depth take neither --all nor --self nor each other, and only "
+                "they take --tolerance";
+    else if (f->at_least >= 0 && (!f->distance || f->tolerance > 0))
+        wrong = "--at-least is for --distance, without --tolerance";
+    else if (f->depth && !(f->tolerance > 0))
+        wrong = "--depth needs a --tolerance greater than 0";
+    if (wrong)
+        (void)command_usage("collide", "%s", wrong);
+    return !wrong;
+}
+
+/* What is certain. */
+static void print_bounds(bool as_json, const ebpo_certain *d)
+{
+    char lo[32], hi[32];
+    if (as_json)
+        printf("\"lo\": %s, \"hi\": %s", json_number(d->lo, lo), json_number(d->hi, hi));
+    else
+        printf("%.17g %.17g", d->lo, d->hi);
+}
+
+/* --- distance --- */
+
+/* The faces, if some have been found. */
+static void print_pair(bool as_json, const ebpo_clearance *c)
+{
+    const double *p = c->point_a, *q = c->point_b;
+    if (c->pair.face_a == EBPO_NO_FACE)
+        return;
+    if (as_json)
+        printf(", \"face_a\": %" PRIu64 ", \"face_b\": %" PRIu64
+               ", \"point_a\": [%.17g, %.17g, %.17g], \"point_b\": [%.17g, %.17g, %.17g]",
+               c->pair.face_a, c->pair.face_b, p[0], p[1], p[2], q[0], q[1], q[2]);
+    else
+        printf(" %" PRIu64 " %" PRIu64, c->pair.face_a, c->pair.face_b);
+}
+
+static void print_distance(bool as_json, const ebpo_clearance *c)
+{
+    printf("%s", as_json ? "{" : "");
+    print_bounds(as_json, &c->distance);
+    print_pair(as_json, c);
+    puts(as_json ? "}" : "");
+}
+
+static void print_at_least(bool as_json, const ebpo_clearance *c)
+{
+    static const char *const words[2][3] = { { "not known", "no", "yes" },
+                                             { "null", "false", "true" } };
+    printf("%s%s", as_json ? "{\"at_least\": " : "", words[as_json][c->at_least + 1]);
+    print_pair(as_json, c);
+    puts(as_json ? "}" : "");
+}
+
+static ebpo_status ask_distance(const collide_far *f, bool as_json, ebpo_collider *c,
+                                const ebpo_collide_options *how, ebpo_error *error)
+{
+    ebpo_clearance_options wanted = EBPO_CLEARANCE_OPTIONS_INIT;
+    ebpo_clearance got;
+    wanted.tolerance = f->tolerance;
+    wanted.at_least = f->at_least;
+    ebpo_status status = ebpo_collide_distance(c, how, &wanted, &got, error);
+    if (status != EBPO_OK)
+        return status;
+    if (f->at_least >= 0)
+        print_at_least(as_json, &got);
+    else
+        print_distance(as_json, &got);
+    return EBPO_OK;
+}
+
+/* --- depth --- */
+
+static void print_depth(bool as_json, const char *name, bool solid, const ebpo_certain *d)
+{
+    printf(as_json ? "\"%s\": " : "%s ", name);
+    if (!solid) {
+        printf(as_json ? "null" : "- -");
+        return;
+    }
+    printf("%s", as_json ? "{" : "");
+    print_bounds(as_json, d);
+    printf("%s", as_json ? "}" : "");
+}
+
+static ebpo_status ask_depth(const collide_far *f, bool as_json, ebpo_collider *c,
+                             const ebpo_collide_options *how, ebpo_error *error)
+{
+    ebpo_certain depth[2] = { { 0, 0, 0, 0 }, { 0, 0, 0, 0 } };
+    ebpo_status status[2];
+    for (int i = 0; i < 2; i++) {
+        status[i] = ebpo_collide_depth(c, how, f->tolerance, i == 0 ? &depth[0] : NULL,
+                                       i == 1 ? &depth[1] : NULL, error);
+        if (status[i] != EBPO_OK && status[i] != EBPO_E_NOT_SOLID)
+            return status[i];
+    }
+    if (status[0] != EBPO_OK && status[1] != EBPO_OK)
+        return status[0];
+    printf("%s", as_json ? "{" : "");
+    print_depth(as_json, "a_in_b", status[0] == EBPO_OK, &depth[0]);
+    printf("%s", as_json ? ", " : "\n");
+    print_depth(as_json, "b_in_a", status[1] == EBPO_OK, &depth[1]);
+    puts(as_json ? "}" : "");
+    return EBPO_OK;
+}
+
+ebpo_status collide_far_ask(const collide_far *f, bool as_json, ebpo_collider *c,
+                            const ebpo_collide_options *how, ebpo_error *error)
+{
+    return f->distance ? ask_distance(f, as_json, c, how, error)
+                       : ask_depth(f, as_json, c, how, error);
+}

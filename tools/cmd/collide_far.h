@@ -1,0 +1,34 @@
+/* ebpo collide --distance and --depth: asking and printing. */
+#ifndef EBPO_TOOLS_COLLIDE_FAR_H
+#define EBPO_TOOLS_COLLIDE_FAR_H
+
+#include <ebpo/collide.h>
+
+/* As the options say; not given: a tolerance of 0, an at_least below 0. */
+typedef struct collide_far {
+    bool distance, depth;
+    double tolerance, at_least;
+} collide_far;
+
+#define COLLIDE_FAR_INIT        \
+    {                           \
+        false, false, 0.0, -1.0 \
+    }
+
+#define COLLIDE_FAR_OPTIONS(type, member)                                                     \
+    OPTION_FLAG("distance", 0, type, member.distance,                                         \
+                "print how far apart the faces are: two bounds, and the nearest faces"),      \
+        OPTION_FLAG("depth", 0, type, member.depth,                                           \
+                    "how deep A's faces are in B, a solid, and B's in A; needs --tolerance"), \
+        OPTION_REAL("tolerance", 0, type, member.tolerance, "T", 0, DBL_MAX,                  \
+                    "bounds may be so far apart; 0, the default of --distance: exact"),       \
+        OPTION_REAL("at-least", 0, type, member.at_least, "D", 0, DBL_MAX,                    \
+                    "with --distance: only whether it is at least D")
+
+/* False, and a message on standard error: they do not go together. others: --all or --self. */
+bool collide_far_fits(const collide_far *far, bool others);
+
+ebpo_status collide_far_ask(const collide_far *far, bool as_json, ebpo_collider *collider,
+                            const ebpo_collide_options *how, ebpo_error *error);
+
+#endif
