@@ -9,6 +9,8 @@
 #include <stdbool.h>
 #include <string.h>
 
+#include "pair/triangle_pair.h"
+
 static const double most_reach = 0x1p200, least_reach = 0x1p-200;
 
 static double dot(const double a[3], const double b[3])
@@ -195,12 +197,41 @@ static bool same_feature(const double a[3][3], int on_a, const double b[3][3], i
     return true;
 }
 
+/* Both lie across one axis, each all at one coordinate, and one is over the other: they are as far
+ * apart as these two. */
+static bool level_faces(const double a[3][3], const double b[3][3], double level[2])
+{
+    for (int k = 0; k < 3; k++) {
+        double p[3][3], q[3][3];
+        level[0] = a[0][k];
+        level[1] = b[0][k];
+        if (a[1][k] != level[0] || a[2][k] != level[0] || b[1][k] != level[1] ||
+            b[2][k] != level[1])
+            continue;
+        memcpy(p, a, sizeof p);
+        memcpy(q, b, sizeof q);
+        for (int i = 0; i < 3; i++)
+            p[i][k] = q[i][k] = 0;
+        return ebpo_triangle_pair((const double(*)[3])p, (const double(*)[3])q) != EBPO_PAIR_APART;
+    }
+    return false;
+}
+
+static bool same_levels(const double a[3][3], const double b[3][3], const double c[3][3],
+                        const double d[3][3])
+{
+    double ab[2], cd[2];
+    return level_faces(a, b, ab) && level_faces(c, d, cd) &&
+           ((ab[0] == cd[0] && ab[1] == cd[1]) || (ab[0] == cd[1] && ab[1] == cd[0]));
+}
+
 bool ebpo_same_distance(const double a[3][3], const double b[3][3],
                         const ebpo_pair_distance_bounds *ab, const double c[3][3],
                         const double d[3][3], const ebpo_pair_distance_bounds *cd)
 {
-    return ab->certain && cd->certain && same_feature(a, ab->feature[0], c, cd->feature[0]) &&
-           same_feature(b, ab->feature[1], d, cd->feature[1]);
+    return (ab->certain && cd->certain && same_feature(a, ab->feature[0], c, cd->feature[0]) &&
+            same_feature(b, ab->feature[1], d, cd->feature[1])) ||
+           same_levels(a, b, c, d);
 }
 
 void ebpo_triangles_distance_bounds(const double a[3][3], const double b[3][3],

@@ -21,8 +21,8 @@ void ebpo_triangles_distance_bounds(const double a[3][3], const double b[3][3],
                                     ebpo_pair_distance_bounds *out);
 
 /* True: the exact distances of both pairs are certainly equal, as they are those of the same
- * corners or edges, or of faces with the same corners. Faces around an edge or corner often are so.
- */
+ * corners or edges, or of faces with the same corners, or of two planes across an axis. Faces
+ * around an edge or corner often are so, and those of flat sides. */
 bool ebpo_same_distance(const double a[3][3], const double b[3][3],
                         const ebpo_pair_distance_bounds *ab, const double c[3][3],
                         const double d[3][3], const ebpo_pair_distance_bounds *cd);

@@ -4,7 +4,9 @@
 
 #include <math.h>
 #include <stdbool.h>
+#include <string.h>
 
+#include "geom/distance.h"
 #include "geom/distance_parts.h"
 #include "geom/integer_vectors.h"
 #include "pair/pair_distance.h"
@@ -94,7 +96,21 @@ static bool edges_square(edges *e, fraction *out)
     return true;
 }
 
-static void take_edges(fraction *best, const double a[3][3], const double b[3][3], int unit)
+/* Farther than `hi` for certain. */
+static bool edges_far(const double a[3][3], int i, const double b[3][3], int j, double hi)
+{
+    double p[3][3], q[3][3];
+    ebpo_pair_distance_bounds bounds;
+    for (int k = 0; k < 3; k++) {
+        memcpy(p[k], a[(i + (k > 0)) % 3], sizeof p[k]);
+        memcpy(q[k], b[(j + (k > 0)) % 3], sizeof q[k]);
+    }
+    ebpo_triangles_distance_bounds((const double(*)[3])p, (const double(*)[3])q, &bounds);
+    return bounds.lo > hi;
+}
+
+static void take_edges(fraction *best, const double a[3][3], const double b[3][3], double hi,
+                       int unit)
 {
     edges e;
     fraction f;
@@ -103,6 +119,8 @@ static void take_edges(fraction *best, const double a[3][3], const double b[3][3
     for (int i = 0; i < 3; i++) {
         set_edge(&e, 0, a[i], a[i == 2 ? 0 : i + 1], unit);
         for (int j = 0; j < 3; j++) {
+            if (edges_far(a, i, b, j, hi))
+                continue;
             set_edge(&e, 1, b[j], b[j == 2 ? 0 : j + 1], unit);
             if (edges_square(&e, &f))
                 take_lesser(best, &f);
@@ -115,11 +133,15 @@ static void take_edges(fraction *best, const double a[3][3], const double b[3][3
 /* --- faces --- */
 
 static void take_corners(fraction *best, const double corner[3][3], const double face[3][3],
-                         int unit)
+                         double hi, int unit)
 {
     fraction f;
     fraction_init(&f);
     for (int i = 0; i < 3; i++) {
+        ebpo_distance_bounds bounds;
+        ebpo_triangle_distance_bounds(corner[i], face, &bounds);
+        if (bounds.lo > hi)
+            continue;
         ebpo_triangle_square_gmp(corner[i], face, unit, f.square, f.denominator);
         take_lesser(best, &f);
     }
@@ -138,10 +160,12 @@ static void squared_distance(const double a[3][3], const double b[3][3], int uni
         mpz_set_ui(out->denominator, 1);
         return;
     }
+    ebpo_pair_distance_bounds bounds; /* what is farther is not the least */
+    ebpo_triangles_distance_bounds(a, b, &bounds);
     mpz_set_ui(out->denominator, 0);
-    take_corners(out, a, b, unit);
-    take_corners(out, b, a, unit);
-    take_edges(out, a, b, unit);
+    take_corners(out, a, b, bounds.hi, unit);
+    take_corners(out, b, a, bounds.hi, unit);
+    take_edges(out, a, b, bounds.hi, unit);
 }
 
 double ebpo_triangles_distance(const double a[3][3], const double b[3][3])

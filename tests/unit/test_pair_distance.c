@@ -83,12 +83,47 @@ START_TEST(comparisons_are_exact)
 }
 END_TEST
 
+/* Across axis k, at a level; corners on a grid of 4. */
+static void level_face(double t[3][3], int k, double level, uint64_t *state)
+{
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            t[i][j] = j == k ? level : (double)(twin_random(state) % 4);
+}
+
+/* Pairs of flat sides at one distance, which other pairs on the same sides need not have. */
+START_TEST(what_is_said_to_be_equal_is)
+{
+    uint64_t state = 5, equal = 0;
+    for (int i = 0; i < (int)ebpo_test_scaled(CASES); i++) {
+        double face[2][2][3][3];
+        ebpo_pair_distance_bounds bounds[2];
+        for (int p = 0; p < 2; p++) {
+            int k = (int)(twin_random(&state) % 3);
+            double level = (double)(twin_random(&state) % 2) * 0.1;
+            level_face(face[p][0], k, level, &state);
+            level_face(face[p][1], k, 0.7 + level * (double)(i % 2), &state);
+            ebpo_triangles_distance_bounds(CORNERS(face[p][0]), CORNERS(face[p][1]), &bounds[p]);
+        }
+        if (!ebpo_same_distance(CORNERS(face[0][0]), CORNERS(face[0][1]), &bounds[0],
+                                CORNERS(face[1][0]), CORNERS(face[1][1]), &bounds[1]))
+            continue;
+        equal++;
+        ck_assert_int_eq(ebpo_triangles_distance_compare(CORNERS(face[0][0]), CORNERS(face[0][1]),
+                                                         CORNERS(face[1][0]), CORNERS(face[1][1])),
+                         0);
+    }
+    ck_assert_uint_gt(equal, 0);
+}
+END_TEST
+
 Suite *test_suite(void)
 {
     TCase *tests = tcase_create("pair_distance");
     tcase_set_timeout(tests, 1000);
     tcase_add_loop_test(tests, distances_equal_brute_force, 0, TWIN_PAIR_KINDS);
     tcase_add_loop_test(tests, comparisons_are_exact, 0, TWIN_PAIR_KINDS);
+    tcase_add_test(tests, what_is_said_to_be_equal_is);
     Suite *suite = suite_create("pair_distance");
     suite_add_tcase(suite, tests);
     return suite;
