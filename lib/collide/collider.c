@@ -71,8 +71,10 @@ void ebpo_collider_free(ebpo_collider *c)
         return;
     ebpo_pair_walk_free(&c->walk);
     ebpo_gap_free(c->gap);
-    for (int i = 0; i < 2; i++)
+    for (int i = 0; i < 2; i++) {
         ebpo_context_free(c->context[i]);
+        free(c->slots[i]);
+    }
     free(c);
 }
 

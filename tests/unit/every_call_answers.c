@@ -23,6 +23,19 @@ static bool count_met(void *user, const ebpo_face_pair *pairs, uint64_t count)
     return true;
 }
 
+static bool count_segments(void *user, const ebpo_contact_segment *segments, uint64_t count)
+{
+    (void)segments;
+    *(uint64_t *)user += count;
+    return true;
+}
+
+static bool count_lines(void *user, const ebpo_polyline *line)
+{
+    *(uint64_t *)user += line->count;
+    return true;
+}
+
 static ebpo_status ask_two(ebpo_collider *collider, const ebpo_collide_options *options,
                            ebpo_error *error)
 {
@@ -37,6 +50,10 @@ static ebpo_status ask_two(ebpo_collider *collider, const ebpo_collide_options *
         status = ebpo_collide_all(collider, options, count_met, &count, error);
     if (status == EBPO_OK)
         status = ebpo_collide_self(collider, options, count_met, &count, error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_contacts(collider, options, count_segments, &count, error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_polylines(collider, options, count_lines, &count, error);
     if (status == EBPO_OK)
         status = ebpo_collide_distance(collider, options, NULL, &clearance, error);
     if (status == EBPO_OK)

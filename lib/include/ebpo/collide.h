@@ -4,6 +4,7 @@
  *   Two models       ebpo_collider_new, one for each thread that asks
  *   Do they meet     ebpo_collide_first
  *   All of it        ebpo_collide_all, ebpo_collide_self
+ *   Where they meet  ebpo_collide_contacts, ebpo_collide_polylines
  *   How far          ebpo_collide_distance
  *   How deep         ebpo_collide_depth
  *
@@ -148,6 +149,66 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_self(ebpo_collider *collider,
                                                      const ebpo_collide_options *options,
                                                      ebpo_pairs_fn take, void *user,
                                                      ebpo_error *error);
+
+/* ---- where they meet ---- */
+
+/*
+ * Where two crossing faces meet: from point[0] to point[1] in the direction of A's normal x B's
+ * normal. Coordinates are within 0.51 units in the last place, and 2^-60 of the greatest one of the
+ * edge that ends there, of the exact ones. Numbers of faces as in ebpo_distance_result.
+ */
+typedef struct ebpo_contact_segment {
+    double point[2][3];
+    uint64_t face_a, face_b;
+
+    /* Of the ends: 0 to 2 that corner, 3 to 5 the edge from corner k - 3 to the next, 6 inside. */
+    uint8_t on_a[2], on_b[2];
+
+    uint8_t reserved[4];
+} ebpo_contact_segment;
+
+/* Segments, lent until it returns. False: enough. */
+typedef bool (*ebpo_segments_fn)(void *user, const ebpo_contact_segment *segments, uint64_t count);
+
+/*
+ * Of the pairs of ebpo_collide_all that are EBPO_PAIR_CROSSING, in that order. When the models are
+ * swapped the segments are the same, with their ends exchanged. Each model takes 4 bytes a face
+ * more in the collider.
+ *
+ * Errors and threads as for ebpo_collide_all.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_contacts(ebpo_collider *collider,
+                                                         const ebpo_collide_options *options,
+                                                         ebpo_segments_fn take, void *user,
+                                                         ebpo_error *error);
+
+/* A line along which two models cross; arrays are lent until the function that gets it returns. */
+typedef struct ebpo_polyline {
+    uint64_t count;        /* of points, 2 or more */
+    const double *points;  /* [count][3]; of a closed one the last is the first */
+    const uint64_t *faces; /* [count - 1][2]: of A and of B, from each point to the next */
+    const double *normals; /* [count - 1][2][3]: their unit normals, as far as doubles tell */
+    bool closed;
+    uint8_t reserved[7];
+} ebpo_polyline;
+
+/* False: enough. */
+typedef bool (*ebpo_polylines_fn)(void *user, const ebpo_polyline *line);
+
+/*
+ * The segments of ebpo_collide_contacts, each in one line, joined where exactly one ends and one
+ * begins at the same corners, edges or faces of both models (corners with equal coordinates in the
+ * model are the same; points that happen to be equal are not joined). Lines come by their first
+ * segment in the order of ebpo_collide_contacts, closed ones begin with it. Of swapped models the
+ * lines run the other way.
+ *
+ * EBPO_E_LIMIT: `memory` does not hold 256 bytes for each segment. Other errors, and threads, as
+ * for ebpo_collide_all.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_polylines(ebpo_collider *collider,
+                                                          const ebpo_collide_options *options,
+                                                          ebpo_polylines_fn take, void *user,
+                                                          ebpo_error *error);
 
 /* ---- how far, how deep ---- */
 
