@@ -12,6 +12,7 @@
 #include "base/sized.h"
 #include "geom/predicates.h"
 #include "octree/rule.h"
+#include "query/options.h"
 
 /* --- making --- */
 
@@ -25,8 +26,9 @@ static ebpo_status make_solids(ebpo_boolean *b, const ebpo_boolean_operand *oper
 {
     for (uint32_t i = 0; i < b->count; i++) {
         ebpo_error cause = EBPO_ERROR_INIT;
-        if (ebpo_posed_solid_make(&b->solid[i], operands[i].model, &operands[i].pose, &cause) !=
-            EBPO_OK)
+        if (ebpo_check_solid(operands[i].model, &cause) != EBPO_OK ||
+            ebpo_posed_solid_make(&b->solid[i], operands[i].model, &operands[i].pose, &cause) !=
+                EBPO_OK)
             return fail_operand(i, &cause, error);
     }
     return EBPO_OK;

@@ -3,7 +3,7 @@
 #define EBPO_BOOLEAN_BOOLEAN_H
 
 #include "boolean/expression.h"
-#include "boolean/posed_sides.h"
+#include "collide/posed_sides.h"
 
 struct ebpo_boolean {
     ebpo_expression expression;

@@ -8,6 +8,7 @@
 #include "collide/collider.h"
 #include "collide/depth_search.h"
 #include "collide/posed_model.h"
+#include "query/options.h"
 
 /* Of the caller's model `solid` (0: A), which holds the other one's surface. */
 static ebpo_status depth_in(const ebpo_collision *q, int solid, double tolerance, ebpo_certain *out,
@@ -17,7 +18,9 @@ static ebpo_status depth_in(const ebpo_collision *q, int solid, double tolerance
     ebpo_posed_solid posed;
     const ebpo_pose *pose = solid ? &q->options.pose_b : &q->options.pose_a;
     const ebpo_posing *posing = &q->posing[solid == q->turned].posing;
-    ebpo_status status = ebpo_posed_solid_make(&posed, c->model[solid], pose, error);
+    ebpo_status status = ebpo_check_solid(c->model[solid], error);
+    if (status == EBPO_OK)
+        status = ebpo_posed_solid_make(&posed, c->model[solid], pose, error);
     if (status == EBPO_OK && !c->context[solid])
         status = ebpo_context_new(c->model[solid], &c->context[solid], error);
     if (status != EBPO_OK)

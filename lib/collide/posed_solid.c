@@ -37,9 +37,7 @@ ebpo_status ebpo_posed_solid_make(ebpo_posed_solid *out, ebpo_model *model, cons
     *out = (ebpo_posed_solid){ .model = model };
     memcpy(out->rotation, pose->rotation, sizeof out->rotation);
     ebpo_model_reach(model, reach);
-    ebpo_status status = ebpo_check_solid(model, error);
-    if (status == EBPO_OK)
-        status = ebpo_check_mesh(model, error);
+    ebpo_status status = ebpo_check_mesh(model, error);
     if (status == EBPO_OK)
         status = ebpo_posing_make(&out->posing, pose, reach, error);
     if (status != EBPO_OK)
@@ -76,6 +74,26 @@ void ebpo_unpose(const ebpo_posed_solid *s, const double w[3], double p[3], doub
                scale;
     double far = s->moved + length * (2 * s->posing.deviation + 8 * 0x1p-53) + 0x1p-1060;
     *doubt = far / scale * more + 0x1p-1060;
+}
+
+void ebpo_unpose_box(const ebpo_posed_solid *s, const double a[3], const double b[3], double low[3],
+                     double high[3])
+{
+    double middle[3], half[3], all = 0, p[3], doubt;
+    for (int k = 0; k < 3; k++) {
+        middle[k] = a[k] / 2 + b[k] / 2;
+        half[k] = fmax(fabs(a[k] - middle[k]), fabs(b[k] - middle[k])) * (1 + 0x1p-50);
+        all += half[k];
+    }
+    ebpo_unpose(s, middle, p, &doubt);
+    for (int k = 0; k < 3; k++) {
+        double reach = 2 * s->posing.deviation * all;
+        for (int i = 0; i < 3; i++)
+            reach += fabs(s->rotation[i][k]) * half[i];
+        reach = reach / s->posing.scale * (1 + 0x1p-40) + doubt;
+        low[k] = nextafter(p[k] - reach, -INFINITY);
+        high[k] = nextafter(p[k] + reach, INFINITY);
+    }
 }
 
 ebpo_status ebpo_posed_solid_clear(ebpo_context *context, const double p[3], double doubt,

@@ -15,7 +15,8 @@ typedef struct ebpo_posed_solid {
     double moved;  /* posed vertices are at most so far from where the true motion has them */
 } ebpo_posed_solid;
 
-/* EBPO_E_ARGUMENT: a pose; EBPO_E_NOT_SOLID, EBPO_E_ABSENT: a model. */
+/* Of a surface too, which nobody may ask for winding numbers then. EBPO_E_ARGUMENT: a pose;
+ * EBPO_E_ABSENT: a model without its mesh. */
 EBPO_MUST_USE ebpo_status ebpo_posed_solid_make(ebpo_posed_solid *out, ebpo_model *model,
                                                 const ebpo_pose *pose, ebpo_error *error);
 
@@ -26,6 +27,11 @@ bool ebpo_posed_solid_near(const ebpo_posed_solid *s, const double w[3], double 
  * within it of p, and so is what rounding has moved. If no face of the model is within *doubt of p,
  * the posed model has at w the winding number that the model has at p. */
 void ebpo_unpose(const ebpo_posed_solid *s, const double w[3], double p[3], double *doubt);
+
+/* The box, in the model, of all faces that may have a point of the box between a and b
+ * (corners of it, in any order) when posed. */
+void ebpo_unpose_box(const ebpo_posed_solid *s, const double a[3], const double b[3], double low[3],
+                     double high[3]);
 
 /* No face of the model is within `doubt` of p, for certain. */
 EBPO_MUST_USE ebpo_status ebpo_posed_solid_clear(ebpo_context *context, const double p[3],

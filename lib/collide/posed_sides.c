@@ -3,7 +3,7 @@
  * axis-parallel segment leads to the point in question; what it crosses is counted. */
 #include "geom/strict_fp.h"
 
-#include "boolean/posed_sides.h"
+#include "collide/posed_sides.h"
 
 #include <math.h>
 #include <string.h>
@@ -74,28 +74,6 @@ static bool take(void *user, const ebpo_triangles *triangles)
     return true;
 }
 
-/* The box, in the model, of all faces that may have a point of the segment from a to b when posed.
- */
-static void box_of_segment(const ebpo_posed_solid *s, const double a[3], const double b[3],
-                           double low[3], double high[3])
-{
-    double middle[3], half[3], all = 0, p[3], doubt;
-    for (int k = 0; k < 3; k++) {
-        middle[k] = a[k] / 2 + b[k] / 2;
-        half[k] = fmax(fabs(a[k] - middle[k]), fabs(b[k] - middle[k])) * (1 + 0x1p-50);
-        all += half[k];
-    }
-    ebpo_unpose(s, middle, p, &doubt);
-    for (int k = 0; k < 3; k++) {
-        double reach = 2 * s->posing.deviation * all;
-        for (int i = 0; i < 3; i++)
-            reach += fabs(s->rotation[i][k]) * half[i];
-        reach = reach / s->posing.scale * (1 + 0x1p-40) + doubt;
-        low[k] = nextafter(p[k] - reach, -INFINITY);
-        high[k] = nextafter(p[k] + reach, INFINITY);
-    }
-}
-
 /* --- a point that is certainly far enough from faces --- */
 
 typedef struct anchor {
@@ -151,7 +129,7 @@ static ebpo_status decide_by_faces(const ebpo_posed_solid *s, ebpo_context *cont
     l.axis = a.axis;
     memcpy(l.low, upward ? w : a.at, sizeof l.low);
     l.to = upward ? a.at[a.axis] : w[a.axis];
-    box_of_segment(s, w, a.at, low, high);
+    ebpo_unpose_box(s, w, a.at, low, high);
     status = ebpo_triangles_in_box(context, low, high, take, &l, error);
     if (status != EBPO_OK)
         return status;

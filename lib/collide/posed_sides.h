@@ -1,7 +1,7 @@
 /* Which side of a solid at a pose a point of the world is on: exact on posed coordinates. Proofs:
  * docs/develop/booleans.md. Any thread, each with a context of its own. */
-#ifndef EBPO_BOOLEAN_POSED_SIDES_H
-#define EBPO_BOOLEAN_POSED_SIDES_H
+#ifndef EBPO_COLLIDE_POSED_SIDES_H
+#define EBPO_COLLIDE_POSED_SIDES_H
 
 #include "collide/posed_solid.h"
 
