@@ -43,6 +43,7 @@ static ebpo_status ask_two(ebpo_collider *collider, const ebpo_collide_options *
     ebpo_collider_stats stats = EBPO_COLLIDER_STATS_INIT;
     ebpo_clearance clearance;
     ebpo_certain depth[2];
+    ebpo_relation_result relation;
     int32_t found;
     uint64_t count = 0;
     ebpo_status status = ebpo_collide_first(collider, options, &pair, &found, error);
@@ -58,6 +59,8 @@ static ebpo_status ask_two(ebpo_collider *collider, const ebpo_collide_options *
         status = ebpo_collide_distance(collider, options, NULL, &clearance, error);
     if (status == EBPO_OK)
         status = ebpo_collide_depth(collider, options, 0.5, &depth[0], &depth[1], error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_relation(collider, options, &relation, error);
     if (status == EBPO_OK)
         status = ebpo_collider_get_stats(collider, &stats);
     return status;

@@ -3,6 +3,7 @@
  *
  *   Two models       ebpo_collider_new, one for each thread that asks
  *   Do they meet     ebpo_collide_first
+ *   How they lie     ebpo_collide_relation
  *   All of it        ebpo_collide_all, ebpo_collide_self
  *   Where they meet  ebpo_collide_contacts, ebpo_collide_polylines
  *   How far          ebpo_collide_distance
@@ -114,6 +115,46 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_first(ebpo_collider *collider,
                                                       const ebpo_collide_options *options,
                                                       ebpo_face_pair *out, int32_t *found,
                                                       ebpo_error *error);
+
+/* ---- how they lie to each other ---- */
+
+/*
+ * Of a solid the closure of the points that its rule puts inside is meant, of a surface its faces;
+ * both as sets of points, at their poses. Faces without area count for nothing here. The first one
+ * that is true:
+ */
+typedef enum ebpo_relation {
+    EBPO_DISJOINT = 0,     /* no common point */
+    EBPO_TOUCHING = 1,     /* a common point, but none that is inner to both */
+    EBPO_INTERSECTING = 2, /* inner points in common, and none of these: */
+    EBPO_A_INSIDE_B = 3,   /* B is a solid and has all points of A, which is not equal to it */
+    EBPO_B_INSIDE_A = 4,   /* the reverse */
+    EBPO_EQUAL = 5,        /* the same points, some */
+    EBPO_RELATION_OPEN = 6 /* the deadline left it open */
+} ebpo_relation;
+
+typedef struct ebpo_relation_result {
+    /* An ebpo_relation. */
+    int32_t relation;
+
+    /* Some faces meet, as for ebpo_collide_first: 1 yes, 0 no, -1 not known. A solid within another
+     * may touch it from within. */
+    int32_t contact;
+} ebpo_relation_result;
+
+/*
+ * How the models lie to each other, exact. A pair of faces that cross nearly always decides, and
+ * of shells that meet nothing a face of each; of models that only touch, every face in contact is
+ * looked at. Each model takes 4 bytes a face more in the collider, and some 60 for the call.
+ *
+ * Errors of ebpo_collide_first; after the deadline it succeeds. EBPO_E_ABSENT: as for ebpo_inside.
+ *
+ * Threads: one per collider; further ones live for the call.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_relation(ebpo_collider *collider,
+                                                         const ebpo_collide_options *options,
+                                                         ebpo_relation_result *out,
+                                                         ebpo_error *error);
 
 /* ---- all of it ---- */
 

@@ -1,0 +1,75 @@
+#include "geom/strict_fp.h"
+
+#include "collide/face_patches.h"
+
+#include <stdlib.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "collide/corner_ids.h"
+
+/* Of the faces joined so far; paths get shorter. */
+static uint32_t first_of(uint32_t *patch, uint32_t face)
+{
+    while (patch[face] != face) {
+        patch[face] = patch[patch[face]];
+        face = patch[face];
+    }
+    return face;
+}
+
+static void join(uint32_t *patch, uint32_t a, uint32_t b)
+{
+    a = first_of(patch, a);
+    b = first_of(patch, b);
+    patch[a > b ? a : b] = a > b ? b : a;
+}
+
+typedef struct joining {
+    ebpo_corner_ids corners;
+    uint32_t *user; /* of each corner: a face that has it */
+    uint64_t users;
+} joining;
+
+static bool join_face(joining *j, uint32_t *patch, uint32_t face, const double t[3][3])
+{
+    for (int i = 0; i < 3; i++) {
+        uint32_t id;
+        uint64_t known = j->corners.count;
+        if (!ebpo_corner_id(&j->corners, t[i], &id) ||
+            !ebpo_grow(&j->user, &j->users, j->corners.count, sizeof *j->user))
+            return false;
+        if (id < known)
+            join(patch, j->user[id], face);
+        else
+            j->user[id] = face;
+    }
+    return true;
+}
+
+ebpo_status ebpo_face_patches(const ebpo_accel *whole, const uint32_t *slots,
+                              const uint64_t *left_out, uint32_t **out, ebpo_error *error)
+{
+    joining j = { 0 };
+    uint32_t *patch = ebpo_alloc(whole->face_count, sizeof *patch);
+    bool fine = patch != NULL;
+    for (uint32_t f = 0; f < whole->face_count && fine; f++)
+        patch[f] = f;
+    for (uint32_t f = 0; f < whole->face_count && fine; f++) {
+        double t[3][3];
+        if (left_out && left_out[f / 64] >> f % 64 & 1)
+            continue;
+        ebpo_accel_triangle(whole, slots[f], t);
+        fine = join_face(&j, patch, f, (const double(*)[3])t);
+    }
+    for (uint32_t f = 0; f < whole->face_count && fine; f++)
+        patch[f] = first_of(patch, f);
+    ebpo_corner_ids_free(&j.corners);
+    free(j.user);
+    if (!fine) {
+        free(patch);
+        return ebpo_fail_memory(error, whole->face_count * sizeof *patch);
+    }
+    *out = patch;
+    return EBPO_OK;
+}

@@ -1,0 +1,424 @@
+/* How two models lie to each other: which of the parts of space that are in both, in one and in the
+ * other there are, found around pieces of faces. */
+#include "geom/strict_fp.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/clock.h"
+#include "base/error.h"
+#include "base/fp_env.h"
+#include "base/parallel.h"
+#include "collide/around_face.h"
+#include "collide/contacts.h"
+#include "collide/face_patches.h"
+#include "geom/predicates.h"
+
+static const char stage[] = "relation";
+
+/* Models in the question's order. */
+typedef struct relating {
+    const ebpo_collision *question;
+    ebpo_two_models two;
+    ebpo_relation_result *out;
+    uint64_t *met[2], *seen[2]; /* a bit for each face: it meets one of the other; was looked at */
+    bool both, only[2];   /* there are points inner to both; of one that are not in the other */
+    bool told;            /* a face with an area has been looked at */
+    bool touch, doubtful; /* a common point; pairs that may have one */
+    unsigned last[2];     /* `in` of the piece looked at last */
+    uint64_t looked_at;
+    bool open;
+    ebpo_error *error; /* of `status`, within callbacks */
+    ebpo_status status;
+} relating;
+
+static bool mixed(const relating *r) { return r->two.solid[0] != r->two.solid[1]; }
+
+static bool surfaces(const relating *r) { return !r->two.solid[0] && !r->two.solid[1]; }
+
+/* Nothing that is still to be looked at can change the relation. */
+static bool is_decided(const relating *r)
+{
+    if (mixed(r))
+        return r->both && r->only[r->two.solid[0]];
+    return r->both && (surfaces(r) ? r->only[0] || r->only[1] : r->only[0] && r->only[1]);
+}
+
+static bool bit(const uint64_t *bits, uint64_t i) { return bits[i / 64] >> i % 64 & 1; }
+
+static void set_bit(uint64_t *bits, uint64_t i) { bits[i / 64] |= UINT64_C(1) << i % 64; }
+
+/* --- looking at faces --- */
+
+typedef struct facing {
+    relating *r;
+    int m;
+} facing;
+
+/* Two solids: each side of the piece is a part of space. */
+static void note_solids(relating *r, const ebpo_around *a)
+{
+    r->both |= (a->in[0] & a->in[1]) != 0;
+    r->only[0] |= (a->in[0] & ~a->in[1]) != 0;
+    r->only[1] |= (a->in[1] & ~a->in[0]) != 0;
+}
+
+static bool note(void *user, const ebpo_around *a)
+{
+    const facing *f = user;
+    relating *r = f->r;
+    unsigned other = a->in[!f->m];
+    r->told = true;
+    memcpy(r->last, a->in, sizeof r->last);
+    if (r->two.solid[0] && r->two.solid[1])
+        note_solids(r, a);
+    else {
+        r->both |= mixed(r) && other == EBPO_SIDE_BOTH;
+        r->only[f->m] |= other == 0;
+    }
+    return !is_decided(r);
+}
+
+/* Once; false: enough, or `status`. Of a solid and a surface the surface's faces tell all. */
+static bool look_at(relating *r, int m, uint64_t face)
+{
+    facing f = { r, m };
+    if ((mixed(r) && r->two.solid[m]) || bit(r->seen[m], face))
+        return true;
+    set_bit(r->seen[m], face);
+    r->status = ebpo_look_around_face(&r->two, m, face, note, &f, r->error);
+    if (r->status == EBPO_OK && ++r->looked_at % 64 == 0 &&
+        !ebpo_progress_step(&r->question->options.progress, stage, 0, 0, r->error))
+        r->status = EBPO_E_CANCELLED;
+    r->open |= ebpo_collision_is_late(r->question);
+    return r->status == EBPO_OK && !r->open && !is_decided(r);
+}
+
+static bool look_at_pair(relating *r, const ebpo_face_pair *pair)
+{
+    const uint64_t face[2] = { pair->file_face_a, pair->file_face_b };
+    bool turned = r->question->turned;
+    return look_at(r, 0, face[turned]) && look_at(r, 1, face[!turned]);
+}
+
+/* --- contacts --- */
+
+static bool all_have_area(const relating *r, const ebpo_face_pair *pair)
+{
+    ebpo_posed_pair faces;
+    ebpo_pose_pair(r->question, pair, &faces);
+    for (int i = 0; i < 2; i++) {
+        const double(*t)[3] = (const double(*)[3])faces.corner[i];
+        if (ebpo_zero_area(t[0], t[1], t[2]))
+            return false;
+    }
+    return true;
+}
+
+/* What a pair tells of two surfaces. */
+static void note_pair(relating *r, const ebpo_face_pair *pair)
+{
+    r->both |= pair->kind != EBPO_PAIR_TOUCHING;
+    r->touch = r->touch || r->both || all_have_area(r, pair);
+}
+
+static bool take_contacts(void *user, const ebpo_face_pair *pairs, uint64_t count)
+{
+    relating *r = user;
+    bool turned = r->question->turned, more = true;
+    for (uint64_t i = 0; i < count && more; i++) {
+        set_bit(r->met[turned], pairs[i].file_face_a);
+        set_bit(r->met[!turned], pairs[i].file_face_b);
+        if (surfaces(r))
+            note_pair(r, &pairs[i]);
+        else if (pairs[i].kind == EBPO_PAIR_CROSSING)
+            more = look_at_pair(r, &pairs[i]);
+    }
+    return more;
+}
+
+/* With what is left of the time. */
+static ebpo_collide_options options_left(const relating *r)
+{
+    ebpo_collide_options options = r->question->options;
+    uint64_t now = ebpo_clock();
+    if (r->question->late != UINT64_MAX)
+        options.deadline_ns = r->question->late > now ? r->question->late - now : 1;
+    return options;
+}
+
+static ebpo_status take_pairs(relating *r, ebpo_pairs_fn take, ebpo_error *error)
+{
+    const ebpo_collision *q = r->question;
+    ebpo_collide_options options = options_left(r);
+    ebpo_status status = ebpo_collide_all(q->collider, &options, take, r, error);
+    if (status == EBPO_E_CANCELLED && ebpo_collision_is_late(q)) {
+        r->open = true;
+        status = EBPO_OK;
+    }
+    return status == EBPO_OK ? r->status : status;
+}
+
+static bool goes_on(const relating *r)
+{
+    return r->status == EBPO_OK && !r->open && !is_decided(r);
+}
+
+static void look_at_met(relating *r)
+{
+    for (int m = 0; m < 2; m++) {
+        uint64_t count = r->question->model[m]->whole->face_count;
+        for (uint64_t f = 0; f < count && goes_on(r); f++)
+            if (bit(r->met[m], f))
+                (void)look_at(r, m, f);
+    }
+}
+
+/* --- faces without contact --- */
+
+/* Patches of them are on one side of the other model; does the rest of a patch tell nothing more
+ * once the last face has been seen? */
+static bool patch_is_done(const relating *r, int m)
+{
+    if (mixed(r))
+        return true;
+    return r->last[!m] ? r->both && r->only[!m] : r->only[m];
+}
+
+/* Faces that meet none of the other model, as long as their patch may tell more. */
+static void look_through(relating *r, int m, const uint32_t *patch, uint64_t *done)
+{
+    uint64_t count = r->question->model[m]->whole->face_count;
+    for (uint64_t f = 0; f < count && goes_on(r); f++) {
+        if (bit(r->met[m], f) || bit(done, patch[f]))
+            continue;
+        r->told = false;
+        (void)look_at(r, m, f);
+        if (r->told && patch_is_done(r, m))
+            set_bit(done, patch[f]);
+    }
+}
+
+static uint64_t *make_bits(uint64_t count) { return ebpo_alloc_zero(count / 64 + 1, 8); }
+
+static ebpo_status fail_bits(uint64_t count, ebpo_error *error)
+{
+    return ebpo_fail_memory(error, count / 8);
+}
+
+static void look_at_patches(relating *r, int m)
+{
+    const ebpo_accel *whole = r->question->model[m]->whole;
+    uint32_t *patch;
+    uint64_t *done;
+    if ((mixed(r) && r->two.solid[m]) || !goes_on(r))
+        return;
+    r->status = ebpo_face_patches(whole, r->two.slots[m], r->met[m], &patch, r->error);
+    if (r->status != EBPO_OK)
+        return;
+    done = make_bits(whole->face_count);
+    if (done)
+        look_through(r, m, patch, done);
+    else
+        r->status = fail_bits(whole->face_count, r->error);
+    free(done);
+    free(patch);
+}
+
+/* --- common points of models that have no inner ones in common --- */
+
+static bool note_sound(void *user, const ebpo_around *a)
+{
+    const facing *f = user;
+    f->r->told = true;
+    f->r->doubtful |= a->in[f->m] == 0;
+    return !f->r->doubtful;
+}
+
+/* Every piece of the face belongs to its model: so does every point of a contact. */
+static bool is_sound(relating *r, int m, uint64_t face)
+{
+    facing f = { r, m };
+    r->told = r->doubtful = false;
+    if (r->status == EBPO_OK)
+        r->status = ebpo_look_around_face(&r->two, m, face, note_sound, &f, r->error);
+    return r->status == EBPO_OK && r->told && !r->doubtful;
+}
+
+static bool take_sound(void *user, const ebpo_face_pair *pairs, uint64_t count)
+{
+    relating *r = user;
+    bool turned = r->question->turned;
+    for (uint64_t i = 0; i < count && !r->touch && r->status == EBPO_OK && !r->open; i++) {
+        const uint64_t face[2] = { pairs[i].file_face_a, pairs[i].file_face_b };
+        r->touch = is_sound(r, 0, face[turned]) && is_sound(r, 1, face[!turned]);
+        r->open |= ebpo_collision_is_late(r->question);
+    }
+    return !r->touch && r->status == EBPO_OK && !r->open;
+}
+
+static ebpo_status find_touch(relating *r, ebpo_error *error)
+{
+    ebpo_status status = take_pairs(r, take_sound, error);
+    uint64_t count = r->question->model[0]->whole->face_count;
+    for (uint64_t f = 0; f < count && status == EBPO_OK && !r->touch && !r->open; f++) {
+        if (bit(r->met[0], f))
+            status = ebpo_face_has_common_point(&r->two, 0, f, &r->touch, error);
+        r->open |= ebpo_collision_is_late(r->question);
+    }
+    return status;
+}
+
+/* --- the relation --- */
+
+static bool has_unmet_area(const relating *r, int m)
+{
+    const ebpo_posed_solid *s = &r->two.model[m];
+    for (uint64_t f = 0; f < s->model->whole->face_count; f++) {
+        double t[3][3];
+        if (bit(r->met[m], f))
+            continue;
+        ebpo_posed_triangle(s->model->whole, &s->posing, r->two.slots[m][f], t);
+        if (!ebpo_zero_area(t[0], t[1], t[2]))
+            return true;
+    }
+    return false;
+}
+
+/* One file twice, at one pose. */
+static bool is_same(const ebpo_collision *q)
+{
+    const ebpo_info *a = q->model[0]->info, *b = q->model[1]->info;
+    return memcmp(a->content_sha256, b->content_sha256, sizeof a->content_sha256) == 0 &&
+           a->solid == b->solid && a->rule == b->rule &&
+           memcmp(&q->options.pose_a, &q->options.pose_b, sizeof q->options.pose_a) == 0;
+}
+
+/* Whether there is anything. */
+static void look_for_any(relating *r)
+{
+    uint64_t count = r->question->model[0]->whole->face_count;
+    r->out->contact = count > 0;
+    if (surfaces(r))
+        r->both = r->touch = has_unmet_area(r, 0);
+    for (uint64_t f = 0; f < count && goes_on(r) && !r->both; f++)
+        (void)look_at(r, 0, f);
+}
+
+/* A pair that meets, and what is around its faces: if they cross, that nearly always decides. */
+static ebpo_status look_at_first(relating *r, ebpo_error *error)
+{
+    const ebpo_collision *q = r->question;
+    ebpo_collide_options options = options_left(r);
+    ebpo_face_pair pair;
+    ebpo_status status = ebpo_collide_first(q->collider, &options, &pair, &r->out->contact, error);
+    r->open |= r->out->contact < 0;
+    if (status != EBPO_OK || r->out->contact != 1 || surfaces(r))
+        return status;
+    (void)look_at_pair(r, &pair);
+    return r->status;
+}
+
+static ebpo_status look_at_contacts(relating *r, ebpo_error *error)
+{
+    ebpo_status status = take_pairs(r, take_contacts, error);
+    for (int m = 0; m < 2 && r->both && surfaces(r) && goes_on(r); m++)
+        r->only[m] = has_unmet_area(r, m);
+    if (status == EBPO_OK && (r->both || !surfaces(r)))
+        look_at_met(r);
+    return status == EBPO_OK ? r->status : status;
+}
+
+static ebpo_status gather_facts(relating *r, ebpo_error *error)
+{
+    ebpo_status status = look_at_first(r, error);
+    if (status == EBPO_OK && r->out->contact == 1 && goes_on(r))
+        status = look_at_contacts(r, error);
+    for (int m = 0; m < 2 && status == EBPO_OK && !surfaces(r); m++) {
+        look_at_patches(r, m);
+        status = r->status;
+    }
+    if (status == EBPO_OK && !r->open && !r->both && !surfaces(r) && r->out->contact == 1)
+        status = find_touch(r, error);
+    return status;
+}
+
+/* Of the question's first model to its second. */
+static ebpo_relation relation_of(const relating *r)
+{
+    if (r->open)
+        return EBPO_RELATION_OPEN;
+    if (surfaces(r))
+        return !r->touch                    ? EBPO_DISJOINT
+               : !r->both                   ? EBPO_TOUCHING
+               : !r->only[0] && !r->only[1] ? EBPO_EQUAL
+                                            : EBPO_INTERSECTING;
+    for (int m = 0; m < 2; m++)
+        if (mixed(r) && !r->two.solid[m] && !r->only[m] && (r->both || r->touch))
+            return m ? EBPO_B_INSIDE_A : EBPO_A_INSIDE_B;
+    if (!r->both)
+        return r->touch ? EBPO_TOUCHING : EBPO_DISJOINT;
+    if (mixed(r) || (r->only[0] && r->only[1]))
+        return EBPO_INTERSECTING;
+    return r->only[0] ? EBPO_B_INSIDE_A : r->only[1] ? EBPO_A_INSIDE_B : EBPO_EQUAL;
+}
+
+static ebpo_relation turned(ebpo_relation r)
+{
+    return r == EBPO_A_INSIDE_B ? EBPO_B_INSIDE_A : r == EBPO_B_INSIDE_A ? EBPO_A_INSIDE_B : r;
+}
+
+static bool boxes_apart(const ebpo_two_models *two)
+{
+    const double *a = two->model[0].box, *b = two->model[1].box;
+    for (int k = 0; k < 3; k++)
+        if (a[k] > b[3 + k] || b[k] > a[3 + k])
+            return true;
+    return false;
+}
+
+static ebpo_status relate(relating *r, ebpo_error *error)
+{
+    const ebpo_collision *q = r->question;
+    ebpo_status status = ebpo_two_models_begin(&r->two, q, error);
+    if (status != EBPO_OK)
+        return status;
+    r->out->contact = boxes_apart(&r->two) ? 0 : -1;
+    if (r->out->contact == 0)
+        return EBPO_OK;
+    for (int m = 0; m < 2; m++) {
+        uint64_t count = q->model[m]->whole->face_count;
+        r->met[m] = make_bits(count);
+        r->seen[m] = make_bits(count);
+        if (!r->met[m] || !r->seen[m])
+            return fail_bits(count, error);
+    }
+    if (!is_same(q))
+        return gather_facts(r, error);
+    look_for_any(r);
+    return r->status;
+}
+
+ebpo_status ebpo_collide_relation(ebpo_collider *c, const ebpo_collide_options *options,
+                                  ebpo_relation_result *out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_collision q;
+    *out = (ebpo_relation_result){ EBPO_RELATION_OPEN, -1 };
+    ebpo_status status = ebpo_collision_begin(&q, c, options, error);
+    if (status == EBPO_OK)
+        status = ebpo_collider_slots(c, error);
+    if (status != EBPO_OK)
+        return status;
+    relating r = { .question = &q, .out = out, .error = error };
+    status = relate(&r, error);
+    ebpo_relation relation = relation_of(&r);
+    out->relation = (int32_t)(q.turned ? turned(relation) : relation);
+    ebpo_two_models_end(&r.two);
+    for (int m = 0; m < 2; m++) {
+        free(r.met[m]);
+        free(r.seen[m]);
+    }
+    return status;
+}
