@@ -36,6 +36,18 @@ static bool count_lines(void *user, const ebpo_polyline *line)
     return true;
 }
 
+static ebpo_status write_met(ebpo_collider *collider, const ebpo_collide_options *options,
+                             ebpo_error *error)
+{
+    ebpo_status status =
+        ebpo_collide_write(collider, options, EBPO_PAIRS_HDF5, scratch("pairs.h5"), error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_write(collider, options, EBPO_PAIRS_PLY, scratch("red.ply"), error);
+    unlink(scratch("pairs.h5"));
+    unlink(scratch("red.ply"));
+    return status;
+}
+
 static ebpo_status ask_two(ebpo_collider *collider, const ebpo_collide_options *options,
                            ebpo_error *error)
 {
@@ -61,6 +73,8 @@ static ebpo_status ask_two(ebpo_collider *collider, const ebpo_collide_options *
         status = ebpo_collide_depth(collider, options, 0.5, &depth[0], &depth[1], error);
     if (status == EBPO_OK)
         status = ebpo_collide_relation(collider, options, &relation, error);
+    if (status == EBPO_OK)
+        status = write_met(collider, options, error);
     if (status == EBPO_OK)
         status = ebpo_collider_get_stats(collider, &stats);
     return status;

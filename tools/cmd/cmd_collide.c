@@ -2,6 +2,7 @@
 #include <float.h>
 #include <stddef.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "cli/answers.h"
 #include "cli/command.h"
@@ -12,8 +13,8 @@
 #include "cmd/commands.h"
 
 typedef struct collide_values {
-    const char *pose_a, *pose_b, *deadline;
-    bool all, self, json, quiet;
+    const char *pose_a, *pose_b, *deadline, *out;
+    bool all, self, relation, json, quiet;
     collide_far far;
     int64_t threads;
     remote_values remote;
@@ -26,6 +27,12 @@ static const arg_option options[] = {
     OPTION_FLAG("all", 0, collide_values, all, "print every pair of faces that meet"),
     OPTION_FLAG("self", 0, collide_values, self,
                 "faces of one model that meet otherwise than as neighbours"),
+    OPTION_FLAG("relation", 0, collide_values, relation,
+                "how they lie to each other: DISJOINT, TOUCHING, INTERSECTING, A_INSIDE_B, "
+                "B_INSIDE_A or EQUAL"),
+    OPTION_TEXT("output", 'o', collide_values, out, "OUT",
+                "write all pairs to OUT.h5, or both models with the faces that meet red to "
+                "OUT.ply"),
     COLLIDE_FAR_OPTIONS(collide_values, far),
     OPTION_TEXT("deadline", 0, collide_values, deadline, "TIME",
                 "stop after about this long; in microseconds, or with a unit: 500us, 50ms, 2s"),
@@ -46,7 +53,7 @@ static const arg_spec spec = {
     .summary =
         "tells whether the faces of two models meet, which do, how far apart or deep they are",
     .text = "A and B are .ebpo.h5 files with their mesh. Prints one pair of faces that meet, or "
-            "'none'. A solid within another one does not meet it.",
+            "'none'. A solid within another one does not meet it; --relation tells that it is.",
     .options = options,
 };
 
@@ -99,6 +106,53 @@ static ebpo_status ask_first(const collide_values *v, ebpo_collider *c,
     return EBPO_OK;
 }
 
+static const char *const relations[] = { "DISJOINT",   "TOUCHING", "INTERSECTING", "A_INSIDE_B",
+                                         "B_INSIDE_A", "EQUAL",    "not known" };
+
+static ebpo_status ask_relation(const collide_values *v, ebpo_collider *c,
+                                const ebpo_collide_options *how, ebpo_error *error)
+{
+    static const char *const contact[] = { "null", "false", "true" };
+    ebpo_relation_result r;
+    ebpo_status status = ebpo_collide_relation(c, how, &r, error);
+    if (status != EBPO_OK)
+        return status;
+    if (!v->json)
+        puts(relations[r.relation]);
+    else if (r.relation == EBPO_RELATION_OPEN)
+        printf("{\"relation\": null, \"contact\": %s}\n", contact[r.contact + 1]);
+    else
+        printf("{\"relation\": \"%s\", \"contact\": %s}\n", relations[r.relation],
+               contact[r.contact + 1]);
+    return EBPO_OK;
+}
+
+static bool ends_with(const char *text, const char *end)
+{
+    size_t n = strlen(text), m = strlen(end);
+    return n > m && strcmp(text + n - m, end) == 0;
+}
+
+/* What is asked on the command line, one after the other. */
+static ebpo_status ask_all(collide_values *v, ebpo_collider *c, const ebpo_collide_options *how,
+                           ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    if (v->self)
+        return ebpo_collide_self(c, how, take_pairs, v, error);
+    if (v->relation)
+        status = ask_relation(v, c, how, error);
+    if (status == EBPO_OK && v->out)
+        status =
+            ebpo_collide_write(c, how, ends_with(v->out, ".ply") ? EBPO_PAIRS_PLY : EBPO_PAIRS_HDF5,
+                               v->out, error);
+    if (status == EBPO_OK && (v->far.distance || v->far.depth))
+        return collide_far_ask(&v->far, v->json, c, how, error);
+    if (status == EBPO_OK && v->all)
+        return ebpo_collide_all(c, how, take_pairs, v, error);
+    return status == EBPO_OK && !v->relation && !v->out ? ask_first(v, c, how, error) : status;
+}
+
 static void tell_stats(const ebpo_collider *c)
 {
     ebpo_collider_stats s = EBPO_COLLIDER_STATS_INIT;
@@ -118,11 +172,7 @@ static int ask(collide_values *v, ebpo_model *a, ebpo_model *b, ebpo_collide_opt
     ebpo_status status = ebpo_collider_new(a, b, &with, &c, &error);
     how->progress = progress_start(&line, "collide", v->quiet);
     if (status == EBPO_OK)
-        status = v->self  ? ebpo_collide_self(c, how, take_pairs, v, &error)
-                 : v->all ? ebpo_collide_all(c, how, take_pairs, v, &error)
-                 : v->far.distance || v->far.depth
-                     ? collide_far_ask(&v->far, v->json, c, how, &error)
-                     : ask_first(v, c, how, &error);
+        status = ask_all(v, c, how, &error);
     progress_wipe(&line);
     if (c && v->remote.stats)
         tell_stats(c);
@@ -142,8 +192,12 @@ static int run(void *given, const char **operand)
         return command_usage("collide", "two models, or one and --self");
     if (!collide_far_fits(&v->far, v->all || v->self))
         return EXIT_USAGE;
-    if (v->self && (v->all || v->pose_a || v->pose_b))
-        return command_usage("collide", "--self takes neither --all nor poses");
+    if (v->self && (v->all || v->pose_a || v->pose_b || v->relation || v->out))
+        return command_usage("collide",
+                             "--self takes neither --all nor poses, --relation or --output");
+    if (v->out && !ends_with(v->out, ".h5") && !ends_with(v->out, ".ply"))
+        return command_usage("collide", "--output %s: expected a name that ends in .h5 or .ply",
+                             v->out);
     if (!read_pose("pose-a", v->pose_a, &how.pose_a) ||
         !read_pose("pose-b", v->pose_b, &how.pose_b) ||
         (v->deadline && !query_read_time("collide", v->deadline, &how.deadline_ns)))

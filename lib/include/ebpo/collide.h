@@ -6,6 +6,7 @@
  *   How they lie     ebpo_collide_relation
  *   All of it        ebpo_collide_all, ebpo_collide_self
  *   Where they meet  ebpo_collide_contacts, ebpo_collide_polylines
+ *   As a file        ebpo_collide_write
  *   How far          ebpo_collide_distance
  *   How deep         ebpo_collide_depth
  *
@@ -250,6 +251,36 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_polylines(ebpo_collider *collide
                                                           const ebpo_collide_options *options,
                                                           ebpo_polylines_fn take, void *user,
                                                           ebpo_error *error);
+
+/* ---- as a file ---- */
+
+typedef enum ebpo_pairs_format {
+    /*
+     * All pairs and segments in the order of ebpo_collide_all, for any HDF5 from 1.8 on:
+     *   /pairs/faces       int64 [n][2]  of A and of B, as in ebpo_distance_result
+     *   /pairs/file_faces  int64 [n][2]  in the files
+     *   /pairs/kind        uint8 [n]     an ebpo_pair_kind
+     *   /contacts/points   double [m][6] of crossing pairs: both ends of the segment
+     *   /contacts/faces    int64 [m][2]  as /pairs/faces
+     *   /contacts/on       uint8 [m][4]  on_a and on_b of the first end, then of the second
+     */
+    EBPO_PAIRS_HDF5 = 0,
+
+    /* Both meshes at their poses, first A's, in the order of the files; faces have a colour: red
+     * (255, 0, 0) where they meet one of the other model, else a grey. */
+    EBPO_PAIRS_PLY = 1
+} ebpo_pairs_format;
+
+/*
+ * Writes a file, which appears whole or not at all.
+ *
+ * EBPO_E_IO: it cannot be written. EBPO_E_LIMIT: also too many vertices for a PLY file. Other
+ * errors, and threads, as for ebpo_collide_all.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_write(ebpo_collider *collider,
+                                                      const ebpo_collide_options *options,
+                                                      ebpo_pairs_format format, const char *path,
+                                                      ebpo_error *error);
 
 /* ---- how far, how deep ---- */
 

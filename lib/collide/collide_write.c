@@ -1,0 +1,262 @@
+/* Pairs of two models in an HDF5 file for other programs; both models in a PLY file, the faces that
+ * meet red. */
+#include "geom/strict_fp.h"
+
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/alloc.h"
+#include "base/error.h"
+#include "base/fp_env.h"
+#include "collide/contacts.h"
+#include "h5/tables.h"
+#include "io/publish.h"
+
+/* --- HDF5 --- */
+
+enum { PAIR_FACES, PAIR_FILE_FACES, PAIR_KIND, POINTS, CONTACT_FACES, CONTACT_ON, TABLES };
+
+static const struct {
+    const char *path;
+    ebpo_h5_number number;
+    uint32_t cols;
+} layout[TABLES] = {
+    [PAIR_FACES] = { "/pairs/faces", EBPO_H5_I64, 2 },
+    [PAIR_FILE_FACES] = { "/pairs/file_faces", EBPO_H5_I64, 2 },
+    [PAIR_KIND] = { "/pairs/kind", EBPO_H5_U8, 0 },
+    [POINTS] = { "/contacts/points", EBPO_H5_F64, 6 },
+    [CONTACT_FACES] = { "/contacts/faces", EBPO_H5_I64, 2 },
+    [CONTACT_ON] = { "/contacts/on", EBPO_H5_U8, 4 },
+};
+
+enum { ROWS = 512 };
+
+typedef struct writing {
+    const ebpo_collision *question;
+    ebpo_h5_out out;
+    ebpo_h5_table table[TABLES];
+    int64_t faces[ROWS][2], file_faces[ROWS][2], contact_faces[ROWS][2];
+    uint8_t kind[ROWS], on[ROWS][4];
+    double points[ROWS][6];
+    uint64_t pairs, contacts; /* that wait */
+    ebpo_error *error;
+    ebpo_status status;
+} writing;
+
+static ebpo_status make_tables(writing *w, ebpo_error *error)
+{
+    static const char *const groups[] = { "/pairs", "/contacts" };
+    ebpo_status status = EBPO_OK;
+    for (int i = 0; i < 2 && status == EBPO_OK; i++) {
+        ebpo_h5_id id;
+        status = ebpo_h5_make_plain_group(&w->out, groups[i], &id, error);
+        ebpo_h5_close_id(id);
+    }
+    for (int i = 0; i < TABLES && status == EBPO_OK; i++)
+        status = ebpo_h5_make_table(&w->out, layout[i].path, layout[i].number, layout[i].cols,
+                                    &w->table[i], error);
+    return status;
+}
+
+static bool flush(writing *w)
+{
+    const void *const data[TABLES] = { w->faces,  w->file_faces,    w->kind,
+                                       w->points, w->contact_faces, w->on };
+    for (int i = 0; i < TABLES && w->status == EBPO_OK; i++)
+        w->status = ebpo_h5_append(&w->out, &w->table[i], data[i],
+                                   i < POINTS ? w->pairs : w->contacts, w->error);
+    w->pairs = w->contacts = 0;
+    return w->status == EBPO_OK;
+}
+
+static void note_contact(writing *w, const ebpo_face_pair *pair)
+{
+    ebpo_posed_pair faces;
+    ebpo_contact_segment s;
+    uint64_t n = w->contacts++;
+    ebpo_pose_pair(w->question, pair, &faces);
+    ebpo_contact_of(&faces, pair, &s);
+    memcpy(w->points[n], s.point, sizeof s.point);
+    w->contact_faces[n][0] = (int64_t)s.face_a;
+    w->contact_faces[n][1] = (int64_t)s.face_b;
+    for (int i = 0; i < 2; i++) {
+        w->on[n][2 * i] = s.on_a[i];
+        w->on[n][2 * i + 1] = s.on_b[i];
+    }
+}
+
+static bool take_rows(void *user, const ebpo_face_pair *pairs, uint64_t count)
+{
+    writing *w = user;
+    for (uint64_t i = 0; i < count; i++) {
+        uint64_t n = w->pairs++;
+        w->faces[n][0] = (int64_t)pairs[i].face_a;
+        w->faces[n][1] = (int64_t)pairs[i].face_b;
+        w->file_faces[n][0] = (int64_t)pairs[i].file_face_a;
+        w->file_faces[n][1] = (int64_t)pairs[i].file_face_b;
+        w->kind[n] = (uint8_t)pairs[i].kind;
+        if (pairs[i].kind == EBPO_PAIR_CROSSING)
+            note_contact(w, &pairs[i]);
+        if (w->pairs == ROWS && !flush(w))
+            return false;
+    }
+    return true;
+}
+
+static ebpo_status write_tables(writing *w, const char *path, ebpo_publish *target)
+{
+    const ebpo_collision *q = w->question;
+    ebpo_status status = ebpo_h5_create_plain(&w->out, ebpo_publish_path(target), path, w->error);
+    if (status == EBPO_OK)
+        status = make_tables(w, w->error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_all(q->collider, &q->options, take_rows, w, w->error);
+    if (status == EBPO_OK)
+        status = w->status;
+    if (status == EBPO_OK && !flush(w))
+        status = w->status;
+    for (int i = 0; i < TABLES; i++)
+        ebpo_h5_close_table(&w->table[i]);
+    if (status == EBPO_OK)
+        status = ebpo_h5_finish(&w->out, w->error);
+    ebpo_h5_discard(&w->out);
+    return status;
+}
+
+static ebpo_status write_hdf5(const ebpo_collision *q, const char *path, ebpo_publish *target,
+                              ebpo_error *error)
+{
+    writing *w = ebpo_alloc_zero(1, sizeof *w);
+    if (!w)
+        return ebpo_fail_memory(error, sizeof *w);
+    w->question = q;
+    w->out = (ebpo_h5_out)EBPO_H5_OUT_INIT;
+    w->error = error;
+    for (int i = 0; i < TABLES; i++)
+        w->table[i] = (ebpo_h5_table)EBPO_H5_TABLE_INIT;
+    ebpo_status status = write_tables(w, path, target);
+    free(w);
+    return status;
+}
+
+/* --- PLY --- */
+
+typedef struct painting {
+    const ebpo_collision *question;
+    ebpo_mesh mesh[2]; /* of the caller's A and B */
+    uint64_t *met[2];  /* a bit for each face */
+} painting;
+
+static bool take_met(void *user, const ebpo_face_pair *pairs, uint64_t count)
+{
+    const painting *p = user;
+    for (uint64_t i = 0; i < count; i++) {
+        p->met[0][pairs[i].file_face_a / 64] |= UINT64_C(1) << pairs[i].file_face_a % 64;
+        p->met[1][pairs[i].file_face_b / 64] |= UINT64_C(1) << pairs[i].file_face_b % 64;
+    }
+    return true;
+}
+
+static void print_vertices(FILE *f, const painting *p, int m)
+{
+    const ebpo_mesh *mesh = &p->mesh[m];
+    const ebpo_posing *posing = &p->question->posing[(int)p->question->turned ^ m].posing;
+    for (uint64_t v = 0; v < mesh->vertex_count; v++) {
+        double x[3], out[3];
+        for (unsigned k = 0; k < 3; k++)
+            x[k] = mesh->xyz64 ? mesh->xyz64[3 * v + k] : (double)mesh->xyz32[3 * v + k];
+        ebpo_posing_apply(posing, x, out);
+        fprintf(f, "%.17g %.17g %.17g\n", out[0], out[1], out[2]);
+    }
+}
+
+static void print_faces(FILE *f, const painting *p, int m, uint64_t first_vertex)
+{
+    static const char *const colour[2] = { "200 200 200", "150 150 160" };
+    const ebpo_mesh *mesh = &p->mesh[m];
+    for (uint64_t i = 0; i < mesh->face_count; i++) {
+        const uint32_t *v = mesh->faces + 3 * i;
+        bool met = p->met[m][i / 64] >> i % 64 & 1;
+        fprintf(f, "3 %" PRIu64 " %" PRIu64 " %" PRIu64 " %s\n", first_vertex + v[0],
+                first_vertex + v[1], first_vertex + v[2], met ? "255 0 0" : colour[m]);
+    }
+}
+
+static ebpo_status print_ply(const painting *p, const char *path, ebpo_publish *target,
+                             ebpo_error *error)
+{
+    FILE *f = ebpo_publish_stream(target);
+    uint64_t vertices = p->mesh[0].vertex_count;
+    if (!f)
+        return ebpo_fail_memory(error, 4096);
+    fprintf(f,
+            "ply\nformat ascii 1.0\nelement vertex %" PRIu64 "\nproperty double x\n"
+            "property double y\nproperty double z\nelement face %" PRIu64 "\n"
+            "property list uchar uint vertex_indices\nproperty uchar red\nproperty uchar green\n"
+            "property uchar blue\nend_header\n",
+            vertices + p->mesh[1].vertex_count, p->mesh[0].face_count + p->mesh[1].face_count);
+    for (int m = 0; m < 2; m++)
+        print_vertices(f, p, m);
+    for (int m = 0; m < 2; m++)
+        print_faces(f, p, m, m ? vertices : 0);
+    if (ferror(f))
+        return ebpo_fail_file(error, EBPO_E_IO, path, "cannot be written");
+    return EBPO_OK;
+}
+
+static ebpo_status read_meshes(painting *p, ebpo_error *error)
+{
+    for (int m = 0; m < 2; m++) {
+        const ebpo_model *model = p->question->collider->model[m];
+        ebpo_status status = ebpo_file_read_mesh(model->file, NULL, &p->mesh[m], error);
+        if (status != EBPO_OK)
+            return status;
+        p->met[m] = ebpo_alloc_zero(p->mesh[m].face_count / 64 + 1, 8);
+        if (!p->met[m])
+            return ebpo_fail_memory(error, p->mesh[m].face_count / 8);
+    }
+    if (p->mesh[0].vertex_count + p->mesh[1].vertex_count > UINT32_MAX)
+        return ebpo_fail(error, EBPO_E_LIMIT, "more than 2^32 - 1 vertices in one PLY file");
+    return EBPO_OK;
+}
+
+static ebpo_status write_ply(const ebpo_collision *q, const char *path, ebpo_publish *target,
+                             ebpo_error *error)
+{
+    painting p = { .question = q };
+    ebpo_status status = read_meshes(&p, error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_all(q->collider, &q->options, take_met, &p, error);
+    if (status == EBPO_OK)
+        status = print_ply(&p, path, target, error);
+    for (int m = 0; m < 2; m++) {
+        ebpo_mesh_free(&p.mesh[m]);
+        free(p.met[m]);
+    }
+    return status;
+}
+
+/* --- either --- */
+
+ebpo_status ebpo_collide_write(ebpo_collider *c, const ebpo_collide_options *options,
+                               ebpo_pairs_format format, const char *path, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_collision q;
+    ebpo_publish target = EBPO_PUBLISH_INIT;
+    if (format != EBPO_PAIRS_HDF5 && format != EBPO_PAIRS_PLY)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: no format of pairs", path);
+    ebpo_status status = ebpo_collision_begin(&q, c, options, error);
+    if (status == EBPO_OK)
+        status = ebpo_collider_slots(c, error);
+    if (status == EBPO_OK)
+        status = ebpo_publish_begin(&target, path, error);
+    if (status == EBPO_OK)
+        status = format == EBPO_PAIRS_PLY ? write_ply(&q, path, &target, error)
+                                          : write_hdf5(&q, path, &target, error);
+    if (status == EBPO_OK)
+        status = ebpo_publish_commit(&target, error);
+    ebpo_publish_abort(&target);
+    return status;
+}
