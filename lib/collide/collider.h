@@ -19,8 +19,7 @@ struct ebpo_collider {
     bool has_nearest;
     uint32_t nearest[2];      /* slots of the last nearest pair, of the caller's A and B */
     ebpo_context *context[2]; /* of depths, once one has been asked of that model */
-    uint32_t nearest[2]; /* slots of the last nearest pair, of the caller's A and B */
-    uint32_t *slots[2];  /* by numbers in the file, once they have been asked for */
+    uint32_t *slots[2];       /* by numbers in the file, once they have been asked for */
 };
 
 /* A question: options checked, models in the order that swapping does not change. */
