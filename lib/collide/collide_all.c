@@ -3,6 +3,7 @@
 
 #include "base/error.h"
 #include "base/fp_env.h"
+#include "collide/gather_parts.h"
 #include "collide/gathering.h"
 
 /* Pairs as they are handed out. */
@@ -55,6 +56,8 @@ static ebpo_status in_runs(giving *v, ebpo_gathering *g, ebpo_error *error)
 static ebpo_status all_pairs(const ebpo_collision *q, bool self, ebpo_pairs_fn take, void *user,
                              ebpo_error *error)
 {
+    if (ebpo_collision_is_in_parts(q))
+        return ebpo_gather_parts(q, self, take, user, error);
     const ebpo_accel *accel[2] = { q->model[0]->whole, q->model[1]->whole };
     const ebpo_block_posing *posing[2] = { &q->posing[0], &q->posing[1] };
     ebpo_accel_pair pair;

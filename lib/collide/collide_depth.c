@@ -49,7 +49,7 @@ ebpo_status ebpo_collide_depth(ebpo_collider *c, const ebpo_collide_options *opt
     if (!(tolerance > 0 && tolerance < INFINITY))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "the depth's tolerance has to be greater than 0 and finite");
-    ebpo_status status = ebpo_collision_begin(&q, c, options, error);
+    ebpo_status status = ebpo_collision_begin_whole(&q, c, options, error);
     if (status == EBPO_OK && a_in_b)
         status = depth_in(&q, 1, tolerance, a_in_b, error);
     if (status == EBPO_OK && b_in_a)

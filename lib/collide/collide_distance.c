@@ -115,7 +115,7 @@ ebpo_status ebpo_collide_distance(ebpo_collider *c, const ebpo_collide_options *
     if (status == EBPO_OK)
         status = check_options(&wanted, error);
     if (status == EBPO_OK)
-        status = ebpo_collision_begin(&q, c, options, error);
+        status = ebpo_collision_begin_whole(&q, c, options, error);
     if (status != EBPO_OK)
         return status;
     if (q.model[0]->whole->bound_count == 0 || q.model[1]->whole->bound_count == 0) {

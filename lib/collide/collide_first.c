@@ -4,7 +4,7 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "base/parallel.h"
-#include "collide/collider.h"
+#include "collide/gather_parts.h"
 
 /* -1: late. */
 static ebpo_status search(const ebpo_collision *q, ebpo_pair_walk *w, const char *stage,
@@ -55,6 +55,8 @@ ebpo_status ebpo_collide_first(ebpo_collider *c, const ebpo_collide_options *opt
     *out = (ebpo_face_pair){ EBPO_NO_FACE, EBPO_NO_FACE, EBPO_NO_FACE, EBPO_NO_FACE, 0, 0 };
     *found = 0;
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
+    if (status == EBPO_OK && ebpo_collision_is_in_parts(&q))
+        return ebpo_first_of_parts(&q, out, found, error);
     if (status == EBPO_OK)
         status = ebpo_collision_first(&q, "first contact", found, error);
     if (status == EBPO_OK && *found == 1)

@@ -247,7 +247,7 @@ ebpo_status ebpo_collide_write(ebpo_collider *c, const ebpo_collide_options *opt
     ebpo_publish target = EBPO_PUBLISH_INIT;
     if (format != EBPO_PAIRS_HDF5 && format != EBPO_PAIRS_PLY)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: no format of pairs", path);
-    ebpo_status status = ebpo_collision_begin(&q, c, options, error);
+    ebpo_status status = ebpo_collision_begin_whole(&q, c, options, error);
     if (status == EBPO_OK)
         status = ebpo_collider_slots(c, error);
     if (status == EBPO_OK)

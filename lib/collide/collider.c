@@ -47,10 +47,6 @@ ebpo_status ebpo_collider_of_parts(ebpo_model *a, ebpo_model *b,
         status = ebpo_check_mesh(a, error);
     if (status == EBPO_OK)
         status = ebpo_check_mesh(b, error);
-    if (status == EBPO_OK && !(a->whole && b->whole))
-        status = ebpo_fail(error, EBPO_E_LIMIT,
-                           "a model is not all in memory, as two models that meet need it: give a "
-                           "larger budget, or fetch a file that is far away");
     if (status != EBPO_OK)
         return status;
     ebpo_collider *c = ebpo_alloc_zero(1, sizeof *c);
@@ -92,6 +88,10 @@ ebpo_status ebpo_collider_get_stats(const ebpo_collider *c, ebpo_collider_stats 
     stats.node_pairs = c->node_pairs;
     stats.block_pairs = c->block_pairs;
     stats.exact = c->exact;
+    stats.subtree_pairs = c->subtree_pairs;
+    stats.subtrees = c->subtrees;
+    stats.loads = c->loads;
+    stats.bytes_read = c->bytes_read;
     return EBPO_GIVE(ebpo_collider_stats, out, &stats);
 }
 
@@ -136,6 +136,23 @@ ebpo_status ebpo_collision_begin(ebpo_collision *out, ebpo_collider *c,
     out->model[1] = c->model[!out->turned];
     out->late = out->options.deadline_ns ? ebpo_clock() + out->options.deadline_ns : UINT64_MAX;
     return make_posings(out, error);
+}
+
+bool ebpo_collision_is_in_parts(const ebpo_collision *q)
+{
+    return !(q->model[0]->whole && q->model[1]->whole);
+}
+
+ebpo_status ebpo_collision_begin_whole(ebpo_collision *out, ebpo_collider *c,
+                                       const ebpo_collide_options *options, ebpo_error *error)
+{
+    ebpo_status status = ebpo_collision_begin(out, c, options, error);
+    if (status == EBPO_OK && ebpo_collision_is_in_parts(out))
+        status = ebpo_fail(error, EBPO_E_LIMIT,
+                           "a model is not all in memory, as all questions but for first contact, "
+                           "all pairs and levels need it: give a larger budget, or fetch a file "
+                           "that is far away");
+    return status;
 }
 
 bool ebpo_collision_is_late(const ebpo_collision *q)

@@ -15,7 +15,8 @@ struct ebpo_collider {
     ebpo_collider_options options;
     ebpo_pair_walk walk; /* of the calling thread */
     uint64_t node_pairs, block_pairs, exact;
-    struct ebpo_gap_search *gap; /* of distances, once one has been asked */
+    uint64_t subtree_pairs, subtrees, loads, bytes_read; /* of models in parts */
+    struct ebpo_gap_search *gap;                         /* of distances, once one has been asked */
     bool has_nearest;
     uint32_t nearest[2];      /* slots of the last nearest pair, of the caller's A and B */
     ebpo_context *context[2]; /* of depths, once one has been asked of that model */
@@ -37,12 +38,20 @@ EBPO_MUST_USE ebpo_status ebpo_collision_begin(ebpo_collision *out, ebpo_collide
                                                const ebpo_collide_options *options,
                                                ebpo_error *error);
 
+/* The same of a question that models in parts cannot be asked yet: EBPO_E_LIMIT. */
+EBPO_MUST_USE ebpo_status ebpo_collision_begin_whole(ebpo_collision *out, ebpo_collider *collider,
+                                                     const ebpo_collide_options *options,
+                                                     ebpo_error *error);
+
 bool ebpo_collision_is_late(const ebpo_collision *collision);
 
 /* The first contact: the collider's walk has it as met[0] and met_slot. found: as of
  * ebpo_collide_first. */
 EBPO_MUST_USE ebpo_status ebpo_collision_first(const ebpo_collision *collision, const char *stage,
                                                int32_t *found, ebpo_error *error);
+
+/* A model is not all in memory. */
+bool ebpo_collision_is_in_parts(const ebpo_collision *collision);
 
 /* Adds a walk's counts to the collider's. */
 void ebpo_collider_count(ebpo_collider *collider, ebpo_pair_walk *walk);

@@ -251,7 +251,7 @@ ebpo_status ebpo_collide_polylines(ebpo_collider *c, const ebpo_collide_options 
     lines l = { .question = &q, .most = c->options.memory / SEGMENT_BYTES };
     if (l.most > SEGMENTS_MOST)
         l.most = SEGMENTS_MOST;
-    ebpo_status status = ebpo_collision_begin(&q, c, options, error);
+    ebpo_status status = ebpo_collision_begin_whole(&q, c, options, error);
     if (status == EBPO_OK)
         status = ebpo_collider_slots(c, error);
     if (status == EBPO_OK)

@@ -78,7 +78,7 @@ ebpo_status ebpo_collide_contacts(ebpo_collider *c, const ebpo_collide_options *
 {
     EBPO_DEFAULT_FP;
     ebpo_collision q;
-    ebpo_status status = ebpo_collision_begin(&q, c, options, error);
+    ebpo_status status = ebpo_collision_begin_whole(&q, c, options, error);
     if (status == EBPO_OK)
         status = ebpo_collider_slots(c, error);
     telling t = { &q, take, user };

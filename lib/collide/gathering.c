@@ -82,7 +82,7 @@ static ebpo_status prepare(ebpo_gathering *g, const ebpo_accel_pair *pair, uint3
     for (unsigned i = 0; i < g->threads; i++) {
         ebpo_pair_walk_begin(&g->walk[i], pair);
         g->walk[i].first = false;
-        g->walk[i].self = g->self;
+        g->walk[i].self = g->walk[i].neighbours = g->self;
         g->walk[i].begin = begin;
         g->walk[i].end = end;
     }

@@ -38,8 +38,8 @@ static ebpo_pair_kind exact_kind(ebpo_pair_walk *w, uint32_t slot_a, uint32_t sl
     ebpo_posed_triangle(p->accel[0], &p->posing[0]->posing, slot_a, a);
     ebpo_posed_triangle(p->accel[1], &p->posing[1]->posing, slot_b, b);
     w->exact++;
-    return w->self ? ebpo_neighbours((const double(*)[3])a, (const double(*)[3])b)
-                   : ebpo_triangle_pair((const double(*)[3])a, (const double(*)[3])b);
+    return w->neighbours ? ebpo_neighbours((const double(*)[3])a, (const double(*)[3])b)
+                         : ebpo_triangle_pair((const double(*)[3])a, (const double(*)[3])b);
 }
 
 bool ebpo_pair_walk_decide(ebpo_pair_walk *w, uint32_t block_a, uint32_t block_b,
@@ -55,7 +55,7 @@ bool ebpo_pair_walk_decide(ebpo_pair_walk *w, uint32_t block_a, uint32_t block_b
         ebpo_met_pair met = { face_a + lane_a, face_b + lane_b, EBPO_PAIR_CROSSING };
         if (met.a < w->begin || met.a >= w->end || (w->self && met.a >= met.b))
             continue;
-        if (w->self || !(pairs->pair[i] & EBPO_CERTAINLY_CROSSING))
+        if (w->neighbours || !(pairs->pair[i] & EBPO_CERTAINLY_CROSSING))
             met.kind = (int32_t)exact_kind(w, block_a * EBPO_BLOCK + lane_a,
                                            block_b * EBPO_BLOCK + lane_b);
         if (met.kind == EBPO_PAIR_APART)

@@ -53,8 +53,9 @@ struct ebpo_pair_walk {
     const ebpo_accel_pair *pair;
     const ebpo_walk_kernels *kernels;
     const ebpo_pair_kernels *filter;
-    bool first; /* ends with the first pair that meets; siblings by least overlap */
-    bool self;  /* both are one accel at one pose: each pair of faces once, neighbours as defined */
+    bool first;          /* ends with the first pair that meets; siblings by least overlap */
+    bool self;           /* both are one accel at one pose: each pair of faces once */
+    bool neighbours;     /* faces are of one mesh: what these have in common is no meeting */
     uint32_t begin, end; /* faces of the first accel that matter */
     ebpo_node_pair *stack;
     uint64_t top, capacity;

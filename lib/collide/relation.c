@@ -406,7 +406,7 @@ ebpo_status ebpo_collide_relation(ebpo_collider *c, const ebpo_collide_options *
     EBPO_DEFAULT_FP;
     ebpo_collision q;
     *out = (ebpo_relation_result){ EBPO_RELATION_OPEN, -1 };
-    ebpo_status status = ebpo_collision_begin(&q, c, options, error);
+    ebpo_status status = ebpo_collision_begin_whole(&q, c, options, error);
     if (status == EBPO_OK)
         status = ebpo_collider_slots(c, error);
     if (status != EBPO_OK)

@@ -203,8 +203,148 @@ static void check_first(const pair_list *want, const query_model *a, const ebpo_
     ck_assert_msg(is && memcmp(is, &pair, sizeof pair) == 0, "%s: no pair that meets", what);
 }
 
+/* --- in parts --- */
+
+/* The same file, cut at a level, or under the least budget that does (level -1). */
+static ebpo_model *in_parts(const query_model *m, int cut_level)
+{
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model_plan plan = EBPO_MODEL_PLAN_INIT;
+    ebpo_model *out;
+    options.cut_level = cut_level;
+    if (cut_level < 0) {
+        ASSERT_OK(ebpo_model_memory(m->file, &options, &plan, error));
+        options.memory = plan.least;
+    }
+    ASSERT_OK(ebpo_model_new(m->file, &options, &out, error));
+    return out;
+}
+
+static void check_first_of_parts(const pair_list *want, ebpo_model *a, const ebpo_pose *pa,
+                                 ebpo_model *b, const ebpo_pose *pb, const char *what)
+{
+    ebpo_face_pair pair, other;
+    int32_t found = ask_first(a, pa, b, pb, &pair);
+    ck_assert_msg(found == (want->count > 0), "%s: first contact", what);
+    ck_assert_int_eq(ask_first(b, pb, a, pa, &other), found);
+    bool is = !found;
+    for (uint64_t i = 0; i < want->count && !is; i++)
+        is = memcmp(&want->pair[i], &pair, sizeof pair) == 0;
+    ck_assert_msg(is, "%s: no pair that meets", what);
+    other = turned(other);
+    ck_assert_msg(!found || memcmp(&pair, &other, sizeof pair) == 0, "%s: swapped", what);
+}
+
+/* In one order and byte for byte what whole models give: of both in parts, of one, swapped, with
+ * threads, and with hardly any memory for pairs. */
+static void check_parts(const pair_list *want, const query_model *a, const ebpo_pose *pa,
+                        const query_model *b, const ebpo_pose *pb, int level, const char *what)
+{
+    ebpo_model *part_a = in_parts(a, level), *part_b = in_parts(b, level < 0 ? 1 : level + 1);
+    pair_list both = ask_all(part_a, pa, part_b, pb, 3, 0),
+              one = ask_all(part_a, pa, b->model, pb, 1, 3000),
+              swapped = ask_all(part_b, pb, part_a, pa, 2, 2000);
+    check_same(want, &both, what);
+    check_same(want, &one, what);
+    for (uint64_t i = 0; i < swapped.count; i++)
+        swapped.pair[i] = turned(swapped.pair[i]);
+    check_same(want, &swapped, what);
+    check_first_of_parts(want, part_a, pa, part_b, pb, what);
+    free(both.pair);
+    free(one.pair);
+    free(swapped.pair);
+    ebpo_model_free(part_a);
+    ebpo_model_free(part_b);
+}
+
+/* --- by levels --- */
+
+static ebpo_level_result ask_levels(ebpo_model *a, const ebpo_pose *pa, ebpo_model *b,
+                                    const ebpo_pose *pb, int level, uint64_t deadline)
+{
+    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
+    ebpo_collider *collider;
+    ebpo_level_result out;
+    options.pose_a = *pa;
+    options.pose_b = *pb;
+    options.level = level;
+    options.deadline_ns = deadline;
+    ASSERT_OK(ebpo_collider_new(a, b, NULL, &collider, error));
+    ASSERT_OK(ebpo_collide_levels(collider, &options, &out, error));
+    ebpo_collider_free(collider);
+    return out;
+}
+
+static bool posed_boxes_apart(const query_model *a, const ebpo_pose *pa, const query_model *b,
+                              const ebpo_pose *pb)
+{
+    double low[2][3], high[2][3];
+    for (int side = 0; side < 2; side++) {
+        const query_model *m = side ? b : a;
+        for (int k = 0; k < 3; k++) {
+            low[side][k] = INFINITY;
+            high[side][k] = -INFINITY;
+        }
+        for (uint64_t f = 0; f < m->mesh.face_count; f++) {
+            double face[3][3];
+            posed_face(m, side ? pb : pa, f, face);
+            for (int i = 0; i < 9; i++) {
+                low[side][i % 3] = fmin(low[side][i % 3], face[i / 3][i % 3]);
+                high[side][i % 3] = fmax(high[side][i % 3], face[i / 3][i % 3]);
+            }
+        }
+    }
+    for (int k = 0; k < 3; k++)
+        if (low[0][k] > high[1][k] || low[1][k] > high[0][k])
+            return true;
+    return false;
+}
+
+static void check_level(const ebpo_level_result *r, bool meet, double distance, bool apart,
+                        const char *what)
+{
+    ck_assert_msg(r->distance.lo <= distance && distance <= r->distance.hi,
+                  "%s: %.17g is not in %.17g .. %.17g", what, distance, r->distance.lo,
+                  r->distance.hi);
+    ck_assert_msg(!meet || (r->contact == -1 && r->common != 0), "%s: faces do meet", what);
+    ck_assert_msg((r->open_pairs == 0) == (r->contact == 0), "%s: pairs that are open", what);
+    ck_assert_msg(!(r->common == 1 && apart), "%s: boxes are apart", what);
+}
+
+/* Whole, in parts and late, with the true distance in between; swapped. */
+static void check_levels(bool meet, const query_model *a, const ebpo_pose *pa, const query_model *b,
+                         const ebpo_pose *pb, const char *what)
+{
+    ebpo_model *part = in_parts(b, 1);
+    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
+    ebpo_collider *collider;
+    ebpo_clearance truth;
+    options.pose_a = *pa;
+    options.pose_b = *pb;
+    ASSERT_OK(ebpo_collider_new(a->model, b->model, NULL, &collider, error));
+    ASSERT_OK(ebpo_collide_distance(collider, &options, NULL, &truth, error));
+    ebpo_collider_free(collider);
+    bool apart = posed_boxes_apart(a, pa, b, pb);
+    for (int level = 0; level < 4; level++) {
+        ebpo_level_result whole = ask_levels(a->model, pa, b->model, pb, level, 0),
+                          parts = ask_levels(a->model, pa, part, pb, level, 0),
+                          late = ask_levels(a->model, pa, b->model, pb, level, 1),
+                          swapped = ask_levels(b->model, pb, a->model, pa, level, 0);
+        check_level(&whole, meet, truth.distance.lo, apart, what);
+        check_level(&parts, meet, truth.distance.lo, apart, what);
+        check_level(&late, meet, truth.distance.lo, apart, what);
+        ck_assert_int_eq(parts.level_b, level < 1 ? level : whole.level_b < 1 ? whole.level_b : 1);
+        ck_assert(swapped.common == whole.common && swapped.open_pairs == whole.open_pairs &&
+                  swapped.distance.lo == whole.distance.lo &&
+                  swapped.distance.hi == whole.distance.hi);
+    }
+    ebpo_model_free(part);
+}
+
+/* --- all of a case --- */
+
 static void check_case(const query_model *a, const ebpo_pose *pa, const query_model *b,
-                       const ebpo_pose *pb, const char *what)
+                       const ebpo_pose *pb, int kind, const char *what)
 {
     pair_list want = brute_force(a, pa, b, pb),
               in_order = ask_all(a->model, pa, b->model, pb, 1, 0),
@@ -214,6 +354,8 @@ static void check_case(const query_model *a, const ebpo_pose *pa, const query_mo
     for (uint64_t i = 0; i < swapped.count; i++)
         swapped.pair[i] = turned(swapped.pair[i]);
     check_same(&in_order, &swapped, what);
+    check_parts(&in_order, a, pa, b, pb, kind % 4 - 1, what);
+    check_levels(in_order.count > 0, a, pa, b, pb, what);
     if (in_order.count)
         qsort(in_order.pair, in_order.count, sizeof *in_order.pair, by_file);
     check_same(&want, &in_order, what);
@@ -252,7 +394,7 @@ static void check_two(const char *name_a, const char *name_b, int variant)
         if (kind >= 8)
             pa = make_pose(8, size_of(&a), &state);
         snprintf(what, sizeof what, "%s, %s, pose %d", name_a, name_b, kind);
-        check_case(&a, &pa, &b, &pb, what);
+        check_case(&a, &pa, &b, &pb, kind, what);
     }
     query_model_free(&a);
     query_model_free(&b);
@@ -340,6 +482,19 @@ START_TEST(faces_that_cross_within_a_model_are_found)
     }
     ck_assert_uint_eq(at, got.count);
     ebpo_collider_free(collider);
+    for (int level = -1; level < 4; level++) {
+        pair_list parts = { 0 };
+        ebpo_model *model = in_parts(&m, level);
+        ebpo_collider_options with = EBPO_COLLIDER_OPTIONS_INIT;
+        with.threads = 1 + (unsigned)level % 3;
+        with.memory = level > 1 ? 1000 : 0;
+        ASSERT_OK(ebpo_collider_new(model, model, &with, &collider, error));
+        ASSERT_OK(ebpo_collide_self(collider, NULL, take_pairs, &parts, error));
+        check_same(&got, &parts, name);
+        ebpo_collider_free(collider);
+        ebpo_model_free(model);
+        free(parts.pair);
+    }
     free(all.pair);
     free(got.pair);
     query_model_free(&m);
@@ -354,6 +509,22 @@ static bool take_one(void *user, const ebpo_face_pair *pairs, uint64_t count)
     *(uint64_t *)user += count;
     return false;
 }
+
+START_TEST(levels_tell_what_is_apart_and_what_meets)
+{
+    query_model m;
+    ebpo_pose here = EBPO_POSE_INIT, beside = EBPO_POSE_INIT, within = EBPO_POSE_INIT;
+    query_variant fine = { "fine", 1, 5, EBPO_RULE_NONZERO, 0 };
+    query_model_make(&m, "blob", query_solid_by_name("blob"), &fine);
+    beside.translation[0] = 1.5 * m.size;
+    within.translation[1] = 0.05 * m.size;
+    ebpo_level_result r = ask_levels(m.model, &here, m.model, &beside, -1, 0);
+    ck_assert(r.common == 0 && r.contact == 0 && r.distance.lo > 0.2 * m.size);
+    r = ask_levels(m.model, &here, m.model, &within, -1, 0);
+    ck_assert(r.common == 1 && r.distance.lo == 0);
+    query_model_free(&m);
+}
+END_TEST
 
 START_TEST(poses_are_refused_and_questions_end_early)
 {
@@ -391,6 +562,7 @@ Suite *test_suite(void)
     tcase_add_test(threads, threads_find_the_same);
     tcase_add_loop_test(tests, all_pairs_are_those_of_brute_force, 0, NAMES * NAMES);
     tcase_add_loop_test(tests, faces_that_cross_within_a_model_are_found, 0, NAMES);
+    tcase_add_test(tests, levels_tell_what_is_apart_and_what_meets);
     tcase_add_test(tests, poses_are_refused_and_questions_end_early);
     Suite *suite = suite_create("collide");
     suite_add_tcase(suite, tests);

@@ -56,6 +56,7 @@ static ebpo_status ask_two(ebpo_collider *collider, const ebpo_collide_options *
     ebpo_clearance clearance;
     ebpo_certain depth[2];
     ebpo_relation_result relation;
+    ebpo_level_result levels;
     int32_t found;
     uint64_t count = 0;
     ebpo_status status = ebpo_collide_first(collider, options, &pair, &found, error);
@@ -75,6 +76,8 @@ static ebpo_status ask_two(ebpo_collider *collider, const ebpo_collide_options *
         status = ebpo_collide_relation(collider, options, &relation, error);
     if (status == EBPO_OK)
         status = write_met(collider, options, error);
+    if (status == EBPO_OK)
+        status = ebpo_collide_levels(collider, options, &levels, error);
     if (status == EBPO_OK)
         status = ebpo_collider_get_stats(collider, &stats);
     return status;

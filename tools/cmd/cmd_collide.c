@@ -13,18 +13,17 @@
 #include "cmd/commands.h"
 
 typedef struct collide_values {
-    const char *pose_a, *pose_b, *deadline, *out;
-    bool all, self, relation, json, quiet;
+    query_values query;
+    const char *pose_a, *pose_b, *out;
+    bool self, relation, quiet;
     collide_far far;
-    int64_t threads;
-    remote_values remote;
 } collide_values;
 
 static const arg_option options[] = {
     OPTION_TEXT("pose-a", 0, collide_values, pose_a, "POSE",
                 "'" POSE_FORM "': where A is: scaled, turned by a quaternion, moved"),
     OPTION_TEXT("pose-b", 0, collide_values, pose_b, "POSE", "the same of B"),
-    OPTION_FLAG("all", 0, collide_values, all, "print every pair of faces that meet"),
+    OPTION_FLAG("all", 0, query_values, all, "print every pair of faces that meet"),
     OPTION_FLAG("self", 0, collide_values, self,
                 "faces of one model that meet otherwise than as neighbours"),
     OPTION_FLAG("relation", 0, collide_values, relation,
@@ -34,14 +33,16 @@ static const arg_option options[] = {
                 "write all pairs to OUT.h5, or both models with the faces that meet red to "
                 "OUT.ply"),
     COLLIDE_FAR_OPTIONS(collide_values, far),
-    OPTION_TEXT("deadline", 0, collide_values, deadline, "TIME",
+    OPTION_INT("level", 0, query_values, level, "L", 0, 20,
+               "look at levels 0 to L only, and say what is certain by these"),
+    OPTION_TEXT("deadline", 0, query_values, deadline, "TIME",
                 "stop after about this long; in microseconds, or with a unit: 500us, 50ms, 2s"),
-    OPTION_FLAG("json", 0, collide_values, json, "print JSON, an object a line"),
-    OPTION_THREADS(collide_values, threads),
+    OPTION_FLAG("json", 0, query_values, json, "print JSON, an object a line"),
+    QUERY_MODEL_OPTIONS,
     OPTION_QUIET(collide_values, quiet),
-    OPTION_FLAG("stats", 0, collide_values, remote.stats,
+    OPTION_FLAG("stats", 0, query_values, remote.stats,
                 "print on standard error at the end how much was looked at"),
-    REMOTE_HTTP_OPTIONS(collide_values, remote),
+    REMOTE_HTTP_OPTIONS(query_values, remote),
     { 0 },
 };
 
@@ -85,7 +86,7 @@ static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     const collide_values *v = user;
     for (uint64_t i = 0; i < count; i++)
-        print_pair(v->json, &pairs[i]);
+        print_pair(v->query.json, &pairs[i]);
     return command_flush("collide");
 }
 
@@ -98,13 +99,16 @@ static ebpo_status ask_first(const collide_values *v, ebpo_collider *c,
     if (status != EBPO_OK)
         return status;
     if (found == 1)
-        print_pair(v->json, &pair);
-    else if (v->json)
+        print_pair(v->query.json, &pair);
+    else if (v->query.json)
         printf("{\"kind\": %s}\n", found ? "null" : "\"APART\"");
     else
         puts(found ? "not known" : "none");
     return EBPO_OK;
 }
+
+/* -1 .. 1 */
+static const char *const truths[] = { "null", "false", "true" };
 
 static const char *const relations[] = { "DISJOINT",   "TOUCHING", "INTERSECTING", "A_INSIDE_B",
                                          "B_INSIDE_A", "EQUAL",    "not known" };
@@ -112,19 +116,44 @@ static const char *const relations[] = { "DISJOINT",   "TOUCHING", "INTERSECTING
 static ebpo_status ask_relation(const collide_values *v, ebpo_collider *c,
                                 const ebpo_collide_options *how, ebpo_error *error)
 {
-    static const char *const contact[] = { "null", "false", "true" };
     ebpo_relation_result r;
     ebpo_status status = ebpo_collide_relation(c, how, &r, error);
     if (status != EBPO_OK)
         return status;
-    if (!v->json)
+    if (!v->query.json)
         puts(relations[r.relation]);
     else if (r.relation == EBPO_RELATION_OPEN)
-        printf("{\"relation\": null, \"contact\": %s}\n", contact[r.contact + 1]);
+        printf("{\"relation\": null, \"contact\": %s}\n", truths[r.contact + 1]);
     else
         printf("{\"relation\": \"%s\", \"contact\": %s}\n", relations[r.relation],
-               contact[r.contact + 1]);
+               truths[r.contact + 1]);
     return EBPO_OK;
+}
+
+/* -1 .. 1 */
+static const char *const words[] = { "possible", "apart", "meeting" };
+
+static void print_levels(bool as_json, const ebpo_level_result *r)
+{
+    char lo[32], hi[32];
+    if (as_json)
+        printf("{\"common\": %s, \"contact\": %s, \"open_pairs\": %llu, \"lo\": %s, \"hi\": "
+               "%s}\n",
+               truths[r->common + 1], truths[r->contact + 1], (unsigned long long)r->open_pairs,
+               json_number(r->distance.lo, lo), json_number(r->distance.hi, hi));
+    else
+        printf("%s %llu %.17g %.17g\n", words[r->common + 1], (unsigned long long)r->open_pairs,
+               r->distance.lo, r->distance.hi);
+}
+
+static ebpo_status ask_levels(const collide_values *v, ebpo_collider *c,
+                              const ebpo_collide_options *how, ebpo_error *error)
+{
+    ebpo_level_result r;
+    ebpo_status status = ebpo_collide_levels(c, how, &r, error);
+    if (status == EBPO_OK)
+        print_levels(v->query.json, &r);
+    return status;
 }
 
 static bool ends_with(const char *text, const char *end)
@@ -138,6 +167,8 @@ static ebpo_status ask_all(collide_values *v, ebpo_collider *c, const ebpo_colli
                            ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
+    if (v->query.level >= 0)
+        return ask_levels(v, c, how, error);
     if (v->self)
         return ebpo_collide_self(c, how, take_pairs, v, error);
     if (v->relation)
@@ -147,8 +178,8 @@ static ebpo_status ask_all(collide_values *v, ebpo_collider *c, const ebpo_colli
             ebpo_collide_write(c, how, ends_with(v->out, ".ply") ? EBPO_PAIRS_PLY : EBPO_PAIRS_HDF5,
                                v->out, error);
     if (status == EBPO_OK && (v->far.distance || v->far.depth))
-        return collide_far_ask(&v->far, v->json, c, how, error);
-    if (status == EBPO_OK && v->all)
+        return collide_far_ask(&v->far, v->query.json, c, how, error);
+    if (status == EBPO_OK && v->query.all)
         return ebpo_collide_all(c, how, take_pairs, v, error);
     return status == EBPO_OK && !v->relation && !v->out ? ask_first(v, c, how, error) : status;
 }
@@ -156,10 +187,15 @@ static ebpo_status ask_all(collide_values *v, ebpo_collider *c, const ebpo_colli
 static void tell_stats(const ebpo_collider *c)
 {
     ebpo_collider_stats s = EBPO_COLLIDER_STATS_INIT;
-    if (ebpo_collider_get_stats(c, &s) == EBPO_OK)
-        fprintf(stderr, "%llu pairs of nodes, %llu of blocks; %llu of faces by the exact test\n",
-                (unsigned long long)s.node_pairs, (unsigned long long)s.block_pairs,
-                (unsigned long long)s.exact);
+    if (ebpo_collider_get_stats(c, &s) != EBPO_OK)
+        return;
+    fprintf(stderr, "%llu pairs of nodes, %llu of blocks; %llu of faces by the exact test\n",
+            (unsigned long long)s.node_pairs, (unsigned long long)s.block_pairs,
+            (unsigned long long)s.exact);
+    if (s.subtree_pairs)
+        fprintf(stderr, "%llu pairs of subtrees, %llu of these, %llu loads, %llu bytes read\n",
+                (unsigned long long)s.subtree_pairs, (unsigned long long)s.subtrees,
+                (unsigned long long)s.loads, (unsigned long long)s.bytes_read);
 }
 
 static int ask(collide_values *v, ebpo_model *a, ebpo_model *b, ebpo_collide_options *how)
@@ -168,13 +204,13 @@ static int ask(collide_values *v, ebpo_model *a, ebpo_model *b, ebpo_collide_opt
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_collider *c = NULL;
     progress_line line;
-    with.threads = (unsigned)v->threads;
+    with.threads = (unsigned)v->query.threads;
     ebpo_status status = ebpo_collider_new(a, b, &with, &c, &error);
     how->progress = progress_start(&line, "collide", v->quiet);
     if (status == EBPO_OK)
         status = ask_all(v, c, how, &error);
     progress_wipe(&line);
-    if (c && v->remote.stats)
+    if (c && v->query.remote.stats)
         tell_stats(c);
     ebpo_collider_free(c);
     if (status != EBPO_OK)
@@ -187,33 +223,42 @@ static int run(void *given, const char **operand)
     collide_values *v = given;
     ebpo_collide_options how = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_model_options holding = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_inside_options inside = EBPO_INSIDE_OPTIONS_INIT;
+    ebpo_distance_options distance = EBPO_DISTANCE_OPTIONS_INIT;
     query_session a = QUERY_SESSION_INIT, b = QUERY_SESSION_INIT;
     if (v->self == (operand[1] != NULL))
         return command_usage("collide", "two models, or one and --self");
-    if (!collide_far_fits(&v->far, v->all || v->self))
+    if (!collide_far_fits(&v->far, v->query.all || v->self))
         return EXIT_USAGE;
-    if (v->self && (v->all || v->pose_a || v->pose_b || v->relation || v->out))
+    if (v->self && (v->query.all || v->pose_a || v->pose_b || v->relation || v->out))
         return command_usage("collide",
                              "--self takes neither --all nor poses, --relation or --output");
     if (v->out && !ends_with(v->out, ".h5") && !ends_with(v->out, ".ply"))
         return command_usage("collide", "--output %s: expected a name that ends in .h5 or .ply",
                              v->out);
+    if (v->query.level >= 0 &&
+        (v->self || v->query.all || v->far.distance || v->far.depth || v->relation || v->out))
+        return command_usage("collide", "--level takes no other question");
     if (!read_pose("pose-a", v->pose_a, &how.pose_a) ||
         !read_pose("pose-b", v->pose_b, &how.pose_b) ||
-        (v->deadline && !query_read_time("collide", v->deadline, &how.deadline_ns)))
+        !query_options_from("collide", &v->query, &holding, &inside, &distance))
         return EXIT_USAGE;
-    holding.threads = (unsigned)v->threads;
+    how.deadline_ns = distance.deadline_ns;
+    how.level = distance.level;
     answers_begin("collide");
-    int code = query_open(&a, "collide", operand[0], &holding, -1, &v->remote);
-    if (code == EXIT_FINE && !v->self)
-        code = query_open(&b, "collide", operand[1], &holding, -1, &v->remote);
+    int code =
+        query_open(&a, "collide", operand[0], &holding, (int)v->query.level, &v->query.remote);
+    bool one = v->self || strcmp(operand[0], operand[1]) == 0; /* then it is in memory once */
+    if (code == EXIT_FINE && !one)
+        code =
+            query_open(&b, "collide", operand[1], &holding, (int)v->query.level, &v->query.remote);
     if (code == EXIT_FINE)
-        code = ask(v, a.model, v->self ? a.model : b.model, &how);
+        code = ask(v, a.model, one ? a.model : b.model, &how);
     query_close(&b);
     query_close(&a);
     return code;
 }
 
-static const collide_values usual = { .far = COLLIDE_FAR_INIT, .remote = REMOTE_VALUES_INIT };
+static const collide_values usual = { .query = QUERY_VALUES_INIT, .far = COLLIDE_FAR_INIT };
 
 const command command_collide = { &spec, sizeof usual, &usual, run };

@@ -9,9 +9,11 @@
  *   As a file        ebpo_collide_write
  *   How far          ebpo_collide_distance
  *   How deep         ebpo_collide_depth
+ *   By levels        ebpo_collide_levels
  *
  * Poses are those of pose.h: decisions are exact on posed coordinates. Swapping the models, threads
- * and processors change nothing. What the kinds of pairs mean: docs/develop/collision.md.
+ * and processors change nothing; nor do budgets, but for the one pair of ebpo_collide_first. What
+ * the kinds of pairs mean: docs/develop/collision.md.
  */
 #ifndef EBPO_COLLIDE_H
 #define EBPO_COLLIDE_H
@@ -75,11 +77,16 @@ typedef struct ebpo_collide_options {
     uint64_t deadline_ns;
 
     ebpo_progress progress;
+
+    /* Of ebpo_collide_levels: look at levels 0 to `level` only. -1: at all that are in memory. */
+    int32_t level;
+
+    int32_t reserved;
 } ebpo_collide_options;
 
-#define EBPO_COLLIDE_OPTIONS_INIT                                                       \
-    {                                                                                   \
-        sizeof(ebpo_collide_options), EBPO_POSE_INIT, EBPO_POSE_INIT, 0, { NULL, NULL } \
+#define EBPO_COLLIDE_OPTIONS_INIT                                                              \
+    {                                                                                          \
+        sizeof(ebpo_collide_options), EBPO_POSE_INIT, EBPO_POSE_INIT, 0, { NULL, NULL }, -1, 0 \
     }
 
 /* ---- do they meet ---- */
@@ -104,8 +111,10 @@ typedef struct ebpo_face_pair {
 
 /*
  * A pair of faces that meet: the same one for the same files and poses, however many threads and on
- * every processor, but not the least in any numbering. *found: 1 yes, 0 none, -1 the deadline left
- * it open. A solid within another is no contact.
+ * every processor, but not the least in any numbering. Of models in parts (a budget, a cut level)
+ * it depends on the parts, too, as few of them are loaded; the first pair of ebpo_collide_all
+ * depends on nothing but files and poses. *found: 1 yes, 0 none, -1 the deadline left it open. A
+ * solid within another is no contact.
  *
  * EBPO_E_ARGUMENT: a pose (ebpo_pose_check). EBPO_E_CANCELLED: by `progress`. EBPO_E_LIMIT,
  * EBPO_E_MEMORY, and the errors of reading.
@@ -165,7 +174,9 @@ typedef bool (*ebpo_pairs_fn)(void *user, const ebpo_face_pair *pairs, uint64_t 
 /*
  * Every pair of faces that meet, once, by their positions in the files: those of the model that
  * comes first (the one with the lesser content_sha256, then with the lesser pose bit by bit), then
- * those of the other. When `take` returns false nothing more is given, and the call succeeds.
+ * those of the other. Models in parts give the same; subtrees whose envelopes may meet are loaded,
+ * each about once if `memory` holds all pairs and the budgets some hundred subtrees. When `take`
+ * returns false nothing more is given, and the call succeeds.
  *
  * After the deadline EBPO_E_CANCELLED; what was given is the beginning of all. Other errors are
  * those of ebpo_collide_first.
@@ -351,8 +362,8 @@ typedef struct ebpo_clearance {
  *
  * options, clearance   NULL for the usual ones
  *
- * EBPO_E_ARGUMENT: also a tolerance below 0 or infinite, at_least is no number. Others as for
- * ebpo_collide_first.
+ * EBPO_E_LIMIT: also a model is not all in memory. EBPO_E_ARGUMENT: also a tolerance below 0 or
+ * infinite, at_least is no number. Others as for ebpo_collide_first.
  *
  * Threads: one per collider.
  */
@@ -380,6 +391,39 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_depth(ebpo_collider *collider,
                                                       const ebpo_collide_options *options,
                                                       double tolerance, ebpo_certain *a_in_b,
                                                       ebpo_certain *b_in_a, ebpo_error *error);
+/* ---- by levels ---- */
+
+typedef struct ebpo_level_result {
+    /* A point that both models have, of solids or of faces: 1 certainly, 0 certainly none, -1 open.
+     */
+    int32_t common;
+
+    /* Faces that meet: 0 certainly none, -1 open. */
+    int32_t contact;
+
+    /* Of the faces, as of ebpo_collide_distance; INFINITY if a model has none. */
+    ebpo_certain distance;
+
+    /* Pairs of nodes that may have faces that meet. */
+    uint64_t open_pairs;
+
+    /* The levels of A and of B that were looked at: of models in parts not below the cut. */
+    int32_t level_a, level_b;
+} ebpo_level_result;
+
+/*
+ * What is certain by levels alone, without faces: envelopes that are apart bound the distance from
+ * below, nodes that have faces from above, and solids meet where a cell within one has a point of
+ * the other. Reads nothing: models that keep a few levels in memory (a cut level) do. After the
+ * deadline, or when pairs of nodes take more than the collider's memory: what is certain by then.
+ *
+ * EBPO_E_ARGUMENT: a pose (ebpo_pose_check). EBPO_E_CANCELLED, EBPO_E_MEMORY.
+ *
+ * Threads: one per collider.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_levels(ebpo_collider *collider,
+                                                       const ebpo_collide_options *options,
+                                                       ebpo_level_result *out, ebpo_error *error);
 
 /* Sums since the collider was made. */
 typedef struct ebpo_collider_stats {
@@ -387,6 +431,13 @@ typedef struct ebpo_collider_stats {
 
     /* Pairs looked at, of nodes and of blocks of faces; of faces, those left to the exact test. */
     uint64_t node_pairs, block_pairs, exact;
+
+    /*
+     * Of models in parts: pairs of subtrees whose envelopes come near each other, how many subtrees
+     * these are, how often one had to be loaded, and bytes read of the files meanwhile, also by
+     * others.
+     */
+    uint64_t subtree_pairs, subtrees, loads, bytes_read;
 } ebpo_collider_stats;
 
 #define EBPO_COLLIDER_STATS_INIT EBPO_SIZED(ebpo_collider_stats)
