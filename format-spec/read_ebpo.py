@@ -2,11 +2,14 @@
 """A second reader of .ebpo.h5 files, laid out like README.md: h5py and numpy only, none of the library's code.
 
     read_ebpo.py FILE [EXPECTED.json]
+    read_ebpo.py --vectors FOLDER
 
-Prints the file as JSON (as vectors/passed/*.json), or compares with what is expected. Checks the content checksum.
+Prints the file as JSON (as vectors/passed/*.json), or compares with what is expected; of a folder, every file with
+its .json and .nodes.json. Checks the content checksum.
 """
 import hashlib
 import json
+import pathlib
 import sys
 
 import h5py
@@ -46,7 +49,7 @@ def faces(dataset):
 
 
 def leaf_first(level):
-    """coding "delta" of leaf_skip: new faces of other levels' leaves in between."""
+    """coding "skips": new faces of other levels' leaves in between."""
     skip, new = level["leaf_skip"][...].astype("u8"), level["leaf_new"][...].astype("u8")
     return np.cumsum(skip + new) - new
 
@@ -64,6 +67,21 @@ def leaf_refs(level, first):
     values = first.astype("i8")[leaf] - (total - before[leaf])
     order = np.lexsort((values, leaf))
     return values[order].astype("u4")
+
+
+CODINGS = {"leaf_skip": ("skips", "delta"), "leaf_refs": ("gap",), "mesh/vertices": ("delta",), "mesh/faces": ("high-water",),
+           "maps/vertex_source": ("delta",), "maps/face_source": ("delta",)}
+
+
+def check_codings(file):
+    """README.md, "Codings": each array names the one that it has. `delta` at leaf_skip is of 1.0."""
+    def check(name, item):
+        if isinstance(item, h5py.Dataset) and not name.startswith("x-"):
+            word, wanted = text(item.attrs["coding"]), name.split("/")[-1] if name.startswith("levels/") else name
+            assert word in CODINGS.get(wanted, ("plain",)), f"/{name}: coding {word}"
+    for group in ("levels", "mesh", "maps", "subtrees"):
+        if group in file:
+            file[group].visititems(lambda name, item, group=group: check(f"{group}/{name}", item))
 
 
 def full_rows(dataset):
@@ -91,9 +109,9 @@ def as_without_subtrees(name, dataset):
 
 def content_sha256(file):
     """README.md, "Content checksum"."""
-    names = []
+    names, parts = [], text(file.attrs["required_parts"]).split() + text(file.attrs["optional_parts"]).split()
     for group in ("levels", "mesh", "maps"):
-        if group in file:
+        if group in parts:
             file[group].visititems(lambda name, item, group=group:
                                    names.append(f"/{group}/{name}") if isinstance(item, h5py.Dataset) else None)
     total = hashlib.sha256()
@@ -240,6 +258,104 @@ def check_pruned(file, subset):
         assert subset or (pruned == 0 and (gray == 0) == (number + 1 == count)), f"level {number}: pruned nodes in a file that is no subset"
 
 
+def plane_of(code):
+    """README.md, "Envelopes": the half-space n . xi <= d / 4096 of a code."""
+    u, v, q = (code & 1023) - 511, (code >> 10 & 1023) - 511, code >> 20
+    n = [u, v, 511 - abs(u) - abs(v)]
+    if n[2] < 0:
+        n[:2] = [(1 if u >= 0 else -1) * (511 - abs(v)), (1 if v >= 0 else -1) * (511 - abs(u))]
+    return n, 4096 * sum(min(i, 0) for i in n) + 511 * (q + 1)
+
+
+def half_space(code, corner, size):
+    n, d = plane_of(code)
+    world = [a / s for a, s in zip(n, size)]
+    return {"code": code, "n": n, "d": d, "model": world + [d / 4096 + sum(a * c for a, c in zip(world, corner))]}
+
+
+def nodes(file):
+    """All nodes breadth first: octcode, type, rank, cell, the half-spaces that are its own."""
+    out, parents = [], []
+    origin, size = file.attrs["box_origin"], file.attrs["box_size"]
+    for number in range(int(file.attrs["level_count"])):
+        level = file[f"/levels/{number:02d}"]
+        rank, grays, at = [0] * 4, [], {"": 0, "leaf_": 0}
+        lists = {part: [level[part + name][...] if part + name in level else None for name in ("plane_counts", "planes")]
+                 for part in ("", "leaf_")}
+        for group, types in enumerate(level["types"][...]):
+            for octant in range(8 if number else 1):
+                kind = int(types) >> 2 * octant & 3
+                code, mine = parents[group] << 3 | octant if number else 1, rank[kind]
+                rank[kind] += 1
+                if number and types == 0:
+                    continue  # a place below a pruned node
+                place = [sum((code >> 3 * k + axis & 1) << k for k in range(number)) for axis in range(3)]
+                edge = [s / 2 ** number for s in size]
+                corner, planes = [o + p * e for o, p, e in zip(origin, place, edge)], []
+                part = {2: "leaf_", 3: ""}.get(kind)
+                if part is not None and lists[part][0] is not None:
+                    count = int(lists[part][0][mine])
+                    planes = [int(c) for c in lists[part][1][at[part]:at[part] + count]] if count else []
+                    at[part] += count
+                if kind == 3:
+                    grays.append(code)
+                out.append({"octcode": code, "type": ("white", "black", "leaf", "gray")[kind], "rank": mine, "corner": corner,
+                            "size": edge, "half_spaces": [half_space(c, corner, edge) for c in planes]})
+        parents = grays
+    return out
+
+
+def winding(corners, point):
+    """By the solid angles of all faces (van Oosterom and Strackee), of a point that is on none."""
+    a, b, c = (corners[:, k] - point for k in range(3))
+    la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
+    above = np.einsum("ij,ij->i", a, np.cross(b, c))
+    below = la * lb * lc + (a * b).sum(1) * lc + (b * c).sum(1) * la + (c * a).sum(1) * lb
+    return round(np.arctan2(above, below).sum() / (2 * np.pi))
+
+
+def check_point(file, expected):
+    xyz = vertices(file["/mesh/vertices"]).astype("f8")
+    corners, point = xyz[faces(file["/mesh/faces"])].reshape(-1, 3, 3), np.array(expected["point"])
+    if (xyz == point).all(1).any():
+        return expected["where"] == "on"
+    number = winding(corners, point)
+    inside = {"nonzero": number != 0, "evenodd": number % 2 != 0, "positive": number > 0}[text(file.attrs["winding_rule"])]
+    return (expected["where"], expected["winding"]) == ("in" if inside else "out", number)
+
+
+def near(a, b):
+    """Equal; numbers that were rounded, but for rounding."""
+    if isinstance(a, dict):
+        return a.keys() == b.keys() and all(near(a[k], b[k]) for k in a)
+    if isinstance(a, list):
+        return len(a) == len(b) and all(near(x, y) for x, y in zip(a, b))
+    return abs(a - b) <= 1e-12 * max(abs(a), abs(b), 1) if isinstance(a, float) else a == b
+
+
+def plain_value(value):
+    return text(value) if isinstance(value, bytes) else value.tolist() if hasattr(value, "tolist") else value
+
+
+def check_nodes(path, expected):
+    """What a .nodes.json says."""
+    with h5py.File(path, "r") as file:
+        attributes = {name: plain_value(value) for name, value in file.attrs.items()}
+        assert attributes == expected["attributes"], "attributes"
+        assert near(nodes(file), expected["nodes"]), "nodes"
+        assert all(check_point(file, point) for point in expected.get("points", [])), "points"
+
+
+def check_vectors(folder):
+    for path in sorted(pathlib.Path(folder).glob("*.ebpo.h5")):
+        stem = str(path)[:-len(".ebpo.h5")]
+        found, wanted = read(path), json.loads(pathlib.Path(stem + ".json").read_text())
+        assert same(found, wanted, found["coordinate_type"] == "float32"), path.name
+        if pathlib.Path(stem + ".nodes.json").exists():
+            check_nodes(path, json.loads(pathlib.Path(stem + ".nodes.json").read_text()))
+        print(path.name)
+
+
 def read(path):
     with h5py.File(path, "r") as file:
         assert text(file.attrs["format"]) == "EBP-Octree in HDF5" and file.attrs["format_version_major"] == 1
@@ -250,6 +366,7 @@ def read(path):
         parts = set(required + text(file.attrs["optional_parts"]).split())
         assert content_sha256(file) == text(file.attrs["content_sha256"]), "content_sha256 differs"
         check_pruned(file, "pruned" in parts)
+        check_codings(file)
         if "subtrees" in parts:
             check_subtrees(file)
         out = {name: text(file.attrs[name]) for name in ("kind", "winding_rule", "coordinate_type")}
@@ -277,8 +394,10 @@ def same(a, b, narrow):
 
 
 if __name__ == "__main__":
+    if len(sys.argv) == 3 and sys.argv[1] == "--vectors":
+        sys.exit(check_vectors(sys.argv[2]))
     if len(sys.argv) not in (2, 3) or sys.argv[1].startswith("-"):
-        sys.exit("usage: read_ebpo.py FILE.ebpo.h5 [EXPECTED.json]")
+        sys.exit("usage: read_ebpo.py FILE.ebpo.h5 [EXPECTED.json] | --vectors FOLDER")
     found = read(sys.argv[1])
     if len(sys.argv) == 2:
         json.dump(found, sys.stdout, indent=1)

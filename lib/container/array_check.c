@@ -40,19 +40,19 @@ static ebpo_status check_types(const ebpo_check *check, const ebpo_info *info, i
                                error);
     if (level == 0 && arrays->types[0] > 3)
         return ebpo_check_fail(check, level, "types", "the root has siblings", error);
+    uint64_t empty = 0;
     EBPO_FOR_ITEMS(check->workspace, i, 0, groups) {
         for (unsigned octant = 0; octant < ebpo_group_octants(level); octant++)
             counts[ebpo_group_type(arrays->types[i], octant)]++;
     }
-    if (info->pruned && level) {
-        uint64_t empty = 0;
-        for (uint64_t i = 0; i < groups; i++)
-            empty += arrays->types[i] == 0;
-        if (empty != info->level[level - 1].pruned_count)
-            return ebpo_check_fail(
-                check, level, "types",
-                "there is not one empty group for each pruned node of the level above", error);
-    }
+    for (uint64_t i = 0; i < groups; i++)
+        empty += arrays->types[i] == 0;
+    if (level && empty != info->level[level - 1].pruned_count)
+        return ebpo_check_fail(
+            check, level, "types",
+            info->pruned ? "there is not one empty group for each pruned node of the level above"
+                         : "a group is 0: all children of a gray node are white",
+            error);
     const ebpo_level_summary *s = &info->level[level];
     if (counts[EBPO_WHITE] != s->white_count || counts[EBPO_BLACK] != s->black_count ||
         counts[EBPO_LEAF] != s->leaf_count || counts[EBPO_GRAY] != s->gray_count)

@@ -175,9 +175,11 @@ static ebpo_status get_parts(ebpo_h5_in *in, ebpo_h5_id root, ebpo_info *info, e
         if (status == EBPO_E_ABSENT)
             return ebpo_fail_at(error, EBPO_E_FORMAT, in->shown, "/", -1,
                                 "attribute %s is missing; get a fresh copy of the file", name);
+        if (status == EBPO_OK && !*words)
+            rest = NULL; /* no words */
         while (status == EBPO_OK && (word = strsep(&rest, " ")) != NULL)
-            if (*word)
-                status = take_part(in, word, required, &seen, error);
+            status = *word ? take_part(in, word, required, &seen, error)
+                           : wrong_value(in, "/", name, error);
         if (status != EBPO_OK)
             return status;
     }

@@ -27,7 +27,7 @@ static ebpo_status locate_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_in *
         return EBPO_OK;
     ebpo_status status =
         ebpo_h5_read_array(h5, a->path, UINT64_MAX, ebpo_reader_rows_of_chunk(file, a->id), &shape,
-                           &chunks, &stored, error);
+                           NULL, &chunks, &stored, error);
     if (status != EBPO_OK)
         return status;
     if (shape.rows != a->shape.rows || shape.cols != a->shape.cols ||

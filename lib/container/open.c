@@ -12,6 +12,14 @@
 #include "container/open.h"
 #include "http/http_source.h"
 
+/* The word says how the numbers are to be read: with another one they would be read wrong. In files
+ * of 1.0 `delta` stands at leaf_skip, too. */
+static bool coding_known(const ebpo_array_spec *spec, const char *word)
+{
+    return strcmp(word, spec->coding) == 0 ||
+           (spec == &ebpo_schema[EBPO_A_LEAF_SKIP] && strcmp(word, "delta") == 0);
+}
+
 static ebpo_status open_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_id id, int level,
                               ebpo_error *error)
 {
@@ -25,11 +33,15 @@ static ebpo_status open_array(ebpo_file *file, ebpo_h5_in *h5, ebpo_array_id id,
         return EBPO_OK;
     /* places of more are in the index, or in a list */
     uint64_t most = ebpo_input_is_far(&file->in) || file->has_places ? 1 : UINT64_MAX;
+    char coding[EBPO_H5_CODING_BYTES];
     ebpo_status status = ebpo_h5_read_array(h5, a->path, most, ebpo_reader_rows_of_chunk(file, id),
-                                            &a->shape, &a->chunks, &a->stored_bytes, error);
+                                            &a->shape, coding, &a->chunks, &a->stored_bytes, error);
     if (status != EBPO_OK)
         return status;
     ebpo_check check = ebpo_reader_check(file, NULL);
+    if (!coding_known(spec, coding))
+        return ebpo_check_fail(&check, -1, a->path,
+                               "the array's coding is none that the format has for it", error);
     if (a->shape.rows != rows && rows != EBPO_ROWS_STATED)
         return ebpo_check_fail(&check, -1, a->path,
                                "the array's length contradicts the counts in the head", error);
@@ -125,6 +137,27 @@ ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error)
     return EBPO_OK;
 }
 
+static ebpo_status check_pipeline(const ebpo_file *file, const ebpo_array_in *a, ebpo_error *error)
+{
+    ebpo_check check = ebpo_reader_check(file, NULL);
+    return !a->present || a->shape.pipeline == file->level_array[0][EBPO_A_TYPES].shape.pipeline
+               ? EBPO_OK
+               : ebpo_check_fail(
+                     &check, -1, a->path,
+                     "the array's filters are other ones than the file's first array has", error);
+}
+
+static ebpo_status check_pipelines(const ebpo_file *file, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (int level = 0; level < file->info.level_count; level++)
+        for (int id = 0; id < EBPO_LEVEL_ARRAYS && status == EBPO_OK; id++)
+            status = check_pipeline(file, &file->level_array[level][id], error);
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS && status == EBPO_OK; id++)
+        status = check_pipeline(file, &file->root_array[id], error);
+    return status;
+}
+
 /* The list of all chunks, which holds unless another program has rewritten the file. */
 static ebpo_status open_places(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *error)
 {
@@ -174,6 +207,8 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_h5_in *h5, ebpo_error *erro
     info->codec = pipeline == EBPO_PIPELINE_ZSTD      ? EBPO_CODEC_ZSTD
                   : pipeline == EBPO_PIPELINE_DEFLATE ? EBPO_CODEC_DEFLATE
                                                       : EBPO_CODEC_NONE;
+    if (status == EBPO_OK)
+        status = check_pipelines(file, error);
     return status == EBPO_OK ? ebpo_stored_check(file, error) : status;
 }
 

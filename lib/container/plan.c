@@ -177,22 +177,10 @@ static uint8_t narrow_signed(const ebpo_level *level, const int32_t *values, uin
     return low >= INT8_MIN && high <= INT8_MAX ? 1 : low >= INT16_MIN && high <= INT16_MAX ? 2 : 4;
 }
 
-static uint8_t narrow_skips(const ebpo_level *level)
-{
-    uint64_t end = 0, all = 0;
-    EBPO_FOR_ITEMS(level->workspace, i, 0, level->leaf_count) {
-        all |= level->leaf_first[i] - end;
-        end = level->leaf_first[i] + level->leaf_new[i];
-    }
-    return all <= UINT32_MAX ? 4 : 8;
-}
-
 /* Bytes of an element in the file. schema.c: where there is a choice, values are of 32 bits. */
 static uint8_t stored_size(const ebpo_plan *plan, const ebpo_array_out *a, const void *values)
 {
     const ebpo_array_spec *spec = &ebpo_schema[a->id];
-    if (a->id == EBPO_A_LEAF_SKIP)
-        return narrow_skips(&plan->tree->level[a->level]);
     if (a->id == EBPO_A_VERTICES)
         return plan->info.double_coordinates ? 8 : 4;
     if (!(spec->sizes & (spec->sizes - 1)))

@@ -69,10 +69,11 @@ const ebpo_count_spec ebpo_counts[EBPO_COUNTS] = {
                    "ebpo_level." #field ": another type than in its row of array_table.inc");
 #include "container/array_table.inc"
 
-/* Values are narrowed from 32 bits, or have one size. */
-#define LEVEL_ARRAY(ID, name, field, type, stored, ...)                                           \
-    _Static_assert((stored) & ((stored)-1) ? sizeof(type) == 4 || EBPO_A_##ID == EBPO_A_LEAF_SKIP \
-                                           : sizeof(type) == (stored),                            \
+/* Values are narrowed from 32 bits, or have one size; what leaf_skip holds is a difference. */
+#define LEVEL_ARRAY(ID, name, field, type, stored, ...)                               \
+    _Static_assert((stored) & ((stored)-1)                                            \
+                       ? sizeof(type) == 4                                            \
+                       : sizeof(type) == (stored) || EBPO_A_##ID == EBPO_A_LEAF_SKIP, \
                    #name ": its sizes in the file do not go with its type in memory");
 #include "container/array_table.inc"
 

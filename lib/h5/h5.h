@@ -164,9 +164,12 @@ typedef enum ebpo_h5_rows {
  * caller frees; NULL on failure. Checked: little-endian integers, one or two fixed dimensions, one
  * of the pipelines, chunks of the rows asked for; every chunk is there, lies within the file,
  * has passed its filters, and takes at most ebpo_chunk_bound bytes. `stored_bytes`: their sum.
- * Arrays of more than `most` chunks: only the shape is told, *chunks is NULL. */
+ * Arrays of more than `most` chunks: only the shape is told, *chunks is NULL. `coding`: what the
+ * attribute says, which must be there; or NULL. */
+enum { EBPO_H5_CODING_BYTES = 16 };
 EBPO_MUST_USE ebpo_status ebpo_h5_read_array(ebpo_h5_in *in, const char *path, uint64_t most,
                                              ebpo_h5_rows rows, ebpo_h5_shape *shape,
+                                             char coding[EBPO_H5_CODING_BYTES],
                                              ebpo_h5_chunk **chunks, uint64_t *stored_bytes,
                                              ebpo_error *error);
 

@@ -160,11 +160,9 @@ bool ebpo_h5_text_ok(const char *text)
     return true;
 }
 
-ebpo_status ebpo_h5_get_text(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const char *name,
+static ebpo_status read_text(ebpo_h5_in *in, hid_t id, const char *object, const char *name,
                              char *text, size_t size, ebpo_error *error)
 {
-    ebpo_h5_scope scope;
-    ebpo_h5_enter(&scope);
     hid_t attribute, type;
     ebpo_status status = open_attribute(in, id, object, name, 1, &attribute, &type, error);
     memset(text, 0, size);
@@ -179,6 +177,15 @@ ebpo_status ebpo_h5_get_text(ebpo_h5_in *in, ebpo_h5_id id, const char *object, 
     if (status != EBPO_OK)
         text[0] = 0;
     close_attribute(attribute, type);
+    return status;
+}
+
+ebpo_status ebpo_h5_get_text(ebpo_h5_in *in, ebpo_h5_id id, const char *object, const char *name,
+                             char *text, size_t size, ebpo_error *error)
+{
+    ebpo_h5_scope scope;
+    ebpo_h5_enter(&scope);
+    ebpo_status status = read_text(in, id, object, name, text, size, error);
     ebpo_h5_leave(&scope);
     return status;
 }
@@ -393,8 +400,8 @@ static ebpo_status find_chunks(ebpo_h5_in *in, hid_t dataset, const char *path,
 }
 
 ebpo_status ebpo_h5_read_array(ebpo_h5_in *in, const char *path, uint64_t most, ebpo_h5_rows rows,
-                               ebpo_h5_shape *shape, ebpo_h5_chunk **chunks, uint64_t *stored_bytes,
-                               ebpo_error *error)
+                               ebpo_h5_shape *shape, char coding[EBPO_H5_CODING_BYTES],
+                               ebpo_h5_chunk **chunks, uint64_t *stored_bytes, ebpo_error *error)
 {
     *chunks = NULL;
     *stored_bytes = 0;
@@ -412,6 +419,11 @@ ebpo_status ebpo_h5_read_array(ebpo_h5_in *in, const char *path, uint64_t most, 
         dcpl < 0 ? "the array's description is damaged" : find_shape(dataset, dcpl, rows, shape);
     ebpo_status status =
         wrong ? ebpo_h5_fail(error, EBPO_E_FORMAT, in->shown, path, wrong) : EBPO_OK;
+    if (status == EBPO_OK && coding)
+        status = read_text(in, dataset, path, "coding", coding, EBPO_H5_CODING_BYTES, error);
+    if (status == EBPO_E_ABSENT)
+        status = ebpo_fail_at(error, EBPO_E_FORMAT, in->shown, path, -1,
+                              "attribute coding is missing; get a fresh copy of the file");
     if (status == EBPO_OK && ebpo_h5_chunk_count(shape) <= most)
         status = find_chunks(in, dataset, path, shape, chunks, stored_bytes, error);
     if (dcpl >= 0)

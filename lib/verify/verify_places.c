@@ -42,7 +42,7 @@ static ebpo_status index_array(comparison *c, const ebpo_array_in *array, uint32
     indexed *to = &c->array[c->arrays++];
     *to = (indexed){ .array = array, .number = number };
     ebpo_status status = ebpo_h5_read_array(&c->h5, array->path, UINT64_MAX, EBPO_H5_ROWS_POWER,
-                                            &shape, &to->chunks, &stored, error);
+                                            &shape, NULL, &to->chunks, &stored, error);
     to->count = status == EBPO_OK ? ebpo_h5_chunk_count(&shape) : 0;
     return status;
 }

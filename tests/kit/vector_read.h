@@ -9,7 +9,7 @@
 
 #include <ebpo/file.h>
 
-static ebpo_status vector_read(const char *path, ebpo_tree *tree, ebpo_error *error)
+static inline ebpo_status vector_read(const char *path, ebpo_tree *tree, ebpo_error *error)
 {
     ebpo_file *file;
     ebpo_status status = ebpo_open(path, &file, error);
@@ -24,7 +24,8 @@ static ebpo_status vector_read(const char *path, ebpo_tree *tree, ebpo_error *er
     return status;
 }
 
-static void vector_outcome(const char *path, const ebpo_error *error, char *text, size_t size)
+static inline void vector_outcome(const char *path, const ebpo_error *error, char *text,
+                                  size_t size)
 {
     const char *name = strrchr(path, '/') ? strrchr(path, '/') + 1 : path;
     const char *rest = strncmp(error->message, path, strlen(path)) == 0

@@ -301,6 +301,17 @@ START_TEST(cut_by_part)
 }
 END_TEST
 
+static void say_plain(hid_t array)
+{
+    hid_t type = H5Tcopy(H5T_C_S1), scalar = H5Screate(H5S_SCALAR);
+    H5Tset_size(type, strlen("plain"));
+    hid_t coding = H5Acreate2(array, "coding", type, scalar, H5P_DEFAULT, H5P_DEFAULT);
+    ck_assert_int_ge(H5Awrite(coding, type, "plain"), 0);
+    H5Aclose(coding);
+    H5Sclose(scalar);
+    H5Tclose(type);
+}
+
 static void replace_marks(int level, hid_t type, hsize_t rows)
 {
     char name[48];
@@ -314,6 +325,7 @@ static void replace_marks(int level, hid_t type, hsize_t rows)
     uint16_t *zeros = calloc(rows, sizeof *zeros);
     ck_assert_int_ge(H5Dwrite(made, H5T_NATIVE_UINT16, H5S_ALL, H5S_ALL, H5P_DEFAULT, zeros), 0);
     free(zeros);
+    say_plain(made);
     H5Dclose(made);
     H5Pclose(how);
     H5Sclose(space);

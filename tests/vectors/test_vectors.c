@@ -75,20 +75,22 @@ static void check_failed(const char *path, const char *expected_path)
     size_t size;
     ck_assert_msg(vector_read(path, &tree, &error) != EBPO_OK, "%s is read without an error", path);
     vector_outcome(path, &error, text, sizeof text);
-    char *expected = slurp(expected_path, &size);
+    char *expected = slurp(expected_path, &size), *sentence = strstr(expected, "Violates section ");
+    ck_assert_msg(sentence != NULL, "%s does not say what is violated", expected_path);
+    *sentence = 0;
     ck_assert_str_eq(text, expected);
     free(expected);
 }
 
 START_TEST(passed_vectors_are_read_as_their_json_says)
 {
-    ck_assert_uint_ge(each("passed", ".json", check_passed), 11);
+    ck_assert_uint_ge(each("passed", ".json", check_passed), 32);
 }
 END_TEST
 
 START_TEST(failed_vectors_are_refused_with_their_text)
 {
-    ck_assert_uint_ge(each("failed", ".txt", check_failed), 60);
+    ck_assert_uint_ge(each("failed", ".txt", check_failed), 80);
 }
 END_TEST
 

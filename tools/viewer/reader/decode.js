@@ -26,8 +26,9 @@ function checkTypes(info, level) {
   const counts = countTypes(level.types, level.level), s = level.summary;
   if (counts[WHITE] !== s.white || counts[BLACK] !== s.black || counts[LEAF] !== s.leaf || counts[GRAY] !== s.gray)
     throw formatError(levelPath(level.level, 'types'), 'the types do not add up to the counts in the head');
-  if (info.parts.has('pruned') && level.level && level.types.reduce((sum, t) => sum + (t === 0), 0) !== info.levels[level.level - 1].pruned)
-    throw formatError(levelPath(level.level, 'types'), 'there is not one empty group for each pruned node of the level above');
+  if (level.level && level.types.reduce((sum, t) => sum + (t === 0), 0) !== info.levels[level.level - 1].pruned)
+    throw formatError(levelPath(level.level, 'types'), info.parts.has('pruned') ? 'there is not one empty group for each pruned node of the level above'
+      : 'a group is 0: all children of a gray node are white');
 }
 
 /** Winding numbers of black and white nodes against the rule. */

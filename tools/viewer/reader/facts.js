@@ -90,7 +90,9 @@ class Facts {
 function readParts(facts) {
   const seen = new Set();
   for (const [name, required] of [['required_parts', true], ['optional_parts', false]])
-    for (const word of facts.text(name).split(' ').filter(Boolean)) {
+    for (const word of facts.text(name) === '' ? [] : facts.text(name).split(' ')) {
+      if (word === '')
+        throw facts.fail(name, 'it has a value that the format does not allow');
       if (!KNOWN_PARTS.includes(word)) {
         if (required)
           throw new EbpoError('VERSION', `the file needs part "${word}", which this reader does not know; use a newer one`);
@@ -273,7 +275,7 @@ const LEVEL_ARRAYS = {
   leaf_winding: [0, [1, 2, 4], true, (info, s) => (info.solid ? s.leaf : 0)],
   black_winding: [0, [1, 2, 4], true, (info, s) => (info.solid ? s.black : 0), true],
   white_winding: [0, [1, 2, 4], true, (info, s) => (info.solid ? s.white : 0), true],
-  leaf_skip: [0, [4, 8], false, (info, s) => has(info, 'mesh', s.leaf)],
+  leaf_skip: [0, [4], false, (info, s) => has(info, 'mesh', s.leaf)],
   leaf_new: [0, [1, 2, 4], false, (info, s) => has(info, 'mesh', s.leaf)],
   leaf_ref_count: [0, [1, 2, 4], false, (info, s) => has(info, 'mesh', s.leaf)],
   leaf_refs: [0, [4], false, (info, s) => has(info, 'mesh', s.faces_referenced)],
@@ -282,6 +284,10 @@ const LEVEL_ARRAYS = {
   leaf_index: [3, [8], false, (info, s) => (info.parts.has('mesh') || info.parts.has('leaf-planes') ? indexRows(s.leaf) : 0)],
   leaf_plane_counts: [0, [1], false, (info, s) => has(info, 'leaf-planes', s.leaf)],
   leaf_planes: [0, [4], false, (info, s) => has(info, 'leaf-planes', s.leaf_planes)],
+};
+const CODINGS = { // others: plain
+  leaf_skip: ['skips', 'delta'], leaf_refs: ['gap'], '/mesh/vertices': ['delta'], '/mesh/faces': ['high-water'], '/maps/vertex_source': ['delta'],
+  '/maps/face_source': ['delta'],
 };
 const faceChunks = (info) => {
   const rows = info.subtree_level === undefined ? chunkRows(info.face_count, 3, 4) : FIXED_ROWS['/mesh/faces'];
@@ -294,6 +300,13 @@ const ROOT_ARRAYS = {
   '/maps/vertex_source': [0, [4], false, (info) => has(info, 'maps', info.vertex_count)],
   '/maps/face_source': [0, [4], false, (info) => has(info, 'maps', info.face_count)],
 };
+
+/** Throws unless an array's attribute names the coding that the format has for it. In files of 1.0 `delta` stands at leaf_skip, too. */
+export function checkCoding(attributes, path) {
+  const word = new Facts(attributes, path).text('coding', 15), name = path.startsWith('/levels/') ? path.slice(path.lastIndexOf('/') + 1) : path;
+  if (!(CODINGS[name] ?? ['plain']).includes(word))
+    throw formatError(path, "the array's coding is none that the format has for it");
+}
 
 /** Columns of /subtrees/counts. */
 export const subtreeCols = (info) => 6 + 7 * (info.level_count - 1 - info.subtree_level);

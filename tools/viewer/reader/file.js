@@ -1,7 +1,7 @@
 // An open EBP-Octree file: its facts, its levels, its mesh. Bytes are fetched when they are asked for, neighbours in one request.
 import { CHUNK_BYTES_MAX, chunkBound, pipelineOf } from './chunk.js';
 import { EbpoError, formatError } from './error.js';
-import { INDEX_ROWS, arraysOf, checkFacts, chunkRows, chunkRowsFit, readFacts, readLevelFacts } from './facts.js';
+import { INDEX_ROWS, arraysOf, checkCoding, checkFacts, chunkRows, chunkRowsFit, readFacts, readLevelFacts } from './facts.js';
 import { Hdf5, NeedBytes } from './hdf5.js';
 import { checkIndexes, checkLevel, checkOrder, decodeFaces, decodeLeaves, decodeMap, decodeVertices, recode } from './decode.js';
 import { Parts } from './parts.js';
@@ -107,6 +107,9 @@ export class EbpoFile {
         continue;
       arrays.set(wanted.path, describe(hdf5, wanted, links.has(name), links.get(name), info));
     }
+    for (const array of arrays.values())
+      if (array.pipeline !== arrays.get('/levels/00/types').pipeline)
+        throw formatError(array.path, "the array's filters are other ones than the file's first array has");
     const counts = arrays.get('/subtrees/counts');
     if (counts && arrays.get('/subtrees/index').rows !== counts.chunkCount)
       throw formatError('/subtrees/index', "the array's length contradicts the chunks of counts");
@@ -485,6 +488,7 @@ function describe(hdf5, wanted, linked, address, info) {
     throw formatError(path, 'the array has the wrong type or the wrong number of columns');
   if (path === '/mesh/vertices' && elementSize !== (info.coordinate_type === 'float64' ? 8 : 4))
     throw formatError(path, "the array's type contradicts coordinate_type");
+  checkCoding(o.attributes, path);
   const rowBytes = elementSize * Math.max(cols, 1), whole = fit * rowBytes;
   if (whole > (path === PLACES ? Math.min(PLACES_BYTES_MOST, 2 * hdf5.size) : CHUNK_BYTES_MAX))
     throw formatError(path, "the array's chunks do not have the size that the format fixes");

@@ -1,0 +1,50 @@
+/* Changing a file through libhdf5, for vectors that the library does not write. What fails ends the
+ * program. */
+#ifndef CHANGE_FILE_H
+#define CHANGE_FILE_H
+
+#include <hdf5.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+extern hid_t changed; /* the copy that is being changed */
+
+_Noreturn void die(const char *what, const char *why);
+void need(bool ok, const char *what);
+
+uint8_t *slurp(const char *path, size_t *size);
+void spill(const char *path, const void *data, size_t size);
+
+/* Opens the file as `changed`, calls `change`, closes it. */
+void change_objects(const char *path, void (*change)(void));
+
+void set_text(const char *object, const char *name, const char *text);
+void set_int(const char *object, const char *name, int64_t value);
+void set_count(const char *object, const char *name, int64_t value);
+void set_reals(const char *name, double a, double b, double c);
+void add_count(const char *object, const char *name, uint64_t value);
+void drop_attribute(const char *object, const char *name);
+void drop(const char *path);
+
+/* One value of an array, counted row by row. */
+void poke(const char *path, unsigned at, int64_t value);
+
+/* An array in place of another, whose coding and about it keeps. */
+typedef struct new_array {
+    hid_t type;
+    hsize_t rows, cols, chunk; /* cols 0: one dimension; chunk 0: contiguous */
+    bool unlimited, unwritten;
+    void (*filters)(hid_t);
+    const int64_t *values; /* NULL: zeros, at most 4096 */
+} new_array;
+void replace(const char *path, new_array a);
+void checksum(hid_t dcpl); /* filters: fletcher32 */
+void scale_offset(hid_t dcpl);
+
+haddr_t chunk_address(const char *path, hsize_t *size);
+
+/* content_sha256 of what the arrays now hold. */
+void state_content(void);
+
+#endif

@@ -1,0 +1,427 @@
+/* The failed vectors: each is a passed one that violates one sentence of the specification, which
+ * its .txt names. */
+#include "make_parts.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "change_file.h"
+#include "vector_read.h"
+
+static const char *folder;
+
+#define LEAVES    "05_two_levels"
+#define DEEP      "06_four_levels_leaf_planes"
+#define ONE       "01_one_leaf_unfiltered"
+#define NO_MESH   "08_without_mesh"
+#define NO_MAPS   "09_without_maps"
+#define ODD       "10_windings_of_two_bytes"
+#define LONG      "11_two_chunks_of_faces"
+#define CUT_SHORT "12_subset_levels"
+#define BOXED     "13_subset_box"
+#define SUBTREES  "15_subtrees_unfiltered"
+#define CHUNKS    "17_chunks_of_subtrees_unfiltered"
+#define LISTS     "28_leaf_index"
+#define INDEXED   "29_types_and_gray_index"
+
+/* As the library writes it; elements of one byte are not shuffled. */
+static void zstd(hid_t dcpl)
+{
+    unsigned level = 6;
+    H5Pset_filter(dcpl, 32015, 0, 1, &level);
+}
+
+static void v_format(void) { set_text("/", "format", "EBP-Octree in HDF6"); }
+static void v_format_missing(void) { drop_attribute("/", "format"); }
+static void v_draft(void) { set_text("/", "format_version", "1.0-draft"); }
+static void v_major(void) { set_int("/", "format_version_major", 2); }
+static void v_required(void) { set_text("/", "required_parts", "levels mesh animation"); }
+static void v_no_levels_part(void) { set_text("/", "required_parts", "mesh"); }
+static void v_part_twice(void) { set_text("/", "optional_parts", "planes planes"); }
+static void v_subset_word(void) { set_text("/", "required_parts", "levels mesh"); }
+static void v_subset_of(void) { drop_attribute("/", "subset_of"); }
+static void v_subset_level(void) { set_int("/", "subset_levels", 0); }
+static void v_pruned_more(void) { set_count("/levels/01", "pruned", 99); }
+static void v_pruned_less(void) { drop_attribute("/levels/01", "pruned"); }
+static void v_pruned_whole(void) { add_count("/levels/01", "pruned", 1); }
+static void v_attribute_missing(void) { drop_attribute("/", "epsilon"); }
+static void v_attribute_type(void)
+{
+    drop_attribute("/", "face_count");
+    set_text("/", "face_count", "4");
+}
+static void v_kind(void) { set_text("/", "kind", "liquid"); }
+static void v_control(void) { set_text("/", "unit", "m\nm"); }
+static void v_digest_text(void) { set_text("/", "content_sha256", "none"); }
+static void v_nan_box(void) { set_reals("box_origin", 0, NAN, 0); }
+static void v_flat_box(void) { set_reals("box_size", 1, 0, 1); }
+static void v_inexact_box(void) { set_reals("box_size", 1.1, 1.3, 1.7); }
+static void v_level_count(void) { set_int("/", "level_count", 22); }
+static void v_level_beyond(void)
+{
+    set_int("/", "max_level", 2);
+    set_int("/", "level_count", 3);
+}
+static void v_max_level(void) { set_int("/", "max_level", 0); }
+static void v_faces_huge(void) { set_count("/", "face_count", (int64_t)1 << 40); }
+static void v_faces_more(void) { set_count("/", "source_face_count", 3); }
+static void v_source_less(void) { set_count("/", "source_vertex_count", 3); }
+static void v_gray_deep(void) { set_count("/levels/01", "gray", 1); }
+static void v_nodes(void) { set_count("/levels/01", "white", 77); }
+static void v_planes_many(void) { set_count("/levels/00", "planes", 256); }
+static void v_planes_count(void) { set_count("/levels/00", "planes", 200); }
+static void v_new_sum(void) { set_count("/levels/01", "faces_new", 3); }
+static void v_level_missing(void) { drop("/levels/01"); }
+static void v_array_missing(void) { drop("/mesh/faces"); }
+static void v_group_for_array(void)
+{
+    hid_t plist = H5Pcreate(H5P_GROUP_CREATE);
+    H5Pset_obj_track_times(plist, false);
+    drop("/mesh/faces");
+    H5Gclose(H5Gcreate2(changed, "/mesh/faces", H5P_DEFAULT, plist, H5P_DEFAULT));
+    H5Pclose(plist);
+}
+static void v_subtree_level(void) { set_int("/", "subtree_level", 0); }
+static void v_subtree_table(void) { drop("/subtrees/counts"); }
+/* Its bytes stay, so that it still holds for a reader. */
+static void v_places_array(void) { poke("/subtrees/places", 1, INT64_C(4097) << 32 | 8); }
+static void v_places_bytes(void) { poke("/subtrees/places", 1, 1 << 30); }
+static void v_soft_link(void)
+{
+    drop("/mesh/faces");
+    need(H5Lcreate_soft("/levels/00/types", changed, "/mesh/faces", H5P_DEFAULT, H5P_DEFAULT) >= 0,
+         "link");
+}
+static void v_external_link(void)
+{
+    drop("/mesh");
+    need(H5Lcreate_external("03_one_leaf.ebpo.h5", "/mesh", changed, "/mesh", H5P_DEFAULT,
+                            H5P_DEFAULT) >= 0,
+         "link");
+}
+static void v_big_endian(void)
+{
+    replace("/mesh/faces", (new_array){ H5T_STD_U32BE, 4, 3, 4, false, false, checksum, NULL });
+}
+static void v_signed(void)
+{
+    replace("/mesh/faces", (new_array){ H5T_STD_I32LE, 4, 3, 4, false, false, checksum, NULL });
+}
+static void v_float(void)
+{
+    replace("/mesh/vertices", (new_array){ H5T_IEEE_F32LE, 4, 3, 4, false, false, checksum, NULL });
+}
+static void v_wide(void)
+{
+    replace("/mesh/vertices", (new_array){ H5T_STD_U64LE, 4, 3, 4, false, false, checksum, NULL });
+}
+static void v_shape(void)
+{
+    replace("/mesh/faces", (new_array){ H5T_STD_U32LE, 4, 2, 4, false, false, checksum, NULL });
+}
+static void v_length(void)
+{
+    replace("/mesh/faces", (new_array){ H5T_STD_U32LE, 5, 3, 5, false, false, checksum, NULL });
+}
+static void v_chunk(void)
+{
+    replace("/mesh/faces", (new_array){ H5T_STD_U32LE, 4, 3, 2, false, false, checksum, NULL });
+}
+static void v_contiguous(void)
+{
+    replace("/mesh/faces", (new_array){ H5T_STD_U32LE, 4, 3, 0, false, false, NULL, NULL });
+}
+static void v_unlimited(void)
+{
+    replace("/mesh/faces", (new_array){ H5T_STD_U32LE, 4, 3, 4, true, false, checksum, NULL });
+}
+static void v_filter(void)
+{
+    replace("/mesh/faces", (new_array){ H5T_STD_U32LE, 4, 3, 4, false, false, scale_offset, NULL });
+}
+/* Its values, with another pipeline than the file's. */
+static void v_two_pipelines(void)
+{
+    static const int64_t values[] = { 0, 4, 1, 4 };
+    replace("/maps/vertex_source",
+            (new_array){ H5T_STD_U32LE, 4, 0, 4, false, false, checksum, values });
+}
+static void v_missing_chunk(void)
+{
+    replace("/maps/face_source",
+            (new_array){ H5T_STD_U32LE, 4, 0, 4, false, true, checksum, NULL });
+}
+/* Shuffled, and not compressed. */
+static void v_filter_mask(void)
+{
+    static const uint32_t codes[] = { 0, 2, 2, 2 };
+    uint8_t shuffled[sizeof codes];
+    for (unsigned i = 0; i < sizeof codes; i++)
+        shuffled[i % 4 * 4 + i / 4] = (uint8_t)(codes[i / 4] >> 8 * (i % 4));
+    hsize_t at[1] = { 0 };
+    hid_t id = H5Dopen2(changed, "/maps/face_source", H5P_DEFAULT);
+    need(H5Dwrite_chunk(id, H5P_DEFAULT, 2, at, sizeof shuffled, shuffled) >= 0, "chunk");
+    H5Dclose(id);
+}
+static void v_coding(void) { set_text("/mesh/faces", "coding", "zebra"); }
+static void v_coding_missing(void) { drop_attribute("/mesh/faces", "coding"); }
+static void v_minor(void) { set_int("/", "format_version_minor", -1); }
+static void v_two_spaces(void) { set_text("/", "optional_parts", "planes  maps"); }
+static void v_c1(void) { set_text("/", "unit", "m\xc2\x85"); }
+static void v_types_index(void) { poke("/levels/07/types_index", 5, 1); }
+static void v_gray_index(void) { poke("/levels/06/gray_index", 1, 3); }
+static void v_leaf_index(void) { poke("/levels/06/leaf_index", 4, 7); }
+
+/* A group whose leaves become white: all else is as if they had been. */
+static void v_zero_group(void)
+{
+    int64_t types[64], winding[512], leaves = 0, white = 0, rank = 0;
+    hid_t id = H5Dopen2(changed, "/levels/02/types", H5P_DEFAULT), space = H5Dget_space(id);
+    int64_t groups = H5Sget_simple_extent_npoints(space), gone = 0;
+    need(groups <= 64 && H5Dread(id, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, types) >= 0,
+         "types");
+    H5Sclose(space);
+    H5Dclose(id);
+    id = H5Dopen2(changed, "/levels/02/leaf_winding", H5P_DEFAULT);
+    need(H5Dread(id, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, winding) >= 0, "winding");
+    H5Dclose(id);
+    for (int64_t g = 0; g < groups; g++)
+        for (int octant = 0; octant < 8; octant++) {
+            int type = (int)(types[g] >> 2 * octant & 3);
+            if (g == groups - 1 && type == 2)
+                gone++;
+            else if (type == 2)
+                winding[leaves++] = winding[rank];
+            rank += type == 2;
+            white += type == 0;
+        }
+    poke("/levels/02/types", (unsigned)groups - 1, 0);
+    set_count("/levels/02", "leaf", leaves);
+    set_count("/levels/02", "white", white + gone);
+    replace("/levels/02/leaf_winding", (new_array){ H5T_STD_I8LE, (hsize_t)leaves, 0,
+                                                    (hsize_t)leaves, false, false, zstd, winding });
+}
+
+static void v_root_siblings(void) { poke("/levels/00/types", 0, 3 | 2 << 2); }
+static void v_types(void) { poke("/levels/01/types", 0, 2); }
+static void v_types_gray(void) { poke("/levels/01/types", 0, 0xffff); }
+static void v_plane_code(void) { poke("/levels/00/planes", 0, 0xffffffff); }
+static void v_plane_counts(void) { poke("/levels/00/plane_counts", 0, 0); }
+static void v_leaf_plane(void) { poke("/levels/03/leaf_planes", 0, 0xfff00000); }
+static void v_skip(void) { poke("/levels/01/leaf_skip", 0, 1); }
+static void v_skip_far(void) { poke("/levels/01/leaf_skip", 0, 0xffffffff); }
+static void v_leaf_new(void) { poke("/levels/01/leaf_new", 0, 200); }
+static void v_ref_counts(void) { poke("/levels/01/leaf_ref_count", 0, 200); }
+static void v_refs(void) { poke("/levels/01/leaf_refs", 0, 4); }
+/* One leaf's new faces begin one later; those after it are where they were. */
+static void v_order(void)
+{
+    poke("/levels/03/leaf_skip", 12, 1);
+    poke("/levels/03/leaf_skip", 13, 127);
+}
+static void v_black(void) { poke("/levels/04/black_winding", 0, 2); }
+static void v_white(void) { poke("/levels/04/white_winding", 0, 1); }
+static void v_nan(void) { poke("/mesh/vertices", 0, (int64_t)0x7fc00000u << 1); }
+static void v_corner(void) { poke("/mesh/faces", 11, 9); }
+static void v_corner_first(void) { poke("/mesh/faces", 0, 1); }
+static void v_faces_index(void) { poke("/mesh/faces_index", 1, 3); }
+static void v_map_twice(void) { poke("/maps/face_source", 1, 0); }
+static void v_map_far(void) { poke("/maps/vertex_source", 0, 200); }
+static void v_content(void) { poke("/mesh/vertices", 0, 2); }
+
+typedef enum late_change { NONE, CUT, FLIP_CHUNK, FLIP_HEAD, SWAP_CHUNK, NOT_HDF5 } late_change;
+
+typedef struct failed_vector {
+    const char *name, *base;
+    void (*change)(void);
+    late_change late;    /* to the bytes, when the file is closed */
+    const char *section; /* of the specification, and what it says there */
+    const char *sentence;
+} failed_vector;
+
+static const failed_vector failed[] = {
+    { "not_hdf5", LEAVES, NULL, NOT_HDF5, "2", "whole HDF5 file" },
+    { "cut_off", LEAVES, NULL, CUT, "2", "whole HDF5 file" },
+    { "head_bit_flipped", LEAVES, NULL, FLIP_HEAD, "2", "all metadata is checksummed" },
+    { "format_wrong", LEAVES, v_format, NONE, "3", "it is not `EBP-Octree in HDF5`" },
+    { "format_missing", LEAVES, v_format_missing, NONE, "3", "it is not `EBP-Octree in HDF5`" },
+    { "version_major_2", LEAVES, v_major, NONE, "3", "major is not 1" },
+    { "version_draft", LEAVES, v_draft, NONE, "3", "it is `1.0-draft`" },
+    { "required_part_unknown", LEAVES, v_required, NONE, "3",
+      "A reader must refuse a word in `required_parts` that it does not know" },
+    { "required_part_levels_missing", LEAVES, v_no_levels_part, NONE, "3", "`levels` is missing" },
+    { "part_listed_twice", LEAVES, v_part_twice, NONE, "3", "a known word stands twice" },
+    { "subset_without_its_word", BOXED, v_subset_word, NONE, "3",
+      "The word `pruned` is there if and only if a node is pruned" },
+    { "subset_of_missing", BOXED, v_subset_of, NONE, "3", "a subset without it" },
+    { "subset_levels_0", CUT_SHORT, v_subset_level, NONE, "3", "not 1 .. 21" },
+    { "pruned_more_than_gray", BOXED, v_pruned_more, NONE, "4",
+      "at each level `pruned` is at most `gray`" },
+    { "pruned_not_counted", BOXED, v_pruned_less, NONE, "4",
+      "the next level has as many groups that are 0" },
+    { "subtree_level_0", SUBTREES, v_subtree_level, NONE, "3", "not 1 .. `level_count` - 2" },
+    { "subtree_table_missing", SUBTREES, v_subtree_table, NONE, "4",
+      "Every array of these tables whose rows the head counts must be there" },
+    { "places_of_another_array", CHUNKS, v_places_array, NONE, "9",
+      "has more or fewer chunks in the list than it has" },
+    { "places_of_impossible_bytes", CHUNKS, v_places_bytes, NONE, "9",
+      "more than its filters can make of it" },
+    { "pruned_in_a_whole_file", DEEP, v_pruned_whole, NONE, "4",
+      "`pruned` is 0 in files that are no subsets" },
+    { "attribute_missing", LEAVES, v_attribute_missing, NONE, "3",
+      "A required attribute that is missing" },
+    { "attribute_of_wrong_type", LEAVES, v_attribute_type, NONE, "2", "refuse other types" },
+    { "kind_unknown", LEAVES, v_kind, NONE, "3", "another word" },
+    { "unit_with_control_character", LEAVES, v_control, NONE, "1", "no control characters" },
+    { "digest_not_hexadecimal", LEAVES, v_digest_text, NONE, "3", "not 64 digits `0-9 a-f`" },
+    { "box_nan", LEAVES, v_nan_box, NONE, "3", "not as section 5 says" },
+    { "box_flat", LEAVES, v_flat_box, NONE, "3", "not as section 5 says" },
+    { "box_inexact", LEAVES, v_inexact_box, NONE, "3", "not as section 5 says" },
+    { "level_count_22", LEAVES, v_level_count, NONE, "3",
+      "1 <= `level_count` <= `max_level` + 1 <= `grid_level` + 1 <= 21" },
+    { "level_count_beyond_levels", LEAVES, v_level_beyond, NONE, "4",
+      "`gray` is 0 at the deepest level and there only" },
+    { "max_level_below_levels", LEAVES, v_max_level, NONE, "3",
+      "1 <= `level_count` <= `max_level` + 1 <= `grid_level` + 1 <= 21" },
+    { "face_count_huge", LEAVES, v_faces_huge, NONE, "3", "not 1 .. 2^32 - 2" },
+    { "face_count_beyond_source", NO_MAPS, v_faces_more, NONE, "3", "less than the mesh has" },
+    { "vertex_count_beyond_source", NO_MAPS, v_source_less, NONE, "3", "less than the mesh has" },
+    { "gray_at_deepest_level", LEAVES, v_gray_deep, NONE, "4",
+      "`gray` is 0 at the deepest level and there only" },
+    { "nodes_do_not_add_up", LEAVES, v_nodes, NONE, "4", "is 8 for each group" },
+    { "planes_more_than_nodes_can_have", LEAVES, v_planes_many, NONE, "4",
+      "more than 255 for each node" },
+    { "planes_count_wrong", DEEP, v_planes_count, NONE, "4",
+      "Its rows are as many as the column *shape* says" },
+    { "new_faces_do_not_add_up", LEAVES, v_new_sum, NONE, "4",
+      "`faces_new` of all levels add up to `face_count`" },
+    { "level_missing", LEAVES, v_level_missing, NONE, "4", "NN = 00 .. `level_count` - 1" },
+    { "array_missing", LEAVES, v_array_missing, NONE, "4",
+      "Every array of these tables whose rows the head counts must be there" },
+    { "group_in_place_of_array", LEAVES, v_group_for_array, NONE, "2",
+      "what stands on a path of this page is of the kind that it says" },
+    { "soft_link_in_place_of_array", LEAVES, v_soft_link, NONE, "2",
+      "refuse soft and external links on the paths below" },
+    { "external_link_in_place_of_group", LEAVES, v_external_link, NONE, "2",
+      "refuse soft and external links on the paths below" },
+    { "array_big_endian", ONE, v_big_endian, NONE, "1", "**little-endian** in the file" },
+    { "array_signed", ONE, v_signed, NONE, "4",
+      "Its type is one of those that the column *type* names" },
+    { "array_of_floats", ONE, v_float, NONE, "4",
+      "Its type is one of those that the column *type* names" },
+    { "vertices_of_other_width", ONE, v_wide, NONE, "4", "u32 (float32) or u64 (float64)" },
+    { "array_with_two_columns", ONE, v_shape, NONE, "4",
+      "Its rows are as many as the column *shape* says" },
+    { "array_too_long", ONE, v_length, NONE, "4",
+      "Its rows are as many as the column *shape* says" },
+    { "array_with_other_chunks", ONE, v_chunk, NONE, "2",
+      "the largest power of two for which a chunk has at most 65,536 bytes" },
+    { "array_contiguous", ONE, v_contiguous, NONE, "2", "integers as stated, chunked" },
+    { "array_unlimited", ONE, v_unlimited, NONE, "2", "1 or 2 fixed dimensions" },
+    { "array_with_other_filter", ONE, v_filter, NONE, "2",
+      "A reader must refuse any other pipeline" },
+    { "chunk_bit_flipped", LEAVES, NULL, FLIP_CHUNK, "2", "the frame's checksum" },
+    { "chunk_frame_of_other_size", LEAVES, NULL, SWAP_CHUNK, "2",
+      "does not decode to exactly its size" },
+    { "root_with_siblings", LEAVES, v_root_siblings, NONE, "4", "level 0: bits 2 .. 15 not 0" },
+    { "types_contradict_counts", LEAVES, v_types, NONE, "4", "counts differ from the attributes" },
+    { "types_gray_at_deepest_level", LEAVES, v_types_gray, NONE, "4",
+      "counts differ from the attributes" },
+    { "plane_code_of_no_plane", DEEP, v_plane_code, NONE, "6",
+      "Codes with q = 4095, u = 1023 or v = 1023 stand for no plane" },
+    { "plane_counts_wrong", DEEP, v_plane_counts, NONE, "4", "the sum is not `planes`" },
+    { "leaf_plane_code_of_no_plane", DEEP, v_leaf_plane, NONE, "6",
+      "Codes with q = 4095, u = 1023 or v = 1023 stand for no plane" },
+    { "leaf_skip_beyond_faces", LEAVES, v_skip, NONE, "4",
+      "new faces would lie beyond the last face" },
+    { "leaf_skip_far_beyond_faces", LEAVES, v_skip_far, NONE, "4",
+      "new faces would lie beyond the last face" },
+    { "leaf_new_too_large", LEAVES, v_leaf_new, NONE, "4",
+      "new faces would lie beyond the last face" },
+    { "leaf_ref_count_too_large", LEAVES, v_ref_counts, NONE, "4",
+      "the sum is not `faces_referenced`" },
+    { "leaf_ref_not_before_first", LEAVES, v_refs, NONE, "4", "a number is below 0" },
+    { "leaves_out_of_depth_first_order", ODD, v_order, NONE, "5",
+      "is not what visiting the leaves depth first gives" },
+    { "black_node_outside", ODD, v_black, NONE, "4", "not inside by the rule" },
+    { "white_node_inside", ODD, v_white, NONE, "4", "inside by the rule" },
+    { "vertex_nan", LEAVES, v_nan, NONE, "4", "a coordinate is NaN or infinite" },
+    { "face_vertex_below_zero", LEAVES, v_corner, NONE, "4", "a corner names no vertex" },
+    { "face_vertex_before_first_use", LEAVES, v_corner_first, NONE, "7", "a code is above `seen`" },
+    { "faces_index_wrong", LONG, v_faces_index, NONE, "4",
+      "vertices seen before each chunk of `faces`" },
+    { "map_number_twice", LEAVES, v_map_twice, NONE, "4", "or twice" },
+    { "map_number_out_of_range", LEAVES, v_map_far, NONE, "4", "not below `source_vertex_count`" },
+    { "coding_unknown", LEAVES, v_coding, NONE, "7", "Another word, or none" },
+    { "coding_missing", LEAVES, v_coding_missing, NONE, "7", "Another word, or none" },
+    { "version_minor_negative", LEAVES, v_minor, NONE, "3", "minor is not 0 .. 2^20" },
+    { "part_list_with_two_spaces", LEAVES, v_two_spaces, NONE, "3",
+      "words with one space between them" },
+    { "unit_with_c1_character", LEAVES, v_c1, NONE, "1", "no control characters" },
+    { "group_of_zeros", NO_MESH, v_zero_group, NONE, "4", "level 1 and deeper: a group is 0" },
+    { "two_pipelines", LEAVES, v_two_pipelines, NONE, "2",
+      "A file must use one pipeline throughout" },
+    { "filter_mask", LEAVES, v_filter_mask, NONE, "2", "a chunk whose filter mask is not 0" },
+    { "chunk_missing", ONE, v_missing_chunk, NONE, "2", "Every chunk must be there" },
+    { "types_index_wrong", INDEXED, v_types_index, NONE, "4", "differs from the sums" },
+    { "gray_index_wrong", INDEXED, v_gray_index, NONE, "4", "differs" },
+    { "leaf_index_wrong", LISTS, v_leaf_index, NONE, "4", "differs" },
+    { "content_changed", LEAVES, v_content, NONE, "3", "it does not match" },
+};
+
+static void change_bytes(const char *path, late_change late)
+{
+    size_t size;
+    hsize_t chunk_size = 0, other_size = 0;
+    uint8_t *data = slurp(path, &size);
+    changed = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
+    haddr_t faces = chunk_address("/mesh/faces", &chunk_size),
+            types = chunk_address("/levels/00/types", &other_size);
+    H5Fclose(changed);
+    switch (late) {
+    case CUT: size -= 40; break;
+    case FLIP_CHUNK: data[faces + chunk_size / 2] ^= 16; break;
+    case FLIP_HEAD: data[60] ^= 16; break;
+    case SWAP_CHUNK: memcpy(data + faces, data + types, other_size); break;
+    case NOT_HDF5: memset(data, ' ', size = 64); break;
+    case NONE: break;
+    }
+    spill(path, data, size);
+    free(data);
+}
+
+static void make_vector(const failed_vector *v)
+{
+    char from[512], path[512], text[2048];
+    size_t size;
+    ebpo_tree tree;
+    ebpo_error error = EBPO_ERROR_INIT;
+    snprintf(from, sizeof from, "%s/passed/%s.ebpo.h5", folder, v->base);
+    snprintf(path, sizeof path, "%s/failed/%s.ebpo.h5", folder, v->name);
+    uint8_t *data = slurp(from, &size);
+    spill(path, data, size);
+    free(data);
+    if (v->change)
+        change_objects(path, v->change);
+    if (v->change && v->change != v_content && v->change != v_digest_text)
+        change_objects(path, state_content);
+    if (v->late != NONE)
+        change_bytes(path, v->late);
+    if (vector_read(path, &tree, &error) == EBPO_OK)
+        die(v->name, "is read without an error");
+    vector_outcome(path, &error, text, sizeof text);
+    size_t used = strlen(text);
+    snprintf(text + used, sizeof text - used, "Violates section %s: \"%s\"\n", v->section,
+             v->sentence);
+    snprintf(path, sizeof path, "%s/failed/%s.txt", folder, v->name);
+    spill(path, text, strlen(text));
+}
+
+void make_failed(const char *to)
+{
+    folder = to;
+    for (size_t i = 0; i < sizeof failed / sizeof failed[0]; i++)
+        make_vector(&failed[i]);
+}

@@ -1,0 +1,389 @@
+/* The passed vectors, in an order in which each needs only what those before it have shown. */
+#include "make_parts.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/build.h>
+
+#include "change_file.h"
+#include "nodes_json.h"
+#include "solids.h"
+#include "subset/subset_parts.h"
+#include "tree_json.h"
+#include "vector_read.h"
+
+static const char *folder;
+
+static const float tetrahedron[] = { 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1 };
+static const uint32_t tetrahedron_faces[] = { 0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3 };
+
+static ebpo_mesh make_mesh(uint64_t faces, bool doubles)
+{
+    ebpo_mesh mesh = { .vertex_count = 4, .face_count = faces };
+    mesh.faces = malloc(sizeof tetrahedron_faces);
+    memcpy(mesh.faces, tetrahedron_faces, sizeof tetrahedron_faces);
+    if (doubles)
+        mesh.xyz64 = malloc(12 * sizeof(double));
+    else
+        mesh.xyz32 = malloc(sizeof tetrahedron);
+    for (int i = 0; i < 12; i++)
+        if (doubles)
+            mesh.xyz64[i] = tetrahedron[i] / 3.0;
+        else
+            mesh.xyz32[i] = tetrahedron[i];
+    return mesh;
+}
+
+/* What differs from vector to vector. */
+typedef struct how {
+    int max_level;
+    uint32_t leaf_faces, more_parts;
+    ebpo_rule rule;
+    bool fill_holes;
+} how;
+
+static void build_mesh(ebpo_tree *tree, ebpo_mesh mesh, how h)
+{
+    ebpo_prepared prepared = EBPO_PREPARED_INIT;
+    ebpo_prepare_options prepare = EBPO_PREPARE_OPTIONS_INIT;
+    ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_error error = EBPO_ERROR_INIT;
+    prepare.threads = options.threads = 1;
+    prepare.fill_holes = h.fill_holes;
+    options.max_level = h.max_level;
+    options.leaf_faces = h.leaf_faces;
+    options.parts |= h.more_parts;
+    options.rule = h.rule;
+    options.unit = "m";
+    if (ebpo_mesh_prepare(&mesh, &prepare, &prepared, &error) != EBPO_OK ||
+        ebpo_build(&mesh, &prepared.report, &prepared.record, &options, tree, &error) != EBPO_OK)
+        die("build", error.message);
+}
+
+static void build(ebpo_tree *tree, uint64_t faces, bool doubles, int max_level, uint32_t leaf_faces,
+                  uint32_t more_parts)
+{
+    build_mesh(tree, make_mesh(faces, doubles), (how){ max_level, leaf_faces, more_parts, 0, 0 });
+}
+
+static void build_float(ebpo_tree *tree, ebpo_mesh mesh, how h)
+{
+    ebpo_test_to_float(&mesh);
+    build_mesh(tree, mesh, h);
+}
+
+/* A tetrahedron of size 1, `outer` times, wound inwards if that is negative; and `inner` times a
+ * box that holds a cell of level 4 beside an edge. */
+static ebpo_mesh nested(int outer, int inner)
+{
+    static const double low[3] = { 0.05, 0.05, 0.24 }, high[3] = { 0.13, 0.13, 0.33 };
+    ebpo_mesh mesh = ebpo_test_tetrahedron(1), second = ebpo_test_box(low, high, 1);
+    uint64_t shell = mesh.face_count, count = (uint64_t)abs(outer) * shell;
+    if (outer < 0)
+        ebpo_test_reverse(&mesh);
+    mesh.faces = realloc(mesh.faces, count * 3 * sizeof *mesh.faces);
+    for (uint64_t i = 3 * shell; i < 3 * count; i++)
+        mesh.faces[i] = mesh.faces[i - 3 * shell];
+    mesh.face_count = count;
+    for (int i = 0; i < inner; i++)
+        ebpo_test_append(&mesh, &second);
+    ebpo_mesh_free(&second);
+    return mesh;
+}
+
+static void write_json(const char *name, const ebpo_tree *tree)
+{
+    char path[512];
+    snprintf(path, sizeof path, "%s/passed/%s.json", folder, name);
+    FILE *out = fopen(path, "w");
+    if (!out)
+        die(path, "cannot be written");
+    tree_json(out, tree);
+    fclose(out);
+    if (!nodes_json_fits(tree))
+        return;
+    snprintf(path, sizeof path, "%s/passed/%s.ebpo.h5", folder, name);
+    char *text = nodes_json(path, tree);
+    snprintf(path, sizeof path, "%s/passed/%s.nodes.json", folder, name);
+    spill(path, text, strlen(text));
+    free(text);
+}
+
+static void write_laid_out(const char *name, ebpo_tree *tree, ebpo_codec codec, uint32_t parts,
+                           uint64_t subtree_faces)
+{
+    char path[512];
+    ebpo_tree back;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_write_options options = EBPO_WRITE_OPTIONS_INIT;
+    options.codec = codec;
+    options.parts = parts;
+    options.subtree_faces = subtree_faces;
+    snprintf(tree->info.generator, sizeof tree->info.generator, "make_vectors");
+    snprintf(path, sizeof path, "%s/passed/%s.ebpo.h5", folder, name);
+    if (ebpo_tree_write(tree, path, &options, &error) != EBPO_OK ||
+        vector_read(path, &back, &error) != EBPO_OK)
+        die(name, error.message);
+    write_json(name, &back);
+    ebpo_tree_free(&back);
+    ebpo_tree_free(tree);
+}
+
+static void write_vector(const char *name, ebpo_tree *tree, ebpo_codec codec, uint32_t parts)
+{
+    write_laid_out(name, tree, codec, parts, 0);
+}
+
+/* A passed vector as another program may have left it, or a later version. */
+static void derive(const char *name, const char *base, void (*change)(void))
+{
+    char path[512];
+    size_t size;
+    ebpo_tree back;
+    ebpo_error error = EBPO_ERROR_INIT;
+    snprintf(path, sizeof path, "%s/passed/%s.ebpo.h5", folder, base);
+    uint8_t *data = slurp(path, &size);
+    snprintf(path, sizeof path, "%s/passed/%s.ebpo.h5", folder, name);
+    spill(path, data, size);
+    free(data);
+    change_objects(path, change);
+    if (vector_read(path, &back, &error) != EBPO_OK)
+        die(name, error.message);
+    write_json(name, &back);
+    ebpo_tree_free(&back);
+}
+
+static void subset(ebpo_tree *tree, const char *base, const ebpo_subset_options *options)
+{
+    char path[512];
+    ebpo_file *whole;
+    ebpo_error error = EBPO_ERROR_INIT;
+    snprintf(path, sizeof path, "%s/passed/%s.ebpo.h5", folder, base);
+    if (ebpo_open(path, &whole, &error) != EBPO_OK ||
+        ebpo_subset_tree(tree, whole, options, &error) != EBPO_OK)
+        die(path, error.message);
+    ebpo_close(whole);
+}
+
+static void make_small(void)
+{
+    ebpo_tree tree;
+    build(&tree, 4, false, 0, 16, 0);
+    write_vector("01_one_leaf_unfiltered", &tree, EBPO_CODEC_NONE, ~0u);
+    build(&tree, 4, false, 0, 16, 0);
+    write_vector("02_one_leaf_deflate", &tree, EBPO_CODEC_DEFLATE, ~0u);
+    build(&tree, 4, false, 0, 16, 0);
+    write_vector("03_one_leaf", &tree, EBPO_CODEC_ZSTD, ~0u);
+    build(&tree, 4, true, 0, 16, 0);
+    write_vector("04_doubles", &tree, EBPO_CODEC_ZSTD, ~0u);
+    build(&tree, 4, false, 1, 0, 0);
+    write_vector("05_two_levels", &tree, EBPO_CODEC_ZSTD, ~0u);
+    build(&tree, 4, false, 3, 1, EBPO_PART_LEAF_PLANES);
+    write_vector("06_four_levels_leaf_planes", &tree, EBPO_CODEC_ZSTD, ~0u);
+    build(&tree, 3, false, 2, 1, 0);
+    write_vector("07_surface", &tree, EBPO_CODEC_ZSTD, ~0u);
+    build(&tree, 4, false, 2, 1, 0);
+    write_vector("08_without_mesh", &tree, EBPO_CODEC_ZSTD, EBPO_PART_PLANES);
+    build(&tree, 4, false, 2, 1, 0);
+    write_vector("09_without_maps", &tree, EBPO_CODEC_ZSTD, EBPO_PART_PLANES | EBPO_PART_MESH);
+    build_float(&tree, nested(128, 1), (how){ 4, 130, 0, EBPO_RULE_EVENODD, 0 });
+    write_vector("10_windings_of_two_bytes", &tree, EBPO_CODEC_ZSTD, ~0u);
+    build_float(&tree, ebpo_test_torus(1, 0.375, 80, 32), (how){ 4, 64, 0, 0, 0 });
+    write_vector("11_two_chunks_of_faces", &tree, EBPO_CODEC_ZSTD, EBPO_PART_MESH);
+}
+
+static void make_subsets(void)
+{
+    ebpo_tree tree;
+    ebpo_subset_options levels = EBPO_SUBSET_OPTIONS_INIT, box = EBPO_SUBSET_OPTIONS_INIT;
+    levels.last_level = 1;
+    levels.parts = EBPO_PART_PLANES | EBPO_PART_LEAF_PLANES;
+    subset(&tree, "06_four_levels_leaf_planes", &levels);
+    write_vector("12_subset_levels", &tree, EBPO_CODEC_ZSTD, ~0u);
+    box.boxed = true;
+    for (int k = 0; k < 3; k++)
+        box.max[k] = 0.2;
+    subset(&tree, "06_four_levels_leaf_planes", &box);
+    write_vector("13_subset_box", &tree, EBPO_CODEC_ZSTD, ~0u);
+}
+
+static void make_subtrees(void)
+{
+    ebpo_tree tree;
+    build(&tree, 4, false, 3, 1, EBPO_PART_LEAF_PLANES);
+    write_laid_out("14_subtrees", &tree, EBPO_CODEC_ZSTD, ~0u, 1);
+    build(&tree, 4, false, 3, 1, EBPO_PART_LEAF_PLANES);
+    write_laid_out("15_subtrees_unfiltered", &tree, EBPO_CODEC_NONE, ~0u, 1);
+    build_float(&tree, ebpo_test_torus(1, 0.375, 80, 32),
+                (how){ 5, 6, EBPO_PART_LEAF_PLANES, 0, 0 });
+    write_laid_out("16_many_subtrees", &tree, EBPO_CODEC_ZSTD, ~0u, 10);
+    build_float(&tree, ebpo_test_torus(1, 0.375, 36, 30), (how){ 5, 16, 0, 0, 0 });
+    write_laid_out("17_chunks_of_subtrees_unfiltered", &tree, EBPO_CODEC_NONE,
+                   EBPO_PART_PLANES | EBPO_PART_MESH, 10);
+}
+
+/* --- what other programs and other versions write --- */
+
+static void without_filters(void)
+{
+    static const char *const paths[] = {
+        "/levels/00/types",    "/levels/00/leaf_winding",   "/levels/00/leaf_skip",
+        "/levels/00/leaf_new", "/levels/00/leaf_ref_count", "/mesh/vertices",
+        "/mesh/faces",         "/maps/vertex_source",       "/maps/face_source"
+    };
+    for (size_t i = 0; i < sizeof paths / sizeof *paths; i++) {
+        int64_t values[64];
+        hsize_t dims[2] = { 0, 0 };
+        hid_t id = H5Dopen2(changed, paths[i], H5P_DEFAULT), space = H5Dget_space(id),
+              type = H5Dget_type(id);
+        H5Sget_simple_extent_dims(space, dims, NULL);
+        need(H5Dread(id, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0, paths[i]);
+        replace(paths[i], (new_array){ .type = type,
+                                       .rows = dims[0],
+                                       .cols = dims[1],
+                                       .chunk = dims[0],
+                                       .values = values });
+        H5Tclose(type);
+        H5Sclose(space);
+        H5Dclose(id);
+    }
+}
+
+static void of_a_later_version(void)
+{
+    hid_t plist = H5Pcreate(H5P_GROUP_CREATE);
+    H5Pset_obj_track_times(plist, false);
+    set_text("/", "format_version", "1.99");
+    set_int("/", "format_version_minor", 99);
+    set_text("/", "optional_parts", "planes maps x-example.org-scans seasons");
+    set_text("/", "x-example.org-operator", "nobody");
+    H5Gclose(H5Gcreate2(changed, "/x-example.org-scans", H5P_DEFAULT, plist, H5P_DEFAULT));
+    H5Gclose(H5Gcreate2(changed, "/seasons", H5P_DEFAULT, plist, H5P_DEFAULT));
+    set_text("/seasons", "about", "a part that this version does not know");
+    H5Pclose(plist);
+}
+
+static void of_version_1_0(void)
+{
+    set_text("/", "format_version", "1.0");
+    set_int("/", "format_version_minor", 0);
+    set_text("/levels/01/leaf_skip", "coding", "delta");
+}
+
+/* The arrays stay where they are, and do not count. */
+static void without_the_word_maps(void)
+{
+    set_text("/", "optional_parts", "planes");
+    H5Lmove(changed, "/maps", changed, "/x-maps", H5P_DEFAULT, H5P_DEFAULT);
+    state_content();
+    H5Lmove(changed, "/x-maps", changed, "/maps", H5P_DEFAULT, H5P_DEFAULT);
+}
+
+static void make_derived(void)
+{
+    derive("18_one_leaf_bare", "03_one_leaf", without_filters);
+    derive("19_unknown_optional_part", "03_one_leaf", of_a_later_version);
+    derive("20_version_1_0", "05_two_levels", of_version_1_0);
+    derive("33_part_not_listed", "05_two_levels", without_the_word_maps);
+}
+
+/* --- what meshes may be like --- */
+
+/* The unit square's triangle in z = 0, and one so low under the wall between the root's lower and
+ * upper children that it comes near the upper ones, and does not touch them. */
+static void build_near(ebpo_tree *tree)
+{
+    ebpo_mesh mesh = ebpo_test_tetrahedron(1);
+    build_mesh(tree, mesh, (how){ 1, 0, 0, 0, 0 });
+    double wall = tree->info.box_origin[2] + tree->info.box_size[2] / 2,
+           z = wall - tree->info.box_size[2] / 2 / 1024;
+    ebpo_tree_free(tree);
+    mesh = ebpo_test_tetrahedron(1);
+    uint32_t a = ebpo_test_append_vertex(&mesh, 0.0625, 0.0625, z),
+             b = ebpo_test_append_vertex(&mesh, 0.125, 0.0625, z),
+             c = ebpo_test_append_vertex(&mesh, 0.0625, 0.125, z),
+             d = ebpo_test_append_vertex(&mesh, 0.0625, 0.0625, z - 0.0625);
+    ebpo_test_append_face(&mesh, a, b, c);
+    ebpo_test_append_face(&mesh, a, c, d);
+    ebpo_test_append_face(&mesh, a, d, b);
+    ebpo_test_append_face(&mesh, b, d, c);
+    build_mesh(tree, mesh, (how){ 1, 0, 0, 0, 0 });
+    if (tree->info.box_origin[2] + tree->info.box_size[2] / 2 != wall)
+        die("near", "the root cell depends on more than the outer faces");
+    ebpo_level *l = &tree->level[1];
+    uint64_t at = 0, leaf = 0; /* the leaf of octant 4, and its references */
+    for (unsigned octant = 0; octant < 4; octant++)
+        if ((l->types[0] >> 2 * octant & 3) == EBPO_LEAF)
+            at += l->leaf_ref_count[leaf++];
+    uint32_t near = UINT32_MAX;
+    for (uint32_t f = 0; f < tree->mesh.face_count; f++) {
+        bool all = true;
+        for (int k = 0; k < 3; k++)
+            all &= tree->mesh.xyz64[3 * tree->mesh.faces[3 * f + k] + 2] == z;
+        near = all ? f : near;
+    }
+    uint64_t place = at, end = at + l->leaf_ref_count[leaf];
+    while (place < end && l->leaf_refs[place] < near)
+        place++;
+    l->leaf_refs = realloc(l->leaf_refs, (l->ref_count + 1) * sizeof *l->leaf_refs);
+    memmove(l->leaf_refs + place + 1, l->leaf_refs + place,
+            (l->ref_count - place) * sizeof *l->leaf_refs);
+    l->leaf_refs[place] = near;
+    l->leaf_ref_count[leaf]++;
+    l->ref_count++;
+}
+
+static void make_meshes(void)
+{
+    ebpo_tree tree;
+    build(&tree, 4, true, 2, 1, EBPO_PART_LEAF_PLANES);
+    write_vector("21_doubles_in_several_leaves", &tree, EBPO_CODEC_ZSTD, ~0u);
+    build_float(&tree, nested(-1, 2), (how){ 4, 1, 0, EBPO_RULE_POSITIVE, 0 });
+    write_vector("22_rule_positive", &tree, EBPO_CODEC_ZSTD, ~0u);
+    build_mesh(&tree, make_mesh(3, false), (how){ 1, 0, 0, 0, true });
+    write_vector("23_faces_added_by_mending", &tree, EBPO_CODEC_ZSTD, ~0u);
+    ebpo_mesh mesh = make_mesh(4, true);
+    (void)ebpo_test_append_vertex(&mesh, 0.1, 0.1, 0.1);
+    build_mesh(&tree, mesh, (how){ 1, 0, 0, 0, 0 });
+    write_vector("24_unused_vertex", &tree, EBPO_CODEC_ZSTD, ~0u);
+    build_near(&tree);
+    write_vector("25_face_that_comes_near", &tree, EBPO_CODEC_ZSTD, ~0u);
+    ebpo_subset_options close_enough = EBPO_SUBSET_OPTIONS_INIT;
+    close_enough.max_error = 0.15;
+    close_enough.parts = EBPO_PART_PLANES;
+    subset(&tree, "16_many_subtrees", &close_enough);
+    write_vector("26_subset_error", &tree, EBPO_CODEC_ZSTD, ~0u);
+    build_float(&tree, nested(32768, 1), (how){ 4, 33000, 0, EBPO_RULE_EVENODD, 0 });
+    write_vector("27_windings_of_four_bytes", &tree, EBPO_CODEC_ZSTD, EBPO_PART_PLANES);
+}
+
+/* --- several chunks, and indexes --- */
+
+static void make_large(void)
+{
+    ebpo_tree tree;
+    build(&tree, 4, false, 6, 0, 0);
+    write_vector("28_leaf_index", &tree, EBPO_CODEC_ZSTD, EBPO_PART_PLANES | EBPO_PART_MESH);
+    build(&tree, 4, false, 7, 0, 0);
+    write_vector("29_types_and_gray_index", &tree, EBPO_CODEC_ZSTD, EBPO_PART_PLANES);
+    build(&tree, 4, false, 7, 0, 0);
+    write_vector("30_chunks_of_lists", &tree, EBPO_CODEC_ZSTD, EBPO_PART_MESH);
+    build_float(&tree, ebpo_test_sheet(64, 64), (how){ 3, 256, 0, 0, 0 });
+    write_vector("31_chunks_of_vertices", &tree, EBPO_CODEC_ZSTD, EBPO_PART_MESH);
+    build_float(&tree, ebpo_test_sheet(128, 128), (how){ 3, 1024, 0, 0, 0 });
+    write_vector("32_chunks_of_maps", &tree, EBPO_CODEC_ZSTD, EBPO_PART_MESH | EBPO_PART_MAPS);
+}
+
+void make_passed(const char *to)
+{
+    folder = to;
+    make_small();
+    make_subsets();
+    make_subtrees();
+    make_derived();
+    make_meshes();
+    make_large();
+}
