@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """test_array_table.py SOURCE: what is said of arrays in other languages says the same as the
 library's table, row by row:
-the specification's section 4, its reader in Python, the viewer's reader."""
+the specification's sections 4 and 7, its reader in Python, the viewer's reader."""
 import pathlib
 import re
 import sys
@@ -54,6 +54,33 @@ def compare(where, rows, wanted):
                         for a, b in zip(rows, wanted) if a != b]
 
 
+def check_codings(root, text):
+    """Each array's coding: in the specification's section 7, and in both other readers."""
+    wanted = {}
+    for _, inside in re.findall(r"^(LEVEL_ARRAY|ROOT_ARRAY)\((.*?)\)\n", re.sub(r"\n +", " ", text),
+                                re.M):
+        name, coding = re.findall(r'^\w+, "?([\w/]+)"?,.*?"(plain|delta|skips|high-water|gap)"',
+                                  inside)[0]
+        if coding != "plain":
+            wanted[name] = coding
+    section = re.search(r"^## 7\. .*?^## 8\. ", (root / "format-spec/README.md").read_text(),
+                        re.M | re.S).group(0)
+    said = {name: coding for coding, names in re.findall(r"^\| `([\w-]+)` \| ([^|]*) \|", section, re.M)
+            for name in re.findall(r"`([\w/]+)`", names.split(";")[0])}
+    viewer = re.search(r"^const CODINGS = .*?^};", (root / "tools/viewer/reader/facts.js").read_text(),
+                       re.M | re.S).group(0)
+    python = re.search(r"^CODINGS = .*?\}$", (root / "format-spec/read_ebpo.py").read_text(),
+                       re.M | re.S).group(0)
+    found = {"format-spec/README.md, section 7": said,
+             "tools/viewer/reader/facts.js":
+             dict(re.findall(r"'?([\w/]+)'?: \['([\w-]+)'", viewer)),
+             "format-spec/read_ebpo.py":
+             {name if name.startswith("leaf") else "/" + name: coding
+              for name, coding in re.findall(r'"([\w/]+)": \("([\w-]+)"', python)}}
+    return [f"{place}: codings are {codings}; array_table.inc says {wanted}"
+            for place, codings in found.items() if codings != wanted]
+
+
 def check_parts(root):
     """Each part has a word in files, in the tools and in the viewer's reader, and a need in the
     table."""
@@ -80,6 +107,7 @@ def main():
     problems += [f"format-spec/read_ebpo.py: {name} is not read" for name in held
                  if f'"{name}"' not in reader]
     problems += check_parts(root)
+    problems += check_codings(root, (root / "lib/container/array_table.inc").read_text())
     print("\n".join(problems) or f"{len(rows)} arrays, the same everywhere")
     sys.exit(1 if problems else 0)
 
