@@ -16,7 +16,7 @@ import tempfile
 
 separator = sys.argv.index("--")
 compiler, (root, *rest) = sys.argv[1:separator], sys.argv[separator + 1:]
-root, update = pathlib.Path(root), "--update" in rest
+root, update = pathlib.Path(root).resolve(), "--update" in rest
 baseline = root / "tests/form/libebpo.abi"
 INCLUDE = root / "lib/include"
 SKIPPED = 77
@@ -55,7 +55,8 @@ def describe(folder, output):
     source.write_text(stub(header_text()))
     subprocess.run([*compiler, "-std=c11", "-g", "-O0", "-shared", "-fPIC", "-fvisibility=hidden",
                     f"-I{INCLUDE}",
-                    "-Wl,-soname,libebpo.so.0", "-nostdlib", "-o", library, source], check=True)
+                    "-Wl,-soname,libebpo.so.0", "-nostdlib", "-o", library, source.name],
+                   cwd=folder, check=True)
     subprocess.run(["abidw", "--no-show-locs", "--no-corpus-path", "--no-comp-dir-path",
                     "--no-elf-needed", "--out-file", output,
                     library], check=True)
