@@ -8,31 +8,13 @@
 #include "base/alloc.h"
 #include "base/error.h"
 #include "pair/pose.h"
+#include "pair/quaternion.h"
 #include "scene/scene_parts.h"
 
 /* What rounding adds to lengths: of a few dozen operations, each 2^-53. */
 static const double slack = 0x1p-44;
 /* Times beyond would have differences that are no numbers. */
 static const double most_time = 0x1p1000;
-
-static double length4(const double q[4])
-{
-    return sqrt((q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]));
-}
-
-/* False: too short, or not finite. */
-static bool normalise(double q[4])
-{
-    double most = fmax(fmax(fabs(q[0]), fabs(q[1])), fmax(fabs(q[2]), fabs(q[3])));
-    if (!(most >= 0x1p-500 && most <= 0x1p500))
-        return false;
-    for (int k = 0; k < 4; k++)
-        q[k] /= most;
-    double length = length4(q);
-    for (int k = 0; k < 4; k++)
-        q[k] /= length;
-    return true;
-}
 
 void scene_turn_of_matrix(const double m[3][3], double turn[4])
 {
@@ -51,20 +33,6 @@ void scene_turn_of_matrix(const double m[3][3], double turn[4])
     turn[j] = m[j][i] + m[i][j];
     turn[k] = m[k][i] + m[i][k];
     turn[3] = m[k][j] - m[j][k];
-}
-
-static void matrix_of_turn(const double q[4], double (*m)[3])
-{
-    double x = q[0], y = q[1], z = q[2], w = q[3];
-    m[0][0] = 1 - 2 * (y * y + z * z);
-    m[0][1] = 2 * (x * y - z * w);
-    m[0][2] = 2 * (x * z + y * w);
-    m[1][0] = 2 * (x * y + z * w);
-    m[1][1] = 1 - 2 * (x * x + z * z);
-    m[1][2] = 2 * (y * z - x * w);
-    m[2][0] = 2 * (x * z - y * w);
-    m[2][1] = 2 * (y * z + x * w);
-    m[2][2] = 1 - 2 * (x * x + y * y);
 }
 
 static bool fits(const scene_key *key)
@@ -86,7 +54,7 @@ ebpo_status scene_add_key(scene_route *route, const scene_key *key, ebpo_error *
             error, EBPO_E_ARGUMENT,
             "a number is not finite, the time is beyond 2^1000, or the scale is not from "
             "2^-300 to 2^300");
-    if (!normalise(k.turn))
+    if (!ebpo_quaternion_normalise(k.turn))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "the quaternion is 0 or too long");
     if (route->count && !(k.time > route->keys[route->count - 1].time))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "time %g is not above the one before, %g", k.time,
@@ -124,14 +92,14 @@ static void turn_between(const double from[4], const double to[4], double u, dou
         double middle[4];
         for (int k = 0; k < 4; k++)
             middle[k] = a[k] + b[k];
-        normalise(middle); /* at most a right angle apart: far from 0 */
+        ebpo_quaternion_normalise(middle); /* at most a right angle apart: far from 0 */
         bool later = u >= 0.5;
         memcpy(later ? a : b, middle, sizeof middle);
         u = later ? 2 * u - 1 : 2 * u;
     }
     for (int k = 0; k < 4; k++)
         out[k] = a[k] + u * (b[k] - a[k]);
-    normalise(out);
+    ebpo_quaternion_normalise(out);
 }
 
 void scene_route_at(const scene_route *route, double time, ebpo_pose *out)
@@ -140,14 +108,14 @@ void scene_route_at(const scene_route *route, double time, ebpo_pose *out)
     const scene_key *a = &route->keys[n], *b = n + 1 < route->count ? a + 1 : a;
     *out = (ebpo_pose)EBPO_POSE_INIT;
     if (a == b || route->jumps || time <= a->time) {
-        matrix_of_turn(a->turn, out->rotation);
+        ebpo_quaternion_matrix(a->turn, out->rotation);
         memcpy(out->translation, a->translation, sizeof out->translation);
         out->scale = a->scale;
         return;
     }
     double u = (time - a->time) / (b->time - a->time), turn[4];
     turn_between(a->turn, b->turn, u, turn);
-    matrix_of_turn(turn, out->rotation);
+    ebpo_quaternion_matrix(turn, out->rotation);
     for (int k = 0; k < 3; k++)
         out->translation[k] = a->translation[k] + u * (b->translation[k] - a->translation[k]);
     out->scale = a->scale + u * (b->scale - a->scale);
@@ -185,7 +153,10 @@ static double angle_between(const double a[4], const double b[4])
         less[k] = a[k] - b[k];
         more[k] = a[k] + b[k];
     }
-    double y = fmin(fmin(length4(less), length4(more)) / 2 * (1 + slack) + 0x1p-50, 0.70711);
+    double y =
+        fmin(fmin(ebpo_quaternion_length(less), ebpo_quaternion_length(more)) / 2 * (1 + slack) +
+                 0x1p-50,
+             0.70711);
     double square = y * y, term = y, sum = y;
     for (int n = 1; n < 40; n++) {
         term *= square * (2 * n - 1) / (2 * n);

@@ -1,6 +1,7 @@
 /* The broad phase: sweep and prune along the axis on which boxes are spread most. */
 #include "geom/strict_fp.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -8,6 +9,9 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "scene/scene_parts.h"
+
+/* 400 MB while they are sorted. */
+static const uint64_t most_pairs = UINT64_C(1) << 23;
 
 typedef struct box {
     double min[3], max[3];
@@ -94,6 +98,11 @@ static ebpo_status take_pair(sweep *s, const box *x, const box *y, ebpo_error *e
     if (!ebpo_scene_pair_rule(s->scene, pair.a, pair.b, &pair.clearance) ||
         !near_each_other(x, y, pair.clearance))
         return EBPO_OK;
+    if (s->pairs_count == most_pairs)
+        return ebpo_fail(error, EBPO_E_LIMIT,
+                         "more than %" PRIu64 " pairs of instances come near each other: place "
+                         "fewer at one place, have pairs ignored, or ask for a shorter time",
+                         most_pairs);
     if (!ebpo_grow(&s->pairs, &s->pairs_capacity, s->pairs_count + 1, sizeof pair))
         return ebpo_fail_memory(error, (s->pairs_count + 1) * sizeof pair);
     s->pairs[s->pairs_count++] = pair;

@@ -121,12 +121,19 @@ static bool keep_meetings(void *user, const ebpo_scene_meeting *meetings, uint64
     return true;
 }
 
-static ebpo_status meet(ebpo_scene *scene, double time, met *out, ebpo_error *error)
+static ebpo_status meet_by(ebpo_scene *scene, double time, unsigned threads, met *out,
+                           ebpo_error *error)
 {
     ebpo_scene_ask_options how = EBPO_SCENE_ASK_OPTIONS_INIT;
     how.count = true;
+    how.threads = threads;
     memset(out, 0, sizeof *out);
     return ebpo_scene_meet(scene, time, &how, keep_meetings, out, NULL, error);
+}
+
+static ebpo_status meet(ebpo_scene *scene, double time, met *out, ebpo_error *error)
+{
+    return meet_by(scene, time, 0, out, error);
 }
 
 START_TEST(packed_scenes_answer_the_same)
@@ -308,10 +315,45 @@ START_TEST(least_distances_hold)
 }
 END_TEST
 
+/* --- threads --- */
+
+/* All that a scene is asked, by so many threads; models are made anew. */
+typedef struct all_answers {
+    met met;
+    ways ways;
+    leasts leasts;
+} all_answers;
+
+static void ask_by(uint64_t seed, unsigned threads, all_answers *out)
+{
+    ebpo_scene_way_options how = EBPO_SCENE_WAY_OPTIONS_INIT;
+    ebpo_scene *scene = some_scene(seed);
+    how.threads = threads;
+    how.tolerance = tolerance;
+    how.most_looks = 100;
+    memset(out, 0, sizeof *out);
+    ASSERT_OK(meet_by(scene, 0.5, threads, &out->met, error));
+    ASSERT_OK(ebpo_scene_approach(scene, 0, LAST, &how, keep_ways, &out->ways, error));
+    ASSERT_OK(ebpo_scene_least_distances(scene, 0, LAST, &how, keep_leasts, &out->leasts, error));
+    ebpo_scene_free(scene);
+}
+
+START_TEST(threads_change_nothing)
+{
+    for (uint64_t n = 0; n < 3; n++) {
+        static all_answers one, many;
+        ask_by(n, 1, &one);
+        ask_by(n, 4, &many);
+        ck_assert(memcmp(&one, &many, sizeof one) == 0);
+        ck_assert_uint_gt(one.ways.count, 0);
+    }
+}
+END_TEST
+
 Suite *test_suite(void)
 {
     Suite *suite = suite_create("scene_routes");
-    TCase *tests = tcase_create("scene_routes");
+    TCase *tests = tcase_create("scene_routes"), *threads = tcase_create("threads");
     tcase_add_checked_fixture(tests, begin, scratch_leave);
     tcase_set_timeout(tests, 900);
     tcase_add_test(tests, packed_scenes_answer_the_same);
@@ -319,5 +361,9 @@ Suite *test_suite(void)
     tcase_add_test(tests, approach_misses_nothing);
     tcase_add_test(tests, least_distances_hold);
     suite_add_tcase(suite, tests);
+    tcase_add_checked_fixture(threads, begin, scratch_leave);
+    tcase_set_timeout(threads, 900);
+    tcase_add_test(threads, threads_change_nothing);
+    suite_add_tcase(suite, threads);
     return suite;
 }

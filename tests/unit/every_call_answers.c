@@ -88,7 +88,10 @@ static ebpo_status collide(ebpo_model *model, ebpo_error *error)
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_collider *collider = NULL;
     options.pose_b.translation[0] = 0.3;
-    ebpo_status status = ebpo_pose_check(model, &options.pose_b, error);
+    static const double half[4] = { 0, 0, 1, 1 };
+    ebpo_status status = ebpo_pose_turn(&options.pose_b, half, error);
+    if (status == EBPO_OK)
+        status = ebpo_pose_check(model, &options.pose_b, error);
     if (status == EBPO_OK)
         status = ebpo_collider_new(model, model, NULL, &collider, error);
     if (status == EBPO_OK)

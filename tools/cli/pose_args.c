@@ -22,23 +22,6 @@ static int read_numbers(const char *text, double number[MOST])
     return count;
 }
 
-/* q: x, y, z, w of any length but 0. */
-static bool turn(ebpo_pose *pose, const double q[4])
-{
-    double most = fmax(fmax(fabs(q[0]), fabs(q[1])), fmax(fabs(q[2]), fabs(q[3])));
-    if (!(most > 0))
-        return false;
-    double x = q[0] / most, y = q[1] / most, z = q[2] / most, w = q[3] / most;
-    double s = 2 / (x * x + y * y + z * z + w * w);
-    const double r[3][3] = {
-        { 1 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y) },
-        { s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x) },
-        { s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y) },
-    };
-    memcpy(pose->rotation, r, sizeof r);
-    return true;
-}
-
 static void take_rows(ebpo_pose *pose, const double *number)
 {
     for (int i = 0; i < 3; i++) {
@@ -59,5 +42,5 @@ bool pose_read(const char *text, ebpo_pose *out)
         memcpy(out->translation, number, sizeof out->translation);
     if (count == 8 || count == 13)
         out->scale = number[count - 1];
-    return count == 3 || count >= 12 || turn(out, number + 3);
+    return count == 3 || count >= 12 || ebpo_pose_turn(out, number + 3, NULL) == EBPO_OK;
 }

@@ -32,6 +32,17 @@ typedef struct ebpo_pose {
     }
 
 /*
+ * Sets pose->rotation to that of a quaternion x, y, z, w, w its real part, of any length: the same
+ * bits as scene files give.
+ *
+ * EBPO_E_ARGUMENT: its greatest part is not from 2^-500 to 2^500; the pose is as it was.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_pose_turn(ebpo_pose *pose, const double quaternion[4],
+                                                  ebpo_error *error);
+
+/*
  * Whether the model may be asked about at this pose.
  *
  * EBPO_E_ARGUMENT: the matrix is not a rotation; the message says by how much its columns are

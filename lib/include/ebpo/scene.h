@@ -372,7 +372,8 @@ typedef bool (*ebpo_scene_pairs_fn)(void *user, const ebpo_scene_pair *pairs, ui
  * (ebpo_scene_instance_box) are at most their clearance apart on each axis; ascending by a, then b.
  * No other pair of instances comes that close at any time of from .. to.
  *
- * EBPO_E_ARGUMENT: not loaded, or not from <= to, both finite. EBPO_E_MEMORY.
+ * EBPO_E_ARGUMENT: not loaded, or not from <= to, both finite. EBPO_E_LIMIT: more than 2^23 pairs.
+ * EBPO_E_MEMORY.
  *
  * Threads: any, while nobody changes the scene.
  */
