@@ -2,7 +2,6 @@
  * meet red. */
 #include "geom/strict_fp.h"
 
-#include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -10,6 +9,7 @@
 #include "base/error.h"
 #include "base/fp_env.h"
 #include "collide/contacts.h"
+#include "collide/red_mesh.h"
 #include "h5/tables.h"
 #include "io/publish.h"
 
@@ -158,53 +158,6 @@ static bool take_met(void *user, const ebpo_face_pair *pairs, uint64_t count)
     return true;
 }
 
-static void print_vertices(FILE *f, const painting *p, int m)
-{
-    const ebpo_mesh *mesh = &p->mesh[m];
-    const ebpo_posing *posing = &p->question->posing[(int)p->question->turned ^ m].posing;
-    for (uint64_t v = 0; v < mesh->vertex_count; v++) {
-        double x[3], out[3];
-        for (unsigned k = 0; k < 3; k++)
-            x[k] = mesh->xyz64 ? mesh->xyz64[3 * v + k] : (double)mesh->xyz32[3 * v + k];
-        ebpo_posing_apply(posing, x, out);
-        fprintf(f, "%.17g %.17g %.17g\n", out[0], out[1], out[2]);
-    }
-}
-
-static void print_faces(FILE *f, const painting *p, int m, uint64_t first_vertex)
-{
-    static const char *const colour[2] = { "200 200 200", "150 150 160" };
-    const ebpo_mesh *mesh = &p->mesh[m];
-    for (uint64_t i = 0; i < mesh->face_count; i++) {
-        const uint32_t *v = mesh->faces + 3 * i;
-        bool met = p->met[m][i / 64] >> i % 64 & 1;
-        fprintf(f, "3 %" PRIu64 " %" PRIu64 " %" PRIu64 " %s\n", first_vertex + v[0],
-                first_vertex + v[1], first_vertex + v[2], met ? "255 0 0" : colour[m]);
-    }
-}
-
-static ebpo_status print_ply(const painting *p, const char *path, ebpo_publish *target,
-                             ebpo_error *error)
-{
-    FILE *f = ebpo_publish_stream(target);
-    uint64_t vertices = p->mesh[0].vertex_count;
-    if (!f)
-        return ebpo_fail_memory(error, 4096);
-    fprintf(f,
-            "ply\nformat ascii 1.0\nelement vertex %" PRIu64 "\nproperty double x\n"
-            "property double y\nproperty double z\nelement face %" PRIu64 "\n"
-            "property list uchar uint vertex_indices\nproperty uchar red\nproperty uchar green\n"
-            "property uchar blue\nend_header\n",
-            vertices + p->mesh[1].vertex_count, p->mesh[0].face_count + p->mesh[1].face_count);
-    for (int m = 0; m < 2; m++)
-        print_vertices(f, p, m);
-    for (int m = 0; m < 2; m++)
-        print_faces(f, p, m, m ? vertices : 0);
-    if (ferror(f))
-        return ebpo_fail_file(error, EBPO_E_IO, path, "cannot be written");
-    return EBPO_OK;
-}
-
 static ebpo_status read_meshes(painting *p, ebpo_error *error)
 {
     for (int m = 0; m < 2; m++) {
@@ -216,20 +169,22 @@ static ebpo_status read_meshes(painting *p, ebpo_error *error)
         if (!p->met[m])
             return ebpo_fail_memory(error, p->mesh[m].face_count / 8);
     }
-    if (p->mesh[0].vertex_count + p->mesh[1].vertex_count > UINT32_MAX)
-        return ebpo_fail(error, EBPO_E_LIMIT, "more than 2^32 - 1 vertices in one PLY file");
     return EBPO_OK;
 }
 
-static ebpo_status write_ply(const ebpo_collision *q, const char *path, ebpo_publish *target,
-                             ebpo_error *error)
+static ebpo_status write_ply(const ebpo_collision *q, ebpo_publish *target, ebpo_error *error)
 {
+    static const char *const colour[2] = { "200 200 200", "150 150 160" };
     painting p = { .question = q };
+    ebpo_red_mesh red[2];
     ebpo_status status = read_meshes(&p, error);
     if (status == EBPO_OK)
         status = ebpo_collide_all(q->collider, &q->options, take_met, &p, error);
+    for (int m = 0; m < 2; m++)
+        red[m] = (ebpo_red_mesh){ &p.mesh[m], &q->posing[(int)q->turned ^ m].posing, p.met[m],
+                                  colour[m] };
     if (status == EBPO_OK)
-        status = print_ply(&p, path, target, error);
+        status = ebpo_red_meshes_print(red, 2, target, error);
     for (int m = 0; m < 2; m++) {
         ebpo_mesh_free(&p.mesh[m]);
         free(p.met[m]);
@@ -253,7 +208,7 @@ ebpo_status ebpo_collide_write(ebpo_collider *c, const ebpo_collide_options *opt
     if (status == EBPO_OK)
         status = ebpo_publish_begin(&target, path, error);
     if (status == EBPO_OK)
-        status = format == EBPO_PAIRS_PLY ? write_ply(&q, path, &target, error)
+        status = format == EBPO_PAIRS_PLY ? write_ply(&q, &target, error)
                                           : write_hdf5(&q, path, &target, error);
     if (status == EBPO_OK)
         status = ebpo_publish_commit(&target, error);

@@ -166,6 +166,33 @@ static ebpo_status call_build_threads(every_call_env *e)
     return build(e, EVERY_CALL_PLY, EBPO_SELECT_OFFSET, 2);
 }
 
+static bool count_crossings(void *user, const ebpo_crossing *crossings, uint64_t count)
+{
+    (void)crossings;
+    *(uint64_t *)user += count;
+    return true;
+}
+
+/* It takes the mesh, too. */
+static ebpo_status call_crossings(every_call_env *e)
+{
+    ebpo_mesh mesh;
+    ebpo_prepared prepared = EBPO_PREPARED_INIT;
+    ebpo_crossings_options options = EBPO_CROSSINGS_OPTIONS_INIT;
+    ebpo_crossings_summary sum = EBPO_CROSSINGS_SUMMARY_INIT;
+    uint64_t count = 0;
+    options.threads = 1;
+    options.ply = scratch("red.ply");
+    ebpo_status status = read_mesh(e, EVERY_CALL_CROSSING, &mesh);
+    if (status == EBPO_OK)
+        status = prepare(&mesh, &prepared, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_crossings(&mesh, &prepared.report, &options, count_crossings, &count,
+                                     &sum, e->error);
+    ebpo_mesh_free(&mesh);
+    return status;
+}
+
 const every_call every_call_meshes[] = {
     { "read", call_read },
     { "import", call_import },
@@ -177,6 +204,7 @@ const every_call every_call_meshes[] = {
     { "orient", call_orient },
     { "fill_holes", call_fill_holes },
     { "prepare", call_prepare },
+    { "crossings", call_crossings },
     { "build", call_build },
     { "build_crossing", call_build_crossing },
     { "build_kmedoids", call_build_kmedoids },

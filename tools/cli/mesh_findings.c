@@ -68,7 +68,7 @@ static void print_findings(FILE *out, const ebpo_mesh_report *report)
         print_places(out, f, findings[i].place);
     }
     if (!any)
-        fputs("  no problems found\n", out);
+        fputs("  no problems found in vertices, edges and single faces\n", out);
 }
 
 static void print_reading(FILE *out, const ebpo_mesh *mesh)
@@ -99,7 +99,7 @@ static const char *kind(const ebpo_mesh_report *report)
 }
 
 void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
-                    const ebpo_mesh_report *report)
+                    const ebpo_mesh_report *report, bool crossings_follow)
 {
     char bytes[32], parts[64];
     fprintf(out, "%s: %llu vertices, %llu faces", path, (unsigned long long)mesh->vertex_count,
@@ -124,6 +124,8 @@ void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
             report->max[2]);
     print_reading(out, mesh);
     print_findings(out, report);
+    if (!crossings_follow)
+        fputs("  not looked for: faces that cross one another (ebpo check --crossings)\n", out);
 }
 
 void findings_print_mending(FILE *out, const ebpo_mend_record *r)

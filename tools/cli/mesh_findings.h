@@ -7,9 +7,10 @@
 
 #include "cli/json.h"
 
-/* What the mesh is, then each finding with its first places. */
+/* What the mesh is, then each finding with its first places, and what was not looked at, unless
+ * faces that cross are looked for later. */
 void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
-                    const ebpo_mesh_report *report);
+                    const ebpo_mesh_report *report, bool crossings_follow);
 /* What mending did; nothing when nothing was asked for. */
 void findings_print_mending(FILE *out, const ebpo_mend_record *record);
 /* For a mesh that does not balance: which finding to mend with which option. `record`: what was

@@ -7,11 +7,13 @@
 #include "cli/mesh_findings.h"
 #include "cli/mesh_input.h"
 #include "cli/progress.h"
+#include "cmd/check_crossings.h"
 #include "cmd/commands.h"
 
 typedef struct values {
     mending mend;
-    bool require_solid, json, quiet;
+    bool require_solid, crossings, json, quiet;
+    const char *out;
     int64_t threads;
     memory_values memory;
 } values;
@@ -20,6 +22,11 @@ static const arg_option options[] = {
     MENDING_OPTIONS(values, mend),
     OPTION_FLAG("require-solid", 0, values, require_solid,
                 "exit with code 3 if the mesh is not a solid"),
+    OPTION_FLAG("crossings", 0, values, crossings,
+                "also look for faces that cross, touch or lie on each other otherwise than as "
+                "neighbours (after mending, if asked for)"),
+    OPTION_TEXT("output", 'o', values, out, "OUT.ply",
+                "with --crossings: write the mesh with these faces red"),
     OPTION_THREADS(values, threads),
     MEMORY_OPTIONS(values, memory),
     OPTION_FLAG("json", 0, values, json, "print the report as JSON"),
@@ -38,28 +45,68 @@ static const arg_spec spec = {
     .options = options,
 };
 
-static void print_json(const mesh_input *p, const char *path)
+/* The outermost object is left open. */
+static void print_json(json *j, const mesh_input *p, const char *path)
 {
-    json j;
-    json_begin(&j, stdout);
-    json_object(&j, NULL);
-    json_text(&j, "file", path);
-    findings_json_source(&j, "source", &p->as_read);
-    findings_json(&j, "report", &p->prepared.before);
+    json_begin(j, stdout);
+    json_object(j, NULL);
+    json_text(j, "file", path);
+    findings_json_source(j, "source", &p->as_read);
+    findings_json(j, "report", &p->prepared.before);
     if (p->prepared.mended) {
-        findings_json_mending(&j, "mend", &p->prepared.record);
-        findings_json(&j, "report_after_mending", &p->prepared.report);
+        findings_json_mending(j, "mend", &p->prepared.record);
+        findings_json(j, "report_after_mending", &p->prepared.report);
     }
-    json_finish(&j);
 }
 
-static void print_words(const mesh_input *p, const char *path)
+static void print_words(const values *v, const mesh_input *p, const char *path)
 {
-    findings_print(stdout, path, &p->as_read, &p->prepared.before);
+    findings_print(stdout, path, &p->as_read, &p->prepared.before, v->crossings);
     if (!p->prepared.mended)
         return;
     findings_print_mending(stdout, &p->prepared.record);
-    findings_print(stdout, "after mending", &p->mesh, &p->prepared.report);
+    findings_print(stdout, "after mending", &p->mesh, &p->prepared.report, v->crossings);
+}
+
+static ebpo_status report(const values *v, mesh_input *p, const char *path, ebpo_progress progress,
+                          progress_line *line, ebpo_error *error)
+{
+    ebpo_crossings_options how = EBPO_CROSSINGS_OPTIONS_INIT;
+    ebpo_status status = EBPO_OK;
+    json j;
+    how.threads = (unsigned)v->threads;
+    how.progress = progress;
+    how.ply = v->out;
+    if (v->json)
+        print_json(&j, p, path);
+    else if (!v->quiet)
+        print_words(v, p, path);
+    command_flush("check");
+    findings_warn(stderr, "check", path, &p->prepared.report, &p->prepared.record);
+    if (v->crossings)
+        status = check_crossings(&p->mesh, &p->prepared.report, &how, v->json ? &j : NULL, v->quiet,
+                                 line, error);
+    else if (v->json)
+        json_null(&j, "crossings"); /* not looked for */
+    if (v->json)
+        json_finish(&j);
+    command_flush("check");
+    return status;
+}
+
+static ebpo_status check(const values *v, const char *path, mesh_input *p,
+                         ebpo_workspace *workspace, ebpo_error *error)
+{
+    progress_line line;
+    ebpo_progress progress = progress_start(&line, "check", v->quiet);
+    ebpo_status status =
+        mesh_input_read(p, path, v->mend, workspace, (unsigned)v->threads, progress, error);
+    progress_wipe(&line);
+    if (status != EBPO_OK)
+        return status;
+    status = report(v, p, path, progress, &line, error);
+    ebpo_mesh_free(&p->mesh);
+    return status;
 }
 
 static const values usual = { 0 };
@@ -69,29 +116,21 @@ static int run(void *given, const char **operand)
     values *v = given;
     if (!memory_good("check", &v->memory))
         return EXIT_USAGE;
+    if (v->out && !v->crossings)
+        return command_usage("check", "--output shows what --crossings finds; give both");
+    if (v->out && command_overwrites("check", operand[0], v->out))
+        return EXIT_USAGE;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_workspace *workspace = NULL;
-    ebpo_status status = memory_make(&workspace, &v->memory, &error);
+    mesh_input p;
+    ebpo_status status = v->out ? ebpo_check_output(v->out, &error) : EBPO_OK;
+    if (status == EBPO_OK)
+        status = memory_make(&workspace, &v->memory, &error);
+    if (status == EBPO_OK)
+        status = check(v, operand[0], &p, workspace, &error);
+    ebpo_workspace_free(workspace);
     if (status != EBPO_OK)
         return command_failed("check", &error);
-    progress_line line;
-    ebpo_progress progress = progress_start(&line, "check", v->quiet);
-    mesh_input p;
-    status =
-        mesh_input_read(&p, operand[0], v->mend, workspace, (unsigned)v->threads, progress, &error);
-    progress_wipe(&line);
-    if (status != EBPO_OK) {
-        ebpo_workspace_free(workspace);
-        return command_failed("check", &error);
-    }
-    if (v->json)
-        print_json(&p, operand[0]);
-    else if (!v->quiet)
-        print_words(&p, operand[0]);
-    command_flush("check");
-    findings_warn(stderr, "check", operand[0], &p.prepared.report, &p.prepared.record);
-    ebpo_mesh_free(&p.mesh);
-    ebpo_workspace_free(workspace);
     return v->require_solid && !p.prepared.report.balanced ? EXIT_NOT_SOLID : EXIT_FINE;
 }
 

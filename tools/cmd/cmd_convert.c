@@ -158,10 +158,10 @@ static uint32_t parts_of(const values *v)
 static void print_reports(const values *v, const mesh_input *p, const char *in)
 {
     if (!v->json && !v->quiet) {
-        findings_print(stdout, in, &p->as_read, &p->prepared.before);
+        findings_print(stdout, in, &p->as_read, &p->prepared.before, false);
         findings_print_mending(stdout, &p->prepared.record);
         if (p->prepared.mended)
-            findings_print(stdout, "after mending", &p->mesh, &p->prepared.report);
+            findings_print(stdout, "after mending", &p->mesh, &p->prepared.report, false);
     }
     command_flush("convert");
     findings_warn(stderr, "convert", in, &p->prepared.report, &p->prepared.record);

@@ -10,6 +10,7 @@
  *   How far          ebpo_collide_distance
  *   How deep         ebpo_collide_depth
  *   By levels        ebpo_collide_levels
+ *   One mesh         ebpo_mesh_crossings
  *
  * Poses are those of pose.h: decisions are exact on posed coordinates. Swapping the models, threads
  * and processors change nothing; nor do budgets, but for the one pair of ebpo_collide_first. What
@@ -18,6 +19,7 @@
 #ifndef EBPO_COLLIDE_H
 #define EBPO_COLLIDE_H
 
+#include <ebpo/mesh.h>
 #include <ebpo/pose.h>
 
 #ifdef __cplusplus
@@ -228,7 +230,9 @@ typedef bool (*ebpo_segments_fn)(void *user, const ebpo_contact_segment *segment
  * swapped the segments are the same, with their ends exchanged. Each model takes 4 bytes a face
  * more in the collider.
  *
- * Errors and threads as for ebpo_collide_all.
+ * Errors as for ebpo_collide_all.
+ *
+ * Threads: one per collider; further ones live for the call.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_contacts(ebpo_collider *collider,
                                                          const ebpo_collide_options *options,
@@ -255,8 +259,10 @@ typedef bool (*ebpo_polylines_fn)(void *user, const ebpo_polyline *line);
  * segment in the order of ebpo_collide_contacts, closed ones begin with it. Of swapped models the
  * lines run the other way.
  *
- * EBPO_E_LIMIT: `memory` does not hold 256 bytes for each segment. Other errors, and threads, as
- * for ebpo_collide_all.
+ * EBPO_E_LIMIT: `memory` does not hold 256 bytes for each segment. Other errors are
+ * those of ebpo_collide_all.
+ *
+ * Threads: one per collider; further ones live for the call.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_polylines(ebpo_collider *collider,
                                                           const ebpo_collide_options *options,
@@ -286,7 +292,9 @@ typedef enum ebpo_pairs_format {
  * Writes a file, which appears whole or not at all.
  *
  * EBPO_E_IO: it cannot be written. EBPO_E_LIMIT: also too many vertices for a PLY file. Other
- * errors, and threads, as for ebpo_collide_all.
+ * errors are those of ebpo_collide_all.
+ *
+ * Threads: one per collider; further ones live for the call.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_write(ebpo_collider *collider,
                                                       const ebpo_collide_options *options,
@@ -424,6 +432,81 @@ typedef struct ebpo_level_result {
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_levels(ebpo_collider *collider,
                                                        const ebpo_collide_options *options,
                                                        ebpo_level_result *out, ebpo_error *error);
+
+/* ---- one mesh ---- */
+
+/* Two faces of one mesh that meet otherwise than as neighbours. */
+typedef struct ebpo_crossing {
+    /* Numbers in the source, the lesser one first. Faces that filling holes has added have numbers
+     * behind those of the source. */
+    uint64_t face[2];
+
+    /* A point that both have, as far as doubles tell; of crossing ones the middle of the segment.
+     */
+    double point[3];
+
+    /* An ebpo_pair_kind, not EBPO_PAIR_APART. */
+    int32_t kind;
+
+    int32_t reserved;
+} ebpo_crossing;
+
+/* Crossings, lent until it returns. False: enough. */
+typedef bool (*ebpo_crossings_fn)(void *user, const ebpo_crossing *crossings, uint64_t count);
+
+typedef struct ebpo_crossings_options {
+    size_t struct_size; /* EBPO_CROSSINGS_OPTIONS_INIT sets it */
+
+    /* 0: all cores. The result does not depend on it. */
+    unsigned threads;
+
+    ebpo_progress progress;
+
+    /* A PLY file to write, which appears whole or not at all: the mesh in the source's order, faces
+     * of crossings red (255, 0, 0), the others grey. NULL: none. */
+    const char *ply;
+} ebpo_crossings_options;
+
+#define EBPO_CROSSINGS_OPTIONS_INIT                             \
+    {                                                           \
+        sizeof(ebpo_crossings_options), 0, { NULL, NULL }, NULL \
+    }
+
+/* What was given to the callback, summed up. */
+typedef struct ebpo_crossings_summary {
+    size_t struct_size; /* EBPO_CROSSINGS_SUMMARY_INIT sets it */
+
+    /* Pairs, by their ebpo_pair_kind. */
+    uint64_t pairs[4];
+
+    /* That are in one pair or more. */
+    uint64_t faces;
+} ebpo_crossings_summary;
+
+#define EBPO_CROSSINGS_SUMMARY_INIT EBPO_SIZED(ebpo_crossings_summary)
+
+/*
+ * All pairs of faces of a mesh that cross, touch or lie on each other otherwise than as neighbours
+ * do, as of ebpo_collide_self, without a file of the caller's: each once, in an order that depends
+ * on the mesh only. Coordinates are compared exactly, so unwelded meshes give the same. Needs no
+ * more memory than the mesh's workspace allows (none: as much as ebpo_workspace_new takes), and
+ * room there for a temporary file of some 20 bytes a face. The mesh is empty afterwards, also on
+ * failure.
+ *
+ * report   what ebpo_mesh_check or ebpo_mesh_prepare has found
+ * take     NULL: only the summary is wanted; when it returns false nothing more is looked for, and
+ *          the call succeeds
+ * out      NULL: not wanted
+ *
+ * EBPO_E_LIMIT: coordinates too large for an exact grid, as for ebpo_build, or too little memory.
+ * EBPO_E_IO: the workspace is full, `ply` cannot be written. EBPO_E_FORMAT: as ebpo_build.
+ * EBPO_E_CANCELLED, EBPO_E_MEMORY.
+ *
+ * Threads: one per mesh; further ones live for the call.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_crossings(
+    ebpo_mesh *mesh, const ebpo_mesh_report *report, const ebpo_crossings_options *options,
+    ebpo_crossings_fn take, void *user, ebpo_crossings_summary *out, ebpo_error *error);
 
 /* Sums since the collider was made. */
 typedef struct ebpo_collider_stats {
