@@ -81,6 +81,8 @@ static ebpo_status near_box(const nearing *n, double from, double to, double mot
     if (status == EBPO_OK)
         status =
             scene_seen_from(n->scene, n->of, n->other, to, &later, &unit_later, n->needs->error);
+    if (status != EBPO_OK)
+        return status;
     double grow = (n->clearance + n->margin + motion) / fmin(unit, unit_later) * (1 + 0x1p-40);
     *any = true;
     for (int k = 0; k < 3; k++) {
@@ -90,7 +92,7 @@ static ebpo_status near_box(const nearing *n, double from, double to, double mot
         out->max[k] = high < n->need->whole.max[k] ? high : n->need->whole.max[k];
         *any = *any && out->min[k] <= out->max[k];
     }
-    return status;
+    return EBPO_OK;
 }
 
 static bool is_within(const scene_space *a, const scene_file_need *need)
